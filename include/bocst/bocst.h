@@ -1,0 +1,10 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#pragma once
+
+#include <bocst/fcl.h>
+#include <bocst/mesh.h>
+#include <bocst/model.h>
+#include <bocst/node_view.h>
+#include <bocst/options.h>
+#include <bocst/oracle.h>
+#include <bocst/statistics.h>

@@ -1,0 +1,108 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#pragma once
+
+// FCL's queries for pairs that involve a bocst::Model, under FCL's own names.
+//
+// The functions in namespace fcl are not templates, so overload resolution prefers them to FCL's templates, also
+// inside fcl::DefaultCollisionFunction and the like when this header was included first. Pairs without a bocst::Model
+// go on to FCL. Code that was compiled without this header reaches bocst through the symbols that libbocst exports;
+// that needs libbocst before libfcl in the link order, which the first Model checks (see model.h).
+
+#include <fcl/narrowphase/collision.h>
+#include <fcl/narrowphase/collision_object.h>
+#include <fcl/narrowphase/collision_request.h>
+#include <fcl/narrowphase/collision_result.h>
+#include <fcl/narrowphase/continuous_collision.h>
+#include <fcl/narrowphase/continuous_collision_object.h>
+#include <fcl/narrowphase/continuous_collision_request.h>
+#include <fcl/narrowphase/continuous_collision_result.h>
+#include <fcl/narrowphase/distance.h>
+#include <fcl/narrowphase/distance_request.h>
+#include <fcl/narrowphase/distance_result.h>
+
+#include <bocst/export.h>
+#include <bocst/model.h>
+
+namespace bocst {
+
+/// Do the two geometries at these poses (world from geometry) touch? As fcl::collide: returns result.numContacts(),
+/// which accumulates; stops at request.num_max_contacts; adds nothing when request.isSatisfied(result) already.
+///
+/// A pair with a Model: partners are another Model and fcl::BVHModel<BV> of any BV. With exact answers there is one
+/// contact for each pair of triangles that touch, and the set of pairs is the one that FCL reports for
+/// BVHModel<OBBRSS>; FCL may list a pair more than once, we do not.
+/// - o1, o2: the caller's order, whatever the geometries are.
+/// - b1, b2: triangle ids; on the side of a Model with conservative answers, the Morton code of the cell at its
+///   collision depth (x in the lowest bit of each triple).
+/// - with enable_contact: normal is a unit vector from o1 to o2 in world frame, penetration_depth >= 0 the length of
+///   the shortest translation of o2's triangle (or sphere) along normal that ends the contact of these two
+///   primitives, pos a point midway in their overlap. It is about two primitives, not about two solids.
+/// - without: normal, pos and penetration_depth are NaN.
+/// - enable_cost adds the overlap of the triangles' world boxes, as FCL's mesh-mesh query does.
+/// Collisions are reported between occupied geometries only (cost_density >= threshold_occupied), as in FCL.
+///
+/// The verdict does not depend on the GJK solver, on the argument order, nor on what is resident.
+/// @throws std::invalid_argument for a partner that is not supported (FCL would answer 0, "free").
+/// Thread rule: any number of threads on the same models, each with its own request and result.
+template <typename S>
+BOCST_EXPORT std::size_t collide(const fcl::CollisionGeometry<S>* o1, const fcl::Transform3<S>& X_W1,
+                                 const fcl::CollisionGeometry<S>* o2, const fcl::Transform3<S>& X_W2,
+                                 const fcl::CollisionRequest<S>& request, fcl::CollisionResult<S>& result);
+
+/// As fcl::distance. In this version a pair with a Model throws std::invalid_argument.
+template <typename S>
+BOCST_EXPORT S distance(const fcl::CollisionGeometry<S>* o1, const fcl::Transform3<S>& X_W1,
+                        const fcl::CollisionGeometry<S>* o2, const fcl::Transform3<S>& X_W2,
+                        const fcl::DistanceRequest<S>& request, fcl::DistanceResult<S>& result);
+
+/// As fcl::continuousCollide over two motions. In this version a pair with a Model throws std::invalid_argument.
+template <typename S>
+BOCST_EXPORT S continuousCollide(const fcl::CollisionGeometry<S>* o1, const fcl::MotionBase<S>* motion1,
+                                 const fcl::CollisionGeometry<S>* o2, const fcl::MotionBase<S>* motion2,
+                                 const fcl::ContinuousCollisionRequest<S>& request,
+                                 fcl::ContinuousCollisionResult<S>& result);
+
+/// True when the geometry is a Model<S>.
+template <typename S>
+BOCST_EXPORT bool isModel(const fcl::CollisionGeometry<S>* geometry);
+
+}  // namespace bocst
+
+namespace fcl {
+
+#define BOCST_FCL_OVERLOADS(S)                                                                                      \
+  inline std::size_t collide(const CollisionGeometry<S>* o1, const Transform3<S>& tf1,                              \
+                             const CollisionGeometry<S>* o2, const Transform3<S>& tf2,                              \
+                             const CollisionRequest<S>& request, CollisionResult<S>& result) {                      \
+    return bocst::collide<S>(o1, tf1, o2, tf2, request, result);                                                    \
+  }                                                                                                                 \
+  inline std::size_t collide(const CollisionObject<S>* o1, const CollisionObject<S>* o2,                            \
+                             const CollisionRequest<S>& request, CollisionResult<S>& result) {                      \
+    return bocst::collide<S>(o1->collisionGeometry().get(), o1->getTransform(), o2->collisionGeometry().get(),      \
+                             o2->getTransform(), request, result);                                                  \
+  }                                                                                                                 \
+  inline S distance(const CollisionGeometry<S>* o1, const Transform3<S>& tf1, const CollisionGeometry<S>* o2,       \
+                    const Transform3<S>& tf2, const DistanceRequest<S>& request, DistanceResult<S>& result) {       \
+    return bocst::distance<S>(o1, tf1, o2, tf2, request, result);                                                   \
+  }                                                                                                                 \
+  inline S distance(const CollisionObject<S>* o1, const CollisionObject<S>* o2, const DistanceRequest<S>& request,  \
+                    DistanceResult<S>& result) {                                                                    \
+    return bocst::distance<S>(o1->collisionGeometry().get(), o1->getTransform(), o2->collisionGeometry().get(),     \
+                              o2->getTransform(), request, result);                                                 \
+  }                                                                                                                 \
+  inline S continuousCollide(const CollisionGeometry<S>* o1, const MotionBase<S>* motion1,                          \
+                             const CollisionGeometry<S>* o2, const MotionBase<S>* motion2,                          \
+                             const ContinuousCollisionRequest<S>& request, ContinuousCollisionResult<S>& result) {  \
+    return bocst::continuousCollide<S>(o1, motion1, o2, motion2, request, result);                                  \
+  }                                                                                                                 \
+  inline S continuousCollide(const ContinuousCollisionObject<S>* o1, const ContinuousCollisionObject<S>* o2,        \
+                             const ContinuousCollisionRequest<S>& request, ContinuousCollisionResult<S>& result) {  \
+    return bocst::continuousCollide<S>(o1->collisionGeometry().get(), o1->getMotion(),                              \
+                                       o2->collisionGeometry().get(), o2->getMotion(), request, result);            \
+  }
+
+BOCST_FCL_OVERLOADS(float)
+BOCST_FCL_OVERLOADS(double)
+#undef BOCST_FCL_OVERLOADS
+
+}  // namespace fcl

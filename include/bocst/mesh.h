@@ -1,0 +1,66 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#pragma once
+
+#include <array>
+#include <cstddef>
+#include <cstdint>
+#include <memory>
+#include <vector>
+
+#include <Eigen/Geometry>
+#include <fcl/math/triangle.h>
+
+#include <bocst/export.h>
+
+namespace bocst {
+
+/// A triangle mesh: validated once, immutable, meant to be shared (`std::shared_ptr<const Mesh>`) by any number of
+/// models and threads. Coordinates are doubles in the mesh's own frame, in any length unit.
+///
+/// A degenerate triangle is legal: it is the segment or the point that it is. Vertices that no triangle uses are kept
+/// and do not count for bounds().
+class BOCST_EXPORT Mesh {
+ public:
+  /// The three vertex indices of a triangle, as stored: 12 bytes.
+  using Indices = std::array<std::uint32_t, 3>;
+
+  /// @throws std::invalid_argument naming the first bad vertex or triangle: no triangles, more than 2^28 triangles or
+  /// 2^32 - 1 vertices, an index out of range, a coordinate that is NaN, infinite or larger than 1e150 in size.
+  Mesh(std::vector<Eigen::Vector3d> vertices, const std::vector<fcl::Triangle>& triangles);
+
+  /// The same from 32-bit indices, which are moved in rather than copied.
+  static std::shared_ptr<const Mesh> fromIndices(std::vector<Eigen::Vector3d> vertices,
+                                                 std::vector<Indices> triangles);
+
+  std::size_t vertexCount() const { return vertices_.size(); }
+  std::size_t triangleCount() const { return triangles_.size(); }
+
+  /// Vertex i, 0 <= i < vertexCount(), in the mesh's frame.
+  const Eigen::Vector3d& vertex(std::size_t i) const { return vertices_[i]; }
+
+  /// Triangle t, 0 <= t < triangleCount(), in FCL's type.
+  fcl::Triangle triangle(std::size_t t) const {
+    const Indices& i = triangles_[t];
+    return fcl::Triangle(i[0], i[1], i[2]);
+  }
+  const Indices& indices(std::size_t t) const { return triangles_[t]; }
+
+  const std::vector<Eigen::Vector3d>& vertices() const { return vertices_; }
+  const std::vector<Indices>& triangles() const { return triangles_; }
+
+  /// The axis-aligned box of all triangles, in the mesh's frame.
+  const Eigen::AlignedBox3d& bounds() const { return bounds_; }
+
+  /// Heap bytes that this mesh holds.
+  std::size_t bytes() const;
+
+ private:
+  Mesh() = default;
+  void validate();
+
+  std::vector<Eigen::Vector3d> vertices_;
+  std::vector<Indices> triangles_;
+  Eigen::AlignedBox3d bounds_;
+};
+
+}  // namespace bocst

@@ -1,0 +1,107 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#pragma once
+
+#include <functional>
+#include <memory>
+#include <string>
+#include <vector>
+
+#include <fcl/geometry/collision_geometry.h>
+
+#include <bocst/export.h>
+#include <bocst/mesh.h>
+#include <bocst/node_view.h>
+#include <bocst/options.h>
+#include <bocst/oracle.h>
+#include <bocst/statistics.h>
+
+namespace fcl {
+template <typename BV>
+class BVHModel;
+}
+
+namespace bocst {
+
+namespace tree {
+class Tree;
+}
+
+/// A Branch On-collide Sphere-tree as an FCL geometry: one sphere at first, grown by the queries that touch it
+/// (Rodríguez and Franquesa, section 3).
+///
+/// Threads: any number of threads may query one model, read its statistics, visit() and prune() it at the same time.
+/// updateVertices() may run beside queries too; a query sees the mesh from before or after, never a mixture. What
+/// CollisionGeometry itself leaves unguarded (cost_density, aabb_local, ...) stays unguarded.
+///
+/// The mesh is a surface, as FCL's BVHModel is: what is wholly inside it does not touch it.
+template <typename S>
+class BOCST_EXPORT Model : public fcl::CollisionGeometry<S> {
+ public:
+  /// @throws std::invalid_argument for a null mesh or an option out of range or not supported in this version,
+  /// OracleError for an oracle that cannot be had, std::runtime_error when code compiled without <bocst/fcl.h> would
+  /// not reach this library (the message has the remedy; BOCST_DISPATCH_CHECK=off turns the check off).
+  explicit Model(std::shared_ptr<const Mesh> mesh, const Options& options = {});
+
+  /// Takes the vertices and triangles of an FCL mesh, not its tree. BV::S must be S.
+  template <typename BV>
+  explicit Model(const fcl::BVHModel<BV>& bvh, const Options& options = {})
+      : Model(meshOf(bvh), options) {}
+
+  ~Model() override;
+  Model(const Model&) = delete;
+  Model& operator=(const Model&) = delete;
+
+  const Options& options() const;
+
+  /// The mesh as it is now. Keeps it alive across updateVertices().
+  std::shared_ptr<const Mesh> mesh() const;
+
+  /// "cpu", "occlusion" or "compute".
+  std::string oracleName() const;
+
+  Statistics statistics() const;
+
+  /// Makes the complete tree down to level `depth` resident (1 to 17), as the paper's tables count it; branches that
+  /// queries have grown deeper are dropped first. For inspection: queries never need it.
+  void expandAll(int depth);
+
+  /// Calls f for every resident node, parents before children. f must not call back into this model.
+  void visit(const std::function<void(const NodeView&)>& f) const;
+
+  /// Applies ttl and memory budget as of `now` (3.1): drops each deepest branch level whose last use is longer ago
+  /// than ttl; its parent's own time starts then. Queries do the same by themselves, now and then.
+  void prune(Clock::time_point now);
+  void prune();
+
+  /// New positions for all vertices, same triangles: the tree falls back to its root, nothing is rebuilt.
+  /// @throws std::invalid_argument for a wrong count or a bad vertex; the model is then as before.
+  void updateVertices(std::vector<Eigen::Vector3d> vertices);
+
+  // What FCL asks of a geometry.
+  void computeLocalAABB() override;                 ///< Constant time: the mesh's bounds and the root sphere.
+  fcl::OBJECT_TYPE getObjectType() const override;  ///< OT_UNKNOWN: FCL never swaps the arguments.
+  fcl::NODE_TYPE getNodeType() const override;      ///< GEOM_TRIANGLE: a slot FCL leaves empty.
+
+  /// For the library itself.
+  tree::Tree& tree() const { return *tree_; }
+
+ private:
+  template <typename BV>
+  static std::shared_ptr<const Mesh> meshOf(const fcl::BVHModel<BV>& bvh) {
+    static_assert(std::is_same<typename BV::S, S>::value, "the scalar of the BVHModel must be the model's");
+    std::vector<Eigen::Vector3d> vertices(bvh.num_vertices > 0 ? bvh.num_vertices : 0);
+    for (std::size_t i = 0; i < vertices.size(); ++i) vertices[i] = bvh.vertices[i].template cast<double>();
+    std::vector<fcl::Triangle> triangles(bvh.tri_indices, bvh.tri_indices + (bvh.num_tris > 0 ? bvh.num_tris : 0));
+    return std::make_shared<const Mesh>(std::move(vertices), triangles);
+  }
+
+  std::unique_ptr<tree::Tree> tree_;
+};
+
+using Modelf = Model<float>;
+using Modeld = Model<double>;
+
+extern template class Model<float>;
+extern template class Model<double>;
+
+}  // namespace bocst

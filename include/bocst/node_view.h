@@ -1,0 +1,44 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#pragma once
+
+#include <array>
+#include <cstddef>
+#include <cstdint>
+
+#include <Eigen/Core>
+
+namespace bocst {
+
+class Mesh;
+
+/// One resident node as the paper draws it (3.1): parent, children, object, n, radius, center; plus its cell. A copy:
+/// it stays valid, though the node may be gone by the time it is read.
+struct NodeView {
+  /// No such node: the root's parent.
+  static constexpr std::uint32_t kNone = 0xffffffffu;
+
+  /// Up to eight node ids, in octant order.
+  struct Children {
+    std::array<std::uint32_t, 8> ids{};
+    std::uint32_t count = 0;
+
+    const std::uint32_t* begin() const { return ids.data(); }
+    const std::uint32_t* end() const { return ids.data() + count; }
+    std::size_t size() const { return count; }
+    bool empty() const { return count == 0; }
+    std::uint32_t operator[](std::size_t i) const { return ids[i]; }
+  };
+
+  std::uint32_t id = 0;          ///< Unique among the nodes of one visit(); the root is 0.
+  std::uint32_t parent = kNone;  ///< The parent's id.
+  Children children;             ///< Ids of the resident children; empty on the frontier.
+  const Mesh* object = nullptr;  ///< The mesh this node is about.
+  int n = 0;                     ///< 2^n is the side of the node's cube, in lattice units (negative below one unit).
+  double radius = 0;             ///< Of the sphere about the node's actual region, in the mesh's length unit.
+  Eigen::Vector3d center;        ///< Of that sphere, in the mesh's frame.
+
+  int level = 1;                         ///< 1 is the root.
+  std::array<std::uint32_t, 3> cell{};   ///< Integer coordinates among the 2^(level-1) cells of an axis.
+};
+
+}  // namespace bocst

@@ -1,0 +1,63 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#pragma once
+
+#include <chrono>
+#include <cstddef>
+#include <functional>
+
+namespace bocst {
+
+/// How a cell is divided (paper, sections 4.2 and 4.3).
+enum class Subdivision {
+  kOctree,  ///< O-BOCST: the root is the centred bounding cube, every cell is halved.
+  kBono,    ///< B-BOCST: branch-on-need; the lower side of every split is the largest exact power of two.
+};
+
+/// What a query answers.
+enum class Answer {
+  kExact,         ///< Triangle tests at the bottom: FCL's mesh-mesh answer.
+  kConservative,  ///< The spheres of Options::depth, as in the paper: never misses, overestimates by the sphere size.
+};
+
+/// Who answers "which octants does the surface meet?".
+enum class OracleKind { kAuto, kCpu, kOcclusion, kCompute };
+
+/// The clock that ttl is measured with.
+using Clock = std::chrono::steady_clock;
+
+/// How a model grows, answers and forgets. Fixed when the model is made.
+struct Options {
+  Subdivision subdivision = Subdivision::kBono;
+  Answer answer = Answer::kExact;
+
+  /// Collision depth: the level at which kConservative answers; the root is level 1. From 1 to 17.
+  int depth = 6;
+
+  /// The paper's d_t: the largest extent of the mesh in lattice units, from 1 to 65536; 0: 65536, the finest lattice.
+  /// Only kBono's cells depend on it (4.4): its root cube has the smallest power of two that is >= d_t as its side.
+  double dimension = 0;
+
+  OracleKind oracle = OracleKind::kAuto;
+
+  /// The paper's Max. time (3.1): a deepest level unused for longer is dropped; 0: never.
+  std::chrono::milliseconds ttl{2000};
+
+  /// Bytes of resident tree to stay under, least recently used branches go first; 0: no limit. A running query may
+  /// exceed it; what it grew is dropped when it ends.
+  std::size_t memory_budget = 0;
+
+  /// Surfaces closer than this collide; in the mesh's length unit. Only 0 is supported in this version.
+  double margin = 0;
+
+  /// A watertight mesh also collides with what is wholly inside it. Only false is supported in this version.
+  bool solid = false;
+
+  /// The paper's level rule (5.3): with kBono and 2^n + 2 <= d_t < 2^n + 2^(n-1), n = nbits(d_t) - 1, the collision
+  /// depth is one more than `depth`.
+  bool level_rule = false;
+
+  /// What queries read the time from; empty: Clock::now. Tests inject their own.
+  std::function<Clock::time_point()> clock;
+};
+
+}  // namespace bocst

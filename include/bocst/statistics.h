@@ -1,0 +1,23 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#pragma once
+
+#include <cstddef>
+#include <cstdint>
+#include <vector>
+
+namespace bocst {
+
+/// A snapshot of what a model holds and has done. The counters only grow; they are exact when no query is running.
+struct Statistics {
+  std::size_t resident_nodes = 0;  ///< Grey cells in memory; 1 when the model is at rest.
+  std::size_t resident_bytes = 0;  ///< Heap bytes of the tree: nodes, triangle lists, bookkeeping; not the mesh.
+  std::vector<std::size_t> nodes_per_level;  ///< [0] is level 1 (the root), as the paper's tables count.
+  std::uint64_t expansions = 0;              ///< Nodes expanded so far.
+  std::uint64_t oracle_batches = 0;          ///< Expansion batches this model took part in.
+  std::uint64_t oracle_cells = 0;            ///< Cells the oracle was asked about (eight octants a plain expansion).
+  std::uint64_t pruned_nodes = 0;            ///< Nodes dropped by ttl, budget, prune() or updateVertices().
+  std::size_t mesh_bytes = 0;                ///< Heap bytes of the mesh, which other models may share.
+  std::size_t device_bytes = 0;              ///< Bytes on a GPU: 0 with the CPU oracle.
+};
+
+}  // namespace bocst
