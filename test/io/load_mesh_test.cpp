@@ -1,0 +1,293 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#include <bocst/io.h>
+#include <gtest/gtest.h>
+#include <unistd.h>
+
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <cstdint>
+#include <cstring>
+#include <filesystem>
+#include <fstream>
+#include <limits>
+#include <stdexcept>
+#include <string>
+
+namespace bocst {
+namespace {
+
+namespace fs = std::filesystem;
+
+/// A folder of its own for each test, gone afterwards.
+class LoadMesh : public ::testing::Test {
+ protected:
+  LoadMesh() {
+    std::string pattern = (fs::temp_directory_path() / "bocst_io_XXXXXX").string();
+    if (mkdtemp(pattern.data()) == nullptr) throw std::runtime_error("no temporary folder");
+    folder_ = pattern;
+  }
+  ~LoadMesh() override { fs::remove_all(folder_); }
+
+  std::string write(const std::string& name, const std::string& content) const {
+    const std::string file = (folder_ / name).string();
+    std::ofstream(file, std::ios::binary) << content;
+    return file;
+  }
+
+  std::shared_ptr<const Mesh> load(const std::string& name, const std::string& content) const {
+    return loadMesh(write(name, content));
+  }
+
+  /// What loading says; it must name the file.
+  std::string complaint(const std::string& file) const {
+    try {
+      const auto mesh = loadMesh(file);
+      ADD_FAILURE() << file << " was read: " << mesh->triangleCount() << " triangles";
+    } catch (const std::runtime_error& e) {
+      EXPECT_EQ(std::string(e.what()).rfind(file + ": ", 0), 0u) << e.what();
+      EXPECT_EQ(std::string(e.what()).find('\n'), std::string::npos) << e.what();
+      return e.what();
+    }
+    return {};
+  }
+
+  void expectComplaint(const std::string& name, const std::string& content, const std::string& about) const {
+    const std::string what = complaint(write(name, content));
+    EXPECT_NE(what.find(about), std::string::npos) << what;
+  }
+
+  fs::path folder_;
+};
+
+void expectSquare(const Mesh& mesh) {
+  ASSERT_EQ(mesh.vertexCount(), 4u);
+  ASSERT_EQ(mesh.triangleCount(), 2u);
+  EXPECT_EQ(mesh.bounds().min(), Eigen::Vector3d(0, 0, 0));
+  EXPECT_EQ(mesh.bounds().max(), Eigen::Vector3d(1, 1, 0));
+}
+
+double areaOf(const Mesh& mesh) {
+  double area = 0;
+  for (const Mesh::Indices& t : mesh.triangles()) {
+    area += (mesh.vertex(t[1]) - mesh.vertex(t[0])).cross(mesh.vertex(t[2]) - mesh.vertex(t[0])).norm() / 2;
+  }
+  return area;
+}
+
+template <typename T>
+void append(std::string& bytes, T value, bool big_endian = false) {
+  char raw[sizeof(T)];
+  std::memcpy(raw, &value, sizeof(T));
+  if (big_endian) std::reverse(raw, raw + sizeof(T));
+  bytes.append(raw, sizeof(T));
+}
+
+const std::string kOff = "OFF\n4 2 0\n0 0 0\n1 0 0\n1 1 0\n0 1 0\n3 0 1 2\n3 0 2 3\n";
+const std::string kObj = "v 0 0 0\nv 1 0 0\nv 1 1 0\nv 0 1 0\nf 1 2 3\nf 1 3 4\n";
+const std::string kPlyHead =
+    "element vertex 4\nproperty float x\nproperty float y\nproperty float z\n"
+    "element face 2\nproperty list uchar int vertex_indices\nend_header\n";
+const std::string kPly = "ply\nformat ascii 1.0\n" + kPlyHead + "0 0 0\n1 0 0\n1 1 0\n0 1 0\n3 0 1 2\n3 0 2 3\n";
+const std::string kStl =
+    "solid s\n"
+    "facet normal 0 0 1\nouter loop\nvertex 0 0 0\nvertex 1 0 0\nvertex 1 1 0\nendloop\nendfacet\n"
+    "facet normal 0 0 1\nouter loop\nvertex 0 0 0\nvertex 1 1 0\nvertex 0 1 0\nendloop\nendfacet\n"
+    "endsolid s\n";
+const std::string kDae = R"(<?xml version="1.0"?>
+<COLLADA xmlns="http://www.collada.org/2005/11/COLLADASchema" version="1.4.1">
+<asset><unit meter="1" name="meter"/><up_axis>Y_UP</up_axis></asset>
+<library_geometries><geometry id="g" name="g"><mesh>
+<source id="p"><float_array id="pa" count="12">0 0 0 1 0 0 1 1 0 0 1 0</float_array><technique_common>
+<accessor source="#pa" count="4" stride="3"><param name="X" type="float"/><param name="Y" type="float"/>
+<param name="Z" type="float"/></accessor></technique_common></source>
+<vertices id="v"><input semantic="POSITION" source="#p"/></vertices>
+<triangles count="2"><input semantic="VERTEX" source="#v" offset="0"/><p>0 1 2 0 2 3</p></triangles>
+</mesh></geometry></library_geometries>
+<library_visual_scenes><visual_scene id="s"><node id="n"><translate>10 0 0</translate><instance_geometry url="#g"/></node>
+<node id="m"><translate>0 0 20</translate><instance_geometry url="#g"/></node></visual_scene></library_visual_scenes>
+<scene><instance_visual_scene url="#s"/></scene></COLLADA>
+)";
+
+std::string binaryPly(bool big_endian) {
+  std::string ply = std::string("ply\nformat binary_") + (big_endian ? "big" : "little") + "_endian 1.0\n" + kPlyHead;
+  for (const float x : {0, 0, 0, 1, 0, 0, 1, 1, 0, 0, 1, 0}) append(ply, x, big_endian);
+  for (const auto& t : {std::array<int, 3>{0, 1, 2}, std::array<int, 3>{0, 2, 3}}) {
+    append(ply, std::uint8_t{3});
+    for (const std::int32_t i : t) append(ply, i, big_endian);
+  }
+  return ply;
+}
+
+std::string binaryStl() {
+  std::string stl(80, 's');
+  append(stl, std::uint32_t{2});
+  for (const auto& t :
+       {std::array<float, 9>{0, 0, 0, 1, 0, 0, 1, 1, 0}, std::array<float, 9>{0, 0, 0, 1, 1, 0, 0, 1, 0}}) {
+    for (const float n : {0.f, 0.f, 1.f}) append(stl, n);
+    for (const float x : t) append(stl, x);
+    append(stl, std::uint16_t{0});
+  }
+  return stl;
+}
+
+TEST_F(LoadMesh, ReadsEachFormat) {
+  expectSquare(*load("square.off", kOff));
+  expectSquare(
+      *load("square.OFF", "# a comment\nOFF 4 2 0\n\n0 0 0\n1 0 0 # and more\n1 1 0\n0 1 0\n3 0 1 2 255 0 0\n3 0 2 3"));
+  expectSquare(*load("square.obj", kObj));
+  expectSquare(*load("relative.obj", "v 0 0 0\nv 1 0 0\nv 1 1 0\nv 0 1 0\nf -4 -3 -2\nf 1 3 4\n"));
+  expectSquare(*load("square.ply", kPly));
+  expectSquare(*load("little.ply", binaryPly(false)));
+  expectSquare(*load("big.ply", binaryPly(true)));
+  expectSquare(*load("text.stl", kStl));
+  expectSquare(*load("binary.stl", binaryStl()));
+}
+
+TEST_F(LoadMesh, PutsMeshesWhereTheirNodesAre) {
+  const auto mesh = load("two.dae", kDae);
+  EXPECT_EQ(mesh->vertexCount(), 8u);
+  EXPECT_EQ(mesh->triangleCount(), 4u);
+  EXPECT_EQ(mesh->bounds().min(), Eigen::Vector3d(0, 0, 0));
+  EXPECT_EQ(mesh->bounds().max(), Eigen::Vector3d(11, 1, 20));
+}
+
+TEST_F(LoadMesh, KeepsVerticesAndTheirOrder) {
+  // Vertices that coincide, or that no face uses, stay: ids in contacts are those of the file.
+  const auto off = load("m.off", "OFF\n6 2 0\n9 9 9\n0 0 0\n1 0 0\n1 1 0\n0 0 0\n0 1 0\n3 1 2 3\n3 4 3 5\n");
+  ASSERT_EQ(off->vertexCount(), 6u);
+  EXPECT_EQ(off->indices(1), (Mesh::Indices{4, 3, 5}));
+  EXPECT_EQ(off->bounds().max(), Eigen::Vector3d(1, 1, 0));
+}
+
+TEST_F(LoadMesh, KeepsNeighboursApart) {
+  const auto mesh = load("tiny.obj", "v 0 0 0\nv 1e-7 0 0\nv 0 1e-7 0\nv 1e-7 1e-7 0\nf 1 2 3\nf 2 4 3\n");
+  EXPECT_EQ(mesh->vertexCount(), 4u);
+}
+
+TEST_F(LoadMesh, ReadsOffAndPlyInDoublePrecision) {
+  const std::string numbers = "0.1234567890123456 1e-300 123456789.123\n1 0 0\n+1 1 0\n";
+  for (const auto& mesh :
+       {load("p.off", "OFF\n3 1 0\n" + numbers + "3 0 1 2\n"),
+        load("p.ply",
+             "ply\nformat ascii 1.0\nelement vertex 3\nproperty double x\nproperty double y\nproperty double z\n"
+             "element face 1\nproperty list uchar int vertex_index\nend_header\n" +
+                 numbers + "3 0 1 2\n")}) {
+    EXPECT_EQ(mesh->vertex(0), Eigen::Vector3d(0.1234567890123456, 1e-300, 123456789.123));
+  }
+}
+
+TEST_F(LoadMesh, CutsPolygonsAlongTheirOutline) {
+  // An arrow head (concave), an L of six corners, and a polygon of twelve.
+  EXPECT_DOUBLE_EQ(areaOf(*load("arrow.off", "OFF\n4 1 0\n0 0 1\n2 -2 1\n0 2 1\n-2 -2 1\n4 0 1 2 3\n")), 4);
+  EXPECT_DOUBLE_EQ(areaOf(*load("l.off", "OFF\n6 1 0\n0 0 0\n0 0 2\n0 1 2\n0 1 1\n0 2 1\n0 2 0\n6 0 1 2 3 4 5\n")), 3);
+  EXPECT_DOUBLE_EQ(areaOf(*load("quad.obj", "v 0 0 1\nv 2 -2 1\nv 0 2 1\nv -2 -2 1\nf 1 2 3 4\n")), 4);
+  std::string corners;
+  std::string face = "12";
+  for (int i = 0; i < 12; ++i) {
+    corners += std::to_string(std::cos(i * M_PI / 6)) + " " + std::to_string(std::sin(i * M_PI / 6)) + " 0\n";
+    face += " " + std::to_string(i);
+  }
+  const auto mesh = load("twelve.off", "OFF\n12 1 0\n" + corners + face + "\n");
+  EXPECT_EQ(mesh->triangleCount(), 10u);
+  EXPECT_NEAR(areaOf(*mesh), 3, 1e-5);
+}
+
+TEST_F(LoadMesh, KeepsDegenerateTrianglesAndSkipsPointsAndLines) {
+  EXPECT_EQ(load("d.obj", "v 0 0 0\nv 1 0 0\nv 1 1 0\nf 1 1 1\nf 1 2 2\nf 1 2 3\np 1\nl 1 2\n")->triangleCount(), 3u);
+  EXPECT_EQ(load("d.off", "OFF\n3 4 0\n0 0 0\n1 0 0\n1 1 0\n1 0\n2 0 1\n3 0 0 1\n3 0 1 2\n")->triangleCount(), 2u);
+  EXPECT_EQ(load("flat.off", "OFF\n4 1 0\n0 0 0\n1 0 0\n2 0 0\n3 0 0\n4 0 1 2 3\n")->triangleCount(), 2u);
+}
+
+TEST_F(LoadMesh, RefusesWhatIsNoFile) {
+  EXPECT_NE(complaint((folder_ / "missing.obj").string()).find("no such file"), std::string::npos);
+  for (const char* name : {"folder.off", "folder.obj"}) {
+    fs::create_directory(folder_ / name);
+    EXPECT_NE(complaint((folder_ / name).string()).find("directory"), std::string::npos);
+  }
+}
+
+TEST_F(LoadMesh, RefusesWhatIsNoMesh) {
+  for (const char* extension : {"off", "obj", "ply", "stl", "dae"}) {
+    expectComplaint(std::string("empty.") + extension, "", "empty");
+    expectComplaint(std::string("blank.") + extension, "\n\n \n", "");
+    expectComplaint(std::string("text.") + extension, "this is a letter, not a mesh\n", "");
+    expectComplaint(std::string("zeros.") + extension, std::string(1000, '\0'), "");
+  }
+  expectComplaint("mesh.xyz", "hello", "");
+  expectComplaint("mesh", "hello", "");
+  expectComplaint("points.obj", "v 0 0 0\nv 1 0 0\np 1\nl 1 2\n", "no triangles");
+  expectComplaint("points.off", "OFF\n2 0 0\n0 0 0\n1 0 0\n", "no triangles");
+  expectComplaint("nothing.off", "OFF\n0 0 0\n", "no triangles");
+  expectComplaint("points.ply",
+                  "ply\nformat ascii 1.0\nelement vertex 1\nproperty float x\nproperty float y\n"
+                  "property float z\nend_header\n0 0 0\n",
+                  "no faces");
+  expectComplaint("flat.off", "4OFF\n1 1 0\n0 0 0 0\n3 0 0 0\n", "three-dimensional");
+  expectComplaint("binary.off", "OFF BINARY\n....", "binary OFF");
+}
+
+TEST_F(LoadMesh, RefusesBadNumbers) {
+  for (const std::string bad : {"nan", "inf", "-inf", "1e999"}) {
+    expectComplaint("n.off", "OFF\n3 1 0\n0 0 0\n1 " + bad + " 0\n1 1 0\n3 0 1 2\n", "vertex 1");
+    expectComplaint("n.ply",
+                    "ply\nformat ascii 1.0\n" + kPlyHead + "0 0 0\n1 " + bad + " 0\n1 1 0\n0 1 0\n3 0 1 2\n3 0 2 3\n",
+                    "vertex 1");
+  }
+  for (const std::string bad : {"nan", "inf"}) {
+    expectComplaint("n.obj", "v 0 0 0\nv 1 " + bad + " 0\nv 1 1 0\nf 1 2 3\n", "vertex 1");
+    expectComplaint("n.stl",
+                    "solid s\nfacet normal 0 0 1\nouter loop\nvertex 0 0 0\nvertex 1 " + bad +
+                        " 0\nvertex 1 1 0\nendloop\nendfacet\nendsolid s\n",
+                    "vertex 1");
+  }
+  std::string dae = kDae;
+  dae.replace(dae.find("0 0 0 1 0 0"), 11, "0 0 0 nan 0");
+  expectComplaint("n.dae", dae, "");
+  std::string ply = binaryPly(false);
+  const float nan = std::numeric_limits<float>::quiet_NaN();
+  std::memcpy(&ply[ply.find("end_header\n") + 11 + 12], &nan, sizeof(nan));
+  expectComplaint("b.ply", ply, "vertex 1");
+  expectComplaint("w.off", "OFF\n3 1 0\n0 0 0\n1 x 0\n1 1 0\n3 0 1 2\n", "line 4: vertex 1");
+}
+
+TEST_F(LoadMesh, RefusesIndicesOutOfRange) {
+  for (const std::string bad : {"4", "-1", "4294967296", "99999999999999999999"}) {
+    expectComplaint("r.off", kOff.substr(0, kOff.size() - 2) + bad + "\n", "line 8: face 1");
+    expectComplaint("r.ply", kPly.substr(0, kPly.size() - 2) + bad + "\n", "face 1");
+  }
+  expectComplaint("r.obj", "v 0 0 0\nv 1 0 0\nv 1 1 0\nf 1 2 9\n", "out of range");
+  expectComplaint("zero.obj", "v 0 0 0\nv 1 0 0\nv 1 1 0\nf 0 1 2\n", "");
+  std::string ply = binaryPly(true);
+  ply.back() = 77;
+  expectComplaint("b.ply", ply, "vertex index 77 out of range");
+  std::string dae = kDae;
+  dae.replace(dae.find("0 2 3<"), 5, "0 2 9");
+  expectComplaint("r.dae", dae, "9");
+}
+
+TEST_F(LoadMesh, RefusesTruncatedFiles) {
+  // Cut anywhere up to the last number (whose loss of digits nobody could see).
+  const auto try_all = [this](const std::string& name, const std::string& whole, std::size_t needed) {
+    for (std::size_t size = 0; size < needed; ++size) {
+      SCOPED_TRACE(name + " cut to " + std::to_string(size));
+      complaint(write(name, whole.substr(0, size)));
+    }
+  };
+  try_all("cut.off", kOff, kOff.size() - 2);
+  try_all("cut.ply", kPly, kPly.size() - 2);
+  try_all("little.ply", binaryPly(false), binaryPly(false).size());
+  try_all("big.ply", binaryPly(true), binaryPly(true).size());
+  try_all("cut.stl", kStl, kStl.rfind("endsolid"));
+  try_all("binary.stl", binaryStl(), binaryStl().size());
+  try_all("cut.dae", kDae, kDae.size() - 3);
+  expectComplaint("cut.obj", kObj.substr(0, kObj.size() - 3), "corners");
+  expectComplaint("huge.off", "OFF\n4000000000 4000000000 0\n0 0 0\n", "truncated");
+  expectComplaint("huge.ply",
+                  "ply\nformat ascii 1.0\nelement vertex 4000000000000\nproperty float x\nproperty float y\n"
+                  "property float z\nelement face 1\nproperty list uchar int vertex_indices\nend_header\n0 0 0\n",
+                  "truncated");
+}
+
+}  // namespace
+}  // namespace bocst
