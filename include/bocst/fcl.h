@@ -4,10 +4,13 @@
 // FCL's queries for pairs that involve a bocst::Model, under FCL's own names.
 //
 // The functions in namespace fcl are not templates, so overload resolution prefers them to FCL's templates, also
-// inside fcl::DefaultCollisionFunction and the like when this header was included first. Pairs without a bocst::Model
-// go on to FCL. Code that was compiled without this header reaches bocst through the symbols that libbocst exports;
-// that needs libbocst before libfcl in the link order, which the first Model checks (see model.h).
+// inside fcl::DefaultCollisionFunction and the like, whatever the order of includes. Pairs without a bocst::Model go on
+// to FCL. Code that was compiled without this header, or that names FCL's template (fcl::collide<double>(...)),
+// reaches bocst through the symbols that libbocst exports; that needs libbocst before libfcl in the link order, which
+// the first Model checks (see model.h).
 
+#include <bocst/export.h>
+#include <bocst/model.h>
 #include <fcl/narrowphase/collision.h>
 #include <fcl/narrowphase/collision_object.h>
 #include <fcl/narrowphase/collision_request.h>
@@ -19,9 +22,6 @@
 #include <fcl/narrowphase/distance.h>
 #include <fcl/narrowphase/distance_request.h>
 #include <fcl/narrowphase/distance_result.h>
-
-#include <bocst/export.h>
-#include <bocst/model.h>
 
 namespace bocst {
 
@@ -49,60 +49,137 @@ BOCST_EXPORT std::size_t collide(const fcl::CollisionGeometry<S>* o1, const fcl:
                                  const fcl::CollisionGeometry<S>* o2, const fcl::Transform3<S>& X_W2,
                                  const fcl::CollisionRequest<S>& request, fcl::CollisionResult<S>& result);
 
+/// The same for callers that bring a solver, which pairs with a Model do not use. Solver is one of FCL's two.
+template <typename S, typename Solver>
+BOCST_EXPORT std::size_t collide(const fcl::CollisionGeometry<S>* o1, const fcl::Transform3<S>& X_W1,
+                                 const fcl::CollisionGeometry<S>* o2, const fcl::Transform3<S>& X_W2,
+                                 const Solver* solver, const fcl::CollisionRequest<S>& request,
+                                 fcl::CollisionResult<S>& result);
+
 /// As fcl::distance. In this version a pair with a Model throws std::invalid_argument.
 template <typename S>
 BOCST_EXPORT S distance(const fcl::CollisionGeometry<S>* o1, const fcl::Transform3<S>& X_W1,
                         const fcl::CollisionGeometry<S>* o2, const fcl::Transform3<S>& X_W2,
                         const fcl::DistanceRequest<S>& request, fcl::DistanceResult<S>& result);
+template <typename S, typename Solver>
+BOCST_EXPORT S distance(const fcl::CollisionGeometry<S>* o1, const fcl::Transform3<S>& X_W1,
+                        const fcl::CollisionGeometry<S>* o2, const fcl::Transform3<S>& X_W2, const Solver* solver,
+                        const fcl::DistanceRequest<S>& request, fcl::DistanceResult<S>& result);
 
-/// As fcl::continuousCollide over two motions. In this version a pair with a Model throws std::invalid_argument.
-template <typename S>
-BOCST_EXPORT S continuousCollide(const fcl::CollisionGeometry<S>* o1, const fcl::MotionBase<S>* motion1,
-                                 const fcl::CollisionGeometry<S>* o2, const fcl::MotionBase<S>* motion2,
-                                 const fcl::ContinuousCollisionRequest<S>& request,
-                                 fcl::ContinuousCollisionResult<S>& result);
-
-/// True when the geometry is a Model<S>.
+/// True when the geometry is a Model<S>; false for null.
 template <typename S>
 BOCST_EXPORT bool isModel(const fcl::CollisionGeometry<S>* geometry);
+
+namespace fcl_room {
+/// @throws std::invalid_argument, naming the query and the two types, when one side is a Model.
+template <typename S>
+BOCST_EXPORT void rejectModels(const char* query, const fcl::CollisionGeometry<S>* o1,
+                               const fcl::CollisionGeometry<S>* o2);
+}  // namespace fcl_room
+
+/// As fcl::continuousCollide, over two motions or from begin to end poses. In this version a pair with a Model throws
+/// std::invalid_argument. (FCL 0.7's own version from poses is for double only: it does not compile for float.)
+template <typename S>
+S continuousCollide(const fcl::CollisionGeometry<S>* o1, const fcl::MotionBase<S>* motion1,
+                    const fcl::CollisionGeometry<S>* o2, const fcl::MotionBase<S>* motion2,
+                    const fcl::ContinuousCollisionRequest<S>& request, fcl::ContinuousCollisionResult<S>& result) {
+  fcl_room::rejectModels<S>("continuousCollide", o1, o2);
+  return fcl::continuousCollide<S>(o1, motion1, o2, motion2, request, result);
+}
+template <typename S>
+S continuousCollide(const fcl::CollisionGeometry<S>* o1, const fcl::Transform3<S>& X_W1_begin,
+                    const fcl::Transform3<S>& X_W1_end, const fcl::CollisionGeometry<S>* o2,
+                    const fcl::Transform3<S>& X_W2_begin, const fcl::Transform3<S>& X_W2_end,
+                    const fcl::ContinuousCollisionRequest<S>& request, fcl::ContinuousCollisionResult<S>& result) {
+  fcl_room::rejectModels<S>("continuousCollide", o1, o2);
+  return fcl::continuousCollide<S>(o1, X_W1_begin, X_W1_end, o2, X_W2_begin, X_W2_end, request, result);
+}
 
 }  // namespace bocst
 
 namespace fcl {
 
-#define BOCST_FCL_OVERLOADS(S)                                                                                      \
-  inline std::size_t collide(const CollisionGeometry<S>* o1, const Transform3<S>& tf1,                              \
-                             const CollisionGeometry<S>* o2, const Transform3<S>& tf2,                              \
-                             const CollisionRequest<S>& request, CollisionResult<S>& result) {                      \
-    return bocst::collide<S>(o1, tf1, o2, tf2, request, result);                                                    \
-  }                                                                                                                 \
-  inline std::size_t collide(const CollisionObject<S>* o1, const CollisionObject<S>* o2,                            \
-                             const CollisionRequest<S>& request, CollisionResult<S>& result) {                      \
-    return bocst::collide<S>(o1->collisionGeometry().get(), o1->getTransform(), o2->collisionGeometry().get(),      \
-                             o2->getTransform(), request, result);                                                  \
-  }                                                                                                                 \
-  inline S distance(const CollisionGeometry<S>* o1, const Transform3<S>& tf1, const CollisionGeometry<S>* o2,       \
-                    const Transform3<S>& tf2, const DistanceRequest<S>& request, DistanceResult<S>& result) {       \
-    return bocst::distance<S>(o1, tf1, o2, tf2, request, result);                                                   \
-  }                                                                                                                 \
-  inline S distance(const CollisionObject<S>* o1, const CollisionObject<S>* o2, const DistanceRequest<S>& request,  \
-                    DistanceResult<S>& result) {                                                                    \
-    return bocst::distance<S>(o1->collisionGeometry().get(), o1->getTransform(), o2->collisionGeometry().get(),     \
-                              o2->getTransform(), request, result);                                                 \
-  }                                                                                                                 \
-  inline S continuousCollide(const CollisionGeometry<S>* o1, const MotionBase<S>* motion1,                          \
-                             const CollisionGeometry<S>* o2, const MotionBase<S>* motion2,                          \
-                             const ContinuousCollisionRequest<S>& request, ContinuousCollisionResult<S>& result) {  \
-    return bocst::continuousCollide<S>(o1, motion1, o2, motion2, request, result);                                  \
-  }                                                                                                                 \
-  inline S continuousCollide(const ContinuousCollisionObject<S>* o1, const ContinuousCollisionObject<S>* o2,        \
-                             const ContinuousCollisionRequest<S>& request, ContinuousCollisionResult<S>& result) {  \
-    return bocst::continuousCollide<S>(o1->collisionGeometry().get(), o1->getMotion(),                              \
-                                       o2->collisionGeometry().get(), o2->getMotion(), request, result);            \
+// FCL's public signatures, each once for every scalar (and solver).
+#define BOCST_FCL_SOLVER_OVERLOADS(S, Solver)                                                                          \
+  inline std::size_t collide(const CollisionGeometry<S>* o1, const Transform3<S>& tf1, const CollisionGeometry<S>* o2, \
+                             const Transform3<S>& tf2, const Solver* solver, const CollisionRequest<S>& request,       \
+                             CollisionResult<S>& result) {                                                             \
+    return bocst::collide<S, Solver>(o1, tf1, o2, tf2, solver, request, result);                                       \
+  }                                                                                                                    \
+  inline std::size_t collide(const CollisionObject<S>* o1, const CollisionObject<S>* o2, const Solver* solver,         \
+                             const CollisionRequest<S>& request, CollisionResult<S>& result) {                         \
+    return bocst::collide<S, Solver>(o1->collisionGeometry().get(), o1->getTransform(), o2->collisionGeometry().get(), \
+                                     o2->getTransform(), solver, request, result);                                     \
+  }                                                                                                                    \
+  inline S distance(const CollisionGeometry<S>* o1, const Transform3<S>& tf1, const CollisionGeometry<S>* o2,          \
+                    const Transform3<S>& tf2, const Solver* solver, const DistanceRequest<S>& request,                 \
+                    DistanceResult<S>& result) {                                                                       \
+    return bocst::distance<S, Solver>(o1, tf1, o2, tf2, solver, request, result);                                      \
+  }                                                                                                                    \
+  inline S distance(const CollisionObject<S>* o1, const CollisionObject<S>* o2, const Solver* solver,                  \
+                    const DistanceRequest<S>& request, DistanceResult<S>& result) {                                    \
+    return bocst::distance<S, Solver>(o1->collisionGeometry().get(), o1->getTransform(),                               \
+                                      o2->collisionGeometry().get(), o2->getTransform(), solver, request, result);     \
+  }
+
+#define BOCST_FCL_OVERLOADS(S)                                                                                         \
+  BOCST_FCL_SOLVER_OVERLOADS(S, detail::GJKSolver_libccd<S>)                                                           \
+  BOCST_FCL_SOLVER_OVERLOADS(S, detail::GJKSolver_indep<S>)                                                            \
+  inline std::size_t collide(const CollisionGeometry<S>* o1, const Transform3<S>& tf1, const CollisionGeometry<S>* o2, \
+                             const Transform3<S>& tf2, const CollisionRequest<S>& request,                             \
+                             CollisionResult<S>& result) {                                                             \
+    return bocst::collide<S>(o1, tf1, o2, tf2, request, result);                                                       \
+  }                                                                                                                    \
+  inline std::size_t collide(const CollisionObject<S>* o1, const CollisionObject<S>* o2,                               \
+                             const CollisionRequest<S>& request, CollisionResult<S>& result) {                         \
+    return bocst::collide<S>(o1->collisionGeometry().get(), o1->getTransform(), o2->collisionGeometry().get(),         \
+                             o2->getTransform(), request, result);                                                     \
+  }                                                                                                                    \
+  inline S distance(const CollisionGeometry<S>* o1, const Transform3<S>& tf1, const CollisionGeometry<S>* o2,          \
+                    const Transform3<S>& tf2, const DistanceRequest<S>& request, DistanceResult<S>& result) {          \
+    return bocst::distance<S>(o1, tf1, o2, tf2, request, result);                                                      \
+  }                                                                                                                    \
+  inline S distance(const CollisionObject<S>* o1, const CollisionObject<S>* o2, const DistanceRequest<S>& request,     \
+                    DistanceResult<S>& result) {                                                                       \
+    return bocst::distance<S>(o1->collisionGeometry().get(), o1->getTransform(), o2->collisionGeometry().get(),        \
+                              o2->getTransform(), request, result);                                                    \
+  }
+
+// Templates, though of nothing, so that a caller pays for FCL's slow code for float only when he calls it. They are
+// still more special than FCL's templates, so they win.
+#define BOCST_FCL_CONTINUOUS_OVERLOADS(S)                                                                             \
+  template <int = 0>                                                                                                  \
+  S continuousCollide(const CollisionGeometry<S>* o1, const MotionBase<S>* motion1, const CollisionGeometry<S>* o2,   \
+                      const MotionBase<S>* motion2, const ContinuousCollisionRequest<S>& request,                     \
+                      ContinuousCollisionResult<S>& result) {                                                         \
+    return bocst::continuousCollide<S>(o1, motion1, o2, motion2, request, result);                                    \
+  }                                                                                                                   \
+  template <int = 0>                                                                                                  \
+  S continuousCollide(const CollisionGeometry<S>* o1, const Transform3<S>& tf1_beg, const Transform3<S>& tf1_end,     \
+                      const CollisionGeometry<S>* o2, const Transform3<S>& tf2_beg, const Transform3<S>& tf2_end,     \
+                      const ContinuousCollisionRequest<S>& request, ContinuousCollisionResult<S>& result) {           \
+    return bocst::continuousCollide<S>(o1, tf1_beg, tf1_end, o2, tf2_beg, tf2_end, request, result);                  \
+  }                                                                                                                   \
+  template <int = 0>                                                                                                  \
+  S continuousCollide(const CollisionObject<S>* o1, const Transform3<S>& tf1_end, const CollisionObject<S>* o2,       \
+                      const Transform3<S>& tf2_end, const ContinuousCollisionRequest<S>& request,                     \
+                      ContinuousCollisionResult<S>& result) {                                                         \
+    return bocst::continuousCollide<S>(o1->collisionGeometry().get(), o1->getTransform(), tf1_end,                    \
+                                       o2->collisionGeometry().get(), o2->getTransform(), tf2_end, request, result);  \
+  }                                                                                                                   \
+  template <int = 0>                                                                                                  \
+  S collide(const ContinuousCollisionObject<S>* o1, const ContinuousCollisionObject<S>* o2,                           \
+            const ContinuousCollisionRequest<S>& request, ContinuousCollisionResult<S>& result) {                     \
+    return bocst::continuousCollide<S>(o1->collisionGeometry().get(), o1->getMotion(),                                \
+                                       o2->collisionGeometry().get(), o2->getMotion(), request, result);              \
   }
 
 BOCST_FCL_OVERLOADS(float)
 BOCST_FCL_OVERLOADS(double)
+BOCST_FCL_CONTINUOUS_OVERLOADS(float)
+BOCST_FCL_CONTINUOUS_OVERLOADS(double)
+#undef BOCST_FCL_CONTINUOUS_OVERLOADS
 #undef BOCST_FCL_OVERLOADS
+#undef BOCST_FCL_SOLVER_OVERLOADS
 
 }  // namespace fcl

@@ -25,7 +25,7 @@ class BOCST_EXPORT Mesh {
   using Indices = std::array<std::uint32_t, 3>;
 
   /// @throws std::invalid_argument naming the first bad vertex or triangle: no triangles, more than 2^28 triangles or
-  /// 2^32 - 1 vertices, an index out of range, a coordinate that is NaN, infinite or larger than 1e150 in size.
+  /// 2^32 - 1 vertices, an index out of range, a coordinate that is NaN, infinite or larger than 1e75 in size.
   Mesh(std::vector<Eigen::Vector3d> vertices, const std::vector<fcl::Triangle>& triangles);
 
   /// The same from 32-bit indices, which are moved in rather than copied.

@@ -1,0 +1,395 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#include "fcl/collide_pair.h"
+
+#include <functional>
+#include <limits>
+#include <shared_mutex>
+#include <stdexcept>
+#include <string>
+
+#include <fcl/geometry/bvh/BVH_model.h>
+#include <fcl/math/geometry.h>
+#include <fcl/narrowphase/detail/traversal/collision/collision_traversal_node_base.h>
+#include <fcl/narrowphase/detail/traversal/collision/intersect.h>
+#include <fcl/narrowphase/detail/traversal/collision_node.h>
+
+#include "fcl/bvh_side.h"
+#include "query/pair_set.h"
+#include "query/pair_walk.h"
+
+namespace bocst::fcl_room {
+namespace {
+
+using query::Corners;
+using query::Placement;
+using query::TreeSide;
+
+/// The triangles of one side as FCL computes with them: corners in S, in the geometry's frame.
+template <typename S>
+class ModelTriangles {
+ public:
+  explicit ModelTriangles(const Mesh& mesh) : mesh_(mesh) {}
+  fcl::Vector3<S> corner(std::uint32_t t, int k) const {
+    return mesh_.vertex(mesh_.indices(t)[static_cast<std::size_t>(k)]).template cast<S>();
+  }
+
+ private:
+  const Mesh& mesh_;
+};
+
+template <typename BV>
+class BvhTriangles {
+ public:
+  explicit BvhTriangles(const fcl::BVHModel<BV>& bvh) : bvh_(bvh) {}
+  const fcl::Vector3<typename BV::S>& corner(std::uint32_t t, int k) const {
+    return bvh_.vertices[bvh_.tri_indices[t][static_cast<std::size_t>(k)]];
+  }
+
+ private:
+  const fcl::BVHModel<BV>& bvh_;
+};
+
+/// The caller's question, in the caller's order.
+template <typename S>
+struct Question {
+  const fcl::CollisionGeometry<S>*o1, *o2;
+  const fcl::Transform3<S>&X_W1, &X_W2;
+  const fcl::CollisionRequest<S>& request;
+  fcl::CollisionResult<S>& result;
+};
+
+/// Turns the pairs of a walk into contacts and cost sources. Side A of the walk is the caller's first geometry, or, when
+/// `swapped`, the second.
+template <typename S, typename Triangles1, typename Triangles2>
+class Collector : public query::Visitor {
+ public:
+  Collector(const Question<S>& q, const Triangles1& t1, const Triangles2& t2, bool swapped, double magnitude)
+      : q_(q), t1_(t1), t2_(t2), swapped_(swapped), magnitude_(magnitude), seen_(pairs()) {
+    fcl::relativeTransform(q.X_W1.linear(), q.X_W1.translation(), q.X_W2.linear(), q.X_W2.translation(), R_12_, p_12_);
+    occupied_ = q.o1->isOccupied() && q.o2->isOccupied();
+    // A boolean query ends at the first contact, so it meets no pair twice.
+    once_ = q.request.num_max_contacts > 1 || q.request.enable_cost;
+    if (once_) seen_.clear();
+  }
+
+  /// Where cells lie in the world: from the lattice frame of side A.
+  void setFrame(const Eigen::Vector3d& origin, double unit) {
+    origin_ = origin;
+    unit_ = unit;
+  }
+
+  bool triangles(std::uint32_t a, std::uint32_t b) override {
+    if (swapped_) std::swap(a, b);
+    if (once_ && !seen_.insert(a, b)) return false;
+    const fcl::Vector3<S> p[3] = {t1_.corner(a, 0), t1_.corner(a, 1), t1_.corner(a, 2)};
+    const fcl::Vector3<S> q[3] = {t2_.corner(b, 0), t2_.corner(b, 1), t2_.corner(b, 2)};
+    if (!fcl::detail::Intersect<S>::intersect_Triangle(p[0], p[1], p[2], q[0], q[1], q[2], R_12_, p_12_)) return false;
+
+    Corners pd, qd;
+    for (int k = 0; k < 3; ++k) {
+      pd[k] = p[k].template cast<double>();
+      qd[k] = q[k].template cast<double>();
+    }
+    const bool degenerate = query::isDegenerate(pd) || query::isDegenerate(qd);
+    if (!degenerate && !needsGeometry()) return add(a, b, nullptr);
+    for (Eigen::Vector3d& x : qd) x = R_12_.template cast<double>() * x + p_12_.template cast<double>();
+    // FCL's axes do not separate segments and points from everything: there the distance decides.
+    if (degenerate && query::distanceDegenerate(pd, qd) > magnitude_ * 16 * kEpsilon) return false;
+    if (q_.request.enable_cost) addCost(a, b);
+    if (!needsGeometry()) return add(a, b, nullptr);
+    query::Touch touch = query::partTriangles(pd, qd);
+    const fcl::Transform3<double> X_W1 = q_.X_W1.template cast<double>();
+    touch.normal = X_W1.linear() * touch.normal;
+    touch.point = X_W1 * touch.point;
+    return add(a, b, &touch);
+  }
+
+  bool cells(const query::CellLeaf& a, const query::CellLeaf& b) override {
+    return addSpheres(a.id, a.sphere, b.id, b.sphere);
+  }
+
+  bool cellOfA(const query::CellLeaf& a, std::uint32_t b, const Eigen::Vector3d& point) override {
+    return addSpheres(a.id, a.sphere, b, {point, 0});
+  }
+
+  bool cellOfB(std::uint32_t a, const query::CellLeaf& b, const Eigen::Vector3d& point) override {
+    return addSpheres(a, {point, 0}, b.id, b.sphere);
+  }
+
+ private:
+  static constexpr double kEpsilon = static_cast<double>(std::numeric_limits<S>::epsilon());
+
+  static query::PairSet& pairs() {
+    thread_local query::PairSet set;
+    return set;
+  }
+
+  bool needsGeometry() const { return q_.request.enable_contact || q_.request.enable_cost; }
+
+  bool addSpheres(std::uint32_t id_a, query::Sphere a, std::uint32_t id_b, query::Sphere b) {
+    if (swapped_) {
+      std::swap(id_a, id_b);
+      std::swap(a, b);
+    }
+    if (once_ && !seen_.insert(id_a, id_b)) return false;
+    const fcl::Transform3<double> X_WA = (swapped_ ? q_.X_W2 : q_.X_W1).template cast<double>();
+    for (query::Sphere* s : {&a, &b}) {
+      s->center = X_WA * Eigen::Vector3d(origin_ + unit_ * s->center);
+      s->radius *= unit_;
+    }
+    if (q_.request.enable_cost) {
+      addCost(boxOf(a), boxOf(b));
+    }
+    if (!q_.request.enable_contact) return add(id_a, id_b, nullptr);
+    query::Touch touch;
+    const Eigen::Vector3d way = b.center - a.center;
+    const double distance = way.norm();
+    if (distance > 0) touch.normal = way / distance;
+    touch.depth = std::max(a.radius + b.radius - distance, 0.0);
+    touch.point = a.center + touch.normal * (a.radius - touch.depth / 2);
+    return add(id_a, id_b, &touch);
+  }
+
+  static fcl::AABB<S> boxOf(const query::Sphere& s) {
+    const Eigen::Vector3d r = Eigen::Vector3d::Constant(s.radius);
+    return fcl::AABB<S>((s.center - r).template cast<S>(), (s.center + r).template cast<S>());
+  }
+
+  void addCost(std::uint32_t a, std::uint32_t b) {
+    addCost(fcl::AABB<S>(q_.X_W1 * t1_.corner(a, 0), q_.X_W1 * t1_.corner(a, 1), q_.X_W1 * t1_.corner(a, 2)),
+            fcl::AABB<S>(q_.X_W2 * t2_.corner(b, 0), q_.X_W2 * t2_.corner(b, 1), q_.X_W2 * t2_.corner(b, 2)));
+  }
+
+  void addCost(const fcl::AABB<S>& a, const fcl::AABB<S>& b) {
+    fcl::AABB<S> overlap;
+    a.overlap(b, overlap);
+    q_.result.addCostSource(fcl::CostSource<S>(overlap, q_.o1->cost_density * q_.o2->cost_density),
+                            q_.request.num_max_cost_sources);
+  }
+
+  bool add(std::uint32_t b1, std::uint32_t b2, const query::Touch* touch) {
+    if (occupied_ && q_.result.numContacts() < q_.request.num_max_contacts) {
+      fcl::Contact<S> c;
+      c.o1 = q_.o1;
+      c.o2 = q_.o2;
+      c.b1 = b1;
+      c.b2 = b2;
+      if (q_.request.enable_contact) {
+        c.normal = touch->normal.template cast<S>();
+        c.pos = touch->point.template cast<S>();
+        c.penetration_depth = static_cast<S>(touch->depth);
+      } else {
+        c.normal.setConstant(std::numeric_limits<S>::quiet_NaN());
+        c.pos = c.normal;
+        c.penetration_depth = std::numeric_limits<S>::quiet_NaN();
+      }
+      q_.result.addContact(c);
+    }
+    return q_.request.isSatisfied(q_.result);
+  }
+
+  const Question<S>& q_;
+  const Triangles1& t1_;
+  const Triangles2& t2_;
+  const bool swapped_;
+  const double magnitude_;  // of positions in the frame of the first geometry
+  query::PairSet& seen_;
+  fcl::Matrix3<S> R_12_;
+  fcl::Vector3<S> p_12_;
+  bool occupied_, once_;
+  Eigen::Vector3d origin_ = Eigen::Vector3d::Zero();
+  double unit_ = 1;
+};
+
+/// FCL's traversal with one leaf, as FCL's octree does it: the walk below that leaf is ours.
+template <typename S, typename Walk>
+class PairTraversalNode : public fcl::detail::CollisionTraversalNodeBase<S> {
+ public:
+  explicit PairTraversalNode(Walk& walk) : walk_(walk) {}
+  bool BVTesting(int, int) const override { return false; }
+  void leafTesting(int, int) const override { walk_.run(); }
+
+ private:
+  Walk& walk_;
+};
+
+template <typename S, typename A, typename B>
+void walk(const A& a, const B& b, const Placement& b_in_a, query::Visitor& visitor) {
+  query::PairWalk<A, B> pair_walk(a, b, b_in_a, visitor);
+  PairTraversalNode<S, query::PairWalk<A, B>> node(pair_walk);
+  fcl::detail::collide(&node);
+}
+
+double magnitudeOf(const Eigen::AlignedBox3d& box) {
+  return std::max(box.min().cwiseAbs().maxCoeff(), box.max().cwiseAbs().maxCoeff());
+}
+
+/// From the frame of B (origin and unit in B's model frame) to that of A, through the pose X_AB in model units.
+template <typename S>
+Placement placementOf(const fcl::Transform3<S>& X_WA, const fcl::Transform3<S>& X_WB, const Eigen::Vector3d& origin_a,
+                      double unit_a, const Eigen::Vector3d& origin_b, double unit_b, double magnitude) {
+  fcl::Matrix3<S> R;
+  fcl::Vector3<S> t;
+  fcl::relativeTransform(X_WA.linear(), X_WA.translation(), X_WB.linear(), X_WB.translation(), R, t);
+  Placement p;
+  p.rotation = R.template cast<double>();
+  p.scale = unit_b / unit_a;
+  p.translation = (p.rotation * origin_b + t.template cast<double>() - origin_a) / unit_a;
+  // What FCL's triangle test, which computes R q + t in S, may take for a contact.
+  p.slack = magnitude * 32 * static_cast<double>(std::numeric_limits<S>::epsilon()) / unit_a;
+  p.defect = (p.rotation.transpose() * p.rotation - Eigen::Matrix3d::Identity()).cwiseAbs().maxCoeff();
+  return p;
+}
+
+/// Positions in the frame of the first geometry are at most this large.
+template <typename S>
+double magnitudeOf(const Question<S>& q, double size1, double size2) {
+  const Eigen::Vector3d p =
+      q.X_W1.linear().transpose().template cast<double>() *
+      (q.X_W2.translation() - q.X_W1.translation()).template cast<double>();
+  return p.norm() + 2 * (size1 + size2);
+}
+
+/// Holds the gates of one or two trees shared, taken in address order, and prunes when it lets go.
+class Look {
+ public:
+  Look(tree::Tree& a, tree::Tree* b) : a_(&a), b_(b == &a ? nullptr : b) {
+    if (b_ != nullptr && std::less<tree::Tree*>()(b_, a_)) std::swap(a_, b_);
+    a_->gate().lock_shared();
+    if (b_ != nullptr) b_->gate().lock_shared();
+  }
+  ~Look() {
+    if (b_ != nullptr) b_->gate().unlock_shared();
+    a_->gate().unlock_shared();
+  }
+  Look(const Look&) = delete;
+  Look& operator=(const Look&) = delete;
+
+ private:
+  tree::Tree *a_, *b_;
+};
+
+template <typename S>
+void collideModels(const Question<S>& q, tree::Tree& tree1, tree::Tree& tree2) {
+  std::int64_t now;
+  {
+    const Look look(tree1, &tree2);
+    // Conservative verdicts must not depend on the argument order, so the walk has an order of its own.
+    const bool swapped = (tree1.conservative() || tree2.conservative()) && std::less<tree::Tree*>()(&tree2, &tree1);
+    tree::Tree &tree_a = swapped ? tree2 : tree1, &tree_b = swapped ? tree1 : tree2;
+    const TreeSide a(tree_a), b(tree_b);
+    now = a.now();
+    const oracle::Surface &sa = tree_a.surface(), &sb = tree_b.surface();
+    const double magnitude = magnitudeOf(q, magnitudeOf(tree1.surface().mesh->bounds()),
+                                         magnitudeOf(tree2.surface().mesh->bounds()));
+    const ModelTriangles<S> t1(*tree1.surface().mesh), t2(*tree2.surface().mesh);
+    Collector<S, ModelTriangles<S>, ModelTriangles<S>> collector(q, t1, t2, swapped, magnitude);
+    collector.setFrame(sa.lattice.origin(), sa.lattice.unit());
+    walk<S>(a, b,
+            placementOf(swapped ? q.X_W2 : q.X_W1, swapped ? q.X_W1 : q.X_W2, sa.lattice.origin(), sa.lattice.unit(),
+                        sb.lattice.origin(), sb.lattice.unit(), magnitude),
+            collector);
+  }
+  tree1.maybePrune(now);
+  if (&tree2 != &tree1) tree2.maybePrune(now);
+}
+
+template <typename BV>
+void collideBvh(const Question<typename BV::S>& q, tree::Tree& tree, const fcl::BVHModel<BV>& bvh, bool swapped) {
+  using S = typename BV::S;
+  std::int64_t now;
+  {
+    const Look look(tree, nullptr);
+    const TreeSide a(tree);
+    const BvhSide<BV> b(bvh);
+    now = a.now();
+    const oracle::Surface& surface = tree.surface();
+    const double magnitude = magnitudeOf(q, magnitudeOf(surface.mesh->bounds()), b.magnitude());
+    const ModelTriangles<S> model(*surface.mesh);
+    const BvhTriangles<BV> partner(bvh);
+    const Placement b_in_a =
+        placementOf(swapped ? q.X_W2 : q.X_W1, swapped ? q.X_W1 : q.X_W2, surface.lattice.origin(),
+                    surface.lattice.unit(), Eigen::Vector3d::Zero(), 1.0, magnitude);
+    const auto run = [&](auto&& collector) {
+      collector.setFrame(surface.lattice.origin(), surface.lattice.unit());
+      walk<S>(a, b, b_in_a, collector);
+    };
+    if (swapped) {
+      run(Collector<S, BvhTriangles<BV>, ModelTriangles<S>>(q, partner, model, true, magnitude));
+    } else {
+      run(Collector<S, ModelTriangles<S>, BvhTriangles<BV>>(q, model, partner, false, magnitude));
+    }
+  }
+  tree.maybePrune(now);
+}
+
+template <template <typename> class BV, typename S>
+const fcl::BVHModel<BV<S>>& as(const fcl::CollisionGeometry<S>* geometry) {
+  return *static_cast<const fcl::BVHModel<BV<S>>*>(geometry);
+}
+template <typename S>
+using Kdop16 = fcl::KDOP<S, 16>;
+template <typename S>
+using Kdop18 = fcl::KDOP<S, 18>;
+template <typename S>
+using Kdop24 = fcl::KDOP<S, 24>;
+
+template <typename S>
+void collideWith(const Question<S>& q, tree::Tree& tree, const fcl::CollisionGeometry<S>* partner, bool swapped) {
+  switch (partner->getNodeType()) {
+    case fcl::BV_AABB:
+      return collideBvh(q, tree, as<fcl::AABB>(partner), swapped);
+    case fcl::BV_OBB:
+      return collideBvh(q, tree, as<fcl::OBB>(partner), swapped);
+    case fcl::BV_RSS:
+      return collideBvh(q, tree, as<fcl::RSS>(partner), swapped);
+    case fcl::BV_kIOS:
+      return collideBvh(q, tree, as<fcl::kIOS>(partner), swapped);
+    case fcl::BV_OBBRSS:
+      return collideBvh(q, tree, as<fcl::OBBRSS>(partner), swapped);
+    case fcl::BV_KDOP16:
+      return collideBvh(q, tree, as<Kdop16>(partner), swapped);
+    case fcl::BV_KDOP18:
+      return collideBvh(q, tree, as<Kdop18>(partner), swapped);
+    case fcl::BV_KDOP24:
+      return collideBvh(q, tree, as<Kdop24>(partner), swapped);
+    default:
+      throw std::invalid_argument("bocst::collide: a Model against FCL node type " +
+                                  std::to_string(partner->getNodeType()) +
+                                  " is not supported in this version; partners are Model and BVHModel");
+  }
+}
+
+}  // namespace
+
+template <typename S>
+std::size_t collidePair(const fcl::CollisionGeometry<S>* o1, const fcl::Transform3<S>& X_W1,
+                        const fcl::CollisionGeometry<S>* o2, const fcl::Transform3<S>& X_W2,
+                        const fcl::CollisionRequest<S>& request, fcl::CollisionResult<S>& result) {
+  const auto* model1 = dynamic_cast<const Model<S>*>(o1);
+  const auto* model2 = dynamic_cast<const Model<S>*>(o2);
+  if (model1 == nullptr && model2 == nullptr) {
+    throw std::logic_error("bocst::collide: neither geometry is a bocst::Model");
+  }
+  if (request.isSatisfied(result)) return result.numContacts();
+  const Question<S> q{o1, o2, X_W1, X_W2, request, result};
+  const bool occupied = o1->isOccupied() && o2->isOccupied();
+  if (!occupied && (o1->isFree() || o2->isFree() || !request.enable_cost)) return result.numContacts();
+  if (model1 != nullptr && model2 != nullptr) {
+    collideModels(q, model1->tree(), model2->tree());
+  } else if (model1 != nullptr) {
+    collideWith(q, model1->tree(), o2, false);
+  } else {
+    collideWith(q, model2->tree(), o1, true);
+  }
+  return result.numContacts();
+}
+
+template std::size_t collidePair<float>(const fcl::CollisionGeometry<float>*, const fcl::Transform3<float>&,
+                                        const fcl::CollisionGeometry<float>*, const fcl::Transform3<float>&,
+                                        const fcl::CollisionRequest<float>&, fcl::CollisionResult<float>&);
+template std::size_t collidePair<double>(const fcl::CollisionGeometry<double>*, const fcl::Transform3<double>&,
+                                         const fcl::CollisionGeometry<double>*, const fcl::Transform3<double>&,
+                                         const fcl::CollisionRequest<double>&, fcl::CollisionResult<double>&);
+
+}  // namespace bocst::fcl_room

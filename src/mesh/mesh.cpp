@@ -1,0 +1,79 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#include <bocst/mesh.h>
+
+#include <cmath>
+#include <limits>
+#include <stdexcept>
+#include <string>
+
+namespace bocst {
+namespace {
+
+constexpr std::size_t kMaxTriangles = std::size_t{1} << 28;
+constexpr std::size_t kMaxVertices = std::numeric_limits<std::uint32_t>::max();
+// Squares and cubes of coordinates appear in the exact test: they must stay finite.
+constexpr double kMaxCoordinate = 1e75;
+
+[[noreturn]] void bad(const std::string& what) { throw std::invalid_argument("bocst::Mesh: " + what); }
+
+std::string coordinates(const Eigen::Vector3d& v) {
+  return "(" + std::to_string(v.x()) + ", " + std::to_string(v.y()) + ", " + std::to_string(v.z()) + ")";
+}
+
+}  // namespace
+
+Mesh::Mesh(std::vector<Eigen::Vector3d> vertices, const std::vector<fcl::Triangle>& triangles)
+    : vertices_(std::move(vertices)), triangles_(triangles.size()) {
+  const std::size_t count = vertices_.size();
+  for (std::size_t t = 0; t < triangles.size(); ++t) {
+    for (int k = 0; k < 3; ++k) {
+      const std::size_t i = triangles[t][k];
+      if (i >= count) {
+        bad("triangle " + std::to_string(t) + " has vertex index " + std::to_string(i) + ", but there are " +
+            std::to_string(count) + " vertices");
+      }
+      triangles_[t][k] = static_cast<std::uint32_t>(i);
+    }
+  }
+  validate();
+}
+
+std::shared_ptr<const Mesh> Mesh::fromIndices(std::vector<Eigen::Vector3d> vertices, std::vector<Indices> triangles) {
+  std::shared_ptr<Mesh> mesh(new Mesh);
+  mesh->vertices_ = std::move(vertices);
+  mesh->triangles_ = std::move(triangles);
+  mesh->validate();
+  return mesh;
+}
+
+void Mesh::validate() {
+  const std::size_t count = vertices_.size();
+  if (triangles_.empty()) bad("no triangles");
+  if (triangles_.size() > kMaxTriangles) bad("more than 2^28 triangles");
+  if (count > kMaxVertices) bad("more than 2^32 - 1 vertices");
+  for (std::size_t i = 0; i < count; ++i) {
+    // One comparison a coordinate finds NaN, infinities and what is too large.
+    if (!(vertices_[i].cwiseAbs().maxCoeff() <= kMaxCoordinate) || vertices_[i].hasNaN()) {
+      bad("vertex " + std::to_string(i) + " is " + coordinates(vertices_[i]));
+    }
+  }
+  Eigen::Array3d lo = Eigen::Array3d::Constant(std::numeric_limits<double>::max());
+  Eigen::Array3d hi = -lo;
+  for (std::size_t t = 0; t < triangles_.size(); ++t) {
+    for (const std::uint32_t i : triangles_[t]) {
+      if (i >= count) {
+        bad("triangle " + std::to_string(t) + " has vertex index " + std::to_string(i) + ", but there are " +
+            std::to_string(count) + " vertices");
+      }
+      lo = lo.min(vertices_[i].array());
+      hi = hi.max(vertices_[i].array());
+    }
+  }
+  bounds_ = Eigen::AlignedBox3d(lo.matrix(), hi.matrix());
+}
+
+std::size_t Mesh::bytes() const {
+  return vertices_.capacity() * sizeof(Eigen::Vector3d) + triangles_.capacity() * sizeof(Indices);
+}
+
+}  // namespace bocst

@@ -1,0 +1,76 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#pragma once
+
+#include <array>
+#include <cstddef>
+#include <cstdint>
+#include <memory>
+#include <string>
+#include <vector>
+
+#include <bocst/oracle.h>
+
+#include "lattice/lattice.h"
+#include "oracle/surface.h"
+
+namespace bocst::oracle {
+
+/// A bound of the surface inside one cell of side s, as bytes: a box AND a slab.
+/// Box: from corner + lo / 255 * s to corner + hi / 255 * s. Slab: |normal . (p - c) / s - slab_center| <=
+/// slab_half / 2 for every surface point p of the cell with centre c; a zero normal is no bound. Rounded outwards.
+struct CellBounds {
+  std::array<std::uint8_t, 3> lo{0, 0, 0}, hi{255, 255, 255};
+  std::array<std::int8_t, 3> normal{0, 0, 0};
+  std::int8_t slab_center = 0;
+  std::uint8_t slab_half = 255;
+};
+
+/// The bounds of eight octants, as structure of arrays for the pair test.
+struct OctantBounds {
+  std::uint8_t lo[3][8] = {}, hi[3][8] = {};
+  std::int8_t normal[3][8] = {};
+  std::int8_t slab_center[8] = {};
+  std::uint8_t slab_half[8] = {};
+
+  void set(int octant, const CellBounds& b);
+  CellBounds get(int octant) const;
+};
+static_assert(sizeof(OctantBounds) == 88);
+
+/// One node to expand: the question and the answer.
+struct Expansion {
+  // Asked.
+  const Surface* surface = nullptr;
+  lattice::Cell cell;
+  const std::uint32_t* ids = nullptr;  ///< Triangles that may meet the cell; null: all of the mesh.
+  std::size_t count = 0;
+
+  // Answered.
+  std::uint8_t grey = 0;  ///< Bit o: the surface meets octant o (reference.h), which has an actual region.
+  OctantBounds octants;
+  CellBounds own;  ///< Of the cell itself: what the octants taught about it.
+  std::vector<std::uint32_t> lists;          ///< Triangles of octant 0, of octant 1, ...
+  std::array<std::size_t, 9> list_begin{};   ///< Octant o has lists[list_begin[o]] to lists[list_begin[o + 1]].
+};
+
+/// Answers expansion batches. Any number of threads may submit; each batch belongs to one thread until wait() returned.
+class Oracle {
+ public:
+  virtual ~Oracle() = default;
+
+  virtual OracleKind kind() const = 0;
+  virtual std::string name() const = 0;
+
+  /// Starts to answer a batch; an oracle without a device of its own may answer all of it here.
+  virtual void submit(std::vector<Expansion>& batch) = 0;
+
+  /// Returns when the whole batch is answered.
+  virtual void wait(std::vector<Expansion>& batch) = 0;
+};
+
+/// The oracle for these options: BOCST_ORACLE overrides kAuto; else compute on a hardware GPU, else the CPU. Shared by
+/// all models.
+/// @throws OracleError for one asked for by name that cannot be had.
+std::shared_ptr<Oracle> makeOracle(OracleKind kind);
+
+}  // namespace bocst::oracle

@@ -1,0 +1,23 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#pragma once
+
+#include <memory>
+
+#include <bocst/mesh.h>
+
+#include "lattice/lattice.h"
+
+namespace bocst::oracle {
+
+/// What an oracle is asked about: a mesh, seen on its lattice.
+struct Surface {
+  std::shared_ptr<const Mesh> mesh;
+  lattice::Lattice lattice;
+
+  /// Corner k of triangle t, in lattice units.
+  Eigen::Vector3d corner(std::uint32_t t, int k) const {
+    return lattice.toLattice(mesh->vertex(mesh->indices(t)[k]));
+  }
+};
+
+}  // namespace bocst::oracle

@@ -1,0 +1,223 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#pragma once
+
+#include <cstdint>
+#include <vector>
+
+#include "query/side.h"
+
+namespace bocst::query {
+
+/// A leaf that is a cell, as the visitor sees it: its sphere in the frame of side A.
+struct CellLeaf {
+  std::uint32_t id;
+  Sphere sphere;
+};
+
+/// What a query does with the pairs that a walk finds. Each function returns true to end the walk. A pair may come more
+/// than once.
+class Visitor {
+ public:
+  virtual ~Visitor() = default;
+
+  /// Triangle a of side A and b of side B may touch; everything that touches comes here.
+  virtual bool triangles(std::uint32_t a, std::uint32_t b) = 0;
+  /// The spheres of two cells overlap.
+  virtual bool cells(const CellLeaf& a, const CellLeaf& b) = 0;
+  /// A cell's sphere on one side meets a triangle on the other, whose point nearest to the sphere's centre is `point`
+  /// (frame of A).
+  virtual bool cellOfA(const CellLeaf& a, std::uint32_t b, const Eigen::Vector3d& point) = 0;
+  virtual bool cellOfB(std::uint32_t a, const CellLeaf& b, const Eigen::Vector3d& point) = 0;
+};
+
+/// The one walk over pairs of nodes. Resident pairs first, depth first; a pair that needs an unexpanded node is set
+/// aside. When the resident pairs do not settle the question, all nodes set aside grow in one batch and the walk goes
+/// on: at most one batch a level.
+///
+/// Triangles against triangles are culled by boxes and slabs; as soon as a side answers with cells, both are culled by
+/// spheres, in double and on integer cells, so a conservative verdict does not depend on what is resident.
+template <typename A, typename B>
+class PairWalk {
+ public:
+  /// `b_in_a` places side B's frame in side A's. Scratch memory is kept by the thread between walks.
+  PairWalk(const A& a, const B& b, const Placement& b_in_a, Visitor& visitor)
+      : a_(a), b_(b), b_in_a_(b_in_a), a_in_b_(b_in_a.inverse()), visitor_(visitor), spheres_(a.cells() || b.cells()) {}
+
+  /// True when the visitor ended it.
+  bool run() {
+    Scratch& s = scratch();
+    s.stack.clear();
+    s.pending.clear();
+    s.pack_of_a = kNoPack;
+    const Pair root{a_.root(), b_.root()};
+    if (!rootsMeet(root)) return false;
+    s.stack.push_back(root);
+    for (;;) {
+      while (!s.stack.empty()) {
+        const Pair pair = s.stack.back();
+        s.stack.pop_back();
+        if (spheres_ ? stepSpheres(pair, s) : stepBoxes(pair, s)) return true;
+      }
+      if (s.pending.empty()) return false;
+      uniqueGrowths(s.growths);
+      tree::Tree::grow(s.growths);
+      s.growths.clear();
+      s.stack.swap(s.pending);
+    }
+  }
+
+ private:
+  struct Pair {
+    typename A::Node a;
+    typename B::Node b;
+  };
+  static constexpr std::uint64_t kNoPack = ~std::uint64_t{0};
+  struct Scratch {
+    std::vector<Pair> stack, pending;
+    std::vector<tree::Tree::Growth> growths;
+    TrianglePack a, b;
+    std::uint64_t pack_of_a = kNoPack;  // which node and part of its list pack `a` holds
+    PackPair found[TrianglePack::kCapacity * TrianglePack::kCapacity];
+  };
+  static Scratch& scratch() {
+    thread_local Scratch s;
+    return s;
+  }
+
+  bool rootsMeet(const Pair& root) const {
+    return spheres_ ? spheresMeet(a_.sphere(root.a), inA(b_.sphere(root.b)))
+                    : !boxesApart(a_.volume(root.a), b_.volume(root.b), b_in_a_);
+  }
+
+  Sphere inA(Sphere s) const { return {b_in_a_ * s.center, s.radius * b_in_a_.scale}; }
+
+  bool spheresMeet(const Sphere& a, const Sphere& b) const {
+    const double reach = (a.radius + b.radius) * (1 + 1e-12) + b_in_a_.slack;
+    return (a.center - b.center).squaredNorm() <= reach * reach;
+  }
+
+  // Sets the pair aside when the node to expand must grow first; so must the other then, as it is the next larger one.
+  template <typename Side, typename Node, typename OtherSide, typename OtherNode>
+  void setAside(const Pair& pair, const Side& side, Node node, const OtherSide& other, OtherNode other_node,
+                State other_state, Scratch& s) const {
+    s.pending.push_back(pair);
+    side.grow(node, s.growths);
+    if (other_state == State::kGrows) other.grow(other_node, s.growths);
+  }
+
+  bool stepBoxes(const Pair& pair, Scratch& s) {
+    const State sa = a_.state(pair.a), sb = b_.state(pair.b);
+    if (sa == State::kLeaf && sb == State::kLeaf) return leafTriangles(pair, s);
+    const Volume va = a_.volume(pair.a), vb = b_.volume(pair.b);
+    const double size_a = va.half.squaredNorm();
+    const double size_b = vb.half.squaredNorm() * b_in_a_.scale * b_in_a_.scale;
+    if (sb == State::kLeaf || (sa != State::kLeaf && size_a >= size_b)) {
+      if (sa == State::kGrows) {
+        setAside(pair, a_, pair.a, b_, pair.b, sb, s);
+      } else {
+        a_.overlappingChildren(pair.a, vb, b_in_a_, [&](typename A::Node c) { s.stack.push_back({c, pair.b}); });
+      }
+    } else if (sb == State::kGrows) {
+      setAside(pair, b_, pair.b, a_, pair.a, sa, s);
+    } else {
+      b_.overlappingChildren(pair.b, va, a_in_b_, [&](typename B::Node c) { s.stack.push_back({pair.a, c}); });
+    }
+    return false;
+  }
+
+  bool stepSpheres(const Pair& pair, Scratch& s) {
+    const State sa = a_.state(pair.a), sb = b_.state(pair.b);
+    if (sa == State::kLeaf && sb == State::kLeaf) return leafSpheres(pair);
+    const Sphere ball_a = a_.sphere(pair.a), ball_b = inA(b_.sphere(pair.b));
+    if (sb == State::kLeaf || (sa != State::kLeaf && ball_a.radius >= ball_b.radius)) {
+      if (sa == State::kGrows) {
+        setAside(pair, a_, pair.a, b_, pair.b, sb, s);
+      } else {
+        a_.children(pair.a, [&](typename A::Node c) {
+          if (spheresMeet(a_.sphere(c), ball_b)) s.stack.push_back({c, pair.b});
+        });
+      }
+    } else if (sb == State::kGrows) {
+      setAside(pair, b_, pair.b, a_, pair.a, sa, s);
+    } else {
+      b_.children(pair.b, [&](typename B::Node c) {
+        if (spheresMeet(ball_a, inA(b_.sphere(c)))) s.stack.push_back({pair.a, c});
+      });
+    }
+    return false;
+  }
+
+  template <typename Side, typename Node>
+  static void fill(const Side& side, Node node, std::size_t begin, const Placement* place,
+                   const Eigen::Vector3d& origin, TrianglePack& pack) {
+    pack.count = std::min(side.triangleCount(node) - begin, TrianglePack::kCapacity);
+    float size = 0;
+    for (std::size_t i = 0; i < pack.count; ++i) {
+      const std::uint32_t t = side.triangle(node, begin + i);
+      pack.ids[i] = t;
+      for (int k = 0; k < 3; ++k) {
+        Eigen::Vector3d x = side.corner(t, k);
+        if (place != nullptr) x = *place * x;
+        x -= origin;
+        for (int c = 0; c < 3; ++c) {
+          const float f = static_cast<float>(x[c]);
+          pack.xyz[3 * k + c][i] = f;
+          size = std::max(size, std::abs(f));
+        }
+      }
+    }
+    pack.size = size;
+  }
+
+  bool leafTriangles(const Pair& pair, Scratch& s) {
+    const Eigen::Vector3d origin = a_.volume(pair.a).center;
+    const std::size_t count_a = a_.triangleCount(pair.a), count_b = b_.triangleCount(pair.b);
+    for (std::size_t i = 0; i < count_a; i += TrianglePack::kCapacity) {
+      const std::uint64_t key = std::uint64_t{pair.a.bits} << 32 | i;
+      if (key != s.pack_of_a) fill(a_, pair.a, i, nullptr, origin, s.a);
+      s.pack_of_a = key;
+      for (std::size_t j = 0; j < count_b; j += TrianglePack::kCapacity) {
+        fill(b_, pair.b, j, &b_in_a_, origin, s.b);
+        const std::size_t found = touchingPairs(s.a, s.b, static_cast<float>(b_in_a_.slack * 1.001), s.found);
+        for (std::size_t k = 0; k < found; ++k) {
+          if (visitor_.triangles(s.a.ids[s.found[k].row], s.b.ids[s.found[k].lane])) return true;
+        }
+      }
+    }
+    return false;
+  }
+
+  bool leafSpheres(const Pair& pair) {
+    if (a_.cells() && b_.cells()) {
+      const CellLeaf a{a_.cellId(pair.a), a_.cellSphere(pair.a)};
+      const CellLeaf b{b_.cellId(pair.b), inA(b_.cellSphere(pair.b))};
+      return spheresMeet(a.sphere, b.sphere) && visitor_.cells(a, b);
+    }
+    if (a_.cells()) {
+      const CellLeaf a{a_.cellId(pair.a), a_.cellSphere(pair.a)};
+      for (std::size_t i = 0; i < b_.triangleCount(pair.b); ++i) {
+        const std::uint32_t t = b_.triangle(pair.b, i);
+        const Corners corners = {b_in_a_ * b_.corner(t, 0), b_in_a_ * b_.corner(t, 1), b_in_a_ * b_.corner(t, 2)};
+        const Eigen::Vector3d point = closestPoint(a.sphere.center, corners);
+        if (spheresMeet(a.sphere, {point, 0}) && visitor_.cellOfA(a, t, point)) return true;
+      }
+      return false;
+    }
+    const CellLeaf b{b_.cellId(pair.b), inA(b_.cellSphere(pair.b))};
+    for (std::size_t i = 0; i < a_.triangleCount(pair.a); ++i) {
+      const std::uint32_t t = a_.triangle(pair.a, i);
+      const Corners corners = {a_.corner(t, 0), a_.corner(t, 1), a_.corner(t, 2)};
+      const Eigen::Vector3d point = closestPoint(b.sphere.center, corners);
+      if (spheresMeet(b.sphere, {point, 0}) && visitor_.cellOfB(t, b, point)) return true;
+    }
+    return false;
+  }
+
+  const A& a_;
+  const B& b_;
+  const Placement b_in_a_, a_in_b_;
+  Visitor& visitor_;
+  const bool spheres_;
+};
+
+}  // namespace bocst::query

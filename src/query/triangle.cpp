@@ -1,0 +1,157 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#include "query/triangle.h"
+
+#include <Eigen/Geometry>
+#include <algorithm>
+#include <cmath>
+#include <limits>
+
+namespace bocst::query {
+namespace {
+
+using Eigen::Vector3d;
+
+struct Interval {
+  double lo, hi;
+};
+
+Interval project(const Vector3d& axis, const Corners& t, const Vector3d& origin) {
+  const double a = axis.dot(t[0] - origin), b = axis.dot(t[1] - origin), c = axis.dot(t[2] - origin);
+  return {std::min({a, b, c}), std::max({a, b, c})};
+}
+
+Vector3d closestOnSegment(const Vector3d& x, const Vector3d& a, const Vector3d& b) {
+  const Vector3d d = b - a;
+  const double dd = d.squaredNorm();
+  return dd > 0 ? Vector3d(a + std::clamp(d.dot(x - a) / dd, 0.0, 1.0) * d) : a;
+}
+
+// Where the closed triangle t cuts the plane through o with normal n; false when it does not cross it.
+bool cutByPlane(const Corners& t, const Vector3d& o, const Vector3d& n, Vector3d& a, Vector3d& b) {
+  int found = 0;
+  Vector3d ends[6];
+  for (int i = 0; i < 3; ++i) {
+    const Vector3d &u = t[i], &v = t[(i + 1) % 3];
+    const double du = n.dot(u - o), dv = n.dot(v - o);
+    if (du == 0) ends[found++] = u;
+    if ((du < 0 && dv > 0) || (du > 0 && dv < 0)) ends[found++] = u + du / (du - dv) * (v - u);
+  }
+  if (found == 0) return false;
+  a = b = ends[0];
+  for (int i = 1; i < found; ++i) {
+    if ((ends[i] - a).squaredNorm() > (b - a).squaredNorm()) b = ends[i];
+  }
+  return true;
+}
+
+Vector3d middleOfOverlap(const Corners& p, const Corners& q) {
+  const Vector3d n = (p[1] - p[0]).cross(p[2] - p[0]), m = (q[1] - q[0]).cross(q[2] - q[0]);
+  const Vector3d line = n.cross(m);
+  Vector3d a, b, c, d;
+  if (line.squaredNorm() > 1e-24 * n.squaredNorm() * m.squaredNorm() && cutByPlane(p, q[0], m, a, b) &&
+      cutByPlane(q, p[0], n, c, d)) {
+    // Both segments lie on the line of the two planes: the middle of what they share.
+    const Vector3d origin = a, dir = line.normalized();
+    const double pa = 0, pb = dir.dot(b - origin), qc = dir.dot(c - origin), qd = dir.dot(d - origin);
+    const double lo = std::max(std::min(pa, pb), std::min(qc, qd)), hi = std::min(std::max(pa, pb), std::max(qc, qd));
+    return origin + (lo + hi) / 2 * dir;
+  }
+  const Vector3d lo = p[0].cwiseMin(p[1]).cwiseMin(p[2]).cwiseMax(q[0].cwiseMin(q[1]).cwiseMin(q[2]));
+  const Vector3d hi = p[0].cwiseMax(p[1]).cwiseMax(p[2]).cwiseMin(q[0].cwiseMax(q[1]).cwiseMax(q[2]));
+  return (lo + hi) / 2;
+}
+
+bool segmentCutsTriangle(const Vector3d& a, const Vector3d& b, const Corners& t) {
+  const Vector3d n = (t[1] - t[0]).cross(t[2] - t[0]);
+  const double da = n.dot(a - t[0]), db = n.dot(b - t[0]);
+  if ((da > 0 && db > 0) || (da < 0 && db < 0) || da == db) return false;
+  const Vector3d x = a + da / (da - db) * (b - a);
+  for (int i = 0; i < 3; ++i) {
+    if (n.dot((t[(i + 1) % 3] - t[i]).cross(x - t[i])) < 0) return false;
+  }
+  return true;
+}
+
+double segmentDistance(const Vector3d& a, const Vector3d& b, const Vector3d& c, const Vector3d& d) {
+  const Vector3d u = b - a, v = d - c, w = a - c;
+  const double uu = u.squaredNorm(), uv = u.dot(v), vv = v.squaredNorm(), det = uu * vv - uv * uv;
+  double best = std::min({(closestOnSegment(a, c, d) - a).norm(), (closestOnSegment(b, c, d) - b).norm(),
+                          (closestOnSegment(c, a, b) - c).norm(), (closestOnSegment(d, a, b) - d).norm()});
+  if (det > 0) {
+    const double s = (uv * v.dot(w) - vv * u.dot(w)) / det, t = (uu * v.dot(w) - uv * u.dot(w)) / det;
+    if (s >= 0 && s <= 1 && t >= 0 && t <= 1) best = std::min(best, (w + s * u - t * v).norm());
+  }
+  return best;
+}
+
+}  // namespace
+
+Touch partTriangles(const Corners& p, const Corners& q) {
+  Touch touch;
+  touch.point = middleOfOverlap(p, q);
+  const Vector3d e[3] = {p[1] - p[0], p[2] - p[1], p[0] - p[2]}, f[3] = {q[1] - q[0], q[2] - q[1], q[0] - q[2]};
+  const Vector3d n = e[0].cross(e[1]), m = f[0].cross(f[1]);
+  double size = 0;
+  for (int i = 0; i < 3; ++i) size = std::max({size, e[i].norm(), f[i].norm()});
+  double least = std::numeric_limits<double>::infinity();
+  const auto consider = [&](const Vector3d& axis, double scale) {
+    const double length = axis.norm();
+    if (!(length > 1e-10 * scale)) return;  // parallel edges: their cross product is rounding
+    const Vector3d a = axis / length;
+    const Interval i = project(a, p, p[0]), j = project(a, q, p[0]);
+    // Two ways out: q beyond the upper end of p, or below the lower end.
+    if (i.hi - j.lo < least) {
+      least = i.hi - j.lo;
+      touch.normal = a;
+    }
+    if (j.hi - i.lo < least) {
+      least = j.hi - i.lo;
+      touch.normal = -a;
+    }
+  };
+  consider(n, size * size);
+  consider(m, size * size);
+  for (int i = 0; i < 3; ++i) {
+    for (int j = 0; j < 3; ++j) consider(e[i].cross(f[j]), e[i].norm() * f[j].norm());
+  }
+  for (int i = 0; i < 3; ++i) {
+    consider(e[i].cross(n), e[i].norm() * n.norm());
+    consider(f[i].cross(m), f[i].norm() * m.norm());
+  }
+  touch.depth = std::isfinite(least) ? std::max(least, 0.0) : 0.0;
+  return touch;
+}
+
+Vector3d closestPoint(const Vector3d& x, const Corners& t) {
+  const Vector3d n = (t[1] - t[0]).cross(t[2] - t[0]);
+  const double nn = n.squaredNorm();
+  if (nn > 0) {
+    const Vector3d foot = x - n * (n.dot(x - t[0]) / nn);
+    bool inside = true;
+    for (int i = 0; i < 3 && inside; ++i) inside = n.dot((t[(i + 1) % 3] - t[i]).cross(foot - t[i])) >= 0;
+    if (inside) return foot;
+  }
+  Vector3d best = closestOnSegment(x, t[0], t[1]);
+  for (int i = 1; i < 3; ++i) {
+    const Vector3d c = closestOnSegment(x, t[i], t[(i + 1) % 3]);
+    if ((c - x).squaredNorm() < (best - x).squaredNorm()) best = c;
+  }
+  return best;
+}
+
+bool isDegenerate(const Corners& t) {
+  const Vector3d e = t[1] - t[0], f = t[2] - t[0];
+  return e.cross(f).norm() <= 1e-14 * e.norm() * f.norm();
+}
+
+double distanceDegenerate(const Corners& p, const Corners& q) {
+  double best = std::numeric_limits<double>::infinity();
+  for (int i = 0; i < 3; ++i) {
+    if (segmentCutsTriangle(p[i], p[(i + 1) % 3], q) || segmentCutsTriangle(q[i], q[(i + 1) % 3], p)) return 0;
+    best = std::min({best, (closestPoint(p[i], q) - p[i]).norm(), (closestPoint(q[i], p) - q[i]).norm()});
+    for (int j = 0; j < 3; ++j) best = std::min(best, segmentDistance(p[i], p[(i + 1) % 3], q[j], q[(j + 1) % 3]));
+  }
+  return best;
+}
+
+}  // namespace bocst::query

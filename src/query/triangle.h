@@ -1,0 +1,32 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#pragma once
+
+#include <Eigen/Core>
+
+namespace bocst::query {
+
+using Corners = Eigen::Vector3d[3];
+
+/// Where two primitives touch: unit normal from the first to the second, depth >= 0 such that moving the second by
+/// depth * normal ends the overlap, and a point midway in it.
+struct Touch {
+  Eigen::Vector3d normal = Eigen::Vector3d::UnitX();
+  Eigen::Vector3d point = Eigen::Vector3d::Zero();
+  double depth = 0;
+};
+
+/// The shortest way to part two triangles that touch: the separating axis (face normals, edge cross products, in-plane
+/// edge normals) with the least overlap. point is the middle of the segment in which they cut, or of the overlap of
+/// their boxes when they are coplanar or degenerate.
+Touch partTriangles(const Corners& p, const Corners& q);
+
+/// The point of a closed triangle, degenerate or not, that is nearest to x.
+Eigen::Vector3d closestPoint(const Eigen::Vector3d& x, const Corners& triangle);
+
+/// Has the triangle no area, up to rounding of its own corners?
+bool isDegenerate(const Corners& triangle);
+
+/// The distance between two triangles of which at least one has no area; 0 where they cross.
+double distanceDegenerate(const Corners& p, const Corners& q);
+
+}  // namespace bocst::query

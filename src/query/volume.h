@@ -1,0 +1,92 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#pragma once
+
+#include <cmath>
+
+#include <Eigen/Core>
+
+#include "lattice/lattice.h"
+#include "query/kernels.h"
+
+namespace bocst::query {
+
+/// What bounds the surface of a node: box AND slab, in the frame of its side (lattice units, or the partner's units).
+struct Volume {
+  Eigen::Vector3d center;
+  Eigen::Matrix3d axes = Eigen::Matrix3d::Identity();  ///< Columns: the box's unit axes.
+  Eigen::Vector3d half;
+  Eigen::Vector3d normal = Eigen::Vector3d::Zero();  ///< About unit length; zero: no slab.
+  double slab_offset = 0;  ///< Middle of the slab along normal, from center.
+  double slab_half = 0;
+};
+
+/// A sphere in the frame of its side.
+struct Sphere {
+  Eigen::Vector3d center;
+  double radius = 0;
+};
+
+/// From the frame of one side to that of the other: x' = scale * rotation * x + translation.
+struct Placement {
+  Eigen::Matrix3d rotation = Eigen::Matrix3d::Identity();
+  double scale = 1;
+  Eigen::Vector3d translation = Eigen::Vector3d::Zero();
+  double slack = 0;   ///< A length in the target frame: what positions may be off by; touching within it counts.
+  double defect = 0;  ///< Largest entry of rotation^T rotation - 1: what the axes tests must allow for.
+
+  Eigen::Vector3d operator*(const Eigen::Vector3d& x) const { return scale * (rotation * x) + translation; }
+
+  Placement inverse() const {
+    Placement p;
+    p.rotation = rotation.transpose();
+    p.scale = 1 / scale;
+    p.translation = -p.scale * (p.rotation * translation);
+    p.slack = slack * p.scale;
+    p.defect = defect;
+    return p;
+  }
+};
+
+/// The volume as the octants of a cell see it; `corner` and `side` are those of the octants' parent cell and of an octant.
+inline OneVolume seenFrom(const Volume& v, const Placement& to, const Eigen::Vector3d& corner, double side) {
+  OneVolume o;
+  const double inverse = 1 / side, scale = to.scale * inverse;
+  const Eigen::Vector3d center = (to * v.center - corner) * inverse;
+  const Eigen::Matrix3d axes = to.rotation * v.axes;
+  const Eigen::Vector3d normal = to.rotation * v.normal;
+  for (int k = 0; k < 3; ++k) {
+    o.center[k] = static_cast<float>(center[k]);
+    o.half[k] = static_cast<float>(v.half[k] * scale);
+    o.normal[k] = static_cast<float>(normal[k]);
+    for (int j = 0; j < 3; ++j) o.axes[j][k] = static_cast<float>(axes(k, j));
+  }
+  o.slab_offset = static_cast<float>(v.slab_offset * scale);
+  o.slab_half = static_cast<float>(v.slab_half * scale);
+  const double q = center.lpNorm<1>() + v.half.lpNorm<1>() * scale + 4;
+  o.pad = static_cast<float>(q * (128 * 0x1p-24 + 4 * to.defect) + to.slack * inverse);
+  return o;
+}
+
+/// Are the two boxes surely apart? The fifteen axes in double; `to` places b in a's frame. For the few pairs that no
+/// kernel sees.
+inline bool boxesApart(const Volume& a, const Volume& b, const Placement& to) {
+  const Eigen::Matrix3d r = a.axes.transpose() * (to.rotation * b.axes);
+  const Eigen::Vector3d t = a.axes.transpose() * (to * b.center - a.center), h = b.half * to.scale;
+  const double pad = (t.lpNorm<1>() + a.half.lpNorm<1>() + h.lpNorm<1>()) * (64 * 0x1p-53 + 4 * to.defect) + to.slack;
+  const Eigen::Matrix3d s = r.cwiseAbs();
+  for (int i = 0; i < 3; ++i) {
+    if (std::abs(t[i]) > a.half[i] + s.row(i).dot(h) + pad) return true;
+    if (std::abs(r.col(i).dot(t)) > h[i] + s.col(i).dot(a.half) + pad) return true;
+  }
+  for (int i = 0; i < 3; ++i) {
+    for (int j = 0; j < 3; ++j) {
+      const int i1 = (i + 1) % 3, i2 = (i + 2) % 3, j1 = (j + 1) % 3, j2 = (j + 2) % 3;
+      const double d = t[i2] * r(i1, j) - t[i1] * r(i2, j);
+      const double reach = a.half[i1] * s(i2, j) + a.half[i2] * s(i1, j) + h[j1] * s(i, j2) + h[j2] * s(i, j1);
+      if (std::abs(d) > reach + 2 * pad) return true;
+    }
+  }
+  return false;
+}
+
+}  // namespace bocst::query

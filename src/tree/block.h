@@ -1,0 +1,73 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#pragma once
+
+#include <atomic>
+#include <cstdint>
+
+#include "oracle/oracle.h"
+
+namespace bocst::tree {
+
+/// Says where the triangles or the children of a resident node are: two bits of tag, thirty of index.
+class Link {
+ public:
+  enum Tag : std::uint32_t {
+    kImplicit = 0,  ///< Frontier: its triangles follow from the mesh (root) or from the root grid.
+    kList = 1,      ///< Frontier: index of a list in the list pool: its length, then triangle ids.
+    kBlock = 2,     ///< Expanded: index of the block of its children.
+  };
+
+  Link() = default;
+  Link(Tag tag, std::uint32_t index) : bits_(tag << 30 | index) {}
+
+  Tag tag() const { return static_cast<Tag>(bits_ >> 30); }
+  std::uint32_t index() const { return bits_ & 0x3fffffffu; }
+  bool operator==(Link other) const { return bits_ == other.bits_; }
+
+ private:
+  std::uint32_t bits_ = 0;
+};
+
+/// What an expanded node knows: its eight octants, published all at once. 160 bytes.
+///
+/// | bytes | what |
+/// |---|---|
+/// | 0..87 | octants: box and slab of each (oracle.h, OctantBounds) |
+/// | 88..98 | own: box and slab of the node itself, as its octants showed it (CellBounds) |
+/// | 99 | grey: bit o says octant o is a node |
+/// | 100..111 | cell: level, then x, y, z of the expanded node (16 bits each) and padding |
+/// | 112..143 | child: the link of each octant |
+/// | 144..151 | stamp: when a query last went through here, ns of the model's clock |
+/// | 152..159 | parent: block and octant where the expanded node itself is a child |
+struct alignas(32) Block {
+  oracle::OctantBounds octants;
+  oracle::CellBounds own;
+  std::uint8_t grey = 0;
+  std::uint8_t level = 1;
+  std::uint16_t at[3] = {0, 0, 0};
+  std::atomic<Link> child[8] = {};
+  mutable std::atomic<std::int64_t> stamp{0};
+  std::uint32_t parent = 0xffffffffu;
+  std::uint32_t parent_octant = 0;
+
+  lattice::Cell cell() const { return {level, {at[0], at[1], at[2]}}; }
+};
+static_assert(sizeof(Block) == 160);
+static_assert(sizeof(oracle::CellBounds) == 11);
+static_assert(std::atomic<Link>::is_always_lock_free);
+
+/// A resident node: the root, or an octant of a block.
+struct NodeRef {
+  static constexpr std::uint32_t kRoot = 0xffffffffu;
+
+  std::uint32_t bits = kRoot;
+
+  static NodeRef octant(std::uint32_t block, int o) { return {block << 3 | static_cast<std::uint32_t>(o)}; }
+  bool isRoot() const { return bits == kRoot; }
+  std::uint32_t block() const { return bits >> 3; }
+  int octant() const { return static_cast<int>(bits & 7); }
+  bool operator==(NodeRef other) const { return bits == other.bits; }
+  bool operator<(NodeRef other) const { return bits < other.bits; }
+};
+
+}  // namespace bocst::tree

@@ -1,0 +1,506 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#include "tree/tree.h"
+
+#include <algorithm>
+#include <cmath>
+#include <mutex>
+#include <numeric>
+#include <shared_mutex>
+#include <stdexcept>
+#include <string>
+
+namespace bocst::tree {
+namespace {
+
+Options checked(const Options& o) {
+  const auto bad = [](const std::string& what) { throw std::invalid_argument("bocst::Options: " + what); };
+  if (o.depth < 1 || o.depth > lattice::kMaxLevel) {
+    bad("depth is " + std::to_string(o.depth) + ", not 1 to " + std::to_string(lattice::kMaxLevel));
+  }
+  const double finest = 1 << lattice::kBits;
+  if (o.dimension != 0 && !(o.dimension >= 1 && o.dimension <= finest)) {
+    bad("dimension is " + std::to_string(o.dimension) + ", not 0 or 1 to 65536");
+  }
+  if (o.ttl.count() < 0) bad("ttl is negative");
+  if (o.margin != 0) bad("margin is " + std::to_string(o.margin) + ", but only 0 is supported in this version");
+  if (o.solid) bad("solid is not supported in this version");
+  return o;
+}
+
+int deepestLevel(const Options& o) {
+  if (o.answer == Answer::kExact) return lattice::kMaxLevel;
+  const bool more = o.level_rule && o.subdivision == Subdivision::kBono && lattice::oneLevelMore(o.dimension);
+  return std::min(o.depth + (more ? 1 : 0), lattice::kMaxLevel);
+}
+
+oracle::Surface surfaceOf(std::shared_ptr<const Mesh> mesh, const Options& o) {
+  if (mesh == nullptr) throw std::invalid_argument("bocst::Model: the mesh is null");
+  lattice::Lattice lattice(mesh->bounds(), o.subdivision, o.dimension);
+  return {std::move(mesh), lattice};
+}
+
+// A box in lattice units as bytes of a cell, rounded outwards; the margin is far above the rounding of toLattice.
+void setBox(const Eigen::AlignedBox3d& box, const lattice::Cell& cell, oracle::CellBounds& bounds) {
+  const double scale = 255.0 / cell.side(), margin = 1e-6;
+  for (int k = 0; k < 3; ++k) {
+    const double corner = cell.corner()[k];
+    bounds.lo[k] =
+        static_cast<std::uint8_t>(std::clamp(std::floor((box.min()[k] - margin - corner) * scale), 0.0, 255.0));
+    bounds.hi[k] =
+        static_cast<std::uint8_t>(std::clamp(std::ceil((box.max()[k] + margin - corner) * scale), 0.0, 255.0));
+  }
+}
+
+Eigen::AlignedBox3d latticeBounds(const oracle::Surface& surface) {
+  const Eigen::AlignedBox3d& b = surface.mesh->bounds();
+  return {surface.lattice.toLattice(b.min()), surface.lattice.toLattice(b.max())};
+}
+
+std::int64_t nanoseconds(Clock::time_point t) {
+  return std::chrono::duration_cast<std::chrono::nanoseconds>(t.time_since_epoch()).count();
+}
+
+}  // namespace
+
+Tree::Tree(std::shared_ptr<const Mesh> mesh, const Options& options)
+    : options_(checked(options)),
+      oracle_(oracle::makeOracle(options.oracle)),
+      deepest_(deepestLevel(options)),
+      surface_(surfaceOf(mesh, options)) {
+  reset(std::move(mesh));
+}
+
+void Tree::reset(std::shared_ptr<const Mesh> mesh) {
+  surface_ = surfaceOf(std::move(mesh), options_);
+  root_bounds_ = oracle::CellBounds();
+  setBox(latticeBounds(surface_), lattice::Cell{}, root_bounds_);
+  keepOnly({});
+}
+
+std::int64_t Tree::now() const { return nanoseconds(options_.clock ? options_.clock() : Clock::now()); }
+
+std::shared_ptr<const Mesh> Tree::mesh() const {
+  const std::shared_lock<Gate> look(gate_);
+  return surface_.mesh;
+}
+
+// Growth.
+
+void Tree::grow(std::vector<Growth>& batch) {
+  // Every growth locks the trees of its pair in address order.
+  std::array<Tree*, 2> trees{};
+  for (const Growth& g : batch) {
+    if (trees[0] == nullptr) trees[0] = g.tree;
+    if (g.tree != trees[0]) trees[1] = g.tree;
+  }
+  if (trees[1] != nullptr && std::less<Tree*>()(trees[1], trees[0])) std::swap(trees[0], trees[1]);
+  std::array<std::unique_lock<std::mutex>, 2> locks;
+  for (int i = 0; i < 2; ++i) {
+    if (trees[i] != nullptr) locks[i] = std::unique_lock<std::mutex>(trees[i]->growth_);
+  }
+
+  std::vector<oracle::Expansion> questions;
+  std::vector<Growth> asked;
+  std::vector<std::vector<std::uint32_t>> gathered;
+  gathered.reserve(batch.size());
+  for (const Growth& g : batch) {
+    Tree& tree = *g.tree;
+    const Link link = tree.link(g.node);
+    if (link.tag() == Link::kBlock) continue;
+    if (g.list_is_enough && link.tag() == Link::kList && tree.list(link).count <= kLeafTriangles) continue;
+    if (g.node.isRoot() && !tree.grid_tried_) tree.growRoot();
+    const lattice::Cell cell = tree.cell(g.node);
+    if (tree.grid_ != nullptr && cell.level < tree.grid_->level()) {
+      tree.growFromGrid(g.node);
+      continue;
+    }
+    oracle::Expansion question;
+    question.surface = &tree.surface_;
+    question.cell = cell;
+    if (link.tag() == Link::kList) {
+      const TriangleList list = tree.list(link);
+      question.ids = list.ids;
+      question.count = list.count;
+    } else if (g.node.isRoot()) {
+      question.count = tree.surface_.mesh->triangleCount();
+      if (g.list_is_enough && question.count <= kLeafTriangles) {
+        std::array<std::uint32_t, kLeafTriangles> ids;
+        std::iota(ids.begin(), ids.end(), 0u);
+        tree.setLink(g.node, tree.addList(ids.data(), question.count));
+        continue;
+      }
+    } else {
+      gathered.emplace_back();
+      tree.gatherNode(g.node, cell, gathered.back());
+      question.ids = gathered.back().data();
+      question.count = gathered.back().size();
+      if (g.list_is_enough && question.count <= kLeafTriangles) {
+        tree.setLink(g.node, tree.addList(question.ids, question.count));
+        continue;
+      }
+    }
+    questions.push_back(std::move(question));
+    asked.push_back(g);
+  }
+  if (!questions.empty()) {
+    oracle::Oracle& oracle = *asked.front().tree->oracle_;
+    oracle.submit(questions);
+    oracle.wait(questions);
+    for (std::size_t i = 0; i < questions.size(); ++i) {
+      asked[i].tree->publish(asked[i].node, questions[i]);
+      asked[i].tree->cells_ += 8;
+    }
+  }
+  for (Tree* tree : trees) {
+    if (tree == nullptr) continue;
+    const auto mine = [tree](const Growth& g) { return g.tree == tree; };
+    if (std::any_of(asked.begin(), asked.end(), mine)) ++tree->batches_;
+    tree->bytes_ = tree->treeBytes();
+  }
+}
+
+void Tree::growRoot() {
+  grid_tried_ = true;
+  grid_ = oracle::RootGrid::make(surface_, deepest_);
+  if (grid_ == nullptr) return;
+  ++batches_;
+  for (int level = 2; level <= grid_->level(); ++level) cells_ += std::uint64_t{1} << 3 * (level - 1);
+}
+
+void Tree::growFromGrid(NodeRef node) {
+  const lattice::Cell cell = this->cell(node);
+  std::uint8_t grey = 0;
+  for (int o = 0; o < 8; ++o) {
+    if (grid_->grey(cell.octant(o))) grey |= 1 << o;
+  }
+  const std::uint32_t index = addBlock(node, cell, grey);
+  Block& block = blocks_[index];
+  const Eigen::AlignedBox3d all = latticeBounds(surface_);
+  Eigen::AlignedBox3d own;
+  for (int o = 0; o < 8; ++o) {
+    if ((grey >> o & 1) == 0) continue;
+    const Eigen::AlignedBox3d box = grid_->bounds(cell.octant(o)).intersection(all);
+    oracle::CellBounds bounds;
+    setBox(box, cell.octant(o), bounds);
+    block.octants.set(o, bounds);
+    own.extend(box);
+  }
+  setBox(own, cell, block.own);
+  setLink(node, Link(Link::kBlock, index));
+}
+
+std::uint32_t Tree::addBlock(NodeRef node, const lattice::Cell& cell, std::uint8_t grey) {
+  const std::uint32_t index = blocks_.append(1);
+  Block& block = blocks_[index];
+  block.grey = grey;
+  block.level = static_cast<std::uint8_t>(cell.level);
+  for (int k = 0; k < 3; ++k) block.at[k] = static_cast<std::uint16_t>(cell.at[k]);
+  if (!node.isRoot()) {
+    block.parent = node.block();
+    block.parent_octant = static_cast<std::uint32_t>(node.octant());
+  }
+  block.stamp.store(now(), std::memory_order_relaxed);
+  nodes_at_[cell.level + 1] += __builtin_popcount(grey);
+  ++expansions_;
+  return index;
+}
+
+Link Tree::addList(const std::uint32_t* ids, std::size_t count) {
+  const std::uint32_t index = lists_.append(count + 1);
+  std::uint32_t* words = &lists_[index];
+  words[0] = static_cast<std::uint32_t>(count);
+  std::copy_n(ids, count, words + 1);
+  return Link(Link::kList, index);
+}
+
+void Tree::setLink(NodeRef node, Link link) {
+  std::atomic<Link>& place = node.isRoot() ? root_ : blocks_[node.block()].child[node.octant()];
+  place.store(link, std::memory_order_release);
+}
+
+void Tree::publish(NodeRef node, const oracle::Expansion& answer) {
+  const std::uint32_t index = addBlock(node, answer.cell, answer.grey);
+  Block& block = blocks_[index];
+  block.octants = answer.octants;
+  block.own = answer.own;
+  for (int o = 0; o < 8; ++o) {
+    if ((answer.grey >> o & 1) == 0) continue;
+    const std::size_t begin = answer.list_begin[o];
+    block.child[o].store(addList(answer.lists.data() + begin, answer.list_begin[o + 1] - begin),
+                         std::memory_order_relaxed);
+  }
+  setLink(node, Link(Link::kBlock, index));
+}
+
+void Tree::gatherNode(NodeRef node, const lattice::Cell& cell, std::vector<std::uint32_t>& ids) const {
+  if (node.isRoot() || grid_ == nullptr) throw std::logic_error("bocst: an implicit list without a grid");
+  grid_->gather(surface_, cell, ids);
+}
+
+// Decay.
+
+void Tree::collectTriangles(Link link, const lattice::Cell& cell, std::vector<std::uint32_t>& ids) const {
+  if (link.tag() == Link::kBlock) {
+    const Block& block = blocks_[link.index()];
+    for (int o = 0; o < 8; ++o) {
+      if (block.grey >> o & 1) collectTriangles(block.child[o].load(std::memory_order_relaxed), cell.octant(o), ids);
+    }
+  } else if (link.tag() == Link::kList) {
+    const TriangleList list = this->list(link);
+    ids.insert(ids.end(), list.ids, list.ids + list.count);
+  } else {
+    grid_->gather(surface_, cell, ids);
+  }
+}
+
+// Copies what stays into fresh pools: what goes leaves no holes, and nothing of it is looked at again.
+void Tree::keepOnly(const std::vector<std::uint8_t>& keep) {
+  const Link old_root = root_.load(std::memory_order_relaxed);
+  std::size_t before = 0, after = 0;
+  for (auto& n : nodes_at_) {
+    before += n;
+    n = 0;
+  }
+  nodes_at_[1] = 1;
+
+  struct Move {
+    Link from;
+    NodeRef to;
+    lattice::Cell cell;
+  };
+  std::vector<Move> moves{{old_root, NodeRef{}, lattice::Cell{}}};
+  const bool root_stays = old_root.tag() == Link::kBlock && old_root.index() < keep.size() && keep[old_root.index()];
+  if (!root_stays) {
+    grid_.reset();
+    grid_tried_ = false;
+    root_.store(Link(), std::memory_order_relaxed);
+    blocks_.clear();
+    lists_.clear();
+  } else {
+    Pool<Block, 5> blocks;
+    Pool<std::uint32_t, 12> lists;
+    Link root;
+    while (!moves.empty()) {
+      const Move move = moves.back();
+      moves.pop_back();
+      Link link = move.from;
+      if (link.tag() == Link::kBlock && !keep[link.index()]) {
+        link = Link();
+        if (grid_ == nullptr || move.cell.level > grid_->level()) {
+          std::vector<std::uint32_t> ids;
+          collectTriangles(move.from, move.cell, ids);
+          std::sort(ids.begin(), ids.end());
+          ids.erase(std::unique(ids.begin(), ids.end()), ids.end());
+          const std::uint32_t index = lists.append(ids.size() + 1);
+          lists[index] = static_cast<std::uint32_t>(ids.size());
+          std::copy(ids.begin(), ids.end(), &lists[index] + 1);
+          link = Link(Link::kList, index);
+        }
+      } else if (link.tag() == Link::kList) {
+        const TriangleList list = this->list(link);
+        const std::uint32_t index = lists.append(list.count + std::size_t{1});
+        std::copy_n(list.ids - 1, list.count + 1, &lists[index]);
+        link = Link(Link::kList, index);
+      } else if (link.tag() == Link::kBlock) {
+        const Block& from = blocks_[link.index()];
+        const std::uint32_t index = blocks.append(1);
+        Block& to = blocks[index];
+        to.octants = from.octants;
+        to.own = from.own;
+        to.grey = from.grey;
+        to.level = from.level;
+        std::copy_n(from.at, 3, to.at);
+        to.stamp.store(from.stamp.load(std::memory_order_relaxed), std::memory_order_relaxed);
+        if (!move.to.isRoot()) {
+          to.parent = move.to.block();
+          to.parent_octant = static_cast<std::uint32_t>(move.to.octant());
+        }
+        nodes_at_[from.level + 1] += __builtin_popcount(from.grey);
+        for (int o = 0; o < 8; ++o) {
+          if (from.grey >> o & 1) {
+            moves.push_back(
+                {from.child[o].load(std::memory_order_relaxed), NodeRef::octant(index, o), move.cell.octant(o)});
+          }
+        }
+        link = Link(Link::kBlock, index);
+      }
+      std::atomic<Link>& place = move.to.isRoot() ? root_ : blocks[move.to.block()].child[move.to.octant()];
+      place.store(link, std::memory_order_relaxed);
+    }
+    blocks_.swap(blocks);
+    lists_.swap(lists);
+  }
+  for (const auto& n : nodes_at_) after += n;
+  if (before > after) pruned_ += before - after;
+  bytes_ = treeBytes();
+}
+
+void Tree::pruneAlone(std::int64_t now, bool budget_only) {
+  if (!budget_only && options_.ttl.count() > 0 && root_.load(std::memory_order_relaxed).tag() == Link::kBlock) {
+    const std::int64_t ttl = std::chrono::duration_cast<std::chrono::nanoseconds>(options_.ttl).count();
+    // Children come after their parents in the pool, so one backward pass sees every child first.
+    std::vector<std::uint8_t> keep(blocks_.size(), 1);
+    bool some = false;
+    for (std::uint32_t i = blocks_.size(); i-- > 0;) {
+      const Block& block = blocks_[i];
+      bool deepest = true;
+      for (int o = 0; o < 8; ++o) {
+        if ((block.grey >> o & 1) == 0) continue;
+        const Link child = block.child[o].load(std::memory_order_relaxed);
+        if (child.tag() != Link::kBlock) continue;
+        deepest = false;
+        if (!keep[child.index()]) block.stamp.store(now, std::memory_order_relaxed);  // its own time starts (3.1)
+      }
+      if (deepest && now - block.stamp.load(std::memory_order_relaxed) > ttl) {
+        keep[i] = 0;
+        some = true;
+      }
+    }
+    if (some) keepOnly(keep);
+  }
+  applyBudget();
+}
+
+void Tree::applyBudget() {
+  const std::size_t budget = options_.memory_budget;
+  if (budget == 0 || bytes_ <= budget) return;
+  // Most recently used first; an ancestor is as recent as what is below it.
+  std::vector<std::uint32_t> order(blocks_.size());
+  for (std::uint32_t i = 0; i < order.size(); ++i) order[i] = i;
+  std::stable_sort(order.begin(), order.end(), [this](std::uint32_t a, std::uint32_t b) {
+    return blocks_[a].stamp.load(std::memory_order_relaxed) > blocks_[b].stamp.load(std::memory_order_relaxed);
+  });
+  for (double share = 0.75 * static_cast<double>(budget) / static_cast<double>(bytes_); bytes_ > budget; share = 0.5) {
+    const auto count = static_cast<std::size_t>(share * static_cast<double>(order.size()));
+    std::vector<std::uint8_t> keep(blocks_.size(), 0);
+    for (std::size_t k = 0; k < count; ++k) {
+      for (std::uint32_t i = order[k]; i != 0xffffffffu && !keep[i]; i = blocks_[i].parent) keep[i] = 1;
+    }
+    keepOnly(keep);
+    if (count == 0) return;
+    order.resize(blocks_.size());
+    for (std::uint32_t i = 0; i < order.size(); ++i) order[i] = i;
+    std::stable_sort(order.begin(), order.end(), [this](std::uint32_t a, std::uint32_t b) {
+      return blocks_[a].stamp.load(std::memory_order_relaxed) > blocks_[b].stamp.load(std::memory_order_relaxed);
+    });
+  }
+}
+
+void Tree::prune(Clock::time_point now) {
+  const std::lock_guard<Gate> alone(gate_);
+  pruneAlone(nanoseconds(now), false);
+}
+
+void Tree::maybePrune(std::int64_t now) {
+  const bool over_budget = options_.memory_budget != 0 && bytes_ > options_.memory_budget;
+  std::int64_t due = next_prune_.load(std::memory_order_relaxed);
+  const bool time_to = options_.ttl.count() > 0 && now >= due;
+  if (!over_budget && !time_to) return;
+  if (time_to) {
+    // A quarter of ttl between looks keeps the cost away from queries; whoever moves the time does the work.
+    const std::int64_t step = std::chrono::duration_cast<std::chrono::nanoseconds>(options_.ttl).count() / 4 + 1;
+    if (!next_prune_.compare_exchange_strong(due, now + step, std::memory_order_relaxed) && !over_budget) return;
+  }
+  std::unique_lock<Gate> alone(gate_, std::try_to_lock);
+  if (alone.owns_lock()) pruneAlone(now, !time_to);
+}
+
+void Tree::updateVertices(std::vector<Eigen::Vector3d> vertices) {
+  const std::lock_guard<Gate> alone(gate_);
+  const Mesh& old = *surface_.mesh;
+  if (vertices.size() != old.vertexCount()) {
+    throw std::invalid_argument("bocst::Model::updateVertices: " + std::to_string(vertices.size()) +
+                                " vertices, but the mesh has " + std::to_string(old.vertexCount()));
+  }
+  reset(Mesh::fromIndices(std::move(vertices), old.triangles()));
+}
+
+// Inspection.
+
+void Tree::expandAll(int depth) {
+  if (depth < 1 || depth > lattice::kMaxLevel) {
+    throw std::invalid_argument("bocst::Model::expandAll: depth is " + std::to_string(depth) + ", not 1 to " +
+                                std::to_string(lattice::kMaxLevel));
+  }
+  {
+    const std::lock_guard<Gate> alone(gate_);
+    keepOnly({});
+  }
+  const std::shared_lock<Gate> look(gate_);
+  constexpr std::size_t kBatch = 1024;  // bounds the memory that answers take before they are published
+  std::vector<NodeRef> level{NodeRef{}}, next;
+  for (int l = 1; l < depth; ++l) {
+    for (std::size_t begin = 0; begin < level.size(); begin += kBatch) {
+      std::vector<Growth> batch;
+      for (std::size_t i = begin; i < std::min(begin + kBatch, level.size()); ++i) {
+        batch.push_back({this, level[i], false});
+      }
+      grow(batch);
+    }
+    next.clear();
+    for (const NodeRef node : level) {
+      const std::uint32_t index = link(node).index();
+      for (int o = 0; o < 8; ++o) {
+        if (blocks_[index].grey >> o & 1) next.push_back(NodeRef::octant(index, o));
+      }
+    }
+    level.swap(next);
+  }
+}
+
+void Tree::visit(const std::function<void(const NodeView&)>& f) const {
+  const std::shared_lock<Gate> look(gate_);
+  const auto id = [](NodeRef node) { return node.isRoot() ? 0 : node.bits + 1; };
+  struct Entry {
+    NodeRef node;
+    std::uint32_t parent;
+  };
+  std::vector<Entry> stack{{NodeRef{}, NodeView::kNone}};
+  while (!stack.empty()) {
+    const Entry e = stack.back();
+    stack.pop_back();
+    const lattice::Cell cell = this->cell(e.node);
+    NodeView view;
+    view.id = id(e.node);
+    view.parent = e.parent;
+    view.object = surface_.mesh.get();
+    view.n = surface_.lattice.rootExponent() - (cell.level - 1);
+    Eigen::Vector3d center, half;
+    surface_.lattice.region(cell, center, half);
+    view.center = surface_.lattice.origin() + surface_.lattice.unit() * center;
+    view.radius = surface_.lattice.unit() * half.norm();
+    view.level = cell.level;
+    view.cell = cell.at;
+    const Link link = this->link(e.node);
+    if (link.tag() == Link::kBlock) {
+      const Block& block = blocks_[link.index()];
+      for (int o = 0; o < 8; ++o) {
+        if ((block.grey >> o & 1) == 0) continue;
+        const NodeRef child = NodeRef::octant(link.index(), o);
+        view.children.ids[view.children.count++] = id(child);
+        stack.push_back({child, view.id});
+      }
+    }
+    f(view);
+  }
+}
+
+Statistics Tree::statistics() const {
+  const std::shared_lock<Gate> look(gate_);
+  Statistics s;
+  s.resident_bytes = bytes_;
+  for (int level = 1; level <= lattice::kMaxLevel && nodes_at_[level] > 0; ++level) {
+    s.nodes_per_level.push_back(nodes_at_[level]);
+    s.resident_nodes += nodes_at_[level];
+  }
+  s.expansions = expansions_;
+  s.oracle_batches = batches_;
+  s.oracle_cells = cells_;
+  s.pruned_nodes = pruned_;
+  s.mesh_bytes = surface_.mesh->bytes();
+  return s;
+}
+
+std::size_t Tree::treeBytes() const { return blocks_.bytes() + lists_.bytes() + (grid_ ? grid_->bytes() : 0); }
+
+}  // namespace bocst::tree

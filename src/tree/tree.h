@@ -1,0 +1,141 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#pragma once
+
+#include <array>
+#include <atomic>
+#include <cstddef>
+#include <cstdint>
+#include <functional>
+#include <memory>
+#include <mutex>
+#include <vector>
+
+#include <bocst/mesh.h>
+#include <bocst/node_view.h>
+#include <bocst/options.h>
+#include <bocst/statistics.h>
+
+#include "oracle/oracle.h"
+#include "oracle/root_grid.h"
+#include "tree/block.h"
+#include "tree/gate.h"
+#include "tree/pool.h"
+
+namespace bocst::tree {
+
+/// Triangles of a frontier node with a list.
+struct TriangleList {
+  const std::uint32_t* ids = nullptr;
+  std::uint32_t count = 0;
+};
+
+/// The sphere-tree of one model: resident nodes, how they grow and how they go.
+///
+/// Threads: a query holds the gate shared while it looks at nodes. Growth appends blocks and publishes each by one
+/// store of its link, so readers are never in its way; one growth a tree at a time. What removes nodes (pruning, new
+/// vertices) holds the gate alone. Links only go implicit -> list -> block while the gate is held shared.
+class Tree {
+ public:
+  /// An exact answer tests the triangles of a node with at most so many instead of expanding it.
+  static constexpr std::uint32_t kLeafTriangles = 32;
+
+  /// @throws std::invalid_argument for options out of range, OracleError.
+  Tree(std::shared_ptr<const Mesh> mesh, const Options& options);
+
+  const Options& options() const { return options_; }
+  const oracle::Oracle& oracle() const { return *oracle_; }
+  Gate& gate() const { return gate_; }
+
+  // While the gate is held, shared or alone.
+
+  const oracle::Surface& surface() const { return surface_; }
+
+  Link link(NodeRef node) const {
+    return node.isRoot() ? root_.load(std::memory_order_acquire)
+                         : blocks_[node.block()].child[node.octant()].load(std::memory_order_acquire);
+  }
+  const Block& block(std::uint32_t index) const { return blocks_[index]; }
+  lattice::Cell cell(NodeRef node) const {
+    return node.isRoot() ? lattice::Cell{} : blocks_[node.block()].cell().octant(node.octant());
+  }
+  /// Box and slab of a node; an expanded one's come from its own octants.
+  oracle::CellBounds bounds(NodeRef node, Link link) const {
+    if (link.tag() == Link::kBlock) return blocks_[link.index()].own;
+    return node.isRoot() ? root_bounds_ : blocks_[node.block()].octants.get(node.octant());
+  }
+  TriangleList list(Link link) const {
+    const std::uint32_t* words = &lists_[link.index()];
+    return {words + 1, words[0]};
+  }
+  /// No more expansions below this node: a single lattice unit, or the collision depth of conservative answers.
+  bool isDeepest(int level) const { return level >= deepest_; }
+  int deepest() const { return deepest_; }
+  bool conservative() const { return options_.answer == Answer::kConservative; }
+
+  /// Marks a block as used now, for ttl and budget.
+  void touch(const Block& block, std::int64_t now) const {
+    if (block.stamp.load(std::memory_order_relaxed) < now) block.stamp.store(now, std::memory_order_relaxed);
+  }
+  std::int64_t now() const;
+
+  /// A node to grow, and whether a list of at most kLeafTriangles is enough (exact answers).
+  struct Growth {
+    Tree* tree;
+    NodeRef node;
+    bool list_is_enough;
+  };
+
+  /// One expansion batch: makes each node's children resident (or, where enough, its list). Nodes that another thread
+  /// has grown meanwhile are skipped. The gates of all trees are held shared.
+  static void grow(std::vector<Growth>& batch);
+
+  // With the gate free.
+
+  Statistics statistics() const;
+  void expandAll(int depth);
+  void visit(const std::function<void(const NodeView&)>& f) const;
+  void prune(Clock::time_point now);
+  void updateVertices(std::vector<Eigen::Vector3d> vertices);
+  std::shared_ptr<const Mesh> mesh() const;
+
+  /// Prunes when it is time and nobody is in the way; after each query.
+  void maybePrune(std::int64_t now);
+
+ private:
+  using Dropped = std::vector<std::uint8_t>;
+
+  void reset(std::shared_ptr<const Mesh> mesh);
+  void growRoot();
+  void growFromGrid(NodeRef node);
+  void publish(NodeRef node, const oracle::Expansion& answer);
+  std::uint32_t addBlock(NodeRef node, const lattice::Cell& cell, std::uint8_t grey);
+  Link addList(const std::uint32_t* ids, std::size_t count);
+  void setLink(NodeRef node, Link link);
+  void pruneAlone(std::int64_t now, bool budget_only);
+  void applyBudget();
+  void keepOnly(const std::vector<std::uint8_t>& keep);
+  void collectTriangles(Link link, const lattice::Cell& cell, std::vector<std::uint32_t>& ids) const;
+  std::size_t treeBytes() const;
+  void gatherNode(NodeRef node, const lattice::Cell& cell, std::vector<std::uint32_t>& ids) const;
+
+  const Options options_;
+  const std::shared_ptr<oracle::Oracle> oracle_;
+  const int deepest_;
+  mutable Gate gate_;
+  std::mutex growth_;  // guards what grow() appends to
+
+  oracle::Surface surface_;
+  oracle::CellBounds root_bounds_;
+  std::unique_ptr<oracle::RootGrid> grid_;
+  bool grid_tried_ = false;
+  std::atomic<Link> root_{Link()};
+  Pool<Block, 5> blocks_;
+  Pool<std::uint32_t, 12> lists_;
+
+  std::array<std::atomic<std::size_t>, lattice::kMaxLevel + 1> nodes_at_{};
+  std::atomic<std::size_t> bytes_{0};
+  std::atomic<std::uint64_t> expansions_{0}, batches_{0}, cells_{0}, pruned_{0};
+  std::atomic<std::int64_t> next_prune_{0};
+};
+
+}  // namespace bocst::tree
