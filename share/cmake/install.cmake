@@ -1,0 +1,35 @@
+# Install and export rules: what find_package(bocst) and pkg-config need. Included last, from the top level.
+option(BOCST_INSTALL "Make the install rules" ${PROJECT_IS_TOP_LEVEL})
+if(NOT BOCST_INSTALL)
+  return()
+endif()
+include(CMakePackageConfigHelpers)
+set(bocst_config_dir ${CMAKE_INSTALL_LIBDIR}/cmake/bocst)
+
+install(TARGETS bocst bocst_io EXPORT bocst-targets)
+install(DIRECTORY include/bocst DESTINATION ${CMAKE_INSTALL_INCLUDEDIR})
+install(FILES LICENSE DESTINATION ${CMAKE_INSTALL_DOCDIR})
+install(EXPORT bocst-targets NAMESPACE bocst:: FILE bocstTargets.cmake DESTINATION ${bocst_config_dir})
+
+# libbocst_io finds libbocst under any prefix.
+set_target_properties(bocst_io PROPERTIES INSTALL_RPATH "$ORIGIN")
+
+configure_package_config_file(${CMAKE_CURRENT_LIST_DIR}/bocstConfig.cmake.in ${PROJECT_BINARY_DIR}/bocstConfig.cmake
+  INSTALL_DESTINATION ${bocst_config_dir})
+write_basic_package_version_file(${PROJECT_BINARY_DIR}/bocstConfigVersion.cmake COMPATIBILITY SameMinorVersion)
+install(FILES ${PROJECT_BINARY_DIR}/bocstConfig.cmake ${PROJECT_BINARY_DIR}/bocstConfigVersion.cmake
+  DESTINATION ${bocst_config_dir})
+
+# The .pc files speak of their own place, so that the prefix can be chosen at install time, too.
+file(RELATIVE_PATH pc_to_include ${CMAKE_INSTALL_FULL_LIBDIR}/pkgconfig ${CMAKE_INSTALL_FULL_INCLUDEDIR})
+if(BUILD_SHARED_LIBS)
+  set(pc_bocst_static "")
+  set(pc_io_static "")
+else()
+  set(pc_bocst_static " -lhwy")
+  set(pc_io_static " -lassimp")
+endif()
+foreach(name bocst bocst-io)
+  configure_file(${CMAKE_CURRENT_LIST_DIR}/${name}.pc.in ${PROJECT_BINARY_DIR}/${name}.pc @ONLY)
+  install(FILES ${PROJECT_BINARY_DIR}/${name}.pc DESTINATION ${CMAKE_INSTALL_LIBDIR}/pkgconfig)
+endforeach()

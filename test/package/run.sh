@@ -1,0 +1,47 @@
+#!/usr/bin/env bash
+# SPDX-License-Identifier: BSD-3-Clause
+# Usage: test/package/run.sh BUILD_DIR
+# Installs a build into a prefix of its own, then builds and runs a separate project against it: by CMake's
+# find_package and by pkg-config.
+set -euo pipefail
+[[ $# -eq 1 ]] || { sed -n 's/^# Usage/usage/p' "$0" >&2; exit 2; }
+build=$(cd "$1" && pwd)
+source=$(cd "$(dirname "$0")" && pwd)
+
+# A value that the build was configured with, so that the consumer is built alike.
+cached() { sed -n "s/^$1:[A-Z]*=//p" "$build/CMakeCache.txt"; }
+compiler=$(cached CMAKE_CXX_COMPILER)
+sanitize=$(cached BOCST_SANITIZE)
+export CXXFLAGS="${sanitize:+-fsanitize=$sanitize}"
+
+work=$(mktemp -d)
+trap 'rm -rf "$work"' EXIT
+prefix=$work/prefix
+cmake --install "$build" --prefix "$prefix" >"$work/log" || { cat "$work/log"; exit 1; }
+
+# Code compiled without <bocst/fcl.h> reaches bocst only when its library is looked up before libfcl.
+check_order() {
+  local first
+  first=$(readelf -d "$1" | grep -oE 'lib(bocst|fcl)\.so' | sed 1q || true)
+  [[ $first == libbocst.so || $(cached BUILD_SHARED_LIBS) != ON ]] || { echo "FAILED: $first comes first"; exit 1; }
+}
+
+echo "-- find_package"
+cmake -S "$source" -B "$work/cmake" -G "$(cached CMAKE_GENERATOR)" -DCMAKE_BUILD_TYPE=Release \
+  -DCMAKE_CXX_COMPILER="$compiler" -DCMAKE_PREFIX_PATH="$prefix" >"$work/log" || { cat "$work/log"; exit 1; }
+cmake --build "$work/cmake"
+(cd "$work" && cmake/consumer)
+check_order "$work/cmake/consumer"
+
+echo "-- pkg-config"
+libdir=$(dirname "$(find "$prefix" -name pkgconfig -type d)")
+export PKG_CONFIG_PATH=$libdir/pkgconfig
+read -ra flags <<<"$CXXFLAGS $(pkg-config --cflags --libs bocst-io bocst)"
+"$compiler" -std=c++17 -O1 "$source/main.cpp" "${flags[@]}" -Wl,-rpath,"$libdir" -o "$work/consumer"
+(cd "$work" && ./consumer)
+check_order "$work/consumer"
+
+if [[ -x $prefix/bin/bocst ]]; then
+  echo "-- the installed program"
+  (cd "$work" && "$prefix/bin/bocst" collide tetrahedron.off tetrahedron.off)
+fi
