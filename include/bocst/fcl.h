@@ -170,8 +170,8 @@ namespace fcl {
   template <int = 0>                                                                                                  \
   S collide(const ContinuousCollisionObject<S>* o1, const ContinuousCollisionObject<S>* o2,                           \
             const ContinuousCollisionRequest<S>& request, ContinuousCollisionResult<S>& result) {                     \
-    return bocst::continuousCollide<S>(o1->collisionGeometry().get(), o1->getMotion(),                                \
-                                       o2->collisionGeometry().get(), o2->getMotion(), request, result);              \
+    return bocst::continuousCollide<S>(o1->collisionGeometry().get(), o1->getMotion(), o2->collisionGeometry().get(), \
+                                       o2->getMotion(), request, result);                                             \
   }
 
 BOCST_FCL_OVERLOADS(float)
