@@ -1,0 +1,71 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#include "arguments.h"
+
+#include <CLI/CLI.hpp>
+
+namespace bocst::program {
+
+void ModelArguments::addShape(CLI::App& command) {
+  command.add_option("--subdivision", subdivision, "how cells are divided: octree (O-BOCST) or bono (B-BOCST)")
+      ->check(CLI::IsMember({"octree", "bono"}))
+      ->capture_default_str();
+  command
+      .add_option("--dimension", dimension,
+                  "the paper's d_t: the largest extent in lattice units, 1 to 65536; 0: chosen for the mesh")
+      ->check(CLI::Range(0.0, 65536.0))
+      ->capture_default_str();
+}
+
+void ModelArguments::addDepth(CLI::App& command) {
+  command.add_option("--depth", depth, "collision depth: the level of the spheres that answer; the root is level 1")
+      ->check(CLI::Range(1, 17))
+      ->capture_default_str();
+}
+
+void ModelArguments::addOracle(CLI::App& command) {
+  command.add_option("--oracle", oracle, "who finds the octants that the surface meets; see `bocst oracles`")
+      ->check(CLI::IsMember({"auto", "cpu", "occlusion", "compute"}))
+      ->capture_default_str();
+}
+
+void ModelArguments::addAnswer(CLI::App& command) {
+  command
+      .add_option("--answer", answer, "exact: triangle tests; conservative: the spheres of --depth, as in the paper")
+      ->check(CLI::IsMember({"exact", "conservative"}))
+      ->capture_default_str();
+  command.add_option("--scalar", scalar, "the scalar type of models and queries")
+      ->check(CLI::IsMember({"double", "float"}))
+      ->capture_default_str();
+}
+
+void ModelArguments::addAll(CLI::App& command) {
+  addAnswer(command);
+  addDepth(command);
+  addShape(command);
+  addOracle(command);
+}
+
+Options ModelArguments::options() const {
+  Options options;
+  options.subdivision = subdivision == "octree" ? Subdivision::kOctree : Subdivision::kBono;
+  options.dimension = dimension;
+  options.answer = exact() ? Answer::kExact : Answer::kConservative;
+  options.depth = depth;
+  options.oracle = oracle == "cpu"         ? OracleKind::kCpu
+                   : oracle == "occlusion" ? OracleKind::kOcclusion
+                   : oracle == "compute"   ? OracleKind::kCompute
+                                           : OracleKind::kAuto;
+  return options;
+}
+
+Json ModelArguments::json() const {
+  return {{"answer", answer},       {"depth", depth},   {"subdivision", subdivision},
+          {"dimension", dimension}, {"oracle", oracle}, {"scalar", scalar}};
+}
+
+void addJson(CLI::App& command, Output& output) {
+  command.add_option("--json", output.json_file, "write a report as JSON into this file, or to stdout with -")
+      ->type_name("FILE|-");
+}
+
+}  // namespace bocst::program

@@ -1,0 +1,53 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#pragma once
+
+#include <bocst/options.h>
+
+#include <cstddef>
+#include <cstdint>
+#include <functional>
+#include <string>
+
+#include "query_pair.h"
+#include "report.h"
+
+namespace CLI {
+class App;
+}
+
+namespace bocst::program {
+
+/// What the command line asked for; returns the exit code.
+using Job = std::function<int()>;
+
+/// Each adds its subcommand to the program; choosing it sets `job`.
+void addCollide(CLI::App& program, Job& job);
+void addInspect(CLI::App& program, Job& job);
+void addValidate(CLI::App& program, Job& job);
+void addBench(CLI::App& program, Job& job);
+void addOracles(CLI::App& program, Job& job);
+
+/// The options of a model as the command line spells them.
+struct ModelArguments {
+  std::string subdivision = "bono";
+  double dimension = 0;
+  std::string answer = "exact";
+  int depth = Options{}.depth;
+  std::string oracle = "auto";
+  std::string scalar = "double";
+
+  void addShape(CLI::App& command);   ///< --subdivision --dimension
+  void addDepth(CLI::App& command);   ///< --depth
+  void addOracle(CLI::App& command);  ///< --oracle
+  void addAnswer(CLI::App& command);  ///< --answer --scalar
+  void addAll(CLI::App& command);
+
+  Options options() const;
+  Scalar scalarKind() const { return scalar == "float" ? Scalar::kFloat : Scalar::kDouble; }
+  bool exact() const { return answer == "exact"; }
+  Json json() const;
+};
+
+void addJson(CLI::App& command, Output& output);  ///< --json
+
+}  // namespace bocst::program

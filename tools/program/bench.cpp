@@ -1,0 +1,202 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#include <bocst/io.h>
+
+#include <CLI/CLI.hpp>
+#include <cstdio>
+#include <iostream>
+#include <memory>
+#include <stdexcept>
+#include <string>
+#include <vector>
+
+#include "arguments.h"
+#include "poses.h"
+#include "query_pair.h"
+
+namespace bocst::program {
+namespace {
+
+/// What one side needed, in microseconds, and what it said.
+struct Side {
+  std::vector<double> first_answers;
+  std::vector<std::vector<double>> rounds;  // by pose
+  std::vector<bool> first_verdicts;
+  std::vector<bool> verdicts;
+
+  std::vector<double> medians() const {
+    std::vector<double> result;
+    result.reserve(rounds.size());
+    for (const std::vector<double>& times : rounds) result.push_back(quantile(times, 0.5));
+    return result;
+  }
+
+  /// FNV-1a over the verdicts in order.
+  std::string hash() const {
+    std::uint64_t h = 0xcbf29ce484222325u;
+    for (const std::vector<bool>& list : {first_verdicts, verdicts}) {
+      for (const bool verdict : list) h = (h ^ (verdict ? 1u : 0u)) * 0x100000001b3u;
+    }
+    char text[17];
+    std::snprintf(text, sizeof(text), "%016llx", static_cast<unsigned long long>(h));
+    return text;
+  }
+};
+
+struct Bench {
+  std::string file_a;
+  std::string file_b;
+  std::size_t poses = 1000;
+  std::uint64_t seed = 1;
+  std::size_t rounds = 5;
+  Output output;
+
+  template <typename Make>
+  static auto timeFirst(const Make& make, const Eigen::Isometry3d& X_AB, Side& side) {
+    const Stopwatch watch;
+    auto pair = make();
+    side.first_verdicts.push_back(pair->touch(X_AB));
+    side.first_answers.push_back(watch.microseconds());
+    return pair;
+  }
+
+  static void timeRound(const QueryPair& pair, const std::vector<Eigen::Isometry3d>& X_ABs, Side& side) {
+    for (std::size_t i = 0; i < X_ABs.size(); ++i) {
+      const Stopwatch watch;
+      const bool verdict = pair.touch(X_ABs[i]);
+      side.rounds[i].push_back(watch.microseconds());
+      if (side.verdicts[i] != verdict) throw std::runtime_error("the same query was answered differently later");
+    }
+  }
+
+  static void warmUp(const QueryPair& pair, const std::vector<Eigen::Isometry3d>& X_ABs, Side& side) {
+    side.rounds.resize(X_ABs.size());
+    for (const Eigen::Isometry3d& X_AB : X_ABs) side.verdicts.push_back(pair.touch(X_AB));
+  }
+
+  int run() const {
+    output.check();
+    const std::shared_ptr<const Mesh> mesh_a = loadMesh(file_a);
+    const std::shared_ptr<const Mesh> mesh_b = file_b.empty() ? mesh_a : loadMesh(file_b);
+    const MeshArrays a(*mesh_a, Scalar::kDouble);
+    const MeshArrays b(*mesh_b, Scalar::kDouble);
+    const auto make_fcl = [&] { return buildFclPair(FclTree::kObbRss, Scalar::kDouble, a, b); };
+    const auto make_bocst = [&] { return makeBocstPair(Scalar::kDouble, a, b, Options{}); };
+
+    // Both sides take turns, so that a slow moment of the machine meets both.
+    Progress progress("step", 2 * rounds + 3);
+    const std::unique_ptr<QueryPair> fcl_pair = make_fcl();
+    progress.step();
+    PoseSampler sampler(*mesh_a, *mesh_b, *fcl_pair, seed);
+    std::vector<Eigen::Isometry3d> first_poses;
+    std::vector<Eigen::Isometry3d> X_ABs;
+    for (std::size_t i = 0; i < rounds; ++i) first_poses.push_back(sampler.nextAnywhere().transform());
+    for (std::size_t i = 0; i < poses; ++i) X_ABs.push_back(sampler.nextAnywhere().transform());
+    progress.step();
+
+    Side ours;
+    Side theirs;
+    std::vector<double> bytes_first;
+    std::string oracle;
+    for (const Eigen::Isometry3d& X_AB : first_poses) {
+      timeFirst(make_fcl, X_AB, theirs);
+      const std::unique_ptr<BocstPair> pair = timeFirst(make_bocst, X_AB, ours);
+      bytes_first.push_back(static_cast<double>(pair->bytes()));
+      oracle = pair->oracleName();
+      progress.step();
+    }
+    const std::unique_ptr<BocstPair> bocst_pair = make_bocst();
+    warmUp(*fcl_pair, X_ABs, theirs);
+    warmUp(*bocst_pair, X_ABs, ours);
+    progress.step();
+    for (std::size_t round = 0; round < rounds; ++round) {
+      if (round % 2 == 0) timeRound(*fcl_pair, X_ABs, theirs);
+      timeRound(*bocst_pair, X_ABs, ours);
+      if (round % 2 == 1) timeRound(*fcl_pair, X_ABs, theirs);
+      progress.step();
+    }
+
+    const bool equal = ours.verdicts == theirs.verdicts && ours.first_verdicts == theirs.first_verdicts;
+    const std::vector<double> our_medians = ours.medians();
+    const std::vector<double> fcl_medians = theirs.medians();
+    const auto fcl_bytes = static_cast<double>(fclTreeBytes(Scalar::kDouble, a.triangles.size()) +
+                                               fclTreeBytes(Scalar::kDouble, b.triangles.size()));
+    struct Row {
+      const char* key;
+      const char* name;
+      double bocst;
+      double fcl;
+    };
+    const std::vector<Row> times = {
+        {"first_answer", "first answer, median", quantile(ours.first_answers, 0.5),
+         quantile(theirs.first_answers, 0.5)},
+        {"query_median", "warm query, median", quantile(our_medians, 0.5), quantile(fcl_medians, 0.5)},
+        {"query_mean", "warm query, mean", mean(our_medians), mean(fcl_medians)},
+        {"query_p95", "warm query, 95th percentile", quantile(our_medians, 0.95), quantile(fcl_medians, 0.95)}};
+    const double memory = fcl_bytes / quantile(bytes_first, 0.5);
+    std::size_t hits = 0;
+    for (const bool verdict : theirs.verdicts) hits += verdict;
+
+    if (output.wantsJson()) {
+      Json ratio;
+      Json microseconds;
+      for (const Row& row : times) {
+        ratio[row.key] = row.fcl / row.bocst;
+        microseconds[row.key] = {{"bocst", row.bocst}, {"fcl", row.fcl}};
+      }
+      ratio["memory"] = memory;
+      ratio["distance_median"] = nullptr;
+      output.write(
+          {{"a", file_a},
+           {"b", file_b.empty() ? file_a : file_b},
+           {"triangles", {a.triangles.size(), b.triangles.size()}},
+           {"poses", poses},
+           {"seed", seed},
+           {"rounds", rounds},
+           {"hits", hits},
+           {"oracle", oracle},
+           {"ratio", ratio},
+           {"microseconds", microseconds},
+           {"bytes",
+            {{"bocst_first", quantile(bytes_first, 0.5)}, {"bocst_all", bocst_pair->bytes()}, {"fcl", fcl_bytes}}},
+           {"verdicts", {{"bocst", ours.hash()}, {"fcl", theirs.hash()}, {"equal", equal}}}});
+    } else {
+      Table table;
+      table.row({"", "bocst", "FCL OBBRSS", "ratio"});
+      for (const Row& row : times) {
+        table.row({row.name, formatTime(row.bocst), formatTime(row.fcl), formatRatio(row.fcl / row.bocst)});
+      }
+      const double first = quantile(bytes_first, 0.5);
+      const auto all = static_cast<double>(bocst_pair->bytes());
+      table.row({"tree bytes after one query", formatBytes(first), formatBytes(fcl_bytes), formatRatio(memory)});
+      table.row(
+          {"tree bytes after all queries", formatBytes(all), formatBytes(fcl_bytes), formatRatio(fcl_bytes / all)});
+      table.print();
+      std::cout << '\n'
+                << poses << " poses, " << hits << " touch; verdicts " << (equal ? "equal" : "DIFFER") << ", hash "
+                << ours.hash() << '\n';
+    }
+    if (!equal) throw std::runtime_error("the verdicts are not FCL's");
+    return 0;
+  }
+};
+
+}  // namespace
+
+void addBench(CLI::App& program, Job& job) {
+  auto bench = std::make_shared<Bench>();
+  CLI::App* command = program.add_subcommand("bench", "time and memory beside FCL's BVHModel<OBBRSS>, in one run");
+  command->footer("Ratios are FCL's figure over bocst's: above 1 bocst is better. About two poses of three touch.");
+  command->add_option("a", bench->file_a, "mesh A: OBJ, PLY, STL, OFF or DAE file")->required();
+  command->add_option("b", bench->file_b, "mesh B; A again if not given");
+  command->add_option("--poses", bench->poses, "number of random poses")
+      ->check(CLI::PositiveNumber)
+      ->capture_default_str();
+  command->add_option("--seed", bench->seed, "the same seed gives the same poses")->capture_default_str();
+  command->add_option("--rounds", bench->rounds, "first answers, and rounds over all poses")
+      ->check(CLI::PositiveNumber)
+      ->capture_default_str();
+  addJson(*command, bench->output);
+  command->callback([bench, &job] { job = [bench] { return bench->run(); }; });
+}
+
+}  // namespace bocst::program

@@ -1,0 +1,53 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#include <bocst/fcl.h>
+#include <bocst/model.h>
+
+#include "pair_of.h"
+#include "query_pair.h"
+
+namespace bocst::program {
+namespace {
+
+template <typename S>
+struct BocstCollide {
+  void operator()(const fcl::CollisionGeometry<S>* o1, const fcl::Transform3<S>& X_W1,
+                  const fcl::CollisionGeometry<S>* o2, const fcl::Transform3<S>& X_W2,
+                  const fcl::CollisionRequest<S>& request, fcl::CollisionResult<S>& result) const {
+    fcl::collide(o1, X_W1, o2, X_W2, request, result);
+  }
+};
+
+template <typename S>
+class ModelPair : public PairOf<S, Model<S>, BocstPair, BocstCollide<S>> {
+ public:
+  using PairOf<S, Model<S>, BocstPair, BocstCollide<S>>::PairOf;
+
+  Statistics statisticsA() const override { return this->a().statistics(); }
+  Statistics statisticsB() const override { return this->b().statistics(); }
+  std::string oracleName() const override { return this->a().oracleName(); }
+};
+
+template <typename S>
+std::unique_ptr<BocstPair> makePair(const MeshArrays& a, const MeshArrays& b, const Options& options) {
+  const auto make = [&options](const MeshArrays& mesh) {
+    return std::make_unique<Model<S>>(std::make_shared<const Mesh>(mesh.vertices, mesh.triangles), options);
+  };
+  return std::make_unique<ModelPair<S>>(make(a), make(b));
+}
+
+}  // namespace
+
+MeshArrays::MeshArrays(const Mesh& mesh, Scalar scalar) : vertices(mesh.vertices()) {
+  if (scalar == Scalar::kFloat) {
+    for (Eigen::Vector3d& v : vertices) v = v.cast<float>().cast<double>();
+  }
+  triangles.reserve(mesh.triangleCount());
+  for (std::size_t t = 0; t < mesh.triangleCount(); ++t) triangles.push_back(mesh.triangle(t));
+}
+
+std::unique_ptr<BocstPair> makeBocstPair(Scalar scalar, const MeshArrays& a, const MeshArrays& b,
+                                         const Options& options) {
+  return scalar == Scalar::kFloat ? makePair<float>(a, b, options) : makePair<double>(a, b, options);
+}
+
+}  // namespace bocst::program

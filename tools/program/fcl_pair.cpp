@@ -1,0 +1,79 @@
+// SPDX-License-Identifier: BSD-3-Clause
+// The only file that builds FCL's trees; its headers take long to compile. No bocst overload is in sight here.
+#include <fcl/geometry/bvh/BVH_model.h>
+#include <fcl/math/bv/OBB.h>
+#include <fcl/math/bv/OBBRSS.h>
+#include <fcl/math/bv/RSS.h>
+#include <fcl/narrowphase/collision.h>
+
+#include <stdexcept>
+
+#include "pair_of.h"
+#include "query_pair.h"
+
+namespace bocst::program {
+namespace {
+
+template <typename S>
+struct FclCollide {
+  void operator()(const fcl::CollisionGeometry<S>* o1, const fcl::Transform3<S>& X_W1,
+                  const fcl::CollisionGeometry<S>* o2, const fcl::Transform3<S>& X_W2,
+                  const fcl::CollisionRequest<S>& request, fcl::CollisionResult<S>& result) const {
+    fcl::collide(o1, X_W1, o2, X_W2, request, result);
+  }
+};
+
+void check(int code) {
+  if (code != fcl::BVH_OK) throw std::runtime_error("FCL refuses the mesh, code " + std::to_string(code));
+}
+
+const std::vector<fcl::Vector3d>& verticesFor(const std::vector<Eigen::Vector3d>& vertices, double) { return vertices; }
+
+std::vector<fcl::Vector3f> verticesFor(const std::vector<Eigen::Vector3d>& vertices, float) {
+  std::vector<fcl::Vector3f> rounded;
+  rounded.reserve(vertices.size());
+  for (const Eigen::Vector3d& v : vertices) rounded.push_back(v.cast<float>());
+  return rounded;
+}
+
+template <typename BV>
+std::unique_ptr<fcl::BVHModel<BV>> build(const MeshArrays& mesh) {
+  auto model = std::make_unique<fcl::BVHModel<BV>>();
+  check(model->beginModel(static_cast<int>(mesh.triangles.size()), static_cast<int>(mesh.vertices.size())));
+  check(model->addSubModel(verticesFor(mesh.vertices, typename BV::S{}), mesh.triangles));
+  check(model->endModel());
+  return model;
+}
+
+template <typename BV>
+std::unique_ptr<QueryPair> buildPair(const MeshArrays& a, const MeshArrays& b) {
+  using S = typename BV::S;
+  return std::make_unique<PairOf<S, fcl::BVHModel<BV>, QueryPair, FclCollide<S>>>(build<BV>(a), build<BV>(b));
+}
+
+template <typename S>
+std::unique_ptr<QueryPair> buildPair(FclTree tree, const MeshArrays& a, const MeshArrays& b) {
+  switch (tree) {
+    case FclTree::kObbRss:
+      return buildPair<fcl::OBBRSS<S>>(a, b);
+    case FclTree::kObb:
+      return buildPair<fcl::OBB<S>>(a, b);
+    case FclTree::kRss:
+      return buildPair<fcl::RSS<S>>(a, b);
+  }
+  return nullptr;
+}
+
+}  // namespace
+
+std::unique_ptr<QueryPair> buildFclPair(FclTree tree, Scalar scalar, const MeshArrays& a, const MeshArrays& b) {
+  return scalar == Scalar::kFloat ? buildPair<float>(tree, a, b) : buildPair<double>(tree, a, b);
+}
+
+std::size_t fclTreeBytes(Scalar scalar, std::size_t triangles) {
+  const std::size_t node =
+      scalar == Scalar::kFloat ? sizeof(fcl::BVNode<fcl::OBBRSS<float>>) : sizeof(fcl::BVNode<fcl::OBBRSS<double>>);
+  return triangles == 0 ? 0 : (2 * triangles - 1) * node;
+}
+
+}  // namespace bocst::program

@@ -1,0 +1,43 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#include <CLI/CLI.hpp>
+#include <algorithm>
+#include <exception>
+#include <iostream>
+#include <string>
+
+#include "arguments.h"
+
+namespace {
+
+int complain(std::string what, int code) {
+  std::replace(what.begin(), what.end(), '\n', ' ');
+  std::cerr << "bocst: " << what << std::endl;
+  return code;
+}
+
+}  // namespace
+
+int main(int argc, char** argv) {
+  using namespace bocst::program;
+  constexpr int kFailed = 1;
+  constexpr int kUsage = 2;
+  Job job;
+  CLI::App program("Sphere-trees that grow on demand: collision queries, measurements and comparisons with FCL.",
+                   "bocst");
+  program.require_subcommand(1);
+  program.footer("Exit code: 0 when all is well, 1 when something failed or was missed, 2 for a wrong command line.");
+  addCollide(program, job);
+  addInspect(program, job);
+  addValidate(program, job);
+  addBench(program, job);
+  addOracles(program, job);
+  try {
+    program.parse(argc, argv);
+    return job();
+  } catch (const CLI::ParseError& e) {
+    if (e.get_exit_code() == 0) return program.exit(e);  // --help
+    return complain(e.what(), kUsage);
+  } catch (const std::exception& e) {
+    return complain(e.what(), kFailed);
+  }
+}

@@ -1,0 +1,72 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#pragma once
+
+#include <fcl/geometry/collision_geometry.h>
+#include <fcl/narrowphase/collision_request.h>
+#include <fcl/narrowphase/collision_result.h>
+
+#include <algorithm>
+#include <memory>
+#include <utility>
+#include <vector>
+
+#include "query_pair.h"
+
+namespace bocst::program {
+
+/// A QueryPair over two FCL geometries. Collide is a functor, since which fcl::collide is meant depends on the headers
+/// that the including file has: FCL's own, or bocst's overloads.
+template <typename S, typename Geometry, typename Base, typename Collide>
+class PairOf : public Base {
+ public:
+  PairOf(std::unique_ptr<Geometry> a, std::unique_ptr<Geometry> b) : a_(std::move(a)), b_(std::move(b)) {}
+
+  bool touch(const Eigen::Isometry3d& X_AB, QueryPair::Order order) const override {
+    const fcl::CollisionRequest<S> request;
+    fcl::CollisionResult<S> result;
+    collide(X_AB, order, request, result);
+    return result.isCollision();
+  }
+
+  std::vector<QueryPair::Contact> contacts(const Eigen::Isometry3d& X_AB, std::size_t limit,
+                                           QueryPair::Order order) const override {
+    const fcl::CollisionRequest<S> request(limit, false);
+    fcl::CollisionResult<S> result;
+    collide(X_AB, order, request, result);
+    std::vector<QueryPair::Contact> found;
+    found.reserve(result.numContacts());
+    for (std::size_t i = 0; i < result.numContacts(); ++i) {
+      const fcl::Contact<S>& contact = result.getContact(i);
+      const bool first_is_a = contact.o1 == static_cast<const fcl::CollisionGeometry<S>*>(a_.get());
+      const auto b1 = static_cast<int>(contact.b1);
+      const auto b2 = static_cast<int>(contact.b2);
+      found.push_back(first_is_a ? QueryPair::Contact(b1, b2) : QueryPair::Contact(b2, b1));
+    }
+    std::sort(found.begin(), found.end());
+    found.erase(std::unique(found.begin(), found.end()), found.end());
+    return found;
+  }
+
+ protected:
+  const Geometry& a() const { return *a_; }
+  const Geometry& b() const { return *b_; }
+
+ private:
+  void collide(const Eigen::Isometry3d& X_AB, QueryPair::Order order, const fcl::CollisionRequest<S>& request,
+               fcl::CollisionResult<S>& result) const {
+    const fcl::Transform3<S> X_WA = fcl::Transform3<S>::Identity();
+    const fcl::Transform3<S> X_WB = X_AB.cast<S>();
+    const fcl::CollisionGeometry<S>* a = a_.get();
+    const fcl::CollisionGeometry<S>* b = b_.get();
+    if (order == QueryPair::Order::kAB) {
+      Collide()(a, X_WA, b, X_WB, request, result);
+    } else {
+      Collide()(b, X_WB, a, X_WA, request, result);
+    }
+  }
+
+  std::unique_ptr<Geometry> a_;
+  std::unique_ptr<Geometry> b_;
+};
+
+}  // namespace bocst::program

@@ -1,0 +1,75 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#pragma once
+
+#include <bocst/mesh.h>
+
+#include <Eigen/Geometry>
+#include <array>
+#include <cstddef>
+#include <cstdint>
+#include <string>
+
+#include "query_pair.h"
+
+namespace bocst::program {
+
+/// The pose of B in A's frame as the command line spells it: x,y,z,qw,qx,qy,qz. Every transform is made from these
+/// seven numbers in one way, so a pose that was printed can be run again bit by bit.
+struct Pose {
+  std::array<double, 7> numbers{0, 0, 0, 1, 0, 0, 0};
+
+  /// @throws std::invalid_argument when the text is not seven finite numbers with a quaternion that can be normalised.
+  static Pose parse(const std::string& text);
+
+  Eigen::Isometry3d transform() const;
+  std::string text() const;
+};
+
+/// splitmix64, and only operations that IEEE 754 rounds correctly: the same poses on every machine.
+class Random {
+ public:
+  explicit Random(std::uint64_t seed) : state_(seed) {}
+
+  std::uint64_t bits();
+  double uniform();  ///< From [0, 1).
+  double between(double low, double high) { return low + (high - low) * uniform(); }
+
+  /// Uniform on the unit sphere of N dimensions, by rejection.
+  template <int N>
+  std::array<double, N> direction();
+
+ private:
+  std::uint64_t state_;
+};
+
+/// Poses of B in A's frame, where the meshes touch or nearly do. Along a random ray the distance at which they part is
+/// found by bisection of a reference's verdicts.
+class PoseSampler {
+ public:
+  PoseSampler(const Mesh& a, const Mesh& b, const QueryPair& reference, std::uint64_t seed);
+
+  /// Around contact: of eight poses on a ray, six lie off contact by 1e-9 to 1e-1 of the smaller radius, evenly in the
+  /// logarithm and to both sides; two anywhere from deep inside to half a contact distance outside.
+  Pose nextAroundContact();
+
+  /// From deep inside to half a contact distance outside, each on a ray of its own: two of three touch.
+  Pose nextAnywhere();
+
+ private:
+  /// @throws std::runtime_error when no ray finds a pose in which the meshes touch.
+  void nextRay(int steps);
+  Pose at(double distance) const;
+
+  const QueryPair& reference_;
+  Random random_;
+  Eigen::Vector3d center_a_;
+  Eigen::Vector3d center_b_;
+  double radius_a_;
+  double radius_b_;
+  std::array<double, 4> rotation_{1, 0, 0, 0};
+  Eigen::Vector3d ray_ = Eigen::Vector3d::UnitX();
+  double contact_ = 0;
+  int left_on_ray_ = 0;
+};
+
+}  // namespace bocst::program

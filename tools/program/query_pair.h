@@ -1,0 +1,79 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#pragma once
+
+#include <bocst/mesh.h>
+#include <bocst/options.h>
+#include <bocst/statistics.h>
+#include <fcl/math/triangle.h>
+
+#include <Eigen/Geometry>
+#include <cstddef>
+#include <limits>
+#include <memory>
+#include <string>
+#include <utility>
+#include <vector>
+
+namespace bocst::program {
+
+enum class Scalar { kFloat, kDouble };
+
+/// A mesh as a caller of FCL has it, so that both sides start from the same arrays.
+struct MeshArrays {
+  std::vector<Eigen::Vector3d> vertices;
+  std::vector<fcl::Triangle> triangles;
+
+  /// With float, vertices are rounded here, once: both sides must see the same mesh.
+  MeshArrays(const Mesh& mesh, Scalar scalar);
+};
+
+/// Two geometries A and B, and questions about them. X_AB is the pose of B in A's frame.
+class QueryPair {
+ public:
+  /// Triangle of A, triangle of B.
+  using Contact = std::pair<int, int>;
+  static constexpr std::size_t kAll = std::numeric_limits<std::size_t>::max();
+  enum class Order { kAB, kBA };
+
+  QueryPair() = default;
+  virtual ~QueryPair() = default;
+  QueryPair(const QueryPair&) = delete;
+  QueryPair& operator=(const QueryPair&) = delete;
+
+  /// fcl::collide in its default form: do they touch? Order says which geometry is the first argument.
+  virtual bool touch(const Eigen::Isometry3d& X_AB, Order order = Order::kAB) const = 0;
+
+  /// Up to `limit` contacts as found, sorted and without repetitions.
+  virtual std::vector<Contact> contacts(const Eigen::Isometry3d& X_AB, std::size_t limit = kAll,
+                                        Order order = Order::kAB) const = 0;
+};
+
+/// FCL's own trees over both meshes.
+enum class FclTree { kObbRss, kObb, kRss };
+
+std::unique_ptr<QueryPair> buildFclPair(FclTree tree, Scalar scalar, const MeshArrays& a, const MeshArrays& b);
+
+/// Bytes of the bounding volume nodes that FCL's OBBRSS tree takes for this many triangles.
+std::size_t fclTreeBytes(Scalar scalar, std::size_t triangles);
+
+/// Two fresh bocst models.
+class BocstPair : public QueryPair {
+ public:
+  virtual Statistics statisticsA() const = 0;
+  virtual Statistics statisticsB() const = 0;
+  virtual std::string oracleName() const = 0;
+
+  std::size_t nodes() const { return statisticsA().resident_nodes + statisticsB().resident_nodes; }
+  std::size_t bytes() const { return statisticsA().resident_bytes + statisticsB().resident_bytes; }
+};
+
+std::unique_ptr<BocstPair> makeBocstPair(Scalar scalar, const MeshArrays& a, const MeshArrays& b,
+                                         const Options& options);
+
+/// Makes the pair and asks once: what a planner pays for its first answer.
+template <typename Make>
+bool firstAnswer(const Make& make, const Eigen::Isometry3d& X_AB) {
+  return make()->touch(X_AB);
+}
+
+}  // namespace bocst::program

@@ -1,0 +1,77 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#pragma once
+
+#include <chrono>
+#include <cstddef>
+#include <nlohmann/json.hpp>
+#include <string>
+#include <vector>
+
+namespace bocst::program {
+
+/// Insertion order is reading order.
+using Json = nlohmann::ordered_json;
+
+/// Where a report goes: a table on stdout, or JSON into a file or ("-") stdout.
+class Output {
+ public:
+  std::string json_file;
+
+  bool wantsJson() const { return !json_file.empty(); }
+
+  /// Fails now rather than after minutes of work. @throws std::runtime_error when the file cannot be written.
+  void check() const;
+
+  /// Files appear whole or not at all. @throws std::runtime_error when that fails.
+  void write(const Json& json) const;
+};
+
+/// A table for people: the first column to the left, the others to the right.
+class Table {
+ public:
+  void row(std::vector<std::string> cells) { rows_.push_back(std::move(cells)); }
+  void print() const;
+
+ private:
+  std::vector<std::vector<std::string>> rows_;
+};
+
+/// A line on stderr that counts up while long work runs; nothing when stderr is no terminal.
+class Progress {
+ public:
+  Progress(std::string what, std::size_t total);
+  ~Progress();
+  Progress(const Progress&) = delete;
+  Progress& operator=(const Progress&) = delete;
+
+  void step();
+
+ private:
+  std::string what_;
+  std::size_t total_;
+  std::size_t done_ = 0;
+  bool terminal_;
+  std::chrono::steady_clock::time_point next_;
+};
+
+/// Microseconds since it was made.
+class Stopwatch {
+ public:
+  double microseconds() const {
+    return std::chrono::duration<double, std::micro>(std::chrono::steady_clock::now() - start_).count();
+  }
+
+ private:
+  std::chrono::steady_clock::time_point start_ = std::chrono::steady_clock::now();
+};
+
+/// The value below which the fraction q of the samples lies; 0.5 is the median. Takes a copy to sort.
+double quantile(std::vector<double> samples, double q);
+double mean(const std::vector<double>& samples);
+
+std::string formatTime(double microseconds);
+std::string formatBytes(double bytes);
+std::string formatNumber(double value, int digits = 3);  ///< That many significant digits, no exponent if short.
+std::string formatRatio(double ratio);                   ///< "12.3 x"
+
+}  // namespace bocst::program

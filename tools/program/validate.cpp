@@ -1,0 +1,186 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#include <bocst/io.h>
+
+#include <CLI/CLI.hpp>
+#include <iostream>
+#include <memory>
+#include <stdexcept>
+#include <string>
+#include <utility>
+#include <vector>
+
+#include "arguments.h"
+#include "poses.h"
+#include "query_pair.h"
+
+namespace bocst::program {
+namespace {
+
+using Order = QueryPair::Order;
+
+struct Validate {
+  std::string file_a;
+  std::string file_b;
+  std::size_t poses = 1000;
+  std::uint64_t seed = 1;
+  bool compare_contacts = false;
+  std::vector<std::string> references{"obbrss"};
+  ModelArguments model;
+  Output output;
+
+  /// A pose with a wrong answer and what was wrong, for the report.
+  struct Failure {
+    Pose pose;
+    std::string what;
+  };
+
+  struct Count {
+    std::size_t reference_hits = 0;
+    std::size_t hits = 0;
+    std::size_t false_negatives = 0;
+    std::size_t false_positives = 0;
+    std::size_t order_differences = 0;
+    std::size_t contact_differences = 0;
+    std::size_t mismatches = 0;
+    std::vector<Failure> failures;
+  };
+
+  static FclTree treeOf(const std::string& name) {
+    return name == "obb" ? FclTree::kObb : name == "rss" ? FclTree::kRss : FclTree::kObbRss;
+  }
+
+  void check(const Pose& pose, const QueryPair& ours, const std::vector<std::unique_ptr<QueryPair>>& all,
+             Count& count) const {
+    const Eigen::Isometry3d X_AB = pose.transform();
+    const bool hit = ours.touch(X_AB, Order::kAB);
+    const bool hit_swapped = ours.touch(X_AB, Order::kBA);
+    bool missed = false;
+    bool invented = false;
+    bool order = hit != hit_swapped;
+    bool sets = false;
+    for (std::size_t i = 0; i < all.size(); ++i) {
+      const bool reference_hit = all[i]->touch(X_AB);
+      if (i == 0) count.reference_hits += reference_hit;
+      missed |= reference_hit && !(hit && hit_swapped);
+      invented |= !reference_hit && (hit || hit_swapped);
+    }
+    if (compare_contacts) {
+      const std::vector<QueryPair::Contact> contacts = ours.contacts(X_AB, QueryPair::kAll, Order::kAB);
+      order |= ours.contacts(X_AB, QueryPair::kAll, Order::kBA) != contacts;
+      for (const auto& reference : all) sets |= reference->contacts(X_AB) != contacts;
+    }
+    count.hits += hit;
+    count.false_negatives += missed;
+    count.false_positives += invented;
+    count.order_differences += order;
+    count.contact_differences += sets;
+    if (!missed && !order && !sets && !(model.exact() && invented)) return;
+    ++count.mismatches;
+    constexpr std::size_t kEnough = 16;
+    if (count.failures.size() < kEnough) {
+      count.failures.push_back({pose, missed     ? "false negative"
+                                      : order    ? "argument order matters"
+                                      : invented ? "false positive"
+                                                 : "contacts differ"});
+    }
+  }
+
+  int run() const {
+    output.check();
+    const std::shared_ptr<const Mesh> mesh_a = loadMesh(file_a);
+    const std::shared_ptr<const Mesh> mesh_b = loadMesh(file_b);
+    const MeshArrays a(*mesh_a, model.scalarKind());
+    const MeshArrays b(*mesh_b, model.scalarKind());
+    std::vector<std::unique_ptr<QueryPair>> all;
+    for (const std::string& name : references) all.push_back(buildFclPair(treeOf(name), model.scalarKind(), a, b));
+    const std::unique_ptr<BocstPair> ours = makeBocstPair(model.scalarKind(), a, b, model.options());
+
+    PoseSampler sampler(*mesh_a, *mesh_b, *all.front(), seed);
+    Count count;
+    {
+      Progress progress("pose", poses);
+      for (std::size_t i = 0; i < poses; ++i) {
+        const Pose pose = sampler.nextAroundContact();
+        try {
+          check(pose, *ours, all, count);
+        } catch (const std::exception& e) {
+          throw std::runtime_error(std::string(e.what()) + " (pose " + pose.text() + ")");
+        }
+        progress.step();
+      }
+    }
+
+    if (output.wantsJson()) {
+      Json report = {{"a", file_a},
+                     {"b", file_b},
+                     {"options", model.json()},
+                     {"oracle", ours->oracleName()},
+                     {"reference", references},
+                     {"contacts_compared", compare_contacts},
+                     {"seed", seed},
+                     {"poses", poses},
+                     {"reference_hits", count.reference_hits},
+                     {"hits", count.hits},
+                     {"false_negatives", count.false_negatives},
+                     {"false_positives", count.false_positives},
+                     {"order_differences", count.order_differences},
+                     {"contact_differences", count.contact_differences},
+                     {"mismatches", count.mismatches},
+                     {"failures", Json::array()}};
+      for (const Failure& failure : count.failures) {
+        report["failures"].push_back({{"pose", failure.pose.numbers}, {"what", failure.what}});
+      }
+      output.write(report);
+    } else {
+      Table table;
+      const auto row = [&table](const char* name, std::size_t n) { table.row({name, std::to_string(n)}); };
+      row("poses", poses);
+      row("reference hits", count.reference_hits);
+      row("bocst hits", count.hits);
+      row("false negatives", count.false_negatives);
+      row("false positives", count.false_positives);
+      row("argument order matters", count.order_differences);
+      if (compare_contacts) row("sets of contacts differ", count.contact_differences);
+      row("mismatches", count.mismatches);
+      table.print();
+      for (const Failure& failure : count.failures) {
+        std::cout << failure.what << ": --pose " << failure.pose.text() << '\n';
+      }
+    }
+    if (count.mismatches == 0) return 0;
+    throw std::runtime_error(std::to_string(count.mismatches) + " of " + std::to_string(poses) +
+                             " poses answered wrongly, the first (" + count.failures.front().what + ") at --pose " +
+                             count.failures.front().pose.text());
+  }
+};
+
+}  // namespace
+
+void addValidate(CLI::App& program, Job& job) {
+  auto validate = std::make_shared<Validate>();
+  CLI::App* command = program.add_subcommand("validate", "compare answers with FCL's on many poses around contact");
+  command->footer(
+      "Of eight poses, six are off contact by 1e-9 to 1e-1 of the smaller radius, to both sides; two are anywhere.\n"
+      "Every pose is asked in both argument orders. A mismatch is a false negative, an answer that depends on the\n"
+      "argument order, and with exact answers also a false positive or another set of contacts.\n"
+      "Exit code 0 means that there was no mismatch.");
+  command->add_option("a", validate->file_a, "mesh A: OBJ, PLY, STL, OFF or DAE file")->required();
+  command->add_option("b", validate->file_b, "mesh B")->required();
+  command->add_option("--poses", validate->poses, "number of poses")->check(CLI::PositiveNumber)->capture_default_str();
+  command->add_option("--seed", validate->seed, "the same seed gives the same poses")->capture_default_str();
+  command->add_flag("--contacts", validate->compare_contacts, "compare the sets of triangle pairs too");
+  command->add_option("--reference", validate->references, "FCL's trees to compare with: obbrss, obb, rss (slow)")
+      ->delimiter(',')
+      ->check(CLI::IsMember({"obbrss", "obb", "rss"}))
+      ->capture_default_str();
+  validate->model.addAll(*command);
+  addJson(*command, validate->output);
+  command->callback([validate, &job] {
+    if (validate->compare_contacts && !validate->model.exact()) {
+      throw CLI::ValidationError("--contacts", "only exact answers have triangle pairs");
+    }
+    job = [validate] { return validate->run(); };
+  });
+}
+
+}  // namespace bocst::program
