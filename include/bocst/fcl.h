@@ -10,6 +10,7 @@
 // the first Model checks (see model.h).
 
 #include <bocst/export.h>
+#include <bocst/fcl_templates.h>
 #include <bocst/model.h>
 #include <fcl/narrowphase/collision.h>
 #include <fcl/narrowphase/collision_object.h>

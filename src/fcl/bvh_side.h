@@ -13,16 +13,16 @@ namespace bocst::fcl_room {
 
 /// The box about a bounding volume of FCL, in the frame of its model.
 template <typename S>
-query::Volume volumeOf(const fcl::AABB<S>& bv) {
-  query::Volume v;
+query::OrientedVolume volumeOf(const fcl::AABB<S>& bv) {
+  query::OrientedVolume v;
   v.center = (bv.min_.template cast<double>() + bv.max_.template cast<double>()) / 2;
   v.half = (bv.max_.template cast<double>() - bv.min_.template cast<double>()) / 2;
   return v;
 }
 
 template <typename S>
-query::Volume volumeOf(const fcl::OBB<S>& bv) {
-  query::Volume v;
+query::OrientedVolume volumeOf(const fcl::OBB<S>& bv) {
+  query::OrientedVolume v;
   v.center = bv.To.template cast<double>();
   v.axes = bv.axis.template cast<double>();
   v.half = bv.extent.template cast<double>();
@@ -31,8 +31,8 @@ query::Volume volumeOf(const fcl::OBB<S>& bv) {
 
 // A rectangle from its corner To along the first two axes, swept by a sphere.
 template <typename S>
-query::Volume volumeOf(const fcl::RSS<S>& bv) {
-  query::Volume v;
+query::OrientedVolume volumeOf(const fcl::RSS<S>& bv) {
+  query::OrientedVolume v;
   v.axes = bv.axis.template cast<double>();
   v.half = Eigen::Vector3d(bv.l[0] / 2.0 + bv.r, bv.l[1] / 2.0 + bv.r, bv.r);
   v.center = bv.To.template cast<double>() + v.axes * Eigen::Vector3d(bv.l[0] / 2.0, bv.l[1] / 2.0, 0);
@@ -40,19 +40,19 @@ query::Volume volumeOf(const fcl::RSS<S>& bv) {
 }
 
 template <typename S>
-query::Volume volumeOf(const fcl::OBBRSS<S>& bv) {
+query::OrientedVolume volumeOf(const fcl::OBBRSS<S>& bv) {
   return volumeOf(bv.obb);
 }
 
 template <typename S>
-query::Volume volumeOf(const fcl::kIOS<S>& bv) {
+query::OrientedVolume volumeOf(const fcl::kIOS<S>& bv) {
   return volumeOf(bv.obb);
 }
 
 // The first three directions of a k-DOP are the axes.
 template <typename S, std::size_t N>
-query::Volume volumeOf(const fcl::KDOP<S, N>& bv) {
-  query::Volume v;
+query::OrientedVolume volumeOf(const fcl::KDOP<S, N>& bv) {
+  query::OrientedVolume v;
   for (std::size_t k = 0; k < 3; ++k) {
     const double lo = bv.dist(k), hi = bv.dist(k + N / 2);
     v.center[static_cast<Eigen::Index>(k)] = (lo + hi) / 2;
@@ -73,7 +73,7 @@ class BvhSide {
     if (bvh.getModelType() != fcl::BVH_MODEL_TRIANGLES || bvh.num_tris <= 0 || bvh.getNumBVs() <= 0) {
       throw std::invalid_argument("bocst::collide: the BVHModel is not a finished triangle mesh");
     }
-    const query::Volume v = volumeOf(bvh.getBV(0).bv);
+    const query::OrientedVolume v = volumeOf(bvh.getBV(0).bv);
     magnitude_ = v.center.cwiseAbs().maxCoeff() + v.half.norm();
   }
 
@@ -85,17 +85,18 @@ class BvhSide {
   query::State state(Node node) const {
     return bvh_.getBV(node).isLeaf() ? query::State::kLeaf : query::State::kInner;
   }
+  bool growsFreely(Node) const { return true; }
   void grow(Node, std::vector<tree::Tree::Growth>&) const {}
 
-  query::Volume volume(Node node) const {
-    query::Volume v = volumeOf(bvh_.getBV(node).bv);
+  query::OrientedVolume volume(Node node) const {
+    query::OrientedVolume v = volumeOf(bvh_.getBV(node).bv);
     // FCL rounds its volumes to nearest: widen each by what that may have lost.
     v.half.array() += magnitude_ * 32 * static_cast<double>(std::numeric_limits<S>::epsilon());
     return v;
   }
 
   query::Sphere sphere(Node node) const {
-    const query::Volume v = volume(node);
+    const query::OrientedVolume v = volume(node);
     return {v.center, v.half.norm()};
   }
 
@@ -106,7 +107,7 @@ class BvhSide {
   template <typename F>
   void overlappingChildren(Node node, const query::Volume& other, const query::Placement& to, F&& f) const {
     children(node, [&](Node child) {
-      if (!query::boxesApart(volume(child), other, to)) f(child);
+      if (!query::boxesApart(volume(child), query::oriented(other), to)) f(child);
     });
   }
 

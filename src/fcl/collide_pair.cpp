@@ -1,17 +1,17 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #include "fcl/collide_pair.h"
 
-#include <functional>
-#include <limits>
-#include <shared_mutex>
-#include <stdexcept>
-#include <string>
-
 #include <fcl/geometry/bvh/BVH_model.h>
 #include <fcl/math/geometry.h>
 #include <fcl/narrowphase/detail/traversal/collision/collision_traversal_node_base.h>
 #include <fcl/narrowphase/detail/traversal/collision/intersect.h>
 #include <fcl/narrowphase/detail/traversal/collision_node.h>
+
+#include <functional>
+#include <limits>
+#include <shared_mutex>
+#include <stdexcept>
+#include <string>
 
 #include "fcl/bvh_side.h"
 #include "query/pair_set.h"
@@ -58,8 +58,8 @@ struct Question {
   fcl::CollisionResult<S>& result;
 };
 
-/// Turns the pairs of a walk into contacts and cost sources. Side A of the walk is the caller's first geometry, or, when
-/// `swapped`, the second.
+/// Turns the pairs of a walk into contacts and cost sources. Side A of the walk is the caller's first geometry, or,
+/// when `swapped`, the second.
 template <typename S, typename Triangles1, typename Triangles2>
 class Collector : public query::Visitor {
  public:
@@ -76,6 +76,10 @@ class Collector : public query::Visitor {
   void setFrame(const Eigen::Vector3d& origin, double unit) {
     origin_ = origin;
     unit_ = unit;
+  }
+
+  bool endsAtFirst() const override {
+    return occupied_ && !q_.request.enable_cost && q_.result.numContacts() + 1 >= q_.request.num_max_contacts;
   }
 
   bool triangles(std::uint32_t a, std::uint32_t b) override {
@@ -238,15 +242,15 @@ Placement placementOf(const fcl::Transform3<S>& X_WA, const fcl::Transform3<S>& 
   // What FCL's triangle test, which computes R q + t in S, may take for a contact.
   p.slack = magnitude * 32 * static_cast<double>(std::numeric_limits<S>::epsilon()) / unit_a;
   p.defect = (p.rotation.transpose() * p.rotation - Eigen::Matrix3d::Identity()).cwiseAbs().maxCoeff();
+  p.ready();
   return p;
 }
 
 /// Positions in the frame of the first geometry are at most this large.
 template <typename S>
 double magnitudeOf(const Question<S>& q, double size1, double size2) {
-  const Eigen::Vector3d p =
-      q.X_W1.linear().transpose().template cast<double>() *
-      (q.X_W2.translation() - q.X_W1.translation()).template cast<double>();
+  const Eigen::Vector3d p = q.X_W1.linear().transpose().template cast<double>() *
+                            (q.X_W2.translation() - q.X_W1.translation()).template cast<double>();
   return p.norm() + 2 * (size1 + size2);
 }
 
@@ -280,8 +284,8 @@ void collideModels(const Question<S>& q, tree::Tree& tree1, tree::Tree& tree2) {
     const TreeSide a(tree_a), b(tree_b);
     now = a.now();
     const oracle::Surface &sa = tree_a.surface(), &sb = tree_b.surface();
-    const double magnitude = magnitudeOf(q, magnitudeOf(tree1.surface().mesh->bounds()),
-                                         magnitudeOf(tree2.surface().mesh->bounds()));
+    const double magnitude =
+        magnitudeOf(q, magnitudeOf(tree1.surface().mesh->bounds()), magnitudeOf(tree2.surface().mesh->bounds()));
     const ModelTriangles<S> t1(*tree1.surface().mesh), t2(*tree2.surface().mesh);
     Collector<S, ModelTriangles<S>, ModelTriangles<S>> collector(q, t1, t2, swapped, magnitude);
     collector.setFrame(sa.lattice.origin(), sa.lattice.unit());
@@ -290,8 +294,8 @@ void collideModels(const Question<S>& q, tree::Tree& tree1, tree::Tree& tree2) {
                         sb.lattice.origin(), sb.lattice.unit(), magnitude),
             collector);
   }
-  tree1.maybePrune(now);
-  if (&tree2 != &tree1) tree2.maybePrune(now);
+  tree1.afterQuery(now);
+  if (&tree2 != &tree1) tree2.afterQuery(now);
 }
 
 template <typename BV>
@@ -307,9 +311,8 @@ void collideBvh(const Question<typename BV::S>& q, tree::Tree& tree, const fcl::
     const double magnitude = magnitudeOf(q, magnitudeOf(surface.mesh->bounds()), b.magnitude());
     const ModelTriangles<S> model(*surface.mesh);
     const BvhTriangles<BV> partner(bvh);
-    const Placement b_in_a =
-        placementOf(swapped ? q.X_W2 : q.X_W1, swapped ? q.X_W1 : q.X_W2, surface.lattice.origin(),
-                    surface.lattice.unit(), Eigen::Vector3d::Zero(), 1.0, magnitude);
+    const Placement b_in_a = placementOf(swapped ? q.X_W2 : q.X_W1, swapped ? q.X_W1 : q.X_W2, surface.lattice.origin(),
+                                         surface.lattice.unit(), Eigen::Vector3d::Zero(), 1.0, magnitude);
     const auto run = [&](auto&& collector) {
       collector.setFrame(surface.lattice.origin(), surface.lattice.unit());
       walk<S>(a, b, b_in_a, collector);
@@ -320,7 +323,7 @@ void collideBvh(const Question<typename BV::S>& q, tree::Tree& tree, const fcl::
       run(Collector<S, ModelTriangles<S>, BvhTriangles<BV>>(q, model, partner, false, magnitude));
     }
   }
-  tree.maybePrune(now);
+  tree.afterQuery(now);
 }
 
 template <template <typename> class BV, typename S>

@@ -33,12 +33,14 @@ bool isInLibfcl(const void* address) {
 }
 
 template <typename S>
-std::string remedy() {
+std::string complaint() {
   return std::string("bocst: fcl::collide<") + scalarName(S()) +
          "> in this process does not reach bocst, so code that was compiled without <bocst/fcl.h> would be told that "
-         "nothing collides. Either let libbocst come before libfcl in the link order (CMake: "
-         "target_link_libraries(app bocst::bocst ...) with bocst::bocst before fcl) or LD_PRELOAD=libbocst.so; or "
-         "include <bocst/fcl.h> wherever FCL's queries are called, and set BOCST_DISPATCH_CHECK=off";
+         "nothing collides. Either let libbocst come before libfcl in the link order (CMake: target_link_libraries(app "
+         "bocst::bocst ...) with bocst::bocst before fcl) or LD_PRELOAD=libbocst.so; and where code makes its own "
+         "copies of FCL's templates (anything in float, a query with a solver), compile it without "
+         "-fvisibility=hidden; or include <bocst/fcl.h> wherever FCL's queries are called, and set "
+         "BOCST_DISPATCH_CHECK=off";
 }
 
 /// Calls through a volatile pointer, so that it is the dynamic linker that says whose code runs, and not the compiler.
@@ -77,7 +79,7 @@ std::string probe() {
   const Symbol<S(Object, Object, const fcl::DistanceRequest<S>&, fcl::DistanceResult<S>&)> distances(&fcl::distance<S>);
 
   // Asking would only print FCL's warning.
-  if (isInLibfcl(solver.address())) return remedy<S>();
+  if (isInLibfcl(solver.address())) return complaint<S>();
 
   const auto sentinel = std::make_shared<Sentinel<S>>();
   const fcl::Transform3<S> pose = fcl::Transform3<S>::Identity();
@@ -92,7 +94,7 @@ std::string probe() {
     if (geometries.pointer(sentinel.get(), pose, sentinel.get(), pose, request, result) != Sentinel<S>::kReached ||
         objects.pointer(&object, &object, request, result) != Sentinel<S>::kReached ||
         distances.pointer(&object, &object, distance_request, distance_result) != Sentinel<S>::kReached) {
-      return remedy<S>();
+      return complaint<S>();
     }
   }
   return {};
@@ -102,8 +104,8 @@ std::string probe() {
 
 template <typename S>
 void checkDispatch() {
-  static const std::string complaint = probe<S>();
-  if (!complaint.empty()) throw std::runtime_error(complaint);
+  static const std::string wrong = probe<S>();
+  if (!wrong.empty()) throw std::runtime_error(wrong);
 }
 template void checkDispatch<float>();
 template void checkDispatch<double>();

@@ -47,46 +47,7 @@ BOCST_EXPORT double continuousCollide<double>(const CollisionGeometry<double>*, 
 
 }  // namespace fcl
 
+#include <bocst/fcl_templates.h>
 #include <fcl/narrowphase/collision.h>
 #include <fcl/narrowphase/continuous_collision.h>
 #include <fcl/narrowphase/distance.h>
-
-// Each is compiled once, in the .cpp file beside this that is named after it: they are slow to compile.
-#define BOCST_FCL_COLLIDE_SOLVER(prefix, S, Solver)                                                  \
-  prefix template std::size_t fcl::collide<S, fcl::detail::Solver<S>>(                               \
-      const fcl::CollisionGeometry<S>*, const fcl::Transform3<S>&, const fcl::CollisionGeometry<S>*, \
-      const fcl::Transform3<S>&, const fcl::detail::Solver<S>*, const fcl::CollisionRequest<S>&,     \
-      fcl::CollisionResult<S>&);                                                                     \
-  prefix template std::size_t fcl::collide<S, fcl::detail::Solver<S>>(                               \
-      const fcl::CollisionObject<S>*, const fcl::CollisionObject<S>*, const fcl::detail::Solver<S>*, \
-      const fcl::CollisionRequest<S>&, fcl::CollisionResult<S>&);
-#define BOCST_FCL_COLLIDE(prefix, S)                                                                          \
-  prefix template std::size_t fcl::collide<S>(const fcl::CollisionGeometry<S>*, const fcl::Transform3<S>&,    \
-                                              const fcl::CollisionGeometry<S>*, const fcl::Transform3<S>&,    \
-                                              const fcl::CollisionRequest<S>&, fcl::CollisionResult<S>&);     \
-  prefix template std::size_t fcl::collide<S>(const fcl::CollisionObject<S>*, const fcl::CollisionObject<S>*, \
-                                              const fcl::CollisionRequest<S>&, fcl::CollisionResult<S>&);
-#define BOCST_FCL_DISTANCE(prefix, S)                                                                \
-  prefix template S fcl::distance<S>(const fcl::CollisionGeometry<S>*, const fcl::Transform3<S>&,    \
-                                     const fcl::CollisionGeometry<S>*, const fcl::Transform3<S>&,    \
-                                     const fcl::DistanceRequest<S>&, fcl::DistanceResult<S>&);       \
-  prefix template S fcl::distance<S>(const fcl::CollisionObject<S>*, const fcl::CollisionObject<S>*, \
-                                     const fcl::DistanceRequest<S>&, fcl::DistanceResult<S>&);
-#define BOCST_FCL_DISTANCE_SOLVER(prefix, S, Solver)                                                                   \
-  prefix template S fcl::distance<fcl::detail::Solver<S>>(const fcl::CollisionGeometry<S>*, const fcl::Transform3<S>&, \
-                                                          const fcl::CollisionGeometry<S>*, const fcl::Transform3<S>&, \
-                                                          const fcl::detail::Solver<S>*,                               \
-                                                          const fcl::DistanceRequest<S>&, fcl::DistanceResult<S>&);    \
-  prefix template S fcl::distance<fcl::detail::Solver<S>>(                                                             \
-      const fcl::CollisionObject<S>*, const fcl::CollisionObject<S>*, const fcl::detail::Solver<S>*,                   \
-      const fcl::DistanceRequest<S>&, fcl::DistanceResult<S>&);
-#define BOCST_FCL_EXTERN(S)                              \
-  BOCST_FCL_COLLIDE_SOLVER(extern, S, GJKSolver_libccd)  \
-  BOCST_FCL_COLLIDE_SOLVER(extern, S, GJKSolver_indep)   \
-  BOCST_FCL_COLLIDE(extern, S)                           \
-  BOCST_FCL_DISTANCE_SOLVER(extern, S, GJKSolver_libccd) \
-  BOCST_FCL_DISTANCE_SOLVER(extern, S, GJKSolver_indep)  \
-  BOCST_FCL_DISTANCE(extern, S)
-BOCST_FCL_EXTERN(float)
-BOCST_FCL_EXTERN(double)
-#undef BOCST_FCL_EXTERN

@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #include <bocst/mesh.h>
 
+#include <algorithm>
 #include <cmath>
 #include <limits>
 #include <stdexcept>
@@ -51,25 +52,33 @@ void Mesh::validate() {
   if (triangles_.empty()) bad("no triangles");
   if (triangles_.size() > kMaxTriangles) bad("more than 2^28 triangles");
   if (count > kMaxVertices) bad("more than 2^32 - 1 vertices");
-  for (std::size_t i = 0; i < count; ++i) {
-    // One comparison a coordinate finds NaN, infinities and what is too large.
-    if (!(vertices_[i].cwiseAbs().maxCoeff() <= kMaxCoordinate) || vertices_[i].hasNaN()) {
-      bad("vertex " + std::to_string(i) + " is " + coordinates(vertices_[i]));
-    }
-  }
-  Eigen::Array3d lo = Eigen::Array3d::Constant(std::numeric_limits<double>::max());
-  Eigen::Array3d hi = -lo;
+  // A vertex that no triangle uses is kept, but is no part of the surface.
+  std::vector<std::uint8_t> used(count, 0);
   for (std::size_t t = 0; t < triangles_.size(); ++t) {
     for (const std::uint32_t i : triangles_[t]) {
       if (i >= count) {
         bad("triangle " + std::to_string(t) + " has vertex index " + std::to_string(i) + ", but there are " +
             std::to_string(count) + " vertices");
       }
-      lo = lo.min(vertices_[i].array());
-      hi = hi.max(vertices_[i].array());
+      used[i] = 1;
     }
   }
-  bounds_ = Eigen::AlignedBox3d(lo.matrix(), hi.matrix());
+  double lo[3], hi[3];
+  std::fill_n(lo, 3, std::numeric_limits<double>::max());
+  std::fill_n(hi, 3, -std::numeric_limits<double>::max());
+  for (std::size_t i = 0; i < count; ++i) {
+    const Eigen::Vector3d& v = vertices_[i];
+    // One comparison a coordinate finds NaN, infinities and what is too large.
+    if (!(std::abs(v[0]) <= kMaxCoordinate && std::abs(v[1]) <= kMaxCoordinate && std::abs(v[2]) <= kMaxCoordinate)) {
+      bad("vertex " + std::to_string(i) + " is " + coordinates(v));
+    }
+    if (!used[i]) continue;
+    for (int k = 0; k < 3; ++k) {
+      lo[k] = std::min(lo[k], v[k]);
+      hi[k] = std::max(hi[k], v[k]);
+    }
+  }
+  bounds_ = Eigen::AlignedBox3d(Eigen::Vector3d(lo), Eigen::Vector3d(hi));
 }
 
 std::size_t Mesh::bytes() const {

@@ -44,13 +44,15 @@ struct Expansion {
   lattice::Cell cell;
   const std::uint32_t* ids = nullptr;  ///< Triangles that may meet the cell; null: all of the mesh.
   std::size_t count = 0;
+  bool own_only = false;  ///< The node stays a leaf: only grey, own and one list (of the cell itself) are wanted.
 
   // Answered.
   std::uint8_t grey = 0;  ///< Bit o: the surface meets octant o (reference.h), which has an actual region.
   OctantBounds octants;
   CellBounds own;  ///< Of the cell itself: what the octants taught about it.
   std::vector<std::uint32_t> lists;          ///< Triangles of octant 0, of octant 1, ...
-  std::array<std::size_t, 9> list_begin{};   ///< Octant o has lists[list_begin[o]] to lists[list_begin[o + 1]].
+  std::array<std::size_t, 9> list_begin{};   ///< Octant o has lists[list_begin[o]] to lists[list_begin[o + 1]];
+                                             ///< with own_only all of lists is the cell's.
 };
 
 /// Answers expansion batches. Any number of threads may submit; each batch belongs to one thread until wait() returned.

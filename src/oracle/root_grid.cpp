@@ -50,6 +50,24 @@ std::unique_ptr<RootGrid> RootGrid::make(const Surface& surface, int max_level) 
   return nullptr;
 }
 
+// Calls f for each triangle that may meet the cell until one returns true.
+template <typename F>
+bool RootGrid::anyCandidate(const lattice::Cell& cell, F&& f) const {
+  const std::uint32_t width = 1u << (level() - cell.level);
+  std::array<std::uint32_t, 3> first;
+  for (int k = 0; k < 3; ++k) first[k] = cell.at[k] * width - (cell.at[k] > 0 ? 1 : 0);
+  for (std::uint32_t z = first[2]; z < (cell.at[2] + 1) * width; ++z) {
+    for (std::uint32_t y = first[1]; y < (cell.at[1] + 1) * width; ++y) {
+      for (std::uint32_t x = first[0]; x < (cell.at[0] + 1) * width; ++x) {
+        for (std::uint32_t t = head_[index(x, y, z)]; t != kNone; t = next_[t]) {
+          if (f(t)) return true;
+        }
+      }
+    }
+  }
+  return std::any_of(large_.begin(), large_.end(), f);
+}
+
 bool RootGrid::build(const Surface& surface) {
   const Mesh& mesh = *surface.mesh;
   const std::size_t count = mesh.triangleCount();
@@ -111,7 +129,6 @@ bool RootGrid::build(const Surface& surface) {
       }
     }
   }
-  std::vector<std::uint32_t> ids;
   for (std::uint32_t z = 0; z < side; ++z) {
     for (std::uint32_t y = 0; y < side; ++y) {
       for (std::uint32_t x = 0; x < side; ++x) {
@@ -119,18 +136,19 @@ bool RootGrid::build(const Surface& surface) {
         const lattice::Cell cell{level(), {x, y, z}};
         if (state != 0 && !surface.lattice.exists(cell)) state = 0;
         if (state == 1) {
-          state = 0;
-          ids.clear();
-          gather(surface, cell, ids);
           const double half = cell.side() / 2.0;
           const Eigen::Vector3d center = Eigen::Vector3d(x + 0.5, y + 0.5, z + 0.5) * cell.side();
-          for (const std::uint32_t t : ids) {
-            const Eigen::Vector3d corners[3] = {surface.corner(t, 0), surface.corner(t, 1), surface.corner(t, 2)};
-            if (touches(corners, center, half)) {
-              state = 1;
-              break;
+          const bool is_grey = anyCandidate(cell, [&](std::uint32_t t) {
+            const Mesh::Indices& i = mesh.indices(t);
+            const Span s = spanOf(vertices[i[0]], vertices[i[1]], vertices[i[2]], shift);
+            for (int k = 0; k < 3; ++k) {
+              const int at = static_cast<int>(cell.at[k]);
+              if (at < s.first[k] || at > s.first[k] + s.reach[k]) return false;
             }
-          }
+            const Eigen::Vector3d corners[3] = {surface.corner(t, 0), surface.corner(t, 1), surface.corner(t, 2)};
+            return touches(corners, center, half);
+          });
+          state = is_grey ? 1 : 0;
         }
         state = state != 0;
       }
@@ -174,29 +192,20 @@ Eigen::AlignedBox3d RootGrid::bounds(const lattice::Cell& cell) const {
 void RootGrid::gather(const Surface& surface, const lattice::Cell& cell, std::vector<std::uint32_t>& ids) const {
   const double margin = 2;  // lattice units: one step of the quantisation
   const auto corner = cell.corner();
-  Eigen::Vector3d lo, hi;
+  double lo[3], hi[3];
   for (int k = 0; k < 3; ++k) {
     lo[k] = corner[k] - margin;
     hi[k] = corner[k] + cell.side() + margin;
   }
-  const auto consider = [&](std::uint32_t t) {
+  anyCandidate(cell, [&](std::uint32_t t) {
     const Eigen::Vector3d a = surface.corner(t, 0), b = surface.corner(t, 1), c = surface.corner(t, 2);
-    if ((a.cwiseMin(b).cwiseMin(c).array() <= hi.array()).all() &&
-        (a.cwiseMax(b).cwiseMax(c).array() >= lo.array()).all()) {
-      ids.push_back(t);
+    bool meets = true;
+    for (int k = 0; k < 3; ++k) {
+      meets &= std::min(std::min(a[k], b[k]), c[k]) <= hi[k] && std::max(std::max(a[k], b[k]), c[k]) >= lo[k];
     }
-  };
-  const std::uint32_t width = 1u << (level() - cell.level);
-  std::array<std::uint32_t, 3> first;
-  for (int k = 0; k < 3; ++k) first[k] = cell.at[k] * width - (cell.at[k] > 0 ? 1 : 0);
-  for (std::uint32_t z = first[2]; z < (cell.at[2] + 1) * width; ++z) {
-    for (std::uint32_t y = first[1]; y < (cell.at[1] + 1) * width; ++y) {
-      for (std::uint32_t x = first[0]; x < (cell.at[0] + 1) * width; ++x) {
-        for (std::uint32_t t = head_[index(x, y, z)]; t != kNone; t = next_[t]) consider(t);
-      }
-    }
-  }
-  for (const std::uint32_t t : large_) consider(t);
+    if (meets) ids.push_back(t);
+    return false;
+  });
 }
 
 std::size_t RootGrid::bytes() const {

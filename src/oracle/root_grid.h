@@ -40,6 +40,8 @@ class RootGrid {
  private:
   explicit RootGrid(int bits) : bits_(bits) {}
   bool build(const Surface& surface);
+  template <typename F>
+  bool anyCandidate(const lattice::Cell& cell, F&& f) const;
   std::size_t index(std::uint32_t x, std::uint32_t y, std::uint32_t z) const {
     return ((std::size_t{z} << bits_) | y) << bits_ | x;
   }

@@ -6,6 +6,10 @@
 #include <hwy/foreach_target.h>
 #include <hwy/highway.h>
 
+// At -O2 the compiler keeps short loops over arrays of vectors, and with them the arrays in memory.
+#undef BOCST_UNROLL
+#define BOCST_UNROLL _Pragma("GCC unroll 8")
+
 HWY_BEFORE_NAMESPACE();
 namespace bocst::query::HWY_NAMESPACE {
 
@@ -26,7 +30,7 @@ HWY_INLINE V fromBytes(D d, const std::int8_t* p) {
   return hn::ConvertTo(d, hn::PromoteTo(di, hn::LoadU(ds, p)));
 }
 
-std::uint8_t OverlappingOctants(const oracle::OctantBounds& octants, const OneVolume& b) {
+std::uint8_t OverlappingOctants(const oracle::OctantBounds& octants, const OneVolume& b, float* distance) {
   const D d;
   HWY_ALIGN static constexpr float kOrigin[3][8] = {
       {0, 1, 0, 1, 0, 1, 0, 1}, {0, 0, 1, 1, 0, 0, 1, 1}, {0, 0, 0, 0, 1, 1, 1, 1}};
@@ -36,22 +40,29 @@ std::uint8_t OverlappingOctants(const oracle::OctantBounds& octants, const OneVo
   for (std::size_t i = 0; i < 8; i += hn::Lanes(d)) {
     // The octant's box: middle and half extents; delta is the way to the volume's middle.
     V middle[3], h[3], delta[3];
+    BOCST_UNROLL
     for (int k = 0; k < 3; ++k) {
       const V lo = fromBytes(d, octants.lo[k] + i), hi = fromBytes(d, octants.hi[k] + i);
       middle[k] = hn::MulAdd(hn::Add(lo, hi), byte, hn::Load(d, kOrigin[k] + i));
       h[k] = hn::Mul(hn::Sub(hi, lo), byte);
       delta[k] = hn::Sub(hn::Set(d, b.center[k]), middle[k]);
     }
+    const V d2 = hn::MulAdd(delta[0], delta[0], hn::MulAdd(delta[1], delta[1], hn::Mul(delta[2], delta[2])));
+    hn::StoreU(d2, d, distance + i);
     M apart = hn::MaskFromVec(hn::Zero(d));
+    BOCST_UNROLL
     for (int k = 0; k < 3; ++k) {
       V r = hn::Add(h[k], pad);
+      BOCST_UNROLL
       for (int j = 0; j < 3; ++j) {
         r = hn::MulAdd(hn::Abs(hn::Set(d, b.axes[j][k])), hn::Set(d, b.half[j]), r);
       }
       apart = hn::Or(apart, hn::Gt(hn::Abs(delta[k]), r));
     }
+    BOCST_UNROLL
     for (int j = 0; j < 3; ++j) {
       V t = hn::Zero(d), r = hn::Add(hn::Set(d, b.half[j]), pad);
+      BOCST_UNROLL
       for (int k = 0; k < 3; ++k) {
         const V a = hn::Set(d, b.axes[j][k]);
         t = hn::MulAdd(a, delta[k], t);
@@ -62,6 +73,7 @@ std::uint8_t OverlappingOctants(const oracle::OctantBounds& octants, const OneVo
 
     // Slabs: for z in a box with |m.z - offset| <= w, any a gives n.z in a * offset +- (|a| w + |n - a m| over the box).
     V n[3], along = hn::Zero(d);
+    BOCST_UNROLL
     for (int k = 0; k < 3; ++k) {
       n[k] = hn::Mul(fromBytes(d, octants.normal[k] + i), per127);
       along = hn::MulAdd(n[k], hn::Set(d, b.normal[k]), along);
@@ -72,12 +84,15 @@ std::uint8_t OverlappingOctants(const oracle::OctantBounds& octants, const OneVo
     {
       // Along the octant's normal; its slab is measured from the octant's centre.
       V t = hn::MulSub(along, boffset, center), r = hn::MulAdd(abs_along, bw, hn::Add(w, pad));
+      BOCST_UNROLL
       for (int k = 0; k < 3; ++k) {
         const V from = hn::Sub(hn::Set(d, b.center[k]), hn::Add(hn::Load(d, kOrigin[k] + i), half));
         t = hn::MulAdd(n[k], from, t);
       }
       V rest[3];
+      BOCST_UNROLL
       for (int k = 0; k < 3; ++k) rest[k] = hn::NegMulAdd(along, hn::Set(d, b.normal[k]), n[k]);
+      BOCST_UNROLL
       for (int j = 0; j < 3; ++j) {
         V p = hn::Mul(rest[0], hn::Set(d, b.axes[j][0]));
         p = hn::MulAdd(rest[1], hn::Set(d, b.axes[j][1]), p);
@@ -89,6 +104,7 @@ std::uint8_t OverlappingOctants(const oracle::OctantBounds& octants, const OneVo
     {
       // Along the volume's normal; the octant's slab counted from its box's middle.
       V own = center, r = hn::MulAdd(abs_along, w, hn::Add(bw, pad)), t = boffset;
+      BOCST_UNROLL
       for (int k = 0; k < 3; ++k) {
         const V m = hn::Set(d, b.normal[k]);
         own = hn::NegMulAdd(n[k], hn::Sub(middle[k], hn::Add(hn::Load(d, kOrigin[k] + i), half)), own);
@@ -126,12 +142,14 @@ std::size_t TouchingPairs(const TrianglePack& rows, const TrianglePack& lanes, f
   std::size_t found = 0;
   for (std::size_t i = 0; i < lanes.count; i += hn::Lanes(d)) {
     Vec3 q[3], f[3];
+    BOCST_UNROLL
     for (int k = 0; k < 3; ++k) {
       q[k] = {hn::Load(d, lanes.xyz[3 * k] + i), hn::Load(d, lanes.xyz[3 * k + 1] + i),
               hn::Load(d, lanes.xyz[3 * k + 2] + i)};
     }
     const Vec3 qmin{min3(q[0].x, q[1].x, q[2].x), min3(q[0].y, q[1].y, q[2].y), min3(q[0].z, q[1].z, q[2].z)};
     const Vec3 qmax{max3(q[0].x, q[1].x, q[2].x), max3(q[0].y, q[1].y, q[2].y), max3(q[0].z, q[1].z, q[2].z)};
+    BOCST_UNROLL
     for (int k = 0; k < 3; ++k) f[k] = sub(q[(k + 1) % 3], q[k]);
     const Vec3 m = cross(f[0], f[1]);
     const V fsize = hn::Add(norm1(f[0]), norm1(f[1]));
@@ -140,6 +158,7 @@ std::size_t TouchingPairs(const TrianglePack& rows, const TrianglePack& lanes, f
 
     for (std::size_t row = 0; row < rows.count; ++row) {
       Vec3 p[3];
+      BOCST_UNROLL
       for (int k = 0; k < 3; ++k) {
         p[k] = {hn::Set(d, rows.xyz[3 * k][row]), hn::Set(d, rows.xyz[3 * k + 1][row]),
                 hn::Set(d, rows.xyz[3 * k + 2][row])};
@@ -164,7 +183,9 @@ std::size_t TouchingPairs(const TrianglePack& rows, const TrianglePack& lanes, f
 
       const V esize = hn::Add(norm1(e[0]), norm1(e[1]));
       const V epad = hn::Mul(hn::Mul(reach, hn::Set(d, 2.0f)), hn::Mul(esize, fsize));
+      BOCST_UNROLL
       for (int a = 0; a < 3; ++a) {
+        BOCST_UNROLL
         for (int b = 0; b < 3; ++b) {
           // Both ends of each edge project to one point: two values a side.
           const Vec3 axis = cross(e[a], f[b]);
@@ -195,8 +216,8 @@ namespace bocst::query {
 HWY_EXPORT(OverlappingOctants);
 HWY_EXPORT(TouchingPairs);
 
-std::uint8_t overlappingOctants(const oracle::OctantBounds& octants, const OneVolume& volume) {
-  return HWY_DYNAMIC_DISPATCH(OverlappingOctants)(octants, volume);
+std::uint8_t overlappingOctants(const oracle::OctantBounds& octants, const OneVolume& volume, float* distance) {
+  return HWY_DYNAMIC_DISPATCH(OverlappingOctants)(octants, volume, distance);
 }
 
 std::size_t touchingPairs(const TrianglePack& rows, const TrianglePack& lanes, float slack, PackPair* pairs) {

@@ -1,7 +1,9 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #pragma once
 
+#include <algorithm>
 #include <cstdint>
+#include <utility>
 #include <vector>
 
 #include "query/side.h"
@@ -20,6 +22,8 @@ class Visitor {
  public:
   virtual ~Visitor() = default;
 
+  /// The first hit will end the walk.
+  virtual bool endsAtFirst() const = 0;
   /// Triangle a of side A and b of side B may touch; everything that touches comes here.
   virtual bool triangles(std::uint32_t a, std::uint32_t b) = 0;
   /// The spheres of two cells overlap.
@@ -31,8 +35,11 @@ class Visitor {
 };
 
 /// The one walk over pairs of nodes. Resident pairs first, depth first; a pair that needs an unexpanded node is set
-/// aside. When the resident pairs do not settle the question, all nodes set aside grow in one batch and the walk goes
-/// on: at most one batch a level.
+/// aside. When the resident pairs do not settle the question, nodes set aside grow in one batch and the walk goes on with
+/// their pairs: a batch never mixes with waiting for a single node, and leads one level down.
+/// A walk that has to see everything grows all that is set aside, so it makes one batch a level. One that ends at its
+/// first hit takes the deepest overlaps first, and twice as many each time: a hit deep inside costs one small batch a
+/// level, a miss at most the logarithm of its pairs more.
 ///
 /// Triangles against triangles are culled by boxes and slabs; as soon as a side answers with cells, both are culled by
 /// spheres, in double and on integer cells, so a conservative verdict does not depend on what is resident.
@@ -43,11 +50,15 @@ class PairWalk {
   PairWalk(const A& a, const B& b, const Placement& b_in_a, Visitor& visitor)
       : a_(a), b_(b), b_in_a_(b_in_a), a_in_b_(b_in_a.inverse()), visitor_(visitor), spheres_(a.cells() || b.cells()) {}
 
+  /// Pairs in the first batch of a walk that may end early; a few oracle answers cost less than one too many.
+  static constexpr std::size_t kFirstBatch = 16;
+
   /// True when the visitor ended it.
   bool run() {
     Scratch& s = scratch();
     s.stack.clear();
     s.pending.clear();
+    s.batch = kFirstBatch;
     s.pack_of_a = kNoPack;
     const Pair root{a_.root(), b_.root()};
     if (!rootsMeet(root)) return false;
@@ -59,10 +70,7 @@ class PairWalk {
         if (spheres_ ? stepSpheres(pair, s) : stepBoxes(pair, s)) return true;
       }
       if (s.pending.empty()) return false;
-      uniqueGrowths(s.growths);
-      tree::Tree::grow(s.growths);
-      s.growths.clear();
-      s.stack.swap(s.pending);
+      growSome(s);
     }
   }
 
@@ -71,10 +79,16 @@ class PairWalk {
     typename A::Node a;
     typename B::Node b;
   };
+  struct Waiting {
+    Pair pair;
+    double gap;  // see gap()
+  };
   static constexpr std::uint64_t kNoPack = ~std::uint64_t{0};
   struct Scratch {
-    std::vector<Pair> stack, pending;
+    std::vector<Pair> stack;
+    std::vector<Waiting> pending;
     std::vector<tree::Tree::Growth> growths;
+    std::size_t batch = kFirstBatch;
     TrianglePack a, b;
     std::uint64_t pack_of_a = kNoPack;  // which node and part of its list pack `a` holds
     PackPair found[TrianglePack::kCapacity * TrianglePack::kCapacity];
@@ -86,7 +100,7 @@ class PairWalk {
 
   bool rootsMeet(const Pair& root) const {
     return spheres_ ? spheresMeet(a_.sphere(root.a), inA(b_.sphere(root.b)))
-                    : !boxesApart(a_.volume(root.a), b_.volume(root.b), b_in_a_);
+                    : !boxesApart(oriented(a_.volume(root.a)), oriented(b_.volume(root.b)), b_in_a_);
   }
 
   Sphere inA(Sphere s) const { return {b_in_a_ * s.center, s.radius * b_in_a_.scale}; }
@@ -96,49 +110,93 @@ class PairWalk {
     return (a.center - b.center).squaredNorm() <= reach * reach;
   }
 
-  // Sets the pair aside when the node to expand must grow first; so must the other then, as it is the next larger one.
-  template <typename Side, typename Node, typename OtherSide, typename OtherNode>
-  void setAside(const Pair& pair, const Side& side, Node node, const OtherSide& other, OtherNode other_node,
-                State other_state, Scratch& s) const {
-    s.pending.push_back(pair);
-    side.grow(node, s.growths);
-    if (other_state == State::kGrows) other.grow(other_node, s.growths);
+  // The distance of the middles over the sizes, squared: least for the deepest overlap.
+  double gap(const Pair& pair) const {
+    const Sphere a = a_.sphere(pair.a), b = inA(b_.sphere(pair.b));
+    return (a.center - b.center).squaredNorm() / (a.radius * a.radius + b.radius * b.radius);
+  }
+
+  void growSome(Scratch& s) {
+    // What a tree knows already comes at once and costs nothing.
+    auto end = std::partition(s.pending.begin(), s.pending.end(),
+                              [this](const Waiting& w) { return asks(a_, w.pair.a) || asks(b_, w.pair.b); });
+    if (end == s.pending.end()) {
+      if (visitor_.endsAtFirst() && s.pending.size() > s.batch) {
+        end -= static_cast<std::ptrdiff_t>(s.batch);
+        for (Waiting& w : s.pending) w.gap = gap(w.pair);
+        std::nth_element(s.pending.begin(), end, s.pending.end(),
+                         [](const Waiting& x, const Waiting& y) { return x.gap > y.gap; });
+      } else {
+        end = s.pending.begin();
+      }
+      s.batch *= 2;
+    }
+    s.growths.clear();
+    for (auto w = end; w != s.pending.end(); ++w) {
+      // Both sides where both must grow: the smaller is the next to be expanded.
+      if (a_.state(w->pair.a) == State::kGrows) a_.grow(w->pair.a, s.growths);
+      if (b_.state(w->pair.b) == State::kGrows) b_.grow(w->pair.b, s.growths);
+      s.stack.push_back(w->pair);
+    }
+    s.pending.erase(end, s.pending.end());
+    uniqueGrowths(s.growths);
+    if (!s.growths.empty()) tree::Tree::grow(s.growths);
+    seen_a_.valid = seen_b_.valid = false;
+  }
+
+  template <typename Side>
+  static bool asks(const Side& side, typename Side::Node node) {
+    return side.state(node) == State::kGrows && !side.growsFreely(node);
+  }
+
+  // The larger of two nodes is expanded, unless it is a leaf.
+  static bool expandsA(State sa, State sb, double size_a, double size_b) {
+    return sb == State::kLeaf || (sa != State::kLeaf && size_a >= size_b);
   }
 
   bool stepBoxes(const Pair& pair, Scratch& s) {
-    const State sa = a_.state(pair.a), sb = b_.state(pair.b);
+    // Depth first, most steps share a node with the one before.
+    seeNode(a_, pair.a, seen_a_);
+    seeNode(b_, pair.b, seen_b_);
+    const State sa = seen_a_.state, sb = seen_b_.state;
     if (sa == State::kLeaf && sb == State::kLeaf) return leafTriangles(pair, s);
-    const Volume va = a_.volume(pair.a), vb = b_.volume(pair.b);
-    const double size_a = va.half.squaredNorm();
-    const double size_b = vb.half.squaredNorm() * b_in_a_.scale * b_in_a_.scale;
-    if (sb == State::kLeaf || (sa != State::kLeaf && size_a >= size_b)) {
+    if (waits(sa, sb)) {
+      s.pending.push_back({pair, 0});
+      return false;
+    }
+    if (expandsA(sa, sb, seen_a_.size, seen_b_.size * b_in_a_.scale * b_in_a_.scale)) {
       if (sa == State::kGrows) {
-        setAside(pair, a_, pair.a, b_, pair.b, sb, s);
+        s.pending.push_back({pair, 0});
       } else {
-        a_.overlappingChildren(pair.a, vb, b_in_a_, [&](typename A::Node c) { s.stack.push_back({c, pair.b}); });
+        a_.overlappingChildren(pair.a, seen_b_.volume, b_in_a_,
+                               [&](typename A::Node c) { s.stack.push_back({c, pair.b}); });
       }
     } else if (sb == State::kGrows) {
-      setAside(pair, b_, pair.b, a_, pair.a, sa, s);
+      s.pending.push_back({pair, 0});
     } else {
-      b_.overlappingChildren(pair.b, va, a_in_b_, [&](typename B::Node c) { s.stack.push_back({pair.a, c}); });
+      b_.overlappingChildren(pair.b, seen_a_.volume, a_in_b_,
+                             [&](typename B::Node c) { s.stack.push_back({pair.a, c}); });
     }
     return false;
   }
+
+  // Neither side has children to go on with.
+  static bool waits(State sa, State sb) { return sa != State::kInner && sb != State::kInner; }
 
   bool stepSpheres(const Pair& pair, Scratch& s) {
     const State sa = a_.state(pair.a), sb = b_.state(pair.b);
     if (sa == State::kLeaf && sb == State::kLeaf) return leafSpheres(pair);
     const Sphere ball_a = a_.sphere(pair.a), ball_b = inA(b_.sphere(pair.b));
-    if (sb == State::kLeaf || (sa != State::kLeaf && ball_a.radius >= ball_b.radius)) {
+    if (expandsA(sa, sb, ball_a.radius, ball_b.radius)) {
       if (sa == State::kGrows) {
-        setAside(pair, a_, pair.a, b_, pair.b, sb, s);
+        s.pending.push_back({pair, 0});
       } else {
         a_.children(pair.a, [&](typename A::Node c) {
           if (spheresMeet(a_.sphere(c), ball_b)) s.stack.push_back({c, pair.b});
         });
       }
     } else if (sb == State::kGrows) {
-      setAside(pair, b_, pair.b, a_, pair.a, sa, s);
+      s.pending.push_back({pair, 0});
     } else {
       b_.children(pair.b, [&](typename B::Node c) {
         if (spheresMeet(ball_a, inA(b_.sphere(c)))) s.stack.push_back({pair.a, c});
@@ -213,6 +271,26 @@ class PairWalk {
     return false;
   }
 
+  template <typename Side>
+  struct Seen {
+    typename Side::Node node{};
+    bool valid = false;
+    State state = State::kLeaf;
+    decltype(std::declval<const Side&>().volume(node)) volume;
+    double size = 0;  // half diagonal, squared
+  };
+  template <typename Side>
+  static void seeNode(const Side& side, typename Side::Node node, Seen<Side>& seen) {
+    if (seen.valid && seen.node == node) return;
+    seen.valid = true;
+    seen.node = node;
+    seen.state = side.state(node);
+    seen.volume = side.volume(node);
+    seen.size = seen.volume.half.squaredNorm();
+  }
+
+  Seen<A> seen_a_;
+  Seen<B> seen_b_;
   const A& a_;
   const B& b_;
   const Placement b_in_a_, a_in_b_;

@@ -24,7 +24,6 @@ enum class State {
 class TreeSide {
  public:
   using Node = tree::NodeRef;
-  static constexpr bool kGrows = true;
 
   explicit TreeSide(tree::Tree& tree) : tree_(tree), now_(tree.now()) {}
 
@@ -37,29 +36,27 @@ class TreeSide {
     const tree::Link link = tree_.link(node);
     if (link.tag() == tree::Link::kBlock && !(cells() && tree_.isDeepest(level(node)))) return State::kInner;
     if (cells()) return tree_.isDeepest(level(node)) ? State::kLeaf : State::kGrows;
-    if (link.tag() != tree::Link::kList) return State::kGrows;
-    const bool small = tree_.list(link).count <= tree::Tree::kLeafTriangles;
-    return small || tree_.isDeepest(level(node)) ? State::kLeaf : State::kGrows;
+    if (link.tag() == tree::Link::kShortList) return State::kLeaf;
+    return link.tag() == tree::Link::kList && tree_.isDeepest(level(node)) ? State::kLeaf : State::kGrows;
   }
+
+  /// Growing this node needs no oracle.
+  bool growsFreely(Node node) const { return tree_.growsFreely(node); }
 
   void grow(Node node, std::vector<tree::Tree::Growth>& batch) const { batch.push_back({&tree_, node, !cells()}); }
 
   Volume volume(Node node) const {
-    const oracle::CellBounds b = tree_.bounds(node, tree_.link(node));
-    const lattice::Cell cell = tree_.cell(node);
-    const double side = cell.side(), byte = side / 255, normal = 1.0 / 127;
-    Volume v;
-    Eigen::Vector3d n, from_cell_center;
-    for (int k = 0; k < 3; ++k) {
-      v.half[k] = (b.hi[k] - b.lo[k]) * (byte / 2);
-      from_cell_center[k] = (b.hi[k] + b.lo[k]) * (byte / 2) - side / 2;
-      v.center[k] = cell.corner()[k] + side / 2 + from_cell_center[k];
-      n[k] = b.normal[k];
+    if (node.isRoot()) {
+      const oracle::CellBounds& b = tree_.rootBounds();
+      return decode(b.lo[0], b.lo[1], b.lo[2], b.hi[0], b.hi[1], b.hi[2], b.normal[0], b.normal[1], b.normal[2],
+                    b.slab_center, b.slab_half, 0, 0, 0, 1);
     }
-    v.normal = n * normal;
-    v.slab_offset = (b.slab_center * side - n.dot(from_cell_center)) * normal;
-    v.slab_half = b.slab_half * (side * normal / 2);
-    return v;
+    const tree::Block& parent = tree_.block(node.block());
+    const oracle::OctantBounds& b = parent.octants;
+    const int o = node.octant();
+    return decode(b.lo[0][o], b.lo[1][o], b.lo[2][o], b.hi[0][o], b.hi[1][o], b.hi[2][o], b.normal[0][o],
+                  b.normal[1][o], b.normal[2][o], b.slab_center[o], b.slab_half[o], 2 * parent.at[0] + (o & 1),
+                  2 * parent.at[1] + (o >> 1 & 1), 2 * parent.at[2] + (o >> 2 & 1), parent.level + 1);
   }
 
   /// Bounds the surface below a node, and the spheres of all cells below it: a cube's sphere holds those of its parts; the
@@ -83,19 +80,25 @@ class TreeSide {
   /// Names the cell of a leaf: its Morton code among those of its level.
   std::uint32_t cellId(Node node) const { return static_cast<std::uint32_t>(tree_.cell(node).morton()); }
 
-  /// Calls f(child) for the children of an inner node that `other`, placed in this frame by `to`, may overlap.
-  template <typename F>
-  void overlappingChildren(Node node, const Volume& other, const Placement& to, F&& f) const {
+  /// Calls f(child) for the children of an inner node that `other`, placed in this frame by `to`, may overlap; the
+  /// nearest last, as it is the first to leave a stack.
+  template <typename OtherVolume, typename F>
+  void overlappingChildren(Node node, const OtherVolume& other, const Placement& to, F&& f) const {
     const std::uint32_t index = tree_.link(node).index();
     const tree::Block& block = tree_.block(index);
     tree_.touch(block, now_);
-    const lattice::Cell cell = block.cell();
-    const auto at = cell.corner();
-    const Eigen::Vector3d corner(at[0], at[1], at[2]);
-    const OneVolume one = seenFrom(other, to, corner, cell.side() / 2.0);
-    for (int mask = overlappingOctants(block.octants, one) & block.grey; mask != 0; mask &= mask - 1) {
-      f(Node::octant(index, __builtin_ctz(static_cast<unsigned>(mask))));
+    const double side = 1 << (lattice::kMaxLevel - block.level);
+    const double corner[3] = {block.at[0] * side, block.at[1] * side, block.at[2] * side};
+    const OneVolume one = seenFrom(other, to, corner, side / 2);
+    float distance[8];
+    int order[8], count = 0;
+    for (int mask = overlappingOctants(block.octants, one, distance) & block.grey; mask != 0; mask &= mask - 1) {
+      const int o = __builtin_ctz(static_cast<unsigned>(mask));
+      int k = count++;
+      for (; k > 0 && distance[order[k - 1]] < distance[o]; --k) order[k] = order[k - 1];
+      order[k] = o;
     }
+    for (int k = 0; k < count; ++k) f(Node::octant(index, order[k]));
   }
 
   /// Calls f(child) for all children.
@@ -120,6 +123,22 @@ class TreeSide {
   tree::Tree& tree() const { return tree_; }
 
  private:
+  // Spelled out, one scalar each: this is the hottest code of a query after the pair test itself.
+  static Volume decode(int lo0, int lo1, int lo2, int hi0, int hi1, int hi2, int n0, int n1, int n2, int slab_center,
+                       int slab_half, int x, int y, int z, int level) {
+    const double side = 1 << (lattice::kMaxLevel - level), byte = side * (0.5 / 255), normal = 1.0 / 127;
+    const double c0 = (lo0 + hi0) * byte, c1 = (lo1 + hi1) * byte, c2 = (lo2 + hi2) * byte, middle = side / 2;
+    Volume v;
+    v.half = Eigen::Vector3d((hi0 - lo0) * byte, (hi1 - lo1) * byte, (hi2 - lo2) * byte);
+    v.center = Eigen::Vector3d(x * side + c0, y * side + c1, z * side + c2);
+    v.normal = Eigen::Vector3d(n0 * normal, n1 * normal, n2 * normal);
+    v.slab_offset =
+        slab_center * side * normal -
+        (v.normal[0] * (c0 - middle) + v.normal[1] * (c1 - middle) + v.normal[2] * (c2 - middle));
+    v.slab_half = slab_half * (side * normal / 2);
+    return v;
+  }
+
   int level(Node node) const { return node.isRoot() ? 1 : tree_.block(node.block()).level + 1; }
 
   tree::Tree& tree_;

@@ -10,14 +10,20 @@
 
 namespace bocst::query {
 
-/// What bounds the surface of a node: box AND slab, in the frame of its side (lattice units, or the partner's units).
+/// What bounds the surface of a node of a tree: box AND slab, in lattice units, axes those of the lattice.
 struct Volume {
+  Eigen::Vector3d center;
+  Eigen::Vector3d half;
+  Eigen::Vector3d normal;  ///< About unit length; zero: no slab.
+  double slab_offset = 0;  ///< Middle of the slab along normal, from center.
+  double slab_half = 0;
+};
+
+/// The same with axes of its own and no slab: the volume of a partner's node.
+struct OrientedVolume {
   Eigen::Vector3d center;
   Eigen::Matrix3d axes = Eigen::Matrix3d::Identity();  ///< Columns: the box's unit axes.
   Eigen::Vector3d half;
-  Eigen::Vector3d normal = Eigen::Vector3d::Zero();  ///< About unit length; zero: no slab.
-  double slab_offset = 0;  ///< Middle of the slab along normal, from center.
-  double slab_half = 0;
 };
 
 /// A sphere in the frame of its side.
@@ -33,6 +39,16 @@ struct Placement {
   Eigen::Vector3d translation = Eigen::Vector3d::Zero();
   double slack = 0;   ///< A length in the target frame: what positions may be off by; touching within it counts.
   double defect = 0;  ///< Largest entry of rotation^T rotation - 1: what the axes tests must allow for.
+  float axes[3][3] = {};  ///< axes[j]: column j of rotation; set by ready().
+  float pad = 0;          ///< Per unit of size, see overlappingOctants(); set by ready().
+
+  /// To be called when rotation and defect are set.
+  void ready() {
+    for (int j = 0; j < 3; ++j) {
+      for (int k = 0; k < 3; ++k) axes[j][k] = static_cast<float>(rotation(k, j));
+    }
+    pad = static_cast<float>((128 * 0x1p-24 + 4 * defect) * 1.0001);
+  }
 
   Eigen::Vector3d operator*(const Eigen::Vector3d& x) const { return scale * (rotation * x) + translation; }
 
@@ -43,33 +59,59 @@ struct Placement {
     p.translation = -p.scale * (p.rotation * translation);
     p.slack = slack * p.scale;
     p.defect = defect;
+    p.ready();
     return p;
   }
 };
 
-/// The volume as the octants of a cell see it; `corner` and `side` are those of the octants' parent cell and of an octant.
-inline OneVolume seenFrom(const Volume& v, const Placement& to, const Eigen::Vector3d& corner, double side) {
+/// The volume as the octants of a cell see it; `corner` is the cell's minimum corner, `side` that of its octants.
+inline OneVolume seenFrom(const Volume& v, const Placement& to, const double* corner, double side) {
   OneVolume o;
-  const double inverse = 1 / side, scale = to.scale * inverse;
-  const Eigen::Vector3d center = (to * v.center - corner) * inverse;
-  const Eigen::Matrix3d axes = to.rotation * v.axes;
-  const Eigen::Vector3d normal = to.rotation * v.normal;
+  const double inverse = 1 / side;
+  const float scale = static_cast<float>(to.scale * inverse);
+  const Eigen::Matrix3d& r = to.rotation;
+  float size = 4;
   for (int k = 0; k < 3; ++k) {
-    o.center[k] = static_cast<float>(center[k]);
-    o.half[k] = static_cast<float>(v.half[k] * scale);
-    o.normal[k] = static_cast<float>(normal[k]);
-    for (int j = 0; j < 3; ++j) o.axes[j][k] = static_cast<float>(axes(k, j));
+    const double x = r(k, 0) * v.center[0] + r(k, 1) * v.center[1] + r(k, 2) * v.center[2];
+    o.center[k] = static_cast<float>((to.scale * x + to.translation[k] - corner[k]) * inverse);
+    o.half[k] = static_cast<float>(v.half[k]) * scale;
+    size += std::abs(o.center[k]) + o.half[k];
   }
-  o.slab_offset = static_cast<float>(v.slab_offset * scale);
-  o.slab_half = static_cast<float>(v.slab_half * scale);
-  const double q = center.lpNorm<1>() + v.half.lpNorm<1>() * scale + 4;
-  o.pad = static_cast<float>(q * (128 * 0x1p-24 + 4 * to.defect) + to.slack * inverse);
+  const float n[3] = {static_cast<float>(v.normal[0]), static_cast<float>(v.normal[1]), static_cast<float>(v.normal[2])};
+  for (int k = 0; k < 3; ++k) {
+    for (int j = 0; j < 3; ++j) o.axes[j][k] = to.axes[j][k];
+    o.normal[k] = n[0] * to.axes[0][k] + n[1] * to.axes[1][k] + n[2] * to.axes[2][k];
+  }
+  o.slab_offset = static_cast<float>(v.slab_offset) * scale;
+  o.slab_half = static_cast<float>(v.slab_half) * scale;
+  o.pad = size * to.pad + static_cast<float>(to.slack * inverse);
   return o;
 }
 
+inline OneVolume seenFrom(const OrientedVolume& v, const Placement& to, const double* corner, double side) {
+  OneVolume o;
+  const double inverse = 1 / side, scale = to.scale * inverse;
+  const Eigen::Vector3d center = (to * v.center - Eigen::Vector3d(corner[0], corner[1], corner[2])) * inverse;
+  const Eigen::Matrix3d axes = to.rotation * v.axes;
+  for (int k = 0; k < 3; ++k) {
+    o.center[k] = static_cast<float>(center[k]);
+    o.half[k] = static_cast<float>(v.half[k] * scale);
+    o.normal[k] = 0;
+    for (int j = 0; j < 3; ++j) o.axes[j][k] = static_cast<float>(axes(k, j));
+  }
+  o.slab_offset = 0;
+  o.slab_half = 0;
+  const double size = center.lpNorm<1>() + v.half.lpNorm<1>() * scale + 4;
+  o.pad = static_cast<float>(size) * to.pad + static_cast<float>(to.slack * inverse);
+  return o;
+}
+
+inline OrientedVolume oriented(const Volume& v) { return {v.center, Eigen::Matrix3d::Identity(), v.half}; }
+inline const OrientedVolume& oriented(const OrientedVolume& v) { return v; }
+
 /// Are the two boxes surely apart? The fifteen axes in double; `to` places b in a's frame. For the few pairs that no
 /// kernel sees.
-inline bool boxesApart(const Volume& a, const Volume& b, const Placement& to) {
+inline bool boxesApart(const OrientedVolume& a, const OrientedVolume& b, const Placement& to) {
   const Eigen::Matrix3d r = a.axes.transpose() * (to.rotation * b.axes);
   const Eigen::Vector3d t = a.axes.transpose() * (to * b.center - a.center), h = b.half * to.scale;
   const double pad = (t.lpNorm<1>() + a.half.lpNorm<1>() + h.lpNorm<1>()) * (64 * 0x1p-53 + 4 * to.defect) + to.slack;

@@ -15,12 +15,14 @@ class Link {
     kImplicit = 0,  ///< Frontier: its triangles follow from the mesh (root) or from the root grid.
     kList = 1,      ///< Frontier: index of a list in the list pool: its length, then triangle ids.
     kBlock = 2,     ///< Expanded: index of the block of its children.
+    kShortList = 3,  ///< As kList, but short enough to be tested rather than expanded.
   };
 
   Link() = default;
   Link(Tag tag, std::uint32_t index) : bits_(tag << 30 | index) {}
 
   Tag tag() const { return static_cast<Tag>(bits_ >> 30); }
+  bool isList() const { return tag() == kList || tag() == kShortList; }
   std::uint32_t index() const { return bits_ & 0x3fffffffu; }
   bool operator==(Link other) const { return bits_ == other.bits_; }
 

@@ -107,7 +107,7 @@ void Tree::grow(std::vector<Growth>& batch) {
     Tree& tree = *g.tree;
     const Link link = tree.link(g.node);
     if (link.tag() == Link::kBlock) continue;
-    if (g.list_is_enough && link.tag() == Link::kList && tree.list(link).count <= kLeafTriangles) continue;
+    if (g.list_is_enough && link.tag() == Link::kShortList) continue;
     if (g.node.isRoot() && !tree.grid_tried_) tree.growRoot();
     const lattice::Cell cell = tree.cell(g.node);
     if (tree.grid_ != nullptr && cell.level < tree.grid_->level()) {
@@ -117,7 +117,7 @@ void Tree::grow(std::vector<Growth>& batch) {
     oracle::Expansion question;
     question.surface = &tree.surface_;
     question.cell = cell;
-    if (link.tag() == Link::kList) {
+    if (link.isList()) {
       const TriangleList list = tree.list(link);
       question.ids = list.ids;
       question.count = list.count;
@@ -134,10 +134,7 @@ void Tree::grow(std::vector<Growth>& batch) {
       tree.gatherNode(g.node, cell, gathered.back());
       question.ids = gathered.back().data();
       question.count = gathered.back().size();
-      if (g.list_is_enough && question.count <= kLeafTriangles) {
-        tree.setLink(g.node, tree.addList(question.ids, question.count));
-        continue;
-      }
+      question.own_only = g.list_is_enough && question.count <= kLeafTriangles;
     }
     questions.push_back(std::move(question));
     asked.push_back(g);
@@ -148,7 +145,7 @@ void Tree::grow(std::vector<Growth>& batch) {
     oracle.wait(questions);
     for (std::size_t i = 0; i < questions.size(); ++i) {
       asked[i].tree->publish(asked[i].node, questions[i]);
-      asked[i].tree->cells_ += 8;
+      asked[i].tree->cells_ += questions[i].own_only ? 1 : 8;
     }
   }
   for (Tree* tree : trees) {
@@ -163,6 +160,7 @@ void Tree::growRoot() {
   grid_tried_ = true;
   grid_ = oracle::RootGrid::make(surface_, deepest_);
   if (grid_ == nullptr) return;
+  grid_known_.store(grid_.get(), std::memory_order_release);
   ++batches_;
   for (int level = 2; level <= grid_->level(); ++level) cells_ += std::uint64_t{1} << 3 * (level - 1);
 }
@@ -210,7 +208,7 @@ Link Tree::addList(const std::uint32_t* ids, std::size_t count) {
   std::uint32_t* words = &lists_[index];
   words[0] = static_cast<std::uint32_t>(count);
   std::copy_n(ids, count, words + 1);
-  return Link(Link::kList, index);
+  return Link(count <= kLeafTriangles ? Link::kShortList : Link::kList, index);
 }
 
 void Tree::setLink(NodeRef node, Link link) {
@@ -219,6 +217,14 @@ void Tree::setLink(NodeRef node, Link link) {
 }
 
 void Tree::publish(NodeRef node, const oracle::Expansion& answer) {
+  if (answer.grey != 0) {
+    refits_.push_back({node, answer.own});
+    refits_wait_.store(true, std::memory_order_relaxed);
+  }
+  if (answer.own_only) {
+    setLink(node, addList(answer.lists.data(), answer.lists.size()));
+    return;
+  }
   const std::uint32_t index = addBlock(node, answer.cell, answer.grey);
   Block& block = blocks_[index];
   block.octants = answer.octants;
@@ -237,6 +243,49 @@ void Tree::gatherNode(NodeRef node, const lattice::Cell& cell, std::vector<std::
   grid_->gather(surface_, cell, ids);
 }
 
+// A node's box from those of its octants; bytes of half the size, so two of the octants' make one of the node's.
+static void uniteBoxes(const Block& block, oracle::CellBounds& own) {
+  std::array<int, 3> lo{511, 511, 511}, hi{0, 0, 0};
+  for (int o = 0; o < 8; ++o) {
+    if ((block.grey >> o & 1) == 0) continue;
+    for (int k = 0; k < 3; ++k) {
+      const int shift = (o >> k & 1) * 255;
+      lo[k] = std::min(lo[k], shift + block.octants.lo[k][o]);
+      hi[k] = std::max(hi[k], shift + block.octants.hi[k][o]);
+    }
+  }
+  for (int k = 0; k < 3; ++k) {
+    own.lo[k] = std::max(own.lo[k], static_cast<std::uint8_t>(lo[k] / 2));
+    own.hi[k] = std::min(own.hi[k], static_cast<std::uint8_t>((hi[k] + 1) / 2));
+  }
+}
+
+void Tree::refit() {
+  refits_wait_.store(false, std::memory_order_relaxed);
+  std::vector<Refit> refits;
+  refits.swap(refits_);
+  std::vector<std::uint8_t> changed(blocks_.size(), 0);
+  const auto apply = [&](NodeRef node, const oracle::CellBounds& bounds) {
+    if (node.isRoot()) {
+      root_bounds_ = bounds;
+    } else {
+      blocks_[node.block()].octants.set(node.octant(), bounds);
+      changed[node.block()] = 1;
+    }
+  };
+  for (const Refit& r : refits) apply(r.node, r.bounds);
+  // Children come after their parents in the pool, so one backward pass reaches the root.
+  for (std::uint32_t i = blocks_.size(); i-- > 0;) {
+    if (!changed[i]) continue;
+    Block& block = blocks_[i];
+    const oracle::CellBounds before = block.own;
+    uniteBoxes(block, block.own);
+    if (block.own.lo == before.lo && block.own.hi == before.hi) continue;
+    apply(block.parent == 0xffffffffu ? NodeRef{} : NodeRef::octant(block.parent, static_cast<int>(block.parent_octant)),
+          block.own);
+  }
+}
+
 // Decay.
 
 void Tree::collectTriangles(Link link, const lattice::Cell& cell, std::vector<std::uint32_t>& ids) const {
@@ -245,7 +294,7 @@ void Tree::collectTriangles(Link link, const lattice::Cell& cell, std::vector<st
     for (int o = 0; o < 8; ++o) {
       if (block.grey >> o & 1) collectTriangles(block.child[o].load(std::memory_order_relaxed), cell.octant(o), ids);
     }
-  } else if (link.tag() == Link::kList) {
+  } else if (link.isList()) {
     const TriangleList list = this->list(link);
     ids.insert(ids.end(), list.ids, list.ids + list.count);
   } else {
@@ -271,6 +320,7 @@ void Tree::keepOnly(const std::vector<std::uint8_t>& keep) {
   std::vector<Move> moves{{old_root, NodeRef{}, lattice::Cell{}}};
   const bool root_stays = old_root.tag() == Link::kBlock && old_root.index() < keep.size() && keep[old_root.index()];
   if (!root_stays) {
+    grid_known_.store(nullptr, std::memory_order_relaxed);
     grid_.reset();
     grid_tried_ = false;
     root_.store(Link(), std::memory_order_relaxed);
@@ -294,13 +344,13 @@ void Tree::keepOnly(const std::vector<std::uint8_t>& keep) {
           const std::uint32_t index = lists.append(ids.size() + 1);
           lists[index] = static_cast<std::uint32_t>(ids.size());
           std::copy(ids.begin(), ids.end(), &lists[index] + 1);
-          link = Link(Link::kList, index);
+          link = Link(ids.size() <= kLeafTriangles ? Link::kShortList : Link::kList, index);
         }
-      } else if (link.tag() == Link::kList) {
+      } else if (link.isList()) {
         const TriangleList list = this->list(link);
         const std::uint32_t index = lists.append(list.count + std::size_t{1});
         std::copy_n(list.ids - 1, list.count + 1, &lists[index]);
-        link = Link(Link::kList, index);
+        link = Link(link.tag(), index);
       } else if (link.tag() == Link::kBlock) {
         const Block& from = blocks_[link.index()];
         const std::uint32_t index = blocks.append(1);
@@ -330,6 +380,8 @@ void Tree::keepOnly(const std::vector<std::uint8_t>& keep) {
     blocks_.swap(blocks);
     lists_.swap(lists);
   }
+  refits_.clear();  // they name nodes of the old pools
+  refits_wait_.store(false, std::memory_order_relaxed);
   for (const auto& n : nodes_at_) after += n;
   if (before > after) pruned_ += before - after;
   bytes_ = treeBytes();
@@ -391,18 +443,21 @@ void Tree::prune(Clock::time_point now) {
   pruneAlone(nanoseconds(now), false);
 }
 
-void Tree::maybePrune(std::int64_t now) {
+void Tree::afterQuery(std::int64_t now) {
+  const bool refits = refits_wait_.load(std::memory_order_relaxed);
   const bool over_budget = options_.memory_budget != 0 && bytes_ > options_.memory_budget;
   std::int64_t due = next_prune_.load(std::memory_order_relaxed);
-  const bool time_to = options_.ttl.count() > 0 && now >= due;
-  if (!over_budget && !time_to) return;
+  bool time_to = options_.ttl.count() > 0 && now >= due;
   if (time_to) {
     // A quarter of ttl between looks keeps the cost away from queries; whoever moves the time does the work.
     const std::int64_t step = std::chrono::duration_cast<std::chrono::nanoseconds>(options_.ttl).count() / 4 + 1;
-    if (!next_prune_.compare_exchange_strong(due, now + step, std::memory_order_relaxed) && !over_budget) return;
+    time_to = next_prune_.compare_exchange_strong(due, now + step, std::memory_order_relaxed);
   }
-  std::unique_lock<Gate> alone(gate_, std::try_to_lock);
-  if (alone.owns_lock()) pruneAlone(now, !time_to);
+  if (!refits && !over_budget && !time_to) return;
+  const std::unique_lock<Gate> alone(gate_, std::try_to_lock);
+  if (!alone.owns_lock()) return;
+  if (refits) refit();
+  if (over_budget || time_to) pruneAlone(now, !time_to);
 }
 
 void Tree::updateVertices(std::vector<Eigen::Vector3d> vertices) {

@@ -58,11 +58,8 @@ class Tree {
   lattice::Cell cell(NodeRef node) const {
     return node.isRoot() ? lattice::Cell{} : blocks_[node.block()].cell().octant(node.octant());
   }
-  /// Box and slab of a node; an expanded one's come from its own octants.
-  oracle::CellBounds bounds(NodeRef node, Link link) const {
-    if (link.tag() == Link::kBlock) return blocks_[link.index()].own;
-    return node.isRoot() ? root_bounds_ : blocks_[node.block()].octants.get(node.octant());
-  }
+  /// Box and slab of the root; those of other nodes are in their parents' blocks.
+  const oracle::CellBounds& rootBounds() const { return root_bounds_; }
   TriangleList list(Link link) const {
     const std::uint32_t* words = &lists_[link.index()];
     return {words + 1, words[0]};
@@ -77,6 +74,12 @@ class Tree {
     if (block.stamp.load(std::memory_order_relaxed) < now) block.stamp.store(now, std::memory_order_relaxed);
   }
   std::int64_t now() const;
+
+  /// The root grid knows the children of this frontier node.
+  bool growsFreely(NodeRef node) const {
+    const oracle::RootGrid* grid = grid_known_.load(std::memory_order_acquire);
+    return grid != nullptr && cell(node).level < grid->level();
+  }
 
   /// A node to grow, and whether a list of at most kLeafTriangles is enough (exact answers).
   struct Growth {
@@ -98,8 +101,8 @@ class Tree {
   void updateVertices(std::vector<Eigen::Vector3d> vertices);
   std::shared_ptr<const Mesh> mesh() const;
 
-  /// Prunes when it is time and nobody is in the way; after each query.
-  void maybePrune(std::int64_t now);
+  /// Takes up what the query taught about bounds, and prunes when it is time; puts it off when others are in the way.
+  void afterQuery(std::int64_t now);
 
  private:
   using Dropped = std::vector<std::uint8_t>;
@@ -111,6 +114,7 @@ class Tree {
   std::uint32_t addBlock(NodeRef node, const lattice::Cell& cell, std::uint8_t grey);
   Link addList(const std::uint32_t* ids, std::size_t count);
   void setLink(NodeRef node, Link link);
+  void refit();
   void pruneAlone(std::int64_t now, bool budget_only);
   void applyBudget();
   void keepOnly(const std::vector<std::uint8_t>& keep);
@@ -127,10 +131,20 @@ class Tree {
   oracle::Surface surface_;
   oracle::CellBounds root_bounds_;
   std::unique_ptr<oracle::RootGrid> grid_;
+  std::atomic<const oracle::RootGrid*> grid_known_{nullptr};  // grid_, for readers
   bool grid_tried_ = false;
   std::atomic<Link> root_{Link()};
   Pool<Block, 5> blocks_;
   Pool<std::uint32_t, 12> lists_;
+
+  // Tighter bounds of nodes than their parents' blocks hold; blocks that readers see are not written to, so these wait
+  // for a moment alone.
+  struct Refit {
+    NodeRef node;
+    oracle::CellBounds bounds;
+  };
+  std::vector<Refit> refits_;
+  std::atomic<bool> refits_wait_{false};
 
   std::array<std::atomic<std::size_t>, lattice::kMaxLevel + 1> nodes_at_{};
   std::atomic<std::size_t> bytes_{0};

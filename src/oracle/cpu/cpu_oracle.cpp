@@ -38,7 +38,11 @@ class Expander {
       block(begin, std::min(e_.count - begin, LocalTriangles::kCapacity));
     }
     e_.grey = proven_;
-    makeLists();
+    if (e_.own_only) {
+      makeOwnList();
+    } else {
+      makeLists();
+    }
     makeBounds();
   }
 
@@ -110,11 +114,18 @@ class Expander {
     }
   }
 
+  void makeOwnList() {
+    e_.lists.clear();
+    for (std::size_t i = 0; i < e_.count; ++i) {
+      if ((s_.masks[i] & proven_) != 0) e_.lists.push_back(id(i));
+    }
+  }
+
   void makeBounds() {
     OctantAccumulator* all = nullptr;
     for (int o = 0; o < 8; ++o) {
       if ((proven_ >> o & 1) == 0) continue;
-      e_.octants.set(o, s_.octants[o].bounds(octantCenter(o, 0.5), 1));
+      if (!e_.own_only) e_.octants.set(o, s_.octants[o].bounds(octantCenter(o, 0.5), 1));
       if (all == nullptr) {
         all = &s_.octants[o];
       } else {

@@ -6,6 +6,10 @@
 #include <hwy/foreach_target.h>
 #include <hwy/highway.h>
 
+// At -O2 the compiler keeps short loops over arrays of vectors, and with them the arrays in memory.
+#undef BOCST_UNROLL
+#define BOCST_UNROLL _Pragma("GCC unroll 8")
+
 HWY_BEFORE_NAMESPACE();
 namespace bocst::oracle::HWY_NAMESPACE {
 
@@ -27,12 +31,15 @@ HWY_INLINE void edgeAxis(D d, V ep, V eq, V ap, V aq, V bp, V bq, V half, int p,
   const V lo_r = hn::Sub(lo, r), hi_r = hn::Add(hi, r);
   const V h = hn::Set(d, 0.5f);
   const V hp = hn::Mul(h, ep), hq = hn::Mul(h, eq);
+  BOCST_UNROLL
   for (int sp = 0; sp < 2; ++sp) {
+    BOCST_UNROLL
     for (int sq = 0; sq < 2; ++sq) {
       // The octant's centre has coordinates +-1/2.
       const V a = sq ? hp : hn::Neg(hp);
       const V c = sp ? hn::Sub(a, hq) : hn::Add(a, hq);
       const M touch = hn::And(hn::Le(lo_r, c), hn::Ge(hi_r, c));
+      BOCST_UNROLL
       for (int o = 0; o < 8; ++o) {
         if ((o >> p & 1) == sp && (o >> q & 1) == sq) alive.octant[o] = hn::And(alive.octant[o], touch);
       }
@@ -48,7 +55,9 @@ void OctantMasks(const LocalTriangles& t, std::size_t count, std::uint8_t* masks
   for (std::size_t i = 0; i < count; i += hn::Lanes(d)) {
     V v[3][3];
     V size = one;
+    BOCST_UNROLL
     for (int k = 0; k < 3; ++k) {
+      BOCST_UNROLL
       for (int c = 0; c < 3; ++c) {
         v[k][c] = hn::Load(d, t.xyz[3 * k + c] + i);
         size = hn::Max(size, hn::Abs(v[k][c]));
@@ -60,6 +69,7 @@ void OctantMasks(const LocalTriangles& t, std::size_t count, std::uint8_t* masks
     // Box axes: which halves of the cell does the triangle's box meet?
     const V outer = hn::Add(one, pad), low_outer = hn::Neg(outer), low_pad = hn::Neg(pad);
     M side[3][2];
+    BOCST_UNROLL
     for (int c = 0; c < 3; ++c) {
       const V lo = hn::Min(hn::Min(v[0][c], v[1][c]), v[2][c]);
       const V hi = hn::Max(hn::Max(v[0][c], v[1][c]), v[2][c]);
@@ -67,11 +77,13 @@ void OctantMasks(const LocalTriangles& t, std::size_t count, std::uint8_t* masks
       side[c][1] = hn::And(hn::Ge(hi, low_pad), hn::Le(lo, outer));
     }
     Alive alive;
+    BOCST_UNROLL
     for (int o = 0; o < 8; ++o) {
       alive.octant[o] = hn::And(hn::And(side[0][o & 1], side[1][o >> 1 & 1]), side[2][o >> 2 & 1]);
     }
 
     V e[3][3];
+    BOCST_UNROLL
     for (int c = 0; c < 3; ++c) {
       e[0][c] = hn::Sub(v[1][c], v[0][c]);
       e[1][c] = hn::Sub(v[2][c], v[1][c]);
@@ -80,6 +92,7 @@ void OctantMasks(const LocalTriangles& t, std::size_t count, std::uint8_t* masks
 
     // Plane.
     V n[3], dist = zero, reach = zero, round = zero;
+    BOCST_UNROLL
     for (int c = 0; c < 3; ++c) {
       const int p = (c + 1) % 3, q = (c + 2) % 3;
       const V a = hn::Mul(e[0][p], e[1][q]), b = hn::Mul(e[0][q], e[1][p]);
@@ -90,6 +103,7 @@ void OctantMasks(const LocalTriangles& t, std::size_t count, std::uint8_t* masks
     }
     reach = hn::MulAdd(u24, round, reach);
     const V nx = hn::Mul(half, n[0]), ny = hn::Mul(half, n[1]), nz = hn::Mul(half, n[2]);
+    BOCST_UNROLL
     for (int o = 0; o < 8; ++o) {
       V c = (o & 1) ? nx : hn::Neg(nx);
       c = (o >> 1 & 1) ? hn::Add(c, ny) : hn::Sub(c, ny);
@@ -97,7 +111,9 @@ void OctantMasks(const LocalTriangles& t, std::size_t count, std::uint8_t* masks
       alive.octant[o] = hn::And(alive.octant[o], hn::Le(hn::Abs(hn::Sub(dist, c)), reach));
     }
 
+    BOCST_UNROLL
     for (int k = 0; k < 3; ++k) {
+      BOCST_UNROLL
       for (int c = 0; c < 3; ++c) {
         const int p = (c + 1) % 3, q = (c + 2) % 3, across = (k + 2) % 3;
         edgeAxis(d, e[k][p], e[k][q], v[k][p], v[k][q], v[across][p], v[across][q], h, p, q, alive);
@@ -105,6 +121,7 @@ void OctantMasks(const LocalTriangles& t, std::size_t count, std::uint8_t* masks
     }
 
     auto bits = hn::Zero(di);
+    BOCST_UNROLL
     for (int o = 0; o < 8; ++o) {
       bits = hn::Or(bits, hn::IfThenElseZero(hn::RebindMask(di, alive.octant[o]), hn::Set(di, 1 << o)));
     }
