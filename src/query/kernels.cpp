@@ -30,7 +30,7 @@ HWY_INLINE V fromBytes(D d, const std::int8_t* p) {
   return hn::ConvertTo(d, hn::PromoteTo(di, hn::LoadU(ds, p)));
 }
 
-std::uint8_t OverlappingOctants(const oracle::OctantBounds& octants, const OneVolume& b, float* distance) {
+std::uint8_t OverlappingOctants(const oracle::OctantBounds& octants, const OneVolume& b) {
   const D d;
   HWY_ALIGN static constexpr float kOrigin[3][8] = {
       {0, 1, 0, 1, 0, 1, 0, 1}, {0, 0, 1, 1, 0, 0, 1, 1}, {0, 0, 0, 0, 1, 1, 1, 1}};
@@ -47,8 +47,6 @@ std::uint8_t OverlappingOctants(const oracle::OctantBounds& octants, const OneVo
       h[k] = hn::Mul(hn::Sub(hi, lo), byte);
       delta[k] = hn::Sub(hn::Set(d, b.center[k]), middle[k]);
     }
-    const V d2 = hn::MulAdd(delta[0], delta[0], hn::MulAdd(delta[1], delta[1], hn::Mul(delta[2], delta[2])));
-    hn::StoreU(d2, d, distance + i);
     M apart = hn::MaskFromVec(hn::Zero(d));
     BOCST_UNROLL
     for (int k = 0; k < 3; ++k) {
@@ -216,8 +214,8 @@ namespace bocst::query {
 HWY_EXPORT(OverlappingOctants);
 HWY_EXPORT(TouchingPairs);
 
-std::uint8_t overlappingOctants(const oracle::OctantBounds& octants, const OneVolume& volume, float* distance) {
-  return HWY_DYNAMIC_DISPATCH(OverlappingOctants)(octants, volume, distance);
+std::uint8_t overlappingOctants(const oracle::OctantBounds& octants, const OneVolume& volume) {
+  return HWY_DYNAMIC_DISPATCH(OverlappingOctants)(octants, volume);
 }
 
 std::size_t touchingPairs(const TrianglePack& rows, const TrianglePack& lanes, float slack, PackPair* pairs) {

@@ -12,7 +12,7 @@ namespace bocst::query {
 /// other's cell at the origin and the side of its octants as unit.
 struct OneVolume {
   float center[3];       ///< Of the box.
-  float axes[3][3];      ///< axes[j]: unit vector of box axis j.
+  const float (*axes)[3];  ///< axes[j]: unit vector of box axis j.
   float half[3];         ///< Half extents along axes[j].
   float normal[3];       ///< Of the slab, about unit length; zero: no slab.
   float slab_offset;     ///< Middle of the slab along normal, from center.
@@ -26,8 +26,7 @@ struct OneVolume {
 /// Every axis projects with sums of at most 24 terms, each rounded at most 4 times and, with Q = |center|_1 + |half|_1
 /// + 4, at most Q in size; so an error is at most 96 Q 2^-24 and volumes must be given with pad >= 128 Q 2^-24, to
 /// which the caller adds what its own coordinates are off by.
-/// distance[o] is the squared distance of the two boxes' middles.
-std::uint8_t overlappingOctants(const oracle::OctantBounds& octants, const OneVolume& volume, float* distance);
+std::uint8_t overlappingOctants(const oracle::OctantBounds& octants, const OneVolume& volume);
 
 /// Corners of up to kCapacity triangles as structure of arrays, in one frame, near the origin.
 struct TrianglePack {

@@ -228,7 +228,7 @@ class PairWalk {
   }
 
   bool leafTriangles(const Pair& pair, Scratch& s) {
-    const Eigen::Vector3d origin = a_.volume(pair.a).center;
+    const Eigen::Vector3d origin = a_.cellSphere(pair.a).center;
     const std::size_t count_a = a_.triangleCount(pair.a), count_b = b_.triangleCount(pair.b);
     for (std::size_t i = 0; i < count_a; i += TrianglePack::kCapacity) {
       const std::uint64_t key = std::uint64_t{pair.a.bits} << 32 | i;
@@ -286,7 +286,7 @@ class PairWalk {
     seen.node = node;
     seen.state = side.state(node);
     seen.volume = side.volume(node);
-    seen.size = seen.volume.half.squaredNorm();
+    seen.size = seen.volume.size();
   }
 
   Seen<A> seen_a_;

@@ -80,25 +80,18 @@ class TreeSide {
   /// Names the cell of a leaf: its Morton code among those of its level.
   std::uint32_t cellId(Node node) const { return static_cast<std::uint32_t>(tree_.cell(node).morton()); }
 
-  /// Calls f(child) for the children of an inner node that `other`, placed in this frame by `to`, may overlap; the
-  /// nearest last, as it is the first to leave a stack.
+  /// Calls f(child) for the children of an inner node that `other`, placed in this frame by `to`, may overlap.
   template <typename OtherVolume, typename F>
-  void overlappingChildren(Node node, const OtherVolume& other, const Placement& to, F&& f) const {
+  void overlappingChildren(Node node, OtherVolume& other, const Placement& to, F&& f) const {
     const std::uint32_t index = tree_.link(node).index();
     const tree::Block& block = tree_.block(index);
     tree_.touch(block, now_);
     const double side = 1 << (lattice::kMaxLevel - block.level);
     const double corner[3] = {block.at[0] * side, block.at[1] * side, block.at[2] * side};
     const OneVolume one = seenFrom(other, to, corner, side / 2);
-    float distance[8];
-    int order[8], count = 0;
-    for (int mask = overlappingOctants(block.octants, one, distance) & block.grey; mask != 0; mask &= mask - 1) {
-      const int o = __builtin_ctz(static_cast<unsigned>(mask));
-      int k = count++;
-      for (; k > 0 && distance[order[k - 1]] < distance[o]; --k) order[k] = order[k - 1];
-      order[k] = o;
+    for (unsigned mask = overlappingOctants(block.octants, one) & block.grey; mask != 0; mask &= mask - 1) {
+      f(Node::octant(index, __builtin_ctz(mask)));
     }
-    for (int k = 0; k < count; ++k) f(Node::octant(index, order[k]));
   }
 
   /// Calls f(child) for all children.
@@ -126,16 +119,23 @@ class TreeSide {
   // Spelled out, one scalar each: this is the hottest code of a query after the pair test itself.
   static Volume decode(int lo0, int lo1, int lo2, int hi0, int hi1, int hi2, int n0, int n1, int n2, int slab_center,
                        int slab_half, int x, int y, int z, int level) {
-    const double side = 1 << (lattice::kMaxLevel - level), byte = side * (0.5 / 255), normal = 1.0 / 127;
-    const double c0 = (lo0 + hi0) * byte, c1 = (lo1 + hi1) * byte, c2 = (lo2 + hi2) * byte, middle = side / 2;
+    const int cells = 1 << (lattice::kMaxLevel - level);
+    const float side = static_cast<float>(cells), byte = side * (0.5f / 255), normal = 1.0f / 127, middle = side / 2;
+    const float c0 = static_cast<float>(lo0 + hi0) * byte, c1 = static_cast<float>(lo1 + hi1) * byte,
+                c2 = static_cast<float>(lo2 + hi2) * byte;
     Volume v;
-    v.half = Eigen::Vector3d((hi0 - lo0) * byte, (hi1 - lo1) * byte, (hi2 - lo2) * byte);
-    v.center = Eigen::Vector3d(x * side + c0, y * side + c1, z * side + c2);
-    v.normal = Eigen::Vector3d(n0 * normal, n1 * normal, n2 * normal);
-    v.slab_offset =
-        slab_center * side * normal -
-        (v.normal[0] * (c0 - middle) + v.normal[1] * (c1 - middle) + v.normal[2] * (c2 - middle));
-    v.slab_half = slab_half * (side * normal / 2);
+    v.half[0] = static_cast<float>(hi0 - lo0) * byte;
+    v.half[1] = static_cast<float>(hi1 - lo1) * byte;
+    v.half[2] = static_cast<float>(hi2 - lo2) * byte;
+    v.center[0] = x * cells + double{c0};
+    v.center[1] = y * cells + double{c1};
+    v.center[2] = z * cells + double{c2};
+    v.normal[0] = static_cast<float>(n0) * normal;
+    v.normal[1] = static_cast<float>(n1) * normal;
+    v.normal[2] = static_cast<float>(n2) * normal;
+    v.slab_offset = static_cast<float>(slab_center) * (side * normal) -
+                    (v.normal[0] * (c0 - middle) + v.normal[1] * (c1 - middle) + v.normal[2] * (c2 - middle));
+    v.slab_half = static_cast<float>(slab_half) * (side * normal / 2);
     return v;
   }
 

@@ -11,12 +11,17 @@
 namespace bocst::query {
 
 /// What bounds the surface of a node of a tree: box AND slab, in lattice units, axes those of the lattice.
+/// Plain numbers: this and what is made of it are the hottest data of a query.
 struct Volume {
-  Eigen::Vector3d center;
-  Eigen::Vector3d half;
-  Eigen::Vector3d normal;  ///< About unit length; zero: no slab.
-  double slab_offset = 0;  ///< Middle of the slab along normal, from center.
-  double slab_half = 0;
+  double center[3];
+  float half[3];
+  float normal[3];    ///< About unit length; zero: no slab.
+  float slab_offset;  ///< Middle of the slab along normal, from center.
+  float slab_half;
+
+  double size() const {  ///< Half the diagonal, squared.
+    return double{half[0]} * half[0] + double{half[1]} * half[1] + double{half[2]} * half[2];
+  }
 };
 
 /// The same with axes of its own and no slab: the volume of a partner's node.
@@ -24,6 +29,9 @@ struct OrientedVolume {
   Eigen::Vector3d center;
   Eigen::Matrix3d axes = Eigen::Matrix3d::Identity();  ///< Columns: the box's unit axes.
   Eigen::Vector3d half;
+  float seen_axes[3][3] = {};  // what seenFrom() points at
+
+  double size() const { return half.squaredNorm(); }
 };
 
 /// A sphere in the frame of its side.
@@ -67,28 +75,30 @@ struct Placement {
 /// The volume as the octants of a cell see it; `corner` is the cell's minimum corner, `side` that of its octants.
 inline OneVolume seenFrom(const Volume& v, const Placement& to, const double* corner, double side) {
   OneVolume o;
-  const double inverse = 1 / side;
-  const float scale = static_cast<float>(to.scale * inverse);
-  const Eigen::Matrix3d& r = to.rotation;
-  float size = 4;
-  for (int k = 0; k < 3; ++k) {
-    const double x = r(k, 0) * v.center[0] + r(k, 1) * v.center[1] + r(k, 2) * v.center[2];
-    o.center[k] = static_cast<float>((to.scale * x + to.translation[k] - corner[k]) * inverse);
-    o.half[k] = static_cast<float>(v.half[k]) * scale;
-    size += std::abs(o.center[k]) + o.half[k];
-  }
-  const float n[3] = {static_cast<float>(v.normal[0]), static_cast<float>(v.normal[1]), static_cast<float>(v.normal[2])};
-  for (int k = 0; k < 3; ++k) {
-    for (int j = 0; j < 3; ++j) o.axes[j][k] = to.axes[j][k];
-    o.normal[k] = n[0] * to.axes[0][k] + n[1] * to.axes[1][k] + n[2] * to.axes[2][k];
-  }
-  o.slab_offset = static_cast<float>(v.slab_offset) * scale;
-  o.slab_half = static_cast<float>(v.slab_half) * scale;
+  const double inverse = 1 / side, shrink = to.scale * inverse;
+  const float scale = static_cast<float>(shrink);
+  const double* r = to.rotation.data();  // column by column
+  const double x = v.center[0], y = v.center[1], z = v.center[2];
+  o.center[0] = static_cast<float>((r[0] * x + r[3] * y + r[6] * z) * shrink + (to.translation[0] - corner[0]) * inverse);
+  o.center[1] = static_cast<float>((r[1] * x + r[4] * y + r[7] * z) * shrink + (to.translation[1] - corner[1]) * inverse);
+  o.center[2] = static_cast<float>((r[2] * x + r[5] * y + r[8] * z) * shrink + (to.translation[2] - corner[2]) * inverse);
+  o.half[0] = v.half[0] * scale;
+  o.half[1] = v.half[1] * scale;
+  o.half[2] = v.half[2] * scale;
+  const float n0 = v.normal[0], n1 = v.normal[1], n2 = v.normal[2];
+  o.normal[0] = n0 * to.axes[0][0] + n1 * to.axes[1][0] + n2 * to.axes[2][0];
+  o.normal[1] = n0 * to.axes[0][1] + n1 * to.axes[1][1] + n2 * to.axes[2][1];
+  o.normal[2] = n0 * to.axes[0][2] + n1 * to.axes[1][2] + n2 * to.axes[2][2];
+  o.slab_offset = v.slab_offset * scale;
+  o.slab_half = v.slab_half * scale;
+  o.axes = to.axes;
+  const float size = 4 + std::abs(o.center[0]) + std::abs(o.center[1]) + std::abs(o.center[2]) + o.half[0] +
+                     o.half[1] + o.half[2];
   o.pad = size * to.pad + static_cast<float>(to.slack * inverse);
   return o;
 }
 
-inline OneVolume seenFrom(const OrientedVolume& v, const Placement& to, const double* corner, double side) {
+inline OneVolume seenFrom(OrientedVolume& v, const Placement& to, const double* corner, double side) {
   OneVolume o;
   const double inverse = 1 / side, scale = to.scale * inverse;
   const Eigen::Vector3d center = (to * v.center - Eigen::Vector3d(corner[0], corner[1], corner[2])) * inverse;
@@ -97,8 +107,9 @@ inline OneVolume seenFrom(const OrientedVolume& v, const Placement& to, const do
     o.center[k] = static_cast<float>(center[k]);
     o.half[k] = static_cast<float>(v.half[k] * scale);
     o.normal[k] = 0;
-    for (int j = 0; j < 3; ++j) o.axes[j][k] = static_cast<float>(axes(k, j));
+    for (int j = 0; j < 3; ++j) v.seen_axes[j][k] = static_cast<float>(axes(k, j));
   }
+  o.axes = v.seen_axes;
   o.slab_offset = 0;
   o.slab_half = 0;
   const double size = center.lpNorm<1>() + v.half.lpNorm<1>() * scale + 4;
@@ -106,7 +117,14 @@ inline OneVolume seenFrom(const OrientedVolume& v, const Placement& to, const do
   return o;
 }
 
-inline OrientedVolume oriented(const Volume& v) { return {v.center, Eigen::Matrix3d::Identity(), v.half}; }
+inline OrientedVolume oriented(const Volume& v) {
+  OrientedVolume o;
+  for (int k = 0; k < 3; ++k) {
+    o.center[k] = v.center[k];
+    o.half[k] = v.half[k];
+  }
+  return o;
+}
 inline const OrientedVolume& oriented(const OrientedVolume& v) { return v; }
 
 /// Are the two boxes surely apart? The fifteen axes in double; `to` places b in a's frame. For the few pairs that no
