@@ -5,6 +5,8 @@
 # {with <bocst/fcl.h>, without} x {-O0, -O2, -O3} x {static, shared libbocst} x {libbocst before libfcl, after}.
 # Each must answer rightly, or refuse with the remedy; the ones with libbocst before libfcl, and the static ones, must answer.
 #
+# And once for float, of which libfcl has no code, so that the order does not matter.
+#
 # matrix.sh SOURCE WORK STATIC_LIB SHARED_LIB LIBFCL CXX [FLAG...]
 #   WORK: a directory for what is built here; FLAG: include directories, libraries of FCL, sanitizers.
 set -euo pipefail
@@ -32,65 +34,73 @@ compile() { # object flags...
   "${launcher[@]}" "${compiler[@]}" -std=c++17 "${compile_flags[@]}" "$@" -c "$source" -o "$object"
 }
 
-# Runs a program and compares with what it must do: "answers", or "answers or refuses".
+# Runs a program and compares what it does with what it must do: "answers", or "answers or refuses".
 check() { # name must command...
   local name=$1 must=$2 status=0 got
   shift 2
   "$@" > "$work/$name.txt" 2> "$work/$name.err" || status=$?
   case $status in
     0) got="answers" ;;
+    1) if grep -q 'overlapping models are told to be free' "$work/$name.txt"; then got="misses"; else got="WRONG"; fi ;;
     3) got="refuses" ;;
     *) got="WRONG (exit $status)" ;;
   esac
   local verdict=ok
   if [[ $status == 3 ]] && ! grep -q 'bocst::bocst before fcl' "$work/$name.txt"; then got="WRONG (no remedy)"; fi
-  if [[ $got == WRONG* || ($must == answers && $got != answers) || ($must == refuses && $got != refuses) ]]; then
+  if [[ " $must " != *" $got "* ]]; then
     verdict=FAILED
     failed=1
   fi
-  printf '%-34s %-10s %s\n' "$name" "$got" "$verdict"
+  printf '%-32s %-10s %s\n' "$name" "$got" "$verdict"
   if [[ $verdict == FAILED ]]; then sed 's/^/    /' "$work/$name.txt" "$work/$name.err"; fi
 }
 
-jobs=$(nproc)
-running=0
-for optimise in O0 O2 O3; do
-  for header in with without; do
-    define=()
-    [[ $header == with ]] && define=(-DWITH_HEADER)
-    compile "$work/$optimise-$header.o" "-$optimise" "${define[@]}" &
-    running=$((running + 1))
-    if ((running >= jobs)); then
-      wait -n
-      running=$((running - 1))
-    fi
-  done
-done
-wait
+link_and_check() { # object kind order must
+  local object=$1 kind=$2 order=$3 must=$4 libs bocst=$shared_lib
+  local name=$kind-$object-$order
+  if [[ $kind == static ]]; then bocst=$static_lib; fi
+  if [[ $order == before ]]; then libs=("$bocst" "$libfcl"); else libs=("$libfcl" "$bocst"); fi
+  "${compiler[@]}" "${compile_flags[@]}" "$work/$object.o" -o "$work/$name" "${libs[@]}" "${link_flags[@]}" \
+    "-Wl,-rpath,$shared_dir"
+  check "$name" "$must" "$work/$name"
+}
 
+objects=()
 for optimise in O0 O2 O3; do
-  for header in with without; do
-    object=$work/$optimise-$header.o
-    for kind in static shared; do
-      for order in before after; do
-        name=$kind-$optimise-$header-$order
-        if [[ $kind == static ]]; then bocst=$static_lib; else bocst=$shared_lib; fi
-        if [[ $order == before ]]; then
-          libs=("$bocst" "$libfcl")
-        else
-          libs=("$libfcl" "$bocst")
-        fi
-        "${compiler[@]}" "${compile_flags[@]}" "$object" -o "$work/$name" "${libs[@]}" "${link_flags[@]}" \
-          "-Wl,-rpath,$shared_dir"
-        must=answers
-        [[ $kind == shared && $order == after ]] && must="answers or refuses"
-        check "$name" "$must" "$work/$name"
-      done
+  objects+=("$optimise-with -$optimise -DWITH_HEADER" "$optimise-without -$optimise")
+done
+objects+=("float-with -O0 -DWITH_FLOAT -DWITH_HEADER" "float-without -O0 -DWITH_FLOAT")
+
+# As many compilers at a time as there are processors; a failure ends the script.
+running=0
+for line in "${objects[@]}"; do
+  read -r -a words <<< "$line"
+  compile "$work/${words[0]}.o" "${words[@]:1}" &
+  running=$((running + 1))
+  if ((running >= $(nproc))); then
+    wait -n
+    running=$((running - 1))
+  fi
+done
+while ((running > 0)); do
+  wait -n
+  running=$((running - 1))
+done
+
+for line in "${objects[@]}"; do
+  object=${line%% *}
+  for kind in static shared; do
+    for order in before after; do
+      must=answers
+      if [[ $kind == shared && $order == after && $object != float* ]]; then must="answers or refuses"; fi
+      link_and_check "$object" "$kind" "$order" "$must"
     done
   done
 done
 
-# The two remedies that the complaint names.
+# The remedies that the complaint names.
 check preload-O2-without-after answers env LD_PRELOAD="$shared_lib" "$work/shared-O2-without-after"
 check check-off-O2-with-after answers env BOCST_DISPATCH_CHECK=off "$work/shared-O2-with-after"
+# And what the check is for: without it, FCL's own table says "free".
+check check-off-O2-without-after misses env BOCST_DISPATCH_CHECK=off "$work/shared-O2-without-after"
 exit $failed

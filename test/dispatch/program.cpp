@@ -11,6 +11,7 @@
 
 #include <fcl/broadphase/broadphase_dynamic_AABB_tree.h>
 #include <fcl/broadphase/default_broadphase_callbacks.h>
+#include <fcl/geometry/bvh/BVH_model.h>
 #include <fcl/geometry/shape/box.h>
 #include <fcl/geometry/shape/sphere.h>
 #include <fcl/geometry/shape/triangle_p.h>
@@ -44,6 +45,15 @@ std::shared_ptr<bocst::Model<S>> makeTetrahedron() {
   std::vector<Eigen::Vector3d> vertices{{0, 0, 0}, {1, 0, 0}, {0, 1, 0}, {0, 0, 1}};
   std::vector<fcl::Triangle> triangles{{0, 2, 1}, {0, 1, 3}, {0, 3, 2}, {1, 2, 3}};
   return std::make_shared<bocst::Model<S>>(std::make_shared<const bocst::Mesh>(std::move(vertices), triangles));
+}
+
+std::shared_ptr<fcl::BVHModel<fcl::OBBRSS<S>>> makeBvh() {
+  auto bvh = std::make_shared<fcl::BVHModel<fcl::OBBRSS<S>>>();
+  bvh->beginModel();
+  bvh->addTriangle(fcl::Vector3<S>(0, 0, 0), fcl::Vector3<S>(1, 0, 0), fcl::Vector3<S>(0, 1, 0));
+  bvh->addTriangle(fcl::Vector3<S>(0, 0, 0), fcl::Vector3<S>(0, 1, 0), fcl::Vector3<S>(0, 0, 1));
+  bvh->endModel();
+  return bvh;
 }
 
 fcl::Transform3<S> moved(S x) {
@@ -113,6 +123,22 @@ void run() {
     expect(hit, std::string(way.name) + ": overlapping models are told to be free");
     expect(is_free, std::string(way.name) + ": models apart are told to be in contact");
   }
+
+  // FCL puts a mesh before a shape; a model must stay where it was put.
+  for (const bool model_first : {true, false}) {
+    const Geometry mesh = makeBvh();
+    fcl::CollisionRequest<S> request;
+    fcl::CollisionResult<S> result;
+    const Geometry &first = model_first ? a : mesh, &second = model_first ? mesh : a;
+    fcl::collide(first.get(), moved(0), second.get(), moved(S(0.25)), request, result);
+    expect(result.isCollision() && result.getContact(0).o1 == first.get() && result.getContact(0).o2 == second.get(),
+           "a model and an FCL mesh are told to be free, or were swapped");
+  }
+  // A partner that is not supported must not be told to be free.
+  expect(throwsInvalidArgument([&] {
+           if (byGeometries(a, ball, moved(S(0.25)), fcl::GST_LIBCCD)) throw std::invalid_argument("supported");
+         }),
+         "a model and a sphere are told to be free");
 
   expect(throwsInvalidArgument([&] {
            fcl::DistanceRequest<S> request;
