@@ -84,7 +84,7 @@ struct Bench {
 
     // Both sides take turns, so that a slow moment of the machine meets both.
     Progress progress("step", 2 * rounds + 3);
-    const std::unique_ptr<QueryPair> fcl_pair = make_fcl();
+    const std::unique_ptr<FclPair> fcl_pair = make_fcl();
     progress.step();
     PoseSampler sampler(*mesh_a, *mesh_b, *fcl_pair, seed);
     std::vector<Eigen::Isometry3d> first_poses;

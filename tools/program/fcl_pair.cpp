@@ -4,7 +4,9 @@
 #include <fcl/math/bv/OBB.h>
 #include <fcl/math/bv/OBBRSS.h>
 #include <fcl/math/bv/RSS.h>
+#include <fcl/math/geometry.h>
 #include <fcl/narrowphase/collision.h>
+#include <fcl/narrowphase/detail/traversal/collision/intersect.h>
 
 #include <stdexcept>
 
@@ -46,13 +48,38 @@ std::unique_ptr<fcl::BVHModel<BV>> build(const MeshArrays& mesh) {
 }
 
 template <typename BV>
-std::unique_ptr<QueryPair> buildPair(const MeshArrays& a, const MeshArrays& b) {
+class BvhPair : public PairOf<typename BV::S, fcl::BVHModel<BV>, FclPair, FclCollide<typename BV::S>> {
   using S = typename BV::S;
-  return std::make_unique<PairOf<S, fcl::BVHModel<BV>, QueryPair, FclCollide<S>>>(build<BV>(a), build<BV>(b));
+
+ public:
+  using PairOf<S, fcl::BVHModel<BV>, FclPair, FclCollide<S>>::PairOf;
+
+  bool trianglesTouch(QueryPair::Contact triangles, const Eigen::Isometry3d& X_AB,
+                      QueryPair::Order order) const override {
+    // In the caller's order and in the first one's frame: so FCL rounds when it asks.
+    const bool ab = order == QueryPair::Order::kAB;
+    const fcl::BVHModel<BV>& first = ab ? this->a() : this->b();
+    const fcl::BVHModel<BV>& second = ab ? this->b() : this->a();
+    const fcl::Transform3<S> X_WA = fcl::Transform3<S>::Identity();
+    const fcl::Transform3<S> X_WB = X_AB.cast<S>();
+    fcl::Matrix3<S> R;
+    fcl::Vector3<S> T;
+    fcl::relativeTransform(ab ? X_WA : X_WB, ab ? X_WB : X_WA, R, T);
+    const fcl::Triangle& p = first.tri_indices[ab ? triangles.first : triangles.second];
+    const fcl::Triangle& q = second.tri_indices[ab ? triangles.second : triangles.first];
+    return fcl::detail::Intersect<S>::intersect_Triangle(first.vertices[p[0]], first.vertices[p[1]],
+                                                         first.vertices[p[2]], second.vertices[q[0]],
+                                                         second.vertices[q[1]], second.vertices[q[2]], R, T);
+  }
+};
+
+template <typename BV>
+std::unique_ptr<FclPair> buildPair(const MeshArrays& a, const MeshArrays& b) {
+  return std::make_unique<BvhPair<BV>>(build<BV>(a), build<BV>(b));
 }
 
 template <typename S>
-std::unique_ptr<QueryPair> buildPair(FclTree tree, const MeshArrays& a, const MeshArrays& b) {
+std::unique_ptr<FclPair> buildPair(FclTree tree, const MeshArrays& a, const MeshArrays& b) {
   switch (tree) {
     case FclTree::kObbRss:
       return buildPair<fcl::OBBRSS<S>>(a, b);
@@ -66,7 +93,7 @@ std::unique_ptr<QueryPair> buildPair(FclTree tree, const MeshArrays& a, const Me
 
 }  // namespace
 
-std::unique_ptr<QueryPair> buildFclPair(FclTree tree, Scalar scalar, const MeshArrays& a, const MeshArrays& b) {
+std::unique_ptr<FclPair> buildFclPair(FclTree tree, Scalar scalar, const MeshArrays& a, const MeshArrays& b) {
   return scalar == Scalar::kFloat ? buildPair<float>(tree, a, b) : buildPair<double>(tree, a, b);
 }
 

@@ -68,7 +68,7 @@ struct Inspect {
       return 0;
     }
 
-    Table summary;
+    Table summary(Table::Others::kLeft);
     summary.row({"mesh", file});
     summary.row({"vertices", std::to_string(mesh->vertexCount())});
     summary.row({"triangles", std::to_string(mesh->triangleCount())});

@@ -16,7 +16,7 @@ void addOracles(CLI::App& program, Job& job) {
     job = [output] {
       output->check();
       Json report = {{"oracles", Json::array()}};
-      Table table;
+      Table table(Table::Others::kLeft);
       table.row({"oracle", "hardware", "usable", "device"});
       for (const OracleInfo& oracle : availableOracles()) {
         report["oracles"].push_back({{"name", oracle.name},

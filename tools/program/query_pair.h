@@ -51,7 +51,13 @@ class QueryPair {
 /// FCL's own trees over both meshes.
 enum class FclTree { kObbRss, kObb, kRss };
 
-std::unique_ptr<QueryPair> buildFclPair(FclTree tree, Scalar scalar, const MeshArrays& a, const MeshArrays& b);
+class FclPair : public QueryPair {
+ public:
+  /// FCL's triangle test alone, as its query would make it had its trees not culled the pair before.
+  virtual bool trianglesTouch(Contact triangles, const Eigen::Isometry3d& X_AB, Order order) const = 0;
+};
+
+std::unique_ptr<FclPair> buildFclPair(FclTree tree, Scalar scalar, const MeshArrays& a, const MeshArrays& b);
 
 /// Bytes of the bounding volume nodes that FCL's OBBRSS tree takes for this many triangles.
 std::size_t fclTreeBytes(Scalar scalar, std::size_t triangles);
@@ -69,11 +75,5 @@ class BocstPair : public QueryPair {
 
 std::unique_ptr<BocstPair> makeBocstPair(Scalar scalar, const MeshArrays& a, const MeshArrays& b,
                                          const Options& options);
-
-/// Makes the pair and asks once: what a planner pays for its first answer.
-template <typename Make>
-bool firstAnswer(const Make& make, const Eigen::Isometry3d& X_AB) {
-  return make()->touch(X_AB);
-}
 
 }  // namespace bocst::program

@@ -101,7 +101,7 @@ void Table::print() const {
     std::string line;
     for (std::size_t i = 0; i < cells.size(); ++i) {
       const std::string pad(width[i] - cells[i].size(), ' ');
-      line += (i == 0 ? "" : "  ") + (i == 0 ? cells[i] + pad : pad + cells[i]);
+      line += (i == 0 ? "" : "  ") + (i == 0 || others_ == Others::kLeft ? cells[i] + pad : pad + cells[i]);
     }
     line.erase(line.find_last_not_of(' ') + 1);
     std::cout << line << '\n';

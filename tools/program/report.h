@@ -26,13 +26,17 @@ class Output {
   void write(const Json& json) const;
 };
 
-/// A table for people: the first column to the left, the others to the right.
+/// A table for people: the first column to the left, the others to the right, where figures belong.
 class Table {
  public:
+  enum class Others { kRight, kLeft };
+  explicit Table(Others others = Others::kRight) : others_(others) {}
+
   void row(std::vector<std::string> cells) { rows_.push_back(std::move(cells)); }
   void print() const;
 
  private:
+  Others others_;
   std::vector<std::vector<std::string>> rows_;
 };
 

@@ -1,0 +1,240 @@
+// SPDX-License-Identifier: BSD-3-Clause
+// Runs the program as a user would. BOCST_PROGRAM is its path, BOCST_MODELS that of share/models.
+#include <gtest/gtest.h>
+#include <sys/wait.h>
+#include <unistd.h>
+
+#include <cmath>
+#include <cstdio>
+#include <cstdlib>
+#include <filesystem>
+#include <fstream>
+#include <nlohmann/json.hpp>
+#include <stdexcept>
+#include <string>
+
+namespace bocst {
+namespace {
+
+namespace fs = std::filesystem;
+using Json = nlohmann::json;
+
+constexpr int kFailed = 1;
+constexpr int kUsage = 2;
+
+class Program : public ::testing::Test {
+ protected:
+  Program() {
+    std::string pattern = (fs::temp_directory_path() / "bocst_program_XXXXXX").string();
+    if (mkdtemp(pattern.data()) == nullptr) throw std::runtime_error("no temporary folder");
+    folder_ = pattern;
+  }
+  ~Program() override { fs::remove_all(folder_); }
+
+  struct Result {
+    int code;
+    std::string out;
+    std::string err;
+  };
+
+  Result run(const std::string& arguments) const {
+    const std::string out = (folder_ / "out").string();
+    const std::string err = (folder_ / "err").string();
+    const std::string command = std::string("'") + BOCST_PROGRAM + "' " + arguments + " >" + out + " 2>" + err;
+    const int status = std::system(command.c_str());
+    return {WIFEXITED(status) ? WEXITSTATUS(status) : -1, read(out), read(err)};
+  }
+
+  /// Runs with --json - and expects the exit code 0.
+  Json json(const std::string& arguments, int code = 0) const {
+    const Result result = run(arguments + " --json -");
+    EXPECT_EQ(result.code, code) << arguments << '\n' << result.err;
+    return Json::parse(result.out, nullptr, false);
+  }
+
+  void expectComplaint(const std::string& arguments, int code, const std::string& about = "") const {
+    const Result result = run(arguments);
+    EXPECT_EQ(result.code, code) << arguments << '\n' << result.err;
+    EXPECT_EQ(result.err.rfind("bocst: ", 0), 0u) << result.err;
+    EXPECT_EQ(result.err.find('\n'), result.err.size() - 1) << "more than one line: " << result.err;
+    EXPECT_NE(result.err.find(about), std::string::npos) << result.err;
+  }
+
+  static std::string read(const fs::path& file) {
+    std::ifstream stream(file, std::ios::binary);
+    return {std::istreambuf_iterator<char>(stream), std::istreambuf_iterator<char>()};
+  }
+
+  std::string write(const std::string& name, const std::string& content) const {
+    const std::string file = (folder_ / name).string();
+    std::ofstream(file, std::ios::binary) << content;
+    return file;
+  }
+
+  static std::string model(const std::string& name) { return std::string("'") + BOCST_MODELS + "/" + name + ".obj'"; }
+
+  /// The unit cube about the origin.
+  std::string cube() const {
+    return write(
+        "cube.off",
+        "OFF\n8 6 0\n-.5 -.5 -.5\n.5 -.5 -.5\n.5 .5 -.5\n-.5 .5 -.5\n-.5 -.5 .5\n.5 -.5 .5\n.5 .5 .5\n-.5 .5 .5\n"
+        "4 0 3 2 1\n4 4 5 6 7\n4 0 1 5 4\n4 1 2 6 5\n4 2 3 7 6\n4 3 0 4 7\n");
+  }
+
+  fs::path folder_;
+};
+
+TEST_F(Program, CollidesTheModelsItComesWith) {
+  const Json report = json("collide " + model("link") + " " + model("gripper"));
+  EXPECT_EQ(report.at("collide"), true);
+  EXPECT_GT(report.at("contacts"), 0);
+  EXPECT_EQ(report.at("contacts"), report.at("fcl").at("contacts"));
+  EXPECT_EQ(report.at("agree"), true);
+  EXPECT_GT(report.at("nodes"), 2);
+  for (const char* key : {"first_answer_us", "warm_query_us", "bytes"}) {
+    EXPECT_GT(report.at(key).at("bocst"), 0) << key;
+    EXPECT_GT(report.at(key).at("fcl"), 0) << key;
+  }
+  for (const char* key : {"first_answer", "warm_query", "memory"}) EXPECT_GT(report.at("ratio").at(key), 0) << key;
+  const Result table = run("collide " + model("link") + " " + model("gripper"));
+  EXPECT_EQ(table.code, 0);
+  EXPECT_NE(table.out.find("They collide."), std::string::npos) << table.out;
+  EXPECT_TRUE(table.err.empty()) << table.err;
+}
+
+TEST_F(Program, PlacesBWhereThePoseSays) {
+  const std::string pair = "collide " + cube() + " " + cube() + " --pose ";
+  EXPECT_EQ(json(pair + "0.9,0,0,1,0,0,0").at("collide"), true);
+  EXPECT_EQ(json(pair + "1.1,0,0,1,0,0,0").at("collide"), false);
+  // Turned by 45 degrees about z, not normalised: the corner reaches to 1.1 - 0.707.
+  EXPECT_EQ(json(pair + "1.1,0,0,2.414213562373095,0,0,1").at("collide"), true);
+  EXPECT_EQ(json(pair + "-1.1,0,0,1,0,0,0").at("contacts"), 0);
+  EXPECT_EQ(json(pair + "0.9,0.1,0,1,0,0,0 --max-contacts 2").at("contacts"), 2);
+  for (const char* scalar : {"float", "double"}) {
+    EXPECT_EQ(json(pair + "0.9,0,0,1,0,0,0 --scalar " + scalar).at("agree"), true) << scalar;
+  }
+}
+
+TEST_F(Program, AnswersConservatively) {
+  const std::string pair =
+      "collide " + cube() + " " + cube() + " --answer conservative --pose 1.05,0,0,1,0,0,0 --depth ";
+  EXPECT_EQ(json(pair + "2").at("collide"), true);
+  EXPECT_EQ(json(pair + "9").at("collide"), false);
+}
+
+TEST_F(Program, InspectsTheTreeByLevel) {
+  for (const std::string subdivision : {"octree", "bono"}) {
+    const Json report = json("inspect " + model("link") + " --depth 5 --subdivision " + subdivision);
+    EXPECT_EQ(report.at("triangles"), 5120);
+    const Json& levels = report.at("levels");
+    ASSERT_EQ(levels.size(), 5u);
+    EXPECT_EQ(levels[0].at("nodes"), 1);
+    std::size_t nodes = 0;
+    double last = 1;
+    for (std::size_t i = 0; i < levels.size(); ++i) {
+      EXPECT_EQ(levels[i].at("level"), i + 1);
+      nodes += levels[i].at("nodes").get<std::size_t>();
+      EXPECT_LE(levels[i].at("error_min"), levels[i].at("error_avg"));
+      EXPECT_LE(levels[i].at("error_avg"), levels[i].at("error_max"));
+      EXPECT_GT(levels[i].at("error_min"), 0);
+      EXPECT_LE(levels[i].at("error_max"), 1);
+      EXPECT_LT(levels[i].at("error_avg"), last);
+      last = levels[i].at("error_avg");
+    }
+    EXPECT_EQ(report.at("nodes"), nodes);
+  }
+}
+
+TEST_F(Program, MeasuresTheErrorThatThePaperDefines) {
+  // The root sphere about the unit cube has the radius sqrt(3)/2, and the point farthest from the cube's surface is
+  // above the middle of a face, sqrt(3)/2 - 1/2 away.
+  const Json report = json("inspect " + cube() + " --depth 1");
+  const double radius = report.at("root_radius");
+  EXPECT_NEAR(radius, std::sqrt(0.75), 1e-6);
+  EXPECT_NEAR(report.at("levels")[0].at("error_max").get<double>(), (radius - 0.5) / (2 * radius), 1e-3);
+}
+
+TEST_F(Program, ValidatesAgainstFcl) {
+  const std::string pair = "validate " + model("link") + " " + model("gripper") + " --poses 64 --seed 7";
+  const Json exact = json(pair + " --contacts --reference obbrss,obb");
+  EXPECT_EQ(exact.at("poses"), 64);
+  EXPECT_GT(exact.at("reference_hits"), 16);
+  EXPECT_LT(exact.at("reference_hits"), 56);
+  EXPECT_EQ(exact.at("hits"), exact.at("reference_hits"));
+  for (const char* key : {"false_negatives", "false_positives", "mismatches"}) EXPECT_EQ(exact.at(key), 0) << key;
+  EXPECT_EQ(json(pair + " --contacts --reference obbrss,obb"), exact) << "the same seed gives the same report";
+
+  const Json conservative = json(pair + " --answer conservative --depth 4 --subdivision octree");
+  EXPECT_EQ(conservative.at("false_negatives"), 0);
+  EXPECT_GT(conservative.at("false_positives"), 0);
+  EXPECT_EQ(json(pair + " --scalar float").at("mismatches"), 0);
+}
+
+TEST_F(Program, ComparesWithFcl) {
+  const Json report = json("bench " + model("link") + " " + model("gripper") + " --poses 20 --rounds 2");
+  for (const char* key : {"first_answer", "query_median", "query_mean", "query_p95", "memory"}) {
+    EXPECT_GT(report.at("ratio").at(key), 0) << key;
+  }
+  EXPECT_TRUE(report.at("ratio").at("distance_median").is_null());
+  EXPECT_EQ(report.at("verdicts").at("equal"), true);
+  EXPECT_EQ(report.at("verdicts").at("bocst"), report.at("verdicts").at("fcl"));
+  EXPECT_EQ(json("bench " + model("link") + " --poses 5 --rounds 1").at("triangles"), Json({5120, 5120}));
+}
+
+TEST_F(Program, ListsOracles) {
+  const Json report = json("oracles");
+  bool cpu = false;
+  for (const Json& oracle : report.at("oracles")) {
+    if (oracle.at("name") == "cpu") cpu = oracle.at("usable");
+    EXPECT_EQ(oracle.at("usable").get<bool>(), oracle.at("why_not") == "");
+  }
+  EXPECT_TRUE(cpu);
+}
+
+TEST_F(Program, WritesJsonFilesWhole) {
+  const std::string file = (folder_ / "report.json").string();
+  EXPECT_EQ(run("inspect " + cube() + " --depth 2 --json " + file).out, "");
+  EXPECT_EQ(Json::parse(read(file)).at("levels").size(), 2u);
+  std::size_t files = 0;
+  for (const auto& entry : fs::directory_iterator(folder_)) {
+    files += entry.path().filename().string().rfind("report.json", 0) == 0;
+  }
+  EXPECT_EQ(files, 1u) << "temporary files are left";
+  expectComplaint("inspect " + cube() + " --json " + (folder_ / "none" / "r.json").string(), kFailed, "r.json");
+  expectComplaint("inspect " + cube() + " --json " + folder_.string(), kFailed, "cannot be written");
+  expectComplaint("inspect " + cube() + " --json /dev/full", kFailed, "/dev/full");
+}
+
+TEST_F(Program, ExplainsWrongCommandLines) {
+  EXPECT_EQ(run("--help").code, 0);
+  EXPECT_EQ(run("validate --help").code, 0);
+  expectComplaint("", kUsage);
+  expectComplaint("fly", kUsage);
+  expectComplaint("collide " + cube(), kUsage);
+  expectComplaint("collide " + cube() + " " + cube() + " --no-such-option", kUsage);
+  for (const std::string pose :
+       {"1,2,3", "0,0,0,0,0,0,0", "0,0,0,1,0,0,0,0", "0,0,0,1,0,0,x", "nan,0,0,1,0,0,0", "1e999,0,0,1,0,0,0"}) {
+    expectComplaint("collide " + cube() + " " + cube() + " --pose=" + pose, kUsage, "--pose");
+  }
+  for (const std::string option :
+       {"--depth 0", "--depth 99", "--depth x", "--subdivision kd", "--dimension -1", "--oracle delphi"}) {
+    expectComplaint("inspect " + cube() + " " + option, kUsage, option.substr(0, option.find(' ')));
+  }
+  expectComplaint("validate " + cube() + " " + cube() + " --poses 0", kUsage, "--poses");
+  expectComplaint("validate " + cube() + " " + cube() + " --answer conservative --contacts", kUsage, "--contacts");
+  expectComplaint("validate " + cube() + " " + cube() + " --reference kdop", kUsage, "--reference");
+}
+
+TEST_F(Program, ExplainsWhatFails) {
+  for (const std::string command : {"inspect", "bench"}) {
+    expectComplaint(command + " " + (folder_ / "missing.obj").string(), kFailed, "missing.obj: no such file");
+    expectComplaint(command + " " + write("bad.off", "OFF\n3 1 0\n0 0 0\n1 nan 0\n1 1 0\n3 0 1 2\n"), kFailed,
+                    "bad.off");
+  }
+  expectComplaint("collide " + cube() + " " + write("empty.stl", ""), kFailed, "empty.stl: is empty");
+  expectComplaint("validate " + write("cut.ply", "ply\nformat ascii 1.0\n") + " " + cube(), kFailed,
+                  "cut.ply: truncated");
+}
+
+}  // namespace
+}  // namespace bocst
