@@ -88,9 +88,13 @@ struct Bench {
     progress.step();
     PoseSampler sampler(*mesh_a, *mesh_b, *fcl_pair, seed);
     std::vector<Eigen::Isometry3d> first_poses;
+    std::vector<Pose> query_poses;
     std::vector<Eigen::Isometry3d> X_ABs;
     for (std::size_t i = 0; i < rounds; ++i) first_poses.push_back(sampler.nextAnywhere().transform());
-    for (std::size_t i = 0; i < poses; ++i) X_ABs.push_back(sampler.nextAnywhere().transform());
+    for (std::size_t i = 0; i < poses; ++i) {
+      query_poses.push_back(sampler.nextAnywhere());
+      X_ABs.push_back(query_poses.back().transform());
+    }
     progress.step();
 
     Side ours;
@@ -133,6 +137,10 @@ struct Bench {
         {"query_mean", "warm query, mean", mean(our_medians), mean(fcl_medians)},
         {"query_p95", "warm query, 95th percentile", quantile(our_medians, 0.95), quantile(fcl_medians, 0.95)}};
     const double memory = fcl_bytes / quantile(bytes_first, 0.5);
+    std::size_t worst = 0;
+    for (std::size_t i = 0; i < poses; ++i) {
+      if (our_medians[i] * fcl_medians[worst] > our_medians[worst] * fcl_medians[i]) worst = i;
+    }
     std::size_t hits = 0;
     for (const bool verdict : theirs.verdicts) hits += verdict;
 
@@ -173,7 +181,8 @@ struct Bench {
       table.print();
       std::cout << '\n'
                 << poses << " poses, " << hits << " touch; verdicts " << (equal ? "equal" : "DIFFER") << ", hash "
-                << ours.hash() << '\n';
+                << ours.hash() << "\nworst query: " << formatTime(our_medians[worst]) << " against "
+                << formatTime(fcl_medians[worst]) << " at --pose " << query_poses[worst].text() << '\n';
     }
     if (!equal) throw std::runtime_error("the verdicts are not FCL's");
     return 0;

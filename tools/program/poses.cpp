@@ -98,6 +98,10 @@ Pose PoseSampler::at(double distance) const {
   return pose;
 }
 
+bool PoseSampler::touches(double distance) const { return reference_.touch(at(distance).transform()); }
+
+Pose PoseSampler::anywhereOnRay() { return at(inner_ + random_.between(0, 1.5) * (contact_ - inner_)); }
+
 void PoseSampler::nextRay(int steps) {
   for (int attempt = 0; attempt < 1000; ++attempt) {
     rotation_ = random_.direction<4>();
@@ -105,17 +109,25 @@ void PoseSampler::nextRay(int steps) {
     ray_ = Eigen::Vector3d(ray[0], ray[1], ray[2]);
     double free = (radius_a_ + radius_b_) * 1.01;
     // Surfaces may miss each other when their centres meet (hollow, or bent around one another): then look outwards.
+    constexpr int kLooks = 16;
+    double inner = 0;
     double touching = -1;
-    for (int k = 0; k < 8 && touching < 0; ++k) {
-      const double distance = free * k / 8;
-      if (reference_.touch(at(distance).transform())) touching = distance;
+    for (int k = 0; k < kLooks && touching < 0; ++k) {
+      const double distance = free * k / kLooks;
+      (touches(distance) ? touching : inner) = distance;
     }
     if (touching < 0) continue;
+    double inner_touching = touching;
     for (int step = 0; step < steps; ++step) {
       const double middle = (touching + free) / 2;
-      (reference_.touch(at(middle).transform()) ? touching : free) = middle;
+      (touches(middle) ? touching : free) = middle;
+    }
+    for (int step = 0; step < 8 && inner_touching > inner; ++step) {
+      const double middle = (inner_touching + inner) / 2;
+      (touches(middle) ? inner_touching : inner) = middle;
     }
     contact_ = (touching + free) / 2;
+    inner_ = inner;
     return;
   }
   throw std::runtime_error("no pose found in which the two meshes touch");
@@ -127,7 +139,7 @@ Pose PoseSampler::nextAroundContact() {
     left_on_ray_ = 8;
   }
   --left_on_ray_;
-  if (left_on_ray_ < 2) return at(random_.between(0, 1.5) * contact_);
+  if (left_on_ray_ < 2) return anywhereOnRay();
   const int exponent = -30 + static_cast<int>(random_.bits() % 27);  // 2^-30 to 2^-3
   const double gap = std::ldexp(1 + random_.uniform(), exponent) * std::min(radius_a_, radius_b_);
   return at(contact_ + (left_on_ray_ % 2 == 0 ? gap : -gap));
@@ -135,7 +147,7 @@ Pose PoseSampler::nextAroundContact() {
 
 Pose PoseSampler::nextAnywhere() {
   nextRay(12);
-  return at(random_.between(0, 1.5) * contact_);
+  return anywhereOnRay();
 }
 
 }  // namespace bocst::program

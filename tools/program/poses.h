@@ -49,16 +49,19 @@ class PoseSampler {
   PoseSampler(const Mesh& a, const Mesh& b, const QueryPair& reference, std::uint64_t seed);
 
   /// Around contact: of eight poses on a ray, six lie off contact by 1e-9 to 1e-1 of the smaller radius, evenly in the
-  /// logarithm and to both sides; two anywhere from deep inside to half a contact distance outside.
+  /// logarithm and to both sides; two anywhere on the ray, as nextAnywhere().
   Pose nextAroundContact();
 
-  /// From deep inside to half a contact distance outside, each on a ray of its own: two of three touch.
+  /// Each on a ray of its own, from where the meshes begin to touch to half as far again beyond where they part: about
+  /// two of three touch.
   Pose nextAnywhere();
 
  private:
   /// @throws std::runtime_error when no ray finds a pose in which the meshes touch.
   void nextRay(int steps);
   Pose at(double distance) const;
+  bool touches(double distance) const;
+  Pose anywhereOnRay();
 
   const QueryPair& reference_;
   Random random_;
@@ -68,7 +71,8 @@ class PoseSampler {
   double radius_b_;
   std::array<double, 4> rotation_{1, 0, 0, 0};
   Eigen::Vector3d ray_ = Eigen::Vector3d::UnitX();
-  double contact_ = 0;
+  double inner_ = 0;    ///< On the ray, the meshes touch from about here
+  double contact_ = 0;  ///< to here, though maybe not all the way.
   int left_on_ray_ = 0;
 };
 
