@@ -102,7 +102,7 @@ class BvhSide {
 
   // Only a side that answers with cells is asked for these.
   query::Sphere cellSphere(Node node) const { return sphere(node); }
-  std::uint32_t cellId(Node node) const { return static_cast<std::uint32_t>(node); }
+  std::uint64_t cellId(Node node) const { return static_cast<std::uint64_t>(node); }
 
   template <typename F>
   void overlappingChildren(Node node, const query::Volume& other, const query::Placement& to, F&& f) const {

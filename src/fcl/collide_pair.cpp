@@ -113,10 +113,12 @@ class Collector : public query::Visitor {
   }
 
   bool cellOfA(const query::CellLeaf& a, std::uint32_t b, const Eigen::Vector3d& point) override {
+    if (once_ && !seen_.insert(a.id, b)) return false;
     return addSpheres(a.id, a.sphere, b, {point, 0});
   }
 
   bool cellOfB(std::uint32_t a, const query::CellLeaf& b, const Eigen::Vector3d& point) override {
+    if (once_ && !seen_.insert(b.id, a)) return false;
     return addSpheres(a, {point, 0}, b.id, b.sphere);
   }
 
@@ -130,12 +132,11 @@ class Collector : public query::Visitor {
 
   bool needsGeometry() const { return q_.request.enable_contact || q_.request.enable_cost; }
 
-  bool addSpheres(std::uint32_t id_a, query::Sphere a, std::uint32_t id_b, query::Sphere b) {
+  bool addSpheres(std::uint64_t id_a, query::Sphere a, std::uint64_t id_b, query::Sphere b) {
     if (swapped_) {
       std::swap(id_a, id_b);
       std::swap(a, b);
     }
-    if (once_ && !seen_.insert(id_a, id_b)) return false;
     const fcl::Transform3<double> X_WA = (swapped_ ? q_.X_W2 : q_.X_W1).template cast<double>();
     for (query::Sphere* s : {&a, &b}) {
       s->center = X_WA * Eigen::Vector3d(origin_ + unit_ * s->center);
@@ -171,13 +172,13 @@ class Collector : public query::Visitor {
                             q_.request.num_max_cost_sources);
   }
 
-  bool add(std::uint32_t b1, std::uint32_t b2, const query::Touch* touch) {
+  bool add(std::uint64_t b1, std::uint64_t b2, const query::Touch* touch) {
     if (occupied_ && q_.result.numContacts() < q_.request.num_max_contacts) {
       fcl::Contact<S> c;
       c.o1 = q_.o1;
       c.o2 = q_.o2;
-      c.b1 = b1;
-      c.b2 = b2;
+      c.b1 = static_cast<std::intptr_t>(b1);
+      c.b2 = static_cast<std::intptr_t>(b2);
       if (q_.request.enable_contact) {
         c.normal = touch->normal.template cast<S>();
         c.pos = touch->point.template cast<S>();

@@ -7,7 +7,7 @@
 
 namespace bocst::query {
 
-/// A set of pairs of 32-bit ids that is emptied in constant time, so that one can serve query after query.
+/// A set of pairs of ids (a cell or a triangle, and a triangle) that is emptied in constant time, so that one can serve query after query.
 class PairSet {
  public:
   void clear() {
@@ -19,26 +19,27 @@ class PairSet {
   }
 
   /// False when the pair was there already.
-  bool insert(std::uint32_t a, std::uint32_t b) {
+  bool insert(std::uint64_t a, std::uint32_t b) {
     if (2 * (size_ + 1) > slots_.size()) grow();
-    return place(std::uint64_t{a} << 32 | b);
+    return place(a, b);
   }
 
  private:
   struct Slot {
-    std::uint64_t key = 0;
+    std::uint64_t a = 0;
+    std::uint32_t b = 0;
     std::uint32_t epoch = 0;
   };
 
-  bool place(std::uint64_t key) {
+  bool place(std::uint64_t a, std::uint32_t b) {
     const std::size_t mask = slots_.size() - 1;
-    for (std::size_t i = (key * 0x9e3779b97f4a7c15ull) >> 20 & mask;; i = (i + 1) & mask) {
+    for (std::size_t i = ((a << 32 ^ a >> 32 ^ b) * 0x9e3779b97f4a7c15ull) >> 20 & mask;; i = (i + 1) & mask) {
       if (slots_[i].epoch != epoch_) {
-        slots_[i] = {key, epoch_};
+        slots_[i] = {a, b, epoch_};
         ++size_;
         return true;
       }
-      if (slots_[i].key == key) return false;
+      if (slots_[i].a == a && slots_[i].b == b) return false;
     }
   }
 
@@ -47,7 +48,7 @@ class PairSet {
     old.swap(slots_);
     size_ = 0;
     for (const Slot& s : old) {
-      if (s.epoch == epoch_) place(s.key);
+      if (s.epoch == epoch_) place(s.a, s.b);
     }
   }
 

@@ -12,7 +12,7 @@ namespace bocst::query {
 
 /// A leaf that is a cell, as the visitor sees it: its sphere in the frame of side A.
 struct CellLeaf {
-  std::uint32_t id;
+  std::uint64_t id;
   Sphere sphere;
 };
 

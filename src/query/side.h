@@ -78,7 +78,7 @@ class TreeSide {
   }
 
   /// Names the cell of a leaf: its Morton code among those of its level.
-  std::uint32_t cellId(Node node) const { return static_cast<std::uint32_t>(tree_.cell(node).morton()); }
+  std::uint64_t cellId(Node node) const { return tree_.cell(node).morton(); }
 
   /// Calls f(child) for the children of an inner node that `other`, placed in this frame by `to`, may overlap.
   template <typename OtherVolume, typename F>

@@ -1,0 +1,503 @@
+// SPDX-License-Identifier: BSD-3-Clause
+// Answers against FCL's own mesh query and, where FCL has none to trust, against brute force.
+#include <gtest/gtest.h>
+
+#include "conformance/reference.h"
+#include "query/triangle.h"
+
+namespace bocst {
+namespace {
+
+using test::Pairs;
+using test::Raw;
+
+template <typename S>
+class Collide : public testing::Test {};
+using Scalars = testing::Types<float, double>;
+TYPED_TEST_SUITE(Collide, Scalars);
+
+TYPED_TEST(Collide, EqualsObbrssOnRandomPoses) {
+  using S = TypeParam;
+  const Raw ra = test::torus(50), rb = test::torus(23, 0.3);
+  const auto fa = test::bvh<fcl::OBBRSS<S>>(ra), fb = test::bvh<fcl::OBBRSS<S>>(rb);
+  for (const Subdivision s : {Subdivision::kOctree, Subdivision::kBono}) {
+    Options options;
+    options.subdivision = s;
+    options.dimension = s == Subdivision::kBono ? 700 : 0;
+    const Model<S> a(*fa, options), b(rb.mesh(), options);
+    std::mt19937_64 g(1);
+    std::uniform_real_distribution<double> u(0, 1);
+    int hits = 0;
+    for (int i = 0; i < 300; ++i) {
+      const auto X = test::pose<S>(test::randomRotation(g), test::randomDirection(g) * u(g));
+      const auto Y = test::pose<S>(test::randomRotation(g), X.translation().template cast<double>() +
+                                                               test::randomDirection(g) * 2.4 * u(g));
+      const bool expected = test::touching<S>(*fa, X, *fb, Y);
+      hits += expected;
+      ASSERT_EQ(test::touching<S>(a, X, b, Y), expected) << i;
+      ASSERT_EQ(test::touching<S>(b, Y, a, X), expected) << i;
+      if (i % 5 == 0) {
+        const Pairs want = test::pairs<S>(*fa, X, *fb, Y);
+        ASSERT_EQ(test::pairs<S>(a, X, b, Y), want) << i;
+        Pairs turned;
+        for (const auto& p : test::pairs<S>(b, Y, a, X)) turned.insert({p.second, p.first});
+        if (std::is_same<S, double>::value) {
+          ASSERT_EQ(turned, want) << i;
+        }
+      }
+    }
+    EXPECT_GT(hits, 100);
+    EXPECT_LT(hits, 290);
+  }
+}
+
+TYPED_TEST(Collide, EqualsObbrssAroundContact) {
+  using S = TypeParam;
+  const Raw raw = test::torus(40, 0.2);
+  const auto fa = test::bvh<fcl::OBBRSS<S>>(raw);
+  const auto fo = test::bvh<fcl::OBB<S>>(raw);
+  const Model<S> a(raw.mesh()), b(raw.mesh());
+  std::mt19937_64 g(2);
+  const auto I = fcl::Transform3<S>(fcl::Transform3<S>::Identity());
+  int hits = 0, count = 0;
+  for (int i = 0; i < 30; ++i) {
+    const Eigen::Matrix3d R = test::randomRotation(g);
+    const Eigen::Vector3d d = test::randomDirection(g);
+    const auto at = [&](double x) { return test::pose<S>(R, d * x); };
+    const double contact =
+        test::contactDistance([&](double x) { return test::touching<S>(*fa, I, *fa, at(x)); }, 4, 52);
+    for (const double gap : {-1e-2, -1e-4, -1e-6, -1e-9, -1e-12, 0.0, 1e-12, 1e-9, 1e-6, 1e-4, 1e-2}) {
+      const auto X = at(contact + gap);
+      const bool expected = test::touching<S>(*fa, I, *fa, X);
+      hits += expected;
+      ++count;
+      ASSERT_EQ(test::touching<S>(a, I, b, X), expected) << i << " gap " << gap;
+      ASSERT_EQ(test::touching<S>(*fo, I, *fo, X), expected);
+    }
+  }
+  EXPECT_GT(hits, count / 4);
+  EXPECT_LT(hits, count * 3 / 4);
+}
+
+template <typename BV>
+void checkPartner(double scale) {
+  using S = typename BV::S;
+  Raw ra = test::torus(30), rb = test::torus(17, 0.3);
+  ra.scale(scale);
+  rb.scale(scale);
+  const auto fa = test::bvh<fcl::OBBRSS<S>>(ra), fb = test::bvh<fcl::OBBRSS<S>>(rb);
+  const auto partner = test::bvh<BV>(rb);
+  const Model<S> a(ra.mesh());
+  Options options;
+  options.answer = Answer::kConservative;
+  options.depth = 7;
+  const Model<S> spheres(ra.mesh(), options);
+  std::mt19937_64 g(3);
+  std::uniform_real_distribution<double> u(0, 1);
+  int hits = 0;
+  for (int i = 0; i < 60; ++i) {
+    const auto X = test::pose<S>(test::randomRotation(g), test::randomDirection(g) * scale);
+    const auto Y = test::pose<S>(test::randomRotation(g), X.translation().template cast<double>() +
+                                                             test::randomDirection(g) * 2.4 * u(g) * scale);
+    const bool expected = test::touching<S>(*fa, X, *fb, Y);
+    hits += expected;
+    ASSERT_EQ(test::touching<S>(a, X, *partner, Y), expected) << i;
+    ASSERT_EQ(test::touching<S>(*partner, Y, a, X), expected) << i;
+    if (expected) {
+      ASSERT_TRUE(test::touching<S>(spheres, X, *partner, Y)) << i;
+      ASSERT_TRUE(test::touching<S>(*partner, Y, spheres, X)) << i;
+    }
+    if (i % 6 == 0) {
+      ASSERT_EQ(test::pairs<S>(a, X, *partner, Y), test::pairs<S>(*fa, X, *fb, Y)) << i;
+    }
+  }
+  EXPECT_GT(hits, 15);
+}
+
+TYPED_TEST(Collide, EveryBvhIsAPartner) {
+  using S = TypeParam;
+  checkPartner<fcl::AABB<S>>(1);
+  checkPartner<fcl::OBB<S>>(1);
+  checkPartner<fcl::RSS<S>>(1);
+  checkPartner<fcl::kIOS<S>>(1);
+  checkPartner<fcl::OBBRSS<S>>(1);
+  checkPartner<fcl::KDOP<S, 16>>(1);
+  checkPartner<fcl::KDOP<S, 18>>(1);
+  checkPartner<fcl::KDOP<S, 24>>(1);
+  checkPartner<fcl::OBBRSS<S>>(1e-3);
+  checkPartner<fcl::OBBRSS<S>>(1e3);
+}
+
+TEST(CollideDouble, AnyScaleAndFarAway) {
+  for (const double scale : {1e-6, 1.0, 1e6}) {
+    for (const double away : {0.0, 1e6}) {
+      for (const bool mesh_away : {false, true}) {
+        Raw ra = test::torus(36), rb = test::torus(20, 0.3);
+        ra.scale(scale);
+        rb.scale(scale);
+        const Eigen::Vector3d far = Eigen::Vector3d(0.6, -0.7, 0.4) * away * scale;
+        if (mesh_away) {  // the mesh lies far from its own origin
+          ra.move(far);
+          rb.move(far);
+        }
+        const auto fa = test::bvh<fcl::OBBRSSd>(ra), fb = test::bvh<fcl::OBBRSSd>(rb);
+        const Modeld a(ra.mesh()), b(rb.mesh());
+        std::mt19937_64 g(4);
+        std::uniform_real_distribution<double> u(0, 1);
+        int hits = 0;
+        for (int i = 0; i < 60; ++i) {
+          const Eigen::Matrix3d R = test::randomRotation(g);
+          const Eigen::Vector3d d = test::randomDirection(g) * 2.3 * u(g) * scale;
+          const auto X = test::pose<double>(Eigen::Matrix3d::Identity(), mesh_away ? Eigen::Vector3d(0, 0, 0) : far);
+          const auto Y = test::pose<double>(R, mesh_away ? Eigen::Vector3d(far - R * far + d) : far + d);
+          const bool expected = test::touching<double>(*fa, X, *fb, Y);
+          hits += expected;
+          ASSERT_EQ(test::touching<double>(a, X, b, Y), expected) << "scale " << scale << " away " << away << " " << i;
+          if (i % 10 == 0) {
+            ASSERT_EQ(test::pairs<double>(a, X, b, Y), test::pairs<double>(*fa, X, *fb, Y));
+          }
+        }
+        EXPECT_GT(hits, 15);
+      }
+    }
+  }
+}
+
+TEST(CollideDouble, MeshesOfVeryDifferentSize) {
+  const Raw ra = test::torus(60);
+  const auto fa = test::bvh<fcl::OBBRSSd>(ra);
+  const Modeld a(ra.mesh());
+  for (const double scale : {1e-6, 1e-3, 1e3}) {
+    Raw rb = test::torus(20);
+    rb.scale(scale);
+    const auto fb = test::bvh<fcl::OBBRSSd>(rb);
+    const Modeld b(rb.mesh());
+    std::mt19937_64 g(5);
+    std::uniform_real_distribution<double> u(-1, 1);
+    int hits = 0;
+    for (int i = 0; i < 200; ++i) {
+      // A vertex of one near the surface of the other.
+      const Eigen::Matrix3d R = test::randomRotation(g);
+      const Eigen::Vector3d p = ra.vertices[g() % ra.vertices.size()] - R * rb.vertices[g() % rb.vertices.size()] +
+                                test::randomDirection(g) * u(g) * 0.5 * std::min(scale, 1.0);
+      const auto X = test::pose<double>(Eigen::Matrix3d::Identity(), {0, 0, 0}), Y = test::pose<double>(R, p);
+      const bool expected = test::touching<double>(*fa, X, *fb, Y);
+      hits += expected;
+      ASSERT_EQ(test::touching<double>(a, X, b, Y), expected) << "scale " << scale << " " << i;
+    }
+    EXPECT_GT(hits, 20);
+  }
+}
+
+// Conservative answers: never a miss, fewer false alarms with depth, the same verdict from any history and order.
+TEST(CollideConservative, NeverMissesAndTightensWithDepth) {
+  const Raw ra = test::torus(40), rb = test::torus(28, 0.3);
+  const auto fa = test::bvh<fcl::OBBRSSd>(ra), fb = test::bvh<fcl::OBBRSSd>(rb);
+  const auto ma = ra.mesh(), mb = rb.mesh();
+  for (const Subdivision s : {Subdivision::kOctree, Subdivision::kBono}) {
+    for (const double dimension : {0.0, 600.0}) {
+      int last = 1 << 30;
+      for (int depth = 2; depth <= 8; depth += 2) {
+        Options options;
+        options.subdivision = s;
+        options.dimension = dimension;
+        options.answer = Answer::kConservative;
+        options.depth = depth;
+        const Modeld a(ma, options), b(mb, options), exact(mb);
+        std::mt19937_64 g(6);
+        std::uniform_real_distribution<double> u(0, 1);
+        int alarms = 0;
+        for (int i = 0; i < 120; ++i) {
+          const auto X = test::pose<double>(test::randomRotation(g), {1, 2, 3});
+          const auto Y =
+              test::pose<double>(test::randomRotation(g), X.translation() + test::randomDirection(g) * (0.8 + 1.6 * u(g)));
+          const bool truth = test::touching<double>(*fa, X, *fb, Y);
+          const bool verdict = test::touching<double>(a, X, b, Y);
+          ASSERT_LE(truth, verdict) << "depth " << depth << " pose " << i;
+          ASSERT_LE(truth, test::touching<double>(a, X, exact, Y)) << "depth " << depth << " pose " << i;
+          ASSERT_LE(truth, test::touching<double>(exact, Y, a, X)) << "depth " << depth << " pose " << i;
+          ASSERT_EQ(verdict, test::touching<double>(b, Y, a, X)) << "argument order";
+          if (i % 10 == 0) {
+            ASSERT_EQ(verdict, test::touching<double>(Modeld(ma, options), X, Modeld(mb, options), Y)) << "history";
+          }
+          alarms += verdict && !truth;
+        }
+        EXPECT_LE(alarms, last) << "depth " << depth;
+        last = alarms;
+      }
+      EXPECT_LE(last, 8);
+    }
+  }
+}
+
+TEST(CollideConservative, ContactsAreSpheresOfTheDepth) {
+  Options options;
+  options.answer = Answer::kConservative;
+  options.depth = 5;
+  const Modeld a(test::torus(30).mesh(), options), b(test::torus(30).mesh(), options);
+  const auto X = test::pose<double>(Eigen::Matrix3d::Identity(), {0, 0, 0});
+  const auto Y = test::pose<double>(Eigen::Matrix3d::Identity(), {1.3, 0.1, 0.2});
+  fcl::CollisionRequestd request(100000, true);
+  fcl::CollisionResultd result;
+  const fcl::CollisionGeometryd *ga = &a, *gb = &b;
+  ASSERT_GT(fcl::collide(ga, X, gb, Y, request, result), 5u);
+  Pairs seen;
+  const double radius = std::sqrt(3.0) / 2 * a.mesh()->bounds().sizes().maxCoeff() / 16;
+  for (std::size_t i = 0; i < result.numContacts(); ++i) {
+    const auto& c = result.getContact(i);
+    EXPECT_TRUE(seen.insert({c.b1, c.b2}).second);
+    EXPECT_LT(c.b1, 1 << 12);
+    EXPECT_NEAR(c.normal.norm(), 1, 1e-12);
+    EXPECT_GE(c.penetration_depth, 0);
+    EXPECT_LE(c.penetration_depth, 2 * radius + 1e-12);
+  }
+}
+
+// The request and the contacts.
+
+TEST(CollideRequest, ContactsAreWhatTheHeaderSays) {
+  const Raw raw = test::torus(40);
+  const auto partner = test::bvh<fcl::OBBRSSd>(raw);
+  const Modeld a(raw.mesh()), b(raw.mesh());
+  std::mt19937_64 g(7);
+  for (int i = 0; i < 10; ++i) {
+    const auto X = test::pose<double>(test::randomRotation(g), {5, 6, 7});
+    const auto Y = test::pose<double>(test::randomRotation(g), X.translation() + test::randomDirection(g) * 1.2);
+    const std::vector<std::pair<const fcl::CollisionGeometryd*, const fcl::CollisionGeometryd*>> orders = {
+        {&a, &b}, {&b, &a}, {&a, partner.get()}, {partner.get(), &b}};
+    for (const auto& [first, second] : orders) {
+      fcl::CollisionRequestd request(100000, true);
+      fcl::CollisionResultd result;
+      fcl::collide(first, X, second, Y, request, result);
+      ASSERT_GT(result.numContacts(), 0u);
+      Pairs seen;
+      for (std::size_t k = 0; k < result.numContacts(); ++k) {
+        const auto& c = result.getContact(k);
+        EXPECT_EQ(c.o1, first) << "the caller's order";
+        EXPECT_EQ(c.o2, second);
+        EXPECT_TRUE(seen.insert({c.b1, c.b2}).second) << "each pair once";
+        const auto corners = [&](const fcl::Transform3d& P, std::intptr_t t, query::Corners& out) {
+          const auto& triangle = raw.triangles[static_cast<std::size_t>(t)];
+          for (std::size_t j = 0; j < 3; ++j) out[j] = P * raw.vertices[triangle[j]];
+        };
+        query::Corners p, q;
+        corners(X, c.b1, p);
+        corners(Y, c.b2, q);
+        EXPECT_NEAR(c.normal.norm(), 1, 1e-9);
+        EXPECT_GE(c.penetration_depth, 0);
+        EXPECT_LT((query::closestPoint(c.pos, p) - c.pos).norm(), 1e-9);
+        EXPECT_LT((query::closestPoint(c.pos, q) - c.pos).norm(), 1e-9);
+        const Eigen::Vector3d out = (c.penetration_depth + 1e-9) * c.normal;
+        EXPECT_FALSE(fcl::detail::Intersect<double>::intersect_Triangle(p[0], p[1], p[2], q[0] + out, q[1] + out,
+                                                                         q[2] + out))
+            << "from the first to the second by depth parts the two triangles";
+      }
+    }
+  }
+}
+
+TEST(CollideRequest, CountsStopAndAccumulate) {
+  const Raw raw = test::torus(40);
+  const Modeld a(raw.mesh()), b(raw.mesh());
+  const auto X = test::pose<double>(Eigen::Matrix3d::Identity(), {0, 0, 0});
+  const auto Y = test::pose<double>(Eigen::Matrix3d::Identity(), {1.2, 0.3, 0.1});
+  const fcl::CollisionGeometryd *ga = &a, *gb = &b;
+  fcl::CollisionResultd result;
+  EXPECT_EQ(fcl::collide(ga, X, gb, Y, fcl::CollisionRequestd(3), result), 3u);
+  EXPECT_EQ(fcl::collide(ga, X, gb, Y, fcl::CollisionRequestd(3), result), 3u) << "satisfied already";
+  EXPECT_EQ(fcl::collide(ga, X, gb, Y, fcl::CollisionRequestd(5), result), 5u) << "accumulates";
+  for (std::size_t i = 0; i < 5; ++i) {
+    const auto& c = result.getContact(i);
+    EXPECT_TRUE(std::isnan(c.penetration_depth) && c.normal.hasNaN() && c.pos.hasNaN()) << "not asked for";
+  }
+  fcl::CollisionResultd none;
+  EXPECT_EQ(fcl::collide(ga, X, gb, Y, fcl::CollisionRequestd(0), none), 0u);
+}
+
+TEST(CollideRequest, FreeAndUncertainGeometriesDoNotCollide) {
+  const Raw raw = test::torus(20);
+  Modeld a(raw.mesh()), b(raw.mesh());
+  const auto X = test::pose<double>(Eigen::Matrix3d::Identity(), {0, 0, 0});
+  const auto Y = test::pose<double>(Eigen::Matrix3d::Identity(), {1.2, 0.3, 0.1});
+  EXPECT_TRUE(test::touching<double>(a, X, b, Y));
+  const fcl::CollisionGeometryd *ga = &a, *gb = &b;
+  fcl::CollisionRequestd costs(1, false, 100, true);
+  fcl::CollisionResultd result;
+  b.cost_density = 0.5;  // uncertain: costs, but no contact
+  EXPECT_EQ(fcl::collide(ga, X, gb, Y, costs, result), 0u);
+  std::vector<fcl::CostSourced> sources;
+  result.getCostSources(sources);
+  EXPECT_FALSE(sources.empty());
+  EXPECT_FALSE(test::touching<double>(a, X, b, Y));
+  b.cost_density = 0;  // free
+  result.clear();
+  EXPECT_EQ(fcl::collide(ga, X, gb, Y, costs, result), 0u);
+  result.getCostSources(sources);
+  EXPECT_TRUE(sources.empty());
+}
+
+TEST(CollideRequest, CostsEqualFcls) {
+  const Raw ra = test::torus(24), rb = test::torus(16, 0.3);
+  const auto fa = test::bvh<fcl::OBBRSSd>(ra), fb = test::bvh<fcl::OBBRSSd>(rb);
+  Modeld a(ra.mesh()), b(rb.mesh());
+  std::mt19937_64 g(8);
+  for (int i = 0; i < 10; ++i) {
+    const auto X = test::pose<double>(test::randomRotation(g), {0, 0, 0});
+    const auto Y = test::pose<double>(test::randomRotation(g), test::randomDirection(g) * 1.2);
+    fcl::CollisionRequestd request(1, false, 1000000, true);
+    const auto sum = [&](const fcl::CollisionGeometryd* p, const fcl::CollisionGeometryd* q) {
+      fcl::CollisionResultd result;
+      fcl::collide(p, X, q, Y, request, result);
+      std::vector<fcl::CostSourced> sources;
+      result.getCostSources(sources);
+      double total = 0;
+      for (const auto& s : sources) total += s.total_cost;
+      return std::make_pair(sources.size(), total);
+    };
+    const auto ours = sum(&a, &b), theirs = sum(fa.get(), fb.get());
+    EXPECT_GT(ours.first, 0u);
+    // FCL adds the box of each pair; equal boxes collapse, so the sets are compared by size and sum.
+    EXPECT_EQ(ours.first, theirs.first);
+    EXPECT_NEAR(ours.second, theirs.second, 1e-9 * theirs.second);
+  }
+}
+
+TEST(CollideRequest, BothSolversAndObjects) {
+  const Raw raw = test::torus(24);
+  const auto a = std::make_shared<Modeld>(raw.mesh()), b = std::make_shared<Modeld>(raw.mesh());
+  for (const auto solver : {fcl::GST_LIBCCD, fcl::GST_INDEP}) {
+    for (const double x : {1.2, 5.0}) {
+      fcl::CollisionObjectd oa(a), ob(b, test::pose<double>(Eigen::Matrix3d::Identity(), {x, 0.3, 0.1}));
+      fcl::CollisionRequestd request;
+      request.gjk_solver_type = solver;
+      fcl::CollisionResultd result;
+      EXPECT_EQ(fcl::collide(&oa, &ob, request, result) > 0, x < 2);
+    }
+  }
+}
+
+TEST(CollideRequest, UnsupportedPartnersThrow) {
+  const Modeld a(test::torus(8).mesh());
+  const fcl::Sphered sphere(1);
+  const fcl::CollisionGeometryd *ga = &a, *gs = &sphere;
+  const fcl::Transform3d I = fcl::Transform3d::Identity();
+  fcl::CollisionRequestd request;
+  fcl::CollisionResultd result;
+  EXPECT_THROW(fcl::collide(ga, I, gs, I, request, result), std::invalid_argument);
+  EXPECT_THROW(fcl::collide(gs, I, ga, I, request, result), std::invalid_argument);
+  fcl::DistanceRequestd distance_request;
+  fcl::DistanceResultd distance_result;
+  EXPECT_THROW(fcl::distance(ga, I, ga, I, distance_request, distance_result), std::invalid_argument);
+  fcl::BVHModel<fcl::OBBRSSd> unfinished;
+  EXPECT_THROW(fcl::collide(ga, I, static_cast<const fcl::CollisionGeometryd*>(&unfinished), I, request, result),
+               std::invalid_argument);
+  EXPECT_EQ(fcl::collide(gs, I, gs, I, request, result), 1u) << "other pairs go on to FCL";
+}
+
+// Degenerate meshes against brute force over triangles with a test that knows segments and points.
+bool bruteForce(const Raw& a, const Raw& b, const fcl::Transform3d& X_AB, bool& close) {
+  bool hit = false;
+  close = false;
+  for (const auto& s : a.triangles) {
+    const query::Corners p = {a.vertices[s[0]], a.vertices[s[1]], a.vertices[s[2]]};
+    for (const auto& t : b.triangles) {
+      const query::Corners q = {X_AB * b.vertices[t[0]], X_AB * b.vertices[t[1]], X_AB * b.vertices[t[2]]};
+      if (query::isDegenerate(p) || query::isDegenerate(q)) {
+        const double d = query::distanceDegenerate(p, q);
+        hit |= d <= 1e-14;
+        close |= d < 1e-11;
+      } else {
+        hit |= fcl::detail::Intersect<double>::intersect_Triangle(p[0], p[1], p[2], q[0], q[1], q[2]);
+      }
+    }
+  }
+  return hit;
+}
+
+TEST(CollideDegenerate, AnswersAreRight) {
+  Raw single;
+  single.vertices = {{0, 0, 0}, {1, 0, 0}, {0, 1, 0}};
+  single.triangles.emplace_back(0, 1, 2);
+  Raw point;
+  point.vertices.assign(3, Eigen::Vector3d(0.2, 0.3, 0.4));
+  point.triangles.emplace_back(0, 1, 2);
+  Raw segment;
+  segment.vertices = {{0, 0, 0}, {0, 0, 1}, {0, 0, 0.5}};
+  segment.triangles.emplace_back(0, 1, 2);
+  Raw same;
+  same.vertices = single.vertices;
+  same.triangles.assign(5000, single.triangles[0]);
+  const std::vector<Raw> meshes = {single, point, segment, test::adversarial(), test::box({0, 0, 0}, {1, 1, 1}),
+                                   test::soup(60, 3)};
+  std::mt19937_64 g(9);
+  std::uniform_real_distribution<double> u(-1, 1);
+  int hits = 0, count = 0;
+  for (const Raw& ra : meshes) {
+    for (const Raw& rb : meshes) {
+      const Modeld a(ra.mesh()), b(rb.mesh());
+      for (int i = 0; i < 60; ++i) {
+        // Lattice translations and right angles make faces coplanar and corners meet; the rest is anywhere.
+        Eigen::Vector3d p = Eigen::Vector3d(u(g), u(g), u(g));
+        Eigen::Matrix3d R = test::randomRotation(g);
+        if (i % 2) p = (p * 4).array().round() / 4;
+        if (i % 3) R = Eigen::Matrix3d::Identity();
+        if (i == 0) p.setZero();
+        const auto X = test::pose<double>(R, p), I = test::pose<double>(Eigen::Matrix3d::Identity(), {0, 0, 0});
+        bool close = false;
+        const bool expected = bruteForce(ra, rb, X, close);
+        ++count;
+        hits += expected;
+        const bool answer = test::touching<double>(a, I, b, X);
+        if (close && !expected) continue;  // apart by less than rounding: either answer is right
+        ASSERT_EQ(answer, expected) << "pose " << i;
+      }
+    }
+  }
+  EXPECT_GT(hits, count / 8);
+  EXPECT_LT(hits, count * 7 / 8);
+  // Many copies of one triangle: all pairs are found, memory stays bounded.
+  const Modeld many(same.mesh()), one(single.mesh());
+  const auto I = test::pose<double>(Eigen::Matrix3d::Identity(), {0, 0, 0});
+  EXPECT_EQ(test::pairs<double>(many, I, one, test::pose<double>(test::randomRotation(g), {0.2, 0.2, 0})).size(), 5000u);
+  EXPECT_FALSE(test::touching<double>(many, I, one, test::pose<double>(Eigen::Matrix3d::Identity(), {0, 0, 1e-9})));
+  EXPECT_LE(many.statistics().resident_bytes, 200u * same.triangles.size());
+}
+
+TEST(CollideDegenerate, CoplanarAndTouchingFacesAreReported) {
+  const Modeld a(test::box({0, 0, 0}, {1, 1, 1}).mesh()), b(test::box({0, 0, 0}, {1, 1, 1}).mesh());
+  const auto at = [](double x, double y, double z) {
+    return test::pose<double>(Eigen::Matrix3d::Identity(), {x, y, z});
+  };
+  const auto I = at(0, 0, 0);
+  EXPECT_TRUE(test::touching<double>(a, I, b, at(1, 0, 0))) << "face on face";
+  EXPECT_TRUE(test::touching<double>(a, I, b, at(1, 1, 0))) << "edge on edge";
+  EXPECT_TRUE(test::touching<double>(a, I, b, at(1, 1, 1))) << "corner on corner";
+  EXPECT_TRUE(test::touching<double>(a, I, b, I)) << "the same place";
+  EXPECT_FALSE(test::touching<double>(a, I, b, at(1 + 1e-9, 0, 0)));
+  const Modeld inner(test::box({0.4, 0.4, 0.4}, {0.6, 0.6, 0.6}).mesh());
+  EXPECT_FALSE(test::touching<double>(a, I, inner, I)) << "a mesh is a surface";
+}
+
+TEST(CollideSelf, OneModelOnBothSides) {
+  const Modeld a(test::torus(40).mesh());
+  const auto f = test::bvh<fcl::OBBRSSd>(test::torus(40));
+  std::mt19937_64 g(10);
+  std::uniform_real_distribution<double> u(0, 1);
+  for (int i = 0; i < 60; ++i) {
+    const auto X = test::pose<double>(test::randomRotation(g), {0, 0, 0});
+    const auto Y = test::pose<double>(test::randomRotation(g), test::randomDirection(g) * 2.3 * u(g));
+    ASSERT_EQ(test::touching<double>(a, X, a, Y), test::touching<double>(*f, X, *f, Y));
+  }
+}
+
+TEST(CollideBatches, AtMostOneALevelWhenEverythingIsAsked) {
+  const Modeld a(test::torus(120).mesh()), b(test::torus(120).mesh());
+  const auto X = test::pose<double>(Eigen::Matrix3d::Identity(), {0, 0, 0});
+  const auto Y = test::pose<double>(Eigen::Matrix3d::Identity(), {1.2, 0.3, 0.1});
+  EXPECT_GT(test::pairs<double>(a, X, b, Y).size(), 100u);
+  const Statistics s = a.statistics();
+  EXPECT_LE(s.oracle_batches, s.nodes_per_level.size() + 1);
+}
+
+}  // namespace
+}  // namespace bocst

@@ -1,0 +1,68 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#pragma once
+
+#include <set>
+#include <utility>
+#include <vector>
+
+#include <fcl/geometry/bvh/BVH_model.h>
+
+#include <bocst/bocst.h>
+
+#include "meshes.h"
+
+namespace bocst::test {
+
+using Pairs = std::set<std::pair<std::intptr_t, std::intptr_t>>;
+
+template <typename BV>
+std::shared_ptr<fcl::BVHModel<BV>> bvh(const Raw& raw) {
+  using S = typename BV::S;
+  std::vector<fcl::Vector3<S>> vertices;
+  for (const auto& v : raw.vertices) vertices.push_back(v.cast<S>());
+  auto model = std::make_shared<fcl::BVHModel<BV>>();
+  model->beginModel();
+  model->addSubModel(vertices, raw.triangles);
+  model->endModel();
+  return model;
+}
+
+template <typename S>
+bool touching(const fcl::CollisionGeometry<S>& a, const fcl::Transform3<S>& X_WA, const fcl::CollisionGeometry<S>& b,
+              const fcl::Transform3<S>& X_WB) {
+  fcl::CollisionRequest<S> request;
+  fcl::CollisionResult<S> result;
+  return fcl::collide(&a, X_WA, &b, X_WB, request, result) > 0;
+}
+
+template <typename S>
+Pairs pairs(const fcl::CollisionGeometry<S>& a, const fcl::Transform3<S>& X_WA, const fcl::CollisionGeometry<S>& b,
+            const fcl::Transform3<S>& X_WB) {
+  fcl::CollisionRequest<S> request(1000000000);
+  fcl::CollisionResult<S> result;
+  fcl::collide(&a, X_WA, &b, X_WB, request, result);
+  Pairs set;
+  for (std::size_t i = 0; i < result.numContacts(); ++i) {
+    const auto& c = result.getContact(i);
+    set.insert({c.b1, c.b2});
+  }
+  return set;
+}
+
+template <typename S>
+fcl::Transform3<S> pose(const Eigen::Matrix3d& R, const Eigen::Vector3d& p) {
+  fcl::Transform3<S> X = fcl::Transform3<S>::Identity();
+  X.linear() = R.cast<S>();
+  X.translation() = p.cast<S>();
+  return X;
+}
+
+/// Along a direction, how far b must go so that the two just part: by bisection of `test(distance)`.
+template <typename Test>
+double contactDistance(Test&& test, double far, int steps) {
+  double lo = 0, hi = far;
+  for (int i = 0; i < steps; ++i) (test((lo + hi) / 2) ? lo : hi) = (lo + hi) / 2;
+  return (lo + hi) / 2;
+}
+
+}  // namespace bocst::test

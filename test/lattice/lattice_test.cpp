@@ -1,0 +1,113 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#include "lattice/lattice.h"
+
+#include <gtest/gtest.h>
+
+namespace bocst::lattice {
+namespace {
+
+const Eigen::AlignedBox3d kBounds(Eigen::Vector3d(-1, 0, 2), Eigen::Vector3d(3, 1, 4));
+
+TEST(Lattice, OctreeRootIsTheCentredCube) {
+  const Lattice lattice(kBounds, Subdivision::kOctree, 0);
+  EXPECT_TRUE(lattice.origin().isApprox(Eigen::Vector3d(-1, -1.5, 1)));
+  EXPECT_DOUBLE_EQ(lattice.unit() * (1 << kBits), 4);
+  for (const std::uint32_t e : lattice.extent()) EXPECT_EQ(e, 1u << kBits);
+}
+
+TEST(Lattice, BonoRootIsTheSmallestPowerOfTwo) {
+  // d_t = 514 lies in a cube of 1024: the mesh takes a little more than its lower half.
+  const Lattice lattice(kBounds, Subdivision::kBono, 514);
+  EXPECT_EQ(lattice.origin(), kBounds.min());
+  EXPECT_EQ(lattice.rootExponent(), 10);
+  EXPECT_NEAR(lattice.unit() * (1 << kBits), 4.0 * 1024 / 514, 1e-12);
+  const std::uint32_t unit = 1u << (kBits - 10);  // one unit of d_t
+  EXPECT_EQ(lattice.extent()[0], 514 * unit);
+  EXPECT_EQ(lattice.extent()[1], 129 * unit);  // 128.5 rounded up
+  EXPECT_EQ(lattice.extent()[2], 257 * unit);
+}
+
+TEST(Lattice, LowerSideOfASplitIsTheLargestPowerOfTwo) {
+  const Lattice lattice(kBounds, Subdivision::kBono, 514);
+  const Eigen::AlignedBox3d lower = lattice.region(Cell{}.octant(0)), upper = lattice.region(Cell{}.octant(1));
+  const double unit = 1 << (kBits - 10);
+  EXPECT_EQ(lower.sizes().x(), 512 * unit);
+  EXPECT_EQ(upper.sizes().x(), 2 * unit);
+  EXPECT_FALSE(lattice.exists(Cell{}.octant(2)));  // 129 units need no upper half along y
+}
+
+TEST(Lattice, RegionsOfOctantsTileTheRegionOfTheCell) {
+  for (const double dimension : {0.0, 514.0, 768.0, 1023.0, 1024.0}) {
+    for (const Subdivision s : {Subdivision::kOctree, Subdivision::kBono}) {
+      const Lattice lattice(kBounds, s, dimension);
+      std::vector<Cell> cells{Cell{}};
+      for (int level = 1; level < 5; ++level) {
+        std::vector<Cell> next;
+        for (const Cell& cell : cells) {
+          double volume = 0;
+          for (int o = 0; o < 8; ++o) {
+            if (!lattice.exists(cell.octant(o))) continue;
+            next.push_back(cell.octant(o));
+            volume += lattice.region(next.back()).volume();
+            EXPECT_TRUE(lattice.region(cell).contains(lattice.region(next.back())));
+          }
+          EXPECT_EQ(volume, lattice.region(cell).volume());
+        }
+        cells.swap(next);
+      }
+    }
+  }
+}
+
+TEST(Lattice, EveryCornerOfTheBoundsIsInside) {
+  for (const double scale : {1e-6, 1.0, 1e6}) {
+    for (const double dimension : {0.0, 1.0, 2.0, 514.0, 65536.0}) {
+      for (const Subdivision s : {Subdivision::kOctree, Subdivision::kBono}) {
+        const Eigen::AlignedBox3d b(kBounds.min() * scale, kBounds.max() * scale);
+        const Lattice lattice(b, s, dimension);
+        const Eigen::AlignedBox3d root = lattice.region(Cell{});
+        const Eigen::Vector3d lo = lattice.toLattice(b.min()), hi = lattice.toLattice(b.max());
+        EXPECT_LT((root.min() - lo).maxCoeff(), 1e-10);
+        EXPECT_LT((hi - root.max()).maxCoeff(), 1e-10);
+      }
+    }
+  }
+}
+
+TEST(Lattice, APointHasACell) {
+  const Eigen::Vector3d p(1e3, 0, -5);
+  const Lattice lattice(Eigen::AlignedBox3d(p, p), Subdivision::kBono, 0);
+  EXPECT_GT(lattice.unit(), 0);
+  EXPECT_TRUE(lattice.exists(Cell{}));
+  EXPECT_TRUE(lattice.toLattice(p).isZero());
+}
+
+TEST(Lattice, MortonNamesEachCellOfALevelOnce) {
+  std::vector<bool> seen(512, false);
+  for (std::uint32_t x = 0; x < 8; ++x) {
+    for (std::uint32_t y = 0; y < 8; ++y) {
+      for (std::uint32_t z = 0; z < 8; ++z) {
+        const std::uint64_t m = Cell{4, {x, y, z}}.morton();
+        ASSERT_LT(m, 512u);
+        EXPECT_FALSE(seen[m]);
+        seen[m] = true;
+      }
+    }
+  }
+  EXPECT_EQ((Cell{17, {1, 0, 0}}.morton()), 1u);
+  EXPECT_EQ((Cell{17, {0, 1, 0}}.morton()), 2u);
+  EXPECT_EQ((Cell{17, {0, 0, 65535}}.morton()), 0x924924924924ull);
+}
+
+TEST(Lattice, LevelRuleOfThePaper) {
+  EXPECT_FALSE(oneLevelMore(0));
+  EXPECT_FALSE(oneLevelMore(513));
+  EXPECT_TRUE(oneLevelMore(514));
+  EXPECT_TRUE(oneLevelMore(767));
+  EXPECT_FALSE(oneLevelMore(768));
+  EXPECT_FALSE(oneLevelMore(1023));
+  EXPECT_FALSE(oneLevelMore(1024));
+}
+
+}  // namespace
+}  // namespace bocst::lattice

@@ -1,0 +1,116 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#pragma once
+
+// Meshes and poses that tests make for themselves.
+
+#include <cmath>
+#include <cstdint>
+#include <memory>
+#include <random>
+#include <vector>
+
+#include <bocst/mesh.h>
+
+namespace bocst::test {
+
+struct Raw {
+  std::vector<Eigen::Vector3d> vertices;
+  std::vector<fcl::Triangle> triangles;
+
+  std::shared_ptr<const Mesh> mesh() const { return std::make_shared<const Mesh>(vertices, triangles); }
+
+  Raw& scale(double s) {
+    for (auto& v : vertices) v *= s;
+    return *this;
+  }
+  Raw& move(const Eigen::Vector3d& d) {
+    for (auto& v : vertices) v += d;
+    return *this;
+  }
+  Raw& add(const Raw& other) {
+    const std::size_t first = vertices.size();
+    vertices.insert(vertices.end(), other.vertices.begin(), other.vertices.end());
+    for (const auto& t : other.triangles) triangles.emplace_back(t[0] + first, t[1] + first, t[2] + first);
+    return *this;
+  }
+};
+
+/// A bumpy torus of 2 * n * n triangles, about two units wide.
+inline Raw torus(std::size_t n, double bumps = 0.08) {
+  Raw raw;
+  const double pi = std::acos(-1.0);
+  for (std::size_t i = 0; i < n; ++i) {
+    for (std::size_t j = 0; j < n; ++j) {
+      const double u = 2 * pi * static_cast<double>(i) / static_cast<double>(n);
+      const double v = 2 * pi * static_cast<double>(j) / static_cast<double>(n);
+      const double r = 0.35 * (1 + bumps * std::sin(5 * u) * std::cos(3 * v));
+      raw.vertices.emplace_back((0.7 + r * std::cos(v)) * std::cos(u), (0.7 + r * std::cos(v)) * std::sin(u),
+                                r * std::sin(v));
+      const std::size_t a = i * n + j, b = i * n + (j + 1) % n, c = (i + 1) % n * n + j, d = (i + 1) % n * n + (j + 1) % n;
+      raw.triangles.emplace_back(a, c, b);
+      raw.triangles.emplace_back(b, c, d);
+    }
+  }
+  return raw;
+}
+
+/// The surface of a box.
+inline Raw box(const Eigen::Vector3d& lo, const Eigen::Vector3d& hi) {
+  Raw raw;
+  for (int i = 0; i < 8; ++i) {
+    raw.vertices.emplace_back(i & 1 ? hi.x() : lo.x(), i & 2 ? hi.y() : lo.y(), i & 4 ? hi.z() : lo.z());
+  }
+  const int faces[12][3] = {{0, 2, 1}, {1, 2, 3}, {4, 5, 6}, {5, 7, 6}, {0, 1, 4}, {1, 5, 4},
+                            {2, 6, 3}, {3, 6, 7}, {0, 4, 2}, {2, 4, 6}, {1, 3, 5}, {3, 7, 5}};
+  for (const auto& f : faces) {
+    raw.triangles.emplace_back(static_cast<std::size_t>(f[0]), static_cast<std::size_t>(f[1]),
+                               static_cast<std::size_t>(f[2]));
+  }
+  return raw;
+}
+
+/// What breaks naive tests: faces on dyadic planes, slivers, segments, points, tiny and huge triangles, duplicates.
+inline Raw adversarial() {
+  Raw raw = box({0, 0, 0}, {1, 1, 1});
+  raw.add(box({0.25, 0.5, 0.125}, {0.75, 0.5, 0.875}));     // flat: faces on cell faces, some without area
+  raw.add(box({0.5, 0.25, 0.5}, {0.5, 0.5, 0.5}));          // a segment, twelve times
+  const auto triangle = [&](const Eigen::Vector3d& a, const Eigen::Vector3d& b, const Eigen::Vector3d& c) {
+    const std::size_t n = raw.vertices.size();
+    raw.vertices.insert(raw.vertices.end(), {a, b, c});
+    raw.triangles.emplace_back(n, n + 1, n + 2);
+  };
+  triangle({0.1, 0.1, 0.1}, {0.9, 0.9, 0.9}, {0.9, 0.9, 0.9 + 1e-12});   // sliver
+  triangle({0.2, 0.8, 0.3}, {0.2, 0.8, 0.3}, {0.2, 0.8, 0.3});           // point
+  triangle({0.3, 0.3, 0.7}, {0.3 + 1e-7, 0.3, 0.7}, {0.3, 0.3 + 1e-7, 0.7});
+  triangle({0.5, 0.5, 0.5}, {0.5 + 1e-7, 0.5, 0.5}, {0.5, 0.5 + 1e-7, 0.5 + 1e-7});  // at the root's centre
+  triangle({0, 0, 0}, {1, 0, 1}, {0, 1, 1});
+  triangle({0, 0, 0}, {1, 0, 1}, {0, 1, 1});  // twice
+  triangle({0.25, 0.25, 0}, {0.25, 0.25, 1}, {0.25, 0.75, 0.5});
+  return raw;
+}
+
+/// Triangles anywhere in the unit cube, of sizes from 1e-6 to 1.
+inline Raw soup(std::size_t count, unsigned seed) {
+  Raw raw;
+  std::mt19937_64 g(seed);
+  std::uniform_real_distribution<double> u(0, 1);
+  for (std::size_t t = 0; t < count; ++t) {
+    const Eigen::Vector3d c(u(g), u(g), u(g));
+    const double size = std::pow(10.0, -6 * u(g));
+    for (int k = 0; k < 3; ++k) raw.vertices.push_back(c + size * (Eigen::Vector3d(u(g), u(g), u(g)) - Eigen::Vector3d::Constant(0.5)));
+    raw.triangles.emplace_back(3 * t, 3 * t + 1, 3 * t + 2);
+  }
+  return raw;
+}
+
+inline Eigen::Matrix3d randomRotation(std::mt19937_64& g) {
+  std::normal_distribution<double> n;
+  return Eigen::Quaterniond(n(g), n(g), n(g), n(g)).normalized().toRotationMatrix();
+}
+
+inline Eigen::Vector3d randomDirection(std::mt19937_64& g) {
+  std::normal_distribution<double> n;
+  return Eigen::Vector3d(n(g), n(g), n(g)).normalized();
+}
+
+}  // namespace bocst::test

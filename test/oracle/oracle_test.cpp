@@ -1,0 +1,380 @@
+// SPDX-License-Identifier: BSD-3-Clause
+// One body for every oracle: grey sets against the padded double reference and against exact integers, bounds against
+// points of the surface, lists against all triangles.
+#include "oracle/oracle.h"
+
+#include <gtest/gtest.h>
+#include <hwy/targets.h>
+
+#include <cstdlib>
+#include <random>
+
+#include "meshes.h"
+#include "oracle/cpu/kernels.h"
+#include "oracle/reference.h"
+#include "oracle/root_grid.h"
+
+namespace bocst::oracle {
+namespace {
+
+using lattice::Cell;
+using lattice::Lattice;
+
+Surface surfaceOf(const test::Raw& raw, Subdivision s = Subdivision::kBono, double dimension = 0) {
+  const auto mesh = raw.mesh();
+  return {mesh, Lattice(mesh->bounds(), s, dimension)};
+}
+
+Eigen::Vector3d centerOf(const Cell& cell) {
+  const auto c = cell.corner();
+  return Eigen::Vector3d(c[0], c[1], c[2]).array() + cell.side() / 2.0;
+}
+
+bool referenceGrey(const Surface& surface, const Cell& cell) {
+  if (!surface.lattice.exists(cell)) return false;
+  for (std::uint32_t t = 0; t < surface.mesh->triangleCount(); ++t) {
+    const Eigen::Vector3d corners[3] = {surface.corner(t, 0), surface.corner(t, 1), surface.corner(t, 2)};
+    if (touches(corners, centerOf(cell), cell.side() / 2.0)) return true;
+  }
+  return false;
+}
+
+// Is p, in lattice units, inside the bounds of the octant?
+bool holds(const CellBounds& b, const Cell& cell, const Eigen::Vector3d& p) {
+  const double side = cell.side(), slack = side * 1e-6 + 1e-9;
+  const Eigen::Vector3d center = centerOf(cell);
+  double along = 0;
+  for (int k = 0; k < 3; ++k) {
+    const double x = p[k] - (center[k] - side / 2);
+    if (x < b.lo[static_cast<std::size_t>(k)] * side / 255 - slack) return false;
+    if (x > b.hi[static_cast<std::size_t>(k)] * side / 255 + slack) return false;
+    along += b.normal[static_cast<std::size_t>(k)] * (p[k] - center[k]) / side;
+  }
+  return std::abs(along - b.slab_center) <= b.slab_half / 2.0 + 127e-6;
+}
+
+struct Case {
+  std::string name;
+  std::function<test::Raw()> make;
+};
+
+class EveryOracle : public testing::TestWithParam<OracleKind> {
+ protected:
+  std::shared_ptr<Oracle> oracle_ = makeOracle(GetParam());
+};
+
+std::vector<Expansion> ask(Oracle& oracle, std::vector<Expansion> batch) {
+  oracle.submit(batch);
+  oracle.wait(batch);
+  return batch;
+}
+
+// Expands all grey cells level by level and checks each answer.
+void checkMesh(Oracle& oracle, const Surface& surface, int levels, std::size_t most_cells) {
+  std::mt19937_64 g(1);
+  std::uniform_real_distribution<double> u(0, 1);
+  Expansion root;
+  root.surface = &surface;
+  root.count = surface.mesh->triangleCount();
+  std::vector<Expansion> level{root};
+  for (int l = 1; l <= levels; ++l) {
+    if (level.size() > most_cells) {
+      std::shuffle(level.begin(), level.end(), g);
+      level.resize(most_cells);
+    }
+    const std::vector<Expansion> answers = ask(oracle, level);
+    static std::vector<std::vector<std::uint32_t>> keep;
+    keep.clear();
+    std::vector<Expansion> next;
+    for (const Expansion& e : answers) {
+      for (int o = 0; o < 8; ++o) {
+        const Cell octant = e.cell.octant(o);
+        const bool grey = e.grey >> o & 1;
+        ASSERT_EQ(grey, referenceGrey(surface, octant)) << "level " << octant.level << " octant " << o;
+        const std::vector<std::uint32_t> list(e.lists.begin() + static_cast<std::ptrdiff_t>(e.list_begin[o]),
+                                              e.lists.begin() + static_cast<std::ptrdiff_t>(e.list_begin[o + 1]));
+        if (!grey) {
+          ASSERT_TRUE(list.empty());
+          continue;
+        }
+        for (std::uint32_t t = 0; t < surface.mesh->triangleCount(); ++t) {
+          const Eigen::Vector3d c[3] = {surface.corner(t, 0), surface.corner(t, 1), surface.corner(t, 2)};
+          if (!touches(c, centerOf(octant), octant.side() / 2.0)) continue;
+          ASSERT_NE(std::find(list.begin(), list.end(), t), list.end()) << "triangle " << t << " is not listed";
+          for (int i = 0; i < 40; ++i) {
+            double a = u(g), b = u(g);
+            if (a + b > 1) a = 1 - a, b = 1 - b;
+            if (i < 3) a = i == 1, b = i == 2;
+            const Eigen::Vector3d p = c[0] + a * (c[1] - c[0]) + b * (c[2] - c[0]);
+            if ((p - centerOf(octant)).cwiseAbs().maxCoeff() > octant.side() / 2.0) continue;
+            ASSERT_TRUE(holds(e.octants.get(o), octant, p)) << "triangle " << t << " level " << octant.level;
+            ASSERT_TRUE(holds(e.own, e.cell, p)) << "triangle " << t << " level " << octant.level;
+          }
+        }
+        Expansion child;
+        child.surface = &surface;
+        child.cell = octant;
+        keep.push_back(list);
+        next.push_back(child);
+      }
+    }
+    for (std::size_t i = 0; i < next.size(); ++i) {
+      next[i].ids = keep[i].data();
+      next[i].count = keep[i].size();
+    }
+    // The lists that the next batch points to must live on.
+    static std::vector<std::vector<std::uint32_t>> held;
+    held.swap(keep);
+    level.swap(next);
+  }
+}
+
+TEST_P(EveryOracle, RealShape) { checkMesh(*oracle_, surfaceOf(test::torus(24)), 6, 40); }
+
+TEST_P(EveryOracle, OctreeAndDimensions) {
+  checkMesh(*oracle_, surfaceOf(test::torus(12), Subdivision::kOctree), 5, 30);
+  for (const double d : {514.0, 768.0, 1023.0}) {
+    checkMesh(*oracle_, surfaceOf(test::torus(12), Subdivision::kBono, d), 5, 30);
+  }
+}
+
+TEST_P(EveryOracle, Adversarial) { checkMesh(*oracle_, surfaceOf(test::adversarial()), 10, 60); }
+
+TEST_P(EveryOracle, Soup) { checkMesh(*oracle_, surfaceOf(test::soup(600, 5)), 8, 40); }
+
+TEST_P(EveryOracle, AnyScaleAndPlace) {
+  for (const double scale : {1e-6, 1e6}) {
+    for (const double away : {0.0, 1e6}) {
+      test::Raw raw = test::torus(8);
+      raw.scale(scale).move(Eigen::Vector3d::Constant(scale * away));
+      checkMesh(*oracle_, surfaceOf(raw), 5, 20);
+    }
+  }
+}
+
+TEST_P(EveryOracle, OddBatches) {
+  const Surface a = surfaceOf(test::torus(16)), b = surfaceOf(test::adversarial());
+  for (const std::size_t size : {std::size_t{1}, std::size_t{2}, std::size_t{3}, std::size_t{63}, std::size_t{1001}}) {
+    std::vector<Expansion> batch(size);
+    for (std::size_t i = 0; i < size; ++i) {
+      batch[i].surface = i % 3 ? &a : &b;
+      batch[i].count = batch[i].surface->mesh->triangleCount();
+      if (i % 2) batch[i].cell = Cell{}.octant(static_cast<int>(i % 8));
+    }
+    const std::vector<Expansion> answers = ask(*oracle_, batch);
+    for (std::size_t i = 0; i < size; i += 97) {
+      for (int o = 0; o < 8; ++o) {
+        EXPECT_EQ(answers[i].grey >> o & 1, referenceGrey(*answers[i].surface, answers[i].cell.octant(o)));
+      }
+    }
+  }
+}
+
+// Triangles with integer corners against cells: whether they touch is decided exactly, in 128-bit integers.
+__extension__ typedef __int128 Int;
+struct IntVec {
+  Int x[3];
+};
+
+bool touchesExactly(const IntVec v[3], const Int center[3], Int half) {
+  IntVec w[3];
+  for (int i = 0; i < 3; ++i) {
+    for (int k = 0; k < 3; ++k) w[i].x[k] = v[i].x[k] - center[k];
+  }
+  const auto apart = [&](const Int axis[3]) {
+    Int lo = 0, hi = 0, r = 0;
+    for (int i = 0; i < 3; ++i) {
+      const Int d = axis[0] * w[i].x[0] + axis[1] * w[i].x[1] + axis[2] * w[i].x[2];
+      lo = i == 0 || d < lo ? d : lo;
+      hi = i == 0 || d > hi ? d : hi;
+    }
+    for (int k = 0; k < 3; ++k) r += half * (axis[k] < 0 ? -axis[k] : axis[k]);
+    return lo > r || hi < -r;
+  };
+  Int e[3][3];
+  for (int i = 0; i < 3; ++i) {
+    for (int k = 0; k < 3; ++k) e[i][k] = w[(i + 1) % 3].x[k] - w[i].x[k];
+  }
+  const auto cross = [](const Int a[3], const Int b[3], Int c[3]) {
+    for (int k = 0; k < 3; ++k) c[k] = a[(k + 1) % 3] * b[(k + 2) % 3] - a[(k + 2) % 3] * b[(k + 1) % 3];
+  };
+  Int n[3];
+  cross(e[0], e[1], n);
+  if (apart(n)) return false;
+  for (int k = 0; k < 3; ++k) {
+    const Int unit[3] = {k == 0, k == 1, k == 2};
+    if (apart(unit)) return false;
+    for (int i = 0; i < 3; ++i) {
+      Int a[3];
+      cross(e[i], unit, a);
+      if (apart(a)) return false;
+    }
+  }
+  return true;
+}
+
+TEST_P(EveryOracle, NothingMissedAgainstIntegers) {
+  // Corners on a grid of 2^-8 units, many of them on faces, edges and corners of cells.
+  std::mt19937_64 g(9);
+  constexpr int kFine = 8;
+  std::uint64_t touching = 0;
+  for (int round = 0; round < 12; ++round) {
+    const int level = 3 + round;  // of the octants
+    const std::int64_t side = std::int64_t{1} << (lattice::kMaxLevel - level + kFine);
+    const std::int64_t whole = std::int64_t{1} << (lattice::kBits + kFine);
+    test::Raw raw;
+    // Two triangles that pin the bounds to the whole cube.
+    for (const double x : {0.0, 65536.0}) {
+      raw.vertices.insert(raw.vertices.end(), 3, Eigen::Vector3d(x, x, x));
+      raw.triangles.emplace_back(raw.vertices.size() - 3, raw.vertices.size() - 2, raw.vertices.size() - 1);
+    }
+    const std::int64_t middle = whole / 2;
+    std::vector<IntVec> corners;
+    for (int t = 0; t < 400; ++t) {
+      for (int k = 0; k < 3; ++k) {
+        IntVec v;
+        for (int c = 0; c < 3; ++c) {
+          const std::int64_t step = g() % 3 == 0 ? side : g() % 2 ? side / 2 : 1;
+          const auto span = static_cast<std::uint64_t>(4 * side / step + 1);
+          v.x[c] = middle - 2 * side + static_cast<std::int64_t>(g() % span) * step;
+        }
+        corners.push_back(v);
+        raw.vertices.emplace_back(std::ldexp(static_cast<double>(v.x[0]), -kFine),
+                                  std::ldexp(static_cast<double>(v.x[1]), -kFine),
+                                  std::ldexp(static_cast<double>(v.x[2]), -kFine));
+      }
+      raw.triangles.emplace_back(raw.vertices.size() - 3, raw.vertices.size() - 2, raw.vertices.size() - 1);
+    }
+    const Surface surface = surfaceOf(raw);
+    ASSERT_EQ(surface.lattice.unit(), 1);
+    std::vector<std::uint32_t> ids(400);
+    for (std::uint32_t t = 0; t < 400; ++t) ids[t] = t + 2;
+    std::vector<Expansion> batch;
+    for (std::uint32_t t = 0; t < 400; ++t) {
+      for (int o = 0; o < 8; ++o) {  // the eight cells of the level above about the middle
+        const std::uint32_t at = 1u << (level - 3);
+        Expansion e;
+        e.surface = &surface;
+        e.cell = Cell{level - 1, {at - (o & 1), at - (o >> 1 & 1), at - (o >> 2 & 1)}};
+        e.ids = &ids[t];
+        e.count = 1;
+        batch.push_back(e);
+      }
+    }
+    const std::vector<Expansion> answers = ask(*oracle_, batch);
+    for (const Expansion& e : answers) {
+      const std::size_t t = *e.ids - 2;
+      for (int o = 0; o < 8; ++o) {
+        const auto corner = e.cell.octant(o).corner();
+        Int center[3];
+        for (int k = 0; k < 3; ++k) center[k] = (Int{corner[k]} << kFine) + side / 2;
+        const bool exact = touchesExactly(&corners[3 * t], center, side / 2);
+        touching += exact;
+        if (exact) {
+          ASSERT_TRUE(e.grey >> o & 1) << "level " << level << " triangle " << t << " octant " << o;
+        }
+      }
+    }
+  }
+  EXPECT_GT(touching, 10000u);
+}
+
+INSTANTIATE_TEST_SUITE_P(Cpu, EveryOracle, testing::Values(OracleKind::kCpu));
+
+TEST(Kernels, EveryInstructionSetAgreesOnGreySets) {
+  const Surface surface = surfaceOf(test::soup(500, 3));
+  Expansion root;
+  root.surface = &surface;
+  root.count = surface.mesh->triangleCount();
+  std::vector<std::uint8_t> greys;
+  int targets = 0;
+  const std::int64_t all = hwy::SupportedTargets();
+  for (std::int64_t left = all; left != 0; left &= left - 1) {
+    hwy::SetSupportedTargetsForTest(left & -left);
+    hwy::GetChosenTarget().Update(hwy::SupportedTargets());
+    ++targets;
+    for (int o = 0; o < 8; ++o) {
+      root.cell = Cell{}.octant(o);
+      const Expansion e = ask(*makeOracle(OracleKind::kCpu), {root})[0];
+      if (targets == 1) {
+        greys.push_back(e.grey);
+      } else {
+        EXPECT_EQ(greys[static_cast<std::size_t>(o)], e.grey) << instructionSet();
+      }
+    }
+    checkMesh(*makeOracle(OracleKind::kCpu), surfaceOf(test::adversarial()), 6, 30);
+  }
+  hwy::SetSupportedTargetsForTest(0);
+  hwy::GetChosenTarget().Update(hwy::SupportedTargets());
+  EXPECT_GE(targets, 1);
+}
+
+TEST(RootGrid, KnowsTheSameGreyCellsAsExpansions) {
+  for (const Subdivision s : {Subdivision::kOctree, Subdivision::kBono}) {
+    for (const double d : {0.0, 514.0, 900.0}) {
+      const Surface surface = surfaceOf(test::torus(60), s, d);
+      const auto grid = RootGrid::make(surface, lattice::kMaxLevel);
+      ASSERT_NE(grid, nullptr);
+      const std::uint32_t side = 1u << (grid->level() - 1);
+      std::size_t grey = 0;
+      for (std::uint32_t z = 0; z < side; ++z) {
+        for (std::uint32_t y = 0; y < side; ++y) {
+          for (std::uint32_t x = 0; x < side; ++x) {
+            const Cell cell{grid->level(), {x, y, z}};
+            ASSERT_EQ(grid->grey(cell), referenceGrey(surface, cell));
+            if (!grid->grey(cell)) continue;
+            ++grey;
+            std::vector<std::uint32_t> ids;
+            grid->gather(surface, cell, ids);
+            std::sort(ids.begin(), ids.end());
+            ASSERT_EQ(std::adjacent_find(ids.begin(), ids.end()), ids.end());
+            for (std::uint32_t t = 0; t < surface.mesh->triangleCount(); ++t) {
+              const Eigen::Vector3d c[3] = {surface.corner(t, 0), surface.corner(t, 1), surface.corner(t, 2)};
+              if (touches(c, centerOf(cell), cell.side() / 2.0)) {
+                ASSERT_TRUE(std::binary_search(ids.begin(), ids.end(), t));
+              }
+            }
+          }
+        }
+      }
+      EXPECT_GT(grey, 20u);
+    }
+  }
+}
+
+TEST(RootGrid, LargeTrianglesAreLeftToExpansions) {
+  test::Raw raw = test::soup(3000, 1);
+  for (auto& t : raw.triangles) {
+    raw.vertices[t[0]].setZero();
+    raw.vertices[t[1]].setOnes();
+  }
+  raw.add(test::torus(40));
+  EXPECT_EQ(RootGrid::make(surfaceOf(raw), lattice::kMaxLevel), nullptr);
+}
+
+TEST(MakeOracle, SaysWhyNot) {
+  EXPECT_EQ(makeOracle(OracleKind::kAuto)->name(), "cpu");
+  for (const OracleInfo& info : availableOracles()) {
+    if (info.why_not.empty()) {
+      EXPECT_EQ(makeOracle(info.kind)->name(), info.name);
+    } else {
+      try {
+        makeOracle(info.kind);
+        ADD_FAILURE() << info.name;
+      } catch (const OracleError& e) {
+        EXPECT_NE(std::string(e.what()).find(info.why_not), std::string::npos);
+      }
+    }
+  }
+  setenv("BOCST_ORACLE", "cpu", 1);
+  EXPECT_EQ(makeOracle(OracleKind::kAuto)->name(), "cpu");
+  for (const char* bad : {"compute", "occlusion", "7", "gpu"}) {
+    setenv("BOCST_ORACLE", bad, 1);
+    EXPECT_THROW(makeOracle(OracleKind::kAuto), OracleError) << bad;
+    EXPECT_EQ(makeOracle(OracleKind::kCpu)->name(), "cpu");
+  }
+  unsetenv("BOCST_ORACLE");
+}
+
+}  // namespace
+}  // namespace bocst::oracle

@@ -1,0 +1,241 @@
+// SPDX-License-Identifier: BSD-3-Clause
+// The float tests of a query never part what touches: against points of the volumes and against FCL's triangle test, on
+// every instruction set that the dispatch can choose.
+#include "query/kernels.h"
+
+#include <gtest/gtest.h>
+#include <hwy/targets.h>
+
+#include <fcl/narrowphase/detail/traversal/collision/intersect.h>
+
+#include <set>
+
+#include "meshes.h"
+#include "query/triangle.h"
+#include "query/volume.h"
+
+namespace bocst::query {
+namespace {
+
+class EveryTarget : public testing::TestWithParam<std::int64_t> {
+ protected:
+  void SetUp() override {
+    hwy::SetSupportedTargetsForTest(GetParam());
+    hwy::GetChosenTarget().Update(hwy::SupportedTargets());
+  }
+  void TearDown() override {
+    hwy::SetSupportedTargetsForTest(0);
+    hwy::GetChosenTarget().Update(hwy::SupportedTargets());
+  }
+};
+
+std::vector<std::int64_t> targets() {
+  std::vector<std::int64_t> result;
+  for (std::int64_t left = hwy::SupportedTargets(); left != 0; left &= left - 1) result.push_back(left & -left);
+  return result;
+}
+
+// Random bounds of an octant, and points of the surface that they allow.
+oracle::CellBounds randomBounds(std::mt19937_64& g) {
+  oracle::CellBounds b;
+  for (std::size_t k = 0; k < 3; ++k) {
+    const auto x = static_cast<std::uint8_t>(g() % 256), y = static_cast<std::uint8_t>(g() % 256);
+    b.lo[k] = std::min(x, y);
+    b.hi[k] = std::max(x, y);
+  }
+  if (g() % 4 != 0) {
+    const Eigen::Vector3d n = test::randomDirection(g) * 127;
+    for (std::size_t k = 0; k < 3; ++k) b.normal[k] = static_cast<std::int8_t>(std::round(n[static_cast<int>(k)]));
+    b.slab_center = static_cast<std::int8_t>(static_cast<int>(g() % 81) - 40);
+    b.slab_half = static_cast<std::uint8_t>(g() % 80);
+  }
+  return b;
+}
+
+bool randomPoint(std::mt19937_64& g, const oracle::CellBounds& b, const Eigen::Vector3d& corner, double side,
+                 Eigen::Vector3d& p) {
+  std::uniform_real_distribution<double> u(0, 1);
+  for (int i = 0; i < 20; ++i) {
+    double along = 0;
+    for (int k = 0; k < 3; ++k) {
+      const auto s = static_cast<std::size_t>(k);
+      // Extreme points matter most.
+      const double f = g() % 3 == 0 ? 0 : g() % 2 ? 1 : u(g);
+      const double x = (b.lo[s] + f * (b.hi[s] - b.lo[s])) / 255;
+      p[k] = corner[k] + x * side;
+      along += b.normal[s] * (x - 0.5);
+    }
+    if (std::abs(along - b.slab_center) <= b.slab_half / 2.0) return true;
+  }
+  return false;
+}
+
+TEST_P(EveryTarget, NoOctantIsLostThatSharesAPoint) {
+  std::mt19937_64 g(2);
+  std::uniform_real_distribution<double> u(-1, 1);
+  int shared = 0, parted = 0;
+  for (int round = 0; round < 20000; ++round) {
+    oracle::OctantBounds octants;
+    for (int o = 0; o < 8; ++o) octants.set(o, randomBounds(g));
+    // A volume of another tree, its own cell at the origin with side 1, placed so that a point of it is a point of ours.
+    const oracle::CellBounds other = randomBounds(g);
+    Volume v;
+    Eigen::Vector3d n, box_middle;
+    for (int k = 0; k < 3; ++k) {
+      const auto s = static_cast<std::size_t>(k);
+      v.half[k] = static_cast<float>((other.hi[s] - other.lo[s]) / 510.0);
+      box_middle[k] = (other.hi[s] + other.lo[s]) / 510.0;
+      v.center[k] = box_middle[k];
+      n[k] = other.normal[s] / 127.0;
+      v.normal[k] = static_cast<float>(n[k]);
+    }
+    v.slab_offset = static_cast<float>(other.slab_center / 127.0 - n.dot(box_middle - Eigen::Vector3d::Constant(0.5)));
+    v.slab_half = static_cast<float>(other.slab_half / 254.0);
+    Placement to;
+    to.rotation = test::randomRotation(g);
+    to.scale = std::pow(10.0, 3 * u(g));
+    const double side = std::pow(10.0, 3 * u(g));
+    const Eigen::Vector3d corner = Eigen::Vector3d(u(g), u(g), u(g)) * std::pow(10.0, 4 * u(g));
+    const int o = static_cast<int>(g() % 8);
+    Eigen::Vector3d mine, theirs;
+    const Eigen::Vector3d octant_corner = corner + side * Eigen::Vector3d(o & 1, o >> 1 & 1, o >> 2 & 1);
+    if (!randomPoint(g, octants.get(o), octant_corner, side, mine)) continue;
+    if (!randomPoint(g, other, Eigen::Vector3d::Zero(), 1, theirs)) continue;
+    to.translation = mine - to.scale * (to.rotation * theirs);
+    to.slack = 1e-13 * corner.norm();
+    to.ready();
+    ++shared;
+    const double at[3] = {corner[0], corner[1], corner[2]};
+    const unsigned mask = overlappingOctants(octants, seenFrom(v, to, at, side));
+    ASSERT_TRUE(mask >> o & 1) << "round " << round;
+    parted += mask != 255;
+  }
+  EXPECT_GT(shared, 5000);
+  EXPECT_GT(parted, shared / 2) << "a test that parts nothing proves nothing";
+}
+
+void put(TrianglePack& pack, std::size_t i, const Corners& t) {
+  for (std::size_t k = 0; k < 3; ++k) {
+    for (std::size_t c = 0; c < 3; ++c) {
+      const auto f = static_cast<float>(t[k][static_cast<int>(c)]);
+      pack.xyz[3 * k + c][i] = f;
+      pack.size = std::max(pack.size, std::abs(f));
+    }
+  }
+}
+
+TEST_P(EveryTarget, NoPairIsLostThatFclFinds) {
+  std::mt19937_64 g(3);
+  std::uniform_real_distribution<double> u(-1, 1);
+  std::uint64_t hits = 0, candidates = 0, pairs = 0;
+  for (int round = 0; round < 400; ++round) {
+    const double scale = std::pow(10.0, 6 * u(g));
+    TrianglePack a, b;
+    a.count = 1 + g() % 32;
+    b.count = 1 + g() % 32;
+    std::vector<std::array<Eigen::Vector3d, 3>> ta(a.count), tb(b.count);
+    const auto make = [&](std::array<Eigen::Vector3d, 3>& t) {
+      const Eigen::Vector3d c(u(g), u(g), u(g));
+      const double size = std::pow(10.0, u(g));
+      for (auto& v : t) v = (c + size * Eigen::Vector3d(u(g), u(g), u(g))) * scale;
+      if (g() % 8 == 0) t[2] = t[1] + 1e-9 * (t[2] - t[1]);  // sliver
+      if (g() % 16 == 0) t[1] = t[0];                        // segment
+      if (g() % 32 == 0) t[1] = t[2] = t[0];                 // point
+    };
+    for (std::size_t i = 0; i < a.count; ++i) {
+      make(ta[i]);
+      Corners t = {ta[i][0], ta[i][1], ta[i][2]};
+      put(a, i, t);
+    }
+    for (std::size_t i = 0; i < b.count; ++i) {
+      make(tb[i]);
+      // Touch a triangle of the other side exactly: by a corner, or moved onto its plane.
+      if (g() % 2) {
+        const auto& other = ta[g() % a.count];
+        const double s = std::abs(u(g)), t = (1 - s) * std::abs(u(g));
+        const Eigen::Vector3d p = g() % 2 ? other[g() % 3]
+                                          : Eigen::Vector3d(other[0] + s * (other[1] - other[0]) + t * (other[2] - other[0]));
+        const Eigen::Vector3d d = p - tb[i][g() % 3];
+        for (auto& v : tb[i]) v += d;
+      }
+      Corners t = {tb[i][0], tb[i][1], tb[i][2]};
+      put(b, i, t);
+    }
+    PackPair found[TrianglePack::kCapacity * TrianglePack::kCapacity];
+    const std::size_t count = touchingPairs(a, b, 0, found);
+    std::set<std::pair<int, int>> set;
+    for (std::size_t k = 0; k < count; ++k) set.insert({found[k].row, found[k].lane});
+    ASSERT_EQ(set.size(), count);
+    candidates += count;
+    for (std::size_t i = 0; i < a.count; ++i) {
+      for (std::size_t j = 0; j < b.count; ++j) {
+        ++pairs;
+        const Corners p = {ta[i][0], ta[i][1], ta[i][2]}, q = {tb[j][0], tb[j][1], tb[j][2]};
+        if (isDegenerate(p) || isDegenerate(q)) {
+          if (distanceDegenerate(p, q) > 1e-13 * scale) continue;
+        } else if (!fcl::detail::Intersect<double>::intersect_Triangle(p[0], p[1], p[2], q[0], q[1], q[2])) {
+          continue;
+        }
+        ++hits;
+        ASSERT_TRUE(set.count({static_cast<int>(i), static_cast<int>(j)})) << "round " << round;
+      }
+    }
+  }
+  EXPECT_GT(hits, 3000u);
+  EXPECT_LT(candidates, hits + pairs / 50) << "a filter that lets everything through proves nothing";
+}
+
+INSTANTIATE_TEST_SUITE_P(Targets, EveryTarget, testing::ValuesIn(targets()),
+                         [](const auto& p) { return std::string(hwy::TargetName(static_cast<int>(p.param))); });
+
+// Properties of what contacts are made of.
+
+TEST(PartTriangles, MovingByDepthParts) {
+  std::mt19937_64 g(6);
+  std::uniform_real_distribution<double> u(-1, 1);
+  int tried = 0;
+  for (int round = 0; round < 20000; ++round) {
+    Corners p, q;
+    for (int k = 0; k < 3; ++k) {
+      p[k] = Eigen::Vector3d(u(g), u(g), u(g));
+      q[k] = Eigen::Vector3d(u(g), u(g), u(g));
+    }
+    using Exact = fcl::detail::Intersect<double>;
+    if (!Exact::intersect_Triangle(p[0], p[1], p[2], q[0], q[1], q[2])) continue;
+    ++tried;
+    const Touch touch = partTriangles(p, q);
+    EXPECT_NEAR(touch.normal.norm(), 1, 1e-12);
+    EXPECT_GE(touch.depth, 0);
+    const auto touches = [&](double by) {
+      const Eigen::Vector3d d = by * touch.normal;
+      return Exact::intersect_Triangle(p[0], p[1], p[2], q[0] + d, q[1] + d, q[2] + d);
+    };
+    EXPECT_FALSE(touches(touch.depth + 1e-9));
+    if (touch.depth > 1e-6) {
+      EXPECT_TRUE(touches(touch.depth * 0.999));
+    }
+    EXPECT_LT((closestPoint(touch.point, p) - touch.point).norm(), 1e-9) << "the point is on both triangles";
+    EXPECT_LT((closestPoint(touch.point, q) - touch.point).norm(), 1e-9);
+  }
+  EXPECT_GT(tried, 500);
+}
+
+TEST(ClosestPoint, IsNoFurtherThanAnyOtherPoint) {
+  std::mt19937_64 g(7);
+  std::uniform_real_distribution<double> u(-1, 1);
+  for (int round = 0; round < 3000; ++round) {
+    Corners t;
+    for (auto& v : t) v = Eigen::Vector3d(u(g), u(g), u(g));
+    if (round % 5 == 0) t[1] = t[0];
+    if (round % 7 == 0) t[2] = t[0];
+    const Eigen::Vector3d x = 2 * Eigen::Vector3d(u(g), u(g), u(g)), c = closestPoint(x, t);
+    for (int i = 0; i < 50; ++i) {
+      double a = std::abs(u(g)), b = std::abs(u(g));
+      if (a + b > 1) a = 1 - a, b = 1 - b;
+      EXPECT_LE((c - x).norm(), (t[0] + a * (t[1] - t[0]) + b * (t[2] - t[0]) - x).norm() + 1e-12);
+    }
+  }
+}
+
+}  // namespace
+}  // namespace bocst::query

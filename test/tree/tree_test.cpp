@@ -1,0 +1,304 @@
+// SPDX-License-Identifier: BSD-3-Clause
+// How a model grows, forgets and shows itself, driven by a clock of the test's own.
+#include <gtest/gtest.h>
+
+#include <map>
+#include <set>
+
+#include <bocst/bocst.h>
+
+#include "lattice/lattice.h"
+#include "meshes.h"
+#include "oracle/reference.h"
+
+namespace bocst {
+namespace {
+
+using std::chrono::milliseconds;
+
+struct FakeClock {
+  Clock::time_point now = Clock::time_point(std::chrono::hours(1));
+  std::function<Clock::time_point()> function() {
+    return [this] { return now; };
+  }
+};
+
+bool touching(const Modeld& a, const Modeld& b, const Eigen::Vector3d& p) {
+  fcl::Transform3d X = fcl::Transform3d::Identity(), Y = X;
+  Y.translation() = p;
+  fcl::CollisionRequestd request;
+  fcl::CollisionResultd result;
+  const fcl::CollisionGeometryd *ga = &a, *gb = &b;
+  return fcl::collide(ga, X, gb, Y, request, result) > 0;
+}
+
+const Eigen::Vector3d kHit(1.3, 0.2, 0.1), kMiss(9, 0, 0);
+
+TEST(Tree, StartsAsOneSphere) {
+  Modeld model(test::torus(64).mesh());
+  const Statistics s = model.statistics();
+  EXPECT_EQ(s.resident_nodes, 1u);
+  EXPECT_EQ(s.nodes_per_level, std::vector<std::size_t>{1});
+  EXPECT_EQ(s.resident_bytes, 0u);
+  EXPECT_EQ(s.expansions, 0u);
+  Modeld other(test::torus(64).mesh());
+  EXPECT_FALSE(touching(model, other, kMiss));
+  EXPECT_EQ(model.statistics().resident_nodes, 1u) << "a miss of the roots needs no branch";
+}
+
+TEST(Tree, GrowsOnlyWhatAQueryNeedsAndNothingTwice) {
+  Modeld a(test::torus(100).mesh()), b(test::torus(100).mesh());
+  EXPECT_TRUE(touching(a, b, kHit));
+  const Statistics first = a.statistics();
+  EXPECT_GT(first.resident_nodes, 1u);
+  Modeld whole(a.mesh());
+  whole.expandAll(static_cast<int>(first.nodes_per_level.size()));
+  EXPECT_LT(first.resident_nodes, whole.statistics().resident_nodes / 2);
+  EXPECT_TRUE(touching(a, b, kHit));
+  EXPECT_EQ(a.statistics().expansions, first.expansions);
+  EXPECT_EQ(a.statistics().oracle_batches, first.oracle_batches);
+}
+
+TEST(Tree, DecaysLevelByLevelToItsRoot) {
+  for (const std::size_t n : {std::size_t{20}, std::size_t{100}}) {  // without and with a root grid
+    FakeClock clock;
+    Options options;
+    options.clock = clock.function();
+    Modeld a(test::torus(n).mesh(), options), b(test::torus(n).mesh(), options);
+    EXPECT_TRUE(touching(a, b, kHit));
+    std::size_t levels = a.statistics().nodes_per_level.size();
+    ASSERT_GT(levels, 2u);
+    a.prune(clock.now + milliseconds(1999));
+    EXPECT_EQ(a.statistics().nodes_per_level.size(), levels) << "not yet";
+    const Statistics before = a.statistics();
+    while (levels > 1) {
+      clock.now += milliseconds(2001);
+      a.prune();
+      EXPECT_EQ(a.statistics().nodes_per_level.size(), levels - 1) << "one level at a time";
+      a.prune();
+      EXPECT_EQ(a.statistics().nodes_per_level.size(), levels - 1) << "the parent's own time has just started";
+      levels = a.statistics().nodes_per_level.size();
+      if (levels > 1) {
+        EXPECT_TRUE(touching(b, Modeld(a.mesh()), kHit));
+      }
+    }
+    const Statistics after = a.statistics();
+    EXPECT_EQ(after.resident_nodes, 1u);
+    EXPECT_EQ(after.resident_bytes, 0u);
+    EXPECT_EQ(after.pruned_nodes, before.resident_nodes - 1);
+    EXPECT_TRUE(touching(a, b, kHit)) << "and grows again";
+  }
+}
+
+TEST(Tree, WhatIsUsedStays) {
+  FakeClock clock;
+  Options options;
+  options.clock = clock.function();
+  Modeld a(test::torus(100).mesh(), options), b(test::torus(100).mesh(), options);
+  EXPECT_TRUE(touching(a, b, kHit));
+  const std::size_t grown = a.statistics().resident_nodes;
+  for (int i = 0; i < 10; ++i) {
+    clock.now += milliseconds(1500);
+    EXPECT_TRUE(touching(a, b, kHit));
+  }
+  EXPECT_EQ(a.statistics().resident_nodes, grown);
+  // Queries prune by themselves: a contact elsewhere lets the old branch go.
+  for (int i = 0; i < 60; ++i) {
+    clock.now += milliseconds(600);
+    EXPECT_TRUE(touching(a, b, -kHit));
+  }
+  EXPECT_GT(a.statistics().pruned_nodes, 0u);
+}
+
+TEST(Tree, TtlZeroKeepsEverything) {
+  FakeClock clock;
+  Options options;
+  options.clock = clock.function();
+  options.ttl = milliseconds(0);
+  Modeld a(test::torus(50).mesh(), options), b(test::torus(50).mesh(), options);
+  EXPECT_TRUE(touching(a, b, kHit));
+  const std::size_t grown = a.statistics().resident_nodes;
+  clock.now += std::chrono::hours(100000);
+  a.prune();
+  EXPECT_TRUE(touching(a, b, kHit));
+  EXPECT_EQ(a.statistics().resident_nodes, grown);
+}
+
+TEST(Tree, AnswersDoNotDependOnDecay) {
+  FakeClock clock;
+  Options options;
+  options.clock = clock.function();
+  Modeld a(test::torus(60).mesh(), options), b(test::torus(60).mesh(), options);
+  std::mt19937_64 g(4);
+  std::uniform_real_distribution<double> u(0, 1);
+  for (int i = 0; i < 200; ++i) {
+    const Eigen::Vector3d p = test::randomDirection(g) * 2.2 * u(g);
+    clock.now += milliseconds(static_cast<int>(3000 * u(g)));
+    if (i % 3 == 0) a.prune();
+    EXPECT_EQ(touching(a, b, p), touching(Modeld(a.mesh()), Modeld(b.mesh()), p));
+  }
+}
+
+TEST(Tree, StaysWithinItsBudget) {
+  Options options;
+  options.memory_budget = 60000;
+  const auto mesh = test::torus(100).mesh();
+  Modeld a(mesh, options), b(mesh);
+  std::mt19937_64 g(8);
+  std::uniform_real_distribution<double> u(0, 1);
+  for (int i = 0; i < 100; ++i) {
+    const Eigen::Vector3d p = test::randomDirection(g) * 2.2 * u(g);
+    EXPECT_EQ(touching(a, b, p), touching(Modeld(mesh), Modeld(mesh), p));
+    EXPECT_LE(a.statistics().resident_bytes, options.memory_budget);
+  }
+  EXPECT_GT(a.statistics().pruned_nodes, 0u);
+}
+
+TEST(Tree, UpdatedVerticesAreANewSurface) {
+  const test::Raw raw = test::torus(60);
+  Modeld a(raw.mesh()), b(raw.mesh());
+  EXPECT_TRUE(touching(a, b, kHit));
+  std::vector<Eigen::Vector3d> moved = raw.vertices;
+  for (auto& v : moved) v += Eigen::Vector3d(5, 0, 0);
+  a.updateVertices(moved);
+  EXPECT_EQ(a.statistics().resident_nodes, 1u);
+  EXPECT_FALSE(touching(a, b, kHit));
+  EXPECT_TRUE(touching(a, b, kHit + Eigen::Vector3d(5, 0, 0)));
+  EXPECT_GT(a.aabb_local.min_.x(), 3);
+  EXPECT_TRUE(a.mesh()->vertex(0).isApprox(moved[0]));
+
+  moved.pop_back();
+  EXPECT_THROW(a.updateVertices(moved), std::invalid_argument);
+  moved.emplace_back(std::nan(""), 0, 0);
+  EXPECT_THROW(a.updateVertices(moved), std::invalid_argument);
+  EXPECT_TRUE(touching(a, b, kHit + Eigen::Vector3d(5, 0, 0))) << "as before";
+}
+
+TEST(Tree, VisitShowsThePapersNodes) {
+  for (const Subdivision s : {Subdivision::kOctree, Subdivision::kBono}) {
+    Options options;
+    options.subdivision = s;
+    options.dimension = 768;
+    Modeld model(test::torus(80).mesh(), options);
+    model.expandAll(5);
+    const lattice::Lattice lattice(model.mesh()->bounds(), s, 768);
+    std::map<std::uint32_t, NodeView> nodes;
+    model.visit([&](const NodeView& v) {
+      if (v.parent != NodeView::kNone) {
+        EXPECT_TRUE(nodes.count(v.parent)) << "parents first";
+      }
+      EXPECT_TRUE(nodes.emplace(v.id, v).second) << "ids are unique";
+    });
+    std::vector<std::size_t> levels(5, 0);
+    for (const auto& [id, v] : nodes) {
+      ++levels[static_cast<std::size_t>(v.level - 1)];
+      EXPECT_EQ(v.object, model.mesh().get());
+      EXPECT_EQ(v.n, 10 - (v.level - 1));  // the root cube of d_t = 768 has a side of 1024
+      EXPECT_EQ(v.children.empty(), v.level == 5);
+      for (const std::uint32_t child : v.children) {
+        EXPECT_EQ(nodes.at(child).parent, id);
+        EXPECT_EQ(nodes.at(child).level, v.level + 1);
+        EXPECT_LE(nodes.at(child).radius, v.radius);
+      }
+      // The sphere is that of the actual region.
+      const Eigen::AlignedBox3d region = lattice.region({v.level, v.cell});
+      EXPECT_NEAR(v.radius, region.sizes().norm() / 2 * lattice.unit(), 1e-12);
+      EXPECT_TRUE(v.center.isApprox(lattice.origin() + region.center() * lattice.unit()));
+    }
+    EXPECT_EQ(model.statistics().nodes_per_level, levels);
+    EXPECT_EQ(model.statistics().resident_nodes, nodes.size());
+  }
+}
+
+TEST(Tree, ExpandAllIsTheCompleteTree) {
+  for (const test::Raw& raw : {test::torus(24), test::torus(60), test::adversarial()}) {  // 60: through the root grid
+    const auto mesh = raw.mesh();
+    for (const double dimension : {0.0, 514.0, 900.0}) {
+      Options options;
+      options.dimension = dimension;
+      Modeld model(mesh, options);
+      const lattice::Lattice lattice(mesh->bounds(), options.subdivision, dimension);
+      model.expandAll(4);
+      for (int level = 2; level <= 4; ++level) {
+        std::size_t grey = 0;
+        const std::uint32_t side = 1u << (level - 1);
+        for (std::uint32_t i = 0; i < side * side * side; ++i) {
+          const lattice::Cell cell{level, {i % side, i / side % side, i / side / side}};
+          if (!lattice.exists(cell)) continue;
+          const auto corner = cell.corner();
+          const Eigen::Vector3d center =
+              Eigen::Vector3d(corner[0], corner[1], corner[2]).array() + cell.side() / 2.0;
+          for (std::size_t t = 0; t < mesh->triangleCount(); ++t) {
+            Eigen::Vector3d c[3];
+            for (std::size_t k = 0; k < 3; ++k) c[k] = lattice.toLattice(mesh->vertex(mesh->indices(t)[k]));
+            if (oracle::touches(c, center, cell.side() / 2.0)) {
+              ++grey;
+              break;
+            }
+          }
+        }
+        EXPECT_EQ(model.statistics().nodes_per_level.at(static_cast<std::size_t>(level - 1)), grey);
+      }
+    }
+  }
+}
+
+TEST(Tree, ConservativeTreesStopAtTheirDepth) {
+  for (const bool rule : {false, true}) {
+    Options options;
+    options.answer = Answer::kConservative;
+    options.depth = 5;
+    options.dimension = 600;
+    options.level_rule = rule;  // 514 <= 600 < 768: one level more
+    Modeld a(test::torus(100).mesh(), options), b(test::torus(100).mesh(), options);
+    EXPECT_TRUE(touching(a, b, kHit));
+    EXPECT_EQ(a.statistics().nodes_per_level.size(), rule ? 6u : 5u);
+  }
+}
+
+TEST(Tree, DeepAndDenseMeshesStayBounded) {
+  // 2^20 triangles in one cell of the finest level, and one far away that makes the lattice coarse.
+  test::Raw raw;
+  raw.vertices = {{0, 0, 0}, {1e-9, 0, 0}, {0, 1e-9, 0}, {1, 1, 1}, {1, 1, 0.9}, {1, 0.9, 1}};
+  raw.triangles.assign(std::size_t{1} << 20, fcl::Triangle(0, 1, 2));
+  raw.triangles.emplace_back(3, 4, 5);
+  Modeld a(raw.mesh()), b(test::box({-0.5, -0.5, -1e-10}, {0.5, 0.5, 0.5}).mesh());
+  EXPECT_TRUE(touching(a, b, {0, 0, 0}));
+  EXPECT_FALSE(touching(a, b, {0, 0, 1e-6}));
+  const Statistics s = a.statistics();
+  EXPECT_LE(s.nodes_per_level.size(), 17u);
+  EXPECT_LE(s.resident_bytes, std::size_t{4} * 20 * raw.triangles.size());
+}
+
+TEST(Tree, BadOptionsAreNamed) {
+  const auto mesh = test::torus(8).mesh();
+  const auto message = [&](const std::function<void(Options&)>& change) {
+    Options o;
+    change(o);
+    try {
+      Modeld model(mesh, o);
+    } catch (const std::invalid_argument& e) {
+      return std::string(e.what());
+    }
+    return std::string();
+  };
+  EXPECT_EQ(message([](Options&) {}), "");
+  EXPECT_NE(message([](Options& o) { o.depth = 0; }).find("depth"), std::string::npos);
+  EXPECT_NE(message([](Options& o) { o.depth = 18; }).find("depth"), std::string::npos);
+  EXPECT_NE(message([](Options& o) { o.dimension = -1; }).find("dimension"), std::string::npos);
+  EXPECT_NE(message([](Options& o) { o.dimension = 65537; }).find("dimension"), std::string::npos);
+  EXPECT_NE(message([](Options& o) { o.dimension = std::nan(""); }).find("dimension"), std::string::npos);
+  EXPECT_NE(message([](Options& o) { o.ttl = milliseconds(-1); }).find("ttl"), std::string::npos);
+  EXPECT_NE(message([](Options& o) { o.margin = 0.1; }).find("margin"), std::string::npos);
+  EXPECT_NE(message([](Options& o) { o.solid = true; }).find("solid"), std::string::npos);
+  EXPECT_THROW(Modeld(nullptr), std::invalid_argument);
+  Options gpu;
+  gpu.oracle = OracleKind::kCompute;
+  EXPECT_THROW(Modeld(mesh, gpu), OracleError);
+  Modeld model(mesh);
+  EXPECT_THROW(model.expandAll(0), std::invalid_argument);
+  EXPECT_THROW(model.expandAll(18), std::invalid_argument);
+}
+
+}  // namespace
+}  // namespace bocst
