@@ -111,6 +111,13 @@ class BvhSide {
     });
   }
 
+  // One triangle a leaf: its volume is as good as itself.
+  template <typename Corner, typename F>
+  void childrenMeeting(Node node, const query::Volume& other, const query::Placement& to, std::size_t, Corner&&,
+                       F&& f) const {
+    overlappingChildren(node, other, to, f);
+  }
+
   template <typename F>
   void children(Node node, F&& f) const {
     f(bvh_.getBV(node).leftChild());

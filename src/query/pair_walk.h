@@ -53,6 +53,9 @@ class PairWalk {
   /// Pairs in the first batch of a walk that may end early; a few oracle answers cost less than one too many.
   static constexpr std::size_t kFirstBatch = 16;
 
+  /// A leaf so many times larger (squared) than the node it meets is taken triangle by triangle.
+  static constexpr double kCoarse = 1.0;
+
   /// True when the visitor ended it.
   bool run() {
     Scratch& s = scratch();
@@ -164,18 +167,29 @@ class PairWalk {
       s.pending.push_back({pair, 0});
       return false;
     }
-    if (expandsA(sa, sb, seen_a_.size, seen_b_.size * b_in_a_.scale * b_in_a_.scale)) {
+    const double size_b = seen_b_.size * b_in_a_.scale * b_in_a_.scale;
+    if (expandsA(sa, sb, seen_a_.size, size_b)) {
       if (sa == State::kGrows) {
         s.pending.push_back({pair, 0});
       } else {
-        a_.overlappingChildren(pair.a, seen_b_.volume, b_in_a_,
-                               [&](typename A::Node c) { s.stack.push_back({c, pair.b}); });
+        const auto push = [&](typename A::Node c) { s.stack.push_back({c, pair.b}); };
+        if (sb == State::kLeaf && seen_a_.size < kCoarse * size_b) {
+          a_.childrenMeeting(pair.a, seen_b_.volume, b_in_a_, b_.triangleCount(pair.b),
+                             [&](std::size_t i, int k) { return b_in_a_ * b_.corner(b_.triangle(pair.b, i), k); }, push);
+        } else {
+          a_.overlappingChildren(pair.a, seen_b_.volume, b_in_a_, push);
+        }
       }
     } else if (sb == State::kGrows) {
       s.pending.push_back({pair, 0});
     } else {
-      b_.overlappingChildren(pair.b, seen_a_.volume, a_in_b_,
-                             [&](typename B::Node c) { s.stack.push_back({pair.a, c}); });
+      const auto push = [&](typename B::Node c) { s.stack.push_back({pair.a, c}); };
+      if (sa == State::kLeaf && size_b < kCoarse * seen_a_.size) {
+        b_.childrenMeeting(pair.b, seen_a_.volume, a_in_b_, a_.triangleCount(pair.a),
+                           [&](std::size_t i, int k) { return a_in_b_ * a_.corner(a_.triangle(pair.a, i), k); }, push);
+      } else {
+        b_.overlappingChildren(pair.b, seen_a_.volume, a_in_b_, push);
+      }
     }
     return false;
   }

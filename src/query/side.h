@@ -5,6 +5,7 @@
 #include <cstdint>
 #include <vector>
 
+#include "oracle/cpu/kernels.h"
 #include "query/kernels.h"
 #include "query/triangle.h"
 #include "query/volume.h"
@@ -89,9 +90,37 @@ class TreeSide {
     const double side = 1 << (lattice::kMaxLevel - block.level);
     const double corner[3] = {block.at[0] * side, block.at[1] * side, block.at[2] * side};
     const OneVolume one = seenFrom(other, to, corner, side / 2);
-    for (unsigned mask = overlappingOctants(block.octants, one) & block.grey; mask != 0; mask &= mask - 1) {
-      f(Node::octant(index, __builtin_ctz(mask)));
+    pushOctants(block, index, overlappingOctants(block.octants, one) & block.grey, f);
+  }
+
+  /// The same against the triangles of a leaf of the other side: with large triangles its volume says little. Octants
+  /// that no triangle meets are left out too. `corner(i, k)` is corner k of triangle i in this side's frame.
+  template <typename OtherVolume, typename Corner, typename F>
+  void childrenMeeting(Node node, OtherVolume& other, const Placement& to, std::size_t count, Corner&& corner_of,
+                       F&& f) const {
+    const std::uint32_t index = tree_.link(node).index();
+    const tree::Block& block = tree_.block(index);
+    tree_.touch(block, now_);
+    const double side = 1 << (lattice::kMaxLevel - block.level), half = side / 2;
+    const double corner[3] = {block.at[0] * side, block.at[1] * side, block.at[2] * side};
+    const unsigned mask = overlappingOctants(block.octants, seenFrom(other, to, corner, half)) & block.grey;
+    if (mask == 0) return;
+    thread_local oracle::LocalTriangles local;
+    std::uint8_t masks[TrianglePack::kCapacity];
+    const Eigen::Vector3d center(corner[0] + half, corner[1] + half, corner[2] + half);
+    unsigned met = 0;
+    for (std::size_t begin = 0; begin < count && (mask & ~met) != 0; begin += TrianglePack::kCapacity) {
+      const std::size_t n = std::min(count - begin, TrianglePack::kCapacity);
+      for (std::size_t i = 0; i < n; ++i) {
+        for (int k = 0; k < 3; ++k) {
+          const Eigen::Vector3d x = (corner_of(begin + i, k) - center) / half;
+          for (int c = 0; c < 3; ++c) local.xyz[3 * k + c][i] = static_cast<float>(x[c]);
+        }
+      }
+      oracle::octantMasks(local, n, static_cast<float>(to.slack / half * 1.001), masks);
+      for (std::size_t i = 0; i < n; ++i) met |= masks[i];
     }
+    pushOctants(block, index, mask & met, f);
   }
 
   /// Calls f(child) for all children.
@@ -116,6 +145,22 @@ class TreeSide {
   tree::Tree& tree() const { return tree_; }
 
  private:
+  // Calls f for the octants of a mask. What is still implicit comes first, so that a stack leaves it for last: a hit among
+  // resident nodes makes its growth unnecessary.
+  template <typename F>
+  static void pushOctants(const tree::Block& block, std::uint32_t index, unsigned mask, F&& f) {
+    unsigned resident = 0;
+    for (unsigned left = mask; left != 0; left &= left - 1) {
+      const int o = __builtin_ctz(left);
+      if (block.child[o].load(std::memory_order_relaxed).tag() == tree::Link::kImplicit) {
+        f(Node::octant(index, o));
+      } else {
+        resident |= 1u << o;
+      }
+    }
+    for (; resident != 0; resident &= resident - 1) f(Node::octant(index, __builtin_ctz(resident)));
+  }
+
   // Spelled out, one scalar each: this is the hottest code of a query after the pair test itself.
   static Volume decode(int lo0, int lo1, int lo2, int hi0, int hi1, int hi2, int n0, int n1, int n2, int slab_center,
                        int slab_half, int x, int y, int z, int level) {

@@ -63,7 +63,7 @@ class Expander {
         for (int c = 0; c < 3; ++c) s_.local.xyz[3 * k + c][i] = static_cast<float>((p[c] - center_[c]) * inverse);
       }
     }
-    octantMasks(s_.local, count, s_.masks.data() + begin);
+    octantMasks(s_.local, count, 0, s_.masks.data() + begin);
     for (std::size_t i = 0; i < count; ++i) {
       std::uint8_t& mask = s_.masks[begin + i];
       mask &= exists_;

@@ -47,7 +47,7 @@ HWY_INLINE void edgeAxis(D d, V ep, V eq, V ap, V aq, V bp, V bq, V half, int p,
   }
 }
 
-void OctantMasks(const LocalTriangles& t, std::size_t count, std::uint8_t* masks) {
+void OctantMasks(const LocalTriangles& t, std::size_t count, float slack, std::uint8_t* masks) {
   const D d;
   const hn::RebindToSigned<D> di;
   const V one = hn::Set(d, 1.0f), half = hn::Set(d, 0.5f), zero = hn::Zero(d);
@@ -63,7 +63,7 @@ void OctantMasks(const LocalTriangles& t, std::size_t count, std::uint8_t* masks
         size = hn::Max(size, hn::Abs(v[k][c]));
       }
     }
-    const V pad = hn::Mul(u16, size);
+    const V pad = hn::MulAdd(u16, size, hn::Set(d, slack));
     const V h = hn::Add(half, pad);
 
     // Box axes: which halves of the cell does the triangle's box meet?
@@ -142,8 +142,8 @@ namespace bocst::oracle {
 HWY_EXPORT(OctantMasks);
 HWY_EXPORT(InstructionSet);
 
-void octantMasks(const LocalTriangles& triangles, std::size_t count, std::uint8_t* masks) {
-  HWY_DYNAMIC_DISPATCH(OctantMasks)(triangles, count, masks);
+void octantMasks(const LocalTriangles& triangles, std::size_t count, float slack, std::uint8_t* masks) {
+  HWY_DYNAMIC_DISPATCH(OctantMasks)(triangles, count, slack, masks);
 }
 
 const char* instructionSet() { return HWY_DYNAMIC_DISPATCH(InstructionSet)(); }

@@ -21,7 +21,8 @@ struct LocalTriangles {
 /// of the products in the plane equation before they cancel covers normal (4), point (1), product (1), sums (5).
 /// Chosen at run time for the machine's instruction set; all choices keep these bounds, with or without fused
 /// multiply-add.
-void octantMasks(const LocalTriangles& triangles, std::size_t count, std::uint8_t* masks);
+/// `slack` is a distance that still counts as touching, for corners that are off by more than one rounding.
+void octantMasks(const LocalTriangles& triangles, std::size_t count, float slack, std::uint8_t* masks);
 
 /// The instruction set in use, for people.
 const char* instructionSet();
