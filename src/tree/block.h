@@ -15,7 +15,7 @@ class Link {
     kImplicit = 0,  ///< Frontier: its triangles follow from the mesh (root) or from the root grid.
     kList = 1,      ///< Frontier: index of a list in the list pool: its length, then triangle ids.
     kBlock = 2,     ///< Expanded: index of the block of its children.
-    kShortList = 3,  ///< As kList, but short enough to be tested rather than expanded.
+    kShortList = 3,  ///< As kList, but to be tested rather than expanded.
   };
 
   Link() = default;

@@ -126,7 +126,7 @@ void Tree::grow(std::vector<Growth>& batch) {
       if (g.list_is_enough && question.count <= kLeafTriangles) {
         std::array<std::uint32_t, kLeafTriangles> ids;
         std::iota(ids.begin(), ids.end(), 0u);
-        tree.setLink(g.node, tree.addList(ids.data(), question.count));
+        tree.setLink(g.node, tree.addList(ids.data(), question.count, true));
         continue;
       }
     } else {
@@ -203,12 +203,12 @@ std::uint32_t Tree::addBlock(NodeRef node, const lattice::Cell& cell, std::uint8
   return index;
 }
 
-Link Tree::addList(const std::uint32_t* ids, std::size_t count) {
+Link Tree::addList(const std::uint32_t* ids, std::size_t count, bool leaf) {
   const std::uint32_t index = lists_.append(count + 1);
   std::uint32_t* words = &lists_[index];
   words[0] = static_cast<std::uint32_t>(count);
   std::copy_n(ids, count, words + 1);
-  return Link(count <= kLeafTriangles ? Link::kShortList : Link::kList, index);
+  return Link(leaf || count <= kLeafTriangles ? Link::kShortList : Link::kList, index);
 }
 
 void Tree::setLink(NodeRef node, Link link) {
@@ -222,7 +222,7 @@ void Tree::publish(NodeRef node, const oracle::Expansion& answer) {
     refits_wait_.store(true, std::memory_order_relaxed);
   }
   if (answer.own_only) {
-    setLink(node, addList(answer.lists.data(), answer.lists.size()));
+    setLink(node, addList(answer.lists.data(), answer.lists.size(), true));
     return;
   }
   const std::uint32_t index = addBlock(node, answer.cell, answer.grey);
@@ -231,9 +231,10 @@ void Tree::publish(NodeRef node, const oracle::Expansion& answer) {
   block.own = answer.own;
   for (int o = 0; o < 8; ++o) {
     if ((answer.grey >> o & 1) == 0) continue;
-    const std::size_t begin = answer.list_begin[o];
-    block.child[o].store(addList(answer.lists.data() + begin, answer.list_begin[o + 1] - begin),
-                         std::memory_order_relaxed);
+    const std::size_t begin = answer.list_begin[o], count = answer.list_begin[o + 1] - begin;
+    // Triangles so large that division only copies them: going on would take memory without end and cull nothing.
+    const bool hopeless = answer.lists.size() > 2 * answer.count && 4 * count > 3 * answer.count;
+    block.child[o].store(addList(answer.lists.data() + begin, count, hopeless), std::memory_order_relaxed);
   }
   setLink(node, Link(Link::kBlock, index));
 }
@@ -416,25 +417,22 @@ void Tree::pruneAlone(std::int64_t now, bool budget_only) {
 void Tree::applyBudget() {
   const std::size_t budget = options_.memory_budget;
   if (budget == 0 || bytes_ <= budget) return;
-  // Most recently used first; an ancestor is as recent as what is below it.
-  std::vector<std::uint32_t> order(blocks_.size());
-  for (std::uint32_t i = 0; i < order.size(); ++i) order[i] = i;
-  std::stable_sort(order.begin(), order.end(), [this](std::uint32_t a, std::uint32_t b) {
-    return blocks_[a].stamp.load(std::memory_order_relaxed) > blocks_[b].stamp.load(std::memory_order_relaxed);
-  });
-  for (double share = 0.75 * static_cast<double>(budget) / static_cast<double>(bytes_); bytes_ > budget; share = 0.5) {
-    const auto count = static_cast<std::size_t>(share * static_cast<double>(order.size()));
-    std::vector<std::uint8_t> keep(blocks_.size(), 0);
-    for (std::size_t k = 0; k < count; ++k) {
-      for (std::uint32_t i = order[k]; i != 0xffffffffu && !keep[i]; i = blocks_[i].parent) keep[i] = 1;
-    }
-    keepOnly(keep);
-    if (count == 0) return;
-    order.resize(blocks_.size());
-    for (std::uint32_t i = 0; i < order.size(); ++i) order[i] = i;
+  // Lists of dropped branches come back at their parents, so how much must go shows only when it is gone.
+  auto count = static_cast<std::size_t>(0.75 * static_cast<double>(budget) / static_cast<double>(bytes_) *
+                                        static_cast<double>(blocks_.size()));
+  for (;; count /= 2) {
+    // Most recently used first, and with each block all that leads to it.
+    std::vector<std::uint32_t> order(blocks_.size());
+    std::iota(order.begin(), order.end(), 0u);
     std::stable_sort(order.begin(), order.end(), [this](std::uint32_t a, std::uint32_t b) {
       return blocks_[a].stamp.load(std::memory_order_relaxed) > blocks_[b].stamp.load(std::memory_order_relaxed);
     });
+    std::vector<std::uint8_t> keep(blocks_.size(), 0);
+    for (std::size_t k = 0; k < std::min(count, order.size()); ++k) {
+      for (std::uint32_t i = order[k]; i != 0xffffffffu && !keep[i]; i = blocks_[i].parent) keep[i] = 1;
+    }
+    keepOnly(keep);
+    if (bytes_ <= budget || count == 0) return;
   }
 }
 

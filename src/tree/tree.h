@@ -36,7 +36,8 @@ struct TriangleList {
 /// vertices) holds the gate alone. Links only go implicit -> list -> block while the gate is held shared.
 class Tree {
  public:
-  /// An exact answer tests the triangles of a node with at most so many instead of expanding it.
+  /// An exact answer tests the triangles of a node with at most so many instead of expanding it; and those of a node
+  /// whose triangles are so large that its octants would just repeat them.
   static constexpr std::uint32_t kLeafTriangles = 32;
 
   /// @throws std::invalid_argument for options out of range, OracleError.
@@ -112,7 +113,7 @@ class Tree {
   void growFromGrid(NodeRef node);
   void publish(NodeRef node, const oracle::Expansion& answer);
   std::uint32_t addBlock(NodeRef node, const lattice::Cell& cell, std::uint8_t grey);
-  Link addList(const std::uint32_t* ids, std::size_t count);
+  Link addList(const std::uint32_t* ids, std::size_t count, bool leaf);
   void setLink(NodeRef node, Link link);
   void refit();
   void pruneAlone(std::int64_t now, bool budget_only);

@@ -196,7 +196,7 @@ TEST(CollideConservative, NeverMissesAndTightensWithDepth) {
   const auto ma = ra.mesh(), mb = rb.mesh();
   for (const Subdivision s : {Subdivision::kOctree, Subdivision::kBono}) {
     for (const double dimension : {0.0, 600.0}) {
-      int last = 1 << 30;
+      int first = -1, last = 1 << 30;
       for (int depth = 2; depth <= 8; depth += 2) {
         Options options;
         options.subdivision = s;
@@ -224,8 +224,9 @@ TEST(CollideConservative, NeverMissesAndTightensWithDepth) {
         }
         EXPECT_LE(alarms, last) << "depth " << depth;
         last = alarms;
+        if (first < 0) first = alarms;
       }
-      EXPECT_LE(last, 8);
+      EXPECT_LE(last, first / 2) << "of the false alarms at depth 2";
     }
   }
 }
@@ -260,6 +261,7 @@ TEST(CollideRequest, ContactsAreWhatTheHeaderSays) {
   const auto partner = test::bvh<fcl::OBBRSSd>(raw);
   const Modeld a(raw.mesh()), b(raw.mesh());
   std::mt19937_64 g(7);
+  std::size_t contacts = 0;
   for (int i = 0; i < 10; ++i) {
     const auto X = test::pose<double>(test::randomRotation(g), {5, 6, 7});
     const auto Y = test::pose<double>(test::randomRotation(g), X.translation() + test::randomDirection(g) * 1.2);
@@ -269,7 +271,7 @@ TEST(CollideRequest, ContactsAreWhatTheHeaderSays) {
       fcl::CollisionRequestd request(100000, true);
       fcl::CollisionResultd result;
       fcl::collide(first, X, second, Y, request, result);
-      ASSERT_GT(result.numContacts(), 0u);
+      contacts += result.numContacts();
       Pairs seen;
       for (std::size_t k = 0; k < result.numContacts(); ++k) {
         const auto& c = result.getContact(k);
@@ -294,6 +296,7 @@ TEST(CollideRequest, ContactsAreWhatTheHeaderSays) {
       }
     }
   }
+  EXPECT_GT(contacts, 1000u);
 }
 
 TEST(CollideRequest, CountsStopAndAccumulate) {

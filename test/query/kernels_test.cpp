@@ -186,7 +186,7 @@ TEST_P(EveryTarget, NoPairIsLostThatFclFinds) {
 }
 
 INSTANTIATE_TEST_SUITE_P(Targets, EveryTarget, testing::ValuesIn(targets()),
-                         [](const auto& p) { return std::string(hwy::TargetName(static_cast<int>(p.param))); });
+                         [](const auto& p) { return std::string(hwy::TargetName(p.param)); });
 
 // Properties of what contacts are made of.
 

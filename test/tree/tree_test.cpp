@@ -95,13 +95,19 @@ TEST(Tree, WhatIsUsedStays) {
   Options options;
   options.clock = clock.function();
   Modeld a(test::torus(100).mesh(), options), b(test::torus(100).mesh(), options);
-  EXPECT_TRUE(touching(a, b, kHit));
-  const std::size_t grown = a.statistics().resident_nodes;
+  // What the first answer explored but the next ones pass by may go; the branch of the contact itself stays.
   for (int i = 0; i < 10; ++i) {
     clock.now += milliseconds(1500);
     EXPECT_TRUE(touching(a, b, kHit));
   }
-  EXPECT_EQ(a.statistics().resident_nodes, grown);
+  const Statistics used = a.statistics();
+  EXPECT_GT(used.resident_nodes, 1u);
+  for (int i = 0; i < 20; ++i) {
+    clock.now += milliseconds(1500);
+    EXPECT_TRUE(touching(a, b, kHit));
+  }
+  EXPECT_EQ(a.statistics().resident_nodes, used.resident_nodes);
+  EXPECT_EQ(a.statistics().expansions, used.expansions);
   // Queries prune by themselves: a contact elsewhere lets the old branch go.
   for (int i = 0; i < 60; ++i) {
     clock.now += milliseconds(600);
@@ -262,7 +268,7 @@ TEST(Tree, DeepAndDenseMeshesStayBounded) {
   raw.vertices = {{0, 0, 0}, {1e-9, 0, 0}, {0, 1e-9, 0}, {1, 1, 1}, {1, 1, 0.9}, {1, 0.9, 1}};
   raw.triangles.assign(std::size_t{1} << 20, fcl::Triangle(0, 1, 2));
   raw.triangles.emplace_back(3, 4, 5);
-  Modeld a(raw.mesh()), b(test::box({-0.5, -0.5, -1e-10}, {0.5, 0.5, 0.5}).mesh());
+  Modeld a(raw.mesh()), b(test::box({-0.5, -0.5, 0}, {0.5, 0.5, 0.5}).mesh());
   EXPECT_TRUE(touching(a, b, {0, 0, 0}));
   EXPECT_FALSE(touching(a, b, {0, 0, 1e-6}));
   const Statistics s = a.statistics();
