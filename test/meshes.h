@@ -3,13 +3,13 @@
 
 // Meshes and poses that tests make for themselves.
 
+#include <bocst/mesh.h>
+
 #include <cmath>
 #include <cstdint>
 #include <memory>
 #include <random>
 #include <vector>
-
-#include <bocst/mesh.h>
 
 namespace bocst::test {
 
@@ -46,7 +46,8 @@ inline Raw torus(std::size_t n, double bumps = 0.08) {
       const double r = 0.35 * (1 + bumps * std::sin(5 * u) * std::cos(3 * v));
       raw.vertices.emplace_back((0.7 + r * std::cos(v)) * std::cos(u), (0.7 + r * std::cos(v)) * std::sin(u),
                                 r * std::sin(v));
-      const std::size_t a = i * n + j, b = i * n + (j + 1) % n, c = (i + 1) % n * n + j, d = (i + 1) % n * n + (j + 1) % n;
+      const std::size_t a = i * n + j, b = i * n + (j + 1) % n, c = (i + 1) % n * n + j,
+                        d = (i + 1) % n * n + (j + 1) % n;
       raw.triangles.emplace_back(a, c, b);
       raw.triangles.emplace_back(b, c, d);
     }
@@ -72,15 +73,15 @@ inline Raw box(const Eigen::Vector3d& lo, const Eigen::Vector3d& hi) {
 /// What breaks naive tests: faces on dyadic planes, slivers, segments, points, tiny and huge triangles, duplicates.
 inline Raw adversarial() {
   Raw raw = box({0, 0, 0}, {1, 1, 1});
-  raw.add(box({0.25, 0.5, 0.125}, {0.75, 0.5, 0.875}));     // flat: faces on cell faces, some without area
-  raw.add(box({0.5, 0.25, 0.5}, {0.5, 0.5, 0.5}));          // a segment, twelve times
+  raw.add(box({0.25, 0.5, 0.125}, {0.75, 0.5, 0.875}));  // flat: faces on cell faces, some without area
+  raw.add(box({0.5, 0.25, 0.5}, {0.5, 0.5, 0.5}));       // a segment, twelve times
   const auto triangle = [&](const Eigen::Vector3d& a, const Eigen::Vector3d& b, const Eigen::Vector3d& c) {
     const std::size_t n = raw.vertices.size();
     raw.vertices.insert(raw.vertices.end(), {a, b, c});
     raw.triangles.emplace_back(n, n + 1, n + 2);
   };
-  triangle({0.1, 0.1, 0.1}, {0.9, 0.9, 0.9}, {0.9, 0.9, 0.9 + 1e-12});   // sliver
-  triangle({0.2, 0.8, 0.3}, {0.2, 0.8, 0.3}, {0.2, 0.8, 0.3});           // point
+  triangle({0.1, 0.1, 0.1}, {0.9, 0.9, 0.9}, {0.9, 0.9, 0.9 + 1e-12});  // sliver
+  triangle({0.2, 0.8, 0.3}, {0.2, 0.8, 0.3}, {0.2, 0.8, 0.3});          // point
   triangle({0.3, 0.3, 0.7}, {0.3 + 1e-7, 0.3, 0.7}, {0.3, 0.3 + 1e-7, 0.7});
   triangle({0.5, 0.5, 0.5}, {0.5 + 1e-7, 0.5, 0.5}, {0.5, 0.5 + 1e-7, 0.5 + 1e-7});  // at the root's centre
   triangle({0, 0, 0}, {1, 0, 1}, {0, 1, 1});
@@ -97,7 +98,8 @@ inline Raw soup(std::size_t count, unsigned seed) {
   for (std::size_t t = 0; t < count; ++t) {
     const Eigen::Vector3d c(u(g), u(g), u(g));
     const double size = std::pow(10.0, -6 * u(g));
-    for (int k = 0; k < 3; ++k) raw.vertices.push_back(c + size * (Eigen::Vector3d(u(g), u(g), u(g)) - Eigen::Vector3d::Constant(0.5)));
+    for (int k = 0; k < 3; ++k)
+      raw.vertices.push_back(c + size * (Eigen::Vector3d(u(g), u(g), u(g)) - Eigen::Vector3d::Constant(0.5)));
     raw.triangles.emplace_back(3 * t, 3 * t + 1, 3 * t + 2);
   }
   return raw;

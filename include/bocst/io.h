@@ -1,11 +1,11 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #pragma once
 
-#include <memory>
-#include <string>
-
 #include <bocst/export.h>
 #include <bocst/mesh.h>
+
+#include <memory>
+#include <string>
 
 namespace bocst {
 

@@ -1,16 +1,15 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #pragma once
 
+#include <bocst/export.h>
+#include <fcl/math/triangle.h>
+
+#include <Eigen/Geometry>
 #include <array>
 #include <cstddef>
 #include <cstdint>
 #include <memory>
 #include <vector>
-
-#include <Eigen/Geometry>
-#include <fcl/math/triangle.h>
-
-#include <bocst/export.h>
 
 namespace bocst {
 
@@ -29,8 +28,7 @@ class BOCST_EXPORT Mesh {
   Mesh(std::vector<Eigen::Vector3d> vertices, const std::vector<fcl::Triangle>& triangles);
 
   /// The same from 32-bit indices, which are moved in rather than copied.
-  static std::shared_ptr<const Mesh> fromIndices(std::vector<Eigen::Vector3d> vertices,
-                                                 std::vector<Indices> triangles);
+  static std::shared_ptr<const Mesh> fromIndices(std::vector<Eigen::Vector3d> vertices, std::vector<Indices> triangles);
 
   std::size_t vertexCount() const { return vertices_.size(); }
   std::size_t triangleCount() const { return triangles_.size(); }

@@ -1,19 +1,18 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #pragma once
 
-#include <functional>
-#include <memory>
-#include <string>
-#include <vector>
-
-#include <fcl/geometry/collision_geometry.h>
-
 #include <bocst/export.h>
 #include <bocst/mesh.h>
 #include <bocst/node_view.h>
 #include <bocst/options.h>
 #include <bocst/oracle.h>
 #include <bocst/statistics.h>
+#include <fcl/geometry/collision_geometry.h>
+
+#include <functional>
+#include <memory>
+#include <string>
+#include <vector>
 
 namespace fcl {
 template <typename BV>
@@ -44,8 +43,7 @@ class BOCST_EXPORT Model : public fcl::CollisionGeometry<S> {
 
   /// Takes the vertices and triangles of an FCL mesh, not its tree. BV::S must be S.
   template <typename BV>
-  explicit Model(const fcl::BVHModel<BV>& bvh, const Options& options = {})
-      : Model(meshOf(bvh), options) {}
+  explicit Model(const fcl::BVHModel<BV>& bvh, const Options& options = {}) : Model(meshOf(bvh), options) {}
 
   ~Model() override;
   Model(const Model&) = delete;

@@ -1,11 +1,10 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #pragma once
 
+#include <Eigen/Core>
 #include <array>
 #include <cstddef>
 #include <cstdint>
-
-#include <Eigen/Core>
 
 namespace bocst {
 
@@ -37,8 +36,8 @@ struct NodeView {
   double radius = 0;             ///< Of the sphere about the node's actual region, in the mesh's length unit.
   Eigen::Vector3d center;        ///< Of that sphere, in the mesh's frame.
 
-  int level = 1;                         ///< 1 is the root.
-  std::array<std::uint32_t, 3> cell{};   ///< Integer coordinates among the 2^(level-1) cells of an axis.
+  int level = 1;                        ///< 1 is the root.
+  std::array<std::uint32_t, 3> cell{};  ///< Integer coordinates among the 2^(level-1) cells of an axis.
 };
 
 }  // namespace bocst

@@ -1,12 +1,12 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #pragma once
 
+#include <bocst/export.h>
+#include <bocst/options.h>
+
 #include <stdexcept>
 #include <string>
 #include <vector>
-
-#include <bocst/export.h>
-#include <bocst/options.h>
 
 namespace bocst {
 
@@ -19,10 +19,10 @@ class BOCST_EXPORT OracleError : public std::runtime_error {
 /// One oracle this build knows of.
 struct OracleInfo {
   OracleKind kind = OracleKind::kCpu;
-  std::string name;      ///< "cpu", "occlusion" or "compute": what BOCST_ORACLE takes.
-  std::string device;    ///< What it runs on, for people.
+  std::string name;       ///< "cpu", "occlusion" or "compute": what BOCST_ORACLE takes.
+  std::string device;     ///< What it runs on, for people.
   bool hardware = false;  ///< Runs on a GPU.
-  std::string why_not;   ///< Empty when it can be used; else the reason.
+  std::string why_not;    ///< Empty when it can be used; else the reason.
 };
 
 /// What is there, and why not the others. Thread-safe.

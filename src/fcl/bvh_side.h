@@ -1,11 +1,11 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #pragma once
 
+#include <fcl/geometry/bvh/BVH_model.h>
+
 #include <limits>
 #include <stdexcept>
 #include <string>
-
-#include <fcl/geometry/bvh/BVH_model.h>
 
 #include "query/side.h"
 
@@ -82,9 +82,7 @@ class BvhSide {
 
   Node root() const { return 0; }
   bool cells() const { return false; }
-  query::State state(Node node) const {
-    return bvh_.getBV(node).isLeaf() ? query::State::kLeaf : query::State::kInner;
-  }
+  query::State state(Node node) const { return bvh_.getBV(node).isLeaf() ? query::State::kLeaf : query::State::kInner; }
   bool growsFreely(Node) const { return true; }
   void grow(Node, std::vector<tree::Tree::Growth>&) const {}
 

@@ -1,12 +1,11 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #pragma once
 
-#include <array>
-#include <cstdint>
+#include <bocst/options.h>
 
 #include <Eigen/Geometry>
-
-#include <bocst/options.h>
+#include <array>
+#include <cstdint>
 
 namespace bocst::lattice {
 

@@ -1,14 +1,14 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #pragma once
 
+#include <bocst/oracle.h>
+
 #include <array>
 #include <cstddef>
 #include <cstdint>
 #include <memory>
 #include <string>
 #include <vector>
-
-#include <bocst/oracle.h>
 
 #include "lattice/lattice.h"
 #include "oracle/surface.h"
@@ -49,10 +49,10 @@ struct Expansion {
   // Answered.
   std::uint8_t grey = 0;  ///< Bit o: the surface meets octant o (reference.h), which has an actual region.
   OctantBounds octants;
-  CellBounds own;  ///< Of the cell itself: what the octants taught about it.
-  std::vector<std::uint32_t> lists;          ///< Triangles of octant 0, of octant 1, ...
-  std::array<std::size_t, 9> list_begin{};   ///< Octant o has lists[list_begin[o]] to lists[list_begin[o + 1]];
-                                             ///< with own_only all of lists is the cell's.
+  CellBounds own;                           ///< Of the cell itself: what the octants taught about it.
+  std::vector<std::uint32_t> lists;         ///< Triangles of octant 0, of octant 1, ...
+  std::array<std::size_t, 9> list_begin{};  ///< Octant o has lists[list_begin[o]] to lists[list_begin[o + 1]];
+                                            ///< with own_only all of lists is the cell's.
 };
 
 /// Answers expansion batches. Any number of threads may submit; each batch belongs to one thread until wait() returned.

@@ -10,9 +10,9 @@ namespace bocst::oracle {
 namespace {
 
 constexpr std::uint32_t kNone = 0xffffffffu;
-constexpr std::size_t kSmallest = 4096;    // triangles: below, plain expansions are as fast
-constexpr std::size_t kLargeShare = 256;   // at most one triangle in so many may span more than two cells
-constexpr int kQuantBits = 15;             // vertices as int16, in steps of two lattice units
+constexpr std::size_t kSmallest = 4096;   // triangles: below, plain expansions are as fast
+constexpr std::size_t kLargeShare = 256;  // at most one triangle in so many may span more than two cells
+constexpr int kQuantBits = 15;            // vertices as int16, in steps of two lattice units
 constexpr int kQuantMax = (1 << kQuantBits) - 1;
 
 // Four lanes that the compiler keeps in one register on every target; the last is unused.
@@ -34,7 +34,9 @@ inline Span spanOf(Quantised a, Quantised b, Quantised c, int shift) {
   return {{first[0], first[1], first[2]}, {reach[0], reach[1], reach[2]}};
 }
 
-inline std::int16_t quantise(double p) { return static_cast<std::int16_t>(std::clamp(p * 0.5, 0.0, double{kQuantMax})); }
+inline std::int16_t quantise(double p) {
+  return static_cast<std::int16_t>(std::clamp(p * 0.5, 0.0, double{kQuantMax}));
+}
 
 }  // namespace
 

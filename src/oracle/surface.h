@@ -1,9 +1,9 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #pragma once
 
-#include <memory>
-
 #include <bocst/mesh.h>
+
+#include <memory>
 
 #include "lattice/lattice.h"
 
@@ -15,9 +15,7 @@ struct Surface {
   lattice::Lattice lattice;
 
   /// Corner k of triangle t, in lattice units.
-  Eigen::Vector3d corner(std::uint32_t t, int k) const {
-    return lattice.toLattice(mesh->vertex(mesh->indices(t)[k]));
-  }
+  Eigen::Vector3d corner(std::uint32_t t, int k) const { return lattice.toLattice(mesh->vertex(mesh->indices(t)[k])); }
 };
 
 }  // namespace bocst::oracle

@@ -69,7 +69,8 @@ std::uint8_t OverlappingOctants(const oracle::OctantBounds& octants, const OneVo
       apart = hn::Or(apart, hn::Gt(hn::Abs(t), r));
     }
 
-    // Slabs: for z in a box with |m.z - offset| <= w, any a gives n.z in a * offset +- (|a| w + |n - a m| over the box).
+    // Slabs: for z in a box with |m.z - offset| <= w, any a gives n.z in a * offset +- (|a| w + |n - a m| over the
+    // box).
     V n[3], along = hn::Zero(d);
     BOCST_UNROLL
     for (int k = 0; k < 3; ++k) {

@@ -8,16 +8,16 @@
 
 namespace bocst::query {
 
-/// One node's volume seen from the eight octants of another: box AND slab, in coordinates with the minimum corner of the
-/// other's cell at the origin and the side of its octants as unit.
+/// One node's volume seen from the eight octants of another: box AND slab, in coordinates with the minimum corner of
+/// the other's cell at the origin and the side of its octants as unit.
 struct OneVolume {
-  float center[3];       ///< Of the box.
+  float center[3];         ///< Of the box.
   const float (*axes)[3];  ///< axes[j]: unit vector of box axis j.
-  float half[3];         ///< Half extents along axes[j].
-  float normal[3];       ///< Of the slab, about unit length; zero: no slab.
-  float slab_offset;     ///< Middle of the slab along normal, from center.
-  float slab_half;       ///< Half its thickness.
-  float pad;             ///< Covers all rounding, see separatedOctants().
+  float half[3];           ///< Half extents along axes[j].
+  float normal[3];         ///< Of the slab, about unit length; zero: no slab.
+  float slab_offset;       ///< Middle of the slab along normal, from center.
+  float slab_half;         ///< Half its thickness.
+  float pad;               ///< Covers all rounding, see separatedOctants().
 };
 
 /// Bit o is set unless octant o is surely separated from the volume, by one of eight axes: the faces of both boxes, the
@@ -42,12 +42,12 @@ struct PackPair {
   std::uint8_t row, lane;
 };
 
-/// Writes the pairs (a triangle of rows, a triangle of lanes) that are not surely apart, by their boxes, their planes and
-/// their edges' cross products; at most rows.count * lanes.count. Returns how many. `slack` is a distance that still
-/// counts as touching: what the caller's coordinates are off by.
+/// Writes the pairs (a triangle of rows, a triangle of lanes) that are not surely apart, by their boxes, their planes
+/// and their edges' cross products; at most rows.count * lanes.count. Returns how many. `slack` is a distance that
+/// still counts as touching: what the caller's coordinates are off by.
 ///
-/// With M the larger size of the packs and u = 2^-24: corners are rounded by u M; a plane's equation by 16 u M times the
-/// sizes of its products before they cancel; an edge axis likewise. The pads are 32 u M times those sizes.
+/// With M the larger size of the packs and u = 2^-24: corners are rounded by u M; a plane's equation by 16 u M times
+/// the sizes of its products before they cancel; an edge axis likewise. The pads are 32 u M times those sizes.
 std::size_t touchingPairs(const TrianglePack& rows, const TrianglePack& lanes, float slack, PackPair* pairs);
 
 }  // namespace bocst::query

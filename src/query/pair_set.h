@@ -7,7 +7,8 @@
 
 namespace bocst::query {
 
-/// A set of pairs of ids (a cell or a triangle, and a triangle) that is emptied in constant time, so that one can serve query after query.
+/// A set of pairs of ids (a cell or a triangle, and a triangle) that is emptied in constant time, so that one can serve
+/// query after query.
 class PairSet {
  public:
   void clear() {

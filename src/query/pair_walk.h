@@ -35,11 +35,11 @@ class Visitor {
 };
 
 /// The one walk over pairs of nodes. Resident pairs first, depth first; a pair that needs an unexpanded node is set
-/// aside. When the resident pairs do not settle the question, nodes set aside grow in one batch and the walk goes on with
-/// their pairs: a batch never mixes with waiting for a single node, and leads one level down.
-/// A walk that has to see everything grows all that is set aside, so it makes one batch a level. One that ends at its
-/// first hit takes the deepest overlaps first, and twice as many each time: a hit deep inside costs one small batch a
-/// level, a miss at most the logarithm of its pairs more.
+/// aside. When the resident pairs do not settle the question, nodes set aside grow in one batch and the walk goes on
+/// with their pairs: a batch never mixes with waiting for a single node, and leads one level down. A walk that has to
+/// see everything grows all that is set aside, so it makes one batch a level. One that ends at its first hit takes the
+/// deepest overlaps first, and twice as many each time: a hit deep inside costs one small batch a level, a miss at most
+/// the logarithm of its pairs more.
 ///
 /// Triangles against triangles are culled by boxes and slabs; as soon as a side answers with cells, both are culled by
 /// spheres, in double and on integer cells, so a conservative verdict does not depend on what is resident.
@@ -174,8 +174,9 @@ class PairWalk {
       } else {
         const auto push = [&](typename A::Node c) { s.stack.push_back({c, pair.b}); };
         if (sb == State::kLeaf && seen_a_.size < kCoarse * size_b) {
-          a_.childrenMeeting(pair.a, seen_b_.volume, b_in_a_, b_.triangleCount(pair.b),
-                             [&](std::size_t i, int k) { return b_in_a_ * b_.corner(b_.triangle(pair.b, i), k); }, push);
+          a_.childrenMeeting(
+              pair.a, seen_b_.volume, b_in_a_, b_.triangleCount(pair.b),
+              [&](std::size_t i, int k) { return b_in_a_ * b_.corner(b_.triangle(pair.b, i), k); }, push);
         } else {
           a_.overlappingChildren(pair.a, seen_b_.volume, b_in_a_, push);
         }
@@ -185,8 +186,9 @@ class PairWalk {
     } else {
       const auto push = [&](typename B::Node c) { s.stack.push_back({pair.a, c}); };
       if (sa == State::kLeaf && size_b < kCoarse * seen_a_.size) {
-        b_.childrenMeeting(pair.b, seen_a_.volume, a_in_b_, a_.triangleCount(pair.a),
-                           [&](std::size_t i, int k) { return a_in_b_ * a_.corner(a_.triangle(pair.a, i), k); }, push);
+        b_.childrenMeeting(
+            pair.b, seen_a_.volume, a_in_b_, a_.triangleCount(pair.a),
+            [&](std::size_t i, int k) { return a_in_b_ * a_.corner(a_.triangle(pair.a, i), k); }, push);
       } else {
         b_.overlappingChildren(pair.b, seen_a_.volume, a_in_b_, push);
       }

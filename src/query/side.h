@@ -60,9 +60,9 @@ class TreeSide {
                   2 * parent.at[1] + (o >> 1 & 1), 2 * parent.at[2] + (o >> 2 & 1), parent.level + 1);
   }
 
-  /// Bounds the surface below a node, and the spheres of all cells below it: a cube's sphere holds those of its parts; the
-  /// sphere of a part of a clipped region may stick out, by less than the factor sqrt(2) about the region's centre, as
-  /// |h - h'| + |h'| <= sqrt(2) |h| for half extents 0 <= h' <= h.
+  /// Bounds the surface below a node, and the spheres of all cells below it: a cube's sphere holds those of its parts;
+  /// the sphere of a part of a clipped region may stick out, by less than the factor sqrt(2) about the region's centre,
+  /// as |h - h'| + |h'| <= sqrt(2) |h| for half extents 0 <= h' <= h.
   Sphere sphere(Node node) const {
     Sphere s = cellSphere(node);
     if (cells() && !tree_.isDeepest(level(node)) && !cube_) s.radius *= 1.4142135623730952;
@@ -145,8 +145,8 @@ class TreeSide {
   tree::Tree& tree() const { return tree_; }
 
  private:
-  // Calls f for the octants of a mask. What is still implicit comes first, so that a stack leaves it for last: a hit among
-  // resident nodes makes its growth unnecessary.
+  // Calls f for the octants of a mask. What is still implicit comes first, so that a stack leaves it for last: a hit
+  // among resident nodes makes its growth unnecessary.
   template <typename F>
   static void pushOctants(const tree::Block& block, std::uint32_t index, unsigned mask, F&& f) {
     unsigned resident = 0;

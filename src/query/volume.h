@@ -1,9 +1,8 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #pragma once
 
-#include <cmath>
-
 #include <Eigen/Core>
+#include <cmath>
 
 #include "lattice/lattice.h"
 #include "query/kernels.h"
@@ -45,8 +44,8 @@ struct Placement {
   Eigen::Matrix3d rotation = Eigen::Matrix3d::Identity();
   double scale = 1;
   Eigen::Vector3d translation = Eigen::Vector3d::Zero();
-  double slack = 0;   ///< A length in the target frame: what positions may be off by; touching within it counts.
-  double defect = 0;  ///< Largest entry of rotation^T rotation - 1: what the axes tests must allow for.
+  double slack = 0;       ///< A length in the target frame: what positions may be off by; touching within it counts.
+  double defect = 0;      ///< Largest entry of rotation^T rotation - 1: what the axes tests must allow for.
   float axes[3][3] = {};  ///< axes[j]: column j of rotation; set by ready().
   float pad = 0;          ///< Per unit of size, see overlappingOctants(); set by ready().
 
@@ -79,9 +78,12 @@ inline OneVolume seenFrom(const Volume& v, const Placement& to, const double* co
   const float scale = static_cast<float>(shrink);
   const double* r = to.rotation.data();  // column by column
   const double x = v.center[0], y = v.center[1], z = v.center[2];
-  o.center[0] = static_cast<float>((r[0] * x + r[3] * y + r[6] * z) * shrink + (to.translation[0] - corner[0]) * inverse);
-  o.center[1] = static_cast<float>((r[1] * x + r[4] * y + r[7] * z) * shrink + (to.translation[1] - corner[1]) * inverse);
-  o.center[2] = static_cast<float>((r[2] * x + r[5] * y + r[8] * z) * shrink + (to.translation[2] - corner[2]) * inverse);
+  o.center[0] =
+      static_cast<float>((r[0] * x + r[3] * y + r[6] * z) * shrink + (to.translation[0] - corner[0]) * inverse);
+  o.center[1] =
+      static_cast<float>((r[1] * x + r[4] * y + r[7] * z) * shrink + (to.translation[1] - corner[1]) * inverse);
+  o.center[2] =
+      static_cast<float>((r[2] * x + r[5] * y + r[8] * z) * shrink + (to.translation[2] - corner[2]) * inverse);
   o.half[0] = v.half[0] * scale;
   o.half[1] = v.half[1] * scale;
   o.half[2] = v.half[2] * scale;
@@ -92,8 +94,8 @@ inline OneVolume seenFrom(const Volume& v, const Placement& to, const double* co
   o.slab_offset = v.slab_offset * scale;
   o.slab_half = v.slab_half * scale;
   o.axes = to.axes;
-  const float size = 4 + std::abs(o.center[0]) + std::abs(o.center[1]) + std::abs(o.center[2]) + o.half[0] +
-                     o.half[1] + o.half[2];
+  const float size =
+      4 + std::abs(o.center[0]) + std::abs(o.center[1]) + std::abs(o.center[2]) + o.half[0] + o.half[1] + o.half[2];
   o.pad = size * to.pad + static_cast<float>(to.slack * inverse);
   return o;
 }

@@ -282,8 +282,9 @@ void Tree::refit() {
     const oracle::CellBounds before = block.own;
     uniteBoxes(block, block.own);
     if (block.own.lo == before.lo && block.own.hi == before.hi) continue;
-    apply(block.parent == 0xffffffffu ? NodeRef{} : NodeRef::octant(block.parent, static_cast<int>(block.parent_octant)),
-          block.own);
+    apply(
+        block.parent == 0xffffffffu ? NodeRef{} : NodeRef::octant(block.parent, static_cast<int>(block.parent_octant)),
+        block.own);
   }
 }
 

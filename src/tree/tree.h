@@ -1,6 +1,11 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #pragma once
 
+#include <bocst/mesh.h>
+#include <bocst/node_view.h>
+#include <bocst/options.h>
+#include <bocst/statistics.h>
+
 #include <array>
 #include <atomic>
 #include <cstddef>
@@ -9,11 +14,6 @@
 #include <memory>
 #include <mutex>
 #include <vector>
-
-#include <bocst/mesh.h>
-#include <bocst/node_view.h>
-#include <bocst/options.h>
-#include <bocst/statistics.h>
 
 #include "oracle/oracle.h"
 #include "oracle/root_grid.h"

@@ -30,8 +30,8 @@ TYPED_TEST(Collide, EqualsObbrssOnRandomPoses) {
     int hits = 0;
     for (int i = 0; i < 300; ++i) {
       const auto X = test::pose<S>(test::randomRotation(g), test::randomDirection(g) * u(g));
-      const auto Y = test::pose<S>(test::randomRotation(g), X.translation().template cast<double>() +
-                                                               test::randomDirection(g) * 2.4 * u(g));
+      const auto Y = test::pose<S>(test::randomRotation(g),
+                                   X.translation().template cast<double>() + test::randomDirection(g) * 2.4 * u(g));
       const bool expected = test::touching<S>(*fa, X, *fb, Y);
       hits += expected;
       ASSERT_EQ(test::touching<S>(a, X, b, Y), expected) << i;
@@ -98,7 +98,7 @@ void checkPartner(double scale) {
   for (int i = 0; i < 60; ++i) {
     const auto X = test::pose<S>(test::randomRotation(g), test::randomDirection(g) * scale);
     const auto Y = test::pose<S>(test::randomRotation(g), X.translation().template cast<double>() +
-                                                             test::randomDirection(g) * 2.4 * u(g) * scale);
+                                                              test::randomDirection(g) * 2.4 * u(g) * scale);
     const bool expected = test::touching<S>(*fa, X, *fb, Y);
     hits += expected;
     ASSERT_EQ(test::touching<S>(a, X, *partner, Y), expected) << i;
@@ -209,8 +209,8 @@ TEST(CollideConservative, NeverMissesAndTightensWithDepth) {
         int alarms = 0;
         for (int i = 0; i < 120; ++i) {
           const auto X = test::pose<double>(test::randomRotation(g), {1, 2, 3});
-          const auto Y =
-              test::pose<double>(test::randomRotation(g), X.translation() + test::randomDirection(g) * (0.8 + 1.6 * u(g)));
+          const auto Y = test::pose<double>(test::randomRotation(g),
+                                            X.translation() + test::randomDirection(g) * (0.8 + 1.6 * u(g)));
           const bool truth = test::touching<double>(*fa, X, *fb, Y);
           const bool verdict = test::touching<double>(a, X, b, Y);
           ASSERT_LE(truth, verdict) << "depth " << depth << " pose " << i;
@@ -290,8 +290,8 @@ TEST(CollideRequest, ContactsAreWhatTheHeaderSays) {
         EXPECT_LT((query::closestPoint(c.pos, p) - c.pos).norm(), 1e-9);
         EXPECT_LT((query::closestPoint(c.pos, q) - c.pos).norm(), 1e-9);
         const Eigen::Vector3d out = (c.penetration_depth + 1e-9) * c.normal;
-        EXPECT_FALSE(fcl::detail::Intersect<double>::intersect_Triangle(p[0], p[1], p[2], q[0] + out, q[1] + out,
-                                                                         q[2] + out))
+        EXPECT_FALSE(
+            fcl::detail::Intersect<double>::intersect_Triangle(p[0], p[1], p[2], q[0] + out, q[1] + out, q[2] + out))
             << "from the first to the second by depth parts the two triangles";
       }
     }
@@ -430,8 +430,8 @@ TEST(CollideDegenerate, AnswersAreRight) {
   Raw same;
   same.vertices = single.vertices;
   same.triangles.assign(5000, single.triangles[0]);
-  const std::vector<Raw> meshes = {single, point, segment, test::adversarial(), test::box({0, 0, 0}, {1, 1, 1}),
-                                   test::soup(60, 3)};
+  const std::vector<Raw> meshes = {
+      single, point, segment, test::adversarial(), test::box({0, 0, 0}, {1, 1, 1}), test::soup(60, 3)};
   std::mt19937_64 g(9);
   std::uniform_real_distribution<double> u(-1, 1);
   int hits = 0, count = 0;
@@ -461,7 +461,8 @@ TEST(CollideDegenerate, AnswersAreRight) {
   // Many copies of one triangle: all pairs are found, memory stays bounded.
   const Modeld many(same.mesh()), one(single.mesh());
   const auto I = test::pose<double>(Eigen::Matrix3d::Identity(), {0, 0, 0});
-  EXPECT_EQ(test::pairs<double>(many, I, one, test::pose<double>(test::randomRotation(g), {0.2, 0.2, 0})).size(), 5000u);
+  EXPECT_EQ(test::pairs<double>(many, I, one, test::pose<double>(test::randomRotation(g), {0.2, 0.2, 0})).size(),
+            5000u);
   EXPECT_FALSE(test::touching<double>(many, I, one, test::pose<double>(Eigen::Matrix3d::Identity(), {0, 0, 1e-9})));
   EXPECT_LE(many.statistics().resident_bytes, 200u * same.triangles.size());
 }

@@ -1,13 +1,12 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #pragma once
 
+#include <bocst/bocst.h>
+#include <fcl/geometry/bvh/BVH_model.h>
+
 #include <set>
 #include <utility>
 #include <vector>
-
-#include <fcl/geometry/bvh/BVH_model.h>
-
-#include <bocst/bocst.h>
 
 #include "meshes.h"
 

@@ -47,8 +47,8 @@ TEST(Threads, OneFreshModel) {
         const Question& q = all[(i * 7 + static_cast<std::size_t>(thread) * 13) % all.size()];
         // Half the threads in the other order, some against the model itself.
         const Modeld& other = i % 5 == 0 ? a : b;
-        const bool answer = thread % 2 ? test::touching<double>(other, q.pose, a, I)
-                                       : test::touching<double>(a, I, other, q.pose);
+        const bool answer =
+            thread % 2 ? test::touching<double>(other, q.pose, a, I) : test::touching<double>(a, I, other, q.pose);
         wrong += answer != q.expected;
       }
     });

@@ -1,20 +1,19 @@
 // SPDX-License-Identifier: BSD-3-Clause
 // What a user's program looks like: two meshes, one from code and one from a file, collided through FCL's own names.
 
+#include <bocst/bocst.h>
+#include <bocst/io.h>
+
 #include <fstream>
 #include <iostream>
 #include <memory>
 #include <vector>
 
-#include <bocst/bocst.h>
-#include <bocst/io.h>
-
 namespace {
 
 std::shared_ptr<const bocst::Mesh> tetrahedron() {
-  return std::make_shared<bocst::Mesh>(
-      std::vector<Eigen::Vector3d>{{0, 0, 0}, {1, 0, 0}, {0, 1, 0}, {0, 0, 1}},
-      std::vector<fcl::Triangle>{{0, 2, 1}, {0, 1, 3}, {1, 2, 3}, {2, 0, 3}});
+  return std::make_shared<bocst::Mesh>(std::vector<Eigen::Vector3d>{{0, 0, 0}, {1, 0, 0}, {0, 1, 0}, {0, 0, 1}},
+                                       std::vector<fcl::Triangle>{{0, 2, 1}, {0, 1, 3}, {1, 2, 3}, {2, 0, 3}});
 }
 
 std::shared_ptr<const bocst::Mesh> tetrahedronFromFile() {

@@ -3,10 +3,9 @@
 // every instruction set that the dispatch can choose.
 #include "query/kernels.h"
 
+#include <fcl/narrowphase/detail/traversal/collision/intersect.h>
 #include <gtest/gtest.h>
 #include <hwy/targets.h>
-
-#include <fcl/narrowphase/detail/traversal/collision/intersect.h>
 
 #include <set>
 
@@ -77,7 +76,8 @@ TEST_P(EveryTarget, NoOctantIsLostThatSharesAPoint) {
   for (int round = 0; round < 20000; ++round) {
     oracle::OctantBounds octants;
     for (int o = 0; o < 8; ++o) octants.set(o, randomBounds(g));
-    // A volume of another tree, its own cell at the origin with side 1, placed so that a point of it is a point of ours.
+    // A volume of another tree, its own cell at the origin with side 1, placed so that a point of it is a point of
+    // ours.
     const oracle::CellBounds other = randomBounds(g);
     Volume v;
     Eigen::Vector3d n, box_middle;
@@ -153,8 +153,9 @@ TEST_P(EveryTarget, NoPairIsLostThatFclFinds) {
       if (g() % 2) {
         const auto& other = ta[g() % a.count];
         const double s = std::abs(u(g)), t = (1 - s) * std::abs(u(g));
-        const Eigen::Vector3d p = g() % 2 ? other[g() % 3]
-                                          : Eigen::Vector3d(other[0] + s * (other[1] - other[0]) + t * (other[2] - other[0]));
+        const Eigen::Vector3d p =
+            g() % 2 ? other[g() % 3]
+                    : Eigen::Vector3d(other[0] + s * (other[1] - other[0]) + t * (other[2] - other[0]));
         const Eigen::Vector3d d = p - tb[i][g() % 3];
         for (auto& v : tb[i]) v += d;
       }

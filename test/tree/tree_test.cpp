@@ -1,11 +1,10 @@
 // SPDX-License-Identifier: BSD-3-Clause
 // How a model grows, forgets and shows itself, driven by a clock of the test's own.
+#include <bocst/bocst.h>
 #include <gtest/gtest.h>
 
 #include <map>
 #include <set>
-
-#include <bocst/bocst.h>
 
 #include "lattice/lattice.h"
 #include "meshes.h"
@@ -232,8 +231,7 @@ TEST(Tree, ExpandAllIsTheCompleteTree) {
           const lattice::Cell cell{level, {i % side, i / side % side, i / side / side}};
           if (!lattice.exists(cell)) continue;
           const auto corner = cell.corner();
-          const Eigen::Vector3d center =
-              Eigen::Vector3d(corner[0], corner[1], corner[2]).array() + cell.side() / 2.0;
+          const Eigen::Vector3d center = Eigen::Vector3d(corner[0], corner[1], corner[2]).array() + cell.side() / 2.0;
           for (std::size_t t = 0; t < mesh->triangleCount(); ++t) {
             Eigen::Vector3d c[3];
             for (std::size_t k = 0; k < 3; ++k) c[k] = lattice.toLattice(mesh->vertex(mesh->indices(t)[k]));
