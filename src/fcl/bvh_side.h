@@ -86,6 +86,8 @@ class BvhSide {
   bool growsFreely(Node) const { return true; }
   void grow(Node, std::vector<tree::Tree::Growth>&) const {}
 
+  double size(Node node) const { return volume(node).half.squaredNorm(); }
+
   query::OrientedVolume volume(Node node) const {
     query::OrientedVolume v = volumeOf(bvh_.getBV(node).bv);
     // FCL rounds its volumes to nearest: widen each by what that may have lost.

@@ -178,7 +178,7 @@ class PairWalk {
               pair.a, seen_b_.volume, b_in_a_, b_.triangleCount(pair.b),
               [&](std::size_t i, int k) { return b_in_a_ * b_.corner(b_.triangle(pair.b, i), k); }, push);
         } else {
-          a_.overlappingChildren(pair.a, seen_b_.volume, b_in_a_, push);
+          a_.overlappingChildren(pair.a, volumeOf(b_, seen_b_), b_in_a_, push);
         }
       }
     } else if (sb == State::kGrows) {
@@ -190,7 +190,7 @@ class PairWalk {
             pair.b, seen_a_.volume, a_in_b_, a_.triangleCount(pair.a),
             [&](std::size_t i, int k) { return a_in_b_ * a_.corner(a_.triangle(pair.a, i), k); }, push);
       } else {
-        b_.overlappingChildren(pair.b, seen_a_.volume, a_in_b_, push);
+        b_.overlappingChildren(pair.b, volumeOf(a_, seen_a_), a_in_b_, push);
       }
     }
     return false;
@@ -293,6 +293,7 @@ class PairWalk {
     bool valid = false;
     State state = State::kLeaf;
     decltype(std::declval<const Side&>().volume(node)) volume;
+    bool volume_valid = false;
     double size = 0;  // half diagonal, squared
   };
   template <typename Side>
@@ -301,8 +302,15 @@ class PairWalk {
     seen.valid = true;
     seen.node = node;
     seen.state = side.state(node);
-    seen.volume = side.volume(node);
-    seen.size = seen.volume.size();
+    seen.size = side.size(node);
+    seen.volume_valid = false;
+  }
+  // Only the side that is not expanded is looked at closely.
+  template <typename Side>
+  static auto& volumeOf(const Side& side, Seen<Side>& seen) {
+    if (!seen.volume_valid) seen.volume = side.volume(seen.node);
+    seen.volume_valid = true;
+    return seen.volume;
   }
 
   Seen<A> seen_a_;

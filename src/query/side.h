@@ -46,6 +46,12 @@ class TreeSide {
 
   void grow(Node node, std::vector<tree::Tree::Growth>& batch) const { batch.push_back({&tree_, node, !cells()}); }
 
+  /// Half the diagonal of the node's cell, squared: what decides which of two nodes is expanded.
+  double size(Node node) const {
+    const double side = 1 << (lattice::kMaxLevel - level(node));
+    return 0.75 * side * side;
+  }
+
   Volume volume(Node node) const {
     if (node.isRoot()) {
       const oracle::CellBounds& b = tree_.rootBounds();

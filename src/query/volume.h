@@ -17,10 +17,6 @@ struct Volume {
   float normal[3];    ///< About unit length; zero: no slab.
   float slab_offset;  ///< Middle of the slab along normal, from center.
   float slab_half;
-
-  double size() const {  ///< Half the diagonal, squared.
-    return double{half[0]} * half[0] + double{half[1]} * half[1] + double{half[2]} * half[2];
-  }
 };
 
 /// The same with axes of its own and no slab: the volume of a partner's node.
@@ -29,8 +25,6 @@ struct OrientedVolume {
   Eigen::Matrix3d axes = Eigen::Matrix3d::Identity();  ///< Columns: the box's unit axes.
   Eigen::Vector3d half;
   float seen_axes[3][3] = {};  // what seenFrom() points at
-
-  double size() const { return half.squaredNorm(); }
 };
 
 /// A sphere in the frame of its side.
