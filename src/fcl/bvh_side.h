@@ -128,8 +128,13 @@ class BvhSide {
   std::uint32_t triangle(Node node, std::size_t) const {
     return static_cast<std::uint32_t>(bvh_.getBV(node).primitiveId());
   }
+  const fcl::Vector3<S>& vertex(std::uint32_t t, int k) const {
+    return bvh_.vertices[bvh_.tri_indices[t][static_cast<std::size_t>(k)]];
+  }
+  Eigen::Vector3d origin() const { return Eigen::Vector3d::Zero(); }
+  double inverseUnit() const { return 1; }
   Eigen::Vector3d corner(std::uint32_t t, int k) const {
-    return bvh_.vertices[bvh_.tri_indices[t][static_cast<std::size_t>(k)]].template cast<double>();
+    return vertex(t, k).template cast<double>();
   }
 
  private:

@@ -3,9 +3,11 @@
 
 #include <algorithm>
 #include <cmath>
+#include <cstring>
 #include <limits>
 #include <stdexcept>
 #include <string>
+#include <type_traits>
 
 namespace bocst {
 namespace {
@@ -17,6 +19,11 @@ constexpr double kMaxCoordinate = 1e75;
 
 [[noreturn]] void bad(const std::string& what) { throw std::invalid_argument("bocst::Mesh: " + what); }
 
+[[noreturn]] void badIndex(std::size_t triangle, std::size_t index, std::size_t vertices) {
+  bad("triangle " + std::to_string(triangle) + " has vertex index " + std::to_string(index) + ", but there are " +
+      std::to_string(vertices) + " vertices");
+}
+
 std::string coordinates(const Eigen::Vector3d& v) {
   return "(" + std::to_string(v.x()) + ", " + std::to_string(v.y()) + ", " + std::to_string(v.z()) + ")";
 }
@@ -25,16 +32,16 @@ std::string coordinates(const Eigen::Vector3d& v) {
 
 Mesh::Mesh(std::vector<Eigen::Vector3d> vertices, const std::vector<fcl::Triangle>& triangles)
     : vertices_(std::move(vertices)), triangles_(triangles.size()) {
-  const std::size_t count = vertices_.size();
+  // FCL's accessor is a call into its library; its triangle is three indices and nothing else.
+  static_assert(sizeof(fcl::Triangle) == 3 * sizeof(std::size_t) && std::is_trivially_copyable<fcl::Triangle>::value);
   for (std::size_t t = 0; t < triangles.size(); ++t) {
-    for (int k = 0; k < 3; ++k) {
-      const std::size_t i = triangles[t][k];
-      if (i >= count) {
-        bad("triangle " + std::to_string(t) + " has vertex index " + std::to_string(i) + ", but there are " +
-            std::to_string(count) + " vertices");
-      }
-      triangles_[t][k] = static_cast<std::uint32_t>(i);
+    std::size_t corners[3];
+    std::memcpy(corners, &triangles[t], sizeof(corners));
+    if ((corners[0] | corners[1] | corners[2]) > kMaxVertices) {
+      const std::size_t i = *std::max_element(corners, corners + 3);
+      badIndex(t, i, vertices_.size());
     }
+    for (std::size_t k = 0; k < 3; ++k) triangles_[t][k] = static_cast<std::uint32_t>(corners[k]);
   }
   validate();
 }
@@ -56,10 +63,7 @@ void Mesh::validate() {
   std::vector<std::uint8_t> used(count, 0);
   for (std::size_t t = 0; t < triangles_.size(); ++t) {
     for (const std::uint32_t i : triangles_[t]) {
-      if (i >= count) {
-        bad("triangle " + std::to_string(t) + " has vertex index " + std::to_string(i) + ", but there are " +
-            std::to_string(count) + " vertices");
-      }
+      if (i >= count) badIndex(t, i, count);
       used[i] = 1;
     }
   }

@@ -175,7 +175,7 @@ class PairWalk {
         const auto push = [&](typename A::Node c) { s.stack.push_back({c, pair.b}); };
         if (sb == State::kLeaf && seen_a_.size < kCoarse * size_b) {
           a_.childrenMeeting(
-              pair.a, seen_b_.volume, b_in_a_, b_.triangleCount(pair.b),
+              pair.a, volumeOf(b_, seen_b_), b_in_a_, b_.triangleCount(pair.b),
               [&](std::size_t i, int k) { return b_in_a_ * b_.corner(b_.triangle(pair.b, i), k); }, push);
         } else {
           a_.overlappingChildren(pair.a, volumeOf(b_, seen_b_), b_in_a_, push);
@@ -187,7 +187,7 @@ class PairWalk {
       const auto push = [&](typename B::Node c) { s.stack.push_back({pair.a, c}); };
       if (sa == State::kLeaf && size_b < kCoarse * seen_a_.size) {
         b_.childrenMeeting(
-            pair.b, seen_a_.volume, a_in_b_, a_.triangleCount(pair.a),
+            pair.b, volumeOf(a_, seen_a_), a_in_b_, a_.triangleCount(pair.a),
             [&](std::size_t i, int k) { return a_in_b_ * a_.corner(a_.triangle(pair.a, i), k); }, push);
       } else {
         b_.overlappingChildren(pair.b, volumeOf(a_, seen_a_), a_in_b_, push);
@@ -221,20 +221,38 @@ class PairWalk {
     return false;
   }
 
+  // Corners straight from the vertices: out = linear * v + offset, in the frame of A about the leaf of A.
+  struct ToPack {
+    double linear[3][3];
+    double offset[3];
+  };
+
+  // Vertices of a side lie at (v - origin) * inverse_unit in its frame, which `place` puts into that of A.
+  template <typename Side>
+  static ToPack toPack(const Side& side, const Placement& place, const Eigen::Vector3d& center) {
+    const Eigen::Matrix3d linear = place.rotation * (place.scale * side.inverseUnit());
+    const Eigen::Vector3d offset = place.translation - linear * side.origin() - center;
+    ToPack t;
+    for (int r = 0; r < 3; ++r) {
+      for (int c = 0; c < 3; ++c) t.linear[r][c] = linear(r, c);
+      t.offset[r] = offset[r];
+    }
+    return t;
+  }
+
   template <typename Side, typename Node>
-  static void fill(const Side& side, Node node, std::size_t begin, const Placement* place,
-                   const Eigen::Vector3d& origin, TrianglePack& pack) {
+  static void fill(const Side& side, Node node, std::size_t begin, const ToPack& to, TrianglePack& pack) {
     pack.count = std::min(side.triangleCount(node) - begin, TrianglePack::kCapacity);
     float size = 0;
     for (std::size_t i = 0; i < pack.count; ++i) {
       const std::uint32_t t = side.triangle(node, begin + i);
       pack.ids[i] = t;
       for (int k = 0; k < 3; ++k) {
-        Eigen::Vector3d x = side.corner(t, k);
-        if (place != nullptr) x = *place * x;
-        x -= origin;
+        const auto& v = side.vertex(t, k);
+        const double x = v[0], y = v[1], z = v[2];
         for (int c = 0; c < 3; ++c) {
-          const float f = static_cast<float>(x[c]);
+          const float f =
+              static_cast<float>(to.linear[c][0] * x + to.linear[c][1] * y + to.linear[c][2] * z + to.offset[c]);
           pack.xyz[3 * k + c][i] = f;
           size = std::max(size, std::abs(f));
         }
@@ -244,14 +262,15 @@ class PairWalk {
   }
 
   bool leafTriangles(const Pair& pair, Scratch& s) {
-    const Eigen::Vector3d origin = a_.cellSphere(pair.a).center;
+    const Eigen::Vector3d center = a_.cellSphere(pair.a).center;
+    const ToPack to_a = toPack(a_, Placement(), center), to_b = toPack(b_, b_in_a_, center);
     const std::size_t count_a = a_.triangleCount(pair.a), count_b = b_.triangleCount(pair.b);
     for (std::size_t i = 0; i < count_a; i += TrianglePack::kCapacity) {
       const std::uint64_t key = std::uint64_t{pair.a.bits} << 32 | i;
-      if (key != s.pack_of_a) fill(a_, pair.a, i, nullptr, origin, s.a);
+      if (key != s.pack_of_a) fill(a_, pair.a, i, to_a, s.a);
       s.pack_of_a = key;
       for (std::size_t j = 0; j < count_b; j += TrianglePack::kCapacity) {
-        fill(b_, pair.b, j, &b_in_a_, origin, s.b);
+        fill(b_, pair.b, j, to_b, s.b);
         const std::size_t found = touchingPairs(s.a, s.b, static_cast<float>(b_in_a_.slack * 1.001), s.found);
         for (std::size_t k = 0; k < found; ++k) {
           if (visitor_.triangles(s.a.ids[s.found[k].row], s.b.ids[s.found[k].lane])) return true;

@@ -144,6 +144,14 @@ class TreeSide {
   std::size_t triangleCount(Node node) const { return tree_.list(tree_.link(node)).count; }
   std::uint32_t triangle(Node node, std::size_t i) const { return tree_.list(tree_.link(node)).ids[i]; }
 
+  /// Corner k of triangle t as given; (v - origin()) * inverseUnit() is it in this side's frame.
+  const Eigen::Vector3d& vertex(std::uint32_t t, int k) const {
+    const Mesh& mesh = *tree_.surface().mesh;
+    return mesh.vertex(mesh.indices(t)[static_cast<std::size_t>(k)]);
+  }
+  const Eigen::Vector3d& origin() const { return tree_.surface().lattice.origin(); }
+  double inverseUnit() const { return 1 / tree_.surface().lattice.unit(); }
+
   /// Corner k of triangle t in this side's frame.
   Eigen::Vector3d corner(std::uint32_t t, int k) const { return tree_.surface().corner(t, k); }
 
