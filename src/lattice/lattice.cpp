@@ -36,6 +36,8 @@ Lattice::Lattice(const Eigen::AlignedBox3d& bounds, Subdivision subdivision, dou
     root_exponent_ = static_cast<int>(std::ceil(std::log2(dimension)));
     if (subdivision == Subdivision::kBono) units = std::ldexp(dimension, kBits - root_exponent_);
   }
+  // The centre of a mesh far from its origin is rounded: a cube this much larger still holds every vertex.
+  if (subdivision == Subdivision::kOctree) largest += magnitude * 0x1p-49;
   unit_ = largest / units;
   inverse_unit_ = units / largest;
   if (subdivision == Subdivision::kOctree) {

@@ -24,8 +24,8 @@ struct OneVolume {
 /// slab normal of the octant and that of the volume. No edge axes: with slabs they gain nothing.
 ///
 /// Every axis projects with sums of at most 24 terms, each rounded at most 4 times and, with Q = |center|_1 + |half|_1
-/// + 4, at most Q in size; so an error is at most 96 Q 2^-24 and volumes must be given with pad >= 128 Q 2^-24, to
-/// which the caller adds what its own coordinates are off by.
+/// + |slab_offset| + slab_half + 4, at most Q in size; so an error is at most 96 Q 2^-24 and volumes must be given with
+/// pad >= 128 Q 2^-24, to which the caller adds what its own coordinates are off by.
 std::uint8_t overlappingOctants(const oracle::OctantBounds& octants, const OneVolume& volume);
 
 /// Corners of up to kCapacity triangles as structure of arrays, in one frame, near the origin.

@@ -51,7 +51,7 @@ class PairWalk {
       : a_(a), b_(b), b_in_a_(b_in_a), a_in_b_(b_in_a.inverse()), visitor_(visitor), spheres_(a.cells() || b.cells()) {}
 
   /// Pairs in the first batch of a walk that may end early; a few oracle answers cost less than one too many.
-  static constexpr std::size_t kFirstBatch = 16;
+  static constexpr std::size_t kFirstBatch = 8;
 
   /// A leaf so many times larger (squared) than the node it meets is taken triangle by triangle.
   static constexpr double kCoarse = 1.0;

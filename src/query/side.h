@@ -179,22 +179,22 @@ class TreeSide {
   static Volume decode(int lo0, int lo1, int lo2, int hi0, int hi1, int hi2, int n0, int n1, int n2, int slab_center,
                        int slab_half, int x, int y, int z, int level) {
     const int cells = 1 << (lattice::kMaxLevel - level);
-    const float side = static_cast<float>(cells), byte = side * (0.5f / 255), normal = 1.0f / 127, middle = side / 2;
-    const float c0 = static_cast<float>(lo0 + hi0) * byte, c1 = static_cast<float>(lo1 + hi1) * byte,
-                c2 = static_cast<float>(lo2 + hi2) * byte;
+    // Positions in double: beside a much smaller node, a rounding relative to this cell would be large.
+    const double side = cells, byte = side * (0.5 / 255), normal = 1.0 / 127, middle = side / 2;
+    const double c0 = (lo0 + hi0) * byte, c1 = (lo1 + hi1) * byte, c2 = (lo2 + hi2) * byte;
     Volume v;
-    v.half[0] = static_cast<float>(hi0 - lo0) * byte;
-    v.half[1] = static_cast<float>(hi1 - lo1) * byte;
-    v.half[2] = static_cast<float>(hi2 - lo2) * byte;
-    v.center[0] = x * cells + double{c0};
-    v.center[1] = y * cells + double{c1};
-    v.center[2] = z * cells + double{c2};
-    v.normal[0] = static_cast<float>(n0) * normal;
-    v.normal[1] = static_cast<float>(n1) * normal;
-    v.normal[2] = static_cast<float>(n2) * normal;
-    v.slab_offset = static_cast<float>(slab_center) * (side * normal) -
-                    (v.normal[0] * (c0 - middle) + v.normal[1] * (c1 - middle) + v.normal[2] * (c2 - middle));
-    v.slab_half = static_cast<float>(slab_half) * (side * normal / 2);
+    v.half[0] = static_cast<float>((hi0 - lo0) * byte);
+    v.half[1] = static_cast<float>((hi1 - lo1) * byte);
+    v.half[2] = static_cast<float>((hi2 - lo2) * byte);
+    v.center[0] = x * side + c0;
+    v.center[1] = y * side + c1;
+    v.center[2] = z * side + c2;
+    v.normal[0] = static_cast<float>(n0 * normal);
+    v.normal[1] = static_cast<float>(n1 * normal);
+    v.normal[2] = static_cast<float>(n2 * normal);
+    v.slab_offset = static_cast<float>(
+        (slab_center * side - (n0 * (c0 - middle) + n1 * (c1 - middle) + n2 * (c2 - middle))) * normal);
+    v.slab_half = static_cast<float>(slab_half * (side * normal / 2));
     return v;
   }
 

@@ -141,7 +141,9 @@ TEST(CollideDouble, AnyScaleAndFarAway) {
           rb.move(far);
         }
         const auto fa = test::bvh<fcl::OBBRSSd>(ra), fb = test::bvh<fcl::OBBRSSd>(rb);
-        const Modeld a(ra.mesh()), b(rb.mesh());
+        Options octree;  // O rounds its centre where B keeps a corner
+        octree.subdivision = Subdivision::kOctree;
+        const Modeld a(ra.mesh()), b(rb.mesh()), oa(ra.mesh(), octree), ob(rb.mesh(), octree);
         std::mt19937_64 g(4);
         std::uniform_real_distribution<double> u(0, 1);
         int hits = 0;
@@ -153,6 +155,8 @@ TEST(CollideDouble, AnyScaleAndFarAway) {
           const bool expected = test::touching<double>(*fa, X, *fb, Y);
           hits += expected;
           ASSERT_EQ(test::touching<double>(a, X, b, Y), expected) << "scale " << scale << " away " << away << " " << i;
+          ASSERT_EQ(test::touching<double>(oa, X, ob, Y), expected)
+              << "scale " << scale << " away " << away << " " << i;
           if (i % 10 == 0) {
             ASSERT_EQ(test::pairs<double>(a, X, b, Y), test::pairs<double>(*fa, X, *fb, Y));
           }

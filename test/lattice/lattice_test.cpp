@@ -11,7 +11,7 @@ const Eigen::AlignedBox3d kBounds(Eigen::Vector3d(-1, 0, 2), Eigen::Vector3d(3, 
 TEST(Lattice, OctreeRootIsTheCentredCube) {
   const Lattice lattice(kBounds, Subdivision::kOctree, 0);
   EXPECT_TRUE(lattice.origin().isApprox(Eigen::Vector3d(-1, -1.5, 1)));
-  EXPECT_DOUBLE_EQ(lattice.unit() * (1 << kBits), 4);
+  EXPECT_NEAR(lattice.unit() * (1 << kBits), 4, 1e-13);
   for (const std::uint32_t e : lattice.extent()) EXPECT_EQ(e, 1u << kBits);
 }
 
@@ -60,6 +60,16 @@ TEST(Lattice, RegionsOfOctantsTileTheRegionOfTheCell) {
 }
 
 TEST(Lattice, EveryCornerOfTheBoundsIsInside) {
+  for (const double far : {0.0, 1e1, 1e3, 1e6}) {
+    const Eigen::AlignedBox3d moved(kBounds.min() + Eigen::Vector3d(far, far / 3, -far / 7),
+                                    kBounds.max() + Eigen::Vector3d(far, far / 3, -far / 7));
+    for (const Subdivision s : {Subdivision::kOctree, Subdivision::kBono}) {
+      const Lattice lattice(moved, s, 0);
+      const Eigen::AlignedBox3d root = lattice.region(Cell{});
+      EXPECT_LT((root.min() - lattice.toLattice(moved.min())).maxCoeff(), 1e-10);
+      EXPECT_LT((lattice.toLattice(moved.max()) - root.max()).maxCoeff(), 1e-10);
+    }
+  }
   for (const double scale : {1e-6, 1.0, 1e6}) {
     for (const double dimension : {0.0, 1.0, 2.0, 514.0, 65536.0}) {
       for (const Subdivision s : {Subdivision::kOctree, Subdivision::kBono}) {
