@@ -133,9 +133,7 @@ class BvhSide {
   }
   Eigen::Vector3d origin() const { return Eigen::Vector3d::Zero(); }
   double inverseUnit() const { return 1; }
-  Eigen::Vector3d corner(std::uint32_t t, int k) const {
-    return vertex(t, k).template cast<double>();
-  }
+  Eigen::Vector3d corner(std::uint32_t t, int k) const { return vertex(t, k).template cast<double>(); }
 
  private:
   const fcl::BVHModel<BV>& bvh_;
