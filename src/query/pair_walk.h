@@ -36,7 +36,7 @@ class Visitor {
 
 /// The one walk over pairs of nodes. Resident pairs first, depth first; a pair that needs an unexpanded node is set
 /// aside. When the resident pairs do not settle the question, nodes set aside grow in one batch and the walk goes on
-/// with their pairs: a batch never mixes with waiting for a single node, and leads one level down. A walk that has to
+/// with their pairs, one level down. A walk that has to
 /// see everything grows all that is set aside, so it makes one batch a level. One that ends at its first hit takes the
 /// deepest overlaps first, and twice as many each time: a hit deep inside costs one small batch a level, a miss at most
 /// the logarithm of its pairs more.
