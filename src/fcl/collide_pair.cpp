@@ -16,6 +16,7 @@
 #include "fcl/bvh_side.h"
 #include "query/pair_set.h"
 #include "query/pair_walk.h"
+#include "query/tree_walk.h"
 
 namespace bocst::fcl_room {
 namespace {
@@ -218,10 +219,9 @@ class PairTraversalNode : public fcl::detail::CollisionTraversalNodeBase<S> {
   Walk& walk_;
 };
 
-template <typename S, typename A, typename B>
-void walk(const A& a, const B& b, const Placement& b_in_a, query::Visitor& visitor) {
-  query::PairWalk<A, B> pair_walk(a, b, b_in_a, visitor);
-  PairTraversalNode<S, query::PairWalk<A, B>> node(pair_walk);
+template <typename S, typename Walk>
+void traverse(Walk&& walk) {
+  PairTraversalNode<S, std::remove_reference_t<Walk>> node(walk);
   fcl::detail::collide(&node);
 }
 
@@ -290,10 +290,14 @@ void collideModels(const Question<S>& q, tree::Tree& tree1, tree::Tree& tree2) {
     const ModelTriangles<S> t1(*tree1.surface().mesh), t2(*tree2.surface().mesh);
     Collector<S, ModelTriangles<S>, ModelTriangles<S>> collector(q, t1, t2, swapped, magnitude);
     collector.setFrame(sa.lattice.origin(), sa.lattice.unit());
-    walk<S>(a, b,
-            placementOf(swapped ? q.X_W2 : q.X_W1, swapped ? q.X_W1 : q.X_W2, sa.lattice.origin(), sa.lattice.unit(),
-                        sb.lattice.origin(), sb.lattice.unit(), magnitude),
-            collector);
+    const Placement b_in_a =
+        placementOf(swapped ? q.X_W2 : q.X_W1, swapped ? q.X_W1 : q.X_W2, sa.lattice.origin(), sa.lattice.unit(),
+                    sb.lattice.origin(), sb.lattice.unit(), magnitude);
+    if (query::TreeWalk::fits(a, b, b_in_a)) {
+      traverse<S>(query::TreeWalk(a, b, b_in_a, collector));
+    } else {
+      traverse<S>(query::PairWalk<TreeSide, TreeSide>(a, b, b_in_a, collector));
+    }
   }
   tree1.afterQuery(now);
   if (&tree2 != &tree1) tree2.afterQuery(now);
@@ -316,7 +320,7 @@ void collideBvh(const Question<typename BV::S>& q, tree::Tree& tree, const fcl::
                                          surface.lattice.unit(), Eigen::Vector3d::Zero(), 1.0, magnitude);
     const auto run = [&](auto&& collector) {
       collector.setFrame(surface.lattice.origin(), surface.lattice.unit());
-      walk<S>(a, b, b_in_a, collector);
+      traverse<S>(query::PairWalk<TreeSide, BvhSide<BV>>(a, b, b_in_a, collector));
     };
     if (swapped) {
       run(Collector<S, BvhTriangles<BV>, ModelTriangles<S>>(q, partner, model, true, magnitude));

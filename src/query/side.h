@@ -107,13 +107,21 @@ class TreeSide {
     const std::uint32_t index = tree_.link(node).index();
     const tree::Block& block = tree_.block(index);
     tree_.touch(block, now_);
-    const double side = 1 << (lattice::kMaxLevel - block.level), half = side / 2;
+    const double side = 1 << (lattice::kMaxLevel - block.level);
     const double corner[3] = {block.at[0] * side, block.at[1] * side, block.at[2] * side};
-    const unsigned mask = overlappingOctants(block.octants, seenFrom(other, to, corner, half)) & block.grey;
-    if (mask == 0) return;
+    const unsigned mask = overlappingOctants(block.octants, seenFrom(other, to, corner, side / 2)) & block.grey;
+    pushOctants(block, index, octantsMeeting(node, mask, to.slack, count, corner_of), f);
+  }
+
+  /// The octants in `mask` of an inner node that a triangle of another leaf meets; see childrenMeeting().
+  template <typename Corner>
+  unsigned octantsMeeting(Node node, unsigned mask, double slack, std::size_t count, Corner&& corner_of) const {
+    const tree::Block& block = tree_.block(tree_.link(node).index());
+    const double half = 1 << (lattice::kMaxLevel - block.level - 1);
+    const Eigen::Vector3d center(2 * block.at[0] * half + half, 2 * block.at[1] * half + half,
+                                 2 * block.at[2] * half + half);
     thread_local oracle::LocalTriangles local;
     std::uint8_t masks[TrianglePack::kCapacity];
-    const Eigen::Vector3d center(corner[0] + half, corner[1] + half, corner[2] + half);
     unsigned met = 0;
     for (std::size_t begin = 0; begin < count && (mask & ~met) != 0; begin += TrianglePack::kCapacity) {
       const std::size_t n = std::min(count - begin, TrianglePack::kCapacity);
@@ -123,10 +131,10 @@ class TreeSide {
           for (int c = 0; c < 3; ++c) local.xyz[3 * k + c][i] = static_cast<float>(x[c]);
         }
       }
-      oracle::octantMasks(local, n, static_cast<float>(to.slack / half * 1.001), masks);
+      oracle::octantMasks(local, n, static_cast<float>(slack / half * 1.001), masks);
       for (std::size_t i = 0; i < n; ++i) met |= masks[i];
     }
-    pushOctants(block, index, mask & met, f);
+    return mask & met;
   }
 
   /// Calls f(child) for all children.

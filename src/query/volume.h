@@ -65,6 +65,8 @@ struct Placement {
   }
 };
 
+inline Sphere placed(const Sphere& s, const Placement& to) { return {to * s.center, s.radius * to.scale}; }
+
 /// The volume as the octants of a cell see it; `corner` is the cell's minimum corner, `side` that of its octants.
 inline OneVolume seenFrom(const Volume& v, const Placement& to, const double* corner, double side) {
   OneVolume o;

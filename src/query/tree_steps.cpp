@@ -1,0 +1,279 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#include "query/tree_steps.h"
+
+#undef HWY_TARGET_INCLUDE
+#define HWY_TARGET_INCLUDE "query/tree_steps.cpp"
+#include <hwy/foreach_target.h>
+#include <hwy/highway.h>
+
+// At -O2 the compiler keeps short loops over arrays of vectors, and with them the arrays in memory.
+#undef BOCST_UNROLL
+#define BOCST_UNROLL _Pragma("GCC unroll 8")
+
+#ifndef BOCST_TREE_STEPS_ONCE
+#define BOCST_TREE_STEPS_ONCE
+namespace bocst::query {
+namespace {
+
+inline bool isLeaf(const StepPair& p, int side) {
+  const tree::Link::Tag tag = p.link[side].tag();
+  return tag == tree::Link::kShortList || (tag == tree::Link::kList && p.level[side] == lattice::kMaxLevel);
+}
+
+inline float sideOf(const PairSteps& s, const StepPair& p, int side) {
+  return s.geometry.unit[side] * static_cast<float>(1 << (lattice::kMaxLevel - p.level[side]));
+}
+
+// What is still implicit comes first, so that the stack leaves it for last: a hit among resident nodes makes its growth
+// unnecessary.
+inline void push(PairSteps& s, const StepPair& pair, int x, std::size_t frame, const tree::Block& block, unsigned mask) {
+  const std::uint32_t index = pair.link[x].index();
+  StepPair next = pair;
+  next.level[x] = static_cast<std::uint8_t>(pair.level[x] + 1);
+  next.frames = static_cast<std::uint16_t>(frame + 1);
+  StepPair* top = s.stack + s.depth;
+  const auto put = [&](int o, tree::Link link) {
+    next.node[x] = tree::NodeRef::octant(index, o);
+    next.link[x] = link;
+    next.lane[x] = static_cast<std::uint16_t>(8 * frame + static_cast<std::size_t>(o));
+    *top++ = next;
+  };
+  unsigned resident = 0;
+  for (unsigned left = mask; left != 0; left &= left - 1) {
+    const int o = __builtin_ctz(left);
+    const tree::Link link = block.child[o].load(std::memory_order_acquire);
+    if (link.tag() == tree::Link::kImplicit) {
+      put(o, link);
+    } else {
+      resident |= 1u << o;
+    }
+  }
+  for (; resident != 0; resident &= resident - 1) {
+    const int o = __builtin_ctz(resident);
+    put(o, block.child[o].load(std::memory_order_acquire));
+  }
+  s.depth = static_cast<std::size_t>(top - s.stack);
+}
+
+}  // namespace
+}  // namespace bocst::query
+#endif
+
+HWY_BEFORE_NAMESPACE();
+namespace bocst::query::HWY_NAMESPACE {
+
+namespace hn = hwy::HWY_NAMESPACE;
+using D = hn::CappedTag<float, 8>;
+using V = hn::Vec<D>;
+using M = hn::Mask<D>;
+
+HWY_INLINE V fromBytes(D d, const std::uint8_t* p) {
+  const hn::Rebind<std::uint8_t, D> du;
+  const hn::RebindToSigned<D> di;
+  return hn::ConvertTo(d, hn::PromoteTo(di, hn::LoadU(du, p)));
+}
+
+HWY_INLINE V fromBytes(D d, const std::int8_t* p) {
+  const hn::Rebind<std::int8_t, D> ds;
+  const hn::RebindToSigned<D> di;
+  return hn::ConvertTo(d, hn::PromoteTo(di, hn::LoadU(ds, p)));
+}
+
+// Writes the volumes of eight octants of side `side`, the first with its corner at `corner`, both in own coordinates.
+HWY_INLINE void decode(const PairFrames& g, int own, const oracle::OctantBounds& octants, const float* corner,
+                       float side, Frame& f) {
+  const D d;
+  HWY_ALIGN static constexpr float kOrigin[3][8] = {
+      {0, 1, 0, 1, 0, 1, 0, 1}, {0, 0, 1, 1, 0, 0, 1, 1}, {0, 0, 0, 0, 1, 1, 1, 1}};
+  const int other = 1 - own;
+  const V byte = hn::Set(d, side * (1.0f / 510)), vside = hn::Set(d, side), per127 = hn::Set(d, 1.0f / 127);
+  const V half = hn::Set(d, 0.5f * side);
+  for (std::size_t i = 0; i < 8; i += hn::Lanes(d)) {
+    V c[3], h[3], n[3];
+    V offset = hn::Mul(fromBytes(d, octants.slab_center + i), hn::Set(d, side * (1.0f / 127)));
+    BOCST_UNROLL
+    for (int k = 0; k < 3; ++k) {
+      const V lo = fromBytes(d, octants.lo[k] + i), hi = fromBytes(d, octants.hi[k] + i);
+      const V within = hn::Mul(hn::Add(lo, hi), byte);
+      c[k] = hn::Add(within, hn::MulAdd(hn::Load(d, kOrigin[k] + i), vside, hn::Set(d, corner[k])));
+      h[k] = hn::Mul(hn::Sub(hi, lo), byte);
+      n[k] = hn::Mul(fromBytes(d, octants.normal[k] + i), per127);
+      // The slab is given from the octant's middle and wanted from its box's.
+      offset = hn::NegMulAdd(n[k], hn::Sub(within, half), offset);
+      hn::Store(c[k], d, f.center[own][k] + i);
+      hn::Store(h[k], d, f.half[own][k] + i);
+      hn::Store(n[k], d, f.normal[own][k] + i);
+    }
+    hn::Store(offset, d, f.slab_center + i);
+    hn::Store(hn::Mul(fromBytes(d, octants.slab_half + i), hn::Set(d, side * (1.0f / 254))), d, f.slab_half + i);
+    BOCST_UNROLL
+    for (int j = 0; j < 3; ++j) {
+      V cj = hn::Set(d, g.shift[own][j]), hj = hn::Zero(d), nj = hn::Zero(d);
+      BOCST_UNROLL
+      for (int k = 0; k < 3; ++k) {
+        const V r = hn::Set(d, g.to_other[own][j][k]);
+        cj = hn::MulAdd(r, c[k], cj);
+        nj = hn::MulAdd(r, n[k], nj);
+        hj = hn::MulAdd(hn::Set(d, g.abs_to_other[own][j][k]), h[k], hj);
+      }
+      hn::Store(cj, d, f.center[other][j] + i);
+      hn::Store(hj, d, f.half[other][j] + i);
+      hn::Store(nj, d, f.normal[other][j] + i);
+    }
+  }
+}
+
+// Bit o is set unless octant o of frame f (side `own`) is surely apart from the volume in lane l of frame y, by one of
+// eight axes: the faces of both boxes and both slab normals. No edge axes: with slabs they gain nothing.
+HWY_INLINE unsigned overlapping(const PairFrames& g, int own, const Frame& f, const Frame& y, std::size_t l) {
+  const D d;
+  const int other = 1 - own;
+  const V pad = hn::Set(d, g.pad), slab_pad = hn::Set(d, g.slab_pad);
+  unsigned result = 0;
+  for (std::size_t i = 0; i < 8; i += hn::Lanes(d)) {
+    V way[2][3];  // from the octants' middles to the volume's, in both frames
+    M apart = hn::MaskFromVec(hn::Zero(d));
+    BOCST_UNROLL
+    for (int s = 0; s < 2; ++s) {
+      BOCST_UNROLL
+      for (int k = 0; k < 3; ++k) {
+        way[s][k] = hn::Sub(hn::Set(d, y.center[s][k][l]), hn::Load(d, f.center[s][k] + i));
+        const V reach = hn::Add(hn::Load(d, f.half[s][k] + i), hn::Add(hn::Set(d, y.half[s][k][l]), pad));
+        apart = hn::Or(apart, hn::Gt(hn::Abs(way[s][k]), reach));
+      }
+    }
+    // Slabs: for z in a box with |m.z - offset| <= w, any a gives n.z in a * offset +- (|a| w + |n - a m| over the
+    // box).
+    const V x_center = hn::Load(d, f.slab_center + i), x_half = hn::Load(d, f.slab_half + i);
+    const V y_center = hn::Set(d, y.slab_center[l]), y_half = hn::Set(d, y.slab_half[l]);
+    V n[3], m[3], along = hn::Zero(d);
+    BOCST_UNROLL
+    for (int k = 0; k < 3; ++k) {
+      n[k] = hn::Load(d, f.normal[other][k] + i);
+      m[k] = hn::Set(d, y.normal[other][k][l]);
+      along = hn::MulAdd(n[k], m[k], along);
+    }
+    const V abs_along = hn::Abs(along);
+    V t = hn::MulSub(along, y_center, x_center), r = hn::MulAdd(abs_along, y_half, hn::Add(x_half, slab_pad));
+    BOCST_UNROLL
+    for (int k = 0; k < 3; ++k) {
+      t = hn::MulAdd(n[k], own == 0 ? way[1][k] : way[0][k], t);
+      r = hn::MulAdd(hn::Set(d, y.half[other][k][l]), hn::Abs(hn::NegMulAdd(along, m[k], n[k])), r);
+    }
+    apart = hn::Or(apart, hn::Gt(hn::Abs(t), r));
+    t = hn::NegMulAdd(along, x_center, y_center);
+    r = hn::MulAdd(abs_along, x_half, hn::Add(y_half, slab_pad));
+    BOCST_UNROLL
+    for (int k = 0; k < 3; ++k) {
+      const V mk = hn::Set(d, y.normal[own][k][l]);
+      t = hn::MulAdd(mk, own == 0 ? way[0][k] : way[1][k], t);
+      r = hn::MulAdd(hn::Load(d, f.half[own][k] + i),
+                     hn::Abs(hn::NegMulAdd(along, hn::Load(d, f.normal[own][k] + i), mk)), r);
+    }
+    apart = hn::Or(apart, hn::Gt(hn::Abs(t), r));
+    std::uint8_t bits[8] = {};
+    hn::StoreMaskBits(d, hn::Not(apart), bits);
+    result |= static_cast<unsigned>(bits[0]) << i;
+  }
+  return result;
+}
+
+HWY_INLINE void decodeBlock(const PairFrames& g, int own, const tree::Block& block, Frame& f) {
+  const int side = 1 << (lattice::kMaxLevel - 1 - block.level), middle = 1 << (lattice::kBits - 1);
+  float corner[3];
+  for (int k = 0; k < 3; ++k) corner[k] = static_cast<float>(2 * block.at[k] * side - middle) * g.unit[own];
+  decode(g, own, block.octants, corner, static_cast<float>(side) * g.unit[own], f);
+}
+
+// Where the volume of a pair's node on one side is; for pairs that come without frames.
+HWY_INLINE void lookUp(PairSteps& s, StepPair& p, int side, std::size_t& frames) {
+  if (p.lane[side] != StepPair::kNoLane) return;
+  const tree::Tree& tree = *s.tree[side];
+  if (p.node[side].isRoot()) {
+    oracle::OctantBounds root;
+    root.set(0, tree.rootBounds());
+    const float middle = static_cast<float>(1 << (lattice::kBits - 1)) * s.geometry.unit[side];
+    const float corner[3] = {-middle, -middle, -middle};
+    decode(s.geometry, side, root, corner, 2 * middle, s.frames[frames]);
+    p.lane[side] = static_cast<std::uint16_t>(8 * frames);
+  } else {
+    decodeBlock(s.geometry, side, tree.block(p.node[side].block()), s.frames[frames]);
+    p.lane[side] = static_cast<std::uint16_t>(8 * frames + static_cast<std::size_t>(p.node[side].octant()));
+  }
+  ++frames;
+}
+
+PairSteps::Event NextEvent(PairSteps& s) {
+  while (s.depth > 0) {
+    StepPair p = s.stack[--s.depth];
+    const bool leaf0 = isLeaf(p, 0), leaf1 = isLeaf(p, 1);
+    if (leaf0 && leaf1) {
+      s.pair = p;
+      return PairSteps::kLeaves;
+    }
+    // The larger of two nodes is expanded, unless it is a leaf.
+    const float side0 = sideOf(s, p, 0), side1 = sideOf(s, p, 1);
+    const int x = leaf1 || (!leaf0 && side0 >= side1) ? 0 : 1, y = 1 - x;
+    if (p.link[x].tag() != tree::Link::kBlock) {
+      s.pair = p;
+      return PairSteps::kAside;
+    }
+    std::size_t frames = p.frames;
+    lookUp(s, p, 0, frames);
+    lookUp(s, p, 1, frames);
+    const tree::Block& block = s.tree[x]->block(p.link[x].index());
+    s.tree[x]->touch(block, s.now);
+    Frame& f = s.frames[frames];
+    decodeBlock(s.geometry, x, block, f);
+    const unsigned mask = overlapping(s.geometry, x, f, s.frames[p.lane[y] / 8], p.lane[y] % 8) & block.grey;
+    if (mask == 0) continue;
+    if ((y == 0 ? leaf0 && side1 < side0 : leaf1 && side0 < side1)) {
+      p.frames = static_cast<std::uint16_t>(frames);
+      s.pair = p;
+      s.expanded = x;
+      s.mask = mask;
+      return PairSteps::kCoarse;
+    }
+    push(s, p, x, frames, block, mask);
+  }
+  return PairSteps::kDone;
+}
+
+}  // namespace bocst::query::HWY_NAMESPACE
+HWY_AFTER_NAMESPACE();
+
+#if HWY_ONCE
+namespace bocst::query {
+
+HWY_EXPORT(NextEvent);
+
+PairFrames::PairFrames(double scale_of_1, const Placement& one_in_zero) {
+  const double q0 = 1 << (lattice::kBits - 1), q1 = q0 * scale_of_1;
+  const Eigen::Matrix3d& r = one_in_zero.rotation;
+  // Where the middle of side 1's root is, from that of side 0's.
+  const Eigen::Vector3d t = one_in_zero * Eigen::Vector3d::Constant(q0) - Eigen::Vector3d::Constant(q0);
+  const Eigen::Vector3d back = -(r.transpose() * t);
+  for (int j = 0; j < 3; ++j) {
+    for (int k = 0; k < 3; ++k) {
+      to_other[0][j][k] = to_other[1][k][j] = static_cast<float>(r(k, j));
+      abs_to_other[0][j][k] = abs_to_other[1][k][j] = static_cast<float>(std::abs(r(k, j)));
+    }
+    shift[0][j] = static_cast<float>(back[j]);
+    shift[1][j] = static_cast<float>(t[j]);
+  }
+  unit[0] = 1;
+  unit[1] = static_cast<float>(scale_of_1);
+  const double size = t.norm() + std::sqrt(3.0) * (q0 + q1), defect = 4 * size * one_in_zero.defect;
+  pad = static_cast<float>((48 * 0x1p-24 * size + defect + one_in_zero.slack) * 1.0001);
+  slab_pad = static_cast<float>((160 * 0x1p-24 * size + 2 * defect + 1.02 * one_in_zero.slack) * 1.0001);
+}
+
+PairSteps::Event nextEvent(PairSteps& steps) { return HWY_DYNAMIC_DISPATCH(NextEvent)(steps); }
+
+void pushOctants(PairSteps& s, unsigned mask) {
+  const int x = s.expanded;
+  push(s, s.pair, x, s.pair.frames, s.tree[x]->block(s.pair.link[x].index()), mask);
+}
+
+}  // namespace bocst::query
+#endif

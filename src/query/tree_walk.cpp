@@ -1,0 +1,76 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#include "query/tree_walk.h"
+
+namespace bocst::query {
+
+struct TreeWalk::Scratch {
+  std::vector<StepPair> stack;
+  Frame frames[PairSteps::kFrames];
+  SetAside<TreeSide, TreeSide> aside;
+  LeafPairs<TreeSide, TreeSide> leaves;
+};
+
+bool TreeWalk::run() {
+  thread_local Scratch s;
+  s.aside.clear();
+  s.leaves.clear();
+  if (boxesApart(oriented(a_.volume(a_.root())), oriented(b_.volume(b_.root())), b_in_a_)) return false;
+
+  PairSteps steps{{&a_.tree(), &b_.tree()}, a_.now(), PairFrames(b_in_a_.scale, b_in_a_), s.frames, nullptr};
+  const auto push = [&](const SetAside<TreeSide, TreeSide>::Pair& pair) {
+    if (s.stack.size() < steps.depth + 1 + PairSteps::kStackRoom) {
+      s.stack.resize(2 * (steps.depth + PairSteps::kStackRoom));
+    }
+    StepPair p;
+    p.node[0] = pair.a;
+    p.node[1] = pair.b;
+    for (int side = 0; side < 2; ++side) {
+      p.link[side] = steps.tree[side]->link(p.node[side]);
+      p.level[side] = static_cast<std::uint8_t>(steps.tree[side]->cell(p.node[side]).level);
+    }
+    s.stack[steps.depth++] = p;
+  };
+  push({a_.root(), b_.root()});
+  for (;;) {
+    steps.stack = s.stack.data();
+    if (stepAll(steps, s)) return true;
+    if (s.aside.empty()) return false;
+    s.aside.grow(a_, b_, b_in_a_, visitor_.endsAtFirst(), push);
+  }
+}
+
+bool TreeWalk::stepAll(PairSteps& steps, Scratch& s) {
+  for (;;) {
+    switch (nextEvent(steps)) {
+      case PairSteps::kDone:
+        return false;
+      case PairSteps::kAside:
+        s.aside.add({steps.pair.node[0], steps.pair.node[1]});
+        break;
+      case PairSteps::kCoarse:
+        pushOctants(steps, meeting(steps));
+        break;
+      case PairSteps::kLeaves:
+        if (s.leaves.test(a_, steps.pair.node[0], b_, steps.pair.node[1], b_in_a_,
+                          [this](std::uint32_t t, std::uint32_t u) { return visitor_.triangles(t, u); })) {
+          return true;
+        }
+        break;
+    }
+  }
+}
+
+unsigned TreeWalk::meeting(const PairSteps& steps) const {
+  const StepPair& p = steps.pair;
+  if (steps.expanded == 0) {
+    return a_.octantsMeeting(p.node[0], steps.mask, b_in_a_.slack, b_.triangleCount(p.node[1]), [&](std::size_t i, int k) {
+      return b_in_a_ * b_.corner(b_.triangle(p.node[1], i), k);
+    });
+  }
+  const Placement a_in_b = b_in_a_.inverse();
+  return b_.octantsMeeting(p.node[1], steps.mask, a_in_b.slack, a_.triangleCount(p.node[0]), [&](std::size_t i, int k) {
+    return a_in_b * a_.corner(a_.triangle(p.node[0], i), k);
+  });
+}
+
+}  // namespace bocst::query

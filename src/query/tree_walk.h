@@ -1,0 +1,38 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#pragma once
+
+#include <vector>
+
+#include "query/leaf_pairs.h"
+#include "query/set_aside.h"
+#include "query/tree_steps.h"
+#include "query/visitor.h"
+
+namespace bocst::query {
+
+/// The walk of PairWalk for two trees with exact answers, where a query spends its time: the same order, with volumes
+/// in float about the roots (see PairFrames) that are decoded once for all that meets them.
+class TreeWalk {
+ public:
+  static bool fits(const TreeSide& a, const TreeSide& b, const Placement& b_in_a) {
+    return !a.cells() && !b.cells() && PairFrames::fits(b_in_a.scale);
+  }
+
+  TreeWalk(const TreeSide& a, const TreeSide& b, const Placement& b_in_a, Visitor& visitor)
+      : a_(a), b_(b), b_in_a_(b_in_a), visitor_(visitor) {}
+
+  /// True when the visitor ended it.
+  bool run();
+
+ private:
+  struct Scratch;
+
+  bool stepAll(PairSteps& steps, Scratch& s);
+  unsigned meeting(const PairSteps& steps) const;
+
+  const TreeSide &a_, &b_;
+  const Placement& b_in_a_;
+  Visitor& visitor_;
+};
+
+}  // namespace bocst::query
