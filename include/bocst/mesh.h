@@ -54,7 +54,7 @@ class BOCST_EXPORT Mesh {
 
  private:
   Mesh() = default;
-  void validate();
+  void validate(const std::vector<fcl::Triangle>* given);
 
   std::vector<Eigen::Vector3d> vertices_;
   std::vector<Indices> triangles_;

@@ -290,9 +290,8 @@ void collideModels(const Question<S>& q, tree::Tree& tree1, tree::Tree& tree2) {
     const ModelTriangles<S> t1(*tree1.surface().mesh), t2(*tree2.surface().mesh);
     Collector<S, ModelTriangles<S>, ModelTriangles<S>> collector(q, t1, t2, swapped, magnitude);
     collector.setFrame(sa.lattice.origin(), sa.lattice.unit());
-    const Placement b_in_a =
-        placementOf(swapped ? q.X_W2 : q.X_W1, swapped ? q.X_W1 : q.X_W2, sa.lattice.origin(), sa.lattice.unit(),
-                    sb.lattice.origin(), sb.lattice.unit(), magnitude);
+    const Placement b_in_a = placementOf(swapped ? q.X_W2 : q.X_W1, swapped ? q.X_W1 : q.X_W2, sa.lattice.origin(),
+                                         sa.lattice.unit(), sb.lattice.origin(), sb.lattice.unit(), magnitude);
     if (query::TreeWalk::fits(a, b, b_in_a)) {
       traverse<S>(query::TreeWalk(a, b, b_in_a, collector));
     } else {

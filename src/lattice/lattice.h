@@ -43,6 +43,7 @@ class Lattice {
 
   const Eigen::Vector3d& origin() const { return origin_; }
   double unit() const { return unit_; }
+  double inverseUnit() const { return inverse_unit_; }
 
   Eigen::Vector3d toLattice(const Eigen::Vector3d& v) const { return (v - origin_) * inverse_unit_; }
 

@@ -4,6 +4,7 @@
 #include <algorithm>
 #include <cmath>
 #include <cstring>
+#include <iterator>
 #include <limits>
 #include <stdexcept>
 #include <string>
@@ -28,61 +29,88 @@ std::string coordinates(const Eigen::Vector3d& v) {
   return "(" + std::to_string(v.x()) + ", " + std::to_string(v.y()) + ", " + std::to_string(v.z()) + ")";
 }
 
+// FCL's accessor is a call into its library; its triangle is three indices and nothing else.
+static_assert(sizeof(fcl::Triangle) == 3 * sizeof(std::size_t) && std::is_trivially_copyable<fcl::Triangle>::value);
+
+/// Reads FCL's triangles as 32-bit indices, so that a vector is written once.
+class NarrowIterator {
+ public:
+  using iterator_category = std::forward_iterator_tag;
+  using value_type = Mesh::Indices;
+  using difference_type = std::ptrdiff_t;
+  using pointer = const value_type*;
+  using reference = value_type;
+
+  explicit NarrowIterator(const fcl::Triangle* at) : at_(at) {}
+  value_type operator*() const {
+    std::size_t wide[3];
+    std::memcpy(wide, at_, sizeof(wide));
+    value_type narrow;
+    for (std::size_t k = 0; k < 3; ++k) narrow[k] = static_cast<std::uint32_t>(std::min(wide[k], kMaxVertices));
+    return narrow;
+  }
+  NarrowIterator& operator++() {
+    ++at_;
+    return *this;
+  }
+  bool operator==(NarrowIterator other) const { return at_ == other.at_; }
+  bool operator!=(NarrowIterator other) const { return at_ != other.at_; }
+
+ private:
+  const fcl::Triangle* at_;
+};
+
 }  // namespace
 
 Mesh::Mesh(std::vector<Eigen::Vector3d> vertices, const std::vector<fcl::Triangle>& triangles)
-    : vertices_(std::move(vertices)), triangles_(triangles.size()) {
-  // FCL's accessor is a call into its library; its triangle is three indices and nothing else.
-  static_assert(sizeof(fcl::Triangle) == 3 * sizeof(std::size_t) && std::is_trivially_copyable<fcl::Triangle>::value);
-  for (std::size_t t = 0; t < triangles.size(); ++t) {
-    std::size_t corners[3];
-    std::memcpy(corners, &triangles[t], sizeof(corners));
-    if ((corners[0] | corners[1] | corners[2]) > kMaxVertices) {
-      const std::size_t i = *std::max_element(corners, corners + 3);
-      badIndex(t, i, vertices_.size());
-    }
-    for (std::size_t k = 0; k < 3; ++k) triangles_[t][k] = static_cast<std::uint32_t>(corners[k]);
-  }
-  validate();
+    : vertices_(std::move(vertices)),
+      triangles_(NarrowIterator(triangles.data()), NarrowIterator(triangles.data() + triangles.size())) {
+  validate(&triangles);
 }
 
 std::shared_ptr<const Mesh> Mesh::fromIndices(std::vector<Eigen::Vector3d> vertices, std::vector<Indices> triangles) {
   std::shared_ptr<Mesh> mesh(new Mesh);
   mesh->vertices_ = std::move(vertices);
   mesh->triangles_ = std::move(triangles);
-  mesh->validate();
+  mesh->validate(nullptr);
   return mesh;
 }
 
-void Mesh::validate() {
+void Mesh::validate(const std::vector<fcl::Triangle>* given) {
   const std::size_t count = vertices_.size();
   if (triangles_.empty()) bad("no triangles");
   if (triangles_.size() > kMaxTriangles) bad("more than 2^28 triangles");
   if (count > kMaxVertices) bad("more than 2^32 - 1 vertices");
-  // A vertex that no triangle uses is kept, but is no part of the surface.
-  std::vector<std::uint8_t> used(count, 0);
-  for (std::size_t t = 0; t < triangles_.size(); ++t) {
-    for (const std::uint32_t i : triangles_[t]) {
-      if (i >= count) badIndex(t, i, count);
-      used[i] = 1;
+  // A vertex that no triangle uses is kept, but is no part of the surface. One place more for indices out of range: to
+  // look once at the end is faster than to branch each time.
+  std::vector<std::uint8_t> used(count + 1, 0);
+  std::uint8_t* const mark = used.data();
+  const Indices* const end = triangles_.data() + triangles_.size();
+  for (const Indices* t = triangles_.data(); t != end; ++t) {
+    for (std::size_t k = 0; k < 3; ++k) mark[std::min<std::size_t>((*t)[k], count)] = 1;
+  }
+  if (used[count]) {
+    for (std::size_t t = 0; t < triangles_.size(); ++t) {
+      for (std::size_t k = 0; k < 3; ++k) {
+        // What 32 bits cannot say was made the largest of them, which is never an index.
+        if (triangles_[t][k] >= count) badIndex(t, given ? (*given)[t][k] : triangles_[t][k], count);
+      }
     }
   }
-  double lo[3], hi[3];
-  std::fill_n(lo, 3, std::numeric_limits<double>::max());
-  std::fill_n(hi, 3, -std::numeric_limits<double>::max());
+  Eigen::Vector3d lo = Eigen::Vector3d::Constant(std::numeric_limits<double>::max()), hi = -lo;
+  const Eigen::Vector3d* const vertices = vertices_.data();
   for (std::size_t i = 0; i < count; ++i) {
-    const Eigen::Vector3d& v = vertices_[i];
+    const double* v = vertices[i].data();
     // One comparison a coordinate finds NaN, infinities and what is too large.
-    if (!(std::abs(v[0]) <= kMaxCoordinate && std::abs(v[1]) <= kMaxCoordinate && std::abs(v[2]) <= kMaxCoordinate)) {
-      bad("vertex " + std::to_string(i) + " is " + coordinates(v));
+    if (!(std::abs(v[0]) <= kMaxCoordinate) | !(std::abs(v[1]) <= kMaxCoordinate) |
+        !(std::abs(v[2]) <= kMaxCoordinate)) {
+      bad("vertex " + std::to_string(i) + " is " + coordinates(vertices_[i]));
     }
-    if (!used[i]) continue;
-    for (int k = 0; k < 3; ++k) {
-      lo[k] = std::min(lo[k], v[k]);
-      hi[k] = std::max(hi[k], v[k]);
-    }
+    if (!mark[i]) continue;
+    lo = lo.cwiseMin(vertices[i]);
+    hi = hi.cwiseMax(vertices[i]);
   }
-  bounds_ = Eigen::AlignedBox3d(Eigen::Vector3d(lo), Eigen::Vector3d(hi));
+  bounds_ = Eigen::AlignedBox3d(lo, hi);
 }
 
 std::size_t Mesh::bytes() const {

@@ -10,8 +10,8 @@
 
 namespace bocst::query {
 
-/// Leaves against leaves, triangle by triangle. Keeps the pack of the last leaf of side A: depth first, most pairs share
-/// it with the one before.
+/// Leaves against leaves, triangle by triangle. Keeps the pack of the last leaf of side A: depth first, most pairs
+/// share it with the one before.
 template <typename A, typename B>
 class LeafPairs {
  public:

@@ -12,8 +12,8 @@
 namespace bocst::query {
 
 /// The walk over pairs of nodes. Resident pairs first, depth first; a pair that needs an unexpanded node is set aside.
-/// When the resident pairs do not settle the question, nodes set aside grow in one batch and the walk goes on with their
-/// pairs, one level down.
+/// When the resident pairs do not settle the question, nodes set aside grow in one batch and the walk goes on with
+/// their pairs, one level down.
 ///
 /// Triangles against triangles are culled by boxes and slabs; as soon as a side answers with cells, both are culled by
 /// spheres, in double and on integer cells, so a conservative verdict does not depend on what is resident.

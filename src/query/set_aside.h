@@ -19,7 +19,7 @@ class SetAside {
   };
 
   /// Pairs in the first batch of a walk that may end early; a few oracle answers cost less than one too many.
-  static constexpr std::size_t kFirstBatch = 8;
+  static constexpr std::size_t kFirstBatch = 4;
 
   void clear() {
     waiting_.clear();

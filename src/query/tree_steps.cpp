@@ -26,7 +26,8 @@ inline float sideOf(const PairSteps& s, const StepPair& p, int side) {
 
 // What is still implicit comes first, so that the stack leaves it for last: a hit among resident nodes makes its growth
 // unnecessary.
-inline void push(PairSteps& s, const StepPair& pair, int x, std::size_t frame, const tree::Block& block, unsigned mask) {
+inline void push(PairSteps& s, const StepPair& pair, int x, std::size_t frame, const tree::Block& block,
+                 unsigned mask) {
   const std::uint32_t index = pair.link[x].index();
   StepPair next = pair;
   next.level[x] = static_cast<std::uint8_t>(pair.level[x] + 1);

@@ -9,8 +9,8 @@
 
 namespace bocst::query {
 
-/// The volumes of eight octants as both sides of a pair see them: along the axes of side 0 and along those of side 1, in
-/// lattice units of side 0 about the middle of each side's root. Structure of arrays: lane o is octant o.
+/// The volumes of eight octants as both sides of a pair see them: along the axes of side 0 and along those of side 1,
+/// in lattice units of side 0 about the middle of each side's root. Structure of arrays: lane o is octant o.
 struct alignas(64) Frame {
   float center[2][3][8];  ///< Middle of the box.
   float half[2][3][8];    ///< Half extents of the box (its own axes) or of what holds it (the other side's).
@@ -33,10 +33,10 @@ struct PairFrames {
   /// Beyond these, one side's rounding is too coarse for the other's nodes.
   static bool fits(double scale) { return scale >= 0x1p-10 && scale <= 0x1p10; }
 
-  float unit[2];             ///< Lattice units of each side, in those of side 0.
-  float to_other[2][3][3];   ///< [own]: row j gives coordinate j in the other frame ...
+  float unit[2];            ///< Lattice units of each side, in those of side 0.
+  float to_other[2][3][3];  ///< [own]: row j gives coordinate j in the other frame ...
   float abs_to_other[2][3][3];
-  float shift[2][3];         ///< ... after this.
+  float shift[2][3];  ///< ... after this.
   float pad, slab_pad;
 };
 
@@ -59,20 +59,20 @@ struct PairSteps {
   static constexpr std::size_t kStackRoom = 7 * (2 * lattice::kMaxLevel + 1) + 1;
 
   enum Event {
-    kDone,     ///< The stack is empty.
-    kLeaves,   ///< `pair` is two leaves, to be tested.
-    kAside,    ///< `pair` needs a node that is not expanded.
-    kCoarse,   ///< `pair` is a leaf and a smaller node, `expanded`, whose octants in `mask` overlap the leaf's volume.
+    kDone,    ///< The stack is empty.
+    kLeaves,  ///< `pair` is two leaves, to be tested.
+    kAside,   ///< `pair` needs a node that is not expanded.
+    kCoarse,  ///< `pair` is a leaf and a smaller node, `expanded`, whose octants in `mask` overlap the leaf's volume.
   };
 
   const tree::Tree* tree[2];
   std::int64_t now;
   PairFrames geometry;
-  Frame* frames;     ///< kFrames of them.
-  StepPair* stack;   ///< With room for kStackRoom more.
+  Frame* frames;    ///< kFrames of them.
+  StepPair* stack;  ///< With room for kStackRoom more.
   std::size_t depth = 0;
 
-  StepPair pair;
+  StepPair pair{};
   int expanded = 0;
   unsigned mask = 0;
 };

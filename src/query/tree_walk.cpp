@@ -63,14 +63,12 @@ bool TreeWalk::stepAll(PairSteps& steps, Scratch& s) {
 unsigned TreeWalk::meeting(const PairSteps& steps) const {
   const StepPair& p = steps.pair;
   if (steps.expanded == 0) {
-    return a_.octantsMeeting(p.node[0], steps.mask, b_in_a_.slack, b_.triangleCount(p.node[1]), [&](std::size_t i, int k) {
-      return b_in_a_ * b_.corner(b_.triangle(p.node[1], i), k);
-    });
+    return a_.octantsMeeting(p.node[0], steps.mask, b_in_a_.slack, b_.triangleCount(p.node[1]),
+                             [&](std::size_t i, int k) { return b_in_a_ * b_.corner(b_.triangle(p.node[1], i), k); });
   }
   const Placement a_in_b = b_in_a_.inverse();
-  return b_.octantsMeeting(p.node[1], steps.mask, a_in_b.slack, a_.triangleCount(p.node[0]), [&](std::size_t i, int k) {
-    return a_in_b * a_.corner(a_.triangle(p.node[0], i), k);
-  });
+  return b_.octantsMeeting(p.node[1], steps.mask, a_in_b.slack, a_.triangleCount(p.node[0]),
+                           [&](std::size_t i, int k) { return a_in_b * a_.corner(a_.triangle(p.node[0], i), k); });
 }
 
 }  // namespace bocst::query

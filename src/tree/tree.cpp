@@ -169,7 +169,7 @@ void Tree::growFromGrid(NodeRef node) {
   const lattice::Cell cell = this->cell(node);
   std::uint8_t grey = 0;
   for (int o = 0; o < 8; ++o) {
-    if (grid_->grey(cell.octant(o))) grey |= 1 << o;
+    if (grid_->grey(surface_, cell.octant(o))) grey |= 1 << o;
   }
   const std::uint32_t index = addBlock(node, cell, grey);
   Block& block = blocks_[index];
@@ -184,6 +184,8 @@ void Tree::growFromGrid(NodeRef node) {
     own.extend(box);
   }
   setBox(own, cell, block.own);
+  refits_.push_back({node, block.own});
+  refits_wait_.store(true, std::memory_order_relaxed);
   setLink(node, Link(Link::kBlock, index));
 }
 

@@ -13,15 +13,15 @@ void OctantAccumulator::clear() {
   corners_.clear();
 }
 
-void OctantAccumulator::add(const Polygon& polygon, bool keep) {
-  const Eigen::Vector3d& first = polygon.corners[0];
+void OctantAccumulator::add(const Eigen::Vector3d* corners, int count, bool keep) {
+  const Eigen::Vector3d& first = corners[0];
   lo_ = lo_.cwiseMin(first);
   hi_ = hi_.cwiseMax(first);
   Eigen::Vector3d area = Eigen::Vector3d::Zero();
-  for (int i = 1; i < polygon.count; ++i) {
-    lo_ = lo_.cwiseMin(polygon.corners[i]);
-    hi_ = hi_.cwiseMax(polygon.corners[i]);
-    if (i >= 2) area += (polygon.corners[i - 1] - first).cross(polygon.corners[i] - first);
+  for (int i = 1; i < count; ++i) {
+    lo_ = lo_.cwiseMin(corners[i]);
+    hi_ = hi_.cwiseMax(corners[i]);
+    if (i >= 2) area += (corners[i - 1] - first).cross(corners[i] - first);
   }
   if (!keep) {
     slab_ = false;
@@ -33,7 +33,7 @@ void OctantAccumulator::add(const Polygon& polygon, bool keep) {
   } else {
     area_ += area;
   }
-  for (int i = 0; i < polygon.count; ++i) corners_.push_back(polygon.corners[i].cast<float>());
+  for (int i = 0; i < count; ++i) corners_.push_back(corners[i].cast<float>());
 }
 
 void OctantAccumulator::addBox(const Eigen::Vector3d& lo, const Eigen::Vector3d& hi) {

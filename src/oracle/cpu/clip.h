@@ -27,8 +27,8 @@ class OctantAccumulator {
  public:
   void clear();
 
-  /// A part of the surface inside the octant. keep: remember the corners for the slab.
-  void add(const Polygon& polygon, bool keep);
+  /// A polygon of the surface inside the octant. keep: remember the corners for the slab.
+  void add(const Eigen::Vector3d* corners, int count, bool keep);
 
   /// A part of the surface whose clipped form is not known beyond this box.
   void addBox(const Eigen::Vector3d& lo, const Eigen::Vector3d& hi);

@@ -83,9 +83,20 @@ class Expander {
     const double inverse = 1 / half_;
     Eigen::Vector3d local[3];
     for (int k = 0; k < 3; ++k) local[k] = (corners[k] - center_) * inverse;
+    if ((mask & (mask - 1)) == 0) {
+      // Most triangles are small and lie in one octant.
+      const int o = __builtin_ctz(mask);
+      const Eigen::Vector3d c = octantCenter(o, 0.5);
+      const double reach = 0.5 + kClipMargin;
+      if ((local[0] - c).lpNorm<Eigen::Infinity>() <= reach && (local[1] - c).lpNorm<Eigen::Infinity>() <= reach &&
+          (local[2] - c).lpNorm<Eigen::Infinity>() <= reach) {
+        s_.octants[o].add(local, 3, slab_);
+        return;
+      }
+    }
     std::uint8_t seen = 0;
     clipToOctants(local, mask, [&](int o, const Polygon& part) {
-      s_.octants[o].add(part, slab_);
+      s_.octants[o].add(part.corners.data(), part.count, slab_);
       seen |= 1 << o;
     });
     // The test's pad is wider than the clipper's: what only the test sees is bounded by the octant itself.

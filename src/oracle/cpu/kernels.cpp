@@ -131,6 +131,32 @@ void OctantMasks(const LocalTriangles& t, std::size_t count, float slack, std::u
   }
 }
 
+void Quantise(const double* in, std::size_t count, const double* origin, double scale, std::int16_t most,
+              std::int16_t* out) {
+  const hn::CappedTag<double, 8> dd;
+  const hn::Rebind<std::int32_t, decltype(dd)> d32;
+  const hn::Rebind<std::int16_t, decltype(dd)> d16;
+  const std::size_t lanes = hn::Lanes(dd), values = 3 * count;
+  // The axis of a lane repeats after three vectors.
+  HWY_ALIGN double pattern[24];
+  for (std::size_t i = 0; i < 3 * lanes; ++i) pattern[i] = origin[i % 3];
+  const auto factor = hn::Set(dd, scale), zero = hn::Zero(dd), top = hn::Set(dd, static_cast<double>(most));
+  std::size_t i = 0;
+  for (; i + 3 * lanes <= values; i += 3 * lanes) {
+    BOCST_UNROLL
+    for (std::size_t k = 0; k < 3; ++k) {
+      const auto from = hn::Load(dd, pattern + k * lanes);
+      const auto x = hn::Mul(hn::Sub(hn::LoadU(dd, in + i + k * lanes), from), factor);
+      const auto whole = hn::DemoteTo(d32, hn::Min(hn::Max(x, zero), top));
+      hn::StoreU(hn::DemoteTo(d16, whole), d16, out + i + k * lanes);
+    }
+  }
+  for (; i < values; ++i) {
+    const double x = (in[i] - origin[i % 3]) * scale;
+    out[i] = static_cast<std::int16_t>(x > 0 ? (x < most ? x : most) : 0);
+  }
+}
+
 const char* InstructionSet() { return hwy::TargetName(HWY_TARGET); }
 
 }  // namespace bocst::oracle::HWY_NAMESPACE
@@ -140,10 +166,16 @@ HWY_AFTER_NAMESPACE();
 namespace bocst::oracle {
 
 HWY_EXPORT(OctantMasks);
+HWY_EXPORT(Quantise);
 HWY_EXPORT(InstructionSet);
 
 void octantMasks(const LocalTriangles& triangles, std::size_t count, float slack, std::uint8_t* masks) {
   HWY_DYNAMIC_DISPATCH(OctantMasks)(triangles, count, slack, masks);
+}
+
+void quantise(const double* in, std::size_t count, const double* origin, double scale, std::int16_t most,
+              std::int16_t* out) {
+  HWY_DYNAMIC_DISPATCH(Quantise)(in, count, origin, scale, most, out);
 }
 
 const char* instructionSet() { return HWY_DYNAMIC_DISPATCH(InstructionSet)(); }

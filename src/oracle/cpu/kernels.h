@@ -24,6 +24,10 @@ struct LocalTriangles {
 /// `slack` is a distance that still counts as touching, for corners that are off by more than one rounding.
 void octantMasks(const LocalTriangles& triangles, std::size_t count, float slack, std::uint8_t* masks);
 
+/// out[3 * i + k] = (in[3 * i + k] - origin[k]) * scale, rounded down, no less than 0 and no more than `most`.
+void quantise(const double* in, std::size_t count, const double* origin, double scale, std::int16_t most,
+              std::int16_t* out);
+
 /// The instruction set in use, for people.
 const char* instructionSet();
 
