@@ -23,6 +23,10 @@ struct CellBounds {
   std::array<std::int8_t, 3> normal{0, 0, 0};
   std::int8_t slab_center = 0;
   std::uint8_t slab_half = 255;
+
+  bool operator==(const CellBounds& b) const {
+    return lo == b.lo && hi == b.hi && normal == b.normal && slab_center == b.slab_center && slab_half == b.slab_half;
+  }
 };
 
 /// The bounds of eight octants, as structure of arrays for the pair test.

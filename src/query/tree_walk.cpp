@@ -3,17 +3,34 @@
 
 namespace bocst::query {
 
+namespace {
+
+constexpr std::size_t kLooks = 8;  // at most so many at each tree after one query
+
+}  // namespace
+
 struct TreeWalk::Scratch {
   std::vector<StepPair> stack;
   Frame frames[PairSteps::kFrames];
   SetAside<TreeSide, TreeSide> aside;
   LeafPairs<TreeSide, TreeSide> leaves;
+  std::vector<tree::NodeRef> unseen[2];  // set aside, and with no slab yet
 };
 
 bool TreeWalk::run() {
   thread_local Scratch s;
   s.aside.clear();
   s.leaves.clear();
+  s.unseen[0].clear();
+  s.unseen[1].clear();
+  if (!search(s)) return false;
+  // What a query could do without, the next one meets again: a look is cheaper than growing it.
+  a_.tree().look(s.unseen[0]);
+  b_.tree().look(s.unseen[1]);
+  return true;
+}
+
+bool TreeWalk::search(Scratch& s) {
   if (boxesApart(oriented(a_.volume(a_.root())), oriented(b_.volume(b_.root())), b_in_a_)) return false;
 
   PairSteps steps{{&a_.tree(), &b_.tree()}, a_.now(), PairFrames(b_in_a_.scale, b_in_a_), s.frames, nullptr};
@@ -45,7 +62,7 @@ bool TreeWalk::stepAll(PairSteps& steps, Scratch& s) {
       case PairSteps::kDone:
         return false;
       case PairSteps::kAside:
-        s.aside.add({steps.pair.node[0], steps.pair.node[1]});
+        setAside(steps, s);
         break;
       case PairSteps::kCoarse:
         pushOctants(steps, meeting(steps));
@@ -57,6 +74,18 @@ bool TreeWalk::stepAll(PairSteps& steps, Scratch& s) {
         }
         break;
     }
+  }
+}
+
+void TreeWalk::setAside(const PairSteps& steps, Scratch& s) {
+  const StepPair& p = steps.pair;
+  s.aside.add({p.node[0], p.node[1]});
+  for (int side = 0; side < 2; ++side) {
+    if (s.unseen[side].size() == kLooks || p.link[side].tag() != tree::Link::kImplicit) continue;
+    if (p.lane[side] == StepPair::kNoLane) continue;
+    const auto& normal = steps.frames[p.lane[side] / 8].normal[side];
+    const std::size_t o = p.lane[side] % 8;
+    if (normal[0][o] == 0 && normal[1][o] == 0 && normal[2][o] == 0) s.unseen[side].push_back(p.node[side]);
   }
 }
 

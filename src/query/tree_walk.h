@@ -27,7 +27,9 @@ class TreeWalk {
  private:
   struct Scratch;
 
+  bool search(Scratch& s);
   bool stepAll(PairSteps& steps, Scratch& s);
+  void setAside(const PairSteps& steps, Scratch& s);
   unsigned meeting(const PairSteps& steps) const;
 
   const TreeSide &a_, &b_;

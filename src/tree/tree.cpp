@@ -3,6 +3,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <limits>
 #include <mutex>
 #include <numeric>
 #include <shared_mutex>
@@ -156,6 +157,17 @@ void Tree::grow(std::vector<Growth>& batch) {
   }
 }
 
+void Tree::look(const std::vector<NodeRef>& nodes) {
+  const std::unique_lock<std::mutex> lock(growth_, std::try_to_lock);
+  if (!lock.owns_lock() || grid_ == nullptr) return;
+  for (const NodeRef node : nodes) {
+    const lattice::Cell cell = this->cell(node);
+    if (cell.level != grid_->level() || link(node).tag() != Link::kImplicit) continue;
+    refits_.push_back({node, grid_->look(surface_, cell)});
+    refits_wait_.store(true, std::memory_order_relaxed);
+  }
+}
+
 void Tree::growRoot() {
   grid_tried_ = true;
   grid_ = oracle::RootGrid::make(surface_, deepest_);
@@ -263,6 +275,46 @@ static void uniteBoxes(const Block& block, oracle::CellBounds& own) {
   }
 }
 
+// A node's slab from the bounds of its octants, if it is thinner than what is known.
+static void uniteSlabs(const Block& block, oracle::CellBounds& own) {
+  // Everything in sides of the octants, about the node's middle; normals and offsets times 127, as stored.
+  Eigen::Vector3d sum = Eigen::Vector3d::Zero();
+  for (int o = 0; o < 8; ++o) {
+    if ((block.grey >> o & 1) == 0) continue;
+    const Eigen::Vector3d m(block.octants.normal[0][o], block.octants.normal[1][o], block.octants.normal[2][o]);
+    sum += m.dot(sum) < 0 ? Eigen::Vector3d(-m) : m;
+  }
+  const double length = sum.norm();
+  if (!(length > 0)) return;
+  const Eigen::Vector3d n = (sum * (127 / length)).array().round();
+  double lo = std::numeric_limits<double>::infinity(), hi = -lo;
+  for (int o = 0; o < 8; ++o) {
+    if ((block.grey >> o & 1) == 0) continue;
+    const oracle::CellBounds b = block.octants.get(o);
+    const Eigen::Vector3d cell(o & 1 ? 0.5 : -0.5, o & 2 ? 0.5 : -0.5, o & 4 ? 0.5 : -0.5);
+    Eigen::Vector3d center, half, m;
+    for (int k = 0; k < 3; ++k) {
+      center[k] = cell[k] - 0.5 + (b.lo[k] + b.hi[k]) / 510.0;
+      half[k] = (b.hi[k] - b.lo[k]) / 510.0;
+      m[k] = b.normal[k];
+    }
+    // Points of the octant are center + q with q in the box and m.q in a slab; any a bounds n.q by both.
+    const double mm = m.squaredNorm(), a = mm > 0 ? n.dot(m) / mm : 0;
+    const double middle = n.dot(center) + a * (b.slab_center - m.dot(center - cell));
+    const double reach = std::abs(a) * b.slab_half / 2 + half.dot((n - a * m).cwiseAbs());
+    lo = std::min(lo, middle - reach);
+    hi = std::max(hi, middle + reach);
+  }
+  // In sides of the node, which are twice as long; the margin is far above the rounding.
+  const double middle = std::round((lo + hi) / 4), margin = 1e-6;
+  const double thickness = std::ceil(2 * (std::max(hi / 2 - middle, middle - lo / 2) + margin));
+  const bool none = own.normal == oracle::CellBounds().normal;
+  if (!(thickness < (none ? 256 : own.slab_half)) || std::abs(middle) > 127) return;
+  for (int k = 0; k < 3; ++k) own.normal[k] = static_cast<std::int8_t>(n[k]);
+  own.slab_center = static_cast<std::int8_t>(middle);
+  own.slab_half = static_cast<std::uint8_t>(thickness);
+}
+
 void Tree::refit() {
   refits_wait_.store(false, std::memory_order_relaxed);
   std::vector<Refit> refits;
@@ -283,7 +335,8 @@ void Tree::refit() {
     Block& block = blocks_[i];
     const oracle::CellBounds before = block.own;
     uniteBoxes(block, block.own);
-    if (block.own.lo == before.lo && block.own.hi == before.hi) continue;
+    uniteSlabs(block, block.own);
+    if (block.own == before) continue;
     apply(
         block.parent == 0xffffffffu ? NodeRef{} : NodeRef::octant(block.parent, static_cast<int>(block.parent_octant)),
         block.own);

@@ -16,7 +16,7 @@
 #include <vector>
 
 #include "oracle/oracle.h"
-#include "oracle/root_grid.h"
+#include "oracle/cpu/root_grid.h"
 #include "tree/block.h"
 #include "tree/gate.h"
 #include "tree/pool.h"
@@ -92,6 +92,10 @@ class Tree {
   /// One expansion batch: makes each node's children resident (or, where enough, its list). Nodes that another thread
   /// has grown meanwhile are skipped. The gates of all trees are held shared.
   static void grow(std::vector<Growth>& batch);
+
+  /// Learns bounds of frontier nodes that a query met and could do without, so that later ones leave them out sooner;
+  /// does nothing while another thread grows the tree. Nodes that the root grid does not know are passed over.
+  void look(const std::vector<NodeRef>& nodes);
 
   // With the gate free.
 

@@ -12,7 +12,7 @@
 #include "meshes.h"
 #include "oracle/cpu/kernels.h"
 #include "oracle/reference.h"
-#include "oracle/root_grid.h"
+#include "oracle/cpu/root_grid.h"
 
 namespace bocst::oracle {
 namespace {

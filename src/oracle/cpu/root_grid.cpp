@@ -1,9 +1,11 @@
 // SPDX-License-Identifier: BSD-3-Clause
-#include "oracle/root_grid.h"
+#include "oracle/cpu/root_grid.h"
 
 #include <algorithm>
+#include <cmath>
 #include <cstring>
 
+#include "oracle/cpu/clip.h"
 #include "oracle/cpu/kernels.h"
 #include "oracle/reference.h"
 
@@ -232,6 +234,29 @@ void RootGrid::gather(const Surface& surface, const lattice::Cell& cell, std::ve
     ids.push_back(t);
     return false;
   });
+}
+
+CellBounds RootGrid::look(const Surface& surface, const lattice::Cell& cell) const {
+  const double half = cell.side() / 2.0;
+  const auto corner = cell.corner();
+  const Eigen::Vector3d center(corner[0] + half, corner[1] + half, corner[2] + half);
+  thread_local OctantAccumulator seen;
+  seen.clear();
+  anyCandidate(surface, cell, [&](std::uint32_t t) {
+    Eigen::Vector3d local[3];
+    for (int k = 0; k < 3; ++k) local[k] = (surface.corner(t, k) - center) / half;
+    seen.add(local, 3, true);
+    return false;
+  });
+  CellBounds b = seen.bounds(Eigen::Vector3d::Zero(), 2);
+  if (b.normal == CellBounds().normal) {
+    // No slab is thinner than the cell: the box is one, too, and says that we have looked.
+    const double lo = 127 * (b.lo[0] / 255.0 - 0.5), hi = 127 * (b.hi[0] / 255.0 - 0.5);
+    b.normal[0] = 127;
+    b.slab_center = static_cast<std::int8_t>(std::round((lo + hi) / 2));
+    b.slab_half = static_cast<std::uint8_t>(std::min(std::ceil(hi - lo) + 2, 255.0));
+  }
+  return b;
 }
 
 std::size_t RootGrid::bytes() const {

@@ -7,7 +7,7 @@
 #include <memory>
 #include <vector>
 
-#include "oracle/surface.h"
+#include "oracle/oracle.h"
 
 namespace bocst::oracle {
 
@@ -34,6 +34,10 @@ class RootGrid {
 
   /// Appends the triangles that may meet a cell of the finest level (a superset), each once, in no order.
   void gather(const Surface& surface, const lattice::Cell& cell, std::vector<std::uint32_t>& ids) const;
+
+  /// Box and slab of the surface in a cell of the finest level, without expanding it: of whole triangles, so not as
+  /// tight as an oracle's, and never without a slab.
+  CellBounds look(const Surface& surface, const lattice::Cell& cell) const;
 
   /// Heap bytes.
   std::size_t bytes() const;
