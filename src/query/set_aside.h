@@ -28,6 +28,15 @@ class SetAside {
   bool empty() const { return waiting_.empty(); }
   void add(const Pair& pair) { waiting_.push_back({pair, 0}); }
 
+  /// Grows what the first pair needs.
+  void invest(const A& a, const B& b) {
+    growths_.clear();
+    const Pair& p = waiting_.front().pair;
+    if (a.state(p.a) == State::kGrows) a.grow(p.a, growths_);
+    if (b.state(p.b) == State::kGrows) b.grow(p.b, growths_);
+    if (!growths_.empty()) tree::Tree::grow(growths_);
+  }
+
   /// Makes what some pairs need resident, in one batch, and gives these pairs to f. A walk that has to see everything
   /// grows all that is set aside, so it makes one batch a level. One that ends at its first hit takes the deepest
   /// overlaps first, and twice as many each time: a hit deep inside costs one small batch a level, a miss at most the

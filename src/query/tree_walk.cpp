@@ -14,6 +14,7 @@ struct TreeWalk::Scratch {
   Frame frames[PairSteps::kFrames];
   SetAside<TreeSide, TreeSide> aside;
   LeafPairs<TreeSide, TreeSide> leaves;
+  bool grew = false;
   std::vector<tree::NodeRef> unseen[2];  // set aside, and with no slab yet
 };
 
@@ -23,10 +24,12 @@ bool TreeWalk::run() {
   s.leaves.clear();
   s.unseen[0].clear();
   s.unseen[1].clear();
+  s.grew = false;
   if (!search(s)) return false;
   // What a query could do without, the next one meets again: a look is cheaper than growing it.
   a_.tree().look(s.unseen[0]);
   b_.tree().look(s.unseen[1]);
+  if (!s.aside.empty() && !s.grew) s.aside.invest(a_, b_);
   return true;
 }
 
@@ -52,6 +55,7 @@ bool TreeWalk::search(Scratch& s) {
     steps.stack = s.stack.data();
     if (stepAll(steps, s)) return true;
     if (s.aside.empty()) return false;
+    s.grew = true;
     s.aside.grow(a_, b_, b_in_a_, visitor_.endsAtFirst(), push);
   }
 }
