@@ -28,16 +28,23 @@ inline float sideOf(const PairSteps& s, const StepPair& p, int side) {
 // unnecessary.
 inline void push(PairSteps& s, const StepPair& pair, int x, std::size_t frame, const tree::Block& block,
                  unsigned mask) {
-  const std::uint32_t index = pair.link[x].index();
-  StepPair next = pair;
-  next.level[x] = static_cast<std::uint8_t>(pair.level[x] + 1);
-  next.frames = static_cast<std::uint16_t>(frame + 1);
+  const int y = 1 - x;
+  const std::uint32_t index = pair.link[x].index(), level = pair.level[x] + 1;
+  const tree::NodeRef node_y = pair.node[y];
+  const tree::Link link_y = pair.link[y];
+  const std::uint32_t level_y = pair.level[y], lane_y = pair.lane[y];
   StepPair* top = s.stack + s.depth;
   const auto put = [&](int o, tree::Link link) {
-    next.node[x] = tree::NodeRef::octant(index, o);
-    next.link[x] = link;
-    next.lane[x] = static_cast<std::uint16_t>(8 * frame + static_cast<std::size_t>(o));
-    *top++ = next;
+    top->node[x] = tree::NodeRef::octant(index, o);
+    top->link[x] = link;
+    top->level[x] = level;
+    top->lane[x] = static_cast<std::uint32_t>(8 * frame) + static_cast<std::uint32_t>(o);
+    top->node[y] = node_y;
+    top->link[y] = link_y;
+    top->level[y] = level_y;
+    top->lane[y] = lane_y;
+    top->frames = static_cast<std::uint32_t>(frame) + 1;
+    ++top;
   };
   unsigned resident = 0;
   for (unsigned left = mask; left != 0; left &= left - 1) {
@@ -196,17 +203,25 @@ HWY_INLINE void lookUp(PairSteps& s, StepPair& p, int side, std::size_t& frames)
     const float middle = static_cast<float>(1 << (lattice::kBits - 1)) * s.geometry.unit[side];
     const float corner[3] = {-middle, -middle, -middle};
     decode(s.geometry, side, root, corner, 2 * middle, s.frames[frames]);
-    p.lane[side] = static_cast<std::uint16_t>(8 * frames);
+    p.lane[side] = static_cast<std::uint32_t>(8 * frames);
   } else {
     decodeBlock(s.geometry, side, tree.block(p.node[side].block()), s.frames[frames]);
-    p.lane[side] = static_cast<std::uint16_t>(8 * frames + static_cast<std::size_t>(p.node[side].octant()));
+    p.lane[side] = static_cast<std::uint32_t>(8 * frames) + static_cast<std::uint32_t>(p.node[side].octant());
   }
   ++frames;
 }
 
 PairSteps::Event NextEvent(PairSteps& s) {
   while (s.depth > 0) {
-    StepPair p = s.stack[--s.depth];
+    const StepPair& top = s.stack[--s.depth];
+    StepPair p;
+    for (int side = 0; side < 2; ++side) {
+      p.node[side] = top.node[side];
+      p.link[side] = top.link[side];
+      p.level[side] = top.level[side];
+      p.lane[side] = top.lane[side];
+    }
+    p.frames = top.frames;
     const bool leaf0 = isLeaf(p, 0), leaf1 = isLeaf(p, 1);
     if (leaf0 && leaf1) {
       s.pair = p;
@@ -229,7 +244,7 @@ PairSteps::Event NextEvent(PairSteps& s) {
     const unsigned mask = overlapping(s.geometry, x, f, s.frames[p.lane[y] / 8], p.lane[y] % 8) & block.grey;
     if (mask == 0) continue;
     if ((y == 0 ? leaf0 && side1 < side0 : leaf1 && side0 < side1)) {
-      p.frames = static_cast<std::uint16_t>(frames);
+      p.frames = static_cast<std::uint32_t>(frames);
       s.pair = p;
       s.expanded = x;
       s.mask = mask;

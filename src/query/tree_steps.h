@@ -40,15 +40,16 @@ struct PairFrames {
   float pad, slab_pad;
 };
 
-/// A pair of nodes, one of each side.
+/// A pair of nodes, one of each side. Words of one size, written and read one by one: a processor is slow to read a wide
+/// word that was just written in parts.
 struct StepPair {
-  static constexpr std::uint16_t kNoLane = 0xffff;
+  static constexpr std::uint32_t kNoLane = 0xffffffff;
 
   tree::NodeRef node[2];
   tree::Link link[2];
-  std::uint16_t lane[2] = {kNoLane, kNoLane};  ///< 8 * frame + octant: where the nodes' volumes are, if they are.
-  std::uint8_t level[2] = {1, 1};
-  std::uint16_t frames = 0;  ///< Frames below this one are in use by this pair or those under it on the stack.
+  std::uint32_t level[2] = {1, 1};
+  std::uint32_t lane[2] = {kNoLane, kNoLane};  ///< 8 * frame + octant: where the nodes' volumes are, if they are.
+  std::uint32_t frames = 0;  ///< Frames below this one are in use by this pair or those under it on the stack.
 };
 
 /// The depth-first walk over resident pairs of two trees, exact answers: up to the next pair of leaves.

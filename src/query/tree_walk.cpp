@@ -46,7 +46,7 @@ bool TreeWalk::search(Scratch& s) {
     p.node[1] = pair.b;
     for (int side = 0; side < 2; ++side) {
       p.link[side] = steps.tree[side]->link(p.node[side]);
-      p.level[side] = static_cast<std::uint8_t>(steps.tree[side]->cell(p.node[side]).level);
+      p.level[side] = static_cast<std::uint32_t>(steps.tree[side]->cell(p.node[side]).level);
     }
     s.stack[steps.depth++] = p;
   };
