@@ -134,11 +134,49 @@ HWY_INLINE V norm1(Vec3 a) { return hn::Add(hn::Add(hn::Abs(a.x), hn::Abs(a.y)),
 HWY_INLINE V min3(V a, V b, V c) { return hn::Min(hn::Min(a, b), c); }
 HWY_INLINE V max3(V a, V b, V c) { return hn::Max(hn::Max(a, b), c); }
 
+void PlaceTriangles(RawTriangles& raw, std::size_t count, const PackPlacement& place, TrianglePack& pack) {
+  const hn::CappedTag<double, 8> dd;
+  const hn::Rebind<float, decltype(dd)> df;
+  pack.count = count;
+  // Whole vectors are read: copies of the first triangle change no maximum.
+  const std::size_t whole = (count + 7) / 8 * 8;
+  for (auto& row : raw.xyz) {
+    for (std::size_t i = count; i < whole; ++i) row[i] = row[0];
+  }
+  auto size = hn::Zero(df);
+  for (std::size_t i = 0; i < whole; i += hn::Lanes(dd)) {
+    BOCST_UNROLL
+    for (std::size_t k = 0; k < 3; ++k) {
+      BOCST_UNROLL
+      for (std::size_t c = 0; c < 3; ++c) {
+        auto x = hn::MulAdd(hn::Set(dd, place.linear[c][0]), hn::Load(dd, raw.xyz[3 * k] + i),
+                            hn::Set(dd, place.offset[c]));
+        x = hn::MulAdd(hn::Set(dd, place.linear[c][1]), hn::Load(dd, raw.xyz[3 * k + 1] + i), x);
+        x = hn::MulAdd(hn::Set(dd, place.linear[c][2]), hn::Load(dd, raw.xyz[3 * k + 2] + i), x);
+        const auto f = hn::DemoteTo(df, x);
+        hn::Store(f, df, pack.xyz[3 * k + c] + i);
+        size = hn::Max(size, hn::Abs(f));
+      }
+    }
+  }
+  pack.size = hn::GetLane(hn::MaxOfLanes(df, size));
+}
+
 std::size_t TouchingPairs(const TrianglePack& rows, const TrianglePack& lanes, float slack, PackPair* pairs) {
   const D d;
   const float size = (rows.size > lanes.size ? rows.size : lanes.size) * 1.0001f;
   const V reach = hn::Set(d, 32 * 0x1p-24f * size + slack);
   std::size_t found = 0;
+  // The rows' boxes, once for all lanes.
+  alignas(64) float lows[3][TrianglePack::kCapacity], highs[3][TrianglePack::kCapacity];
+  for (std::size_t i = 0; i < rows.count; i += hn::Lanes(d)) {
+    BOCST_UNROLL
+    for (int c = 0; c < 3; ++c) {
+      const V a = hn::Load(d, rows.xyz[c] + i), b = hn::Load(d, rows.xyz[3 + c] + i), e = hn::Load(d, rows.xyz[6 + c] + i);
+      hn::Store(hn::Sub(min3(a, b, e), reach), d, lows[c] + i);
+      hn::Store(hn::Add(max3(a, b, e), reach), d, highs[c] + i);
+    }
+  }
   for (std::size_t i = 0; i < lanes.count; i += hn::Lanes(d)) {
     Vec3 q[3], f[3];
     BOCST_UNROLL
@@ -156,19 +194,17 @@ std::size_t TouchingPairs(const TrianglePack& rows, const TrianglePack& lanes, f
     const V mpad = hn::Mul(reach, hn::Add(norm1(m), hn::Mul(norm1(f[0]), norm1(f[1]))));
 
     for (std::size_t row = 0; row < rows.count; ++row) {
+      M near = hn::And(hn::Le(qmin.x, hn::Set(d, highs[0][row])), hn::Ge(qmax.x, hn::Set(d, lows[0][row])));
+      near = hn::And(near, hn::And(hn::Le(qmin.y, hn::Set(d, highs[1][row])), hn::Ge(qmax.y, hn::Set(d, lows[1][row]))));
+      near = hn::And(near, hn::And(hn::Le(qmin.z, hn::Set(d, highs[2][row])), hn::Ge(qmax.z, hn::Set(d, lows[2][row]))));
+      if (hn::AllFalse(d, near)) continue;
+
       Vec3 p[3];
       BOCST_UNROLL
       for (int k = 0; k < 3; ++k) {
         p[k] = {hn::Set(d, rows.xyz[3 * k][row]), hn::Set(d, rows.xyz[3 * k + 1][row]),
                 hn::Set(d, rows.xyz[3 * k + 2][row])};
       }
-      const Vec3 pmin{min3(p[0].x, p[1].x, p[2].x), min3(p[0].y, p[1].y, p[2].y), min3(p[0].z, p[1].z, p[2].z)};
-      const Vec3 pmax{max3(p[0].x, p[1].x, p[2].x), max3(p[0].y, p[1].y, p[2].y), max3(p[0].z, p[1].z, p[2].z)};
-      M near = hn::And(hn::Le(hn::Sub(qmin.x, reach), pmax.x), hn::Ge(hn::Add(qmax.x, reach), pmin.x));
-      near = hn::And(near, hn::And(hn::Le(hn::Sub(qmin.y, reach), pmax.y), hn::Ge(hn::Add(qmax.y, reach), pmin.y)));
-      near = hn::And(near, hn::And(hn::Le(hn::Sub(qmin.z, reach), pmax.z), hn::Ge(hn::Add(qmax.z, reach), pmin.z)));
-      if (hn::AllFalse(d, near)) continue;
-
       const Vec3 e[3] = {sub(p[1], p[0]), sub(p[2], p[1]), sub(p[0], p[2])};
       const Vec3 n = cross(e[0], e[1]);
       const V npad = hn::Mul(reach, hn::Add(norm1(n), hn::Mul(norm1(e[0]), norm1(e[1]))));
@@ -213,10 +249,15 @@ HWY_AFTER_NAMESPACE();
 namespace bocst::query {
 
 HWY_EXPORT(OverlappingOctants);
+HWY_EXPORT(PlaceTriangles);
 HWY_EXPORT(TouchingPairs);
 
 std::uint8_t overlappingOctants(const oracle::OctantBounds& octants, const OneVolume& volume) {
   return HWY_DYNAMIC_DISPATCH(OverlappingOctants)(octants, volume);
+}
+
+void placeTriangles(RawTriangles& raw, std::size_t count, const PackPlacement& place, TrianglePack& pack) {
+  HWY_DYNAMIC_DISPATCH(PlaceTriangles)(raw, count, place, pack);
 }
 
 std::size_t touchingPairs(const TrianglePack& rows, const TrianglePack& lanes, float slack, PackPair* pairs) {

@@ -37,6 +37,20 @@ struct TrianglePack {
   float size = 0;  ///< Largest coordinate, in absolute value.
 };
 
+/// Corners as given, to be placed: coordinate c of corner k at [3 * k + c].
+struct RawTriangles {
+  alignas(64) double xyz[9][TrianglePack::kCapacity];
+};
+
+/// Corners are linear * v + offset: computed in double, rounded once.
+struct PackPlacement {
+  double linear[3][3];
+  double offset[3];
+};
+
+/// Fills the pack (all but the ids) with `count` triangles, 1 to kCapacity. What is in `raw` beyond is overwritten.
+void placeTriangles(RawTriangles& raw, std::size_t count, const PackPlacement& place, TrianglePack& pack);
+
 /// Two triangles that may touch, as positions in their packs.
 struct PackPair {
   std::uint8_t row, lane;

@@ -2,7 +2,6 @@
 #pragma once
 
 #include <algorithm>
-#include <cmath>
 #include <cstddef>
 #include <cstdint>
 
@@ -22,7 +21,7 @@ class LeafPairs {
   template <typename F>
   bool test(const A& a, typename A::Node node_a, const B& b, typename B::Node node_b, const Placement& b_in_a, F&& f) {
     const Eigen::Vector3d center = a.cellSphere(node_a).center;
-    const ToPack to_a = toPack(a, Placement(), center), to_b = toPack(b, b_in_a, center);
+    const PackPlacement to_a = toPack(a, Placement(), center), to_b = toPack(b, b_in_a, center);
     const std::size_t count_a = a.triangleCount(node_a), count_b = b.triangleCount(node_b);
     for (std::size_t i = 0; i < count_a; i += TrianglePack::kCapacity) {
       const std::uint64_t key = std::uint64_t{node_a.bits} << 32 | i;
@@ -42,18 +41,12 @@ class LeafPairs {
  private:
   static constexpr std::uint64_t kNoPack = ~std::uint64_t{0};
 
-  // Corners straight from the vertices: out = linear * v + offset, in the frame of A about the leaf of A.
-  struct ToPack {
-    double linear[3][3];
-    double offset[3];
-  };
-
-  // Vertices of a side lie at (v - origin) * inverse_unit in its frame, which `place` puts into that of A.
+  // Corners straight from the vertices into the frame of A, about the leaf of A. Vertices of a side lie at (v - origin) * inverse_unit in its frame, which `place` puts into that of A.
   template <typename Side>
-  static ToPack toPack(const Side& side, const Placement& place, const Eigen::Vector3d& center) {
+  static PackPlacement toPack(const Side& side, const Placement& place, const Eigen::Vector3d& center) {
     const Eigen::Matrix3d linear = place.rotation * (place.scale * side.inverseUnit());
     const Eigen::Vector3d offset = place.translation - linear * side.origin() - center;
-    ToPack t;
+    PackPlacement t;
     for (int r = 0; r < 3; ++r) {
       for (int c = 0; c < 3; ++c) t.linear[r][c] = linear(r, c);
       t.offset[r] = offset[r];
@@ -62,26 +55,20 @@ class LeafPairs {
   }
 
   template <typename Side, typename Node>
-  static void fill(const Side& side, Node node, std::size_t begin, const ToPack& to, TrianglePack& pack) {
-    pack.count = std::min(side.triangleCount(node) - begin, TrianglePack::kCapacity);
-    float size = 0;
-    for (std::size_t i = 0; i < pack.count; ++i) {
+  void fill(const Side& side, Node node, std::size_t begin, const PackPlacement& place, TrianglePack& pack) {
+    const std::size_t count = std::min(side.triangleCount(node) - begin, TrianglePack::kCapacity);
+    for (std::size_t i = 0; i < count; ++i) {
       const std::uint32_t t = side.triangle(node, begin + i);
       pack.ids[i] = t;
       for (int k = 0; k < 3; ++k) {
         const auto& v = side.vertex(t, k);
-        const double x = v[0], y = v[1], z = v[2];
-        for (int c = 0; c < 3; ++c) {
-          const float f =
-              static_cast<float>(to.linear[c][0] * x + to.linear[c][1] * y + to.linear[c][2] * z + to.offset[c]);
-          pack.xyz[3 * k + c][i] = f;
-          size = std::max(size, std::abs(f));
-        }
+        for (int c = 0; c < 3; ++c) raw_.xyz[3 * k + c][i] = v[c];
       }
     }
-    pack.size = size;
+    placeTriangles(raw_, count, place, pack);
   }
 
+  RawTriangles raw_;
   TrianglePack a_, b_;
   std::uint64_t pack_of_a_ = kNoPack;  // which node and part of its list pack a_ holds
   PackPair found_[TrianglePack::kCapacity * TrianglePack::kCapacity];
