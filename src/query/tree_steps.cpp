@@ -186,7 +186,11 @@ HWY_INLINE unsigned overlapping(const PairFrames& g, int own, const Frame& f, co
   return result;
 }
 
-HWY_INLINE void decodeBlock(const PairFrames& g, int own, const tree::Block& block, Frame& f) {
+// The octants of a block. Pairs that differ in the other node only come one after the other and find the frame filled.
+HWY_INLINE void decodeBlock(const PairFrames& g, int own, std::uint32_t index, const tree::Block& block, Frame& f) {
+  const std::uint64_t holds = std::uint64_t{index} << 1 | static_cast<std::uint64_t>(own);
+  if (f.holds == holds) return;
+  f.holds = holds;
   const int side = 1 << (lattice::kMaxLevel - 1 - block.level), middle = 1 << (lattice::kBits - 1);
   float corner[3];
   for (int k = 0; k < 3; ++k) corner[k] = static_cast<float>(2 * block.at[k] * side - middle) * g.unit[own];
@@ -203,9 +207,11 @@ HWY_INLINE void lookUp(PairSteps& s, StepPair& p, int side, std::size_t& frames)
     const float middle = static_cast<float>(1 << (lattice::kBits - 1)) * s.geometry.unit[side];
     const float corner[3] = {-middle, -middle, -middle};
     decode(s.geometry, side, root, corner, 2 * middle, s.frames[frames]);
+    s.frames[frames].holds = Frame::kNothing;
     p.lane[side] = static_cast<std::uint32_t>(8 * frames);
   } else {
-    decodeBlock(s.geometry, side, tree.block(p.node[side].block()), s.frames[frames]);
+    const std::uint32_t index = p.node[side].block();
+    decodeBlock(s.geometry, side, index, tree.block(index), s.frames[frames]);
     p.lane[side] = static_cast<std::uint32_t>(8 * frames) + static_cast<std::uint32_t>(p.node[side].octant());
   }
   ++frames;
@@ -240,7 +246,7 @@ PairSteps::Event NextEvent(PairSteps& s) {
     const tree::Block& block = s.tree[x]->block(p.link[x].index());
     s.tree[x]->touch(block, s.now);
     Frame& f = s.frames[frames];
-    decodeBlock(s.geometry, x, block, f);
+    decodeBlock(s.geometry, x, p.link[x].index(), block, f);
     const unsigned mask = overlapping(s.geometry, x, f, s.frames[p.lane[y] / 8], p.lane[y] % 8) & block.grey;
     if (mask == 0) continue;
     if ((y == 0 ? leaf0 && side1 < side0 : leaf1 && side0 < side1)) {

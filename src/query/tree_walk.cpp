@@ -36,6 +36,7 @@ bool TreeWalk::run() {
 bool TreeWalk::search(Scratch& s) {
   if (boxesApart(oriented(a_.volume(a_.root())), oriented(b_.volume(b_.root())), b_in_a_)) return false;
 
+  for (Frame& f : s.frames) f.holds = Frame::kNothing;
   PairSteps steps{{&a_.tree(), &b_.tree()}, a_.now(), PairFrames(b_in_a_.scale, b_in_a_), s.frames, nullptr};
   const auto push = [&](const SetAside<TreeSide, TreeSide>::Pair& pair) {
     if (s.stack.size() < steps.depth + 1 + PairSteps::kStackRoom) {
