@@ -149,8 +149,8 @@ void PlaceTriangles(RawTriangles& raw, std::size_t count, const PackPlacement& p
     for (std::size_t k = 0; k < 3; ++k) {
       BOCST_UNROLL
       for (std::size_t c = 0; c < 3; ++c) {
-        auto x = hn::MulAdd(hn::Set(dd, place.linear[c][0]), hn::Load(dd, raw.xyz[3 * k] + i),
-                            hn::Set(dd, place.offset[c]));
+        auto x =
+            hn::MulAdd(hn::Set(dd, place.linear[c][0]), hn::Load(dd, raw.xyz[3 * k] + i), hn::Set(dd, place.offset[c]));
         x = hn::MulAdd(hn::Set(dd, place.linear[c][1]), hn::Load(dd, raw.xyz[3 * k + 1] + i), x);
         x = hn::MulAdd(hn::Set(dd, place.linear[c][2]), hn::Load(dd, raw.xyz[3 * k + 2] + i), x);
         const auto f = hn::DemoteTo(df, x);
@@ -172,7 +172,8 @@ std::size_t TouchingPairs(const TrianglePack& rows, const TrianglePack& lanes, f
   for (std::size_t i = 0; i < rows.count; i += hn::Lanes(d)) {
     BOCST_UNROLL
     for (int c = 0; c < 3; ++c) {
-      const V a = hn::Load(d, rows.xyz[c] + i), b = hn::Load(d, rows.xyz[3 + c] + i), e = hn::Load(d, rows.xyz[6 + c] + i);
+      const V a = hn::Load(d, rows.xyz[c] + i), b = hn::Load(d, rows.xyz[3 + c] + i),
+              e = hn::Load(d, rows.xyz[6 + c] + i);
       hn::Store(hn::Sub(min3(a, b, e), reach), d, lows[c] + i);
       hn::Store(hn::Add(max3(a, b, e), reach), d, highs[c] + i);
     }
@@ -195,8 +196,10 @@ std::size_t TouchingPairs(const TrianglePack& rows, const TrianglePack& lanes, f
 
     for (std::size_t row = 0; row < rows.count; ++row) {
       M near = hn::And(hn::Le(qmin.x, hn::Set(d, highs[0][row])), hn::Ge(qmax.x, hn::Set(d, lows[0][row])));
-      near = hn::And(near, hn::And(hn::Le(qmin.y, hn::Set(d, highs[1][row])), hn::Ge(qmax.y, hn::Set(d, lows[1][row]))));
-      near = hn::And(near, hn::And(hn::Le(qmin.z, hn::Set(d, highs[2][row])), hn::Ge(qmax.z, hn::Set(d, lows[2][row]))));
+      near =
+          hn::And(near, hn::And(hn::Le(qmin.y, hn::Set(d, highs[1][row])), hn::Ge(qmax.y, hn::Set(d, lows[1][row]))));
+      near =
+          hn::And(near, hn::And(hn::Le(qmin.z, hn::Set(d, highs[2][row])), hn::Ge(qmax.z, hn::Set(d, lows[2][row]))));
       if (hn::AllFalse(d, near)) continue;
 
       Vec3 p[3];

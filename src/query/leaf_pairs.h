@@ -41,7 +41,8 @@ class LeafPairs {
  private:
   static constexpr std::uint64_t kNoPack = ~std::uint64_t{0};
 
-  // Corners straight from the vertices into the frame of A, about the leaf of A. Vertices of a side lie at (v - origin) * inverse_unit in its frame, which `place` puts into that of A.
+  // Corners straight from the vertices into the frame of A, about the leaf of A. Vertices of a side lie at (v - origin)
+  // * inverse_unit in its frame, which `place` puts into that of A.
   template <typename Side>
   static PackPlacement toPack(const Side& side, const Placement& place, const Eigen::Vector3d& center) {
     const Eigen::Matrix3d linear = place.rotation * (place.scale * side.inverseUnit());

@@ -43,8 +43,8 @@ struct PairFrames {
   float pad, slab_pad;
 };
 
-/// A pair of nodes, one of each side. Words of one size, written and read one by one: a processor is slow to read a wide
-/// word that was just written in parts.
+/// A pair of nodes, one of each side. Words of one size, written and read one by one: a processor is slow to read a
+/// wide word that was just written in parts.
 struct StepPair {
   static constexpr std::uint32_t kNoLane = 0xffffffff;
 

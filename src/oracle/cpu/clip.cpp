@@ -75,7 +75,8 @@ CellBounds OctantAccumulator::bounds(const Eigen::Vector3d& center, double side)
   }
   // Corners and sums in float: at most 8 roundings of values below 3 * 127 * size.
   const double size = std::max({(lo_ - center).lpNorm<Eigen::Infinity>(), (hi_ - center).lpNorm<Eigen::Infinity>(),
-                                center.lpNorm<Eigen::Infinity>()}) * 2;
+                                center.lpNorm<Eigen::Infinity>()}) *
+                      2;
   const double round = 8 * 0x1p-24 * 3 * 127 * size + 127 * 2 * margin;
   const double below = (lo - round) / side, above = (hi + round) / side;
   const double middle = std::round((below + above) / 2);
