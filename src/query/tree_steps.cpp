@@ -186,15 +186,21 @@ HWY_INLINE unsigned overlapping(const PairFrames& g, int own, const Frame& f, co
   return result;
 }
 
+template <typename Position>
+HWY_INLINE void decodeCell(const PairFrames& g, int own, int level, const Position& at,
+                           const oracle::OctantBounds& octants, Frame& f) {
+  const int side = 1 << (lattice::kMaxLevel - 1 - level), middle = 1 << (lattice::kBits - 1);
+  float corner[3];
+  for (int k = 0; k < 3; ++k) corner[k] = static_cast<float>(2 * static_cast<int>(at[k]) * side - middle) * g.unit[own];
+  decode(g, own, octants, corner, static_cast<float>(side) * g.unit[own], f);
+}
+
 // The octants of a block. Pairs that differ in the other node only come one after the other and find the frame filled.
 HWY_INLINE void decodeBlock(const PairFrames& g, int own, std::uint32_t index, const tree::Block& block, Frame& f) {
   const std::uint64_t holds = std::uint64_t{index} << 1 | static_cast<std::uint64_t>(own);
   if (f.holds == holds) return;
   f.holds = holds;
-  const int side = 1 << (lattice::kMaxLevel - 1 - block.level), middle = 1 << (lattice::kBits - 1);
-  float corner[3];
-  for (int k = 0; k < 3; ++k) corner[k] = static_cast<float>(2 * block.at[k] * side - middle) * g.unit[own];
-  decode(g, own, block.octants, corner, static_cast<float>(side) * g.unit[own], f);
+  decodeCell(g, own, block.level, block.at, block.octants, f);
 }
 
 // Where the volume of a pair's node on one side is; for pairs that come without frames.
@@ -215,6 +221,14 @@ HWY_INLINE void lookUp(PairSteps& s, StepPair& p, int side, std::size_t& frames)
     p.lane[side] = static_cast<std::uint32_t>(8 * frames) + static_cast<std::uint32_t>(p.node[side].octant());
   }
   ++frames;
+}
+
+std::uint8_t OverlappingOctants(const PairFrames& geometry, int own, const CellOctants& cell, const CellOctants& other,
+                                int octant) {
+  Frame f, y;
+  decodeCell(geometry, own, cell.cell.level, cell.cell.at, cell.octants, f);
+  decodeCell(geometry, 1 - own, other.cell.level, other.cell.at, other.octants, y);
+  return static_cast<std::uint8_t>(overlapping(geometry, own, f, y, static_cast<std::size_t>(octant)));
 }
 
 PairSteps::Event NextEvent(PairSteps& s) {
@@ -267,6 +281,7 @@ HWY_AFTER_NAMESPACE();
 #if HWY_ONCE
 namespace bocst::query {
 
+HWY_EXPORT(OverlappingOctants);
 HWY_EXPORT(NextEvent);
 
 PairFrames::PairFrames(double scale_of_1, const Placement& one_in_zero) {
@@ -288,6 +303,11 @@ PairFrames::PairFrames(double scale_of_1, const Placement& one_in_zero) {
   const double size = t.norm() + std::sqrt(3.0) * (q0 + q1), defect = 4 * size * one_in_zero.defect;
   pad = static_cast<float>((48 * 0x1p-24 * size + defect + one_in_zero.slack) * 1.0001);
   slab_pad = static_cast<float>((160 * 0x1p-24 * size + 2 * defect + 1.02 * one_in_zero.slack) * 1.0001);
+}
+
+std::uint8_t overlappingOctants(const PairFrames& geometry, int own, const CellOctants& cell, const CellOctants& other,
+                                int octant) {
+  return HWY_DYNAMIC_DISPATCH(OverlappingOctants)(geometry, own, cell, other, octant);
 }
 
 PairSteps::Event nextEvent(PairSteps& steps) { return HWY_DYNAMIC_DISPATCH(NextEvent)(steps); }

@@ -84,6 +84,17 @@ struct PairSteps {
 /// Goes on to the next event. Chosen at run time for the machine's instruction set.
 PairSteps::Event nextEvent(PairSteps& steps);
 
+/// The octants of a cell, wherever they come from.
+struct CellOctants {
+  lattice::Cell cell;
+  oracle::OctantBounds octants;
+};
+
+/// What a step computes, by itself: bit o is set unless octant o of a cell of side `own` is surely apart from octant
+/// `octant` of a cell of the other side.
+std::uint8_t overlappingOctants(const PairFrames& geometry, int own, const CellOctants& cell, const CellOctants& other,
+                                int octant);
+
 /// Puts the octants in `mask` of the expanded node of steps.pair on the stack, after kCoarse.
 void pushOctants(PairSteps& steps, unsigned mask);
 

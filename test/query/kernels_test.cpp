@@ -10,6 +10,7 @@
 #include <set>
 
 #include "meshes.h"
+#include "query/tree_steps.h"
 #include "query/triangle.h"
 #include "query/volume.h"
 
@@ -112,6 +113,46 @@ TEST_P(EveryTarget, NoOctantIsLostThatSharesAPoint) {
   }
   EXPECT_GT(shared, 5000);
   EXPECT_GT(parted, shared / 2) << "a test that parts nothing proves nothing";
+}
+
+TEST_P(EveryTarget, NoOctantIsLostThatSharesAPointInFramesOfTheRoots) {
+  std::mt19937_64 g(12);
+  std::uniform_real_distribution<double> u(-1, 1);
+  int shared = 0, parted = 0;
+  for (int round = 0; round < 20000; ++round) {
+    // Two cells at any depth of two trees, placed so that a point of an octant of one is one of an octant of the other.
+    CellOctants cells[2];
+    Eigen::Vector3d points[2];
+    int octants[2];
+    bool found = true;
+    for (int side = 0; side < 2 && found; ++side) {
+      CellOctants& c = cells[side];
+      c.cell.level = 1 + static_cast<int>(g() % 14);
+      for (auto& x : c.cell.at) x = static_cast<std::uint32_t>(g() % (1u << (c.cell.level - 1)));
+      for (int o = 0; o < 8; ++o) c.octants.set(o, randomBounds(g));
+      octants[side] = static_cast<int>(g() % 8);
+      const lattice::Cell octant = c.cell.octant(octants[side]);
+      const auto corner = octant.corner();
+      found = randomPoint(g, c.octants.get(octants[side]), Eigen::Vector3d(corner[0], corner[1], corner[2]),
+                          octant.side(), points[side]);
+    }
+    if (!found) continue;
+    Placement to;
+    to.rotation = test::randomRotation(g);
+    to.scale = std::pow(2.0, 10 * u(g));
+    to.translation = points[0] - to.scale * (to.rotation * points[1]);
+    to.ready();
+    ASSERT_TRUE(PairFrames::fits(to.scale));
+    const PairFrames frames(to.scale, to);
+    ++shared;
+    for (int own = 0; own < 2; ++own) {
+      const unsigned mask = overlappingOctants(frames, own, cells[own], cells[1 - own], octants[1 - own]);
+      ASSERT_TRUE(mask >> octants[own] & 1) << "round " << round << " side " << own;
+      parted += mask != 255;
+    }
+  }
+  EXPECT_GT(shared, 5000);
+  EXPECT_GT(parted, shared) << "a test that parts nothing proves nothing";
 }
 
 void put(TrianglePack& pack, std::size_t i, const Corners& t) {
