@@ -21,6 +21,9 @@ class SetAside {
   /// Pairs in the first batch of a walk that may end early; a few oracle answers cost less than one too many.
   static constexpr std::size_t kFirstBatch = 4;
 
+  /// Pairs that a hit grows for the next query.
+  static constexpr std::size_t kInvestment = 2;
+
   void clear() {
     waiting_.clear();
     batch_ = kFirstBatch;
@@ -28,13 +31,11 @@ class SetAside {
   bool empty() const { return waiting_.empty(); }
   void add(const Pair& pair) { waiting_.push_back({pair, 0}); }
 
-  /// Grows what the first pair needs.
-  void invest(const A& a, const B& b) {
+  /// Grows what the first few pairs need, in one batch.
+  void growFirst(const A& a, const B& b) {
     growths_.clear();
-    const Pair& p = waiting_.front().pair;
-    if (a.state(p.a) == State::kGrows) a.grow(p.a, growths_);
-    if (b.state(p.b) == State::kGrows) b.grow(p.b, growths_);
-    if (!growths_.empty()) tree::Tree::grow(growths_);
+    for (std::size_t i = 0; i < std::min(waiting_.size(), kInvestment); ++i) add(a, b, waiting_[i].pair);
+    growAll();
   }
 
   /// Makes what some pairs need resident, in one batch, and gives these pairs to f. A walk that has to see everything
@@ -58,13 +59,8 @@ class SetAside {
       batch_ *= 2;
     }
     growths_.clear();
-    for (auto w = end; w != waiting_.end(); ++w) {
-      // Both sides where both must grow: the smaller is the next to be expanded.
-      if (a.state(w->pair.a) == State::kGrows) a.grow(w->pair.a, growths_);
-      if (b.state(w->pair.b) == State::kGrows) b.grow(w->pair.b, growths_);
-    }
-    uniqueGrowths(growths_);
-    if (!growths_.empty()) tree::Tree::grow(growths_);
+    for (auto w = end; w != waiting_.end(); ++w) add(a, b, w->pair);
+    growAll();
     for (auto w = end; w != waiting_.end(); ++w) f(w->pair);
     waiting_.erase(end, waiting_.end());
   }
@@ -74,6 +70,17 @@ class SetAside {
     Pair pair;
     double gap;
   };
+
+  // Both sides where both must grow: the smaller is the next to be expanded.
+  void add(const A& a, const B& b, const Pair& pair) {
+    if (a.state(pair.a) == State::kGrows) a.grow(pair.a, growths_);
+    if (b.state(pair.b) == State::kGrows) b.grow(pair.b, growths_);
+  }
+
+  void growAll() {
+    uniqueGrowths(growths_);
+    if (!growths_.empty()) tree::Tree::grow(growths_);
+  }
 
   template <typename Side>
   static bool asks(const Side& side, typename Side::Node node) {

@@ -50,4 +50,11 @@ std::unique_ptr<BocstPair> makeBocstPair(Scalar scalar, const MeshArrays& a, con
   return scalar == Scalar::kFloat ? makePair<float>(a, b, options) : makePair<double>(a, b, options);
 }
 
+std::unique_ptr<BocstPair> makeBocstPair(HandedOver&& a, HandedOver&& b, const Options& options) {
+  const auto make = [&options](HandedOver& mesh) {
+    return std::make_unique<Modeld>(Mesh::fromIndices(std::move(mesh.vertices), std::move(mesh.triangles)), options);
+  };
+  return std::make_unique<ModelPair<double>>(make(a), make(b));
+}
+
 }  // namespace bocst::program

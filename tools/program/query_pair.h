@@ -76,4 +76,15 @@ class BocstPair : public QueryPair {
 std::unique_ptr<BocstPair> makeBocstPair(Scalar scalar, const MeshArrays& a, const MeshArrays& b,
                                          const Options& options);
 
+/// Vertices and 32-bit indices, to be handed over.
+struct HandedOver {
+  std::vector<Eigen::Vector3d> vertices;
+  std::vector<Mesh::Indices> triangles;
+
+  explicit HandedOver(const Mesh& mesh) : vertices(mesh.vertices()), triangles(mesh.triangles()) {}
+};
+
+/// The same, in double, of arrays that nobody else needs.
+std::unique_ptr<BocstPair> makeBocstPair(HandedOver&& a, HandedOver&& b, const Options& options);
+
 }  // namespace bocst::program
