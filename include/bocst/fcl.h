@@ -57,7 +57,22 @@ BOCST_EXPORT std::size_t collide(const fcl::CollisionGeometry<S>* o1, const fcl:
                                  const Solver* solver, const fcl::CollisionRequest<S>& request,
                                  fcl::CollisionResult<S>& result);
 
-/// As fcl::distance. In this version a pair with a Model throws std::invalid_argument.
+/// How far are the surfaces of the two geometries from each other, at these poses (world from geometry)? As
+/// fcl::distance: lowers result.min_distance, a running minimum that a result brings along, and returns it; does nothing
+/// when request.isSatisfied(result) already.
+///
+/// A pair with a Model: partners are another Model and fcl::BVHModel<BV> of any BV. Surfaces that touch are at distance
+/// 0; a model wholly inside another is as far as the surfaces are, for models are shells.
+/// - o1, o2, b1, b2, nearest_points: the caller's order; triangle ids (or the Morton codes of cells, see collide());
+///   points on the surfaces (or spheres), world frame, if enable_nearest_points.
+/// - with conservative answers, the distance of the spheres of the collision depth: never more than that of the
+///   surfaces, 0 where spheres overlap.
+/// - abs_err and rel_err allow an answer that is larger than the least distance by so much, as in FCL.
+/// - enable_signed_distance: surfaces that touch are at minus the penetration_depth of one contact as collide() gives
+///   it, with both points there, as FCL does for meshes; it is about two triangles, not about two solids.
+/// Errors of the answer are below 1e-11 of the sizes; it does not depend on the solver, nor on what is resident.
+/// @throws std::invalid_argument for a partner that is not supported.
+/// Thread rule: as collide().
 template <typename S>
 BOCST_EXPORT S distance(const fcl::CollisionGeometry<S>* o1, const fcl::Transform3<S>& X_W1,
                         const fcl::CollisionGeometry<S>* o2, const fcl::Transform3<S>& X_W2,

@@ -13,7 +13,7 @@
 #include <stdexcept>
 #include <string>
 
-#include "fcl/bvh_side.h"
+#include "fcl/pair.h"
 #include "query/pair_set.h"
 #include "query/pair_walk.h"
 #include "query/tree_walk.h"
@@ -99,7 +99,10 @@ class Collector : public query::Visitor {
     if (!degenerate && !needsGeometry()) return add(a, b, nullptr);
     for (Eigen::Vector3d& x : qd) x = R_12_.template cast<double>() * x + p_12_.template cast<double>();
     // FCL's axes do not separate segments and points from everything: there the distance decides.
-    if (degenerate && query::distanceDegenerate(pd, qd) > magnitude_ * 16 * kEpsilon) return false;
+    if (degenerate) {
+      Eigen::Vector3d on_p, on_q;
+      if (query::nearestPoints(pd, qd, on_p, on_q) > magnitude_ * 16 * kEpsilon) return false;
+    }
     if (q_.request.enable_cost) addCost(a, b);
     if (!needsGeometry()) return add(a, b, nullptr);
     query::Touch touch = query::partTriangles(pd, qd);
@@ -225,55 +228,6 @@ void traverse(Walk&& walk) {
   fcl::detail::collide(&node);
 }
 
-double magnitudeOf(const Eigen::AlignedBox3d& box) {
-  return std::max(box.min().cwiseAbs().maxCoeff(), box.max().cwiseAbs().maxCoeff());
-}
-
-/// From the frame of B (origin and unit in B's model frame) to that of A, through the pose X_AB in model units.
-template <typename S>
-Placement placementOf(const fcl::Transform3<S>& X_WA, const fcl::Transform3<S>& X_WB, const Eigen::Vector3d& origin_a,
-                      double unit_a, const Eigen::Vector3d& origin_b, double unit_b, double magnitude) {
-  fcl::Matrix3<S> R;
-  fcl::Vector3<S> t;
-  fcl::relativeTransform(X_WA.linear(), X_WA.translation(), X_WB.linear(), X_WB.translation(), R, t);
-  Placement p;
-  p.rotation = R.template cast<double>();
-  p.scale = unit_b / unit_a;
-  p.translation = (p.rotation * origin_b + t.template cast<double>() - origin_a) / unit_a;
-  // What FCL's triangle test, which computes R q + t in S, may take for a contact.
-  p.slack = magnitude * 32 * static_cast<double>(std::numeric_limits<S>::epsilon()) / unit_a;
-  p.defect = (p.rotation.transpose() * p.rotation - Eigen::Matrix3d::Identity()).cwiseAbs().maxCoeff();
-  p.ready();
-  return p;
-}
-
-/// Positions in the frame of the first geometry are at most this large.
-template <typename S>
-double magnitudeOf(const Question<S>& q, double size1, double size2) {
-  const Eigen::Vector3d p = q.X_W1.linear().transpose().template cast<double>() *
-                            (q.X_W2.translation() - q.X_W1.translation()).template cast<double>();
-  return p.norm() + 2 * (size1 + size2);
-}
-
-/// Holds the gates of one or two trees shared, taken in address order, and prunes when it lets go.
-class Look {
- public:
-  Look(tree::Tree& a, tree::Tree* b) : a_(&a), b_(b == &a ? nullptr : b) {
-    if (b_ != nullptr && std::less<tree::Tree*>()(b_, a_)) std::swap(a_, b_);
-    a_->gate().lock_shared();
-    if (b_ != nullptr) b_->gate().lock_shared();
-  }
-  ~Look() {
-    if (b_ != nullptr) b_->gate().unlock_shared();
-    a_->gate().unlock_shared();
-  }
-  Look(const Look&) = delete;
-  Look& operator=(const Look&) = delete;
-
- private:
-  tree::Tree *a_, *b_;
-};
-
 template <typename S>
 void collideModels(const Question<S>& q, tree::Tree& tree1, tree::Tree& tree2) {
   std::int64_t now;
@@ -285,8 +239,8 @@ void collideModels(const Question<S>& q, tree::Tree& tree1, tree::Tree& tree2) {
     const TreeSide a(tree_a), b(tree_b);
     now = a.now();
     const oracle::Surface &sa = tree_a.surface(), &sb = tree_b.surface();
-    const double magnitude =
-        magnitudeOf(q, magnitudeOf(tree1.surface().mesh->bounds()), magnitudeOf(tree2.surface().mesh->bounds()));
+    const double magnitude = magnitudeOf(q.X_W1, q.X_W2, magnitudeOf(tree1.surface().mesh->bounds()),
+                                         magnitudeOf(tree2.surface().mesh->bounds()));
     const ModelTriangles<S> t1(*tree1.surface().mesh), t2(*tree2.surface().mesh);
     Collector<S, ModelTriangles<S>, ModelTriangles<S>> collector(q, t1, t2, swapped, magnitude);
     collector.setFrame(sa.lattice.origin(), sa.lattice.unit());
@@ -312,7 +266,7 @@ void collideBvh(const Question<typename BV::S>& q, tree::Tree& tree, const fcl::
     const BvhSide<BV> b(bvh);
     now = a.now();
     const oracle::Surface& surface = tree.surface();
-    const double magnitude = magnitudeOf(q, magnitudeOf(surface.mesh->bounds()), b.magnitude());
+    const double magnitude = magnitudeOf(q.X_W1, q.X_W2, magnitudeOf(surface.mesh->bounds()), b.magnitude());
     const ModelTriangles<S> model(*surface.mesh);
     const BvhTriangles<BV> partner(bvh);
     const Placement b_in_a = placementOf(swapped ? q.X_W2 : q.X_W1, swapped ? q.X_W1 : q.X_W2, surface.lattice.origin(),
@@ -328,43 +282,6 @@ void collideBvh(const Question<typename BV::S>& q, tree::Tree& tree, const fcl::
     }
   }
   tree.afterQuery(now);
-}
-
-template <template <typename> class BV, typename S>
-const fcl::BVHModel<BV<S>>& as(const fcl::CollisionGeometry<S>* geometry) {
-  return *static_cast<const fcl::BVHModel<BV<S>>*>(geometry);
-}
-template <typename S>
-using Kdop16 = fcl::KDOP<S, 16>;
-template <typename S>
-using Kdop18 = fcl::KDOP<S, 18>;
-template <typename S>
-using Kdop24 = fcl::KDOP<S, 24>;
-
-template <typename S>
-void collideWith(const Question<S>& q, tree::Tree& tree, const fcl::CollisionGeometry<S>* partner, bool swapped) {
-  switch (partner->getNodeType()) {
-    case fcl::BV_AABB:
-      return collideBvh(q, tree, as<fcl::AABB>(partner), swapped);
-    case fcl::BV_OBB:
-      return collideBvh(q, tree, as<fcl::OBB>(partner), swapped);
-    case fcl::BV_RSS:
-      return collideBvh(q, tree, as<fcl::RSS>(partner), swapped);
-    case fcl::BV_kIOS:
-      return collideBvh(q, tree, as<fcl::kIOS>(partner), swapped);
-    case fcl::BV_OBBRSS:
-      return collideBvh(q, tree, as<fcl::OBBRSS>(partner), swapped);
-    case fcl::BV_KDOP16:
-      return collideBvh(q, tree, as<Kdop16>(partner), swapped);
-    case fcl::BV_KDOP18:
-      return collideBvh(q, tree, as<Kdop18>(partner), swapped);
-    case fcl::BV_KDOP24:
-      return collideBvh(q, tree, as<Kdop24>(partner), swapped);
-    default:
-      throw std::invalid_argument("bocst::collide: a Model against FCL node type " +
-                                  std::to_string(partner->getNodeType()) +
-                                  " is not supported in this version; partners are Model and BVHModel");
-  }
 }
 
 }  // namespace
@@ -384,10 +301,10 @@ std::size_t collidePair(const fcl::CollisionGeometry<S>* o1, const fcl::Transfor
   if (!occupied && (o1->isFree() || o2->isFree() || !request.enable_cost)) return result.numContacts();
   if (model1 != nullptr && model2 != nullptr) {
     collideModels(q, model1->tree(), model2->tree());
-  } else if (model1 != nullptr) {
-    collideWith(q, model1->tree(), o2, false);
   } else {
-    collideWith(q, model2->tree(), o1, true);
+    const bool swapped = model1 == nullptr;
+    withBvh<S>("collide", swapped ? o1 : o2,
+               [&](const auto& bvh) { collideBvh(q, (swapped ? model2 : model1)->tree(), bvh, swapped); });
   }
   return result.numContacts();
 }

@@ -164,7 +164,7 @@ std::size_t collide(const fcl::CollisionGeometry<S>* o1, const fcl::Transform3<S
 template <typename S>
 S distance(const fcl::CollisionGeometry<S>* o1, const fcl::Transform3<S>& X_W1, const fcl::CollisionGeometry<S>* o2,
            const fcl::Transform3<S>& X_W2, const fcl::DistanceRequest<S>& request, fcl::DistanceResult<S>& result) {
-  fcl_room::rejectModels<S>("distance", o1, o2);
+  if (isModel<S>(o1) || isModel<S>(o2)) return fcl_room::distancePair<S>(o1, X_W1, o2, X_W2, request, result);
   return fcl::distance<S>(o1, X_W1, o2, X_W2, request, result);
 }
 
@@ -172,7 +172,7 @@ template <typename S, typename Solver>
 S distance(const fcl::CollisionGeometry<S>* o1, const fcl::Transform3<S>& X_W1, const fcl::CollisionGeometry<S>* o2,
            const fcl::Transform3<S>& X_W2, const Solver* solver, const fcl::DistanceRequest<S>& request,
            fcl::DistanceResult<S>& result) {
-  fcl_room::rejectModels<S>("distance", o1, o2);
+  if (isModel<S>(o1) || isModel<S>(o2)) return bocst::distance<S>(o1, X_W1, o2, X_W2, request, result);
   return fcl::distance<Solver>(o1, X_W1, o2, X_W2, solver, request, result);
 }
 

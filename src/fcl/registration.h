@@ -11,6 +11,7 @@
 #include <limits>
 
 #include "fcl/collide_pair.h"
+#include "fcl/distance_pair.h"
 
 namespace bocst::fcl_room {
 
@@ -50,9 +51,10 @@ std::size_t collideEntry(const fcl::CollisionGeometry<S>* o1, const fcl::Transfo
 }
 
 template <typename S, typename Solver>
-S distanceEntry(const fcl::CollisionGeometry<S>* o1, const fcl::Transform3<S>&, const fcl::CollisionGeometry<S>* o2,
-                const fcl::Transform3<S>&, const Solver*, const fcl::DistanceRequest<S>&, fcl::DistanceResult<S>&) {
-  rejectModels<S>("distance", o1, o2);
+S distanceEntry(const fcl::CollisionGeometry<S>* o1, const fcl::Transform3<S>& X_W1,
+                const fcl::CollisionGeometry<S>* o2, const fcl::Transform3<S>& X_W2, const Solver*,
+                const fcl::DistanceRequest<S>& request, fcl::DistanceResult<S>& result) {
+  if (isModel<S>(o1) || isModel<S>(o2)) return distancePair<S>(o1, X_W1, o2, X_W2, request, result);
   if (isSentinel<S>(o1)) return Sentinel<S>::kReached;
   warnAsFcl<S>("distance", o1, o2);
   return std::numeric_limits<S>::max();

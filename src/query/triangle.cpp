@@ -61,27 +61,15 @@ Vector3d middleOfOverlap(const Corners& p, const Corners& q) {
   return (lo + hi) / 2;
 }
 
-bool segmentCutsTriangle(const Vector3d& a, const Vector3d& b, const Corners& t) {
+bool segmentCutsTriangle(const Vector3d& a, const Vector3d& b, const Corners& t, Vector3d& at) {
   const Vector3d n = (t[1] - t[0]).cross(t[2] - t[0]);
   const double da = n.dot(a - t[0]), db = n.dot(b - t[0]);
   if ((da > 0 && db > 0) || (da < 0 && db < 0) || da == db) return false;
-  const Vector3d x = a + da / (da - db) * (b - a);
+  at = a + da / (da - db) * (b - a);
   for (int i = 0; i < 3; ++i) {
-    if (n.dot((t[(i + 1) % 3] - t[i]).cross(x - t[i])) < 0) return false;
+    if (n.dot((t[(i + 1) % 3] - t[i]).cross(at - t[i])) < 0) return false;
   }
   return true;
-}
-
-double segmentDistance(const Vector3d& a, const Vector3d& b, const Vector3d& c, const Vector3d& d) {
-  const Vector3d u = b - a, v = d - c, w = a - c;
-  const double uu = u.squaredNorm(), uv = u.dot(v), vv = v.squaredNorm(), det = uu * vv - uv * uv;
-  double best = std::min({(closestOnSegment(a, c, d) - a).norm(), (closestOnSegment(b, c, d) - b).norm(),
-                          (closestOnSegment(c, a, b) - c).norm(), (closestOnSegment(d, a, b) - d).norm()});
-  if (det > 0) {
-    const double s = (uv * v.dot(w) - vv * u.dot(w)) / det, t = (uu * v.dot(w) - uv * u.dot(w)) / det;
-    if (s >= 0 && s <= 1 && t >= 0 && t <= 1) best = std::min(best, (w + s * u - t * v).norm());
-  }
-  return best;
 }
 
 }  // namespace
@@ -144,14 +132,34 @@ bool isDegenerate(const Corners& t) {
   return e.cross(f).norm() <= 1e-14 * e.norm() * f.norm();
 }
 
-double distanceDegenerate(const Corners& p, const Corners& q) {
-  double best = std::numeric_limits<double>::infinity();
+double nearestPoints(const Corners& p, const Corners& q, Vector3d& on_p, Vector3d& on_q) {
+  double best = std::numeric_limits<double>::infinity();  // squared
+  const auto consider = [&](const Vector3d& a, const Vector3d& b) {
+    const double d = (a - b).squaredNorm();
+    if (d >= best) return;
+    best = d;
+    on_p = a;
+    on_q = b;
+  };
   for (int i = 0; i < 3; ++i) {
-    if (segmentCutsTriangle(p[i], p[(i + 1) % 3], q) || segmentCutsTriangle(q[i], q[(i + 1) % 3], p)) return 0;
-    best = std::min({best, (closestPoint(p[i], q) - p[i]).norm(), (closestPoint(q[i], p) - q[i]).norm()});
-    for (int j = 0; j < 3; ++j) best = std::min(best, segmentDistance(p[i], p[(i + 1) % 3], q[j], q[(j + 1) % 3]));
+    const Vector3d &a = p[i], &b = p[(i + 1) % 3];
+    Vector3d at;
+    if (segmentCutsTriangle(a, b, q, at) || segmentCutsTriangle(q[i], q[(i + 1) % 3], p, at)) {
+      on_p = on_q = at;
+      return 0;
+    }
+    consider(a, closestPoint(a, q));
+    consider(closestPoint(q[i], p), q[i]);
+    // Two edges, inside both; where an end is nearest, its corner has been considered.
+    for (int j = 0; j < 3; ++j) {
+      const Vector3d &c = q[j], u = b - a, v = q[(j + 1) % 3] - c, w = a - c;
+      const double uu = u.squaredNorm(), uv = u.dot(v), vv = v.squaredNorm(), det = uu * vv - uv * uv;
+      if (!(det > 0)) continue;
+      const double s = (uv * v.dot(w) - vv * u.dot(w)) / det, t = (uu * v.dot(w) - uv * u.dot(w)) / det;
+      if (s >= 0 && s <= 1 && t >= 0 && t <= 1) consider(a + s * u, c + t * v);
+    }
   }
-  return best;
+  return std::sqrt(best);
 }
 
 }  // namespace bocst::query

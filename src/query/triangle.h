@@ -26,7 +26,8 @@ Eigen::Vector3d closestPoint(const Eigen::Vector3d& x, const Corners& triangle);
 /// Has the triangle no area, up to rounding of its own corners?
 bool isDegenerate(const Corners& triangle);
 
-/// The distance between two triangles of which at least one has no area; 0 where they cross.
-double distanceDegenerate(const Corners& p, const Corners& q);
+/// The distance between two closed triangles, degenerate or not, 0 where they cross, and a point of each that is as
+/// near to the other.
+double nearestPoints(const Corners& p, const Corners& q, Eigen::Vector3d& on_p, Eigen::Vector3d& on_q);
 
 }  // namespace bocst::query

@@ -394,7 +394,8 @@ TEST(CollideRequest, UnsupportedPartnersThrow) {
   EXPECT_THROW(fcl::collide(gs, I, ga, I, request, result), std::invalid_argument);
   fcl::DistanceRequestd distance_request;
   fcl::DistanceResultd distance_result;
-  EXPECT_THROW(fcl::distance(ga, I, ga, I, distance_request, distance_result), std::invalid_argument);
+  EXPECT_THROW(fcl::distance(ga, I, gs, I, distance_request, distance_result), std::invalid_argument);
+  EXPECT_THROW(fcl::distance(gs, I, ga, I, distance_request, distance_result), std::invalid_argument);
   fcl::BVHModel<fcl::OBBRSSd> unfinished;
   EXPECT_THROW(fcl::collide(ga, I, static_cast<const fcl::CollisionGeometryd*>(&unfinished), I, request, result),
                std::invalid_argument);
@@ -410,7 +411,8 @@ bool bruteForce(const Raw& a, const Raw& b, const fcl::Transform3d& X_AB, bool& 
     for (const auto& t : b.triangles) {
       const query::Corners q = {X_AB * b.vertices[t[0]], X_AB * b.vertices[t[1]], X_AB * b.vertices[t[2]]};
       if (query::isDegenerate(p) || query::isDegenerate(q)) {
-        const double d = query::distanceDegenerate(p, q);
+        Eigen::Vector3d on_p, on_q;
+        const double d = query::nearestPoints(p, q, on_p, on_q);
         hit |= d <= 1e-14;
         close |= d < 1e-11;
       } else {

@@ -214,7 +214,8 @@ TEST_P(EveryTarget, NoPairIsLostThatFclFinds) {
         ++pairs;
         const Corners p = {ta[i][0], ta[i][1], ta[i][2]}, q = {tb[j][0], tb[j][1], tb[j][2]};
         if (isDegenerate(p) || isDegenerate(q)) {
-          if (distanceDegenerate(p, q) > 1e-13 * scale) continue;
+          Eigen::Vector3d on_p, on_q;
+          if (nearestPoints(p, q, on_p, on_q) > 1e-13 * scale) continue;
         } else if (!fcl::detail::Intersect<double>::intersect_Triangle(p[0], p[1], p[2], q[0], q[1], q[2])) {
           continue;
         }

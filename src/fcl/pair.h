@@ -1,0 +1,103 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#pragma once
+
+#include <fcl/geometry/bvh/BVH_model.h>
+#include <fcl/math/geometry.h>
+
+#include <algorithm>
+#include <functional>
+#include <limits>
+#include <stdexcept>
+#include <string>
+
+#include "fcl/bvh_side.h"
+#include "query/volume.h"
+#include "tree/tree.h"
+
+// What the queries about a pair of geometries share.
+
+namespace bocst::fcl_room {
+
+/// The largest coordinate, in absolute value.
+inline double magnitudeOf(const Eigen::AlignedBox3d& box) {
+  return std::max(box.min().cwiseAbs().maxCoeff(), box.max().cwiseAbs().maxCoeff());
+}
+
+/// Positions in the frame of the first geometry are at most this large.
+template <typename S>
+double magnitudeOf(const fcl::Transform3<S>& X_W1, const fcl::Transform3<S>& X_W2, double size1, double size2) {
+  const Eigen::Vector3d p = X_W1.linear().transpose().template cast<double>() *
+                            (X_W2.translation() - X_W1.translation()).template cast<double>();
+  return p.norm() + 2 * (size1 + size2);
+}
+
+/// From the frame of B (origin and unit in B's model frame) to that of A, through the pose X_AB in model units.
+template <typename S>
+query::Placement placementOf(const fcl::Transform3<S>& X_WA, const fcl::Transform3<S>& X_WB,
+                             const Eigen::Vector3d& origin_a, double unit_a, const Eigen::Vector3d& origin_b,
+                             double unit_b, double magnitude) {
+  fcl::Matrix3<S> R;
+  fcl::Vector3<S> t;
+  fcl::relativeTransform(X_WA.linear(), X_WA.translation(), X_WB.linear(), X_WB.translation(), R, t);
+  query::Placement p;
+  p.rotation = R.template cast<double>();
+  p.scale = unit_b / unit_a;
+  p.translation = (p.rotation * origin_b + t.template cast<double>() - origin_a) / unit_a;
+  // What FCL's triangle test, which computes R q + t in S, may take for a contact.
+  p.slack = magnitude * 32 * static_cast<double>(std::numeric_limits<S>::epsilon()) / unit_a;
+  p.defect = (p.rotation.transpose() * p.rotation - Eigen::Matrix3d::Identity()).cwiseAbs().maxCoeff();
+  p.ready();
+  return p;
+}
+
+/// Holds the gates of one or two trees shared, taken in address order.
+class Look {
+ public:
+  Look(tree::Tree& a, tree::Tree* b) : a_(&a), b_(b == &a ? nullptr : b) {
+    if (b_ != nullptr && std::less<tree::Tree*>()(b_, a_)) std::swap(a_, b_);
+    a_->gate().lock_shared();
+    if (b_ != nullptr) b_->gate().lock_shared();
+  }
+  ~Look() {
+    if (b_ != nullptr) b_->gate().unlock_shared();
+    a_->gate().unlock_shared();
+  }
+  Look(const Look&) = delete;
+  Look& operator=(const Look&) = delete;
+
+ private:
+  tree::Tree *a_, *b_;
+};
+
+/// Calls f with the partner of a model as the BVHModel that it is.
+/// @throws std::invalid_argument when it is none.
+template <typename S, typename F>
+void withBvh(const char* query, const fcl::CollisionGeometry<S>* partner, F&& f) {
+  const auto as = [partner](auto* bv) -> const auto& {
+    return *static_cast<const fcl::BVHModel<std::remove_pointer_t<decltype(bv)>>*>(partner);
+  };
+  switch (partner->getNodeType()) {
+    case fcl::BV_AABB:
+      return f(as(static_cast<fcl::AABB<S>*>(nullptr)));
+    case fcl::BV_OBB:
+      return f(as(static_cast<fcl::OBB<S>*>(nullptr)));
+    case fcl::BV_RSS:
+      return f(as(static_cast<fcl::RSS<S>*>(nullptr)));
+    case fcl::BV_kIOS:
+      return f(as(static_cast<fcl::kIOS<S>*>(nullptr)));
+    case fcl::BV_OBBRSS:
+      return f(as(static_cast<fcl::OBBRSS<S>*>(nullptr)));
+    case fcl::BV_KDOP16:
+      return f(as(static_cast<fcl::KDOP<S, 16>*>(nullptr)));
+    case fcl::BV_KDOP18:
+      return f(as(static_cast<fcl::KDOP<S, 18>*>(nullptr)));
+    case fcl::BV_KDOP24:
+      return f(as(static_cast<fcl::KDOP<S, 24>*>(nullptr)));
+    default:
+      throw std::invalid_argument(std::string("bocst::") + query + ": a Model against FCL node type " +
+                                  std::to_string(partner->getNodeType()) +
+                                  " is not supported in this version; partners are Model and BVHModel");
+  }
+}
+
+}  // namespace bocst::fcl_room

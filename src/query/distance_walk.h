@@ -1,0 +1,279 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#pragma once
+
+#include <algorithm>
+#include <cmath>
+#include <cstddef>
+#include <cstdint>
+#include <limits>
+#include <vector>
+
+#include "query/reach.h"
+#include "query/side.h"
+#include "query/triangle.h"
+
+namespace bocst::query {
+
+/// The nearest primitives of two sides that a walk has seen, in the frame of side A.
+struct Nearest {
+  double distance = std::numeric_limits<double>::infinity();
+  std::uint64_t a = 0, b = 0;  ///< Triangles, or names of cells.
+  Eigen::Vector3d on_a = Eigen::Vector3d::Zero(), on_b = Eigen::Vector3d::Zero();
+};
+
+/// How far a walk has to go.
+struct DistanceGoal {
+  double below = std::numeric_limits<double>::infinity();  ///< Only what is nearer is of interest.
+  double absolute = 0, relative = 0;  ///< An answer that is too large by so much will do, as in FCL's canStop().
+};
+
+/// Looks for the nearest primitives of two sides: triangles with exact answers, spheres of the collision depth with
+/// conservative ones. Best first: pairs of nodes lie in a heap by a lower bound of their distance, and what cannot beat
+/// the best answer is never looked at. Pairs that need a node that is not expanded wait, the nearest first, while what
+/// is resident may still make them superfluous; then they grow in one batch, each twice as large as the one before.
+template <typename A, typename B>
+class DistanceWalk {
+ public:
+  DistanceWalk(const A& a, const B& b, const Placement& b_in_a) : a_(a), b_(b), b_in_a_(b_in_a) {}
+
+  Nearest run(const DistanceGoal& goal) {
+    goal_ = goal;
+    limit_ = goal.below;
+    Scratch& s = scratch();
+    s.heap.clear();
+    s.waiting.clear();
+    std::size_t batch = kFirstBatch;
+    start(s);
+    for (;;) {
+      while (!s.heap.empty() && worthIt(s.heap.front().bound) && s.waiting.size() < batch) {
+        std::pop_heap(s.heap.begin(), s.heap.end(), later);
+        const Pair pair = s.heap.back();
+        s.heap.pop_back();
+        step(pair, s);
+        if (!(limit_ > 0)) return best_;
+      }
+      const auto end =
+          std::remove_if(s.waiting.begin(), s.waiting.end(), [this](const Pair& p) { return !worthIt(p.bound); });
+      s.waiting.erase(end, s.waiting.end());
+      if (s.waiting.empty()) {
+        if (s.heap.empty() || !worthIt(s.heap.front().bound)) return best_;
+        continue;
+      }
+      grow(s);
+      batch *= 2;
+    }
+  }
+
+ private:
+  static constexpr std::size_t kFirstBatch = 4;
+
+  struct Pair {
+    double bound;
+    typename A::Node a;
+    typename B::Node b;
+  };
+  static bool later(const Pair& x, const Pair& y) { return x.bound > y.bound; }
+
+  struct Scratch {
+    std::vector<Pair> heap, waiting;
+    std::vector<tree::Tree::Growth> growths;
+    std::vector<TriangleReach> a, b;
+  };
+  static Scratch& scratch() {
+    thread_local Scratch s;
+    return s;
+  }
+
+  bool spheres() const { return a_.cells() || b_.cells(); }
+
+  // Can something at this distance or beyond improve the answer enough?
+  bool worthIt(double bound) const {
+    return bound < limit_ &&
+           !(bound >= best_.distance - goal_.absolute && bound * (1 + goal_.relative) >= best_.distance);
+  }
+
+  // Puts a pair on the heap, if it is worth it.
+  void push(Pair pair, Scratch& s) {
+    if (!worthIt(pair.bound)) return;
+    s.heap.push_back(pair);
+    std::push_heap(s.heap.begin(), s.heap.end(), later);
+  }
+
+  NodeReach reachOfA(typename A::Node n) const { return NodeReach(a_.volume(n), Placement()); }
+  NodeReach reachOfB(typename B::Node n) const { return NodeReach(b_.volume(n), b_in_a_); }
+
+  double boundOf(const NodeReach& a, const NodeReach& b) {
+    // Each node holds a piece of surface, so something is no farther than this.
+    limit_ = std::min(limit_, farthest(a, b));
+    return distanceBound(a, b, way_);
+  }
+
+  Sphere ballOfB(typename B::Node n) const { return placed(b_.sphere(n), b_in_a_); }
+
+  static double boundOf(const Sphere& a, const Sphere& b) {
+    return (a.center - b.center).norm() * (1 - 1e-12) - (a.radius + b.radius) * (1 + 1e-12);
+  }
+
+  void start(Scratch& s) {
+    const Pair root{0, a_.root(), b_.root()};
+    const double bound =
+        spheres() ? boundOf(a_.sphere(root.a), ballOfB(root.b)) : boundOf(reachOfA(root.a), reachOfB(root.b));
+    push({bound, root.a, root.b}, s);
+  }
+
+  void expandA(const Pair& pair, Scratch& s) {
+    if (spheres()) {
+      const Sphere b = ballOfB(pair.b);
+      a_.children(pair.a, [&](typename A::Node c) { push({boundOf(a_.sphere(c), b), c, pair.b}, s); });
+    } else {
+      const NodeReach b = reachOfB(pair.b);
+      a_.children(pair.a, [&](typename A::Node c) { push({boundOf(reachOfA(c), b), c, pair.b}, s); });
+    }
+  }
+
+  void expandB(const Pair& pair, Scratch& s) {
+    if (spheres()) {
+      const Sphere a = a_.sphere(pair.a);
+      b_.children(pair.b, [&](typename B::Node c) { push({boundOf(a, ballOfB(c)), pair.a, c}, s); });
+    } else {
+      const NodeReach a = reachOfA(pair.a);
+      b_.children(pair.b, [&](typename B::Node c) { push({boundOf(a, reachOfB(c)), pair.a, c}, s); });
+    }
+  }
+
+  void step(const Pair& pair, Scratch& s) {
+    const State sa = a_.state(pair.a), sb = b_.state(pair.b);
+    if (sa == State::kLeaf && sb == State::kLeaf) {
+      leaves(pair, s);
+      return;
+    }
+    const bool expands_a = sb == State::kLeaf ||
+                           (sa != State::kLeaf && a_.size(pair.a) >= b_.size(pair.b) * b_in_a_.scale * b_in_a_.scale);
+    if ((expands_a ? sa : sb) == State::kGrows) {
+      s.waiting.push_back(pair);
+    } else if (expands_a) {
+      expandA(pair, s);
+    } else {
+      expandB(pair, s);
+    }
+  }
+
+  void grow(Scratch& s) {
+    s.growths.clear();
+    for (const Pair& p : s.waiting) {
+      if (a_.state(p.a) == State::kGrows) a_.grow(p.a, s.growths);
+      if (b_.state(p.b) == State::kGrows) b_.grow(p.b, s.growths);
+    }
+    uniqueGrowths(s.growths);
+    if (!s.growths.empty()) tree::Tree::grow(s.growths);
+    for (const Pair& p : s.waiting) {
+      s.heap.push_back(p);
+      std::push_heap(s.heap.begin(), s.heap.end(), later);
+    }
+    s.waiting.clear();
+  }
+
+  void found(const Nearest& n) {
+    if (!(n.distance < std::min(best_.distance, goal_.below))) return;
+    best_ = n;
+    limit_ = std::min(limit_, n.distance);
+    if (n.distance > 0) way_ = (n.on_b - n.on_a) / n.distance;
+  }
+
+  void leaves(const Pair& pair, Scratch& s) {
+    if (spheres()) {
+      leafSpheres(pair);
+      return;
+    }
+    fill(a_, pair.a, Placement(), s.a);
+    fill(b_, pair.b, b_in_a_, s.b);
+    // The pair of nearest middles first: a good answer makes most of the others superfluous.
+    std::size_t first_a = 0, first_b = 0;
+    double nearest = std::numeric_limits<double>::infinity();
+    for (std::size_t i = 0; i < s.a.size(); ++i) {
+      for (std::size_t j = 0; j < s.b.size(); ++j) {
+        const double d = (s.a[i].middle() - s.b[j].middle()).squaredNorm();
+        if (d < nearest) nearest = d, first_a = i, first_b = j;
+      }
+    }
+    triangles(s.a[first_a], s.b[first_b]);
+    for (TriangleReach& t : s.a) t.along(way_);
+    for (TriangleReach& t : s.b) t.along(way_);
+    for (const TriangleReach& t : s.a) {
+      for (const TriangleReach& u : s.b) {
+        if (u.lowest - t.highest < limit_ && worthIt(distanceBound(t, u))) triangles(t, u);
+      }
+    }
+  }
+
+  template <typename Side, typename Node>
+  static void fill(const Side& side, Node node, const Placement& place, std::vector<TriangleReach>& out) {
+    out.resize(side.triangleCount(node));
+    for (std::size_t i = 0; i < out.size(); ++i) {
+      out[i].id = side.triangle(node, i);
+      for (int k = 0; k < 3; ++k) out[i].corners[k] = place * side.corner(out[i].id, k);
+      out[i].ready();
+    }
+  }
+
+  void triangles(const TriangleReach& t, const TriangleReach& u) {
+    Nearest n;
+    n.a = t.id;
+    n.b = u.id;
+    n.distance = nearestPoints(t.corners, u.corners, n.on_a, n.on_b);
+    found(n);
+  }
+
+  void leafSpheres(const Pair& pair) {
+    const Placement here;
+    if (a_.cells() && b_.cells()) {
+      spheresFound({a_.cellId(pair.a), a_.cellSphere(pair.a)},
+                   {b_.cellId(pair.b), placed(b_.cellSphere(pair.b), b_in_a_)});
+    } else if (a_.cells()) {
+      const Ball ball{a_.cellId(pair.a), a_.cellSphere(pair.a)};
+      for (std::size_t i = 0; i < b_.triangleCount(pair.b); ++i) {
+        spheresFound(ball, pointOf(b_, b_.triangle(pair.b, i), b_in_a_, ball.sphere.center));
+      }
+    } else {
+      const Ball ball{b_.cellId(pair.b), placed(b_.cellSphere(pair.b), b_in_a_)};
+      for (std::size_t i = 0; i < a_.triangleCount(pair.a); ++i) {
+        spheresFound(pointOf(a_, a_.triangle(pair.a, i), here, ball.sphere.center), ball);
+      }
+    }
+  }
+
+  struct Ball {
+    std::uint64_t id;
+    Sphere sphere;
+  };
+
+  // A triangle is a sphere without radius, at its point nearest to the other.
+  template <typename Side>
+  static Ball pointOf(const Side& side, std::uint32_t t, const Placement& place, const Eigen::Vector3d& to) {
+    const Corners corners = {place * side.corner(t, 0), place * side.corner(t, 1), place * side.corner(t, 2)};
+    return {t, {closestPoint(to, corners), 0}};
+  }
+
+  void spheresFound(const Ball& a, const Ball& b) {
+    Nearest n;
+    n.a = a.id;
+    n.b = b.id;
+    const Eigen::Vector3d way = b.sphere.center - a.sphere.center;
+    const double apart = way.norm();
+    const Eigen::Vector3d direction = apart > 0 ? Eigen::Vector3d(way / apart) : Eigen::Vector3d::UnitX();
+    n.distance = std::max(apart - a.sphere.radius - b.sphere.radius, 0.0);
+    n.on_a = a.sphere.center + std::min(a.sphere.radius, apart) * direction;
+    n.on_b = n.on_a + n.distance * direction;
+    found(n);
+  }
+
+  const A& a_;
+  const B& b_;
+  const Placement& b_in_a_;
+  DistanceGoal goal_;
+  Nearest best_;
+  double limit_ = 0;                               // something at least this near exists, or nobody asks for more
+  Eigen::Vector3d way_ = Eigen::Vector3d::Zero();  // from side A to side B where they are nearest so far, unit length
+};
+
+}  // namespace bocst::query

@@ -1,0 +1,102 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#pragma once
+
+#include <Eigen/Core>
+#include <algorithm>
+#include <cmath>
+#include <cstdint>
+
+#include "query/triangle.h"
+#include "query/volume.h"
+
+// How far bodies are from each other, from below: for distance queries. All in double, in one frame.
+
+namespace bocst::query {
+
+/// What bounds the surface of a node, placed in the common frame: a box of any direction AND a slab.
+struct NodeReach {
+  Eigen::Vector3d center;
+  Eigen::Matrix3d axes;  ///< Columns.
+  Eigen::Vector3d half;
+  Eigen::Vector3d normal = Eigen::Vector3d::Zero();
+  double slab_offset = 0, slab_half = 0;  ///< Along normal, from center.
+
+  NodeReach(const Volume& v, const Placement& to) : axes(to.rotation) {
+    center = to * Eigen::Vector3d(v.center[0], v.center[1], v.center[2]);
+    half = Eigen::Vector3d(v.half[0], v.half[1], v.half[2]) * to.scale;
+    normal = to.rotation * Eigen::Vector3d(v.normal[0], v.normal[1], v.normal[2]);
+    slab_offset = v.slab_offset * to.scale;
+    slab_half = v.slab_half * to.scale;
+  }
+  NodeReach(const OrientedVolume& v, const Placement& to)
+      : center(to * v.center), axes(to.rotation * v.axes), half(v.half * to.scale) {}
+
+  /// Along a unit direction the node reaches from lo to hi, counted from its centre.
+  void along(const Eigen::Vector3d& direction, double& lo, double& hi) const {
+    hi = (axes.transpose() * direction).cwiseAbs().dot(half);
+    lo = -hi;
+    const double nn = normal.squaredNorm();
+    if (!(nn > 0)) return;
+    const double a = direction.dot(normal) / nn, middle = a * slab_offset;
+    const double reach = std::abs(a) * slab_half + (axes.transpose() * (direction - a * normal)).cwiseAbs().dot(half);
+    lo = std::max(lo, middle - reach);
+    hi = std::min(hi, middle + reach);
+  }
+};
+
+/// No point of a is nearer to any of b than this, up to a part of 1e-12 of the sizes, which is taken off. `way` is a
+/// direction in which the bound is likely to be good, or zero.
+inline double distanceBound(const NodeReach& a, const NodeReach& b, const Eigen::Vector3d& way) {
+  const Eigen::Vector3d t = b.center - a.center;
+  const Eigen::Matrix3d r = a.axes.transpose() * b.axes, s = r.cwiseAbs();
+  // On three axes at right angles, gaps add up as the sides of a box.
+  const Eigen::Vector3d gap_a = ((a.axes.transpose() * t).cwiseAbs() - a.half - s * b.half).cwiseMax(0);
+  const Eigen::Vector3d gap_b = ((b.axes.transpose() * t).cwiseAbs() - b.half - s.transpose() * a.half).cwiseMax(0);
+  double best = std::sqrt(std::max(gap_a.squaredNorm(), gap_b.squaredNorm()));
+  const auto look = [&](const Eigen::Vector3d& direction) {
+    double lo_a, hi_a, lo_b, hi_b;
+    a.along(direction, lo_a, hi_a);
+    b.along(direction, lo_b, hi_b);
+    const double d = direction.dot(t);
+    best = std::max({best, d + lo_b - hi_a, lo_a - d - hi_b});
+  };
+  const double apart = t.norm();
+  if (apart > 0) look(t / apart);
+  if (way.squaredNorm() > 0) look(way);
+  for (const NodeReach* n : {&a, &b}) {
+    const double length = n->normal.norm();
+    if (length > 0) look(n->normal / length);
+  }
+  return best - 1e-12 * (apart + a.half.sum() + b.half.sum());
+}
+
+/// Some point of a is no farther from one of b than this.
+inline double farthest(const NodeReach& a, const NodeReach& b) {
+  return ((b.center - a.center).norm() + a.half.norm() + b.half.norm()) * (1 + 1e-12);
+}
+
+/// A triangle and its box.
+struct TriangleReach {
+  Corners corners;
+  Eigen::Vector3d lo, hi;
+  double lowest = 0, highest = 0;  ///< Along a direction, see along().
+  std::uint32_t id = 0;
+
+  void ready() {
+    lo = corners[0].cwiseMin(corners[1]).cwiseMin(corners[2]);
+    hi = corners[0].cwiseMax(corners[1]).cwiseMax(corners[2]);
+  }
+  Eigen::Vector3d middle() const { return corners[0] + corners[1] + corners[2]; }  ///< Times three.
+  void along(const Eigen::Vector3d& direction) {
+    const double x = direction.dot(corners[0]), y = direction.dot(corners[1]), z = direction.dot(corners[2]);
+    lowest = std::min({x, y, z});
+    highest = std::max({x, y, z});
+  }
+};
+
+/// The distance of the boxes.
+inline double distanceBound(const TriangleReach& a, const TriangleReach& b) {
+  return (b.lo - a.hi).cwiseMax(a.lo - b.hi).cwiseMax(0).norm() * (1 - 1e-15);
+}
+
+}  // namespace bocst::query

@@ -1,0 +1,314 @@
+// SPDX-License-Identifier: BSD-3-Clause
+// Distances against FCL's own mesh query, against brute force over triangles, and against what they must mean.
+#include <fcl/narrowphase/detail/primitive_shape_algorithm/triangle_distance.h>
+#include <gtest/gtest.h>
+
+#include <thread>
+
+#include "conformance/reference.h"
+#include "query/triangle.h"
+
+namespace bocst {
+namespace {
+
+using test::Raw;
+
+template <typename S>
+fcl::DistanceResult<S> ask(const fcl::CollisionGeometry<S>& a, const fcl::Transform3<S>& X,
+                           const fcl::CollisionGeometry<S>& b, const fcl::Transform3<S>& Y, bool is_signed = false) {
+  fcl::DistanceRequest<S> request(true);
+  request.enable_signed_distance = is_signed;
+  fcl::DistanceResult<S> result;
+  const S returned = fcl::distance(&a, X, &b, Y, request, result);
+  EXPECT_EQ(returned, result.min_distance);
+  return result;
+}
+
+template <typename S>
+class Distance : public testing::Test {};
+using Scalars = testing::Types<float, double>;
+TYPED_TEST_SUITE(Distance, Scalars);
+
+template <typename S>
+Eigen::Vector3d onTriangle(const Raw& raw, std::intptr_t t, const fcl::Transform3<S>& X, const fcl::Vector3<S>& p) {
+  const auto& i = raw.triangles[static_cast<std::size_t>(t)];
+  const fcl::Transform3<double> Xd = X.template cast<double>();
+  const query::Corners c = {Xd * raw.vertices[i[0]], Xd * raw.vertices[i[1]], Xd * raw.vertices[i[2]]};
+  return query::closestPoint(p.template cast<double>(), c);
+}
+
+template <typename BV>
+void checkAgainstFcl(int poses, double scale) {
+  using S = typename BV::S;
+  Raw ra = test::torus(40), rb = test::torus(23, 0.3);
+  ra.scale(scale);
+  rb.scale(scale);
+  // FCL's OBB and k-DOP trees know no distance; RSS is its best.
+  const auto fa = test::bvh<fcl::RSS<S>>(ra), fb = test::bvh<fcl::RSS<S>>(rb);
+  const auto partner = test::bvh<BV>(rb);
+  const Model<S> a(ra.mesh()), b(rb.mesh());
+  std::mt19937_64 g(1);
+  std::uniform_real_distribution<double> u(0, 1);
+  const double tolerance = std::is_same<S, double>::value ? 1e-10 : 2e-5;
+  int apart = 0;
+  for (int i = 0; i < poses; ++i) {
+    const auto X = test::pose<S>(test::randomRotation(g), test::randomDirection(g) * scale);
+    const auto Y = test::pose<S>(test::randomRotation(g),
+                                 X.translation().template cast<double>() + test::randomDirection(g) * 6 * u(g) * scale);
+    const bool touch = test::touching<S>(*fa, X, *fb, Y);
+    const double expected = touch ? 0 : static_cast<double>(ask<S>(*fa, X, *fb, Y).min_distance);
+    apart += !touch;
+    const auto check = [&](const fcl::CollisionGeometry<S>& o1, const fcl::Transform3<S>& X1, const Raw& r1,
+                           const fcl::CollisionGeometry<S>& o2, const fcl::Transform3<S>& X2, const Raw& r2) {
+      const auto d = ask<S>(o1, X1, o2, X2);
+      ASSERT_NEAR(d.min_distance, expected, tolerance * scale) << i;
+      ASSERT_EQ(d.o1, &o1);
+      ASSERT_EQ(d.o2, &o2);
+      const auto &p = d.nearest_points[0], &q = d.nearest_points[1];
+      ASSERT_NEAR((p - q).norm(), d.min_distance, tolerance * scale);
+      ASSERT_LT((onTriangle(r1, d.b1, X1, p) - p.template cast<double>()).norm(), tolerance * scale);
+      ASSERT_LT((onTriangle(r2, d.b2, X2, q) - q.template cast<double>()).norm(), tolerance * scale);
+    };
+    check(a, X, ra, b, Y, rb);
+    check(b, Y, rb, a, X, ra);
+    check(a, X, ra, *partner, Y, rb);
+    check(*partner, Y, rb, a, X, ra);
+  }
+  EXPECT_GT(apart, poses / 3);
+  EXPECT_LT(apart, poses);
+}
+
+TYPED_TEST(Distance, EqualsFclsOnRandomPoses) {
+  using S = TypeParam;
+  checkAgainstFcl<fcl::OBBRSS<S>>(60, 1);
+  checkAgainstFcl<fcl::OBBRSS<S>>(20, 1e-4);
+  checkAgainstFcl<fcl::OBBRSS<S>>(20, 1e4);
+}
+
+TYPED_TEST(Distance, EveryBvhIsAPartner) {
+  using S = TypeParam;
+  checkAgainstFcl<fcl::AABB<S>>(8, 1);
+  checkAgainstFcl<fcl::OBB<S>>(8, 1);
+  checkAgainstFcl<fcl::RSS<S>>(8, 1);
+  checkAgainstFcl<fcl::kIOS<S>>(8, 1);
+  checkAgainstFcl<fcl::KDOP<S, 16>>(8, 1);
+  checkAgainstFcl<fcl::KDOP<S, 18>>(8, 1);
+  checkAgainstFcl<fcl::KDOP<S, 24>>(8, 1);
+}
+
+TEST(DistanceDouble, MovingByItTouchesAndNotBefore) {
+  const Raw ra = test::torus(60), rb = test::torus(31, 0.2);
+  const Modeld a(ra.mesh()), b(rb.mesh());
+  std::mt19937_64 g(3);
+  std::uniform_real_distribution<double> u(0, 1);
+  const auto I = fcl::Transform3d(fcl::Transform3d::Identity());
+  for (int i = 0; i < 40; ++i) {
+    auto Y = test::pose<double>(test::randomRotation(g), test::randomDirection(g) * (2.5 + 3 * u(g)));
+    const auto d = ask<double>(a, I, b, Y);
+    if (d.min_distance <= 0) continue;
+    const Eigen::Vector3d way = (d.nearest_points[0] - d.nearest_points[1]).normalized(), start = Y.translation();
+    Y.translation() = start + way * (d.min_distance - 1e-9);
+    EXPECT_FALSE(test::touching<double>(a, I, b, Y)) << i;
+    Y.translation() = start + way * (d.min_distance + 1e-9);
+    EXPECT_TRUE(test::touching<double>(a, I, b, Y)) << i;
+  }
+}
+
+// Slivers, segments, points, duplicates, a soup; and one triangle against many. Brute force knows no tree.
+TEST(DistanceDouble, DegenerateMeshesAgainstBruteForce) {
+  const Raw meshes[] = {test::adversarial(), test::soup(60, 4), test::torus(6)};
+  std::mt19937_64 g(4);
+  const auto I = fcl::Transform3d(fcl::Transform3d::Identity());
+  for (const Raw& ra : meshes) {
+    for (const Raw& rb : meshes) {
+      const Modeld a(ra.mesh()), b(rb.mesh());
+      for (int i = 0; i < 6; ++i) {
+        const auto Y = test::pose<double>(test::randomRotation(g), test::randomDirection(g) * i * 0.8);
+        double expected = std::numeric_limits<double>::infinity();
+        for (const auto& s : ra.triangles) {
+          const query::Corners p = {ra.vertices[s[0]], ra.vertices[s[1]], ra.vertices[s[2]]};
+          for (const auto& t : rb.triangles) {
+            const query::Corners q = {Y * rb.vertices[t[0]], Y * rb.vertices[t[1]], Y * rb.vertices[t[2]]};
+            Eigen::Vector3d on_p, on_q;
+            expected = std::min(expected, query::nearestPoints(p, q, on_p, on_q));
+          }
+        }
+        ASSERT_NEAR(ask<double>(a, I, b, Y).min_distance, expected, 1e-12);
+        ASSERT_NEAR(ask<double>(b, Y, a, I).min_distance, expected, 1e-12);
+      }
+    }
+  }
+}
+
+TEST(NearestPoints, EqualFclsTriangleDistance) {
+  std::mt19937_64 g(5);
+  std::uniform_real_distribution<double> u(-1, 1);
+  int apart = 0;
+  for (int round = 0; round < 20000; ++round) {
+    query::Corners p, q;
+    const double size = std::pow(10.0, u(g));
+    const Eigen::Vector3d away = 2 * test::randomDirection(g) * size;
+    for (int k = 0; k < 3; ++k) {
+      p[k] = Eigen::Vector3d(u(g), u(g), u(g));
+      q[k] = size * Eigen::Vector3d(u(g), u(g), u(g)) + away;
+    }
+    Eigen::Vector3d a, b, fa, fb;
+    const double d = query::nearestPoints(p, q, a, b);
+    const double expected = fcl::detail::TriangleDistance<double>::triDistance(p, q, fa, fb);
+    ASSERT_NEAR(d, expected, 1e-10) << round;
+    ASSERT_NEAR((a - b).norm(), d, 1e-12);
+    ASSERT_LT((query::closestPoint(a, p) - a).norm(), 1e-9);
+    ASSERT_LT((query::closestPoint(b, q) - b).norm(), 1e-9);
+    apart += d > 0;
+  }
+  EXPECT_GT(apart, 10000);
+  EXPECT_LT(apart, 20000);
+}
+
+TEST(DistanceRequest, MinimaRunAndErrorsAreTaken) {
+  const Raw ra = test::torus(60), rb = test::torus(31, 0.2);
+  const Modeld a(ra.mesh()), b(rb.mesh());
+  const auto I = fcl::Transform3d(fcl::Transform3d::Identity());
+  const auto Y = test::pose<double>(Eigen::Matrix3d::Identity(), Eigen::Vector3d(4, 0.3, 0.5));
+  const double exact = ask<double>(a, I, b, Y).min_distance;
+  ASSERT_GT(exact, 0.5);
+
+  fcl::DistanceRequestd request;
+  fcl::DistanceResultd result;
+  result.min_distance = exact / 2;
+  EXPECT_EQ(fcl::distance(&a, I, &b, Y, request, result), exact / 2) << "something nearer is known";
+  EXPECT_EQ(result.o1, nullptr);
+  result.min_distance = exact * 2;
+  EXPECT_NEAR(fcl::distance(&a, I, &b, Y, request, result), exact, 1e-12);
+  EXPECT_EQ(result.o1, &a);
+
+  result.clear();
+  result.min_distance = 0;
+  EXPECT_EQ(fcl::distance(&a, I, &b, Y, request, result), 0) << "satisfied before it starts";
+
+  for (const double error : {1e-3, 0.1, 0.5}) {
+    const Modeld fresh(ra.mesh()), other(rb.mesh());
+    fcl::DistanceRequestd loose(true, false, error, 0);
+    fcl::DistanceResultd relative;
+    const double r = fcl::distance(&fresh, I, &other, Y, loose, relative);
+    EXPECT_GE(r, exact * (1 - 1e-12));
+    EXPECT_LE(r, exact * (1 + error) * (1 + 1e-12));
+    fcl::DistanceRequestd looser(true, false, 0, error);
+    fcl::DistanceResultd absolute;
+    const double s = fcl::distance(&fresh, I, &other, Y, looser, absolute);
+    EXPECT_GE(s, exact * (1 - 1e-12));
+    EXPECT_LE(s, exact + error + 1e-12);
+  }
+}
+
+TEST(DistanceRequest, TouchingIsZeroOrTheDepthOfAContact) {
+  const Modeld a(test::torus(40).mesh()), b(test::torus(40).mesh());
+  const auto I = fcl::Transform3d(fcl::Transform3d::Identity());
+  const auto Y = test::pose<double>(Eigen::Matrix3d::Identity(), Eigen::Vector3d(1.3, 0.2, 0.1));
+  ASSERT_TRUE(test::touching<double>(a, I, b, Y));
+  const auto d = ask<double>(a, I, b, Y);
+  EXPECT_EQ(d.min_distance, 0);
+  EXPECT_LT((d.nearest_points[0] - d.nearest_points[1]).norm(), 1e-12);
+  const auto s = ask<double>(a, I, b, Y, true);
+  EXPECT_LT(s.min_distance, 0);
+  fcl::CollisionRequestd request(1, true);
+  fcl::CollisionResultd result;
+  fcl::collide(&a, I, &b, Y, request, result);
+  EXPECT_EQ(s.min_distance, -result.getContact(0).penetration_depth);
+  EXPECT_EQ(s.nearest_points[0], result.getContact(0).pos);
+
+  // A shell inside a shell is as far as the surfaces are.
+  Raw small = test::torus(20);
+  small.scale(1e-3);
+  const Modeld inside(small.mesh());
+  const auto hole = ask<double>(a, I, inside, I);
+  EXPECT_GT(hole.min_distance, 0.1);
+  EXPECT_EQ(ask<double>(a, I, inside, I, true).min_distance, hole.min_distance);
+}
+
+TEST(DistanceConservative, IsNeverMoreAndNearerWithDepth) {
+  const Raw ra = test::torus(60), rb = test::torus(31, 0.2);
+  const Modeld exact_a(ra.mesh()), exact_b(rb.mesh());
+  const auto fb = test::bvh<fcl::OBBRSSd>(rb);
+  std::mt19937_64 g(6);
+  const auto I = fcl::Transform3d(fcl::Transform3d::Identity());
+  for (const Subdivision subdivision : {Subdivision::kOctree, Subdivision::kBono}) {
+    for (int i = 0; i < 5; ++i) {
+      const auto Y = test::pose<double>(test::randomRotation(g), test::randomDirection(g) * (2.2 + 0.5 * i));
+      const double exact = ask<double>(exact_a, I, exact_b, Y).min_distance;
+      double before = -1;
+      for (const int depth : {4, 6, 8}) {
+        Options options;
+        options.answer = Answer::kConservative;
+        options.subdivision = subdivision;
+        options.depth = depth;
+        const Modeld a(ra.mesh(), options), b(rb.mesh(), options);
+        const double d = ask<double>(a, I, b, Y).min_distance;
+        EXPECT_LE(d, exact + 1e-12);
+        EXPECT_GE(d, before - 0.15 / depth) << "spheres shrink with depth";
+        EXPECT_EQ(d > 0, !test::touching<double>(a, I, b, Y));
+        EXPECT_NEAR(ask<double>(b, Y, a, I).min_distance, d, 1e-12);
+        // Spheres against triangles lie between.
+        for (const fcl::CollisionGeometryd* partner : {static_cast<const fcl::CollisionGeometryd*>(&exact_b),
+                                                       static_cast<const fcl::CollisionGeometryd*>(fb.get())}) {
+          const double mixed = ask<double>(a, I, *partner, Y).min_distance;
+          EXPECT_GE(mixed, d - 1e-12);
+          EXPECT_LE(mixed, exact + 1e-12);
+          EXPECT_NEAR(ask<double>(*partner, Y, a, I).min_distance, mixed, 1e-12);
+        }
+        before = d;
+      }
+      EXPECT_NEAR(before, exact, 0.1);
+    }
+  }
+}
+
+TEST(DistanceGrowth, OnlyWhatTheBoundNeedsAndNothingTwice) {
+  const Raw raw = test::torus(100);
+  Modeld a(raw.mesh()), b(raw.mesh());
+  const auto I = fcl::Transform3d(fcl::Transform3d::Identity());
+  const auto Y = test::pose<double>(Eigen::Matrix3d::Identity(), Eigen::Vector3d(3.5, 0.2, 0.1));
+  const double d = ask<double>(a, I, b, Y).min_distance;
+  const Statistics first = a.statistics();
+  EXPECT_GT(first.resident_nodes, 1u);
+  Modeld whole(a.mesh());
+  whole.expandAll(static_cast<int>(first.nodes_per_level.size()));
+  EXPECT_LT(first.resident_nodes, whole.statistics().resident_nodes / 2);
+  EXPECT_EQ(ask<double>(a, I, b, Y).min_distance, d);
+  EXPECT_EQ(a.statistics().expansions, first.expansions);
+  EXPECT_EQ(ask<double>(a, I, a, Y).min_distance, ask<double>(a, I, b, Y).min_distance) << "one model on both sides";
+}
+
+TEST(DistanceThreads, FreshModelsPruningAndCollisions) {
+  const Raw raw = test::torus(60);
+  std::mt19937_64 g(7);
+  std::uniform_real_distribution<double> u(0, 1);
+  const auto I = fcl::Transform3d(fcl::Transform3d::Identity());
+  std::vector<fcl::Transform3d> poses;
+  std::vector<double> expected;
+  const Modeld calm(raw.mesh());
+  for (int i = 0; i < 40; ++i) {
+    poses.push_back(test::pose<double>(test::randomRotation(g), test::randomDirection(g) * (1 + 3 * u(g))));
+    expected.push_back(ask<double>(calm, I, calm, poses.back()).min_distance);
+  }
+  Modeld a(raw.mesh()), b(raw.mesh());
+  std::vector<std::thread> threads;
+  std::atomic<int> wrong{0};
+  for (std::size_t k = 0; k < 4; ++k) {
+    threads.emplace_back([&, k] {
+      for (std::size_t i = 0; i < poses.size(); ++i) {
+        const std::size_t n = (i * 7 + k * 11) % poses.size();
+        const double d =
+            k % 2 ? ask<double>(b, poses[n], a, I).min_distance : ask<double>(a, I, b, poses[n]).min_distance;
+        wrong += !(std::abs(d - expected[n]) < 1e-12);
+        wrong += test::touching<double>(a, I, b, poses[n]) != (expected[n] <= 0);
+        if (i % 13 == k) a.prune(Clock::now() + std::chrono::hours(1));
+      }
+    });
+  }
+  for (auto& t : threads) t.join();
+  EXPECT_EQ(wrong, 0);
+}
+
+}  // namespace
+}  // namespace bocst
