@@ -9,8 +9,10 @@
 #include <limits>
 #include <stdexcept>
 #include <string>
+#include <type_traits>
 
 #include "fcl/bvh_side.h"
+#include "fcl/dispatch.h"
 #include "query/volume.h"
 #include "tree/tree.h"
 
@@ -94,9 +96,9 @@ void withBvh(const char* query, const fcl::CollisionGeometry<S>* partner, F&& f)
     case fcl::BV_KDOP24:
       return f(as(static_cast<fcl::KDOP<S, 24>*>(nullptr)));
     default:
-      throw std::invalid_argument(std::string("bocst::") + query + ": a Model against FCL node type " +
-                                  std::to_string(partner->getNodeType()) +
-                                  " is not supported in this version; partners are Model and BVHModel");
+      throw std::invalid_argument(
+          std::string("bocst::") + query + ": bocst::Model<" + (std::is_same<S, float>::value ? "float" : "double") +
+          "> and " + typeName<S>(partner) + " are not supported in this version; partners are Model and BVHModel");
   }
 }
 

@@ -86,11 +86,11 @@ class DistanceWalk {
 
   bool spheres() const { return a_.cells() || b_.cells(); }
 
-  // Can something at this distance or beyond improve the answer enough?
-  bool worthIt(double bound) const {
-    return bound < limit_ &&
-           !(bound >= best_.distance - goal_.absolute && bound * (1 + goal_.relative) >= best_.distance);
+  // What is at this distance or beyond does not improve the answer by more than the caller lets go.
+  double enough() const {
+    return std::min(limit_, std::max(best_.distance - goal_.absolute, best_.distance / (1 + goal_.relative)));
   }
+  bool worthIt(double bound) const { return bound < enough(); }
 
   // Puts a pair on the heap, if it is worth it.
   void push(Pair pair, Scratch& s) {
@@ -105,7 +105,7 @@ class DistanceWalk {
   double boundOf(const NodeReach& a, const NodeReach& b) {
     // Each node holds a piece of surface, so something is no farther than this.
     limit_ = std::min(limit_, farthest(a, b));
-    return distanceBound(a, b, way_);
+    return distanceBound(a, b, way_, enough());
   }
 
   Sphere ballOfB(typename B::Node n) const { return placed(b_.sphere(n), b_in_a_); }
@@ -201,7 +201,7 @@ class DistanceWalk {
     for (TriangleReach& t : s.b) t.along(way_);
     for (const TriangleReach& t : s.a) {
       for (const TriangleReach& u : s.b) {
-        if (u.lowest - t.highest < limit_ && worthIt(distanceBound(t, u))) triangles(t, u);
+        if (worthIt(u.lowest - t.highest) && !isBeyond(t, u, enough())) triangles(t, u);
       }
     }
   }

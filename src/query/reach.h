@@ -45,29 +45,32 @@ struct NodeReach {
 };
 
 /// No point of a is nearer to any of b than this, up to a part of 1e-12 of the sizes, which is taken off. `way` is a
-/// direction in which the bound is likely to be good, or zero.
-inline double distanceBound(const NodeReach& a, const NodeReach& b, const Eigen::Vector3d& way) {
+/// direction in which the bound is likely to be good, or zero; a bound of `enough` or more is not made better.
+inline double distanceBound(const NodeReach& a, const NodeReach& b, const Eigen::Vector3d& way, double enough) {
   const Eigen::Vector3d t = b.center - a.center;
-  const Eigen::Matrix3d r = a.axes.transpose() * b.axes, s = r.cwiseAbs();
-  // On three axes at right angles, gaps add up as the sides of a box.
-  const Eigen::Vector3d gap_a = ((a.axes.transpose() * t).cwiseAbs() - a.half - s * b.half).cwiseMax(0);
-  const Eigen::Vector3d gap_b = ((b.axes.transpose() * t).cwiseAbs() - b.half - s.transpose() * a.half).cwiseMax(0);
-  double best = std::sqrt(std::max(gap_a.squaredNorm(), gap_b.squaredNorm()));
-  const auto look = [&](const Eigen::Vector3d& direction) {
+  const double apart = t.norm(), pad = 1e-12 * (apart + a.half.sum() + b.half.sum());
+  double best = 0;
+  const auto isEnough = [&](const Eigen::Vector3d& direction) {
     double lo_a, hi_a, lo_b, hi_b;
     a.along(direction, lo_a, hi_a);
     b.along(direction, lo_b, hi_b);
     const double d = direction.dot(t);
     best = std::max({best, d + lo_b - hi_a, lo_a - d - hi_b});
+    return best - pad >= enough;
   };
-  const double apart = t.norm();
-  if (apart > 0) look(t / apart);
-  if (way.squaredNorm() > 0) look(way);
+  if (way.squaredNorm() > 0 && isEnough(way)) return best - pad;
+  if (apart > 0 && isEnough(t / apart)) return best - pad;
+  // On three axes at right angles, gaps add up as the sides of a box.
+  const Eigen::Matrix3d s = (a.axes.transpose() * b.axes).cwiseAbs();
+  const Eigen::Vector3d gap_a = ((a.axes.transpose() * t).cwiseAbs() - a.half - s * b.half).cwiseMax(0);
+  const Eigen::Vector3d gap_b = ((b.axes.transpose() * t).cwiseAbs() - b.half - s.transpose() * a.half).cwiseMax(0);
+  best = std::max(best, std::sqrt(std::max(gap_a.squaredNorm(), gap_b.squaredNorm())));
+  if (best - pad >= enough) return best - pad;
   for (const NodeReach* n : {&a, &b}) {
     const double length = n->normal.norm();
-    if (length > 0) look(n->normal / length);
+    if (length > 0 && isEnough(n->normal / length)) break;
   }
-  return best - 1e-12 * (apart + a.half.sum() + b.half.sum());
+  return best - pad;
 }
 
 /// Some point of a is no farther from one of b than this.
@@ -94,9 +97,18 @@ struct TriangleReach {
   }
 };
 
-/// The distance of the boxes.
-inline double distanceBound(const TriangleReach& a, const TriangleReach& b) {
-  return (b.lo - a.hi).cwiseMax(a.lo - b.hi).cwiseMax(0).norm() * (1 - 1e-15);
+/// Is the one at least this far from the other, by their boxes or along the line of their middles?
+inline bool isBeyond(const TriangleReach& a, const TriangleReach& b, double distance) {
+  const double least = distance * (1 + 1e-12);
+  if ((b.lo - a.hi).cwiseMax(a.lo - b.hi).cwiseMax(0).squaredNorm() >= least * least) return true;
+  const Eigen::Vector3d line = b.middle() - a.middle();
+  double highest = line.dot(a.corners[0]), lowest = line.dot(b.corners[0]);
+  for (int k = 1; k < 3; ++k) {
+    highest = std::max(highest, line.dot(a.corners[k]));
+    lowest = std::min(lowest, line.dot(b.corners[k]));
+  }
+  const double size = a.corners[0].lpNorm<1>() + b.corners[0].lpNorm<1>();
+  return lowest - highest >= line.norm() * (least + 1e-14 * size);
 }
 
 }  // namespace bocst::query

@@ -122,7 +122,29 @@ TYPED_TEST(Overloads, NoContactsAskedForIsNone) {
   EXPECT_EQ(result.numContacts(), 0u);
 }
 
-TYPED_TEST(Overloads, DistanceRefusesModels) {
+TYPED_TEST(Overloads, DistanceReachesModels) {
+  using S = TypeParam;
+  Scene<S> s;
+  const fcl::DistanceRequest<S> request;
+  const auto check = [](auto&& ask) {
+    fcl::DistanceResult<S> result;
+    EXPECT_GT(ask(result), 0);
+    EXPECT_GE(result.b1, 0) << "the answer of a mesh names its triangles";
+  };
+  const auto far = moved<S>(9);
+  const fcl::CollisionObject<S> far_object(s.model, far);
+  auto& m = s.model;
+  auto& a = s.model_object;
+  check([&](auto& r) { return fcl::distance(m.get(), s.at0, m.get(), far, request, r); });
+  check([&](auto& r) { return fcl::distance(m.get(), s.at0, m.get(), far, &s.libccd, request, r); });
+  check([&](auto& r) { return fcl::distance(m.get(), s.at0, m.get(), far, &s.indep, request, r); });
+  check([&](auto& r) { return fcl::distance(&a, &far_object, request, r); });
+  check([&](auto& r) { return fcl::distance(&a, &far_object, &s.libccd, request, r); });
+  check([&](auto& r) { return fcl::distance(&a, &far_object, &s.indep, request, r); });
+  check([&](auto& r) { return fcl::distance<S>(&a, &far_object, request, r); });
+}
+
+TYPED_TEST(Overloads, DistanceRefusesOtherPartners) {
   using S = TypeParam;
   Scene<S> s;
   const fcl::DistanceRequest<S> request;

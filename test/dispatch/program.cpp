@@ -146,6 +146,18 @@ void run() {
            fcl::distance(a.get(), moved(0), ball.get(), moved(3), request, result);
          }),
          "distance from a model does not throw");
+  for (int solver : {fcl::GST_LIBCCD, fcl::GST_INDEP}) {
+    fcl::DistanceRequest<S> request;
+    request.gjk_solver_type = static_cast<fcl::GJKSolverType>(solver);
+    fcl::DistanceResult<S> result;
+    const fcl::CollisionObject<S> object1(a, moved(0)), object2(a, moved(9));
+    const S d = fcl::distance(&object1, &object2, request, result);
+    expect(d > 0 && d < 9 && result.b1 >= 0, "the distance of two models is not bocst's");
+    result.clear();
+    const Geometry mesh = makeBvh();
+    expect(fcl::distance(a.get(), moved(0), mesh.get(), moved(9), request, result) > 0 && result.b2 >= 0,
+           "the distance of a model and an FCL mesh is not bocst's");
+  }
   {
     fcl::CollisionObject<S> object1(a, moved(0)), object2(ball, moved(3));
     fcl::DistanceRequest<S> request;

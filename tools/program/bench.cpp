@@ -2,6 +2,7 @@
 #include <bocst/io.h>
 
 #include <CLI/CLI.hpp>
+#include <cmath>
 #include <cstdio>
 #include <iostream>
 #include <memory>
@@ -22,11 +23,13 @@ struct Side {
   std::vector<std::vector<double>> rounds;  // by pose
   std::vector<bool> first_verdicts;
   std::vector<bool> verdicts;
+  std::vector<std::vector<double>> distance_rounds;  // by pose that does not touch
+  std::vector<double> distances;
 
-  std::vector<double> medians() const {
+  static std::vector<double> medians(const std::vector<std::vector<double>>& by_pose) {
     std::vector<double> result;
-    result.reserve(rounds.size());
-    for (const std::vector<double>& times : rounds) result.push_back(quantile(times, 0.5));
+    result.reserve(by_pose.size());
+    for (const std::vector<double>& times : by_pose) result.push_back(quantile(times, 0.5));
     return result;
   }
 
@@ -68,6 +71,37 @@ struct Bench {
     }
   }
 
+  static void timeDistances(const QueryPair& pair, const std::vector<Eigen::Isometry3d>& X_ABs, Side& side) {
+    for (std::size_t i = 0; i < X_ABs.size(); ++i) {
+      const Stopwatch watch;
+      const double distance = pair.distance(X_ABs[i]);
+      side.distance_rounds[i].push_back(watch.microseconds());
+      if (side.distances[i] != distance) throw std::runtime_error("the same distance was different later");
+    }
+  }
+
+  /// Distances where the poses do not touch, both sides in turn. Does nothing when all touch.
+  void benchDistances(const FclPair& fcl, const BocstPair& bocst, const std::vector<Eigen::Isometry3d>& X_ABs,
+                      Side& theirs, Side& ours) const {
+    std::vector<Eigen::Isometry3d> apart;
+    for (std::size_t i = 0; i < X_ABs.size(); ++i) {
+      if (!theirs.verdicts[i]) apart.push_back(X_ABs[i]);
+    }
+    theirs.distance_rounds.resize(apart.size());
+    ours.distance_rounds.resize(apart.size());
+    for (const Eigen::Isometry3d& X_AB : apart) {
+      theirs.distances.push_back(fcl.distance(X_AB));
+      ours.distances.push_back(bocst.distance(X_AB));
+      if (!(std::abs(theirs.distances.back() - ours.distances.back()) <= 1e-9 * theirs.distances.back())) {
+        throw std::runtime_error("the distances are not FCL's");
+      }
+    }
+    for (std::size_t round = 0; round < rounds; ++round) {
+      timeDistances(fcl, apart, theirs);
+      timeDistances(bocst, apart, ours);
+    }
+  }
+
   /// At most so many rounds over all poses until a tree has what they need.
   static constexpr int kWarmUps = 10;
 
@@ -94,7 +128,7 @@ struct Bench {
     const auto make_fcl = [&] { return buildFclPair(FclTree::kObbRss, Scalar::kDouble, a, b); };
 
     // Both sides take turns, so that a slow moment of the machine meets both.
-    Progress progress("step", 2 * rounds + 3);
+    Progress progress("step", 2 * rounds + 4);
     const std::unique_ptr<FclPair> fcl_pair = make_fcl();
     progress.step();
     PoseSampler sampler(*mesh_a, *mesh_b, *fcl_pair, seed);
@@ -132,9 +166,13 @@ struct Bench {
       progress.step();
     }
 
+    const std::size_t bytes_all = bocst_pair->bytes();
+    benchDistances(*fcl_pair, *bocst_pair, X_ABs, theirs, ours);
+    progress.step();
+
     const bool equal = ours.verdicts == theirs.verdicts && ours.first_verdicts == theirs.first_verdicts;
-    const std::vector<double> our_medians = ours.medians();
-    const std::vector<double> fcl_medians = theirs.medians();
+    const std::vector<double> our_medians = Side::medians(ours.rounds);
+    const std::vector<double> fcl_medians = Side::medians(theirs.rounds);
     const auto fcl_bytes = static_cast<double>(fclTreeBytes(Scalar::kDouble, a.triangles.size()) +
                                                fclTreeBytes(Scalar::kDouble, b.triangles.size()));
     struct Row {
@@ -143,12 +181,16 @@ struct Bench {
       double bocst;
       double fcl;
     };
-    const std::vector<Row> times = {
+    std::vector<Row> times = {
         {"first_answer", "first answer, median", quantile(ours.first_answers, 0.5),
          quantile(theirs.first_answers, 0.5)},
         {"query_median", "warm query, median", quantile(our_medians, 0.5), quantile(fcl_medians, 0.5)},
         {"query_mean", "warm query, mean", mean(our_medians), mean(fcl_medians)},
         {"query_p95", "warm query, 95th percentile", quantile(our_medians, 0.95), quantile(fcl_medians, 0.95)}};
+    if (!ours.distances.empty()) {
+      times.push_back({"distance_median", "warm distance, median", quantile(Side::medians(ours.distance_rounds), 0.5),
+                       quantile(Side::medians(theirs.distance_rounds), 0.5)});
+    }
     const double memory = fcl_bytes / quantile(bytes_first, 0.5);
     std::size_t worst = 0;
     for (std::size_t i = 0; i < poses; ++i) {
@@ -165,7 +207,7 @@ struct Bench {
         microseconds[row.key] = {{"bocst", row.bocst}, {"fcl", row.fcl}};
       }
       ratio["memory"] = memory;
-      ratio["distance_median"] = nullptr;
+      if (ours.distances.empty()) ratio["distance_median"] = nullptr;
       output.write(
           {{"a", file_a},
            {"b", file_b.empty() ? file_a : file_b},
@@ -177,8 +219,7 @@ struct Bench {
            {"oracle", oracle},
            {"ratio", ratio},
            {"microseconds", microseconds},
-           {"bytes",
-            {{"bocst_first", quantile(bytes_first, 0.5)}, {"bocst_all", bocst_pair->bytes()}, {"fcl", fcl_bytes}}},
+           {"bytes", {{"bocst_first", quantile(bytes_first, 0.5)}, {"bocst_all", bytes_all}, {"fcl", fcl_bytes}}},
            {"verdicts", {{"bocst", ours.hash()}, {"fcl", theirs.hash()}, {"equal", equal}}}});
     } else {
       Table table;
@@ -187,7 +228,7 @@ struct Bench {
         table.row({row.name, formatTime(row.bocst), formatTime(row.fcl), formatRatio(row.fcl / row.bocst)});
       }
       const double first = quantile(bytes_first, 0.5);
-      const auto all = static_cast<double>(bocst_pair->bytes());
+      const auto all = static_cast<double>(bytes_all);
       table.row({"tree bytes after one query", formatBytes(first), formatBytes(fcl_bytes), formatRatio(memory)});
       table.row(
           {"tree bytes after all queries", formatBytes(all), formatBytes(fcl_bytes), formatRatio(fcl_bytes / all)});

@@ -9,18 +9,24 @@ namespace bocst::program {
 namespace {
 
 template <typename S>
-struct BocstCollide {
-  void operator()(const fcl::CollisionGeometry<S>* o1, const fcl::Transform3<S>& X_W1,
-                  const fcl::CollisionGeometry<S>* o2, const fcl::Transform3<S>& X_W2,
-                  const fcl::CollisionRequest<S>& request, fcl::CollisionResult<S>& result) const {
+struct BocstQueries {
+  using Geometry = fcl::CollisionGeometry<S>;
+  using Pose = fcl::Transform3<S>;
+
+  static void collide(const Geometry* o1, const Pose& X_W1, const Geometry* o2, const Pose& X_W2,
+                      const fcl::CollisionRequest<S>& request, fcl::CollisionResult<S>& result) {
     fcl::collide(o1, X_W1, o2, X_W2, request, result);
+  }
+  static void distance(const Geometry* o1, const Pose& X_W1, const Geometry* o2, const Pose& X_W2,
+                       const fcl::DistanceRequest<S>& request, fcl::DistanceResult<S>& result) {
+    fcl::distance(o1, X_W1, o2, X_W2, request, result);
   }
 };
 
 template <typename S>
-class ModelPair : public PairOf<S, Model<S>, BocstPair, BocstCollide<S>> {
+class ModelPair : public PairOf<S, Model<S>, BocstPair, BocstQueries<S>> {
  public:
-  using PairOf<S, Model<S>, BocstPair, BocstCollide<S>>::PairOf;
+  using PairOf<S, Model<S>, BocstPair, BocstQueries<S>>::PairOf;
 
   Statistics statisticsA() const override { return this->a().statistics(); }
   Statistics statisticsB() const override { return this->b().statistics(); }

@@ -7,6 +7,7 @@
 #include <fcl/math/geometry.h>
 #include <fcl/narrowphase/collision.h>
 #include <fcl/narrowphase/detail/traversal/collision/intersect.h>
+#include <fcl/narrowphase/distance.h>
 
 #include <stdexcept>
 
@@ -17,11 +18,17 @@ namespace bocst::program {
 namespace {
 
 template <typename S>
-struct FclCollide {
-  void operator()(const fcl::CollisionGeometry<S>* o1, const fcl::Transform3<S>& X_W1,
-                  const fcl::CollisionGeometry<S>* o2, const fcl::Transform3<S>& X_W2,
-                  const fcl::CollisionRequest<S>& request, fcl::CollisionResult<S>& result) const {
+struct FclQueries {
+  using Geometry = fcl::CollisionGeometry<S>;
+  using Pose = fcl::Transform3<S>;
+
+  static void collide(const Geometry* o1, const Pose& X_W1, const Geometry* o2, const Pose& X_W2,
+                      const fcl::CollisionRequest<S>& request, fcl::CollisionResult<S>& result) {
     fcl::collide(o1, X_W1, o2, X_W2, request, result);
+  }
+  static void distance(const Geometry* o1, const Pose& X_W1, const Geometry* o2, const Pose& X_W2,
+                       const fcl::DistanceRequest<S>& request, fcl::DistanceResult<S>& result) {
+    fcl::distance(o1, X_W1, o2, X_W2, request, result);
   }
 };
 
@@ -48,11 +55,11 @@ std::unique_ptr<fcl::BVHModel<BV>> build(const MeshArrays& mesh) {
 }
 
 template <typename BV>
-class BvhPair : public PairOf<typename BV::S, fcl::BVHModel<BV>, FclPair, FclCollide<typename BV::S>> {
+class BvhPair : public PairOf<typename BV::S, fcl::BVHModel<BV>, FclPair, FclQueries<typename BV::S>> {
   using S = typename BV::S;
 
  public:
-  using PairOf<S, fcl::BVHModel<BV>, FclPair, FclCollide<S>>::PairOf;
+  using PairOf<S, fcl::BVHModel<BV>, FclPair, FclQueries<S>>::PairOf;
 
   bool trianglesTouch(QueryPair::Contact triangles, const Eigen::Isometry3d& X_AB,
                       QueryPair::Order order) const override {

@@ -4,6 +4,8 @@
 #include <fcl/geometry/collision_geometry.h>
 #include <fcl/narrowphase/collision_request.h>
 #include <fcl/narrowphase/collision_result.h>
+#include <fcl/narrowphase/distance_request.h>
+#include <fcl/narrowphase/distance_result.h>
 
 #include <algorithm>
 #include <memory>
@@ -14,9 +16,9 @@
 
 namespace bocst::program {
 
-/// A QueryPair over two FCL geometries. Collide is a functor, since which fcl::collide is meant depends on the headers
-/// that the including file has: FCL's own, or bocst's overloads.
-template <typename S, typename Geometry, typename Base, typename Collide>
+/// A QueryPair over two FCL geometries. Queries has fcl::collide and fcl::distance, since which are meant depends on
+/// the headers that the including file has: FCL's own, or bocst's overloads.
+template <typename S, typename Geometry, typename Base, typename Queries>
 class PairOf : public Base {
  public:
   PairOf(std::unique_ptr<Geometry> a, std::unique_ptr<Geometry> b) : a_(std::move(a)), b_(std::move(b)) {}
@@ -46,6 +48,17 @@ class PairOf : public Base {
     return found;
   }
 
+  double distance(const Eigen::Isometry3d& X_AB) const override {
+    const fcl::DistanceRequest<S> request;
+    fcl::DistanceResult<S> result;
+    const fcl::Transform3<S> X_WA = fcl::Transform3<S>::Identity();
+    const fcl::Transform3<S> X_WB = X_AB.cast<S>();
+    const fcl::CollisionGeometry<S>* a = a_.get();
+    const fcl::CollisionGeometry<S>* b = b_.get();
+    Queries::distance(a, X_WA, b, X_WB, request, result);
+    return result.min_distance;
+  }
+
  protected:
   const Geometry& a() const { return *a_; }
   const Geometry& b() const { return *b_; }
@@ -58,9 +71,9 @@ class PairOf : public Base {
     const fcl::CollisionGeometry<S>* a = a_.get();
     const fcl::CollisionGeometry<S>* b = b_.get();
     if (order == QueryPair::Order::kAB) {
-      Collide()(a, X_WA, b, X_WB, request, result);
+      Queries::collide(a, X_WA, b, X_WB, request, result);
     } else {
-      Collide()(b, X_WB, a, X_WA, request, result);
+      Queries::collide(b, X_WB, a, X_WA, request, result);
     }
   }
 

@@ -46,6 +46,9 @@ class QueryPair {
   /// Up to `limit` contacts as found, sorted and without repetitions.
   virtual std::vector<Contact> contacts(const Eigen::Isometry3d& X_AB, std::size_t limit = kAll,
                                         Order order = Order::kAB) const = 0;
+
+  /// fcl::distance in its default form.
+  virtual double distance(const Eigen::Isometry3d& X_AB) const = 0;
 };
 
 /// FCL's own trees over both meshes.
