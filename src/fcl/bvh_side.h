@@ -111,11 +111,11 @@ class BvhSide {
     });
   }
 
-  // One triangle a leaf: its volume is as good as itself.
-  template <typename Corner, typename F>
-  void childrenMeeting(Node node, const query::Volume& other, const query::Placement& to, std::size_t, Corner&&,
-                       F&& f) const {
-    overlappingChildren(node, other, to, f);
+  // A pair of children is not worth a look at each triangle.
+  template <typename Coarse, typename Other, typename F>
+  void childrenMeeting(Node node, const query::Volume& volume, const query::Placement& to, Coarse&, const Other&,
+                       typename Other::Node, F&& f) const {
+    overlappingChildren(node, volume, to, f);
   }
 
   template <typename F>

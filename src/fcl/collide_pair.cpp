@@ -17,6 +17,7 @@
 #include "query/pair_set.h"
 #include "query/pair_walk.h"
 #include "query/tree_walk.h"
+#include "query/triangle.h"
 
 namespace bocst::fcl_room {
 namespace {

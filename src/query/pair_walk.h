@@ -7,6 +7,7 @@
 
 #include "query/leaf_pairs.h"
 #include "query/set_aside.h"
+#include "query/triangle.h"
 #include "query/visitor.h"
 
 namespace bocst::query {
@@ -33,6 +34,8 @@ class PairWalk {
     s.stack.clear();
     s.aside.clear();
     s.leaves.clear();
+    s.coarse_a.clear();
+    s.coarse_b.clear();
     const Pair root{a_.root(), b_.root()};
     if (!rootsMeet(root)) return false;
     s.stack.push_back(root);
@@ -54,6 +57,8 @@ class PairWalk {
     std::vector<Pair> stack;
     SetAside<A, B> aside;
     LeafPairs<A, B> leaves;
+    CoarseLeaf<A> coarse_a;
+    CoarseLeaf<B> coarse_b;
   };
   static Scratch& scratch() {
     thread_local Scratch s;
@@ -97,9 +102,7 @@ class PairWalk {
       } else {
         const auto push = [&](typename A::Node c) { s.stack.push_back({c, pair.b}); };
         if (sb == State::kLeaf && seen_a_.size < kCoarse * size_b) {
-          a_.childrenMeeting(
-              pair.a, volumeOf(b_, seen_b_), b_in_a_, b_.triangleCount(pair.b),
-              [&](std::size_t i, int k) { return b_in_a_ * b_.corner(b_.triangle(pair.b, i), k); }, push);
+          a_.childrenMeeting(pair.a, volumeOf(b_, seen_b_), b_in_a_, s.coarse_b, b_, pair.b, push);
         } else {
           a_.overlappingChildren(pair.a, volumeOf(b_, seen_b_), b_in_a_, push);
         }
@@ -109,9 +112,7 @@ class PairWalk {
     } else {
       const auto push = [&](typename B::Node c) { s.stack.push_back({pair.a, c}); };
       if (sa == State::kLeaf && size_b < kCoarse * seen_a_.size) {
-        b_.childrenMeeting(
-            pair.b, volumeOf(a_, seen_a_), a_in_b_, a_.triangleCount(pair.a),
-            [&](std::size_t i, int k) { return a_in_b_ * a_.corner(a_.triangle(pair.a, i), k); }, push);
+        b_.childrenMeeting(pair.b, volumeOf(a_, seen_a_), a_in_b_, s.coarse_a, a_, pair.a, push);
       } else {
         b_.overlappingChildren(pair.b, volumeOf(a_, seen_a_), a_in_b_, push);
       }

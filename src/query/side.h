@@ -5,9 +5,7 @@
 #include <cstdint>
 #include <vector>
 
-#include "oracle/cpu/kernels.h"
 #include "query/kernels.h"
-#include "query/triangle.h"
 #include "query/volume.h"
 #include "tree/tree.h"
 
@@ -91,50 +89,25 @@ class TreeSide {
   template <typename OtherVolume, typename F>
   void overlappingChildren(Node node, OtherVolume& other, const Placement& to, F&& f) const {
     const std::uint32_t index = tree_.link(node).index();
-    const tree::Block& block = tree_.block(index);
-    tree_.touch(block, now_);
-    const double side = 1 << (lattice::kMaxLevel - block.level);
-    const double corner[3] = {block.at[0] * side, block.at[1] * side, block.at[2] * side};
-    const OneVolume one = seenFrom(other, to, corner, side / 2);
-    pushOctants(block, index, overlappingOctants(block.octants, one) & block.grey, f);
+    pushOctants(tree_.block(index), index, octantsOverlapping(index, other, to), f);
   }
 
-  /// The same against the triangles of a leaf of the other side: with large triangles its volume says little. Octants
-  /// that no triangle meets are left out too. `corner(i, k)` is corner k of triangle i in this side's frame.
-  template <typename OtherVolume, typename Corner, typename F>
-  void childrenMeeting(Node node, OtherVolume& other, const Placement& to, std::size_t count, Corner&& corner_of,
-                       F&& f) const {
+  /// The same against the triangles of a leaf of the other side, see CoarseLeaf: octants that no triangle meets are
+  /// left out too.
+  template <typename OtherVolume, typename Coarse, typename Other, typename F>
+  void childrenMeeting(Node node, OtherVolume& volume, const Placement& to, Coarse& coarse, const Other& other,
+                       typename Other::Node leaf, F&& f) const {
     const std::uint32_t index = tree_.link(node).index();
-    const tree::Block& block = tree_.block(index);
-    tree_.touch(block, now_);
-    const double side = 1 << (lattice::kMaxLevel - block.level);
-    const double corner[3] = {block.at[0] * side, block.at[1] * side, block.at[2] * side};
-    const unsigned mask = overlappingOctants(block.octants, seenFrom(other, to, corner, side / 2)) & block.grey;
-    pushOctants(block, index, octantsMeeting(node, mask, to.slack, count, corner_of), f);
+    const unsigned mask = octantsOverlapping(index, volume, to);
+    if (mask != 0) pushOctants(tree_.block(index), index, coarse.octantsMeeting(*this, node, mask, other, leaf, to), f);
   }
 
-  /// The octants in `mask` of an inner node that a triangle of another leaf meets; see childrenMeeting().
-  template <typename Corner>
-  unsigned octantsMeeting(Node node, unsigned mask, double slack, std::size_t count, Corner&& corner_of) const {
+  /// The centre of an inner node's cell and half its side, which is the side of its octants.
+  double octantsOf(Node node, Eigen::Vector3d& center) const {
     const tree::Block& block = tree_.block(tree_.link(node).index());
     const double half = 1 << (lattice::kMaxLevel - block.level - 1);
-    const Eigen::Vector3d center(2 * block.at[0] * half + half, 2 * block.at[1] * half + half,
-                                 2 * block.at[2] * half + half);
-    thread_local oracle::LocalTriangles local;
-    std::uint8_t masks[TrianglePack::kCapacity];
-    unsigned met = 0;
-    for (std::size_t begin = 0; begin < count && (mask & ~met) != 0; begin += TrianglePack::kCapacity) {
-      const std::size_t n = std::min(count - begin, TrianglePack::kCapacity);
-      for (std::size_t i = 0; i < n; ++i) {
-        for (int k = 0; k < 3; ++k) {
-          const Eigen::Vector3d x = (corner_of(begin + i, k) - center) / half;
-          for (int c = 0; c < 3; ++c) local.xyz[3 * k + c][i] = static_cast<float>(x[c]);
-        }
-      }
-      oracle::octantMasks(local, n, static_cast<float>(slack / half * 1.001), masks);
-      for (std::size_t i = 0; i < n; ++i) met |= masks[i];
-    }
-    return mask & met;
+    center = Eigen::Vector3d(2 * block.at[0] + 1, 2 * block.at[1] + 1, 2 * block.at[2] + 1) * half;
+    return half;
   }
 
   /// Calls f(child) for all children.
@@ -167,6 +140,15 @@ class TreeSide {
   tree::Tree& tree() const { return tree_; }
 
  private:
+  template <typename OtherVolume>
+  unsigned octantsOverlapping(std::uint32_t index, OtherVolume& other, const Placement& to) const {
+    const tree::Block& block = tree_.block(index);
+    tree_.touch(block, now_);
+    const double side = 1 << (lattice::kMaxLevel - block.level);
+    const double corner[3] = {block.at[0] * side, block.at[1] * side, block.at[2] * side};
+    return overlappingOctants(block.octants, seenFrom(other, to, corner, side / 2)) & block.grey;
+  }
+
   // Calls f for the octants of a mask. What is still implicit comes first, so that a stack leaves it for last: a hit
   // among resident nodes makes its growth unnecessary.
   template <typename F>

@@ -14,6 +14,7 @@ struct TreeWalk::Scratch {
   Frame frames[PairSteps::kFrames];
   SetAside<TreeSide, TreeSide> aside;
   LeafPairs<TreeSide, TreeSide> leaves;
+  CoarseLeaf<TreeSide> coarse_a, coarse_b;
   bool grew = false;
   std::vector<tree::NodeRef> unseen[2];  // set aside, and with no slab yet
 };
@@ -22,6 +23,8 @@ bool TreeWalk::run() {
   thread_local Scratch s;
   s.aside.clear();
   s.leaves.clear();
+  s.coarse_a.clear();
+  s.coarse_b.clear();
   s.unseen[0].clear();
   s.unseen[1].clear();
   s.grew = false;
@@ -70,7 +73,10 @@ bool TreeWalk::stepAll(PairSteps& steps, Scratch& s) {
         setAside(steps, s);
         break;
       case PairSteps::kCoarse:
-        pushOctants(steps, meeting(steps));
+        pushOctants(steps, steps.expanded == 0 ? s.coarse_b.octantsMeeting(a_, steps.pair.node[0], steps.mask, b_,
+                                                                           steps.pair.node[1], b_in_a_)
+                                               : s.coarse_a.octantsMeeting(b_, steps.pair.node[1], steps.mask, a_,
+                                                                           steps.pair.node[0], a_in_b_));
         break;
       case PairSteps::kLeaves:
         if (s.leaves.test(a_, steps.pair.node[0], b_, steps.pair.node[1], b_in_a_,
@@ -92,17 +98,6 @@ void TreeWalk::setAside(const PairSteps& steps, Scratch& s) {
     const std::size_t o = p.lane[side] % 8;
     if (normal[0][o] == 0 && normal[1][o] == 0 && normal[2][o] == 0) s.unseen[side].push_back(p.node[side]);
   }
-}
-
-unsigned TreeWalk::meeting(const PairSteps& steps) const {
-  const StepPair& p = steps.pair;
-  if (steps.expanded == 0) {
-    return a_.octantsMeeting(p.node[0], steps.mask, b_in_a_.slack, b_.triangleCount(p.node[1]),
-                             [&](std::size_t i, int k) { return b_in_a_ * b_.corner(b_.triangle(p.node[1], i), k); });
-  }
-  const Placement a_in_b = b_in_a_.inverse();
-  return b_.octantsMeeting(p.node[1], steps.mask, a_in_b.slack, a_.triangleCount(p.node[0]),
-                           [&](std::size_t i, int k) { return a_in_b * a_.corner(a_.triangle(p.node[0], i), k); });
 }
 
 }  // namespace bocst::query

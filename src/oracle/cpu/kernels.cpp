@@ -47,7 +47,7 @@ HWY_INLINE void edgeAxis(D d, V ep, V eq, V ap, V aq, V bp, V bq, V half, int p,
   }
 }
 
-void OctantMasks(const LocalTriangles& t, std::size_t count, float slack, std::uint8_t* masks) {
+void OctantMasks(const float* xyz, std::size_t stride, std::size_t count, float slack, std::uint8_t* masks) {
   const D d;
   const hn::RebindToSigned<D> di;
   const V one = hn::Set(d, 1.0f), half = hn::Set(d, 0.5f), zero = hn::Zero(d);
@@ -59,7 +59,7 @@ void OctantMasks(const LocalTriangles& t, std::size_t count, float slack, std::u
     for (int k = 0; k < 3; ++k) {
       BOCST_UNROLL
       for (int c = 0; c < 3; ++c) {
-        v[k][c] = hn::Load(d, t.xyz[3 * k + c] + i);
+        v[k][c] = hn::Load(d, xyz + static_cast<std::size_t>(3 * k + c) * stride + i);
         size = hn::Max(size, hn::Abs(v[k][c]));
       }
     }
@@ -169,8 +169,8 @@ HWY_EXPORT(OctantMasks);
 HWY_EXPORT(Quantise);
 HWY_EXPORT(InstructionSet);
 
-void octantMasks(const LocalTriangles& triangles, std::size_t count, float slack, std::uint8_t* masks) {
-  HWY_DYNAMIC_DISPATCH(OctantMasks)(triangles, count, slack, masks);
+void octantMasks(const float* xyz, std::size_t stride, std::size_t count, float slack, std::uint8_t* masks) {
+  HWY_DYNAMIC_DISPATCH(OctantMasks)(xyz, stride, count, slack, masks);
 }
 
 void quantise(const double* in, std::size_t count, const double* origin, double scale, std::int16_t most,

@@ -22,7 +22,13 @@ struct LocalTriangles {
 /// Chosen at run time for the machine's instruction set; all choices keep these bounds, with or without fused
 /// multiply-add.
 /// `slack` is a distance that still counts as touching, for corners that are off by more than one rounding.
-void octantMasks(const LocalTriangles& triangles, std::size_t count, float slack, std::uint8_t* masks);
+///
+/// Coordinate c of corner k of triangle i is at xyz[(3 * k + c) * stride + i]; stride is a multiple of 8, xyz aligned
+/// to as many floats.
+void octantMasks(const float* xyz, std::size_t stride, std::size_t count, float slack, std::uint8_t* masks);
+inline void octantMasks(const LocalTriangles& triangles, std::size_t count, float slack, std::uint8_t* masks) {
+  octantMasks(triangles.xyz[0], LocalTriangles::kCapacity, count, slack, masks);
+}
 
 /// out[3 * i + k] = (in[3 * i + k] - origin[k]) * scale, rounded down, no less than 0 and no more than `most`.
 void quantise(const double* in, std::size_t count, const double* origin, double scale, std::int16_t most,
