@@ -231,58 +231,44 @@ void traverse(Walk&& walk) {
 
 template <typename S>
 void collideModels(const Question<S>& q, tree::Tree& tree1, tree::Tree& tree2) {
-  std::int64_t now;
-  {
-    const Look look(tree1, &tree2);
-    // Conservative verdicts must not depend on the argument order, so the walk has an order of its own.
-    const bool swapped = (tree1.conservative() || tree2.conservative()) && std::less<tree::Tree*>()(&tree2, &tree1);
-    tree::Tree &tree_a = swapped ? tree2 : tree1, &tree_b = swapped ? tree1 : tree2;
-    const TreeSide a(tree_a), b(tree_b);
-    now = a.now();
-    const oracle::Surface &sa = tree_a.surface(), &sb = tree_b.surface();
-    const double magnitude = magnitudeOf(q.X_W1, q.X_W2, magnitudeOf(tree1.surface().mesh->bounds()),
-                                         magnitudeOf(tree2.surface().mesh->bounds()));
+  // Conservative verdicts must not depend on the argument order, so the walk has an order of its own.
+  const bool swapped = (tree1.conservative() || tree2.conservative()) && std::less<tree::Tree*>()(&tree2, &tree1);
+  const auto run = [&](const TreeSide& a, const TreeSide& b, const Placement& b_in_a, double magnitude) {
+    const oracle::Surface& s = a.tree().surface();
     const ModelTriangles<S> t1(*tree1.surface().mesh), t2(*tree2.surface().mesh);
     Collector<S, ModelTriangles<S>, ModelTriangles<S>> collector(q, t1, t2, swapped, magnitude);
-    collector.setFrame(sa.lattice.origin(), sa.lattice.unit());
-    const Placement b_in_a = placementOf(swapped ? q.X_W2 : q.X_W1, swapped ? q.X_W1 : q.X_W2, sa.lattice.origin(),
-                                         sa.lattice.unit(), sb.lattice.origin(), sb.lattice.unit(), magnitude);
+    collector.setFrame(s.lattice.origin(), s.lattice.unit());
     if (query::TreeWalk::fits(a, b, b_in_a)) {
       traverse<S>(query::TreeWalk(a, b, b_in_a, collector));
     } else {
       traverse<S>(query::PairWalk<TreeSide, TreeSide>(a, b, b_in_a, collector));
     }
+  };
+  if (swapped) {
+    betweenTrees(q.X_W2, tree2, q.X_W1, tree1, run);
+  } else {
+    betweenTrees(q.X_W1, tree1, q.X_W2, tree2, run);
   }
-  tree1.afterQuery(now);
-  if (&tree2 != &tree1) tree2.afterQuery(now);
 }
 
 template <typename BV>
 void collideBvh(const Question<typename BV::S>& q, tree::Tree& tree, const fcl::BVHModel<BV>& bvh, bool swapped) {
   using S = typename BV::S;
-  std::int64_t now;
-  {
-    const Look look(tree, nullptr);
-    const TreeSide a(tree);
-    const BvhSide<BV> b(bvh);
-    now = a.now();
-    const oracle::Surface& surface = tree.surface();
-    const double magnitude = magnitudeOf(q.X_W1, q.X_W2, magnitudeOf(surface.mesh->bounds()), b.magnitude());
-    const ModelTriangles<S> model(*surface.mesh);
+  const auto run = [&](const TreeSide& a, const BvhSide<BV>& b, const Placement& b_in_a, double magnitude) {
+    const oracle::Surface& s = tree.surface();
+    const ModelTriangles<S> model(*s.mesh);
     const BvhTriangles<BV> partner(bvh);
-    const Placement b_in_a = placementOf(swapped ? q.X_W2 : q.X_W1, swapped ? q.X_W1 : q.X_W2, surface.lattice.origin(),
-                                         surface.lattice.unit(), Eigen::Vector3d::Zero(), 1.0, magnitude);
-    const auto run = [&](auto&& collector) {
-      collector.setFrame(surface.lattice.origin(), surface.lattice.unit());
+    const auto walk = [&](auto&& collector) {
+      collector.setFrame(s.lattice.origin(), s.lattice.unit());
       traverse<S>(query::PairWalk<TreeSide, BvhSide<BV>>(a, b, b_in_a, collector));
     };
     if (swapped) {
-      run(Collector<S, BvhTriangles<BV>, ModelTriangles<S>>(q, partner, model, true, magnitude));
+      walk(Collector<S, BvhTriangles<BV>, ModelTriangles<S>>(q, partner, model, true, magnitude));
     } else {
-      run(Collector<S, ModelTriangles<S>, BvhTriangles<BV>>(q, model, partner, false, magnitude));
+      walk(Collector<S, ModelTriangles<S>, BvhTriangles<BV>>(q, model, partner, false, magnitude));
     }
-  }
-  tree.afterQuery(now);
+  };
+  betweenTreeAndBvh(swapped ? q.X_W2 : q.X_W1, tree, swapped ? q.X_W1 : q.X_W2, bvh, run);
 }
 
 }  // namespace

@@ -56,42 +56,12 @@ void report(const Question<S>& q, query::Nearest n, bool swapped, const Eigen::V
   }
 }
 
-template <typename S>
-void distanceModels(const Question<S>& q, tree::Tree& tree1, tree::Tree& tree2) {
-  std::int64_t now;
-  {
-    const Look look(tree1, &tree2);
-    const TreeSide a(tree1), b(tree2);
-    now = a.now();
-    const oracle::Surface &sa = tree1.surface(), &sb = tree2.surface();
-    const double magnitude =
-        magnitudeOf(q.X_W1, q.X_W2, magnitudeOf(sa.mesh->bounds()), magnitudeOf(sb.mesh->bounds()));
-    const Placement b_in_a = placementOf(q.X_W1, q.X_W2, sa.lattice.origin(), sa.lattice.unit(), sb.lattice.origin(),
-                                         sb.lattice.unit(), magnitude);
-    query::DistanceWalk<TreeSide, TreeSide> walk(a, b, b_in_a);
-    report(q, walk.run(goalOf(q, sa.lattice.unit())), false, sa.lattice.origin(), sa.lattice.unit());
-  }
-  tree1.afterQuery(now);
-  if (&tree2 != &tree1) tree2.afterQuery(now);
-}
-
-template <typename BV>
-void distanceBvh(const Question<typename BV::S>& q, tree::Tree& tree, const fcl::BVHModel<BV>& bvh, bool swapped) {
-  std::int64_t now;
-  {
-    const Look look(tree, nullptr);
-    const TreeSide a(tree);
-    const BvhSide<BV> b(bvh);
-    now = a.now();
-    const oracle::Surface& surface = tree.surface();
-    const double magnitude = magnitudeOf(q.X_W1, q.X_W2, magnitudeOf(surface.mesh->bounds()), b.magnitude());
-    const Placement b_in_a =
-        placementOf(swapped ? q.X_W2 : q.X_W1, swapped ? q.X_W1 : q.X_W2, surface.lattice.origin(),
-                    surface.lattice.unit(), Eigen::Vector3d(Eigen::Vector3d::Zero()), 1.0, magnitude);
-    query::DistanceWalk<TreeSide, BvhSide<BV>> walk(a, b, b_in_a);
-    report(q, walk.run(goalOf(q, surface.lattice.unit())), swapped, surface.lattice.origin(), surface.lattice.unit());
-  }
-  tree.afterQuery(now);
+/// Looks for the nearest primitives; side A is the caller's first geometry, or the second when `swapped`.
+template <typename S, typename B>
+void search(const Question<S>& q, const TreeSide& a, const B& b, const Placement& b_in_a, bool swapped) {
+  const lattice::Lattice& lattice = a.tree().surface().lattice;
+  query::DistanceWalk<TreeSide, B> walk(a, b, b_in_a);
+  report(q, walk.run(goalOf(q, lattice.unit())), swapped, lattice.origin(), lattice.unit());
 }
 
 /// Surfaces that touch have no negative distance of their own; FCL takes the depth of a contact, and so do we.
@@ -122,11 +92,16 @@ S distancePair(const fcl::CollisionGeometry<S>* o1, const fcl::Transform3<S>& X_
   if (request.isSatisfied(result)) return result.min_distance;
   const Question<S> q{o1, o2, X_W1, X_W2, request, result};
   if (model1 != nullptr && model2 != nullptr) {
-    distanceModels(q, model1->tree(), model2->tree());
+    betweenTrees(
+        X_W1, model1->tree(), X_W2, model2->tree(),
+        [&](const TreeSide& a, const TreeSide& b, const Placement& b_in_a, double) { search(q, a, b, b_in_a, false); });
   } else {
     const bool swapped = model1 == nullptr;
-    withBvh<S>("distance", swapped ? o1 : o2,
-               [&](const auto& bvh) { distanceBvh(q, (swapped ? model2 : model1)->tree(), bvh, swapped); });
+    withBvh<S>("distance", swapped ? o1 : o2, [&](const auto& bvh) {
+      betweenTreeAndBvh(
+          swapped ? X_W2 : X_W1, (swapped ? model2 : model1)->tree(), swapped ? X_W1 : X_W2, bvh,
+          [&](const TreeSide& a, const auto& b, const Placement& b_in_a, double) { search(q, a, b, b_in_a, swapped); });
+    });
   }
   if (request.enable_signed_distance && !(result.min_distance > 0)) sign(q);
   return result.min_distance;

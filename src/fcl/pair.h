@@ -71,6 +71,44 @@ class Look {
   tree::Tree *a_, *b_;
 };
 
+/// Calls f(a, b, b_in_a, magnitude) with two trees as the sides of a walk, while nobody takes nodes away.
+template <typename S, typename F>
+void betweenTrees(const fcl::Transform3<S>& X_WA, tree::Tree& tree_a, const fcl::Transform3<S>& X_WB,
+                  tree::Tree& tree_b, F&& f) {
+  std::int64_t now;
+  {
+    const Look look(tree_a, &tree_b);
+    const query::TreeSide a(tree_a), b(tree_b);
+    now = a.now();
+    const oracle::Surface &sa = tree_a.surface(), &sb = tree_b.surface();
+    const double magnitude = magnitudeOf(X_WA, X_WB, magnitudeOf(sa.mesh->bounds()), magnitudeOf(sb.mesh->bounds()));
+    f(a, b,
+      placementOf(X_WA, X_WB, sa.lattice.origin(), sa.lattice.unit(), sb.lattice.origin(), sb.lattice.unit(),
+                  magnitude),
+      magnitude);
+  }
+  tree_a.afterQuery(now);
+  if (&tree_b != &tree_a) tree_b.afterQuery(now);
+}
+
+/// The same with a tree as side A and an FCL mesh as side B.
+template <typename BV, typename F>
+void betweenTreeAndBvh(const fcl::Transform3<typename BV::S>& X_WA, tree::Tree& tree,
+                       const fcl::Transform3<typename BV::S>& X_WB, const fcl::BVHModel<BV>& bvh, F&& f) {
+  std::int64_t now;
+  {
+    const Look look(tree, nullptr);
+    const query::TreeSide a(tree);
+    const BvhSide<BV> b(bvh);
+    now = a.now();
+    const oracle::Surface& s = tree.surface();
+    const double magnitude = magnitudeOf(X_WA, X_WB, magnitudeOf(s.mesh->bounds()), b.magnitude());
+    const Eigen::Vector3d origin = Eigen::Vector3d::Zero();
+    f(a, b, placementOf(X_WA, X_WB, s.lattice.origin(), s.lattice.unit(), origin, 1.0, magnitude), magnitude);
+  }
+  tree.afterQuery(now);
+}
+
 /// Calls f with the partner of a model as the BVHModel that it is.
 /// @throws std::invalid_argument when it is none.
 template <typename S, typename F>

@@ -6,34 +6,13 @@
 #include <hwy/foreach_target.h>
 #include <hwy/highway.h>
 
-// At -O2 the compiler keeps short loops over arrays of vectors, and with them the arrays in memory.
-#undef BOCST_UNROLL
-#define BOCST_UNROLL _Pragma("GCC unroll 8")
+#include "query/octants-inl.h"
 
 HWY_BEFORE_NAMESPACE();
 namespace bocst::query::HWY_NAMESPACE {
 
-namespace hn = hwy::HWY_NAMESPACE;
-using D = hn::CappedTag<float, 8>;
-using V = hn::Vec<D>;
-using M = hn::Mask<D>;
-
-HWY_INLINE V fromBytes(D d, const std::uint8_t* p) {
-  const hn::Rebind<std::uint8_t, D> du;
-  const hn::RebindToSigned<D> di;
-  return hn::ConvertTo(d, hn::PromoteTo(di, hn::LoadU(du, p)));
-}
-
-HWY_INLINE V fromBytes(D d, const std::int8_t* p) {
-  const hn::Rebind<std::int8_t, D> ds;
-  const hn::RebindToSigned<D> di;
-  return hn::ConvertTo(d, hn::PromoteTo(di, hn::LoadU(ds, p)));
-}
-
 std::uint8_t OverlappingOctants(const oracle::OctantBounds& octants, const OneVolume& b) {
   const D d;
-  HWY_ALIGN static constexpr float kOrigin[3][8] = {
-      {0, 1, 0, 1, 0, 1, 0, 1}, {0, 0, 1, 1, 0, 0, 1, 1}, {0, 0, 0, 0, 1, 1, 1, 1}};
   const V pad = hn::Set(d, b.pad), byte = hn::Set(d, 1.0f / 510), half = hn::Set(d, 0.5f);
   const V per127 = hn::Set(d, 1.0f / 127), per254 = hn::Set(d, 1.0f / 254);
   std::uint8_t result = 0;
@@ -43,7 +22,7 @@ std::uint8_t OverlappingOctants(const oracle::OctantBounds& octants, const OneVo
     BOCST_UNROLL
     for (int k = 0; k < 3; ++k) {
       const V lo = fromBytes(d, octants.lo[k] + i), hi = fromBytes(d, octants.hi[k] + i);
-      middle[k] = hn::MulAdd(hn::Add(lo, hi), byte, hn::Load(d, kOrigin[k] + i));
+      middle[k] = hn::MulAdd(hn::Add(lo, hi), byte, hn::Load(d, kOctantCorner[k] + i));
       h[k] = hn::Mul(hn::Sub(hi, lo), byte);
       delta[k] = hn::Sub(hn::Set(d, b.center[k]), middle[k]);
     }
@@ -85,7 +64,7 @@ std::uint8_t OverlappingOctants(const oracle::OctantBounds& octants, const OneVo
       V t = hn::MulSub(along, boffset, center), r = hn::MulAdd(abs_along, bw, hn::Add(w, pad));
       BOCST_UNROLL
       for (int k = 0; k < 3; ++k) {
-        const V from = hn::Sub(hn::Set(d, b.center[k]), hn::Add(hn::Load(d, kOrigin[k] + i), half));
+        const V from = hn::Sub(hn::Set(d, b.center[k]), hn::Add(hn::Load(d, kOctantCorner[k] + i), half));
         t = hn::MulAdd(n[k], from, t);
       }
       V rest[3];
@@ -106,7 +85,7 @@ std::uint8_t OverlappingOctants(const oracle::OctantBounds& octants, const OneVo
       BOCST_UNROLL
       for (int k = 0; k < 3; ++k) {
         const V m = hn::Set(d, b.normal[k]);
-        own = hn::NegMulAdd(n[k], hn::Sub(middle[k], hn::Add(hn::Load(d, kOrigin[k] + i), half)), own);
+        own = hn::NegMulAdd(n[k], hn::Sub(middle[k], hn::Add(hn::Load(d, kOctantCorner[k] + i), half)), own);
         t = hn::MulAdd(m, delta[k], t);
         r = hn::MulAdd(hn::Abs(hn::NegMulAdd(along, n[k], m)), h[k], r);
       }

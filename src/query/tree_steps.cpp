@@ -6,9 +6,7 @@
 #include <hwy/foreach_target.h>
 #include <hwy/highway.h>
 
-// At -O2 the compiler keeps short loops over arrays of vectors, and with them the arrays in memory.
-#undef BOCST_UNROLL
-#define BOCST_UNROLL _Pragma("GCC unroll 8")
+#include "query/octants-inl.h"
 
 #ifndef BOCST_TREE_STEPS_ONCE
 #define BOCST_TREE_STEPS_ONCE
@@ -70,29 +68,10 @@ inline void push(PairSteps& s, const StepPair& pair, int x, std::size_t frame, c
 HWY_BEFORE_NAMESPACE();
 namespace bocst::query::HWY_NAMESPACE {
 
-namespace hn = hwy::HWY_NAMESPACE;
-using D = hn::CappedTag<float, 8>;
-using V = hn::Vec<D>;
-using M = hn::Mask<D>;
-
-HWY_INLINE V fromBytes(D d, const std::uint8_t* p) {
-  const hn::Rebind<std::uint8_t, D> du;
-  const hn::RebindToSigned<D> di;
-  return hn::ConvertTo(d, hn::PromoteTo(di, hn::LoadU(du, p)));
-}
-
-HWY_INLINE V fromBytes(D d, const std::int8_t* p) {
-  const hn::Rebind<std::int8_t, D> ds;
-  const hn::RebindToSigned<D> di;
-  return hn::ConvertTo(d, hn::PromoteTo(di, hn::LoadU(ds, p)));
-}
-
 // Writes the volumes of eight octants of side `side`, the first with its corner at `corner`, both in own coordinates.
 HWY_INLINE void decode(const PairFrames& g, int own, const oracle::OctantBounds& octants, const float* corner,
                        float side, Frame& f) {
   const D d;
-  HWY_ALIGN static constexpr float kOrigin[3][8] = {
-      {0, 1, 0, 1, 0, 1, 0, 1}, {0, 0, 1, 1, 0, 0, 1, 1}, {0, 0, 0, 0, 1, 1, 1, 1}};
   const int other = 1 - own;
   const V byte = hn::Set(d, side * (1.0f / 510)), vside = hn::Set(d, side), per127 = hn::Set(d, 1.0f / 127);
   const V half = hn::Set(d, 0.5f * side);
@@ -103,7 +82,7 @@ HWY_INLINE void decode(const PairFrames& g, int own, const oracle::OctantBounds&
     for (int k = 0; k < 3; ++k) {
       const V lo = fromBytes(d, octants.lo[k] + i), hi = fromBytes(d, octants.hi[k] + i);
       const V within = hn::Mul(hn::Add(lo, hi), byte);
-      c[k] = hn::Add(within, hn::MulAdd(hn::Load(d, kOrigin[k] + i), vside, hn::Set(d, corner[k])));
+      c[k] = hn::Add(within, hn::MulAdd(hn::Load(d, kOctantCorner[k] + i), vside, hn::Set(d, corner[k])));
       h[k] = hn::Mul(hn::Sub(hi, lo), byte);
       n[k] = hn::Mul(fromBytes(d, octants.normal[k] + i), per127);
       // The slab is given from the octant's middle and wanted from its box's.

@@ -1,0 +1,43 @@
+// SPDX-License-Identifier: BSD-3-Clause
+// What the tests of eight octants share, once for each instruction set; see Highway's -inl.h headers.
+#if defined(BOCST_QUERY_OCTANTS_INL_H) == defined(HWY_TARGET_TOGGLE)
+#ifdef BOCST_QUERY_OCTANTS_INL_H
+#undef BOCST_QUERY_OCTANTS_INL_H
+#else
+#define BOCST_QUERY_OCTANTS_INL_H
+#endif
+
+#include <hwy/highway.h>
+
+// At -O2 the compiler keeps short loops over arrays of vectors, and with them the arrays in memory.
+#undef BOCST_UNROLL
+#define BOCST_UNROLL _Pragma("GCC unroll 8")
+
+HWY_BEFORE_NAMESPACE();
+namespace bocst::query::HWY_NAMESPACE {
+
+namespace hn = hwy::HWY_NAMESPACE;
+using D = hn::CappedTag<float, 8>;
+using V = hn::Vec<D>;
+using M = hn::Mask<D>;
+
+// The corners of eight octants in sides of an octant, from that of the first.
+HWY_ALIGN static constexpr float kOctantCorner[3][8] = {
+    {0, 1, 0, 1, 0, 1, 0, 1}, {0, 0, 1, 1, 0, 0, 1, 1}, {0, 0, 0, 0, 1, 1, 1, 1}};
+
+HWY_INLINE V fromBytes(D d, const std::uint8_t* p) {
+  const hn::Rebind<std::uint8_t, D> du;
+  const hn::RebindToSigned<D> di;
+  return hn::ConvertTo(d, hn::PromoteTo(di, hn::LoadU(du, p)));
+}
+
+HWY_INLINE V fromBytes(D d, const std::int8_t* p) {
+  const hn::Rebind<std::int8_t, D> ds;
+  const hn::RebindToSigned<D> di;
+  return hn::ConvertTo(d, hn::PromoteTo(di, hn::LoadU(ds, p)));
+}
+
+}  // namespace bocst::query::HWY_NAMESPACE
+HWY_AFTER_NAMESPACE();
+
+#endif
