@@ -32,7 +32,6 @@ std::uint8_t overlappingOctants(const oracle::OctantBounds& octants, const OneVo
 struct TrianglePack {
   static constexpr std::size_t kCapacity = 32;
   alignas(64) float xyz[9][kCapacity];  ///< Coordinate c of corner k at [3 * k + c].
-  std::uint32_t ids[kCapacity];
   std::size_t count = 0;
   float size = 0;  ///< Largest coordinate, in absolute value.
 };
@@ -48,7 +47,7 @@ struct PackPlacement {
   double offset[3];
 };
 
-/// Fills the pack (all but the ids) with `count` triangles, 1 to kCapacity. What is in `raw` beyond is overwritten.
+/// Fills the pack with `count` triangles, 1 to kCapacity. What is in `raw` beyond is overwritten.
 void placeTriangles(RawTriangles& raw, std::size_t count, const PackPlacement& place, TrianglePack& pack);
 
 /// Two triangles that may touch, as positions in their packs.

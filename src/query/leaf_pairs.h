@@ -10,19 +10,40 @@
 
 namespace bocst::query {
 
-/// Gathers the corners of at most a pack of a leaf's triangles, from the one at `begin`; returns how many.
-template <typename Side, typename Node>
-std::size_t gatherCorners(const Side& side, Node leaf, std::size_t begin, RawTriangles& raw) {
-  const std::size_t count = std::min(side.triangleCount(leaf) - begin, TrianglePack::kCapacity);
-  for (std::size_t i = 0; i < count; ++i) {
-    const std::uint32_t t = side.triangle(leaf, begin + i);
-    for (int k = 0; k < 3; ++k) {
-      const auto& v = side.vertex(t, k);
-      for (int c = 0; c < 3; ++c) raw.xyz[3 * k + c][i] = v[c];
+/// The corners of a leaf as its mesh gives them, kept until another leaf is asked for: depth first, most pairs of
+/// leaves share one with the pair before.
+template <typename Side>
+class LeafCorners {
+ public:
+  /// To be called before the first use in a walk.
+  void clear() { count_ = 0; }
+
+  /// Takes at most a pack of the leaf's triangles, from the one at `begin`. False when it has them already.
+  bool take(const Side& side, typename Side::Node leaf, std::size_t begin) {
+    if (count_ != 0 && leaf_ == leaf && begin_ == begin) return false;
+    leaf_ = leaf;
+    begin_ = begin;
+    count_ = std::min(side.triangleCount(leaf) - begin, TrianglePack::kCapacity);
+    for (std::size_t i = 0; i < count_; ++i) {
+      const std::uint32_t t = ids_[i] = side.triangle(leaf, begin + i);
+      for (int k = 0; k < 3; ++k) {
+        const auto& v = side.vertex(t, k);
+        for (int c = 0; c < 3; ++c) raw_.xyz[3 * k + c][i] = v[c];
+      }
     }
+    return true;
   }
-  return count;
-}
+
+  std::size_t count() const { return count_; }
+  std::uint32_t id(std::size_t i) const { return ids_[i]; }
+  void place(const PackPlacement& to, TrianglePack& pack) { placeTriangles(raw_, count_, to, pack); }
+
+ private:
+  RawTriangles raw_;
+  std::uint32_t ids_[TrianglePack::kCapacity];
+  std::size_t count_ = 0, begin_ = 0;  // nothing is held when the count is 0
+  typename Side::Node leaf_{};
+};
 
 /// Corners straight from the vertices into the frame that `place` leads to, about `center` there and `scale` times as
 /// large. Vertices of a side lie at (v - origin) * inverse_unit in its frame.
@@ -39,12 +60,12 @@ PackPlacement packPlacement(const Side& side, const Placement& place, const Eige
 }
 
 /// The triangles of a leaf against the octants of smaller nodes of the other side: with large triangles the leaf's
-/// volume says little. Keeps the leaf's corners: depth first, most nodes meet the same leaf as the one before.
+/// volume says little.
 template <typename Other>
 class CoarseLeaf {
  public:
   /// To be called before the first use in a walk.
-  void clear() { count_ = 0; }
+  void clear() { leaf_.clear(); }
 
   /// The octants in `mask` of an inner node that a triangle of `leaf` meets.
   unsigned octantsMeeting(const TreeSide& side, tree::NodeRef node, unsigned mask, const Other& other,
@@ -56,50 +77,44 @@ class CoarseLeaf {
     const std::size_t count = other.triangleCount(leaf);
     unsigned met = 0;
     for (std::size_t begin = 0; begin < count && (mask & ~met) != 0; begin += TrianglePack::kCapacity) {
-      if (count_ == 0 || !(leaf_ == leaf) || begin_ != begin) {
-        count_ = gatherCorners(other, leaf, begin, raw_);
-        leaf_ = leaf;
-        begin_ = begin;
-      }
-      placeTriangles(raw_, count_, place, pack_);
+      leaf_.take(other, leaf, begin);
+      leaf_.place(place, pack_);
       std::uint8_t masks[TrianglePack::kCapacity];
-      oracle::octantMasks(pack_.xyz[0], TrianglePack::kCapacity, count_, slack, masks);
-      for (std::size_t i = 0; i < count_; ++i) met |= masks[i];
+      oracle::octantMasks(pack_.xyz[0], TrianglePack::kCapacity, leaf_.count(), slack, masks);
+      for (std::size_t i = 0; i < leaf_.count(); ++i) met |= masks[i];
     }
     return mask & met;
   }
 
  private:
-  RawTriangles raw_;
+  LeafCorners<Other> leaf_;
   TrianglePack pack_;
-  // What raw_ holds; nothing when the count is 0.
-  std::size_t count_ = 0, begin_ = 0;
-  typename Other::Node leaf_{};
 };
 
-/// Leaves against leaves, triangle by triangle. Keeps the pack of the last leaf of side A: depth first, most pairs
-/// share it with the one before.
+/// Leaves against leaves, triangle by triangle.
 template <typename A, typename B>
 class LeafPairs {
  public:
   /// To be called before the first test of a walk.
-  void clear() { pack_of_a_ = kNoPack; }
+  void clear() {
+    corners_a_.clear();
+    corners_b_.clear();
+  }
 
   /// Calls f(triangle of a, triangle of b) for the pairs that are not surely apart, until it returns true.
   template <typename F>
   bool test(const A& a, typename A::Node node_a, const B& b, typename B::Node node_b, const Placement& b_in_a, F&& f) {
     const Eigen::Vector3d center = a.cellSphere(node_a).center;
-    const PackPlacement to_a = packPlacement(a, Placement(), center, 1), to_b = packPlacement(b, b_in_a, center, 1);
+    const PackPlacement to_b = packPlacement(b, b_in_a, center, 1);
     const std::size_t count_a = a.triangleCount(node_a), count_b = b.triangleCount(node_b);
     for (std::size_t i = 0; i < count_a; i += TrianglePack::kCapacity) {
-      const std::uint64_t key = std::uint64_t{node_a.bits} << 32 | i;
-      if (key != pack_of_a_) fill(a, node_a, i, to_a, a_);
-      pack_of_a_ = key;
+      if (corners_a_.take(a, node_a, i)) corners_a_.place(packPlacement(a, Placement(), center, 1), a_);
       for (std::size_t j = 0; j < count_b; j += TrianglePack::kCapacity) {
-        fill(b, node_b, j, to_b, b_);
+        corners_b_.take(b, node_b, j);
+        corners_b_.place(to_b, b_);
         const std::size_t found = touchingPairs(a_, b_, static_cast<float>(b_in_a.slack * 1.001), found_);
         for (std::size_t k = 0; k < found; ++k) {
-          if (f(a_.ids[found_[k].row], b_.ids[found_[k].lane])) return true;
+          if (f(corners_a_.id(found_[k].row), corners_b_.id(found_[k].lane))) return true;
         }
       }
     }
@@ -107,18 +122,9 @@ class LeafPairs {
   }
 
  private:
-  static constexpr std::uint64_t kNoPack = ~std::uint64_t{0};
-
-  template <typename Side, typename Node>
-  void fill(const Side& side, Node node, std::size_t begin, const PackPlacement& place, TrianglePack& pack) {
-    const std::size_t count = gatherCorners(side, node, begin, raw_);
-    for (std::size_t i = 0; i < count; ++i) pack.ids[i] = side.triangle(node, begin + i);
-    placeTriangles(raw_, count, place, pack);
-  }
-
-  RawTriangles raw_;
+  LeafCorners<A> corners_a_;
+  LeafCorners<B> corners_b_;
   TrianglePack a_, b_;
-  std::uint64_t pack_of_a_ = kNoPack;  // which node and part of its list pack a_ holds
   PackPair found_[TrianglePack::kCapacity * TrianglePack::kCapacity];
 };
 
