@@ -173,7 +173,24 @@ std::size_t TouchingPairs(const TrianglePack& rows, const TrianglePack& lanes, f
     // The products of a normal are at most the product of the edges' sizes.
     const V mpad = hn::Mul(reach, hn::Add(norm1(m), hn::Mul(norm1(f[0]), norm1(f[1]))));
 
-    for (std::size_t row = 0; row < rows.count; ++row) {
+    // Rows that reach into the box of these lanes.
+    const V low[3] = {hn::MinOfLanes(d, qmin.x), hn::MinOfLanes(d, qmin.y), hn::MinOfLanes(d, qmin.z)};
+    const V high[3] = {hn::MaxOfLanes(d, qmax.x), hn::MaxOfLanes(d, qmax.y), hn::MaxOfLanes(d, qmax.z)};
+    std::uint64_t near_rows = 0;
+    for (std::size_t row = 0; row < rows.count; row += hn::Lanes(d)) {
+      M in = hn::And(hn::Le(low[0], hn::Load(d, highs[0] + row)), hn::Ge(high[0], hn::Load(d, lows[0] + row)));
+      in = hn::And(in,
+                   hn::And(hn::Le(low[1], hn::Load(d, highs[1] + row)), hn::Ge(high[1], hn::Load(d, lows[1] + row))));
+      in = hn::And(in,
+                   hn::And(hn::Le(low[2], hn::Load(d, highs[2] + row)), hn::Ge(high[2], hn::Load(d, lows[2] + row))));
+      std::uint8_t bits[8] = {};
+      hn::StoreMaskBits(d, in, bits);
+      near_rows |= std::uint64_t{bits[0]} << row;
+    }
+    near_rows &= (std::uint64_t{1} << rows.count) - 1;
+
+    for (; near_rows != 0; near_rows &= near_rows - 1) {
+      const auto row = static_cast<std::size_t>(__builtin_ctzll(near_rows));
       M near = hn::And(hn::Le(qmin.x, hn::Set(d, highs[0][row])), hn::Ge(qmax.x, hn::Set(d, lows[0][row])));
       near =
           hn::And(near, hn::And(hn::Le(qmin.y, hn::Set(d, highs[1][row])), hn::Ge(qmax.y, hn::Set(d, lows[1][row]))));
