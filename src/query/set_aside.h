@@ -31,11 +31,11 @@ class SetAside {
   bool empty() const { return waiting_.empty(); }
   void add(const Pair& pair) { waiting_.push_back({pair, 0}); }
 
-  /// Grows what the first few pairs need, in one batch.
+  /// Grows what the first few pairs need, in one batch, for later queries; does not wait for other threads.
   void growFirst(const A& a, const B& b) {
     growths_.clear();
     for (std::size_t i = 0; i < std::min(waiting_.size(), kInvestment); ++i) add(a, b, waiting_[i].pair);
-    growAll();
+    growAll(false);
   }
 
   /// Makes what some pairs need resident, in one batch, and gives these pairs to f. A walk that has to see everything
@@ -60,7 +60,7 @@ class SetAside {
     }
     growths_.clear();
     for (auto w = end; w != waiting_.end(); ++w) add(a, b, w->pair);
-    growAll();
+    growAll(true);
     for (auto w = end; w != waiting_.end(); ++w) f(w->pair);
     waiting_.erase(end, waiting_.end());
   }
@@ -77,9 +77,9 @@ class SetAside {
     if (b.state(pair.b) == State::kGrows) b.grow(pair.b, growths_);
   }
 
-  void growAll() {
+  void growAll(bool wait) {
     uniqueGrowths(growths_);
-    if (!growths_.empty()) tree::Tree::grow(growths_);
+    if (!growths_.empty()) tree::Tree::grow(growths_, wait);
   }
 
   template <typename Side>

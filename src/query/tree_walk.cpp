@@ -32,7 +32,7 @@ bool TreeWalk::run() {
   // What a query could do without, the next one meets again: a look is cheaper than growing it.
   a_.tree().look(s.unseen[0]);
   b_.tree().look(s.unseen[1]);
-  if (!s.aside.empty() && !s.grew) s.aside.growFirst(a_, b_);
+  if (!s.aside.empty() && !s.grew && a_.tree().hasRoom() && b_.tree().hasRoom()) s.aside.growFirst(a_, b_);
   return true;
 }
 

@@ -87,7 +87,7 @@ std::shared_ptr<const Mesh> Tree::mesh() const {
 
 // Growth.
 
-void Tree::grow(std::vector<Growth>& batch) {
+void Tree::grow(std::vector<Growth>& batch, bool wait) {
   // Every growth locks the trees of its pair in address order.
   std::array<Tree*, 2> trees{};
   for (const Growth& g : batch) {
@@ -97,7 +97,13 @@ void Tree::grow(std::vector<Growth>& batch) {
   if (trees[1] != nullptr && std::less<Tree*>()(trees[1], trees[0])) std::swap(trees[0], trees[1]);
   std::array<std::unique_lock<std::mutex>, 2> locks;
   for (int i = 0; i < 2; ++i) {
-    if (trees[i] != nullptr) locks[i] = std::unique_lock<std::mutex>(trees[i]->growth_);
+    if (trees[i] == nullptr) continue;
+    locks[i] = std::unique_lock<std::mutex>(trees[i]->growth_, std::defer_lock);
+    if (wait) {
+      locks[i].lock();
+    } else if (!locks[i].try_lock()) {
+      return;
+    }
   }
 
   std::vector<oracle::Expansion> questions;

@@ -15,8 +15,8 @@
 #include <mutex>
 #include <vector>
 
-#include "oracle/oracle.h"
 #include "oracle/cpu/root_grid.h"
+#include "oracle/oracle.h"
 #include "tree/block.h"
 #include "tree/gate.h"
 #include "tree/pool.h"
@@ -90,8 +90,12 @@ class Tree {
   };
 
   /// One expansion batch: makes each node's children resident (or, where enough, its list). Nodes that another thread
-  /// has grown meanwhile are skipped. The gates of all trees are held shared.
-  static void grow(std::vector<Growth>& batch);
+  /// has grown meanwhile are skipped. The gates of all trees are held shared. Unless `wait`, it does nothing while
+  /// another thread grows one of the trees.
+  static void grow(std::vector<Growth>& batch, bool wait = true);
+
+  /// Growth that no answer needs is welcome: it would not bring the tree near its memory budget.
+  bool hasRoom() const { return options_.memory_budget == 0 || bytes_ < options_.memory_budget / 2; }
 
   /// Learns bounds of frontier nodes that a query met and could do without, so that later ones leave them out sooner;
   /// does nothing while another thread grows the tree. Nodes that the root grid does not know are passed over.

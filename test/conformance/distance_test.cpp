@@ -43,8 +43,8 @@ void checkAgainstFcl(int poses, double scale) {
   Raw ra = test::torus(40), rb = test::torus(23, 0.3);
   ra.scale(scale);
   rb.scale(scale);
-  // FCL's OBB and k-DOP trees know no distance; RSS is its best.
-  const auto fa = test::bvh<fcl::RSS<S>>(ra), fb = test::bvh<fcl::RSS<S>>(rb);
+  // FCL's OBB and k-DOP trees know no distance.
+  const auto fa = test::bvh<fcl::OBBRSS<S>>(ra), fb = test::bvh<fcl::OBBRSS<S>>(rb);
   const auto partner = test::bvh<BV>(rb);
   const Model<S> a(ra.mesh()), b(rb.mesh());
   std::mt19937_64 g(1);
