@@ -58,8 +58,8 @@ BOCST_EXPORT std::size_t collide(const fcl::CollisionGeometry<S>* o1, const fcl:
                                  fcl::CollisionResult<S>& result);
 
 /// How far are the surfaces of the two geometries from each other, at these poses (world from geometry)? As
-/// fcl::distance: lowers result.min_distance, a running minimum that a result brings along, and returns it; does nothing
-/// when request.isSatisfied(result) already.
+/// fcl::distance: lowers result.min_distance, a running minimum that a result brings along, and returns it; does
+/// nothing when request.isSatisfied(result) already.
 ///
 /// A pair with a Model: partners are another Model and fcl::BVHModel<BV> of any BV. Surfaces that touch are at distance
 /// 0; a model wholly inside another is as far as the surfaces are, for models are shells.
