@@ -11,8 +11,8 @@
 
 #include "meshes.h"
 #include "oracle/cpu/kernels.h"
-#include "oracle/reference.h"
 #include "oracle/cpu/root_grid.h"
+#include "oracle/reference.h"
 
 namespace bocst::oracle {
 namespace {

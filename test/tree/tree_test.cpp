@@ -1,5 +1,7 @@
 // SPDX-License-Identifier: BSD-3-Clause
 // How a model grows, forgets and shows itself, driven by a clock of the test's own.
+#include "tree/tree.h"
+
 #include <bocst/bocst.h>
 #include <gtest/gtest.h>
 
@@ -9,7 +11,6 @@
 #include "lattice/lattice.h"
 #include "meshes.h"
 #include "oracle/reference.h"
-#include "tree/tree.h"
 
 namespace bocst {
 namespace {
