@@ -51,10 +51,16 @@ class BOCST_EXPORT Model : public fcl::CollisionGeometry<S> {
 
   const Options& options() const;
 
-  /// The mesh as it is now. Keeps it alive across updateVertices().
+  /// The mesh as it is now. Keeps it alive across updateVertices(). Null after releaseMesh().
   std::shared_ptr<const Mesh> mesh() const;
 
-  /// "cpu", "occlusion" or "compute".
+  /// Lets go of the mesh in host memory; the compute oracle has it on its device (3: "the model need not be in core
+  /// memory"). It goes when nobody else holds it. From then on a query throws OracleError if the device is lost.
+  /// @throws std::logic_error for exact answers, which test the triangles here; OracleError when the oracle of this
+  /// model has no copy.
+  void releaseMesh();
+
+  /// "cpu", "occlusion", "sampled" or "compute".
   std::string oracleName() const;
 
   Statistics statistics() const;
@@ -72,7 +78,8 @@ class BOCST_EXPORT Model : public fcl::CollisionGeometry<S> {
   void prune();
 
   /// New positions for all vertices, same triangles: the tree falls back to its root, nothing is rebuilt.
-  /// @throws std::invalid_argument for a wrong count or a bad vertex; the model is then as before.
+  /// @throws std::invalid_argument for a wrong count or a bad vertex, std::logic_error after releaseMesh(); the model
+  /// is then as before.
   void updateVertices(std::vector<Eigen::Vector3d> vertices);
 
   // What FCL asks of a geometry.

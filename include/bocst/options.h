@@ -20,7 +20,14 @@ enum class Answer {
 };
 
 /// Who answers "which octants does the surface meet?".
-enum class OracleKind { kAuto, kCpu, kOcclusion, kCompute };
+enum class OracleKind {
+  kAuto,       ///< BOCST_ORACLE where it is set; else compute on a hardware GPU, else the CPU.
+  kCpu,        ///< SIMD on the calling thread.
+  kOcclusion,  ///< OpenGL 3.3: occlusion queries whose geometry shader tests exactly what the query is about.
+  kCompute,    ///< OpenGL 4.3: compute shaders; triangle lists stay on the device.
+  kSampled,    ///< The paper's occlusion queries as written (4.2). They miss surface, so answers may be false "free":
+               ///< for comparison only.
+};
 
 /// The clock that ttl is measured with.
 using Clock = std::chrono::steady_clock;
@@ -38,6 +45,9 @@ struct Options {
   double dimension = 0;
 
   OracleKind oracle = OracleKind::kAuto;
+
+  /// Pixels a side of the views that kSampled draws, from 1 to 4096.
+  int viewport = 16;
 
   /// The paper's Max. time (3.1): a deepest level unused for longer is dropped; 0: never.
   std::chrono::milliseconds ttl{2000};

@@ -30,13 +30,13 @@ using query::TreeSide;
 template <typename S>
 class ModelTriangles {
  public:
-  explicit ModelTriangles(const Mesh& mesh) : mesh_(mesh) {}
+  explicit ModelTriangles(const tree::Tree& tree) : mesh_(tree.surface().mesh.get()) {}
   fcl::Vector3<S> corner(std::uint32_t t, int k) const {
-    return mesh_.vertex(mesh_.indices(t)[static_cast<std::size_t>(k)]).template cast<S>();
+    return mesh_->vertex(mesh_->indices(t)[static_cast<std::size_t>(k)]).template cast<S>();
   }
 
  private:
-  const Mesh& mesh_;
+  const Mesh* mesh_;  // null where the host has none: conservative answers ask for no triangle
 };
 
 template <typename BV>
@@ -235,7 +235,7 @@ void collideModels(const Question<S>& q, tree::Tree& tree1, tree::Tree& tree2) {
   const bool swapped = (tree1.conservative() || tree2.conservative()) && std::less<tree::Tree*>()(&tree2, &tree1);
   const auto run = [&](const TreeSide& a, const TreeSide& b, const Placement& b_in_a, double magnitude) {
     const oracle::Surface& s = a.tree().surface();
-    const ModelTriangles<S> t1(*tree1.surface().mesh), t2(*tree2.surface().mesh);
+    const ModelTriangles<S> t1(tree1), t2(tree2);
     Collector<S, ModelTriangles<S>, ModelTriangles<S>> collector(q, t1, t2, swapped, magnitude);
     collector.setFrame(s.lattice.origin(), s.lattice.unit());
     if (query::TreeWalk::fits(a, b, b_in_a)) {
@@ -256,7 +256,7 @@ void collideBvh(const Question<typename BV::S>& q, tree::Tree& tree, const fcl::
   using S = typename BV::S;
   const auto run = [&](const TreeSide& a, const BvhSide<BV>& b, const Placement& b_in_a, double magnitude) {
     const oracle::Surface& s = tree.surface();
-    const ModelTriangles<S> model(*s.mesh);
+    const ModelTriangles<S> model(tree);
     const BvhTriangles<BV> partner(bvh);
     const auto walk = [&](auto&& collector) {
       collector.setFrame(s.lattice.origin(), s.lattice.unit());

@@ -44,6 +44,11 @@ std::shared_ptr<const Mesh> Model<S>::mesh() const {
 }
 
 template <typename S>
+void Model<S>::releaseMesh() {
+  tree_->releaseMesh();
+}
+
+template <typename S>
 std::string Model<S>::oracleName() const {
   return tree_->oracle().name();
 }
@@ -82,7 +87,7 @@ void Model<S>::updateVertices(std::vector<Eigen::Vector3d> vertices) {
 
 template <typename S>
 void Model<S>::computeLocalAABB() {
-  const Eigen::AlignedBox3d b = tree_->mesh()->bounds();
+  const Eigen::AlignedBox3d b = tree_->bounds();
   for (int k = 0; k < 3; ++k) {
     this->aabb_local.min_[k] = roundDown<S>(b.min()[k]);
     this->aabb_local.max_[k] = roundUp<S>(b.max()[k]);

@@ -59,6 +59,10 @@ class Lattice {
   /// Centre (lattice units) and half extents of the actual region.
   void region(const Cell& cell, Eigen::Vector3d& center, Eigen::Vector3d& half) const;
 
+  bool operator==(const Lattice& other) const {
+    return origin_ == other.origin_ && unit_ == other.unit_ && extent_ == other.extent_;
+  }
+
   /// The paper's n for level 1: 2^n is the side of the root cube in units of d_t.
   int rootExponent() const { return root_exponent_; }
 

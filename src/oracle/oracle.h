@@ -6,6 +6,7 @@
 #include <array>
 #include <cstddef>
 #include <cstdint>
+#include <limits>
 #include <memory>
 #include <string>
 #include <vector>
@@ -14,6 +15,13 @@
 #include "oracle/surface.h"
 
 namespace bocst::oracle {
+
+/// Something in an oracle's own memory; it goes when nobody holds it any more.
+class Held {
+ public:
+  virtual ~Held() = default;
+  virtual std::size_t bytes() const = 0;
+};
 
 /// A bound of the surface inside one cell of side s, as bytes: a box AND a slab.
 /// Box: from corner + lo / 255 * s to corner + hi / 255 * s. Slab: |normal . (p - c) / s - slab_center| <=
@@ -43,12 +51,22 @@ static_assert(sizeof(OctantBounds) == 88);
 
 /// One node to expand: the question and the answer.
 struct Expansion {
+  static constexpr std::size_t kAll = std::numeric_limits<std::size_t>::max();
+
+  /// A list that the oracle keeps for itself.
+  struct Kept {
+    std::uint32_t begin = 0, count = 0;
+  };
+
   // Asked.
   const Surface* surface = nullptr;
   lattice::Cell cell;
-  const std::uint32_t* ids = nullptr;  ///< Triangles that may meet the cell; null: all of the mesh.
+  const std::uint32_t* ids = nullptr;  ///< Triangles that may meet the cell; null: see `shelf`.
   std::size_t count = 0;
+  std::shared_ptr<const Held> shelf;  ///< The list is one that this oracle keeps; null, and no ids: all of the mesh.
+  std::uint32_t shelf_begin = 0;
   bool own_only = false;  ///< The node stays a leaf: only grey, own and one list (of the cell itself) are wanted.
+  std::size_t ids_up_to = kAll;  ///< Longer lists may stay with the oracle.
 
   // Answered.
   std::uint8_t grey = 0;  ///< Bit o: the surface meets octant o (reference.h), which has an actual region.
@@ -57,6 +75,10 @@ struct Expansion {
   std::vector<std::uint32_t> lists;         ///< Triangles of octant 0, of octant 1, ...
   std::array<std::size_t, 9> list_begin{};  ///< Octant o has lists[list_begin[o]] to lists[list_begin[o + 1]];
                                             ///< with own_only all of lists is the cell's.
+  std::shared_ptr<const Held> kept;         ///< Holds the lists that the oracle keeps.
+  std::array<Kept, 8> kept_lists{};         ///< Where it has octant o's, if count is not 0; it is then not in `lists`.
+
+  std::size_t listSize(int o) const { return list_begin[o + 1] - list_begin[o] + kept_lists[o].count; }
 };
 
 /// Answers expansion batches. Any number of threads may submit; each batch belongs to one thread until wait() returned.
@@ -70,13 +92,24 @@ class Oracle {
   /// Starts to answer a batch; an oracle without a device of its own may answer all of it here.
   virtual void submit(std::vector<Expansion>& batch) = 0;
 
-  /// Returns when the whole batch is answered.
+  /// Returns when the whole batch is answered. @throws OracleError when a device was lost that had the only copy of a
+  /// mesh.
   virtual void wait(std::vector<Expansion>& batch) = 0;
+
+  /// Brings the surface to where the oracle works, if that is elsewhere, for as long as the result is held; null where
+  /// it cannot. An oracle brings what nobody holds anew for each batch.
+  virtual std::shared_ptr<const Held> hold(const Surface&) { return nullptr; }
+
+  /// Does it need the mesh on the host, too?
+  virtual bool needsHostMesh() const { return true; }
+
+  /// The ids of a list that this oracle keeps; false when it has lost them.
+  virtual bool fetch(const Held&, Expansion::Kept, std::uint32_t*) { return false; }
 };
 
 /// The oracle for these options: BOCST_ORACLE overrides kAuto; else compute on a hardware GPU, else the CPU. Shared by
-/// all models.
+/// all models. viewport: Options::viewport.
 /// @throws OracleError for one asked for by name that cannot be had.
-std::shared_ptr<Oracle> makeOracle(OracleKind kind);
+std::shared_ptr<Oracle> makeOracle(OracleKind kind, int viewport = Options{}.viewport);
 
 }  // namespace bocst::oracle

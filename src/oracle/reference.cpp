@@ -31,8 +31,12 @@ bool touches(const Eigen::Vector3d corners[3], const Eigen::Vector3d& center, do
     n[k] = a - b;
     size[k] = std::abs(a) + std::abs(b);
   }
-  const double reach = h * n.lpNorm<1>() + kPlanePad * size.dot((v[0].cwiseAbs().array() + h).matrix());
-  if (std::abs(n.dot(v[0])) > reach) return false;
+  // Sums in the order that shaders/decide.glsl has, too.
+  const double width = (std::abs(n[0]) + std::abs(n[1])) + std::abs(n[2]);
+  const double products =
+      (size[0] * (std::abs(v[0][0]) + h) + size[1] * (std::abs(v[0][1]) + h)) + size[2] * (std::abs(v[0][2]) + h);
+  const double along = (n[0] * v[0][0] + n[1] * v[0][1]) + n[2] * v[0][2];
+  if (std::abs(along) > h * width + kPlanePad * products) return false;
 
   for (int i = 0; i < 3; ++i) {
     const Eigen::Vector3d& a = v[i];            // both ends of the edge project to the same value

@@ -9,10 +9,15 @@
 
 namespace bocst::oracle {
 
+class Held;
+
 /// What an oracle is asked about: a mesh, seen on its lattice.
 struct Surface {
-  std::shared_ptr<const Mesh> mesh;
+  std::shared_ptr<const Mesh> mesh;  ///< Null when only the device has it.
   lattice::Lattice lattice;
+  std::shared_ptr<const Held> device = nullptr;  ///< What Oracle::hold() gave.
+  std::size_t triangle_count = mesh->triangleCount();
+  Eigen::AlignedBox3d bounds = mesh->bounds();  ///< In the mesh's frame.
 
   /// Corner k of triangle t, in lattice units.
   Eigen::Vector3d corner(std::uint32_t t, int k) const { return lattice.toLattice(mesh->vertex(mesh->indices(t)[k])); }

@@ -37,19 +37,23 @@ class Link {
 /// | 0..87 | octants: box and slab of each (oracle.h, OctantBounds) |
 /// | 88..98 | own: box and slab of the node itself, as its octants showed it (CellBounds) |
 /// | 99 | grey: bit o says octant o is a node |
-/// | 100..111 | cell: level, then x, y, z of the expanded node (16 bits each) and padding |
-/// | 112..143 | child: the link of each octant |
+/// | 100..107 | cell: level, padding, then x, y, z of the expanded node (16 bits each) |
+/// | 108..139 | child: the link of each octant |
+/// | 140..143 | own_list: where the list of the expanded node itself is; only where an oracle keeps its octants' |
 /// | 144..151 | stamp: when a query last went through here, ns of the model's clock |
 /// | 152..159 | parent: block and octant where the expanded node itself is a child |
 struct alignas(32) Block {
+  static constexpr std::uint32_t kNone = 0xffffffffu;
+
   oracle::OctantBounds octants;
   oracle::CellBounds own;
   std::uint8_t grey = 0;
   std::uint8_t level = 1;
   std::uint16_t at[3] = {0, 0, 0};
   std::atomic<Link> child[8] = {};
+  std::uint32_t own_list = kNone;
   mutable std::atomic<std::int64_t> stamp{0};
-  std::uint32_t parent = 0xffffffffu;
+  std::uint32_t parent = kNone;
   std::uint32_t parent_octant = 0;
 
   lattice::Cell cell() const { return {level, {at[0], at[1], at[2]}}; }

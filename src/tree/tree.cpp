@@ -23,6 +23,7 @@ Options checked(const Options& o) {
     bad("dimension is " + std::to_string(o.dimension) + ", not 0 or 1 to 65536");
   }
   if (o.ttl.count() < 0) bad("ttl is negative");
+  if (o.viewport < 1 || o.viewport > 4096) bad("viewport is " + std::to_string(o.viewport) + ", not 1 to 4096");
   if (o.margin != 0) bad("margin is " + std::to_string(o.margin) + ", but only 0 is supported in this version");
   if (o.solid) bad("solid is not supported in this version");
   return o;
@@ -53,7 +54,7 @@ void setBox(const Eigen::AlignedBox3d& box, const lattice::Cell& cell, oracle::C
 }
 
 Eigen::AlignedBox3d latticeBounds(const oracle::Surface& surface) {
-  const Eigen::AlignedBox3d& b = surface.mesh->bounds();
+  const Eigen::AlignedBox3d& b = surface.bounds;
   return {surface.lattice.toLattice(b.min()), surface.lattice.toLattice(b.max())};
 }
 
@@ -65,7 +66,7 @@ std::int64_t nanoseconds(Clock::time_point t) {
 
 Tree::Tree(std::shared_ptr<const Mesh> mesh, const Options& options)
     : options_(checked(options)),
-      oracle_(oracle::makeOracle(options.oracle)),
+      oracle_(oracle::makeOracle(options.oracle, options.viewport)),
       deepest_(deepestLevel(options)),
       surface_(surfaceOf(mesh, options)) {
   reset(std::move(mesh));
@@ -83,6 +84,23 @@ std::int64_t Tree::now() const { return nanoseconds(options_.clock ? options_.cl
 std::shared_ptr<const Mesh> Tree::mesh() const {
   const std::shared_lock<Gate> look(gate_);
   return surface_.mesh;
+}
+
+Eigen::AlignedBox3d Tree::bounds() const {
+  const std::shared_lock<Gate> look(gate_);
+  return surface_.bounds;
+}
+
+void Tree::releaseMesh() {
+  if (!conservative()) {
+    throw std::logic_error("bocst::Model::releaseMesh: exact answers test the triangles on the host");
+  }
+  const std::lock_guard<Gate> alone(gate_);
+  if (surface_.device == nullptr) surface_.device = oracle_->hold(surface_);
+  if (surface_.device == nullptr || oracle_->needsHostMesh()) {
+    throw OracleError("bocst::Model::releaseMesh: the oracle " + oracle_->name() + " needs the mesh on the host");
+  }
+  surface_.mesh = nullptr;
 }
 
 // Growth.
@@ -115,7 +133,7 @@ void Tree::grow(std::vector<Growth>& batch, bool wait) {
     const Link link = tree.link(g.node);
     if (link.tag() == Link::kBlock) continue;
     if (g.list_is_enough && link.tag() == Link::kShortList) continue;
-    if (g.node.isRoot() && !tree.grid_tried_) tree.growRoot();
+    if (g.node.isRoot()) tree.growRoot();
     const lattice::Cell cell = tree.cell(g.node);
     if (tree.grid_ != nullptr && cell.level < tree.grid_->level()) {
       tree.growFromGrid(g.node);
@@ -124,12 +142,14 @@ void Tree::grow(std::vector<Growth>& batch, bool wait) {
     oracle::Expansion question;
     question.surface = &tree.surface_;
     question.cell = cell;
+    // Leaves are tested here; who answers conservatively has none.
+    question.ids_up_to = tree.conservative()              ? 0
+                         : tree.isDeepest(cell.level + 1) ? oracle::Expansion::kAll
+                                                          : kLeafTriangles;
     if (link.isList()) {
-      const TriangleList list = tree.list(link);
-      question.ids = list.ids;
-      question.count = list.count;
+      tree.askFor(link.index(), question);
     } else if (g.node.isRoot()) {
-      question.count = tree.surface_.mesh->triangleCount();
+      question.count = tree.surface_.triangle_count;
       if (g.list_is_enough && question.count <= kLeafTriangles) {
         std::array<std::uint32_t, kLeafTriangles> ids;
         std::iota(ids.begin(), ids.end(), 0u);
@@ -146,20 +166,51 @@ void Tree::grow(std::vector<Growth>& batch, bool wait) {
     questions.push_back(std::move(question));
     asked.push_back(g);
   }
-  if (!questions.empty()) {
-    oracle::Oracle& oracle = *asked.front().tree->oracle_;
-    oracle.submit(questions);
-    oracle.wait(questions);
-    for (std::size_t i = 0; i < questions.size(); ++i) {
-      asked[i].tree->publish(asked[i].node, questions[i]);
-      asked[i].tree->cells_ += questions[i].own_only ? 1 : 8;
-    }
-  }
+  ask(asked, questions);
   for (Tree* tree : trees) {
     if (tree == nullptr) continue;
     const auto mine = [tree](const Growth& g) { return g.tree == tree; };
     if (std::any_of(asked.begin(), asked.end(), mine)) ++tree->batches_;
-    tree->bytes_ = tree->treeBytes();
+    tree->countBytes();
+  }
+}
+
+// The questions of one oracle go out together.
+void Tree::ask(std::vector<Growth>& asked, std::vector<oracle::Expansion>& questions) {
+  const auto publish_all = [&](std::vector<oracle::Expansion>& answers, const std::vector<Growth>& growths) {
+    oracle::Oracle& oracle = *growths.front().tree->oracle_;
+    oracle.submit(answers);
+    oracle.wait(answers);
+    for (std::size_t i = 0; i < answers.size(); ++i) {
+      growths[i].tree->publish(growths[i].node, answers[i]);
+      growths[i].tree->cells_ += answers[i].own_only ? 1 : 8;
+    }
+  };
+  if (asked.empty()) return;
+  const oracle::Oracle* const first = asked.front().tree->oracle_.get();
+  const auto is_other = [first](const Growth& g) { return g.tree->oracle_.get() != first; };
+  if (std::none_of(asked.begin(), asked.end(), is_other)) {
+    publish_all(questions, asked);
+    return;
+  }
+  std::array<std::vector<oracle::Expansion>, 2> parts;
+  std::array<std::vector<Growth>, 2> growths;
+  for (std::size_t i = 0; i < asked.size(); ++i) {
+    const std::size_t part = is_other(asked[i]);
+    parts[part].push_back(std::move(questions[i]));
+    growths[part].push_back(asked[i]);
+  }
+  for (std::size_t part = 0; part < 2; ++part) publish_all(parts[part], growths[part]);
+}
+
+void Tree::askFor(std::uint32_t list, oracle::Expansion& question) const {
+  const std::uint32_t* words = &lists_[list];
+  question.count = words[0] & ~kKept;
+  if ((words[0] & kKept) == 0) {
+    question.ids = words + 1;
+  } else {
+    question.shelf = shelves_[words[1]];
+    question.shelf_begin = words[2];
   }
 }
 
@@ -175,6 +226,8 @@ void Tree::look(const std::vector<NodeRef>& nodes) {
 }
 
 void Tree::growRoot() {
+  if (surface_.device == nullptr) surface_.device = oracle_->hold(surface_);
+  if (grid_tried_ || oracle_->kind() != OracleKind::kCpu) return;
   grid_tried_ = true;
   grid_ = oracle::RootGrid::make(surface_, deepest_);
   if (grid_ == nullptr) return;
@@ -231,6 +284,33 @@ Link Tree::addList(const std::uint32_t* ids, std::size_t count, bool leaf) {
   return Link(leaf || count <= kLeafTriangles ? Link::kShortList : Link::kList, index);
 }
 
+Link Tree::addKept(const std::shared_ptr<const oracle::Held>& shelf, oracle::Expansion::Kept list) {
+  if (shelves_.empty() || shelves_.back() != shelf) shelves_.push_back(shelf);
+  const std::uint32_t index = lists_.append(kKeptWords);
+  lists_[index] = list.count | kKept;
+  lists_[index + 1] = static_cast<std::uint32_t>(shelves_.size() - 1);
+  lists_[index + 2] = list.begin;
+  return Link(Link::kList, index);
+}
+
+Link Tree::addOctantList(const oracle::Expansion& answer, int octant) {
+  const std::size_t count = answer.listSize(octant),
+                    all = answer.lists.size() +
+                          std::accumulate(
+                              answer.kept_lists.begin(), answer.kept_lists.end(), std::size_t{0},
+                              [](std::size_t sum, const oracle::Expansion::Kept&kept) { return sum + kept.count; });
+  // Triangles so large that division only copies them: going on would take memory without end and cull nothing.
+  const bool hopeless = all > 2 * answer.count && 4 * count > 3 * answer.count;
+  const oracle::Expansion::Kept& kept = answer.kept_lists[static_cast<std::size_t>(octant)];
+  if (kept.count == 0) return addList(answer.lists.data() + answer.list_begin[octant], count, hopeless);
+  if (hopeless && !conservative()) {
+    // A leaf's triangles are needed here.
+    std::vector<std::uint32_t> ids(count);
+    if (oracle_->fetch(*answer.kept, kept, ids.data())) return addList(ids.data(), count, true);
+  }
+  return addKept(answer.kept, kept);
+}
+
 void Tree::setLink(NodeRef node, Link link) {
   std::atomic<Link>& place = node.isRoot() ? root_ : blocks_[node.block()].child[node.octant()];
   place.store(link, std::memory_order_release);
@@ -249,12 +329,12 @@ void Tree::publish(NodeRef node, const oracle::Expansion& answer) {
   Block& block = blocks_[index];
   block.octants = answer.octants;
   block.own = answer.own;
+  if (answer.kept != nullptr) {
+    const Link own = link(node);
+    if (own.isList()) block.own_list = own.index();
+  }
   for (int o = 0; o < 8; ++o) {
-    if ((answer.grey >> o & 1) == 0) continue;
-    const std::size_t begin = answer.list_begin[o], count = answer.list_begin[o + 1] - begin;
-    // Triangles so large that division only copies them: going on would take memory without end and cull nothing.
-    const bool hopeless = answer.lists.size() > 2 * answer.count && 4 * count > 3 * answer.count;
-    block.child[o].store(addList(answer.lists.data() + begin, count, hopeless), std::memory_order_relaxed);
+    if (answer.grey >> o & 1) block.child[o].store(addOctantList(answer, o), std::memory_order_relaxed);
   }
   setLink(node, Link(Link::kBlock, index));
 }
@@ -344,7 +424,7 @@ void Tree::refit() {
     uniteSlabs(block, block.own);
     if (block.own == before) continue;
     apply(
-        block.parent == 0xffffffffu ? NodeRef{} : NodeRef::octant(block.parent, static_cast<int>(block.parent_octant)),
+        block.parent == Block::kNone ? NodeRef{} : NodeRef::octant(block.parent, static_cast<int>(block.parent_octant)),
         block.own);
   }
 }
@@ -362,6 +442,51 @@ void Tree::collectTriangles(Link link, const lattice::Cell& cell, std::vector<st
     ids.insert(ids.end(), list.ids, list.ids + list.count);
   } else {
     grid_->gather(surface_, cell, ids);
+  }
+}
+
+Link Tree::copyList(Link list, Pool<std::uint32_t, 12>& lists) const {
+  const std::uint32_t* from = &lists_[list.index()];
+  const std::size_t words = (from[0] & kKept) != 0 ? kKeptWords : from[0] + std::size_t{1};
+  const std::uint32_t index = lists.append(words);
+  std::copy_n(from, words, &lists[index]);
+  return Link(list.tag(), index);
+}
+
+// The list of a node whose block goes.
+Link Tree::regained(Link block, const lattice::Cell& cell, Pool<std::uint32_t, 12>& lists) const {
+  if (grid_ != nullptr && cell.level <= grid_->level()) return Link();
+  const std::uint32_t own = blocks_[block.index()].own_list;
+  if (own != Block::kNone) {
+    const bool is_short = lists_[own] <= kLeafTriangles;  // the length of a list that the oracle keeps looks huge
+    return copyList(Link(is_short ? Link::kShortList : Link::kList, own), lists);
+  }
+  std::vector<std::uint32_t> ids;
+  collectTriangles(block, cell, ids);
+  std::sort(ids.begin(), ids.end());
+  ids.erase(std::unique(ids.begin(), ids.end()), ids.end());
+  const std::uint32_t index = lists.append(ids.size() + 1);
+  lists[index] = static_cast<std::uint32_t>(ids.size());
+  std::copy(ids.begin(), ids.end(), &lists[index] + 1);
+  return Link(ids.size() <= kLeafTriangles ? Link::kShortList : Link::kList, index);
+}
+
+void Tree::dropUnusedShelves() {
+  // Which shelves do the lists that stay lie on? Each is known by its first use.
+  std::vector<std::uint8_t> used(shelves_.size(), 0);
+  const auto mark = [&](std::uint32_t list) {
+    if ((lists_[list] & kKept) != 0) used[lists_[list + 1]] = 1;
+  };
+  for (std::uint32_t i = 0; i < blocks_.size(); ++i) {
+    const Block& block = blocks_[i];
+    if (block.own_list != Block::kNone) mark(block.own_list);
+    for (int o = 0; o < 8; ++o) {
+      const Link link = block.child[o].load(std::memory_order_relaxed);
+      if ((block.grey >> o & 1) != 0 && link.isList()) mark(link.index());
+    }
+  }
+  for (std::size_t i = 0; i < shelves_.size(); ++i) {
+    if (!used[i]) shelves_[i] = nullptr;
   }
 }
 
@@ -389,6 +514,7 @@ void Tree::keepOnly(const std::vector<std::uint8_t>& keep) {
     root_.store(Link(), std::memory_order_relaxed);
     blocks_.clear();
     lists_.clear();
+    shelves_.clear();
   } else {
     Pool<Block, 5> blocks;
     Pool<std::uint32_t, 12> lists;
@@ -398,22 +524,9 @@ void Tree::keepOnly(const std::vector<std::uint8_t>& keep) {
       moves.pop_back();
       Link link = move.from;
       if (link.tag() == Link::kBlock && !keep[link.index()]) {
-        link = Link();
-        if (grid_ == nullptr || move.cell.level > grid_->level()) {
-          std::vector<std::uint32_t> ids;
-          collectTriangles(move.from, move.cell, ids);
-          std::sort(ids.begin(), ids.end());
-          ids.erase(std::unique(ids.begin(), ids.end()), ids.end());
-          const std::uint32_t index = lists.append(ids.size() + 1);
-          lists[index] = static_cast<std::uint32_t>(ids.size());
-          std::copy(ids.begin(), ids.end(), &lists[index] + 1);
-          link = Link(ids.size() <= kLeafTriangles ? Link::kShortList : Link::kList, index);
-        }
+        link = regained(move.from, move.cell, lists);
       } else if (link.isList()) {
-        const TriangleList list = this->list(link);
-        const std::uint32_t index = lists.append(list.count + std::size_t{1});
-        std::copy_n(list.ids - 1, list.count + 1, &lists[index]);
-        link = Link(link.tag(), index);
+        link = copyList(link, lists);
       } else if (link.tag() == Link::kBlock) {
         const Block& from = blocks_[link.index()];
         const std::uint32_t index = blocks.append(1);
@@ -423,6 +536,7 @@ void Tree::keepOnly(const std::vector<std::uint8_t>& keep) {
         to.grey = from.grey;
         to.level = from.level;
         std::copy_n(from.at, 3, to.at);
+        if (from.own_list != Block::kNone) to.own_list = copyList(Link(Link::kList, from.own_list), lists).index();
         to.stamp.store(from.stamp.load(std::memory_order_relaxed), std::memory_order_relaxed);
         if (!move.to.isRoot()) {
           to.parent = move.to.block();
@@ -442,12 +556,13 @@ void Tree::keepOnly(const std::vector<std::uint8_t>& keep) {
     }
     blocks_.swap(blocks);
     lists_.swap(lists);
+    dropUnusedShelves();
   }
   refits_.clear();  // they name nodes of the old pools
   refits_wait_.store(false, std::memory_order_relaxed);
   for (const auto& n : nodes_at_) after += n;
   if (before > after) pruned_ += before - after;
-  bytes_ = treeBytes();
+  countBytes();
 }
 
 void Tree::pruneAlone(std::int64_t now, bool budget_only) {
@@ -491,7 +606,7 @@ void Tree::applyBudget() {
     });
     std::vector<std::uint8_t> keep(blocks_.size(), 0);
     for (std::size_t k = 0; k < std::min(count, order.size()); ++k) {
-      for (std::uint32_t i = order[k]; i != 0xffffffffu && !keep[i]; i = blocks_[i].parent) keep[i] = 1;
+      for (std::uint32_t i = order[k]; i != Block::kNone && !keep[i]; i = blocks_[i].parent) keep[i] = 1;
     }
     keepOnly(keep);
     if (bytes_ <= budget || count == 0) return;
@@ -522,6 +637,7 @@ void Tree::afterQuery(std::int64_t now) {
 
 void Tree::updateVertices(std::vector<Eigen::Vector3d> vertices) {
   const std::lock_guard<Gate> alone(gate_);
+  if (surface_.mesh == nullptr) throw std::logic_error("bocst::Model::updateVertices: the mesh was released");
   const Mesh& old = *surface_.mesh;
   if (vertices.size() != old.vertexCount()) {
     throw std::invalid_argument("bocst::Model::updateVertices: " + std::to_string(vertices.size()) +
@@ -612,8 +728,20 @@ Statistics Tree::statistics() const {
   s.oracle_batches = batches_;
   s.oracle_cells = cells_;
   s.pruned_nodes = pruned_;
-  s.mesh_bytes = surface_.mesh->bytes();
+  s.mesh_bytes = surface_.mesh != nullptr ? surface_.mesh->bytes() : 0;
+  s.device_bytes = device_bytes_;
   return s;
+}
+
+void Tree::countBytes() {
+  bytes_ = treeBytes();
+  std::size_t device = surface_.device != nullptr ? surface_.device->bytes() : 0;
+  const oracle::Held* last = nullptr;
+  for (const auto& shelf : shelves_) {
+    if (shelf != nullptr && shelf.get() != last) device += shelf->bytes();
+    last = shelf.get();
+  }
+  device_bytes_ = device;
 }
 
 std::size_t Tree::treeBytes() const { return blocks_.bytes() + lists_.bytes() + (grid_ ? grid_->bytes() : 0); }

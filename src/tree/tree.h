@@ -23,7 +23,7 @@
 
 namespace bocst::tree {
 
-/// Triangles of a frontier node with a list.
+/// Triangles of a frontier node with a list; ids is null where only the oracle has them, never for a leaf.
 struct TriangleList {
   const std::uint32_t* ids = nullptr;
   std::uint32_t count = 0;
@@ -63,7 +63,7 @@ class Tree {
   const oracle::CellBounds& rootBounds() const { return root_bounds_; }
   TriangleList list(Link link) const {
     const std::uint32_t* words = &lists_[link.index()];
-    return {words + 1, words[0]};
+    return {(words[0] & kKept) != 0 ? nullptr : words + 1, words[0] & ~kKept};
   }
   /// No more expansions below this node: a single lattice unit, or the collision depth of conservative answers.
   bool isDeepest(int level) const { return level >= deepest_; }
@@ -108,7 +108,9 @@ class Tree {
   void visit(const std::function<void(const NodeView&)>& f) const;
   void prune(Clock::time_point now);
   void updateVertices(std::vector<Eigen::Vector3d> vertices);
+  void releaseMesh();
   std::shared_ptr<const Mesh> mesh() const;
+  Eigen::AlignedBox3d bounds() const;  ///< Of the mesh, in its frame.
 
   /// Takes up what the query taught about bounds, and prunes when it is time; puts it off when others are in the way.
   void afterQuery(std::int64_t now);
@@ -117,6 +119,14 @@ class Tree {
   using Dropped = std::vector<std::uint8_t>;
 
   void reset(std::shared_ptr<const Mesh> mesh);
+  // A list is a length and the ids; where the oracle keeps it, the length with this bit, a shelf and a place there.
+  static constexpr std::uint32_t kKept = 0x80000000u;
+  static constexpr std::size_t kKeptWords = 3;
+
+  void askFor(std::uint32_t list, oracle::Expansion& question) const;
+  Link addKept(const std::shared_ptr<const oracle::Held>& shelf, oracle::Expansion::Kept list);
+  Link addOctantList(const oracle::Expansion& answer, int octant);
+  static void ask(std::vector<Growth>& asked, std::vector<oracle::Expansion>& questions);
   void growRoot();
   void growFromGrid(NodeRef node);
   void publish(NodeRef node, const oracle::Expansion& answer);
@@ -128,7 +138,11 @@ class Tree {
   void applyBudget();
   void keepOnly(const std::vector<std::uint8_t>& keep);
   void collectTriangles(Link link, const lattice::Cell& cell, std::vector<std::uint32_t>& ids) const;
+  Link regained(Link block, const lattice::Cell& cell, Pool<std::uint32_t, 12>& lists) const;
+  Link copyList(Link list, Pool<std::uint32_t, 12>& lists) const;
+  void dropUnusedShelves();
   std::size_t treeBytes() const;
+  void countBytes();
   void gatherNode(NodeRef node, const lattice::Cell& cell, std::vector<std::uint32_t>& ids) const;
 
   const Options options_;
@@ -145,6 +159,7 @@ class Tree {
   std::atomic<Link> root_{Link()};
   Pool<Block, 5> blocks_;
   Pool<std::uint32_t, 12> lists_;
+  std::vector<std::shared_ptr<const oracle::Held>> shelves_;  // of the lists that the oracle keeps
 
   // Tighter bounds of nodes than their parents' blocks hold; blocks that readers see are not written to, so these wait
   // for a moment alone.
@@ -156,7 +171,7 @@ class Tree {
   std::atomic<bool> refits_wait_{false};
 
   std::array<std::atomic<std::size_t>, lattice::kMaxLevel + 1> nodes_at_{};
-  std::atomic<std::size_t> bytes_{0};
+  std::atomic<std::size_t> bytes_{0}, device_bytes_{0};
   std::atomic<std::uint64_t> expansions_{0}, batches_{0}, cells_{0}, pruned_{0};
   std::atomic<std::int64_t> next_prune_{0};
 };

@@ -25,6 +25,13 @@ Surface surfaceOf(const test::Raw& raw, Subdivision s = Subdivision::kBono, doub
   return {mesh, Lattice(mesh->bounds(), s, dimension)};
 }
 
+// Where the oracle works.
+Surface heldBy(Oracle& oracle, Surface surface) {
+  surface.device = oracle.hold(surface);
+  EXPECT_EQ(surface.device != nullptr, oracle.kind() != OracleKind::kCpu);
+  return surface;
+}
+
 Eigen::Vector3d centerOf(const Cell& cell) {
   const auto c = cell.corner();
   return Eigen::Vector3d(c[0], c[1], c[2]).array() + cell.side() / 2.0;
@@ -70,7 +77,8 @@ std::vector<Expansion> ask(Oracle& oracle, std::vector<Expansion> batch) {
 }
 
 // Expands all grey cells level by level and checks each answer.
-void checkMesh(Oracle& oracle, const Surface& surface, int levels, std::size_t most_cells) {
+void checkMesh(Oracle& oracle, const Surface& here, int levels, std::size_t most_cells) {
+  const Surface surface = heldBy(oracle, here);
   std::mt19937_64 g(1);
   std::uniform_real_distribution<double> u(0, 1);
   Expansion root;
@@ -153,7 +161,8 @@ TEST_P(EveryOracle, AnyScaleAndPlace) {
 }
 
 TEST_P(EveryOracle, OddBatches) {
-  const Surface a = surfaceOf(test::torus(16)), b = surfaceOf(test::adversarial());
+  const Surface a = heldBy(*oracle_, surfaceOf(test::torus(16)));
+  const Surface b = heldBy(*oracle_, surfaceOf(test::adversarial()));
   for (const std::size_t size : {std::size_t{1}, std::size_t{2}, std::size_t{3}, std::size_t{63}, std::size_t{1001}}) {
     std::vector<Expansion> batch(size);
     for (std::size_t i = 0; i < size; ++i) {
@@ -245,7 +254,7 @@ TEST_P(EveryOracle, NothingMissedAgainstIntegers) {
       }
       raw.triangles.emplace_back(raw.vertices.size() - 3, raw.vertices.size() - 2, raw.vertices.size() - 1);
     }
-    const Surface surface = surfaceOf(raw);
+    const Surface surface = heldBy(*oracle_, surfaceOf(raw));
     ASSERT_EQ(surface.lattice.unit(), 1);
     std::vector<std::uint32_t> ids(400);
     for (std::uint32_t t = 0; t < 400; ++t) ids[t] = t + 2;
@@ -279,7 +288,13 @@ TEST_P(EveryOracle, NothingMissedAgainstIntegers) {
   EXPECT_GT(touching, 10000u);
 }
 
-INSTANTIATE_TEST_SUITE_P(Cpu, EveryOracle, testing::Values(OracleKind::kCpu));
+const char* nameOf(OracleKind kind) {
+  return kind == OracleKind::kCpu ? "cpu" : kind == OracleKind::kOcclusion ? "occlusion" : "compute";
+}
+
+INSTANTIATE_TEST_SUITE_P(All, EveryOracle,
+                         testing::Values(OracleKind::kCpu, OracleKind::kOcclusion, OracleKind::kCompute),
+                         [](const auto& kind) { return std::string(nameOf(kind.param)); });
 
 TEST(Kernels, EveryInstructionSetAgreesOnGreySets) {
   const Surface surface = surfaceOf(test::soup(500, 3));
@@ -368,7 +383,7 @@ TEST(MakeOracle, SaysWhyNot) {
   }
   setenv("BOCST_ORACLE", "cpu", 1);
   EXPECT_EQ(makeOracle(OracleKind::kAuto)->name(), "cpu");
-  for (const char* bad : {"compute", "occlusion", "7", "gpu"}) {
+  for (const char* bad : {"7", "gpu", "sampled", "-1"}) {
     setenv("BOCST_ORACLE", bad, 1);
     EXPECT_THROW(makeOracle(OracleKind::kAuto), OracleError) << bad;
     EXPECT_EQ(makeOracle(OracleKind::kCpu)->name(), "cpu");

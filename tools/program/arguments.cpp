@@ -23,8 +23,11 @@ void ModelArguments::addDepth(CLI::App& command) {
 }
 
 void ModelArguments::addOracle(CLI::App& command) {
-  command.add_option("--oracle", oracle, "who finds the octants that the surface meets; see `bocst oracles`")
-      ->check(CLI::IsMember({"auto", "cpu", "occlusion", "compute"}))
+  command
+      .add_option("--oracle", oracle,
+                  "who finds the octants that the surface meets; see `bocst oracles`; sampled is the "
+                  "paper's, which misses some")
+      ->check(CLI::IsMember({"auto", "cpu", "occlusion", "compute", "sampled"}))
       ->capture_default_str();
 }
 
@@ -54,6 +57,7 @@ Options ModelArguments::options() const {
   options.oracle = oracle == "cpu"         ? OracleKind::kCpu
                    : oracle == "occlusion" ? OracleKind::kOcclusion
                    : oracle == "compute"   ? OracleKind::kCompute
+                   : oracle == "sampled"   ? OracleKind::kSampled
                                            : OracleKind::kAuto;
   return options;
 }

@@ -22,13 +22,16 @@ struct Scratch {
 
 class Expander {
  public:
-  Expander(Expansion& e, Scratch& s) : e_(e), s_(s), slab_(e.count <= kSlabTriangles) {
+  Expander(Expansion& e, Scratch& s, std::uint8_t candidates) : e_(e), s_(s), slab_(e.count <= kSlabTriangles) {
     half_ = e.cell.side() / 2.0;
     for (int k = 0; k < 3; ++k) center_[k] = e.cell.corner()[k] + half_;
     for (int o = 0; o < 8; ++o) {
       if (e.surface->lattice.exists(e.cell.octant(o))) exists_ |= 1 << o;
       s.octants[o].clear();
     }
+    exists_ &= candidates;
+    e.kept = nullptr;
+    e.kept_lists = {};
   }
 
   void run() {
@@ -156,9 +159,24 @@ class Expander {
 
 }  // namespace
 
-void CpuOracle::submit(std::vector<Expansion>& batch) {
+void expand(Expansion& e, std::uint8_t candidates) {
   thread_local Scratch scratch;
-  for (Expansion& e : batch) Expander(e, scratch).run();
+  Expander(e, scratch, candidates).run();
+}
+
+void answerOnCpu(Expansion& e, std::uint8_t candidates) {
+  if (e.surface->mesh == nullptr) {
+    throw OracleError("the GPU that had the only copy of a mesh was lost or could not answer");
+  }
+  Expansion here = e;
+  if (e.ids == nullptr) here.count = e.surface->mesh->triangleCount();
+  expand(here, candidates);
+  here.count = e.count;
+  e = std::move(here);
+}
+
+void CpuOracle::submit(std::vector<Expansion>& batch) {
+  for (Expansion& e : batch) expand(e);
 }
 
 std::string CpuOracle::device() { return std::string("CPU, ") + instructionSet(); }

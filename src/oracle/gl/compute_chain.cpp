@@ -1,0 +1,246 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#include "oracle/gl/compute_chain.h"
+
+#include <algorithm>
+#include <chrono>
+#include <cstring>
+#include <string>
+
+#include "oracle/gl/shaders.h"
+
+namespace bocst::oracle::gl {
+namespace {
+
+// The layout that the shaders share (shaders/common.glsl).
+constexpr std::uint32_t kGroup = 128;
+constexpr std::uint32_t kImplicit = 0xffffffffu;
+constexpr std::size_t kStateWords = 18 + 8 * 15;
+constexpr std::size_t kHeader = 2, kRow = 35, kRowSizes = 25, kRowList = 33, kRowIds = 34;
+constexpr std::size_t kBoundsBytes = 100;
+static_assert(sizeof(OctantBounds) + sizeof(CellBounds) + 1 == kBoundsBytes);
+
+constexpr std::size_t kWord = sizeof(std::uint32_t);
+constexpr std::uint64_t kMostGroups = 1 << 15;  // in one dimension; 65535 is the least that drivers must allow
+
+std::string source(const std::string& name, bool clips) {
+  return "#version 430 core\n" + shader("common") + (clips ? shader("clip") : "") + shader(name);
+}
+
+const DeviceMesh* meshOf(const Expansion& e) { return static_cast<const DeviceMesh*>(e.surface->device.get()); }
+
+std::uint32_t narrow(std::uint64_t n) { return static_cast<std::uint32_t>(n); }
+
+class Watch {
+ public:
+  double nanoseconds() {
+    const auto now = std::chrono::steady_clock::now();
+    return static_cast<double>(std::chrono::nanoseconds(now - std::exchange(last_, now)).count());
+  }
+
+ private:
+  std::chrono::steady_clock::time_point last_ = std::chrono::steady_clock::now();
+};
+
+}  // namespace
+
+ComputeChain::ComputeChain(Limits limits, Arena& arena) : limits_(limits), arena_(arena) {
+  GLint bindings = 0;
+  glGetIntegerv(GL_MAX_COMPUTE_SHADER_STORAGE_BLOCKS, &bindings);
+  if (bindings < 8) throw OracleError("the driver binds only " + std::to_string(bindings) + " storage buffers, not 8");
+  const std::pair<const char*, bool> passes[kPasses] = {{"masks", false}, {"decide", false},  {"place", false},
+                                                        {"fill", true},   {"normals", false}, {"slabs", true},
+                                                        {"pack", false}};
+  for (const auto& [name, clips] : passes) {
+    auto program = std::make_unique<Program>(std::vector<Program::Stage>{{GL_COMPUTE_SHADER, source(name, clips)}});
+    const Program& p = *program;
+    steps_.push_back({std::move(program), p.uniform("u_pairs"), p.uniform("u_cells"), p.uniform("u_cell_count"),
+                      p.uniform("u_list_room"), p.uniform("u_id_room")});
+  }
+}
+
+bool ComputeChain::fits(const Expansion& e) const {
+  const DeviceMesh& mesh = *meshOf(e);
+  const std::size_t largest = std::max(mesh.vertices().bytes(), std::max(mesh.indices().bytes(), mesh.exact().bytes()));
+  return e.count <= limits_.pairs && largest <= limits_.bytes && e.count * kWord <= limits_.bytes;
+}
+
+std::size_t ComputeChain::part(const std::vector<Expansion*>& questions, std::size_t first) const {
+  std::uint64_t pairs = 0;
+  std::size_t n = 0;
+  while (first + n < questions.size() && n < limits_.cells) {
+    pairs += questions[first + n]->count;
+    if (n > 0 && pairs > limits_.pairs) break;
+    ++n;
+  }
+  return n;
+}
+
+void ComputeChain::upload(const std::vector<Expansion*>& questions) {
+  std::uint64_t uploads = 0;
+  for (const Expansion* e : questions) {
+    if (e->ids != nullptr) uploads += e->count;
+  }
+  uploaded_ = uploads > 0 ? arena_.take(uploads) : nullptr;
+  std::vector<std::uint32_t> ids;
+  ids.reserve(uploads);
+  rows_.clear();
+  ranges_.clear();
+  std::uint32_t pairs = 0;
+  for (const Expansion* question : questions) {
+    const Expansion& e = *question;
+    const double half = e.cell.side() / 2.0;
+    Cell row{};
+    for (std::size_t k = 0; k < 3; ++k) row.center[k] = static_cast<float>(e.cell.corner()[k] + half);
+    row.half_side = static_cast<float>(half);
+    row.first_pair = pairs;
+    row.list = kImplicit;
+    if (e.ids != nullptr) {
+      row.list = uploaded_->begin() + narrow(ids.size());
+      ids.insert(ids.end(), e.ids, e.ids + e.count);
+    } else if (e.shelf != nullptr) {
+      row.list = e.shelf_begin;
+    }
+    for (int o = 0; o < 8; ++o) {
+      if (e.surface->lattice.exists(e.cell.octant(o))) row.exists |= 1u << o;
+    }
+    row.ids_up_to = narrow(std::min<std::size_t>(e.ids_up_to, 0xffffffffu));
+    if (ranges_.empty() || ranges_.back().mesh != meshOf(e)) {
+      const std::uint32_t cell = narrow(rows_.size());
+      ranges_.push_back({meshOf(e), cell, cell, pairs, pairs});
+    }
+    rows_.push_back(row);
+    pairs += narrow(e.count);
+    ranges_.back().cell_end = narrow(rows_.size());
+    ranges_.back().pair_end = pairs;
+  }
+  cells_.reserve(rows_.size() * sizeof(Cell));
+  cells_.write(0, rows_.size() * sizeof(Cell), rows_.data());
+  states_.reserve(rows_.size() * kStateWords * kWord);
+  states_.clear(rows_.size() * kStateWords * kWord);
+  masks_.reserve(std::max<std::size_t>(pairs, 1) * kWord);
+  if (uploaded_ != nullptr) arena_.buffer().write(uploaded_->begin() * kWord, ids.size() * kWord, ids.data());
+}
+
+void ComputeChain::dispatch(Pass pass, std::uint64_t invocations) const {
+  const std::uint64_t groups = (invocations + kGroup - 1) / kGroup;
+  if (groups == 0) return;
+  const std::uint64_t across = std::min(groups, kMostGroups);
+  const Step& step = steps_[pass];
+  step.program->use();
+  glUniform1ui(step.cell_count, narrow(rows_.size()));
+  glUniform2ui(step.list_room, placed_->begin(), narrow(list_room_));
+  glUniform1ui(step.id_room, narrow(id_room_));
+  glDispatchCompute(narrow(across), narrow((groups + across - 1) / across), 1);
+}
+
+void ComputeChain::dispatchPairs(Pass pass) const {
+  for (const Range& r : ranges_) {
+    glBindBufferBase(GL_SHADER_STORAGE_BUFFER, 0, r.mesh->vertices().name());
+    glBindBufferBase(GL_SHADER_STORAGE_BUFFER, 1, r.mesh->indices().name());
+    glBindBufferBase(GL_SHADER_STORAGE_BUFFER, 7, r.mesh->exact().name());
+    steps_[pass].program->use();
+    glUniform2ui(steps_[pass].pairs, r.pair_begin, r.pair_end);
+    glUniform2ui(steps_[pass].cells, r.cell_begin, r.cell_end);
+    dispatch(pass, r.pair_end - r.pair_begin);
+  }
+  glMemoryBarrier(GL_SHADER_STORAGE_BARRIER_BIT);
+}
+
+void ComputeChain::placeAndFill() {
+  answers_.reserve((kHeader + rows_.size() * kRow + id_room_) * kWord);
+  answers_.clear(kHeader * kWord);
+  const GLuint bound[] = {arena_.buffer().name(), cells_.name(), states_.name(), masks_.name(), answers_.name()};
+  for (GLuint i = 0; i < 5; ++i) glBindBufferBase(GL_SHADER_STORAGE_BUFFER, 2 + i, bound[i]);
+  dispatch(kPlace, rows_.size());
+  glMemoryBarrier(GL_SHADER_STORAGE_BARRIER_BIT);
+  dispatchPairs(kFill);
+  dispatch(kNormals, 8 * rows_.size());
+  glMemoryBarrier(GL_SHADER_STORAGE_BARRIER_BIT);
+  dispatchPairs(kSlabs);
+  dispatch(kPack, rows_.size());
+  glMemoryBarrier(GL_BUFFER_UPDATE_BARRIER_BIT | GL_SHADER_STORAGE_BARRIER_BIT);
+}
+
+void ComputeChain::readBack(const std::vector<Expansion*>& questions) {
+  for (std::size_t i = 0; i < questions.size(); ++i) {
+    Expansion& e = *questions[i];
+    const std::uint32_t* row = &words_[kHeader + i * kRow];
+    unsigned char bytes[kBoundsBytes];
+    std::memcpy(bytes, row, sizeof(bytes));
+    std::memcpy(&e.octants, bytes, sizeof(e.octants));
+    std::memcpy(&e.own, bytes + sizeof(e.octants), sizeof(e.own));
+    e.grey = bytes[kBoundsBytes - 1];
+    const std::uint32_t* ids = &words_[kHeader + questions.size() * kRow] + row[kRowIds];
+    std::uint32_t list = row[kRowList];
+    e.lists.clear();
+    e.kept = nullptr;
+    for (std::size_t o = 0; o < 8; ++o) {
+      const std::uint32_t size = row[kRowSizes + o];
+      const bool here = size <= e.ids_up_to;
+      e.list_begin[o] = e.lists.size();
+      e.kept_lists[o] = here ? Expansion::Kept{} : Expansion::Kept{list, size};
+      if (here) {
+        e.lists.insert(e.lists.end(), ids, ids + size);
+        ids += size;
+      } else {
+        e.kept = placed_;
+      }
+      list += size;
+    }
+    e.list_begin[8] = e.lists.size();
+  }
+}
+
+void ComputeChain::answer(const std::vector<Expansion*>& questions, Thread& thread) {
+  while (glGetError() != GL_NO_ERROR) {
+  }
+  Watch watch;
+  upload(questions);
+  std::uint64_t pairs = 0, ids = 0;
+  for (const Expansion* e : questions) {
+    pairs += e->count;
+    ids += std::min<std::uint64_t>(2 * e->count, 8 * std::min<std::uint64_t>(e->ids_up_to, 1u << 28));
+  }
+  list_room_ = 2 * pairs + 8 * questions.size();
+  id_room_ = ids + 64;
+  placed_ = arena_.take(list_room_);
+  cost_.upload = watch.nanoseconds();
+
+  const GLuint bound[] = {arena_.buffer().name(), cells_.name(), states_.name(), masks_.name()};
+  for (GLuint i = 0; i < 4; ++i) glBindBufferBase(GL_SHADER_STORAGE_BUFFER, 2 + i, bound[i]);
+  glMemoryBarrier(GL_SHADER_STORAGE_BARRIER_BIT | GL_BUFFER_UPDATE_BARRIER_BIT);
+  dispatchPairs(kMasks);
+  dispatchPairs(kDecide);
+  placeAndFill();
+
+  // Most answers fit into the first read; what does not is known from the header.
+  const std::size_t fixed = kHeader + questions.size() * kRow;
+  std::size_t read = fixed + std::min<std::uint64_t>(id_room_, 64 * questions.size());
+  const auto readFrom = [&](std::size_t first, std::size_t end) {
+    words_.resize(end);
+    answers_.read(first * kWord, (end - first) * kWord, words_.data() + first);
+  };
+  glFlush();
+  readFrom(0, read);
+  cost_.kernels = watch.nanoseconds();
+  if (words_[0] > list_room_ || words_[1] > id_room_) {
+    list_room_ = words_[0];
+    id_room_ = words_[1];
+    placed_ = nullptr;
+    placed_ = arena_.take(list_room_);
+    placeAndFill();
+    read = 0;
+  }
+  const std::size_t all = fixed + (read == 0 ? id_room_ : words_[1]);
+  if (all > read) readFrom(read, all);
+  const GLenum error = glGetError();
+  thread.checkReset();
+  if (error != GL_NO_ERROR) throw OracleError("OpenGL error " + std::to_string(error));
+  placed_->trim(words_[0]);
+  readBack(questions);
+  cost_.read_back = watch.nanoseconds();
+  placed_ = nullptr;
+  uploaded_ = nullptr;
+}
+
+}  // namespace bocst::oracle::gl

@@ -1,0 +1,78 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#include "oracle/gl/compute_oracle.h"
+
+#include <algorithm>
+#include <functional>
+#include <utility>
+
+namespace bocst::oracle::gl {
+namespace {
+
+const DeviceMesh* meshOf(const Expansion& e) { return static_cast<const DeviceMesh*>(e.surface->device.get()); }
+
+}  // namespace
+
+ComputeOracle::ComputeOracle(std::shared_ptr<Thread> thread, ComputeChain::Limits limits)
+    : DeviceOracle(std::move(thread), true) {
+  thread_->run([&] {
+    if (limits.bytes == 0) {
+      GLint64 bytes = 0;
+      glGetInteger64v(GL_MAX_SHADER_STORAGE_BLOCK_SIZE, &bytes);
+      limits.bytes = static_cast<std::size_t>(bytes);
+    }
+    arena_ = std::make_shared<Arena>(thread_, limits.bytes);
+    chain_ = std::make_unique<ComputeChain>(limits, *arena_);
+  });
+}
+
+ComputeOracle::~ComputeOracle() {
+  finish();
+  thread_->post([chain = chain_.release()] { delete chain; });
+}
+
+void ComputeOracle::answer(const std::vector<Expansion*>& questions, std::vector<Verdict>& verdicts) {
+  // Questions about one mesh follow each other.
+  std::vector<std::size_t> order;
+  for (std::size_t i = 0; i < questions.size(); ++i) {
+    const Expansion& e = *questions[i];
+    if (!e.own_only && meshOf(e) != nullptr && chain_->fits(e)) order.push_back(i);
+  }
+  std::stable_sort(order.begin(), order.end(), [&](std::size_t a, std::size_t b) {
+    return std::less<const DeviceMesh*>()(meshOf(*questions[a]), meshOf(*questions[b]));
+  });
+  std::vector<Expansion*> sorted;
+  for (const std::size_t i : order) sorted.push_back(questions[i]);
+  for (std::size_t first = 0; first < sorted.size();) {
+    const std::size_t count = chain_->part(sorted, first);
+    try {
+      chain_->answer({sorted.begin() + static_cast<std::ptrdiff_t>(first),
+                      sorted.begin() + static_cast<std::ptrdiff_t>(first + count)},
+                     *thread_);
+      for (std::size_t i = first; i < first + count; ++i) verdicts[order[i]].kind = Verdict::Kind::kAnswer;
+    } catch (const std::exception&) {
+      // No memory, or no context any more: what has no answer yet is the CPU's.
+      if (thread_->isLost()) return;
+    }
+    first += count;
+  }
+}
+
+bool ComputeOracle::fetch(const Held&, Expansion::Kept list, std::uint32_t* ids) {
+  try {
+    thread_->run([&] {
+      arena_->buffer().read(list.begin * sizeof(*ids), list.count * sizeof(*ids), ids);
+      thread_->checkReset();
+    });
+    return true;
+  } catch (const OracleError&) {
+    return false;
+  }
+}
+
+ComputeChain::Cost ComputeOracle::lastCost() {
+  ComputeChain::Cost cost;
+  thread_->run([&] { cost = chain_->cost(); });
+  return cost;
+}
+
+}  // namespace bocst::oracle::gl

@@ -1,0 +1,80 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#include "oracle/gl/device_oracle.h"
+
+#include <algorithm>
+
+#include "oracle/cpu/cpu_oracle.h"
+
+namespace bocst::oracle::gl {
+
+void DeviceOracle::submit(std::vector<Expansion>& batch) {
+  if (batch.empty() || thread_->isLost()) return;
+  const std::lock_guard<std::mutex> lock(mutex_);
+  tickets_.push_back({&batch});
+  if (flush_is_due_) return;
+  flush_is_due_ = true;
+  thread_->post([this] { flush(); });
+}
+
+void DeviceOracle::flush() {
+  std::vector<Ticket*> taken;
+  {
+    const std::lock_guard<std::mutex> lock(mutex_);
+    flush_is_due_ = false;
+    for (Ticket& t : tickets_) {
+      if (t.taken) continue;
+      t.taken = true;
+      taken.push_back(&t);
+    }
+  }
+  std::vector<Expansion*> questions;
+  for (const Ticket* t : taken) {
+    for (Expansion& e : *t->batch) questions.push_back(&e);
+  }
+  std::vector<Verdict> verdicts(questions.size());
+  if (!thread_->isLost()) answer(questions, verdicts);
+  const std::lock_guard<std::mutex> lock(mutex_);
+  auto next = verdicts.begin();
+  for (Ticket* t : taken) {
+    const auto end = next + static_cast<std::ptrdiff_t>(t->batch->size());
+    t->verdicts.assign(next, end);
+    t->done = true;
+    next = end;
+  }
+  answered_.notify_all();
+}
+
+void DeviceOracle::wait(std::vector<Expansion>& batch) {
+  std::vector<Verdict> verdicts;
+  if (!thread_->isForked()) {
+    std::unique_lock<std::mutex> lock(mutex_);
+    const auto ticket =
+        std::find_if(tickets_.begin(), tickets_.end(), [&](const Ticket& t) { return t.batch == &batch; });
+    if (ticket != tickets_.end()) {
+      answered_.wait(lock, [&] { return ticket->done; });
+      verdicts = std::move(ticket->verdicts);
+      tickets_.erase(ticket);
+    }
+  }
+  verdicts.resize(batch.size());
+  for (std::size_t i = 0; i < batch.size(); ++i) {
+    if (verdicts[i].kind == Verdict::Kind::kAnswer) continue;
+    if (verdicts[i].kind == Verdict::Kind::kNone) ++left_to_cpu_;
+    answerOnCpu(batch[i], verdicts[i].candidates);
+  }
+}
+
+std::shared_ptr<const Held> DeviceOracle::hold(const Surface& surface) {
+  try {
+    return meshes_.hold(surface);
+  } catch (const OracleError&) {
+    return nullptr;
+  }
+}
+
+void DeviceOracle::finish() {
+  if (thread_->isLost()) return;
+  thread_->run([] {});  // a flush may still be on its way out of this object
+}
+
+}  // namespace bocst::oracle::gl

@@ -1,0 +1,67 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#pragma once
+
+#include <atomic>
+#include <condition_variable>
+#include <cstdint>
+#include <list>
+#include <memory>
+#include <mutex>
+#include <vector>
+
+#include "oracle/gl/device_mesh.h"
+#include "oracle/gl/thread.h"
+#include "oracle/oracle.h"
+
+namespace bocst::oracle::gl {
+
+/// What the oracles on a device have in common: batches of threads that wait at the same time are answered together,
+/// in the thread of the context; what the device cannot do (no memory, too large a request, context lost, a child
+/// after fork()) is answered on the CPU, in the thread that waits.
+class DeviceOracle : public Oracle {
+ public:
+  void submit(std::vector<Expansion>& batch) final;
+  void wait(std::vector<Expansion>& batch) final;
+  std::shared_ptr<const Held> hold(const Surface& surface) final;
+
+  Thread& thread() { return *thread_; }
+
+  /// How many questions the CPU had to answer alone.
+  std::uint64_t leftToCpu() const { return left_to_cpu_.load(std::memory_order_relaxed); }
+
+ protected:
+  /// What the device has to say to a question.
+  struct Verdict {
+    enum class Kind { kNone, kCandidates, kAnswer } kind = Kind::kNone;
+    std::uint8_t candidates = 0xff;  ///< kCandidates: octants that may be grey; the CPU does the rest.
+  };
+
+  /// exact: device meshes have their vertices in double, too.
+  DeviceOracle(std::shared_ptr<Thread> thread, bool exact) : thread_(std::move(thread)), meshes_(thread_, exact) {}
+
+  /// Ends what is still going on; derived classes do so before anything else goes.
+  void finish();
+
+  /// In the thread of the context; must not throw. Answers as much as it can.
+  virtual void answer(const std::vector<Expansion*>& questions, std::vector<Verdict>& verdicts) = 0;
+
+  const std::shared_ptr<Thread> thread_;
+
+ private:
+  struct Ticket {
+    std::vector<Expansion>* batch;
+    bool taken = false, done = false;
+    std::vector<Verdict> verdicts = {};
+  };
+
+  void flush();
+
+  DeviceMeshes meshes_;
+  std::atomic<std::uint64_t> left_to_cpu_{0};
+  std::mutex mutex_;  // of what follows
+  std::condition_variable answered_;
+  std::list<Ticket> tickets_;
+  bool flush_is_due_ = false;
+};
+
+}  // namespace bocst::oracle::gl

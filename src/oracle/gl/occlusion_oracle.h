@@ -1,0 +1,42 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#pragma once
+
+#include <cstdint>
+#include <memory>
+#include <string>
+#include <vector>
+
+#include "oracle/gl/device_oracle.h"
+#include "oracle/gl/handles.h"
+
+namespace bocst::oracle::gl {
+
+class OcclusionQueries;
+
+/// The paper's Algorithm 1 (4.1, 4.2) as an oracle (OpenGL 3.3): an occlusion query asks whether any triangle of the
+/// parent's subset is seen in an octant. Many queries are on their way before any result is read. Lists and bounds of
+/// the octants that pass are the CPU's work.
+///
+/// - conservative: a geometry shader tests each triangle for the octant and emits one point; nothing is lost.
+/// - sampled: the paper's own form, three axis views of `viewport` pixels a side with an early end. It loses octants
+/// that
+///   the surface passes without covering a pixel's centre in any view: for comparison only.
+class OcclusionOracle : public DeviceOracle {
+ public:
+  enum class Form { kConservative, kSampled };
+
+  /// viewport: pixels a side of the sampled form's views. @throws OracleError when a shader does not compile.
+  OcclusionOracle(std::shared_ptr<Thread> thread, Form form, int viewport);
+  ~OcclusionOracle() override;
+
+  OracleKind kind() const override { return form_ == Form::kSampled ? OracleKind::kSampled : OracleKind::kOcclusion; }
+  std::string name() const override { return form_ == Form::kSampled ? "sampled" : "occlusion"; }
+
+ private:
+  void answer(const std::vector<Expansion*>& questions, std::vector<Verdict>& verdicts) override;
+
+  const Form form_;
+  std::unique_ptr<OcclusionQueries> queries_;
+};
+
+}  // namespace bocst::oracle::gl

@@ -1,0 +1,101 @@
+// What the passes of the compute oracle share: the tables they read and write, and how a pair finds its cell.
+//
+// A *pair* is a triangle and a cell to expand whose list it is on. Pairs are numbered through the whole batch, cell by
+// cell; an invocation works on one pair, so lanes stay busy however short the lists are.
+
+#define GROUP 128
+layout(local_size_x = GROUP) in;
+
+const uint kAll = 0xffffffffu;  // as a list: the triangles of the mesh, in order
+
+struct Cell {
+  vec3 center;      // in lattice units
+  float half_side;
+  uint first_pair;
+  uint list;        // where its list begins in `lists`, or kAll
+  uint exists;      // octants that have an actual region
+  uint ids_up_to;   // longer lists are not wanted by the host
+};
+
+// Per cell, in words. Maxima of values that are never negative start at 0, so a cleared table is an empty one.
+const uint kGrey = 0u;     // octants that a triangle surely meets
+const uint kLoose = 1u;    // octants with a part that only its box bounds: no slab
+const uint kCounts = 2u;   // 8: lengths of the octants' lists
+const uint kNext = 10u;    // 8: where the next triangle of each list goes
+const uint kOctants = 18u; // 8 times kOctantWords
+const uint kOctantWords = 15u;
+const uint kBox = 0u;      // 3 times 255 - lo, 3 times hi, in 1/255 of the octant's side
+const uint kTensor = 6u;   // sum of area * normal * normal^T: xx yy zz xy yz zx, as fixed point
+const uint kNormal = 12u;  // the slab's, in bytes
+const uint kSlab = 13u;    // how far the surface reaches along -normal and normal, as fixed point
+const uint kStateWords = kOctants + 8u * kOctantWords;
+
+const uint kSlabTriangles = 4096u;  // longer lists belong to cells whose slabs cull nothing
+
+// The answer: a header, a row per cell, then the ids of lists that the host wants.
+const uint kListWords = 0u;  // header: words taken from the room for lists
+const uint kIdWords = 1u;    // words taken from the room for ids
+const uint kHeader = 2u;
+const uint kRowBounds = 0u;  // 100 bytes: OctantBounds, own CellBounds, grey
+const uint kRowSizes = 25u;
+const uint kRowList = 33u;   // where octant 0's list begins; the others follow
+const uint kRowIds = 34u;    // where the ids begin, likewise
+const uint kRow = 35u;
+
+layout(std430, binding = 0) readonly buffer Vertices { float vertices[]; };  // 3 x high, 3 x low part
+layout(std430, binding = 1) readonly buffer Indices { uint indices[]; };
+layout(std430, binding = 2) buffer Lists { uint lists[]; };
+layout(std430, binding = 3) readonly buffer Cells { Cell cells[]; };
+layout(std430, binding = 4) buffer States { uint states[]; };
+layout(std430, binding = 5) buffer Masks { uint masks[]; };
+layout(std430, binding = 6) buffer Answers { uint answers[]; };
+layout(std430, binding = 7) readonly buffer Exact { double exact[]; };  // vertices in lattice units
+
+uniform uvec2 u_pairs;      // first and end of the pairs of this surface
+uniform uvec2 u_cells;      // first and end of its cells
+uniform uint u_cell_count;  // of the batch
+uniform uvec2 u_list_room;  // first word and number of words
+uniform uint u_id_room;
+
+uint invocation() {
+  return (gl_WorkGroupID.y * gl_NumWorkGroups.x + gl_WorkGroupID.x) * GROUP + gl_LocalInvocationIndex;
+}
+
+uint cellOf(uint pair) {
+  uint lo = u_cells.x, hi = u_cells.y;  // cells[lo].first_pair <= pair < cells[hi].first_pair
+  while (hi - lo > 1u) {
+    uint middle = (lo + hi) / 2u;
+    if (cells[middle].first_pair <= pair) lo = middle; else hi = middle;
+  }
+  return lo;
+}
+
+uint triangleOf(uint cell, uint pair) {
+  uint i = pair - cells[cell].first_pair;
+  return cells[cell].list == kAll ? i : lists[cells[cell].list + i];
+}
+
+uint state(uint cell, uint word) { return cell * kStateWords + word; }
+uint octantState(uint cell, int octant, uint word) {
+  return state(cell, kOctants + uint(octant) * kOctantWords + word);
+}
+
+// Did a list or the ids not find room? Then the host makes room and starts over from the placing of the lists.
+bool isOverflown() { return answers[kListWords] > u_list_room.y || answers[kIdWords] > u_id_room; }
+
+uint sizeOf(uint cell, int octant) { return states[state(cell, kCounts + uint(octant))]; }
+
+// Corners in the cell's own coordinates, centre 0 and half side 1: two roundings at most, as the pads expect.
+void cornersOf(uint cell, uint triangle, out vec3 v[3]) {
+  float inverse = 1.0 / cells[cell].half_side;  // a power of two
+  for (int k = 0; k < 3; ++k) {
+    uint at = 6u * indices[3u * triangle + uint(k)];
+    vec3 high = vec3(vertices[at], vertices[at + 1u], vertices[at + 2u]);
+    vec3 low = vec3(vertices[at + 3u], vertices[at + 4u], vertices[at + 5u]);
+    v[k] = ((high - cells[cell].center) + low) * inverse;
+  }
+}
+
+vec3 octantCenter(int o) { return vec3((o & 1) != 0, (o & 2) != 0, (o & 4) != 0) - 0.5; }
+
+const float kUlp = 1.0 / 16777216.0;  // 2^-24

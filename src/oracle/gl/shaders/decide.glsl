@@ -1,0 +1,69 @@
+// Pass 2: octants that no triangle surely meets, but that some may: the reference test (oracle/reference.h), operation
+// by operation in double, so that grey is the same for all oracles.
+
+const double kBoxPad = 16.0lf * 65536.0lf / 9007199254740992.0lf;  // 16 * 2^16 * 2^-53
+const double kPlanePad = 32.0lf / 9007199254740992.0lf;
+
+bool touches(dvec3 corners[3], dvec3 center, double side) {
+  precise double h = side + kBoxPad;
+  precise dvec3 v[3], e[3];
+  for (int k = 0; k < 3; ++k) v[k] = corners[k] - center;
+  for (int k = 0; k < 3; ++k) {
+    if (min(min(v[0][k], v[1][k]), v[2][k]) > h || max(max(v[0][k], v[1][k]), v[2][k]) < -h) return false;
+  }
+  for (int k = 0; k < 3; ++k) e[k] = corners[(k + 1) % 3] - corners[k];
+
+  precise dvec3 n, size;
+  for (int k = 0; k < 3; ++k) {
+    int i = (k + 1) % 3, j = (k + 2) % 3;
+    precise double a = e[0][i] * e[1][j], b = e[0][j] * e[1][i];
+    n[k] = a - b;
+    size[k] = abs(a) + abs(b);
+  }
+  precise double width = (abs(n[0]) + abs(n[1])) + abs(n[2]);
+  precise double s0 = size[0] * (abs(v[0][0]) + h), s1 = size[1] * (abs(v[0][1]) + h),
+                 s2 = size[2] * (abs(v[0][2]) + h);
+  precise double products = (s0 + s1) + s2;
+  precise double reach_n = h * width, reach_p = kPlanePad * products;
+  precise double reach = reach_n + reach_p;
+  precise double d0 = n[0] * v[0][0], d1 = n[1] * v[0][1], d2 = n[2] * v[0][2];
+  precise double along = (d0 + d1) + d2;
+  if (abs(along) > reach) return false;
+
+  for (int i = 0; i < 3; ++i) {
+    dvec3 a = v[i], b = v[(i + 2) % 3];
+    for (int k = 0; k < 3; ++k) {
+      int p = (k + 1) % 3, q = (k + 2) % 3;
+      double ep = e[i][p], eq = e[i][q];
+      precise double sa = ep * a[q], sb = eq * a[p], ta = ep * b[q], tb = eq * b[p];
+      precise double s = sa - sb, t = ta - tb;
+      precise double sum = abs(ep) + abs(eq);
+      precise double r = h * sum;
+      if (min(s, t) > r || max(s, t) < -r) return false;
+    }
+  }
+  return true;
+}
+
+void main() {
+  uint pair = u_pairs.x + invocation();
+  if (pair >= u_pairs.y) return;
+  uint maybe = masks[pair];
+  if (maybe == 0u) return;
+  uint cell = cellOf(pair);
+  uint open = maybe & ~states[state(cell, kGrey)];
+  if (open == 0u) return;
+  uint triangle = triangleOf(cell, pair);
+  dvec3 corners[3];
+  for (int k = 0; k < 3; ++k) {
+    uint at = 3u * indices[3u * triangle + uint(k)];
+    corners[k] = dvec3(exact[at], exact[at + 1u], exact[at + 2u]);
+  }
+  double side = double(cells[cell].half_side) / 2.0lf;
+  dvec3 center = dvec3(cells[cell].center);
+  for (int o = 0; o < 8; ++o) {
+    if ((open >> o & 1u) == 0u) continue;
+    dvec3 way = dvec3(octantCenter(o)) * (2.0lf * side);
+    if (touches(corners, center + way, side)) atomicOr(states[state(cell, kGrey)], 1u << o);
+  }
+}

@@ -1,0 +1,56 @@
+// Pass 5, one invocation an octant: the normal of its slab, and the ids that the host wants, short lists in order.
+
+const uint kSorted = 32u;
+
+void copyIds(uint cell, int octant) {
+  uint row = kHeader + cell * kRow;
+  uint from = answers[row + kRowList], to = kHeader + u_cell_count * kRow + answers[row + kRowIds];
+  for (int o = 0; o < octant; ++o) {
+    from += sizeOf(cell, o);
+    if (sizeOf(cell, o) <= cells[cell].ids_up_to) to += sizeOf(cell, o);
+  }
+  uint size = sizeOf(cell, octant);
+  if (size > cells[cell].ids_up_to) return;
+  if (size > kSorted) {
+    for (uint i = 0u; i < size; ++i) answers[to + i] = lists[from + i];
+    return;
+  }
+  uint ids[kSorted];
+  for (uint i = 0u; i < size; ++i) {
+    uint id = lists[from + i];
+    int k = int(i);
+    for (; k > 0 && ids[k - 1] > id; --k) ids[k] = ids[k - 1];
+    ids[k] = id;
+  }
+  for (uint i = 0u; i < size; ++i) answers[to + i] = ids[i];
+}
+
+void main() {
+  if (isOverflown()) return;
+  uint index = invocation();
+  uint cell = index / 8u;
+  int o = int(index % 8u);
+  if (cell >= u_cell_count || (states[state(cell, kGrey)] >> o & 1u) == 0u) return;
+  copyIds(cell, o);
+  if ((states[state(cell, kLoose)] >> o & 1u) != 0u || sizeOf(cell, o) > kSlabTriangles) return;
+
+  float t[6];
+  for (uint k = 0u; k < 6u; ++k) t[k] = float(int(states[octantState(cell, o, kTensor + k)]));
+  mat3 m = mat3(t[0], t[3], t[5], t[3], t[1], t[4], t[5], t[4], t[2]);
+  float trace = t[0] + t[1] + t[2];
+  if (!(trace > 0.0)) return;
+  m /= trace;
+  // Powers of a symmetric matrix turn its columns towards the largest eigenvector.
+  for (int i = 0; i < 4; ++i) {
+    m = m * m;
+    m /= max(m[0][0] + m[1][1] + m[2][2], 1e-30);
+  }
+  vec3 n = m[0];
+  if (dot(m[1], m[1]) > dot(n, n)) n = m[1];
+  if (dot(m[2], m[2]) > dot(n, n)) n = m[2];
+  float size = length(n);
+  if (!(size > 0.0)) return;
+  ivec3 bytes = ivec3(round(n / size * 127.0));
+  states[octantState(cell, o, kNormal)] =
+      uint(bytes.x & 0xff) | uint(bytes.y & 0xff) << 8 | uint(bytes.z & 0xff) << 16;
+}

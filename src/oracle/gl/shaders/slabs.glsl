@@ -1,0 +1,36 @@
+// Pass 6: how far the surface in each octant reaches along its slab's normal.
+
+void main() {
+  if (isOverflown()) return;
+  uint pair = u_pairs.x + invocation();
+  if (pair >= u_pairs.y) return;
+  uint mask = masks[pair];
+  if (mask == 0u) return;
+  uint cell = cellOf(pair);
+  mask &= states[state(cell, kGrey)] & ~states[state(cell, kLoose)];
+  if (mask == 0u) return;
+  vec3 v[3];
+  cornersOf(cell, triangleOf(cell, pair), v);
+  float margin = marginOf(v);
+  for (int o = 0; o < 8; ++o) {
+    if ((mask >> o & 1u) == 0u) continue;
+    uint bytes = states[octantState(cell, o, kNormal)];
+    if (bytes == 0u) continue;
+    vec3 n = vec3(bitfieldExtract(int(bytes), 0, 8), bitfieldExtract(int(bytes), 8, 8), bitfieldExtract(int(bytes), 16, 8));
+    Polygon p = clipToOctant(v, o, margin);
+    if (p.count == 0) continue;
+    vec3 center = octantCenter(o);
+    float lo = 1e30, hi = -1e30;
+    for (int i = 0; i < p.count; ++i) {
+      float t = dot(n, p.corners[i] - center);
+      lo = min(lo, t);
+      hi = max(hi, t);
+    }
+    float slack = 3.0 * 127.0 * margin;
+    // |t| <= 127 * sqrt(3) / 2 and a little: 512 keeps it positive, and 2^13 within float's 24 bits.
+    uint below = uint(clamp(ceil((512.0 - lo + slack) * 8192.0) + 1.0, 0.0, 8388608.0));
+    uint above = uint(clamp(ceil((512.0 + hi + slack) * 8192.0) + 1.0, 0.0, 8388608.0));
+    atomicMax(states[octantState(cell, o, kSlab)], below);
+    atomicMax(states[octantState(cell, o, kSlab + 1u)], above);
+  }
+}

@@ -1,0 +1,73 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#pragma once
+
+#include <sys/types.h>
+
+#include <atomic>
+#include <condition_variable>
+#include <deque>
+#include <functional>
+#include <memory>
+#include <mutex>
+#include <string>
+#include <thread>
+
+#include "oracle/gl/context.h"
+
+namespace bocst::oracle::gl {
+
+/// The one thread that owns a context and does all work with it, in the order in which it came.
+///
+/// In a child after fork() there is no such thread: the child's copy counts as lost and touches nothing.
+class Thread {
+ public:
+  /// @throws OracleError as Context does.
+  explicit Thread(const ContextRequest& request);
+  /// Does what is still in the queue first.
+  ~Thread();
+  Thread(const Thread&) = delete;
+  Thread& operator=(const Thread&) = delete;
+
+  const ContextInfo& info() const { return info_; }
+
+  /// Does the job and waits for it; what it throws arrives here. @throws OracleError when the context is lost.
+  void run(const std::function<void()>& job);
+
+  /// Does the job some time, also when the context is lost by then (OpenGL then ignores it). It must not throw. In a
+  /// child after fork(), where nobody would do it, it is dropped.
+  void post(std::function<void()> job);
+
+  /// Is this a child's copy? Locks that the parent's thread may have held must not be asked for.
+  bool isForked() const;
+
+  /// Is there no context to work with any more?
+  bool isLost() const;
+
+  /// Gives the context up, and says so once on stderr.
+  void lose(const std::string& why);
+
+  /// In a job: looks whether the driver has lost the context.
+  void checkReset();
+
+ private:
+  struct Job {
+    std::function<void()> work;
+    bool* done;  // null: nobody waits
+    std::exception_ptr* error;
+  };
+
+  void loop(const ContextRequest& request);
+
+  ContextInfo info_;
+  const pid_t process_;
+  std::atomic<bool> lost_{false};
+  std::mutex mutex_;
+  std::condition_variable work_, done_;
+  std::deque<Job> jobs_;
+  bool stop_ = false, started_ = false;
+  std::exception_ptr failure_;
+  const Context* context_ = nullptr;
+  std::unique_ptr<std::thread> thread_;
+};
+
+}  // namespace bocst::oracle::gl
