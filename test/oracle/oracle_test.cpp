@@ -9,10 +9,10 @@
 #include <cstdlib>
 #include <random>
 
-#include "meshes.h"
 #include "oracle/cpu/kernels.h"
 #include "oracle/cpu/root_grid.h"
-#include "oracle/reference.h"
+#include "oracle/gl/device_oracle.h"
+#include "surfaces.h"
 
 namespace bocst::oracle {
 namespace {
@@ -20,30 +20,11 @@ namespace {
 using lattice::Cell;
 using lattice::Lattice;
 
-Surface surfaceOf(const test::Raw& raw, Subdivision s = Subdivision::kBono, double dimension = 0) {
-  const auto mesh = raw.mesh();
-  return {mesh, Lattice(mesh->bounds(), s, dimension)};
-}
-
 // Where the oracle works.
 Surface heldBy(Oracle& oracle, Surface surface) {
   surface.device = oracle.hold(surface);
   EXPECT_EQ(surface.device != nullptr, oracle.kind() != OracleKind::kCpu);
   return surface;
-}
-
-Eigen::Vector3d centerOf(const Cell& cell) {
-  const auto c = cell.corner();
-  return Eigen::Vector3d(c[0], c[1], c[2]).array() + cell.side() / 2.0;
-}
-
-bool referenceGrey(const Surface& surface, const Cell& cell) {
-  if (!surface.lattice.exists(cell)) return false;
-  for (std::uint32_t t = 0; t < surface.mesh->triangleCount(); ++t) {
-    const Eigen::Vector3d corners[3] = {surface.corner(t, 0), surface.corner(t, 1), surface.corner(t, 2)};
-    if (touches(corners, centerOf(cell), cell.side() / 2.0)) return true;
-  }
-  return false;
 }
 
 // Is p, in lattice units, inside the bounds of the octant?
@@ -60,30 +41,23 @@ bool holds(const CellBounds& b, const Cell& cell, const Eigen::Vector3d& p) {
   return std::abs(along - b.slab_center) <= b.slab_half / 2.0 + 127e-6;
 }
 
-struct Case {
-  std::string name;
-  std::function<test::Raw()> make;
-};
-
 class EveryOracle : public testing::TestWithParam<OracleKind> {
  protected:
   std::shared_ptr<Oracle> oracle_ = makeOracle(GetParam());
+  // No test body is passed by the CPU in place of a device.
+  void TearDown() override {
+    const auto* device = dynamic_cast<gl::DeviceOracle*>(oracle_.get());
+    if (device == nullptr) return;
+    EXPECT_EQ(device->leftToCpu(), 0u);
+  }
 };
-
-std::vector<Expansion> ask(Oracle& oracle, std::vector<Expansion> batch) {
-  oracle.submit(batch);
-  oracle.wait(batch);
-  return batch;
-}
 
 // Expands all grey cells level by level and checks each answer.
 void checkMesh(Oracle& oracle, const Surface& here, int levels, std::size_t most_cells) {
   const Surface surface = heldBy(oracle, here);
   std::mt19937_64 g(1);
   std::uniform_real_distribution<double> u(0, 1);
-  Expansion root;
-  root.surface = &surface;
-  root.count = surface.mesh->triangleCount();
+  Expansion root = rootOf(surface);
   std::vector<Expansion> level{root};
   for (int l = 1; l <= levels; ++l) {
     if (level.size() > most_cells) {
@@ -298,9 +272,7 @@ INSTANTIATE_TEST_SUITE_P(All, EveryOracle,
 
 TEST(Kernels, EveryInstructionSetAgreesOnGreySets) {
   const Surface surface = surfaceOf(test::soup(500, 3));
-  Expansion root;
-  root.surface = &surface;
-  root.count = surface.mesh->triangleCount();
+  Expansion root = rootOf(surface);
   std::vector<std::uint8_t> greys;
   int targets = 0;
   const std::int64_t all = hwy::SupportedTargets();

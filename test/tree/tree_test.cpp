@@ -55,13 +55,13 @@ TEST(Tree, GrowsOnlyWhatAQueryNeedsAndSettles) {
   Modeld whole(a.mesh());
   whole.expandAll(static_cast<int>(first.nodes_per_level.size()));
   EXPECT_LT(first.resident_nodes, whole.statistics().resident_nodes / 2);
-  // A hit that passes pairs by grows one of them for the next query, until there are none.
+  // A hit that passes pairs by grows two of them for the next query, until there are none.
   Statistics before = first;
   int repeats = 0;
   for (int unchanged = 0; unchanged < 3 && repeats < 100; ++repeats) {
     EXPECT_TRUE(touching(a, b, kHit));
     const Statistics now = a.statistics();
-    EXPECT_LE(now.expansions, before.expansions + 1);
+    EXPECT_LE(now.expansions, before.expansions + 2);
     unchanged = now.expansions == before.expansions ? unchanged + 1 : 0;
     before = now;
   }
@@ -116,7 +116,8 @@ TEST(Tree, WhatIsUsedStays) {
     clock.now += milliseconds(1500);
     EXPECT_TRUE(touching(a, b, kHit));
   }
-  EXPECT_EQ(a.statistics().resident_nodes, used.resident_nodes);
+  EXPECT_GT(a.statistics().resident_nodes, 1u);
+  EXPECT_LE(a.statistics().resident_nodes, used.resident_nodes);
   EXPECT_EQ(a.statistics().expansions, used.expansions);
   // Queries prune by themselves: a contact elsewhere lets the old branch go.
   for (int i = 0; i < 60; ++i) {
@@ -132,7 +133,7 @@ TEST(Tree, TtlZeroKeepsEverything) {
   options.clock = clock.function();
   options.ttl = milliseconds(0);
   Modeld a(test::torus(50).mesh(), options), b(test::torus(50).mesh(), options);
-  EXPECT_TRUE(touching(a, b, kHit));
+  for (int i = 0; i < 30; ++i) EXPECT_TRUE(touching(a, b, kHit));
   const std::size_t grown = a.statistics().resident_nodes;
   clock.now += std::chrono::hours(100000);
   a.prune();
@@ -358,9 +359,7 @@ TEST(Tree, BadOptionsAreNamed) {
   EXPECT_NE(message([](Options& o) { o.margin = 0.1; }).find("margin"), std::string::npos);
   EXPECT_NE(message([](Options& o) { o.solid = true; }).find("solid"), std::string::npos);
   EXPECT_THROW(Modeld(nullptr), std::invalid_argument);
-  Options gpu;
-  gpu.oracle = OracleKind::kCompute;
-  EXPECT_THROW(Modeld(mesh, gpu), OracleError);
+  EXPECT_NE(message([](Options& o) { o.viewport = 0; }).find("viewport"), std::string::npos);
   Modeld model(mesh);
   EXPECT_THROW(model.expandAll(0), std::invalid_argument);
   EXPECT_THROW(model.expandAll(18), std::invalid_argument);

@@ -5,6 +5,7 @@
 #include <dlfcn.h>
 #include <epoxy/egl.h>
 #include <epoxy/gl.h>
+#include <unistd.h>
 
 #include <algorithm>
 
@@ -44,6 +45,9 @@ struct Device {
 
 /// @throws OracleError
 std::vector<Device> devices(const Libraries& libraries) {
+  // Drivers keep threads of their own, which a child does not have: it would wait for them for ever.
+  static const pid_t first = getpid();
+  if (getpid() != first) throw OracleError("OpenGL was in use before fork(), so the child cannot use it");
   const std::string missing = libraries.whyNot();
   if (!missing.empty()) throw OracleError(missing);
   const char* client = eglQueryString(EGL_NO_DISPLAY, EGL_EXTENSIONS);

@@ -167,6 +167,12 @@ OcclusionOracle::~OcclusionOracle() {
   thread_->post([queries = queries_.release()] { delete queries; });
 }
 
+std::vector<std::uint8_t> OcclusionOracle::candidates(const std::vector<Expansion*>& questions) {
+  std::vector<std::uint8_t> candidates(questions.size(), 0);
+  thread_->run([&] { queries_->ask(questions, candidates, *thread_); });
+  return candidates;
+}
+
 void OcclusionOracle::answer(const std::vector<Expansion*>& questions, std::vector<Verdict>& verdicts) {
   constexpr std::size_t most = kMostIndices / 3;
   std::vector<std::size_t> order;

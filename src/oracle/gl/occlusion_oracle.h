@@ -30,6 +30,10 @@ class OcclusionOracle : public DeviceOracle {
   ~OcclusionOracle() override;
 
   OracleKind kind() const override { return form_ == Form::kSampled ? OracleKind::kSampled : OracleKind::kOcclusion; }
+
+  /// Which octants the device sees, before the CPU has its say; surfaces must be held. @throws OracleError
+  std::vector<std::uint8_t> candidates(const std::vector<Expansion*>& questions);
+
   std::string name() const override { return form_ == Form::kSampled ? "sampled" : "occlusion"; }
 
  private:

@@ -1,0 +1,491 @@
+// SPDX-License-Identifier: BSD-3-Clause
+// What the oracles on a device add: lists that stay there, limits, losses, threads, and what occlusion queries see.
+#include <gtest/gtest.h>
+#include <sys/wait.h>
+#include <unistd.h>
+
+#include <fstream>
+#include <random>
+#include <set>
+#include <thread>
+
+#include "oracle/cpu/cpu_oracle.h"
+#include "oracle/gl/compute_oracle.h"
+#include "oracle/gl/context.h"
+#include "oracle/gl/devices.h"
+#include "oracle/gl/occlusion_oracle.h"
+#include "surfaces.h"
+
+namespace bocst::oracle::gl {
+namespace {
+
+using lattice::Cell;
+
+std::shared_ptr<Thread> newThread() { return std::make_shared<Thread>(ContextRequest()); }
+
+Surface heldBy(Oracle& oracle, Surface surface) {
+  surface.device = oracle.hold(surface);
+  EXPECT_NE(surface.device, nullptr);
+  return surface;
+}
+
+// All cells of a level that are grey, grown by the oracle itself from lists that it keeps.
+std::vector<Expansion> grownFromKeptLists(Oracle& oracle, const Surface& surface, int levels) {
+  std::vector<Expansion> level{rootOf(surface)};
+  level[0].ids_up_to = 0;
+  for (int l = 1; l < levels; ++l) {
+    const std::vector<Expansion> answers = ask(oracle, level);
+    level.clear();
+    for (const Expansion& e : answers) {
+      for (int o = 0; o < 8; ++o) {
+        if ((e.grey >> o & 1) == 0) continue;
+        Expansion child;
+        child.surface = &surface;
+        child.cell = e.cell.octant(o);
+        child.shelf = e.kept;
+        child.shelf_begin = e.kept_lists[static_cast<std::size_t>(o)].begin;
+        child.count = e.kept_lists[static_cast<std::size_t>(o)].count;
+        child.ids_up_to = 0;
+        EXPECT_GT(child.count, 0u);
+        level.push_back(child);
+      }
+    }
+  }
+  return level;
+}
+
+std::set<std::uint64_t> greyCells(const std::vector<Expansion>& level) {
+  std::set<std::uint64_t> cells;
+  for (const Expansion& e : level) cells.insert(e.cell.morton());
+  return cells;
+}
+
+std::set<std::uint64_t> greyCellsByReference(const Surface& surface, int level) {
+  std::vector<Cell> cells{Cell{}}, next;
+  for (int l = 1; l < level; ++l) {
+    next.clear();
+    for (const Cell& cell : cells) {
+      for (int o = 0; o < 8; ++o) {
+        if (referenceGrey(surface, cell.octant(o))) next.push_back(cell.octant(o));
+      }
+    }
+    cells.swap(next);
+  }
+  std::set<std::uint64_t> names;
+  for (const Cell& cell : cells) names.insert(cell.morton());
+  return names;
+}
+
+TEST(Compute, GrowsFromListsThatItKeeps) {
+  ComputeOracle oracle(newThread());
+  const Surface surface = heldBy(oracle, surfaceOf(test::torus(16)));
+  EXPECT_EQ(greyCells(grownFromKeptLists(oracle, surface, 5)), greyCellsByReference(surface, 5));
+  EXPECT_EQ(oracle.leftToCpu(), 0u);
+}
+
+TEST(Compute, FetchesWhatItKeeps) {
+  ComputeOracle oracle(newThread());
+  const Surface surface = heldBy(oracle, surfaceOf(test::torus(16)));
+  Expansion kept = rootOf(surface), here = kept;
+  kept.ids_up_to = 0;
+  kept = ask(oracle, {kept})[0];
+  here = ask(oracle, {here})[0];
+  for (std::size_t o = 0; o < 8; ++o) {
+    std::vector<std::uint32_t> ids(kept.kept_lists[o].count);
+    ASSERT_TRUE(oracle.fetch(*kept.kept, kept.kept_lists[o], ids.data()));
+    std::vector<std::uint32_t> expected(here.lists.begin() + static_cast<std::ptrdiff_t>(here.list_begin[o]),
+                                        here.lists.begin() + static_cast<std::ptrdiff_t>(here.list_begin[o + 1]));
+    std::sort(ids.begin(), ids.end());
+    std::sort(expected.begin(), expected.end());
+    EXPECT_EQ(ids, expected);
+  }
+}
+
+TEST(Compute, ListsGoWhenNobodyHoldsThem) {
+  ComputeOracle oracle(newThread());
+  const Surface surface = heldBy(oracle, surfaceOf(test::torus(32)));
+  std::uint32_t end = 0;
+  for (int i = 0; i < 50; ++i) {
+    Expansion root = rootOf(surface);
+    root.ids_up_to = 0;
+    root = ask(oracle, {root})[0];
+    const std::uint32_t begin = root.kept_lists[0].begin;
+    if (i == 0) end = begin;
+    EXPECT_EQ(begin, end) << "round " << i << ": the room of the last round was free again";
+  }
+}
+
+TEST(Compute, SplitsWhatExceedsALimit) {
+  const auto thread = newThread();
+  ComputeOracle whole(thread);
+  ComputeChain::Limits limits;
+  limits.pairs = 400;
+  limits.cells = 7;
+  ComputeOracle split(thread, limits);
+  const Surface surface = heldBy(whole, surfaceOf(test::torus(16)));
+  const Surface same = heldBy(split, surface);
+  std::vector<std::uint32_t> some(300);
+  for (std::uint32_t i = 0; i < some.size(); ++i) some[i] = i;
+  std::vector<Expansion> batch;
+  for (int i = 0; i < 64; ++i) {
+    Expansion e;
+    e.cell = Cell{}.octant(i % 8).octant(i / 8);
+    e.ids = some.data();
+    e.count = some.size();
+    batch.push_back(e);
+  }
+  const auto askAbout = [&](Oracle& oracle, const Surface& s) {
+    for (Expansion& e : batch) e.surface = &s;
+    return ask(oracle, batch);
+  };
+  const std::vector<Expansion> a = askAbout(whole, surface), b = askAbout(split, same);
+  for (std::size_t i = 0; i < batch.size(); ++i) {
+    EXPECT_EQ(a[i].grey, b[i].grey);
+    EXPECT_EQ(a[i].list_begin, b[i].list_begin);
+  }
+  EXPECT_EQ(split.leftToCpu(), 0u);
+  // What does not fit even alone is the CPU's.
+  const Expansion root = ask(split, {rootOf(same)})[0], expected = ask(whole, {rootOf(surface)})[0];
+  EXPECT_EQ(split.leftToCpu(), 1u);
+  EXPECT_EQ(root.grey, expected.grey);
+}
+
+TEST(Compute, NoRoomForListsIsTheCpus) {
+  ComputeChain::Limits limits;
+  limits.bytes = 300000;
+  ComputeOracle oracle(newThread(), limits);
+  const Surface surface = heldBy(oracle, surfaceOf(test::torus(40)));
+  Expansion expected = rootOf(surface);
+  expand(expected);
+  std::vector<Expansion> batch(100, rootOf(surface));  // 320000 pairs
+  const std::vector<Expansion> answers = ask(oracle, batch);
+  EXPECT_EQ(oracle.leftToCpu(), 100u);
+  for (const Expansion& e : answers) EXPECT_EQ(e.grey, expected.grey);
+}
+
+TEST(Compute, RunsAgainWhenTheRoomWasTooSmall) {
+  // Triangles that meet every octant: lists of eight times the parent's length, where two are expected.
+  test::Raw raw = test::soup(500, 1);
+  for (auto& t : raw.triangles) {
+    raw.vertices[t[0]].setZero();
+    raw.vertices[t[1]].setOnes();
+  }
+  ComputeOracle oracle(newThread());
+  const Surface surface = heldBy(oracle, surfaceOf(raw));
+  Expansion expected = rootOf(surface);
+  expand(expected);
+  for (const std::size_t up_to : {std::size_t{0}, std::size_t{32}, Expansion::kAll}) {
+    Expansion root = rootOf(surface);
+    root.ids_up_to = up_to;
+    root = ask(oracle, {root})[0];
+    EXPECT_EQ(root.grey, expected.grey);
+    std::size_t all = 0;
+    for (int o = 0; o < 8; ++o) {
+      EXPECT_EQ(root.listSize(o), expected.listSize(o));
+      all += root.listSize(o);
+    }
+    EXPECT_GT(all, 2 * root.count + 8);
+  }
+  EXPECT_EQ(oracle.leftToCpu(), 0u);
+}
+
+TEST(Compute, AHundredThousandCellsInABatch) {
+  ComputeOracle oracle(newThread());
+  const Surface a = heldBy(oracle, surfaceOf(test::torus(24))), b = heldBy(oracle, surfaceOf(test::soup(2000, 3)));
+  std::mt19937_64 g(5);
+  std::vector<std::uint32_t> ids(100000);
+  std::vector<Expansion> batch(100000);
+  for (std::size_t i = 0; i < batch.size(); ++i) {
+    Expansion& e = batch[i];
+    e.surface = i % 2 ? &a : &b;
+    e.ids = &ids[i];
+    e.count = 1;
+    ids[i] = static_cast<std::uint32_t>(g() % e.surface->triangle_count);
+    // A cell about a corner of the triangle.
+    const Eigen::Vector3d p = e.surface->corner(ids[i], 0);
+    e.cell.level = 2 + static_cast<int>(g() % 8);
+    for (int k = 0; k < 3; ++k) {
+      e.cell.at[static_cast<std::size_t>(k)] =
+          std::min(static_cast<std::uint32_t>(p[k] / e.cell.side()), (1u << (e.cell.level - 1)) - 1);
+    }
+  }
+  const std::vector<Expansion> answers = ask(oracle, batch);
+  std::size_t grey = 0;
+  for (std::size_t i = 0; i < batch.size(); ++i) {
+    for (int o = 0; o < 8; ++o) {
+      const Cell octant = batch[i].cell.octant(o);
+      const bool expected = batch[i].surface->lattice.exists(octant) && meets(*batch[i].surface, ids[i], octant);
+      ASSERT_EQ(answers[i].grey >> o & 1, expected) << "cell " << i << " octant " << o;
+      grey += expected;
+    }
+  }
+  EXPECT_GT(grey, 100000u);
+  EXPECT_EQ(oracle.leftToCpu(), 0u);
+}
+
+TEST(Compute, ThreadsThatWaitTogether) {
+  ComputeOracle oracle(newThread());
+  const Surface surface = heldBy(oracle, surfaceOf(test::torus(16)));
+  std::vector<std::uint8_t> expected;
+  for (int o = 0; o < 8; ++o) {
+    Expansion e = rootOf(surface);
+    e.cell = Cell{}.octant(o);
+    expand(e);
+    expected.push_back(e.grey);
+  }
+  std::vector<std::thread> threads;
+  std::atomic<int> wrong{0};
+  for (int t = 0; t < 8; ++t) {
+    threads.emplace_back([&, t] {
+      for (int i = 0; i < 20; ++i) {
+        const std::size_t size = 1 + static_cast<std::size_t>(t + i) % 5;
+        std::vector<Expansion> batch(size, rootOf(surface));
+        for (std::size_t k = 0; k < size; ++k) batch[k].cell = Cell{}.octant(static_cast<int>(t + i + k) % 8);
+        batch = ask(oracle, batch);
+        for (std::size_t k = 0; k < size; ++k) {
+          wrong += batch[k].grey != expected[(static_cast<std::size_t>(t + i) + k) % 8];
+        }
+      }
+    });
+  }
+  for (std::thread& t : threads) t.join();
+  EXPECT_EQ(wrong, 0);
+  EXPECT_EQ(oracle.leftToCpu(), 0u);
+}
+
+TEST(Device, MeshesAreShared) {
+  ComputeOracle oracle(newThread());
+  const Surface a = surfaceOf(test::torus(16));
+  const auto first = oracle.hold(a), second = oracle.hold(a);
+  EXPECT_EQ(first, second);
+  // 12 bytes a triangle; 24 a vertex for the parts and 24 for the doubles.
+  EXPECT_EQ(first->bytes(), 12 * a.mesh->triangleCount() + 48 * a.mesh->vertexCount());
+  const Surface other{a.mesh, lattice::Lattice(a.bounds, Subdivision::kBono, 514)};
+  EXPECT_NE(oracle.hold(other), first);
+}
+
+TEST(Device, ALostContextLeavesEverythingToTheCpu) {
+  for (const bool occlusion : {false, true}) {
+    const auto thread = newThread();
+    std::unique_ptr<Oracle> oracle;
+    if (occlusion) {
+      oracle = std::make_unique<OcclusionOracle>(thread, OcclusionOracle::Form::kConservative, 16);
+    } else {
+      oracle = std::make_unique<ComputeOracle>(thread);
+    }
+    const Surface surface = heldBy(*oracle, surfaceOf(test::torus(16)));
+    Expansion root = rootOf(surface);
+    root.ids_up_to = 0;
+    root = ask(*oracle, {root})[0];
+    std::vector<Expansion> children;
+    for (int o = 0; o < 8; ++o) {
+      Expansion child;
+      child.surface = &surface;
+      child.cell = root.cell.octant(o);
+      child.count = root.listSize(o);
+      if (root.kept != nullptr) {
+        child.shelf = root.kept;
+        child.shelf_begin = root.kept_lists[static_cast<std::size_t>(o)].begin;
+      } else {
+        child.ids = root.lists.data() + root.list_begin[static_cast<std::size_t>(o)];
+      }
+      children.push_back(child);
+    }
+    testing::internal::CaptureStderr();
+    thread->lose("a test says so");
+    thread->lose("again");
+    EXPECT_TRUE(thread->isLost());
+    const std::string notice = testing::internal::GetCapturedStderr();
+    EXPECT_NE(notice.find("a test says so"), std::string::npos);
+    EXPECT_EQ(notice.find("again"), std::string::npos) << "one notice is enough";
+    const std::vector<Expansion> answers = ask(*oracle, children);
+    for (const Expansion& e : answers) {
+      for (int o = 0; o < 8; ++o) EXPECT_EQ(e.grey >> o & 1, referenceGrey(surface, e.cell.octant(o)));
+    }
+    EXPECT_EQ(oracle->hold(surfaceOf(test::torus(8))), nullptr);
+    // Without a mesh on the host there is nobody to ask.
+    Surface released = surface;
+    released.mesh = nullptr;
+    for (Expansion& e : children) e.surface = &released;
+    EXPECT_THROW(ask(*oracle, children), OracleError);
+  }
+}
+
+TEST(Device, AChildAfterForkAnswersOnTheCpu) {
+  ComputeOracle oracle(newThread());
+  const Surface surface = heldBy(oracle, surfaceOf(test::torus(16)));
+  const std::uint8_t expected = ask(oracle, {rootOf(surface)})[0].grey;
+  const pid_t child = fork();
+  if (child == 0) {
+    // _exit: the child runs none of the parent's destructors or tests.
+    alarm(60);
+    if (!oracle.thread().isForked()) _exit(2);
+    if (ask(oracle, {rootOf(surface)})[0].grey != expected) _exit(3);
+    try {
+      makeOracle(OracleKind::kCompute, ContextRequest::kAnyDevice, 16);
+      _exit(4);
+    } catch (const OracleError&) {
+    }
+    _exit(oracle::makeOracle(OracleKind::kAuto)->kind() == OracleKind::kCpu ? 0 : 5);
+  }
+  int status = 0;
+  ASSERT_EQ(waitpid(child, &status, 0), child);
+  EXPECT_TRUE(WIFEXITED(status) && WEXITSTATUS(status) == 0) << "status " << status;
+  EXPECT_EQ(ask(oracle, {rootOf(surface)})[0].grey, expected) << "the parent goes on";
+}
+
+std::size_t residentBytes() {
+  std::ifstream statm("/proc/self/statm");
+  std::size_t size = 0, resident = 0;
+  statm >> size >> resident;
+  return resident * static_cast<std::size_t>(sysconf(_SC_PAGESIZE));
+}
+
+TEST(Device, RoundsLeakNothing) {
+  const auto round = [] {
+    const auto thread = newThread();
+    ComputeOracle compute(thread);
+    OcclusionOracle occlusion(thread, OcclusionOracle::Form::kConservative, 16);
+    const Surface surface = heldBy(compute, surfaceOf(test::torus(64)));
+    Expansion root = rootOf(surface);
+    root.ids_up_to = 0;
+    root = ask(compute, {root})[0];
+    EXPECT_NE(root.grey, 0);
+    return root.kept;  // outlives its oracle
+  };
+  std::shared_ptr<const Held> last;
+  for (int i = 0; i < 20; ++i) last = round();
+  const std::size_t before = residentBytes();
+  for (int i = 0; i < 100; ++i) last = round();
+  // The mesh alone takes 300 kB a round.
+  EXPECT_LT(residentBytes(), before + (std::size_t{8} << 20));
+}
+
+TEST(Device, MissingLibrariesAreNamed) {
+  Libraries libraries;
+  EXPECT_EQ(libraries.whyNot(), "");
+  libraries.egl = {"libEGL-not-there.so.1"};
+  EXPECT_NE(libraries.whyNot().find("libEGL-not-there.so.1"), std::string::npos);
+  ContextRequest request;
+  request.libraries = libraries;
+  EXPECT_THROW(Thread thread(request), OracleError);
+  libraries = Libraries();
+  libraries.gl = {"libOpenGL-not-there.so.0", "libGL-not-there.so.1"};
+  request.libraries = libraries;
+  EXPECT_THROW(Thread thread(request), OracleError);
+}
+
+TEST(Device, WhatIsNotThereIsSaid) {
+  ContextRequest request;
+  request.device = 99;
+  EXPECT_THROW(Thread thread(request), OracleError);
+  request = ContextRequest();
+  request.major = 9;
+  try {
+    Thread thread(request);
+    ADD_FAILURE();
+  } catch (const OracleError& e) {
+    EXPECT_NE(std::string(e.what()).find("OpenGL 9.3"), std::string::npos) << e.what();
+  }
+}
+
+TEST(Device, AShaderThatDoesNotCompileIsAnError) {
+  const auto thread = newThread();
+  for (const char* source : {"#version 430 core\nlayout(local_size_x = 1) in;\nvoid main() { nonsense; }\n",
+                             "#version 430 core\nlayout(local_size_x = 1) in;\nvoid other() {}\n"}) {
+    try {
+      thread->run([&] { Program program({{GL_COMPUTE_SHADER, source}}); });
+      ADD_FAILURE() << source;
+    } catch (const OracleError& e) {
+      EXPECT_NE(std::string(e.what()).find("the driver refuses"), std::string::npos) << e.what();
+    }
+  }
+  thread->run([] { EXPECT_EQ(glGetError(), static_cast<GLenum>(GL_NO_ERROR)); });
+}
+
+struct Seen {
+  std::size_t grey = 0, missed = 0, added = 0, unexplained = 0;
+};
+
+// What the device sees on its own, against the reference, for the children of the grey cells of some levels.
+Seen lookAt(OcclusionOracle& oracle, const Surface& surface, int levels) {
+  Seen seen;
+  std::vector<std::vector<std::uint32_t>> lists;
+  std::vector<Expansion> level{rootOf(surface)};
+  for (int l = 1; l <= levels; ++l) {
+    std::vector<Expansion*> questions;
+    for (Expansion& e : level) questions.push_back(&e);
+    const std::vector<std::uint8_t> candidates = oracle.candidates(questions);
+    std::vector<Expansion> next;
+    std::vector<std::vector<std::uint32_t>> next_lists;
+    for (std::size_t i = 0; i < level.size(); ++i) {
+      Expansion e = level[i];
+      expand(e);
+      for (int o = 0; o < 8; ++o) {
+        const bool grey = e.grey >> o & 1, candidate = candidates[i] >> o & 1;
+        const Cell octant = e.cell.octant(o);
+        seen.grey += grey;
+        seen.missed += grey && !candidate;
+        if (candidate && !grey) {
+          ++seen.added;
+          // The pads let a triangle pass that is as near as 64 roundings of its own size.
+          bool explained = false;
+          for (std::size_t k = 0; k < e.count && !explained; ++k) {
+            const std::uint32_t t = e.ids == nullptr ? static_cast<std::uint32_t>(k) : e.ids[k];
+            double size = octant.side();
+            for (int c = 0; c < 3; ++c) {
+              size = std::max(size, (surface.corner(t, c) - centerOf(octant)).lpNorm<Eigen::Infinity>());
+            }
+            explained = meets(surface, t, octant, 64 * 0x1p-24 * size);
+          }
+          seen.unexplained += !explained;
+        }
+        if (!grey) continue;
+        next_lists.emplace_back(
+            e.lists.begin() + static_cast<std::ptrdiff_t>(e.list_begin[static_cast<std::size_t>(o)]),
+            e.lists.begin() + static_cast<std::ptrdiff_t>(e.list_begin[static_cast<std::size_t>(o) + 1]));
+        Expansion child;
+        child.surface = &surface;
+        child.cell = octant;
+        next.push_back(child);
+      }
+    }
+    lists.swap(next_lists);
+    level.swap(next);
+    for (std::size_t i = 0; i < level.size(); ++i) {
+      level[i].ids = lists[i].data();
+      level[i].count = lists[i].size();
+    }
+  }
+  return seen;
+}
+
+TEST(Occlusion, ConservativeQueriesLoseNothingAndAddOnlyTheirPad) {
+  OcclusionOracle oracle(newThread(), OcclusionOracle::Form::kConservative, 16);
+  for (const test::Raw& raw : {test::torus(24), test::adversarial(), test::soup(300, 2)}) {
+    const Surface surface = heldBy(oracle, surfaceOf(raw));
+    const Seen seen = lookAt(oracle, surface, 5);
+    EXPECT_GT(seen.grey, 500u);
+    EXPECT_EQ(seen.missed, 0u);
+    EXPECT_EQ(seen.unexplained, 0u) << "of " << seen.added;
+  }
+}
+
+TEST(Occlusion, SampledQueriesLoseSurface) {
+  // The paper's own form; more pixels lose less, and none is enough.
+  const auto thread = newThread();
+  std::vector<std::size_t> missed;
+  for (const int viewport : {8, 64}) {
+    OcclusionOracle oracle(thread, OcclusionOracle::Form::kSampled, viewport);
+    const Surface thin = heldBy(oracle, surfaceOf(test::adversarial()));
+    const Surface torus = heldBy(oracle, surfaceOf(test::torus(24)));
+    const Seen on_thin = lookAt(oracle, thin, 5), on_torus = lookAt(oracle, torus, 5);
+    EXPECT_GT(on_thin.missed, on_thin.grey / 20);
+    missed.push_back(on_torus.missed);
+    EXPECT_LT(on_torus.missed, on_torus.grey / 5);
+  }
+  EXPECT_GT(missed[0], missed[1]);
+}
+
+}  // namespace
+}  // namespace bocst::oracle::gl

@@ -1,0 +1,50 @@
+// SPDX-License-Identifier: BSD-3-Clause
+// What the tests of the oracles share.
+#pragma once
+
+#include <vector>
+
+#include "meshes.h"
+#include "oracle/oracle.h"
+#include "oracle/reference.h"
+
+namespace bocst::oracle {
+
+inline Surface surfaceOf(const test::Raw& raw, Subdivision s = Subdivision::kBono, double dimension = 0) {
+  const auto mesh = raw.mesh();
+  return {mesh, lattice::Lattice(mesh->bounds(), s, dimension)};
+}
+
+inline Eigen::Vector3d centerOf(const lattice::Cell& cell) {
+  const auto c = cell.corner();
+  return Eigen::Vector3d(c[0], c[1], c[2]).array() + cell.side() / 2.0;
+}
+
+inline bool meets(const Surface& surface, std::uint32_t t, const lattice::Cell& cell, double more = 0) {
+  const Eigen::Vector3d corners[3] = {surface.corner(t, 0), surface.corner(t, 1), surface.corner(t, 2)};
+  return touches(corners, centerOf(cell), cell.side() / 2.0 + more);
+}
+
+inline bool referenceGrey(const Surface& surface, const lattice::Cell& cell) {
+  if (!surface.lattice.exists(cell)) return false;
+  for (std::uint32_t t = 0; t < surface.mesh->triangleCount(); ++t) {
+    if (meets(surface, t, cell)) return true;
+  }
+  return false;
+}
+
+/// The question about all of a mesh.
+inline Expansion rootOf(const Surface& surface) {
+  Expansion root;
+  root.surface = &surface;
+  root.count = surface.triangle_count;
+  return root;
+}
+
+inline std::vector<Expansion> ask(Oracle& oracle, std::vector<Expansion> batch) {
+  oracle.submit(batch);
+  oracle.wait(batch);
+  return batch;
+}
+
+}  // namespace bocst::oracle
