@@ -81,7 +81,7 @@ void betweenTrees(const fcl::Transform3<S>& X_WA, tree::Tree& tree_a, const fcl:
     const query::TreeSide a(tree_a), b(tree_b);
     now = a.now();
     const oracle::Surface &sa = tree_a.surface(), &sb = tree_b.surface();
-    const double magnitude = magnitudeOf(X_WA, X_WB, magnitudeOf(sa.mesh->bounds()), magnitudeOf(sb.mesh->bounds()));
+    const double magnitude = magnitudeOf(X_WA, X_WB, magnitudeOf(sa.bounds), magnitudeOf(sb.bounds));
     f(a, b,
       placementOf(X_WA, X_WB, sa.lattice.origin(), sa.lattice.unit(), sb.lattice.origin(), sb.lattice.unit(),
                   magnitude),
@@ -102,7 +102,7 @@ void betweenTreeAndBvh(const fcl::Transform3<typename BV::S>& X_WA, tree::Tree& 
     const BvhSide<BV> b(bvh);
     now = a.now();
     const oracle::Surface& s = tree.surface();
-    const double magnitude = magnitudeOf(X_WA, X_WB, magnitudeOf(s.mesh->bounds()), b.magnitude());
+    const double magnitude = magnitudeOf(X_WA, X_WB, magnitudeOf(s.bounds), b.magnitude());
     const Eigen::Vector3d origin = Eigen::Vector3d::Zero();
     f(a, b, placementOf(X_WA, X_WB, s.lattice.origin(), s.lattice.unit(), origin, 1.0, magnitude), magnitude);
   }

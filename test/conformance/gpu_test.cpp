@@ -1,0 +1,232 @@
+// SPDX-License-Identifier: BSD-3-Clause
+// Models whose oracle is on a device: the same verdicts as with the CPU's, also when the mesh or the device goes.
+#include <gtest/gtest.h>
+#include <sys/wait.h>
+#include <unistd.h>
+
+#include "conformance/reference.h"
+#include "oracle/gl/device_oracle.h"
+#include "tree/tree.h"
+
+namespace bocst {
+namespace {
+
+using test::Raw;
+
+Options with(OracleKind oracle, Answer answer = Answer::kExact, int depth = 6) {
+  Options o;
+  o.oracle = oracle;
+  o.answer = answer;
+  o.depth = depth;
+  return o;
+}
+
+oracle::gl::DeviceOracle& deviceOf(const Modeld& model) {
+  return dynamic_cast<oracle::gl::DeviceOracle&>(const_cast<oracle::Oracle&>(model.tree().oracle()));
+}
+
+const fcl::Transform3d kIdentity = fcl::Transform3d::Identity();
+
+std::vector<fcl::Transform3d> poses(int count, double far) {
+  std::mt19937_64 g(4);
+  std::uniform_real_distribution<double> u(0, 1);
+  std::vector<fcl::Transform3d> all;
+  for (int i = 0; i < count; ++i) {
+    all.push_back(test::pose<double>(test::randomRotation(g), test::randomDirection(g) * far * u(g)));
+  }
+  return all;
+}
+
+class OnDevice : public testing::TestWithParam<OracleKind> {};
+
+TEST_P(OnDevice, ExactAnswersAreThoseOfTheCpu) {
+  const Raw ra = test::torus(50), rb = test::torus(23, 0.3);
+  const Modeld a(ra.mesh(), with(GetParam())), b(rb.mesh(), with(GetParam()));
+  const Modeld c(ra.mesh(), with(OracleKind::kCpu)), d(rb.mesh(), with(OracleKind::kCpu));
+  int hits = 0;
+  for (const auto& X : poses(80, 2.2)) {
+    const test::Pairs expected = test::pairs<double>(c, kIdentity, d, X);
+    hits += !expected.empty();
+    ASSERT_EQ(test::touching<double>(a, kIdentity, b, X), !expected.empty());
+    ASSERT_EQ(test::pairs<double>(a, kIdentity, b, X), expected);
+    // Models of different oracles in one pair.
+    ASSERT_EQ(test::pairs<double>(a, kIdentity, d, X), expected);
+    ASSERT_EQ(test::touching<double>(d, X, a, kIdentity), !expected.empty());
+  }
+  EXPECT_GT(hits, 20);
+  EXPECT_LT(hits, 75);
+  EXPECT_EQ(deviceOf(a).leftToCpu(), 0u);
+}
+
+TEST_P(OnDevice, ConservativeVerdictsAreThoseOfTheCpu) {
+  const Raw ra = test::torus(30), rb = test::torus(23, 0.3);
+  for (const Subdivision s : {Subdivision::kOctree, Subdivision::kBono}) {
+    for (const int depth : {3, 5, 7}) {
+      Options device = with(GetParam(), Answer::kConservative, depth), cpu = device;
+      device.subdivision = cpu.subdivision = s;
+      cpu.oracle = OracleKind::kCpu;
+      const Modeld a(ra.mesh(), device), b(rb.mesh(), device), c(ra.mesh(), cpu), d(rb.mesh(), cpu);
+      for (const auto& X : poses(40, 2.6)) {
+        ASSERT_EQ(test::touching<double>(a, kIdentity, b, X), test::touching<double>(c, kIdentity, d, X));
+      }
+    }
+  }
+}
+
+TEST_P(OnDevice, CompleteTreesAreThoseOfTheCpu) {
+  for (const Raw& raw : {test::torus(30), test::adversarial()}) {
+    Modeld a(raw.mesh(), with(GetParam())), c(raw.mesh(), with(OracleKind::kCpu));
+    a.expandAll(6);
+    c.expandAll(6);
+    EXPECT_EQ(a.statistics().nodes_per_level, c.statistics().nodes_per_level);
+  }
+}
+
+TEST_P(OnDevice, BranchesThatWentGrowAgain) {
+  const Raw raw = test::torus(60);
+  for (const Answer answer : {Answer::kExact, Answer::kConservative}) {
+    Options options = with(GetParam(), answer, 7);
+    auto now = std::chrono::steady_clock::time_point();
+    options.clock = [&now] { return now; };
+    options.memory_budget = 60000;
+    Modeld a(raw.mesh(), options), b(raw.mesh(), options);
+    Options cpu = with(OracleKind::kCpu, answer, 7);
+    const Modeld c(raw.mesh(), cpu), d(raw.mesh(), cpu);
+    for (const auto& X : poses(60, 2.2)) {
+      now += std::chrono::milliseconds(700);
+      ASSERT_EQ(test::touching<double>(a, kIdentity, b, X), test::touching<double>(c, kIdentity, d, X));
+    }
+    EXPECT_GT(a.statistics().pruned_nodes, 0u);
+    now += std::chrono::hours(1);
+    for (int level = 0; level < 20; ++level, now += std::chrono::seconds(3)) a.prune(now);
+    EXPECT_EQ(a.statistics().resident_nodes, 1u);
+    EXPECT_TRUE(test::touching<double>(a, kIdentity, b, kIdentity));
+  }
+}
+
+TEST_P(OnDevice, MovedVerticesAreSeen) {
+  Raw raw = test::torus(30);
+  Modeld a(raw.mesh(), with(GetParam())), b(raw.mesh(), with(GetParam()));
+  const auto X = test::pose<double>(Eigen::Matrix3d::Identity(), {1.5, 0, 0});
+  EXPECT_TRUE(test::touching<double>(a, kIdentity, b, X));
+  raw.move({0, 0, 10});
+  a.updateVertices(raw.vertices);
+  EXPECT_FALSE(test::touching<double>(a, kIdentity, b, X));
+  const auto up = test::pose<double>(Eigen::Matrix3d::Identity(), {1.5, 0, 10});
+  EXPECT_TRUE(test::touching<double>(a, kIdentity, b, up));
+}
+
+TEST_P(OnDevice, ALostDeviceChangesNoAnswer) {
+  const Raw raw = test::torus(50);
+  for (const Answer answer : {Answer::kExact, Answer::kConservative}) {
+    const Modeld a(raw.mesh(), with(GetParam(), answer)), b(raw.mesh(), with(GetParam(), answer));
+    const Modeld c(raw.mesh(), with(OracleKind::kCpu, answer)), d(raw.mesh(), with(OracleKind::kCpu, answer));
+    int i = 0;
+    for (const auto& X : poses(30, 2.2)) {
+      if (i++ == 5) deviceOf(a).thread().lose("a test says so");
+      ASSERT_EQ(test::touching<double>(a, kIdentity, b, X), test::touching<double>(c, kIdentity, d, X));
+    }
+    EXPECT_GT(deviceOf(a).leftToCpu(), 0u);
+    // Later models get a new context.
+    const Modeld e(raw.mesh(), with(GetParam(), answer));
+    EXPECT_FALSE(deviceOf(e).thread().isLost());
+  }
+}
+
+TEST_P(OnDevice, AChildAfterForkAnswers) {
+  const Raw raw = test::torus(40);
+  const Modeld a(raw.mesh(), with(GetParam())), b(raw.mesh(), with(GetParam()));
+  const auto all = poses(20, 2.2);
+  std::vector<bool> expected;
+  for (std::size_t i = 0; i < 5; ++i) expected.push_back(test::touching<double>(a, kIdentity, b, all[i]));
+  const pid_t child = fork();
+  if (child == 0) {
+    alarm(60);
+    const Modeld c(raw.mesh(), with(OracleKind::kCpu)), d(raw.mesh(), with(OracleKind::kCpu));
+    for (const auto& X : all) {
+      if (test::touching<double>(a, kIdentity, b, X) != test::touching<double>(c, kIdentity, d, X)) _exit(1);
+    }
+    _exit(0);
+  }
+  int status = 0;
+  ASSERT_EQ(waitpid(child, &status, 0), child);
+  EXPECT_TRUE(WIFEXITED(status) && WEXITSTATUS(status) == 0) << status;
+}
+
+std::string nameOf(const testing::TestParamInfo<OracleKind>& info) {
+  return info.param == OracleKind::kCompute ? "compute" : "occlusion";
+}
+INSTANTIATE_TEST_SUITE_P(All, OnDevice, testing::Values(OracleKind::kCompute, OracleKind::kOcclusion), nameOf);
+
+TEST(Compute, TheMeshNeedNotBeInHostMemory) {
+  const Raw raw = test::torus(60);
+  const auto options = with(OracleKind::kCompute, Answer::kConservative, 7);
+  auto mesh = raw.mesh();
+  Modeld a(mesh, options), b(mesh, options);
+  const std::weak_ptr<const Mesh> host = mesh;
+  mesh.reset();
+  EXPECT_GT(a.statistics().mesh_bytes, 0u);
+  a.releaseMesh();
+  EXPECT_FALSE(host.expired()) << "b holds it";
+  b.releaseMesh();
+  EXPECT_TRUE(host.expired());
+  EXPECT_EQ(a.mesh(), nullptr);
+  EXPECT_EQ(a.statistics().mesh_bytes, 0u);
+  const auto cpu = with(OracleKind::kCpu, Answer::kConservative, 7);
+  const Modeld c(raw.mesh(), cpu), d(raw.mesh(), cpu), exact(raw.mesh());
+  const auto bvh = test::bvh<fcl::OBBRSSd>(raw);
+  for (const auto& X : poses(40, 2.4)) {
+    ASSERT_EQ(test::touching<double>(a, kIdentity, b, X), test::touching<double>(c, kIdentity, d, X));
+    ASSERT_EQ(test::touching<double>(a, kIdentity, exact, X), test::touching<double>(c, kIdentity, exact, X));
+    ASSERT_EQ(test::touching<double>(*bvh, X, a, kIdentity), test::touching<double>(*bvh, X, c, kIdentity));
+    fcl::DistanceRequest<double> request;
+    fcl::DistanceResult<double> ours, theirs;
+    ASSERT_EQ(fcl::distance(&a, kIdentity, &b, X, request, ours), fcl::distance(&c, kIdentity, &d, X, request, theirs));
+  }
+  EXPECT_GT(a.statistics().device_bytes, 12 * raw.triangles.size());
+  a.computeLocalAABB();
+  EXPECT_EQ(a.aabb_local.min_, c.aabb_local.min_);
+  a.visit([](const NodeView& node) { EXPECT_EQ(node.object, nullptr); });
+  EXPECT_THROW(a.updateVertices(raw.vertices), std::logic_error);
+  EXPECT_EQ(deviceOf(a).leftToCpu(), 0u);
+  // Nobody has the mesh any more once the device goes: that is an error, never "free".
+  deviceOf(a).thread().lose("a test says so");
+  a.prune(Clock::now() + std::chrono::hours(1));
+  EXPECT_THROW(
+      {
+        for (const auto& X : poses(60, 2.0)) test::touching<double>(a, kIdentity, b, X);
+      },
+      OracleError);
+}
+
+TEST(Compute, WhatNeedsTheMeshKeepsIt) {
+  const auto mesh = test::torus(20).mesh();
+  Modeld exact(mesh, with(OracleKind::kCompute)), cpu(mesh, with(OracleKind::kCpu, Answer::kConservative));
+  Modeld occlusion(mesh, with(OracleKind::kOcclusion, Answer::kConservative));
+  EXPECT_THROW(exact.releaseMesh(), std::logic_error);
+  EXPECT_THROW(cpu.releaseMesh(), OracleError);
+  EXPECT_THROW(occlusion.releaseMesh(), OracleError);
+  EXPECT_EQ(occlusion.mesh(), mesh);
+}
+
+TEST(Compute, BytesOnTheDeviceComeAndGo) {
+  const Raw raw = test::torus(60);
+  Modeld a(raw.mesh(), with(OracleKind::kCompute)), b(raw.mesh(), with(OracleKind::kCompute));
+  EXPECT_EQ(a.statistics().device_bytes, 0u) << "at rest nothing was sent";
+  EXPECT_TRUE(test::touching<double>(a, kIdentity, b, test::pose<double>(Eigen::Matrix3d::Identity(), {1.5, 0.2, 0})));
+  const std::size_t mesh = 12 * raw.triangles.size() + 48 * raw.vertices.size();
+  EXPECT_GT(a.statistics().device_bytes, mesh) << "and lists";
+  Clock::time_point later = Clock::now();
+  for (int level = 0; level < 20; ++level) a.prune(later += std::chrono::hours(1));
+  EXPECT_EQ(a.statistics().resident_nodes, 1u);
+  EXPECT_EQ(a.statistics().device_bytes, mesh) << "lists went with their branches";
+}
+
+TEST(Sampled, IsNeverChosenByItself) {
+  const auto mesh = test::torus(20).mesh();
+  EXPECT_NE(Modeld(mesh).oracleName(), "sampled");
+  EXPECT_EQ(Modeld(mesh, with(OracleKind::kSampled)).oracleName(), "sampled");
+}
+
+}  // namespace
+}  // namespace bocst
