@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #pragma once
 
+#include <bocst/export.h>
 #include <bocst/options.h>
 
 #include <Eigen/Geometry>
@@ -36,7 +37,7 @@ struct Cell {
 /// B (4.3): the lower corner of the cube is that of the bounds, the largest extent is d_t units of a cube whose side is
 /// the smallest power of two >= d_t (scaled by a power of two to 2^kBits); so the lower side of each split is the
 /// largest exact power of two. A cell's actual region is its part inside the bounds, rounded up to units.
-class Lattice {
+class BOCST_EXPORT Lattice {
  public:
   /// dimension is the paper's d_t, 0 (finest) or 1 to 2^kBits.
   Lattice(const Eigen::AlignedBox3d& bounds, Subdivision subdivision, double dimension);

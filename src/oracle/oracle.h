@@ -103,6 +103,13 @@ class Oracle {
   /// Does it need the mesh on the host, too?
   virtual bool needsHostMesh() const { return true; }
 
+  /// Where the time of the last batch went, in seconds, as the device measured it. read_back is what else passed until
+  /// the answers were there. All 0 without a device.
+  struct Cost {
+    double upload = 0, kernels = 0, read_back = 0;
+  };
+  virtual Cost lastCost() { return {}; }
+
   /// The ids of a list that this oracle keeps; false when it has lost them.
   virtual bool fetch(const Held&, Expansion::Kept, std::uint32_t*) { return false; }
 };
@@ -110,6 +117,6 @@ class Oracle {
 /// The oracle for these options: BOCST_ORACLE overrides kAuto; else compute on a hardware GPU, else the CPU. Shared by
 /// all models. viewport: Options::viewport.
 /// @throws OracleError for one asked for by name that cannot be had.
-std::shared_ptr<Oracle> makeOracle(OracleKind kind, int viewport = Options{}.viewport);
+BOCST_EXPORT std::shared_ptr<Oracle> makeOracle(OracleKind kind, int viewport = Options{}.viewport);
 
 }  // namespace bocst::oracle

@@ -11,6 +11,7 @@
 #include <vector>
 
 #include "arguments.h"
+#include "bench_oracles.h"
 #include "poses.h"
 #include "query_pair.h"
 
@@ -52,6 +53,8 @@ struct Bench {
   std::uint64_t seed = 1;
   std::size_t rounds = 5;
   Output output;
+  bool of_oracles = false;
+  OracleBench oracles;
 
   template <typename Make>
   static auto timeFirst(const Make& make, const Eigen::Isometry3d& X_AB, Side& side) {
@@ -121,6 +124,11 @@ struct Bench {
 
   int run() const {
     output.check();
+    if (of_oracles) {
+      OracleBench bench = oracles;
+      bench.file = file_a;
+      return bench.run(output);
+    }
     const std::shared_ptr<const Mesh> mesh_a = loadMesh(file_a);
     const std::shared_ptr<const Mesh> mesh_b = file_b.empty() ? mesh_a : loadMesh(file_b);
     const MeshArrays a(*mesh_a, Scalar::kDouble);
@@ -259,6 +267,16 @@ void addBench(CLI::App& program, Job& job) {
       ->capture_default_str();
   command->add_option("--seed", bench->seed, "the same seed gives the same poses")->capture_default_str();
   command->add_option("--rounds", bench->rounds, "first answers, and rounds over all poses")
+      ->check(CLI::PositiveNumber)
+      ->capture_default_str();
+  command->add_flag("--oracles", bench->of_oracles,
+                    "instead: each oracle of this machine on mesh A, subdivided to several sizes");
+  command->add_option("--triangles", bench->oracles.sizes, "with --oracles: the sizes to come near to")
+      ->delimiter(',')
+      ->capture_default_str();
+  command
+      ->add_option("--limit", bench->oracles.limit_seconds,
+                   "with --oracles: seconds; an oracle that needs more to grow a tree is left out from there on")
       ->check(CLI::PositiveNumber)
       ->capture_default_str();
   addJson(*command, bench->output);

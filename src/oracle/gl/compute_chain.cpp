@@ -2,6 +2,7 @@
 #include "oracle/gl/compute_chain.h"
 
 #include <algorithm>
+#include <array>
 #include <chrono>
 #include <cstring>
 #include <string>
@@ -30,17 +31,6 @@ const DeviceMesh* meshOf(const Expansion& e) { return static_cast<const DeviceMe
 
 std::uint32_t narrow(std::uint64_t n) { return static_cast<std::uint32_t>(n); }
 
-class Watch {
- public:
-  double nanoseconds() {
-    const auto now = std::chrono::steady_clock::now();
-    return static_cast<double>(std::chrono::nanoseconds(now - std::exchange(last_, now)).count());
-  }
-
- private:
-  std::chrono::steady_clock::time_point last_ = std::chrono::steady_clock::now();
-};
-
 }  // namespace
 
 ComputeChain::ComputeChain(Limits limits, Arena& arena) : limits_(limits), arena_(arena) {
@@ -50,6 +40,7 @@ ComputeChain::ComputeChain(Limits limits, Arena& arena) : limits_(limits), arena
   const std::pair<const char*, bool> passes[kPasses] = {{"masks", false}, {"decide", false},  {"place", false},
                                                         {"fill", true},   {"normals", false}, {"slabs", true},
                                                         {"pack", false}};
+  times_.reserve(3);
   for (const auto& [name, clips] : passes) {
     auto program = std::make_unique<Program>(std::vector<Program::Stage>{{GL_COMPUTE_SHADER, source(name, clips)}});
     const Program& p = *program;
@@ -194,7 +185,8 @@ void ComputeChain::readBack(const std::vector<Expansion*>& questions) {
 void ComputeChain::answer(const std::vector<Expansion*>& questions, Thread& thread) {
   while (glGetError() != GL_NO_ERROR) {
   }
-  Watch watch;
+  const auto begin = std::chrono::steady_clock::now();
+  glQueryCounter(times_[0], GL_TIMESTAMP);
   upload(questions);
   std::uint64_t pairs = 0, ids = 0;
   for (const Expansion* e : questions) {
@@ -204,7 +196,7 @@ void ComputeChain::answer(const std::vector<Expansion*>& questions, Thread& thre
   list_room_ = 2 * pairs + 8 * questions.size();
   id_room_ = ids + 64;
   placed_ = arena_.take(list_room_);
-  cost_.upload = watch.nanoseconds();
+  glQueryCounter(times_[1], GL_TIMESTAMP);
 
   const GLuint bound[] = {arena_.buffer().name(), cells_.name(), states_.name(), masks_.name()};
   for (GLuint i = 0; i < 4; ++i) glBindBufferBase(GL_SHADER_STORAGE_BUFFER, 2 + i, bound[i]);
@@ -213,6 +205,8 @@ void ComputeChain::answer(const std::vector<Expansion*>& questions, Thread& thre
   dispatchPairs(kDecide);
   placeAndFill();
 
+  glQueryCounter(times_[2], GL_TIMESTAMP);
+
   // Most answers fit into the first read; what does not is known from the header.
   const std::size_t fixed = kHeader + questions.size() * kRow;
   std::size_t read = fixed + std::min<std::uint64_t>(id_room_, 64 * questions.size());
@@ -220,9 +214,7 @@ void ComputeChain::answer(const std::vector<Expansion*>& questions, Thread& thre
     words_.resize(end);
     answers_.read(first * kWord, (end - first) * kWord, words_.data() + first);
   };
-  glFlush();
   readFrom(0, read);
-  cost_.kernels = watch.nanoseconds();
   if (words_[0] > list_room_ || words_[1] > id_room_) {
     list_room_ = words_[0];
     id_room_ = words_[1];
@@ -238,7 +230,12 @@ void ComputeChain::answer(const std::vector<Expansion*>& questions, Thread& thre
   if (error != GL_NO_ERROR) throw OracleError("OpenGL error " + std::to_string(error));
   placed_->trim(words_[0]);
   readBack(questions);
-  cost_.read_back = watch.nanoseconds();
+  std::array<GLuint64, 3> times{};
+  for (std::size_t i = 0; i < times.size(); ++i) glGetQueryObjectui64v(times_[i], GL_QUERY_RESULT, &times[i]);
+  const std::chrono::duration<double> all_time = std::chrono::steady_clock::now() - begin;
+  cost_.upload = 1e-9 * static_cast<double>(times[1] - times[0]);
+  cost_.kernels = 1e-9 * static_cast<double>(times[2] - times[1]);
+  cost_.read_back = all_time.count() - cost_.upload - cost_.kernels;
   placed_ = nullptr;
   uploaded_ = nullptr;
 }

@@ -21,12 +21,6 @@ class ComputeChain {
     std::size_t bytes = 0;  ///< Of one buffer; 0: what the driver says.
   };
 
-  /// Where the time of the last chain went, in nanoseconds: filling buffers, until the first answers came, and what
-  /// followed.
-  struct Cost {
-    double upload = 0, kernels = 0, read_back = 0;
-  };
-
   /// @throws OracleError when a shader does not compile or the driver's limits are below what the chain needs.
   ComputeChain(Limits limits, Arena& arena);
 
@@ -39,7 +33,7 @@ class ComputeChain {
   /// Answers them all; questions about one mesh follow each other. @throws OracleError
   void answer(const std::vector<Expansion*>& questions, Thread& thread);
 
-  const Cost& cost() const { return cost_; }
+  const Oracle::Cost& cost() const { return cost_; }
 
  private:
   // As in the shaders.
@@ -75,7 +69,8 @@ class ComputeChain {
   std::vector<std::uint32_t> words_;  // of the answer
   std::shared_ptr<Arena::Range> uploaded_, placed_;
   std::uint64_t list_room_ = 0, id_room_ = 0;
-  Cost cost_;
+  Queries times_;
+  Oracle::Cost cost_;
 };
 
 }  // namespace bocst::oracle::gl

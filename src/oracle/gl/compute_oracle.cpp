@@ -69,8 +69,8 @@ bool ComputeOracle::fetch(const Held&, Expansion::Kept list, std::uint32_t* ids)
   }
 }
 
-ComputeChain::Cost ComputeOracle::lastCost() {
-  ComputeChain::Cost cost;
+Oracle::Cost ComputeOracle::lastCost() {
+  Cost cost;
   thread_->run([&] { cost = chain_->cost(); });
   return cost;
 }

@@ -25,7 +25,7 @@ class ComputeOracle : public DeviceOracle {
   bool needsHostMesh() const override { return false; }
   bool fetch(const Held& shelf, Expansion::Kept list, std::uint32_t* ids) override;
 
-  ComputeChain::Cost lastCost();
+  Cost lastCost() override;
 
  private:
   void answer(const std::vector<Expansion*>& questions, std::vector<Verdict>& verdicts) override;
