@@ -4,12 +4,15 @@
 #include <sys/wait.h>
 #include <unistd.h>
 
+#include <array>
 #include <cmath>
 #include <cstdio>
 #include <cstdlib>
 #include <filesystem>
 #include <fstream>
 #include <nlohmann/json.hpp>
+#include <regex>
+#include <sstream>
 #include <stdexcept>
 #include <string>
 
@@ -154,6 +157,67 @@ TEST_F(Program, MeasuresTheErrorThatThePaperDefines) {
   EXPECT_NEAR(report.at("levels")[0].at("error_max").get<double>(), (radius - 0.5) / (2 * radius), 1e-3);
 }
 
+TEST_F(Program, InspectsTheHealthOfAMesh) {
+  const Json sound = json("inspect " + cube() + " --depth 1").at("health");
+  EXPECT_EQ(sound.at("watertight"), true);
+  EXPECT_EQ(sound.at("components"), 1);
+  EXPECT_NEAR(sound.at("volume"), 1, 1e-12);
+  EXPECT_NEAR(sound.at("area"), 6, 1e-12);
+  EXPECT_NE(run("inspect " + cube() + " --depth 1").out.find("faults      none"), std::string::npos);
+
+  const std::string open = write("open.off", "OFF\n4 2 0\n0 0 0\n1 0 0\n1 1 0\n0 1 0\n3 0 1 2\n3 0 2 3\n");
+  const Json faulty = json("inspect " + open + " --depth 1").at("health");
+  EXPECT_EQ(faulty.at("watertight"), false);
+  EXPECT_EQ(faulty.at("open_edges"), 4);
+  EXPECT_TRUE(faulty.at("volume").is_null());
+  EXPECT_NE(run("inspect " + open + " --depth 1").out.find("open edges 4"), std::string::npos);
+}
+
+TEST_F(Program, WritesTheSpheresOfALevel) {
+  const auto file = [this](const std::string& ending) { return (folder_ / ("spheres" + ending)).string(); };
+  const std::string inspect = "inspect " + model("gripper") + " --depth 4 --no-error ";
+  const std::size_t count = json(inspect + "--spheres " + file(".json")).at("levels")[3].at("nodes");
+  const Json spheres = Json::parse(read(file(".json")));
+  ASSERT_EQ(spheres.size(), count);
+
+  ASSERT_EQ(run(inspect + "--spheres " + file(".ply")).code, 0);
+  std::istringstream ply(read(file(".ply")));
+  std::string line, header;
+  while (std::getline(ply, line) && line != "end_header") header += line + '\n';
+  EXPECT_EQ(header, "ply\nformat ascii 1.0\nelement vertex " + std::to_string(count) +
+                        "\nproperty double x\nproperty double y\nproperty double z\nproperty double radius\n");
+
+  ASSERT_EQ(run(inspect + "--link hand --spheres " + file(".yaml")).code, 0);
+  std::istringstream yaml(read(file(".yaml")));
+  std::getline(yaml, line);
+  EXPECT_EQ(line, "collision_spheres:");
+  std::getline(yaml, line);
+  EXPECT_EQ(line, "  \"hand\":");
+
+  // The same numbers in all; those of YAML in the form that its readers take for numbers.
+  const std::string number = "([-+]?[0-9]+|[-+]?[0-9]+\\.[0-9]*(?:[eE][-+][0-9]+)?)";
+  const std::regex center("    - \"center\": \\[" + number + ", " + number + ", " + number + "\\]");
+  const std::regex radius("      \"radius\": " + number);
+  for (const Json& sphere : spheres) {
+    std::array<double, 4> expected{}, other{};
+    for (std::size_t k = 0; k < 3; ++k) expected[k] = sphere.at("center")[k];
+    expected[3] = sphere.at("radius");
+    for (double& x : other) ply >> x;
+    EXPECT_EQ(other, expected);
+    std::smatch match;
+    std::getline(yaml, line);
+    ASSERT_TRUE(std::regex_match(line, match, center)) << line;
+    for (std::size_t k = 0; k < 3; ++k) other[k] = std::stod(match[k + 1]);
+    std::getline(yaml, line);
+    ASSERT_TRUE(std::regex_match(line, match, radius)) << line;
+    other[3] = std::stod(match[1]);
+    EXPECT_EQ(other, expected);
+  }
+  EXPECT_TRUE(ply >> std::ws && ply.eof());
+  EXPECT_FALSE(std::getline(yaml, line));
+  expectComplaint(inspect + "--spheres " + file(".txt"), kUsage, "--spheres");
+}
+
 TEST_F(Program, ValidatesAgainstFcl) {
   const std::string pair = "validate " + model("link") + " " + model("gripper") + " --poses 64 --seed 7";
   const Json exact = json(pair + " --contacts --reference obbrss,obb");
@@ -197,7 +261,7 @@ TEST_F(Program, WritesJsonFilesWhole) {
   EXPECT_EQ(Json::parse(read(file)).at("levels").size(), 2u);
   std::size_t files = 0;
   for (const auto& entry : fs::directory_iterator(folder_)) {
-    files += entry.path().filename().string().rfind("report.json", 0) == 0;
+    files += entry.path().filename().string().find("report.json") != std::string::npos;
   }
   EXPECT_EQ(files, 1u) << "temporary files are left";
   expectComplaint("inspect " + cube() + " --json " + (folder_ / "none" / "r.json").string(), kFailed, "r.json");

@@ -45,9 +45,11 @@ struct ModelArguments {
   Options options() const;
   Scalar scalarKind() const { return scalar == "float" ? Scalar::kFloat : Scalar::kDouble; }
   bool exact() const { return answer == "exact"; }
+  std::string answerText() const { return exact() ? "exact" : "conservative, depth " + std::to_string(depth); }
   Json json() const;
 };
 
-void addJson(CLI::App& command, Output& output);  ///< --json
+void addJson(CLI::App& command, Output& output);     ///< --json
+void addHtml(CLI::App& command, std::string& file);  ///< --html
 
 }  // namespace bocst::program

@@ -3,9 +3,11 @@
 #include <algorithm>
 #include <exception>
 #include <iostream>
+#include <stdexcept>
 #include <string>
 
 #include "arguments.h"
+#include "file.h"
 
 namespace {
 
@@ -33,7 +35,10 @@ int main(int argc, char** argv) {
   addOracles(program, job);
   try {
     program.parse(argc, argv);
-    return job();
+    cleanUpOnSignals();
+    const int code = job();
+    if (!std::cout.flush()) throw std::runtime_error("stdout: cannot be written");
+    return code;
   } catch (const CLI::ParseError& e) {
     if (e.get_exit_code() == 0) return program.exit(e);  // --help
     return complain(e.what(), kUsage);

@@ -22,7 +22,7 @@ class Output {
   /// Fails now rather than after minutes of work. @throws std::runtime_error when the file cannot be written.
   void check() const;
 
-  /// Files appear whole or not at all. @throws std::runtime_error when that fails.
+  /// As writeFile(). @throws std::runtime_error when that fails; main() looks after stdout.
   void write(const Json& json) const;
 };
 
