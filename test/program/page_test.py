@@ -143,6 +143,19 @@ class PageTest(unittest.TestCase):
                 self.assertEqual(browser.value(COVERAGE), 0)
                 self.assertEqual(browser.complaints, [])
 
+    def test_validate_shows_the_worst_case(self):
+        report = self.report("validate", LINK, GRIPPER, "--poses", "60", "--answer", "conservative", "--depth", "5",
+                             "--histogram")
+        self.assertGreater(report["overestimates"][4]["largest"], 0)
+        with Browser() as browser:
+            browser.open(self.page)
+            facts = browser.text("facts")
+            self.assertIn("theycollide", facts)
+            self.assertIn("apart, the farthest of 60 poses", facts)
+            pose = [float(x) for x in facts.split("B in A")[1].split("answer")[0].split(",")]
+            self.assertEqual(pose, report["overestimates"][4]["pose"])
+            self.assertEqual(browser.complaints, [])
+
     def test_apart_there_are_no_contacts(self):
         self.report("collide", LINK, GRIPPER, "--pose", "9,0,0,1,0,0,0")
         with Browser() as browser:

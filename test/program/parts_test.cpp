@@ -16,6 +16,7 @@
 #include "meshes.h"
 #include "page.h"
 #include "spheres.h"
+#include "validation.h"
 
 namespace bocst {
 namespace {
@@ -212,6 +213,67 @@ TEST(Spheres, KeepFloatsFloatsInYaml) {
   EXPECT_NE(text.find("\"a \\\"b\\\"\":"), std::string::npos) << text;
   EXPECT_THROW(program::checkSphereFile("a.txt"), std::invalid_argument);
   EXPECT_NO_THROW(program::checkSphereFile("a.PLY"));
+}
+
+program::Pose poseOf(double x) {
+  program::Pose pose;
+  pose.numbers[0] = x;
+  return pose;
+}
+
+TEST(Shard, IsReadAsItIsWritten) {
+  EXPECT_EQ(program::Shard::parse("3/7").index, 3u);
+  EXPECT_EQ(program::Shard::parse("3/7").of, 7u);
+  for (const char* text : {"", "/", "0/3", "4/3", "1", "1/", "/2", "a/b", "-1/3", "1/3x", "1/99999999999", "1.0/2"}) {
+    EXPECT_THROW(program::Shard::parse(text), std::invalid_argument) << text;
+  }
+}
+
+TEST(Overestimate, HasABinForEachDistance) {
+  using program::Overestimate;
+  EXPECT_EQ(Overestimate::binOf(0), 0u);
+  EXPECT_EQ(Overestimate::binOf(0.99e-6), 0u);
+  EXPECT_EQ(Overestimate::binOf(1.01e-6), 1u);
+  EXPECT_EQ(Overestimate::binOf(0.05), 5u);
+  EXPECT_EQ(Overestimate::binOf(0.5), 6u);
+  EXPECT_EQ(Overestimate::binOf(1e9), 7u);
+  EXPECT_EQ(Overestimate::binName(Overestimate::binOf(0.05)), "< 1e-1");
+  EXPECT_EQ(Overestimate::binName(Overestimate::binOf(0.5)), "< 1");
+}
+
+TEST(Validation, PartsAddUpToTheWhole) {
+  using program::Validation;
+  std::mt19937 g(5);
+  for (int round = 0; round < 50; ++round) {
+    const std::size_t of = 1 + g() % 5;
+    Validation whole;
+    whole.settings = {{"seed", 1}, {"contacts_compared", false}, {"options", {{"scalar", "double"}}}};
+    whole.overestimates.resize(2);
+    std::vector<Validation> parts(of, whole);
+    for (std::size_t i = 0; i < of; ++i) parts[i].shard = {i + 1, of};
+    for (std::size_t number = 0; number < 200; ++number) {
+      // Few values, so that the largest is met more than once.
+      const double value = static_cast<double>(g() % 4);
+      const bool fails = g() % 6 == 0;
+      for (Validation* sum : {&whole, &parts[number / 8 % of]}) {
+        ++sum->count[Validation::kPoses];
+        if (fails) sum->fail(number, poseOf(value), "false negative");
+        sum->overestimates[number % 2].add(value, number, poseOf(static_cast<double>(number)));
+      }
+    }
+    std::shuffle(parts.begin(), parts.end(), g);
+    std::vector<Validation> read;
+    for (const Validation& part : parts) read.push_back(Validation::fromJson(program::Json::parse(part.json().dump())));
+    EXPECT_EQ(Validation::merged(read).json(), whole.json());
+    EXPECT_THROW(Validation::merged(read).throwIfWrong(), std::runtime_error);
+    if (of == 1) continue;
+    std::vector<Validation> some(read.begin() + 1, read.end());
+    EXPECT_THROW(Validation::merged(some), std::runtime_error);
+    some.push_back(some.front());
+    EXPECT_THROW(Validation::merged(some), std::runtime_error);
+    read.back().settings["seed"] = 2;
+    EXPECT_THROW(Validation::merged(read), std::runtime_error);
+  }
 }
 
 }  // namespace

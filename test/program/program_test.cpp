@@ -234,6 +234,59 @@ TEST_F(Program, ValidatesAgainstFcl) {
   EXPECT_EQ(json(pair + " --scalar float").at("mismatches"), 0);
 }
 
+TEST_F(Program, DividesAValidation) {
+  const std::string whole = "validate " + model("link") + " " + model("gripper") + " --poses 100 --seed 5";
+  for (const std::string options : {" --contacts", " --answer conservative --depth 5 --histogram"}) {
+    std::string shards;
+    for (const char* i : {"3", "1", "2"}) {
+      const std::string file = (folder_ / ("shard" + std::string(i) + ".json")).string();
+      ASSERT_EQ(run(whole + options + " --shard " + i + "/3 --json " + file).code, 0);
+      EXPECT_LT(Json::parse(read(file)).at("poses"), 60);
+      shards += " " + file;
+    }
+    EXPECT_EQ(json("merge" + shards), json(whole + options));
+    EXPECT_EQ(run("merge" + shards).out, run(whole + options).out);
+    expectComplaint("merge " + (folder_ / "shard1.json").string(), kFailed, "shard 2/3 is missing");
+    // A mismatch in one shard is one of the whole.
+    Json bad = Json::parse(read(folder_ / "shard2.json"));
+    bad["mismatches"] = 1;
+    bad["failures"] = {{{"at", 9}, {"pose", {1, 2, 3, 1, 0, 0, 0}}, {"what", "false negative"}}};
+    write("shard2.json", bad.dump());
+    EXPECT_EQ(run("merge" + shards + " --json -").code, kFailed);
+    expectComplaint("merge" + shards, kFailed, "1 of 100 poses answered wrongly, the first (false negative)");
+  }
+  expectComplaint("merge " + cube(), kFailed, "cube.off: not JSON");
+  expectComplaint("merge " + write("list.json", "[1, 2]"), kFailed, "list.json: not a report");
+  expectComplaint(whole + " --shard 4/3", kUsage, "--shard");
+  expectComplaint(whole + " --histogram", kUsage, "--histogram");
+}
+
+TEST_F(Program, SaysHowMuchConservativeAnswersOverestimate) {
+  const Json report = json("validate " + model("link") + " " + model("gripper") +
+                           " --poses 200 --seed 5 --answer conservative --depth 6 --histogram");
+  const Json& depths = report.at("overestimates");
+  ASSERT_EQ(depths.size(), 6u);
+  EXPECT_EQ(depths[5].at("false_positives"), report.at("false_positives"));
+  double last = 1e9;
+  std::size_t last_count = 200;
+  for (const Json& depth : depths) {
+    std::size_t sum = 0;
+    for (const Json& bin : depth.at("bins")) sum += bin.get<std::size_t>();
+    EXPECT_EQ(sum, depth.at("false_positives"));
+    EXPECT_LE(sum, last_count) << "depth " << depth.at("depth");
+    EXPECT_LE(depth.at("largest"), last);
+    last = depth.at("largest");
+    last_count = sum;
+    // At the worst pose the surfaces are apart, and the conservative answer of that depth is a hit.
+    std::string pose;
+    for (const Json& x : depth.at("pose")) pose += (pose.empty() ? "" : ",") + x.dump();
+    const std::string pair = "collide " + model("link") + " " + model("gripper") + " --pose=" + pose;
+    EXPECT_EQ(json(pair).at("collide"), false);
+    EXPECT_EQ(json(pair + " --answer conservative --depth " + depth.at("depth").dump()).at("collide"), true);
+  }
+  EXPECT_GT(last_count, 0u);
+}
+
 TEST_F(Program, ComparesWithFcl) {
   const Json report = json("bench " + model("link") + " " + model("gripper") + " --poses 20 --rounds 2");
   for (const char* key : {"first_answer", "query_median", "query_mean", "query_p95", "memory"}) {

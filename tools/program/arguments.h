@@ -24,6 +24,7 @@ using Job = std::function<int()>;
 void addCollide(CLI::App& program, Job& job);
 void addInspect(CLI::App& program, Job& job);
 void addValidate(CLI::App& program, Job& job);
+void addMerge(CLI::App& program, Job& job);
 void addBench(CLI::App& program, Job& job);
 void addOracles(CLI::App& program, Job& job);
 

@@ -31,6 +31,7 @@ int main(int argc, char** argv) {
   addCollide(program, job);
   addInspect(program, job);
   addValidate(program, job);
+  addMerge(program, job);
   addBench(program, job);
   addOracles(program, job);
   try {
