@@ -12,6 +12,7 @@
 #include <fstream>
 #include <nlohmann/json.hpp>
 #include <regex>
+#include <set>
 #include <sstream>
 #include <stdexcept>
 #include <string>
@@ -40,12 +41,25 @@ class Program : public ::testing::Test {
     std::string err;
   };
 
-  Result run(const std::string& arguments) const {
+  static std::string program() { return std::string("'") + BOCST_PROGRAM + "'"; }
+
+  Result run(const std::string& arguments) const { return shell(program() + " " + arguments); }
+  Result runTo(const std::string& out, const std::string& arguments) const {
+    return shell("exec >" + out + "; " + program() + " " + arguments);
+  }
+
+  /// A line for the shell.
+  Result shell(const std::string& line) const {
     const std::string out = (folder_ / "out").string();
     const std::string err = (folder_ / "err").string();
-    const std::string command = std::string("'") + BOCST_PROGRAM + "' " + arguments + " >" + out + " 2>" + err;
-    const int status = std::system(command.c_str());
+    const int status = std::system(("exec >" + out + " 2>" + err + "; " + line).c_str());
     return {WIFEXITED(status) ? WEXITSTATUS(status) : -1, read(out), read(err)};
+  }
+
+  std::set<std::string> files() const {
+    std::set<std::string> names;
+    for (const auto& entry : fs::directory_iterator(folder_)) names.insert(entry.path().filename().string());
+    return names;
   }
 
   /// Runs with --json - and expects the exit code 0.
@@ -312,11 +326,7 @@ TEST_F(Program, WritesJsonFilesWhole) {
   const std::string file = (folder_ / "report.json").string();
   EXPECT_EQ(run("inspect " + cube() + " --depth 2 --json " + file).out, "");
   EXPECT_EQ(Json::parse(read(file)).at("levels").size(), 2u);
-  std::size_t files = 0;
-  for (const auto& entry : fs::directory_iterator(folder_)) {
-    files += entry.path().filename().string().find("report.json") != std::string::npos;
-  }
-  EXPECT_EQ(files, 1u) << "temporary files are left";
+  EXPECT_EQ(files(), (std::set<std::string>{"report.json", "cube.off", "out", "err"}));
   expectComplaint("inspect " + cube() + " --json " + (folder_ / "none" / "r.json").string(), kFailed, "r.json");
   expectComplaint("inspect " + cube() + " --json " + folder_.string(), kFailed, "cannot be written");
   expectComplaint("inspect " + cube() + " --json /dev/full", kFailed, "/dev/full");
@@ -351,6 +361,90 @@ TEST_F(Program, ExplainsWhatFails) {
   expectComplaint("collide " + cube() + " " + write("empty.stl", ""), kFailed, "empty.stl: is empty");
   expectComplaint("validate " + write("cut.ply", "ply\nformat ascii 1.0\n") + " " + cube(), kFailed,
                   "cut.ply: truncated");
+}
+
+TEST_F(Program, ExplainsWhatCannotBeWritten) {
+  const std::string inspect = "inspect " + cube() + " --depth 2";
+  for (const std::string option : {"--json", "--html"}) {
+    expectComplaint(inspect + " " + option + " /dev/full", kFailed, "/dev/full: cannot be written: No space left");
+    expectComplaint(inspect + " " + option + " " + (folder_ / "none" / "f").string(), kFailed, "none/f");
+    expectComplaint(inspect + " " + option + " " + folder_.string(), kFailed, "Is a directory");
+    expectComplaint(inspect + " " + option + " " + folder_.string() + "/" + std::string(300, 'x'), kFailed, "too long");
+  }
+  expectComplaint(inspect + " --spheres " + (folder_ / "none" / "f.ply").string(), kFailed, "none/f.ply");
+  EXPECT_EQ(runTo("/dev/full", inspect).err, "bocst: stdout: cannot be written\n");
+  EXPECT_EQ(runTo("/dev/full", inspect + " --json -").code, kFailed);
+  // What goes in, or out elsewhere, is not written over.
+  const std::string ply = (folder_ / "a.ply").string();
+  ASSERT_EQ(run(inspect + " --spheres " + ply).code, 0);
+  const std::string before = read(ply);
+  fs::create_symlink(ply, folder_ / "b.ply");
+  expectComplaint("inspect " + ply + " --spheres " + (folder_ / "b.ply").string(), kFailed, "another file");
+  expectComplaint(inspect + " --html " + ply + " --json " + ply, kFailed, "another file");
+  EXPECT_EQ(read(ply), before);
+  // A link stays one.
+  ASSERT_EQ(run(inspect + " --json " + (folder_ / "b.ply").string()).code, 0);
+  EXPECT_TRUE(fs::is_symlink(folder_ / "b.ply"));
+  EXPECT_EQ(Json::parse(read(ply)).at("triangles"), 12);
+}
+
+TEST_F(Program, LeavesTheOldFileWhenTheDiskIsFull) {
+  const std::string page = write("page.html", "as before");
+  const std::string command = "inspect " + model("link") + " --depth 5 --no-error --html " + page;
+  const std::string before = "trap '' XFSZ; ulimit -f 8; ";
+  const Result result = shell(before + program() + " " + command);
+  EXPECT_EQ(result.code, kFailed);
+  EXPECT_EQ(result.err, "bocst: " + page + ": cannot be written: File too large\n");
+  EXPECT_EQ(read(page), "as before");
+  EXPECT_EQ(files(), (std::set<std::string>{"page.html", "out", "err"}));
+}
+
+TEST_F(Program, LeavesNothingBehindWhenInterrupted) {
+  const std::string report = (folder_ / "report.json").string();
+  const std::string poses =
+      " validate " + model("link") + " " + model("gripper") + " --poses 100000000 --json " + report;
+  for (const std::string signal : {"INT", "TERM", "HUP"}) {
+    const Result result = shell("timeout --preserve-status -s " + signal + " 0.7 " + program() + poses);
+    EXPECT_GT(result.code, 128);
+    EXPECT_EQ(result.err, "bocst: interrupted\n");
+    EXPECT_EQ(files(), (std::set<std::string>{"out", "err"}));
+  }
+  // At any moment: the page is there whole, or not at all.
+  const std::string page = (folder_ / "page.html").string();
+  const std::string inspect = " inspect " + model("link") + " --depth 6 --no-error --html " + page;
+  ASSERT_EQ(shell(program() + inspect).code, 0);
+  const std::string whole = read(page);
+  std::set<bool> seen;
+  for (int ms = 2; ms < 200; ms += 4) {
+    fs::remove(page);
+    shell("timeout -s INT 0." +
+          std::string(ms < 10    ? "00"
+                      : ms < 100 ? "0"
+                                 : "") +
+          std::to_string(ms) + " " + program() + inspect);
+    std::set<std::string> left = files();
+    seen.insert(left.erase("page.html") == 1);
+    EXPECT_EQ(left, (std::set<std::string>{"out", "err"}));
+    EXPECT_TRUE(!fs::exists(page) || read(page).size() == whole.size());
+  }
+  EXPECT_EQ(seen.count(false), 1u) << "never interrupted in time";
+}
+
+TEST_F(Program, ShowsProgressToPeopleOnly) {
+  const std::string command = program() + " validate " + model("link") + " " + model("gripper") + " --poses 3000";
+  EXPECT_EQ(shell(command).err, "");
+  const Result terminal = shell("script -qec \"" + command + "\" /dev/null");
+  EXPECT_EQ(terminal.code, 0);
+  EXPECT_NE(terminal.out.find(" of 375"), std::string::npos) << terminal.out;
+  EXPECT_NE(terminal.out.find("mismatches"), std::string::npos);
+}
+
+TEST_F(Program, ReportsNamesThatAreNoText) {
+  const std::string odd = (folder_ / "odd\xff\".off").string();
+  fs::copy_file(cube(), odd);
+  const Json report = json("inspect '" + odd + "' --depth 1 --html " + (folder_ / "page.html").string());
+  EXPECT_EQ(report.at("triangles"), 12);
+  expectComplaint("inspect '" + odd + "x.off'", kFailed, "no such file");
 }
 
 }  // namespace

@@ -6,6 +6,7 @@
 #include <sys/stat.h>
 #include <unistd.h>
 
+#include <algorithm>
 #include <cerrno>
 #include <climits>
 #include <cstdio>
@@ -117,11 +118,24 @@ void cleanUp(int signal) {
 
 }  // namespace
 
-void checkWritable(const std::string& file) {
-  std::error_code error;
-  if (fs::is_directory(file, error)) cannotWrite(file, EISDIR);
-  const std::string looked_at = isSpecial(file) ? file : folderOf(targetOf(file)).string();
-  if (::access(looked_at.c_str(), W_OK) != 0) cannotWrite(file, errno);
+void checkOutputs(const std::vector<std::string>& outputs, const std::vector<std::string>& inputs) {
+  std::vector<fs::path> taken;
+  for (const std::string& input : inputs) taken.push_back(targetOf(input));
+  for (const std::string& file : outputs) {
+    if (file.empty() || file == "-") continue;
+    std::error_code error;
+    if (fs::is_directory(file, error)) cannotWrite(file, EISDIR);
+    if (isSpecial(file)) {
+      if (::access(file.c_str(), W_OK) != 0) cannotWrite(file, errno);
+      continue;
+    }
+    const fs::path target = targetOf(file);
+    if (::access(folderOf(target).c_str(), W_OK) != 0) cannotWrite(file, errno);
+    if (std::find(taken.begin(), taken.end(), target) != taken.end()) {
+      throw std::runtime_error(file + ": would be written over: it is another file of this command");
+    }
+    taken.push_back(target);
+  }
 }
 
 std::string readFile(const std::string& file) {

@@ -2,11 +2,13 @@
 #pragma once
 
 #include <string>
+#include <vector>
 
 namespace bocst::program {
 
-/// Fails now rather than after minutes of work. @throws std::runtime_error when the file cannot be written.
-void checkWritable(const std::string& file);
+/// Fails now rather than after minutes of work. Empty names and "-" (stdout) are no files.
+/// @throws std::runtime_error when one of the outputs cannot be written, or is another output or an input, too.
+void checkOutputs(const std::vector<std::string>& outputs, const std::vector<std::string>& inputs);
 
 /// The whole of a text file. @throws std::runtime_error when it cannot be read.
 std::string readFile(const std::string& file);

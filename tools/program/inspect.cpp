@@ -103,10 +103,7 @@ struct Inspect {
   Output output;
 
   int run() const {
-    output.check();
-    for (const std::string& written : {spheres_file, html_file}) {
-      if (!written.empty()) checkWritable(written);
-    }
+    output.check({file}, {spheres_file, html_file});
     const std::shared_ptr<const Mesh> mesh = loadMesh(file);
     const Health health = healthOf(*mesh);
     const Grown grown = grow(mesh, model.options(), !no_error);

@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <exception>
 #include <iostream>
+#include <new>
 #include <stdexcept>
 #include <string>
 
@@ -43,6 +44,8 @@ int main(int argc, char** argv) {
   } catch (const CLI::ParseError& e) {
     if (e.get_exit_code() == 0) return program.exit(e);  // --help
     return complain(e.what(), kUsage);
+  } catch (const std::bad_alloc&) {
+    return complain("out of memory", kFailed);
   } catch (const std::exception& e) {
     return complain(e.what(), kFailed);
   }

@@ -17,7 +17,7 @@ struct Merge {
   Output output;
 
   int run() const {
-    output.check();
+    output.check(files);
     std::vector<Validation> parts;
     for (const std::string& file : files) {
       const Json json = Json::parse(readFile(file), nullptr, false);

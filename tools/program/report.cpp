@@ -14,8 +14,9 @@
 
 namespace bocst::program {
 
-void Output::check() const {
-  if (wantsJson() && json_file != "-") checkWritable(json_file);
+void Output::check(const std::vector<std::string>& inputs, std::vector<std::string> others) const {
+  others.push_back(json_file);
+  checkOutputs(others, inputs);
 }
 
 void Output::write(const Json& json) const {

@@ -19,8 +19,8 @@ class Output {
 
   bool wantsJson() const { return !json_file.empty(); }
 
-  /// Fails now rather than after minutes of work. @throws std::runtime_error when the file cannot be written.
-  void check() const;
+  /// As checkOutputs(), with `others` written beside this.
+  void check(const std::vector<std::string>& inputs = {}, std::vector<std::string> others = {}) const;
 
   /// As writeFile(). @throws std::runtime_error when that fails; main() looks after stdout.
   void write(const Json& json) const;

@@ -105,8 +105,7 @@ struct Validate {
   }
 
   int run() const {
-    output.check();
-    if (!html_file.empty()) checkWritable(html_file);
+    output.check({file_a, file_b}, {html_file});
     const std::shared_ptr<const Mesh> mesh_a = loadMesh(file_a);
     const std::shared_ptr<const Mesh> mesh_b = loadMesh(file_b);
     const MeshArrays a(*mesh_a, model.scalarKind());
