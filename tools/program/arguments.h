@@ -27,6 +27,7 @@ void addValidate(CLI::App& program, Job& job);
 void addMerge(CLI::App& program, Job& job);
 void addBench(CLI::App& program, Job& job);
 void addOracles(CLI::App& program, Job& job);
+void addManual(CLI::App& program, Job& job);  ///< After all others.
 
 /// The options of a model as the command line spells them.
 struct ModelArguments {
