@@ -30,8 +30,8 @@ class BOCST_EXPORT Mesh {
   /// The same from 32-bit indices, which are moved in rather than copied.
   static std::shared_ptr<const Mesh> fromIndices(std::vector<Eigen::Vector3d> vertices, std::vector<Indices> triangles);
 
-  std::size_t vertexCount() const { return vertices_.size(); }
-  std::size_t triangleCount() const { return triangles_.size(); }
+  std::size_t vertexCount() const { return vertices_.size(); }     ///< Unused ones included.
+  std::size_t triangleCount() const { return triangles_.size(); }  ///< At least 1.
 
   /// Vertex i, 0 <= i < vertexCount(), in the mesh's frame.
   const Eigen::Vector3d& vertex(std::size_t i) const { return vertices_[i]; }
@@ -41,10 +41,10 @@ class BOCST_EXPORT Mesh {
     const Indices& i = triangles_[t];
     return fcl::Triangle(i[0], i[1], i[2]);
   }
-  const Indices& indices(std::size_t t) const { return triangles_[t]; }
+  const Indices& indices(std::size_t t) const { return triangles_[t]; }  ///< The same as stored.
 
-  const std::vector<Eigen::Vector3d>& vertices() const { return vertices_; }
-  const std::vector<Indices>& triangles() const { return triangles_; }
+  const std::vector<Eigen::Vector3d>& vertices() const { return vertices_; }  ///< In the mesh's frame.
+  const std::vector<Indices>& triangles() const { return triangles_; }        ///< As stored.
 
   /// The axis-aligned box of all triangles, in the mesh's frame.
   const Eigen::AlignedBox3d& bounds() const { return bounds_; }

@@ -49,7 +49,7 @@ class BOCST_EXPORT Model : public fcl::CollisionGeometry<S> {
   Model(const Model&) = delete;
   Model& operator=(const Model&) = delete;
 
-  const Options& options() const;
+  const Options& options() const;  ///< As given.
 
   /// The mesh as it is now. Keeps it alive across updateVertices(). Null after releaseMesh().
   std::shared_ptr<const Mesh> mesh() const;
@@ -63,7 +63,7 @@ class BOCST_EXPORT Model : public fcl::CollisionGeometry<S> {
   /// "cpu", "occlusion", "sampled" or "compute".
   std::string oracleName() const;
 
-  Statistics statistics() const;
+  Statistics statistics() const;  ///< A snapshot.
 
   /// Makes the complete tree down to level `depth` resident (1 to 17), as the paper's tables count it; branches that
   /// queries have grown deeper are dropped first. For inspection: queries never need it.
@@ -75,7 +75,7 @@ class BOCST_EXPORT Model : public fcl::CollisionGeometry<S> {
   /// Applies ttl and memory budget as of `now` (3.1): drops each deepest branch level whose last use is longer ago
   /// than ttl; its parent's own time starts then. Queries do the same by themselves, now and then.
   void prune(Clock::time_point now);
-  void prune();
+  void prune();  ///< As of now.
 
   /// New positions for all vertices, same triangles: the tree falls back to its root, nothing is rebuilt.
   /// @throws std::invalid_argument for a wrong count or a bad vertex, std::logic_error after releaseMesh(); the model

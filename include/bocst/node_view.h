@@ -18,14 +18,14 @@ struct NodeView {
 
   /// Up to eight node ids, in octant order.
   struct Children {
-    std::array<std::uint32_t, 8> ids{};
-    std::uint32_t count = 0;
+    std::array<std::uint32_t, 8> ids{};  ///< The first `count` are meant.
+    std::uint32_t count = 0;             ///< 0 to 8.
 
-    const std::uint32_t* begin() const { return ids.data(); }
-    const std::uint32_t* end() const { return ids.data() + count; }
-    std::size_t size() const { return count; }
-    bool empty() const { return count == 0; }
-    std::uint32_t operator[](std::size_t i) const { return ids[i]; }
+    const std::uint32_t* begin() const { return ids.data(); }         ///< For range-for.
+    const std::uint32_t* end() const { return ids.data() + count; }   ///< For range-for.
+    std::size_t size() const { return count; }                        ///< 0 to 8.
+    bool empty() const { return count == 0; }                         ///< On the frontier.
+    std::uint32_t operator[](std::size_t i) const { return ids[i]; }  ///< 0 <= i < size().
   };
 
   std::uint32_t id = 0;          ///< Unique among the nodes of one visit(); the root is 0.

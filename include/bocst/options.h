@@ -34,8 +34,8 @@ using Clock = std::chrono::steady_clock;
 
 /// How a model grows, answers and forgets. Fixed when the model is made.
 struct Options {
-  Subdivision subdivision = Subdivision::kBono;
-  Answer answer = Answer::kExact;
+  Subdivision subdivision = Subdivision::kBono;  ///< How cells are divided.
+  Answer answer = Answer::kExact;                ///< What a query answers.
 
   /// Collision depth: the level at which kConservative answers; the root is level 1. From 1 to 17.
   int depth = 6;
@@ -44,7 +44,7 @@ struct Options {
   /// Only kBono's cells depend on it (4.4): its root cube has the smallest power of two that is >= d_t as its side.
   double dimension = 0;
 
-  OracleKind oracle = OracleKind::kAuto;
+  OracleKind oracle = OracleKind::kAuto;  ///< kAuto: BOCST_ORACLE if set, else the fastest that there is.
 
   /// Pixels a side of the views that kSampled draws, from 1 to 4096.
   int viewport = 16;

@@ -4,12 +4,16 @@
 #include <sys/wait.h>
 #include <unistd.h>
 
+#include <array>
 #include <cmath>
 #include <cstdio>
 #include <cstdlib>
 #include <filesystem>
 #include <fstream>
 #include <nlohmann/json.hpp>
+#include <regex>
+#include <set>
+#include <sstream>
 #include <stdexcept>
 #include <string>
 
@@ -37,12 +41,25 @@ class Program : public ::testing::Test {
     std::string err;
   };
 
-  Result run(const std::string& arguments) const {
+  static std::string program() { return std::string("'") + BOCST_PROGRAM + "'"; }
+
+  Result run(const std::string& arguments) const { return shell(program() + " " + arguments); }
+  Result runTo(const std::string& out, const std::string& arguments) const {
+    return shell("exec >" + out + "; " + program() + " " + arguments);
+  }
+
+  /// A line for the shell.
+  Result shell(const std::string& line) const {
     const std::string out = (folder_ / "out").string();
     const std::string err = (folder_ / "err").string();
-    const std::string command = std::string("'") + BOCST_PROGRAM + "' " + arguments + " >" + out + " 2>" + err;
-    const int status = std::system(command.c_str());
+    const int status = std::system(("exec >" + out + " 2>" + err + "; " + line).c_str());
     return {WIFEXITED(status) ? WEXITSTATUS(status) : -1, read(out), read(err)};
+  }
+
+  std::set<std::string> files() const {
+    std::set<std::string> names;
+    for (const auto& entry : fs::directory_iterator(folder_)) names.insert(entry.path().filename().string());
+    return names;
   }
 
   /// Runs with --json - and expects the exit code 0.
@@ -154,6 +171,67 @@ TEST_F(Program, MeasuresTheErrorThatThePaperDefines) {
   EXPECT_NEAR(report.at("levels")[0].at("error_max").get<double>(), (radius - 0.5) / (2 * radius), 1e-3);
 }
 
+TEST_F(Program, InspectsTheHealthOfAMesh) {
+  const Json sound = json("inspect " + cube() + " --depth 1").at("health");
+  EXPECT_EQ(sound.at("watertight"), true);
+  EXPECT_EQ(sound.at("components"), 1);
+  EXPECT_NEAR(sound.at("volume"), 1, 1e-12);
+  EXPECT_NEAR(sound.at("area"), 6, 1e-12);
+  EXPECT_NE(run("inspect " + cube() + " --depth 1").out.find("faults      none"), std::string::npos);
+
+  const std::string open = write("open.off", "OFF\n4 2 0\n0 0 0\n1 0 0\n1 1 0\n0 1 0\n3 0 1 2\n3 0 2 3\n");
+  const Json faulty = json("inspect " + open + " --depth 1").at("health");
+  EXPECT_EQ(faulty.at("watertight"), false);
+  EXPECT_EQ(faulty.at("open_edges"), 4);
+  EXPECT_TRUE(faulty.at("volume").is_null());
+  EXPECT_NE(run("inspect " + open + " --depth 1").out.find("open edges 4"), std::string::npos);
+}
+
+TEST_F(Program, WritesTheSpheresOfALevel) {
+  const auto file = [this](const std::string& ending) { return (folder_ / ("spheres" + ending)).string(); };
+  const std::string inspect = "inspect " + model("gripper") + " --depth 4 --no-error ";
+  const std::size_t count = json(inspect + "--spheres " + file(".json")).at("levels")[3].at("nodes");
+  const Json spheres = Json::parse(read(file(".json")));
+  ASSERT_EQ(spheres.size(), count);
+
+  ASSERT_EQ(run(inspect + "--spheres " + file(".ply")).code, 0);
+  std::istringstream ply(read(file(".ply")));
+  std::string line, header;
+  while (std::getline(ply, line) && line != "end_header") header += line + '\n';
+  EXPECT_EQ(header, "ply\nformat ascii 1.0\nelement vertex " + std::to_string(count) +
+                        "\nproperty double x\nproperty double y\nproperty double z\nproperty double radius\n");
+
+  ASSERT_EQ(run(inspect + "--link hand --spheres " + file(".yaml")).code, 0);
+  std::istringstream yaml(read(file(".yaml")));
+  std::getline(yaml, line);
+  EXPECT_EQ(line, "collision_spheres:");
+  std::getline(yaml, line);
+  EXPECT_EQ(line, "  \"hand\":");
+
+  // The same numbers in all; those of YAML in the form that its readers take for numbers.
+  const std::string number = "([-+]?[0-9]+|[-+]?[0-9]+\\.[0-9]*(?:[eE][-+][0-9]+)?)";
+  const std::regex center("    - \"center\": \\[" + number + ", " + number + ", " + number + "\\]");
+  const std::regex radius("      \"radius\": " + number);
+  for (const Json& sphere : spheres) {
+    std::array<double, 4> expected{}, other{};
+    for (std::size_t k = 0; k < 3; ++k) expected[k] = sphere.at("center")[k];
+    expected[3] = sphere.at("radius");
+    for (double& x : other) ply >> x;
+    EXPECT_EQ(other, expected);
+    std::smatch match;
+    std::getline(yaml, line);
+    ASSERT_TRUE(std::regex_match(line, match, center)) << line;
+    for (std::size_t k = 0; k < 3; ++k) other[k] = std::stod(match[k + 1]);
+    std::getline(yaml, line);
+    ASSERT_TRUE(std::regex_match(line, match, radius)) << line;
+    other[3] = std::stod(match[1]);
+    EXPECT_EQ(other, expected);
+  }
+  EXPECT_TRUE(ply >> std::ws && ply.eof());
+  EXPECT_FALSE(std::getline(yaml, line));
+  expectComplaint(inspect + "--spheres " + file(".txt"), kUsage, "--spheres");
+}
+
 TEST_F(Program, ValidatesAgainstFcl) {
   const std::string pair = "validate " + model("link") + " " + model("gripper") + " --poses 64 --seed 7";
   const Json exact = json(pair + " --contacts --reference obbrss,obb");
@@ -168,6 +246,59 @@ TEST_F(Program, ValidatesAgainstFcl) {
   EXPECT_EQ(conservative.at("false_negatives"), 0);
   EXPECT_GT(conservative.at("false_positives"), 0);
   EXPECT_EQ(json(pair + " --scalar float").at("mismatches"), 0);
+}
+
+TEST_F(Program, DividesAValidation) {
+  const std::string whole = "validate " + model("link") + " " + model("gripper") + " --poses 100 --seed 5";
+  for (const std::string options : {" --contacts", " --answer conservative --depth 5 --histogram"}) {
+    std::string shards;
+    for (const char* i : {"3", "1", "2"}) {
+      const std::string file = (folder_ / ("shard" + std::string(i) + ".json")).string();
+      ASSERT_EQ(run(whole + options + " --shard " + i + "/3 --json " + file).code, 0);
+      EXPECT_LT(Json::parse(read(file)).at("poses"), 60);
+      shards += " " + file;
+    }
+    EXPECT_EQ(json("merge" + shards), json(whole + options));
+    EXPECT_EQ(run("merge" + shards).out, run(whole + options).out);
+    expectComplaint("merge " + (folder_ / "shard1.json").string(), kFailed, "shard 2/3 is missing");
+    // A mismatch in one shard is one of the whole.
+    Json bad = Json::parse(read(folder_ / "shard2.json"));
+    bad["mismatches"] = 1;
+    bad["failures"] = {{{"at", 9}, {"pose", {1, 2, 3, 1, 0, 0, 0}}, {"what", "false negative"}}};
+    write("shard2.json", bad.dump());
+    EXPECT_EQ(run("merge" + shards + " --json -").code, kFailed);
+    expectComplaint("merge" + shards, kFailed, "1 of 100 poses answered wrongly, the first (false negative)");
+  }
+  expectComplaint("merge " + cube(), kFailed, "cube.off: not JSON");
+  expectComplaint("merge " + write("list.json", "[1, 2]"), kFailed, "list.json: not a report");
+  expectComplaint(whole + " --shard 4/3", kUsage, "--shard");
+  expectComplaint(whole + " --histogram", kUsage, "--histogram");
+}
+
+TEST_F(Program, SaysHowMuchConservativeAnswersOverestimate) {
+  const Json report = json("validate " + model("link") + " " + model("gripper") +
+                           " --poses 200 --seed 5 --answer conservative --depth 6 --histogram");
+  const Json& depths = report.at("overestimates");
+  ASSERT_EQ(depths.size(), 6u);
+  EXPECT_EQ(depths[5].at("false_positives"), report.at("false_positives"));
+  double last = 1e9;
+  std::size_t last_count = 200;
+  for (const Json& depth : depths) {
+    std::size_t sum = 0;
+    for (const Json& bin : depth.at("bins")) sum += bin.get<std::size_t>();
+    EXPECT_EQ(sum, depth.at("false_positives"));
+    EXPECT_LE(sum, last_count) << "depth " << depth.at("depth");
+    EXPECT_LE(depth.at("largest"), last);
+    last = depth.at("largest");
+    last_count = sum;
+    // At the worst pose the surfaces are apart, and the conservative answer of that depth is a hit.
+    std::string pose;
+    for (const Json& x : depth.at("pose")) pose += (pose.empty() ? "" : ",") + x.dump();
+    const std::string pair = "collide " + model("link") + " " + model("gripper") + " --pose=" + pose;
+    EXPECT_EQ(json(pair).at("collide"), false);
+    EXPECT_EQ(json(pair + " --answer conservative --depth " + depth.at("depth").dump()).at("collide"), true);
+  }
+  EXPECT_GT(last_count, 0u);
 }
 
 TEST_F(Program, ComparesWithFcl) {
@@ -195,11 +326,7 @@ TEST_F(Program, WritesJsonFilesWhole) {
   const std::string file = (folder_ / "report.json").string();
   EXPECT_EQ(run("inspect " + cube() + " --depth 2 --json " + file).out, "");
   EXPECT_EQ(Json::parse(read(file)).at("levels").size(), 2u);
-  std::size_t files = 0;
-  for (const auto& entry : fs::directory_iterator(folder_)) {
-    files += entry.path().filename().string().rfind("report.json", 0) == 0;
-  }
-  EXPECT_EQ(files, 1u) << "temporary files are left";
+  EXPECT_EQ(files(), (std::set<std::string>{"report.json", "cube.off", "out", "err"}));
   expectComplaint("inspect " + cube() + " --json " + (folder_ / "none" / "r.json").string(), kFailed, "r.json");
   expectComplaint("inspect " + cube() + " --json " + folder_.string(), kFailed, "cannot be written");
   expectComplaint("inspect " + cube() + " --json /dev/full", kFailed, "/dev/full");
@@ -234,6 +361,90 @@ TEST_F(Program, ExplainsWhatFails) {
   expectComplaint("collide " + cube() + " " + write("empty.stl", ""), kFailed, "empty.stl: is empty");
   expectComplaint("validate " + write("cut.ply", "ply\nformat ascii 1.0\n") + " " + cube(), kFailed,
                   "cut.ply: truncated");
+}
+
+TEST_F(Program, ExplainsWhatCannotBeWritten) {
+  const std::string inspect = "inspect " + cube() + " --depth 2";
+  for (const std::string option : {"--json", "--html"}) {
+    expectComplaint(inspect + " " + option + " /dev/full", kFailed, "/dev/full: cannot be written: No space left");
+    expectComplaint(inspect + " " + option + " " + (folder_ / "none" / "f").string(), kFailed, "none/f");
+    expectComplaint(inspect + " " + option + " " + folder_.string(), kFailed, "Is a directory");
+    expectComplaint(inspect + " " + option + " " + folder_.string() + "/" + std::string(300, 'x'), kFailed, "too long");
+  }
+  expectComplaint(inspect + " --spheres " + (folder_ / "none" / "f.ply").string(), kFailed, "none/f.ply");
+  EXPECT_EQ(runTo("/dev/full", inspect).err, "bocst: stdout: cannot be written\n");
+  EXPECT_EQ(runTo("/dev/full", inspect + " --json -").code, kFailed);
+  // What goes in, or out elsewhere, is not written over.
+  const std::string ply = (folder_ / "a.ply").string();
+  ASSERT_EQ(run(inspect + " --spheres " + ply).code, 0);
+  const std::string before = read(ply);
+  fs::create_symlink(ply, folder_ / "b.ply");
+  expectComplaint("inspect " + ply + " --spheres " + (folder_ / "b.ply").string(), kFailed, "another file");
+  expectComplaint(inspect + " --html " + ply + " --json " + ply, kFailed, "another file");
+  EXPECT_EQ(read(ply), before);
+  // A link stays one.
+  ASSERT_EQ(run(inspect + " --json " + (folder_ / "b.ply").string()).code, 0);
+  EXPECT_TRUE(fs::is_symlink(folder_ / "b.ply"));
+  EXPECT_EQ(Json::parse(read(ply)).at("triangles"), 12);
+}
+
+TEST_F(Program, LeavesTheOldFileWhenTheDiskIsFull) {
+  const std::string page = write("page.html", "as before");
+  const std::string command = "inspect " + model("link") + " --depth 5 --no-error --html " + page;
+  const std::string before = "trap '' XFSZ; ulimit -f 8; ";
+  const Result result = shell(before + program() + " " + command);
+  EXPECT_EQ(result.code, kFailed);
+  EXPECT_EQ(result.err, "bocst: " + page + ": cannot be written: File too large\n");
+  EXPECT_EQ(read(page), "as before");
+  EXPECT_EQ(files(), (std::set<std::string>{"page.html", "out", "err"}));
+}
+
+TEST_F(Program, LeavesNothingBehindWhenInterrupted) {
+  const std::string report = (folder_ / "report.json").string();
+  const std::string poses =
+      " validate " + model("link") + " " + model("gripper") + " --poses 100000000 --json " + report;
+  for (const std::string signal : {"INT", "TERM", "HUP"}) {
+    const Result result = shell("timeout --preserve-status -s " + signal + " 0.7 " + program() + poses);
+    EXPECT_GT(result.code, 128);
+    EXPECT_EQ(result.err, "bocst: interrupted\n");
+    EXPECT_EQ(files(), (std::set<std::string>{"out", "err"}));
+  }
+  // At any moment: the page is there whole, or not at all.
+  const std::string page = (folder_ / "page.html").string();
+  const std::string inspect = " inspect " + model("link") + " --depth 6 --no-error --html " + page;
+  ASSERT_EQ(shell(program() + inspect).code, 0);
+  const std::string whole = read(page);
+  std::set<bool> seen;
+  for (int ms = 2; ms < 200; ms += 4) {
+    fs::remove(page);
+    shell("timeout -s INT 0." +
+          std::string(ms < 10    ? "00"
+                      : ms < 100 ? "0"
+                                 : "") +
+          std::to_string(ms) + " " + program() + inspect);
+    std::set<std::string> left = files();
+    seen.insert(left.erase("page.html") == 1);
+    EXPECT_EQ(left, (std::set<std::string>{"out", "err"}));
+    EXPECT_TRUE(!fs::exists(page) || read(page).size() == whole.size());
+  }
+  EXPECT_EQ(seen.count(false), 1u) << "never interrupted in time";
+}
+
+TEST_F(Program, ShowsProgressToPeopleOnly) {
+  const std::string command = program() + " validate " + model("link") + " " + model("gripper") + " --poses 3000";
+  EXPECT_EQ(shell(command).err, "");
+  const Result terminal = shell("script -qec \"" + command + "\" /dev/null");
+  EXPECT_EQ(terminal.code, 0);
+  EXPECT_NE(terminal.out.find(" of 375"), std::string::npos) << terminal.out;
+  EXPECT_NE(terminal.out.find("mismatches"), std::string::npos);
+}
+
+TEST_F(Program, ReportsNamesThatAreNoText) {
+  const std::string odd = (folder_ / "odd\xff\".off").string();
+  fs::copy_file(cube(), odd);
+  const Json report = json("inspect '" + odd + "' --depth 1 --html " + (folder_ / "page.html").string());
+  EXPECT_EQ(report.at("triangles"), 12);
+  expectComplaint("inspect '" + odd + "x.off'", kFailed, "no such file");
 }
 
 }  // namespace

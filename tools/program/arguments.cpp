@@ -72,4 +72,9 @@ void addJson(CLI::App& command, Output& output) {
       ->type_name("FILE|-");
 }
 
+void addHtml(CLI::App& command, std::string& file) {
+  command.add_option("--html", file, "write a page that shows it in 3D; it needs a browser with WebGL 2, no network")
+      ->type_name("FILE");
+}
+
 }  // namespace bocst::program

@@ -24,8 +24,10 @@ using Job = std::function<int()>;
 void addCollide(CLI::App& program, Job& job);
 void addInspect(CLI::App& program, Job& job);
 void addValidate(CLI::App& program, Job& job);
+void addMerge(CLI::App& program, Job& job);
 void addBench(CLI::App& program, Job& job);
 void addOracles(CLI::App& program, Job& job);
+void addManual(CLI::App& program, Job& job);  ///< After all others.
 
 /// The options of a model as the command line spells them.
 struct ModelArguments {
@@ -45,9 +47,11 @@ struct ModelArguments {
   Options options() const;
   Scalar scalarKind() const { return scalar == "float" ? Scalar::kFloat : Scalar::kDouble; }
   bool exact() const { return answer == "exact"; }
+  std::string answerText() const { return exact() ? "exact" : "conservative, depth " + std::to_string(depth); }
   Json json() const;
 };
 
-void addJson(CLI::App& command, Output& output);  ///< --json
+void addJson(CLI::App& command, Output& output);     ///< --json
+void addHtml(CLI::App& command, std::string& file);  ///< --html
 
 }  // namespace bocst::program

@@ -28,9 +28,31 @@ class ModelPair : public PairOf<S, Model<S>, BocstPair, BocstQueries<S>> {
  public:
   using PairOf<S, Model<S>, BocstPair, BocstQueries<S>>::PairOf;
 
+  std::vector<TouchingPoint> touchingPoints(const Eigen::Isometry3d& X_AB, std::size_t limit) const override {
+    const fcl::CollisionRequest<S> request(limit, true);
+    fcl::CollisionResult<S> result;
+    this->collide(X_AB, QueryPair::Order::kAB, request, result);
+    std::vector<TouchingPoint> points;
+    points.reserve(result.numContacts());
+    for (std::size_t i = 0; i < result.numContacts(); ++i) {
+      const fcl::Contact<S>& c = result.getContact(i);
+      points.push_back({c.pos.template cast<double>(), c.normal.template cast<double>(), c.penetration_depth});
+    }
+    return points;
+  }
+
+  std::vector<NodeView> nodesA() const override { return nodesOf(this->a()); }
+  std::vector<NodeView> nodesB() const override { return nodesOf(this->b()); }
   Statistics statisticsA() const override { return this->a().statistics(); }
   Statistics statisticsB() const override { return this->b().statistics(); }
   std::string oracleName() const override { return this->a().oracleName(); }
+
+ private:
+  static std::vector<NodeView> nodesOf(const Model<S>& model) {
+    std::vector<NodeView> nodes;
+    model.visit([&nodes](const NodeView& node) { nodes.push_back(node); });
+    return nodes;
+  }
 };
 
 template <typename S>

@@ -9,6 +9,8 @@
 #include <vector>
 
 #include "arguments.h"
+#include "file.h"
+#include "pair_page.h"
 #include "poses.h"
 #include "query_pair.h"
 
@@ -55,10 +57,11 @@ struct Collide {
   Pose pose;
   std::size_t max_contacts = QueryPair::kAll;
   ModelArguments model;
+  std::string html_file;
   Output output;
 
   int run() const {
-    output.check();
+    output.check({file_a, file_b}, {html_file});
     const std::shared_ptr<const Mesh> mesh_a = loadMesh(file_a);
     const std::shared_ptr<const Mesh> mesh_b = loadMesh(file_b);
     const MeshArrays a(*mesh_a, model.scalarKind());
@@ -94,6 +97,9 @@ struct Collide {
                    ? our_contacts == fcl_contacts
                    : std::includes(our_contacts.begin(), our_contacts.end(), fcl_contacts.begin(), fcl_contacts.end());
     }
+    if (!html_file.empty()) {
+      writeFile(html_file, pairPage(file_a, *mesh_a, file_b, *mesh_b, model, pose, max_contacts, {}).html());
+    }
     if (output.wantsJson()) {
       const auto compare = [](double bocst, double fcl) { return Json{{"bocst", bocst}, {"fcl", fcl}}; };
       const auto count = [](std::size_t bocst, std::size_t fcl) { return Json{{"bocst", bocst}, {"fcl", fcl}}; };
@@ -122,7 +128,7 @@ struct Collide {
       head.row({"A", file_a + ", " + std::to_string(a.triangles.size()) + " triangles"});
       head.row({"B", file_b + ", " + std::to_string(b.triangles.size()) + " triangles"});
       head.row({"B in A", pose.text()});
-      head.row({"answer", model.exact() ? "exact" : "conservative, depth " + std::to_string(model.depth)});
+      head.row({"answer", model.answerText()});
       head.print();
       std::cout << '\n' << (ours.touching ? "They collide." : "They do not collide.") << "\n\n";
       Table table;
@@ -170,6 +176,7 @@ void addCollide(CLI::App& program, Job& job) {
   command->add_option("--max-contacts", collide->max_contacts, "stop after so many contacts; all if not given")
       ->check(CLI::PositiveNumber);
   collide->model.addAll(*command);
+  addHtml(*command, collide->html_file);
   addJson(*command, collide->output);
   command->callback([collide, &job] { job = [collide] { return collide->run(); }; });
 }

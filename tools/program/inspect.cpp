@@ -3,81 +3,165 @@
 #include <bocst/model.h>
 
 #include <CLI/CLI.hpp>
+#include <filesystem>
 #include <iostream>
 #include <memory>
+#include <stdexcept>
+#include <utility>
 #include <vector>
 
 #include "arguments.h"
+#include "file.h"
+#include "health.h"
+#include "page.h"
 #include "sphere_error.h"
+#include "spheres.h"
 
 namespace bocst::program {
 namespace {
+
+/// A whole tree, down to the collision depth.
+struct Grown {
+  std::vector<NodeView> nodes;
+  std::vector<LevelError> levels;  ///< Only nodes are counted where errors were not wanted.
+  std::size_t bytes = 0;
+  std::string oracle;
+  double microseconds = 0;
+};
+
+Grown grow(const std::shared_ptr<const Mesh>& mesh, Options options, bool errors) {
+  options.ttl = std::chrono::milliseconds(0);
+  Grown grown;
+  const Stopwatch watch;
+  Modeld tree(mesh, options);
+  tree.expandAll(options.depth);
+  grown.microseconds = watch.microseconds();
+  tree.visit([&grown](const NodeView& node) { grown.nodes.push_back(node); });
+  grown.bytes = tree.statistics().resident_bytes;
+  grown.oracle = tree.oracleName();
+  if (errors) {
+    grown.levels = errorByLevel(*mesh, grown.nodes);
+    return grown;
+  }
+  for (const NodeView& node : grown.nodes) {
+    grown.levels.resize(std::max(grown.levels.size(), static_cast<std::size_t>(node.level)));
+    ++grown.levels[static_cast<std::size_t>(node.level) - 1].nodes;
+  }
+  return grown;
+}
+
+std::string extentsText(const Mesh& mesh) {
+  const Eigen::Vector3d extent = mesh.bounds().sizes();
+  return formatNumber(extent.x(), 6) + " x " + formatNumber(extent.y(), 6) + " x " + formatNumber(extent.z(), 6);
+}
+
+std::string watertightText(const Health& health) {
+  if (!health.watertight()) return "no";
+  if (!health.oriented()) return "yes, but triangles face both ways";
+  return health.volume < 0 ? "yes, inside out" : "yes";
+}
+
+/// What is wrong with a mesh, in words.
+std::string faultsText(const Health& health) {
+  std::string text;
+  const auto add = [&text](std::size_t count, const char* what) {
+    if (count > 0) text += std::string(text.empty() ? "" : ", ") + what + " " + std::to_string(count);
+  };
+  add(health.open_edges, "open edges");
+  add(health.non_manifold_edges, "non-manifold edges");
+  add(health.flipped_edges, "flipped edges");
+  add(health.degenerate_triangles, "degenerate triangles");
+  add(health.duplicate_triangles, "duplicate triangles");
+  add(health.repeated_vertices, "repeated vertices");
+  add(health.unused_vertices, "unused vertices");
+  return text.empty() ? "none" : text;
+}
+
+Json json(const Health& health) {
+  const bool has_volume = health.watertight() && health.oriented();
+  return {{"watertight", health.watertight()},
+          {"oriented", health.oriented()},
+          {"components", health.components},
+          {"open_edges", health.open_edges},
+          {"non_manifold_edges", health.non_manifold_edges},
+          {"flipped_edges", health.flipped_edges},
+          {"degenerate_triangles", health.degenerate_triangles},
+          {"duplicate_triangles", health.duplicate_triangles},
+          {"repeated_vertices", health.repeated_vertices},
+          {"unused_vertices", health.unused_vertices},
+          {"area", health.area},
+          {"volume", has_volume ? Json(health.volume) : Json()}};
+}
 
 struct Inspect {
   std::string file;
   ModelArguments model;
   bool no_error = false;
+  std::string spheres_file;
+  std::string link;
+  std::string html_file;
   Output output;
 
   int run() const {
-    output.check();
+    output.check({file}, {spheres_file, html_file});
     const std::shared_ptr<const Mesh> mesh = loadMesh(file);
-    Options options = model.options();
-    options.ttl = std::chrono::milliseconds(0);
-    const Stopwatch growing;
-    Modeld tree(mesh, options);
-    tree.expandAll(model.depth);
-    const double grow_time = growing.microseconds();
-    std::vector<NodeView> nodes;
-    tree.visit([&nodes](const NodeView& node) { nodes.push_back(node); });
-    const Statistics statistics = tree.statistics();
-
-    std::vector<LevelError> levels;
-    if (no_error) {
-      for (const NodeView& node : nodes) {
-        levels.resize(std::max(levels.size(), static_cast<std::size_t>(node.level)));
-        ++levels[static_cast<std::size_t>(node.level) - 1].nodes;
-      }
-    } else {
-      levels = errorByLevel(*mesh, nodes);
+    const Health health = healthOf(*mesh);
+    const Grown grown = grow(mesh, model.options(), !no_error);
+    if (!spheres_file.empty()) {
+      const std::string name = link.empty() ? std::filesystem::path(file).stem().string() : link;
+      writeFile(spheres_file, sphereFile(spheres_file, leavesAt(grown.nodes, model.depth), name));
     }
-
-    const Eigen::Vector3d extent = mesh->bounds().sizes();
+    if (!html_file.empty()) writeFile(html_file, page(mesh, health, grown).html());
     if (output.wantsJson()) {
-      Json report = {{"mesh", file},
-                     {"vertices", mesh->vertexCount()},
-                     {"triangles", mesh->triangleCount()},
-                     {"extents", {extent.x(), extent.y(), extent.z()}},
-                     {"subdivision", model.subdivision},
-                     {"dimension", model.dimension},
-                     {"depth", model.depth},
-                     {"oracle", tree.oracleName()},
-                     {"nodes", statistics.resident_nodes},
-                     {"tree_bytes", statistics.resident_bytes},
-                     {"grow_us", grow_time},
-                     {"root_radius", nodes.front().radius}};
-      report["levels"] = Json::array();
-      for (std::size_t i = 0; i < levels.size(); ++i) {
-        Json level = {{"level", i + 1}, {"nodes", levels[i].nodes}};
-        level["error_min"] = no_error ? Json() : Json(levels[i].min);
-        level["error_avg"] = no_error ? Json() : Json(levels[i].average);
-        level["error_max"] = no_error ? Json() : Json(levels[i].max);
-        report["levels"].push_back(level);
-      }
-      output.write(report);
-      return 0;
+      output.write(report(*mesh, health, grown));
+    } else {
+      print(*mesh, health, grown);
     }
+    return 0;
+  }
 
+ private:
+  Json report(const Mesh& mesh, const Health& health, const Grown& grown) const {
+    const Eigen::Vector3d extent = mesh.bounds().sizes();
+    Json report = {{"mesh", file},
+                   {"vertices", mesh.vertexCount()},
+                   {"triangles", mesh.triangleCount()},
+                   {"extents", {extent.x(), extent.y(), extent.z()}},
+                   {"health", json(health)},
+                   {"subdivision", model.subdivision},
+                   {"dimension", model.dimension},
+                   {"depth", model.depth},
+                   {"oracle", grown.oracle},
+                   {"nodes", grown.nodes.size()},
+                   {"tree_bytes", grown.bytes},
+                   {"grow_us", grown.microseconds},
+                   {"root_radius", grown.nodes.front().radius}};
+    report["levels"] = Json::array();
+    for (std::size_t i = 0; i < grown.levels.size(); ++i) {
+      const LevelError& error = grown.levels[i];
+      Json level = {{"level", i + 1}, {"nodes", error.nodes}};
+      level["error_min"] = no_error ? Json() : Json(error.min);
+      level["error_avg"] = no_error ? Json() : Json(error.average);
+      level["error_max"] = no_error ? Json() : Json(error.max);
+      report["levels"].push_back(level);
+    }
+    return report;
+  }
+
+  void print(const Mesh& mesh, const Health& health, const Grown& grown) const {
     Table summary(Table::Others::kLeft);
     summary.row({"mesh", file});
-    summary.row({"vertices", std::to_string(mesh->vertexCount())});
-    summary.row({"triangles", std::to_string(mesh->triangleCount())});
-    summary.row({"extents", formatNumber(extent.x(), 6) + " x " + formatNumber(extent.y(), 6) + " x " +
-                                formatNumber(extent.z(), 6)});
-    summary.row(
-        {"tree", model.subdivision + ", depth " + std::to_string(model.depth) + ", oracle " + tree.oracleName()});
-    summary.row({"grown in", formatTime(grow_time)});
-    summary.row({"bytes", formatBytes(static_cast<double>(statistics.resident_bytes))});
+    summary.row({"vertices", std::to_string(mesh.vertexCount())});
+    summary.row({"triangles", std::to_string(mesh.triangleCount())});
+    summary.row({"extents", extentsText(mesh)});
+    summary.row({"components", std::to_string(health.components)});
+    summary.row({"watertight", watertightText(health)});
+    summary.row({"faults", faultsText(health)});
+    summary.row({"area", formatNumber(health.area, 6)});
+    if (health.watertight() && health.oriented()) summary.row({"volume", formatNumber(health.volume, 6)});
+    summary.row({"tree", model.subdivision + ", depth " + std::to_string(model.depth) + ", oracle " + grown.oracle});
+    summary.row({"grown in", formatTime(grown.microseconds)});
+    summary.row({"bytes", formatBytes(static_cast<double>(grown.bytes))});
     summary.print();
     std::cout << '\n';
     Table table;
@@ -86,17 +170,38 @@ struct Inspect {
     } else {
       table.row({"level", "nodes", "error min", "average", "max"});
     }
-    for (std::size_t i = 0; i < levels.size(); ++i) {
-      std::vector<std::string> row = {std::to_string(i + 1), std::to_string(levels[i].nodes)};
+    for (std::size_t i = 0; i < grown.levels.size(); ++i) {
+      const LevelError& error = grown.levels[i];
+      std::vector<std::string> row = {std::to_string(i + 1), std::to_string(error.nodes)};
       if (!no_error) {
-        row.push_back(formatNumber(levels[i].min));
-        row.push_back(formatNumber(levels[i].average));
-        row.push_back(formatNumber(levels[i].max));
+        row.push_back(formatNumber(error.min));
+        row.push_back(formatNumber(error.average));
+        row.push_back(formatNumber(error.max));
       }
       table.row(row);
     }
     table.print();
-    return 0;
+  }
+
+  /// Both subdivisions, the asked for first.
+  Page page(const std::shared_ptr<const Mesh>& mesh, const Health& health, const Grown& grown) const {
+    Page page(std::filesystem::path(file).filename().string());
+    page.fact("triangles", std::to_string(mesh->triangleCount()));
+    page.fact("vertices", std::to_string(mesh->vertexCount()));
+    page.fact("extents", extentsText(*mesh));
+    page.fact("components", std::to_string(health.components));
+    page.fact("watertight", watertightText(health));
+    page.fact("faults", faultsText(health));
+    page.object(std::filesystem::path(file).filename().string(), *mesh);
+    Options options = model.options();
+    const auto add = [&](const Grown& tree) {
+      page.tree(*mesh, tree.nodes, options.subdivision, options.dimension,
+                no_error ? std::vector<LevelError>() : tree.levels);
+    };
+    add(grown);
+    options.subdivision = options.subdivision == Subdivision::kOctree ? Subdivision::kBono : Subdivision::kOctree;
+    add(grow(mesh, options, !no_error));
+    return page;
   }
 };
 
@@ -104,18 +209,37 @@ struct Inspect {
 
 void addInspect(CLI::App& program, Job& job) {
   auto inspect = std::make_shared<Inspect>();
-  CLI::App* command = program.add_subcommand("inspect", "grow the whole tree of a mesh and measure it");
+  CLI::App* command =
+      program.add_subcommand("inspect", "the health of a mesh; grow its whole tree and measure, export and show it");
   command->footer(
       "The error of a node (paper, 5.2) is the greatest distance from a point of its sphere to the surface inside "
       "that\n"
-      "sphere, divided by the diameter of the root's sphere. Each level is shown as if the tree ended there.");
+      "sphere, divided by the diameter of the root's sphere. Each level is shown as if the tree ended there.\n"
+      "Vertices with equal coordinates count as one for components, edges and duplicates.\n"
+      "The page shows at most " +
+      std::to_string(Page::kMaxTriangles) + " triangles (a larger mesh is made coarser) and " +
+      std::to_string(Page::kMaxNodes) + " nodes of a tree.");
   command->add_option("mesh", inspect->file, "OBJ, PLY, STL, OFF or DAE file")->required();
   inspect->model.addDepth(*command);
   inspect->model.addShape(*command);
   inspect->model.addOracle(*command);
   command->add_flag("--no-error", inspect->no_error, "count nodes only");
+  command
+      ->add_option("--spheres", inspect->spheres_file,
+                   "write the spheres of the collision depth: .ply, .json or .yaml (cuRobo's sphere list)")
+      ->type_name("FILE");
+  command->add_option("--link", inspect->link, "the link's name in the .yaml file; the mesh's if not given")
+      ->type_name("NAME");
+  addHtml(*command, inspect->html_file);
   addJson(*command, inspect->output);
-  command->callback([inspect, &job] { job = [inspect] { return inspect->run(); }; });
+  command->callback([inspect, &job] {
+    try {
+      if (!inspect->spheres_file.empty()) checkSphereFile(inspect->spheres_file);
+    } catch (const std::invalid_argument& e) {
+      throw CLI::ValidationError("--spheres", e.what());
+    }
+    job = [inspect] { return inspect->run(); };
+  });
 }
 
 }  // namespace bocst::program

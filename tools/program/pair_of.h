@@ -63,7 +63,6 @@ class PairOf : public Base {
   const Geometry& a() const { return *a_; }
   const Geometry& b() const { return *b_; }
 
- private:
   void collide(const Eigen::Isometry3d& X_AB, QueryPair::Order order, const fcl::CollisionRequest<S>& request,
                fcl::CollisionResult<S>& result) const {
     const fcl::Transform3<S> X_WA = fcl::Transform3<S>::Identity();
@@ -77,6 +76,7 @@ class PairOf : public Base {
     }
   }
 
+ private:
   std::unique_ptr<Geometry> a_;
   std::unique_ptr<Geometry> b_;
 };

@@ -79,6 +79,7 @@ std::array<double, N> Random::direction() {
 
 PoseSampler::PoseSampler(const Mesh& a, const Mesh& b, const QueryPair& reference, std::uint64_t seed)
     : reference_(reference),
+      seed_(seed),
       random_(seed),
       center_a_(a.bounds().center()),
       center_b_(b.bounds().center()),
@@ -133,16 +134,17 @@ void PoseSampler::nextRay(int steps) {
   throw std::runtime_error("no pose found in which the two meshes touch");
 }
 
-Pose PoseSampler::nextAroundContact() {
-  if (left_on_ray_ == 0) {
-    nextRay(40);
-    left_on_ray_ = 8;
+std::array<Pose, PoseSampler::kPosesOnRay> PoseSampler::aroundContact(std::uint64_t ray) {
+  random_ = Random(Random(seed_).bits() ^ Random(ray).bits());
+  nextRay(40);
+  std::array<Pose, kPosesOnRay> poses;
+  for (std::size_t i = 0; i < 6; ++i) {
+    const int exponent = -30 + static_cast<int>(random_.bits() % 27);  // 2^-30 to 2^-3
+    const double gap = std::ldexp(1 + random_.uniform(), exponent) * smallerRadius();
+    poses[i] = at(contact_ + (i % 2 == 0 ? -gap : gap));
   }
-  --left_on_ray_;
-  if (left_on_ray_ < 2) return anywhereOnRay();
-  const int exponent = -30 + static_cast<int>(random_.bits() % 27);  // 2^-30 to 2^-3
-  const double gap = std::ldexp(1 + random_.uniform(), exponent) * std::min(radius_a_, radius_b_);
-  return at(contact_ + (left_on_ray_ % 2 == 0 ? gap : -gap));
+  for (std::size_t i = 6; i < kPosesOnRay; ++i) poses[i] = anywhereOnRay();
+  return poses;
 }
 
 Pose PoseSampler::nextAnywhere() {

@@ -4,6 +4,7 @@
 #include <bocst/mesh.h>
 
 #include <Eigen/Geometry>
+#include <algorithm>
 #include <array>
 #include <cstddef>
 #include <cstdint>
@@ -48,13 +49,19 @@ class PoseSampler {
  public:
   PoseSampler(const Mesh& a, const Mesh& b, const QueryPair& reference, std::uint64_t seed);
 
-  /// Around contact: of eight poses on a ray, six lie off contact by 1e-9 to 1e-1 of the smaller radius, evenly in the
-  /// logarithm and to both sides; two anywhere on the ray, as nextAnywhere().
-  Pose nextAroundContact();
+  static constexpr std::size_t kPosesOnRay = 8;
+
+  /// Poses on a ray that follows from the seed and its number alone, so that a run can be divided. Six lie off contact
+  /// by 1e-9 to 1e-1 of the smaller radius, evenly in the logarithm and to both sides; two anywhere on the ray, as
+  /// nextAnywhere().
+  std::array<Pose, kPosesOnRay> aroundContact(std::uint64_t ray);
 
   /// Each on a ray of its own, from where the meshes begin to touch to half as far again beyond where they part: about
   /// two of three touch.
   Pose nextAnywhere();
+
+  /// The radius of the sphere about the bounds of the smaller mesh.
+  double smallerRadius() const { return std::min(radius_a_, radius_b_); }
 
  private:
   /// @throws std::runtime_error when no ray finds a pose in which the meshes touch.
@@ -64,6 +71,7 @@ class PoseSampler {
   Pose anywhereOnRay();
 
   const QueryPair& reference_;
+  const std::uint64_t seed_;
   Random random_;
   Eigen::Vector3d center_a_;
   Eigen::Vector3d center_b_;
@@ -73,7 +81,6 @@ class PoseSampler {
   Eigen::Vector3d ray_ = Eigen::Vector3d::UnitX();
   double inner_ = 0;    ///< On the ray, the meshes touch from about here
   double contact_ = 0;  ///< to here, though maybe not all the way.
-  int left_on_ray_ = 0;
 };
 
 }  // namespace bocst::program

@@ -2,6 +2,7 @@
 #pragma once
 
 #include <bocst/mesh.h>
+#include <bocst/node_view.h>
 #include <bocst/options.h>
 #include <bocst/statistics.h>
 #include <fcl/math/triangle.h>
@@ -65,9 +66,23 @@ std::unique_ptr<FclPair> buildFclPair(FclTree tree, Scalar scalar, const MeshArr
 /// Bytes of the bounding volume nodes that FCL's OBBRSS tree takes for this many triangles.
 std::size_t fclTreeBytes(Scalar scalar, std::size_t triangles);
 
+/// Where two geometries touch, in A's frame.
+struct TouchingPoint {
+  Eigen::Vector3d position;
+  Eigen::Vector3d normal;  ///< A unit vector from A to B.
+  double depth = 0;        ///< In the meshes' length unit.
+};
+
 /// Two fresh bocst models.
 class BocstPair : public QueryPair {
  public:
+  /// As contacts(), in the order found, by their geometry.
+  virtual std::vector<TouchingPoint> touchingPoints(const Eigen::Isometry3d& X_AB, std::size_t limit = kAll) const = 0;
+
+  /// What is resident, parents before children.
+  virtual std::vector<NodeView> nodesA() const = 0;
+  virtual std::vector<NodeView> nodesB() const = 0;
+
   virtual Statistics statisticsA() const = 0;
   virtual Statistics statisticsB() const = 0;
   virtual std::string oracleName() const = 0;

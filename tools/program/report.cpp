@@ -1,94 +1,28 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #include "report.h"
 
-#include <sys/stat.h>
 #include <unistd.h>
 
 #include <algorithm>
-#include <cerrno>
 #include <cmath>
 #include <cstdio>
-#include <cstdlib>
-#include <filesystem>
 #include <iostream>
 #include <numeric>
-#include <stdexcept>
-#include <system_error>
 #include <utility>
 
+#include "file.h"
+
 namespace bocst::program {
-namespace {
 
-namespace fs = std::filesystem;
-
-[[noreturn]] void cannotWrite(const std::string& file, int error) {
-  throw std::runtime_error(file + ": cannot be written: " + std::generic_category().message(error));
-}
-
-fs::path folderOf(const std::string& file) {
-  const fs::path folder = fs::path(file).parent_path();
-  return folder.empty() ? fs::path(".") : folder;
-}
-
-/// Pipes and devices have no "whole or not at all".
-bool isSpecial(const std::string& file) {
-  std::error_code error;
-  const fs::file_status status = fs::status(file, error);
-  return fs::exists(status) && !fs::is_regular_file(status) && !fs::is_directory(status);
-}
-
-void writeAll(int fd, const std::string& text, const std::string& file) {
-  for (std::size_t done = 0; done < text.size();) {
-    const ssize_t n = ::write(fd, text.data() + done, text.size() - done);
-    if (n < 0 && errno == EINTR) continue;
-    if (n < 0) cannotWrite(file, errno);
-    done += static_cast<std::size_t>(n);
-  }
-}
-
-}  // namespace
-
-void Output::check() const {
-  if (json_file.empty() || json_file == "-") return;
-  std::error_code error;
-  if (fs::is_directory(json_file, error)) cannotWrite(json_file, EISDIR);
-  const bool special = isSpecial(json_file);
-  if (::access(special ? json_file.c_str() : folderOf(json_file).c_str(), W_OK) != 0) cannotWrite(json_file, errno);
+void Output::check(const std::vector<std::string>& inputs, std::vector<std::string> others) const {
+  others.push_back(json_file);
+  checkOutputs(others, inputs);
 }
 
 void Output::write(const Json& json) const {
-  const std::string text = json.dump(2) + "\n";
-  if (json_file == "-") {
-    std::cout << text << std::flush;
-    if (!std::cout) throw std::runtime_error("stdout: cannot be written");
-    return;
-  }
-  if (isSpecial(json_file)) {
-    std::FILE* stream = std::fopen(json_file.c_str(), "w");
-    if (stream == nullptr) cannotWrite(json_file, errno);
-    const bool good = std::fputs(text.c_str(), stream) >= 0;
-    if (std::fclose(stream) != 0 || !good) cannotWrite(json_file, errno);
-    return;
-  }
-  // A temporary file beside it, then a rename, which replaces at once.
-  std::string temporary = (folderOf(json_file) / (fs::path(json_file).filename().string() + ".XXXXXX")).string();
-  const int fd = ::mkstemp(temporary.data());
-  if (fd < 0) cannotWrite(json_file, errno);
-  try {
-    writeAll(fd, text, json_file);
-    const mode_t mask = ::umask(0);
-    ::umask(mask);
-    if (::fchmod(fd, 0666 & ~mask) != 0) cannotWrite(json_file, errno);
-  } catch (...) {
-    ::close(fd);
-    ::unlink(temporary.c_str());
-    throw;
-  }
-  if (::close(fd) != 0 || std::rename(temporary.c_str(), json_file.c_str()) != 0) {
-    const int error = errno;
-    ::unlink(temporary.c_str());
-    cannotWrite(json_file, error);
-  }
+  const std::string text = json.dump(2, ' ', false, Json::error_handler_t::replace) + "\n";
+  if (json_file != "-") return writeFile(json_file, text);
+  std::cout << text << std::flush;
 }
 
 void Table::print() const {

@@ -19,10 +19,10 @@ class Output {
 
   bool wantsJson() const { return !json_file.empty(); }
 
-  /// Fails now rather than after minutes of work. @throws std::runtime_error when the file cannot be written.
-  void check() const;
+  /// As checkOutputs(), with `others` written beside this.
+  void check(const std::vector<std::string>& inputs = {}, std::vector<std::string> others = {}) const;
 
-  /// Files appear whole or not at all. @throws std::runtime_error when that fails.
+  /// As writeFile(). @throws std::runtime_error when that fails; main() looks after stdout.
   void write(const Json& json) const;
 };
 

@@ -6,14 +6,18 @@
 #include <array>
 #include <iostream>
 #include <memory>
+#include <optional>
 #include <stdexcept>
 #include <string>
 #include <utility>
 #include <vector>
 
 #include "arguments.h"
+#include "file.h"
+#include "pair_page.h"
 #include "poses.h"
 #include "query_pair.h"
+#include "validation.h"
 
 namespace bocst::program {
 namespace {
@@ -26,28 +30,12 @@ struct Validate {
   std::size_t poses = 1000;
   std::uint64_t seed = 1;
   bool compare_contacts = false;
+  bool histogram = false;
+  Shard shard;
   std::vector<std::string> references{"obbrss"};
   ModelArguments model;
+  std::string html_file;
   Output output;
-
-  /// A pose with a wrong answer and what was wrong, for the report.
-  struct Failure {
-    Pose pose;
-    std::string what;
-  };
-
-  struct Count {
-    std::size_t reference_hits = 0;
-    std::size_t hits = 0;
-    std::size_t false_negatives = 0;
-    std::size_t false_positives = 0;
-    std::size_t order_differences = 0;
-    std::size_t reference_order_differences = 0;
-    std::size_t contact_differences = 0;
-    std::size_t lost_by_fcl = 0;
-    std::size_t mismatches = 0;
-    std::vector<Failure> failures;
-  };
 
   static FclTree treeOf(const std::string& name) {
     return name == "obb" ? FclTree::kObb : name == "rss" ? FclTree::kRss : FclTree::kObbRss;
@@ -63,8 +51,9 @@ struct Validate {
     });
   }
 
-  void check(const Pose& pose, const QueryPair& ours, const std::vector<std::unique_ptr<FclPair>>& all,
-             Count& count) const {
+  /// @return does the reference say that they touch?
+  bool check(std::size_t number, const Pose& pose, const QueryPair& ours,
+             const std::vector<std::unique_ptr<FclPair>>& all, Validation& sum) const {
     const Eigen::Isometry3d X_AB = pose.transform();
     bool missed = false;
     bool invented = false;
@@ -96,28 +85,27 @@ struct Validate {
       }
     }
     const bool order_matters = hit[0] != hit[1];
-    count.reference_hits += reference_hit[0];
-    count.hits += hit[0];
-    count.false_negatives += missed;
-    count.false_positives += invented;
-    count.order_differences += order_matters;
-    count.reference_order_differences += reference_hit[0] != reference_hit[1];
-    count.contact_differences += sets;
-    count.lost_by_fcl += lost;
-    const bool wrong = missed || (model.exact() ? invented || sets : order_matters);
-    if (!wrong) return;
-    ++count.mismatches;
-    constexpr std::size_t kEnough = 16;
-    if (count.failures.size() < kEnough) {
-      count.failures.push_back({pose, missed           ? "false negative"
-                                      : !model.exact() ? "argument order matters"
-                                      : invented       ? "false positive"
-                                                       : "contacts differ"});
+    ++sum.count[Validation::kPoses];
+    sum.count[Validation::kReferenceHits] += reference_hit[0];
+    sum.count[Validation::kHits] += hit[0];
+    sum.count[Validation::kFalseNegatives] += missed;
+    sum.count[Validation::kFalsePositives] += invented;
+    sum.count[Validation::kOrderDifferences] += order_matters;
+    sum.count[Validation::kReferenceOrderDifferences] += reference_hit[0] != reference_hit[1];
+    sum.count[Validation::kContactDifferences] += sets;
+    sum.count[Validation::kLostByFcl] += lost;
+    if (missed || (model.exact() ? invented || sets : order_matters)) {
+      sum.fail(number, pose,
+               missed           ? "false negative"
+               : !model.exact() ? "argument order matters"
+               : invented       ? "false positive"
+                                : "contacts differ");
     }
+    return reference_hit[0];
   }
 
   int run() const {
-    output.check();
+    output.check({file_a, file_b}, {html_file});
     const std::shared_ptr<const Mesh> mesh_a = loadMesh(file_a);
     const std::shared_ptr<const Mesh> mesh_b = loadMesh(file_b);
     const MeshArrays a(*mesh_a, model.scalarKind());
@@ -125,67 +113,79 @@ struct Validate {
     std::vector<std::unique_ptr<FclPair>> all;
     for (const std::string& name : references) all.push_back(buildFclPair(treeOf(name), model.scalarKind(), a, b));
     const std::unique_ptr<BocstPair> ours = makeBocstPair(model.scalarKind(), a, b, model.options());
+    std::vector<std::unique_ptr<BocstPair>> by_depth;  // [0] is depth 1
+    if (histogram) {
+      Options options = model.options();
+      for (options.depth = 1; options.depth <= model.depth; ++options.depth) {
+        by_depth.push_back(makeBocstPair(model.scalarKind(), a, b, options));
+      }
+    }
 
+    Validation sum;
+    sum.settings = {{"a", file_a},
+                    {"b", file_b},
+                    {"options", model.json()},
+                    {"oracle", ours->oracleName()},
+                    {"reference", references},
+                    {"contacts_compared", compare_contacts},
+                    {"poses_in_all", poses},
+                    {"seed", seed}};
+    sum.shard = shard;
+    sum.overestimates.resize(by_depth.size());
     PoseSampler sampler(*mesh_a, *mesh_b, *all.front(), seed);
-    Count count;
+    const auto look = [&](std::size_t number, const Pose& pose) {
+      const bool touching = check(number, pose, *ours, all, sum);
+      if (touching || by_depth.empty()) return;
+      const Eigen::Isometry3d X_AB = pose.transform();
+      const double distance = all.front()->distance(X_AB) / sampler.smallerRadius();
+      for (std::size_t i = 0; i < by_depth.size(); ++i) {
+        if (by_depth[i]->touch(X_AB)) sum.overestimates[i].add(distance, number, pose);
+      }
+    };
+    std::optional<Pose> first;
     {
-      Progress progress("pose", poses);
-      for (std::size_t i = 0; i < poses; ++i) {
-        const Pose pose = sampler.nextAroundContact();
-        try {
-          check(pose, *ours, all, count);
-        } catch (const std::exception& e) {
-          throw std::runtime_error(std::string(e.what()) + " (pose " + pose.text() + ")");
+      const std::size_t rays = (poses + PoseSampler::kPosesOnRay - 1) / PoseSampler::kPosesOnRay;
+      Progress progress("ray", rays / shard.of);
+      for (std::size_t ray = 0; ray < rays; ++ray) {
+        if (!shard.has(ray)) continue;
+        std::size_t number = ray * PoseSampler::kPosesOnRay;
+        for (const Pose& pose : sampler.aroundContact(ray)) {
+          if (number == poses) break;
+          if (!first) first = pose;
+          try {
+            look(number++, pose);
+          } catch (const std::exception& e) {
+            throw std::runtime_error(std::string(e.what()) + " (pose " + pose.text() + ")");
+          }
         }
         progress.step();
       }
     }
 
+    if (!html_file.empty() && first) writeFile(html_file, worst(*mesh_a, *mesh_b, sum, *first).html());
     if (output.wantsJson()) {
-      Json report = {{"a", file_a},
-                     {"b", file_b},
-                     {"options", model.json()},
-                     {"oracle", ours->oracleName()},
-                     {"reference", references},
-                     {"contacts_compared", compare_contacts},
-                     {"seed", seed},
-                     {"poses", poses},
-                     {"reference_hits", count.reference_hits},
-                     {"hits", count.hits},
-                     {"false_negatives", count.false_negatives},
-                     {"false_positives", count.false_positives},
-                     {"order_differences", count.order_differences},
-                     {"reference_order_differences", count.reference_order_differences},
-                     {"contact_differences", count.contact_differences},
-                     {"lost_by_fcl", count.lost_by_fcl},
-                     {"mismatches", count.mismatches},
-                     {"failures", Json::array()}};
-      for (const Failure& failure : count.failures) {
-        report["failures"].push_back({{"pose", failure.pose.numbers}, {"what", failure.what}});
-      }
-      output.write(report);
+      output.write(sum.json());
     } else {
-      Table table;
-      const auto row = [&table](const char* name, std::size_t n) { table.row({name, std::to_string(n)}); };
-      row("poses", poses);
-      row("reference hits", count.reference_hits);
-      row("bocst hits", count.hits);
-      row("false negatives", count.false_negatives);
-      row("false positives", count.false_positives);
-      row("argument order matters", count.order_differences);
-      row("argument order matters to FCL", count.reference_order_differences);
-      if (compare_contacts) row("sets of contacts differ", count.contact_differences);
-      if (model.scalarKind() == Scalar::kFloat) row("contacts lost by FCL", count.lost_by_fcl);
-      row("mismatches", count.mismatches);
-      table.print();
-      for (const Failure& failure : count.failures) {
-        std::cout << failure.what << ": --pose " << failure.pose.text() << '\n';
-      }
+      sum.print();
     }
-    if (count.mismatches == 0) return 0;
-    throw std::runtime_error(std::to_string(count.mismatches) + " of " + std::to_string(poses) +
-                             " poses answered wrongly, the first (" + count.failures.front().what + ") at --pose " +
-                             count.failures.front().pose.text());
+    sum.throwIfWrong();
+    return 0;
+  }
+
+ private:
+  /// The first mismatch; else where conservative answers overestimate most; else the first pose.
+  Page worst(const Mesh& mesh_a, const Mesh& mesh_b, const Validation& sum, const Pose& first) const {
+    Pose pose = first;
+    std::string why = "no mismatch; the first pose";
+    if (!sum.failures.empty()) {
+      pose = sum.failures.front().pose;
+      why = "mismatch: " + sum.failures.front().what;
+    } else if (!sum.overestimates.empty() && sum.overestimates.back().count() > 0) {
+      pose = sum.overestimates.back().pose;
+      why = "taken for touching though " + formatNumber(sum.overestimates.back().largest) +
+            " of the smaller radius apart, the farthest of " + std::to_string(sum.count[Validation::kPoses]) + " poses";
+    }
+    return pairPage(file_a, mesh_a, file_b, mesh_b, model, pose, QueryPair::kAll, {{"this pose", why}});
   }
 };
 
@@ -201,7 +201,8 @@ void addValidate(CLI::App& program, Job& job) {
       "false positive or another set of contacts; with conservative ones also a verdict that depends on the order.\n"
       "With --scalar float, pairs that FCL's trees cull though its own triangle test finds them touching do not "
       "count.\n"
-      "Exit code 0 means that there was no mismatch.");
+      "The page of --html shows the first mismatch, else the pose that conservative answers overestimate most (with\n"
+      "--histogram), else the first pose. Exit code 0 means that there was no mismatch.");
   command->add_option("a", validate->file_a, "mesh A: OBJ, PLY, STL, OFF or DAE file")->required();
   command->add_option("b", validate->file_b, "mesh B")->required();
   command->add_option("--poses", validate->poses, "number of poses")->check(CLI::PositiveNumber)->capture_default_str();
@@ -211,11 +212,30 @@ void addValidate(CLI::App& program, Job& job) {
       ->delimiter(',')
       ->check(CLI::IsMember({"obbrss", "obb", "rss"}))
       ->capture_default_str();
+  command->add_flag(
+      "--histogram", validate->histogram,
+      "how far apart the poses are that conservative answers of each depth up to --depth take for touching");
+  command
+      ->add_option_function<std::string>(
+          "--shard",
+          [validate](const std::string& text) {
+            try {
+              validate->shard = Shard::parse(text);
+            } catch (const std::invalid_argument& e) {
+              throw CLI::ValidationError("--shard", e.what());
+            }
+          },
+          "ask only part i of n of the poses; `bocst merge` adds the reports up")
+      ->type_name("i/n");
   validate->model.addAll(*command);
+  addHtml(*command, validate->html_file);
   addJson(*command, validate->output);
   command->callback([validate, &job] {
     if (validate->compare_contacts && !validate->model.exact()) {
       throw CLI::ValidationError("--contacts", "only exact answers have triangle pairs");
+    }
+    if (validate->histogram && validate->model.exact()) {
+      throw CLI::ValidationError("--histogram", "only conservative answers overestimate");
     }
     job = [validate] { return validate->run(); };
   });

@@ -1,0 +1,177 @@
+#!/usr/bin/env python3
+# SPDX-License-Identifier: BSD-3-Clause
+"""Usage: page_test.py PROGRAM MODELS [PICTURES]
+Opens the pages of `bocst inspect --html` and `bocst collide --html` in Chromium and uses them as a person would.
+PICTURES: a folder for screenshots."""
+
+import json
+import math
+import os
+import subprocess
+import sys
+import tempfile
+import unittest
+
+from browser import Browser
+
+PROGRAM, MODELS = sys.argv[1:3]
+PICTURES = sys.argv[3] if len(sys.argv) > 3 else None
+LINK, GRIPPER = (os.path.join(MODELS, name + ".obj") for name in ("link", "gripper"))
+
+# Pixels of the 3D view that are not background, in the frame that a change of `volume` causes.
+COVERAGE = """new Promise(done => {
+  document.getElementById('volume').dispatchEvent(new Event('input'));
+  requestAnimationFrame(() => {
+    const view = document.getElementById('view'), copy = document.createElement('canvas');
+    [copy.width, copy.height] = [view.width, view.height];
+    const context = copy.getContext('2d');
+    context.drawImage(view, 0, 0);
+    const pixels = context.getImageData(0, 0, copy.width, copy.height).data;
+    let covered = 0;
+    for (let i = 0; i < pixels.length; i += 4) covered += Math.abs(pixels[i] - 244) > 3 || Math.abs(pixels[i + 2] - 248) > 3;
+    done(covered);
+  });
+})"""
+
+
+def torus(file, n):
+    with open(file, "w", encoding="ascii") as out:
+        out.write(f"OFF\n{n * n} {2 * n * n} 0\n")
+        for i in range(n):
+            for j in range(n):
+                u, v = 2 * math.pi * i / n, 2 * math.pi * j / n
+                r = 1 + 0.3 * math.cos(v)
+                out.write(f"{r * math.cos(u)} {r * math.sin(u)} {0.3 * math.sin(v)}\n")
+        for i in range(n):
+            for j in range(n):
+                a, b, c, d = (x % n * n + y % n for x in (i, i + 1) for y in (j, j + 1))
+                out.write(f"3 {a} {c} {b}\n3 {b} {c} {d}\n")
+
+
+class PageTest(unittest.TestCase):
+    def setUp(self):
+        self.folder = tempfile.TemporaryDirectory()
+        self.page = os.path.join(self.folder.name, "page.html")
+
+    def tearDown(self):
+        self.folder.cleanup()
+
+    def report(self, *arguments):
+        """Makes the page, and gives the report beside it."""
+        done = subprocess.run([PROGRAM, *arguments, "--html", self.page, "--json", "-"], check=True,
+                              stdout=subprocess.PIPE)
+        return json.loads(done.stdout)
+
+    def keep(self, browser, name):
+        if PICTURES:
+            browser.screenshot(os.path.join(PICTURES, name + ".png"))
+
+    def test_inspect_shows_each_level_of_both_trees(self):
+        counts = {}
+        for name, subdivision in (("O-BOCST", "octree"), ("B-BOCST", "bono")):
+            report = self.report("inspect", LINK, "--depth", "6", "--subdivision", subdivision)
+            counts[name] = [level["nodes"] for level in report["levels"]]
+        self.assertNotEqual(counts["O-BOCST"], counts["B-BOCST"])
+        with Browser() as browser:
+            browser.open(self.page)
+            self.assertEqual(browser.value("document.title"), "link.obj - bocst")
+            self.assertEqual(browser.value("document.getElementById('problem').hidden"), True)
+            for name, by_level in counts.items():
+                browser.choose("tree", name)
+                for level, count in enumerate(by_level, 1):
+                    browser.choose("level", level)
+                    self.assertEqual(browser.text("count").split()[0].replace(",", ""), str(count))
+            self.keep(browser, "inspect")
+            # What is drawn: nothing, the mesh, and ever less of spheres and boxes around it.
+            browser.choose("mesh", False)
+            browser.choose("volume", "none")
+            self.assertEqual(browser.value(COVERAGE), 0)
+            browser.choose("mesh", True)
+            mesh = browser.value(COVERAGE)
+            self.assertGreater(mesh, 10000)
+            for volume in ("spheres", "boxes"):
+                browser.choose("volume", volume)
+                covered = []
+                for level in (2, 4, 6):
+                    browser.choose("level", level)
+                    covered.append(browser.value(COVERAGE))
+                    self.keep(browser, f"inspect_{volume}_{level}")
+                self.assertGreater(covered[0], 1.05 * covered[1])
+                self.assertGreater(covered[1], 1.02 * covered[2])
+                self.assertGreater(covered[2], mesh)
+            self.assertEqual(browser.value("document.querySelectorAll('#plot circle').length"), 12)
+            browser.choose("up", "y")
+            self.assertNotEqual(browser.value(COVERAGE), covered[2])
+            self.assertEqual(browser.complaints, [])
+
+    def test_a_large_mesh_is_shown_coarser(self):
+        mesh = os.path.join(self.folder.name, "<img src=x onerror=alert(1)>.off")
+        torus(mesh, 400)
+        self.report("inspect", mesh, "--depth", "3", "--no-error")
+        self.assertLess(os.path.getsize(self.page), 8e6)
+        with Browser() as browser:
+            browser.open(self.page)
+            self.assertIn("of 320,000 triangles", browser.text("notes"))
+            self.assertEqual(browser.text("title"), os.path.basename(mesh))
+            self.assertEqual(browser.value("document.getElementById('plot-row').hidden"), True)
+            browser.choose("volume", "none")
+            self.assertGreater(browser.value(COVERAGE), 10000)
+            self.assertEqual(browser.complaints, [])
+
+    def test_collide_shows_what_grew_and_the_contacts(self):
+        for extra in ([], ["--answer", "conservative", "--depth", "5"]):
+            report = self.report("collide", LINK, GRIPPER, *extra)
+            with Browser() as browser:
+                browser.open(self.page)
+                facts = browser.text("facts")
+                self.assertIn("theycollide", facts)
+                if not extra:
+                    self.assertIn(f"contacts{report['contacts']}", facts)
+                at_level = []
+                for level in range(1, 6):
+                    browser.choose("level", level)
+                    at_level.append(int(browser.text("count").split()[0].replace(",", "")))
+                self.assertEqual(at_level[0], 2)
+                self.assertEqual(sorted(at_level), at_level)
+                self.keep(browser, "collide" + str(len(extra)))
+                browser.choose("cut", "leaves")
+                self.assertGreater(int(browser.text("count").split()[0].replace(",", "")), at_level[-1])
+                browser.choose("mesh", False)
+                browser.choose("volume", "none")
+                self.assertGreater(browser.value(COVERAGE), 100)
+                browser.choose("contacts", False)
+                self.assertEqual(browser.value(COVERAGE), 0)
+                self.assertEqual(browser.complaints, [])
+
+    def test_validate_shows_the_worst_case(self):
+        report = self.report("validate", LINK, GRIPPER, "--poses", "60", "--answer", "conservative", "--depth", "5",
+                             "--histogram")
+        self.assertGreater(report["overestimates"][4]["largest"], 0)
+        with Browser() as browser:
+            browser.open(self.page)
+            facts = browser.text("facts")
+            self.assertIn("theycollide", facts)
+            self.assertIn("apart, the farthest of 60 poses", facts)
+            pose = [float(x) for x in facts.split("B in A")[1].split("answer")[0].split(",")]
+            self.assertEqual(pose, report["overestimates"][4]["pose"])
+            self.assertEqual(browser.complaints, [])
+
+    def test_apart_there_are_no_contacts(self):
+        self.report("collide", LINK, GRIPPER, "--pose", "9,0,0,1,0,0,0")
+        with Browser() as browser:
+            browser.open(self.page)
+            self.assertIn("theydo not collide", browser.text("facts"))
+            self.assertEqual(browser.value("document.getElementById('contacts-row').hidden"), True)
+            self.assertEqual(browser.complaints, [])
+
+    def test_without_webgl_the_figures_remain(self):
+        report = self.report("inspect", LINK, "--depth", "4")
+        with Browser(webgl=False) as browser:
+            browser.open(self.page)
+            self.assertIn("no WebGL 2", browser.text("problem"))
+            browser.choose("level", 3)
+            self.assertEqual(browser.text("count"), f"{report['levels'][2]['nodes']} nodes")
+
+
+if __name__ == "__main__":
+    unittest.main(argv=sys.argv[:1], verbosity=2)

@@ -1,0 +1,280 @@
+// SPDX-License-Identifier: BSD-3-Clause
+// The parts of the program that can be tested without running it.
+#include <bocst/model.h>
+#include <gtest/gtest.h>
+
+#include <algorithm>
+#include <array>
+#include <map>
+#include <random>
+#include <set>
+#include <string>
+#include <vector>
+
+#include "display_mesh.h"
+#include "health.h"
+#include "meshes.h"
+#include "page.h"
+#include "spheres.h"
+#include "validation.h"
+
+namespace bocst {
+namespace {
+
+using program::Health;
+using program::healthOf;
+
+Health healthOfRaw(const test::Raw& raw) { return healthOf(*raw.mesh()); }
+
+test::Raw cube() { return test::box({0, 0, 0}, {1, 2, 3}); }
+
+/// As many vertices as corners: equal coordinates are one vertex in space.
+test::Raw exploded(const test::Raw& raw) {
+  test::Raw result;
+  for (const fcl::Triangle& t : raw.triangles) {
+    for (std::size_t k = 0; k < 3; ++k) result.vertices.push_back(raw.vertices[t[k]]);
+    result.triangles.emplace_back(result.vertices.size() - 3, result.vertices.size() - 2, result.vertices.size() - 1);
+  }
+  return result;
+}
+
+TEST(Health, OfASoundMesh) {
+  const Health health = healthOfRaw(cube());
+  EXPECT_TRUE(health.watertight());
+  EXPECT_TRUE(health.oriented());
+  EXPECT_EQ(health.components, 1u);
+  EXPECT_EQ(health.degenerate_triangles + health.duplicate_triangles + health.repeated_vertices, 0u);
+  EXPECT_NEAR(health.area, 22, 1e-12);
+  EXPECT_NEAR(std::abs(health.volume), 6, 1e-12);
+}
+
+TEST(Health, SeesTheShapeRatherThanTheIndices) {
+  const Health health = healthOfRaw(exploded(cube()));
+  EXPECT_TRUE(health.watertight());
+  EXPECT_EQ(health.components, 1u);
+  EXPECT_EQ(health.repeated_vertices, 36u - 8u);
+  EXPECT_NEAR(std::abs(health.volume), 6, 1e-12);
+  test::Raw zeros = test::box({0, 0, 0}, {1, 1, 1});
+  for (std::size_t i = 0; i < zeros.vertices.size(); ++i) {
+    for (int k = 0; k < 3; ++k) {
+      if (i % 2 == 0 && zeros.vertices[i][k] == 0) zeros.vertices[i][k] = -0.0;
+    }
+  }
+  EXPECT_EQ(healthOfRaw(exploded(zeros)).repeated_vertices, 36u - 8u) << "-0 is 0";
+}
+
+TEST(Health, TurnedInsideOutTheVolumeChangesItsSign) {
+  test::Raw raw = cube();
+  const double volume = healthOfRaw(raw).volume;
+  for (fcl::Triangle& t : raw.triangles) t = fcl::Triangle(t[1], t[0], t[2]);
+  EXPECT_DOUBLE_EQ(healthOfRaw(raw).volume, -volume);
+}
+
+TEST(Health, CountsEachFault) {
+  test::Raw raw = cube();
+  raw.triangles.pop_back();
+  EXPECT_EQ(healthOfRaw(raw).open_edges, 3u);
+  EXPECT_FALSE(healthOfRaw(raw).watertight());
+  EXPECT_EQ(healthOfRaw(raw).volume, 0);
+
+  raw = cube();
+  raw.triangles[0] = fcl::Triangle(raw.triangles[0][1], raw.triangles[0][0], raw.triangles[0][2]);
+  EXPECT_EQ(healthOfRaw(raw).flipped_edges, 3u);
+  EXPECT_TRUE(healthOfRaw(raw).watertight());
+  EXPECT_FALSE(healthOfRaw(raw).oriented());
+
+  raw = cube();
+  raw.triangles.emplace_back(raw.triangles[0][2], raw.triangles[0][0], raw.triangles[0][1]);
+  EXPECT_EQ(healthOfRaw(raw).duplicate_triangles, 1u);
+  EXPECT_EQ(healthOfRaw(raw).non_manifold_edges, 3u);
+
+  raw = cube();
+  raw.vertices.emplace_back(9, 9, 9);
+  EXPECT_EQ(healthOfRaw(raw).unused_vertices, 1u);
+  raw.triangles.emplace_back(0, 0, 1);  // a segment
+  raw.triangles.emplace_back(2, 2, 2);  // a point
+  EXPECT_EQ(healthOfRaw(raw).degenerate_triangles, 2u);
+  EXPECT_TRUE(healthOfRaw(raw).watertight()) << "what has no three corners has no edges";
+
+  raw = cube();
+  raw.add(test::box({5, 5, 5}, {6, 6, 6}));
+  EXPECT_EQ(healthOfRaw(raw).components, 2u);
+  EXPECT_EQ(healthOfRaw(test::adversarial()).degenerate_triangles,
+            healthOfRaw(exploded(test::adversarial())).degenerate_triangles);
+}
+
+TEST(Health, AgreesWithACountByMaps) {
+  std::mt19937 g(7);
+  for (int round = 0; round < 40; ++round) {
+    // A torus with holes, some triangles turned and some twice, in any order.
+    test::Raw raw = test::torus(8);
+    std::shuffle(raw.triangles.begin(), raw.triangles.end(), g);
+    raw.triangles.resize(raw.triangles.size() - g() % 100);
+    for (std::size_t i = 0; i < g() % 20; ++i) {
+      const fcl::Triangle t = raw.triangles[g() % raw.triangles.size()];
+      raw.triangles.emplace_back(t[1], t[0], t[2]);
+    }
+    std::map<std::set<std::size_t>, std::vector<bool>> edges;
+    std::set<std::set<std::size_t>> distinct;
+    for (const fcl::Triangle& t : raw.triangles) {
+      distinct.insert({t[0], t[1], t[2]});
+      for (std::size_t k = 0; k < 3; ++k) edges[{t[k], t[(k + 1) % 3]}].push_back(t[k] < t[(k + 1) % 3]);
+    }
+    std::array<std::size_t, 3> expected{};
+    for (const auto& [edge, uses] : edges) {
+      expected[0] += uses.size() == 1;
+      expected[1] += uses.size() > 2;
+      expected[2] += uses.size() == 2 && uses[0] == uses[1];
+    }
+    const Health health = healthOfRaw(raw);
+    EXPECT_EQ((std::array<std::size_t, 3>{health.open_edges, health.non_manifold_edges, health.flipped_edges}),
+              expected);
+    EXPECT_EQ(health.duplicate_triangles, raw.triangles.size() - distinct.size());
+  }
+}
+
+TEST(DisplayMesh, KeepsASmallMeshAndMakesALargeOneCoarser) {
+  const auto mesh = test::torus(64).scale(1e-3).move({1e3, -5, 0}).mesh();
+  const program::DisplayMesh all = program::displayMesh(*mesh, 1u << 20);
+  ASSERT_EQ(all.triangles(), mesh->triangleCount());
+  const double size = program::displaySize(*mesh);
+  for (std::size_t t = 0; t < mesh->triangleCount(); ++t) {
+    for (std::size_t c = 0; c < 3; ++c) {
+      const Eigen::Vector3d& corner = mesh->vertex(mesh->indices(t)[c]);
+      for (std::size_t k = 0; k < 3; ++k) {
+        const double shown = (all.positions[3 * all.indices[3 * t + c] + k] / 65535.0 - 0.5) * size;
+        EXPECT_NEAR(shown + mesh->bounds().center()[static_cast<int>(k)], corner[static_cast<int>(k)], size * 1e-5);
+      }
+    }
+  }
+  const program::DisplayMesh few = program::displayMesh(*mesh, 1000);
+  EXPECT_LE(few.triangles(), 1000u);
+  EXPECT_GT(few.triangles(), 100u);
+  for (const std::uint32_t i : few.indices) ASSERT_LT(3 * i + 2, few.positions.size());
+}
+
+TEST(DisplayMesh, OfAPoint) {
+  test::Raw raw;
+  raw.vertices.emplace_back(1, 2, 3);
+  raw.triangles.emplace_back(0, 0, 0);
+  EXPECT_EQ(program::displayMesh(*raw.mesh(), 10).triangles(), 0u);
+  EXPECT_EQ(program::displaySize(*raw.mesh()), 1);
+}
+
+/// Every dimension and subdivision: a page draws the boxes that the spheres are about.
+TEST(Page, BoxesAreThoseOfTheSpheres) {
+  for (const test::Raw& raw : {test::torus(16), test::adversarial(), test::soup(200, 3).move({100, -50, 7})}) {
+    const auto mesh = raw.mesh();
+    for (const Subdivision subdivision : {Subdivision::kOctree, Subdivision::kBono}) {
+      for (const double dimension : {0.0, 514.0, 768.0, 832.5, 1024.0}) {
+        Options options;
+        options.subdivision = subdivision;
+        options.dimension = dimension;
+        Modeld model(mesh, options);
+        model.expandAll(5);
+        model.visit([&](const NodeView& node) {
+          const Eigen::Vector3d half = program::halfRegion(node, *mesh, subdivision, dimension);
+          EXPECT_NEAR(half.norm(), node.radius, 1e-9 * mesh->bounds().diagonal().norm());
+        });
+      }
+    }
+  }
+}
+
+TEST(Spheres, HoldTheSurface) {
+  const auto mesh = test::torus(24).mesh();
+  Options options;
+  options.dimension = 12;  // whole units, so branches end before the depth
+  for (const double dimension : {0.0, 12.0}) {
+    options.dimension = dimension;
+    Modeld model(mesh, options);
+    model.expandAll(6);
+    std::vector<NodeView> nodes;
+    model.visit([&nodes](const NodeView& node) { nodes.push_back(node); });
+    for (int level = 1; level <= 6; ++level) {
+      const std::vector<NodeView> leaves = program::leavesAt(nodes, level);
+      for (const Mesh::Indices& t : mesh->triangles()) {
+        const Eigen::Vector3d p = (mesh->vertex(t[0]) + mesh->vertex(t[1]) + mesh->vertex(t[2])) / 3;
+        EXPECT_TRUE(
+            std::any_of(leaves.begin(), leaves.end(),
+                        [&](const NodeView& node) { return (p - node.center).norm() <= node.radius * (1 + 1e-12); }))
+            << "level " << level;
+      }
+    }
+  }
+}
+
+TEST(Spheres, KeepFloatsFloatsInYaml) {
+  NodeView node;
+  node.center = {1e-5, 1e22, -3};
+  node.radius = 0.5;
+  const std::string text = program::sphereFile("a.yaml", {node}, "a \"b\"");
+  EXPECT_NE(text.find("1.0e+22, -3]"), std::string::npos) << text;
+  EXPECT_NE(text.find("\"a \\\"b\\\"\":"), std::string::npos) << text;
+  EXPECT_THROW(program::checkSphereFile("a.txt"), std::invalid_argument);
+  EXPECT_NO_THROW(program::checkSphereFile("a.PLY"));
+}
+
+program::Pose poseOf(double x) {
+  program::Pose pose;
+  pose.numbers[0] = x;
+  return pose;
+}
+
+TEST(Shard, IsReadAsItIsWritten) {
+  EXPECT_EQ(program::Shard::parse("3/7").index, 3u);
+  EXPECT_EQ(program::Shard::parse("3/7").of, 7u);
+  for (const char* text : {"", "/", "0/3", "4/3", "1", "1/", "/2", "a/b", "-1/3", "1/3x", "1/99999999999", "1.0/2"}) {
+    EXPECT_THROW(program::Shard::parse(text), std::invalid_argument) << text;
+  }
+}
+
+TEST(Overestimate, HasABinForEachDistance) {
+  using program::Overestimate;
+  EXPECT_EQ(Overestimate::binOf(0), 0u);
+  EXPECT_EQ(Overestimate::binOf(0.99e-6), 0u);
+  EXPECT_EQ(Overestimate::binOf(1.01e-6), 1u);
+  EXPECT_EQ(Overestimate::binOf(0.05), 5u);
+  EXPECT_EQ(Overestimate::binOf(0.5), 6u);
+  EXPECT_EQ(Overestimate::binOf(1e9), 7u);
+  EXPECT_EQ(Overestimate::binName(Overestimate::binOf(0.05)), "< 1e-1");
+  EXPECT_EQ(Overestimate::binName(Overestimate::binOf(0.5)), "< 1");
+}
+
+TEST(Validation, PartsAddUpToTheWhole) {
+  using program::Validation;
+  std::mt19937 g(5);
+  for (int round = 0; round < 50; ++round) {
+    const std::size_t of = 1 + g() % 5;
+    Validation whole;
+    whole.settings = {{"seed", 1}, {"contacts_compared", false}, {"options", {{"scalar", "double"}}}};
+    whole.overestimates.resize(2);
+    std::vector<Validation> parts(of, whole);
+    for (std::size_t i = 0; i < of; ++i) parts[i].shard = {i + 1, of};
+    for (std::size_t number = 0; number < 200; ++number) {
+      // Few values, so that the largest is met more than once.
+      const double value = static_cast<double>(g() % 4);
+      const bool fails = g() % 6 == 0;
+      for (Validation* sum : {&whole, &parts[number / 8 % of]}) {
+        ++sum->count[Validation::kPoses];
+        if (fails) sum->fail(number, poseOf(value), "false negative");
+        sum->overestimates[number % 2].add(value, number, poseOf(static_cast<double>(number)));
+      }
+    }
+    std::shuffle(parts.begin(), parts.end(), g);
+    std::vector<Validation> read;
+    for (const Validation& part : parts) read.push_back(Validation::fromJson(program::Json::parse(part.json().dump())));
+    EXPECT_EQ(Validation::merged(read).json(), whole.json());
+    EXPECT_THROW(Validation::merged(read).throwIfWrong(), std::runtime_error);
+    if (of == 1) continue;
+    std::vector<Validation> some(read.begin() + 1, read.end());
+    EXPECT_THROW(Validation::merged(some), std::runtime_error);
+    some.push_back(some.front());
+    EXPECT_THROW(Validation::merged(some), std::runtime_error);
+    read.back().settings["seed"] = 2;
+    EXPECT_THROW(Validation::merged(read), std::runtime_error);
+  }
+}
+
+}  // namespace
+}  // namespace bocst
