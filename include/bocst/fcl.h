@@ -24,6 +24,9 @@
 #include <fcl/narrowphase/distance_request.h>
 #include <fcl/narrowphase/distance_result.h>
 
+#include <stdexcept>
+#include <type_traits>
+
 namespace bocst {
 
 /// Do the two geometries at these poses (world from geometry) touch? As fcl::collide: returns result.numContacts(),
@@ -87,19 +90,45 @@ template <typename S>
 BOCST_EXPORT bool isModel(const fcl::CollisionGeometry<S>* geometry);
 
 namespace fcl_room {
-/// @throws std::invalid_argument, naming the query and the two types, when one side is a Model.
 template <typename S>
-BOCST_EXPORT void rejectModels(const char* query, const fcl::CollisionGeometry<S>* o1,
-                               const fcl::CollisionGeometry<S>* o2);
+BOCST_EXPORT S continuousPair(const fcl::CollisionGeometry<S>* o1, const fcl::MotionBase<S>* motion1,
+                              const fcl::CollisionGeometry<S>* o2, const fcl::MotionBase<S>* motion2,
+                              const fcl::ContinuousCollisionRequest<S>& request,
+                              fcl::ContinuousCollisionResult<S>& result);
+template <typename S>
+BOCST_EXPORT S continuousPair(const fcl::CollisionGeometry<S>* o1, const fcl::Transform3<S>& X_W1_begin,
+                              const fcl::Transform3<S>& X_W1_end, const fcl::CollisionGeometry<S>* o2,
+                              const fcl::Transform3<S>& X_W2_begin, const fcl::Transform3<S>& X_W2_end,
+                              const fcl::ContinuousCollisionRequest<S>& request,
+                              fcl::ContinuousCollisionResult<S>& result);
 }  // namespace fcl_room
 
-/// As fcl::continuousCollide, over two motions or from begin to end poses. In this version a pair with a Model throws
-/// std::invalid_argument. (FCL 0.7's own version from poses is for double only: it does not compile for float.)
+/// When do the two geometries first touch, while time goes from 0 to 1? As fcl::continuousCollide, over two motions or
+/// from begin to end poses (world from geometry): sets the result and returns its time_of_contact.
+///
+/// A pair with a Model: partners are another Model and fcl::BVHModel<BV> of any BV.
+/// - is_collide: the geometries touch at some time, as collide() means it (margin, solid, conservative answers and
+///   occupancy included). Always by conservative advancement, whatever ccd_solver_type asks for: no contact is stepped
+///   over, so num_max_iterations and gjk_solver_type mean nothing.
+/// - time_of_contact: never later than the first contact, and at most toc_err earlier; before it they do not touch. 0
+///   when they touch at the begin, 1 without contact. toc_err may be 0.
+/// - contact_tf1, contact_tf2: the poses at that time; without contact, at the end.
+/// - What passes at a distance of less than 1e-9 of the smaller geometry's size (with float: some 1e-5 of the
+///   coordinates) is taken to touch.
+/// Motions are FCL's own four: TranslationMotion, InterpMotion, ScrewMotion, SplineMotion (in FCL 0.7, two of them
+/// exist for double only); they are not written to. From poses, ccd_motion_type says how: CCDM_TRANS keeps the rotation
+/// of the begin; CCDM_LINEAR moves the geometry's origin on a line and turns about a fixed axis; CCDM_SCREW turns about
+/// and moves along one axis; CCDM_SPLINE moves the origin on a line and takes rotation vectors on a line.
+/// @throws std::invalid_argument for a partner or a motion that is not supported, a pose that is not finite, a toc_err
+/// that is negative or NaN; and, with float, from poses, for a pair without a Model: FCL 0.7 has no such query.
+/// Thread rule: as collide(); motions may be shared while nobody calls their integrate().
 template <typename S>
 S continuousCollide(const fcl::CollisionGeometry<S>* o1, const fcl::MotionBase<S>* motion1,
                     const fcl::CollisionGeometry<S>* o2, const fcl::MotionBase<S>* motion2,
                     const fcl::ContinuousCollisionRequest<S>& request, fcl::ContinuousCollisionResult<S>& result) {
-  fcl_room::rejectModels<S>("continuousCollide", o1, o2);
+  if (isModel<S>(o1) || isModel<S>(o2)) {
+    return fcl_room::continuousPair<S>(o1, motion1, o2, motion2, request, result);
+  }
   return fcl::continuousCollide<S>(o1, motion1, o2, motion2, request, result);
 }
 template <typename S>
@@ -107,8 +136,14 @@ S continuousCollide(const fcl::CollisionGeometry<S>* o1, const fcl::Transform3<S
                     const fcl::Transform3<S>& X_W1_end, const fcl::CollisionGeometry<S>* o2,
                     const fcl::Transform3<S>& X_W2_begin, const fcl::Transform3<S>& X_W2_end,
                     const fcl::ContinuousCollisionRequest<S>& request, fcl::ContinuousCollisionResult<S>& result) {
-  fcl_room::rejectModels<S>("continuousCollide", o1, o2);
-  return fcl::continuousCollide<S>(o1, X_W1_begin, X_W1_end, o2, X_W2_begin, X_W2_end, request, result);
+  if (isModel<S>(o1) || isModel<S>(o2)) {
+    return fcl_room::continuousPair<S>(o1, X_W1_begin, X_W1_end, o2, X_W2_begin, X_W2_end, request, result);
+  }
+  if constexpr (std::is_same<S, double>::value) {
+    return fcl::continuousCollide<S>(o1, X_W1_begin, X_W1_end, o2, X_W2_begin, X_W2_end, request, result);
+  } else {
+    throw std::invalid_argument("fcl::continuousCollide: FCL 0.7 has no query from poses with float");
+  }
 }
 
 }  // namespace bocst

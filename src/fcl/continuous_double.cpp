@@ -1,13 +1,15 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #include "fcl/registration.h"
 
-// In FCL's words, but for the first line.
+// In FCL's words, but for models.
 template <>
 double fcl::continuousCollide<double>(const CollisionGeometry<double>* o1, const MotionBase<double>* motion1,
                                       const CollisionGeometry<double>* o2, const MotionBase<double>* motion2,
                                       const ContinuousCollisionRequest<double>& request,
                                       ContinuousCollisionResult<double>& result) {
-  bocst::fcl_room::rejectModels<double>("continuousCollide", o1, o2);
+  if (bocst::isModel<double>(o1) || bocst::isModel<double>(o2)) {
+    return bocst::fcl_room::continuousPair<double>(o1, motion1, o2, motion2, request, result);
+  }
   switch (request.ccd_solver_type) {
     case CCDC_NAIVE:
       return continuousCollideNaive<double>(o1, motion1, o2, motion2, request, result);
@@ -31,11 +33,20 @@ double fcl::continuousCollide<double>(const CollisionGeometry<double>* o1, const
   return -1;
 }
 
-template double fcl::continuousCollide<double>(const CollisionGeometry<double>*, const Transform3<double>&,
-                                               const Transform3<double>&, const CollisionGeometry<double>*,
-                                               const Transform3<double>&, const Transform3<double>&,
-                                               const ContinuousCollisionRequest<double>&,
-                                               ContinuousCollisionResult<double>&);
+template <>
+double fcl::continuousCollide<double>(const CollisionGeometry<double>* o1, const Transform3<double>& X_W1_begin,
+                                      const Transform3<double>& X_W1_end, const CollisionGeometry<double>* o2,
+                                      const Transform3<double>& X_W2_begin, const Transform3<double>& X_W2_end,
+                                      const ContinuousCollisionRequest<double>& request,
+                                      ContinuousCollisionResult<double>& result) {
+  if (bocst::isModel<double>(o1) || bocst::isModel<double>(o2)) {
+    return bocst::fcl_room::continuousPair<double>(o1, X_W1_begin, X_W1_end, o2, X_W2_begin, X_W2_end, request, result);
+  }
+  const auto motion1 = getMotionBase<double>(X_W1_begin, X_W1_end, request.ccd_motion_type);
+  const auto motion2 = getMotionBase<double>(X_W2_begin, X_W2_end, request.ccd_motion_type);
+  return continuousCollide<double>(o1, motion1.get(), o2, motion2.get(), request, result);
+}
+
 template double fcl::continuousCollide<double>(const CollisionObject<double>*, const Transform3<double>&,
                                                const CollisionObject<double>*, const Transform3<double>&,
                                                const ContinuousCollisionRequest<double>&,

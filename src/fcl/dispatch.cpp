@@ -121,17 +121,6 @@ std::string typeName(const fcl::CollisionGeometry<S>* geometry) {
 template std::string typeName<float>(const fcl::CollisionGeometry<float>*);
 template std::string typeName<double>(const fcl::CollisionGeometry<double>*);
 
-template <typename S>
-void rejectModels(const char* query, const fcl::CollisionGeometry<S>* o1, const fcl::CollisionGeometry<S>* o2) {
-  if (!isModel<S>(o1) && !isModel<S>(o2)) return;
-  throw std::invalid_argument(std::string("bocst: ") + query + " is not supported in this version, for " +
-                              typeName<S>(o1) + " and " + typeName<S>(o2));
-}
-template void rejectModels<float>(const char*, const fcl::CollisionGeometry<float>*,
-                                  const fcl::CollisionGeometry<float>*);
-template void rejectModels<double>(const char*, const fcl::CollisionGeometry<double>*,
-                                   const fcl::CollisionGeometry<double>*);
-
 }  // namespace fcl_room
 
 template <typename S>

@@ -34,14 +34,24 @@ template <typename Solver>
 __attribute__((visibility("default"))) detail::ConservativeAdvancementFunctionMatrix<Solver>&
 getConservativeAdvancementFunctionLookTable();
 
-// Two of its four solvers answer -1 for a geometry they do not know, before they look into any table. So the whole
-// function is ours, for double (float is in no libfcl); it must be declared before FCL says that it is libfcl's.
+// Three of its four solvers do not look into any table, and from poses it makes motions with unset members. So both
+// functions are ours, for double (float is in no libfcl); they must be declared before FCL says that they are libfcl's.
 template <typename S>
 S continuousCollide(const CollisionGeometry<S>*, const MotionBase<S>*, const CollisionGeometry<S>*,
                     const MotionBase<S>*, const ContinuousCollisionRequest<S>&, ContinuousCollisionResult<S>&);
 template <>
 BOCST_EXPORT double continuousCollide<double>(const CollisionGeometry<double>*, const MotionBase<double>*,
                                               const CollisionGeometry<double>*, const MotionBase<double>*,
+                                              const ContinuousCollisionRequest<double>&,
+                                              ContinuousCollisionResult<double>&);
+template <typename S>
+S continuousCollide(const CollisionGeometry<S>*, const Transform3<S>&, const Transform3<S>&,
+                    const CollisionGeometry<S>*, const Transform3<S>&, const Transform3<S>&,
+                    const ContinuousCollisionRequest<S>&, ContinuousCollisionResult<S>&);
+template <>
+BOCST_EXPORT double continuousCollide<double>(const CollisionGeometry<double>*, const Transform3<double>&,
+                                              const Transform3<double>&, const CollisionGeometry<double>*,
+                                              const Transform3<double>&, const Transform3<double>&,
                                               const ContinuousCollisionRequest<double>&,
                                               ContinuousCollisionResult<double>&);
 

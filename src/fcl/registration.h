@@ -61,10 +61,10 @@ S distanceEntry(const fcl::CollisionGeometry<S>* o1, const fcl::Transform3<S>& X
 }
 
 template <typename S, typename Solver>
-S advancementEntry(const fcl::CollisionGeometry<S>* o1, const fcl::MotionBase<S>*, const fcl::CollisionGeometry<S>* o2,
-                   const fcl::MotionBase<S>*, const Solver*, const fcl::ContinuousCollisionRequest<S>&,
-                   fcl::ContinuousCollisionResult<S>&) {
-  rejectModels<S>("continuousCollide", o1, o2);
+S advancementEntry(const fcl::CollisionGeometry<S>* o1, const fcl::MotionBase<S>* motion1,
+                   const fcl::CollisionGeometry<S>* o2, const fcl::MotionBase<S>* motion2, const Solver*,
+                   const fcl::ContinuousCollisionRequest<S>& request, fcl::ContinuousCollisionResult<S>& result) {
+  if (isModel<S>(o1) || isModel<S>(o2)) return continuousPair<S>(o1, motion1, o2, motion2, request, result);
   warnAsFcl<S>("collision", o1, o2);
   return -1;
 }

@@ -8,6 +8,7 @@
 #include <limits>
 #include <vector>
 
+#include "query/best_first.h"
 #include "query/reach.h"
 #include "query/side.h"
 #include "query/triangle.h"
@@ -28,55 +29,30 @@ struct DistanceGoal {
 };
 
 /// Looks for the nearest primitives of two sides: triangles with exact answers, spheres of the collision depth with
-/// conservative ones. Best first: pairs of nodes lie in a heap by a lower bound of their distance, and what cannot beat
-/// the best answer is never looked at. Pairs that need a node that is not expanded wait, the nearest first, while what
-/// is resident may still make them superfluous; then they grow in one batch, each twice as large as the one before.
+/// conservative ones.
 template <typename A, typename B>
-class DistanceWalk {
+class DistanceWalk : private BestFirst<DistanceWalk<A, B>, A, B> {
  public:
-  DistanceWalk(const A& a, const B& b, const Placement& b_in_a) : a_(a), b_(b), b_in_a_(b_in_a) {}
+  DistanceWalk(const A& a, const B& b, const Placement& b_in_a) : Base(a, b, scratch()), b_in_a_(b_in_a) {}
 
   Nearest run(const DistanceGoal& goal) {
     goal_ = goal;
     limit_ = goal.below;
-    Scratch& s = scratch();
-    s.heap.clear();
-    s.waiting.clear();
-    std::size_t batch = kFirstBatch;
-    start(s);
-    for (;;) {
-      while (!s.heap.empty() && worthIt(s.heap.front().bound) && s.waiting.size() < batch) {
-        std::pop_heap(s.heap.begin(), s.heap.end(), later);
-        const Pair pair = s.heap.back();
-        s.heap.pop_back();
-        step(pair, s);
-        if (!(limit_ > 0)) return best_;
-      }
-      const auto end =
-          std::remove_if(s.waiting.begin(), s.waiting.end(), [this](const Pair& p) { return !worthIt(p.bound); });
-      s.waiting.erase(end, s.waiting.end());
-      if (s.waiting.empty()) {
-        if (s.heap.empty() || !worthIt(s.heap.front().bound)) return best_;
-        continue;
-      }
-      grow(s);
-      batch *= 2;
-    }
+    start();
+    this->search();
+    return best_;
   }
 
  private:
-  static constexpr std::size_t kFirstBatch = 4;
+  using Base = BestFirst<DistanceWalk<A, B>, A, B>;
+  friend Base;
+  using Pair = typename Base::Pair;
+  using Base::a_;
+  using Base::b_;
+  using Base::push;
+  using Base::spheres;
 
-  struct Pair {
-    double bound;
-    typename A::Node a;
-    typename B::Node b;
-  };
-  static bool later(const Pair& x, const Pair& y) { return x.bound > y.bound; }
-
-  struct Scratch {
-    std::vector<Pair> heap, waiting;
-    std::vector<tree::Tree::Growth> growths;
+  struct Scratch : Base::Heap {
     std::vector<TriangleReach> a, b;
   };
   static Scratch& scratch() {
@@ -84,20 +60,14 @@ class DistanceWalk {
     return s;
   }
 
-  bool spheres() const { return a_.cells() || b_.cells(); }
-
   // What is at this distance or beyond does not improve the answer by more than the caller lets go.
   double enough() const {
     return std::min(limit_, std::max(best_.distance - goal_.absolute, best_.distance / (1 + goal_.relative)));
   }
   bool worthIt(double bound) const { return bound < enough(); }
-
-  // Puts a pair on the heap, if it is worth it.
-  void push(Pair pair, Scratch& s) {
-    if (!worthIt(pair.bound)) return;
-    s.heap.push_back(pair);
-    std::push_heap(s.heap.begin(), s.heap.end(), later);
-  }
+  bool settled() const { return !(limit_ > 0); }
+  bool again(const Pair&) { return false; }
+  double scaleOfB() const { return b_in_a_.scale; }
 
   NodeReach reachOfA(typename A::Node n) const { return NodeReach(a_.volume(n), Placement()); }
   NodeReach reachOfB(typename B::Node n) const { return NodeReach(b_.volume(n), b_in_a_); }
@@ -114,63 +84,31 @@ class DistanceWalk {
     return (a.center - b.center).norm() * (1 - 1e-12) - (a.radius + b.radius) * (1 + 1e-12);
   }
 
-  void start(Scratch& s) {
+  void start() {
     const Pair root{0, a_.root(), b_.root()};
     const double bound =
         spheres() ? boundOf(a_.sphere(root.a), ballOfB(root.b)) : boundOf(reachOfA(root.a), reachOfB(root.b));
-    push({bound, root.a, root.b}, s);
+    push({bound, root.a, root.b});
   }
 
-  void expandA(const Pair& pair, Scratch& s) {
+  void expandA(const Pair& pair) {
     if (spheres()) {
       const Sphere b = ballOfB(pair.b);
-      a_.children(pair.a, [&](typename A::Node c) { push({boundOf(a_.sphere(c), b), c, pair.b}, s); });
+      a_.children(pair.a, [&](typename A::Node c) { push({boundOf(a_.sphere(c), b), c, pair.b}); });
     } else {
       const NodeReach b = reachOfB(pair.b);
-      a_.children(pair.a, [&](typename A::Node c) { push({boundOf(reachOfA(c), b), c, pair.b}, s); });
+      a_.children(pair.a, [&](typename A::Node c) { push({boundOf(reachOfA(c), b), c, pair.b}); });
     }
   }
 
-  void expandB(const Pair& pair, Scratch& s) {
+  void expandB(const Pair& pair) {
     if (spheres()) {
       const Sphere a = a_.sphere(pair.a);
-      b_.children(pair.b, [&](typename B::Node c) { push({boundOf(a, ballOfB(c)), pair.a, c}, s); });
+      b_.children(pair.b, [&](typename B::Node c) { push({boundOf(a, ballOfB(c)), pair.a, c}); });
     } else {
       const NodeReach a = reachOfA(pair.a);
-      b_.children(pair.b, [&](typename B::Node c) { push({boundOf(a, reachOfB(c)), pair.a, c}, s); });
+      b_.children(pair.b, [&](typename B::Node c) { push({boundOf(a, reachOfB(c)), pair.a, c}); });
     }
-  }
-
-  void step(const Pair& pair, Scratch& s) {
-    const State sa = a_.state(pair.a), sb = b_.state(pair.b);
-    if (sa == State::kLeaf && sb == State::kLeaf) {
-      leaves(pair, s);
-      return;
-    }
-    const bool expands_a = sb == State::kLeaf ||
-                           (sa != State::kLeaf && a_.size(pair.a) >= b_.size(pair.b) * b_in_a_.scale * b_in_a_.scale);
-    if ((expands_a ? sa : sb) == State::kGrows) {
-      s.waiting.push_back(pair);
-    } else if (expands_a) {
-      expandA(pair, s);
-    } else {
-      expandB(pair, s);
-    }
-  }
-
-  void grow(Scratch& s) {
-    s.growths.clear();
-    for (const Pair& p : s.waiting) {
-      if (a_.state(p.a) == State::kGrows) a_.grow(p.a, s.growths);
-      if (b_.state(p.b) == State::kGrows) b_.grow(p.b, s.growths);
-    }
-    uniqueGrowths(s.growths);
-    if (!s.growths.empty()) tree::Tree::grow(s.growths);
-    for (const Pair& p : s.waiting) {
-      s.heap.push_back(p);
-      std::push_heap(s.heap.begin(), s.heap.end(), later);
-    }
-    s.waiting.clear();
   }
 
   void found(const Nearest& n) {
@@ -180,11 +118,12 @@ class DistanceWalk {
     if (n.distance > 0) way_ = (n.on_b - n.on_a) / n.distance;
   }
 
-  void leaves(const Pair& pair, Scratch& s) {
+  void leaves(const Pair& pair) {
     if (spheres()) {
       leafSpheres(pair);
       return;
     }
+    Scratch& s = scratch();
     fill(a_, pair.a, Placement(), s.a);
     fill(b_, pair.b, b_in_a_, s.b);
     // The pair of nearest middles first: a good answer makes most of the others superfluous.
@@ -267,8 +206,6 @@ class DistanceWalk {
     found(n);
   }
 
-  const A& a_;
-  const B& b_;
   const Placement& b_in_a_;
   DistanceGoal goal_;
   Nearest best_;

@@ -2,6 +2,7 @@
 //
 // With <bocst/fcl.h>, each public signature of FCL takes a model as it takes any other geometry.
 #include <bocst/bocst.h>
+#include <fcl/broadphase/default_broadphase_callbacks.h>
 #include <fcl/geometry/shape/sphere.h>
 #include <fcl/geometry/shape/triangle_p.h>
 #include <gtest/gtest.h>
@@ -166,20 +167,58 @@ TYPED_TEST(Overloads, DistanceRefusesOtherPartners) {
   EXPECT_NEAR(fcl::distance(&s.ball_object, &b, &s.libccd, request, result), 1, 1e-3);
 }
 
-TEST(OverloadsOfContinuousCollide, RefuseModels) {
+TYPED_TEST(Overloads, ContinuousCollideReachesModels) {
+  using S = TypeParam;
+  Scene<S> s;
+  const fcl::TranslationMotion<S> still(s.at0, s.at0), motion(moved<S>(3), moved<S>(-1));
+  fcl::ContinuousCollisionRequest<S> request;
+  const auto check = [](auto&& ask) {
+    fcl::ContinuousCollisionResult<S> result;
+    EXPECT_NEAR(ask(result), 0.5, 2e-4);
+    EXPECT_TRUE(result.is_collide);
+    EXPECT_NEAR(result.time_of_contact, 0.5, 2e-4);
+  };
+  auto &m = s.model, &o = s.other;
+  auto &a = s.model_object, &c = s.away_object;
+  for (const auto type : {fcl::CCDM_TRANS, fcl::CCDM_LINEAR, fcl::CCDM_SCREW, fcl::CCDM_SPLINE}) {
+    request.ccd_motion_type = type;
+    check([&](auto& r) { return fcl::continuousCollide(m.get(), &still, o.get(), &motion, request, r); });
+    check([&](auto& r) {
+      return fcl::continuousCollide(m.get(), s.at0, s.at0, o.get(), moved<S>(3), moved<S>(-1), request, r);
+    });
+    check([&](auto& r) { return fcl::continuousCollide(&a, s.at0, &c, moved<S>(-1), request, r); });
+    check([&](auto& r) { return continuousCollide(&a, s.at0, &c, moved<S>(-1), request, r); });
+  }
+}
+
+TEST(OverloadsOfContinuousCollide, OfObjectsAndByName) {
   using S = double;
   const auto model = makeModel<S>();
   const auto ball = std::make_shared<fcl::Sphere<S>>(1);
   const auto at0 = moved<S>(0), away = moved<S>(3);
   const fcl::TranslationMotion<S> still(at0, at0), motion(at0, away);
-  fcl::CollisionObject<S> model_object(model, at0), ball_object(ball, away), other_ball(ball, at0);
-  const auto motion_of = [&] { return std::make_shared<fcl::TranslationMotion<S>>(at0, away); };
-  fcl::ContinuousCollisionObject<S> moving_model(model, motion_of()), moving_ball(ball, motion_of());
+  fcl::CollisionObject<S> model_object(model, at0), ball_object(ball, away), other_ball(ball, at0), other(model, away);
+  const auto motion_of = [&](const auto& X, const auto& Y) {
+    return std::make_shared<fcl::TranslationMotion<S>>(X, Y);
+  };
+  fcl::ContinuousCollisionObject<S> moving_model(model, motion_of(at0, at0)), moving_ball(ball, motion_of(at0, away));
+  fcl::ContinuousCollisionObject<S> coming_model(model, motion_of(away, moved<S>(-1)));
   fcl::ContinuousCollisionResult<S> result;
   for (const auto solver :
        {fcl::CCDC_NAIVE, fcl::CCDC_CONSERVATIVE_ADVANCEMENT, fcl::CCDC_RAY_SHOOTING, fcl::CCDC_POLYNOMIAL_SOLVER}) {
     fcl::ContinuousCollisionRequest<S> request;
     request.ccd_solver_type = solver;
+    EXPECT_NEAR(fcl::collide(&moving_model, &coming_model, request, result), 0.5, 2e-4);
+    EXPECT_NEAR(fcl::continuousCollide<S>(&model_object, at0, &other, moved<S>(-1), request, result), 0.5, 2e-4);
+    EXPECT_NEAR(fcl::continuousCollide<S>(model.get(), at0, at0, model.get(), away, moved<S>(-1), request, result), 0.5,
+                2e-4);
+    // As the callback for broadphase managers asks.
+    fcl::DefaultContinuousCollisionData<S> data;
+    data.request = request;
+    fcl::DefaultContinuousCollisionFunction(&moving_model, &coming_model, &data);
+    EXPECT_TRUE(data.result.is_collide);
+    EXPECT_NEAR(data.result.time_of_contact, 0.5, 2e-4);
+
     EXPECT_THROW(fcl::continuousCollide(model.get(), &motion, ball.get(), &still, request, result),
                  std::invalid_argument);
     EXPECT_THROW(fcl::continuousCollide(ball.get(), at0, away, model.get(), away, away, request, result),
@@ -195,6 +234,12 @@ TEST(OverloadsOfContinuousCollide, RefuseModels) {
   fcl::continuousCollide(&other_ball, away, &ball_object, away, request, result);
   EXPECT_TRUE(result.is_collide);
   EXPECT_NEAR(result.time_of_contact, 1. / 3, 1e-2);
+  // FCL 0.7 itself does not compile from poses with float.
+  const auto ballf = std::make_shared<fcl::Sphere<float>>(1.f);
+  fcl::ContinuousCollisionResult<float> resultf;
+  EXPECT_THROW(fcl::continuousCollide(ballf.get(), moved<float>(0), moved<float>(0), ballf.get(), moved<float>(0),
+                                      moved<float>(0), fcl::ContinuousCollisionRequest<float>(), resultf),
+               std::invalid_argument);
 }
 
 TEST(Dispatch, FirstModelsFromManyThreads) {

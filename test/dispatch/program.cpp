@@ -171,13 +171,20 @@ void run() {
 #ifndef WITH_FLOAT  // FCL 0.7 has no continuousCollide from poses for float.
   for (const fcl::CCDSolverType solver :
        {fcl::CCDC_NAIVE, fcl::CCDC_CONSERVATIVE_ADVANCEMENT, fcl::CCDC_RAY_SHOOTING, fcl::CCDC_POLYNOMIAL_SOLVER}) {
-    fcl::ContinuousCollisionRequest<S> request;
-    request.ccd_solver_type = solver;
-    fcl::ContinuousCollisionResult<S> result;
-    expect(throwsInvalidArgument([&] {
-             fcl::continuousCollide(a.get(), moved(0), moved(3), ball.get(), moved(3), moved(3), request, result);
-           }),
-           "continuousCollide of a model does not throw, solver " + std::to_string(solver));
+    for (const fcl::CCDMotionType type : {fcl::CCDM_TRANS, fcl::CCDM_LINEAR, fcl::CCDM_SCREW, fcl::CCDM_SPLINE}) {
+      fcl::ContinuousCollisionRequest<S> request;
+      request.ccd_solver_type = solver;
+      request.ccd_motion_type = type;
+      fcl::ContinuousCollisionResult<S> result;
+      // The tetrahedra are one wide; from 3 apart to 1 the wrong way.
+      fcl::continuousCollide(a.get(), moved(0), moved(0), b.get(), moved(3), moved(-1), request, result);
+      expect(result.is_collide && result.time_of_contact > 0.499 && result.time_of_contact < 0.5001,
+             "continuousCollide of models is not bocst's, solver " + std::to_string(solver) + ", motion " +
+                 std::to_string(type));
+      fcl::CollisionObject<S> object1(a, moved(0)), object2(b, moved(3));
+      fcl::continuousCollide(&object1, moved(0), &object2, moved(5), request, result);
+      expect(!result.is_collide, "continuousCollide of objects that recede is not bocst's");
+    }
   }
   {
     fcl::CollisionObject<S> object1(box, moved(0)), object2(ball, moved(3)), object3(a, moved(0));
@@ -186,7 +193,7 @@ void run() {
     fcl::ContinuousCollisionResult<S> result;
     expect(
         throwsInvalidArgument([&] { fcl::continuousCollide(&object3, moved(3), &object2, moved(3), request, result); }),
-        "continuousCollide of objects does not throw");
+        "continuousCollide with a partner that is not supported does not throw");
     fcl::continuousCollide(&object1, moved(3), &object2, moved(3), request, result);
     expect(result.is_collide && result.time_of_contact > 0.4 && result.time_of_contact < 0.6,
            "continuousCollide without a model is not FCL's");

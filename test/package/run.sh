@@ -2,7 +2,7 @@
 # SPDX-License-Identifier: BSD-3-Clause
 # Usage: test/package/run.sh BUILD_DIR
 # Installs a build into a prefix of its own, then builds and runs a separate project against it: by CMake's
-# find_package and by pkg-config.
+# find_package and by pkg-config; and the example planner.
 set -euo pipefail
 [[ $# -eq 1 ]] || { sed -n 's/^# Usage/usage/p' "$0" >&2; exit 2; }
 build=$(cd "$1" && pwd)
@@ -26,12 +26,17 @@ check_order() {
   [[ $first == libbocst.so || $(cached BUILD_SHARED_LIBS) != ON ]] || { echo "FAILED: $first comes first"; exit 1; }
 }
 
+# build_project SOURCE: builds it in $work/<its name>
+build_project() {
+  cmake -S "$1" -B "$work/$(basename "$1")" -G "$(cached CMAKE_GENERATOR)" -DCMAKE_BUILD_TYPE=Release \
+    -DCMAKE_CXX_COMPILER="$compiler" -DCMAKE_PREFIX_PATH="$prefix" >"$work/log" || { cat "$work/log"; exit 1; }
+  cmake --build "$work/$(basename "$1")"
+}
+
 echo "-- find_package"
-cmake -S "$source" -B "$work/cmake" -G "$(cached CMAKE_GENERATOR)" -DCMAKE_BUILD_TYPE=Release \
-  -DCMAKE_CXX_COMPILER="$compiler" -DCMAKE_PREFIX_PATH="$prefix" >"$work/log" || { cat "$work/log"; exit 1; }
-cmake --build "$work/cmake"
-(cd "$work" && cmake/consumer)
-check_order "$work/cmake/consumer"
+build_project "$source"
+(cd "$work" && package/consumer)
+check_order "$work/package/consumer"
 
 echo "-- pkg-config"
 libdir=$(dirname "$(find "$prefix" -name pkgconfig -type d)")
@@ -40,6 +45,12 @@ read -ra flags <<<"$CXXFLAGS $(pkg-config --cflags --libs bocst-io bocst)"
 "$compiler" -std=c++17 -O1 "$source/main.cpp" "${flags[@]}" -Wl,-rpath,"$libdir" -o "$work/consumer"
 (cd "$work" && ./consumer)
 check_order "$work/consumer"
+
+echo "-- the example planner"
+share=$source/../../share
+build_project "$share/examples/planner"
+check_order "$work/planner/planner"
+"$work/planner/planner" "$share/models/wall.obj" "$share/models/link.obj" 3
 
 if [[ -x $prefix/bin/bocst ]]; then
   echo "-- the installed program"

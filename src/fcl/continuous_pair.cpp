@@ -1,0 +1,147 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#include <bocst/fcl.h>
+
+#include <algorithm>
+#include <cmath>
+#include <limits>
+
+#include "fcl/collide_pair.h"
+#include "fcl/motion.h"
+#include "fcl/pair.h"
+#include "query/contact_time_walk.h"
+
+namespace bocst::fcl_room {
+namespace {
+
+using query::ContactGoal;
+using query::Motion;
+using query::Placement;
+using query::TreeSide;
+
+/// The caller's question, in the caller's order.
+template <typename S>
+struct Question {
+  const fcl::CollisionGeometry<S>* o1;
+  const Motion& motion1;
+  const fcl::CollisionGeometry<S>* o2;
+  const Motion& motion2;
+  const fcl::ContinuousCollisionRequest<S>& request;
+};
+
+template <typename S>
+fcl::Transform3<S> poseAt(const Motion& motion, double time) {
+  const Eigen::Isometry3d X = motion.at(time);
+  fcl::Transform3<S> Y = fcl::Transform3<S>::Identity();
+  Y.linear() = X.linear().template cast<S>();
+  Y.translation() = X.translation().template cast<S>();
+  return Y;
+}
+
+Placement inBody(const tree::Tree& tree) {
+  Placement p;
+  p.scale = tree.surface().lattice.unit();
+  p.translation = tree.surface().lattice.origin();
+  return p;
+}
+
+/// What is to be taken for a contact. The bodies are at most so far from their origins; `largest` coordinate of all.
+template <typename S>
+ContactGoal goalOf(const Question<S>& q, double size1, double size2, double margin) {
+  double largest = size1 + size2;
+  for (const Motion* m : {&q.motion1, &q.motion2}) {
+    const Eigen::Vector3d p = m->at(0).translation();
+    largest = std::max(largest, p.norm() + m->fastest(p, size1 + size2, 0));
+  }
+  ContactGoal goal;
+  goal.margin = margin;
+  // FCL's triangle test in S, and this walk's coordinates in the world; a billionth of the smaller body so that a pair
+  // that passes at no distance at all does not take for ever.
+  goal.touch = std::max({1e-9 * std::min(size1, size2), 1e-14 * largest,
+                         32 * static_cast<double>(std::numeric_limits<S>::epsilon()) * largest,
+                         std::numeric_limits<double>::min()});
+  goal.time_error = static_cast<double>(q.request.toc_err);
+  return goal;
+}
+
+template <typename S>
+double firstContact(const Question<S>& q) {
+  const auto* model1 = dynamic_cast<const Model<S>*>(q.o1);
+  const auto* model2 = dynamic_cast<const Model<S>*>(q.o2);
+  const fcl::Transform3<S> X_W1 = poseAt<S>(q.motion1, 0), X_W2 = poseAt<S>(q.motion2, 0);
+  fcl::CollisionResult<S> begin;
+  if (collidePair<S>(q.o1, X_W1, q.o2, X_W2, fcl::CollisionRequest<S>(), begin) > 0) return 0;
+  double time = std::numeric_limits<double>::infinity();
+  if (!q.o1->isOccupied() || !q.o2->isOccupied()) return time;
+  if (model1 != nullptr && model2 != nullptr) {
+    betweenTrees(X_W1, model1->tree(), X_W2, model2->tree(),
+                 [&](const TreeSide& a, const TreeSide& b, const Placement&, double) {
+                   const double size1 = magnitudeOf(a.tree().surface().mesh->bounds());
+                   const double size2 = magnitudeOf(b.tree().surface().mesh->bounds());
+                   query::ContactTimeWalk<TreeSide, TreeSide> walk(a, inBody(a.tree()), q.motion1, b, inBody(b.tree()),
+                                                                   q.motion2);
+                   time = walk.run(goalOf(q, size1, size2, 0));
+                 });
+    return time;
+  }
+  const bool swapped = model1 == nullptr;
+  const Motion &motion_a = swapped ? q.motion2 : q.motion1, &motion_b = swapped ? q.motion1 : q.motion2;
+  withBvh<S>("continuousCollide", swapped ? q.o1 : q.o2, [&](const auto& bvh) {
+    betweenTreeAndBvh(swapped ? X_W2 : X_W1, (swapped ? model2 : model1)->tree(), swapped ? X_W1 : X_W2, bvh,
+                      [&](const TreeSide& a, const auto& b, const Placement&, double) {
+                        const double size = magnitudeOf(a.tree().surface().mesh->bounds());
+                        query::ContactTimeWalk<TreeSide, std::decay_t<decltype(b)>> walk(a, inBody(a.tree()), motion_a,
+                                                                                         b, Placement(), motion_b);
+                        time = walk.run(goalOf(q, size, b.magnitude(), 0));
+                      });
+  });
+  return time;
+}
+
+template <typename S>
+S answer(const Question<S>& q, fcl::ContinuousCollisionResult<S>& result) {
+  if (!(q.request.toc_err >= 0)) {
+    throw std::invalid_argument("bocst::continuousCollide: toc_err is " + std::to_string(q.request.toc_err));
+  }
+  const double time = firstContact(q);
+  result.is_collide = time <= 1;
+  // Rounded, if at all, to what is earlier.
+  result.time_of_contact = result.is_collide ? static_cast<S>(time) : S(1);
+  if (static_cast<double>(result.time_of_contact) > time) {
+    result.time_of_contact = std::nextafter(result.time_of_contact, S(0));
+  }
+  result.contact_tf1 = poseAt<S>(q.motion1, static_cast<double>(result.time_of_contact));
+  result.contact_tf2 = poseAt<S>(q.motion2, static_cast<double>(result.time_of_contact));
+  return result.time_of_contact;
+}
+
+}  // namespace
+
+template <typename S>
+S continuousPair(const fcl::CollisionGeometry<S>* o1, const fcl::MotionBase<S>* motion1,
+                 const fcl::CollisionGeometry<S>* o2, const fcl::MotionBase<S>* motion2,
+                 const fcl::ContinuousCollisionRequest<S>& request, fcl::ContinuousCollisionResult<S>& result) {
+  const auto m1 = motionOf<S>(motion1), m2 = motionOf<S>(motion2);
+  return answer(Question<S>{o1, *m1, o2, *m2, request}, result);
+}
+
+template <typename S>
+S continuousPair(const fcl::CollisionGeometry<S>* o1, const fcl::Transform3<S>& X_W1_begin,
+                 const fcl::Transform3<S>& X_W1_end, const fcl::CollisionGeometry<S>* o2,
+                 const fcl::Transform3<S>& X_W2_begin, const fcl::Transform3<S>& X_W2_end,
+                 const fcl::ContinuousCollisionRequest<S>& request, fcl::ContinuousCollisionResult<S>& result) {
+  const auto m1 = motionOf<S>(X_W1_begin, X_W1_end, request.ccd_motion_type);
+  const auto m2 = motionOf<S>(X_W2_begin, X_W2_end, request.ccd_motion_type);
+  return answer(Question<S>{o1, *m1, o2, *m2, request}, result);
+}
+
+#define BOCST_INSTANTIATE(S)                                                                                        \
+  template S continuousPair(const fcl::CollisionGeometry<S>*, const fcl::MotionBase<S>*,                            \
+                            const fcl::CollisionGeometry<S>*, const fcl::MotionBase<S>*,                            \
+                            const fcl::ContinuousCollisionRequest<S>&, fcl::ContinuousCollisionResult<S>&);         \
+  template S continuousPair(const fcl::CollisionGeometry<S>*, const fcl::Transform3<S>&, const fcl::Transform3<S>&, \
+                            const fcl::CollisionGeometry<S>*, const fcl::Transform3<S>&, const fcl::Transform3<S>&, \
+                            const fcl::ContinuousCollisionRequest<S>&, fcl::ContinuousCollisionResult<S>&);
+BOCST_INSTANTIATE(float)
+BOCST_INSTANTIATE(double)
+
+}  // namespace bocst::fcl_room

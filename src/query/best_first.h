@@ -1,0 +1,116 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#pragma once
+
+#include <algorithm>
+#include <cstddef>
+#include <vector>
+
+#include "query/side.h"
+
+namespace bocst::query {
+
+/// The walk of queries that look for the least of something (a distance, a time) over all pairs of leaves. Best first:
+/// pairs of nodes lie in a heap by a lower bound, and what cannot beat the best answer is never looked at. Pairs that
+/// need a node that is not expanded wait, the nearest first, while what is resident may still make them superfluous;
+/// then they grow in one batch, each twice as large as the one before.
+///
+/// A query (Walk) derives from this and has, for this base: worthIt(bound), settled(), again(pair) (true: pushed with a
+/// better bound instead), expandA(pair), expandB(pair), leaves(pair).
+template <typename Walk, typename A, typename B>
+class BestFirst {
+ protected:
+  struct Pair {
+    double bound;
+    typename A::Node a;
+    typename B::Node b;
+  };
+  /// Kept by the thread between walks.
+  struct Heap {
+    std::vector<Pair> heap, waiting;
+    std::vector<tree::Tree::Growth> growths;
+  };
+
+  BestFirst(const A& a, const B& b, Heap& heap) : a_(a), b_(b), heap_(heap) {
+    heap_.heap.clear();
+    heap_.waiting.clear();
+  }
+
+  /// Goes on from the pairs that were pushed until nothing can be better than what was found.
+  void search() {
+    std::size_t batch = kFirstBatch;
+    for (;;) {
+      while (!heap_.heap.empty() && walk().worthIt(heap_.heap.front().bound) && heap_.waiting.size() < batch) {
+        std::pop_heap(heap_.heap.begin(), heap_.heap.end(), later);
+        const Pair pair = heap_.heap.back();
+        heap_.heap.pop_back();
+        step(pair);
+        if (walk().settled()) return;
+      }
+      const auto end = std::remove_if(heap_.waiting.begin(), heap_.waiting.end(),
+                                      [this](const Pair& p) { return !walk().worthIt(p.bound); });
+      heap_.waiting.erase(end, heap_.waiting.end());
+      if (heap_.waiting.empty()) {
+        if (heap_.heap.empty() || !walk().worthIt(heap_.heap.front().bound)) return;
+        continue;
+      }
+      grow();
+      batch *= 2;
+    }
+  }
+
+  /// Puts a pair on the heap, if it is worth it.
+  void push(const Pair& pair) {
+    if (walk().worthIt(pair.bound)) put(pair);
+  }
+
+  bool spheres() const { return a_.cells() || b_.cells(); }
+
+  const A& a_;
+  const B& b_;
+
+ private:
+  static constexpr std::size_t kFirstBatch = 4;
+
+  Walk& walk() { return static_cast<Walk&>(*this); }
+  static bool later(const Pair& x, const Pair& y) { return x.bound > y.bound; }
+
+  void put(const Pair& pair) {
+    heap_.heap.push_back(pair);
+    std::push_heap(heap_.heap.begin(), heap_.heap.end(), later);
+  }
+
+  void step(const Pair& pair) {
+    if (walk().again(pair)) return;
+    const State sa = a_.state(pair.a), sb = b_.state(pair.b);
+    if (sa == State::kLeaf && sb == State::kLeaf) {
+      walk().leaves(pair);
+      return;
+    }
+    const double scale = walk().scaleOfB();
+    const bool expands_a =
+        sb == State::kLeaf || (sa != State::kLeaf && a_.size(pair.a) >= b_.size(pair.b) * scale * scale);
+    if ((expands_a ? sa : sb) == State::kGrows) {
+      heap_.waiting.push_back(pair);
+    } else if (expands_a) {
+      walk().expandA(pair);
+    } else {
+      walk().expandB(pair);
+    }
+  }
+
+  void grow() {
+    heap_.growths.clear();
+    for (const Pair& p : heap_.waiting) {
+      if (a_.state(p.a) == State::kGrows) a_.grow(p.a, heap_.growths);
+      if (b_.state(p.b) == State::kGrows) b_.grow(p.b, heap_.growths);
+    }
+    uniqueGrowths(heap_.growths);
+    if (!heap_.growths.empty()) tree::Tree::grow(heap_.growths);
+    for (const Pair& p : heap_.waiting) put(p);
+    heap_.waiting.clear();
+  }
+
+  Heap& heap_;
+};
+
+}  // namespace bocst::query

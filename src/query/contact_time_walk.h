@@ -1,0 +1,294 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#pragma once
+
+#include <algorithm>
+#include <cmath>
+#include <cstddef>
+#include <limits>
+#include <vector>
+
+#include "query/best_first.h"
+#include "query/motion.h"
+#include "query/reach.h"
+#include "query/side.h"
+#include "query/triangle.h"
+
+namespace bocst::query {
+
+/// What counts as contact of two bodies that move, and how well its time must be known.
+struct ContactGoal {
+  double margin = 0;      ///< What is no farther than this touches.
+  double touch = 0;       ///< And what is no farther than margin + touch, for the sake of rounding; more than 0.
+  double time_error = 0;  ///< The answer may be earlier than the contact by so much.
+};
+
+/// When do two moving sides first touch? Conservative advancement, for each pair of nodes by itself: apart by a gap
+/// along a direction, they cannot touch before the gap is closed at the largest speed along it that any of their points
+/// can have. Best first by that time, so a pair is looked at again at the time when it might touch, and only its parts
+/// from there on. No contact is stepped over, whatever the motions are.
+///
+/// All in world coordinates, in the unit of the meshes.
+template <typename A, typename B>
+class ContactTimeWalk : private BestFirst<ContactTimeWalk<A, B>, A, B> {
+ public:
+  /// X_MA and X_MB lead from the sides' frames to those of the bodies that the motions are about; only their scale and
+  /// translation are used.
+  ContactTimeWalk(const A& a, const Placement& a_in_body, const Motion& motion_a, const B& b,
+                  const Placement& b_in_body, const Motion& motion_b)
+      : Base(a, b, scratch()), a_in_body_(a_in_body), b_in_body_(b_in_body), motion_a_(motion_a), motion_b_(motion_b) {}
+
+  /// The time of the first contact, at most goal.time_error too early and never too late; infinite without contact.
+  double run(const ContactGoal& goal) {
+    goal_ = goal;
+    first_ = std::numeric_limits<double>::infinity();
+    at(0);
+    push({boundOf(a_.root(), b_.root()), a_.root(), b_.root()});
+    this->search();
+    return first_;
+  }
+
+ private:
+  using Base = BestFirst<ContactTimeWalk<A, B>, A, B>;
+  friend Base;
+  using Pair = typename Base::Pair;
+  using Base::a_;
+  using Base::b_;
+  using Base::push;
+  using Base::spheres;
+
+  // A pair that can be put off by this much is looked at again before its parts are.
+  static constexpr double kWorthWaiting = 1.0 / 64;
+
+  // Unit directions are off by less.
+  static constexpr double kBlur = 1e-15;
+
+  struct Body {
+    Corners corners;
+    std::size_t count = 0;  // 3: a triangle, 1: a ball about its first corner
+    double radius = 0;
+  };
+  struct Scratch : Base::Heap {
+    std::vector<Body> a, b;
+  };
+  static Scratch& scratch() {
+    thread_local Scratch s;
+    return s;
+  }
+
+  double reach() const { return goal_.margin + goal_.touch; }
+  bool worthIt(double time) const { return time <= 1 && time < first_; }
+  bool settled() const { return !(first_ > 0); }
+  double scaleOfB() const { return b_in_body_.scale / a_in_body_.scale; }
+
+  static Placement placed(const Placement& in_body, const Motion& motion, double time) {
+    const Eigen::Isometry3d X = motion.at(time);
+    Placement p;
+    p.rotation = X.linear();
+    p.scale = in_body.scale;
+    p.translation = X * in_body.translation;
+    return p;
+  }
+
+  void at(double time) {
+    if (time == now_) return;
+    now_ = time;
+    a_in_world_ = placed(a_in_body_, motion_a_, time);
+    b_in_world_ = placed(b_in_body_, motion_b_, time);
+  }
+
+  // The time at which a gap along a direction, between what lies in two balls, may be closed.
+  double timeToClose(double gap, const Eigen::Vector3d& direction, const Eigen::Vector3d& center_a, double radius_a,
+                     const Eigen::Vector3d& center_b, double radius_b) const {
+    return advanced(gap, motion_a_.approach(direction, kBlur, center_a, radius_a, now_) +
+                             motion_b_.approach(-direction, kBlur, center_b, radius_b, now_));
+  }
+
+  double advanced(double gap, const Approach& approach) const {
+    return gap > 0 ? now_ + approach.timeFor(gap) * (1 - 1e-12) : now_;
+  }
+
+  double boundOf(const NodeReach& a, const NodeReach& b) const {
+    const Eigen::Vector3d t = b.center - a.center;
+    const double apart = t.norm(), radius_a = a.half.norm(), radius_b = b.half.norm();
+    const double pad = 1e-12 * (apart + radius_a + radius_b) + reach();
+    double best = now_;
+    const auto consider = [&](Eigen::Vector3d direction) {
+      double lo_a, hi_a, lo_b, hi_b, along = direction.dot(t);
+      if (along < 0) {
+        direction = -direction;
+        along = -along;
+      }
+      a.along(direction, lo_a, hi_a);
+      b.along(direction, lo_b, hi_b);
+      const double gap = along + lo_b - hi_a - pad;
+      if (gap > 0) best = std::max(best, timeToClose(gap, direction, a.center, radius_a, b.center, radius_b));
+      return !worthIt(best);
+    };
+    if (apart > 0 && consider(t / apart)) return best;
+    const Eigen::Matrix3d s = (a.axes.transpose() * b.axes).cwiseAbs();
+    const Eigen::Vector3d in_a = a.axes.transpose() * t, in_b = b.axes.transpose() * t;
+    const Eigen::Vector3d gap_a = (in_a.cwiseAbs() - a.half - s * b.half).cwiseMax(0);
+    const Eigen::Vector3d gap_b = (in_b.cwiseAbs() - b.half - s.transpose() * a.half).cwiseMax(0);
+    // Where boxes are apart on several of a box's axes, the way between them is a mixture of these.
+    const double length_a = gap_a.norm(), length_b = gap_b.norm();
+    if (length_a > 0 && consider(a.axes * (gap_a.cwiseProduct(in_a.cwiseSign()) / length_a))) return best;
+    if (length_b > 0 && consider(b.axes * (gap_b.cwiseProduct(in_b.cwiseSign()) / length_b))) return best;
+    for (const NodeReach* n : {&a, &b}) {
+      const double length = n->normal.norm();
+      if (length > 0 && consider(n->normal / length)) break;
+    }
+    return best;
+  }
+
+  // Two balls stay apart as long as their middles do: turning does not matter to a ball.
+  double boundOf(const Sphere& a, const Sphere& b) const {
+    const Eigen::Vector3d t = b.center - a.center;
+    const double apart = t.norm();
+    const double gap = apart * (1 - 1e-12) - (a.radius + b.radius) * (1 + 1e-12) - reach();
+    return gap > 0 ? timeToClose(gap, t / apart, a.center, 0, b.center, 0) : now_;
+  }
+
+  NodeReach reachOfA(typename A::Node n) const { return NodeReach(a_.volume(n), a_in_world_); }
+  NodeReach reachOfB(typename B::Node n) const { return NodeReach(b_.volume(n), b_in_world_); }
+  Sphere ballOfA(typename A::Node n) const { return query::placed(a_.sphere(n), a_in_world_); }
+  Sphere ballOfB(typename B::Node n) const { return query::placed(b_.sphere(n), b_in_world_); }
+
+  double boundOf(typename A::Node a, typename B::Node b) const {
+    return spheres() ? boundOf(ballOfA(a), ballOfB(b)) : boundOf(reachOfA(a), reachOfB(b));
+  }
+
+  bool again(const Pair& pair) {
+    at(pair.bound);
+    const double time = boundOf(pair.a, pair.b);
+    if (time < now_ + kWorthWaiting) return !worthIt(time);
+    push({time, pair.a, pair.b});
+    return true;
+  }
+
+  void expandA(const Pair& pair) {
+    if (spheres()) {
+      const Sphere b = ballOfB(pair.b);
+      a_.children(pair.a, [&](typename A::Node c) { push({boundOf(ballOfA(c), b), c, pair.b}); });
+    } else {
+      const NodeReach b = reachOfB(pair.b);
+      a_.children(pair.a, [&](typename A::Node c) { push({boundOf(reachOfA(c), b), c, pair.b}); });
+    }
+  }
+
+  void expandB(const Pair& pair) {
+    if (spheres()) {
+      const Sphere a = ballOfA(pair.a);
+      b_.children(pair.b, [&](typename B::Node c) { push({boundOf(a, ballOfB(c)), pair.a, c}); });
+    } else {
+      const NodeReach a = reachOfA(pair.a);
+      b_.children(pair.b, [&](typename B::Node c) { push({boundOf(a, reachOfB(c)), pair.a, c}); });
+    }
+  }
+
+  // The primitives of a leaf, in the frame of their side.
+  template <typename Side>
+  static void fill(const Side& side, typename Side::Node node, std::vector<Body>& out) {
+    if (side.cells()) {
+      const Sphere s = side.cellSphere(node);
+      out.resize(1);
+      out[0].corners[0] = s.center;
+      out[0].count = 1;
+      out[0].radius = s.radius;
+      return;
+    }
+    out.resize(side.triangleCount(node));
+    for (std::size_t i = 0; i < out.size(); ++i) {
+      const std::uint32_t t = side.triangle(node, i);
+      for (int k = 0; k < 3; ++k) out[i].corners[k] = side.corner(t, k);
+      out[i].count = 3;
+      out[i].radius = 0;
+    }
+  }
+
+  void leaves(const Pair& pair) {
+    Scratch& s = scratch();
+    fill(a_, pair.a, s.a);
+    fill(b_, pair.b, s.b);
+    for (const Body& p : s.a) {
+      for (const Body& q : s.b) first_ = std::min(first_, firstContact(p, q, pair.bound));
+    }
+  }
+
+  static Body inWorld(const Body& body, const Placement& to) {
+    Body w = body;
+    for (std::size_t k = 0; k < body.count; ++k) w.corners[k] = to * body.corners[k];
+    w.radius *= to.scale;
+    return w;
+  }
+
+  // How far two primitives are apart, and the unit way from p to q.
+  static double distanceOf(const Body& p, const Body& q, Eigen::Vector3d& way) {
+    Eigen::Vector3d on_p = p.corners[0], on_q = q.corners[0];
+    if (p.count == 3 && q.count == 3) {
+      nearestPoints(p.corners, q.corners, on_p, on_q);
+    } else if (p.count == 3) {
+      on_p = closestPoint(on_q, p.corners);
+    } else if (q.count == 3) {
+      on_q = closestPoint(on_p, q.corners);
+    }
+    way = on_q - on_p;
+    const double length = way.norm();
+    if (length > 0) way /= length;
+    return std::max(0.0, length - p.radius - q.radius);
+  }
+
+  // Velocities are affine in position, so a triangle's extremes are at its corners; a ball goes with its middle.
+  static Approach approachOf(const Motion& motion, const Body& body, const Eigen::Vector3d& direction, double blur,
+                             double time) {
+    Approach most = motion.approach(direction, blur, body.corners[0], 0, time);
+    for (std::size_t k = 1; k < body.count; ++k) {
+      most = Approach::most(most, motion.approach(direction, blur, body.corners[k], 0, time));
+    }
+    return most;
+  }
+
+  static double sizeOf(const Body& b) {
+    double size = b.radius;
+    for (std::size_t k = 1; k < b.count; ++k) size = std::max(size, (b.corners[k] - b.corners[0]).norm());
+    return size;
+  }
+
+  bool touch(const Body& p, const Body& q, double time) {
+    at(time);
+    Eigen::Vector3d way;
+    return distanceOf(inWorld(p, a_in_world_), inWorld(q, b_in_world_), way) <= reach();
+  }
+
+  // Two convex primitives that do not touch before `time`.
+  double firstContact(const Body& p, const Body& q, double time) {
+    while (worthIt(time)) {
+      at(time);
+      const Body pw = inWorld(p, a_in_world_), qw = inWorld(q, b_in_world_);
+      Eigen::Vector3d way;
+      const double distance = distanceOf(pw, qw, way);
+      if (distance <= reach()) return time;
+      // The way is known as well as rounding lets it be.
+      const double size = sizeOf(pw) + sizeOf(qw) + pw.corners[0].norm() + qw.corners[0].norm();
+      const double blur = std::min(1.0, 8 * std::numeric_limits<double>::epsilon() * size / distance);
+      // To half of what counts as contact, so that steps do not shrink for ever.
+      const double later =
+          advanced(distance - reach() + goal_.touch / 2,
+                   approachOf(motion_a_, pw, way, blur, time) + approachOf(motion_b_, qw, -way, blur, time));
+      if (!(later > time)) return time;
+      // Close to a contact: if it is certain to come soon, the rest of the way need not be gone.
+      if (later - time < goal_.time_error && time + goal_.time_error <= 1 && touch(p, q, time + goal_.time_error)) {
+        return time;
+      }
+      time = later;
+    }
+    return std::numeric_limits<double>::infinity();
+  }
+
+  const Placement a_in_body_, b_in_body_;
+  const Motion &motion_a_, &motion_b_;
+  ContactGoal goal_;
+  double now_ = -1, first_ = 0;
+  Placement a_in_world_, b_in_world_;  // at the time now_
+};
+
+}  // namespace bocst::query

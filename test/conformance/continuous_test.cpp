@@ -1,0 +1,513 @@
+// SPDX-License-Identifier: BSD-3-Clause
+// Times of contact against brute-force sampling, against what can be computed by hand, and against FCL's motions.
+#include <fcl/math/motion/interp_motion.h>
+#include <fcl/math/motion/screw_motion.h>
+#include <fcl/math/motion/spline_motion.h>
+#include <fcl/math/motion/translation_motion.h>
+#include <gtest/gtest.h>
+
+#include "conformance/reference.h"
+#include "query/motion.h"
+
+namespace bocst {
+namespace {
+
+using test::Raw;
+
+constexpr fcl::CCDMotionType kTypes[] = {fcl::CCDM_TRANS, fcl::CCDM_LINEAR, fcl::CCDM_SCREW, fcl::CCDM_SPLINE};
+
+template <typename S>
+fcl::Transform3<S> identity() {
+  return fcl::Transform3<S>::Identity();
+}
+
+Eigen::Isometry3d isometry(const fcl::Transform3d& X) {
+  Eigen::Isometry3d Y = Eigen::Isometry3d::Identity();
+  Y.matrix() = X.matrix();
+  return Y;
+}
+
+/// A way between two poses as the walks take it, for sampling.
+template <typename S>
+std::unique_ptr<query::Motion> motionOf(const fcl::Transform3<S>& X, const fcl::Transform3<S>& Y,
+                                        fcl::CCDMotionType type) {
+  const Eigen::Isometry3d begin = isometry(X.template cast<double>()), end = isometry(Y.template cast<double>());
+  switch (type) {
+    case fcl::CCDM_TRANS:
+      return std::make_unique<query::AxisMotion>(query::translation(begin, end));
+    case fcl::CCDM_LINEAR:
+      return std::make_unique<query::AxisMotion>(query::interpolation(begin, end));
+    case fcl::CCDM_SCREW:
+      return std::make_unique<query::AxisMotion>(query::screw(begin, end));
+    default:
+      return std::make_unique<query::SplineMotion>(query::spline(begin, end));
+  }
+}
+
+template <typename S>
+fcl::Transform3<S> poseAt(const query::Motion& m, double t) {
+  const Eigen::Isometry3d X = m.at(t);
+  return test::pose<S>(X.linear(), X.translation());
+}
+
+fcl::Transform3d currentPose(const fcl::MotionBase<double>& m) {
+  fcl::Transform3d X;
+  m.getCurrentTransform(X);
+  return X;
+}
+
+// Motions.
+
+fcl::Transform3d randomPose(std::mt19937_64& g, double reach) {
+  return test::pose<double>(test::randomRotation(g), test::randomDirection(g) * reach);
+}
+
+TEST(Motions, GoWhereFclsGo) {
+  std::mt19937_64 g(1);
+  for (int round = 0; round < 50; ++round) {
+    const fcl::Transform3d X = randomPose(g, 2), Y = randomPose(g, 3);
+    const Eigen::Vector3d zero = Eigen::Vector3d::Zero();
+    const fcl::TranslationMotion<double> translation(X, Y);
+    const fcl::InterpMotion<double> interp(X.linear(), X.translation(), Y.linear(), Y.translation(), zero);
+    const fcl::ScrewMotion<double> screw(X, Y);
+    const std::pair<const fcl::MotionBase<double>*, fcl::CCDMotionType> all[] = {
+        {&translation, fcl::CCDM_TRANS}, {&interp, fcl::CCDM_LINEAR}, {&screw, fcl::CCDM_SCREW}};
+    for (const auto& [theirs, type] : all) {
+      const auto ours = motionOf<double>(X, Y, type);
+      for (const double t : {0.0, 0.1, 0.5, 0.9, 1.0}) {
+        theirs->integrate(t);
+        ASSERT_LT((ours->at(t).matrix() - currentPose(*theirs).matrix()).cwiseAbs().maxCoeff(), 1e-10)
+            << type << ' ' << t;
+      }
+    }
+    const auto spline = motionOf<double>(X, Y, fcl::CCDM_SPLINE);
+    EXPECT_LT((spline->at(0).matrix() - X.matrix()).cwiseAbs().maxCoeff(), 1e-12);
+    EXPECT_LT((spline->at(1).matrix() - Y.matrix()).cwiseAbs().maxCoeff(), 1e-12);
+  }
+}
+
+query::SplineMotion::Points randomPoints(std::mt19937_64& g, double size) {
+  query::SplineMotion::Points p;
+  for (auto& x : p) x = size * test::randomDirection(g);
+  return p;
+}
+
+TEST(Motions, SplinesGoWhereFclsGo) {
+  std::mt19937_64 g(2);
+  for (int round = 0; round < 50; ++round) {
+    const auto p = randomPoints(g, 3), r = randomPoints(g, 2);
+    const fcl::SplineMotion<double> theirs(p[0], p[1], p[2], p[3], r[0], r[1], r[2], r[3]);
+    const query::SplineMotion ours(p, r);
+    for (const double t : {0.0, 0.3, 1.0}) {
+      theirs.integrate(t);
+      ASSERT_LT((ours.at(t).matrix() - currentPose(theirs).matrix()).cwiseAbs().maxCoeff(), 1e-12);
+    }
+  }
+}
+
+TEST(Motions, NothingIsFasterThanTheyClaim) {
+  std::mt19937_64 g(3);
+  std::uniform_real_distribution<double> u(0, 1);
+  for (int round = 0; round < 400; ++round) {
+    std::unique_ptr<query::Motion> m;
+    if (round % 5 == 4) {
+      m = std::make_unique<query::SplineMotion>(randomPoints(g, 3), randomPoints(g, 4 * u(g)));
+    } else {
+      m = motionOf<double>(randomPose(g, 1), randomPose(g, 2 * u(g)), kTypes[round % 4]);
+    }
+    const double time = u(g), radius = u(g);
+    const Eigen::Vector3d center = 3 * test::randomDirection(g), direction = test::randomDirection(g);
+    const query::Approach approach = m->approach(direction, 0, center, radius, time);
+    const double fastest = m->fastest(center, radius, time), reach = 2 * u(g);
+    EXPECT_LE(approach.now, approach.ever + 1e-9);
+    EXPECT_LE(approach.ever, fastest + 1e-12);
+    EXPECT_GE(m->approach(direction, 0.1, center, radius, time).now, approach.now);
+    const Eigen::Isometry3d back = m->at(time).inverse();
+    for (int i = 0; i < 60; ++i) {
+      const Eigen::Vector3d way = test::randomDirection(g), start = center + radius * way, point = back * start;
+      const double t = time + (1 - time) * u(g), h = std::min(1e-6, 1 - t);
+      if (!(h > 1e-9)) continue;
+      const Eigen::Vector3d v = (m->at(t + h) * point - m->at(t) * point) / h;
+      ASSERT_LE(v.norm(), fastest + 1e-6) << round;
+      ASSERT_LE(direction.dot(v), approach.ever + 1e-6) << round;
+      ASSERT_LE(direction.dot(v), approach.now + approach.change * (t + h - time) + 1e-6) << round;
+      // No point goes so far before the time that a gap needs.
+      const double needed = approach.timeFor(reach);
+      ASSERT_LE(direction.dot(m->at(std::min(1.0, time + needed)) * point - start), reach + 1e-9);
+    }
+  }
+}
+
+// Times of contact.
+
+template <typename S>
+using Result = fcl::ContinuousCollisionResult<S>;
+
+template <typename S>
+fcl::ContinuousCollisionRequest<S> request(fcl::CCDMotionType type, double toc_err = 1e-4) {
+  fcl::ContinuousCollisionRequest<S> r;
+  r.ccd_motion_type = type;
+  r.ccd_solver_type = fcl::CCDC_CONSERVATIVE_ADVANCEMENT;
+  r.toc_err = static_cast<S>(toc_err);
+  return r;
+}
+
+/// Two geometries on their ways.
+template <typename S>
+struct Ways {
+  const fcl::CollisionGeometry<S>* o1;
+  fcl::Transform3<S> begin1, end1;
+  const fcl::CollisionGeometry<S>* o2;
+  fcl::Transform3<S> begin2, end2;
+
+  Result<S> ask(const fcl::ContinuousCollisionRequest<S>& r) const {
+    Result<S> result;
+    const S time = fcl::continuousCollide(o1, begin1, end1, o2, begin2, end2, r, result);
+    EXPECT_EQ(time, result.time_of_contact);
+    return result;
+  }
+  Ways swapped() const { return {o2, begin2, end2, o1, begin1, end1}; }
+};
+
+template <typename S>
+double distanceAt(const fcl::CollisionGeometry<S>& a, const fcl::Transform3<S>& X, const fcl::CollisionGeometry<S>& b,
+                  const fcl::Transform3<S>& Y) {
+  fcl::DistanceResult<S> result;
+  return static_cast<double>(fcl::distance(&a, X, &b, Y, fcl::DistanceRequest<S>(), result));
+}
+
+/// Checks an answer by many poses on the way, each asked of `a` and `b`, which look like the geometries of `ways`.
+template <typename S>
+void checkBySampling(const Ways<S>& ways, const fcl::CollisionGeometry<S>& a, const fcl::CollisionGeometry<S>& b,
+                     fcl::CCDMotionType type, double toc_err, const Result<S>& result, int samples) {
+  const auto m1 = motionOf<S>(ways.begin1, ways.end1, type), m2 = motionOf<S>(ways.begin2, ways.end2, type);
+  const auto isHit = [&](double t) { return test::touching<S>(a, poseAt<S>(*m1, t), b, poseAt<S>(*m2, t)); };
+  const double toc = static_cast<double>(result.time_of_contact), end = result.is_collide ? toc : 1;
+  // Below this, the poses themselves are rounded.
+  const double resolution = std::is_same<S, double>::value ? 1e-9 : 1e-4;
+  for (int i = 0; i < samples && end > 0; ++i) {
+    const double t = i == 0 ? 0 : end * (1 - resolution) * i / (samples - 1);
+    ASSERT_FALSE(isHit(t)) << "a contact at " << t << " was stepped over; answer: " << result.is_collide << ' ' << toc;
+  }
+  if (!result.is_collide) {
+    EXPECT_EQ(toc, 1);
+    ASSERT_FALSE(isHit(1));
+    return;
+  }
+  // Somewhere in what the answer leaves open, they touch.
+  double nearest = std::numeric_limits<double>::infinity();
+  const auto look = [&](double t) {
+    const double d = distanceAt<S>(a, poseAt<S>(*m1, t), b, poseAt<S>(*m2, t));
+    nearest = std::min(nearest, d);
+  };
+  for (int i = 0; i <= 8; ++i) look(std::min(toc + toc_err * i / 8, 1.0));
+  EXPECT_LT(nearest, (std::is_same<S, double>::value ? 1e-7 : 1e-3)) << toc;
+  const auto X = m1->at(toc).matrix();
+  EXPECT_LT((result.contact_tf1.matrix().template cast<double>() - X).cwiseAbs().maxCoeff(), 1e-5);
+}
+
+template <typename S>
+class Continuous : public testing::Test {};
+using Scalars = testing::Types<float, double>;
+TYPED_TEST_SUITE(Continuous, Scalars);
+
+template <typename S>
+Ways<S> randomWays(std::mt19937_64& g, const fcl::CollisionGeometry<S>& a, const fcl::CollisionGeometry<S>& b,
+                   double far) {
+  std::uniform_real_distribution<double> u(0, 1);
+  const Eigen::Vector3d p = test::randomDirection(g), q = test::randomDirection(g);
+  Ways<S> w{&a, {}, {}, &b, {}, {}};
+  w.begin1 = test::pose<S>(test::randomRotation(g), 0.3 * p);
+  w.end1 = test::pose<S>(test::randomRotation(g), 0.5 * q);
+  w.begin2 = test::pose<S>(test::randomRotation(g), far * test::randomDirection(g));
+  w.end2 = test::pose<S>(test::randomRotation(g), far * u(g) * test::randomDirection(g));
+  return w;
+}
+
+template <typename S, typename BV>
+void checkRandomWays(int rounds) {
+  const Raw ra = test::torus(24), rb = test::torus(17, 0.3);
+  const auto fa = test::bvh<fcl::OBBRSS<S>>(ra), fb = test::bvh<fcl::OBBRSS<S>>(rb);
+  const auto partner = test::bvh<BV>(rb);
+  const Model<S> a(ra.mesh()), b(rb.mesh());
+  std::mt19937_64 g(4);
+  int hits = 0;
+  for (int i = 0; i < rounds; ++i) {
+    const fcl::CCDMotionType type = kTypes[i % 4];
+    Ways<S> ways = randomWays<S>(g, a, b, i % 3 == 0 ? 1.6 : 2.6);
+    const Result<S> result = ways.ask(request<S>(type));
+    checkBySampling<S>(ways, *fa, *fb, type, 1e-4, result, 60);
+    if (testing::Test::HasFatalFailure()) return;
+    hits += result.is_collide && result.time_of_contact > 0;
+    const auto same = [&](const Result<S>& other) {
+      ASSERT_EQ(other.is_collide, result.is_collide);
+      ASSERT_NEAR(other.time_of_contact, result.time_of_contact, 2e-4);
+    };
+    same(ways.swapped().ask(request<S>(type)));
+    ways.o2 = partner.get();
+    same(ways.ask(request<S>(type)));
+    same(ways.swapped().ask(request<S>(type)));
+  }
+  EXPECT_GE(hits, rounds / 4);
+}
+
+TYPED_TEST(Continuous, NothingIsSteppedOverOnRandomWays) { checkRandomWays<TypeParam, fcl::OBBRSS<TypeParam>>(60); }
+
+TYPED_TEST(Continuous, EveryBvhIsAPartner) {
+  using S = TypeParam;
+  checkRandomWays<S, fcl::AABB<S>>(4);
+  checkRandomWays<S, fcl::OBB<S>>(4);
+  checkRandomWays<S, fcl::RSS<S>>(4);
+  checkRandomWays<S, fcl::kIOS<S>>(4);
+  checkRandomWays<S, fcl::KDOP<S, 16>>(4);
+  checkRandomWays<S, fcl::KDOP<S, 18>>(4);
+  checkRandomWays<S, fcl::KDOP<S, 24>>(4);
+}
+
+// A bullet through a plate: sampling at a few times, as FCL's default solver does, misses it.
+TYPED_TEST(Continuous, AThinPlateStopsAFastBullet) {
+  using S = TypeParam;
+  const Raw plate = test::box({-0.001, -1, -1}, {0.001, 1, 1});
+  Raw bullet = test::torus(8);
+  bullet.scale(0.02);
+  const Model<S> a(plate.mesh()), b(bullet.mesh());
+  const auto fa = test::bvh<fcl::OBBRSS<S>>(plate), fb = test::bvh<fcl::OBBRSS<S>>(bullet);
+  const Eigen::Matrix3d I = Eigen::Matrix3d::Identity();
+  const auto begin = test::pose<S>(I, {-5, 0.1, 0.2}), end = test::pose<S>(I, {7, 0.1, 0.2});
+  const double front = bullet.mesh()->bounds().max().x(), expected = (5 - 0.001 - front) / 12;
+  const double rounding = std::is_same<S, double>::value ? 1e-9 : 1e-4;
+  for (const auto type : kTypes) {
+    for (const auto solver :
+         {fcl::CCDC_NAIVE, fcl::CCDC_CONSERVATIVE_ADVANCEMENT, fcl::CCDC_RAY_SHOOTING, fcl::CCDC_POLYNOMIAL_SOLVER}) {
+      for (const std::size_t iterations : {std::size_t{1}, std::size_t{10}}) {
+        for (const double toc_err : {0.0, 1e-6, 1e-4, 0.01}) {
+          auto r = request<S>(type, toc_err);
+          r.ccd_solver_type = solver;
+          r.num_max_iterations = iterations;
+          const Ways<S> ways{&a, identity<S>(), identity<S>(), &b, begin, end};
+          for (const Ways<S>& w : {ways, ways.swapped()}) {
+            const Result<S> result = w.ask(r);
+            ASSERT_TRUE(result.is_collide);
+            EXPECT_LE(result.time_of_contact, expected + rounding);
+            EXPECT_GE(result.time_of_contact, expected - toc_err - rounding);
+          }
+        }
+      }
+    }
+  }
+  // Beside the plate it flies on.
+  const auto beside = test::pose<S>(I, {-5, 1.05, 0.2}), there = test::pose<S>(I, {7, 1.05, 0.2});
+  const Result<S> miss = Ways<S>{&a, identity<S>(), identity<S>(), &b, beside, there}.ask(request<S>(fcl::CCDM_LINEAR));
+  EXPECT_FALSE(miss.is_collide);
+  EXPECT_EQ(miss.time_of_contact, 1);
+  EXPECT_TRUE(miss.contact_tf2.isApprox(there));
+}
+
+TEST(ContinuousDouble, FclsMotionsAreTakenAsTheyAre) {
+  // A bar about the z axis meets a peg after a known angle, whatever its reference point is.
+  const Modeld bar(test::box({0, -0.05, -0.05}, {1, 0.05, 0.05}).mesh());
+  const Modeld peg(test::box({-0.05, 0.7, -0.5}, {0.05, 0.9, 0.5}).mesh());
+  const fcl::Transform3d I = identity<double>();
+  const auto quarter = test::pose<double>(Eigen::AngleAxisd(3, Eigen::Vector3d::UnitZ()).toRotationMatrix(), {0, 0, 0});
+  const fcl::TranslationMotion<double> still(I, I);
+  // The bar's upper face, at a distance of 0.05 from the axis, meets the peg's corner (0.05, 0.9) or (0.05, 0.7).
+  const auto angleOf = [](double x, double y) { return std::atan2(y, x) - std::asin(0.05 / std::hypot(x, y)); };
+  const double expected = std::min(angleOf(0.05, 0.7), angleOf(0.05, 0.9)) / 3;
+
+  const fcl::InterpMotion<double> about_origin(I.linear(), I.translation(), quarter.linear(), quarter.translation(),
+                                               Eigen::Vector3d::Zero());
+  const fcl::ScrewMotion<double> screw(I, quarter);
+  const Eigen::Vector3d o = Eigen::Vector3d::Zero(), z = Eigen::Vector3d::UnitZ();
+  const fcl::SplineMotion<double> spline(o, o, o, o, -3 * z, 0 * z, 3 * z, 6 * z);
+  for (const fcl::MotionBase<double>* turn :
+       {static_cast<const fcl::MotionBase<double>*>(&about_origin), static_cast<const fcl::MotionBase<double>*>(&screw),
+        static_cast<const fcl::MotionBase<double>*>(&spline)}) {
+    turn->integrate(0.125);
+    const auto before = currentPose(*turn);
+    Result<double> result, other;
+    fcl::continuousCollide(&bar, turn, &peg, &still, request<double>(fcl::CCDM_TRANS, 1e-6), result);
+    fcl::continuousCollide(&peg, &still, &bar, turn, request<double>(fcl::CCDM_TRANS, 1e-6), other);
+    EXPECT_TRUE(result.is_collide);
+    EXPECT_NEAR(result.time_of_contact, expected, 2e-6);
+    EXPECT_NEAR(other.time_of_contact, expected, 2e-6);
+    EXPECT_EQ(currentPose(*turn).matrix(), before.matrix()) << "a motion is not written to";
+    turn->integrate(result.time_of_contact);
+    EXPECT_TRUE(result.contact_tf1.isApprox(currentPose(*turn), 1e-12));
+  }
+  // About a point of its own: the bar's far end stays, so it swings the other way round.
+  const fcl::InterpMotion<double> about_end(I.linear(), I.translation(), quarter.linear(),
+                                            Eigen::Vector3d(1, 0, 0) - quarter.linear() * Eigen::Vector3d(1, 0, 0),
+                                            Eigen::Vector3d(1, 0, 0));
+  about_end.integrate(0.5);
+  ASSERT_LT((currentPose(about_end) * Eigen::Vector3d(1, 0, 0) - Eigen::Vector3d(1, 0, 0)).norm(), 1e-12);
+  Result<double> result;
+  fcl::continuousCollide(&bar, &about_end, &peg, &still, request<double>(fcl::CCDM_TRANS), result);
+  EXPECT_FALSE(result.is_collide);
+}
+
+TEST(ContinuousDouble, SplinesFromRandomPoints) {
+  const Raw ra = test::torus(20), rb = test::torus(15, 0.2);
+  const Modeld a(ra.mesh()), b(rb.mesh());
+  std::mt19937_64 g(6);
+  const fcl::TranslationMotion<double> still(identity<double>(), identity<double>());
+  int hits = 0;
+  for (int i = 0; i < 20; ++i) {
+    const auto p = randomPoints(g, 4), r = randomPoints(g, 2);
+    const fcl::SplineMotion<double> m(p[0], p[1], p[2], p[3], r[0], r[1], r[2], r[3]);
+    Result<double> result;
+    fcl::continuousCollide(&a, &still, &b, &m, request<double>(fcl::CCDM_TRANS), result);
+    const double end = result.is_collide ? result.time_of_contact - 1e-9 : 1;
+    for (int k = 0; k < 100 && end > 0; ++k) {
+      m.integrate(end * k / 99);
+      ASSERT_FALSE(test::touching<double>(a, identity<double>(), b, currentPose(m)));
+    }
+    if (!result.is_collide) continue;
+    EXPECT_LT(distanceAt<double>(a, result.contact_tf1, b, result.contact_tf2), 1e-2);
+    hits += result.time_of_contact > 0;
+  }
+  EXPECT_GT(hits, 2);
+}
+
+TEST(ContinuousDouble, SlidingAtASmallGapIsNoContact) {
+  const Modeld floor(test::box({-10, -10, -1}, {10, 10, 0}).mesh());
+  const Modeld foot(test::torus(30).mesh());
+  const double low = -foot.mesh()->bounds().min().z();
+  for (const double gap : {1e-3, 1e-6}) {
+    const auto turn = Eigen::AngleAxisd(2, Eigen::Vector3d::UnitZ()).toRotationMatrix();
+    const auto begin = test::pose<double>(Eigen::Matrix3d::Identity(), {-8, 0, low + gap});
+    const Ways<double> ways{
+        &floor, identity<double>(), identity<double>(), &foot, begin, test::pose<double>(turn, {8, 1, low + gap})};
+    for (const auto type : kTypes) {
+      EXPECT_FALSE(ways.ask(request<double>(type)).is_collide) << gap << ' ' << type;
+      EXPECT_FALSE(ways.swapped().ask(request<double>(type)).is_collide) << gap << ' ' << type;
+    }
+    const Ways<double> sinking{
+        &floor, identity<double>(), identity<double>(), &foot, begin, test::pose<double>(turn, {8, 1, low - gap})};
+    for (const auto type : kTypes) {
+      const auto result = sinking.ask(request<double>(type));
+      EXPECT_TRUE(result.is_collide);
+      EXPECT_NEAR(result.time_of_contact, 0.5, 0.2) << gap << ' ' << type;
+    }
+  }
+}
+
+TEST(ContinuousDouble, TouchingAtTheBeginOrTheEnd) {
+  const Modeld a(test::box({0, 0, 0}, {1, 1, 1}).mesh()), b(test::box({0, 0, 0}, {1, 1, 1}).mesh());
+  const auto at = [](double x) { return test::pose<double>(Eigen::Matrix3d::Identity(), {x, 0.25, 0.125}); };
+  const fcl::Transform3d I = identity<double>();
+  EXPECT_EQ((Ways<double>{&a, I, I, &b, at(0.5), at(4)}.ask(request<double>(fcl::CCDM_TRANS)).time_of_contact), 0);
+  EXPECT_EQ((Ways<double>{&a, I, I, &b, at(1), at(4)}.ask(request<double>(fcl::CCDM_TRANS)).time_of_contact), 0);
+  const auto end = Ways<double>{&a, I, I, &b, at(4), at(1)}.ask(request<double>(fcl::CCDM_TRANS));
+  EXPECT_TRUE(end.is_collide);
+  EXPECT_NEAR(end.time_of_contact, 1, 2e-4);
+  EXPECT_LE(end.time_of_contact, 1);
+  EXPECT_FALSE((Ways<double>{&a, I, I, &b, at(4), at(1 + 1e-6)}.ask(request<double>(fcl::CCDM_TRANS)).is_collide));
+  EXPECT_FALSE((Ways<double>{&a, I, I, &b, at(4), at(4)}.ask(request<double>(fcl::CCDM_LINEAR)).is_collide));
+}
+
+TEST(ContinuousDouble, DegenerateMeshes) {
+  const Raw meshes[] = {test::adversarial(), test::soup(60, 4), test::torus(6)};
+  std::mt19937_64 g(8);
+  for (const Raw& ra : meshes) {
+    for (const Raw& rb : meshes) {
+      const Modeld a(ra.mesh()), b(rb.mesh());
+      for (int i = 0; i < 8; ++i) {
+        const fcl::CCDMotionType type = kTypes[i % 4];
+        const Ways<double> ways = randomWays<double>(g, a, b, 3);
+        checkBySampling<double>(ways, a, b, type, 1e-4, ways.ask(request<double>(type)), 40);
+        if (HasFatalFailure()) return;
+      }
+    }
+  }
+}
+
+// Spheres of the collision depth: never later than the surfaces, and as conservative collide() says on the way.
+TEST(ContinuousConservative, IsNeverLater) {
+  const Raw ra = test::torus(24), rb = test::torus(17, 0.3);
+  const Modeld exact_a(ra.mesh()), exact_b(rb.mesh());
+  const auto fb = test::bvh<fcl::OBBRSSd>(rb);
+  std::mt19937_64 g(9);
+  int later = 0;
+  for (const Subdivision subdivision : {Subdivision::kOctree, Subdivision::kBono}) {
+    for (int i = 0; i < 12; ++i) {
+      Options options;
+      options.answer = Answer::kConservative;
+      options.subdivision = subdivision;
+      options.depth = 4 + i % 3;
+      const Modeld a(ra.mesh(), options), b(rb.mesh(), options);
+      const fcl::CCDMotionType type = kTypes[i % 4];
+      Ways<double> ways = randomWays<double>(g, exact_a, exact_b, 3);
+      const double exact = ways.ask(request<double>(type)).time_of_contact;
+      ways.o1 = &a;
+      for (const fcl::CollisionGeometryd* other :
+           {static_cast<const fcl::CollisionGeometryd*>(&b), static_cast<const fcl::CollisionGeometryd*>(&exact_b),
+            static_cast<const fcl::CollisionGeometryd*>(fb.get())}) {
+        ways.o2 = other;
+        const auto result = ways.ask(request<double>(type)), reversed = ways.swapped().ask(request<double>(type));
+        EXPECT_LE(result.time_of_contact, exact);
+        EXPECT_EQ(result.is_collide, reversed.is_collide);
+        EXPECT_NEAR(result.time_of_contact, reversed.time_of_contact, 2e-4);
+        checkBySampling<double>(ways, a, *other, type, 1e-4, result, 40);
+        if (HasFatalFailure()) return;
+        later += result.time_of_contact < exact;
+      }
+    }
+  }
+  EXPECT_GT(later, 10);
+}
+
+TEST(ContinuousRequest, WhatCannotBeDoneThrows) {
+  struct Wobble : fcl::TranslationMotion<double> {
+    using fcl::TranslationMotion<double>::TranslationMotion;
+  };
+  const Modeld a(test::torus(6).mesh()), b(test::torus(6).mesh());
+  const fcl::Transform3d I = identity<double>(), far = test::pose<double>(Eigen::Matrix3d::Identity(), {9, 0, 0});
+  const fcl::TranslationMotion<double> good(I, far);
+  const Wobble unknown(I, far);
+  Result<double> result;
+  const auto r = request<double>(fcl::CCDM_LINEAR);
+  EXPECT_THROW(fcl::continuousCollide(&a, &good, &b, &unknown, r, result), std::invalid_argument);
+  EXPECT_THROW(fcl::continuousCollide(&a, static_cast<const fcl::MotionBase<double>*>(nullptr), &b, &good, r, result),
+               std::invalid_argument);
+  auto broken = far;
+  broken.translation().x() = std::numeric_limits<double>::quiet_NaN();
+  EXPECT_THROW(fcl::continuousCollide(&a, I, I, &b, I, broken, r, result), std::invalid_argument);
+  const fcl::TranslationMotion<double> nowhere(I, broken);
+  EXPECT_THROW(fcl::continuousCollide(&a, &good, &b, &nowhere, r, result), std::invalid_argument);
+  for (const double error : {-1e-3, std::numeric_limits<double>::quiet_NaN()}) {
+    EXPECT_THROW(fcl::continuousCollide(&a, I, I, &b, far, I, request<double>(fcl::CCDM_LINEAR, error), result),
+                 std::invalid_argument);
+  }
+  auto odd = r;
+  odd.ccd_motion_type = static_cast<fcl::CCDMotionType>(17);
+  EXPECT_THROW(fcl::continuousCollide(&a, I, I, &b, far, I, odd, result), std::invalid_argument);
+}
+
+TEST(ContinuousRequest, OnlyOccupiedGeometriesCollide) {
+  const Modeld a(test::torus(6).mesh());
+  Modeld b(test::torus(6).mesh());
+  b.cost_density = 0;
+  b.threshold_occupied = 0.5;
+  ASSERT_FALSE(b.isOccupied());
+  const fcl::Transform3d I = identity<double>(), far = test::pose<double>(Eigen::Matrix3d::Identity(), {9, 0, 0});
+  EXPECT_FALSE((Ways<double>{&a, I, I, &b, far, I}.ask(request<double>(fcl::CCDM_LINEAR)).is_collide));
+  EXPECT_TRUE((Ways<double>{&a, I, I, &a, far, I}.ask(request<double>(fcl::CCDM_LINEAR)).is_collide));
+}
+
+TEST(ContinuousGrowth, OnlyWhatTheWayMeets) {
+  const Raw raw = test::torus(100);
+  const Modeld a(raw.mesh()), b(raw.mesh());
+  const fcl::Transform3d I = identity<double>();
+  const auto begin = test::pose<double>(Eigen::Matrix3d::Identity(), {4, 0.2, 0.1});
+  EXPECT_FALSE((Ways<double>{&a, I, I, &b, begin, test::pose<double>(I.linear(), {9, 9, 0})}
+                    .ask(request<double>(fcl::CCDM_LINEAR))
+                    .is_collide));
+  EXPECT_EQ(a.statistics().resident_nodes, 1u) << "what only recedes needs no tree";
+  EXPECT_TRUE((Ways<double>{&a, I, I, &b, begin, I}.ask(request<double>(fcl::CCDM_LINEAR)).is_collide));
+  Modeld whole(a.mesh());
+  whole.expandAll(static_cast<int>(a.statistics().nodes_per_level.size()));
+  EXPECT_LT(a.statistics().resident_nodes, whole.statistics().resident_nodes / 2);
+}
+
+}  // namespace
+}  // namespace bocst
