@@ -29,6 +29,9 @@ void ModelArguments::addOracle(CLI::App& command) {
                   "paper's, which misses some")
       ->check(CLI::IsMember({"auto", "cpu", "occlusion", "compute", "sampled"}))
       ->capture_default_str();
+  command.add_option("--viewport", viewport, "pixels a side of the views that --oracle sampled draws")
+      ->check(CLI::Range(1, 4096))
+      ->capture_default_str();
 }
 
 void ModelArguments::addAnswer(CLI::App& command) {
@@ -54,6 +57,7 @@ Options ModelArguments::options() const {
   options.dimension = dimension;
   options.answer = exact() ? Answer::kExact : Answer::kConservative;
   options.depth = depth;
+  options.viewport = viewport;
   options.oracle = oracle == "cpu"         ? OracleKind::kCpu
                    : oracle == "occlusion" ? OracleKind::kOcclusion
                    : oracle == "compute"   ? OracleKind::kCompute

@@ -36,11 +36,12 @@ struct ModelArguments {
   std::string answer = "exact";
   int depth = Options{}.depth;
   std::string oracle = "auto";
+  int viewport = Options{}.viewport;
   std::string scalar = "double";
 
   void addShape(CLI::App& command);   ///< --subdivision --dimension
   void addDepth(CLI::App& command);   ///< --depth
-  void addOracle(CLI::App& command);  ///< --oracle
+  void addOracle(CLI::App& command);  ///< --oracle --viewport
   void addAnswer(CLI::App& command);  ///< --answer --scalar
   void addAll(CLI::App& command);
 
