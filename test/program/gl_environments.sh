@@ -1,0 +1,55 @@
+#!/usr/bin/env bash
+# SPDX-License-Identifier: BSD-3-Clause
+# Usage: gl_environments.sh PROGRAM MODELS
+# The program where OpenGL is missing, old, or the surroundings are bare: it says so or works, and never crashes. On a
+# machine without Mesa's software renderer the cases that need one cannot be had, and that is a failure, too.
+set -uo pipefail
+bocst=$1
+models=$2
+failures=0
+out=$(mktemp)
+trap 'rm -f "$out"' EXIT
+
+# What must be said, the exit code, then environment and arguments.
+expect() {
+  local pattern=$1 code=$2 got=0
+  shift 2
+  timeout 120 env "$@" >"$out" 2>&1 || got=$?
+  if [[ $got -ne $code ]] || ! grep -qE "$pattern" "$out"; then
+    echo "FAILED (exit code $got, expected $code; output must match: $pattern): $*"
+    cat "$out"
+    failures=$((failures + 1))
+  fi
+}
+
+pair=("$models/link.obj" "$models/gripper.obj")
+mesa=(LIBGL_ALWAYS_SOFTWARE=1)
+no_driver=(__EGL_VENDOR_LIBRARY_FILENAMES=/nonexistent.json)
+
+expect '^compute +no +yes' 0 "${mesa[@]}" "$bocst" oracles
+expect '^cpu +no +yes' 0 "${no_driver[@]}" "$bocst" oracles
+expect '^compute +no +no: ' 0 "${no_driver[@]}" "$bocst" oracles
+expect '^bocst: oracle compute: ' 1 "${no_driver[@]}" "$bocst" collide "${pair[@]}" --oracle compute
+expect '^bocst: oracle occlusion: ' 1 "${no_driver[@]}" BOCST_ORACLE=occlusion "$bocst" collide "${pair[@]}"
+expect 'They collide' 0 "${no_driver[@]}" "$bocst" collide "${pair[@]}"
+
+old=("${mesa[@]}" MESA_GL_VERSION_OVERRIDE=3.3)
+expect '^compute +no +no: .*OpenGL 4\.3' 0 "${old[@]}" "$bocst" oracles
+expect '^occlusion +no +yes' 0 "${old[@]}" "$bocst" oracles
+expect '^bocst: oracle compute: ' 1 "${old[@]}" "$bocst" collide "${pair[@]}" --oracle compute
+expect 'They collide' 0 "${old[@]}" "$bocst" collide "${pair[@]}" --oracle occlusion
+expect 'They collide' 0 "${mesa[@]}" MESA_GL_VERSION_OVERRIDE=4.6 "$bocst" collide "${pair[@]}" --oracle compute
+expect '^cpu +no +yes' 0 "${mesa[@]}" GALLIUM_DRIVER=softpipe "$bocst" oracles
+
+expect 'no device 99|not one of' 1 "${mesa[@]}" BOCST_ORACLE=99 "$bocst" collide "${pair[@]}"
+expect 'They collide' 0 "${mesa[@]}" BOCST_ORACLE=0 "$bocst" collide "${pair[@]}"
+
+# No HOME, no DISPLAY, nothing; and as somebody who owns nothing.
+expect 'They collide' 0 -i "${mesa[@]}" "$bocst" collide "${pair[@]}" --oracle compute
+if [[ $EUID -eq 0 ]]; then
+  expect 'They collide' 0 -i "${mesa[@]}" setpriv --reuid=65534 --regid=65534 --clear-groups "$bocst" collide "${pair[@]}" \
+    --oracle compute
+fi
+
+[[ $failures -eq 0 ]] || { echo "$failures failed"; exit 1; }
+echo "all as expected"
