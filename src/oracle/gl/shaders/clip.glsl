@@ -35,9 +35,16 @@ Polygon clipToOctant(vec3 v[3], int octant, float margin) {
   p.count = 3;
   vec3 center = octantCenter(octant), lo = min(min(v[0], v[1]), v[2]), hi = max(max(v[0], v[1]), v[2]);
   float reach = 0.5 + margin;
+  // Most triangles cross few of the planes; a loop over those is short, where branches would cost what they skip.
+  uint planes = 0u;
   for (int axis = 0; axis < 3; ++axis) {
-    if (hi[axis] > center[axis] + reach) cut(p, axis, center[axis] + reach, 1.0);
-    if (lo[axis] < center[axis] - reach) cut(p, axis, center[axis] - reach, -1.0);
+    if (hi[axis] > center[axis] + reach) planes |= 1u << (2 * axis);
+    if (lo[axis] < center[axis] - reach) planes |= 2u << (2 * axis);
+  }
+  for (; planes != 0u; planes &= planes - 1u) {
+    int plane = findLSB(planes), axis = plane / 2;
+    float sign = plane % 2 == 0 ? 1.0 : -1.0;
+    cut(p, axis, center[axis] + sign * reach, sign);
   }
   return p;
 }

@@ -61,8 +61,8 @@ void main() {
   }
   double side = double(cells[cell].half_side) / 2.0lf;
   dvec3 center = dvec3(cells[cell].center);
-  for (int o = 0; o < 8; ++o) {
-    if ((open >> o & 1u) == 0u) continue;
+  for (; open != 0u; open &= open - 1u) {
+    int o = findLSB(open);
     dvec3 way = dvec3(octantCenter(o)) * (2.0lf * side);
     if (touches(corners, center + way, side)) atomicOr(states[state(cell, kGrey)], 1u << o);
   }

@@ -76,16 +76,14 @@ void main() {
   uint mask = has_pair ? masks[pair] & states[state(cell, kGrey)] : 0u;
   uint triangle = has_pair ? triangleOf(cell, pair) : 0u;
   uint place[8];
-  for (int o = 0; o < 8; ++o) {
-    if ((mask >> o & 1u) == 0u) continue;
+  for (uint left = mask; left != 0u; left &= left - 1u) {
+    int o = findLSB(left);
     place[o] = together ? atomicAdd(s_counts[o], 1u) : atomicAdd(states[state(cell, kNext + uint(o))], 1u);
   }
   if (mask != 0u) {
     vec3 v[3];
     cornersOf(cell, triangle, v);
-    for (int o = 0; o < 8; ++o) {
-      if ((mask >> o & 1u) != 0u) addPart(together, cell, o, v);
-    }
+    for (uint left = mask; left != 0u; left &= left - 1u) addPart(together, cell, findLSB(left), v);
   }
   barrier();
   if (together && lane < 8u && s_counts[lane] != 0u) {
@@ -98,7 +96,8 @@ void main() {
     if (s_tensors[lane] != 0) atomicAdd(states[octantState(cell, o, kTensor + k)], uint(s_tensors[lane]));
   }
   barrier();
-  for (int o = 0; o < 8; ++o) {
-    if ((mask >> o & 1u) != 0u) lists[(together ? s_first[o] : 0u) + place[o]] = triangle;
+  for (uint left = mask; left != 0u; left &= left - 1u) {
+    int o = findLSB(left);
+    lists[(together ? s_first[o] : 0u) + place[o]] = triangle;
   }
 }

@@ -84,13 +84,11 @@ void main() {
     masks[pair] = maybe;
   }
   if (together) {
-    for (int o = 0; o < 8; ++o) {
-      if ((maybe >> o & 1u) != 0u) atomicAdd(s_counts[o], 1u);
-    }
+    for (uint left = maybe; left != 0u; left &= left - 1u) atomicAdd(s_counts[findLSB(left)], 1u);
     if (surely != 0u) atomicOr(s_grey, surely);
   } else if (has_pair) {
-    for (int o = 0; o < 8; ++o) {
-      if ((maybe >> o & 1u) != 0u) atomicAdd(states[state(cell, kCounts + uint(o))], 1u);
+    for (uint left = maybe; left != 0u; left &= left - 1u) {
+      atomicAdd(states[state(cell, kCounts + uint(findLSB(left)))], 1u);
     }
     if (surely != 0u) atomicOr(states[state(cell, kGrey)], surely);
   }

@@ -12,8 +12,8 @@ void main() {
   vec3 v[3];
   cornersOf(cell, triangleOf(cell, pair), v);
   float margin = marginOf(v);
-  for (int o = 0; o < 8; ++o) {
-    if ((mask >> o & 1u) == 0u) continue;
+  for (; mask != 0u; mask &= mask - 1u) {
+    int o = findLSB(mask);
     uint bytes = states[octantState(cell, o, kNormal)];
     if (bytes == 0u) continue;
     vec3 n = vec3(bitfieldExtract(int(bytes), 0, 8), bitfieldExtract(int(bytes), 8, 8), bitfieldExtract(int(bytes), 16, 8));
