@@ -3,7 +3,7 @@
 set(CPACK_GENERATOR DEB)
 set(CPACK_PACKAGE_VENDOR "the bocst project")
 set(CPACK_PACKAGE_CONTACT "the bocst maintainers <maintainers@users.noreply.github.com>")
-set(CPACK_PACKAGE_DESCRIPTION_SUMMARY "${PROJECT_DESCRIPTION}")
+set(CPACK_PACKAGE_DESCRIPTION_SUMMARY "Sphere-trees for FCL that grow on demand")
 set(CPACK_PACKAGING_INSTALL_PREFIX /usr)
 set(CPACK_STRIP_FILES ON)
 set(CPACK_DEB_COMPONENT_INSTALL ON)
@@ -25,7 +25,8 @@ set(CPACK_DEBIAN_LIBRARY_PACKAGE_SECTION libs)
 set(CPACK_DEBIAN_LIBRARY_PACKAGE_SHLIBDEPS ON)
 set(CPACK_DEBIAN_PACKAGE_GENERATE_SHLIBS ON)
 set(CPACK_DEBIAN_PACKAGE_GENERATE_SHLIBS_POLICY "=")
-set(CPACK_COMPONENT_LIBRARY_DESCRIPTION "The libraries: what programs need that were built with libbocst-dev.")
+set(CPACK_COMPONENT_LIBRARY_DESCRIPTION
+  "The libraries: what programs need that were built with libbocst-dev.")
 
 set(CPACK_DEBIAN_DEV_PACKAGE_NAME libbocst-dev)
 set(CPACK_DEBIAN_DEV_PACKAGE_SECTION libdevel)
@@ -34,15 +35,15 @@ if(NOT BUILD_SHARED_LIBS)
   list(APPEND CPACK_DEBIAN_DEV_PACKAGE_DEPENDS libhwy-dev libassimp-dev zlib1g-dev)
 endif()
 list(JOIN CPACK_DEBIAN_DEV_PACKAGE_DEPENDS ", " CPACK_DEBIAN_DEV_PACKAGE_DEPENDS)
-set(CPACK_COMPONENT_DEV_DESCRIPTION "Headers, CMake's find_package(bocst) and pkg-config files. A model is one sphere at
-first and grows where collision queries need it.")
+set(CPACK_COMPONENT_DEV_DESCRIPTION "Headers, CMake's find_package(bocst) and pkg-config files.
+A model is one sphere at first and grows where collision queries need it.")
 
 set(CPACK_DEBIAN_TOOLS_PACKAGE_NAME bocst)
 set(CPACK_DEBIAN_TOOLS_PACKAGE_SECTION science)
 set(CPACK_DEBIAN_TOOLS_PACKAGE_DEPENDS ${needs_library})
 set(CPACK_DEBIAN_TOOLS_PACKAGE_SHLIBDEPS ON)
-set(CPACK_COMPONENT_TOOLS_DESCRIPTION "The program bocst: the health of a mesh, its sphere-tree as a page in 3D, single
-queries, and validation and timing beside FCL.")
+set(CPACK_COMPONENT_TOOLS_DESCRIPTION "The program bocst: the health of a mesh, its sphere-tree
+as a page in 3D, single queries, and validation and timing beside FCL.")
 # The tools' own libraries are in another of these packages.
 set(CPACK_DEBIAN_PACKAGE_SHLIBDEPS_PRIVATE_DIRS ${PROJECT_BINARY_DIR}/src)
 

@@ -43,7 +43,7 @@ if [[ $(cached BUILD_SHARED_LIBS) == ON ]]; then
   dpkg-deb --ctrl-tarfile "$work/packages/libbocst0"_*.deb | tar -xO ./shlibs | grep -q "^libbocst 0 libbocst0" || fail "no shlibs"
 fi
 if [[ -s $work/bocst.files ]]; then
-  for file in bin/bocst share/man/man1/bocst.1 share/bash-completion/completions/bocst; do
+  for file in bin/bocst share/man/man1/bocst.1.gz share/bash-completion/completions/bocst; do
     grep -qx "./usr/$file" "$work/bocst.files" || fail "bocst has no $file"
   done
 fi
