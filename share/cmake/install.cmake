@@ -6,10 +6,13 @@ endif()
 include(CMakePackageConfigHelpers)
 set(bocst_config_dir ${CMAKE_INSTALL_LIBDIR}/cmake/bocst)
 
-install(TARGETS bocst bocst_io EXPORT bocst-targets)
-install(DIRECTORY include/bocst DESTINATION ${CMAKE_INSTALL_INCLUDEDIR})
-install(FILES LICENSE DESTINATION ${CMAKE_INSTALL_DOCDIR})
-install(EXPORT bocst-targets NAMESPACE bocst:: FILE bocstTargets.cmake DESTINATION ${bocst_config_dir})
+# What runs programs is in the component library, what builds them in dev; tools/ has the third, tools.
+install(TARGETS bocst bocst_io EXPORT bocst-targets
+  LIBRARY COMPONENT library NAMELINK_COMPONENT dev
+  ARCHIVE COMPONENT dev)
+install(DIRECTORY include/bocst DESTINATION ${CMAKE_INSTALL_INCLUDEDIR} COMPONENT dev)
+install(FILES LICENSE DESTINATION ${CMAKE_INSTALL_DOCDIR} COMPONENT dev)
+install(EXPORT bocst-targets NAMESPACE bocst:: FILE bocstTargets.cmake DESTINATION ${bocst_config_dir} COMPONENT dev)
 
 # libbocst_io finds libbocst under any prefix.
 set_target_properties(bocst_io PROPERTIES INSTALL_RPATH "$ORIGIN")
@@ -18,7 +21,17 @@ configure_package_config_file(${CMAKE_CURRENT_LIST_DIR}/bocstConfig.cmake.in ${P
   INSTALL_DESTINATION ${bocst_config_dir})
 write_basic_package_version_file(${PROJECT_BINARY_DIR}/bocstConfigVersion.cmake COMPATIBILITY SameMinorVersion)
 install(FILES ${PROJECT_BINARY_DIR}/bocstConfig.cmake ${PROJECT_BINARY_DIR}/bocstConfigVersion.cmake
-  DESTINATION ${bocst_config_dir})
+  DESTINATION ${bocst_config_dir} COMPONENT dev)
+
+# So that ROS 2 finds it as a package of a workspace.
+file(STRINGS package.xml ros_version REGEX "<version>")
+if(NOT ros_version MATCHES ">${PROJECT_VERSION}<")
+  message(FATAL_ERROR "package.xml is of another version: ${ros_version}")
+endif()
+install(FILES package.xml DESTINATION ${CMAKE_INSTALL_DATADIR}/bocst COMPONENT dev)
+file(WRITE ${PROJECT_BINARY_DIR}/ament_marker "")
+install(FILES ${PROJECT_BINARY_DIR}/ament_marker RENAME bocst COMPONENT dev
+  DESTINATION ${CMAKE_INSTALL_DATADIR}/ament_index/resource_index/packages)
 
 # The .pc files speak of their own place, so that the prefix can be chosen at install time, too.
 file(RELATIVE_PATH pc_to_include ${CMAKE_INSTALL_FULL_LIBDIR}/pkgconfig ${CMAKE_INSTALL_FULL_INCLUDEDIR})
@@ -31,5 +44,7 @@ else()
 endif()
 foreach(name bocst bocst-io)
   configure_file(${CMAKE_CURRENT_LIST_DIR}/${name}.pc.in ${PROJECT_BINARY_DIR}/${name}.pc @ONLY)
-  install(FILES ${PROJECT_BINARY_DIR}/${name}.pc DESTINATION ${CMAKE_INSTALL_LIBDIR}/pkgconfig)
+  install(FILES ${PROJECT_BINARY_DIR}/${name}.pc DESTINATION ${CMAKE_INSTALL_LIBDIR}/pkgconfig COMPONENT dev)
 endforeach()
+
+include(${CMAKE_CURRENT_LIST_DIR}/debian.cmake)

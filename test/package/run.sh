@@ -1,10 +1,10 @@
 #!/usr/bin/env bash
 # SPDX-License-Identifier: BSD-3-Clause
-# Usage: test/package/run.sh BUILD_DIR
-# Installs a build into a prefix of its own, then builds and runs a separate project against it: by CMake's
-# find_package and by pkg-config; and the example planner.
+# Usage: test/package/run.sh BUILD_DIR [PREFIX]
+# Builds and runs a separate project against an installation, by CMake's find_package and by pkg-config, and the example
+# planner. Without PREFIX the build is installed first, into a prefix of its own.
 set -euo pipefail
-[[ $# -eq 1 ]] || { sed -n 's/^# Usage/usage/p' "$0" >&2; exit 2; }
+[[ $# -eq 1 || $# -eq 2 ]] || { sed -n 's/^# Usage/usage/p' "$0" >&2; exit 2; }
 build=$(cd "$1" && pwd)
 source=$(cd "$(dirname "$0")" && pwd)
 
@@ -16,8 +16,8 @@ export CXXFLAGS="${sanitize:+-fsanitize=$sanitize}"
 
 work=$(mktemp -d)
 trap 'rm -rf "$work"' EXIT
-prefix=$work/prefix
-cmake --install "$build" --prefix "$prefix" >"$work/log" || { cat "$work/log"; exit 1; }
+prefix=${2:-$work/prefix}
+[[ $# -eq 2 ]] || cmake --install "$build" --prefix "$prefix" >"$work/log" || { cat "$work/log"; exit 1; }
 
 # Code compiled without <bocst/fcl.h> reaches bocst only when its library is looked up before libfcl.
 check_order() {

@@ -1,0 +1,51 @@
+#!/usr/bin/env bash
+# SPDX-License-Identifier: BSD-3-Clause
+# Usage: test/package/debian.sh BUILD_DIR
+# Makes the Debian packages of a build, looks into them, and builds and runs a separate project against what is in them.
+set -euo pipefail
+[[ $# -eq 1 ]] || { sed -n 's/^# Usage/usage/p' "$0" >&2; exit 2; }
+build=$(cd "$1" && pwd)
+here=$(cd "$(dirname "$0")" && pwd)
+cached() { sed -n "s/^$1:[A-Z]*=//p" "$build/CMakeCache.txt"; }
+fail() { echo "FAILED: $*"; exit 1; }
+
+work=$(mktemp -d)
+trap 'rm -rf "$work"' EXIT
+cpack -G DEB --config "$build/CPackConfig.cmake" -B "$work/packages" >"$work/log" 2>&1 || { cat "$work/log"; exit 1; }
+names=(libbocst-dev)
+[[ $(cached BUILD_SHARED_LIBS) != ON ]] || names+=(libbocst0)
+[[ $(cached BOCST_BUILD_TOOLS) != ON ]] || names+=(bocst)
+
+field() { dpkg-deb -f "$work/packages/$1"_*.deb "$2"; }
+version=$(field libbocst-dev Version)
+for name in "${names[@]}"; do
+  deb=$(echo "$work/packages/$name"_*.deb)
+  [[ -f $deb ]] || fail "no package $name"
+  dpkg-deb -x "$deb" "$work/root"
+  dpkg-deb -c "$deb" | awk '$1 !~ /^d/ { print $6 }' | sort >"$work/$name.files"
+  grep -q "/doc/$name/copyright$" "$work/$name.files" || fail "$name has no copyright file"
+  [[ $(field "$name" Version) == "$version" ]] || fail "$name is of another version"
+done
+twice=$(sort "$work"/*.files | uniq -d)
+[[ -z $twice ]] || fail "in two packages: $twice"
+[[ $(find "$work/packages" -maxdepth 1 -name '*.deb' | wc -l) == "${#names[@]}" ]] || fail "more packages than these: ${names[*]}"
+
+depends() { # PACKAGE ON...
+  local on
+  for on in "${@:2}"; do [[ ", $(field "$1" Depends)," == *", $on"[\ ,]* ]] || fail "$1 does not depend on $on"; done
+}
+depends libbocst-dev libfcl-dev libeigen3-dev
+if [[ $(cached BUILD_SHARED_LIBS) == ON ]]; then
+  depends libbocst-dev "libbocst0 (= $version)"
+  depends libbocst0 libfcl0.7 libassimp5 libhwy1
+  [[ ! -s $work/bocst.files ]] || depends bocst "libbocst0 (= $version)" libfcl0.7
+  if grep -E '\.(h|cmake|pc|so)$' "$work/libbocst0.files"; then fail "libbocst0 has files of the dev package"; fi
+  dpkg-deb --ctrl-tarfile "$work/packages/libbocst0"_*.deb | tar -xO ./shlibs | grep -q "^libbocst 0 libbocst0" || fail "no shlibs"
+fi
+if [[ -s $work/bocst.files ]]; then
+  for file in bin/bocst share/man/man1/bocst.1.gz share/bash-completion/completions/bocst; do
+    grep -qx "./usr/$file" "$work/bocst.files" || fail "bocst has no $file"
+  done
+fi
+
+"$here/run.sh" "$build" "$work/root/usr"
