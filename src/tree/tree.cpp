@@ -23,8 +23,9 @@ Options checked(const Options& o) {
     bad("dimension is " + std::to_string(o.dimension) + ", not 0 or 1 to 65536");
   }
   if (o.ttl.count() < 0) bad("ttl is negative");
-  if (o.margin != 0) bad("margin is " + std::to_string(o.margin) + ", but only 0 is supported in this version");
-  if (o.solid) bad("solid is not supported in this version");
+  if (!(o.margin >= 0) || !std::isfinite(o.margin)) {
+    bad("margin is " + std::to_string(o.margin) + ", not a length of 0 or more");
+  }
   return o;
 }
 
@@ -72,6 +73,9 @@ Tree::Tree(std::shared_ptr<const Mesh> mesh, const Options& options)
 }
 
 void Tree::reset(std::shared_ptr<const Mesh> mesh) {
+  solid_ = options_.solid ? std::make_shared<const Solid>(mesh) : nullptr;
+  pieces_known_ = nullptr;
+  pieces_ = nullptr;
   surface_ = surfaceOf(std::move(mesh), options_);
   root_bounds_ = oracle::CellBounds();
   setBox(latticeBounds(surface_), lattice::Cell{}, root_bounds_);
@@ -79,6 +83,17 @@ void Tree::reset(std::shared_ptr<const Mesh> mesh) {
 }
 
 std::int64_t Tree::now() const { return nanoseconds(options_.clock ? options_.clock() : Clock::now()); }
+
+const std::vector<Eigen::Vector3d>& Tree::pieces() const {
+  if (const auto* known = pieces_known_.load(std::memory_order_acquire)) return *known;
+  const std::lock_guard<std::mutex> lock(pieces_mutex_);
+  if (pieces_ == nullptr) {
+    pieces_ = std::make_unique<const std::vector<Eigen::Vector3d>>(
+        pointOfEachPiece(surface_.mesh->vertices(), surface_.mesh->triangles()));
+    pieces_known_.store(pieces_.get(), std::memory_order_release);
+  }
+  return *pieces_;
+}
 
 std::shared_ptr<const Mesh> Tree::mesh() const {
   const std::shared_lock<Gate> look(gate_);
@@ -612,7 +627,7 @@ Statistics Tree::statistics() const {
   s.oracle_batches = batches_;
   s.oracle_cells = cells_;
   s.pruned_nodes = pruned_;
-  s.mesh_bytes = surface_.mesh->bytes();
+  s.mesh_bytes = surface_.mesh->bytes() + (solid_ != nullptr ? solid_->bytes() : 0);
   return s;
 }
 
