@@ -41,7 +41,14 @@ namespace bocst {
 /// - with enable_contact: normal is a unit vector from o1 to o2 in world frame, penetration_depth >= 0 the length of
 ///   the shortest translation of o2's triangle (or sphere) along normal that ends the contact of these two
 ///   primitives, pos a point midway in their overlap. It is about two primitives, not about two solids.
-/// - without: normal, pos and penetration_depth are NaN.
+/// - with a margin (Options::margin, the sum of both models'), a contact is a pair of primitives no farther apart than
+///   that; penetration_depth is the margin minus their distance (plus the depth above, when they meet), normal the way
+///   between their nearest points, and pos the middle of it.
+/// - solid (Options::solid): where no primitives touch but one geometry is inside the other, there is one contact, with
+///   Contact::NONE for b1 and b2; penetration_depth is the distance of the surfaces (plus the margin), which is what it
+///   takes at least to part them, normal the way for o2 (that brings the surfaces together there), pos between the
+///   nearest points. Beside a BVHModel, a query whose bounding balls meet takes time linear in its triangles for that.
+/// - without enable_contact: normal, pos and penetration_depth are NaN.
 /// - enable_cost adds the overlap of the triangles' world boxes, as FCL's mesh-mesh query does.
 /// Collisions are reported between occupied geometries only (cost_density >= threshold_occupied), as in FCL.
 ///
@@ -65,7 +72,8 @@ BOCST_EXPORT std::size_t collide(const fcl::CollisionGeometry<S>* o1, const fcl:
 /// nothing when request.isSatisfied(result) already.
 ///
 /// A pair with a Model: partners are another Model and fcl::BVHModel<BV> of any BV. Surfaces that touch are at distance
-/// 0; a model wholly inside another is as far as the surfaces are, for models are shells.
+/// 0; a model wholly inside another is as far as the surfaces are, for models are shells, unless the outer one is
+/// solid: then it is at 0, and the nearest points are not those of a contact. A margin does not matter.
 /// - o1, o2, b1, b2, nearest_points: the caller's order; triangle ids (or the Morton codes of cells, see collide());
 ///   points on the surfaces (or spheres), world frame, if enable_nearest_points.
 /// - with conservative answers, the distance of the spheres of the collision depth: never more than that of the

@@ -32,11 +32,11 @@ class Tree;
 /// updateVertices() may run beside queries too; a query sees the mesh from before or after, never a mixture. What
 /// CollisionGeometry itself leaves unguarded (cost_density, aabb_local, ...) stays unguarded.
 ///
-/// The mesh is a surface, as FCL's BVHModel is: what is wholly inside it does not touch it.
+/// The mesh is a surface, as FCL's BVHModel is: what is wholly inside it does not touch it (but see Options::solid).
 template <typename S>
 class BOCST_EXPORT Model : public fcl::CollisionGeometry<S> {
  public:
-  /// @throws std::invalid_argument for a null mesh or an option out of range or not supported in this version,
+  /// @throws std::invalid_argument for a null mesh, an option out of range, or a mesh that is not watertight if solid,
   /// OracleError for an oracle that cannot be had, std::runtime_error when code compiled without <bocst/fcl.h> would
   /// not reach this library (the message has the remedy; BOCST_DISPATCH_CHECK=off turns the check off).
   explicit Model(std::shared_ptr<const Mesh> mesh, const Options& options = {});
@@ -56,8 +56,8 @@ class BOCST_EXPORT Model : public fcl::CollisionGeometry<S> {
 
   /// Lets go of the mesh in host memory; the compute oracle has it on its device (3: "the model need not be in core
   /// memory"). It goes when nobody else holds it. From then on a query throws OracleError if the device is lost.
-  /// @throws std::logic_error for exact answers, which test the triangles here; OracleError when the oracle of this
-  /// model has no copy.
+  /// @throws std::logic_error for exact answers and for solids, which look at the triangles here; OracleError when the
+  /// oracle of this model has no copy.
   void releaseMesh();
 
   /// "cpu", "occlusion", "sampled" or "compute".
@@ -78,8 +78,8 @@ class BOCST_EXPORT Model : public fcl::CollisionGeometry<S> {
   void prune();  ///< As of now.
 
   /// New positions for all vertices, same triangles: the tree falls back to its root, nothing is rebuilt.
-  /// @throws std::invalid_argument for a wrong count or a bad vertex, std::logic_error after releaseMesh(); the model
-  /// is then as before.
+  /// @throws std::invalid_argument for a wrong count, a bad vertex, or what is not watertight if solid, std::logic_error
+  /// after releaseMesh(); the model is then as before.
   void updateVertices(std::vector<Eigen::Vector3d> vertices);
 
   // What FCL asks of a geometry.

@@ -16,7 +16,8 @@ struct Statistics {
   std::uint64_t oracle_batches = 0;          ///< Expansion batches this model took part in.
   std::uint64_t oracle_cells = 0;            ///< Cells the oracle was asked about (eight octants a plain expansion).
   std::uint64_t pruned_nodes = 0;            ///< Nodes dropped by ttl, budget, prune() or updateVertices().
-  std::size_t mesh_bytes = 0;    ///< Heap bytes of the mesh, which other models may share; 0 after releaseMesh().
+  std::size_t mesh_bytes = 0;    ///< Heap bytes of the mesh, which other models may share and which are 0 after
+                                 ///< releaseMesh(), and of `solid`.
   std::size_t device_bytes = 0;  ///< Bytes on a GPU: the mesh, which other models may share, and triangle lists; what
                                  ///< was grown together for two models counts for both. 0 with the CPU oracle.
 };

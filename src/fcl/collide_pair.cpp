@@ -7,13 +7,16 @@
 #include <fcl/narrowphase/detail/traversal/collision/intersect.h>
 #include <fcl/narrowphase/detail/traversal/collision_node.h>
 
+#include <algorithm>
 #include <functional>
 #include <limits>
 #include <shared_mutex>
 #include <stdexcept>
 #include <string>
 
+#include "fcl/inside.h"
 #include "fcl/pair.h"
+#include "query/distance_walk.h"
 #include "query/pair_set.h"
 #include "query/pair_walk.h"
 #include "query/tree_walk.h"
@@ -58,6 +61,13 @@ struct Question {
   const fcl::Transform3<S>&X_W1, &X_W2;
   const fcl::CollisionRequest<S>& request;
   fcl::CollisionResult<S>& result;
+  double margin;
+
+  /// No surfaces met, and a contact would be reported.
+  bool mayBeInside(std::size_t contacts_before) const {
+    return result.numContacts() == contacts_before && contacts_before < request.num_max_contacts && o1->isOccupied() &&
+           o2->isOccupied();
+  }
 };
 
 /// Turns the pairs of a walk into contacts and cost sources. Side A of the walk is the caller's first geometry, or,
@@ -66,7 +76,7 @@ template <typename S, typename Triangles1, typename Triangles2>
 class Collector : public query::Visitor {
  public:
   Collector(const Question<S>& q, const Triangles1& t1, const Triangles2& t2, bool swapped, double magnitude)
-      : q_(q), t1_(t1), t2_(t2), swapped_(swapped), magnitude_(magnitude), seen_(pairs()) {
+      : q_(q), t1_(t1), t2_(t2), swapped_(swapped), magnitude_(magnitude), margin_(q.margin), seen_(pairs()) {
     fcl::relativeTransform(q.X_W1.linear(), q.X_W1.translation(), q.X_W2.linear(), q.X_W2.translation(), R_12_, p_12_);
     occupied_ = q.o1->isOccupied() && q.o2->isOccupied();
     // A boolean query ends at the first contact, so it meets no pair twice.
@@ -89,7 +99,8 @@ class Collector : public query::Visitor {
     if (once_ && !seen_.insert(a, b)) return false;
     const fcl::Vector3<S> p[3] = {t1_.corner(a, 0), t1_.corner(a, 1), t1_.corner(a, 2)};
     const fcl::Vector3<S> q[3] = {t2_.corner(b, 0), t2_.corner(b, 1), t2_.corner(b, 2)};
-    if (!fcl::detail::Intersect<S>::intersect_Triangle(p[0], p[1], p[2], q[0], q[1], q[2], R_12_, p_12_)) return false;
+    const bool meet = fcl::detail::Intersect<S>::intersect_Triangle(p[0], p[1], p[2], q[0], q[1], q[2], R_12_, p_12_);
+    if (!meet && margin_ == 0) return false;
 
     Corners pd, qd;
     for (int k = 0; k < 3; ++k) {
@@ -97,16 +108,24 @@ class Collector : public query::Visitor {
       qd[k] = q[k].template cast<double>();
     }
     const bool degenerate = query::isDegenerate(pd) || query::isDegenerate(qd);
-    if (!degenerate && !needsGeometry()) return add(a, b, nullptr);
+    if (!degenerate && margin_ == 0 && !needsGeometry()) return add(a, b, nullptr);
     for (Eigen::Vector3d& x : qd) x = R_12_.template cast<double>() * x + p_12_.template cast<double>();
-    // FCL's axes do not separate segments and points from everything: there the distance decides.
-    if (degenerate) {
-      Eigen::Vector3d on_p, on_q;
-      if (query::nearestPoints(pd, qd, on_p, on_q) > magnitude_ * 16 * kEpsilon) return false;
+    Eigen::Vector3d on_p, on_q;
+    double distance = 0;
+    if (degenerate || margin_ > 0) {
+      distance = query::nearestPoints(pd, qd, on_p, on_q);
+      // FCL's axes do not separate segments and points from everything: there the distance decides.
+      if (degenerate ? distance > std::max(margin_, rounding()) : !meet && distance > margin_) return false;
     }
     if (q_.request.enable_cost) addCost(a, b);
     if (!needsGeometry()) return add(a, b, nullptr);
-    query::Touch touch = query::partTriangles(pd, qd);
+    query::Touch touch;
+    if (distance > rounding()) {
+      touch = {(on_q - on_p) / distance, (on_p + on_q) / 2, std::max(margin_ - distance, 0.0)};
+    } else {
+      touch = query::partTriangles(pd, qd);
+      touch.depth += margin_;
+    }
     const fcl::Transform3<double> X_W1 = q_.X_W1.template cast<double>();
     touch.normal = X_W1.linear() * touch.normal;
     touch.point = X_W1 * touch.point;
@@ -135,6 +154,9 @@ class Collector : public query::Visitor {
     return set;
   }
 
+  // What distances near 0 may be off by.
+  double rounding() const { return magnitude_ * 16 * kEpsilon; }
+
   bool needsGeometry() const { return q_.request.enable_contact || q_.request.enable_cost; }
 
   bool addSpheres(std::uint64_t id_a, query::Sphere a, std::uint64_t id_b, query::Sphere b) {
@@ -155,8 +177,9 @@ class Collector : public query::Visitor {
     const Eigen::Vector3d way = b.center - a.center;
     const double distance = way.norm();
     if (distance > 0) touch.normal = way / distance;
-    touch.depth = std::max(a.radius + b.radius - distance, 0.0);
-    touch.point = a.center + touch.normal * (a.radius - touch.depth / 2);
+    const double overlap = a.radius + b.radius - distance;  // negative: a gap, within the margin
+    touch.depth = std::max(overlap + margin_, 0.0);
+    touch.point = a.center + touch.normal * (a.radius - overlap / 2);
     return add(id_a, id_b, &touch);
   }
 
@@ -172,7 +195,7 @@ class Collector : public query::Visitor {
 
   void addCost(const fcl::AABB<S>& a, const fcl::AABB<S>& b) {
     fcl::AABB<S> overlap;
-    a.overlap(b, overlap);
+    if (!a.overlap(b, overlap)) return;  // apart, within the margin
     q_.result.addCostSource(fcl::CostSource<S>(overlap, q_.o1->cost_density * q_.o2->cost_density),
                             q_.request.num_max_cost_sources);
   }
@@ -203,6 +226,7 @@ class Collector : public query::Visitor {
   const Triangles2& t2_;
   const bool swapped_;
   const double magnitude_;  // of positions in the frame of the first geometry
+  const double margin_;
   query::PairSet& seen_;
   fcl::Matrix3<S> R_12_;
   fcl::Vector3<S> p_12_;
@@ -229,8 +253,41 @@ void traverse(Walk&& walk) {
   fcl::detail::collide(&node);
 }
 
+/// What is within the margin touches: the walk's slack, in units of side A, is so much more.
+Placement withMargin(Placement b_in_a, const TreeSide& a, double margin, bool spheres) {
+  // Slabs are measured along normals that are up to a hundredth too long.
+  b_in_a.slack += margin / a.tree().surface().lattice.unit() * (spheres ? 1 : 1.02);
+  return b_in_a;
+}
+
+/// The contact of what is inside with the solid around it: no triangles meet. With contacts asked for, it is about the
+/// places where the surfaces are nearest; the way out is at least so long.
+template <typename S, typename B>
+void addInside(const Question<S>& q, const TreeSide& a, const B& b, const Placement& b_in_a, bool swapped) {
+  fcl::Contact<S> c;
+  c.o1 = q.o1;
+  c.o2 = q.o2;
+  c.b1 = c.b2 = fcl::Contact<S>::NONE;
+  c.normal.setConstant(std::numeric_limits<S>::quiet_NaN());
+  c.pos = c.normal;
+  c.penetration_depth = std::numeric_limits<S>::quiet_NaN();
+  if (q.request.enable_contact) {
+    const lattice::Lattice& lattice = a.tree().surface().lattice;
+    query::Nearest n = query::DistanceWalk<TreeSide, B>(a, b, b_in_a).run({});
+    if (swapped) std::swap(n.on_a, n.on_b);
+    const Eigen::Isometry3d X_WA = isometryOf<S>(swapped ? q.X_W2 : q.X_W1);
+    const Eigen::Vector3d way = n.on_a - n.on_b;
+    const Eigen::Vector3d normal = n.distance > 0 ? Eigen::Vector3d(way / n.distance) : Eigen::Vector3d::UnitX();
+    c.normal = (X_WA.linear() * normal).template cast<S>();
+    c.pos = (X_WA * Eigen::Vector3d(lattice.origin() + lattice.unit() / 2 * (n.on_a + n.on_b))).template cast<S>();
+    c.penetration_depth = static_cast<S>(n.distance * lattice.unit() + q.margin);
+  }
+  q.result.addContact(c);
+}
+
 template <typename S>
 void collideModels(const Question<S>& q, tree::Tree& tree1, tree::Tree& tree2) {
+  const std::size_t before = q.result.numContacts();
   // Conservative verdicts must not depend on the argument order, so the walk has an order of its own.
   const bool swapped = (tree1.conservative() || tree2.conservative()) && std::less<tree::Tree*>()(&tree2, &tree1);
   const auto run = [&](const TreeSide& a, const TreeSide& b, const Placement& b_in_a, double magnitude) {
@@ -238,10 +295,15 @@ void collideModels(const Question<S>& q, tree::Tree& tree1, tree::Tree& tree2) {
     const ModelTriangles<S> t1(tree1), t2(tree2);
     Collector<S, ModelTriangles<S>, ModelTriangles<S>> collector(q, t1, t2, swapped, magnitude);
     collector.setFrame(s.lattice.origin(), s.lattice.unit());
-    if (query::TreeWalk::fits(a, b, b_in_a)) {
+    if (q.margin == 0 && query::TreeWalk::fits(a, b, b_in_a)) {
       traverse<S>(query::TreeWalk(a, b, b_in_a, collector));
     } else {
-      traverse<S>(query::PairWalk<TreeSide, TreeSide>(a, b, b_in_a, collector));
+      const Placement near = withMargin(b_in_a, a, q.margin, a.cells() || b.cells());
+      traverse<S>(query::PairWalk<TreeSide, TreeSide>(a, b, near, collector));
+    }
+    if (q.mayBeInside(before) &&
+        (holds<S>(tree1, q.X_W1, tree2, q.X_W2, magnitude) || holds<S>(tree2, q.X_W2, tree1, q.X_W1, magnitude))) {
+      addInside(q, a, b, b_in_a, swapped);
     }
   };
   if (swapped) {
@@ -254,21 +316,52 @@ void collideModels(const Question<S>& q, tree::Tree& tree1, tree::Tree& tree2) {
 template <typename BV>
 void collideBvh(const Question<typename BV::S>& q, tree::Tree& tree, const fcl::BVHModel<BV>& bvh, bool swapped) {
   using S = typename BV::S;
+  const std::size_t before = q.result.numContacts();
   const auto run = [&](const TreeSide& a, const BvhSide<BV>& b, const Placement& b_in_a, double magnitude) {
     const oracle::Surface& s = tree.surface();
     const ModelTriangles<S> model(tree);
     const BvhTriangles<BV> partner(bvh);
     const auto walk = [&](auto&& collector) {
       collector.setFrame(s.lattice.origin(), s.lattice.unit());
-      traverse<S>(query::PairWalk<TreeSide, BvhSide<BV>>(a, b, b_in_a, collector));
+      traverse<S>(query::PairWalk<TreeSide, BvhSide<BV>>(a, b, withMargin(b_in_a, a, q.margin, a.cells()), collector));
     };
     if (swapped) {
       walk(Collector<S, BvhTriangles<BV>, ModelTriangles<S>>(q, partner, model, true, magnitude));
     } else {
       walk(Collector<S, ModelTriangles<S>, BvhTriangles<BV>>(q, model, partner, false, magnitude));
     }
+    if (q.mayBeInside(before) && holds(tree, swapped ? q.X_W2 : q.X_W1, bvh, swapped ? q.X_W1 : q.X_W2, magnitude)) {
+      addInside(q, a, b, b_in_a, swapped);
+    }
   };
   betweenTreeAndBvh(swapped ? q.X_W2 : q.X_W1, tree, swapped ? q.X_W1 : q.X_W2, bvh, run);
+}
+
+/// The models among two geometries, of which one at least is one.
+template <typename S>
+struct Models {
+  Models(const fcl::CollisionGeometry<S>* o1, const fcl::CollisionGeometry<S>* o2)
+      : first(dynamic_cast<const Model<S>*>(o1)), second(dynamic_cast<const Model<S>*>(o2)) {
+    if (first == nullptr && second == nullptr) {
+      throw std::logic_error("bocst::collide: neither geometry is a bocst::Model");
+    }
+  }
+  const Model<S>*first, *second;
+};
+
+template <typename S>
+std::size_t answer(const Question<S>& q, const Models<S>& models) {
+  if (q.request.isSatisfied(q.result)) return q.result.numContacts();
+  const bool occupied = q.o1->isOccupied() && q.o2->isOccupied();
+  if (!occupied && (q.o1->isFree() || q.o2->isFree() || !q.request.enable_cost)) return q.result.numContacts();
+  if (models.first != nullptr && models.second != nullptr) {
+    collideModels(q, models.first->tree(), models.second->tree());
+  } else {
+    const bool swapped = models.first == nullptr;
+    withBvh<S>("collide", swapped ? q.o1 : q.o2,
+               [&](const auto& bvh) { collideBvh(q, (swapped ? models.second : models.first)->tree(), bvh, swapped); });
+  }
+  return q.result.numContacts();
 }
 
 }  // namespace
@@ -277,30 +370,25 @@ template <typename S>
 std::size_t collidePair(const fcl::CollisionGeometry<S>* o1, const fcl::Transform3<S>& X_W1,
                         const fcl::CollisionGeometry<S>* o2, const fcl::Transform3<S>& X_W2,
                         const fcl::CollisionRequest<S>& request, fcl::CollisionResult<S>& result) {
-  const auto* model1 = dynamic_cast<const Model<S>*>(o1);
-  const auto* model2 = dynamic_cast<const Model<S>*>(o2);
-  if (model1 == nullptr && model2 == nullptr) {
-    throw std::logic_error("bocst::collide: neither geometry is a bocst::Model");
-  }
-  if (request.isSatisfied(result)) return result.numContacts();
-  const Question<S> q{o1, o2, X_W1, X_W2, request, result};
-  const bool occupied = o1->isOccupied() && o2->isOccupied();
-  if (!occupied && (o1->isFree() || o2->isFree() || !request.enable_cost)) return result.numContacts();
-  if (model1 != nullptr && model2 != nullptr) {
-    collideModels(q, model1->tree(), model2->tree());
-  } else {
-    const bool swapped = model1 == nullptr;
-    withBvh<S>("collide", swapped ? o1 : o2,
-               [&](const auto& bvh) { collideBvh(q, (swapped ? model2 : model1)->tree(), bvh, swapped); });
-  }
-  return result.numContacts();
+  const Models<S> models(o1, o2);
+  return answer(Question<S>{o1, o2, X_W1, X_W2, request, result, marginOf(models.first, models.second)}, models);
 }
 
-template std::size_t collidePair<float>(const fcl::CollisionGeometry<float>*, const fcl::Transform3<float>&,
-                                        const fcl::CollisionGeometry<float>*, const fcl::Transform3<float>&,
-                                        const fcl::CollisionRequest<float>&, fcl::CollisionResult<float>&);
-template std::size_t collidePair<double>(const fcl::CollisionGeometry<double>*, const fcl::Transform3<double>&,
-                                         const fcl::CollisionGeometry<double>*, const fcl::Transform3<double>&,
-                                         const fcl::CollisionRequest<double>&, fcl::CollisionResult<double>&);
+template <typename S>
+std::size_t collidePair(const fcl::CollisionGeometry<S>* o1, const fcl::Transform3<S>& X_W1,
+                        const fcl::CollisionGeometry<S>* o2, const fcl::Transform3<S>& X_W2,
+                        const fcl::CollisionRequest<S>& request, fcl::CollisionResult<S>& result, double margin) {
+  return answer(Question<S>{o1, o2, X_W1, X_W2, request, result, margin}, Models<S>(o1, o2));
+}
+
+#define BOCST_INSTANTIATE(S)                                                                    \
+  template std::size_t collidePair(const fcl::CollisionGeometry<S>*, const fcl::Transform3<S>&, \
+                                   const fcl::CollisionGeometry<S>*, const fcl::Transform3<S>&, \
+                                   const fcl::CollisionRequest<S>&, fcl::CollisionResult<S>&);  \
+  template std::size_t collidePair(const fcl::CollisionGeometry<S>*, const fcl::Transform3<S>&, \
+                                   const fcl::CollisionGeometry<S>*, const fcl::Transform3<S>&, \
+                                   const fcl::CollisionRequest<S>&, fcl::CollisionResult<S>&, double);
+BOCST_INSTANTIATE(float)
+BOCST_INSTANTIATE(double)
 
 }  // namespace bocst::fcl_room

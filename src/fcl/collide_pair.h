@@ -14,4 +14,10 @@ std::size_t collidePair(const fcl::CollisionGeometry<S>* o1, const fcl::Transfor
                         const fcl::CollisionGeometry<S>* o2, const fcl::Transform3<S>& X_W2,
                         const fcl::CollisionRequest<S>& request, fcl::CollisionResult<S>& result);
 
+/// The same with this margin instead of the models' own.
+template <typename S>
+std::size_t collidePair(const fcl::CollisionGeometry<S>* o1, const fcl::Transform3<S>& X_W1,
+                        const fcl::CollisionGeometry<S>* o2, const fcl::Transform3<S>& X_W2,
+                        const fcl::CollisionRequest<S>& request, fcl::CollisionResult<S>& result, double margin);
+
 }  // namespace bocst::fcl_room

@@ -63,23 +63,29 @@ ContactGoal goalOf(const Question<S>& q, double size1, double size2, double marg
   return goal;
 }
 
+/// The mesh of a model as it is now, null for another geometry.
 template <typename S>
-double firstContact(const Question<S>& q) {
+std::shared_ptr<const Mesh> meshOf(const Model<S>* model) {
+  return model != nullptr ? model->mesh() : nullptr;
+}
+
+/// When the two first touch, if they do not at the begin; infinite without contact. False in `same` when a mesh is not
+/// the one it is said to be.
+template <typename S>
+double walk(const Question<S>& q, const Mesh* mesh1, const Mesh* mesh2, bool& same) {
   const auto* model1 = dynamic_cast<const Model<S>*>(q.o1);
   const auto* model2 = dynamic_cast<const Model<S>*>(q.o2);
   const fcl::Transform3<S> X_W1 = poseAt<S>(q.motion1, 0), X_W2 = poseAt<S>(q.motion2, 0);
-  fcl::CollisionResult<S> begin;
-  if (collidePair<S>(q.o1, X_W1, q.o2, X_W2, fcl::CollisionRequest<S>(), begin) > 0) return 0;
+  const double margin = marginOf(model1, model2);
   double time = std::numeric_limits<double>::infinity();
-  if (!q.o1->isOccupied() || !q.o2->isOccupied()) return time;
   if (model1 != nullptr && model2 != nullptr) {
     betweenTrees(X_W1, model1->tree(), X_W2, model2->tree(),
                  [&](const TreeSide& a, const TreeSide& b, const Placement&, double) {
-                   const double size1 = magnitudeOf(a.tree().surface().mesh->bounds());
-                   const double size2 = magnitudeOf(b.tree().surface().mesh->bounds());
+                   const oracle::Surface &s1 = a.tree().surface(), &s2 = b.tree().surface();
+                   same = s1.mesh.get() == mesh1 && s2.mesh.get() == mesh2;
                    query::ContactTimeWalk<TreeSide, TreeSide> walk(a, inBody(a.tree()), q.motion1, b, inBody(b.tree()),
                                                                    q.motion2);
-                   time = walk.run(goalOf(q, size1, size2, 0));
+                   if (same) time = walk.run(goalOf(q, magnitudeOf(s1.bounds), magnitudeOf(s2.bounds), margin));
                  });
     return time;
   }
@@ -88,13 +94,30 @@ double firstContact(const Question<S>& q) {
   withBvh<S>("continuousCollide", swapped ? q.o1 : q.o2, [&](const auto& bvh) {
     betweenTreeAndBvh(swapped ? X_W2 : X_W1, (swapped ? model2 : model1)->tree(), swapped ? X_W1 : X_W2, bvh,
                       [&](const TreeSide& a, const auto& b, const Placement&, double) {
-                        const double size = magnitudeOf(a.tree().surface().mesh->bounds());
+                        const oracle::Surface& surface = a.tree().surface();
+                        same = surface.mesh.get() == (swapped ? mesh2 : mesh1);
                         query::ContactTimeWalk<TreeSide, std::decay_t<decltype(b)>> walk(a, inBody(a.tree()), motion_a,
                                                                                          b, Placement(), motion_b);
-                        time = walk.run(goalOf(q, size, b.magnitude(), 0));
+                        if (same) time = walk.run(goalOf(q, magnitudeOf(surface.bounds), b.magnitude(), margin));
                       });
   });
   return time;
+}
+
+template <typename S>
+double firstContact(const Question<S>& q) {
+  const fcl::Transform3<S> X_W1 = poseAt<S>(q.motion1, 0), X_W2 = poseAt<S>(q.motion2, 0);
+  for (;;) {
+    // Held, so that another mesh does not get the address of one of these.
+    const auto mesh1 = meshOf(dynamic_cast<const Model<S>*>(q.o1)), mesh2 = meshOf(dynamic_cast<const Model<S>*>(q.o2));
+    fcl::CollisionResult<S> begin;
+    if (collidePair<S>(q.o1, X_W1, q.o2, X_W2, fcl::CollisionRequest<S>(), begin) > 0) return 0;
+    if (!q.o1->isOccupied() || !q.o2->isOccupied()) return std::numeric_limits<double>::infinity();
+    // What the begin was asked of must be what moves on.
+    bool same = true;
+    const double time = walk(q, mesh1.get(), mesh2.get(), same);
+    if (same) return time;
+  }
 }
 
 template <typename S>

@@ -6,6 +6,7 @@
 #include <fcl/narrowphase/collision_result.h>
 
 #include "fcl/collide_pair.h"
+#include "fcl/inside.h"
 #include "fcl/pair.h"
 #include "query/distance_walk.h"
 
@@ -64,13 +65,22 @@ void search(const Question<S>& q, const TreeSide& a, const B& b, const Placement
   report(q, walk.run(goalOf(q, lattice.unit())), swapped, lattice.origin(), lattice.unit());
 }
 
+/// What is inside a solid is not apart from it. There are no points where they touch; the nearest of the surfaces, if
+/// they are known, stay.
+template <typename S>
+void notApart(const Question<S>& q) {
+  q.result.min_distance = 0;
+  q.result.o1 = q.o1;
+  q.result.o2 = q.o2;
+}
+
 /// Surfaces that touch have no negative distance of their own; FCL takes the depth of a contact, and so do we.
 template <typename S>
 void sign(const Question<S>& q) {
   fcl::CollisionRequest<S> request;
   request.enable_contact = true;
   fcl::CollisionResult<S> contacts;
-  collidePair<S>(q.o1, q.X_W1, q.o2, q.X_W2, request, contacts);
+  collidePair<S>(q.o1, q.X_W1, q.o2, q.X_W2, request, contacts, 0);
   if (!contacts.isCollision()) return;
   const fcl::Contact<S>& contact = contacts.getContact(0);
   q.result.min_distance = -contact.penetration_depth;
@@ -92,15 +102,25 @@ S distancePair(const fcl::CollisionGeometry<S>* o1, const fcl::Transform3<S>& X_
   if (request.isSatisfied(result)) return result.min_distance;
   const Question<S> q{o1, o2, X_W1, X_W2, request, result};
   if (model1 != nullptr && model2 != nullptr) {
-    betweenTrees(
-        X_W1, model1->tree(), X_W2, model2->tree(),
-        [&](const TreeSide& a, const TreeSide& b, const Placement& b_in_a, double) { search(q, a, b, b_in_a, false); });
+    betweenTrees(X_W1, model1->tree(), X_W2, model2->tree(),
+                 [&](const TreeSide& a, const TreeSide& b, const Placement& b_in_a, double magnitude) {
+                   search(q, a, b, b_in_a, false);
+                   if (result.min_distance > 0 && (holds<S>(a.tree(), X_W1, b.tree(), X_W2, magnitude) ||
+                                                   holds<S>(b.tree(), X_W2, a.tree(), X_W1, magnitude))) {
+                     notApart(q);
+                   }
+                 });
   } else {
     const bool swapped = model1 == nullptr;
     withBvh<S>("distance", swapped ? o1 : o2, [&](const auto& bvh) {
-      betweenTreeAndBvh(
-          swapped ? X_W2 : X_W1, (swapped ? model2 : model1)->tree(), swapped ? X_W1 : X_W2, bvh,
-          [&](const TreeSide& a, const auto& b, const Placement& b_in_a, double) { search(q, a, b, b_in_a, swapped); });
+      betweenTreeAndBvh(swapped ? X_W2 : X_W1, (swapped ? model2 : model1)->tree(), swapped ? X_W1 : X_W2, bvh,
+                        [&](const TreeSide& a, const auto& b, const Placement& b_in_a, double magnitude) {
+                          search(q, a, b, b_in_a, swapped);
+                          if (result.min_distance > 0 &&
+                              holds(a.tree(), swapped ? X_W2 : X_W1, bvh, swapped ? X_W1 : X_W2, magnitude)) {
+                            notApart(q);
+                          }
+                        });
     });
   }
   if (request.enable_signed_distance && !(result.min_distance > 0)) sign(q);

@@ -87,7 +87,10 @@ void Model<S>::updateVertices(std::vector<Eigen::Vector3d> vertices) {
 
 template <typename S>
 void Model<S>::computeLocalAABB() {
-  const Eigen::AlignedBox3d b = tree_->bounds();
+  // What is within the margin touches, so broadphase managers must not leave it out.
+  Eigen::AlignedBox3d b = tree_->bounds();
+  const Eigen::Vector3d margin = Eigen::Vector3d::Constant(tree_->options().margin * (1 + 4e-16));
+  b = Eigen::AlignedBox3d(b.min() - margin, b.max() + margin);
   for (int k = 0; k < 3; ++k) {
     this->aabb_local.min_[k] = roundDown<S>(b.min()[k]);
     this->aabb_local.max_[k] = roundUp<S>(b.max()[k]);

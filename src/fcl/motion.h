@@ -14,20 +14,13 @@
 #include <typeinfo>
 #include <utility>
 
+#include "fcl/pair.h"
 #include "query/motion.h"
 
 // FCL's motions, as the walks know them. Nothing here writes to a motion, so threads may share one that nobody else
 // integrates.
 
 namespace bocst::fcl_room {
-
-template <typename S>
-Eigen::Isometry3d isometryOf(const fcl::Transform3<S>& X) {
-  Eigen::Isometry3d Y = Eigen::Isometry3d::Identity();
-  Y.linear() = X.linear().template cast<double>();
-  Y.translation() = X.translation().template cast<double>();
-  return Y;
-}
 
 /// Where a motion begins. Asks a copy: integrate() writes to its motion.
 template <typename S, typename M>

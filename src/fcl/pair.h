@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #pragma once
 
+#include <bocst/model.h>
 #include <fcl/geometry/bvh/BVH_model.h>
 #include <fcl/math/geometry.h>
 
@@ -20,9 +21,23 @@
 
 namespace bocst::fcl_room {
 
+template <typename S>
+Eigen::Isometry3d isometryOf(const fcl::Transform3<S>& X) {
+  Eigen::Isometry3d Y = Eigen::Isometry3d::Identity();
+  Y.linear() = X.linear().template cast<double>();
+  Y.translation() = X.translation().template cast<double>();
+  return Y;
+}
+
 /// The largest coordinate, in absolute value.
 inline double magnitudeOf(const Eigen::AlignedBox3d& box) {
   return std::max(box.min().cwiseAbs().maxCoeff(), box.max().cwiseAbs().maxCoeff());
+}
+
+/// What is no farther touches: the sum of what the two ask for.
+template <typename S>
+double marginOf(const Model<S>* model1, const Model<S>* model2) {
+  return (model1 != nullptr ? model1->options().margin : 0) + (model2 != nullptr ? model2->options().margin : 0);
 }
 
 /// Positions in the frame of the first geometry are at most this large.

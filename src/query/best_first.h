@@ -14,8 +14,9 @@ namespace bocst::query {
 /// need a node that is not expanded wait, the nearest first, while what is resident may still make them superfluous;
 /// then they grow in one batch, each twice as large as the one before.
 ///
-/// A query (Walk) derives from this and has, for this base: worthIt(bound), settled(), again(pair) (true: pushed with a
-/// better bound instead), expandA(pair), expandB(pair), leaves(pair).
+/// A query (Walk) derives from this and has, for this base: worthIt(bound); settled(); again(pair), true when it pushed
+/// the pair with a better bound instead; reachOfA(node) and reachOfB(node), or ballOfA(node) and ballOfB(node) when a
+/// side answers with cells; boundOf() of two of these; leaves(pair); scaleOfB(), the unit of B in that of A.
 template <typename Walk, typename A, typename B>
 class BestFirst {
  protected:
@@ -35,8 +36,10 @@ class BestFirst {
     heap_.waiting.clear();
   }
 
-  /// Goes on from the pairs that were pushed until nothing can be better than what was found.
+  /// Looks at pairs, from that of the roots on, until nothing can be better than what was found.
   void search() {
+    const Pair root{0, a_.root(), b_.root()};
+    push({boundOf(root), root.a, root.b});
     std::size_t batch = kFirstBatch;
     for (;;) {
       while (!heap_.heap.empty() && walk().worthIt(heap_.heap.front().bound) && heap_.waiting.size() < batch) {
@@ -61,6 +64,11 @@ class BestFirst {
   /// Puts a pair on the heap, if it is worth it.
   void push(const Pair& pair) {
     if (walk().worthIt(pair.bound)) put(pair);
+  }
+
+  double boundOf(const Pair& pair) {
+    return spheres() ? walk().boundOf(walk().ballOfA(pair.a), walk().ballOfB(pair.b))
+                     : walk().boundOf(walk().reachOfA(pair.a), walk().reachOfB(pair.b));
   }
 
   bool spheres() const { return a_.cells() || b_.cells(); }
@@ -92,9 +100,29 @@ class BestFirst {
     if ((expands_a ? sa : sb) == State::kGrows) {
       heap_.waiting.push_back(pair);
     } else if (expands_a) {
-      walk().expandA(pair);
+      expandA(pair);
     } else {
-      walk().expandB(pair);
+      expandB(pair);
+    }
+  }
+
+  void expandA(const Pair& pair) {
+    if (spheres()) {
+      const auto b = walk().ballOfB(pair.b);
+      a_.children(pair.a, [&](typename A::Node c) { push({walk().boundOf(walk().ballOfA(c), b), c, pair.b}); });
+    } else {
+      const auto b = walk().reachOfB(pair.b);
+      a_.children(pair.a, [&](typename A::Node c) { push({walk().boundOf(walk().reachOfA(c), b), c, pair.b}); });
+    }
+  }
+
+  void expandB(const Pair& pair) {
+    if (spheres()) {
+      const auto a = walk().ballOfA(pair.a);
+      b_.children(pair.b, [&](typename B::Node c) { push({walk().boundOf(a, walk().ballOfB(c)), pair.a, c}); });
+    } else {
+      const auto a = walk().reachOfA(pair.a);
+      b_.children(pair.b, [&](typename B::Node c) { push({walk().boundOf(a, walk().reachOfB(c)), pair.a, c}); });
     }
   }
 

@@ -31,8 +31,8 @@ struct ContactGoal {
 template <typename A, typename B>
 class ContactTimeWalk : private BestFirst<ContactTimeWalk<A, B>, A, B> {
  public:
-  /// X_MA and X_MB lead from the sides' frames to those of the bodies that the motions are about; only their scale and
-  /// translation are used.
+  /// `a_in_body` and `b_in_body` lead from the sides' frames to those of the bodies that the motions are about, without
+  /// turning.
   ContactTimeWalk(const A& a, const Placement& a_in_body, const Motion& motion_a, const B& b,
                   const Placement& b_in_body, const Motion& motion_b)
       : Base(a, b, scratch()), a_in_body_(a_in_body), b_in_body_(b_in_body), motion_a_(motion_a), motion_b_(motion_b) {}
@@ -42,7 +42,6 @@ class ContactTimeWalk : private BestFirst<ContactTimeWalk<A, B>, A, B> {
     goal_ = goal;
     first_ = std::numeric_limits<double>::infinity();
     at(0);
-    push({boundOf(a_.root(), b_.root()), a_.root(), b_.root()});
     this->search();
     return first_;
   }
@@ -153,36 +152,12 @@ class ContactTimeWalk : private BestFirst<ContactTimeWalk<A, B>, A, B> {
   Sphere ballOfA(typename A::Node n) const { return query::placed(a_.sphere(n), a_in_world_); }
   Sphere ballOfB(typename B::Node n) const { return query::placed(b_.sphere(n), b_in_world_); }
 
-  double boundOf(typename A::Node a, typename B::Node b) const {
-    return spheres() ? boundOf(ballOfA(a), ballOfB(b)) : boundOf(reachOfA(a), reachOfB(b));
-  }
-
   bool again(const Pair& pair) {
     at(pair.bound);
-    const double time = boundOf(pair.a, pair.b);
+    const double time = Base::boundOf(pair);
     if (time < now_ + kWorthWaiting) return !worthIt(time);
     push({time, pair.a, pair.b});
     return true;
-  }
-
-  void expandA(const Pair& pair) {
-    if (spheres()) {
-      const Sphere b = ballOfB(pair.b);
-      a_.children(pair.a, [&](typename A::Node c) { push({boundOf(ballOfA(c), b), c, pair.b}); });
-    } else {
-      const NodeReach b = reachOfB(pair.b);
-      a_.children(pair.a, [&](typename A::Node c) { push({boundOf(reachOfA(c), b), c, pair.b}); });
-    }
-  }
-
-  void expandB(const Pair& pair) {
-    if (spheres()) {
-      const Sphere a = ballOfA(pair.a);
-      b_.children(pair.b, [&](typename B::Node c) { push({boundOf(a, ballOfB(c)), pair.a, c}); });
-    } else {
-      const NodeReach a = reachOfA(pair.a);
-      b_.children(pair.b, [&](typename B::Node c) { push({boundOf(a, reachOfB(c)), pair.a, c}); });
-    }
   }
 
   // The primitives of a leaf, in the frame of their side.

@@ -38,7 +38,6 @@ class DistanceWalk : private BestFirst<DistanceWalk<A, B>, A, B> {
   Nearest run(const DistanceGoal& goal) {
     goal_ = goal;
     limit_ = goal.below;
-    start();
     this->search();
     return best_;
   }
@@ -49,7 +48,6 @@ class DistanceWalk : private BestFirst<DistanceWalk<A, B>, A, B> {
   using Pair = typename Base::Pair;
   using Base::a_;
   using Base::b_;
-  using Base::push;
   using Base::spheres;
 
   struct Scratch : Base::Heap {
@@ -78,37 +76,11 @@ class DistanceWalk : private BestFirst<DistanceWalk<A, B>, A, B> {
     return distanceBound(a, b, way_, enough());
   }
 
+  Sphere ballOfA(typename A::Node n) const { return a_.sphere(n); }
   Sphere ballOfB(typename B::Node n) const { return placed(b_.sphere(n), b_in_a_); }
 
   static double boundOf(const Sphere& a, const Sphere& b) {
     return (a.center - b.center).norm() * (1 - 1e-12) - (a.radius + b.radius) * (1 + 1e-12);
-  }
-
-  void start() {
-    const Pair root{0, a_.root(), b_.root()};
-    const double bound =
-        spheres() ? boundOf(a_.sphere(root.a), ballOfB(root.b)) : boundOf(reachOfA(root.a), reachOfB(root.b));
-    push({bound, root.a, root.b});
-  }
-
-  void expandA(const Pair& pair) {
-    if (spheres()) {
-      const Sphere b = ballOfB(pair.b);
-      a_.children(pair.a, [&](typename A::Node c) { push({boundOf(a_.sphere(c), b), c, pair.b}); });
-    } else {
-      const NodeReach b = reachOfB(pair.b);
-      a_.children(pair.a, [&](typename A::Node c) { push({boundOf(reachOfA(c), b), c, pair.b}); });
-    }
-  }
-
-  void expandB(const Pair& pair) {
-    if (spheres()) {
-      const Sphere a = a_.sphere(pair.a);
-      b_.children(pair.b, [&](typename B::Node c) { push({boundOf(a, ballOfB(c)), pair.a, c}); });
-    } else {
-      const NodeReach a = reachOfA(pair.a);
-      b_.children(pair.b, [&](typename B::Node c) { push({boundOf(a, reachOfB(c)), pair.a, c}); });
-    }
   }
 
   void found(const Nearest& n) {

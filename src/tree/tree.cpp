@@ -24,8 +24,9 @@ Options checked(const Options& o) {
   }
   if (o.ttl.count() < 0) bad("ttl is negative");
   if (o.viewport < 1 || o.viewport > 4096) bad("viewport is " + std::to_string(o.viewport) + ", not 1 to 4096");
-  if (o.margin != 0) bad("margin is " + std::to_string(o.margin) + ", but only 0 is supported in this version");
-  if (o.solid) bad("solid is not supported in this version");
+  if (!(o.margin >= 0) || !std::isfinite(o.margin)) {
+    bad("margin is " + std::to_string(o.margin) + ", not a length of 0 or more");
+  }
   return o;
 }
 
@@ -73,6 +74,9 @@ Tree::Tree(std::shared_ptr<const Mesh> mesh, const Options& options)
 }
 
 void Tree::reset(std::shared_ptr<const Mesh> mesh) {
+  solid_ = options_.solid ? std::make_shared<const Solid>(mesh) : nullptr;
+  pieces_known_ = nullptr;
+  pieces_ = nullptr;
   surface_ = surfaceOf(std::move(mesh), options_);
   root_bounds_ = oracle::CellBounds();
   setBox(latticeBounds(surface_), lattice::Cell{}, root_bounds_);
@@ -80,6 +84,17 @@ void Tree::reset(std::shared_ptr<const Mesh> mesh) {
 }
 
 std::int64_t Tree::now() const { return nanoseconds(options_.clock ? options_.clock() : Clock::now()); }
+
+const std::vector<Eigen::Vector3d>& Tree::pieces() const {
+  if (const auto* known = pieces_known_.load(std::memory_order_acquire)) return *known;
+  const std::lock_guard<std::mutex> lock(pieces_mutex_);
+  if (pieces_ == nullptr) {
+    pieces_ = std::make_unique<const std::vector<Eigen::Vector3d>>(
+        pointOfEachPiece(surface_.mesh->vertices(), surface_.mesh->triangles()));
+    pieces_known_.store(pieces_.get(), std::memory_order_release);
+  }
+  return *pieces_;
+}
 
 std::shared_ptr<const Mesh> Tree::mesh() const {
   const std::shared_lock<Gate> look(gate_);
@@ -95,11 +110,13 @@ void Tree::releaseMesh() {
   if (!conservative()) {
     throw std::logic_error("bocst::Model::releaseMesh: exact answers test the triangles on the host");
   }
+  if (options_.solid) throw std::logic_error("bocst::Model::releaseMesh: a solid looks at its triangles on the host");
   const std::lock_guard<Gate> alone(gate_);
   if (surface_.device == nullptr) surface_.device = oracle_->hold(surface_);
   if (surface_.device == nullptr || oracle_->needsHostMesh()) {
     throw OracleError("bocst::Model::releaseMesh: the oracle " + oracle_->name() + " needs the mesh on the host");
   }
+  pieces();  // all that another solid asks of it
   surface_.mesh = nullptr;
 }
 
@@ -728,7 +745,8 @@ Statistics Tree::statistics() const {
   s.oracle_batches = batches_;
   s.oracle_cells = cells_;
   s.pruned_nodes = pruned_;
-  s.mesh_bytes = surface_.mesh != nullptr ? surface_.mesh->bytes() : 0;
+  s.mesh_bytes =
+      (surface_.mesh != nullptr ? surface_.mesh->bytes() : 0) + (solid_ != nullptr ? solid_->bytes() : 0);
   s.device_bytes = device_bytes_;
   return s;
 }

@@ -15,6 +15,7 @@
 #include <mutex>
 #include <vector>
 
+#include "mesh/solid.h"
 #include "oracle/cpu/root_grid.h"
 #include "oracle/oracle.h"
 #include "tree/block.h"
@@ -69,6 +70,11 @@ class Tree {
   bool isDeepest(int level) const { return level >= deepest_; }
   int deepest() const { return deepest_; }
   bool conservative() const { return options_.answer == Answer::kConservative; }
+
+  /// What the mesh encloses, for a model that is solid; else null.
+  const Solid* solid() const { return solid_.get(); }
+  /// A point of each connected piece of the surface, in the mesh's frame; found when first asked for.
+  const std::vector<Eigen::Vector3d>& pieces() const;
 
   /// Marks a block as used now, for ttl and budget.
   void touch(const Block& block, std::int64_t now) const {
@@ -152,6 +158,10 @@ class Tree {
   std::mutex growth_;  // guards what grow() appends to
 
   oracle::Surface surface_;
+  std::shared_ptr<const Solid> solid_;
+  mutable std::mutex pieces_mutex_;  // guards pieces_ while they are found
+  mutable std::unique_ptr<const std::vector<Eigen::Vector3d>> pieces_;
+  mutable std::atomic<const std::vector<Eigen::Vector3d>*> pieces_known_{nullptr};  // pieces_, for readers
   oracle::CellBounds root_bounds_;
   std::unique_ptr<oracle::RootGrid> grid_;
   std::atomic<const oracle::RootGrid*> grid_known_{nullptr};  // grid_, for readers

@@ -207,6 +207,9 @@ TEST(Compute, WhatNeedsTheMeshKeepsIt) {
   EXPECT_THROW(cpu.releaseMesh(), OracleError);
   EXPECT_THROW(occlusion.releaseMesh(), OracleError);
   EXPECT_EQ(occlusion.mesh(), mesh);
+  Options solid = with(OracleKind::kCompute, Answer::kConservative);
+  solid.solid = true;
+  EXPECT_THROW(Modeld(mesh, solid).releaseMesh(), std::logic_error);
 }
 
 TEST(Compute, BytesOnTheDeviceComeAndGo) {

@@ -1,0 +1,249 @@
+// SPDX-License-Identifier: BSD-3-Clause
+// Margins: surfaces no farther apart than the margin collide. Against distances, and against brute force over
+// triangles.
+#include <fcl/broadphase/broadphase_dynamic_AABB_tree.h>
+#include <fcl/broadphase/default_broadphase_callbacks.h>
+#include <gtest/gtest.h>
+
+#include "conformance/reference.h"
+#include "query/triangle.h"
+
+namespace bocst {
+namespace {
+
+using test::Raw;
+
+Options with(double margin, Answer answer = Answer::kExact, Subdivision subdivision = Subdivision::kBono) {
+  Options o;
+  o.margin = margin;
+  o.answer = answer;
+  o.subdivision = subdivision;
+  return o;
+}
+
+template <typename S>
+S distanceOf(const fcl::CollisionGeometry<S>& a, const fcl::Transform3<S>& X, const fcl::CollisionGeometry<S>& b,
+             const fcl::Transform3<S>& Y) {
+  fcl::DistanceResult<S> result;
+  return fcl::distance(&a, X, &b, Y, fcl::DistanceRequest<S>(), result);
+}
+
+template <typename S>
+class Margin : public testing::Test {};
+using Scalars = testing::Types<float, double>;
+TYPED_TEST_SUITE(Margin, Scalars);
+
+// Just more and just less than the distance, however it is shared between the two.
+TYPED_TEST(Margin, IsTheDistanceUpToWhichTheyCollide) {
+  using S = TypeParam;
+  const Raw ra = test::torus(40), rb = test::torus(23, 0.3);
+  const Model<S> plain_a(ra.mesh()), plain_b(rb.mesh());
+  const auto bvh = test::bvh<fcl::OBBRSS<S>>(rb);
+  const double off = std::is_same<S, double>::value ? 1e-10 : 1e-4;
+  std::mt19937_64 g(1);
+  std::uniform_real_distribution<double> u(0, 1);
+  int apart = 0;
+  for (int i = 0; i < 24; ++i) {
+    const auto X = test::pose<S>(test::randomRotation(g), test::randomDirection(g));
+    const auto Y = test::pose<S>(test::randomRotation(g), test::randomDirection(g) * 4 * u(g));
+    const double d = static_cast<double>(distanceOf<S>(plain_a, X, plain_b, Y));
+    if (d < 1e-3) continue;
+    ++apart;
+    const double share = i % 3 == 0 ? 0 : u(g);
+    for (const double margin : {d * (1 + off), d * (1 - off), d * 3, d / 3}) {
+      const bool hit = margin > d;
+      const Model<S> a(ra.mesh(), with(margin * share)), b(rb.mesh(), with(margin * (1 - share)));
+      const Model<S> all(ra.mesh(), with(margin));
+      ASSERT_EQ(test::touching<S>(a, X, b, Y), hit) << margin << ' ' << d;
+      ASSERT_EQ(test::touching<S>(b, Y, a, X), hit);
+      ASSERT_EQ(test::touching<S>(all, X, *bvh, Y), hit);
+      ASSERT_EQ(test::touching<S>(*bvh, Y, all, X), hit);
+      ASSERT_EQ(distanceOf<S>(a, X, b, Y), distanceOf<S>(plain_a, X, plain_b, Y)) << "distances know no margin";
+    }
+  }
+  EXPECT_GT(apart, 8);
+}
+
+/// All pairs of triangles no farther apart than the margin.
+test::Pairs bruteForce(const Raw& ra, const Raw& rb, const fcl::Transform3d& Y, double margin) {
+  test::Pairs pairs;
+  for (std::size_t i = 0; i < ra.triangles.size(); ++i) {
+    const auto& s = ra.triangles[i];
+    const query::Corners p = {ra.vertices[s[0]], ra.vertices[s[1]], ra.vertices[s[2]]};
+    for (std::size_t j = 0; j < rb.triangles.size(); ++j) {
+      const auto& t = rb.triangles[j];
+      const query::Corners q = {Y * rb.vertices[t[0]], Y * rb.vertices[t[1]], Y * rb.vertices[t[2]]};
+      Eigen::Vector3d on_p, on_q;
+      if (query::nearestPoints(p, q, on_p, on_q) <= margin) {
+        pairs.insert({static_cast<std::intptr_t>(i), static_cast<std::intptr_t>(j)});
+      }
+    }
+  }
+  return pairs;
+}
+
+TEST(MarginDouble, ContactsAreAllPairsWithinIt) {
+  const Raw meshes[] = {test::adversarial(), test::soup(60, 4), test::torus(7), test::torus(14, 0.3)};
+  std::mt19937_64 g(2);
+  const fcl::Transform3d I = fcl::Transform3d::Identity();
+  std::size_t found = 0;
+  for (const Raw& ra : meshes) {
+    for (const Raw& rb : meshes) {
+      const auto bvh = test::bvh<fcl::OBBRSSd>(rb);
+      for (const double margin : {1e-9, 0.01, 0.2, 30.0}) {
+        const Modeld a(ra.mesh(), with(margin / 4)), b(rb.mesh(), with(margin * 3 / 4)), all(ra.mesh(), with(margin));
+        for (int i = 0; i < 2; ++i) {
+          const auto Y = test::pose<double>(test::randomRotation(g), test::randomDirection(g) * (0.7 + 0.9 * i));
+          const test::Pairs expected = bruteForce(ra, rb, Y, margin);
+          ASSERT_EQ(test::pairs<double>(a, I, b, Y), expected) << margin;
+          ASSERT_EQ(test::pairs<double>(all, I, *bvh, Y), expected) << margin;
+          test::Pairs swapped;
+          for (const auto& [t, u] : test::pairs<double>(b, Y, a, I)) swapped.insert({u, t});
+          ASSERT_EQ(swapped, expected) << margin;
+          found += expected.size();
+        }
+      }
+    }
+  }
+  EXPECT_GT(found, 1000u);
+}
+
+// The depth is how far the second must go along the normal until the two primitives are a margin apart.
+TEST(MarginDouble, ContactsSayHowToPart) {
+  const Raw ra = test::torus(20), rb = test::torus(15, 0.3);
+  const double margin = 0.1;
+  const Modeld a(ra.mesh(), with(margin)), b(rb.mesh());
+  std::mt19937_64 g(3);
+  const auto X = test::pose<double>(test::randomRotation(g), {0.3, 0.2, 0.1});
+  int near = 0, meeting = 0;
+  for (int i = 0; i < 6; ++i) {
+    const auto Y = test::pose<double>(test::randomRotation(g), test::randomDirection(g) * (1.6 + 0.1 * i));
+    for (const bool swapped : {false, true}) {
+      const fcl::CollisionRequestd request(10000, true);
+      fcl::CollisionResultd result;
+      if (swapped) {
+        fcl::collide(&b, Y, &a, X, request, result);
+      } else {
+        fcl::collide(&a, X, &b, Y, request, result);
+      }
+      for (std::size_t k = 0; k < result.numContacts(); ++k) {
+        const auto& c = result.getContact(k);
+        ASSERT_EQ(c.o1, swapped ? static_cast<const fcl::CollisionGeometryd*>(&b) : &a);
+        query::Corners p, q;
+        for (int v = 0; v < 3; ++v) {
+          const auto &s = ra.triangles[static_cast<std::size_t>(swapped ? c.b2 : c.b1)],
+                     &t = rb.triangles[static_cast<std::size_t>(swapped ? c.b1 : c.b2)];
+          p[v] = X * ra.vertices[s[static_cast<std::size_t>(v)]];
+          q[v] = Y * rb.vertices[t[static_cast<std::size_t>(v)]];
+        }
+        Eigen::Vector3d on_p, on_q;
+        const double d = query::nearestPoints(p, q, on_p, on_q);
+        ASSERT_NEAR(c.normal.norm(), 1, 1e-12);
+        if (d > 1e-9) {
+          ASSERT_NEAR(c.penetration_depth, margin - d, 1e-9);
+          ASSERT_LT((c.pos - (on_p + on_q) / 2).norm(), 1e-6);
+          ++near;
+        } else {
+          ASSERT_GE(c.penetration_depth, margin);
+          ++meeting;
+        }
+        auto& moved = swapped ? p : q;
+        for (auto& x : moved) x += c.normal * (c.penetration_depth + 1e-9);
+        ASSERT_GE(query::nearestPoints(p, q, on_p, on_q), margin - 1e-9);
+      }
+    }
+  }
+  EXPECT_GT(near, 100);
+  EXPECT_GT(meeting, 10);
+}
+
+TEST(MarginConservative, NeverFreeWithinIt) {
+  const Raw ra = test::torus(40), rb = test::torus(23, 0.3);
+  const Modeld exact_a(ra.mesh()), exact_b(rb.mesh());
+  const auto bvh = test::bvh<fcl::OBBRSSd>(rb);
+  const fcl::Transform3d I = fcl::Transform3d::Identity();
+  std::mt19937_64 g(4);
+  std::uniform_real_distribution<double> u(0, 1);
+  int free_ones = 0;
+  for (const Subdivision subdivision : {Subdivision::kOctree, Subdivision::kBono}) {
+    for (int i = 0; i < 12; ++i) {
+      const auto Y = test::pose<double>(test::randomRotation(g), test::randomDirection(g) * (1.8 + 2 * u(g)));
+      const double d = distanceOf<double>(exact_a, I, exact_b, Y);
+      for (const double margin : {d * (1 + 1e-9), d * 2 + 1e-3, d / 4}) {
+        auto options = with(margin, Answer::kConservative, subdivision);
+        options.depth = 5;
+        auto none = options;
+        none.margin = 0;
+        const Modeld a(ra.mesh(), options), b(rb.mesh(), none), same(ra.mesh(), none);
+        const bool hit = test::touching<double>(a, I, b, Y);
+        EXPECT_TRUE(hit || margin < d);
+        EXPECT_EQ(test::touching<double>(b, Y, a, I), hit);
+        // As the distance of the spheres says, which is a query of its own.
+        EXPECT_EQ(hit, distanceOf<double>(same, I, b, Y) <= margin);
+        for (const fcl::CollisionGeometryd* partner : {static_cast<const fcl::CollisionGeometryd*>(&exact_b),
+                                                       static_cast<const fcl::CollisionGeometryd*>(bvh.get())}) {
+          EXPECT_EQ(test::touching<double>(a, I, *partner, Y), distanceOf<double>(same, I, *partner, Y) <= margin);
+          EXPECT_EQ(test::touching<double>(*partner, Y, a, I), distanceOf<double>(same, I, *partner, Y) <= margin);
+        }
+        free_ones += !hit;
+      }
+    }
+  }
+  EXPECT_GT(free_ones, 5);
+}
+
+TEST(MarginDouble, BroadphaseManagersSeeIt) {
+  const auto model = std::make_shared<Modeld>(test::box({0, 0, 0}, {1, 1, 1}).mesh(), with(0.5));
+  const auto bvh = test::bvh<fcl::OBBRSSd>(test::box({0, 0, 0}, {1, 1, 1}));
+  for (const double x : {1.4, 1.6}) {
+    fcl::CollisionObjectd a(model, fcl::Transform3d(fcl::Transform3d::Identity()));
+    fcl::CollisionObjectd b(bvh, test::pose<double>(Eigen::Matrix3d::Identity(), {x, 0, 0}));
+    fcl::DynamicAABBTreeCollisionManagerd manager;
+    manager.registerObject(&a);
+    manager.registerObject(&b);
+    manager.setup();
+    fcl::DefaultCollisionData<double> data;
+    manager.collide(&data, fcl::DefaultCollisionFunction<double>);
+    EXPECT_EQ(data.result.isCollision(), x < 1.5);
+  }
+}
+
+TEST(MarginDouble, TimesOfContactAreThoseOfTheMargin) {
+  const Modeld a(test::box({-1, -1, -1}, {0, 1, 1}).mesh(), with(0.25)), b(test::torus(12).mesh(), with(0.125));
+  const double left = b.mesh()->bounds().min().x();
+  const fcl::Transform3d I = fcl::Transform3d::Identity();
+  const auto begin = test::pose<double>(I.linear(), {6 - left, 0.1, 0}),
+             end = test::pose<double>(I.linear(), {-left, 0.1, 0});
+  fcl::ContinuousCollisionRequestd request;
+  fcl::ContinuousCollisionResultd result;
+  fcl::continuousCollide(&a, I, I, &b, begin, end, request, result);
+  EXPECT_TRUE(result.is_collide);
+  EXPECT_NEAR(result.time_of_contact, (6 - 0.375) / 6, 1.1e-4);
+  fcl::continuousCollide(&b, begin, end, &a, I, I, request, result);
+  EXPECT_NEAR(result.time_of_contact, (6 - 0.375) / 6, 1.1e-4);
+  const auto short_of_it = test::pose<double>(I.linear(), {0.376 - left, 0.1, 0});
+  fcl::continuousCollide(&a, I, I, &b, begin, short_of_it, request, result);
+  EXPECT_FALSE(result.is_collide);
+}
+
+TEST(MarginDouble, SignedDistancesAreThoseOfTheSurfaces) {
+  const Raw raw = test::torus(20);
+  const Modeld plain(raw.mesh()), wide(raw.mesh(), with(0.5));
+  const fcl::Transform3d I = fcl::Transform3d::Identity();
+  fcl::DistanceRequestd request;
+  request.enable_signed_distance = true;
+  for (const double x : {1.3, 2.3}) {
+    const auto Y = test::pose<double>(I.linear(), {x, 0.2, 0.1});
+    fcl::DistanceResultd p, w;
+    fcl::distance(&plain, I, &plain, Y, request, p);
+    fcl::distance(&wide, I, &wide, Y, request, w);
+    EXPECT_EQ(p.min_distance < 0, x < 2);
+    EXPECT_EQ(w.min_distance < 0, x < 2);
+    if (x > 2) {
+      EXPECT_EQ(p.min_distance, w.min_distance);
+    }
+  }
+}
+
+}  // namespace
+}  // namespace bocst

@@ -1,0 +1,314 @@
+// SPDX-License-Identifier: BSD-3-Clause
+// Solids: what is wholly inside a watertight mesh collides. Against winding numbers by solid angles, which know no
+// rays.
+#include "mesh/solid.h"
+
+#include <gtest/gtest.h>
+
+#include "conformance/reference.h"
+#include "query/triangle.h"
+
+namespace bocst {
+namespace {
+
+using test::Raw;
+
+Options solid(Answer answer = Answer::kExact) {
+  Options o;
+  o.solid = true;
+  o.answer = answer;
+  return o;
+}
+
+Raw turnedOver(Raw raw) {
+  for (auto& t : raw.triangles) t = fcl::Triangle(t[0], t[2], t[1]);
+  return raw;
+}
+
+/// Every triangle with vertices of its own, as STL files have them.
+Raw unwelded(const Raw& raw) {
+  Raw out;
+  for (const auto& t : raw.triangles) {
+    const std::size_t n = out.vertices.size();
+    for (std::size_t k = 0; k < 3; ++k) out.vertices.push_back(raw.vertices[t[k]]);
+    out.triangles.emplace_back(n, n + 1, n + 2);
+  }
+  return out;
+}
+
+/// How often the surface winds about a point, by the solid angles of its triangles.
+double windings(const Raw& raw, const Eigen::Vector3d& p) {
+  double sum = 0;
+  for (const auto& t : raw.triangles) {
+    const Eigen::Vector3d a = raw.vertices[t[0]] - p, b = raw.vertices[t[1]] - p, c = raw.vertices[t[2]] - p;
+    const double la = a.norm(), lb = b.norm(), lc = c.norm();
+    sum += std::atan2(a.dot(b.cross(c)), la * lb * lc + a.dot(b) * lc + b.dot(c) * la + c.dot(a) * lb);
+  }
+  return sum / (2 * std::acos(-1.0));
+}
+
+double distanceTo(const Raw& raw, const Eigen::Vector3d& p) {
+  double least = std::numeric_limits<double>::infinity();
+  for (const auto& t : raw.triangles) {
+    const query::Corners c = {raw.vertices[t[0]], raw.vertices[t[1]], raw.vertices[t[2]]};
+    least = std::min(least, (query::closestPoint(p, c) - p).norm());
+  }
+  return least;
+}
+
+/// A box with a cavity, beside which two boxes overlap.
+Raw cavity() {
+  Raw raw = test::box({0, 0, 0}, {1, 1, 1});
+  raw.add(turnedOver(test::box({0.25, 0.25, 0.25}, {0.75, 0.75, 0.75})));
+  raw.add(test::box({2, 0, 0}, {3, 1, 1}));
+  raw.add(test::box({2.5, 0.5, 0.5}, {3.5, 1.5, 1.5}));
+  return raw;
+}
+
+TEST(Solid, HoldsWhatItsSurfaceWindsAbout) {
+  std::mt19937_64 g(1);
+  std::uniform_real_distribution<double> u(0, 1);
+  Raw flat = test::torus(16);
+  flat.scale(1);
+  for (auto& v : flat.vertices) v.z() *= 1e-3;
+  Raw far = test::torus(9);
+  far.move({1e3, -2e3, 3e3});
+  for (const Raw& raw : {test::box({0, 0, 0}, {1, 1, 1}), test::torus(30), test::torus(7, 0.3), cavity(), flat, far,
+                         turnedOver(test::torus(12)), unwelded(test::torus(20, 0.2))}) {
+    const Solid s(raw.mesh());
+    const Eigen::AlignedBox3d& b = raw.mesh()->bounds();
+    int inside = 0;
+    const auto check = [&](const Eigen::Vector3d& p) {
+      // On the surface itself either answer would do.
+      if (distanceTo(raw, p) < 1e-10 * b.max().cwiseAbs().maxCoeff()) return;
+      const double w = windings(raw, p);
+      ASSERT_NEAR(w, std::round(w), 1e-3);
+      const bool is_inside = std::abs(w) > 0.5;
+      ASSERT_EQ(s.mayHold(p, 0), is_inside) << p.transpose() << " winds " << w;
+      inside += is_inside;
+    };
+    for (int i = 0; i < 300; ++i) {
+      check(b.min() + 1.2 * b.sizes().cwiseProduct(Eigen::Vector3d(u(g), u(g), u(g))) - 0.1 * b.sizes());
+      // Lines along z through corners, along edges, and through the middles of edges.
+      const auto& t = raw.triangles[static_cast<std::size_t>(u(g) * static_cast<double>(raw.triangles.size()))];
+      const Eigen::Vector3d v = raw.vertices[t[0]], w = raw.vertices[t[1]];
+      const double z = b.min().z() + u(g) * b.sizes().z();
+      check({v.x(), v.y(), z});
+      check({(v.x() + w.x()) / 2, (v.y() + w.y()) / 2, z});
+      check({v.x(), b.center().y(), z});
+    }
+    EXPECT_GT(inside, 50);
+  }
+}
+
+TEST(Solid, PointsBesideTheSurfaceAreTakenToBeInside) {
+  const Solid s(test::box({0, 0, 0}, {1, 1, 1}).mesh());
+  EXPECT_FALSE(s.mayHold({0.5, 0.5, -1e-6}, 1e-9));
+  EXPECT_TRUE(s.mayHold({0.5, 0.5, -1e-9}, 1e-9));
+  EXPECT_TRUE(s.mayHold({-1e-9, 0.3, 0.3}, 1e-9));
+  EXPECT_TRUE(s.mayHold({0.3, 1 + 1e-9, 0.3}, 1e-9));
+  EXPECT_TRUE(s.mayHold({0.5, 0.5, 0.5}, 0));
+}
+
+std::string refusal(const Raw& raw) {
+  try {
+    Modeld model(raw.mesh(), solid());
+  } catch (const std::invalid_argument& e) {
+    return e.what();
+  }
+  return "none";
+}
+
+TEST(SolidModel, OnlyOfWatertightMeshes) {
+  for (const Raw& raw : {test::box({0, 0, 0}, {1, 1, 1}), test::torus(8), unwelded(test::torus(8)), cavity(),
+                         turnedOver(test::torus(8))}) {
+    EXPECT_EQ(refusal(raw), "none");
+  }
+  Raw degenerate = test::torus(8);
+  degenerate.triangles.emplace_back(0, 0, 5);
+  degenerate.triangles.emplace_back(3, 3, 3);
+  EXPECT_EQ(refusal(degenerate), "none");
+
+  Raw open = test::torus(8);
+  open.triangles.erase(open.triangles.begin() + 17);
+  EXPECT_NE(refusal(open).find("has only one triangle"), std::string::npos) << refusal(open);
+  EXPECT_NE(refusal(open).find("watertight"), std::string::npos);
+  Raw turned = test::torus(8);
+  std::swap(turned.triangles[20][0], turned.triangles[20][1]);
+  EXPECT_NE(refusal(turned).find("turned over"), std::string::npos) << refusal(turned);
+  EXPECT_NE(refusal(test::soup(20, 1)), "none");
+  EXPECT_NE(refusal(test::adversarial()), "none");
+
+  // A mesh that loses its water keeps the shape it had.
+  Modeld model(unwelded(test::torus(8)).mesh(), solid());
+  const auto before = model.mesh();
+  auto torn = before->vertices();
+  torn[7].x() += 0.5;
+  EXPECT_THROW(model.updateVertices(torn), std::invalid_argument);
+  EXPECT_EQ(model.mesh(), before);
+}
+
+template <typename S>
+class SolidQueries : public testing::Test {};
+using Scalars = testing::Types<float, double>;
+TYPED_TEST_SUITE(SolidQueries, Scalars);
+
+TYPED_TEST(SolidQueries, WhatIsInsideCollidesEitherWayRound) {
+  using S = TypeParam;
+  const Raw ra = test::torus(30);
+  Raw rb = test::torus(10, 0.2);
+  rb.scale(0.12);
+  const auto fa = test::bvh<fcl::OBBRSS<S>>(ra), fb = test::bvh<fcl::OBBRSS<S>>(rb);
+  std::mt19937_64 g(2);
+  std::uniform_real_distribution<double> u(0, 1);
+  for (const Answer answer : {Answer::kExact, Answer::kConservative}) {
+    Options deep = solid(answer), none = deep;
+    deep.depth = none.depth = 8;
+    none.solid = false;
+    const Model<S> a(ra.mesh(), deep), b(rb.mesh(), none), both(rb.mesh(), deep), shell(ra.mesh(), none);
+    int held = 0, is_free = 0;
+    for (int i = 0; i < 150; ++i) {
+      // Along the middle of the tube, and anywhere about it.
+      const double angle = 6.3 * u(g);
+      const Eigen::Vector3d tube(0.7 * std::cos(angle), 0.7 * std::sin(angle), 0);
+      const auto X = test::pose<S>(test::randomRotation(g), test::randomDirection(g) * 5);
+      const auto Y = X * test::pose<S>(test::randomRotation(g), tube + test::randomDirection(g) * 0.9 * u(g));
+      const Eigen::Vector3d p = (X.inverse(Eigen::Isometry) * Y).template cast<double>() * rb.vertices[0];
+      const bool touch = test::touching<S>(*fa, X, *fb, Y), inside = std::abs(windings(ra, p)) > 0.5;
+      if (answer == Answer::kConservative && !touch && !inside) {
+        // Only what spheres say may be more.
+        ASSERT_EQ(test::touching<S>(a, X, b, Y), test::touching<S>(shell, X, b, Y));
+        continue;
+      }
+      const bool hit = touch || inside;
+      held += inside && !touch;
+      is_free += !hit;
+      ASSERT_EQ(test::touching<S>(a, X, b, Y), hit) << i;
+      ASSERT_EQ(test::touching<S>(b, Y, a, X), hit) << i;
+      ASSERT_EQ(test::touching<S>(a, X, both, Y), hit) << i;
+      ASSERT_EQ(test::touching<S>(both, Y, a, X), hit) << i;
+      ASSERT_EQ(test::touching<S>(a, X, *fb, Y), hit) << i;
+      ASSERT_EQ(test::touching<S>(*fb, Y, a, X), hit) << i;
+      if (answer == Answer::kExact) {
+        // The other way round, the small one is no shell around the large one.
+        ASSERT_EQ(test::touching<S>(shell, X, both, Y), touch) << i;
+        ASSERT_EQ(test::pairs<S>(a, X, b, Y).size(), touch ? test::pairs<S>(*fa, X, *fb, Y).size() : inside) << i;
+        fcl::DistanceResult<S> result;
+        fcl::distance(&a, X, &b, Y, fcl::DistanceRequest<S>(), result);
+        ASSERT_EQ(result.min_distance > 0, !hit) << i;
+      }
+    }
+    EXPECT_GT(held, 20);
+    EXPECT_TRUE(answer == Answer::kConservative || is_free > 20);
+  }
+}
+
+TEST(SolidModel, EachPieceCounts) {
+  const Modeld box(test::box({0, 0, 0}, {1, 1, 1}).mesh(), solid());
+  Raw dust;
+  for (int i = 0; i < 5; ++i) {
+    Raw grain = test::torus(5);
+    grain.scale(0.02).move({2.0 + i, 0.5, 0.5});
+    dust.add(grain);
+  }
+  const auto bvh = test::bvh<fcl::OBBRSSd>(dust);
+  const Modeld model(dust.mesh());
+  const fcl::Transform3d I = fcl::Transform3d::Identity();
+  for (int i = 0; i < 8; ++i) {
+    const auto X = test::pose<double>(I.linear(), {-0.5 - i, 0, 0});
+    const bool hit = i >= 1 && i <= 5;
+    EXPECT_EQ(test::touching<double>(box, I, model, X), hit) << i;
+    EXPECT_EQ(test::touching<double>(model, X, box, I), hit) << i;
+    EXPECT_EQ(test::touching<double>(box, I, *bvh, X), hit) << i;
+    EXPECT_EQ(test::touching<double>(*bvh, X, box, I), hit) << i;
+  }
+  // In the hole of a torus there is nothing; in a cavity neither.
+  const Modeld ring(test::torus(30).mesh(), solid()), hollow(cavity().mesh(), solid());
+  Raw grain = test::torus(6);
+  grain.scale(0.05);
+  const Modeld small(grain.mesh());
+  const auto at = [&](double x, double y, double z) { return test::pose<double>(I.linear(), {x, y, z}); };
+  EXPECT_FALSE(test::touching<double>(ring, I, small, I));
+  EXPECT_TRUE(test::touching<double>(ring, I, small, at(0.7, 0, 0)));
+  EXPECT_FALSE(test::touching<double>(hollow, I, small, at(0.5, 0.5, 0.5)));
+  EXPECT_TRUE(test::touching<double>(hollow, I, small, at(0.12, 0.12, 0.12)));
+  EXPECT_TRUE(test::touching<double>(hollow, I, small, at(2.75, 0.75, 0.75))) << "where two boxes overlap";
+}
+
+TEST(SolidModel, ContactsSayHowFarTheWallIs) {
+  const Modeld box(test::box({0, 0, 0}, {1, 1, 1}).mesh(), solid()), shell(box.mesh());
+  Raw raw = test::torus(10);
+  raw.scale(0.1);
+  const Modeld small(raw.mesh());
+  const fcl::Transform3d I = fcl::Transform3d::Identity();
+  const auto X = test::pose<double>(Eigen::Matrix3d::Identity(), {0.5, 0.3, 0.6});
+  const auto part = [](const fcl::Transform3d& Y, const Eigen::Vector3d& way) {
+    fcl::Transform3d Z = Y;
+    Z.translation() += way;
+    return Z;
+  };
+  const fcl::CollisionRequestd request(100, true);
+  fcl::CollisionResultd result;
+  ASSERT_EQ(fcl::collide(&box, I, &small, X, request, result), 1u);
+  const auto& c = result.getContact(0);
+  EXPECT_EQ(c.o1, &box);
+  EXPECT_EQ(c.b1, -1);
+  EXPECT_EQ(c.b2, -1);
+  EXPECT_NEAR(c.penetration_depth, 0.3 + raw.mesh()->bounds().min().y(), 1e-3);
+  EXPECT_FALSE(test::touching<double>(shell, I, small, part(X, c.normal * (c.penetration_depth - 1e-9))));
+  EXPECT_TRUE(test::touching<double>(shell, I, small, part(X, c.normal * (c.penetration_depth + 1e-9))));
+
+  result.clear();
+  ASSERT_EQ(fcl::collide(&small, X, &box, I, request, result), 1u);
+  const auto& d = result.getContact(0);
+  EXPECT_EQ(d.o1, &small);
+  EXPECT_TRUE(test::touching<double>(small, X, shell, part(I, d.normal * (d.penetration_depth + 1e-9))));
+  EXPECT_FALSE(test::touching<double>(small, X, shell, part(I, d.normal * (d.penetration_depth - 1e-9))));
+
+  fcl::DistanceRequestd distance_request;
+  distance_request.enable_signed_distance = true;
+  fcl::DistanceResultd distance;
+  fcl::distance(&box, I, &small, X, distance_request, distance);
+  EXPECT_NEAR(distance.min_distance, -c.penetration_depth, 1e-12);
+
+  result.clear();
+  fcl::CollisionRequestd plain;
+  ASSERT_EQ(fcl::collide(&box, I, &small, X, plain, result), 1u);
+  EXPECT_TRUE(std::isnan(result.getContact(0).penetration_depth));
+}
+
+TEST(SolidModel, TimesOfContact) {
+  const Modeld box(test::box({0, 0, 0}, {1, 1, 1}).mesh(), solid()), shell(box.mesh());
+  Raw raw = test::torus(8);
+  raw.scale(0.1);
+  const Modeld small(raw.mesh());
+  const fcl::Transform3d I = fcl::Transform3d::Identity();
+  const auto at = [&](double x) { return test::pose<double>(I.linear(), {x, 0.5, 0.5}); };
+  fcl::ContinuousCollisionRequestd request;
+  fcl::ContinuousCollisionResultd result;
+  fcl::continuousCollide(&box, I, I, &small, at(0.5), at(0.6), request, result);
+  EXPECT_TRUE(result.is_collide);
+  EXPECT_EQ(result.time_of_contact, 0);
+  fcl::continuousCollide(&shell, I, I, &small, at(0.5), at(0.6), request, result);
+  EXPECT_FALSE(result.is_collide);
+  fcl::continuousCollide(&small, at(3), at(0.5), &box, I, I, request, result);
+  EXPECT_TRUE(result.is_collide);
+  EXPECT_NEAR(result.time_of_contact, (3 - 1 + raw.mesh()->bounds().min().x()) / 2.5, 1.1e-4);
+}
+
+TEST(SolidModel, OfManyTrianglesAndOfLargeOnes) {
+  // Columns of a fine mesh, and one with a few triangles over all of them.
+  Raw raw = test::torus(120);
+  raw.add(test::box({-3, -3, -3}, {3, 3, -2}));
+  const Solid s(raw.mesh());
+  EXPECT_LT(s.bytes(), 64 * raw.triangles.size());
+  std::mt19937_64 g(5);
+  std::uniform_real_distribution<double> u(-1, 1);
+  for (int i = 0; i < 200; ++i) {
+    const Eigen::Vector3d p = 3.2 * Eigen::Vector3d(u(g), u(g), u(g));
+    ASSERT_EQ(s.mayHold(p, 0), std::abs(windings(raw, p)) > 0.5) << p.transpose();
+  }
+}
+
+}  // namespace
+}  // namespace bocst
