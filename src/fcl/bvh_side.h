@@ -67,6 +67,7 @@ class BvhSide {
  public:
   using S = typename BV::S;
   using Node = int;
+  static constexpr bool kBodies = false;
 
   /// @throws std::invalid_argument when the model is no finished triangle mesh.
   explicit BvhSide(const fcl::BVHModel<BV>& bvh) : bvh_(bvh) {

@@ -13,7 +13,9 @@
 #include <stdexcept>
 #include <string>
 
+#include "fcl/collide_shape.h"
 #include "fcl/pair.h"
+#include "fcl/question.h"
 #include "query/pair_set.h"
 #include "query/pair_walk.h"
 #include "query/tree_walk.h"
@@ -51,15 +53,6 @@ class BvhTriangles {
   const fcl::BVHModel<BV>& bvh_;
 };
 
-/// The caller's question, in the caller's order.
-template <typename S>
-struct Question {
-  const fcl::CollisionGeometry<S>*o1, *o2;
-  const fcl::Transform3<S>&X_W1, &X_W2;
-  const fcl::CollisionRequest<S>& request;
-  fcl::CollisionResult<S>& result;
-};
-
 /// Turns the pairs of a walk into contacts and cost sources. Side A of the walk is the caller's first geometry, or,
 /// when `swapped`, the second.
 template <typename S, typename Triangles1, typename Triangles2>
@@ -68,7 +61,6 @@ class Collector : public query::Visitor {
   Collector(const Question<S>& q, const Triangles1& t1, const Triangles2& t2, bool swapped, double magnitude)
       : q_(q), t1_(t1), t2_(t2), swapped_(swapped), magnitude_(magnitude), seen_(pairs()) {
     fcl::relativeTransform(q.X_W1.linear(), q.X_W1.translation(), q.X_W2.linear(), q.X_W2.translation(), R_12_, p_12_);
-    occupied_ = q.o1->isOccupied() && q.o2->isOccupied();
     // A boolean query ends at the first contact, so it meets no pair twice.
     once_ = q.request.num_max_contacts > 1 || q.request.enable_cost;
     if (once_) seen_.clear();
@@ -80,9 +72,7 @@ class Collector : public query::Visitor {
     unit_ = unit;
   }
 
-  bool endsAtFirst() const override {
-    return occupied_ && !q_.request.enable_cost && q_.result.numContacts() + 1 >= q_.request.num_max_contacts;
-  }
+  bool endsAtFirst() const override { return q_.endsAtFirst(); }
 
   bool triangles(std::uint32_t a, std::uint32_t b) override {
     if (swapped_) std::swap(a, b);
@@ -171,31 +161,11 @@ class Collector : public query::Visitor {
   }
 
   void addCost(const fcl::AABB<S>& a, const fcl::AABB<S>& b) {
-    fcl::AABB<S> overlap;
-    a.overlap(b, overlap);
-    q_.result.addCostSource(fcl::CostSource<S>(overlap, q_.o1->cost_density * q_.o2->cost_density),
-                            q_.request.num_max_cost_sources);
+    q_.addCost(a, b, q_.o1->cost_density * q_.o2->cost_density);
   }
 
   bool add(std::uint64_t b1, std::uint64_t b2, const query::Touch* touch) {
-    if (occupied_ && q_.result.numContacts() < q_.request.num_max_contacts) {
-      fcl::Contact<S> c;
-      c.o1 = q_.o1;
-      c.o2 = q_.o2;
-      c.b1 = static_cast<std::intptr_t>(b1);
-      c.b2 = static_cast<std::intptr_t>(b2);
-      if (q_.request.enable_contact) {
-        c.normal = touch->normal.template cast<S>();
-        c.pos = touch->point.template cast<S>();
-        c.penetration_depth = static_cast<S>(touch->depth);
-      } else {
-        c.normal.setConstant(std::numeric_limits<S>::quiet_NaN());
-        c.pos = c.normal;
-        c.penetration_depth = std::numeric_limits<S>::quiet_NaN();
-      }
-      q_.result.addContact(c);
-    }
-    return q_.request.isSatisfied(q_.result);
+    return q_.addContact(static_cast<std::intptr_t>(b1), static_cast<std::intptr_t>(b2), touch);
   }
 
   const Question<S>& q_;
@@ -206,7 +176,7 @@ class Collector : public query::Visitor {
   query::PairSet& seen_;
   fcl::Matrix3<S> R_12_;
   fcl::Vector3<S> p_12_;
-  bool occupied_, once_;
+  bool once_;
   Eigen::Vector3d origin_ = Eigen::Vector3d::Zero();
   double unit_ = 1;
 };
@@ -276,7 +246,8 @@ void collideBvh(const Question<typename BV::S>& q, tree::Tree& tree, const fcl::
 template <typename S>
 std::size_t collidePair(const fcl::CollisionGeometry<S>* o1, const fcl::Transform3<S>& X_W1,
                         const fcl::CollisionGeometry<S>* o2, const fcl::Transform3<S>& X_W2,
-                        const fcl::CollisionRequest<S>& request, fcl::CollisionResult<S>& result) {
+                        const BroughtSolver<S>& solver, const fcl::CollisionRequest<S>& request,
+                        fcl::CollisionResult<S>& result) {
   const auto* model1 = dynamic_cast<const Model<S>*>(o1);
   const auto* model2 = dynamic_cast<const Model<S>*>(o2);
   if (model1 == nullptr && model2 == nullptr) {
@@ -284,23 +255,29 @@ std::size_t collidePair(const fcl::CollisionGeometry<S>* o1, const fcl::Transfor
   }
   if (request.isSatisfied(result)) return result.numContacts();
   const Question<S> q{o1, o2, X_W1, X_W2, request, result};
-  const bool occupied = o1->isOccupied() && o2->isOccupied();
-  if (!occupied && (o1->isFree() || o2->isFree() || !request.enable_cost)) return result.numContacts();
+  if (!q.occupied() && (o1->isFree() || o2->isFree() || !request.enable_cost)) return result.numContacts();
   if (model1 != nullptr && model2 != nullptr) {
     collideModels(q, model1->tree(), model2->tree());
   } else {
     const bool swapped = model1 == nullptr;
-    withBvh<S>("collide", swapped ? o1 : o2,
-               [&](const auto& bvh) { collideBvh(q, (swapped ? model2 : model1)->tree(), bvh, swapped); });
+    const fcl::CollisionGeometry<S>* partner = swapped ? o1 : o2;
+    tree::Tree& tree = (swapped ? model2 : model1)->tree();
+    if (isShape(partner)) {
+      collideShape(q, tree, swapped, solver);
+    } else {
+      withBvh<S>("collide", partner, [&](const auto& bvh) { collideBvh(q, tree, bvh, swapped); });
+    }
   }
   return result.numContacts();
 }
 
 template std::size_t collidePair<float>(const fcl::CollisionGeometry<float>*, const fcl::Transform3<float>&,
                                         const fcl::CollisionGeometry<float>*, const fcl::Transform3<float>&,
-                                        const fcl::CollisionRequest<float>&, fcl::CollisionResult<float>&);
+                                        const BroughtSolver<float>&, const fcl::CollisionRequest<float>&,
+                                        fcl::CollisionResult<float>&);
 template std::size_t collidePair<double>(const fcl::CollisionGeometry<double>*, const fcl::Transform3<double>&,
                                          const fcl::CollisionGeometry<double>*, const fcl::Transform3<double>&,
-                                         const fcl::CollisionRequest<double>&, fcl::CollisionResult<double>&);
+                                         const BroughtSolver<double>&, const fcl::CollisionRequest<double>&,
+                                         fcl::CollisionResult<double>&);
 
 }  // namespace bocst::fcl_room

@@ -70,7 +70,7 @@ void sign(const Question<S>& q) {
   fcl::CollisionRequest<S> request;
   request.enable_contact = true;
   fcl::CollisionResult<S> contacts;
-  collidePair<S>(q.o1, q.X_W1, q.o2, q.X_W2, request, contacts);
+  collidePair<S>(q.o1, q.X_W1, q.o2, q.X_W2, {}, request, contacts);
   if (!contacts.isCollision()) return;
   const fcl::Contact<S>& contact = contacts.getContact(0);
   q.result.min_distance = -contact.penetration_depth;

@@ -23,6 +23,7 @@ enum class State {
 class TreeSide {
  public:
   using Node = tree::NodeRef;
+  static constexpr bool kBodies = false;
 
   explicit TreeSide(tree::Tree& tree) : tree_(tree), now_(tree.now()) {}
 
