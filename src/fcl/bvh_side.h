@@ -68,6 +68,7 @@ class BvhSide {
   using S = typename BV::S;
   using Node = int;
   static constexpr bool kBodies = false;
+  static constexpr bool kNodesHoldSurface = true;
 
   /// @throws std::invalid_argument when the model is no finished triangle mesh.
   explicit BvhSide(const fcl::BVHModel<BV>& bvh) : bvh_(bvh) {

@@ -5,6 +5,7 @@
 
 #include <algorithm>
 #include <limits>
+#include <type_traits>
 
 #include "fcl/body_pair.h"
 #include "fcl/narrow_phase.h"
@@ -18,8 +19,7 @@ namespace bocst::fcl_room {
 /// Turns what a walk of a model and solid bodies finds into contacts and cost sources. Partner is the side of the
 /// bodies, and knows them as FCL does:
 ///   bool touch(node, narrow_phase, corners, X_WM)  FCL's test of the body and a triangle of the model
-///   std::intptr_t id(node)                         what stands in b1 or b2
-///   S density(node)                                of cost sources
+///   fcl::AABB<S> worldBox(node), S density(node)   for cost sources
 ///   bool occupied(node)                            it makes contacts, and not only costs
 ///
 /// A triangle touches a body when they meet, in double, or when FCL's test, in S and with the solver's tolerance, says
@@ -72,7 +72,7 @@ class BodyCollector final : public query::BodyVisitor<typename Partner::Node> {
     const query::Points points{corners, 3};
     const query::Gap gap = partner_.gap(b, points, slack_);
     if (gap.atLeast > slack_) return false;
-    if (once_ && !seen_.insert(static_cast<std::uint64_t>(partner_.id(b)), t)) return false;
+    if (once_ && !seen_.insert(partner_.name(b), t)) return false;
 
     if (!gap.touches()) {
       fcl::Vector3<S> c[3];
@@ -145,22 +145,14 @@ class BodyCollector final : public query::BodyVisitor<typename Partner::Node> {
     partner_.children(b, [&](const Node& c) { addApproximateCosts(c, box, in_world); });
   }
 
-  void addCost(const fcl::AABB<S>& box, const Node& b) const { q_.addCost(box, worldBox(b), partner_.density(b)); }
-
-  fcl::AABB<S> worldBox(const Node& b) const {
-    const Eigen::Matrix3d axes = X_WB_.linear().transpose();
-    Eigen::Vector3d lo, hi;
-    for (int k = 0; k < 3; ++k) {
-      hi[k] = X_WB_.translation()[k] + partner_.height(b, axes.col(k));
-      lo[k] = X_WB_.translation()[k] - partner_.height(b, -axes.col(k));
-    }
-    return fcl::AABB<S>(lo.template cast<S>(), hi.template cast<S>());
+  void addCost(const fcl::AABB<S>& box, const Node& b) const {
+    q_.addCost(box, partner_.worldBox(b), partner_.density(b));
   }
 
   // `touch` has the normal from the body to the model.
   bool add(std::uint64_t id, const Node& b, const query::Touch* touch) const {
     if (!partner_.occupied(b)) return q_.request.isSatisfied(q_.result);
-    const std::intptr_t model = static_cast<std::intptr_t>(id), body = partner_.id(b);
+    const std::intptr_t model = static_cast<std::intptr_t>(id), body = static_cast<std::intptr_t>(partner_.name(b));
     if (swapped_ || touch == nullptr) return q_.addContact(swapped_ ? body : model, swapped_ ? model : body, touch);
     query::Touch turned = *touch;
     turned.normal = -turned.normal;
@@ -179,8 +171,8 @@ class BodyCollector final : public query::BodyVisitor<typename Partner::Node> {
   query::PairSet& seen_;
 };
 
-/// The collision of a model and the bodies of a partner, the first geometry when `swapped`: with_partner(frame, f)
-/// makes the partner's side and calls f with it.
+/// The collision of a model and the bodies of a partner, the first geometry when `swapped`: with_partner(frame,
+/// costs, f) makes the partner's side, with what has no contacts but costs or without, and calls f with it.
 template <typename S, typename F>
 void collideBodies(const Question<S>& q, tree::Tree& tree, bool swapped, const NarrowPhase<S>& narrow_phase,
                    F&& with_partner) {
@@ -196,16 +188,24 @@ void collideBodies(const Question<S>& q, tree::Tree& tree, bool swapped, const N
     now = a.now();
     const oracle::Surface& surface = tree.surface();
     const BodyFrame<S> frame(swapped ? q.X_W2 : q.X_W1, swapped ? q.X_W1 : q.X_W2, surface);
-    with_partner(frame, [&](const auto& partner) {
-      using Partner = std::remove_cv_t<std::remove_reference_t<decltype(partner)>>;
-      using Visitor = query::BodyVisitor<typename Partner::Node>;
-      BodyCollector<S, Partner> collector(first, partner, frame, surface, narrow_phase, swapped, request.enable_cost);
-      if (q.occupied() || request.enable_cost) {
+    const auto with_collector = [&](bool costs, auto&& f) {
+      with_partner(frame, costs, [&](const auto& partner) {
+        using Partner = std::remove_cv_t<std::remove_reference_t<decltype(partner)>>;
+        BodyCollector<S, Partner> collector(first, partner, frame, surface, narrow_phase, swapped, request.enable_cost);
+        f(partner, collector);
+      });
+    };
+    if (q.occupied() || request.enable_cost) {
+      with_collector(request.enable_cost, [&](const auto& partner, auto& collector) {
+        using Partner = std::remove_cv_t<std::remove_reference_t<decltype(partner)>>;
+        using Visitor = query::BodyVisitor<typename Partner::Node>;
         const query::Placement b_in_a = frame.toLattice(surface.lattice, collector.slack());
         query::PairWalk<query::TreeSide, Partner, Visitor>(a, partner, b_in_a, collector).run();
-      }
-      if (approximate) collector.addApproximateCosts(partner.root());
-    });
+      });
+    }
+    if (approximate) {
+      with_collector(true, [](const auto& partner, auto& collector) { collector.addApproximateCosts(partner.root()); });
+    }
   }
   tree.afterQuery(now);
 }

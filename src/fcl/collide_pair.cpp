@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #include "fcl/collide_pair.h"
 
+#include <fcl/config.h>
 #include <fcl/geometry/bvh/BVH_model.h>
 #include <fcl/math/geometry.h>
 #include <fcl/narrowphase/detail/traversal/collision/collision_traversal_node_base.h>
@@ -13,6 +14,7 @@
 #include <stdexcept>
 #include <string>
 
+#include "fcl/collide_octree.h"
 #include "fcl/collide_shape.h"
 #include "fcl/pair.h"
 #include "fcl/question.h"
@@ -264,6 +266,10 @@ std::size_t collidePair(const fcl::CollisionGeometry<S>* o1, const fcl::Transfor
     tree::Tree& tree = (swapped ? model2 : model1)->tree();
     if (isShape(partner)) {
       collideShape(q, tree, swapped, solver);
+#if FCL_HAVE_OCTOMAP
+    } else if (partner->getNodeType() == fcl::GEOM_OCTREE) {
+      collideOcTree(q, tree, swapped, solver);
+#endif
     } else {
       withBvh<S>("collide", partner, [&](const auto& bvh) { collideBvh(q, tree, bvh, swapped); });
     }

@@ -1,6 +1,8 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #include "fcl/collide_shape.h"
 
+#include <fcl/geometry/shape/utility.h>
+
 #include "fcl/collide_bodies.h"
 
 namespace bocst::fcl_room {
@@ -17,9 +19,15 @@ class ShapeSide : public query::BodySide {
              const fcl::Transform3<S>& X_WM) const {
     return narrow_phase.touch(shape_, X_WS_, corners, X_WM);
   }
-  std::intptr_t id(Node) const { return fcl::Contact<S>::NONE; }
   bool occupied(Node) const { return true; }
   S density(Node) const { return density_; }
+  fcl::AABB<S> worldBox(Node) const {
+    return withShape(shape_, [this](const auto& s) {
+      fcl::AABB<S> box;
+      fcl::computeBV(s, X_WS_, box);
+      return box;
+    });
+  }
 
  private:
   const fcl::ShapeBase<S>& shape_;
@@ -34,9 +42,9 @@ void collideShape(const Question<S>& q, tree::Tree& tree, bool swapped, const Br
   const auto& shape = static_cast<const fcl::ShapeBase<S>&>(*(swapped ? q.o1 : q.o2));
   const fcl::Transform3<S>& X_WS = swapped ? q.X_W1 : q.X_W2;
   withNarrowPhase<S>(brought, q.request, [&](const NarrowPhase<S>& narrow_phase) {
-    collideBodies(q, tree, swapped, narrow_phase, [&](const BodyFrame<S>& frame, auto&& walk) {
+    collideBodies(q, tree, swapped, narrow_phase, [&](const BodyFrame<S>& frame, bool, auto&& f) {
       withBody(shape, frame.region(), [&](const query::Body& body) {
-        walk(ShapeSide<S>(body, shape, X_WS, q.o1->cost_density * q.o2->cost_density));
+        f(ShapeSide<S>(body, shape, X_WS, q.o1->cost_density * q.o2->cost_density));
       });
     });
   });

@@ -1,12 +1,12 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #pragma once
 
-#include <fcl/geometry/shape/triangle_p.h>
 #include <fcl/narrowphase/detail/gjk_solver_indep.h>
 #include <fcl/narrowphase/detail/gjk_solver_libccd.h>
 #include <fcl/narrowphase/detail/traversal/collision/intersect.h>
 
 #include "fcl/narrow_phase.h"
+#include "fcl/shapes.h"
 
 // FCL's solvers are slow to compile: one scalar a file.
 
@@ -21,38 +21,19 @@ class NarrowPhaseOf final : public NarrowPhase<S> {
 
   bool touch(const fcl::ShapeBase<S>& shape, const fcl::Transform3<S>& X_WS, const fcl::Vector3<S> (&corners)[3],
              const fcl::Transform3<S>& X_WM) const override {
-    const auto as = [&](const auto& s) {
-      return solver_.shapeTriangleIntersect(s, X_WS, corners[0], corners[1], corners[2], X_WM, nullptr, nullptr,
-                                            nullptr);
-    };
-    switch (shape.getNodeType()) {
-      case fcl::GEOM_BOX:
-        return as(static_cast<const fcl::Box<S>&>(shape));
-      case fcl::GEOM_SPHERE:
-        return as(static_cast<const fcl::Sphere<S>&>(shape));
-      case fcl::GEOM_ELLIPSOID:
-        return as(static_cast<const fcl::Ellipsoid<S>&>(shape));
-      case fcl::GEOM_CAPSULE:
-        return as(static_cast<const fcl::Capsule<S>&>(shape));
-      case fcl::GEOM_CONE:
-        return as(static_cast<const fcl::Cone<S>&>(shape));
-      case fcl::GEOM_CYLINDER:
-        return as(static_cast<const fcl::Cylinder<S>&>(shape));
-      case fcl::GEOM_CONVEX:
-        return as(static_cast<const fcl::Convex<S>&>(shape));
-      case fcl::GEOM_PLANE:
-        return as(static_cast<const fcl::Plane<S>&>(shape));
-      case fcl::GEOM_HALFSPACE:
-        return as(static_cast<const fcl::Halfspace<S>&>(shape));
-      default:
-        // FCL tests triangles as it does those of two meshes.
-        return triangles(static_cast<const fcl::TriangleP<S>&>(shape), X_WS, corners, X_WM);
-    }
+    return withShape(shape, [&](const auto& s) { return ask(s, X_WS, corners, X_WM); });
   }
 
  private:
-  static bool triangles(const fcl::TriangleP<S>& t, const fcl::Transform3<S>& X_WT, const fcl::Vector3<S> (&c)[3],
-                        const fcl::Transform3<S>& X_WM) {
+  template <typename Shape>
+  bool ask(const Shape& s, const fcl::Transform3<S>& X_WS, const fcl::Vector3<S> (&c)[3],
+           const fcl::Transform3<S>& X_WM) const {
+    return solver_.shapeTriangleIntersect(s, X_WS, c[0], c[1], c[2], X_WM, nullptr, nullptr, nullptr);
+  }
+
+  // Of two triangles, FCL's test is that of meshes.
+  bool ask(const fcl::TriangleP<S>& t, const fcl::Transform3<S>& X_WT, const fcl::Vector3<S> (&c)[3],
+           const fcl::Transform3<S>& X_WM) const {
     const fcl::Transform3<S> X_MT = X_WM.inverse(Eigen::Isometry) * X_WT;
     return fcl::detail::Intersect<S>::intersect_Triangle(c[0], c[1], c[2], t.a, t.b, t.c, X_MT.linear(),
                                                          X_MT.translation());

@@ -1,19 +1,9 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #pragma once
 
-#include <fcl/geometry/shape/box.h>
-#include <fcl/geometry/shape/capsule.h>
-#include <fcl/geometry/shape/cone.h>
-#include <fcl/geometry/shape/convex.h>
-#include <fcl/geometry/shape/cylinder.h>
-#include <fcl/geometry/shape/ellipsoid.h>
-#include <fcl/geometry/shape/halfspace.h>
-#include <fcl/geometry/shape/plane.h>
-#include <fcl/geometry/shape/sphere.h>
-#include <fcl/geometry/shape/triangle_p.h>
+#include <limits>
 
-#include <functional>
-
+#include "fcl/shapes.h"
 #include "query/body.h"
 
 namespace bocst::fcl_room {
@@ -55,65 +45,52 @@ class ConvexShapeBody final : public query::ConvexBody {
   const fcl::Convex<S>& convex_;
 };
 
-/// One of FCL's shapes that are partners, TriangleP too (but not Model, which shares its node type)?
+/// A shape as a body in its own frame; unbounded ones reach as far as `region` (same frame) does.
 template <typename S>
-bool isShape(const fcl::CollisionGeometry<S>* geometry) {
-  switch (geometry->getNodeType()) {
-    case fcl::GEOM_BOX:
-    case fcl::GEOM_SPHERE:
-    case fcl::GEOM_ELLIPSOID:
-    case fcl::GEOM_CAPSULE:
-    case fcl::GEOM_CONE:
-    case fcl::GEOM_CYLINDER:
-    case fcl::GEOM_CONVEX:
-    case fcl::GEOM_PLANE:
-    case fcl::GEOM_HALFSPACE:
-      return true;
-    case fcl::GEOM_TRIANGLE:
-      return dynamic_cast<const fcl::TriangleP<S>*>(geometry) != nullptr;
-    default:
-      return false;
-  }
+query::BoxBody bodyOf(const fcl::Box<S>& s, const query::Sphere&) {
+  return query::BoxBody(s.side.template cast<double>() / 2);
+}
+template <typename S>
+query::CapsuleBody bodyOf(const fcl::Sphere<S>& s, const query::Sphere&) {
+  return query::CapsuleBody(s.radius, 0);
+}
+template <typename S>
+query::EllipsoidBody bodyOf(const fcl::Ellipsoid<S>& s, const query::Sphere&) {
+  return query::EllipsoidBody(s.radii.template cast<double>());
+}
+template <typename S>
+query::CapsuleBody bodyOf(const fcl::Capsule<S>& s, const query::Sphere&) {
+  return query::CapsuleBody(s.radius, s.lz);
+}
+template <typename S>
+query::RoundBody bodyOf(const fcl::Cone<S>& s, const query::Sphere&) {
+  return query::RoundBody(s.radius, 0, s.lz);
+}
+template <typename S>
+query::RoundBody bodyOf(const fcl::Cylinder<S>& s, const query::Sphere&) {
+  return query::RoundBody(s.radius, s.radius, s.lz);
+}
+template <typename S>
+ConvexShapeBody<S> bodyOf(const fcl::Convex<S>& s, const query::Sphere&) {
+  return ConvexShapeBody<S>(s);
+}
+template <typename S>
+query::PlaneBody bodyOf(const fcl::Plane<S>& s, const query::Sphere& region) {
+  return query::PlaneBody(s.n.template cast<double>(), s.d, region);
+}
+template <typename S>
+query::HalfspaceBody bodyOf(const fcl::Halfspace<S>& s, const query::Sphere& region) {
+  return query::HalfspaceBody(s.n.template cast<double>(), s.d, region);
+}
+template <typename S>
+query::TriangleBody bodyOf(const fcl::TriangleP<S>& s, const query::Sphere&) {
+  return query::TriangleBody({s.a.template cast<double>(), s.b.template cast<double>(), s.c.template cast<double>()});
 }
 
-/// Calls f with the shape as a body in its own frame; unbounded ones reach as far as `region` (same frame) does.
+/// Calls f with the body of a shape.
 template <typename S, typename F>
 void withBody(const fcl::ShapeBase<S>& shape, const query::Sphere& region, F&& f) {
-  const auto vector = [](const fcl::Vector3<S>& v) { return Eigen::Vector3d(v.template cast<double>()); };
-  switch (shape.getNodeType()) {
-    case fcl::GEOM_BOX:
-      return f(query::BoxBody(vector(static_cast<const fcl::Box<S>&>(shape).side) / 2));
-    case fcl::GEOM_SPHERE:
-      return f(query::CapsuleBody(static_cast<const fcl::Sphere<S>&>(shape).radius, 0));
-    case fcl::GEOM_ELLIPSOID:
-      return f(query::EllipsoidBody(vector(static_cast<const fcl::Ellipsoid<S>&>(shape).radii)));
-    case fcl::GEOM_CAPSULE: {
-      const auto& s = static_cast<const fcl::Capsule<S>&>(shape);
-      return f(query::CapsuleBody(s.radius, s.lz));
-    }
-    case fcl::GEOM_CONE: {
-      const auto& s = static_cast<const fcl::Cone<S>&>(shape);
-      return f(query::RoundBody(s.radius, 0, s.lz));
-    }
-    case fcl::GEOM_CYLINDER: {
-      const auto& s = static_cast<const fcl::Cylinder<S>&>(shape);
-      return f(query::RoundBody(s.radius, s.radius, s.lz));
-    }
-    case fcl::GEOM_CONVEX:
-      return f(ConvexShapeBody<S>(static_cast<const fcl::Convex<S>&>(shape)));
-    case fcl::GEOM_PLANE: {
-      const auto& s = static_cast<const fcl::Plane<S>&>(shape);
-      return f(query::PlaneBody(vector(s.n), s.d, region));
-    }
-    case fcl::GEOM_HALFSPACE: {
-      const auto& s = static_cast<const fcl::Halfspace<S>&>(shape);
-      return f(query::HalfspaceBody(vector(s.n), s.d, region));
-    }
-    default: {
-      const auto& s = static_cast<const fcl::TriangleP<S>&>(shape);
-      return f(query::TriangleBody({vector(s.a), vector(s.b), vector(s.c)}));
-    }
-  }
+  withShape(shape, [&](const auto& s) { f(bodyOf(s, region)); });
 }
 
 }  // namespace bocst::fcl_room

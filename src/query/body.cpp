@@ -35,7 +35,7 @@ class Simplex {
     return false;
   }
 
-  /// Leaves only the points that the nearest point needs. False when the origin is inside.
+  /// Leaves only the points that the nearest point needs. False when the origin is inside, which then is that point.
   bool reduce() {
     Face best;
     switch (n_) {
@@ -49,7 +49,10 @@ class Simplex {
         best = triangle(0, 1, 2);
         break;
       default:
-        if (tetrahedron(best)) return false;
+        if (tetrahedron(best)) {
+          weighOrigin();
+          return false;
+        }
     }
     Simplex kept;
     for (int i = 0; i < best.n; ++i) {
@@ -106,6 +109,17 @@ class Simplex {
     f.nearest = w_[a] + f.weight[1] * d;
     f.nearest -= d * (d.dot(f.nearest) / dd);
     return f;
+  }
+
+  // The weights of the origin inside a tetrahedron: its volumes with the faces.
+  void weighOrigin() {
+    const auto volume = [this](int a, int b, int c) { return w_[a].dot(w_[b].cross(w_[c])); };
+    weight_[0] = volume(1, 2, 3);
+    weight_[1] = -volume(0, 2, 3);
+    weight_[2] = volume(0, 1, 3);
+    weight_[3] = -volume(0, 1, 2);
+    const double total = weight_[0] + weight_[1] + weight_[2] + weight_[3];
+    for (double& weight : weight_) weight /= total;
   }
 
   static const Face& nearer(const Face& f, const Face& g) {
@@ -174,8 +188,6 @@ ConvexBody::ConvexBody(const Vector3d& center, const Vector3d& half_of_core, dou
   box_.half = half_of_core + Vector3d::Constant(radius);
 }
 
-double ConvexBody::height(const Vector3d& direction) const { return direction.dot(support(direction)) + radius_; }
-
 Gap ConvexBody::coreGap(const Points& points, double enough) const {
   constexpr int kMostSteps = 200, kPatience = 12;
   Gap gap;
@@ -203,6 +215,7 @@ Gap ConvexBody::coreGap(const Points& points, double enough) const {
     v = simplex.nearest();
     if (inside || v.norm() <= kRounding * size) {
       gap.atLeast = gap.distance = 0;
+      gap.on_body = gap.on_points = simplex.onPoints();
       return gap;
     }
     const double distance = (simplex.onBody() - simplex.onPoints()).norm();
@@ -237,6 +250,7 @@ Gap ConvexBody::gap(const Points& points, double enough) const {
   gap.atLeast -= radius_;
   if (gap.touches()) {
     gap.distance = 0;
+    gap.on_body = gap.on_points;
   } else if (std::isfinite(core)) {
     gap.distance = std::max(core - radius_, 0.0);
     if (core > 0) gap.on_body += (gap.on_points - gap.on_body) * std::min(radius_ / core, 1.0);
@@ -246,15 +260,13 @@ Gap ConvexBody::gap(const Points& points, double enough) const {
 
 Touch ConvexBody::part(const Points& points) const {
   Touch touch;
-  if (radius_ > 0) {
-    const Gap core = coreGap(points, std::numeric_limits<double>::infinity());
-    if (core.atLeast > 0) {
-      // Straight on from the core, for nothing of the points is nearer along this line.
-      touch.normal = (core.on_points - core.on_body).normalized();
-      touch.depth = std::max(radius_ - core.distance, 0.0);
-      touch.point = core.on_points + touch.normal * (touch.depth / 2);
-      return touch;
-    }
+  const Gap core = coreGap(points, std::numeric_limits<double>::infinity());
+  if (radius_ > 0 && !core.touches()) {
+    // Straight on from the core, for nothing of the points is nearer along this line.
+    touch.normal = (core.on_points - core.on_body).normalized();
+    touch.depth = std::max(radius_ - core.distance, 0.0);
+    touch.point = core.on_points + touch.normal * (touch.depth / 2);
+    return touch;
   }
   // The best of many directions, and of curved bodies downhill from there.
   constexpr std::size_t kStarts = 4;
@@ -297,6 +309,7 @@ Touch ConvexBody::part(const Points& points) const {
     if (way.depth < touch.depth) touch = way;
   }
   touch.depth = std::max(touch.depth, 0.0);
+  touch.point = core.on_points;
   return touch;
 }
 
@@ -319,10 +332,8 @@ Touch ConvexBody::descend(const Vector3d& normal, const Points& points) const {
 
 Touch ConvexBody::along(const Vector3d& normal, const Points& points) const {
   Touch touch;
-  const Vector3d p = support(normal), &q = points.support(-normal);
   touch.normal = normal;
-  touch.depth = normal.dot(p - q) + radius_;
-  touch.point = q + normal * (touch.depth / 2);
+  touch.depth = normal.dot(support(normal) - points.support(-normal)) + radius_;
   return touch;
 }
 
@@ -377,10 +388,6 @@ void asTriangle(const Points& points, Corners& corners) {
 
 }  // namespace
 
-double TriangleBody::height(const Vector3d& direction) const {
-  return std::max({direction.dot(corners_[0]), direction.dot(corners_[1]), direction.dot(corners_[2])});
-}
-
 Gap TriangleBody::gap(const Points& points, double) const {
   Gap gap;
   Corners other;
@@ -412,8 +419,6 @@ OrientedVolume layer(const Vector3d& n, double lo, double hi, const Sphere& regi
   return box;
 }
 
-bool same(const Vector3d& a, const Vector3d& b) { return (a - b).squaredNorm() < 1e-24; }
-
 // The lowest point along n.
 const Vector3d& lowest(const Points& points, const Vector3d& n) { return points.support(-n); }
 
@@ -425,17 +430,13 @@ HalfspaceBody::HalfspaceBody(const Vector3d& normal, double height, const Sphere
   box_ = layer(normal, floor, height, region);
 }
 
-double HalfspaceBody::height(const Vector3d& direction) const {
-  return same(direction, normal_) ? height_ : std::numeric_limits<double>::infinity();
-}
-
 Gap HalfspaceBody::gap(const Points& points, double) const {
   Gap gap;
   gap.on_points = lowest(points, normal_);
   const double above = normal_.dot(gap.on_points) - height_;
   gap.atLeast = above - kRounding * (gap.on_points.lpNorm<1>() + std::abs(height_));
   gap.distance = gap.touches() ? 0 : above;
-  gap.on_body = gap.on_points - normal_ * above;
+  gap.on_body = gap.touches() ? gap.on_points : Vector3d(gap.on_points - normal_ * above);
   return gap;
 }
 
@@ -452,11 +453,6 @@ PlaneBody::PlaneBody(const Vector3d& normal, double height, const Sphere& region
   box_ = layer(normal, height, height, region);
 }
 
-double PlaneBody::height(const Vector3d& direction) const {
-  if (same(direction, normal_)) return height_;
-  return same(direction, -normal_) ? -height_ : std::numeric_limits<double>::infinity();
-}
-
 Gap PlaneBody::gap(const Points& points, double) const {
   Gap gap;
   const Vector3d &low = lowest(points, normal_), &high = points.support(normal_);
@@ -465,7 +461,11 @@ Gap PlaneBody::gap(const Points& points, double) const {
   const double apart = std::max(above, below);
   gap.atLeast = apart - kRounding * (gap.on_points.lpNorm<1>() + std::abs(height_));
   gap.distance = gap.touches() ? 0 : apart;
-  gap.on_body = gap.on_points - normal_ * (normal_.dot(gap.on_points) - height_);
+  if (gap.touches() && above + below < 0) {
+    gap.on_body = gap.on_points = low + (high - low) * (above / (above + below));
+  } else {
+    gap.on_body = gap.on_points - normal_ * (normal_.dot(gap.on_points) - height_);
+  }
   return gap;
 }
 

@@ -40,7 +40,8 @@ struct Gap {
   /// The distance is surely no less, up to 4e-15 of the coordinates, which is taken off: where it is not positive, the
   /// two may touch.
   double atLeast = 0;
-  /// Of the nearest points; 0 where the two touch. Not looked for when `atLeast` was found to be enough.
+  /// Of the nearest points; 0 where the two touch, at a point of both. Not looked for when `atLeast` was found to be
+  /// enough.
   double distance = std::numeric_limits<double>::infinity();
   Eigen::Vector3d on_body = Eigen::Vector3d::Zero(), on_points = Eigen::Vector3d::Zero();
 
@@ -54,15 +55,12 @@ class Body {
   /// A box about the body; of an unbounded one, about as much of it as its maker was told to care for.
   const OrientedVolume& box() const { return box_; }
 
-  /// The farthest that the body reaches along a unit direction; may be infinite.
-  virtual double height(const Eigen::Vector3d& direction) const = 0;
-
   /// The distance of the points. More than `enough` is not looked at closely.
   virtual Gap gap(const Points& points, double enough) const = 0;
 
   /// How points that touch the body get away from it, in a straight line: normal from the body to the points, depth >=
-  /// 0 so that moving the points by depth * normal leaves them touching at most, and a point midway in the overlap. Of
-  /// boxes, balls, planes, half-spaces and triangles the shortest way; of other bodies one that is seldom longer.
+  /// 0 so that moving the points by depth * normal leaves them touching at most, and a point in or beside the overlap.
+  /// Of boxes, balls, planes, half-spaces and triangles the shortest way; of other bodies one that is seldom longer.
   virtual Touch part(const Points& points) const = 0;
 
  protected:
@@ -72,7 +70,6 @@ class Body {
 /// A convex core, blown up by a radius.
 class ConvexBody : public Body {
  public:
-  double height(const Eigen::Vector3d& direction) const override;
   Gap gap(const Points& points, double enough) const override;
   Touch part(const Points& points) const override;
 
@@ -143,7 +140,6 @@ class TriangleBody final : public Body {
  public:
   explicit TriangleBody(const Corners& corners);
 
-  double height(const Eigen::Vector3d& direction) const override;
   Gap gap(const Points& points, double enough) const override;
   Touch part(const Points& points) const override;
 
@@ -156,7 +152,6 @@ class HalfspaceBody final : public Body {
  public:
   HalfspaceBody(const Eigen::Vector3d& normal, double height, const Sphere& region);
 
-  double height(const Eigen::Vector3d& direction) const override;
   Gap gap(const Points& points, double enough) const override;
   Touch part(const Points& points) const override;
 
@@ -170,7 +165,6 @@ class PlaneBody final : public Body {
  public:
   PlaneBody(const Eigen::Vector3d& normal, double height, const Sphere& region);
 
-  double height(const Eigen::Vector3d& direction) const override;
   Gap gap(const Points& points, double enough) const override;
   Touch part(const Points& points) const override;
 

@@ -14,6 +14,7 @@ class BodySide {
  public:
   using Node = int;
   static constexpr bool kBodies = true;
+  static constexpr bool kNodesHoldSurface = true;
 
   explicit BodySide(const Body& body) : body_(body) {}
 
@@ -23,11 +24,13 @@ class BodySide {
   bool growsFreely(Node) const { return true; }
   void grow(Node, std::vector<tree::Tree::Growth>&) const {}
 
+  /// FCL's name for what has no parts.
+  std::uint64_t name(Node) const { return ~std::uint64_t{0}; }
+
   double size(Node) const { return body_.box().half.squaredNorm(); }
   OrientedVolume volume(Node) const { return body_.box(); }
   Sphere sphere(Node) const { return {body_.box().center, body_.box().half.norm()}; }
 
-  double height(Node, const Eigen::Vector3d& direction) const { return body_.height(direction); }
   Gap gap(Node, const Points& points, double enough) const { return body_.gap(points, enough); }
   Touch part(Node, const Points& points) const { return body_.part(points); }
 

@@ -8,6 +8,7 @@
 #include <limits>
 #include <vector>
 
+#include "query/body.h"
 #include "query/reach.h"
 #include "query/side.h"
 #include "query/triangle.h"
@@ -34,7 +35,8 @@ struct DistanceGoal {
 template <typename A, typename B>
 class DistanceWalk {
  public:
-  DistanceWalk(const A& a, const B& b, const Placement& b_in_a) : a_(a), b_(b), b_in_a_(b_in_a) {}
+  DistanceWalk(const A& a, const B& b, const Placement& b_in_a)
+      : a_(a), b_(b), b_in_a_(b_in_a), a_in_b_(b_in_a.inverse()) {}
 
   Nearest run(const DistanceGoal& goal) {
     goal_ = goal;
@@ -103,28 +105,34 @@ class DistanceWalk {
   NodeReach reachOfB(typename B::Node n) const { return NodeReach(b_.volume(n), b_in_a_); }
 
   double boundOf(const NodeReach& a, const NodeReach& b) {
-    // Each node holds a piece of surface, so something is no farther than this.
-    limit_ = std::min(limit_, farthest(a, b));
+    // Where each node holds a piece of surface, something is no farther than this.
+    if (B::kNodesHoldSurface) limit_ = std::min(limit_, farthest(a, b));
     return distanceBound(a, b, way_, enough());
   }
 
   Sphere ballOfB(typename B::Node n) const { return placed(b_.sphere(n), b_in_a_); }
 
-  static double boundOf(const Sphere& a, const Sphere& b) {
-    return (a.center - b.center).norm() * (1 - 1e-12) - (a.radius + b.radius) * (1 + 1e-12);
+  // A ball against a ball, or against the bodies themselves.
+  double boundOf(const Sphere& a, typename B::Node b) const {
+    if constexpr (B::kBodies) {
+      const Sphere ball = placed(a, a_in_b_);
+      const double reach = ball.radius * (1 + 1e-12);
+      return (b_.gap(b, {&ball.center, 1}, enough() * a_in_b_.scale + reach).atLeast - reach) * b_in_a_.scale;
+    } else {
+      const Sphere ball = ballOfB(b);
+      return (a.center - ball.center).norm() * (1 - 1e-12) - (a.radius + ball.radius) * (1 + 1e-12);
+    }
   }
 
   void start(Scratch& s) {
     const Pair root{0, a_.root(), b_.root()};
-    const double bound =
-        spheres() ? boundOf(a_.sphere(root.a), ballOfB(root.b)) : boundOf(reachOfA(root.a), reachOfB(root.b));
+    const double bound = spheres() ? boundOf(a_.sphere(root.a), root.b) : boundOf(reachOfA(root.a), reachOfB(root.b));
     push({bound, root.a, root.b}, s);
   }
 
   void expandA(const Pair& pair, Scratch& s) {
     if (spheres()) {
-      const Sphere b = ballOfB(pair.b);
-      a_.children(pair.a, [&](typename A::Node c) { push({boundOf(a_.sphere(c), b), c, pair.b}, s); });
+      a_.children(pair.a, [&](typename A::Node c) { push({boundOf(a_.sphere(c), pair.b), c, pair.b}, s); });
     } else {
       const NodeReach b = reachOfB(pair.b);
       a_.children(pair.a, [&](typename A::Node c) { push({boundOf(reachOfA(c), b), c, pair.b}, s); });
@@ -134,7 +142,7 @@ class DistanceWalk {
   void expandB(const Pair& pair, Scratch& s) {
     if (spheres()) {
       const Sphere a = a_.sphere(pair.a);
-      b_.children(pair.b, [&](typename B::Node c) { push({boundOf(a, ballOfB(c)), pair.a, c}, s); });
+      b_.children(pair.b, [&](typename B::Node c) { push({boundOf(a, c), pair.a, c}, s); });
     } else {
       const NodeReach a = reachOfA(pair.a);
       b_.children(pair.b, [&](typename B::Node c) { push({boundOf(a, reachOfB(c)), pair.a, c}, s); });
@@ -181,6 +189,45 @@ class DistanceWalk {
   }
 
   void leaves(const Pair& pair, Scratch& s) {
+    if constexpr (B::kBodies) {
+      leafBody(pair);
+    } else {
+      leafPair(pair, s);
+    }
+  }
+
+  void leafBody(const Pair& pair) {
+    if (a_.cells()) {
+      const Sphere in_a = a_.cellSphere(pair.a), ball = placed(in_a, a_in_b_);
+      const Gap gap = b_.gap(pair.b, {&ball.center, 1}, enough() * a_in_b_.scale + ball.radius);
+      if (std::isfinite(gap.distance)) bodyFound(a_.cellId(pair.a), pair.b, gap, ball.center, ball.radius);
+      return;
+    }
+    for (std::size_t i = 0; i < a_.triangleCount(pair.a); ++i) {
+      const std::uint32_t t = a_.triangle(pair.a, i);
+      const Corners corners = {a_in_b_ * a_.corner(t, 0), a_in_b_ * a_.corner(t, 1), a_in_b_ * a_.corner(t, 2)};
+      const Points points{corners, 3};
+      const Gap gap = b_.gap(pair.b, points, enough() * a_in_b_.scale);
+      if (std::isfinite(gap.distance)) bodyFound(t, pair.b, gap, gap.on_points, 0);
+    }
+  }
+
+  // What is within `radius` of `point`, in the frame of B, is the gap away from a body.
+  void bodyFound(std::uint64_t a, typename B::Node b, const Gap& gap, const Eigen::Vector3d& point, double radius) {
+    Nearest n;
+    n.a = a;
+    n.b = b_.name(b);
+    const double distance = std::max(gap.distance - radius, 0.0);
+    const Eigen::Vector3d on_body = gap.touches() ? point : gap.on_body;
+    n.distance = distance * b_in_a_.scale;
+    n.on_b = b_in_a_ * on_body;
+    // Straight on towards the body, by the radius at most.
+    const double part = gap.distance > 0 ? std::min(radius / gap.distance, 1.0) : 0;
+    n.on_a = b_in_a_ * Eigen::Vector3d(point + part * (on_body - point));
+    found(n);
+  }
+
+  void leafPair(const Pair& pair, Scratch& s) {
     if (spheres()) {
       leafSpheres(pair);
       return;
@@ -270,6 +317,7 @@ class DistanceWalk {
   const A& a_;
   const B& b_;
   const Placement& b_in_a_;
+  const Placement a_in_b_;
   DistanceGoal goal_;
   Nearest best_;
   double limit_ = 0;                               // something at least this near exists, or nobody asks for more

@@ -24,6 +24,7 @@ class TreeSide {
  public:
   using Node = tree::NodeRef;
   static constexpr bool kBodies = false;
+  static constexpr bool kNodesHoldSurface = true;
 
   explicit TreeSide(tree::Tree& tree) : tree_(tree), now_(tree.now()) {}
 

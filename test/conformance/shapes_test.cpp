@@ -70,6 +70,15 @@ class Truth {
   const fcl::ShapeBase<S>& shape_;
 };
 
+/// The point of a triangle of a mesh that is nearest to p.
+template <typename S>
+Vector3d onTriangle(const Raw& raw, std::size_t t, const fcl::Transform3<S>& X, const Vector3d& p) {
+  const fcl::Transform3<double> Xd = X.template cast<double>();
+  const auto& i = raw.triangles[t];
+  const query::Corners c = {Xd * raw.vertices[i[0]], Xd * raw.vertices[i[1]], Xd * raw.vertices[i[2]]};
+  return query::closestPoint(p, c);
+}
+
 /// Poses around contact and anywhere.
 template <typename S, typename F>
 void forPoses(int count, unsigned seed, const Truth<S>& truth, F&& f) {
@@ -181,6 +190,8 @@ TYPED_TEST(Shapes, ContactsPartWhatTouches) {
           // Moved back from the shape by the depth, and a little for what the solver's tolerance is, it is off.
           ASSERT_GT(truth.gap(t, X, Y, -n * (depth * 1.001 + off)).distance, 0)
               << i << " solver " << solver << " depth " << depth;
+          const Vector3d pos = c.pos.template cast<double>();
+          ASSERT_LE((onTriangle(raw, t, X, pos) - pos).norm(), depth + off) << "it is where they overlap";
           ++contacts;
         }
       }
@@ -253,6 +264,8 @@ TEST(ShapesDouble, CostsEqualFcls) {
     shape->computeLocalAABB();
     shape->cost_density = 2;
     const Modeld model(raw.mesh());
+    const Truth<double> truth(raw, *shape);
+    int costs = 0;
     std::mt19937_64 g(3);
     for (int i = 0; i < 6; ++i) {
       const auto X = test::pose<double>(test::randomRotation(g), {0, 0, 0});
@@ -263,14 +276,16 @@ TEST(ShapesDouble, CostsEqualFcls) {
                              const auto& XB) {
           fcl::CollisionResultd result;
           fcl::collide(a, XA, b, XB, request, result);
-          EXPECT_EQ(result.numContacts(), 3u);
+          EXPECT_EQ(result.numContacts(), truth.distance(X, Y) == 0 ? 3u : 0u);
           std::vector<fcl::CostSourced> sources;
           result.getCostSources(sources);
           return sources;
         };
         const auto ours = ask(&model, X, shape.get(), Y), turned = ask(shape.get(), Y, &model, X);
-        ASSERT_GT(ours.size(), 0u);
         ASSERT_EQ(turned.size(), ours.size());
+        if (truth.distance(X, Y) > 0) continue;
+        ASSERT_GT(ours.size(), 0u);
+        ++costs;
         if (approximate) {
           // One, of the whole mesh; FCL's box about the mesh is another than ours.
           ASSERT_EQ(ours.size(), 1u);
@@ -295,6 +310,7 @@ TEST(ShapesDouble, CostsEqualFcls) {
         ASSERT_LE(sources.size(), 2u);
       }
     }
+    EXPECT_GT(costs, 5);
   }
 }
 
@@ -346,6 +362,129 @@ TYPED_TEST(Shapes, ConservativeAnswersMissNothing) {
       EXPECT_GE(hits[1], hits[2]);
       EXPECT_GE(hits[2], expected);
     }
+  }
+}
+
+template <typename S>
+fcl::DistanceResult<S> askDistance(const fcl::CollisionGeometry<S>& a, const fcl::Transform3<S>& X,
+                                   const fcl::CollisionGeometry<S>& b, const fcl::Transform3<S>& Y,
+                                   fcl::GJKSolverType solver = fcl::GST_LIBCCD, bool is_signed = false) {
+  fcl::DistanceRequest<S> request(true, is_signed);
+  request.gjk_solver_type = solver;
+  fcl::DistanceResult<S> result;
+  const S returned = fcl::distance(&a, X, &b, Y, request, result);
+  EXPECT_EQ(returned, result.min_distance);
+  return result;
+}
+
+TYPED_TEST(Shapes, DistancesEqualThoseOfAllTriangles) {
+  using S = TypeParam;
+  const Raw raw = test::torus(14);
+  const auto theirs = test::bvh<fcl::OBBRSS<S>>(raw);
+  const double off = std::is_same<S, double>::value ? 2e-9 : 2e-5;
+  for (const auto& [name, shape] : test::shapes<S>()) {
+    SCOPED_TRACE(name);
+    shape->computeLocalAABB();
+    const Model<S> model(raw.mesh());
+    const Truth<S> truth(raw, *shape);
+    int apart = 0;
+    const int count = 50;
+    forPoses<S>(count, 8, truth, [&](int i, const auto& X, const auto& Y) {
+      const double expected = truth.distance(X, Y);
+      for (const bool turn : {false, true}) {
+        const auto solver = kSolvers[i % 2];
+        const auto d = turn ? askDistance<S>(*shape, Y, model, X, solver) : askDistance<S>(model, X, *shape, Y, solver);
+        ASSERT_NEAR(d.min_distance, expected, off) << i;
+        ASSERT_EQ(d.o1, turn ? static_cast<const fcl::CollisionGeometry<S>*>(shape.get()) : &model);
+        ASSERT_EQ(d.o2, turn ? &model : static_cast<const fcl::CollisionGeometry<S>*>(shape.get()));
+        ASSERT_EQ(turn ? d.b1 : d.b2, +fcl::DistanceResult<S>::NONE);
+        const auto t = static_cast<std::size_t>(turn ? d.b2 : d.b1);
+        const Vector3d p = d.nearest_points[turn ? 1 : 0].template cast<double>();
+        const Vector3d q = d.nearest_points[turn ? 0 : 1].template cast<double>();
+        ASSERT_NEAR((p - q).norm(), expected, off) << i;
+        ASSERT_LT((onTriangle(raw, t, X, p) - p).norm(), 10 * off) << "on the triangle";
+        Raw point;
+        point.vertices.assign(3, q);
+        point.triangles.emplace_back(0, 1, 2);
+        const auto I = test::pose<S>(Eigen::Matrix3d::Identity(), {0, 0, 0});
+        ASSERT_LT(Truth<S>(point, *shape).distance(I, Y), 10 * off) << "on the shape";
+        if (expected <= 0.01) continue;
+        // Moved towards each other by nearly as much, they are nearly there.
+        auto Z = Y;
+        Z.translation() += ((p - q) * (1 - 1e-3)).template cast<S>();
+        ASSERT_NEAR(askDistance<S>(model, X, *shape, Z).min_distance, 1e-3 * expected, 10 * off + 1e-5 * expected);
+        ASSERT_FALSE(test::touching<S>(model, X, *shape, Z));
+      }
+      // FCL knows no distance of planes, half-spaces and triangles.
+      if (expected > 0.01 && name != "plane" && name != "half-space" && name != "triangle") {
+        ASSERT_NEAR(askDistance<S>(*theirs, X, *shape, Y).min_distance, expected, 1e-3);
+      }
+      apart += expected > 0;
+      // With signs, touching is at minus the depth of a contact.
+      const auto d = askDistance<S>(model, X, *shape, Y, fcl::GST_LIBCCD, true);
+      if (expected > 0) {
+        ASSERT_NEAR(d.min_distance, expected, off);
+      } else {
+        ASSERT_LE(d.min_distance, 0);
+        fcl::CollisionRequest<S> request(1, true);
+        fcl::CollisionResult<S> result;
+        fcl::collide(&model, X, shape.get(), Y, request, result);
+        ASSERT_EQ(d.min_distance, -result.getContact(0).penetration_depth);
+      }
+    });
+    EXPECT_GT(apart, count / 8);
+    EXPECT_LT(apart, count);
+  }
+}
+
+TYPED_TEST(Shapes, MinimaRunAndErrorsAreTaken) {
+  using S = TypeParam;
+  const Raw raw = test::torus(30);
+  const fcl::Cylinder<S> cylinder(S(0.4), S(1));
+  const auto I = test::pose<S>(Eigen::Matrix3d::Identity(), {0, 0, 0});
+  const auto Y = test::pose<S>(Eigen::Matrix3d::Identity(), {3, 0.3, 0.5});
+  const Model<S> model(raw.mesh());
+  const S exact = askDistance<S>(model, I, cylinder, Y).min_distance;
+  ASSERT_GT(exact, 1);
+  fcl::DistanceRequest<S> request;
+  fcl::DistanceResult<S> result;
+  result.min_distance = exact / 2;
+  EXPECT_EQ(fcl::distance(&model, I, &cylinder, Y, request, result), exact / 2) << "something nearer is known";
+  EXPECT_EQ(result.o1, nullptr);
+  result.min_distance = exact * 2;
+  EXPECT_NEAR(fcl::distance(&cylinder, Y, &model, I, request, result), exact, 1e-5);
+  EXPECT_EQ(result.o2, &model);
+  for (const S error : {S(1e-3), S(0.1), S(0.5)}) {
+    const Model<S> fresh(raw.mesh());
+    fcl::DistanceRequest<S> loose(true, false, error, 0), looser(true, false, 0, error);
+    fcl::DistanceResult<S> relative, absolute;
+    EXPECT_LE(fcl::distance(&fresh, I, &cylinder, Y, loose, relative), exact * (1 + error) * S(1.0001));
+    EXPECT_LE(fcl::distance(&fresh, I, &cylinder, Y, looser, absolute), (exact + error) * S(1.0001));
+    EXPECT_GE(relative.min_distance, exact * S(0.9999));
+    EXPECT_GE(absolute.min_distance, exact * S(0.9999));
+  }
+}
+
+TYPED_TEST(Shapes, ConservativeDistancesAreNeverMore) {
+  using S = TypeParam;
+  const Raw raw = test::torus(14);
+  Options options;
+  options.answer = Answer::kConservative;
+  options.depth = 6;
+  for (const auto& [name, shape] : test::shapes<S>()) {
+    SCOPED_TRACE(name);
+    const Model<S> model(raw.mesh(), options);
+    const Truth<S> truth(raw, *shape);
+    forPoses<S>(20, 9, truth, [&](int i, const auto& X, const auto& Y) {
+      const double expected = truth.distance(X, Y);
+      const double d = static_cast<double>(askDistance<S>(model, X, *shape, Y).min_distance);
+      ASSERT_LE(d, expected + 1e-5) << i;
+      ASSERT_GE(d, expected - 0.13) << i;
+      ASSERT_NEAR(d, askDistance<S>(*shape, Y, model, X).min_distance, 1e-5);
+      if (d > 1e-4) {
+        ASSERT_FALSE(test::touching<S>(model, X, *shape, Y));
+      }
+    });
   }
 }
 

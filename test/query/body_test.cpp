@@ -96,11 +96,27 @@ double lowest(const Vector3d& n, const Points& p) {
 
 constexpr double kFar = std::numeric_limits<double>::infinity();
 
+/// A body that is a point.
+class PointBody final : public ConvexBody {
+ public:
+  explicit PointBody(const Vector3d& at) : ConvexBody(at, Vector3d::Zero(), 0), at_(at) {}
+
+ protected:
+  Vector3d support(const Vector3d&) const override { return at_; }
+
+ private:
+  const Vector3d at_;
+};
+
 void checkGap(const Known& k, const Points& p, double tolerance) {
   const Gap gap = k.body->gap(p, kFar);
   ASSERT_LE(gap.atLeast, gap.distance);
   if (gap.touches()) {
     ASSERT_EQ(gap.distance, 0);
+    // At a point of both.
+    ASSERT_EQ(gap.on_body, gap.on_points);
+    ASSERT_LE(k.level(gap.on_body), tolerance);
+    ASSERT_LE(PointBody(gap.on_points).gap(p, kFar).distance, tolerance);
     return;
   }
   ASSERT_LE(gap.distance - gap.atLeast, tolerance);
