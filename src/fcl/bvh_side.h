@@ -67,6 +67,8 @@ class BvhSide {
  public:
   using S = typename BV::S;
   using Node = int;
+  static constexpr bool kBodies = false;
+  static constexpr bool kNodesHoldSurface = true;
 
   /// @throws std::invalid_argument when the model is no finished triangle mesh.
   explicit BvhSide(const fcl::BVHModel<BV>& bvh) : bvh_(bvh) {

@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #include "fcl/collide_pair.h"
 
+#include <fcl/config.h>
 #include <fcl/geometry/bvh/BVH_model.h>
 #include <fcl/math/geometry.h>
 #include <fcl/narrowphase/detail/traversal/collision/collision_traversal_node_base.h>
@@ -14,8 +15,11 @@
 #include <stdexcept>
 #include <string>
 
+#include "fcl/collide_octree.h"
+#include "fcl/collide_shape.h"
 #include "fcl/inside.h"
 #include "fcl/pair.h"
+#include "fcl/question.h"
 #include "query/distance_walk.h"
 #include "query/pair_set.h"
 #include "query/pair_walk.h"
@@ -54,22 +58,6 @@ class BvhTriangles {
   const fcl::BVHModel<BV>& bvh_;
 };
 
-/// The caller's question, in the caller's order.
-template <typename S>
-struct Question {
-  const fcl::CollisionGeometry<S>*o1, *o2;
-  const fcl::Transform3<S>&X_W1, &X_W2;
-  const fcl::CollisionRequest<S>& request;
-  fcl::CollisionResult<S>& result;
-  double margin;
-
-  /// No surfaces met, and a contact would be reported.
-  bool mayBeInside(std::size_t contacts_before) const {
-    return result.numContacts() == contacts_before && contacts_before < request.num_max_contacts && o1->isOccupied() &&
-           o2->isOccupied();
-  }
-};
-
 /// Turns the pairs of a walk into contacts and cost sources. Side A of the walk is the caller's first geometry, or,
 /// when `swapped`, the second.
 template <typename S, typename Triangles1, typename Triangles2>
@@ -78,7 +66,6 @@ class Collector : public query::Visitor {
   Collector(const Question<S>& q, const Triangles1& t1, const Triangles2& t2, bool swapped, double magnitude)
       : q_(q), t1_(t1), t2_(t2), swapped_(swapped), magnitude_(magnitude), margin_(q.margin), seen_(pairs()) {
     fcl::relativeTransform(q.X_W1.linear(), q.X_W1.translation(), q.X_W2.linear(), q.X_W2.translation(), R_12_, p_12_);
-    occupied_ = q.o1->isOccupied() && q.o2->isOccupied();
     // A boolean query ends at the first contact, so it meets no pair twice.
     once_ = q.request.num_max_contacts > 1 || q.request.enable_cost;
     if (once_) seen_.clear();
@@ -90,9 +77,7 @@ class Collector : public query::Visitor {
     unit_ = unit;
   }
 
-  bool endsAtFirst() const override {
-    return occupied_ && !q_.request.enable_cost && q_.result.numContacts() + 1 >= q_.request.num_max_contacts;
-  }
+  bool endsAtFirst() const override { return q_.endsAtFirst(); }
 
   bool triangles(std::uint32_t a, std::uint32_t b) override {
     if (swapped_) std::swap(a, b);
@@ -194,31 +179,13 @@ class Collector : public query::Visitor {
   }
 
   void addCost(const fcl::AABB<S>& a, const fcl::AABB<S>& b) {
-    fcl::AABB<S> overlap;
-    if (!a.overlap(b, overlap)) return;  // apart, within the margin
-    q_.result.addCostSource(fcl::CostSource<S>(overlap, q_.o1->cost_density * q_.o2->cost_density),
-                            q_.request.num_max_cost_sources);
+    const S density = q_.o1->cost_density * q_.o2->cost_density;
+    // Apart, within the margin, they share no room.
+    if (q_.margin == 0 || a.overlap(b)) q_.addCost(a, b, density);
   }
 
   bool add(std::uint64_t b1, std::uint64_t b2, const query::Touch* touch) {
-    if (occupied_ && q_.result.numContacts() < q_.request.num_max_contacts) {
-      fcl::Contact<S> c;
-      c.o1 = q_.o1;
-      c.o2 = q_.o2;
-      c.b1 = static_cast<std::intptr_t>(b1);
-      c.b2 = static_cast<std::intptr_t>(b2);
-      if (q_.request.enable_contact) {
-        c.normal = touch->normal.template cast<S>();
-        c.pos = touch->point.template cast<S>();
-        c.penetration_depth = static_cast<S>(touch->depth);
-      } else {
-        c.normal.setConstant(std::numeric_limits<S>::quiet_NaN());
-        c.pos = c.normal;
-        c.penetration_depth = std::numeric_limits<S>::quiet_NaN();
-      }
-      q_.result.addContact(c);
-    }
-    return q_.request.isSatisfied(q_.result);
+    return q_.addContact(static_cast<std::intptr_t>(b1), static_cast<std::intptr_t>(b2), touch);
   }
 
   const Question<S>& q_;
@@ -230,7 +197,7 @@ class Collector : public query::Visitor {
   query::PairSet& seen_;
   fcl::Matrix3<S> R_12_;
   fcl::Vector3<S> p_12_;
-  bool occupied_, once_;
+  bool once_;
   Eigen::Vector3d origin_ = Eigen::Vector3d::Zero();
   double unit_ = 1;
 };
@@ -350,16 +317,26 @@ struct Models {
 };
 
 template <typename S>
-std::size_t answer(const Question<S>& q, const Models<S>& models) {
+std::size_t answer(const Question<S>& q, const Models<S>& models, const BroughtSolver<S>& solver) {
   if (q.request.isSatisfied(q.result)) return q.result.numContacts();
-  const bool occupied = q.o1->isOccupied() && q.o2->isOccupied();
-  if (!occupied && (q.o1->isFree() || q.o2->isFree() || !q.request.enable_cost)) return q.result.numContacts();
+  if (!q.occupied() && (q.o1->isFree() || q.o2->isFree() || !q.request.enable_cost)) return q.result.numContacts();
   if (models.first != nullptr && models.second != nullptr) {
     collideModels(q, models.first->tree(), models.second->tree());
+    return q.result.numContacts();
+  }
+  const bool swapped = models.first == nullptr;
+  const fcl::CollisionGeometry<S>* partner = swapped ? q.o1 : q.o2;
+  tree::Tree& tree = (swapped ? models.second : models.first)->tree();
+  if (isShape(partner)) {
+    refuse(q.margin, tree, "shapes");
+    collideShape(q, tree, swapped, solver);
+#if FCL_HAVE_OCTOMAP
+  } else if (partner->getNodeType() == fcl::GEOM_OCTREE) {
+    refuse(q.margin, tree, "octrees");
+    collideOcTree(q, tree, swapped, solver);
+#endif
   } else {
-    const bool swapped = models.first == nullptr;
-    withBvh<S>("collide", swapped ? q.o1 : q.o2,
-               [&](const auto& bvh) { collideBvh(q, (swapped ? models.second : models.first)->tree(), bvh, swapped); });
+    withBvh<S>("collide", partner, [&](const auto& bvh) { collideBvh(q, tree, bvh, swapped); });
   }
   return q.result.numContacts();
 }
@@ -369,24 +346,26 @@ std::size_t answer(const Question<S>& q, const Models<S>& models) {
 template <typename S>
 std::size_t collidePair(const fcl::CollisionGeometry<S>* o1, const fcl::Transform3<S>& X_W1,
                         const fcl::CollisionGeometry<S>* o2, const fcl::Transform3<S>& X_W2,
-                        const fcl::CollisionRequest<S>& request, fcl::CollisionResult<S>& result) {
+                        const BroughtSolver<S>& solver, const fcl::CollisionRequest<S>& request,
+                        fcl::CollisionResult<S>& result) {
   const Models<S> models(o1, o2);
-  return answer(Question<S>{o1, o2, X_W1, X_W2, request, result, marginOf(models.first, models.second)}, models);
+  const double margin = marginOf(models.first, models.second);
+  return answer(Question<S>{o1, o2, X_W1, X_W2, request, result, margin}, models, solver);
 }
 
 template <typename S>
 std::size_t collidePair(const fcl::CollisionGeometry<S>* o1, const fcl::Transform3<S>& X_W1,
                         const fcl::CollisionGeometry<S>* o2, const fcl::Transform3<S>& X_W2,
                         const fcl::CollisionRequest<S>& request, fcl::CollisionResult<S>& result, double margin) {
-  return answer(Question<S>{o1, o2, X_W1, X_W2, request, result, margin}, Models<S>(o1, o2));
+  return answer(Question<S>{o1, o2, X_W1, X_W2, request, result, margin}, Models<S>(o1, o2), BroughtSolver<S>());
 }
 
-#define BOCST_INSTANTIATE(S)                                                                    \
-  template std::size_t collidePair(const fcl::CollisionGeometry<S>*, const fcl::Transform3<S>&, \
-                                   const fcl::CollisionGeometry<S>*, const fcl::Transform3<S>&, \
-                                   const fcl::CollisionRequest<S>&, fcl::CollisionResult<S>&);  \
-  template std::size_t collidePair(const fcl::CollisionGeometry<S>*, const fcl::Transform3<S>&, \
-                                   const fcl::CollisionGeometry<S>*, const fcl::Transform3<S>&, \
+#define BOCST_INSTANTIATE(S)                                                                                          \
+  template std::size_t collidePair(                                                                                   \
+      const fcl::CollisionGeometry<S>*, const fcl::Transform3<S>&, const fcl::CollisionGeometry<S>*,                  \
+      const fcl::Transform3<S>&, const BroughtSolver<S>&, const fcl::CollisionRequest<S>&, fcl::CollisionResult<S>&); \
+  template std::size_t collidePair(const fcl::CollisionGeometry<S>*, const fcl::Transform3<S>&,                       \
+                                   const fcl::CollisionGeometry<S>*, const fcl::Transform3<S>&,                       \
                                    const fcl::CollisionRequest<S>&, fcl::CollisionResult<S>&, double);
 BOCST_INSTANTIATE(float)
 BOCST_INSTANTIATE(double)

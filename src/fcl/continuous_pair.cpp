@@ -111,7 +111,7 @@ double firstContact(const Question<S>& q) {
     // Held, so that another mesh does not get the address of one of these.
     const auto mesh1 = meshOf(dynamic_cast<const Model<S>*>(q.o1)), mesh2 = meshOf(dynamic_cast<const Model<S>*>(q.o2));
     fcl::CollisionResult<S> begin;
-    if (collidePair<S>(q.o1, X_W1, q.o2, X_W2, fcl::CollisionRequest<S>(), begin) > 0) return 0;
+    if (collidePair<S>(q.o1, X_W1, q.o2, X_W2, {}, fcl::CollisionRequest<S>(), begin) > 0) return 0;
     if (!q.o1->isOccupied() || !q.o2->isOccupied()) return std::numeric_limits<double>::infinity();
     // What the begin was asked of must be what moves on.
     bool same = true;

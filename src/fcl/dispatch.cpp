@@ -130,23 +130,35 @@ bool isModel(const fcl::CollisionGeometry<S>* geometry) {
          dynamic_cast<const Model<S>*>(geometry) != nullptr;
 }
 
+namespace {
+
+template <typename S>
+std::size_t collideModel(const fcl::CollisionGeometry<S>* o1, const fcl::Transform3<S>& X_W1,
+                         const fcl::CollisionGeometry<S>* o2, const fcl::Transform3<S>& X_W2,
+                         const fcl_room::BroughtSolver<S>& solver, const fcl::CollisionRequest<S>& request,
+                         fcl::CollisionResult<S>& result) {
+  if (request.num_max_contacts == 0) {
+    std::cerr << "Warning: should stop early as num_max_contact is 0 !\n";
+    return 0;
+  }
+  return fcl_room::collidePair<S>(o1, X_W1, o2, X_W2, solver, request, result);
+}
+
+}  // namespace
+
 template <typename S>
 std::size_t collide(const fcl::CollisionGeometry<S>* o1, const fcl::Transform3<S>& X_W1,
                     const fcl::CollisionGeometry<S>* o2, const fcl::Transform3<S>& X_W2,
                     const fcl::CollisionRequest<S>& request, fcl::CollisionResult<S>& result) {
   if (!isModel<S>(o1) && !isModel<S>(o2)) return fcl::collide<S>(o1, X_W1, o2, X_W2, request, result);
-  if (request.num_max_contacts == 0) {
-    std::cerr << "Warning: should stop early as num_max_contact is 0 !\n";
-    return 0;
-  }
-  return fcl_room::collidePair<S>(o1, X_W1, o2, X_W2, request, result);
+  return collideModel<S>(o1, X_W1, o2, X_W2, {}, request, result);
 }
 
 template <typename S, typename Solver>
 std::size_t collide(const fcl::CollisionGeometry<S>* o1, const fcl::Transform3<S>& X_W1,
                     const fcl::CollisionGeometry<S>* o2, const fcl::Transform3<S>& X_W2, const Solver* solver,
                     const fcl::CollisionRequest<S>& request, fcl::CollisionResult<S>& result) {
-  if (isModel<S>(o1) || isModel<S>(o2)) return bocst::collide<S>(o1, X_W1, o2, X_W2, request, result);
+  if (isModel<S>(o1) || isModel<S>(o2)) return collideModel<S>(o1, X_W1, o2, X_W2, solver, request, result);
   return fcl::collide<S, Solver>(o1, X_W1, o2, X_W2, solver, request, result);
 }
 

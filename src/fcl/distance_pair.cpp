@@ -5,8 +5,10 @@
 #include <fcl/narrowphase/collision_request.h>
 #include <fcl/narrowphase/collision_result.h>
 
+#include "fcl/body_pair.h"
 #include "fcl/collide_pair.h"
 #include "fcl/inside.h"
+#include "fcl/octree_side.h"
 #include "fcl/pair.h"
 #include "query/distance_walk.h"
 
@@ -74,6 +76,53 @@ void notApart(const Question<S>& q) {
   q.result.o2 = q.o2;
 }
 
+/// The same between a tree and solid bodies: with_partner(frame, f) makes the side of the bodies and calls f with it.
+template <typename S, typename F>
+void searchBodies(const Question<S>& q, tree::Tree& tree, bool swapped, F&& with_partner) {
+  std::int64_t now;
+  {
+    const Look look(tree, nullptr);
+    const TreeSide a(tree);
+    now = a.now();
+    const oracle::Surface& surface = tree.surface();
+    const BodyFrame<S> frame(swapped ? q.X_W2 : q.X_W1, swapped ? q.X_W1 : q.X_W2, surface);
+    const Placement b_in_a = frame.toLattice(surface.lattice, 0);
+    with_partner(frame, [&](const auto& b) { search(q, a, b, b_in_a, swapped); });
+  }
+  tree.afterQuery(now);
+}
+
+/// Between a tree and whatever is no model, the first geometry when `swapped`.
+/// @throws std::invalid_argument for a partner that is not supported.
+template <typename S>
+void searchPartner(const Question<S>& q, tree::Tree& tree, bool swapped) {
+  const fcl::CollisionGeometry<S>* partner = swapped ? q.o1 : q.o2;
+  const fcl::Transform3<S>&X_WM = swapped ? q.X_W2 : q.X_W1, &X_WP = swapped ? q.X_W1 : q.X_W2;
+  if (isShape(partner)) {
+    refuse(0, tree, "shapes");
+    const auto& shape = static_cast<const fcl::ShapeBase<S>&>(*partner);
+    searchBodies(q, tree, swapped, [&](const BodyFrame<S>& frame, auto&& f) {
+      withBody(shape, frame.region(), [&](const query::Body& body) { f(query::BodySide(body)); });
+    });
+#if FCL_HAVE_OCTOMAP
+  } else if (partner->getNodeType() == fcl::GEOM_OCTREE) {
+    refuse(0, tree, "octrees");
+    searchBodies(q, tree, swapped, [&](const BodyFrame<S>&, auto&& f) {
+      const OcTreeSide<S> side(static_cast<const fcl::OcTree<S>&>(*partner), X_WP, 1, false);
+      if (!side.empty()) f(side);
+    });
+#endif
+  } else {
+    withBvh<S>("distance", partner, [&](const auto& bvh) {
+      betweenTreeAndBvh(X_WM, tree, X_WP, bvh,
+                        [&](const TreeSide& a, const auto& b, const Placement& b_in_a, double magnitude) {
+                          search(q, a, b, b_in_a, swapped);
+                          if (q.result.min_distance > 0 && holds(tree, X_WM, bvh, X_WP, magnitude)) notApart(q);
+                        });
+    });
+  }
+}
+
 /// Surfaces that touch have no negative distance of their own; FCL takes the depth of a contact, and so do we.
 template <typename S>
 void sign(const Question<S>& q) {
@@ -112,16 +161,7 @@ S distancePair(const fcl::CollisionGeometry<S>* o1, const fcl::Transform3<S>& X_
                  });
   } else {
     const bool swapped = model1 == nullptr;
-    withBvh<S>("distance", swapped ? o1 : o2, [&](const auto& bvh) {
-      betweenTreeAndBvh(swapped ? X_W2 : X_W1, (swapped ? model2 : model1)->tree(), swapped ? X_W1 : X_W2, bvh,
-                        [&](const TreeSide& a, const auto& b, const Placement& b_in_a, double magnitude) {
-                          search(q, a, b, b_in_a, swapped);
-                          if (result.min_distance > 0 &&
-                              holds(a.tree(), swapped ? X_W2 : X_W1, bvh, swapped ? X_W1 : X_W2, magnitude)) {
-                            notApart(q);
-                          }
-                        });
-    });
+    searchPartner(q, (swapped ? model2 : model1)->tree(), swapped);
   }
   if (request.enable_signed_distance && !(result.min_distance > 0)) sign(q);
   return result.min_distance;

@@ -3,6 +3,8 @@
 
 #include <algorithm>
 #include <limits>
+#include <stdexcept>
+#include <string>
 
 #include "fcl/pair.h"
 
@@ -62,6 +64,14 @@ bool holds(const tree::Tree& a, const fcl::Transform3<typename BV::S>& X_WA, con
     for (std::size_t k = 0; k < 3; ++k) triangles[t][k] = static_cast<std::uint32_t>(bvh.tri_indices[t][k]);
   }
   return holdsOne(*a.solid(), pointOfEachPiece(vertices, triangles), X_AB, tolerance);
+}
+
+/// @throws std::invalid_argument where what these options ask for cannot be answered, rather than a false "free".
+inline void refuse(double margin, const tree::Tree& tree, const char* partners) {
+  const bool solid = tree.options().solid;
+  if (margin == 0 && !solid) return;
+  throw std::invalid_argument(std::string("bocst: a model ") + (solid ? "that is solid" : "with a margin") +
+                              " has no answers about " + partners + " in this version");
 }
 
 }  // namespace bocst::fcl_room

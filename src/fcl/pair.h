@@ -149,9 +149,10 @@ void withBvh(const char* query, const fcl::CollisionGeometry<S>* partner, F&& f)
     case fcl::BV_KDOP24:
       return f(as(static_cast<fcl::KDOP<S, 24>*>(nullptr)));
     default:
-      throw std::invalid_argument(
-          std::string("bocst::") + query + ": bocst::Model<" + (std::is_same<S, float>::value ? "float" : "double") +
-          "> and " + typeName<S>(partner) + " are not supported in this version; partners are Model and BVHModel");
+      throw std::invalid_argument(std::string("bocst::") + query + ": bocst::Model<" +
+                                  (std::is_same<S, float>::value ? "float" : "double") + "> and " +
+                                  typeName<S>(partner) +
+                                  " are not supported; partners are Model, BVHModel, FCL's shapes and OcTree");
   }
 }
 

@@ -42,9 +42,9 @@ void warnAsFcl(const char* query, const fcl::CollisionGeometry<S>* o1, const fcl
 
 template <typename S, typename Solver>
 std::size_t collideEntry(const fcl::CollisionGeometry<S>* o1, const fcl::Transform3<S>& X_W1,
-                         const fcl::CollisionGeometry<S>* o2, const fcl::Transform3<S>& X_W2, const Solver*,
+                         const fcl::CollisionGeometry<S>* o2, const fcl::Transform3<S>& X_W2, const Solver* solver,
                          const fcl::CollisionRequest<S>& request, fcl::CollisionResult<S>& result) {
-  if (isModel<S>(o1) || isModel<S>(o2)) return collidePair<S>(o1, X_W1, o2, X_W2, request, result);
+  if (isModel<S>(o1) || isModel<S>(o2)) return collidePair<S>(o1, X_W1, o2, X_W2, solver, request, result);
   if (isSentinel<S>(o1)) return Sentinel<S>::kReached;
   warnAsFcl<S>("collision", o1, o2);
   return 0;

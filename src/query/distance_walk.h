@@ -9,6 +9,7 @@
 #include <vector>
 
 #include "query/best_first.h"
+#include "query/body.h"
 #include "query/reach.h"
 #include "query/side.h"
 #include "query/triangle.h"
@@ -33,7 +34,8 @@ struct DistanceGoal {
 template <typename A, typename B>
 class DistanceWalk : private BestFirst<DistanceWalk<A, B>, A, B> {
  public:
-  DistanceWalk(const A& a, const B& b, const Placement& b_in_a) : Base(a, b, scratch()), b_in_a_(b_in_a) {}
+  DistanceWalk(const A& a, const B& b, const Placement& b_in_a)
+      : Base(a, b, scratch()), b_in_a_(b_in_a), a_in_b_(b_in_a.inverse()) {}
 
   Nearest run(const DistanceGoal& goal) {
     goal_ = goal;
@@ -71,16 +73,28 @@ class DistanceWalk : private BestFirst<DistanceWalk<A, B>, A, B> {
   NodeReach reachOfB(typename B::Node n) const { return NodeReach(b_.volume(n), b_in_a_); }
 
   double boundOf(const NodeReach& a, const NodeReach& b) {
-    // Each node holds a piece of surface, so something is no farther than this.
-    limit_ = std::min(limit_, farthest(a, b));
+    // Where each node holds a piece of surface, something is no farther than this.
+    if (B::kNodesHoldSurface) limit_ = std::min(limit_, farthest(a, b));
     return distanceBound(a, b, way_, enough());
   }
 
   Sphere ballOfA(typename A::Node n) const { return a_.sphere(n); }
-  Sphere ballOfB(typename B::Node n) const { return placed(b_.sphere(n), b_in_a_); }
+  // Of bodies the ball would be a poor bound: they are asked themselves.
+  auto ballOfB(typename B::Node n) const {
+    if constexpr (B::kBodies) {
+      return n;
+    } else {
+      return placed(b_.sphere(n), b_in_a_);
+    }
+  }
 
   static double boundOf(const Sphere& a, const Sphere& b) {
     return (a.center - b.center).norm() * (1 - 1e-12) - (a.radius + b.radius) * (1 + 1e-12);
+  }
+  double boundOf(const Sphere& a, typename B::Node body) const {
+    const Sphere ball = placed(a, a_in_b_);
+    const double reach = ball.radius * (1 + 1e-12);
+    return (b_.gap(body, {&ball.center, 1}, enough() * a_in_b_.scale + reach).atLeast - reach) * b_in_a_.scale;
   }
 
   void found(const Nearest& n) {
@@ -91,6 +105,45 @@ class DistanceWalk : private BestFirst<DistanceWalk<A, B>, A, B> {
   }
 
   void leaves(const Pair& pair) {
+    if constexpr (B::kBodies) {
+      leafBody(pair);
+    } else {
+      leafPair(pair);
+    }
+  }
+
+  void leafBody(const Pair& pair) {
+    if (a_.cells()) {
+      const Sphere in_a = a_.cellSphere(pair.a), ball = placed(in_a, a_in_b_);
+      const Gap gap = b_.gap(pair.b, {&ball.center, 1}, enough() * a_in_b_.scale + ball.radius);
+      if (std::isfinite(gap.distance)) bodyFound(a_.cellId(pair.a), pair.b, gap, ball.center, ball.radius);
+      return;
+    }
+    for (std::size_t i = 0; i < a_.triangleCount(pair.a); ++i) {
+      const std::uint32_t t = a_.triangle(pair.a, i);
+      const Corners corners = {a_in_b_ * a_.corner(t, 0), a_in_b_ * a_.corner(t, 1), a_in_b_ * a_.corner(t, 2)};
+      const Points points{corners, 3};
+      const Gap gap = b_.gap(pair.b, points, enough() * a_in_b_.scale);
+      if (std::isfinite(gap.distance)) bodyFound(t, pair.b, gap, gap.on_points, 0);
+    }
+  }
+
+  // What is within `radius` of `point`, in the frame of B, is the gap away from a body.
+  void bodyFound(std::uint64_t a, typename B::Node b, const Gap& gap, const Eigen::Vector3d& point, double radius) {
+    Nearest n;
+    n.a = a;
+    n.b = b_.name(b);
+    const double distance = std::max(gap.distance - radius, 0.0);
+    const Eigen::Vector3d on_body = gap.touches() ? point : gap.on_body;
+    n.distance = distance * b_in_a_.scale;
+    n.on_b = b_in_a_ * on_body;
+    // Straight on towards the body, by the radius at most.
+    const double part = gap.distance > 0 ? std::min(radius / gap.distance, 1.0) : 0;
+    n.on_a = b_in_a_ * Eigen::Vector3d(point + part * (on_body - point));
+    found(n);
+  }
+
+  void leafPair(const Pair& pair) {
     if (spheres()) {
       leafSpheres(pair);
       return;
@@ -179,6 +232,7 @@ class DistanceWalk : private BestFirst<DistanceWalk<A, B>, A, B> {
   }
 
   const Placement& b_in_a_;
+  const Placement a_in_b_;
   DistanceGoal goal_;
   Nearest best_;
   double limit_ = 0;                               // something at least this near exists, or nobody asks for more

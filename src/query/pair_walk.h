@@ -18,11 +18,14 @@ namespace bocst::query {
 ///
 /// Triangles against triangles are culled by boxes and slabs; as soon as a side answers with cells, both are culled by
 /// spheres, in double and on integer cells, so a conservative verdict does not depend on what is resident.
-template <typename A, typename B>
+///
+/// Where leaves of side B are solid bodies (B::kBodies), the visitor V is a BodyVisitor, and spheres meet the bodies
+/// themselves.
+template <typename A, typename B, typename V = Visitor>
 class PairWalk {
  public:
   /// `b_in_a` places side B's frame in side A's. Scratch memory is kept by the thread between walks.
-  PairWalk(const A& a, const B& b, const Placement& b_in_a, Visitor& visitor)
+  PairWalk(const A& a, const B& b, const Placement& b_in_a, V& visitor)
       : a_(a), b_(b), b_in_a_(b_in_a), a_in_b_(b_in_a.inverse()), visitor_(visitor), spheres_(a.cells() || b.cells()) {}
 
   /// A leaf so many times larger (squared) than the node it meets is taken triangle by triangle.
@@ -66,7 +69,7 @@ class PairWalk {
   }
 
   bool rootsMeet(const Pair& root) const {
-    return spheres_ ? spheresMeet(a_.sphere(root.a), inA(b_.sphere(root.b)))
+    return spheres_ ? sphereMeets(a_.sphere(root.a), root.b)
                     : !boxesApart(oriented(a_.volume(root.a)), oriented(b_.volume(root.b)), b_in_a_);
   }
 
@@ -75,6 +78,14 @@ class PairWalk {
   bool spheresMeet(const Sphere& a, const Sphere& b) const {
     const double reach = (a.radius + b.radius) * (1 + 1e-12) + b_in_a_.slack;
     return (a.center - b.center).squaredNorm() <= reach * reach;
+  }
+
+  bool sphereMeets(const Sphere& a, typename B::Node b) const {
+    if constexpr (B::kBodies) {
+      return b_.meets(b, placed(a, a_in_b_), a_in_b_.slack);
+    } else {
+      return spheresMeet(a, inA(b_.sphere(b)));
+    }
   }
 
   // The larger of two nodes is expanded, unless it is a leaf.
@@ -87,10 +98,7 @@ class PairWalk {
     seeNode(a_, pair.a, seen_a_);
     seeNode(b_, pair.b, seen_b_);
     const State sa = seen_a_.state, sb = seen_b_.state;
-    if (sa == State::kLeaf && sb == State::kLeaf) {
-      return s.leaves.test(a_, pair.a, b_, pair.b, b_in_a_,
-                           [this](std::uint32_t t, std::uint32_t u) { return visitor_.triangles(t, u); });
-    }
+    if (sa == State::kLeaf && sb == State::kLeaf) return leafTriangles(pair, s);
     if (waits(sa, sb)) {
       s.aside.add(pair);
       return false;
@@ -101,11 +109,13 @@ class PairWalk {
         s.aside.add(pair);
       } else {
         const auto push = [&](typename A::Node c) { s.stack.push_back({c, pair.b}); };
-        if (sb == State::kLeaf && seen_a_.size < kCoarse * size_b) {
-          a_.childrenMeeting(pair.a, volumeOf(b_, seen_b_), b_in_a_, s.coarse_b, b_, pair.b, push);
-        } else {
-          a_.overlappingChildren(pair.a, volumeOf(b_, seen_b_), b_in_a_, push);
+        if constexpr (!B::kBodies) {
+          if (sb == State::kLeaf && seen_a_.size < kCoarse * size_b) {
+            a_.childrenMeeting(pair.a, volumeOf(b_, seen_b_), b_in_a_, s.coarse_b, b_, pair.b, push);
+            return false;
+          }
         }
+        a_.overlappingChildren(pair.a, volumeOf(b_, seen_b_), b_in_a_, push);
       }
     } else if (sb == State::kGrows) {
       s.aside.add(pair);
@@ -120,6 +130,18 @@ class PairWalk {
     return false;
   }
 
+  bool leafTriangles(const Pair& pair, Scratch& s) {
+    if constexpr (B::kBodies) {
+      for (std::size_t i = 0; i < a_.triangleCount(pair.a); ++i) {
+        if (visitor_.triangle(a_.triangle(pair.a, i), pair.b)) return true;
+      }
+      return false;
+    } else {
+      return s.leaves.test(a_, pair.a, b_, pair.b, b_in_a_,
+                           [this](std::uint32_t t, std::uint32_t u) { return visitor_.triangles(t, u); });
+    }
+  }
+
   // Neither side has children to go on with.
   static bool waits(State sa, State sb) { return sa != State::kInner && sb != State::kInner; }
 
@@ -132,20 +154,29 @@ class PairWalk {
         s.aside.add(pair);
       } else {
         a_.children(pair.a, [&](typename A::Node c) {
-          if (spheresMeet(a_.sphere(c), ball_b)) s.stack.push_back({c, pair.b});
+          if (sphereMeets(a_.sphere(c), pair.b)) s.stack.push_back({c, pair.b});
         });
       }
     } else if (sb == State::kGrows) {
       s.aside.add(pair);
     } else {
       b_.children(pair.b, [&](typename B::Node c) {
-        if (spheresMeet(ball_a, inA(b_.sphere(c)))) s.stack.push_back({pair.a, c});
+        if (sphereMeets(ball_a, c)) s.stack.push_back({pair.a, c});
       });
     }
     return false;
   }
 
   bool leafSpheres(const Pair& pair) {
+    if constexpr (B::kBodies) {
+      const CellLeaf a{a_.cellId(pair.a), a_.cellSphere(pair.a)};
+      return sphereMeets(a.sphere, pair.b) && visitor_.cell(a, pair.b);
+    } else {
+      return leafCells(pair);
+    }
+  }
+
+  bool leafCells(const Pair& pair) {
     if (a_.cells() && b_.cells()) {
       const CellLeaf a{a_.cellId(pair.a), a_.cellSphere(pair.a)};
       const CellLeaf b{b_.cellId(pair.b), inA(b_.cellSphere(pair.b))};
@@ -202,7 +233,7 @@ class PairWalk {
   const A& a_;
   const B& b_;
   const Placement b_in_a_, a_in_b_;
-  Visitor& visitor_;
+  V& visitor_;
   const bool spheres_;
 };
 

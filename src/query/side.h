@@ -23,6 +23,8 @@ enum class State {
 class TreeSide {
  public:
   using Node = tree::NodeRef;
+  static constexpr bool kBodies = false;
+  static constexpr bool kNodesHoldSurface = true;
 
   explicit TreeSide(tree::Tree& tree) : tree_(tree), now_(tree.now()) {}
 

@@ -32,4 +32,17 @@ class Visitor {
   virtual bool cellOfB(std::uint32_t a, const CellLeaf& b, const Eigen::Vector3d& point) = 0;
 };
 
+/// The same where side B is made of solid bodies; `b` is the node of one.
+template <typename Node>
+class BodyVisitor {
+ public:
+  virtual ~BodyVisitor() = default;
+
+  virtual bool endsAtFirst() const = 0;
+  /// Triangle a of side A and body b may touch; everything that touches comes here.
+  virtual bool triangle(std::uint32_t a, const Node& b) = 0;
+  /// The sphere of a cell (frame of A) meets body b.
+  virtual bool cell(const CellLeaf& a, const Node& b) = 0;
+};
+
 }  // namespace bocst::query

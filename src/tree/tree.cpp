@@ -745,8 +745,7 @@ Statistics Tree::statistics() const {
   s.oracle_batches = batches_;
   s.oracle_cells = cells_;
   s.pruned_nodes = pruned_;
-  s.mesh_bytes =
-      (surface_.mesh != nullptr ? surface_.mesh->bytes() : 0) + (solid_ != nullptr ? solid_->bytes() : 0);
+  s.mesh_bytes = (surface_.mesh != nullptr ? surface_.mesh->bytes() : 0) + (solid_ != nullptr ? solid_->bytes() : 0);
   s.device_bytes = device_bytes_;
   return s;
 }

@@ -134,18 +134,27 @@ void run() {
     expect(result.isCollision() && result.getContact(0).o1 == first.get() && result.getContact(0).o2 == second.get(),
            "a model and an FCL mesh are told to be free, or were swapped");
   }
+  for (const auto& way : ways) {
+    for (const fcl::GJKSolverType solver : {fcl::GST_LIBCCD, fcl::GST_INDEP}) {
+      expect(way.query(a, ball, moved(S(0.25)), solver) && way.query(box, a, moved(S(0.25)), solver) &&
+                 !way.query(a, ball, moved(S(3)), solver) && !way.query(box, a, moved(S(3)), solver),
+             std::string(way.name) + ": a model and a shape are not answered by bocst");
+    }
+  }
   // A partner that is not supported must not be told to be free.
-  expect(throwsInvalidArgument([&] {
-           if (byGeometries(a, ball, moved(S(0.25)), fcl::GST_LIBCCD)) throw std::invalid_argument("supported");
-         }),
-         "a model and a sphere are told to be free");
-
+  class Strange final : public fcl::CollisionGeometry<S> {
+   public:
+    void computeLocalAABB() override {}
+  };
+  const Geometry strange = std::make_shared<Strange>();
+  expect(throwsInvalidArgument([&] { byGeometries(a, strange, moved(0), fcl::GST_LIBCCD); }),
+         "a model and a geometry that nobody knows are told to be free");
   expect(throwsInvalidArgument([&] {
            fcl::DistanceRequest<S> request;
            fcl::DistanceResult<S> result;
-           fcl::distance(a.get(), moved(0), ball.get(), moved(3), request, result);
+           fcl::distance(strange.get(), moved(0), a.get(), moved(3), request, result);
          }),
-         "distance from a model does not throw");
+         "distance from a geometry that nobody knows does not throw");
   for (int solver : {fcl::GST_LIBCCD, fcl::GST_INDEP}) {
     fcl::DistanceRequest<S> request;
     request.gjk_solver_type = static_cast<fcl::GJKSolverType>(solver);

@@ -1,0 +1,176 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#pragma once
+
+#include <Eigen/Core>
+#include <cstddef>
+#include <limits>
+
+#include "query/triangle.h"
+#include "query/volume.h"
+
+// Solid convex bodies against the convex hull of a few points (a triangle, a point, a box), in the frame of the body.
+// All in double.
+
+namespace bocst::query {
+
+/// A few points; what is meant is their convex hull.
+struct Points {
+  const Eigen::Vector3d* x;
+  int count;
+
+  Eigen::Vector3d middle() const {
+    Eigen::Vector3d m = x[0];
+    for (int i = 1; i < count; ++i) m += x[i];
+    return m / count;
+  }
+  /// The point that is farthest along d.
+  const Eigen::Vector3d& support(const Eigen::Vector3d& d) const {
+    int best = 0;
+    double most = d.dot(x[0]);
+    for (int i = 1; i < count; ++i) {
+      const double h = d.dot(x[i]);
+      if (h > most) most = h, best = i;
+    }
+    return x[best];
+  }
+};
+
+/// How far points are from a body.
+struct Gap {
+  /// The distance is surely no less, up to 4e-15 of the coordinates, which is taken off: where it is not positive, the
+  /// two may touch.
+  double atLeast = 0;
+  /// Of the nearest points; 0 where the two touch, at a point of both. Not looked for when `atLeast` was found to be
+  /// enough.
+  double distance = std::numeric_limits<double>::infinity();
+  Eigen::Vector3d on_body = Eigen::Vector3d::Zero(), on_points = Eigen::Vector3d::Zero();
+
+  bool touches() const { return !(atLeast > 0); }
+};
+
+class Body {
+ public:
+  virtual ~Body() = default;
+
+  /// A box about the body; of an unbounded one, about as much of it as its maker was told to care for.
+  const OrientedVolume& box() const { return box_; }
+
+  /// The distance of the points. More than `enough` is not looked at closely.
+  virtual Gap gap(const Points& points, double enough) const = 0;
+
+  /// How points that touch the body get away from it, in a straight line: normal from the body to the points, depth >=
+  /// 0 so that moving the points by depth * normal leaves them touching at most, and a point in or beside the overlap.
+  /// Of boxes, balls, planes, half-spaces and triangles the shortest way; of other bodies one that is seldom longer.
+  virtual Touch part(const Points& points) const = 0;
+
+ protected:
+  OrientedVolume box_;
+};
+
+/// A convex core, blown up by a radius.
+class ConvexBody : public Body {
+ public:
+  Gap gap(const Points& points, double enough) const override;
+  Touch part(const Points& points) const override;
+
+ protected:
+  ConvexBody(const Eigen::Vector3d& center, const Eigen::Vector3d& half_of_core, double radius);
+
+  /// The point of the core that is farthest along d, which has any length but zero.
+  virtual Eigen::Vector3d support(const Eigen::Vector3d& d) const = 0;
+
+ private:
+  double boxGap(const Points& points) const;
+  Gap coreGap(const Points& points, double enough) const;
+  Touch descend(const Eigen::Vector3d& normal, const Points& points) const;
+  Touch along(const Eigen::Vector3d& normal, const Points& points) const;
+
+  const double radius_;
+};
+
+/// From half sizes, at the origin.
+class BoxBody final : public ConvexBody {
+ public:
+  explicit BoxBody(const Eigen::Vector3d& half);
+
+ protected:
+  Eigen::Vector3d support(const Eigen::Vector3d& d) const override;
+
+ private:
+  const Eigen::Vector3d half_;
+};
+
+/// What is within `radius` of a segment of the given length along z, about the origin: a capsule, or a ball.
+class CapsuleBody final : public ConvexBody {
+ public:
+  CapsuleBody(double radius, double length);
+
+ protected:
+  Eigen::Vector3d support(const Eigen::Vector3d& d) const override;
+
+ private:
+  const double half_length_;
+};
+
+class EllipsoidBody final : public ConvexBody {
+ public:
+  explicit EllipsoidBody(const Eigen::Vector3d& radii);
+
+ protected:
+  Eigen::Vector3d support(const Eigen::Vector3d& d) const override;
+
+ private:
+  const Eigen::Vector3d radii_;
+};
+
+/// About z, from -length / 2 with radius `bottom` to length / 2 with radius `top`: a cylinder, or a cone.
+class RoundBody final : public ConvexBody {
+ public:
+  RoundBody(double bottom, double top, double length);
+
+ protected:
+  Eigen::Vector3d support(const Eigen::Vector3d& d) const override;
+
+ private:
+  const double bottom_, top_, half_length_;
+};
+
+/// A triangle, which parts as triangles do.
+class TriangleBody final : public Body {
+ public:
+  explicit TriangleBody(const Corners& corners);
+
+  Gap gap(const Points& points, double enough) const override;
+  Touch part(const Points& points) const override;
+
+ private:
+  Corners corners_;
+};
+
+/// What lies at or below a height along a unit normal: n.x <= height. Its box reaches as far as the region does.
+class HalfspaceBody final : public Body {
+ public:
+  HalfspaceBody(const Eigen::Vector3d& normal, double height, const Sphere& region);
+
+  Gap gap(const Points& points, double enough) const override;
+  Touch part(const Points& points) const override;
+
+ private:
+  const Eigen::Vector3d normal_;
+  const double height_;
+};
+
+/// n.x == height.
+class PlaneBody final : public Body {
+ public:
+  PlaneBody(const Eigen::Vector3d& normal, double height, const Sphere& region);
+
+  Gap gap(const Points& points, double enough) const override;
+  Touch part(const Points& points) const override;
+
+ private:
+  const Eigen::Vector3d normal_;
+  const double height_;
+};
+
+}  // namespace bocst::query

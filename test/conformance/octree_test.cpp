@@ -1,0 +1,298 @@
+// SPDX-License-Identifier: BSD-3-Clause
+// fcl::OcTree as a partner: against FCL's own mesh query where that is right, and against all boxes and triangles.
+#include <fcl/geometry/octree/octree.h>
+#include <gtest/gtest.h>
+
+#include <limits>
+#include <map>
+
+#include "conformance/reference.h"
+#include "query/body.h"
+
+namespace bocst {
+namespace {
+
+using Eigen::Vector3d;
+using test::Pairs;
+using test::Raw;
+
+/// A cloud about the origin, with cells that are occupied, free, uncertain and unknown.
+template <typename S>
+std::shared_ptr<fcl::OcTree<S>> cloud(unsigned seed, std::size_t points, double resolution = 0.1) {
+  auto map = std::make_shared<octomap::OcTree>(resolution);
+  std::mt19937_64 g(seed);
+  std::uniform_real_distribution<double> u(0, 1);
+  for (std::size_t i = 0; i < points; ++i) {
+    const Vector3d p = test::randomDirection(g) * 0.6 * std::cbrt(u(g));
+    const octomap::point3d at(static_cast<float>(p.x()), static_cast<float>(p.y()), static_cast<float>(p.z()));
+    const double kind = u(g);
+    map->updateNode(at, static_cast<float>(kind < 0.6 ? 2 : kind < 0.8 ? -2 : 0.2));
+  }
+  map->updateInnerOccupancy();
+  auto octree = std::make_shared<fcl::OcTree<S>>(map);
+  octree->setOccupancyThres(S(0.7));
+  octree->setFreeThres(S(0.4));
+  return octree;
+}
+
+/// The distance of a triangle of a mesh at X and a box of toBoxes() at Y.
+template <typename S>
+double gap(const Raw& raw, std::size_t t, const fcl::Transform3<S>& X, const std::array<S, 6>& box,
+           const fcl::Transform3<S>& Y) {
+  const Vector3d center(box[0], box[1], box[2]);
+  Vector3d c[3];
+  for (std::size_t k = 0; k < 3; ++k) {
+    c[k] =
+        Y.template cast<double>().inverse() * (X.template cast<double>() * raw.vertices[raw.triangles[t][k]]) - center;
+  }
+  return query::BoxBody(Vector3d::Constant(box[3] / 2.0)).gap({c, 3}, std::numeric_limits<double>::infinity()).distance;
+}
+
+template <typename S>
+class OcTrees : public testing::Test {};
+using Scalars = testing::Types<float, double>;
+TYPED_TEST_SUITE(OcTrees, Scalars);
+
+template <typename S>
+fcl::CollisionResult<S> ask(const fcl::CollisionGeometry<S>& a, const fcl::Transform3<S>& X,
+                            const fcl::CollisionGeometry<S>& b, const fcl::Transform3<S>& Y, fcl::GJKSolverType solver,
+                            bool contacts = false, std::size_t most = 1000000) {
+  fcl::CollisionRequest<S> request(most, contacts);
+  request.gjk_solver_type = solver;
+  fcl::CollisionResult<S> result;
+  fcl::collide(&a, X, &b, Y, request, result);
+  return result;
+}
+
+/// Pairs of cell and triangle; FCL keeps the lower half of the names of cells only.
+template <typename S>
+Pairs pairsOf(const fcl::CollisionResult<S>& result, bool octree_first) {
+  Pairs pairs;
+  for (std::size_t i = 0; i < result.numContacts(); ++i) {
+    const auto& c = result.getContact(i);
+    const std::intptr_t cell = octree_first ? c.b1 : c.b2;
+    pairs.insert({static_cast<int>(cell), octree_first ? c.b2 : c.b1});
+  }
+  EXPECT_EQ(pairs.size(), result.numContacts());
+  return pairs;
+}
+
+TYPED_TEST(OcTrees, VerdictsAndPairsEqualFclsWhereFclIsRight) {
+  using S = TypeParam;
+  const Raw raw = test::torus(12);
+  const auto theirs = test::bvh<fcl::OBBRSS<S>>(raw);
+  const auto octree = cloud<S>(1, 300);
+  const auto boxes = octree->toBoxes();
+  ASSERT_GT(boxes.size(), 20u);
+  const Model<S> model(raw.mesh());
+  const double tolerance = std::is_same<S, double>::value ? 2e-6 : 2e-5;
+  std::mt19937_64 g(2);
+  std::uniform_real_distribution<double> u(0, 1);
+  int hits = 0;
+  for (int i = 0; i < 40; ++i) {
+    const auto X = test::pose<S>(test::randomRotation(g), test::randomDirection(g));
+    const auto Y = test::pose<S>(test::randomRotation(g),
+                                 X.translation().template cast<double>() + test::randomDirection(g) * 2.2 * u(g));
+    std::size_t touching = 0, near = 0;
+    for (std::size_t t = 0; t < raw.triangles.size(); ++t) {
+      for (const auto& box : boxes) {
+        const double d = gap<S>(raw, t, X, box, Y);
+        touching += d == 0;
+        near += d <= tolerance;
+      }
+    }
+    for (const auto solver : {fcl::GST_LIBCCD, fcl::GST_INDEP}) {
+      const auto ours = ask<S>(model, X, *octree, Y, solver);
+      const Pairs pairs = pairsOf(ours, false);
+      ASSERT_EQ(pairs, pairsOf(ask<S>(*octree, Y, model, X, solver), true));
+      ASSERT_GE(pairs.size(), touching);
+      ASSERT_LE(pairs.size(), near);
+      for (const auto& pair : pairsOf(ask<S>(*octree, Y, *theirs, X, solver), true)) ASSERT_TRUE(pairs.count(pair));
+      const bool once = ask<S>(model, X, *octree, Y, solver, false, 1).isCollision();
+      ASSERT_EQ(once, !pairs.empty());
+      hits += once;
+    }
+  }
+  EXPECT_GT(hits, 10);
+  EXPECT_LT(hits, 80);
+}
+
+TYPED_TEST(OcTrees, ContactsNameTheirCells) {
+  using S = TypeParam;
+  const Raw raw = test::torus(12);
+  const auto octree = cloud<S>(3, 300);
+  const Model<S> model(raw.mesh());
+  std::mt19937_64 g(4);
+  std::size_t found = 0, all = 0;
+  for (int i = 0; i < 10; ++i) {
+    const auto X = test::pose<S>(test::randomRotation(g), {0, 0, 0});
+    const auto Y = test::pose<S>(test::randomRotation(g), test::randomDirection(g) * 0.8);
+    const auto ours = ask<S>(model, X, *octree, Y, fcl::GST_LIBCCD, true);
+    const auto turned = ask<S>(*octree, Y, model, X, fcl::GST_LIBCCD, true);
+    std::map<std::pair<std::intptr_t, std::intptr_t>, fcl::Vector3<S>> normals;
+    for (std::size_t k = 0; k < turned.numContacts(); ++k) {
+      const auto& c = turned.getContact(k);
+      ASSERT_EQ(c.o1, octree.get());
+      normals[{c.b1, c.b2}] = c.normal;
+    }
+    for (std::size_t k = 0; k < ours.numContacts(); ++k) {
+      const auto& c = ours.getContact(k);
+      ASSERT_EQ(c.o1, &model);
+      ASSERT_EQ(c.o2, octree.get());
+      ASSERT_EQ(c.normal, -(normals[{c.b2, c.b1}]));
+      ASSERT_GE(c.penetration_depth, 0);
+      fcl::AABB<S> cell;
+      const fcl::Vector3<S> in_octree = Y.inverse(Eigen::Isometry) * c.pos;
+      const auto* node = octree->getNodeByQueryCellId(c.b2, in_octree, &cell);
+      ++all;
+      if (node == nullptr) continue;  // on the border of two cells FCL may look at the wrong one
+      ++found;
+      ASSERT_TRUE(octree->isNodeOccupied(node));
+      ASSERT_LT(cell.distance(fcl::AABB<S>(in_octree)), 1e-5);
+      // Moved back by the depth, the triangle is off the cell.
+      const Vector3d away = -c.normal.template cast<double>() * static_cast<double>(c.penetration_depth + S(1e-5));
+      auto Z = X;
+      Z.translation() += away.template cast<S>();
+      const auto middle = cell.center();
+      const S side = cell.width();
+      ASSERT_GT(gap<S>(raw, static_cast<std::size_t>(c.b1), Z, {middle[0], middle[1], middle[2], side, 0, 0}, Y), 0);
+    }
+  }
+  EXPECT_GT(all, 100u);
+  EXPECT_GT(found, all * 9 / 10);
+}
+
+TEST(OcTreesDouble, CostsEqualFcls) {
+  const Raw raw = test::torus(12);
+  const auto theirs = test::bvh<fcl::OBBRSSd>(raw);
+  const auto octree = cloud<double>(5, 200);
+  Modeld model(raw.mesh());
+  std::mt19937_64 g(6);
+  for (const double density : {1.0, 0.5, 0.0}) {  // occupied, uncertain, free
+    model.cost_density = theirs->cost_density = density;
+    for (int i = 0; i < 4; ++i) {
+      const auto X = test::pose<double>(test::randomRotation(g), {0, 0, 0});
+      const auto Y = test::pose<double>(test::randomRotation(g), test::randomDirection(g) * 0.8);
+      const auto cost = [&](const fcl::CollisionGeometryd& a, const auto& XA, const fcl::CollisionGeometryd& b,
+                            const auto& XB, bool approximate) {
+        const fcl::CollisionRequestd request(2, false, 1000000, true, approximate);
+        fcl::CollisionResultd result;
+        fcl::collide(&a, XA, &b, XB, request, result);
+        std::vector<fcl::CostSourced> sources;
+        result.getCostSources(sources);
+        double total = 0;
+        for (const auto& s : sources) total += s.total_cost;
+        EXPECT_EQ(result.numContacts(), density == 1 ? 2u : 0u);
+        return std::make_pair(sources.size(), total);
+      };
+      const auto ours = cost(model, X, *octree, Y, false), reference = cost(*octree, Y, *theirs, X, false);
+      EXPECT_EQ(ours.first > 0, density > 0);
+      EXPECT_NEAR(static_cast<double>(ours.first), static_cast<double>(reference.first), 0.01 * ours.first);
+      EXPECT_NEAR(ours.second, reference.second, 1e-3 * ours.second);
+      const auto rough = cost(*octree, Y, model, X, true);
+      EXPECT_EQ(rough.first > 0, density > 0);
+      EXPECT_GE(rough.second, 0);
+    }
+  }
+}
+
+TYPED_TEST(OcTrees, DistancesEqualThoseOfAllBoxes) {
+  using S = TypeParam;
+  const Raw raw = test::torus(12);
+  const auto theirs = test::bvh<fcl::OBBRSS<S>>(raw);
+  const auto octree = cloud<S>(7, 60);
+  const auto boxes = octree->toBoxes();
+  const Model<S> model(raw.mesh());
+  const double off = std::is_same<S, double>::value ? 1e-10 : 2e-5;
+  std::mt19937_64 g(8);
+  std::uniform_real_distribution<double> u(0, 1);
+  int apart = 0;
+  for (int i = 0; i < 30; ++i) {
+    const auto X = test::pose<S>(test::randomRotation(g), test::randomDirection(g));
+    const auto Y = test::pose<S>(test::randomRotation(g),
+                                 X.translation().template cast<double>() + test::randomDirection(g) * (1.5 + 2 * u(g)));
+    double expected = std::numeric_limits<double>::infinity();
+    for (std::size_t t = 0; t < raw.triangles.size(); ++t) {
+      for (const auto& box : boxes) expected = std::min(expected, gap<S>(raw, t, X, box, Y));
+    }
+    apart += expected > 0;
+    for (const bool turn : {false, true}) {
+      fcl::DistanceRequest<S> request(true);
+      fcl::DistanceResult<S> d;
+      const S returned = turn ? fcl::distance(octree.get(), Y, &model, X, request, d)
+                              : fcl::distance(&model, X, octree.get(), Y, request, d);
+      ASSERT_EQ(returned, d.min_distance);
+      ASSERT_NEAR(d.min_distance, expected, off) << i;
+      ASSERT_EQ(d.o1, turn ? static_cast<const fcl::CollisionGeometry<S>*>(octree.get()) : &model);
+      ASSERT_NEAR((d.nearest_points[0] - d.nearest_points[1]).norm(), expected, off);
+      const Vector3d in_octree =
+          Y.template cast<double>().inverse() * d.nearest_points[turn ? 0 : 1].template cast<double>();
+      bool on_a_box = false;
+      for (const auto& b : boxes) {
+        on_a_box |= ((in_octree - Vector3d(b[0], b[1], b[2])).cwiseAbs().array() <= b[3] / 2.0 + 10 * off).all();
+      }
+      ASSERT_TRUE(on_a_box);
+    }
+    if (expected > 0.01) {
+      fcl::DistanceRequest<S> request;
+      fcl::DistanceResult<S> reference;
+      ASSERT_NEAR(fcl::distance(octree.get(), Y, theirs.get(), X, request, reference), expected, 1e-3);
+    }
+  }
+  EXPECT_GT(apart, 10);
+}
+
+TYPED_TEST(OcTrees, ConservativeAnswersMissNothing) {
+  using S = TypeParam;
+  const Raw raw = test::torus(12);
+  const auto octree = cloud<S>(9, 100);
+  Options options;
+  options.answer = Answer::kConservative;
+  options.depth = 6;
+  const Model<S> exact(raw.mesh()), spheres(raw.mesh(), options);
+  std::mt19937_64 g(10);
+  std::uniform_real_distribution<double> u(0, 1);
+  const auto far = [&](const Model<S>& model, const auto& X, const auto& Y) {
+    fcl::DistanceRequest<S> request;
+    fcl::DistanceResult<S> result;
+    return fcl::distance(&model, X, octree.get(), Y, request, result);
+  };
+  for (int i = 0; i < 30; ++i) {
+    const auto X = test::pose<S>(test::randomRotation(g), test::randomDirection(g));
+    const auto Y = test::pose<S>(test::randomRotation(g),
+                                 X.translation().template cast<double>() + test::randomDirection(g) * 2.2 * u(g));
+    const S d = far(exact, X, Y), e = far(spheres, X, Y);
+    ASSERT_LE(e, d + S(1e-5));
+    ASSERT_GE(e, d - S(0.13));
+    const bool hit = test::touching<S>(spheres, X, *octree, Y);
+    ASSERT_EQ(hit, test::touching<S>(*octree, Y, spheres, X));
+    if (test::touching<S>(exact, X, *octree, Y)) {
+      ASSERT_TRUE(hit);
+    }
+    ASSERT_TRUE(!hit || d < S(0.13));
+  }
+}
+
+TYPED_TEST(OcTrees, EmptyOnesAreNowhere) {
+  using S = TypeParam;
+  const fcl::OcTree<S> octree(S(0.1));
+  const Model<S> model(test::torus(12).mesh());
+  const auto I = test::pose<S>(Eigen::Matrix3d::Identity(), {0, 0, 0});
+  EXPECT_FALSE(test::touching<S>(model, I, octree, I));
+  EXPECT_FALSE(test::touching<S>(octree, I, model, I));
+  fcl::DistanceRequest<S> request;
+  fcl::DistanceResult<S> result;
+  EXPECT_EQ(fcl::distance(&octree, I, &model, I, request, result), std::numeric_limits<S>::max());
+  // Nothing in it is known, which costs where costs are asked for.
+  for (const bool costs : {false, true}) {
+    const fcl::CollisionRequest<S> collision(1, false, 10, costs);
+    fcl::CollisionResult<S> none;
+    EXPECT_EQ(fcl::collide(&model, I, &octree, I, collision, none), 0u);
+    std::vector<fcl::CostSource<S>> sources;
+    none.getCostSources(sources);
+    EXPECT_EQ(sources.empty(), !costs);
+  }
+}
+
+}  // namespace
+}  // namespace bocst

@@ -1,0 +1,622 @@
+// SPDX-License-Identifier: BSD-3-Clause
+// FCL's shapes as partners: against FCL's own mesh query where that is right, against every triangle one by one, and
+// against what the answers must mean.
+#include "conformance/shapes.h"
+
+#include <fcl/broadphase/broadphase_dynamic_AABB_tree.h>
+#include <fcl/broadphase/default_broadphase_callbacks.h>
+#include <gtest/gtest.h>
+
+#include <map>
+#include <thread>
+
+#include "conformance/reference.h"
+#include "fcl/shape_body.h"
+
+namespace bocst {
+namespace {
+
+using Eigen::Vector3d;
+using test::NamedShape;
+using test::Raw;
+
+constexpr double kFar = std::numeric_limits<double>::infinity();
+constexpr fcl::GJKSolverType kSolvers[] = {fcl::GST_LIBCCD, fcl::GST_INDEP};
+
+/// What FCL's solvers may be off by: their tolerance, and rounding.
+template <typename S>
+double tolerance() {
+  return std::is_same<S, double>::value ? 2e-6 : 2e-5;
+}
+
+template <typename S>
+fcl::CollisionRequest<S> all(fcl::GJKSolverType solver, bool contacts = false) {
+  fcl::CollisionRequest<S> request(1000000, contacts);
+  request.gjk_solver_type = solver;
+  return request;
+}
+
+/// The distance of each triangle of a mesh from a shape, triangle by triangle, and how far it must go along a direction
+/// to be off the shape. body_test proves these gaps.
+template <typename S>
+class Truth {
+ public:
+  Truth(const Raw& raw, const fcl::ShapeBase<S>& shape) : raw_(raw), shape_(shape) {}
+
+  query::Gap gap(std::size_t t, const fcl::Transform3<S>& X, const fcl::Transform3<S>& Y,
+                 const Vector3d& moved = Vector3d::Zero()) const {
+    query::Gap gap;
+    fcl_room::withBody(shape_, {Vector3d::Zero(), 1e3}, [&](const query::Body& body) {
+      const auto Yd = Y.template cast<double>();
+      Vector3d c[3];
+      for (std::size_t k = 0; k < 3; ++k) {
+        c[k] = Yd.inverse() * (X.template cast<double>() * raw_.vertices[raw_.triangles[t][k]] + moved);
+      }
+      gap = body.gap({c, 3}, kFar);
+      gap.on_body = Yd * gap.on_body;
+      gap.on_points = Yd * gap.on_points;
+    });
+    return gap;
+  }
+
+  double distance(const fcl::Transform3<S>& X, const fcl::Transform3<S>& Y) const {
+    double least = kFar;
+    for (std::size_t t = 0; t < raw_.triangles.size(); ++t) least = std::min(least, gap(t, X, Y).distance);
+    return least;
+  }
+
+ private:
+  const Raw& raw_;
+  const fcl::ShapeBase<S>& shape_;
+};
+
+/// The point of a triangle of a mesh that is nearest to p.
+template <typename S>
+Vector3d onTriangle(const Raw& raw, std::size_t t, const fcl::Transform3<S>& X, const Vector3d& p) {
+  const fcl::Transform3<double> Xd = X.template cast<double>();
+  const auto& i = raw.triangles[t];
+  const query::Corners c = {Xd * raw.vertices[i[0]], Xd * raw.vertices[i[1]], Xd * raw.vertices[i[2]]};
+  return query::closestPoint(p, c);
+}
+
+/// Poses around contact and anywhere.
+template <typename S, typename F>
+void forPoses(int count, unsigned seed, const Truth<S>& truth, F&& f) {
+  std::mt19937_64 g(seed);
+  std::uniform_real_distribution<double> u(0, 1);
+  for (int i = 0; i < count; ++i) {
+    const auto X = test::pose<S>(test::randomRotation(g), test::randomDirection(g));
+    const Eigen::Matrix3d R = test::randomRotation(g);
+    const Vector3d p = X.translation().template cast<double>(), way = test::randomDirection(g);
+    const auto at = [&](double d) { return test::pose<S>(R, p + way * d); };
+    double d = 2.5 * u(g);
+    if (i % 2 == 1) {
+      d = test::contactDistance([&](double x) { return truth.distance(X, at(x)) == 0; }, 4, 12);
+      d += (i % 4 == 1 ? 1 : -1) * std::pow(10.0, -1 - 7 * u(g));
+    }
+    f(i, X, at(d));
+  }
+}
+
+template <typename S>
+class Shapes : public testing::Test {};
+using Scalars = testing::Types<float, double>;
+TYPED_TEST_SUITE(Shapes, Scalars);
+
+template <typename S>
+std::set<std::intptr_t> triangles(const fcl::CollisionResult<S>& result, bool first) {
+  std::set<std::intptr_t> ids;
+  for (std::size_t i = 0; i < result.numContacts(); ++i) {
+    const auto& c = result.getContact(i);
+    ids.insert(first ? c.b1 : c.b2);
+    EXPECT_EQ(first ? c.b2 : c.b1, +fcl::Contact<S>::NONE);
+  }
+  EXPECT_EQ(ids.size(), result.numContacts()) << "no pair twice";
+  return ids;
+}
+
+TYPED_TEST(Shapes, VerdictsAndTrianglesEqualFclsWhereFclIsRight) {
+  using S = TypeParam;
+  const Raw raw = test::torus(14);
+  const auto theirs = test::bvh<fcl::OBBRSS<S>>(raw);
+  for (const auto& [name, shape] : test::shapes<S>()) {
+    SCOPED_TRACE(name);
+    shape->computeLocalAABB();
+    const Model<S> model(raw.mesh());
+    const Truth<S> truth(raw, *shape);
+    int hits = 0;
+    const int count = 60;
+    forPoses<S>(count, 1, truth, [&](int i, const auto& X, const auto& Y) {
+      for (const auto solver : kSolvers) {
+        fcl::CollisionResult<S> ours, turned, once, reference;
+        fcl::collide(&model, X, shape.get(), Y, all<S>(solver), ours);
+        fcl::collide(shape.get(), Y, &model, X, all<S>(solver), turned);
+        fcl::CollisionRequest<S> boolean;
+        boolean.gjk_solver_type = solver;
+        fcl::collide(&model, X, shape.get(), Y, boolean, once);
+        const auto set = triangles(ours, true);
+        ASSERT_EQ(set, triangles(turned, false)) << i;
+        ASSERT_EQ(once.numContacts(), set.empty() ? 0u : 1u) << i;
+        if (name != "triangle") {  // FCL has no such pair
+          fcl::collide(theirs.get(), X, shape.get(), Y, all<S>(solver), reference);
+          for (const std::intptr_t t : triangles(reference, true)) ASSERT_TRUE(set.count(t)) << i << ' ' << t;
+        }
+        // What FCL misses touches, and what we have beyond that is within FCL's tolerance.
+        for (std::size_t t = 0; t < raw.triangles.size(); ++t) {
+          const double gap = truth.gap(t, X, Y).distance;
+          if (gap == 0 || gap > tolerance<S>()) {
+            ASSERT_EQ(set.count(static_cast<std::intptr_t>(t)), gap == 0) << gap;
+          }
+        }
+        hits += !set.empty();
+      }
+    });
+    EXPECT_GT(hits, count / 2);
+    EXPECT_LT(hits, 2 * count);
+  }
+}
+
+TYPED_TEST(Shapes, ContactsPartWhatTouches) {
+  using S = TypeParam;
+  const Raw raw = test::torus(14);
+  for (const auto& [name, shape] : test::shapes<S>()) {
+    SCOPED_TRACE(name);
+    const Model<S> model(raw.mesh());
+    const Truth<S> truth(raw, *shape);
+    std::size_t contacts = 0;
+    forPoses<S>(40, 2, truth, [&](int i, const auto& X, const auto& Y) {
+      for (const auto solver : kSolvers) {
+        fcl::CollisionResult<S> ours, turned;
+        fcl::collide(&model, X, shape.get(), Y, all<S>(solver, true), ours);
+        fcl::collide(shape.get(), Y, &model, X, all<S>(solver, true), turned);
+        ASSERT_EQ(ours.numContacts(), turned.numContacts());
+        std::map<std::intptr_t, fcl::Contact<S>> other;
+        for (std::size_t k = 0; k < turned.numContacts(); ++k) other[turned.getContact(k).b2] = turned.getContact(k);
+        for (std::size_t k = 0; k < ours.numContacts(); ++k) {
+          const auto& c = ours.getContact(k);
+          const auto& d = other[c.b1];
+          ASSERT_EQ(c.o1, &model);
+          ASSERT_EQ(c.o2, shape.get());
+          ASSERT_EQ(d.o1, shape.get());
+          ASSERT_EQ(d.o2, &model);
+          ASSERT_EQ(c.normal, -d.normal);
+          ASSERT_EQ(c.pos, d.pos);
+          ASSERT_EQ(c.penetration_depth, d.penetration_depth);
+          ASSERT_NEAR(c.normal.norm(), 1, 1e-5);
+          ASSERT_GE(c.penetration_depth, 0);
+          const auto t = static_cast<std::size_t>(c.b1);
+          const Vector3d n = c.normal.template cast<double>();
+          const double depth = static_cast<double>(c.penetration_depth), off = 20 * tolerance<S>();
+          // Moved back from the shape by the depth, and a little for what the solver's tolerance is, it is off.
+          ASSERT_GT(truth.gap(t, X, Y, -n * (depth * 1.001 + off)).distance, 0)
+              << i << " solver " << solver << " depth " << depth;
+          const Vector3d pos = c.pos.template cast<double>();
+          ASSERT_LE((onTriangle(raw, t, X, pos) - pos).norm(), depth + off) << "it is where they overlap";
+          ++contacts;
+        }
+      }
+    });
+    EXPECT_GT(contacts, 200u);
+  }
+}
+
+TYPED_TEST(Shapes, RequestsAreHonoured) {
+  using S = TypeParam;
+  const Raw raw = test::torus(20);
+  const Model<S> model(raw.mesh());
+  const fcl::Sphere<S> sphere(S(0.5));
+  const auto I = test::pose<S>(Eigen::Matrix3d::Identity(), {0, 0, 0});
+  const auto Y = test::pose<S>(Eigen::Matrix3d::Identity(), {0.9, 0.2, 0.1});
+  const fcl::CollisionGeometry<S>*m = &model, *s = &sphere;
+  fcl::CollisionResult<S> result;
+  EXPECT_EQ(fcl::collide(m, I, s, Y, fcl::CollisionRequest<S>(3), result), 3u);
+  EXPECT_EQ(fcl::collide(m, I, s, Y, fcl::CollisionRequest<S>(3), result), 3u) << "satisfied already";
+  EXPECT_EQ(fcl::collide(s, Y, m, I, fcl::CollisionRequest<S>(5), result), 5u) << "accumulates";
+  for (std::size_t i = 0; i < 5; ++i) {
+    const auto& c = result.getContact(i);
+    EXPECT_TRUE(std::isnan(c.penetration_depth) && c.normal.hasNaN() && c.pos.hasNaN()) << "not asked for";
+  }
+  fcl::CollisionResult<S> none;
+  EXPECT_EQ(fcl::collide(m, I, s, Y, fcl::CollisionRequest<S>(0), none), 0u);
+  // A solver that the caller brings.
+  const fcl::detail::GJKSolver_libccd<S> libccd;
+  const fcl::detail::GJKSolver_indep<S> indep;
+  for (const S x : {S(0.9), S(3)}) {
+    const auto Z = test::pose<S>(Eigen::Matrix3d::Identity(), {static_cast<double>(x), 0, 0});
+    fcl::CollisionResult<S> a, b, c;
+    const fcl::CollisionRequest<S> request;
+    fcl::collide(m, I, s, Z, &libccd, request, a);
+    fcl::collide(s, Z, m, I, &indep, request, b);
+    fcl::collide<S>(s, Z, m, I, request, c);  // through what the library exports
+    EXPECT_TRUE(a.isCollision() == (x < 1) && b.isCollision() == (x < 1) && c.isCollision() == (x < 1));
+  }
+}
+
+TYPED_TEST(Shapes, FreeAndUncertainShapesDoNotCollide) {
+  using S = TypeParam;
+  const Raw raw = test::torus(20);
+  const Model<S> model(raw.mesh());
+  fcl::Box<S> box(1, 1, 1);
+  const auto I = test::pose<S>(Eigen::Matrix3d::Identity(), {0, 0, 0});
+  const auto Y = test::pose<S>(Eigen::Matrix3d::Identity(), {0.9, 0.2, 0.1});
+  EXPECT_TRUE(test::touching<S>(model, I, box, Y));
+  for (const bool approximate : {false, true}) {
+    const fcl::CollisionRequest<S> request(1, false, 100, true, approximate);
+    for (const S density : {S(0.5), S(0)}) {
+      box.cost_density = density;
+      fcl::CollisionResult<S> result;
+      EXPECT_EQ(fcl::collide(&model, I, &box, Y, request, result), 0u);
+      std::vector<fcl::CostSource<S>> sources;
+      result.getCostSources(sources);
+      EXPECT_EQ(sources.empty(), density == 0) << "uncertain costs, free does not";
+    }
+    EXPECT_FALSE(test::touching<S>(model, I, box, Y));
+    box.cost_density = 1;
+  }
+}
+
+TEST(ShapesDouble, CostsEqualFcls) {
+  const Raw raw = test::torus(24);
+  const auto theirs = test::bvh<fcl::OBBRSSd>(raw);
+  for (const auto& [name, shape] : test::shapes<double>()) {
+    if (name == "triangle") continue;
+    SCOPED_TRACE(name);
+    shape->computeLocalAABB();
+    shape->cost_density = 2;
+    const Modeld model(raw.mesh());
+    const Truth<double> truth(raw, *shape);
+    int costs = 0;
+    std::mt19937_64 g(3);
+    for (int i = 0; i < 6; ++i) {
+      const auto X = test::pose<double>(test::randomRotation(g), {0, 0, 0});
+      const auto Y = test::pose<double>(test::randomRotation(g), test::randomDirection(g) * 0.8);
+      for (const bool approximate : {false, true}) {
+        const fcl::CollisionRequestd request(3, false, 1000000, true, approximate);
+        const auto ask = [&](const fcl::CollisionGeometryd* a, const auto& XA, const fcl::CollisionGeometryd* b,
+                             const auto& XB) {
+          fcl::CollisionResultd result;
+          fcl::collide(a, XA, b, XB, request, result);
+          EXPECT_EQ(result.numContacts(), truth.distance(X, Y) == 0 ? 3u : 0u);
+          std::vector<fcl::CostSourced> sources;
+          result.getCostSources(sources);
+          return sources;
+        };
+        const auto ours = ask(&model, X, shape.get(), Y), turned = ask(shape.get(), Y, &model, X);
+        ASSERT_EQ(turned.size(), ours.size());
+        if (truth.distance(X, Y) > 0) continue;
+        ASSERT_GT(ours.size(), 0u);
+        ++costs;
+        if (approximate) {
+          // One, of the whole mesh; FCL's box about the mesh is another than ours.
+          ASSERT_EQ(ours.size(), 1u);
+          ASSERT_EQ(ours[0].cost_density, 2);
+          ASSERT_GT(ours[0].total_cost, 0);
+          continue;
+        }
+        const auto reference = ask(theirs.get(), X, shape.get(), Y);
+        // FCL's solver may miss what it just touches, and unbounded boxes have no cost that one could sum.
+        ASSERT_NEAR(static_cast<double>(ours.size()), static_cast<double>(reference.size()), 2);
+        const auto sum = [](const auto& sources) {
+          double total = 0;
+          for (const auto& s : sources) total += s.total_cost;
+          return total;
+        };
+        ASSERT_NEAR(sum(ours), sum(reference), 1e-3 * sum(reference));
+        fcl::CollisionRequestd few(3, false, 2, true, false);
+        fcl::CollisionResultd result;
+        fcl::collide(&model, X, shape.get(), Y, few, result);
+        std::vector<fcl::CostSourced> sources;
+        result.getCostSources(sources);
+        ASSERT_LE(sources.size(), 2u);
+      }
+    }
+    EXPECT_GT(costs, 5);
+  }
+}
+
+TYPED_TEST(Shapes, ConservativeAnswersMissNothing) {
+  using S = TypeParam;
+  const Raw raw = test::torus(14);
+  for (const auto& [name, shape] : test::shapes<S>()) {
+    SCOPED_TRACE(name);
+    const Truth<S> truth(raw, *shape);
+    for (const Subdivision subdivision : {Subdivision::kOctree, Subdivision::kBono}) {
+      std::vector<std::unique_ptr<Model<S>>> models;
+      for (const int depth : {1, 4, 7}) {
+        Options options;
+        options.answer = Answer::kConservative;
+        options.subdivision = subdivision;
+        options.depth = depth;
+        models.push_back(std::make_unique<Model<S>>(raw.mesh(), options));
+      }
+      int hits[3] = {0, 0, 0}, expected = 0;
+      forPoses<S>(40, 4, truth, [&](int i, const auto& X, const auto& Y) {
+        const double distance = truth.distance(X, Y);
+        expected += distance == 0;
+        for (std::size_t m = 0; m < models.size(); ++m) {
+          fcl::CollisionResult<S> ours, turned;
+          fcl::collide(models[m].get(), X, shape.get(), Y, all<S>(fcl::GST_LIBCCD, true), ours);
+          fcl::collide(shape.get(), Y, models[m].get(), X, all<S>(fcl::GST_INDEP, true), turned);
+          ASSERT_EQ(ours.numContacts(), turned.numContacts()) << i;
+          if (distance == 0) {
+            ASSERT_TRUE(ours.isCollision()) << i;
+          }
+          hits[m] += ours.isCollision();
+          std::map<std::intptr_t, fcl::Vector3<S>> normals;
+          for (std::size_t k = 0; k < turned.numContacts(); ++k) {
+            normals[turned.getContact(k).b2] = turned.getContact(k).normal;
+          }
+          for (std::size_t k = 0; k < ours.numContacts(); ++k) {
+            const auto& c = ours.getContact(k);
+            ASSERT_EQ(c.b2, +fcl::Contact<S>::NONE);
+            ASSERT_GE(c.penetration_depth, 0);
+            ASSERT_NEAR(c.normal.norm(), 1, 1e-5);
+            ASSERT_EQ(c.normal, -normals[c.b1]);
+          }
+          if (m > 0) {
+            ASSERT_TRUE(!ours.isCollision() || distance < 4 * std::pow(2, -3.0 * static_cast<double>(m))) << distance;
+          }
+        }
+      });
+      EXPECT_GE(hits[0], hits[1]);
+      EXPECT_GE(hits[1], hits[2]);
+      EXPECT_GE(hits[2], expected);
+    }
+  }
+}
+
+template <typename S>
+fcl::DistanceResult<S> askDistance(const fcl::CollisionGeometry<S>& a, const fcl::Transform3<S>& X,
+                                   const fcl::CollisionGeometry<S>& b, const fcl::Transform3<S>& Y,
+                                   fcl::GJKSolverType solver = fcl::GST_LIBCCD, bool is_signed = false) {
+  fcl::DistanceRequest<S> request(true, is_signed);
+  request.gjk_solver_type = solver;
+  fcl::DistanceResult<S> result;
+  const S returned = fcl::distance(&a, X, &b, Y, request, result);
+  EXPECT_EQ(returned, result.min_distance);
+  return result;
+}
+
+TYPED_TEST(Shapes, DistancesEqualThoseOfAllTriangles) {
+  using S = TypeParam;
+  const Raw raw = test::torus(14);
+  const auto theirs = test::bvh<fcl::OBBRSS<S>>(raw);
+  const double off = std::is_same<S, double>::value ? 2e-9 : 2e-5;
+  for (const auto& [name, shape] : test::shapes<S>()) {
+    SCOPED_TRACE(name);
+    shape->computeLocalAABB();
+    const Model<S> model(raw.mesh());
+    const Truth<S> truth(raw, *shape);
+    int apart = 0;
+    const int count = 50;
+    forPoses<S>(count, 8, truth, [&](int i, const auto& X, const auto& Y) {
+      const double expected = truth.distance(X, Y);
+      for (const bool turn : {false, true}) {
+        const auto solver = kSolvers[i % 2];
+        const auto d = turn ? askDistance<S>(*shape, Y, model, X, solver) : askDistance<S>(model, X, *shape, Y, solver);
+        ASSERT_NEAR(d.min_distance, expected, off) << i;
+        ASSERT_EQ(d.o1, turn ? static_cast<const fcl::CollisionGeometry<S>*>(shape.get()) : &model);
+        ASSERT_EQ(d.o2, turn ? &model : static_cast<const fcl::CollisionGeometry<S>*>(shape.get()));
+        ASSERT_EQ(turn ? d.b1 : d.b2, +fcl::DistanceResult<S>::NONE);
+        const auto t = static_cast<std::size_t>(turn ? d.b2 : d.b1);
+        const Vector3d p = d.nearest_points[turn ? 1 : 0].template cast<double>();
+        const Vector3d q = d.nearest_points[turn ? 0 : 1].template cast<double>();
+        ASSERT_NEAR((p - q).norm(), expected, off) << i;
+        ASSERT_LT((onTriangle(raw, t, X, p) - p).norm(), 10 * off) << "on the triangle";
+        Raw point;
+        point.vertices.assign(3, q);
+        point.triangles.emplace_back(0, 1, 2);
+        const auto I = test::pose<S>(Eigen::Matrix3d::Identity(), {0, 0, 0});
+        ASSERT_LT(Truth<S>(point, *shape).distance(I, Y), 10 * off) << "on the shape";
+        if (expected <= 0.01) continue;
+        // Moved towards each other by nearly as much, they are nearly there.
+        auto Z = Y;
+        Z.translation() += ((p - q) * (1 - 1e-3)).template cast<S>();
+        ASSERT_NEAR(askDistance<S>(model, X, *shape, Z).min_distance, 1e-3 * expected, 10 * off + 1e-5 * expected);
+        ASSERT_FALSE(test::touching<S>(model, X, *shape, Z));
+      }
+      // FCL knows no distance of planes, half-spaces and triangles.
+      if (expected > 0.01 && name != "plane" && name != "half-space" && name != "triangle") {
+        ASSERT_NEAR(askDistance<S>(*theirs, X, *shape, Y).min_distance, expected, 1e-3);
+      }
+      apart += expected > 0;
+      // With signs, touching is at minus the depth of a contact.
+      const auto d = askDistance<S>(model, X, *shape, Y, fcl::GST_LIBCCD, true);
+      if (expected > 0) {
+        ASSERT_NEAR(d.min_distance, expected, off);
+      } else {
+        ASSERT_LE(d.min_distance, 0);
+        fcl::CollisionRequest<S> request(1, true);
+        fcl::CollisionResult<S> result;
+        fcl::collide(&model, X, shape.get(), Y, request, result);
+        ASSERT_EQ(d.min_distance, -result.getContact(0).penetration_depth);
+      }
+    });
+    EXPECT_GT(apart, count / 8);
+    EXPECT_LT(apart, count);
+  }
+}
+
+TYPED_TEST(Shapes, MinimaRunAndErrorsAreTaken) {
+  using S = TypeParam;
+  const Raw raw = test::torus(30);
+  const fcl::Cylinder<S> cylinder(S(0.4), S(1));
+  const auto I = test::pose<S>(Eigen::Matrix3d::Identity(), {0, 0, 0});
+  const auto Y = test::pose<S>(Eigen::Matrix3d::Identity(), {3, 0.3, 0.5});
+  const Model<S> model(raw.mesh());
+  const S exact = askDistance<S>(model, I, cylinder, Y).min_distance;
+  ASSERT_GT(exact, 1);
+  fcl::DistanceRequest<S> request;
+  fcl::DistanceResult<S> result;
+  result.min_distance = exact / 2;
+  EXPECT_EQ(fcl::distance(&model, I, &cylinder, Y, request, result), exact / 2) << "something nearer is known";
+  EXPECT_EQ(result.o1, nullptr);
+  result.min_distance = exact * 2;
+  EXPECT_NEAR(fcl::distance(&cylinder, Y, &model, I, request, result), exact, 1e-5);
+  EXPECT_EQ(result.o2, &model);
+  for (const S error : {S(1e-3), S(0.1), S(0.5)}) {
+    const Model<S> fresh(raw.mesh());
+    fcl::DistanceRequest<S> loose(true, false, error, 0), looser(true, false, 0, error);
+    fcl::DistanceResult<S> relative, absolute;
+    EXPECT_LE(fcl::distance(&fresh, I, &cylinder, Y, loose, relative), exact * (1 + error) * S(1.0001));
+    EXPECT_LE(fcl::distance(&fresh, I, &cylinder, Y, looser, absolute), (exact + error) * S(1.0001));
+    EXPECT_GE(relative.min_distance, exact * S(0.9999));
+    EXPECT_GE(absolute.min_distance, exact * S(0.9999));
+  }
+}
+
+TYPED_TEST(Shapes, ConservativeDistancesAreNeverMore) {
+  using S = TypeParam;
+  const Raw raw = test::torus(14);
+  Options options;
+  options.answer = Answer::kConservative;
+  options.depth = 6;
+  for (const auto& [name, shape] : test::shapes<S>()) {
+    SCOPED_TRACE(name);
+    const Model<S> model(raw.mesh(), options);
+    const Truth<S> truth(raw, *shape);
+    forPoses<S>(20, 9, truth, [&](int i, const auto& X, const auto& Y) {
+      const double expected = truth.distance(X, Y);
+      const double d = static_cast<double>(askDistance<S>(model, X, *shape, Y).min_distance);
+      ASSERT_LE(d, expected + 1e-5) << i;
+      ASSERT_GE(d, expected - 0.13) << i;
+      ASSERT_NEAR(d, askDistance<S>(*shape, Y, model, X).min_distance, 1e-5);
+      if (d > 1e-4) {
+        ASSERT_FALSE(test::touching<S>(model, X, *shape, Y));
+      }
+    });
+  }
+}
+
+// Far from the origin, tiny and huge: where FCL says that they touch, we do, and what we say is near enough.
+TYPED_TEST(Shapes, FarTinyAndHuge) {
+  using S = TypeParam;
+  for (const double scale : {1e-3, 1.0, 1e3}) {
+    for (const double far : {0.0, 30.0, 3000.0}) {
+      Raw raw = test::torus(14);
+      raw.scale(scale);
+      const auto theirs = test::bvh<fcl::OBBRSS<S>>(raw);
+      const Model<S> model(raw.mesh());
+      const S size = static_cast<S>(scale);
+      const std::vector<std::shared_ptr<fcl::ShapeBase<S>>> shapes = {
+          std::make_shared<fcl::Box<S>>(S(0.7) * size, S(0.4) * size, size),
+          std::make_shared<fcl::Sphere<S>>(S(0.5) * size), std::make_shared<fcl::Cylinder<S>>(S(0.3) * size, size),
+          std::make_shared<fcl::Halfspace<S>>(fcl::Vector3<S>(0, 0, 1), S(0.1) * size)};
+      std::mt19937_64 g(5);
+      std::uniform_real_distribution<double> u(0, 1);
+      for (const auto& shape : shapes) {
+        shape->computeLocalAABB();
+        const Truth<S> truth(raw, *shape);
+        for (int i = 0; i < 12; ++i) {
+          const Vector3d place = test::randomDirection(g) * far * scale;
+          const auto X = test::pose<S>(test::randomRotation(g), place);
+          const auto Y = test::pose<S>(test::randomRotation(g), place + test::randomDirection(g) * 2 * u(g) * scale);
+          fcl::CollisionRequest<S> request;
+          request.gjk_tolerance = static_cast<S>(1e-6 * scale);
+          fcl::CollisionResult<S> ours, reference;
+          fcl::collide(&model, X, shape.get(), Y, request, ours);
+          fcl::collide(theirs.get(), X, shape.get(), Y, request, reference);
+          const double distance = truth.distance(X, Y);
+          if (reference.isCollision() || distance == 0) {
+            ASSERT_TRUE(ours.isCollision()) << scale << ' ' << far << ' ' << i;
+          }
+          const double slack = 100 * static_cast<double>(std::numeric_limits<S>::epsilon()) * (far + 3) * scale;
+          if (ours.isCollision()) {
+            ASSERT_LT(distance, slack + 2e-6 * scale) << scale << ' ' << far << ' ' << i;
+          }
+        }
+      }
+    }
+  }
+}
+
+// FCL's test of a sphere takes a triangle without area to be anywhere.
+TEST(ShapesDouble, DegenerateMeshes) {
+  for (const Raw& raw : {test::adversarial(), test::soup(60, 4)}) {
+    const Modeld model(raw.mesh());
+    std::mt19937_64 g(6);
+    std::uniform_real_distribution<double> u(-1, 2);
+    for (const auto& [name, shape] : test::shapes<double>()) {
+      SCOPED_TRACE(name);
+      const Truth<double> truth(raw, *shape);
+      int hits = 0;
+      for (int i = 0; i < 40; ++i) {
+        Vector3d p(u(g), u(g), u(g));
+        if (i % 2) p = (p * 4).array().round() / 4;
+        const auto Y =
+            test::pose<double>(i % 3 ? Eigen::Matrix3d(Eigen::Matrix3d::Identity()) : test::randomRotation(g), p);
+        const auto I = test::pose<double>(Eigen::Matrix3d::Identity(), {0, 0, 0});
+        const double distance = truth.distance(I, Y);
+        const bool touch = test::touching<double>(model, I, *shape, Y);
+        hits += touch;
+        if (distance == 0 || distance > tolerance<double>()) {
+          ASSERT_EQ(touch, distance == 0) << i << ' ' << distance;
+        }
+      }
+      EXPECT_GT(hits, 0);
+    }
+  }
+}
+
+TEST(ShapesDouble, WhatIsWhollyInsideASolidTouchesIt) {
+  Raw raw = test::torus(12);
+  raw.scale(0.01);
+  const Modeld model(raw.mesh());
+  const auto I = test::pose<double>(Eigen::Matrix3d::Identity(), {0, 0, 0});
+  for (const auto& [name, shape] : test::shapes<double>()) {
+    if (name == "plane" || name == "triangle" || name == "half-space") continue;
+    SCOPED_TRACE(name);
+    EXPECT_TRUE(test::touching<double>(model, I, *shape, I)) << "a shape is solid";
+  }
+  const fcl::Sphered dust(1e-6);
+  const Modeld shell(test::torus(12).mesh());
+  EXPECT_FALSE(test::touching<double>(shell, I, dust, test::pose<double>(Eigen::Matrix3d::Identity(), {0.7, 0, 0})))
+      << "a model is not";
+}
+
+TEST(ShapesDouble, ManagersAndObjects) {
+  const auto model = std::make_shared<Modeld>(test::torus(20).mesh());
+  fcl::CollisionObjectd arm(model);
+  const auto box = std::make_shared<fcl::Boxd>(0.5, 0.5, 0.5);
+  fcl::CollisionObjectd near(box, Eigen::Matrix3d::Identity(), Vector3d(0.9, 0, 0));
+  fcl::CollisionObjectd far(box, Eigen::Matrix3d::Identity(), Vector3d(0, 0, 0.9));
+  for (auto* object : {&near, &far}) {
+    object->computeAABB();
+    fcl::DynamicAABBTreeCollisionManagerd manager;
+    manager.registerObject(&arm);
+    manager.setup();
+    fcl::DefaultCollisionData<double> data;
+    manager.collide(object, &data, fcl::DefaultCollisionFunction<double>);
+    EXPECT_EQ(data.result.isCollision(), object == &near);
+  }
+}
+
+TEST(ShapesDouble, ThreadsGrowOneModel) {
+  const Modeld model(test::torus(60).mesh());
+  const auto shapes = test::shapes<double>();
+  const auto I = test::pose<double>(Eigen::Matrix3d::Identity(), {0, 0, 0});
+  std::vector<fcl::Transform3d> poses;
+  std::vector<bool> expected;
+  std::mt19937_64 g(7);
+  const Modeld calm(test::torus(60).mesh());
+  for (std::size_t i = 0; i < 66; ++i) {
+    poses.push_back(test::pose<double>(test::randomRotation(g), test::randomDirection(g) * 1.2));
+    expected.push_back(test::touching<double>(calm, I, *shapes[i % shapes.size()].shape, poses.back()));
+  }
+  std::atomic<int> wrong{0};
+  std::vector<std::thread> threads;
+  for (std::size_t k = 0; k < 4; ++k) {
+    threads.emplace_back([&, k] {
+      for (std::size_t i = 0; i < poses.size(); ++i) {
+        const std::size_t n = (i * 7 + k * 11) % poses.size();
+        const auto& shape = *shapes[n % shapes.size()].shape;
+        wrong += test::touching<double>(shape, poses[n], model, I) != expected[n];
+      }
+    });
+  }
+  for (auto& t : threads) t.join();
+  EXPECT_EQ(wrong, 0);
+}
+
+}  // namespace
+}  // namespace bocst

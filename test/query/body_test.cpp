@@ -1,0 +1,286 @@
+// SPDX-License-Identifier: BSD-3-Clause
+// Bodies against triangles, points and boxes: what a gap claims is proved by a separating plane or by a common point
+// that know nothing of how it was found.
+#include "query/body.h"
+
+#include <gtest/gtest.h>
+
+#include <cmath>
+#include <functional>
+#include <memory>
+#include <random>
+#include <vector>
+
+#include "meshes.h"
+
+namespace bocst::query {
+namespace {
+
+using Eigen::Vector3d;
+
+/// A body and what is known of it in closed form.
+struct Known {
+  const char* name;
+  std::shared_ptr<const Body> body;
+  std::function<double(const Vector3d&)> level;   // convex, and at most 0 exactly in the body
+  std::function<double(const Vector3d&)> height;  // the farthest along a unit direction
+  bool shortest;                                  // part() is the shortest way
+};
+
+std::vector<Known> bodies() {
+  const Vector3d h(0.7, 0.4, 1.1), r(0.5, 1.2, 0.8);
+  const double radius = 0.6, half = 0.9, top = 0.2;
+  const Vector3d n = Vector3d(1, 2, -2) / 3;
+  const Sphere region{Vector3d(0.3, -0.2, 0.1), 50};
+  const auto round = [half](double bottom, double above) {
+    return Known{"round", std::make_shared<RoundBody>(bottom, above, 2 * half),
+                 [=](const Vector3d& x) {
+                   const double at = bottom + (above - bottom) * (x.z() + half) / (2 * half);
+                   return std::max(std::hypot(x.x(), x.y()) - at, std::abs(x.z()) - half);
+                 },
+                 [=](const Vector3d& d) {
+                   const double out = std::hypot(d.x(), d.y());
+                   return std::max(out * bottom - d.z() * half, out * above + d.z() * half);
+                 },
+                 false};
+  };
+  return {
+      {"box", std::make_shared<BoxBody>(h), [=](const Vector3d& x) { return (x.cwiseAbs() - h).maxCoeff(); },
+       [=](const Vector3d& d) { return d.cwiseAbs().dot(h); }, true},
+      {"ball", std::make_shared<CapsuleBody>(radius, 0), [=](const Vector3d& x) { return x.norm() - radius; },
+       [=](const Vector3d&) { return radius; }, true},
+      {"capsule", std::make_shared<CapsuleBody>(radius, 2 * half),
+       [=](const Vector3d& x) { return (x - Vector3d(0, 0, std::min(std::max(x.z(), -half), half))).norm() - radius; },
+       [=](const Vector3d& d) { return radius + half * std::abs(d.z()); }, false},
+      {"ellipsoid", std::make_shared<EllipsoidBody>(r),
+       [=](const Vector3d& x) { return x.cwiseQuotient(r).norm() - 1; },
+       [=](const Vector3d& d) { return d.cwiseProduct(r).norm(); }, false},
+      round(0.6, 0.6),
+      round(0.8, 0),
+      round(0.5, top),
+      {"half-space", std::make_shared<HalfspaceBody>(n, 0.25, region),
+       [=](const Vector3d& x) { return n.dot(x) - 0.25; },
+       [=](const Vector3d& d) { return (d - n).norm() < 1e-9 ? 0.25 : std::numeric_limits<double>::infinity(); }, true},
+      {"plane", std::make_shared<PlaneBody>(n, 0.25, region),
+       [=](const Vector3d& x) { return std::abs(n.dot(x) - 0.25); },
+       [=](const Vector3d& d) {
+         if ((d - n).norm() < 1e-9) return 0.25;
+         return (d + n).norm() < 1e-9 ? -0.25 : std::numeric_limits<double>::infinity();
+       },
+       true},
+  };
+}
+
+/// The least of a convex function over a triangle, by golden sections within golden sections.
+double least(const std::function<double(const Vector3d&)>& f, const Vector3d* t) {
+  const auto section = [](const auto& g) {
+    const double golden = (std::sqrt(5.0) - 1) / 2;
+    double lo = 0, hi = 1;
+    for (int i = 0; i < 70; ++i) {
+      const double a = hi - golden * (hi - lo), b = lo + golden * (hi - lo);
+      (g(a) < g(b) ? hi : lo) = g(a) < g(b) ? b : a;
+    }
+    return std::min({g(0), g((lo + hi) / 2), g(1)});
+  };
+  return section([&](double u) {
+    const Vector3d a = t[0] + u * (t[1] - t[0]), b = t[0] + u * (t[2] - t[0]);
+    return section([&](double v) { return f(a + v * (b - a)); });
+  });
+}
+
+double lowest(const Vector3d& n, const Points& p) {
+  double h = n.dot(p.x[0]);
+  for (int i = 1; i < p.count; ++i) h = std::min(h, n.dot(p.x[i]));
+  return h;
+}
+
+constexpr double kFar = std::numeric_limits<double>::infinity();
+
+/// A body that is a point.
+class PointBody final : public ConvexBody {
+ public:
+  explicit PointBody(const Vector3d& at) : ConvexBody(at, Vector3d::Zero(), 0), at_(at) {}
+
+ protected:
+  Vector3d support(const Vector3d&) const override { return at_; }
+
+ private:
+  const Vector3d at_;
+};
+
+void checkGap(const Known& k, const Points& p, double tolerance) {
+  const Gap gap = k.body->gap(p, kFar);
+  ASSERT_LE(gap.atLeast, gap.distance);
+  if (gap.touches()) {
+    ASSERT_EQ(gap.distance, 0);
+    // At a point of both.
+    ASSERT_EQ(gap.on_body, gap.on_points);
+    ASSERT_LE(k.level(gap.on_body), tolerance);
+    ASSERT_LE(PointBody(gap.on_points).gap(p, kFar).distance, tolerance);
+    return;
+  }
+  ASSERT_LE(gap.distance - gap.atLeast, tolerance);
+  // The points are where they should be, and a plane between them has the two on its sides.
+  const Vector3d n = (gap.on_points - gap.on_body).normalized();
+  ASSERT_NEAR((gap.on_points - gap.on_body).norm(), gap.distance, tolerance);
+  ASSERT_LE(k.level(gap.on_body), tolerance);
+  if (gap.distance > 1e-4) {
+    const double height = k.height(n);
+    if (std::isfinite(height)) {
+      ASSERT_GE(lowest(n, p) - height, gap.distance - 1e-5);
+    }
+  }
+  // Asked whether they are within a part of the distance, it says no, with reason.
+  const Gap quick = k.body->gap(p, gap.distance / 2);
+  ASSERT_GT(quick.atLeast, gap.distance / 2);
+  ASSERT_LE(quick.atLeast, gap.distance + tolerance);
+}
+
+TEST(Body, GapsOfTrianglesAreProvedBothWays) {
+  std::mt19937_64 g(1);
+  std::uniform_real_distribution<double> u(-1, 1);
+  for (const Known& k : bodies()) {
+    SCOPED_TRACE(k.name);
+    int touching = 0;
+    for (int i = 0; i < 1500; ++i) {
+      const double size = std::pow(10.0, 1.5 * u(g) - 0.5);
+      const Vector3d at = 3 * Vector3d(u(g), u(g), u(g));
+      const Vector3d t[3] = {at + size * Vector3d(u(g), u(g), u(g)), at + size * Vector3d(u(g), u(g), u(g)),
+                             at + size * Vector3d(u(g), u(g), u(g))};
+      const Points p{t, 3};
+      checkGap(k, p, 1e-8);
+      if (HasFatalFailure()) return;
+      const bool touches = k.body->gap(p, kFar).touches();
+      const double level = least(k.level, t);
+      if (level < -1e-9 || level > 1e-6) {
+        ASSERT_EQ(touches, level < 0) << i << ' ' << level;
+      }
+      touching += touches;
+    }
+    EXPECT_GT(touching, 25);
+    EXPECT_LT(touching, 1475);
+  }
+}
+
+TEST(Body, NearContactNothingThatTouchesIsApart) {
+  std::mt19937_64 g(2);
+  std::uniform_real_distribution<double> u(-1, 1);
+  for (const Known& k : bodies()) {
+    SCOPED_TRACE(k.name);
+    for (int i = 0; i < 400; ++i) {
+      Vector3d t[3];
+      for (Vector3d& x : t) x = 2.5 * Vector3d(u(g), u(g), u(g));
+      const Gap gap = k.body->gap({t, 3}, kFar);
+      if (gap.touches()) continue;
+      const Vector3d way = gap.on_body - gap.on_points;
+      for (const double beyond : {1e-12, 1e-9, 1e-6, 1e-3}) {
+        Vector3d in[3], out[3];
+        for (int c = 0; c < 3; ++c) {
+          in[c] = t[c] + way * (1 + beyond / way.norm());
+          out[c] = t[c] + way * (1 - beyond / way.norm());
+        }
+        // What passes the tip of a cone need not meet it.
+        if (k.shortest) {
+          ASSERT_TRUE(k.body->gap({in, 3}, kFar).touches()) << i << ' ' << beyond;
+        }
+        const Gap left = k.body->gap({out, 3}, kFar);
+        ASSERT_NEAR(left.distance, beyond, 1e-8) << i;
+        ASSERT_TRUE(!left.touches() || beyond < 1e-8) << i << ' ' << beyond;
+      }
+    }
+  }
+}
+
+TEST(Body, PointsSegmentsAndBoxes) {
+  std::mt19937_64 g(3);
+  std::uniform_real_distribution<double> u(-1, 1);
+  for (const Known& k : bodies()) {
+    SCOPED_TRACE(k.name);
+    for (int i = 0; i < 500; ++i) {
+      const Vector3d x = 2 * Vector3d(u(g), u(g), u(g));
+      checkGap(k, {&x, 1}, 1e-8);
+      if (HasFatalFailure()) return;
+      if (std::abs(k.level(x)) > 1e-9) {
+        ASSERT_EQ(k.body->gap({&x, 1}, kFar).touches(), k.level(x) < 0);
+      }
+      const Vector3d same[3] = {x, x, x},
+                     line[3] = {x, -x + Vector3d(3, 0, 0), Vector3d(1.5, 0, 0)};  // a segment and its middle
+      ASSERT_NEAR(k.body->gap({same, 3}, kFar).distance, k.body->gap({&x, 1}, kFar).distance, 1e-12);
+      ASSERT_NEAR(k.body->gap({line, 3}, kFar).distance, k.body->gap({line, 2}, kFar).distance, 1e-8);
+      Vector3d corners[8];
+      for (int c = 0; c < 8; ++c) {
+        corners[c] = x + Vector3d(c & 1 ? 0.5 : -0.5, c & 2 ? 0.25 : -0.25, c & 4 ? 0.125 : -0.125);
+      }
+      checkGap(k, {corners, 8}, 1e-8);
+      if (HasFatalFailure()) return;
+    }
+  }
+}
+
+// Points of which one or more lie exactly on the surface, or in a line with the axis.
+TEST(Body, TouchingExactlyIsTouching) {
+  const BoxBody box(Vector3d(1, 2, 0.5));
+  const Vector3d on_face[3] = {{1, 0, 0}, {2, 1, 1}, {2, -1, 1}}, on_corner[3] = {{1, 2, 0.5}, {2, 3, 1}, {3, 2, 1}};
+  const Vector3d on_edge[3] = {{2, 1, 0}, {0, 3, 0}, {2, 3, 0}}, flat[3] = {{-5, -5, 0.5}, {5, -5, 0.5}, {0, 9, 0.5}};
+  for (const auto* t : {on_face, on_corner, on_edge, flat}) EXPECT_TRUE(box.gap({t, 3}, kFar).touches());
+  const CapsuleBody ball(1, 0), capsule(1, 2);
+  const Vector3d above[3] = {{0, 0, 1}, {1, 0, 1}, {0, 1, 1}}, tip[3] = {{0, 0, 2}, {1, 0, 3}, {0, 1, 3}};
+  EXPECT_TRUE(ball.gap({above, 3}, kFar).touches());
+  EXPECT_TRUE(capsule.gap({tip, 3}, kFar).touches());
+  const RoundBody cone(1, 0, 2);
+  const Vector3d apex[3] = {{0, 0, 1}, {1, 0, 2}, {0, 1, 2}}, base[3] = {{0, 0, -1}, {1, 0, -2}, {0, 1, -2}};
+  EXPECT_TRUE(cone.gap({apex, 3}, kFar).touches());
+  EXPECT_TRUE(cone.gap({base, 3}, kFar).touches());
+  const PlaneBody plane(Vector3d::UnitZ(), 0.5, {Vector3d::Zero(), 9});
+  EXPECT_TRUE(plane.gap({flat, 3}, kFar).touches()) << "a triangle in the plane";
+}
+
+TEST(Body, PartingPartsAndIsLeastWhereItSaysSo) {
+  std::mt19937_64 g(4);
+  std::uniform_real_distribution<double> u(-1, 1);
+  for (const Known& k : bodies()) {
+    SCOPED_TRACE(k.name);
+    int parted = 0, longer = 0;
+    for (int i = 0; i < 1500; ++i) {
+      const double size = std::pow(10.0, u(g));
+      const Vector3d at = Vector3d(u(g), u(g), u(g));
+      Vector3d t[3];
+      for (Vector3d& x : t) x = at + size * Vector3d(u(g), u(g), u(g));
+      if (!k.body->gap({t, 3}, kFar).touches()) continue;
+      const Touch touch = k.body->part({t, 3});
+      ASSERT_NEAR(touch.normal.norm(), 1, 1e-12);
+      ASSERT_GE(touch.depth, 0);
+      const auto moved = [&](const Vector3d& by) {
+        const Vector3d m[3] = {t[0] + by, t[1] + by, t[2] + by};
+        return k.body->gap({m, 3}, kFar);
+      };
+      ASSERT_FALSE(moved(touch.normal * (touch.depth + 1e-8)).touches()) << i;
+      ++parted;
+      double least = kFar;
+      for (int j = 0; j < 300; ++j) {
+        const Vector3d n = test::randomDirection(g);
+        least = std::min(least, k.height(n) - lowest(n, {t, 3}));
+      }
+      if (k.shortest) {
+        ASSERT_LE(touch.depth, least * (1 + 1e-9)) << i;
+      }
+      longer += touch.depth > 1.5 * least;
+    }
+    EXPECT_GT(parted, 100);
+    EXPECT_LT(longer, parted / 10);
+  }
+}
+
+TEST(Body, TrianglesPartAsTriangles) {
+  const Corners c = {{0, 0, 0}, {2, 0, 0}, {0, 2, 0}};
+  const TriangleBody body(c);
+  const Vector3d across[3] = {{0.5, 0.5, -0.25}, {0.5, 0.5, 1}, {1, 0.5, 1}},
+                 off[3] = {{0, 0, 1}, {1, 0, 1}, {0, 1, 1}};
+  EXPECT_TRUE(body.gap({across, 3}, kFar).touches());
+  EXPECT_NEAR(body.part({across, 3}).depth, 0.25, 1e-12);
+  EXPECT_NEAR(body.part({across, 3}).normal.z(), 1, 1e-12);
+  EXPECT_NEAR(body.gap({off, 3}, kFar).distance, 1, 1e-12);
+}
+
+}  // namespace
+}  // namespace bocst::query
