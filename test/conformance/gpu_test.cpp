@@ -231,5 +231,41 @@ TEST(Sampled, IsNeverChosenByItself) {
   EXPECT_EQ(Modeld(mesh, with(OracleKind::kSampled)).oracleName(), "sampled");
 }
 
+// A rod along a direction: many triangles, so that it is no leaf, and nearly no width.
+Raw rod(double width) {
+  Raw raw;
+  const Eigen::Vector3d d = Eigen::Vector3d(0.8, 0.5, 0.33).normalized(), u = d.unitOrthogonal(), v = d.cross(u);
+  constexpr std::size_t parts = 100;
+  for (std::size_t i = 0; i <= parts; ++i) {
+    for (int k = 0; k < 4; ++k) {
+      const double a = k == 0 || k == 3 ? -0.5 : 0.5, b = k < 2 ? -0.5 : 0.5;
+      raw.vertices.push_back(static_cast<double>(i) / parts * d + width * (a * u + b * v));
+    }
+  }
+  for (std::size_t i = 0; i < parts; ++i) {
+    for (std::size_t k = 0; k < 4; ++k) {
+      const std::size_t p = 4 * i + k, q = 4 * i + (k + 1) % 4;
+      raw.triangles.emplace_back(p, q, q + 4);
+      raw.triangles.emplace_back(p, q + 4, p + 4);
+    }
+  }
+  return raw;
+}
+
+TEST(Sampled, MissesWhatIsThin) {
+  const Raw thin = rod(2e-4), other = test::torus(30);
+  const auto hits = [&](OracleKind kind) {
+    const Modeld a(thin.mesh(), with(kind)), b(other.mesh(), with(OracleKind::kCpu));
+    int count = 0;
+    for (const auto& X : poses(60, 1.0)) count += test::touching<double>(a, kIdentity, b, X);
+    return count;
+  };
+  const int expected = hits(OracleKind::kCpu);
+  EXPECT_GT(expected, 15);
+  EXPECT_EQ(hits(OracleKind::kCompute), expected);
+  EXPECT_EQ(hits(OracleKind::kOcclusion), expected);
+  EXPECT_LT(hits(OracleKind::kSampled), expected / 2);
+}
+
 }  // namespace
 }  // namespace bocst
