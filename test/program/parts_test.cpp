@@ -181,6 +181,38 @@ TEST(Page, BoxesAreThoseOfTheSpheres) {
   }
 }
 
+/// The scene of a page as its script reads it.
+program::Json sceneOf(const program::Page& page) {
+  const std::string html = page.html();
+  const std::string before = "<script type=\"application/json\" id=\"scene\">";
+  const std::size_t begin = html.find(before) + before.size();
+  return program::Json::parse(html.substr(begin, html.find("</script>", begin) - begin));
+}
+
+TEST(Page, LeavesOutWhatIsTooMuchAndSaysSo) {
+  const auto mesh = test::box({0, 0, 0}, {1, 1, 1}).mesh();
+  program::Page page("</script><b>");
+  page.object("box", *mesh);
+  std::vector<NodeView> nodes(1);
+  NodeView node;
+  node.level = 2;
+  nodes.resize(1 + program::Page::kMaxNodes, node);
+  page.tree(*mesh, nodes, Subdivision::kOctree, 0);
+  nodes.pop_back();
+  page.tree(*mesh, nodes, Subdivision::kBono, 0);
+  page.contacts(std::vector<program::TouchingPoint>(program::Page::kMaxContacts + 5));
+  const program::Json scene = sceneOf(page);
+  EXPECT_EQ(scene.at("title"), "</script><b>");
+  const program::Json& trees = scene.at("objects")[0].at("trees");
+  EXPECT_EQ(trees[0].at("levels"), 1) << "one node more than fits";
+  EXPECT_EQ(trees[0].at("counts"), program::Json({1, program::Page::kMaxNodes}));
+  EXPECT_EQ(trees[1].at("levels"), 2);
+  EXPECT_EQ(trees[1].at("level_of").get<std::string>().size(), (program::Page::kMaxNodes + 2) / 3 * 4);
+  EXPECT_EQ(scene.at("contacts").at("total"), program::Page::kMaxContacts + 5);
+  EXPECT_EQ(scene.at("contacts").at("numbers").get<std::string>().size(),
+            (program::Page::kMaxContacts * 56 + 2) / 3 * 4);
+}
+
 TEST(Spheres, HoldTheSurface) {
   const auto mesh = test::torus(24).mesh();
   Options options;

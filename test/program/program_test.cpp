@@ -404,7 +404,7 @@ TEST_F(Program, LeavesNothingBehindWhenInterrupted) {
   const std::string poses =
       " validate " + model("link") + " " + model("gripper") + " --poses 100000000 --json " + report;
   for (const std::string signal : {"INT", "TERM", "HUP"}) {
-    const Result result = shell("timeout --preserve-status -s " + signal + " 0.7 " + program() + poses);
+    const Result result = shell("timeout --preserve-status -s " + signal + " 2 " + program() + poses);
     EXPECT_GT(result.code, 128);
     EXPECT_EQ(result.err, "bocst: interrupted\n");
     EXPECT_EQ(files(), (std::set<std::string>{"out", "err"}));

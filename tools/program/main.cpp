@@ -22,6 +22,7 @@ int complain(std::string what, int code) {
 
 int main(int argc, char** argv) {
   using namespace bocst::program;
+  cleanUpOnSignals();
   constexpr int kFailed = 1;
   constexpr int kUsage = 2;
   Job job;
@@ -39,7 +40,6 @@ int main(int argc, char** argv) {
   addManual(program, job);
   try {
     program.parse(argc, argv);
-    cleanUpOnSignals();
     const int code = job();
     if (!std::cout.flush()) throw std::runtime_error("stdout: cannot be written");
     return code;

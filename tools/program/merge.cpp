@@ -48,9 +48,7 @@ void addMerge(CLI::App& program, Job& job) {
       "The reports are those of `bocst validate ... --shard i/n --json REPORT` for i from 1 to n. Their sum is what "
       "one\n"
       "run without --shard reports, exit code included.");
-  command->add_option("report", merge->files, "JSON report of each shard of one run")
-      ->required()
-      ->type_name("REPORT");
+  command->add_option("report", merge->files, "JSON report of each shard of one run")->required()->type_name("REPORT");
   addJson(*command, merge->output);
   command->callback([merge, &job] { job = [merge] { return merge->run(); }; });
 }

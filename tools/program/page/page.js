@@ -155,7 +155,7 @@ const shaders = {
   marks: [`
     layout(location = 0) in vec3 position;
     uniform mat4 toEye, projection;
-    void main() { gl_Position = projection * toEye * vec4(position, 1); gl_PointSize = 7.0; }`, `
+    void main() { gl_Position = projection * toEye * vec4(position, 1); gl_PointSize = 5.0; }`, `
     uniform vec4 color;
     out vec4 result;
     void main() { result = color; }`],
@@ -432,6 +432,19 @@ function pointer() {
   });
 }
 
+/** Contacts are looked at from their side of the scene. */
+function lookAtContacts() {
+  const middle = [0, 0, 0];
+  for (let i = 0; i < contacts.length; i += 7) {
+    const p = matrix.applied(toBall, contacts.subarray(i, i + 3));
+    for (let k = 0; k < 3; ++k) middle[k] += p[k] / (contacts.length / 7);
+  }
+  const distance = Math.hypot(...middle);
+  if (!(distance > 0.02)) return;
+  camera.turn = Math.atan2(middle[1], middle[0]) + 0.35;
+  camera.tilt = Math.max(-0.9, Math.min(1.2, Math.asin(middle[2] / distance) + 0.2));
+}
+
 function start() {
   document.title = scene.title + ' - bocst';
   byId('title').textContent = scene.title;
@@ -447,6 +460,7 @@ function start() {
   byId('cut-row').hidden = !scene.contacts;
   byId('level').max = Math.max(1, ...treesShown().map((tree) => tree ? tree.levels : 1));
   byId('level').value = Math.min(Number(byId('level').max), 5);
+  lookAtContacts();
   if (gl) {
     prepare();
     pointer();
