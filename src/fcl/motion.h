@@ -39,8 +39,9 @@ query::AxisMotion read(const fcl::TranslationMotion<S>& m) {
 template <typename S>
 query::AxisMotion read(const fcl::InterpMotion<S>& m) {
   const Eigen::Isometry3d begin = beginOf<S>(m);
-  return {begin, m.getLinearVelocity().template cast<double>(), begin * m.getReferencePoint().template cast<double>(),
-          m.getAngularAxis().template cast<double>(), static_cast<double>(m.getAngularVelocity())};
+  return {begin, m.getLinearVelocity().template cast<double>(),
+          -(begin.linear() * m.getReferencePoint().template cast<double>()), m.getAngularAxis().template cast<double>(),
+          static_cast<double>(m.getAngularVelocity())};
 }
 
 template <typename S>
@@ -49,7 +50,8 @@ query::AxisMotion read(const fcl::ScrewMotion<S>& m) {
   // Without a turn, FCL's axis is no unit vector; this is how its integrate() moves then.
   const Eigen::Vector3d velocity = axis * static_cast<double>(m.getLinearVelocity());
   if (m.getAngularVelocity() == 0) return {beginOf<S>(m), velocity};
-  return {beginOf<S>(m), velocity, m.getAxisOrigin().template cast<double>(), axis,
+  const Eigen::Isometry3d begin = beginOf<S>(m);
+  return {begin, velocity, begin.translation() - m.getAxisOrigin().template cast<double>(), axis,
           static_cast<double>(m.getAngularVelocity())};
 }
 

@@ -58,6 +58,9 @@ class ContactTimeWalk : private BestFirst<ContactTimeWalk<A, B>, A, B> {
   // A pair that can be put off by this much is looked at again before its parts are.
   static constexpr double kWorthWaiting = 1.0 / 64;
 
+  // How far two leaves go between two looks at their primitives, in their sizes; but for so long at least.
+  static constexpr double kShareOfLeaves = 0.25, kLeastWindow = 1e-6;
+
   // Unit directions are off by less.
   static constexpr double kBlur = 1e-15;
 
@@ -68,6 +71,7 @@ class ContactTimeWalk : private BestFirst<ContactTimeWalk<A, B>, A, B> {
   };
   struct Scratch : Base::Heap {
     std::vector<Body> a, b;
+    std::vector<Eigen::AlignedBox3d> boxes_a, boxes_b;
   };
   static Scratch& scratch() {
     thread_local Scratch s;
@@ -180,13 +184,43 @@ class ContactTimeWalk : private BestFirst<ContactTimeWalk<A, B>, A, B> {
     }
   }
 
+  // The primitives of two leaves, for as long as these take to go a part of their size: most are too far from each
+  // other for that. Then the pair waits for its next turn.
   void leaves(const Pair& pair) {
     Scratch& s = scratch();
     fill(a_, pair.a, s.a);
     fill(b_, pair.b, s.b);
-    for (const Body& p : s.a) {
-      for (const Body& q : s.b) first_ = std::min(first_, firstContact(p, q, pair.bound));
+    const Sphere a = boundsOf(s.a, a_in_world_, s.boxes_a), b = boundsOf(s.b, b_in_world_, s.boxes_b);
+    const double speed =
+        motion_a_.fastest(a.center, a.radius, pair.bound) + motion_b_.fastest(b.center, b.radius, pair.bound);
+    const double gap = std::max(0.0, (a.center - b.center).norm() - a.radius - b.radius);
+    const double window =
+        speed > 0 ? std::max(kLeastWindow, (gap + kShareOfLeaves * (a.radius + b.radius)) / speed) : 2;
+    const double until = pair.bound + window;
+    const double near = (window * speed + reach()) * (1 + 1e-12) + 1e-15 * (a.center.norm() + b.center.norm());
+    for (std::size_t i = 0; i < s.a.size(); ++i) {
+      for (std::size_t j = 0; j < s.b.size(); ++j) {
+        if (s.boxes_a[i].squaredExteriorDistance(s.boxes_b[j]) > near * near) continue;
+        first_ = std::min(first_, firstContact(s.a[i], s.b[j], pair.bound, until));
+      }
     }
+    push({until, pair.a, pair.b});
+  }
+
+  // Boxes of all bodies in the world, and a ball about these.
+  static Sphere boundsOf(const std::vector<Body>& bodies, const Placement& to,
+                         std::vector<Eigen::AlignedBox3d>& boxes) {
+    boxes.clear();
+    Eigen::AlignedBox3d all;
+    for (const Body& body : bodies) {
+      const Body w = inWorld(body, to);
+      Eigen::AlignedBox3d box(w.corners[0]);
+      for (std::size_t k = 1; k < w.count; ++k) box.extend(w.corners[k]);
+      const Eigen::Vector3d r = Eigen::Vector3d::Constant(w.radius);
+      boxes.emplace_back(box.min() - r, box.max() + r);
+      all.extend(boxes.back());
+    }
+    return {all.center(), all.diagonal().norm() / 2};
   }
 
   static Body inWorld(const Body& body, const Placement& to) {
@@ -234,9 +268,9 @@ class ContactTimeWalk : private BestFirst<ContactTimeWalk<A, B>, A, B> {
     return distanceOf(inWorld(p, a_in_world_), inWorld(q, b_in_world_), way) <= reach();
   }
 
-  // Two convex primitives that do not touch before `time`.
-  double firstContact(const Body& p, const Body& q, double time) {
-    while (worthIt(time)) {
+  // When two convex primitives that do not touch before `time` first do, if before `until`.
+  double firstContact(const Body& p, const Body& q, double time, double until) {
+    while (worthIt(time) && time < until) {
       at(time);
       const Body pw = inWorld(p, a_in_world_), qw = inWorld(q, b_in_world_);
       Eigen::Vector3d way;

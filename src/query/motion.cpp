@@ -20,21 +20,28 @@ double Approach::timeFor(double gap) const {
 }
 
 AxisMotion::AxisMotion(const Isometry3d& begin, const Vector3d& velocity)
-    : AxisMotion(begin, velocity, begin.translation(), Vector3d::UnitX(), 0) {}
+    : AxisMotion(begin, velocity, Vector3d::Zero(), Vector3d::UnitX(), 0) {}
 
-AxisMotion::AxisMotion(const Isometry3d& begin, const Vector3d& velocity, const Vector3d& pivot, const Vector3d& axis,
+AxisMotion::AxisMotion(const Isometry3d& begin, const Vector3d& velocity, const Vector3d& arm, const Vector3d& axis,
                        double angle)
-    : begin_(begin), velocity_(velocity), pivot_(pivot), axis_(axis), angle_(angle) {}
+    : begin_(begin), velocity_(velocity), arm_(arm), axis_(axis), angle_(angle) {}
 
 Isometry3d AxisMotion::at(double time) const {
   Isometry3d X = begin_;
   if (angle_ != 0) {
-    const Eigen::Matrix3d turn = AngleAxisd(time * angle_, axis_).toRotationMatrix();
-    X.linear() = turn * begin_.linear();
-    X.translation() = pivot_ + turn * (begin_.translation() - pivot_);
+    const double turn = time * angle_, half = std::sin(turn / 2);
+    X.linear() = AngleAxisd(turn, axis_).toRotationMatrix() * begin_.linear();
+    // What the turn does to the arm, which may be long, with a small angle.
+    const Vector3d across = axis_.cross(arm_);
+    X.translation() += std::sin(turn) * across + 2 * half * half * axis_.cross(across);
   }
   X.translation() += time * velocity_;
   return X;
+}
+
+// The axis times the way from it to a point: the direction in which the point moves.
+Vector3d AxisMotion::around(const Vector3d& point, double time) const {
+  return axis_.cross(point - begin_.translation() - time * velocity_) + axis_.cross(arm_);
 }
 
 Approach AxisMotion::approach(const Vector3d& direction, double blur, const Vector3d& center, double radius,
@@ -43,14 +50,14 @@ Approach AxisMotion::approach(const Vector3d& direction, double blur, const Vect
   if (angle_ == 0) return {straight, straight, 0};
   // Each point keeps its distance from the axis, moves across it, and is drawn towards it.
   const double speed = std::abs(angle_);
-  const Vector3d around = axis_.cross(center - pivot_ - time * velocity_);
-  const double distance = around.norm() + radius, across = direction.cross(axis_).norm() + blur;
-  const double now = angle_ * direction.dot(around) + speed * (across * radius + blur * distance);
+  const Vector3d way = around(center, time);
+  const double distance = way.norm() + radius, across = direction.cross(axis_).norm() + blur;
+  const double now = angle_ * direction.dot(way) + speed * (across * radius + blur * distance);
   return {straight + speed * across * distance, straight + now, speed * speed * across * distance};
 }
 
 double AxisMotion::fastest(const Vector3d& center, double radius, double time) const {
-  return velocity_.norm() + std::abs(angle_) * (axis_.cross(center - pivot_ - time * velocity_).norm() + radius);
+  return velocity_.norm() + std::abs(angle_) * (around(center, time).norm() + radius);
 }
 
 SplineMotion::SplineMotion(const Points& positions, const Points& rotations)
@@ -133,17 +140,17 @@ AxisMotion translation(const Isometry3d& begin, const Isometry3d& end) {
 
 AxisMotion interpolation(const Isometry3d& begin, const Isometry3d& end) {
   const AngleAxisd turn(Eigen::Matrix3d(end.linear() * begin.linear().transpose()));
-  return {begin, end.translation() - begin.translation(), begin.translation(), turn.axis(), turn.angle()};
+  return {begin, end.translation() - begin.translation(), Vector3d::Zero(), turn.axis(), turn.angle()};
 }
 
 AxisMotion screw(const Isometry3d& begin, const Isometry3d& end) {
   const AngleAxisd turn(Eigen::Matrix3d(end.linear() * begin.linear().transpose()));
   const Vector3d way = end.translation() - begin.translation(), axis = turn.axis();
-  // Below, the axis is too far away to say where it is; the two motions are the same up to rounding.
-  if (std::abs(turn.angle()) < 1e-10) return interpolation(begin, end);
+  // Below, the two motions are the same up to rounding.
+  if (std::abs(turn.angle()) < 1e-14) return interpolation(begin, end);
   const Vector3d across = way - axis.dot(way) * axis;
-  const Vector3d pivot = begin.translation() + (across + axis.cross(way) / std::tan(turn.angle() / 2)) / 2;
-  return {begin, axis.dot(way) * axis, pivot, axis, turn.angle()};
+  const Vector3d arm = -(across + axis.cross(way) / std::tan(turn.angle() / 2)) / 2;
+  return {begin, axis.dot(way) * axis, arm, axis, turn.angle()};
 }
 
 SplineMotion spline(const Isometry3d& begin, const Isometry3d& end) {

@@ -44,8 +44,9 @@ class AxisMotion final : public Motion {
  public:
   /// A pure translation, from a pose on.
   AxisMotion(const Eigen::Isometry3d& begin, const Eigen::Vector3d& velocity);
-  /// `axis` (unit) goes through `pivot` at time 0; `angle` is in radians, over the whole time.
-  AxisMotion(const Eigen::Isometry3d& begin, const Eigen::Vector3d& velocity, const Eigen::Vector3d& pivot,
+  /// The turn is by `angle` (radians, over the whole time) about `axis` (unit); `arm` leads from a point of the axis to
+  /// the body's origin at time 0.
+  AxisMotion(const Eigen::Isometry3d& begin, const Eigen::Vector3d& velocity, const Eigen::Vector3d& arm,
              const Eigen::Vector3d& axis, double angle);
 
   Eigen::Isometry3d at(double time) const override;
@@ -54,8 +55,10 @@ class AxisMotion final : public Motion {
   double fastest(const Eigen::Vector3d& center, double radius, double time) const override;
 
  private:
+  Eigen::Vector3d around(const Eigen::Vector3d& point, double time) const;
+
   Eigen::Isometry3d begin_;
-  Eigen::Vector3d velocity_, pivot_, axis_;
+  Eigen::Vector3d velocity_, arm_, axis_;
   double angle_;
 };
 

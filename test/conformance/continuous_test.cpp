@@ -86,6 +86,24 @@ TEST(Motions, GoWhereFclsGo) {
   }
 }
 
+// The axis of a screw with a small turn is far away; its poses are as good as any.
+TEST(Motions, ScrewsWithSmallTurns) {
+  std::mt19937_64 g(12);
+  for (const double angle : {1e-3, 1e-6, 1e-9, 1e-12, 1e-15, 0.0}) {
+    const Eigen::Vector3d axis = test::randomDirection(g);
+    const fcl::Transform3d X = randomPose(g, 2);
+    fcl::Transform3d Y = X;
+    Y.linear() = Eigen::AngleAxisd(angle, axis).toRotationMatrix() * X.linear();
+    Y.translation() += 3 * test::randomDirection(g);
+    const auto screw = motionOf<double>(X, Y, fcl::CCDM_SCREW);
+    EXPECT_EQ(screw->at(0).matrix(), X.matrix());
+    // The angle itself is known only as well as the poses are.
+    EXPECT_LT((screw->at(1).matrix() - Y.matrix()).cwiseAbs().maxCoeff(), 1e-12) << angle;
+    const Eigen::Vector3d middle = (X.translation() + Y.translation()) / 2;
+    EXPECT_LT((screw->at(0.5).translation() - middle).norm(), angle + 1e-12) << angle;
+  }
+}
+
 query::SplineMotion::Points randomPoints(std::mt19937_64& g, double size) {
   query::SplineMotion::Points p;
   for (auto& x : p) x = size * test::randomDirection(g);
