@@ -110,6 +110,19 @@ class DistanceWalk {
     return distanceBound(a, b, way_, enough());
   }
 
+  // The same by the body itself, which may be much smaller than the box about it.
+  double boundOf(typename A::Node a, const NodeReach& reach_a, typename B::Node b, const NodeReach& reach_b) {
+    const double bound = boundOf(reach_a, reach_b);
+    if constexpr (B::kBodies) {
+      if (worthIt(bound) && !b_.isBox(b)) {
+        Eigen::Vector3d corners[8];
+        cornersOf(oriented(a_.volume(a)), a_in_b_, corners);
+        return std::max(bound, b_.gap(b, {corners, 8}, enough() * a_in_b_.scale).atLeast * b_in_a_.scale);
+      }
+    }
+    return bound;
+  }
+
   Sphere ballOfB(typename B::Node n) const { return placed(b_.sphere(n), b_in_a_); }
 
   // A ball against a ball, or against the bodies themselves.
@@ -135,7 +148,7 @@ class DistanceWalk {
       a_.children(pair.a, [&](typename A::Node c) { push({boundOf(a_.sphere(c), pair.b), c, pair.b}, s); });
     } else {
       const NodeReach b = reachOfB(pair.b);
-      a_.children(pair.a, [&](typename A::Node c) { push({boundOf(reachOfA(c), b), c, pair.b}, s); });
+      a_.children(pair.a, [&](typename A::Node c) { push({boundOf(c, reachOfA(c), pair.b, b), c, pair.b}, s); });
     }
   }
 
