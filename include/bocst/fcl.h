@@ -32,27 +32,35 @@ namespace bocst {
 /// Do the two geometries at these poses (world from geometry) touch? As fcl::collide: returns result.numContacts(),
 /// which accumulates; stops at request.num_max_contacts; adds nothing when request.isSatisfied(result) already.
 ///
-/// A pair with a Model: partners are another Model and fcl::BVHModel<BV> of any BV. With exact answers there is one
-/// contact for each pair of triangles that touch, and the set of pairs is the one that FCL reports for
-/// BVHModel<OBBRSS>; FCL may list a pair more than once, we do not.
+/// A pair with a Model: partners are another Model, fcl::BVHModel<BV> of any BV, FCL's shapes (Box, Sphere, Ellipsoid,
+/// Capsule, Cone, Cylinder, Convex, Plane, Halfspace, TriangleP) and OcTree. With exact answers there is one contact
+/// for each pair of primitives that touch: triangles, shapes, occupied cells of an octree. Between meshes the set of
+/// pairs is the one that FCL reports for BVHModel<OBBRSS>; FCL may list a pair more than once, we do not. Shapes and
+/// cells are solid; to a triangle they touch when the two meet, or when FCL's own test says so, which may be where they
+/// are apart by less than its tolerance (gjk_tolerance, and rounding in S).
 /// - o1, o2: the caller's order, whatever the geometries are.
 /// - b1, b2: triangle ids; on the side of a Model with conservative answers, the Morton code of the cell at its
-///   collision depth (x in the lowest bit of each triple).
-/// - with enable_contact: normal is a unit vector from o1 to o2 in world frame, penetration_depth >= 0 the length of
-///   the shortest translation of o2's triangle (or sphere) along normal that ends the contact of these two
-///   primitives, pos a point midway in their overlap. It is about two primitives, not about two solids.
-/// - with a margin (Options::margin, the sum of both models'), a contact is a pair of primitives no farther apart than
-///   that; penetration_depth is the margin minus their distance (plus the depth above, when they meet), normal the way
-///   between their nearest points, and pos the middle of it.
-/// - solid (Options::solid): where no primitives touch but one geometry is inside the other, there is one contact, with
-///   Contact::NONE for b1 and b2; penetration_depth is the distance of the surfaces (plus the margin), which is what it
-///   takes at least to part them, normal the way for o2 (that brings the surfaces together there), pos between the
-///   nearest points. Beside a BVHModel, a query whose bounding balls meet takes time linear in its triangles for that.
+///   collision depth (x in the lowest bit of each triple); Contact::NONE for shapes; for octrees the query cell id of
+///   FCL, whole.
+/// - with enable_contact: normal is a unit vector from o1 to o2 in world frame, penetration_depth >= 0 the length of a
+///   translation of o2's primitive along normal that ends the contact of these two primitives, pos a point in or beside
+///   their overlap. The translation is the shortest between triangles, and between triangles and boxes, balls, cells,
+///   planes and half-spaces; with other shapes seldom longer. It is about two primitives, not about two solids.
+/// - with a margin (Options::margin, the sum of both models'; between models and BVHModels), a contact is a pair of
+///   primitives no farther apart than that; penetration_depth is the margin minus their distance (plus the depth above,
+///   when they meet), normal the way between their nearest points, and pos the middle of it.
+/// - solid (Options::solid; between models and BVHModels): where no primitives touch but one geometry is inside the
+///   other, there is one contact, with Contact::NONE for b1 and b2; penetration_depth is the distance of the surfaces
+///   (plus the margin), which is what it takes at least to part them, normal the way for o2 (that brings the surfaces
+///   together there), pos between the nearest points. Beside a BVHModel, a query whose bounding balls meet takes time
+///   linear in its triangles for that.
 /// - without enable_contact: normal, pos and penetration_depth are NaN.
-/// - enable_cost adds the overlap of the triangles' world boxes, as FCL's mesh-mesh query does.
+/// - enable_cost adds the overlap of the primitives' world boxes, as FCL does; with shapes and octrees, and
+///   use_approximate_cost, that of the box about the whole mesh (unlike FCL, for occupied cells too).
 /// Collisions are reported between occupied geometries only (cost_density >= threshold_occupied), as in FCL.
 ///
-/// The verdict does not depend on the GJK solver, on the argument order, nor on what is resident.
+/// The verdict does not depend on the argument order, nor on what is resident, nor on the GJK solver, but for a
+/// triangle and a shape or a cell that are apart by less than the solver's tolerance.
 /// @throws std::invalid_argument for a partner that is not supported (FCL would answer 0, "free").
 /// Thread rule: any number of threads on the same models, each with its own request and result.
 template <typename S>
@@ -60,7 +68,7 @@ BOCST_EXPORT std::size_t collide(const fcl::CollisionGeometry<S>* o1, const fcl:
                                  const fcl::CollisionGeometry<S>* o2, const fcl::Transform3<S>& X_W2,
                                  const fcl::CollisionRequest<S>& request, fcl::CollisionResult<S>& result);
 
-/// The same for callers that bring a solver, which pairs with a Model do not use. Solver is one of FCL's two.
+/// The same for callers that bring a solver, one of FCL's two: its tolerance takes the place of the request's.
 template <typename S, typename Solver>
 BOCST_EXPORT std::size_t collide(const fcl::CollisionGeometry<S>* o1, const fcl::Transform3<S>& X_W1,
                                  const fcl::CollisionGeometry<S>* o2, const fcl::Transform3<S>& X_W2,
@@ -71,17 +79,19 @@ BOCST_EXPORT std::size_t collide(const fcl::CollisionGeometry<S>* o1, const fcl:
 /// fcl::distance: lowers result.min_distance, a running minimum that a result brings along, and returns it; does
 /// nothing when request.isSatisfied(result) already.
 ///
-/// A pair with a Model: partners are another Model and fcl::BVHModel<BV> of any BV. Surfaces that touch are at distance
-/// 0; a model wholly inside another is as far as the surfaces are, for models are shells, unless the outer one is
-/// solid: then it is at 0, and the nearest points are not those of a contact. A margin does not matter.
-/// - o1, o2, b1, b2, nearest_points: the caller's order; triangle ids (or the Morton codes of cells, see collide());
-///   points on the surfaces (or spheres), world frame, if enable_nearest_points.
+/// A pair with a Model: the partners of collide(); of an octree, its occupied cells. What touches is at distance 0; a
+/// model wholly inside another is as far as the surfaces are, for models are shells, unless the outer one is solid:
+/// then it is at 0, and the nearest points are not those of a contact. Shapes and cells are solid. A margin does not
+/// matter. An octree without occupied cells leaves the result as it is.
+/// - o1, o2, b1, b2, nearest_points: the caller's order; ids as in collide(), DistanceResult::NONE for shapes; points
+///   on the surfaces (or spheres), world frame, if enable_nearest_points.
 /// - with conservative answers, the distance of the spheres of the collision depth: never more than that of the
 ///   surfaces, 0 where spheres overlap.
 /// - abs_err and rel_err allow an answer that is larger than the least distance by so much, as in FCL.
 /// - enable_signed_distance: surfaces that touch are at minus the penetration_depth of one contact as collide() gives
-///   it, with both points there, as FCL does for meshes; it is about two triangles, not about two solids.
-/// Errors of the answer are below 1e-11 of the sizes; it does not depend on the solver, nor on what is resident.
+///   it, with both points there, as FCL does for meshes; it is about two primitives, not about two solids.
+/// Errors of the answer are below 1e-11 of the sizes, with ellipsoids, cones and cylinders below 1e-8, and rounding of
+/// S; it does not depend on the solver, nor on what is resident.
 /// @throws std::invalid_argument for a partner that is not supported.
 /// Thread rule: as collide().
 template <typename S>

@@ -77,6 +77,7 @@ class OcTreeSide {
   }
   query::Sphere sphere(const Node& n) const { return {n.center, std::sqrt(3.0) * n.half}; }
 
+  bool isBox(const Node&) const { return true; }
   query::Gap gap(const Node& n, const query::Points& points, double enough) const {
     Eigen::Vector3d x[8];
     query::Gap gap = bodyOf(n).gap(about(n, points, x), enough);

@@ -292,10 +292,12 @@ Touch ConvexBody::part(const Points& points) const {
     const Vector3d e = points.x[(i + 1) % points.count] - corner, f = points.x[(i + 2) % points.count] - corner;
     const Vector3d n = e.cross(f);
     if (i == 0) consider(n);
-    consider(e.cross(n));
-    consider(corner - center);
-    const double ee = e.squaredNorm();
-    if (ee > 0) consider(corner - center + e * std::clamp(e.dot(center - corner) / ee, 0.0, 1.0));
+    if (!isBox()) {
+      consider(e.cross(n));
+      consider(corner - center);
+      const double ee = e.squaredNorm();
+      if (ee > 0) consider(corner - center + e * std::clamp(e.dot(center - corner) / ee, 0.0, 1.0));
+    }
     for (int k = 0; k < 3; ++k) {
       const Vector3d c = e.cross(box_.axes.col(k));
       // Nearly parallel edges: their cross product is rounding.
@@ -304,7 +306,7 @@ Touch ConvexBody::part(const Points& points) const {
   }
   touch = starts[0];
   for (const Touch& start : starts) {
-    if (!std::isfinite(start.depth)) break;
+    if (isBox() || !std::isfinite(start.depth)) break;
     const Touch way = descend(start.normal, points);
     if (way.depth < touch.depth) touch = way;
   }
@@ -371,13 +373,22 @@ Vector3d RoundBody::support(const Vector3d& d) const {
   return Vector3d(d[0] * radius, d[1] * radius, up ? half_length_ : -half_length_);
 }
 
-TriangleBody::TriangleBody(const Corners& corners) {
-  for (int k = 0; k < 3; ++k) corners_[k] = corners[k];
-  const Vector3d lo = corners[0].cwiseMin(corners[1]).cwiseMin(corners[2]);
-  const Vector3d hi = corners[0].cwiseMax(corners[1]).cwiseMax(corners[2]);
-  box_.center = (lo + hi) / 2;
-  box_.half = (hi - lo) / 2;
+namespace {
+
+Eigen::AlignedBox3d boxOf(const Corners& corners) {
+  Eigen::AlignedBox3d box;
+  for (const Vector3d& corner : corners) box.extend(corner);
+  return box;
 }
+
+}  // namespace
+
+TriangleBody::TriangleBody(const Corners& corners)
+    : ConvexBody(boxOf(corners).center(), boxOf(corners).sizes() / 2, 0) {
+  for (int k = 0; k < 3; ++k) corners_[k] = corners[k];
+}
+
+Vector3d TriangleBody::support(const Vector3d& d) const { return Points{corners_, 3}.support(d); }
 
 namespace {
 
@@ -388,7 +399,8 @@ void asTriangle(const Points& points, Corners& corners) {
 
 }  // namespace
 
-Gap TriangleBody::gap(const Points& points, double) const {
+Gap TriangleBody::gap(const Points& points, double enough) const {
+  if (points.count > 3) return ConvexBody::gap(points, enough);
   Gap gap;
   Corners other;
   asTriangle(points, other);
@@ -401,6 +413,7 @@ Gap TriangleBody::gap(const Points& points, double) const {
 }
 
 Touch TriangleBody::part(const Points& points) const {
+  if (points.count > 3) return ConvexBody::part(points);
   Corners other;
   asTriangle(points, other);
   return partTriangles(corners_, other);

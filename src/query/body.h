@@ -45,7 +45,7 @@ struct Gap {
   double distance = std::numeric_limits<double>::infinity();
   Eigen::Vector3d on_body = Eigen::Vector3d::Zero(), on_points = Eigen::Vector3d::Zero();
 
-  bool touches() const { return !(atLeast > 0); }
+  bool touches() const { return !(atLeast > 0 && distance > 0); }
 };
 
 class Body {
@@ -54,6 +54,9 @@ class Body {
 
   /// A box about the body; of an unbounded one, about as much of it as its maker was told to care for.
   const OrientedVolume& box() const { return box_; }
+
+  /// The box is the body, or as good: what meets the one is worth a look at the other.
+  virtual bool isBox() const { return false; }
 
   /// The distance of the points. More than `enough` is not looked at closely.
   virtual Gap gap(const Points& points, double enough) const = 0;
@@ -92,6 +95,8 @@ class ConvexBody : public Body {
 class BoxBody final : public ConvexBody {
  public:
   explicit BoxBody(const Eigen::Vector3d& half);
+
+  bool isBox() const override { return true; }
 
  protected:
   Eigen::Vector3d support(const Eigen::Vector3d& d) const override;
@@ -136,12 +141,15 @@ class RoundBody final : public ConvexBody {
 };
 
 /// A triangle, which parts as triangles do.
-class TriangleBody final : public Body {
+class TriangleBody final : public ConvexBody {
  public:
   explicit TriangleBody(const Corners& corners);
 
   Gap gap(const Points& points, double enough) const override;
   Touch part(const Points& points) const override;
+
+ protected:
+  Eigen::Vector3d support(const Eigen::Vector3d& d) const override;
 
  private:
   Corners corners_;
@@ -152,6 +160,7 @@ class HalfspaceBody final : public Body {
  public:
   HalfspaceBody(const Eigen::Vector3d& normal, double height, const Sphere& region);
 
+  bool isBox() const override { return true; }
   Gap gap(const Points& points, double enough) const override;
   Touch part(const Points& points) const override;
 
@@ -165,6 +174,7 @@ class PlaneBody final : public Body {
  public:
   PlaneBody(const Eigen::Vector3d& normal, double height, const Sphere& region);
 
+  bool isBox() const override { return true; }
   Gap gap(const Points& points, double enough) const override;
   Touch part(const Points& points) const override;
 

@@ -31,6 +31,7 @@ class BodySide {
   OrientedVolume volume(Node) const { return body_.box(); }
   Sphere sphere(Node) const { return {body_.box().center, body_.box().half.norm()}; }
 
+  bool isBox(Node) const { return body_.isBox(); }
   Gap gap(Node, const Points& points, double enough) const { return body_.gap(points, enough); }
   Touch part(Node, const Points& points) const { return body_.part(points); }
 

@@ -66,7 +66,20 @@ class DistanceWalk : private BestFirst<DistanceWalk<A, B>, A, B> {
   }
   bool worthIt(double bound) const { return bound < enough(); }
   bool settled() const { return !(limit_ > 0); }
-  bool again(const Pair&) { return false; }
+  // A body may be much smaller than the box about it: what is worth a look is bounded by the body itself, once.
+  bool again(const Pair& pair) {
+    if constexpr (B::kBodies) {
+      if (spheres() || b_.isBox(pair.b)) return false;
+      Eigen::Vector3d corners[8];
+      cornersOf(oriented(a_.volume(pair.a)), a_in_b_, corners);
+      const double bound = b_.gap(pair.b, {corners, 8}, enough() * a_in_b_.scale).atLeast * b_in_a_.scale;
+      if (!(bound > pair.bound * (1 + 1e-9))) return false;
+      this->push({bound, pair.a, pair.b});
+      return true;
+    } else {
+      return false;
+    }
+  }
   double scaleOfB() const { return b_in_a_.scale; }
 
   NodeReach reachOfA(typename A::Node n) const { return NodeReach(a_.volume(n), Placement()); }

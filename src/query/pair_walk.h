@@ -88,6 +88,15 @@ class PairWalk {
     }
   }
 
+  // May the box of a node meet the body itself, and not only the box about it?
+  bool boxMeets(typename A::Node a, typename B::Node b) const {
+    if (b_.isBox(b)) return true;
+    Eigen::Vector3d corners[8];
+    cornersOf(oriented(a_.volume(a)), a_in_b_, corners);
+    const double slack = a_in_b_.slack + 4 * a_in_b_.defect * a_in_b_.translation.norm();
+    return !(b_.gap(b, {corners, 8}, slack).atLeast > slack);
+  }
+
   // The larger of two nodes is expanded, unless it is a leaf.
   static bool expandsA(State sa, State sb, double size_a, double size_b) {
     return sb == State::kLeaf || (sa != State::kLeaf && size_a >= size_b);
@@ -115,7 +124,13 @@ class PairWalk {
             return false;
           }
         }
-        a_.overlappingChildren(pair.a, volumeOf(b_, seen_b_), b_in_a_, push);
+        if constexpr (B::kBodies) {
+          a_.overlappingChildren(pair.a, volumeOf(b_, seen_b_), b_in_a_, [&](typename A::Node c) {
+            if (boxMeets(c, pair.b)) push(c);
+          });
+        } else {
+          a_.overlappingChildren(pair.a, volumeOf(b_, seen_b_), b_in_a_, push);
+        }
       }
     } else if (sb == State::kGrows) {
       s.aside.add(pair);

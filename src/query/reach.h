@@ -23,10 +23,12 @@ struct NodeReach {
 
   NodeReach(const Volume& v, const Placement& to) : axes(to.rotation) {
     center = to * Eigen::Vector3d(v.center[0], v.center[1], v.center[2]);
-    half = Eigen::Vector3d(v.half[0], v.half[1], v.half[2]) * to.scale;
+    // All but the centre was rounded to float: twice over is enough.
+    constexpr double round = 0x1p-22;
+    half = Eigen::Vector3d(v.half[0], v.half[1], v.half[2]) * (to.scale * (1 + round));
     normal = to.rotation * Eigen::Vector3d(v.normal[0], v.normal[1], v.normal[2]);
     slab_offset = v.slab_offset * to.scale;
-    slab_half = v.slab_half * to.scale;
+    slab_half = v.slab_half * to.scale + round * (std::abs(slab_offset) + half.sum());
   }
   NodeReach(const OrientedVolume& v, const Placement& to)
       : center(to * v.center), axes(to.rotation * v.axes), half(v.half * to.scale) {}

@@ -119,11 +119,20 @@ inline OrientedVolume oriented(const Volume& v) {
   OrientedVolume o;
   for (int k = 0; k < 3; ++k) {
     o.center[k] = v.center[k];
-    o.half[k] = v.half[k];
+    o.half[k] = v.half[k] * (1 + 0x1p-22);  // it was rounded to float
   }
   return o;
 }
 inline const OrientedVolume& oriented(const OrientedVolume& v) { return v; }
+
+/// The corners of a box, placed.
+inline void cornersOf(const OrientedVolume& box, const Placement& to, Eigen::Vector3d (&corners)[8]) {
+  const Eigen::Vector3d center = to * box.center;
+  const Eigen::Matrix3d edges = to.rotation * box.axes * (box.half * to.scale).asDiagonal();
+  for (int i = 0; i < 8; ++i) {
+    corners[i] = center + edges * Eigen::Vector3d(i & 1 ? 1 : -1, i & 2 ? 1 : -1, i & 4 ? 1 : -1);
+  }
+}
 
 /// Are the two boxes surely apart? The fifteen axes in double; `to` places b in a's frame. For the few pairs that no
 /// kernel sees.

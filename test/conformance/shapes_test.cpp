@@ -558,6 +558,40 @@ TEST(ShapesDouble, DegenerateMeshes) {
   }
 }
 
+// Discs, needles, sheets and points: as those that are a little thicker.
+TEST(ShapesDouble, ShapesWithoutExtent) {
+  const Raw raw = test::torus(14);
+  const Modeld model(raw.mesh());
+  const auto make = [](double e) {
+    return std::vector<std::shared_ptr<fcl::ShapeBase<double>>>{
+        std::make_shared<fcl::Boxd>(1, 1, e),       std::make_shared<fcl::Boxd>(e, 1, e),
+        std::make_shared<fcl::Boxd>(e, e, e),       std::make_shared<fcl::Sphered>(e),
+        std::make_shared<fcl::Capsuled>(e, 1),      std::make_shared<fcl::Capsuled>(0.3, e),
+        std::make_shared<fcl::Cylinderd>(0.5, e),   std::make_shared<fcl::Cylinderd>(e, 1),
+        std::make_shared<fcl::Coned>(0.5, e),       std::make_shared<fcl::Coned>(e, 1),
+        std::make_shared<fcl::Ellipsoidd>(1, 1, e), std::make_shared<fcl::Ellipsoidd>(e, 1, e)};
+  };
+  const auto thin = make(0), thick = make(1e-7);
+  const auto I = test::pose<double>(Eigen::Matrix3d::Identity(), {0, 0, 0});
+  std::mt19937_64 g(11);
+  int hits = 0;
+  for (std::size_t s = 0; s < thin.size(); ++s) {
+    for (int i = 0; i < 30; ++i) {
+      const auto Y = test::pose<double>(test::randomRotation(g), test::randomDirection(g));
+      const bool touch = test::touching<double>(model, I, *thin[s], Y);
+      hits += touch;
+      const double d = askDistance<double>(model, I, *thin[s], Y).min_distance;
+      ASSERT_NEAR(d, askDistance<double>(model, I, *thick[s], Y).min_distance, 1e-6) << s << ' ' << i;
+      if (touch) {
+        ASSERT_TRUE(test::touching<double>(*thick[s], Y, model, I)) << s << ' ' << i;
+      } else {
+        ASSERT_GT(d, 0);
+      }
+    }
+  }
+  EXPECT_GT(hits, 60);
+}
+
 TEST(ShapesDouble, WhatIsWhollyInsideASolidTouchesIt) {
   Raw raw = test::torus(12);
   raw.scale(0.01);

@@ -52,7 +52,7 @@ touch a.off b.OBJ "c d.ply" e.txt f.json
 expect "$(printf '%s\n' --help --version $commands | sort | tr '\n' ' ' | sed 's/ $//')" ""
 expect "inspect" in
 expect "octree" inspect a.off --subdivision o
-expect "auto compute cpu occlusion" collide a.off a.off --oracle ""
+expect "auto compute cpu occlusion sampled" collide a.off a.off --oracle ""
 expect "a.off b.OBJ c d.ply folder" inspect ""
 expect "c d.ply" collide a.off c
 expect "f.json folder" merge f

@@ -280,6 +280,12 @@ TEST(Body, TrianglesPartAsTriangles) {
   EXPECT_NEAR(body.part({across, 3}).depth, 0.25, 1e-12);
   EXPECT_NEAR(body.part({across, 3}).normal.z(), 1, 1e-12);
   EXPECT_NEAR(body.gap({off, 3}, kFar).distance, 1, 1e-12);
+  // More points than three.
+  Vector3d corners[8];
+  for (const double z : {-0.5, 0.25}) {
+    for (int i = 0; i < 8; ++i) corners[i] = Vector3d(i & 1 ? 5 : 0.5, i & 2 ? 5 : 0.5, z + (i & 4 ? 1 : 0));
+    EXPECT_EQ(body.gap({corners, 8}, kFar).touches(), z < 0);
+  }
 }
 
 }  // namespace
