@@ -104,8 +104,17 @@ double walk(const Question<S>& q, const Mesh* mesh1, const Mesh* mesh2, bool& sa
   return time;
 }
 
+/// @throws std::invalid_argument for partners that only collide() and distance() know, wherever they are.
+template <typename S>
+void checkPartner(const Question<S>& q) {
+  for (const auto* o : {q.o1, q.o2}) {
+    if (dynamic_cast<const Model<S>*>(o) == nullptr) withBvh<S>("continuousCollide", o, [](const auto&) {});
+  }
+}
+
 template <typename S>
 double firstContact(const Question<S>& q) {
+  checkPartner(q);
   const fcl::Transform3<S> X_W1 = poseAt<S>(q.motion1, 0), X_W2 = poseAt<S>(q.motion2, 0);
   for (;;) {
     // Held, so that another mesh does not get the address of one of these.

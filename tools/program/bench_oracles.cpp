@@ -10,6 +10,7 @@
 #include <map>
 #include <memory>
 #include <set>
+#include <utility>
 
 #include "oracle/oracle.h"
 
@@ -175,9 +176,11 @@ int OracleBench::run(const Output& output) const {
   table.row({"triangles", "oracle", "upload", "first answer", "batch: cells", "pairs", "time", "cells/s", "pairs/s",
              "device: upload", "kernels", "read-back", "bytes host", "device"});
   Progress progress("row", sizes.size() * oracles.size());
+  std::size_t last = 0;
   for (const std::size_t size : sizes) {
     // As near as whole subdivisions come.
     while (static_cast<double>(mesh->triangleCount()) * 2 < static_cast<double>(size)) mesh = subdivided(*mesh);
+    if (std::exchange(last, mesh->triangleCount()) == mesh->triangleCount()) continue;
     for (const OracleInfo& info : oracles) {
       progress.step();
       if (slow.count(info.name) != 0) continue;
