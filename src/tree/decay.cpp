@@ -1,0 +1,210 @@
+// SPDX-License-Identifier: BSD-3-Clause
+// How branches go: by age and by budget, and where their triangles are then.
+#include <algorithm>
+#include <mutex>
+#include <numeric>
+
+#include "tree/tree.h"
+
+namespace bocst::tree {
+
+void Tree::collectTriangles(Link link, const lattice::Cell& cell, std::vector<std::uint32_t>& ids) const {
+  if (link.tag() == Link::kBlock) {
+    const Block& block = blocks_[link.index()];
+    for (int o = 0; o < 8; ++o) {
+      if (block.grey >> o & 1) collectTriangles(block.child[o].load(std::memory_order_relaxed), cell.octant(o), ids);
+    }
+  } else if (link.isList()) {
+    const TriangleList list = this->list(link);
+    ids.insert(ids.end(), list.ids, list.ids + list.count);
+  } else {
+    grid_->gather(surface_, cell, ids);
+  }
+}
+
+Link Tree::copyList(Link list, Pool<std::uint32_t, 12>& lists) const {
+  const std::uint32_t* from = &lists_[list.index()];
+  const std::size_t words = (from[0] & kKept) != 0 ? kKeptWords : from[0] + std::size_t{1};
+  const std::uint32_t index = lists.append(words);
+  std::copy_n(from, words, &lists[index]);
+  return Link(list.tag(), index);
+}
+
+// The list of a node whose block goes.
+Link Tree::regained(Link block, const lattice::Cell& cell, Pool<std::uint32_t, 12>& lists) const {
+  if (grid_ != nullptr && cell.level <= grid_->level()) return Link();
+  const std::uint32_t own = blocks_[block.index()].own_list;
+  if (own != Block::kNone) {
+    const bool is_short = lists_[own] <= kLeafTriangles;  // the length of a list that the oracle keeps looks huge
+    return copyList(Link(is_short ? Link::kShortList : Link::kList, own), lists);
+  }
+  std::vector<std::uint32_t> ids;
+  collectTriangles(block, cell, ids);
+  std::sort(ids.begin(), ids.end());
+  ids.erase(std::unique(ids.begin(), ids.end()), ids.end());
+  const std::uint32_t index = lists.append(ids.size() + 1);
+  lists[index] = static_cast<std::uint32_t>(ids.size());
+  std::copy(ids.begin(), ids.end(), &lists[index] + 1);
+  return Link(ids.size() <= kLeafTriangles ? Link::kShortList : Link::kList, index);
+}
+
+void Tree::dropUnusedShelves() {
+  // Which shelves do the lists that stay lie on? Each is known by its first use.
+  std::vector<std::uint8_t> used(shelves_.size(), 0);
+  const auto mark = [&](std::uint32_t list) {
+    if ((lists_[list] & kKept) != 0) used[lists_[list + 1]] = 1;
+  };
+  for (std::uint32_t i = 0; i < blocks_.size(); ++i) {
+    const Block& block = blocks_[i];
+    if (block.own_list != Block::kNone) mark(block.own_list);
+    for (int o = 0; o < 8; ++o) {
+      const Link link = block.child[o].load(std::memory_order_relaxed);
+      if ((block.grey >> o & 1) != 0 && link.isList()) mark(link.index());
+    }
+  }
+  for (std::size_t i = 0; i < shelves_.size(); ++i) {
+    if (!used[i]) shelves_[i] = nullptr;
+  }
+}
+
+// Copies what stays into fresh pools: what goes leaves no holes, and nothing of it is looked at again.
+void Tree::keepOnly(const std::vector<std::uint8_t>& keep) {
+  const Link old_root = root_.load(std::memory_order_relaxed);
+  std::size_t before = 0, after = 0;
+  for (auto& n : nodes_at_) {
+    before += n;
+    n = 0;
+  }
+  nodes_at_[1] = 1;
+
+  struct Move {
+    Link from;
+    NodeRef to;
+    lattice::Cell cell;
+  };
+  std::vector<Move> moves{{old_root, NodeRef{}, lattice::Cell{}}};
+  const bool root_stays = old_root.tag() == Link::kBlock && old_root.index() < keep.size() && keep[old_root.index()];
+  if (!root_stays) {
+    grid_known_.store(nullptr, std::memory_order_relaxed);
+    grid_.reset();
+    grid_tried_ = false;
+    root_.store(Link(), std::memory_order_relaxed);
+    blocks_.clear();
+    lists_.clear();
+    shelves_.clear();
+  } else {
+    Pool<Block, 5> blocks;
+    Pool<std::uint32_t, 12> lists;
+    Link root;
+    while (!moves.empty()) {
+      const Move move = moves.back();
+      moves.pop_back();
+      Link link = move.from;
+      if (link.tag() == Link::kBlock && !keep[link.index()]) {
+        link = regained(move.from, move.cell, lists);
+      } else if (link.isList()) {
+        link = copyList(link, lists);
+      } else if (link.tag() == Link::kBlock) {
+        const Block& from = blocks_[link.index()];
+        const std::uint32_t index = blocks.append(1);
+        Block& to = blocks[index];
+        to.octants = from.octants;
+        to.own = from.own;
+        to.grey = from.grey;
+        to.level = from.level;
+        std::copy_n(from.at, 3, to.at);
+        if (from.own_list != Block::kNone) to.own_list = copyList(Link(Link::kList, from.own_list), lists).index();
+        to.stamp.store(from.stamp.load(std::memory_order_relaxed), std::memory_order_relaxed);
+        if (!move.to.isRoot()) {
+          to.parent = move.to.block();
+          to.parent_octant = static_cast<std::uint32_t>(move.to.octant());
+        }
+        nodes_at_[from.level + 1] += __builtin_popcount(from.grey);
+        for (int o = 0; o < 8; ++o) {
+          if (from.grey >> o & 1) {
+            moves.push_back(
+                {from.child[o].load(std::memory_order_relaxed), NodeRef::octant(index, o), move.cell.octant(o)});
+          }
+        }
+        link = Link(Link::kBlock, index);
+      }
+      std::atomic<Link>& place = move.to.isRoot() ? root_ : blocks[move.to.block()].child[move.to.octant()];
+      place.store(link, std::memory_order_relaxed);
+    }
+    blocks_.swap(blocks);
+    lists_.swap(lists);
+    dropUnusedShelves();
+  }
+  refits_.clear();  // they name nodes of the old pools
+  refits_wait_.store(false, std::memory_order_relaxed);
+  for (const auto& n : nodes_at_) after += n;
+  if (before > after) pruned_ += before - after;
+  countBytes();
+}
+
+void Tree::pruneAlone(std::int64_t now, bool budget_only) {
+  if (!budget_only && options_.ttl.count() > 0 && root_.load(std::memory_order_relaxed).tag() == Link::kBlock) {
+    const std::int64_t ttl = std::chrono::duration_cast<std::chrono::nanoseconds>(options_.ttl).count();
+    // Children come after their parents in the pool, so one backward pass sees every child first.
+    std::vector<std::uint8_t> keep(blocks_.size(), 1);
+    bool some = false;
+    for (std::uint32_t i = blocks_.size(); i-- > 0;) {
+      const Block& block = blocks_[i];
+      bool deepest = true;
+      for (int o = 0; o < 8; ++o) {
+        if ((block.grey >> o & 1) == 0) continue;
+        const Link child = block.child[o].load(std::memory_order_relaxed);
+        if (child.tag() != Link::kBlock) continue;
+        deepest = false;
+        if (!keep[child.index()]) block.stamp.store(now, std::memory_order_relaxed);  // its own time starts (3.1)
+      }
+      if (deepest && now - block.stamp.load(std::memory_order_relaxed) > ttl) {
+        keep[i] = 0;
+        some = true;
+      }
+    }
+    if (some) keepOnly(keep);
+  }
+  applyBudget();
+}
+
+void Tree::applyBudget() {
+  const std::size_t budget = options_.memory_budget;
+  if (budget == 0 || bytes_ <= budget) return;
+  // Lists of dropped branches come back at their parents, so how much must go shows only when it is gone.
+  auto count = static_cast<std::size_t>(0.75 * static_cast<double>(budget) / static_cast<double>(bytes_) *
+                                        static_cast<double>(blocks_.size()));
+  for (;; count /= 2) {
+    // Most recently used first, and with each block all that leads to it.
+    std::vector<std::uint32_t> order(blocks_.size());
+    std::iota(order.begin(), order.end(), 0u);
+    std::stable_sort(order.begin(), order.end(), [this](std::uint32_t a, std::uint32_t b) {
+      return blocks_[a].stamp.load(std::memory_order_relaxed) > blocks_[b].stamp.load(std::memory_order_relaxed);
+    });
+    std::vector<std::uint8_t> keep(blocks_.size(), 0);
+    for (std::size_t k = 0; k < std::min(count, order.size()); ++k) {
+      for (std::uint32_t i = order[k]; i != Block::kNone && !keep[i]; i = blocks_[i].parent) keep[i] = 1;
+    }
+    keepOnly(keep);
+    if (bytes_ <= budget || count == 0) return;
+  }
+}
+
+void Tree::afterQuery(std::int64_t now) {
+  const bool refits = refits_wait_.load(std::memory_order_relaxed);
+  const bool over_budget = options_.memory_budget != 0 && bytes_ > options_.memory_budget;
+  std::int64_t due = next_prune_.load(std::memory_order_relaxed);
+  bool time_to = options_.ttl.count() > 0 && now >= due;
+  if (time_to) {
+    // A quarter of ttl between looks keeps the cost away from queries; whoever moves the time does the work.
+    const std::int64_t step = std::chrono::duration_cast<std::chrono::nanoseconds>(options_.ttl).count() / 4 + 1;
+    time_to = next_prune_.compare_exchange_strong(due, now + step, std::memory_order_relaxed);
+  }
+  if (!refits && !over_budget && !time_to) return;
+  const std::unique_lock<Gate> alone(gate_, std::try_to_lock);
+  if (!alone.owns_lock()) return;
+  if (refits) refit();
+  if (over_budget || time_to) pruneAlone(now, !time_to);
+}
+
+}  // namespace bocst::tree
