@@ -44,6 +44,10 @@ expect '^cpu +no +yes' 0 "${mesa[@]}" GALLIUM_DRIVER=softpipe "$bocst" oracles
 expect 'no device 99|not one of' 1 "${mesa[@]}" BOCST_ORACLE=99 "$bocst" collide "${pair[@]}"
 expect 'They collide' 0 "${mesa[@]}" BOCST_ORACLE=0 "$bocst" collide "${pair[@]}"
 
+expect '^auto takes cpu' 0 "${no_driver[@]}" "$bocst" oracles
+expect '^auto takes occlusion' 0 "${mesa[@]}" BOCST_ORACLE=occlusion "$bocst" oracles
+expect '^auto takes none: .*no device 99' 0 "${mesa[@]}" BOCST_ORACLE=99 "$bocst" oracles
+
 # No HOME, no DISPLAY, nothing; and as somebody who owns nothing.
 expect 'They collide' 0 -i "${mesa[@]}" "$bocst" collide "${pair[@]}" --oracle compute
 if [[ $EUID -eq 0 ]]; then

@@ -2,9 +2,12 @@
 #include <bocst/oracle.h>
 
 #include <CLI/CLI.hpp>
+#include <iostream>
 #include <memory>
+#include <string>
 
 #include "arguments.h"
+#include "oracle/oracle.h"
 
 namespace bocst::program {
 
@@ -27,10 +30,20 @@ void addOracles(CLI::App& program, Job& job) {
         table.row({oracle.name, oracle.hardware ? "yes" : "no",
                    oracle.why_not.empty() ? "yes" : "no: " + oracle.why_not, oracle.device});
       }
+      // What a model takes that leaves the choice open.
+      std::string automatic, why_not;
+      try {
+        automatic = oracle::makeOracle(OracleKind::kAuto)->name();
+      } catch (const OracleError& e) {
+        why_not = e.what();
+      }
+      report["auto"] = automatic.empty() ? Json() : Json(automatic);
+      if (!why_not.empty()) report["auto_why_not"] = why_not;
       if (output->wantsJson()) {
         output->write(report);
       } else {
         table.print();
+        std::cout << "\nauto takes " << (automatic.empty() ? "none: " + why_not : automatic) << '\n';
       }
       return 0;
     };
