@@ -78,8 +78,8 @@ class BOCST_EXPORT Model : public fcl::CollisionGeometry<S> {
   void prune();  ///< As of now.
 
   /// New positions for all vertices, same triangles: the tree falls back to its root, nothing is rebuilt.
-  /// @throws std::invalid_argument for a wrong count, a bad vertex, or what is not watertight if solid, std::logic_error
-  /// after releaseMesh(); the model is then as before.
+  /// @throws std::invalid_argument for a wrong count, a bad vertex, or what is not watertight if solid,
+  /// std::logic_error after releaseMesh(); the model is then as before.
   void updateVertices(std::vector<Eigen::Vector3d> vertices);
 
   // What FCL asks of a geometry.

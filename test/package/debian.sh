@@ -21,7 +21,7 @@ version=$(field libbocst-dev Version)
 for name in "${names[@]}"; do
   deb=$(echo "$work/packages/$name"_*.deb)
   [[ -f $deb ]] || fail "no package $name"
-  dpkg-deb -x "$deb" "$work/root"
+  dpkg-deb -x "$deb" "$work/unpacked"
   dpkg-deb -c "$deb" | awk '$1 !~ /^d/ { print $6 }' | sort >"$work/$name.files"
   grep -q "/doc/$name/copyright$" "$work/$name.files" || fail "$name has no copyright file"
   [[ $(field "$name" Version) == "$version" ]] || fail "$name is of another version"
@@ -48,4 +48,4 @@ if [[ -s $work/bocst.files ]]; then
   done
 fi
 
-"$here/run.sh" "$build" "$work/root/usr"
+"$here/run.sh" "$build" "$work/unpacked/usr"
