@@ -163,6 +163,30 @@ TEST(Compute, NoRoomForListsIsTheCpus) {
   for (const Expansion& e : answers) EXPECT_EQ(e.grey, expected.grey);
 }
 
+TEST(Compute, TablesStayWithinOneBuffer) {
+  // Smaller buffers than any driver's: the states of 3000 cells take 1.7 MB.
+  ComputeChain::Limits limits;
+  limits.bytes = std::size_t{1} << 20;
+  ComputeOracle oracle(newThread(), limits);
+  const Surface surface = heldBy(oracle, surfaceOf(test::torus(16)));
+  std::vector<std::uint32_t> ids(surface.triangle_count);
+  for (std::uint32_t i = 0; i < ids.size(); ++i) ids[i] = i;
+  std::vector<Expansion> batch(3000);
+  for (std::size_t i = 0; i < batch.size(); ++i) {
+    batch[i].surface = &surface;
+    batch[i].cell = Cell{}.octant(static_cast<int>(i % 8)).octant(static_cast<int>(i / 8 % 8));
+    batch[i].ids = &ids[i % ids.size()];
+    batch[i].count = 1;
+  }
+  const std::vector<Expansion> answers = ask(oracle, batch);
+  EXPECT_EQ(oracle.leftToCpu(), 0u);
+  for (std::size_t i = 0; i < batch.size(); ++i) {
+    Expansion expected = batch[i];
+    expand(expected);
+    ASSERT_EQ(answers[i].grey, expected.grey) << i;
+  }
+}
+
 TEST(Compute, RunsAgainWhenTheRoomWasTooSmall) {
   // Triangles that meet every octant: lists of eight times the parent's length, where two are expected.
   test::Raw raw = test::soup(500, 1);

@@ -31,9 +31,15 @@ const DeviceMesh* meshOf(const Expansion& e) { return static_cast<const DeviceMe
 
 std::uint32_t narrow(std::uint64_t n) { return static_cast<std::uint32_t>(n); }
 
+// So many cells that their states fit into one buffer.
+ComputeChain::Limits clamped(ComputeChain::Limits limits) {
+  limits.cells = std::max<std::size_t>(1, std::min(limits.cells, limits.bytes / (kStateWords * kWord)));
+  return limits;
+}
+
 }  // namespace
 
-ComputeChain::ComputeChain(Limits limits, Arena& arena) : limits_(limits), arena_(arena) {
+ComputeChain::ComputeChain(Limits limits, Arena& arena) : limits_(clamped(limits)), arena_(arena) {
   GLint bindings = 0;
   glGetIntegerv(GL_MAX_COMPUTE_SHADER_STORAGE_BLOCKS, &bindings);
   if (bindings < 8) throw OracleError("the driver binds only " + std::to_string(bindings) + " storage buffers, not 8");
@@ -64,6 +70,14 @@ std::size_t ComputeChain::part(const std::vector<Expansion*>& questions, std::si
     ++n;
   }
   return n;
+}
+
+// What a shader reaches beyond the limit reads as nothing, and nothing means white: that must not happen unseen.
+void ComputeChain::reserve(Buffer& buffer, std::size_t words) const {
+  if (words * kWord > limits_.bytes) {
+    throw OracleError("a table of " + std::to_string(words * kWord) + " bytes is more than the device takes");
+  }
+  buffer.reserve(words * kWord);
 }
 
 void ComputeChain::upload(const std::vector<Expansion*>& questions) {
@@ -104,11 +118,11 @@ void ComputeChain::upload(const std::vector<Expansion*>& questions) {
     ranges_.back().cell_end = narrow(rows_.size());
     ranges_.back().pair_end = pairs;
   }
-  cells_.reserve(rows_.size() * sizeof(Cell));
+  reserve(cells_, rows_.size() * sizeof(Cell) / kWord);
   cells_.write(0, rows_.size() * sizeof(Cell), rows_.data());
-  states_.reserve(rows_.size() * kStateWords * kWord);
+  reserve(states_, rows_.size() * kStateWords);
   states_.clear(rows_.size() * kStateWords * kWord);
-  masks_.reserve(std::max<std::size_t>(pairs, 1) * kWord);
+  reserve(masks_, std::max<std::size_t>(pairs, 1));
   if (uploaded_ != nullptr) arena_.buffer().write(uploaded_->begin() * kWord, ids.size() * kWord, ids.data());
 }
 
@@ -138,7 +152,7 @@ void ComputeChain::dispatchPairs(Pass pass) const {
 }
 
 void ComputeChain::placeAndFill() {
-  answers_.reserve((kHeader + rows_.size() * kRow + id_room_) * kWord);
+  reserve(answers_, kHeader + rows_.size() * kRow + id_room_);
   answers_.clear(kHeader * kWord);
   const GLuint bound[] = {arena_.buffer().name(), cells_.name(), states_.name(), masks_.name(), answers_.name()};
   for (GLuint i = 0; i < 5; ++i) glBindBufferBase(GL_SHADER_STORAGE_BUFFER, 2 + i, bound[i]);

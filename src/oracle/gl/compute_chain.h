@@ -54,6 +54,7 @@ class ComputeChain {
     GLint pairs, cells, cell_count, list_room, id_room;
   };
 
+  void reserve(Buffer& buffer, std::size_t words) const;
   void upload(const std::vector<Expansion*>& questions);
   void dispatch(Pass pass, std::uint64_t invocations) const;
   void dispatchPairs(Pass pass) const;
