@@ -43,7 +43,7 @@ class BestFirst {
     std::size_t batch = kFirstBatch;
     for (;;) {
       while (!heap_.heap.empty() && walk().worthIt(heap_.heap.front().bound) && heap_.waiting.size() < batch) {
-        std::pop_heap(heap_.heap.begin(), heap_.heap.end(), later);
+        std::pop_heap(heap_.heap.begin(), heap_.heap.end(), Later());
         const Pair pair = heap_.heap.back();
         heap_.heap.pop_back();
         step(pair);
@@ -71,6 +71,21 @@ class BestFirst {
                      : walk().boundOf(walk().reachOfA(pair.a), walk().reachOfB(pair.b));
   }
 
+  /// Pushes the pairs of one node's children and the other node. A query may have a faster way of its own.
+  void expand(const Pair& pair, bool expands_a) {
+    if (expands_a) {
+      expandA(pair);
+    } else {
+      expandB(pair);
+    }
+  }
+
+  /// Which node of a pair that is not two leaves is expanded, given their states: the larger that can be.
+  bool expandsA(const Pair& pair, State sa, State sb) const {
+    const double scale = walk().scaleOfB();
+    return sb == State::kLeaf || (sa != State::kLeaf && a_.size(pair.a) >= b_.size(pair.b) * scale * scale);
+  }
+
   bool spheres() const { return a_.cells() || b_.cells(); }
 
   const A& a_;
@@ -80,11 +95,14 @@ class BestFirst {
   static constexpr std::size_t kFirstBatch = 4;
 
   Walk& walk() { return static_cast<Walk&>(*this); }
-  static bool later(const Pair& x, const Pair& y) { return x.bound > y.bound; }
+  const Walk& walk() const { return static_cast<const Walk&>(*this); }
+  struct Later {
+    bool operator()(const Pair& x, const Pair& y) const { return x.bound > y.bound; }
+  };
 
   void put(const Pair& pair) {
     heap_.heap.push_back(pair);
-    std::push_heap(heap_.heap.begin(), heap_.heap.end(), later);
+    std::push_heap(heap_.heap.begin(), heap_.heap.end(), Later());
   }
 
   void step(const Pair& pair) {
@@ -94,15 +112,11 @@ class BestFirst {
       walk().leaves(pair);
       return;
     }
-    const double scale = walk().scaleOfB();
-    const bool expands_a =
-        sb == State::kLeaf || (sa != State::kLeaf && a_.size(pair.a) >= b_.size(pair.b) * scale * scale);
+    const bool expands_a = expandsA(pair, sa, sb);
     if ((expands_a ? sa : sb) == State::kGrows) {
       heap_.waiting.push_back(pair);
-    } else if (expands_a) {
-      expandA(pair);
     } else {
-      expandB(pair);
+      walk().expand(pair, expands_a);
     }
   }
 

@@ -6,12 +6,15 @@
 #include <cstddef>
 #include <cstdint>
 #include <limits>
+#include <optional>
+#include <type_traits>
 #include <vector>
 
 #include "query/best_first.h"
 #include "query/body.h"
 #include "query/reach.h"
 #include "query/side.h"
+#include "query/tree_gaps.h"
 #include "query/triangle.h"
 
 namespace bocst::query {
@@ -35,12 +38,17 @@ template <typename A, typename B>
 class DistanceWalk : private BestFirst<DistanceWalk<A, B>, A, B> {
  public:
   DistanceWalk(const A& a, const B& b, const Placement& b_in_a)
-      : Base(a, b, scratch()), b_in_a_(b_in_a), a_in_b_(b_in_a.inverse()) {}
+      : Base(a, b, scratch()), b_in_a_(b_in_a), a_in_b_(b_in_a.inverse()) {
+    if constexpr (kTrees) {
+      if (!spheres() && PairFrames::fits(b_in_a.scale)) gaps_.emplace(a, b, b_in_a);
+    }
+  }
 
   Nearest run(const DistanceGoal& goal) {
     goal_ = goal;
     limit_ = goal.below;
-    this->search();
+    if (gaps_.has_value()) dive();
+    if (!settled()) this->search();
     return best_;
   }
 
@@ -51,6 +59,7 @@ class DistanceWalk : private BestFirst<DistanceWalk<A, B>, A, B> {
   using Base::a_;
   using Base::b_;
   using Base::spheres;
+  static constexpr bool kTrees = std::is_same<A, TreeSide>::value && std::is_same<B, TreeSide>::value;
 
   struct Scratch : Base::Heap {
     std::vector<TriangleReach> a, b;
@@ -110,11 +119,66 @@ class DistanceWalk : private BestFirst<DistanceWalk<A, B>, A, B> {
     return (b_.gap(body, {&ball.center, 1}, enough() * a_in_b_.scale + reach).atLeast - reach) * b_in_a_.scale;
   }
 
+  // Two trees have their bounds in SIMD.
+  OctantGaps gapsOf(const Pair& pair, bool expands_a) {
+    return expands_a ? gaps_->ofOctants(0, pair.a, pair.b) : gaps_->ofOctants(1, pair.b, pair.a);
+  }
+  template <typename F>
+  void children(const Pair& pair, bool expands_a, F&& f) const {
+    if (expands_a) {
+      a_.children(pair.a, [&](typename A::Node c) { f(c.octant(), c, pair.b); });
+    } else {
+      b_.children(pair.b, [&](typename B::Node c) { f(c.octant(), pair.a, c); });
+    }
+  }
+
+  void expand(const Pair& pair, bool expands_a) {
+    if constexpr (kTrees) {
+      if (gaps_.has_value()) {
+        const OctantGaps gaps = gapsOf(pair, expands_a);
+        children(pair, expands_a, [&](int o, tree::NodeRef a, tree::NodeRef b) {
+          limit_ = std::min(limit_, double{gaps.at_most[o]});
+          this->push({gaps.at_least[o], a, b});
+        });
+        return;
+      }
+    }
+    Base::expand(pair, expands_a);
+  }
+
+  // Straight down to a pair of leaves, if they are resident. With its answer in hand, and the direction in which it
+  // was found, the search from the root on leaves most pairs out at once.
+  void dive() {
+    if constexpr (kTrees) {
+      Pair pair{0, a_.root(), b_.root()};
+      for (;;) {
+        const State sa = a_.state(pair.a), sb = b_.state(pair.b);
+        if (sa == State::kLeaf && sb == State::kLeaf) return leaves(pair);
+        const bool expands_a = this->expandsA(pair, sa, sb);
+        if ((expands_a ? sa : sb) == State::kGrows) return;
+        const OctantGaps gaps = gapsOf(pair, expands_a);
+        float least = std::numeric_limits<float>::infinity();
+        Pair next = pair;
+        children(pair, expands_a, [&](int o, tree::NodeRef a, tree::NodeRef b) {
+          const float guess = gaps.at_least[o] + gaps.at_most[o];
+          if (!(guess < least)) return;
+          least = guess;
+          next = {gaps.at_least[o], a, b};
+        });
+        pair = next;
+      }
+    }
+  }
+
   void found(const Nearest& n) {
     if (!(n.distance < std::min(best_.distance, goal_.below))) return;
     best_ = n;
     limit_ = std::min(limit_, n.distance);
-    if (n.distance > 0) way_ = (n.on_b - n.on_a) / n.distance;
+    if (!(n.distance > 0)) return;
+    way_ = (n.on_b - n.on_a) / n.distance;
+    if constexpr (kTrees) {
+      if (gaps_.has_value()) gaps_->expect(way_);
+    }
   }
 
   void leaves(const Pair& pair) {
@@ -161,6 +225,15 @@ class DistanceWalk : private BestFirst<DistanceWalk<A, B>, A, B> {
       leafSpheres(pair);
       return;
     }
+    if constexpr (kTrees) {
+      if (gaps_.has_value()) {
+        for (const TreeGaps::Candidate& c : gaps_->ofTriangles(pair.a, pair.b, enough())) {
+          if (!worthIt(c.at_least)) break;
+          triangles(c.a, c.b);
+        }
+        return;
+      }
+    }
     Scratch& s = scratch();
     fill(a_, pair.a, Placement(), s.a);
     fill(b_, pair.b, b_in_a_, s.b);
@@ -193,11 +266,19 @@ class DistanceWalk : private BestFirst<DistanceWalk<A, B>, A, B> {
     }
   }
 
-  void triangles(const TriangleReach& t, const TriangleReach& u) {
+  void triangles(const TriangleReach& t, const TriangleReach& u) { triangles(t.id, t.corners, u.id, u.corners); }
+
+  void triangles(std::uint32_t t, std::uint32_t u) {
+    const Corners in_a = {a_.corner(t, 0), a_.corner(t, 1), a_.corner(t, 2)};
+    const Corners of_b = {b_in_a_ * b_.corner(u, 0), b_in_a_ * b_.corner(u, 1), b_in_a_ * b_.corner(u, 2)};
+    triangles(t, in_a, u, of_b);
+  }
+
+  void triangles(std::uint32_t t, const Corners& in_a, std::uint32_t u, const Corners& of_b) {
     Nearest n;
-    n.a = t.id;
-    n.b = u.id;
-    n.distance = nearestPoints(t.corners, u.corners, n.on_a, n.on_b);
+    n.a = t;
+    n.b = u;
+    n.distance = nearestPoints(in_a, of_b, n.on_a, n.on_b);
     found(n);
   }
 
@@ -246,6 +327,7 @@ class DistanceWalk : private BestFirst<DistanceWalk<A, B>, A, B> {
 
   const Placement& b_in_a_;
   const Placement a_in_b_;
+  std::optional<TreeGaps> gaps_;  // of two trees with exact answers
   DistanceGoal goal_;
   Nearest best_;
   double limit_ = 0;                               // something at least this near exists, or nobody asks for more

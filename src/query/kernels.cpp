@@ -7,6 +7,7 @@
 #include <hwy/highway.h>
 
 #include "query/octants-inl.h"
+#include "query/vectors-inl.h"
 
 HWY_BEFORE_NAMESPACE();
 namespace bocst::query::HWY_NAMESPACE {
@@ -98,20 +99,6 @@ std::uint8_t OverlappingOctants(const oracle::OctantBounds& octants, const OneVo
   }
   return result;
 }
-
-struct Vec3 {
-  V x, y, z;
-};
-
-HWY_INLINE Vec3 sub(Vec3 a, Vec3 b) { return {hn::Sub(a.x, b.x), hn::Sub(a.y, b.y), hn::Sub(a.z, b.z)}; }
-HWY_INLINE V dot(Vec3 a, Vec3 b) { return hn::MulAdd(a.x, b.x, hn::MulAdd(a.y, b.y, hn::Mul(a.z, b.z))); }
-HWY_INLINE Vec3 cross(Vec3 a, Vec3 b) {
-  return {hn::Sub(hn::Mul(a.y, b.z), hn::Mul(a.z, b.y)), hn::Sub(hn::Mul(a.z, b.x), hn::Mul(a.x, b.z)),
-          hn::Sub(hn::Mul(a.x, b.y), hn::Mul(a.y, b.x))};
-}
-HWY_INLINE V norm1(Vec3 a) { return hn::Add(hn::Add(hn::Abs(a.x), hn::Abs(a.y)), hn::Abs(a.z)); }
-HWY_INLINE V min3(V a, V b, V c) { return hn::Min(hn::Min(a, b), c); }
-HWY_INLINE V max3(V a, V b, V c) { return hn::Max(hn::Max(a, b), c); }
 
 void PlaceTriangles(RawTriangles& raw, std::size_t count, const PackPlacement& place, TrianglePack& pack) {
   const hn::CappedTag<double, 8> dd;

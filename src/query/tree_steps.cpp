@@ -6,7 +6,7 @@
 #include <hwy/foreach_target.h>
 #include <hwy/highway.h>
 
-#include "query/octants-inl.h"
+#include "query/frames-inl.h"
 
 #ifndef BOCST_TREE_STEPS_ONCE
 #define BOCST_TREE_STEPS_ONCE
@@ -68,48 +68,6 @@ inline void push(PairSteps& s, const StepPair& pair, int x, std::size_t frame, c
 HWY_BEFORE_NAMESPACE();
 namespace bocst::query::HWY_NAMESPACE {
 
-// Writes the volumes of eight octants of side `side`, the first with its corner at `corner`, both in own coordinates.
-HWY_INLINE void decode(const PairFrames& g, int own, const oracle::OctantBounds& octants, const float* corner,
-                       float side, Frame& f) {
-  const D d;
-  const int other = 1 - own;
-  const V byte = hn::Set(d, side * (1.0f / 510)), vside = hn::Set(d, side), per127 = hn::Set(d, 1.0f / 127);
-  const V half = hn::Set(d, 0.5f * side);
-  for (std::size_t i = 0; i < 8; i += hn::Lanes(d)) {
-    V c[3], h[3], n[3];
-    V offset = hn::Mul(fromBytes(d, octants.slab_center + i), hn::Set(d, side * (1.0f / 127)));
-    BOCST_UNROLL
-    for (int k = 0; k < 3; ++k) {
-      const V lo = fromBytes(d, octants.lo[k] + i), hi = fromBytes(d, octants.hi[k] + i);
-      const V within = hn::Mul(hn::Add(lo, hi), byte);
-      c[k] = hn::Add(within, hn::MulAdd(hn::Load(d, kOctantCorner[k] + i), vside, hn::Set(d, corner[k])));
-      h[k] = hn::Mul(hn::Sub(hi, lo), byte);
-      n[k] = hn::Mul(fromBytes(d, octants.normal[k] + i), per127);
-      // The slab is given from the octant's middle and wanted from its box's.
-      offset = hn::NegMulAdd(n[k], hn::Sub(within, half), offset);
-      hn::Store(c[k], d, f.center[own][k] + i);
-      hn::Store(h[k], d, f.half[own][k] + i);
-      hn::Store(n[k], d, f.normal[own][k] + i);
-    }
-    hn::Store(offset, d, f.slab_center + i);
-    hn::Store(hn::Mul(fromBytes(d, octants.slab_half + i), hn::Set(d, side * (1.0f / 254))), d, f.slab_half + i);
-    BOCST_UNROLL
-    for (int j = 0; j < 3; ++j) {
-      V cj = hn::Set(d, g.shift[own][j]), hj = hn::Zero(d), nj = hn::Zero(d);
-      BOCST_UNROLL
-      for (int k = 0; k < 3; ++k) {
-        const V r = hn::Set(d, g.to_other[own][j][k]);
-        cj = hn::MulAdd(r, c[k], cj);
-        nj = hn::MulAdd(r, n[k], nj);
-        hj = hn::MulAdd(hn::Set(d, g.abs_to_other[own][j][k]), h[k], hj);
-      }
-      hn::Store(cj, d, f.center[other][j] + i);
-      hn::Store(hj, d, f.half[other][j] + i);
-      hn::Store(nj, d, f.normal[other][j] + i);
-    }
-  }
-}
-
 // Bit o is set unless octant o of frame f (side `own`) is surely apart from the volume in lane l of frame y, by one of
 // eight axes: the faces of both boxes and both slab normals. No edge axes: with slabs they gain nothing.
 HWY_INLINE unsigned overlapping(const PairFrames& g, int own, const Frame& f, const Frame& y, std::size_t l) {
@@ -165,18 +123,9 @@ HWY_INLINE unsigned overlapping(const PairFrames& g, int own, const Frame& f, co
   return result;
 }
 
-template <typename Position>
-HWY_INLINE void decodeCell(const PairFrames& g, int own, int level, const Position& at,
-                           const oracle::OctantBounds& octants, Frame& f) {
-  const int side = 1 << (lattice::kMaxLevel - 1 - level), middle = 1 << (lattice::kBits - 1);
-  float corner[3];
-  for (int k = 0; k < 3; ++k) corner[k] = static_cast<float>(2 * static_cast<int>(at[k]) * side - middle) * g.unit[own];
-  decode(g, own, octants, corner, static_cast<float>(side) * g.unit[own], f);
-}
-
 // The octants of a block. Pairs that differ in the other node only come one after the other and find the frame filled.
 HWY_INLINE void decodeBlock(const PairFrames& g, int own, std::uint32_t index, const tree::Block& block, Frame& f) {
-  const std::uint64_t holds = std::uint64_t{index} << 1 | static_cast<std::uint64_t>(own);
+  const std::uint64_t holds = Frame::name(own, index);
   if (f.holds == holds) return;
   f.holds = holds;
   decodeCell(g, own, block.level, block.at, block.octants, f);
@@ -187,11 +136,7 @@ HWY_INLINE void lookUp(PairSteps& s, StepPair& p, int side, std::size_t& frames)
   if (p.lane[side] != StepPair::kNoLane) return;
   const tree::Tree& tree = *s.tree[side];
   if (p.node[side].isRoot()) {
-    oracle::OctantBounds root;
-    root.set(0, tree.rootBounds());
-    const float middle = static_cast<float>(1 << (lattice::kBits - 1)) * s.geometry.unit[side];
-    const float corner[3] = {-middle, -middle, -middle};
-    decode(s.geometry, side, root, corner, 2 * middle, s.frames[frames]);
+    decodeRoot(s.geometry, side, tree.rootBounds(), s.frames[frames]);
     s.frames[frames].holds = Frame::kNothing;
     p.lane[side] = static_cast<std::uint32_t>(8 * frames);
   } else {
@@ -262,27 +207,6 @@ namespace bocst::query {
 
 HWY_EXPORT(OverlappingOctants);
 HWY_EXPORT(NextEvent);
-
-PairFrames::PairFrames(double scale_of_1, const Placement& one_in_zero) {
-  const double q0 = 1 << (lattice::kBits - 1), q1 = q0 * scale_of_1;
-  const Eigen::Matrix3d& r = one_in_zero.rotation;
-  // Where the middle of side 1's root is, from that of side 0's.
-  const Eigen::Vector3d t = one_in_zero * Eigen::Vector3d::Constant(q0) - Eigen::Vector3d::Constant(q0);
-  const Eigen::Vector3d back = -(r.transpose() * t);
-  for (int j = 0; j < 3; ++j) {
-    for (int k = 0; k < 3; ++k) {
-      to_other[0][j][k] = to_other[1][k][j] = static_cast<float>(r(k, j));
-      abs_to_other[0][j][k] = abs_to_other[1][k][j] = static_cast<float>(std::abs(r(k, j)));
-    }
-    shift[0][j] = static_cast<float>(back[j]);
-    shift[1][j] = static_cast<float>(t[j]);
-  }
-  unit[0] = 1;
-  unit[1] = static_cast<float>(scale_of_1);
-  const double size = t.norm() + std::sqrt(3.0) * (q0 + q1), defect = 4 * size * one_in_zero.defect;
-  pad = static_cast<float>((48 * 0x1p-24 * size + defect + one_in_zero.slack) * 1.0001);
-  slab_pad = static_cast<float>((160 * 0x1p-24 * size + 2 * defect + 1.02 * one_in_zero.slack) * 1.0001);
-}
 
 std::uint8_t overlappingOctants(const PairFrames& geometry, int own, const CellOctants& cell, const CellOctants& other,
                                 int octant) {

@@ -1,0 +1,29 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#include "query/frames.h"
+
+#include <cmath>
+
+namespace bocst::query {
+
+PairFrames::PairFrames(double scale_of_1, const Placement& one_in_zero) {
+  const double q0 = 1 << (lattice::kBits - 1), q1 = q0 * scale_of_1;
+  const Eigen::Matrix3d& r = one_in_zero.rotation;
+  // Where the middle of side 1's root is, from that of side 0's.
+  const Eigen::Vector3d t = one_in_zero * Eigen::Vector3d::Constant(q0) - Eigen::Vector3d::Constant(q0);
+  const Eigen::Vector3d back = -(r.transpose() * t);
+  for (int j = 0; j < 3; ++j) {
+    for (int k = 0; k < 3; ++k) {
+      to_other[0][j][k] = to_other[1][k][j] = static_cast<float>(r(k, j));
+      abs_to_other[0][j][k] = abs_to_other[1][k][j] = static_cast<float>(std::abs(r(k, j)));
+    }
+    shift[0][j] = static_cast<float>(back[j]);
+    shift[1][j] = static_cast<float>(t[j]);
+  }
+  unit[0] = 1;
+  unit[1] = static_cast<float>(scale_of_1);
+  const double size = t.norm() + std::sqrt(3.0) * (q0 + q1), defect = 4 * size * one_in_zero.defect;
+  pad = static_cast<float>((48 * 0x1p-24 * size + defect + one_in_zero.slack) * 1.0001);
+  slab_pad = static_cast<float>((160 * 0x1p-24 * size + 2 * defect + 1.02 * one_in_zero.slack) * 1.0001);
+}
+
+}  // namespace bocst::query
