@@ -72,6 +72,20 @@ bool segmentCutsTriangle(const Vector3d& a, const Vector3d& b, const Corners& t,
   return true;
 }
 
+double clampToUnit(double x) { return std::clamp(x, 0.0, 1.0); }
+
+// The foot of a point, `above` = n.(x - t[0]) over the plane of a triangle with edges e and normal n, if it is inside.
+// That of a sliver is left to its edges: its normal is mostly rounding.
+bool footInside(const Vector3d& x, const Corners& t, const Vector3d (&e)[3], const Vector3d& n, double nn, double above,
+                Vector3d& foot) {
+  if (!(nn > 1e-16 * e[0].squaredNorm() * e[1].squaredNorm())) return false;
+  foot = x - n * (above / nn);
+  for (int i = 0; i < 3; ++i) {
+    if (n.dot(e[i].cross(foot - t[i])) < 0) return false;
+  }
+  return true;
+}
+
 }  // namespace
 
 Touch partTriangles(const Corners& p, const Corners& q) {
@@ -136,27 +150,48 @@ double nearestPoints(const Corners& p, const Corners& q, Vector3d& on_p, Vector3
   double best = std::numeric_limits<double>::infinity();  // squared
   const auto consider = [&](const Vector3d& a, const Vector3d& b) {
     const double d = (a - b).squaredNorm();
-    if (d >= best) return;
+    if (!(d < best)) return;
     best = d;
     on_p = a;
     on_q = b;
   };
-  for (int i = 0; i < 3; ++i) {
-    const Vector3d &a = p[i], &b = p[(i + 1) % 3];
-    Vector3d at;
-    if (segmentCutsTriangle(a, b, q, at) || segmentCutsTriangle(q[i], q[(i + 1) % 3], p, at)) {
-      on_p = on_q = at;
-      return 0;
+  const Vector3d e[3] = {p[1] - p[0], p[2] - p[1], p[0] - p[2]}, f[3] = {q[1] - q[0], q[2] - q[1], q[0] - q[2]};
+  const Vector3d n = e[0].cross(e[1]), m = f[0].cross(f[1]);
+  const Vector3d above_p(n.dot(q[0] - p[0]), n.dot(q[1] - p[0]), n.dot(q[2] - p[0]));
+  const Vector3d above_q(m.dot(p[0] - q[0]), m.dot(p[1] - q[0]), m.dot(p[2] - q[0]));
+  // On one side of the other's plane, neither cuts the other.
+  if (above_p.minCoeff() <= 0 && above_p.maxCoeff() >= 0 && above_q.minCoeff() <= 0 && above_q.maxCoeff() >= 0) {
+    for (int i = 0; i < 3; ++i) {
+      Vector3d at;
+      if (segmentCutsTriangle(p[i], p[(i + 1) % 3], q, at) || segmentCutsTriangle(q[i], q[(i + 1) % 3], p, at)) {
+        on_p = on_q = at;
+        return 0;
+      }
     }
-    consider(a, closestPoint(a, q));
-    consider(closestPoint(q[i], p), q[i]);
-    // Two edges, inside both; where an end is nearest, its corner has been considered.
+  }
+  // A corner over the inside of the other, or a point of an edge and one of the other's.
+  const double nn = n.squaredNorm(), mm = m.squaredNorm();
+  for (int i = 0; i < 3; ++i) {
+    Vector3d foot;
+    if (footInside(q[i], p, e, n, nn, above_p[i], foot)) consider(foot, q[i]);
+    if (footInside(p[i], q, f, m, mm, above_q[i], foot)) consider(p[i], foot);
+  }
+  const double ee[3] = {e[0].squaredNorm(), e[1].squaredNorm(), e[2].squaredNorm()};
+  const double ff[3] = {f[0].squaredNorm(), f[1].squaredNorm(), f[2].squaredNorm()};
+  for (int i = 0; i < 3; ++i) {
     for (int j = 0; j < 3; ++j) {
-      const Vector3d &c = q[j], u = b - a, v = q[(j + 1) % 3] - c, w = a - c;
-      const double uu = u.squaredNorm(), uv = u.dot(v), vv = v.squaredNorm(), det = uu * vv - uv * uv;
-      if (!(det > 0)) continue;
-      const double s = (uv * v.dot(w) - vv * u.dot(w)) / det, t = (uu * v.dot(w) - uv * u.dot(w)) / det;
-      if (s >= 0 && s <= 1 && t >= 0 && t <= 1) consider(a + s * u, c + t * v);
+      const Vector3d w = p[i] - q[j];
+      const double ew = e[i].dot(w), fw = f[j].dot(w), ef = e[i].dot(f[j]), det = ee[i] * ff[j] - ef * ef;
+      double s = det > 0 ? clampToUnit((ef * fw - ff[j] * ew) / det) : 0;
+      const double t = ff[j] > 0 ? clampToUnit((ef * s + fw) / ff[j]) : 0;
+      s = ee[i] > 0 ? clampToUnit((ef * t - ew) / ee[i]) : 0;
+      consider(p[i] + s * e[i], q[j] + t * f[j]);
+      if (det > 1e-6 * ee[i] * ff[j]) continue;
+      // All but parallel, the quotient is inaccurate; so may the nearest points be, unless the ends are looked at too.
+      consider(p[i], closestOnSegment(p[i], q[j], q[(j + 1) % 3]));
+      consider(p[(i + 1) % 3], closestOnSegment(p[(i + 1) % 3], q[j], q[(j + 1) % 3]));
+      consider(closestOnSegment(q[j], p[i], p[(i + 1) % 3]), q[j]);
+      consider(closestOnSegment(q[(j + 1) % 3], p[i], p[(i + 1) % 3]), q[(j + 1) % 3]);
     }
   }
   return std::sqrt(best);
