@@ -160,6 +160,8 @@ std::size_t NearPairs(const TrianglePack& rows, const TrianglePack& lanes, const
     const V ff[3] = {dot(f[0], f[0]), dot(f[1], f[1]), dot(f[2], f[2])};
     const V mq[3] = {dot(m, q[0]), dot(m, q[1]), dot(m, q[2])};
 
+    const M is_triangle = hn::FirstN(d, lanes.count - i);
+
     // Rows that come near to the box of these lanes.
     const Vec3 low{hn::MinOfLanes(d, qmin.x), hn::MinOfLanes(d, qmin.y), hn::MinOfLanes(d, qmin.z)};
     const Vec3 high{hn::MaxOfLanes(d, qmax.x), hn::MaxOfLanes(d, qmax.y), hn::MaxOfLanes(d, qmax.z)};
@@ -179,7 +181,7 @@ std::size_t NearPairs(const TrianglePack& rows, const TrianglePack& lanes, const
       const Vec3 row_low = broadcast(lows[0][row], lows[1][row], lows[2][row]);
       const Vec3 row_high = broadcast(highs[0][row], highs[1][row], highs[2][row]);
       M near = hn::And(hn::Lt(squareOfGap(qmin, qmax, row_low, row_high), far_squared),
-                       hn::Lt(hn::Sub(qlow, hn::Set(d, reach[row])), far));
+                       hn::And(hn::Lt(hn::Sub(qlow, hn::Set(d, reach[row])), far), is_triangle));
       if (hn::AllFalse(d, near)) continue;
 
       Vec3 p[3];
@@ -229,11 +231,12 @@ std::size_t NearPairs(const TrianglePack& rows, const TrianglePack& lanes, const
       hn::StoreMaskBits(d, near, bits);
       if (bits[0] == 0) continue;
       // The edges are no farther apart than where they were found, so nothing farther is of interest any more.
-      far = hn::Min(far, hn::MulAdd(hn::Sqrt(hn::MinOfLanes(d, nearest)), more, hn::Add(pad, pad)));
+      far = hn::Min(far, hn::MulAdd(hn::Sqrt(hn::MinOfLanes(d, hn::IfThenElse(near, nearest, hn::Set(d, 3e38f)))), more,
+                                    hn::Add(pad, pad)));
       far_squared = hn::Mul(far, hn::Mul(far, more));
       alignas(64) float least[8];
       hn::Store(hn::Max(hn::Sub(hn::Mul(at_least, hn::Set(d, 1 - 16 * 0x1p-24f)), pad), zero), d, least);
-      for (std::size_t k = 0; k < hn::Lanes(d) && i + k < lanes.count; ++k) {
+      for (std::size_t k = 0; k < hn::Lanes(d); ++k) {
         if (bits[0] >> k & 1) {
           pairs[found++] = {least[k], static_cast<std::uint8_t>(row), static_cast<std::uint8_t>(i + k)};
         }

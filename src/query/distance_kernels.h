@@ -37,15 +37,15 @@ struct OctantGaps {
 void octantGaps(const PairFrames& geometry, int own, const Frame& f, const Frame& y, std::size_t lane,
                 const FrameDirection& way, OctantGaps& gaps);
 
-/// Two triangles that may be nearer than what was asked for.
+/// Two triangles that may be the nearest.
 struct NearPair {
   float at_least;  ///< They are no nearer than this.
   std::uint8_t row, lane;
 };
 
-/// Writes the pairs (a triangle of rows, a triangle of lanes) that may be less than `enough` apart, at most
-/// rows.count * lanes.count of them. Returns how many. `way` is a unit vector from rows to lanes, where the nearest
-/// points are expected, or zero.
+/// Writes the pairs (a triangle of rows, a triangle of lanes) that may be the nearest of all and less than `enough`
+/// apart, at most rows.count * lanes.count of them. Returns how many. `way` is a unit vector from rows to lanes, where
+/// the nearest points are expected, or zero.
 ///
 /// A triangle pair is at least as far apart as along any direction: those of both normals and that between the nearest
 /// points of their edges, found by sloppy arithmetic, are looked at; one of them is exact but for rounding. Nine edge

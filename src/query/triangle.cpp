@@ -125,14 +125,9 @@ Touch partTriangles(const Corners& p, const Corners& q) {
 }
 
 Vector3d closestPoint(const Vector3d& x, const Corners& t) {
-  const Vector3d n = (t[1] - t[0]).cross(t[2] - t[0]);
-  const double nn = n.squaredNorm();
-  if (nn > 0) {
-    const Vector3d foot = x - n * (n.dot(x - t[0]) / nn);
-    bool inside = true;
-    for (int i = 0; i < 3 && inside; ++i) inside = n.dot((t[(i + 1) % 3] - t[i]).cross(foot - t[i])) >= 0;
-    if (inside) return foot;
-  }
+  const Vector3d e[3] = {t[1] - t[0], t[2] - t[1], t[0] - t[2]}, n = e[0].cross(e[1]);
+  Vector3d foot;
+  if (footInside(x, t, e, n, n.squaredNorm(), n.dot(x - t[0]), foot)) return foot;
   Vector3d best = closestOnSegment(x, t[0], t[1]);
   for (int i = 1; i < 3; ++i) {
     const Vector3d c = closestOnSegment(x, t[i], t[(i + 1) % 3]);

@@ -7,9 +7,11 @@
 #include <gtest/gtest.h>
 #include <hwy/targets.h>
 
+#include <map>
 #include <set>
 
 #include "meshes.h"
+#include "query/distance_kernels.h"
 #include "query/tree_steps.h"
 #include "query/triangle.h"
 #include "query/volume.h"
@@ -228,6 +230,138 @@ TEST_P(EveryTarget, NoPairIsLostThatFclFinds) {
   EXPECT_LT(candidates, hits + pairs / 50) << "a filter that lets everything through proves nothing";
 }
 
+TEST_P(EveryTarget, GapsOfOctantsHoldTheDistancesOfTheirPoints) {
+  std::mt19937_64 g(21);
+  std::uniform_real_distribution<double> u(-1, 1);
+  int compared = 0, close = 0;
+  for (int round = 0; round < 20000; ++round) {
+    tree::Block blocks[2];
+    Eigen::Vector3d points[2];
+    int octants[2];
+    bool found = true;
+    for (int side = 0; side < 2 && found; ++side) {
+      lattice::Cell cell;
+      cell.level = 1 + static_cast<int>(g() % 14);
+      for (auto& x : cell.at) x = static_cast<std::uint32_t>(g() % (1u << (cell.level - 1)));
+      blocks[side].level = static_cast<std::uint8_t>(cell.level);
+      for (std::size_t k = 0; k < 3; ++k) blocks[side].at[k] = static_cast<decltype(+blocks[side].at[k])>(cell.at[k]);
+      for (int o = 0; o < 8; ++o) blocks[side].octants.set(o, randomBounds(g));
+      octants[side] = static_cast<int>(g() % 8);
+      const lattice::Cell octant = cell.octant(octants[side]);
+      const auto corner = octant.corner();
+      found = randomPoint(g, blocks[side].octants.get(octants[side]), Eigen::Vector3d(corner[0], corner[1], corner[2]),
+                          octant.side(), points[side]);
+    }
+    if (!found) continue;
+    Placement to;
+    to.rotation = test::randomRotation(g);
+    to.scale = std::pow(2.0, 10 * u(g));
+    const Eigen::Vector3d way = test::randomDirection(g) * std::pow(10.0, 3 + 3 * u(g));
+    to.translation = points[0] + way - to.scale * (to.rotation * points[1]);
+    to.ready();
+    const PairFrames geometry(to.scale, to);
+    const double distance = (to * points[1] - points[0]).norm(), rounding = 1e-12 * geometry.pad * 0x1p24;
+    FrameDirection expected;
+    if (round % 3 != 0) {
+      const Eigen::Vector3d d = round % 3 == 1 ? Eigen::Vector3d(way.normalized()) : test::randomDirection(g);
+      const Eigen::Vector3d back = to.rotation.transpose() * d;
+      for (int k = 0; k < 3; ++k) {
+        expected.in[0][k] = static_cast<float>(d[k]);
+        expected.in[1][k] = static_cast<float>(back[k]);
+      }
+    }
+    Frame frames[2];
+    for (int side = 0; side < 2; ++side) fillFrame(geometry, side, blocks[side], frames[side]);
+    for (int own = 0; own < 2; ++own) {
+      OctantGaps gaps;
+      octantGaps(geometry, own, frames[own], frames[1 - own], static_cast<std::size_t>(octants[1 - own]), expected,
+                 gaps);
+      ASSERT_LE(gaps.at_least[octants[own]], distance + rounding) << "round " << round << " side " << own;
+      ASSERT_GE(gaps.at_most[octants[own]], distance - rounding) << "round " << round << " side " << own;
+      ++compared;
+      close += gaps.at_least[octants[own]] > 0.5 * distance;
+    }
+  }
+  EXPECT_GT(compared, 10000);
+  EXPECT_GT(close, compared / 10) << "bounds of nothing prove nothing";
+}
+
+TEST_P(EveryTarget, NoPairIsLostThatIsNearest) {
+  std::mt19937_64 g(22);
+  std::uniform_real_distribution<double> u(-1, 1);
+  std::size_t nearer = 0, ties = 0, candidates = 0, pairs = 0, tight = 0;
+  for (int round = 0; round < 600; ++round) {
+    const double scale = std::pow(10.0, 6 * u(g));
+    TrianglePack a, b;
+    a.count = 1 + g() % 32;
+    b.count = 1 + g() % 32;
+    std::vector<std::array<Eigen::Vector3d, 3>> ta(a.count), tb(b.count);
+    const Eigen::Vector3d apart = test::randomDirection(g) * std::pow(10.0, 2 * u(g));
+    const auto make = [&](std::array<Eigen::Vector3d, 3>& t, const Eigen::Vector3d& about) {
+      const Eigen::Vector3d c = about + Eigen::Vector3d(u(g), u(g), u(g));
+      const double size = std::pow(10.0, u(g));
+      for (auto& v : t) v = (c + size * Eigen::Vector3d(u(g), u(g), u(g))) * scale;
+      if (g() % 8 == 0) t[2] = t[1] + 1e-9 * (t[2] - t[1]);  // sliver
+      if (g() % 16 == 0) t[1] = t[0];                        // segment
+      if (g() % 32 == 0) t[1] = t[2] = t[0];                 // point
+    };
+    // Neighbours that share a corner or an edge are as near as each other.
+    const auto makeAll = [&](std::vector<std::array<Eigen::Vector3d, 3>>& all, const Eigen::Vector3d& about) {
+      for (std::size_t i = 0; i < all.size(); ++i) {
+        make(all[i], about);
+        if (i > 0 && g() % 2) all[i][0] = all[i - 1][2];
+        if (i > 0 && g() % 3 == 0) all[i][1] = all[i - 1][1];
+      }
+    };
+    makeAll(ta, Eigen::Vector3d::Zero());
+    makeAll(tb, apart);
+    for (std::size_t i = 0; i < a.count; ++i) put(a, i, {ta[i][0], ta[i][1], ta[i][2]});
+    for (std::size_t i = 0; i < b.count; ++i) put(b, i, {tb[i][0], tb[i][1], tb[i][2]});
+    std::vector<double> distances;
+    Eigen::Vector3d on_p, on_q, way = Eigen::Vector3d::Zero();
+    double least = std::numeric_limits<double>::infinity();
+    for (std::size_t i = 0; i < a.count; ++i) {
+      for (std::size_t j = 0; j < b.count; ++j) {
+        distances.push_back(nearestPoints({ta[i][0], ta[i][1], ta[i][2]}, {tb[j][0], tb[j][1], tb[j][2]}, on_p, on_q));
+        if (!(distances.back() < least)) continue;
+        least = distances.back();
+        way = on_q - on_p;
+      }
+    }
+    if (round % 3 == 0) way = test::randomDirection(g);
+    if (way.norm() > 0) way.normalize();
+    if (round % 4 == 0) way.setZero();
+    const float expected[3] = {static_cast<float>(way[0]), static_cast<float>(way[1]), static_cast<float>(way[2])};
+    const double factors[] = {0.5, 1, 1.0001, 2, std::numeric_limits<double>::infinity()};
+    const auto enough = static_cast<float>(std::max(least, 1e-3 * scale) * factors[round % 5]);
+    static NearPair found[TrianglePack::kCapacity * TrianglePack::kCapacity];
+    const std::size_t count = nearPairs(a, b, expected, enough, found);
+    std::map<std::pair<std::size_t, std::size_t>, double> bounds;
+    for (std::size_t k = 0; k < count; ++k) bounds[{found[k].row, found[k].lane}] = found[k].at_least;
+    ASSERT_EQ(bounds.size(), count);
+    pairs += distances.size();
+    candidates += count;
+    const double size = std::max(a.size, b.size);
+    for (const auto& [pair, bound] : bounds) {
+      ASSERT_LT(pair.first, a.count);
+      ASSERT_LT(pair.second, b.count);
+      const double distance = distances[pair.first * b.count + pair.second];
+      ASSERT_LE(bound, distance * (1 + 1e-12)) << "round " << round;
+      tight += bound >= distance - 1e-4 * size;
+    }
+    for (std::size_t k = 0; k < distances.size(); ++k) {
+      if (!(distances[k] < enough) || distances[k] > least * (1 + 1e-13)) continue;
+      ++nearer;
+      ties += distances[k] != least;
+      ASSERT_TRUE(bounds.count({k / b.count, k % b.count})) << "round " << round;
+    }
+  }
+  EXPECT_GT(nearer, 400u);
+  EXPECT_GT(ties, 3u);
+  EXPECT_LT(candidates, pairs / 5) << "a filter that lets everything through proves nothing";
+  EXPECT_GT(tight, candidates * 8 / 10);
+}
+
 INSTANTIATE_TEST_SUITE_P(Targets, EveryTarget, testing::ValuesIn(targets()),
                          [](const auto& p) { return std::string(hwy::TargetName(p.param)); });
 
@@ -261,6 +395,39 @@ TEST(PartTriangles, MovingByDepthParts) {
     EXPECT_LT((closestPoint(touch.point, q) - touch.point).norm(), 1e-9);
   }
   EXPECT_GT(tried, 500);
+}
+
+TEST(NearestPoints, NoTwoPointsAreNearer) {
+  std::mt19937_64 g(32);
+  std::uniform_real_distribution<double> u(-1, 1);
+  const auto pointOf = [&](const Corners& t) {
+    double a = std::abs(u(g)), b = std::abs(u(g));
+    if (a + b > 1) a = 1 - a, b = 1 - b;
+    return Eigen::Vector3d(t[0] + a * (t[1] - t[0]) + b * (t[2] - t[0]));
+  };
+  for (int round = 0; round < 5000; ++round) {
+    Corners p, q;
+    for (Eigen::Vector3d* t : {p, q}) {
+      for (int k = 0; k < 3; ++k) t[k] = Eigen::Vector3d(u(g), u(g), u(g));
+      if (g() % 4 == 0) t[2] = t[1] + 1e-9 * (t[2] - t[1]);  // sliver
+      if (g() % 8 == 0) t[1] = t[0];                         // segment
+      if (g() % 16 == 0) t[1] = t[2] = t[0];                 // point
+    }
+    // FCL's own triangle distance misses the nearest points of parallel edges.
+    if (round % 3 == 0) q[1] = q[0] + (1 + 0.5 * u(g)) * (p[1] - p[0]);
+    if (round % 6 == 0) q[1] += 1e-7 * Eigen::Vector3d(u(g), u(g), u(g));
+    Eigen::Vector3d on_p, on_q;
+    const double distance = nearestPoints(p, q, on_p, on_q);
+    EXPECT_LT((closestPoint(on_p, p) - on_p).norm(), 1e-12);
+    EXPECT_LT((closestPoint(on_q, q) - on_q).norm(), 1e-12);
+    EXPECT_NEAR((on_p - on_q).norm(), distance, 1e-12);
+    for (int i = 0; i < 20; ++i) {
+      const Eigen::Vector3d x = pointOf(p), y = pointOf(q);
+      EXPECT_LE(distance, (x - y).norm() + 1e-12) << "round " << round;
+      EXPECT_LE(distance, (closestPoint(x, q) - x).norm() + 1e-12) << "round " << round;
+      EXPECT_LE(distance, (closestPoint(y, p) - y).norm() + 1e-12) << "round " << round;
+    }
+  }
 }
 
 TEST(ClosestPoint, IsNoFurtherThanAnyOtherPoint) {
