@@ -42,10 +42,9 @@ class BestFirst {
     push({boundOf(root), root.a, root.b});
     std::size_t batch = kFirstBatch;
     for (;;) {
-      while (!heap_.heap.empty() && walk().worthIt(heap_.heap.front().bound) && heap_.waiting.size() < batch) {
-        std::pop_heap(heap_.heap.begin(), heap_.heap.end(), Later());
-        const Pair pair = heap_.heap.back();
-        heap_.heap.pop_back();
+      while (heap_.waiting.size() < batch && next()) {
+        const Pair pair = next_;
+        has_next_ = false;
         step(pair);
         if (walk().settled()) return;
       }
@@ -53,7 +52,7 @@ class BestFirst {
                                       [this](const Pair& p) { return !walk().worthIt(p.bound); });
       heap_.waiting.erase(end, heap_.waiting.end());
       if (heap_.waiting.empty()) {
-        if (heap_.heap.empty() || !walk().worthIt(heap_.heap.front().bound)) return;
+        if (!next()) return;
         continue;
       }
       grow();
@@ -100,9 +99,32 @@ class BestFirst {
     bool operator()(const Pair& x, const Pair& y) const { return x.bound > y.bound; }
   };
 
-  void put(const Pair& pair) {
+  // The least of what was put lately stays out of the heap: mostly it is the next.
+  void put(Pair pair) {
+    if (!has_next_) {
+      next_ = pair;
+      has_next_ = true;
+      return;
+    }
+    if (pair.bound < next_.bound) std::swap(pair, next_);
     heap_.heap.push_back(pair);
     std::push_heap(heap_.heap.begin(), heap_.heap.end(), Later());
+  }
+
+  // Makes the pair of the least bound the next; false when it is not worth it, or there is none.
+  bool next() {
+    if (!heap_.heap.empty() && (!has_next_ || heap_.heap.front().bound < next_.bound)) {
+      std::pop_heap(heap_.heap.begin(), heap_.heap.end(), Later());
+      Pair least = heap_.heap.back();
+      heap_.heap.pop_back();
+      if (has_next_) {
+        heap_.heap.push_back(next_);
+        std::push_heap(heap_.heap.begin(), heap_.heap.end(), Later());
+      }
+      next_ = least;
+      has_next_ = true;
+    }
+    return has_next_ && walk().worthIt(next_.bound);
   }
 
   void step(const Pair& pair) {
@@ -153,6 +175,8 @@ class BestFirst {
   }
 
   Heap& heap_;
+  Pair next_{};
+  bool has_next_ = false;
 };
 
 }  // namespace bocst::query
