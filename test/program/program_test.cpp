@@ -307,6 +307,7 @@ TEST_F(Program, ComparesWithFcl) {
     EXPECT_GT(report.at("ratio").at(key), 0) << key;
   }
   EXPECT_GT(report.at("ratio").at("distance_median").get<double>(), 0);
+  EXPECT_GT(report.at("ratio").at("first_distance").get<double>(), 0);
   EXPECT_EQ(report.at("verdicts").at("equal"), true);
   EXPECT_EQ(report.at("verdicts").at("bocst"), report.at("verdicts").at("fcl"));
   EXPECT_EQ(json("bench " + model("link") + " --poses 5 --rounds 1").at("triangles"), Json({5120, 5120}));

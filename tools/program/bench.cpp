@@ -21,6 +21,7 @@ namespace {
 /// What one side needed, in microseconds, and what it said.
 struct Side {
   std::vector<double> first_answers;
+  std::vector<double> first_distance_times;
   std::vector<std::vector<double>> rounds;  // by pose
   std::vector<bool> first_verdicts;
   std::vector<bool> verdicts;
@@ -46,6 +47,15 @@ struct Side {
   }
 };
 
+/// Makes two models from arrays of its own, once.
+struct FreshModels {
+  HandedOver a;
+  HandedOver b;
+
+  FreshModels(const Mesh& mesh_a, const Mesh& mesh_b) : a(mesh_a), b(mesh_b) {}
+  std::unique_ptr<BocstPair> operator()() { return makeBocstPair(std::move(a), std::move(b), Options{}); }
+};
+
 struct Bench {
   std::string file_a;
   std::string file_b;
@@ -57,12 +67,30 @@ struct Bench {
   OracleBench oracles;
 
   template <typename Make>
-  static auto timeFirst(const Make& make, const Eigen::Isometry3d& X_AB, Side& side) {
+  static auto timeFirst(Make&& make, const Eigen::Isometry3d& X_AB, Side& side) {
     const Stopwatch watch;
     auto pair = make();
     side.first_verdicts.push_back(pair->touch(X_AB));
     side.first_answers.push_back(watch.microseconds());
     return pair;
+  }
+
+  /// A first distance of both sides, where the meshes are apart. FCL's trees are the same whatever is asked, so they
+  /// are not built once more: `built` is how long it took.
+  template <typename Make>
+  static void timeFirstDistance(const FclPair& fcl, double built, Make&& make, const Eigen::Isometry3d& X_AB,
+                                Side& theirs, Side& ours) {
+    const Stopwatch fcl_watch;
+    const double expected = fcl.distance(X_AB);
+    theirs.first_distance_times.push_back(built + fcl_watch.microseconds());
+    const Stopwatch watch;
+    const double distance = make()->distance(X_AB);
+    ours.first_distance_times.push_back(watch.microseconds());
+    checkDistance(expected, distance);
+  }
+
+  static void checkDistance(double fcl, double bocst) {
+    if (!(std::abs(fcl - bocst) <= 1e-9 * fcl)) throw std::runtime_error("the distances are not FCL's");
   }
 
   static void timeRound(const QueryPair& pair, const std::vector<Eigen::Isometry3d>& X_ABs, Side& side) {
@@ -95,9 +123,7 @@ struct Bench {
     for (const Eigen::Isometry3d& X_AB : apart) {
       theirs.distances.push_back(fcl.distance(X_AB));
       ours.distances.push_back(bocst.distance(X_AB));
-      if (!(std::abs(theirs.distances.back() - ours.distances.back()) <= 1e-9 * theirs.distances.back())) {
-        throw std::runtime_error("the distances are not FCL's");
-      }
+      checkDistance(theirs.distances.back(), ours.distances.back());
     }
     for (std::size_t round = 0; round < rounds; ++round) {
       timeDistances(fcl, apart, theirs);
@@ -137,7 +163,9 @@ struct Bench {
 
     // Both sides take turns, so that a slow moment of the machine meets both.
     Progress progress("step", 2 * rounds + 4);
+    const Stopwatch build_watch;
     const std::unique_ptr<FclPair> fcl_pair = make_fcl();
+    const double built = build_watch.microseconds();
     progress.step();
     PoseSampler sampler(*mesh_a, *mesh_b, *fcl_pair, seed);
     std::vector<Eigen::Isometry3d> first_poses;
@@ -148,6 +176,11 @@ struct Bench {
       query_poses.push_back(sampler.nextAnywhere());
       X_ABs.push_back(query_poses.back().transform());
     }
+    std::vector<Eigen::Isometry3d> apart_poses;
+    for (std::size_t i = 0; i < 16 * rounds && apart_poses.size() < rounds; ++i) {
+      const Eigen::Isometry3d X_AB = sampler.nextAnywhere().transform();
+      if (!fcl_pair->touch(X_AB)) apart_poses.push_back(X_AB);
+    }
     progress.step();
 
     Side ours;
@@ -156,13 +189,13 @@ struct Bench {
     std::string oracle;
     for (const Eigen::Isometry3d& X_AB : first_poses) {
       timeFirst(make_fcl, X_AB, theirs);
-      HandedOver copy_a(*mesh_a);
-      HandedOver copy_b(*mesh_b);
-      const auto make_bocst = [&] { return makeBocstPair(std::move(copy_a), std::move(copy_b), Options{}); };
-      const std::unique_ptr<BocstPair> pair = timeFirst(make_bocst, X_AB, ours);
+      const std::unique_ptr<BocstPair> pair = timeFirst(FreshModels(*mesh_a, *mesh_b), X_AB, ours);
       bytes_first.push_back(static_cast<double>(pair->bytes()));
       oracle = pair->oracleName();
       progress.step();
+    }
+    for (const Eigen::Isometry3d& X_AB : apart_poses) {
+      timeFirstDistance(*fcl_pair, built, FreshModels(*mesh_a, *mesh_b), X_AB, theirs, ours);
     }
     const std::unique_ptr<BocstPair> bocst_pair = makeBocstPair(Scalar::kDouble, a, b, Options{});
     warmUp(*fcl_pair, *bocst_pair, X_ABs, theirs, ours);
@@ -199,6 +232,10 @@ struct Bench {
       times.push_back({"distance_median", "warm distance, median", quantile(Side::medians(ours.distance_rounds), 0.5),
                        quantile(Side::medians(theirs.distance_rounds), 0.5)});
     }
+    if (!ours.first_distance_times.empty()) {
+      times.push_back({"first_distance", "first distance, median", quantile(ours.first_distance_times, 0.5),
+                       quantile(theirs.first_distance_times, 0.5)});
+    }
     const double memory = fcl_bytes / quantile(bytes_first, 0.5);
     std::size_t worst = 0;
     for (std::size_t i = 0; i < poses; ++i) {
@@ -216,6 +253,7 @@ struct Bench {
       }
       ratio["memory"] = memory;
       if (ours.distances.empty()) ratio["distance_median"] = nullptr;
+      if (ours.first_distance_times.empty()) ratio["first_distance"] = nullptr;
       output.write(
           {{"a", file_a},
            {"b", file_b.empty() ? file_a : file_b},
