@@ -8,6 +8,7 @@
 #include <fcl/broadphase/broadphase_interval_tree.h>
 #include <fcl/broadphase/broadphase_spatialhash.h>
 #include <fcl/broadphase/default_broadphase_callbacks.h>
+#include <fcl/math/motion/interp_motion.h>
 #include <gtest/gtest.h>
 
 #include <algorithm>
@@ -222,6 +223,50 @@ TYPED_TEST(Broadphase, SameAsFclsMeshesWhereObjectsCrowd) {
 TYPED_TEST(Broadphase, SameAsFclsMeshesWhereObjectsAreScarce) {
   using S = typename ScalarOf<TypeParam>::type;
   checkLayout<TypeParam>(layout<S>(10, 9, 3), layout<S>(10, 25, 7));
+}
+
+// FCL has an interface for managers of moving objects, but none; what such a manager would call is its callback.
+TEST(BroadphaseCallbacks, DefaultContinuousCallbackReachesModels) {
+  const auto model = [](double size) {
+    Raw raw = test::torus(10);
+    raw.scale(size);
+    return std::make_shared<Modeld>(raw.mesh());
+  };
+  const auto at = [](double x, double angle) {
+    return test::pose<double>(Eigen::AngleAxisd(angle, Eigen::Vector3d::UnitZ()).toRotationMatrix(), {x, 0, 0});
+  };
+  const auto moving = [](std::shared_ptr<fcl::CollisionGeometryd> geometry, const fcl::Transform3d& begin,
+                         const fcl::Transform3d& end) {
+    // Without its last argument, FCL 0.7 leaves the motion's reference point unset.
+    const Eigen::Vector3d origin = Eigen::Vector3d::Zero();
+    fcl::ContinuousCollisionObjectd object(geometry, std::make_shared<fcl::InterpMotion<double>>(begin, end, origin));
+    object.computeAABB();
+    return object;
+  };
+  int hits = 0, misses = 0;
+  for (const double reach : {-8.6, -7.9, 5.0}) {
+    const auto a = model(1), b = model(0.7);
+    auto standing = moving(a, at(0, 0), at(0, 1)), coming = moving(b, at(9, 0), at(9 + reach, 0.5));
+    for (const bool swapped : {false, true}) {
+      fcl::DefaultContinuousCollisionData<double> data;
+      data.request.ccd_motion_type = fcl::CCDM_LINEAR;
+      data.request.ccd_solver_type = fcl::CCDC_CONSERVATIVE_ADVANCEMENT;
+      auto &first = swapped ? coming : standing, &second = swapped ? standing : coming;
+      EXPECT_FALSE(fcl::DefaultContinuousCollisionFunction(&first, &second, &data));
+      fcl::ContinuousCollisionResultd expected;
+      fcl::continuousCollide(a.get(), at(0, 0), at(0, 1), b.get(), at(9, 0), at(9 + reach, 0.5), data.request,
+                             expected);
+      EXPECT_EQ(data.result.is_collide, expected.is_collide);
+      EXPECT_NEAR(data.result.time_of_contact, expected.time_of_contact, 2 * data.request.toc_err);
+      (expected.is_collide ? hits : misses) += 1;
+      fcl::DefaultContinuousCollisionData<double> done;
+      done.done = true;
+      EXPECT_TRUE(fcl::DefaultContinuousCollisionFunction(&first, &second, &done));
+      EXPECT_FALSE(done.result.is_collide);
+    }
+  }
+  EXPECT_EQ(hits, 4);
+  EXPECT_EQ(misses, 2);
 }
 
 TEST(BroadphaseLayouts, HaveHitsAndDistances) {
