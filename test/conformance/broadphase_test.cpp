@@ -237,9 +237,11 @@ TEST(BroadphaseCallbacks, DefaultContinuousCallbackReachesModels) {
   };
   const auto moving = [](std::shared_ptr<fcl::CollisionGeometryd> geometry, const fcl::Transform3d& begin,
                          const fcl::Transform3d& end) {
-    // Without its last argument, FCL 0.7 leaves the motion's reference point unset.
+    // FCL 0.7's other constructors leave the reference point or the velocities unset.
     const Eigen::Vector3d origin = Eigen::Vector3d::Zero();
-    fcl::ContinuousCollisionObjectd object(geometry, std::make_shared<fcl::InterpMotion<double>>(begin, end, origin));
+    const auto motion = std::make_shared<fcl::InterpMotion<double>>(begin.linear(), begin.translation(), end.linear(),
+                                                                    end.translation(), origin);
+    fcl::ContinuousCollisionObjectd object(geometry, motion);
     object.computeAABB();
     return object;
   };
