@@ -33,15 +33,17 @@ Picture whitePicture(int width, int height) {
   const Pen pen = penOn(picture);
   cairo_set_source_rgb(pen.get(), 1, 1, 1);
   cairo_paint(pen.get());
-  check(cairo_status(pen.get()));
+  check(pen);
   return picture;
 }
 
 Pen penOn(const Picture& picture) {
   Pen pen(cairo_create(picture.get()));
-  check(cairo_status(pen.get()));
+  check(pen);
   return pen;
 }
+
+void check(const Pen& pen) { check(cairo_status(pen.get())); }
 
 std::string png(const Picture& picture) {
   std::string text;

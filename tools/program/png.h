@@ -21,7 +21,10 @@ Picture whitePicture(int width, int height);
 /// What draws on it. @throws std::runtime_error
 Pen penOn(const Picture& picture);
 
-/// The bytes of a PNG file. @throws std::runtime_error when something went wrong while it was drawn, too.
+/// @throws std::runtime_error when something went wrong while it drew.
+void check(const Pen& pen);
+
+/// The bytes of a PNG file. @throws std::runtime_error
 std::string png(const Picture& picture);
 
 /// As writeFile() does: whole or not at all. @throws std::runtime_error

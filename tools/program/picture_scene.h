@@ -1,0 +1,38 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#pragma once
+
+// What pictures of one mesh and of two have in common.
+
+#include <bocst/mesh.h>
+#include <bocst/node_view.h>
+#include <bocst/options.h>
+
+#include <array>
+#include <limits>
+#include <string>
+#include <vector>
+
+#include "render/renderer.h"
+
+namespace bocst::program {
+
+/// From the right, the front and above.
+constexpr double kTurn = 0.7, kTilt = 0.45;
+
+/// What has no extent is looked at as if it had this.
+constexpr double kSmallest = std::numeric_limits<double>::min() * 1e16;
+
+/// Of A and B.
+constexpr std::array<render::Color, 2> kSurfaceColors = {{{0.93f, 0.91f, 0.87f}, {0.80f, 0.76f, 0.70f}}};
+constexpr std::array<render::Color, 2> kVolumeColors = {{{0.20f, 0.50f, 0.86f}, {0.93f, 0.52f, 0.16f}}};
+
+render::Volumes volumesOf(const std::vector<NodeView>& nodes, const Mesh& mesh, const Options& options,
+                          render::Volumes::Shape shape);
+
+/// "1 node", "2 nodes".
+std::string counted(std::size_t count, const std::string& what);
+
+/// As the paper calls it.
+std::string nameOf(Subdivision subdivision);
+
+}  // namespace bocst::program
