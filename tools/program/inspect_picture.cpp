@@ -9,6 +9,15 @@
 
 namespace bocst::program {
 
+render::View viewOf(const NodeView& root, render::Up up) {
+  render::View view;
+  view.axes = render::View::axesFrom(kTurn, kTilt, up);
+  view.center = root.center;
+  view.radius = radiusToSee(1.03 * root.radius, root.center);
+  view.reach = 1.05 * view.radius;
+  return view;
+}
+
 Picture inspectPicture(render::Renderer& renderer, const std::string& file, const Mesh& mesh,
                        const std::vector<NodeView>& nodes, const Options& options, const ImageArguments& image) {
   Sheet sheet;
@@ -20,18 +29,14 @@ Picture inspectPicture(render::Renderer& renderer, const std::string& file, cons
   for (const NodeView& node : nodes) levels = std::max(levels, node.level);
   sheet.columns = columnsFor(static_cast<std::size_t>(levels) + 1);
 
-  const NodeView& root = nodes.front();
-  render::View view;
-  view.axes = render::View::axesFrom(kTurn, kTilt, image.upAxis());
-  view.center = root.center;
-  view.radius = 1.03 * std::max(root.radius, kSmallest);
-  view.reach = 1.05 * view.radius;
+  const render::View view = viewOf(nodes.front(), image.upAxis());
   const auto draw = [&](const std::vector<NodeView>& shown) {
     render::Scene scene;
-    scene.surfaces.push_back({&mesh, Eigen::Isometry3d::Identity(), kSurfaceColors[0]});
+    scene.surfaces.push_back({&mesh, Eigen::Isometry3d::Identity(), kMeshColor, 1});
     scene.volumes.push_back(volumesOf(shown, mesh, options, image.shape()));
     return renderer.draw(scene, view, sheet.side(), sheet.side());
   };
+  Progress progress("view", static_cast<std::size_t>(levels));
   sheet.panels.push_back({draw({}), "the mesh", {}});
   for (int level = 1; level <= levels; ++level) {
     const auto count =
@@ -39,6 +44,7 @@ Picture inspectPicture(render::Renderer& renderer, const std::string& file, cons
     sheet.panels.push_back({draw(leavesAt(nodes, level)),
                             "level " + std::to_string(level) + " · " + counted(static_cast<std::size_t>(count), "node"),
                             {}});
+    progress.step();
   }
   return sheet.picture();
 }

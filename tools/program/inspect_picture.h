@@ -14,6 +14,9 @@
 
 namespace bocst::program {
 
+/// How it looks at a tree with this root.
+render::View viewOf(const NodeView& root, render::Up up);
+
 /// The mesh, then the tree of it as it ends at each level, all from one side and at one scale.
 /// @param nodes the whole tree down to the level options.depth, the root first.
 Picture inspectPicture(render::Renderer& renderer, const std::string& file, const Mesh& mesh,

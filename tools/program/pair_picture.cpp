@@ -2,9 +2,14 @@
 #include "pair_picture.h"
 
 #include <algorithm>
+#include <array>
 #include <cmath>
-#include <optional>
+#include <iterator>
+#include <string>
+#include <utility>
+#include <vector>
 
+#include "marks.h"
 #include "picture_scene.h"
 
 namespace bocst::program {
@@ -12,7 +17,8 @@ namespace {
 
 using render::View;
 
-constexpr render::Color kContactColor = {0.80f, 0.0f, 0.28f};
+/// Of surfaces that only show where they are.
+constexpr float kGlass = 0.2f;
 
 /// One of the two, with what grew.
 struct Side {
@@ -48,7 +54,7 @@ struct Extent {
     View view;
     view.axes = axes;
     view.center = axes.transpose() * box.center();
-    view.radius = std::max(room * box.sizes().head<2>().maxCoeff() / 2, kSmallest);
+    view.radius = radiusToSee(room * box.sizes().head<2>().maxCoeff() / 2, view.center);
     return view;
   }
 };
@@ -79,19 +85,21 @@ class Drawn {
     const auto frame = [&, this](cairo_t* pen) {
       if (!focus_.empty()) markFrame(pen, all, near, side);
     };
-    sheet.panels.push_back({draw(all, side, {}), "the objects", [&, frame](cairo_t* pen) {
-                              markContacts(pen, all, side, false);
+    sheet.panels.push_back({draw(all, side, surfaces(1), {}),
+                            grown_.contacts.empty() ? "the objects" : "the objects and their contacts",
+                            [&, frame](cairo_t* pen) {
+                              markContacts(pen, grown_.contacts, all, side, false);
                               frame(pen);
                             }});
-    sheet.panels.push_back({draw(all, side, {1, 1}),
+    sheet.panels.push_back({draw(all, side, surfaces(1), {1, 1}),
                             "what grew: " + counted(grown_.pair->statisticsA().resident_nodes, "node") + " in A, " +
                                 std::to_string(grown_.pair->statisticsB().resident_nodes) + " in B",
                             frame});
     if (!focus_.empty()) {
-      sheet.panels.push_back({draw(near, side, {sides_[0].deepest(), sides_[1].deepest()}),
+      sheet.panels.push_back({draw(near, side, surfaces(kGlass), {sides_[0].deepest(), sides_[1].deepest()}),
                               "the frame, with the deepest nodes: level " + std::to_string(sides_[0].deepest()) +
                                   " in A, " + std::to_string(sides_[1].deepest()) + " in B",
-                              [&](cairo_t* pen) { markContacts(pen, near, side, true); }});
+                              [&](cairo_t* pen) { markContacts(pen, grown_.contacts, near, side, true); }});
     }
     return sheet.picture();
   }
@@ -117,7 +125,7 @@ class Drawn {
     const std::size_t step = (focus_.size() + kMostPoints - 1) / kMostPoints;
     for (std::size_t i = 0; i < focus_.size(); i += step) points.push_back(focus_[i]);
     double best = -1;
-    const render::Scene scene = surfaces();
+    const render::Scene scene = surfaces(1);
     const Eigen::Matrix3d usual = axes_;
     for (const double tilt : {kTilt, 1.1, -kTilt}) {
       for (int eighth = 0; eighth < 8; ++eighth) {
@@ -135,9 +143,11 @@ class Drawn {
     axes_ = best > 0 ? best_axes_ : usual;
   }
 
-  render::Scene surfaces() const {
+  render::Scene surfaces(float opacity) const {
     render::Scene scene;
-    for (const Side& side : sides_) scene.surfaces.push_back({&side.mesh, side.pose, kSurfaceColors[side.index]});
+    for (const Side& side : sides_) {
+      scene.surfaces.push_back({&side.mesh, side.pose, kPairColors[side.index], opacity});
+    }
     return scene;
   }
 
@@ -160,6 +170,10 @@ class Drawn {
       for (const NodeView& node : side.frontier(side.deepest())) view.radius = std::max(view.radius, 6 * node.radius);
     }
     view.radius = std::min(view.radius, all.radius);
+    // Nothing is beyond what the overview shows.
+    const double most = all.radius - view.radius;
+    const Eigen::Vector3d off = axes_ * (view.center - all.center);
+    view.center -= axes_.topRows<2>().transpose() * (off - off.cwiseMax(-most).cwiseMin(most)).head<2>();
     return withReach(view);
   }
 
@@ -174,64 +188,19 @@ class Drawn {
     return view;
   }
 
-  /// With each side's frontier from this level on, if any.
-  render::Image draw(const View& view, int side_pixels, const std::vector<int>& from_levels) const {
-    render::Scene scene = surfaces();
+  /// With each side's frontier from this level on, if any; opaque where the surfaces are not.
+  render::Image draw(const View& view, int side_pixels, render::Scene scene,
+                     const std::vector<int>& from_levels) const {
     const Options options = grown_.model.options();
     for (std::size_t i = 0; i < from_levels.size(); ++i) {
       const Side& side = sides_[i];
       render::Volumes volumes = volumesOf(side.frontier(from_levels[i]), side.mesh, options, image_.shape());
       volumes.pose = side.pose;
       volumes.color = kVolumeColors[i];
+      if (scene.surfaces[i].opacity < 1) volumes.opacity = 1;
       scene.volumes.push_back(std::move(volumes));
     }
     return renderer_.draw(scene, view, side_pixels, side_pixels);
-  }
-
-  void markContacts(cairo_t* pen, const View& view, int side, bool normals) const {
-    const double unit = std::max(side / 260.0, 1.0);
-    cairo_set_source_rgb(pen, kContactColor.red, kContactColor.green, kContactColor.blue);
-    for (const TouchingPoint& contact : grown_.contacts) {
-      const Eigen::Vector2d at = view.toPixel(contact.position, side, side);
-      cairo_arc(pen, at.x(), at.y(), (normals ? 1.2 : 0.9) * unit, 0, 8 * std::atan(1.0));
-      cairo_fill(pen);
-    }
-    if (!normals) return;
-    // As many arrows as have room.
-    std::vector<Eigen::Vector2d> taken;
-    for (const TouchingPoint& contact : grown_.contacts) {
-      const Eigen::Vector2d at = view.toPixel(contact.position, side, side);
-      const auto near = [&](const Eigen::Vector2d& other) { return (other - at).norm() < side / 28.0; };
-      if (std::any_of(taken.begin(), taken.end(), near)) continue;
-      taken.push_back(at);
-      arrow(pen, at, view.toPixel(contact.position + 0.22 * view.radius * contact.normal, side, side), unit);
-    }
-  }
-
-  static void arrow(cairo_t* pen, const Eigen::Vector2d& from, const Eigen::Vector2d& to, double unit) {
-    const double length = (to - from).norm();
-    if (!(length > unit)) return;
-    const Eigen::Vector2d along = (to - from) / length;
-    const Eigen::Vector2d aside(-along.y(), along.x());
-    const double head = std::min(4.5 * unit, 0.6 * length);
-    const Eigen::Vector2d neck = to - head * along;
-    cairo_set_line_width(pen, 0.9 * unit);
-    cairo_move_to(pen, from.x(), from.y());
-    cairo_line_to(pen, neck.x(), neck.y());
-    cairo_stroke(pen);
-    cairo_move_to(pen, to.x(), to.y());
-    for (const double s : {0.35, -0.35})
-      cairo_line_to(pen, neck.x() + s * head * aside.x(), neck.y() + s * head * aside.y());
-    cairo_fill(pen);
-  }
-
-  static void markFrame(cairo_t* pen, const View& all, const View& near, int side) {
-    const Eigen::Vector2d middle = all.toPixel(near.center, side, side);
-    const double half = near.radius / all.radius * side / 2;
-    cairo_set_source_rgba(pen, 0.1, 0.1, 0.1, 0.8);
-    cairo_set_line_width(pen, std::max(side / 400.0, 1.0));
-    cairo_rectangle(pen, middle.x() - half, middle.y() - half, 2 * half, 2 * half);
-    cairo_stroke(pen);
   }
 
   std::string subtitle() const {

@@ -70,9 +70,9 @@ void drawHead(cairo_t* pen, const Sheet& sheet, const Measures& m) {
   write(pen, m.gap, 4 * m.em, 0, m.em, right - m.gap, sheet.subtitle);
 }
 
-void drawPanel(cairo_t* pen, const Panel& panel, double x, double y, int side, const Measures& m) {
+void drawPanel(cairo_t* pen, const Panel& panel, const std::array<int, 2>& corner, int side, const Measures& m) {
   cairo_save(pen);
-  cairo_translate(pen, x, y);
+  cairo_translate(pen, corner[0], corner[1]);
   cairo_rectangle(pen, 0, 0, side, side);
   cairo_set_source_rgb(pen, 0.957, 0.965, 0.973);
   cairo_fill_preserve(pen);
@@ -88,7 +88,7 @@ void drawPanel(cairo_t* pen, const Panel& panel, double x, double y, int side, c
   if (panel.marks) panel.marks(pen);
   cairo_restore(pen);
   font(pen, CAIRO_FONT_WEIGHT_NORMAL, 0.2);
-  write(pen, x + side / 2.0, y + side + 1.5 * m.em, 0.5, m.em, side, panel.label);
+  write(pen, corner[0] + side / 2.0, corner[1] + side + 1.5 * m.em, 0.5, m.em, side, panel.label);
 }
 
 }  // namespace
@@ -109,18 +109,20 @@ int Sheet::side() const {
   return std::max(1, static_cast<int>((width - m.gap * (columns + 1)) / columns));
 }
 
+std::array<int, 2> Sheet::corner(std::size_t panel) const {
+  const Measures m(*this);
+  const auto across = static_cast<std::size_t>(columns);
+  return {static_cast<int>(m.gap + static_cast<double>(panel % across) * (side() + m.gap)),
+          static_cast<int>(m.head + static_cast<double>(panel / across) * (side() + m.label))};
+}
+
 Picture Sheet::picture() const {
   const Measures m(*this);
-  const std::size_t across = static_cast<std::size_t>(columns);
-  const std::size_t rows = (panels.size() + across - 1) / across;
-  const double pitch = side() + m.label;
-  Picture picture = whitePicture(width, static_cast<int>(m.head + static_cast<double>(rows) * pitch + m.gap));
+  const int bottom = panels.empty() ? 0 : corner(panels.size() - 1)[1] + side();
+  Picture picture = whitePicture(width, bottom + static_cast<int>(m.label + m.gap));
   const Pen pen = penOn(picture);
   drawHead(pen.get(), *this, m);
-  for (std::size_t i = 0; i < panels.size(); ++i) {
-    const double x = m.gap + static_cast<double>(i % across) * (side() + m.gap);
-    drawPanel(pen.get(), panels[i], std::round(x), m.head + static_cast<double>(i / across) * pitch, side(), m);
-  }
+  for (std::size_t i = 0; i < panels.size(); ++i) drawPanel(pen.get(), panels[i], corner(i), side(), m);
   check(pen);
   return picture;
 }

@@ -3,6 +3,7 @@
 
 #include <cairo.h>
 
+#include <array>
 #include <functional>
 #include <string>
 #include <vector>
@@ -35,6 +36,9 @@ struct Sheet {
 
   /// Pixels a side of a view.
   int side() const;
+
+  /// The upper left corner of a view, in the picture's pixels.
+  std::array<int, 2> corner(std::size_t panel) const;
 
   /// Text that is not UTF-8 is mended, and made smaller where it is too long. @throws std::runtime_error
   Picture picture() const;

@@ -1,9 +1,16 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #include "picture_scene.h"
 
+#include <algorithm>
+
 #include "page.h"
 
 namespace bocst::program {
+
+double radiusToSee(double radius, const Eigen::Vector3d& center) {
+  constexpr double kResolved = 1e-12, kSmallest = 1e-290;
+  return std::max({radius, kResolved * center.cwiseAbs().maxCoeff(), kSmallest});
+}
 
 render::Volumes volumesOf(const std::vector<NodeView>& nodes, const Mesh& mesh, const Options& options,
                           render::Volumes::Shape shape) {

@@ -8,7 +8,6 @@
 #include <bocst/options.h>
 
 #include <array>
-#include <limits>
 #include <string>
 #include <vector>
 
@@ -19,11 +18,13 @@ namespace bocst::program {
 /// From the right, the front and above.
 constexpr double kTurn = 0.7, kTilt = 0.45;
 
-/// What has no extent is looked at as if it had this.
-constexpr double kSmallest = std::numeric_limits<double>::min() * 1e16;
+/// A view's radius that is no less than what coordinates about this centre resolve.
+double radiusToSee(double radius, const Eigen::Vector3d& center);
+
+constexpr render::Color kMeshColor = {0.93f, 0.90f, 0.84f};
 
 /// Of A and B.
-constexpr std::array<render::Color, 2> kSurfaceColors = {{{0.93f, 0.91f, 0.87f}, {0.80f, 0.76f, 0.70f}}};
+constexpr std::array<render::Color, 2> kPairColors = {{{0.72f, 0.79f, 0.88f}, {0.91f, 0.80f, 0.67f}}};
 constexpr std::array<render::Color, 2> kVolumeColors = {{{0.20f, 0.50f, 0.86f}, {0.93f, 0.52f, 0.16f}}};
 
 render::Volumes volumesOf(const std::vector<NodeView>& nodes, const Mesh& mesh, const Options& options,

@@ -135,8 +135,15 @@ class Renderer::Drawing {
 
   Image draw(const Scene& scene, const View& view, int width, int height) {
     prepare(view, width, height);
-    for (const Surface& surface : scene.surfaces) drawSurface(surface, view);
+    for (const Surface& surface : scene.surfaces) {
+      if (surface.opacity >= 1) drawSurface(surface, view);
+    }
     for (const Volumes& volumes : scene.volumes) drawVolumes(volumes, view);
+    glDepthMask(GL_FALSE);
+    for (const Surface& surface : scene.surfaces) {
+      if (surface.opacity < 1) drawSurface(surface, view);
+    }
+    glDepthMask(GL_TRUE);
     const std::vector<std::uint32_t> samples = read<std::uint32_t>(width, height, GL_BGRA, GL_UNSIGNED_INT_8_8_8_8_REV);
     return reduced(samples, width, height);
   }
@@ -209,10 +216,11 @@ class Renderer::Drawing {
     glClear(GL_COLOR_BUFFER_BIT | GL_DEPTH_BUFFER_BIT);
   }
 
-  void use(const gl::Program& program, const Color& color) const {
+  void use(const gl::Program& program, const Color& color, float opacity) const {
     program.use();
     glUniform3f(program.uniform("u_scale"), scale_[0], scale_[1], scale_[2]);
     glUniform3f(program.uniform("u_color"), color.red, color.green, color.blue);
+    glUniform1f(program.uniform("u_opacity"), opacity);
   }
 
   void drawSurface(const Surface& surface, const View& view) const {
@@ -225,7 +233,7 @@ class Renderer::Drawing {
       glBindBuffer(GL_ARRAY_BUFFER, positions.name());
       attribute(0, 3, sizeof(Eigen::Vector3f), 0, 0);
       glBindBuffer(GL_ELEMENT_ARRAY_BUFFER, indices.name());
-      use(mesh_, surface.color);
+      use(mesh_, surface.color, surface.opacity);
       glDrawElements(GL_TRIANGLES, static_cast<GLsizei>(triangles.indices.size()), GL_UNSIGNED_INT, nullptr);
     }
     if (!triangles.strokes.empty()) {
@@ -234,7 +242,7 @@ class Renderer::Drawing {
       glDisableVertexAttribArray(0);
       attribute(1, 3, sizeof(triangles.strokes[0]), 0, 1);
       attribute(2, 3, sizeof(triangles.strokes[0]), sizeof(Eigen::Vector3f), 1);
-      use(stroke_, surface.color);
+      use(stroke_, surface.color, surface.opacity);
       glUniform2f(stroke_.uniform("u_pixel"), pixel_[0], pixel_[1]);
       glUniform1f(stroke_.uniform("u_pixels"), kStrokePixels);
       glDrawArraysInstanced(GL_TRIANGLE_STRIP, 0, 4, static_cast<GLsizei>(triangles.strokes.size()));
@@ -261,8 +269,7 @@ class Renderer::Drawing {
       attribute(3, 1, sizeof(Instance), 6 * sizeof(float), 1);
     }
     const gl::Program& program = boxes ? box_ : sphere_;
-    use(program, volumes.color);
-    glUniform1f(program.uniform("u_opacity"), volumes.opacity);
+    use(program, volumes.color, volumes.opacity);
     if (boxes) {
       const Eigen::Matrix3f axes = (view.axes * volumes.pose.linear()).cast<float>();
       glUniformMatrix3fv(program.uniform("u_axes"), 1, GL_FALSE, axes.data());

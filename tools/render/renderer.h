@@ -24,6 +24,7 @@ struct Surface {
   const Mesh* mesh = nullptr;
   Eigen::Isometry3d pose = Eigen::Isometry3d::Identity();
   Color color;
+  float opacity = 1;  ///< Below 1 it is glass: drawn last, and hides nothing.
 };
 
 /// Spheres or boxes at a pose, over the surfaces: of these only what is nearest to the eye is seen, mixed with what is
@@ -45,7 +46,7 @@ struct Volumes {
 
 struct Scene {
   std::vector<Surface> surfaces;
-  std::vector<Volumes> volumes;  ///< In this order.
+  std::vector<Volumes> volumes;  ///< Drawn in this order.
 };
 
 /// Pixels by rows, the uppermost first: 0xAARRGGBB, colours multiplied by alpha, as Cairo's ARGB32. Where nothing is

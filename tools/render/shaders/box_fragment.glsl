@@ -8,11 +8,8 @@ out vec4 result;
 void main() {
   // Of the two coordinates that vary over this face: how many pixels from an edge?
   vec3 change = fwidth(at);
-  vec3 away = (1.0 - abs(at)) / max(change, 1e-9);
-  if (change.x < 1e-6) away.x = 1e9;
-  if (change.y < 1e-6) away.y = 1e9;
-  if (change.z < 1e-6) away.z = 1e9;
+  vec3 away = mix((1.0 - abs(at)) / max(change, 1e-9), vec3(1e9), lessThan(change, vec3(1e-6)));
   bool edge = min(away.x, min(away.y, away.z)) < 0.5 * u_pixels;
-  vec3 color = lit(u_color, cross(dFdx(p), dFdy(p)));
+  vec3 color = mix(u_color, lit(u_color, cross(dFdx(p), dFdy(p))), 0.7);
   result = edge ? vec4(color * 0.45, min(1.0, u_opacity + 0.3)) : vec4(color, u_opacity);
 }
