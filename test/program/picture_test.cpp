@@ -169,7 +169,9 @@ TEST_F(Pictures, SurfacesCoverTheirProjection) {
     for (const double away : {0.0, 1e6}) {
       View view = randomView(g);
       view.center.x() += away;
-      Surface surface{mesh.get()};
+      Surface surface;
+      surface.mesh = mesh.get();
+      surface.color = kRed;
       surface.pose = Eigen::Translation3d(away, 0, 0) * Eigen::AngleAxisd(0.3, Eigen::Vector3d::UnitY());
       const Image image = draw({{surface}, {}}, view, 97);
       Coverage expected(97);
@@ -251,7 +253,9 @@ TEST_F(Pictures, WhatHasNoAreaIsSeen) {
         const Eigen::Vector2d p(x + 0.5, y + 0.5), along = to - from;
         const double t =
             along.squaredNorm() > 0 ? std::clamp((p - from).dot(along) / along.squaredNorm(), 0.0, 1.0) : 0;
-        if ((p - from - t * along).norm() > 3.5) EXPECT_EQ(alphaOf(image, x, y), 0) << x << " " << y;
+        if ((p - from - t * along).norm() > 3.5) {
+          EXPECT_EQ(alphaOf(image, x, y), 0) << x << " " << y;
+        }
       }
     }
   }
@@ -345,7 +349,6 @@ program::Sheet layout(int width, std::size_t panels) {
 
 TEST_F(Pictures, InspectShowsTheSpheresOfEachLevel) {
   constexpr int kWidth = 700;
-  constexpr std::uint32_t kBackground = 0xf4f6f8;
   const Eigen::Vector3d a(1, 2, 3);
   const std::vector<std::shared_ptr<const Mesh>> meshes = {
       test::torus(24).mesh(),
@@ -381,6 +384,9 @@ TEST_F(Pictures, InspectShowsTheSpheresOfEachLevel) {
         const auto [left, top] = sheet.corner(static_cast<std::size_t>(level));
         EXPECT_GT(pixels.countDark(left, top + side, side, pixels.height > top + side + 20 ? 20 : 10), 20)
             << "no label";
+        // A sphere about everything leaves the corners free.
+        const std::uint32_t background = pixels.at(left, top);
+        EXPECT_NE(background, 0xffffffu);
         Coverage expected(side);
         addTriangles(expected, *mesh, Eigen::Isometry3d::Identity(), view);
         if (level > 0) {
@@ -390,7 +396,7 @@ TEST_F(Pictures, InspectShowsTheSpheresOfEachLevel) {
         int shown = 0, wrong = 0;
         for (int y = 0; y < side; ++y) {
           for (int x = 0; x < side; ++x) {
-            const bool drawn = pixels.at(left + x, top + y) != kBackground;
+            const bool drawn = pixels.at(left + x, top + y) != background;
             shown += drawn ? 1 : 0;
             // Where it is covered in part, and where strokes are wider than what they stand for, either is right.
             double least = 1, most = 0;
@@ -461,7 +467,7 @@ TEST(Marks, AreWhereContactsAre) {
   for (const Eigen::Vector2d& tip : {rightOf(0.5, length), rightOf(-0.5 - length, 0)}) {
     EXPECT_GT(arrows.countContact(static_cast<int>(tip.x()) - 2, static_cast<int>(tip.y()) - 2, 5, 5), 3);
   }
-  EXPECT_GT(arrows.countContact(0, 0, kSide, kSide), all_dots + 60);
+  EXPECT_GT(arrows.countContact(0, 0, kSide, kSide), all_dots + 20);
   const Eigen::Vector2d against = rightOf(0.5, -0.1);
   EXPECT_EQ(arrows.countContact(static_cast<int>(against.x()) - 3, static_cast<int>(against.y()), 7, 30), 0);
 }
@@ -469,7 +475,7 @@ TEST(Marks, AreWhereContactsAre) {
 TEST_F(Pictures, PairsShowContactsAndWhatGrew) {
   constexpr int kWidth = 900;
   const auto torus = test::torus(24).mesh();
-  const auto box = test::box({-0.3, -0.3, -0.3}, {0.3, 0.3, 0.3}).mesh();
+  const auto box = test::box({-0.2, -0.2, -0.2}, {0.2, 0.2, 0.2}).mesh();
   program::ImageArguments image;
   image.width = kWidth;
   program::ModelArguments model;

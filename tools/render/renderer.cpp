@@ -20,6 +20,7 @@ namespace gl = oracle::gl;
 
 constexpr int kSamples = 3;            // a side of a pixel: spheres end inside triangles, where no multisampling helps
 constexpr float kStrokePixels = 2.5f;  // of triangles without area
+constexpr double kSliver = 1e-7;       // what is thinner, of its length, no sample would see
 constexpr float kBoxEdgePixels = 1.25f;
 
 gl::Program program(const char* vertex, const char* fragment) {
@@ -45,7 +46,7 @@ std::size_t bytesOf(const std::vector<T>& list) {
 struct Triangles {
   std::vector<Eigen::Vector3f> positions;
   std::vector<std::uint32_t> indices;
-  std::vector<std::array<Eigen::Vector3f, 2>> strokes;  ///< Triangles without area.
+  std::vector<std::array<Eigen::Vector3f, 2>> strokes;  ///< The longest edges of triangles without area.
 };
 
 Triangles trianglesOf(const Surface& surface, const View& view) {
@@ -58,14 +59,13 @@ Triangles trianglesOf(const Surface& surface, const View& view) {
   result.indices.reserve(3 * mesh.triangleCount());
   for (const Mesh::Indices& t : mesh.triangles()) {
     const std::array<Eigen::Vector3d, 3> c = {mesh.vertex(t[0]), mesh.vertex(t[1]), mesh.vertex(t[2])};
-    if ((c[1] - c[0]).cross(c[2] - c[0]).squaredNorm() > 0) {
+    std::size_t longest = 0;
+    const auto square = [&c](std::size_t i) { return (c[(i + 1) % 3] - c[i]).squaredNorm(); };
+    for (const std::size_t i : {1, 2}) longest = square(i) > square(longest) ? i : longest;
+    if ((c[1] - c[0]).cross(c[2] - c[0]).norm() > kSliver * square(longest)) {
       result.indices.insert(result.indices.end(), t.begin(), t.end());
       continue;
     }
-    // The longest edge is all that there is.
-    std::size_t longest = 0;
-    const auto length = [&c](std::size_t i) { return (c[(i + 1) % 3] - c[i]).squaredNorm(); };
-    for (const std::size_t i : {1, 2}) longest = length(i) > length(longest) ? i : longest;
     result.strokes.push_back({result.positions[t[longest]], result.positions[t[(longest + 1) % 3]]});
   }
   return result;
