@@ -253,7 +253,7 @@ TEST_F(Pictures, WhatHasNoAreaIsSeen) {
         const Eigen::Vector2d p(x + 0.5, y + 0.5), along = to - from;
         const double t =
             along.squaredNorm() > 0 ? std::clamp((p - from).dot(along) / along.squaredNorm(), 0.0, 1.0) : 0;
-        if ((p - from - t * along).norm() > 3.5) {
+        if ((p - from - t * along).norm() > 4.5) {
           EXPECT_EQ(alphaOf(image, x, y), 0) << x << " " << y;
         }
       }

@@ -17,6 +17,12 @@ namespace {
 
 using render::View;
 
+/// From this level on a side's deepest nodes say where it was asked.
+constexpr int kGrown = 3;
+
+/// The least part of the overview that is worth a close-up.
+constexpr double kLeastPart = 0.15;
+
 /// Of surfaces that only show where they are.
 constexpr float kGlass = 0.2f;
 
@@ -33,11 +39,20 @@ struct Side {
     return level;
   }
 
-  /// Those without children from this level on.
-  std::vector<NodeView> frontier(int from_level) const {
+  std::vector<NodeView> frontier() const {
     std::vector<NodeView> result;
     std::copy_if(nodes.begin(), nodes.end(), std::back_inserter(result),
-                 [from_level](const NodeView& node) { return node.children.empty() && node.level >= from_level; });
+                 [](const NodeView& node) { return node.children.empty(); });
+    return result;
+  }
+
+  /// None where little grew.
+  std::vector<NodeView> deepestNodes() const {
+    std::vector<NodeView> result;
+    const int level = deepest();
+    if (level < kGrown) return result;
+    std::copy_if(nodes.begin(), nodes.end(), std::back_inserter(result),
+                 [level](const NodeView& node) { return node.level == level; });
     return result;
   }
 };
@@ -91,14 +106,14 @@ class Drawn {
                               markContacts(pen, grown_.contacts, all, side, false);
                               frame(pen);
                             }});
-    sheet.panels.push_back({draw(all, side, surfaces(1), {1, 1}),
+    sheet.panels.push_back({draw(all, side, surfaces(1), {sides_[0].frontier(), sides_[1].frontier()}),
                             "what grew: " + counted(grown_.pair->statisticsA().resident_nodes, "node") + " in A, " +
                                 std::to_string(grown_.pair->statisticsB().resident_nodes) + " in B",
                             frame});
     if (!focus_.empty()) {
-      sheet.panels.push_back({draw(near, side, surfaces(kGlass), {sides_[0].deepest(), sides_[1].deepest()}),
-                              "the frame, with the deepest nodes: level " + std::to_string(sides_[0].deepest()) +
-                                  " in A, " + std::to_string(sides_[1].deepest()) + " in B",
+      const std::vector<std::vector<NodeView>> deepest = {sides_[0].deepestNodes(), sides_[1].deepestNodes()};
+      const bool grown = !deepest[0].empty() || !deepest[1].empty();
+      sheet.panels.push_back({draw(near, side, surfaces(grown ? kGlass : 1), deepest), closeUpLabel(),
                               [&](cairo_t* pen) { markContacts(pen, grown_.contacts, near, side, true); }});
     }
     return sheet.picture();
@@ -110,8 +125,7 @@ class Drawn {
     for (const TouchingPoint& contact : grown_.contacts) focus_.push_back(contact.position);
     if (!focus_.empty()) return;
     for (const Side& side : sides_) {
-      if (side.deepest() < 3) continue;
-      for (const NodeView& node : side.frontier(side.deepest())) focus_.push_back(side.pose * node.center);
+      for (const NodeView& node : side.deepestNodes()) focus_.push_back(side.pose * node.center);
     }
   }
 
@@ -167,9 +181,9 @@ class Drawn {
     View view = extent.view(1.3);
     // A few of the deepest nodes at least, but no more than there is.
     for (const Side& side : sides_) {
-      for (const NodeView& node : side.frontier(side.deepest())) view.radius = std::max(view.radius, 6 * node.radius);
+      for (const NodeView& node : side.deepestNodes()) view.radius = std::max(view.radius, 6 * node.radius);
     }
-    view.radius = std::min(view.radius, all.radius);
+    view.radius = std::clamp(view.radius, kLeastPart * all.radius, all.radius);
     // Nothing is beyond what the overview shows.
     const double most = all.radius - view.radius;
     const Eigen::Vector3d off = axes_ * (view.center - all.center);
@@ -188,19 +202,29 @@ class Drawn {
     return view;
   }
 
-  /// With each side's frontier from this level on, if any; opaque where the surfaces are not.
+  /// With these nodes of A and B; opaque where the surfaces are not.
   render::Image draw(const View& view, int side_pixels, render::Scene scene,
-                     const std::vector<int>& from_levels) const {
+                     const std::vector<std::vector<NodeView>>& nodes) const {
     const Options options = grown_.model.options();
-    for (std::size_t i = 0; i < from_levels.size(); ++i) {
+    for (std::size_t i = 0; i < nodes.size(); ++i) {
       const Side& side = sides_[i];
-      render::Volumes volumes = volumesOf(side.frontier(from_levels[i]), side.mesh, options, image_.shape());
+      render::Volumes volumes = volumesOf(nodes[i], side.mesh, options, image_.shape());
       volumes.pose = side.pose;
       volumes.color = kVolumeColors[i];
       if (scene.surfaces[i].opacity < 1) volumes.opacity = 1;
       scene.volumes.push_back(std::move(volumes));
     }
     return renderer_.draw(scene, view, side_pixels, side_pixels);
+  }
+
+  std::string closeUpLabel() const {
+    std::string text;
+    for (const Side& side : sides_) {
+      if (side.deepest() < kGrown) continue;
+      text += text.empty() ? "the frame, with the deepest nodes: level " : ", ";
+      text += std::to_string(side.deepest()) + (side.index == 0 ? " in A" : " in B");
+    }
+    return text.empty() ? "the frame" : text;
   }
 
   std::string subtitle() const {
