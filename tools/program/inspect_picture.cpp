@@ -5,6 +5,7 @@
 #include <filesystem>
 
 #include "picture_scene.h"
+#include "report.h"
 #include "spheres.h"
 
 namespace bocst::program {

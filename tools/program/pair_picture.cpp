@@ -11,6 +11,7 @@
 
 #include "marks.h"
 #include "picture_scene.h"
+#include "report.h"
 
 namespace bocst::program {
 namespace {
@@ -131,30 +132,33 @@ class Drawn {
 
   /// From the usual side, or from where more of the focus is seen.
   void chooseAxes() {
-    constexpr int kSide = 160;
+    constexpr int kPixels = 160;
     constexpr std::size_t kMostPoints = 400;
-    axes_ = View::axesFrom(kTurn, kTilt, image_.upAxis());
+    constexpr double kGoodEnough = 0.75;
+    const Eigen::Matrix3d usual = View::axesFrom(kTurn, kTilt, image_.upAxis());
+    axes_ = usual;
     if (focus_.empty()) return;
     std::vector<Eigen::Vector3d> points;
     const std::size_t step = (focus_.size() + kMostPoints - 1) / kMostPoints;
     for (std::size_t i = 0; i < focus_.size(); i += step) points.push_back(focus_[i]);
-    double best = -1;
     const render::Scene scene = surfaces(1);
-    const Eigen::Matrix3d usual = axes_;
+    Eigen::Matrix3d best_axes = usual;
+    double best = 0;
+    Progress progress("side", 24);
     for (const double tilt : {kTilt, 1.1, -kTilt}) {
-      for (int eighth = 0; eighth < 8; ++eighth) {
+      for (int eighth = 0; eighth < 8 && best < kGoodEnough; ++eighth) {
         axes_ = View::axesFrom(kTurn + eighth * std::atan(1.0), tilt, image_.upAxis());
-        const double seen = static_cast<double>(renderer_.countSeen(scene, overview(), kSide, points)) /
+        const double seen = static_cast<double>(renderer_.countSeen(scene, overview(), kPixels, points)) /
                             static_cast<double>(points.size());
+        progress.step();
         // Better by a little is not worth an unusual side.
         const double value = seen - (tilt == kTilt ? 0 : 0.15) - (eighth == 0 ? 0 : 0.05);
-        if (value > best + 0.02) {
-          best = value;
-          best_axes_ = axes_;
-        }
+        if (value <= best + 0.02) continue;
+        best = value;
+        best_axes = axes_;
       }
     }
-    axes_ = best > 0 ? best_axes_ : usual;
+    axes_ = best_axes;
   }
 
   render::Scene surfaces(float opacity) const {
@@ -240,7 +244,7 @@ class Drawn {
   const ImageArguments& image_;
   std::array<Side, 2> sides_;
   std::vector<Eigen::Vector3d> focus_;
-  Eigen::Matrix3d axes_, best_axes_;
+  Eigen::Matrix3d axes_;
 };
 
 }  // namespace
