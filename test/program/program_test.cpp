@@ -488,6 +488,19 @@ TEST_F(Program, DrawsPictures) {
   EXPECT_EQ(different.size(), 7u);
 }
 
+TEST_F(Program, DrawsTheFirstMismatch) {
+  // The paper's oracle at its coarsest misses what it should see.
+  const std::string validate = "validate " + model("link") + " " + model("gripper") + " --poses 32 --image ";
+  const std::string wrong = (folder_ / "wrong.png").string(), right = (folder_ / "right.png").string();
+  const Result result = run(validate + wrong + " --oracle sampled --viewport 1");
+  EXPECT_EQ(result.code, kFailed);
+  EXPECT_NE(result.err.find("poses answered wrongly"), std::string::npos) << result.err;
+  EXPECT_EQ(run(validate + right + " --oracle cpu").code, 0);
+  EXPECT_EQ(sizeOfPng(read(wrong)).first, 1600u);
+  EXPECT_EQ(sizeOfPng(read(right)).first, 1600u);
+  EXPECT_NE(read(wrong), read(right));
+}
+
 TEST_F(Program, RefusesPicturesThatMakeNoSense) {
   const std::string inspect = "inspect " + cube() + " --depth 2";
   const std::string image = " --image " + (folder_ / "a.png").string();
