@@ -480,11 +480,11 @@ TEST_F(Pictures, PairsShowContactsAndWhatGrew) {
   image.width = kWidth;
   program::ModelArguments model;
   model.oracle = "cpu";
-  const auto pixelsAt = [&](const std::string& pose) {
-    const program::GrownPair grown("a.off", *torus, "b.off", *box, model, program::Pose::parse(pose),
-                                   program::QueryPair::kAll);
+  const auto pixelsOf = [&](const Mesh& a, const Mesh& b, const std::string& pose) {
+    const program::GrownPair grown("a.off", a, "b.off", b, model, program::Pose::parse(pose), program::QueryPair::kAll);
     return Pixels(program::pairPicture(renderer(), grown, image));
   };
+  const auto pixelsAt = [&](const std::string& pose) { return pixelsOf(*torus, *box, pose); };
   const program::Sheet three = layout(kWidth, 3);
   const auto contactsIn = [&](const Pixels& pixels, std::size_t panel) {
     const auto [left, top] = three.corner(panel);
@@ -501,6 +501,19 @@ TEST_F(Pictures, PairsShowContactsAndWhatGrew) {
   const Pixels far = pixelsAt("9,0,0,1,0,0,0");
   EXPECT_EQ(far.countContact(0, 0, far.width, far.height), 0);
   EXPECT_GT(far.height, touching.height);
+  // Neither object hides the other: A, which is bluish, would be behind a wall from the usual side.
+  const auto wall = test::box({-5, -5, -0.1}, {5, 5, 0.1}).mesh();
+  const Pixels behind = pixelsOf(*box, *wall, "0,0,3,1,0,0,0");
+  const program::Sheet two = layout(kWidth, 2);
+  const auto [left, top] = two.corner(0);
+  int bluish = 0;
+  for (int y = top; y < top + two.side(); ++y) {
+    for (int x = left; x < left + two.side(); ++x) {
+      const std::uint32_t c = behind.at(x, y);
+      bluish += 100 * (c & 255) > 112 * (c >> 16 & 255) ? 1 : 0;
+    }
+  }
+  EXPECT_GT(bluish, 50);
 }
 
 }  // namespace

@@ -130,35 +130,49 @@ class Drawn {
     }
   }
 
-  /// From the usual side, or from where more of the focus is seen.
+  /// From the usual side, or from where more is seen of the focus, or else of both objects.
   void chooseAxes() {
     constexpr int kPixels = 160;
-    constexpr std::size_t kMostPoints = 400;
-    constexpr double kGoodEnough = 0.75;
-    const Eigen::Matrix3d usual = View::axesFrom(kTurn, kTilt, image_.upAxis());
-    axes_ = usual;
-    if (focus_.empty()) return;
-    std::vector<Eigen::Vector3d> points;
-    const std::size_t step = (focus_.size() + kMostPoints - 1) / kMostPoints;
-    for (std::size_t i = 0; i < focus_.size(); i += step) points.push_back(focus_[i]);
+    std::vector<std::vector<Eigen::Vector3d>> points;
+    if (focus_.empty()) {
+      for (const Side& side : sides_) {
+        points.push_back(some(side.mesh.vertices()));
+        for (Eigen::Vector3d& point : points.back()) point = side.pose * point;
+      }
+    } else {
+      points.push_back(some(focus_));
+    }
+    // Half of an object is at its back.
+    const double good_enough = focus_.empty() ? 0.4 : 0.75;
     const render::Scene scene = surfaces(1);
-    Eigen::Matrix3d best_axes = usual;
+    Eigen::Matrix3d best_axes = View::axesFrom(kTurn, kTilt, image_.upAxis());
     double best = 0;
     Progress progress("side", 24);
     for (const double tilt : {kTilt, 1.1, -kTilt}) {
-      for (int eighth = 0; eighth < 8 && best < kGoodEnough; ++eighth) {
+      for (int eighth = 0; eighth < 8 && best < good_enough; ++eighth) {
         axes_ = View::axesFrom(kTurn + eighth * std::atan(1.0), tilt, image_.upAxis());
-        const double seen = static_cast<double>(renderer_.countSeen(scene, overview(), kPixels, points)) /
-                            static_cast<double>(points.size());
+        double seen = 1;
+        for (const std::vector<Eigen::Vector3d>& group : points) {
+          seen = std::min(seen, static_cast<double>(renderer_.countSeen(scene, overview(), kPixels, group)) /
+                                    static_cast<double>(group.size()));
+        }
         progress.step();
         // Better by a little is not worth an unusual side.
-        const double value = seen - (tilt == kTilt ? 0 : 0.15) - (eighth == 0 ? 0 : 0.05);
-        if (value <= best + 0.02) continue;
+        const double value = seen - good_enough * ((tilt == kTilt ? 0 : 0.2) + (eighth == 0 ? 0 : 0.06));
+        if (value <= best + 0.03 * good_enough) continue;
         best = value;
         best_axes = axes_;
       }
     }
     axes_ = best_axes;
+  }
+
+  /// Of many points a few hundred.
+  static std::vector<Eigen::Vector3d> some(const std::vector<Eigen::Vector3d>& all) {
+    constexpr std::size_t kMost = 400;
+    std::vector<Eigen::Vector3d> result;
+    for (std::size_t i = 0; i < all.size(); i += (all.size() + kMost - 1) / kMost) result.push_back(all[i]);
+    return result;
   }
 
   render::Scene surfaces(float opacity) const {
