@@ -1,5 +1,6 @@
-# Writes a source file that holds the text of shaders, so that an installed library needs no files.
-function(bocst_embed_shaders output)
+# Writes a source file that defines shader() of a header and its namespace: the text of shaders, so that what is
+# installed needs no files.
+function(bocst_embed_shaders output header namespace)
   set(entries "")
   foreach(file IN LISTS ARGN)
     file(READ ${file} text)
@@ -8,12 +9,12 @@ function(bocst_embed_shaders output)
     set_property(DIRECTORY APPEND PROPERTY CMAKE_CONFIGURE_DEPENDS ${file})
   endforeach()
   file(CONFIGURE OUTPUT ${output} @ONLY CONTENT [[// Generated from shaders/*.glsl.
-#include "oracle/gl/shaders.h"
+#include "@header@"
 
 #include <map>
 #include <stdexcept>
 
-namespace bocst::oracle::gl {
+namespace @namespace@ {
 
 const std::string& shader(const std::string& name) {
   static const std::map<std::string, std::string> all = {
@@ -23,6 +24,6 @@ const std::string& shader(const std::string& name) {
   return found->second;
 }
 
-}  // namespace bocst::oracle::gl
+}  // namespace @namespace@
 ]])
 endfunction()

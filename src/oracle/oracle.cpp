@@ -1,33 +1,12 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #include "oracle/oracle.h"
 
-#include <cstdlib>
-
 #include "oracle/cpu/cpu_oracle.h"
-#include "oracle/gl/context.h"
 #include "oracle/gl/devices.h"
+#include "oracle/wish.h"
 
 namespace bocst::oracle {
 namespace {
-
-/// What was asked for, after BOCST_ORACLE had its say.
-struct Wish {
-  OracleKind kind;
-  int device = gl::ContextRequest::kAnyDevice;
-};
-
-Wish fromEnvironment() {
-  const char* value = std::getenv("BOCST_ORACLE");
-  if (value == nullptr || *value == '\0') return {OracleKind::kAuto};
-  const std::string name(value);
-  if (name == "cpu") return {OracleKind::kCpu};
-  if (name == "occlusion") return {OracleKind::kOcclusion};
-  if (name == "compute") return {OracleKind::kCompute};
-  if (name.size() < 5 && name.find_first_not_of("0123456789") == std::string::npos) {
-    return {OracleKind::kCompute, std::stoi(name)};
-  }
-  throw OracleError("BOCST_ORACLE=" + name + ": not one of cpu, occlusion, compute or a device index");
-}
 
 const char* nameOf(OracleKind kind) {
   switch (kind) {
@@ -68,8 +47,7 @@ CellBounds OctantBounds::get(int octant) const {
 
 std::shared_ptr<Oracle> makeOracle(OracleKind kind, int viewport) {
   static const std::shared_ptr<Oracle> cpu = std::make_shared<CpuOracle>();
-  Wish wish{kind};
-  if (kind == OracleKind::kAuto) wish = fromEnvironment();
+  const Wish wish = wishOf(kind);
   if (wish.kind == OracleKind::kAuto) {
     const std::shared_ptr<Oracle> hardware = gl::makeOracleOnHardware();
     return hardware != nullptr ? hardware : cpu;

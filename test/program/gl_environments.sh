@@ -8,7 +8,8 @@ bocst=$1
 models=$2
 failures=0
 out=$(mktemp)
-trap 'rm -f "$out"' EXIT
+image=$out.png
+trap 'rm -f "$out" "$image"' EXIT
 
 # What must be said, the exit code, then environment and arguments.
 expect() {
@@ -43,6 +44,29 @@ expect '^cpu +no +yes' 0 "${mesa[@]}" GALLIUM_DRIVER=softpipe "$bocst" oracles
 
 expect 'no device 99|not one of' 1 "${mesa[@]}" BOCST_ORACLE=99 "$bocst" collide "${pair[@]}"
 expect 'They collide' 0 "${mesa[@]}" BOCST_ORACLE=0 "$bocst" collide "${pair[@]}"
+
+# Pictures need a device, whatever the oracle; without one nothing is written.
+expect_no_picture() {
+  expect "$@"
+  [[ ! -e $image ]] || { echo "FAILED: a picture was written: $*"; failures=$((failures + 1)); rm "$image"; }
+}
+expect_picture() {
+  expect "$@"
+  [[ $(head -c 4 "$image" | tail -c 3) == PNG ]] || { echo "FAILED: no picture was written: $*"; failures=$((failures + 1)); }
+  rm -f "$image"
+}
+for command in "inspect ${pair[0]}" "collide ${pair[*]}" "validate ${pair[*]} --poses 8"; do
+  read -ra words <<<"$command --oracle cpu --image $image"
+  expect_no_picture '^bocst: no picture can be drawn: ' 1 "${no_driver[@]}" "$bocst" "${words[@]}"
+done
+inspect=(inspect "${pair[0]}" --depth 2 --image "$image")
+expect_no_picture '^bocst: no picture can be drawn: .*no device 99' 1 "${mesa[@]}" BOCST_ORACLE=99 "$bocst" "${inspect[@]}"
+expect_picture '^level' 0 "${mesa[@]}" BOCST_ORACLE=0 "$bocst" "${inspect[@]}"
+expect_picture '^level' 0 "${mesa[@]}" BOCST_ORACLE=99 "$bocst" "${inspect[@]}" --oracle cpu
+expect_picture '^level' 0 "${old[@]}" "$bocst" "${inspect[@]}"
+expect_picture '^level' 0 "${mesa[@]}" GALLIUM_DRIVER=softpipe "$bocst" "${inspect[@]}"
+expect_picture '^level' 0 -i "${mesa[@]}" "$bocst" "${inspect[@]}"
+expect_no_picture '^bocst: no picture can be drawn: .*OpenGL 3\.3' 1 "${mesa[@]}" MESA_GL_VERSION_OVERRIDE=3.1 "$bocst" "${inspect[@]}"
 
 expect '^auto takes cpu' 0 "${no_driver[@]}" "$bocst" oracles
 expect '^auto takes occlusion' 0 "${mesa[@]}" BOCST_ORACLE=occlusion "$bocst" oracles

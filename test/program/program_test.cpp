@@ -16,6 +16,7 @@
 #include <sstream>
 #include <stdexcept>
 #include <string>
+#include <utility>
 
 namespace bocst {
 namespace {
@@ -366,7 +367,7 @@ TEST_F(Program, ExplainsWhatFails) {
 
 TEST_F(Program, ExplainsWhatCannotBeWritten) {
   const std::string inspect = "inspect " + cube() + " --depth 2";
-  for (const std::string option : {"--json", "--html"}) {
+  for (const std::string option : {"--json", "--html", "--image"}) {
     expectComplaint(inspect + " " + option + " /dev/full", kFailed, "/dev/full: cannot be written: No space left");
     expectComplaint(inspect + " " + option + " " + (folder_ / "none" / "f").string(), kFailed, "none/f");
     expectComplaint(inspect + " " + option + " " + folder_.string(), kFailed, "Is a directory");
@@ -382,6 +383,7 @@ TEST_F(Program, ExplainsWhatCannotBeWritten) {
   fs::create_symlink(ply, folder_ / "b.ply");
   expectComplaint("inspect " + ply + " --spheres " + (folder_ / "b.ply").string(), kFailed, "another file");
   expectComplaint(inspect + " --html " + ply + " --json " + ply, kFailed, "another file");
+  expectComplaint(inspect + " --image " + ply + " --html " + ply, kFailed, "another file");
   EXPECT_EQ(read(ply), before);
   // A link stays one.
   ASSERT_EQ(run(inspect + " --json " + (folder_ / "b.ply").string()).code, 0);
@@ -390,14 +392,16 @@ TEST_F(Program, ExplainsWhatCannotBeWritten) {
 }
 
 TEST_F(Program, LeavesTheOldFileWhenTheDiskIsFull) {
-  const std::string page = write("page.html", "as before");
-  const std::string command = "inspect " + model("link") + " --depth 5 --no-error --html " + page;
-  const std::string before = "trap '' XFSZ; ulimit -f 8; ";
-  const Result result = shell(before + program() + " " + command);
-  EXPECT_EQ(result.code, kFailed);
-  EXPECT_EQ(result.err, "bocst: " + page + ": cannot be written: File too large\n");
-  EXPECT_EQ(read(page), "as before");
-  EXPECT_EQ(files(), (std::set<std::string>{"page.html", "out", "err"}));
+  for (const std::string option : {"--html", "--image"}) {
+    const std::string file = write("file", "as before");
+    const std::string command = "inspect " + model("link") + " --depth 5 --no-error " + option + " " + file;
+    const std::string before = "trap '' XFSZ; ulimit -f 8; ";
+    const Result result = shell(before + program() + " " + command);
+    EXPECT_EQ(result.code, kFailed);
+    EXPECT_EQ(result.err, "bocst: " + file + ": cannot be written: File too large\n");
+    EXPECT_EQ(read(file), "as before");
+    EXPECT_EQ(files(), (std::set<std::string>{"file", "out", "err"}));
+  }
 }
 
 TEST_F(Program, LeavesNothingBehindWhenInterrupted) {
@@ -410,25 +414,104 @@ TEST_F(Program, LeavesNothingBehindWhenInterrupted) {
     EXPECT_EQ(result.err, "bocst: interrupted\n");
     EXPECT_EQ(files(), (std::set<std::string>{"out", "err"}));
   }
-  // At any moment: the page is there whole, or not at all.
-  const std::string page = (folder_ / "page.html").string();
-  const std::string inspect = " inspect " + model("link") + " --depth 6 --no-error --html " + page;
-  ASSERT_EQ(shell(program() + inspect).code, 0);
-  const std::string whole = read(page);
-  std::set<bool> seen;
-  for (int ms = 2; ms < 200; ms += 4) {
-    fs::remove(page);
-    shell("timeout -s INT 0." +
-          std::string(ms < 10    ? "00"
-                      : ms < 100 ? "0"
-                                 : "") +
-          std::to_string(ms) + " " + program() + inspect);
-    std::set<std::string> left = files();
-    seen.insert(left.erase("page.html") == 1);
-    EXPECT_EQ(left, (std::set<std::string>{"out", "err"}));
-    EXPECT_TRUE(!fs::exists(page) || read(page).size() == whole.size());
+}
+
+/// At any moment: the file is there whole, or not at all.
+TEST_F(Program, WritesWholeFilesWhenInterrupted) {
+  const auto expectWhole = [this](const std::string& option, int step_ms, int end_ms) {
+    const std::string file = (folder_ / "file").string();
+    const std::string inspect = " inspect " + model("link") + " --depth 6 --no-error " + option + " " + file;
+    ASSERT_EQ(shell(program() + inspect).code, 0);
+    const std::string whole = read(file);
+    std::set<bool> seen;
+    for (int ms = 2; ms < end_ms; ms += step_ms) {
+      fs::remove(file);
+      char seconds[16];
+      std::snprintf(seconds, sizeof(seconds), "%.3f", ms / 1000.0);
+      shell(std::string("timeout -s INT ") + seconds + " " + program() + inspect);
+      std::set<std::string> left = files();
+      seen.insert(left.erase("file") == 1);
+      EXPECT_EQ(left, (std::set<std::string>{"out", "err"}));
+      EXPECT_TRUE(!fs::exists(file) || read(file).size() == whole.size());
+    }
+    EXPECT_EQ(seen.count(false), 1u) << "never interrupted in time";
+    fs::remove(file);
+  };
+  expectWhole("--html", 4, 200);
+  expectWhole("--image", 40, 1200);
+}
+
+/// Width and height of a PNG file; it must have its end, too.
+std::pair<unsigned, unsigned> sizeOfPng(const std::string& bytes) {
+  const auto number = [&bytes](std::size_t at) {
+    unsigned value = 0;
+    for (std::size_t i = at; i < at + 4; ++i) value = value << 8 | static_cast<unsigned char>(bytes.at(i));
+    return value;
+  };
+  if (bytes.compare(0, 8, "\x89PNG\r\n\x1a\n") != 0 || bytes.compare(bytes.size() - 8, 4, "IEND") != 0) return {0, 0};
+  return {number(16), number(20)};
+}
+
+TEST_F(Program, DrawsPictures) {
+  const std::string image = (folder_ / "a.png").string();
+  const auto drawn = [&](const std::string& arguments) {
+    const Result result = run(arguments + " --image " + image);
+    EXPECT_EQ(result.code, 0) << arguments << '\n' << result.err;
+    EXPECT_EQ(result.err, "");
+    const std::string bytes = read(image);
+    fs::remove(image);
+    return bytes;
+  };
+  const std::string pair = model("link") + " " + model("gripper");
+  const std::string inspect = "inspect " + model("link") + " --no-error --depth ";
+  const auto [width, height] = sizeOfPng(drawn(inspect + "4"));
+  EXPECT_EQ(width, 1600u);
+  EXPECT_EQ(sizeOfPng(drawn(inspect + "4 --image-width 500")).first, 500u);
+  EXPECT_GT(sizeOfPng(drawn(inspect + "6")).second, height) << "two rows";
+  // The same picture each time; another one of boxes, from another side, of another tree.
+  const std::string link = inspect + "3 --image-width 300";
+  std::set<std::string> different;
+  for (const std::string option : {"", "", " --image-nodes boxes", " --image-up y", " --subdivision octree"}) {
+    different.insert(drawn(link + option));
   }
-  EXPECT_EQ(seen.count(false), 1u) << "never interrupted in time";
+  EXPECT_EQ(different.size(), 4u);
+
+  different.clear();
+  for (const std::string& command :
+       {"collide " + pair, "collide " + pair + " --pose 9,0,0,1,0,0,0", "collide " + pair + " --image-nodes boxes",
+        "collide " + pair + " --answer conservative --depth 4", "collide " + pair + " --max-contacts 1",
+        "validate " + pair + " --poses 16",
+        "validate " + pair + " --poses 16 --answer conservative --depth 4 --histogram"}) {
+    const std::string bytes = drawn(command);
+    EXPECT_EQ(sizeOfPng(bytes).first, 1600u) << command;
+    different.insert(bytes);
+  }
+  EXPECT_EQ(different.size(), 7u);
+}
+
+TEST_F(Program, DrawsTheFirstMismatch) {
+  // The paper's oracle at its coarsest misses what it should see.
+  const std::string validate = "validate " + model("link") + " " + model("gripper") + " --poses 32 --image ";
+  const std::string wrong = (folder_ / "wrong.png").string(), right = (folder_ / "right.png").string();
+  const Result result = run(validate + wrong + " --oracle sampled --viewport 1");
+  EXPECT_EQ(result.code, kFailed);
+  EXPECT_NE(result.err.find("poses answered wrongly"), std::string::npos) << result.err;
+  EXPECT_EQ(run(validate + right + " --oracle cpu").code, 0);
+  EXPECT_EQ(sizeOfPng(read(wrong)).first, 1600u);
+  EXPECT_EQ(sizeOfPng(read(right)).first, 1600u);
+  EXPECT_NE(read(wrong), read(right));
+}
+
+TEST_F(Program, RefusesPicturesThatMakeNoSense) {
+  const std::string inspect = "inspect " + cube() + " --depth 2";
+  const std::string image = " --image " + (folder_ / "a.png").string();
+  for (const std::string option : {"--image-nodes boxes", "--image-up y", "--image-width 500"}) {
+    expectComplaint(inspect + " " + option, kUsage, "--image");
+  }
+  for (const std::string option : {"--image-nodes cones", "--image-up x", "--image-width 20", "--image-width 1e9"}) {
+    expectComplaint(inspect + image + " " + option, kUsage, option.substr(0, option.find(' ')));
+  }
+  EXPECT_EQ(files(), (std::set<std::string>{"cube.off", "out", "err"}));
 }
 
 TEST_F(Program, ShowsProgressToPeopleOnly) {

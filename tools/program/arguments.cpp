@@ -71,6 +71,24 @@ Json ModelArguments::json() const {
           {"dimension", dimension}, {"oracle", oracle}, {"scalar", scalar}};
 }
 
+void ImageArguments::add(CLI::App& command) {
+  CLI::Option* image =
+      command.add_option("--image", file, "write a picture that shows it (PNG); drawn without a display")
+          ->type_name("FILE");
+  command.add_option("--image-nodes", nodes, "what stands for nodes in the picture: their spheres, or boxes")
+      ->check(CLI::IsMember({"spheres", "boxes"}))
+      ->capture_default_str()
+      ->needs(image);
+  command.add_option("--image-up", up, "the axis that points upwards in the picture")
+      ->check(CLI::IsMember({"y", "z"}))
+      ->capture_default_str()
+      ->needs(image);
+  command.add_option("--image-width", width, "pixels; the height follows")
+      ->check(CLI::Range(200, 8000))
+      ->capture_default_str()
+      ->needs(image);
+}
+
 void addJson(CLI::App& command, Output& output) {
   command.add_option("--json", output.json_file, "write a report as JSON into this file, or to stdout with -")
       ->type_name("FILE|-");

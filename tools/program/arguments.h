@@ -9,6 +9,7 @@
 #include <string>
 
 #include "query_pair.h"
+#include "render/renderer.h"
 #include "report.h"
 
 namespace CLI {
@@ -50,6 +51,21 @@ struct ModelArguments {
   bool exact() const { return answer == "exact"; }
   std::string answerText() const { return exact() ? "exact" : "conservative, depth " + std::to_string(depth); }
   Json json() const;
+};
+
+/// A picture of what a command looks at.
+struct ImageArguments {
+  std::string file;
+  std::string nodes = "spheres";
+  std::string up = "z";
+  int width = 1600;
+
+  void add(CLI::App& command);  ///< --image --image-nodes --image-up --image-width
+  bool wanted() const { return !file.empty(); }
+  render::Volumes::Shape shape() const {
+    return nodes == "boxes" ? render::Volumes::Shape::kBoxes : render::Volumes::Shape::kSpheres;
+  }
+  render::Up upAxis() const { return up == "y" ? render::Up::kY : render::Up::kZ; }
 };
 
 void addJson(CLI::App& command, Output& output);     ///< --json

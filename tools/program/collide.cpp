@@ -5,12 +5,14 @@
 #include <algorithm>
 #include <iostream>
 #include <memory>
+#include <optional>
 #include <string>
 #include <vector>
 
 #include "arguments.h"
 #include "file.h"
 #include "pair_page.h"
+#include "pair_picture.h"
 #include "poses.h"
 #include "query_pair.h"
 
@@ -58,10 +60,13 @@ struct Collide {
   std::size_t max_contacts = QueryPair::kAll;
   ModelArguments model;
   std::string html_file;
+  ImageArguments image;
   Output output;
 
   int run() const {
-    output.check({file_a, file_b}, {html_file});
+    output.check({file_a, file_b}, {html_file, image.file});
+    std::optional<render::Renderer> renderer;
+    if (image.wanted()) renderer.emplace(model.options().oracle);
     const std::shared_ptr<const Mesh> mesh_a = loadMesh(file_a);
     const std::shared_ptr<const Mesh> mesh_b = loadMesh(file_b);
     const MeshArrays a(*mesh_a, model.scalarKind());
@@ -97,8 +102,10 @@ struct Collide {
                    ? our_contacts == fcl_contacts
                    : std::includes(our_contacts.begin(), our_contacts.end(), fcl_contacts.begin(), fcl_contacts.end());
     }
-    if (!html_file.empty()) {
-      writeFile(html_file, pairPage(file_a, *mesh_a, file_b, *mesh_b, model, pose, max_contacts, {}).html());
+    if (!html_file.empty() || renderer) {
+      const GrownPair grown(file_a, *mesh_a, file_b, *mesh_b, model, pose, max_contacts);
+      if (!html_file.empty()) writeFile(html_file, pairPage(grown).html());
+      if (renderer) writePng(image.file, pairPicture(*renderer, grown, image));
     }
     if (output.wantsJson()) {
       const auto compare = [](double bocst, double fcl) { return Json{{"bocst", bocst}, {"fcl", fcl}}; };
@@ -177,6 +184,7 @@ void addCollide(CLI::App& program, Job& job) {
       ->check(CLI::PositiveNumber);
   collide->model.addAll(*command);
   addHtml(*command, collide->html_file);
+  collide->image.add(*command);
   addJson(*command, collide->output);
   command->callback([collide, &job] { job = [collide] { return collide->run(); }; });
 }

@@ -6,6 +6,7 @@
 #include <filesystem>
 #include <iostream>
 #include <memory>
+#include <optional>
 #include <stdexcept>
 #include <utility>
 #include <vector>
@@ -13,6 +14,7 @@
 #include "arguments.h"
 #include "file.h"
 #include "health.h"
+#include "inspect_picture.h"
 #include "page.h"
 #include "sphere_error.h"
 #include "spheres.h"
@@ -100,10 +102,13 @@ struct Inspect {
   std::string spheres_file;
   std::string link;
   std::string html_file;
+  ImageArguments image;
   Output output;
 
   int run() const {
-    output.check({file}, {spheres_file, html_file});
+    output.check({file}, {spheres_file, html_file, image.file});
+    std::optional<render::Renderer> renderer;
+    if (image.wanted()) renderer.emplace(model.options().oracle);
     const std::shared_ptr<const Mesh> mesh = loadMesh(file);
     const Health health = healthOf(*mesh);
     const Grown grown = grow(mesh, model.options(), !no_error);
@@ -112,6 +117,7 @@ struct Inspect {
       writeFile(spheres_file, sphereFile(spheres_file, leavesAt(grown.nodes, model.depth), name));
     }
     if (!html_file.empty()) writeFile(html_file, page(mesh, health, grown).html());
+    if (renderer) writePng(image.file, inspectPicture(*renderer, file, *mesh, grown.nodes, model.options(), image));
     if (output.wantsJson()) {
       output.write(report(*mesh, health, grown));
     } else {
@@ -231,6 +237,7 @@ void addInspect(CLI::App& program, Job& job) {
   command->add_option("--link", inspect->link, "the link's name in the .yaml file; the mesh's if not given")
       ->type_name("NAME");
   addHtml(*command, inspect->html_file);
+  inspect->image.add(*command);
   addJson(*command, inspect->output);
   command->callback([inspect, &job] {
     try {

@@ -31,6 +31,7 @@ constexpr std::pair<const char*, const char*> kEnvironment[] = {
 constexpr std::pair<const char*, const char*> kExamples[] = {
     {"bocst collide link.obj gripper.obj", "Do they touch where their frames coincide?"},
     {"bocst inspect link.obj --depth 6 --html link.html", "A page that shows the sphere-tree."},
+    {"bocst collide link.obj gripper.obj --image pair.png", "A picture of where they touch and of what grew."},
     {"bocst inspect link.obj --depth 5 --spheres link.yaml", "Collision spheres for a GPU planner."},
     {"bocst validate link.obj gripper.obj --poses 10000 --shard 1/4 --json 1.json", "A quarter of a validation."},
 };

@@ -15,6 +15,7 @@
 #include "arguments.h"
 #include "file.h"
 #include "pair_page.h"
+#include "pair_picture.h"
 #include "poses.h"
 #include "query_pair.h"
 #include "validation.h"
@@ -35,6 +36,7 @@ struct Validate {
   std::vector<std::string> references{"obbrss"};
   ModelArguments model;
   std::string html_file;
+  ImageArguments image;
   Output output;
 
   static FclTree treeOf(const std::string& name) {
@@ -105,7 +107,9 @@ struct Validate {
   }
 
   int run() const {
-    output.check({file_a, file_b}, {html_file});
+    output.check({file_a, file_b}, {html_file, image.file});
+    std::optional<render::Renderer> renderer;
+    if (image.wanted()) renderer.emplace(model.options().oracle);
     const std::shared_ptr<const Mesh> mesh_a = loadMesh(file_a);
     const std::shared_ptr<const Mesh> mesh_b = loadMesh(file_b);
     const MeshArrays a(*mesh_a, model.scalarKind());
@@ -162,7 +166,11 @@ struct Validate {
       }
     }
 
-    if (!html_file.empty() && first) writeFile(html_file, worst(*mesh_a, *mesh_b, sum, *first).html());
+    if ((!html_file.empty() || renderer) && first) {
+      const GrownPair grown = worst(*mesh_a, *mesh_b, sum, *first);
+      if (!html_file.empty()) writeFile(html_file, pairPage(grown).html());
+      if (renderer) writePng(image.file, pairPicture(*renderer, grown, image));
+    }
     if (output.wantsJson()) {
       output.write(sum.json());
     } else {
@@ -174,7 +182,7 @@ struct Validate {
 
  private:
   /// The first mismatch; else where conservative answers overestimate most; else the first pose.
-  Page worst(const Mesh& mesh_a, const Mesh& mesh_b, const Validation& sum, const Pose& first) const {
+  GrownPair worst(const Mesh& mesh_a, const Mesh& mesh_b, const Validation& sum, const Pose& first) const {
     Pose pose = first;
     std::string why = "no mismatch; the first pose";
     if (!sum.failures.empty()) {
@@ -185,7 +193,9 @@ struct Validate {
       why = "taken for touching though " + formatNumber(sum.overestimates.back().largest) +
             " of the smaller radius apart, the farthest of " + std::to_string(sum.count[Validation::kPoses]) + " poses";
     }
-    return pairPage(file_a, mesh_a, file_b, mesh_b, model, pose, QueryPair::kAll, {{"this pose", why}});
+    GrownPair grown(file_a, mesh_a, file_b, mesh_b, model, pose, QueryPair::kAll);
+    grown.facts = {{"this pose", why}};
+    return grown;
   }
 };
 
@@ -201,7 +211,7 @@ void addValidate(CLI::App& program, Job& job) {
       "false positive or another set of contacts; with conservative ones also a verdict that depends on the order.\n"
       "With --scalar float, pairs that FCL's trees cull though its own triangle test finds them touching do not "
       "count.\n"
-      "The page of --html shows the first mismatch, else the pose that conservative answers overestimate most (with\n"
+      "--html and --image show the first mismatch, else the pose that conservative answers overestimate most (with\n"
       "--histogram), else the first pose. Exit code 0 means that there was no mismatch.");
   command->add_option("a", validate->file_a, "mesh A: OBJ, PLY, STL, OFF or DAE file")->required();
   command->add_option("b", validate->file_b, "mesh B")->required();
@@ -229,6 +239,7 @@ void addValidate(CLI::App& program, Job& job) {
       ->type_name("i/n");
   validate->model.addAll(*command);
   addHtml(*command, validate->html_file);
+  validate->image.add(*command);
   addJson(*command, validate->output);
   command->callback([validate, &job] {
     if (validate->compare_contacts && !validate->model.exact()) {
