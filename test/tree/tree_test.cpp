@@ -259,6 +259,35 @@ TEST(Tree, ExpandAllIsTheCompleteTree) {
   }
 }
 
+TEST(Tree, CountsTheOctantsThatThePaperWouldAskAbout) {
+  for (const test::Raw& raw : {test::torus(24), test::torus(60)}) {  // 60: through the root grid
+    const auto mesh = raw.mesh();
+    for (const Subdivision subdivision : {Subdivision::kOctree, Subdivision::kBono}) {
+      for (const double dimension : {514.0, 700.0, 1024.0}) {
+        Options options;
+        options.subdivision = subdivision;
+        options.dimension = dimension;
+        Modeld model(mesh, options);
+        EXPECT_EQ(model.statistics().expanded_octants, 0u);
+        model.expandAll(5);
+        const lattice::Lattice lattice(mesh->bounds(), subdivision, dimension);
+        std::size_t octants = 0, inner = 0;
+        model.visit([&](const NodeView& node) {
+          if (node.level == 5) return;
+          ++inner;
+          for (int o = 0; o < 8; ++o) octants += lattice.exists(lattice::Cell{node.level, node.cell}.octant(o));
+        });
+        EXPECT_EQ(model.statistics().expanded_octants, octants);
+        if (subdivision == Subdivision::kOctree || dimension == 1024) {
+          EXPECT_LE(octants, 8 * inner);
+        } else {
+          EXPECT_LT(octants, 8 * inner) << "some octants have no actual region";
+        }
+      }
+    }
+  }
+}
+
 // Boxes and slabs come from expansions, from looks at what was passed by, and from octants; none may lose a point.
 TEST(Tree, BoundsHoldTheSurfaceHoweverTheyWereLearnt) {
   for (const Subdivision subdivision : {Subdivision::kOctree, Subdivision::kBono}) {
