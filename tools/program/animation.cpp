@@ -148,6 +148,7 @@ Animation::Run Animation::runOnce(const Setting& setting) const {
     const double time = timeOf(f);
     now = start + std::chrono::nanoseconds(static_cast<std::int64_t>(time * 1e9));
     const Eigen::Isometry3d X_WO = poseAt(time);
+    const bool still = f > 0 && X_WO.matrix() == poseAt(timeOf(f - 1)).matrix();
     bool hit = false;
     const Stopwatch watch;
     for (std::size_t i = 0; i < kObstacles; ++i) {
@@ -174,6 +175,7 @@ Animation::Run Animation::runOnce(const Setting& setting) const {
       ++part->frames;
       part->hits += hit;
       part->octants += octants_now - octants;
+      if (still) part->still_octants += octants_now - octants;
       part->gl_queries += oracle->queries() - gl_queries;
       part->microseconds += took;
       if (octants_now == octants) part->quiet_microseconds += took;

@@ -55,11 +55,12 @@ class Animation {
   /// A second of the animation, or all of it.
   struct Part {
     std::size_t frames = 0;
-    std::size_t hits = 0;           ///< Frames in which a pair collides.
-    std::uint64_t octants = 0;      ///< Statistics::expanded_octants.
-    std::uint64_t gl_queries = 0;   ///< Occlusion queries that OpenGL was given.
-    double microseconds = 0;        ///< Of the queries alone.
-    double quiet_microseconds = 0;  ///< Of those of frames that ask nothing.
+    std::size_t hits = 0;             ///< Frames in which a pair collides.
+    std::uint64_t octants = 0;        ///< Statistics::expanded_octants.
+    std::uint64_t still_octants = 0;  ///< Of those, of frames in which the object is where it was in the one before.
+    std::uint64_t gl_queries = 0;     ///< Occlusion queries that OpenGL was given.
+    double microseconds = 0;          ///< Of the queries alone.
+    double quiet_microseconds = 0;    ///< Of those of frames that ask nothing.
   };
 
   struct Run {

@@ -22,7 +22,7 @@ struct PaperReport {
     std::vector<Plot> plots;
     int height = 0;  ///< Of each plot, in pixels.
   };
-  static constexpr int kWidth = 840;
+  static constexpr int kWidth = 800;
 
   std::string text;
   std::vector<Named> pictures;

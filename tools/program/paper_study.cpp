@@ -38,9 +38,13 @@ std::vector<std::size_t> countsOf(const std::vector<NodeView>& nodes) {
 }
 
 Json jsonOf(const Animation::Part& part) {
-  return {{"frames", part.frames},        {"hits", part.hits},
-          {"queries", part.octants},      {"gl_queries", part.gl_queries},
-          {"time_us", part.microseconds}, {"quiet_time_us", part.quiet_microseconds}};
+  return {{"frames", part.frames},
+          {"hits", part.hits},
+          {"queries", part.octants},
+          {"queries_at_rest", part.still_octants},
+          {"gl_queries", part.gl_queries},
+          {"time_us", part.microseconds},
+          {"quiet_time_us", part.quiet_microseconds}};
 }
 
 }  // namespace
