@@ -324,7 +324,7 @@ TEST_F(Program, ListsOracles) {
 
 TEST_F(Program, SetsThePaperBesideIt) {
   const std::string folder = (folder_ / "deep" / "er").string();
-  const Result result = run("paper " + model("gripper") + " " + cube() + " --frames 70 --oracle cpu --out " + folder +
+  const Result result = run("paper " + cube() + " " + cube() + " --frames 70 --oracle cpu --out " + folder +
                             " --json " + (folder_ / "paper.json").string());
   ASSERT_EQ(result.code, 0) << result.err;
   EXPECT_EQ(result.out + result.err, "");
@@ -376,12 +376,13 @@ TEST_F(Program, SetsThePaperBesideIt) {
 
 TEST_F(Program, ExplainsWhyThereIsNoPaper) {
   const std::string paper = "paper " + cube() + " --frames 7 --oracle cpu";
+  const std::string into = " --out " + (folder_ / "none").string();
   expectComplaint("paper", kUsage, "mesh");
   expectComplaint("paper " + cube() + " " + cube() + " " + cube() + " " + cube() + " " + cube(), kUsage);
-  expectComplaint(paper + ",gpu", kUsage, "--oracle");
-  expectComplaint(paper + " --frames 0", kUsage, "--frames");
-  expectComplaint(paper + " --triangles -3", kUsage, "--triangles");
-  expectComplaint("paper " + (folder_ / "missing.obj").string(), kFailed, "missing.obj: no such file");
+  expectComplaint(paper + ",gpu" + into, kUsage, "--oracle");
+  expectComplaint(paper + into + " --frames 0", kUsage, "--frames");
+  expectComplaint(paper + into + " --triangles -3", kUsage, "--triangles");
+  expectComplaint("paper " + (folder_ / "missing.obj").string() + into, kFailed, "missing.obj: no such file");
   expectComplaint(paper + " --out " + cube(), kFailed, "cube.off: is no folder");
   expectComplaint(paper + " --out " + cube() + "/below", kFailed, "cube.off: is no folder");
   expectComplaint(paper + " --out /dev/full", kFailed, "/dev/full: is no folder");

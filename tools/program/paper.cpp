@@ -146,6 +146,7 @@ void addPaper(CLI::App& program, Job& job) {
   command
       ->add_option("--triangles", paper->triangles,
                    "meshes with more triangles are decimated to about so many (the paper's have about 5100); 0: never")
+      ->check(CLI::Range(0, 1000000000))
       ->capture_default_str();
   command->add_option("--frames", paper->frames, "frames of the animation, which takes 7 s of its own clock")
       ->check(CLI::Range(1, 1000000))
