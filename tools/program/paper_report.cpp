@@ -509,12 +509,13 @@ void writeClaims(Text& text, const AnimationStudy& study, const OfOracle& shown)
     all += column.run.all.microseconds;
     quiet += column.run.all.quiet_microseconds;
   }
-  text.paragraph("Pairs are B : O. The paper's time follows its queries and its drawing. Of ours, " +
-                 percent(quiet / std::max(all, 1e-3)) +
-                 " is spent in frames that ask nothing: walks over spheres that are there already. O's spheres lie "
-                 "inside their parents'. Those of B need not, where a region is cut off, so bocst culls inner nodes of "
-                 "B by spheres the square root of 2 larger: a walk over B meets more pairs, takes longer for it, and "
-                 "asks about more nodes than it would.");
+  text.paragraph(
+      "Pairs are B : O. The paper's time follows its queries and its drawing. Of ours, " +
+      percent(quiet / std::max(all, 1e-3)) +
+      " is spent in frames that ask nothing: walks over spheres that are there already. A walk takes as long "
+      "as it has pairs of spheres to look at, and the spheres of B are the larger ones at the same level, "
+      "the more so the less of its cube the object fills (d_t 514); where its regions are cut off, their "
+      "octants' spheres may stick out of theirs, so bocst culls by larger ones there.");
 }
 
 }  // namespace
