@@ -15,6 +15,8 @@ struct Statistics {
   std::uint64_t expansions = 0;              ///< Nodes expanded so far.
   std::uint64_t oracle_batches = 0;          ///< Expansion batches this model took part in.
   std::uint64_t oracle_cells = 0;            ///< Cells the oracle was asked about (eight octants a plain expansion).
+  std::uint64_t expanded_octants = 0;        ///< Octants of expanded nodes that have an actual region; the paper makes
+                                             ///< an occlusion query for each (5.4), from up to three sides.
   std::uint64_t pruned_nodes = 0;            ///< Nodes dropped by ttl, budget, prune() or updateVertices().
   std::size_t mesh_bytes = 0;    ///< Heap bytes of the mesh, which other models may share and which are 0 after
                                  ///< releaseMesh(), and of `solid`.

@@ -110,6 +110,9 @@ class Oracle {
   };
   virtual Cost lastCost() { return {}; }
 
+  /// Occlusion queries made so far, for all models.
+  virtual std::uint64_t queries() const { return 0; }
+
   /// The ids of a list that this oracle keeps; false when it has lost them.
   virtual bool fetch(const Held&, Expansion::Kept, std::uint32_t*) { return false; }
 };

@@ -70,19 +70,14 @@ class TreeSide {
   /// the sphere of a part of a clipped region may stick out, by less than the factor sqrt(2) about the region's centre,
   /// as |h - h'| + |h'| <= sqrt(2) |h| for half extents 0 <= h' <= h.
   Sphere sphere(Node node) const {
-    Sphere s = cellSphere(node);
-    if (cells() && !tree_.isDeepest(level(node)) && !cube_) s.radius *= 1.4142135623730952;
+    const lattice::Cell cell = tree_.cell(node);
+    Sphere s = sphereAbout(cell);
+    if (cells() && !tree_.isDeepest(cell.level) && isClipped(cell)) s.radius *= 1.4142135623730952;
     return s;
   }
 
   /// The sphere about the node's actual region.
-  Sphere cellSphere(Node node) const {
-    Sphere s;
-    Eigen::Vector3d half;
-    tree_.surface().lattice.region(tree_.cell(node), s.center, half);
-    s.radius = half.norm();
-    return s;
-  }
+  Sphere cellSphere(Node node) const { return sphereAbout(tree_.cell(node)); }
 
   /// Names the cell of a leaf: its Morton code among those of its level.
   std::uint64_t cellId(Node node) const { return tree_.cell(node).morton(); }
@@ -190,12 +185,28 @@ class TreeSide {
     return v;
   }
 
+  Sphere sphereAbout(const lattice::Cell& cell) const {
+    Sphere s;
+    Eigen::Vector3d half;
+    tree_.surface().lattice.region(cell, s.center, half);
+    s.radius = half.norm();
+    return s;
+  }
+
+  /// Is the actual region less than the cell? If not, none below it is.
+  bool isClipped(const lattice::Cell& cell) const {
+    const std::array<std::uint32_t, 3>& end = tree_.surface().lattice.extent();
+    const std::array<std::uint32_t, 3> corner = cell.corner();
+    for (std::size_t k = 0; k < 3; ++k) {
+      if (corner[k] + cell.side() > end[k]) return true;
+    }
+    return false;
+  }
+
   int level(Node node) const { return node.isRoot() ? 1 : tree_.block(node.block()).level + 1; }
 
   tree::Tree& tree_;
   const std::int64_t now_;
-  const bool cube_ = tree_.surface().lattice.extent() ==
-                     std::array<std::uint32_t, 3>{1u << lattice::kBits, 1u << lattice::kBits, 1u << lattice::kBits};
 };
 
 /// Orders a batch so that each node is grown once.

@@ -290,6 +290,7 @@ std::uint32_t Tree::addBlock(NodeRef node, const lattice::Cell& cell, std::uint8
   block.stamp.store(now(), std::memory_order_relaxed);
   nodes_at_[cell.level + 1] += __builtin_popcount(grey);
   ++expansions_;
+  for (int o = 0; o < 8; ++o) octants_ += surface_.lattice.exists(cell.octant(o));
   return index;
 }
 
@@ -456,6 +457,7 @@ Statistics Tree::statistics() const {
     s.resident_nodes += nodes_at_[level];
   }
   s.expansions = expansions_;
+  s.expanded_octants = octants_;
   s.oracle_batches = batches_;
   s.oracle_cells = cells_;
   s.pruned_nodes = pruned_;

@@ -72,6 +72,15 @@ expect '^auto takes cpu' 0 "${no_driver[@]}" "$bocst" oracles
 expect '^auto takes occlusion' 0 "${mesa[@]}" BOCST_ORACLE=occlusion "$bocst" oracles
 expect '^auto takes none: .*no device 99' 0 "${mesa[@]}" BOCST_ORACLE=99 "$bocst" oracles
 
+# A report names what it could not ask.
+report=$(mktemp -d)
+trap 'rm -rf "$out" "$report"' EXIT
+expect "^report: $report/paper.md" 0 "${no_driver[@]}" "$bocst" paper "$models/gripper.obj" --frames 70 --out "$report"
+for oracle in occlusion compute sampled; do
+  grep -q "^| $oracle | not to be had: ." "$report/paper.md" || { echo "FAILED: no word of $oracle"; failures=$((failures + 1)); }
+done
+expect '^bocst: oracle compute: ' 1 "${no_driver[@]}" "$bocst" paper "$models/gripper.obj" --oracle compute --out "$report"
+
 # No HOME, no DISPLAY, nothing; and as somebody who owns nothing.
 expect 'They collide' 0 -i "${mesa[@]}" "$bocst" collide "${pair[@]}" --oracle compute
 if [[ $EUID -eq 0 ]]; then

@@ -324,6 +324,87 @@ TEST_F(Program, ListsOracles) {
   EXPECT_TRUE(cpu);
 }
 
+TEST_F(Program, SetsThePaperBesideIt) {
+  const std::string folder = (folder_ / "deep" / "er").string();
+  const Result result = run("paper " + cube() + " " + cube() + " --frames 70 --oracle cpu --out " + folder +
+                            " --json " + (folder_ / "paper.json").string());
+  ASSERT_EQ(result.code, 0) << result.err;
+  EXPECT_EQ(result.out + result.err, "");
+  const Json report = Json::parse(read(folder_ / "paper.json"));
+  // Each tree is that of `inspect`.
+  const Json& tables = report.at("trees");
+  ASSERT_EQ(tables.size(), 2u);
+  EXPECT_EQ(tables[0].at("table"), 1);
+  EXPECT_EQ(tables[1].at("table"), 2);
+  for (const Json& tree : tables[1].at("trees")) {
+    const bool octree = tree.at("method") == "O";
+    const std::size_t depth = tree.at("levels").size();
+    const Json inspected =
+        json("inspect " + cube() + " --oracle cpu --depth " + std::to_string(depth) +
+             (octree ? " --subdivision octree" : " --subdivision bono --dimension " + tree.at("dimension").dump()));
+    for (std::size_t l = 0; l < depth; ++l) {
+      for (const char* key : {"level", "nodes", "error_min", "error_avg", "error_max"}) {
+        EXPECT_EQ(tree.at("levels")[l].at(key), inspected.at("levels")[l].at(key)) << tree.at("dimension") << key;
+      }
+    }
+  }
+  const Json& animation = report.at("animation");
+  EXPECT_EQ(animation.at("frames"), 70);
+  ASSERT_EQ(animation.at("oracles").size(), 1u);
+  ASSERT_EQ(animation.at("oracles")[0].at("runs").size(), 9u);
+  for (const Json& run : animation.at("oracles")[0].at("runs")) {
+    EXPECT_EQ(run.at("missed"), 0);
+    std::size_t queries = 0, frames = 0;
+    for (const Json& second : run.at("by_second")) {
+      queries += second.at("queries").get<std::size_t>();
+      frames += second.at("frames").get<std::size_t>();
+    }
+    EXPECT_EQ(run.at("all").at("queries"), queries);
+    EXPECT_EQ(frames, 70u);
+  }
+  // The report shows each picture, and each is there.
+  const std::string text = read(fs::path(folder) / "paper.md");
+  std::set<std::string> shown, there;
+  const std::regex picture("\\]\\(pictures/([^)]+)\\)");
+  for (std::sregex_iterator it(text.begin(), text.end(), picture), end; it != end; ++it) shown.insert((*it)[1]);
+  for (const auto& entry : fs::directory_iterator(fs::path(folder) / "pictures")) {
+    there.insert(entry.path().filename().string());
+    EXPECT_EQ(read(entry.path()).rfind("\x89PNG", 0), 0u);
+  }
+  EXPECT_EQ(shown.size(), 5u);
+  EXPECT_EQ(shown, there);
+  EXPECT_NE(text.find("--frames 70 --oracle cpu"), std::string::npos) << "how it was made";
+}
+
+TEST_F(Program, ExplainsWhyThereIsNoPaper) {
+  const std::string paper = "paper " + cube() + " --frames 7 --oracle cpu";
+  const std::string into = " --out " + (folder_ / "none").string();
+  expectComplaint("paper", kUsage, "mesh");
+  expectComplaint("paper " + cube() + " " + cube() + " " + cube() + " " + cube() + " " + cube(), kUsage);
+  expectComplaint(paper + ",gpu" + into, kUsage, "--oracle");
+  expectComplaint(paper + into + " --frames 0", kUsage, "--frames");
+  expectComplaint(paper + into + " --triangles -3", kUsage, "--triangles");
+  expectComplaint("paper " + (folder_ / "missing.obj").string() + into, kFailed, "missing.obj: no such file");
+  expectComplaint(paper + " --out " + cube(), kFailed, "cube.off: is no folder");
+  expectComplaint(paper + " --out " + cube() + "/below", kFailed, "cube.off: is no folder");
+  expectComplaint(paper + " --out /dev/full", kFailed, "/dev/full: is no folder");
+  expectComplaint(paper + " --json /dev/full", kFailed, "/dev/full");
+  const Result full = runTo("/dev/full", paper + " --json -");
+  EXPECT_EQ(full.code, kFailed);
+  EXPECT_EQ(full.err, "bocst: stdout: cannot be written\n");
+  EXPECT_EQ(files(), (std::set<std::string>{"cube.off", "out", "err"}));
+  // A report of before is not touched by a run that fails or ends early.
+  fs::create_directory(folder_ / "report");
+  const std::string before = write("report/paper.md", "as before");
+  expectComplaint(paper + " --out " + (folder_ / "report").string() + " --json " + before, kFailed, "another file");
+  const Result stopped = shell("timeout --preserve-status -s INT 1 " + program() + " paper " + model("gripper") +
+                               " --frames 1000000 --oracle cpu --out " + (folder_ / "report").string());
+  EXPECT_GT(stopped.code, 128);
+  EXPECT_EQ(stopped.err, "bocst: interrupted\n");
+  EXPECT_EQ(read(before), "as before");
+  EXPECT_EQ(std::distance(fs::directory_iterator(folder_ / "report"), fs::directory_iterator()), 1);
+}
+
 TEST_F(Program, WritesJsonFilesWhole) {
   const std::string file = (folder_ / "report.json").string();
   EXPECT_EQ(run("inspect " + cube() + " --depth 2 --json " + file).out, "");

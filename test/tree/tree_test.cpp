@@ -11,6 +11,7 @@
 #include "lattice/lattice.h"
 #include "meshes.h"
 #include "oracle/reference.h"
+#include "query/side.h"
 
 namespace bocst {
 namespace {
@@ -255,6 +256,66 @@ TEST(Tree, ExpandAllIsTheCompleteTree) {
         }
         EXPECT_EQ(model.statistics().nodes_per_level.at(static_cast<std::size_t>(level - 1)), grey);
       }
+    }
+  }
+}
+
+TEST(Tree, CountsTheOctantsThatThePaperWouldAskAbout) {
+  for (const test::Raw& raw : {test::torus(24), test::torus(60)}) {  // 60: through the root grid
+    const auto mesh = raw.mesh();
+    for (const Subdivision subdivision : {Subdivision::kOctree, Subdivision::kBono}) {
+      for (const double dimension : {514.0, 700.0, 1024.0}) {
+        Options options;
+        options.subdivision = subdivision;
+        options.dimension = dimension;
+        Modeld model(mesh, options);
+        EXPECT_EQ(model.statistics().expanded_octants, 0u);
+        model.expandAll(5);
+        const lattice::Lattice lattice(mesh->bounds(), subdivision, dimension);
+        std::size_t octants = 0, inner = 0;
+        model.visit([&](const NodeView& node) {
+          if (node.level == 5) return;
+          ++inner;
+          for (int o = 0; o < 8; ++o) octants += lattice.exists(lattice::Cell{node.level, node.cell}.octant(o));
+        });
+        EXPECT_EQ(model.statistics().expanded_octants, octants);
+        if (subdivision == Subdivision::kOctree || dimension == 1024) {
+          EXPECT_LE(octants, 8 * inner);
+        } else {
+          EXPECT_LT(octants, 8 * inner) << "some octants have no actual region";
+        }
+      }
+    }
+  }
+}
+
+TEST(Tree, SpheresHoldThoseOfAllCellsBelow) {
+  for (const Subdivision subdivision : {Subdivision::kOctree, Subdivision::kBono}) {
+    for (const double dimension : {0.0, 514.0, 700.0, 1023.0}) {
+      Options options;
+      options.subdivision = subdivision;
+      options.dimension = dimension;
+      options.answer = Answer::kConservative;
+      Modeld model(test::torus(24).scale(0.37).mesh(), options);
+      model.expandAll(options.depth);
+      const tree::Tree& tree = model.tree();
+      const query::TreeSide side(model.tree());
+      std::size_t exact = 0, inner = 0;
+      const auto visit = [&](const auto& self, tree::NodeRef node, std::vector<query::Sphere> above) -> void {
+        const query::Sphere cell = side.cellSphere(node), bound = side.sphere(node);
+        above.push_back(bound);
+        for (const query::Sphere& s : above) {
+          EXPECT_LE((s.center - cell.center).norm() + cell.radius, s.radius * (1 + 1e-12));
+        }
+        if (tree.isDeepest(tree.cell(node).level)) return;
+        ++inner;
+        exact += bound.radius == cell.radius;
+        side.children(node, [&](tree::NodeRef child) { self(self, child, above); });
+      };
+      visit(visit, side.root(), {});
+      EXPECT_GT(inner, 100u);
+      EXPECT_GT(exact, inner / 2) << "most cells are not clipped, and need no more than their own sphere";
+      EXPECT_TRUE(subdivision == Subdivision::kBono || exact == inner);
     }
   }
 }

@@ -36,6 +36,7 @@ int main(int argc, char** argv) {
   addValidate(program, job);
   addMerge(program, job);
   addBench(program, job);
+  addPaper(program, job);
   addOracles(program, job);
   addManual(program, job);
   try {

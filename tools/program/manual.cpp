@@ -33,6 +33,7 @@ constexpr std::pair<const char*, const char*> kExamples[] = {
     {"bocst inspect link.obj --depth 6 --html link.html", "A page that shows the sphere-tree."},
     {"bocst collide link.obj gripper.obj --image pair.png", "A picture of where they touch and of what grew."},
     {"bocst inspect link.obj --depth 5 --spheres link.yaml", "Collision spheres for a GPU planner."},
+    {"bocst paper bunny00.off ChineseDragon-10kv.off --out paper", "The paper's tables and figures beside ours."},
     {"bocst validate link.obj gripper.obj --poses 10000 --shard 1/4 --json 1.json", "A quarter of a validation."},
 };
 
@@ -58,7 +59,10 @@ std::vector<std::string> choicesOf(const CLI::Option& option) {
   return choices;
 }
 
-bool takesFile(const CLI::Option& option) { return option.get_type_name().rfind("FILE", 0) == 0; }
+bool takesFile(const CLI::Option& option) {
+  const std::string type = option.get_type_name();
+  return type.rfind("FILE", 0) == 0 || type.rfind("DIR", 0) == 0;
+}
 
 /// A value as the man page names it: the choices, a number, or what the option itself says.
 std::string valueOf(const CLI::Option& option) {

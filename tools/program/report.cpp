@@ -90,6 +90,12 @@ std::string formatNumber(double value, int digits) {
   return text;
 }
 
+std::string formatPlain(double value) {
+  char text[64];
+  std::snprintf(text, sizeof(text), "%.12g", value);
+  return text;
+}
+
 std::string formatTime(double microseconds) {
   if (microseconds < 1e3) return formatNumber(microseconds) + " us";
   if (microseconds < 1e6) return formatNumber(microseconds / 1e3) + " ms";

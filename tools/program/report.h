@@ -76,6 +76,7 @@ double mean(const std::vector<double>& samples);
 std::string formatTime(double microseconds);
 std::string formatBytes(double bytes);
 std::string formatNumber(double value, int digits = 3);  ///< That many significant digits, no exponent if short.
+std::string formatPlain(double value);                   ///< "514", "0.05": up to twelve digits, no zeros after them.
 std::string formatRatio(double ratio);                   ///< "12.3 x"
 
 }  // namespace bocst::program

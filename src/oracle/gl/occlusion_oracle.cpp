@@ -2,6 +2,7 @@
 #include "oracle/gl/occlusion_oracle.h"
 
 #include <algorithm>
+#include <atomic>
 #include <utility>
 
 #include "oracle/gl/shaders.h"
@@ -27,8 +28,8 @@ Program programFor(OcclusionOracle::Form form) {
 /// The OpenGL objects of an occlusion oracle. In the thread of the context.
 class OcclusionQueries {
  public:
-  OcclusionQueries(OcclusionOracle::Form form, int viewport)
-      : views_(form == OcclusionOracle::Form::kSampled ? 3 : 1), program_(programFor(form)) {
+  OcclusionQueries(OcclusionOracle::Form form, int viewport, std::atomic<std::uint64_t>& asked)
+      : asked_(asked), views_(form == OcclusionOracle::Form::kSampled ? 3 : 1), program_(programFor(form)) {
     center_ = program_.uniform("u_center");
     inverse_half_ = program_.uniform("u_inverse_half");
     axis_ = program_.uniform("u_axis");
@@ -138,6 +139,7 @@ class OcclusionQueries {
         asked.push_back({i, o});
       }
     }
+    asked_ += asked.size();
     for (std::size_t q = 0; q < asked.size(); ++q) {
       GLuint seen = 0;
       glGetQueryObjectuiv(queries_[q], GL_QUERY_RESULT, &seen);
@@ -145,6 +147,7 @@ class OcclusionQueries {
     }
   }
 
+  std::atomic<std::uint64_t>& asked_;
   const GLint views_;
   Program program_;
   GLint center_, inverse_half_, axis_;
@@ -159,7 +162,7 @@ class OcclusionQueries {
 
 OcclusionOracle::OcclusionOracle(std::shared_ptr<Thread> thread, Form form, int viewport)
     : DeviceOracle(std::move(thread), false), form_(form) {
-  thread_->run([&] { queries_ = std::make_unique<OcclusionQueries>(form, viewport); });
+  thread_->run([&] { queries_ = std::make_unique<OcclusionQueries>(form, viewport, asked_); });
 }
 
 OcclusionOracle::~OcclusionOracle() {

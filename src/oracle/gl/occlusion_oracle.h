@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #pragma once
 
+#include <atomic>
 #include <cstdint>
 #include <memory>
 #include <string>
@@ -34,12 +35,15 @@ class OcclusionOracle : public DeviceOracle {
   /// Which octants the device sees, before the CPU has its say; surfaces must be held. @throws OracleError
   std::vector<std::uint8_t> candidates(const std::vector<Expansion*>& questions);
 
+  std::uint64_t queries() const override { return asked_; }
+
   std::string name() const override { return form_ == Form::kSampled ? "sampled" : "occlusion"; }
 
  private:
   void answer(const std::vector<Expansion*>& questions, std::vector<Verdict>& verdicts) override;
 
   const Form form_;
+  std::atomic<std::uint64_t> asked_{0};
   std::unique_ptr<OcclusionQueries> queries_;
 };
 
