@@ -352,6 +352,44 @@ void checkCollide(const Partner<S>& row) {
   EXPECT_GT(misses, 2 * count / 5) << "of " << 2 * count;
 }
 
+/// At the very edge of what FCL calls a contact, as far as S can tell: what FCL sees there is seen.
+template <typename S>
+void checkEdge(const Partner<S>& row) {
+  auto reference = row.fcl;
+  if (const auto* t = dynamic_cast<const fcl::TriangleP<S>*>(row.geometry.get())) {
+    // FCL has a test of two triangles, if not of TriangleP.
+    Raw one;
+    for (const auto& v : {t->a, t->b, t->c}) one.vertices.push_back(v.template cast<double>());
+    one.triangles.emplace_back(0, 1, 2);
+    reference = bvh<fcl::OBBRSS<S>>(one);
+  }
+  const Raw raw = modelMesh();
+  const Model<S> model(raw.mesh());
+  const auto theirs = bvh<fcl::OBBRSS<S>>(raw);
+  std::mt19937_64 g(13);
+  int edges = 0;
+  for (int i = 0; i < 40; ++i) {
+    SCOPED_TRACE(i);
+    const Eigen::Vector3d p = randomDirection(g), way = randomDirection(g);
+    const Eigen::Matrix3d R = randomRotation(g);
+    Situation<S> s;
+    s.X = pose<S>(randomRotation(g), p);
+    const auto sees = [&](double d, const fcl::CollisionGeometry<S>& mesh, const fcl::CollisionGeometry<S>& partner) {
+      return touching<S>(mesh, s.X, partner, pose<S>(R, p + way * d));
+    };
+    double lo = 0, hi = 4;
+    if (sees(hi, *theirs, *reference)) continue;
+    for (int step = 0; step < 56; ++step) (sees((lo + hi) / 2, *theirs, *reference) ? lo : hi) = (lo + hi) / 2;
+    if (!sees(lo, *theirs, *reference)) continue;
+    s.Y = pose<S>(R, p + way * lo);
+    ASSERT_TRUE(touching<S>(model, s.X, *row.geometry, s.Y)) << lo;
+    // Of meshes, FCL's test may tell the orders apart.
+    ASSERT_TRUE(row.is_mesh || touching<S>(*row.geometry, s.Y, model, s.X)) << lo;
+    ++edges;
+  }
+  EXPECT_GT(edges, 15);
+}
+
 /// distance() with exact answers.
 template <typename S>
 void checkDistance(const Partner<S>& row) {
@@ -500,6 +538,7 @@ void checkOneTriangle(const Partner<S>& row) {
 #define BOCST_TEST_MATRIX(Suite, S)                                                                         \
   class Suite : public testing::TestWithParam<const char*> {};                                              \
   TEST_P(Suite, Collide) { bocst::test::checkCollide<S>(bocst::test::partner<S>(GetParam())); }             \
+  TEST_P(Suite, EdgeOfFcl) { bocst::test::checkEdge<S>(bocst::test::partner<S>(GetParam())); }              \
   TEST_P(Suite, Distance) { bocst::test::checkDistance<S>(bocst::test::partner<S>(GetParam())); }           \
   TEST_P(Suite, Conservative) { bocst::test::checkConservative<S>(bocst::test::partner<S>(GetParam())); }   \
   INSTANTIATE_TEST_SUITE_P(Shapes, Suite, testing::ValuesIn(bocst::test::kShapes), bocst::test::testName);  \

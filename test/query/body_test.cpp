@@ -302,6 +302,25 @@ TEST(Body, WhatOverlapsByLittlePartsByLittle) {
   }
 }
 
+TEST(Body, TrianglesThatAreJustApartTouchBetweenTheirNearestPoints) {
+  std::mt19937_64 g(10);
+  std::uniform_real_distribution<double> u(-1, 1);
+  for (int i = 0; i < 500; ++i) {
+    Corners p, q;
+    for (Vector3d& x : p) x = Vector3d(u(g), u(g), u(g));
+    for (Vector3d& x : q) x = Vector3d(u(g), u(g), u(g));
+    Vector3d a, b;
+    if (nearestPoints(p, q, a, b) < 1e-3) continue;
+    // Put so that they are 1e-9 apart, where they were nearest.
+    const Vector3d step = (a - b) - (a - b).normalized() * 1e-9;
+    for (Vector3d& x : q) x += step;
+    const Touch touch = partTriangles(p, q);
+    ASSERT_LT((closestPoint(touch.point, p) - touch.point).norm(), 1e-6) << i;
+    ASSERT_LT((closestPoint(touch.point, q) - touch.point).norm(), 1e-6) << i;
+    ASSERT_LT(touch.depth, 1e-9) << i;
+  }
+}
+
 TEST(Body, TrianglesPartAsTriangles) {
   const Corners c = {{0, 0, 0}, {2, 0, 0}, {0, 2, 0}};
   const TriangleBody body(c);
