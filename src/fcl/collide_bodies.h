@@ -86,14 +86,7 @@ class BodyCollector final : public query::BodyVisitor<typename Partner::Node> {
       addCost(fcl::AABB<S>(p, r, s), b);
     }
     if (!q_.request.enable_contact) return add(t, b, nullptr);
-    query::Touch touch;
-    if (gap.touches()) {
-      touch = partner_.part(b, points);
-    } else {
-      touch.normal = (gap.on_points - gap.on_body) / gap.distance;
-      touch.point = (gap.on_points + gap.on_body) / 2;
-    }
-    touch = inWorld(touch);
+    const query::Touch touch = inWorld(gap.touches() ? partner_.part(b, points) : bridge(gap, points, b));
     return add(t, b, &touch);
   }
 
@@ -117,6 +110,17 @@ class BodyCollector final : public query::BodyVisitor<typename Partner::Node> {
     return set;
   }
 
+  /// Of points that are just off the body: the way between the nearest ones, of no depth.
+  query::Touch bridge(const query::Gap& gap, const query::Points& points, const Node& b) const {
+    const Eigen::Vector3d way = gap.on_points - gap.on_body;
+    query::Touch touch;
+    // The shortest ways are rounding, and lead anywhere.
+    const double size = gap.on_points.norm() + gap.on_body.norm();
+    touch.normal = way.norm() > 1e-12 * size ? way.normalized() : partner_.part(b, points).normal;
+    touch.point = (gap.on_points + gap.on_body) / 2;
+    return touch;
+  }
+
   query::Touch partBall(const Eigen::Vector3d& center, double radius, const Node& b) const {
     const query::Points point{&center, 1};
     const query::Gap gap = partner_.gap(b, point, std::numeric_limits<double>::infinity());
@@ -126,7 +130,7 @@ class BodyCollector final : public query::BodyVisitor<typename Partner::Node> {
       touch.depth += radius;
       touch.point -= touch.normal * (radius / 2);
     } else {
-      touch.normal = (center - gap.on_body) / gap.distance;
+      touch.normal = (center - gap.on_body).normalized();
       touch.depth = std::max(radius - gap.distance, 0.0);
       touch.point = gap.on_body - touch.normal * (touch.depth / 2);
     }

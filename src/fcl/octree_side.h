@@ -152,9 +152,8 @@ class OcTreeSide {
     return fcl::Box<S>(side, side, side);
   }
   fcl::Transform3<S> poseOf(const Node& n) const {
-    fcl::Transform3<S> X = X_WO_;
-    X.translation() = X_WO_ * fcl::Vector3<S>(n.center.template cast<S>());
-    return X;
+    // As FCL multiplies it: the sums round in another order when a point is moved.
+    return X_WO_ * fcl::Translation3<S>(fcl::Vector3<S>(n.center.template cast<S>()));
   }
 
   const fcl::OcTree<S>& octree_;

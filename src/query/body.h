@@ -86,6 +86,7 @@ class ConvexBody : public Body {
   double boxGap(const Points& points) const;
   Gap coreGap(const Points& points, double enough) const;
   Touch descend(const Eigen::Vector3d& normal, const Points& points) const;
+  Touch shorten(Touch touch, const Points& points) const;
   Touch along(const Eigen::Vector3d& normal, const Points& points) const;
 
   const double radius_;

@@ -54,8 +54,12 @@ Vector3d middleOfOverlap(const Corners& p, const Corners& q) {
     const Vector3d origin = a, dir = line.normalized();
     const double pa = 0, pb = dir.dot(b - origin), qc = dir.dot(c - origin), qd = dir.dot(d - origin);
     const double lo = std::max(std::min(pa, pb), std::min(qc, qd)), hi = std::min(std::max(pa, pb), std::max(qc, qd));
-    return origin + (lo + hi) / 2 * dir;
+    if (lo <= hi) return origin + (lo + hi) / 2 * dir;
+    nearestPoints(p, q, a, b);
+    return (a + b) / 2;
   }
+  // They may be said to touch, in S, and be just apart.
+  if (nearestPoints(p, q, a, b) > 0) return (a + b) / 2;
   const Vector3d lo = p[0].cwiseMin(p[1]).cwiseMin(p[2]).cwiseMax(q[0].cwiseMin(q[1]).cwiseMin(q[2]));
   const Vector3d hi = p[0].cwiseMax(p[1]).cwiseMax(p[2]).cwiseMin(q[0].cwiseMax(q[1]).cwiseMax(q[2]));
   return (lo + hi) / 2;

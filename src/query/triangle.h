@@ -16,8 +16,8 @@ struct Touch {
 };
 
 /// The shortest way to part two triangles that touch: the separating axis (face normals, edge cross products, in-plane
-/// edge normals) with the least overlap. point is the middle of the segment in which they cut, or of the overlap of
-/// their boxes when they are coplanar or degenerate.
+/// edge normals) with the least overlap. point is the middle of the segment in which they cut, of the overlap of their
+/// boxes when they are coplanar or degenerate, or between their nearest points when they do not meet.
 Touch partTriangles(const Corners& p, const Corners& q);
 
 /// The point of a closed triangle, degenerate or not, that is nearest to x.

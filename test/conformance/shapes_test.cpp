@@ -608,6 +608,40 @@ TEST(ShapesDouble, WhatIsWhollyInsideASolidTouchesIt) {
       << "a model is not";
 }
 
+// Gaps down to what rounding leaves of them: FCL's solver calls them contacts.
+TEST(ShapesDouble, NormalsOfWhatIsJustOffAreUnitVectors) {
+  Raw raw;
+  raw.vertices = {{-3, -2, 0}, {4, -1, 0}, {0, 5, 0}};
+  raw.triangles.emplace_back(0, 1, 2);
+  const Modeld model(raw.mesh());
+  const double lean = 0.3;
+  const std::vector<std::pair<std::shared_ptr<fcl::ShapeBased>, double>> shapes = {
+      {std::make_shared<fcl::Sphered>(0.3), 0.3},
+      {std::make_shared<fcl::Capsuled>(0.3, 0.8), 0.3 + 0.4 * std::cos(lean)},
+      {std::make_shared<fcl::Boxd>(0.7, 0.4, 1.1), 0.35 * std::sin(lean) + 0.55 * std::cos(lean)},
+      {std::make_shared<fcl::Cylinderd>(0.4, 0.8), 0.4 * std::sin(lean) + 0.4 * std::cos(lean)}};
+  std::mt19937_64 g(12);
+  int contacts = 0;
+  for (const auto& [shape, reach] : shapes) {
+    for (int i = 0; i < 300; ++i) {
+      const auto W = test::pose<double>(test::randomRotation(g), test::randomDirection(g));
+      const double gap = std::pow(10.0, -7 - 9.0 * i / 300);
+      const Eigen::Matrix3d R = Eigen::AngleAxisd(lean, Vector3d::UnitY()).toRotationMatrix();
+      const auto Y = test::pose<double>(R, {0.1, 0.2, reach + gap});
+      for (const auto solver : kSolvers) {
+        fcl::CollisionResultd result;
+        fcl::collide(&model, W, shape.get(), W * Y, all<double>(solver, true), result);
+        if (!result.isCollision()) continue;
+        const auto& c = result.getContact(0);
+        ASSERT_NEAR(c.normal.norm(), 1, 1e-12) << gap;
+        ASSERT_GT(c.normal.dot(W.linear().col(2)), 0.9) << gap;
+        ++contacts;
+      }
+    }
+  }
+  EXPECT_GT(contacts, 500);
+}
+
 TEST(ShapesDouble, ManagersAndObjects) {
   const auto model = std::make_shared<Modeld>(test::torus(20).mesh());
   fcl::CollisionObjectd arm(model);

@@ -76,7 +76,7 @@ TEST(Solid, HoldsWhatItsSurfaceWindsAbout) {
   for (const Raw& raw : {test::box({0, 0, 0}, {1, 1, 1}), test::torus(30), test::torus(7, 0.3), cavity(), flat, far,
                          turnedOver(test::torus(12)), unwelded(test::torus(20, 0.2))}) {
     const Solid s(raw.mesh());
-    const Eigen::AlignedBox3d& b = raw.mesh()->bounds();
+    const Eigen::AlignedBox3d b = raw.mesh()->bounds();
     int inside = 0;
     const auto check = [&](const Eigen::Vector3d& p) {
       // On the surface itself either answer would do.

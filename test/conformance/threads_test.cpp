@@ -1,11 +1,13 @@
 // SPDX-License-Identifier: BSD-3-Clause
 // Many threads on the same fresh models: right answers whatever else happens to the trees. Runs under TSan.
+#include <fcl/geometry/octree/octree.h>
 #include <gtest/gtest.h>
 
 #include <atomic>
 #include <thread>
 
 #include "conformance/reference.h"
+#include "conformance/shapes.h"
 
 namespace bocst {
 namespace {
@@ -220,6 +222,151 @@ TEST(Threads, DistancesTimesAndSolidsWhileVerticesChange) {
         wrong += x.contacts != one[k].contacts && x.contacts != other[k].contacts;
         wrong += !(std::abs(x.distance - one[k].distance) < 1e-12 || std::abs(x.distance - other[k].distance) < 1e-12);
         wrong += !(std::abs(x.time - one[k].time) < 2e-4 || std::abs(x.time - other[k].time) < 2e-4);
+      }
+    }
+    --running;
+  });
+  EXPECT_EQ(wrong, 0);
+}
+
+/// One of each of FCL's shapes, an octree and a mesh.
+std::vector<std::shared_ptr<fcl::CollisionGeometryd>> partners() {
+  std::vector<std::shared_ptr<fcl::CollisionGeometryd>> all;
+  for (const auto& s : test::shapes<double>()) all.push_back(s.shape);
+  auto map = std::make_shared<octomap::OcTree>(0.2);
+  std::mt19937_64 g(3);
+  for (int i = 0; i < 60; ++i) {
+    const Eigen::Vector3f p = (test::randomDirection(g) * 0.5).cast<float>();
+    map->updateNode(octomap::point3d(p.x(), p.y(), p.z()), true);
+  }
+  all.push_back(std::make_shared<fcl::OcTreed>(map));
+  all.push_back(test::bvh<fcl::OBBRSSd>(test::torus(10).scale(0.5)));
+  return all;
+}
+
+/// Answers about a model and any partner, by the solver and in the order that `way` says.
+struct BodyAnswers {
+  bool touches = false;
+  std::size_t contacts = 0, costs = 0;
+  double distance = 0;
+
+  static BodyAnswers of(const Modeld& model, const fcl::CollisionGeometryd& partner, const fcl::Transform3d& Y,
+                        unsigned way) {
+    const fcl::Transform3d I = fcl::Transform3d::Identity();
+    const fcl::CollisionGeometryd *a = &model, *b = &partner;
+    const fcl::Transform3d *X_A = &I, *X_B = &Y;
+    if (way & 1) std::swap(a, b), std::swap(X_A, X_B);
+    const auto solver = way & 2 ? fcl::GST_INDEP : fcl::GST_LIBCCD;
+    fcl::CollisionRequestd one, all(100000, true, 100000, true, false);
+    fcl::DistanceRequestd far(true);
+    one.gjk_solver_type = all.gjk_solver_type = far.gjk_solver_type = solver;
+    BodyAnswers answers;
+    fcl::CollisionResultd first, every;
+    answers.touches = fcl::collide(a, *X_A, b, *X_B, one, first) > 0;
+    answers.contacts = fcl::collide(a, *X_A, b, *X_B, all, every);
+    answers.costs = every.numCostSources();
+    fcl::DistanceResultd nearest;
+    answers.distance = fcl::distance(a, *X_A, b, *X_B, far, nearest);
+    return answers;
+  }
+  bool operator==(const BodyAnswers& o) const {
+    return touches == o.touches && contacts == o.contacts && costs == o.costs && std::abs(distance - o.distance) < 1e-8;
+  }
+};
+
+TEST(Threads, ShapesAndOctreesWhilePruningAndLooking) {
+  const test::Raw raw = test::torus(30);
+  Options exact, coarse;
+  exact.ttl = coarse.ttl = std::chrono::milliseconds(1);
+  exact.memory_budget = 200000;
+  coarse.answer = Answer::kConservative;
+  coarse.depth = 5;
+  const auto others = partners();
+  std::mt19937_64 g(4);
+  std::uniform_real_distribution<double> u(0, 1);
+  std::vector<fcl::Transform3d> poses;
+  for (int i = 0; i < 3; ++i) {
+    poses.push_back(test::pose<double>(test::randomRotation(g), test::randomDirection(g) * (0.5 + 1.5 * u(g))));
+  }
+  const Modeld calm_exact(raw.mesh(), exact), calm_coarse(raw.mesh(), coarse);
+  Modeld a(raw.mesh(), exact), b(raw.mesh(), coarse);
+  struct Case {
+    bool is_exact;
+    std::size_t partner, pose;
+    BodyAnswers expected;
+  };
+  std::vector<Case> cases;
+  int hits = 0;
+  for (const bool is_exact : {true, false}) {
+    for (std::size_t k = 0; k < others.size(); ++k) {
+      for (std::size_t p = 0; p < poses.size(); ++p) {
+        cases.push_back(
+            {is_exact, k, p, BodyAnswers::of(is_exact ? calm_exact : calm_coarse, *others[k], poses[p], 0)});
+        hits += cases.back().expected.touches;
+      }
+    }
+  }
+  EXPECT_GT(hits, 10);
+  EXPECT_LT(hits, static_cast<int>(cases.size()) - 10);
+  std::atomic<int> wrong{0}, running{4};
+  inThreads(5, [&](int thread) {
+    if (thread == 4) {
+      while (running > 0) {
+        for (Modeld* model : {&a, &b}) {
+          model->prune(Clock::now() + std::chrono::seconds(10));
+          std::size_t nodes = 0;
+          model->visit([&](const NodeView&) { ++nodes; });
+          if (nodes < 1 || model->statistics().resident_nodes < 1) ++wrong;
+        }
+        std::this_thread::yield();
+      }
+      return;
+    }
+    for (std::size_t i = 0; i < cases.size(); ++i) {
+      const Case& c = cases[(i * 5 + static_cast<std::size_t>(thread) * 17) % cases.size()];
+      const BodyAnswers x =
+          BodyAnswers::of(c.is_exact ? a : b, *others[c.partner], poses[c.pose], static_cast<unsigned>(thread));
+      wrong += !(x == c.expected);
+    }
+    --running;
+  });
+  EXPECT_EQ(wrong, 0);
+}
+
+TEST(Threads, ShapesAndOctreesWhileVerticesChange) {
+  // The mesh jumps between here and there; an answer is that of the one or of the other place.
+  const test::Raw raw = test::torus(16);
+  std::vector<Eigen::Vector3d> away = raw.vertices;
+  for (auto& v : away) v.x() += 2;
+  Modeld a(raw.mesh());
+  const Modeld here(raw.mesh()), there(std::make_shared<const Mesh>(away, raw.triangles));
+  const auto others = partners();
+  std::vector<fcl::Transform3d> poses;
+  for (const double x : {0.7, 2.2, 5.0}) {
+    poses.push_back(test::pose<double>(Eigen::Matrix3d::Identity(), {x, 0.1, 0.05}));
+  }
+  std::vector<BodyAnswers> one, other;
+  for (const auto& partner : others) {
+    for (const auto& Y : poses) {
+      one.push_back(BodyAnswers::of(here, *partner, Y, 0));
+      other.push_back(BodyAnswers::of(there, *partner, Y, 0));
+    }
+  }
+  std::atomic<int> wrong{0}, running{3};
+  inThreads(4, [&](int thread) {
+    if (thread == 3) {
+      for (int i = 0; running > 0; ++i) a.updateVertices(i % 2 ? raw.vertices : away);
+      return;
+    }
+    for (std::size_t round = 0; round < 5; ++round) {
+      for (std::size_t n = 0; n < one.size(); ++n) {
+        // The model may jump between two queries, so each is looked at by itself.
+        const BodyAnswers x =
+            BodyAnswers::of(a, *others[n / poses.size()], poses[n % poses.size()], static_cast<unsigned>(thread));
+        wrong += x.touches != one[n].touches && x.touches != other[n].touches;
+        wrong += x.contacts != one[n].contacts && x.contacts != other[n].contacts;
+        wrong += x.costs != one[n].costs && x.costs != other[n].costs;
+        wrong += std::abs(x.distance - one[n].distance) > 1e-8 && std::abs(x.distance - other[n].distance) > 1e-8;
       }
     }
     --running;

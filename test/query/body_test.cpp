@@ -9,6 +9,7 @@
 #include <functional>
 #include <memory>
 #include <random>
+#include <string>
 #include <vector>
 
 #include "meshes.h"
@@ -268,6 +269,55 @@ TEST(Body, PartingPartsAndIsLeastWhereItSaysSo) {
     }
     EXPECT_GT(parted, 100);
     EXPECT_LT(longer, parted / 10);
+  }
+}
+
+TEST(Body, WhatOverlapsByLittlePartsByLittle) {
+  std::mt19937_64 g(9);
+  std::uniform_real_distribution<double> u(-1, 1);
+  for (const Known& k : bodies()) {
+    for (const double overlap : {1e-2, 1e-4, 1e-6}) {
+      SCOPED_TRACE(std::string(k.name) + " by " + std::to_string(overlap));
+      int parted = 0, longer = 0;
+      for (int i = 0; i < 200; ++i) {
+        const double size = std::pow(10.0, u(g));
+        Vector3d t[3], m[3];
+        for (Vector3d& x : t) x = size * Vector3d(u(g), u(g), u(g));
+        const Vector3d way = test::randomDirection(g);
+        const auto touchesAt = [&](double d) {
+          for (int c = 0; c < 3; ++c) m[c] = t[c] + way * d;
+          return k.body->gap({m, 3}, kFar).touches();
+        };
+        double lo = 0, hi = 40;
+        if (!touchesAt(lo) || touchesAt(hi)) continue;
+        for (int s = 0; s < 50; ++s) (touchesAt((lo + hi) / 2) ? lo : hi) = (lo + hi) / 2;
+        if (!touchesAt(lo - overlap)) continue;
+        // Back along the way is one way to part them.
+        longer += k.body->part({m, 3}).depth > 1.5 * overlap;
+        ++parted;
+      }
+      EXPECT_GT(parted, 50);
+      EXPECT_LT(longer, parted / 10);
+    }
+  }
+}
+
+TEST(Body, TrianglesThatAreJustApartTouchBetweenTheirNearestPoints) {
+  std::mt19937_64 g(10);
+  std::uniform_real_distribution<double> u(-1, 1);
+  for (int i = 0; i < 500; ++i) {
+    Corners p, q;
+    for (Vector3d& x : p) x = Vector3d(u(g), u(g), u(g));
+    for (Vector3d& x : q) x = Vector3d(u(g), u(g), u(g));
+    Vector3d a, b;
+    if (nearestPoints(p, q, a, b) < 1e-3) continue;
+    // Put so that they are 1e-9 apart, where they were nearest.
+    const Vector3d step = (a - b) - (a - b).normalized() * 1e-9;
+    for (Vector3d& x : q) x += step;
+    const Touch touch = partTriangles(p, q);
+    ASSERT_LT((closestPoint(touch.point, p) - touch.point).norm(), 1e-6) << i;
+    ASSERT_LT((closestPoint(touch.point, q) - touch.point).norm(), 1e-6) << i;
+    ASSERT_LT(touch.depth, 1e-9) << i;
   }
 }
 

@@ -1,0 +1,8 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#include "conformance/matrix.h"
+
+namespace {
+
+BOCST_TEST_MATRIX(MatrixFloat, float);
+
+}  // namespace
