@@ -42,7 +42,7 @@ struct Question {
       c.o2 = o2;
       c.b1 = b1;
       c.b2 = b2;
-      if (request.enable_contact) {
+      if (request.enable_contact && touch != nullptr) {
         c.normal = touch->normal.template cast<S>();
         c.pos = touch->point.template cast<S>();
         c.penetration_depth = static_cast<S>(touch->depth);
