@@ -160,6 +160,15 @@ TEST_F(Program, InspectsTheTreeByLevel) {
       last = levels[i].at("error_avg");
     }
     EXPECT_EQ(report.at("nodes"), nodes);
+    EXPECT_EQ(levels.back().at("bytes"), report.at("tree_bytes"));
+    EXPECT_LT(levels[0].at("bytes"), levels.back().at("bytes"));
+    // The other subdivision stands beside it.
+    const Json& other = report.at("other");
+    const std::string name = subdivision == "octree" ? "bono" : "octree";
+    EXPECT_EQ(other.at("subdivision"), name);
+    const Json asked = json("inspect " + model("link") + " --depth 5 --subdivision " + name);
+    EXPECT_EQ(other.at("levels"), asked.at("levels"));
+    EXPECT_EQ(other.at("nodes"), asked.at("nodes"));
   }
 }
 

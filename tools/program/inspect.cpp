@@ -26,7 +26,7 @@ namespace {
 struct Grown {
   std::vector<NodeView> nodes;
   std::vector<LevelError> levels;  ///< Only nodes are counted where errors were not wanted.
-  std::size_t bytes = 0;
+  std::vector<std::size_t> bytes;  ///< Of the tree as it ended at each level.
   std::string oracle;
   double microseconds = 0;
 };
@@ -36,10 +36,12 @@ Grown grow(const std::shared_ptr<const Mesh>& mesh, Options options, bool errors
   Grown grown;
   const Stopwatch watch;
   Modeld tree(mesh, options);
-  tree.expandAll(options.depth);
+  for (int level = 1; level <= options.depth; ++level) {
+    tree.expandAll(level);
+    grown.bytes.push_back(tree.statistics().resident_bytes);
+  }
   grown.microseconds = watch.microseconds();
   tree.visit([&grown](const NodeView& node) { grown.nodes.push_back(node); });
-  grown.bytes = tree.statistics().resident_bytes;
   grown.oracle = tree.oracleName();
   if (errors) {
     grown.levels = errorByLevel(*mesh, grown.nodes);
@@ -111,23 +113,43 @@ struct Inspect {
     if (image.wanted()) renderer.emplace(model.options().oracle);
     const std::shared_ptr<const Mesh> mesh = loadMesh(file);
     const Health health = healthOf(*mesh);
-    const Grown grown = grow(mesh, model.options(), !no_error);
+    const Grown grown = grow(mesh, model.options(), !no_error), other = grow(mesh, otherOptions(), !no_error);
     if (!spheres_file.empty()) {
       const std::string name = link.empty() ? std::filesystem::path(file).stem().string() : link;
       writeFile(spheres_file, sphereFile(spheres_file, leavesAt(grown.nodes, model.depth), name));
     }
-    if (!html_file.empty()) writeFile(html_file, page(mesh, health, grown).html());
+    if (!html_file.empty()) writeFile(html_file, page(*mesh, health, grown, other).html());
     if (renderer) writePng(image.file, inspectPicture(*renderer, file, *mesh, grown.nodes, model.options(), image));
     if (output.wantsJson()) {
-      output.write(report(*mesh, health, grown));
+      output.write(report(*mesh, health, grown, other));
     } else {
-      print(*mesh, health, grown);
+      print(*mesh, health, grown, other);
     }
     return 0;
   }
 
  private:
-  Json report(const Mesh& mesh, const Health& health, const Grown& grown) const {
+  /// The same with the other subdivision, for comparison.
+  Options otherOptions() const {
+    Options options = model.options();
+    options.subdivision = options.subdivision == Subdivision::kOctree ? Subdivision::kBono : Subdivision::kOctree;
+    return options;
+  }
+
+  Json levels(const Grown& grown) const {
+    Json levels = Json::array();
+    for (std::size_t i = 0; i < grown.levels.size(); ++i) {
+      const LevelError& error = grown.levels[i];
+      Json level = {{"level", i + 1}, {"nodes", error.nodes}, {"bytes", grown.bytes[i]}};
+      level["error_min"] = no_error ? Json() : Json(error.min);
+      level["error_avg"] = no_error ? Json() : Json(error.average);
+      level["error_max"] = no_error ? Json() : Json(error.max);
+      levels.push_back(level);
+    }
+    return levels;
+  }
+
+  Json report(const Mesh& mesh, const Health& health, const Grown& grown, const Grown& other) const {
     const Eigen::Vector3d extent = mesh.bounds().sizes();
     Json report = {{"mesh", file},
                    {"vertices", mesh.vertexCount()},
@@ -139,22 +161,18 @@ struct Inspect {
                    {"depth", model.depth},
                    {"oracle", grown.oracle},
                    {"nodes", grown.nodes.size()},
-                   {"tree_bytes", grown.bytes},
+                   {"tree_bytes", grown.bytes.back()},
                    {"grow_us", grown.microseconds},
                    {"root_radius", grown.nodes.front().radius}};
-    report["levels"] = Json::array();
-    for (std::size_t i = 0; i < grown.levels.size(); ++i) {
-      const LevelError& error = grown.levels[i];
-      Json level = {{"level", i + 1}, {"nodes", error.nodes}};
-      level["error_min"] = no_error ? Json() : Json(error.min);
-      level["error_avg"] = no_error ? Json() : Json(error.average);
-      level["error_max"] = no_error ? Json() : Json(error.max);
-      report["levels"].push_back(level);
-    }
+    report["levels"] = levels(grown);
+    report["other"] = {{"subdivision", otherOptions().subdivision == Subdivision::kOctree ? "octree" : "bono"},
+                       {"nodes", other.nodes.size()},
+                       {"tree_bytes", other.bytes.back()},
+                       {"levels", levels(other)}};
     return report;
   }
 
-  void print(const Mesh& mesh, const Health& health, const Grown& grown) const {
+  void print(const Mesh& mesh, const Health& health, const Grown& grown, const Grown& other) const {
     Table summary(Table::Others::kLeft);
     summary.row({"mesh", file});
     summary.row({"vertices", std::to_string(mesh.vertexCount())});
@@ -167,18 +185,23 @@ struct Inspect {
     if (health.watertight() && health.oriented()) summary.row({"volume", formatNumber(health.volume, 6)});
     summary.row({"tree", model.subdivision + ", depth " + std::to_string(model.depth) + ", oracle " + grown.oracle});
     summary.row({"grown in", formatTime(grown.microseconds)});
-    summary.row({"bytes", formatBytes(static_cast<double>(grown.bytes))});
     summary.print();
-    std::cout << '\n';
+    print(model.options().subdivision, grown);
+    print(otherOptions().subdivision, other);
+  }
+
+  void print(Subdivision subdivision, const Grown& grown) const {
+    std::cout << '\n' << (subdivision == Subdivision::kOctree ? "O-BOCST, octree" : "B-BOCST, branch on need") << '\n';
     Table table;
     if (no_error) {
-      table.row({"level", "nodes"});
+      table.row({"level", "nodes", "bytes"});
     } else {
-      table.row({"level", "nodes", "error min", "average", "max"});
+      table.row({"level", "nodes", "bytes", "error min", "average", "max"});
     }
     for (std::size_t i = 0; i < grown.levels.size(); ++i) {
       const LevelError& error = grown.levels[i];
-      std::vector<std::string> row = {std::to_string(i + 1), std::to_string(error.nodes)};
+      std::vector<std::string> row = {std::to_string(i + 1), std::to_string(error.nodes),
+                                      formatBytes(static_cast<double>(grown.bytes[i]))};
       if (!no_error) {
         row.push_back(formatNumber(error.min));
         row.push_back(formatNumber(error.average));
@@ -190,23 +213,20 @@ struct Inspect {
   }
 
   /// Both subdivisions, the asked for first.
-  Page page(const std::shared_ptr<const Mesh>& mesh, const Health& health, const Grown& grown) const {
+  Page page(const Mesh& mesh, const Health& health, const Grown& grown, const Grown& other) const {
     Page page(std::filesystem::path(file).filename().string());
-    page.fact("triangles", std::to_string(mesh->triangleCount()));
-    page.fact("vertices", std::to_string(mesh->vertexCount()));
-    page.fact("extents", extentsText(*mesh));
+    page.fact("triangles", std::to_string(mesh.triangleCount()));
+    page.fact("vertices", std::to_string(mesh.vertexCount()));
+    page.fact("extents", extentsText(mesh));
     page.fact("components", std::to_string(health.components));
     page.fact("watertight", watertightText(health));
     page.fact("faults", faultsText(health));
-    page.object(std::filesystem::path(file).filename().string(), *mesh);
-    Options options = model.options();
-    const auto add = [&](const Grown& tree) {
-      page.tree(*mesh, tree.nodes, options.subdivision, options.dimension,
-                no_error ? std::vector<LevelError>() : tree.levels);
+    page.object(std::filesystem::path(file).filename().string(), mesh);
+    const auto add = [&](const Grown& tree, Subdivision subdivision) {
+      page.tree(mesh, tree.nodes, subdivision, model.dimension, no_error ? std::vector<LevelError>() : tree.levels);
     };
-    add(grown);
-    options.subdivision = options.subdivision == Subdivision::kOctree ? Subdivision::kBono : Subdivision::kOctree;
-    add(grow(mesh, options, !no_error));
+    add(grown, model.options().subdivision);
+    add(other, otherOptions().subdivision);
     return page;
   }
 };
@@ -221,6 +241,7 @@ void addInspect(CLI::App& program, Job& job) {
       "The error of a node (paper, 5.2) is the greatest distance from a point of its sphere to the surface inside "
       "that\n"
       "sphere, divided by the diameter of the root's sphere. Each level is shown as if the tree ended there.\n"
+      "Bytes are those of the tree when it had grown to that level. The other subdivision is measured for comparison.\n"
       "Vertices with equal coordinates count as one for components, edges and duplicates.\n"
       "The page shows at most " +
       std::to_string(Page::kMaxTriangles) + " triangles (a larger mesh is made coarser) and " +
