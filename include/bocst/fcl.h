@@ -46,9 +46,9 @@ namespace bocst {
 ///   translation of o2's primitive along normal that ends the contact of these two primitives, pos a point in or beside
 ///   their overlap. The translation is the shortest between triangles, and between triangles and boxes, balls, cells,
 ///   planes and half-spaces; with other shapes seldom longer. It is about two primitives, not about two solids.
-/// - with a margin (Options::margin, the sum of both models'; between models and BVHModels), a contact is a pair of
-///   primitives no farther apart than that; penetration_depth is the margin minus their distance (plus the depth above,
-///   when they meet), normal the way between their nearest points, and pos the middle of it.
+/// - with a margin (Options::margin, the sum of both models'; other partners have none of their own), a contact is a
+///   pair of primitives no farther apart than that; penetration_depth is the margin minus their distance (plus the depth
+///   above, when they meet), normal the way between their nearest points, and pos the middle of it.
 /// - solid (Options::solid; between models and BVHModels): where no primitives touch but one geometry is inside the
 ///   other, there is one contact, with Contact::NONE for b1 and b2; penetration_depth is the distance of the surfaces
 ///   (plus the margin), which is what it takes at least to part them, normal the way for o2 (that brings the surfaces

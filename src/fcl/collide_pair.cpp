@@ -179,9 +179,7 @@ class Collector : public query::Visitor {
   }
 
   void addCost(const fcl::AABB<S>& a, const fcl::AABB<S>& b) {
-    const S density = q_.o1->cost_density * q_.o2->cost_density;
-    // Apart, within the margin, they share no room.
-    if (q_.margin == 0 || a.overlap(b)) q_.addCost(a, b, density);
+    q_.addCost(a, b, q_.o1->cost_density * q_.o2->cost_density);
   }
 
   bool add(std::uint64_t b1, std::uint64_t b2, const query::Touch* touch) {
@@ -221,9 +219,9 @@ void traverse(Walk&& walk) {
 }
 
 /// What is within the margin touches: the walk's slack, in units of side A, is so much more.
-Placement withMargin(Placement b_in_a, const TreeSide& a, double margin, bool spheres) {
-  // Slabs are measured along normals that are up to a hundredth too long.
-  b_in_a.slack += margin / a.tree().surface().lattice.unit() * (spheres ? 1 : 1.02);
+template <typename S>
+Placement withMargin(Placement b_in_a, const TreeSide& a, const Question<S>& q, bool spheres) {
+  b_in_a.slack += q.cullingMargin(spheres) / a.tree().surface().lattice.unit();
   return b_in_a;
 }
 
@@ -265,7 +263,7 @@ void collideModels(const Question<S>& q, tree::Tree& tree1, tree::Tree& tree2) {
     if (q.margin == 0 && query::TreeWalk::fits(a, b, b_in_a)) {
       traverse<S>(query::TreeWalk(a, b, b_in_a, collector));
     } else {
-      const Placement near = withMargin(b_in_a, a, q.margin, a.cells() || b.cells());
+      const Placement near = withMargin(b_in_a, a, q, a.cells() || b.cells());
       traverse<S>(query::PairWalk<TreeSide, TreeSide>(a, b, near, collector));
     }
     if (q.mayBeInside(before) &&
@@ -290,7 +288,7 @@ void collideBvh(const Question<typename BV::S>& q, tree::Tree& tree, const fcl::
     const BvhTriangles<BV> partner(bvh);
     const auto walk = [&](auto&& collector) {
       collector.setFrame(s.lattice.origin(), s.lattice.unit());
-      traverse<S>(query::PairWalk<TreeSide, BvhSide<BV>>(a, b, withMargin(b_in_a, a, q.margin, a.cells()), collector));
+      traverse<S>(query::PairWalk<TreeSide, BvhSide<BV>>(a, b, withMargin(b_in_a, a, q, a.cells()), collector));
     };
     if (swapped) {
       walk(Collector<S, BvhTriangles<BV>, ModelTriangles<S>>(q, partner, model, true, magnitude));
@@ -328,11 +326,11 @@ std::size_t answer(const Question<S>& q, const Models<S>& models, const BroughtS
   const fcl::CollisionGeometry<S>* partner = swapped ? q.o1 : q.o2;
   tree::Tree& tree = (swapped ? models.second : models.first)->tree();
   if (isShape(partner)) {
-    refuse(q.margin, tree, "shapes");
+    refuse(tree, "shapes");
     collideShape(q, tree, swapped, solver);
 #if FCL_HAVE_OCTOMAP
   } else if (partner->getNodeType() == fcl::GEOM_OCTREE) {
-    refuse(q.margin, tree, "octrees");
+    refuse(tree, "octrees");
     collideOcTree(q, tree, swapped, solver);
 #endif
   } else {

@@ -67,11 +67,10 @@ bool holds(const tree::Tree& a, const fcl::Transform3<typename BV::S>& X_WA, con
 }
 
 /// @throws std::invalid_argument where what these options ask for cannot be answered, rather than a false "free".
-inline void refuse(double margin, const tree::Tree& tree, const char* partners) {
-  const bool solid = tree.options().solid;
-  if (margin == 0 && !solid) return;
-  throw std::invalid_argument(std::string("bocst: a model ") + (solid ? "that is solid" : "with a margin") +
-                              " has no answers about " + partners + " in this version");
+inline void refuse(const tree::Tree& tree, const char* partners) {
+  if (!tree.options().solid) return;
+  throw std::invalid_argument(std::string("bocst: a model that is solid has no answers about ") + partners +
+                              " in this version");
 }
 
 }  // namespace bocst::fcl_room
