@@ -8,6 +8,8 @@
 #include <type_traits>
 
 #include "fcl/body_pair.h"
+#include "fcl/inside.h"
+#include "fcl/inside_contact.h"
 #include "fcl/narrow_phase.h"
 #include "fcl/question.h"
 #include "query/pair_set.h"
@@ -186,6 +188,7 @@ void collideBodies(const Question<S>& q, tree::Tree& tree, bool swapped, const N
   fcl::CollisionRequest<S> request(q.request);
   request.enable_cost = q.request.enable_cost && !approximate;
   const Question<S> first{q.o1, q.o2, q.X_W1, q.X_W2, request, q.result, q.margin};
+  const std::size_t before = q.result.numContacts();
   std::int64_t now;
   {
     const Look look(tree, nullptr);
@@ -206,6 +209,12 @@ void collideBodies(const Question<S>& q, tree::Tree& tree, bool swapped, const N
         using Visitor = query::BodyVisitor<typename Partner::Node>;
         const query::Placement b_in_a = frame.toLattice(surface.lattice, collector.slack(a.cells()));
         query::PairWalk<query::TreeSide, Partner, Visitor>(a, partner, b_in_a, collector).run();
+      });
+    }
+    if (tree.solid() != nullptr && q.mayBeInside(before)) {
+      with_partner(frame, false, [&](const auto& partner) {
+        if (!holds(a, frame, partner)) return;
+        addInside(q, a, partner, frame.toLattice(surface.lattice, 0), swapped);
       });
     }
     if (approximate) {

@@ -18,9 +18,9 @@
 #include "fcl/collide_octree.h"
 #include "fcl/collide_shape.h"
 #include "fcl/inside.h"
+#include "fcl/inside_contact.h"
 #include "fcl/pair.h"
 #include "fcl/question.h"
-#include "query/distance_walk.h"
 #include "query/pair_set.h"
 #include "query/pair_walk.h"
 #include "query/tree_walk.h"
@@ -225,31 +225,6 @@ Placement withMargin(Placement b_in_a, const TreeSide& a, const Question<S>& q, 
   return b_in_a;
 }
 
-/// The contact of what is inside with the solid around it: no triangles meet. With contacts asked for, it is about the
-/// places where the surfaces are nearest; the way out is at least so long.
-template <typename S, typename B>
-void addInside(const Question<S>& q, const TreeSide& a, const B& b, const Placement& b_in_a, bool swapped) {
-  fcl::Contact<S> c;
-  c.o1 = q.o1;
-  c.o2 = q.o2;
-  c.b1 = c.b2 = fcl::Contact<S>::NONE;
-  c.normal.setConstant(std::numeric_limits<S>::quiet_NaN());
-  c.pos = c.normal;
-  c.penetration_depth = std::numeric_limits<S>::quiet_NaN();
-  if (q.request.enable_contact) {
-    const lattice::Lattice& lattice = a.tree().surface().lattice;
-    query::Nearest n = query::DistanceWalk<TreeSide, B>(a, b, b_in_a).run({});
-    if (swapped) std::swap(n.on_a, n.on_b);
-    const Eigen::Isometry3d X_WA = isometryOf<S>(swapped ? q.X_W2 : q.X_W1);
-    const Eigen::Vector3d way = n.on_a - n.on_b;
-    const Eigen::Vector3d normal = n.distance > 0 ? Eigen::Vector3d(way / n.distance) : Eigen::Vector3d::UnitX();
-    c.normal = (X_WA.linear() * normal).template cast<S>();
-    c.pos = (X_WA * Eigen::Vector3d(lattice.origin() + lattice.unit() / 2 * (n.on_a + n.on_b))).template cast<S>();
-    c.penetration_depth = static_cast<S>(n.distance * lattice.unit() + q.margin);
-  }
-  q.result.addContact(c);
-}
-
 template <typename S>
 void collideModels(const Question<S>& q, tree::Tree& tree1, tree::Tree& tree2) {
   const std::size_t before = q.result.numContacts();
@@ -326,11 +301,9 @@ std::size_t answer(const Question<S>& q, const Models<S>& models, const BroughtS
   const fcl::CollisionGeometry<S>* partner = swapped ? q.o1 : q.o2;
   tree::Tree& tree = (swapped ? models.second : models.first)->tree();
   if (isShape(partner)) {
-    refuse(tree, "shapes");
     collideShape(q, tree, swapped, solver);
 #if FCL_HAVE_OCTOMAP
   } else if (partner->getNodeType() == fcl::GEOM_OCTREE) {
-    refuse(tree, "octrees");
     collideOcTree(q, tree, swapped, solver);
 #endif
   } else {

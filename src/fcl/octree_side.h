@@ -11,6 +11,7 @@
 
 #include <cmath>
 #include <cstdint>
+#include <optional>
 #include <vector>
 
 #include "fcl/narrow_phase.h"
@@ -91,6 +92,8 @@ class OcTreeSide {
     touch.point += n.center;
     return touch;
   }
+  std::optional<Eigen::Vector3d> point(const Node& n) const { return n.center; }
+  query::Hull hull(const Node& n) const { return query::hullOf(volume(n)); }
   bool meets(const Node& n, const query::Sphere& s, double slack) const {
     const double reach = s.radius * (1 + 1e-12) + slack;
     return !(gap(n, {&s.center, 1}, reach).atLeast > reach);

@@ -183,6 +183,13 @@ class Simplex {
 
 }  // namespace
 
+Hull hullOf(const OrientedVolume& box) {
+  Hull hull;
+  cornersOf(box, Placement(), hull.corners);
+  hull.count = 8;
+  return hull;
+}
+
 ConvexBody::ConvexBody(const Vector3d& center, const Vector3d& half_of_core, double radius) : radius_(radius) {
   box_.center = center;
   box_.half = half_of_core + Vector3d::Constant(radius);
@@ -205,6 +212,7 @@ Gap ConvexBody::coreGap(const Points& points, double enough) const {
     const double beyond = v.dot(w) / v.norm() - kRounding * size;
     if (beyond > gap.atLeast) {
       gap.atLeast = beyond;
+      gap.normal = -v / v.norm();
       improved = step;
     }
     if (gap.atLeast > enough) return gap;
@@ -352,6 +360,15 @@ Vector3d CapsuleBody::support(const Vector3d& d) const {
   return Vector3d(0, 0, d[2] < 0 ? -half_length_ : half_length_);
 }
 
+Hull CapsuleBody::hull() const {
+  Hull hull;
+  hull.count = half_length_ > 0 ? 2 : 1;
+  hull.corners[0] = Vector3d(0, 0, half_length_);
+  hull.corners[1] = Vector3d(0, 0, -half_length_);
+  hull.radius = radius_;
+  return hull;
+}
+
 EllipsoidBody::EllipsoidBody(const Vector3d& radii) : ConvexBody(Vector3d::Zero(), radii, 0), radii_(radii) {}
 
 Vector3d EllipsoidBody::support(const Vector3d& d) const {
@@ -405,11 +422,19 @@ Gap TriangleBody::gap(const Points& points, double enough) const {
   Corners other;
   asTriangle(points, other);
   gap.distance = nearestPoints(corners_, other, gap.on_body, gap.on_points);
+  if (gap.distance > 0) gap.normal = (gap.on_points - gap.on_body) / gap.distance;
   double size = 0;
   for (int k = 0; k < 3; ++k) size = std::max({size, corners_[k].lpNorm<1>(), other[k].lpNorm<1>()});
   gap.atLeast = gap.distance - kRounding * size;
   if (gap.touches()) gap.distance = 0;
   return gap;
+}
+
+Hull TriangleBody::hull() const {
+  Hull hull;
+  hull.count = 3;
+  std::copy(corners_, corners_ + 3, hull.corners);
+  return hull;
 }
 
 Touch TriangleBody::part(const Points& points) const {
@@ -446,6 +471,7 @@ HalfspaceBody::HalfspaceBody(const Vector3d& normal, double height, const Sphere
 Gap HalfspaceBody::gap(const Points& points, double) const {
   Gap gap;
   gap.on_points = lowest(points, normal_);
+  gap.normal = normal_;
   const double above = normal_.dot(gap.on_points) - height_;
   gap.atLeast = above - kRounding * (gap.on_points.lpNorm<1>() + std::abs(height_));
   gap.distance = gap.touches() ? 0 : above;
@@ -471,6 +497,7 @@ Gap PlaneBody::gap(const Points& points, double) const {
   const Vector3d &low = lowest(points, normal_), &high = points.support(normal_);
   const double above = normal_.dot(low) - height_, below = height_ - normal_.dot(high);
   gap.on_points = above > below ? low : high;
+  gap.normal = above > below ? normal_ : Vector3d(-normal_);
   const double apart = std::max(above, below);
   gap.atLeast = apart - kRounding * (gap.on_points.lpNorm<1>() + std::abs(height_));
   gap.distance = gap.touches() ? 0 : apart;

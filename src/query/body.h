@@ -4,6 +4,7 @@
 #include <Eigen/Core>
 #include <cstddef>
 #include <limits>
+#include <optional>
 
 #include "query/triangle.h"
 #include "query/volume.h"
@@ -44,9 +45,22 @@ struct Gap {
   /// enough.
   double distance = std::numeric_limits<double>::infinity();
   Eigen::Vector3d on_body = Eigen::Vector3d::Zero(), on_points = Eigen::Vector3d::Zero();
+  /// The unit direction, from the body to the points, along which they are apart by `atLeast`. Where `atLeast` was more
+  /// than enough, it may be zero.
+  Eigen::Vector3d normal = Eigen::Vector3d::Zero();
 
   bool touches() const { return !(atLeast > 0 && distance > 0); }
 };
+
+/// A few points in whose hull, blown up by a radius, a body lies: what bounds how fast any point of it moves.
+struct Hull {
+  Eigen::Vector3d corners[8];
+  std::size_t count = 0;
+  double radius = 0;
+};
+
+/// That of a box.
+Hull hullOf(const OrientedVolume& box);
 
 class Body {
  public:
@@ -60,6 +74,12 @@ class Body {
 
   /// The distance of the points. More than `enough` is not looked at closely.
   virtual Gap gap(const Points& points, double enough) const = 0;
+
+  /// A point of the body; none of what has no end.
+  virtual std::optional<Eigen::Vector3d> point() const = 0;
+
+  /// That of its box, if nothing better is known.
+  virtual Hull hull() const { return hullOf(box_); }
 
   /// How points that touch the body get away from it, in a straight line: normal from the body to the points, depth >=
   /// 0 so that moving the points by depth * normal leaves them touching at most, and a point in or beside the overlap.
@@ -75,6 +95,7 @@ class ConvexBody : public Body {
  public:
   Gap gap(const Points& points, double enough) const override;
   Touch part(const Points& points) const override;
+  std::optional<Eigen::Vector3d> point() const override { return support(Eigen::Vector3d::UnitX()); }
 
  protected:
   ConvexBody(const Eigen::Vector3d& center, const Eigen::Vector3d& half_of_core, double radius);
@@ -82,13 +103,13 @@ class ConvexBody : public Body {
   /// The point of the core that is farthest along d, which has any length but zero.
   virtual Eigen::Vector3d support(const Eigen::Vector3d& d) const = 0;
 
+  const double radius_;
+
  private:
   double boxGap(const Points& points) const;
   Gap coreGap(const Points& points, double enough) const;
   Touch descend(const Eigen::Vector3d& normal, const Points& points) const;
   Touch along(const Eigen::Vector3d& normal, const Points& points) const;
-
-  const double radius_;
 };
 
 /// From half sizes, at the origin.
@@ -109,6 +130,8 @@ class BoxBody final : public ConvexBody {
 class CapsuleBody final : public ConvexBody {
  public:
   CapsuleBody(double radius, double length);
+
+  Hull hull() const override;
 
  protected:
   Eigen::Vector3d support(const Eigen::Vector3d& d) const override;
@@ -147,6 +170,7 @@ class TriangleBody final : public ConvexBody {
 
   Gap gap(const Points& points, double enough) const override;
   Touch part(const Points& points) const override;
+  Hull hull() const override;
 
  protected:
   Eigen::Vector3d support(const Eigen::Vector3d& d) const override;
@@ -163,6 +187,7 @@ class HalfspaceBody final : public Body {
   bool isBox() const override { return true; }
   Gap gap(const Points& points, double enough) const override;
   Touch part(const Points& points) const override;
+  std::optional<Eigen::Vector3d> point() const override { return std::nullopt; }
 
  private:
   const Eigen::Vector3d normal_;
@@ -177,6 +202,7 @@ class PlaneBody final : public Body {
   bool isBox() const override { return true; }
   Gap gap(const Points& points, double enough) const override;
   Touch part(const Points& points) const override;
+  std::optional<Eigen::Vector3d> point() const override { return std::nullopt; }
 
  private:
   const Eigen::Vector3d normal_;
