@@ -49,11 +49,10 @@ namespace bocst {
 /// - with a margin (Options::margin, the sum of both models'; other partners have none of their own), a contact is a
 ///   pair of primitives no farther apart than that; penetration_depth is the margin minus their distance (plus the
 ///   depth above, when they meet), normal the way between their nearest points, and pos the middle of it.
-/// - solid (Options::solid): where no primitives touch but one geometry, or a connected piece of it, or an occupied
-/// cell,
-///   is inside the other, there is one contact, with Contact::NONE for b1 and b2; penetration_depth is the distance of
-///   the surfaces (plus the margin), which is what it takes at least to part them, normal the way for o2 (that brings
-///   the surfaces together there), pos between the nearest points. Beside a BVHModel, a query whose bounding balls meet
+/// - solid (Options::solid): where no primitives touch but one geometry (a connected piece of it, an occupied cell) is
+///   inside the other, there is one contact, with Contact::NONE for b1 and b2; penetration_depth is the distance of the
+///   surfaces (plus the margin), which is what it takes at least to part them, normal the way for o2 (that brings the
+///   surfaces together there), pos between the nearest points. Beside a BVHModel, a query whose bounding balls meet
 ///   takes time linear in its triangles for that. Planes and half-spaces have no end, so they are inside nothing.
 /// - without enable_contact: normal, pos and penetration_depth are NaN.
 /// - enable_cost adds the overlap of the primitives' world boxes, as FCL does; with shapes and octrees, and

@@ -92,7 +92,7 @@ class BodyCollector final : public query::BodyVisitor<typename Partner::Node> {
     query::Touch touch;
     // With a margin the way must be known, and of what is nearly in touch it is not.
     if (gap.touches() || (q_.margin > 0 && gap.distance <= frame_.rounding())) {
-      touch = partner_.part(b, points);
+      touch = partner_.part(b, points, gap);
       touch.depth += q_.margin;
     } else {
       touch.normal = (gap.on_points - gap.on_body) / gap.distance;
@@ -128,7 +128,7 @@ class BodyCollector final : public query::BodyVisitor<typename Partner::Node> {
     const query::Gap gap = partner_.gap(b, point, std::numeric_limits<double>::infinity());
     query::Touch touch;
     if (gap.touches()) {
-      touch = partner_.part(b, point);
+      touch = partner_.part(b, point, gap);
       touch.depth += radius + q_.margin;
       touch.point -= touch.normal * (radius / 2);
     } else {

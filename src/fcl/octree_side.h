@@ -86,9 +86,11 @@ class OcTreeSide {
     gap.on_points += n.center;
     return gap;
   }
-  query::Touch part(const Node& n, const query::Points& points) const {
+  query::Touch part(const Node& n, const query::Points& points, query::Gap gap) const {
     Eigen::Vector3d x[8];
-    query::Touch touch = bodyOf(n).part(about(n, points, x));
+    gap.on_body -= n.center;
+    gap.on_points -= n.center;
+    query::Touch touch = bodyOf(n).part(about(n, points, x), gap);
     touch.point += n.center;
     return touch;
   }
