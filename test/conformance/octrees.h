@@ -15,8 +15,7 @@
 namespace bocst::test {
 
 /// A cloud about the origin, with cells that are occupied, free, uncertain and unknown.
-template <typename S>
-std::shared_ptr<fcl::OcTree<S>> cloud(unsigned seed, std::size_t points, double resolution = 0.1) {
+inline std::shared_ptr<octomap::OcTree> cloudMap(unsigned seed, std::size_t points, double resolution = 0.1) {
   auto map = std::make_shared<octomap::OcTree>(resolution);
   std::mt19937_64 g(seed);
   std::uniform_real_distribution<double> u(0, 1);
@@ -27,10 +26,20 @@ std::shared_ptr<fcl::OcTree<S>> cloud(unsigned seed, std::size_t points, double 
     map->updateNode(at, static_cast<float>(kind < 0.6 ? 2 : kind < 0.8 ? -2 : 0.2));
   }
   map->updateInnerOccupancy();
+  return map;
+}
+
+template <typename S>
+std::shared_ptr<fcl::OcTree<S>> cloud(const std::shared_ptr<octomap::OcTree>& map) {
   auto octree = std::make_shared<fcl::OcTree<S>>(map);
   octree->setOccupancyThres(S(0.7));
   octree->setFreeThres(S(0.4));
   return octree;
+}
+
+template <typename S>
+std::shared_ptr<fcl::OcTree<S>> cloud(unsigned seed, std::size_t points) {
+  return cloud<S>(cloudMap(seed, points));
 }
 
 /// The distance of a triangle of a mesh at X and a box of toBoxes() at Y.
