@@ -46,14 +46,14 @@ namespace bocst {
 ///   translation of o2's primitive along normal that ends the contact of these two primitives, pos a point in or beside
 ///   their overlap. The translation is the shortest between triangles, and between triangles and boxes, balls, cells,
 ///   planes and half-spaces; with other shapes seldom longer. It is about two primitives, not about two solids.
-/// - with a margin (Options::margin, the sum of both models'; between models and BVHModels), a contact is a pair of
-///   primitives no farther apart than that; penetration_depth is the margin minus their distance (plus the depth above,
-///   when they meet), normal the way between their nearest points, and pos the middle of it.
-/// - solid (Options::solid; between models and BVHModels): where no primitives touch but one geometry is inside the
-///   other, there is one contact, with Contact::NONE for b1 and b2; penetration_depth is the distance of the surfaces
-///   (plus the margin), which is what it takes at least to part them, normal the way for o2 (that brings the surfaces
-///   together there), pos between the nearest points. Beside a BVHModel, a query whose bounding balls meet takes time
-///   linear in its triangles for that.
+/// - with a margin (Options::margin, the sum of both models'; other partners have none of their own), a contact is a
+///   pair of primitives no farther apart than that; penetration_depth is the margin minus their distance (plus the
+///   depth above, when they meet), normal the way between their nearest points, and pos the middle of it.
+/// - solid (Options::solid): where no primitives touch but one geometry (a connected piece of it, an occupied cell) is
+///   inside the other, there is one contact, with Contact::NONE for b1 and b2; penetration_depth is the distance of the
+///   surfaces (plus the margin), which is what it takes at least to part them, normal the way for o2 (that brings the
+///   surfaces together there), pos between the nearest points. Beside a BVHModel, a query whose bounding balls meet
+///   takes time linear in its triangles for that. Planes and half-spaces have no end, so they are inside nothing.
 /// - without enable_contact: normal, pos and penetration_depth are NaN.
 /// - enable_cost adds the overlap of the primitives' world boxes, as FCL does; with shapes and octrees, and
 ///   use_approximate_cost, that of the box about the whole mesh (unlike FCL, for occupied cells too).
@@ -80,8 +80,8 @@ BOCST_EXPORT std::size_t collide(const fcl::CollisionGeometry<S>* o1, const fcl:
 /// nothing when request.isSatisfied(result) already.
 ///
 /// A pair with a Model: the partners of collide(); of an octree, its occupied cells. What touches is at distance 0; a
-/// model wholly inside another is as far as the surfaces are, for models are shells, unless the outer one is solid:
-/// then it is at 0, and the nearest points are not those of a contact. Shapes and cells are solid. A margin does not
+/// geometry wholly inside a model is as far as the surfaces are, for models are shells, unless the model is solid: then
+/// it is at 0, and the nearest points are not those of a contact. Shapes and cells are solid. A margin does not
 /// matter. An octree without occupied cells leaves the result as it is.
 /// - o1, o2, b1, b2, nearest_points: the caller's order; ids as in collide(), DistanceResult::NONE for shapes; points
 ///   on the surfaces (or spheres), world frame, if enable_nearest_points.
@@ -124,7 +124,7 @@ BOCST_EXPORT S continuousPair(const fcl::CollisionGeometry<S>* o1, const fcl::Tr
 /// When do the two geometries first touch, while time goes from 0 to 1? As fcl::continuousCollide, over two motions or
 /// from begin to end poses (world from geometry): sets the result and returns its time_of_contact.
 ///
-/// A pair with a Model: partners are another Model and fcl::BVHModel<BV> of any BV.
+/// A pair with a Model: the partners of collide(); of an octree, its occupied cells; planes and half-spaces move, too.
 /// - is_collide: the geometries touch at some time, as collide() means it (margin, solid, conservative answers and
 ///   occupancy included). Always by conservative advancement, whatever ccd_solver_type asks for: no contact is stepped
 ///   over, so num_max_iterations and gjk_solver_type mean nothing.
@@ -132,7 +132,8 @@ BOCST_EXPORT S continuousPair(const fcl::CollisionGeometry<S>* o1, const fcl::Tr
 ///   when they touch at the begin, 1 without contact. toc_err may be 0.
 /// - contact_tf1, contact_tf2: the poses at that time; without contact, at the end.
 /// - What passes at a distance of less than 1e-9 of the smaller geometry's size (with float: some 1e-5 of the
-///   coordinates) is taken to touch.
+///   coordinates) is taken to touch; beside shapes and cells, at less than 2e-6 (collide() takes half of it for a
+///   touch, where FCL's solvers do).
 /// Motions are FCL's own four: TranslationMotion, InterpMotion, ScrewMotion, SplineMotion (in FCL 0.7, two of them
 /// exist for double only); they are not written to. From poses, ccd_motion_type says how: CCDM_TRANS keeps the rotation
 /// of the begin; CCDM_LINEAR moves the geometry's origin on a line and turns about a fixed axis; CCDM_SCREW turns about

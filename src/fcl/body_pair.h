@@ -36,6 +36,9 @@ class BodyFrame {
 
   Eigen::Vector3d operator*(const Eigen::Vector3d& x) const { return R_BM_ * x + p_BM_; }
 
+  /// The other way.
+  Eigen::Vector3d toModel(const Eigen::Vector3d& x) const { return R_BM_.transpose() * (x - p_BM_); }
+
   /// A ball about the model.
   const query::Sphere& region() const { return region_; }
 

@@ -8,6 +8,8 @@
 #include <type_traits>
 
 #include "fcl/body_pair.h"
+#include "fcl/inside.h"
+#include "fcl/inside_contact.h"
 #include "fcl/narrow_phase.h"
 #include "fcl/question.h"
 #include "query/pair_set.h"
@@ -22,8 +24,8 @@ namespace bocst::fcl_room {
 ///   fcl::AABB<S> worldBox(node), S density(node)   for cost sources
 ///   bool occupied(node)                            it makes contacts, and not only costs
 ///
-/// A triangle touches a body when they meet, in double, or when FCL's test, in S and with the solver's tolerance, says
-/// so.
+/// A triangle touches a body when they meet or are no farther apart than the margin, in double, or when FCL's test, in
+/// S and with the solver's tolerance, says so.
 template <typename S, typename Partner>
 class BodyCollector final : public query::BodyVisitor<typename Partner::Node> {
  public:
@@ -47,8 +49,8 @@ class BodyCollector final : public query::BodyVisitor<typename Partner::Node> {
     if (once_) seen_.clear();
   }
 
-  /// Bodies within so much of the surface are to be visited.
-  double slack() const { return slack_; }
+  /// Bodies within so much of the surface, or of its cells' spheres, are to be visited.
+  double slack(bool spheres) const { return slack_ + q_.cullingMargin(spheres); }
 
   bool endsAtFirst() const override { return q_.endsAtFirst(); }
 
@@ -70,11 +72,12 @@ class BodyCollector final : public query::BodyVisitor<typename Partner::Node> {
     const Eigen::Vector3d corners[3] = {frame_ * surface_.mesh->vertex(i[0]), frame_ * surface_.mesh->vertex(i[1]),
                                         frame_ * surface_.mesh->vertex(i[2])};
     const query::Points points{corners, 3};
-    const query::Gap gap = partner_.gap(b, points, slack_);
-    if (gap.atLeast > slack_) return false;
+    const double near = std::max(slack_, q_.margin);
+    const query::Gap gap = partner_.gap(b, points, near);
+    if (gap.atLeast > near) return false;
     if (once_ && !seen_.insert(partner_.name(b), t)) return false;
 
-    if (!gap.touches()) {
+    if (!gap.touches() && gap.atLeast > q_.margin) {
       fcl::Vector3<S> c[3];
       for (std::size_t k = 0; k < 3; ++k) c[k] = surface_.mesh->vertex(i[k]).template cast<S>();
       if (!partner_.touch(b, narrow_phase_, c, X_WM_)) return false;
@@ -86,7 +89,16 @@ class BodyCollector final : public query::BodyVisitor<typename Partner::Node> {
       addCost(fcl::AABB<S>(p, r, s), b);
     }
     if (!q_.request.enable_contact) return add(t, b, nullptr);
-    const query::Touch touch = inWorld(gap.touches() ? partner_.part(b, points) : bridge(gap, points, b));
+    // With a margin the way must be known, and of what is nearly in touch it is not.
+    query::Touch touch;
+    if (gap.touches() || (q_.margin > 0 && gap.distance <= frame_.rounding())) {
+      touch = partner_.part(b, points, gap);
+      touch.depth += q_.margin;
+    } else {
+      touch = bridge(gap, points, b);
+      touch.depth = std::max(q_.margin - gap.distance, 0.0);
+    }
+    touch = inWorld(touch);
     return add(t, b, &touch);
   }
 
@@ -116,7 +128,7 @@ class BodyCollector final : public query::BodyVisitor<typename Partner::Node> {
     query::Touch touch;
     // The shortest ways are rounding, and lead anywhere.
     const double size = gap.on_points.norm() + gap.on_body.norm();
-    touch.normal = way.norm() > 1e-12 * size ? way.normalized() : partner_.part(b, points).normal;
+    touch.normal = way.norm() > 1e-12 * size ? way.normalized() : partner_.part(b, points, gap).normal;
     touch.point = (gap.on_points + gap.on_body) / 2;
     return touch;
   }
@@ -126,13 +138,14 @@ class BodyCollector final : public query::BodyVisitor<typename Partner::Node> {
     const query::Gap gap = partner_.gap(b, point, std::numeric_limits<double>::infinity());
     query::Touch touch;
     if (gap.touches()) {
-      touch = partner_.part(b, point);
-      touch.depth += radius;
+      touch = partner_.part(b, point, gap);
+      touch.depth += radius + q_.margin;
       touch.point -= touch.normal * (radius / 2);
     } else {
+      const double overlap = radius - gap.distance;  // negative: a gap, within the margin
       touch.normal = (center - gap.on_body).normalized();
-      touch.depth = std::max(radius - gap.distance, 0.0);
-      touch.point = gap.on_body - touch.normal * (touch.depth / 2);
+      touch.depth = std::max(overlap + q_.margin, 0.0);
+      touch.point = gap.on_body - touch.normal * (overlap / 2);
     }
     return touch;
   }
@@ -184,7 +197,8 @@ void collideBodies(const Question<S>& q, tree::Tree& tree, bool swapped, const N
   const bool approximate = q.request.enable_cost && q.request.use_approximate_cost;
   fcl::CollisionRequest<S> request(q.request);
   request.enable_cost = q.request.enable_cost && !approximate;
-  const Question<S> first{q.o1, q.o2, q.X_W1, q.X_W2, request, q.result};
+  const Question<S> first{q.o1, q.o2, q.X_W1, q.X_W2, request, q.result, q.margin};
+  const std::size_t before = q.result.numContacts();
   std::int64_t now;
   {
     const Look look(tree, nullptr);
@@ -203,8 +217,14 @@ void collideBodies(const Question<S>& q, tree::Tree& tree, bool swapped, const N
       with_collector(request.enable_cost, [&](const auto& partner, auto& collector) {
         using Partner = std::remove_cv_t<std::remove_reference_t<decltype(partner)>>;
         using Visitor = query::BodyVisitor<typename Partner::Node>;
-        const query::Placement b_in_a = frame.toLattice(surface.lattice, collector.slack());
+        const query::Placement b_in_a = frame.toLattice(surface.lattice, collector.slack(a.cells()));
         query::PairWalk<query::TreeSide, Partner, Visitor>(a, partner, b_in_a, collector).run();
+      });
+    }
+    if (tree.solid() != nullptr && q.mayBeInside(before)) {
+      with_partner(frame, false, [&](const auto& partner) {
+        if (!holds(a, frame, partner)) return;
+        addInside(q, a, partner, frame.toLattice(surface.lattice, 0), swapped);
       });
     }
     if (approximate) {

@@ -18,9 +18,9 @@
 #include "fcl/collide_octree.h"
 #include "fcl/collide_shape.h"
 #include "fcl/inside.h"
+#include "fcl/inside_contact.h"
 #include "fcl/pair.h"
 #include "fcl/question.h"
-#include "query/distance_walk.h"
 #include "query/pair_set.h"
 #include "query/pair_walk.h"
 #include "query/tree_walk.h"
@@ -179,9 +179,7 @@ class Collector : public query::Visitor {
   }
 
   void addCost(const fcl::AABB<S>& a, const fcl::AABB<S>& b) {
-    const S density = q_.o1->cost_density * q_.o2->cost_density;
-    // Apart, within the margin, they share no room.
-    if (q_.margin == 0 || a.overlap(b)) q_.addCost(a, b, density);
+    q_.addCost(a, b, q_.o1->cost_density * q_.o2->cost_density);
   }
 
   bool add(std::uint64_t b1, std::uint64_t b2, const query::Touch* touch) {
@@ -221,35 +219,10 @@ void traverse(Walk&& walk) {
 }
 
 /// What is within the margin touches: the walk's slack, in units of side A, is so much more.
-Placement withMargin(Placement b_in_a, const TreeSide& a, double margin, bool spheres) {
-  // Slabs are measured along normals that are up to a hundredth too long.
-  b_in_a.slack += margin / a.tree().surface().lattice.unit() * (spheres ? 1 : 1.02);
+template <typename S>
+Placement withMargin(Placement b_in_a, const TreeSide& a, const Question<S>& q, bool spheres) {
+  b_in_a.slack += q.cullingMargin(spheres) / a.tree().surface().lattice.unit();
   return b_in_a;
-}
-
-/// The contact of what is inside with the solid around it: no triangles meet. With contacts asked for, it is about the
-/// places where the surfaces are nearest; the way out is at least so long.
-template <typename S, typename B>
-void addInside(const Question<S>& q, const TreeSide& a, const B& b, const Placement& b_in_a, bool swapped) {
-  fcl::Contact<S> c;
-  c.o1 = q.o1;
-  c.o2 = q.o2;
-  c.b1 = c.b2 = fcl::Contact<S>::NONE;
-  c.normal.setConstant(std::numeric_limits<S>::quiet_NaN());
-  c.pos = c.normal;
-  c.penetration_depth = std::numeric_limits<S>::quiet_NaN();
-  if (q.request.enable_contact) {
-    const lattice::Lattice& lattice = a.tree().surface().lattice;
-    query::Nearest n = query::DistanceWalk<TreeSide, B>(a, b, b_in_a).run({});
-    if (swapped) std::swap(n.on_a, n.on_b);
-    const Eigen::Isometry3d X_WA = isometryOf<S>(swapped ? q.X_W2 : q.X_W1);
-    const Eigen::Vector3d way = n.on_a - n.on_b;
-    const Eigen::Vector3d normal = n.distance > 0 ? Eigen::Vector3d(way / n.distance) : Eigen::Vector3d::UnitX();
-    c.normal = (X_WA.linear() * normal).template cast<S>();
-    c.pos = (X_WA * Eigen::Vector3d(lattice.origin() + lattice.unit() / 2 * (n.on_a + n.on_b))).template cast<S>();
-    c.penetration_depth = static_cast<S>(n.distance * lattice.unit() + q.margin);
-  }
-  q.result.addContact(c);
 }
 
 template <typename S>
@@ -265,7 +238,7 @@ void collideModels(const Question<S>& q, tree::Tree& tree1, tree::Tree& tree2) {
     if (q.margin == 0 && query::TreeWalk::fits(a, b, b_in_a)) {
       traverse<S>(query::TreeWalk(a, b, b_in_a, collector));
     } else {
-      const Placement near = withMargin(b_in_a, a, q.margin, a.cells() || b.cells());
+      const Placement near = withMargin(b_in_a, a, q, a.cells() || b.cells());
       traverse<S>(query::PairWalk<TreeSide, TreeSide>(a, b, near, collector));
     }
     if (q.mayBeInside(before) &&
@@ -290,7 +263,7 @@ void collideBvh(const Question<typename BV::S>& q, tree::Tree& tree, const fcl::
     const BvhTriangles<BV> partner(bvh);
     const auto walk = [&](auto&& collector) {
       collector.setFrame(s.lattice.origin(), s.lattice.unit());
-      traverse<S>(query::PairWalk<TreeSide, BvhSide<BV>>(a, b, withMargin(b_in_a, a, q.margin, a.cells()), collector));
+      traverse<S>(query::PairWalk<TreeSide, BvhSide<BV>>(a, b, withMargin(b_in_a, a, q, a.cells()), collector));
     };
     if (swapped) {
       walk(Collector<S, BvhTriangles<BV>, ModelTriangles<S>>(q, partner, model, true, magnitude));
@@ -328,11 +301,9 @@ std::size_t answer(const Question<S>& q, const Models<S>& models, const BroughtS
   const fcl::CollisionGeometry<S>* partner = swapped ? q.o1 : q.o2;
   tree::Tree& tree = (swapped ? models.second : models.first)->tree();
   if (isShape(partner)) {
-    refuse(q.margin, tree, "shapes");
     collideShape(q, tree, swapped, solver);
 #if FCL_HAVE_OCTOMAP
   } else if (partner->getNodeType() == fcl::GEOM_OCTREE) {
-    refuse(q.margin, tree, "octrees");
     collideOcTree(q, tree, swapped, solver);
 #endif
   } else {

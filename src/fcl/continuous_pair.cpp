@@ -5,8 +5,10 @@
 #include <cmath>
 #include <limits>
 
+#include "fcl/body_pair.h"
 #include "fcl/collide_pair.h"
 #include "fcl/motion.h"
+#include "fcl/octree_side.h"
 #include "fcl/pair.h"
 #include "query/contact_time_walk.h"
 
@@ -44,6 +46,15 @@ Placement inBody(const tree::Tree& tree) {
   return p;
 }
 
+/// A shape or an octree?
+template <typename S>
+bool isBodies(const fcl::CollisionGeometry<S>* geometry) {
+#if FCL_HAVE_OCTOMAP
+  if (geometry->getNodeType() == fcl::GEOM_OCTREE) return true;
+#endif
+  return isShape(geometry);
+}
+
 /// What is to be taken for a contact. The bodies are at most so far from their origins; `largest` coordinate of all.
 template <typename S>
 ContactGoal goalOf(const Question<S>& q, double size1, double size2, double margin) {
@@ -69,6 +80,69 @@ std::shared_ptr<const Mesh> meshOf(const Model<S>* model) {
   return model != nullptr ? model->mesh() : nullptr;
 }
 
+/// A ball about the origin of the partner that holds the model on all of its way, in the partner's frame. What is kept
+/// by all motions is the distance of a partner's point from its origin, so nothing beyond matters.
+query::Sphere regionOf(const Motion& of_model, const Eigen::AlignedBox3d& bounds, const Motion& of_partner) {
+  const Eigen::Vector3d center = of_model.at(0) * bounds.center(), origin = of_partner.at(0).translation();
+  // Spheres of cells stick out of the bounds.
+  const double radius = 2 * bounds.diagonal().norm();
+  return {Eigen::Vector3d::Zero(),
+          (center - origin).norm() + radius + of_model.fastest(center, radius, 0) + of_partner.fastest(origin, 0, 0)};
+}
+
+/// The distance at which collide() may call bodies touching, see BodyFrame and NarrowPhase, on all of the way.
+template <typename S>
+double reachOfCollide(const Question<S>& q, double model_size, double region) {
+  double largest = region + 2 * model_size;
+  for (const Motion* m : {&q.motion1, &q.motion2}) {
+    const Eigen::Vector3d p = m->at(0).translation();
+    largest += p.norm() + m->fastest(p, 0, 0);
+  }
+  return 32 * static_cast<double>(std::numeric_limits<S>::epsilon()) * largest +
+         static_cast<double>(fcl::CollisionRequest<S>().gjk_tolerance);
+}
+
+/// When a model and a shape or an octree, the first geometry when `swapped`, first touch; see walk().
+template <typename S>
+double walkBodies(const Question<S>& q, tree::Tree& tree, const Mesh* mesh, bool swapped, double margin, bool& same) {
+  const fcl::CollisionGeometry<S>* partner = swapped ? q.o1 : q.o2;
+  const Motion &of_model = swapped ? q.motion2 : q.motion1, &of_partner = swapped ? q.motion1 : q.motion2;
+  double time = std::numeric_limits<double>::infinity();
+  std::int64_t now;
+  {
+    const Look look(tree, nullptr);
+    const TreeSide a(tree);
+    now = a.now();
+    const oracle::Surface& surface = tree.surface();
+    same = surface.mesh.get() == mesh;
+    const query::Sphere region = regionOf(of_model, surface.bounds, of_partner);
+    const auto run = [&](const auto& b) {
+      const query::Sphere ball = b.sphere(b.root());
+      const double size = std::min(ball.center.norm() + ball.radius, region.radius);
+      query::ContactTimeWalk<TreeSide, std::decay_t<decltype(b)>> walk(a, inBody(tree), of_model, b, Placement(),
+                                                                       of_partner);
+      const double model_size = magnitudeOf(surface.bounds);
+      ContactGoal goal = goalOf(q, model_size, size, margin);
+      // The walk stops between a half of it and all of it.
+      goal.touch = std::max(goal.touch, 2 * reachOfCollide(q, model_size, region.radius));
+      time = walk.run(goal);
+    };
+    if (same && isShape(partner)) {
+      withBody(static_cast<const fcl::ShapeBase<S>&>(*partner), region,
+               [&](const query::Body& body) { run(query::BodySide(body)); });
+    }
+#if FCL_HAVE_OCTOMAP
+    if (same && partner->getNodeType() == fcl::GEOM_OCTREE) {
+      const fcl::Transform3<S> X_WO = poseAt<S>(of_partner, 0);
+      const OcTreeSide<S> side(static_cast<const fcl::OcTree<S>&>(*partner), X_WO, 1, false);
+      if (!side.empty()) run(side);
+    }
+#endif
+  }
+  tree.afterQuery(now);
+  return time;
+}
+
 /// When the two first touch, if they do not at the begin; infinite without contact. False in `same` when a mesh is not
 /// the one it is said to be.
 template <typename S>
@@ -91,6 +165,9 @@ double walk(const Question<S>& q, const Mesh* mesh1, const Mesh* mesh2, bool& sa
   }
   const bool swapped = model1 == nullptr;
   const Motion &motion_a = swapped ? q.motion2 : q.motion1, &motion_b = swapped ? q.motion1 : q.motion2;
+  if (isBodies(swapped ? q.o1 : q.o2)) {
+    return walkBodies(q, (swapped ? model2 : model1)->tree(), swapped ? mesh2 : mesh1, swapped, margin, same);
+  }
   withBvh<S>("continuousCollide", swapped ? q.o1 : q.o2, [&](const auto& bvh) {
     betweenTreeAndBvh(swapped ? X_W2 : X_W1, (swapped ? model2 : model1)->tree(), swapped ? X_W1 : X_W2, bvh,
                       [&](const TreeSide& a, const auto& b, const Placement&, double) {
@@ -104,11 +181,13 @@ double walk(const Question<S>& q, const Mesh* mesh1, const Mesh* mesh2, bool& sa
   return time;
 }
 
-/// @throws std::invalid_argument for partners that only collide() and distance() know, wherever they are.
+/// @throws std::invalid_argument for partners that are not supported, wherever they are.
 template <typename S>
 void checkPartner(const Question<S>& q) {
   for (const auto* o : {q.o1, q.o2}) {
-    if (dynamic_cast<const Model<S>*>(o) == nullptr) withBvh<S>("continuousCollide", o, [](const auto&) {});
+    if (dynamic_cast<const Model<S>*>(o) == nullptr && !isBodies(o)) {
+      withBvh<S>("continuousCollide", o, [](const auto&) {});
+    }
   }
 }
 

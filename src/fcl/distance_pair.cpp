@@ -87,7 +87,10 @@ void searchBodies(const Question<S>& q, tree::Tree& tree, bool swapped, F&& with
     const oracle::Surface& surface = tree.surface();
     const BodyFrame<S> frame(swapped ? q.X_W2 : q.X_W1, swapped ? q.X_W1 : q.X_W2, surface);
     const Placement b_in_a = frame.toLattice(surface.lattice, 0);
-    with_partner(frame, [&](const auto& b) { search(q, a, b, b_in_a, swapped); });
+    with_partner(frame, [&](const auto& b) {
+      search(q, a, b, b_in_a, swapped);
+      if (q.result.min_distance > 0 && holds(a, frame, b)) notApart(q);
+    });
   }
   tree.afterQuery(now);
 }
@@ -99,14 +102,12 @@ void searchPartner(const Question<S>& q, tree::Tree& tree, bool swapped) {
   const fcl::CollisionGeometry<S>* partner = swapped ? q.o1 : q.o2;
   const fcl::Transform3<S>&X_WM = swapped ? q.X_W2 : q.X_W1, &X_WP = swapped ? q.X_W1 : q.X_W2;
   if (isShape(partner)) {
-    refuse(0, tree, "shapes");
     const auto& shape = static_cast<const fcl::ShapeBase<S>&>(*partner);
     searchBodies(q, tree, swapped, [&](const BodyFrame<S>& frame, auto&& f) {
       withBody(shape, frame.region(), [&](const query::Body& body) { f(query::BodySide(body)); });
     });
 #if FCL_HAVE_OCTOMAP
   } else if (partner->getNodeType() == fcl::GEOM_OCTREE) {
-    refuse(0, tree, "octrees");
     searchBodies(q, tree, swapped, [&](const BodyFrame<S>&, auto&& f) {
       const OcTreeSide<S> side(static_cast<const fcl::OcTree<S>&>(*partner), X_WP, 1, false);
       if (!side.empty()) f(side);

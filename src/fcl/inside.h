@@ -3,10 +3,11 @@
 
 #include <algorithm>
 #include <limits>
-#include <stdexcept>
-#include <string>
+#include <vector>
 
+#include "fcl/body_pair.h"
 #include "fcl/pair.h"
+#include "query/pieces.h"
 
 // What lies wholly inside a solid (Options::solid), for surfaces that do not meet: each connected piece is then inside
 // or outside as any of its points is. While the gates are held.
@@ -66,12 +67,15 @@ bool holds(const tree::Tree& a, const fcl::Transform3<typename BV::S>& X_WA, con
   return holdsOne(*a.solid(), pointOfEachPiece(vertices, triangles), X_AB, tolerance);
 }
 
-/// @throws std::invalid_argument where what these options ask for cannot be answered, rather than a false "free".
-inline void refuse(double margin, const tree::Tree& tree, const char* partners) {
-  const bool solid = tree.options().solid;
-  if (margin == 0 && !solid) return;
-  throw std::invalid_argument(std::string("bocst: a model ") + (solid ? "that is solid" : "with a margin") +
-                              " has no answers about " + partners + " in this version");
+/// Is a body of the partner, none of which meets the surface, inside the solid?
+template <typename S, typename Partner>
+bool holds(const query::TreeSide& a, const BodyFrame<S>& frame, const Partner& partner) {
+  const Solid* solid = a.tree().solid();
+  if (solid == nullptr) return false;
+  const query::Placement b_in_a = frame.toLattice(a.tree().surface().lattice, frame.rounding());
+  return query::Pieces<query::TreeSide, Partner>(a, partner, b_in_a).any([&](const Eigen::Vector3d& p) {
+    return solid->mayHold(frame.toModel(p), frame.rounding());
+  });
 }
 
 }  // namespace bocst::fcl_room

@@ -11,6 +11,7 @@
 
 #include <cmath>
 #include <cstdint>
+#include <optional>
 #include <vector>
 
 #include "fcl/narrow_phase.h"
@@ -85,12 +86,16 @@ class OcTreeSide {
     gap.on_points += n.center;
     return gap;
   }
-  query::Touch part(const Node& n, const query::Points& points) const {
+  query::Touch part(const Node& n, const query::Points& points, query::Gap gap) const {
     Eigen::Vector3d x[8];
-    query::Touch touch = bodyOf(n).part(about(n, points, x));
+    gap.on_body -= n.center;
+    gap.on_points -= n.center;
+    query::Touch touch = bodyOf(n).part(about(n, points, x), gap);
     touch.point += n.center;
     return touch;
   }
+  std::optional<Eigen::Vector3d> point(const Node& n) const { return n.center; }
+  query::Hull hull(const Node& n) const { return query::hullOf(volume(n)); }
   bool meets(const Node& n, const query::Sphere& s, double slack) const {
     const double reach = s.radius * (1 + 1e-12) + slack;
     return !(gap(n, {&s.center, 1}, reach).atLeast > reach);

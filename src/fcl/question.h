@@ -23,6 +23,9 @@ struct Question {
   /// Only between occupied geometries are there contacts.
   bool occupied() const { return o1->isOccupied() && o2->isOccupied(); }
 
+  /// By how much culling must be wider for the margin: slabs are measured along normals up to a hundredth too long.
+  double cullingMargin(bool spheres) const { return margin * (spheres ? 1 : 1.02); }
+
   /// No surfaces met, and a contact would be reported.
   bool mayBeInside(std::size_t contacts_before) const {
     return result.numContacts() == contacts_before && contacts_before < request.num_max_contacts && occupied();
@@ -56,8 +59,9 @@ struct Question {
     return request.isSatisfied(result);
   }
 
-  /// Adds the overlap of two world boxes as a cost source.
+  /// Adds the overlap of two world boxes as a cost source. What is apart, within the margin, shares no room.
   void addCost(const fcl::AABB<S>& a, const fcl::AABB<S>& b, S density) const {
+    if (margin > 0 && !a.overlap(b)) return;
     fcl::AABB<S> overlap;
     overlap.min_ = a.min_.cwiseMax(b.min_);
     // Boxes of what touches overlap, but for rounding.

@@ -3,8 +3,9 @@
 
 #include <Eigen/Geometry>
 #include <algorithm>
-#include <array>
 #include <cmath>
+
+#include "query/expansion.h"
 
 namespace bocst::query {
 namespace {
@@ -68,6 +69,7 @@ class Simplex {
   }
 
   const Vector3d& nearest() const { return nearest_; }
+  const Vector3d& at(int i) const { return w_[i]; }
   Vector3d onBody() const { return sum(body_); }
   Vector3d onPoints() const { return sum(points_); }
 
@@ -183,6 +185,13 @@ class Simplex {
 
 }  // namespace
 
+Hull hullOf(const OrientedVolume& box) {
+  Hull hull;
+  cornersOf(box, Placement(), hull.corners);
+  hull.count = 8;
+  return hull;
+}
+
 ConvexBody::ConvexBody(const Vector3d& center, const Vector3d& half_of_core, double radius) : radius_(radius) {
   box_.center = center;
   box_.half = half_of_core + Vector3d::Constant(radius);
@@ -205,6 +214,7 @@ Gap ConvexBody::coreGap(const Points& points, double enough) const {
     const double beyond = v.dot(w) / v.norm() - kRounding * size;
     if (beyond > gap.atLeast) {
       gap.atLeast = beyond;
+      gap.normal = -v / v.norm();
       improved = step;
     }
     if (gap.atLeast > enough) return gap;
@@ -216,6 +226,8 @@ Gap ConvexBody::coreGap(const Points& points, double enough) const {
     if (inside || v.norm() <= kRounding * size) {
       gap.atLeast = gap.distance = 0;
       gap.on_body = gap.on_points = simplex.onPoints();
+      gap.around_count = simplex.size();
+      for (int i = 0; i < simplex.size(); ++i) gap.around[i] = simplex.at(i);
       return gap;
     }
     const double distance = (simplex.onBody() - simplex.onPoints()).norm();
@@ -245,6 +257,14 @@ Gap ConvexBody::gap(const Points& points, double enough) const {
   // For most triangles of a leaf this is enough.
   gap.atLeast = boxGap(points);
   if (gap.atLeast > enough) return gap;
+  for (int i = 0; i < points.count; ++i) {
+    if (!holds(points.x[i])) continue;
+    gap.atLeast = gap.distance = 0;
+    gap.on_body = gap.on_points = points.x[i];
+    gap.around[0].setZero();
+    gap.around_count = 1;
+    return gap;
+  }
   gap = coreGap(points, enough + radius_);
   const double core = gap.distance;
   gap.atLeast -= radius_;
@@ -258,98 +278,24 @@ Gap ConvexBody::gap(const Points& points, double enough) const {
   return gap;
 }
 
-Touch ConvexBody::part(const Points& points) const {
+Touch ConvexBody::part(const Points& points, const Gap& gap) const {
+  constexpr double kTolerance = 0.1;
   Touch touch;
-  const Gap core = coreGap(points, std::numeric_limits<double>::infinity());
-  if (radius_ > 0 && !core.touches()) {
-    // Straight on from the core, for nothing of the points is nearer along this line.
-    touch.normal = (core.on_points - core.on_body).normalized();
-    touch.depth = std::max(radius_ - core.distance, 0.0);
-    touch.point = core.on_points + touch.normal * (touch.depth / 2);
+  touch.point = gap.on_points;
+  if (gap.around_count == 0) {
+    // The cores are apart, or all but: along this direction by atLeast.
+    touch.normal = gap.normal;
+    touch.depth = std::max(-gap.atLeast, 0.0);
+    touch.point += touch.normal * (touch.depth / 2);
     return touch;
   }
-  // The best of many directions, and of curved bodies downhill from there.
-  constexpr std::size_t kStarts = 4;
-  std::array<Touch, kStarts> starts;
-  for (Touch& start : starts) start.depth = std::numeric_limits<double>::infinity();
-  const auto consider = [&](const Vector3d& axis) {
-    const double length = axis.norm();
-    if (!(length > 0)) return;
-    for (const double sign : {1.0, -1.0}) {
-      const Touch way = along(axis * (sign / length), points);
-      std::size_t i = kStarts;
-      for (; i > 0 && way.depth < starts[i - 1].depth; --i) {
-        if (i < kStarts) starts[i] = starts[i - 1];
-      }
-      if (i < kStarts) starts[i] = way;
-    }
-  };
-  const Vector3d middle = points.middle(), &center = box_.center;
-  consider(middle - center);
-  for (int k = 0; k < 3; ++k) consider(box_.axes.col(k));
-  for (int i = 0; i < points.count && points.count <= 3; ++i) {
-    const Vector3d& corner = points.x[i];
-    const Vector3d e = points.x[(i + 1) % points.count] - corner, f = points.x[(i + 2) % points.count] - corner;
-    const Vector3d n = e.cross(f);
-    if (i == 0) consider(n);
-    if (!isBox()) {
-      consider(e.cross(n));
-      consider(corner - center);
-      const double ee = e.squaredNorm();
-      if (ee > 0) consider(corner - center + e * std::clamp(e.dot(center - corner) / ee, 0.0, 1.0));
-    }
-    for (int k = 0; k < 3; ++k) {
-      const Vector3d c = e.cross(box_.axes.col(k));
-      // Nearly parallel edges: their cross product is rounding.
-      if (c.norm() > 1e-10 * e.norm()) consider(c);
-    }
-  }
-  touch = starts[0];
-  for (const Touch& start : starts) {
-    if (isBox() || !std::isfinite(start.depth)) break;
-    const Touch way = descend(start.normal, points);
-    if (way.depth < touch.depth) touch = way;
-  }
-  // Deep overlaps have no need of it.
-  if (!isBox() && touch.depth < 0.1 * box_.half.maxCoeff()) touch = shorten(touch, points);
+  Expansion expansion(box_.center.lpNorm<1>() + box_.half.lpNorm<1>() + points.x[0].lpNorm<1>());
+  for (int i = 0; i < gap.around_count; ++i) expansion.add(gap.around[i]);
+  const Vector3d normal =
+      expansion.run([&](const Vector3d& d) { return Vector3d(support(d) - points.support(-d)); }, kTolerance);
+  touch = along(normal.squaredNorm() > 0 ? normal : Vector3d(Vector3d::UnitX()), points);
   touch.depth = std::max(touch.depth, 0.0);
-  touch.point = core.on_points;
-  return touch;
-}
-
-// Where points have been moved out of the body, the shortest way on to them is a better normal: along it they overlap
-// by no more than they were moved, less the gap. What overlaps by little is soon there.
-Touch ConvexBody::shorten(Touch touch, const Points& points) const {
-  constexpr int kMostPoints = 8, kMostSteps = 6;
-  Vector3d moved[kMostPoints];
-  if (points.count > kMostPoints) return touch;
-  for (int step = 0; step < kMostSteps && touch.depth > 0; ++step) {
-    for (int i = 0; i < points.count; ++i) moved[i] = points.x[i] + touch.normal * touch.depth;
-    const Gap gap = coreGap({moved, points.count}, std::numeric_limits<double>::infinity());
-    const Vector3d way = gap.on_points - gap.on_body;
-    if (gap.touches() || !(way.squaredNorm() > 0)) break;
-    const Touch better = along(way.normalized(), points);
-    const bool settled = !(better.depth < 0.9 * touch.depth);
-    if (better.depth < touch.depth) touch = better;
-    if (settled) break;
-  }
-  return touch;
-}
-
-Touch ConvexBody::descend(const Vector3d& normal, const Points& points) const {
-  Touch touch = along(normal, points);
-  double step = 0.3;
-  for (int i = 0; i < 16; ++i) {
-    // The depth along a normal grows as the support of the difference does.
-    const Vector3d w = support(touch.normal) - points.support(-touch.normal);
-    const Vector3d slope = w - touch.normal * touch.normal.dot(w);
-    const double length = slope.norm();
-    if (!(length > 1e-12 * w.norm())) break;
-    const Touch way = along((touch.normal - slope * (step / length)).normalized(), points);
-    const bool better = way.depth < touch.depth;
-    if (better) touch = way;
-    step *= better ? 1.5 : 0.4;
-  }
+  touch.point = gap.on_points;
   return touch;
 }
 
@@ -362,6 +308,50 @@ Touch ConvexBody::along(const Vector3d& normal, const Points& points) const {
 
 BoxBody::BoxBody(const Vector3d& half) : ConvexBody(Vector3d::Zero(), half, 0), half_(half) {}
 
+bool BoxBody::holds(const Vector3d& x) const { return ((half_ - x.cwiseAbs()).array() > 0).all(); }
+
+bool EllipsoidBody::holds(const Vector3d& x) const { return x.cwiseQuotient(radii_).squaredNorm() < 1; }
+
+bool RoundBody::holds(const Vector3d& x) const {
+  if (!(std::abs(x.z()) < half_length_)) return false;
+  const double radius = bottom_ + (top_ - bottom_) * ((x.z() + half_length_) / (2 * half_length_));
+  return x.x() * x.x() + x.y() * x.y() < radius * radius;
+}
+
+// All the directions in which a box and a triangle can be apart.
+Touch BoxBody::part(const Points& points, const Gap& gap) const {
+  if (points.count > 3) return ConvexBody::part(points, gap);
+  Touch touch;
+  touch.depth = std::numeric_limits<double>::infinity();
+  const auto consider = [&](const Vector3d& axis, double least) {
+    const double length = axis.norm();
+    if (!(length > least)) return;
+    double lo = axis.dot(points.x[0]), hi = lo;
+    for (int i = 1; i < points.count; ++i) {
+      const double h = axis.dot(points.x[i]);
+      lo = std::min(lo, h);
+      hi = std::max(hi, h);
+    }
+    const double depth = (axis.cwiseAbs().dot(half_) + std::min(-lo, hi)) / length;
+    if (!(depth < touch.depth)) return;
+    touch.depth = depth;
+    touch.normal = axis / (-lo < hi ? length : -length);
+  };
+  for (int k = 0; k < 3; ++k) consider(Vector3d::Unit(k), 0);
+  for (int i = 0; i < points.count; ++i) {
+    const Vector3d e = points.x[(i + 1) % points.count] - points.x[i];
+    // Nearly parallel edges: their cross product is rounding.
+    const double least = 1e-10 * e.norm();
+    if (i == 0 && points.count == 3) consider(e.cross(points.x[2] - points.x[0]), 0);
+    consider(Vector3d(0, e.z(), -e.y()), least);
+    consider(Vector3d(-e.z(), 0, e.x()), least);
+    consider(Vector3d(e.y(), -e.x(), 0), least);
+  }
+  touch.depth = std::max(touch.depth, 0.0);
+  touch.point = gap.on_points;
+  return touch;
+}
+
 Vector3d BoxBody::support(const Vector3d& d) const {
   return Vector3d(d[0] < 0 ? -half_[0] : half_[0], d[1] < 0 ? -half_[1] : half_[1], d[2] < 0 ? -half_[2] : half_[2]);
 }
@@ -371,6 +361,15 @@ CapsuleBody::CapsuleBody(double radius, double length)
 
 Vector3d CapsuleBody::support(const Vector3d& d) const {
   return Vector3d(0, 0, d[2] < 0 ? -half_length_ : half_length_);
+}
+
+Hull CapsuleBody::hull() const {
+  Hull hull;
+  hull.count = half_length_ > 0 ? 2 : 1;
+  hull.corners[0] = Vector3d(0, 0, half_length_);
+  hull.corners[1] = Vector3d(0, 0, -half_length_);
+  hull.radius = radius_;
+  return hull;
 }
 
 EllipsoidBody::EllipsoidBody(const Vector3d& radii) : ConvexBody(Vector3d::Zero(), radii, 0), radii_(radii) {}
@@ -388,7 +387,7 @@ RoundBody::RoundBody(double bottom, double top, double length)
       half_length_(length / 2) {}
 
 Vector3d RoundBody::support(const Vector3d& d) const {
-  const double out = std::hypot(d[0], d[1]);
+  const double out = std::sqrt(d[0] * d[0] + d[1] * d[1]);
   const bool up = d[2] * half_length_ + out * top_ > -d[2] * half_length_ + out * bottom_;
   const double radius = out > 0 ? (up ? top_ : bottom_) / out : 0;
   return Vector3d(d[0] * radius, d[1] * radius, up ? half_length_ : -half_length_);
@@ -426,6 +425,7 @@ Gap TriangleBody::gap(const Points& points, double enough) const {
   Corners other;
   asTriangle(points, other);
   gap.distance = nearestPoints(corners_, other, gap.on_body, gap.on_points);
+  if (gap.distance > 0) gap.normal = (gap.on_points - gap.on_body) / gap.distance;
   double size = 0;
   for (int k = 0; k < 3; ++k) size = std::max({size, corners_[k].lpNorm<1>(), other[k].lpNorm<1>()});
   gap.atLeast = gap.distance - kRounding * size;
@@ -433,8 +433,15 @@ Gap TriangleBody::gap(const Points& points, double enough) const {
   return gap;
 }
 
-Touch TriangleBody::part(const Points& points) const {
-  if (points.count > 3) return ConvexBody::part(points);
+Hull TriangleBody::hull() const {
+  Hull hull;
+  hull.count = 3;
+  std::copy(corners_, corners_ + 3, hull.corners);
+  return hull;
+}
+
+Touch TriangleBody::part(const Points& points, const Gap& gap) const {
+  if (points.count > 3) return ConvexBody::part(points, gap);
   Corners other;
   asTriangle(points, other);
   return partTriangles(corners_, other);
@@ -467,6 +474,7 @@ HalfspaceBody::HalfspaceBody(const Vector3d& normal, double height, const Sphere
 Gap HalfspaceBody::gap(const Points& points, double) const {
   Gap gap;
   gap.on_points = lowest(points, normal_);
+  gap.normal = normal_;
   const double above = normal_.dot(gap.on_points) - height_;
   gap.atLeast = above - kRounding * (gap.on_points.lpNorm<1>() + std::abs(height_));
   gap.distance = gap.touches() ? 0 : above;
@@ -474,7 +482,7 @@ Gap HalfspaceBody::gap(const Points& points, double) const {
   return gap;
 }
 
-Touch HalfspaceBody::part(const Points& points) const {
+Touch HalfspaceBody::part(const Points& points, const Gap&) const {
   Touch touch;
   const Vector3d& p = lowest(points, normal_);
   touch.normal = normal_;
@@ -492,6 +500,7 @@ Gap PlaneBody::gap(const Points& points, double) const {
   const Vector3d &low = lowest(points, normal_), &high = points.support(normal_);
   const double above = normal_.dot(low) - height_, below = height_ - normal_.dot(high);
   gap.on_points = above > below ? low : high;
+  gap.normal = above > below ? normal_ : Vector3d(-normal_);
   const double apart = std::max(above, below);
   gap.atLeast = apart - kRounding * (gap.on_points.lpNorm<1>() + std::abs(height_));
   gap.distance = gap.touches() ? 0 : apart;
@@ -503,7 +512,7 @@ Gap PlaneBody::gap(const Points& points, double) const {
   return gap;
 }
 
-Touch PlaneBody::part(const Points& points) const {
+Touch PlaneBody::part(const Points& points, const Gap&) const {
   const Vector3d &low = lowest(points, normal_), &high = points.support(normal_);
   const double up = height_ - normal_.dot(low), down = normal_.dot(high) - height_;
   Touch touch;

@@ -4,6 +4,7 @@
 #include <Eigen/Core>
 #include <cstddef>
 #include <limits>
+#include <optional>
 
 #include "query/triangle.h"
 #include "query/volume.h"
@@ -44,9 +45,25 @@ struct Gap {
   /// enough.
   double distance = std::numeric_limits<double>::infinity();
   Eigen::Vector3d on_body = Eigen::Vector3d::Zero(), on_points = Eigen::Vector3d::Zero();
+  /// The unit direction, from the body to the points, along which they are apart by `atLeast`. Where `atLeast` was more
+  /// than enough, it may be zero.
+  Eigen::Vector3d normal = Eigen::Vector3d::Zero();
+  /// Where cores overlap: points of the difference (body minus points) in whose hull the origin is, for part().
+  Eigen::Vector3d around[4];
+  int around_count = 0;
 
   bool touches() const { return !(atLeast > 0 && distance > 0); }
 };
+
+/// A few points in whose hull, blown up by a radius, a body lies: what bounds how fast any point of it moves.
+struct Hull {
+  Eigen::Vector3d corners[8];
+  std::size_t count = 0;
+  double radius = 0;
+};
+
+/// That of a box.
+Hull hullOf(const OrientedVolume& box);
 
 class Body {
  public:
@@ -61,10 +78,18 @@ class Body {
   /// The distance of the points. More than `enough` is not looked at closely.
   virtual Gap gap(const Points& points, double enough) const = 0;
 
+  /// A point of the body; none of what has no end.
+  virtual std::optional<Eigen::Vector3d> point() const = 0;
+
+  /// That of its box, if nothing better is known.
+  virtual Hull hull() const { return hullOf(box_); }
+
   /// How points that touch the body get away from it, in a straight line: normal from the body to the points, depth >=
   /// 0 so that moving the points by depth * normal leaves them touching at most, and a point in or beside the overlap.
-  /// Of boxes, balls, planes, half-spaces and triangles the shortest way; of other bodies one that is seldom longer.
-  virtual Touch part(const Points& points) const = 0;
+  /// Of boxes, balls, planes, half-spaces and triangles the shortest way; of other bodies one that is seldom longer by
+  /// more than a tenth. `gap` is what gap() says of these points.
+  virtual Touch part(const Points& points, const Gap& gap) const = 0;
+  Touch part(const Points& points) const { return part(points, gap(points, std::numeric_limits<double>::infinity())); }
 
  protected:
   OrientedVolume box_;
@@ -74,7 +99,9 @@ class Body {
 class ConvexBody : public Body {
  public:
   Gap gap(const Points& points, double enough) const override;
-  Touch part(const Points& points) const override;
+  using Body::part;
+  Touch part(const Points& points, const Gap& gap) const override;
+  std::optional<Eigen::Vector3d> point() const override { return support(Eigen::Vector3d::UnitX()); }
 
  protected:
   ConvexBody(const Eigen::Vector3d& center, const Eigen::Vector3d& half_of_core, double radius);
@@ -82,14 +109,15 @@ class ConvexBody : public Body {
   /// The point of the core that is farthest along d, which has any length but zero.
   virtual Eigen::Vector3d support(const Eigen::Vector3d& d) const = 0;
 
+  /// Is the point surely in the core? False where that is not known at a glance.
+  virtual bool holds(const Eigen::Vector3d&) const { return false; }
+
+  const double radius_;
+
  private:
   double boxGap(const Points& points) const;
   Gap coreGap(const Points& points, double enough) const;
-  Touch descend(const Eigen::Vector3d& normal, const Points& points) const;
-  Touch shorten(Touch touch, const Points& points) const;
   Touch along(const Eigen::Vector3d& normal, const Points& points) const;
-
-  const double radius_;
 };
 
 /// From half sizes, at the origin.
@@ -98,9 +126,12 @@ class BoxBody final : public ConvexBody {
   explicit BoxBody(const Eigen::Vector3d& half);
 
   bool isBox() const override { return true; }
+  using Body::part;
+  Touch part(const Points& points, const Gap& gap) const override;
 
  protected:
   Eigen::Vector3d support(const Eigen::Vector3d& d) const override;
+  bool holds(const Eigen::Vector3d& x) const override;
 
  private:
   const Eigen::Vector3d half_;
@@ -110,6 +141,8 @@ class BoxBody final : public ConvexBody {
 class CapsuleBody final : public ConvexBody {
  public:
   CapsuleBody(double radius, double length);
+
+  Hull hull() const override;
 
  protected:
   Eigen::Vector3d support(const Eigen::Vector3d& d) const override;
@@ -124,6 +157,7 @@ class EllipsoidBody final : public ConvexBody {
 
  protected:
   Eigen::Vector3d support(const Eigen::Vector3d& d) const override;
+  bool holds(const Eigen::Vector3d& x) const override;
 
  private:
   const Eigen::Vector3d radii_;
@@ -136,6 +170,7 @@ class RoundBody final : public ConvexBody {
 
  protected:
   Eigen::Vector3d support(const Eigen::Vector3d& d) const override;
+  bool holds(const Eigen::Vector3d& x) const override;
 
  private:
   const double bottom_, top_, half_length_;
@@ -147,7 +182,9 @@ class TriangleBody final : public ConvexBody {
   explicit TriangleBody(const Corners& corners);
 
   Gap gap(const Points& points, double enough) const override;
-  Touch part(const Points& points) const override;
+  using Body::part;
+  Touch part(const Points& points, const Gap& gap) const override;
+  Hull hull() const override;
 
  protected:
   Eigen::Vector3d support(const Eigen::Vector3d& d) const override;
@@ -163,7 +200,9 @@ class HalfspaceBody final : public Body {
 
   bool isBox() const override { return true; }
   Gap gap(const Points& points, double enough) const override;
-  Touch part(const Points& points) const override;
+  using Body::part;
+  Touch part(const Points& points, const Gap& gap) const override;
+  std::optional<Eigen::Vector3d> point() const override { return std::nullopt; }
 
  private:
   const Eigen::Vector3d normal_;
@@ -177,7 +216,9 @@ class PlaneBody final : public Body {
 
   bool isBox() const override { return true; }
   Gap gap(const Points& points, double enough) const override;
-  Touch part(const Points& points) const override;
+  using Body::part;
+  Touch part(const Points& points, const Gap& gap) const override;
+  std::optional<Eigen::Vector3d> point() const override { return std::nullopt; }
 
  private:
   const Eigen::Vector3d normal_;

@@ -2,6 +2,7 @@
 #pragma once
 
 #include <cstdint>
+#include <optional>
 #include <vector>
 
 #include "query/body.h"
@@ -33,7 +34,10 @@ class BodySide {
 
   bool isBox(Node) const { return body_.isBox(); }
   Gap gap(Node, const Points& points, double enough) const { return body_.gap(points, enough); }
-  Touch part(Node, const Points& points) const { return body_.part(points); }
+  Touch part(Node, const Points& points, const Gap& gap) const { return body_.part(points, gap); }
+
+  std::optional<Eigen::Vector3d> point(Node) const { return body_.point(); }
+  Hull hull(Node) const { return body_.hull(); }
 
   /// Does a sphere in this frame come within `slack` of the body?
   bool meets(Node node, const Sphere& s, double slack) const {

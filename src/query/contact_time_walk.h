@@ -5,9 +5,11 @@
 #include <cmath>
 #include <cstddef>
 #include <limits>
+#include <type_traits>
 #include <vector>
 
 #include "query/best_first.h"
+#include "query/body.h"
 #include "query/motion.h"
 #include "query/reach.h"
 #include "query/side.h"
@@ -26,6 +28,8 @@ struct ContactGoal {
 /// along a direction, they cannot touch before the gap is closed at the largest speed along it that any of their points
 /// can have. Best first by that time, so a pair is looked at again at the time when it might touch, and only its parts
 /// from there on. No contact is stepped over, whatever the motions are.
+///
+/// Where leaves of side B are solid bodies (B::kBodies), what is inside one touches it.
 ///
 /// All in world coordinates, in the unit of the meshes.
 template <typename A, typename B>
@@ -61,16 +65,23 @@ class ContactTimeWalk : private BestFirst<ContactTimeWalk<A, B>, A, B> {
   // How far two leaves go between two looks at their primitives, in their sizes; but for so long at least.
   static constexpr double kShareOfLeaves = 0.25, kLeastWindow = 1e-6;
 
+  static constexpr double kFar = std::numeric_limits<double>::infinity();
+
   // Unit directions are off by less.
   static constexpr double kBlur = 1e-15;
 
-  struct Body {
+  struct Primitive {
     Corners corners;
     std::size_t count = 0;  // 3: a triangle, 1: a ball about its first corner
     double radius = 0;
   };
+  struct Convex : Hull {
+    typename B::Node node;
+  };
+  using PrimitiveOfB = std::conditional_t<B::kBodies, Convex, Primitive>;
   struct Scratch : Base::Heap {
-    std::vector<Body> a, b;
+    std::vector<Primitive> a;
+    std::vector<PrimitiveOfB> b;
     std::vector<Eigen::AlignedBox3d> boxes_a, boxes_b;
   };
   static Scratch& scratch() {
@@ -97,6 +108,7 @@ class ContactTimeWalk : private BestFirst<ContactTimeWalk<A, B>, A, B> {
     now_ = time;
     a_in_world_ = placed(a_in_body_, motion_a_, time);
     b_in_world_ = placed(b_in_body_, motion_b_, time);
+    if constexpr (B::kBodies) world_in_b_ = b_in_world_.inverse();
   }
 
   // The time at which a gap along a direction, between what lies in two balls, may be closed.
@@ -151,22 +163,65 @@ class ContactTimeWalk : private BestFirst<ContactTimeWalk<A, B>, A, B> {
     return gap > 0 ? timeToClose(gap, t / apart, a.center, 0, b.center, 0) : now_;
   }
 
+  // What lies in a ball and a node of bodies, apart by a gap of the ball's middle or of other points in it.
+  double boundOf(const Gap& gap, double radius, const Sphere& ball, double radius_of_turn, const Convex& b) const {
+    const double far = gap.atLeast * b_in_world_.scale;
+    const double free = far * (1 - 1e-12) - radius * (1 + 1e-12) - reach();
+    if (!(free > 0)) return now_;
+    const Eigen::Vector3d way = -(b_in_world_.rotation * gap.normal);
+    return advanced(free, motion_a_.approach(way, kBlur, ball.center, radius_of_turn, now_) +
+                              approachOf(motion_b_, inWorld(b, b_in_world_), -way, kBlur, now_));
+  }
+
+  // Of bodies the ball would be a poor bound: they are asked themselves.
+  double boundOf(const Sphere& a, typename B::Node b) const {
+    const Eigen::Vector3d center = world_in_b_ * a.center;
+    return boundOf(b_.gap(b, {&center, 1}, kFar), a.radius, a, 0, convexOf(b));
+  }
+
+  // A body may be much smaller than the box about it.
+  double bodyBound(const Pair& pair) const {
+    const OrientedVolume box = oriented(a_.volume(pair.a));
+    Eigen::Vector3d corners[8];
+    cornersOf(box, a_in_world_, corners);
+    for (Eigen::Vector3d& x : corners) x = world_in_b_ * x;
+    const Sphere ball{a_in_world_ * box.center, box.half.norm() * a_in_world_.scale};
+    return boundOf(b_.gap(pair.b, {corners, 8}, kFar), 0, ball, ball.radius, convexOf(pair.b));
+  }
+
+  Convex convexOf(typename B::Node node) const {
+    Convex convex;
+    static_cast<Hull&>(convex) = b_.hull(node);
+    convex.node = node;
+    return convex;
+  }
+
   NodeReach reachOfA(typename A::Node n) const { return NodeReach(a_.volume(n), a_in_world_); }
   NodeReach reachOfB(typename B::Node n) const { return NodeReach(b_.volume(n), b_in_world_); }
   Sphere ballOfA(typename A::Node n) const { return query::placed(a_.sphere(n), a_in_world_); }
-  Sphere ballOfB(typename B::Node n) const { return query::placed(b_.sphere(n), b_in_world_); }
+  auto ballOfB(typename B::Node n) const {
+    if constexpr (B::kBodies) {
+      return n;
+    } else {
+      return query::placed(b_.sphere(n), b_in_world_);
+    }
+  }
 
   bool again(const Pair& pair) {
     at(pair.bound);
-    const double time = Base::boundOf(pair);
+    double time = Base::boundOf(pair);
+    if constexpr (B::kBodies) {
+      if (!spheres() && !b_.isBox(pair.b) && worthIt(time)) time = std::max(time, bodyBound(pair));
+    }
     if (time < now_ + kWorthWaiting) return !worthIt(time);
     push({time, pair.a, pair.b});
     return true;
   }
 
   // The primitives of a leaf, in the frame of their side.
+  void fill(const B&, typename B::Node node, std::vector<Convex>& out) const { out.assign(1, convexOf(node)); }
   template <typename Side>
-  static void fill(const Side& side, typename Side::Node node, std::vector<Body>& out) {
+  void fill(const Side& side, typename Side::Node node, std::vector<Primitive>& out) const {
     if (side.cells()) {
       const Sphere s = side.cellSphere(node);
       out.resize(1);
@@ -208,12 +263,13 @@ class ContactTimeWalk : private BestFirst<ContactTimeWalk<A, B>, A, B> {
   }
 
   // Boxes of all bodies in the world, and a ball about these.
-  static Sphere boundsOf(const std::vector<Body>& bodies, const Placement& to,
+  template <typename T>
+  static Sphere boundsOf(const std::vector<T>& primitives, const Placement& to,
                          std::vector<Eigen::AlignedBox3d>& boxes) {
     boxes.clear();
     Eigen::AlignedBox3d all;
-    for (const Body& body : bodies) {
-      const Body w = inWorld(body, to);
+    for (const T& primitive : primitives) {
+      const T w = inWorld(primitive, to);
       Eigen::AlignedBox3d box(w.corners[0]);
       for (std::size_t k = 1; k < w.count; ++k) box.extend(w.corners[k]);
       const Eigen::Vector3d r = Eigen::Vector3d::Constant(w.radius);
@@ -223,15 +279,16 @@ class ContactTimeWalk : private BestFirst<ContactTimeWalk<A, B>, A, B> {
     return {all.center(), all.diagonal().norm() / 2};
   }
 
-  static Body inWorld(const Body& body, const Placement& to) {
-    Body w = body;
-    for (std::size_t k = 0; k < body.count; ++k) w.corners[k] = to * body.corners[k];
+  template <typename T>
+  static T inWorld(const T& primitive, const Placement& to) {
+    T w = primitive;
+    for (std::size_t k = 0; k < w.count; ++k) w.corners[k] = to * w.corners[k];
     w.radius *= to.scale;
     return w;
   }
 
   // How far two primitives are apart, and the unit way from p to q.
-  static double distanceOf(const Body& p, const Body& q, Eigen::Vector3d& way) {
+  double distanceOf(const Primitive& p, const Primitive& q, Eigen::Vector3d& way) const {
     Eigen::Vector3d on_p = p.corners[0], on_q = q.corners[0];
     if (p.count == 3 && q.count == 3) {
       nearestPoints(p.corners, q.corners, on_p, on_q);
@@ -245,34 +302,44 @@ class ContactTimeWalk : private BestFirst<ContactTimeWalk<A, B>, A, B> {
     if (length > 0) way /= length;
     return std::max(0.0, length - p.radius - q.radius);
   }
+  double distanceOf(const Primitive& p, const Convex& q, Eigen::Vector3d& way) const {
+    Corners x;
+    for (std::size_t k = 0; k < p.count; ++k) x[k] = world_in_b_ * p.corners[k];
+    const Gap gap = b_.gap(q.node, {x, static_cast<int>(p.count)}, kFar);
+    way = -(b_in_world_.rotation * gap.normal);
+    return gap.touches() ? 0 : std::max(0.0, gap.atLeast * b_in_world_.scale - p.radius);
+  }
 
-  // Velocities are affine in position, so a triangle's extremes are at its corners; a ball goes with its middle.
-  static Approach approachOf(const Motion& motion, const Body& body, const Eigen::Vector3d& direction, double blur,
+  // Velocities are affine in position, so a hull's extremes are at its corners; a ball goes with its middle.
+  template <typename T>
+  static Approach approachOf(const Motion& motion, const T& primitive, const Eigen::Vector3d& direction, double blur,
                              double time) {
-    Approach most = motion.approach(direction, blur, body.corners[0], 0, time);
-    for (std::size_t k = 1; k < body.count; ++k) {
-      most = Approach::most(most, motion.approach(direction, blur, body.corners[k], 0, time));
+    Approach most = motion.approach(direction, blur, primitive.corners[0], 0, time);
+    for (std::size_t k = 1; k < primitive.count; ++k) {
+      most = Approach::most(most, motion.approach(direction, blur, primitive.corners[k], 0, time));
     }
     return most;
   }
 
-  static double sizeOf(const Body& b) {
+  template <typename T>
+  static double sizeOf(const T& b) {
     double size = b.radius;
     for (std::size_t k = 1; k < b.count; ++k) size = std::max(size, (b.corners[k] - b.corners[0]).norm());
     return size;
   }
 
-  bool touch(const Body& p, const Body& q, double time) {
+  bool touch(const Primitive& p, const PrimitiveOfB& q, double time) {
     at(time);
     Eigen::Vector3d way;
     return distanceOf(inWorld(p, a_in_world_), inWorld(q, b_in_world_), way) <= reach();
   }
 
   // When two convex primitives that do not touch before `time` first do, if before `until`.
-  double firstContact(const Body& p, const Body& q, double time, double until) {
+  double firstContact(const Primitive& p, const PrimitiveOfB& q, double time, double until) {
     while (worthIt(time) && time < until) {
       at(time);
-      const Body pw = inWorld(p, a_in_world_), qw = inWorld(q, b_in_world_);
+      const Primitive pw = inWorld(p, a_in_world_);
+      const PrimitiveOfB qw = inWorld(q, b_in_world_);
       Eigen::Vector3d way;
       const double distance = distanceOf(pw, qw, way);
       if (distance <= reach()) return time;
@@ -297,7 +364,7 @@ class ContactTimeWalk : private BestFirst<ContactTimeWalk<A, B>, A, B> {
   const Motion &motion_a_, &motion_b_;
   ContactGoal goal_;
   double now_ = -1, first_ = 0;
-  Placement a_in_world_, b_in_world_;  // at the time now_
+  Placement a_in_world_, b_in_world_, world_in_b_;  // at the time now_; the last for bodies only
 };
 
 }  // namespace bocst::query

@@ -5,7 +5,10 @@
 #include <fcl/broadphase/default_broadphase_callbacks.h>
 #include <gtest/gtest.h>
 
+#include "conformance/octrees.h"
 #include "conformance/reference.h"
+#include "conformance/shapes.h"
+#include "conformance/truth.h"
 #include "query/triangle.h"
 
 namespace bocst {
@@ -190,6 +193,195 @@ TEST(MarginConservative, NeverFreeWithinIt) {
     }
   }
   EXPECT_GT(free_ones, 5);
+}
+
+// Shapes and octrees have no margin of their own.
+
+TYPED_TEST(Margin, ShapesWithinItCollide) {
+  using S = TypeParam;
+  const Raw raw = test::torus(14);
+  const Model<S> plain(raw.mesh());
+  const double off = std::is_same<S, double>::value ? 1e-6 : 1e-3;
+  std::mt19937_64 g(5);
+  std::uniform_real_distribution<double> u(0, 1);
+  for (const auto& [name, shape] : test::shapes<S>()) {
+    SCOPED_TRACE(name);
+    const test::Truth<S> truth(raw, *shape);
+    int apart = 0;
+    for (int i = 0; i < 30; ++i) {
+      const auto X = test::pose<S>(test::randomRotation(g), test::randomDirection(g));
+      const auto Y = test::pose<S>(test::randomRotation(g), test::randomDirection(g) * 4 * u(g));
+      const double d = truth.distance(X, Y);
+      for (const double margin : {d * (1 + off) + 1e-4, d * (1 - off) - 1e-4, d * 3 + 1e-2, d / 3}) {
+        if (margin < 0) continue;
+        const bool hit = margin > d || d == 0;
+        const Model<S> wide(raw.mesh(), with(margin));
+        for (const auto solver : {fcl::GST_LIBCCD, fcl::GST_INDEP}) {
+          fcl::CollisionRequest<S> request;
+          request.gjk_solver_type = solver;
+          fcl::CollisionResult<S> one, other;
+          ASSERT_EQ(fcl::collide(&wide, X, shape.get(), Y, request, one) > 0, hit) << margin << ' ' << d;
+          ASSERT_EQ(fcl::collide(shape.get(), Y, &wide, X, request, other) > 0, hit) << margin << ' ' << d;
+        }
+        ASSERT_EQ(distanceOf<S>(wide, X, *shape, Y), distanceOf<S>(plain, X, *shape, Y)) << "distances know no margin";
+      }
+      apart += d > 0;
+    }
+    EXPECT_GT(apart, 3);
+  }
+}
+
+TYPED_TEST(Margin, ContactsWithShapesAreAllWithinItAndSayHowToPart) {
+  using S = TypeParam;
+  const Raw raw = test::torus(14);
+  const double margin = 0.15, off = std::is_same<S, double>::value ? 1e-6 : 1e-4;
+  const Model<S> wide(raw.mesh(), with(margin));
+  std::mt19937_64 g(6);
+  std::uniform_real_distribution<double> u(0, 1);
+  for (const auto& [name, shape] : test::shapes<S>()) {
+    SCOPED_TRACE(name);
+    const test::Truth<S> truth(raw, *shape);
+    int near = 0, meeting = 0;
+    for (int i = 0; i < 16; ++i) {
+      const auto X = test::pose<S>(test::randomRotation(g), test::randomDirection(g));
+      const auto Y = test::pose<S>(test::randomRotation(g), X.translation().template cast<double>() +
+                                                                test::randomDirection(g) * (0.3 + 1.6 * u(g)));
+      const fcl::CollisionRequest<S> request(1000000, true);
+      fcl::CollisionResult<S> ours, turned;
+      fcl::collide(&wide, X, shape.get(), Y, request, ours);
+      fcl::collide(shape.get(), Y, &wide, X, request, turned);
+      ASSERT_EQ(ours.numContacts(), turned.numContacts());
+      std::set<std::intptr_t> found, back;
+      for (std::size_t k = 0; k < ours.numContacts(); ++k) {
+        const auto &c = ours.getContact(k), &d = turned.getContact(k);
+        found.insert(c.b1);
+        back.insert(d.b2);
+        const auto t = static_cast<std::size_t>(c.b1);
+        const query::Gap gap = truth.gap(t, X, Y);
+        const double depth = static_cast<double>(c.penetration_depth);
+        ASSERT_NEAR(c.normal.norm(), 1, 1e-5);
+        if (gap.distance > off) {
+          ASSERT_NEAR(depth, margin - gap.distance, off);
+          ASSERT_LT((c.pos.template cast<double>() - (gap.on_body + gap.on_points) / 2).norm(), 0.05);
+          ++near;
+        } else {
+          ASSERT_GE(depth, margin - off);
+          ++meeting;
+        }
+        // Moved back from the shape by the depth, they are a margin apart.
+        const Eigen::Vector3d n = c.normal.template cast<double>();
+        ASSERT_GE(truth.gap(t, X, Y, -n * (depth * (1 + 1e-3))).distance, margin - 2 * off) << i << ' ' << depth;
+      }
+      ASSERT_EQ(found, back);
+      ASSERT_EQ(found.size(), ours.numContacts()) << "no pair twice";
+      for (std::size_t t = 0; t < raw.triangles.size(); ++t) {
+        const double d = truth.gap(t, X, Y).distance;
+        if (std::abs(d - margin) > off) {
+          ASSERT_EQ(found.count(static_cast<std::intptr_t>(t)), d < margin) << d;
+        }
+      }
+    }
+    EXPECT_GT(near, 50);
+    EXPECT_GT(meeting, 10);
+  }
+}
+
+TYPED_TEST(Margin, CellsOfOctreesWithinItCollide) {
+  using S = TypeParam;
+  const Raw raw = test::torus(12);
+  const auto octree = test::cloud<S>(2, 60);
+  const auto boxes = octree->toBoxes();
+  const double off = std::is_same<S, double>::value ? 1e-6 : 1e-4;
+  std::mt19937_64 g(7);
+  std::uniform_real_distribution<double> u(0, 1);
+  std::size_t pairs = 0;
+  for (int i = 0; i < 20; ++i) {
+    const auto X = test::pose<S>(test::randomRotation(g), test::randomDirection(g));
+    const auto Y = test::pose<S>(test::randomRotation(g),
+                                 X.translation().template cast<double>() + test::randomDirection(g) * 3 * u(g));
+    std::vector<double> gaps;
+    for (std::size_t t = 0; t < raw.triangles.size(); ++t) {
+      for (const auto& box : boxes) gaps.push_back(test::gap<S>(raw, t, X, box, Y));
+    }
+    const double least = *std::min_element(gaps.begin(), gaps.end());
+    for (const double margin : {0.1, least * 1.01 + 1e-3, least * 0.99}) {
+      const Model<S> wide(raw.mesh(), with(margin));
+      const auto within = [&](double d) {
+        return std::count_if(gaps.begin(), gaps.end(), [d](double x) { return x <= d; });
+      };
+      const fcl::CollisionRequest<S> request(1000000, true);
+      fcl::CollisionResult<S> ours, turned;
+      fcl::collide(&wide, X, octree.get(), Y, request, ours);
+      fcl::collide(octree.get(), Y, &wide, X, request, turned);
+      ASSERT_EQ(ours.numContacts(), turned.numContacts());
+      ASSERT_GE(static_cast<long>(ours.numContacts()), within(margin - off));
+      ASSERT_LE(static_cast<long>(ours.numContacts()), within(margin + off));
+      ASSERT_EQ(test::touching<S>(wide, X, *octree, Y), ours.isCollision());
+      pairs += ours.numContacts();
+      for (std::size_t k = 0; k < ours.numContacts(); ++k) {
+        const auto &c = ours.getContact(k), &d = turned.getContact(k);
+        ASSERT_EQ(c.o2, octree.get());
+        ASSERT_EQ(d.o1, octree.get());
+        ASSERT_GE(c.penetration_depth, 0);
+        ASSERT_NEAR(c.normal.norm(), 1, 1e-5);
+      }
+    }
+  }
+  EXPECT_GT(pairs, 1000u);
+}
+
+TEST(MarginConservative, ShapesAndCellsAreNeverFreeWithinIt) {
+  const Raw raw = test::torus(14);
+  std::vector<std::shared_ptr<fcl::CollisionGeometryd>> partners = {test::cloud<double>(9, 60)};
+  for (const auto& [name, shape] : test::shapes<double>()) partners.push_back(shape);
+  std::mt19937_64 g(8);
+  std::uniform_real_distribution<double> u(0, 1);
+  const Modeld exact(raw.mesh());
+  int hits = 0, free_ones = 0;
+  for (const auto& partner : partners) {
+    for (const Subdivision subdivision : {Subdivision::kOctree, Subdivision::kBono}) {
+      for (int i = 0; i < 6; ++i) {
+        const auto X = test::pose<double>(test::randomRotation(g), test::randomDirection(g));
+        const auto Y = test::pose<double>(test::randomRotation(g), test::randomDirection(g) * 4 * u(g));
+        const double d = distanceOf<double>(exact, X, *partner, Y);
+        auto options = with(0, Answer::kConservative, subdivision);
+        options.depth = 5;
+        const Modeld none(raw.mesh(), options);
+        const double e = distanceOf<double>(none, X, *partner, Y);
+        for (const double margin : {d * (1 + 1e-6) + 1e-6, e * (1 + 1e-4) + 1e-4, e * (1 - 1e-4) - 1e-4}) {
+          if (margin < 0) continue;
+          options.margin = margin;
+          const Modeld a(raw.mesh(), options);
+          fcl::CollisionResultd result;
+          const bool hit = fcl::collide(&a, X, partner.get(), Y, fcl::CollisionRequestd(100, true), result) > 0;
+          EXPECT_EQ(hit, e <= margin) << "as the distance of the spheres says";
+          EXPECT_EQ(test::touching<double>(*partner, Y, a, X), hit);
+          for (std::size_t k = 0; k < result.numContacts(); ++k) EXPECT_GE(result.getContact(k).penetration_depth, 0);
+          (hit ? hits : free_ones)++;
+        }
+      }
+    }
+  }
+  EXPECT_GT(hits, 100);
+  EXPECT_GT(free_ones, 30);
+}
+
+TEST(MarginDouble, CostsAreOfWhatSharesRoom) {
+  const Modeld plain(test::box({0, 0, 0}, {1, 1, 1}).mesh()), wide(plain.mesh(), with(0.5));
+  const fcl::Boxd box(1, 1, 1);
+  const fcl::Transform3d I = fcl::Transform3d::Identity();
+  for (const double x : {1.4, 1.7}) {
+    const auto Y = test::pose<double>(I.linear(), {x, 0.5, 0.5});
+    std::vector<fcl::CostSourced> p, w;
+    for (const auto& [model, sources] : {std::make_pair(&plain, &p), std::make_pair(&wide, &w)}) {
+      fcl::CollisionResultd result;
+      fcl::collide(model, I, &box, Y, fcl::CollisionRequestd(1, false, 1000, true, false), result);
+      result.getCostSources(*sources);
+      EXPECT_EQ(result.isCollision(), x < 1.5 || model == &wide);
+    }
+    EXPECT_EQ(w.empty(), x > 1.5);
+    EXPECT_GE(w.size(), p.size());
+  }
 }
 
 TEST(MarginDouble, BroadphaseManagersSeeIt) {

@@ -1,52 +1,21 @@
 // SPDX-License-Identifier: BSD-3-Clause
 // fcl::OcTree as a partner: against FCL's own mesh query where that is right, and against all boxes and triangles.
-#include <fcl/geometry/octree/octree.h>
 #include <gtest/gtest.h>
 
 #include <limits>
 #include <map>
 
+#include "conformance/octrees.h"
 #include "conformance/reference.h"
-#include "query/body.h"
 
 namespace bocst {
 namespace {
 
 using Eigen::Vector3d;
+using test::cloud;
+using test::gap;
 using test::Pairs;
 using test::Raw;
-
-/// A cloud about the origin, with cells that are occupied, free, uncertain and unknown.
-template <typename S>
-std::shared_ptr<fcl::OcTree<S>> cloud(unsigned seed, std::size_t points, double resolution = 0.1) {
-  auto map = std::make_shared<octomap::OcTree>(resolution);
-  std::mt19937_64 g(seed);
-  std::uniform_real_distribution<double> u(0, 1);
-  for (std::size_t i = 0; i < points; ++i) {
-    const Vector3d p = test::randomDirection(g) * 0.6 * std::cbrt(u(g));
-    const octomap::point3d at(static_cast<float>(p.x()), static_cast<float>(p.y()), static_cast<float>(p.z()));
-    const double kind = u(g);
-    map->updateNode(at, static_cast<float>(kind < 0.6 ? 2 : kind < 0.8 ? -2 : 0.2));
-  }
-  map->updateInnerOccupancy();
-  auto octree = std::make_shared<fcl::OcTree<S>>(map);
-  octree->setOccupancyThres(S(0.7));
-  octree->setFreeThres(S(0.4));
-  return octree;
-}
-
-/// The distance of a triangle of a mesh at X and a box of toBoxes() at Y.
-template <typename S>
-double gap(const Raw& raw, std::size_t t, const fcl::Transform3<S>& X, const std::array<S, 6>& box,
-           const fcl::Transform3<S>& Y) {
-  const Vector3d center(box[0], box[1], box[2]);
-  Vector3d c[3];
-  for (std::size_t k = 0; k < 3; ++k) {
-    c[k] =
-        Y.template cast<double>().inverse() * (X.template cast<double>() * raw.vertices[raw.triangles[t][k]]) - center;
-  }
-  return query::BoxBody(Vector3d::Constant(box[3] / 2.0)).gap({c, 3}, std::numeric_limits<double>::infinity()).distance;
-}
 
 template <typename S>
 class OcTrees : public testing::Test {};
@@ -192,6 +161,70 @@ TEST(OcTreesDouble, CostsEqualFcls) {
       const auto rough = cost(*octree, Y, model, X, true);
       EXPECT_EQ(rough.first > 0, density > 0);
       EXPECT_GE(rough.second, 0);
+    }
+  }
+}
+
+// The box about the mesh costs where it meets a cell. FCL computes that for all cells, but keeps what nobody has seen.
+TEST(OcTreesDouble, ApproximateCostsAreFclsAndThoseOfAllCells) {
+  const Raw raw = test::torus(12);
+  const auto theirs = test::bvh<fcl::AABBd>(raw);  // whose box about the mesh is ours
+  const auto map = test::cloudMap(13, 150);
+  const auto octree = cloud<double>(map);
+  const auto map_threshold = octree->getOccupancyThres();
+  Modeld model(raw.mesh());
+  const Eigen::AlignedBox3d& bounds = model.mesh()->bounds();
+  std::mt19937_64 g(14);
+  for (const double density : {1.0, 0.5}) {  // occupied, uncertain
+    model.cost_density = theirs->cost_density = density;
+    for (int i = 0; i < 6; ++i) {
+      const auto X = test::pose<double>(test::randomRotation(g), {0, 0, 0});
+      const auto Y = test::pose<double>(test::randomRotation(g), test::randomDirection(g) * 0.8);
+      const auto ask = [&](const fcl::CollisionGeometryd& a, const auto& XA, const fcl::CollisionGeometryd& b,
+                           const auto& XB) {
+        fcl::CollisionResultd result;
+        fcl::collide(&a, XA, &b, XB, fcl::CollisionRequestd(2, false, 1000000, true, true), result);
+        std::vector<fcl::CostSourced> sources;
+        result.getCostSources(sources);
+        return sources;
+      };
+      const auto ours = ask(model, X, *octree, Y), turned = ask(*octree, Y, model, X);
+      const auto reference = ask(*octree, Y, *theirs, X);
+      ASSERT_EQ(ours.size(), turned.size());
+      ASSERT_GT(reference.size(), 0u);
+      double unseen = 0, total = 0, expected = 0;
+      for (const auto& s : reference) {
+        ASSERT_NEAR(s.cost_density, map_threshold * density, 1e-12);
+        unseen += s.total_cost;
+        ASSERT_TRUE(std::any_of(ours.begin(), ours.end(), [&](const fcl::CostSourced& o) {
+          return o.aabb_min.isApprox(s.aabb_min, 1e-9) && o.aabb_max.isApprox(s.aabb_max, 1e-9) &&
+                 std::abs(o.total_cost - s.total_cost) <= 1e-9 * s.total_cost;
+        }));
+      }
+      for (const auto& s : ours) total += s.total_cost;
+      // And of each cell that is occupied or uncertain, its box in the world and that of the mesh's box.
+      Vector3d corners[8];
+      Eigen::AlignedBox3d about_mesh;
+      for (int k = 0; k < 8; ++k) {
+        corners[k] = X * bounds.corner(static_cast<Eigen::AlignedBox3d::CornerType>(k));
+        about_mesh.extend(corners[k]);
+      }
+      std::size_t cells = 0;
+      for (auto leaf = map->begin_leafs(); leaf != map->end_leafs(); ++leaf) {
+        if (octree->isNodeFree(&*leaf)) continue;
+        const Vector3d center(leaf.getX(), leaf.getY(), leaf.getZ()), half = Vector3d::Constant(leaf.getSize() / 2);
+        const double occupancy = leaf->getOccupancy();
+        Vector3d c[8];
+        for (int k = 0; k < 8; ++k) c[k] = Y.inverse(Eigen::Isometry) * corners[k] - center;
+        if (!query::BoxBody(half).gap({c, 8}, 0).touches()) continue;
+        const Vector3d reach = Y.linear().cwiseAbs() * half, middle = Y * center;
+        const Eigen::AlignedBox3d shared = about_mesh.intersection({middle - reach, middle + reach});
+        expected += shared.volume() * occupancy * density;
+        ++cells;
+      }
+      EXPECT_EQ(ours.size(), reference.size() + cells);
+      EXPECT_NEAR(total, unseen + expected, 1e-6 * total);
+      ASSERT_GT(cells, 5u);
     }
   }
 }

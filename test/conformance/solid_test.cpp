@@ -5,7 +5,10 @@
 
 #include <gtest/gtest.h>
 
+#include "conformance/octrees.h"
 #include "conformance/reference.h"
+#include "conformance/shapes.h"
+#include "conformance/truth.h"
 #include "query/triangle.h"
 
 namespace bocst {
@@ -233,6 +236,189 @@ TEST(SolidModel, EachPieceCounts) {
   EXPECT_FALSE(test::touching<double>(hollow, I, small, at(0.5, 0.5, 0.5)));
   EXPECT_TRUE(test::touching<double>(hollow, I, small, at(0.12, 0.12, 0.12)));
   EXPECT_TRUE(test::touching<double>(hollow, I, small, at(2.75, 0.75, 0.75))) << "where two boxes overlap";
+}
+
+// Shapes and octrees.
+
+/// Shapes that fit into the tube of a torus(), and a point of each.
+template <typename S>
+std::vector<std::pair<test::NamedShape<S>, Eigen::Vector3d>> smallShapes() {
+  const auto v = [](double x, double y, double z) { return Eigen::Vector3d(x, y, z).cast<S>().eval(); };
+  const Eigen::Vector3d o = Eigen::Vector3d::Zero();
+  return {{{"box", std::make_shared<fcl::Box<S>>(v(0.1, 0.2, 0.05))}, o},
+          {{"sphere", std::make_shared<fcl::Sphere<S>>(S(0.1))}, o},
+          {{"ellipsoid", std::make_shared<fcl::Ellipsoid<S>>(v(0.03, 0.1, 0.07))}, o},
+          {{"capsule", std::make_shared<fcl::Capsule<S>>(S(0.05), S(0.1))}, o},
+          {{"cone", std::make_shared<fcl::Cone<S>>(S(0.08), S(0.15))}, o},
+          {{"cylinder", std::make_shared<fcl::Cylinder<S>>(S(0.06), S(0.1))}, o},
+          {{"convex", test::polytope<S>(6, {0.1, 0.06, 0.08})}, o},
+          {{"triangle", std::make_shared<fcl::TriangleP<S>>(v(0.1, 0, 0), v(-0.1, 0.1, 0), v(0, -0.1, 0.05))},
+           {0.1, 0, 0}}};
+}
+
+TYPED_TEST(SolidQueries, ShapesInsideCollideEitherWayRound) {
+  using S = TypeParam;
+  const Raw raw = test::torus(24);
+  std::mt19937_64 g(3);
+  std::uniform_real_distribution<double> u(0, 1);
+  for (const Answer answer : {Answer::kExact, Answer::kConservative}) {
+    Options deep = solid(answer), none = deep;
+    deep.depth = none.depth = 8;
+    none.solid = false;
+    const Model<S> a(raw.mesh(), deep), shell(raw.mesh(), none);
+    for (const auto& [named, point] : smallShapes<S>()) {
+      const fcl::ShapeBase<S>& shape = *named.shape;
+      SCOPED_TRACE(named.name);
+      const test::Truth<S> truth(raw, shape);
+      int held = 0, is_free = 0;
+      for (int i = 0; i < 60; ++i) {
+        const double angle = 6.3 * u(g);
+        const Eigen::Vector3d tube(0.7 * std::cos(angle), 0.7 * std::sin(angle), 0);
+        const auto X = test::pose<S>(test::randomRotation(g), test::randomDirection(g) * 5);
+        const auto Y = X * test::pose<S>(test::randomRotation(g), tube + test::randomDirection(g) * 0.7 * u(g));
+        const double d = truth.distance(X, Y);
+        if (d > 0 && d < 1e-4) continue;  // FCL's tolerance
+        const Eigen::Vector3d p = (X.inverse(Eigen::Isometry) * Y).template cast<double>() * point;
+        const bool inside = std::abs(windings(raw, p)) > 0.5, hit = d == 0 || inside;
+        if (answer == Answer::kConservative && !hit) {
+          ASSERT_EQ(test::touching<S>(a, X, shape, Y), test::touching<S>(shell, X, shape, Y));
+          continue;
+        }
+        held += inside && d > 0;
+        is_free += !hit;
+        ASSERT_EQ(test::touching<S>(a, X, shape, Y), hit) << i << ' ' << d;
+        ASSERT_EQ(test::touching<S>(shape, Y, a, X), hit) << i << ' ' << d;
+        if (answer == Answer::kConservative) continue;
+        ASSERT_EQ(test::touching<S>(shell, X, shape, Y), d == 0);
+        for (const bool turned : {false, true}) {
+          fcl::DistanceResult<S> result;
+          const fcl::DistanceRequest<S> request;
+          turned ? fcl::distance(&shape, Y, &a, X, request, result) : fcl::distance(&a, X, &shape, Y, request, result);
+          ASSERT_EQ(result.min_distance > 0, !hit);
+        }
+        if (!inside || d == 0) continue;
+        // What brings the surfaces together.
+        const fcl::CollisionRequest<S> request(100, true);
+        fcl::CollisionResult<S> result;
+        ASSERT_EQ(fcl::collide(&a, X, &shape, Y, request, result), 1u);
+        const auto& c = result.getContact(0);
+        ASSERT_EQ(c.b1, +fcl::Contact<S>::NONE);
+        ASSERT_EQ(c.b2, +fcl::Contact<S>::NONE);
+        ASSERT_NEAR(c.penetration_depth, d, 1e-4);
+        auto Z = Y;
+        Z.translation() += c.normal * (c.penetration_depth + S(1e-4));
+        ASSERT_EQ(truth.distance(X, Z), 0);
+        Z.translation() -= c.normal * S(3e-4);
+        ASSERT_GT(truth.distance(X, Z), 0);
+      }
+      EXPECT_GT(held, 3);
+      EXPECT_TRUE(answer == Answer::kConservative || is_free > 5);
+    }
+  }
+}
+
+// What has no end is never inside; a shape about a solid has it inside, as about any mesh.
+TEST(SolidModel, UnboundedAndLargeShapes) {
+  const Modeld box(test::box({0, 0, 0}, {1, 1, 1}).mesh(), solid());
+  const fcl::Transform3d I = fcl::Transform3d::Identity();
+  const fcl::Planed plane(Eigen::Vector3d::UnitZ(), -0.5);
+  const fcl::Halfspaced below(Eigen::Vector3d::UnitZ(), -0.5), above(-Eigen::Vector3d::UnitZ(), 0.5);
+  EXPECT_FALSE(test::touching<double>(box, I, plane, I));
+  EXPECT_FALSE(test::touching<double>(below, I, box, I));
+  EXPECT_TRUE(test::touching<double>(above, I, box, I));
+  EXPECT_TRUE(test::touching<double>(box, I, fcl::Sphered(5), I));
+}
+
+TYPED_TEST(SolidQueries, OccupiedCellsInsideCollide) {
+  using S = TypeParam;
+  const Raw raw = test::torus(24);
+  const Model<S> a(raw.mesh(), solid());
+  const auto I = test::pose<S>(Eigen::Matrix3d::Identity(), {0, 0, 0});
+  std::mt19937_64 g(4);
+  std::uniform_real_distribution<double> u(0, 1);
+  int held = 0, is_free = 0;
+  for (int i = 0; i < 120; ++i) {
+    // A few cells here and there, of which one or none is in the tube; free ones, too.
+    auto map = std::make_shared<octomap::OcTree>(0.05);
+    const auto fill = [&](const Eigen::Vector3d& p, float odds) {
+      map->updateNode(octomap::point3d(static_cast<float>(p.x()), static_cast<float>(p.y()), static_cast<float>(p.z())),
+                      odds);
+    };
+    const double angle = 6.3 * u(g);
+    const Eigen::Vector3d tube(0.7 * std::cos(angle), 0.7 * std::sin(angle), 0);
+    for (int k = 0; k < 20; ++k) fill(2.5 * test::randomDirection(g), 2);
+    for (int k = 0; k < 40; ++k) fill(test::randomDirection(g), -2);
+    if (i % 3 != 0) fill(tube + test::randomDirection(g) * 0.3 * u(g), 2);
+    map->updateInnerOccupancy();
+    // A large cell of equal ones.
+    if (i % 4 == 0) map->prune();
+    fcl::OcTree<S> octree(map);
+    const auto Y = test::pose<S>(Eigen::AngleAxisd(i % 2, test::randomDirection(g)).toRotationMatrix(), {0, 0, 0});
+    double d = std::numeric_limits<double>::infinity();
+    bool inside = false;
+    for (const auto& b : octree.toBoxes()) {
+      for (std::size_t t = 0; t < raw.triangles.size(); ++t) d = std::min(d, test::gap<S>(raw, t, I, b, Y));
+      inside |= std::abs(windings(raw, Y.template cast<double>() * Eigen::Vector3d(b[0], b[1], b[2]))) > 0.5;
+    }
+    if (d > 0 && d < 1e-4) continue;
+    const bool hit = d == 0 || inside;
+    ASSERT_EQ(test::touching<S>(a, I, octree, Y), hit) << i;
+    ASSERT_EQ(test::touching<S>(octree, Y, a, I), hit) << i;
+    fcl::DistanceResult<S> result;
+    fcl::distance(&octree, Y, &a, I, fcl::DistanceRequest<S>(), result);
+    ASSERT_EQ(result.min_distance > 0, !hit) << i;
+    held += inside && d > 0;
+    is_free += !hit;
+    if (!inside || d == 0) continue;
+    fcl::CollisionResult<S> contacts;
+    ASSERT_EQ(fcl::collide(&a, I, &octree, Y, fcl::CollisionRequest<S>(10, true), contacts), 1u);
+    ASSERT_NEAR(contacts.getContact(0).penetration_depth, d, 1e-4);
+    ASSERT_EQ(contacts.getContact(0).b2, +fcl::Contact<S>::NONE);
+  }
+  EXPECT_GT(held, 10);
+  EXPECT_GT(is_free, 10);
+}
+
+// Blocks of cells that the surface does not meet are settled by one of their points, whatever is known of the tree.
+TEST(SolidModel, BlocksOfCells) {
+  auto map = std::make_shared<octomap::OcTree>(0.1);
+  for (int x = -8; x < 8; ++x) {
+    for (int y = -8; y < 8; ++y) {
+      for (int z = -8; z < 8; ++z) {
+        map->updateNode(octomap::point3d(0.1f * static_cast<float>(x) + 0.05f, 0.1f * static_cast<float>(y) + 0.05f,
+                                         0.1f * static_cast<float>(z) + 0.05f),
+                        2.0f);
+      }
+    }
+  }
+  map->updateInnerOccupancy();
+  const fcl::OcTreed octree(map);
+  const fcl::Transform3d I = fcl::Transform3d::Identity();
+  const auto at = [&](double x) { return test::pose<double>(I.linear(), {x, 0, 0}); };
+  for (const std::size_t n : {std::size_t{6}, std::size_t{60}}) {
+    Raw shell = test::torus(n);
+    shell.scale(6);  // the tube is two units thick, its hole more
+    const Modeld model(shell.mesh(), solid());
+    EXPECT_FALSE(test::touching<double>(model, I, octree, at(0)));
+    EXPECT_TRUE(test::touching<double>(model, I, octree, at(4.2)));
+    EXPECT_TRUE(test::touching<double>(octree, at(-4.2), model, I));
+    EXPECT_FALSE(test::touching<double>(model, I, octree, at(12)));
+  }
+}
+
+TYPED_TEST(SolidQueries, WhatIsNotOccupiedIsNotHeld) {
+  using S = TypeParam;
+  const Model<S> box(test::box({0, 0, 0}, {1, 1, 1}).mesh(), solid());
+  fcl::Sphere<S> ball(S(0.1));
+  const auto I = test::pose<S>(Eigen::Matrix3d::Identity(), {0, 0, 0}),
+             Y = test::pose<S>(Eigen::Matrix3d::Identity(), {0.5, 0.5, 0.5});
+  EXPECT_TRUE(test::touching<S>(box, I, ball, Y));
+  ball.cost_density = S(0.5);
+  EXPECT_FALSE(test::touching<S>(box, I, ball, Y));
+  auto map = std::make_shared<octomap::OcTree>(0.05);
+  map->updateNode(octomap::point3d(0.5f, 0.5f, 0.5f), -2.0f);
+  const fcl::OcTree<S> octree(map);
+  EXPECT_FALSE(test::touching<S>(box, I, octree, I));
 }
 
 TEST(SolidModel, ContactsSayHowFarTheWallIs) {

@@ -203,12 +203,15 @@ TEST(OverloadsOfContinuousCollide, OfObjectsAndByName) {
   const auto model = makeModel<S>();
   const auto ball = std::make_shared<fcl::Sphere<S>>(1);
   const auto at0 = moved<S>(0), away = moved<S>(3);
-  const fcl::TranslationMotion<S> still(at0, at0), motion(at0, away);
-  fcl::CollisionObject<S> model_object(model, at0), ball_object(ball, away), other_ball(ball, at0), other(model, away);
+  const auto strange = std::make_shared<Strange<S>>();
+  const fcl::TranslationMotion<S> still(at0, at0);
+  fcl::CollisionObject<S> strange_object(strange, away), model_object(model, at0), ball_object(ball, away),
+      other_ball(ball, at0), other(model, away);
   const auto motion_of = [&](const auto& X, const auto& Y) {
     return std::make_shared<fcl::TranslationMotion<S>>(X, Y);
   };
-  fcl::ContinuousCollisionObject<S> moving_model(model, motion_of(at0, at0)), moving_ball(ball, motion_of(at0, away));
+  fcl::ContinuousCollisionObject<S> moving_model(model, motion_of(at0, at0)),
+      coming_ball(ball, motion_of(away, moved<S>(-1))), moving_strange(strange, motion_of(at0, away));
   fcl::ContinuousCollisionObject<S> coming_model(model, motion_of(away, moved<S>(-1)));
   fcl::ContinuousCollisionResult<S> result;
   for (const auto solver :
@@ -226,14 +229,22 @@ TEST(OverloadsOfContinuousCollide, OfObjectsAndByName) {
     EXPECT_TRUE(data.result.is_collide);
     EXPECT_NEAR(data.result.time_of_contact, 0.5, 2e-4);
 
-    EXPECT_THROW(fcl::continuousCollide(model.get(), &motion, ball.get(), &still, request, result),
+    // A ball comes from 3, and is in touch at 2.
+    const fcl::TranslationMotion<S> coming(away, moved<S>(-1));
+    EXPECT_NEAR(fcl::continuousCollide(model.get(), &still, ball.get(), &coming, request, result), 0.25, 2e-4);
+    EXPECT_NEAR(fcl::continuousCollide(ball.get(), away, moved<S>(-1), model.get(), at0, at0, request, result), 0.25,
+                2e-4);
+    EXPECT_NEAR(fcl::continuousCollide(&model_object, at0, &ball_object, moved<S>(-1), request, result), 0.25, 2e-4);
+    EXPECT_NEAR(fcl::collide(&moving_model, &coming_ball, request, result), 0.25, 2e-4);
+    EXPECT_NEAR(fcl::continuousCollide<S>(&model_object, at0, &ball_object, moved<S>(-1), request, result), 0.25, 2e-4);
+    EXPECT_THROW(fcl::continuousCollide(model.get(), &still, strange.get(), &coming, request, result),
                  std::invalid_argument);
-    EXPECT_THROW(fcl::continuousCollide(ball.get(), at0, away, model.get(), away, away, request, result),
+    EXPECT_THROW(fcl::continuousCollide(strange.get(), away, at0, model.get(), away, away, request, result),
                  std::invalid_argument);
-    EXPECT_THROW(fcl::continuousCollide(&model_object, away, &ball_object, away, request, result),
+    EXPECT_THROW(fcl::continuousCollide(&model_object, away, &strange_object, away, request, result),
                  std::invalid_argument);
-    EXPECT_THROW(fcl::collide(&moving_model, &moving_ball, request, result), std::invalid_argument);
-    EXPECT_THROW(fcl::continuousCollide<S>(&model_object, away, &ball_object, away, request, result),
+    EXPECT_THROW(fcl::collide(&moving_model, &moving_strange, request, result), std::invalid_argument);
+    EXPECT_THROW(fcl::continuousCollide<S>(&model_object, away, &strange_object, away, request, result),
                  std::invalid_argument);
   }
   fcl::ContinuousCollisionRequest<S> request;

@@ -197,13 +197,17 @@ void run() {
     }
   }
   {
-    fcl::CollisionObject<S> object1(box, moved(0)), object2(ball, moved(3)), object3(a, moved(0));
+    fcl::CollisionObject<S> object1(box, moved(0)), object2(ball, moved(3)), object3(a, moved(0)),
+        object4(strange, moved(3));
     fcl::ContinuousCollisionRequest<S> request;
     request.ccd_solver_type = fcl::CCDC_CONSERVATIVE_ADVANCEMENT;
     fcl::ContinuousCollisionResult<S> result;
     expect(
-        throwsInvalidArgument([&] { fcl::continuousCollide(&object3, moved(3), &object2, moved(3), request, result); }),
+        throwsInvalidArgument([&] { fcl::continuousCollide(&object3, moved(3), &object4, moved(3), request, result); }),
         "continuousCollide with a partner that is not supported does not throw");
+    fcl::continuousCollide(&object3, moved(3), &object2, moved(3), request, result);
+    expect(result.is_collide && result.time_of_contact > 0 && result.time_of_contact < 1,
+           "continuousCollide of a model and a ball is not bocst's");
     fcl::continuousCollide(&object1, moved(3), &object2, moved(3), request, result);
     expect(result.is_collide && result.time_of_contact > 0.4 && result.time_of_contact < 0.6,
            "continuousCollide without a model is not FCL's");
