@@ -294,8 +294,28 @@ Touch ConvexBody::part(const Points& points, const Gap& gap) const {
   const Vector3d normal =
       expansion.run([&](const Vector3d& d) { return Vector3d(support(d) - points.support(-d)); }, kTolerance);
   touch = along(normal.squaredNorm() > 0 ? normal : Vector3d(Vector3d::UnitX()), points);
+  if (!expansion.settled()) touch = shorten(touch, points);
   touch.depth = std::max(touch.depth, 0.0);
   touch.point = gap.on_points;
+  return touch;
+}
+
+// Where points have been moved out of the body, the shortest way on to them is a better normal: along it they overlap
+// by no more than they were moved, less the gap. What overlaps a curved body by little is soon there.
+Touch ConvexBody::shorten(Touch touch, const Points& points) const {
+  constexpr int kMostPoints = 8, kMostSteps = 6;
+  Vector3d moved[kMostPoints];
+  if (points.count > kMostPoints) return touch;
+  for (int step = 0; step < kMostSteps && touch.depth > 0; ++step) {
+    for (int i = 0; i < points.count; ++i) moved[i] = points.x[i] + touch.normal * touch.depth;
+    const Gap gap = coreGap({moved, points.count}, std::numeric_limits<double>::infinity());
+    const Vector3d way = gap.on_points - gap.on_body;
+    if (gap.touches() || !(way.squaredNorm() > 0)) break;
+    const Touch better = along(way.normalized(), points);
+    const bool settled = !(better.depth < 0.9 * touch.depth);
+    if (better.depth < touch.depth) touch = better;
+    if (settled) break;
+  }
   return touch;
 }
 

@@ -118,6 +118,7 @@ class ConvexBody : public Body {
   double boxGap(const Points& points) const;
   Gap coreGap(const Points& points, double enough) const;
   Touch along(const Eigen::Vector3d& normal, const Points& points) const;
+  Touch shorten(Touch touch, const Points& points) const;
 };
 
 /// From half sizes, at the origin.

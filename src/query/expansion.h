@@ -35,10 +35,14 @@ class Expansion {
       const Eigen::Vector3d w = support(normal);
       consider(normal, w);
       // The polytope is inside, so nothing of the set reaches less far than its nearest face.
-      if (reach_ - lowest <= tolerance * reach_ + tiny_ || !expand(w)) break;
+      settled_ = reach_ - lowest <= tolerance * reach_ + tiny_;
+      if (settled_ || !expand(w)) break;
     }
     return direction_;
   }
+
+  /// The last run() found what was asked for: its numbers did not give out, nor its steps.
+  bool settled() const { return settled_; }
 
  private:
   static constexpr int kMostSteps = 32, kMostFaces = 2 * (kMostSteps + 4);
@@ -147,6 +151,7 @@ class Expansion {
   Eigen::Vector3d points_[kMostSteps + 4];
   std::size_t count_ = 0;
   Face faces_[kMostFaces];
+  bool settled_ = false;
   int face_count_ = 0;
   Eigen::Vector3d direction_ = Eigen::Vector3d::Zero();
   double reach_ = std::numeric_limits<double>::infinity();
