@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #pragma once
 
+#include <fcl/math/geometry.h>
 #include <fcl/narrowphase/detail/gjk_solver_indep.h>
 #include <fcl/narrowphase/detail/gjk_solver_libccd.h>
 #include <fcl/narrowphase/detail/traversal/collision/intersect.h>
@@ -31,12 +32,13 @@ class NarrowPhaseOf final : public NarrowPhase<S> {
     return solver_.shapeTriangleIntersect(s, X_WS, c[0], c[1], c[2], X_WM, nullptr, nullptr, nullptr);
   }
 
-  // Of two triangles, FCL's test is that of meshes.
+  // Of two triangles, FCL's test is that of meshes, rounded as there.
   bool ask(const fcl::TriangleP<S>& t, const fcl::Transform3<S>& X_WT, const fcl::Vector3<S> (&c)[3],
            const fcl::Transform3<S>& X_WM) const {
-    const fcl::Transform3<S> X_MT = X_WM.inverse(Eigen::Isometry) * X_WT;
-    return fcl::detail::Intersect<S>::intersect_Triangle(c[0], c[1], c[2], t.a, t.b, t.c, X_MT.linear(),
-                                                         X_MT.translation());
+    fcl::Matrix3<S> R_MT;
+    fcl::Vector3<S> p_MT;
+    fcl::relativeTransform(X_WM.linear(), X_WM.translation(), X_WT.linear(), X_WT.translation(), R_MT, p_MT);
+    return fcl::detail::Intersect<S>::intersect_Triangle(c[0], c[1], c[2], t.a, t.b, t.c, R_MT, p_MT);
   }
 
   const Solver& solver_;

@@ -29,6 +29,7 @@ class OcTreeSide {
     const octomap::OcTreeNode* node = nullptr;
     Eigen::Vector3d center = Eigen::Vector3d::Zero();
     double half = 0;
+    fcl::AABB<S> box;  ///< As FCL halves it, level by level, in S.
 
     bool operator==(const Node& other) const {
       return node == other.node && center == other.center && half == other.half;
@@ -42,9 +43,9 @@ class OcTreeSide {
   /// for.
   OcTreeSide(const fcl::OcTree<S>& octree, const fcl::Transform3<S>& X_WO, S density, bool costs)
       : octree_(octree), X_WO_(X_WO), density_(density), costs_(costs), root_node_(octree.getRoot()) {
-    const fcl::AABB<S> box = octree.getRootBV();
     root_.node = root_node_;
-    root_.half = (static_cast<double>(box.max_[0]) - static_cast<double>(box.min_[0])) / 2;
+    root_.box = octree.getRootBV();
+    root_.half = (static_cast<double>(root_.box.max_[0]) - static_cast<double>(root_.box.min_[0])) / 2;
   }
 
   /// Nothing in it is of interest.
@@ -109,6 +110,7 @@ class OcTreeSide {
       if (!sees(child.node)) continue;
       child.half = n.half / 2;
       for (int k = 0; k < 3; ++k) child.center[k] = n.center[k] + ((i >> k & 1) != 0 ? child.half : -child.half);
+      fcl::computeChildBV(n.box, i, child.box);
       f(child);
     }
   }
@@ -125,18 +127,24 @@ class OcTreeSide {
     overlappingChildren(n, other, to, f);
   }
 
-  // For BodyCollector.
+  // For BodyCollector. Cells are made as FCL makes them, with its rounding.
   bool touch(const Node& n, const NarrowPhase<S>& narrow_phase, const fcl::Vector3<S> (&corners)[3],
              const fcl::Transform3<S>& X_WM) const {
-    return narrow_phase.touch(boxOf(n), poseOf(n), corners, X_WM);
+    fcl::Box<S> cell;
+    fcl::Transform3<S> X_WC;
+    fcl::constructBox(n.box, X_WO_, cell, X_WC);
+    return narrow_phase.touch(cell, X_WC, corners, X_WM);
   }
   bool occupied(const Node& n) const { return n.node != nullptr && octree_.isNodeOccupied(n.node); }
   S density(const Node& n) const {
     return (n.node != nullptr ? static_cast<S>(n.node->getOccupancy()) : octree_.getOccupancyThres()) * density_;
   }
   fcl::AABB<S> worldBox(const Node& n) const {
+    fcl::Box<S> cell;
+    fcl::Transform3<S> X_WC;
+    fcl::constructBox(n.box, X_WO_, cell, X_WC);
     fcl::AABB<S> box;
-    fcl::computeBV(boxOf(n), poseOf(n), box);
+    fcl::computeBV(cell, X_WC, box);
     return box;
   }
 
@@ -150,15 +158,6 @@ class OcTreeSide {
   static query::Points about(const Node& n, const query::Points& points, Eigen::Vector3d (&x)[8]) {
     for (int i = 0; i < points.count; ++i) x[i] = points.x[i] - n.center;
     return {x, points.count};
-  }
-
-  static fcl::Box<S> boxOf(const Node& n) {
-    const S side = static_cast<S>(2 * n.half);
-    return fcl::Box<S>(side, side, side);
-  }
-  fcl::Transform3<S> poseOf(const Node& n) const {
-    // As FCL multiplies it: the sums round in another order when a point is moved.
-    return X_WO_ * fcl::Translation3<S>(fcl::Vector3<S>(n.center.template cast<S>()));
   }
 
   const fcl::OcTree<S>& octree_;

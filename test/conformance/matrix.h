@@ -36,8 +36,8 @@ inline Raw modelMesh() { return inFloat(torus(8)); }
 inline Raw partnerMesh() { return inFloat(torus(6, 0.2).scale(0.8)); }
 
 template <typename S>
-Partner<S> octreePartner() {
-  auto map = std::make_shared<octomap::OcTree>(0.125);
+Partner<S> octreePartner(double resolution) {
+  auto map = std::make_shared<octomap::OcTree>(resolution);
   std::mt19937_64 g(5);
   for (int i = 0; i < 90; ++i) {
     const Eigen::Vector3f p = (randomDirection(g) * 0.5).cast<float>();
@@ -93,14 +93,17 @@ Partner<S> partner(const std::string& name) {
   if (name == "BVH of KDOP16") return bvhPartner<S, fcl::KDOP<S, 16>>();
   if (name == "BVH of KDOP18") return bvhPartner<S, fcl::KDOP<S, 18>>();
   if (name == "BVH of KDOP24") return bvhPartner<S, fcl::KDOP<S, 24>>();
-  if (name == "octree") return octreePartner<S>();
+  if (name == "octree") return octreePartner<S>(0.125);
+  // Its cells' corners are rounded, by FCL level by level.
+  if (name == "octree of decimetres") return octreePartner<S>(0.1);
   if (name == "model") return modelPartner<S>();
   return shapePartner<S>(name);
 }
 const char* const kShapes[] = {"box",    "sphere",       "ellipsoid",        "capsule", "cone",       "cylinder",
                                "convex", "large convex", "convex of a mesh", "plane",   "half-space", "triangle"};
-const char* const kUnions[] = {"BVH of AABB",   "BVH of OBB",    "BVH of RSS",    "BVH of kIOS", "BVH of OBBRSS",
-                               "BVH of KDOP16", "BVH of KDOP18", "BVH of KDOP24", "octree",      "model"};
+const char* const kUnions[] = {"BVH of AABB",   "BVH of OBB",           "BVH of RSS",    "BVH of kIOS",
+                               "BVH of OBBRSS", "BVH of KDOP16",        "BVH of KDOP18", "BVH of KDOP24",
+                               "octree",        "octree of decimetres", "model"};
 
 inline std::string testName(const testing::TestParamInfo<const char*>& info) {
   std::string name = info.param;

@@ -102,8 +102,10 @@ Solids solidsOf(const fcl::OcTree<S>& octree, const octomap::OcTree& map) {
   Solids all;
   for (auto leaf = map.begin_leafs(); leaf != map.end_leafs(); ++leaf) {
     if (!octree.isNodeOccupied(&*leaf)) continue;
-    const octomap::point3d c = leaf.getCoordinate();
-    all.push_back(boxOf({c.x(), c.y(), c.z()}, Eigen::Vector3d::Constant(leaf.getSize() / 2)));
+    // In double, unlike octomap's points.
+    Eigen::Vector3d center;
+    for (int k = 0; k < 3; ++k) center[k] = map.keyToCoord(leaf.getKey()[static_cast<unsigned>(k)], leaf.getDepth());
+    all.push_back(boxOf(center, Eigen::Vector3d::Constant(leaf.getSize() / 2)));
     all.back().id = &*leaf - map.getRoot();
   }
   return all;
