@@ -89,7 +89,8 @@ BOCST_EXPORT std::size_t collide(const fcl::CollisionGeometry<S>* o1, const fcl:
 ///   surfaces, 0 where spheres overlap.
 /// - abs_err and rel_err allow an answer that is larger than the least distance by so much, as in FCL.
 /// - enable_signed_distance: surfaces that touch are at minus the penetration_depth of one contact as collide() gives
-///   it, with both points there, as FCL does for meshes; it is about two primitives, not about two solids.
+///   it, with both points there, as FCL does for meshes; it is about two primitives, not about two solids. What is
+///   inside a solid is at minus the depth of the contact that collide() makes of it: the distance of the surfaces.
 /// Errors of the answer are below 1e-11 of the sizes, with ellipsoids, cones and cylinders below 1e-8, and rounding of
 /// S; it does not depend on the solver, nor on what is resident.
 /// @throws std::invalid_argument for a partner that is not supported.

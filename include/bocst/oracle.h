@@ -19,7 +19,7 @@ class BOCST_EXPORT OracleError : public std::runtime_error {
 /// One oracle this build knows of.
 struct OracleInfo {
   OracleKind kind = OracleKind::kCpu;  ///< What Options::oracle takes.
-  std::string name;                    ///< "cpu", "occlusion" or "compute": what BOCST_ORACLE takes.
+  std::string name;                    ///< "cpu", "occlusion" or "compute", as BOCST_ORACLE takes it; or "sampled".
   std::string device;                  ///< What it runs on, for people.
   bool hardware = false;               ///< Runs on a GPU.
   std::string why_not;                 ///< Empty when it can be used; else the reason.

@@ -40,7 +40,7 @@ class DistanceWalk : private BestFirst<DistanceWalk<A, B>, A, B> {
   DistanceWalk(const A& a, const B& b, const Placement& b_in_a)
       : Base(a, b, scratch()), b_in_a_(b_in_a), a_in_b_(b_in_a.inverse()) {
     if constexpr (kTrees) {
-      if (!spheres() && PairFrames::fits(b_in_a.scale)) gaps_.emplace(a, b, b_in_a);
+      if (!spheres() && PairFrames::isFine(b_in_a)) gaps_.emplace(a, b, b_in_a);
     }
   }
 
@@ -165,6 +165,8 @@ class DistanceWalk : private BestFirst<DistanceWalk<A, B>, A, B> {
           least = guess;
           next = {gaps.at_least[o], a, b};
         });
+        // A cell at the edge of what is grey may have no grey octants.
+        if (!std::isfinite(least)) return;
         pair = next;
       }
     }

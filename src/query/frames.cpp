@@ -1,9 +1,16 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #include "query/frames.h"
 
+#include <algorithm>
 #include <cmath>
 
 namespace bocst::query {
+
+bool PairFrames::isFine(const Placement& one_in_zero) {
+  const double q0 = 1 << (lattice::kBits - 1), q1 = q0 * one_in_zero.scale;
+  // Not true of what is not a number.
+  return fits(one_in_zero.scale) && (one_in_zero.translation.norm() + q0 + q1) * 0x1p-9 <= std::min(q0, q1);
+}
 
 PairFrames::PairFrames(double scale_of_1, const Placement& one_in_zero) {
   const double q0 = 1 << (lattice::kBits - 1), q1 = q0 * scale_of_1;

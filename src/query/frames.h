@@ -39,6 +39,9 @@ struct PairFrames {
   /// Beyond these, one side's rounding is too coarse for the other's nodes.
   static bool fits(double scale) { return scale >= 0x1p-10 && scale <= 0x1p10; }
 
+  /// Are pads small beside both sides? What is far away is no pair for collisions; for distances it is one.
+  static bool isFine(const Placement& one_in_zero);
+
   float unit[2];            ///< Lattice units of each side, in those of side 0.
   float to_other[2][3][3];  ///< [own]: row j gives coordinate j in the other frame ...
   float abs_to_other[2][3][3];

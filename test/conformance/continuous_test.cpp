@@ -702,7 +702,7 @@ TEST(ContinuousConservative, ShapesAndCellsAreNeverLater) {
       const double time = ways.ask(request<double>(type)).time_of_contact;
       ways.o1 = &a;
       const auto result = ways.ask(request<double>(type)), other = ways.swapped().ask(request<double>(type));
-      EXPECT_LE(result.time_of_contact, time);
+      EXPECT_LE(result.time_of_contact, time + 1e-4) << "each may be early by toc_err";
       EXPECT_EQ(other.is_collide, result.is_collide);
       EXPECT_NEAR(other.time_of_contact, result.time_of_contact, 2e-4);
       checkBySampling<double>(ways, a, *partner, type, 1e-4, result, 40);

@@ -96,6 +96,47 @@ TYPED_TEST(Distance, EveryBvhIsAPartner) {
   checkAgainstFcl<fcl::KDOP<S, 24>>(8, 1);
 }
 
+// Far beyond their sizes, where float tells nothing apart any more.
+TEST(DistanceDouble, OfWhatIsFarApart) {
+  const Raw ra = test::torus(20), rb = test::torus(17, 0.2);
+  const Modeld a(ra.mesh()), b(rb.mesh());
+  const auto theirs = test::bvh<fcl::OBBRSSd>(ra), others = test::bvh<fcl::OBBRSSd>(rb);
+  std::mt19937_64 g(14);
+  for (const double far : {30.0, 1e2, 1e3, 1e4, 1e6, 1e9, 1e12, 1e15, 1e20, 1e40}) {
+    SCOPED_TRACE(far);
+    for (int i = 0; i < 4; ++i) {
+      const auto X = test::pose<double>(test::randomRotation(g), test::randomDirection(g));
+      const auto Y = test::pose<double>(test::randomRotation(g), test::randomDirection(g) * far);
+      const double expected = ask<double>(*theirs, X, *others, Y).min_distance;
+      EXPECT_NEAR(ask<double>(a, X, b, Y).min_distance, expected, 1e-12 * far);
+      EXPECT_NEAR(ask<double>(b, Y, a, X).min_distance, expected, 1e-12 * far);
+    }
+  }
+}
+
+TEST(DistanceDouble, APoseThatIsNoNumberReturns) {
+  const Modeld a(test::torus(20).mesh()), b(test::torus(17).mesh());
+  const auto I = fcl::Transform3d(fcl::Transform3d::Identity());
+  ask<double>(a, I, b, test::pose<double>(Eigen::Matrix3d::Identity(), {3, 0, 0}));
+  for (const double bad : {std::numeric_limits<double>::quiet_NaN(), std::numeric_limits<double>::infinity()}) {
+    const double d = ask<double>(a, I, b, test::pose<double>(Eigen::Matrix3d::Identity(), {bad, 0, 0})).min_distance;
+    EXPECT_FALSE(d < 1e300);
+  }
+}
+
+TEST(DistanceDouble, SignedOfWhatIsInsideASolid) {
+  Options options;
+  options.solid = true;
+  const Modeld hull(test::box({-2, -2, -2}, {2, 2, 2}).mesh(), options), inside(test::torus(12).mesh());
+  const auto I = fcl::Transform3d(fcl::Transform3d::Identity());
+  const double surfaces = ask<double>(Modeld(test::box({-2, -2, -2}, {2, 2, 2}).mesh()), I, inside, I).min_distance;
+  EXPECT_GT(surfaces, 0.5);
+  EXPECT_EQ(ask<double>(hull, I, inside, I).min_distance, 0);
+  const auto d = ask<double>(hull, I, inside, I, true);
+  EXPECT_NEAR(d.min_distance, -surfaces, 1e-12);
+  EXPECT_EQ(d.b1, fcl::Contactd::NONE);
+}
+
 TEST(DistanceDouble, MovingByItTouchesAndNotBefore) {
   const Raw ra = test::torus(60), rb = test::torus(31, 0.2);
   const Modeld a(ra.mesh()), b(rb.mesh());

@@ -74,7 +74,7 @@ expect '^auto takes none: .*no device 99' 0 "${mesa[@]}" BOCST_ORACLE=99 "$bocst
 
 # A report names what it could not ask.
 report=$(mktemp -d)
-trap 'rm -rf "$out" "$report"' EXIT
+trap 'rm -rf "$out" "$image" "$report"' EXIT
 expect "^report: $report/paper.md" 0 "${no_driver[@]}" "$bocst" paper "$models/gripper.obj" --frames 70 --out "$report"
 for oracle in occlusion compute sampled; do
   grep -q "^| $oracle | not to be had: ." "$report/paper.md" || { echo "FAILED: no word of $oracle"; failures=$((failures + 1)); }

@@ -36,13 +36,14 @@ Grown grow(const std::shared_ptr<const Mesh>& mesh, Options options, bool errors
   Grown grown;
   const Stopwatch watch;
   Modeld tree(mesh, options);
+  tree.expandAll(options.depth);
+  grown.microseconds = watch.microseconds();
+  tree.visit([&grown](const NodeView& node) { grown.nodes.push_back(node); });
+  grown.oracle = tree.oracleName();
   for (int level = 1; level <= options.depth; ++level) {
     tree.expandAll(level);
     grown.bytes.push_back(tree.statistics().resident_bytes);
   }
-  grown.microseconds = watch.microseconds();
-  tree.visit([&grown](const NodeView& node) { grown.nodes.push_back(node); });
-  grown.oracle = tree.oracleName();
   if (errors) {
     grown.levels = errorByLevel(*mesh, grown.nodes);
     return grown;

@@ -136,7 +136,7 @@ class Drawn {
     std::vector<std::vector<Eigen::Vector3d>> points;
     if (focus_.empty()) {
       for (const Side& side : sides_) {
-        points.push_back(some(side.mesh.vertices()));
+        points.push_back(some(cornersOf(side.mesh)));
         for (Eigen::Vector3d& point : points.back()) point = side.pose * point;
       }
     } else {
@@ -167,6 +167,15 @@ class Drawn {
     axes_ = best_axes;
   }
 
+  /// Vertices that no triangle has are no part of the surface.
+  static std::vector<Eigen::Vector3d> cornersOf(const Mesh& mesh) {
+    std::vector<Eigen::Vector3d> corners;
+    for (const Mesh::Indices& t : mesh.triangles()) {
+      for (const auto i : t) corners.push_back(mesh.vertex(i));
+    }
+    return corners;
+  }
+
   /// Of many points a few hundred.
   static std::vector<Eigen::Vector3d> some(const std::vector<Eigen::Vector3d>& all) {
     constexpr std::size_t kMost = 400;
@@ -187,7 +196,7 @@ class Drawn {
   View overview() const {
     Extent extent{{}, axes_};
     for (const Side& side : sides_) {
-      for (const Eigen::Vector3d& v : side.mesh.vertices()) extent.add(side.pose * v);
+      for (const Eigen::Vector3d& v : cornersOf(side.mesh)) extent.add(side.pose * v);
     }
     return withReach(extent.view(1.12));
   }

@@ -116,8 +116,6 @@ std::string rate(double per_second) {
 
 std::string columnName(const PaperRun& run) { return methodName(run.subdivision) + " l=" + std::to_string(run.depth); }
 
-std::string methodOf(const TreeStudy::Tree& tree) { return tree.dimension == 0 ? "O" : "B"; }
-
 std::string dimensionOf(const TreeStudy::Tree& tree) {
   return tree.dimension == 0 ? "any" : formatPlain(tree.dimension);
 }

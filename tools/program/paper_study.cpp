@@ -51,6 +51,10 @@ Json jsonOf(const Animation::Part& part) {
 
 std::string methodName(Subdivision subdivision) { return subdivision == Subdivision::kOctree ? "O" : "B"; }
 
+std::string methodOf(const TreeStudy::Tree& tree) {
+  return methodName(tree.dimension == 0 ? Subdivision::kOctree : Subdivision::kBono);
+}
+
 const TreeStudy::Tree& TreeStudy::at(double dimension) const {
   const auto tree =
       std::find_if(trees.begin(), trees.end(), [dimension](const Tree& t) { return t.dimension == dimension; });
@@ -132,7 +136,7 @@ Json json(const TreeStudy& study) {
       if (tree.paper != nullptr && i < tree.paper->nodes.size()) entry["nodes_paper"] = tree.paper->nodes[i];
       levels.push_back(entry);
     }
-    report["trees"].push_back({{"method", tree.dimension == 0 ? "O" : "B"},
+    report["trees"].push_back({{"method", methodOf(tree)},
                                {"dimension", tree.dimension == 0 ? Json() : Json(tree.dimension)},
                                {"levels", levels}});
   }

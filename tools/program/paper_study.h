@@ -69,5 +69,6 @@ Json json(const TreeStudy& study);
 Json json(const AnimationStudy& study);
 
 std::string methodName(Subdivision subdivision);  ///< "O" or "B".
+std::string methodOf(const TreeStudy::Tree& tree);
 
 }  // namespace bocst::program

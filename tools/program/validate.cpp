@@ -166,15 +166,16 @@ struct Validate {
       }
     }
 
-    if ((!html_file.empty() || renderer) && first) {
-      const GrownPair grown = worst(*mesh_a, *mesh_b, sum, *first);
-      if (!html_file.empty()) writeFile(html_file, pairPage(grown).html());
-      if (renderer) writePng(image.file, pairPicture(*renderer, grown, image));
-    }
+    // First of all the result: pictures may fail.
     if (output.wantsJson()) {
       output.write(sum.json());
     } else {
       sum.print();
+    }
+    if ((!html_file.empty() || renderer) && first) {
+      const GrownPair grown = worst(*mesh_a, *mesh_b, sum, *first);
+      if (!html_file.empty()) writeFile(html_file, pairPage(grown).html());
+      if (renderer) writePng(image.file, pairPicture(*renderer, grown, image));
     }
     sum.throwIfWrong();
     return 0;
