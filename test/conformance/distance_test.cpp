@@ -134,7 +134,7 @@ TEST(DistanceDouble, SignedOfWhatIsInsideASolid) {
   EXPECT_EQ(ask<double>(hull, I, inside, I).min_distance, 0);
   const auto d = ask<double>(hull, I, inside, I, true);
   EXPECT_NEAR(d.min_distance, -surfaces, 1e-12);
-  EXPECT_EQ(d.b1, fcl::Contactd::NONE);
+  EXPECT_EQ(d.b1, -1) << "Contact::NONE";
 }
 
 TEST(DistanceDouble, MovingByItTouchesAndNotBefore) {
