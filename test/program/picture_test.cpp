@@ -494,6 +494,10 @@ TEST_F(Pictures, PairsShowContactsAndWhatGrew) {
   EXPECT_GT(contactsIn(touching, 0), 20);
   EXPECT_EQ(contactsIn(touching, 1), 0);
   EXPECT_GT(contactsIn(touching, 2), contactsIn(touching, 0));
+  // A vertex that no triangle has is no part of the surface, wherever it is.
+  test::Raw stray = test::torus(24);
+  stray.vertices.emplace_back(1000, 0, 0);
+  EXPECT_EQ(contactsIn(pixelsOf(*stray.mesh(), *box, "0.7,0,0.3,1,0,0,0"), 0), contactsIn(touching, 0));
   // In the middle of the torus, near its surface but not on it: a close-up, but no contacts.
   const Pixels apart = pixelsAt("0,0,0,1,0,0,0");
   EXPECT_EQ(apart.countContact(0, 0, apart.width, apart.height), 0);
