@@ -120,7 +120,7 @@ TEST(PaperTrees, CountTheCellsOfACubeAsOneWouldByHand) {
 }
 
 TEST(PaperTrees, TheSampledFormFindsNoMoreThanThereIs) {
-  if (!usable(OracleKind::kSampled)) GTEST_SKIP() << "no OpenGL here";
+  ASSERT_TRUE(usable(OracleKind::kSampled)) << "tests need an EGL device, llvmpipe at least";
   const program::TreeStudy study = program::studyTrees(program::paperMeshes()[1], studyMesh(test::torus(12)), true);
   for (const auto& tree : study.trees) {
     if (tree.paper == nullptr) continue;
