@@ -167,6 +167,14 @@ void put(TrianglePack& pack, std::size_t i, const Corners& t) {
   }
 }
 
+// Makes one triangle in `often` a sliver, and half and a quarter as many a segment and a point.
+template <typename Triangle>
+void degenerateAtTimes(std::mt19937_64& g, Triangle& t, unsigned often) {
+  if (g() % often == 0) t[2] = t[1] + 1e-9 * (t[2] - t[1]);
+  if (g() % (2 * often) == 0) t[1] = t[0];
+  if (g() % (4 * often) == 0) t[1] = t[2] = t[0];
+}
+
 TEST_P(EveryTarget, NoPairIsLostThatFclFinds) {
   std::mt19937_64 g(3);
   std::uniform_real_distribution<double> u(-1, 1);
@@ -181,9 +189,7 @@ TEST_P(EveryTarget, NoPairIsLostThatFclFinds) {
       const Eigen::Vector3d c(u(g), u(g), u(g));
       const double size = std::pow(10.0, u(g));
       for (auto& v : t) v = (c + size * Eigen::Vector3d(u(g), u(g), u(g))) * scale;
-      if (g() % 8 == 0) t[2] = t[1] + 1e-9 * (t[2] - t[1]);  // sliver
-      if (g() % 16 == 0) t[1] = t[0];                        // segment
-      if (g() % 32 == 0) t[1] = t[2] = t[0];                 // point
+      degenerateAtTimes(g, t, 8);
     };
     for (std::size_t i = 0; i < a.count; ++i) {
       make(ta[i]);
@@ -301,9 +307,7 @@ TEST_P(EveryTarget, NoPairIsLostThatIsNearest) {
       const Eigen::Vector3d c = about + Eigen::Vector3d(u(g), u(g), u(g));
       const double size = std::pow(10.0, u(g));
       for (auto& v : t) v = (c + size * Eigen::Vector3d(u(g), u(g), u(g))) * scale;
-      if (g() % 8 == 0) t[2] = t[1] + 1e-9 * (t[2] - t[1]);  // sliver
-      if (g() % 16 == 0) t[1] = t[0];                        // segment
-      if (g() % 32 == 0) t[1] = t[2] = t[0];                 // point
+      degenerateAtTimes(g, t, 8);
     };
     // Neighbours that share a corner or an edge are as near as each other.
     const auto makeAll = [&](std::vector<std::array<Eigen::Vector3d, 3>>& all, const Eigen::Vector3d& about) {
@@ -409,9 +413,7 @@ TEST(NearestPoints, NoTwoPointsAreNearer) {
     Corners p, q;
     for (Eigen::Vector3d* t : {p, q}) {
       for (int k = 0; k < 3; ++k) t[k] = Eigen::Vector3d(u(g), u(g), u(g));
-      if (g() % 4 == 0) t[2] = t[1] + 1e-9 * (t[2] - t[1]);  // sliver
-      if (g() % 8 == 0) t[1] = t[0];                         // segment
-      if (g() % 16 == 0) t[1] = t[2] = t[0];                 // point
+      degenerateAtTimes(g, t, 4);
     }
     // FCL's own triangle distance misses the nearest points of parallel edges.
     if (round % 3 == 0) q[1] = q[0] + (1 + 0.5 * u(g)) * (p[1] - p[0]);
