@@ -4,9 +4,7 @@
 #include <fcl/config.h>
 #include <fcl/geometry/bvh/BVH_model.h>
 #include <fcl/math/geometry.h>
-#include <fcl/narrowphase/detail/traversal/collision/collision_traversal_node_base.h>
 #include <fcl/narrowphase/detail/traversal/collision/intersect.h>
-#include <fcl/narrowphase/detail/traversal/collision_node.h>
 
 #include <algorithm>
 #include <functional>
@@ -65,7 +63,6 @@ class Collector : public query::Visitor {
  public:
   Collector(const Question<S>& q, const Triangles1& t1, const Triangles2& t2, bool swapped, double magnitude)
       : q_(q), t1_(t1), t2_(t2), swapped_(swapped), magnitude_(magnitude), margin_(q.margin), seen_(pairs()) {
-    fcl::relativeTransform(q.X_W1.linear(), q.X_W1.translation(), q.X_W2.linear(), q.X_W2.translation(), R_12_, p_12_);
     // A boolean query ends at the first contact, so it meets no pair twice.
     once_ = q.request.num_max_contacts > 1 || q.request.enable_cost;
     if (once_) seen_.clear();
@@ -82,6 +79,12 @@ class Collector : public query::Visitor {
   bool triangles(std::uint32_t a, std::uint32_t b) override {
     if (swapped_) std::swap(a, b);
     if (once_ && !seen_.insert(a, b)) return false;
+    if (!placed_) {
+      // Most queries that miss never come here.
+      fcl::relativeTransform(q_.X_W1.linear(), q_.X_W1.translation(), q_.X_W2.linear(), q_.X_W2.translation(), R_12_,
+                             p_12_);
+      placed_ = true;
+    }
     const fcl::Vector3<S> p[3] = {t1_.corner(a, 0), t1_.corner(a, 1), t1_.corner(a, 2)};
     const fcl::Vector3<S> q[3] = {t2_.corner(b, 0), t2_.corner(b, 1), t2_.corner(b, 2)};
     const bool meet = fcl::detail::Intersect<S>::intersect_Triangle(p[0], p[1], p[2], q[0], q[1], q[2], R_12_, p_12_);
@@ -195,28 +198,11 @@ class Collector : public query::Visitor {
   query::PairSet& seen_;
   fcl::Matrix3<S> R_12_;
   fcl::Vector3<S> p_12_;
+  bool placed_ = false;  // R_12_ and p_12_ are set
   bool once_;
   Eigen::Vector3d origin_ = Eigen::Vector3d::Zero();
   double unit_ = 1;
 };
-
-/// FCL's traversal with one leaf, as FCL's octree does it: the walk below that leaf is ours.
-template <typename S, typename Walk>
-class PairTraversalNode : public fcl::detail::CollisionTraversalNodeBase<S> {
- public:
-  explicit PairTraversalNode(Walk& walk) : walk_(walk) {}
-  bool BVTesting(int, int) const override { return false; }
-  void leafTesting(int, int) const override { walk_.run(); }
-
- private:
-  Walk& walk_;
-};
-
-template <typename S, typename Walk>
-void traverse(Walk&& walk) {
-  PairTraversalNode<S, std::remove_reference_t<Walk>> node(walk);
-  fcl::detail::collide(&node);
-}
 
 /// What is within the margin touches: the walk's slack, in units of side A, is so much more.
 template <typename S>
@@ -236,10 +222,10 @@ void collideModels(const Question<S>& q, tree::Tree& tree1, tree::Tree& tree2) {
     Collector<S, ModelTriangles<S>, ModelTriangles<S>> collector(q, t1, t2, swapped, magnitude);
     collector.setFrame(s.lattice.origin(), s.lattice.unit());
     if (q.margin == 0 && query::TreeWalk::fits(a, b, b_in_a)) {
-      traverse<S>(query::TreeWalk(a, b, b_in_a, collector));
+      query::TreeWalk(a, b, b_in_a, collector).run();
     } else {
       const Placement near = withMargin(b_in_a, a, q, a.cells() || b.cells());
-      traverse<S>(query::PairWalk<TreeSide, TreeSide>(a, b, near, collector));
+      query::PairWalk<TreeSide, TreeSide>(a, b, near, collector).run();
     }
     if (q.mayBeInside(before) &&
         (holds<S>(tree1, q.X_W1, tree2, q.X_W2, magnitude) || holds<S>(tree2, q.X_W2, tree1, q.X_W1, magnitude))) {
@@ -263,7 +249,7 @@ void collideBvh(const Question<typename BV::S>& q, tree::Tree& tree, const fcl::
     const BvhTriangles<BV> partner(bvh);
     const auto walk = [&](auto&& collector) {
       collector.setFrame(s.lattice.origin(), s.lattice.unit());
-      traverse<S>(query::PairWalk<TreeSide, BvhSide<BV>>(a, b, withMargin(b_in_a, a, q, a.cells()), collector));
+      query::PairWalk<TreeSide, BvhSide<BV>>(a, b, withMargin(b_in_a, a, q, a.cells()), collector).run();
     };
     if (swapped) {
       walk(Collector<S, BvhTriangles<BV>, ModelTriangles<S>>(q, partner, model, true, magnitude));

@@ -19,7 +19,7 @@ class TreeWalk {
   }
 
   TreeWalk(const TreeSide& a, const TreeSide& b, const Placement& b_in_a, Visitor& visitor)
-      : a_(a), b_(b), b_in_a_(b_in_a), a_in_b_(b_in_a.inverse()), visitor_(visitor) {}
+      : a_(a), b_(b), b_in_a_(b_in_a), visitor_(visitor) {}
 
   /// True when the visitor ended it.
   bool run();
@@ -33,7 +33,6 @@ class TreeWalk {
 
   const TreeSide &a_, &b_;
   const Placement& b_in_a_;
-  const Placement a_in_b_;
   Visitor& visitor_;
 };
 

@@ -1,6 +1,8 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #include "tree/tree.h"
 
+#include <time.h>
+
 #include <algorithm>
 #include <cmath>
 #include <limits>
@@ -63,6 +65,16 @@ std::int64_t nanoseconds(Clock::time_point t) {
   return std::chrono::duration_cast<std::chrono::nanoseconds>(t.time_since_epoch()).count();
 }
 
+// The clock as of the system's last tick, a few milliseconds old: to read it to the nanosecond takes longer than a
+// query of what is apart, and stamps that differ each time are written each time, to lines that threads share.
+std::int64_t coarseNow() {
+#ifdef CLOCK_MONOTONIC_COARSE
+  timespec t;
+  if (clock_gettime(CLOCK_MONOTONIC_COARSE, &t) == 0) return std::int64_t{t.tv_sec} * 1000000000 + t.tv_nsec;
+#endif
+  return nanoseconds(Clock::now());
+}
+
 }  // namespace
 
 Tree::Tree(std::shared_ptr<const Mesh> mesh, const Options& options)
@@ -83,7 +95,7 @@ void Tree::reset(std::shared_ptr<const Mesh> mesh) {
   keepOnly({});
 }
 
-std::int64_t Tree::now() const { return nanoseconds(options_.clock ? options_.clock() : Clock::now()); }
+std::int64_t Tree::now() const { return options_.clock ? nanoseconds(options_.clock()) : coarseNow(); }
 
 const std::vector<Eigen::Vector3d>& Tree::pieces() const {
   if (const auto* known = pieces_known_.load(std::memory_order_acquire)) return *known;
