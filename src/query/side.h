@@ -112,7 +112,7 @@ class TreeSide {
   void children(Node node, F&& f) const {
     const std::uint32_t index = tree_.link(node).index();
     const tree::Block& block = tree_.block(index);
-    tree_.touch(block, now_);
+    tree_.touch(index, now_);
     for (int mask = block.grey; mask != 0; mask &= mask - 1) {
       f(Node::octant(index, __builtin_ctz(static_cast<unsigned>(mask))));
     }
@@ -140,7 +140,7 @@ class TreeSide {
   template <typename OtherVolume>
   unsigned octantsOverlapping(std::uint32_t index, OtherVolume& other, const Placement& to) const {
     const tree::Block& block = tree_.block(index);
-    tree_.touch(block, now_);
+    tree_.touch(index, now_);
     const double side = 1 << (lattice::kMaxLevel - block.level);
     const double corner[3] = {block.at[0] * side, block.at[1] * side, block.at[2] * side};
     return overlappingOctants(block.octants, seenFrom(other, to, corner, side / 2)) & block.grey;

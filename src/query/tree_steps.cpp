@@ -183,7 +183,7 @@ PairSteps::Event NextEvent(PairSteps& s) {
     lookUp(s, s.pair[1], 1, frames);
     const std::uint32_t index = own.link.index();
     const tree::Block& block = s.tree[x]->block(index);
-    s.tree[x]->touch(block, s.now);
+    s.tree[x]->touch(index, s.now);
     decodeBlock(s, x, index, block, frames);
     const unsigned mask =
         overlapping(s.geometry, x, s.frames[frames], s.frames[other.lane / 8], other.lane % 8) & block.grey;

@@ -14,9 +14,12 @@ struct TreeWalk::Scratch {
   Frame frames[PairSteps::kFrames];
   SetAside<TreeSide, TreeSide> aside;
   LeafPairs<TreeSide, TreeSide> leaves;
+  PackedLeaves packed;
+  PackPair found[TrianglePack::kCapacity * TrianglePack::kCapacity];
   CoarseLeaf<TreeSide> coarse_a, coarse_b;
   bool grew = false;
   std::vector<tree::NodeRef> unseen[2];  // set aside, and with no slab yet
+  std::vector<tree::NodeRef> loose[2];   // leaves whose corners are not packed
 };
 
 bool TreeWalk::run() {
@@ -25,10 +28,19 @@ bool TreeWalk::run() {
   s.leaves.clear();
   s.coarse_a.clear();
   s.coarse_b.clear();
-  s.unseen[0].clear();
-  s.unseen[1].clear();
+  s.packed.clear();
+  for (int side = 0; side < 2; ++side) {
+    s.unseen[side].clear();
+    s.loose[side].clear();
+  }
   s.grew = false;
-  if (!search(s)) return false;
+  const bool ended = search(s);
+  // A first answer has enough to do; what a later one needs again is worth to be packed.
+  if (!s.grew) {
+    a_.tree().packLeaves(s.loose[0]);
+    b_.tree().packLeaves(s.loose[1]);
+  }
+  if (!ended) return false;
   // What a query could do without, the next one meets again: a look is cheaper than growing it.
   a_.tree().look(s.unseen[0]);
   b_.tree().look(s.unseen[1]);
@@ -71,13 +83,33 @@ bool TreeWalk::stepAll(PairSteps& steps, Scratch& s) {
                                                                            steps.pair[0].node, b_in_a_.inverse()));
         break;
       case PairSteps::kLeaves:
-        if (s.leaves.test(a_, steps.pair[0].node, b_, steps.pair[1].node, b_in_a_,
-                          [this](std::uint32_t t, std::uint32_t u) { return visitor_.triangles(t, u); })) {
-          return true;
-        }
+        if (testLeaves(steps, s)) return true;
         break;
     }
   }
+}
+
+bool TreeWalk::testLeaves(const PairSteps& steps, Scratch& s) {
+  const StepNode &a = steps.pair[0], &b = steps.pair[1];
+  tree::PackedTriangles packed[2];
+  const bool packed_a = a_.tree().packed(a.link, packed[0]), packed_b = b_.tree().packed(b.link, packed[1]);
+  const auto fits = [](const tree::PackedTriangles& p) { return p.count <= TrianglePack::kCapacity; };
+  if (packed_a && packed_b && fits(packed[0]) && fits(packed[1])) {
+    const std::uint32_t *ids_a = a_.tree().list(a.link).ids, *ids_b = b_.tree().list(b.link).ids;
+    const std::size_t found =
+        s.packed.test(a.node, packed[0], a_.cellSphere(a.node).center, packed[1], b_in_a_, s.found);
+    for (std::size_t i = 0; i < found; ++i) {
+      if (visitor_.triangles(ids_a[s.found[i].row], ids_b[s.found[i].lane])) return true;
+    }
+    return false;
+  }
+  for (int side = 0; side < 2; ++side) {
+    if (!(side == 0 ? packed_a : packed_b) && s.loose[side].size() < kLooks) {
+      s.loose[side].push_back(steps.pair[side].node);
+    }
+  }
+  return s.leaves.test(a_, a.node, b_, b.node, b_in_a_,
+                       [this](std::uint32_t t, std::uint32_t u) { return visitor_.triangles(t, u); });
 }
 
 void TreeWalk::setAside(const PairSteps& steps, Scratch& s) {

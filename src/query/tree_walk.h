@@ -4,6 +4,7 @@
 #include <vector>
 
 #include "query/leaf_pairs.h"
+#include "query/packed_leaves.h"
 #include "query/set_aside.h"
 #include "query/tree_steps.h"
 #include "query/visitor.h"
@@ -29,6 +30,7 @@ class TreeWalk {
 
   bool search(Scratch& s);
   bool stepAll(PairSteps& steps, Scratch& s);
+  bool testLeaves(const PairSteps& steps, Scratch& s);
   void setAside(const PairSteps& steps, Scratch& s);
 
   const TreeSide &a_, &b_;
