@@ -43,10 +43,14 @@ inline std::uint32_t pop(PairSteps& s, StepNode (&pair)[2]) {
   for (;;) {
     StepGroup& top = s.stack[s.depth - 1];
     const unsigned octants = top.octants != 0 ? top.octants : top.implicit;
-    const int o = __builtin_ctz(octants);
+    int o = __builtin_ctz(octants);
+    for (unsigned left = octants & (octants - 1); left != 0; left &= left - 1) {
+      const int p = __builtin_ctz(left);
+      o = top.overlap[p] > top.overlap[o] ? p : o;
+    }
     const tree::NodeRef node = tree::NodeRef::octant(top.block, o);
     const tree::Link link = s.tree[top.side]->link(node);
-    const unsigned rest = octants & (octants - 1);
+    const unsigned rest = octants & ~(1u << o);
     if (top.octants != 0) {
       top.octants = rest;
       if (link.tag() == tree::Link::kImplicit && (rest | top.implicit) != 0) {
@@ -84,23 +88,26 @@ namespace bocst::query::HWY_NAMESPACE {
 
 // Bit o is set unless octant o of frame f (side `own`) is surely apart from the volume in lane l of frame y, by one of
 // eight axes: the faces of both boxes and both slab normals. No edge axes: with slabs they gain nothing.
-HWY_INLINE unsigned overlapping(const PairFrames& g, int own, const Frame& f, const Frame& y, std::size_t l) {
+HWY_INLINE unsigned overlapping(const PairFrames& g, int own, const Frame& f, const Frame& y, std::size_t l,
+                                float* overlap) {
   const D d;
   const int other = 1 - own;
   const V pad = hn::Set(d, g.pad), slab_pad = hn::Set(d, g.slab_pad);
   unsigned result = 0;
   for (std::size_t i = 0; i < 8; i += hn::Lanes(d)) {
     V way[2][3];  // from the octants' middles to the volume's, in both frames
-    M apart = hn::MaskFromVec(hn::Zero(d));
+    V least = hn::Set(d, 1e30f);
     BOCST_UNROLL
     for (int s = 0; s < 2; ++s) {
       BOCST_UNROLL
       for (int k = 0; k < 3; ++k) {
         way[s][k] = hn::Sub(hn::Set(d, y.center[s][k][l]), hn::Load(d, f.center[s][k] + i));
         const V reach = hn::Add(hn::Load(d, f.half[s][k] + i), hn::Add(hn::Set(d, y.half[s][k][l]), pad));
-        apart = hn::Or(apart, hn::Gt(hn::Abs(way[s][k]), reach));
+        least = hn::Min(least, hn::Sub(reach, hn::Abs(way[s][k])));
       }
     }
+    hn::StoreU(least, d, overlap + i);
+    M apart = hn::Lt(least, hn::Zero(d));
     // Slabs: for z in a box with |m.z - offset| <= w, any a gives n.z in a * offset +- (|a| w + |n - a m| over the
     // box).
     const V x_center = hn::Load(d, f.slab_center + i), x_half = hn::Load(d, f.slab_half + i);
@@ -166,7 +173,8 @@ std::uint8_t OverlappingOctants(const PairFrames& geometry, int own, const CellO
   Frame f, y;
   decodeCell(geometry, own, cell.cell.level, cell.cell.at, cell.octants, f);
   decodeCell(geometry, 1 - own, other.cell.level, other.cell.at, other.octants, y);
-  return static_cast<std::uint8_t>(overlapping(geometry, own, f, y, static_cast<std::size_t>(octant)));
+  float overlap[8];
+  return static_cast<std::uint8_t>(overlapping(geometry, own, f, y, static_cast<std::size_t>(octant), overlap));
 }
 
 PairSteps::Event NextEvent(PairSteps& s) {
@@ -179,14 +187,20 @@ PairSteps::Event NextEvent(PairSteps& s) {
     const int x = leaf1 || (!leaf0 && side0 >= side1) ? 0 : 1, y = 1 - x;
     StepNode &own = s.pair[x], &other = s.pair[y];
     if (own.link.tag() != tree::Link::kBlock) return PairSteps::kAside;
+    if (other.link.tag() == tree::Link::kBlock) {
+      const tree::Block& b = s.tree[y]->block(other.link.index());
+      __builtin_prefetch(&b);
+      __builtin_prefetch(reinterpret_cast<const char*>(&b) + 64);
+    }
     lookUp(s, s.pair[0], 0, frames);
     lookUp(s, s.pair[1], 1, frames);
     const std::uint32_t index = own.link.index();
     const tree::Block& block = s.tree[x]->block(index);
     s.tree[x]->touch(index, s.now);
     decodeBlock(s, x, index, block, frames);
-    const unsigned mask =
-        overlapping(s.geometry, x, s.frames[frames], s.frames[other.lane / 8], other.lane % 8) & block.grey;
+    const unsigned mask = overlapping(s.geometry, x, s.frames[frames], s.frames[other.lane / 8], other.lane % 8,
+                                      s.stack[s.depth].overlap) &
+                          block.grey;
     if (mask == 0) continue;
     if (y == 0 ? leaf0 && side1 < side0 : leaf1 && side0 < side1) {
       s.frames_used = frames;

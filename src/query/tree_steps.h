@@ -30,6 +30,7 @@ struct StepGroup {
   std::uint32_t frame;  ///< Where the block's octants are, if they are; those below it are in use, too.
   std::uint32_t level;  ///< Of the octants.
   std::uint32_t octants;
+  float overlap[8];
   std::uint32_t implicit;  ///< Octants that turned out to be so: they wait for the others.
 };
 

@@ -95,6 +95,10 @@ bool TreeWalk::testLeaves(const PairSteps& steps, Scratch& s) {
   const bool packed_a = a_.tree().packed(a.link, packed[0]), packed_b = b_.tree().packed(b.link, packed[1]);
   const auto fits = [](const tree::PackedTriangles& p) { return p.count <= TrianglePack::kCapacity; };
   if (packed_a && packed_b && fits(packed[0]) && fits(packed[1])) {
+    for (int i = 0; i < 6; ++i) {
+      __builtin_prefetch(reinterpret_cast<const char*>(packed[0].steps) + 64 * i);
+      __builtin_prefetch(reinterpret_cast<const char*>(packed[1].steps) + 64 * i);
+    }
     const std::uint32_t *ids_a = a_.tree().list(a.link).ids, *ids_b = b_.tree().list(b.link).ids;
     const std::size_t found =
         s.packed.test(a.node, packed[0], a_.cellSphere(a.node).center, packed[1], b_in_a_, s.found);
