@@ -22,7 +22,7 @@ struct TreeWalk::Scratch {
 bool TreeWalk::run() {
   thread_local Scratch s;
   s.aside.clear();
-  s.leaves.clear();
+  s.leaves.start(b_in_a_, a_in_b_);
   s.coarse_a.clear();
   s.coarse_b.clear();
   s.unseen[0].clear();
@@ -79,8 +79,9 @@ bool TreeWalk::stepAll(PairSteps& steps, Scratch& s) {
                                                                            steps.pair.node[0], a_in_b_));
         break;
       case PairSteps::kLeaves:
-        if (s.leaves.test(a_, steps.pair.node[0], b_, steps.pair.node[1], b_in_a_,
-                          [this](std::uint32_t t, std::uint32_t u) { return visitor_.triangles(t, u); })) {
+        if (s.leaves.test(
+                a_, steps.pair.node[0], b_, steps.pair.node[1],
+                [this](std::uint32_t t, std::uint32_t u, bool certain) { return visitor_.triangles(t, u, certain); })) {
           return true;
         }
         break;
