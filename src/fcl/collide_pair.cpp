@@ -76,9 +76,10 @@ class Collector : public query::Visitor {
 
   bool endsAtFirst() const override { return q_.endsAtFirst(); }
 
-  bool triangles(std::uint32_t a, std::uint32_t b) override {
+  bool triangles(std::uint32_t a, std::uint32_t b, bool certain) override {
     if (swapped_) std::swap(a, b);
     if (once_ && !seen_.insert(a, b)) return false;
+    if (certain && margin_ == 0 && !needsGeometry()) return add(a, b, nullptr);
     if (!placed_) {
       // Most queries that miss never come here.
       fcl::relativeTransform(q_.X_W1.linear(), q_.X_W1.translation(), q_.X_W2.linear(), q_.X_W2.translation(), R_12_,
@@ -87,7 +88,8 @@ class Collector : public query::Visitor {
     }
     const fcl::Vector3<S> p[3] = {t1_.corner(a, 0), t1_.corner(a, 1), t1_.corner(a, 2)};
     const fcl::Vector3<S> q[3] = {t2_.corner(b, 0), t2_.corner(b, 1), t2_.corner(b, 2)};
-    const bool meet = fcl::detail::Intersect<S>::intersect_Triangle(p[0], p[1], p[2], q[0], q[1], q[2], R_12_, p_12_);
+    const bool meet =
+        certain || fcl::detail::Intersect<S>::intersect_Triangle(p[0], p[1], p[2], q[0], q[1], q[2], R_12_, p_12_);
     if (!meet && margin_ == 0) return false;
 
     Corners pd, qd;
@@ -95,7 +97,7 @@ class Collector : public query::Visitor {
       pd[k] = p[k].template cast<double>();
       qd[k] = q[k].template cast<double>();
     }
-    const bool degenerate = query::isDegenerate(pd) || query::isDegenerate(qd);
+    const bool degenerate = !certain && (query::isDegenerate(pd) || query::isDegenerate(qd));
     if (!degenerate && margin_ == 0 && !needsGeometry()) return add(a, b, nullptr);
     for (Eigen::Vector3d& x : qd) x = R_12_.template cast<double>() * x + p_12_.template cast<double>();
     Eigen::Vector3d on_p, on_q;

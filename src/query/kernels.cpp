@@ -1,6 +1,9 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #include "query/kernels.h"
 
+#include <algorithm>
+#include <cmath>
+
 #undef HWY_TARGET_INCLUDE
 #define HWY_TARGET_INCLUDE "query/kernels.cpp"
 #include <hwy/foreach_target.h>
@@ -93,9 +96,7 @@ std::uint8_t OverlappingOctants(const oracle::OctantBounds& octants, const OneVo
       t = hn::NegMulAdd(along, own, t);
       apart = hn::Or(apart, hn::Gt(hn::Abs(t), r));
     }
-    std::uint8_t bits[8] = {};
-    hn::StoreMaskBits(d, hn::Not(apart), bits);
-    result = static_cast<std::uint8_t>(result | bits[0] << i);
+    result = static_cast<std::uint8_t>(result | maskBits(hn::Not(apart)) << i);
   }
   return result;
 }
@@ -128,56 +129,84 @@ void PlaceTriangles(RawTriangles& raw, std::size_t count, const PackPlacement& p
   pack.size = hn::GetLane(hn::MaxOfLanes(df, size));
 }
 
-std::size_t TouchingPairs(const TrianglePack& rows, const TrianglePack& lanes, float slack, PackPair* pairs) {
+std::uint32_t TrianglesWithin(const TrianglePack& pack, const PackRegion& region) {
   const D d;
-  const float size = (rows.size > lanes.size ? rows.size : lanes.size) * 1.0001f;
-  const V reach = hn::Set(d, 32 * 0x1p-24f * size + slack);
+  std::uint32_t result = 0;
+  for (std::size_t i = 0; i < pack.count; i += hn::Lanes(d)) {
+    const Vec3 v[3] = {corner(pack, 0, i), corner(pack, 1, i), corner(pack, 2, i)};
+    const Vec3 lo = min3(v), hi = max3(v), n = broadcast(region.normal[0], region.normal[1], region.normal[2]);
+    const V along[3] = {dot(n, v[0]), dot(n, v[1]), dot(n, v[2])};
+    M in = hn::And(hn::Le(lo.x, hn::Set(d, region.high[0])), hn::Ge(hi.x, hn::Set(d, region.low[0])));
+    in = hn::And(in, hn::And(hn::Le(lo.y, hn::Set(d, region.high[1])), hn::Ge(hi.y, hn::Set(d, region.low[1]))));
+    in = hn::And(in, hn::And(hn::Le(lo.z, hn::Set(d, region.high[2])), hn::Ge(hi.z, hn::Set(d, region.low[2]))));
+    in = hn::And(in, hn::And(hn::Le(min3(along[0], along[1], along[2]), hn::Set(d, region.slab_high)),
+                             hn::Ge(max3(along[0], along[1], along[2]), hn::Set(d, region.slab_low))));
+    result |= maskBits(in) << i;
+  }
+  return pack.count < 32 ? result & ((1u << pack.count) - 1) : result;
+}
+
+void MoveTriangles(const TrianglePack& pack, std::uint32_t which, const PackMotion& motion, TrianglePack& moved) {
+  const D d;
+  moved.count = 0;
+  for (std::size_t i = 0; i < pack.count; i += hn::Lanes(d)) {
+    const std::uint8_t bits[8] = {static_cast<std::uint8_t>(which >> i)};
+    if (bits[0] == 0) continue;
+    const M kept = hn::LoadMaskBits(d, bits);
+    BOCST_UNROLL
+    for (std::size_t k = 0; k < 3; ++k) {
+      const Vec3 v = corner(pack, k, i);
+      BOCST_UNROLL
+      for (std::size_t c = 0; c < 3; ++c) {
+        V x = hn::MulAdd(hn::Set(d, motion.linear[c][0]), v.x, hn::Set(d, motion.offset[c]));
+        x = hn::MulAdd(hn::Set(d, motion.linear[c][1]), v.y, x);
+        x = hn::MulAdd(hn::Set(d, motion.linear[c][2]), v.z, x);
+        // Whole vectors are written, but never beyond the place where they were read.
+        hn::CompressStore(x, kept, d, moved.xyz[3 * k + c] + moved.count);
+      }
+    }
+    moved.count += hn::CountTrue(d, kept);
+  }
+  float square = 0, offset = 0;
+  for (int c = 0; c < 3; ++c) {
+    const float(&r)[3] = motion.linear[c];
+    square = std::max(square, r[0] * r[0] + r[1] * r[1] + r[2] * r[2]);
+    offset = std::max(offset, std::abs(motion.offset[c]));
+  }
+  moved.size = (std::sqrt(3 * square) * pack.size + offset) * 1.0001f;
+}
+
+std::size_t TouchingPairs(const TrianglePack& rows, std::uint32_t which, const TrianglePack& lanes,
+                          const PackRegion& region, float slack, PackPair* pairs) {
+  const D d;
+  const float size = std::max(rows.size, lanes.size) * 1.0001f, u = 0x1p-24f;
+  const V reach = hn::Set(d, 64 * u * size + slack), moved = hn::Set(d, 8 * u * size + slack);
+  const V tiny = hn::Set(d, 1e-30f), zero = hn::Zero(d);  // products below have lost bits
   std::size_t found = 0;
-  // The rows' boxes, once for all lanes.
+  // The rows' boxes within the region, once for all lanes.
   alignas(64) float lows[3][TrianglePack::kCapacity], highs[3][TrianglePack::kCapacity];
   for (std::size_t i = 0; i < rows.count; i += hn::Lanes(d)) {
     BOCST_UNROLL
     for (int c = 0; c < 3; ++c) {
       const V a = hn::Load(d, rows.xyz[c] + i), b = hn::Load(d, rows.xyz[3 + c] + i),
               e = hn::Load(d, rows.xyz[6 + c] + i);
-      hn::Store(hn::Sub(min3(a, b, e), reach), d, lows[c] + i);
-      hn::Store(hn::Add(max3(a, b, e), reach), d, highs[c] + i);
+      const V low = hn::Max(min3(a, b, e), hn::Set(d, region.low[c]));
+      const V high = hn::Min(max3(a, b, e), hn::Set(d, region.high[c]));
+      hn::Store(hn::Sub(low, reach), d, lows[c] + i);
+      hn::Store(hn::Add(high, reach), d, highs[c] + i);
     }
   }
   for (std::size_t i = 0; i < lanes.count; i += hn::Lanes(d)) {
-    Vec3 q[3], f[3];
-    BOCST_UNROLL
-    for (int k = 0; k < 3; ++k) {
-      q[k] = {hn::Load(d, lanes.xyz[3 * k] + i), hn::Load(d, lanes.xyz[3 * k + 1] + i),
-              hn::Load(d, lanes.xyz[3 * k + 2] + i)};
-    }
-    const Vec3 qmin{min3(q[0].x, q[1].x, q[2].x), min3(q[0].y, q[1].y, q[2].y), min3(q[0].z, q[1].z, q[2].z)};
-    const Vec3 qmax{max3(q[0].x, q[1].x, q[2].x), max3(q[0].y, q[1].y, q[2].y), max3(q[0].z, q[1].z, q[2].z)};
-    BOCST_UNROLL
-    for (int k = 0; k < 3; ++k) f[k] = sub(q[(k + 1) % 3], q[k]);
+    const Vec3 q[3] = {corner(lanes, 0, i), corner(lanes, 1, i), corner(lanes, 2, i)};
+    const Vec3 qmin = min3(q), qmax = max3(q);
+    const Vec3 f[3] = {sub(q[1], q[0]), sub(q[2], q[1]), sub(q[0], q[2])};
     const Vec3 m = cross(f[0], f[1]);
     const V fsize = hn::Add(norm1(f[0]), norm1(f[1]));
     // The products of a normal are at most the product of the edges' sizes.
-    const V mpad = hn::Mul(reach, hn::Add(norm1(m), hn::Mul(norm1(f[0]), norm1(f[1]))));
+    const V mpad = hn::MulAdd(reach, hn::MulAdd(norm1(f[0]), norm1(f[1]), norm1(m)), tiny);
 
-    // Rows that reach into the box of these lanes.
-    const V low[3] = {hn::MinOfLanes(d, qmin.x), hn::MinOfLanes(d, qmin.y), hn::MinOfLanes(d, qmin.z)};
-    const V high[3] = {hn::MaxOfLanes(d, qmax.x), hn::MaxOfLanes(d, qmax.y), hn::MaxOfLanes(d, qmax.z)};
-    std::uint64_t near_rows = 0;
-    for (std::size_t row = 0; row < rows.count; row += hn::Lanes(d)) {
-      M in = hn::And(hn::Le(low[0], hn::Load(d, highs[0] + row)), hn::Ge(high[0], hn::Load(d, lows[0] + row)));
-      in = hn::And(in,
-                   hn::And(hn::Le(low[1], hn::Load(d, highs[1] + row)), hn::Ge(high[1], hn::Load(d, lows[1] + row))));
-      in = hn::And(in,
-                   hn::And(hn::Le(low[2], hn::Load(d, highs[2] + row)), hn::Ge(high[2], hn::Load(d, lows[2] + row))));
-      std::uint8_t bits[8] = {};
-      hn::StoreMaskBits(d, in, bits);
-      near_rows |= std::uint64_t{bits[0]} << row;
-    }
-    near_rows &= (std::uint64_t{1} << rows.count) - 1;
-
-    for (; near_rows != 0; near_rows &= near_rows - 1) {
-      const auto row = static_cast<std::size_t>(__builtin_ctzll(near_rows));
+    for (std::uint32_t left = which; left != 0; left &= left - 1) {
+      const auto row = static_cast<std::size_t>(__builtin_ctz(left));
       M near = hn::And(hn::Le(qmin.x, hn::Set(d, highs[0][row])), hn::Ge(qmax.x, hn::Set(d, lows[0][row])));
       near =
           hn::And(near, hn::And(hn::Le(qmin.y, hn::Set(d, highs[1][row])), hn::Ge(qmax.y, hn::Set(d, lows[1][row]))));
@@ -188,40 +217,46 @@ std::size_t TouchingPairs(const TrianglePack& rows, const TrianglePack& lanes, f
       Vec3 p[3];
       BOCST_UNROLL
       for (int k = 0; k < 3; ++k) {
-        p[k] = {hn::Set(d, rows.xyz[3 * k][row]), hn::Set(d, rows.xyz[3 * k + 1][row]),
-                hn::Set(d, rows.xyz[3 * k + 2][row])};
+        p[k] = broadcast(rows.xyz[3 * k][row], rows.xyz[3 * k + 1][row], rows.xyz[3 * k + 2][row]);
       }
       const Vec3 e[3] = {sub(p[1], p[0]), sub(p[2], p[1]), sub(p[0], p[2])};
       const Vec3 n = cross(e[0], e[1]);
-      const V npad = hn::Mul(reach, hn::Add(norm1(n), hn::Mul(norm1(e[0]), norm1(e[1]))));
+      const V npad = hn::MulAdd(reach, hn::MulAdd(norm1(e[0]), norm1(e[1]), norm1(n)), tiny);
       const V n0 = dot(n, sub(q[0], p[0])), n1 = dot(n, sub(q[1], p[0])), n2 = dot(n, sub(q[2], p[0]));
-      near = hn::And(near, hn::Le(min3(n0, n1, n2), npad));
-      near = hn::And(near, hn::Ge(max3(n0, n1, n2), hn::Neg(npad)));
       const V m0 = dot(m, sub(p[0], q[0])), m1 = dot(m, sub(p[1], q[0])), m2 = dot(m, sub(p[2], q[0]));
-      near = hn::And(near, hn::Le(min3(m0, m1, m2), mpad));
-      near = hn::And(near, hn::Ge(max3(m0, m1, m2), hn::Neg(mpad)));
+      // How far the one reaches to the nearer side of the other's plane.
+      const V by_n = hn::Min(max3(n0, n1, n2), hn::Neg(min3(n0, n1, n2)));
+      const V by_m = hn::Min(max3(m0, m1, m2), hn::Neg(min3(m0, m1, m2)));
+      near = hn::And(near, hn::And(hn::Ge(by_n, hn::Neg(npad)), hn::Ge(by_m, hn::Neg(mpad))));
       if (hn::AllFalse(d, near)) continue;
 
       const V esize = hn::Add(norm1(e[0]), norm1(e[1]));
-      const V epad = hn::Mul(hn::Mul(reach, hn::Set(d, 2.0f)), hn::Mul(esize, fsize));
+      const V epad = hn::MulAdd(hn::Mul(hn::Set(d, 2.0f), reach), hn::Mul(esize, fsize), tiny);
+      V overlap = hn::Min(by_n, by_m), by_edges = hn::Set(d, 3e38f);
       BOCST_UNROLL
       for (int a = 0; a < 3; ++a) {
         BOCST_UNROLL
         for (int b = 0; b < 3; ++b) {
-          // Both ends of each edge project to one point: two values a side.
+          // Both ends of each edge project to one point: two values a side, one of them 0.
           const Vec3 axis = cross(e[a], f[b]);
-          const Vec3 from = q[b];
-          const V s0 = dot(axis, sub(p[a], from)), s1 = dot(axis, sub(p[(a + 2) % 3], from));
-          const V t1 = dot(axis, sub(q[(b + 2) % 3], from)), zero = hn::Zero(d);
-          const M before = hn::Lt(hn::Add(hn::Max(s0, s1), epad), hn::Min(t1, zero));
-          const M after = hn::Gt(hn::Sub(hn::Min(s0, s1), epad), hn::Max(t1, zero));
-          near = hn::AndNot(hn::Or(before, after), near);
+          const V s0 = dot(axis, sub(p[a], q[b])), s1 = dot(axis, sub(p[(a + 2) % 3], q[b]));
+          const V t = dot(axis, sub(q[(b + 2) % 3], q[b]));
+          by_edges = hn::Min(by_edges, hn::Min(hn::Sub(hn::Max(s0, s1), hn::Min(t, zero)),
+                                               hn::Sub(hn::Max(t, zero), hn::Min(s0, s1))));
         }
       }
-      std::uint8_t bits[8] = {};
-      hn::StoreMaskBits(d, near, bits);
-      for (std::size_t k = 0; k < hn::Lanes(d) && i + k < lanes.count; ++k) {
-        if (bits[0] >> k & 1) pairs[found++] = {static_cast<std::uint8_t>(row), static_cast<std::uint8_t>(i + k)};
+      const std::uint32_t bits = maskBits(hn::And(near, hn::Ge(by_edges, hn::Neg(epad))));
+      if (bits == 0) continue;
+      overlap = hn::Min(overlap, by_edges);
+      const V length = hn::MulAdd(hn::Set(d, 3.0f), reach, hn::Add(esize, fsize));
+      const V change = hn::MulAdd(hn::Set(d, u), length, moved);
+      const V sure = hn::MulAdd(hn::Mul(hn::Set(d, 12.0f), change), hn::Mul(length, length), tiny);
+      const std::uint32_t certain = maskBits(hn::Gt(overlap, sure));
+      for (std::uint32_t k = bits; k != 0; k &= k - 1) {
+        const auto lane = static_cast<std::size_t>(__builtin_ctz(k));
+        if (i + lane >= lanes.count) break;
+        pairs[found++] = {static_cast<std::uint8_t>(row), static_cast<std::uint8_t>(i + lane),
+                          (certain >> lane & 1) != 0};
       }
     }
   }
@@ -236,6 +271,8 @@ namespace bocst::query {
 
 HWY_EXPORT(OverlappingOctants);
 HWY_EXPORT(PlaceTriangles);
+HWY_EXPORT(TrianglesWithin);
+HWY_EXPORT(MoveTriangles);
 HWY_EXPORT(TouchingPairs);
 
 std::uint8_t overlappingOctants(const oracle::OctantBounds& octants, const OneVolume& volume) {
@@ -246,8 +283,17 @@ void placeTriangles(RawTriangles& raw, std::size_t count, const PackPlacement& p
   HWY_DYNAMIC_DISPATCH(PlaceTriangles)(raw, count, place, pack);
 }
 
-std::size_t touchingPairs(const TrianglePack& rows, const TrianglePack& lanes, float slack, PackPair* pairs) {
-  return HWY_DYNAMIC_DISPATCH(TouchingPairs)(rows, lanes, slack, pairs);
+std::uint32_t trianglesWithin(const TrianglePack& pack, const PackRegion& region) {
+  return HWY_DYNAMIC_DISPATCH(TrianglesWithin)(pack, region);
+}
+
+void moveTriangles(const TrianglePack& pack, std::uint32_t which, const PackMotion& motion, TrianglePack& moved) {
+  HWY_DYNAMIC_DISPATCH(MoveTriangles)(pack, which, motion, moved);
+}
+
+std::size_t touchingPairs(const TrianglePack& rows, std::uint32_t which, const TrianglePack& lanes,
+                          const PackRegion& region, float slack, PackPair* pairs) {
+  return HWY_DYNAMIC_DISPATCH(TouchingPairs)(rows, which, lanes, region, slack, pairs);
 }
 
 }  // namespace bocst::query

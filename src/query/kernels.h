@@ -50,17 +50,49 @@ struct PackPlacement {
 /// Fills the pack with `count` triangles, 1 to kCapacity. What is in `raw` beyond is overwritten.
 void placeTriangles(RawTriangles& raw, std::size_t count, const PackPlacement& place, TrianglePack& pack);
 
+/// Where triangles of a pack can meet those of another leaf: a box and a slab, all in the pack's frame and padded.
+struct PackRegion {
+  float low[3], high[3];
+  float normal[3];            ///< Of the slab; zero: no slab.
+  float slab_low, slab_high;  ///< Along normal.
+};
+
+/// Bit i is set unless triangle i is surely outside of the region.
+std::uint32_t trianglesWithin(const TrianglePack& pack, const PackRegion& region);
+
+/// Corners are linear * v + offset, in float.
+struct PackMotion {
+  float linear[3][3];
+  float offset[3];
+};
+
+/// Fills `moved` with the triangles of `pack` in `which`, in that order. With s the largest sum of squares in a row of
+/// linear, rooted, its size is at least B = sqrt(3) s pack.size + |offset|, and corners are off by no more than 6 u B:
+/// the coordinates given, linear, offset and three sums of products.
+void moveTriangles(const TrianglePack& pack, std::uint32_t which, const PackMotion& motion, TrianglePack& moved);
+
 /// Two triangles that may touch, as positions in their packs.
 struct PackPair {
   std::uint8_t row, lane;
+  bool certain;  ///< They surely meet.
 };
 
-/// Writes the pairs (a triangle of rows, a triangle of lanes) that are not surely apart, by their boxes, their planes
-/// and their edges' cross products; at most rows.count * lanes.count. Returns how many. `slack` is a distance that
-/// still counts as touching: what the caller's coordinates are off by.
+/// Writes the pairs (a triangle of rows, of those in `which`, and a triangle of lanes) that are not surely apart, by
+/// their boxes, their planes and their edges' cross products; at most rows.count * lanes.count. Returns how many. What
+/// the rows have outside of the box of `region` is not looked at. `slack` is a distance that still counts as touching:
+/// what the caller's coordinates are off by.
 ///
-/// With M the larger size of the packs and u = 2^-24: corners are rounded by u M; a plane's equation by 16 u M times
-/// the sizes of its products before they cancel; an edge axis likewise. The pads are 32 u M times those sizes.
-std::size_t touchingPairs(const TrianglePack& rows, const TrianglePack& lanes, float slack, PackPair* pairs);
+/// With M the larger size of the packs and u = 2^-24: corners are off by 6 u M. Along a given axis, that and the dot
+/// products' rounding is 34 u M times its length; a plane's equation and an edge axis lose 12 u M times the sizes of
+/// their products before they cancel. The pads are 64 u M times those sizes, and twice that for edge axes.
+///
+/// A pair is certain when its triangles would meet however each corner were moved by h = 6 u M + slack along each axis:
+/// each of the eleven axes' overlaps, a determinant of three edges or ways between corners, is more than what that
+/// and rounding can change it by. With L the sum of both triangles' sizes (edges' norms, |.|_1) and of 3 pads, a
+/// determinant changes by 5 (h + u L) L^2 at most, while h is less than L / 6, as else no pair is certain; an overlap
+/// is the difference of two, and 12 are asked for. Triangles whose corners are on both sides of the other's plane are
+/// not in one plane, so those axes are all that could part them.
+std::size_t touchingPairs(const TrianglePack& rows, std::uint32_t which, const TrianglePack& lanes,
+                          const PackRegion& region, float slack, PackPair* pairs);
 
 }  // namespace bocst::query

@@ -2,11 +2,15 @@
 #pragma once
 
 #include <algorithm>
+#include <cmath>
 #include <cstddef>
 #include <cstdint>
+#include <type_traits>
+#include <vector>
 
 #include "oracle/cpu/kernels.h"
 #include "query/side.h"
+#include "query/unpack.h"
 
 namespace bocst::query {
 
@@ -91,40 +95,215 @@ class CoarseLeaf {
   TrianglePack pack_;
 };
 
+/// What bounds a leaf's triangles, as far as they are its own: a box and a slab, in its own frame [0] and in that of
+/// the other side [1].
+struct LeafVolume {
+  LeafVolume() = default;
+
+  LeafVolume(const Volume& v, const Placement& to_other) : slab{v.slab_offset, v.slab_half} {
+    for (int k = 0; k < 3; ++k) {
+      center[0][k] = v.center[k];
+      half[0][k] = v.half[k];
+      normal[0][k] = v.normal[k];
+      double n = 0;
+      for (int j = 0; j < 3; ++j) n += to_other.rotation(k, j) * v.normal[j];
+      normal[1][k] = n;
+    }
+    placeBox(to_other.rotation.cwiseAbs(), to_other);
+  }
+
+  LeafVolume(const OrientedVolume& v, const Placement& to_other) {
+    const Eigen::Vector3d own = v.axes.cwiseAbs() * v.half;
+    for (int k = 0; k < 3; ++k) {
+      center[0][k] = v.center[k];
+      half[0][k] = own[k];
+    }
+    placeBox(to_other.rotation.cwiseAbs(), to_other);
+  }
+
+  double center[2][3];
+  double half[2][3];
+  double normal[2][3] = {};  ///< Of the slab, about unit length; zero: no slab.
+  double slab[2] = {};       ///< Along normal, from center: its middle and half its thickness, in own units.
+
+ private:
+  void placeBox(const Eigen::Matrix3d& turn, const Placement& to_other) {
+    const Eigen::Vector3d c = to_other * Eigen::Vector3d(center[0][0], center[0][1], center[0][2]);
+    for (int k = 0; k < 3; ++k) {
+      center[1][k] = c[k];
+      half[1][k] = to_other.scale * (turn(k, 0) * half[0][0] + turn(k, 1) * half[0][1] + turn(k, 2) * half[0][2]);
+    }
+  }
+};
+
+/// The leaves of one side that a walk has met, packed: triangles are about the middle of their leaf's box.
+template <typename Side>
+class LeafPacks {
+ public:
+  struct Leaf {
+    typename Side::Node node{};
+    std::size_t begin = 0, count = 0;
+    std::uint64_t walk = 0;
+    float error = 0;  ///< Corners may be so far from where they are, beside the rounding of floats.
+    LeafVolume volume;
+    TrianglePack pack;
+    const std::uint32_t* listed = nullptr;  ///< The triangles' numbers where the tree keeps them, else in `own`.
+    std::uint32_t own[TrianglePack::kCapacity];
+
+    std::uint32_t id(std::size_t i) const { return listed != nullptr ? listed[i] : own[i]; }
+  };
+
+  /// To be called before the first use in a walk.
+  void clear() {
+    ++walk_;
+    used_ = 0;
+    loose_.clear();
+  }
+
+  /// Leaves met in this walk, a few of them, whose corners the tree does not keep packed.
+  const std::vector<typename Side::Node>& loose() const { return loose_; }
+
+  /// At most a pack of the leaf's triangles, from the one at `begin`; good until the next call.
+  const Leaf& get(const Side& side, typename Side::Node node, std::size_t begin, const Placement& to_other) {
+    std::uint16_t& slot = slots_[(number(node) + begin) % (4 * kLeaves)];
+    if (slot < leaves_.size() && leaves_[slot].walk == walk_ && leaves_[slot].node == node &&
+        leaves_[slot].begin == begin) {
+      return leaves_[slot];
+    }
+    // A walk that meets few leaves stays in the first, which are in the processor's cache.
+    slot = static_cast<std::uint16_t>(used_++ % kLeaves);
+    if (slot == leaves_.size()) leaves_.emplace_back();
+    Leaf& leaf = leaves_[slot];
+    leaf.node = node;
+    leaf.begin = begin;
+    leaf.walk = walk_;
+    leaf.volume = LeafVolume(side.volume(node), to_other);
+    fill(side, leaf);
+    return leaf;
+  }
+
+ private:
+  static constexpr std::size_t kLeaves = 256;
+  static constexpr std::size_t kLoose = 16;
+
+  void fill(const Side& side, Leaf& leaf) {
+    const double(&c)[3] = leaf.volume.center[0];
+    if constexpr (std::is_same<Side, TreeSide>::value) {
+      tree::PackedTriangles packed;
+      if (side.packed(leaf.node, packed, leaf.listed)) {
+        unpackTriangles(packed, c, leaf.pack);
+        leaf.count = packed.count;
+        // Half a step along each axis, and what unpacking rounds more than placing does.
+        leaf.error = 1.7321f * (0.5f * packed.step + 2 * 0x1p-24f * leaf.pack.size);
+        return;
+      }
+      if (loose_.size() < kLoose) loose_.push_back(leaf.node);
+    }
+    corners_.clear();
+    corners_.take(side, leaf.node, leaf.begin);
+    corners_.place(packPlacement(side, Placement(), Eigen::Vector3d(c[0], c[1], c[2]), 1), leaf.pack);
+    leaf.count = corners_.count();
+    leaf.error = 0;
+    leaf.listed = nullptr;
+    for (std::size_t i = 0; i < leaf.count; ++i) leaf.own[i] = corners_.id(i);
+  }
+
+  static std::size_t number(tree::NodeRef node) { return node.bits; }
+  static std::size_t number(int node) { return static_cast<std::size_t>(node); }
+
+  std::vector<Leaf> leaves_;
+  std::uint16_t slots_[4 * kLeaves] = {};
+  std::size_t used_ = 0;
+  std::uint64_t walk_ = 1;
+  LeafCorners<Side> corners_;
+  std::vector<typename Side::Node> loose_;
+};
+
 /// Leaves against leaves, triangle by triangle.
 template <typename A, typename B>
 class LeafPairs {
  public:
   /// To be called before the first test of a walk.
-  void clear() {
-    corners_a_.clear();
-    corners_b_.clear();
+  void start(const Placement& b_in_a, const Placement& a_in_b) {
+    leaves_a_.clear();
+    leaves_b_.clear();
+    for (int r = 0; r < 3; ++r) {
+      for (int c = 0; c < 3; ++c) to_a_.linear[r][c] = static_cast<float>(b_in_a.scale * b_in_a.rotation(r, c));
+    }
+    b_in_a_ = &b_in_a;
+    a_in_b_ = &a_in_b;
   }
 
-  /// Calls f(triangle of a, triangle of b) for the pairs that are not surely apart, until it returns true.
+  /// Calls f(triangle of a, triangle of b, whether they surely meet) for the pairs that are not surely apart, until it
+  /// returns true. A pair may be left to other leaves where it touches, too.
   template <typename F>
-  bool test(const A& a, typename A::Node node_a, const B& b, typename B::Node node_b, const Placement& b_in_a, F&& f) {
-    const Eigen::Vector3d center = a.cellSphere(node_a).center;
-    const PackPlacement to_b = packPlacement(b, b_in_a, center, 1);
+  bool test(const A& a, typename A::Node node_a, const B& b, typename B::Node node_b, F&& f) {
     const std::size_t count_a = a.triangleCount(node_a), count_b = b.triangleCount(node_b);
     for (std::size_t i = 0; i < count_a; i += TrianglePack::kCapacity) {
-      if (corners_a_.take(a, node_a, i)) corners_a_.place(packPlacement(a, Placement(), center, 1), a_);
+      const auto& leaf_a = leaves_a_.get(a, node_a, i, *a_in_b_);
       for (std::size_t j = 0; j < count_b; j += TrianglePack::kCapacity) {
-        corners_b_.take(b, node_b, j);
-        corners_b_.place(to_b, b_);
-        const std::size_t found = touchingPairs(a_, b_, static_cast<float>(b_in_a.slack * 1.001), found_);
-        for (std::size_t k = 0; k < found; ++k) {
-          if (f(corners_a_.id(found_[k].row), corners_b_.id(found_[k].lane))) return true;
-        }
+        const auto& leaf_b = leaves_b_.get(b, node_b, j, *b_in_a_);
+        if (testPacks(leaf_a, leaf_b, f)) return true;
       }
     }
     return false;
   }
 
+  /// Leaves met in this walk, a few of them, that are worth to be packed.
+  const std::vector<typename A::Node>& looseOfA() const { return leaves_a_.loose(); }
+  const std::vector<typename B::Node>& looseOfB() const { return leaves_b_.loose(); }
+
  private:
-  LeafCorners<A> corners_a_;
-  LeafCorners<B> corners_b_;
-  TrianglePack a_, b_;
+  template <typename F>
+  bool testPacks(const typename LeafPacks<A>::Leaf& a, const typename LeafPacks<B>::Leaf& b, F&& f) {
+    // What touches within both leaves does so within both boxes and both slabs.
+    PackRegion region;
+    fillRegion(b.volume, a.volume, *a_in_b_, b.pack.size, b.error, region);
+    const std::uint32_t lanes = trianglesWithin(b.pack, region);
+    if (lanes == 0) return false;
+    fillRegion(a.volume, b.volume, *b_in_a_, a.pack.size, a.error, region);
+    const std::uint32_t rows = trianglesWithin(a.pack, region);
+    if (rows == 0) return false;
+    for (int k = 0; k < 3; ++k) to_a_.offset[k] = static_cast<float>(b.volume.center[1][k] - a.volume.center[0][k]);
+    moveTriangles(b.pack, lanes, to_a_, lanes_);
+    std::uint32_t ids[TrianglePack::kCapacity], *id = ids;
+    for (std::uint32_t left = lanes; left != 0; left &= left - 1)
+      *id++ = b.id(static_cast<std::size_t>(__builtin_ctz(left)));
+    const auto slack = static_cast<float>(
+        (b_in_a_->slack + static_cast<double>(a.error) + b_in_a_->scale * static_cast<double>(b.error)) * 1.001);
+    const std::size_t found = touchingPairs(a.pack, rows, lanes_, region, slack, found_);
+    for (std::size_t k = 0; k < found; ++k) {
+      if (f(a.id(found_[k].row), ids[found_[k].lane], found_[k].certain)) return true;
+    }
+    return false;
+  }
+
+  /// Where the triangles of a leaf can meet those of another, which `to` places in its frame. With M = `reach`, what is
+  /// computed here and by trianglesWithin() is off by 15 u M: corners 2, the normal 3, sums along it 10.
+  static void fillRegion(const LeafVolume& own, const LeafVolume& other, const Placement& to, double size, float error,
+                         PackRegion& region) {
+    double way[3], reach = size, offset = to.scale * other.slab[0];
+    for (int k = 0; k < 3; ++k) {
+      way[k] = other.center[1][k] - own.center[0][k];
+      reach = std::max(reach, std::abs(way[k]) + other.half[1][k]);
+      offset += other.normal[1][k] * way[k];
+      region.normal[k] = static_cast<float>(other.normal[1][k]);
+    }
+    const double pad = (32 * 0x1p-24 + 4 * to.defect) * reach + 1.02 * (to.slack + static_cast<double>(error));
+    for (int k = 0; k < 3; ++k) {
+      region.low[k] = static_cast<float>(std::max(-own.half[0][k], way[k] - other.half[1][k]) - pad);
+      region.high[k] = static_cast<float>(std::min(own.half[0][k], way[k] + other.half[1][k]) + pad);
+    }
+    const double half = to.scale * other.slab[1] + pad;
+    region.slab_low = static_cast<float>(offset - half);
+    region.slab_high = static_cast<float>(offset + half);
+  }
+
+  LeafPacks<A> leaves_a_;
+  LeafPacks<B> leaves_b_;
+  PackMotion to_a_;
+  TrianglePack lanes_;
+  const Placement *b_in_a_ = nullptr, *a_in_b_ = nullptr;
   PackPair found_[TrianglePack::kCapacity * TrianglePack::kCapacity];
 };
 

@@ -9,9 +9,11 @@
 
 #include <hwy/highway.h>
 
+#include <cstdint>
+
 // At -O2 the compiler keeps short loops over arrays of vectors, and with them the arrays in memory.
 #undef BOCST_UNROLL
-#define BOCST_UNROLL _Pragma("GCC unroll 8")
+#define BOCST_UNROLL _Pragma("GCC unroll 9")
 
 HWY_BEFORE_NAMESPACE();
 namespace bocst::query::HWY_NAMESPACE {
@@ -35,6 +37,12 @@ HWY_INLINE V fromBytes(D d, const std::int8_t* p) {
   const hn::Rebind<std::int8_t, D> ds;
   const hn::RebindToSigned<D> di;
   return hn::ConvertTo(d, hn::PromoteTo(di, hn::LoadU(ds, p)));
+}
+
+HWY_INLINE std::uint32_t maskBits(M mask) {
+  std::uint8_t bits[8] = {};
+  hn::StoreMaskBits(D(), mask, bits);
+  return bits[0];
 }
 
 }  // namespace bocst::query::HWY_NAMESPACE

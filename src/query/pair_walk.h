@@ -36,7 +36,7 @@ class PairWalk {
     Scratch& s = scratch();
     s.stack.clear();
     s.aside.clear();
-    s.leaves.clear();
+    s.leaves.start(b_in_a_, a_in_b_);
     s.coarse_a.clear();
     s.coarse_b.clear();
     const Pair root{a_.root(), b_.root()};
@@ -152,8 +152,9 @@ class PairWalk {
       }
       return false;
     } else {
-      return s.leaves.test(a_, pair.a, b_, pair.b, b_in_a_,
-                           [this](std::uint32_t t, std::uint32_t u) { return visitor_.triangles(t, u); });
+      return s.leaves.test(a_, pair.a, b_, pair.b, [this](std::uint32_t t, std::uint32_t u, bool certain) {
+        return visitor_.triangles(t, u, certain);
+      });
     }
   }
 

@@ -122,6 +122,14 @@ class TreeSide {
   std::size_t triangleCount(Node node) const { return tree_.list(tree_.link(node)).count; }
   std::uint32_t triangle(Node node, std::size_t i) const { return tree_.list(tree_.link(node)).ids[i]; }
 
+  /// The corners of a leaf's triangles where the tree keeps them packed, and their numbers; else false.
+  bool packed(Node node, tree::PackedTriangles& triangles, const std::uint32_t*& ids) const {
+    const tree::Link link = tree_.link(node);
+    if (!tree_.packed(link, triangles)) return false;
+    ids = tree_.list(link).ids;
+    return true;
+  }
+
   /// Corner k of triangle t as given; (v - origin()) * inverseUnit() is it in this side's frame.
   const Eigen::Vector3d& vertex(std::uint32_t t, int k) const {
     const Mesh& mesh = *tree_.surface().mesh;

@@ -14,31 +14,26 @@ struct TreeWalk::Scratch {
   Frame frames[PairSteps::kFrames];
   SetAside<TreeSide, TreeSide> aside;
   LeafPairs<TreeSide, TreeSide> leaves;
-  PackedLeaves packed;
-  PackPair found[TrianglePack::kCapacity * TrianglePack::kCapacity];
+  bool leaves_started = false;
   CoarseLeaf<TreeSide> coarse_a, coarse_b;
   bool grew = false;
   std::vector<tree::NodeRef> unseen[2];  // set aside, and with no slab yet
-  std::vector<tree::NodeRef> loose[2];   // leaves whose corners are not packed
 };
 
 bool TreeWalk::run() {
   thread_local Scratch s;
   s.aside.clear();
-  s.leaves.clear();
+  s.leaves_started = false;
   s.coarse_a.clear();
   s.coarse_b.clear();
-  s.packed.clear();
-  for (int side = 0; side < 2; ++side) {
-    s.unseen[side].clear();
-    s.loose[side].clear();
-  }
+  s.unseen[0].clear();
+  s.unseen[1].clear();
   s.grew = false;
   const bool ended = search(s);
   // A first answer has enough to do; what a later one needs again is worth to be packed.
-  if (!s.grew) {
-    a_.tree().packLeaves(s.loose[0]);
-    b_.tree().packLeaves(s.loose[1]);
+  if (s.leaves_started && !s.grew) {
+    a_.tree().packLeaves(s.leaves.looseOfA());
+    b_.tree().packLeaves(s.leaves.looseOfB());
   }
   if (!ended) return false;
   // What a query could do without, the next one meets again: a look is cheaper than growing it.
@@ -77,10 +72,10 @@ bool TreeWalk::stepAll(PairSteps& steps, Scratch& s) {
         setAside(steps, s);
         break;
       case PairSteps::kCoarse:
-        pushOctants(steps, steps.expanded == 0 ? s.coarse_b.octantsMeeting(a_, steps.pair[0].node, steps.mask, b_,
-                                                                           steps.pair[1].node, b_in_a_)
-                                               : s.coarse_a.octantsMeeting(b_, steps.pair[1].node, steps.mask, a_,
-                                                                           steps.pair[0].node, b_in_a_.inverse()));
+        pushOctants(
+            steps, steps.expanded == 0
+                       ? s.coarse_b.octantsMeeting(a_, steps.pair[0].node, steps.mask, b_, steps.pair[1].node, b_in_a_)
+                       : s.coarse_a.octantsMeeting(b_, steps.pair[1].node, steps.mask, a_, steps.pair[0].node, aInB()));
         break;
       case PairSteps::kLeaves:
         if (testLeaves(steps, s)) return true;
@@ -90,30 +85,19 @@ bool TreeWalk::stepAll(PairSteps& steps, Scratch& s) {
 }
 
 bool TreeWalk::testLeaves(const PairSteps& steps, Scratch& s) {
-  const StepNode &a = steps.pair[0], &b = steps.pair[1];
-  tree::PackedTriangles packed[2];
-  const bool packed_a = a_.tree().packed(a.link, packed[0]), packed_b = b_.tree().packed(b.link, packed[1]);
-  const auto fits = [](const tree::PackedTriangles& p) { return p.count <= TrianglePack::kCapacity; };
-  if (packed_a && packed_b && fits(packed[0]) && fits(packed[1])) {
-    for (int i = 0; i < 6; ++i) {
-      __builtin_prefetch(reinterpret_cast<const char*>(packed[0].steps) + 64 * i);
-      __builtin_prefetch(reinterpret_cast<const char*>(packed[1].steps) + 64 * i);
-    }
-    const std::uint32_t *ids_a = a_.tree().list(a.link).ids, *ids_b = b_.tree().list(b.link).ids;
-    const std::size_t found =
-        s.packed.test(a.node, packed[0], a_.cellSphere(a.node).center, packed[1], b_in_a_, s.found);
-    for (std::size_t i = 0; i < found; ++i) {
-      if (visitor_.triangles(ids_a[s.found[i].row], ids_b[s.found[i].lane])) return true;
-    }
-    return false;
+  if (!s.leaves_started) {
+    s.leaves.start(b_in_a_, aInB());
+    s.leaves_started = true;
   }
-  for (int side = 0; side < 2; ++side) {
-    if (!(side == 0 ? packed_a : packed_b) && s.loose[side].size() < kLooks) {
-      s.loose[side].push_back(steps.pair[side].node);
-    }
-  }
-  return s.leaves.test(a_, a.node, b_, b.node, b_in_a_,
-                       [this](std::uint32_t t, std::uint32_t u) { return visitor_.triangles(t, u); });
+  return s.leaves.test(
+      a_, steps.pair[0].node, b_, steps.pair[1].node,
+      [this](std::uint32_t t, std::uint32_t u, bool certain) { return visitor_.triangles(t, u, certain); });
+}
+
+const Placement& TreeWalk::aInB() {
+  if (!inverted_) a_in_b_ = b_in_a_.inverse();
+  inverted_ = true;
+  return a_in_b_;
 }
 
 void TreeWalk::setAside(const PairSteps& steps, Scratch& s) {

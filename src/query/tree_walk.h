@@ -4,7 +4,6 @@
 #include <vector>
 
 #include "query/leaf_pairs.h"
-#include "query/packed_leaves.h"
 #include "query/set_aside.h"
 #include "query/tree_steps.h"
 #include "query/visitor.h"
@@ -34,7 +33,11 @@ class TreeWalk {
   void setAside(const PairSteps& steps, Scratch& s);
 
   const TreeSide &a_, &b_;
+  const Placement& aInB();
+
   const Placement& b_in_a_;
+  Placement a_in_b_;  // once asked for
+  bool inverted_ = false;
   Visitor& visitor_;
 };
 

@@ -175,10 +175,15 @@ void degenerateAtTimes(std::mt19937_64& g, Triangle& t, unsigned often) {
   if (g() % (4 * often) == 0) t[1] = t[2] = t[0];
 }
 
+PackRegion everywhere() {
+  constexpr float kInfinity = std::numeric_limits<float>::infinity();
+  return {{-kInfinity, -kInfinity, -kInfinity}, {kInfinity, kInfinity, kInfinity}, {0, 0, 0}, -kInfinity, kInfinity};
+}
+
 TEST_P(EveryTarget, NoPairIsLostThatFclFinds) {
   std::mt19937_64 g(3);
   std::uniform_real_distribution<double> u(-1, 1);
-  std::uint64_t hits = 0, candidates = 0, pairs = 0;
+  std::uint64_t hits = 0, candidates = 0, pairs = 0, certain = 0;
   for (int round = 0; round < 400; ++round) {
     const double scale = std::pow(10.0, 6 * u(g));
     TrianglePack a, b;
@@ -212,28 +217,206 @@ TEST_P(EveryTarget, NoPairIsLostThatFclFinds) {
       put(b, i, t);
     }
     PackPair found[TrianglePack::kCapacity * TrianglePack::kCapacity];
-    const std::size_t count = touchingPairs(a, b, 0, found);
-    std::set<std::pair<int, int>> set;
-    for (std::size_t k = 0; k < count; ++k) set.insert({found[k].row, found[k].lane});
+    const std::size_t count = touchingPairs(a, ~0u >> (32 - a.count), b, everywhere(), 0, found);
+    std::map<std::pair<int, int>, bool> set;
+    for (std::size_t k = 0; k < count; ++k) set[{found[k].row, found[k].lane}] = found[k].certain;
     ASSERT_EQ(set.size(), count);
     candidates += count;
     for (std::size_t i = 0; i < a.count; ++i) {
       for (std::size_t j = 0; j < b.count; ++j) {
         ++pairs;
         const Corners p = {ta[i][0], ta[i][1], ta[i][2]}, q = {tb[j][0], tb[j][1], tb[j][2]};
+        const auto at = set.find({static_cast<int>(i), static_cast<int>(j)});
+        const bool is_certain = at != set.end() && at->second;
+        certain += is_certain;
         if (isDegenerate(p) || isDegenerate(q)) {
+          ASSERT_FALSE(is_certain) << "round " << round;
           Eigen::Vector3d on_p, on_q;
           if (nearestPoints(p, q, on_p, on_q) > 1e-13 * scale) continue;
         } else if (!fcl::detail::Intersect<double>::intersect_Triangle(p[0], p[1], p[2], q[0], q[1], q[2])) {
+          ASSERT_FALSE(is_certain) << "round " << round;
           continue;
         }
         ++hits;
-        ASSERT_TRUE(set.count({static_cast<int>(i), static_cast<int>(j)})) << "round " << round;
+        ASSERT_TRUE(at != set.end()) << "round " << round;
       }
     }
   }
   EXPECT_GT(hits, 3000u);
   EXPECT_LT(candidates, hits + pairs / 50) << "a filter that lets everything through proves nothing";
+  EXPECT_GT(certain, hits / 2) << "what is never certain is never wrong";
+}
+
+// Two triangles that touch, all but touch or just part, each in its own frame, as LeafPairs makes packs of them.
+template <typename S>
+void certainMeansThatFclSaysSo() {
+  std::mt19937_64 g(33);
+  std::uniform_real_distribution<double> u(-1, 1);
+  using Exact = fcl::detail::Intersect<S>;
+  int certain = 0, met = 0, apart = 0;
+  for (int round = 0; round < 60000; ++round) {
+    const double size = std::pow(10.0, u(g)), far = std::pow(10.0, 4 * std::abs(u(g)));
+    fcl::Vector3<S> p[3], q[3];
+    const Eigen::Vector3d at = far * Eigen::Vector3d(u(g), u(g), u(g));
+    Corners t;
+    for (auto& v : t) v = at + size * Eigen::Vector3d(u(g), u(g), u(g));
+    degenerateAtTimes(g, t, 16);
+    for (int k = 0; k < 3; ++k) p[k] = t[k].cast<S>();
+    for (auto& v : t) v = size * Eigen::Vector3d(u(g), u(g), u(g));
+    degenerateAtTimes(g, t, 16);
+    for (int k = 0; k < 3; ++k) q[k] = t[k].cast<S>();
+    // A corner, a point of an edge or one of the inside of both at one place, but for a gap.
+    const auto pointOf = [&](const fcl::Vector3<S>(&c)[3]) {
+      const double a = g() % 3 == 0 ? 0 : std::abs(u(g)), b = g() % 3 == 0 ? 0 : (1 - a) * std::abs(u(g));
+      const int k = static_cast<int>(g() % 3);
+      const Eigen::Vector3d x = c[k].template cast<double>(), y = c[(k + 1) % 3].template cast<double>(),
+                            z = c[(k + 2) % 3].template cast<double>();
+      return Eigen::Vector3d(x + a * (y - x) + b * (z - x));
+    };
+    const fcl::Matrix3<S> R = test::randomRotation(g).cast<S>();
+    const Eigen::Vector3d gap = test::randomDirection(g) * size * std::pow(10.0, -8 + 8 * u(g));
+    const fcl::Vector3<S> T = (pointOf(p) + gap - R.template cast<double>() * pointOf(q)).template cast<S>();
+    if (round % 8 == 0) {
+      // An edge along one of the other.
+      q[1] = q[0] + R.transpose() * (p[1] - p[0]) * static_cast<S>(1 + u(g));
+    }
+    const double magnitude = T.template cast<double>().norm() + 2 * (far + 2 * size);
+    Placement to;
+    to.rotation = R.template cast<double>();
+    to.translation = T.template cast<double>();
+    Corners pd, qd;
+    Eigen::Vector3d middle_p = Eigen::Vector3d::Zero(), middle_q = middle_p;
+    for (int k = 0; k < 3; ++k) {
+      pd[k] = p[k].template cast<double>();
+      qd[k] = q[k].template cast<double>();
+      middle_p += pd[k] / 3;
+      middle_q += qd[k] / 3;
+    }
+    TrianglePack a, b, moved;
+    a.count = b.count = 1;
+    for (auto& v : pd) v -= middle_p;
+    for (auto& v : qd) v -= middle_q;
+    put(a, 0, pd);
+    put(b, 0, qd);
+    PackMotion motion;
+    const Eigen::Vector3d offset = to * middle_q - middle_p;
+    for (int r = 0; r < 3; ++r) {
+      for (int c = 0; c < 3; ++c) motion.linear[r][c] = static_cast<float>(to.rotation(r, c));
+      motion.offset[r] = static_cast<float>(offset[r]);
+    }
+    moveTriangles(b, 1, motion, moved);
+    const auto slack = static_cast<float>(magnitude * 32 * static_cast<double>(std::numeric_limits<S>::epsilon()));
+    PackPair found[1];
+    const std::size_t count = touchingPairs(a, 1, moved, everywhere(), slack, found);
+    const bool meet = Exact::intersect_Triangle(p[0], p[1], p[2], q[0], q[1], q[2], R, T);
+    const bool degenerate = isDegenerate(pd) || isDegenerate(qd);
+    if (count == 1 && found[0].certain) {
+      ASSERT_TRUE(meet && !degenerate) << "round " << round;
+      ++certain;
+    }
+    if (meet && !degenerate) {
+      ASSERT_EQ(count, 1u) << "round " << round;
+    }
+    met += meet;
+    apart += !meet;
+  }
+  EXPECT_GT(apart, 5000);
+  EXPECT_GT(certain, met / 10);
+}
+
+TEST_P(EveryTarget, CertainMeansThatFclSaysSo) {
+  certainMeansThatFclSaysSo<double>();
+  certainMeansThatFclSaysSo<float>();
+}
+
+TEST_P(EveryTarget, NoTriangleIsLostThatReachesIntoARegion) {
+  std::mt19937_64 g(34);
+  std::uniform_real_distribution<double> u(-1, 1);
+  std::size_t within = 0, lost = 0;
+  for (int round = 0; round < 3000; ++round) {
+    const double scale = std::pow(10.0, 6 * u(g));
+    TrianglePack pack;
+    pack.count = 1 + g() % TrianglePack::kCapacity;
+    std::vector<Eigen::Vector3d> points;  // one of each triangle, as given
+    for (std::size_t i = 0; i < pack.count; ++i) {
+      Corners t;
+      const Eigen::Vector3d c(u(g), u(g), u(g));
+      for (auto& v : t) v = (c + 0.3 * Eigen::Vector3d(u(g), u(g), u(g))) * scale;
+      degenerateAtTimes(g, t, 8);
+      put(pack, i, t);
+      // Corners are what touches a region first.
+      points.push_back(g() % 2 ? t[g() % 3] : Eigen::Vector3d((t[0] + t[1] + t[2]) / 3));
+    }
+    // A box and a slab about the point of one triangle, which may lie on their ends.
+    const Eigen::Vector3d x = points[g() % pack.count], n = test::randomDirection(g);
+    const double size = pack.size, pad = 32 * 0x1p-24 * size;
+    PackRegion region;
+    const auto bound = [&](double at, int sign) {
+      return static_cast<float>(at + sign * ((g() % 2 ? 0 : std::abs(u(g)) * 0.5 * scale) + pad));
+    };
+    for (int k = 0; k < 3; ++k) {
+      region.low[k] = bound(x[k], -1);
+      region.high[k] = bound(x[k], 1);
+      region.normal[k] = static_cast<float>(n[k]);
+    }
+    region.slab_low = bound(n.dot(x), -1);
+    region.slab_high = bound(n.dot(x), 1);
+    const std::uint32_t mask = trianglesWithin(pack, region);
+    for (std::size_t i = 0; i < pack.count; ++i) {
+      bool in = n.dot(points[i]) >= region.slab_low + pad && n.dot(points[i]) <= region.slab_high - pad;
+      for (int k = 0; k < 3; ++k) {
+        in = in && points[i][k] >= region.low[k] + pad && points[i][k] <= region.high[k] - pad;
+      }
+      in = in || points[i] == x;
+      if (in) {
+        ASSERT_TRUE(mask >> i & 1) << "round " << round;
+      }
+      within += in;
+      lost += !(mask >> i & 1);
+    }
+    ASSERT_EQ(static_cast<std::uint64_t>(mask) >> pack.count, 0u);
+  }
+  EXPECT_GT(within, 3000u);
+  EXPECT_GT(lost, within) << "a test that leaves nothing out proves nothing";
+}
+
+TEST_P(EveryTarget, MovedTrianglesAreWhereTheyBelong) {
+  std::mt19937_64 g(35);
+  std::uniform_real_distribution<double> u(-1, 1);
+  for (int round = 0; round < 3000; ++round) {
+    const double scale = std::pow(10.0, 4 * u(g));
+    TrianglePack pack, moved;
+    pack.count = 1 + g() % TrianglePack::kCapacity;
+    std::vector<std::array<Eigen::Vector3d, 3>> given(pack.count);
+    for (std::size_t i = 0; i < pack.count; ++i) {
+      for (auto& v : given[i]) v = scale * Eigen::Vector3d(u(g), u(g), u(g));
+      put(pack, i, {given[i][0], given[i][1], given[i][2]});
+    }
+    const Eigen::Matrix3d linear = test::randomRotation(g) * std::pow(10.0, 2 * u(g));
+    const Eigen::Vector3d offset = Eigen::Vector3d(u(g), u(g), u(g)) * std::pow(10.0, 4 * u(g));
+    PackMotion motion;
+    for (int r = 0; r < 3; ++r) {
+      for (int c = 0; c < 3; ++c) motion.linear[r][c] = static_cast<float>(linear(r, c));
+      motion.offset[r] = static_cast<float>(offset[r]);
+    }
+    const auto which = static_cast<std::uint32_t>(g() & (~0u >> (32 - pack.count)));
+    moveTriangles(pack, which, motion, moved);
+    std::size_t at = 0;
+    for (std::size_t i = 0; i < pack.count; ++i) {
+      if (!(which >> i & 1)) continue;
+      ASSERT_LT(at, moved.count);
+      for (std::size_t k = 0; k < 3; ++k) {
+        const Eigen::Vector3d x = linear * given[i][k] + offset;
+        for (std::size_t c = 0; c < 3; ++c) {
+          const double y = x[static_cast<int>(c)];
+          ASSERT_NEAR(static_cast<double>(moved.xyz[3 * k + c][at]), y, 6 * 0x1p-24 * moved.size) << "round " << round;
+          ASSERT_LE(std::abs(y), static_cast<double>(moved.size) * (1 + 1e-6));
+        }
+      }
+      ++at;
+    }
+    ASSERT_EQ(at, moved.count);
+  }
 }
 
 TEST_P(EveryTarget, GapsOfOctantsHoldTheDistancesOfTheirPoints) {
