@@ -30,8 +30,10 @@ struct StepGroup {
   std::uint32_t frame;  ///< Where the block's octants are, if they are; those below it are in use, too.
   std::uint32_t level;  ///< Of the octants.
   std::uint32_t octants;
-  float overlap[8];
-  std::uint32_t implicit;  ///< Octants that turned out to be so: they wait for the others.
+  /// For each of these: how far it overlaps the other node, as the bits of a float whose lowest three are the octant.
+  /// 0 for the others; kLast, a depth below all, for what waits until they are gone.
+  std::uint32_t order[8];
+  static constexpr std::uint32_t kLast = 8;
 };
 
 /// The depth-first walk over resident pairs of two trees, exact answers: up to the next pair of leaves.

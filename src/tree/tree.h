@@ -69,6 +69,8 @@ class Tree {
     if ((words[0] & kKept) != 0) return {nullptr, count};
     return {words + 1 + ((words[0] & kPacked) != 0 ? PackedTriangles::words(count) : 0), count};
   }
+  /// Where a list lies, for those who want it in the processor's cache.
+  const std::uint32_t* words(Link list) const { return &lists_[list.index()]; }
   /// The corners of a leaf's triangles, in the order of its list; false while they are not packed.
   bool packed(Link link, PackedTriangles& triangles) const {
     const std::uint32_t* words = &lists_[link.index()];
