@@ -378,6 +378,9 @@ TEST_F(Program, HasARowForEachGoal) {
   EXPECT_GT(rows["heap"].at("fcl"), rows["memory_all"].at("fcl").get<double>() + 24);
   EXPECT_GT(rows["moving_touching"].at("fcl"), 0);
   EXPECT_EQ(rows["moving_touching"].at("bocst"), rows["moving_touching"].at("fcl"));
+  EXPECT_GT(report.at("moving").at("worst_frame"), 0);
+  EXPECT_LT(report.at("moving").at("worst_frame"), 60);
+  EXPECT_EQ(report.at("contacts").at("poses"), 12);
   EXPECT_GT(report.at("contacts").at("pairs"), 0);
   EXPECT_EQ(report.at("verdicts").at("equal"), true);
   EXPECT_EQ(report.at("verdicts").at("bocst"), report.at("verdicts").at("fcl"));

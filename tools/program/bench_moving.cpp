@@ -99,6 +99,9 @@ void benchMoving(BenchSetting& setting, BenchReport& report) {
   const auto touching = [](const std::vector<bool>& verdicts) {
     return static_cast<double>(std::count(verdicts.begin(), verdicts.end(), true));
   };
+  const auto worst = static_cast<std::size_t>(std::max_element(rest.begin(), rest.end()) - rest.begin()) + 1;
+  report.set("moving", {{"worst_frame", worst}});
+  report.note("moving: bocst's worst frame after the first is number " + std::to_string(worst));
   report.figure("moving_touching", "frames that touch", BenchRow::Unit::kFrames, touching(ours.verdicts()),
                 touching(theirs.verdicts()));
 }

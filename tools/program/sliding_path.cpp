@@ -16,7 +16,8 @@ constexpr std::size_t kFramesOfKey = 4;  ///< Between two poses whose contact is
 constexpr double kStep = 0.01;           ///< Of the smaller radius, a frame.
 constexpr double kTurn = 2 * kPi / 2000;
 constexpr double kSteepest = 4;  ///< Up and down over along.
-constexpr double kSunk = 0.01;   ///< Of the smaller radius: how deep at most, where contact was looked for.
+constexpr double kSunk = 0.01;   ///< Of the smaller radius: how deep at most, and half as far off, where contact was
+                                 ///< looked for.
 
 double radiusOf(const Mesh& mesh) { return mesh.bounds().sizes().norm() / 2; }
 
@@ -45,7 +46,7 @@ class Path {
     lookForContact(frames / kFramesOfKey + 2);
     limitSlopes();
     for (std::size_t k = 0; k < keys_.size(); ++k) {
-      keys_[k] -= kSunk * radiusOf(smaller_) * (0.5 + 0.5 * std::sin(static_cast<double>(k)));
+      keys_[k] -= kSunk * radiusOf(smaller_) * (0.25 + 0.75 * std::sin(static_cast<double>(k)));
     }
     std::vector<Eigen::Isometry3d> poses;
     for (std::size_t i = 0; i < frames; ++i) poses.push_back(at(static_cast<double>(i), distanceAt(i)));
