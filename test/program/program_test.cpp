@@ -373,9 +373,12 @@ TEST_F(Program, HasARowForEachGoal) {
     EXPECT_GT(rows[row].at("bocst"), 0) << row;
   }
   EXPECT_EQ(rows["growth_first_2000"].at("ratio"), 1);
-  // Its own copies of the vertices and of the indices are among what a model holds.
-  EXPECT_GT(rows["heap"].at("bocst"), rows["memory_all"].at("bocst").get<double>() + 12);
-  EXPECT_GT(rows["heap"].at("fcl"), rows["memory_all"].at("fcl").get<double>() + 24);
+  // Its own copies of the vertices and of the indices are among what a model holds, where the allocator tells.
+  ASSERT_EQ(rows.count("heap"), 1u);
+  if (report.at("skipped").empty() || report.at("skipped").at(0).at("row") != "heap") {
+    EXPECT_GT(rows["heap"].at("bocst"), rows["memory_all"].at("bocst").get<double>() + 12);
+    EXPECT_GT(rows["heap"].at("fcl"), rows["memory_all"].at("fcl").get<double>() + 24);
+  }
   EXPECT_GT(rows["moving_touching"].at("fcl"), 0);
   EXPECT_EQ(rows["moving_touching"].at("bocst"), rows["moving_touching"].at("fcl"));
   EXPECT_GT(report.at("moving").at("worst_frame"), 0);
@@ -387,7 +390,7 @@ TEST_F(Program, HasARowForEachGoal) {
   cpu_set_t processors;
   ASSERT_EQ(sched_getaffinity(0, sizeof(processors), &processors), 0);
   if (CPU_COUNT(&processors) == 1) {
-    EXPECT_EQ(report.at("skipped").at(0).at("scenario"), "threads");
+    EXPECT_EQ(report.at("skipped").back().at("scenario"), "threads");
     return;
   }
   for (const char* row : {"threads_one", "threads_two", "threads_gain", "threads_cold_two"}) {
@@ -410,7 +413,8 @@ TEST_F(Program, MeasuresTheScenariosThatAreNamed) {
   const Result csv = run(bench + " --scenarios memory --csv -");
   EXPECT_EQ(csv.code, 0) << csv.err;
   EXPECT_EQ(csv.out.rfind("scenario,row,unit,bocst,fcl,ratio\nmemory,memory,bytes/triangle,", 0), 0u) << csv.out;
-  const Result table = run(bench + " --scenarios threads");
+  const Result table = run("bench --scenarios threads,memory " + model("link") + " --poses 6 --rounds 1");
+  EXPECT_EQ(table.code, 0) << table.err;
   EXPECT_NE(table.out.find("threads"), std::string::npos) << table.out;
   const Result alone = shell("taskset -c $(taskset -cp $$ | sed 's/.*: //; s/[-,].*//') " + program() + " " + bench +
                              " --scenarios threads --json -");

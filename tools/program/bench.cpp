@@ -117,7 +117,8 @@ void addSizes(CLI::App& command, Bench& bench) {
           "the sizes that growth and --oracles come near to; without it 10k, 100k, 1 M and 10 M, with --oracles "
           "5k, 75k, 1 M and 10 M")
       ->check(CLI::PositiveNumber)
-      ->delimiter(',');
+      ->delimiter(',')
+      ->allow_extra_args(false);
 }
 
 void addOracleBench(CLI::App& command, Bench& bench) {
@@ -153,6 +154,7 @@ void addBench(CLI::App& program, Job& job) {
   command->add_option("--scenarios", bench->scenarios, "what is measured")
       ->check(CLI::IsMember(choices()))
       ->delimiter(',')
+      ->allow_extra_args(false)
       ->capture_default_str();
   command->add_option("--poses", bench->wish.poses, "number of random poses")
       ->check(CLI::PositiveNumber)
@@ -167,7 +169,7 @@ void addBench(CLI::App& program, Job& job) {
   addSizes(*command, *bench);
   addOracleBench(*command, *bench);
   addJson(*command, bench->output);
-  command->add_option("--csv", bench->csv_file, "write scenario,row,unit,bocst,fcl,ratio into this file, or to stdout")
+  command->add_option("--csv", bench->csv_file, "write the rows as CSV into this file, or to stdout with -")
       ->type_name("FILE|-");
   command->callback([bench, &job] {
     if (bench->csv_file == "-" && bench->output.json_file == "-") {

@@ -6,7 +6,7 @@
 
 namespace bocst::program {
 
-/// Bytes that this process holds of the allocator, in all threads; nothing where the C library does not tell.
+/// Bytes that this process holds of the allocator, in all threads; nothing where the allocator does not tell.
 std::optional<std::size_t> heapBytes();
 
 }  // namespace bocst::program
