@@ -66,11 +66,13 @@ std::optional<std::size_t> BenchSetting::fclHeapBytes() {
 void BenchSetting::drawPoses() {
   if (!query_poses_.empty()) return;
   PoseSampler sampler(*mesh_a_, *mesh_b_, fcl(), wish_.seed);
+  Progress progress("pose", wish_.poses);
   for (std::size_t i = 0; i < wish_.rounds; ++i) first_poses_.push_back(sampler.nextAnywhere().transform());
   for (std::size_t i = 0; i < wish_.poses; ++i) {
     query_poses_.push_back(sampler.nextAnywhere());
     query_transforms_.push_back(query_poses_.back().transform());
     query_verdicts_.push_back(fcl().touch(query_transforms_.back()));
+    progress.step();
   }
   for (std::size_t i = 0; i < 16 * wish_.rounds && apart_poses_.size() < wish_.rounds; ++i) {
     const Eigen::Isometry3d X_AB = sampler.nextAnywhere().transform();
