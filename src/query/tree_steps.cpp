@@ -209,7 +209,7 @@ PairSteps::Event NextEvent(PairSteps& s) {
     const int x = leaf1 || (!leaf0 && side0 >= side1) ? 0 : 1, y = 1 - x;
     StepNode &own = s.pair[x], &other = s.pair[y];
     if (own.link.tag() != tree::Link::kBlock) return PairSteps::kAside;
-    fetch(*s.tree[y], other);
+    if (other.link.tag() == tree::Link::kBlock) fetch(*s.tree[y], other);
     lookUp(s, s.pair[0], 0, frames);
     lookUp(s, s.pair[1], 1, frames);
     const std::uint32_t index = own.link.index();
