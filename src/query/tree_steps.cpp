@@ -210,8 +210,7 @@ PairSteps::Event NextEvent(PairSteps& s) {
     StepNode &own = s.pair[x], &other = s.pair[y];
     if (own.link.tag() != tree::Link::kBlock) return PairSteps::kAside;
     if (other.link.tag() == tree::Link::kBlock) fetch(*s.tree[y], other);
-    lookUp(s, s.pair[0], 0, frames);
-    lookUp(s, s.pair[1], 1, frames);
+    lookUp(s, other, y, frames);
     const std::uint32_t index = own.link.index();
     const tree::Block& block = s.tree[x]->block(index);
     s.tree[x]->touch(index, s.now);

@@ -38,7 +38,7 @@ struct StepGroup {
 
 /// The depth-first walk over resident pairs of two trees, exact answers: up to the next pair of leaves.
 struct PairSteps {
-  /// Frames alive at once: two to look up a pair that comes without, one more each level of either side.
+  /// Frames alive at once: to look up the nodes of a pair that comes without, and one more each level of either side.
   static constexpr std::size_t kFrames = 2 + 2 * lattice::kMaxLevel + 1;
   /// What a walk below one pair can add to the stack: one more each level of either side.
   static constexpr std::size_t kStackRoom = 2 * lattice::kMaxLevel + 1;
