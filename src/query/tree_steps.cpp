@@ -20,10 +20,6 @@ inline bool isLeaf(const StepNode& n) {
   return tag == tree::Link::kShortList || (tag == tree::Link::kList && n.level == lattice::kMaxLevel);
 }
 
-inline float sideOf(const PairSteps& s, const StepNode& n, int side) {
-  return s.geometry.unit[side] * static_cast<float>(1 << (lattice::kMaxLevel - n.level));
-}
-
 // The order is there already: overlapping() writes it to where the group will be.
 inline void push(PairSteps& s, int side, std::uint32_t block, std::uint32_t level, std::uint32_t frame,
                  const StepNode& other, unsigned octants) {
@@ -37,45 +33,6 @@ inline void push(PairSteps& s, int side, std::uint32_t block, std::uint32_t leve
   top.frame = frame;
   top.level = level;
   top.octants = octants;
-}
-
-// The octant that overlaps the most. Without branches: they would be guessed wrong.
-inline std::uint32_t deepest(const std::uint32_t (&order)[8]) {
-  const auto larger = [](std::uint32_t a, std::uint32_t b) { return a > b ? a : b; };
-  return larger(larger(larger(order[0], order[1]), larger(order[2], order[3])),
-                larger(larger(order[4], order[5]), larger(order[6], order[7])));
-}
-
-// Takes the next pair off the stack and says how many frames it and what is under it use. What is still implicit is
-// left for last: a hit among resident nodes makes its growth unnecessary.
-inline std::uint32_t pop(PairSteps& s, StepNode (&pair)[2]) {
-  for (;;) {
-    StepGroup& top = s.stack[s.depth - 1];
-    const std::uint32_t depth = deepest(top.order), o = depth & 7, rest = top.octants & ~(1u << o);
-    const tree::NodeRef node = tree::NodeRef::octant(top.block, static_cast<int>(o));
-    const tree::Link link = s.tree[top.side]->link(node);
-    if (link.tag() == tree::Link::kImplicit && rest != 0 && depth >= 2 * StepGroup::kLast) {
-      top.order[o] = StepGroup::kLast | o;
-      continue;
-    }
-    top.order[o] = 0;
-    top.octants = rest;
-    if (rest == 0) --s.depth;
-    StepNode &own = pair[top.side], &other = pair[1 - top.side];
-    own.node = node;
-    own.link = link;
-    own.level = top.level;
-    other.node = top.other.node;
-    other.link = top.other.link;
-    other.level = top.other.level;
-    other.lane = top.other.lane;
-    if (top.frame == StepGroup::kNoFrame) {
-      own.lane = StepNode::kNoLane;
-      return 0;
-    }
-    own.lane = 8 * top.frame + o;
-    return top.frame + 1;
-  }
 }
 
 // Brings to the processor what the next steps will read of a node, or, of a leaf, its corners.
@@ -195,6 +152,45 @@ std::uint8_t OverlappingOctants(const PairFrames& geometry, int own, const CellO
   return static_cast<std::uint8_t>(overlapping(geometry, own, f, y, static_cast<std::size_t>(octant), 0xff, order));
 }
 
+// The octant that overlaps the most. Without branches: they would be guessed wrong.
+HWY_INLINE std::uint32_t deepest(const std::uint32_t (&order)[8]) {
+  const auto larger = [](std::uint32_t a, std::uint32_t b) { return a > b ? a : b; };
+  return larger(larger(larger(order[0], order[1]), larger(order[2], order[3])),
+                larger(larger(order[4], order[5]), larger(order[6], order[7])));
+}
+
+// Takes the next pair off the stack and says how many frames it and what is under it use. What is still implicit is
+// left for last: a hit among resident nodes makes its growth unnecessary.
+HWY_INLINE std::uint32_t pop(PairSteps& s, StepNode (&pair)[2]) {
+  for (;;) {
+    StepGroup& top = s.stack[s.depth - 1];
+    const std::uint32_t depth = deepest(top.order), o = depth & 7, rest = top.octants & ~(1u << o);
+    const tree::NodeRef node = tree::NodeRef::octant(top.block, static_cast<int>(o));
+    const tree::Link link = s.tree[top.side]->link(node);
+    if (link.tag() == tree::Link::kImplicit && rest != 0 && depth >= 2 * StepGroup::kLast) {
+      top.order[o] = StepGroup::kLast | o;
+      continue;
+    }
+    top.order[o] = 0;
+    top.octants = rest;
+    if (rest == 0) --s.depth;
+    StepNode &own = pair[top.side], &other = pair[1 - top.side];
+    own.node = node;
+    own.link = link;
+    own.level = top.level;
+    other.node = top.other.node;
+    other.link = top.other.link;
+    other.level = top.other.level;
+    other.lane = top.other.lane;
+    if (top.frame == StepGroup::kNoFrame) {
+      own.lane = StepNode::kNoLane;
+      return 0;
+    }
+    own.lane = 8 * top.frame + o;
+    return top.frame + 1;
+  }
+}
+
 PairSteps::Event NextEvent(PairSteps& s) {
   while (s.depth > 0) {
     std::uint32_t frames = pop(s, s.pair);
@@ -205,8 +201,8 @@ PairSteps::Event NextEvent(PairSteps& s) {
       return PairSteps::kLeaves;
     }
     // The larger of two nodes is expanded, unless it is a leaf.
-    const float side0 = sideOf(s, s.pair[0], 0), side1 = sideOf(s, s.pair[1], 1);
-    const int x = leaf1 || (!leaf0 && side0 >= side1) ? 0 : 1, y = 1 - x;
+    const int deeper = static_cast<int>(s.pair[1].level) - static_cast<int>(s.pair[0].level);
+    const int x = leaf1 || (!leaf0 && deeper >= s.not_smaller) ? 0 : 1, y = 1 - x;
     StepNode &own = s.pair[x], &other = s.pair[y];
     if (own.link.tag() != tree::Link::kBlock) return PairSteps::kAside;
     if (other.link.tag() == tree::Link::kBlock) fetch(*s.tree[y], other);
@@ -218,7 +214,7 @@ PairSteps::Event NextEvent(PairSteps& s) {
     const unsigned mask = overlapping(s.geometry, x, s.frames[frames], s.frames[other.lane / 8], other.lane % 8,
                                       block.grey, s.stack[s.depth].order);
     if (mask == 0) continue;
-    if (y == 0 ? leaf0 && side1 < side0 : leaf1 && side0 < side1) {
+    if (y == 0 ? leaf0 && deeper >= s.larger : leaf1 && deeper < s.not_smaller) {
       s.frames_used = frames;
       s.expanded = x;
       s.mask = mask;

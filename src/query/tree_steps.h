@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #pragma once
 
+#include <cmath>
 #include <cstddef>
 #include <cstdint>
 
@@ -57,6 +58,9 @@ struct PairSteps {
   StepGroup* stack;  ///< With room for kStackRoom more.
   std::size_t depth = 0;
 
+  /// A node of side 0 is not smaller (is larger) than one of side 1 that is at least so many levels deeper.
+  int not_smaller, larger;
+
   StepNode pair[2];  ///< Of the event.
   std::uint32_t frames_used = 0;
   int expanded = 0;
@@ -70,6 +74,11 @@ struct PairSteps {
 
   PairSteps(const tree::Tree* a, const tree::Tree* b, std::int64_t now_, const PairFrames& geometry_, Frame* frames_)
       : tree{a, b}, now(now_), geometry(geometry_), frames(frames_), stack(nullptr) {
+    // 2^deeper against the ratio of units, exactly.
+    int exponent = 0;
+    const bool even = std::frexp(geometry.unit[1] / geometry.unit[0], &exponent) == 0.5f;
+    not_smaller = even ? exponent - 1 : exponent;
+    larger = exponent;
     for (std::uint64_t& h : holds) h = kNothing;
   }
 };
