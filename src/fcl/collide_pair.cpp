@@ -64,11 +64,22 @@ template <typename S, typename Triangles1, typename Triangles2>
 class Collector : public query::Visitor {
  public:
   Collector(const Question<S>& q, const Triangles1& t1, const Triangles2& t2, bool swapped, double magnitude)
-      : q_(q), t1_(t1), t2_(t2), swapped_(swapped), magnitude_(magnitude), margin_(q.margin), seen_(pairs()) {
+      : q_(q),
+        t1_(t1),
+        t2_(t2),
+        swapped_(swapped),
+        magnitude_(magnitude),
+        margin_(q.margin),
+        seen_(pairs()),
+        later_(later()) {
     fcl::relativeTransform(q.X_W1.linear(), q.X_W1.translation(), q.X_W2.linear(), q.X_W2.translation(), R_12_, p_12_);
     // A boolean query ends at the first contact, so it meets no pair twice.
     once_ = q.request.num_max_contacts > 1 || q.request.enable_cost;
     if (once_) seen_.clear();
+    later_.pairs.count = 0;
+    to_world_ = q.X_W1.template cast<double>();
+    place_.linear() = R_12_.template cast<double>();
+    place_.translation() = p_12_.template cast<double>();
   }
 
   /// Where cells lie in the world: from the lattice frame of side A.
@@ -82,7 +93,7 @@ class Collector : public query::Visitor {
   bool triangles(std::uint32_t a, std::uint32_t b, bool certain) override {
     if (swapped_) std::swap(a, b);
     if (once_ && !seen_.insert(a, b)) return false;
-    if (certain && margin_ == 0 && !needsGeometry()) return add(a, b, nullptr);
+    if (certain && !needsCorners()) return add(a, b, nullptr);
     const fcl::Vector3<S> p[3] = {t1_.corner(a, 0), t1_.corner(a, 1), t1_.corner(a, 2)};
     const fcl::Vector3<S> q[3] = {t2_.corner(b, 0), t2_.corner(b, 1), t2_.corner(b, 2)};
     const bool meet =
@@ -95,8 +106,8 @@ class Collector : public query::Visitor {
       qd[k] = q[k].template cast<double>();
     }
     const bool degenerate = !certain && (query::isDegenerate(pd) || query::isDegenerate(qd));
-    if (!degenerate && margin_ == 0 && !needsGeometry()) return add(a, b, nullptr);
-    for (Eigen::Vector3d& x : qd) x = R_12_.template cast<double>() * x + p_12_.template cast<double>();
+    if (!degenerate && !needsCorners()) return add(a, b, nullptr);
+    for (Eigen::Vector3d& x : qd) x = place_ * x;
     Eigen::Vector3d on_p, on_q;
     double distance = 0;
     if (degenerate || margin_ > 0) {
@@ -105,18 +116,22 @@ class Collector : public query::Visitor {
       if (degenerate ? distance > std::max(margin_, rounding()) : !meet && distance > margin_) return false;
     }
     if (q_.request.enable_cost) addCost(a, b);
-    if (!needsGeometry()) return add(a, b, nullptr);
-    query::Touch touch;
+    if (!q_.request.enable_contact || !q_.occupied()) return add(a, b, nullptr);
     if (distance > rounding()) {
-      touch = {(on_q - on_p) / distance, (on_p + on_q) / 2, std::max(margin_ - distance, 0.0)};
-    } else {
-      touch = query::partTriangles(pd, qd);
-      touch.depth += margin_;
+      return addTouch(a, b, {(on_q - on_p) / distance, (on_p + on_q) / 2, std::max(margin_ - distance, 0.0)});
     }
-    const fcl::Transform3<double> X_W1 = q_.X_W1.template cast<double>();
-    touch.normal = X_W1.linear() * touch.normal;
-    touch.point = X_W1 * touch.point;
-    return add(a, b, &touch);
+    return addLater(a, b, pd, qd);
+  }
+
+  /// To be called at the end of the walk.
+  void finish() {
+    query::Touch touches[query::TrianglePairs::kCapacity];
+    query::partTriangles(later_.pairs, touches);
+    for (std::size_t i = 0; i < later_.pairs.count; ++i) {
+      touches[i].depth += margin_;
+      addTouch(later_.ids[i][0], later_.ids[i][1], touches[i]);
+    }
+    later_.pairs.count = 0;
   }
 
   bool cells(const query::CellLeaf& a, const query::CellLeaf& b) override {
@@ -144,7 +159,36 @@ class Collector : public query::Visitor {
   // What distances near 0 may be off by.
   double rounding() const { return magnitude_ * 16 * kEpsilon; }
 
-  bool needsGeometry() const { return q_.request.enable_contact || q_.request.enable_cost; }
+  // Of triangles that meet.
+  bool needsCorners() const { return q_.request.enable_contact || q_.request.enable_cost || margin_ > 0; }
+
+  // Contacts that are still to be parted, several at once.
+  struct Later {
+    query::TrianglePairs pairs;
+    std::uint32_t ids[query::TrianglePairs::kCapacity][2];
+  };
+  static Later& later() {
+    thread_local Later later;
+    return later;
+  }
+
+  bool addLater(std::uint32_t a, std::uint32_t b, const Corners& p, const Corners& q) {
+    query::TrianglePairs& pairs = later_.pairs;
+    pairs.put(pairs.count, p, q);
+    later_.ids[pairs.count][0] = a;
+    later_.ids[pairs.count][1] = b;
+    ++pairs.count;
+    const bool is_last = q_.result.numContacts() + pairs.count >= q_.request.num_max_contacts;
+    if (is_last || pairs.count == query::TrianglePairs::kCapacity) finish();
+    return q_.request.isSatisfied(q_.result);
+  }
+
+  // From the frame of the first geometry.
+  bool addTouch(std::uint32_t a, std::uint32_t b, query::Touch touch) {
+    touch.normal = to_world_.linear() * touch.normal;
+    touch.point = to_world_ * touch.point;
+    return add(a, b, &touch);
+  }
 
   bool addSpheres(std::uint64_t id_a, query::Sphere a, std::uint64_t id_b, query::Sphere b) {
     if (swapped_) {
@@ -195,6 +239,8 @@ class Collector : public query::Visitor {
   const double magnitude_;  // of positions in the frame of the first geometry
   const double margin_;
   query::PairSet& seen_;
+  Later& later_;
+  fcl::Transform3<double> place_ = fcl::Transform3<double>::Identity(), to_world_;
   fcl::Matrix3<S> R_12_;
   fcl::Vector3<S> p_12_;
   bool once_;
@@ -243,6 +289,7 @@ void collideModels(const Question<S>& q, tree::Tree& tree1, tree::Tree& tree2) {
       const Placement near = withMargin(b_in_a, a, q, a.cells() || b.cells());
       traverse<S>(query::PairWalk<TreeSide, TreeSide>(a, b, near, collector));
     }
+    collector.finish();
     if (q.mayBeInside(before) &&
         (holds<S>(tree1, q.X_W1, tree2, q.X_W2, magnitude) || holds<S>(tree2, q.X_W2, tree1, q.X_W1, magnitude))) {
       addInside(q, a, b, b_in_a, swapped);
@@ -266,6 +313,7 @@ void collideBvh(const Question<typename BV::S>& q, tree::Tree& tree, const fcl::
     const auto walk = [&](auto&& collector) {
       collector.setFrame(s.lattice.origin(), s.lattice.unit());
       traverse<S>(query::PairWalk<TreeSide, BvhSide<BV>>(a, b, withMargin(b_in_a, a, q, a.cells()), collector));
+      collector.finish();
     };
     if (swapped) {
       walk(Collector<S, BvhTriangles<BV>, ModelTriangles<S>>(q, partner, model, true, magnitude));

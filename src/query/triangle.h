@@ -3,6 +3,8 @@
 
 #include <Eigen/Core>
 
+#include "query/part_kernels.h"
+
 namespace bocst::query {
 
 using Corners = Eigen::Vector3d[3];
@@ -19,6 +21,9 @@ struct Touch {
 /// edge normals) with the least overlap. point is the middle of the segment in which they cut, of the overlap of their
 /// boxes when they are coplanar or degenerate, or between their nearest points when they do not meet.
 Touch partTriangles(const Corners& p, const Corners& q);
+
+/// The same for many pairs at once; touches has room for pairs.count.
+void partTriangles(const TrianglePairs& pairs, Touch* touches);
 
 /// The point of a closed triangle, degenerate or not, that is nearest to x.
 Eigen::Vector3d closestPoint(const Eigen::Vector3d& x, const Corners& triangle);
