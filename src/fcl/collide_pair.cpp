@@ -4,9 +4,7 @@
 #include <fcl/config.h>
 #include <fcl/geometry/bvh/BVH_model.h>
 #include <fcl/math/geometry.h>
-#include <fcl/narrowphase/detail/traversal/collision/collision_traversal_node_base.h>
 #include <fcl/narrowphase/detail/traversal/collision/intersect.h>
-#include <fcl/narrowphase/detail/traversal/collision_node.h>
 
 #include <algorithm>
 #include <functional>
@@ -72,14 +70,10 @@ class Collector : public query::Visitor {
         margin_(q.margin),
         seen_(pairs()),
         later_(later()) {
-    fcl::relativeTransform(q.X_W1.linear(), q.X_W1.translation(), q.X_W2.linear(), q.X_W2.translation(), R_12_, p_12_);
     // A boolean query ends at the first contact, so it meets no pair twice.
     once_ = q.request.num_max_contacts > 1 || q.request.enable_cost;
     if (once_) seen_.clear();
     later_.pairs.count = 0;
-    to_world_ = q.X_W1.template cast<double>();
-    place_.linear() = R_12_.template cast<double>();
-    place_.translation() = p_12_.template cast<double>();
   }
 
   /// Where cells lie in the world: from the lattice frame of side A.
@@ -94,6 +88,12 @@ class Collector : public query::Visitor {
     if (swapped_) std::swap(a, b);
     if (once_ && !seen_.insert(a, b)) return false;
     if (certain && !needsCorners()) return add(a, b, nullptr);
+    if (!placed_) {
+      // Most queries that miss never come here.
+      fcl::relativeTransform(q_.X_W1.linear(), q_.X_W1.translation(), q_.X_W2.linear(), q_.X_W2.translation(), R_12_,
+                             p_12_);
+      placed_ = true;
+    }
     const fcl::Vector3<S> p[3] = {t1_.corner(a, 0), t1_.corner(a, 1), t1_.corner(a, 2)};
     const fcl::Vector3<S> q[3] = {t2_.corner(b, 0), t2_.corner(b, 1), t2_.corner(b, 2)};
     const bool meet =
@@ -185,8 +185,9 @@ class Collector : public query::Visitor {
 
   // From the frame of the first geometry.
   bool addTouch(std::uint32_t a, std::uint32_t b, query::Touch touch) {
-    touch.normal = to_world_.linear() * touch.normal;
-    touch.point = to_world_ * touch.point;
+    const fcl::Transform3<double> X_W1 = q_.X_W1.template cast<double>();
+    touch.normal = X_W1.linear() * touch.normal;
+    touch.point = X_W1 * touch.point;
     return add(a, b, &touch);
   }
 
@@ -240,31 +241,14 @@ class Collector : public query::Visitor {
   const double margin_;
   query::PairSet& seen_;
   Later& later_;
-  fcl::Transform3<double> place_ = fcl::Transform3<double>::Identity(), to_world_;
+  fcl::Transform3<double> place_ = fcl::Transform3<double>::Identity();  // the same in double
   fcl::Matrix3<S> R_12_;
   fcl::Vector3<S> p_12_;
+  bool placed_ = false;  // R_12_ and p_12_ are set
   bool once_;
   Eigen::Vector3d origin_ = Eigen::Vector3d::Zero();
   double unit_ = 1;
 };
-
-/// FCL's traversal with one leaf, as FCL's octree does it: the walk below that leaf is ours.
-template <typename S, typename Walk>
-class PairTraversalNode : public fcl::detail::CollisionTraversalNodeBase<S> {
- public:
-  explicit PairTraversalNode(Walk& walk) : walk_(walk) {}
-  bool BVTesting(int, int) const override { return false; }
-  void leafTesting(int, int) const override { walk_.run(); }
-
- private:
-  Walk& walk_;
-};
-
-template <typename S, typename Walk>
-void traverse(Walk&& walk) {
-  PairTraversalNode<S, std::remove_reference_t<Walk>> node(walk);
-  fcl::detail::collide(&node);
-}
 
 /// What is within the margin touches: the walk's slack, in units of side A, is so much more.
 template <typename S>
@@ -284,10 +268,10 @@ void collideModels(const Question<S>& q, tree::Tree& tree1, tree::Tree& tree2) {
     Collector<S, ModelTriangles<S>, ModelTriangles<S>> collector(q, t1, t2, swapped, magnitude);
     collector.setFrame(s.lattice.origin(), s.lattice.unit());
     if (q.margin == 0 && query::TreeWalk::fits(a, b, b_in_a)) {
-      traverse<S>(query::TreeWalk(a, b, b_in_a, collector));
+      query::TreeWalk(a, b, b_in_a, collector).run();
     } else {
       const Placement near = withMargin(b_in_a, a, q, a.cells() || b.cells());
-      traverse<S>(query::PairWalk<TreeSide, TreeSide>(a, b, near, collector));
+      query::PairWalk<TreeSide, TreeSide>(a, b, near, collector).run();
     }
     collector.finish();
     if (q.mayBeInside(before) &&
@@ -312,7 +296,7 @@ void collideBvh(const Question<typename BV::S>& q, tree::Tree& tree, const fcl::
     const BvhTriangles<BV> partner(bvh);
     const auto walk = [&](auto&& collector) {
       collector.setFrame(s.lattice.origin(), s.lattice.unit());
-      traverse<S>(query::PairWalk<TreeSide, BvhSide<BV>>(a, b, withMargin(b_in_a, a, q, a.cells()), collector));
+      query::PairWalk<TreeSide, BvhSide<BV>>(a, b, withMargin(b_in_a, a, q, a.cells()), collector).run();
       collector.finish();
     };
     if (swapped) {

@@ -6,6 +6,7 @@
 #include <fcl/math/geometry.h>
 
 #include <algorithm>
+#include <cmath>
 #include <functional>
 #include <limits>
 #include <stdexcept>
@@ -40,29 +41,55 @@ double marginOf(const Model<S>* model1, const Model<S>* model2) {
   return (model1 != nullptr ? model1->options().margin : 0) + (model2 != nullptr ? model2->options().margin : 0);
 }
 
-/// Positions in the frame of the first geometry are at most this large.
+/// The pose of B in A's frame, computed in S as FCL does. Spelled out: Eigen's products of blocks are calls.
 template <typename S>
-double magnitudeOf(const fcl::Transform3<S>& X_W1, const fcl::Transform3<S>& X_W2, double size1, double size2) {
-  const Eigen::Vector3d p = X_W1.linear().transpose().template cast<double>() *
-                            (X_W2.translation() - X_W1.translation()).template cast<double>();
-  return p.norm() + 2 * (size1 + size2);
-}
+struct RelativePose {
+  S rotation[3][3];
+  S translation[3];
+
+  RelativePose(const fcl::Transform3<S>& X_WA, const fcl::Transform3<S>& X_WB) {
+    const S *a = X_WA.matrix().data(), *b = X_WB.matrix().data();  // columns of four
+    const S way[3] = {b[12] - a[12], b[13] - a[13], b[14] - a[14]};
+#pragma GCC unroll 3
+    for (int r = 0; r < 3; ++r) {
+      const S* axis = a + 4 * r;
+#pragma GCC unroll 3
+      for (int c = 0; c < 3; ++c) rotation[r][c] = axis[0] * b[4 * c] + axis[1] * b[4 * c + 1] + axis[2] * b[4 * c + 2];
+      translation[r] = axis[0] * way[0] + axis[1] * way[1] + axis[2] * way[2];
+    }
+  }
+
+  /// Positions in A's frame are at most this large, for sizes of A and B in their own.
+  double magnitude(double size_a, double size_b) const {
+    const double x = translation[0], y = translation[1], z = translation[2];
+    return std::sqrt(x * x + y * y + z * z) + 2 * (size_a + size_b);
+  }
+};
 
 /// From the frame of B (origin and unit in B's model frame) to that of A, through the pose X_AB in model units.
 template <typename S>
-query::Placement placementOf(const fcl::Transform3<S>& X_WA, const fcl::Transform3<S>& X_WB,
-                             const Eigen::Vector3d& origin_a, double unit_a, const Eigen::Vector3d& origin_b,
-                             double unit_b, double magnitude) {
-  fcl::Matrix3<S> R;
-  fcl::Vector3<S> t;
-  fcl::relativeTransform(X_WA.linear(), X_WA.translation(), X_WB.linear(), X_WB.translation(), R, t);
+query::Placement placementOf(const RelativePose<S>& X_AB, const Eigen::Vector3d& origin_a, double unit_a,
+                             const Eigen::Vector3d& origin_b, double unit_b, double magnitude) {
   query::Placement p;
-  p.rotation = R.template cast<double>();
+#pragma GCC unroll 3
+  for (int r = 0; r < 3; ++r) {
+    double at = static_cast<double>(X_AB.translation[r]) - origin_a[r];
+#pragma GCC unroll 3
+    for (int c = 0; c < 3; ++c) {
+      p.rotation(r, c) = static_cast<double>(X_AB.rotation[r][c]);
+      at += p.rotation(r, c) * origin_b[c];
+    }
+    p.translation[r] = at / unit_a;
+  }
   p.scale = unit_b / unit_a;
-  p.translation = (p.rotation * origin_b + t.template cast<double>() - origin_a) / unit_a;
   // What FCL's triangle test, which computes R q + t in S, may take for a contact.
   p.slack = magnitude * 32 * static_cast<double>(std::numeric_limits<S>::epsilon()) / unit_a;
-  p.defect = (p.rotation.transpose() * p.rotation - Eigen::Matrix3d::Identity()).cwiseAbs().maxCoeff();
+  const auto dot = [&p](int c, int d) {
+    return p.rotation(0, c) * p.rotation(0, d) + p.rotation(1, c) * p.rotation(1, d) +
+           p.rotation(2, c) * p.rotation(2, d);
+  };
+  p.defect = std::max(std::max(std::max(std::abs(dot(0, 0) - 1), std::abs(dot(1, 1) - 1)), std::abs(dot(2, 2) - 1)),
+                      std::max(std::max(std::abs(dot(0, 1)), std::abs(dot(0, 2))), std::abs(dot(1, 2))));
   p.ready();
   return p;
 }
@@ -96,10 +123,10 @@ void betweenTrees(const fcl::Transform3<S>& X_WA, tree::Tree& tree_a, const fcl:
     const query::TreeSide a(tree_a), b(tree_b);
     now = a.now();
     const oracle::Surface &sa = tree_a.surface(), &sb = tree_b.surface();
-    const double magnitude = magnitudeOf(X_WA, X_WB, magnitudeOf(sa.bounds), magnitudeOf(sb.bounds));
+    const RelativePose<S> X_AB(X_WA, X_WB);
+    const double magnitude = X_AB.magnitude(magnitudeOf(sa.bounds), magnitudeOf(sb.bounds));
     f(a, b,
-      placementOf(X_WA, X_WB, sa.lattice.origin(), sa.lattice.unit(), sb.lattice.origin(), sb.lattice.unit(),
-                  magnitude),
+      placementOf(X_AB, sa.lattice.origin(), sa.lattice.unit(), sb.lattice.origin(), sb.lattice.unit(), magnitude),
       magnitude);
   }
   tree_a.afterQuery(now);
@@ -117,9 +144,10 @@ void betweenTreeAndBvh(const fcl::Transform3<typename BV::S>& X_WA, tree::Tree& 
     const BvhSide<BV> b(bvh);
     now = a.now();
     const oracle::Surface& s = tree.surface();
-    const double magnitude = magnitudeOf(X_WA, X_WB, magnitudeOf(s.bounds), b.magnitude());
+    const RelativePose<typename BV::S> X_AB(X_WA, X_WB);
+    const double magnitude = X_AB.magnitude(magnitudeOf(s.bounds), b.magnitude());
     const Eigen::Vector3d origin = Eigen::Vector3d::Zero();
-    f(a, b, placementOf(X_WA, X_WB, s.lattice.origin(), s.lattice.unit(), origin, 1.0, magnitude), magnitude);
+    f(a, b, placementOf(X_AB, s.lattice.origin(), s.lattice.unit(), origin, 1.0, magnitude), magnitude);
   }
   tree.afterQuery(now);
 }

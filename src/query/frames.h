@@ -16,13 +16,6 @@ struct alignas(64) Frame {
   float normal[2][3][8];  ///< Of the slab, about unit length; zero: no slab.
   float slab_center[8];   ///< Middle of the slab along normal, from center.
   float slab_half[8];
-
-  static constexpr std::uint64_t kNothing = ~std::uint64_t{0};
-  /// Names a block of a side.
-  static constexpr std::uint64_t name(int side, std::uint32_t block) {
-    return std::uint64_t{block} << 1 | static_cast<std::uint64_t>(side);
-  }
-  std::uint64_t holds = kNothing;  ///< Which block of which side, in this walk.
 };
 
 /// How the frames of two trees lie to each other, in float, and what that loses.

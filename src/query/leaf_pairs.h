@@ -5,10 +5,12 @@
 #include <cmath>
 #include <cstddef>
 #include <cstdint>
+#include <type_traits>
 #include <vector>
 
 #include "oracle/cpu/kernels.h"
 #include "query/side.h"
+#include "query/unpack.h"
 
 namespace bocst::query {
 
@@ -149,16 +151,24 @@ class LeafPacks {
     typename Side::Node node{};
     std::size_t begin = 0, count = 0;
     std::uint64_t walk = 0;
+    float error = 0;  ///< Corners may be so far from where they are, beside the rounding of floats.
     LeafVolume volume;
     TrianglePack pack;
-    std::uint32_t ids[TrianglePack::kCapacity];
+    const std::uint32_t* listed = nullptr;  ///< The triangles' numbers where the tree keeps them, else in `own`.
+    std::uint32_t own[TrianglePack::kCapacity];
+
+    std::uint32_t id(std::size_t i) const { return listed != nullptr ? listed[i] : own[i]; }
   };
 
   /// To be called before the first use in a walk.
   void clear() {
     ++walk_;
     used_ = 0;
+    loose_.clear();
   }
+
+  /// Leaves met in this walk, a few of them, whose corners the tree does not keep packed.
+  const std::vector<typename Side::Node>& loose() const { return loose_; }
 
   /// At most a pack of the leaf's triangles, from the one at `begin`; good until the next call.
   const Leaf& get(const Side& side, typename Side::Node node, std::size_t begin, const Placement& to_other) {
@@ -175,17 +185,35 @@ class LeafPacks {
     leaf.begin = begin;
     leaf.walk = walk_;
     leaf.volume = LeafVolume(side.volume(node), to_other);
-    corners_.clear();
-    corners_.take(side, node, begin);
-    const double(&c)[3] = leaf.volume.center[0];
-    corners_.place(packPlacement(side, Placement(), Eigen::Vector3d(c[0], c[1], c[2]), 1), leaf.pack);
-    leaf.count = corners_.count();
-    for (std::size_t i = 0; i < leaf.count; ++i) leaf.ids[i] = corners_.id(i);
+    fill(side, leaf);
     return leaf;
   }
 
  private:
   static constexpr std::size_t kLeaves = 256;
+  static constexpr std::size_t kLoose = 16;
+
+  void fill(const Side& side, Leaf& leaf) {
+    const double(&c)[3] = leaf.volume.center[0];
+    if constexpr (std::is_same<Side, TreeSide>::value) {
+      tree::PackedTriangles packed;
+      if (side.packed(leaf.node, packed, leaf.listed)) {
+        unpackTriangles(packed, c, leaf.pack);
+        leaf.count = packed.count;
+        // Half a step along each axis, and what unpacking rounds more than placing does.
+        leaf.error = 1.7321f * (0.5f * packed.step + 2 * 0x1p-24f * leaf.pack.size);
+        return;
+      }
+      if (loose_.size() < kLoose) loose_.push_back(leaf.node);
+    }
+    corners_.clear();
+    corners_.take(side, leaf.node, leaf.begin);
+    corners_.place(packPlacement(side, Placement(), Eigen::Vector3d(c[0], c[1], c[2]), 1), leaf.pack);
+    leaf.count = corners_.count();
+    leaf.error = 0;
+    leaf.listed = nullptr;
+    for (std::size_t i = 0; i < leaf.count; ++i) leaf.own[i] = corners_.id(i);
+  }
 
   static std::size_t number(tree::NodeRef node) { return node.bits; }
   static std::size_t number(int node) { return static_cast<std::size_t>(node); }
@@ -195,6 +223,7 @@ class LeafPacks {
   std::size_t used_ = 0;
   std::uint64_t walk_ = 1;
   LeafCorners<Side> corners_;
+  std::vector<typename Side::Node> loose_;
 };
 
 /// Leaves against leaves, triangle by triangle.
@@ -227,32 +256,38 @@ class LeafPairs {
     return false;
   }
 
+  /// Leaves met in this walk, a few of them, that are worth to be packed.
+  const std::vector<typename A::Node>& looseOfA() const { return leaves_a_.loose(); }
+  const std::vector<typename B::Node>& looseOfB() const { return leaves_b_.loose(); }
+
  private:
   template <typename F>
   bool testPacks(const typename LeafPacks<A>::Leaf& a, const typename LeafPacks<B>::Leaf& b, F&& f) {
     // What touches within both leaves does so within both boxes and both slabs.
     PackRegion region;
-    fillRegion(b.volume, a.volume, *a_in_b_, b.pack.size, region);
+    fillRegion(b.volume, a.volume, *a_in_b_, b.pack.size, b.error, region);
     const std::uint32_t lanes = trianglesWithin(b.pack, region);
     if (lanes == 0) return false;
-    fillRegion(a.volume, b.volume, *b_in_a_, a.pack.size, region);
+    fillRegion(a.volume, b.volume, *b_in_a_, a.pack.size, a.error, region);
     const std::uint32_t rows = trianglesWithin(a.pack, region);
     if (rows == 0) return false;
     for (int k = 0; k < 3; ++k) to_a_.offset[k] = static_cast<float>(b.volume.center[1][k] - a.volume.center[0][k]);
     moveTriangles(b.pack, lanes, to_a_, lanes_);
     std::uint32_t ids[TrianglePack::kCapacity], *id = ids;
-    for (std::uint32_t left = lanes; left != 0; left &= left - 1) *id++ = b.ids[__builtin_ctz(left)];
-    const auto slack = static_cast<float>(b_in_a_->slack * 1.001);
+    for (std::uint32_t left = lanes; left != 0; left &= left - 1)
+      *id++ = b.id(static_cast<std::size_t>(__builtin_ctz(left)));
+    const auto slack = static_cast<float>(
+        (b_in_a_->slack + static_cast<double>(a.error) + b_in_a_->scale * static_cast<double>(b.error)) * 1.001);
     const std::size_t found = touchingPairs(a.pack, rows, lanes_, region, slack, found_);
     for (std::size_t k = 0; k < found; ++k) {
-      if (f(a.ids[found_[k].row], ids[found_[k].lane], found_[k].certain)) return true;
+      if (f(a.id(found_[k].row), ids[found_[k].lane], found_[k].certain)) return true;
     }
     return false;
   }
 
   /// Where the triangles of a leaf can meet those of another, which `to` places in its frame. With M = `reach`, what is
   /// computed here and by trianglesWithin() is off by 15 u M: corners 2, the normal 3, sums along it 10.
-  static void fillRegion(const LeafVolume& own, const LeafVolume& other, const Placement& to, double size,
+  static void fillRegion(const LeafVolume& own, const LeafVolume& other, const Placement& to, double size, float error,
                          PackRegion& region) {
     double way[3], reach = size, offset = to.scale * other.slab[0];
     for (int k = 0; k < 3; ++k) {
@@ -261,7 +296,7 @@ class LeafPairs {
       offset += other.normal[1][k] * way[k];
       region.normal[k] = static_cast<float>(other.normal[1][k]);
     }
-    const double pad = (32 * 0x1p-24 + 4 * to.defect) * reach + 1.02 * to.slack;
+    const double pad = (32 * 0x1p-24 + 4 * to.defect) * reach + 1.02 * (to.slack + static_cast<double>(error));
     for (int k = 0; k < 3; ++k) {
       region.low[k] = static_cast<float>(std::max(-own.half[0][k], way[k] - other.half[1][k]) - pad);
       region.high[k] = static_cast<float>(std::min(own.half[0][k], way[k] + other.half[1][k]) + pad);

@@ -112,7 +112,7 @@ class TreeSide {
   void children(Node node, F&& f) const {
     const std::uint32_t index = tree_.link(node).index();
     const tree::Block& block = tree_.block(index);
-    tree_.touch(block, now_);
+    tree_.touch(index, now_);
     for (int mask = block.grey; mask != 0; mask &= mask - 1) {
       f(Node::octant(index, __builtin_ctz(static_cast<unsigned>(mask))));
     }
@@ -121,6 +121,14 @@ class TreeSide {
   /// Triangles of a leaf that is not a cell.
   std::size_t triangleCount(Node node) const { return tree_.list(tree_.link(node)).count; }
   std::uint32_t triangle(Node node, std::size_t i) const { return tree_.list(tree_.link(node)).ids[i]; }
+
+  /// The corners of a leaf's triangles where the tree keeps them packed, and their numbers; else false.
+  bool packed(Node node, tree::PackedTriangles& triangles, const std::uint32_t*& ids) const {
+    const tree::Link link = tree_.link(node);
+    if (!tree_.packed(link, triangles)) return false;
+    ids = tree_.list(link).ids;
+    return true;
+  }
 
   /// Triangle t is about to be read.
   void prefetch(std::uint32_t t) const { __builtin_prefetch(&tree_.surface().mesh->indices(t)); }
@@ -143,7 +151,7 @@ class TreeSide {
   template <typename OtherVolume>
   unsigned octantsOverlapping(std::uint32_t index, OtherVolume& other, const Placement& to) const {
     const tree::Block& block = tree_.block(index);
-    tree_.touch(block, now_);
+    tree_.touch(index, now_);
     const double side = 1 << (lattice::kMaxLevel - block.level);
     const double corner[3] = {block.at[0] * side, block.at[1] * side, block.at[2] * side};
     return overlappingOctants(block.octants, seenFrom(other, to, corner, side / 2)) & block.grey;

@@ -13,52 +13,70 @@
 namespace bocst::query {
 namespace {
 
-inline bool isLeaf(const StepPair& p, int side) {
-  const tree::Link::Tag tag = p.link[side].tag();
-  return tag == tree::Link::kShortList || (tag == tree::Link::kList && p.level[side] == lattice::kMaxLevel);
+inline bool isLeaf(const StepNode& n) {
+  const tree::Link::Tag tag = n.link.tag();
+  return tag == tree::Link::kShortList || (tag == tree::Link::kList && n.level == lattice::kMaxLevel);
 }
 
-inline float sideOf(const PairSteps& s, const StepPair& p, int side) {
-  return s.geometry.unit[side] * static_cast<float>(1 << (lattice::kMaxLevel - p.level[side]));
+inline float sideOf(const PairSteps& s, const StepNode& n, int side) {
+  return s.geometry.unit[side] * static_cast<float>(1 << (lattice::kMaxLevel - n.level));
 }
 
-// What is still implicit comes first, so that the stack leaves it for last: a hit among resident nodes makes its growth
-// unnecessary.
-inline void push(PairSteps& s, const StepPair& pair, int x, std::size_t frame, const tree::Block& block,
-                 unsigned mask) {
-  const int y = 1 - x;
-  const std::uint32_t index = pair.link[x].index(), level = pair.level[x] + 1;
-  const tree::NodeRef node_y = pair.node[y];
-  const tree::Link link_y = pair.link[y];
-  const std::uint32_t level_y = pair.level[y], lane_y = pair.lane[y];
-  StepPair* top = s.stack + s.depth;
-  const auto put = [&](int o, tree::Link link) {
-    top->node[x] = tree::NodeRef::octant(index, o);
-    top->link[x] = link;
-    top->level[x] = level;
-    top->lane[x] = static_cast<std::uint32_t>(8 * frame) + static_cast<std::uint32_t>(o);
-    top->node[y] = node_y;
-    top->link[y] = link_y;
-    top->level[y] = level_y;
-    top->lane[y] = lane_y;
-    top->frames = static_cast<std::uint32_t>(frame) + 1;
-    ++top;
-  };
-  unsigned resident = 0;
-  for (unsigned left = mask; left != 0; left &= left - 1) {
-    const int o = __builtin_ctz(left);
-    const tree::Link link = block.child[o].load(std::memory_order_acquire);
-    if (link.tag() == tree::Link::kImplicit) {
-      put(o, link);
-    } else {
-      resident |= 1u << o;
+inline void push(PairSteps& s, int side, std::uint32_t block, std::uint32_t level, std::uint32_t frame,
+                 const StepNode& other, unsigned octants) {
+  StepGroup& top = s.stack[s.depth++];
+  top.other.node = other.node;
+  top.other.link = other.link;
+  top.other.level = other.level;
+  top.other.lane = other.lane;
+  top.side = static_cast<std::uint32_t>(side);
+  top.block = block;
+  top.frame = frame;
+  top.level = level;
+  top.octants = octants;
+  top.implicit = 0;
+}
+
+// Takes the next pair off the stack and says how many frames it and what is under it use. What is still implicit is
+// left for last: a hit among resident nodes makes its growth unnecessary.
+inline std::uint32_t pop(PairSteps& s, StepNode (&pair)[2]) {
+  for (;;) {
+    StepGroup& top = s.stack[s.depth - 1];
+    const unsigned octants = top.octants != 0 ? top.octants : top.implicit;
+    int o = __builtin_ctz(octants);
+    for (unsigned left = octants & (octants - 1); left != 0; left &= left - 1) {
+      const int p = __builtin_ctz(left);
+      o = top.overlap[p] > top.overlap[o] ? p : o;
     }
+    const tree::NodeRef node = tree::NodeRef::octant(top.block, o);
+    const tree::Link link = s.tree[top.side]->link(node);
+    const unsigned rest = octants & ~(1u << o);
+    if (top.octants != 0) {
+      top.octants = rest;
+      if (link.tag() == tree::Link::kImplicit && (rest | top.implicit) != 0) {
+        top.implicit |= 1u << o;
+        continue;
+      }
+      if ((rest | top.implicit) == 0) --s.depth;
+    } else {
+      top.implicit = rest;
+      if (rest == 0) --s.depth;
+    }
+    StepNode &own = pair[top.side], &other = pair[1 - top.side];
+    own.node = node;
+    own.link = link;
+    own.level = top.level;
+    other.node = top.other.node;
+    other.link = top.other.link;
+    other.level = top.other.level;
+    other.lane = top.other.lane;
+    if (top.frame == StepGroup::kNoFrame) {
+      own.lane = StepNode::kNoLane;
+      return 0;
+    }
+    own.lane = 8 * top.frame + static_cast<std::uint32_t>(o);
+    return top.frame + 1;
   }
-  for (; resident != 0; resident &= resident - 1) {
-    const int o = __builtin_ctz(resident);
-    put(o, block.child[o].load(std::memory_order_acquire));
-  }
-  s.depth = static_cast<std::size_t>(top - s.stack);
 }
 
 }  // namespace
@@ -70,23 +88,26 @@ namespace bocst::query::HWY_NAMESPACE {
 
 // Bit o is set unless octant o of frame f (side `own`) is surely apart from the volume in lane l of frame y, by one of
 // eight axes: the faces of both boxes and both slab normals. No edge axes: with slabs they gain nothing.
-HWY_INLINE unsigned overlapping(const PairFrames& g, int own, const Frame& f, const Frame& y, std::size_t l) {
+HWY_INLINE unsigned overlapping(const PairFrames& g, int own, const Frame& f, const Frame& y, std::size_t l,
+                                float* overlap) {
   const D d;
   const int other = 1 - own;
   const V pad = hn::Set(d, g.pad), slab_pad = hn::Set(d, g.slab_pad);
   unsigned result = 0;
   for (std::size_t i = 0; i < 8; i += hn::Lanes(d)) {
     V way[2][3];  // from the octants' middles to the volume's, in both frames
-    M apart = hn::MaskFromVec(hn::Zero(d));
+    V least = hn::Set(d, 1e30f);
     BOCST_UNROLL
     for (int s = 0; s < 2; ++s) {
       BOCST_UNROLL
       for (int k = 0; k < 3; ++k) {
         way[s][k] = hn::Sub(hn::Set(d, y.center[s][k][l]), hn::Load(d, f.center[s][k] + i));
         const V reach = hn::Add(hn::Load(d, f.half[s][k] + i), hn::Add(hn::Set(d, y.half[s][k][l]), pad));
-        apart = hn::Or(apart, hn::Gt(hn::Abs(way[s][k]), reach));
+        least = hn::Min(least, hn::Sub(reach, hn::Abs(way[s][k])));
       }
     }
+    hn::StoreU(least, d, overlap + i);
+    M apart = hn::Lt(least, hn::Zero(d));
     // Slabs: for z in a box with |m.z - offset| <= w, any a gives n.z in a * offset +- (|a| w + |n - a m| over the
     // box).
     const V x_center = hn::Load(d, f.slab_center + i), x_half = hn::Load(d, f.slab_half + i);
@@ -124,25 +145,25 @@ HWY_INLINE unsigned overlapping(const PairFrames& g, int own, const Frame& f, co
 }
 
 // The octants of a block. Pairs that differ in the other node only come one after the other and find the frame filled.
-HWY_INLINE void decodeBlock(const PairFrames& g, int own, std::uint32_t index, const tree::Block& block, Frame& f) {
-  const std::uint64_t holds = Frame::name(own, index);
-  if (f.holds == holds) return;
-  f.holds = holds;
-  decodeCell(g, own, block.level, block.at, block.octants, f);
+HWY_INLINE void decodeBlock(PairSteps& s, int own, std::uint32_t index, const tree::Block& block, std::uint32_t frame) {
+  const std::uint64_t name = PairSteps::name(own, index);
+  if (s.holds[frame] == name) return;
+  s.holds[frame] = name;
+  decodeCell(s.geometry, own, block.level, block.at, block.octants, s.frames[frame]);
 }
 
 // Where the volume of a pair's node on one side is; for pairs that come without frames.
-HWY_INLINE void lookUp(PairSteps& s, StepPair& p, int side, std::size_t& frames) {
-  if (p.lane[side] != StepPair::kNoLane) return;
+HWY_INLINE void lookUp(PairSteps& s, StepNode& n, int side, std::uint32_t& frames) {
+  if (n.lane != StepNode::kNoLane) return;
   const tree::Tree& tree = *s.tree[side];
-  if (p.node[side].isRoot()) {
+  if (n.node.isRoot()) {
     decodeRoot(s.geometry, side, tree.rootBounds(), s.frames[frames]);
-    s.frames[frames].holds = Frame::kNothing;
-    p.lane[side] = static_cast<std::uint32_t>(8 * frames);
+    s.holds[frames] = PairSteps::kNothing;
+    n.lane = 8 * frames;
   } else {
-    const std::uint32_t index = p.node[side].block();
-    decodeBlock(s.geometry, side, index, tree.block(index), s.frames[frames]);
-    p.lane[side] = static_cast<std::uint32_t>(8 * frames) + static_cast<std::uint32_t>(p.node[side].octant());
+    const std::uint32_t index = n.node.block();
+    decodeBlock(s, side, index, tree.block(index), frames);
+    n.lane = 8 * frames + static_cast<std::uint32_t>(n.node.octant());
   }
   ++frames;
 }
@@ -152,49 +173,42 @@ std::uint8_t OverlappingOctants(const PairFrames& geometry, int own, const CellO
   Frame f, y;
   decodeCell(geometry, own, cell.cell.level, cell.cell.at, cell.octants, f);
   decodeCell(geometry, 1 - own, other.cell.level, other.cell.at, other.octants, y);
-  return static_cast<std::uint8_t>(overlapping(geometry, own, f, y, static_cast<std::size_t>(octant)));
+  float overlap[8];
+  return static_cast<std::uint8_t>(overlapping(geometry, own, f, y, static_cast<std::size_t>(octant), overlap));
 }
 
 PairSteps::Event NextEvent(PairSteps& s) {
   while (s.depth > 0) {
-    const StepPair& top = s.stack[--s.depth];
-    StepPair p;
-    for (int side = 0; side < 2; ++side) {
-      p.node[side] = top.node[side];
-      p.link[side] = top.link[side];
-      p.level[side] = top.level[side];
-      p.lane[side] = top.lane[side];
-    }
-    p.frames = top.frames;
-    const bool leaf0 = isLeaf(p, 0), leaf1 = isLeaf(p, 1);
-    if (leaf0 && leaf1) {
-      s.pair = p;
-      return PairSteps::kLeaves;
-    }
+    std::uint32_t frames = pop(s, s.pair);
+    const bool leaf0 = isLeaf(s.pair[0]), leaf1 = isLeaf(s.pair[1]);
+    if (leaf0 && leaf1) return PairSteps::kLeaves;
     // The larger of two nodes is expanded, unless it is a leaf.
-    const float side0 = sideOf(s, p, 0), side1 = sideOf(s, p, 1);
+    const float side0 = sideOf(s, s.pair[0], 0), side1 = sideOf(s, s.pair[1], 1);
     const int x = leaf1 || (!leaf0 && side0 >= side1) ? 0 : 1, y = 1 - x;
-    if (p.link[x].tag() != tree::Link::kBlock) {
-      s.pair = p;
-      return PairSteps::kAside;
+    StepNode &own = s.pair[x], &other = s.pair[y];
+    if (own.link.tag() != tree::Link::kBlock) return PairSteps::kAside;
+    if (other.link.tag() == tree::Link::kBlock) {
+      const tree::Block& b = s.tree[y]->block(other.link.index());
+      __builtin_prefetch(&b);
+      __builtin_prefetch(reinterpret_cast<const char*>(&b) + 64);
     }
-    std::size_t frames = p.frames;
-    lookUp(s, p, 0, frames);
-    lookUp(s, p, 1, frames);
-    const tree::Block& block = s.tree[x]->block(p.link[x].index());
-    s.tree[x]->touch(block, s.now);
-    Frame& f = s.frames[frames];
-    decodeBlock(s.geometry, x, p.link[x].index(), block, f);
-    const unsigned mask = overlapping(s.geometry, x, f, s.frames[p.lane[y] / 8], p.lane[y] % 8) & block.grey;
+    lookUp(s, s.pair[0], 0, frames);
+    lookUp(s, s.pair[1], 1, frames);
+    const std::uint32_t index = own.link.index();
+    const tree::Block& block = s.tree[x]->block(index);
+    s.tree[x]->touch(index, s.now);
+    decodeBlock(s, x, index, block, frames);
+    const unsigned mask = overlapping(s.geometry, x, s.frames[frames], s.frames[other.lane / 8], other.lane % 8,
+                                      s.stack[s.depth].overlap) &
+                          block.grey;
     if (mask == 0) continue;
-    if ((y == 0 ? leaf0 && side1 < side0 : leaf1 && side0 < side1)) {
-      p.frames = static_cast<std::uint32_t>(frames);
-      s.pair = p;
+    if (y == 0 ? leaf0 && side1 < side0 : leaf1 && side0 < side1) {
+      s.frames_used = frames;
       s.expanded = x;
       s.mask = mask;
       return PairSteps::kCoarse;
     }
-    push(s, p, x, frames, block, mask);
+    push(s, x, index, own.level + 1, frames, other, mask);
   }
   return PairSteps::kDone;
 }
@@ -216,8 +230,18 @@ std::uint8_t overlappingOctants(const PairFrames& geometry, int own, const CellO
 PairSteps::Event nextEvent(PairSteps& steps) { return HWY_DYNAMIC_DISPATCH(NextEvent)(steps); }
 
 void pushOctants(PairSteps& s, unsigned mask) {
+  if (mask == 0) return;
   const int x = s.expanded;
-  push(s, s.pair, x, s.pair.frames, s.tree[x]->block(s.pair.link[x].index()), mask);
+  push(s, x, s.pair[x].link.index(), s.pair[x].level + 1, s.frames_used, s.pair[1 - x], mask);
+}
+
+void pushPair(PairSteps& s, tree::NodeRef node_a, tree::NodeRef node_b) {
+  StepNode other;
+  other.node = node_b;
+  other.link = s.tree[1]->link(node_b);
+  other.level = static_cast<std::uint32_t>(s.tree[1]->cell(node_b).level);
+  push(s, 0, node_a.block(), static_cast<std::uint32_t>(s.tree[0]->cell(node_a).level), StepGroup::kNoFrame, other,
+       1u << node_a.octant());
 }
 
 }  // namespace bocst::query

@@ -9,24 +9,37 @@
 
 namespace bocst::query {
 
-/// A pair of nodes, one of each side. Words of one size, written and read one by one: a processor is slow to read a
-/// wide word that was just written in parts.
-struct StepPair {
+/// A node as the walk knows it.
+struct StepNode {
   static constexpr std::uint32_t kNoLane = 0xffffffff;
 
-  tree::NodeRef node[2];
-  tree::Link link[2];
-  std::uint32_t level[2] = {1, 1};
-  std::uint32_t lane[2] = {kNoLane, kNoLane};  ///< 8 * frame + octant: where the nodes' volumes are, if they are.
-  std::uint32_t frames = 0;  ///< Frames below this one are in use by this pair or those under it on the stack.
+  tree::NodeRef node;
+  tree::Link link;
+  std::uint32_t level = 1;
+  std::uint32_t lane = kNoLane;  ///< 8 * frame + octant: where the node's volume is, if it is.
+};
+
+/// Octants of one block against one node of the other side, still to be walked. Words of one size, written and read one
+/// by one: a processor is slow to read a wide word that was just written in parts.
+struct StepGroup {
+  static constexpr std::uint32_t kNoFrame = 0xffffffff;
+
+  StepNode other;
+  std::uint32_t side;   ///< That of the block.
+  std::uint32_t block;  ///< As NodeRef names it, so the root is octant 7 of a block that there is not.
+  std::uint32_t frame;  ///< Where the block's octants are, if they are; those below it are in use, too.
+  std::uint32_t level;  ///< Of the octants.
+  std::uint32_t octants;
+  float overlap[8];
+  std::uint32_t implicit;  ///< Octants that turned out to be so: they wait for the others.
 };
 
 /// The depth-first walk over resident pairs of two trees, exact answers: up to the next pair of leaves.
 struct PairSteps {
   /// Frames alive at once: two to look up a pair that comes without, one more each level of either side.
   static constexpr std::size_t kFrames = 2 + 2 * lattice::kMaxLevel + 1;
-  /// What a walk below one pair can add to the stack: seven more for each of its levels.
-  static constexpr std::size_t kStackRoom = 7 * (2 * lattice::kMaxLevel + 1) + 1;
+  /// What a walk below one pair can add to the stack: one more each level of either side.
+  static constexpr std::size_t kStackRoom = 2 * lattice::kMaxLevel + 1;
 
   enum Event {
     kDone,    ///< The stack is empty.
@@ -38,13 +51,25 @@ struct PairSteps {
   const tree::Tree* tree[2];
   std::int64_t now;
   PairFrames geometry;
-  Frame* frames;    ///< kFrames of them.
-  StepPair* stack;  ///< With room for kStackRoom more.
+  Frame* frames;     ///< kFrames of them.
+  StepGroup* stack;  ///< With room for kStackRoom more.
   std::size_t depth = 0;
 
-  StepPair pair{};
+  StepNode pair[2];  ///< Of the event.
+  std::uint32_t frames_used = 0;
   int expanded = 0;
   unsigned mask = 0;
+
+  std::uint64_t holds[kFrames];  ///< Which block of which side is in a frame.
+  static constexpr std::uint64_t kNothing = ~std::uint64_t{0};
+  static constexpr std::uint64_t name(int side, std::uint32_t block) {
+    return std::uint64_t{block} << 1 | static_cast<std::uint64_t>(side);
+  }
+
+  PairSteps(const tree::Tree* a, const tree::Tree* b, std::int64_t now_, const PairFrames& geometry_, Frame* frames_)
+      : tree{a, b}, now(now_), geometry(geometry_), frames(frames_), stack(nullptr) {
+    for (std::uint64_t& h : holds) h = kNothing;
+  }
 };
 
 /// Goes on to the next event. Chosen at run time for the machine's instruction set.
@@ -63,5 +88,8 @@ std::uint8_t overlappingOctants(const PairFrames& geometry, int own, const CellO
 
 /// Puts the octants in `mask` of the expanded node of steps.pair on the stack, after kCoarse.
 void pushOctants(PairSteps& steps, unsigned mask);
+
+/// Puts a pair of nodes on the stack that comes without frames.
+void pushPair(PairSteps& steps, tree::NodeRef node_a, tree::NodeRef node_b);
 
 }  // namespace bocst::query

@@ -19,7 +19,7 @@ class TreeWalk {
   }
 
   TreeWalk(const TreeSide& a, const TreeSide& b, const Placement& b_in_a, Visitor& visitor)
-      : a_(a), b_(b), b_in_a_(b_in_a), a_in_b_(b_in_a.inverse()), visitor_(visitor) {}
+      : a_(a), b_(b), b_in_a_(b_in_a), visitor_(visitor) {}
 
   /// True when the visitor ended it.
   bool run();
@@ -29,11 +29,15 @@ class TreeWalk {
 
   bool search(Scratch& s);
   bool stepAll(PairSteps& steps, Scratch& s);
+  bool testLeaves(const PairSteps& steps, Scratch& s);
   void setAside(const PairSteps& steps, Scratch& s);
 
   const TreeSide &a_, &b_;
+  const Placement& aInB();
+
   const Placement& b_in_a_;
-  const Placement a_in_b_;
+  Placement a_in_b_;  // once asked for
+  bool inverted_ = false;
   Visitor& visitor_;
 };
 

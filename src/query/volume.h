@@ -156,4 +156,33 @@ inline bool boxesApart(const OrientedVolume& a, const OrientedVolume& b, const P
   return false;
 }
 
+/// The same by the six face axes alone, for volumes along their frames' axes. Of the roots: what only an edge axis
+/// parts is parted one step later.
+inline bool facesApart(const Volume& a, const Volume& b, const Placement& to) {
+  const double* r = to.rotation.data();  // column by column
+  double way[3], b_half[3], sum = 0;
+#pragma GCC unroll 3
+  for (int k = 0; k < 3; ++k) {
+    b_half[k] = static_cast<double>(b.half[k]) * to.scale;
+    way[k] = to.scale * (r[k] * b.center[0] + r[k + 3] * b.center[1] + r[k + 6] * b.center[2]) + to.translation[k] -
+             a.center[k];
+    sum += std::abs(way[k]) + static_cast<double>(a.half[k]) + b_half[k];
+  }
+  // Half extents were rounded to float.
+  const double pad = sum * (0x1p-22 + 4 * to.defect) + to.slack;
+  bool apart = false;
+#pragma GCC unroll 3
+  for (int k = 0; k < 3; ++k) {
+    const double reach_b = std::abs(r[k]) * b_half[0] + std::abs(r[k + 3]) * b_half[1] + std::abs(r[k + 6]) * b_half[2];
+    apart |= std::abs(way[k]) > static_cast<double>(a.half[k]) + reach_b + pad;
+    const double* axis = r + 3 * k;
+    const double along = axis[0] * way[0] + axis[1] * way[1] + axis[2] * way[2];
+    const double reach_a = std::abs(axis[0]) * static_cast<double>(a.half[0]) +
+                           std::abs(axis[1]) * static_cast<double>(a.half[1]) +
+                           std::abs(axis[2]) * static_cast<double>(a.half[2]);
+    apart |= std::abs(along) > b_half[k] + reach_a + pad;
+  }
+  return apart;
+}
+
 }  // namespace bocst::query

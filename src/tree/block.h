@@ -30,35 +30,26 @@ class Link {
   std::uint32_t bits_ = 0;
 };
 
-/// What an expanded node knows: its eight octants, published all at once. 160 bytes.
+/// What a walk reads of an expanded node: its eight octants, published all at once. Two cache lines.
 ///
 /// | bytes | what |
 /// |---|---|
 /// | 0..87 | octants: box and slab of each (oracle.h, OctantBounds) |
-/// | 88..98 | own: box and slab of the node itself, as its octants showed it (CellBounds) |
-/// | 99 | grey: bit o says octant o is a node |
-/// | 100..107 | cell: level, padding, then x, y, z of the expanded node (16 bits each) |
-/// | 108..139 | child: the link of each octant |
-/// | 140..143 | own_list: where the list of the expanded node itself is; only where an oracle keeps its octants' |
-/// | 144..151 | stamp: when a query last went through here, ns of the model's clock |
-/// | 152..159 | parent: block and octant where the expanded node itself is a child |
-struct alignas(32) Block {
+/// | 88 | grey: bit o says octant o is a node |
+/// | 89..95 | cell: level, then x, y, z of the expanded node (16 bits each) |
+/// | 96..127 | child: the link of each octant |
+struct alignas(64) Block {
   static constexpr std::uint32_t kNone = 0xffffffffu;
 
   oracle::OctantBounds octants;
-  oracle::CellBounds own;
   std::uint8_t grey = 0;
   std::uint8_t level = 1;
   std::uint16_t at[3] = {0, 0, 0};
   std::atomic<Link> child[8] = {};
-  std::uint32_t own_list = kNone;
-  mutable std::atomic<std::int64_t> stamp{0};
-  std::uint32_t parent = kNone;
-  std::uint32_t parent_octant = 0;
 
   lattice::Cell cell() const { return {level, {at[0], at[1], at[2]}}; }
 };
-static_assert(sizeof(Block) == 160);
+static_assert(sizeof(Block) == 128);
 static_assert(sizeof(oracle::CellBounds) == 11);
 static_assert(std::atomic<Link>::is_always_lock_free);
 
@@ -74,6 +65,13 @@ struct NodeRef {
   int octant() const { return static_cast<int>(bits & 7); }
   bool operator==(NodeRef other) const { return bits == other.bits; }
   bool operator<(NodeRef other) const { return bits < other.bits; }
+};
+
+/// What growth and decay know of a block beside; its number is the block's.
+struct BlockRecord {
+  oracle::CellBounds own;                 ///< Box and slab of the expanded node itself, as its octants showed it.
+  std::uint32_t own_list = Block::kNone;  ///< Where its list is; only where an oracle keeps its octants'.
+  NodeRef parent;                         ///< Which node was expanded.
 };
 
 }  // namespace bocst::tree

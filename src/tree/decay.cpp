@@ -24,7 +24,7 @@ void Tree::collectTriangles(Link link, const lattice::Cell& cell, std::vector<st
 
 Link Tree::copyList(Link list, Pool<std::uint32_t, 12>& lists) const {
   const std::uint32_t* from = &lists_[list.index()];
-  const std::size_t words = (from[0] & kKept) != 0 ? kKeptWords : from[0] + std::size_t{1};
+  const std::size_t words = listWords(from);
   const std::uint32_t index = lists.append(words);
   std::copy_n(from, words, &lists[index]);
   return Link(list.tag(), index);
@@ -33,9 +33,9 @@ Link Tree::copyList(Link list, Pool<std::uint32_t, 12>& lists) const {
 // The list of a node whose block goes.
 Link Tree::regained(Link block, const lattice::Cell& cell, Pool<std::uint32_t, 12>& lists) const {
   if (grid_ != nullptr && cell.level <= grid_->level()) return Link();
-  const std::uint32_t own = blocks_[block.index()].own_list;
+  const std::uint32_t own = records_[block.index()].own_list;
   if (own != Block::kNone) {
-    const bool is_short = lists_[own] <= kLeafTriangles;  // the length of a list that the oracle keeps looks huge
+    const bool is_short = (lists_[own] & ~kPacked) <= kLeafTriangles;  // one that the oracle keeps looks huge
     return copyList(Link(is_short ? Link::kShortList : Link::kList, own), lists);
   }
   std::vector<std::uint32_t> ids;
@@ -56,7 +56,7 @@ void Tree::dropUnusedShelves() {
   };
   for (std::uint32_t i = 0; i < blocks_.size(); ++i) {
     const Block& block = blocks_[i];
-    if (block.own_list != Block::kNone) mark(block.own_list);
+    if (records_[i].own_list != Block::kNone) mark(records_[i].own_list);
     for (int o = 0; o < 8; ++o) {
       const Link link = block.child[o].load(std::memory_order_relaxed);
       if ((block.grey >> o & 1) != 0 && link.isList()) mark(link.index());
@@ -90,10 +90,14 @@ void Tree::keepOnly(const std::vector<std::uint8_t>& keep) {
     grid_tried_ = false;
     root_.store(Link(), std::memory_order_relaxed);
     blocks_.clear();
+    records_.clear();
+    stamps_.clear();
     lists_.clear();
     shelves_.clear();
   } else {
     Pool<Block, 5> blocks;
+    Pool<BlockRecord, 5> records;
+    Pool<std::atomic<std::int64_t>, 5> stamps;
     Pool<std::uint32_t, 12> lists;
     Link root;
     while (!moves.empty()) {
@@ -106,19 +110,18 @@ void Tree::keepOnly(const std::vector<std::uint8_t>& keep) {
         link = copyList(link, lists);
       } else if (link.tag() == Link::kBlock) {
         const Block& from = blocks_[link.index()];
-        const std::uint32_t index = blocks.append(1);
+        const std::uint32_t own_list = records_[link.index()].own_list, index = blocks.append(1);
+        records.append(1);
+        stamps.append(1);
         Block& to = blocks[index];
         to.octants = from.octants;
-        to.own = from.own;
         to.grey = from.grey;
         to.level = from.level;
         std::copy_n(from.at, 3, to.at);
-        if (from.own_list != Block::kNone) to.own_list = copyList(Link(Link::kList, from.own_list), lists).index();
-        to.stamp.store(from.stamp.load(std::memory_order_relaxed), std::memory_order_relaxed);
-        if (!move.to.isRoot()) {
-          to.parent = move.to.block();
-          to.parent_octant = static_cast<std::uint32_t>(move.to.octant());
-        }
+        records[index].own = records_[link.index()].own;
+        if (own_list != Block::kNone) records[index].own_list = copyList(Link(Link::kList, own_list), lists).index();
+        records[index].parent = move.to;
+        stamps[index].store(stamps_[link.index()].load(std::memory_order_relaxed), std::memory_order_relaxed);
         nodes_at_[from.level + 1] += __builtin_popcount(from.grey);
         for (int o = 0; o < 8; ++o) {
           if (from.grey >> o & 1) {
@@ -132,6 +135,8 @@ void Tree::keepOnly(const std::vector<std::uint8_t>& keep) {
       place.store(link, std::memory_order_relaxed);
     }
     blocks_.swap(blocks);
+    records_.swap(records);
+    stamps_.swap(stamps);
     lists_.swap(lists);
     dropUnusedShelves();
   }
@@ -156,9 +161,9 @@ void Tree::pruneAlone(std::int64_t now, bool budget_only) {
         const Link child = block.child[o].load(std::memory_order_relaxed);
         if (child.tag() != Link::kBlock) continue;
         deepest = false;
-        if (!keep[child.index()]) block.stamp.store(now, std::memory_order_relaxed);  // its own time starts (3.1)
+        if (!keep[child.index()]) stamps_[i].store(now, std::memory_order_relaxed);  // its own time starts (3.1)
       }
-      if (deepest && now - block.stamp.load(std::memory_order_relaxed) > ttl) {
+      if (deepest && now - stamps_[i].load(std::memory_order_relaxed) > ttl) {
         keep[i] = 0;
         some = true;
       }
@@ -179,11 +184,14 @@ void Tree::applyBudget() {
     std::vector<std::uint32_t> order(blocks_.size());
     std::iota(order.begin(), order.end(), 0u);
     std::stable_sort(order.begin(), order.end(), [this](std::uint32_t a, std::uint32_t b) {
-      return blocks_[a].stamp.load(std::memory_order_relaxed) > blocks_[b].stamp.load(std::memory_order_relaxed);
+      return stamps_[a].load(std::memory_order_relaxed) > stamps_[b].load(std::memory_order_relaxed);
     });
     std::vector<std::uint8_t> keep(blocks_.size(), 0);
     for (std::size_t k = 0; k < std::min(count, order.size()); ++k) {
-      for (std::uint32_t i = order[k]; i != Block::kNone && !keep[i]; i = blocks_[i].parent) keep[i] = 1;
+      for (std::uint32_t i = order[k]; !keep[i]; i = records_[i].parent.block()) {
+        keep[i] = 1;
+        if (records_[i].parent.isRoot()) break;
+      }
     }
     keepOnly(keep);
     if (bytes_ <= budget || count == 0) return;

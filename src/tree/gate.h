@@ -1,48 +1,80 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #pragma once
 
+#include <array>
 #include <atomic>
+#include <condition_variable>
+#include <cstddef>
 #include <mutex>
-#include <shared_mutex>
 
 namespace bocst::tree {
 
 /// Readers pass together; a writer gets in between them, and is not starved by readers that keep coming.
-/// A thread that needs several gates takes them in address order.
+/// A thread that needs several gates takes them in address order, and gives back itself what it took.
+///
+/// Readers count themselves on cache lines of their own, so that threads that only read do not slow each other down.
+/// Either a reader sees that somebody writes, or the writer sees the reader: that takes sequential consistency.
 class Gate {
  public:
   void lock_shared() {
-    if (writers_.load(std::memory_order_acquire) != 0) {
-      const std::lock_guard<std::mutex> wait(turnstile_);
+    std::atomic<int>& readers = mine();
+    readers.fetch_add(1);
+    while (writing_.load()) {
+      leave(readers);
+      { const std::lock_guard<std::mutex> wait(turnstile_); }
+      readers.fetch_add(1);
     }
-    gate_.lock_shared();
   }
-  void unlock_shared() { gate_.unlock_shared(); }
+  void unlock_shared() { leave(mine()); }
 
   void lock() {
-    writers_.fetch_add(1, std::memory_order_acq_rel);
     turnstile_.lock();
-    gate_.lock();
+    writing_.store(true);
+    std::unique_lock<std::mutex> lock(leaving_);
+    left_.wait(lock, [this] { return isEmpty(); });
   }
   bool try_lock() {
-    if (!turnstile_.try_lock()) return false;
-    if (!gate_.try_lock()) {
-      turnstile_.unlock();
-      return false;
-    }
-    writers_.fetch_add(1, std::memory_order_acq_rel);
-    return true;
+    if (!isEmpty() || !turnstile_.try_lock()) return false;
+    writing_.store(true);
+    if (isEmpty()) return true;
+    unlock();
+    return false;
   }
   void unlock() {
-    writers_.fetch_sub(1, std::memory_order_acq_rel);
-    gate_.unlock();
+    writing_.store(false);
     turnstile_.unlock();
   }
 
  private:
-  std::atomic<int> writers_{0};
-  std::mutex turnstile_;
-  std::shared_mutex gate_;
+  struct alignas(64) Slot {
+    std::atomic<int> readers{0};
+  };
+
+  std::atomic<int>& mine() {
+    static std::atomic<std::size_t> threads{0};
+    thread_local const std::size_t number = threads.fetch_add(1, std::memory_order_relaxed);
+    return slots_[number % slots_.size()].readers;
+  }
+
+  void leave(std::atomic<int>& readers) {
+    readers.fetch_sub(1);
+    if (!writing_.load()) return;
+    const std::lock_guard<std::mutex> lock(leaving_);
+    left_.notify_all();
+  }
+
+  bool isEmpty() const {
+    for (const Slot& slot : slots_) {
+      if (slot.readers.load() != 0) return false;
+    }
+    return true;
+  }
+
+  std::array<Slot, 8> slots_;
+  std::atomic<bool> writing_{false};
+  std::mutex turnstile_;  // held while somebody writes
+  std::mutex leaving_;    // between the last reader that leaves and a writer that waits
+  std::condition_variable left_;
 };
 
 }  // namespace bocst::tree

@@ -85,14 +85,11 @@ void Tree::refit() {
   // Children come after their parents in the pool, so one backward pass reaches the root.
   for (std::uint32_t i = blocks_.size(); i-- > 0;) {
     if (!changed[i]) continue;
-    Block& block = blocks_[i];
-    const oracle::CellBounds before = block.own;
-    uniteBoxes(block, block.own);
-    uniteSlabs(block, block.own);
-    if (block.own == before) continue;
-    apply(
-        block.parent == Block::kNone ? NodeRef{} : NodeRef::octant(block.parent, static_cast<int>(block.parent_octant)),
-        block.own);
+    BlockRecord& record = records_[i];
+    const oracle::CellBounds before = record.own;
+    uniteBoxes(blocks_[i], record.own);
+    uniteSlabs(blocks_[i], record.own);
+    if (!(record.own == before)) apply(record.parent, record.own);
   }
 }
 

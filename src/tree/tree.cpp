@@ -1,6 +1,8 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #include "tree/tree.h"
 
+#include <time.h>
+
 #include <algorithm>
 #include <cmath>
 #include <limits>
@@ -63,6 +65,16 @@ std::int64_t nanoseconds(Clock::time_point t) {
   return std::chrono::duration_cast<std::chrono::nanoseconds>(t.time_since_epoch()).count();
 }
 
+// The clock as of the system's last tick, a few milliseconds old: to read it to the nanosecond takes longer than a
+// query of what is apart, and stamps that differ each time are written each time, to lines that threads share.
+std::int64_t coarseNow() {
+#ifdef CLOCK_MONOTONIC_COARSE
+  timespec t;
+  if (clock_gettime(CLOCK_MONOTONIC_COARSE, &t) == 0) return std::int64_t{t.tv_sec} * 1000000000 + t.tv_nsec;
+#endif
+  return nanoseconds(Clock::now());
+}
+
 }  // namespace
 
 Tree::Tree(std::shared_ptr<const Mesh> mesh, const Options& options)
@@ -83,7 +95,7 @@ void Tree::reset(std::shared_ptr<const Mesh> mesh) {
   keepOnly({});
 }
 
-std::int64_t Tree::now() const { return nanoseconds(options_.clock ? options_.clock() : Clock::now()); }
+std::int64_t Tree::now() const { return options_.clock ? nanoseconds(options_.clock()) : coarseNow(); }
 
 const std::vector<Eigen::Vector3d>& Tree::pieces() const {
   if (const auto* known = pieces_known_.load(std::memory_order_acquire)) return *known;
@@ -222,7 +234,7 @@ void Tree::ask(std::vector<Growth>& asked, std::vector<oracle::Expansion>& quest
 
 void Tree::askFor(std::uint32_t list, oracle::Expansion& question) const {
   const std::uint32_t* words = &lists_[list];
-  question.count = words[0] & ~kKept;
+  question.count = words[0] & kCount;
   if ((words[0] & kKept) == 0) {
     question.ids = words + 1;
   } else {
@@ -271,8 +283,9 @@ void Tree::growFromGrid(NodeRef node) {
     block.octants.set(o, bounds);
     own.extend(box);
   }
-  setBox(own, cell, block.own);
-  refits_.push_back({node, block.own});
+  oracle::CellBounds& bounds_of_all = records_[index].own;
+  setBox(own, cell, bounds_of_all);
+  refits_.push_back({node, bounds_of_all});
   refits_wait_.store(true, std::memory_order_relaxed);
   setLink(node, Link(Link::kBlock, index));
 }
@@ -283,11 +296,10 @@ std::uint32_t Tree::addBlock(NodeRef node, const lattice::Cell& cell, std::uint8
   block.grey = grey;
   block.level = static_cast<std::uint8_t>(cell.level);
   for (int k = 0; k < 3; ++k) block.at[k] = static_cast<std::uint16_t>(cell.at[k]);
-  if (!node.isRoot()) {
-    block.parent = node.block();
-    block.parent_octant = static_cast<std::uint32_t>(node.octant());
-  }
-  block.stamp.store(now(), std::memory_order_relaxed);
+  records_.append(1);
+  records_[index].parent = node;
+  stamps_.append(1);
+  stamps_[index].store(now(), std::memory_order_relaxed);
   nodes_at_[cell.level + 1] += __builtin_popcount(grey);
   ++expansions_;
   for (int o = 0; o < 8; ++o) octants_ += surface_.lattice.exists(cell.octant(o));
@@ -300,6 +312,36 @@ Link Tree::addList(const std::uint32_t* ids, std::size_t count, bool leaf) {
   words[0] = static_cast<std::uint32_t>(count);
   std::copy_n(ids, count, words + 1);
   return Link(leaf || count <= kLeafTriangles ? Link::kShortList : Link::kList, index);
+}
+
+// The same list with its corners; the old one stays for whoever reads it now.
+Link Tree::addPacked(Link list) {
+  const std::uint32_t count = lists_[list.index()];
+  const std::size_t words = PackedTriangles::words(count);
+  const std::uint32_t index = lists_.append(1 + words + count);
+  const std::uint32_t* const ids = &lists_[list.index()] + 1;
+  std::uint32_t* const to = &lists_[index];
+  to[0] = count | kPacked;
+  PackedTriangles::pack(surface_, ids, count, to + 1);
+  std::copy_n(ids, count, to + 1 + words);
+  return Link(list.tag(), index);
+}
+
+std::size_t Tree::listWords(const std::uint32_t* list) {
+  if ((list[0] & kKept) != 0) return kKeptWords;
+  const std::size_t count = list[0] & kCount;
+  return 1 + count + ((list[0] & kPacked) != 0 ? PackedTriangles::words(count) : 0);
+}
+
+void Tree::packLeaves(const std::vector<NodeRef>& leaves) {
+  if (leaves.empty() || !hasRoom()) return;
+  const std::unique_lock<std::mutex> lock(growth_, std::try_to_lock);
+  if (!lock.owns_lock()) return;
+  for (const NodeRef leaf : leaves) {
+    const Link list = link(leaf);
+    if (list.isList() && lists_[list.index()] <= kLeafTriangles) setLink(leaf, addPacked(list));
+  }
+  countBytes();
 }
 
 Link Tree::addKept(const std::shared_ptr<const oracle::Held>& shelf, oracle::Expansion::Kept list) {
@@ -346,10 +388,10 @@ void Tree::publish(NodeRef node, const oracle::Expansion& answer) {
   const std::uint32_t index = addBlock(node, answer.cell, answer.grey);
   Block& block = blocks_[index];
   block.octants = answer.octants;
-  block.own = answer.own;
+  records_[index].own = answer.own;
   if (answer.kept != nullptr) {
     const Link own = link(node);
-    if (own.isList()) block.own_list = own.index();
+    if (own.isList()) records_[index].own_list = own.index();
   }
   for (int o = 0; o < 8; ++o) {
     if (answer.grey >> o & 1) block.child[o].store(addOctantList(answer, o), std::memory_order_relaxed);
@@ -477,6 +519,8 @@ void Tree::countBytes() {
   device_bytes_ = device;
 }
 
-std::size_t Tree::treeBytes() const { return blocks_.bytes() + lists_.bytes() + (grid_ ? grid_->bytes() : 0); }
+std::size_t Tree::treeBytes() const {
+  return blocks_.bytes() + records_.bytes() + stamps_.bytes() + lists_.bytes() + (grid_ ? grid_->bytes() : 0);
+}
 
 }  // namespace bocst::tree

@@ -20,6 +20,7 @@
 #include "oracle/oracle.h"
 #include "tree/block.h"
 #include "tree/gate.h"
+#include "tree/packed_triangles.h"
 #include "tree/pool.h"
 
 namespace bocst::tree {
@@ -64,7 +65,16 @@ class Tree {
   const oracle::CellBounds& rootBounds() const { return root_bounds_; }
   TriangleList list(Link link) const {
     const std::uint32_t* words = &lists_[link.index()];
-    return {(words[0] & kKept) != 0 ? nullptr : words + 1, words[0] & ~kKept};
+    const std::uint32_t count = words[0] & kCount;
+    if ((words[0] & kKept) != 0) return {nullptr, count};
+    return {words + 1 + ((words[0] & kPacked) != 0 ? PackedTriangles::words(count) : 0), count};
+  }
+  /// The corners of a leaf's triangles, in the order of its list; false while they are not packed.
+  bool packed(Link link, PackedTriangles& triangles) const {
+    const std::uint32_t* words = &lists_[link.index()];
+    if ((words[0] & kPacked) == 0) return false;
+    triangles = PackedTriangles(words + 1, words[0] & kCount);
+    return true;
   }
   /// No more expansions below this node: a single lattice unit, or the collision depth of conservative answers.
   bool isDeepest(int level) const { return level >= deepest_; }
@@ -77,8 +87,9 @@ class Tree {
   const std::vector<Eigen::Vector3d>& pieces() const;
 
   /// Marks a block as used now, for ttl and budget.
-  void touch(const Block& block, std::int64_t now) const {
-    if (block.stamp.load(std::memory_order_relaxed) < now) block.stamp.store(now, std::memory_order_relaxed);
+  void touch(std::uint32_t block, std::int64_t now) const {
+    std::atomic<std::int64_t>& stamp = stamps_[block];
+    if (stamp.load(std::memory_order_relaxed) < now) stamp.store(now, std::memory_order_relaxed);
   }
   std::int64_t now() const;
 
@@ -107,6 +118,9 @@ class Tree {
   /// does nothing while another thread grows the tree. Nodes that the root grid does not know are passed over.
   void look(const std::vector<NodeRef>& nodes);
 
+  /// Packs the corners of leaves that queries come to; does nothing while another thread grows the tree.
+  void packLeaves(const std::vector<NodeRef>& leaves);
+
   // With the gate free.
 
   Statistics statistics() const;
@@ -125,8 +139,9 @@ class Tree {
   using Dropped = std::vector<std::uint8_t>;
 
   void reset(std::shared_ptr<const Mesh> mesh);
-  // A list is a length and the ids; where the oracle keeps it, the length with this bit, a shelf and a place there.
-  static constexpr std::uint32_t kKept = 0x80000000u;
+  // A list is a length and the ids; with kPacked, PackedTriangles are between them. With kKept the oracle has the ids:
+  // the length is followed by a shelf and a place there.
+  static constexpr std::uint32_t kKept = 0x80000000u, kPacked = 0x40000000u, kCount = ~(kKept | kPacked);
   static constexpr std::size_t kKeptWords = 3;
 
   void askFor(std::uint32_t list, oracle::Expansion& question) const;
@@ -138,6 +153,8 @@ class Tree {
   void publish(NodeRef node, const oracle::Expansion& answer);
   std::uint32_t addBlock(NodeRef node, const lattice::Cell& cell, std::uint8_t grey);
   Link addList(const std::uint32_t* ids, std::size_t count, bool leaf);
+  Link addPacked(Link list);
+  static std::size_t listWords(const std::uint32_t* list);
   void setLink(NodeRef node, Link link);
   void refit();
   void pruneAlone(std::int64_t now, bool budget_only);
@@ -167,7 +184,11 @@ class Tree {
   std::atomic<const oracle::RootGrid*> grid_known_{nullptr};  // grid_, for readers
   bool grid_tried_ = false;
   std::atomic<Link> root_{Link()};
+  // Of each block: what walks read, what growth and decay know, and when a query last went through it, in ns of the
+  // model's clock. Apart, so that walks have few lines to read.
   Pool<Block, 5> blocks_;
+  Pool<BlockRecord, 5> records_;
+  mutable Pool<std::atomic<std::int64_t>, 5> stamps_;
   Pool<std::uint32_t, 12> lists_;
   std::vector<std::shared_ptr<const oracle::Held>> shelves_;  // of the lists that the oracle keeps
 
