@@ -16,6 +16,12 @@ using Vd = hn::Vec<Dd>;
 using Md = hn::Mask<Dd>;
 using Vec3d = Vec3Of<Vd>;
 
+HWY_INLINE std::uint32_t bitsOf(Md mask) {
+  std::uint8_t bits[8] = {};
+  hn::StoreMaskBits(Dd(), mask, bits);
+  return bits[0];
+}
+
 struct LeastOverlap {
   Vd depth;
   Vec3d normal;
@@ -62,10 +68,10 @@ HWY_INLINE Md cut(const Vec3d (&t)[3], const Vd (&above)[3], Vec3d& a, Vec3d& b)
   return hn::AndNot(none, hn::Or(other1, other2));
 }
 
-void PartPairs(const TrianglePairs& pairs, PairTouches& touches) {
+void PartPairs(const TrianglePairs& pairs, double slack, PairTouches& touches) {
   const Dd d;
   const Vd zero = hn::Zero(d);
-  touches.no_point = 0;
+  touches.no_point = touches.meet = touches.apart = 0;
   for (std::size_t i = 0; i < pairs.count; i += hn::Lanes(d)) {
     const auto at = [&](std::size_t k) HWY_ATTR {
       return Vec3d{hn::Load(d, pairs.xyz[3 * k] + i), hn::Load(d, pairs.xyz[3 * k + 1] + i),
@@ -105,8 +111,12 @@ void PartPairs(const TrianglePairs& pairs, PairTouches& touches) {
         consider(t, cross(f[a], m), hn::Mul(tiny, hn::Mul(ff[a], mm)), least);
       }
     }
-    const Vd depth = hn::IfThenElse(hn::Lt(least.depth, hn::Set(d, 1e300)), hn::Max(least.depth, zero), zero);
+    const Vd depth = hn::IfThenElse(hn::Lt(least.depth, hn::Set(d, 1e300)), least.depth, zero);
     hn::Store(depth, d, touches.depth + i);
+    const Vd longest = hn::Sqrt(hn::Max(max3(ee[0], ee[1], ee[2]), max3(ff[0], ff[1], ff[2])));
+    const Vd enough = hn::MulAdd(hn::Set(d, 1e-4), longest, hn::Set(d, slack));
+    touches.meet |= bitsOf(hn::Gt(depth, enough)) << i;
+    touches.apart |= bitsOf(hn::Gt(hn::Neg(depth), enough)) << i;
     hn::Store(least.normal.x, d, touches.normal[0] + i);
     hn::Store(least.normal.y, d, touches.normal[1] + i);
     hn::Store(least.normal.z, d, touches.normal[2] + i);
@@ -126,11 +136,14 @@ void PartPairs(const TrianglePairs& pairs, PairTouches& touches) {
     hn::Store(point.y, d, touches.point[1] + i);
     hn::Store(point.z, d, touches.point[2] + i);
     const Md slanted = hn::Gt(squared, hn::Mul(hn::Set(d, 1e-24), hn::Mul(nn, mm)));
-    std::uint8_t bits[8] = {};
-    hn::StoreMaskBits(d, hn::And(hn::And(cuts, slanted), hn::Le(lo, hi)), bits);
-    touches.no_point |= (~std::uint32_t{bits[0]} & ((1u << hn::Lanes(d)) - 1)) << i;
+    touches.no_point |= (bitsOf(hn::Not(hn::And(hn::And(cuts, slanted), hn::Le(lo, hi))))) << i;
   }
-  if (pairs.count < 32) touches.no_point &= (1u << pairs.count) - 1;
+  if (pairs.count < 32) {
+    const std::uint32_t all = (1u << pairs.count) - 1;
+    touches.no_point &= all;
+    touches.meet &= all;
+    touches.apart &= all;
+  }
 }
 
 }  // namespace bocst::query::HWY_NAMESPACE
@@ -141,7 +154,9 @@ namespace bocst::query {
 
 HWY_EXPORT(PartPairs);
 
-void partPairs(const TrianglePairs& pairs, PairTouches& touches) { HWY_DYNAMIC_DISPATCH(PartPairs)(pairs, touches); }
+void partPairs(const TrianglePairs& pairs, double slack, PairTouches& touches) {
+  HWY_DYNAMIC_DISPATCH(PartPairs)(pairs, slack, touches);
+}
 
 }  // namespace bocst::query
 #endif

@@ -88,23 +88,24 @@ Touch partTriangles(const Corners& p, const Corners& q) {
   pair.put(0, p, q);
   pair.count = 1;
   Touch touch;
-  partTriangles(pair, &touch);
+  partTriangles(pair, 0, &touch);
   return touch;
 }
 
-void partTriangles(const TrianglePairs& pairs, Touch* touches) {
+Parted partTriangles(const TrianglePairs& pairs, double slack, Touch* touches) {
   PairTouches found;
-  partPairs(pairs, found);
+  partPairs(pairs, slack, found);
   for (std::size_t i = 0; i < pairs.count; ++i) {
     Touch& touch = touches[i];
     touch.normal = Vector3d(found.normal[0][i], found.normal[1][i], found.normal[2][i]);
-    touch.depth = found.depth[i];
+    touch.depth = std::max(found.depth[i], 0.0);
     touch.point = Vector3d(found.point[0][i], found.point[1][i], found.point[2][i]);
-    if ((found.no_point >> i & 1) == 0) continue;
+    if (((found.no_point & ~found.apart) >> i & 1) == 0) continue;
     Corners p, q;
     pairs.get(i, p, q);
     touch.point = middleOfOverlap(p, q);
   }
+  return {found.meet, found.apart};
 }
 
 Vector3d closestPoint(const Vector3d& x, const Corners& t) {
