@@ -130,6 +130,7 @@ class BvhSide {
   std::uint32_t triangle(Node node, std::size_t) const {
     return static_cast<std::uint32_t>(bvh_.getBV(node).primitiveId());
   }
+  void prefetch(std::uint32_t) const {}  // there is no other in the leaf
   const fcl::Vector3<S>& vertex(std::uint32_t t, int k) const {
     return bvh_.vertices[bvh_.tri_indices[t][static_cast<std::size_t>(k)]];
   }

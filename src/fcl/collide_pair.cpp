@@ -40,6 +40,11 @@ class ModelTriangles {
   fcl::Vector3<S> corner(std::uint32_t t, int k) const {
     return mesh_->vertex(mesh_->indices(t)[static_cast<std::size_t>(k)]).template cast<S>();
   }
+  /// Triangle t is about to be asked for, and now its corners.
+  void prefetch(std::uint32_t t) const { __builtin_prefetch(&mesh_->indices(t)); }
+  void prefetchCorners(std::uint32_t t) const {
+    for (const std::uint32_t v : mesh_->indices(t)) __builtin_prefetch(&mesh_->vertex(v));
+  }
 
  private:
   const Mesh* mesh_;  // null where the host has none: conservative answers ask for no triangle
@@ -52,6 +57,10 @@ class BvhTriangles {
   const fcl::Vector3<typename BV::S>& corner(std::uint32_t t, int k) const {
     return bvh_.vertices[bvh_.tri_indices[t][static_cast<std::size_t>(k)]];
   }
+  void prefetch(std::uint32_t t) const { __builtin_prefetch(&bvh_.tri_indices[t]); }
+  void prefetchCorners(std::uint32_t t) const {
+    for (int k = 0; k < 3; ++k) __builtin_prefetch(&corner(t, k));
+  }
 
  private:
   const fcl::BVHModel<BV>& bvh_;
@@ -63,10 +72,18 @@ template <typename S, typename Triangles1, typename Triangles2>
 class Collector : public query::Visitor {
  public:
   Collector(const Question<S>& q, const Triangles1& t1, const Triangles2& t2, bool swapped, double magnitude)
-      : q_(q), t1_(t1), t2_(t2), swapped_(swapped), magnitude_(magnitude), margin_(q.margin), seen_(pairs()) {
+      : q_(q),
+        t1_(t1),
+        t2_(t2),
+        swapped_(swapped),
+        magnitude_(magnitude),
+        margin_(q.margin),
+        seen_(pairs()),
+        later_(later()) {
     // A boolean query ends at the first contact, so it meets no pair twice.
     once_ = q.request.num_max_contacts > 1 || q.request.enable_cost;
     if (once_) seen_.clear();
+    later_.pairs.count = 0;
   }
 
   /// Where cells lie in the world: from the lattice frame of side A.
@@ -80,47 +97,38 @@ class Collector : public query::Visitor {
   bool triangles(std::uint32_t a, std::uint32_t b, bool certain) override {
     if (swapped_) std::swap(a, b);
     if (once_ && !seen_.insert(a, b)) return false;
-    if (certain && margin_ == 0 && !needsGeometry()) return add(a, b, nullptr);
-    if (!placed_) {
-      // Most queries that miss never come here.
-      fcl::relativeTransform(q_.X_W1.linear(), q_.X_W1.translation(), q_.X_W2.linear(), q_.X_W2.translation(), R_12_,
-                             p_12_);
-      placed_ = true;
-    }
-    const fcl::Vector3<S> p[3] = {t1_.corner(a, 0), t1_.corner(a, 1), t1_.corner(a, 2)};
-    const fcl::Vector3<S> q[3] = {t2_.corner(b, 0), t2_.corner(b, 1), t2_.corner(b, 2)};
-    const bool meet =
-        certain || fcl::detail::Intersect<S>::intersect_Triangle(p[0], p[1], p[2], q[0], q[1], q[2], R_12_, p_12_);
-    if (!meet && margin_ == 0) return false;
+    if (certain && !needsCorners()) return add(a, b, nullptr);
+    const std::size_t i = later_.pairs.count++;
+    later_.ids[i][0] = a;
+    later_.ids[i][1] = b;
+    later_.certain[i] = certain;
+    t1_.prefetch(a);
+    t2_.prefetch(b);
+    // Several at once are cheaper, but the last contact that is asked for is not to be missed.
+    const bool may_be_last = q_.result.numContacts() + later_.pairs.count >= q_.request.num_max_contacts;
+    if (may_be_last || later_.pairs.count == query::TrianglePairs::kCapacity) finish();
+    return q_.request.isSatisfied(q_.result);
+  }
 
-    Corners pd, qd;
-    for (int k = 0; k < 3; ++k) {
-      pd[k] = p[k].template cast<double>();
-      qd[k] = q[k].template cast<double>();
-    }
-    const bool degenerate = !certain && (query::isDegenerate(pd) || query::isDegenerate(qd));
-    if (!degenerate && margin_ == 0 && !needsGeometry()) return add(a, b, nullptr);
-    for (Eigen::Vector3d& x : qd) x = R_12_.template cast<double>() * x + p_12_.template cast<double>();
-    Eigen::Vector3d on_p, on_q;
-    double distance = 0;
-    if (degenerate || margin_ > 0) {
-      distance = query::nearestPoints(pd, qd, on_p, on_q);
-      // FCL's axes do not separate segments and points from everything: there the distance decides.
-      if (degenerate ? distance > std::max(margin_, rounding()) : !meet && distance > margin_) return false;
-    }
-    if (q_.request.enable_cost) addCost(a, b);
-    if (!needsGeometry()) return add(a, b, nullptr);
-    query::Touch touch;
-    if (distance > rounding()) {
-      touch = {(on_q - on_p) / distance, (on_p + on_q) / 2, std::max(margin_ - distance, 0.0)};
+  /// To be called at the end of the walk.
+  void finish() {
+    if (later_.pairs.count == 0) return;
+    getCorners();
+    if (later_.pairs.count == 1 && !later_.certain[0] && !q_.request.enable_contact) {
+      decide(0, nullptr);
     } else {
-      touch = query::partTriangles(pd, qd);
-      touch.depth += margin_;
+      query::Touch touches[query::TrianglePairs::kCapacity];
+      const query::Parted parted = query::partTriangles(later_.pairs, 2 * rounding(), touches);
+      for (std::size_t i = 0; i < later_.pairs.count; ++i) {
+        const bool meet = later_.certain[i] || (parted.meet >> i & 1);
+        if (meet && margin_ == 0) {
+          addMet(i, &touches[i]);
+        } else if (margin_ > 0 || !(parted.apart >> i & 1)) {
+          decide(i, &touches[i]);
+        }
+      }
     }
-    const fcl::Transform3<double> X_W1 = q_.X_W1.template cast<double>();
-    touch.normal = X_W1.linear() * touch.normal;
-    touch.point = X_W1 * touch.point;
-    return add(a, b, &touch);
+    later_.pairs.count = 0;
   }
 
   bool cells(const query::CellLeaf& a, const query::CellLeaf& b) override {
@@ -148,7 +156,82 @@ class Collector : public query::Visitor {
   // What distances near 0 may be off by.
   double rounding() const { return magnitude_ * 16 * kEpsilon; }
 
-  bool needsGeometry() const { return q_.request.enable_contact || q_.request.enable_cost; }
+  // Of triangles that certainly meet.
+  bool needsCorners() const { return q_.request.enable_contact || q_.request.enable_cost || margin_ > 0; }
+
+  // Most queries that miss never come here.
+  void place() {
+    fcl::relativeTransform(q_.X_W1.linear(), q_.X_W1.translation(), q_.X_W2.linear(), q_.X_W2.translation(), R_12_,
+                           p_12_);
+    place_.linear() = R_12_.template cast<double>();
+    place_.translation() = p_12_.template cast<double>();
+    placed_ = true;
+  }
+
+  // Pairs that are still to be looked at, several at once.
+  struct Later {
+    query::TrianglePairs pairs;
+    std::uint32_t ids[query::TrianglePairs::kCapacity][2];
+    bool certain[query::TrianglePairs::kCapacity];
+  };
+  static Later& later() {
+    thread_local Later later;
+    return later;
+  }
+
+  void getCorners() {
+    if (!placed_) place();
+    const std::size_t count = later_.pairs.count;
+    for (std::size_t i = 0; i < count; ++i) {
+      t1_.prefetchCorners(later_.ids[i][0]);
+      t2_.prefetchCorners(later_.ids[i][1]);
+    }
+    for (std::size_t i = 0; i < count; ++i) {
+      Corners p, q;
+      for (int k = 0; k < 3; ++k) {
+        p[k] = t1_.corner(later_.ids[i][0], k).template cast<double>();
+        q[k] = place_ * t2_.corner(later_.ids[i][1], k).template cast<double>().eval();
+      }
+      later_.pairs.put(i, p, q);
+    }
+  }
+
+  // FCL's test, and what it leaves open. `touch` is how the pair is parted, or null where nobody asks.
+  void decide(std::size_t i, const query::Touch* touch) {
+    const std::uint32_t a = later_.ids[i][0], b = later_.ids[i][1];
+    const bool meet = later_.certain[i] || fcl::detail::Intersect<S>::intersect_Triangle(
+                                               t1_.corner(a, 0), t1_.corner(a, 1), t1_.corner(a, 2), t2_.corner(b, 0),
+                                               t2_.corner(b, 1), t2_.corner(b, 2), R_12_, p_12_);
+    if (!meet && margin_ == 0) return;
+    Corners p, q;
+    later_.pairs.get(i, p, q);
+    const bool degenerate = !later_.certain[i] && (query::isDegenerate(p) || query::isDegenerate(q));
+    if (!degenerate && margin_ == 0) return addMet(i, touch);
+    Eigen::Vector3d on_p, on_q;
+    const double distance = query::nearestPoints(p, q, on_p, on_q);
+    // FCL's axes do not separate segments and points from everything: there the distance decides.
+    if (degenerate ? distance > std::max(margin_, rounding()) : !meet && distance > margin_) return;
+    if (touch == nullptr) return addMet(i, nullptr);
+    if (distance > rounding()) {
+      const query::Touch gap{(on_q - on_p) / distance, (on_p + on_q) / 2, std::max(margin_ - distance, 0.0)};
+      return addMet(i, &gap);
+    }
+    query::Touch deeper = *touch;
+    deeper.depth += margin_;
+    addMet(i, &deeper);
+  }
+
+  void addMet(std::size_t i, const query::Touch* touch) {
+    const std::uint32_t a = later_.ids[i][0], b = later_.ids[i][1];
+    if (q_.request.enable_cost) addCost(a, b);
+    if (touch == nullptr || !q_.request.enable_contact) {
+      add(a, b, nullptr);
+      return;
+    }
+    const fcl::Transform3<double> X_W1 = q_.X_W1.template cast<double>();
+    const query::Touch in_world{X_W1.linear() * touch->normal, X_W1 * touch->point, touch->depth};
+    add(a, b, &in_world);
+  }
 
   bool addSpheres(std::uint64_t id_a, query::Sphere a, std::uint64_t id_b, query::Sphere b) {
     if (swapped_) {
@@ -199,6 +282,8 @@ class Collector : public query::Visitor {
   const double magnitude_;  // of positions in the frame of the first geometry
   const double margin_;
   query::PairSet& seen_;
+  Later& later_;
+  fcl::Transform3<double> place_ = fcl::Transform3<double>::Identity();  // the same in double
   fcl::Matrix3<S> R_12_;
   fcl::Vector3<S> p_12_;
   bool placed_ = false;  // R_12_ and p_12_ are set
@@ -230,6 +315,7 @@ void collideModels(const Question<S>& q, tree::Tree& tree1, tree::Tree& tree2) {
       const Placement near = withMargin(b_in_a, a, q, a.cells() || b.cells());
       query::PairWalk<TreeSide, TreeSide>(a, b, near, collector).run();
     }
+    collector.finish();
     if (q.mayBeInside(before) &&
         (holds<S>(tree1, q.X_W1, tree2, q.X_W2, magnitude) || holds<S>(tree2, q.X_W2, tree1, q.X_W1, magnitude))) {
       addInside(q, a, b, b_in_a, swapped);
@@ -253,6 +339,7 @@ void collideBvh(const Question<typename BV::S>& q, tree::Tree& tree, const fcl::
     const auto walk = [&](auto&& collector) {
       collector.setFrame(s.lattice.origin(), s.lattice.unit());
       query::PairWalk<TreeSide, BvhSide<BV>>(a, b, withMargin(b_in_a, a, q, a.cells()), collector).run();
+      collector.finish();
     };
     if (swapped) {
       walk(Collector<S, BvhTriangles<BV>, ModelTriangles<S>>(q, partner, model, true, magnitude));

@@ -28,10 +28,17 @@ class LeafCorners {
     leaf_ = leaf;
     begin_ = begin;
     count_ = std::min(side.triangleCount(leaf) - begin, TrianglePack::kCapacity);
+    // Triangles and vertices lie anywhere in memory: ask for all of them before any is waited for.
     for (std::size_t i = 0; i < count_; ++i) {
-      const std::uint32_t t = ids_[i] = side.triangle(leaf, begin + i);
+      ids_[i] = side.triangle(leaf, begin + i);
+      side.prefetch(ids_[i]);
+    }
+    for (std::size_t i = 0; i < count_; ++i) {
+      for (int k = 0; k < 3; ++k) __builtin_prefetch(&side.vertex(ids_[i], k));
+    }
+    for (std::size_t i = 0; i < count_; ++i) {
       for (int k = 0; k < 3; ++k) {
-        const auto& v = side.vertex(t, k);
+        const auto& v = side.vertex(ids_[i], k);
         for (int c = 0; c < 3; ++c) raw_.xyz[3 * k + c][i] = v[c];
       }
     }

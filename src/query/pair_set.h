@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #pragma once
 
+#include <algorithm>
 #include <cstddef>
 #include <cstdint>
 #include <vector>
@@ -12,20 +13,24 @@ namespace bocst::query {
 class PairSet {
  public:
   void clear() {
-    size_ = 0;
     if (++epoch_ == 0) {
       slots_.assign(slots_.size(), Slot());
       epoch_ = 1;
     }
+    // The next queries are likely to be like this one, and what is small stays in the processor's cache.
+    if (used_ > kLeast && 8 * size_ < used_) used_ /= 2;
+    size_ = 0;
   }
 
   /// False when the pair was there already.
   bool insert(std::uint64_t a, std::uint32_t b) {
-    if (2 * (size_ + 1) > slots_.size()) grow();
+    if (2 * (size_ + 1) > used_) grow();
     return place(a, b);
   }
 
  private:
+  static constexpr std::size_t kLeast = 1024;
+
   struct Slot {
     std::uint64_t a = 0;
     std::uint32_t b = 0;
@@ -33,7 +38,7 @@ class PairSet {
   };
 
   bool place(std::uint64_t a, std::uint32_t b) {
-    const std::size_t mask = slots_.size() - 1;
+    const std::size_t mask = used_ - 1;
     for (std::size_t i = ((a << 32 ^ a >> 32 ^ b) * 0x9e3779b97f4a7c15ull) >> 20 & mask;; i = (i + 1) & mask) {
       if (slots_[i].epoch != epoch_) {
         slots_[i] = {a, b, epoch_};
@@ -45,15 +50,18 @@ class PairSet {
   }
 
   void grow() {
-    std::vector<Slot> old(slots_.empty() ? 1024 : 2 * slots_.size());
-    old.swap(slots_);
-    size_ = 0;
-    for (const Slot& s : old) {
-      if (s.epoch == epoch_) place(s.a, s.b);
+    held_.assign(slots_.begin(), slots_.begin() + static_cast<std::ptrdiff_t>(used_));
+    const std::uint32_t epoch = epoch_;
+    used_ = std::max(2 * used_, kLeast);
+    slots_.resize(std::max(used_, slots_.size()));
+    clear();
+    for (const Slot& s : held_) {
+      if (s.epoch == epoch) place(s.a, s.b);
     }
   }
 
-  std::vector<Slot> slots_;
+  std::vector<Slot> slots_, held_;  // held_: while it grows
+  std::size_t used_ = 0;  // of slots_, a power of two
   std::size_t size_ = 0;
   std::uint32_t epoch_ = 1;
 };

@@ -130,6 +130,9 @@ class TreeSide {
     return true;
   }
 
+  /// Triangle t is about to be read.
+  void prefetch(std::uint32_t t) const { __builtin_prefetch(&tree_.surface().mesh->indices(t)); }
+
   /// Corner k of triangle t as given; (v - origin()) * inverseUnit() is it in this side's frame.
   const Eigen::Vector3d& vertex(std::uint32_t t, int k) const {
     const Mesh& mesh = *tree_.surface().mesh;

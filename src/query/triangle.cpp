@@ -11,15 +11,6 @@ namespace {
 
 using Eigen::Vector3d;
 
-struct Interval {
-  double lo, hi;
-};
-
-Interval project(const Vector3d& axis, const Corners& t, const Vector3d& origin) {
-  const double a = axis.dot(t[0] - origin), b = axis.dot(t[1] - origin), c = axis.dot(t[2] - origin);
-  return {std::min({a, b, c}), std::max({a, b, c})};
-}
-
 Vector3d closestOnSegment(const Vector3d& x, const Vector3d& a, const Vector3d& b) {
   const Vector3d d = b - a;
   const double dd = d.squaredNorm();
@@ -93,39 +84,28 @@ bool footInside(const Vector3d& x, const Corners& t, const Vector3d (&e)[3], con
 }  // namespace
 
 Touch partTriangles(const Corners& p, const Corners& q) {
+  TrianglePairs pair;
+  pair.put(0, p, q);
+  pair.count = 1;
   Touch touch;
-  touch.point = middleOfOverlap(p, q);
-  const Vector3d e[3] = {p[1] - p[0], p[2] - p[1], p[0] - p[2]}, f[3] = {q[1] - q[0], q[2] - q[1], q[0] - q[2]};
-  const Vector3d n = e[0].cross(e[1]), m = f[0].cross(f[1]);
-  double size = 0;
-  for (int i = 0; i < 3; ++i) size = std::max({size, e[i].norm(), f[i].norm()});
-  double least = std::numeric_limits<double>::infinity();
-  const auto consider = [&](const Vector3d& axis, double scale) {
-    const double length = axis.norm();
-    if (!(length > 1e-10 * scale)) return;  // parallel edges: their cross product is rounding
-    const Vector3d a = axis / length;
-    const Interval i = project(a, p, p[0]), j = project(a, q, p[0]);
-    // Two ways out: q beyond the upper end of p, or below the lower end.
-    if (i.hi - j.lo < least) {
-      least = i.hi - j.lo;
-      touch.normal = a;
-    }
-    if (j.hi - i.lo < least) {
-      least = j.hi - i.lo;
-      touch.normal = -a;
-    }
-  };
-  consider(n, size * size);
-  consider(m, size * size);
-  for (int i = 0; i < 3; ++i) {
-    for (int j = 0; j < 3; ++j) consider(e[i].cross(f[j]), e[i].norm() * f[j].norm());
-  }
-  for (int i = 0; i < 3; ++i) {
-    consider(e[i].cross(n), e[i].norm() * n.norm());
-    consider(f[i].cross(m), f[i].norm() * m.norm());
-  }
-  touch.depth = std::isfinite(least) ? std::max(least, 0.0) : 0.0;
+  partTriangles(pair, 0, &touch);
   return touch;
+}
+
+Parted partTriangles(const TrianglePairs& pairs, double slack, Touch* touches) {
+  PairTouches found;
+  partPairs(pairs, slack, found);
+  for (std::size_t i = 0; i < pairs.count; ++i) {
+    Touch& touch = touches[i];
+    touch.normal = Vector3d(found.normal[0][i], found.normal[1][i], found.normal[2][i]);
+    touch.depth = std::max(found.depth[i], 0.0);
+    touch.point = Vector3d(found.point[0][i], found.point[1][i], found.point[2][i]);
+    if (((found.no_point & ~found.apart) >> i & 1) == 0) continue;
+    Corners p, q;
+    pairs.get(i, p, q);
+    touch.point = middleOfOverlap(p, q);
+  }
+  return {found.meet, found.apart};
 }
 
 Vector3d closestPoint(const Vector3d& x, const Corners& t) {

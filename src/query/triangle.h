@@ -2,6 +2,9 @@
 #pragma once
 
 #include <Eigen/Core>
+#include <cstdint>
+
+#include "query/part_kernels.h"
 
 namespace bocst::query {
 
@@ -19,6 +22,15 @@ struct Touch {
 /// edge normals) with the least overlap. point is the middle of the segment in which they cut, of the overlap of their
 /// boxes when they are coplanar or degenerate, or between their nearest points when they do not meet.
 Touch partTriangles(const Corners& p, const Corners& q);
+
+/// What the depths of many pairs say, a bit each: whether FCL's test surely finds that they meet, or that they do not.
+struct Parted {
+  std::uint32_t meet, apart;
+};
+
+/// The same for many pairs at once, whether they touch or not; touches has room for pairs.count. `slack` is a length
+/// that corners may be off by without that meet or apart is wrong.
+Parted partTriangles(const TrianglePairs& pairs, double slack, Touch* touches);
 
 /// The point of a closed triangle, degenerate or not, that is nearest to x.
 Eigen::Vector3d closestPoint(const Eigen::Vector3d& x, const Corners& triangle);

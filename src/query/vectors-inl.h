@@ -13,19 +13,37 @@
 HWY_BEFORE_NAMESPACE();
 namespace bocst::query::HWY_NAMESPACE {
 
-struct Vec3 {
-  V x, y, z;
+template <typename T>
+struct Vec3Of {
+  T x, y, z;
 };
+using Vec3 = Vec3Of<V>;
 
-HWY_INLINE Vec3 sub(Vec3 a, Vec3 b) { return {hn::Sub(a.x, b.x), hn::Sub(a.y, b.y), hn::Sub(a.z, b.z)}; }
-HWY_INLINE V dot(Vec3 a, Vec3 b) { return hn::MulAdd(a.x, b.x, hn::MulAdd(a.y, b.y, hn::Mul(a.z, b.z))); }
-HWY_INLINE Vec3 cross(Vec3 a, Vec3 b) {
+template <typename T>
+HWY_INLINE Vec3Of<T> sub(Vec3Of<T> a, Vec3Of<T> b) {
+  return {hn::Sub(a.x, b.x), hn::Sub(a.y, b.y), hn::Sub(a.z, b.z)};
+}
+template <typename T>
+HWY_INLINE T dot(Vec3Of<T> a, Vec3Of<T> b) {
+  return hn::MulAdd(a.x, b.x, hn::MulAdd(a.y, b.y, hn::Mul(a.z, b.z)));
+}
+template <typename T>
+HWY_INLINE Vec3Of<T> cross(Vec3Of<T> a, Vec3Of<T> b) {
   return {hn::Sub(hn::Mul(a.y, b.z), hn::Mul(a.z, b.y)), hn::Sub(hn::Mul(a.z, b.x), hn::Mul(a.x, b.z)),
           hn::Sub(hn::Mul(a.x, b.y), hn::Mul(a.y, b.x))};
 }
-HWY_INLINE V norm1(Vec3 a) { return hn::Add(hn::Add(hn::Abs(a.x), hn::Abs(a.y)), hn::Abs(a.z)); }
-HWY_INLINE V min3(V a, V b, V c) { return hn::Min(hn::Min(a, b), c); }
-HWY_INLINE V max3(V a, V b, V c) { return hn::Max(hn::Max(a, b), c); }
+template <typename T>
+HWY_INLINE T norm1(Vec3Of<T> a) {
+  return hn::Add(hn::Add(hn::Abs(a.x), hn::Abs(a.y)), hn::Abs(a.z));
+}
+template <typename T>
+HWY_INLINE T min3(T a, T b, T c) {
+  return hn::Min(hn::Min(a, b), c);
+}
+template <typename T>
+HWY_INLINE T max3(T a, T b, T c) {
+  return hn::Max(hn::Max(a, b), c);
+}
 
 HWY_INLINE Vec3 min3(const Vec3 (&v)[3]) {
   return {min3(v[0].x, v[1].x, v[2].x), min3(v[0].y, v[1].y, v[2].y), min3(v[0].z, v[1].z, v[2].z)};
@@ -34,7 +52,19 @@ HWY_INLINE Vec3 max3(const Vec3 (&v)[3]) {
   return {max3(v[0].x, v[1].x, v[2].x), max3(v[0].y, v[1].y, v[2].y), max3(v[0].z, v[1].z, v[2].z)};
 }
 HWY_INLINE Vec3 abs(Vec3 a) { return {hn::Abs(a.x), hn::Abs(a.y), hn::Abs(a.z)}; }
-HWY_INLINE Vec3 scaled(Vec3 a, V by) { return {hn::Mul(a.x, by), hn::Mul(a.y, by), hn::Mul(a.z, by)}; }
+template <typename T>
+HWY_INLINE Vec3Of<T> scaled(Vec3Of<T> a, T by) {
+  return {hn::Mul(a.x, by), hn::Mul(a.y, by), hn::Mul(a.z, by)};
+}
+/// a + by * way.
+template <typename T>
+HWY_INLINE Vec3Of<T> along(Vec3Of<T> a, T by, Vec3Of<T> way) {
+  return {hn::MulAdd(by, way.x, a.x), hn::MulAdd(by, way.y, a.y), hn::MulAdd(by, way.z, a.z)};
+}
+template <typename Mask, typename T>
+HWY_INLINE Vec3Of<T> choose(Mask mask, Vec3Of<T> yes, Vec3Of<T> no) {
+  return {hn::IfThenElse(mask, yes.x, no.x), hn::IfThenElse(mask, yes.y, no.y), hn::IfThenElse(mask, yes.z, no.z)};
+}
 
 HWY_INLINE Vec3 broadcast(float x, float y, float z) {
   const D d;

@@ -253,7 +253,7 @@ void certainMeansThatFclSaysSo() {
   std::mt19937_64 g(33);
   std::uniform_real_distribution<double> u(-1, 1);
   using Exact = fcl::detail::Intersect<S>;
-  int certain = 0, met = 0, apart = 0;
+  int certain = 0, met = 0, apart = 0, deep = 0, wide = 0;
   for (int round = 0; round < 60000; ++round) {
     const double size = std::pow(10.0, u(g)), far = std::pow(10.0, 4 * std::abs(u(g)));
     fcl::Vector3<S> p[3], q[3];
@@ -319,9 +319,29 @@ void certainMeansThatFclSaysSo() {
     }
     met += meet;
     apart += !meet;
+
+    TrianglePairs pair;
+    Touch touch;
+    for (int k = 0; k < 3; ++k) {
+      pd[k] = p[k].template cast<double>();
+      qd[k] = to * q[k].template cast<double>().eval();
+    }
+    pair.put(0, pd, qd);
+    pair.count = 1;
+    const Parted parted = partTriangles(pair, static_cast<double>(slack), &touch);
+    if (parted.meet != 0) {
+      ASSERT_TRUE(meet) << "round " << round;
+    }
+    if (parted.apart != 0) {
+      ASSERT_TRUE(!meet || degenerate) << "round " << round;
+    }
+    deep += parted.meet == 1;
+    wide += parted.apart == 1;
   }
   EXPECT_GT(apart, 5000);
   EXPECT_GT(certain, met / 10);
+  EXPECT_GT(deep, met / 4);
+  EXPECT_GT(wide, apart / 4);
 }
 
 TEST_P(EveryTarget, CertainMeansThatFclSaysSo) {
@@ -549,40 +569,91 @@ TEST_P(EveryTarget, NoPairIsLostThatIsNearest) {
   EXPECT_GT(tight, candidates * 8 / 10);
 }
 
+// The least overlap along the seventeen axes, one by one.
+double leastOverlap(const Corners& p, const Corners& q) {
+  const Eigen::Vector3d e[3] = {p[1] - p[0], p[2] - p[1], p[0] - p[2]}, f[3] = {q[1] - q[0], q[2] - q[1], q[0] - q[2]};
+  const Eigen::Vector3d n = e[0].cross(e[1]), m = f[0].cross(f[1]);
+  std::vector<Eigen::Vector3d> axes = {n, m};
+  for (int i = 0; i < 3; ++i) {
+    for (int j = 0; j < 3; ++j) axes.push_back(e[i].cross(f[j]));
+    axes.push_back(e[i].cross(n));
+    axes.push_back(f[i].cross(m));
+  }
+  double least = std::numeric_limits<double>::infinity();
+  for (const Eigen::Vector3d& axis : axes) {
+    if (axis.norm() < 1e-9) continue;
+    const Eigen::Vector3d along = axis.normalized();
+    double lo[2] = {1e300, 1e300}, hi[2] = {-1e300, -1e300};
+    for (int k = 0; k < 3; ++k) {
+      lo[0] = std::min(lo[0], along.dot(p[k]));
+      hi[0] = std::max(hi[0], along.dot(p[k]));
+      lo[1] = std::min(lo[1], along.dot(q[k]));
+      hi[1] = std::max(hi[1], along.dot(q[k]));
+    }
+    least = std::min({least, hi[0] - lo[1], hi[1] - lo[0]});
+  }
+  return least;
+}
+
+TEST_P(EveryTarget, MovingByDepthParts) {
+  std::mt19937_64 g(6);
+  std::uniform_real_distribution<double> u(-1, 1);
+  int tried = 0, slivers = 0;
+  for (int round = 0; round < 20000; round += static_cast<int>(TrianglePairs::kCapacity)) {
+    using Exact = fcl::detail::Intersect<double>;
+    Corners p[TrianglePairs::kCapacity], q[TrianglePairs::kCapacity];
+    TrianglePairs pairs;
+    pairs.count = 1 + g() % TrianglePairs::kCapacity;
+    for (std::size_t i = 0; i < pairs.count; ++i) {
+      for (int k = 0; k < 3; ++k) {
+        p[i][k] = Eigen::Vector3d(u(g), u(g), u(g));
+        q[i][k] = Eigen::Vector3d(u(g), u(g), u(g));
+      }
+      degenerateAtTimes(g, p[i], 16);
+      if (g() % 16 == 0) {
+        // In one plane, or an edge along one of the other.
+        for (int k = 0; k < 3; ++k) q[i][k] = p[i][0] + u(g) * (p[i][1] - p[i][0]) + u(g) * (p[i][2] - p[i][0]);
+      } else if (g() % 16 == 0) {
+        q[i][1] = q[i][0] + u(g) * (p[i][1] - p[i][0]);
+      }
+      pairs.put(i, p[i], q[i]);
+    }
+    Touch touches[TrianglePairs::kCapacity];
+    partTriangles(pairs, 0, touches);
+    for (std::size_t i = 0; i < pairs.count; ++i) {
+      const Touch& touch = touches[i];
+      if (!Exact::intersect_Triangle(p[i][0], p[i][1], p[i][2], q[i][0], q[i][1], q[i][2])) continue;
+      const Touch alone = partTriangles(p[i], q[i]);
+      EXPECT_EQ(alone.depth, touch.depth);
+      EXPECT_EQ(alone.normal, touch.normal);
+      EXPECT_EQ(alone.point, touch.point);
+      EXPECT_NEAR(touch.normal.norm(), 1, 1e-12);
+      EXPECT_GE(touch.depth, 0);
+      EXPECT_LE(touch.depth, std::max(0.0, leastOverlap(p[i], q[i])) + 1e-9);
+      if (isDegenerate(p[i])) continue;
+      ++tried;
+      slivers += (p[i][2] - p[i][1]).norm() < 1e-6;
+      const auto meets = [&](double by) {
+        const Eigen::Vector3d d = by * touch.normal;
+        return Exact::intersect_Triangle(p[i][0], p[i][1], p[i][2], q[i][0] + d, q[i][1] + d, q[i][2] + d);
+      };
+      EXPECT_FALSE(meets(touch.depth + 1e-9));
+      if (touch.depth > 1e-6) {
+        EXPECT_TRUE(meets(touch.depth * 0.999));
+      }
+      if (touch.depth < 1e-12) continue;  // in one plane, the middle of the boxes' overlap is the point
+      EXPECT_LT((closestPoint(touch.point, p[i]) - touch.point).norm(), 1e-9) << "the point is on both triangles";
+      EXPECT_LT((closestPoint(touch.point, q[i]) - touch.point).norm(), 1e-9);
+    }
+  }
+  EXPECT_GT(tried, 500);
+  EXPECT_GT(slivers, 5);
+}
+
 INSTANTIATE_TEST_SUITE_P(Targets, EveryTarget, testing::ValuesIn(targets()),
                          [](const auto& p) { return std::string(hwy::TargetName(p.param)); });
 
 // Properties of what contacts are made of.
-
-TEST(PartTriangles, MovingByDepthParts) {
-  std::mt19937_64 g(6);
-  std::uniform_real_distribution<double> u(-1, 1);
-  int tried = 0;
-  for (int round = 0; round < 20000; ++round) {
-    Corners p, q;
-    for (int k = 0; k < 3; ++k) {
-      p[k] = Eigen::Vector3d(u(g), u(g), u(g));
-      q[k] = Eigen::Vector3d(u(g), u(g), u(g));
-    }
-    using Exact = fcl::detail::Intersect<double>;
-    if (!Exact::intersect_Triangle(p[0], p[1], p[2], q[0], q[1], q[2])) continue;
-    ++tried;
-    const Touch touch = partTriangles(p, q);
-    EXPECT_NEAR(touch.normal.norm(), 1, 1e-12);
-    EXPECT_GE(touch.depth, 0);
-    const auto touches = [&](double by) {
-      const Eigen::Vector3d d = by * touch.normal;
-      return Exact::intersect_Triangle(p[0], p[1], p[2], q[0] + d, q[1] + d, q[2] + d);
-    };
-    EXPECT_FALSE(touches(touch.depth + 1e-9));
-    if (touch.depth > 1e-6) {
-      EXPECT_TRUE(touches(touch.depth * 0.999));
-    }
-    EXPECT_LT((closestPoint(touch.point, p) - touch.point).norm(), 1e-9) << "the point is on both triangles";
-    EXPECT_LT((closestPoint(touch.point, q) - touch.point).norm(), 1e-9);
-  }
-  EXPECT_GT(tried, 500);
-}
 
 TEST(NearestPoints, NoTwoPointsAreNearer) {
   std::mt19937_64 g(32);
