@@ -336,12 +336,17 @@ CellBounds RootGrid::look(const Surface& surface, const lattice::Cell& cell) con
   thread_local OctantAccumulator seen;
   seen.clear();
   anyCandidate(surface, cell, [&](std::uint32_t t) {
-    Eigen::Vector3d local[3];
-    for (int k = 0; k < 3; ++k) local[k] = (surface.corner(t, k) - center) / half;
-    seen.add(local, 3, true);
+    Polygon<LocalPoint> whole;
+    for (int k = 0; k < 3; ++k) {
+      LocalPoint p = LocalPoint::Zero();
+      p.head<3>() = ((surface.corner(t, k) - center) / half).cast<float>();
+      whole.add(p);
+    }
+    seen.add(whole, true);
     return false;
   });
-  CellBounds b = seen.bounds(Eigen::Vector3d::Zero(), 2);
+  const OctantAccumulator* const all[] = {&seen};
+  CellBounds b = OctantAccumulator::bounds(all, 1, Eigen::Vector3d::Zero(), 2);
   if (b.normal == CellBounds().normal) {
     // No slab is thinner than the cell: the box is one, too, and says that we have looked.
     const double lo = 127 * (b.lo[0] / 255.0 - 0.5), hi = 127 * (b.hi[0] / 255.0 - 0.5);
