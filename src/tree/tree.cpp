@@ -47,12 +47,12 @@ oracle::Surface surfaceOf(std::shared_ptr<const Mesh> mesh, const Options& o) {
 // A box in lattice units as bytes of a cell, rounded outwards; the margin is far above the rounding of toLattice.
 void setBox(const Eigen::AlignedBox3d& box, const lattice::Cell& cell, oracle::CellBounds& bounds) {
   const double scale = 255.0 / cell.side(), margin = 1e-6;
+  // What is clamped is not negative, so to truncate is to round down.
+  const auto byte = [](double x) { return static_cast<int>(std::min(std::max(x, 0.0), 255.0)); };
   for (int k = 0; k < 3; ++k) {
     const double corner = cell.corner()[k];
-    bounds.lo[k] =
-        static_cast<std::uint8_t>(std::clamp(std::floor((box.min()[k] - margin - corner) * scale), 0.0, 255.0));
-    bounds.hi[k] =
-        static_cast<std::uint8_t>(std::clamp(std::ceil((box.max()[k] + margin - corner) * scale), 0.0, 255.0));
+    bounds.lo[k] = static_cast<std::uint8_t>(byte((box.min()[k] - margin - corner) * scale));
+    bounds.hi[k] = static_cast<std::uint8_t>(255 - byte(255 - (box.max()[k] + margin - corner) * scale));
   }
 }
 
@@ -187,6 +187,7 @@ void Tree::grow(std::vector<Growth>& batch, bool wait) {
       }
     } else {
       gathered.emplace_back();
+      gathered.back().reserve(4 * kLeafTriangles);
       tree.gatherNode(g.node, cell, gathered.back());
       question.ids = gathered.back().data();
       question.count = gathered.back().size();
@@ -417,7 +418,7 @@ void Tree::updateVertices(std::vector<Eigen::Vector3d> vertices) {
     throw std::invalid_argument("bocst::Model::updateVertices: " + std::to_string(vertices.size()) +
                                 " vertices, but the mesh has " + std::to_string(old.vertexCount()));
   }
-  reset(Mesh::fromIndices(std::move(vertices), old.triangles()));
+  reset(old.withVertices(std::move(vertices)));
 }
 
 // Inspection.

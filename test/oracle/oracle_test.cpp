@@ -6,6 +6,7 @@
 #include <gtest/gtest.h>
 #include <hwy/targets.h>
 
+#include <algorithm>
 #include <cstdlib>
 #include <random>
 
@@ -326,6 +327,49 @@ TEST(RootGrid, KnowsTheSameGreyCellsAsExpansions) {
       }
       EXPECT_GT(grey, 20u);
     }
+  }
+}
+
+TEST(RootGrid, KnowsFineMeshesWithSomeLargeTriangles) {
+  // Finer grids, an odd number of triangles, a few that span many cells, vertices out of order.
+  for (const std::size_t n : {75u, 390u}) {
+    test::Raw raw = test::torus(n);
+    raw.add(test::box({-0.9, -0.9, -0.3}, {0.9, 0.9, 0.3}));
+    raw.triangles.pop_back();
+    std::mt19937 random(3);
+    std::shuffle(raw.triangles.begin(), raw.triangles.end(), random);
+    const Surface surface = surfaceOf(raw);
+    const auto grid = RootGrid::make(surface, lattice::kMaxLevel);
+    ASSERT_NE(grid, nullptr);
+    EXPECT_EQ(grid->level(), n == 75u ? 5 : 6);
+    const std::uint32_t side = 1u << (grid->level() - 1);
+    std::uniform_int_distribution<std::uint32_t> at(0, side - 1);
+    std::size_t grey = 0;
+    for (int i = 0; i < 60; ++i) {
+      const Cell cell{grid->level(), {at(random), at(random), at(random) % (side / 2)}};
+      ASSERT_EQ(grid->grey(surface, cell), referenceGrey(surface, cell));
+      if (!grid->grey(surface, cell)) continue;
+      ++grey;
+      std::vector<std::uint32_t> ids;
+      grid->gather(surface, cell, ids);
+      std::sort(ids.begin(), ids.end());
+      ASSERT_EQ(std::adjacent_find(ids.begin(), ids.end()), ids.end());
+      const Eigen::AlignedBox3d box = grid->bounds(cell);
+      EXPECT_EQ(box.min(), centerOf(cell) - Eigen::Vector3d::Constant(cell.side() / 2.0));
+      EXPECT_EQ(box.max(), centerOf(cell) + Eigen::Vector3d::Constant(cell.side() / 2.0));
+      Cell parent{cell.level - 1, {cell.at[0] / 2, cell.at[1] / 2, cell.at[2] / 2}};
+      for (; parent.level >= 2; --parent.level, parent.at = {parent.at[0] / 2, parent.at[1] / 2, parent.at[2] / 2}) {
+        EXPECT_TRUE(grid->grey(surface, parent));
+        EXPECT_TRUE(grid->bounds(parent).contains(box));
+      }
+      for (std::uint32_t t = 0; t < surface.mesh->triangleCount(); ++t) {
+        const Eigen::Vector3d c[3] = {surface.corner(t, 0), surface.corner(t, 1), surface.corner(t, 2)};
+        if (touches(c, centerOf(cell), cell.side() / 2.0)) {
+          ASSERT_TRUE(std::binary_search(ids.begin(), ids.end(), t));
+        }
+      }
+    }
+    EXPECT_GT(grey, 3u);
   }
 }
 

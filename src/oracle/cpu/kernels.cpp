@@ -140,20 +140,20 @@ void Quantise(const double* in, std::size_t count, const double* origin, double 
   // The axis of a lane repeats after three vectors.
   HWY_ALIGN double pattern[24];
   for (std::size_t i = 0; i < 3 * lanes; ++i) pattern[i] = origin[i % 3];
-  const auto factor = hn::Set(dd, scale), zero = hn::Zero(dd), top = hn::Set(dd, static_cast<double>(most));
+  const auto factor = hn::Set(dd, scale), least = hn::Set(dd, 1.0), top = hn::Set(dd, static_cast<double>(most));
   std::size_t i = 0;
   for (; i + 3 * lanes <= values; i += 3 * lanes) {
     BOCST_UNROLL
     for (std::size_t k = 0; k < 3; ++k) {
       const auto from = hn::Load(dd, pattern + k * lanes);
       const auto x = hn::Mul(hn::Sub(hn::LoadU(dd, in + i + k * lanes), from), factor);
-      const auto whole = hn::DemoteTo(d32, hn::Min(hn::Max(x, zero), top));
+      const auto whole = hn::DemoteTo(d32, hn::Min(hn::Max(x, least), top));
       hn::StoreU(hn::DemoteTo(d16, whole), d16, out + i + k * lanes);
     }
   }
   for (; i < values; ++i) {
     const double x = (in[i] - origin[i % 3]) * scale;
-    out[i] = static_cast<std::int16_t>(x > 0 ? (x < most ? x : most) : 0);
+    out[i] = static_cast<std::int16_t>(x > 1 ? (x < most ? x : most) : 1);
   }
 }
 

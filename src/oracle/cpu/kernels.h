@@ -30,7 +30,7 @@ inline void octantMasks(const LocalTriangles& triangles, std::size_t count, floa
   octantMasks(triangles.xyz[0], LocalTriangles::kCapacity, count, slack, masks);
 }
 
-/// out[3 * i + k] = (in[3 * i + k] - origin[k]) * scale, rounded down, no less than 0 and no more than `most`.
+/// out[3 * i + k] = (in[3 * i + k] - origin[k]) * scale, rounded down, no less than 1 and no more than `most`.
 void quantise(const double* in, std::size_t count, const double* origin, double scale, std::int16_t most,
               std::int16_t* out);
 
