@@ -315,23 +315,15 @@ Link Tree::addList(const std::uint32_t* ids, std::size_t count, bool leaf) {
   return Link(leaf || count <= kLeafTriangles ? Link::kShortList : Link::kList, index);
 }
 
-// The same list with its corners; the old one stays for whoever reads it now.
+// The same list with its corners; whoever reads the old one goes on.
 Link Tree::addPacked(Link list) {
   const std::uint32_t count = lists_[list.index()];
-  const std::size_t words = PackedTriangles::words(count);
-  const std::uint32_t index = lists_.append(1 + words + count);
-  const std::uint32_t* const ids = &lists_[list.index()] + 1;
-  std::uint32_t* const to = &lists_[index];
-  to[0] = count | kPacked;
-  PackedTriangles::pack(surface_, ids, count, to + 1);
-  std::copy_n(ids, count, to + 1 + words);
+  const std::uint32_t index = lists_.append(2 + PackedTriangles::words(count));
+  std::uint32_t* const words = &lists_[index];
+  words[0] = count | kPacked;
+  words[1] = list.index() + 1;
+  PackedTriangles::pack(surface_, &lists_[words[1]], count, words + 2);
   return Link(list.tag(), index);
-}
-
-std::size_t Tree::listWords(const std::uint32_t* list) {
-  if ((list[0] & kKept) != 0) return kKeptWords;
-  const std::size_t count = list[0] & kCount;
-  return 1 + count + ((list[0] & kPacked) != 0 ? PackedTriangles::words(count) : 0);
 }
 
 void Tree::packLeaves(const std::vector<NodeRef>& leaves) {
