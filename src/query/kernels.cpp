@@ -180,7 +180,8 @@ std::size_t TouchingPairs(const TrianglePack& rows, std::uint32_t which, const T
                           const PackRegion& region, float slack, PackPair* pairs) {
   const D d;
   const float size = std::max(rows.size, lanes.size) * 1.0001f, u = 0x1p-24f;
-  const V reach = hn::Set(d, 64 * u * size + slack), moved = hn::Set(d, 8 * u * size + slack);
+  const float moved = 25 * u * size + slack;
+  const V reach = hn::Set(d, 64 * u * size + slack);
   const V tiny = hn::Set(d, 1e-30f), zero = hn::Zero(d);  // products below have lost bits
   std::size_t found = 0;
   // The rows' boxes within the region, once for all lanes.
@@ -227,12 +228,13 @@ std::size_t TouchingPairs(const TrianglePack& rows, std::uint32_t which, const T
       // How far the one reaches to the nearer side of the other's plane.
       const V by_n = hn::Min(max3(n0, n1, n2), hn::Neg(min3(n0, n1, n2)));
       const V by_m = hn::Min(max3(m0, m1, m2), hn::Neg(min3(m0, m1, m2)));
+      const V by_planes = hn::Min(by_n, by_m);
       near = hn::And(near, hn::And(hn::Ge(by_n, hn::Neg(npad)), hn::Ge(by_m, hn::Neg(mpad))));
       if (hn::AllFalse(d, near)) continue;
 
       const V esize = hn::Add(norm1(e[0]), norm1(e[1]));
       const V epad = hn::MulAdd(hn::Mul(hn::Set(d, 2.0f), reach), hn::Mul(esize, fsize), tiny);
-      V overlap = hn::Min(by_n, by_m), by_edges = hn::Set(d, 3e38f);
+      V by_edges = hn::Set(d, 3e38f);
       BOCST_UNROLL
       for (int a = 0; a < 3; ++a) {
         BOCST_UNROLL
@@ -247,11 +249,18 @@ std::size_t TouchingPairs(const TrianglePack& rows, std::uint32_t which, const T
       }
       const std::uint32_t bits = maskBits(hn::And(near, hn::Ge(by_edges, hn::Neg(epad))));
       if (bits == 0) continue;
-      overlap = hn::Min(overlap, by_edges);
-      const V length = hn::MulAdd(hn::Set(d, 3.0f), reach, hn::Add(esize, fsize));
-      const V change = hn::MulAdd(hn::Set(d, u), length, moved);
-      const V sure = hn::MulAdd(hn::Mul(hn::Set(d, 12.0f), change), hn::Mul(length, length), tiny);
-      const std::uint32_t certain = maskBits(hn::Gt(overlap, sure));
+      const Vec3 w[3] = {sub(q[0], p[0]), sub(q[1], p[0]), sub(q[2], p[0])};
+      const V elong = hn::Sqrt(max3(dot(e[0], e[0]), dot(e[1], e[1]), dot(e[2], e[2])));
+      const V flong = hn::Sqrt(max3(dot(f[0], f[0]), dot(f[1], f[1]), dot(f[2], f[2])));
+      const V way = hn::Add(elong, hn::Sqrt(max3(dot(w[0], w[0]), dot(w[1], w[1]), dot(w[2], w[2]))));
+      const V edge = hn::Max(elong, flong);
+      const V change = hn::Mul(edge, hn::MulAdd(hn::Set(d, 42 * u), edge, hn::Set(d, 1.125f * moved)));
+      const V by_planes_least = hn::MulAdd(change, hn::MulAdd(hn::Set(d, 4.0f), way, edge), tiny);
+      const V by_edges_least =
+          hn::MulAdd(change, hn::MulAdd(hn::Set(d, 2.0f), way, hn::Mul(hn::Set(d, 5.0f), edge)), tiny);
+      M sure = hn::And(hn::Gt(by_planes, by_planes_least), hn::Gt(by_edges, by_edges_least));
+      sure = hn::And(sure, hn::Gt(edge, hn::Set(d, 64 * moved)));
+      const std::uint32_t certain = maskBits(sure);
       for (std::uint32_t k = bits; k != 0; k &= k - 1) {
         const auto lane = static_cast<std::size_t>(__builtin_ctz(k));
         if (i + lane >= lanes.count) break;

@@ -86,12 +86,13 @@ struct PackPair {
 /// products' rounding is 34 u M times its length; a plane's equation and an edge axis lose 12 u M times the sizes of
 /// their products before they cancel. The pads are 64 u M times those sizes, and twice that for edge axes.
 ///
-/// A pair is certain when its triangles would meet however each corner were moved by h = 6 u M + slack along each axis:
-/// each of the eleven axes' overlaps, a determinant of three edges or ways between corners, is more than what that
-/// and rounding can change it by. With L the sum of both triangles' sizes (edges' norms, |.|_1) and of 3 pads, a
-/// determinant changes by 5 (h + u L) L^2 at most, while h is less than L / 6, as else no pair is certain; an overlap
-/// is the difference of two, and 12 are asked for. Triangles whose corners are on both sides of the other's plane are
-/// not in one plane, so those axes are all that could part them.
+/// A pair is certain when its triangles would meet however the corners of both were moved, by s = 25 u M + slack in
+/// sum (corners are off by less than 7 u M along each axis, so by 12 u M): each of the eleven axes' overlaps, a
+/// determinant of three edges or ways between corners, or the difference of two, is more than that and rounding can
+/// change it by. Let G be the longest edge, W no less than a way between corners, s < G / 64. Determinants with a
+/// plane's normal change by s (4 G W + G^2) to first order, overlaps along edge axes by s (2 G W + 5 G^2), and both by
+/// less than a tenth more; rounding is 42 u |x| |y| |z|. Triangles whose corners are on both sides of the other's plane
+/// are not in one plane, so those axes are all that could part them.
 std::size_t touchingPairs(const TrianglePack& rows, std::uint32_t which, const TrianglePack& lanes,
                           const PackRegion& region, float slack, PackPair* pairs);
 

@@ -149,7 +149,8 @@ class LeafPacks {
  public:
   struct Leaf {
     typename Side::Node node{};
-    std::size_t begin = 0, count = 0;
+    std::size_t begin = 0;
+    std::size_t all = 0;  ///< Triangles of the leaf, those in other packs included.
     std::uint64_t walk = 0;
     float error = 0;  ///< Corners may be so far from where they are, beside the rounding of floats.
     LeafVolume volume;
@@ -199,7 +200,7 @@ class LeafPacks {
       tree::PackedTriangles packed;
       if (side.packed(leaf.node, packed, leaf.listed)) {
         unpackTriangles(packed, c, leaf.pack);
-        leaf.count = packed.count;
+        leaf.all = packed.count;
         // Half a step along each axis, and what unpacking rounds more than placing does.
         leaf.error = 1.7321f * (0.5f * packed.step + 2 * 0x1p-24f * leaf.pack.size);
         return;
@@ -209,10 +210,10 @@ class LeafPacks {
     corners_.clear();
     corners_.take(side, leaf.node, leaf.begin);
     corners_.place(packPlacement(side, Placement(), Eigen::Vector3d(c[0], c[1], c[2]), 1), leaf.pack);
-    leaf.count = corners_.count();
+    leaf.all = side.triangleCount(leaf.node);
     leaf.error = 0;
     leaf.listed = nullptr;
-    for (std::size_t i = 0; i < leaf.count; ++i) leaf.own[i] = corners_.id(i);
+    for (std::size_t i = 0; i < leaf.pack.count; ++i) leaf.own[i] = corners_.id(i);
   }
 
   static std::size_t number(tree::NodeRef node) { return node.bits; }
@@ -245,15 +246,17 @@ class LeafPairs {
   /// returns true. A pair may be left to other leaves where it touches, too.
   template <typename F>
   bool test(const A& a, typename A::Node node_a, const B& b, typename B::Node node_b, F&& f) {
-    const std::size_t count_a = a.triangleCount(node_a), count_b = b.triangleCount(node_b);
-    for (std::size_t i = 0; i < count_a; i += TrianglePack::kCapacity) {
+    for (std::size_t i = 0;;) {
       const auto& leaf_a = leaves_a_.get(a, node_a, i, *a_in_b_);
-      for (std::size_t j = 0; j < count_b; j += TrianglePack::kCapacity) {
+      for (std::size_t j = 0;;) {
         const auto& leaf_b = leaves_b_.get(b, node_b, j, *b_in_a_);
         if (testPacks(leaf_a, leaf_b, f)) return true;
+        j += TrianglePack::kCapacity;
+        if (j >= leaf_b.all) break;
       }
+      i += TrianglePack::kCapacity;
+      if (i >= leaf_a.all) return false;
     }
-    return false;
   }
 
   /// Leaves met in this walk, a few of them, that are worth to be packed.
