@@ -15,25 +15,13 @@ namespace {
 constexpr std::uint32_t kNone = 0xffffffffu;
 constexpr std::size_t kSmallest = 4096;   // triangles: below, plain expansions are as fast
 constexpr std::size_t kLargeShare = 256;  // at most one triangle in so many may span more than two cells
-constexpr int kQuantBits = 15;            // vertices as int16, in steps of two lattice units
 constexpr double kMargin = 2;             // lattice units: one step
 constexpr int kAxesShift = 28;            // of the links of lists; a mesh has at most 2^28 triangles
 constexpr std::uint32_t kTriangle = (1u << kAxesShift) - 1;
 
-// Two vertices: four lanes each, of which the last means nothing (it belongs to the next vertex). The compiler has a
-// register for it on every target.
-using TwoVertices = std::int16_t __attribute__((vector_size(16)));
-using TwoWords = std::uint64_t __attribute__((vector_size(16)));
-
-inline TwoVertices least(TwoVertices a, TwoVertices b) { return a < b ? a : b; }
-inline TwoVertices greatest(TwoVertices a, TwoVertices b) { return a > b ? a : b; }
-
-/// Where a triangle's box lies in the grid: the bucket of its minimum corner in the low 16 bits; then two bits an axis:
-/// how many cells further its maximum corner is, 2 for any more.
-using Span = std::uint32_t;
-constexpr std::size_t bucketOf(Span s) { return s & 0xffff; }
-constexpr std::uint32_t reachOf(Span s) { return s >> 16; }
-constexpr bool isLarge(Span s) { return (reachOf(s) & 0x2a) != 0; }
+constexpr std::size_t bucketOf(GridSpan s) { return s & 0xffff; }
+constexpr std::size_t reachOf(GridSpan s) { return s >> 16 & 0x3f; }
+constexpr bool isLarge(GridSpan s) { return (reachOf(s) & 0x2a) != 0; }
 
 /// What a reach without a 2 means: the axes as a link has them, and their bit among the patterns.
 struct Reach {
@@ -53,62 +41,35 @@ constexpr Reach kReach;
 /// The vertices in steps of two lattice units.
 class QuantisedMesh {
  public:
-  QuantisedMesh(const Surface& surface, int bits)
-      : triangles_(surface.mesh->triangles().data()), shift_(kQuantBits - bits), bits_(bits) {
+  QuantisedMesh(const Surface& surface, int bits) : triangles_(surface.mesh->triangles().data()), bits_(bits) {
     const Mesh& mesh = *surface.mesh;
     vertices_.reset(new std::int16_t[3 * mesh.vertexCount() + 1]);
     // Room for a step of margin on both sides.
     quantise(mesh.vertices().data()->data(), mesh.vertexCount(), surface.lattice.origin().data(),
-             surface.lattice.inverseUnit() / kMargin, (1 << kQuantBits) - 2, vertices_.get());
+             surface.lattice.inverseUnit() / kMargin, (1 << kGridSpanBits) - 2, vertices_.get());
+    vertices_[3 * mesh.vertexCount()] = 0;
   }
 
-  /// Of `count` triangles from t on; one more may be written.
-  void spans(std::size_t t, std::size_t count, Span* out) const {
-    const std::uint32_t* i = triangles_[t].data();
-    for (; count >= 2; count -= 2, i += 6, out += 2) {
-      __builtin_prefetch(i + 512);  // what the hardware fetches ahead is too little for meshes larger than caches
-      twoSpans(pairOf(i[0], i[3]), pairOf(i[1], i[4]), pairOf(i[2], i[5]), out);
-    }
-    if (count != 0) twoSpans(pairOf(i[0], i[0]), pairOf(i[1], i[1]), pairOf(i[2], i[2]), out);
+  /// Of `count` triangles from t on. One step of margin covers the rounding of toLattice and closed cells that only
+  /// touch.
+  void spans(std::size_t t, std::size_t count, GridSpan* out) const {
+    gridSpans(vertices_.get(), triangles_[t].data(), count, bits_, out);
   }
 
   /// The first and the last cell of a triangle's box along each axis.
   void box(std::size_t t, std::uint32_t first[3], std::uint32_t last[3]) const {
+    const int shift = kGridSpanBits - bits_;
     for (std::size_t k = 0; k < 3; ++k) {
       const auto at = [&](std::size_t corner) { return vertices_[3 * std::size_t{triangles_[t][corner]} + k]; };
       const std::int16_t a = at(0), b = at(1), c = at(2);
-      first[k] = static_cast<std::uint32_t>(std::min({a, b, c}) - 1) >> shift_;
-      last[k] = static_cast<std::uint32_t>(std::max({a, b, c}) + 1) >> shift_;
+      first[k] = static_cast<std::uint32_t>(std::min({a, b, c}) - 1) >> shift;
+      last[k] = static_cast<std::uint32_t>(std::max({a, b, c}) + 1) >> shift;
     }
   }
 
  private:
-  TwoVertices pairOf(std::size_t i, std::size_t j) const {
-    std::uint64_t a, b;
-    std::memcpy(&a, vertices_.get() + 3 * i, sizeof(a));
-    std::memcpy(&b, vertices_.get() + 3 * j, sizeof(b));
-    return reinterpret_cast<TwoVertices>(TwoWords{a, b});
-  }
-
-  // One step of margin on both sides covers the rounding of toLattice and closed cells that only touch.
-  void twoSpans(TwoVertices a, TwoVertices b, TwoVertices c, Span* out) const {
-    const auto y = static_cast<std::int16_t>(1 << bits_), z = static_cast<std::int16_t>(1 << 2 * bits_);
-    const TwoVertices strides = {1, y, z, 0, 1, y, z, 0}, digits = {1, 4, 16, 0, 1, 4, 16, 0};
-    const TwoVertices one = TwoVertices{} + 1, two = one + one;
-    const TwoVertices lo = (least(least(a, b), c) - one) >> shift_;
-    const TwoVertices hi = (greatest(greatest(a, b), c) + one) >> shift_;
-    // The sums of each triangle's lanes, in the lowest.
-    auto first = reinterpret_cast<TwoWords>(lo * strides),
-         reach = reinterpret_cast<TwoWords>(least(hi - lo, two) * digits);
-    first += (first >> 32) + (first >> 16);
-    reach += (reach >> 32) + (reach >> 16);
-    const TwoWords spans = (first & 0xffff) | (reach & 0x3f) << 16;
-    out[0] = static_cast<Span>(spans[0]);
-    out[1] = static_cast<Span>(spans[1]);
-  }
-
   const Mesh::Indices* triangles_;
-  const int shift_, bits_;
+  const int bits_;
   std::unique_ptr<std::int16_t[]> vertices_;
 };
 
@@ -139,21 +100,20 @@ bool RootGrid::build(const Surface& surface) {
   std::uint32_t *const head = head_.data(), *const next = next_.get();
   std::uint8_t* const reaches = reaches_.data();
   constexpr std::size_t kBlock = 256;
-  Span spans[kBlock + 1];
+  GridSpan spans[kBlock];
   for (std::size_t begin = 0; begin < count; begin += kBlock) {
     const std::size_t size = std::min(kBlock, count - begin);
     mesh.spans(begin, size, spans);
     for (std::size_t i = 0; i < size; ++i) {
-      const Span s = spans[i];
-      const auto t = static_cast<std::uint32_t>(begin + i);
+      const GridSpan s = spans[i];
       if (isLarge(s)) {
-        large_.push_back(t);
+        large_.push_back(static_cast<std::uint32_t>(begin + i));
         continue;
       }
-      const std::size_t c = bucketOf(s);
-      next[t] = head[c];
-      head[c] = t | kReach.axes[reachOf(s)];
-      reaches[c] |= kReach.pattern[reachOf(s)];
+      const std::size_t c = bucketOf(s), reach = reachOf(s);
+      next[begin + i] = head[c];
+      head[c] = static_cast<std::uint32_t>(begin + i) | kReach.axes[reach];
+      reaches[c] |= kReach.pattern[reach];
     }
     if (large_.size() > most_large) return false;
   }
