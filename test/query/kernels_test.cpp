@@ -476,7 +476,7 @@ TEST_P(EveryTarget, PackedCornersAreWhereTheMeshHasThem) {
     }
     EXPECT_LE(static_cast<double>(packed.step), std::max((box.sizes().maxCoeff() + 1) / 32767, 0x1p-20));
     const Eigen::Vector3d center = box.center();
-    TrianglePack pack;
+    TrianglePack pack{};
     unpackTriangles(packed, center.data(), pack);
     ASSERT_EQ(pack.count, count);
     const double error = static_cast<double>(packed.step) / 2 + 2 * 0x1p-24 * static_cast<double>(pack.size);
