@@ -30,34 +30,38 @@ class BOCST_EXPORT Mesh {
   /// The same from 32-bit indices, which are moved in rather than copied.
   static std::shared_ptr<const Mesh> fromIndices(std::vector<Eigen::Vector3d> vertices, std::vector<Indices> triangles);
 
-  std::size_t vertexCount() const { return vertices_.size(); }     ///< Unused ones included.
-  std::size_t triangleCount() const { return triangles_.size(); }  ///< At least 1.
+  /// The same triangles between other vertices; both meshes share the indices.
+  /// @throws std::invalid_argument naming the first bad vertex, or for another number of vertices than vertexCount().
+  std::shared_ptr<const Mesh> withVertices(std::vector<Eigen::Vector3d> vertices) const;
+
+  std::size_t vertexCount() const { return vertices_.size(); }      ///< Unused ones included.
+  std::size_t triangleCount() const { return triangles_->size(); }  ///< At least 1.
 
   /// Vertex i, 0 <= i < vertexCount(), in the mesh's frame.
   const Eigen::Vector3d& vertex(std::size_t i) const { return vertices_[i]; }
 
   /// Triangle t, 0 <= t < triangleCount(), in FCL's type.
   fcl::Triangle triangle(std::size_t t) const {
-    const Indices& i = triangles_[t];
+    const Indices& i = indices(t);
     return fcl::Triangle(i[0], i[1], i[2]);
   }
-  const Indices& indices(std::size_t t) const { return triangles_[t]; }  ///< The same as stored.
+  const Indices& indices(std::size_t t) const { return (*triangles_)[t]; }  ///< The same as stored.
 
   const std::vector<Eigen::Vector3d>& vertices() const { return vertices_; }  ///< In the mesh's frame.
-  const std::vector<Indices>& triangles() const { return triangles_; }        ///< As stored.
+  const std::vector<Indices>& triangles() const { return *triangles_; }       ///< As stored.
 
   /// The axis-aligned box of all triangles, in the mesh's frame.
   const Eigen::AlignedBox3d& bounds() const { return bounds_; }
 
-  /// Heap bytes that this mesh holds.
+  /// Heap bytes that this mesh holds, those of shared indices included.
   std::size_t bytes() const;
 
  private:
-  Mesh() = default;
+  Mesh(std::vector<Eigen::Vector3d> vertices, std::shared_ptr<const std::vector<Indices>> triangles);
   void validate(const std::vector<fcl::Triangle>* given);
 
   std::vector<Eigen::Vector3d> vertices_;
-  std::vector<Indices> triangles_;
+  std::shared_ptr<const std::vector<Indices>> triangles_;
   Eigen::AlignedBox3d bounds_;
 };
 

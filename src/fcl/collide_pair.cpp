@@ -15,6 +15,7 @@
 
 #include "fcl/collide_octree.h"
 #include "fcl/collide_shape.h"
+#include "fcl/dispatch.h"
 #include "fcl/inside.h"
 #include "fcl/inside_contact.h"
 #include "fcl/pair.h"
@@ -356,7 +357,7 @@ void collideBvh(const Question<typename BV::S>& q, tree::Tree& tree, const fcl::
 template <typename S>
 struct Models {
   Models(const fcl::CollisionGeometry<S>* o1, const fcl::CollisionGeometry<S>* o2)
-      : first(dynamic_cast<const Model<S>*>(o1)), second(dynamic_cast<const Model<S>*>(o2)) {
+      : first(asModel<S>(o1)), second(asModel<S>(o2)) {
     if (first == nullptr && second == nullptr) {
       throw std::logic_error("bocst::collide: neither geometry is a bocst::Model");
     }

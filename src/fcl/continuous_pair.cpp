@@ -7,6 +7,7 @@
 
 #include "fcl/body_pair.h"
 #include "fcl/collide_pair.h"
+#include "fcl/dispatch.h"
 #include "fcl/motion.h"
 #include "fcl/octree_side.h"
 #include "fcl/pair.h"
@@ -147,8 +148,8 @@ double walkBodies(const Question<S>& q, tree::Tree& tree, const Mesh* mesh, bool
 /// the one it is said to be.
 template <typename S>
 double walk(const Question<S>& q, const Mesh* mesh1, const Mesh* mesh2, bool& same) {
-  const auto* model1 = dynamic_cast<const Model<S>*>(q.o1);
-  const auto* model2 = dynamic_cast<const Model<S>*>(q.o2);
+  const auto* model1 = asModel<S>(q.o1);
+  const auto* model2 = asModel<S>(q.o2);
   const fcl::Transform3<S> X_W1 = poseAt<S>(q.motion1, 0), X_W2 = poseAt<S>(q.motion2, 0);
   const double margin = marginOf(model1, model2);
   double time = std::numeric_limits<double>::infinity();
@@ -185,7 +186,7 @@ double walk(const Question<S>& q, const Mesh* mesh1, const Mesh* mesh2, bool& sa
 template <typename S>
 void checkPartner(const Question<S>& q) {
   for (const auto* o : {q.o1, q.o2}) {
-    if (dynamic_cast<const Model<S>*>(o) == nullptr && !isBodies(o)) {
+    if (asModel<S>(o) == nullptr && !isBodies(o)) {
       withBvh<S>("continuousCollide", o, [](const auto&) {});
     }
   }
@@ -197,7 +198,7 @@ double firstContact(const Question<S>& q) {
   const fcl::Transform3<S> X_W1 = poseAt<S>(q.motion1, 0), X_W2 = poseAt<S>(q.motion2, 0);
   for (;;) {
     // Held, so that another mesh does not get the address of one of these.
-    const auto mesh1 = meshOf(dynamic_cast<const Model<S>*>(q.o1)), mesh2 = meshOf(dynamic_cast<const Model<S>*>(q.o2));
+    const auto mesh1 = meshOf(asModel<S>(q.o1)), mesh2 = meshOf(asModel<S>(q.o2));
     fcl::CollisionResult<S> begin;
     if (collidePair<S>(q.o1, X_W1, q.o2, X_W2, {}, fcl::CollisionRequest<S>(), begin) > 0) return 0;
     if (!q.o1->isOccupied() || !q.o2->isOccupied()) return std::numeric_limits<double>::infinity();

@@ -125,9 +125,7 @@ template std::string typeName<double>(const fcl::CollisionGeometry<double>*);
 
 template <typename S>
 bool isModel(const fcl::CollisionGeometry<S>* geometry) {
-  // The node type first: a dynamic_cast that fails takes longer than a query of two spheres.
-  return geometry != nullptr && geometry->getNodeType() == fcl::GEOM_TRIANGLE &&
-         dynamic_cast<const Model<S>*>(geometry) != nullptr;
+  return fcl_room::asModel<S>(geometry) != nullptr;
 }
 
 namespace {

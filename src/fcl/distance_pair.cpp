@@ -7,6 +7,7 @@
 
 #include "fcl/body_pair.h"
 #include "fcl/collide_pair.h"
+#include "fcl/dispatch.h"
 #include "fcl/inside.h"
 #include "fcl/octree_side.h"
 #include "fcl/pair.h"
@@ -144,8 +145,8 @@ void sign(const Question<S>& q) {
 template <typename S>
 S distancePair(const fcl::CollisionGeometry<S>* o1, const fcl::Transform3<S>& X_W1, const fcl::CollisionGeometry<S>* o2,
                const fcl::Transform3<S>& X_W2, const fcl::DistanceRequest<S>& request, fcl::DistanceResult<S>& result) {
-  const auto* model1 = dynamic_cast<const Model<S>*>(o1);
-  const auto* model2 = dynamic_cast<const Model<S>*>(o2);
+  const auto* model1 = asModel<S>(o1);
+  const auto* model2 = asModel<S>(o2);
   if (model1 == nullptr && model2 == nullptr) {
     throw std::logic_error("bocst::distance: neither geometry is a bocst::Model");
   }

@@ -10,6 +10,8 @@
 #include <string>
 #include <type_traits>
 
+#include "mesh/scan.h"
+
 namespace bocst {
 namespace {
 
@@ -60,61 +62,126 @@ class NarrowIterator {
   const fcl::Triangle* at_;
 };
 
+[[noreturn]] void badVertex(const std::vector<Eigen::Vector3d>& vertices) {
+  const auto good = [](const Eigen::Vector3d& v) {
+    // One comparison a coordinate finds NaN, infinities and what is too large.
+    return std::abs(v[0]) <= kMaxCoordinate && std::abs(v[1]) <= kMaxCoordinate && std::abs(v[2]) <= kMaxCoordinate;
+  };
+  const auto v = std::find_if_not(vertices.begin(), vertices.end(), good);
+  bad("vertex " + std::to_string(v - vertices.begin()) + " is " + coordinates(*v));
+}
+
+/// The box of points, and for each of its faces, lower ones first, one that lies there.
+struct Extremes {
+  Eigen::AlignedBox3d box;
+  std::array<std::uint32_t, 6> at{};
+};
+
+Extremes extremesOf(const std::vector<Eigen::Vector3d>& vertices) {
+  constexpr std::size_t kBlock = 512;  // few enough to look through again
+  Eigen::Vector3d lo = Eigen::Vector3d::Constant(std::numeric_limits<double>::max()), hi = -lo;
+  std::array<std::size_t, 6> block{};
+  for (std::size_t begin = 0; begin < vertices.size(); begin += kBlock) {
+    const Eigen::Vector3d lo_before = lo, hi_before = hi;
+    const std::size_t count = std::min(kBlock, vertices.size() - begin);
+    if (!widenByPoints(vertices[begin].data(), count, kMaxCoordinate, lo.data(), hi.data())) badVertex(vertices);
+    for (int k = 0; k < 3; ++k) {
+      if (lo[k] < lo_before[k]) block[k] = begin;
+      if (hi[k] > hi_before[k]) block[3 + k] = begin;
+    }
+  }
+  Extremes e{{lo, hi}, {}};
+  if (vertices.empty()) return e;
+  for (int face = 0; face < 6; ++face) {
+    const int k = face % 3;
+    const double extreme = face < 3 ? lo[k] : hi[k];
+    std::size_t i = block[face];
+    while (vertices[i][k] != extreme) ++i;
+    e.at[face] = static_cast<std::uint32_t>(i);
+  }
+  return e;
+}
+
+struct IndexScan {
+  std::uint32_t largest = 0;
+  bool uses_all = false;  ///< Are all of the wanted among the indices?
+};
+
+IndexScan scanIndices(const std::vector<Mesh::Indices>& triangles, std::array<std::uint32_t, 6> wanted) {
+  constexpr std::size_t kChunk = 1024;  // triangles that stay in the nearest cache while they are looked through
+  IndexScan scan;
+  std::size_t left = wanted.size();
+  for (std::size_t begin = 0; begin < triangles.size(); begin += kChunk) {
+    const std::uint32_t* const indices = triangles[begin].data();
+    const std::size_t count = 3 * std::min(kChunk, triangles.size() - begin);
+    scan.largest = std::max(scan.largest, largest(indices, count));
+    for (std::size_t w = left; w-- > 0;) {
+      if (contains(indices, count, wanted[w])) wanted[w] = wanted[--left];
+    }
+  }
+  scan.uses_all = left == 0;
+  return scan;
+}
+
+Eigen::AlignedBox3d boundsOfUsed(const std::vector<Eigen::Vector3d>& vertices,
+                                 const std::vector<Mesh::Indices>& triangles) {
+  Eigen::AlignedBox3d box;
+  for (const Mesh::Indices& t : triangles) {
+    for (const std::uint32_t i : t) box.extend(vertices[i]);
+  }
+  return box;
+}
+
 }  // namespace
 
+Mesh::Mesh(std::vector<Eigen::Vector3d> vertices, std::shared_ptr<const std::vector<Indices>> triangles)
+    : vertices_(std::move(vertices)), triangles_(std::move(triangles)) {}
+
 Mesh::Mesh(std::vector<Eigen::Vector3d> vertices, const std::vector<fcl::Triangle>& triangles)
-    : vertices_(std::move(vertices)),
-      triangles_(NarrowIterator(triangles.data()), NarrowIterator(triangles.data() + triangles.size())) {
+    : Mesh(std::move(vertices),
+           std::make_shared<const std::vector<Indices>>(NarrowIterator(triangles.data()),
+                                                        NarrowIterator(triangles.data() + triangles.size()))) {
   validate(&triangles);
 }
 
 std::shared_ptr<const Mesh> Mesh::fromIndices(std::vector<Eigen::Vector3d> vertices, std::vector<Indices> triangles) {
-  std::shared_ptr<Mesh> mesh(new Mesh);
-  mesh->vertices_ = std::move(vertices);
-  mesh->triangles_ = std::move(triangles);
+  std::shared_ptr<Mesh> mesh(
+      new Mesh(std::move(vertices), std::make_shared<const std::vector<Indices>>(std::move(triangles))));
+  mesh->validate(nullptr);
+  return mesh;
+}
+
+std::shared_ptr<const Mesh> Mesh::withVertices(std::vector<Eigen::Vector3d> vertices) const {
+  if (vertices.size() != vertexCount()) {
+    bad(std::to_string(vertices.size()) + " vertices, but the triangles are of a mesh with " +
+        std::to_string(vertexCount()));
+  }
+  std::shared_ptr<Mesh> mesh(new Mesh(std::move(vertices), triangles_));
   mesh->validate(nullptr);
   return mesh;
 }
 
 void Mesh::validate(const std::vector<fcl::Triangle>* given) {
   const std::size_t count = vertices_.size();
-  if (triangles_.empty()) bad("no triangles");
-  if (triangles_.size() > kMaxTriangles) bad("more than 2^28 triangles");
+  if (triangles_->empty()) bad("no triangles");
+  if (triangles_->size() > kMaxTriangles) bad("more than 2^28 triangles");
   if (count > kMaxVertices) bad("more than 2^32 - 1 vertices");
-  // A vertex that no triangle uses is kept, but is no part of the surface. One place more for indices out of range: to
-  // look once at the end is faster than to branch each time.
-  std::vector<std::uint8_t> used(count + 1, 0);
-  std::uint8_t* const mark = used.data();
-  const Indices* const end = triangles_.data() + triangles_.size();
-  for (const Indices* t = triangles_.data(); t != end; ++t) {
-    for (std::size_t k = 0; k < 3; ++k) mark[std::min<std::size_t>((*t)[k], count)] = 1;
-  }
-  if (used[count]) {
-    for (std::size_t t = 0; t < triangles_.size(); ++t) {
+  const Extremes all = extremesOf(vertices_);
+  const IndexScan scan = scanIndices(*triangles_, all.at);
+  if (scan.largest >= count) {
+    for (std::size_t t = 0; t < triangles_->size(); ++t) {
       for (std::size_t k = 0; k < 3; ++k) {
         // What 32 bits cannot say was made the largest of them, which is never an index.
-        if (triangles_[t][k] >= count) badIndex(t, given ? (*given)[t][k] : triangles_[t][k], count);
+        if (indices(t)[k] >= count) badIndex(t, given ? (*given)[t][k] : indices(t)[k], count);
       }
     }
   }
-  Eigen::Vector3d lo = Eigen::Vector3d::Constant(std::numeric_limits<double>::max()), hi = -lo;
-  const Eigen::Vector3d* const vertices = vertices_.data();
-  for (std::size_t i = 0; i < count; ++i) {
-    const double* v = vertices[i].data();
-    // One comparison a coordinate finds NaN, infinities and what is too large.
-    if (!(std::abs(v[0]) <= kMaxCoordinate) | !(std::abs(v[1]) <= kMaxCoordinate) |
-        !(std::abs(v[2]) <= kMaxCoordinate)) {
-      bad("vertex " + std::to_string(i) + " is " + coordinates(vertices_[i]));
-    }
-    if (!mark[i]) continue;
-    lo = lo.cwiseMin(vertices[i]);
-    hi = hi.cwiseMax(vertices[i]);
-  }
-  bounds_ = Eigen::AlignedBox3d(lo, hi);
+  // A vertex that no triangle uses is kept, but is no part of the surface. Most meshes use those of the extremes.
+  bounds_ = scan.uses_all ? all.box : boundsOfUsed(vertices_, *triangles_);
 }
 
 std::size_t Mesh::bytes() const {
-  return vertices_.capacity() * sizeof(Eigen::Vector3d) + triangles_.capacity() * sizeof(Indices);
+  return vertices_.capacity() * sizeof(Eigen::Vector3d) + triangles_->capacity() * sizeof(Indices);
 }
 
 }  // namespace bocst

@@ -6,6 +6,8 @@
 #include <hwy/foreach_target.h>
 #include <hwy/highway.h>
 
+#include <algorithm>
+
 #include "query/frames-inl.h"
 
 #ifndef BOCST_TREE_STEPS_ONCE
@@ -18,10 +20,7 @@ inline bool isLeaf(const StepNode& n) {
   return tag == tree::Link::kShortList || (tag == tree::Link::kList && n.level == lattice::kMaxLevel);
 }
 
-inline float sideOf(const PairSteps& s, const StepNode& n, int side) {
-  return s.geometry.unit[side] * static_cast<float>(1 << (lattice::kMaxLevel - n.level));
-}
-
+// The order is there already: overlapping() writes it to where the group will be.
 inline void push(PairSteps& s, int side, std::uint32_t block, std::uint32_t level, std::uint32_t frame,
                  const StepNode& other, unsigned octants) {
   StepGroup& top = s.stack[s.depth++];
@@ -34,48 +33,18 @@ inline void push(PairSteps& s, int side, std::uint32_t block, std::uint32_t leve
   top.frame = frame;
   top.level = level;
   top.octants = octants;
-  top.implicit = 0;
 }
 
-// Takes the next pair off the stack and says how many frames it and what is under it use. What is still implicit is
-// left for last: a hit among resident nodes makes its growth unnecessary.
-inline std::uint32_t pop(PairSteps& s, StepNode (&pair)[2]) {
-  for (;;) {
-    StepGroup& top = s.stack[s.depth - 1];
-    const unsigned octants = top.octants != 0 ? top.octants : top.implicit;
-    int o = __builtin_ctz(octants);
-    for (unsigned left = octants & (octants - 1); left != 0; left &= left - 1) {
-      const int p = __builtin_ctz(left);
-      o = top.overlap[p] > top.overlap[o] ? p : o;
-    }
-    const tree::NodeRef node = tree::NodeRef::octant(top.block, o);
-    const tree::Link link = s.tree[top.side]->link(node);
-    const unsigned rest = octants & ~(1u << o);
-    if (top.octants != 0) {
-      top.octants = rest;
-      if (link.tag() == tree::Link::kImplicit && (rest | top.implicit) != 0) {
-        top.implicit |= 1u << o;
-        continue;
-      }
-      if ((rest | top.implicit) == 0) --s.depth;
-    } else {
-      top.implicit = rest;
-      if (rest == 0) --s.depth;
-    }
-    StepNode &own = pair[top.side], &other = pair[1 - top.side];
-    own.node = node;
-    own.link = link;
-    own.level = top.level;
-    other.node = top.other.node;
-    other.link = top.other.link;
-    other.level = top.other.level;
-    other.lane = top.other.lane;
-    if (top.frame == StepGroup::kNoFrame) {
-      own.lane = StepNode::kNoLane;
-      return 0;
-    }
-    own.lane = 8 * top.frame + static_cast<std::uint32_t>(o);
-    return top.frame + 1;
+// Brings to the processor what the next steps will read of a node, or, of a leaf, its corners.
+inline void fetch(const tree::Tree& tree, const StepNode& n) {
+  constexpr std::size_t kLine = 64, kLeafLines = 6;
+  if (n.link.tag() == tree::Link::kBlock) {
+    const char* at = reinterpret_cast<const char*>(&tree.block(n.link.index()));
+    __builtin_prefetch(at);
+    __builtin_prefetch(at + kLine);
+  } else if (n.link.tag() == tree::Link::kShortList) {
+    const char* at = reinterpret_cast<const char*>(tree.words(n.link));
+    for (std::size_t i = 0; i < kLeafLines; ++i) __builtin_prefetch(at + i * kLine);
   }
 }
 
@@ -87,10 +56,12 @@ HWY_BEFORE_NAMESPACE();
 namespace bocst::query::HWY_NAMESPACE {
 
 // Bit o is set unless octant o of frame f (side `own`) is surely apart from the volume in lane l of frame y, by one of
-// eight axes: the faces of both boxes and both slab normals. No edge axes: with slabs they gain nothing.
+// eight axes: the faces of both boxes and both slab normals. No edge axes: with slabs they gain nothing. Of `octants`
+// only; order as in StepGroup, by the faces.
 HWY_INLINE unsigned overlapping(const PairFrames& g, int own, const Frame& f, const Frame& y, std::size_t l,
-                                float* overlap) {
+                                unsigned octants, std::uint32_t* order) {
   const D d;
+  const hn::RebindToUnsigned<D> du;
   const int other = 1 - own;
   const V pad = hn::Set(d, g.pad), slab_pad = hn::Set(d, g.slab_pad);
   unsigned result = 0;
@@ -106,7 +77,6 @@ HWY_INLINE unsigned overlapping(const PairFrames& g, int own, const Frame& f, co
         least = hn::Min(least, hn::Sub(reach, hn::Abs(way[s][k])));
       }
     }
-    hn::StoreU(least, d, overlap + i);
     M apart = hn::Lt(least, hn::Zero(d));
     // Slabs: for z in a box with |m.z - offset| <= w, any a gives n.z in a * offset +- (|a| w + |n - a m| over the
     // box).
@@ -137,8 +107,13 @@ HWY_INLINE unsigned overlapping(const PairFrames& g, int own, const Frame& f, co
                      hn::Abs(hn::NegMulAdd(along, hn::Load(d, f.normal[own][k] + i), mk)), r);
     }
     apart = hn::Or(apart, hn::Gt(hn::Abs(t), r));
+    const std::uint8_t wanted[8] = {static_cast<std::uint8_t>(octants >> i)};
+    const M left = hn::AndNot(apart, hn::LoadMaskBits(d, wanted));
+    const auto depth =
+        hn::Or(hn::And(hn::BitCast(du, least), hn::Set(du, ~7u)), hn::Iota(du, static_cast<std::uint32_t>(i)));
+    hn::StoreU(hn::IfThenElseZero(hn::RebindMask(du, left), depth), du, order + i);
     std::uint8_t bits[8] = {};
-    hn::StoreMaskBits(d, hn::Not(apart), bits);
+    hn::StoreMaskBits(d, left, bits);
     result |= static_cast<unsigned>(bits[0]) << i;
   }
   return result;
@@ -173,36 +148,73 @@ std::uint8_t OverlappingOctants(const PairFrames& geometry, int own, const CellO
   Frame f, y;
   decodeCell(geometry, own, cell.cell.level, cell.cell.at, cell.octants, f);
   decodeCell(geometry, 1 - own, other.cell.level, other.cell.at, other.octants, y);
-  float overlap[8];
-  return static_cast<std::uint8_t>(overlapping(geometry, own, f, y, static_cast<std::size_t>(octant), overlap));
+  std::uint32_t order[8];
+  return static_cast<std::uint8_t>(overlapping(geometry, own, f, y, static_cast<std::size_t>(octant), 0xff, order));
+}
+
+// The octant that overlaps the most. Without branches: they would be guessed wrong.
+HWY_INLINE std::uint32_t deepest(const std::uint32_t (&order)[8]) {
+  const auto larger = [](std::uint32_t a, std::uint32_t b) { return a > b ? a : b; };
+  return larger(larger(larger(order[0], order[1]), larger(order[2], order[3])),
+                larger(larger(order[4], order[5]), larger(order[6], order[7])));
+}
+
+// Takes the next pair off the stack and says how many frames it and what is under it use. What is still implicit is
+// left for last: a hit among resident nodes makes its growth unnecessary.
+HWY_INLINE std::uint32_t pop(PairSteps& s, StepNode (&pair)[2]) {
+  for (;;) {
+    StepGroup& top = s.stack[s.depth - 1];
+    const std::uint32_t depth = deepest(top.order), o = depth & 7, rest = top.octants & ~(1u << o);
+    const tree::NodeRef node = tree::NodeRef::octant(top.block, static_cast<int>(o));
+    const tree::Link link = s.tree[top.side]->link(node);
+    if (link.tag() == tree::Link::kImplicit && rest != 0 && depth >= 2 * StepGroup::kLast) {
+      top.order[o] = StepGroup::kLast | o;
+      continue;
+    }
+    top.order[o] = 0;
+    top.octants = rest;
+    if (rest == 0) --s.depth;
+    StepNode &own = pair[top.side], &other = pair[1 - top.side];
+    own.node = node;
+    own.link = link;
+    own.level = top.level;
+    other.node = top.other.node;
+    other.link = top.other.link;
+    other.level = top.other.level;
+    other.lane = top.other.lane;
+    if (top.frame == StepGroup::kNoFrame) {
+      own.lane = StepNode::kNoLane;
+      return 0;
+    }
+    own.lane = 8 * top.frame + o;
+    return top.frame + 1;
+  }
 }
 
 PairSteps::Event NextEvent(PairSteps& s) {
   while (s.depth > 0) {
     std::uint32_t frames = pop(s, s.pair);
     const bool leaf0 = isLeaf(s.pair[0]), leaf1 = isLeaf(s.pair[1]);
-    if (leaf0 && leaf1) return PairSteps::kLeaves;
+    if (leaf0 && leaf1) {
+      fetch(*s.tree[0], s.pair[0]);
+      fetch(*s.tree[1], s.pair[1]);
+      return PairSteps::kLeaves;
+    }
     // The larger of two nodes is expanded, unless it is a leaf.
-    const float side0 = sideOf(s, s.pair[0], 0), side1 = sideOf(s, s.pair[1], 1);
-    const int x = leaf1 || (!leaf0 && side0 >= side1) ? 0 : 1, y = 1 - x;
+    const int deeper = static_cast<int>(s.pair[1].level) - static_cast<int>(s.pair[0].level);
+    const int x = leaf1 || (!leaf0 && deeper >= s.not_smaller) ? 0 : 1, y = 1 - x;
     StepNode &own = s.pair[x], &other = s.pair[y];
     if (own.link.tag() != tree::Link::kBlock) return PairSteps::kAside;
-    if (other.link.tag() == tree::Link::kBlock) {
-      const tree::Block& b = s.tree[y]->block(other.link.index());
-      __builtin_prefetch(&b);
-      __builtin_prefetch(reinterpret_cast<const char*>(&b) + 64);
-    }
-    lookUp(s, s.pair[0], 0, frames);
-    lookUp(s, s.pair[1], 1, frames);
+    if (other.link.tag() == tree::Link::kBlock) fetch(*s.tree[y], other);
+    lookUp(s, other, y, frames);
     const std::uint32_t index = own.link.index();
     const tree::Block& block = s.tree[x]->block(index);
     s.tree[x]->touch(index, s.now);
     decodeBlock(s, x, index, block, frames);
     const unsigned mask = overlapping(s.geometry, x, s.frames[frames], s.frames[other.lane / 8], other.lane % 8,
-                                      s.stack[s.depth].overlap) &
-                          block.grey;
+                                      block.grey, s.stack[s.depth].order);
     if (mask == 0) continue;
-    if (y == 0 ? leaf0 && side1 < side0 : leaf1 && side0 < side1) {
+    if (y == 0 ? leaf0 && deeper >= s.larger : leaf1 && deeper < s.not_smaller) {
       s.frames_used = frames;
       s.expanded = x;
       s.mask = mask;
@@ -231,6 +243,9 @@ PairSteps::Event nextEvent(PairSteps& steps) { return HWY_DYNAMIC_DISPATCH(NextE
 
 void pushOctants(PairSteps& s, unsigned mask) {
   if (mask == 0) return;
+  for (unsigned o = 0; o < 8; ++o) {
+    if ((mask >> o & 1) == 0) s.stack[s.depth].order[o] = 0;
+  }
   const int x = s.expanded;
   push(s, x, s.pair[x].link.index(), s.pair[x].level + 1, s.frames_used, s.pair[1 - x], mask);
 }
@@ -240,8 +255,11 @@ void pushPair(PairSteps& s, tree::NodeRef node_a, tree::NodeRef node_b) {
   other.node = node_b;
   other.link = s.tree[1]->link(node_b);
   other.level = static_cast<std::uint32_t>(s.tree[1]->cell(node_b).level);
+  const auto o = static_cast<std::uint32_t>(node_a.octant());
+  std::fill_n(s.stack[s.depth].order, 8, 0);
+  s.stack[s.depth].order[o] = StepGroup::kLast | o;
   push(s, 0, node_a.block(), static_cast<std::uint32_t>(s.tree[0]->cell(node_a).level), StepGroup::kNoFrame, other,
-       1u << node_a.octant());
+       1u << o);
 }
 
 }  // namespace bocst::query

@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #pragma once
 
+#include <cmath>
 #include <cstddef>
 #include <cstdint>
 
@@ -30,13 +31,15 @@ struct StepGroup {
   std::uint32_t frame;  ///< Where the block's octants are, if they are; those below it are in use, too.
   std::uint32_t level;  ///< Of the octants.
   std::uint32_t octants;
-  float overlap[8];
-  std::uint32_t implicit;  ///< Octants that turned out to be so: they wait for the others.
+  /// For each of these: how far it overlaps the other node, as the bits of a float whose lowest three are the octant.
+  /// 0 for the others; kLast, a depth below all, for what waits until they are gone.
+  std::uint32_t order[8];
+  static constexpr std::uint32_t kLast = 8;
 };
 
 /// The depth-first walk over resident pairs of two trees, exact answers: up to the next pair of leaves.
 struct PairSteps {
-  /// Frames alive at once: two to look up a pair that comes without, one more each level of either side.
+  /// Frames alive at once: to look up the nodes of a pair that comes without, and one more each level of either side.
   static constexpr std::size_t kFrames = 2 + 2 * lattice::kMaxLevel + 1;
   /// What a walk below one pair can add to the stack: one more each level of either side.
   static constexpr std::size_t kStackRoom = 2 * lattice::kMaxLevel + 1;
@@ -55,6 +58,9 @@ struct PairSteps {
   StepGroup* stack;  ///< With room for kStackRoom more.
   std::size_t depth = 0;
 
+  /// A node of side 0 is not smaller (is larger) than one of side 1 that is at least so many levels deeper.
+  int not_smaller, larger;
+
   StepNode pair[2];  ///< Of the event.
   std::uint32_t frames_used = 0;
   int expanded = 0;
@@ -68,6 +74,11 @@ struct PairSteps {
 
   PairSteps(const tree::Tree* a, const tree::Tree* b, std::int64_t now_, const PairFrames& geometry_, Frame* frames_)
       : tree{a, b}, now(now_), geometry(geometry_), frames(frames_), stack(nullptr) {
+    // 2^deeper against the ratio of units, exactly.
+    int exponent = 0;
+    const bool even = std::frexp(geometry.unit[1] / geometry.unit[0], &exponent) == 0.5f;
+    not_smaller = even ? exponent - 1 : exponent;
+    larger = exponent;
     for (std::uint64_t& h : holds) h = kNothing;
   }
 };

@@ -23,12 +23,13 @@ void UnpackTriangles(const tree::PackedTriangles& packed, const double* center, 
     offset[c] = hn::Set(d, static_cast<float>(static_cast<double>(packed.origin[c]) - center[c]));
   }
   for (std::size_t i = 0; i < packed.count; i += hn::Lanes(d)) {
-    const std::uint16_t* const group =
-        packed.steps + i / PackedTriangles::kGroup * PackedTriangles::kGroupSteps + i % PackedTriangles::kGroup;
+    // Lanes beyond the last triangle repeat the first of the vector.
+    const M in = hn::FirstN(d, packed.count - i);
     BOCST_UNROLL
-    for (std::size_t k = 0; k < 9; ++k) {
-      const auto steps = hn::PromoteTo(di, hn::LoadU(du, group + PackedTriangles::kGroup * k));
-      const V x = hn::MulAdd(hn::ConvertTo(d, steps), step, offset[k % 3]);
+    for (std::size_t k = 0; k < PackedTriangles::kRows; ++k) {
+      const std::uint16_t* const row = packed.steps + k * packed.count + i;
+      const V q = hn::ConvertTo(d, hn::PromoteTo(di, hn::LoadU(du, row)));
+      const V x = hn::MulAdd(hn::IfThenElse(in, q, hn::Set(d, static_cast<float>(row[0]))), step, offset[k % 3]);
       hn::Store(x, d, pack.xyz[k] + i);
       size = hn::Max(size, hn::Abs(x));
     }

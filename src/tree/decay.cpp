@@ -24,9 +24,16 @@ void Tree::collectTriangles(Link link, const lattice::Cell& cell, std::vector<st
 
 Link Tree::copyList(Link list, Pool<std::uint32_t, 12>& lists) const {
   const std::uint32_t* from = &lists_[list.index()];
-  const std::size_t words = listWords(from);
-  const std::uint32_t index = lists.append(words);
-  std::copy_n(from, words, &lists[index]);
+  const auto copy = [&lists](const std::uint32_t* words, std::size_t count) {
+    const std::uint32_t index = lists.append(count);
+    std::copy_n(words, count, &lists[index]);
+    return index;
+  };
+  if ((from[0] & kKept) != 0) return Link(list.tag(), copy(from, kKeptWords));
+  const std::uint32_t count = from[0] & kCount;
+  if ((from[0] & kPacked) == 0) return Link(list.tag(), copy(from, 1 + std::size_t{count}));
+  const std::uint32_t ids = copy(&lists_[from[1]], count), index = copy(from, 2 + PackedTriangles::words(count));
+  lists[index + 1] = ids;
   return Link(list.tag(), index);
 }
 

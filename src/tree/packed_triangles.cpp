@@ -37,14 +37,13 @@ void PackedTriangles::pack(const oracle::Surface& surface, const std::uint32_t* 
   const auto s = static_cast<float>(step);
   std::memcpy(words + 3, &s, sizeof(s));
   auto* const steps = reinterpret_cast<char*>(words + kHeader);
-  for (std::size_t i = 0; i < groups(count) * kGroup; ++i) {
-    const std::uint32_t t = ids[std::min(i, count - 1)];
+  std::memset(steps, 0, (PackedTriangles::words(count) - kHeader) * sizeof(*words));
+  for (std::size_t i = 0; i < count; ++i) {
     for (std::size_t k = 0; k < 3; ++k) {
-      const Eigen::Vector3d at = (surface.corner(t, static_cast<int>(k)) - origin) / step;
+      const Eigen::Vector3d at = (surface.corner(ids[i], static_cast<int>(k)) - origin) / step;
       for (std::size_t c = 0; c < 3; ++c) {
         const auto q = static_cast<std::uint16_t>(std::clamp(std::round(at[c]), 0.0, kMost));
-        const std::size_t place = kGroupSteps * (i / kGroup) + kGroup * (3 * k + c) + i % kGroup;
-        std::memcpy(steps + place * sizeof(q), &q, sizeof(q));
+        std::memcpy(steps + ((3 * k + c) * count + i) * sizeof(q), &q, sizeof(q));
       }
     }
   }

@@ -9,18 +9,16 @@
 namespace bocst::tree {
 
 /// The corners of a leaf's triangles side by side, as 16-bit steps on a grid of the leaf's own: what a query would else
-/// collect from places all over the mesh. In groups of eight triangles: coordinate c of corner k of triangle i of group
-/// g at steps()[72 * g + 8 * (3 * k + c) + i]; the last triangle fills the last group up.
+/// collect from places all over the mesh. Coordinate c of corner k of triangle i is steps[(3 * k + c) * count + i].
 ///
 /// A coordinate is origin + step * q in lattice units, origin a whole number and step a power of two, so all of it is
 /// exact in float but for q, which is off by half a step.
 class PackedTriangles {
  public:
-  static constexpr std::size_t kGroup = 8;
-  static constexpr std::size_t kGroupSteps = 9 * kGroup;
+  static constexpr std::size_t kRows = 9;
 
-  /// How many words a list of `count` triangles takes, packed.
-  static std::size_t words(std::size_t count) { return kHeader + groups(count) * kGroupSteps / 2; }
+  /// How many words `count` triangles take. Whole vectors of eight are read, so there is some room beyond.
+  static std::size_t words(std::size_t count) { return kHeader + (kRows * count + 1) / 2 + kBeyond; }
 
   /// Writes words(count) words.
   static void pack(const oracle::Surface& surface, const std::uint32_t* ids, std::size_t count, std::uint32_t* words);
@@ -34,8 +32,7 @@ class PackedTriangles {
   const std::uint16_t* steps = nullptr;
 
  private:
-  static constexpr std::size_t kHeader = 4;
-  static std::size_t groups(std::size_t count) { return (count + kGroup - 1) / kGroup; }
+  static constexpr std::size_t kHeader = 4, kBeyond = 4;
 };
 
 }  // namespace bocst::tree

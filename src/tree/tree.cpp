@@ -47,12 +47,12 @@ oracle::Surface surfaceOf(std::shared_ptr<const Mesh> mesh, const Options& o) {
 // A box in lattice units as bytes of a cell, rounded outwards; the margin is far above the rounding of toLattice.
 void setBox(const Eigen::AlignedBox3d& box, const lattice::Cell& cell, oracle::CellBounds& bounds) {
   const double scale = 255.0 / cell.side(), margin = 1e-6;
+  // What is clamped is not negative, so to truncate is to round down.
+  const auto byte = [](double x) { return static_cast<int>(std::min(std::max(x, 0.0), 255.0)); };
   for (int k = 0; k < 3; ++k) {
     const double corner = cell.corner()[k];
-    bounds.lo[k] =
-        static_cast<std::uint8_t>(std::clamp(std::floor((box.min()[k] - margin - corner) * scale), 0.0, 255.0));
-    bounds.hi[k] =
-        static_cast<std::uint8_t>(std::clamp(std::ceil((box.max()[k] + margin - corner) * scale), 0.0, 255.0));
+    bounds.lo[k] = static_cast<std::uint8_t>(byte((box.min()[k] - margin - corner) * scale));
+    bounds.hi[k] = static_cast<std::uint8_t>(255 - byte(255 - (box.max()[k] + margin - corner) * scale));
   }
 }
 
@@ -187,6 +187,7 @@ void Tree::grow(std::vector<Growth>& batch, bool wait) {
       }
     } else {
       gathered.emplace_back();
+      gathered.back().reserve(4 * kLeafTriangles);
       tree.gatherNode(g.node, cell, gathered.back());
       question.ids = gathered.back().data();
       question.count = gathered.back().size();
@@ -314,23 +315,15 @@ Link Tree::addList(const std::uint32_t* ids, std::size_t count, bool leaf) {
   return Link(leaf || count <= kLeafTriangles ? Link::kShortList : Link::kList, index);
 }
 
-// The same list with its corners; the old one stays for whoever reads it now.
+// The same list with its corners; whoever reads the old one goes on.
 Link Tree::addPacked(Link list) {
   const std::uint32_t count = lists_[list.index()];
-  const std::size_t words = PackedTriangles::words(count);
-  const std::uint32_t index = lists_.append(1 + words + count);
-  const std::uint32_t* const ids = &lists_[list.index()] + 1;
-  std::uint32_t* const to = &lists_[index];
-  to[0] = count | kPacked;
-  PackedTriangles::pack(surface_, ids, count, to + 1);
-  std::copy_n(ids, count, to + 1 + words);
+  const std::uint32_t index = lists_.append(2 + PackedTriangles::words(count));
+  std::uint32_t* const words = &lists_[index];
+  words[0] = count | kPacked;
+  words[1] = list.index() + 1;
+  PackedTriangles::pack(surface_, &lists_[words[1]], count, words + 2);
   return Link(list.tag(), index);
-}
-
-std::size_t Tree::listWords(const std::uint32_t* list) {
-  if ((list[0] & kKept) != 0) return kKeptWords;
-  const std::size_t count = list[0] & kCount;
-  return 1 + count + ((list[0] & kPacked) != 0 ? PackedTriangles::words(count) : 0);
 }
 
 void Tree::packLeaves(const std::vector<NodeRef>& leaves) {
@@ -417,7 +410,7 @@ void Tree::updateVertices(std::vector<Eigen::Vector3d> vertices) {
     throw std::invalid_argument("bocst::Model::updateVertices: " + std::to_string(vertices.size()) +
                                 " vertices, but the mesh has " + std::to_string(old.vertexCount()));
   }
-  reset(Mesh::fromIndices(std::move(vertices), old.triangles()));
+  reset(old.withVertices(std::move(vertices)));
 }
 
 // Inspection.

@@ -67,13 +67,15 @@ class Tree {
     const std::uint32_t* words = &lists_[link.index()];
     const std::uint32_t count = words[0] & kCount;
     if ((words[0] & kKept) != 0) return {nullptr, count};
-    return {words + 1 + ((words[0] & kPacked) != 0 ? PackedTriangles::words(count) : 0), count};
+    return {(words[0] & kPacked) != 0 ? &lists_[words[1]] : words + 1, count};
   }
+  /// Where a list lies, for those who want it in the processor's cache.
+  const std::uint32_t* words(Link list) const { return &lists_[list.index()]; }
   /// The corners of a leaf's triangles, in the order of its list; false while they are not packed.
   bool packed(Link link, PackedTriangles& triangles) const {
     const std::uint32_t* words = &lists_[link.index()];
     if ((words[0] & kPacked) == 0) return false;
-    triangles = PackedTriangles(words + 1, words[0] & kCount);
+    triangles = PackedTriangles(words + 2, words[0] & kCount);
     return true;
   }
   /// No more expansions below this node: a single lattice unit, or the collision depth of conservative answers.
@@ -139,8 +141,8 @@ class Tree {
   using Dropped = std::vector<std::uint8_t>;
 
   void reset(std::shared_ptr<const Mesh> mesh);
-  // A list is a length and the ids; with kPacked, PackedTriangles are between them. With kKept the oracle has the ids:
-  // the length is followed by a shelf and a place there.
+  // A list is a length and the ids. With kPacked the length is followed by where the ids are and PackedTriangles; with
+  // kKept, where the oracle has the ids, by a shelf and a place there.
   static constexpr std::uint32_t kKept = 0x80000000u, kPacked = 0x40000000u, kCount = ~(kKept | kPacked);
   static constexpr std::size_t kKeptWords = 3;
 
@@ -154,7 +156,6 @@ class Tree {
   std::uint32_t addBlock(NodeRef node, const lattice::Cell& cell, std::uint8_t grey);
   Link addList(const std::uint32_t* ids, std::size_t count, bool leaf);
   Link addPacked(Link list);
-  static std::size_t listWords(const std::uint32_t* list);
   void setLink(NodeRef node, Link link);
   void refit();
   void pruneAlone(std::int64_t now, bool budget_only);

@@ -39,6 +39,69 @@ TEST(Mesh, UnusedVerticesDoNotCount) {
   EXPECT_EQ(raw.mesh()->bounds().max(), Eigen::Vector3d(1, 1, 1));
 }
 
+TEST(Mesh, BoundsOfMeshesLargerThanABlock) {
+  const Raw raw = test::torus(50);
+  Eigen::AlignedBox3d expected;
+  for (const Eigen::Vector3d& v : raw.vertices) expected.extend(v);
+  EXPECT_EQ(raw.mesh()->bounds().min(), expected.min());
+  EXPECT_EQ(raw.mesh()->bounds().max(), expected.max());
+  // A stray vertex at any place, beyond any face, alone or beside one that is used.
+  for (const std::size_t place : {std::size_t{0}, raw.vertices.size() / 2, raw.vertices.size()}) {
+    for (int face = 0; face < 6; ++face) {
+      Raw stray = raw;
+      for (auto& t : stray.triangles) {
+        for (std::size_t k = 0; k < 3; ++k) t[k] += t[k] >= place;
+      }
+      Eigen::Vector3d v = expected.center();
+      v[face % 3] = face < 3 ? -5 : 5;
+      stray.vertices.insert(stray.vertices.begin() + static_cast<std::ptrdiff_t>(place), v);
+      EXPECT_EQ(stray.mesh()->bounds().min(), expected.min());
+      EXPECT_EQ(stray.mesh()->bounds().max(), expected.max());
+      stray.vertices[place][face % 3] = face < 3 ? expected.min()[face] : expected.max()[face % 3];
+      EXPECT_EQ(stray.mesh()->bounds().min(), expected.min());
+      EXPECT_EQ(stray.mesh()->bounds().max(), expected.max());
+    }
+  }
+}
+
+TEST(Mesh, SharesTrianglesWithOtherVertices) {
+  const Raw raw = test::torus(30);
+  const auto mesh = raw.mesh();
+  Raw moved = raw;
+  moved.scale(3).move({1, 2, 3});
+  const auto other = mesh->withVertices(moved.vertices);
+  EXPECT_EQ(other->triangles().data(), mesh->triangles().data());
+  EXPECT_EQ(other->vertices(), moved.vertices);
+  EXPECT_EQ(other->bounds().min(), moved.mesh()->bounds().min());
+  EXPECT_EQ(other->bounds().max(), moved.mesh()->bounds().max());
+  moved.vertices[7].y() = std::numeric_limits<double>::quiet_NaN();
+  EXPECT_THROW(mesh->withVertices(moved.vertices), std::invalid_argument);
+  moved.vertices = raw.vertices;
+  moved.vertices.pop_back();
+  EXPECT_THROW(mesh->withVertices(moved.vertices), std::invalid_argument);
+}
+
+TEST(Mesh, NamesTheFirstThatIsBadInALargeMesh) {
+  const Raw raw = test::torus(50);
+  for (const std::size_t i :
+       {std::size_t{0}, std::size_t{511}, std::size_t{512}, std::size_t{2497}, std::size_t{2499}}) {
+    Raw number = raw;
+    number.vertices[i].z() = std::numeric_limits<double>::quiet_NaN();
+    number.vertices.back().x() = -1e76;
+    EXPECT_NE(messageOf(number).find("vertex " + std::to_string(i) + " "), std::string::npos) << messageOf(number);
+  }
+  for (const std::size_t t : {std::size_t{0}, std::size_t{1023}, std::size_t{1024}, std::size_t{4999}}) {
+    for (const std::size_t index : {raw.vertices.size(), std::size_t{0xffffffff}, std::size_t{0x100000000}}) {
+      Raw wrong = raw;
+      wrong.triangles[t][2] = index;
+      wrong.triangles.back()[2] = index;
+      EXPECT_NE(messageOf(wrong).find("triangle " + std::to_string(t) + " has vertex index " + std::to_string(index)),
+                std::string::npos)
+          << messageOf(wrong);
+    }
+  }
+}
+
 TEST(Mesh, NamesWhatIsBad) {
   Raw raw = test::box({0, 0, 0}, {1, 1, 1});
   EXPECT_EQ(messageOf(raw), "");

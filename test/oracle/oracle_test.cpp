@@ -6,6 +6,7 @@
 #include <gtest/gtest.h>
 #include <hwy/targets.h>
 
+#include <algorithm>
 #include <cstdlib>
 #include <random>
 
@@ -270,6 +271,45 @@ INSTANTIATE_TEST_SUITE_P(All, EveryOracle,
                          testing::Values(OracleKind::kCpu, OracleKind::kOcclusion, OracleKind::kCompute),
                          [](const auto& kind) { return std::string(nameOf(kind.param)); });
 
+// The quantised vertices and the grid's spans of random triangles, one by one.
+void checkGridSpans() {
+  std::mt19937 random(5);
+  std::uniform_real_distribution<double> coordinate(-1, 11);
+  constexpr std::size_t kVertices = 203;
+  std::vector<double> points(3 * kVertices);
+  for (double& x : points) x = coordinate(random);
+  const double origin[3] = {0.5, 1, -0.25}, scale = 3000;
+  std::vector<std::int16_t> vertices(3 * kVertices + 1);
+  quantise(points.data(), kVertices, origin, scale, 32766, vertices.data());
+  for (std::size_t i = 0; i < points.size(); ++i) {
+    ASSERT_EQ(vertices[i], static_cast<int>(std::clamp((points[i] - origin[i % 3]) * scale, 1.0, 32766.0)));
+  }
+  std::uniform_int_distribution<std::uint32_t> index(0, kVertices - 1), step(0, 4);
+  for (std::size_t count = 0; count < 40; ++count) {
+    std::vector<std::uint32_t> indices(3 * count);
+    // Some triangles lie in one cell or two, most do not.
+    for (std::size_t i = 0; i < indices.size(); ++i) {
+      indices[i] = i % 3 == 0 || step(random) != 0 ? index(random) : indices[i - 1];
+    }
+    for (int bits = 1; bits <= 5; ++bits) {
+      std::vector<GridSpan> spans(count + 8);
+      gridSpans(vertices.data(), indices.data(), count, bits, spans.data());
+      for (std::size_t t = 0; t < count; ++t) {
+        std::uint32_t expected = 0;
+        for (int k = 0; k < 3; ++k) {
+          const auto at = [&](std::size_t corner) {
+            return int{vertices[3 * indices[3 * t + corner] + static_cast<std::size_t>(k)]};
+          };
+          const int lo = (std::min({at(0), at(1), at(2)}) - 1) >> (15 - bits),
+                    hi = (std::max({at(0), at(1), at(2)}) + 1) >> (15 - bits);
+          expected |= static_cast<std::uint32_t>(lo << k * bits | std::min(hi - lo, 2) << (16 + 2 * k));
+        }
+        ASSERT_EQ(static_cast<std::uint32_t>(spans[t]) & 0x3fffffu, expected) << instructionSet() << " bits " << bits;
+      }
+    }
+  }
+}
+
 TEST(Kernels, EveryInstructionSetAgreesOnGreySets) {
   const Surface surface = surfaceOf(test::soup(500, 3));
   Expansion root = rootOf(surface);
@@ -290,6 +330,7 @@ TEST(Kernels, EveryInstructionSetAgreesOnGreySets) {
       }
     }
     checkMesh(*makeOracle(OracleKind::kCpu), surfaceOf(test::adversarial()), 6, 30);
+    checkGridSpans();
   }
   hwy::SetSupportedTargetsForTest(0);
   hwy::GetChosenTarget().Update(hwy::SupportedTargets());
@@ -326,6 +367,49 @@ TEST(RootGrid, KnowsTheSameGreyCellsAsExpansions) {
       }
       EXPECT_GT(grey, 20u);
     }
+  }
+}
+
+TEST(RootGrid, KnowsFineMeshesWithSomeLargeTriangles) {
+  // Finer grids, an odd number of triangles, a few that span many cells, vertices out of order.
+  for (const std::size_t n : {75u, 390u}) {
+    test::Raw raw = test::torus(n);
+    raw.add(test::box({-0.9, -0.9, -0.3}, {0.9, 0.9, 0.3}));
+    raw.triangles.pop_back();
+    std::mt19937 random(3);
+    std::shuffle(raw.triangles.begin(), raw.triangles.end(), random);
+    const Surface surface = surfaceOf(raw);
+    const auto grid = RootGrid::make(surface, lattice::kMaxLevel);
+    ASSERT_NE(grid, nullptr);
+    EXPECT_EQ(grid->level(), n == 75u ? 5 : 6);
+    const std::uint32_t side = 1u << (grid->level() - 1);
+    std::uniform_int_distribution<std::uint32_t> at(0, side - 1);
+    std::size_t grey = 0;
+    for (int i = 0; i < 60; ++i) {
+      const Cell cell{grid->level(), {at(random), at(random), at(random) % (side / 2)}};
+      ASSERT_EQ(grid->grey(surface, cell), referenceGrey(surface, cell));
+      if (!grid->grey(surface, cell)) continue;
+      ++grey;
+      std::vector<std::uint32_t> ids;
+      grid->gather(surface, cell, ids);
+      std::sort(ids.begin(), ids.end());
+      ASSERT_EQ(std::adjacent_find(ids.begin(), ids.end()), ids.end());
+      const Eigen::AlignedBox3d box = grid->bounds(cell);
+      EXPECT_EQ(box.min(), centerOf(cell) - Eigen::Vector3d::Constant(cell.side() / 2.0));
+      EXPECT_EQ(box.max(), centerOf(cell) + Eigen::Vector3d::Constant(cell.side() / 2.0));
+      Cell parent{cell.level - 1, {cell.at[0] / 2, cell.at[1] / 2, cell.at[2] / 2}};
+      for (; parent.level >= 2; --parent.level, parent.at = {parent.at[0] / 2, parent.at[1] / 2, parent.at[2] / 2}) {
+        EXPECT_TRUE(grid->grey(surface, parent));
+        EXPECT_TRUE(grid->bounds(parent).contains(box));
+      }
+      for (std::uint32_t t = 0; t < surface.mesh->triangleCount(); ++t) {
+        const Eigen::Vector3d c[3] = {surface.corner(t, 0), surface.corner(t, 1), surface.corner(t, 2)};
+        if (touches(c, centerOf(cell), cell.side() / 2.0)) {
+          ASSERT_TRUE(std::binary_search(ids.begin(), ids.end(), t));
+        }
+      }
+    }
+    EXPECT_GT(grey, 3u);
   }
 }
 

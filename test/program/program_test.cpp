@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: BSD-3-Clause
 // Runs the program as a user would. BOCST_PROGRAM is its path, BOCST_MODELS that of share/models.
 #include <gtest/gtest.h>
+#include <sched.h>
 #include <sys/wait.h>
 #include <unistd.h>
 
@@ -11,6 +12,7 @@
 #include <cstdlib>
 #include <filesystem>
 #include <fstream>
+#include <map>
 #include <nlohmann/json.hpp>
 #include <regex>
 #include <set>
@@ -18,6 +20,7 @@
 #include <stdexcept>
 #include <string>
 #include <utility>
+#include <vector>
 
 namespace bocst {
 namespace {
@@ -319,9 +322,109 @@ TEST_F(Program, ComparesWithFcl) {
   }
   EXPECT_GT(report.at("ratio").at("distance_median").get<double>(), 0);
   EXPECT_GT(report.at("ratio").at("first_distance").get<double>(), 0);
+  EXPECT_EQ(report.at("scenarios"), Json({"first", "warm", "distance", "memory"}));
   EXPECT_EQ(report.at("verdicts").at("equal"), true);
   EXPECT_EQ(report.at("verdicts").at("bocst"), report.at("verdicts").at("fcl"));
+  EXPECT_GT(report.at("hits"), 0);
+  EXPECT_GT(report.at("bytes").at("bocst_all"), report.at("bytes").at("bocst_first"));
   EXPECT_EQ(json("bench " + model("link") + " --poses 5 --rounds 1").at("triangles"), Json({5120, 5120}));
+}
+
+TEST_F(Program, HasARowForEachGoal) {
+  const std::string csv = (folder_ / "rows.csv").string();
+  const Json report = json("bench " + model("link") + " " + model("gripper") +
+                           " --scenarios all --poses 12 --rounds 2 --frames 60 --triangles 2000,9000 --csv " + csv);
+  std::vector<std::string> lines{"scenario,row,unit,bocst,fcl,ratio"};
+  std::map<std::string, Json> rows;
+  for (const Json& row : report.at("rows")) {
+    const auto number = [&row](const char* key) { return row.at(key).is_null() ? "" : "[-+0-9.e]+"; };
+    lines.push_back(row.at("scenario").get<std::string>() + "," + row.at("row").get<std::string>() + "," +
+                    row.at("unit").get<std::string>() + "," + number("bocst") + "," + number("fcl") + "," +
+                    number("ratio"));
+    EXPECT_TRUE(rows.emplace(row.at("row"), row).second) << row;
+    for (const char* key : {"bocst", "fcl", "ratio"}) EXPECT_TRUE(row.at(key).is_null() || row.at(key) >= 0) << row;
+  }
+  std::istringstream written(read(csv));
+  std::string line;
+  for (const std::string& expected : lines) {
+    ASSERT_TRUE(std::getline(written, line)) << expected;
+    EXPECT_TRUE(std::regex_match(line, std::regex(expected))) << line << " is not " << expected;
+  }
+  EXPECT_FALSE(std::getline(written, line)) << line;
+
+  for (const std::string row : {"first_answer",     "first_distance",
+                                "query_median",     "query_mean",
+                                "query_p95",        "query_miss_median",
+                                "query_miss_mean",  "query_miss_p95",
+                                "query_hit_median", "query_hit_mean",
+                                "query_hit_p95",    "contacts_median",
+                                "contacts_mean",    "contacts_p95",
+                                "distance_median",  "memory",
+                                "memory_all",       "heap",
+                                "moving_first",     "moving_worst",
+                                "moving_p999",      "moving_total",
+                                "moving_raw_worst", "deforming_rebuild",
+                                "deforming_refit",  "deforming_refit_replace"}) {
+    ASSERT_EQ(rows.count(row), 1u) << row;
+    EXPECT_GT(rows[row].at("ratio"), 0) << row;
+  }
+  for (const std::string row : {"first_over_streaming", "streaming_pass", "growth_first_2000", "growth_query_2000"}) {
+    ASSERT_EQ(rows.count(row), 1u) << row;
+    EXPECT_GT(rows[row].at("bocst"), 0) << row;
+  }
+  EXPECT_EQ(rows["growth_first_2000"].at("ratio"), 1);
+  // Its own copies of the vertices and of the indices are among what a model holds, where the allocator tells.
+  ASSERT_EQ(rows.count("heap"), 1u);
+  if (report.at("skipped").empty() || report.at("skipped").at(0).at("row") != "heap") {
+    EXPECT_GT(rows["heap"].at("bocst"), rows["memory_all"].at("bocst").get<double>() + 12);
+    EXPECT_GT(rows["heap"].at("fcl"), rows["memory_all"].at("fcl").get<double>() + 24);
+  }
+  EXPECT_GT(rows["moving_touching"].at("fcl"), 0);
+  EXPECT_EQ(rows["moving_touching"].at("bocst"), rows["moving_touching"].at("fcl"));
+  EXPECT_GT(report.at("moving").at("worst_frame"), 0);
+  EXPECT_LT(report.at("moving").at("worst_frame"), 60);
+  EXPECT_EQ(report.at("contacts").at("poses"), 12);
+  EXPECT_GT(report.at("contacts").at("pairs"), 0);
+  EXPECT_EQ(report.at("verdicts").at("equal"), true);
+  EXPECT_EQ(report.at("verdicts").at("bocst"), report.at("verdicts").at("fcl"));
+  cpu_set_t processors;
+  ASSERT_EQ(sched_getaffinity(0, sizeof(processors), &processors), 0);
+  if (CPU_COUNT(&processors) == 1) {
+    EXPECT_EQ(report.at("skipped").back().at("scenario"), "threads");
+    return;
+  }
+  for (const char* row : {"threads_one", "threads_two", "threads_gain", "threads_cold_two"}) {
+    ASSERT_EQ(rows.count(row), 1u) << row;
+    EXPECT_GT(rows[row].at("ratio"), 0) << row;
+  }
+}
+
+TEST_F(Program, MeasuresTheScenariosThatAreNamed) {
+  const std::string bench = "bench " + model("link") + " --poses 6 --rounds 1";
+  const Json report = json(bench + " --scenarios memory,warm --subdivide 1");
+  EXPECT_EQ(report.at("scenarios"), Json({"warm", "memory"}));
+  EXPECT_EQ(report.at("triangles"), Json({20480, 20480}));
+  for (const Json& row : report.at("rows")) {
+    EXPECT_TRUE(row.at("scenario") == "warm" || row.at("scenario") == "memory") << row;
+  }
+  EXPECT_TRUE(report.at("ratio").at("first_answer").is_null());
+  EXPECT_GT(report.at("ratio").at("memory"), 0);
+
+  const Result csv = run(bench + " --scenarios memory --csv -");
+  EXPECT_EQ(csv.code, 0) << csv.err;
+  EXPECT_EQ(csv.out.rfind("scenario,row,unit,bocst,fcl,ratio\nmemory,memory,bytes/triangle,", 0), 0u) << csv.out;
+  const Result table = run("bench --scenarios threads,memory " + model("link") + " --poses 6 --rounds 1");
+  EXPECT_EQ(table.code, 0) << table.err;
+  EXPECT_NE(table.out.find("threads"), std::string::npos) << table.out;
+  const Result alone = shell("taskset -c $(taskset -cp $$ | sed 's/.*: //; s/[-,].*//') " + program() + " " + bench +
+                             " --scenarios threads --json -");
+  EXPECT_EQ(alone.code, 0) << alone.err;
+  EXPECT_EQ(Json::parse(alone.out).at("skipped").at(0).at("scenario"), "threads");
+
+  expectComplaint(bench + " --scenarios first,nosuch", kUsage, "--scenarios");
+  expectComplaint(bench + " --json - --csv -", kUsage, "--csv");
+  expectComplaint(bench + " --oracles --csv -", kUsage, "--csv");
+  expectComplaint(bench + " --csv " + (folder_ / "none" / "f.csv").string(), kFailed, "none/f.csv");
 }
 
 TEST_F(Program, ListsOracles) {

@@ -7,37 +7,17 @@
 #include <algorithm>
 #include <cmath>
 #include <iostream>
-#include <map>
 #include <memory>
 #include <set>
 #include <utility>
 
 #include "oracle/oracle.h"
+#include "subdivide.h"
 
 namespace bocst::program {
 namespace {
 
 using oracle::Expansion;
-
-/// Each triangle into four, by the middles of its edges.
-std::shared_ptr<const Mesh> subdivided(const Mesh& mesh) {
-  std::vector<Eigen::Vector3d> vertices = mesh.vertices();
-  std::vector<Mesh::Indices> triangles;
-  triangles.reserve(4 * mesh.triangleCount());
-  std::map<std::pair<std::uint32_t, std::uint32_t>, std::uint32_t> middles;
-  const auto middle = [&](std::uint32_t a, std::uint32_t b) {
-    const auto [it, is_new] = middles.try_emplace(std::minmax(a, b), static_cast<std::uint32_t>(vertices.size()));
-    if (is_new) vertices.push_back((vertices[a] + vertices[b]) / 2);
-    return it->second;
-  };
-  for (const Mesh::Indices& t : mesh.triangles()) {
-    const std::uint32_t ab = middle(t[0], t[1]), bc = middle(t[1], t[2]), ca = middle(t[2], t[0]);
-    for (const Mesh::Indices& part : {Mesh::Indices{t[0], ab, ca}, {ab, t[1], bc}, {ca, bc, t[2]}, {ab, bc, ca}}) {
-      triangles.push_back(part);
-    }
-  }
-  return Mesh::fromIndices(std::move(vertices), std::move(triangles));
-}
 
 /// What one oracle needed for one mesh; times in microseconds.
 struct Figures {

@@ -41,6 +41,8 @@ class ModelPair : public PairOf<S, Model<S>, BocstPair, BocstQueries<S>> {
     return points;
   }
 
+  void updateA(std::vector<Eigen::Vector3d> vertices) override { this->a().updateVertices(std::move(vertices)); }
+
   std::vector<NodeView> nodesA() const override { return nodesOf(this->a()); }
   std::vector<NodeView> nodesB() const override { return nodesOf(this->b()); }
   Statistics statisticsA() const override { return this->a().statistics(); }

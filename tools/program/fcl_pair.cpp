@@ -78,6 +78,22 @@ class BvhPair : public PairOf<typename BV::S, fcl::BVHModel<BV>, FclPair, FclQue
                                                          first.vertices[p[2]], second.vertices[q[0]],
                                                          second.vertices[q[1]], second.vertices[q[2]], R, T);
   }
+
+  void rebuildA(const MeshArrays& mesh) override { this->replaceA(build<BV>(mesh)); }
+
+  void refitA(const std::vector<Eigen::Vector3d>& vertices, FclPair::Refit refit) override {
+    fcl::BVHModel<BV>& model = this->a();
+    const auto& positions = verticesFor(vertices, S{});
+    if (refit == FclPair::Refit::kNewPositions) {
+      check(model.beginReplaceModel());
+      check(model.replaceSubModel(positions));
+      check(model.endReplaceModel(true, true));
+    } else {
+      check(model.beginUpdateModel());
+      check(model.updateSubModel(positions));
+      check(model.endUpdateModel(true, true));
+    }
+  }
 };
 
 template <typename BV>

@@ -48,6 +48,13 @@ class PairOf : public Base {
     return found;
   }
 
+  std::size_t countContacts(const Eigen::Isometry3d& X_AB) const override {
+    const fcl::CollisionRequest<S> request(QueryPair::kAll, true);
+    fcl::CollisionResult<S> result;
+    collide(X_AB, QueryPair::Order::kAB, request, result);
+    return result.numContacts();
+  }
+
   double distance(const Eigen::Isometry3d& X_AB) const override {
     const fcl::DistanceRequest<S> request;
     fcl::DistanceResult<S> result;
@@ -62,6 +69,8 @@ class PairOf : public Base {
  protected:
   const Geometry& a() const { return *a_; }
   const Geometry& b() const { return *b_; }
+  Geometry& a() { return *a_; }
+  void replaceA(std::unique_ptr<Geometry> a) { a_ = std::move(a); }
 
   void collide(const Eigen::Isometry3d& X_AB, QueryPair::Order order, const fcl::CollisionRequest<S>& request,
                fcl::CollisionResult<S>& result) const {

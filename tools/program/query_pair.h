@@ -48,6 +48,9 @@ class QueryPair {
   virtual std::vector<Contact> contacts(const Eigen::Isometry3d& X_AB, std::size_t limit = kAll,
                                         Order order = Order::kAB) const = 0;
 
+  /// All contacts with their geometry, as the query itself counts them.
+  virtual std::size_t countContacts(const Eigen::Isometry3d& X_AB) const = 0;
+
   /// fcl::distance in its default form.
   virtual double distance(const Eigen::Isometry3d& X_AB) const = 0;
 };
@@ -59,6 +62,18 @@ class FclPair : public QueryPair {
  public:
   /// FCL's triangle test alone, as its query would make it had its trees not culled the pair before.
   virtual bool trianglesTouch(Contact triangles, const Eigen::Isometry3d& X_AB, Order order) const = 0;
+
+  /// What a refitted box of FCL's is about.
+  enum class Refit {
+    kNewPositions,   ///< Its triangles where they are now: endReplaceModel.
+    kBothPositions,  ///< Where they are and where they were before: endUpdateModel.
+  };
+
+  /// A's vertices move, and its tree is built anew.
+  virtual void rebuildA(const MeshArrays& mesh) = 0;
+
+  /// A's vertices move, and its tree keeps its shape. One pair takes one kind of refit only.
+  virtual void refitA(const std::vector<Eigen::Vector3d>& vertices, Refit refit) = 0;
 };
 
 std::unique_ptr<FclPair> buildFclPair(FclTree tree, Scalar scalar, const MeshArrays& a, const MeshArrays& b);
@@ -78,6 +93,9 @@ class BocstPair : public QueryPair {
  public:
   /// As contacts(), in the order found, by their geometry.
   virtual std::vector<TouchingPoint> touchingPoints(const Eigen::Isometry3d& X_AB, std::size_t limit = kAll) const = 0;
+
+  /// A's vertices move.
+  virtual void updateA(std::vector<Eigen::Vector3d> vertices) = 0;
 
   /// What is resident, parents before children.
   virtual std::vector<NodeView> nodesA() const = 0;

@@ -20,8 +20,11 @@ void Output::check(const std::vector<std::string>& inputs, std::vector<std::stri
 }
 
 void Output::write(const Json& json) const {
-  const std::string text = json.dump(2, ' ', false, Json::error_handler_t::replace) + "\n";
-  if (json_file != "-") return writeFile(json_file, text);
+  writeText(json_file, json.dump(2, ' ', false, Json::error_handler_t::replace) + "\n");
+}
+
+void writeText(const std::string& file, const std::string& text) {
+  if (file != "-") return writeFile(file, text);
   std::cout << text << std::flush;
 }
 

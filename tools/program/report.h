@@ -22,9 +22,12 @@ class Output {
   /// As checkOutputs(), with `others` written beside this.
   void check(const std::vector<std::string>& inputs = {}, std::vector<std::string> others = {}) const;
 
-  /// As writeFile(). @throws std::runtime_error when that fails; main() looks after stdout.
+  /// As writeText().
   void write(const Json& json) const;
 };
+
+/// As writeFile(), or to stdout for "-". @throws std::runtime_error when that fails; main() looks after stdout.
+void writeText(const std::string& file, const std::string& text);
 
 /// A table for people: the first column to the left, the others to the right, where figures belong.
 class Table {

@@ -6,83 +6,89 @@
 namespace bocst::oracle {
 
 void OctantAccumulator::clear() {
-  lo_.setConstant(std::numeric_limits<double>::infinity());
+  lo_.setConstant(std::numeric_limits<float>::infinity());
   hi_ = -lo_;
   area_.setZero();
   slab_ = true;
-  corners_.clear();
+  count_ = 0;
 }
 
-void OctantAccumulator::add(const Eigen::Vector3d* corners, int count, bool keep) {
-  const Eigen::Vector3d& first = corners[0];
-  lo_ = lo_.cwiseMin(first);
-  hi_ = hi_.cwiseMax(first);
-  Eigen::Vector3d area = Eigen::Vector3d::Zero();
-  for (int i = 1; i < count; ++i) {
-    lo_ = lo_.cwiseMin(corners[i]);
-    hi_ = hi_.cwiseMax(corners[i]);
-    if (i >= 2) area += (corners[i - 1] - first).cross(corners[i] - first);
-  }
+void OctantAccumulator::add(const LocalPoint* corners, int count, const LocalPoint& lo, const LocalPoint& hi,
+                            bool keep) {
+  lo_ = lo_.cwiseMin(lo);
+  hi_ = hi_.cwiseMax(hi);
   if (!keep) {
     slab_ = false;
     return;
   }
+  if (count_ + 12 > corners_[0].size()) {
+    for (auto& c : corners_) c.resize(2 * count_ + 240);
+  }
+  for (int i = 0; i < count; ++i) {
+    for (std::size_t k = 0; k < 3; ++k) corners_[k][count_] = corners[i][static_cast<int>(k)];
+    ++count_;
+  }
+  LocalPoint area = LocalPoint::Zero();
+  for (int i = 2; i < count; ++i) area += (corners[i - 1] - corners[0]).cross3(corners[i] - corners[0]);
   // Neighbouring triangles need not agree on which side is out.
   if (area.dot(area_) < 0) {
     area_ -= area;
   } else {
     area_ += area;
   }
-  for (int i = 0; i < count; ++i) corners_.push_back(corners[i].cast<float>());
 }
 
-void OctantAccumulator::addBox(const Eigen::Vector3d& lo, const Eigen::Vector3d& hi) {
+void OctantAccumulator::addBox(const LocalPoint& lo, const LocalPoint& hi) {
   lo_ = lo_.cwiseMin(lo);
   hi_ = hi_.cwiseMax(hi);
   slab_ = false;
 }
 
-void OctantAccumulator::merge(const OctantAccumulator& other) {
-  lo_ = lo_.cwiseMin(other.lo_);
-  hi_ = hi_.cwiseMax(other.hi_);
-  slab_ = slab_ && other.slab_;
-  if (other.area_.dot(area_) < 0) {
-    area_ -= other.area_;
-  } else {
-    area_ += other.area_;
-  }
-  corners_.insert(corners_.end(), other.corners_.begin(), other.corners_.end());
+void OctantAccumulator::extremesAlong(const LocalPoint& normal, float& lo, float& hi) const {
+  if (count_ == 0) return;
+  const auto coordinate = [this](std::size_t k) {
+    return Eigen::Map<const Eigen::ArrayXf>(corners_[k].data(), static_cast<Eigen::Index>(count_));
+  };
+  const auto along = coordinate(0) * normal[0] + coordinate(1) * normal[1] + coordinate(2) * normal[2];
+  lo = std::min(lo, along.minCoeff());
+  hi = std::max(hi, along.maxCoeff());
 }
 
-CellBounds OctantAccumulator::bounds(const Eigen::Vector3d& center, double side) const {
+CellBounds OctantAccumulator::bounds(const OctantAccumulator* const* parts, std::size_t count,
+                                     const Eigen::Vector3d& center, double side) {
+  LocalPoint lo = parts[0]->lo_, hi = parts[0]->hi_, area = parts[0]->area_;
+  bool slab = parts[0]->slab_;
+  for (std::size_t i = 1; i < count; ++i) {
+    lo = lo.cwiseMin(parts[i]->lo_);
+    hi = hi.cwiseMax(parts[i]->hi_);
+    slab = slab && parts[i]->slab_;
+    area += area.dot(parts[i]->area_) < 0 ? LocalPoint(-parts[i]->area_) : parts[i]->area_;
+  }
   CellBounds b;
   const double scale = 255 / side, margin = 2 * kClipMargin;
+  // What is clamped is not negative, so to truncate is to round down.
+  const auto byte = [](double x) { return static_cast<int>(std::min(std::max(x, 0.0), 255.0)); };
   for (int k = 0; k < 3; ++k) {
     const double corner = center[k] - side / 2;
-    b.lo[k] = static_cast<std::uint8_t>(std::clamp(std::floor((lo_[k] - margin - corner) * scale), 0.0, 255.0));
-    b.hi[k] = static_cast<std::uint8_t>(std::clamp(std::ceil((hi_[k] + margin - corner) * scale), 0.0, 255.0));
+    b.lo[static_cast<std::size_t>(k)] = static_cast<std::uint8_t>(byte((lo[k] - margin - corner) * scale));
+    b.hi[static_cast<std::size_t>(k)] = static_cast<std::uint8_t>(255 - byte(255 - (hi[k] + margin - corner) * scale));
   }
-  const double length = area_.norm();
-  if (!slab_ || !(length > 0) || corners_.empty()) return b;
-  Eigen::Vector3d n;
-  for (int k = 0; k < 3; ++k) n[k] = std::round(area_[k] / length * 127);
-  const Eigen::Vector3f nf = n.cast<float>(), cf = center.cast<float>();
-  float lo = std::numeric_limits<float>::infinity(), hi = -lo;
-  for (const Eigen::Vector3f& p : corners_) {
-    const float t = nf.dot(p - cf);
-    lo = std::min(lo, t);
-    hi = std::max(hi, t);
-  }
-  // Corners and sums in float: at most 8 roundings of values below 3 * 127 * size.
-  const double size = std::max({(lo_ - center).lpNorm<Eigen::Infinity>(), (hi_ - center).lpNorm<Eigen::Infinity>(),
-                                center.lpNorm<Eigen::Infinity>()}) *
-                      2;
-  const double round = 8 * 0x1p-24 * 3 * 127 * size + 127 * 2 * margin;
-  const double below = (lo - round) / side, above = (hi + round) / side;
+  const float length = area.norm();
+  if (!slab || !(length > 0)) return b;
+  LocalPoint n = LocalPoint::Zero();
+  for (int k = 0; k < 3; ++k) n[k] = std::round(area[k] / length * 127);
+  float least = std::numeric_limits<float>::infinity(), most = -least;
+  for (std::size_t i = 0; i < count; ++i) parts[i]->extremesAlong(n, least, most);
+  // Corners are within half the margin on each axis; their sums in float: at most 8 roundings of values below
+  // 3 * 127 * size.
+  const double size = std::max(lo.head<3>().cwiseAbs().maxCoeff(), hi.head<3>().cwiseAbs().maxCoeff());
+  const double round = 8 * 0x1p-24 * 3 * 127 * size + n.head<3>().lpNorm<1>() * kClipMargin;
+  const double middle_of_cell = n.head<3>().cast<double>().dot(center);
+  const double below = (least - middle_of_cell - round) / side, above = (most - middle_of_cell + round) / side;
   const double middle = std::round((below + above) / 2);
   const double half = std::ceil(2 * std::max(above - middle, middle - below));
-  if (half > 255 || std::abs(middle) > 127) return b;
-  for (int k = 0; k < 3; ++k) b.normal[k] = static_cast<std::int8_t>(n[k]);
+  if (!(half <= 255) || !(std::abs(middle) <= 127)) return b;
+  for (int k = 0; k < 3; ++k) b.normal[static_cast<std::size_t>(k)] = static_cast<std::int8_t>(n[k]);
   b.slab_center = static_cast<std::int8_t>(middle);
   b.slab_half = static_cast<std::uint8_t>(half);
   return b;

@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #pragma once
 
-#include <Eigen/Core>
+#include <Eigen/Geometry>
 #include <algorithm>
 #include <array>
 #include <cmath>
@@ -12,14 +12,29 @@
 
 namespace bocst::oracle {
 
-/// Clipping happens in the cell's own coordinates (centre 0, half side 1) in double; its rounding, at most about
-/// 4 * 2^-53 * 2^17 = 6e-11 there, is covered by this margin on every plane and on every bound.
-constexpr double kClipMargin = 1e-9;
+/// A point in the cell's own coordinates (centre 0, half side 1); the last of four lanes is 0.
+using LocalPoint = Eigen::Vector4f;
 
-/// A triangle cut by at most 6 + 3 planes.
+/// Clipping moves each plane outwards by this, and each bound by twice as much. With u the unit roundoff and M the
+/// triangle's largest coordinate, a corner is off by u M, and a point cut from an edge by 13 u M more than its ends: 4
+/// u for the place along the edge, at most 2 M long, 2 u for the way there, and 1 u for the sum. A triangle is cut at
+/// most nine times, so its parts are off by less than 128 u M: in float for M up to kFloatReach, in double for all M <=
+/// 2^17.
+constexpr float kClipMargin = 0x1p-14f;
+constexpr float kFloatReach = 8;
+
+/// A triangle cut by at most 6 + 3 planes, and the box of its corners.
+template <typename Point>
 struct Polygon {
-  std::array<Eigen::Vector3d, 12> corners;
+  std::array<Point, 12> corners;
   int count = 0;
+  Point lo, hi;
+
+  void add(const Point& p) {
+    lo = count == 0 ? p : Point(lo.cwiseMin(p));
+    hi = count == 0 ? p : Point(hi.cwiseMax(p));
+    corners[static_cast<std::size_t>(count++)] = p;
+  }
 };
 
 /// What is known of the surface in one octant while its triangles go by.
@@ -27,58 +42,73 @@ class OctantAccumulator {
  public:
   void clear();
 
-  /// A polygon of the surface inside the octant. keep: remember the corners for the slab.
-  void add(const Eigen::Vector3d* corners, int count, bool keep);
+  /// A part of the surface, of no more than 12 corners. keep: remember these for the slab.
+  void add(const LocalPoint* corners, int count, const LocalPoint& lo, const LocalPoint& hi, bool keep);
+  template <typename Point>
+  void add(const Polygon<Point>& part, bool keep);
 
   /// A part of the surface whose clipped form is not known beyond this box.
-  void addBox(const Eigen::Vector3d& lo, const Eigen::Vector3d& hi);
+  void addBox(const LocalPoint& lo, const LocalPoint& hi);
 
-  /// All of what `other` has seen, as if it had been added here.
-  void merge(const OctantAccumulator& other);
-
-  /// The bounds in a cell of the given centre and side, in the same coordinates as the parts.
-  CellBounds bounds(const Eigen::Vector3d& center, double side) const;
+  /// The bounds of all that the accumulators have seen, in a cell of the given centre and side.
+  static CellBounds bounds(const OctantAccumulator* const* parts, std::size_t count, const Eigen::Vector3d& center,
+                           double side);
 
  private:
-  Eigen::Vector3d lo_, hi_;
-  Eigen::Vector3d area_;  // doubled area vector, all parts turned to one side
+  void extremesAlong(const LocalPoint& normal, float& lo, float& hi) const;
+
+  LocalPoint lo_, hi_;
+  LocalPoint area_;  // doubled area vector, all parts turned to one side
   bool slab_ = true;
-  std::vector<Eigen::Vector3f> corners_;
+  std::array<std::vector<float>, 3> corners_;
+  std::size_t count_ = 0;
 };
 
-/// Divides the triangle, given in the cell's own coordinates, among the octants of `mask` that it may meet.
+/// Divides the triangle among the octants of `mask` that it may meet.
 /// emit(octant, polygon) is called for each octant that keeps a part.
-template <typename Emit>
-void clipToOctants(const Eigen::Vector3d corners[3], std::uint8_t mask, Emit&& emit);
+template <typename Point, typename Emit>
+void clipToOctants(const Point corners[3], std::uint8_t mask, Emit&& emit);
 
 // Implementation.
 
-inline void cut(const Polygon& in, int axis, double bound, bool below, Polygon& out) {
-  out.count = 0;
-  const double sign = below ? 1 : -1;
-  for (int i = 0; i < in.count; ++i) {
-    const Eigen::Vector3d& a = in.corners[i];
-    const Eigen::Vector3d& b = in.corners[i + 1 == in.count ? 0 : i + 1];
-    const double da = sign * (a[axis] - bound), db = sign * (b[axis] - bound);
-    if (da <= 0) out.corners[out.count++] = a;
-    if ((da < 0 && db > 0) || (da > 0 && db < 0)) {
-      Eigen::Vector3d p = a + (da / (da - db)) * (b - a);
-      p[axis] = bound;
-      out.corners[out.count++] = p;
+template <typename Point>
+void OctantAccumulator::add(const Polygon<Point>& part, bool keep) {
+  if constexpr (std::is_same<Point, LocalPoint>::value) {
+    add(part.corners.data(), part.count, part.lo, part.hi, keep);
+  } else {
+    Polygon<LocalPoint> rounded;
+    for (int i = 0; i < part.count; ++i) {
+      LocalPoint p = LocalPoint::Zero();
+      p.head<3>() = part.corners[static_cast<std::size_t>(i)].template cast<float>();
+      rounded.add(p);
     }
+    add(rounded, keep);
   }
 }
 
-inline void extremes(const Polygon& p, int axis, double& lo, double& hi) {
-  lo = hi = p.corners[0][axis];
-  for (int i = 1; i < p.count; ++i) {
-    lo = std::min(lo, p.corners[i][axis]);
-    hi = std::max(hi, p.corners[i][axis]);
+template <typename Point>
+void cut(const Polygon<Point>& in, int axis, typename Point::Scalar bound, bool below, Polygon<Point>& out) {
+  using S = typename Point::Scalar;
+  out.count = 0;
+  const S sign = below ? 1 : -1;
+  const Point* a = &in.corners[static_cast<std::size_t>(in.count - 1)];
+  S da = sign * ((*a)[axis] - bound);
+  for (int i = 0; i < in.count; ++i) {
+    const Point& b = in.corners[static_cast<std::size_t>(i)];
+    const S db = sign * (b[axis] - bound);
+    if ((da < 0 && db > 0) || (da > 0 && db < 0)) {
+      Point p = *a + (da / (da - db)) * (b - *a);
+      p[axis] = bound;
+      out.add(p);
+    }
+    if (db <= 0) out.add(b);
+    a = &b;
+    da = db;
   }
 }
 
-template <typename Emit>
-void divide(const Polygon& p, int axis, int octant, std::uint8_t mask, Emit& emit) {
+template <typename Point, typename Emit>
+void divide(const Polygon<Point>& p, int axis, int octant, std::uint8_t mask, Emit& emit) {
   if (axis == 3) {
     emit(octant, p);
     return;
@@ -86,14 +116,13 @@ void divide(const Polygon& p, int axis, int octant, std::uint8_t mask, Emit& emi
   // The octants of `mask` on either side, among those that agree with `octant` on the axes already divided.
   static constexpr std::uint8_t kUpper[3] = {0xaa, 0xcc, 0xf0};
   const std::uint8_t upper = mask & kUpper[axis], lower = mask & static_cast<std::uint8_t>(~kUpper[axis]);
-  double lo, hi;
-  extremes(p, axis, lo, hi);
-  Polygon part;
+  const auto lo = p.lo[axis], hi = p.hi[axis];
+  Polygon<Point> part;
   if (lower != 0 && lo <= kClipMargin) {
     if (hi <= kClipMargin) {
       divide(p, axis + 1, octant, lower, emit);
     } else {
-      cut(p, axis, kClipMargin, true, part);
+      cut<Point>(p, axis, kClipMargin, true, part);
       if (part.count > 0) divide(part, axis + 1, octant, lower, emit);
     }
   }
@@ -101,33 +130,31 @@ void divide(const Polygon& p, int axis, int octant, std::uint8_t mask, Emit& emi
     if (lo >= -kClipMargin) {
       divide(p, axis + 1, octant | 1 << axis, upper, emit);
     } else {
-      cut(p, axis, -kClipMargin, false, part);
+      cut<Point>(p, axis, -kClipMargin, false, part);
       if (part.count > 0) divide(part, axis + 1, octant | 1 << axis, upper, emit);
     }
   }
 }
 
-template <typename Emit>
-void clipToOctants(const Eigen::Vector3d corners[3], std::uint8_t mask, Emit&& emit) {
-  Polygon p, q;
-  p.count = 3;
-  std::copy(corners, corners + 3, p.corners.begin());
-  constexpr double outer = 1 + kClipMargin;
+template <typename Point, typename Emit>
+void clipToOctants(const Point corners[3], std::uint8_t mask, Emit&& emit) {
+  Polygon<Point> parts[2];
+  Polygon<Point>*p = &parts[0], *q = &parts[1];
+  for (int k = 0; k < 3; ++k) p->add(corners[k]);
+  constexpr typename Point::Scalar outer = 1 + kClipMargin;
   for (int axis = 0; axis < 3; ++axis) {
-    double lo, hi;
-    extremes(p, axis, lo, hi);
-    if (hi > outer) {
-      cut(p, axis, outer, true, q);
-      if (q.count == 0) return;
+    if (p->hi[axis] > outer) {
+      cut<Point>(*p, axis, outer, true, *q);
+      if (q->count == 0) return;
       std::swap(p, q);
     }
-    if (lo < -outer) {
-      cut(p, axis, -outer, false, q);
-      if (q.count == 0) return;
+    if (p->lo[axis] < -outer) {
+      cut<Point>(*p, axis, -outer, false, *q);
+      if (q->count == 0) return;
       std::swap(p, q);
     }
   }
-  divide(p, 0, 0, mask, emit);
+  divide(*p, 0, 0, mask, emit);
 }
 
 }  // namespace bocst::oracle

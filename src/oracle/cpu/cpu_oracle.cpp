@@ -15,8 +15,8 @@ constexpr std::size_t kSlabTriangles = 4096;
 
 struct Scratch {
   LocalTriangles local;
-  std::vector<Eigen::Vector3d> corners;  // of one block of triangles, in lattice units
-  std::vector<std::uint8_t> masks;       // of the whole list
+  std::array<LocalPoint, 3 * LocalTriangles::kCapacity> corners;  // of one block of triangles
+  std::vector<std::uint8_t> masks;                                // of the whole list
   std::array<OctantAccumulator, 8> octants;
 };
 
@@ -36,7 +36,6 @@ class Expander {
 
   void run() {
     s_.masks.resize(e_.count);
-    s_.corners.resize(3 * std::min(e_.count, LocalTriangles::kCapacity));
     for (std::size_t begin = 0; begin < e_.count; begin += LocalTriangles::kCapacity) {
       block(begin, std::min(e_.count - begin, LocalTriangles::kCapacity));
     }
@@ -56,58 +55,72 @@ class Expander {
     return {o & 1 ? distance : -distance, o & 2 ? distance : -distance, o & 4 ? distance : -distance};
   }
 
+  static LocalPoint localOctantCenter(int o) {
+    return {o & 1 ? 0.5f : -0.5f, o & 2 ? 0.5f : -0.5f, o & 4 ? 0.5f : -0.5f, 0};
+  }
+
   void block(std::size_t begin, std::size_t count) {
-    const double inverse = 1 / half_;
+    const Mesh& mesh = *e_.surface->mesh;
+    const Eigen::Vector3d& origin = e_.surface->lattice.origin();
+    const double inverse = 1 / half_, scale = e_.surface->lattice.inverseUnit() * inverse;
+    const double shift[3] = {center_[0] * inverse, center_[1] * inverse, center_[2] * inverse};
     for (std::size_t i = 0; i < count; ++i) {
-      const std::uint32_t t = id(begin + i);
-      for (int k = 0; k < 3; ++k) {
-        const Eigen::Vector3d p = e_.surface->corner(t, k);
-        s_.corners[3 * i + k] = p;
-        for (int c = 0; c < 3; ++c) s_.local.xyz[3 * k + c][i] = static_cast<float>((p[c] - center_[c]) * inverse);
+      const Mesh::Indices& indices = mesh.indices(id(begin + i));
+      for (std::size_t k = 0; k < 3; ++k) {
+        const Eigen::Vector3d& v = mesh.vertex(indices[k]);
+        LocalPoint& p = s_.corners[3 * i + k];
+        p[3] = 0;
+        for (int c = 0; c < 3; ++c) {
+          p[c] = s_.local.xyz[3 * k + static_cast<std::size_t>(c)][i] =
+              static_cast<float>((v[c] - origin[c]) * scale - shift[c]);
+        }
       }
     }
     octantMasks(s_.local, count, 0, s_.masks.data() + begin);
     for (std::size_t i = 0; i < count; ++i) {
       std::uint8_t& mask = s_.masks[begin + i];
       mask &= exists_;
-      prove(&s_.corners[3 * i], mask & ~proven_);
-      if (mask != 0) bound(&s_.corners[3 * i], mask);
+      if ((mask & ~proven_) != 0) prove(id(begin + i), mask & ~proven_);
+      if (mask != 0) bound(id(begin + i), &s_.corners[3 * i], mask);
     }
   }
 
   // One certain triangle makes an octant grey; most octants are settled by the first.
-  void prove(const Eigen::Vector3d* corners, int candidates) {
+  void prove(std::uint32_t t, int candidates) {
+    const Eigen::Vector3d corners[3] = {e_.surface->corner(t, 0), e_.surface->corner(t, 1), e_.surface->corner(t, 2)};
     for (int o = 0; candidates != 0; ++o, candidates >>= 1) {
       if ((candidates & 1) && touches(corners, center_ + octantCenter(o, half_ / 2), half_ / 2)) proven_ |= 1 << o;
     }
   }
 
-  void bound(const Eigen::Vector3d* corners, std::uint8_t mask) {
-    const double inverse = 1 / half_;
-    Eigen::Vector3d local[3];
-    for (int k = 0; k < 3; ++k) local[k] = (corners[k] - center_) * inverse;
+  void bound(std::uint32_t t, const LocalPoint* corners, std::uint8_t mask) {
+    const LocalPoint lo = corners[0].cwiseMin(corners[1]).cwiseMin(corners[2]);
+    const LocalPoint hi = corners[0].cwiseMax(corners[1]).cwiseMax(corners[2]);
     if ((mask & (mask - 1)) == 0) {
       // Most triangles are small and lie in one octant.
       const int o = __builtin_ctz(mask);
-      const Eigen::Vector3d c = octantCenter(o, 0.5);
-      const double reach = 0.5 + kClipMargin;
-      if ((local[0] - c).lpNorm<Eigen::Infinity>() <= reach && (local[1] - c).lpNorm<Eigen::Infinity>() <= reach &&
-          (local[2] - c).lpNorm<Eigen::Infinity>() <= reach) {
-        s_.octants[o].add(local, 3, slab_);
+      const LocalPoint c = localOctantCenter(o);
+      if ((hi - c).cwiseMax(c - lo).maxCoeff() <= 0.5f + kClipMargin) {
+        s_.octants[o].add(corners, 3, lo, hi, slab_);
         return;
       }
     }
     std::uint8_t seen = 0;
-    clipToOctants(local, mask, [&](int o, const Polygon& part) {
-      s_.octants[o].add(part.corners.data(), part.count, slab_);
+    const auto take = [&](int o, const auto& part) {
+      s_.octants[o].add(part, slab_);
       seen |= 1 << o;
-    });
-    // The test's pad is wider than the clipper's: what only the test sees is bounded by the octant itself.
+    };
+    if (hi.cwiseMax(-lo).maxCoeff() <= kFloatReach) {
+      clipToOctants(corners, mask, take);
+    } else {
+      Eigen::Vector3d exact[3];
+      for (int k = 0; k < 3; ++k) exact[k] = (e_.surface->corner(t, k) - center_) / half_;
+      clipToOctants(exact, mask, take);
+    }
+    // The test's pad may be wider than the clipper's: what only the test sees is bounded by the octant itself.
     for (int missed = mask & ~seen, o = 0; missed != 0; ++o, missed >>= 1) {
       if ((missed & 1) == 0) continue;
-      const Eigen::Vector3d lo = local[0].cwiseMin(local[1]).cwiseMin(local[2]);
-      const Eigen::Vector3d hi = local[0].cwiseMax(local[1]).cwiseMax(local[2]);
-      const Eigen::Vector3d c = octantCenter(o, 0.5), h = Eigen::Vector3d::Constant(0.5);
+      const LocalPoint c = localOctantCenter(o), h = LocalPoint(0.5f, 0.5f, 0.5f, 0);
       s_.octants[o].addBox(lo.cwiseMax(c - h).cwiseMin(c + h), hi.cwiseMin(c + h).cwiseMax(c - h));
     }
   }
@@ -136,17 +149,15 @@ class Expander {
   }
 
   void makeBounds() {
-    OctantAccumulator* all = nullptr;
+    std::array<const OctantAccumulator*, 8> grey;
+    std::size_t count = 0;
     for (int o = 0; o < 8; ++o) {
       if ((proven_ >> o & 1) == 0) continue;
-      if (!e_.own_only) e_.octants.set(o, s_.octants[o].bounds(octantCenter(o, 0.5), 1));
-      if (all == nullptr) {
-        all = &s_.octants[o];
-      } else {
-        all->merge(s_.octants[o]);
-      }
+      grey[count] = &s_.octants[o];
+      if (!e_.own_only) e_.octants.set(o, OctantAccumulator::bounds(&grey[count], 1, octantCenter(o, 0.5), 1));
+      ++count;
     }
-    if (all != nullptr) e_.own = all->bounds(Eigen::Vector3d::Zero(), 2);
+    if (count != 0) e_.own = OctantAccumulator::bounds(grey.data(), count, Eigen::Vector3d::Zero(), 2);
   }
 
   Expansion& e_;

@@ -1,6 +1,8 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #include "oracle/cpu/kernels.h"
 
+#include <algorithm>
+
 #undef HWY_TARGET_INCLUDE
 #define HWY_TARGET_INCLUDE "oracle/cpu/kernels.cpp"
 #include <hwy/foreach_target.h>
@@ -17,6 +19,9 @@ namespace hn = hwy::HWY_NAMESPACE;
 using D = hn::CappedTag<float, 8>;  // lists are short: wider vectors lose more to padding than they gain
 using V = hn::Vec<D>;
 using M = hn::Mask<D>;
+
+// Triangles at once: two where vectors are short, else four.
+constexpr std::size_t kSpanLanes = 16;
 
 struct Alive {
   M octant[8];
@@ -140,22 +145,90 @@ void Quantise(const double* in, std::size_t count, const double* origin, double 
   // The axis of a lane repeats after three vectors.
   HWY_ALIGN double pattern[24];
   for (std::size_t i = 0; i < 3 * lanes; ++i) pattern[i] = origin[i % 3];
-  const auto factor = hn::Set(dd, scale), zero = hn::Zero(dd), top = hn::Set(dd, static_cast<double>(most));
+  const auto factor = hn::Set(dd, scale), least = hn::Set(dd, 1.0), top = hn::Set(dd, static_cast<double>(most));
   std::size_t i = 0;
   for (; i + 3 * lanes <= values; i += 3 * lanes) {
     BOCST_UNROLL
     for (std::size_t k = 0; k < 3; ++k) {
       const auto from = hn::Load(dd, pattern + k * lanes);
       const auto x = hn::Mul(hn::Sub(hn::LoadU(dd, in + i + k * lanes), from), factor);
-      const auto whole = hn::DemoteTo(d32, hn::Min(hn::Max(x, zero), top));
+      const auto whole = hn::DemoteTo(d32, hn::Min(hn::Max(x, least), top));
       hn::StoreU(hn::DemoteTo(d16, whole), d16, out + i + k * lanes);
     }
   }
   for (; i < values; ++i) {
     const double x = (in[i] - origin[i % 3]) * scale;
-    out[i] = static_cast<std::int16_t>(x > 0 ? (x < most ? x : most) : 0);
+    out[i] = static_cast<std::int16_t>(x > 1 ? (x < most ? x : most) : 1);
   }
 }
+
+#if HWY_TARGET == HWY_SCALAR
+
+void GridSpans(const std::int16_t* vertices, const std::uint32_t* indices, std::size_t count, int bits, GridSpan* out) {
+  const int shift = kGridSpanBits - bits;
+  for (std::size_t i = 0; i < count; ++i, indices += 3) {
+    out[i] = 0;
+    for (int axis = 0; axis < 3; ++axis) {
+      const auto at = [&](int k) { return vertices[3 * std::size_t{indices[k]} + static_cast<std::size_t>(axis)]; };
+      const int lo = (std::min({at(0), at(1), at(2)}) - 1) >> shift,
+                hi = (std::max({at(0), at(1), at(2)}) + 1) >> shift;
+      out[i] |= static_cast<GridSpan>(lo << axis * bits | std::min(hi - lo, 2) << (16 + 2 * axis));
+    }
+  }
+}
+
+#else
+
+// The vertices of one corner of as many triangles as fit, four lanes each: the last is the next vertex's.
+template <class D16>
+HWY_INLINE hn::Vec<D16> cornersOf(D16 d, const std::int16_t* vertices, const std::uint32_t* index) {
+  const hn::Half<D16> half;
+  if constexpr (hn::MaxLanes(d) == 8) {
+    return hn::Combine(d, hn::LoadU(half, vertices + 3 * std::size_t{index[3]}),
+                       hn::LoadU(half, vertices + 3 * std::size_t{index[0]}));
+  } else {
+    return hn::Combine(d, cornersOf(half, vertices, index + 3 * hn::MaxLanes(d) / 8), cornersOf(half, vertices, index));
+  }
+}
+
+void GridSpans(const std::int16_t* vertices, const std::uint32_t* indices, std::size_t count, int bits, GridSpan* out) {
+  const hn::CappedTag<std::int16_t, kSpanLanes> d;
+  const hn::Repartition<std::uint64_t, decltype(d)> d64;
+  const std::size_t at_once = hn::Lanes(d) / 4;
+  HWY_ALIGN std::int16_t pattern[2][kSpanLanes];
+  for (std::size_t i = 0; i < kSpanLanes; ++i) {
+    const std::size_t axis = i % 4;
+    pattern[0][i] = static_cast<std::int16_t>(axis < 3 ? 1 << axis * static_cast<std::size_t>(bits) : 0);
+    pattern[1][i] = static_cast<std::int16_t>(axis < 3 ? 1 << 2 * axis : 0);
+  }
+  const auto strides = hn::Load(d, pattern[0]), digits = hn::Load(d, pattern[1]);
+  const auto one = hn::Set(d, std::int16_t{1}), two = hn::Set(d, std::int16_t{2});
+  const auto low = hn::Set(d64, std::uint64_t{0xffff});
+  const int shift = kGridSpanBits - bits;
+  const auto take = [&](const std::uint32_t* i, GridSpan* to) HWY_ATTR {
+    const auto a = cornersOf(d, vertices, i), b = cornersOf(d, vertices, i + 1), c = cornersOf(d, vertices, i + 2);
+    const auto lo = hn::ShiftRightSame(hn::Sub(hn::Min(hn::Min(a, b), c), one), shift);
+    const auto hi = hn::ShiftRightSame(hn::Add(hn::Max(hn::Max(a, b), c), one), shift);
+    const auto cell = hn::BitCast(d64, hn::Mul(lo, strides));
+    const auto reach = hn::BitCast(d64, hn::Mul(hn::Min(hn::Sub(hi, lo), two), digits));
+    // Sums of each triangle's lanes, in the lowest.
+    const auto cells = hn::Add(hn::Add(cell, hn::ShiftRight<16>(cell)), hn::ShiftRight<32>(cell));
+    const auto reaches = hn::Add(hn::Add(reach, hn::ShiftRight<16>(reach)), hn::ShiftRight<32>(reach));
+    hn::StoreU(hn::Or(hn::And(cells, low), hn::ShiftLeft<16>(reaches)), d64, to);
+  };
+  std::size_t i = 0;
+  for (; i + at_once <= count; i += at_once) {
+    __builtin_prefetch(indices + 3 * i + 512);  // what the hardware fetches ahead is too little for the largest meshes
+    take(indices + 3 * i, out + i);
+  }
+  if (i < count) {
+    std::uint32_t last[3 * kSpanLanes / 4] = {};
+    std::copy(indices + 3 * i, indices + 3 * count, last);
+    take(last, out + i);
+  }
+}
+
+#endif
 
 const char* InstructionSet() { return hwy::TargetName(HWY_TARGET); }
 
@@ -167,6 +240,7 @@ namespace bocst::oracle {
 
 HWY_EXPORT(OctantMasks);
 HWY_EXPORT(Quantise);
+HWY_EXPORT(GridSpans);
 HWY_EXPORT(InstructionSet);
 
 void octantMasks(const float* xyz, std::size_t stride, std::size_t count, float slack, std::uint8_t* masks) {
@@ -176,6 +250,10 @@ void octantMasks(const float* xyz, std::size_t stride, std::size_t count, float 
 void quantise(const double* in, std::size_t count, const double* origin, double scale, std::int16_t most,
               std::int16_t* out) {
   HWY_DYNAMIC_DISPATCH(Quantise)(in, count, origin, scale, most, out);
+}
+
+void gridSpans(const std::int16_t* vertices, const std::uint32_t* indices, std::size_t count, int bits, GridSpan* out) {
+  HWY_DYNAMIC_DISPATCH(GridSpans)(vertices, indices, count, bits, out);
 }
 
 const char* instructionSet() { return HWY_DYNAMIC_DISPATCH(InstructionSet)(); }

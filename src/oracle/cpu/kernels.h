@@ -30,9 +30,20 @@ inline void octantMasks(const LocalTriangles& triangles, std::size_t count, floa
   octantMasks(triangles.xyz[0], LocalTriangles::kCapacity, count, slack, masks);
 }
 
-/// out[3 * i + k] = (in[3 * i + k] - origin[k]) * scale, rounded down, no less than 0 and no more than `most`.
+/// out[3 * i + k] = (in[3 * i + k] - origin[k]) * scale, rounded down, no less than 1 and no more than `most`.
 void quantise(const double* in, std::size_t count, const double* origin, double scale, std::int16_t most,
               std::int16_t* out);
+
+/// Where a triangle's box, widened by one step on each side, lies in a grid of 2^bits cells along each axis over 2^15
+/// steps: in the low 16 bits the number of the cell of its minimum corner (x, then y, then z from low to high); then
+/// two bits an axis that say how many cells further its maximum corner is, 2 for any more. The upper half means
+/// nothing.
+using GridSpan = std::uint64_t;
+constexpr int kGridSpanBits = 15;
+
+/// The spans of `count` triangles between vertices that quantise() made, no more than 2^15 - 2; one value after the
+/// last vertex is read, too. out: room for a multiple of 8. bits: 1 to 5.
+void gridSpans(const std::int16_t* vertices, const std::uint32_t* indices, std::size_t count, int bits, GridSpan* out);
 
 /// The instruction set in use, for people.
 const char* instructionSet();

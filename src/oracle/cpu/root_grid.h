@@ -29,7 +29,8 @@ class RootGrid {
   /// Is this cell, of level 2 to level(), grey? Remembers the answer, so one thread at a time.
   bool grey(const Surface& surface, const lattice::Cell& cell);
 
-  /// A box of the surface inside a cell, in lattice units: that of its finest cells which are not known to be white.
+  /// A box of the surface inside a grey cell, in lattice units: that of its finest cells which are not known to be
+  /// white.
   Eigen::AlignedBox3d bounds(const lattice::Cell& cell) const;
 
   /// Appends the triangles that may meet a cell of the finest level (a superset), each once, in no order.
@@ -43,25 +44,31 @@ class RootGrid {
   std::size_t bytes() const;
 
  private:
-  enum State : std::uint8_t { kWhite, kUnknown, kGrey };
+  /// One bit for each cell of a level, along x in one word: the cell (x, y, z) of 2^b cells a side is bit x of word
+  /// (4^b - 4) / 3 + (z 2^b + y), b from 1.
+  using Bits = std::vector<std::uint32_t>;
 
   explicit RootGrid(int bits) : bits_(bits) {}
   bool build(const Surface& surface);
-  void markCells(const Surface& surface);
+  void markCells();
+  void dropMissingCells(const Surface& surface);
+  void markCoarseCells();
+  bool decide(const Surface& surface, const lattice::Cell& cell);
   template <typename F>
   bool anyCandidate(const Surface& surface, const lattice::Cell& cell, F&& f) const;
-  State& state(const lattice::Cell& cell) {
-    const int b = cell.level - 1;
-    return states_[static_cast<std::size_t>(b - 1)][index(b, cell.at[0], cell.at[1], cell.at[2])];
-  }
-  static std::size_t index(int bits, std::size_t x, std::size_t y, std::size_t z) {
-    return (z << bits | y) << bits | x;
+  std::size_t bucket(std::size_t x, std::size_t y, std::size_t z) const { return (z << bits_ | y) << bits_ | x; }
+  static std::size_t word(int b, std::size_t y, std::size_t z) {
+    return ((std::size_t{1} << 2 * b) - 4) / 3 + (z << b | y);
   }
 
   int bits_;  // 2^bits_ cells along an axis
-  std::vector<std::uint32_t> head_, next_, large_;
-  std::vector<std::uint8_t> reaches_;       // bit p: a triangle of the bucket extends to the next cell on the axes of p
-  std::vector<std::vector<State>> states_;  // [level - 2], one byte a cell
+  // Lists: a triangle, and the axes on which it reaches the next cell.
+  std::vector<std::uint32_t> head_;        // [bucket]
+  std::unique_ptr<std::uint32_t[]> next_;  // [triangle]
+  std::size_t triangle_count_ = 0;
+  std::vector<std::uint8_t> reaches_;  // [bucket], bit p: a triangle there reaches the next cell on the axes of p
+  std::vector<std::uint32_t> large_;
+  Bits may_be_grey_, is_grey_;  // the first without the second is to be decided
 };
 
 }  // namespace bocst::oracle

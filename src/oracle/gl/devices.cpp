@@ -18,10 +18,13 @@
 namespace bocst::oracle::gl {
 namespace {
 
-// A look at device files costs nothing; to load OpenGL only to learn that it is software would.
+// To load OpenGL only to learn that it is software would cost much; a look at device files, little. Once a process:
+// each model asks.
 bool mayHaveHardware() {
   const char* const files[] = {"/dev/dri", "/dev/nvidiactl", "/dev/dxg"};
-  return std::any_of(std::begin(files), std::end(files), [](const char* file) { return access(file, F_OK) == 0; });
+  static const bool may =
+      std::any_of(std::begin(files), std::end(files), [](const char* file) { return access(file, F_OK) == 0; });
+  return may;
 }
 
 /// Contexts and oracles of this process. They are never destroyed: at exit, threads that still use them and drivers
