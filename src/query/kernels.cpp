@@ -176,13 +176,28 @@ void MoveTriangles(const TrianglePack& pack, std::uint32_t which, const PackMoti
   moved.size = (std::sqrt(3 * square) * pack.size + offset) * 1.0001f;
 }
 
+// The corner of a triangle that is alone on its side of a plane, and its edges; `above` as the corners are over it.
+struct Fork {
+  Vec3 corner, edge[2];
+};
+
+HWY_INLINE Fork forkOf(const Vec3 (&t)[3], V above0, V above1, V above2) {
+  const V zero = hn::Zero(D());
+  const M below = hn::Lt(above0, zero);
+  const M other1 = hn::Xor(below, hn::Lt(above1, zero)), other2 = hn::Xor(below, hn::Lt(above2, zero));
+  const M alone1 = hn::AndNot(other2, other1), alone2 = hn::AndNot(other1, other2);
+  const Vec3 corner = choose(alone1, t[1], choose(alone2, t[2], t[0]));
+  // The others: that after it comes in place 0 or 1 of two, either will do.
+  return {corner, {sub(choose(alone1, t[0], t[1]), corner), sub(choose(alone2, t[0], t[2]), corner)}};
+}
+
 std::size_t TouchingPairs(const TrianglePack& rows, std::uint32_t which, const TrianglePack& lanes,
                           const PackRegion& region, float slack, PackPair* pairs) {
   const D d;
   const float size = std::max(rows.size, lanes.size) * 1.0001f, u = 0x1p-24f;
   const float moved = 25 * u * size + slack;
   const V reach = hn::Set(d, 64 * u * size + slack);
-  const V tiny = hn::Set(d, 1e-30f), zero = hn::Zero(d);  // products below have lost bits
+  const V tiny = hn::Set(d, 1e-30f);  // products below have lost bits
   std::size_t found = 0;
   // The rows' boxes within the region, once for all lanes.
   alignas(64) float lows[3][TrianglePack::kCapacity], highs[3][TrianglePack::kCapacity];
@@ -202,7 +217,7 @@ std::size_t TouchingPairs(const TrianglePack& rows, std::uint32_t which, const T
     const Vec3 qmin = min3(q), qmax = max3(q);
     const Vec3 f[3] = {sub(q[1], q[0]), sub(q[2], q[1]), sub(q[0], q[2])};
     const Vec3 m = cross(f[0], f[1]);
-    const V fsize = hn::Add(norm1(f[0]), norm1(f[1]));
+    const V flong = hn::Sqrt(max3(dot(f[0], f[0]), dot(f[1], f[1]), dot(f[2], f[2])));
     // The products of a normal are at most the product of the edges' sizes.
     const V mpad = hn::MulAdd(reach, hn::MulAdd(norm1(f[0]), norm1(f[1]), norm1(m)), tiny);
 
@@ -222,45 +237,42 @@ std::size_t TouchingPairs(const TrianglePack& rows, std::uint32_t which, const T
       }
       const Vec3 e[3] = {sub(p[1], p[0]), sub(p[2], p[1]), sub(p[0], p[2])};
       const Vec3 n = cross(e[0], e[1]);
+      const V elong = hn::Sqrt(max3(dot(e[0], e[0]), dot(e[1], e[1]), dot(e[2], e[2])));
       const V npad = hn::MulAdd(reach, hn::MulAdd(norm1(e[0]), norm1(e[1]), norm1(n)), tiny);
-      const V n0 = dot(n, sub(q[0], p[0])), n1 = dot(n, sub(q[1], p[0])), n2 = dot(n, sub(q[2], p[0]));
+      const Vec3 w[3] = {sub(q[0], p[0]), sub(q[1], p[0]), sub(q[2], p[0])};
+      const V n0 = dot(n, w[0]), n1 = dot(n, w[1]), n2 = dot(n, w[2]);
       const V m0 = dot(m, sub(p[0], q[0])), m1 = dot(m, sub(p[1], q[0])), m2 = dot(m, sub(p[2], q[0]));
       // How far the one reaches to the nearer side of the other's plane.
       const V by_n = hn::Min(max3(n0, n1, n2), hn::Neg(min3(n0, n1, n2)));
       const V by_m = hn::Min(max3(m0, m1, m2), hn::Neg(min3(m0, m1, m2)));
-      const V by_planes = hn::Min(by_n, by_m);
       near = hn::And(near, hn::And(hn::Ge(by_n, hn::Neg(npad)), hn::Ge(by_m, hn::Neg(mpad))));
       if (hn::AllFalse(d, near)) continue;
 
-      const V esize = hn::Add(norm1(e[0]), norm1(e[1]));
-      const V epad = hn::MulAdd(hn::Mul(hn::Set(d, 2.0f), reach), hn::Mul(esize, fsize), tiny);
-      V by_edges = hn::Set(d, 3e38f);
-      BOCST_UNROLL
-      for (int a = 0; a < 3; ++a) {
-        BOCST_UNROLL
-        for (int b = 0; b < 3; ++b) {
-          // Both ends of each edge project to one point: two values a side, one of them 0.
-          const Vec3 axis = cross(e[a], f[b]);
-          const V s0 = dot(axis, sub(p[a], q[b])), s1 = dot(axis, sub(p[(a + 2) % 3], q[b]));
-          const V t = dot(axis, sub(q[(b + 2) % 3], q[b]));
-          by_edges = hn::Min(by_edges, hn::Min(hn::Sub(hn::Max(s0, s1), hn::Min(t, zero)),
-                                               hn::Sub(hn::Max(t, zero), hn::Min(s0, s1))));
-        }
-      }
-      const std::uint32_t bits = maskBits(hn::And(near, hn::Ge(by_edges, hn::Neg(epad))));
-      if (bits == 0) continue;
-      const Vec3 w[3] = {sub(q[0], p[0]), sub(q[1], p[0]), sub(q[2], p[0])};
-      const V elong = hn::Sqrt(max3(dot(e[0], e[0]), dot(e[1], e[1]), dot(e[2], e[2])));
-      const V flong = hn::Sqrt(max3(dot(f[0], f[0]), dot(f[1], f[1]), dot(f[2], f[2])));
+      // How far the determinants below may be off: those with a plane's normal, and those of an edge of each.
       const V way = hn::Add(elong, hn::Sqrt(max3(dot(w[0], w[0]), dot(w[1], w[1]), dot(w[2], w[2]))));
-      const V edge = hn::Max(elong, flong);
-      const V change = hn::Mul(edge, hn::MulAdd(hn::Set(d, 42 * u), edge, hn::Set(d, 1.125f * moved)));
-      const V by_planes_least = hn::MulAdd(change, hn::MulAdd(hn::Set(d, 4.0f), way, edge), tiny);
-      const V by_edges_least =
-          hn::MulAdd(change, hn::MulAdd(hn::Set(d, 2.0f), way, hn::Mul(hn::Set(d, 5.0f), edge)), tiny);
-      M sure = hn::And(hn::Gt(by_planes, by_planes_least), hn::Gt(by_edges, by_edges_least));
-      sure = hn::And(sure, hn::Gt(edge, hn::Set(d, 64 * moved)));
-      const std::uint32_t certain = maskBits(sure);
+      const V way4 = hn::Mul(hn::Set(d, 4.0f), way), moves = hn::Set(d, 1.125f * moved), rounds = hn::Set(d, 42 * u);
+      const V n_off = hn::MulAdd(hn::Mul(elong, hn::MulAdd(rounds, elong, moves)), hn::Add(way4, elong), tiny);
+      const V m_off = hn::MulAdd(hn::Mul(flong, hn::MulAdd(rounds, flong, moves)), hn::Add(way4, flong), tiny);
+      const V longer = hn::Max(elong, flong), shorter = hn::Min(elong, flong);
+      const V edges_off =
+          hn::MulAdd(hn::Mul(longer, hn::MulAdd(rounds, shorter, moves)), hn::Add(hn::Add(way, way), shorter), tiny);
+      M clear = hn::Gt(min3(hn::Abs(n0), hn::Abs(n1), hn::Abs(n2)), n_off);
+      clear = hn::And(clear, hn::Gt(min3(hn::Abs(m0), hn::Abs(m1), hn::Abs(m2)), m_off));
+      clear = hn::And(clear, hn::Gt(shorter, hn::Set(d, 64 * moved)));
+
+      // Each cuts the other's plane with the edges from its corner that is alone on its side, in an interval of the
+      // line of both planes. Where an end of the one lies to an end of the other, the determinant of these edges says;
+      // the intervals share no point when all ends of the one lie to one side of all of the other.
+      const Fork fp = forkOf(p, m0, m1, m2), fq = forkOf(q, n0, n1, n2);
+      const Vec3 between = sub(fq.corner, fp.corner), c0 = cross(between, fp.edge[0]), c1 = cross(between, fp.edge[1]);
+      const V d00 = dot(c0, fq.edge[0]), d01 = dot(c0, fq.edge[1]), d10 = dot(c1, fq.edge[0]),
+              d11 = dot(c1, fq.edge[1]);
+      const V low = hn::Min(hn::Min(d00, d01), hn::Min(d10, d11)), high = hn::Max(hn::Max(d00, d01), hn::Max(d10, d11));
+      const M beside = hn::Or(hn::Gt(low, edges_off), hn::Lt(high, hn::Neg(edges_off)));
+      const M across = hn::And(hn::Lt(low, hn::Neg(edges_off)), hn::Gt(high, edges_off));
+      const M cut = hn::Gt(hn::Min(by_n, by_m), hn::Zero(d));
+      const std::uint32_t bits = maskBits(hn::AndNot(hn::And(clear, hn::Or(hn::Not(cut), beside)), near));
+      const std::uint32_t certain = maskBits(hn::And(clear, hn::And(cut, across)));
       for (std::uint32_t k = bits; k != 0; k &= k - 1) {
         const auto lane = static_cast<std::size_t>(__builtin_ctz(k));
         if (i + lane >= lanes.count) break;

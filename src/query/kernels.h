@@ -78,21 +78,22 @@ struct PackPair {
 };
 
 /// Writes the pairs (a triangle of rows, of those in `which`, and a triangle of lanes) that are not surely apart, by
-/// their boxes, their planes and their edges' cross products; at most rows.count * lanes.count. Returns how many. What
-/// the rows have outside of the box of `region` is not looked at. `slack` is a distance that still counts as touching:
-/// what the caller's coordinates are off by.
+/// their boxes, their planes and where they cut the line of both planes; at most rows.count * lanes.count. Returns how
+/// many. What the rows have outside of the box of `region` is not looked at. `slack` is a distance that still counts as
+/// touching: what the caller's coordinates are off by.
 ///
-/// With M the larger size of the packs and u = 2^-24: corners are off by 6 u M. Along a given axis, that and the dot
-/// products' rounding is 34 u M times its length; a plane's equation and an edge axis lose 12 u M times the sizes of
-/// their products before they cancel. The pads are 64 u M times those sizes, and twice that for edge axes.
+/// With M the larger size of the packs and u = 2^-24, corners are off by 6 u M along each axis.
 ///
-/// A pair is certain when its triangles would meet however the corners of both were moved, by s = 25 u M + slack in
-/// sum (corners are off by less than 7 u M along each axis, so by 12 u M): each of the eleven axes' overlaps, a
-/// determinant of three edges or ways between corners, or the difference of two, is more than that and rounding can
-/// change it by. Let G be the longest edge, W no less than a way between corners, s < G / 64. Determinants with a
-/// plane's normal change by s (4 G W + G^2) to first order, overlaps along edge axes by s (2 G W + 5 G^2), and both by
-/// less than a tenth more; rounding is 42 u |x| |y| |z|. Triangles whose corners are on both sides of the other's plane
-/// are not in one plane, so those axes are all that could part them.
+/// Boxes and planes part alone: along a plane's normal, corners and the dot products' rounding are off by 34 u M times
+/// its length, and the equation by 12 u M times the sizes of its products before they cancel. The pad is 64 u M + slack
+/// times those sizes.
+///
+/// Else a pair is certain to meet, or to be apart, when it is however the corners of both were moved, by s = 25 u M +
+/// slack in sum. Let E and F be the longest edges, each more than 64 s, G the longer, W no less than a way between
+/// corners. Determinants of two edges of one triangle and a way change by s (4 E W + E^2) to first order, those of an
+/// edge of each and a way by s (2 G W + E F), and both by less than a tenth more; rounding is 42 u times the three
+/// lengths. Where the former are more, all corners are on known sides of the other's plane; so are the ends of the
+/// intervals in which the two cut the line of both planes to each other, by the latter.
 std::size_t touchingPairs(const TrianglePack& rows, std::uint32_t which, const TrianglePack& lanes,
                           const PackRegion& region, float slack, PackPair* pairs);
 
