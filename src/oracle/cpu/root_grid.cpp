@@ -43,17 +43,17 @@ class QuantisedMesh {
  public:
   QuantisedMesh(const Surface& surface, int bits) : triangles_(surface.mesh->triangles().data()), bits_(bits) {
     const Mesh& mesh = *surface.mesh;
-    vertices_.reset(new std::int16_t[3 * mesh.vertexCount() + 1]);
+    vertices_ = room(3 * mesh.vertexCount() + 1);
     // Room for a step of margin on both sides.
     quantise(mesh.vertices().data()->data(), mesh.vertexCount(), surface.lattice.origin().data(),
-             surface.lattice.inverseUnit() / kMargin, (1 << kGridSpanBits) - 2, vertices_.get());
+             surface.lattice.inverseUnit() / kMargin, (1 << kGridSpanBits) - 2, vertices_);
     vertices_[3 * mesh.vertexCount()] = 0;
   }
 
   /// Of `count` triangles from t on. One step of margin covers the rounding of toLattice and closed cells that only
   /// touch.
   void spans(std::size_t t, std::size_t count, GridSpan* out) const {
-    gridSpans(vertices_.get(), triangles_[t].data(), count, bits_, out);
+    gridSpans(vertices_, triangles_[t].data(), count, bits_, out);
   }
 
   /// The first and the last cell of a triangle's box along each axis.
@@ -68,9 +68,27 @@ class QuantisedMesh {
   }
 
  private:
+  // Fresh memory costs as much as what is written to it, so a thread keeps some, one MB at most, for its next mesh.
+  std::int16_t* room(std::size_t count) {
+    struct Kept {
+      std::unique_ptr<std::int16_t[]> values;
+      std::size_t count = 0;
+    };
+    thread_local Kept kept;
+    const bool keep = count <= kMostKept;
+    if (keep && kept.count >= count) return kept.values.get();
+    std::unique_ptr<std::int16_t[]>& values = keep ? kept.values : own_;
+    values.reset(new std::int16_t[count]);
+    if (keep) kept.count = count;
+    return values.get();
+  }
+
+  static constexpr std::size_t kMostKept = 1 << 19;
+
   const Mesh::Indices* triangles_;
   const int bits_;
-  std::unique_ptr<std::int16_t[]> vertices_;
+  std::unique_ptr<std::int16_t[]> own_;
+  std::int16_t* vertices_;
 };
 
 // Of the eight patterns of axes, those that have all the axes of q.
