@@ -19,7 +19,7 @@ class SetAside {
   };
 
   /// Pairs in the first batch of a walk that may end early; a few oracle answers cost less than one too many.
-  static constexpr std::size_t kFirstBatch = 4;
+  static constexpr std::size_t kFirstBatch = 2;
 
   /// Pairs that a hit grows for the next query.
   static constexpr std::size_t kInvestment = 2;
@@ -29,7 +29,7 @@ class SetAside {
     batch_ = kFirstBatch;
   }
   bool empty() const { return waiting_.empty(); }
-  void add(const Pair& pair) { waiting_.push_back({pair, 0}); }
+  void add(const Pair& pair) { waiting_.push_back({pair, kUnknown}); }
 
   /// Grows what the first few pairs need, in one batch, for later queries; does not wait for other threads.
   void growFirst(const A& a, const B& b) {
@@ -50,7 +50,9 @@ class SetAside {
     if (end == waiting_.end()) {
       if (ends_at_first && waiting_.size() > batch_) {
         end -= static_cast<std::ptrdiff_t>(batch_);
-        for (Waiting& w : waiting_) w.gap = gap(a.sphere(w.pair.a), placed(b.sphere(w.pair.b), b_in_a));
+        for (Waiting& w : waiting_) {
+          if (w.gap == kUnknown) w.gap = gap(a.sphere(w.pair.a), placed(b.sphere(w.pair.b), b_in_a));
+        }
         std::nth_element(waiting_.begin(), end, waiting_.end(),
                          [](const Waiting& x, const Waiting& y) { return x.gap > y.gap; });
       } else {
@@ -66,6 +68,8 @@ class SetAside {
   }
 
  private:
+  static constexpr double kUnknown = -1;
+
   struct Waiting {
     Pair pair;
     double gap;

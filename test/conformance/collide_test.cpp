@@ -79,6 +79,41 @@ TYPED_TEST(Collide, EqualsObbrssAroundContact) {
   EXPECT_LT(hits, count * 3 / 4);
 }
 
+TYPED_TEST(Collide, PackedLeavesChangeNoAnswer) {
+  using S = TypeParam;
+  // Around contact, where packed corners are off by more than the surfaces are apart.
+  const Raw ra = test::torus(60, 0.2), rb = test::torus(31, 0.3);
+  const auto fa = test::bvh<fcl::OBBRSS<S>>(ra), fb = test::bvh<fcl::OBBRSS<S>>(rb);
+  const Model<S> a(ra.mesh()), b(rb.mesh());
+  std::mt19937_64 g(12);
+  const auto I = fcl::Transform3<S>(fcl::Transform3<S>::Identity());
+  std::size_t packed = 0;
+  int hits = 0;
+  for (int i = 0; i < 12; ++i) {
+    const Eigen::Matrix3d R = test::randomRotation(g);
+    const Eigen::Vector3d d = test::randomDirection(g);
+    const auto at = [&](double x) { return test::pose<S>(R, d * x); };
+    const double contact =
+        test::contactDistance([&](double x) { return test::touching<S>(*fa, I, *fb, at(x)); }, 4, 52);
+    for (const double gap : {-0.3, -1e-3, -1e-5, -1e-7, 0.0, 1e-7, 1e-5, 1e-3}) {
+      const auto X = at(contact + gap);
+      const bool expected = test::touching<S>(*fa, I, *fb, X);
+      const Pairs want = test::pairs<S>(*fa, I, *fb, X);
+      hits += expected;
+      Statistics before = a.statistics();
+      for (int again = 0; again < 6; ++again) {
+        ASSERT_EQ(test::touching<S>(a, I, b, X), expected) << i << " gap " << gap << " asked " << again;
+        ASSERT_EQ(test::pairs<S>(a, I, b, X), want) << i << " gap " << gap << " asked " << again;
+        const Statistics now = a.statistics();
+        packed += now.expansions == before.expansions && now.resident_bytes > before.resident_bytes;
+        before = now;
+      }
+    }
+  }
+  EXPECT_GT(hits, 30);
+  EXPECT_GT(packed, 0u) << "no query packed the leaves that it met";
+}
+
 template <typename BV>
 void checkPartner(double scale) {
   using S = typename BV::S;

@@ -8,13 +8,16 @@
 #include <hwy/targets.h>
 
 #include <map>
+#include <numeric>
 #include <set>
 
 #include "meshes.h"
 #include "query/distance_kernels.h"
 #include "query/tree_steps.h"
 #include "query/triangle.h"
+#include "query/unpack.h"
 #include "query/volume.h"
+#include "tree/packed_triangles.h"
 
 namespace bocst::query {
 namespace {
@@ -436,6 +439,61 @@ TEST_P(EveryTarget, MovedTrianglesAreWhereTheyBelong) {
       ++at;
     }
     ASSERT_EQ(at, moved.count);
+  }
+}
+
+TEST_P(EveryTarget, PackedCornersAreWhereTheMeshHasThem) {
+  std::mt19937_64 g(36);
+  std::uniform_real_distribution<double> u(-1, 1);
+  for (int round = 0; round < 300; ++round) {
+    // A few triangles of a mesh that may be far larger than they are, and may be points.
+    test::Raw raw;
+    const double size = std::pow(10.0, 3 * u(g)), part = round % 10 == 0 ? 0 : std::pow(10.0, 2 * u(g) - 2);
+    const std::size_t count = 1 + g() % TrianglePack::kCapacity;
+    const Eigen::Vector3d at = size * 0.5 * Eigen::Vector3d(u(g), u(g), u(g));
+    const auto add = [&raw](const Eigen::Vector3d& p, const Eigen::Vector3d& q, const Eigen::Vector3d& r) {
+      const std::size_t first = raw.vertices.size();
+      for (const Eigen::Vector3d& v : {p, q, r}) raw.vertices.push_back(v);
+      raw.triangles.emplace_back(first, first + 1, first + 2);
+    };
+    add(size * Eigen::Vector3d(-1, -1, -1), size * Eigen::Vector3d(1, 1, 1), size * Eigen::Vector3d(1, -1, 0));
+    for (std::size_t i = 0; i < count; ++i) {
+      std::array<Eigen::Vector3d, 3> v;
+      for (auto& p : v) p = at + size * part * 0.5 * Eigen::Vector3d(u(g), u(g), u(g));
+      add(v[0], v[1], v[2]);
+    }
+    const auto mesh = raw.mesh();
+    const oracle::Surface surface{mesh, lattice::Lattice(mesh->bounds(), Subdivision::kBono, 0)};
+    std::vector<std::uint32_t> ids(count);
+    std::iota(ids.begin(), ids.end(), 1u);
+    std::shuffle(ids.begin(), ids.end(), g);
+    std::vector<std::uint32_t> words(tree::PackedTriangles::words(count));
+    tree::PackedTriangles::pack(surface, ids.data(), count, words.data());
+    const tree::PackedTriangles packed(words.data(), count);
+    Eigen::AlignedBox3d box;
+    for (const std::uint32_t t : ids) {
+      for (int k = 0; k < 3; ++k) box.extend(surface.corner(t, k));
+    }
+    EXPECT_LE(static_cast<double>(packed.step), std::max((box.sizes().maxCoeff() + 1) / 32767, 0x1p-20));
+    const Eigen::Vector3d center = box.center();
+    TrianglePack pack{};
+    unpackTriangles(packed, center.data(), pack);
+    ASSERT_EQ(pack.count, count);
+    const double error = static_cast<double>(packed.step) / 2 + 2 * 0x1p-24 * static_cast<double>(pack.size);
+    for (std::size_t i = 0; i < count; ++i) {
+      for (std::size_t k = 0; k < 3; ++k) {
+        const Eigen::Vector3d x = surface.corner(ids[i], static_cast<int>(k)) - center;
+        for (std::size_t c = 0; c < 3; ++c) {
+          const auto y = static_cast<double>(pack.xyz[3 * k + c][i]);
+          ASSERT_NEAR(y, x[static_cast<int>(c)], error * (1 + 1e-6)) << "round " << round;
+          ASSERT_LE(std::abs(y), static_cast<double>(pack.size));
+        }
+      }
+    }
+    // Whole vectors are read: what is beyond the last triangle must be as harmless as it is.
+    for (std::size_t i = count; i < (count + 7) / 8 * 8; ++i) {
+      for (const auto& row : pack.xyz) ASSERT_LE(std::abs(row[i]), pack.size);
+    }
   }
 }
 

@@ -433,7 +433,7 @@ void writeAnimation(Text& text, const AnimationStudy& study) {
       "gets the first levels of a mesh of 4096 triangles or more from one pass over it, so it knows octants that "
       "nobody would have asked for.");
   text.item(
-      "**Order.** The paper asks for one node after another. bocst asks for several at once, 4, 8, 16, ... of a walk "
+      "**Order.** The paper asks for one node after another. bocst asks for several at once, 2, 4, 8, ... of a walk "
       "that ends at its first hit: fewer waits, some more queries.");
   text.item(
       "**Missed** are frames in which the surfaces touch by FCL's exact test and no pair of models collides. "
