@@ -150,9 +150,14 @@ void MoveTriangles(const TrianglePack& pack, std::uint32_t which, const PackMoti
   const D d;
   moved.count = 0;
   for (std::size_t i = 0; i < pack.count; i += hn::Lanes(d)) {
-    const std::uint8_t bits[8] = {static_cast<std::uint8_t>(which >> i)};
-    if (bits[0] == 0) continue;
-    const M kept = hn::LoadMaskBits(d, bits);
+    // Those wanted to the front. (Highway's Compress may be slow: with AVX2 it copies its table at each use.)
+    alignas(32) std::int32_t from[8] = {};
+    std::size_t count = 0;
+    for (std::uint32_t left = which >> i & ((1u << hn::Lanes(d)) - 1); left != 0; left &= left - 1) {
+      from[count++] = __builtin_ctz(left);
+    }
+    if (count == 0) continue;
+    const auto order = hn::SetTableIndices(d, from);
     BOCST_UNROLL
     for (std::size_t k = 0; k < 3; ++k) {
       const Vec3 v = corner(pack, k, i);
@@ -162,10 +167,10 @@ void MoveTriangles(const TrianglePack& pack, std::uint32_t which, const PackMoti
         x = hn::MulAdd(hn::Set(d, motion.linear[c][1]), v.y, x);
         x = hn::MulAdd(hn::Set(d, motion.linear[c][2]), v.z, x);
         // Whole vectors are written, but never beyond the place where they were read.
-        hn::CompressStore(x, kept, d, moved.xyz[3 * k + c] + moved.count);
+        hn::StoreU(hn::TableLookupLanes(x, order), d, moved.xyz[3 * k + c] + moved.count);
       }
     }
-    moved.count += hn::CountTrue(d, kept);
+    moved.count += count;
   }
   float square = 0, offset = 0;
   for (int c = 0; c < 3; ++c) {
