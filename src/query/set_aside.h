@@ -3,6 +3,7 @@
 
 #include <algorithm>
 #include <cstddef>
+#include <type_traits>
 #include <vector>
 
 #include "query/side.h"
@@ -51,7 +52,7 @@ class SetAside {
       if (ends_at_first && waiting_.size() > batch_) {
         end -= static_cast<std::ptrdiff_t>(batch_);
         for (Waiting& w : waiting_) {
-          if (w.gap == kUnknown) w.gap = gap(a.sphere(w.pair.a), placed(b.sphere(w.pair.b), b_in_a));
+          if (w.gap == kUnknown) w.gap = gap(sphereOf(a, w.pair.a), placed(sphereOf(b, w.pair.b), b_in_a));
         }
         std::nth_element(waiting_.begin(), end, waiting_.end(),
                          [](const Waiting& x, const Waiting& y) { return x.gap > y.gap; });
@@ -89,6 +90,15 @@ class SetAside {
   template <typename Side>
   static bool asks(const Side& side, typename Side::Node node) {
     return side.state(node) == State::kGrows && !side.growsFreely(node);
+  }
+
+  template <typename Side>
+  static Sphere sphereOf(const Side& side, typename Side::Node node) {
+    if constexpr (std::is_same<Side, TreeSide>::value) {
+      return side.roughSphere(node);
+    } else {
+      return side.sphere(node);
+    }
   }
 
   // The distance of the middles over the sizes, squared: least for the deepest overlap.

@@ -76,6 +76,13 @@ class TreeSide {
     return s;
   }
 
+  /// The sphere about the node's cube: quickly had, for what only wants an order.
+  Sphere roughSphere(Node node) const {
+    const lattice::Cell cell = tree_.cell(node);
+    const double side = cell.side();
+    return {(Eigen::Vector3d(cell.at[0], cell.at[1], cell.at[2]).array() + 0.5) * side, 0.8660254037844387 * side};
+  }
+
   /// The sphere about the node's actual region.
   Sphere cellSphere(Node node) const { return sphereAbout(tree_.cell(node)); }
 
