@@ -299,11 +299,20 @@ Placement withMargin(Placement b_in_a, const TreeSide& a, const Question<S>& q, 
   return b_in_a;
 }
 
+// Is the second to be side A? The same whichever the caller names first; by address only where the poses are equal, so
+// that what a query grows does not depend on where models happen to lie.
+template <typename S>
+bool turnsRound(const Question<S>& q, const tree::Tree& tree1, const tree::Tree& tree2) {
+  const S *x1 = q.X_W1.matrix().data(), *x2 = q.X_W2.matrix().data();
+  const auto differ = std::mismatch(x1, x1 + 16, x2);
+  return differ.first == x1 + 16 ? std::less<const tree::Tree*>()(&tree2, &tree1) : *differ.second < *differ.first;
+}
+
 template <typename S>
 void collideModels(const Question<S>& q, tree::Tree& tree1, tree::Tree& tree2) {
   const std::size_t before = q.result.numContacts();
   // Conservative verdicts must not depend on the argument order, so the walk has an order of its own.
-  const bool swapped = (tree1.conservative() || tree2.conservative()) && std::less<tree::Tree*>()(&tree2, &tree1);
+  const bool swapped = (tree1.conservative() || tree2.conservative()) && turnsRound(q, tree1, tree2);
   const auto run = [&](const TreeSide& a, const TreeSide& b, const Placement& b_in_a, double magnitude) {
     const oracle::Surface& s = a.tree().surface();
     const ModelTriangles<S> t1(tree1), t2(tree2);
