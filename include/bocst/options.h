@@ -72,7 +72,8 @@ struct Options {
   /// depth is one more than `depth`.
   bool level_rule = false;
 
-  /// What queries read the time from; empty: Clock::now. Tests inject their own.
+  /// What queries read the time from; empty: Clock, as of the system's last tick (some milliseconds). Tests inject
+  /// their own.
   std::function<Clock::time_point()> clock;
 };
 

@@ -12,6 +12,7 @@
 #include <shared_mutex>
 #include <stdexcept>
 #include <string>
+#include <type_traits>
 
 #include "fcl/collide_octree.h"
 #include "fcl/collide_shape.h"
@@ -123,7 +124,7 @@ class Collector : public query::Visitor {
         const bool meet = later_.certain[i] || (parted.meet >> i & 1);
         if (meet && margin_ == 0) {
           addMet(i, &touches[i]);
-        } else if (margin_ > 0 || !(parted.apart >> i & 1)) {
+        } else if (margin_ > 0 || !kTrustsApart || !(parted.apart >> i & 1)) {
           decide(i, &touches[i]);
         }
       }
@@ -147,6 +148,8 @@ class Collector : public query::Visitor {
 
  private:
   static constexpr double kEpsilon = static_cast<double>(std::numeric_limits<S>::epsilon());
+  // In float, FCL's axes between slivers' all but parallel edges are rubbish, and it may say that they meet.
+  static constexpr bool kTrustsApart = std::is_same<S, double>::value;
 
   static query::PairSet& pairs() {
     thread_local query::PairSet set;

@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #include <bocst/model.h>
 
+#include <chrono>
 #include <cmath>
 #include <limits>
 
@@ -75,8 +76,7 @@ void Model<S>::prune(Clock::time_point now) {
 
 template <typename S>
 void Model<S>::prune() {
-  const auto& clock = tree_->options().clock;
-  tree_->prune(clock ? clock() : Clock::now());
+  tree_->prune(Clock::time_point(std::chrono::nanoseconds(tree_->now())));
 }
 
 template <typename S>

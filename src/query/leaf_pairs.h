@@ -56,6 +56,10 @@ class LeafCorners {
   typename Side::Node leaf_{};
 };
 
+/// Can the float tests compute with these corners? Determinants of three lengths must neither overflow nor vanish; NaN
+/// is out of range, too.
+inline bool inRange(const TrianglePack& pack) { return pack.size > 1e-9f && pack.size < 1e9f; }
+
 /// Corners straight from the vertices into the frame that `place` leads to, about `center` there and `scale` times as
 /// large. Vertices of a side lie at (v - origin) * inverse_unit in its frame.
 template <typename Side>
@@ -90,6 +94,7 @@ class CoarseLeaf {
     for (std::size_t begin = 0; begin < count && (mask & ~met) != 0; begin += TrianglePack::kCapacity) {
       leaf_.take(other, leaf, begin);
       leaf_.place(place, pack_);
+      if (!inRange(pack_)) return mask;
       std::uint8_t masks[TrianglePack::kCapacity];
       oracle::octantMasks(pack_.xyz[0], TrianglePack::kCapacity, leaf_.count(), slack, masks);
       for (std::size_t i = 0; i < leaf_.count(); ++i) met |= masks[i];
@@ -201,8 +206,9 @@ class LeafPacks {
       if (side.packed(leaf.node, packed, leaf.listed)) {
         unpackTriangles(packed, c, leaf.pack);
         leaf.all = packed.count;
-        // Half a step along each axis, and what unpacking rounds more than placing does.
-        leaf.error = 1.7321f * (0.5f * packed.step + 2 * 0x1p-24f * leaf.pack.size);
+        // Half a step along each axis, and what unpacking rounds more than placing does; the middle lies in the box,
+        // but for a unit or a byte of the cell, and less than a hundredth of a step covers those.
+        leaf.error = 1.7321f * (0.504f * packed.step + 2 * 0x1p-24f * leaf.pack.size);
         return;
       }
       if (loose_.size() < kLoose) loose_.push_back(leaf.node);
@@ -266,6 +272,7 @@ class LeafPairs {
  private:
   template <typename F>
   bool testPacks(const typename LeafPacks<A>::Leaf& a, const typename LeafPacks<B>::Leaf& b, F&& f) {
+    if (!inRange(a.pack) || !inRange(b.pack)) return allPairs(a, b, f);
     // What touches within both leaves does so within both boxes and both slabs.
     PackRegion region;
     fillRegion(b.volume, a.volume, *a_in_b_, b.pack.size, b.error, region);
@@ -276,6 +283,7 @@ class LeafPairs {
     if (rows == 0) return false;
     for (int k = 0; k < 3; ++k) to_a_.offset[k] = static_cast<float>(b.volume.center[1][k] - a.volume.center[0][k]);
     moveTriangles(b.pack, lanes, to_a_, lanes_);
+    if (!inRange(lanes_)) return allPairs(a, b, f);
     std::uint32_t ids[TrianglePack::kCapacity], *id = ids;
     for (std::uint32_t left = lanes; left != 0; left &= left - 1)
       *id++ = b.id(static_cast<std::size_t>(__builtin_ctz(left)));
@@ -284,6 +292,17 @@ class LeafPairs {
     const std::size_t found = touchingPairs(a.pack, rows, lanes_, region, slack, found_);
     for (std::size_t k = 0; k < found; ++k) {
       if (f(a.id(found_[k].row), ids[found_[k].lane], found_[k].certain)) return true;
+    }
+    return false;
+  }
+
+  /// Nothing is known of them.
+  template <typename F>
+  static bool allPairs(const typename LeafPacks<A>::Leaf& a, const typename LeafPacks<B>::Leaf& b, F&& f) {
+    for (std::size_t i = 0; i < a.pack.count; ++i) {
+      for (std::size_t j = 0; j < b.pack.count; ++j) {
+        if (f(a.id(i), b.id(j), false)) return true;
+      }
     }
     return false;
   }

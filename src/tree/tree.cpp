@@ -236,7 +236,9 @@ void Tree::ask(std::vector<Growth>& asked, std::vector<oracle::Expansion>& quest
 void Tree::askFor(std::uint32_t list, oracle::Expansion& question) const {
   const std::uint32_t* words = &lists_[list];
   question.count = words[0] & kCount;
-  if ((words[0] & kKept) == 0) {
+  if ((words[0] & kPacked) != 0) {
+    question.ids = &lists_[words[1]];
+  } else if ((words[0] & kKept) == 0) {
     question.ids = words + 1;
   } else {
     question.shelf = shelves_[words[1]];
@@ -327,12 +329,14 @@ Link Tree::addPacked(Link list) {
 }
 
 void Tree::packLeaves(const std::vector<NodeRef>& leaves) {
-  if (leaves.empty() || !hasRoom()) return;
+  if (leaves.empty() || !hasRoom() || lists_.size() > Pool<std::uint32_t, 12>::kMost / 2) return;
   const std::unique_lock<std::mutex> lock(growth_, std::try_to_lock);
   if (!lock.owns_lock()) return;
   for (const NodeRef leaf : leaves) {
     const Link list = link(leaf);
-    if (list.isList() && lists_[list.index()] <= kLeafTriangles) setLink(leaf, addPacked(list));
+    if (!list.isList()) continue;
+    const std::uint32_t words = lists_[list.index()];
+    if (words > 0 && words <= kLeafTriangles) setLink(leaf, addPacked(list));
   }
   countBytes();
 }
@@ -420,11 +424,9 @@ void Tree::expandAll(int depth) {
     throw std::invalid_argument("bocst::Model::expandAll: depth is " + std::to_string(depth) + ", not 1 to " +
                                 std::to_string(lattice::kMaxLevel));
   }
-  {
-    const std::lock_guard<Gate> alone(gate_);
-    keepOnly({});
-  }
-  const std::shared_lock<Gate> look(gate_);
+  // Queries never expand a leaf, and do not expect that somebody does.
+  const std::lock_guard<Gate> alone(gate_);
+  keepOnly({});
   constexpr std::size_t kBatch = 1024;  // bounds the memory that answers take before they are published
   std::vector<NodeRef> level{NodeRef{}}, next;
   for (int l = 1; l < depth; ++l) {

@@ -1,6 +1,10 @@
 // SPDX-License-Identifier: BSD-3-Clause
 // Answers against FCL's own mesh query and, where FCL has none to trust, against brute force.
+#include <fcl/narrowphase/detail/traversal/collision/intersect.h>
 #include <gtest/gtest.h>
+
+#include <algorithm>
+#include <array>
 
 #include "conformance/reference.h"
 #include "query/triangle.h"
@@ -229,6 +233,92 @@ TEST(CollideDouble, MeshesOfVeryDifferentSize) {
 }
 
 // Conservative answers: never a miss, fewer false alarms with depth, the same verdict from any history and order.
+TEST(CollideDouble, OneTriangleOfAnySizeThroughAMesh) {
+  // Float tests of the two overflow, or see only one of them.
+  const Raw small = test::torus(40, 0.2);
+  const auto fa = test::bvh<fcl::OBBRSS<double>>(small);
+  const auto I = fcl::Transform3<double>(fcl::Transform3<double>::Identity());
+  for (const double size : {1.0, 1e3, 1e6, 1e8, 1e9, 1e10, 1e12, 1e15}) {
+    Raw huge;
+    huge.vertices = {{-size, -size, -0.3 * size}, {size, -size, 0.3 * size}, {0, size, 0}};
+    huge.triangles.emplace_back(0, 1, 2);
+    const auto fb = test::bvh<fcl::OBBRSS<double>>(huge);
+    const Pairs want = test::pairs<double>(*fa, I, *fb, I), turned = test::pairs<double>(*fb, I, *fa, I);
+    ASSERT_GT(want.size(), 10u);
+    // Where rounding is as large as the mesh, FCL's own trees cull pairs that its triangle test takes for contacts.
+    const auto check = [size](const Pairs& found, const Pairs& expected) {
+      if (size <= 1e12) {
+        EXPECT_EQ(found, expected) << size;
+      } else {
+        EXPECT_TRUE(std::includes(found.begin(), found.end(), expected.begin(), expected.end())) << size;
+      }
+    };
+    const Modeld a(small.mesh()), b(huge.mesh());
+    for (int again = 0; again < 3; ++again) {
+      check(test::pairs<double>(a, I, b, I), want);
+      check(test::pairs<double>(a, I, *fb, I), want);
+      check(test::pairs<double>(b, I, a, I), turned);
+      EXPECT_TRUE(test::touching<double>(a, I, b, I)) << size;
+      EXPECT_TRUE(test::touching<double>(b, I, a, I)) << size;
+    }
+  }
+}
+
+TEST(CollideDouble, PartnersInUnitsThatFloatDoesNotHave) {
+  for (const double scale : {1e-60, 1e-36, 1e-12, 1e12, 1e40, 1e70}) {
+    Raw ra = test::torus(24, 0.2), rb = test::torus(17, 0.3);
+    ra.scale(scale);
+    rb.scale(scale);
+    const Modeld a(ra.mesh()), b(rb.mesh());
+    const auto fb = test::bvh<fcl::OBB<double>>(rb);
+    const auto I = fcl::Transform3<double>(fcl::Transform3<double>::Identity());
+    // Brute force: FCL's trees do not go so far.
+    const auto X = test::pose<double>(Eigen::Matrix3d::Identity(), Eigen::Vector3d(0.7, 0.4, 0.1) * scale);
+    Pairs want;
+    for (std::size_t t = 0; t < ra.triangles.size(); ++t) {
+      for (std::size_t u = 0; u < rb.triangles.size(); ++u) {
+        const auto p = [&](std::size_t k) { return ra.vertices[ra.triangles[t][k]]; };
+        const auto q = [&](std::size_t k) { return rb.vertices[rb.triangles[u][k]]; };
+        if (fcl::detail::Intersect<double>::intersect_Triangle(p(0), p(1), p(2), q(0), q(1), q(2), X.linear(),
+                                                               X.translation())) {
+          want.insert({static_cast<int>(t), static_cast<int>(u)});
+        }
+      }
+    }
+    EXPECT_EQ(test::pairs<double>(a, I, b, X), want) << scale;
+    EXPECT_EQ(test::pairs<double>(a, I, *fb, X), want) << scale;
+  }
+}
+
+TEST(CollideFloat, SliversAreJudgedByFclHoweverItIsAsked) {
+  // Apart in exact numbers; FCL's test in float takes them for a contact.
+  Raw ra, rb;
+  ra.vertices = {{.846626937, .939808547, -.0532171503},
+                 {.570552647, -.0348982476, -.704938114},
+                 {.886638999, 1.08112156, .0412970334}};
+  rb.vertices = {{.846753597, .939733148, -.0531537607},
+                 {.528128147, -.213764593, -.818966568},
+                 {.644336283, .206439346, -.539995611}};
+  ra.triangles.emplace_back(0, 1, 2);
+  rb.triangles.emplace_back(0, 1, 2);
+  const auto I = fcl::Transform3<float>(fcl::Transform3<float>::Identity());
+  std::array<fcl::Vector3f, 3> p, q;
+  for (std::size_t k = 0; k < 3; ++k) {
+    p[k] = ra.vertices[k].cast<float>();
+    q[k] = rb.vertices[k].cast<float>();
+  }
+  const bool expected = fcl::detail::Intersect<float>::intersect_Triangle(p[0], p[1], p[2], q[0], q[1], q[2],
+                                                                          I.linear(), I.translation());
+  const Modelf a(ra.mesh()), b(rb.mesh());
+  for (const std::size_t most : {std::size_t{1}, std::size_t{100}}) {
+    for (const bool contacts : {false, true}) {
+      const fcl::CollisionRequestf request(most, contacts);
+      fcl::CollisionResultf result;
+      EXPECT_EQ(fcl::collide(&a, I, &b, I, request, result), expected ? 1u : 0u) << most << " " << contacts;
+    }
+  }
+}
+
 TEST(CollideConservative, NeverMissesAndTightensWithDepth) {
   const Raw ra = test::torus(40), rb = test::torus(28, 0.3);
   const auto fa = test::bvh<fcl::OBBRSSd>(ra), fb = test::bvh<fcl::OBBRSSd>(rb);

@@ -87,6 +87,30 @@ TEST(Threads, QueriesWhilePruning) {
   EXPECT_EQ(wrong, 0);
 }
 
+TEST(Threads, QueriesWhileEverythingIsExpanded) {
+  // The complete tree expands leaves that queries test, packed ones, too.
+  Modeld a(test::torus(24).mesh());
+  const Modeld b(test::torus(24).mesh());
+  std::atomic<bool> done{false};
+  std::atomic<int> asked{0}, wrong{0};
+  std::vector<std::thread> threads;
+  for (int t = 0; t < 3; ++t) {
+    threads.emplace_back([&, t] {
+      for (int i = 0; !done || i < 20; ++i) {
+        const auto X =
+            test::pose<double>(Eigen::Matrix3d::Identity(), Eigen::Vector3d(1.2 + 0.02 * (i % 4), 0.3, 0.01 * t));
+        wrong += !test::touching<double>(a, fcl::Transform3d::Identity(), b, X);
+        ++asked;
+      }
+    });
+  }
+  for (int i = 0; i < 60; ++i) a.expandAll(7);
+  done = true;
+  for (std::thread& t : threads) t.join();
+  EXPECT_EQ(wrong, 0);
+  EXPECT_GE(asked, 60);
+}
+
 TEST(Threads, QueriesWhileVerticesChange) {
   // The mesh jumps between here and far away: a query sees the one or the other, so it never hits while it is away,
   // and the model itself is never in between.
