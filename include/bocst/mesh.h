@@ -27,7 +27,7 @@ class BOCST_EXPORT Mesh {
   /// 2^32 - 1 vertices, an index out of range, a coordinate that is NaN, infinite or larger than 1e75 in size.
   Mesh(std::vector<Eigen::Vector3d> vertices, const std::vector<fcl::Triangle>& triangles);
 
-  Mesh(const Mesh&) = default;  // and no moving: a mesh is never without its triangles
+  Mesh(const Mesh&) = default;  ///< Shares the triangles. There is no moving: a mesh is never without them.
   Mesh& operator=(const Mesh&) = delete;
 
   /// The same from 32-bit indices, which are moved in rather than copied.
