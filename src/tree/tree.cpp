@@ -329,9 +329,9 @@ Link Tree::addPacked(Link list) {
 }
 
 void Tree::packLeaves(const std::vector<NodeRef>& leaves) {
-  if (leaves.empty() || !hasRoom() || lists_.size() > Pool<std::uint32_t, 12>::kMost / 2) return;
+  if (leaves.empty() || !hasRoom()) return;
   const std::unique_lock<std::mutex> lock(growth_, std::try_to_lock);
-  if (!lock.owns_lock()) return;
+  if (!lock.owns_lock() || lists_.size() > Pool<std::uint32_t, 12>::kMost / 2) return;
   for (const NodeRef leaf : leaves) {
     const Link list = link(leaf);
     if (!list.isList()) continue;
