@@ -61,7 +61,7 @@ class PairSet {
   }
 
   std::vector<Slot> slots_, held_;  // held_: while it grows
-  std::size_t used_ = 0;  // of slots_, a power of two
+  std::size_t used_ = 0;            // of slots_, a power of two
   std::size_t size_ = 0;
   std::uint32_t epoch_ = 1;
 };
