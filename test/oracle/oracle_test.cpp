@@ -337,6 +337,20 @@ TEST(Kernels, EveryInstructionSetAgreesOnGreySets) {
   EXPECT_GE(targets, 1);
 }
 
+// Every triangle that touches the cell is gathered, and none twice.
+void gathersAllOnce(const RootGrid& grid, const Surface& surface, const Cell& cell) {
+  std::vector<std::uint32_t> ids;
+  grid.gather(surface, cell, ids);
+  std::sort(ids.begin(), ids.end());
+  ASSERT_EQ(std::adjacent_find(ids.begin(), ids.end()), ids.end());
+  for (std::uint32_t t = 0; t < surface.mesh->triangleCount(); ++t) {
+    const Eigen::Vector3d c[3] = {surface.corner(t, 0), surface.corner(t, 1), surface.corner(t, 2)};
+    if (touches(c, centerOf(cell), cell.side() / 2.0)) {
+      ASSERT_TRUE(std::binary_search(ids.begin(), ids.end(), t));
+    }
+  }
+}
+
 TEST(RootGrid, KnowsTheSameGreyCellsAsExpansions) {
   for (const Subdivision s : {Subdivision::kOctree, Subdivision::kBono}) {
     for (const double d : {0.0, 514.0, 900.0}) {
@@ -352,16 +366,7 @@ TEST(RootGrid, KnowsTheSameGreyCellsAsExpansions) {
             ASSERT_EQ(grid->grey(surface, cell), referenceGrey(surface, cell));
             if (!grid->grey(surface, cell)) continue;
             ++grey;
-            std::vector<std::uint32_t> ids;
-            grid->gather(surface, cell, ids);
-            std::sort(ids.begin(), ids.end());
-            ASSERT_EQ(std::adjacent_find(ids.begin(), ids.end()), ids.end());
-            for (std::uint32_t t = 0; t < surface.mesh->triangleCount(); ++t) {
-              const Eigen::Vector3d c[3] = {surface.corner(t, 0), surface.corner(t, 1), surface.corner(t, 2)};
-              if (touches(c, centerOf(cell), cell.side() / 2.0)) {
-                ASSERT_TRUE(std::binary_search(ids.begin(), ids.end(), t));
-              }
-            }
+            ASSERT_NO_FATAL_FAILURE(gathersAllOnce(*grid, surface, cell));
           }
         }
       }
@@ -390,10 +395,7 @@ TEST(RootGrid, KnowsFineMeshesWithSomeLargeTriangles) {
       ASSERT_EQ(grid->grey(surface, cell), referenceGrey(surface, cell));
       if (!grid->grey(surface, cell)) continue;
       ++grey;
-      std::vector<std::uint32_t> ids;
-      grid->gather(surface, cell, ids);
-      std::sort(ids.begin(), ids.end());
-      ASSERT_EQ(std::adjacent_find(ids.begin(), ids.end()), ids.end());
+      ASSERT_NO_FATAL_FAILURE(gathersAllOnce(*grid, surface, cell));
       const Eigen::AlignedBox3d box = grid->bounds(cell);
       EXPECT_EQ(box.min(), centerOf(cell) - Eigen::Vector3d::Constant(cell.side() / 2.0));
       EXPECT_EQ(box.max(), centerOf(cell) + Eigen::Vector3d::Constant(cell.side() / 2.0));
@@ -401,12 +403,6 @@ TEST(RootGrid, KnowsFineMeshesWithSomeLargeTriangles) {
       for (; parent.level >= 2; --parent.level, parent.at = {parent.at[0] / 2, parent.at[1] / 2, parent.at[2] / 2}) {
         EXPECT_TRUE(grid->grey(surface, parent));
         EXPECT_TRUE(grid->bounds(parent).contains(box));
-      }
-      for (std::uint32_t t = 0; t < surface.mesh->triangleCount(); ++t) {
-        const Eigen::Vector3d c[3] = {surface.corner(t, 0), surface.corner(t, 1), surface.corner(t, 2)};
-        if (touches(c, centerOf(cell), cell.side() / 2.0)) {
-          ASSERT_TRUE(std::binary_search(ids.begin(), ids.end(), t));
-        }
       }
     }
     EXPECT_GT(grey, 3u);
