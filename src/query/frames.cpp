@@ -30,6 +30,8 @@ PairFrames::PairFrames(double scale_of_1, const Placement& one_in_zero) {
   unit[1] = static_cast<float>(scale_of_1);
   const double size = t.norm() + std::sqrt(3.0) * (q0 + q1), defect = 4 * size * one_in_zero.defect;
   pad = static_cast<float>((48 * 0x1p-24 * size + defect + one_in_zero.slack) * 1.0001);
+  own_pad[0] = static_cast<float>((128 * 0x1p-24 * q0 + defect + one_in_zero.slack) * 1.0001);
+  own_pad[1] = static_cast<float>((128 * 0x1p-24 * q1 + defect + one_in_zero.slack) * 1.0001);
   slab_pad = static_cast<float>((160 * 0x1p-24 * size + 2 * defect + 1.02 * one_in_zero.slack) * 1.0001);
 }
 

@@ -26,6 +26,9 @@ struct alignas(64) Frame {
 /// below 1.01, off by 10 u an entry) the way between centres is off by 42 u M, 18 by the normal and 9 by sums; offsets
 /// 11; the radius 38 by the normals and 15 by sums: 133 u M; `slab_pad` takes 160. To both comes the defect of the
 /// rotation, 4 M of it, and the slack.
+///
+/// What sees octants in their own frame only, along axes whose entries' sizes sum up to 1, is off by less: see
+/// octantsMeeting().
 struct PairFrames {
   PairFrames(double scale_of_1, const Placement& one_in_zero);
 
@@ -40,6 +43,7 @@ struct PairFrames {
   float abs_to_other[2][3][3];
   float shift[2][3];  ///< ... after this.
   float pad, slab_pad;
+  float own_pad[2];  ///< For what is in double beside octants in their own frame: 128 u Q, defect and slack.
 };
 
 }  // namespace bocst::query

@@ -9,70 +9,12 @@
 #include <vector>
 
 #include "oracle/cpu/kernels.h"
+#include "query/coarse_triangles.h"
+#include "query/leaf_corners.h"
 #include "query/side.h"
 #include "query/unpack.h"
 
 namespace bocst::query {
-
-/// The corners of a leaf as its mesh gives them, kept until another leaf is asked for: depth first, most pairs of
-/// leaves share one with the pair before.
-template <typename Side>
-class LeafCorners {
- public:
-  /// To be called before the first use in a walk.
-  void clear() { count_ = 0; }
-
-  /// Takes at most a pack of the leaf's triangles, from the one at `begin`. False when it has them already.
-  bool take(const Side& side, typename Side::Node leaf, std::size_t begin) {
-    if (count_ != 0 && leaf_ == leaf && begin_ == begin) return false;
-    leaf_ = leaf;
-    begin_ = begin;
-    count_ = std::min(side.triangleCount(leaf) - begin, TrianglePack::kCapacity);
-    // Triangles and vertices lie anywhere in memory: ask for all of them before any is waited for.
-    for (std::size_t i = 0; i < count_; ++i) {
-      ids_[i] = side.triangle(leaf, begin + i);
-      side.prefetch(ids_[i]);
-    }
-    for (std::size_t i = 0; i < count_; ++i) {
-      for (int k = 0; k < 3; ++k) __builtin_prefetch(&side.vertex(ids_[i], k));
-    }
-    for (std::size_t i = 0; i < count_; ++i) {
-      for (int k = 0; k < 3; ++k) {
-        const auto& v = side.vertex(ids_[i], k);
-        for (int c = 0; c < 3; ++c) raw_.xyz[3 * k + c][i] = v[c];
-      }
-    }
-    return true;
-  }
-
-  std::size_t count() const { return count_; }
-  std::uint32_t id(std::size_t i) const { return ids_[i]; }
-  void place(const PackPlacement& to, TrianglePack& pack) { placeTriangles(raw_, count_, to, pack); }
-
- private:
-  RawTriangles raw_;
-  std::uint32_t ids_[TrianglePack::kCapacity];
-  std::size_t count_ = 0, begin_ = 0;  // nothing is held when the count is 0
-  typename Side::Node leaf_{};
-};
-
-/// Can the float tests compute with these corners? Determinants of three lengths must neither overflow nor vanish; NaN
-/// is out of range, too.
-inline bool inRange(const TrianglePack& pack) { return pack.size > 1e-9f && pack.size < 1e9f; }
-
-/// Corners straight from the vertices into the frame that `place` leads to, about `center` there and `scale` times as
-/// large. Vertices of a side lie at (v - origin) * inverse_unit in its frame.
-template <typename Side>
-PackPlacement packPlacement(const Side& side, const Placement& place, const Eigen::Vector3d& center, double scale) {
-  const Eigen::Matrix3d linear = place.rotation * (place.scale * side.inverseUnit());
-  const Eigen::Vector3d offset = place.translation - linear * side.origin() - center;
-  PackPlacement t;
-  for (int r = 0; r < 3; ++r) {
-    for (int c = 0; c < 3; ++c) t.linear[r][c] = linear(r, c) * scale;
-    t.offset[r] = offset[r] * scale;
-  }
-  return t;
-}
 
 /// The triangles of a leaf against the octants of smaller nodes of the other side: with large triangles the leaf's
 /// volume says little.
@@ -107,45 +49,44 @@ class CoarseLeaf {
   TrianglePack pack_;
 };
 
-/// What bounds a leaf's triangles, as far as they are its own: a box and a slab, in its own frame [0] and in that of
-/// the other side [1].
+/// What bounds a leaf's triangles, as far as they are its own: a box and a slab, in its own frame [0] and, once placed
+/// there, in that of the other side [1].
 struct LeafVolume {
   LeafVolume() = default;
 
-  LeafVolume(const Volume& v, const Placement& to_other) : slab{v.slab_offset, v.slab_half} {
+  explicit LeafVolume(const Volume& v) : slab{v.slab_offset, v.slab_half} {
     for (int k = 0; k < 3; ++k) {
       center[0][k] = v.center[k];
       half[0][k] = v.half[k];
       normal[0][k] = v.normal[k];
-      double n = 0;
-      for (int j = 0; j < 3; ++j) n += to_other.rotation(k, j) * v.normal[j];
-      normal[1][k] = n;
     }
-    placeBox(to_other.rotation.cwiseAbs(), to_other);
   }
 
-  LeafVolume(const OrientedVolume& v, const Placement& to_other) {
+  explicit LeafVolume(const OrientedVolume& v) {
     const Eigen::Vector3d own = v.axes.cwiseAbs() * v.half;
     for (int k = 0; k < 3; ++k) {
       center[0][k] = v.center[k];
       half[0][k] = own[k];
     }
-    placeBox(to_other.rotation.cwiseAbs(), to_other);
+  }
+
+  void place(const Placement& to_other) {
+    const Eigen::Matrix3d turn = to_other.rotation.cwiseAbs();
+    const Eigen::Vector3d c = to_other * Eigen::Vector3d(center[0][0], center[0][1], center[0][2]);
+    for (int k = 0; k < 3; ++k) {
+      center[1][k] = c[k];
+      half[1][k] = to_other.scale * (turn(k, 0) * half[0][0] + turn(k, 1) * half[0][1] + turn(k, 2) * half[0][2]);
+      normal[1][k] = 0;
+      for (int j = 0; j < 3; ++j) normal[1][k] += to_other.rotation(k, j) * normal[0][j];
+    }
+    placed = true;
   }
 
   double center[2][3];
   double half[2][3];
   double normal[2][3] = {};  ///< Of the slab, about unit length; zero: no slab.
   double slab[2] = {};       ///< Along normal, from center: its middle and half its thickness, in own units.
-
- private:
-  void placeBox(const Eigen::Matrix3d& turn, const Placement& to_other) {
-    const Eigen::Vector3d c = to_other * Eigen::Vector3d(center[0][0], center[0][1], center[0][2]);
-    for (int k = 0; k < 3; ++k) {
-      center[1][k] = c[k];
-      half[1][k] = to_other.scale * (turn(k, 0) * half[0][0] + turn(k, 1) * half[0][1] + turn(k, 2) * half[0][2]);
-    }
-  }
+  bool placed = false;
 };
 
 /// The leaves of one side that a walk has met, packed: triangles are about the middle of their leaf's box.
@@ -178,6 +119,19 @@ class LeafPacks {
 
   /// At most a pack of the leaf's triangles, from the one at `begin`; good until the next call.
   const Leaf& get(const Side& side, typename Side::Node node, std::size_t begin, const Placement& to_other) {
+    Leaf& leaf = own(side, node, begin);
+    if (!leaf.volume.placed) leaf.volume.place(to_other);
+    return leaf;
+  }
+
+  /// The same for who asks nothing of it in the other side's frame.
+  const Leaf& get(const Side& side, typename Side::Node node, std::size_t begin) { return own(side, node, begin); }
+
+ private:
+  static constexpr std::size_t kLeaves = 256;
+  static constexpr std::size_t kLoose = 16;
+
+  Leaf& own(const Side& side, typename Side::Node node, std::size_t begin) {
     std::uint16_t& slot = slots_[(number(node) + begin) % (4 * kLeaves)];
     if (slot < leaves_.size() && leaves_[slot].walk == walk_ && leaves_[slot].node == node &&
         leaves_[slot].begin == begin) {
@@ -190,14 +144,10 @@ class LeafPacks {
     leaf.node = node;
     leaf.begin = begin;
     leaf.walk = walk_;
-    leaf.volume = LeafVolume(side.volume(node), to_other);
+    leaf.volume = LeafVolume(side.volume(node));
     fill(side, leaf);
     return leaf;
   }
-
- private:
-  static constexpr std::size_t kLeaves = 256;
-  static constexpr std::size_t kLoose = 16;
 
   void fill(const Side& side, Leaf& leaf) {
     const double(&c)[3] = leaf.volume.center[0];
@@ -265,6 +215,17 @@ class LeafPairs {
     }
   }
 
+  /// The same for a leaf of one side and those triangles of a larger one of the other that may meet it, a bit each.
+  template <typename F>
+  bool testCoarseA(const CoarseTriangles& a, std::uint32_t which, const B& b, typename B::Node node_b, F&& f) {
+    return testCoarse(leaves_b_, b, node_b, a, which, *a_in_b_,
+                      [&f](std::uint32_t t, std::uint32_t u, bool certain) { return f(u, t, certain); });
+  }
+  template <typename F>
+  bool testCoarseB(const A& a, typename A::Node node_a, const CoarseTriangles& b, std::uint32_t which, F&& f) {
+    return testCoarse(leaves_a_, a, node_a, b, which, *b_in_a_, f);
+  }
+
   /// Leaves met in this walk, a few of them, that are worth to be packed.
   const std::vector<typename A::Node>& looseOfA() const { return leaves_a_.loose(); }
   const std::vector<typename B::Node>& looseOfB() const { return leaves_b_.loose(); }
@@ -292,6 +253,61 @@ class LeafPairs {
     const std::size_t found = touchingPairs(a.pack, rows, lanes_, region, slack, found_);
     for (std::size_t k = 0; k < found; ++k) {
       if (f(a.id(found_[k].row), ids[found_[k].lane], found_[k].certain)) return true;
+    }
+    return false;
+  }
+
+  // About the middle of the smaller leaf, as its corners are packed; calls f(triangle of the leaf, coarse triangle,
+  // ...).
+  template <typename Side, typename F>
+  bool testCoarse(LeafPacks<Side>& leaves, const Side& side, typename Side::Node node, const CoarseTriangles& coarse,
+                  std::uint32_t which, const Placement& to, F&& f) {
+    for (std::size_t begin = 0;; begin += TrianglePack::kCapacity) {
+      const auto& leaf = leaves.get(side, node, begin);
+      std::uint32_t ids[TrianglePack::kCapacity];
+      const double(&c)[3] = leaf.volume.center[0];
+      const Eigen::Vector3d middle(c[0], c[1], c[2]);
+      rows_.count = 0;
+      rows_.size = 0;
+      for (std::uint32_t left = which; left != 0; left &= left - 1) {
+        const auto t = static_cast<std::size_t>(__builtin_ctz(left));
+        for (std::size_t k = 0; k < 3; ++k) {
+          const Eigen::Vector3d v = coarse.corners(t)[k] - (middle.array() - CoarseTriangles::kMiddle).matrix();
+          for (std::size_t x = 0; x < 3; ++x) {
+            const auto at = static_cast<float>(v[static_cast<int>(x)]);
+            rows_.xyz[3 * k + x][rows_.count] = at;
+            rows_.size = std::max(rows_.size, std::abs(at));
+          }
+        }
+        ids[rows_.count++] = coarse.id(t);
+      }
+      if (testRows(leaf, to, ids, f)) return true;
+      if (begin + TrianglePack::kCapacity >= leaf.all) return false;
+    }
+  }
+
+  template <typename Leaf, typename F>
+  bool testRows(const Leaf& leaf, const Placement& to, const std::uint32_t* ids, F&& f) {
+    if (!inRange(rows_) || !inRange(leaf.pack)) {
+      for (std::size_t i = 0; i < rows_.count; ++i) {
+        for (std::size_t j = 0; j < leaf.pack.count; ++j) {
+          if (f(leaf.id(j), ids[i], false)) return true;
+        }
+      }
+      return false;
+    }
+    PackRegion region{};
+    const double size = static_cast<double>(leaf.pack.size), error = static_cast<double>(leaf.error);
+    const double pad = (32 * 0x1p-24 + 4 * to.defect) * size + 1.02 * (to.slack + error);
+    for (int k = 0; k < 3; ++k) {
+      region.high[k] = static_cast<float>(leaf.volume.half[0][k] + pad);
+      region.low[k] = -region.high[k];
+    }
+    const std::uint32_t all = rows_.count < 32 ? (1u << rows_.count) - 1 : ~0u;
+    const auto slack = static_cast<float>((to.slack + error) * 1.001);
+    const std::size_t found = touchingPairs(rows_, all, leaf.pack, region, slack, found_);
+    for (std::size_t k = 0; k < found; ++k) {
+      if (f(leaf.id(found_[k].lane), ids[found_[k].row], found_[k].certain)) return true;
     }
     return false;
   }
@@ -331,7 +347,7 @@ class LeafPairs {
   LeafPacks<A> leaves_a_;
   LeafPacks<B> leaves_b_;
   PackMotion to_a_;
-  TrianglePack lanes_;
+  TrianglePack lanes_, rows_;
   const Placement *b_in_a_ = nullptr, *a_in_b_ = nullptr;
   PackPair found_[TrianglePack::kCapacity * TrianglePack::kCapacity];
 };

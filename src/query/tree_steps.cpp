@@ -22,7 +22,7 @@ inline bool isLeaf(const StepNode& n) {
 
 // The order is there already: overlapping() writes it to where the group will be.
 inline void push(PairSteps& s, int side, std::uint32_t block, std::uint32_t level, std::uint32_t frame,
-                 const StepNode& other, unsigned octants) {
+                 const StepNode& other, unsigned octants, std::uint32_t coarse = 0) {
   StepGroup& top = s.stack[s.depth++];
   top.other.node = other.node;
   top.other.link = other.link;
@@ -33,6 +33,7 @@ inline void push(PairSteps& s, int side, std::uint32_t block, std::uint32_t leve
   top.frame = frame;
   top.level = level;
   top.octants = octants;
+  top.coarse = coarse;
 }
 
 // Brings to the processor what the next steps will read of a node, or, of a leaf, its corners.
@@ -182,6 +183,12 @@ HWY_INLINE std::uint32_t pop(PairSteps& s, StepNode (&pair)[2]) {
     other.link = top.other.link;
     other.level = top.other.level;
     other.lane = top.other.lane;
+    s.coarse_side = PairSteps::kNone;
+    s.triangles = ~0u;
+    if (top.coarse != 0) {
+      s.coarse_side = 1 - static_cast<int>(top.side);
+      s.triangles = top.triangles[o];
+    }
     if (top.frame == StepGroup::kNoFrame) {
       own.lane = StepNode::kNoLane;
       return 0;
@@ -189,6 +196,108 @@ HWY_INLINE std::uint32_t pop(PairSteps& s, StepNode (&pair)[2]) {
     own.lane = 8 * top.frame + o;
     return top.frame + 1;
   }
+}
+
+// The octants of a frame against triangles, see octantsMeeting(). Of the octants in `mask`, and the triangles in
+// `which`; f(lane, which triangles) is called for each vector. Returns the octants that a triangle may meet.
+template <typename BoundsOf, typename F>
+HWY_INLINE unsigned meeting(const PairFrames& g, int own, const Frame& f, unsigned mask, std::uint32_t which,
+                            BoundsOf&& bounds_of, F&& store) {
+  const D d;
+  const hn::RebindToUnsigned<D> du;
+  const V pad = hn::Set(d, g.own_pad[own]);
+  unsigned result = 0;
+  for (std::size_t i = 0; i < 8; i += hn::Lanes(d)) {
+    const std::uint8_t wanted[8] = {static_cast<std::uint8_t>(mask >> i)};
+    const M in = hn::LoadMaskBits(d, wanted);
+    V c[3], h[3], m[3], low[3], high[3];
+    BOCST_UNROLL
+    for (int k = 0; k < 3; ++k) {
+      c[k] = hn::Load(d, f.center[own][k] + i);
+      h[k] = hn::Load(d, f.half[own][k] + i);
+      m[k] = hn::Load(d, f.normal[own][k] + i);
+      const V reach = hn::Add(h[k], pad);
+      low[k] = hn::Sub(c[k], reach);
+      high[k] = hn::Add(c[k], reach);
+    }
+    const V slab = hn::Load(d, f.slab_center + i), thick = hn::Load(d, f.slab_half + i);
+    auto triangles = hn::Zero(du);
+    for (std::uint32_t left = which; left != 0; left &= left - 1) {
+      const int t = __builtin_ctz(left);
+      const TriangleBounds& b = bounds_of(static_cast<std::size_t>(t));
+      M meet = in;
+      BOCST_UNROLL
+      for (int k = 0; k < 3; ++k) {
+        meet = hn::And(meet, hn::And(hn::Le(low[k], hn::Set(d, b.high[k])), hn::Ge(high[k], hn::Set(d, b.low[k]))));
+      }
+      {
+        // How far the octant reaches along the normal: its box, and its slab as in overlapping().
+        V n[3], at = hn::Zero(d), r = pad, along = hn::Zero(d);
+        BOCST_UNROLL
+        for (int k = 0; k < 3; ++k) {
+          n[k] = hn::Set(d, b.normal[k]);
+          at = hn::MulAdd(n[k], c[k], at);
+          r = hn::MulAdd(hn::Abs(n[k]), h[k], r);
+          along = hn::MulAdd(n[k], m[k], along);
+        }
+        V slab_r = hn::MulAdd(hn::Abs(along), thick, pad);
+        BOCST_UNROLL
+        for (int k = 0; k < 3; ++k) slab_r = hn::MulAdd(hn::Abs(hn::NegMulAdd(along, m[k], n[k])), h[k], slab_r);
+        const V slab_at = hn::MulAdd(along, slab, at);
+        const V least = hn::Max(hn::Sub(at, r), hn::Sub(slab_at, slab_r));
+        const V most = hn::Min(hn::Add(at, r), hn::Add(slab_at, slab_r));
+        meet = hn::And(meet, hn::And(hn::Le(least, hn::Set(d, b.normal_high)), hn::Ge(most, hn::Set(d, b.normal_low))));
+      }
+      if (hn::AllFalse(d, meet)) continue;
+      BOCST_UNROLL
+      for (int e = 0; e < 3; ++e) {
+        V at = hn::Zero(d), r = pad;
+        BOCST_UNROLL
+        for (int k = 0; k < 3; ++k) {
+          const V a = hn::Set(d, b.edge[e][k]);
+          at = hn::MulAdd(a, c[k], at);
+          r = hn::MulAdd(hn::Abs(a), h[k], r);
+        }
+        meet = hn::And(meet, hn::Le(hn::Sub(at, r), hn::Set(d, b.edge_high[e])));
+      }
+      triangles = hn::Or(triangles, hn::IfThenElseZero(hn::RebindMask(du, meet), hn::Set(du, 1u << t)));
+    }
+    store(i, triangles);
+    std::uint8_t bits[8] = {};
+    hn::StoreMaskBits(du, hn::Ne(triangles, hn::Zero(du)), bits);
+    result |= static_cast<unsigned>(bits[0]) << i;
+  }
+  return result;
+}
+
+// The octants of the pair's smaller node that the larger leaf's triangles may meet, onto the stack.
+HWY_INLINE void pushThose(PairSteps& s) {
+  const hn::RebindToUnsigned<D> du;
+  const int x = s.expanded, y = 1 - x;
+  const CoarseTriangles& triangles = *s.coarse[y];
+  StepGroup& top = s.stack[s.depth];
+  const unsigned mask = meeting(
+      s.geometry, x, s.frames[s.frames_used], s.mask, s.triangles,
+      [&triangles](std::size_t t) -> const TriangleBounds& { return triangles.bounds(t); },
+      [&top, du](std::size_t i, hn::Vec<hn::RebindToUnsigned<D>> met) HWY_ATTR {
+        hn::StoreU(met, du, top.triangles + i);
+        const auto none = hn::Eq(met, hn::Zero(du));
+        hn::StoreU(hn::IfThenZeroElse(none, hn::LoadU(du, top.order + i)), du, top.order + i);
+      });
+  if (mask != 0) push(s, x, s.pair[x].link.index(), s.pair[x].level + 1, s.frames_used, s.pair[y], mask, 1);
+}
+
+void PushMeeting(PairSteps& s) { pushThose(s); }
+
+void OctantsMeeting(const PairFrames& geometry, int own, const CellOctants& cell, const TriangleBounds* triangles,
+                    std::size_t count, std::uint32_t (&met)[8]) {
+  const hn::RebindToUnsigned<D> du;
+  Frame f;
+  decodeCell(geometry, own, cell.cell.level, cell.cell.at, cell.octants, f);
+  meeting(
+      geometry, own, f, 0xff, count < 32 ? (1u << count) - 1 : ~0u,
+      [triangles](std::size_t t) -> const TriangleBounds& { return triangles[t]; },
+      [&met, du](std::size_t i, hn::Vec<hn::RebindToUnsigned<D>> m) HWY_ATTR { hn::StoreU(m, du, met + i); });
 }
 
 PairSteps::Event NextEvent(PairSteps& s) {
@@ -218,7 +327,9 @@ PairSteps::Event NextEvent(PairSteps& s) {
       s.frames_used = frames;
       s.expanded = x;
       s.mask = mask;
-      return PairSteps::kCoarse;
+      if (!s.coarse[y]->know(other.node, s.triangles)) return PairSteps::kCoarse;
+      pushThose(s);
+      continue;
     }
     push(s, x, index, own.level + 1, frames, other, mask);
   }
@@ -233,6 +344,8 @@ namespace bocst::query {
 
 HWY_EXPORT(OverlappingOctants);
 HWY_EXPORT(NextEvent);
+HWY_EXPORT(PushMeeting);
+HWY_EXPORT(OctantsMeeting);
 
 std::uint8_t overlappingOctants(const PairFrames& geometry, int own, const CellOctants& cell, const CellOctants& other,
                                 int octant) {
@@ -240,6 +353,13 @@ std::uint8_t overlappingOctants(const PairFrames& geometry, int own, const CellO
 }
 
 PairSteps::Event nextEvent(PairSteps& steps) { return HWY_DYNAMIC_DISPATCH(NextEvent)(steps); }
+
+void pushMeeting(PairSteps& steps) { HWY_DYNAMIC_DISPATCH(PushMeeting)(steps); }
+
+void octantsMeeting(const PairFrames& geometry, int own, const CellOctants& cell, const TriangleBounds* triangles,
+                    std::size_t count, std::uint32_t (&met)[8]) {
+  HWY_DYNAMIC_DISPATCH(OctantsMeeting)(geometry, own, cell, triangles, count, met);
+}
 
 void pushOctants(PairSteps& s, unsigned mask) {
   if (mask == 0) return;

@@ -5,6 +5,7 @@
 #include <cstddef>
 #include <cstdint>
 
+#include "query/coarse_triangles.h"
 #include "query/frames.h"
 #include "tree/tree.h"
 
@@ -31,6 +32,9 @@ struct StepGroup {
   std::uint32_t frame;  ///< Where the block's octants are, if they are; those below it are in use, too.
   std::uint32_t level;  ///< Of the octants.
   std::uint32_t octants;
+  std::uint32_t
+      coarse;  ///< The other node is a larger leaf, and `triangles` says which of its triangles may meet each.
+  std::uint32_t triangles[8];
   /// For each of these: how far it overlaps the other node, as the bits of a float whose lowest three are the octant.
   /// 0 for the others; kLast, a depth below all, for what waits until they are gone.
   std::uint32_t order[8];
@@ -48,7 +52,9 @@ struct PairSteps {
     kDone,    ///< The stack is empty.
     kLeaves,  ///< `pair` is two leaves, to be tested.
     kAside,   ///< `pair` needs a node that is not expanded.
-    kCoarse,  ///< `pair` is a leaf and a smaller node, `expanded`, whose octants in `mask` overlap the leaf's volume.
+    /// `pair` is a leaf and a smaller node, `expanded`, whose octants in `mask` overlap the leaf's volume; of the
+    /// leaf's triangles those in `triangles` may meet the node, but are not known.
+    kCoarse,
   };
 
   const tree::Tree* tree[2];
@@ -61,7 +67,11 @@ struct PairSteps {
   /// A node of side 0 is not smaller (is larger) than one of side 1 that is at least so many levels deeper.
   int not_smaller, larger;
 
-  StepNode pair[2];  ///< Of the event.
+  StepNode pair[2];               ///< Of the event.
+  int coarse_side = kNone;        ///< Which of the two is a larger leaf whose triangles were asked about the other ...
+  std::uint32_t triangles = ~0u;  ///< ... and may meet it, if any.
+  static constexpr int kNone = -1;
+  const CoarseTriangles* coarse[2] = {nullptr, nullptr};  ///< Those of a leaf of each side.
   std::uint32_t frames_used = 0;
   int expanded = 0;
   unsigned mask = 0;
@@ -97,7 +107,22 @@ struct CellOctants {
 std::uint8_t overlappingOctants(const PairFrames& geometry, int own, const CellOctants& cell, const CellOctants& other,
                                 int octant);
 
-/// Puts the octants in `mask` of the expanded node of steps.pair on the stack, after kCoarse.
+/// After kCoarse: puts those octants of the expanded node on the stack that the leaf's triangles in steps.triangles may
+/// meet. These are known.
+void pushMeeting(PairSteps& steps);
+
+/// The test of pushMeeting() by itself, for at most 32 triangles: bit t of met[o] is set unless triangle t surely
+/// misses octant o of a cell of side `own`.
+///
+/// Along the axes of the octants, the triangle's normal and those of its edges in its plane; along the normal the
+/// octant's slab counts, too. With Q half a root's side and u = 2^-24, a centre is off by 6 u Q, an extent by 3 u Q. A
+/// projection on an axis of unit sum adds 4 u Q, a radius 4 u Q, sums of both 3 u Q, the bound 4 u Q: 24 u Q. By the
+/// slab (its offset 11, normal 3, what the normals differ by 5, sums 22; then 21 as before) it is 62 u Q;
+/// PairFrames::own_pad takes 128.
+void octantsMeeting(const PairFrames& geometry, int own, const CellOctants& cell, const TriangleBounds* triangles,
+                    std::size_t count, std::uint32_t (&met)[8]);
+
+/// After kCoarse: puts the octants in `mask` of the expanded node of steps.pair on the stack.
 void pushOctants(PairSteps& steps, unsigned mask);
 
 /// Puts a pair of nodes on the stack that comes without frames.

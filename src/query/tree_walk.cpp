@@ -15,7 +15,8 @@ struct TreeWalk::Scratch {
   SetAside<TreeSide, TreeSide> aside;
   LeafPairs<TreeSide, TreeSide> leaves;
   bool leaves_started = false;
-  CoarseLeaf<TreeSide> coarse_a, coarse_b;
+  CoarseTriangles coarse[2];
+  CoarseLeaf<TreeSide> long_a, long_b;  // leaves of more triangles than those hold
   bool grew = false;
   std::vector<tree::NodeRef> unseen[2];  // set aside, and with no slab yet
 };
@@ -24,8 +25,9 @@ bool TreeWalk::run() {
   thread_local Scratch s;
   s.aside.clear();
   s.leaves_started = false;
-  s.coarse_a.clear();
-  s.coarse_b.clear();
+  for (CoarseTriangles& coarse : s.coarse) coarse.clear();
+  s.long_a.clear();
+  s.long_b.clear();
   s.unseen[0].clear();
   s.unseen[1].clear();
   s.grew = false;
@@ -47,6 +49,7 @@ bool TreeWalk::search(Scratch& s) {
   if (facesApart(a_.volume(a_.root()), b_.volume(b_.root()), b_in_a_)) return false;
 
   PairSteps steps(&a_.tree(), &b_.tree(), a_.now(), PairFrames(b_in_a_.scale, b_in_a_), s.frames);
+  for (int side = 0; side < 2; ++side) steps.coarse[side] = &s.coarse[side];
   const auto push = [&](const SetAside<TreeSide, TreeSide>::Pair& pair) {
     if (s.stack.size() < steps.depth + 1 + PairSteps::kStackRoom) {
       s.stack.resize(2 * (steps.depth + PairSteps::kStackRoom));
@@ -72,10 +75,7 @@ bool TreeWalk::stepAll(PairSteps& steps, Scratch& s) {
         setAside(steps, s);
         break;
       case PairSteps::kCoarse:
-        pushOctants(
-            steps, steps.expanded == 0
-                       ? s.coarse_b.octantsMeeting(a_, steps.pair[0].node, steps.mask, b_, steps.pair[1].node, b_in_a_)
-                       : s.coarse_a.octantsMeeting(b_, steps.pair[1].node, steps.mask, a_, steps.pair[0].node, aInB()));
+        meetCoarse(steps, s);
         break;
       case PairSteps::kLeaves:
         if (testLeaves(steps, s)) return true;
@@ -84,14 +84,33 @@ bool TreeWalk::stepAll(PairSteps& steps, Scratch& s) {
   }
 }
 
+void TreeWalk::meetCoarse(PairSteps& steps, Scratch& s) {
+  const int x = steps.expanded, y = 1 - x;
+  const TreeSide &small = x == 0 ? a_ : b_, &large = x == 0 ? b_ : a_;
+  const Placement& to = x == 0 ? b_in_a_ : aInB();
+  const tree::NodeRef node = steps.pair[x].node, leaf = steps.pair[y].node;
+  if (large.triangleCount(leaf) <= CoarseTriangles::kCapacity) {
+    const auto unit = static_cast<double>(steps.geometry.unit[x]);
+    steps.triangles = s.coarse[y].meeting(small, node, large, leaf, steps.triangles, to, unit);
+    if (steps.triangles != 0) pushMeeting(steps);
+  } else {
+    pushOctants(steps, (x == 0 ? s.long_b : s.long_a).octantsMeeting(small, node, steps.mask, large, leaf, to));
+  }
+}
+
 bool TreeWalk::testLeaves(const PairSteps& steps, Scratch& s) {
   if (!s.leaves_started) {
     s.leaves.start(b_in_a_, aInB());
     s.leaves_started = true;
   }
-  return s.leaves.test(
-      a_, steps.pair[0].node, b_, steps.pair[1].node,
-      [this](std::uint32_t t, std::uint32_t u, bool certain) { return visitor_.triangles(t, u, certain); });
+  const auto visit = [this](std::uint32_t t, std::uint32_t u, bool certain) {
+    return visitor_.triangles(t, u, certain);
+  };
+  const tree::NodeRef a = steps.pair[0].node, b = steps.pair[1].node;
+  const int y = steps.coarse_side;
+  if (y == PairSteps::kNone) return s.leaves.test(a_, a, b_, b, visit);
+  return y == 0 ? s.leaves.testCoarseA(s.coarse[0], steps.triangles, b_, b, visit)
+                : s.leaves.testCoarseB(a_, a, s.coarse[1], steps.triangles, visit);
 }
 
 const Placement& TreeWalk::aInB() {

@@ -29,6 +29,7 @@ class TreeWalk {
 
   bool search(Scratch& s);
   bool stepAll(PairSteps& steps, Scratch& s);
+  void meetCoarse(PairSteps& steps, Scratch& s);
   bool testLeaves(const PairSteps& steps, Scratch& s);
   void setAside(const PairSteps& steps, Scratch& s);
 

@@ -12,6 +12,8 @@
 #include <set>
 
 #include "meshes.h"
+#include "oracle/reference.h"
+#include "query/coarse_triangles.h"
 #include "query/distance_kernels.h"
 #include "query/tree_steps.h"
 #include "query/triangle.h"
@@ -176,6 +178,87 @@ void degenerateAtTimes(std::mt19937_64& g, Triangle& t, unsigned often) {
   if (g() % often == 0) t[2] = t[1] + 1e-9 * (t[2] - t[1]);
   if (g() % (2 * often) == 0) t[1] = t[0];
   if (g() % (4 * often) == 0) t[1] = t[2] = t[0];
+}
+
+// Three corners of a triangle with `point` at a corner, on an edge or inside.
+void aroundPoint(std::mt19937_64& g, const Eigen::Vector3d& point, double size, Corners& t) {
+  std::uniform_real_distribution<double> u(-1, 1);
+  for (auto& v : t) v = size * Eigen::Vector3d(u(g), u(g), u(g));
+  if (g() % 3 == 0) {
+    // Along an axis of the octants, as floors and walls are.
+    const auto axis = static_cast<int>(g() % 3);
+    for (auto& v : t) v[axis] = t[0][axis];
+  }
+  degenerateAtTimes(g, t, 8);
+  const double a = g() % 3 == 0 ? 0 : std::abs(u(g)), b = g() % 3 == 0 ? 0 : (1 - a) * std::abs(u(g));
+  const Eigen::Vector3d at = t[0] + a * (t[1] - t[0]) + b * (t[2] - t[0]);
+  for (auto& v : t) v += point - at;
+}
+
+TEST_P(EveryTarget, NoTriangleIsLostThatMeetsAnOctant) {
+  std::mt19937_64 g(36);
+  std::uniform_real_distribution<double> u(-1, 1);
+  constexpr double kMiddle = CoarseTriangles::kMiddle;
+  std::size_t others = 0, seen = 0, needless = 0;
+  for (int round = 0; round < 4000; ++round) {
+    CellOctants c;
+    c.cell.level = 1 + static_cast<int>(g() % 14);
+    for (auto& x : c.cell.at) x = static_cast<std::uint32_t>(g() % (1u << (c.cell.level - 1)));
+    for (int o = 0; o < 8; ++o) c.octants.set(o, randomBounds(g));
+    c.octants.set(0, oracle::CellBounds());  // one has points for sure
+    const int own = static_cast<int>(g() % 2);
+    Placement to;
+    to.rotation = test::randomRotation(g);
+    to.scale = std::pow(2.0, 10 * u(g));
+    to.translation = Eigen::Vector3d(u(g), u(g), u(g)) * kMiddle;
+    to.ready();
+    const PairFrames frames(to.scale, to);
+    const auto unit = static_cast<double>(frames.unit[own]);
+    // Triangles through a point of an octant.
+    const std::size_t count = 1 + g() % CoarseTriangles::kCapacity;
+    std::vector<TriangleBounds> bounds;
+    std::vector<int> octant;
+    std::vector<std::array<Eigen::Vector3d, 3>> corners;
+    while (bounds.size() < count) {
+      const int o = static_cast<int>(g() % 8);
+      const lattice::Cell cell = c.cell.octant(o);
+      const auto corner = cell.corner();
+      Eigen::Vector3d point;
+      const Eigen::Vector3d at(corner[0], corner[1], corner[2]);
+      if (!randomPoint(g, c.octants.get(o), at, cell.side(), point)) continue;
+      Corners t;
+      aroundPoint(g, point, cell.side() * std::pow(10.0, 1.5 + 3 * u(g)), t);
+      corners.push_back({t[0], t[1], t[2]});
+      for (auto& v : t) v = (v.array() - kMiddle) * unit;
+      bounds.emplace_back(t, kMiddle * unit);
+      octant.push_back(o);
+    }
+    std::uint32_t found[8];
+    octantsMeeting(frames, own, c, bounds.data(), count, found);
+    for (std::size_t i = 0; i < count; ++i) {
+      for (int o = 0; o < 8; ++o) {
+        const bool is_met = found[o] >> i & 1;
+        if (o == octant[i]) {
+          ASSERT_TRUE(is_met) << "round " << round << " octant " << o;
+          continue;
+        }
+        // The whole octant, by the reference of the oracle: what it says is free may not be found too often.
+        const lattice::Cell cell = c.cell.octant(o);
+        const auto corner = cell.corner();
+        const double half = cell.side() / 2.0;
+        const Eigen::Vector3d middle = Eigen::Vector3d(corner[0], corner[1], corner[2]).array() + half;
+        const bool free = !oracle::touches(corners[i].data(), middle, half + 2);
+        ++others;
+        seen += free;
+        needless += free && is_met;
+      }
+    }
+    if (count < 32) {
+      for (const std::uint32_t f : found) ASSERT_EQ(f >> count, 0u);
+    }
+  }
+  EXPECT_GT(seen, others / 10);
+  EXPECT_LT(needless, seen / 10) << "a test that lets everything through proves nothing";
 }
 
 PackRegion everywhere() {
