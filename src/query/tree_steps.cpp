@@ -22,7 +22,7 @@ inline bool isLeaf(const StepNode& n) {
 
 // The order is there already: overlapping() writes it to where the group will be.
 inline void push(PairSteps& s, int side, std::uint32_t block, std::uint32_t level, std::uint32_t frame,
-                 const StepNode& other, unsigned octants, std::uint32_t coarse = 0) {
+                 const StepNode& other, unsigned octants, std::uint32_t coarse = StepGroup::kNone) {
   StepGroup& top = s.stack[s.depth++];
   top.other.node = other.node;
   top.other.link = other.link;
@@ -183,12 +183,8 @@ HWY_INLINE std::uint32_t pop(PairSteps& s, StepNode (&pair)[2]) {
     other.link = top.other.link;
     other.level = top.other.level;
     other.lane = top.other.lane;
-    s.coarse_side = PairSteps::kNone;
-    s.triangles = ~0u;
-    if (top.coarse != 0) {
-      s.coarse_side = 1 - static_cast<int>(top.side);
-      s.triangles = top.triangles[o];
-    }
+    s.coarse = top.coarse;
+    s.triangles = top.triangles[o];
     if (top.frame == StepGroup::kNoFrame) {
       own.lane = StepNode::kNoLane;
       return 0;
@@ -271,10 +267,10 @@ HWY_INLINE unsigned meeting(const PairFrames& g, int own, const Frame& f, unsign
 }
 
 // The octants of the pair's smaller node that the larger leaf's triangles may meet, onto the stack.
-HWY_INLINE void pushThose(PairSteps& s) {
+HWY_NOINLINE void pushThose(PairSteps& s) {
   const hn::RebindToUnsigned<D> du;
   const int x = s.expanded, y = 1 - x;
-  const CoarseTriangles& triangles = *s.coarse[y];
+  const CoarseTriangles& triangles = *s.leaf[y];
   StepGroup& top = s.stack[s.depth];
   const unsigned mask = meeting(
       s.geometry, x, s.frames[s.frames_used], s.mask, s.triangles,
@@ -284,7 +280,9 @@ HWY_INLINE void pushThose(PairSteps& s) {
         const auto none = hn::Eq(met, hn::Zero(du));
         hn::StoreU(hn::IfThenZeroElse(none, hn::LoadU(du, top.order + i)), du, top.order + i);
       });
-  if (mask != 0) push(s, x, s.pair[x].link.index(), s.pair[x].level + 1, s.frames_used, s.pair[y], mask, 1);
+  if (mask != 0)
+    push(s, x, s.pair[x].link.index(), s.pair[x].level + 1, s.frames_used, s.pair[y], mask,
+         static_cast<std::uint32_t>(y));
 }
 
 void PushMeeting(PairSteps& s) { pushThose(s); }
@@ -327,7 +325,7 @@ PairSteps::Event NextEvent(PairSteps& s) {
       s.frames_used = frames;
       s.expanded = x;
       s.mask = mask;
-      if (!s.coarse[y]->know(other.node, s.triangles)) return PairSteps::kCoarse;
+      if (s.coarse == StepGroup::kNone || !s.leaf[y]->know(other.node, s.triangles)) return PairSteps::kCoarse;
       pushThose(s);
       continue;
     }

@@ -32,13 +32,13 @@ struct StepGroup {
   std::uint32_t frame;  ///< Where the block's octants are, if they are; those below it are in use, too.
   std::uint32_t level;  ///< Of the octants.
   std::uint32_t octants;
-  std::uint32_t
-      coarse;  ///< The other node is a larger leaf, and `triangles` says which of its triangles may meet each.
-  std::uint32_t triangles[8];
   /// For each of these: how far it overlaps the other node, as the bits of a float whose lowest three are the octant.
   /// 0 for the others; kLast, a depth below all, for what waits until they are gone.
   std::uint32_t order[8];
   static constexpr std::uint32_t kLast = 8;
+  std::uint32_t coarse;        ///< Which side's node is a larger leaf whose triangles were asked about the octants ...
+  std::uint32_t triangles[8];  ///< ... and which of them, a bit each, may meet each octant.
+  static constexpr std::uint32_t kNone = 2;
 };
 
 /// The depth-first walk over resident pairs of two trees, exact answers: up to the next pair of leaves.
@@ -53,7 +53,7 @@ struct PairSteps {
     kLeaves,  ///< `pair` is two leaves, to be tested.
     kAside,   ///< `pair` needs a node that is not expanded.
     /// `pair` is a leaf and a smaller node, `expanded`, whose octants in `mask` overlap the leaf's volume; of the
-    /// leaf's triangles those in `triangles` may meet the node, but are not known.
+    /// leaf's triangles those in `triangles` may meet the node, if they were asked, but are not known.
     kCoarse,
   };
 
@@ -67,11 +67,10 @@ struct PairSteps {
   /// A node of side 0 is not smaller (is larger) than one of side 1 that is at least so many levels deeper.
   int not_smaller, larger;
 
-  StepNode pair[2];               ///< Of the event.
-  int coarse_side = kNone;        ///< Which of the two is a larger leaf whose triangles were asked about the other ...
-  std::uint32_t triangles = ~0u;  ///< ... and may meet it, if any.
-  static constexpr int kNone = -1;
-  const CoarseTriangles* coarse[2] = {nullptr, nullptr};  ///< Those of a leaf of each side.
+  StepNode pair[2];                         ///< Of the event.
+  std::uint32_t coarse = StepGroup::kNone;  ///< As in StepGroup, of the pair.
+  std::uint32_t triangles = 0;
+  const CoarseTriangles* leaf[2] = {nullptr, nullptr};  ///< Those of a larger leaf of each side.
   std::uint32_t frames_used = 0;
   int expanded = 0;
   unsigned mask = 0;

@@ -49,7 +49,7 @@ bool TreeWalk::search(Scratch& s) {
   if (facesApart(a_.volume(a_.root()), b_.volume(b_.root()), b_in_a_)) return false;
 
   PairSteps steps(&a_.tree(), &b_.tree(), a_.now(), PairFrames(b_in_a_.scale, b_in_a_), s.frames);
-  for (int side = 0; side < 2; ++side) steps.coarse[side] = &s.coarse[side];
+  for (int side = 0; side < 2; ++side) steps.leaf[side] = &s.coarse[side];
   const auto push = [&](const SetAside<TreeSide, TreeSide>::Pair& pair) {
     if (s.stack.size() < steps.depth + 1 + PairSteps::kStackRoom) {
       s.stack.resize(2 * (steps.depth + PairSteps::kStackRoom));
@@ -91,7 +91,8 @@ void TreeWalk::meetCoarse(PairSteps& steps, Scratch& s) {
   const tree::NodeRef node = steps.pair[x].node, leaf = steps.pair[y].node;
   if (large.triangleCount(leaf) <= CoarseTriangles::kCapacity) {
     const auto unit = static_cast<double>(steps.geometry.unit[x]);
-    steps.triangles = s.coarse[y].meeting(small, node, large, leaf, steps.triangles, to, unit);
+    const std::uint32_t asked = steps.coarse == StepGroup::kNone ? ~0u : steps.triangles;
+    steps.triangles = s.coarse[y].meeting(small, node, large, leaf, asked, to, unit);
     if (steps.triangles != 0) pushMeeting(steps);
   } else {
     pushOctants(steps, (x == 0 ? s.long_b : s.long_a).octantsMeeting(small, node, steps.mask, large, leaf, to));
@@ -107,10 +108,9 @@ bool TreeWalk::testLeaves(const PairSteps& steps, Scratch& s) {
     return visitor_.triangles(t, u, certain);
   };
   const tree::NodeRef a = steps.pair[0].node, b = steps.pair[1].node;
-  const int y = steps.coarse_side;
-  if (y == PairSteps::kNone) return s.leaves.test(a_, a, b_, b, visit);
-  return y == 0 ? s.leaves.testCoarseA(s.coarse[0], steps.triangles, b_, b, visit)
-                : s.leaves.testCoarseB(a_, a, s.coarse[1], steps.triangles, visit);
+  if (steps.coarse == StepGroup::kNone) return s.leaves.test(a_, a, b_, b, visit);
+  return steps.coarse == 0 ? s.leaves.testCoarseA(s.coarse[0], steps.triangles, b_, b, visit)
+                           : s.leaves.testCoarseB(a_, a, s.coarse[1], steps.triangles, visit);
 }
 
 const Placement& TreeWalk::aInB() {
