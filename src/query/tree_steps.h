@@ -114,10 +114,9 @@ void pushMeeting(PairSteps& steps);
 /// misses octant o of a cell of side `own`.
 ///
 /// Along the axes of the octants, the triangle's normal and those of its edges in its plane; along the normal the
-/// octant's slab counts, too. With Q half a root's side and u = 2^-24, a centre is off by 6 u Q, an extent by 3 u Q. A
-/// projection on an axis of unit sum adds 4 u Q, a radius 4 u Q, sums of both 3 u Q, the bound 4 u Q: 24 u Q. By the
-/// slab (its offset 11, normal 3, what the normals differ by 5, sums 22; then 21 as before) it is 62 u Q;
-/// PairFrames::own_pad takes 128.
+/// octant's slab counts, too. With Q half a root's side and u = 2^-24, a centre is off by 6 u Q, an extent by 3, a
+/// projection on an axis of unit sum by 4 and a radius by 4 more, sums of both by 3, a bound by 2: 22 u Q. Slabs add
+/// 41: their offset 11, their normal 3, what the normals differ by 5, sums 22. PairFrames::own_pad takes 128.
 void octantsMeeting(const PairFrames& geometry, int own, const CellOctants& cell, const TriangleBounds* triangles,
                     std::size_t count, std::uint32_t (&met)[8]);
 

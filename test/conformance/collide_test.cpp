@@ -143,6 +143,20 @@ void expectPairs(const Pairs& found, const Pairs& expected, const Raw& a, const 
   }
 }
 
+// Triangles about a corner that they share, more than a leaf is to have.
+Raw fan(std::mt19937_64& g) {
+  constexpr std::size_t kTriangles = 70;
+  std::uniform_real_distribution<double> u(-1, 1);
+  Raw raw;
+  raw.vertices.emplace_back(0, 0, 0);
+  for (std::size_t i = 0; i < kTriangles; ++i) {
+    const double angle = 2 * std::acos(-1.0) * static_cast<double>(i) / kTriangles;
+    raw.vertices.emplace_back(std::cos(angle), std::sin(angle), 0.3 * u(g));
+    raw.triangles.emplace_back(0, i + 1, (i + 1) % kTriangles + 1);
+  }
+  return raw;
+}
+
 TYPED_TEST(Collide, SmallMeshesBesideLargeTriangles) {
   using S = TypeParam;
   // As large as a few of the other's triangles, which it meets by their insides, their edges and their corners.
@@ -152,9 +166,8 @@ TYPED_TEST(Collide, SmallMeshesBesideLargeTriangles) {
   std::mt19937_64 g(14);
   const auto I = fcl::Transform3<S>(fcl::Transform3<S>::Identity());
   int hits = 0, count = 0;
-  for (const double scale : {4.0, 30.0, 200.0}) {
-    Raw ra = test::torus(12, 0.3);
-    ra.scale(scale);
+  for (const Raw& ra : {test::torus(12, 0.3).scale(4), test::torus(12, 0.3).scale(30), test::torus(12, 0.3).scale(200),
+                        fan(g).scale(30)}) {
     const auto fa = test::bvh<fcl::OBBRSS<S>>(ra);
     const Model<S> a(ra.mesh());
     for (int i = 0; i < 12; ++i) {
@@ -169,7 +182,7 @@ TYPED_TEST(Collide, SmallMeshesBesideLargeTriangles) {
       for (const double gap : {-0.3, -1e-2, -1e-4, -1e-6, 0.0, 1e-6, 1e-4, 1e-2}) {
         const auto X = at(contact + gap);
         const Pairs found = test::pairs<S>(a, I, b, X), turned = test::pairs<S>(b, X, a, I);
-        SCOPED_TRACE(testing::Message() << "scale " << scale << " pose " << i << " gap " << gap);
+        SCOPED_TRACE(testing::Message() << ra.vertices[1].norm() << " pose " << i << " gap " << gap);
         expectPairs<S>(found, test::pairs<S>(*fa, I, *fb, X), ra, I, rb, X);
         expectPairs<S>(turned, test::pairs<S>(*fb, X, *fa, I), rb, X, ra, I);
         ASSERT_EQ(test::touching<S>(a, I, b, X), !found.empty());
