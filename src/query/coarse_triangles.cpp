@@ -7,28 +7,6 @@
 namespace bocst::query {
 namespace {
 
-// An axis as floats, and how far the corners reach along it.
-struct Axis {
-  float axis[3];
-  double low, high;
-
-  Axis(const Eigen::Vector3d& along, const Corners& corners, double far) : axis{0, 0, 0}, low(-far), high(far) {
-    const double size = std::abs(along[0]) + std::abs(along[1]) + std::abs(along[2]);
-    if (!(size > 1e-100 && size < 1e100)) return;
-    const double scale = 1 / size;
-    Eigen::Vector3d n;
-    for (int k = 0; k < 3; ++k) {
-      axis[k] = static_cast<float>(along[k] * scale);
-      n[k] = axis[k];
-    }
-    const double a = n.dot(corners[0]), b = n.dot(corners[1]), c = n.dot(corners[2]);
-    low = std::min({a, b, c});
-    high = std::max({a, b, c});
-  }
-};
-
-float within(double x, double far) { return static_cast<float>(std::min(std::max(x, -far), far)); }
-
 // Where a pack about the middle of the root can meet a node's volume. With M = `reach`, what is computed here and by
 // trianglesWithin() is off by 15 u M, as for LeafPairs.
 PackRegion regionOf(const Volume& v, const Placement& other_in_side, double size) {
@@ -52,25 +30,6 @@ PackRegion regionOf(const Volume& v, const Placement& other_in_side, double size
 
 }  // namespace
 
-TriangleBounds::TriangleBounds(const Corners& corners, double far) {
-  far *= 2;
-  for (int k = 0; k < 3; ++k) {
-    low[k] = within(std::min({corners[0][k], corners[1][k], corners[2][k]}), far);
-    high[k] = within(std::max({corners[0][k], corners[1][k], corners[2][k]}), far);
-  }
-  const Eigen::Vector3d edges[3] = {corners[1] - corners[0], corners[2] - corners[1], corners[0] - corners[2]};
-  const Eigen::Vector3d n = edges[0].cross(edges[1]);
-  const Axis plane(n, corners, far);
-  std::copy_n(plane.axis, 3, normal);
-  normal_low = within(plane.low, far);
-  normal_high = within(plane.high, far);
-  for (int e = 0; e < 3; ++e) {
-    const Axis out(edges[e].cross(n), corners, far);
-    std::copy_n(out.axis, 3, edge[e]);
-    edge_high[e] = within(out.high, far);
-  }
-}
-
 std::uint32_t CoarseTriangles::meeting(const TreeSide& side, tree::NodeRef node, const TreeSide& other,
                                        tree::NodeRef leaf, std::uint32_t which, const Placement& other_in_side,
                                        double unit) {
@@ -86,20 +45,8 @@ std::uint32_t CoarseTriangles::meeting(const TreeSide& side, tree::NodeRef node,
   if (inRange(pack_)) {
     met &= trianglesWithin(pack_, regionOf(side.volume(node), other_in_side, static_cast<double>(pack_.size)));
   }
-  for (std::uint32_t left = met & ~known_; left != 0; left &= left - 1) {
-    const auto i = static_cast<std::size_t>(__builtin_ctz(left));
-    Corners scaled;
-    for (std::size_t k = 0; k < 3; ++k) {
-      const Eigen::Vector3d v = raw_.corner(i, k);
-      for (int r = 0; r < 3; ++r) {
-        const double(&l)[3] = place_.linear[r];
-        corners_[i][k][r] = l[0] * v[0] + l[1] * v[1] + l[2] * v[2] + place_.offset[r];
-      }
-      scaled[k] = corners_[i][k] * unit;
-    }
-    bounds_[i] = TriangleBounds(scaled, kMiddle * unit);
-  }
-  known_ |= met;
+  const std::uint32_t wanted = met & ~known_;
+  if (wanted != 0) known_ |= boundTriangles(raw_.raw(), wanted, place_, unit, 2 * kMiddle * unit, placed_, bounds_);
   return met;
 }
 

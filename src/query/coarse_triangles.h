@@ -6,24 +6,8 @@
 
 #include "query/leaf_corners.h"
 #include "query/side.h"
-#include "query/triangle.h"
 
 namespace bocst::query {
-
-/// Where a triangle is, for tests against boxes that are not larger than it: between two bounds along each axis, along
-/// its normal, and behind its edges in its plane. In the coordinates of PairFrames.
-///
-/// Axes are rounded to float first and the bounds computed along what they are then, so whatever an axis is, it is one.
-/// The sum of its entries' sizes is 1, or 0 where there is none.
-struct TriangleBounds {
-  float low[3], high[3];
-  float normal[3], normal_low, normal_high;
-  float edge[3][3], edge_high[3];
-
-  /// `far`: a length that no box's coordinates exceed; bounds beyond twice that are cut off there.
-  TriangleBounds(const Corners& corners, double far);
-  TriangleBounds() = default;
-};
 
 /// The triangles of a leaf of one side as smaller nodes of the other see them: with large triangles the leaf's volume
 /// says little. What misses a node misses its octants, so only the first of these is asked about all triangles.
@@ -50,9 +34,12 @@ class CoarseTriangles {
 
   // Of triangles that are known.
 
-  const TriangleBounds& bounds(std::size_t i) const { return bounds_[i]; }
-  /// Corners in lattice units of the smaller side, about the middle of its root.
-  const Corners& corners(std::size_t i) const { return corners_[i]; }
+  /// In the coordinates of PairFrames.
+  const TriangleBounds& bounds() const { return bounds_; }
+  /// In lattice units of the smaller side, about the middle of its root.
+  Eigen::Vector3d corner(std::size_t i, std::size_t k) const {
+    return {placed_.xyz[3 * k][i], placed_.xyz[3 * k + 1][i], placed_.xyz[3 * k + 2][i]};
+  }
   std::uint32_t id(std::size_t i) const { return raw_.id(i); }
 
   static constexpr double kMiddle = 1 << (lattice::kBits - 1);
@@ -64,8 +51,8 @@ class CoarseTriangles {
   tree::NodeRef leaf_;
   std::size_t count_ = 0;  // nothing is held when it is 0
   std::uint32_t known_ = 0;
-  TriangleBounds bounds_[kCapacity];
-  Corners corners_[kCapacity];
+  RawTriangles placed_;
+  TriangleBounds bounds_;
 };
 
 }  // namespace bocst::query

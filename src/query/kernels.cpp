@@ -129,6 +129,67 @@ void PlaceTriangles(RawTriangles& raw, std::size_t count, const PackPlacement& p
   pack.size = hn::GetLane(hn::MaxOfLanes(df, size));
 }
 
+std::uint32_t BoundTriangles(const RawTriangles& raw, std::uint32_t which, const PackPlacement& place, double unit,
+                             double far, RawTriangles& placed, TriangleBounds& bounds) {
+  const hn::CappedTag<double, 8> dd;
+  const hn::Rebind<float, decltype(dd)> df;
+  using VD = hn::Vec<decltype(dd)>;
+  const VD most = hn::Set(dd, far), least = hn::Set(dd, -far), scale = hn::Set(dd, unit);
+  const auto put = [&](VD x, float* to)
+                       HWY_ATTR { hn::Store(hn::DemoteTo(df, hn::Min(hn::Max(x, least), most)), df, to); };
+  const std::uint32_t lanes = (1u << hn::Lanes(dd)) - 1;
+  std::uint32_t done = 0;
+  for (std::size_t i = 0; i < TriangleBounds::kCapacity; i += hn::Lanes(dd)) {
+    if ((which >> i & lanes) == 0) continue;
+    done |= lanes << i;
+    Vec3Of<VD> v[3];
+    BOCST_UNROLL
+    for (std::size_t k = 0; k < 3; ++k) {
+      const VD from[3] = {hn::Load(dd, raw.xyz[3 * k] + i), hn::Load(dd, raw.xyz[3 * k + 1] + i),
+                          hn::Load(dd, raw.xyz[3 * k + 2] + i)};
+      VD at[3];
+      BOCST_UNROLL
+      for (std::size_t c = 0; c < 3; ++c) {
+        at[c] = hn::MulAdd(hn::Set(dd, place.linear[c][0]), from[0], hn::Set(dd, place.offset[c]));
+        at[c] = hn::MulAdd(hn::Set(dd, place.linear[c][1]), from[1], at[c]);
+        at[c] = hn::MulAdd(hn::Set(dd, place.linear[c][2]), from[2], at[c]);
+        hn::Store(at[c], dd, placed.xyz[3 * k + c] + i);
+      }
+      v[k] = scaled(Vec3Of<VD>{at[0], at[1], at[2]}, scale);
+    }
+    put(min3(v[0].x, v[1].x, v[2].x), bounds.low[0] + i);
+    put(min3(v[0].y, v[1].y, v[2].y), bounds.low[1] + i);
+    put(min3(v[0].z, v[1].z, v[2].z), bounds.low[2] + i);
+    put(max3(v[0].x, v[1].x, v[2].x), bounds.high[0] + i);
+    put(max3(v[0].y, v[1].y, v[2].y), bounds.high[1] + i);
+    put(max3(v[0].z, v[1].z, v[2].z), bounds.high[2] + i);
+
+    // A direction as floats of unit sum, and as these are in double.
+    const auto direction = [&](Vec3Of<VD> along, float(*to)[TriangleBounds::kCapacity]) HWY_ATTR {
+      const VD size = hn::Add(hn::Add(hn::Abs(along.x), hn::Abs(along.y)), hn::Abs(along.z));
+      const auto is = hn::And(hn::Gt(size, hn::Set(dd, 1e-100)), hn::Lt(size, hn::Set(dd, 1e100)));
+      const VD by = hn::IfThenElseZero(is, hn::Div(hn::Set(dd, 1.0), size));
+      const Vec3Of<VD> n = scaled(along, by);
+      const auto x = hn::DemoteTo(df, n.x), y = hn::DemoteTo(df, n.y), z = hn::DemoteTo(df, n.z);
+      hn::Store(x, df, to[0] + i);
+      hn::Store(y, df, to[1] + i);
+      hn::Store(z, df, to[2] + i);
+      return Vec3Of<VD>{hn::PromoteTo(dd, x), hn::PromoteTo(dd, y), hn::PromoteTo(dd, z)};
+    };
+    const Vec3Of<VD> e[3] = {sub(v[1], v[0]), sub(v[2], v[1]), sub(v[0], v[2])};
+    const Vec3Of<VD> across = cross(e[0], e[1]), n = direction(across, bounds.normal);
+    const VD n0 = dot(n, v[0]), n1 = dot(n, v[1]), n2 = dot(n, v[2]);
+    put(min3(n0, n1, n2), bounds.normal_low + i);
+    put(max3(n0, n1, n2), bounds.normal_high + i);
+    BOCST_UNROLL
+    for (std::size_t k = 0; k < 3; ++k) {
+      const Vec3Of<VD> out = direction(cross(e[k], across), bounds.edge[k]);
+      put(max3(dot(out, v[0]), dot(out, v[1]), dot(out, v[2])), bounds.edge_high[k] + i);
+    }
+  }
+  return done;
+}
+
 std::uint32_t TrianglesWithin(const TrianglePack& pack, const PackRegion& region) {
   const D d;
   std::uint32_t result = 0;
@@ -297,6 +358,7 @@ namespace bocst::query {
 
 HWY_EXPORT(OverlappingOctants);
 HWY_EXPORT(PlaceTriangles);
+HWY_EXPORT(BoundTriangles);
 HWY_EXPORT(TrianglesWithin);
 HWY_EXPORT(MoveTriangles);
 HWY_EXPORT(TouchingPairs);
@@ -307,6 +369,11 @@ std::uint8_t overlappingOctants(const oracle::OctantBounds& octants, const OneVo
 
 void placeTriangles(RawTriangles& raw, std::size_t count, const PackPlacement& place, TrianglePack& pack) {
   HWY_DYNAMIC_DISPATCH(PlaceTriangles)(raw, count, place, pack);
+}
+
+std::uint32_t boundTriangles(const RawTriangles& raw, std::uint32_t which, const PackPlacement& place, double unit,
+                             double far, RawTriangles& placed, TriangleBounds& bounds) {
+  return HWY_DYNAMIC_DISPATCH(BoundTriangles)(raw, which, place, unit, far, placed, bounds);
 }
 
 std::uint32_t trianglesWithin(const TrianglePack& pack, const PackRegion& region) {

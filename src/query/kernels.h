@@ -50,6 +50,23 @@ struct PackPlacement {
 /// Fills the pack with `count` triangles, 1 to kCapacity. What is in `raw` beyond is overwritten.
 void placeTriangles(RawTriangles& raw, std::size_t count, const PackPlacement& place, TrianglePack& pack);
 
+/// Where up to TrianglePack::kCapacity triangles are, for tests against boxes that are not larger than them: between
+/// two bounds along each axis, along their normals, and behind their edges in their planes.
+///
+/// Directions are rounded to float first and the bounds computed along what they are then, so whatever a direction is,
+/// its bounds hold. The sum of its entries' sizes is 1, or 0 where there is none.
+struct TriangleBounds {
+  static constexpr std::size_t kCapacity = TrianglePack::kCapacity;
+  alignas(64) float low[3][kCapacity], high[3][kCapacity];
+  float normal[3][kCapacity], normal_low[kCapacity], normal_high[kCapacity];
+  float edge[3][3][kCapacity], edge_high[3][kCapacity];  ///< [edge]: out of the triangle; [axis].
+};
+
+/// Places at least those triangles in `which`, in double, and finds the bounds of what is placed, times `unit`, cut off
+/// at `far`. `raw` must have been placed in a pack. Returns which triangles are done; the places of others may be, too.
+std::uint32_t boundTriangles(const RawTriangles& raw, std::uint32_t which, const PackPlacement& place, double unit,
+                             double far, RawTriangles& placed, TriangleBounds& bounds);
+
 /// Where triangles of a pack can meet those of another leaf: a box and a slab, all in the pack's frame and padded.
 struct PackRegion {
   float low[3], high[3];

@@ -43,10 +43,7 @@ class LeafCorners {
 
   std::size_t count() const { return count_; }
   std::uint32_t id(std::size_t i) const { return ids_[i]; }
-  /// Corner k of triangle i, in the mesh's frame.
-  Eigen::Vector3d corner(std::size_t i, std::size_t k) const {
-    return {raw_.xyz[3 * k][i], raw_.xyz[3 * k + 1][i], raw_.xyz[3 * k + 2][i]};
-  }
+  const RawTriangles& raw() const { return raw_; }
   void place(const PackPlacement& to, TrianglePack& pack) { placeTriangles(raw_, count_, to, pack); }
 
  private:

@@ -272,7 +272,7 @@ class LeafPairs {
       for (std::uint32_t left = which; left != 0; left &= left - 1) {
         const auto t = static_cast<std::size_t>(__builtin_ctz(left));
         for (std::size_t k = 0; k < 3; ++k) {
-          const Eigen::Vector3d v = coarse.corners(t)[k] - (middle.array() - CoarseTriangles::kMiddle).matrix();
+          const Eigen::Vector3d v = coarse.corner(t, k) - (middle.array() - CoarseTriangles::kMiddle).matrix();
           for (std::size_t x = 0; x < 3; ++x) {
             const auto at = static_cast<float>(v[static_cast<int>(x)]);
             rows_.xyz[3 * k + x][rows_.count] = at;

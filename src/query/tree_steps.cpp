@@ -196,9 +196,9 @@ HWY_INLINE std::uint32_t pop(PairSteps& s, StepNode (&pair)[2]) {
 
 // The octants of a frame against triangles, see octantsMeeting(). Of the octants in `mask`, and the triangles in
 // `which`; f(lane, which triangles) is called for each vector. Returns the octants that a triangle may meet.
-template <typename BoundsOf, typename F>
+template <typename F>
 HWY_INLINE unsigned meeting(const PairFrames& g, int own, const Frame& f, unsigned mask, std::uint32_t which,
-                            BoundsOf&& bounds_of, F&& store) {
+                            const TriangleBounds& b, F&& store) {
   const D d;
   const hn::RebindToUnsigned<D> du;
   const V pad = hn::Set(d, g.own_pad[own]);
@@ -220,18 +220,18 @@ HWY_INLINE unsigned meeting(const PairFrames& g, int own, const Frame& f, unsign
     auto triangles = hn::Zero(du);
     for (std::uint32_t left = which; left != 0; left &= left - 1) {
       const int t = __builtin_ctz(left);
-      const TriangleBounds& b = bounds_of(static_cast<std::size_t>(t));
       M meet = in;
       BOCST_UNROLL
       for (int k = 0; k < 3; ++k) {
-        meet = hn::And(meet, hn::And(hn::Le(low[k], hn::Set(d, b.high[k])), hn::Ge(high[k], hn::Set(d, b.low[k]))));
+        meet =
+            hn::And(meet, hn::And(hn::Le(low[k], hn::Set(d, b.high[k][t])), hn::Ge(high[k], hn::Set(d, b.low[k][t]))));
       }
       {
         // How far the octant reaches along the normal: its box, and its slab as in overlapping().
         V n[3], at = hn::Zero(d), r = pad, along = hn::Zero(d);
         BOCST_UNROLL
         for (int k = 0; k < 3; ++k) {
-          n[k] = hn::Set(d, b.normal[k]);
+          n[k] = hn::Set(d, b.normal[k][t]);
           at = hn::MulAdd(n[k], c[k], at);
           r = hn::MulAdd(hn::Abs(n[k]), h[k], r);
           along = hn::MulAdd(n[k], m[k], along);
@@ -242,7 +242,8 @@ HWY_INLINE unsigned meeting(const PairFrames& g, int own, const Frame& f, unsign
         const V slab_at = hn::MulAdd(along, slab, at);
         const V least = hn::Max(hn::Sub(at, r), hn::Sub(slab_at, slab_r));
         const V most = hn::Min(hn::Add(at, r), hn::Add(slab_at, slab_r));
-        meet = hn::And(meet, hn::And(hn::Le(least, hn::Set(d, b.normal_high)), hn::Ge(most, hn::Set(d, b.normal_low))));
+        meet = hn::And(meet,
+                       hn::And(hn::Le(least, hn::Set(d, b.normal_high[t])), hn::Ge(most, hn::Set(d, b.normal_low[t]))));
       }
       if (hn::AllFalse(d, meet)) continue;
       BOCST_UNROLL
@@ -250,11 +251,11 @@ HWY_INLINE unsigned meeting(const PairFrames& g, int own, const Frame& f, unsign
         V at = hn::Zero(d), r = pad;
         BOCST_UNROLL
         for (int k = 0; k < 3; ++k) {
-          const V a = hn::Set(d, b.edge[e][k]);
+          const V a = hn::Set(d, b.edge[e][k][t]);
           at = hn::MulAdd(a, c[k], at);
           r = hn::MulAdd(hn::Abs(a), h[k], r);
         }
-        meet = hn::And(meet, hn::Le(hn::Sub(at, r), hn::Set(d, b.edge_high[e])));
+        meet = hn::And(meet, hn::Le(hn::Sub(at, r), hn::Set(d, b.edge_high[e][t])));
       }
       triangles = hn::Or(triangles, hn::IfThenElseZero(hn::RebindMask(du, meet), hn::Set(du, 1u << t)));
     }
@@ -270,16 +271,13 @@ HWY_INLINE unsigned meeting(const PairFrames& g, int own, const Frame& f, unsign
 HWY_NOINLINE void pushThose(PairSteps& s) {
   const hn::RebindToUnsigned<D> du;
   const int x = s.expanded, y = 1 - x;
-  const CoarseTriangles& triangles = *s.leaf[y];
   StepGroup& top = s.stack[s.depth];
-  const unsigned mask = meeting(
-      s.geometry, x, s.frames[s.frames_used], s.mask, s.triangles,
-      [&triangles](std::size_t t) -> const TriangleBounds& { return triangles.bounds(t); },
-      [&top, du](std::size_t i, hn::Vec<hn::RebindToUnsigned<D>> met) HWY_ATTR {
-        hn::StoreU(met, du, top.triangles + i);
-        const auto none = hn::Eq(met, hn::Zero(du));
-        hn::StoreU(hn::IfThenZeroElse(none, hn::LoadU(du, top.order + i)), du, top.order + i);
-      });
+  const unsigned mask = meeting(s.geometry, x, s.frames[s.frames_used], s.mask, s.triangles, s.leaf[y]->bounds(),
+                                [&top, du](std::size_t i, hn::Vec<hn::RebindToUnsigned<D>> met) HWY_ATTR {
+                                  hn::StoreU(met, du, top.triangles + i);
+                                  const auto none = hn::Eq(met, hn::Zero(du));
+                                  hn::StoreU(hn::IfThenZeroElse(none, hn::LoadU(du, top.order + i)), du, top.order + i);
+                                });
   if (mask != 0)
     push(s, x, s.pair[x].link.index(), s.pair[x].level + 1, s.frames_used, s.pair[y], mask,
          static_cast<std::uint32_t>(y));
@@ -287,15 +285,13 @@ HWY_NOINLINE void pushThose(PairSteps& s) {
 
 void PushMeeting(PairSteps& s) { pushThose(s); }
 
-void OctantsMeeting(const PairFrames& geometry, int own, const CellOctants& cell, const TriangleBounds* triangles,
+void OctantsMeeting(const PairFrames& geometry, int own, const CellOctants& cell, const TriangleBounds& triangles,
                     std::size_t count, std::uint32_t (&met)[8]) {
   const hn::RebindToUnsigned<D> du;
   Frame f;
   decodeCell(geometry, own, cell.cell.level, cell.cell.at, cell.octants, f);
-  meeting(
-      geometry, own, f, 0xff, count < 32 ? (1u << count) - 1 : ~0u,
-      [triangles](std::size_t t) -> const TriangleBounds& { return triangles[t]; },
-      [&met, du](std::size_t i, hn::Vec<hn::RebindToUnsigned<D>> m) HWY_ATTR { hn::StoreU(m, du, met + i); });
+  meeting(geometry, own, f, 0xff, count < 32 ? (1u << count) - 1 : ~0u, triangles,
+          [&met, du](std::size_t i, hn::Vec<hn::RebindToUnsigned<D>> m) HWY_ATTR { hn::StoreU(m, du, met + i); });
 }
 
 PairSteps::Event NextEvent(PairSteps& s) {
@@ -354,7 +350,7 @@ PairSteps::Event nextEvent(PairSteps& steps) { return HWY_DYNAMIC_DISPATCH(NextE
 
 void pushMeeting(PairSteps& steps) { HWY_DYNAMIC_DISPATCH(PushMeeting)(steps); }
 
-void octantsMeeting(const PairFrames& geometry, int own, const CellOctants& cell, const TriangleBounds* triangles,
+void octantsMeeting(const PairFrames& geometry, int own, const CellOctants& cell, const TriangleBounds& triangles,
                     std::size_t count, std::uint32_t (&met)[8]) {
   HWY_DYNAMIC_DISPATCH(OctantsMeeting)(geometry, own, cell, triangles, count, met);
 }

@@ -117,7 +117,7 @@ void pushMeeting(PairSteps& steps);
 /// octant's slab counts, too. With Q half a root's side and u = 2^-24, a centre is off by 6 u Q, an extent by 3, a
 /// projection on an axis of unit sum by 4 and a radius by 4 more, sums of both by 3, a bound by 2: 22 u Q. Slabs add
 /// 41: their offset 11, their normal 3, what the normals differ by 5, sums 22. PairFrames::own_pad takes 128.
-void octantsMeeting(const PairFrames& geometry, int own, const CellOctants& cell, const TriangleBounds* triangles,
+void octantsMeeting(const PairFrames& geometry, int own, const CellOctants& cell, const TriangleBounds& triangles,
                     std::size_t count, std::uint32_t (&met)[8]);
 
 /// After kCoarse: puts the octants in `mask` of the expanded node of steps.pair on the stack.

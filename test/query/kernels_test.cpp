@@ -216,10 +216,9 @@ TEST_P(EveryTarget, NoTriangleIsLostThatMeetsAnOctant) {
     const auto unit = static_cast<double>(frames.unit[own]);
     // Triangles through a point of an octant.
     const std::size_t count = 1 + g() % CoarseTriangles::kCapacity;
-    std::vector<TriangleBounds> bounds;
     std::vector<int> octant;
     std::vector<std::array<Eigen::Vector3d, 3>> corners;
-    while (bounds.size() < count) {
+    while (corners.size() < count) {
       const int o = static_cast<int>(g() % 8);
       const lattice::Cell cell = c.cell.octant(o);
       const auto corner = cell.corner();
@@ -229,12 +228,24 @@ TEST_P(EveryTarget, NoTriangleIsLostThatMeetsAnOctant) {
       Corners t;
       aroundPoint(g, point, cell.side() * std::pow(10.0, 1.5 + 3 * u(g)), t);
       corners.push_back({t[0], t[1], t[2]});
-      for (auto& v : t) v = (v.array() - kMiddle) * unit;
-      bounds.emplace_back(t, kMiddle * unit);
       octant.push_back(o);
     }
+    RawTriangles raw, placed;
+    for (std::size_t i = 0; i < count; ++i) {
+      for (std::size_t k = 0; k < 3; ++k) {
+        for (std::size_t x = 0; x < 3; ++x) raw.xyz[3 * k + x][i] = corners[i][k][static_cast<int>(x)];
+      }
+    }
+    const PackPlacement place = {{{1, 0, 0}, {0, 1, 0}, {0, 0, 1}}, {-kMiddle, -kMiddle, -kMiddle}};
+    TrianglePack pack;
+    placeTriangles(raw, count, place, pack);
+    const std::uint32_t all = ~0u >> (32 - count), first = all & static_cast<std::uint32_t>(g());
+    TriangleBounds bounds;
+    const std::uint32_t done = boundTriangles(raw, first, place, unit, 2 * kMiddle * unit, placed, bounds);
+    ASSERT_EQ(first & ~done, 0u);
+    ASSERT_EQ(all & ~(done | boundTriangles(raw, all & ~done, place, unit, 2 * kMiddle * unit, placed, bounds)), 0u);
     std::uint32_t found[8];
-    octantsMeeting(frames, own, c, bounds.data(), count, found);
+    octantsMeeting(frames, own, c, bounds, count, found);
     for (std::size_t i = 0; i < count; ++i) {
       for (int o = 0; o < 8; ++o) {
         const bool is_met = found[o] >> i & 1;
