@@ -119,19 +119,19 @@ class LeafPacks {
 
   /// At most a pack of the leaf's triangles, from the one at `begin`; good until the next call.
   const Leaf& get(const Side& side, typename Side::Node node, std::size_t begin, const Placement& to_other) {
-    Leaf& leaf = own(side, node, begin);
+    Leaf& leaf = find(side, node, begin);
     if (!leaf.volume.placed) leaf.volume.place(to_other);
     return leaf;
   }
 
   /// The same for who asks nothing of it in the other side's frame.
-  const Leaf& get(const Side& side, typename Side::Node node, std::size_t begin) { return own(side, node, begin); }
+  const Leaf& get(const Side& side, typename Side::Node node, std::size_t begin) { return find(side, node, begin); }
 
  private:
   static constexpr std::size_t kLeaves = 256;
   static constexpr std::size_t kLoose = 16;
 
-  Leaf& own(const Side& side, typename Side::Node node, std::size_t begin) {
+  Leaf& find(const Side& side, typename Side::Node node, std::size_t begin) {
     std::uint16_t& slot = slots_[(number(node) + begin) % (4 * kLeaves)];
     if (slot < leaves_.size() && leaves_[slot].walk == walk_ && leaves_[slot].node == node &&
         leaves_[slot].begin == begin) {

@@ -278,9 +278,9 @@ HWY_NOINLINE void pushThose(PairSteps& s) {
                                   const auto none = hn::Eq(met, hn::Zero(du));
                                   hn::StoreU(hn::IfThenZeroElse(none, hn::LoadU(du, top.order + i)), du, top.order + i);
                                 });
-  if (mask != 0)
-    push(s, x, s.pair[x].link.index(), s.pair[x].level + 1, s.frames_used, s.pair[y], mask,
-         static_cast<std::uint32_t>(y));
+  if (mask == 0) return;
+  push(s, x, s.pair[x].link.index(), s.pair[x].level + 1, s.frames_used, s.pair[y], mask,
+       static_cast<std::uint32_t>(y));
 }
 
 void PushMeeting(PairSteps& s) { pushThose(s); }
