@@ -120,8 +120,10 @@ void betweenTrees(const fcl::Transform3<S>& X_WA, tree::Tree& tree_a, const fcl:
   std::int64_t now;
   {
     const Look look(tree_a, &tree_b);
-    const query::TreeSide a(tree_a), b(tree_b);
-    now = a.now();
+    now = tree_a.now();
+    // The system's clock need not be read twice.
+    const bool has_clock = tree_a.options().clock || tree_b.options().clock;
+    const query::TreeSide a(tree_a, now), b(tree_b, has_clock ? tree_b.now() : now);
     const oracle::Surface &sa = tree_a.surface(), &sb = tree_b.surface();
     const RelativePose<S> X_AB(X_WA, X_WB);
     const double magnitude = X_AB.magnitude(magnitudeOf(sa.bounds), magnitudeOf(sb.bounds));

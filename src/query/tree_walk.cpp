@@ -1,6 +1,8 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #include "query/tree_walk.h"
 
+#include "query/separation.h"
+
 namespace bocst::query {
 
 namespace {
@@ -17,6 +19,7 @@ struct TreeWalk::Scratch {
   bool leaves_started = false;
   CoarseLeaf<TreeSide> coarse_a, coarse_b;
   bool grew = false;
+  NearDirections near;
   std::vector<tree::NodeRef> unseen[2];  // set aside, and with no slab yet
 };
 
@@ -35,7 +38,10 @@ bool TreeWalk::run() {
     a_.tree().packLeaves(s.leaves.looseOfA());
     b_.tree().packLeaves(s.leaves.looseOfB());
   }
-  if (!ended) return false;
+  if (!ended) {
+    if (!s.grew) sharpenSupports(a_, b_, s.near);
+    return false;
+  }
   // What a query could do without, the next one meets again: a look is cheaper than growing it.
   a_.tree().look(s.unseen[0]);
   b_.tree().look(s.unseen[1]);
@@ -44,9 +50,13 @@ bool TreeWalk::run() {
 }
 
 bool TreeWalk::search(Scratch& s) {
-  if (facesApart(a_.volume(a_.root()), b_.volume(b_.root()), b_in_a_)) return false;
+  if (areSeparate(a_.tree().supports(), b_.tree().supports(), b_in_a_, s.near)) return false;
+  // Nothing grows for what is far away.
+  const bool new_root = a_.state(a_.root()) == State::kGrows || b_.state(b_.root()) == State::kGrows;
+  if (new_root && facesApart(a_.volume(a_.root()), b_.volume(b_.root()), b_in_a_)) return false;
 
   PairSteps steps(&a_.tree(), &b_.tree(), a_.now(), PairFrames(b_in_a_.scale, b_in_a_), s.frames);
+  steps.all_at_once = s.near.shallow;
   const auto push = [&](const SetAside<TreeSide, TreeSide>::Pair& pair) {
     if (s.stack.size() < steps.depth + 1 + PairSteps::kStackRoom) {
       s.stack.resize(2 * (steps.depth + PairSteps::kStackRoom));

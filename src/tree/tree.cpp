@@ -91,7 +91,10 @@ void Tree::reset(std::shared_ptr<const Mesh> mesh) {
   pieces_ = nullptr;
   surface_ = surfaceOf(std::move(mesh), options_);
   root_bounds_ = oracle::CellBounds();
-  setBox(latticeBounds(surface_), lattice::Cell{}, root_bounds_);
+  const Eigen::AlignedBox3d box = latticeBounds(surface_);
+  setBox(box, lattice::Cell{}, root_bounds_);
+  const double middle = lattice::Cell{}.side() / 2.0;
+  supports_.start({box.min().array() - middle, box.max().array() - middle});
   keepOnly({});
 }
 
@@ -401,6 +404,20 @@ void Tree::gatherNode(NodeRef node, const lattice::Cell& cell, std::vector<std::
   grid_->gather(surface_, cell, ids);
 }
 
+bool Tree::trianglesOf(NodeRef node, std::vector<std::uint32_t>& ids) const {
+  const Link link = this->link(node);
+  if (link.isList()) {
+    const TriangleList list = this->list(link);
+    if (list.ids != nullptr) ids.insert(ids.end(), list.ids, list.ids + list.count);
+    return list.ids != nullptr;
+  }
+  const oracle::RootGrid* grid = grid_known_.load(std::memory_order_acquire);
+  const lattice::Cell cell = this->cell(node);
+  if (link.tag() != Link::kImplicit || grid == nullptr || cell.level != grid->level()) return false;
+  grid->gather(surface_, cell, ids);
+  return true;
+}
+
 void Tree::prune(Clock::time_point now) {
   const std::lock_guard<Gate> alone(gate_);
   pruneAlone(nanoseconds(now), false);
@@ -515,7 +532,8 @@ void Tree::countBytes() {
 }
 
 std::size_t Tree::treeBytes() const {
-  return blocks_.bytes() + records_.bytes() + stamps_.bytes() + lists_.bytes() + (grid_ ? grid_->bytes() : 0);
+  return blocks_.bytes() + records_.bytes() + stamps_.bytes() + lists_.bytes() + sizeof(supports_) +
+         (grid_ ? grid_->bytes() : 0);
 }
 
 }  // namespace bocst::tree
