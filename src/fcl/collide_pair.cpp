@@ -79,8 +79,8 @@ class Collector : public query::Visitor {
         swapped_(swapped),
         magnitude_(magnitude),
         margin_(q.margin),
-        seen_(pairs()),
-        later_(later()) {
+        seen_(scratch().seen),
+        later_(scratch().later) {
     // A boolean query ends at the first contact, so it meets no pair twice.
     once_ = q.request.num_max_contacts > 1 || q.request.enable_cost;
     if (once_) seen_.clear();
@@ -151,11 +151,6 @@ class Collector : public query::Visitor {
   // In float, FCL's axes between slivers' all but parallel edges are rubbish, and it may say that they meet.
   static constexpr bool kTrustsApart = std::is_same<S, double>::value;
 
-  static query::PairSet& pairs() {
-    thread_local query::PairSet set;
-    return set;
-  }
-
   // What distances near 0 may be off by.
   double rounding() const { return magnitude_ * 16 * kEpsilon; }
 
@@ -177,9 +172,14 @@ class Collector : public query::Visitor {
     std::uint32_t ids[query::TrianglePairs::kCapacity][2];
     bool certain[query::TrianglePairs::kCapacity];
   };
-  static Later& later() {
-    thread_local Later later;
-    return later;
+  // Kept by the thread between queries.
+  struct Scratch {
+    query::PairSet seen;
+    Later later;
+  };
+  static Scratch& scratch() {
+    thread_local Scratch scratch;
+    return scratch;
   }
 
   void getCorners() {

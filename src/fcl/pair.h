@@ -97,20 +97,21 @@ query::Placement placementOf(const RelativePose<S>& X_AB, const Eigen::Vector3d&
 /// Holds the gates of one or two trees shared, taken in address order.
 class Look {
  public:
-  Look(tree::Tree& a, tree::Tree* b) : a_(&a), b_(b == &a ? nullptr : b) {
+  Look(tree::Tree& a, tree::Tree* b) : a_(&a), b_(b == &a ? nullptr : b), seat_(tree::Gate::seat()) {
     if (b_ != nullptr && std::less<tree::Tree*>()(b_, a_)) std::swap(a_, b_);
-    a_->gate().lock_shared();
-    if (b_ != nullptr) b_->gate().lock_shared();
+    a_->gate().lock_shared(seat_);
+    if (b_ != nullptr) b_->gate().lock_shared(seat_);
   }
   ~Look() {
-    if (b_ != nullptr) b_->gate().unlock_shared();
-    a_->gate().unlock_shared();
+    if (b_ != nullptr) b_->gate().unlock_shared(seat_);
+    a_->gate().unlock_shared(seat_);
   }
   Look(const Look&) = delete;
   Look& operator=(const Look&) = delete;
 
  private:
   tree::Tree *a_, *b_;
+  std::size_t seat_;
 };
 
 /// Calls f(a, b, b_in_a, magnitude) with two trees as the sides of a walk, while nobody takes nodes away.

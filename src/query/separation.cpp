@@ -84,8 +84,8 @@ struct Between {
   float scale, slack, defect;
 };
 
-// f of StepGroup's comment; places are those of the directions in both sides' frames.
-HWY_INLINE void values(const Supports& a, const Supports& b, const Between& g, const float (*u)[8], Places& in_a,
+// f of EightSeparations, and the largest of it; places are those of the directions in both sides' frames.
+HWY_INLINE float values(const Supports& a, const Supports& b, const Between& g, const float (*u)[8], Places& in_a,
                        Places& in_b, float* value) {
   const D d;
   alignas(64) float along[8];
@@ -106,9 +106,12 @@ HWY_INLINE void values(const Supports& a, const Supports& b, const Between& g, c
     locate(w, lane, in_b);
     hn::Store(sum, d, along + lane);
   }
+  float most = -1e30f;
   for (std::size_t lane = 0; lane < 8; ++lane) {
     value[lane] = along[lane] - interpolated(a, in_a, lane) - g.scale * interpolated(b, in_b, lane);
+    most = std::max(most, value[lane]);
   }
+  return most;
 }
 
 // The directions about a unit one, `radius` away in the plane across it, and, as the first of seven, itself.
@@ -175,7 +178,10 @@ bool AreSeparate(const Supports& a, const Supports& b, const Placement& b_in_a, 
   const float size = q * (1 + g.scale), pad = 1.25f * (64 * 0x1p-24f * (distance + 2 * size) + g.slack);
   // Not true of what is not a number.
   if (!(length > 1e-12f * size * size && length < 0x1p100f && g.defect < 1e-3f)) return false;
-  const float per_length = 1 / std::sqrt(length);
+  length = std::sqrt(length);
+  // No direction can do better than this; most hits are so deep.
+  if (length - a.innerRadius() - g.scale * b.innerRadius() < -kHopeless * size) return false;
+  const float per_length = 1 / length;
   for (float& x : n) x *= per_length;
 
   alignas(64) float u[3][8];
@@ -184,10 +190,9 @@ bool AreSeparate(const Supports& a, const Supports& b, const Placement& b_in_a, 
   float best = -1e30f, hopeless = -kHopeless * size, radius = kFirstRadius;
   for (int look = 0; look < kLooks; ++look) {
     ringAbout(n, radius, look == 0 ? kSevenAndMiddle : kEight, u);
-    values(a, b, g, u, in_a, in_b, value);
+    if (values(a, b, g, u, in_a, in_b, value) > pad) return true;
     const std::size_t lane = largest(value);
     if (lane == 8) return false;
-    if (value[lane] > pad) return true;
     if (value[lane] > best) {
       best = value[lane];
       if (best < hopeless) break;

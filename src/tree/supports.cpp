@@ -26,6 +26,7 @@ Eigen::Vector3d Supports::direction(int number) {
 void Supports::start(const Eigen::AlignedBox3d& box) {
   const Eigen::Vector3d center = box.center(), half = box.sizes() / 2;
   center_ = center.cast<float>();
+  inner_radius_.store(static_cast<float>(half.minCoeff()), std::memory_order_relaxed);
   for (int n = 0; n < kCount; ++n) {
     const Eigen::Vector3d d = direction(n);
     const auto i = static_cast<std::size_t>(n);
@@ -39,6 +40,9 @@ void Supports::lower(int number, double value, bool exact) {
   const float rounded = roundedUp(value);
   // Another thread may lower it, too; whichever comes last is an upper bound.
   if (rounded < values_[i].load(std::memory_order_relaxed)) values_[i].store(rounded, std::memory_order_relaxed);
+  const Eigen::Vector3f d = direction(number).cast<float>();
+  const float radius = (rounded - d.dot(center_)) / d.norm();
+  if (radius < innerRadius()) inner_radius_.store(radius, std::memory_order_relaxed);
   states_[i].store(exact ? kExact : kAsked, std::memory_order_relaxed);
 }
 

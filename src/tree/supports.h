@@ -32,6 +32,9 @@ class Supports {
   /// The middle of that box.
   const Eigen::Vector3f& center() const { return center_; }
 
+  /// About how far it is from there to the hull's surface, at least; for what only wants a guess.
+  float innerRadius() const { return inner_radius_.load(std::memory_order_relaxed); }
+
   float value(int number) const { return values_[static_cast<std::size_t>(number)].load(std::memory_order_relaxed); }
 
   /// Not yet as good as a tree of so many expansions can say.
@@ -49,6 +52,7 @@ class Supports {
   void reopen(std::uint64_t expansions);
 
   Eigen::Vector3f center_ = Eigen::Vector3f::Zero();
+  std::atomic<float> inner_radius_{0};
   std::array<std::atomic<float>, kCount> values_{};
   std::array<std::atomic<State>, kCount> states_{};
   std::atomic<std::uint64_t> expansions_{0};
