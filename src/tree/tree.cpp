@@ -338,6 +338,14 @@ void Tree::packLeaves(const std::vector<NodeRef>& leaves) {
   for (const NodeRef leaf : leaves) {
     const Link list = link(leaf);
     if (!list.isList()) continue;
+    if (!leaf.isRoot()) {
+      // Half of the leaves are met but once in hundreds of queries: the second time is early enough.
+      std::uint8_t& came = records_[leaf.block()].came;
+      const auto bit = static_cast<std::uint8_t>(1 << leaf.octant());
+      const bool again = (came & bit) != 0;
+      came |= bit;
+      if (!again) continue;
+    }
     const std::uint32_t words = lists_[list.index()];
     if (words > 0 && words <= kLeafTriangles) setLink(leaf, addPacked(list));
   }
