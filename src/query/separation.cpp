@@ -86,7 +86,7 @@ struct Between {
 
 // f of EightSeparations, and the largest of it; places are those of the directions in both sides' frames.
 HWY_INLINE float values(const Supports& a, const Supports& b, const Between& g, const float (*u)[8], Places& in_a,
-                       Places& in_b, float* value) {
+                        Places& in_b, float* value) {
   const D d;
   alignas(64) float along[8];
   for (std::size_t lane = 0; lane < 8; lane += hn::Lanes(d)) {

@@ -13,7 +13,7 @@ namespace bocst::query {
 /// Directions that a look for one was between and that may be worth to know better.
 struct NearDirections {
   bool shallow = false;  ///< The hulls overlap so little that the surfaces are probably apart.
-  int lanes = 0;  ///< 8, or 0 if there are none.
+  int lanes = 0;         ///< 8, or 0 if there are none.
   std::int32_t of_a[3][8], of_b[3][8];
 };
 

@@ -191,8 +191,8 @@ HWY_INLINE std::uint32_t pop(PairSteps& s, StepNode (&pair)[2]) {
   }
 }
 
-// Expands the other node of the pair for all octants in `mask` of block `index`, in frame `frame`; false where it is not
-// the next to be expanded.
+// Expands the other node of the pair for all octants in `mask` of block `index`, in frame `frame`; false where it is
+// not the next to be expanded.
 HWY_INLINE bool expandOther(PairSteps& s, int x, std::uint32_t index, std::uint32_t frame, unsigned mask) {
   const int y = 1 - x;
   const std::uint32_t level = s.pair[x].level + 1;
@@ -206,8 +206,8 @@ HWY_INLINE bool expandOther(PairSteps& s, int x, std::uint32_t index, std::uint3
   decodeBlock(s, y, other_index, block, frame + 1);
   for (; mask != 0; mask &= mask - 1) {
     const auto o = static_cast<std::uint32_t>(__builtin_ctz(mask));
-    const unsigned left = overlapping(s.geometry, y, s.frames[frame + 1], s.frames[frame], o, block.grey,
-                                      s.stack[s.depth].order);
+    const unsigned left =
+        overlapping(s.geometry, y, s.frames[frame + 1], s.frames[frame], o, block.grey, s.stack[s.depth].order);
     if (left == 0) continue;
     StepNode n;
     n.node = tree::NodeRef::octant(index, static_cast<int>(o));

@@ -540,8 +540,7 @@ void Tree::countBytes() {
 }
 
 std::size_t Tree::treeBytes() const {
-  return blocks_.bytes() + records_.bytes() + stamps_.bytes() + lists_.bytes() + sizeof(supports_) +
-         (grid_ ? grid_->bytes() : 0);
+  return blocks_.bytes() + records_.bytes() + stamps_.bytes() + lists_.bytes() + (grid_ ? grid_->bytes() : 0);
 }
 
 }  // namespace bocst::tree
