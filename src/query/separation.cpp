@@ -27,8 +27,8 @@ struct alignas(64) Places {
   float weight[3][8];
 };
 
-// Looks narrow down: most that are apart are found so by the first, all but few by the fourth. What touches overlaps by
-// more than `hopeless` of the sizes in every direction nearly always, so it costs one look.
+// Looks narrow down: most that are apart are found so by the first, all but few by the fourth. Hulls of what touches
+// overlap by more than kHopeless of the half sides in every direction nearly always, so a hit costs one look at most.
 constexpr int kLooks = 6;
 constexpr int kSharpened = 6;  // of each side, after one query
 constexpr float kFirstRadius = 0.45f, kHopeless = 0.15f, kHopelessLater = 0.6f;

@@ -335,19 +335,21 @@ void Tree::packLeaves(const std::vector<NodeRef>& leaves) {
   if (leaves.empty() || !hasRoom()) return;
   const std::unique_lock<std::mutex> lock(growth_, std::try_to_lock);
   if (!lock.owns_lock() || lists_.size() > Pool<std::uint32_t, 12>::kMost / 2) return;
+  std::size_t left = 16 + leaves.size() / 8;
   for (const NodeRef leaf : leaves) {
     const Link list = link(leaf);
-    if (!list.isList()) continue;
+    const std::uint32_t count = list.isList() ? lists_[list.index()] : 0;
+    if (count == 0 || count > kLeafTriangles) continue;  // packed already: the count has a flag
     if (!leaf.isRoot()) {
       // Half of the leaves are met but once in hundreds of queries: the second time is early enough.
       std::uint8_t& came = records_[leaf.block()].came;
-      const auto bit = static_cast<std::uint8_t>(1 << leaf.octant());
-      const bool again = (came & bit) != 0;
-      came |= bit;
+      const bool again = (came >> leaf.octant() & 1) != 0;
+      came = static_cast<std::uint8_t>(came | 1 << leaf.octant());
       if (!again) continue;
     }
-    const std::uint32_t words = lists_[list.index()];
-    if (words > 0 && words <= kLeafTriangles) setLink(leaf, addPacked(list));
+    if (left == 0) continue;
+    setLink(leaf, addPacked(list));
+    --left;
   }
   countBytes();
 }
