@@ -1,8 +1,6 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #include "query/tree_walk.h"
 
-#include "query/separation.h"
-
 namespace bocst::query {
 
 namespace {
@@ -19,11 +17,11 @@ struct TreeWalk::Scratch {
   bool leaves_started = false;
   CoarseLeaf<TreeSide> coarse_a, coarse_b;
   bool grew = false;
-  NearDirections near;
   std::vector<tree::NodeRef> unseen[2];  // set aside, and with no slab yet
 };
 
-bool TreeWalk::run() {
+bool TreeWalk::run(Visitor& visitor) {
+  visitor_ = &visitor;
   thread_local Scratch s;
   s.aside.clear();
   s.leaves_started = false;
@@ -39,7 +37,7 @@ bool TreeWalk::run() {
     b_.tree().packLeaves(s.leaves.looseOfB());
   }
   if (!ended) {
-    if (!s.grew) sharpenSupports(a_, b_, s.near);
+    if (!s.grew) sharpenSupports(a_, b_, near_);
     return false;
   }
   // What a query could do without, the next one meets again: a look is cheaper than growing it.
@@ -50,13 +48,12 @@ bool TreeWalk::run() {
 }
 
 bool TreeWalk::search(Scratch& s) {
-  if (areSeparate(a_.tree().supports(), b_.tree().supports(), b_in_a_, s.near)) return false;
   // Nothing grows for what is far away.
   const bool new_root = a_.state(a_.root()) == State::kGrows || b_.state(b_.root()) == State::kGrows;
   if (new_root && facesApart(a_.volume(a_.root()), b_.volume(b_.root()), b_in_a_)) return false;
 
   PairSteps steps(&a_.tree(), &b_.tree(), a_.now(), PairFrames(b_in_a_.scale, b_in_a_), s.frames);
-  steps.all_at_once = s.near.shallow;
+  steps.all_at_once = near_.shallow;
   const auto push = [&](const SetAside<TreeSide, TreeSide>::Pair& pair) {
     if (s.stack.size() < steps.depth + 1 + PairSteps::kStackRoom) {
       s.stack.resize(2 * (steps.depth + PairSteps::kStackRoom));
@@ -69,7 +66,7 @@ bool TreeWalk::search(Scratch& s) {
     if (stepAll(steps, s)) return true;
     if (s.aside.empty()) return false;
     s.grew = true;
-    s.aside.grow(a_, b_, b_in_a_, visitor_.endsAtFirst(), push);
+    s.aside.grow(a_, b_, b_in_a_, visitor_->endsAtFirst(), push);
   }
 }
 
@@ -101,7 +98,7 @@ bool TreeWalk::testLeaves(const PairSteps& steps, Scratch& s) {
   }
   return s.leaves.test(
       a_, steps.pair[0].node, b_, steps.pair[1].node,
-      [this](std::uint32_t t, std::uint32_t u, bool certain) { return visitor_.triangles(t, u, certain); });
+      [this](std::uint32_t t, std::uint32_t u, bool certain) { return visitor_->triangles(t, u, certain); });
 }
 
 const Placement& TreeWalk::aInB() {
