@@ -282,7 +282,7 @@ void sharpen(const TreeSide& side, int number) {
     add({hi + direction.dot(reach.center - middle), node});
   };
   addNode(side.root());
-  for (;;) {
+  while (!parts.empty()) {
     std::pop_heap(parts.begin(), parts.end());
     const Part part = parts.back();
     parts.pop_back();
@@ -299,6 +299,8 @@ void sharpen(const TreeSide& side, int number) {
     }
     add({reach, part.node, true, known});
   }
+  // A sampled oracle has lost all of the surface.
+  supports.lower(number, supports.value(number), false);
 }
 
 void sharpenSome(const TreeSide& side, const std::int32_t (&near)[3][8], int count) {
