@@ -292,7 +292,7 @@ void sharpen(const TreeSide& side, int number) {
       continue;
     }
     triangles.clear();
-    const bool known = side.tree().trianglesOf(part.node, triangles);
+    const bool known = side.tree().trianglesOf(part.node, triangles) && !triangles.empty();
     double reach = known ? -std::numeric_limits<double>::infinity() : part.reach;
     for (const std::uint32_t t : triangles) {
       for (int k = 0; k < 3; ++k) reach = std::max(reach, direction.dot(side.corner(t, k) - middle));
