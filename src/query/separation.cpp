@@ -30,7 +30,10 @@ struct alignas(64) Places {
 // Looks narrow down: most that are apart are found so by the first, all but few by the fourth. Hulls of what touches
 // overlap by more than kHopeless of the half sides in every direction nearly always, so a hit costs one look at most.
 constexpr int kLooks = 6;
-constexpr int kSharpened = 6;  // of each side, after one query
+// What a miss pays for later ones, on each side: so many directions, unless they take more triangles; and of one that
+// takes a great many, a bound must do.
+constexpr int kSharpened = 6;
+constexpr std::size_t kTrianglesOfAll = 1 << 13, kTrianglesOfOne = 1 << 16;
 constexpr float kFirstRadius = 0.45f, kHopeless = 0.15f, kHopelessLater = 0.6f;
 constexpr float kShallow = 0.3f;
 
@@ -264,7 +267,8 @@ bool hasChildren(const TreeSide& side, tree::NodeRef node) {
   return isInner();
 }
 
-void sharpen(const TreeSide& side, int number) {
+// Says how many triangles it looked at.
+std::size_t sharpen(const TreeSide& side, int number) {
   tree::Supports& supports = side.tree().supports();
   const Eigen::Vector3d direction = Supports::direction(number);
   const Eigen::Vector3d middle = Eigen::Vector3d::Constant(1 << (lattice::kBits - 1));
@@ -282,11 +286,15 @@ void sharpen(const TreeSide& side, int number) {
     add({hi + direction.dot(reach.center - middle), node});
   };
   addNode(side.root());
+  std::size_t looked_at = 0;
   while (!parts.empty()) {
     std::pop_heap(parts.begin(), parts.end());
     const Part part = parts.back();
     parts.pop_back();
-    if (part.known) return supports.lower(number, part.reach, part.reached);
+    if (part.known || looked_at > kTrianglesOfOne) {
+      supports.lower(number, part.reach, part.reached);
+      return looked_at;
+    }
     if (hasChildren(side, part.node)) {
       side.children(part.node, addNode);
       continue;
@@ -297,20 +305,23 @@ void sharpen(const TreeSide& side, int number) {
     for (const std::uint32_t t : triangles) {
       for (int k = 0; k < 3; ++k) reach = std::max(reach, direction.dot(side.corner(t, k) - middle));
     }
+    looked_at += triangles.size();
     add({reach, part.node, true, known});
   }
   // A sampled oracle has lost all of the surface.
   supports.lower(number, supports.value(number), false);
+  return looked_at;
 }
 
 void sharpenSome(const TreeSide& side, const std::int32_t (&near)[3][8], int count) {
   tree::Supports& supports = side.tree().supports();
   int left = kSharpened;
+  std::size_t looked_at = 0;
   for (int lane = 0; lane < count; ++lane) {
     for (int k = 0; k < 3; ++k) {
       if (!supports.isOpen(near[k][lane], side.tree().expansions())) continue;
-      sharpen(side, near[k][lane]);
-      if (--left == 0) return;
+      looked_at += sharpen(side, near[k][lane]);
+      if (--left == 0 || looked_at > kTrianglesOfAll) return;
     }
   }
 }
