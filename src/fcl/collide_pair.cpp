@@ -79,8 +79,8 @@ class Collector : public query::Visitor {
         swapped_(swapped),
         magnitude_(magnitude),
         margin_(q.margin),
-        seen_(pairs()),
-        later_(later()) {
+        seen_(scratch().seen),
+        later_(scratch().later) {
     // A boolean query ends at the first contact, so it meets no pair twice.
     once_ = q.request.num_max_contacts > 1 || q.request.enable_cost;
     if (once_) seen_.clear();
@@ -151,11 +151,6 @@ class Collector : public query::Visitor {
   // In float, FCL's axes between slivers' all but parallel edges are rubbish, and it may say that they meet.
   static constexpr bool kTrustsApart = std::is_same<S, double>::value;
 
-  static query::PairSet& pairs() {
-    thread_local query::PairSet set;
-    return set;
-  }
-
   // What distances near 0 may be off by.
   double rounding() const { return magnitude_ * 16 * kEpsilon; }
 
@@ -177,9 +172,14 @@ class Collector : public query::Visitor {
     std::uint32_t ids[query::TrianglePairs::kCapacity][2];
     bool certain[query::TrianglePairs::kCapacity];
   };
-  static Later& later() {
-    thread_local Later later;
-    return later;
+  // Kept by the thread between queries.
+  struct Scratch {
+    query::PairSet seen;
+    Later later;
+  };
+  static Scratch& scratch() {
+    thread_local Scratch scratch;
+    return scratch;
   }
 
   void getCorners() {
@@ -316,18 +316,22 @@ void collideModels(const Question<S>& q, tree::Tree& tree1, tree::Tree& tree2) {
   const std::size_t before = q.result.numContacts();
   // Conservative verdicts must not depend on the argument order, so the walk has an order of its own.
   const bool swapped = (tree1.conservative() || tree2.conservative()) && turnsRound(q, tree1, tree2);
-  const auto run = [&](const TreeSide& a, const TreeSide& b, const Placement& b_in_a, double magnitude) {
+  const auto walk = [&](const TreeSide& a, double magnitude, auto&& with_collector) {
     const oracle::Surface& s = a.tree().surface();
     const ModelTriangles<S> t1(tree1), t2(tree2);
     Collector<S, ModelTriangles<S>, ModelTriangles<S>> collector(q, t1, t2, swapped, magnitude);
     collector.setFrame(s.lattice.origin(), s.lattice.unit());
+    with_collector(collector);
+    collector.finish();
+  };
+  const auto run = [&](const TreeSide& a, const TreeSide& b, const Placement& b_in_a, double magnitude) {
     if (q.margin == 0 && query::TreeWalk::fits(a, b, b_in_a)) {
-      query::TreeWalk(a, b, b_in_a, collector).run();
+      query::TreeWalk trees(a, b, b_in_a);
+      if (!trees.isNeedless()) walk(a, magnitude, [&](auto& collector) { trees.run(collector); });
     } else {
       const Placement near = withMargin(b_in_a, a, q, a.cells() || b.cells());
-      query::PairWalk<TreeSide, TreeSide>(a, b, near, collector).run();
+      walk(a, magnitude, [&](auto& collector) { query::PairWalk<TreeSide, TreeSide>(a, b, near, collector).run(); });
     }
-    collector.finish();
     if (q.mayBeInside(before) &&
         (holds<S>(tree1, q.X_W1, tree2, q.X_W2, magnitude) || holds<S>(tree2, q.X_W2, tree1, q.X_W1, magnitude))) {
       addInside(q, a, b, b_in_a, swapped);

@@ -71,6 +71,7 @@ template <typename S>
 query::Placement placementOf(const RelativePose<S>& X_AB, const Eigen::Vector3d& origin_a, double unit_a,
                              const Eigen::Vector3d& origin_b, double unit_b, double magnitude) {
   query::Placement p;
+  const double per_unit = 1 / unit_a;
 #pragma GCC unroll 3
   for (int r = 0; r < 3; ++r) {
     double at = static_cast<double>(X_AB.translation[r]) - origin_a[r];
@@ -79,17 +80,19 @@ query::Placement placementOf(const RelativePose<S>& X_AB, const Eigen::Vector3d&
       p.rotation(r, c) = static_cast<double>(X_AB.rotation[r][c]);
       at += p.rotation(r, c) * origin_b[c];
     }
-    p.translation[r] = at / unit_a;
+    p.translation[r] = at * per_unit;
   }
   p.scale = unit_b / unit_a;
   // What FCL's triangle test, which computes R q + t in S, may take for a contact.
-  p.slack = magnitude * 32 * static_cast<double>(std::numeric_limits<S>::epsilon()) / unit_a;
+  p.slack = magnitude * 32 * static_cast<double>(std::numeric_limits<S>::epsilon()) * per_unit;
   const auto dot = [&p](int c, int d) {
     return p.rotation(0, c) * p.rotation(0, d) + p.rotation(1, c) * p.rotation(1, d) +
            p.rotation(2, c) * p.rotation(2, d);
   };
-  p.defect = std::max(std::max(std::max(std::abs(dot(0, 0) - 1), std::abs(dot(1, 1) - 1)), std::abs(dot(2, 2) - 1)),
-                      std::max(std::max(std::abs(dot(0, 1)), std::abs(dot(0, 2))), std::abs(dot(1, 2))));
+  // By value: of references the compiler makes branches.
+  const auto larger = [](double x, double y) { return x > y ? x : y; };
+  p.defect = larger(larger(larger(std::abs(dot(0, 0) - 1), std::abs(dot(1, 1) - 1)), std::abs(dot(2, 2) - 1)),
+                    larger(larger(std::abs(dot(0, 1)), std::abs(dot(0, 2))), std::abs(dot(1, 2))));
   p.ready();
   return p;
 }
@@ -97,20 +100,21 @@ query::Placement placementOf(const RelativePose<S>& X_AB, const Eigen::Vector3d&
 /// Holds the gates of one or two trees shared, taken in address order.
 class Look {
  public:
-  Look(tree::Tree& a, tree::Tree* b) : a_(&a), b_(b == &a ? nullptr : b) {
+  Look(tree::Tree& a, tree::Tree* b) : a_(&a), b_(b == &a ? nullptr : b), seat_(tree::Gate::seat()) {
     if (b_ != nullptr && std::less<tree::Tree*>()(b_, a_)) std::swap(a_, b_);
-    a_->gate().lock_shared();
-    if (b_ != nullptr) b_->gate().lock_shared();
+    a_->gate().lock_shared(seat_);
+    if (b_ != nullptr) b_->gate().lock_shared(seat_);
   }
   ~Look() {
-    if (b_ != nullptr) b_->gate().unlock_shared();
-    a_->gate().unlock_shared();
+    if (b_ != nullptr) b_->gate().unlock_shared(seat_);
+    a_->gate().unlock_shared(seat_);
   }
   Look(const Look&) = delete;
   Look& operator=(const Look&) = delete;
 
  private:
   tree::Tree *a_, *b_;
+  std::size_t seat_;
 };
 
 /// Calls f(a, b, b_in_a, magnitude) with two trees as the sides of a walk, while nobody takes nodes away.
@@ -120,8 +124,10 @@ void betweenTrees(const fcl::Transform3<S>& X_WA, tree::Tree& tree_a, const fcl:
   std::int64_t now;
   {
     const Look look(tree_a, &tree_b);
-    const query::TreeSide a(tree_a), b(tree_b);
-    now = a.now();
+    now = tree_a.now();
+    // The system's clock need not be read twice.
+    const bool has_clock = tree_a.options().clock || tree_b.options().clock;
+    const query::TreeSide a(tree_a, now), b(tree_b, has_clock ? tree_b.now() : now);
     const oracle::Surface &sa = tree_a.surface(), &sb = tree_b.surface();
     const RelativePose<S> X_AB(X_WA, X_WB);
     const double magnitude = X_AB.magnitude(magnitudeOf(sa.bounds), magnitudeOf(sb.bounds));

@@ -114,7 +114,7 @@ class LeafPacks {
     loose_.clear();
   }
 
-  /// Leaves met in this walk, a few of them, whose corners the tree does not keep packed.
+  /// Leaves met in this walk whose corners the tree does not keep packed.
   const std::vector<typename Side::Node>& loose() const { return loose_; }
 
   /// At most a pack of the leaf's triangles, from the one at `begin`; good until the next call.
@@ -129,7 +129,6 @@ class LeafPacks {
 
  private:
   static constexpr std::size_t kLeaves = 256;
-  static constexpr std::size_t kLoose = 16;
 
   Leaf& find(const Side& side, typename Side::Node node, std::size_t begin) {
     std::uint16_t& slot = slots_[(number(node) + begin) % (4 * kLeaves)];
@@ -161,7 +160,7 @@ class LeafPacks {
         leaf.error = 1.7321f * (0.504f * packed.step + 2 * 0x1p-24f * leaf.pack.size);
         return;
       }
-      if (loose_.size() < kLoose) loose_.push_back(leaf.node);
+      loose_.push_back(leaf.node);
     }
     corners_.clear();
     corners_.take(side, leaf.node, leaf.begin);
@@ -226,7 +225,7 @@ class LeafPairs {
     return testCoarse(leaves_a_, a, node_a, b, which, *b_in_a_, f);
   }
 
-  /// Leaves met in this walk, a few of them, that are worth to be packed.
+  /// Leaves met in this walk that are worth to be packed.
   const std::vector<typename A::Node>& looseOfA() const { return leaves_a_.loose(); }
   const std::vector<typename B::Node>& looseOfB() const { return leaves_b_.loose(); }
 

@@ -26,7 +26,8 @@ class TreeSide {
   static constexpr bool kBodies = false;
   static constexpr bool kNodesHoldSurface = true;
 
-  explicit TreeSide(tree::Tree& tree) : tree_(tree), now_(tree.now()) {}
+  explicit TreeSide(tree::Tree& tree) : TreeSide(tree, tree.now()) {}
+  TreeSide(tree::Tree& tree, std::int64_t now) : tree_(tree), now_(now) {}
 
   Node root() const { return Node(); }
 

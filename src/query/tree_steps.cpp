@@ -294,6 +294,34 @@ void OctantsMeeting(const PairFrames& geometry, int own, const CellOctants& cell
           [&met, du](std::size_t i, hn::Vec<hn::RebindToUnsigned<D>> m) HWY_ATTR { hn::StoreU(m, du, met + i); });
 }
 
+// Expands the other node of the pair for all octants in `mask` of block `index`, in frame `frame`; false where it is
+// not the next to be expanded.
+HWY_INLINE bool expandOther(PairSteps& s, int x, std::uint32_t index, std::uint32_t frame, unsigned mask) {
+  const int y = 1 - x;
+  const std::uint32_t level = s.pair[x].level + 1;
+  const StepNode& other = s.pair[y];
+  if (other.link.tag() != tree::Link::kBlock) return false;
+  const int deeper = static_cast<int>(other.level) - static_cast<int>(level);
+  if (x == 0 ? deeper >= s.not_smaller : -deeper < s.not_smaller) return false;
+  const std::uint32_t other_index = other.link.index();
+  const tree::Block& block = s.tree[y]->block(other_index);
+  s.tree[y]->touch(other_index, s.now);
+  decodeBlock(s, y, other_index, block, frame + 1);
+  for (; mask != 0; mask &= mask - 1) {
+    const auto o = static_cast<std::uint32_t>(__builtin_ctz(mask));
+    const unsigned left =
+        overlapping(s.geometry, y, s.frames[frame + 1], s.frames[frame], o, block.grey, s.stack[s.depth].order);
+    if (left == 0) continue;
+    StepNode n;
+    n.node = tree::NodeRef::octant(index, static_cast<int>(o));
+    n.link = s.tree[x]->link(n.node);
+    n.level = level;
+    n.lane = 8 * frame + o;
+    push(s, y, other_index, other.level + 1, frame + 1, n, left);
+  }
+  return true;
+}
+
 PairSteps::Event NextEvent(PairSteps& s) {
   while (s.depth > 0) {
     std::uint32_t frames = pop(s, s.pair);
@@ -325,7 +353,9 @@ PairSteps::Event NextEvent(PairSteps& s) {
       pushThose(s);
       continue;
     }
-    push(s, x, index, own.level + 1, frames, other, mask);
+    if (!s.all_at_once || !expandOther(s, x, index, frames, mask)) {
+      push(s, x, index, own.level + 1, frames, other, mask);
+    }
   }
   return PairSteps::kDone;
 }

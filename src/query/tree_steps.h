@@ -45,8 +45,8 @@ struct StepGroup {
 struct PairSteps {
   /// Frames alive at once: to look up the nodes of a pair that comes without, and one more each level of either side.
   static constexpr std::size_t kFrames = 2 + 2 * lattice::kMaxLevel + 1;
-  /// What a walk below one pair can add to the stack: one more each level of either side.
-  static constexpr std::size_t kStackRoom = 2 * lattice::kMaxLevel + 1;
+  /// What a walk below one pair can add to the stack: one more each level of either side, eight of two levels at once.
+  static constexpr std::size_t kStackRoom = 8 * lattice::kMaxLevel + 1;
 
   enum Event {
     kDone,    ///< The stack is empty.
@@ -66,6 +66,10 @@ struct PairSteps {
 
   /// A node of side 0 is not smaller (is larger) than one of side 1 that is at least so many levels deeper.
   int not_smaller, larger;
+
+  /// A hit is not expected, so all octants of a node go down the other side at once: their tests overlap in time, where
+  /// a walk that ends at its first hit would not make most of them.
+  bool all_at_once = false;
 
   StepNode pair[2];                         ///< Of the event.
   std::uint32_t coarse = StepGroup::kNone;  ///< As in StepGroup, of the pair.

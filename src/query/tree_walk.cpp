@@ -21,7 +21,8 @@ struct TreeWalk::Scratch {
   std::vector<tree::NodeRef> unseen[2];  // set aside, and with no slab yet
 };
 
-bool TreeWalk::run() {
+bool TreeWalk::run(Visitor& visitor) {
+  visitor_ = &visitor;
   thread_local Scratch s;
   s.aside.clear();
   s.leaves_started = false;
@@ -37,7 +38,10 @@ bool TreeWalk::run() {
     a_.tree().packLeaves(s.leaves.looseOfA());
     b_.tree().packLeaves(s.leaves.looseOfB());
   }
-  if (!ended) return false;
+  if (!ended) {
+    if (!s.grew) sharpenSupports(a_, b_, near_);
+    return false;
+  }
   // What a query could do without, the next one meets again: a look is cheaper than growing it.
   a_.tree().look(s.unseen[0]);
   b_.tree().look(s.unseen[1]);
@@ -46,10 +50,13 @@ bool TreeWalk::run() {
 }
 
 bool TreeWalk::search(Scratch& s) {
-  if (facesApart(a_.volume(a_.root()), b_.volume(b_.root()), b_in_a_)) return false;
+  // Nothing grows for what is far away.
+  const bool new_root = a_.state(a_.root()) == State::kGrows || b_.state(b_.root()) == State::kGrows;
+  if (new_root && facesApart(a_.volume(a_.root()), b_.volume(b_.root()), b_in_a_)) return false;
 
   PairSteps steps(&a_.tree(), &b_.tree(), a_.now(), PairFrames(b_in_a_.scale, b_in_a_), s.frames);
   for (int side = 0; side < 2; ++side) steps.leaf[side] = &s.coarse[side];
+  steps.all_at_once = near_.shallow;
   const auto push = [&](const SetAside<TreeSide, TreeSide>::Pair& pair) {
     if (s.stack.size() < steps.depth + 1 + PairSteps::kStackRoom) {
       s.stack.resize(2 * (steps.depth + PairSteps::kStackRoom));
@@ -62,7 +69,7 @@ bool TreeWalk::search(Scratch& s) {
     if (stepAll(steps, s)) return true;
     if (s.aside.empty()) return false;
     s.grew = true;
-    s.aside.grow(a_, b_, b_in_a_, visitor_.endsAtFirst(), push);
+    s.aside.grow(a_, b_, b_in_a_, visitor_->endsAtFirst(), push);
   }
 }
 
@@ -105,7 +112,7 @@ bool TreeWalk::testLeaves(const PairSteps& steps, Scratch& s) {
     s.leaves_started = true;
   }
   const auto visit = [this](std::uint32_t t, std::uint32_t u, bool certain) {
-    return visitor_.triangles(t, u, certain);
+    return visitor_->triangles(t, u, certain);
   };
   const tree::NodeRef a = steps.pair[0].node, b = steps.pair[1].node;
   if (steps.coarse == StepGroup::kNone) return s.leaves.test(a_, a, b_, b, visit);

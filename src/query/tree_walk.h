@@ -4,6 +4,7 @@
 #include <vector>
 
 #include "query/leaf_pairs.h"
+#include "query/separation.h"
 #include "query/set_aside.h"
 #include "query/tree_steps.h"
 #include "query/visitor.h"
@@ -18,11 +19,13 @@ class TreeWalk {
     return !a.cells() && !b.cells() && PairFrames::fits(b_in_a.scale);
   }
 
-  TreeWalk(const TreeSide& a, const TreeSide& b, const Placement& b_in_a, Visitor& visitor)
-      : a_(a), b_(b), b_in_a_(b_in_a), visitor_(visitor) {}
+  TreeWalk(const TreeSide& a, const TreeSide& b, const Placement& b_in_a) : a_(a), b_(b), b_in_a_(b_in_a) {}
+
+  /// Are the two so surely apart that nobody need walk? To be asked first, before anything is made ready for run().
+  bool isNeedless() { return areSeparate(a_.tree().supports(), b_.tree().supports(), b_in_a_, near_); }
 
   /// True when the visitor ended it.
-  bool run();
+  bool run(Visitor& visitor);
 
  private:
   struct Scratch;
@@ -32,14 +35,14 @@ class TreeWalk {
   void meetCoarse(PairSteps& steps, Scratch& s);
   bool testLeaves(const PairSteps& steps, Scratch& s);
   void setAside(const PairSteps& steps, Scratch& s);
-
-  const TreeSide &a_, &b_;
   const Placement& aInB();
 
+  const TreeSide &a_, &b_;
   const Placement& b_in_a_;
   Placement a_in_b_;  // once asked for
   bool inverted_ = false;
-  Visitor& visitor_;
+  NearDirections near_;
+  Visitor* visitor_ = nullptr;
 };
 
 }  // namespace bocst::query

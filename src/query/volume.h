@@ -45,7 +45,9 @@ struct Placement {
 
   /// To be called when rotation and defect are set.
   void ready() {
+#pragma GCC unroll 3
     for (int j = 0; j < 3; ++j) {
+#pragma GCC unroll 3
       for (int k = 0; k < 3; ++k) axes[j][k] = static_cast<float>(rotation(k, j));
     }
     pad = static_cast<float>((128 * 0x1p-24 + 4 * defect) * 1.0001);

@@ -16,8 +16,17 @@ namespace bocst::tree {
 /// Either a reader sees that somebody writes, or the writer sees the reader: that takes sequential consistency.
 class Gate {
  public:
-  void lock_shared() {
-    std::atomic<int>& readers = mine();
+  /// Where this thread counts itself; to be told to who takes several gates.
+  static std::size_t seat() {
+    static std::atomic<std::size_t> threads{0};
+    thread_local const std::size_t number = threads.fetch_add(1, std::memory_order_relaxed);
+    return number % kSeats;
+  }
+
+  void lock_shared() { lock_shared(seat()); }
+  void unlock_shared() { unlock_shared(seat()); }
+  void lock_shared(std::size_t seat) {
+    std::atomic<int>& readers = seats_[seat].readers;
     readers.fetch_add(1);
     while (writing_.load()) {
       leave(readers);
@@ -25,7 +34,7 @@ class Gate {
       readers.fetch_add(1);
     }
   }
-  void unlock_shared() { leave(mine()); }
+  void unlock_shared(std::size_t seat) { leave(seats_[seat].readers); }
 
   void lock() {
     turnstile_.lock();
@@ -46,15 +55,11 @@ class Gate {
   }
 
  private:
-  struct alignas(64) Slot {
+  static constexpr std::size_t kSeats = 8;
+
+  struct alignas(64) Seat {
     std::atomic<int> readers{0};
   };
-
-  std::atomic<int>& mine() {
-    static std::atomic<std::size_t> threads{0};
-    thread_local const std::size_t number = threads.fetch_add(1, std::memory_order_relaxed);
-    return slots_[number % slots_.size()].readers;
-  }
 
   void leave(std::atomic<int>& readers) {
     readers.fetch_sub(1);
@@ -64,13 +69,13 @@ class Gate {
   }
 
   bool isEmpty() const {
-    for (const Slot& slot : slots_) {
-      if (slot.readers.load() != 0) return false;
+    for (const Seat& seat : seats_) {
+      if (seat.readers.load() != 0) return false;
     }
     return true;
   }
 
-  std::array<Slot, 8> slots_;
+  std::array<Seat, kSeats> seats_;
   std::atomic<bool> writing_{false};
   std::mutex turnstile_;  // held while somebody writes
   std::mutex leaving_;    // between the last reader that leaves and a writer that waits

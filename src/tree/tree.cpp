@@ -91,7 +91,10 @@ void Tree::reset(std::shared_ptr<const Mesh> mesh) {
   pieces_ = nullptr;
   surface_ = surfaceOf(std::move(mesh), options_);
   root_bounds_ = oracle::CellBounds();
-  setBox(latticeBounds(surface_), lattice::Cell{}, root_bounds_);
+  const Eigen::AlignedBox3d box = latticeBounds(surface_);
+  setBox(box, lattice::Cell{}, root_bounds_);
+  const double middle = lattice::Cell{}.side() / 2.0;
+  supports_.start({box.min().array() - middle, box.max().array() - middle});
   keepOnly({});
 }
 
@@ -332,11 +335,21 @@ void Tree::packLeaves(const std::vector<NodeRef>& leaves) {
   if (leaves.empty() || !hasRoom()) return;
   const std::unique_lock<std::mutex> lock(growth_, std::try_to_lock);
   if (!lock.owns_lock() || lists_.size() > Pool<std::uint32_t, 12>::kMost / 2) return;
+  std::size_t left = 16 + leaves.size() / 8;
   for (const NodeRef leaf : leaves) {
     const Link list = link(leaf);
-    if (!list.isList()) continue;
-    const std::uint32_t words = lists_[list.index()];
-    if (words > 0 && words <= kLeafTriangles) setLink(leaf, addPacked(list));
+    const std::uint32_t count = list.isList() ? lists_[list.index()] : 0;
+    if (count == 0 || count > kLeafTriangles) continue;  // packed already: the count has a flag
+    if (!leaf.isRoot()) {
+      // Half of the leaves are met but once in hundreds of queries: the second time is early enough.
+      std::uint8_t& came = records_[leaf.block()].came;
+      const bool again = (came >> leaf.octant() & 1) != 0;
+      came = static_cast<std::uint8_t>(came | 1 << leaf.octant());
+      if (!again) continue;
+    }
+    if (left == 0) continue;
+    setLink(leaf, addPacked(list));
+    --left;
   }
   countBytes();
 }
@@ -399,6 +412,20 @@ void Tree::publish(NodeRef node, const oracle::Expansion& answer) {
 void Tree::gatherNode(NodeRef node, const lattice::Cell& cell, std::vector<std::uint32_t>& ids) const {
   if (node.isRoot() || grid_ == nullptr) throw std::logic_error("bocst: an implicit list without a grid");
   grid_->gather(surface_, cell, ids);
+}
+
+bool Tree::trianglesOf(NodeRef node, std::vector<std::uint32_t>& ids) const {
+  const Link link = this->link(node);
+  if (link.isList()) {
+    const TriangleList list = this->list(link);
+    if (list.ids != nullptr) ids.insert(ids.end(), list.ids, list.ids + list.count);
+    return list.ids != nullptr;
+  }
+  const oracle::RootGrid* grid = grid_known_.load(std::memory_order_acquire);
+  const lattice::Cell cell = this->cell(node);
+  if (link.tag() != Link::kImplicit || grid == nullptr || cell.level != grid->level()) return false;
+  grid->gather(surface_, cell, ids);
+  return true;
 }
 
 void Tree::prune(Clock::time_point now) {

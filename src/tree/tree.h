@@ -22,6 +22,7 @@
 #include "tree/gate.h"
 #include "tree/packed_triangles.h"
 #include "tree/pool.h"
+#include "tree/supports.h"
 
 namespace bocst::tree {
 
@@ -69,6 +70,8 @@ class Tree {
     if ((words[0] & kKept) != 0) return {nullptr, count};
     return {(words[0] & kPacked) != 0 ? &lists_[words[1]] : words + 1, count};
   }
+  /// Appends the triangles of a node without children, or a superset; false where they are not known here.
+  bool trianglesOf(NodeRef node, std::vector<std::uint32_t>& ids) const;
   /// Where a list lies, for those who want it in the processor's cache.
   const std::uint32_t* words(Link list) const { return &lists_[list.index()]; }
   /// The corners of a leaf's triangles, in the order of its list; false while they are not packed.
@@ -78,6 +81,9 @@ class Tree {
     triangles = PackedTriangles(words + 2, words[0] & kCount);
     return true;
   }
+  /// How far the surface reaches in any direction; what is known of it, for queries to use and to better.
+  Supports& supports() const { return supports_; }
+  std::uint64_t expansions() const { return expansions_.load(std::memory_order_relaxed); }
   /// No more expansions below this node: a single lattice unit, or the collision depth of conservative answers.
   bool isDeepest(int level) const { return level >= deepest_; }
   int deepest() const { return deepest_; }
@@ -120,7 +126,8 @@ class Tree {
   /// does nothing while another thread grows the tree. Nodes that the root grid does not know are passed over.
   void look(const std::vector<NodeRef>& nodes);
 
-  /// Packs the corners of leaves that queries come to; does nothing while another thread grows the tree.
+  /// Packs the corners of leaves that a query came to and an earlier one, too: as many as the query hardly feels. Does
+  /// nothing while another thread grows the tree.
   void packLeaves(const std::vector<NodeRef>& leaves);
 
   // With the gate free.
@@ -181,6 +188,7 @@ class Tree {
   mutable std::unique_ptr<const std::vector<Eigen::Vector3d>> pieces_;
   mutable std::atomic<const std::vector<Eigen::Vector3d>*> pieces_known_{nullptr};  // pieces_, for readers
   oracle::CellBounds root_bounds_;
+  mutable Supports supports_;
   std::unique_ptr<oracle::RootGrid> grid_;
   std::atomic<const oracle::RootGrid*> grid_known_{nullptr};  // grid_, for readers
   bool grid_tried_ = false;

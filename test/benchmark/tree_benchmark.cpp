@@ -74,23 +74,29 @@ class Counter : public query::Visitor {
   bool first_;
 };
 
-// A walk over resident nodes, with torus B beside or in A: apart, to the first pair that surely meets, or to the last.
-void warmWalk(benchmark::State& state, double x, bool first) {
-  const auto tree_a = torusTree(128), tree_b = torusTree(128);
+// Where torus B lies beside or in A.
+query::Placement beside(const tree::Tree& tree_a, const tree::Tree& tree_b, double x) {
   query::Placement place;
   std::mt19937_64 g(3);
   place.rotation = test::randomRotation(g);
-  const lattice::Lattice &la = tree_a->surface().lattice, &lb = tree_b->surface().lattice;
+  const lattice::Lattice &la = tree_a.surface().lattice, &lb = tree_b.surface().lattice;
   place.scale = lb.unit() / la.unit();
   place.translation = (place.rotation * lb.origin() + Eigen::Vector3d(x, 0, 0) - la.origin()) / la.unit();
   place.slack = 1e-9;
   place.ready();
+  return place;
+}
+
+// A walk over resident nodes: apart, to the first pair that surely meets, or to the last.
+void warmWalk(benchmark::State& state, double x, bool first) {
+  const auto tree_a = torusTree(128), tree_b = torusTree(128);
+  const query::Placement place = beside(*tree_a, *tree_b, x);
   Counter counter(first);
   const std::shared_lock<tree::Gate> look_a(tree_a->gate()), look_b(tree_b->gate());
   const query::TreeSide a(*tree_a), b(*tree_b);
-  for (int i = 0; i < 50; ++i) query::TreeWalk(a, b, place, counter).run();
+  for (int i = 0; i < 50; ++i) query::TreeWalk(a, b, place).run(counter);
   counter = Counter(first);
-  for (auto _ : state) query::TreeWalk(a, b, place, counter).run();
+  for (auto _ : state) query::TreeWalk(a, b, place).run(counter);
   const auto each = benchmark::Counter::kAvgIterations;
   state.counters["pairs"] = benchmark::Counter(static_cast<double>(counter.pairs), each);
   state.counters["certain"] = benchmark::Counter(static_cast<double>(counter.sure), each);
@@ -98,6 +104,25 @@ void warmWalk(benchmark::State& state, double x, bool first) {
 BENCHMARK_CAPTURE(warmWalk, apart, 2.05, true);
 BENCHMARK_CAPTURE(warmWalk, first, 0.9, true);
 BENCHMARK_CAPTURE(warmWalk, all, 0.9, false)->Unit(benchmark::kMicrosecond);
+
+// A look for a direction between two hulls that are apart, or deep in each other.
+void separation(benchmark::State& state, double x) {
+  const auto tree_a = torusTree(128), tree_b = torusTree(128);
+  const query::Placement place = beside(*tree_a, *tree_b, x);
+  Counter counter(true);
+  const std::shared_lock<tree::Gate> look_a(tree_a->gate()), look_b(tree_b->gate());
+  const query::TreeSide a(*tree_a), b(*tree_b);
+  bool apart = false;
+  for (int i = 0; i < 50 && !apart; ++i) {
+    query::TreeWalk walk(a, b, place);
+    apart = walk.isNeedless();
+    if (!apart) walk.run(counter);
+  }
+  for (auto _ : state) benchmark::DoNotOptimize(query::TreeWalk(a, b, place).isNeedless());
+  state.counters["apart"] = apart;
+}
+BENCHMARK_CAPTURE(separation, apart, 2.6);
+BENCHMARK_CAPTURE(separation, deep, 0.2);
 
 }  // namespace
 }  // namespace bocst

@@ -352,19 +352,33 @@ TEST_F(Program, HasARowForEachGoal) {
   }
   EXPECT_FALSE(std::getline(written, line)) << line;
 
-  for (const std::string row : {"first_answer",     "first_distance",
-                                "query_median",     "query_mean",
-                                "query_p95",        "query_miss_median",
-                                "query_miss_mean",  "query_miss_p95",
-                                "query_hit_median", "query_hit_mean",
-                                "query_hit_p95",    "contacts_median",
-                                "contacts_mean",    "contacts_p95",
-                                "distance_median",  "memory",
-                                "memory_all",       "heap",
-                                "moving_first",     "moving_worst",
-                                "moving_p999",      "moving_total",
-                                "moving_raw_worst", "deforming_rebuild",
-                                "deforming_refit",  "deforming_refit_replace"}) {
+  for (const std::string row : {"first_answer",
+                                "first_distance",
+                                "query_median",
+                                "query_mean",
+                                "query_p95",
+                                "query_miss_median",
+                                "query_miss_mean",
+                                "query_miss_p95",
+                                "query_hit_median",
+                                "query_hit_mean",
+                                "query_hit_p95",
+                                "contacts_median",
+                                "contacts_mean",
+                                "contacts_p95",
+                                "distance_median",
+                                "memory",
+                                "memory_all",
+                                "memory_settled",
+                                "heap",
+                                "moving_first",
+                                "moving_worst",
+                                "moving_p999",
+                                "moving_total",
+                                "moving_raw_worst",
+                                "deforming_rebuild",
+                                "deforming_refit",
+                                "deforming_refit_replace"}) {
     ASSERT_EQ(rows.count(row), 1u) << row;
     EXPECT_GT(rows[row].at("ratio"), 0) << row;
   }

@@ -1,0 +1,56 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#include "tree/supports.h"
+
+#include <cmath>
+#include <limits>
+
+namespace bocst::tree {
+namespace {
+
+// Beside the rounding to float, that of the sums in double.
+float roundedUp(double x) {
+  return std::nextafter(static_cast<float>(x + 1e-9 * std::abs(x)), std::numeric_limits<float>::infinity());
+}
+
+}  // namespace
+
+Eigen::Vector3d Supports::direction(int number) {
+  const int j = number % kRow, i = number / kRow % kRow, face = number / (kRow * kRow), k = face / 2;
+  Eigen::Vector3d d;
+  d[k] = face % 2 == 0 ? 1 : -1;
+  d[(k + 1) % 3] = 2.0 * i / kCells - 1;
+  d[(k + 2) % 3] = 2.0 * j / kCells - 1;
+  return d;
+}
+
+void Supports::start(const Eigen::AlignedBox3d& box) {
+  const Eigen::Vector3d center = box.center(), half = box.sizes() / 2;
+  center_ = center.cast<float>();
+  inner_radius_.store(static_cast<float>(half.minCoeff()), std::memory_order_relaxed);
+  for (int n = 0; n < kCount; ++n) {
+    const Eigen::Vector3d d = direction(n);
+    const auto i = static_cast<std::size_t>(n);
+    values_[i].store(roundedUp(d.dot(center) + d.cwiseAbs().dot(half)), std::memory_order_relaxed);
+    states_[i].store(kOpen, std::memory_order_relaxed);
+  }
+}
+
+void Supports::lower(int number, double value, bool exact) {
+  const auto i = static_cast<std::size_t>(number);
+  const float rounded = roundedUp(value);
+  // Another thread may lower it, too; whichever comes last is an upper bound.
+  if (rounded < values_[i].load(std::memory_order_relaxed)) values_[i].store(rounded, std::memory_order_relaxed);
+  const Eigen::Vector3f d = direction(number).cast<float>();
+  const float radius = (rounded - d.dot(center_)) / d.norm();
+  if (radius < innerRadius()) inner_radius_.store(radius, std::memory_order_relaxed);
+  states_[i].store(exact ? kExact : kAsked, std::memory_order_relaxed);
+}
+
+void Supports::reopen(std::uint64_t expansions) {
+  expansions_.store(expansions, std::memory_order_relaxed);
+  for (std::atomic<State>& state : states_) {
+    if (state.load(std::memory_order_relaxed) == kAsked) state.store(kOpen, std::memory_order_relaxed);
+  }
+}
+
+}  // namespace bocst::tree
