@@ -164,28 +164,33 @@ HWY_INLINE std::size_t largest(const float (&values)[8]) {
   return static_cast<std::size_t>(__builtin_ctz(bits));
 }
 
+// The direction from the middle of a's bounds to that of b's, and how far that is.
+HWY_INLINE float wayBetweenMiddles(const Supports& a, const Supports& b, const Between& g, float (&n)[3]) {
+  const Eigen::Vector3f &from = a.center(), &to = b.center();
+  float squared = 0;
+  for (int k = 0; k < 3; ++k) {
+    const float turned = g.rotation[0][k] * to[0] + g.rotation[1][k] * to[1] + g.rotation[2][k] * to[2];
+    n[k] = g.t[k] + g.scale * turned - from[k];
+    squared += n[k] * n[k];
+  }
+  const float length = std::sqrt(squared), per_length = 1 / length;
+  for (float& x : n) x *= per_length;
+  return length;
+}
+
 bool AreSeparate(const Supports& a, const Supports& b, const Placement& b_in_a, NearDirections& near) {
   near.lanes = 0;
   near.shallow = false;
   const Between g = between(b_in_a);
+  const float size = static_cast<float>(1 << (lattice::kBits - 1)) * (1 + g.scale);
+  const float distance = std::abs(g.t[0]) + std::abs(g.t[1]) + std::abs(g.t[2]);
+  const float pad = 1.25f * (64 * 0x1p-24f * (distance + 2 * size) + g.slack);
   float n[3];
-  constexpr float q = 1 << (lattice::kBits - 1);
-  float length = 0, distance = 0;
-  for (int k = 0; k < 3; ++k) {
-    const Eigen::Vector3f& c = b.center();
-    n[k] = g.t[k] - a.center()[k] +
-           g.scale * (g.rotation[0][k] * c[0] + g.rotation[1][k] * c[1] + g.rotation[2][k] * c[2]);
-    length += n[k] * n[k];
-    distance += std::abs(g.t[k]);
-  }
-  const float size = q * (1 + g.scale), pad = 1.25f * (64 * 0x1p-24f * (distance + 2 * size) + g.slack);
+  const float length = wayBetweenMiddles(a, b, g, n);
   // Not true of what is not a number.
-  if (!(length > 1e-12f * size * size && length < 0x1p100f && g.defect < 1e-3f)) return false;
-  length = std::sqrt(length);
+  if (!(length > 1e-6f * size && length < 0x1p50f && g.defect < 1e-3f)) return false;
   // No direction can do better than this; most hits are so deep.
   if (length - a.innerRadius() - g.scale * b.innerRadius() < -kHopeless * size) return false;
-  const float per_length = 1 / length;
-  for (float& x : n) x *= per_length;
 
   alignas(64) float u[3][8];
   float value[8];

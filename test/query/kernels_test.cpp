@@ -5,12 +5,12 @@
 
 #include <fcl/narrowphase/detail/traversal/collision/intersect.h>
 #include <gtest/gtest.h>
-#include <hwy/targets.h>
 
 #include <map>
 #include <numeric>
 #include <set>
 
+#include "every_target.h"
 #include "meshes.h"
 #include "oracle/reference.h"
 #include "query/coarse_triangles.h"
@@ -24,23 +24,7 @@
 namespace bocst::query {
 namespace {
 
-class EveryTarget : public testing::TestWithParam<std::int64_t> {
- protected:
-  void SetUp() override {
-    hwy::SetSupportedTargetsForTest(GetParam());
-    hwy::GetChosenTarget().Update(hwy::SupportedTargets());
-  }
-  void TearDown() override {
-    hwy::SetSupportedTargetsForTest(0);
-    hwy::GetChosenTarget().Update(hwy::SupportedTargets());
-  }
-};
-
-std::vector<std::int64_t> targets() {
-  std::vector<std::int64_t> result;
-  for (std::int64_t left = hwy::SupportedTargets(); left != 0; left &= left - 1) result.push_back(left & -left);
-  return result;
-}
+using EveryTarget = test::EveryTarget;
 
 // Random bounds of an octant, and points of the surface that they allow.
 oracle::CellBounds randomBounds(std::mt19937_64& g) {
@@ -802,8 +786,8 @@ TEST_P(EveryTarget, MovingByDepthParts) {
   EXPECT_GT(slivers, 5);
 }
 
-INSTANTIATE_TEST_SUITE_P(Targets, EveryTarget, testing::ValuesIn(targets()),
-                         [](const auto& p) { return std::string(hwy::TargetName(p.param)); });
+INSTANTIATE_TEST_SUITE_P(Targets, EveryTarget, testing::ValuesIn(test::EveryTarget::targets()),
+                         test::EveryTarget::name);
 
 // Properties of what contacts are made of.
 

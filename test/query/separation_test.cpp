@@ -5,13 +5,13 @@
 
 #include <bocst/bocst.h>
 #include <gtest/gtest.h>
-#include <hwy/targets.h>
 
 #include <algorithm>
 #include <cmath>
 #include <limits>
 
 #include "conformance/reference.h"
+#include "every_target.h"
 #include "meshes.h"
 
 namespace bocst::query {
@@ -70,17 +70,7 @@ void sharpenAll(const Side& a, const Side& b) {
   }
 }
 
-class Separation : public testing::TestWithParam<std::int64_t> {
- protected:
-  void SetUp() override {
-    hwy::SetSupportedTargetsForTest(GetParam());
-    hwy::GetChosenTarget().Update(hwy::SupportedTargets());
-  }
-  void TearDown() override {
-    hwy::SetSupportedTargetsForTest(0);
-    hwy::GetChosenTarget().Update(hwy::SupportedTargets());
-  }
-};
+class Separation : public test::EveryTarget {};
 
 std::vector<test::Raw> surfaces() {
   test::Raw rod = test::box({0, 0, 0}, {1, 0.001, 0.0003});
@@ -173,14 +163,7 @@ TEST_P(Separation, WhatIsNoNumberIsNotSeparate) {
     EXPECT_EQ(near.lanes, 0) << x;
   }
 }
-
-std::vector<std::int64_t> targets() {
-  std::vector<std::int64_t> result;
-  for (std::int64_t left = hwy::SupportedTargets(); left != 0; left &= left - 1) result.push_back(left & -left);
-  return result;
-}
-INSTANTIATE_TEST_SUITE_P(Targets, Separation, testing::ValuesIn(targets()),
-                         [](const auto& target) { return std::string(hwy::TargetName(target.param)); });
+INSTANTIATE_TEST_SUITE_P(Targets, Separation, testing::ValuesIn(test::EveryTarget::targets()), test::EveryTarget::name);
 
 TEST(Supports, AreExactWhereATreeHasGrown) {
   for (const std::size_t n : {std::size_t{20}, std::size_t{100}}) {  // without and with a root grid
