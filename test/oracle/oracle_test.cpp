@@ -302,9 +302,10 @@ void checkGridSpans() {
           };
           const int lo = (std::min({at(0), at(1), at(2)}) - 1) >> (15 - bits),
                     hi = (std::max({at(0), at(1), at(2)}) + 1) >> (15 - bits);
-          expected |= static_cast<std::uint32_t>(lo << k * bits | std::min(hi - lo, 2) << (16 + 2 * k));
+          expected |= static_cast<std::uint32_t>(lo << k * bits | (hi - lo == 1) << (3 * bits + k) |
+                                                 (hi - lo > 1) << (3 * bits + 6 + k));
         }
-        ASSERT_EQ(static_cast<std::uint32_t>(spans[t]) & 0x3fffffu, expected) << instructionSet() << " bits " << bits;
+        ASSERT_EQ(static_cast<std::uint32_t>(spans[t]), expected) << instructionSet() << " bits " << bits;
       }
     }
   }

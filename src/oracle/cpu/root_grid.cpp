@@ -6,6 +6,7 @@
 #include <cstring>
 
 #include "oracle/cpu/clip.h"
+#include "oracle/cpu/huge_pages.h"
 #include "oracle/cpu/kernels.h"
 #include "oracle/reference.h"
 
@@ -19,35 +20,55 @@ constexpr double kMargin = 2;             // lattice units: one step
 constexpr int kAxesShift = 28;            // of the links of lists; a mesh has at most 2^28 triangles
 constexpr std::uint32_t kTriangle = (1u << kAxesShift) - 1;
 
-constexpr std::size_t bucketOf(GridSpan s) { return s & 0xffff; }
-constexpr std::size_t reachOf(GridSpan s) { return s >> 16 & 0x3f; }
-constexpr bool isLarge(GridSpan s) { return (reachOf(s) & 0x2a) != 0; }
-
-/// What a reach without a 2 means: the axes as a link has them, and their bit among the patterns.
-struct Reach {
-  std::uint32_t axes[64] = {};
-  std::uint8_t pattern[64] = {};
-
-  constexpr Reach() {
-    for (std::uint32_t r = 0; r < 64; ++r) {
-      const std::uint32_t q = (r & 1) | (r >> 1 & 2) | (r >> 2 & 4);
-      axes[r] = q << kAxesShift;
-      pattern[r] = static_cast<std::uint8_t>(1 << q);
+/// Room for what a grid is made from.
+class Room {
+ public:
+  // Fresh memory costs as much as what is written to it, so a thread keeps some, one MB at most, for its next mesh.
+  explicit Room(std::size_t bytes) {
+    if (bytes > kMostKept) {
+      own_ = HugePages(bytes);
+      begin_ = static_cast<std::byte*>(own_.begin());
+      return;
     }
+    struct Kept {
+      std::unique_ptr<std::byte[]> bytes;
+      std::size_t size = 0;
+    };
+    thread_local Kept kept;
+    if (kept.size < bytes) {
+      kept.bytes.reset(new std::byte[bytes]);
+      kept.size = bytes;
+    }
+    begin_ = kept.bytes.get();
   }
+
+  /// The next `count` of them, with any values.
+  template <typename T>
+  T* take(std::size_t count) {
+    T* const values = new (begin_) T[count];
+    begin_ += count * sizeof(T);
+    return values;
+  }
+
+ private:
+  static constexpr std::size_t kMostKept = 1 << 20;
+
+  HugePages own_;
+  std::byte* begin_;
 };
-constexpr Reach kReach;
 
 /// The vertices in steps of two lattice units.
 class QuantisedMesh {
  public:
-  QuantisedMesh(const Surface& surface, int bits) : triangles_(surface.mesh->triangles().data()), bits_(bits) {
+  static std::size_t values(const Surface& surface) { return 3 * surface.mesh->vertexCount() + 1; }
+
+  QuantisedMesh(const Surface& surface, int bits, std::int16_t* room)
+      : triangles_(surface.mesh->triangles().data()), bits_(bits), vertices_(room) {
     const Mesh& mesh = *surface.mesh;
-    vertices_ = room(3 * mesh.vertexCount() + 1);
     // Room for a step of margin on both sides.
     quantise(mesh.vertices().data()->data(), mesh.vertexCount(), surface.lattice.origin().data(),
              surface.lattice.inverseUnit() / kMargin, (1 << kGridSpanBits) - 2, vertices_);
-    vertices_[3 * mesh.vertexCount()] = 0;
+    vertices_[values(surface) - 1] = 0;
   }
 
   /// Of `count` triangles from t on. One step of margin covers the rounding of toLattice and closed cells that only
@@ -68,28 +89,24 @@ class QuantisedMesh {
   }
 
  private:
-  // Fresh memory costs as much as what is written to it, so a thread keeps some, one MB at most, for its next mesh.
-  std::int16_t* room(std::size_t count) {
-    struct Kept {
-      std::unique_ptr<std::int16_t[]> values;
-      std::size_t count = 0;
-    };
-    thread_local Kept kept;
-    const bool keep = count <= kMostKept;
-    if (keep && kept.count >= count) return kept.values.get();
-    std::unique_ptr<std::int16_t[]>& values = keep ? kept.values : own_;
-    values.reset(new std::int16_t[count]);
-    if (keep) kept.count = count;
-    return values.get();
-  }
-
-  static constexpr std::size_t kMostKept = 1 << 19;
-
   const Mesh::Indices* triangles_;
   const int bits_;
-  std::unique_ptr<std::int16_t[]> own_;
   std::int16_t* vertices_;
 };
+
+std::uint64_t wordOf(const std::uint8_t* bytes) {
+  std::uint64_t word;
+  std::memcpy(&word, bytes, 8);
+  return word;
+}
+
+// Bit i: byte i in memory is 1, not 0.
+std::uint32_t bitsOf(std::uint64_t bytes) {
+#if __BYTE_ORDER__ == __ORDER_BIG_ENDIAN__
+  bytes = __builtin_bswap64(bytes);
+#endif
+  return static_cast<std::uint32_t>(bytes * 0x0102040810204080u >> 56);
+}
 
 // Of the eight patterns of axes, those that have all the axes of q.
 constexpr std::uint8_t kReaching[8] = {0xff, 0xaa, 0xcc, 0x88, 0xf0, 0xa0, 0xc0, 0x80};
@@ -110,35 +127,29 @@ std::unique_ptr<RootGrid> RootGrid::make(const Surface& surface, int max_level) 
 
 bool RootGrid::build(const Surface& surface) {
   const std::size_t count = surface.mesh->triangleCount(), most_large = count / kLargeShare;
-  const QuantisedMesh mesh(surface, bits_);
-  head_.assign(std::size_t{1} << 3 * bits_, kNone);
+  const std::size_t buckets = std::size_t{1} << 3 * bits_;
+  Room room(8 * buckets + QuantisedMesh::values(surface) * sizeof(std::int16_t));
+  // [axes][bucket], a byte each: a triangle there reaches the next cell on these axes. Bits of one byte would have to
+  // be read just after they were written.
+  std::uint8_t* const reached = room.take<std::uint8_t>(8 * buckets);
+  std::memset(reached, 0, 8 * buckets);
+  const QuantisedMesh mesh(surface, bits_, room.take<std::int16_t>(QuantisedMesh::values(surface)));
+  head_.assign(buckets, kNone);
   next_.reset(new std::uint32_t[count]);
+  adviseHugePages(next_.get(), count * sizeof(next_[0]));
   triangle_count_ = count;
-  reaches_.assign(head_.size(), 0);
-  std::uint32_t *const head = head_.data(), *const next = next_.get();
-  std::uint8_t* const reaches = reaches_.data();
   constexpr std::size_t kBlock = 256;
   GridSpan spans[kBlock];
   for (std::size_t begin = 0; begin < count; begin += kBlock) {
     const std::size_t size = std::min(kBlock, count - begin);
     mesh.spans(begin, size, spans);
-    for (std::size_t i = 0; i < size; ++i) {
-      const GridSpan s = spans[i];
-      if (isLarge(s)) {
-        large_.push_back(static_cast<std::uint32_t>(begin + i));
-        continue;
-      }
-      const std::size_t c = bucketOf(s), reach = reachOf(s);
-      next[begin + i] = head[c];
-      head[c] = static_cast<std::uint32_t>(begin + i) | kReach.axes[reach];
-      reaches[c] |= kReach.pattern[reach];
-    }
+    link(static_cast<std::uint32_t>(begin), static_cast<std::uint32_t>(begin + size), spans, reached);
     if (large_.size() > most_large) return false;
   }
 
   may_be_grey_.assign(word(bits_ + 1, 0, 0), 0);
   is_grey_.assign(may_be_grey_.size(), 0);
-  markCells();
+  markCells(reached);
   for (const std::uint32_t t : large_) {
     std::uint32_t first[3], last[3];
     mesh.box(t, first, last);
@@ -152,20 +163,49 @@ bool RootGrid::build(const Surface& surface) {
   return true;
 }
 
-void RootGrid::markCells() {
-  const std::size_t side = std::size_t{1} << bits_;
+void RootGrid::link(std::uint32_t begin, std::uint32_t end, const GridSpan* spans, std::uint8_t* reached) {
+  const std::uint32_t first_large = kGridSpanLarge << 3 * bits_, bucket_mask = (1u << 3 * bits_) - 1;
+  const int axes_shift = kAxesShift - 3 * bits_;
+  std::uint32_t *const head = head_.data(), *const next = next_.get();
+#pragma GCC unroll 4
+  for (std::uint32_t t = begin; t < end; ++t) {
+    const auto span = static_cast<std::uint32_t>(*spans++);
+    if (span >= first_large) {
+      large_.push_back(std::uint32_t{t});
+      continue;
+    }
+    const std::uint32_t bucket = span & bucket_mask, axes = span & ~bucket_mask;
+    next[t] = head[bucket];
+    head[bucket] = t | axes << axes_shift;
+    reached[span] = 1;
+  }
+}
+
+void RootGrid::markCells(const std::uint8_t* reached) {
+  const std::size_t side = std::size_t{1} << bits_, buckets = side * side * side;
+  reaches_.resize(buckets);
+  for (std::size_t c = 0; c < buckets; c += 8) {
+    std::uint64_t patterns = 0;  // of eight buckets at once
+    for (unsigned q = 0; q < 8; ++q) patterns |= wordOf(reached + q * buckets + c) << q;
+    std::memcpy(&reaches_[c], &patterns, 8);
+  }
   for (std::size_t z = 0; z < side; ++z) {
     for (std::size_t y = 0; y < side; ++y) {
-      const std::uint8_t* row = &reaches_[bucket(0, y, z)];
-      std::uint32_t inside = 0, reached[8] = {};
-      for (std::size_t x = 0; x < side; ++x) {
-        if (row[x] == 0) continue;
-        inside |= (row[x] & 1u) << x;
-        for (unsigned q = 0; q < 8; ++q) reached[q] |= std::uint32_t{(row[x] & kReaching[q]) != 0} << x;
-      }
-      is_grey_[word(bits_, y, z)] = inside;
+      std::uint32_t row[8] = {};
       for (unsigned q = 0; q < 8; ++q) {
-        if (reached[q] != 0) may_be_grey_[word(bits_, y + (q >> 1 & 1), z + (q >> 2))] |= reached[q] << (q & 1);
+        for (std::size_t x = 0; x < side; x += 8) {
+          row[q] |= bitsOf(wordOf(reached + q * buckets + bucket(x, y, z))) << x;
+        }
+      }
+      is_grey_[word(bits_, y, z)] = row[0];
+      // Who reaches on some axes does so on fewer.
+      for (unsigned axis = 1; axis < 8; axis *= 2) {
+        for (unsigned q = 0; q < 8; ++q) {
+          if ((q & axis) == 0) row[q] |= row[q | axis];
+        }
+      }
+      for (unsigned q = 0; q < 8; ++q) {
+        if (row[q] != 0) may_be_grey_[word(bits_, y + (q >> 1 & 1), z + (q >> 2))] |= row[q] << (q & 1);
       }
     }
   }

@@ -7,6 +7,7 @@
 #include <memory>
 #include <vector>
 
+#include "oracle/cpu/kernels.h"
 #include "oracle/oracle.h"
 
 namespace bocst::oracle {
@@ -50,7 +51,8 @@ class RootGrid {
 
   explicit RootGrid(int bits) : bits_(bits) {}
   bool build(const Surface& surface);
-  void markCells();
+  void link(std::uint32_t begin, std::uint32_t end, const GridSpan* spans, std::uint8_t* reached);
+  void markCells(const std::uint8_t* reached);
   void dropMissingCells(const Surface& surface);
   void markCoarseCells();
   bool decide(const Surface& surface, const lattice::Cell& cell);
