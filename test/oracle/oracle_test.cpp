@@ -311,6 +311,22 @@ void checkGridSpans() {
   }
 }
 
+void checkBitsOfOthers() {
+  std::mt19937 random(7);
+  std::uniform_int_distribution<std::uint32_t> of_three(0, 2);
+  for (std::size_t count = 0; count <= 64; count += 8) {
+    std::vector<std::uint32_t> values(count);
+    for (std::uint32_t& value : values) value = of_three(random) - 1;
+    for (const std::uint32_t value : {0u, 1u, 0xffffffffu}) {
+      std::vector<std::uint8_t> bits(count / 8, 0xa5);
+      bitsOfOthers(values.data(), count, value, bits.data());
+      for (std::size_t i = 0; i < count; ++i) {
+        ASSERT_EQ((bits[i / 8] >> i % 8 & 1) != 0, values[i] != value) << instructionSet() << " value " << i;
+      }
+    }
+  }
+}
+
 TEST(Kernels, EveryInstructionSetAgreesOnGreySets) {
   const Surface surface = surfaceOf(test::soup(500, 3));
   Expansion root = rootOf(surface);
@@ -332,6 +348,7 @@ TEST(Kernels, EveryInstructionSetAgreesOnGreySets) {
     }
     checkMesh(*makeOracle(OracleKind::kCpu), surfaceOf(test::adversarial()), 6, 30);
     checkGridSpans();
+    checkBitsOfOthers();
   }
   hwy::SetSupportedTargetsForTest(0);
   hwy::GetChosenTarget().Update(hwy::SupportedTargets());

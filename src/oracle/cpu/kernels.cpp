@@ -239,6 +239,20 @@ void GridSpans(const std::int16_t* vertices, const std::uint32_t* indices, std::
 
 #endif
 
+void BitsOfOthers(const std::uint32_t* values, std::size_t count, std::uint32_t value, std::uint8_t* bits) {
+  const hn::CappedTag<std::uint32_t, 8> d;
+  const auto same = hn::Set(d, value);
+  for (std::size_t i = 0; i < count; i += 8) {
+    unsigned byte = 0;
+    for (std::size_t k = 0; k < 8; k += hn::Lanes(d)) {
+      std::uint8_t part[8];
+      hn::StoreMaskBits(d, hn::Ne(hn::LoadU(d, values + i + k), same), part);
+      byte |= static_cast<unsigned>(part[0]) << k;
+    }
+    bits[i / 8] = static_cast<std::uint8_t>(byte);
+  }
+}
+
 const char* InstructionSet() { return hwy::TargetName(HWY_TARGET); }
 
 }  // namespace bocst::oracle::HWY_NAMESPACE
@@ -250,6 +264,7 @@ namespace bocst::oracle {
 HWY_EXPORT(OctantMasks);
 HWY_EXPORT(Quantise);
 HWY_EXPORT(GridSpans);
+HWY_EXPORT(BitsOfOthers);
 HWY_EXPORT(InstructionSet);
 
 void octantMasks(const float* xyz, std::size_t stride, std::size_t count, float slack, std::uint8_t* masks) {
@@ -263,6 +278,10 @@ void quantise(const double* in, std::size_t count, const double* origin, double 
 
 void gridSpans(const std::int16_t* vertices, const std::uint32_t* indices, std::size_t count, int bits, GridSpan* out) {
   HWY_DYNAMIC_DISPATCH(GridSpans)(vertices, indices, count, bits, out);
+}
+
+void bitsOfOthers(const std::uint32_t* values, std::size_t count, std::uint32_t value, std::uint8_t* bits) {
+  HWY_DYNAMIC_DISPATCH(BitsOfOthers)(values, count, value, bits);
 }
 
 const char* instructionSet() { return HWY_DYNAMIC_DISPATCH(InstructionSet)(); }

@@ -46,6 +46,9 @@ constexpr std::uint32_t kGridSpanLarge = 1u << 6;
 /// last vertex is read, too. out: room for a multiple of 8. bits: 1 to 5.
 void gridSpans(const std::int16_t* vertices, const std::uint32_t* indices, std::size_t count, int bits, GridSpan* out);
 
+/// Bit i % 8 of bits[i / 8]: is values[i] another value than this? count: a multiple of 8.
+void bitsOfOthers(const std::uint32_t* values, std::size_t count, std::uint32_t value, std::uint8_t* bits);
+
 /// The instruction set in use, for people.
 const char* instructionSet();
 

@@ -17,8 +17,6 @@ constexpr std::uint32_t kNone = 0xffffffffu;
 constexpr std::size_t kSmallest = 4096;   // triangles: below, plain expansions are as fast
 constexpr std::size_t kLargeShare = 256;  // at most one triangle in so many may span more than two cells
 constexpr double kMargin = 2;             // lattice units: one step
-constexpr int kAxesShift = 28;            // of the links of lists; a mesh has at most 2^28 triangles
-constexpr std::uint32_t kTriangle = (1u << kAxesShift) - 1;
 
 /// Room for what a grid is made from.
 class Room {
@@ -94,23 +92,6 @@ class QuantisedMesh {
   std::int16_t* vertices_;
 };
 
-std::uint64_t wordOf(const std::uint8_t* bytes) {
-  std::uint64_t word;
-  std::memcpy(&word, bytes, 8);
-  return word;
-}
-
-// Bit i: byte i in memory is 1, not 0.
-std::uint32_t bitsOf(std::uint64_t bytes) {
-#if __BYTE_ORDER__ == __ORDER_BIG_ENDIAN__
-  bytes = __builtin_bswap64(bytes);
-#endif
-  return static_cast<std::uint32_t>(bytes * 0x0102040810204080u >> 56);
-}
-
-// Of the eight patterns of axes, those that have all the axes of q.
-constexpr std::uint8_t kReaching[8] = {0xff, 0xaa, 0xcc, 0x88, 0xf0, 0xa0, 0xc0, 0x80};
-
 }  // namespace
 
 std::unique_ptr<RootGrid> RootGrid::make(const Surface& surface, int max_level) {
@@ -127,14 +108,11 @@ std::unique_ptr<RootGrid> RootGrid::make(const Surface& surface, int max_level) 
 
 bool RootGrid::build(const Surface& surface) {
   const std::size_t count = surface.mesh->triangleCount(), most_large = count / kLargeShare;
-  const std::size_t buckets = std::size_t{1} << 3 * bits_;
-  Room room(8 * buckets + QuantisedMesh::values(surface) * sizeof(std::int16_t));
-  // [axes][bucket], a byte each: a triangle there reaches the next cell on these axes. Bits of one byte would have to
-  // be read just after they were written.
-  std::uint8_t* const reached = room.take<std::uint8_t>(8 * buckets);
-  std::memset(reached, 0, 8 * buckets);
+  const std::size_t lists = std::size_t{8} << 3 * bits_;
+  Room room(lists * sizeof(std::uint32_t) + QuantisedMesh::values(surface) * sizeof(std::int16_t) + lists / 8);
+  auto* const heads = room.take<std::uint32_t>(lists);
+  std::fill_n(heads, lists, kNone);
   const QuantisedMesh mesh(surface, bits_, room.take<std::int16_t>(QuantisedMesh::values(surface)));
-  head_.assign(buckets, kNone);
   next_.reset(new std::uint32_t[count]);
   adviseHugePages(next_.get(), count * sizeof(next_[0]));
   triangle_count_ = count;
@@ -143,13 +121,14 @@ bool RootGrid::build(const Surface& surface) {
   for (std::size_t begin = 0; begin < count; begin += kBlock) {
     const std::size_t size = std::min(kBlock, count - begin);
     mesh.spans(begin, size, spans);
-    link(static_cast<std::uint32_t>(begin), static_cast<std::uint32_t>(begin + size), spans, reached);
+    link(static_cast<std::uint32_t>(begin), static_cast<std::uint32_t>(begin + size), spans, heads);
     if (large_.size() > most_large) return false;
   }
 
+  keepLists(heads, room.take<std::uint8_t>(lists / 8));
   may_be_grey_.assign(word(bits_ + 1, 0, 0), 0);
   is_grey_.assign(may_be_grey_.size(), 0);
-  markCells(reached);
+  markCells();
   for (const std::uint32_t t : large_) {
     std::uint32_t first[3], last[3];
     mesh.box(t, first, last);
@@ -163,49 +142,54 @@ bool RootGrid::build(const Surface& surface) {
   return true;
 }
 
-void RootGrid::link(std::uint32_t begin, std::uint32_t end, const GridSpan* spans, std::uint8_t* reached) {
-  const std::uint32_t first_large = kGridSpanLarge << 3 * bits_, bucket_mask = (1u << 3 * bits_) - 1;
-  const int axes_shift = kAxesShift - 3 * bits_;
-  std::uint32_t *const head = head_.data(), *const next = next_.get();
+void RootGrid::link(std::uint32_t begin, std::uint32_t end, const GridSpan* spans, std::uint32_t* heads) {
+  const std::uint32_t first_large = kGridSpanLarge << 3 * bits_;
+  std::uint32_t* const next = next_.get();
 #pragma GCC unroll 4
   for (std::uint32_t t = begin; t < end; ++t) {
-    const auto span = static_cast<std::uint32_t>(*spans++);
-    if (span >= first_large) {
+    const auto list = static_cast<std::uint32_t>(*spans++);
+    if (list >= first_large) {
       large_.push_back(std::uint32_t{t});
       continue;
     }
-    const std::uint32_t bucket = span & bucket_mask, axes = span & ~bucket_mask;
-    next[t] = head[bucket];
-    head[bucket] = t | axes << axes_shift;
-    reached[span] = 1;
+    next[t] = heads[list];
+    heads[list] = t;
   }
 }
 
-void RootGrid::markCells(const std::uint8_t* reached) {
-  const std::size_t side = std::size_t{1} << bits_, buckets = side * side * side;
-  reaches_.resize(buckets);
-  for (std::size_t c = 0; c < buckets; c += 8) {
-    std::uint64_t patterns = 0;  // of eight buckets at once
-    for (unsigned q = 0; q < 8; ++q) patterns |= wordOf(reached + q * buckets + c) << q;
-    std::memcpy(&reaches_[c], &patterns, 8);
+void RootGrid::keepLists(const std::uint32_t* heads, std::uint8_t* bits) {
+  const std::size_t side = std::size_t{1} << bits_, bytes = side / 8;
+  rows_.resize(8 * side * side);
+  bitsOfOthers(heads, rows_.size() * side, kNone, bits);
+  std::uint32_t count = 0;
+  for (Row& row : rows_) {
+    row = {0, count};
+    for (std::size_t k = 0; k < bytes; ++k) row.lists |= std::uint32_t{*bits++} << 8 * k;
+    count += static_cast<std::uint32_t>(__builtin_popcount(row.lists));
   }
+  head_.resize(count);
+  std::uint32_t* head = head_.data();
+  for (const Row& row : rows_) {
+    for (std::uint32_t left = row.lists; left != 0; left &= left - 1) *head++ = heads[__builtin_ctz(left)];
+    heads += side;
+  }
+}
+
+void RootGrid::markCells() {
+  const std::size_t side = std::size_t{1} << bits_;
   for (std::size_t z = 0; z < side; ++z) {
     for (std::size_t y = 0; y < side; ++y) {
-      std::uint32_t row[8] = {};
-      for (unsigned q = 0; q < 8; ++q) {
-        for (std::size_t x = 0; x < side; x += 8) {
-          row[q] |= bitsOf(wordOf(reached + q * buckets + bucket(x, y, z))) << x;
-        }
-      }
-      is_grey_[word(bits_, y, z)] = row[0];
-      // Who reaches on some axes does so on fewer.
+      std::uint32_t reached[8];
+      for (unsigned q = 0; q < 8; ++q) reached[q] = rows_[row(q, y, z)].lists;
+      is_grey_[word(bits_, y, z)] = reached[0];
+      // What reaches the next cell on some axes does so on fewer.
       for (unsigned axis = 1; axis < 8; axis *= 2) {
         for (unsigned q = 0; q < 8; ++q) {
-          if ((q & axis) == 0) row[q] |= row[q | axis];
+          if ((q & axis) == 0) reached[q] |= reached[q | axis];
         }
       }
       for (unsigned q = 0; q < 8; ++q) {
-        if (row[q] != 0) may_be_grey_[word(bits_, y + (q >> 1 & 1), z + (q >> 2))] |= row[q] << (q & 1);
+        if (reached[q] != 0) may_be_grey_[word(bits_, y + (q >> 1 & 1), z + (q >> 2))] |= reached[q] << (q & 1);
       }
     }
   }
@@ -311,11 +295,22 @@ bool RootGrid::anyCandidate(const Surface& surface, const lattice::Cell& cell, F
       --from[k];
     }
     if (outside) continue;
-    const std::size_t b = bucket(from[0], from[1], from[2]);
-    if ((reaches_[b] & kReaching[q]) == 0) continue;
     // What starts in this cell meets it; what starts in a neighbour has to reach it on the axes between them.
-    for (std::uint32_t link = head_[b]; link != kNone; link = next_[link & kTriangle]) {
-      if ((link >> kAxesShift & q) == q && f(link & kTriangle)) return true;
+    std::uint32_t heads[8];
+    int count = 0;
+    for (unsigned p = q; p < 8; p = (p + 1) | q) {
+      const Row& r = rows_[row(p, from[1], from[2])];
+      const std::uint32_t bit = 1u << from[0];
+      if ((r.lists & bit) != 0) heads[count++] = head_[r.first + __builtin_popcount(r.lists & (bit - 1))];
+    }
+    // Each list goes from the last triangle to the first; so does what they are together.
+    while (count > 0) {
+      int last = 0;
+      for (int i = 1; i < count; ++i) last = heads[i] > heads[last] ? i : last;
+      const std::uint32_t t = heads[last];
+      heads[last] = next_[t];
+      if (heads[last] == kNone) heads[last] = heads[--count];
+      if (f(t)) return true;
     }
   }
   if (large_.empty()) return false;
@@ -376,9 +371,9 @@ CellBounds RootGrid::look(const Surface& surface, const lattice::Cell& cell) con
 }
 
 std::size_t RootGrid::bytes() const {
-  return sizeof(*this) + triangle_count_ * sizeof(next_[0]) +
-         (head_.capacity() + large_.capacity() + may_be_grey_.capacity() + is_grey_.capacity()) * sizeof(head_[0]) +
-         reaches_.capacity();
+  return sizeof(*this) + rows_.capacity() * sizeof(Row) +
+         (triangle_count_ + head_.capacity() + large_.capacity() + may_be_grey_.capacity() + is_grey_.capacity()) *
+             sizeof(head_[0]);
 }
 
 }  // namespace bocst::oracle
