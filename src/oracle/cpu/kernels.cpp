@@ -195,7 +195,7 @@ HWY_INLINE hn::Vec<D16> cornersOf(D16 d, const std::int16_t* vertices, const std
 template <class D16>
 HWY_INLINE auto sumsOfPairs(D16 d, hn::Vec<D16> a, hn::Vec<D16> b) {
   const hn::Repartition<std::int32_t, D16> d32;
-#if HWY_ARCH_X86
+#if HWY_ARCH_X86 && HWY_TARGET != HWY_EMU128
   auto unused = hn::Zero(d32);
   return hn::ReorderWidenMulAccumulate(d32, a, b, hn::Zero(d32), unused);  // one instruction
 #else
