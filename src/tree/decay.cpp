@@ -155,8 +155,14 @@ void Tree::keepOnly(const std::vector<std::uint8_t>& keep) {
 }
 
 void Tree::pruneAlone(std::int64_t now, bool budget_only) {
-  if (!budget_only && options_.ttl.count() > 0 && root_.load(std::memory_order_relaxed).tag() == Link::kBlock) {
-    const std::int64_t ttl = std::chrono::duration_cast<std::chrono::nanoseconds>(options_.ttl).count();
+  const std::int64_t ttl = std::chrono::duration_cast<std::chrono::nanoseconds>(options_.ttl).count();
+  const auto is_old = [&](std::uint32_t block) { return now - stamps_[block].load(std::memory_order_relaxed) > ttl; };
+  const auto some_are_old = [&] {
+    std::uint32_t i = blocks_.size();
+    while (i > 0 && !is_old(i - 1)) --i;
+    return i > 0;
+  };
+  if (!budget_only && ttl > 0 && root_.load(std::memory_order_relaxed).tag() == Link::kBlock && some_are_old()) {
     // Children come after their parents in the pool, so one backward pass sees every child first.
     std::vector<std::uint8_t> keep(blocks_.size(), 1);
     bool some = false;
@@ -170,7 +176,7 @@ void Tree::pruneAlone(std::int64_t now, bool budget_only) {
         deepest = false;
         if (!keep[child.index()]) stamps_[i].store(now, std::memory_order_relaxed);  // its own time starts (3.1)
       }
-      if (deepest && now - stamps_[i].load(std::memory_order_relaxed) > ttl) {
+      if (deepest && is_old(i)) {
         keep[i] = 0;
         some = true;
       }

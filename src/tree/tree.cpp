@@ -308,7 +308,9 @@ std::uint32_t Tree::addBlock(NodeRef node, const lattice::Cell& cell, std::uint8
   stamps_[index].store(now(), std::memory_order_relaxed);
   nodes_at_[cell.level + 1] += __builtin_popcount(grey);
   ++expansions_;
-  for (int o = 0; o < 8; ++o) octants_ += surface_.lattice.exists(cell.octant(o));
+  std::uint64_t octants = 0;
+  for (int o = 0; o < 8; ++o) octants += surface_.lattice.exists(cell.octant(o));
+  octants_ += octants;
   return index;
 }
 

@@ -302,9 +302,26 @@ void checkGridSpans() {
           };
           const int lo = (std::min({at(0), at(1), at(2)}) - 1) >> (15 - bits),
                     hi = (std::max({at(0), at(1), at(2)}) + 1) >> (15 - bits);
-          expected |= static_cast<std::uint32_t>(lo << k * bits | std::min(hi - lo, 2) << (16 + 2 * k));
+          expected |= static_cast<std::uint32_t>(lo << k * bits | (hi - lo == 1) << (3 * bits + k) |
+                                                 (hi - lo > 1) << (3 * bits + 6 + k));
         }
-        ASSERT_EQ(static_cast<std::uint32_t>(spans[t]) & 0x3fffffu, expected) << instructionSet() << " bits " << bits;
+        ASSERT_EQ(static_cast<std::uint32_t>(spans[t]), expected) << instructionSet() << " bits " << bits;
+      }
+    }
+  }
+}
+
+void checkBitsOfOthers() {
+  std::mt19937 random(7);
+  std::uniform_int_distribution<std::uint32_t> of_three(0, 2);
+  for (std::size_t count = 0; count <= 64; count += 8) {
+    std::vector<std::uint32_t> values(count);
+    for (std::uint32_t& value : values) value = of_three(random) - 1;
+    for (const std::uint32_t value : {0u, 1u, 0xffffffffu}) {
+      std::vector<std::uint8_t> bits(count / 8, 0xa5);
+      bitsOfOthers(values.data(), count, value, bits.data());
+      for (std::size_t i = 0; i < count; ++i) {
+        ASSERT_EQ((bits[i / 8] >> i % 8 & 1) != 0, values[i] != value) << instructionSet() << " value " << i;
       }
     }
   }
@@ -331,6 +348,7 @@ TEST(Kernels, EveryInstructionSetAgreesOnGreySets) {
     }
     checkMesh(*makeOracle(OracleKind::kCpu), surfaceOf(test::adversarial()), 6, 30);
     checkGridSpans();
+    checkBitsOfOthers();
   }
   hwy::SetSupportedTargetsForTest(0);
   hwy::GetChosenTarget().Update(hwy::SupportedTargets());

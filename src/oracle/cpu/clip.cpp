@@ -28,14 +28,18 @@ void OctantAccumulator::add(const LocalPoint* corners, int count, const LocalPoi
     for (std::size_t k = 0; k < 3; ++k) corners_[k][count_] = corners[i][static_cast<int>(k)];
     ++count_;
   }
-  LocalPoint area = LocalPoint::Zero();
-  for (int i = 2; i < count; ++i) area += (corners[i - 1] - corners[0]).cross3(corners[i] - corners[0]);
-  // Neighbouring triangles need not agree on which side is out.
-  if (area.dot(area_) < 0) {
-    area_ -= area;
-  } else {
-    area_ += area;
+  // One coordinate at a time: vectors would go through memory.
+  float area[3] = {0, 0, 0};
+  for (int i = 2; i < count; ++i) {
+    const LocalPoint &a = corners[0], &b = corners[i - 1], &c = corners[i];
+    const float u[3] = {b[0] - a[0], b[1] - a[1], b[2] - a[2]}, v[3] = {c[0] - a[0], c[1] - a[1], c[2] - a[2]};
+    area[0] += u[1] * v[2] - u[2] * v[1];
+    area[1] += u[2] * v[0] - u[0] * v[2];
+    area[2] += u[0] * v[1] - u[1] * v[0];
   }
+  // Neighbouring triangles need not agree on which side is out.
+  const float same = area[0] * area_[0] + area[2] * area_[2] + area[1] * area_[1], sign = same < 0 ? -1.0f : 1.0f;
+  for (int k = 0; k < 3; ++k) area_[k] += sign * area[k];
 }
 
 void OctantAccumulator::addBox(const LocalPoint& lo, const LocalPoint& hi) {

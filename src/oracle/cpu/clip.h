@@ -26,7 +26,7 @@ constexpr float kFloatReach = 8;
 /// A triangle cut by at most 6 + 3 planes, and the box of its corners.
 template <typename Point>
 struct Polygon {
-  std::array<Point, 12> corners;
+  std::array<Point, 12 + 1> corners;  // the last is for what cut() tries
   int count = 0;
   Point lo, hi;
 
@@ -89,21 +89,32 @@ void OctantAccumulator::add(const Polygon<Point>& part, bool keep) {
 template <typename Point>
 void cut(const Polygon<Point>& in, int axis, typename Point::Scalar bound, bool below, Polygon<Point>& out) {
   using S = typename Point::Scalar;
-  out.count = 0;
+  // Out of a table: a coordinate that is written alone delays whoever reads the point.
+  alignas(32) static constexpr S kUnit[3][4] = {{1, 0, 0, 0}, {0, 1, 0, 0}, {0, 0, 1, 0}};
+  const Point unit = Eigen::Map<const Point>(kUnit[axis]), others = Point::Ones() - unit, plane = bound * unit;
   const S sign = below ? 1 : -1;
   const Point* a = &in.corners[static_cast<std::size_t>(in.count - 1)];
   S da = sign * ((*a)[axis] - bound);
+  std::size_t count = 0;
   for (int i = 0; i < in.count; ++i) {
     const Point& b = in.corners[static_cast<std::size_t>(i)];
     const S db = sign * (b[axis] - bound);
-    if ((da < 0 && db > 0) || (da > 0 && db < 0)) {
-      Point p = *a + (da / (da - db)) * (b - *a);
-      p[axis] = bound;
-      out.add(p);
-    }
-    if (db <= 0) out.add(b);
+    // Both are written, and stay if they are counted: to branch here is to guess.
+    out.corners[count] = (*a + (da / (da - db)) * (b - *a)).cwiseProduct(others) + plane;
+    count += static_cast<std::size_t>(((da < 0) & (db > 0)) | ((da > 0) & (db < 0)));
+    out.corners[count] = b;
+    count += static_cast<std::size_t>(db <= 0);
     a = &b;
     da = db;
+  }
+  out.count = static_cast<int>(count);
+  if (count == 0) return;
+  // As many steps as above, which are easier to foresee than as many as there are corners.
+  out.lo = out.hi = out.corners[0];
+  for (int i = 1; i <= in.count; ++i) {
+    const Point& p = out.corners[std::min(static_cast<std::size_t>(i), count - 1)];
+    out.lo = out.lo.cwiseMin(p);
+    out.hi = out.hi.cwiseMax(p);
   }
 }
 

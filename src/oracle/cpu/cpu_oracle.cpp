@@ -56,8 +56,13 @@ class Expander {
   }
 
   static LocalPoint localOctantCenter(int o) {
-    return {o & 1 ? 0.5f : -0.5f, o & 2 ? 0.5f : -0.5f, o & 4 ? 0.5f : -0.5f, 0};
+    alignas(16) static constexpr float kCenters[8][4] = {
+        {-0.5f, -0.5f, -0.5f, 0}, {0.5f, -0.5f, -0.5f, 0}, {-0.5f, 0.5f, -0.5f, 0}, {0.5f, 0.5f, -0.5f, 0},
+        {-0.5f, -0.5f, 0.5f, 0},  {0.5f, -0.5f, 0.5f, 0},  {-0.5f, 0.5f, 0.5f, 0},  {0.5f, 0.5f, 0.5f, 0}};
+    return LocalPoint::Map(kCenters[o]);
   }
+
+  static bool allUpTo(float most, const LocalPoint& p) { return p[0] <= most && p[1] <= most && p[2] <= most; }
 
   void block(std::size_t begin, std::size_t count) {
     const Mesh& mesh = *e_.surface->mesh;
@@ -100,7 +105,7 @@ class Expander {
       // Most triangles are small and lie in one octant.
       const int o = __builtin_ctz(mask);
       const LocalPoint c = localOctantCenter(o);
-      if ((hi - c).cwiseMax(c - lo).maxCoeff() <= 0.5f + kClipMargin) {
+      if (allUpTo(0.5f + kClipMargin, (hi - c).cwiseMax(c - lo))) {
         s_.octants[o].add(corners, 3, lo, hi, slab_);
         return;
       }
@@ -110,7 +115,7 @@ class Expander {
       s_.octants[o].add(part, slab_);
       seen |= 1 << o;
     };
-    if (hi.cwiseMax(-lo).maxCoeff() <= kFloatReach) {
+    if (allUpTo(kFloatReach, hi.cwiseMax(-lo))) {
       clipToOctants(corners, mask, take);
     } else {
       Eigen::Vector3d exact[3];
@@ -125,11 +130,22 @@ class Expander {
     }
   }
 
+  // 1 in byte o for bit o.
+  static std::uint64_t bytesOfBits(std::uint8_t bits) {
+    const std::uint64_t own_bit_in_each = bits * 0x0101010101010101u & 0x8040201008040201u;
+    return (own_bit_in_each + 0x7f7f7f7f7f7f7f7fu) >> 7 & 0x0101010101010101u;
+  }
+
   void makeLists() {
     std::array<std::size_t, 8> sizes{};
-    for (std::size_t i = 0; i < e_.count; ++i) {
-      s_.masks[i] &= proven_;
-      for (int o = 0; o < 8; ++o) sizes[o] += s_.masks[i] >> o & 1;
+    constexpr std::size_t kMostInByte = 255;
+    for (std::size_t begin = 0; begin < e_.count; begin += kMostInByte) {
+      std::uint64_t sums = 0;  // a byte for each octant
+      for (std::size_t i = begin; i < std::min(begin + kMostInByte, e_.count); ++i) {
+        s_.masks[i] &= proven_;
+        sums += bytesOfBits(s_.masks[i]);
+      }
+      for (int o = 0; o < 8; ++o) sizes[o] += sums >> 8 * o & 0xff;
     }
     e_.list_begin[0] = 0;
     for (int o = 0; o < 8; ++o) e_.list_begin[o + 1] = e_.list_begin[o] + sizes[o];

@@ -171,8 +171,8 @@ void GridSpans(const std::int16_t* vertices, const std::uint32_t* indices, std::
     for (int axis = 0; axis < 3; ++axis) {
       const auto at = [&](int k) { return vertices[3 * std::size_t{indices[k]} + static_cast<std::size_t>(axis)]; };
       const int lo = (std::min({at(0), at(1), at(2)}) - 1) >> shift,
-                hi = (std::max({at(0), at(1), at(2)}) + 1) >> shift;
-      out[i] |= static_cast<GridSpan>(lo << axis * bits | std::min(hi - lo, 2) << (16 + 2 * axis));
+                reach = ((std::max({at(0), at(1), at(2)}) + 1) >> shift) - lo;
+      out[i] |= static_cast<GridSpan>(lo << axis * bits | (reach > 1 ? kGridSpanLarge : reach) << (3 * bits + axis));
     }
   }
 }
@@ -191,6 +191,19 @@ HWY_INLINE hn::Vec<D16> cornersOf(D16 d, const std::int16_t* vertices, const std
   }
 }
 
+// a times b, each two neighbours added up; the products fit in 15 bits.
+template <class D16>
+HWY_INLINE auto sumsOfPairs(D16 d, hn::Vec<D16> a, hn::Vec<D16> b) {
+  const hn::Repartition<std::int32_t, D16> d32;
+#if HWY_ARCH_X86 && HWY_TARGET != HWY_EMU128
+  auto unused = hn::Zero(d32);
+  return hn::ReorderWidenMulAccumulate(d32, a, b, hn::Zero(d32), unused);  // one instruction
+#else
+  const auto products = hn::BitCast(d32, hn::Mul(a, b));
+  return hn::Add(hn::And(products, hn::Set(d32, 0xffff)), hn::ShiftRight<16>(products));
+#endif
+}
+
 void GridSpans(const std::int16_t* vertices, const std::uint32_t* indices, std::size_t count, int bits, GridSpan* out) {
   const hn::CappedTag<std::int16_t, kSpanLanes> d;
   const hn::Repartition<std::uint64_t, decltype(d)> d64;
@@ -199,36 +212,46 @@ void GridSpans(const std::int16_t* vertices, const std::uint32_t* indices, std::
   for (std::size_t i = 0; i < kSpanLanes; ++i) {
     const std::size_t axis = i % 4;
     pattern[0][i] = static_cast<std::int16_t>(axis < 3 ? 1 << axis * static_cast<std::size_t>(bits) : 0);
-    pattern[1][i] = static_cast<std::int16_t>(axis < 3 ? 1 << 2 * axis : 0);
+    pattern[1][i] = static_cast<std::int16_t>(axis < 3 ? 1 << axis : 0);
   }
   const auto strides = hn::Load(d, pattern[0]), digits = hn::Load(d, pattern[1]);
-  const auto one = hn::Set(d, std::int16_t{1}), two = hn::Set(d, std::int16_t{2});
-  const auto low = hn::Set(d64, std::uint64_t{0xffff});
+  const auto one = hn::Set(d, std::int16_t{1}), large = hn::Set(d, static_cast<std::int16_t>(kGridSpanLarge));
   const int shift = kGridSpanBits - bits;
-  const auto take = [&](const std::uint32_t* i, GridSpan* to) HWY_ATTR {
+  std::uint32_t last[3 * kSpanLanes / 4] = {};
+  for (std::size_t at = 0; at < count; at += at_once) {
+    const std::uint32_t* i = indices + 3 * at;
+    if (at + at_once > count) {
+      std::copy(i, indices + 3 * count, last);
+      i = last;
+    }
+    __builtin_prefetch(i + 512);  // what the hardware fetches ahead is too little for the largest meshes
     const auto a = cornersOf(d, vertices, i), b = cornersOf(d, vertices, i + 1), c = cornersOf(d, vertices, i + 2);
     const auto lo = hn::ShiftRightSame(hn::Sub(hn::Min(hn::Min(a, b), c), one), shift);
     const auto hi = hn::ShiftRightSame(hn::Add(hn::Max(hn::Max(a, b), c), one), shift);
-    const auto cell = hn::BitCast(d64, hn::Mul(lo, strides));
-    const auto reach = hn::BitCast(d64, hn::Mul(hn::Min(hn::Sub(hi, lo), two), digits));
-    // Sums of each triangle's lanes, in the lowest.
-    const auto cells = hn::Add(hn::Add(cell, hn::ShiftRight<16>(cell)), hn::ShiftRight<32>(cell));
-    const auto reaches = hn::Add(hn::Add(reach, hn::ShiftRight<16>(reach)), hn::ShiftRight<32>(reach));
-    hn::StoreU(hn::Or(hn::And(cells, low), hn::ShiftLeft<16>(reaches)), d64, to);
-  };
-  std::size_t i = 0;
-  for (; i + at_once <= count; i += at_once) {
-    __builtin_prefetch(indices + 3 * i + 512);  // what the hardware fetches ahead is too little for the largest meshes
-    take(indices + 3 * i, out + i);
-  }
-  if (i < count) {
-    std::uint32_t last[3 * kSpanLanes / 4] = {};
-    std::copy(indices + 3 * i, indices + 3 * count, last);
-    take(last, out + i);
+    const auto reach = hn::Sub(hi, lo);
+    const auto code = hn::IfThenElse(hn::Gt(reach, one), large, reach);
+    // x with y, z alone: their sum is in the lower half of each triangle's lanes.
+    const auto parts = hn::BitCast(
+        d64, hn::Or(sumsOfPairs(d, lo, strides), hn::ShiftLeftSame(sumsOfPairs(d, code, digits), 3 * bits)));
+    hn::StoreU(hn::Add(parts, hn::ShiftRight<32>(parts)), d64, out + at);
   }
 }
 
 #endif
+
+void BitsOfOthers(const std::uint32_t* values, std::size_t count, std::uint32_t value, std::uint8_t* bits) {
+  const hn::CappedTag<std::uint32_t, 8> d;
+  const auto same = hn::Set(d, value);
+  for (std::size_t i = 0; i < count; i += 8) {
+    unsigned byte = 0;
+    for (std::size_t k = 0; k < 8; k += hn::Lanes(d)) {
+      std::uint8_t part[8];
+      hn::StoreMaskBits(d, hn::Ne(hn::LoadU(d, values + i + k), same), part);
+      byte |= static_cast<unsigned>(part[0]) << k;
+    }
+    bits[i / 8] = static_cast<std::uint8_t>(byte);
+  }
+}
 
 const char* InstructionSet() { return hwy::TargetName(HWY_TARGET); }
 
@@ -241,6 +264,7 @@ namespace bocst::oracle {
 HWY_EXPORT(OctantMasks);
 HWY_EXPORT(Quantise);
 HWY_EXPORT(GridSpans);
+HWY_EXPORT(BitsOfOthers);
 HWY_EXPORT(InstructionSet);
 
 void octantMasks(const float* xyz, std::size_t stride, std::size_t count, float slack, std::uint8_t* masks) {
@@ -254,6 +278,10 @@ void quantise(const double* in, std::size_t count, const double* origin, double 
 
 void gridSpans(const std::int16_t* vertices, const std::uint32_t* indices, std::size_t count, int bits, GridSpan* out) {
   HWY_DYNAMIC_DISPATCH(GridSpans)(vertices, indices, count, bits, out);
+}
+
+void bitsOfOthers(const std::uint32_t* values, std::size_t count, std::uint32_t value, std::uint8_t* bits) {
+  HWY_DYNAMIC_DISPATCH(BitsOfOthers)(values, count, value, bits);
 }
 
 const char* instructionSet() { return HWY_DYNAMIC_DISPATCH(InstructionSet)(); }

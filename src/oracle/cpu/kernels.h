@@ -35,15 +35,19 @@ void quantise(const double* in, std::size_t count, const double* origin, double 
               std::int16_t* out);
 
 /// Where a triangle's box, widened by one step on each side, lies in a grid of 2^bits cells along each axis over 2^15
-/// steps: in the low 16 bits the number of the cell of its minimum corner (x, then y, then z from low to high); then
-/// two bits an axis that say how many cells further its maximum corner is, 2 for any more. The upper half means
-/// nothing.
+/// steps: in the low 3 * bits bits the number of the cell of its minimum corner (x, then y, then z from low to high);
+/// above them a bit an axis, set where its maximum corner is in the next cell, and kGridSpanLarge of these, where it is
+/// farther away. The upper half means nothing.
 using GridSpan = std::uint64_t;
 constexpr int kGridSpanBits = 15;
+constexpr std::uint32_t kGridSpanLarge = 1u << 6;
 
 /// The spans of `count` triangles between vertices that quantise() made, no more than 2^15 - 2; one value after the
 /// last vertex is read, too. out: room for a multiple of 8. bits: 1 to 5.
 void gridSpans(const std::int16_t* vertices, const std::uint32_t* indices, std::size_t count, int bits, GridSpan* out);
+
+/// Bit i % 8 of bits[i / 8]: is values[i] another value than this? count: a multiple of 8.
+void bitsOfOthers(const std::uint32_t* values, std::size_t count, std::uint32_t value, std::uint8_t* bits);
 
 /// The instruction set in use, for people.
 const char* instructionSet();

@@ -6,6 +6,7 @@
 #include <cstring>
 
 #include "oracle/cpu/clip.h"
+#include "oracle/cpu/huge_pages.h"
 #include "oracle/cpu/kernels.h"
 #include "oracle/reference.h"
 
@@ -16,38 +17,56 @@ constexpr std::uint32_t kNone = 0xffffffffu;
 constexpr std::size_t kSmallest = 4096;   // triangles: below, plain expansions are as fast
 constexpr std::size_t kLargeShare = 256;  // at most one triangle in so many may span more than two cells
 constexpr double kMargin = 2;             // lattice units: one step
-constexpr int kAxesShift = 28;            // of the links of lists; a mesh has at most 2^28 triangles
-constexpr std::uint32_t kTriangle = (1u << kAxesShift) - 1;
 
-constexpr std::size_t bucketOf(GridSpan s) { return s & 0xffff; }
-constexpr std::size_t reachOf(GridSpan s) { return s >> 16 & 0x3f; }
-constexpr bool isLarge(GridSpan s) { return (reachOf(s) & 0x2a) != 0; }
-
-/// What a reach without a 2 means: the axes as a link has them, and their bit among the patterns.
-struct Reach {
-  std::uint32_t axes[64] = {};
-  std::uint8_t pattern[64] = {};
-
-  constexpr Reach() {
-    for (std::uint32_t r = 0; r < 64; ++r) {
-      const std::uint32_t q = (r & 1) | (r >> 1 & 2) | (r >> 2 & 4);
-      axes[r] = q << kAxesShift;
-      pattern[r] = static_cast<std::uint8_t>(1 << q);
+/// Room for what a grid is made from.
+class Room {
+ public:
+  // Fresh memory costs as much as what is written to it, so a thread keeps some, one MB at most, for its next mesh.
+  explicit Room(std::size_t bytes) {
+    if (bytes > kMostKept) {
+      own_ = HugePages(bytes);
+      begin_ = static_cast<std::byte*>(own_.begin());
+      return;
     }
+    struct Kept {
+      std::unique_ptr<std::byte[]> bytes;
+      std::size_t size = 0;
+    };
+    thread_local Kept kept;
+    if (kept.size < bytes) {
+      kept.bytes.reset(new std::byte[bytes]);
+      kept.size = bytes;
+    }
+    begin_ = kept.bytes.get();
   }
+
+  /// The next `count` of them, with any values.
+  template <typename T>
+  T* take(std::size_t count) {
+    T* const values = new (begin_) T[count];
+    begin_ += count * sizeof(T);
+    return values;
+  }
+
+ private:
+  static constexpr std::size_t kMostKept = 1 << 20;
+
+  HugePages own_;
+  std::byte* begin_;
 };
-constexpr Reach kReach;
 
 /// The vertices in steps of two lattice units.
 class QuantisedMesh {
  public:
-  QuantisedMesh(const Surface& surface, int bits) : triangles_(surface.mesh->triangles().data()), bits_(bits) {
+  static std::size_t values(const Surface& surface) { return 3 * surface.mesh->vertexCount() + 1; }
+
+  QuantisedMesh(const Surface& surface, int bits, std::int16_t* room)
+      : triangles_(surface.mesh->triangles().data()), bits_(bits), vertices_(room) {
     const Mesh& mesh = *surface.mesh;
-    vertices_ = room(3 * mesh.vertexCount() + 1);
     // Room for a step of margin on both sides.
     quantise(mesh.vertices().data()->data(), mesh.vertexCount(), surface.lattice.origin().data(),
              surface.lattice.inverseUnit() / kMargin, (1 << kGridSpanBits) - 2, vertices_);
-    vertices_[3 * mesh.vertexCount()] = 0;
+    vertices_[values(surface) - 1] = 0;
   }
 
   /// Of `count` triangles from t on. One step of margin covers the rounding of toLattice and closed cells that only
@@ -68,31 +87,10 @@ class QuantisedMesh {
   }
 
  private:
-  // Fresh memory costs as much as what is written to it, so a thread keeps some, one MB at most, for its next mesh.
-  std::int16_t* room(std::size_t count) {
-    struct Kept {
-      std::unique_ptr<std::int16_t[]> values;
-      std::size_t count = 0;
-    };
-    thread_local Kept kept;
-    const bool keep = count <= kMostKept;
-    if (keep && kept.count >= count) return kept.values.get();
-    std::unique_ptr<std::int16_t[]>& values = keep ? kept.values : own_;
-    values.reset(new std::int16_t[count]);
-    if (keep) kept.count = count;
-    return values.get();
-  }
-
-  static constexpr std::size_t kMostKept = 1 << 19;
-
   const Mesh::Indices* triangles_;
   const int bits_;
-  std::unique_ptr<std::int16_t[]> own_;
   std::int16_t* vertices_;
 };
-
-// Of the eight patterns of axes, those that have all the axes of q.
-constexpr std::uint8_t kReaching[8] = {0xff, 0xaa, 0xcc, 0x88, 0xf0, 0xa0, 0xc0, 0x80};
 
 }  // namespace
 
@@ -110,32 +108,24 @@ std::unique_ptr<RootGrid> RootGrid::make(const Surface& surface, int max_level) 
 
 bool RootGrid::build(const Surface& surface) {
   const std::size_t count = surface.mesh->triangleCount(), most_large = count / kLargeShare;
-  const QuantisedMesh mesh(surface, bits_);
-  head_.assign(std::size_t{1} << 3 * bits_, kNone);
+  const std::size_t lists = std::size_t{8} << 3 * bits_;
+  Room room(lists * sizeof(std::uint32_t) + QuantisedMesh::values(surface) * sizeof(std::int16_t) + lists / 8);
+  auto* const heads = room.take<std::uint32_t>(lists);
+  std::fill_n(heads, lists, kNone);
+  const QuantisedMesh mesh(surface, bits_, room.take<std::int16_t>(QuantisedMesh::values(surface)));
   next_.reset(new std::uint32_t[count]);
+  adviseHugePages(next_.get(), count * sizeof(next_[0]));
   triangle_count_ = count;
-  reaches_.assign(head_.size(), 0);
-  std::uint32_t *const head = head_.data(), *const next = next_.get();
-  std::uint8_t* const reaches = reaches_.data();
   constexpr std::size_t kBlock = 256;
   GridSpan spans[kBlock];
   for (std::size_t begin = 0; begin < count; begin += kBlock) {
     const std::size_t size = std::min(kBlock, count - begin);
     mesh.spans(begin, size, spans);
-    for (std::size_t i = 0; i < size; ++i) {
-      const GridSpan s = spans[i];
-      if (isLarge(s)) {
-        large_.push_back(static_cast<std::uint32_t>(begin + i));
-        continue;
-      }
-      const std::size_t c = bucketOf(s), reach = reachOf(s);
-      next[begin + i] = head[c];
-      head[c] = static_cast<std::uint32_t>(begin + i) | kReach.axes[reach];
-      reaches[c] |= kReach.pattern[reach];
-    }
+    link(static_cast<std::uint32_t>(begin), static_cast<std::uint32_t>(begin + size), spans, heads);
     if (large_.size() > most_large) return false;
   }
 
+  keepLists(heads, room.take<std::uint8_t>(lists / 8));
   may_be_grey_.assign(word(bits_ + 1, 0, 0), 0);
   is_grey_.assign(may_be_grey_.size(), 0);
   markCells();
@@ -152,18 +142,52 @@ bool RootGrid::build(const Surface& surface) {
   return true;
 }
 
+void RootGrid::link(std::uint32_t begin, std::uint32_t end, const GridSpan* spans, std::uint32_t* heads) {
+  const std::uint32_t first_large = kGridSpanLarge << 3 * bits_;
+  std::uint32_t* const next = next_.get();
+#pragma GCC unroll 4
+  for (std::uint32_t t = begin; t < end; ++t) {
+    const auto list = static_cast<std::uint32_t>(*spans++);
+    if (list >= first_large) {
+      large_.push_back(std::uint32_t{t});
+      continue;
+    }
+    next[t] = heads[list];
+    heads[list] = t;
+  }
+}
+
+void RootGrid::keepLists(const std::uint32_t* heads, std::uint8_t* bits) {
+  const std::size_t side = std::size_t{1} << bits_, bytes = side / 8;
+  rows_.resize(8 * side * side);
+  bitsOfOthers(heads, rows_.size() * side, kNone, bits);
+  std::uint32_t count = 0;
+  for (Row& row : rows_) {
+    row = {0, count};
+    for (std::size_t k = 0; k < bytes; ++k) row.lists |= std::uint32_t{*bits++} << 8 * k;
+    count += static_cast<std::uint32_t>(__builtin_popcount(row.lists));
+  }
+  head_.resize(count);
+  std::uint32_t* head = head_.data();
+  for (const Row& row : rows_) {
+    for (std::uint32_t left = row.lists; left != 0; left &= left - 1) *head++ = heads[__builtin_ctz(left)];
+    heads += side;
+  }
+}
+
 void RootGrid::markCells() {
   const std::size_t side = std::size_t{1} << bits_;
   for (std::size_t z = 0; z < side; ++z) {
     for (std::size_t y = 0; y < side; ++y) {
-      const std::uint8_t* row = &reaches_[bucket(0, y, z)];
-      std::uint32_t inside = 0, reached[8] = {};
-      for (std::size_t x = 0; x < side; ++x) {
-        if (row[x] == 0) continue;
-        inside |= (row[x] & 1u) << x;
-        for (unsigned q = 0; q < 8; ++q) reached[q] |= std::uint32_t{(row[x] & kReaching[q]) != 0} << x;
+      std::uint32_t reached[8];
+      for (unsigned q = 0; q < 8; ++q) reached[q] = rows_[row(q, y, z)].lists;
+      is_grey_[word(bits_, y, z)] = reached[0];
+      // What reaches the next cell on some axes does so on fewer.
+      for (unsigned axis = 1; axis < 8; axis *= 2) {
+        for (unsigned q = 0; q < 8; ++q) {
+          if ((q & axis) == 0) reached[q] |= reached[q | axis];
+        }
       }
-      is_grey_[word(bits_, y, z)] = inside;
       for (unsigned q = 0; q < 8; ++q) {
         if (reached[q] != 0) may_be_grey_[word(bits_, y + (q >> 1 & 1), z + (q >> 2))] |= reached[q] << (q & 1);
       }
@@ -271,11 +295,22 @@ bool RootGrid::anyCandidate(const Surface& surface, const lattice::Cell& cell, F
       --from[k];
     }
     if (outside) continue;
-    const std::size_t b = bucket(from[0], from[1], from[2]);
-    if ((reaches_[b] & kReaching[q]) == 0) continue;
     // What starts in this cell meets it; what starts in a neighbour has to reach it on the axes between them.
-    for (std::uint32_t link = head_[b]; link != kNone; link = next_[link & kTriangle]) {
-      if ((link >> kAxesShift & q) == q && f(link & kTriangle)) return true;
+    std::uint32_t heads[8];
+    int count = 0;
+    for (unsigned p = q; p < 8; p = (p + 1) | q) {
+      const Row& r = rows_[row(p, from[1], from[2])];
+      const std::uint32_t bit = 1u << from[0];
+      if ((r.lists & bit) != 0) heads[count++] = head_[r.first + __builtin_popcount(r.lists & (bit - 1))];
+    }
+    // Each list goes from the last triangle to the first; so does what they are together.
+    while (count > 0) {
+      int last = 0;
+      for (int i = 1; i < count; ++i) last = heads[i] > heads[last] ? i : last;
+      const std::uint32_t t = heads[last];
+      heads[last] = next_[t];
+      if (heads[last] == kNone) heads[last] = heads[--count];
+      if (f(t)) return true;
     }
   }
   if (large_.empty()) return false;
@@ -336,9 +371,9 @@ CellBounds RootGrid::look(const Surface& surface, const lattice::Cell& cell) con
 }
 
 std::size_t RootGrid::bytes() const {
-  return sizeof(*this) + triangle_count_ * sizeof(next_[0]) +
-         (head_.capacity() + large_.capacity() + may_be_grey_.capacity() + is_grey_.capacity()) * sizeof(head_[0]) +
-         reaches_.capacity();
+  return sizeof(*this) + rows_.capacity() * sizeof(Row) +
+         (triangle_count_ + head_.capacity() + large_.capacity() + may_be_grey_.capacity() + is_grey_.capacity()) *
+             sizeof(head_[0]);
 }
 
 }  // namespace bocst::oracle

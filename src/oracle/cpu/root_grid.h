@@ -7,6 +7,7 @@
 #include <memory>
 #include <vector>
 
+#include "oracle/cpu/kernels.h"
 #include "oracle/oracle.h"
 
 namespace bocst::oracle {
@@ -14,10 +15,11 @@ namespace bocst::oracle {
 /// The first levels of a large mesh in one streaming pass: which cells of the levels 2 to level() may be grey, and for
 /// each of the finest a list of the triangles that may meet it, gathered when asked for.
 ///
-/// Each triangle is linked into the bucket of the cell of its box's minimum corner; it can reach at most the next cell
-/// along each axis (the few that are larger are kept apart). So the candidates of a cell are in the eight buckets on
-/// its minimum side. A bucket with a triangle that lies wholly inside is grey; what else a triangle's box meets is
-/// decided by the reference test when somebody asks. 4 bytes a triangle.
+/// Each triangle is linked into a list of the cell of its box's minimum corner; it can reach at most the next cell
+/// along each axis (the few that are larger are kept apart), and for each choice of axes there is a list of its own. So
+/// the candidates of a cell are in its own lists and in some of the seven cells on its minimum side. A cell with a
+/// triangle that lies wholly inside is grey; what else a triangle's box meets is decided by the reference test when
+/// somebody asks. 4 bytes a triangle.
 class RootGrid {
  public:
   /// Null when the mesh is too small or its triangles too large for the pass to pay, or max_level is below 4.
@@ -50,23 +52,29 @@ class RootGrid {
 
   explicit RootGrid(int bits) : bits_(bits) {}
   bool build(const Surface& surface);
+  void link(std::uint32_t begin, std::uint32_t end, const GridSpan* spans, std::uint32_t* heads);
+  void keepLists(const std::uint32_t* heads, std::uint8_t* bits);
   void markCells();
   void dropMissingCells(const Surface& surface);
   void markCoarseCells();
   bool decide(const Surface& surface, const lattice::Cell& cell);
   template <typename F>
   bool anyCandidate(const Surface& surface, const lattice::Cell& cell, F&& f) const;
-  std::size_t bucket(std::size_t x, std::size_t y, std::size_t z) const { return (z << bits_ | y) << bits_ | x; }
+  std::size_t row(unsigned axes, std::size_t y, std::size_t z) const { return (axes << bits_ | z) << bits_ | y; }
   static std::size_t word(int b, std::size_t y, std::size_t z) {
     return ((std::size_t{1} << 2 * b) - 4) / 3 + (z << b | y);
   }
 
   int bits_;  // 2^bits_ cells along an axis
-  // Lists: a triangle, and the axes on which it reaches the next cell.
-  std::vector<std::uint32_t> head_;        // [bucket]
+  // Lists of triangles, from the last to the first; kept are those that are not empty, ordered by axes, z, y, x.
+  struct Row {
+    std::uint32_t lists;  // bit x: the cell x of the row has one
+    std::uint32_t first;
+  };
+  std::vector<Row> rows_;  // [axes][z][y]
+  std::vector<std::uint32_t> head_;
   std::unique_ptr<std::uint32_t[]> next_;  // [triangle]
   std::size_t triangle_count_ = 0;
-  std::vector<std::uint8_t> reaches_;  // [bucket], bit p: a triangle there reaches the next cell on the axes of p
   std::vector<std::uint32_t> large_;
   Bits may_be_grey_, is_grey_;  // the first without the second is to be decided
 };
