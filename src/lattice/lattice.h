@@ -13,6 +13,7 @@ namespace bocst::lattice {
 /// The root cube has 2^kBits lattice units a side; the cells of level kMaxLevel are single units.
 constexpr int kBits = 16;
 constexpr int kMaxLevel = kBits + 1;
+constexpr int kMiddle = 1 << (kBits - 1);  ///< Of the root cube, along each axis.
 
 /// A cube of the lattice; level 1 is the root, as the paper counts. Its side is 2^(kBits + 1 - level) units and its
 /// minimum corner is that side times (x, y, z).

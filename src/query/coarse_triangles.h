@@ -42,7 +42,7 @@ class CoarseTriangles {
   }
   std::uint32_t id(std::size_t i) const { return raw_.id(i); }
 
-  static constexpr double kMiddle = 1 << (lattice::kBits - 1);
+  static constexpr double kMiddle = lattice::kMiddle;
 
  private:
   LeafCorners<TreeSide> raw_;

@@ -58,7 +58,7 @@ HWY_INLINE void decode(const PairFrames& g, int own, const oracle::OctantBounds&
 template <typename Position>
 HWY_INLINE void decodeCell(const PairFrames& g, int own, int level, const Position& at,
                            const oracle::OctantBounds& octants, Frame& f) {
-  const int side = 1 << (lattice::kMaxLevel - 1 - level), middle = 1 << (lattice::kBits - 1);
+  const int side = 1 << (lattice::kMaxLevel - 1 - level), middle = lattice::kMiddle;
   float corner[3];
   for (int k = 0; k < 3; ++k) corner[k] = static_cast<float>(2 * static_cast<int>(at[k]) * side - middle) * g.unit[own];
   decode(g, own, octants, corner, static_cast<float>(side) * g.unit[own], f);
@@ -67,7 +67,7 @@ HWY_INLINE void decodeCell(const PairFrames& g, int own, int level, const Positi
 HWY_INLINE void decodeRoot(const PairFrames& g, int own, const oracle::CellBounds& bounds, Frame& f) {
   oracle::OctantBounds root;
   root.set(0, bounds);
-  const float middle = static_cast<float>(1 << (lattice::kBits - 1)) * g.unit[own];
+  const float middle = static_cast<float>(lattice::kMiddle) * g.unit[own];
   const float corner[3] = {-middle, -middle, -middle};
   decode(g, own, root, corner, 2 * middle, f);
 }

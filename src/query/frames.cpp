@@ -7,13 +7,13 @@
 namespace bocst::query {
 
 bool PairFrames::isFine(const Placement& one_in_zero) {
-  const double q0 = 1 << (lattice::kBits - 1), q1 = q0 * one_in_zero.scale;
+  const double q0 = lattice::kMiddle, q1 = q0 * one_in_zero.scale;
   // Not true of what is not a number.
   return fits(one_in_zero.scale) && (one_in_zero.translation.norm() + q0 + q1) * 0x1p-9 <= std::min(q0, q1);
 }
 
 PairFrames::PairFrames(double scale_of_1, const Placement& one_in_zero) {
-  const double q0 = 1 << (lattice::kBits - 1), q1 = q0 * scale_of_1;
+  const double q0 = lattice::kMiddle, q1 = q0 * scale_of_1;
   const Eigen::Matrix3d& r = one_in_zero.rotation;
   // Where the middle of side 1's root is, from that of side 0's.
   const Eigen::Vector3d t = one_in_zero * Eigen::Vector3d::Constant(q0) - Eigen::Vector3d::Constant(q0);

@@ -28,12 +28,12 @@ struct alignas(64) Places {
 };
 
 // Looks narrow down: most that are apart are found so by the first, all but few by the fourth. Hulls of what touches
-// overlap by more than kHopeless of the half sides in every direction nearly always, so a hit costs one look at most.
+// overlap by more than kHopeless of the smaller side in every direction nearly always, so most hits cost one look or
+// none; a small body on the outside of a large one may cost all of them.
 constexpr int kLooks = 6;
-// What a miss pays for later ones, on each side: so many directions, unless they take more triangles; and of one that
-// takes a great many, a bound must do.
-constexpr int kSharpened = 6;
-constexpr std::size_t kTrianglesOfAll = 1 << 13, kTrianglesOfOne = 1 << 16;
+// What a miss pays for later ones, on each side: so much as to look at some thousands of triangles. To grow a node by
+// what the root grid knows is as much as a thousand.
+constexpr std::size_t kEffort = 1 << 13, kGrowthEffort = 1 << 10;
 constexpr float kFirstRadius = 0.45f, kHopeless = 0.15f, kHopelessLater = 0.6f;
 constexpr float kShallow = 0.3f;
 
@@ -140,7 +140,7 @@ HWY_ALIGN constexpr float kEight[2][8] = {{1, 0.7071068f, 0, -0.7071068f, -1, -0
                                           {0, 0.7071068f, 1, 0.7071068f, 0, -0.7071068f, -1, -0.7071068f}};
 
 HWY_INLINE Between between(const Placement& b_in_a) {
-  constexpr double q = 1 << (lattice::kBits - 1);
+  constexpr double q = lattice::kMiddle;
   const double* r = b_in_a.rotation.data();
   Between g;
   for (int k = 0; k < 3; ++k) {
@@ -182,7 +182,8 @@ bool AreSeparate(const Supports& a, const Supports& b, const Placement& b_in_a, 
   near.lanes = 0;
   near.shallow = false;
   const Between g = between(b_in_a);
-  const float size = static_cast<float>(1 << (lattice::kBits - 1)) * (1 + g.scale);
+  const float size = static_cast<float>(lattice::kMiddle) * (1 + g.scale);
+  const float smaller = 2 * lattice::kMiddle * std::min(1.0f, g.scale);
   const float distance = std::abs(g.t[0]) + std::abs(g.t[1]) + std::abs(g.t[2]);
   const float pad = 1.25f * (64 * 0x1p-24f * (distance + 2 * size) + g.slack);
   float n[3];
@@ -190,12 +191,12 @@ bool AreSeparate(const Supports& a, const Supports& b, const Placement& b_in_a, 
   // Not true of what is not a number.
   if (!(length > 1e-6f * size && length < 0x1p50f && g.defect < 1e-3f)) return false;
   // No direction can do better than this; most hits are so deep.
-  if (length - a.innerRadius() - g.scale * b.innerRadius() < -kHopeless * size) return false;
+  if (length - a.innerRadius() - g.scale * b.innerRadius() < -kHopeless * smaller) return false;
 
   alignas(64) float u[3][8];
   float value[8];
   Places in_a, in_b;
-  float best = -1e30f, hopeless = -kHopeless * size, radius = kFirstRadius;
+  float best = -1e30f, hopeless = -kHopeless * smaller, radius = kFirstRadius;
   for (int look = 0; look < kLooks; ++look) {
     ringAbout(n, radius, look == 0 ? kSevenAndMiddle : kEight, u);
     if (values(a, b, g, u, in_a, in_b, value) > pad) return true;
@@ -214,7 +215,7 @@ bool AreSeparate(const Supports& a, const Supports& b, const Placement& b_in_a, 
     hopeless *= kHopelessLater;
   }
   near.lanes = 8;
-  near.shallow = best > -kShallow * size;
+  near.shallow = best > -kShallow * smaller;
   for (int k = 0; k < 3; ++k) {
     std::copy_n(in_a.at[k], 8, near.of_a[k]);
     std::copy_n(in_b.at[k], 8, near.of_b[k]);
@@ -261,72 +262,109 @@ struct Part {
   bool operator<(const Part& other) const { return reach < other.reach; }
 };
 
-// Is it an inner node, now or after growth that asks no oracle?
-bool hasChildren(const TreeSide& side, tree::NodeRef node) {
-  const auto isInner = [&] { return side.state(node) == State::kInner; };
-  if (isInner() || !side.growsFreely(node) || !side.tree().hasRoom()) return isInner();
-  thread_local std::vector<tree::Tree::Growth> batch;
-  batch.clear();
-  side.grow(node, batch);
-  tree::Tree::grow(batch, false);
-  return isInner();
-}
+// Asks one tree how far its surface reaches, after a miss.
+class Sharpening {
+ public:
+  explicit Sharpening(const TreeSide& side) : side_(side), room_(room()) {}
 
-// Says how many triangles it looked at.
-std::size_t sharpen(const TreeSide& side, int number) {
-  tree::Supports& supports = side.tree().supports();
-  const Eigen::Vector3d direction = Supports::direction(number);
-  const Eigen::Vector3d middle = Eigen::Vector3d::Constant(1 << (lattice::kBits - 1));
-  thread_local std::vector<Part> parts;
-  thread_local std::vector<std::uint32_t> triangles;
-  parts.clear();
-  const auto add = [&](const Part& part) {
-    parts.push_back(part);
-    std::push_heap(parts.begin(), parts.end());
-  };
-  const auto addNode = [&](tree::NodeRef node) {
-    const NodeReach reach(side.volume(node), Placement());
-    double lo, hi;
-    reach.along(direction, lo, hi);
-    add({hi + direction.dot(reach.center - middle), node});
-  };
-  addNode(side.root());
-  std::size_t looked_at = 0;
-  while (!parts.empty()) {
-    std::pop_heap(parts.begin(), parts.end());
-    const Part part = parts.back();
-    parts.pop_back();
-    if (part.known || looked_at > kTrianglesOfOne) {
-      supports.lower(number, part.reach, part.reached);
-      return looked_at;
+  /// Of a kept direction; false when that takes more effort than is left.
+  bool ask(int number) {
+    tree::Supports& supports = side_.tree().supports();
+    direction_ = Supports::direction(number);
+    has_all_effort_ = left_ == kEffort;
+    room_.parts.clear();
+    addNode(side_.root());
+    while (!room_.parts.empty()) {
+      std::pop_heap(room_.parts.begin(), room_.parts.end());
+      const Part part = room_.parts.back();
+      room_.parts.pop_back();
+      if (part.known) {
+        supports.lower(number, part.reach, part.reached);
+        return true;
+      }
+      if (growsFreely(part.node) && !grow(part.node)) return false;
+      if (side_.state(part.node) == State::kInner) {
+        side_.children(part.node, [this](tree::NodeRef node) { addNode(node); });
+      } else if (!addTriangles(part)) {
+        return false;
+      }
     }
-    if (hasChildren(side, part.node)) {
-      side.children(part.node, addNode);
-      continue;
-    }
-    triangles.clear();
-    const bool known = side.tree().trianglesOf(part.node, triangles) && !triangles.empty();
-    double reach = known ? -std::numeric_limits<double>::infinity() : part.reach;
-    for (const std::uint32_t t : triangles) {
-      for (int k = 0; k < 3; ++k) reach = std::max(reach, direction.dot(side.corner(t, k) - middle));
-    }
-    looked_at += triangles.size();
-    add({reach, part.node, true, known});
+    // A sampled oracle has lost all of the surface.
+    supports.lower(number, supports.value(number), false);
+    return true;
   }
-  // A sampled oracle has lost all of the surface.
-  supports.lower(number, supports.value(number), false);
-  return looked_at;
-}
 
-void sharpenSome(const TreeSide& side, const std::int32_t (&near)[3][8], int count) {
+ private:
+  // Kept by the thread.
+  struct Room {
+    std::vector<Part> parts;  // a heap
+    std::vector<std::uint32_t> triangles;
+    std::vector<tree::Tree::Growth> growth;
+  };
+  static Room& room() {
+    thread_local Room room;
+    return room;
+  }
+
+  void add(const Part& part) {
+    room_.parts.push_back(part);
+    std::push_heap(room_.parts.begin(), room_.parts.end());
+  }
+
+  void addNode(tree::NodeRef node) {
+    const NodeReach reach(side_.volume(node), Placement());
+    double lo, hi;
+    reach.along(direction_, lo, hi);
+    add({hi + direction_.dot(reach.center - middle_), node});
+  }
+
+  // The part as its triangles know it, or, if it cannot be otherwise, its bounds.
+  bool addTriangles(const Part& part) {
+    const bool are_known = side_.tree().trianglesOf(part.node, left_, room_.triangles) && !room_.triangles.empty();
+    left_ -= std::min(left_, room_.triangles.size());
+    if (!are_known) {
+      // Perhaps they only are too many for what is left now.
+      if (has_all_effort_) add({part.reach, part.node, true, false});
+      return has_all_effort_;
+    }
+    double reach = -std::numeric_limits<double>::infinity();
+    for (const std::uint32_t t : room_.triangles) {
+      for (int k = 0; k < 3; ++k) reach = std::max(reach, direction_.dot(side_.corner(t, k) - middle_));
+    }
+    add({reach, part.node, true, true});
+    return true;
+  }
+
+  bool growsFreely(tree::NodeRef node) const {
+    return side_.state(node) == State::kGrows && side_.growsFreely(node) && side_.tree().hasRoom();
+  }
+
+  // Unless another thread grows the tree just now.
+  bool grow(tree::NodeRef node) {
+    if (left_ < kGrowthEffort) return false;
+    left_ -= kGrowthEffort;
+    has_all_effort_ = false;
+    room_.growth.clear();
+    side_.grow(node, room_.growth);
+    tree::Tree::grow(room_.growth, false);
+    return side_.state(node) == State::kInner;
+  }
+
+  const TreeSide& side_;
+  Room& room_;
+  const Eigen::Vector3d middle_ = Eigen::Vector3d::Constant(lattice::kMiddle);
+  Eigen::Vector3d direction_;
+  std::size_t left_ = kEffort;
+  bool has_all_effort_ = true;  // for the direction that is asked about
+};
+
+void sharpen(const TreeSide& side, const std::int32_t (&near)[3][8]) {
   tree::Supports& supports = side.tree().supports();
-  int left = kSharpened;
-  std::size_t looked_at = 0;
-  for (int lane = 0; lane < count; ++lane) {
+  supports.reopen(side.tree().growth());
+  Sharpening sharpening(side);
+  for (int lane = 0; lane < 8; ++lane) {
     for (int k = 0; k < 3; ++k) {
-      if (!supports.isOpen(near[k][lane], side.tree().expansions())) continue;
-      looked_at += sharpen(side, near[k][lane]);
-      if (--left == 0 || looked_at > kTrianglesOfAll) return;
+      if (supports.isOpen(near[k][lane]) && !sharpening.ask(near[k][lane])) return;
     }
   }
 }
@@ -334,8 +372,9 @@ void sharpenSome(const TreeSide& side, const std::int32_t (&near)[3][8], int cou
 }  // namespace
 
 void sharpenSupports(const TreeSide& a, const TreeSide& b, const NearDirections& near) {
-  sharpenSome(a, near.of_a, near.lanes);
-  sharpenSome(b, near.of_b, near.lanes);
+  if (near.lanes == 0) return;
+  sharpen(a, near.of_a);
+  sharpen(b, near.of_b);
 }
 
 }  // namespace bocst::query

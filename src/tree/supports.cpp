@@ -26,6 +26,7 @@ Eigen::Vector3d Supports::direction(int number) {
 void Supports::start(const Eigen::AlignedBox3d& box) {
   const Eigen::Vector3d center = box.center(), half = box.sizes() / 2;
   center_ = center.cast<float>();
+  expansions_.store(0, std::memory_order_relaxed);
   inner_radius_.store(static_cast<float>(half.minCoeff()), std::memory_order_relaxed);
   for (int n = 0; n < kCount; ++n) {
     const Eigen::Vector3d d = direction(n);
@@ -38,8 +39,9 @@ void Supports::start(const Eigen::AlignedBox3d& box) {
 void Supports::lower(int number, double value, bool exact) {
   const auto i = static_cast<std::size_t>(number);
   const float rounded = roundedUp(value);
-  // Another thread may lower it, too; whichever comes last is an upper bound.
-  if (rounded < values_[i].load(std::memory_order_relaxed)) values_[i].store(rounded, std::memory_order_relaxed);
+  float known = values_[i].load(std::memory_order_relaxed);
+  while (rounded < known && !values_[i].compare_exchange_weak(known, rounded, std::memory_order_relaxed)) {
+  }
   const Eigen::Vector3f d = direction(number).cast<float>();
   const float radius = (rounded - d.dot(center_)) / d.norm();
   if (radius < innerRadius()) inner_radius_.store(radius, std::memory_order_relaxed);
@@ -47,9 +49,12 @@ void Supports::lower(int number, double value, bool exact) {
 }
 
 void Supports::reopen(std::uint64_t expansions) {
+  const std::uint64_t before = expansions_.load(std::memory_order_relaxed);
+  if (expansions <= before + before / 2) return;
   expansions_.store(expansions, std::memory_order_relaxed);
   for (std::atomic<State>& state : states_) {
-    if (state.load(std::memory_order_relaxed) == kAsked) state.store(kOpen, std::memory_order_relaxed);
+    State asked = kAsked;
+    state.compare_exchange_strong(asked, kOpen, std::memory_order_relaxed);
   }
 }
 

@@ -37,19 +37,19 @@ class Supports {
 
   float value(int number) const { return values_[static_cast<std::size_t>(number)].load(std::memory_order_relaxed); }
 
-  /// Not yet as good as a tree of so many expansions can say.
-  bool isOpen(int number, std::uint64_t expansions) {
-    if (expansions_.load(std::memory_order_relaxed) != expansions) reopen(expansions);
+  /// Not yet as good as the tree can say.
+  bool isOpen(int number) const {
     return states_[static_cast<std::size_t>(number)].load(std::memory_order_relaxed) == kOpen;
   }
+
+  /// A tree that has grown by half since can say more of what is not exact. `expansions`: so many since start().
+  void reopen(std::uint64_t expansions);
 
   /// The surface reaches no farther; `exact`: and as far, so the tree cannot say more when it has grown.
   void lower(int number, double value, bool exact);
 
  private:
   enum State : std::uint8_t { kOpen, kAsked, kExact };
-
-  void reopen(std::uint64_t expansions);
 
   Eigen::Vector3f center_ = Eigen::Vector3f::Zero();
   std::atomic<float> inner_radius_{0};

@@ -93,8 +93,9 @@ void Tree::reset(std::shared_ptr<const Mesh> mesh) {
   root_bounds_ = oracle::CellBounds();
   const Eigen::AlignedBox3d box = latticeBounds(surface_);
   setBox(box, lattice::Cell{}, root_bounds_);
-  const double middle = lattice::Cell{}.side() / 2.0;
-  supports_.start({box.min().array() - middle, box.max().array() - middle});
+  const Eigen::Vector3d middle = Eigen::Vector3d::Constant(lattice::kMiddle);
+  supports_.start({box.min() - middle, box.max() - middle});
+  expansions_before_ = expansions_;
   keepOnly({});
 }
 
@@ -416,18 +417,19 @@ void Tree::gatherNode(NodeRef node, const lattice::Cell& cell, std::vector<std::
   grid_->gather(surface_, cell, ids);
 }
 
-bool Tree::trianglesOf(NodeRef node, std::vector<std::uint32_t>& ids) const {
+bool Tree::trianglesOf(NodeRef node, std::size_t most, std::vector<std::uint32_t>& ids) const {
+  ids.clear();
   const Link link = this->link(node);
   if (link.isList()) {
     const TriangleList list = this->list(link);
-    if (list.ids != nullptr) ids.insert(ids.end(), list.ids, list.ids + list.count);
-    return list.ids != nullptr;
+    if (list.ids == nullptr || list.count > most) return false;
+    ids.assign(list.ids, list.ids + list.count);
+    return true;
   }
   const oracle::RootGrid* grid = grid_known_.load(std::memory_order_acquire);
   const lattice::Cell cell = this->cell(node);
   if (link.tag() != Link::kImplicit || grid == nullptr || cell.level != grid->level()) return false;
-  grid->gather(surface_, cell, ids);
-  return true;
+  return grid->gather(surface_, cell, most, ids);
 }
 
 void Tree::prune(Clock::time_point now) {

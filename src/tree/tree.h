@@ -70,8 +70,9 @@ class Tree {
     if ((words[0] & kKept) != 0) return {nullptr, count};
     return {(words[0] & kPacked) != 0 ? &lists_[words[1]] : words + 1, count};
   }
-  /// Appends the triangles of a node without children, or a superset; false where they are not known here.
-  bool trianglesOf(NodeRef node, std::vector<std::uint32_t>& ids) const;
+  /// Fills `ids` with the triangles of a node without children, or a superset; false where they are not known here or
+  /// more than `most`.
+  bool trianglesOf(NodeRef node, std::size_t most, std::vector<std::uint32_t>& ids) const;
   /// Where a list lies, for those who want it in the processor's cache.
   const std::uint32_t* words(Link list) const { return &lists_[list.index()]; }
   /// The corners of a leaf's triangles, in the order of its list; false while they are not packed.
@@ -83,7 +84,8 @@ class Tree {
   }
   /// How far the surface reaches in any direction; what is known of it, for queries to use and to better.
   Supports& supports() const { return supports_; }
-  std::uint64_t expansions() const { return expansions_.load(std::memory_order_relaxed); }
+  /// How often this surface's tree has grown by a block.
+  std::uint64_t growth() const { return expansions_.load(std::memory_order_relaxed) - expansions_before_; }
   /// No more expansions below this node: a single lattice unit, or the collision depth of conservative answers.
   bool isDeepest(int level) const { return level >= deepest_; }
   int deepest() const { return deepest_; }
@@ -212,6 +214,7 @@ class Tree {
 
   std::array<std::atomic<std::size_t>, lattice::kMaxLevel + 1> nodes_at_{};
   std::atomic<std::size_t> bytes_{0}, device_bytes_{0};
+  std::uint64_t expansions_before_ = 0;  // of former surfaces
   std::atomic<std::uint64_t> expansions_{0}, octants_{0}, batches_{0}, cells_{0}, pruned_{0};
   std::atomic<std::int64_t> next_prune_{0};
 };

@@ -13,6 +13,7 @@
 #include "conformance/reference.h"
 #include "every_target.h"
 #include "meshes.h"
+#include "query/tree_walk.h"
 
 namespace bocst::query {
 namespace {
@@ -60,11 +61,11 @@ void sharpenAll(const Side& a, const Side& b) {
   a.tree.expandAll(6);
   b.tree.expandAll(6);
   const TreeSide side_a(a.tree), side_b(b.tree);
-  NearDirections near;
-  near.lanes = 8;
-  for (int first = 0; first < tree::Supports::kCount; ++first) {
+  for (int number = 0; number < tree::Supports::kCount; ++number) {
+    NearDirections near;
+    near.lanes = 8;
     for (auto* of : {&near.of_a, &near.of_b}) {
-      for (auto& row : *of) std::fill(std::begin(row), std::end(row), first);
+      for (auto& row : *of) std::fill(std::begin(row), std::end(row), number);
     }
     sharpenSupports(side_a, side_b, near);
   }
@@ -161,8 +162,23 @@ TEST_P(Separation, WhatIsNoNumberIsNotSeparate) {
     const Placement to = apartBy(a, b, Eigen::Matrix3d::Identity(), 1, Vector3d(x, 0, 0));
     EXPECT_FALSE(areSeparate(a.tree.supports(), b.tree.supports(), to, near)) << x;
     EXPECT_EQ(near.lanes, 0) << x;
+    // Directions that are none lie among the kept ones, too.
+    EightSeparations eight;
+    for (int lane = 0; lane < 8; ++lane) {
+      for (int k = 0; k < 3; ++k) eight.u[k][lane] = static_cast<float>((lane >> k & 1) != 0 ? x : 0);
+    }
+    evaluate(a.tree.supports(), b.tree.supports(), apartBy(a, b, Eigen::Matrix3d::Identity(), 1, {9, 9, 9}), eight);
+    for (const auto* of : {&eight.of_a, &eight.of_b}) {
+      for (const auto& row : *of) {
+        for (const std::int32_t at : row) {
+          EXPECT_GE(at, 0) << x;
+          EXPECT_LT(at, tree::Supports::kCount) << x;
+        }
+      }
+    }
   }
 }
+
 INSTANTIATE_TEST_SUITE_P(Targets, Separation, testing::ValuesIn(test::EveryTarget::targets()), test::EveryTarget::name);
 
 TEST(Supports, AreExactWhereATreeHasGrown) {
@@ -184,24 +200,56 @@ TEST(Supports, AreExactWhereATreeHasGrown) {
   }
 }
 
+// Answers by a walk, of which there must be none once supports part the two.
+struct NoContact : Visitor {
+  bool endsAtFirst() const override { return true; }
+  bool triangles(std::uint32_t, std::uint32_t, bool) override { return false; }
+  bool cells(const CellLeaf&, const CellLeaf&) override { return false; }
+  bool cellOfA(const CellLeaf&, std::uint32_t, const Vector3d&) override { return false; }
+  bool cellOfB(std::uint32_t, const CellLeaf&, const Vector3d&) override { return false; }
+};
+
 TEST(Supports, MissesSharpenThemAndAskNoOracle) {
-  const test::Raw raw = test::torus(100, 0.2);
-  const Modeld a(raw.mesh()), b(raw.mesh());
-  const auto I = fcl::Transform3d(fcl::Transform3d::Identity());
-  std::mt19937_64 g(33);
-  std::vector<fcl::Transform3d> poses;
-  while (poses.size() < 40) {
-    const auto X = test::pose<double>(test::randomRotation(g), test::randomDirection(g) * 2.1);
-    if (!test::touching<double>(a, I, b, X)) poses.push_back(X);
+  const Side a(test::torus(100, 0.2)), b(test::torus(100, 0.2));
+  // Where the boxes' corners would meet, but not what is in them.
+  const Eigen::Matrix3d R = Eigen::AngleAxisd(0.3, Vector3d::UnitZ()).toRotationMatrix();
+  const Vector3d d = Vector3d(1, 1, 0.2).normalized();
+  const Placement to = apartBy(a, b, R, 1, a.extreme(d) - R * b.extreme(-(R.transpose() * d)) + 2500 * d);
+  const auto ask = [&] {
+    const TreeSide side_a(a.tree), side_b(b.tree);
+    TreeWalk walk(side_a, side_b, to);
+    if (walk.isNeedless()) return true;
+    NoContact visitor;
+    EXPECT_FALSE(walk.run(visitor));
+    return false;
+  };
+  EXPECT_FALSE(ask()) << "the first must walk, and grow";
+  Statistics before = a.tree.statistics();
+  int walks = 1;
+  for (; walks < 40 && !ask(); ++walks) {
+    const Statistics now = a.tree.statistics();
+    EXPECT_EQ(now.oracle_batches, before.oracle_batches) << walks;
+    before = now;
   }
-  for (int round = 0; round < 5; ++round) {
-    for (const auto& X : poses) EXPECT_FALSE(test::touching<double>(a, I, b, X));
+  EXPECT_LT(walks, 40);
+}
+
+TEST(Supports, EffortForOneMissIsBounded) {
+  // A cluster of all triangles in one cell of the grid, far from three others: the cluster is bounded by its cell.
+  test::Raw raw = test::torus(200);
+  raw.scale(1e-4);
+  for (const Vector3d& p : {Vector3d(1, 0, 0), Vector3d(0, 1, 0), Vector3d(0, 0, 1)}) {
+    raw.add(test::Raw(test::torus(4)).scale(1e-3).move(p));
   }
-  const Statistics before = a.statistics();
-  for (const auto& X : poses) EXPECT_FALSE(test::touching<double>(a, I, b, X));
-  const Statistics after = a.statistics();
-  EXPECT_EQ(after.oracle_batches, before.oracle_batches);
-  EXPECT_EQ(after.expansions, before.expansions);
+  const Side a(raw), b(test::torus(20));
+  sharpenAll(a, b);
+  std::size_t exact = 0;
+  for (int number = 0; number < tree::Supports::kCount; ++number) {
+    const double reach = a.support(tree::Supports::direction(number)), value = a.tree.supports().value(number);
+    ASSERT_GE(value, reach) << number;
+    exact += value <= reach + 0.02;
+  }
+  EXPECT_GT(exact, 100u);
 }
 
 TEST(Supports, ANewSurfaceHasNewOnes) {
@@ -209,11 +257,13 @@ TEST(Supports, ANewSurfaceHasNewOnes) {
   Modeld a(raw.mesh());
   const Modeld b(raw.mesh());
   const auto I = fcl::Transform3d(fcl::Transform3d::Identity());
-  const auto X = test::pose<double>(Eigen::Matrix3d::Identity(), {2.15, 0.1, 0});
+  const auto X = test::pose<double>(Eigen::Matrix3d::Identity(), {1.61, 1.61, 0});
   for (int i = 0; i < 50; ++i) EXPECT_FALSE(test::touching<double>(a, I, b, X));
-  test::Raw larger = raw;
-  larger.scale(1.2);
-  a.updateVertices(larger.vertices);
+  // A bulge inside the same bounds, so that only the supports change.
+  test::Raw bulged = raw;
+  const auto less = [](const Vector3d& v, const Vector3d& w) { return v.x() + v.y() < w.x() + w.y(); };
+  *std::max_element(bulged.vertices.begin(), bulged.vertices.end(), less) = Vector3d(1.04, 1.04, 0);
+  a.updateVertices(bulged.vertices);
   EXPECT_TRUE(test::touching<double>(a, I, b, X));
   a.updateVertices(raw.vertices);
   EXPECT_FALSE(test::touching<double>(a, I, b, X));

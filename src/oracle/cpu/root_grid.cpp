@@ -342,6 +342,15 @@ void RootGrid::gather(const Surface& surface, const lattice::Cell& cell, std::ve
   });
 }
 
+bool RootGrid::gather(const Surface& surface, const lattice::Cell& cell, std::size_t most,
+                      std::vector<std::uint32_t>& ids) const {
+  return !anyCandidate(surface, cell, [&ids, most](std::uint32_t t) {
+    if (ids.size() == most) return true;
+    ids.push_back(t);
+    return false;
+  });
+}
+
 CellBounds RootGrid::look(const Surface& surface, const lattice::Cell& cell) const {
   const double half = cell.side() / 2.0;
   const auto corner = cell.corner();
