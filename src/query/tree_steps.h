@@ -67,8 +67,8 @@ struct PairSteps {
   /// A node of side 0 is not smaller (is larger) than one of side 1 that is at least so many levels deeper.
   int not_smaller, larger;
 
-  /// A hit is not expected, so all octants of a node go down the other side at once: their tests overlap in time, where
-  /// a walk that ends at its first hit would not make most of them.
+  /// A hit is not expected, or does not end the walk, so all octants of a node go down the other side at once: their
+  /// tests overlap in time, where a walk that ends at its first hit would not make most of them.
   bool all_at_once = false;
 
   StepNode pair[2];                         ///< Of the event.

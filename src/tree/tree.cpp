@@ -338,7 +338,7 @@ void Tree::packLeaves(const std::vector<NodeRef>& leaves) {
   if (leaves.empty() || !hasRoom()) return;
   const std::unique_lock<std::mutex> lock(growth_, std::try_to_lock);
   if (!lock.owns_lock() || lists_.size() > Pool<std::uint32_t, 12>::kMost / 2) return;
-  std::size_t left = 16 + leaves.size() / 8;
+  std::size_t left = 16 + leaves.size() / 4;
   for (const NodeRef leaf : leaves) {
     const Link list = link(leaf);
     const std::uint32_t count = list.isList() ? lists_[list.index()] : 0;
