@@ -128,8 +128,8 @@ class Tree {
   /// does nothing while another thread grows the tree. Nodes that the root grid does not know are passed over.
   void look(const std::vector<NodeRef>& nodes);
 
-  /// Packs the corners of leaves that a query came to and an earlier one, too: as many as the query hardly feels. Does
-  /// nothing while another thread grows the tree.
+  /// Packs the corners of leaves that are come to the second time, as many as a query hardly feels. Does nothing while
+  /// another thread grows the tree.
   void packLeaves(const std::vector<NodeRef>& leaves);
 
   // With the gate free.
