@@ -117,8 +117,8 @@ class BodyCollector final : public query::BodyVisitor<typename Partner::Node> {
   }
 
  private:
-  static query::PairSet& pairs() {
-    thread_local query::PairSet set;
+  static query::PairSet<std::uint64_t>& pairs() {
+    thread_local query::PairSet<std::uint64_t> set;
     return set;
   }
 
@@ -185,7 +185,7 @@ class BodyCollector final : public query::BodyVisitor<typename Partner::Node> {
   const fcl::Transform3<double> X_WB_;
   const double slack_;
   const bool swapped_, costs_, once_;
-  query::PairSet& seen_;
+  query::PairSet<std::uint64_t>& seen_;
 };
 
 /// The collision of a model and the bodies of a partner, the first geometry when `swapped`: with_partner(frame,

@@ -33,6 +33,13 @@ using query::Corners;
 using query::Placement;
 using query::TreeSide;
 
+/// A vertex may lie in two cache lines.
+template <typename Vertex>
+void prefetchVertex(const Vertex& v) {
+  __builtin_prefetch(&v[0]);
+  __builtin_prefetch(&v[2]);
+}
+
 /// The triangles of one side as FCL computes with them: corners in S, in the geometry's frame.
 template <typename S>
 class ModelTriangles {
@@ -44,7 +51,7 @@ class ModelTriangles {
   /// Triangle t is about to be asked for, and now its corners.
   void prefetch(std::uint32_t t) const { __builtin_prefetch(&mesh_->indices(t)); }
   void prefetchCorners(std::uint32_t t) const {
-    for (const std::uint32_t v : mesh_->indices(t)) __builtin_prefetch(&mesh_->vertex(v));
+    for (const std::uint32_t v : mesh_->indices(t)) prefetchVertex(mesh_->vertex(v));
   }
 
  private:
@@ -60,7 +67,7 @@ class BvhTriangles {
   }
   void prefetch(std::uint32_t t) const { __builtin_prefetch(&bvh_.tri_indices[t]); }
   void prefetchCorners(std::uint32_t t) const {
-    for (int k = 0; k < 3; ++k) __builtin_prefetch(&corner(t, k));
+    for (int k = 0; k < 3; ++k) prefetchVertex(corner(t, k));
   }
 
  private:
@@ -80,11 +87,18 @@ class Collector : public query::Visitor {
         magnitude_(magnitude),
         margin_(q.margin),
         seen_(scratch().seen),
+        seen_cells_(scratch().seen_cells),
+        pairs_(scratch().pairs),
+        now_(scratch().now),
         later_(scratch().later) {
     // A boolean query ends at the first contact, so it meets no pair twice.
+    left_ = q.contactsLeft();
     once_ = q.request.num_max_contacts > 1 || q.request.enable_cost;
-    if (once_) seen_.clear();
-    later_.pairs.count = 0;
+    if (once_) {
+      seen_.clear();
+      seen_cells_.clear();
+    }
+    now_.count = later_.count = 0;
   }
 
   /// Where cells lie in the world: from the lattice frame of side A.
@@ -99,37 +113,25 @@ class Collector : public query::Visitor {
     if (swapped_) std::swap(a, b);
     if (once_ && !seen_.insert(a, b)) return false;
     if (certain && !needsCorners()) return add(a, b, nullptr);
-    const std::size_t i = later_.pairs.count++;
-    later_.ids[i][0] = a;
-    later_.ids[i][1] = b;
-    later_.certain[i] = certain;
+    later_.add(a, b, certain);
     t1_.prefetch(a);
     t2_.prefetch(b);
     // Several at once are cheaper, but the last contact that is asked for is not to be missed.
-    const bool may_be_last = q_.result.numContacts() + later_.pairs.count >= q_.request.num_max_contacts;
-    if (may_be_last || later_.pairs.count == query::TrianglePairs::kCapacity) finish();
+    if (now_.count + later_.count >= left_) {
+      finish();
+    } else if (later_.count == Found::kCapacity) {
+      turn();
+    } else {
+      return false;
+    }
     return q_.request.isSatisfied(q_.result);
   }
 
   /// To be called at the end of the walk.
   void finish() {
-    if (later_.pairs.count == 0) return;
-    getCorners();
-    if (later_.pairs.count == 1 && !later_.certain[0] && !q_.request.enable_contact) {
-      decide(0, nullptr);
-    } else {
-      query::Touch touches[query::TrianglePairs::kCapacity];
-      const query::Parted parted = query::partTriangles(later_.pairs, 2 * rounding(), touches);
-      for (std::size_t i = 0; i < later_.pairs.count; ++i) {
-        const bool meet = later_.certain[i] || (parted.meet >> i & 1);
-        if (meet && margin_ == 0) {
-          addMet(i, &touches[i]);
-        } else if (margin_ > 0 || !kTrustsApart || !(parted.apart >> i & 1)) {
-          decide(i, &touches[i]);
-        }
-      }
-    }
-    later_.pairs.count = 0;
+    if (now_.count + later_.count == 0) return;
+    turn();
+    turn();
   }
 
   bool cells(const query::CellLeaf& a, const query::CellLeaf& b) override {
@@ -137,12 +139,12 @@ class Collector : public query::Visitor {
   }
 
   bool cellOfA(const query::CellLeaf& a, std::uint32_t b, const Eigen::Vector3d& point) override {
-    if (once_ && !seen_.insert(a.id, b)) return false;
+    if (once_ && !seen_cells_.insert(a.id, b)) return false;
     return addSpheres(a.id, a.sphere, b, {point, 0});
   }
 
   bool cellOfB(std::uint32_t a, const query::CellLeaf& b, const Eigen::Vector3d& point) override {
-    if (once_ && !seen_.insert(b.id, a)) return false;
+    if (once_ && !seen_cells_.insert(b.id, a)) return false;
     return addSpheres(a, {point, 0}, b.id, b.sphere);
   }
 
@@ -167,48 +169,80 @@ class Collector : public query::Visitor {
   }
 
   // Pairs that are still to be looked at, several at once.
-  struct Later {
-    query::TrianglePairs pairs;
-    std::uint32_t ids[query::TrianglePairs::kCapacity][2];
-    bool certain[query::TrianglePairs::kCapacity];
+  struct Found {
+    static constexpr std::size_t kCapacity = query::TrianglePairs::kCapacity;
+
+    void add(std::uint32_t a, std::uint32_t b, bool is_certain) {
+      ids[count][0] = a;
+      ids[count][1] = b;
+      certain[count++] = is_certain;
+    }
+
+    std::uint32_t ids[kCapacity][2];
+    bool certain[kCapacity];
+    std::size_t count = 0;
   };
   // Kept by the thread between queries.
   struct Scratch {
-    query::PairSet seen;
-    Later later;
+    query::PairSet<std::uint32_t> seen;
+    query::PairSet<std::uint64_t> seen_cells;
+    query::TrianglePairs pairs;
+    Found now, later;
   };
   static Scratch& scratch() {
     thread_local Scratch scratch;
     return scratch;
   }
 
-  void getCorners() {
-    if (!placed_) place();
-    const std::size_t count = later_.pairs.count;
-    for (std::size_t i = 0; i < count; ++i) {
+  // Looks at the pairs found before the last ones, whose corners are fetched: the walk goes on until they are there.
+  void turn() {
+    for (std::size_t i = 0; i < later_.count; ++i) {
       t1_.prefetchCorners(later_.ids[i][0]);
       t2_.prefetchCorners(later_.ids[i][1]);
     }
-    for (std::size_t i = 0; i < count; ++i) {
+    if (now_.count != 0) lookAt();
+    std::swap(now_, later_);
+    later_.count = 0;
+  }
+
+  void lookAt() {
+    getCorners();
+    if (now_.count == 1 && !now_.certain[0] && !q_.request.enable_contact) return decide(0, nullptr);
+    query::Touch touches[Found::kCapacity];
+    const query::Parted parted = query::partTriangles(pairs_, 2 * rounding(), touches);
+    for (std::size_t i = 0; i < now_.count; ++i) {
+      const bool meet = now_.certain[i] || (parted.meet >> i & 1);
+      if (meet && margin_ == 0) {
+        addMet(i, &touches[i]);
+      } else if (margin_ > 0 || !kTrustsApart || !(parted.apart >> i & 1)) {
+        decide(i, &touches[i]);
+      }
+    }
+  }
+
+  void getCorners() {
+    if (!placed_) place();
+    pairs_.count = now_.count;
+    for (std::size_t i = 0; i < now_.count; ++i) {
       Corners p, q;
       for (int k = 0; k < 3; ++k) {
-        p[k] = t1_.corner(later_.ids[i][0], k).template cast<double>();
-        q[k] = place_ * t2_.corner(later_.ids[i][1], k).template cast<double>().eval();
+        p[k] = t1_.corner(now_.ids[i][0], k).template cast<double>();
+        q[k] = place_ * t2_.corner(now_.ids[i][1], k).template cast<double>().eval();
       }
-      later_.pairs.put(i, p, q);
+      pairs_.put(i, p, q);
     }
   }
 
   // FCL's test, and what it leaves open. `touch` is how the pair is parted, or null where nobody asks.
   void decide(std::size_t i, const query::Touch* touch) {
-    const std::uint32_t a = later_.ids[i][0], b = later_.ids[i][1];
-    const bool meet = later_.certain[i] || fcl::detail::Intersect<S>::intersect_Triangle(
-                                               t1_.corner(a, 0), t1_.corner(a, 1), t1_.corner(a, 2), t2_.corner(b, 0),
-                                               t2_.corner(b, 1), t2_.corner(b, 2), R_12_, p_12_);
+    const std::uint32_t a = now_.ids[i][0], b = now_.ids[i][1];
+    const bool meet = now_.certain[i] || fcl::detail::Intersect<S>::intersect_Triangle(
+                                             t1_.corner(a, 0), t1_.corner(a, 1), t1_.corner(a, 2), t2_.corner(b, 0),
+                                             t2_.corner(b, 1), t2_.corner(b, 2), R_12_, p_12_);
     if (!meet && margin_ == 0) return;
     Corners p, q;
-    later_.pairs.get(i, p, q);
-    const bool degenerate = !later_.certain[i] && (query::isDegenerate(p) || query::isDegenerate(q));
+    pairs_.get(i, p, q);
+    const bool degenerate = !now_.certain[i] && (query::isDegenerate(p) || query::isDegenerate(q));
     if (!degenerate && margin_ == 0) return addMet(i, touch);
     Eigen::Vector3d on_p, on_q;
     const double distance = query::nearestPoints(p, q, on_p, on_q);
@@ -225,7 +259,7 @@ class Collector : public query::Visitor {
   }
 
   void addMet(std::size_t i, const query::Touch* touch) {
-    const std::uint32_t a = later_.ids[i][0], b = later_.ids[i][1];
+    const std::uint32_t a = now_.ids[i][0], b = now_.ids[i][1];
     if (q_.request.enable_cost) addCost(a, b);
     if (touch == nullptr || !q_.request.enable_contact) {
       add(a, b, nullptr);
@@ -275,7 +309,9 @@ class Collector : public query::Visitor {
   }
 
   bool add(std::uint64_t b1, std::uint64_t b2, const query::Touch* touch) {
-    return q_.addContact(static_cast<std::intptr_t>(b1), static_cast<std::intptr_t>(b2), touch);
+    const bool ends = q_.addContact(static_cast<std::intptr_t>(b1), static_cast<std::intptr_t>(b2), touch);
+    left_ = q_.contactsLeft();
+    return ends;
   }
 
   const Question<S>& q_;
@@ -284,13 +320,16 @@ class Collector : public query::Visitor {
   const bool swapped_;
   const double magnitude_;  // of positions in the frame of the first geometry
   const double margin_;
-  query::PairSet& seen_;
-  Later& later_;
+  query::PairSet<std::uint32_t>& seen_;
+  query::PairSet<std::uint64_t>& seen_cells_;
+  query::TrianglePairs& pairs_;
+  Found &now_, &later_;
   fcl::Transform3<double> place_ = fcl::Transform3<double>::Identity();  // the same in double
   fcl::Matrix3<S> R_12_;
   fcl::Vector3<S> p_12_;
   bool placed_ = false;  // R_12_ and p_12_ are set
   bool once_;
+  std::size_t left_;  // contacts that are still asked for
   Eigen::Vector3d origin_ = Eigen::Vector3d::Zero();
   double unit_ = 1;
 };

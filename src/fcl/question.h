@@ -4,6 +4,8 @@
 #include <fcl/narrowphase/collision_request.h>
 #include <fcl/narrowphase/collision_result.h>
 
+#include <algorithm>
+#include <cstddef>
 #include <cstdint>
 #include <limits>
 
@@ -29,6 +31,11 @@ struct Question {
   /// No surfaces met, and a contact would be reported.
   bool mayBeInside(std::size_t contacts_before) const {
     return result.numContacts() == contacts_before && contacts_before < request.num_max_contacts && occupied();
+  }
+
+  /// How many contacts are still asked for.
+  std::size_t contactsLeft() const {
+    return request.num_max_contacts - std::min(request.num_max_contacts, result.numContacts());
   }
 
   /// The next contact is the last that is asked for.

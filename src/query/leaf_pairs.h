@@ -104,6 +104,11 @@ class LeafPacks {
     const std::uint32_t* listed = nullptr;  ///< The triangles' numbers where the tree keeps them, else in `own`.
     std::uint32_t own[TrianglePack::kCapacity];
 
+    void prefetchIds() const {
+      if (listed == nullptr) return;
+      __builtin_prefetch(listed);
+      __builtin_prefetch(listed + TrianglePack::kCapacity / 2);
+    }
     std::uint32_t id(std::size_t i) const { return listed != nullptr ? listed[i] : own[i]; }
   };
 
@@ -233,6 +238,8 @@ class LeafPairs {
   template <typename F>
   bool testPacks(const typename LeafPacks<A>::Leaf& a, const typename LeafPacks<B>::Leaf& b, F&& f) {
     if (!inRange(a.pack) || !inRange(b.pack)) return allPairs(a, b, f);
+    a.prefetchIds();
+    b.prefetchIds();
     // What touches within both leaves does so within both boxes and both slabs.
     PackRegion region;
     fillRegion(b.volume, a.volume, *a_in_b_, b.pack.size, b.error, region);

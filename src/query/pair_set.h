@@ -4,66 +4,71 @@
 #include <algorithm>
 #include <cstddef>
 #include <cstdint>
+#include <iterator>
+#include <limits>
 #include <vector>
 
 namespace bocst::query {
 
-/// A set of pairs of ids (a cell or a triangle, and a triangle) that is emptied in constant time, so that one can serve
-/// query after query.
+/// A set of pairs of an id (of a triangle, or with 64 bits a cell) and a triangle, to serve query after query. No more
+/// memory is touched than the last queries needed: beside it, a walk wants the processor's cache.
+template <typename Id>
 class PairSet {
  public:
   void clear() {
-    if (++epoch_ == 0) {
-      slots_.assign(slots_.size(), Slot());
-      epoch_ = 1;
-    }
-    // The next queries are likely to be like this one, and what is small stays in the processor's cache.
+    if (size_ != 0) std::fill_n(slots_.begin(), used_, Slot());
+    // The next queries are likely to be like this one.
     if (used_ > kLeast && 8 * size_ < used_) used_ /= 2;
     size_ = 0;
   }
 
-  /// False when the pair was there already.
-  bool insert(std::uint64_t a, std::uint32_t b) {
+  /// False when the pair was there already. No triangle has the largest number.
+  bool insert(Id a, std::uint32_t b) {
     if (2 * (size_ + 1) > used_) grow();
-    return place(a, b);
+    return place({a, b});
   }
 
  private:
   static constexpr std::size_t kLeast = 1024;
+  static constexpr std::uint32_t kNone = std::numeric_limits<std::uint32_t>::max();
 
   struct Slot {
-    std::uint64_t a = 0;
-    std::uint32_t b = 0;
-    std::uint32_t epoch = 0;
+    Id a = 0;
+    std::uint32_t b = kNone;
   };
 
-  bool place(std::uint64_t a, std::uint32_t b) {
+  bool place(const Slot& pair) {
     const std::size_t mask = used_ - 1;
-    for (std::size_t i = ((a << 32 ^ a >> 32 ^ b) * 0x9e3779b97f4a7c15ull) >> 20 & mask;; i = (i + 1) & mask) {
-      if (slots_[i].epoch != epoch_) {
-        slots_[i] = {a, b, epoch_};
+    for (std::size_t i = first(pair) & mask;; i = (i + 1) & mask) {
+      Slot& slot = slots_[i];
+      if (slot.b == kNone) {
+        slot = pair;
         ++size_;
         return true;
       }
-      if (slots_[i].a == a && slots_[i].b == b) return false;
+      if (slot.a == pair.a && slot.b == pair.b) return false;
     }
+  }
+
+  // Triangles with numbers next to each other are often neighbours, and their pairs come together: to one cache line.
+  static std::size_t first(const Slot& pair) {
+    const std::uint64_t a = pair.a / 4, b = pair.b / 4, key = (a << 32 ^ a >> 32 ^ b) * 0x9e3779b97f4a7c15ull;
+    return (key >> 20 & ~std::uint64_t{7}) | (pair.a % 4 * 4 + pair.b % 4) / 2;
   }
 
   void grow() {
-    held_.assign(slots_.begin(), slots_.begin() + static_cast<std::ptrdiff_t>(used_));
-    const std::uint32_t epoch = epoch_;
+    held_.clear();
+    std::copy_if(slots_.begin(), slots_.begin() + static_cast<std::ptrdiff_t>(used_), std::back_inserter(held_),
+                 [](const Slot& s) { return s.b != kNone; });
+    clear();
     used_ = std::max(2 * used_, kLeast);
     slots_.resize(std::max(used_, slots_.size()));
-    clear();
-    for (const Slot& s : held_) {
-      if (s.epoch == epoch) place(s.a, s.b);
-    }
+    for (const Slot& s : held_) place(s);
   }
 
-  std::vector<Slot> slots_, held_;  // held_: while it grows
-  std::size_t used_ = 0;            // of slots_, a power of two
+  std::vector<Slot> slots_, held_;  // empty from used_ on; held_: while it grows
+  std::size_t used_ = 0;            // a power of two
   std::size_t size_ = 0;
-  std::uint32_t epoch_ = 1;
 };
 
 }  // namespace bocst::query

@@ -36,16 +36,28 @@ inline void push(PairSteps& s, int side, std::uint32_t block, std::uint32_t leve
   top.coarse = coarse;
 }
 
-// Brings to the processor what the next steps will read of a node, or, of a leaf, its corners.
-inline void fetch(const tree::Tree& tree, const StepNode& n) {
-  constexpr std::size_t kLine = 64, kLeafLines = 6;
-  if (n.link.tag() == tree::Link::kBlock) {
-    const char* at = reinterpret_cast<const char*>(&tree.block(n.link.index()));
+// Most of a leaf's corners, and all of them.
+constexpr std::size_t kNextLeafLines = 6, kLeafLines = 10;
+
+// Brings to the processor what the next steps will read of a node, or, of a leaf, its corners: so many lines of them.
+inline void fetch(const tree::Tree& tree, tree::Link link, std::size_t leaf_lines) {
+  constexpr std::size_t kLine = 64;
+  if (link.tag() == tree::Link::kBlock) {
+    const char* at = reinterpret_cast<const char*>(&tree.block(link.index()));
     __builtin_prefetch(at);
     __builtin_prefetch(at + kLine);
-  } else if (n.link.tag() == tree::Link::kShortList) {
-    const char* at = reinterpret_cast<const char*>(tree.words(n.link));
-    for (std::size_t i = 0; i < kLeafLines; ++i) __builtin_prefetch(at + i * kLine);
+  } else if (link.tag() == tree::Link::kShortList) {
+    const char* at = reinterpret_cast<const char*>(tree.words(link));
+    for (std::size_t i = 0; i < leaf_lines; ++i) __builtin_prefetch(at + i * kLine);
+  }
+}
+
+// The same for octants that are all to be walked, so that there is time until they are asked for: a leaf as a whole.
+inline void fetchAll(const tree::Tree& tree, const tree::Block& block, unsigned octants) {
+  for (; octants != 0; octants &= octants - 1) {
+    const tree::Link link = block.child[__builtin_ctz(octants)].load(std::memory_order_relaxed);
+    fetch(tree, link, kLeafLines);
+    if (link.tag() == tree::Link::kBlock) tree.fetchStamp(link.index());
   }
 }
 
@@ -307,11 +319,14 @@ HWY_INLINE bool expandOther(PairSteps& s, int x, std::uint32_t index, std::uint3
   const tree::Block& block = s.tree[y]->block(other_index);
   s.tree[y]->touch(other_index, s.now);
   decodeBlock(s, y, other_index, block, frame + 1);
+  fetchAll(*s.tree[x], s.tree[x]->block(index), mask);
+  unsigned all = 0;
   for (; mask != 0; mask &= mask - 1) {
     const auto o = static_cast<std::uint32_t>(__builtin_ctz(mask));
     const unsigned left =
         overlapping(s.geometry, y, s.frames[frame + 1], s.frames[frame], o, block.grey, s.stack[s.depth].order);
     if (left == 0) continue;
+    all |= left;
     StepNode n;
     n.node = tree::NodeRef::octant(index, static_cast<int>(o));
     n.link = s.tree[x]->link(n.node);
@@ -319,6 +334,7 @@ HWY_INLINE bool expandOther(PairSteps& s, int x, std::uint32_t index, std::uint3
     n.lane = 8 * frame + o;
     push(s, y, other_index, other.level + 1, frame + 1, n, left);
   }
+  fetchAll(*s.tree[y], block, all);
   return true;
 }
 
@@ -327,8 +343,9 @@ PairSteps::Event NextEvent(PairSteps& s) {
     std::uint32_t frames = pop(s, s.pair);
     const bool leaf0 = isLeaf(s.pair[0]), leaf1 = isLeaf(s.pair[1]);
     if (leaf0 && leaf1) {
-      fetch(*s.tree[0], s.pair[0]);
-      fetch(*s.tree[1], s.pair[1]);
+      if (!s.all_at_once) {
+        for (int side = 0; side < 2; ++side) fetch(*s.tree[side], s.pair[side].link, kNextLeafLines);
+      }
       return PairSteps::kLeaves;
     }
     // The larger of two nodes is expanded, unless it is a leaf.
@@ -336,7 +353,7 @@ PairSteps::Event NextEvent(PairSteps& s) {
     const int x = leaf1 || (!leaf0 && deeper >= s.not_smaller) ? 0 : 1, y = 1 - x;
     StepNode &own = s.pair[x], &other = s.pair[y];
     if (own.link.tag() != tree::Link::kBlock) return PairSteps::kAside;
-    if (other.link.tag() == tree::Link::kBlock) fetch(*s.tree[y], other);
+    if (!s.all_at_once && other.link.tag() == tree::Link::kBlock) fetch(*s.tree[y], other.link, 0);
     lookUp(s, other, y, frames);
     const std::uint32_t index = own.link.index();
     const tree::Block& block = s.tree[x]->block(index);
@@ -354,6 +371,7 @@ PairSteps::Event NextEvent(PairSteps& s) {
       continue;
     }
     if (!s.all_at_once || !expandOther(s, x, index, frames, mask)) {
+      if (s.all_at_once) fetchAll(*s.tree[x], block, mask);
       push(s, x, index, own.level + 1, frames, other, mask);
     }
   }

@@ -101,6 +101,8 @@ class Tree {
     std::atomic<std::int64_t>& stamp = stamps_[block];
     if (stamp.load(std::memory_order_relaxed) < now) stamp.store(now, std::memory_order_relaxed);
   }
+  /// A block is about to be marked.
+  void fetchStamp(std::uint32_t block) const { __builtin_prefetch(&stamps_[block]); }
   std::int64_t now() const;
 
   /// The root grid knows the children of this frontier node.

@@ -524,6 +524,35 @@ TEST(CollideRequest, CountsStopAndAccumulate) {
   EXPECT_EQ(fcl::collide(ga, X, gb, Y, fcl::CollisionRequestd(0), none), 0u);
 }
 
+// Pairs are looked at several at once, while the walk goes on; as many are reported as are asked for, and no other.
+TEST(CollideRequest, AnyNumberOfContacts) {
+  const Raw raw = test::torus(40);
+  const auto bvh = test::bvh<fcl::OBBRSSd>(raw);
+  const Modeld a(raw.mesh()), b(raw.mesh());
+  const auto X = test::pose<double>(Eigen::Matrix3d::Identity(), {0, 0, 0});
+  const auto Y = test::pose<double>(Eigen::Matrix3d::Identity(), {1.2, 0.3, 0.1});
+  const Pairs all = test::pairs<double>(*bvh, X, *bvh, Y);
+  ASSERT_GT(all.size(), 100u);
+  const fcl::CollisionGeometryd* ga = &a;
+  for (const fcl::CollisionGeometryd* gb :
+       {static_cast<const fcl::CollisionGeometryd*>(&b), static_cast<const fcl::CollisionGeometryd*>(bvh.get())}) {
+    for (std::size_t limit = 1; limit < all.size() + 3; limit += limit < 100 ? 1 : 7) {
+      for (const bool with_geometry : {false, true}) {
+        fcl::CollisionResultd result;
+        const std::size_t count = fcl::collide(ga, X, gb, Y, fcl::CollisionRequestd(limit, with_geometry), result);
+        ASSERT_EQ(count, std::min(limit, all.size()));
+        Pairs found;
+        for (std::size_t i = 0; i < count; ++i) {
+          const auto& c = result.getContact(i);
+          ASSERT_TRUE(found.insert({c.b1, c.b2}).second) << "twice, of " << limit;
+          ASSERT_EQ(std::isfinite(c.penetration_depth), with_geometry);
+        }
+        ASSERT_TRUE(std::includes(all.begin(), all.end(), found.begin(), found.end())) << limit;
+      }
+    }
+  }
+}
+
 TEST(CollideRequest, FreeAndUncertainGeometriesDoNotCollide) {
   const Raw raw = test::torus(20);
   Modeld a(raw.mesh()), b(raw.mesh());
