@@ -133,11 +133,12 @@ HWY_INLINE unsigned overlapping(const PairFrames& g, int own, const Frame& f, co
 }
 
 // The octants of a block. Pairs that differ in the other node only come one after the other and find the frame filled.
-HWY_INLINE void decodeBlock(PairSteps& s, int own, std::uint32_t index, const tree::Block& block, std::uint32_t frame) {
+HWY_INLINE bool decodeBlock(PairSteps& s, int own, std::uint32_t index, const tree::Block& block, std::uint32_t frame) {
   const std::uint64_t name = PairSteps::name(own, index);
-  if (s.holds[frame] == name) return;
+  if (s.holds[frame] == name) return false;
   s.holds[frame] = name;
   decodeCell(s.geometry, own, block.level, block.at, block.octants, s.frames[frame]);
+  return true;
 }
 
 // Where the volume of a pair's node on one side is; for pairs that come without frames.
@@ -308,7 +309,7 @@ void OctantsMeeting(const PairFrames& geometry, int own, const CellOctants& cell
 
 // Expands the other node of the pair for all octants in `mask` of block `index`, in frame `frame`; false where it is
 // not the next to be expanded.
-HWY_INLINE bool expandOther(PairSteps& s, int x, std::uint32_t index, std::uint32_t frame, unsigned mask) {
+HWY_INLINE bool expandOther(PairSteps& s, int x, std::uint32_t index, std::uint32_t frame, unsigned mask, bool is_new) {
   const int y = 1 - x;
   const std::uint32_t level = s.pair[x].level + 1;
   const StepNode& other = s.pair[y];
@@ -318,8 +319,8 @@ HWY_INLINE bool expandOther(PairSteps& s, int x, std::uint32_t index, std::uint3
   const std::uint32_t other_index = other.link.index();
   const tree::Block& block = s.tree[y]->block(other_index);
   s.tree[y]->touch(other_index, s.now);
-  decodeBlock(s, y, other_index, block, frame + 1);
-  fetchAll(*s.tree[x], s.tree[x]->block(index), mask);
+  const bool other_new = decodeBlock(s, y, other_index, block, frame + 1);
+  if (is_new) fetchAll(*s.tree[x], s.tree[x]->block(index), mask);
   unsigned all = 0;
   for (; mask != 0; mask &= mask - 1) {
     const auto o = static_cast<std::uint32_t>(__builtin_ctz(mask));
@@ -334,7 +335,7 @@ HWY_INLINE bool expandOther(PairSteps& s, int x, std::uint32_t index, std::uint3
     n.lane = 8 * frame + o;
     push(s, y, other_index, other.level + 1, frame + 1, n, left);
   }
-  fetchAll(*s.tree[y], block, all);
+  if (other_new) fetchAll(*s.tree[y], block, all);
   return true;
 }
 
@@ -358,7 +359,7 @@ PairSteps::Event NextEvent(PairSteps& s) {
     const std::uint32_t index = own.link.index();
     const tree::Block& block = s.tree[x]->block(index);
     s.tree[x]->touch(index, s.now);
-    decodeBlock(s, x, index, block, frames);
+    const bool is_new = decodeBlock(s, x, index, block, frames);
     const unsigned mask = overlapping(s.geometry, x, s.frames[frames], s.frames[other.lane / 8], other.lane % 8,
                                       block.grey, s.stack[s.depth].order);
     if (mask == 0) continue;
@@ -370,8 +371,8 @@ PairSteps::Event NextEvent(PairSteps& s) {
       pushThose(s);
       continue;
     }
-    if (!s.all_at_once || !expandOther(s, x, index, frames, mask)) {
-      if (s.all_at_once) fetchAll(*s.tree[x], block, mask);
+    if (!s.all_at_once || !expandOther(s, x, index, frames, mask, is_new)) {
+      if (s.all_at_once && is_new) fetchAll(*s.tree[x], block, mask);
       push(s, x, index, own.level + 1, frames, other, mask);
     }
   }
