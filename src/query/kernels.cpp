@@ -257,93 +257,148 @@ HWY_INLINE Fork forkOf(const Vec3 (&t)[3], V above0, V above1, V above2) {
   return {corner, {sub(choose(alone1, t[0], t[1]), corner), sub(choose(alone2, t[0], t[2]), corner)}};
 }
 
+// Triangles of a pack, those wanted one after the other, and their boxes as far as they matter.
+struct PickedRows {
+  alignas(64) float xyz[9][TrianglePack::kCapacity];
+  alignas(64) float low[3][TrianglePack::kCapacity], high[3][TrianglePack::kCapacity];
+  std::uint8_t row[TrianglePack::kCapacity];
+  std::size_t count = 0;
+};
+
+HWY_INLINE void pickRows(const TrianglePack& rows, std::uint32_t which, const PackRegion& region, V reach,
+                         PickedRows& picked) {
+  const D d;
+  for (std::size_t i = 0; i < rows.count; i += hn::Lanes(d)) {
+    const std::uint32_t wanted = which >> i & ((1u << hn::Lanes(d)) - 1);
+    if (wanted == 0) continue;
+    alignas(32) std::int32_t from[8] = {};
+    std::size_t count = 0;
+    for (std::uint32_t left = wanted; left != 0; left &= left - 1) {
+      const int lane = __builtin_ctz(left);
+      picked.row[picked.count + count] = static_cast<std::uint8_t>(i + static_cast<std::size_t>(lane));
+      from[count++] = lane;
+    }
+    const auto order = hn::SetTableIndices(d, from);
+    // Whole vectors are written, but never beyond the place where they were read.
+    BOCST_UNROLL
+    for (std::size_t k = 0; k < 9; ++k) {
+      hn::StoreU(hn::TableLookupLanes(hn::Load(d, rows.xyz[k] + i), order), d, picked.xyz[k] + picked.count);
+    }
+    picked.count += count;
+  }
+  for (std::size_t i = 0; i < picked.count; i += hn::Lanes(d)) {
+    BOCST_UNROLL
+    for (int c = 0; c < 3; ++c) {
+      const V a = hn::Load(d, picked.xyz[c] + i), b = hn::Load(d, picked.xyz[3 + c] + i),
+              e = hn::Load(d, picked.xyz[6 + c] + i);
+      const V low = hn::Max(min3(a, b, e), hn::Set(d, region.low[c]));
+      const V high = hn::Min(max3(a, b, e), hn::Set(d, region.high[c]));
+      hn::Store(hn::Sub(low, reach), d, picked.low[c] + i);
+      hn::Store(hn::Add(high, reach), d, picked.high[c] + i);
+    }
+  }
+}
+
 std::size_t TouchingPairs(const TrianglePack& rows, std::uint32_t which, const TrianglePack& lanes,
                           const PackRegion& region, float slack, PackPair* pairs) {
   const D d;
+  const hn::RebindToSigned<D> di;
+  constexpr std::size_t kMost = hn::MaxLanes(D());
   const float size = std::max(rows.size, lanes.size) * 1.0001f, u = 0x1p-24f;
   const float moved = 25 * u * size + slack;
   const V reach = hn::Set(d, 64 * u * size + slack);
   const V tiny = hn::Set(d, 1e-30f);  // products below have lost bits
   std::size_t found = 0;
-  // The rows' boxes within the region, once for all lanes.
-  alignas(64) float lows[3][TrianglePack::kCapacity], highs[3][TrianglePack::kCapacity];
-  for (std::size_t i = 0; i < rows.count; i += hn::Lanes(d)) {
-    BOCST_UNROLL
-    for (int c = 0; c < 3; ++c) {
-      const V a = hn::Load(d, rows.xyz[c] + i), b = hn::Load(d, rows.xyz[3 + c] + i),
-              e = hn::Load(d, rows.xyz[6 + c] + i);
-      const V low = hn::Max(min3(a, b, e), hn::Set(d, region.low[c]));
-      const V high = hn::Min(max3(a, b, e), hn::Set(d, region.high[c]));
-      hn::Store(hn::Sub(low, reach), d, lows[c] + i);
-      hn::Store(hn::Add(high, reach), d, highs[c] + i);
-    }
-  }
+  PickedRows picked;
+  pickRows(rows, which, region, reach, picked);
   for (std::size_t i = 0; i < lanes.count; i += hn::Lanes(d)) {
-    const Vec3 q[3] = {corner(lanes, 0, i), corner(lanes, 1, i), corner(lanes, 2, i)};
-    const Vec3 qmin = min3(q), qmax = max3(q);
-    const Vec3 f[3] = {sub(q[1], q[0]), sub(q[2], q[1]), sub(q[0], q[2])};
-    const Vec3 m = cross(f[0], f[1]);
-    const V flong = hn::Sqrt(max3(dot(f[0], f[0]), dot(f[1], f[1]), dot(f[2], f[2])));
-    // The products of a normal are at most the product of the edges' sizes.
-    const V mpad = hn::MulAdd(reach, hn::MulAdd(norm1(f[0]), norm1(f[1]), norm1(m)), tiny);
-
-    for (std::uint32_t left = which; left != 0; left &= left - 1) {
-      const auto row = static_cast<std::size_t>(__builtin_ctz(left));
-      M near = hn::And(hn::Le(qmin.x, hn::Set(d, highs[0][row])), hn::Ge(qmax.x, hn::Set(d, lows[0][row])));
-      near =
-          hn::And(near, hn::And(hn::Le(qmin.y, hn::Set(d, highs[1][row])), hn::Ge(qmax.y, hn::Set(d, lows[1][row]))));
-      near =
-          hn::And(near, hn::And(hn::Le(qmin.z, hn::Set(d, highs[2][row])), hn::Ge(qmax.z, hn::Set(d, lows[2][row]))));
-      if (hn::AllFalse(d, near)) continue;
-
-      Vec3 p[3];
-      BOCST_UNROLL
-      for (int k = 0; k < 3; ++k) {
-        p[k] = broadcast(rows.xyz[3 * k][row], rows.xyz[3 * k + 1][row], rows.xyz[3 * k + 2][row]);
+    const std::uint32_t filled = lanes.count - i < hn::Lanes(d) ? (1u << (lanes.count - i)) - 1 : 0xff;
+    const Vec3 lane_corner[3] = {corner(lanes, 0, i), corner(lanes, 1, i), corner(lanes, 2, i)};
+    const Vec3 qmin = min3(lane_corner), qmax = max3(lane_corner);
+    for (std::size_t j = 0; j < picked.count; j += hn::Lanes(d)) {
+      // Pairs whose boxes meet, eight bits a row: one of them in three or four, so they are gathered before what costs
+      // more.
+      std::uint64_t meeting = 0;
+      const std::size_t end = std::min(hn::Lanes(d), picked.count - j);
+      for (std::size_t r = 0; r < end; ++r) {
+        M near = hn::And(hn::Le(qmin.x, hn::Set(d, picked.high[0][j + r])),
+                         hn::Ge(qmax.x, hn::Set(d, picked.low[0][j + r])));
+        near = hn::And(near, hn::And(hn::Le(qmin.y, hn::Set(d, picked.high[1][j + r])),
+                                     hn::Ge(qmax.y, hn::Set(d, picked.low[1][j + r]))));
+        near = hn::And(near, hn::And(hn::Le(qmin.z, hn::Set(d, picked.high[2][j + r])),
+                                     hn::Ge(qmax.z, hn::Set(d, picked.low[2][j + r]))));
+        meeting |= std::uint64_t{maskBits(near) & filled} << 8 * r;
       }
-      const Vec3 e[3] = {sub(p[1], p[0]), sub(p[2], p[1]), sub(p[0], p[2])};
-      const Vec3 n = cross(e[0], e[1]);
-      const V elong = hn::Sqrt(max3(dot(e[0], e[0]), dot(e[1], e[1]), dot(e[2], e[2])));
-      const V npad = hn::MulAdd(reach, hn::MulAdd(norm1(e[0]), norm1(e[1]), norm1(n)), tiny);
-      const Vec3 w[3] = {sub(q[0], p[0]), sub(q[1], p[0]), sub(q[2], p[0])};
-      const V n0 = dot(n, w[0]), n1 = dot(n, w[1]), n2 = dot(n, w[2]);
-      const V m0 = dot(m, sub(p[0], q[0])), m1 = dot(m, sub(p[1], q[0])), m2 = dot(m, sub(p[2], q[0]));
-      // How far the one reaches to the nearer side of the other's plane.
-      const V by_n = hn::Min(max3(n0, n1, n2), hn::Neg(min3(n0, n1, n2)));
-      const V by_m = hn::Min(max3(m0, m1, m2), hn::Neg(min3(m0, m1, m2)));
-      near = hn::And(near, hn::And(hn::Ge(by_n, hn::Neg(npad)), hn::Ge(by_m, hn::Neg(mpad))));
-      if (hn::AllFalse(d, near)) continue;
+      if (meeting == 0) continue;
+      alignas(64) std::int32_t which_pair[kMost * 8 + kMost];
+      std::size_t count = 0;
+      for (; meeting != 0; meeting &= meeting - 1) which_pair[count++] = __builtin_ctzll(meeting);
+      hn::StoreU(hn::Zero(di), di, which_pair + count);
 
-      // How far the determinants below may be off: those with a plane's normal, and those of an edge of each.
-      const V way = hn::Add(elong, hn::Sqrt(max3(dot(w[0], w[0]), dot(w[1], w[1]), dot(w[2], w[2]))));
-      const V way4 = hn::Mul(hn::Set(d, 4.0f), way), moves = hn::Set(d, 1.125f * moved), rounds = hn::Set(d, 42 * u);
-      const V n_off = hn::MulAdd(hn::Mul(elong, hn::MulAdd(rounds, elong, moves)), hn::Add(way4, elong), tiny);
-      const V m_off = hn::MulAdd(hn::Mul(flong, hn::MulAdd(rounds, flong, moves)), hn::Add(way4, flong), tiny);
-      const V longer = hn::Max(elong, flong), shorter = hn::Min(elong, flong);
-      const V edges_off =
-          hn::MulAdd(hn::Mul(longer, hn::MulAdd(rounds, shorter, moves)), hn::Add(hn::Add(way, way), shorter), tiny);
-      M clear = hn::Gt(min3(hn::Abs(n0), hn::Abs(n1), hn::Abs(n2)), n_off);
-      clear = hn::And(clear, hn::Gt(min3(hn::Abs(m0), hn::Abs(m1), hn::Abs(m2)), m_off));
-      clear = hn::And(clear, hn::Gt(shorter, hn::Set(d, 64 * moved)));
+      for (std::size_t at = 0; at < count; at += hn::Lanes(d)) {
+        const auto pair = hn::Load(di, which_pair + at);
+        const auto row = hn::IndicesFromVec(d, hn::ShiftRight<3>(pair));
+        const auto lane = hn::IndicesFromVec(d, hn::And(pair, hn::Set(di, 7)));
+        Vec3 p[3], q[3];
+        BOCST_UNROLL
+        for (std::size_t k = 0; k < 3; ++k) {
+          p[k] = {hn::TableLookupLanes(hn::Load(d, picked.xyz[3 * k] + j), row),
+                  hn::TableLookupLanes(hn::Load(d, picked.xyz[3 * k + 1] + j), row),
+                  hn::TableLookupLanes(hn::Load(d, picked.xyz[3 * k + 2] + j), row)};
+          q[k] = {hn::TableLookupLanes(lane_corner[k].x, lane), hn::TableLookupLanes(lane_corner[k].y, lane),
+                  hn::TableLookupLanes(lane_corner[k].z, lane)};
+        }
+        M near = hn::FirstN(d, count - at);
+        const Vec3 f[3] = {sub(q[1], q[0]), sub(q[2], q[1]), sub(q[0], q[2])};
+        const Vec3 m = cross(f[0], f[1]);
+        const V flong = hn::Sqrt(max3(dot(f[0], f[0]), dot(f[1], f[1]), dot(f[2], f[2])));
+        // The products of a normal are at most the product of the edges' sizes.
+        const V mpad = hn::MulAdd(reach, hn::MulAdd(norm1(f[0]), norm1(f[1]), norm1(m)), tiny);
+        const Vec3 e[3] = {sub(p[1], p[0]), sub(p[2], p[1]), sub(p[0], p[2])};
+        const Vec3 n = cross(e[0], e[1]);
+        const V elong = hn::Sqrt(max3(dot(e[0], e[0]), dot(e[1], e[1]), dot(e[2], e[2])));
+        const V npad = hn::MulAdd(reach, hn::MulAdd(norm1(e[0]), norm1(e[1]), norm1(n)), tiny);
+        const Vec3 w[3] = {sub(q[0], p[0]), sub(q[1], p[0]), sub(q[2], p[0])};
+        const V n0 = dot(n, w[0]), n1 = dot(n, w[1]), n2 = dot(n, w[2]);
+        const V m0 = dot(m, sub(p[0], q[0])), m1 = dot(m, sub(p[1], q[0])), m2 = dot(m, sub(p[2], q[0]));
+        // How far the one reaches to the nearer side of the other's plane.
+        const V by_n = hn::Min(max3(n0, n1, n2), hn::Neg(min3(n0, n1, n2)));
+        const V by_m = hn::Min(max3(m0, m1, m2), hn::Neg(min3(m0, m1, m2)));
+        near = hn::And(near, hn::And(hn::Ge(by_n, hn::Neg(npad)), hn::Ge(by_m, hn::Neg(mpad))));
+        if (hn::AllFalse(d, near)) continue;
 
-      // Each cuts the other's plane with the edges from its corner that is alone on its side, in an interval of the
-      // line of both planes. Where an end of the one lies to an end of the other, the determinant of these edges says;
-      // the intervals share no point when all ends of the one lie to one side of all of the other.
-      const Fork fp = forkOf(p, m0, m1, m2), fq = forkOf(q, n0, n1, n2);
-      const Vec3 between = sub(fq.corner, fp.corner), c0 = cross(between, fp.edge[0]), c1 = cross(between, fp.edge[1]);
-      const V d00 = dot(c0, fq.edge[0]), d01 = dot(c0, fq.edge[1]), d10 = dot(c1, fq.edge[0]),
-              d11 = dot(c1, fq.edge[1]);
-      const V low = hn::Min(hn::Min(d00, d01), hn::Min(d10, d11)), high = hn::Max(hn::Max(d00, d01), hn::Max(d10, d11));
-      const M beside = hn::Or(hn::Gt(low, edges_off), hn::Lt(high, hn::Neg(edges_off)));
-      const M across = hn::And(hn::Lt(low, hn::Neg(edges_off)), hn::Gt(high, edges_off));
-      const M cut = hn::Gt(hn::Min(by_n, by_m), hn::Zero(d));
-      const std::uint32_t bits = maskBits(hn::AndNot(hn::And(clear, hn::Or(hn::Not(cut), beside)), near));
-      const std::uint32_t certain = maskBits(hn::And(clear, hn::And(cut, across)));
-      for (std::uint32_t k = bits; k != 0; k &= k - 1) {
-        const auto lane = static_cast<std::size_t>(__builtin_ctz(k));
-        if (i + lane >= lanes.count) break;
-        pairs[found++] = {static_cast<std::uint8_t>(row), static_cast<std::uint8_t>(i + lane),
-                          (certain >> lane & 1) != 0};
+        // How far the determinants below may be off: those with a plane's normal, and those of an edge of each.
+        const V way = hn::Add(elong, hn::Sqrt(max3(dot(w[0], w[0]), dot(w[1], w[1]), dot(w[2], w[2]))));
+        const V way4 = hn::Mul(hn::Set(d, 4.0f), way), moves = hn::Set(d, 1.125f * moved), rounds = hn::Set(d, 42 * u);
+        const V n_off = hn::MulAdd(hn::Mul(elong, hn::MulAdd(rounds, elong, moves)), hn::Add(way4, elong), tiny);
+        const V m_off = hn::MulAdd(hn::Mul(flong, hn::MulAdd(rounds, flong, moves)), hn::Add(way4, flong), tiny);
+        const V longer = hn::Max(elong, flong), shorter = hn::Min(elong, flong);
+        const V edges_off =
+            hn::MulAdd(hn::Mul(longer, hn::MulAdd(rounds, shorter, moves)), hn::Add(hn::Add(way, way), shorter), tiny);
+        M clear = hn::Gt(min3(hn::Abs(n0), hn::Abs(n1), hn::Abs(n2)), n_off);
+        clear = hn::And(clear, hn::Gt(min3(hn::Abs(m0), hn::Abs(m1), hn::Abs(m2)), m_off));
+        clear = hn::And(clear, hn::Gt(shorter, hn::Set(d, 64 * moved)));
+
+        // Each cuts the other's plane with the edges from its corner that is alone on its side, in an interval of the
+        // line of both planes. Where an end of the one lies to an end of the other, the determinant of these edges
+        // says; the intervals share no point when all ends of the one lie to one side of all of the other.
+        const Fork fp = forkOf(p, m0, m1, m2), fq = forkOf(q, n0, n1, n2);
+        const Vec3 between = sub(fq.corner, fp.corner), c0 = cross(between, fp.edge[0]),
+                   c1 = cross(between, fp.edge[1]);
+        const V d00 = dot(c0, fq.edge[0]), d01 = dot(c0, fq.edge[1]), d10 = dot(c1, fq.edge[0]),
+                d11 = dot(c1, fq.edge[1]);
+        const V low = hn::Min(hn::Min(d00, d01), hn::Min(d10, d11)),
+                high = hn::Max(hn::Max(d00, d01), hn::Max(d10, d11));
+        const M beside = hn::Or(hn::Gt(low, edges_off), hn::Lt(high, hn::Neg(edges_off)));
+        const M across = hn::And(hn::Lt(low, hn::Neg(edges_off)), hn::Gt(high, edges_off));
+        const M cut = hn::Gt(hn::Min(by_n, by_m), hn::Zero(d));
+        const std::uint32_t bits = maskBits(hn::AndNot(hn::And(clear, hn::Or(hn::Not(cut), beside)), near));
+        const std::uint32_t certain = maskBits(hn::And(clear, hn::And(cut, across)));
+        for (std::uint32_t k = bits; k != 0; k &= k - 1) {
+          const auto in = static_cast<std::size_t>(__builtin_ctz(k));
+          const auto met = static_cast<std::size_t>(which_pair[at + in]);
+          pairs[found++] = {picked.row[j + met / 8], static_cast<std::uint8_t>(i + met % 8), (certain >> in & 1) != 0};
+        }
       }
     }
   }
