@@ -132,7 +132,8 @@ HWY_INLINE unsigned overlapping(const PairFrames& g, int own, const Frame& f, co
   return result;
 }
 
-// The octants of a block. Pairs that differ in the other node only come one after the other and find the frame filled.
+// The octants of a block. Pairs that differ in the other node only come one after the other and find the frame filled:
+// then it is false.
 HWY_INLINE bool decodeBlock(PairSteps& s, int own, std::uint32_t index, const tree::Block& block, std::uint32_t frame) {
   const std::uint64_t name = PairSteps::name(own, index);
   if (s.holds[frame] == name) return false;
@@ -308,8 +309,9 @@ void OctantsMeeting(const PairFrames& geometry, int own, const CellOctants& cell
 }
 
 // Expands the other node of the pair for all octants in `mask` of block `index`, in frame `frame`; false where it is
-// not the next to be expanded.
-HWY_INLINE bool expandOther(PairSteps& s, int x, std::uint32_t index, std::uint32_t frame, unsigned mask, bool is_new) {
+// not the next to be expanded. `fetch_own`: nobody has fetched what is below that block.
+HWY_INLINE bool expandOther(PairSteps& s, int x, std::uint32_t index, std::uint32_t frame, unsigned mask,
+                            bool fetch_own) {
   const int y = 1 - x;
   const std::uint32_t level = s.pair[x].level + 1;
   const StepNode& other = s.pair[y];
@@ -319,15 +321,15 @@ HWY_INLINE bool expandOther(PairSteps& s, int x, std::uint32_t index, std::uint3
   const std::uint32_t other_index = other.link.index();
   const tree::Block& block = s.tree[y]->block(other_index);
   s.tree[y]->touch(other_index, s.now);
-  const bool other_new = decodeBlock(s, y, other_index, block, frame + 1);
-  if (is_new) fetchAll(*s.tree[x], s.tree[x]->block(index), mask);
-  unsigned all = 0;
+  const bool fetch_other = decodeBlock(s, y, other_index, block, frame + 1) && s.sees_all;
+  if (fetch_own) fetchAll(*s.tree[x], s.tree[x]->block(index), mask);
+  unsigned met = 0;
   for (; mask != 0; mask &= mask - 1) {
     const auto o = static_cast<std::uint32_t>(__builtin_ctz(mask));
     const unsigned left =
         overlapping(s.geometry, y, s.frames[frame + 1], s.frames[frame], o, block.grey, s.stack[s.depth].order);
     if (left == 0) continue;
-    all |= left;
+    met |= left;
     StepNode n;
     n.node = tree::NodeRef::octant(index, static_cast<int>(o));
     n.link = s.tree[x]->link(n.node);
@@ -335,7 +337,7 @@ HWY_INLINE bool expandOther(PairSteps& s, int x, std::uint32_t index, std::uint3
     n.lane = 8 * frame + o;
     push(s, y, other_index, other.level + 1, frame + 1, n, left);
   }
-  if (other_new) fetchAll(*s.tree[y], block, all);
+  if (fetch_other) fetchAll(*s.tree[y], block, met);
   return true;
 }
 
@@ -344,7 +346,7 @@ PairSteps::Event NextEvent(PairSteps& s) {
     std::uint32_t frames = pop(s, s.pair);
     const bool leaf0 = isLeaf(s.pair[0]), leaf1 = isLeaf(s.pair[1]);
     if (leaf0 && leaf1) {
-      if (!s.all_at_once) {
+      if (!s.sees_all) {
         for (int side = 0; side < 2; ++side) fetch(*s.tree[side], s.pair[side].link, kNextLeafLines);
       }
       return PairSteps::kLeaves;
@@ -354,12 +356,12 @@ PairSteps::Event NextEvent(PairSteps& s) {
     const int x = leaf1 || (!leaf0 && deeper >= s.not_smaller) ? 0 : 1, y = 1 - x;
     StepNode &own = s.pair[x], &other = s.pair[y];
     if (own.link.tag() != tree::Link::kBlock) return PairSteps::kAside;
-    if (!s.all_at_once && other.link.tag() == tree::Link::kBlock) fetch(*s.tree[y], other.link, 0);
+    if (!s.sees_all && other.link.tag() == tree::Link::kBlock) fetch(*s.tree[y], other.link, 0);
     lookUp(s, other, y, frames);
     const std::uint32_t index = own.link.index();
     const tree::Block& block = s.tree[x]->block(index);
     s.tree[x]->touch(index, s.now);
-    const bool is_new = decodeBlock(s, x, index, block, frames);
+    const bool fetch_own = decodeBlock(s, x, index, block, frames) && s.sees_all;
     const unsigned mask = overlapping(s.geometry, x, s.frames[frames], s.frames[other.lane / 8], other.lane % 8,
                                       block.grey, s.stack[s.depth].order);
     if (mask == 0) continue;
@@ -371,8 +373,8 @@ PairSteps::Event NextEvent(PairSteps& s) {
       pushThose(s);
       continue;
     }
-    if (!s.all_at_once || !expandOther(s, x, index, frames, mask, is_new)) {
-      if (s.all_at_once && is_new) fetchAll(*s.tree[x], block, mask);
+    if (!s.all_at_once || !expandOther(s, x, index, frames, mask, fetch_own)) {
+      if (fetch_own) fetchAll(*s.tree[x], block, mask);
       push(s, x, index, own.level + 1, frames, other, mask);
     }
   }

@@ -71,6 +71,9 @@ struct PairSteps {
   /// tests overlap in time, where a walk that ends at its first hit would not make most of them.
   bool all_at_once = false;
 
+  /// No hit ends the walk: what is on the stack will be walked, so it is fetched ahead.
+  bool sees_all = false;
+
   StepNode pair[2];                         ///< Of the event.
   std::uint32_t coarse = StepGroup::kNone;  ///< As in StepGroup, of the pair.
   std::uint32_t triangles = 0;

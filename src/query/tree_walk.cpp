@@ -56,7 +56,8 @@ bool TreeWalk::search(Scratch& s) {
 
   PairSteps steps(&a_.tree(), &b_.tree(), a_.now(), PairFrames(b_in_a_.scale, b_in_a_), s.frames);
   for (int side = 0; side < 2; ++side) steps.leaf[side] = &s.coarse[side];
-  steps.all_at_once = near_.shallow || !visitor_->endsAtFirst();
+  steps.sees_all = !visitor_->endsAtFirst();
+  steps.all_at_once = near_.shallow || steps.sees_all;
   const auto push = [&](const SetAside<TreeSide, TreeSide>::Pair& pair) {
     if (s.stack.size() < steps.depth + 1 + PairSteps::kStackRoom) {
       s.stack.resize(2 * (steps.depth + PairSteps::kStackRoom));
