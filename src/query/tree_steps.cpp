@@ -44,7 +44,7 @@ inline void fetch(const tree::Tree& tree, const StepNode& n) {
     __builtin_prefetch(at);
     __builtin_prefetch(at + kLine);
   } else if (n.link.tag() == tree::Link::kShortList) {
-    const char* at = reinterpret_cast<const char*>(tree.words(n.link));
+    const char* at = reinterpret_cast<const char*>(tree.lists().begin(n.link.index()));
     for (std::size_t i = 0; i < kLeafLines; ++i) __builtin_prefetch(at + i * kLine);
   }
 }

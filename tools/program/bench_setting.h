@@ -77,7 +77,7 @@ class BenchSetting {
   std::vector<bool> query_verdicts_;
 };
 
-/// Asks until the trees stop growing.
+/// Asks until the trees have stopped growing.
 void warmUp(const BocstPair& pair, const std::vector<Eigen::Isometry3d>& X_ABs);
 
 }  // namespace bocst::program

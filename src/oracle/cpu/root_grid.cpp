@@ -113,8 +113,8 @@ bool RootGrid::build(const Surface& surface) {
   auto* const heads = room.take<std::uint32_t>(lists);
   std::fill_n(heads, lists, kNone);
   const QuantisedMesh mesh(surface, bits_, room.take<std::int16_t>(QuantisedMesh::values(surface)));
-  next_.reset(new std::uint32_t[count]);
-  adviseHugePages(next_.get(), count * sizeof(next_[0]));
+  back_.reset(new std::uint16_t[count]);
+  adviseHugePages(back_.get(), count * sizeof(back_[0]));
   triangle_count_ = count;
   constexpr std::size_t kBlock = 256;
   GridSpan spans[kBlock];
@@ -144,7 +144,7 @@ bool RootGrid::build(const Surface& surface) {
 
 void RootGrid::link(std::uint32_t begin, std::uint32_t end, const GridSpan* spans, std::uint32_t* heads) {
   const std::uint32_t first_large = kGridSpanLarge << 3 * bits_;
-  std::uint32_t* const next = next_.get();
+  std::uint16_t* const back = back_.get();
 #pragma GCC unroll 4
   for (std::uint32_t t = begin; t < end; ++t) {
     const auto list = static_cast<std::uint32_t>(*spans++);
@@ -152,9 +152,22 @@ void RootGrid::link(std::uint32_t begin, std::uint32_t end, const GridSpan* span
       large_.push_back(std::uint32_t{t});
       continue;
     }
-    next[t] = heads[list];
+    const std::uint32_t next = heads[list], steps = next == kNone ? 0 : t - next;
     heads[list] = t;
+    back[t] = static_cast<std::uint16_t>(steps);
+    if (steps < kFar) continue;
+    back[t] = kFar;
+    far_.push_back({t, next});
   }
+}
+
+// What follows a triangle in its list.
+std::uint32_t RootGrid::next(std::uint32_t triangle) const {
+  const std::uint32_t steps = back_[triangle];
+  if (steps == 0) return kNone;
+  if (steps != kFar) return triangle - steps;
+  const auto is_before = [](const Far& f, std::uint32_t t) { return f.triangle < t; };
+  return std::lower_bound(far_.begin(), far_.end(), triangle, is_before)->next;
 }
 
 void RootGrid::keepLists(const std::uint32_t* heads, std::uint8_t* bits) {
@@ -308,7 +321,7 @@ bool RootGrid::anyCandidate(const Surface& surface, const lattice::Cell& cell, F
       int last = 0;
       for (int i = 1; i < count; ++i) last = heads[i] > heads[last] ? i : last;
       const std::uint32_t t = heads[last];
-      heads[last] = next_[t];
+      heads[last] = next(t);
       if (heads[last] == kNone) heads[last] = heads[--count];
       if (f(t)) return true;
     }
@@ -380,9 +393,9 @@ CellBounds RootGrid::look(const Surface& surface, const lattice::Cell& cell) con
 }
 
 std::size_t RootGrid::bytes() const {
-  return sizeof(*this) + rows_.capacity() * sizeof(Row) +
-         (triangle_count_ + head_.capacity() + large_.capacity() + may_be_grey_.capacity() + is_grey_.capacity()) *
-             sizeof(head_[0]);
+  return sizeof(*this) + rows_.capacity() * sizeof(Row) + triangle_count_ * sizeof(back_[0]) +
+         far_.capacity() * sizeof(Far) +
+         (head_.capacity() + large_.capacity() + may_be_grey_.capacity() + is_grey_.capacity()) * sizeof(head_[0]);
 }
 
 }  // namespace bocst::oracle
