@@ -38,7 +38,7 @@ inline void push(PairSteps& s, int side, std::uint32_t block, std::uint32_t leve
 
 // Brings to the processor what the next steps will read of a node, or, of a leaf, its corners.
 inline void fetch(const tree::Tree& tree, const StepNode& n) {
-  constexpr std::size_t kLine = 64, kLeafLines = 6;
+  constexpr std::size_t kLine = 64, kLeafLines = 4;
   if (n.link.tag() == tree::Link::kBlock) {
     const char* at = reinterpret_cast<const char*>(&tree.block(n.link.index()));
     __builtin_prefetch(at);

@@ -61,7 +61,7 @@ class RootGrid {
   void markCells();
   void dropMissingCells(const Surface& surface);
   void markCoarseCells();
-  std::uint32_t next(std::uint32_t triangle) const;
+  std::uint32_t farNext(std::uint32_t triangle) const;
   bool decide(const Surface& surface, const lattice::Cell& cell);
   template <typename F>
   bool anyCandidate(const Surface& surface, const lattice::Cell& cell, F&& f) const;
@@ -79,7 +79,7 @@ class RootGrid {
   std::vector<Row> rows_;  // [axes][z][y]
   std::vector<std::uint32_t> head_;
   // [triangle]: so many triangles back is the next of its list; 0 for the last, kFar for what far_ has.
-  static constexpr std::uint16_t kFar = 0xffff;
+  static constexpr std::uint32_t kFar = 0xffff;
   std::unique_ptr<std::uint16_t[]> back_;
   struct Far {
     std::uint32_t triangle, next;
