@@ -113,7 +113,8 @@ std::optional<std::size_t> BenchSetting::hits() const {
 
 std::string BenchSetting::oracleName() const { return makeBocst()->oracleName(); }
 
-void warmUp(const BocstPair& pair, const std::vector<Eigen::Isometry3d>& X_ABs) {
+void warmUp(const BocstPair& pair, const std::vector<Eigen::Isometry3d>& X_ABs,
+            const std::function<void(const Eigen::Isometry3d&)>& ask) {
   // Pools grow in steps, so one round without a change says little; and ttl may take from the largest what was grown.
   constexpr int kMostRounds = 60, kQuietRounds = 3;
   const auto state = [&pair] {
@@ -122,11 +123,15 @@ void warmUp(const BocstPair& pair, const std::vector<Eigen::Isometry3d>& X_ABs) 
   };
   auto before = state();
   for (int round = 0, quiet = 0; round < kMostRounds && quiet < kQuietRounds; ++round) {
-    for (const Eigen::Isometry3d& X_AB : X_ABs) pair.touch(X_AB);
+    for (const Eigen::Isometry3d& X_AB : X_ABs) ask(X_AB);
     const auto after = state();
     quiet = after == before ? quiet + 1 : 0;
     before = after;
   }
+}
+
+void warmUp(const BocstPair& pair, const std::vector<Eigen::Isometry3d>& X_ABs) {
+  warmUp(pair, X_ABs, [&pair](const Eigen::Isometry3d& X_AB) { pair.touch(X_AB); });
 }
 
 }  // namespace bocst::program
