@@ -13,7 +13,7 @@
 namespace bocst::oracle {
 namespace {
 
-constexpr std::uint32_t kNone = 0x80000000u;  // more triangles than a grid is made for
+constexpr std::uint32_t kNone = 0x7f7f7f7fu;  // more triangles than a grid is made for; of equal bytes, so quickly set
 constexpr std::size_t kSmallest = 4096;       // triangles: below, plain expansions are as fast
 constexpr std::size_t kLargeShare = 256;      // at most one triangle in so many may span more than two cells
 constexpr double kMargin = 2;                 // lattice units: one step
@@ -114,7 +114,7 @@ bool RootGrid::build(const Surface& surface) {
   const std::size_t lists = std::size_t{8} << 3 * bits_;
   Room room(lists * sizeof(std::uint32_t) + QuantisedMesh::values(surface) * sizeof(std::int16_t) + lists / 8);
   auto* const heads = room.take<std::uint32_t>(lists);
-  std::fill_n(heads, lists, kNone);
+  std::memset(heads, kNone & 0xff, lists * sizeof(*heads));
   const QuantisedMesh mesh(surface, bits_, room.take<std::int16_t>(QuantisedMesh::values(surface)));
   back_.reset(new std::uint16_t[roundedUp(count)]);
   adviseHugePages(back_.get(), count * sizeof(back_[0]));
