@@ -33,6 +33,7 @@ inline void push(PairSteps& s, int side, std::uint32_t block, std::uint32_t leve
   top.frame = frame;
   top.level = level;
   top.octants = octants;
+  top.late = 0;
   top.coarse = coarse;
 }
 
@@ -56,28 +57,29 @@ inline void fetch(const tree::Tree& tree, const StepNode& n) {
 HWY_BEFORE_NAMESPACE();
 namespace bocst::query::HWY_NAMESPACE {
 
-// Bit o is set unless octant o of frame f (side `own`) is surely apart from the volume in lane l of frame y, by one of
-// eight axes: the faces of both boxes and both slab normals. No edge axes: with slabs they gain nothing. Of `octants`
-// only; order as in StepGroup, by the faces.
-HWY_INLINE unsigned overlapping(const PairFrames& g, int own, const Frame& f, const Frame& y, std::size_t l,
-                                unsigned octants, std::uint32_t* order) {
+// Bit o is set unless octant o of frame f is surely apart from the volume in lane l of frame y, of the other side, by
+// one of eight axes: the faces of both boxes and both slab normals. No edge axes: with slabs they gain nothing. Of
+// `octants` only; order as in StepGroup, by the faces.
+HWY_INLINE unsigned overlapping(const PairFrames& g, const Frame& f, const Frame& y, std::size_t l, unsigned octants,
+                                std::uint32_t* order) {
   const D d;
   const hn::RebindToUnsigned<D> du;
-  const int other = 1 - own;
   const V pad = hn::Set(d, g.pad), slab_pad = hn::Set(d, g.slab_pad);
   unsigned result = 0;
   for (std::size_t i = 0; i < 8; i += hn::Lanes(d)) {
-    V way[2][3];  // from the octants' middles to the volume's, in both frames
-    V least = hn::Set(d, 1e30f);
+    V way[2][3], reach[2][3];  // from the octants' middles to the volume's, along the axes of [0] the octants' side
     BOCST_UNROLL
     for (int s = 0; s < 2; ++s) {
       BOCST_UNROLL
       for (int k = 0; k < 3; ++k) {
-        way[s][k] = hn::Sub(hn::Set(d, y.center[s][k][l]), hn::Load(d, f.center[s][k] + i));
-        const V reach = hn::Add(hn::Load(d, f.half[s][k] + i), hn::Add(hn::Set(d, y.half[s][k][l]), pad));
-        least = hn::Min(least, hn::Sub(reach, hn::Abs(way[s][k])));
+        way[s][k] = hn::Sub(hn::Set(d, y.center[1 - s][k][l]), hn::Load(d, f.center[s][k] + i));
+        const V both = hn::Add(hn::Load(d, f.half[s][k] + i), hn::Set(d, y.half[1 - s][k][l]));
+        reach[s][k] = hn::Sub(both, hn::Abs(way[s][k]));
       }
     }
+    const V least = hn::Add(hn::Min(hn::Min(hn::Min(reach[0][0], reach[0][1]), hn::Min(reach[0][2], reach[1][0])),
+                                    hn::Min(reach[1][1], reach[1][2])),
+                            pad);
     M apart = hn::Lt(least, hn::Zero(d));
     // Slabs: for z in a box with |m.z - offset| <= w, any a gives n.z in a * offset +- (|a| w + |n - a m| over the
     // box).
@@ -86,33 +88,33 @@ HWY_INLINE unsigned overlapping(const PairFrames& g, int own, const Frame& f, co
     V n[3], m[3], along = hn::Zero(d);
     BOCST_UNROLL
     for (int k = 0; k < 3; ++k) {
-      n[k] = hn::Load(d, f.normal[other][k] + i);
-      m[k] = hn::Set(d, y.normal[other][k][l]);
+      n[k] = hn::Load(d, f.normal[1][k] + i);
+      m[k] = hn::Set(d, y.normal[0][k][l]);
       along = hn::MulAdd(n[k], m[k], along);
     }
     const V abs_along = hn::Abs(along);
     V t = hn::MulSub(along, y_center, x_center), r = hn::MulAdd(abs_along, y_half, hn::Add(x_half, slab_pad));
     BOCST_UNROLL
     for (int k = 0; k < 3; ++k) {
-      t = hn::MulAdd(n[k], own == 0 ? way[1][k] : way[0][k], t);
-      r = hn::MulAdd(hn::Set(d, y.half[other][k][l]), hn::Abs(hn::NegMulAdd(along, m[k], n[k])), r);
+      t = hn::MulAdd(n[k], way[1][k], t);
+      r = hn::MulAdd(hn::Set(d, y.half[0][k][l]), hn::Abs(hn::NegMulAdd(along, m[k], n[k])), r);
     }
     apart = hn::Or(apart, hn::Gt(hn::Abs(t), r));
     t = hn::NegMulAdd(along, x_center, y_center);
     r = hn::MulAdd(abs_along, x_half, hn::Add(y_half, slab_pad));
     BOCST_UNROLL
     for (int k = 0; k < 3; ++k) {
-      const V mk = hn::Set(d, y.normal[own][k][l]);
-      t = hn::MulAdd(mk, own == 0 ? way[0][k] : way[1][k], t);
-      r = hn::MulAdd(hn::Load(d, f.half[own][k] + i),
-                     hn::Abs(hn::NegMulAdd(along, hn::Load(d, f.normal[own][k] + i), mk)), r);
+      const V mk = hn::Set(d, y.normal[1][k][l]);
+      t = hn::MulAdd(mk, way[0][k], t);
+      r = hn::MulAdd(hn::Load(d, f.half[0][k] + i), hn::Abs(hn::NegMulAdd(along, hn::Load(d, f.normal[0][k] + i), mk)),
+                     r);
     }
     apart = hn::Or(apart, hn::Gt(hn::Abs(t), r));
     const std::uint8_t wanted[8] = {static_cast<std::uint8_t>(octants >> i)};
     const M left = hn::AndNot(apart, hn::LoadMaskBits(d, wanted));
     const auto depth =
         hn::Or(hn::And(hn::BitCast(du, least), hn::Set(du, ~7u)), hn::Iota(du, static_cast<std::uint32_t>(i)));
-    hn::StoreU(hn::IfThenElseZero(hn::RebindMask(du, left), depth), du, order + i);
+    hn::StoreU(depth, du, order + i);
     std::uint8_t bits[8] = {};
     hn::StoreMaskBits(d, left, bits);
     result |= static_cast<unsigned>(bits[0]) << i;
@@ -150,14 +152,19 @@ std::uint8_t OverlappingOctants(const PairFrames& geometry, int own, const CellO
   decodeCell(geometry, own, cell.cell.level, cell.cell.at, cell.octants, f);
   decodeCell(geometry, 1 - own, other.cell.level, other.cell.at, other.octants, y);
   std::uint32_t order[8];
-  return static_cast<std::uint8_t>(overlapping(geometry, own, f, y, static_cast<std::size_t>(octant), 0xff, order));
+  return static_cast<std::uint8_t>(overlapping(geometry, f, y, static_cast<std::size_t>(octant), 0xff, order));
 }
 
-// The octant that overlaps the most. Without branches: they would be guessed wrong.
-HWY_INLINE std::uint32_t deepest(const std::uint32_t (&order)[8]) {
-  const auto larger = [](std::uint32_t a, std::uint32_t b) { return a > b ? a : b; };
-  return larger(larger(larger(order[0], order[1]), larger(order[2], order[3])),
-                larger(larger(order[4], order[5]), larger(order[6], order[7])));
+// Which of a group's octants overlaps the most.
+HWY_INLINE std::uint32_t deepest(const StepGroup& group, std::uint32_t octants) {
+  const hn::RebindToUnsigned<D> du;
+  auto most = hn::Zero(du);
+  for (std::size_t i = 0; i < 8; i += hn::Lanes(du)) {
+    const std::uint8_t wanted[8] = {static_cast<std::uint8_t>(octants >> i)};
+    const auto depth = hn::LoadU(du, group.order + i);
+    most = hn::Max(most, hn::IfThenElseZero(hn::LoadMaskBits(du, wanted), depth));
+  }
+  return hn::GetLane(hn::MaxOfLanes(du, most)) & 7;
 }
 
 // Takes the next pair off the stack and says how many frames it and what is under it use. What is still implicit is
@@ -165,14 +172,14 @@ HWY_INLINE std::uint32_t deepest(const std::uint32_t (&order)[8]) {
 HWY_INLINE std::uint32_t pop(PairSteps& s, StepNode (&pair)[2]) {
   for (;;) {
     StepGroup& top = s.stack[s.depth - 1];
-    const std::uint32_t depth = deepest(top.order), o = depth & 7, rest = top.octants & ~(1u << o);
+    const std::uint32_t soon = top.octants & ~top.late;
+    const std::uint32_t o = deepest(top, soon != 0 ? soon : top.octants), rest = top.octants & ~(1u << o);
     const tree::NodeRef node = tree::NodeRef::octant(top.block, static_cast<int>(o));
     const tree::Link link = s.tree[top.side]->link(node);
-    if (link.tag() == tree::Link::kImplicit && rest != 0 && depth >= 2 * StepGroup::kLast) {
-      top.order[o] = StepGroup::kLast | o;
+    if (link.tag() == tree::Link::kImplicit && rest != 0 && soon != 0) {
+      top.late |= 1u << o;
       continue;
     }
-    top.order[o] = 0;
     top.octants = rest;
     if (rest == 0) --s.depth;
     StepNode &own = pair[top.side], &other = pair[1 - top.side];
@@ -201,7 +208,7 @@ HWY_INLINE unsigned meeting(const PairFrames& g, int own, const Frame& f, unsign
                             const TriangleBounds& b, F&& store) {
   const D d;
   const hn::RebindToUnsigned<D> du;
-  const V pad = hn::Set(d, g.own_pad[own]);
+  const V pad = hn::Set(d, g.side[own].pad);
   unsigned result = 0;
   for (std::size_t i = 0; i < 8; i += hn::Lanes(d)) {
     const std::uint8_t wanted[8] = {static_cast<std::uint8_t>(mask >> i)};
@@ -209,9 +216,9 @@ HWY_INLINE unsigned meeting(const PairFrames& g, int own, const Frame& f, unsign
     V c[3], h[3], m[3], low[3], high[3];
     BOCST_UNROLL
     for (int k = 0; k < 3; ++k) {
-      c[k] = hn::Load(d, f.center[own][k] + i);
-      h[k] = hn::Load(d, f.half[own][k] + i);
-      m[k] = hn::Load(d, f.normal[own][k] + i);
+      c[k] = hn::Load(d, f.center[0][k] + i);
+      h[k] = hn::Load(d, f.half[0][k] + i);
+      m[k] = hn::Load(d, f.normal[0][k] + i);
       const V reach = hn::Add(h[k], pad);
       low[k] = hn::Sub(c[k], reach);
       high[k] = hn::Add(c[k], reach);
@@ -273,11 +280,8 @@ HWY_NOINLINE void pushThose(PairSteps& s) {
   const int x = s.expanded, y = 1 - x;
   StepGroup& top = s.stack[s.depth];
   const unsigned mask = meeting(s.geometry, x, s.frames[s.frames_used], s.mask, s.triangles, s.leaf[y]->bounds(),
-                                [&top, du](std::size_t i, hn::Vec<hn::RebindToUnsigned<D>> met) HWY_ATTR {
-                                  hn::StoreU(met, du, top.triangles + i);
-                                  const auto none = hn::Eq(met, hn::Zero(du));
-                                  hn::StoreU(hn::IfThenZeroElse(none, hn::LoadU(du, top.order + i)), du, top.order + i);
-                                });
+                                [&top, du](std::size_t i, hn::Vec<hn::RebindToUnsigned<D>> met)
+                                    HWY_ATTR { hn::StoreU(met, du, top.triangles + i); });
   if (mask == 0) return;
   push(s, x, s.pair[x].link.index(), s.pair[x].level + 1, s.frames_used, s.pair[y], mask,
        static_cast<std::uint32_t>(y));
@@ -310,13 +314,14 @@ HWY_INLINE bool expandOther(PairSteps& s, int x, std::uint32_t index, std::uint3
   for (; mask != 0; mask &= mask - 1) {
     const auto o = static_cast<std::uint32_t>(__builtin_ctz(mask));
     const unsigned left =
-        overlapping(s.geometry, y, s.frames[frame + 1], s.frames[frame], o, block.grey, s.stack[s.depth].order);
+        overlapping(s.geometry, s.frames[frame + 1], s.frames[frame], o, block.grey, s.stack[s.depth].order);
     if (left == 0) continue;
     StepNode n;
     n.node = tree::NodeRef::octant(index, static_cast<int>(o));
     n.link = s.tree[x]->link(n.node);
     n.level = level;
     n.lane = 8 * frame + o;
+    fetch(*s.tree[x], n);
     push(s, y, other_index, other.level + 1, frame + 1, n, left);
   }
   return true;
@@ -342,7 +347,7 @@ PairSteps::Event NextEvent(PairSteps& s) {
     const tree::Block& block = s.tree[x]->block(index);
     s.tree[x]->touch(index, s.now);
     decodeBlock(s, x, index, block, frames);
-    const unsigned mask = overlapping(s.geometry, x, s.frames[frames], s.frames[other.lane / 8], other.lane % 8,
+    const unsigned mask = overlapping(s.geometry, s.frames[frames], s.frames[other.lane / 8], other.lane % 8,
                                       block.grey, s.stack[s.depth].order);
     if (mask == 0) continue;
     if (y == 0 ? leaf0 && deeper >= s.larger : leaf1 && deeper < s.not_smaller) {
@@ -387,9 +392,6 @@ void octantsMeeting(const PairFrames& geometry, int own, const CellOctants& cell
 
 void pushOctants(PairSteps& s, unsigned mask) {
   if (mask == 0) return;
-  for (unsigned o = 0; o < 8; ++o) {
-    if ((mask >> o & 1) == 0) s.stack[s.depth].order[o] = 0;
-  }
   const int x = s.expanded;
   push(s, x, s.pair[x].link.index(), s.pair[x].level + 1, s.frames_used, s.pair[1 - x], mask);
 }
@@ -400,8 +402,7 @@ void pushPair(PairSteps& s, tree::NodeRef node_a, tree::NodeRef node_b) {
   other.link = s.tree[1]->link(node_b);
   other.level = static_cast<std::uint32_t>(s.tree[1]->cell(node_b).level);
   const auto o = static_cast<std::uint32_t>(node_a.octant());
-  std::fill_n(s.stack[s.depth].order, 8, 0);
-  s.stack[s.depth].order[o] = StepGroup::kLast | o;
+  std::fill_n(s.stack[s.depth].order, 8, o);
   push(s, 0, node_a.block(), static_cast<std::uint32_t>(s.tree[0]->cell(node_a).level), StepGroup::kNoFrame, other,
        1u << o);
 }

@@ -197,7 +197,7 @@ TEST_P(EveryTarget, NoTriangleIsLostThatMeetsAnOctant) {
     to.translation = Eigen::Vector3d(u(g), u(g), u(g)) * kMiddle;
     to.ready();
     const PairFrames frames(to.scale, to);
-    const auto unit = static_cast<double>(frames.unit[own]);
+    const auto unit = static_cast<double>(frames.side[own].unit);
     // Triangles through a point of an octant.
     const std::size_t count = 1 + g() % CoarseTriangles::kCapacity;
     std::vector<int> octant;
