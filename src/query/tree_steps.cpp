@@ -61,7 +61,7 @@ namespace bocst::query::HWY_NAMESPACE {
 
 // Bit o is set unless octant o of frame f is surely apart from the volume in lane l of frame y, of the other side, by
 // one of eight axes: the faces of both boxes and both slab normals. No edge axes: with slabs they gain nothing. Of
-// `octants` only; order as in StepGroup, by the faces.
+// `octants` only; order as in StepGroup, by the faces, where it is asked for.
 HWY_INLINE unsigned overlapping(const PairFrames& g, const Frame& f, const Frame& y, std::size_t l, unsigned octants,
                                 std::uint32_t* order) {
   const D d;
@@ -114,9 +114,11 @@ HWY_INLINE unsigned overlapping(const PairFrames& g, const Frame& f, const Frame
     apart = hn::Or(apart, hn::Gt(hn::Abs(t), r));
     const std::uint8_t wanted[8] = {static_cast<std::uint8_t>(octants >> i)};
     const M left = hn::AndNot(apart, hn::LoadMaskBits(d, wanted));
-    const auto depth =
-        hn::Or(hn::And(hn::BitCast(du, least), hn::Set(du, ~7u)), hn::Iota(du, static_cast<std::uint32_t>(i)));
-    hn::StoreU(depth, du, order + i);
+    if (order != nullptr) {
+      const auto depth =
+          hn::Or(hn::And(hn::BitCast(du, least), hn::Set(du, ~7u)), hn::Iota(du, static_cast<std::uint32_t>(i)));
+      hn::StoreU(depth, du, order + i);
+    }
     std::uint8_t bits[8] = {};
     hn::StoreMaskBits(d, left, bits);
     result |= static_cast<unsigned>(bits[0]) << i;
@@ -320,8 +322,7 @@ HWY_INLINE bool expandOther(PairSteps& s, int x, const tree::Block& own, std::ui
   decodeBlock(s, y, other_index, block, frame + 1);
   for (; mask != 0; mask &= mask - 1) {
     const auto o = static_cast<std::uint32_t>(__builtin_ctz(mask));
-    const unsigned left =
-        overlapping(s.geometry, s.frames[frame + 1], s.frames[frame], o, block.grey, s.stack[s.depth].order);
+    const unsigned left = overlapping(s.geometry, s.frames[frame + 1], s.frames[frame], o, block.grey, nullptr);
     if (left == 0) continue;
     StepNode n;
     n.node = tree::NodeRef::octant(index, static_cast<int>(o));
@@ -334,9 +335,34 @@ HWY_INLINE bool expandOther(PairSteps& s, int x, const tree::Block& own, std::ui
   return true;
 }
 
+// Puts some octants of a block on the stack, but for the one that is next: true where that is in `next`, at once.
+HWY_INLINE bool pushOthers(PairSteps& s, int side, const tree::Block& block, std::uint32_t index, std::uint32_t level,
+                           std::uint32_t frame, const StepNode& other, unsigned octants, Popped& next) {
+  const std::uint32_t o =
+      s.all_at_once ? static_cast<std::uint32_t>(__builtin_ctz(octants)) : deepest(s.stack[s.depth], octants);
+  const std::uint32_t rest = octants & ~(1u << o);
+  next.side = side;
+  next.own.node = tree::NodeRef::octant(index, static_cast<int>(o));
+  next.own.link = block.child[o].load(std::memory_order_acquire);
+  next.own.level = level;
+  next.own.lane = 8 * frame + o;
+  next.other = other;
+  next.frames = frame + 1;
+  s.coarse = StepGroup::kNone;
+  const bool waits = rest != 0 && next.own.link.tag() == tree::Link::kImplicit;
+  if (rest != 0) push(s, side, &block, index, level, frame, other, waits ? octants : rest);
+  return !waits;
+}
+
 PairSteps::Event NextEvent(PairSteps& s) {
-  while (s.depth > 0) {
-    Popped p = pop(s);
+  Popped p;
+  bool known = false;  // what comes next
+  for (;;) {
+    if (!known) {
+      if (s.depth == 0) break;
+      p = pop(s);
+    }
+    known = false;
     const int side = p.side;
     s.pair[side] = p.own;
     s.pair[1 - side] = p.other;
@@ -376,7 +402,7 @@ PairSteps::Event NextEvent(PairSteps& s) {
       continue;
     }
     if (!s.all_at_once || !expandOther(s, x, block, index, own.level + 1, other, frames, mask)) {
-      push(s, x, &block, index, own.level + 1, frames, other, mask);
+      known = pushOthers(s, x, block, index, own.level + 1, frames, other, mask, p);
     }
   }
   return PairSteps::kDone;
