@@ -36,22 +36,25 @@ using VI = hn::Vec<hn::RebindToSigned<D>>;
 
 // The corners of the cells whose first ones are at `at`: those with i, j; i, j + 1; i + 1, j; i + 1, j + 1. A lane at a
 // time, since processors gather no faster.
-HWY_INLINE void cornersOf(const float* values, VI at, V (&corner)[4]) {
+HWY_INLINE void cornersOf(const Supports& supports, VI at, V (&corner)[4]) {
   const D d;
-#if HWY_TARGET == HWY_SCALAR
-  corner[0] = hn::GatherIndex(d, values, at);
-  corner[1] = hn::GatherIndex(d, values + 1, at);
-  corner[2] = hn::GatherIndex(d, values + Supports::kRow, at);
-  corner[3] = hn::GatherIndex(d, values + Supports::kRow + 1, at);
-#else
   const hn::RebindToSigned<D> di;
+  alignas(64) std::int32_t lanes[8];
+  hn::Store(at, di, lanes);
+#if HWY_TARGET == HWY_SCALAR || HWY_IS_TSAN
+  // One by one, as ThreadSanitizer can follow it, too.
+  constexpr int kCorner[4] = {0, 1, Supports::kRow, Supports::kRow + 1};
+  alignas(64) float values[8];
+  for (int k = 0; k < 4; ++k) {
+    for (std::size_t lane = 0; lane < hn::Lanes(d); ++lane) values[lane] = supports.value(lanes[lane] + kCorner[k]);
+    corner[k] = hn::Load(d, values);
+  }
+#else
   const hn::Full128<float> d4;
   const hn::Half<hn::Full128<float>> d2;
   const hn::Repartition<std::uint64_t, D> dw;
-  alignas(64) std::int32_t lanes[8];
-  hn::Store(at, di, lanes);
   const auto fourOf = [&](std::size_t lane) HWY_ATTR {
-    const float* first = values + lanes[lane];
+    const float* first = supports.values() + lanes[lane];
     return hn::Combine(d4, hn::LoadU(d2, first + Supports::kRow), hn::LoadU(d2, first));
   };
   V row[4];
@@ -108,7 +111,7 @@ HWY_INLINE Support supportOf(const Supports& supports, const V (&u)[3]) {
   s.at[1] = hn::Add(s.at[0], aside);
   s.at[2] = hn::Add(s.at[0], hn::Set(di, Supports::kRow + 1));
   V corner[4];
-  cornersOf(supports.values(), s.at[0], corner);
+  cornersOf(supports, s.at[0], corner);
   const V inner = hn::Mul(hn::Sub(one, high), corner[0]), outer = hn::Mul(low, corner[3]);
   const V middle = hn::Mul(hn::Sub(high, low), hn::IfThenElse(hn::Ge(rest_i, rest_j), corner[2], corner[1]));
   s.value = hn::Mul(size, hn::Add(hn::Add(inner, middle), outer));

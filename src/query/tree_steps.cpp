@@ -21,9 +21,11 @@ inline bool isLeaf(const StepNode& n) {
 }
 
 // The order is there already: overlapping() writes it to where the group will be.
-inline void push(PairSteps& s, int side, std::uint32_t block, std::uint32_t level, std::uint32_t frame,
-                 const StepNode& other, unsigned octants, std::uint32_t coarse = StepGroup::kNone) {
+inline void push(PairSteps& s, int side, const tree::Block* at, std::uint32_t block, std::uint32_t level,
+                 std::uint32_t frame, const StepNode& other, unsigned octants,
+                 std::uint32_t coarse = StepGroup::kNone) {
   StepGroup& top = s.stack[s.depth++];
+  top.at = at;
   top.other.node = other.node;
   top.other.link = other.link;
   top.other.level = other.level;
@@ -59,7 +61,7 @@ namespace bocst::query::HWY_NAMESPACE {
 
 // Bit o is set unless octant o of frame f is surely apart from the volume in lane l of frame y, of the other side, by
 // one of eight axes: the faces of both boxes and both slab normals. No edge axes: with slabs they gain nothing. Of
-// `octants` only; order as in StepGroup, by the faces.
+// `octants` only; order as in StepGroup, by the faces, where it is asked for.
 HWY_INLINE unsigned overlapping(const PairFrames& g, const Frame& f, const Frame& y, std::size_t l, unsigned octants,
                                 std::uint32_t* order) {
   const D d;
@@ -112,9 +114,11 @@ HWY_INLINE unsigned overlapping(const PairFrames& g, const Frame& f, const Frame
     apart = hn::Or(apart, hn::Gt(hn::Abs(t), r));
     const std::uint8_t wanted[8] = {static_cast<std::uint8_t>(octants >> i)};
     const M left = hn::AndNot(apart, hn::LoadMaskBits(d, wanted));
-    const auto depth =
-        hn::Or(hn::And(hn::BitCast(du, least), hn::Set(du, ~7u)), hn::Iota(du, static_cast<std::uint32_t>(i)));
-    hn::StoreU(depth, du, order + i);
+    if (order != nullptr) {
+      const auto depth =
+          hn::Or(hn::And(hn::BitCast(du, least), hn::Set(du, ~7u)), hn::Iota(du, static_cast<std::uint32_t>(i)));
+      hn::StoreU(depth, du, order + i);
+    }
     std::uint8_t bits[8] = {};
     hn::StoreMaskBits(d, left, bits);
     result |= static_cast<unsigned>(bits[0]) << i;
@@ -132,7 +136,6 @@ HWY_INLINE void decodeBlock(PairSteps& s, int own, std::uint32_t index, const tr
 
 // Where the volume of a pair's node on one side is; for pairs that come without frames.
 HWY_INLINE void lookUp(PairSteps& s, StepNode& n, int side, std::uint32_t& frames) {
-  if (n.lane != StepNode::kNoLane) return;
   const tree::Tree& tree = *s.tree[side];
   if (n.node.isRoot()) {
     decodeRoot(s.geometry, side, tree.rootBounds(), s.frames[frames]);
@@ -167,37 +170,43 @@ HWY_INLINE std::uint32_t deepest(const StepGroup& group, std::uint32_t octants) 
   return hn::GetLane(hn::MaxOfLanes(du, most)) & 7;
 }
 
-// Takes the next pair off the stack and says how many frames it and what is under it use. What is still implicit is
-// left for last: a hit among resident nodes makes its growth unnecessary.
-HWY_INLINE std::uint32_t pop(PairSteps& s, StepNode (&pair)[2]) {
+// A pair off the stack: an octant of a group, the other node, and how many frames they and what is under them use.
+struct Popped {
+  StepNode own, other;
+  int side;
+  std::uint32_t frames;
+};
+
+// Takes the next pair off the stack: the deepest, or, where all are wanted, the first, which is known sooner. A step is
+// mostly a chain of what waits for each other, from a link to the next one, so what is handed on stays in registers.
+// What is still implicit is left for last: a hit among resident nodes makes its growth unnecessary.
+HWY_INLINE Popped pop(PairSteps& s) {
   for (;;) {
     StepGroup& top = s.stack[s.depth - 1];
-    const std::uint32_t soon = top.octants & ~top.late;
-    const std::uint32_t o = deepest(top, soon != 0 ? soon : top.octants), rest = top.octants & ~(1u << o);
-    const tree::NodeRef node = tree::NodeRef::octant(top.block, static_cast<int>(o));
-    const tree::Link link = s.tree[top.side]->link(node);
-    if (link.tag() == tree::Link::kImplicit && rest != 0 && soon != 0) {
+    const std::uint32_t soon = top.octants & ~top.late, which = soon != 0 ? soon : top.octants;
+    const std::uint32_t o = s.all_at_once ? static_cast<std::uint32_t>(__builtin_ctz(which)) : deepest(top, which);
+    const std::uint32_t rest = top.octants & ~(1u << o);
+    Popped p;
+    p.side = static_cast<int>(top.side);
+    p.own.node = tree::NodeRef::octant(top.block, static_cast<int>(o));
+    p.own.link =
+        top.at != nullptr ? top.at->child[o].load(std::memory_order_acquire) : s.tree[p.side]->link(p.own.node);
+    if (p.own.link.tag() == tree::Link::kImplicit && rest != 0 && soon != 0) {
       top.late |= 1u << o;
       continue;
     }
     top.octants = rest;
     if (rest == 0) --s.depth;
-    StepNode &own = pair[top.side], &other = pair[1 - top.side];
-    own.node = node;
-    own.link = link;
-    own.level = top.level;
-    other.node = top.other.node;
-    other.link = top.other.link;
-    other.level = top.other.level;
-    other.lane = top.other.lane;
+    p.own.level = top.level;
+    p.own.lane = top.frame == StepGroup::kNoFrame ? StepNode::kNoLane : 8 * top.frame + o;
+    p.other.node = top.other.node;
+    p.other.link = top.other.link;
+    p.other.level = top.other.level;
+    p.other.lane = top.other.lane;
+    p.frames = top.frame + 1;  // 0 without a frame
     s.coarse = top.coarse;
     s.triangles = top.triangles[o];
-    if (top.frame == StepGroup::kNoFrame) {
-      own.lane = StepNode::kNoLane;
-      return 0;
-    }
-    own.lane = 8 * top.frame + o;
-    return top.frame + 1;
+    return p;
   }
 }
 
@@ -283,7 +292,8 @@ HWY_NOINLINE void pushThose(PairSteps& s) {
                                 [&top, du](std::size_t i, hn::Vec<hn::RebindToUnsigned<D>> met)
                                     HWY_ATTR { hn::StoreU(met, du, top.triangles + i); });
   if (mask == 0) return;
-  push(s, x, s.pair[x].link.index(), s.pair[x].level + 1, s.frames_used, s.pair[y], mask,
+  const std::uint32_t index = s.pair[x].link.index();
+  push(s, x, &s.tree[x]->block(index), index, s.pair[x].level + 1, s.frames_used, s.pair[y], mask,
        static_cast<std::uint32_t>(y));
 }
 
@@ -300,10 +310,9 @@ void OctantsMeeting(const PairFrames& geometry, int own, const CellOctants& cell
 
 // Expands the other node of the pair for all octants in `mask` of block `index`, in frame `frame`; false where it is
 // not the next to be expanded.
-HWY_INLINE bool expandOther(PairSteps& s, int x, std::uint32_t index, std::uint32_t frame, unsigned mask) {
+HWY_INLINE bool expandOther(PairSteps& s, int x, const tree::Block& own, std::uint32_t index, std::uint32_t level,
+                            const StepNode& other, std::uint32_t frame, unsigned mask) {
   const int y = 1 - x;
-  const std::uint32_t level = s.pair[x].level + 1;
-  const StepNode& other = s.pair[y];
   if (other.link.tag() != tree::Link::kBlock) return false;
   const int deeper = static_cast<int>(other.level) - static_cast<int>(level);
   if (x == 0 ? deeper >= s.not_smaller : -deeper < s.not_smaller) return false;
@@ -313,36 +322,70 @@ HWY_INLINE bool expandOther(PairSteps& s, int x, std::uint32_t index, std::uint3
   decodeBlock(s, y, other_index, block, frame + 1);
   for (; mask != 0; mask &= mask - 1) {
     const auto o = static_cast<std::uint32_t>(__builtin_ctz(mask));
-    const unsigned left =
-        overlapping(s.geometry, s.frames[frame + 1], s.frames[frame], o, block.grey, s.stack[s.depth].order);
+    const unsigned left = overlapping(s.geometry, s.frames[frame + 1], s.frames[frame], o, block.grey, nullptr);
     if (left == 0) continue;
     StepNode n;
     n.node = tree::NodeRef::octant(index, static_cast<int>(o));
-    n.link = s.tree[x]->link(n.node);
+    n.link = own.child[o].load(std::memory_order_acquire);
     n.level = level;
     n.lane = 8 * frame + o;
     fetch(*s.tree[x], n);
-    push(s, y, other_index, other.level + 1, frame + 1, n, left);
+    push(s, y, &block, other_index, other.level + 1, frame + 1, n, left);
   }
   return true;
 }
 
+// Puts some octants of a block on the stack, but for the one that is next: true where that is in `next`, at once.
+HWY_INLINE bool pushOthers(PairSteps& s, int side, const tree::Block& block, std::uint32_t index, std::uint32_t level,
+                           std::uint32_t frame, const StepNode& other, unsigned octants, Popped& next) {
+  const std::uint32_t o =
+      s.all_at_once ? static_cast<std::uint32_t>(__builtin_ctz(octants)) : deepest(s.stack[s.depth], octants);
+  const std::uint32_t rest = octants & ~(1u << o);
+  next.side = side;
+  next.own.node = tree::NodeRef::octant(index, static_cast<int>(o));
+  next.own.link = block.child[o].load(std::memory_order_acquire);
+  next.own.level = level;
+  next.own.lane = 8 * frame + o;
+  next.other = other;
+  next.frames = frame + 1;
+  s.coarse = StepGroup::kNone;
+  const bool waits = rest != 0 && next.own.link.tag() == tree::Link::kImplicit;
+  if (rest != 0) push(s, side, &block, index, level, frame, other, waits ? octants : rest);
+  return !waits;
+}
+
 PairSteps::Event NextEvent(PairSteps& s) {
-  while (s.depth > 0) {
-    std::uint32_t frames = pop(s, s.pair);
-    const bool leaf0 = isLeaf(s.pair[0]), leaf1 = isLeaf(s.pair[1]);
-    if (leaf0 && leaf1) {
-      fetch(*s.tree[0], s.pair[0]);
-      fetch(*s.tree[1], s.pair[1]);
+  Popped p;
+  bool known = false;  // what comes next
+  for (;;) {
+    if (!known) {
+      if (s.depth == 0) break;
+      p = pop(s);
+    }
+    known = false;
+    const int side = p.side;
+    s.pair[side] = p.own;
+    s.pair[1 - side] = p.other;
+    const bool own_leaf = isLeaf(p.own), other_leaf = isLeaf(p.other);
+    if (own_leaf && other_leaf) {
+      fetch(*s.tree[side], p.own);
+      fetch(*s.tree[1 - side], p.other);
       return PairSteps::kLeaves;
     }
     // The larger of two nodes is expanded, unless it is a leaf.
-    const int deeper = static_cast<int>(s.pair[1].level) - static_cast<int>(s.pair[0].level);
+    const bool leaf0 = side == 0 ? own_leaf : other_leaf, leaf1 = side == 0 ? other_leaf : own_leaf;
+    const int below = static_cast<int>(p.own.level) - static_cast<int>(p.other.level);
+    const int deeper = side == 0 ? -below : below;
     const int x = leaf1 || (!leaf0 && deeper >= s.not_smaller) ? 0 : 1, y = 1 - x;
-    StepNode &own = s.pair[x], &other = s.pair[y];
+    const StepNode own = x == side ? p.own : p.other;
+    StepNode other = x == side ? p.other : p.own;
     if (own.link.tag() != tree::Link::kBlock) return PairSteps::kAside;
     if (other.link.tag() == tree::Link::kBlock) fetch(*s.tree[y], other);
-    lookUp(s, other, y, frames);
+    std::uint32_t frames = p.frames;
+    if (other.lane == StepNode::kNoLane) {
+      lookUp(s, other, y, frames);
+      s.pair[y].lane = other.lane;
+    }
     const std::uint32_t index = own.link.index();
     const tree::Block& block = s.tree[x]->block(index);
     s.tree[x]->touch(index, s.now);
@@ -358,8 +401,8 @@ PairSteps::Event NextEvent(PairSteps& s) {
       pushThose(s);
       continue;
     }
-    if (!s.all_at_once || !expandOther(s, x, index, frames, mask)) {
-      push(s, x, index, own.level + 1, frames, other, mask);
+    if (!s.all_at_once || !expandOther(s, x, block, index, own.level + 1, other, frames, mask)) {
+      known = pushOthers(s, x, block, index, own.level + 1, frames, other, mask, p);
     }
   }
   return PairSteps::kDone;
@@ -393,7 +436,8 @@ void octantsMeeting(const PairFrames& geometry, int own, const CellOctants& cell
 void pushOctants(PairSteps& s, unsigned mask) {
   if (mask == 0) return;
   const int x = s.expanded;
-  push(s, x, s.pair[x].link.index(), s.pair[x].level + 1, s.frames_used, s.pair[1 - x], mask);
+  const std::uint32_t index = s.pair[x].link.index();
+  push(s, x, &s.tree[x]->block(index), index, s.pair[x].level + 1, s.frames_used, s.pair[1 - x], mask);
 }
 
 void pushPair(PairSteps& s, tree::NodeRef node_a, tree::NodeRef node_b) {
@@ -403,8 +447,8 @@ void pushPair(PairSteps& s, tree::NodeRef node_a, tree::NodeRef node_b) {
   other.level = static_cast<std::uint32_t>(s.tree[1]->cell(node_b).level);
   const auto o = static_cast<std::uint32_t>(node_a.octant());
   std::fill_n(s.stack[s.depth].order, 8, o);
-  push(s, 0, node_a.block(), static_cast<std::uint32_t>(s.tree[0]->cell(node_a).level), StepGroup::kNoFrame, other,
-       1u << o);
+  push(s, 0, node_a.isRoot() ? nullptr : &s.tree[0]->block(node_a.block()), node_a.block(),
+       static_cast<std::uint32_t>(s.tree[0]->cell(node_a).level), StepGroup::kNoFrame, other, 1u << o);
 }
 
 }  // namespace bocst::query

@@ -27,10 +27,11 @@ struct StepGroup {
   static constexpr std::uint32_t kNoFrame = 0xffffffff;
 
   StepNode other;
-  std::uint32_t side;   ///< That of the block.
-  std::uint32_t block;  ///< As NodeRef names it, so the root is octant 7 of a block that there is not.
-  std::uint32_t frame;  ///< Where the block's octants are, if they are; those below it are in use, too.
-  std::uint32_t level;  ///< Of the octants.
+  const tree::Block* at;  ///< The block, or null where there is none.
+  std::uint32_t side;     ///< That of the block.
+  std::uint32_t block;    ///< As NodeRef names it, so the root is octant 7 of a block that there is not.
+  std::uint32_t frame;    ///< Where the block's octants are, if they are; those below it are in use, too.
+  std::uint32_t level;    ///< Of the octants.
   std::uint32_t octants;
   std::uint32_t late;  ///< Those of them that wait until the others are gone.
   /// For each of them: how far it overlaps the other node, as the bits of a float whose lowest three are the octant. As
