@@ -52,23 +52,23 @@ void OctantGapsOf(const PairFrames& g, int own, const Frame& f, const Frame& y, 
   const D d;
   const int other = 1 - own;
   const V zero = hn::Zero(d), one = hn::Set(d, 1.0f), tiny = hn::Set(d, 1e-12f);
-  const Vec3 y_half = broadcast(y.half[other][0][l], y.half[other][1][l], y.half[other][2][l]);
-  const Vec3 y_normal = broadcast(y.normal[other][0][l], y.normal[other][1][l], y.normal[other][2][l]);
+  const Vec3 y_half = broadcast(y.half[0][0][l], y.half[0][1][l], y.half[0][2][l]);
+  const Vec3 y_normal = broadcast(y.normal[0][0][l], y.normal[0][1][l], y.normal[0][2][l]);
   const V y_slab_center = hn::Set(d, y.slab_center[l]), y_slab_half = hn::Set(d, y.slab_half[l]);
   const Vec3 along_own = broadcast(along.in[own][0], along.in[own][1], along.in[own][2]);
   const Vec3 along_other = broadcast(along.in[other][0], along.in[other][1], along.in[other][2]);
   const Reach y_along = reachAlong(along_other, y_half, y_normal, y_slab_center, y_slab_half);
   const V y_radius = hn::Sqrt(dot(y_half, y_half));
   for (std::size_t i = 0; i < 8; i += hn::Lanes(d)) {
-    Vec3 way[2];  // from the octants' middles to the node's, in both frames
+    Vec3 way[2];  // from the octants' middles to the node's, along the axes of [0] the octants' side
     V squares[2];
     BOCST_UNROLL
     for (int s = 0; s < 2; ++s) {
       V w[3], gap[3];
       BOCST_UNROLL
       for (int k = 0; k < 3; ++k) {
-        w[k] = hn::Sub(hn::Set(d, y.center[s][k][l]), hn::Load(d, f.center[s][k] + i));
-        const V reach = hn::Add(hn::Load(d, f.half[s][k] + i), hn::Set(d, y.half[s][k][l]));
+        w[k] = hn::Sub(hn::Set(d, y.center[1 - s][k][l]), hn::Load(d, f.center[s][k] + i));
+        const V reach = hn::Add(hn::Load(d, f.half[s][k] + i), hn::Set(d, y.half[1 - s][k][l]));
         gap[k] = hn::Max(hn::Sub(hn::Abs(w[k]), reach), zero);
       }
       way[s] = {w[0], w[1], w[2]};
@@ -77,8 +77,8 @@ void OctantGapsOf(const PairFrames& g, int own, const Frame& f, const Frame& y, 
     }
     V best = hn::Sqrt(hn::Max(squares[0], squares[1]));
 
-    const Vec3& w = way[own];
-    const Vec3 half = load(f.half[own], i), normal = load(f.normal[own], i);
+    const Vec3& w = way[0];
+    const Vec3 half = load(f.half[0], i), normal = load(f.normal[0], i);
     const V slab_center = hn::Load(d, f.slab_center + i), slab_half = hn::Load(d, f.slab_half + i);
     const auto reach = [&](const Vec3& direction) {
       return reachAlong(direction, half, normal, slab_center, slab_half);
@@ -86,14 +86,14 @@ void OctantGapsOf(const PairFrames& g, int own, const Frame& f, const Frame& y, 
     best = hn::Max(best, gapOf(dot(along_own, w), reach(along_own), y_along));
 
     const V length = hn::Sqrt(dot(w, w)), inverse = hn::Div(one, hn::Max(length, tiny));
-    const Vec3 line = scaled(w, inverse), line_other = turned(g.to_other[own], line);
+    const Vec3 line = scaled(w, inverse), line_other = turned(g.side[own].to_other, line);
     const Reach y_line = reachAlong(line_other, y_half, y_normal, y_slab_center, y_slab_half);
     best = hn::Max(best, gapOf(dot(line, w), reach(line), y_line));
 
     // Along the normals, which may be shorter than one by what their bytes round; no normal gives no gap.
     const V shortest = hn::Set(d, 0.5f);
     {
-      const Vec3 n = load(f.normal[other], i);
+      const Vec3 n = load(f.normal[1], i);
       const Reach y_reach = reachAlong(n, y_half, y_normal, y_slab_center, y_slab_half);
       const Reach own_reach{hn::Sub(slab_center, slab_half), hn::Add(slab_center, slab_half)};
       const V norm = hn::Max(hn::Sqrt(dot(normal, normal)), shortest);
@@ -101,7 +101,7 @@ void OctantGapsOf(const PairFrames& g, int own, const Frame& f, const Frame& y, 
       best = hn::IfThenElse(hn::Gt(dot(normal, normal), zero), hn::Max(best, gap), best);
     }
     {
-      const Vec3 m = broadcast(y.normal[own][0][l], y.normal[own][1][l], y.normal[own][2][l]);
+      const Vec3 m = broadcast(y.normal[1][0][l], y.normal[1][1][l], y.normal[1][2][l]);
       const Reach y_reach{hn::Sub(y_slab_center, y_slab_half), hn::Add(y_slab_center, y_slab_half)};
       const V norm = hn::Max(hn::Sqrt(dot(y_normal, y_normal)), shortest);
       const V gap = hn::Div(gapOf(dot(m, w), reach(m), y_reach), norm);

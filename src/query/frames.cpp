@@ -20,18 +20,18 @@ PairFrames::PairFrames(double scale_of_1, const Placement& one_in_zero) {
   const Eigen::Vector3d back = -(r.transpose() * t);
   for (int j = 0; j < 3; ++j) {
     for (int k = 0; k < 3; ++k) {
-      to_other[0][j][k] = to_other[1][k][j] = static_cast<float>(r(k, j));
-      abs_to_other[0][j][k] = abs_to_other[1][k][j] = static_cast<float>(std::abs(r(k, j)));
+      side[0].to_other[j][k] = side[1].to_other[k][j] = static_cast<float>(r(k, j));
+      side[0].abs_to_other[j][k] = side[1].abs_to_other[k][j] = static_cast<float>(std::abs(r(k, j)));
     }
-    shift[0][j] = static_cast<float>(back[j]);
-    shift[1][j] = static_cast<float>(t[j]);
+    side[0].shift[j] = static_cast<float>(back[j]);
+    side[1].shift[j] = static_cast<float>(t[j]);
   }
-  unit[0] = 1;
-  unit[1] = static_cast<float>(scale_of_1);
+  side[0].unit = 1;
+  side[1].unit = static_cast<float>(scale_of_1);
   const double size = t.norm() + std::sqrt(3.0) * (q0 + q1), defect = 4 * size * one_in_zero.defect;
   pad = static_cast<float>((48 * 0x1p-24 * size + defect + one_in_zero.slack) * 1.0001);
-  own_pad[0] = static_cast<float>((128 * 0x1p-24 * q0 + defect + one_in_zero.slack) * 1.0001);
-  own_pad[1] = static_cast<float>((128 * 0x1p-24 * q1 + defect + one_in_zero.slack) * 1.0001);
+  side[0].pad = static_cast<float>((128 * 0x1p-24 * q0 + defect + one_in_zero.slack) * 1.0001);
+  side[1].pad = static_cast<float>((128 * 0x1p-24 * q1 + defect + one_in_zero.slack) * 1.0001);
   slab_pad = static_cast<float>((160 * 0x1p-24 * size + 2 * defect + 1.02 * one_in_zero.slack) * 1.0001);
 }
 

@@ -8,11 +8,12 @@
 
 namespace bocst::query {
 
-/// The volumes of eight octants as both sides of a pair see them: along the axes of side 0 and along those of side 1,
-/// in lattice units of side 0 about the middle of each side's root. Structure of arrays: lane o is octant o.
+/// The volumes of eight octants as both sides of a pair see them: [0] along the axes of their own side and [1] along
+/// those of the other, in lattice units of side 0 about the middle of each side's root. Structure of arrays: lane o is
+/// octant o.
 struct alignas(64) Frame {
   float center[2][3][8];  ///< Middle of the box.
-  float half[2][3][8];    ///< Half extents of the box (its own axes) or of what holds it (the other side's).
+  float half[2][3][8];    ///< Half extents of the box [0] or of what holds it [1].
   float normal[2][3][8];  ///< Of the slab, about unit length; zero: no slab.
   float slab_center[8];   ///< Middle of the slab along normal, from center.
   float slab_half[8];
@@ -38,12 +39,15 @@ struct PairFrames {
   /// Are pads small beside both sides? What is far away is no pair for collisions; for distances it is one.
   static bool isFine(const Placement& one_in_zero);
 
-  float unit[2];            ///< Lattice units of each side, in those of side 0.
-  float to_other[2][3][3];  ///< [own]: row j gives coordinate j in the other frame ...
-  float abs_to_other[2][3][3];
-  float shift[2][3];  ///< ... after this.
+  struct Side {
+    float unit;            ///< A lattice unit, in those of side 0.
+    float shift[3];        ///< Coordinate j in the other frame is this ...
+    float to_other[3][3];  ///< ... and row j by the own coordinates.
+    float abs_to_other[3][3];
+    float pad;  ///< For what is in double beside octants in their own frame: 128 u Q, defect and slack.
+  };
+  Side side[2];
   float pad, slab_pad;
-  float own_pad[2];  ///< For what is in double beside octants in their own frame: 128 u Q, defect and slack.
 };
 
 }  // namespace bocst::query

@@ -101,15 +101,13 @@ class LeafPacks {
     float error = 0;  ///< Corners may be so far from where they are, beside the rounding of floats.
     LeafVolume volume;
     TrianglePack pack;
-    const std::uint32_t* listed = nullptr;  ///< The triangles' numbers where the tree keeps them, else in `own`.
+    tree::TriangleIds listed;  ///< The triangles' numbers where the tree keeps them, else in `own`.
     std::uint32_t own[TrianglePack::kCapacity];
 
     void prefetchIds() const {
-      if (listed == nullptr) return;
-      __builtin_prefetch(listed);
-      __builtin_prefetch(listed + TrianglePack::kCapacity / 2);
+      if (listed.areKnown()) listed.prefetch();
     }
-    std::uint32_t id(std::size_t i) const { return listed != nullptr ? listed[i] : own[i]; }
+    std::uint32_t id(std::size_t i) const { return listed.areKnown() ? listed[i] : own[i]; }
   };
 
   /// To be called before the first use in a walk.
@@ -172,7 +170,7 @@ class LeafPacks {
     corners_.place(packPlacement(side, Placement(), Eigen::Vector3d(c[0], c[1], c[2]), 1), leaf.pack);
     leaf.all = side.triangleCount(leaf.node);
     leaf.error = 0;
-    leaf.listed = nullptr;
+    leaf.listed = {};
     for (std::size_t i = 0; i < leaf.pack.count; ++i) leaf.own[i] = corners_.id(i);
   }
 

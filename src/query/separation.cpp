@@ -8,11 +8,8 @@
 
 #include <algorithm>
 #include <cmath>
-#include <limits>
-#include <vector>
 
 #include "query/octants-inl.h"
-#include "query/reach.h"
 
 #ifndef BOCST_SEPARATION_ONCE
 #define BOCST_SEPARATION_ONCE
@@ -21,26 +18,12 @@ namespace {
 
 using tree::Supports;
 
-/// Where a direction lies among the kept ones: between three of them, with weights that sum up to its largest entry.
-struct alignas(64) Places {
-  std::int32_t at[3][8];
-  float weight[3][8];
-};
-
 // Looks narrow down: most that are apart are found so by the first, all but few by the fourth. Hulls of what touches
 // overlap by more than kHopeless of the smaller side in every direction nearly always, so most hits cost one look or
 // none; a small body on the outside of a large one may cost all of them.
 constexpr int kLooks = 6;
-// What a miss pays for later ones, on each side: so much as to look at some thousands of triangles. To grow a node by
-// what the root grid knows is as much as a thousand.
-constexpr std::size_t kEffort = 1 << 13, kGrowthEffort = 1 << 10;
-constexpr float kFirstRadius = 0.45f, kHopeless = 0.15f, kHopelessLater = 0.6f;
+constexpr float kFirstRadius = 0.45f, kHopeless = 0.12f, kHopelessLater = 0.5f;
 constexpr float kShallow = 0.3f;
-
-inline float interpolated(const Supports& s, const Places& p, std::size_t lane) {
-  return p.weight[0][lane] * s.value(p.at[0][lane]) + p.weight[1][lane] * s.value(p.at[1][lane]) +
-         p.weight[2][lane] * s.value(p.at[2][lane]);
-}
 
 }  // namespace
 }  // namespace bocst::query
@@ -49,7 +32,59 @@ inline float interpolated(const Supports& s, const Places& p, std::size_t lane) 
 HWY_BEFORE_NAMESPACE();
 namespace bocst::query::HWY_NAMESPACE {
 
-HWY_INLINE void locate(const V (&u)[3], std::size_t lane, Places& p) {
+using VI = hn::Vec<hn::RebindToSigned<D>>;
+
+// The corners of the cells whose first ones are at `at`: those with i, j; i, j + 1; i + 1, j; i + 1, j + 1. A lane at a
+// time, since processors gather no faster.
+HWY_INLINE void cornersOf(const Supports& supports, VI at, V (&corner)[4]) {
+  const D d;
+  const hn::RebindToSigned<D> di;
+  alignas(64) std::int32_t lanes[8];
+  hn::Store(at, di, lanes);
+#if HWY_TARGET == HWY_SCALAR || HWY_IS_TSAN
+  // One by one, as ThreadSanitizer can follow it, too.
+  constexpr int kCorner[4] = {0, 1, Supports::kRow, Supports::kRow + 1};
+  alignas(64) float values[8];
+  for (int k = 0; k < 4; ++k) {
+    for (std::size_t lane = 0; lane < hn::Lanes(d); ++lane) values[lane] = supports.value(lanes[lane] + kCorner[k]);
+    corner[k] = hn::Load(d, values);
+  }
+#else
+  const hn::Full128<float> d4;
+  const hn::Half<hn::Full128<float>> d2;
+  const hn::Repartition<std::uint64_t, D> dw;
+  const auto fourOf = [&](std::size_t lane) HWY_ATTR {
+    const float* first = supports.values() + lanes[lane];
+    return hn::Combine(d4, hn::LoadU(d2, first + Supports::kRow), hn::LoadU(d2, first));
+  };
+  V row[4];
+  BOCST_UNROLL
+  for (std::size_t k = 0; k < 4; ++k) {
+#if HWY_MAX_BYTES >= 32
+    row[k] = hn::Combine(d, fourOf(k + 4), fourOf(k));
+#else
+    row[k] = fourOf(k);
+#endif
+  }
+  const auto even = hn::BitCast(dw, hn::InterleaveLower(d, row[0], row[1]));
+  const auto even2 = hn::BitCast(dw, hn::InterleaveLower(d, row[2], row[3]));
+  const auto odd = hn::BitCast(dw, hn::InterleaveUpper(d, row[0], row[1]));
+  const auto odd2 = hn::BitCast(dw, hn::InterleaveUpper(d, row[2], row[3]));
+  corner[0] = hn::BitCast(d, hn::InterleaveLower(dw, even, even2));
+  corner[1] = hn::BitCast(d, hn::InterleaveUpper(dw, even, even2));
+  corner[2] = hn::BitCast(d, hn::InterleaveLower(dw, odd, odd2));
+  corner[3] = hn::BitCast(d, hn::InterleaveUpper(dw, odd, odd2));
+#endif
+}
+
+/// The support of a surface in some directions: where they lie among the kept ones, between three of them, and what is
+/// interpolated.
+struct Support {
+  VI at[3];
+  V value;
+};
+
+HWY_INLINE Support supportOf(const Supports& supports, const V (&u)[3]) {
   const D d;
   const hn::RebindToSigned<D> di;
   const V zero = hn::Zero(d), one = hn::Set(d, 1), half = hn::Set(d, Supports::kCells / 2.0f);
@@ -70,14 +105,17 @@ HWY_INLINE void locate(const V (&u)[3], std::size_t lane, Places& p) {
   const V high = hn::Max(rest_i, rest_j), low = hn::Min(rest_i, rest_j);
   const V face = hn::Add(choose(zero, hn::Set(d, 2), hn::Set(d, 4)), hn::IfThenElseZero(hn::Lt(major, zero), one));
   const V row = hn::Set(d, Supports::kRow);
-  const auto at = hn::ConvertTo(di, hn::MulAdd(hn::MulAdd(face, row, i), row, j));
   const auto aside = hn::ConvertTo(di, hn::IfThenElse(hn::Ge(rest_i, rest_j), row, one));
-  hn::Store(at, di, p.at[0] + lane);
-  hn::Store(hn::Add(at, aside), di, p.at[1] + lane);
-  hn::Store(hn::Add(at, hn::Set(di, Supports::kRow + 1)), di, p.at[2] + lane);
-  hn::Store(hn::Mul(size, hn::Sub(one, high)), d, p.weight[0] + lane);
-  hn::Store(hn::Mul(size, hn::Sub(high, low)), d, p.weight[1] + lane);
-  hn::Store(hn::Mul(size, low), d, p.weight[2] + lane);
+  Support s;
+  s.at[0] = hn::ConvertTo(di, hn::MulAdd(hn::MulAdd(face, row, i), row, j));
+  s.at[1] = hn::Add(s.at[0], aside);
+  s.at[2] = hn::Add(s.at[0], hn::Set(di, Supports::kRow + 1));
+  V corner[4];
+  cornersOf(supports, s.at[0], corner);
+  const V inner = hn::Mul(hn::Sub(one, high), corner[0]), outer = hn::Mul(low, corner[3]);
+  const V middle = hn::Mul(hn::Sub(high, low), hn::IfThenElse(hn::Ge(rest_i, rest_j), corner[2], corner[1]));
+  s.value = hn::Mul(size, hn::Add(hn::Add(inner, middle), outer));
+  return s;
 }
 
 /// Where the pair's lattices lie to each other, in float; t is the way between the middles of the roots.
@@ -87,51 +125,72 @@ struct Between {
   float scale, slack, defect;
 };
 
-// f of EightSeparations, and the largest of it; places are those of the directions in both sides' frames.
-HWY_INLINE float values(const Supports& a, const Supports& b, const Between& g, const float (*u)[8], Places& in_a,
-                        Places& in_b, float* value) {
+// f of EightSeparations, the largest of it, and between which kept directions it looked. direction(lane, v) gives the
+// directions.
+template <typename F>
+HWY_INLINE float values(const Supports& a, const Supports& b, const Between& g, F&& direction, NearDirections& near,
+                        float* value) {
   const D d;
-  alignas(64) float along[8];
+  const hn::RebindToSigned<D> di;
+  V most = hn::Set(d, -1e30f);
   for (std::size_t lane = 0; lane < 8; lane += hn::Lanes(d)) {
-    V v[3], w[3], sum = hn::Zero(d);
+    V v[3], w[3], along = hn::Zero(d);
+    direction(lane, v);
     BOCST_UNROLL
-    for (int k = 0; k < 3; ++k) {
-      v[k] = hn::Load(d, u[k] + lane);
-      sum = hn::MulAdd(hn::Set(d, g.t[k]), v[k], sum);
-    }
+    for (int k = 0; k < 3; ++k) along = hn::MulAdd(hn::Set(d, g.t[k]), v[k], along);
     BOCST_UNROLL
     for (int j = 0; j < 3; ++j) {
-      w[j] = hn::Mul(hn::Set(d, -g.rotation[j][0]), v[0]);
-      w[j] = hn::NegMulAdd(hn::Set(d, g.rotation[j][1]), v[1], w[j]);
-      w[j] = hn::NegMulAdd(hn::Set(d, g.rotation[j][2]), v[2], w[j]);
+      w[j] = hn::Mul(hn::Set(d, g.rotation[j][0]), v[0]);
+      w[j] = hn::MulAdd(hn::Set(d, g.rotation[j][1]), v[1], w[j]);
+      w[j] = hn::Neg(hn::MulAdd(hn::Set(d, g.rotation[j][2]), v[2], w[j]));
     }
-    locate(v, lane, in_a);
-    locate(w, lane, in_b);
-    hn::Store(sum, d, along + lane);
-  }
-  float most = -1e30f;
-  for (std::size_t lane = 0; lane < 8; ++lane) {
-    value[lane] = along[lane] - interpolated(a, in_a, lane) - g.scale * interpolated(b, in_b, lane);
-    most = std::max(most, value[lane]);
-  }
-  return most;
-}
-
-// The directions about a unit one, `radius` away in the plane across it, and, as the first of seven, itself.
-HWY_INLINE void ringAbout(const float (&n)[3], float radius, const float (*circle)[8], float (*u)[8]) {
-  const float sign = std::copysign(1.0f, n[2]), a = -1 / (sign + n[2]), b = n[0] * n[1] * a;
-  const float across[2][3] = {{1 + sign * n[0] * n[0] * a, sign * b, -sign * n[0]}, {b, sign + n[1] * n[1] * a, -n[1]}};
-  const D d;
-  for (std::size_t lane = 0; lane < 8; lane += hn::Lanes(d)) {
-    const V x = hn::Mul(hn::Set(d, radius), hn::Load(d, circle[0] + lane));
-    const V y = hn::Mul(hn::Set(d, radius), hn::Load(d, circle[1] + lane));
+    const Support of_a = supportOf(a, v), of_b = supportOf(b, w);
     BOCST_UNROLL
     for (int k = 0; k < 3; ++k) {
-      hn::Store(hn::MulAdd(hn::Set(d, across[0][k]), x, hn::MulAdd(hn::Set(d, across[1][k]), y, hn::Set(d, n[k]))), d,
-                u[k] + lane);
+      hn::StoreU(of_a.at[k], di, near.of_a[k] + lane);
+      hn::StoreU(of_b.at[k], di, near.of_b[k] + lane);
+    }
+    const V f = hn::NegMulAdd(hn::Set(d, g.scale), of_b.value, hn::Sub(along, of_a.value));
+    hn::StoreU(f, d, value + lane);
+    most = hn::Max(most, f);
+  }
+  return hn::GetLane(hn::MaxOfLanes(d, most));
+}
+
+// Good to some bits, which is enough for directions: what a look says of one holds for any.
+HWY_INLINE float roughInverse(float x) {
+  const hn::CappedTag<float, 1> d;
+  return hn::GetLane(hn::ApproximateReciprocal(hn::Set(d, x)));
+}
+
+HWY_INLINE float roughInverseSqrt(float x) {
+  const hn::CappedTag<float, 1> d;
+  return hn::GetLane(hn::ApproximateReciprocalSqrt(hn::Set(d, x)));
+}
+
+// Directions about one of about unit length, `radius` away in the plane across it.
+struct Ring {
+  HWY_INLINE Ring(const float (&n)[3], float radius, const float (*circle_)[8])
+      : middle{n[0], n[1], n[2]}, circle(circle_) {
+    const float sign = std::copysign(1.0f, n[2]), a = -roughInverse(sign + n[2]), b = n[0] * n[1] * a;
+    const float both[2][3] = {{1 + sign * n[0] * n[0] * a, sign * b, -sign * n[0]}, {b, sign + n[1] * n[1] * a, -n[1]}};
+    BOCST_UNROLL
+    for (int k = 0; k < 3; ++k) across[0][k] = both[0][k] * radius, across[1][k] = both[1][k] * radius;
+  }
+  HWY_INLINE void directions(std::size_t lane, V (&v)[3]) const {
+    const D d;
+    const V x = hn::Load(d, circle[0] + lane), y = hn::Load(d, circle[1] + lane);
+    BOCST_UNROLL
+    for (int k = 0; k < 3; ++k) {
+      v[k] = hn::MulAdd(hn::Set(d, across[0][k]), x, hn::MulAdd(hn::Set(d, across[1][k]), y, hn::Set(d, middle[k])));
     }
   }
-}
+  HWY_INLINE float entry(int k, std::size_t lane) const {
+    return middle[k] + across[0][k] * circle[0][lane] + across[1][k] * circle[1][lane];
+  }
+  float middle[3], across[2][3];
+  const float (*circle)[8];
+};
 
 HWY_ALIGN constexpr float kSevenAndMiddle[2][8] = {
     {0, 1, 0.6234898f, -0.2225209f, -0.9009689f, -0.9009689f, -0.2225209f, 0.6234898f},
@@ -153,14 +212,13 @@ HWY_INLINE Between between(const Placement& b_in_a) {
   return g;
 }
 
-// Which of eight values is the largest; 8 if they are not numbers.
-HWY_INLINE std::size_t largest(const float (&values)[8]) {
+// Which of eight values is the largest, given that; 8 if they are not numbers.
+HWY_INLINE std::size_t largest(const float (&values)[8], float most) {
   const D d;
-  V most = hn::LoadU(d, values);
-  for (std::size_t i = hn::Lanes(d); i < 8; i += hn::Lanes(d)) most = hn::Max(most, hn::LoadU(d, values + i));
-  const V all = hn::MaxOfLanes(d, most);
   unsigned bits = 1u << 8;
-  for (std::size_t i = 0; i < 8; i += hn::Lanes(d)) bits |= maskBits(hn::Eq(hn::LoadU(d, values + i), all)) << i;
+  for (std::size_t i = 0; i < 8; i += hn::Lanes(d)) {
+    bits |= maskBits(hn::Eq(hn::LoadU(d, values + i), hn::Set(d, most))) << i;
+  }
   return static_cast<std::size_t>(__builtin_ctz(bits));
 }
 
@@ -168,12 +226,13 @@ HWY_INLINE std::size_t largest(const float (&values)[8]) {
 HWY_INLINE float wayBetweenMiddles(const Supports& a, const Supports& b, const Between& g, float (&n)[3]) {
   const Eigen::Vector3f &from = a.center(), &to = b.center();
   float squared = 0;
+  BOCST_UNROLL
   for (int k = 0; k < 3; ++k) {
     const float turned = g.rotation[0][k] * to[0] + g.rotation[1][k] * to[1] + g.rotation[2][k] * to[2];
     n[k] = g.t[k] + g.scale * turned - from[k];
     squared += n[k] * n[k];
   }
-  const float length = std::sqrt(squared), per_length = 1 / length;
+  const float per_length = roughInverseSqrt(squared), length = squared * per_length;
   for (float& x : n) x *= per_length;
   return length;
 }
@@ -193,45 +252,36 @@ bool AreSeparate(const Supports& a, const Supports& b, const Placement& b_in_a, 
   // No direction can do better than this; most hits are so deep.
   if (length - a.innerRadius() - g.scale * b.innerRadius() < -kHopeless * smaller) return false;
 
-  alignas(64) float u[3][8];
-  float value[8];
-  Places in_a, in_b;
-  float best = -1e30f, hopeless = -kHopeless * smaller, radius = kFirstRadius;
+  float value[8], best = -1e30f, hopeless = -kHopeless * smaller, radius = kFirstRadius;
   for (int look = 0; look < kLooks; ++look) {
-    ringAbout(n, radius, look == 0 ? kSevenAndMiddle : kEight, u);
-    if (values(a, b, g, u, in_a, in_b, value) > pad) return true;
-    const std::size_t lane = largest(value);
+    const Ring ring(n, radius, look == 0 ? kSevenAndMiddle : kEight);
+    const auto directions = [&ring](std::size_t lane, V(&v)[3]) HWY_ATTR { ring.directions(lane, v); };
+    const float most = values(a, b, g, directions, near, value);
+    if (most > pad) return true;
+    const std::size_t lane = largest(value, most);
     if (lane == 8) return false;
-    if (value[lane] > best) {
-      best = value[lane];
-      if (best < hopeless) break;
+    if (most > best) {
+      best = most;
       const bool same = look == 0 && lane == 0;
-      const float shrink = same ? 1 : 1 / std::sqrt(1 + radius * radius);
-      for (int k = 0; k < 3; ++k) n[k] = u[k][lane] * shrink;
+      const float shrink = same ? 1 : roughInverseSqrt(1 + radius * radius);
+      for (int k = 0; k < 3; ++k) n[k] = ring.entry(k, lane) * shrink;
       radius *= same ? 0.5f : 0.7f;
     } else {
       radius *= 0.4f;
     }
+    if (best < hopeless) break;
     hopeless *= kHopelessLater;
   }
   near.lanes = 8;
   near.shallow = best > -kShallow * smaller;
-  for (int k = 0; k < 3; ++k) {
-    std::copy_n(in_a.at[k], 8, near.of_a[k]);
-    std::copy_n(in_b.at[k], 8, near.of_b[k]);
-  }
   return false;
 }
 
 void Evaluate(const Supports& a, const Supports& b, const Placement& b_in_a, EightSeparations& eight) {
-  alignas(64) float u[3][8];
-  for (int k = 0; k < 3; ++k) std::copy_n(eight.u[k], 8, u[k]);
-  Places in_a, in_b;
-  values(a, b, between(b_in_a), u, in_a, in_b, eight.value);
-  for (int k = 0; k < 3; ++k) {
-    std::copy_n(in_a.at[k], 8, eight.of_a[k]);
-    std::copy_n(in_b.at[k], 8, eight.of_b[k]);
-  }
+  const auto directions = [&eight](std::size_t lane, V(&v)[3]) HWY_ATTR {
+    for (int k = 0; k < 3; ++k) v[k] = hn::LoadU(D(), eight.u[k] + lane);
+  };
+  values(a, b, between(b_in_a), directions, eight.near, eight.value);
 }
 
 }  // namespace bocst::query::HWY_NAMESPACE
@@ -249,132 +299,6 @@ bool areSeparate(const Supports& a, const Supports& b, const Placement& b_in_a, 
 
 void evaluate(const Supports& a, const Supports& b, const Placement& b_in_a, EightSeparations& eight) {
   HWY_DYNAMIC_DISPATCH(Evaluate)(a, b, b_in_a, eight);
-}
-
-namespace {
-
-// A part of the surface and how far it may reach.
-struct Part {
-  double reach;
-  tree::NodeRef node;
-  bool known = false;    // the tree can say no more
-  bool reached = false;  // by a vertex
-  bool operator<(const Part& other) const { return reach < other.reach; }
-};
-
-// Asks one tree how far its surface reaches, after a miss.
-class Sharpening {
- public:
-  explicit Sharpening(const TreeSide& side) : side_(side), room_(room()) {}
-
-  /// Of a kept direction; false when that takes more effort than is left.
-  bool ask(int number) {
-    tree::Supports& supports = side_.tree().supports();
-    direction_ = Supports::direction(number);
-    has_all_effort_ = left_ == kEffort;
-    room_.parts.clear();
-    addNode(side_.root());
-    while (!room_.parts.empty()) {
-      std::pop_heap(room_.parts.begin(), room_.parts.end());
-      const Part part = room_.parts.back();
-      room_.parts.pop_back();
-      if (part.known) {
-        supports.lower(number, part.reach, part.reached);
-        return true;
-      }
-      if (growsFreely(part.node) && !grow(part.node)) return false;
-      if (side_.state(part.node) == State::kInner) {
-        side_.children(part.node, [this](tree::NodeRef node) { addNode(node); });
-      } else if (!addTriangles(part)) {
-        return false;
-      }
-    }
-    // A sampled oracle has lost all of the surface.
-    supports.lower(number, supports.value(number), false);
-    return true;
-  }
-
- private:
-  // Kept by the thread.
-  struct Room {
-    std::vector<Part> parts;  // a heap
-    std::vector<std::uint32_t> triangles;
-    std::vector<tree::Tree::Growth> growth;
-  };
-  static Room& room() {
-    thread_local Room room;
-    return room;
-  }
-
-  void add(const Part& part) {
-    room_.parts.push_back(part);
-    std::push_heap(room_.parts.begin(), room_.parts.end());
-  }
-
-  void addNode(tree::NodeRef node) {
-    const NodeReach reach(side_.volume(node), Placement());
-    double lo, hi;
-    reach.along(direction_, lo, hi);
-    add({hi + direction_.dot(reach.center - middle_), node});
-  }
-
-  // The part as its triangles know it, or, if it cannot be otherwise, its bounds.
-  bool addTriangles(const Part& part) {
-    const bool are_known = side_.tree().trianglesOf(part.node, left_, room_.triangles) && !room_.triangles.empty();
-    left_ -= std::min(left_, room_.triangles.size());
-    if (!are_known) {
-      // Perhaps they only are too many for what is left now.
-      if (has_all_effort_) add({part.reach, part.node, true, false});
-      return has_all_effort_;
-    }
-    double reach = -std::numeric_limits<double>::infinity();
-    for (const std::uint32_t t : room_.triangles) {
-      for (int k = 0; k < 3; ++k) reach = std::max(reach, direction_.dot(side_.corner(t, k) - middle_));
-    }
-    add({reach, part.node, true, true});
-    return true;
-  }
-
-  bool growsFreely(tree::NodeRef node) const {
-    return side_.state(node) == State::kGrows && side_.growsFreely(node) && side_.tree().hasRoom();
-  }
-
-  // Unless another thread grows the tree just now.
-  bool grow(tree::NodeRef node) {
-    if (left_ < kGrowthEffort) return false;
-    left_ -= kGrowthEffort;
-    has_all_effort_ = false;
-    room_.growth.clear();
-    side_.grow(node, room_.growth);
-    tree::Tree::grow(room_.growth, false);
-    return side_.state(node) == State::kInner;
-  }
-
-  const TreeSide& side_;
-  Room& room_;
-  const Eigen::Vector3d middle_ = Eigen::Vector3d::Constant(lattice::kMiddle);
-  Eigen::Vector3d direction_;
-  std::size_t left_ = kEffort;
-  bool has_all_effort_ = true;  // for the direction that is asked about
-};
-
-void sharpen(const TreeSide& side, const std::int32_t (&near)[3][8]) {
-  tree::Supports& supports = side.tree().supports();
-  supports.reopen(side.tree().growth());
-  Sharpening sharpening(side);
-  for (int lane = 0; lane < 8; ++lane) {
-    for (int k = 0; k < 3; ++k) {
-      if (supports.isOpen(near[k][lane]) && !sharpening.ask(near[k][lane])) return;
-    }
-  }
-}
-
-}  // namespace
-
-void sharpenSupports(const TreeSide& a, const TreeSide& b, const NearDirections& near) {
-  if (near.lanes == 0) return;
-  sharpen(a, near.of_a);
-  sharpen(b, near.of_b);
 }
 
 }  // namespace bocst::query

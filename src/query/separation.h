@@ -1,7 +1,6 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #pragma once
 
-#include "query/side.h"
 #include "query/volume.h"
 #include "tree/supports.h"
 
@@ -27,11 +26,8 @@ bool areSeparate(const tree::Supports& a, const tree::Supports& b, const Placeme
 struct EightSeparations {
   float u[3][8];  ///< in
   float value[8];
-  int of_a[3][8], of_b[3][8];
+  NearDirections near;
 };
 void evaluate(const tree::Supports& a, const tree::Supports& b, const Placement& b_in_a, EightSeparations& eight);
-
-/// Asks the trees how far their surfaces reach in the directions that a look was between, a few of them each time.
-void sharpenSupports(const TreeSide& a, const TreeSide& b, const NearDirections& near);
 
 }  // namespace bocst::query

@@ -131,10 +131,10 @@ class TreeSide {
   std::uint32_t triangle(Node node, std::size_t i) const { return tree_.list(tree_.link(node)).ids[i]; }
 
   /// The corners of a leaf's triangles where the tree keeps them packed, and their numbers; else false.
-  bool packed(Node node, tree::PackedTriangles& triangles, const std::uint32_t*& ids) const {
-    const tree::Link link = tree_.link(node);
-    if (!tree_.packed(link, triangles)) return false;
-    ids = tree_.list(link).ids;
+  bool packed(Node node, tree::PackedTriangles& triangles, tree::TriangleIds& ids) const {
+    const std::uint32_t list = tree_.link(node).index();
+    if (!tree_.lists().packed(list, triangles)) return false;
+    ids = tree_.lists()[list].ids;
     return true;
   }
 

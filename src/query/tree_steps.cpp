@@ -21,9 +21,11 @@ inline bool isLeaf(const StepNode& n) {
 }
 
 // The order is there already: overlapping() writes it to where the group will be.
-inline void push(PairSteps& s, int side, std::uint32_t block, std::uint32_t level, std::uint32_t frame,
-                 const StepNode& other, unsigned octants, std::uint32_t coarse = StepGroup::kNone) {
+inline void push(PairSteps& s, int side, const tree::Block* at, std::uint32_t block, std::uint32_t level,
+                 std::uint32_t frame, const StepNode& other, unsigned octants,
+                 std::uint32_t coarse = StepGroup::kNone) {
   StepGroup& top = s.stack[s.depth++];
+  top.at = at;
   top.other.node = other.node;
   top.other.link = other.link;
   top.other.level = other.level;
@@ -33,21 +35,22 @@ inline void push(PairSteps& s, int side, std::uint32_t block, std::uint32_t leve
   top.frame = frame;
   top.level = level;
   top.octants = octants;
+  top.late = 0;
   top.coarse = coarse;
 }
 
 // Most of a leaf's corners, and all of them.
-constexpr std::size_t kNextLeafLines = 6, kLeafLines = 10;
+constexpr std::size_t kNextLeafLines = 4, kLeafLines = 10;
 
 // Brings to the processor what the next steps will read of a node, or, of a leaf, its corners: so many lines of them.
-inline void fetch(const tree::Tree& tree, tree::Link link, std::size_t leaf_lines) {
+inline void fetch(const tree::Tree& tree, tree::Link link, std::size_t leaf_lines = kNextLeafLines) {
   constexpr std::size_t kLine = 64;
   if (link.tag() == tree::Link::kBlock) {
     const char* at = reinterpret_cast<const char*>(&tree.block(link.index()));
     __builtin_prefetch(at);
     __builtin_prefetch(at + kLine);
   } else if (link.tag() == tree::Link::kShortList) {
-    const char* at = reinterpret_cast<const char*>(tree.words(link));
+    const char* at = reinterpret_cast<const char*>(tree.lists().begin(link.index()));
     for (std::size_t i = 0; i < leaf_lines; ++i) __builtin_prefetch(at + i * kLine);
   }
 }
@@ -68,28 +71,29 @@ inline void fetchAll(const tree::Tree& tree, const tree::Block& block, unsigned 
 HWY_BEFORE_NAMESPACE();
 namespace bocst::query::HWY_NAMESPACE {
 
-// Bit o is set unless octant o of frame f (side `own`) is surely apart from the volume in lane l of frame y, by one of
-// eight axes: the faces of both boxes and both slab normals. No edge axes: with slabs they gain nothing. Of `octants`
-// only; order as in StepGroup, by the faces.
-HWY_INLINE unsigned overlapping(const PairFrames& g, int own, const Frame& f, const Frame& y, std::size_t l,
-                                unsigned octants, std::uint32_t* order) {
+// Bit o is set unless octant o of frame f is surely apart from the volume in lane l of frame y, of the other side, by
+// one of eight axes: the faces of both boxes and both slab normals. No edge axes: with slabs they gain nothing. Of
+// `octants` only; order as in StepGroup, by the faces, where it is asked for.
+HWY_INLINE unsigned overlapping(const PairFrames& g, const Frame& f, const Frame& y, std::size_t l, unsigned octants,
+                                std::uint32_t* order) {
   const D d;
   const hn::RebindToUnsigned<D> du;
-  const int other = 1 - own;
   const V pad = hn::Set(d, g.pad), slab_pad = hn::Set(d, g.slab_pad);
   unsigned result = 0;
   for (std::size_t i = 0; i < 8; i += hn::Lanes(d)) {
-    V way[2][3];  // from the octants' middles to the volume's, in both frames
-    V least = hn::Set(d, 1e30f);
+    V way[2][3], reach[2][3];  // from the octants' middles to the volume's, along the axes of [0] the octants' side
     BOCST_UNROLL
     for (int s = 0; s < 2; ++s) {
       BOCST_UNROLL
       for (int k = 0; k < 3; ++k) {
-        way[s][k] = hn::Sub(hn::Set(d, y.center[s][k][l]), hn::Load(d, f.center[s][k] + i));
-        const V reach = hn::Add(hn::Load(d, f.half[s][k] + i), hn::Add(hn::Set(d, y.half[s][k][l]), pad));
-        least = hn::Min(least, hn::Sub(reach, hn::Abs(way[s][k])));
+        way[s][k] = hn::Sub(hn::Set(d, y.center[1 - s][k][l]), hn::Load(d, f.center[s][k] + i));
+        const V both = hn::Add(hn::Load(d, f.half[s][k] + i), hn::Set(d, y.half[1 - s][k][l]));
+        reach[s][k] = hn::Sub(both, hn::Abs(way[s][k]));
       }
     }
+    const V least = hn::Add(hn::Min(hn::Min(hn::Min(reach[0][0], reach[0][1]), hn::Min(reach[0][2], reach[1][0])),
+                                    hn::Min(reach[1][1], reach[1][2])),
+                            pad);
     M apart = hn::Lt(least, hn::Zero(d));
     // Slabs: for z in a box with |m.z - offset| <= w, any a gives n.z in a * offset +- (|a| w + |n - a m| over the
     // box).
@@ -98,33 +102,35 @@ HWY_INLINE unsigned overlapping(const PairFrames& g, int own, const Frame& f, co
     V n[3], m[3], along = hn::Zero(d);
     BOCST_UNROLL
     for (int k = 0; k < 3; ++k) {
-      n[k] = hn::Load(d, f.normal[other][k] + i);
-      m[k] = hn::Set(d, y.normal[other][k][l]);
+      n[k] = hn::Load(d, f.normal[1][k] + i);
+      m[k] = hn::Set(d, y.normal[0][k][l]);
       along = hn::MulAdd(n[k], m[k], along);
     }
     const V abs_along = hn::Abs(along);
     V t = hn::MulSub(along, y_center, x_center), r = hn::MulAdd(abs_along, y_half, hn::Add(x_half, slab_pad));
     BOCST_UNROLL
     for (int k = 0; k < 3; ++k) {
-      t = hn::MulAdd(n[k], own == 0 ? way[1][k] : way[0][k], t);
-      r = hn::MulAdd(hn::Set(d, y.half[other][k][l]), hn::Abs(hn::NegMulAdd(along, m[k], n[k])), r);
+      t = hn::MulAdd(n[k], way[1][k], t);
+      r = hn::MulAdd(hn::Set(d, y.half[0][k][l]), hn::Abs(hn::NegMulAdd(along, m[k], n[k])), r);
     }
     apart = hn::Or(apart, hn::Gt(hn::Abs(t), r));
     t = hn::NegMulAdd(along, x_center, y_center);
     r = hn::MulAdd(abs_along, x_half, hn::Add(y_half, slab_pad));
     BOCST_UNROLL
     for (int k = 0; k < 3; ++k) {
-      const V mk = hn::Set(d, y.normal[own][k][l]);
-      t = hn::MulAdd(mk, own == 0 ? way[0][k] : way[1][k], t);
-      r = hn::MulAdd(hn::Load(d, f.half[own][k] + i),
-                     hn::Abs(hn::NegMulAdd(along, hn::Load(d, f.normal[own][k] + i), mk)), r);
+      const V mk = hn::Set(d, y.normal[1][k][l]);
+      t = hn::MulAdd(mk, way[0][k], t);
+      r = hn::MulAdd(hn::Load(d, f.half[0][k] + i), hn::Abs(hn::NegMulAdd(along, hn::Load(d, f.normal[0][k] + i), mk)),
+                     r);
     }
     apart = hn::Or(apart, hn::Gt(hn::Abs(t), r));
     const std::uint8_t wanted[8] = {static_cast<std::uint8_t>(octants >> i)};
     const M left = hn::AndNot(apart, hn::LoadMaskBits(d, wanted));
-    const auto depth =
-        hn::Or(hn::And(hn::BitCast(du, least), hn::Set(du, ~7u)), hn::Iota(du, static_cast<std::uint32_t>(i)));
-    hn::StoreU(hn::IfThenElseZero(hn::RebindMask(du, left), depth), du, order + i);
+    if (order != nullptr) {
+      const auto depth =
+          hn::Or(hn::And(hn::BitCast(du, least), hn::Set(du, ~7u)), hn::Iota(du, static_cast<std::uint32_t>(i)));
+      hn::StoreU(depth, du, order + i);
+    }
     std::uint8_t bits[8] = {};
     hn::StoreMaskBits(d, left, bits);
     result |= static_cast<unsigned>(bits[0]) << i;
@@ -144,7 +150,6 @@ HWY_INLINE bool decodeBlock(PairSteps& s, int own, std::uint32_t index, const tr
 
 // Where the volume of a pair's node on one side is; for pairs that come without frames.
 HWY_INLINE void lookUp(PairSteps& s, StepNode& n, int side, std::uint32_t& frames) {
-  if (n.lane != StepNode::kNoLane) return;
   const tree::Tree& tree = *s.tree[side];
   if (n.node.isRoot()) {
     decodeRoot(s.geometry, side, tree.rootBounds(), s.frames[frames]);
@@ -164,47 +169,58 @@ std::uint8_t OverlappingOctants(const PairFrames& geometry, int own, const CellO
   decodeCell(geometry, own, cell.cell.level, cell.cell.at, cell.octants, f);
   decodeCell(geometry, 1 - own, other.cell.level, other.cell.at, other.octants, y);
   std::uint32_t order[8];
-  return static_cast<std::uint8_t>(overlapping(geometry, own, f, y, static_cast<std::size_t>(octant), 0xff, order));
+  return static_cast<std::uint8_t>(overlapping(geometry, f, y, static_cast<std::size_t>(octant), 0xff, order));
 }
 
-// The octant that overlaps the most. Without branches: they would be guessed wrong.
-HWY_INLINE std::uint32_t deepest(const std::uint32_t (&order)[8]) {
-  const auto larger = [](std::uint32_t a, std::uint32_t b) { return a > b ? a : b; };
-  return larger(larger(larger(order[0], order[1]), larger(order[2], order[3])),
-                larger(larger(order[4], order[5]), larger(order[6], order[7])));
+// Which of a group's octants overlaps the most.
+HWY_INLINE std::uint32_t deepest(const StepGroup& group, std::uint32_t octants) {
+  const hn::RebindToUnsigned<D> du;
+  auto most = hn::Zero(du);
+  for (std::size_t i = 0; i < 8; i += hn::Lanes(du)) {
+    const std::uint8_t wanted[8] = {static_cast<std::uint8_t>(octants >> i)};
+    const auto depth = hn::LoadU(du, group.order + i);
+    most = hn::Max(most, hn::IfThenElseZero(hn::LoadMaskBits(du, wanted), depth));
+  }
+  return hn::GetLane(hn::MaxOfLanes(du, most)) & 7;
 }
 
-// Takes the next pair off the stack and says how many frames it and what is under it use. What is still implicit is
-// left for last: a hit among resident nodes makes its growth unnecessary.
-HWY_INLINE std::uint32_t pop(PairSteps& s, StepNode (&pair)[2]) {
+// A pair off the stack: an octant of a group, the other node, and how many frames they and what is under them use.
+struct Popped {
+  StepNode own, other;
+  int side;
+  std::uint32_t frames;
+};
+
+// Takes the next pair off the stack: the deepest, or, where all are wanted, the first, which is known sooner. A step is
+// mostly a chain of what waits for each other, from a link to the next one, so what is handed on stays in registers.
+// What is still implicit is left for last: a hit among resident nodes makes its growth unnecessary.
+HWY_INLINE Popped pop(PairSteps& s) {
   for (;;) {
     StepGroup& top = s.stack[s.depth - 1];
-    const std::uint32_t depth = deepest(top.order), o = depth & 7, rest = top.octants & ~(1u << o);
-    const tree::NodeRef node = tree::NodeRef::octant(top.block, static_cast<int>(o));
-    const tree::Link link = s.tree[top.side]->link(node);
-    if (link.tag() == tree::Link::kImplicit && rest != 0 && depth >= 2 * StepGroup::kLast) {
-      top.order[o] = StepGroup::kLast | o;
+    const std::uint32_t soon = top.octants & ~top.late, which = soon != 0 ? soon : top.octants;
+    const std::uint32_t o = s.all_at_once ? static_cast<std::uint32_t>(__builtin_ctz(which)) : deepest(top, which);
+    const std::uint32_t rest = top.octants & ~(1u << o);
+    Popped p;
+    p.side = static_cast<int>(top.side);
+    p.own.node = tree::NodeRef::octant(top.block, static_cast<int>(o));
+    p.own.link =
+        top.at != nullptr ? top.at->child[o].load(std::memory_order_acquire) : s.tree[p.side]->link(p.own.node);
+    if (p.own.link.tag() == tree::Link::kImplicit && rest != 0 && soon != 0) {
+      top.late |= 1u << o;
       continue;
     }
-    top.order[o] = 0;
     top.octants = rest;
     if (rest == 0) --s.depth;
-    StepNode &own = pair[top.side], &other = pair[1 - top.side];
-    own.node = node;
-    own.link = link;
-    own.level = top.level;
-    other.node = top.other.node;
-    other.link = top.other.link;
-    other.level = top.other.level;
-    other.lane = top.other.lane;
+    p.own.level = top.level;
+    p.own.lane = top.frame == StepGroup::kNoFrame ? StepNode::kNoLane : 8 * top.frame + o;
+    p.other.node = top.other.node;
+    p.other.link = top.other.link;
+    p.other.level = top.other.level;
+    p.other.lane = top.other.lane;
+    p.frames = top.frame + 1;  // 0 without a frame
     s.coarse = top.coarse;
     s.triangles = top.triangles[o];
-    if (top.frame == StepGroup::kNoFrame) {
-      own.lane = StepNode::kNoLane;
-      return 0;
-    }
-    own.lane = 8 * top.frame + o;
-    return top.frame + 1;
+    return p;
   }
 }
 
@@ -215,7 +231,7 @@ HWY_INLINE unsigned meeting(const PairFrames& g, int own, const Frame& f, unsign
                             const TriangleBounds& b, F&& store) {
   const D d;
   const hn::RebindToUnsigned<D> du;
-  const V pad = hn::Set(d, g.own_pad[own]);
+  const V pad = hn::Set(d, g.side[own].pad);
   unsigned result = 0;
   for (std::size_t i = 0; i < 8; i += hn::Lanes(d)) {
     const std::uint8_t wanted[8] = {static_cast<std::uint8_t>(mask >> i)};
@@ -223,9 +239,9 @@ HWY_INLINE unsigned meeting(const PairFrames& g, int own, const Frame& f, unsign
     V c[3], h[3], m[3], low[3], high[3];
     BOCST_UNROLL
     for (int k = 0; k < 3; ++k) {
-      c[k] = hn::Load(d, f.center[own][k] + i);
-      h[k] = hn::Load(d, f.half[own][k] + i);
-      m[k] = hn::Load(d, f.normal[own][k] + i);
+      c[k] = hn::Load(d, f.center[0][k] + i);
+      h[k] = hn::Load(d, f.half[0][k] + i);
+      m[k] = hn::Load(d, f.normal[0][k] + i);
       const V reach = hn::Add(h[k], pad);
       low[k] = hn::Sub(c[k], reach);
       high[k] = hn::Add(c[k], reach);
@@ -287,13 +303,11 @@ HWY_NOINLINE void pushThose(PairSteps& s) {
   const int x = s.expanded, y = 1 - x;
   StepGroup& top = s.stack[s.depth];
   const unsigned mask = meeting(s.geometry, x, s.frames[s.frames_used], s.mask, s.triangles, s.leaf[y]->bounds(),
-                                [&top, du](std::size_t i, hn::Vec<hn::RebindToUnsigned<D>> met) HWY_ATTR {
-                                  hn::StoreU(met, du, top.triangles + i);
-                                  const auto none = hn::Eq(met, hn::Zero(du));
-                                  hn::StoreU(hn::IfThenZeroElse(none, hn::LoadU(du, top.order + i)), du, top.order + i);
-                                });
+                                [&top, du](std::size_t i, hn::Vec<hn::RebindToUnsigned<D>> met)
+                                    HWY_ATTR { hn::StoreU(met, du, top.triangles + i); });
   if (mask == 0) return;
-  push(s, x, s.pair[x].link.index(), s.pair[x].level + 1, s.frames_used, s.pair[y], mask,
+  const std::uint32_t index = s.pair[x].link.index();
+  push(s, x, &s.tree[x]->block(index), index, s.pair[x].level + 1, s.frames_used, s.pair[y], mask,
        static_cast<std::uint32_t>(y));
 }
 
@@ -310,11 +324,9 @@ void OctantsMeeting(const PairFrames& geometry, int own, const CellOctants& cell
 
 // Expands the other node of the pair for all octants in `mask` of block `index`, in frame `frame`; false where it is
 // not the next to be expanded. `fetch_own`: nobody has fetched what is below that block.
-HWY_INLINE bool expandOther(PairSteps& s, int x, std::uint32_t index, std::uint32_t frame, unsigned mask,
-                            bool fetch_own) {
+HWY_INLINE bool expandOther(PairSteps& s, int x, const tree::Block& own, std::uint32_t index, std::uint32_t level,
+                            const StepNode& other, std::uint32_t frame, unsigned mask, bool fetch_own) {
   const int y = 1 - x;
-  const std::uint32_t level = s.pair[x].level + 1;
-  const StepNode& other = s.pair[y];
   if (other.link.tag() != tree::Link::kBlock) return false;
   const int deeper = static_cast<int>(other.level) - static_cast<int>(level);
   if (x == 0 ? deeper >= s.not_smaller : -deeper < s.not_smaller) return false;
@@ -322,47 +334,83 @@ HWY_INLINE bool expandOther(PairSteps& s, int x, std::uint32_t index, std::uint3
   const tree::Block& block = s.tree[y]->block(other_index);
   s.tree[y]->touch(other_index, s.now);
   const bool fetch_other = decodeBlock(s, y, other_index, block, frame + 1) && s.sees_all;
-  if (fetch_own) fetchAll(*s.tree[x], s.tree[x]->block(index), mask);
+  if (fetch_own) fetchAll(*s.tree[x], own, mask);
   unsigned met = 0;
   for (; mask != 0; mask &= mask - 1) {
     const auto o = static_cast<std::uint32_t>(__builtin_ctz(mask));
-    const unsigned left =
-        overlapping(s.geometry, y, s.frames[frame + 1], s.frames[frame], o, block.grey, s.stack[s.depth].order);
+    const unsigned left = overlapping(s.geometry, s.frames[frame + 1], s.frames[frame], o, block.grey, nullptr);
     if (left == 0) continue;
     met |= left;
     StepNode n;
     n.node = tree::NodeRef::octant(index, static_cast<int>(o));
-    n.link = s.tree[x]->link(n.node);
+    n.link = own.child[o].load(std::memory_order_acquire);
     n.level = level;
     n.lane = 8 * frame + o;
-    push(s, y, other_index, other.level + 1, frame + 1, n, left);
+    if (!s.sees_all) fetch(*s.tree[x], n.link);
+    push(s, y, &block, other_index, other.level + 1, frame + 1, n, left);
   }
   if (fetch_other) fetchAll(*s.tree[y], block, met);
   return true;
 }
 
+// Puts some octants of a block on the stack, but for the one that is next: true where that is in `next`, at once.
+HWY_INLINE bool pushOthers(PairSteps& s, int side, const tree::Block& block, std::uint32_t index, std::uint32_t level,
+                           std::uint32_t frame, const StepNode& other, unsigned octants, Popped& next) {
+  const std::uint32_t o =
+      s.all_at_once ? static_cast<std::uint32_t>(__builtin_ctz(octants)) : deepest(s.stack[s.depth], octants);
+  const std::uint32_t rest = octants & ~(1u << o);
+  next.side = side;
+  next.own.node = tree::NodeRef::octant(index, static_cast<int>(o));
+  next.own.link = block.child[o].load(std::memory_order_acquire);
+  next.own.level = level;
+  next.own.lane = 8 * frame + o;
+  next.other = other;
+  next.frames = frame + 1;
+  s.coarse = StepGroup::kNone;
+  const bool waits = rest != 0 && next.own.link.tag() == tree::Link::kImplicit;
+  if (rest != 0) push(s, side, &block, index, level, frame, other, waits ? octants : rest);
+  return !waits;
+}
+
 PairSteps::Event NextEvent(PairSteps& s) {
-  while (s.depth > 0) {
-    std::uint32_t frames = pop(s, s.pair);
-    const bool leaf0 = isLeaf(s.pair[0]), leaf1 = isLeaf(s.pair[1]);
-    if (leaf0 && leaf1) {
+  Popped p;
+  bool known = false;  // what comes next
+  for (;;) {
+    if (!known) {
+      if (s.depth == 0) break;
+      p = pop(s);
+    }
+    known = false;
+    const int side = p.side;
+    s.pair[side] = p.own;
+    s.pair[1 - side] = p.other;
+    const bool own_leaf = isLeaf(p.own), other_leaf = isLeaf(p.other);
+    if (own_leaf && other_leaf) {
       if (!s.sees_all) {
-        for (int side = 0; side < 2; ++side) fetch(*s.tree[side], s.pair[side].link, kNextLeafLines);
+        fetch(*s.tree[side], p.own.link);
+        fetch(*s.tree[1 - side], p.other.link);
       }
       return PairSteps::kLeaves;
     }
     // The larger of two nodes is expanded, unless it is a leaf.
-    const int deeper = static_cast<int>(s.pair[1].level) - static_cast<int>(s.pair[0].level);
+    const bool leaf0 = side == 0 ? own_leaf : other_leaf, leaf1 = side == 0 ? other_leaf : own_leaf;
+    const int below = static_cast<int>(p.own.level) - static_cast<int>(p.other.level);
+    const int deeper = side == 0 ? -below : below;
     const int x = leaf1 || (!leaf0 && deeper >= s.not_smaller) ? 0 : 1, y = 1 - x;
-    StepNode &own = s.pair[x], &other = s.pair[y];
+    const StepNode own = x == side ? p.own : p.other;
+    StepNode other = x == side ? p.other : p.own;
     if (own.link.tag() != tree::Link::kBlock) return PairSteps::kAside;
-    if (!s.sees_all && other.link.tag() == tree::Link::kBlock) fetch(*s.tree[y], other.link, 0);
-    lookUp(s, other, y, frames);
+    if (!s.sees_all && other.link.tag() == tree::Link::kBlock) fetch(*s.tree[y], other.link);
+    std::uint32_t frames = p.frames;
+    if (other.lane == StepNode::kNoLane) {
+      lookUp(s, other, y, frames);
+      s.pair[y].lane = other.lane;
+    }
     const std::uint32_t index = own.link.index();
     const tree::Block& block = s.tree[x]->block(index);
     s.tree[x]->touch(index, s.now);
     const bool fetch_own = decodeBlock(s, x, index, block, frames) && s.sees_all;
-    const unsigned mask = overlapping(s.geometry, x, s.frames[frames], s.frames[other.lane / 8], other.lane % 8,
+    const unsigned mask = overlapping(s.geometry, s.frames[frames], s.frames[other.lane / 8], other.lane % 8,
                                       block.grey, s.stack[s.depth].order);
     if (mask == 0) continue;
     if (y == 0 ? leaf0 && deeper >= s.larger : leaf1 && deeper < s.not_smaller) {
@@ -373,9 +421,9 @@ PairSteps::Event NextEvent(PairSteps& s) {
       pushThose(s);
       continue;
     }
-    if (!s.all_at_once || !expandOther(s, x, index, frames, mask, fetch_own)) {
+    if (!s.all_at_once || !expandOther(s, x, block, index, own.level + 1, other, frames, mask, fetch_own)) {
       if (fetch_own) fetchAll(*s.tree[x], block, mask);
-      push(s, x, index, own.level + 1, frames, other, mask);
+      known = pushOthers(s, x, block, index, own.level + 1, frames, other, mask, p);
     }
   }
   return PairSteps::kDone;
@@ -408,11 +456,9 @@ void octantsMeeting(const PairFrames& geometry, int own, const CellOctants& cell
 
 void pushOctants(PairSteps& s, unsigned mask) {
   if (mask == 0) return;
-  for (unsigned o = 0; o < 8; ++o) {
-    if ((mask >> o & 1) == 0) s.stack[s.depth].order[o] = 0;
-  }
   const int x = s.expanded;
-  push(s, x, s.pair[x].link.index(), s.pair[x].level + 1, s.frames_used, s.pair[1 - x], mask);
+  const std::uint32_t index = s.pair[x].link.index();
+  push(s, x, &s.tree[x]->block(index), index, s.pair[x].level + 1, s.frames_used, s.pair[1 - x], mask);
 }
 
 void pushPair(PairSteps& s, tree::NodeRef node_a, tree::NodeRef node_b) {
@@ -421,10 +467,9 @@ void pushPair(PairSteps& s, tree::NodeRef node_a, tree::NodeRef node_b) {
   other.link = s.tree[1]->link(node_b);
   other.level = static_cast<std::uint32_t>(s.tree[1]->cell(node_b).level);
   const auto o = static_cast<std::uint32_t>(node_a.octant());
-  std::fill_n(s.stack[s.depth].order, 8, 0);
-  s.stack[s.depth].order[o] = StepGroup::kLast | o;
-  push(s, 0, node_a.block(), static_cast<std::uint32_t>(s.tree[0]->cell(node_a).level), StepGroup::kNoFrame, other,
-       1u << o);
+  std::fill_n(s.stack[s.depth].order, 8, o);
+  push(s, 0, node_a.isRoot() ? nullptr : &s.tree[0]->block(node_a.block()), node_a.block(),
+       static_cast<std::uint32_t>(s.tree[0]->cell(node_a).level), StepGroup::kNoFrame, other, 1u << o);
 }
 
 }  // namespace bocst::query

@@ -27,15 +27,16 @@ struct StepGroup {
   static constexpr std::uint32_t kNoFrame = 0xffffffff;
 
   StepNode other;
-  std::uint32_t side;   ///< That of the block.
-  std::uint32_t block;  ///< As NodeRef names it, so the root is octant 7 of a block that there is not.
-  std::uint32_t frame;  ///< Where the block's octants are, if they are; those below it are in use, too.
-  std::uint32_t level;  ///< Of the octants.
+  const tree::Block* at;  ///< The block, or null where there is none.
+  std::uint32_t side;     ///< That of the block.
+  std::uint32_t block;    ///< As NodeRef names it, so the root is octant 7 of a block that there is not.
+  std::uint32_t frame;    ///< Where the block's octants are, if they are; those below it are in use, too.
+  std::uint32_t level;    ///< Of the octants.
   std::uint32_t octants;
-  /// For each of these: how far it overlaps the other node, as the bits of a float whose lowest three are the octant.
-  /// 0 for the others; kLast, a depth below all, for what waits until they are gone.
+  std::uint32_t late;  ///< Those of them that wait until the others are gone.
+  /// For each of them: how far it overlaps the other node, as the bits of a float whose lowest three are the octant. As
+  /// the step wrote it: what is written to in parts is slow to be read as a whole.
   std::uint32_t order[8];
-  static constexpr std::uint32_t kLast = 8;
   std::uint32_t coarse;        ///< Which side's node is a larger leaf whose triangles were asked about the octants ...
   std::uint32_t triangles[8];  ///< ... and which of them, a bit each, may meet each octant.
   static constexpr std::uint32_t kNone = 2;
@@ -92,7 +93,7 @@ struct PairSteps {
       : tree{a, b}, now(now_), geometry(geometry_), frames(frames_), stack(nullptr) {
     // 2^deeper against the ratio of units, exactly.
     int exponent = 0;
-    const bool even = std::frexp(geometry.unit[1] / geometry.unit[0], &exponent) == 0.5f;
+    const bool even = std::frexp(geometry.side[1].unit / geometry.side[0].unit, &exponent) == 0.5f;
     not_smaller = even ? exponent - 1 : exponent;
     larger = exponent;
     for (std::uint64_t& h : holds) h = kNothing;
@@ -123,7 +124,7 @@ void pushMeeting(PairSteps& steps);
 /// Along the axes of the octants, the triangle's normal and those of its edges in its plane; along the normal the
 /// octant's slab counts, too. With Q half a root's side and u = 2^-24, a centre is off by 6 u Q, an extent by 3, a
 /// projection on an axis of unit sum by 4 and a radius by 4 more, sums of both by 3, a bound by 2: 22 u Q. Slabs add
-/// 41: their offset 11, their normal 3, what the normals differ by 5, sums 22. PairFrames::own_pad takes 128.
+/// 41: their offset 11, their normal 3, what the normals differ by 5, sums 22. PairFrames::Side::pad takes 128.
 void octantsMeeting(const PairFrames& geometry, int own, const CellOctants& cell, const TriangleBounds& triangles,
                     std::size_t count, std::uint32_t (&met)[8]);
 

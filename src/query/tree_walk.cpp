@@ -1,11 +1,13 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #include "query/tree_walk.h"
 
+#include "query/sharpening.h"
+
 namespace bocst::query {
 
 namespace {
 
-constexpr std::size_t kLooks = 8;  // at most so many at each tree after one query
+constexpr std::size_t kUnseen = 8;  // nodes to look at, at most so many of each tree after one query
 
 }  // namespace
 
@@ -98,7 +100,7 @@ void TreeWalk::meetCoarse(PairSteps& steps, Scratch& s) {
   const Placement& to = x == 0 ? b_in_a_ : aInB();
   const tree::NodeRef node = steps.pair[x].node, leaf = steps.pair[y].node;
   if (large.triangleCount(leaf) <= CoarseTriangles::kCapacity) {
-    const auto unit = static_cast<double>(steps.geometry.unit[x]);
+    const auto unit = static_cast<double>(steps.geometry.side[x].unit);
     const std::uint32_t asked = steps.coarse == StepGroup::kNone ? ~0u : steps.triangles;
     steps.triangles = s.coarse[y].meeting(small, node, large, leaf, asked, to, unit);
     if (steps.triangles != 0) pushMeeting(steps);
@@ -131,9 +133,9 @@ void TreeWalk::setAside(const PairSteps& steps, Scratch& s) {
   s.aside.add({steps.pair[0].node, steps.pair[1].node});
   for (int side = 0; side < 2; ++side) {
     const StepNode& n = steps.pair[side];
-    if (s.unseen[side].size() == kLooks || n.link.tag() != tree::Link::kImplicit) continue;
+    if (s.unseen[side].size() == kUnseen || n.link.tag() != tree::Link::kImplicit) continue;
     if (n.lane == StepNode::kNoLane) continue;
-    const auto& normal = steps.frames[n.lane / 8].normal[side];
+    const auto& normal = steps.frames[n.lane / 8].normal[0];
     const std::size_t o = n.lane % 8;
     if (normal[0][o] == 0 && normal[1][o] == 0 && normal[2][o] == 0) s.unseen[side].push_back(n.node);
   }

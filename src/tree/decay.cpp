@@ -15,51 +15,32 @@ void Tree::collectTriangles(Link link, const lattice::Cell& cell, std::vector<st
       if (block.grey >> o & 1) collectTriangles(block.child[o].load(std::memory_order_relaxed), cell.octant(o), ids);
     }
   } else if (link.isList()) {
-    const TriangleList list = this->list(link);
-    ids.insert(ids.end(), list.ids, list.ids + list.count);
+    list(link).appendTo(ids);
   } else {
     grid_->gather(surface_, cell, ids);
   }
 }
 
-Link Tree::copyList(Link list, Pool<std::uint32_t, 12>& lists) const {
-  const std::uint32_t* from = &lists_[list.index()];
-  const auto copy = [&lists](const std::uint32_t* words, std::size_t count) {
-    const std::uint32_t index = lists.append(count);
-    std::copy_n(words, count, &lists[index]);
-    return index;
-  };
-  if ((from[0] & kKept) != 0) return Link(list.tag(), copy(from, kKeptWords));
-  const std::uint32_t count = from[0] & kCount;
-  if ((from[0] & kPacked) == 0) return Link(list.tag(), copy(from, 1 + std::size_t{count}));
-  const std::uint32_t ids = copy(&lists_[from[1]], count), index = copy(from, 2 + PackedTriangles::words(count));
-  lists[index + 1] = ids;
-  return Link(list.tag(), index);
-}
-
 // The list of a node whose block goes.
-Link Tree::regained(Link block, const lattice::Cell& cell, Pool<std::uint32_t, 12>& lists) const {
+Link Tree::regained(Link block, const lattice::Cell& cell, TriangleLists& lists) const {
   if (grid_ != nullptr && cell.level <= grid_->level()) return Link();
   const std::uint32_t own = records_[block.index()].own_list;
   if (own != Block::kNone) {
-    const bool is_short = (lists_[own] & ~kPacked) <= kLeafTriangles;  // one that the oracle keeps looks huge
-    return copyList(Link(is_short ? Link::kShortList : Link::kList, own), lists);
+    const bool is_short = !lists_.isKept(own) && lists_[own].count <= kLeafTriangles;
+    return Link(is_short ? Link::kShortList : Link::kList, lists.addCopy(lists_, own));
   }
   std::vector<std::uint32_t> ids;
   collectTriangles(block, cell, ids);
   std::sort(ids.begin(), ids.end());
   ids.erase(std::unique(ids.begin(), ids.end()), ids.end());
-  const std::uint32_t index = lists.append(ids.size() + 1);
-  lists[index] = static_cast<std::uint32_t>(ids.size());
-  std::copy(ids.begin(), ids.end(), &lists[index] + 1);
-  return Link(ids.size() <= kLeafTriangles ? Link::kShortList : Link::kList, index);
+  return Link(ids.size() <= kLeafTriangles ? Link::kShortList : Link::kList, lists.add(ids.data(), ids.size()));
 }
 
 void Tree::dropUnusedShelves() {
   // Which shelves do the lists that stay lie on? Each is known by its first use.
   std::vector<std::uint8_t> used(shelves_.size(), 0);
   const auto mark = [&](std::uint32_t list) {
-    if ((lists_[list] & kKept) != 0) used[lists_[list + 1]] = 1;
+    if (lists_.isKept(list)) used[lists_.place(list).shelf] = 1;
   };
   for (std::uint32_t i = 0; i < blocks_.size(); ++i) {
     const Block& block = blocks_[i];
@@ -105,7 +86,7 @@ void Tree::keepOnly(const std::vector<std::uint8_t>& keep) {
     Pool<Block, 5> blocks;
     Pool<BlockRecord, 5> records;
     Pool<std::atomic<std::int64_t>, 5> stamps;
-    Pool<std::uint32_t, 12> lists;
+    TriangleLists lists;
     Link root;
     while (!moves.empty()) {
       const Move move = moves.back();
@@ -114,7 +95,7 @@ void Tree::keepOnly(const std::vector<std::uint8_t>& keep) {
       if (link.tag() == Link::kBlock && !keep[link.index()]) {
         link = regained(move.from, move.cell, lists);
       } else if (link.isList()) {
-        link = copyList(link, lists);
+        link = Link(link.tag(), lists.addCopy(lists_, link.index()));
       } else if (link.tag() == Link::kBlock) {
         const Block& from = blocks_[link.index()];
         const std::uint32_t own_list = records_[link.index()].own_list, index = blocks.append(1);
@@ -126,7 +107,7 @@ void Tree::keepOnly(const std::vector<std::uint8_t>& keep) {
         to.level = from.level;
         std::copy_n(from.at, 3, to.at);
         records[index].own = records_[link.index()].own;
-        if (own_list != Block::kNone) records[index].own_list = copyList(Link(Link::kList, own_list), lists).index();
+        if (own_list != Block::kNone) records[index].own_list = lists.addCopy(lists_, own_list);
         records[index].parent = move.to;
         stamps[index].store(stamps_[link.index()].load(std::memory_order_relaxed), std::memory_order_relaxed);
         nodes_at_[from.level + 1] += __builtin_popcount(from.grey);

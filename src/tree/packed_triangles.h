@@ -3,36 +3,42 @@
 
 #include <cstddef>
 #include <cstdint>
+#include <vector>
 
 #include "oracle/oracle.h"
 
 namespace bocst::tree {
 
-/// The corners of a leaf's triangles side by side, as 16-bit steps on a grid of the leaf's own: what a query would else
-/// collect from places all over the mesh. Coordinate c of corner k of triangle i is steps[(3 * k + c) * count + i].
+/// The corners of a leaf's triangles side by side, as 16-bit steps on a grid of the leaf's own, each place once: what a
+/// query would else collect from places all over the mesh.
 ///
 /// A coordinate is origin + step * q in lattice units, origin a whole number and step a power of two, so all of it is
 /// exact in float but for q, which is off by half a step.
 class PackedTriangles {
  public:
-  static constexpr std::size_t kRows = 9;
+  static constexpr std::size_t kMostTriangles = 32, kMostPlaces = 3 * kMostTriangles;
 
-  /// How many words `count` triangles take. Whole vectors of eight are read, so there is some room beyond.
-  static std::size_t words(std::size_t count) { return kHeader + (kRows * count + 1) / 2 + kBeyond; }
-
-  /// Writes words(count) words.
-  static void pack(const oracle::Surface& surface, const std::uint32_t* ids, std::size_t count, std::uint32_t* words);
+  /// The words of at most kMostTriangles, at least one.
+  static std::vector<std::uint32_t> pack(const oracle::Surface& surface, const std::vector<std::uint32_t>& ids);
 
   PackedTriangles() = default;
   PackedTriangles(const std::uint32_t* words, std::size_t count);
 
-  std::size_t count = 0;
+  /// How many words they take.
+  std::size_t words() const { return words(count, places); }
+
+  std::size_t count = 0;   ///< Triangles.
+  std::size_t places = 0;  ///< Of corners.
   float origin[3] = {0, 0, 0};
   float step = 0;
-  const std::uint16_t* steps = nullptr;
+  // Whole vectors of eight may be read of both.
+  const std::uint16_t* steps = nullptr;   ///< Coordinate c of place p at [c * places + p].
+  const std::uint8_t* corners = nullptr;  ///< The place of corner k of triangle i at [k * count + i].
 
  private:
-  static constexpr std::size_t kHeader = 4, kBeyond = 4;
+  // The number of places, the exponent of step, the origin; steps, corners, and room for the last vectors.
+  static constexpr std::size_t kHeader = 2;
+  static std::size_t words(std::size_t count, std::size_t places);
 };
 
 }  // namespace bocst::tree

@@ -37,6 +37,12 @@ class Supports {
 
   float value(int number) const { return values_[static_cast<std::size_t>(number)].load(std::memory_order_relaxed); }
 
+  /// All of them, for who reads several at once; each is a word of its own, so it is never read in parts.
+  const float* values() const {
+    static_assert(sizeof(std::atomic<float>) == sizeof(float) && std::atomic<float>::is_always_lock_free);
+    return reinterpret_cast<const float*>(values_.data());
+  }
+
   /// Not yet as good as the tree can say.
   bool isOpen(int number) const {
     return states_[static_cast<std::size_t>(number)].load(std::memory_order_relaxed) == kOpen;

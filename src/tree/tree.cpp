@@ -180,7 +180,8 @@ void Tree::grow(std::vector<Growth>& batch, bool wait) {
                          : tree.isDeepest(cell.level + 1) ? oracle::Expansion::kAll
                                                           : kLeafTriangles;
     if (link.isList()) {
-      tree.askFor(link.index(), question);
+      gathered.emplace_back();
+      tree.askFor(link.index(), question, gathered.back());
     } else if (g.node.isRoot()) {
       question.count = tree.surface_.triangle_count;
       if (g.list_is_enough && question.count <= kLeafTriangles) {
@@ -237,17 +238,17 @@ void Tree::ask(std::vector<Growth>& asked, std::vector<oracle::Expansion>& quest
   for (std::size_t part = 0; part < 2; ++part) publish_all(parts[part], growths[part]);
 }
 
-void Tree::askFor(std::uint32_t list, oracle::Expansion& question) const {
-  const std::uint32_t* words = &lists_[list];
-  question.count = words[0] & kCount;
-  if ((words[0] & kPacked) != 0) {
-    question.ids = &lists_[words[1]];
-  } else if ((words[0] & kKept) == 0) {
-    question.ids = words + 1;
-  } else {
-    question.shelf = shelves_[words[1]];
-    question.shelf_begin = words[2];
+void Tree::askFor(std::uint32_t list, oracle::Expansion& question, std::vector<std::uint32_t>& ids) const {
+  const TriangleList triangles = lists_[list];
+  question.count = triangles.count;
+  if (lists_.isKept(list)) {
+    const TriangleLists::Place place = lists_.place(list);
+    question.shelf = shelves_[place.shelf];
+    question.shelf_begin = place.begin;
+    return;
   }
+  triangles.appendTo(ids);
+  question.ids = ids.data();
 }
 
 void Tree::look(const std::vector<NodeRef>& nodes) {
@@ -316,33 +317,20 @@ std::uint32_t Tree::addBlock(NodeRef node, const lattice::Cell& cell, std::uint8
 }
 
 Link Tree::addList(const std::uint32_t* ids, std::size_t count, bool leaf) {
-  const std::uint32_t index = lists_.append(count + 1);
-  std::uint32_t* words = &lists_[index];
-  words[0] = static_cast<std::uint32_t>(count);
-  std::copy_n(ids, count, words + 1);
+  const std::uint32_t index = lists_.add(ids, count);
   return Link(leaf || count <= kLeafTriangles ? Link::kShortList : Link::kList, index);
-}
-
-// The same list with its corners; whoever reads the old one goes on.
-Link Tree::addPacked(Link list) {
-  const std::uint32_t count = lists_[list.index()];
-  const std::uint32_t index = lists_.append(2 + PackedTriangles::words(count));
-  std::uint32_t* const words = &lists_[index];
-  words[0] = count | kPacked;
-  words[1] = list.index() + 1;
-  PackedTriangles::pack(surface_, &lists_[words[1]], count, words + 2);
-  return Link(list.tag(), index);
 }
 
 void Tree::packLeaves(const std::vector<NodeRef>& leaves) {
   if (leaves.empty() || !hasRoom()) return;
   const std::unique_lock<std::mutex> lock(growth_, std::try_to_lock);
-  if (!lock.owns_lock() || lists_.size() > Pool<std::uint32_t, 12>::kMost / 2) return;
+  if (!lock.owns_lock() || lists_.isHalfFull()) return;
   std::size_t left = 16 + leaves.size() / 4;
   for (const NodeRef leaf : leaves) {
     const Link list = link(leaf);
-    const std::uint32_t count = list.isList() ? lists_[list.index()] : 0;
-    if (count == 0 || count > kLeafTriangles) continue;  // packed already: the count has a flag
+    if (!list.isList() || lists_.isPacked(list.index())) continue;
+    const std::uint32_t count = lists_[list.index()].count;
+    if (count == 0 || count > kLeafTriangles) continue;
     if (!leaf.isRoot()) {
       // Half of the leaves are met but once in hundreds of queries: the second time is early enough.
       std::uint8_t& came = records_[leaf.block()].came;
@@ -351,7 +339,7 @@ void Tree::packLeaves(const std::vector<NodeRef>& leaves) {
       if (!again) continue;
     }
     if (left == 0) continue;
-    setLink(leaf, addPacked(list));
+    setLink(leaf, Link(list.tag(), lists_.addPacked(surface_, list.index())));
     --left;
   }
   countBytes();
@@ -359,11 +347,8 @@ void Tree::packLeaves(const std::vector<NodeRef>& leaves) {
 
 Link Tree::addKept(const std::shared_ptr<const oracle::Held>& shelf, oracle::Expansion::Kept list) {
   if (shelves_.empty() || shelves_.back() != shelf) shelves_.push_back(shelf);
-  const std::uint32_t index = lists_.append(kKeptWords);
-  lists_[index] = list.count | kKept;
-  lists_[index + 1] = static_cast<std::uint32_t>(shelves_.size() - 1);
-  lists_[index + 2] = list.begin;
-  return Link(Link::kList, index);
+  const auto number = static_cast<std::uint32_t>(shelves_.size() - 1);
+  return Link(Link::kList, lists_.addKept(list.count, {number, list.begin}));
 }
 
 Link Tree::addOctantList(const oracle::Expansion& answer, int octant) {
@@ -422,8 +407,8 @@ bool Tree::trianglesOf(NodeRef node, std::size_t most, std::vector<std::uint32_t
   const Link link = this->link(node);
   if (link.isList()) {
     const TriangleList list = this->list(link);
-    if (list.ids == nullptr || list.count > most) return false;
-    ids.assign(list.ids, list.ids + list.count);
+    if (!list.ids.areKnown() || list.count > most) return false;
+    list.appendTo(ids);
     return true;
   }
   const oracle::RootGrid* grid = grid_known_.load(std::memory_order_acquire);

@@ -20,17 +20,11 @@
 #include "oracle/oracle.h"
 #include "tree/block.h"
 #include "tree/gate.h"
-#include "tree/packed_triangles.h"
 #include "tree/pool.h"
 #include "tree/supports.h"
+#include "tree/triangle_lists.h"
 
 namespace bocst::tree {
-
-/// Triangles of a frontier node with a list; ids is null where only the oracle has them, never for a leaf.
-struct TriangleList {
-  const std::uint32_t* ids = nullptr;
-  std::uint32_t count = 0;
-};
 
 /// The sphere-tree of one model: resident nodes, how they grow and how they go.
 ///
@@ -64,24 +58,11 @@ class Tree {
   }
   /// Box and slab of the root; those of other nodes are in their parents' blocks.
   const oracle::CellBounds& rootBounds() const { return root_bounds_; }
-  TriangleList list(Link link) const {
-    const std::uint32_t* words = &lists_[link.index()];
-    const std::uint32_t count = words[0] & kCount;
-    if ((words[0] & kKept) != 0) return {nullptr, count};
-    return {(words[0] & kPacked) != 0 ? &lists_[words[1]] : words + 1, count};
-  }
+  TriangleList list(Link link) const { return lists_[link.index()]; }
   /// Fills `ids` with the triangles of a node without children, or a superset; false where they are not known here or
   /// more than `most`.
   bool trianglesOf(NodeRef node, std::size_t most, std::vector<std::uint32_t>& ids) const;
-  /// Where a list lies, for those who want it in the processor's cache.
-  const std::uint32_t* words(Link list) const { return &lists_[list.index()]; }
-  /// The corners of a leaf's triangles, in the order of its list; false while they are not packed.
-  bool packed(Link link, PackedTriangles& triangles) const {
-    const std::uint32_t* words = &lists_[link.index()];
-    if ((words[0] & kPacked) == 0) return false;
-    triangles = PackedTriangles(words + 2, words[0] & kCount);
-    return true;
-  }
+  const TriangleLists& lists() const { return lists_; }
   /// How far the surface reaches in any direction; what is known of it, for queries to use and to better.
   Supports& supports() const { return supports_; }
   /// How often this surface's tree has grown by a block.
@@ -152,12 +133,8 @@ class Tree {
   using Dropped = std::vector<std::uint8_t>;
 
   void reset(std::shared_ptr<const Mesh> mesh);
-  // A list is a length and the ids. With kPacked the length is followed by where the ids are and PackedTriangles; with
-  // kKept, where the oracle has the ids, by a shelf and a place there.
-  static constexpr std::uint32_t kKept = 0x80000000u, kPacked = 0x40000000u, kCount = ~(kKept | kPacked);
-  static constexpr std::size_t kKeptWords = 3;
 
-  void askFor(std::uint32_t list, oracle::Expansion& question) const;
+  void askFor(std::uint32_t list, oracle::Expansion& question, std::vector<std::uint32_t>& ids) const;
   Link addKept(const std::shared_ptr<const oracle::Held>& shelf, oracle::Expansion::Kept list);
   Link addOctantList(const oracle::Expansion& answer, int octant);
   static void ask(std::vector<Growth>& asked, std::vector<oracle::Expansion>& questions);
@@ -166,15 +143,13 @@ class Tree {
   void publish(NodeRef node, const oracle::Expansion& answer);
   std::uint32_t addBlock(NodeRef node, const lattice::Cell& cell, std::uint8_t grey);
   Link addList(const std::uint32_t* ids, std::size_t count, bool leaf);
-  Link addPacked(Link list);
   void setLink(NodeRef node, Link link);
   void refit();
   void pruneAlone(std::int64_t now, bool budget_only);
   void applyBudget();
   void keepOnly(const std::vector<std::uint8_t>& keep);
   void collectTriangles(Link link, const lattice::Cell& cell, std::vector<std::uint32_t>& ids) const;
-  Link regained(Link block, const lattice::Cell& cell, Pool<std::uint32_t, 12>& lists) const;
-  Link copyList(Link list, Pool<std::uint32_t, 12>& lists) const;
+  Link regained(Link block, const lattice::Cell& cell, TriangleLists& lists) const;
   void dropUnusedShelves();
   std::size_t treeBytes() const;
   void countBytes();
@@ -202,7 +177,7 @@ class Tree {
   Pool<Block, 5> blocks_;
   Pool<BlockRecord, 5> records_;
   mutable Pool<std::atomic<std::int64_t>, 5> stamps_;
-  Pool<std::uint32_t, 12> lists_;
+  TriangleLists lists_;
   std::vector<std::shared_ptr<const oracle::Held>> shelves_;  // of the lists that the oracle keeps
 
   // Tighter bounds of nodes than their parents' blocks hold; blocks that readers see are not written to, so these wait

@@ -327,6 +327,30 @@ void checkBitsOfOthers() {
   }
 }
 
+void checkStepsBack() {
+  std::mt19937 random(8);
+  for (const std::uint32_t span : {3u, 0xfffeu, 0x10002u, 0x7fffffffu}) {
+    for (std::size_t count = 1; count <= 40; ++count) {
+      const std::size_t whole = (count + 7) / 8 * 8;
+      const auto first = static_cast<std::uint32_t>(random() % 0x40000000u);
+      std::vector<std::uint32_t> from(whole, first);
+      for (std::size_t i = 0; i < count; ++i) {
+        const auto at = static_cast<std::uint32_t>(first + i);
+        from[i] = random() % 4 == 0 ? 0x80000000u : at - static_cast<std::uint32_t>(random()) % std::min(span, at + 1);
+      }
+      std::vector<std::uint16_t> back(whole, 7);
+      bool any_far = false;
+      const bool said_far = stepsBack(from.data(), first, count, back.data());
+      for (std::size_t i = 0; i < count; ++i) {
+        const std::int64_t steps = std::int64_t{first} + static_cast<std::int64_t>(i) - std::int64_t{from[i]};
+        ASSERT_EQ(back[i], std::clamp<std::int64_t>(steps, 0, 65535)) << instructionSet() << " value " << i;
+        any_far |= back[i] == 65535;
+      }
+      ASSERT_EQ(said_far, any_far) << instructionSet();
+    }
+  }
+}
+
 TEST(Kernels, EveryInstructionSetAgreesOnGreySets) {
   const Surface surface = surfaceOf(test::soup(500, 3));
   Expansion root = rootOf(surface);
@@ -349,6 +373,7 @@ TEST(Kernels, EveryInstructionSetAgreesOnGreySets) {
     checkMesh(*makeOracle(OracleKind::kCpu), surfaceOf(test::adversarial()), 6, 30);
     checkGridSpans();
     checkBitsOfOthers();
+    checkStepsBack();
   }
   hwy::SetSupportedTargetsForTest(0);
   hwy::GetChosenTarget().Update(hwy::SupportedTargets());

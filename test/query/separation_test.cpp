@@ -13,6 +13,7 @@
 #include "conformance/reference.h"
 #include "every_target.h"
 #include "meshes.h"
+#include "query/sharpening.h"
 #include "query/tree_walk.h"
 
 namespace bocst::query {
@@ -114,7 +115,7 @@ TEST_P(Separation, NeverExceedsBruteForce) {
             ASSERT_GE(eight.value[lane], exact - 0.16 * size) << i << ' ' << round << ' ' << lane;
           }
           for (int k = 0; k < 3; ++k) {
-            for (const std::int32_t at : {eight.of_a[k][lane], eight.of_b[k][lane]}) {
+            for (const std::int32_t at : {eight.near.of_a[k][lane], eight.near.of_b[k][lane]}) {
               ASSERT_GE(at, 0);
               ASSERT_LT(at, tree::Supports::kCount);
             }
@@ -168,7 +169,7 @@ TEST_P(Separation, WhatIsNoNumberIsNotSeparate) {
       for (int k = 0; k < 3; ++k) eight.u[k][lane] = static_cast<float>((lane >> k & 1) != 0 ? x : 0);
     }
     evaluate(a.tree.supports(), b.tree.supports(), apartBy(a, b, Eigen::Matrix3d::Identity(), 1, {9, 9, 9}), eight);
-    for (const auto* of : {&eight.of_a, &eight.of_b}) {
+    for (const auto* of : {&eight.near.of_a, &eight.near.of_b}) {
       for (const auto& row : *of) {
         for (const std::int32_t at : row) {
           EXPECT_GE(at, 0) << x;

@@ -140,7 +140,7 @@ void addBench(CLI::App& program, Job& job) {
       "Ratios are FCL's figure over bocst's: above 1 bocst is better. About two poses of three touch.\n"
       "first: two new models and one query, from vertex and index arrays, which FCL copies and bocst takes over; the "
       "streaming pass adds up all vertices through the index arrays.\n"
-      "warm, contacts, distance: the poses were asked before, and once more before each turn.\n"
+      "warm, contacts, distance: the poses were asked until nothing grew any more, and once more before each turn.\n"
       "memory: heap is what the allocator says that both models hold, mesh copies included.\n"
       "moving: one mesh slides over the other at 60 frames a second of the models' clock; of each frame the least of "
       "all rounds counts.\n"

@@ -44,7 +44,7 @@ double firstAnswer(const Mesh& mesh, const std::vector<Eigen::Isometry3d>& X_ABs
   return quantile(least, 0.5);
 }
 
-/// The same of all poses, asked before.
+/// The same of all poses, asked until nothing grew any more.
 double warmQuery(const Mesh& mesh, const std::vector<Eigen::Isometry3d>& X_ABs, std::size_t rounds) {
   const std::unique_ptr<BocstPair> pair = pairOf(mesh);
   warmUp(*pair, X_ABs);

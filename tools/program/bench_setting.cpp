@@ -4,6 +4,7 @@
 #include <bocst/io.h>
 
 #include <algorithm>
+#include <array>
 
 #include "heap.h"
 #include "report.h"
@@ -112,14 +113,25 @@ std::optional<std::size_t> BenchSetting::hits() const {
 
 std::string BenchSetting::oracleName() const { return makeBocst()->oracleName(); }
 
+void warmUp(const BocstPair& pair, const std::vector<Eigen::Isometry3d>& X_ABs,
+            const std::function<void(const Eigen::Isometry3d&)>& ask) {
+  // Pools grow in steps, so one round without a change says little; and ttl may take from the largest what was grown.
+  constexpr int kMostRounds = 60, kQuietRounds = 3;
+  const auto state = [&pair] {
+    const Statistics a = pair.statisticsA(), b = pair.statisticsB();
+    return std::array<std::uint64_t, 3>{a.expansions, b.expansions, pair.bytes()};
+  };
+  auto before = state();
+  for (int round = 0, quiet = 0; round < kMostRounds && quiet < kQuietRounds; ++round) {
+    for (const Eigen::Isometry3d& X_AB : X_ABs) ask(X_AB);
+    const auto after = state();
+    quiet = after == before ? quiet + 1 : 0;
+    before = after;
+  }
+}
+
 void warmUp(const BocstPair& pair, const std::vector<Eigen::Isometry3d>& X_ABs) {
-  constexpr int kMostRounds = 10;
-  std::size_t before = 0;
-  int rounds = 0;
-  do {
-    before = pair.bytes();
-    for (const Eigen::Isometry3d& X_AB : X_ABs) pair.touch(X_AB);
-  } while (++rounds < kMostRounds && before != pair.bytes());
+  warmUp(pair, X_ABs, [&pair](const Eigen::Isometry3d& X_AB) { pair.touch(X_AB); });
 }
 
 }  // namespace bocst::program

@@ -7,6 +7,7 @@
 #include <Eigen/Geometry>
 #include <cstddef>
 #include <cstdint>
+#include <functional>
 #include <memory>
 #include <optional>
 #include <string>
@@ -77,7 +78,9 @@ class BenchSetting {
   std::vector<bool> query_verdicts_;
 };
 
-/// Asks until the trees stop growing.
+/// Asks until the trees have stopped growing; whether the two touch, if nothing else.
+void warmUp(const BocstPair& pair, const std::vector<Eigen::Isometry3d>& X_ABs,
+            const std::function<void(const Eigen::Isometry3d&)>& ask);
 void warmUp(const BocstPair& pair, const std::vector<Eigen::Isometry3d>& X_ABs);
 
 }  // namespace bocst::program

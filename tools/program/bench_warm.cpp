@@ -35,7 +35,7 @@ void noteWorst(BenchSetting& setting, BenchReport& report, const std::vector<dou
 
 /// As many of the poses, from the first on, as FCL can be asked about in a few seconds: it takes some 7 us a pair.
 std::vector<Eigen::Isometry3d> posesForContacts(BenchSetting& setting) {
-  constexpr std::size_t kMostPairs = 500000;
+  constexpr std::size_t kMostPairs = 2000000;
   const std::size_t most = kMostPairs / (2 * setting.wish().rounds + 1);
   std::vector<Eigen::Isometry3d> poses;
   std::size_t pairs = 0;
@@ -105,6 +105,7 @@ void benchContacts(BenchSetting& setting, BenchReport& report) {
   }
   report.mustBeEqual(same, "pairs of triangles");
 
+  warmUp(*pair, X_ABs, [&pair](const Eigen::Isometry3d& X_AB) { pair->countContacts(X_AB); });
   Side<std::size_t> bocst(X_ABs, [&](const Eigen::Isometry3d& X_AB) { return pair->countContacts(X_AB); });
   Side<std::size_t> fcl(X_ABs, [&](const Eigen::Isometry3d& X_AB) { return setting.fcl().countContacts(X_AB); });
   takeTurns(bocst, fcl, setting.wish().rounds, "contacts");
@@ -121,6 +122,7 @@ void benchDistance(BenchSetting& setting, BenchReport& report) {
   }
   if (apart.empty()) return report.skip("distance", "all poses touch");
   const std::unique_ptr<BocstPair> pair = setting.makeBocst();
+  warmUp(*pair, apart, [&pair](const Eigen::Isometry3d& X_AB) { pair->distance(X_AB); });
   Side<double> bocst(apart, [&](const Eigen::Isometry3d& X_AB) { return pair->distance(X_AB); });
   Side<double> fcl(apart, [&](const Eigen::Isometry3d& X_AB) { return setting.fcl().distance(X_AB); });
   takeTurns(bocst, fcl, setting.wish().rounds, "distance");

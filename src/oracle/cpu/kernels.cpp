@@ -253,6 +253,20 @@ void BitsOfOthers(const std::uint32_t* values, std::size_t count, std::uint32_t 
   }
 }
 
+bool StepsBack(const std::uint32_t* from, std::uint32_t first, std::size_t count, std::uint16_t* back) {
+  const hn::CappedTag<std::uint32_t, 8> d;
+  const hn::RebindToSigned<decltype(d)> di;
+  const hn::Rebind<std::uint16_t, decltype(d)> du;
+  auto most = hn::Zero(di);
+  for (std::size_t i = 0; i < count; i += hn::Lanes(d)) {
+    const auto at = hn::Iota(d, first + static_cast<std::uint32_t>(i));
+    const auto steps = hn::BitCast(di, hn::Sub(at, hn::LoadU(d, from + i)));
+    most = hn::Max(most, steps);
+    hn::StoreU(hn::DemoteTo(du, steps), du, back + i);
+  }
+  return hn::GetLane(hn::MaxOfLanes(di, most)) >= 0xffff;
+}
+
 const char* InstructionSet() { return hwy::TargetName(HWY_TARGET); }
 
 }  // namespace bocst::oracle::HWY_NAMESPACE
@@ -265,6 +279,7 @@ HWY_EXPORT(OctantMasks);
 HWY_EXPORT(Quantise);
 HWY_EXPORT(GridSpans);
 HWY_EXPORT(BitsOfOthers);
+HWY_EXPORT(StepsBack);
 HWY_EXPORT(InstructionSet);
 
 void octantMasks(const float* xyz, std::size_t stride, std::size_t count, float slack, std::uint8_t* masks) {
@@ -282,6 +297,10 @@ void gridSpans(const std::int16_t* vertices, const std::uint32_t* indices, std::
 
 void bitsOfOthers(const std::uint32_t* values, std::size_t count, std::uint32_t value, std::uint8_t* bits) {
   HWY_DYNAMIC_DISPATCH(BitsOfOthers)(values, count, value, bits);
+}
+
+bool stepsBack(const std::uint32_t* from, std::uint32_t first, std::size_t count, std::uint16_t* back) {
+  return HWY_DYNAMIC_DISPATCH(StepsBack)(from, first, count, back);
 }
 
 const char* instructionSet() { return HWY_DYNAMIC_DISPATCH(InstructionSet)(); }

@@ -49,6 +49,10 @@ void gridSpans(const std::int16_t* vertices, const std::uint32_t* indices, std::
 /// Bit i % 8 of bits[i / 8]: is values[i] another value than this? count: a multiple of 8.
 void bitsOfOthers(const std::uint32_t* values, std::size_t count, std::uint32_t value, std::uint8_t* bits);
 
+/// back[i] = first + i - from[i], modulo 2^32 and then as a signed number, no less than 0 and no more than 65535. Whole
+/// vectors of eight are read and written. Returns whether any is 65535, one beyond the last perhaps.
+bool stepsBack(const std::uint32_t* from, std::uint32_t first, std::size_t count, std::uint16_t* back);
+
 /// The instruction set in use, for people.
 const char* instructionSet();
 

@@ -13,10 +13,13 @@
 namespace bocst::oracle {
 namespace {
 
-constexpr std::uint32_t kNone = 0xffffffffu;
-constexpr std::size_t kSmallest = 4096;   // triangles: below, plain expansions are as fast
-constexpr std::size_t kLargeShare = 256;  // at most one triangle in so many may span more than two cells
-constexpr double kMargin = 2;             // lattice units: one step
+constexpr std::uint32_t kNone = 0x7f7f7f7fu;  // more triangles than a grid is made for; of equal bytes, so quickly set
+constexpr std::size_t kSmallest = 4096;       // triangles: below, plain expansions are as fast
+constexpr std::size_t kLargeShare = 256;      // at most one triangle in so many may span more than two cells
+constexpr double kMargin = 2;                 // lattice units: one step
+constexpr std::size_t kBlock = 256;           // triangles that are linked at once
+
+std::size_t roundedUp(std::size_t triangles) { return (triangles + 7) / 8 * 8; }
 
 /// Room for what a grid is made from.
 class Room {
@@ -96,7 +99,7 @@ class QuantisedMesh {
 
 std::unique_ptr<RootGrid> RootGrid::make(const Surface& surface, int max_level) {
   const std::size_t count = surface.mesh->triangleCount();
-  if (count < kSmallest) return nullptr;
+  if (count < kSmallest || count >= kNone) return nullptr;
   const int bits = std::min(count < 10000 ? 3 : count < 300000 ? 4 : 5, max_level - 1);
   // A coarser grid suits larger triangles.
   for (int b = bits; b >= 3; --b) {
@@ -111,12 +114,11 @@ bool RootGrid::build(const Surface& surface) {
   const std::size_t lists = std::size_t{8} << 3 * bits_;
   Room room(lists * sizeof(std::uint32_t) + QuantisedMesh::values(surface) * sizeof(std::int16_t) + lists / 8);
   auto* const heads = room.take<std::uint32_t>(lists);
-  std::fill_n(heads, lists, kNone);
+  std::memset(heads, kNone & 0xff, lists * sizeof(*heads));
   const QuantisedMesh mesh(surface, bits_, room.take<std::int16_t>(QuantisedMesh::values(surface)));
-  next_.reset(new std::uint32_t[count]);
-  adviseHugePages(next_.get(), count * sizeof(next_[0]));
+  back_.reset(new std::uint16_t[roundedUp(count)]);
+  adviseHugePages(back_.get(), count * sizeof(back_[0]));
   triangle_count_ = count;
-  constexpr std::size_t kBlock = 256;
   GridSpan spans[kBlock];
   for (std::size_t begin = 0; begin < count; begin += kBlock) {
     const std::size_t size = std::min(kBlock, count - begin);
@@ -144,17 +146,27 @@ bool RootGrid::build(const Surface& surface) {
 
 void RootGrid::link(std::uint32_t begin, std::uint32_t end, const GridSpan* spans, std::uint32_t* heads) {
   const std::uint32_t first_large = kGridSpanLarge << 3 * bits_;
-  std::uint32_t* const next = next_.get();
+  std::uint32_t next[kBlock] = {};
 #pragma GCC unroll 4
   for (std::uint32_t t = begin; t < end; ++t) {
     const auto list = static_cast<std::uint32_t>(*spans++);
     if (list >= first_large) {
       large_.push_back(std::uint32_t{t});
+      next[t - begin] = kNone;
       continue;
     }
-    next[t] = heads[list];
+    next[t - begin] = heads[list];
     heads[list] = t;
   }
+  if (!stepsBack(next, begin, end - begin, &back_[begin])) return;
+  for (std::uint32_t t = begin; t < end; ++t) {
+    if (next[t - begin] != kNone && t - next[t - begin] >= kFar) far_.push_back({t, next[t - begin]});
+  }
+}
+
+std::uint32_t RootGrid::farNext(std::uint32_t triangle) const {
+  const auto is_before = [](const Far& f, std::uint32_t t) { return f.triangle < t; };
+  return std::lower_bound(far_.begin(), far_.end(), triangle, is_before)->next;
 }
 
 void RootGrid::keepLists(const std::uint32_t* heads, std::uint8_t* bits) {
@@ -308,8 +320,9 @@ bool RootGrid::anyCandidate(const Surface& surface, const lattice::Cell& cell, F
       int last = 0;
       for (int i = 1; i < count; ++i) last = heads[i] > heads[last] ? i : last;
       const std::uint32_t t = heads[last];
-      heads[last] = next_[t];
-      if (heads[last] == kNone) heads[last] = heads[--count];
+      const std::uint32_t back = back_[t];
+      heads[last] = back != kFar ? t - back : farNext(t);
+      if (back == 0) heads[last] = heads[--count];
       if (f(t)) return true;
     }
   }
@@ -380,9 +393,9 @@ CellBounds RootGrid::look(const Surface& surface, const lattice::Cell& cell) con
 }
 
 std::size_t RootGrid::bytes() const {
-  return sizeof(*this) + rows_.capacity() * sizeof(Row) +
-         (triangle_count_ + head_.capacity() + large_.capacity() + may_be_grey_.capacity() + is_grey_.capacity()) *
-             sizeof(head_[0]);
+  return sizeof(*this) + rows_.capacity() * sizeof(Row) + roundedUp(triangle_count_) * sizeof(back_[0]) +
+         far_.capacity() * sizeof(Far) +
+         (head_.capacity() + large_.capacity() + may_be_grey_.capacity() + is_grey_.capacity()) * sizeof(head_[0]);
 }
 
 }  // namespace bocst::oracle

@@ -19,7 +19,7 @@ namespace bocst::oracle {
 /// along each axis (the few that are larger are kept apart), and for each choice of axes there is a list of its own. So
 /// the candidates of a cell are in its own lists and in some of the seven cells on its minimum side. A cell with a
 /// triangle that lies wholly inside is grey; what else a triangle's box meets is decided by the reference test when
-/// somebody asks. 4 bytes a triangle.
+/// somebody asks. 2 bytes a triangle.
 class RootGrid {
  public:
   /// Null when the mesh is too small or its triangles too large for the pass to pay, or max_level is below 4.
@@ -61,6 +61,7 @@ class RootGrid {
   void markCells();
   void dropMissingCells(const Surface& surface);
   void markCoarseCells();
+  std::uint32_t farNext(std::uint32_t triangle) const;
   bool decide(const Surface& surface, const lattice::Cell& cell);
   template <typename F>
   bool anyCandidate(const Surface& surface, const lattice::Cell& cell, F&& f) const;
@@ -77,7 +78,13 @@ class RootGrid {
   };
   std::vector<Row> rows_;  // [axes][z][y]
   std::vector<std::uint32_t> head_;
-  std::unique_ptr<std::uint32_t[]> next_;  // [triangle]
+  // [triangle]: so many triangles back is the next of its list; 0 for the last, kFar for what far_ has.
+  static constexpr std::uint32_t kFar = 0xffff;
+  std::unique_ptr<std::uint16_t[]> back_;
+  struct Far {
+    std::uint32_t triangle, next;
+  };
+  std::vector<Far> far_;  // ordered by triangle
   std::size_t triangle_count_ = 0;
   std::vector<std::uint32_t> large_;
   Bits may_be_grey_, is_grey_;  // the first without the second is to be decided
