@@ -115,8 +115,8 @@ std::string BenchSetting::oracleName() const { return makeBocst()->oracleName();
 
 void warmUp(const BocstPair& pair, const std::vector<Eigen::Isometry3d>& X_ABs,
             const std::function<void(const Eigen::Isometry3d&)>& ask) {
-  // Pools grow in steps, so one round without a change says little; and ttl may take from the largest what was grown.
-  constexpr int kMostRounds = 60, kQuietRounds = 3;
+  // Pools grow in steps, so a few rounds without a change say little; and ttl may take from the largest what was grown.
+  constexpr int kMostRounds = 60, kQuietRounds = 8;
   const auto state = [&pair] {
     const Statistics a = pair.statisticsA(), b = pair.statisticsB();
     return std::array<std::uint64_t, 3>{a.expansions, b.expansions, pair.bytes()};

@@ -33,6 +33,13 @@ void noteWorst(BenchSetting& setting, BenchReport& report, const std::vector<dou
               setting.queryPoses()[worst].text());
 }
 
+/// FCL's turn may take longer than ttl, after which all would grow anew: the models' clock stands still.
+std::unique_ptr<BocstPair> makeAgeless(const BenchSetting& setting) {
+  Options options;
+  options.clock = [] { return Clock::time_point(); };
+  return setting.makeBocst(options);
+}
+
 /// As many of the poses, from the first on, as FCL can be asked about in a few seconds: it takes some 7 us a pair.
 std::vector<Eigen::Isometry3d> posesForContacts(BenchSetting& setting) {
   constexpr std::size_t kMostPairs = 2000000;
@@ -95,7 +102,7 @@ void benchWarm(BenchSetting& setting, BenchReport& report) {
 
 void benchContacts(BenchSetting& setting, BenchReport& report) {
   const std::vector<Eigen::Isometry3d> X_ABs = posesForContacts(setting);
-  const std::unique_ptr<BocstPair> pair = setting.makeBocst();
+  const std::unique_ptr<BocstPair> pair = makeAgeless(setting);
   bool same = true;
   std::size_t count = 0;
   for (const Eigen::Isometry3d& X_AB : X_ABs) {
@@ -121,7 +128,7 @@ void benchDistance(BenchSetting& setting, BenchReport& report) {
     if (!setting.queryVerdicts()[i]) apart.push_back(setting.queryTransforms()[i]);
   }
   if (apart.empty()) return report.skip("distance", "all poses touch");
-  const std::unique_ptr<BocstPair> pair = setting.makeBocst();
+  const std::unique_ptr<BocstPair> pair = makeAgeless(setting);
   warmUp(*pair, apart, [&pair](const Eigen::Isometry3d& X_AB) { pair->distance(X_AB); });
   Side<double> bocst(apart, [&](const Eigen::Isometry3d& X_AB) { return pair->distance(X_AB); });
   Side<double> fcl(apart, [&](const Eigen::Isometry3d& X_AB) { return setting.fcl().distance(X_AB); });
