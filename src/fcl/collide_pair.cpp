@@ -89,8 +89,8 @@ class Collector : public query::Visitor {
         seen_(scratch().seen),
         seen_cells_(scratch().seen_cells),
         pairs_(scratch().pairs),
-        now_(scratch().now),
-        later_(scratch().later) {
+        now_(&scratch().found[0]),
+        later_(&scratch().found[1]) {
     // A boolean query ends at the first contact, so it meets no pair twice.
     left_ = q.contactsLeft();
     once_ = q.request.num_max_contacts > 1 || q.request.enable_cost;
@@ -98,7 +98,7 @@ class Collector : public query::Visitor {
       seen_.clear();
       seen_cells_.clear();
     }
-    now_.count = later_.count = 0;
+    now_->count = later_->count = 0;
   }
 
   /// Where cells lie in the world: from the lattice frame of side A.
@@ -113,13 +113,13 @@ class Collector : public query::Visitor {
     if (swapped_) std::swap(a, b);
     if (once_ && !seen_.insert(a, b)) return false;
     if (certain && !needsCorners()) return add(a, b, nullptr);
-    later_.add(a, b, certain);
+    later_->add(a, b, certain);
     t1_.prefetch(a);
     t2_.prefetch(b);
     // Several at once are cheaper, but the last contact that is asked for is not to be missed.
-    if (now_.count + later_.count >= left_) {
+    if (now_->count + later_->count >= left_) {
       finish();
-    } else if (later_.count == Found::kCapacity) {
+    } else if (later_->count == Found::kCapacity) {
       turn();
     } else {
       return false;
@@ -129,7 +129,7 @@ class Collector : public query::Visitor {
 
   /// To be called at the end of the walk.
   void finish() {
-    if (now_.count + later_.count == 0) return;
+    if (now_->count + later_->count == 0) return;
     turn();
     turn();
   }
@@ -187,7 +187,7 @@ class Collector : public query::Visitor {
     query::PairSet<std::uint32_t> seen;
     query::PairSet<std::uint64_t> seen_cells;
     query::TrianglePairs pairs;
-    Found now, later;
+    Found found[2];
   };
   static Scratch& scratch() {
     thread_local Scratch scratch;
@@ -196,22 +196,22 @@ class Collector : public query::Visitor {
 
   // Looks at the pairs found before the last ones, whose corners are fetched: the walk goes on until they are there.
   void turn() {
-    for (std::size_t i = 0; i < later_.count; ++i) {
-      t1_.prefetchCorners(later_.ids[i][0]);
-      t2_.prefetchCorners(later_.ids[i][1]);
+    for (std::size_t i = 0; i < later_->count; ++i) {
+      t1_.prefetchCorners(later_->ids[i][0]);
+      t2_.prefetchCorners(later_->ids[i][1]);
     }
-    if (now_.count != 0) lookAt();
+    if (now_->count != 0) lookAt();
     std::swap(now_, later_);
-    later_.count = 0;
+    later_->count = 0;
   }
 
   void lookAt() {
     getCorners();
-    if (now_.count == 1 && !now_.certain[0] && !q_.request.enable_contact) return decide(0, nullptr);
+    if (now_->count == 1 && !now_->certain[0] && !q_.request.enable_contact) return decide(0, nullptr);
     query::Touch touches[Found::kCapacity];
     const query::Parted parted = query::partTriangles(pairs_, 2 * rounding(), touches);
-    for (std::size_t i = 0; i < now_.count; ++i) {
-      const bool meet = now_.certain[i] || (parted.meet >> i & 1);
+    for (std::size_t i = 0; i < now_->count; ++i) {
+      const bool meet = now_->certain[i] || (parted.meet >> i & 1);
       if (meet && margin_ == 0) {
         addMet(i, &touches[i]);
       } else if (margin_ > 0 || !kTrustsApart || !(parted.apart >> i & 1)) {
@@ -222,12 +222,12 @@ class Collector : public query::Visitor {
 
   void getCorners() {
     if (!placed_) place();
-    pairs_.count = now_.count;
-    for (std::size_t i = 0; i < now_.count; ++i) {
+    pairs_.count = now_->count;
+    for (std::size_t i = 0; i < now_->count; ++i) {
       Corners p, q;
       for (int k = 0; k < 3; ++k) {
-        p[k] = t1_.corner(now_.ids[i][0], k).template cast<double>();
-        q[k] = place_ * t2_.corner(now_.ids[i][1], k).template cast<double>().eval();
+        p[k] = t1_.corner(now_->ids[i][0], k).template cast<double>();
+        q[k] = place_ * t2_.corner(now_->ids[i][1], k).template cast<double>().eval();
       }
       pairs_.put(i, p, q);
     }
@@ -235,14 +235,14 @@ class Collector : public query::Visitor {
 
   // FCL's test, and what it leaves open. `touch` is how the pair is parted, or null where nobody asks.
   void decide(std::size_t i, const query::Touch* touch) {
-    const std::uint32_t a = now_.ids[i][0], b = now_.ids[i][1];
-    const bool meet = now_.certain[i] || fcl::detail::Intersect<S>::intersect_Triangle(
-                                             t1_.corner(a, 0), t1_.corner(a, 1), t1_.corner(a, 2), t2_.corner(b, 0),
-                                             t2_.corner(b, 1), t2_.corner(b, 2), R_12_, p_12_);
+    const std::uint32_t a = now_->ids[i][0], b = now_->ids[i][1];
+    const bool meet = now_->certain[i] || fcl::detail::Intersect<S>::intersect_Triangle(
+                                              t1_.corner(a, 0), t1_.corner(a, 1), t1_.corner(a, 2), t2_.corner(b, 0),
+                                              t2_.corner(b, 1), t2_.corner(b, 2), R_12_, p_12_);
     if (!meet && margin_ == 0) return;
     Corners p, q;
     pairs_.get(i, p, q);
-    const bool degenerate = !now_.certain[i] && (query::isDegenerate(p) || query::isDegenerate(q));
+    const bool degenerate = !now_->certain[i] && (query::isDegenerate(p) || query::isDegenerate(q));
     if (!degenerate && margin_ == 0) return addMet(i, touch);
     Eigen::Vector3d on_p, on_q;
     const double distance = query::nearestPoints(p, q, on_p, on_q);
@@ -259,7 +259,7 @@ class Collector : public query::Visitor {
   }
 
   void addMet(std::size_t i, const query::Touch* touch) {
-    const std::uint32_t a = now_.ids[i][0], b = now_.ids[i][1];
+    const std::uint32_t a = now_->ids[i][0], b = now_->ids[i][1];
     if (q_.request.enable_cost) addCost(a, b);
     if (touch == nullptr || !q_.request.enable_contact) {
       add(a, b, nullptr);
@@ -323,7 +323,7 @@ class Collector : public query::Visitor {
   query::PairSet<std::uint32_t>& seen_;
   query::PairSet<std::uint64_t>& seen_cells_;
   query::TrianglePairs& pairs_;
-  Found &now_, &later_;
+  Found *now_, *later_;
   fcl::Transform3<double> place_ = fcl::Transform3<double>::Identity();  // the same in double
   fcl::Matrix3<S> R_12_;
   fcl::Vector3<S> p_12_;

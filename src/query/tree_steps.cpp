@@ -58,7 +58,7 @@ inline void fetch(const tree::Tree& tree, tree::Link link, std::size_t leaf_line
 // The same for octants that are all to be walked, so that there is time until they are asked for: a leaf as a whole.
 inline void fetchAll(const tree::Tree& tree, const tree::Block& block, unsigned octants) {
   for (; octants != 0; octants &= octants - 1) {
-    const tree::Link link = block.child[__builtin_ctz(octants)].load(std::memory_order_relaxed);
+    const tree::Link link = block.child[__builtin_ctz(octants)].load(std::memory_order_acquire);
     fetch(tree, link, kLeafLines);
     if (link.tag() == tree::Link::kBlock) tree.fetchStamp(link.index());
   }

@@ -13,7 +13,7 @@ class Link {
  public:
   enum Tag : std::uint32_t {
     kImplicit = 0,   ///< Frontier: its triangles follow from the mesh (root) or from the root grid.
-    kList = 1,       ///< Frontier: index of a list in the list pool: its length, then triangle ids.
+    kList = 1,       ///< Frontier: index of a list (triangle_lists.h).
     kBlock = 2,      ///< Expanded: index of the block of its children.
     kShortList = 3,  ///< As kList, but to be tested rather than expanded.
   };

@@ -19,7 +19,8 @@ class Pool {
  public:
   static constexpr std::size_t kMost = std::size_t{1} << 30;  ///< Links have thirty bits.
   static constexpr std::size_t kChunk = std::size_t{1} << kChunkBits;
-  static constexpr std::size_t kShare = 16;  ///< It grows by a chunk, or by the 16th part.
+  /// It grows by a chunk, or by the 16th part, but not by so many bytes that who appends would feel it.
+  static constexpr std::size_t kShare = 16, kLargestShare = 1 << 16;
 
   T& operator[](std::uint32_t i) { return chunk(i)[i & (kChunk - 1)]; }
   const T& operator[](std::uint32_t i) const { return chunk(i)[i & (kChunk - 1)]; }
@@ -29,11 +30,15 @@ class Pool {
   /// `count` consecutive default-initialised elements, contiguous in memory; returns the index of the first.
   std::uint32_t append(std::size_t count) {
     // What room there is lies in the last chunks; a run that does not fit starts with chunks of its own.
-    if (count > capacity_ - size_) {
-      size_ = static_cast<std::uint32_t>(capacity_);
-      grow(std::max((count + kChunk - 1) / kChunk, (capacity_ >> kChunkBits) / kShare));
+    const bool fits = count <= capacity_ - size_;
+    if ((fits ? size_ : capacity_) + count > kMost) {
+      throw std::length_error("bocst: a tree of more than 2^30 nodes or list entries");
     }
-    if (size_ + count > kMost) throw std::length_error("bocst: a tree of more than 2^30 nodes or list entries");
+    if (!fits) {
+      const std::size_t share = std::min(capacity_ / kShare, kLargestShare / sizeof(T));
+      size_ = static_cast<std::uint32_t>(capacity_);
+      grow((std::max(count, share) + kChunk - 1) / kChunk);
+    }
     const std::uint32_t first = size_;
     size_ += static_cast<std::uint32_t>(count);
     return first;

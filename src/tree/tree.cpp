@@ -247,6 +247,7 @@ void Tree::askFor(std::uint32_t list, oracle::Expansion& question, std::vector<s
     question.shelf_begin = place.begin;
     return;
   }
+  ids.reserve(std::max<std::size_t>(1, triangles.count));  // null is another question
   triangles.appendTo(ids);
   question.ids = ids.data();
 }

@@ -311,6 +311,58 @@ TEST(CollideDouble, MeshesOfVeryDifferentSize) {
 }
 
 // Conservative answers: never a miss, fewer false alarms with depth, the same verdict from any history and order.
+// Small triangles in seven octants of each level's last: as many pairs at every level wait for deeper ones as can.
+Raw nested(int levels, int in_each, double size, unsigned seed) {
+  std::mt19937_64 g(seed);
+  std::uniform_real_distribution<double> u(0, 1);
+  const auto point = [&] { return Eigen::Vector3d(u(g), u(g), u(g)); };
+  Raw raw;
+  raw.vertices = {{0, 0, 0}, {1, 1, 1}};
+  raw.triangles = {fcl::Triangle(0, 0, 0), fcl::Triangle(1, 1, 1)};
+  double side = 1;
+  for (int level = 0; level < levels; ++level) {
+    side /= 2;
+    for (int o = 0; o < 7; ++o) {
+      const Eigen::Vector3d corner =
+          Eigen::Vector3d::Constant(1 - 2 * side) + side * Eigen::Vector3d(o & 1, o >> 1 & 1, o >> 2);
+      for (int i = 0; i < in_each; ++i) {
+        const Eigen::Vector3d at = corner + side * (0.9 * point() + Eigen::Vector3d::Constant(0.05));
+        const std::size_t n = raw.vertices.size();
+        for (int k = 0; k < 3; ++k) {
+          raw.vertices.push_back(at + size * side * (point() - Eigen::Vector3d::Constant(0.5)));
+        }
+        raw.triangles.emplace_back(n, n + 1, n + 2);
+      }
+    }
+  }
+  return raw;
+}
+
+TEST(CollideDouble, AllLevelsAtOnce) {
+  const Raw ra = nested(15, 36, 0.9, 1), rb = nested(15, 36, 0.9, 2);
+  const auto fa = test::bvh<fcl::OBBRSS<double>>(ra), fb = test::bvh<fcl::OBBRSS<double>>(rb);
+  const Model<double> a(ra.mesh()), b(rb.mesh());
+  const Eigen::Vector3d corner(1, 1, 1);
+  std::mt19937_64 g(3);
+  std::size_t met = 0;
+  for (int i = 0; i < 8; ++i) {
+    const Eigen::Matrix3d R =
+        Eigen::AngleAxisd(i % 2 * std::pow(10.0, -0.5 * i), test::randomDirection(g)).toRotationMatrix();
+    const Eigen::Vector3d way = (i + 1) * 1e-5 * test::randomDirection(g);
+    const auto X = test::pose<double>(Eigen::Matrix3d::Identity(), {0, 0, 0});
+    const auto Y = test::pose<double>(R, corner - R * corner + way);
+    const Pairs want = test::pairs<double>(*fa, X, *fb, Y);
+    ASSERT_GT(want.size(), 100u) << i;
+    met += want.size();
+    for (int again = 0; again < 3; ++again) {
+      ASSERT_EQ(test::pairs<double>(a, X, b, Y), want) << i;
+      ASSERT_EQ(test::touching<double>(a, X, b, Y), !want.empty());
+    }
+  }
+  EXPECT_GT(met, 50000u);
+  EXPECT_GE(a.statistics().nodes_per_level.size(), 14u);
+}
+
 TEST(CollideDouble, OneTriangleOfAnySizeThroughAMesh) {
   // Float tests of the two overflow, or see only one of them.
   const Raw small = test::torus(40, 0.2);

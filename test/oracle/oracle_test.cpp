@@ -452,6 +452,34 @@ TEST(RootGrid, KnowsFineMeshesWithSomeLargeTriangles) {
   }
 }
 
+TEST(RootGrid, FollowsListsOverAnyDistance) {
+  // Three triangles in a cell of their own, so far apart in the mesh that steps back just fit, or just do not.
+  const test::Raw torus = test::torus(260);
+  for (const std::size_t gap : {1u, 65533u, 65534u, 65535u, 65536u, 65537u}) {
+    for (const std::size_t first : {0u, 255u, 256u}) {
+      test::Raw raw = torus;
+      const std::size_t v = raw.vertices.size();
+      for (const Eigen::Vector3d& p :
+           {Eigen::Vector3d(0, 0, 0), Eigen::Vector3d(0, 1e-3, 0), Eigen::Vector3d(1e-3, 0, 0)}) {
+        raw.vertices.push_back(p - Eigen::Vector3d::Constant(3));
+      }
+      std::vector<std::uint32_t> expected;
+      for (std::size_t t = first; t < raw.triangles.size() && expected.size() < 3; t += gap) {
+        raw.triangles[t] = fcl::Triangle(v, v + 1, v + 2);
+        expected.push_back(static_cast<std::uint32_t>(t));
+      }
+      ASSERT_GE(expected.size(), 3u);
+      const Surface surface = surfaceOf(raw);
+      const auto grid = RootGrid::make(surface, lattice::kMaxLevel);
+      ASSERT_NE(grid, nullptr);
+      std::vector<std::uint32_t> ids;
+      grid->gather(surface, Cell{grid->level(), {0, 0, 0}}, ids);
+      std::sort(ids.begin(), ids.end());
+      EXPECT_EQ(ids, expected) << "gap " << gap << " first " << first;
+    }
+  }
+}
+
 TEST(RootGrid, LargeTrianglesAreLeftToExpansions) {
   test::Raw raw = test::soup(3000, 1);
   for (auto& t : raw.triangles) {

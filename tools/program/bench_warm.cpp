@@ -40,7 +40,7 @@ std::unique_ptr<BocstPair> makeAgeless(const BenchSetting& setting) {
   return setting.makeBocst(options);
 }
 
-/// As many of the poses, from the first on, as FCL can be asked about in a few seconds: it takes some 7 us a pair.
+/// As many of the poses, from the first on, as FCL can be asked about in ten seconds or so: it takes some 4 us a pair.
 std::vector<Eigen::Isometry3d> posesForContacts(BenchSetting& setting) {
   constexpr std::size_t kMostPairs = 2000000;
   const std::size_t most = kMostPairs / (2 * setting.wish().rounds + 1);
