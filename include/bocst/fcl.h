@@ -108,7 +108,7 @@ BOCST_EXPORT S distance(const fcl::CollisionGeometry<S>* o1, const fcl::Transfor
 template <typename S>
 BOCST_EXPORT bool isModel(const fcl::CollisionGeometry<S>* geometry);
 
-namespace fcl_room {
+namespace fcl_adapter {
 template <typename S>
 BOCST_EXPORT S continuousPair(const fcl::CollisionGeometry<S>* o1, const fcl::MotionBase<S>* motion1,
                               const fcl::CollisionGeometry<S>* o2, const fcl::MotionBase<S>* motion2,
@@ -120,7 +120,7 @@ BOCST_EXPORT S continuousPair(const fcl::CollisionGeometry<S>* o1, const fcl::Tr
                               const fcl::Transform3<S>& X_W2_begin, const fcl::Transform3<S>& X_W2_end,
                               const fcl::ContinuousCollisionRequest<S>& request,
                               fcl::ContinuousCollisionResult<S>& result);
-}  // namespace fcl_room
+}  // namespace fcl_adapter
 
 /// When do the two geometries first touch, while time goes from 0 to 1? As fcl::continuousCollide, over two motions or
 /// from begin to end poses (world from geometry): sets the result and returns its time_of_contact.
@@ -147,7 +147,7 @@ S continuousCollide(const fcl::CollisionGeometry<S>* o1, const fcl::MotionBase<S
                     const fcl::CollisionGeometry<S>* o2, const fcl::MotionBase<S>* motion2,
                     const fcl::ContinuousCollisionRequest<S>& request, fcl::ContinuousCollisionResult<S>& result) {
   if (isModel<S>(o1) || isModel<S>(o2)) {
-    return fcl_room::continuousPair<S>(o1, motion1, o2, motion2, request, result);
+    return fcl_adapter::continuousPair<S>(o1, motion1, o2, motion2, request, result);
   }
   return fcl::continuousCollide<S>(o1, motion1, o2, motion2, request, result);
 }
@@ -157,7 +157,7 @@ S continuousCollide(const fcl::CollisionGeometry<S>* o1, const fcl::Transform3<S
                     const fcl::Transform3<S>& X_W2_begin, const fcl::Transform3<S>& X_W2_end,
                     const fcl::ContinuousCollisionRequest<S>& request, fcl::ContinuousCollisionResult<S>& result) {
   if (isModel<S>(o1) || isModel<S>(o2)) {
-    return fcl_room::continuousPair<S>(o1, X_W1_begin, X_W1_end, o2, X_W2_begin, X_W2_end, request, result);
+    return fcl_adapter::continuousPair<S>(o1, X_W1_begin, X_W1_end, o2, X_W2_begin, X_W2_end, request, result);
   }
   if constexpr (std::is_same<S, double>::value) {
     return fcl::continuousCollide<S>(o1, X_W1_begin, X_W1_end, o2, X_W2_begin, X_W2_end, request, result);

@@ -76,8 +76,8 @@ void checkWatertight(const Mesh& mesh) {
 
 }  // namespace
 
-std::vector<Vector3d> pointOfEachPiece(const std::vector<Vector3d>& vertices,
-                                       const std::vector<Mesh::Indices>& triangles) {
+std::vector<Vector3d> pointOfEachComponent(const std::vector<Vector3d>& vertices,
+                                           const std::vector<Mesh::Indices>& triangles) {
   std::vector<std::uint32_t> parent = weld(vertices);
   const auto root = [&parent](std::uint32_t i) {
     while (parent[i] != i) i = parent[i] = parent[parent[i]];
@@ -188,15 +188,15 @@ bool Solid::windsAbout(const Vector3d& point) const {
   return winding != 0;
 }
 
-bool Solid::mayHold(const Vector3d& point, double tolerance) const {
+bool Solid::mayContain(const Vector3d& point, double tolerance) const {
   const double off = 2 * (tolerance + rounding_);
   const Eigen::AlignedBox3d& bounds = mesh_->bounds();
   if (((bounds.min() - point).array() > off).any() || ((point - bounds.max()).array() > off).any()) return false;
   if (windsAbout(point)) return true;
   // Of the six ways along the axes, one leads into the surface by more than half, if the point is just outside.
   for (int k = 0; k < 3; ++k) {
-    const Vector3d way = off * Vector3d::Unit(k);
-    if (windsAbout(point + way) || windsAbout(point - way)) return true;
+    const Vector3d displacement = off * Vector3d::Unit(k);
+    if (windsAbout(point + displacement) || windsAbout(point - displacement)) return true;
   }
   return false;
 }

@@ -12,9 +12,9 @@
 
 namespace bocst {
 
-/// A point of each connected piece of a surface: vertices at the same place are one.
-std::vector<Eigen::Vector3d> pointOfEachPiece(const std::vector<Eigen::Vector3d>& vertices,
-                                              const std::vector<Mesh::Indices>& triangles);
+/// A point of each connected component of a surface: vertices at the same place are one.
+std::vector<Eigen::Vector3d> pointOfEachComponent(const std::vector<Eigen::Vector3d>& vertices,
+                                                  const std::vector<Mesh::Indices>& triangles);
 
 /// What a watertight mesh encloses: the points about which its surface winds. So pieces may overlap, and a piece turned
 /// inside out within another is a cavity. Immutable; 12 to 40 bytes a triangle.
@@ -27,7 +27,7 @@ class Solid {
 
   /// Is the point (in the mesh's frame), whose coordinates may be off by `tolerance`, inside? True also where rounding
   /// leaves that open.
-  bool mayHold(const Eigen::Vector3d& point, double tolerance) const;
+  bool mayContain(const Eigen::Vector3d& point, double tolerance) const;
 
   std::size_t bytes() const;
 

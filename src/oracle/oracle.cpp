@@ -1,9 +1,9 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #include "oracle/oracle.h"
 
+#include "egl/oracle_selection.h"
 #include "oracle/cpu/cpu_oracle.h"
 #include "oracle/gl/devices.h"
-#include "oracle/wish.h"
 
 namespace bocst::oracle {
 namespace {
@@ -47,16 +47,16 @@ CellBounds OctantBounds::get(int octant) const {
 
 std::shared_ptr<Oracle> makeOracle(OracleKind kind, int viewport) {
   static const std::shared_ptr<Oracle> cpu = std::make_shared<CpuOracle>();
-  const Wish wish = wishOf(kind);
-  if (wish.kind == OracleKind::kAuto) {
+  const OracleSelection selection = oracleSelectionOf(kind);
+  if (selection.kind == OracleKind::kAuto) {
     const std::shared_ptr<Oracle> hardware = gl::makeOracleOnHardware();
     return hardware != nullptr ? hardware : cpu;
   }
-  if (wish.kind == OracleKind::kCpu) return cpu;
+  if (selection.kind == OracleKind::kCpu) return cpu;
   try {
-    return gl::makeOracle(wish.kind, wish.device, viewport);
+    return gl::makeOracle(selection.kind, selection.device, viewport);
   } catch (const OracleError& e) {
-    throw OracleError(std::string("oracle ") + nameOf(wish.kind) + ": " + e.what());
+    throw OracleError(std::string("oracle ") + nameOf(selection.kind) + ": " + e.what());
   }
 }
 

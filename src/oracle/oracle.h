@@ -17,9 +17,9 @@
 namespace bocst::oracle {
 
 /// Something in an oracle's own memory; it goes when nobody holds it any more.
-class Held {
+class DeviceResource {
  public:
-  virtual ~Held() = default;
+  virtual ~DeviceResource() = default;
   virtual std::size_t bytes() const = 0;
 };
 
@@ -50,21 +50,22 @@ struct OctantBounds {
 static_assert(sizeof(OctantBounds) == 88);
 
 /// One node to expand: the question and the answer.
-struct Expansion {
+struct ExpansionRequest {
   static constexpr std::size_t kAll = std::numeric_limits<std::size_t>::max();
 
   /// A list that the oracle keeps for itself.
-  struct Kept {
+  struct DeviceList {
     std::uint32_t begin = 0, count = 0;
   };
 
   // Asked.
   const Surface* surface = nullptr;
   lattice::Cell cell;
-  const std::uint32_t* ids = nullptr;  ///< Triangles that may meet the cell; null: see `shelf`.
+  const std::uint32_t* ids = nullptr;  ///< Triangles that may meet the cell; null: see `resource`.
   std::size_t count = 0;
-  std::shared_ptr<const Held> shelf;  ///< The list is one that this oracle keeps; null, and no ids: all of the mesh.
-  std::uint32_t shelf_begin = 0;
+  std::shared_ptr<const DeviceResource>
+      resource;  ///< The list is one that this oracle keeps; null, and no ids: all of the mesh.
+  std::uint32_t resource_begin = 0;
   bool own_only = false;  ///< The node stays a leaf: only grey, own and one list (of the cell itself) are wanted.
   std::size_t ids_up_to = kAll;  ///< Longer lists may stay with the oracle.
 
@@ -75,10 +76,10 @@ struct Expansion {
   std::vector<std::uint32_t> lists;         ///< Triangles of octant 0, of octant 1, ...
   std::array<std::size_t, 9> list_begin{};  ///< Octant o has lists[list_begin[o]] to lists[list_begin[o + 1]];
                                             ///< with own_only all of lists is the cell's.
-  std::shared_ptr<const Held> kept;         ///< Holds the lists that the oracle keeps.
-  std::array<Kept, 8> kept_lists{};         ///< Where it has octant o's, if count is not 0; it is then not in `lists`.
+  std::shared_ptr<const DeviceResource> kept_resource;  ///< Holds the lists that the oracle keeps.
+  std::array<DeviceList, 8> device_lists{};  ///< Where it has octant o's, if count is not 0; it is then not in `lists`.
 
-  std::size_t listSize(int o) const { return list_begin[o + 1] - list_begin[o] + kept_lists[o].count; }
+  std::size_t listSize(int o) const { return list_begin[o + 1] - list_begin[o] + device_lists[o].count; }
 };
 
 /// Answers expansion batches. Any number of threads may submit; each batch belongs to one thread until wait() returned.
@@ -90,15 +91,15 @@ class Oracle {
   virtual std::string name() const = 0;
 
   /// Starts to answer a batch; an oracle without a device of its own may answer all of it here.
-  virtual void submit(std::vector<Expansion>& batch) = 0;
+  virtual void submit(std::vector<ExpansionRequest>& batch) = 0;
 
   /// Returns when the whole batch is answered. @throws OracleError when a device was lost that had the only copy of a
   /// mesh.
-  virtual void wait(std::vector<Expansion>& batch) = 0;
+  virtual void wait(std::vector<ExpansionRequest>& batch) = 0;
 
   /// Brings the surface to where the oracle works, if that is elsewhere, for as long as the result is held; null where
   /// it cannot. An oracle brings what nobody holds anew for each batch.
-  virtual std::shared_ptr<const Held> hold(const Surface&) { return nullptr; }
+  virtual std::shared_ptr<const DeviceResource> makeResident(const Surface&) { return nullptr; }
 
   /// Does it need the mesh on the host, too?
   virtual bool needsHostMesh() const { return true; }
@@ -114,7 +115,7 @@ class Oracle {
   virtual std::uint64_t queries() const { return 0; }
 
   /// The ids of a list that this oracle keeps; false when it has lost them.
-  virtual bool fetch(const Held&, Expansion::Kept, std::uint32_t*) { return false; }
+  virtual bool fetch(const DeviceResource&, ExpansionRequest::DeviceList, std::uint32_t*) { return false; }
 };
 
 /// The oracle for these options: BOCST_ORACLE overrides kAuto; else compute on a hardware GPU, else the CPU. Shared by

@@ -10,13 +10,13 @@ namespace bocst::oracle {
 namespace {
 
 constexpr double kUlp = 0x1p-53;
-constexpr double kBoxPad = 16 * kUlp * (1 << lattice::kBits);
-constexpr double kPlanePad = 32 * kUlp;
+constexpr double kBoxRoundingMargin = 16 * kUlp * (1 << lattice::kBits);
+constexpr double kPlaneRoundingMargin = 32 * kUlp;
 
 }  // namespace
 
-bool touches(const Eigen::Vector3d corners[3], const Eigen::Vector3d& center, double half) {
-  const double h = half + kBoxPad;
+bool triangleMeetsCube(const Eigen::Vector3d corners[3], const Eigen::Vector3d& center, double half) {
+  const double h = half + kBoxRoundingMargin;
   const Eigen::Vector3d v[3] = {corners[0] - center, corners[1] - center, corners[2] - center};
   for (int k = 0; k < 3; ++k) {
     if (std::min({v[0][k], v[1][k], v[2][k]}) > h || std::max({v[0][k], v[1][k], v[2][k]}) < -h) return false;
@@ -36,7 +36,7 @@ bool touches(const Eigen::Vector3d corners[3], const Eigen::Vector3d& center, do
   const double products =
       (size[0] * (std::abs(v[0][0]) + h) + size[1] * (std::abs(v[0][1]) + h)) + size[2] * (std::abs(v[0][2]) + h);
   const double along = (n[0] * v[0][0] + n[1] * v[0][1]) + n[2] * v[0][2];
-  if (std::abs(along) > h * width + kPlanePad * products) return false;
+  if (std::abs(along) > h * width + kPlaneRoundingMargin * products) return false;
 
   for (int i = 0; i < 3; ++i) {
     const Eigen::Vector3d& a = v[i];            // both ends of the edge project to the same value

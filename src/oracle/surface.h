@@ -9,13 +9,13 @@
 
 namespace bocst::oracle {
 
-class Held;
+class DeviceResource;
 
 /// What an oracle is asked about: a mesh, seen on its lattice.
 struct Surface {
   std::shared_ptr<const Mesh> mesh;  ///< Null when only the device has it.
   lattice::Lattice lattice;
-  std::shared_ptr<const Held> device = nullptr;  ///< What Oracle::hold() gave.
+  std::shared_ptr<const DeviceResource> device = nullptr;  ///< What Oracle::hold() gave.
   std::size_t triangle_count = mesh->triangleCount();
   Eigen::AlignedBox3d bounds = mesh->bounds();  ///< In the mesh's frame.
 

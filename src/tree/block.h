@@ -9,7 +9,7 @@
 namespace bocst::tree {
 
 /// Says where the triangles or the children of a resident node are: two bits of tag, thirty of index.
-class Link {
+class ChildRef {
  public:
   enum Tag : std::uint32_t {
     kImplicit = 0,   ///< Frontier: its triangles follow from the mesh (root) or from the root grid.
@@ -18,13 +18,13 @@ class Link {
     kShortList = 3,  ///< As kList, but to be tested rather than expanded.
   };
 
-  Link() = default;
-  Link(Tag tag, std::uint32_t index) : bits_(tag << 30 | index) {}
+  ChildRef() = default;
+  ChildRef(Tag tag, std::uint32_t index) : bits_(tag << 30 | index) {}
 
   Tag tag() const { return static_cast<Tag>(bits_ >> 30); }
   bool isList() const { return tag() == kList || tag() == kShortList; }
   std::uint32_t index() const { return bits_ & 0x3fffffffu; }
-  bool operator==(Link other) const { return bits_ == other.bits_; }
+  bool operator==(ChildRef other) const { return bits_ == other.bits_; }
 
  private:
   std::uint32_t bits_ = 0;
@@ -37,7 +37,7 @@ class Link {
 /// | 0..87 | octants: box and slab of each (oracle.h, OctantBounds) |
 /// | 88 | grey: bit o says octant o is a node |
 /// | 89..95 | cell: level, then x, y, z of the expanded node (16 bits each) |
-/// | 96..127 | child: the link of each octant |
+/// | 96..127 | child: the child reference of each octant |
 struct alignas(64) Block {
   static constexpr std::uint32_t kNone = 0xffffffffu;
 
@@ -45,13 +45,13 @@ struct alignas(64) Block {
   std::uint8_t grey = 0;
   std::uint8_t level = 1;
   std::uint16_t at[3] = {0, 0, 0};
-  std::atomic<Link> child[8] = {};
+  std::atomic<ChildRef> child[8] = {};
 
   lattice::Cell cell() const { return {level, {at[0], at[1], at[2]}}; }
 };
 static_assert(sizeof(Block) == 128);
 static_assert(sizeof(oracle::CellBounds) == 11);
-static_assert(std::atomic<Link>::is_always_lock_free);
+static_assert(std::atomic<ChildRef>::is_always_lock_free);
 
 /// A resident node: the root, or an octant of a block.
 struct NodeRef {

@@ -8,56 +8,57 @@
 
 namespace bocst::tree {
 
-void Tree::collectTriangles(Link link, const lattice::Cell& cell, std::vector<std::uint32_t>& ids) const {
-  if (link.tag() == Link::kBlock) {
-    const Block& block = blocks_[link.index()];
+void Tree::collectTriangles(ChildRef ref, const lattice::Cell& cell, std::vector<std::uint32_t>& ids) const {
+  if (ref.tag() == ChildRef::kBlock) {
+    const Block& block = blocks_[ref.index()];
     for (int o = 0; o < 8; ++o) {
       if (block.grey >> o & 1) collectTriangles(block.child[o].load(std::memory_order_relaxed), cell.octant(o), ids);
     }
-  } else if (link.isList()) {
-    list(link).appendTo(ids);
+  } else if (ref.isList()) {
+    list(ref).appendTo(ids);
   } else {
     grid_->gather(surface_, cell, ids);
   }
 }
 
 // The list of a node whose block goes.
-Link Tree::regained(Link block, const lattice::Cell& cell, TriangleLists& lists) const {
-  if (grid_ != nullptr && cell.level <= grid_->level()) return Link();
+ChildRef Tree::regained(ChildRef block, const lattice::Cell& cell, TriangleLists& lists) const {
+  if (grid_ != nullptr && cell.level <= grid_->level()) return ChildRef();
   const std::uint32_t own = records_[block.index()].own_list;
   if (own != Block::kNone) {
-    const bool is_short = !lists_.isKept(own) && lists_[own].count <= kLeafTriangles;
-    return Link(is_short ? Link::kShortList : Link::kList, lists.addCopy(lists_, own));
+    const bool is_short = !lists_.isOnDevice(own) && lists_[own].count <= kLeafTriangles;
+    return ChildRef(is_short ? ChildRef::kShortList : ChildRef::kList, lists.addCopy(lists_, own));
   }
   std::vector<std::uint32_t> ids;
   collectTriangles(block, cell, ids);
   std::sort(ids.begin(), ids.end());
   ids.erase(std::unique(ids.begin(), ids.end()), ids.end());
-  return Link(ids.size() <= kLeafTriangles ? Link::kShortList : Link::kList, lists.add(ids.data(), ids.size()));
+  return ChildRef(ids.size() <= kLeafTriangles ? ChildRef::kShortList : ChildRef::kList,
+                  lists.add(ids.data(), ids.size()));
 }
 
-void Tree::dropUnusedShelves() {
+void Tree::dropUnusedResources() {
   // Which shelves do the lists that stay lie on? Each is known by its first use.
-  std::vector<std::uint8_t> used(shelves_.size(), 0);
+  std::vector<std::uint8_t> used(resources_.size(), 0);
   const auto mark = [&](std::uint32_t list) {
-    if (lists_.isKept(list)) used[lists_.place(list).shelf] = 1;
+    if (lists_.isOnDevice(list)) used[lists_.place(list).resource] = 1;
   };
   for (std::uint32_t i = 0; i < blocks_.size(); ++i) {
     const Block& block = blocks_[i];
     if (records_[i].own_list != Block::kNone) mark(records_[i].own_list);
     for (int o = 0; o < 8; ++o) {
-      const Link link = block.child[o].load(std::memory_order_relaxed);
-      if ((block.grey >> o & 1) != 0 && link.isList()) mark(link.index());
+      const ChildRef ref = block.child[o].load(std::memory_order_relaxed);
+      if ((block.grey >> o & 1) != 0 && ref.isList()) mark(ref.index());
     }
   }
-  for (std::size_t i = 0; i < shelves_.size(); ++i) {
-    if (!used[i]) shelves_[i] = nullptr;
+  for (std::size_t i = 0; i < resources_.size(); ++i) {
+    if (!used[i]) resources_[i] = nullptr;
   }
 }
 
 // Copies what stays into fresh pools: what goes leaves no holes, and nothing of it is looked at again.
 void Tree::keepOnly(const std::vector<std::uint8_t>& keep) {
-  const Link old_root = root_.load(std::memory_order_relaxed);
+  const ChildRef old_root = root_.load(std::memory_order_relaxed);
   std::size_t before = 0, after = 0;
   for (auto& n : nodes_at_) {
     before += n;
@@ -66,50 +67,51 @@ void Tree::keepOnly(const std::vector<std::uint8_t>& keep) {
   nodes_at_[1] = 1;
 
   struct Move {
-    Link from;
+    ChildRef from;
     NodeRef to;
     lattice::Cell cell;
   };
   std::vector<Move> moves{{old_root, NodeRef{}, lattice::Cell{}}};
-  const bool root_stays = old_root.tag() == Link::kBlock && old_root.index() < keep.size() && keep[old_root.index()];
+  const bool root_stays =
+      old_root.tag() == ChildRef::kBlock && old_root.index() < keep.size() && keep[old_root.index()];
   if (!root_stays) {
     grid_known_.store(nullptr, std::memory_order_relaxed);
     grid_.reset();
     grid_tried_ = false;
-    root_.store(Link(), std::memory_order_relaxed);
+    root_.store(ChildRef(), std::memory_order_relaxed);
     blocks_.clear();
     records_.clear();
-    stamps_.clear();
+    last_use_.clear();
     lists_.clear();
-    shelves_.clear();
+    resources_.clear();
   } else {
     Pool<Block, 5> blocks;
     Pool<BlockRecord, 5> records;
-    Pool<std::atomic<std::int64_t>, 5> stamps;
+    Pool<std::atomic<std::int64_t>, 5> last_use;
     TriangleLists lists;
-    Link root;
+    ChildRef root;
     while (!moves.empty()) {
       const Move move = moves.back();
       moves.pop_back();
-      Link link = move.from;
-      if (link.tag() == Link::kBlock && !keep[link.index()]) {
-        link = regained(move.from, move.cell, lists);
-      } else if (link.isList()) {
-        link = Link(link.tag(), lists.addCopy(lists_, link.index()));
-      } else if (link.tag() == Link::kBlock) {
-        const Block& from = blocks_[link.index()];
-        const std::uint32_t own_list = records_[link.index()].own_list, index = blocks.append(1);
+      ChildRef ref = move.from;
+      if (ref.tag() == ChildRef::kBlock && !keep[ref.index()]) {
+        ref = regained(move.from, move.cell, lists);
+      } else if (ref.isList()) {
+        ref = ChildRef(ref.tag(), lists.addCopy(lists_, ref.index()));
+      } else if (ref.tag() == ChildRef::kBlock) {
+        const Block& from = blocks_[ref.index()];
+        const std::uint32_t own_list = records_[ref.index()].own_list, index = blocks.append(1);
         records.append(1);
-        stamps.append(1);
+        last_use.append(1);
         Block& to = blocks[index];
         to.octants = from.octants;
         to.grey = from.grey;
         to.level = from.level;
         std::copy_n(from.at, 3, to.at);
-        records[index].own = records_[link.index()].own;
+        records[index].own = records_[ref.index()].own;
         if (own_list != Block::kNone) records[index].own_list = lists.addCopy(lists_, own_list);
         records[index].parent = move.to;
-        stamps[index].store(stamps_[link.index()].load(std::memory_order_relaxed), std::memory_order_relaxed);
+        last_use[index].store(last_use_[ref.index()].load(std::memory_order_relaxed), std::memory_order_relaxed);
         nodes_at_[from.level + 1] += __builtin_popcount(from.grey);
         for (int o = 0; o < 8; ++o) {
           if (from.grey >> o & 1) {
@@ -117,16 +119,16 @@ void Tree::keepOnly(const std::vector<std::uint8_t>& keep) {
                 {from.child[o].load(std::memory_order_relaxed), NodeRef::octant(index, o), move.cell.octant(o)});
           }
         }
-        link = Link(Link::kBlock, index);
+        ref = ChildRef(ChildRef::kBlock, index);
       }
-      std::atomic<Link>& place = move.to.isRoot() ? root_ : blocks[move.to.block()].child[move.to.octant()];
-      place.store(link, std::memory_order_relaxed);
+      std::atomic<ChildRef>& place = move.to.isRoot() ? root_ : blocks[move.to.block()].child[move.to.octant()];
+      place.store(ref, std::memory_order_relaxed);
     }
     blocks_.swap(blocks);
     records_.swap(records);
-    stamps_.swap(stamps);
+    last_use_.swap(last_use);
     lists_.swap(lists);
-    dropUnusedShelves();
+    dropUnusedResources();
   }
   refits_.clear();  // they name nodes of the old pools
   refits_wait_.store(false, std::memory_order_relaxed);
@@ -137,13 +139,13 @@ void Tree::keepOnly(const std::vector<std::uint8_t>& keep) {
 
 void Tree::pruneAlone(std::int64_t now, bool budget_only) {
   const std::int64_t ttl = std::chrono::duration_cast<std::chrono::nanoseconds>(options_.ttl).count();
-  const auto is_old = [&](std::uint32_t block) { return now - stamps_[block].load(std::memory_order_relaxed) > ttl; };
+  const auto is_old = [&](std::uint32_t block) { return now - last_use_[block].load(std::memory_order_relaxed) > ttl; };
   const auto some_are_old = [&] {
     std::uint32_t i = blocks_.size();
     while (i > 0 && !is_old(i - 1)) --i;
     return i > 0;
   };
-  if (!budget_only && ttl > 0 && root_.load(std::memory_order_relaxed).tag() == Link::kBlock && some_are_old()) {
+  if (!budget_only && ttl > 0 && root_.load(std::memory_order_relaxed).tag() == ChildRef::kBlock && some_are_old()) {
     // Children come after their parents in the pool, so one backward pass sees every child first.
     std::vector<std::uint8_t> keep(blocks_.size(), 1);
     bool some = false;
@@ -152,10 +154,10 @@ void Tree::pruneAlone(std::int64_t now, bool budget_only) {
       bool deepest = true;
       for (int o = 0; o < 8; ++o) {
         if ((block.grey >> o & 1) == 0) continue;
-        const Link child = block.child[o].load(std::memory_order_relaxed);
-        if (child.tag() != Link::kBlock) continue;
+        const ChildRef child = block.child[o].load(std::memory_order_relaxed);
+        if (child.tag() != ChildRef::kBlock) continue;
         deepest = false;
-        if (!keep[child.index()]) stamps_[i].store(now, std::memory_order_relaxed);  // its own time starts (3.1)
+        if (!keep[child.index()]) last_use_[i].store(now, std::memory_order_relaxed);  // its own time starts (3.1)
       }
       if (deepest && is_old(i)) {
         keep[i] = 0;
@@ -178,7 +180,7 @@ void Tree::applyBudget() {
     std::vector<std::uint32_t> order(blocks_.size());
     std::iota(order.begin(), order.end(), 0u);
     std::stable_sort(order.begin(), order.end(), [this](std::uint32_t a, std::uint32_t b) {
-      return stamps_[a].load(std::memory_order_relaxed) > stamps_[b].load(std::memory_order_relaxed);
+      return last_use_[a].load(std::memory_order_relaxed) > last_use_[b].load(std::memory_order_relaxed);
     });
     std::vector<std::uint8_t> keep(blocks_.size(), 0);
     for (std::size_t k = 0; k < std::min(count, order.size()); ++k) {
@@ -203,7 +205,7 @@ void Tree::afterQuery(std::int64_t now) {
     time_to = next_prune_.compare_exchange_strong(due, now + step, std::memory_order_relaxed);
   }
   if (!refits && !over_budget && !time_to) return;
-  const std::unique_lock<Gate> alone(gate_, std::try_to_lock);
+  const std::unique_lock<ShardedLock> alone(query_lock_, std::try_to_lock);
   if (!alone.owns_lock()) return;
   if (refits) refit();
   if (over_budget || time_to) pruneAlone(now, !time_to);

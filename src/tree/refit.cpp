@@ -49,7 +49,7 @@ void uniteSlabs(const Block& block, oracle::CellBounds& own) {
       half[k] = (b.hi[k] - b.lo[k]) / 510.0;
       m[k] = b.normal[k];
     }
-    // Points of the octant are center + q with q in the box and m.q in a slab; any a bounds n.q by both.
+    // PointSet of the octant are center + q with q in the box and m.q in a slab; any a bounds n.q by both.
     const double mm = m.squaredNorm(), a = mm > 0 ? n.dot(m) / mm : 0;
     const double middle = n.dot(center) + a * (b.slab_center - m.dot(center - cell));
     const double reach = std::abs(a) * b.slab_half / 2 + half.dot((n - a * m).cwiseAbs());

@@ -87,8 +87,8 @@ Tree::Tree(std::shared_ptr<const Mesh> mesh, const Options& options)
 
 void Tree::reset(std::shared_ptr<const Mesh> mesh) {
   solid_ = options_.solid ? std::make_shared<const Solid>(mesh) : nullptr;
-  pieces_known_ = nullptr;
-  pieces_ = nullptr;
+  component_points_known_ = nullptr;
+  component_points_ = nullptr;
   surface_ = surfaceOf(std::move(mesh), options_);
   root_bounds_ = oracle::CellBounds();
   const Eigen::AlignedBox3d box = latticeBounds(surface_);
@@ -101,24 +101,24 @@ void Tree::reset(std::shared_ptr<const Mesh> mesh) {
 
 std::int64_t Tree::now() const { return options_.clock ? nanoseconds(options_.clock()) : coarseNow(); }
 
-const std::vector<Eigen::Vector3d>& Tree::pieces() const {
-  if (const auto* known = pieces_known_.load(std::memory_order_acquire)) return *known;
-  const std::lock_guard<std::mutex> lock(pieces_mutex_);
-  if (pieces_ == nullptr) {
-    pieces_ = std::make_unique<const std::vector<Eigen::Vector3d>>(
-        pointOfEachPiece(surface_.mesh->vertices(), surface_.mesh->triangles()));
-    pieces_known_.store(pieces_.get(), std::memory_order_release);
+const std::vector<Eigen::Vector3d>& Tree::componentPoints() const {
+  if (const auto* known = component_points_known_.load(std::memory_order_acquire)) return *known;
+  const std::lock_guard<std::mutex> lock(component_mutex_);
+  if (component_points_ == nullptr) {
+    component_points_ = std::make_unique<const std::vector<Eigen::Vector3d>>(
+        pointOfEachComponent(surface_.mesh->vertices(), surface_.mesh->triangles()));
+    component_points_known_.store(component_points_.get(), std::memory_order_release);
   }
-  return *pieces_;
+  return *component_points_;
 }
 
 std::shared_ptr<const Mesh> Tree::mesh() const {
-  const std::shared_lock<Gate> look(gate_);
+  const std::shared_lock<ShardedLock> lock(query_lock_);
   return surface_.mesh;
 }
 
 Eigen::AlignedBox3d Tree::bounds() const {
-  const std::shared_lock<Gate> look(gate_);
+  const std::shared_lock<ShardedLock> lock(query_lock_);
   return surface_.bounds;
 }
 
@@ -127,12 +127,12 @@ void Tree::releaseMesh() {
     throw std::logic_error("bocst::Model::releaseMesh: exact answers test the triangles on the host");
   }
   if (options_.solid) throw std::logic_error("bocst::Model::releaseMesh: a solid looks at its triangles on the host");
-  const std::lock_guard<Gate> alone(gate_);
-  if (surface_.device == nullptr) surface_.device = oracle_->hold(surface_);
+  const std::lock_guard<ShardedLock> alone(query_lock_);
+  if (surface_.device == nullptr) surface_.device = oracle_->makeResident(surface_);
   if (surface_.device == nullptr || oracle_->needsHostMesh()) {
     throw OracleError("bocst::Model::releaseMesh: the oracle " + oracle_->name() + " needs the mesh on the host");
   }
-  pieces();  // all that another solid asks of it
+  componentPoints();  // all that another solid asks of it
   surface_.mesh = nullptr;
 }
 
@@ -157,51 +157,51 @@ void Tree::grow(std::vector<Growth>& batch, bool wait) {
     }
   }
 
-  std::vector<oracle::Expansion> questions;
+  std::vector<oracle::ExpansionRequest> requests;
   std::vector<Growth> asked;
   std::vector<std::vector<std::uint32_t>> gathered;
   gathered.reserve(batch.size());
   for (const Growth& g : batch) {
     Tree& tree = *g.tree;
-    const Link link = tree.link(g.node);
-    if (link.tag() == Link::kBlock) continue;
-    if (g.list_is_enough && link.tag() == Link::kShortList) continue;
+    const ChildRef ref = tree.childRef(g.node);
+    if (ref.tag() == ChildRef::kBlock) continue;
+    if (g.list_suffices && ref.tag() == ChildRef::kShortList) continue;
     if (g.node.isRoot()) tree.growRoot();
     const lattice::Cell cell = tree.cell(g.node);
     if (tree.grid_ != nullptr && cell.level < tree.grid_->level()) {
       tree.growFromGrid(g.node);
       continue;
     }
-    oracle::Expansion question;
-    question.surface = &tree.surface_;
-    question.cell = cell;
+    oracle::ExpansionRequest request;
+    request.surface = &tree.surface_;
+    request.cell = cell;
     // Leaves are tested here; who answers conservatively has none.
-    question.ids_up_to = tree.conservative()              ? 0
-                         : tree.isDeepest(cell.level + 1) ? oracle::Expansion::kAll
-                                                          : kLeafTriangles;
-    if (link.isList()) {
+    request.ids_up_to = tree.conservative()              ? 0
+                        : tree.isDeepest(cell.level + 1) ? oracle::ExpansionRequest::kAll
+                                                         : kLeafTriangles;
+    if (ref.isList()) {
       gathered.emplace_back();
-      tree.askFor(link.index(), question, gathered.back());
+      tree.askFor(ref.index(), request, gathered.back());
     } else if (g.node.isRoot()) {
-      question.count = tree.surface_.triangle_count;
-      if (g.list_is_enough && question.count <= kLeafTriangles) {
+      request.count = tree.surface_.triangle_count;
+      if (g.list_suffices && request.count <= kLeafTriangles) {
         std::array<std::uint32_t, kLeafTriangles> ids;
         std::iota(ids.begin(), ids.end(), 0u);
-        tree.setLink(g.node, tree.addList(ids.data(), question.count, true));
+        tree.setChild(g.node, tree.addList(ids.data(), request.count, true));
         continue;
       }
     } else {
       gathered.emplace_back();
       gathered.back().reserve(4 * kLeafTriangles);
       tree.gatherNode(g.node, cell, gathered.back());
-      question.ids = gathered.back().data();
-      question.count = gathered.back().size();
-      question.own_only = g.list_is_enough && question.count <= kLeafTriangles;
+      request.ids = gathered.back().data();
+      request.count = gathered.back().size();
+      request.own_only = g.list_suffices && request.count <= kLeafTriangles;
     }
-    questions.push_back(std::move(question));
+    requests.push_back(std::move(request));
     asked.push_back(g);
   }
-  ask(asked, questions);
+  ask(asked, requests);
   for (Tree* tree : trees) {
     if (tree == nullptr) continue;
     const auto mine = [tree](const Growth& g) { return g.tree == tree; };
@@ -211,8 +211,8 @@ void Tree::grow(std::vector<Growth>& batch, bool wait) {
 }
 
 // The questions of one oracle go out together.
-void Tree::ask(std::vector<Growth>& asked, std::vector<oracle::Expansion>& questions) {
-  const auto publish_all = [&](std::vector<oracle::Expansion>& answers, const std::vector<Growth>& growths) {
+void Tree::ask(std::vector<Growth>& asked, std::vector<oracle::ExpansionRequest>& requests) {
+  const auto publish_all = [&](std::vector<oracle::ExpansionRequest>& answers, const std::vector<Growth>& growths) {
     oracle::Oracle& oracle = *growths.front().tree->oracle_;
     oracle.submit(answers);
     oracle.wait(answers);
@@ -225,46 +225,46 @@ void Tree::ask(std::vector<Growth>& asked, std::vector<oracle::Expansion>& quest
   const oracle::Oracle* const first = asked.front().tree->oracle_.get();
   const auto is_other = [first](const Growth& g) { return g.tree->oracle_.get() != first; };
   if (std::none_of(asked.begin(), asked.end(), is_other)) {
-    publish_all(questions, asked);
+    publish_all(requests, asked);
     return;
   }
-  std::array<std::vector<oracle::Expansion>, 2> parts;
+  std::array<std::vector<oracle::ExpansionRequest>, 2> parts;
   std::array<std::vector<Growth>, 2> growths;
   for (std::size_t i = 0; i < asked.size(); ++i) {
     const std::size_t part = is_other(asked[i]);
-    parts[part].push_back(std::move(questions[i]));
+    parts[part].push_back(std::move(requests[i]));
     growths[part].push_back(asked[i]);
   }
   for (std::size_t part = 0; part < 2; ++part) publish_all(parts[part], growths[part]);
 }
 
-void Tree::askFor(std::uint32_t list, oracle::Expansion& question, std::vector<std::uint32_t>& ids) const {
+void Tree::askFor(std::uint32_t list, oracle::ExpansionRequest& request, std::vector<std::uint32_t>& ids) const {
   const TriangleList triangles = lists_[list];
-  question.count = triangles.count;
-  if (lists_.isKept(list)) {
+  request.count = triangles.count;
+  if (lists_.isOnDevice(list)) {
     const TriangleLists::Place place = lists_.place(list);
-    question.shelf = shelves_[place.shelf];
-    question.shelf_begin = place.begin;
+    request.resource = resources_[place.resource];
+    request.resource_begin = place.begin;
     return;
   }
   ids.reserve(std::max<std::size_t>(1, triangles.count));  // null is another question
   triangles.appendTo(ids);
-  question.ids = ids.data();
+  request.ids = ids.data();
 }
 
-void Tree::look(const std::vector<NodeRef>& nodes) {
+void Tree::tightenBounds(const std::vector<NodeRef>& nodes) {
   const std::unique_lock<std::mutex> lock(growth_, std::try_to_lock);
   if (!lock.owns_lock() || grid_ == nullptr) return;
   for (const NodeRef node : nodes) {
     const lattice::Cell cell = this->cell(node);
-    if (cell.level != grid_->level() || link(node).tag() != Link::kImplicit) continue;
-    refits_.push_back({node, grid_->look(surface_, cell)});
+    if (cell.level != grid_->level() || childRef(node).tag() != ChildRef::kImplicit) continue;
+    refits_.push_back({node, grid_->tightBounds(surface_, cell)});
     refits_wait_.store(true, std::memory_order_relaxed);
   }
 }
 
 void Tree::growRoot() {
-  if (surface_.device == nullptr) surface_.device = oracle_->hold(surface_);
+  if (surface_.device == nullptr) surface_.device = oracle_->makeResident(surface_);
   if (grid_tried_ || oracle_->kind() != OracleKind::kCpu) return;
   grid_tried_ = true;
   grid_ = oracle::RootGrid::make(surface_, deepest_);
@@ -296,7 +296,7 @@ void Tree::growFromGrid(NodeRef node) {
   setBox(own, cell, bounds_of_all);
   refits_.push_back({node, bounds_of_all});
   refits_wait_.store(true, std::memory_order_relaxed);
-  setLink(node, Link(Link::kBlock, index));
+  setChild(node, ChildRef(ChildRef::kBlock, index));
 }
 
 std::uint32_t Tree::addBlock(NodeRef node, const lattice::Cell& cell, std::uint8_t grey) {
@@ -307,8 +307,8 @@ std::uint32_t Tree::addBlock(NodeRef node, const lattice::Cell& cell, std::uint8
   for (int k = 0; k < 3; ++k) block.at[k] = static_cast<std::uint16_t>(cell.at[k]);
   records_.append(1);
   records_[index].parent = node;
-  stamps_.append(1);
-  stamps_[index].store(now(), std::memory_order_relaxed);
+  last_use_.append(1);
+  last_use_[index].store(now(), std::memory_order_relaxed);
   nodes_at_[cell.level + 1] += __builtin_popcount(grey);
   ++expansions_;
   std::uint64_t octants = 0;
@@ -317,18 +317,18 @@ std::uint32_t Tree::addBlock(NodeRef node, const lattice::Cell& cell, std::uint8
   return index;
 }
 
-Link Tree::addList(const std::uint32_t* ids, std::size_t count, bool leaf) {
+ChildRef Tree::addList(const std::uint32_t* ids, std::size_t count, bool leaf) {
   const std::uint32_t index = lists_.add(ids, count);
-  return Link(leaf || count <= kLeafTriangles ? Link::kShortList : Link::kList, index);
+  return ChildRef(leaf || count <= kLeafTriangles ? ChildRef::kShortList : ChildRef::kList, index);
 }
 
 void Tree::packLeaves(const std::vector<NodeRef>& leaves) {
-  if (leaves.empty() || !hasRoom()) return;
+  if (leaves.empty() || !hasBudget()) return;
   const std::unique_lock<std::mutex> lock(growth_, std::try_to_lock);
   if (!lock.owns_lock() || lists_.isHalfFull()) return;
   std::size_t left = 16 + leaves.size() / 4;
   for (const NodeRef leaf : leaves) {
-    const Link list = link(leaf);
+    const ChildRef list = childRef(leaf);
     if (!list.isList() || lists_.isPacked(list.index())) continue;
     const std::uint32_t count = lists_[list.index()].count;
     if (count == 0 || count > kLeafTriangles) continue;
@@ -340,62 +340,64 @@ void Tree::packLeaves(const std::vector<NodeRef>& leaves) {
       if (!again) continue;
     }
     if (left == 0) continue;
-    setLink(leaf, Link(list.tag(), lists_.addPacked(surface_, list.index())));
+    setChild(leaf, ChildRef(list.tag(), lists_.addPacked(surface_, list.index())));
     --left;
   }
   countBytes();
 }
 
-Link Tree::addKept(const std::shared_ptr<const oracle::Held>& shelf, oracle::Expansion::Kept list) {
-  if (shelves_.empty() || shelves_.back() != shelf) shelves_.push_back(shelf);
-  const auto number = static_cast<std::uint32_t>(shelves_.size() - 1);
-  return Link(Link::kList, lists_.addKept(list.count, {number, list.begin}));
+ChildRef Tree::addDeviceList(const std::shared_ptr<const oracle::DeviceResource>& resource,
+                             oracle::ExpansionRequest::DeviceList list) {
+  if (resources_.empty() || resources_.back() != resource) resources_.push_back(resource);
+  const auto number = static_cast<std::uint32_t>(resources_.size() - 1);
+  return ChildRef(ChildRef::kList, lists_.addDeviceList(list.count, {number, list.begin}));
 }
 
-Link Tree::addOctantList(const oracle::Expansion& answer, int octant) {
+ChildRef Tree::addOctantList(const oracle::ExpansionRequest& answer, int octant) {
   const std::size_t count = answer.listSize(octant),
                     all = answer.lists.size() +
-                          std::accumulate(
-                              answer.kept_lists.begin(), answer.kept_lists.end(), std::size_t{0},
-                              [](std::size_t sum, const oracle::Expansion::Kept&kept) { return sum + kept.count; });
+                          std::accumulate(answer.device_lists.begin(), answer.device_lists.end(), std::size_t{0},
+                                          [](std::size_t sum, const oracle::ExpansionRequest::DeviceList&kept) {
+                                            return sum + kept.count;
+                                          });
   // Triangles so large that division only copies them: going on would take memory without end and cull nothing.
   const bool hopeless = all > 2 * answer.count && 4 * count > 3 * answer.count;
-  const oracle::Expansion::Kept& kept = answer.kept_lists[static_cast<std::size_t>(octant)];
+  const oracle::ExpansionRequest::DeviceList& kept = answer.device_lists[static_cast<std::size_t>(octant)];
   if (kept.count == 0) return addList(answer.lists.data() + answer.list_begin[octant], count, hopeless);
   if (hopeless && !conservative()) {
     // A leaf's triangles are needed here.
     std::vector<std::uint32_t> ids(count);
-    if (oracle_->fetch(*answer.kept, kept, ids.data())) return addList(ids.data(), count, true);
+    if (oracle_->fetch(*answer.kept_resource, kept, ids.data())) return addList(ids.data(), count, true);
   }
-  return addKept(answer.kept, kept);
+  return addDeviceList(answer.kept_resource, kept);
 }
 
-void Tree::setLink(NodeRef node, Link link) {
-  std::atomic<Link>& place = node.isRoot() ? root_ : blocks_[node.block()].child[node.octant()];
-  place.store(link, std::memory_order_release);
+void Tree::setChild(NodeRef node, ChildRef ref) {
+  std::atomic<ChildRef>& place = node.isRoot() ? root_ : blocks_[node.block()].child[node.octant()];
+  place.store(ref, std::memory_order_release);
 }
 
-void Tree::publish(NodeRef node, const oracle::Expansion& answer) {
+void Tree::publish(NodeRef node, const oracle::ExpansionRequest& answer) {
   if (answer.grey != 0) {
     refits_.push_back({node, answer.own});
     refits_wait_.store(true, std::memory_order_relaxed);
   }
   if (answer.own_only) {
-    setLink(node, addList(answer.lists.data(), answer.lists.size(), true));
+    setChild(node, addList(answer.lists.data(), answer.lists.size(), true));
     return;
   }
   const std::uint32_t index = addBlock(node, answer.cell, answer.grey);
   Block& block = blocks_[index];
   block.octants = answer.octants;
   records_[index].own = answer.own;
-  if (answer.kept != nullptr) {
-    const Link own = link(node);
+  if (answer.kept_resource != nullptr) {
+    const ChildRef own = childRef(node);
     if (own.isList()) records_[index].own_list = own.index();
   }
   for (int o = 0; o < 8; ++o) {
     if (answer.grey >> o & 1) block.child[o].store(addOctantList(answer, o), std::memory_order_relaxed);
   }
-  setLink(node, Link(Link::kBlock, index));
+  setChild(node, ChildRef(ChildRef::kBlock, index));
 }
 
 void Tree::gatherNode(NodeRef node, const lattice::Cell& cell, std::vector<std::uint32_t>& ids) const {
@@ -405,26 +407,26 @@ void Tree::gatherNode(NodeRef node, const lattice::Cell& cell, std::vector<std::
 
 bool Tree::trianglesOf(NodeRef node, std::size_t most, std::vector<std::uint32_t>& ids) const {
   ids.clear();
-  const Link link = this->link(node);
-  if (link.isList()) {
-    const TriangleList list = this->list(link);
+  const ChildRef ref = this->childRef(node);
+  if (ref.isList()) {
+    const TriangleList list = this->list(ref);
     if (!list.ids.areKnown() || list.count > most) return false;
     list.appendTo(ids);
     return true;
   }
   const oracle::RootGrid* grid = grid_known_.load(std::memory_order_acquire);
   const lattice::Cell cell = this->cell(node);
-  if (link.tag() != Link::kImplicit || grid == nullptr || cell.level != grid->level()) return false;
+  if (ref.tag() != ChildRef::kImplicit || grid == nullptr || cell.level != grid->level()) return false;
   return grid->gather(surface_, cell, most, ids);
 }
 
 void Tree::prune(Clock::time_point now) {
-  const std::lock_guard<Gate> alone(gate_);
+  const std::lock_guard<ShardedLock> alone(query_lock_);
   pruneAlone(nanoseconds(now), false);
 }
 
 void Tree::updateVertices(std::vector<Eigen::Vector3d> vertices) {
-  const std::lock_guard<Gate> alone(gate_);
+  const std::lock_guard<ShardedLock> alone(query_lock_);
   if (surface_.mesh == nullptr) throw std::logic_error("bocst::Model::updateVertices: the mesh was released");
   const Mesh& old = *surface_.mesh;
   if (vertices.size() != old.vertexCount()) {
@@ -442,7 +444,7 @@ void Tree::expandAll(int depth) {
                                 std::to_string(lattice::kMaxLevel));
   }
   // Queries never expand a leaf, and do not expect that somebody does.
-  const std::lock_guard<Gate> alone(gate_);
+  const std::lock_guard<ShardedLock> alone(query_lock_);
   keepOnly({});
   constexpr std::size_t kBatch = 1024;  // bounds the memory that answers take before they are published
   std::vector<NodeRef> level{NodeRef{}}, next;
@@ -456,7 +458,7 @@ void Tree::expandAll(int depth) {
     }
     next.clear();
     for (const NodeRef node : level) {
-      const std::uint32_t index = link(node).index();
+      const std::uint32_t index = childRef(node).index();
       for (int o = 0; o < 8; ++o) {
         if (blocks_[index].grey >> o & 1) next.push_back(NodeRef::octant(index, o));
       }
@@ -466,7 +468,7 @@ void Tree::expandAll(int depth) {
 }
 
 void Tree::visit(const std::function<void(const NodeView&)>& f) const {
-  const std::shared_lock<Gate> look(gate_);
+  const std::shared_lock<ShardedLock> lock(query_lock_);
   const auto id = [](NodeRef node) { return node.isRoot() ? 0 : node.bits + 1; };
   struct Entry {
     NodeRef node;
@@ -488,12 +490,12 @@ void Tree::visit(const std::function<void(const NodeView&)>& f) const {
     view.radius = surface_.lattice.unit() * half.norm();
     view.level = cell.level;
     view.cell = cell.at;
-    const Link link = this->link(e.node);
-    if (link.tag() == Link::kBlock) {
-      const Block& block = blocks_[link.index()];
+    const ChildRef ref = this->childRef(e.node);
+    if (ref.tag() == ChildRef::kBlock) {
+      const Block& block = blocks_[ref.index()];
       for (int o = 0; o < 8; ++o) {
         if ((block.grey >> o & 1) == 0) continue;
-        const NodeRef child = NodeRef::octant(link.index(), o);
+        const NodeRef child = NodeRef::octant(ref.index(), o);
         view.children.ids[view.children.count++] = id(child);
         stack.push_back({child, view.id});
       }
@@ -503,7 +505,7 @@ void Tree::visit(const std::function<void(const NodeView&)>& f) const {
 }
 
 Statistics Tree::statistics() const {
-  const std::shared_lock<Gate> look(gate_);
+  const std::shared_lock<ShardedLock> lock(query_lock_);
   Statistics s;
   s.resident_bytes = bytes_;
   for (int level = 1; level <= lattice::kMaxLevel && nodes_at_[level] > 0; ++level) {
@@ -523,16 +525,16 @@ Statistics Tree::statistics() const {
 void Tree::countBytes() {
   bytes_ = treeBytes();
   std::size_t device = surface_.device != nullptr ? surface_.device->bytes() : 0;
-  const oracle::Held* last = nullptr;
-  for (const auto& shelf : shelves_) {
-    if (shelf != nullptr && shelf.get() != last) device += shelf->bytes();
-    last = shelf.get();
+  const oracle::DeviceResource* last = nullptr;
+  for (const auto& resource : resources_) {
+    if (resource != nullptr && resource.get() != last) device += resource->bytes();
+    last = resource.get();
   }
   device_bytes_ = device;
 }
 
 std::size_t Tree::treeBytes() const {
-  return blocks_.bytes() + records_.bytes() + stamps_.bytes() + lists_.bytes() + (grid_ ? grid_->bytes() : 0);
+  return blocks_.bytes() + records_.bytes() + last_use_.bytes() + lists_.bytes() + (grid_ ? grid_->bytes() : 0);
 }
 
 }  // namespace bocst::tree

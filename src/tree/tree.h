@@ -16,21 +16,22 @@
 #include <vector>
 
 #include "mesh/solid.h"
-#include "oracle/cpu/root_grid.h"
 #include "oracle/oracle.h"
 #include "tree/block.h"
-#include "tree/gate.h"
 #include "tree/pool.h"
-#include "tree/supports.h"
+#include "tree/root_grid.h"
+#include "tree/sharded_lock.h"
+#include "tree/support_table.h"
 #include "tree/triangle_lists.h"
 
 namespace bocst::tree {
 
 /// The sphere-tree of one model: resident nodes, how they grow and how they go.
 ///
-/// Threads: a query holds the gate shared while it looks at nodes. Growth appends blocks and publishes each by one
-/// store of its link, so readers are never in its way; one growth a tree at a time. What removes nodes (pruning, new
-/// vertices) holds the gate alone. Links only go implicit -> list -> block while the gate is held shared.
+/// Threads: a query holds the query lock shared while it looks at nodes. Growth appends blocks and publishes each by
+/// one store of its child reference, so readers are never in its way; one growth a tree at a time. What removes nodes
+/// (pruning, new vertices) holds the query lock alone. Links only go implicit -> list -> block while the query lock is
+/// held shared.
 class Tree {
  public:
   /// An exact answer tests the triangles of a node with at most so many instead of expanding it; and those of a node
@@ -42,13 +43,13 @@ class Tree {
 
   const Options& options() const { return options_; }
   const oracle::Oracle& oracle() const { return *oracle_; }
-  Gate& gate() const { return gate_; }
+  ShardedLock& queryLock() const { return query_lock_; }
 
-  // While the gate is held, shared or alone.
+  // While the query lock is held, shared or alone.
 
   const oracle::Surface& surface() const { return surface_; }
 
-  Link link(NodeRef node) const {
+  ChildRef childRef(NodeRef node) const {
     return node.isRoot() ? root_.load(std::memory_order_acquire)
                          : blocks_[node.block()].child[node.octant()].load(std::memory_order_acquire);
   }
@@ -58,13 +59,13 @@ class Tree {
   }
   /// Box and slab of the root; those of other nodes are in their parents' blocks.
   const oracle::CellBounds& rootBounds() const { return root_bounds_; }
-  TriangleList list(Link link) const { return lists_[link.index()]; }
+  TriangleList list(ChildRef ref) const { return lists_[ref.index()]; }
   /// Fills `ids` with the triangles of a node without children, or a superset; false where they are not known here or
   /// more than `most`.
   bool trianglesOf(NodeRef node, std::size_t most, std::vector<std::uint32_t>& ids) const;
   const TriangleLists& lists() const { return lists_; }
   /// How far the surface reaches in any direction; what is known of it, for queries to use and to better.
-  Supports& supports() const { return supports_; }
+  SupportTable& supports() const { return supports_; }
   /// How often this surface's tree has grown by a block.
   std::uint64_t growth() const { return expansions_.load(std::memory_order_relaxed) - expansions_before_; }
   /// No more expansions below this node: a single lattice unit, or the collision depth of conservative answers.
@@ -74,20 +75,20 @@ class Tree {
 
   /// What the mesh encloses, for a model that is solid; else null.
   const Solid* solid() const { return solid_.get(); }
-  /// A point of each connected piece of the surface, in the mesh's frame; found when first asked for.
-  const std::vector<Eigen::Vector3d>& pieces() const;
+  /// A point of each connected component of the surface, in the mesh's frame; found when first asked for.
+  const std::vector<Eigen::Vector3d>& componentPoints() const;
 
   /// Marks a block as used now, for ttl and budget.
-  void touch(std::uint32_t block, std::int64_t now) const {
-    std::atomic<std::int64_t>& stamp = stamps_[block];
-    if (stamp.load(std::memory_order_relaxed) < now) stamp.store(now, std::memory_order_relaxed);
+  void markUsed(std::uint32_t block, std::int64_t now) const {
+    std::atomic<std::int64_t>& last_use = last_use_[block];
+    if (last_use.load(std::memory_order_relaxed) < now) last_use.store(now, std::memory_order_relaxed);
   }
   /// A block is about to be marked.
-  void fetchStamp(std::uint32_t block) const { __builtin_prefetch(&stamps_[block]); }
+  void prefetchLastUse(std::uint32_t block) const { __builtin_prefetch(&last_use_[block]); }
   std::int64_t now() const;
 
   /// The root grid knows the children of this frontier node.
-  bool growsFreely(NodeRef node) const {
+  bool growsFromGrid(NodeRef node) const {
     const oracle::RootGrid* grid = grid_known_.load(std::memory_order_acquire);
     return grid != nullptr && cell(node).level < grid->level();
   }
@@ -96,26 +97,26 @@ class Tree {
   struct Growth {
     Tree* tree;
     NodeRef node;
-    bool list_is_enough;
+    bool list_suffices;
   };
 
   /// One expansion batch: makes each node's children resident (or, where enough, its list). Nodes that another thread
-  /// has grown meanwhile are skipped. The gates of all trees are held shared. Unless `wait`, it does nothing while
-  /// another thread grows one of the trees.
+  /// has grown meanwhile are skipped. The query locks of all trees are held shared. Unless `wait`, it does nothing
+  /// while another thread grows one of the trees.
   static void grow(std::vector<Growth>& batch, bool wait = true);
 
   /// Growth that no answer needs is welcome: it would not bring the tree near its memory budget.
-  bool hasRoom() const { return options_.memory_budget == 0 || bytes_ < options_.memory_budget / 2; }
+  bool hasBudget() const { return options_.memory_budget == 0 || bytes_ < options_.memory_budget / 2; }
 
   /// Learns bounds of frontier nodes that a query met and could do without, so that later ones leave them out sooner;
   /// does nothing while another thread grows the tree. Nodes that the root grid does not know are passed over.
-  void look(const std::vector<NodeRef>& nodes);
+  void tightenBounds(const std::vector<NodeRef>& nodes);
 
   /// Packs the corners of leaves that are come to the second time, as many as a query hardly feels. Does nothing while
   /// another thread grows the tree.
   void packLeaves(const std::vector<NodeRef>& leaves);
 
-  // With the gate free.
+  // With the query lock free.
 
   Statistics statistics() const;
   void expandAll(int depth);
@@ -134,23 +135,24 @@ class Tree {
 
   void reset(std::shared_ptr<const Mesh> mesh);
 
-  void askFor(std::uint32_t list, oracle::Expansion& question, std::vector<std::uint32_t>& ids) const;
-  Link addKept(const std::shared_ptr<const oracle::Held>& shelf, oracle::Expansion::Kept list);
-  Link addOctantList(const oracle::Expansion& answer, int octant);
-  static void ask(std::vector<Growth>& asked, std::vector<oracle::Expansion>& questions);
+  void askFor(std::uint32_t list, oracle::ExpansionRequest& request, std::vector<std::uint32_t>& ids) const;
+  ChildRef addDeviceList(const std::shared_ptr<const oracle::DeviceResource>& resource,
+                         oracle::ExpansionRequest::DeviceList list);
+  ChildRef addOctantList(const oracle::ExpansionRequest& answer, int octant);
+  static void ask(std::vector<Growth>& asked, std::vector<oracle::ExpansionRequest>& requests);
   void growRoot();
   void growFromGrid(NodeRef node);
-  void publish(NodeRef node, const oracle::Expansion& answer);
+  void publish(NodeRef node, const oracle::ExpansionRequest& answer);
   std::uint32_t addBlock(NodeRef node, const lattice::Cell& cell, std::uint8_t grey);
-  Link addList(const std::uint32_t* ids, std::size_t count, bool leaf);
-  void setLink(NodeRef node, Link link);
+  ChildRef addList(const std::uint32_t* ids, std::size_t count, bool leaf);
+  void setChild(NodeRef node, ChildRef ref);
   void refit();
   void pruneAlone(std::int64_t now, bool budget_only);
   void applyBudget();
   void keepOnly(const std::vector<std::uint8_t>& keep);
-  void collectTriangles(Link link, const lattice::Cell& cell, std::vector<std::uint32_t>& ids) const;
-  Link regained(Link block, const lattice::Cell& cell, TriangleLists& lists) const;
-  void dropUnusedShelves();
+  void collectTriangles(ChildRef ref, const lattice::Cell& cell, std::vector<std::uint32_t>& ids) const;
+  ChildRef regained(ChildRef block, const lattice::Cell& cell, TriangleLists& lists) const;
+  void dropUnusedResources();
   std::size_t treeBytes() const;
   void countBytes();
   void gatherNode(NodeRef node, const lattice::Cell& cell, std::vector<std::uint32_t>& ids) const;
@@ -158,27 +160,27 @@ class Tree {
   const Options options_;
   const std::shared_ptr<oracle::Oracle> oracle_;
   const int deepest_;
-  mutable Gate gate_;
+  mutable ShardedLock query_lock_;
   std::mutex growth_;  // guards what grow() appends to
 
   oracle::Surface surface_;
   std::shared_ptr<const Solid> solid_;
-  mutable std::mutex pieces_mutex_;  // guards pieces_ while they are found
-  mutable std::unique_ptr<const std::vector<Eigen::Vector3d>> pieces_;
-  mutable std::atomic<const std::vector<Eigen::Vector3d>*> pieces_known_{nullptr};  // pieces_, for readers
+  mutable std::mutex component_mutex_;  // guards pieces_ while they are found
+  mutable std::unique_ptr<const std::vector<Eigen::Vector3d>> component_points_;
+  mutable std::atomic<const std::vector<Eigen::Vector3d>*> component_points_known_{nullptr};  // pieces_, for readers
   oracle::CellBounds root_bounds_;
-  mutable Supports supports_;
+  mutable SupportTable supports_;
   std::unique_ptr<oracle::RootGrid> grid_;
   std::atomic<const oracle::RootGrid*> grid_known_{nullptr};  // grid_, for readers
   bool grid_tried_ = false;
-  std::atomic<Link> root_{Link()};
+  std::atomic<ChildRef> root_{ChildRef()};
   // Of each block: what walks read, what growth and decay know, and when a query last went through it, in ns of the
   // model's clock. Apart, so that walks have few lines to read.
   Pool<Block, 5> blocks_;
   Pool<BlockRecord, 5> records_;
-  mutable Pool<std::atomic<std::int64_t>, 5> stamps_;
+  mutable Pool<std::atomic<std::int64_t>, 5> last_use_;
   TriangleLists lists_;
-  std::vector<std::shared_ptr<const oracle::Held>> shelves_;  // of the lists that the oracle keeps
+  std::vector<std::shared_ptr<const oracle::DeviceResource>> resources_;  // of the lists that the oracle keeps
 
   // Tighter bounds of nodes than their parents' blocks hold; blocks that readers see are not written to, so these wait
   // for a moment alone.

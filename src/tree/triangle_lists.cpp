@@ -41,11 +41,11 @@ std::uint32_t TriangleLists::add(const std::uint32_t* ids, std::size_t count) {
   return index;
 }
 
-std::uint32_t TriangleLists::addKept(std::size_t count, Place place) {
+std::uint32_t TriangleLists::addDeviceList(std::size_t count, Place place) {
   if (count > kCount) throw std::length_error("bocst: a node of more than 2^29 triangles");
-  const std::uint32_t index = words_.append(kKeptWords);
-  words_[index] = static_cast<std::uint32_t>(count) | kKept;
-  words_[index + 1] = place.shelf;
+  const std::uint32_t index = words_.append(kDeviceListWords);
+  words_[index] = static_cast<std::uint32_t>(count) | kOnDevice;
+  words_[index + 1] = place.resource;
   words_[index + 2] = place.begin;
   return index;
 }
@@ -70,7 +70,7 @@ std::uint32_t TriangleLists::addCopy(const TriangleLists& from, std::uint32_t li
   };
   const std::uint32_t* const words = &from.words_[list];
   const std::uint32_t flags = words[0];
-  if ((flags & kKept) != 0) return copy(words, kKeptWords);
+  if ((flags & kOnDevice) != 0) return copy(words, kDeviceListWords);
   if ((flags & kPacked) == 0) return copy(words, 1 + idWords(flags));
   const std::uint32_t ids = copy(&from.words_[words[1]], idWords(flags)),
                       index = copy(words, kPackedHeader + packedAt(words).words());

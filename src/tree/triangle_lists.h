@@ -49,9 +49,9 @@ struct TriangleList {
 /// Threads: as Pool.
 class TriangleLists {
  public:
-  /// Where an oracle keeps a list: the number of a shelf, and a place there.
+  /// Where an oracle keeps a list: the number of a resource, and a place there.
   struct Place {
-    std::uint32_t shelf, begin;
+    std::uint32_t resource, begin;
   };
 
   // What is there.
@@ -59,7 +59,7 @@ class TriangleLists {
   TriangleList operator[](std::uint32_t list) const {
     const std::uint32_t* const words = &words_[list];
     const std::uint32_t flags = words[0], count = flags & kCount;
-    if ((flags & kKept) != 0) return {{}, count};
+    if ((flags & kOnDevice) != 0) return {{}, count};
     const bool narrow = (flags & kNarrow) != 0;
     return {{(flags & kPacked) != 0 ? &words_[words[1]] : words + 1, narrow}, count};
   }
@@ -72,7 +72,7 @@ class TriangleLists {
   }
   bool isPacked(std::uint32_t list) const { return (words_[list] & kPacked) != 0; }
   /// Does the oracle keep it?
-  bool isKept(std::uint32_t list) const { return (words_[list] & kKept) != 0; }
+  bool isOnDevice(std::uint32_t list) const { return (words_[list] & kOnDevice) != 0; }
   Place place(std::uint32_t list) const { return {words_[list + 1], words_[list + 2]}; }
   /// Where it lies, for those who want it in the processor's cache.
   const std::uint32_t* begin(std::uint32_t list) const { return &words_[list]; }
@@ -80,7 +80,7 @@ class TriangleLists {
   // What is new; each returns the list's index. They throw std::length_error beyond 2^29 triangles or 2^30 words.
 
   std::uint32_t add(const std::uint32_t* ids, std::size_t count);
-  std::uint32_t addKept(std::size_t count, Place place);
+  std::uint32_t addDeviceList(std::size_t count, Place place);
   /// A list of this, with its corners; whoever reads the old one goes on.
   std::uint32_t addPacked(const oracle::Surface& surface, std::uint32_t list);
   std::uint32_t addCopy(const TriangleLists& from, std::uint32_t list);
@@ -95,9 +95,9 @@ class TriangleLists {
 
   // A list is flags and a length, then the numbers: all as they are or, narrow, the least and 16-bit steps from it.
   // Packed: flags and length, where the numbers are, PackedTriangles. Kept: flags and length, the place.
-  static constexpr std::uint32_t kKept = 0x80000000u, kPacked = 0x40000000u, kNarrow = 0x20000000u,
+  static constexpr std::uint32_t kOnDevice = 0x80000000u, kPacked = 0x40000000u, kNarrow = 0x20000000u,
                                  kCount = 0x1fffffffu;
-  static constexpr std::size_t kKeptWords = 3, kPackedHeader = 2;
+  static constexpr std::size_t kDeviceListWords = 3, kPackedHeader = 2;
 
   static std::size_t idWords(std::uint32_t flags);
   static PackedTriangles packedAt(const std::uint32_t* list) { return {list + kPackedHeader, list[0] & kCount}; }

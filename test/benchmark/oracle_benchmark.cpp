@@ -5,8 +5,8 @@
 #include "meshes.h"
 #include "oracle/cpu/cpu_oracle.h"
 #include "oracle/cpu/kernels.h"
-#include "oracle/cpu/root_grid.h"
 #include "oracle/surfaces.h"
+#include "tree/root_grid.h"
 
 namespace bocst::oracle {
 namespace {
@@ -36,7 +36,7 @@ BENCHMARK(octantMasksOfTriangles);
 // An expansion whose list has about as many triangles as asked for.
 void expansionOfList(benchmark::State& state) {
   const Surface surface = surfaceOf(test::torus(256));
-  Expansion e = rootOf(surface);
+  ExpansionRequest e = rootOf(surface);
   std::vector<std::uint32_t> ids;
   for (;;) {
     expand(e);
@@ -48,7 +48,7 @@ void expansionOfList(benchmark::State& state) {
     ids.assign(begin + static_cast<std::ptrdiff_t>(e.list_begin[fullest]),
                begin + static_cast<std::ptrdiff_t>(e.list_begin[fullest + 1]));
     const lattice::Cell cell = e.cell.octant(fullest);
-    e = Expansion();
+    e = ExpansionRequest();
     e.surface = &surface;
     e.cell = cell;
     e.ids = ids.data();
@@ -56,9 +56,9 @@ void expansionOfList(benchmark::State& state) {
     if (ids.size() <= static_cast<std::size_t>(state.range(0))) break;
   }
   for (auto _ : state) {
-    Expansion question = e;
-    expand(question);
-    benchmark::DoNotOptimize(question.grey);
+    ExpansionRequest request = e;
+    expand(request);
+    benchmark::DoNotOptimize(request.grey);
   }
   perTriangle(state, e.count);
 }

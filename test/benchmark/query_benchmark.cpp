@@ -3,10 +3,10 @@
 #include <benchmark/benchmark.h>
 #include <fcl/narrowphase/detail/traversal/collision/intersect.h>
 
+#include "geometry/triangle.h"
 #include "meshes.h"
-#include "query/distance_kernels.h"
-#include "query/tree_steps.h"
-#include "query/triangle.h"
+#include "query/collide/tree_steps.h"
+#include "query/distance/distance_kernels.h"
 
 namespace bocst::query {
 namespace {
@@ -38,8 +38,8 @@ struct Cells {
       for (CellOctants& c : side) c = randomCell(g);
     }
   }
-  static Placement placement(std::mt19937_64& g) {
-    Placement to;
+  static SimilarityTransform placement(std::mt19937_64& g) {
+    SimilarityTransform to;
     to.rotation = test::randomRotation(g);
     to.translation = Eigen::Vector3d::Constant(32768) - to.rotation * Eigen::Vector3d::Constant(32768);
     to.ready();
@@ -134,8 +134,8 @@ void nearestOfLeaves(benchmark::State& state) {
   std::mt19937_64 g(4);
   const Leaf a(g, 24, 0), b(g, 24, 3);
   static NearPair found[TrianglePack::kCapacity * TrianglePack::kCapacity];
-  const float way[3] = {0, 0, 1};
-  for (auto _ : state) benchmark::DoNotOptimize(nearPairs(a.pack, b.pack, way, 5, found));
+  const float displacement[3] = {0, 0, 1};
+  for (auto _ : state) benchmark::DoNotOptimize(nearPairs(a.pack, b.pack, displacement, 5, found));
 }
 BENCHMARK(nearestOfLeaves);
 
@@ -171,8 +171,8 @@ void trianglesParted(benchmark::State& state) {
   TrianglePairs pairs;
   pairs.count = static_cast<std::size_t>(state.range(0));
   for (std::size_t i = 0; i < pairs.count; ++i) pairs.put(i, m.p[i], m.q[i]);
-  Touch touches[TrianglePairs::kCapacity];
-  for (auto _ : state) benchmark::DoNotOptimize(partTriangles(pairs, 1e-12, touches));
+  ContactPoint touches[TrianglePairs::kCapacity];
+  for (auto _ : state) benchmark::DoNotOptimize(trianglePenetrations(pairs, 1e-12, touches));
   state.SetItemsProcessed(state.range(0) * state.iterations());
 }
 BENCHMARK(trianglesParted)->Arg(1)->Arg(32);

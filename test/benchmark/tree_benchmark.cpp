@@ -5,7 +5,7 @@
 #include <shared_mutex>
 
 #include "meshes.h"
-#include "query/tree_walk.h"
+#include "query/collide/tree_walk.h"
 #include "tree/tree.h"
 
 namespace bocst {
@@ -41,7 +41,7 @@ void growLevel(benchmark::State& state) {
   for (auto _ : state) {
     state.PauseTiming();
     const auto tree = torusTree(128);
-    const std::shared_lock<tree::Gate> look(tree->gate());
+    const std::shared_lock<tree::ShardedLock> lock(tree->queryLock());
     for (int level = 1; level < state.range(0); ++level) {
       auto batch = frontier(*tree);
       tree::Tree::grow(batch);
@@ -75,14 +75,14 @@ class Counter : public query::Visitor {
 };
 
 // Where torus B lies beside or in A.
-query::Placement beside(const tree::Tree& tree_a, const tree::Tree& tree_b, double x) {
-  query::Placement place;
+query::SimilarityTransform beside(const tree::Tree& tree_a, const tree::Tree& tree_b, double x) {
+  query::SimilarityTransform place;
   std::mt19937_64 g(3);
   place.rotation = test::randomRotation(g);
   const lattice::Lattice &la = tree_a.surface().lattice, &lb = tree_b.surface().lattice;
   place.scale = lb.unit() / la.unit();
   place.translation = (place.rotation * lb.origin() + Eigen::Vector3d(x, 0, 0) - la.origin()) / la.unit();
-  place.slack = 1e-9;
+  place.tolerance = 1e-9;
   place.ready();
   return place;
 }
@@ -90,9 +90,9 @@ query::Placement beside(const tree::Tree& tree_a, const tree::Tree& tree_b, doub
 // A walk over resident nodes: apart, to the first pair that surely meets, or to the last.
 void warmWalk(benchmark::State& state, double x, bool first) {
   const auto tree_a = torusTree(128), tree_b = torusTree(128);
-  const query::Placement place = beside(*tree_a, *tree_b, x);
+  const query::SimilarityTransform place = beside(*tree_a, *tree_b, x);
   Counter counter(first);
-  const std::shared_lock<tree::Gate> look_a(tree_a->gate()), look_b(tree_b->gate());
+  const std::shared_lock<tree::ShardedLock> lock_a(tree_a->queryLock()), lock_b(tree_b->queryLock());
   const query::TreeSide a(*tree_a), b(*tree_b);
   for (int i = 0; i < 50; ++i) query::TreeWalk(a, b, place).run(counter);
   counter = Counter(first);
@@ -108,9 +108,9 @@ BENCHMARK_CAPTURE(warmWalk, all, 0.9, false)->Unit(benchmark::kMicrosecond);
 // A look for a direction between two hulls that are apart, or deep in each other.
 void separation(benchmark::State& state, double x) {
   const auto tree_a = torusTree(128), tree_b = torusTree(128);
-  const query::Placement place = beside(*tree_a, *tree_b, x);
+  const query::SimilarityTransform place = beside(*tree_a, *tree_b, x);
   Counter counter(true);
-  const std::shared_lock<tree::Gate> look_a(tree_a->gate()), look_b(tree_b->gate());
+  const std::shared_lock<tree::ShardedLock> lock_a(tree_a->queryLock()), lock_b(tree_b->queryLock());
   const query::TreeSide a(*tree_a), b(*tree_b);
   bool apart = false;
   for (int i = 0; i < 50 && !apart; ++i) {

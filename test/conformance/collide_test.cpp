@@ -7,7 +7,7 @@
 #include <array>
 
 #include "conformance/reference.h"
-#include "query/triangle.h"
+#include "geometry/triangle.h"
 
 namespace bocst {
 namespace {
@@ -348,9 +348,9 @@ TEST(CollideDouble, AllLevelsAtOnce) {
   for (int i = 0; i < 8; ++i) {
     const Eigen::Matrix3d R =
         Eigen::AngleAxisd(i % 2 * std::pow(10.0, -0.5 * i), test::randomDirection(g)).toRotationMatrix();
-    const Eigen::Vector3d way = (i + 1) * 1e-5 * test::randomDirection(g);
+    const Eigen::Vector3d displacement = (i + 1) * 1e-5 * test::randomDirection(g);
     const auto X = test::pose<double>(Eigen::Matrix3d::Identity(), {0, 0, 0});
-    const auto Y = test::pose<double>(R, corner - R * corner + way);
+    const auto Y = test::pose<double>(R, corner - R * corner + displacement);
     const Pairs want = test::pairs<double>(*fa, X, *fb, Y);
     ASSERT_GT(want.size(), 100u) << i;
     met += want.size();

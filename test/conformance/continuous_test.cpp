@@ -9,7 +9,7 @@
 #include "conformance/octrees.h"
 #include "conformance/reference.h"
 #include "conformance/shapes.h"
-#include "query/motion.h"
+#include "geometry/motion.h"
 
 namespace bocst {
 namespace {
@@ -140,22 +140,23 @@ TEST(Motions, NothingIsFasterThanTheyClaim) {
     }
     const double time = u(g), radius = u(g);
     const Eigen::Vector3d center = 3 * test::randomDirection(g), direction = test::randomDirection(g);
-    const query::Approach approach = m->approach(direction, 0, center, radius, time);
+    const query::ClosingSpeed closing_speed = m->closingSpeed(direction, 0, center, radius, time);
     const double fastest = m->fastest(center, radius, time), reach = 2 * u(g);
-    EXPECT_LE(approach.now, approach.ever + 1e-9);
-    EXPECT_LE(approach.ever, fastest + 1e-12);
-    EXPECT_GE(m->approach(direction, 0.1, center, radius, time).now, approach.now);
+    EXPECT_LE(closing_speed.now, closing_speed.ever + 1e-9);
+    EXPECT_LE(closing_speed.ever, fastest + 1e-12);
+    EXPECT_GE(m->closingSpeed(direction, 0.1, center, radius, time).now, closing_speed.now);
     const Eigen::Isometry3d back = m->at(time).inverse();
     for (int i = 0; i < 60; ++i) {
-      const Eigen::Vector3d way = test::randomDirection(g), start = center + radius * way, point = back * start;
+      const Eigen::Vector3d displacement = test::randomDirection(g), start = center + radius * displacement,
+                            point = back * start;
       const double t = time + (1 - time) * u(g), h = std::min(1e-6, 1 - t);
       if (!(h > 1e-9)) continue;
       const Eigen::Vector3d v = (m->at(t + h) * point - m->at(t) * point) / h;
       ASSERT_LE(v.norm(), fastest + 1e-6) << round;
-      ASSERT_LE(direction.dot(v), approach.ever + 1e-6) << round;
-      ASSERT_LE(direction.dot(v), approach.now + approach.change * (t + h - time) + 1e-6) << round;
+      ASSERT_LE(direction.dot(v), closing_speed.ever + 1e-6) << round;
+      ASSERT_LE(direction.dot(v), closing_speed.now + closing_speed.change * (t + h - time) + 1e-6) << round;
       // No point goes so far before the time that a gap needs.
-      const double needed = approach.timeFor(reach);
+      const double needed = closing_speed.timeFor(reach);
       ASSERT_LE(direction.dot(m->at(std::min(1.0, time + needed)) * point - start), reach + 1e-9);
     }
   }

@@ -24,7 +24,7 @@ struct Solid {
 };
 
 /// The hull of some points.
-inline Solid hullOf(std::vector<Eigen::Vector3d> points) {
+inline Solid sweptHullOf(std::vector<Eigen::Vector3d> points) {
   Solid s;
   for (const auto& p : points) s.center += p / static_cast<double>(points.size());
   for (const auto& p : points) s.reach = std::max(s.reach, (p - s.center).norm());

@@ -19,7 +19,7 @@ Eigen::Isometry3d at(const Vector3d& p, const Eigen::Matrix3d& R = Eigen::Matrix
 }
 
 Solid ball(double radius) {
-  Solid s = hullOf({Vector3d::Zero()});
+  Solid s = sweptHullOf({Vector3d::Zero()});
   s.round = s.reach = radius;
   return s;
 }
@@ -35,7 +35,7 @@ Solid smooth(double radius) {
 Solid cube() {
   std::vector<Vector3d> corners;
   for (int i = 0; i < 8; ++i) corners.emplace_back(i & 1 ? 1 : -1, i & 2 ? 1 : -1, i & 4 ? 1 : -1);
-  return hullOf(corners);
+  return sweptHullOf(corners);
 }
 
 TEST(ConvexDistance, KnowsBallsAndCubes) {
@@ -66,7 +66,7 @@ TEST(ConvexDistance, TrianglesThatMeetAndThoseThatDoNot) {
   const auto any = [&] { return Vector3d(n(g), n(g), n(g)); };
   int meeting = 0;
   for (int i = 0; i < 3000; ++i) {
-    const Solid a = hullOf({any(), any(), any()}), b = hullOf({any(), any(), any()});
+    const Solid a = sweptHullOf({any(), any(), any()}), b = sweptHullOf({any(), any(), any()});
     const Interval d = distanceOf(a, at({0, 0, 0}), b), e = distanceOf(b, at({0, 0, 0}), a);
     ASSERT_EQ(d.meets(), e.meets());
     ASSERT_LE(d.high - d.low, 1e-9);

@@ -6,7 +6,7 @@
 #include <thread>
 
 #include "conformance/reference.h"
-#include "query/triangle.h"
+#include "geometry/triangle.h"
 
 namespace bocst {
 namespace {
@@ -147,10 +147,11 @@ TEST(DistanceDouble, MovingByItTouchesAndNotBefore) {
     auto Y = test::pose<double>(test::randomRotation(g), test::randomDirection(g) * (2.5 + 3 * u(g)));
     const auto d = ask<double>(a, I, b, Y);
     if (d.min_distance <= 0) continue;
-    const Eigen::Vector3d way = (d.nearest_points[0] - d.nearest_points[1]).normalized(), start = Y.translation();
-    Y.translation() = start + way * (d.min_distance - 1e-9);
+    const Eigen::Vector3d displacement = (d.nearest_points[0] - d.nearest_points[1]).normalized(),
+                          start = Y.translation();
+    Y.translation() = start + displacement * (d.min_distance - 1e-9);
     EXPECT_FALSE(test::touching<double>(a, I, b, Y)) << i;
-    Y.translation() = start + way * (d.min_distance + 1e-9);
+    Y.translation() = start + displacement * (d.min_distance + 1e-9);
     EXPECT_TRUE(test::touching<double>(a, I, b, Y)) << i;
   }
 }

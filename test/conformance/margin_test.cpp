@@ -9,7 +9,7 @@
 #include "conformance/reference.h"
 #include "conformance/shapes.h"
 #include "conformance/truth.h"
-#include "query/triangle.h"
+#include "geometry/triangle.h"
 
 namespace bocst {
 namespace {
@@ -257,7 +257,7 @@ TYPED_TEST(Margin, ContactsWithShapesAreAllWithinItAndSayHowToPart) {
         found.insert(c.b1);
         back.insert(d.b2);
         const auto t = static_cast<std::size_t>(c.b1);
-        const query::Gap gap = truth.gap(t, X, Y);
+        const query::SeparationResult gap = truth.gap(t, X, Y);
         const double depth = static_cast<double>(c.penetration_depth);
         ASSERT_NEAR(c.normal.norm(), 1, 1e-5);
         if (gap.distance > off) {

@@ -137,11 +137,11 @@ std::vector<Situation<S>> situations(const Solids& model, const Solids& partner,
     const int kind = i % 8;
     Situation<S> s;
     s.away = kind == 5 || kind == 6 ? far : 1;
-    const Eigen::Vector3d p = randomDirection(g) * s.away, way = randomDirection(g);
+    const Eigen::Vector3d p = randomDirection(g) * s.away, displacement = randomDirection(g);
     const Eigen::Matrix3d R = randomRotation(g);
     s.X = pose<S>(randomRotation(g), p);
     const auto at = [&](double d) {
-      s.Y = pose<S>(R, p + way * d);
+      s.Y = pose<S>(R, p + displacement * d);
       return s;
     };
     if (kind == 4) {
@@ -169,7 +169,7 @@ double roundingOf(double away) {
 
 /// What FCL's solvers, and rounding in S, may be off by.
 template <typename S>
-double slackOf(double away) {
+double toleranceOf(double away) {
   return 2e-6 + roundingOf<S>(away);
 }
 
@@ -260,14 +260,14 @@ void checkContact(const Pairing<S>& pairing, const Situation<S>& s, bool turned,
   const auto ids = idsOf(c, turned);
   ASSERT_TRUE(model.count(ids.first) && partner.count(ids.second)) << ids.first << ' ' << ids.second;
   const Solid &a = *model.at(ids.first), &b = *partner.at(ids.second);
-  const double off = 20 * slackOf<S>(s.away);
+  const double off = 20 * toleranceOf<S>(s.away);
   // The second moved along the normal, or the model the other way if it is the first.
   const double depth = static_cast<double>(c.penetration_depth);
   const Eigen::Vector3d moved = (turned ? 1 : -1) * (depth * 1.001 + off) * c.normal.template cast<double>();
   Eigen::Isometry3d X = s.modelInPartner();
   X.translation() += s.Y.template cast<double>().linear().transpose() * moved;
   ASSERT_FALSE(distanceOf(a, X, b).meets()) << "depth " << depth;
-  const Solid point = hullOf({c.pos.template cast<double>()});
+  const Solid point = sweptHullOf({c.pos.template cast<double>()});
   ASSERT_LE(distanceOf(point, Eigen::Isometry3d(s.X.template cast<double>().matrix()).inverse(), a).low, depth + off);
   ASSERT_LE(distanceOf(point, Eigen::Isometry3d(s.Y.template cast<double>().matrix()).inverse(), b).low, depth + off);
 }
@@ -283,7 +283,7 @@ template <typename S>
 void checkCollide(const Partner<S>& row) {
   const Raw raw = modelMesh();
   const Solids solids = solidsOf(raw);
-  const auto model_pieces = byId(solids), partner_pieces = byId(row.solids);
+  const auto model_components = byId(solids), partner_components = byId(row.solids);
   const Model<S> model(raw.mesh());
   const auto theirs = bvh<fcl::OBBRSS<S>>(raw);
   const Pairing<S> pairing{model, *row.geometry};
@@ -292,7 +292,7 @@ void checkCollide(const Partner<S>& row) {
   int i = -1;
   for (const auto& s : situations<S>(solids, row.solids, count)) {
     SCOPED_TRACE("situation " + std::to_string(++i));
-    const double slack = slackOf<S>(s.away);
+    const double tolerance = toleranceOf<S>(s.away);
     const Eigen::Isometry3d X = s.modelInPartner();
     for (const auto solver : {fcl::GST_LIBCCD, fcl::GST_INDEP}) {
       Pairs found[2];
@@ -300,7 +300,8 @@ void checkCollide(const Partner<S>& row) {
         const auto result = pairing.collide(s, turned, solver, kAll, true);
         for (std::size_t k = 0; k < result.numContacts(); ++k) {
           found[turned].insert(idsOf(result.getContact(k), turned));
-          ASSERT_NO_FATAL_FAILURE(checkContact(pairing, s, turned, result.getContact(k), model_pieces, partner_pieces));
+          ASSERT_NO_FATAL_FAILURE(
+              checkContact(pairing, s, turned, result.getContact(k), model_components, partner_components));
         }
         ASSERT_EQ(found[turned].size(), result.numContacts()) << "a pair twice";
         const auto once = pairing.collide(s, turned, solver, 1, false);
@@ -317,16 +318,16 @@ void checkCollide(const Partner<S>& row) {
       (found[0].empty() ? misses : hits)++;
 
       bool touch = false, near = false;
-      for (const Couple& c : couples(solids, X, row.solids, slack)) {
+      for (const Couple& c : couples(solids, X, row.solids, tolerance)) {
         const Solid &a = solids[c.a], &b = row.solids[c.b];
         const Interval d = distanceOf(a, X, b);
-        near |= d.low <= slack;
+        near |= d.low <= tolerance;
         // Of meshes FCL's test in S decides; of others what rounding leaves open.
-        const bool surely = d.meets() && meetSurely(a, X, b, row.is_mesh ? slack : 1e-13 + roundingOf<S>(s.away));
+        const bool surely = d.meets() && meetSurely(a, X, b, row.is_mesh ? tolerance : 1e-13 + roundingOf<S>(s.away));
         touch |= surely;
         for (const Pairs& pairs : found) {
           if (pairs.count({a.id, b.id})) {
-            ASSERT_LE(d.low, slack) << a.id << ' ' << b.id;
+            ASSERT_LE(d.low, tolerance) << a.id << ' ' << b.id;
           } else {
             ASSERT_FALSE(surely) << a.id << ' ' << b.id << " is missed";
           }
@@ -373,18 +374,18 @@ void checkEdge(const Partner<S>& row) {
   int edges = 0;
   for (int i = 0; i < 40; ++i) {
     SCOPED_TRACE(i);
-    const Eigen::Vector3d p = randomDirection(g), way = randomDirection(g);
+    const Eigen::Vector3d p = randomDirection(g), displacement = randomDirection(g);
     const Eigen::Matrix3d R = randomRotation(g);
     Situation<S> s;
     s.X = pose<S>(randomRotation(g), p);
     const auto sees = [&](double d, const fcl::CollisionGeometry<S>& mesh, const fcl::CollisionGeometry<S>& partner) {
-      return touching<S>(mesh, s.X, partner, pose<S>(R, p + way * d));
+      return touching<S>(mesh, s.X, partner, pose<S>(R, p + displacement * d));
     };
     double lo = 0, hi = 4;
     if (sees(hi, *theirs, *reference)) continue;
     for (int step = 0; step < 56; ++step) (sees((lo + hi) / 2, *theirs, *reference) ? lo : hi) = (lo + hi) / 2;
     if (!sees(lo, *theirs, *reference)) continue;
-    s.Y = pose<S>(R, p + way * lo);
+    s.Y = pose<S>(R, p + displacement * lo);
     ASSERT_TRUE(touching<S>(model, s.X, *row.geometry, s.Y)) << lo;
     // Of meshes, FCL's test may tell the orders apart.
     ASSERT_TRUE(row.is_mesh || touching<S>(*row.geometry, s.Y, model, s.X)) << lo;
@@ -398,7 +399,7 @@ template <typename S>
 void checkDistance(const Partner<S>& row) {
   const Raw raw = modelMesh();
   const Solids solids = solidsOf(raw);
-  const auto model_pieces = byId(solids), partner_pieces = byId(row.solids);
+  const auto model_components = byId(solids), partner_components = byId(row.solids);
   const Model<S> model(raw.mesh());
   const Pairing<S> pairing{model, *row.geometry};
   int apart = 0, touching = 0;
@@ -421,22 +422,22 @@ void checkDistance(const Partner<S>& row) {
         const Eigen::Vector3d p = d.nearest_points[turned ? 1 : 0].template cast<double>();
         const Eigen::Vector3d q = d.nearest_points[turned ? 0 : 1].template cast<double>();
         ASSERT_NEAR((p - q).norm(), value, 4 * off);
-        const auto a = model_pieces.find(turned ? d.b2 : d.b1), b = partner_pieces.find(turned ? d.b1 : d.b2);
-        ASSERT_TRUE(a != model_pieces.end() && b != partner_pieces.end()) << d.b1 << ' ' << d.b2;
+        const auto a = model_components.find(turned ? d.b2 : d.b1), b = partner_components.find(turned ? d.b1 : d.b2);
+        ASSERT_TRUE(a != model_components.end() && b != partner_components.end()) << d.b1 << ' ' << d.b2;
         const auto inFrame = [](const fcl::Transform3<S>& X) {
           return Eigen::Isometry3d(Eigen::Isometry3d(X.template cast<double>().matrix()).inverse());
         };
         // Where curved bodies just touch, the point is not as sharp as the distance.
         const double on = value <= off ? std::max(10 * off, 1e-4) : 10 * off;
-        ASSERT_LE(distanceOf(hullOf({p}), inFrame(s.X), *a->second).low, on) << "on the triangle";
-        ASSERT_LE(distanceOf(hullOf({q}), inFrame(s.Y), *b->second).low, on) << "on the partner";
+        ASSERT_LE(distanceOf(sweptHullOf({p}), inFrame(s.X), *a->second).low, on) << "on the triangle";
+        ASSERT_LE(distanceOf(sweptHullOf({q}), inFrame(s.Y), *b->second).low, on) << "on the partner";
         if (expected.low < 0.01) continue;
         // Moved nearly as far, they are nearly there; and a little farther, they touch.
         Situation<S> near = s, there = s;
         near.Y.translation() += ((p - q) * (1 - 1e-3)).template cast<S>();
-        there.Y.translation() += ((p - q) * (1 + (slackOf<S>(s.away) + 4 * off) / value)).template cast<S>();
+        there.Y.translation() += ((p - q) * (1 + (toleranceOf<S>(s.away) + 4 * off) / value)).template cast<S>();
         ASSERT_NEAR(static_cast<double>(pairing.distance(near, turned, solver).min_distance), 1e-3 * value, 10 * off);
-        if (1e-3 * value > 2 * slackOf<S>(s.away)) {
+        if (1e-3 * value > 2 * toleranceOf<S>(s.away)) {
           ASSERT_FALSE(pairing.collide(near, turned, solver, 1, false).isCollision());
         }
         ASSERT_TRUE(pairing.collide(there, turned, solver, 1, false).isCollision());
@@ -445,7 +446,7 @@ void checkDistance(const Partner<S>& row) {
     const double with_sign = static_cast<double>(pairing.distance(s, i % 2, fcl::GST_LIBCCD, true).min_distance);
     // What is nearer than the solver's tolerance may be a contact.
     ASSERT_LE(with_sign, expected.high + 2 * off);
-    if (expected.low > slackOf<S>(s.away)) {
+    if (expected.low > toleranceOf<S>(s.away)) {
       ASSERT_GE(with_sign, expected.low - 2 * off);
     }
   }
@@ -472,7 +473,7 @@ void checkConservative(const Partner<S>& row) {
   for (const auto& s : situations<S>(solids, row.solids, 24)) {
     SCOPED_TRACE("situation " + std::to_string(++i));
     const Interval expected = distanceOf(solids, s.modelInPartner(), row.solids);
-    const double off = slackOf<S>(s.away);
+    const double off = toleranceOf<S>(s.away);
     for (const auto& model : models) {
       const Pairing<S> pairing{*model.second, *row.geometry};
       for (const auto solver : {fcl::GST_LIBCCD, fcl::GST_INDEP}) {
@@ -519,7 +520,7 @@ void checkOneTriangle(const Partner<S>& row) {
   int parted = 0, i = -1;
   for (const auto& s : situations<S>(solids, row.solids, 40)) {
     SCOPED_TRACE("situation " + std::to_string(++i));
-    const double off = 20 * slackOf<S>(s.away);
+    const double off = 20 * toleranceOf<S>(s.away);
     for (const bool turned : {false, true}) {
       const auto result = pairing.collide(s, turned, fcl::GST_LIBCCD, kAll, true);
       if (result.numContacts() != 1) continue;

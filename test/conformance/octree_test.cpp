@@ -216,7 +216,7 @@ TEST(OcTreesDouble, ApproximateCostsAreFclsAndThoseOfAllCells) {
         const double occupancy = leaf->getOccupancy();
         Vector3d c[8];
         for (int k = 0; k < 8; ++k) c[k] = Y.inverse(Eigen::Isometry) * corners[k] - center;
-        if (!query::BoxBody(half).gap({c, 8}, 0).touches()) continue;
+        if (!query::BoxShape(half).gap({c, 8}, 0).isTouching()) continue;
         const Vector3d reach = Y.linear().cwiseAbs() * half, middle = Y * center;
         const Eigen::AlignedBox3d shared = about_mesh.intersection({middle - reach, middle + reach});
         expected += shared.volume() * occupancy * density;

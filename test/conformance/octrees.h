@@ -9,8 +9,8 @@
 #include <limits>
 #include <memory>
 
+#include "geometry/convex_shape.h"
 #include "meshes.h"
-#include "query/body.h"
 
 namespace bocst::test {
 
@@ -52,7 +52,7 @@ double gap(const Raw& raw, std::size_t t, const fcl::Transform3<S>& X, const std
     c[k] =
         Y.template cast<double>().inverse() * (X.template cast<double>() * raw.vertices[raw.triangles[t][k]]) - center;
   }
-  return query::BoxBody(Eigen::Vector3d::Constant(box[3] / 2.0))
+  return query::BoxShape(Eigen::Vector3d::Constant(box[3] / 2.0))
       .gap({c, 3}, std::numeric_limits<double>::infinity())
       .distance;
 }

@@ -134,10 +134,10 @@ TEST(TownAndRobot, StepByStepByPoseAndByVertices) {
     const Modeld by_pose(rob.mesh(), options);
     Modeld town_model(env.mesh(), options), by_vertices(rob.mesh(), options);
     fcl::Transform3d X = anywhereInTown(g);
-    const Vector3d way = test::randomDirection(g) * 25, axis = test::randomDirection(g);
+    const Vector3d displacement = test::randomDirection(g) * 25, axis = test::randomDirection(g);
     bool before = false;
     for (int i = 0; i < 60; ++i, ++steps) {
-      X.translation() += way;
+      X.translation() += displacement;
       X.rotate(Eigen::AngleAxisd(0.03, axis));
       std::vector<Vector3d> moved;
       for (const auto& v : rob.vertices) moved.push_back(X * v);
@@ -208,9 +208,9 @@ TYPED_TEST(ShapesAsMeshes, AgreeWithTheShapes) {
       for (int i = 0; i < 16; ++i) {
         // Along an axis at first, as FCL does, then any way; the pair as it is, and the two moved together.
         const bool plain = i % 4 == 0;
-        const Vector3d way = plain ? Vector3d(Vector3d::UnitX()) : test::randomDirection(g);
+        const Vector3d displacement = plain ? Vector3d(Vector3d::UnitX()) : test::randomDirection(g);
         const Eigen::Matrix3d R = plain ? Eigen::Matrix3d(Eigen::Matrix3d::Identity()) : test::randomRotation(g);
-        const auto between = [&](double d) { return test::pose<double>(R, way * d); };
+        const auto between = [&](double d) { return test::pose<double>(R, displacement * d); };
         const auto meet = [&](double d) {
           return distanceOf(sa, Eigen::Isometry3d(between(d).inverse().matrix()), sb).meets();
         };

@@ -160,7 +160,7 @@ TEST(OctreeAndMeshes, TheSameContactsThreeWays) {
       test::Solids triangles;
       for (std::size_t t = 0; t < mesh->triangleCount(); ++t) {
         const auto corner = [&](std::size_t k) { return mesh->vertex(mesh->triangle(t)[k]); };
-        triangles.push_back(test::hullOf({corner(0), corner(1), corner(2)}));
+        triangles.push_back(test::sweptHullOf({corner(0), corner(1), corner(2)}));
       }
       const Eigen::Isometry3d X((W.inverse() * o->getTransform()).matrix());
       for (const auto& c : test::couples(triangles, X, cells, 0)) {

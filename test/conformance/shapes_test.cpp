@@ -54,8 +54,8 @@ void forPoses(int count, unsigned seed, const Truth<S>& truth, F&& f) {
   for (int i = 0; i < count; ++i) {
     const auto X = test::pose<S>(test::randomRotation(g), test::randomDirection(g));
     const Eigen::Matrix3d R = test::randomRotation(g);
-    const Vector3d p = X.translation().template cast<double>(), way = test::randomDirection(g);
-    const auto at = [&](double d) { return test::pose<S>(R, p + way * d); };
+    const Vector3d p = X.translation().template cast<double>(), displacement = test::randomDirection(g);
+    const auto at = [&](double d) { return test::pose<S>(R, p + displacement * d); };
     double d = 2.5 * u(g);
     if (i % 2 == 1) {
       d = test::contactDistance([&](double x) { return truth.distance(X, at(x)) == 0; }, 4, 12);
@@ -496,9 +496,9 @@ TYPED_TEST(Shapes, FarTinyAndHuge) {
           if (reference.isCollision() || distance == 0) {
             ASSERT_TRUE(ours.isCollision()) << scale << ' ' << far << ' ' << i;
           }
-          const double slack = 100 * static_cast<double>(std::numeric_limits<S>::epsilon()) * (far + 3) * scale;
+          const double tolerance = 100 * static_cast<double>(std::numeric_limits<S>::epsilon()) * (far + 3) * scale;
           if (ours.isCollision()) {
-            ASSERT_LT(distance, slack + 2e-6 * scale) << scale << ' ' << far << ' ' << i;
+            ASSERT_LT(distance, tolerance + 2e-6 * scale) << scale << ' ' << far << ' ' << i;
           }
         }
       }

@@ -9,7 +9,7 @@
 #include "conformance/reference.h"
 #include "conformance/shapes.h"
 #include "conformance/truth.h"
-#include "query/triangle.h"
+#include "geometry/triangle.h"
 
 namespace bocst {
 namespace {
@@ -87,7 +87,7 @@ TEST(Solid, HoldsWhatItsSurfaceWindsAbout) {
       const double w = windings(raw, p);
       ASSERT_NEAR(w, std::round(w), 1e-3);
       const bool is_inside = std::abs(w) > 0.5;
-      ASSERT_EQ(s.mayHold(p, 0), is_inside) << p.transpose() << " winds " << w;
+      ASSERT_EQ(s.mayContain(p, 0), is_inside) << p.transpose() << " winds " << w;
       inside += is_inside;
     };
     for (int i = 0; i < 300; ++i) {
@@ -106,11 +106,11 @@ TEST(Solid, HoldsWhatItsSurfaceWindsAbout) {
 
 TEST(Solid, PointsBesideTheSurfaceAreTakenToBeInside) {
   const Solid s(test::box({0, 0, 0}, {1, 1, 1}).mesh());
-  EXPECT_FALSE(s.mayHold({0.5, 0.5, -1e-6}, 1e-9));
-  EXPECT_TRUE(s.mayHold({0.5, 0.5, -1e-9}, 1e-9));
-  EXPECT_TRUE(s.mayHold({-1e-9, 0.3, 0.3}, 1e-9));
-  EXPECT_TRUE(s.mayHold({0.3, 1 + 1e-9, 0.3}, 1e-9));
-  EXPECT_TRUE(s.mayHold({0.5, 0.5, 0.5}, 0));
+  EXPECT_FALSE(s.mayContain({0.5, 0.5, -1e-6}, 1e-9));
+  EXPECT_TRUE(s.mayContain({0.5, 0.5, -1e-9}, 1e-9));
+  EXPECT_TRUE(s.mayContain({-1e-9, 0.3, 0.3}, 1e-9));
+  EXPECT_TRUE(s.mayContain({0.3, 1 + 1e-9, 0.3}, 1e-9));
+  EXPECT_TRUE(s.mayContain({0.5, 0.5, 0.5}, 0));
 }
 
 std::string refusal(const Raw& raw) {
@@ -428,9 +428,9 @@ TEST(SolidModel, ContactsSayHowFarTheWallIs) {
   const Modeld small(raw.mesh());
   const fcl::Transform3d I = fcl::Transform3d::Identity();
   const auto X = test::pose<double>(Eigen::Matrix3d::Identity(), {0.5, 0.3, 0.6});
-  const auto part = [](const fcl::Transform3d& Y, const Eigen::Vector3d& way) {
+  const auto part = [](const fcl::Transform3d& Y, const Eigen::Vector3d& displacement) {
     fcl::Transform3d Z = Y;
-    Z.translation() += way;
+    Z.translation() += displacement;
     return Z;
   };
   const fcl::CollisionRequestd request(100, true);
@@ -492,7 +492,7 @@ TEST(SolidModel, OfManyTrianglesAndOfLargeOnes) {
   std::uniform_real_distribution<double> u(-1, 1);
   for (int i = 0; i < 200; ++i) {
     const Eigen::Vector3d p = 3.2 * Eigen::Vector3d(u(g), u(g), u(g));
-    ASSERT_EQ(s.mayHold(p, 0), std::abs(windings(raw, p)) > 0.5) << p.transpose();
+    ASSERT_EQ(s.mayContain(p, 0), std::abs(windings(raw, p)) > 0.5) << p.transpose();
   }
 }
 

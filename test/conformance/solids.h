@@ -18,7 +18,7 @@ constexpr double kWide = 8;
 inline Solids solidsOf(const Raw& raw) {
   Solids all;
   for (const auto& t : raw.triangles) {
-    all.push_back(hullOf({raw.vertices[t[0]], raw.vertices[t[1]], raw.vertices[t[2]]}));
+    all.push_back(sweptHullOf({raw.vertices[t[0]], raw.vertices[t[1]], raw.vertices[t[2]]}));
     all.back().id = static_cast<std::intptr_t>(all.size()) - 1;
   }
   return all;
@@ -29,7 +29,7 @@ inline Solid boxOf(const Eigen::Vector3d& center, const Eigen::Vector3d& half) {
   for (int i = 0; i < 8; ++i) {
     corners.push_back(center + Eigen::Vector3d(i & 1 ? 1 : -1, i & 2 ? 1 : -1, i & 4 ? 1 : -1).cwiseProduct(half));
   }
-  return hullOf(std::move(corners));
+  return sweptHullOf(std::move(corners));
 }
 
 /// What is between two planes n.x = low and n.x = high, as wide as kWide.
@@ -39,7 +39,7 @@ inline Solid slabOf(const Eigen::Vector3d& n, double low, double high) {
   for (const double d : {low, high}) {
     for (const double s : {-1, 1}) corners.insert(corners.end(), {n * d + u + s * v, n * d - u + s * v});
   }
-  return hullOf(std::move(corners));
+  return sweptHullOf(std::move(corners));
 }
 
 /// What lies between two discs about the z axis, with radii below and above.
@@ -63,7 +63,7 @@ Solid solidOf(const fcl::ShapeBase<S>& shape) {
   if (const auto* box = dynamic_cast<const fcl::Box<S>*>(&shape)) {
     s = boxOf({0, 0, 0}, v(box->side) / 2);
   } else if (const auto* sphere = dynamic_cast<const fcl::Sphere<S>*>(&shape)) {
-    s = hullOf({Eigen::Vector3d::Zero()});
+    s = sweptHullOf({Eigen::Vector3d::Zero()});
     s.round = sphere->radius;
   } else if (const auto* ellipsoid = dynamic_cast<const fcl::Ellipsoid<S>*>(&shape)) {
     s.reach = v(ellipsoid->radii).maxCoeff();
@@ -72,7 +72,7 @@ Solid solidOf(const fcl::ShapeBase<S>& shape) {
       return Eigen::Vector3d(r.cwiseProduct(rd) / rd.norm());
     };
   } else if (const auto* capsule = dynamic_cast<const fcl::Capsule<S>*>(&shape)) {
-    s = hullOf({Eigen::Vector3d(0, 0, -capsule->lz / 2.0), Eigen::Vector3d(0, 0, capsule->lz / 2.0)});
+    s = sweptHullOf({Eigen::Vector3d(0, 0, -capsule->lz / 2.0), Eigen::Vector3d(0, 0, capsule->lz / 2.0)});
     s.round = capsule->radius;
   } else if (const auto* cone = dynamic_cast<const fcl::Cone<S>*>(&shape)) {
     s = roundOf(cone->radius, 0, cone->lz);
@@ -81,13 +81,13 @@ Solid solidOf(const fcl::ShapeBase<S>& shape) {
   } else if (const auto* convex = dynamic_cast<const fcl::Convex<S>*>(&shape)) {
     std::vector<Eigen::Vector3d> points;
     for (const auto& p : convex->getVertices()) points.push_back(v(p));
-    s = hullOf(std::move(points));
+    s = sweptHullOf(std::move(points));
   } else if (const auto* plane = dynamic_cast<const fcl::Plane<S>*>(&shape)) {
     s = slabOf(v(plane->n), plane->d, plane->d);
   } else if (const auto* space = dynamic_cast<const fcl::Halfspace<S>*>(&shape)) {
     s = slabOf(v(space->n), space->d - kWide, space->d);
   } else if (const auto* triangle = dynamic_cast<const fcl::TriangleP<S>*>(&shape)) {
-    s = hullOf({v(triangle->a), v(triangle->b), v(triangle->c)});
+    s = sweptHullOf({v(triangle->a), v(triangle->b), v(triangle->c)});
   } else {
     throw std::logic_error("no such shape");
   }

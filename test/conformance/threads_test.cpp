@@ -12,16 +12,16 @@
 namespace bocst {
 namespace {
 
-struct Question {
+struct PosedQuery {
   fcl::Transform3d pose;
   bool expected;
 };
 
-std::vector<Question> questions(const test::Raw& raw, int count) {
+std::vector<PosedQuery> questions(const test::Raw& raw, int count) {
   const auto f = test::bvh<fcl::OBBRSSd>(raw);
   std::mt19937_64 g(1);
   std::uniform_real_distribution<double> u(0, 1);
-  std::vector<Question> all;
+  std::vector<PosedQuery> all;
   const fcl::Transform3d I = fcl::Transform3d::Identity();
   for (int i = 0; i < count; ++i) {
     const auto X = test::pose<double>(test::randomRotation(g), test::randomDirection(g) * 2.2 * u(g));
@@ -39,14 +39,14 @@ void inThreads(int count, F&& f) {
 
 TEST(Threads, OneFreshModel) {
   const test::Raw raw = test::torus(60);
-  const std::vector<Question> all = questions(raw, 60);
+  const std::vector<PosedQuery> all = questions(raw, 60);
   const fcl::Transform3d I = fcl::Transform3d::Identity();
   for (int round = 0; round < 3; ++round) {
     const Modeld a(raw.mesh()), b(raw.mesh());
     std::atomic<int> wrong{0};
     inThreads(4, [&](int thread) {
       for (std::size_t i = 0; i < all.size(); ++i) {
-        const Question& q = all[(i * 7 + static_cast<std::size_t>(thread) * 13) % all.size()];
+        const PosedQuery& q = all[(i * 7 + static_cast<std::size_t>(thread) * 13) % all.size()];
         // Half the threads in the other order, some against the model itself.
         const Modeld& other = i % 5 == 0 ? a : b;
         const bool answer =
@@ -60,7 +60,7 @@ TEST(Threads, OneFreshModel) {
 
 TEST(Threads, QueriesWhilePruning) {
   const test::Raw raw = test::torus(60);
-  const std::vector<Question> all = questions(raw, 40);
+  const std::vector<PosedQuery> all = questions(raw, 40);
   const fcl::Transform3d I = fcl::Transform3d::Identity();
   Options options;
   options.ttl = std::chrono::milliseconds(1);
@@ -80,7 +80,7 @@ TEST(Threads, QueriesWhilePruning) {
       return;
     }
     for (int round = 0; round < 3; ++round) {
-      for (const Question& q : all) wrong += test::touching<double>(a, I, b, q.pose) != q.expected;
+      for (const PosedQuery& q : all) wrong += test::touching<double>(a, I, b, q.pose) != q.expected;
     }
     --running;
   });
@@ -269,13 +269,13 @@ std::vector<std::shared_ptr<fcl::CollisionGeometryd>> partners() {
 }
 
 /// Answers about a model and any partner, by the solver and in the order that `way` says.
-struct BodyAnswers {
+struct ConvexAnswers {
   bool touches = false;
   std::size_t contacts = 0, costs = 0;
   double distance = 0;
 
-  static BodyAnswers of(const Modeld& model, const fcl::CollisionGeometryd& partner, const fcl::Transform3d& Y,
-                        unsigned way) {
+  static ConvexAnswers of(const Modeld& model, const fcl::CollisionGeometryd& partner, const fcl::Transform3d& Y,
+                          unsigned way) {
     const fcl::Transform3d I = fcl::Transform3d::Identity();
     const fcl::CollisionGeometryd *a = &model, *b = &partner;
     const fcl::Transform3d *X_A = &I, *X_B = &Y;
@@ -284,7 +284,7 @@ struct BodyAnswers {
     fcl::CollisionRequestd one, all(100000, true, 100000, true, false);
     fcl::DistanceRequestd far(true);
     one.gjk_solver_type = all.gjk_solver_type = far.gjk_solver_type = solver;
-    BodyAnswers answers;
+    ConvexAnswers answers;
     fcl::CollisionResultd first, every;
     answers.touches = fcl::collide(a, *X_A, b, *X_B, one, first) > 0;
     answers.contacts = fcl::collide(a, *X_A, b, *X_B, all, every);
@@ -293,7 +293,7 @@ struct BodyAnswers {
     answers.distance = fcl::distance(a, *X_A, b, *X_B, far, nearest);
     return answers;
   }
-  bool operator==(const BodyAnswers& o) const {
+  bool operator==(const ConvexAnswers& o) const {
     return touches == o.touches && contacts == o.contacts && costs == o.costs && std::abs(distance - o.distance) < 1e-8;
   }
 };
@@ -317,7 +317,7 @@ TEST(Threads, ShapesAndOctreesWhilePruningAndLooking) {
   struct Case {
     bool is_exact;
     std::size_t partner, pose;
-    BodyAnswers expected;
+    ConvexAnswers expected;
   };
   std::vector<Case> cases;
   int hits = 0;
@@ -325,7 +325,7 @@ TEST(Threads, ShapesAndOctreesWhilePruningAndLooking) {
     for (std::size_t k = 0; k < others.size(); ++k) {
       for (std::size_t p = 0; p < poses.size(); ++p) {
         cases.push_back(
-            {is_exact, k, p, BodyAnswers::of(is_exact ? calm_exact : calm_coarse, *others[k], poses[p], 0)});
+            {is_exact, k, p, ConvexAnswers::of(is_exact ? calm_exact : calm_coarse, *others[k], poses[p], 0)});
         hits += cases.back().expected.touches;
       }
     }
@@ -348,8 +348,8 @@ TEST(Threads, ShapesAndOctreesWhilePruningAndLooking) {
     }
     for (std::size_t i = 0; i < cases.size(); ++i) {
       const Case& c = cases[(i * 5 + static_cast<std::size_t>(thread) * 17) % cases.size()];
-      const BodyAnswers x =
-          BodyAnswers::of(c.is_exact ? a : b, *others[c.partner], poses[c.pose], static_cast<unsigned>(thread));
+      const ConvexAnswers x =
+          ConvexAnswers::of(c.is_exact ? a : b, *others[c.partner], poses[c.pose], static_cast<unsigned>(thread));
       wrong += !(x == c.expected);
     }
     --running;
@@ -369,11 +369,11 @@ TEST(Threads, ShapesAndOctreesWhileVerticesChange) {
   for (const double x : {0.7, 2.2, 5.0}) {
     poses.push_back(test::pose<double>(Eigen::Matrix3d::Identity(), {x, 0.1, 0.05}));
   }
-  std::vector<BodyAnswers> one, other;
+  std::vector<ConvexAnswers> one, other;
   for (const auto& partner : others) {
     for (const auto& Y : poses) {
-      one.push_back(BodyAnswers::of(here, *partner, Y, 0));
-      other.push_back(BodyAnswers::of(there, *partner, Y, 0));
+      one.push_back(ConvexAnswers::of(here, *partner, Y, 0));
+      other.push_back(ConvexAnswers::of(there, *partner, Y, 0));
     }
   }
   std::atomic<int> wrong{0}, running{3};
@@ -385,8 +385,8 @@ TEST(Threads, ShapesAndOctreesWhileVerticesChange) {
     for (std::size_t round = 0; round < 5; ++round) {
       for (std::size_t n = 0; n < one.size(); ++n) {
         // The model may jump between two queries, so each is looked at by itself.
-        const BodyAnswers x =
-            BodyAnswers::of(a, *others[n / poses.size()], poses[n % poses.size()], static_cast<unsigned>(thread));
+        const ConvexAnswers x =
+            ConvexAnswers::of(a, *others[n / poses.size()], poses[n % poses.size()], static_cast<unsigned>(thread));
         wrong += x.touches != one[n].touches && x.touches != other[n].touches;
         wrong += x.contacts != one[n].contacts && x.contacts != other[n].contacts;
         wrong += x.costs != one[n].costs && x.costs != other[n].costs;

@@ -6,7 +6,7 @@
 #include <algorithm>
 #include <limits>
 
-#include "fcl/shape_body.h"
+#include "fcl/adapters/convex_shapes.h"
 #include "meshes.h"
 
 namespace bocst::test {
@@ -18,10 +18,10 @@ class Truth {
  public:
   Truth(const Raw& raw, const fcl::ShapeBase<S>& shape) : raw_(raw), shape_(shape) {}
 
-  query::Gap gap(std::size_t t, const fcl::Transform3<S>& X, const fcl::Transform3<S>& Y,
-                 const Eigen::Vector3d& moved = Eigen::Vector3d::Zero()) const {
-    query::Gap gap;
-    fcl_room::withBody(shape_, {Eigen::Vector3d::Zero(), 1e3}, [&](const query::Body& body) {
+  query::SeparationResult gap(std::size_t t, const fcl::Transform3<S>& X, const fcl::Transform3<S>& Y,
+                              const Eigen::Vector3d& moved = Eigen::Vector3d::Zero()) const {
+    query::SeparationResult gap;
+    fcl_adapter::withConvexShape(shape_, {Eigen::Vector3d::Zero(), 1e3}, [&](const query::ConvexShape& body) {
       const auto Yd = Y.template cast<double>();
       Eigen::Vector3d c[3];
       for (std::size_t k = 0; k < 3; ++k) {

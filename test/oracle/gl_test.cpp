@@ -9,9 +9,9 @@
 #include <set>
 #include <thread>
 
+#include "egl/context.h"
 #include "oracle/cpu/cpu_oracle.h"
 #include "oracle/gl/compute_oracle.h"
-#include "oracle/gl/context.h"
 #include "oracle/gl/devices.h"
 #include "oracle/gl/occlusion_oracle.h"
 #include "surfaces.h"
@@ -23,28 +23,28 @@ using lattice::Cell;
 
 std::shared_ptr<Thread> newThread() { return std::make_shared<Thread>(ContextRequest()); }
 
-Surface heldBy(Oracle& oracle, Surface surface) {
-  surface.device = oracle.hold(surface);
+Surface residentOn(Oracle& oracle, Surface surface) {
+  surface.device = oracle.makeResident(surface);
   EXPECT_NE(surface.device, nullptr);
   return surface;
 }
 
 // All cells of a level that are grey, grown by the oracle itself from lists that it keeps.
-std::vector<Expansion> grownFromKeptLists(Oracle& oracle, const Surface& surface, int levels) {
-  std::vector<Expansion> level{rootOf(surface)};
+std::vector<ExpansionRequest> grownFromKeptLists(Oracle& oracle, const Surface& surface, int levels) {
+  std::vector<ExpansionRequest> level{rootOf(surface)};
   level[0].ids_up_to = 0;
   for (int l = 1; l < levels; ++l) {
-    const std::vector<Expansion> answers = ask(oracle, level);
+    const std::vector<ExpansionRequest> answers = ask(oracle, level);
     level.clear();
-    for (const Expansion& e : answers) {
+    for (const ExpansionRequest& e : answers) {
       for (int o = 0; o < 8; ++o) {
         if ((e.grey >> o & 1) == 0) continue;
-        Expansion child;
+        ExpansionRequest child;
         child.surface = &surface;
         child.cell = e.cell.octant(o);
-        child.shelf = e.kept;
-        child.shelf_begin = e.kept_lists[static_cast<std::size_t>(o)].begin;
-        child.count = e.kept_lists[static_cast<std::size_t>(o)].count;
+        child.resource = e.kept_resource;
+        child.resource_begin = e.device_lists[static_cast<std::size_t>(o)].begin;
+        child.count = e.device_lists[static_cast<std::size_t>(o)].count;
         child.ids_up_to = 0;
         EXPECT_GT(child.count, 0u);
         level.push_back(child);
@@ -54,9 +54,9 @@ std::vector<Expansion> grownFromKeptLists(Oracle& oracle, const Surface& surface
   return level;
 }
 
-std::set<std::uint64_t> greyCells(const std::vector<Expansion>& level) {
+std::set<std::uint64_t> greyCells(const std::vector<ExpansionRequest>& level) {
   std::set<std::uint64_t> cells;
-  for (const Expansion& e : level) cells.insert(e.cell.morton());
+  for (const ExpansionRequest& e : level) cells.insert(e.cell.morton());
   return cells;
 }
 
@@ -78,21 +78,21 @@ std::set<std::uint64_t> greyCellsByReference(const Surface& surface, int level) 
 
 TEST(Compute, GrowsFromListsThatItKeeps) {
   ComputeOracle oracle(newThread());
-  const Surface surface = heldBy(oracle, surfaceOf(test::torus(16)));
+  const Surface surface = residentOn(oracle, surfaceOf(test::torus(16)));
   EXPECT_EQ(greyCells(grownFromKeptLists(oracle, surface, 5)), greyCellsByReference(surface, 5));
   EXPECT_EQ(oracle.leftToCpu(), 0u);
 }
 
 TEST(Compute, FetchesWhatItKeeps) {
   ComputeOracle oracle(newThread());
-  const Surface surface = heldBy(oracle, surfaceOf(test::torus(16)));
-  Expansion kept = rootOf(surface), here = kept;
+  const Surface surface = residentOn(oracle, surfaceOf(test::torus(16)));
+  ExpansionRequest kept = rootOf(surface), here = kept;
   kept.ids_up_to = 0;
   kept = ask(oracle, {kept})[0];
   here = ask(oracle, {here})[0];
   for (std::size_t o = 0; o < 8; ++o) {
-    std::vector<std::uint32_t> ids(kept.kept_lists[o].count);
-    ASSERT_TRUE(oracle.fetch(*kept.kept, kept.kept_lists[o], ids.data()));
+    std::vector<std::uint32_t> ids(kept.device_lists[o].count);
+    ASSERT_TRUE(oracle.fetch(*kept.kept_resource, kept.device_lists[o], ids.data()));
     std::vector<std::uint32_t> expected(here.lists.begin() + static_cast<std::ptrdiff_t>(here.list_begin[o]),
                                         here.lists.begin() + static_cast<std::ptrdiff_t>(here.list_begin[o + 1]));
     std::sort(ids.begin(), ids.end());
@@ -103,13 +103,13 @@ TEST(Compute, FetchesWhatItKeeps) {
 
 TEST(Compute, ListsGoWhenNobodyHoldsThem) {
   ComputeOracle oracle(newThread());
-  const Surface surface = heldBy(oracle, surfaceOf(test::torus(32)));
+  const Surface surface = residentOn(oracle, surfaceOf(test::torus(32)));
   std::uint32_t end = 0;
   for (int i = 0; i < 50; ++i) {
-    Expansion root = rootOf(surface);
+    ExpansionRequest root = rootOf(surface);
     root.ids_up_to = 0;
     root = ask(oracle, {root})[0];
-    const std::uint32_t begin = root.kept_lists[0].begin;
+    const std::uint32_t begin = root.device_lists[0].begin;
     if (i == 0) end = begin;
     EXPECT_EQ(begin, end) << "round " << i << ": the room of the last round was free again";
   }
@@ -122,30 +122,30 @@ TEST(Compute, SplitsWhatExceedsALimit) {
   limits.pairs = 400;
   limits.cells = 7;
   ComputeOracle split(thread, limits);
-  const Surface surface = heldBy(whole, surfaceOf(test::torus(16)));
-  const Surface same = heldBy(split, surface);
+  const Surface surface = residentOn(whole, surfaceOf(test::torus(16)));
+  const Surface same = residentOn(split, surface);
   std::vector<std::uint32_t> some(300);
   for (std::uint32_t i = 0; i < some.size(); ++i) some[i] = i;
-  std::vector<Expansion> batch;
+  std::vector<ExpansionRequest> batch;
   for (int i = 0; i < 64; ++i) {
-    Expansion e;
+    ExpansionRequest e;
     e.cell = Cell{}.octant(i % 8).octant(i / 8);
     e.ids = some.data();
     e.count = some.size();
     batch.push_back(e);
   }
   const auto askAbout = [&](Oracle& oracle, const Surface& s) {
-    for (Expansion& e : batch) e.surface = &s;
+    for (ExpansionRequest& e : batch) e.surface = &s;
     return ask(oracle, batch);
   };
-  const std::vector<Expansion> a = askAbout(whole, surface), b = askAbout(split, same);
+  const std::vector<ExpansionRequest> a = askAbout(whole, surface), b = askAbout(split, same);
   for (std::size_t i = 0; i < batch.size(); ++i) {
     EXPECT_EQ(a[i].grey, b[i].grey);
     EXPECT_EQ(a[i].list_begin, b[i].list_begin);
   }
   EXPECT_EQ(split.leftToCpu(), 0u);
   // What does not fit even alone is the CPU's.
-  const Expansion root = ask(split, {rootOf(same)})[0], expected = ask(whole, {rootOf(surface)})[0];
+  const ExpansionRequest root = ask(split, {rootOf(same)})[0], expected = ask(whole, {rootOf(surface)})[0];
   EXPECT_EQ(split.leftToCpu(), 1u);
   EXPECT_EQ(root.grey, expected.grey);
 }
@@ -154,13 +154,13 @@ TEST(Compute, NoRoomForListsIsTheCpus) {
   ComputeChain::Limits limits;
   limits.bytes = 300000;
   ComputeOracle oracle(newThread(), limits);
-  const Surface surface = heldBy(oracle, surfaceOf(test::torus(40)));
-  Expansion expected = rootOf(surface);
+  const Surface surface = residentOn(oracle, surfaceOf(test::torus(40)));
+  ExpansionRequest expected = rootOf(surface);
   expand(expected);
-  std::vector<Expansion> batch(100, rootOf(surface));  // 320000 pairs
-  const std::vector<Expansion> answers = ask(oracle, batch);
+  std::vector<ExpansionRequest> batch(100, rootOf(surface));  // 320000 pairs
+  const std::vector<ExpansionRequest> answers = ask(oracle, batch);
   EXPECT_EQ(oracle.leftToCpu(), 100u);
-  for (const Expansion& e : answers) EXPECT_EQ(e.grey, expected.grey);
+  for (const ExpansionRequest& e : answers) EXPECT_EQ(e.grey, expected.grey);
 }
 
 TEST(Compute, TablesStayWithinOneBuffer) {
@@ -168,20 +168,20 @@ TEST(Compute, TablesStayWithinOneBuffer) {
   ComputeChain::Limits limits;
   limits.bytes = std::size_t{1} << 20;
   ComputeOracle oracle(newThread(), limits);
-  const Surface surface = heldBy(oracle, surfaceOf(test::torus(16)));
+  const Surface surface = residentOn(oracle, surfaceOf(test::torus(16)));
   std::vector<std::uint32_t> ids(surface.triangle_count);
   for (std::uint32_t i = 0; i < ids.size(); ++i) ids[i] = i;
-  std::vector<Expansion> batch(3000);
+  std::vector<ExpansionRequest> batch(3000);
   for (std::size_t i = 0; i < batch.size(); ++i) {
     batch[i].surface = &surface;
     batch[i].cell = Cell{}.octant(static_cast<int>(i % 8)).octant(static_cast<int>(i / 8 % 8));
     batch[i].ids = &ids[i % ids.size()];
     batch[i].count = 1;
   }
-  const std::vector<Expansion> answers = ask(oracle, batch);
+  const std::vector<ExpansionRequest> answers = ask(oracle, batch);
   EXPECT_EQ(oracle.leftToCpu(), 0u);
   for (std::size_t i = 0; i < batch.size(); ++i) {
-    Expansion expected = batch[i];
+    ExpansionRequest expected = batch[i];
     expand(expected);
     ASSERT_EQ(answers[i].grey, expected.grey) << i;
   }
@@ -195,11 +195,11 @@ TEST(Compute, RunsAgainWhenTheRoomWasTooSmall) {
     raw.vertices[t[1]].setOnes();
   }
   ComputeOracle oracle(newThread());
-  const Surface surface = heldBy(oracle, surfaceOf(raw));
-  Expansion expected = rootOf(surface);
+  const Surface surface = residentOn(oracle, surfaceOf(raw));
+  ExpansionRequest expected = rootOf(surface);
   expand(expected);
-  for (const std::size_t up_to : {std::size_t{0}, std::size_t{32}, Expansion::kAll}) {
-    Expansion root = rootOf(surface);
+  for (const std::size_t up_to : {std::size_t{0}, std::size_t{32}, ExpansionRequest::kAll}) {
+    ExpansionRequest root = rootOf(surface);
     root.ids_up_to = up_to;
     root = ask(oracle, {root})[0];
     EXPECT_EQ(root.grey, expected.grey);
@@ -215,12 +215,13 @@ TEST(Compute, RunsAgainWhenTheRoomWasTooSmall) {
 
 TEST(Compute, AHundredThousandCellsInABatch) {
   ComputeOracle oracle(newThread());
-  const Surface a = heldBy(oracle, surfaceOf(test::torus(24))), b = heldBy(oracle, surfaceOf(test::soup(2000, 3)));
+  const Surface a = residentOn(oracle, surfaceOf(test::torus(24))),
+                b = residentOn(oracle, surfaceOf(test::soup(2000, 3)));
   std::mt19937_64 g(5);
   std::vector<std::uint32_t> ids(100000);
-  std::vector<Expansion> batch(100000);
+  std::vector<ExpansionRequest> batch(100000);
   for (std::size_t i = 0; i < batch.size(); ++i) {
-    Expansion& e = batch[i];
+    ExpansionRequest& e = batch[i];
     e.surface = i % 2 ? &a : &b;
     e.ids = &ids[i];
     e.count = 1;
@@ -233,7 +234,7 @@ TEST(Compute, AHundredThousandCellsInABatch) {
           std::min(static_cast<std::uint32_t>(p[k] / e.cell.side()), (1u << (e.cell.level - 1)) - 1);
     }
   }
-  const std::vector<Expansion> answers = ask(oracle, batch);
+  const std::vector<ExpansionRequest> answers = ask(oracle, batch);
   std::size_t grey = 0;
   for (std::size_t i = 0; i < batch.size(); ++i) {
     for (int o = 0; o < 8; ++o) {
@@ -249,10 +250,10 @@ TEST(Compute, AHundredThousandCellsInABatch) {
 
 TEST(Compute, ThreadsThatWaitTogether) {
   ComputeOracle oracle(newThread());
-  const Surface surface = heldBy(oracle, surfaceOf(test::torus(16)));
+  const Surface surface = residentOn(oracle, surfaceOf(test::torus(16)));
   std::vector<std::uint8_t> expected;
   for (int o = 0; o < 8; ++o) {
-    Expansion e = rootOf(surface);
+    ExpansionRequest e = rootOf(surface);
     e.cell = Cell{}.octant(o);
     expand(e);
     expected.push_back(e.grey);
@@ -263,7 +264,7 @@ TEST(Compute, ThreadsThatWaitTogether) {
     threads.emplace_back([&, t] {
       for (int i = 0; i < 20; ++i) {
         const std::size_t size = 1 + static_cast<std::size_t>(t + i) % 5;
-        std::vector<Expansion> batch(size, rootOf(surface));
+        std::vector<ExpansionRequest> batch(size, rootOf(surface));
         for (std::size_t k = 0; k < size; ++k) batch[k].cell = Cell{}.octant(static_cast<int>(t + i + k) % 8);
         batch = ask(oracle, batch);
         for (std::size_t k = 0; k < size; ++k) {
@@ -280,12 +281,12 @@ TEST(Compute, ThreadsThatWaitTogether) {
 TEST(Device, MeshesAreShared) {
   ComputeOracle oracle(newThread());
   const Surface a = surfaceOf(test::torus(16));
-  const auto first = oracle.hold(a), second = oracle.hold(a);
+  const auto first = oracle.makeResident(a), second = oracle.makeResident(a);
   EXPECT_EQ(first, second);
   // 12 bytes a triangle; 24 a vertex for the parts and 24 for the doubles.
   EXPECT_EQ(first->bytes(), 12 * a.mesh->triangleCount() + 48 * a.mesh->vertexCount());
   const Surface other{a.mesh, lattice::Lattice(a.bounds, Subdivision::kBono, 514)};
-  EXPECT_NE(oracle.hold(other), first);
+  EXPECT_NE(oracle.makeResident(other), first);
 }
 
 TEST(Device, ALostContextLeavesEverythingToTheCpu) {
@@ -297,19 +298,19 @@ TEST(Device, ALostContextLeavesEverythingToTheCpu) {
     } else {
       oracle = std::make_unique<ComputeOracle>(thread);
     }
-    const Surface surface = heldBy(*oracle, surfaceOf(test::torus(16)));
-    Expansion root = rootOf(surface);
+    const Surface surface = residentOn(*oracle, surfaceOf(test::torus(16)));
+    ExpansionRequest root = rootOf(surface);
     root.ids_up_to = 0;
     root = ask(*oracle, {root})[0];
-    std::vector<Expansion> children;
+    std::vector<ExpansionRequest> children;
     for (int o = 0; o < 8; ++o) {
-      Expansion child;
+      ExpansionRequest child;
       child.surface = &surface;
       child.cell = root.cell.octant(o);
       child.count = root.listSize(o);
-      if (root.kept != nullptr) {
-        child.shelf = root.kept;
-        child.shelf_begin = root.kept_lists[static_cast<std::size_t>(o)].begin;
+      if (root.kept_resource != nullptr) {
+        child.resource = root.kept_resource;
+        child.resource_begin = root.device_lists[static_cast<std::size_t>(o)].begin;
       } else {
         child.ids = root.lists.data() + root.list_begin[static_cast<std::size_t>(o)];
       }
@@ -322,22 +323,22 @@ TEST(Device, ALostContextLeavesEverythingToTheCpu) {
     const std::string notice = testing::internal::GetCapturedStderr();
     EXPECT_NE(notice.find("a test says so"), std::string::npos);
     EXPECT_EQ(notice.find("again"), std::string::npos) << "one notice is enough";
-    const std::vector<Expansion> answers = ask(*oracle, children);
-    for (const Expansion& e : answers) {
+    const std::vector<ExpansionRequest> answers = ask(*oracle, children);
+    for (const ExpansionRequest& e : answers) {
       for (int o = 0; o < 8; ++o) EXPECT_EQ(e.grey >> o & 1, referenceGrey(surface, e.cell.octant(o)));
     }
-    EXPECT_EQ(oracle->hold(surfaceOf(test::torus(8))), nullptr);
+    EXPECT_EQ(oracle->makeResident(surfaceOf(test::torus(8))), nullptr);
     // Without a mesh on the host there is nobody to ask.
     Surface released = surface;
     released.mesh = nullptr;
-    for (Expansion& e : children) e.surface = &released;
+    for (ExpansionRequest& e : children) e.surface = &released;
     EXPECT_THROW(ask(*oracle, children), OracleError);
   }
 }
 
 TEST(Device, AChildAfterForkAnswersOnTheCpu) {
   ComputeOracle oracle(newThread());
-  const Surface surface = heldBy(oracle, surfaceOf(test::torus(16)));
+  const Surface surface = residentOn(oracle, surfaceOf(test::torus(16)));
   const std::uint8_t expected = ask(oracle, {rootOf(surface)})[0].grey;
   const pid_t child = fork();
   if (child == 0) {
@@ -370,14 +371,14 @@ TEST(Device, RoundsLeakNothing) {
     const auto thread = newThread();
     ComputeOracle compute(thread);
     OcclusionOracle occlusion(thread, OcclusionOracle::Form::kConservative, 16);
-    const Surface surface = heldBy(compute, surfaceOf(test::torus(64)));
-    Expansion root = rootOf(surface);
+    const Surface surface = residentOn(compute, surfaceOf(test::torus(64)));
+    ExpansionRequest root = rootOf(surface);
     root.ids_up_to = 0;
     root = ask(compute, {root})[0];
     EXPECT_NE(root.grey, 0);
-    return root.kept;  // outlives its oracle
+    return root.kept_resource;  // outlives its oracle
   };
-  std::shared_ptr<const Held> last;
+  std::shared_ptr<const DeviceResource> last;
   for (int i = 0; i < 20; ++i) last = round();
   const std::size_t before = residentBytes();
   for (int i = 0; i < 100; ++i) last = round();
@@ -435,15 +436,15 @@ struct Seen {
 Seen lookAt(OcclusionOracle& oracle, const Surface& surface, int levels) {
   Seen seen;
   std::vector<std::vector<std::uint32_t>> lists;
-  std::vector<Expansion> level{rootOf(surface)};
+  std::vector<ExpansionRequest> level{rootOf(surface)};
   for (int l = 1; l <= levels; ++l) {
-    std::vector<Expansion*> questions;
-    for (Expansion& e : level) questions.push_back(&e);
-    const std::vector<std::uint8_t> candidates = oracle.candidates(questions);
-    std::vector<Expansion> next;
+    std::vector<ExpansionRequest*> requests;
+    for (ExpansionRequest& e : level) requests.push_back(&e);
+    const std::vector<std::uint8_t> candidates = oracle.candidates(requests);
+    std::vector<ExpansionRequest> next;
     std::vector<std::vector<std::uint32_t>> next_lists;
     for (std::size_t i = 0; i < level.size(); ++i) {
-      Expansion e = level[i];
+      ExpansionRequest e = level[i];
       expand(e);
       for (int o = 0; o < 8; ++o) {
         const bool grey = e.grey >> o & 1, candidate = candidates[i] >> o & 1;
@@ -468,7 +469,7 @@ Seen lookAt(OcclusionOracle& oracle, const Surface& surface, int levels) {
         next_lists.emplace_back(
             e.lists.begin() + static_cast<std::ptrdiff_t>(e.list_begin[static_cast<std::size_t>(o)]),
             e.lists.begin() + static_cast<std::ptrdiff_t>(e.list_begin[static_cast<std::size_t>(o) + 1]));
-        Expansion child;
+        ExpansionRequest child;
         child.surface = &surface;
         child.cell = octant;
         next.push_back(child);
@@ -487,7 +488,7 @@ Seen lookAt(OcclusionOracle& oracle, const Surface& surface, int levels) {
 TEST(Occlusion, ConservativeQueriesLoseNothingAndAddOnlyTheirPad) {
   OcclusionOracle oracle(newThread(), OcclusionOracle::Form::kConservative, 16);
   for (const test::Raw& raw : {test::torus(24), test::adversarial(), test::soup(300, 2)}) {
-    const Surface surface = heldBy(oracle, surfaceOf(raw));
+    const Surface surface = residentOn(oracle, surfaceOf(raw));
     const Seen seen = lookAt(oracle, surface, 5);
     EXPECT_GT(seen.grey, 500u);
     EXPECT_EQ(seen.missed, 0u);
@@ -501,8 +502,8 @@ TEST(Occlusion, SampledQueriesLoseSurface) {
   std::vector<std::size_t> missed;
   for (const int viewport : {8, 64}) {
     OcclusionOracle oracle(thread, OcclusionOracle::Form::kSampled, viewport);
-    const Surface thin = heldBy(oracle, surfaceOf(test::adversarial()));
-    const Surface torus = heldBy(oracle, surfaceOf(test::torus(24)));
+    const Surface thin = residentOn(oracle, surfaceOf(test::adversarial()));
+    const Surface torus = residentOn(oracle, surfaceOf(test::torus(24)));
     const Seen on_thin = lookAt(oracle, thin, 5), on_torus = lookAt(oracle, torus, 5);
     EXPECT_GT(on_thin.missed, on_thin.grey / 20);
     missed.push_back(on_torus.missed);

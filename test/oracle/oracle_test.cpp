@@ -11,9 +11,9 @@
 #include <random>
 
 #include "oracle/cpu/kernels.h"
-#include "oracle/cpu/root_grid.h"
 #include "oracle/gl/device_oracle.h"
 #include "surfaces.h"
+#include "tree/root_grid.h"
 
 namespace bocst::oracle {
 namespace {
@@ -22,21 +22,21 @@ using lattice::Cell;
 using lattice::Lattice;
 
 // Where the oracle works.
-Surface heldBy(Oracle& oracle, Surface surface) {
-  surface.device = oracle.hold(surface);
+Surface residentOn(Oracle& oracle, Surface surface) {
+  surface.device = oracle.makeResident(surface);
   EXPECT_EQ(surface.device != nullptr, oracle.kind() != OracleKind::kCpu);
   return surface;
 }
 
 // Is p, in lattice units, inside the bounds of the octant?
-bool holds(const CellBounds& b, const Cell& cell, const Eigen::Vector3d& p) {
-  const double side = cell.side(), slack = side * 1e-6 + 1e-9;
+bool contains(const CellBounds& b, const Cell& cell, const Eigen::Vector3d& p) {
+  const double side = cell.side(), tolerance = side * 1e-6 + 1e-9;
   const Eigen::Vector3d center = centerOf(cell);
   double along = 0;
   for (int k = 0; k < 3; ++k) {
     const double x = p[k] - (center[k] - side / 2);
-    if (x < b.lo[static_cast<std::size_t>(k)] * side / 255 - slack) return false;
-    if (x > b.hi[static_cast<std::size_t>(k)] * side / 255 + slack) return false;
+    if (x < b.lo[static_cast<std::size_t>(k)] * side / 255 - tolerance) return false;
+    if (x > b.hi[static_cast<std::size_t>(k)] * side / 255 + tolerance) return false;
     along += b.normal[static_cast<std::size_t>(k)] * (p[k] - center[k]) / side;
   }
   return std::abs(along - b.slab_center) <= b.slab_half / 2.0 + 127e-6;
@@ -55,21 +55,21 @@ class EveryOracle : public testing::TestWithParam<OracleKind> {
 
 // Expands all grey cells level by level and checks each answer.
 void checkMesh(Oracle& oracle, const Surface& here, int levels, std::size_t most_cells) {
-  const Surface surface = heldBy(oracle, here);
+  const Surface surface = residentOn(oracle, here);
   std::mt19937_64 g(1);
   std::uniform_real_distribution<double> u(0, 1);
-  Expansion root = rootOf(surface);
-  std::vector<Expansion> level{root};
+  ExpansionRequest root = rootOf(surface);
+  std::vector<ExpansionRequest> level{root};
   for (int l = 1; l <= levels; ++l) {
     if (level.size() > most_cells) {
       std::shuffle(level.begin(), level.end(), g);
       level.resize(most_cells);
     }
-    const std::vector<Expansion> answers = ask(oracle, level);
+    const std::vector<ExpansionRequest> answers = ask(oracle, level);
     static std::vector<std::vector<std::uint32_t>> keep;
     keep.clear();
-    std::vector<Expansion> next;
-    for (const Expansion& e : answers) {
+    std::vector<ExpansionRequest> next;
+    for (const ExpansionRequest& e : answers) {
       for (int o = 0; o < 8; ++o) {
         const Cell octant = e.cell.octant(o);
         const bool grey = e.grey >> o & 1;
@@ -82,7 +82,7 @@ void checkMesh(Oracle& oracle, const Surface& here, int levels, std::size_t most
         }
         for (std::uint32_t t = 0; t < surface.mesh->triangleCount(); ++t) {
           const Eigen::Vector3d c[3] = {surface.corner(t, 0), surface.corner(t, 1), surface.corner(t, 2)};
-          if (!touches(c, centerOf(octant), octant.side() / 2.0)) continue;
+          if (!triangleMeetsCube(c, centerOf(octant), octant.side() / 2.0)) continue;
           ASSERT_NE(std::find(list.begin(), list.end(), t), list.end()) << "triangle " << t << " is not listed";
           for (int i = 0; i < 40; ++i) {
             double a = u(g), b = u(g);
@@ -90,11 +90,11 @@ void checkMesh(Oracle& oracle, const Surface& here, int levels, std::size_t most
             if (i < 3) a = i == 1, b = i == 2;
             const Eigen::Vector3d p = c[0] + a * (c[1] - c[0]) + b * (c[2] - c[0]);
             if ((p - centerOf(octant)).cwiseAbs().maxCoeff() > octant.side() / 2.0) continue;
-            ASSERT_TRUE(holds(e.octants.get(o), octant, p)) << "triangle " << t << " level " << octant.level;
-            ASSERT_TRUE(holds(e.own, e.cell, p)) << "triangle " << t << " level " << octant.level;
+            ASSERT_TRUE(contains(e.octants.get(o), octant, p)) << "triangle " << t << " level " << octant.level;
+            ASSERT_TRUE(contains(e.own, e.cell, p)) << "triangle " << t << " level " << octant.level;
           }
         }
-        Expansion child;
+        ExpansionRequest child;
         child.surface = &surface;
         child.cell = octant;
         keep.push_back(list);
@@ -136,16 +136,16 @@ TEST_P(EveryOracle, AnyScaleAndPlace) {
 }
 
 TEST_P(EveryOracle, OddBatches) {
-  const Surface a = heldBy(*oracle_, surfaceOf(test::torus(16)));
-  const Surface b = heldBy(*oracle_, surfaceOf(test::adversarial()));
+  const Surface a = residentOn(*oracle_, surfaceOf(test::torus(16)));
+  const Surface b = residentOn(*oracle_, surfaceOf(test::adversarial()));
   for (const std::size_t size : {std::size_t{1}, std::size_t{2}, std::size_t{3}, std::size_t{63}, std::size_t{1001}}) {
-    std::vector<Expansion> batch(size);
+    std::vector<ExpansionRequest> batch(size);
     for (std::size_t i = 0; i < size; ++i) {
       batch[i].surface = i % 3 ? &a : &b;
       batch[i].count = batch[i].surface->mesh->triangleCount();
       if (i % 2) batch[i].cell = Cell{}.octant(static_cast<int>(i % 8));
     }
-    const std::vector<Expansion> answers = ask(*oracle_, batch);
+    const std::vector<ExpansionRequest> answers = ask(*oracle_, batch);
     for (std::size_t i = 0; i < size; i += 97) {
       for (int o = 0; o < 8; ++o) {
         EXPECT_EQ(answers[i].grey >> o & 1, referenceGrey(*answers[i].surface, answers[i].cell.octant(o)));
@@ -229,15 +229,15 @@ TEST_P(EveryOracle, NothingMissedAgainstIntegers) {
       }
       raw.triangles.emplace_back(raw.vertices.size() - 3, raw.vertices.size() - 2, raw.vertices.size() - 1);
     }
-    const Surface surface = heldBy(*oracle_, surfaceOf(raw));
+    const Surface surface = residentOn(*oracle_, surfaceOf(raw));
     ASSERT_EQ(surface.lattice.unit(), 1);
     std::vector<std::uint32_t> ids(400);
     for (std::uint32_t t = 0; t < 400; ++t) ids[t] = t + 2;
-    std::vector<Expansion> batch;
+    std::vector<ExpansionRequest> batch;
     for (std::uint32_t t = 0; t < 400; ++t) {
       for (int o = 0; o < 8; ++o) {  // the eight cells of the level above about the middle
         const std::uint32_t at = 1u << (level - 3);
-        Expansion e;
+        ExpansionRequest e;
         e.surface = &surface;
         e.cell = Cell{level - 1, {at - (o & 1), at - (o >> 1 & 1), at - (o >> 2 & 1)}};
         e.ids = &ids[t];
@@ -245,8 +245,8 @@ TEST_P(EveryOracle, NothingMissedAgainstIntegers) {
         batch.push_back(e);
       }
     }
-    const std::vector<Expansion> answers = ask(*oracle_, batch);
-    for (const Expansion& e : answers) {
+    const std::vector<ExpansionRequest> answers = ask(*oracle_, batch);
+    for (const ExpansionRequest& e : answers) {
       const std::size_t t = *e.ids - 2;
       for (int o = 0; o < 8; ++o) {
         const auto corner = e.cell.octant(o).corner();
@@ -353,7 +353,7 @@ void checkStepsBack() {
 
 TEST(Kernels, EveryInstructionSetAgreesOnGreySets) {
   const Surface surface = surfaceOf(test::soup(500, 3));
-  Expansion root = rootOf(surface);
+  ExpansionRequest root = rootOf(surface);
   std::vector<std::uint8_t> greys;
   int targets = 0;
   const std::int64_t all = hwy::SupportedTargets();
@@ -363,7 +363,7 @@ TEST(Kernels, EveryInstructionSetAgreesOnGreySets) {
     ++targets;
     for (int o = 0; o < 8; ++o) {
       root.cell = Cell{}.octant(o);
-      const Expansion e = ask(*makeOracle(OracleKind::kCpu), {root})[0];
+      const ExpansionRequest e = ask(*makeOracle(OracleKind::kCpu), {root})[0];
       if (targets == 1) {
         greys.push_back(e.grey);
       } else {
@@ -388,7 +388,7 @@ void gathersAllOnce(const RootGrid& grid, const Surface& surface, const Cell& ce
   ASSERT_EQ(std::adjacent_find(ids.begin(), ids.end()), ids.end());
   for (std::uint32_t t = 0; t < surface.mesh->triangleCount(); ++t) {
     const Eigen::Vector3d c[3] = {surface.corner(t, 0), surface.corner(t, 1), surface.corner(t, 2)};
-    if (touches(c, centerOf(cell), cell.side() / 2.0)) {
+    if (triangleMeetsCube(c, centerOf(cell), cell.side() / 2.0)) {
       ASSERT_TRUE(std::binary_search(ids.begin(), ids.end(), t));
     }
   }

@@ -22,7 +22,7 @@ inline Eigen::Vector3d centerOf(const lattice::Cell& cell) {
 
 inline bool meets(const Surface& surface, std::uint32_t t, const lattice::Cell& cell, double more = 0) {
   const Eigen::Vector3d corners[3] = {surface.corner(t, 0), surface.corner(t, 1), surface.corner(t, 2)};
-  return touches(corners, centerOf(cell), cell.side() / 2.0 + more);
+  return triangleMeetsCube(corners, centerOf(cell), cell.side() / 2.0 + more);
 }
 
 inline bool referenceGrey(const Surface& surface, const lattice::Cell& cell) {
@@ -34,14 +34,14 @@ inline bool referenceGrey(const Surface& surface, const lattice::Cell& cell) {
 }
 
 /// The question about all of a mesh.
-inline Expansion rootOf(const Surface& surface) {
-  Expansion root;
+inline ExpansionRequest rootOf(const Surface& surface) {
+  ExpansionRequest root;
   root.surface = &surface;
   root.count = surface.triangle_count;
   return root;
 }
 
-inline std::vector<Expansion> ask(Oracle& oracle, std::vector<Expansion> batch) {
+inline std::vector<ExpansionRequest> ask(Oracle& oracle, std::vector<ExpansionRequest> batch) {
   oracle.submit(batch);
   oracle.wait(batch);
   return batch;

@@ -9,13 +9,13 @@
 #include <utility>
 #include <vector>
 
-#include "bench_report.h"
-#include "health.h"
-#include "heap.h"
+#include "bench/bench_report.h"
+#include "bench/heap.h"
+#include "mesh/health.h"
+#include "mesh/subdivide.h"
 #include "meshes.h"
-#include "query_pair.h"
-#include "sliding_path.h"
-#include "subdivide.h"
+#include "pairs/query_pair.h"
+#include "pairs/sliding_path.h"
 
 namespace bocst {
 namespace {

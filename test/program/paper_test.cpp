@@ -10,12 +10,12 @@
 #include <string>
 #include <vector>
 
-#include "animation.h"
-#include "decimate.h"
-#include "health.h"
+#include "mesh/decimate.h"
+#include "mesh/health.h"
 #include "meshes.h"
-#include "paper_report.h"
-#include "plot.h"
+#include "paper/animation.h"
+#include "paper/paper_report.h"
+#include "paper/plot.h"
 
 namespace bocst {
 namespace {
@@ -190,7 +190,7 @@ TEST(Decimation, TakesWhatIsHardToReduce) {
   const auto far = program::decimated(exploded.move({1e6, -1e6, 0}).mesh(), 500);
   EXPECT_LE(far->triangleCount(), 500u);
   EXPECT_TRUE(program::healthOf(*far).watertight());
-  // Points and needles: whatever is left is a mesh.
+  // PointSet and needles: whatever is left is a mesh.
   test::Raw needles;
   for (int i = 0; i < 50; ++i) {
     needles.vertices.push_back({i * 1.0, 0, 0});

@@ -11,12 +11,12 @@
 #include <string>
 #include <vector>
 
-#include "display_mesh.h"
-#include "health.h"
+#include "commands/validation.h"
+#include "mesh/health.h"
+#include "mesh/spheres.h"
 #include "meshes.h"
-#include "page.h"
-#include "spheres.h"
-#include "validation.h"
+#include "picture/display_mesh.h"
+#include "picture/page.h"
 
 namespace bocst {
 namespace {

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: BSD-3-Clause
 // What is in pictures, by projections computed here.
-#include "picture.h"
+#include "picture/picture.h"
 
 #include <bocst/model.h>
 #include <bocst/oracle.h>
@@ -17,12 +17,12 @@
 #include <utility>
 #include <vector>
 
-#include "inspect_picture.h"
-#include "marks.h"
+#include "mesh/spheres.h"
 #include "meshes.h"
-#include "pair_picture.h"
+#include "picture/inspect_picture.h"
+#include "picture/marks.h"
+#include "picture/pair_picture.h"
 #include "render/renderer.h"
-#include "spheres.h"
 
 namespace bocst {
 namespace {

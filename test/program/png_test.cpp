@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: BSD-3-Clause
-#include "png.h"
+#include "picture/png.h"
 
 #include <gtest/gtest.h>
 

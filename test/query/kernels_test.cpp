@@ -1,8 +1,6 @@
 // SPDX-License-Identifier: BSD-3-Clause
 // The float tests of a query never part what touches: against points of the volumes and against FCL's triangle test, on
 // every instruction set that the dispatch can choose.
-#include "query/kernels.h"
-
 #include <fcl/narrowphase/detail/traversal/collision/intersect.h>
 #include <gtest/gtest.h>
 
@@ -11,14 +9,15 @@
 #include <set>
 
 #include "every_target.h"
+#include "geometry/overlap_kernels.h"
+#include "geometry/triangle.h"
+#include "geometry/volume.h"
 #include "meshes.h"
 #include "oracle/reference.h"
-#include "query/coarse_triangles.h"
-#include "query/distance_kernels.h"
-#include "query/tree_steps.h"
-#include "query/triangle.h"
-#include "query/unpack.h"
-#include "query/volume.h"
+#include "query/collide/tree_steps.h"
+#include "query/distance/distance_kernels.h"
+#include "query/leaf/large_triangles.h"
+#include "query/leaf/unpack.h"
 #include "tree/packed_triangles.h"
 
 namespace bocst::query {
@@ -83,7 +82,7 @@ TEST_P(EveryTarget, NoOctantIsLostThatSharesAPoint) {
     }
     v.slab_offset = static_cast<float>(other.slab_center / 127.0 - n.dot(box_middle - Eigen::Vector3d::Constant(0.5)));
     v.slab_half = static_cast<float>(other.slab_half / 254.0);
-    Placement to;
+    SimilarityTransform to;
     to.rotation = test::randomRotation(g);
     to.scale = std::pow(10.0, 3 * u(g));
     const double side = std::pow(10.0, 3 * u(g));
@@ -94,7 +93,7 @@ TEST_P(EveryTarget, NoOctantIsLostThatSharesAPoint) {
     if (!randomPoint(g, octants.get(o), octant_corner, side, mine)) continue;
     if (!randomPoint(g, other, Eigen::Vector3d::Zero(), 1, theirs)) continue;
     to.translation = mine - to.scale * (to.rotation * theirs);
-    to.slack = 1e-13 * corner.norm();
+    to.tolerance = 1e-13 * corner.norm();
     to.ready();
     ++shared;
     const double at[3] = {corner[0], corner[1], corner[2]};
@@ -128,7 +127,7 @@ TEST_P(EveryTarget, NoOctantIsLostThatSharesAPointInFramesOfTheRoots) {
                           octant.side(), points[side]);
     }
     if (!found) continue;
-    Placement to;
+    SimilarityTransform to;
     to.rotation = test::randomRotation(g);
     to.scale = std::pow(2.0, 10 * u(g));
     to.translation = points[0] - to.scale * (to.rotation * points[1]);
@@ -182,7 +181,7 @@ void aroundPoint(std::mt19937_64& g, const Eigen::Vector3d& point, double size, 
 TEST_P(EveryTarget, NoTriangleIsLostThatMeetsAnOctant) {
   std::mt19937_64 g(36);
   std::uniform_real_distribution<double> u(-1, 1);
-  constexpr double kMiddle = CoarseTriangles::kMiddle;
+  constexpr double kMiddle = LargeTriangles::kMiddle;
   std::size_t others = 0, seen = 0, needless = 0;
   for (int round = 0; round < 4000; ++round) {
     CellOctants c;
@@ -191,7 +190,7 @@ TEST_P(EveryTarget, NoTriangleIsLostThatMeetsAnOctant) {
     for (int o = 0; o < 8; ++o) c.octants.set(o, randomBounds(g));
     c.octants.set(0, oracle::CellBounds());  // one has points for sure
     const int own = static_cast<int>(g() % 2);
-    Placement to;
+    SimilarityTransform to;
     to.rotation = test::randomRotation(g);
     to.scale = std::pow(2.0, 10 * u(g));
     to.translation = Eigen::Vector3d(u(g), u(g), u(g)) * kMiddle;
@@ -199,7 +198,7 @@ TEST_P(EveryTarget, NoTriangleIsLostThatMeetsAnOctant) {
     const PairFrames frames(to.scale, to);
     const auto unit = static_cast<double>(frames.side[own].unit);
     // Triangles through a point of an octant.
-    const std::size_t count = 1 + g() % CoarseTriangles::kCapacity;
+    const std::size_t count = 1 + g() % LargeTriangles::kCapacity;
     std::vector<int> octant;
     std::vector<std::array<Eigen::Vector3d, 3>> corners;
     while (corners.size() < count) {
@@ -220,7 +219,7 @@ TEST_P(EveryTarget, NoTriangleIsLostThatMeetsAnOctant) {
         for (std::size_t x = 0; x < 3; ++x) raw.xyz[3 * k + x][i] = corners[i][k][static_cast<int>(x)];
       }
     }
-    const PackPlacement place = {{{1, 0, 0}, {0, 1, 0}, {0, 0, 1}}, {-kMiddle, -kMiddle, -kMiddle}};
+    const PackTransform place = {{{1, 0, 0}, {0, 1, 0}, {0, 0, 1}}, {-kMiddle, -kMiddle, -kMiddle}};
     TrianglePack pack;
     placeTriangles(raw, count, place, pack);
     const std::uint32_t all = ~0u >> (32 - count), first = all & static_cast<std::uint32_t>(g());
@@ -242,7 +241,7 @@ TEST_P(EveryTarget, NoTriangleIsLostThatMeetsAnOctant) {
         const auto corner = cell.corner();
         const double half = cell.side() / 2.0;
         const Eigen::Vector3d middle = Eigen::Vector3d(corner[0], corner[1], corner[2]).array() + half;
-        const bool free = !oracle::touches(corners[i].data(), middle, half + 2);
+        const bool free = !oracle::triangleMeetsCube(corners[i].data(), middle, half + 2);
         ++others;
         seen += free;
         needless += free && is_met;
@@ -284,7 +283,7 @@ TEST_P(EveryTarget, NoPairIsLostThatFclFinds) {
     }
     for (std::size_t i = 0; i < b.count; ++i) {
       make(tb[i]);
-      // Touch a triangle of the other side exactly: by a corner, or moved onto its plane.
+      // ContactPoint a triangle of the other side exactly: by a corner, or moved onto its plane.
       if (g() % 2) {
         const auto& other = ta[g() % a.count];
         const double s = std::abs(u(g)), t = (1 - s) * std::abs(u(g));
@@ -362,7 +361,7 @@ void certainMeansThatFclSaysSo() {
       q[1] = q[0] + R.transpose() * (p[1] - p[0]) * static_cast<S>(1 + u(g));
     }
     const double magnitude = T.template cast<double>().norm() + 2 * (far + 2 * size);
-    Placement to;
+    SimilarityTransform to;
     to.rotation = R.template cast<double>();
     to.translation = T.template cast<double>();
     Corners pd, qd;
@@ -386,9 +385,9 @@ void certainMeansThatFclSaysSo() {
       motion.offset[r] = static_cast<float>(offset[r]);
     }
     moveTriangles(b, 1, motion, moved);
-    const auto slack = static_cast<float>(magnitude * 32 * static_cast<double>(std::numeric_limits<S>::epsilon()));
+    const auto tolerance = static_cast<float>(magnitude * 32 * static_cast<double>(std::numeric_limits<S>::epsilon()));
     PackPair found[1];
-    const std::size_t count = touchingPairs(a, 1, moved, everywhere(), slack, found);
+    const std::size_t count = touchingPairs(a, 1, moved, everywhere(), tolerance, found);
     const bool meet = Exact::intersect_Triangle(p[0], p[1], p[2], q[0], q[1], q[2], R, T);
     const bool degenerate = isDegenerate(pd) || isDegenerate(qd);
     if (count == 1 && found[0].certain) {
@@ -402,14 +401,14 @@ void certainMeansThatFclSaysSo() {
     apart += !meet;
 
     TrianglePairs pair;
-    Touch touch;
+    ContactPoint touch;
     for (int k = 0; k < 3; ++k) {
       pd[k] = p[k].template cast<double>();
       qd[k] = to * q[k].template cast<double>().eval();
     }
     pair.put(0, pd, qd);
     pair.count = 1;
-    const Parted parted = partTriangles(pair, static_cast<double>(slack), &touch);
+    const PenetrationVerdicts parted = trianglePenetrations(pair, static_cast<double>(tolerance), &touch);
     if (parted.meet != 0) {
       ASSERT_TRUE(meet) << "round " << round;
     }
@@ -450,10 +449,10 @@ TEST_P(EveryTarget, NoTriangleIsLostThatReachesIntoARegion) {
     }
     // A box and a slab about the point of one triangle, which may lie on their ends.
     const Eigen::Vector3d x = points[g() % pack.count], n = test::randomDirection(g);
-    const double size = pack.size, pad = 32 * 0x1p-24 * size;
+    const double size = pack.size, rounding_margin = 32 * 0x1p-24 * size;
     PackRegion region;
     const auto bound = [&](double at, int sign) {
-      return static_cast<float>(at + sign * ((g() % 2 ? 0 : std::abs(u(g)) * 0.5 * scale) + pad));
+      return static_cast<float>(at + sign * ((g() % 2 ? 0 : std::abs(u(g)) * 0.5 * scale) + rounding_margin));
     };
     for (int k = 0; k < 3; ++k) {
       region.low[k] = bound(x[k], -1);
@@ -464,9 +463,10 @@ TEST_P(EveryTarget, NoTriangleIsLostThatReachesIntoARegion) {
     region.slab_high = bound(n.dot(x), 1);
     const std::uint32_t mask = trianglesWithin(pack, region);
     for (std::size_t i = 0; i < pack.count; ++i) {
-      bool in = n.dot(points[i]) >= region.slab_low + pad && n.dot(points[i]) <= region.slab_high - pad;
+      bool in = n.dot(points[i]) >= region.slab_low + rounding_margin &&
+                n.dot(points[i]) <= region.slab_high - rounding_margin;
       for (int k = 0; k < 3; ++k) {
-        in = in && points[i][k] >= region.low[k] + pad && points[i][k] <= region.high[k] - pad;
+        in = in && points[i][k] >= region.low[k] + rounding_margin && points[i][k] <= region.high[k] - rounding_margin;
       }
       in = in || points[i] == x;
       if (in) {
@@ -603,17 +603,17 @@ TEST_P(EveryTarget, GapsOfOctantsHoldTheDistancesOfTheirPoints) {
                           octant.side(), points[side]);
     }
     if (!found) continue;
-    Placement to;
+    SimilarityTransform to;
     to.rotation = test::randomRotation(g);
     to.scale = std::pow(2.0, 10 * u(g));
-    const Eigen::Vector3d way = test::randomDirection(g) * std::pow(10.0, 3 + 3 * u(g));
-    to.translation = points[0] + way - to.scale * (to.rotation * points[1]);
+    const Eigen::Vector3d displacement = test::randomDirection(g) * std::pow(10.0, 3 + 3 * u(g));
+    to.translation = points[0] + displacement - to.scale * (to.rotation * points[1]);
     to.ready();
     const PairFrames geometry(to.scale, to);
-    const double distance = (to * points[1] - points[0]).norm(), rounding = 1e-12 * geometry.pad * 0x1p24;
+    const double distance = (to * points[1] - points[0]).norm(), rounding = 1e-12 * geometry.rounding_margin * 0x1p24;
     FrameDirection expected;
     if (round % 3 != 0) {
-      const Eigen::Vector3d d = round % 3 == 1 ? Eigen::Vector3d(way.normalized()) : test::randomDirection(g);
+      const Eigen::Vector3d d = round % 3 == 1 ? Eigen::Vector3d(displacement.normalized()) : test::randomDirection(g);
       const Eigen::Vector3d back = to.rotation.transpose() * d;
       for (int k = 0; k < 3; ++k) {
         expected.in[0][k] = static_cast<float>(d[k]);
@@ -666,24 +666,25 @@ TEST_P(EveryTarget, NoPairIsLostThatIsNearest) {
     for (std::size_t i = 0; i < a.count; ++i) put(a, i, {ta[i][0], ta[i][1], ta[i][2]});
     for (std::size_t i = 0; i < b.count; ++i) put(b, i, {tb[i][0], tb[i][1], tb[i][2]});
     std::vector<double> distances;
-    Eigen::Vector3d on_p, on_q, way = Eigen::Vector3d::Zero();
+    Eigen::Vector3d on_p, on_q, displacement = Eigen::Vector3d::Zero();
     double least = std::numeric_limits<double>::infinity();
     for (std::size_t i = 0; i < a.count; ++i) {
       for (std::size_t j = 0; j < b.count; ++j) {
         distances.push_back(nearestPoints({ta[i][0], ta[i][1], ta[i][2]}, {tb[j][0], tb[j][1], tb[j][2]}, on_p, on_q));
         if (!(distances.back() < least)) continue;
         least = distances.back();
-        way = on_q - on_p;
+        displacement = on_q - on_p;
       }
     }
-    if (round % 3 == 0) way = test::randomDirection(g);
-    if (way.norm() > 0) way.normalize();
-    if (round % 4 == 0) way.setZero();
-    const float expected[3] = {static_cast<float>(way[0]), static_cast<float>(way[1]), static_cast<float>(way[2])};
+    if (round % 3 == 0) displacement = test::randomDirection(g);
+    if (displacement.norm() > 0) displacement.normalize();
+    if (round % 4 == 0) displacement.setZero();
+    const float expected[3] = {static_cast<float>(displacement[0]), static_cast<float>(displacement[1]),
+                               static_cast<float>(displacement[2])};
     const double factors[] = {0.5, 1, 1.0001, 2, std::numeric_limits<double>::infinity()};
-    const auto enough = static_cast<float>(std::max(least, 1e-3 * scale) * factors[round % 5]);
+    const auto cutoff = static_cast<float>(std::max(least, 1e-3 * scale) * factors[round % 5]);
     static NearPair found[TrianglePack::kCapacity * TrianglePack::kCapacity];
-    const std::size_t count = nearPairs(a, b, expected, enough, found);
+    const std::size_t count = nearPairs(a, b, expected, cutoff, found);
     std::map<std::pair<std::size_t, std::size_t>, double> bounds;
     for (std::size_t k = 0; k < count; ++k) bounds[{found[k].row, found[k].lane}] = found[k].at_least;
     ASSERT_EQ(bounds.size(), count);
@@ -698,7 +699,7 @@ TEST_P(EveryTarget, NoPairIsLostThatIsNearest) {
       tight += bound >= distance - 1e-4 * size;
     }
     for (std::size_t k = 0; k < distances.size(); ++k) {
-      if (!(distances[k] < enough) || distances[k] > least * (1 + 1e-13)) continue;
+      if (!(distances[k] < cutoff) || distances[k] > least * (1 + 1e-13)) continue;
       ++nearer;
       ties += distances[k] != least;
       ASSERT_TRUE(bounds.count({k / b.count, k % b.count})) << "round " << round;
@@ -759,12 +760,12 @@ TEST_P(EveryTarget, MovingByDepthParts) {
       }
       pairs.put(i, p[i], q[i]);
     }
-    Touch touches[TrianglePairs::kCapacity];
-    partTriangles(pairs, 0, touches);
+    ContactPoint touches[TrianglePairs::kCapacity];
+    trianglePenetrations(pairs, 0, touches);
     for (std::size_t i = 0; i < pairs.count; ++i) {
-      const Touch& touch = touches[i];
+      const ContactPoint& touch = touches[i];
       if (!Exact::intersect_Triangle(p[i][0], p[i][1], p[i][2], q[i][0], q[i][1], q[i][2])) continue;
-      const Touch alone = partTriangles(p[i], q[i]);
+      const ContactPoint alone = trianglePenetrations(p[i], q[i]);
       EXPECT_EQ(alone.depth, touch.depth);
       EXPECT_EQ(alone.normal, touch.normal);
       EXPECT_EQ(alone.point, touch.point);

@@ -11,7 +11,7 @@
 #include "lattice/lattice.h"
 #include "meshes.h"
 #include "oracle/reference.h"
-#include "query/side.h"
+#include "query/sides/side.h"
 
 namespace bocst {
 namespace {
@@ -248,7 +248,7 @@ TEST(Tree, ExpandAllIsTheCompleteTree) {
           for (std::size_t t = 0; t < mesh->triangleCount(); ++t) {
             Eigen::Vector3d c[3];
             for (std::size_t k = 0; k < 3; ++k) c[k] = lattice.toLattice(mesh->vertex(mesh->indices(t)[k]));
-            if (oracle::touches(c, center, cell.side() / 2.0)) {
+            if (oracle::triangleMeetsCube(c, center, cell.side() / 2.0)) {
               ++grey;
               break;
             }
@@ -333,7 +333,7 @@ TEST(Tree, BoundsHoldTheSurfaceHoweverTheyWereLearnt) {
     std::map<int, int> slabs;
     for (const Modeld* model : {&a, &b}) {
       const tree::Tree& tree = model->tree();
-      const auto holds = [](const oracle::CellBounds& bounds, const lattice::Cell& cell, const Eigen::Vector3d& p) {
+      const auto contains = [](const oracle::CellBounds& bounds, const lattice::Cell& cell, const Eigen::Vector3d& p) {
         constexpr double kRounding = 1e-9;  // of p, in lattice units; bounds are rounded outwards
         double along = 0;
         for (std::size_t k = 0; k < 3; ++k) {
@@ -352,18 +352,18 @@ TEST(Tree, BoundsHoldTheSurfaceHoweverTheyWereLearnt) {
         const Eigen::Vector3d c0 = tree.surface().corner(t, 0), c1 = tree.surface().corner(t, 1),
                               c2 = tree.surface().corner(t, 2), p = c0 + s * (c1 - c0) + r * (c2 - c0);
         lattice::Cell cell;
-        ASSERT_TRUE(holds(tree.rootBounds(), cell, p));
-        tree::Link link = tree.link(tree::NodeRef());
-        while (link.tag() == tree::Link::kBlock) {
-          const tree::Block& block = tree.block(link.index());
+        ASSERT_TRUE(contains(tree.rootBounds(), cell, p));
+        tree::ChildRef ref = tree.childRef(tree::NodeRef());
+        while (ref.tag() == tree::ChildRef::kBlock) {
+          const tree::Block& block = tree.block(ref.index());
           int o = 0;
           for (int k = 0; k < 3; ++k) o |= (p[k] >= cell.corner()[static_cast<std::size_t>(k)] + cell.side() / 2) << k;
           ASSERT_TRUE(block.grey >> o & 1);
           cell = cell.octant(o);
           const oracle::CellBounds bounds = block.octants.get(o);
-          ASSERT_TRUE(holds(bounds, cell, p)) << "level " << cell.level;
+          ASSERT_TRUE(contains(bounds, cell, p)) << "level " << cell.level;
           slabs[cell.level] += bounds.normal != oracle::CellBounds().normal;
-          link = block.child[o].load();
+          ref = block.child[o].load();
         }
       }
     }

@@ -38,7 +38,7 @@ TEST(TriangleLists, AreReadAsTheyWereWrittenAndCopied) {
   for (std::size_t i = 0; i < all.size(); ++i) {
     ASSERT_EQ(idsOf(lists, at[i]), all[i]);
     ASSERT_EQ(idsOf(copies, copied[i]), all[i]);
-    ASSERT_FALSE(lists.isKept(at[i]));
+    ASSERT_FALSE(lists.isOnDevice(at[i]));
     ASSERT_TRUE(lists[at[i]].ids.areKnown());
   }
 }
@@ -66,7 +66,7 @@ TEST(TriangleLists, PackedAndKeptOnesGoAlongWithCopies) {
     Ids ids(1 + g() % PackedTriangles::kMostTriangles);
     for (auto& id : ids) id = static_cast<std::uint32_t>(g() % mesh->triangleCount());
     const std::uint32_t plain = lists.add(ids.data(), ids.size()), packed = lists.addPacked(surface, plain),
-                        kept = lists.addKept(1000 * i, {i, 7 * i}), copy = copies.addCopy(lists, packed),
+                        kept = lists.addDeviceList(1000 * i, {i, 7 * i}), copy = copies.addCopy(lists, packed),
                         kept_copy = copies.addCopy(lists, kept);
     PackedTriangles no, first, second;
     ASSERT_FALSE(lists.packed(plain, no));
@@ -80,18 +80,18 @@ TEST(TriangleLists, PackedAndKeptOnesGoAlongWithCopies) {
     ASSERT_EQ(first.step, second.step);
     ASSERT_TRUE(std::equal(first.steps, first.steps + 3 * first.places, second.steps));
     ASSERT_TRUE(std::equal(first.corners, first.corners + 3 * first.count, second.corners));
-    ASSERT_TRUE(copies.isKept(kept_copy));
+    ASSERT_TRUE(copies.isOnDevice(kept_copy));
     ASSERT_FALSE(copies[kept_copy].ids.areKnown());
     ASSERT_EQ(copies[kept_copy].count, 1000 * i);
-    ASSERT_EQ(copies.place(kept_copy).shelf, i);
+    ASSERT_EQ(copies.place(kept_copy).resource, i);
     ASSERT_EQ(copies.place(kept_copy).begin, 7 * i);
   }
 }
 
 TEST(TriangleLists, RefuseMoreThanTheyCanCount) {
   TriangleLists lists;
-  EXPECT_THROW(lists.addKept(std::size_t{1} << 29, {0, 0}), std::length_error);
-  EXPECT_NO_THROW(lists.addKept((std::size_t{1} << 29) - 1, {0, 0}));
+  EXPECT_THROW(lists.addDeviceList(std::size_t{1} << 29, {0, 0}), std::length_error);
+  EXPECT_NO_THROW(lists.addDeviceList((std::size_t{1} << 29) - 1, {0, 0}));
 }
 
 }  // namespace

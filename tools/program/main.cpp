@@ -7,8 +7,8 @@
 #include <stdexcept>
 #include <string>
 
-#include "arguments.h"
-#include "file.h"
+#include "cli/arguments.h"
+#include "cli/file.h"
 
 namespace {
 

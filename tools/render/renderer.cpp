@@ -8,9 +8,9 @@
 #include <array>
 #include <limits>
 
-#include "oracle/gl/context.h"
-#include "oracle/gl/handles.h"
-#include "oracle/wish.h"
+#include "egl/context.h"
+#include "egl/handles.h"
+#include "egl/oracle_selection.h"
 #include "render/shaders.h"
 
 namespace bocst::render {
@@ -31,7 +31,7 @@ gl::Program program(const char* vertex, const char* fragment) {
 
 gl::ContextRequest requestFor(OracleKind oracle) {
   gl::ContextRequest request;
-  request.device = oracle::wishOf(oracle).device;
+  request.device = oracle::oracleSelectionOf(oracle).device;
   request.major = 3;
   request.minor = 3;
   return request;

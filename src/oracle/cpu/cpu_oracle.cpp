@@ -22,7 +22,7 @@ struct Scratch {
 
 class Expander {
  public:
-  Expander(Expansion& e, Scratch& s, std::uint8_t candidates) : e_(e), s_(s), slab_(e.count <= kSlabTriangles) {
+  Expander(ExpansionRequest& e, Scratch& s, std::uint8_t candidates) : e_(e), s_(s), slab_(e.count <= kSlabTriangles) {
     half_ = e.cell.side() / 2.0;
     for (int k = 0; k < 3; ++k) center_[k] = e.cell.corner()[k] + half_;
     for (int o = 0; o < 8; ++o) {
@@ -30,8 +30,8 @@ class Expander {
       s.octants[o].clear();
     }
     exists_ &= candidates;
-    e.kept = nullptr;
-    e.kept_lists = {};
+    e.kept_resource = nullptr;
+    e.device_lists = {};
   }
 
   void run() {
@@ -94,7 +94,8 @@ class Expander {
   void prove(std::uint32_t t, int candidates) {
     const Eigen::Vector3d corners[3] = {e_.surface->corner(t, 0), e_.surface->corner(t, 1), e_.surface->corner(t, 2)};
     for (int o = 0; candidates != 0; ++o, candidates >>= 1) {
-      if ((candidates & 1) && touches(corners, center_ + octantCenter(o, half_ / 2), half_ / 2)) proven_ |= 1 << o;
+      if ((candidates & 1) && triangleMeetsCube(corners, center_ + octantCenter(o, half_ / 2), half_ / 2))
+        proven_ |= 1 << o;
     }
   }
 
@@ -122,7 +123,8 @@ class Expander {
       for (int k = 0; k < 3; ++k) exact[k] = (e_.surface->corner(t, k) - center_) / half_;
       clipToOctants(exact, mask, take);
     }
-    // The test's pad may be wider than the clipper's: what only the test sees is bounded by the octant itself.
+    // The test's rounding margin may be wider than the clipper's: what only the test sees is bounded by the octant
+    // itself.
     for (int missed = mask & ~seen, o = 0; missed != 0; ++o, missed >>= 1) {
       if ((missed & 1) == 0) continue;
       const LocalPoint c = localOctantCenter(o), h = LocalPoint(0.5f, 0.5f, 0.5f, 0);
@@ -176,7 +178,7 @@ class Expander {
     if (count != 0) e_.own = OctantAccumulator::bounds(grey.data(), count, Eigen::Vector3d::Zero(), 2);
   }
 
-  Expansion& e_;
+  ExpansionRequest& e_;
   Scratch& s_;
   const bool slab_;
   double half_;
@@ -186,24 +188,24 @@ class Expander {
 
 }  // namespace
 
-void expand(Expansion& e, std::uint8_t candidates) {
+void expand(ExpansionRequest& e, std::uint8_t candidates) {
   thread_local Scratch scratch;
   Expander(e, scratch, candidates).run();
 }
 
-void answerOnCpu(Expansion& e, std::uint8_t candidates) {
+void answerOnCpu(ExpansionRequest& e, std::uint8_t candidates) {
   if (e.surface->mesh == nullptr) {
     throw OracleError("the GPU that had the only copy of a mesh was lost or could not answer");
   }
-  Expansion here = e;
+  ExpansionRequest here = e;
   if (e.ids == nullptr) here.count = e.surface->mesh->triangleCount();
   expand(here, candidates);
   here.count = e.count;
   e = std::move(here);
 }
 
-void CpuOracle::submit(std::vector<Expansion>& batch) {
-  for (Expansion& e : batch) expand(e);
+void CpuOracle::submit(std::vector<ExpansionRequest>& batch) {
+  for (ExpansionRequest& e : batch) expand(e);
 }
 
 std::string CpuOracle::device() { return std::string("CPU, ") + instructionSet(); }

@@ -43,16 +43,16 @@ HWY_INLINE void edgeAxis(D d, V ep, V eq, V ap, V aq, V bp, V bq, V half, int p,
       // The octant's centre has coordinates +-1/2.
       const V a = sq ? hp : hn::Neg(hp);
       const V c = sp ? hn::Sub(a, hq) : hn::Add(a, hq);
-      const M touch = hn::And(hn::Le(lo_r, c), hn::Ge(hi_r, c));
+      const M meets = hn::And(hn::Le(lo_r, c), hn::Ge(hi_r, c));
       BOCST_UNROLL
       for (int o = 0; o < 8; ++o) {
-        if ((o >> p & 1) == sp && (o >> q & 1) == sq) alive.octant[o] = hn::And(alive.octant[o], touch);
+        if ((o >> p & 1) == sp && (o >> q & 1) == sq) alive.octant[o] = hn::And(alive.octant[o], meets);
       }
     }
   }
 }
 
-void OctantMasks(const float* xyz, std::size_t stride, std::size_t count, float slack, std::uint8_t* masks) {
+void OctantMasks(const float* xyz, std::size_t stride, std::size_t count, float tolerance, std::uint8_t* masks) {
   const D d;
   const hn::RebindToSigned<D> di;
   const V one = hn::Set(d, 1.0f), half = hn::Set(d, 0.5f), zero = hn::Zero(d);
@@ -68,18 +68,18 @@ void OctantMasks(const float* xyz, std::size_t stride, std::size_t count, float 
         size = hn::Max(size, hn::Abs(v[k][c]));
       }
     }
-    const V pad = hn::MulAdd(u16, size, hn::Set(d, slack));
-    const V h = hn::Add(half, pad);
+    const V rounding_margin = hn::MulAdd(u16, size, hn::Set(d, tolerance));
+    const V h = hn::Add(half, rounding_margin);
 
     // Box axes: which halves of the cell does the triangle's box meet?
-    const V outer = hn::Add(one, pad), low_outer = hn::Neg(outer), low_pad = hn::Neg(pad);
+    const V outer = hn::Add(one, rounding_margin), low_outer = hn::Neg(outer), low_margin = hn::Neg(rounding_margin);
     M side[3][2];
     BOCST_UNROLL
     for (int c = 0; c < 3; ++c) {
       const V lo = hn::Min(hn::Min(v[0][c], v[1][c]), v[2][c]);
       const V hi = hn::Max(hn::Max(v[0][c], v[1][c]), v[2][c]);
-      side[c][0] = hn::And(hn::Le(lo, pad), hn::Ge(hi, low_outer));
-      side[c][1] = hn::And(hn::Ge(hi, low_pad), hn::Le(lo, outer));
+      side[c][0] = hn::And(hn::Le(lo, rounding_margin), hn::Ge(hi, low_outer));
+      side[c][1] = hn::And(hn::Ge(hi, low_margin), hn::Le(lo, outer));
     }
     Alive alive;
     BOCST_UNROLL
@@ -282,8 +282,8 @@ HWY_EXPORT(BitsOfOthers);
 HWY_EXPORT(StepsBack);
 HWY_EXPORT(InstructionSet);
 
-void octantMasks(const float* xyz, std::size_t stride, std::size_t count, float slack, std::uint8_t* masks) {
-  HWY_DYNAMIC_DISPATCH(OctantMasks)(xyz, stride, count, slack, masks);
+void octantMasks(const float* xyz, std::size_t stride, std::size_t count, float tolerance, std::uint8_t* masks) {
+  HWY_DYNAMIC_DISPATCH(OctantMasks)(xyz, stride, count, tolerance, masks);
 }
 
 void quantise(const double* in, std::size_t count, const double* origin, double scale, std::int16_t most,

@@ -21,13 +21,13 @@ struct LocalTriangles {
 /// of the products in the plane equation before they cancel covers normal (4), point (1), product (1), sums (5).
 /// Chosen at run time for the machine's instruction set; all choices keep these bounds, with or without fused
 /// multiply-add.
-/// `slack` is a distance that still counts as touching, for corners that are off by more than one rounding.
+/// `tolerance` is a distance that still counts as touching, for corners that are off by more than one rounding.
 ///
 /// Coordinate c of corner k of triangle i is at xyz[(3 * k + c) * stride + i]; stride is a multiple of 8, xyz aligned
 /// to as many floats.
-void octantMasks(const float* xyz, std::size_t stride, std::size_t count, float slack, std::uint8_t* masks);
-inline void octantMasks(const LocalTriangles& triangles, std::size_t count, float slack, std::uint8_t* masks) {
-  octantMasks(triangles.xyz[0], LocalTriangles::kCapacity, count, slack, masks);
+void octantMasks(const float* xyz, std::size_t stride, std::size_t count, float tolerance, std::uint8_t* masks);
+inline void octantMasks(const LocalTriangles& triangles, std::size_t count, float tolerance, std::uint8_t* masks) {
+  octantMasks(triangles.xyz[0], LocalTriangles::kCapacity, count, tolerance, masks);
 }
 
 /// out[3 * i + k] = (in[3 * i + k] - origin[k]) * scale, rounded down, no less than 1 and no more than `most`.

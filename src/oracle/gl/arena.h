@@ -6,7 +6,7 @@
 #include <memory>
 #include <mutex>
 
-#include "oracle/gl/handles.h"
+#include "egl/handles.h"
 #include "oracle/gl/thread.h"
 #include "oracle/oracle.h"
 
@@ -16,7 +16,7 @@ namespace bocst::oracle::gl {
 class Arena : public std::enable_shared_from_this<Arena> {
  public:
   /// Words of the arena; they come back to it at the end.
-  class Range : public Held {
+  class Range : public DeviceResource {
    public:
     Range(std::shared_ptr<Arena> arena, std::uint32_t begin, std::uint32_t words)
         : arena_(std::move(arena)), begin_(begin), words_(words) {}

@@ -27,7 +27,7 @@ std::string source(const std::string& name, bool clips) {
   return "#version 430 core\n" + shader("common") + (clips ? shader("clip") : "") + shader(name);
 }
 
-const DeviceMesh* meshOf(const Expansion& e) { return static_cast<const DeviceMesh*>(e.surface->device.get()); }
+const DeviceMesh* meshOf(const ExpansionRequest& e) { return static_cast<const DeviceMesh*>(e.surface->device.get()); }
 
 std::uint32_t narrow(std::uint64_t n) { return static_cast<std::uint32_t>(n); }
 
@@ -55,17 +55,17 @@ ComputeChain::ComputeChain(Limits limits, Arena& arena) : limits_(clamped(limits
   }
 }
 
-bool ComputeChain::fits(const Expansion& e) const {
+bool ComputeChain::fits(const ExpansionRequest& e) const {
   const DeviceMesh& mesh = *meshOf(e);
   const std::size_t largest = std::max(mesh.vertices().bytes(), std::max(mesh.indices().bytes(), mesh.exact().bytes()));
   return e.count <= limits_.pairs && largest <= limits_.bytes && e.count * kWord <= limits_.bytes;
 }
 
-std::size_t ComputeChain::part(const std::vector<Expansion*>& questions, std::size_t first) const {
+std::size_t ComputeChain::part(const std::vector<ExpansionRequest*>& requests, std::size_t first) const {
   std::uint64_t pairs = 0;
   std::size_t n = 0;
-  while (first + n < questions.size() && n < limits_.cells) {
-    pairs += questions[first + n]->count;
+  while (first + n < requests.size() && n < limits_.cells) {
+    pairs += requests[first + n]->count;
     if (n > 0 && pairs > limits_.pairs) break;
     ++n;
   }
@@ -80,9 +80,9 @@ void ComputeChain::reserve(Buffer& buffer, std::size_t words) const {
   buffer.reserve(words * kWord);
 }
 
-void ComputeChain::upload(const std::vector<Expansion*>& questions) {
+void ComputeChain::upload(const std::vector<ExpansionRequest*>& requests) {
   std::uint64_t uploads = 0;
-  for (const Expansion* e : questions) {
+  for (const ExpansionRequest* e : requests) {
     if (e->ids != nullptr) uploads += e->count;
   }
   uploaded_ = uploads > 0 ? arena_.take(uploads) : nullptr;
@@ -91,8 +91,8 @@ void ComputeChain::upload(const std::vector<Expansion*>& questions) {
   rows_.clear();
   ranges_.clear();
   std::uint32_t pairs = 0;
-  for (const Expansion* question : questions) {
-    const Expansion& e = *question;
+  for (const ExpansionRequest* request : requests) {
+    const ExpansionRequest& e = *request;
     const double half = e.cell.side() / 2.0;
     Cell row{};
     for (std::size_t k = 0; k < 3; ++k) row.center[k] = static_cast<float>(e.cell.corner()[k] + half);
@@ -102,8 +102,8 @@ void ComputeChain::upload(const std::vector<Expansion*>& questions) {
     if (e.ids != nullptr) {
       row.list = uploaded_->begin() + narrow(ids.size());
       ids.insert(ids.end(), e.ids, e.ids + e.count);
-    } else if (e.shelf != nullptr) {
-      row.list = e.shelf_begin;
+    } else if (e.resource != nullptr) {
+      row.list = e.resource_begin;
     }
     for (int o = 0; o < 8; ++o) {
       if (e.surface->lattice.exists(e.cell.octant(o))) row.exists |= 1u << o;
@@ -133,8 +133,8 @@ void ComputeChain::dispatch(Pass pass, std::uint64_t invocations) const {
   const Step& step = steps_[pass];
   step.program->use();
   glUniform1ui(step.cell_count, narrow(rows_.size()));
-  glUniform2ui(step.list_room, placed_->begin(), narrow(list_room_));
-  glUniform1ui(step.id_room, narrow(id_room_));
+  glUniform2ui(step.list_capacity, placed_->begin(), narrow(list_capacity_));
+  glUniform1ui(step.id_capacity, narrow(id_capacity_));
   glDispatchCompute(narrow(across), narrow((groups + across - 1) / across), 1);
 }
 
@@ -152,7 +152,7 @@ void ComputeChain::dispatchPairs(Pass pass) const {
 }
 
 void ComputeChain::placeAndFill() {
-  reserve(answers_, kHeader + rows_.size() * kRow + id_room_);
+  reserve(answers_, kHeader + rows_.size() * kRow + id_capacity_);
   answers_.clear(kHeader * kWord);
   const GLuint bound[] = {arena_.buffer().name(), cells_.name(), states_.name(), masks_.name(), answers_.name()};
   for (GLuint i = 0; i < 5; ++i) glBindBufferBase(GL_SHADER_STORAGE_BUFFER, 2 + i, bound[i]);
@@ -166,29 +166,29 @@ void ComputeChain::placeAndFill() {
   glMemoryBarrier(GL_BUFFER_UPDATE_BARRIER_BIT | GL_SHADER_STORAGE_BARRIER_BIT);
 }
 
-void ComputeChain::readBack(const std::vector<Expansion*>& questions) {
-  for (std::size_t i = 0; i < questions.size(); ++i) {
-    Expansion& e = *questions[i];
+void ComputeChain::readBack(const std::vector<ExpansionRequest*>& requests) {
+  for (std::size_t i = 0; i < requests.size(); ++i) {
+    ExpansionRequest& e = *requests[i];
     const std::uint32_t* row = &words_[kHeader + i * kRow];
     unsigned char bytes[kBoundsBytes];
     std::memcpy(bytes, row, sizeof(bytes));
     std::memcpy(&e.octants, bytes, sizeof(e.octants));
     std::memcpy(&e.own, bytes + sizeof(e.octants), sizeof(e.own));
     e.grey = bytes[kBoundsBytes - 1];
-    const std::uint32_t* ids = &words_[kHeader + questions.size() * kRow] + row[kRowIds];
+    const std::uint32_t* ids = &words_[kHeader + requests.size() * kRow] + row[kRowIds];
     std::uint32_t list = row[kRowList];
     e.lists.clear();
-    e.kept = nullptr;
+    e.kept_resource = nullptr;
     for (std::size_t o = 0; o < 8; ++o) {
       const std::uint32_t size = row[kRowSizes + o];
       const bool here = size <= e.ids_up_to;
       e.list_begin[o] = e.lists.size();
-      e.kept_lists[o] = here ? Expansion::Kept{} : Expansion::Kept{list, size};
+      e.device_lists[o] = here ? ExpansionRequest::DeviceList{} : ExpansionRequest::DeviceList{list, size};
       if (here) {
         e.lists.insert(e.lists.end(), ids, ids + size);
         ids += size;
       } else {
-        e.kept = placed_;
+        e.kept_resource = placed_;
       }
       list += size;
     }
@@ -196,20 +196,20 @@ void ComputeChain::readBack(const std::vector<Expansion*>& questions) {
   }
 }
 
-void ComputeChain::answer(const std::vector<Expansion*>& questions, Thread& thread) {
+void ComputeChain::answer(const std::vector<ExpansionRequest*>& requests, Thread& thread) {
   while (glGetError() != GL_NO_ERROR) {
   }
   const auto begin = std::chrono::steady_clock::now();
   glQueryCounter(times_[0], GL_TIMESTAMP);
-  upload(questions);
+  upload(requests);
   std::uint64_t pairs = 0, ids = 0;
-  for (const Expansion* e : questions) {
+  for (const ExpansionRequest* e : requests) {
     pairs += e->count;
     ids += std::min<std::uint64_t>(2 * e->count, 8 * std::min<std::uint64_t>(e->ids_up_to, 1u << 28));
   }
-  list_room_ = 2 * pairs + 8 * questions.size();
-  id_room_ = ids + 64;
-  placed_ = arena_.take(list_room_);
+  list_capacity_ = 2 * pairs + 8 * requests.size();
+  id_capacity_ = ids + 64;
+  placed_ = arena_.take(list_capacity_);
   glQueryCounter(times_[1], GL_TIMESTAMP);
 
   const GLuint bound[] = {arena_.buffer().name(), cells_.name(), states_.name(), masks_.name()};
@@ -222,28 +222,28 @@ void ComputeChain::answer(const std::vector<Expansion*>& questions, Thread& thre
   glQueryCounter(times_[2], GL_TIMESTAMP);
 
   // Most answers fit into the first read; what does not is known from the header.
-  const std::size_t fixed = kHeader + questions.size() * kRow;
-  std::size_t read = fixed + std::min<std::uint64_t>(id_room_, 64 * questions.size());
+  const std::size_t fixed = kHeader + requests.size() * kRow;
+  std::size_t read = fixed + std::min<std::uint64_t>(id_capacity_, 64 * requests.size());
   const auto readFrom = [&](std::size_t first, std::size_t end) {
     words_.resize(end);
     answers_.read(first * kWord, (end - first) * kWord, words_.data() + first);
   };
   readFrom(0, read);
-  if (words_[0] > list_room_ || words_[1] > id_room_) {
-    list_room_ = words_[0];
-    id_room_ = words_[1];
+  if (words_[0] > list_capacity_ || words_[1] > id_capacity_) {
+    list_capacity_ = words_[0];
+    id_capacity_ = words_[1];
     placed_ = nullptr;
-    placed_ = arena_.take(list_room_);
+    placed_ = arena_.take(list_capacity_);
     placeAndFill();
     read = 0;
   }
-  const std::size_t all = fixed + (read == 0 ? id_room_ : words_[1]);
+  const std::size_t all = fixed + (read == 0 ? id_capacity_ : words_[1]);
   if (all > read) readFrom(read, all);
   const GLenum error = glGetError();
   thread.checkReset();
   if (error != GL_NO_ERROR) throw OracleError("OpenGL error " + std::to_string(error));
   placed_->trim(words_[0]);
-  readBack(questions);
+  readBack(requests);
   std::array<GLuint64, 3> times{};
   for (std::size_t i = 0; i < times.size(); ++i) glGetQueryObjectui64v(times_[i], GL_QUERY_RESULT, &times[i]);
   const std::chrono::duration<double> all_time = std::chrono::steady_clock::now() - begin;

@@ -5,9 +5,9 @@
 #include <memory>
 #include <vector>
 
+#include "egl/handles.h"
 #include "oracle/gl/arena.h"
 #include "oracle/gl/device_mesh.h"
-#include "oracle/gl/handles.h"
 
 namespace bocst::oracle::gl {
 
@@ -25,13 +25,13 @@ class ComputeChain {
   ComputeChain(Limits limits, Arena& arena);
 
   /// Does this question, with its mesh on the device, fit into a chain at all?
-  bool fits(const Expansion& question) const;
+  bool fits(const ExpansionRequest& request) const;
 
   /// How many of the questions, from the first on, fit into one chain; at least one.
-  std::size_t part(const std::vector<Expansion*>& questions, std::size_t first) const;
+  std::size_t part(const std::vector<ExpansionRequest*>& requests, std::size_t first) const;
 
   /// Answers them all; questions about one mesh follow each other. @throws OracleError
-  void answer(const std::vector<Expansion*>& questions, Thread& thread);
+  void answer(const std::vector<ExpansionRequest*>& requests, Thread& thread);
 
   const Oracle::Cost& cost() const { return cost_; }
 
@@ -51,15 +51,15 @@ class ComputeChain {
   /// A program and where its uniforms are; -1 for those that it does not have.
   struct Step {
     std::unique_ptr<Program> program;
-    GLint pairs, cells, cell_count, list_room, id_room;
+    GLint pairs, cells, cell_count, list_capacity, id_capacity;
   };
 
   void reserve(Buffer& buffer, std::size_t words) const;
-  void upload(const std::vector<Expansion*>& questions);
+  void upload(const std::vector<ExpansionRequest*>& requests);
   void dispatch(Pass pass, std::uint64_t invocations) const;
   void dispatchPairs(Pass pass) const;
   void placeAndFill();
-  void readBack(const std::vector<Expansion*>& questions);
+  void readBack(const std::vector<ExpansionRequest*>& requests);
 
   const Limits limits_;
   Arena& arena_;
@@ -69,7 +69,7 @@ class ComputeChain {
   std::vector<Range> ranges_;
   std::vector<std::uint32_t> words_;  // of the answer
   std::shared_ptr<Arena::Range> uploaded_, placed_;
-  std::uint64_t list_room_ = 0, id_room_ = 0;
+  std::uint64_t list_capacity_ = 0, id_capacity_ = 0;
   Queries times_;
   Oracle::Cost cost_;
 };

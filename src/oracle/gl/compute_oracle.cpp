@@ -8,7 +8,7 @@
 namespace bocst::oracle::gl {
 namespace {
 
-const DeviceMesh* meshOf(const Expansion& e) { return static_cast<const DeviceMesh*>(e.surface->device.get()); }
+const DeviceMesh* meshOf(const ExpansionRequest& e) { return static_cast<const DeviceMesh*>(e.surface->device.get()); }
 
 }  // namespace
 
@@ -30,18 +30,18 @@ ComputeOracle::~ComputeOracle() {
   thread_->post([chain = chain_.release()] { delete chain; });
 }
 
-void ComputeOracle::answer(const std::vector<Expansion*>& questions, std::vector<Verdict>& verdicts) {
+void ComputeOracle::answer(const std::vector<ExpansionRequest*>& requests, std::vector<Verdict>& verdicts) {
   // Questions about one mesh follow each other.
   std::vector<std::size_t> order;
-  for (std::size_t i = 0; i < questions.size(); ++i) {
-    const Expansion& e = *questions[i];
+  for (std::size_t i = 0; i < requests.size(); ++i) {
+    const ExpansionRequest& e = *requests[i];
     if (!e.own_only && meshOf(e) != nullptr && chain_->fits(e)) order.push_back(i);
   }
   std::stable_sort(order.begin(), order.end(), [&](std::size_t a, std::size_t b) {
-    return std::less<const DeviceMesh*>()(meshOf(*questions[a]), meshOf(*questions[b]));
+    return std::less<const DeviceMesh*>()(meshOf(*requests[a]), meshOf(*requests[b]));
   });
-  std::vector<Expansion*> sorted;
-  for (const std::size_t i : order) sorted.push_back(questions[i]);
+  std::vector<ExpansionRequest*> sorted;
+  for (const std::size_t i : order) sorted.push_back(requests[i]);
   for (std::size_t first = 0; first < sorted.size();) {
     const std::size_t count = chain_->part(sorted, first);
     try {
@@ -57,7 +57,7 @@ void ComputeOracle::answer(const std::vector<Expansion*>& questions, std::vector
   }
 }
 
-bool ComputeOracle::fetch(const Held&, Expansion::Kept list, std::uint32_t* ids) {
+bool ComputeOracle::fetch(const DeviceResource&, ExpansionRequest::DeviceList list, std::uint32_t* ids) {
   try {
     thread_->run([&] {
       arena_->buffer().read(list.begin * sizeof(*ids), list.count * sizeof(*ids), ids);

@@ -23,12 +23,12 @@ class ComputeOracle : public DeviceOracle {
   OracleKind kind() const override { return OracleKind::kCompute; }
   std::string name() const override { return "compute"; }
   bool needsHostMesh() const override { return false; }
-  bool fetch(const Held& shelf, Expansion::Kept list, std::uint32_t* ids) override;
+  bool fetch(const DeviceResource& resource, ExpansionRequest::DeviceList list, std::uint32_t* ids) override;
 
   Cost lastCost() override;
 
  private:
-  void answer(const std::vector<Expansion*>& questions, std::vector<Verdict>& verdicts) override;
+  void answer(const std::vector<ExpansionRequest*>& requests, std::vector<Verdict>& verdicts) override;
 
   std::shared_ptr<Arena> arena_;
   std::unique_ptr<ComputeChain> chain_;

@@ -41,7 +41,7 @@ DeviceMesh::~DeviceMesh() {
   thread_->post([b = buffers_.release()] { delete b; });
 }
 
-std::shared_ptr<DeviceMesh> DeviceMeshes::hold(const Surface& surface) {
+std::shared_ptr<DeviceMesh> DeviceMeshes::makeResident(const Surface& surface) {
   if (thread_->isLost()) throw OracleError("the GPU context is lost");
   const std::lock_guard<std::mutex> lock(mutex_);
   entries_.erase(std::remove_if(entries_.begin(), entries_.end(), [](const Entry& e) { return e.device.expired(); }),

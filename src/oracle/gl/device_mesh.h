@@ -6,7 +6,7 @@
 #include <mutex>
 #include <vector>
 
-#include "oracle/gl/handles.h"
+#include "egl/handles.h"
 #include "oracle/gl/thread.h"
 #include "oracle/oracle.h"
 
@@ -14,7 +14,7 @@ namespace bocst::oracle::gl {
 
 /// A surface in device memory: its triangles, and its vertices in lattice units. Models of one mesh and one lattice
 /// share it. 12 bytes a triangle and 24 a vertex, with `exact` 48.
-class DeviceMesh : public Held {
+class DeviceMesh : public DeviceResource {
  public:
   /// Uploads; from any thread but that of the context. exact: also the vertices in double.
   /// @throws OracleError when there is no room.
@@ -46,7 +46,7 @@ class DeviceMeshes {
   DeviceMeshes(std::shared_ptr<Thread> thread, bool exact) : thread_(std::move(thread)), exact_(exact) {}
 
   /// @throws OracleError
-  std::shared_ptr<DeviceMesh> hold(const Surface& surface);
+  std::shared_ptr<DeviceMesh> makeResident(const Surface& surface);
 
  private:
   struct Entry {

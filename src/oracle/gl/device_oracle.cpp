@@ -7,7 +7,7 @@
 
 namespace bocst::oracle::gl {
 
-void DeviceOracle::submit(std::vector<Expansion>& batch) {
+void DeviceOracle::submit(std::vector<ExpansionRequest>& batch) {
   if (batch.empty() || thread_->isLost()) return;
   const std::lock_guard<std::mutex> lock(mutex_);
   tickets_.push_back({&batch});
@@ -27,12 +27,12 @@ void DeviceOracle::flush() {
       taken.push_back(&t);
     }
   }
-  std::vector<Expansion*> questions;
+  std::vector<ExpansionRequest*> requests;
   for (const Ticket* t : taken) {
-    for (Expansion& e : *t->batch) questions.push_back(&e);
+    for (ExpansionRequest& e : *t->batch) requests.push_back(&e);
   }
-  std::vector<Verdict> verdicts(questions.size());
-  if (!thread_->isLost()) answer(questions, verdicts);
+  std::vector<Verdict> verdicts(requests.size());
+  if (!thread_->isLost()) answer(requests, verdicts);
   const std::lock_guard<std::mutex> lock(mutex_);
   auto next = verdicts.begin();
   for (Ticket* t : taken) {
@@ -44,7 +44,7 @@ void DeviceOracle::flush() {
   answered_.notify_all();
 }
 
-void DeviceOracle::wait(std::vector<Expansion>& batch) {
+void DeviceOracle::wait(std::vector<ExpansionRequest>& batch) {
   std::vector<Verdict> verdicts;
   if (!thread_->isForked()) {
     std::unique_lock<std::mutex> lock(mutex_);
@@ -64,9 +64,9 @@ void DeviceOracle::wait(std::vector<Expansion>& batch) {
   }
 }
 
-std::shared_ptr<const Held> DeviceOracle::hold(const Surface& surface) {
+std::shared_ptr<const DeviceResource> DeviceOracle::makeResident(const Surface& surface) {
   try {
-    return meshes_.hold(surface);
+    return meshes_.makeResident(surface);
   } catch (const OracleError&) {
     return nullptr;
   }

@@ -20,9 +20,9 @@ namespace bocst::oracle::gl {
 /// after fork()) is answered on the CPU, in the thread that waits.
 class DeviceOracle : public Oracle {
  public:
-  void submit(std::vector<Expansion>& batch) final;
-  void wait(std::vector<Expansion>& batch) final;
-  std::shared_ptr<const Held> hold(const Surface& surface) final;
+  void submit(std::vector<ExpansionRequest>& batch) final;
+  void wait(std::vector<ExpansionRequest>& batch) final;
+  std::shared_ptr<const DeviceResource> makeResident(const Surface& surface) final;
 
   Thread& thread() { return *thread_; }
 
@@ -43,13 +43,13 @@ class DeviceOracle : public Oracle {
   void finish();
 
   /// In the thread of the context; must not throw. Answers as much as it can.
-  virtual void answer(const std::vector<Expansion*>& questions, std::vector<Verdict>& verdicts) = 0;
+  virtual void answer(const std::vector<ExpansionRequest*>& requests, std::vector<Verdict>& verdicts) = 0;
 
   const std::shared_ptr<Thread> thread_;
 
  private:
   struct Ticket {
-    std::vector<Expansion>* batch;
+    std::vector<ExpansionRequest>* batch;
     bool taken = false, done = false;
     std::vector<Verdict> verdicts = {};
   };

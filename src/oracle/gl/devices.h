@@ -7,7 +7,7 @@
 #include <string>
 #include <vector>
 
-#include "oracle/gl/context.h"
+#include "egl/context.h"
 #include "oracle/oracle.h"
 
 namespace bocst::oracle::gl {

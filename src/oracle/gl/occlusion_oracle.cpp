@@ -46,7 +46,7 @@ class OcclusionQueries {
   }
 
   /// candidates[i]: the octants of question i that are seen. @throws OracleError
-  void ask(const std::vector<Expansion*>& questions, std::vector<std::uint8_t>& candidates, Thread& thread) {
+  void ask(const std::vector<ExpansionRequest*>& requests, std::vector<std::uint8_t>& candidates, Thread& thread) {
     while (glGetError() != GL_NO_ERROR) {
     }
     glBindFramebuffer(GL_FRAMEBUFFER, framebuffer_.name());
@@ -57,10 +57,10 @@ class OcclusionQueries {
     glColorMask(GL_FALSE, GL_FALSE, GL_FALSE, GL_FALSE);
     glBindVertexArray(array_.name());
     program_.use();
-    for (std::size_t first = 0; first < questions.size();) {
-      const std::size_t end = part(questions, first);
-      uploadLists(questions, first, end);
-      for (GLint axis = 0; axis < views_; ++axis) askView(questions, first, end, axis, candidates);
+    for (std::size_t first = 0; first < requests.size();) {
+      const std::size_t end = part(requests, first);
+      uploadLists(requests, first, end);
+      for (GLint axis = 0; axis < views_; ++axis) askView(requests, first, end, axis, candidates);
       first = end;
     }
     glColorMask(GL_TRUE, GL_TRUE, GL_TRUE, GL_TRUE);
@@ -71,23 +71,25 @@ class OcclusionQueries {
   }
 
  private:
-  static const DeviceMesh& meshOf(const Expansion& e) { return static_cast<const DeviceMesh&>(*e.surface->device); }
+  static const DeviceMesh& meshOf(const ExpansionRequest& e) {
+    return static_cast<const DeviceMesh&>(*e.surface->device);
+  }
 
-  static std::size_t part(const std::vector<Expansion*>& questions, std::size_t first) {
+  static std::size_t part(const std::vector<ExpansionRequest*>& requests, std::size_t first) {
     std::size_t indices = 0, end = first;
-    while (end < questions.size() && 8 * (end - first + 1) <= kMostQueries) {
-      if (questions[end]->ids != nullptr) indices += 3 * questions[end]->count;
+    while (end < requests.size() && 8 * (end - first + 1) <= kMostQueries) {
+      if (requests[end]->ids != nullptr) indices += 3 * requests[end]->count;
       if (end > first && indices > kMostIndices) break;
       ++end;
     }
     return end;
   }
 
-  void uploadLists(const std::vector<Expansion*>& questions, std::size_t first, std::size_t end) {
+  void uploadLists(const std::vector<ExpansionRequest*>& requests, std::size_t first, std::size_t end) {
     std::vector<std::uint32_t> indices;
     begins_.assign(end - first, 0);
     for (std::size_t i = first; i < end; ++i) {
-      const Expansion& e = *questions[i];
+      const ExpansionRequest& e = *requests[i];
       begins_[i - first] = indices.size();
       if (e.ids == nullptr) continue;  // all of the mesh: its own index buffer
       for (std::size_t k = 0; k < e.count; ++k) {
@@ -109,17 +111,17 @@ class OcclusionQueries {
   }
 
   // Asks for all octants that no view has shown so far, then reads what it learned.
-  void askView(const std::vector<Expansion*>& questions, std::size_t first, std::size_t end, GLint axis,
+  void askView(const std::vector<ExpansionRequest*>& requests, std::size_t first, std::size_t end, GLint axis,
                std::vector<std::uint8_t>& candidates) {
     struct Asked {
-      std::size_t question;
+      std::size_t request;
       int octant;
     };
     std::vector<Asked> asked;
     const DeviceMesh* bound = nullptr;
     glUniform1i(axis_, axis);
     for (std::size_t i = first; i < end; ++i) {
-      const Expansion& e = *questions[i];
+      const ExpansionRequest& e = *requests[i];
       if (&meshOf(e) != bound) bind(*(bound = &meshOf(e)));
       glBindBuffer(GL_ELEMENT_ARRAY_BUFFER, e.ids == nullptr ? meshOf(e).indices().name() : lists_.name());
       const auto* begin = reinterpret_cast<const void*>(begins_[i - first] * sizeof(std::uint32_t));
@@ -143,7 +145,7 @@ class OcclusionQueries {
     for (std::size_t q = 0; q < asked.size(); ++q) {
       GLuint seen = 0;
       glGetQueryObjectuiv(queries_[q], GL_QUERY_RESULT, &seen);
-      if (seen != 0) candidates[asked[q].question] |= 1 << asked[q].octant;
+      if (seen != 0) candidates[asked[q].request] |= 1 << asked[q].octant;
     }
   }
 
@@ -170,21 +172,21 @@ OcclusionOracle::~OcclusionOracle() {
   thread_->post([queries = queries_.release()] { delete queries; });
 }
 
-std::vector<std::uint8_t> OcclusionOracle::candidates(const std::vector<Expansion*>& questions) {
-  std::vector<std::uint8_t> candidates(questions.size(), 0);
-  thread_->run([&] { queries_->ask(questions, candidates, *thread_); });
+std::vector<std::uint8_t> OcclusionOracle::candidates(const std::vector<ExpansionRequest*>& requests) {
+  std::vector<std::uint8_t> candidates(requests.size(), 0);
+  thread_->run([&] { queries_->ask(requests, candidates, *thread_); });
   return candidates;
 }
 
-void OcclusionOracle::answer(const std::vector<Expansion*>& questions, std::vector<Verdict>& verdicts) {
+void OcclusionOracle::answer(const std::vector<ExpansionRequest*>& requests, std::vector<Verdict>& verdicts) {
   constexpr std::size_t most = kMostIndices / 3;
   std::vector<std::size_t> order;
-  std::vector<Expansion*> asked;
-  for (std::size_t i = 0; i < questions.size(); ++i) {
-    const Expansion& e = *questions[i];
+  std::vector<ExpansionRequest*> asked;
+  for (std::size_t i = 0; i < requests.size(); ++i) {
+    const ExpansionRequest& e = *requests[i];
     if (e.surface->device == nullptr || (e.ids != nullptr && e.count > most)) continue;
     order.push_back(i);
-    asked.push_back(questions[i]);
+    asked.push_back(requests[i]);
   }
   std::vector<std::uint8_t> candidates(asked.size(), 0);
   try {

@@ -7,8 +7,8 @@
 #include <string>
 #include <vector>
 
+#include "egl/handles.h"
 #include "oracle/gl/device_oracle.h"
-#include "oracle/gl/handles.h"
 
 namespace bocst::oracle::gl {
 
@@ -33,14 +33,14 @@ class OcclusionOracle : public DeviceOracle {
   OracleKind kind() const override { return form_ == Form::kSampled ? OracleKind::kSampled : OracleKind::kOcclusion; }
 
   /// Which octants the device sees, before the CPU has its say; surfaces must be held. @throws OracleError
-  std::vector<std::uint8_t> candidates(const std::vector<Expansion*>& questions);
+  std::vector<std::uint8_t> candidates(const std::vector<ExpansionRequest*>& requests);
 
   std::uint64_t queries() const override { return asked_; }
 
   std::string name() const override { return form_ == Form::kSampled ? "sampled" : "occlusion"; }
 
  private:
-  void answer(const std::vector<Expansion*>& questions, std::vector<Verdict>& verdicts) override;
+  void answer(const std::vector<ExpansionRequest*>& requests, std::vector<Verdict>& verdicts) override;
 
   const Form form_;
   std::atomic<std::uint64_t> asked_{0};

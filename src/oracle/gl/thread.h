@@ -12,7 +12,7 @@
 #include <string>
 #include <thread>
 
-#include "oracle/gl/context.h"
+#include "egl/context.h"
 
 namespace bocst::oracle::gl {
 

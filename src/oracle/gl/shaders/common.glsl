@@ -54,8 +54,8 @@ layout(std430, binding = 7) readonly buffer Exact { double exact[]; };  // verti
 uniform uvec2 u_pairs;      // first and end of the pairs of this surface
 uniform uvec2 u_cells;      // first and end of its cells
 uniform uint u_cell_count;  // of the batch
-uniform uvec2 u_list_room;  // first word and number of words
-uniform uint u_id_room;
+uniform uvec2 u_list_capacity;  // first word and number of words
+uniform uint u_id_capacity;
 
 uint invocation() {
   return (gl_WorkGroupID.y * gl_NumWorkGroups.x + gl_WorkGroupID.x) * GROUP + gl_LocalInvocationIndex;
@@ -81,11 +81,11 @@ uint octantState(uint cell, int octant, uint word) {
 }
 
 // Did a list or the ids not find room? Then the host makes room and starts over from the placing of the lists.
-bool isOverflown() { return answers[kListWords] > u_list_room.y || answers[kIdWords] > u_id_room; }
+bool isOverflown() { return answers[kListWords] > u_list_capacity.y || answers[kIdWords] > u_id_capacity; }
 
 uint sizeOf(uint cell, int octant) { return states[state(cell, kCounts + uint(octant))]; }
 
-// Corners in the cell's own coordinates, centre 0 and half side 1: two roundings at most, as the pads expect.
+// Corners in the cell's own coordinates, centre 0 and half side 1: two roundings at most, as the rounding margins expect.
 void cornersOf(uint cell, uint triangle, out vec3 v[3]) {
   float inverse = 1.0 / cells[cell].half_side;  // a power of two
   for (int k = 0; k < 3; ++k) {

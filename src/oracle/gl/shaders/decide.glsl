@@ -1,11 +1,11 @@
 // Pass 2: octants that no triangle surely meets, but that some may: the reference test (oracle/reference.h), operation
 // by operation in double, so that grey is the same for all oracles.
 
-const double kBoxPad = 16.0lf * 65536.0lf / 9007199254740992.0lf;  // 16 * 2^16 * 2^-53
-const double kPlanePad = 32.0lf / 9007199254740992.0lf;
+const double kBoxRoundingMargin = 16.0lf * 65536.0lf / 9007199254740992.0lf;  // 16 * 2^16 * 2^-53
+const double kPlaneRoundingMargin = 32.0lf / 9007199254740992.0lf;
 
-bool touches(dvec3 corners[3], dvec3 center, double side) {
-  precise double h = side + kBoxPad;
+bool triangleMeetsCube(dvec3 corners[3], dvec3 center, double side) {
+  precise double h = side + kBoxRoundingMargin;
   precise dvec3 v[3], e[3];
   for (int k = 0; k < 3; ++k) v[k] = corners[k] - center;
   for (int k = 0; k < 3; ++k) {
@@ -24,7 +24,7 @@ bool touches(dvec3 corners[3], dvec3 center, double side) {
   precise double s0 = size[0] * (abs(v[0][0]) + h), s1 = size[1] * (abs(v[0][1]) + h),
                  s2 = size[2] * (abs(v[0][2]) + h);
   precise double products = (s0 + s1) + s2;
-  precise double reach_n = h * width, reach_p = kPlanePad * products;
+  precise double reach_n = h * width, reach_p = kPlaneRoundingMargin * products;
   precise double reach = reach_n + reach_p;
   precise double d0 = n[0] * v[0][0], d1 = n[1] * v[0][1], d2 = n[2] * v[0][2];
   precise double along = (d0 + d1) + d2;
@@ -63,7 +63,7 @@ void main() {
   dvec3 center = dvec3(cells[cell].center);
   for (; open != 0u; open &= open - 1u) {
     int o = findLSB(open);
-    dvec3 way = dvec3(octantCenter(o)) * (2.0lf * side);
-    if (touches(corners, center + way, side)) atomicOr(states[state(cell, kGrey)], 1u << o);
+    dvec3 displacement = dvec3(octantCenter(o)) * (2.0lf * side);
+    if (triangleMeetsCube(corners, center + displacement, side)) atomicOr(states[state(cell, kGrey)], 1u << o);
   }
 }

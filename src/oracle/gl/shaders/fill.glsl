@@ -29,7 +29,7 @@ void addPart(bool together, uint cell, int o, vec3 v[3]) {
       hi = max(hi, p.corners[i]);
     }
   } else {
-    // The test's pad is wider than the clipper's: what only the test sees is bounded by the triangle's box.
+    // The test's rounding margin is wider than the clipper's: what only the test sees is bounded by the triangle's box.
     lo = clamp(min(min(v[0], v[1]), v[2]), center - 0.5, center + 0.5);
     hi = clamp(max(max(v[0], v[1]), v[2]), center - 0.5, center + 0.5);
     atomicOr(states[state(cell, kLoose)], 1u << o);

@@ -1,6 +1,6 @@
 // Pass 1: which octants may each triangle meet, which does it surely meet? The separating-axis test of octantMasks()
-// (oracle/cpu/kernels.h) with its pads: 16 u M on the half side, 24 u on the products of the plane equation. Here
-// corners carry two roundings rather than one, 9.5 u M in all. With the pads taken away instead of added, what still
+// (oracle/cpu/kernels.h) with its rounding margins: 16 u M on the half side, 24 u on the products of the plane equation. Here
+// corners carry two roundings rather than one, 9.5 u M in all. With the rounding margins taken away instead of added, what still
 // overlaps on every axis surely touches.
 
 shared uint s_cells[2];
@@ -11,12 +11,12 @@ const uint kUpper[3] = uint[3](0xaau, 0xccu, 0xf0u);
 
 uint sideMask(int axis, bool upper) { return upper ? kUpper[axis] : ~kUpper[axis] & 0xffu; }
 
-void edgeAxis(float ep, float eq, float ap, float aq, float bp, float bq, float pad, int p, int q, inout uint maybe,
+void edgeAxis(float ep, float eq, float ap, float aq, float bp, float bq, float rounding_margin, int p, int q, inout uint maybe,
               inout uint surely) {
   float fa = ep * aq - eq * ap, fb = ep * bq - eq * bp;
   float lo = min(fa, fb), hi = max(fa, fb);
   float size = abs(ep) + abs(eq);
-  float r = (0.5 + pad) * size, rs = (0.5 - pad) * size;
+  float r = (0.5 + rounding_margin) * size, rs = (0.5 - rounding_margin) * size;
   for (int s = 0; s < 4; ++s) {
     bool sp = (s & 1) != 0, sq = (s & 2) != 0;
     float c = (sq ? 0.5 * ep : -0.5 * ep) + (sp ? -0.5 * eq : 0.5 * eq);
@@ -28,14 +28,14 @@ void edgeAxis(float ep, float eq, float ap, float aq, float bp, float bq, float 
 
 void overlaps(vec3 v[3], out uint maybe, out uint surely) {
   vec3 size3 = max(max(abs(v[0]), abs(v[1])), abs(v[2]));
-  float pad = 16.0 * kUlp * max(1.0, max(max(size3.x, size3.y), size3.z));
+  float rounding_margin = 16.0 * kUlp * max(1.0, max(max(size3.x, size3.y), size3.z));
   maybe = surely = 0xffu;
   vec3 lo = min(min(v[0], v[1]), v[2]), hi = max(max(v[0], v[1]), v[2]);
   for (int c = 0; c < 3; ++c) {
-    if (lo[c] > pad || hi[c] < -1.0 - pad) maybe &= kUpper[c];
-    if (hi[c] < -pad || lo[c] > 1.0 + pad) maybe &= ~kUpper[c];
-    if (!(lo[c] <= -pad && hi[c] >= pad - 1.0)) surely &= kUpper[c];
-    if (!(hi[c] >= pad && lo[c] <= 1.0 - pad)) surely &= ~kUpper[c];
+    if (lo[c] > rounding_margin || hi[c] < -1.0 - rounding_margin) maybe &= kUpper[c];
+    if (hi[c] < -rounding_margin || lo[c] > 1.0 + rounding_margin) maybe &= ~kUpper[c];
+    if (!(lo[c] <= -rounding_margin && hi[c] >= rounding_margin - 1.0)) surely &= kUpper[c];
+    if (!(hi[c] >= rounding_margin && lo[c] <= 1.0 - rounding_margin)) surely &= ~kUpper[c];
   }
   if (maybe == 0u) {
     surely = 0u;
@@ -46,8 +46,8 @@ void overlaps(vec3 v[3], out uint maybe, out uint surely) {
   vec3 a = e[0].yzx * e[1].zxy, b = e[0].zxy * e[1].yzx;
   vec3 n = a - b;
   float along = dot(n, v[0]), width = abs(n.x) + abs(n.y) + abs(n.z);
-  float slack = 24.0 * kUlp * dot(abs(a) + abs(b), abs(v[0]) + 1.0);
-  float reach = (0.5 + pad) * width + slack, reach_surely = (0.5 - pad) * width - slack;
+  float tolerance = 24.0 * kUlp * dot(abs(a) + abs(b), abs(v[0]) + 1.0);
+  float reach = (0.5 + rounding_margin) * width + tolerance, reach_surely = (0.5 - rounding_margin) * width - tolerance;
   for (int o = 0; o < 8; ++o) {
     float d = abs(along - dot(n, octantCenter(o)));
     if (d > reach) maybe &= ~(1u << o);
@@ -55,9 +55,9 @@ void overlaps(vec3 v[3], out uint maybe, out uint surely) {
   }
   for (int k = 0; k < 3; ++k) {
     vec3 at = v[k], across = v[(k + 2) % 3];
-    edgeAxis(e[k].y, e[k].z, at.y, at.z, across.y, across.z, pad, 1, 2, maybe, surely);
-    edgeAxis(e[k].z, e[k].x, at.z, at.x, across.z, across.x, pad, 2, 0, maybe, surely);
-    edgeAxis(e[k].x, e[k].y, at.x, at.y, across.x, across.y, pad, 0, 1, maybe, surely);
+    edgeAxis(e[k].y, e[k].z, at.y, at.z, across.y, across.z, rounding_margin, 1, 2, maybe, surely);
+    edgeAxis(e[k].z, e[k].x, at.z, at.x, across.z, across.x, rounding_margin, 2, 0, maybe, surely);
+    edgeAxis(e[k].x, e[k].y, at.x, at.y, across.x, across.y, rounding_margin, 0, 1, maybe, surely);
   }
   surely &= maybe;
 }

@@ -1,4 +1,4 @@
-// The conservative form: one point for each triangle that may meet the octant, by the separating-axis test with the pads
+// The conservative form: one point for each triangle that may meet the octant, by the separating-axis test with the rounding margins
 // of octantMasks() (oracle/cpu/kernels.h); corners carry two roundings here, 9.5 u M in all of the 16 u M.
 
 layout(triangles) in;
@@ -16,8 +16,8 @@ bool overlaps(vec3 v[3]) {
   vec3 e[3] = vec3[3](v[1] - v[0], v[2] - v[1], v[0] - v[2]);
   vec3 a = e[0].yzx * e[1].zxy, b = e[0].zxy * e[1].yzx;
   vec3 n = a - b;
-  float slack = 24.0 * kUlp * dot(abs(a) + abs(b), abs(v[0]) + 1.0);
-  if (abs(dot(n, v[0])) > h * (abs(n.x) + abs(n.y) + abs(n.z)) + slack) return false;
+  float tolerance = 24.0 * kUlp * dot(abs(a) + abs(b), abs(v[0]) + 1.0);
+  if (abs(dot(n, v[0])) > h * (abs(n.x) + abs(n.y) + abs(n.z)) + tolerance) return false;
   for (int i = 0; i < 3; ++i) {
     vec3 at = v[i], across = v[(i + 2) % 3];
     for (int k = 0; k < 3; ++k) {

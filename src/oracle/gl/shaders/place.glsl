@@ -12,7 +12,7 @@ void main() {
     if (states[count] <= cells[cell].ids_up_to) ids += states[count];
   }
   uint row = kHeader + cell * kRow;
-  uint begin = u_list_room.x + atomicAdd(answers[kListWords], words);
+  uint begin = u_list_capacity.x + atomicAdd(answers[kListWords], words);
   answers[row + kRowList] = begin;
   answers[row + kRowIds] = atomicAdd(answers[kIdWords], ids);
   for (int o = 0; o < 8; ++o) {

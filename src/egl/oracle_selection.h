@@ -1,0 +1,19 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#pragma once
+
+#include <bocst/options.h>
+
+#include "egl/context.h"
+
+namespace bocst::oracle {
+
+/// Which oracle is asked for, and on which EGL device.
+struct OracleSelection {
+  OracleKind kind = OracleKind::kAuto;
+  int device = gl::ContextRequest::kAnyDevice;
+};
+
+/// With kAuto, BOCST_ORACLE has its say. @throws OracleError when it says what is not known.
+OracleSelection oracleSelectionOf(OracleKind kind);
+
+}  // namespace bocst::oracle

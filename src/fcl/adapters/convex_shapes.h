@@ -1,0 +1,96 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#pragma once
+
+#include <limits>
+
+#include "fcl/adapters/shapes.h"
+#include "geometry/convex_shape.h"
+
+namespace bocst::fcl_adapter {
+
+/// FCL's polytope; its vertices are read where they are.
+template <typename S>
+class PolytopeShape final : public query::SupportShape {
+ public:
+  explicit PolytopeShape(const fcl::Convex<S>& convex) : PolytopeShape(convex, boxOf(convex)) {}
+
+ protected:
+  Eigen::Vector3d support(const Eigen::Vector3d& d) const override {
+    // FCL's climb along the edges is worth it, and is used by FCL itself, where there are many.
+    if (convex_.getVertices().size() > kMany) {
+      return convex_.findExtremeVertex(d.normalized().template cast<S>()).template cast<double>();
+    }
+    Eigen::Vector3d best = Eigen::Vector3d::Zero();
+    double most = -std::numeric_limits<double>::infinity();
+    for (const fcl::Vector3<S>& v : convex_.getVertices()) {
+      const Eigen::Vector3d x = v.template cast<double>();
+      const double h = d.dot(x);
+      if (h > most) most = h, best = x;
+    }
+    return best;
+  }
+
+ private:
+  static constexpr std::size_t kMany = 64;
+
+  PolytopeShape(const fcl::Convex<S>& convex, const Eigen::AlignedBox3d& box)
+      : SupportShape(box.center(), box.sizes() / 2, 0), convex_(convex) {}
+
+  static Eigen::AlignedBox3d boxOf(const fcl::Convex<S>& convex) {
+    Eigen::AlignedBox3d box;
+    for (const fcl::Vector3<S>& v : convex.getVertices()) box.extend(v.template cast<double>());
+    return box;
+  }
+
+  const fcl::Convex<S>& convex_;
+};
+
+/// A shape as a body in its own frame; unbounded ones reach as far as `region` (same frame) does.
+template <typename S>
+query::BoxShape bodyOf(const fcl::Box<S>& s, const query::Sphere&) {
+  return query::BoxShape(s.side.template cast<double>() / 2);
+}
+template <typename S>
+query::CapsuleShape bodyOf(const fcl::Sphere<S>& s, const query::Sphere&) {
+  return query::CapsuleShape(s.radius, 0);
+}
+template <typename S>
+query::EllipsoidShape bodyOf(const fcl::Ellipsoid<S>& s, const query::Sphere&) {
+  return query::EllipsoidShape(s.radii.template cast<double>());
+}
+template <typename S>
+query::CapsuleShape bodyOf(const fcl::Capsule<S>& s, const query::Sphere&) {
+  return query::CapsuleShape(s.radius, s.lz);
+}
+template <typename S>
+query::RoundShape bodyOf(const fcl::Cone<S>& s, const query::Sphere&) {
+  return query::RoundShape(s.radius, 0, s.lz);
+}
+template <typename S>
+query::RoundShape bodyOf(const fcl::Cylinder<S>& s, const query::Sphere&) {
+  return query::RoundShape(s.radius, s.radius, s.lz);
+}
+template <typename S>
+PolytopeShape<S> bodyOf(const fcl::Convex<S>& s, const query::Sphere&) {
+  return PolytopeShape<S>(s);
+}
+template <typename S>
+query::PlaneShape bodyOf(const fcl::Plane<S>& s, const query::Sphere& region) {
+  return query::PlaneShape(s.n.template cast<double>(), s.d, region);
+}
+template <typename S>
+query::HalfspaceShape bodyOf(const fcl::Halfspace<S>& s, const query::Sphere& region) {
+  return query::HalfspaceShape(s.n.template cast<double>(), s.d, region);
+}
+template <typename S>
+query::TriangleShape bodyOf(const fcl::TriangleP<S>& s, const query::Sphere&) {
+  return query::TriangleShape({s.a.template cast<double>(), s.b.template cast<double>(), s.c.template cast<double>()});
+}
+
+/// Calls f with the body of a shape.
+template <typename S, typename F>
+void withConvexShape(const fcl::ShapeBase<S>& shape, const query::Sphere& region, F&& f) {
+  withShape(shape, [&](const auto& s) { f(bodyOf(s, region)); });
+}
+
+}  // namespace bocst::fcl_adapter

@@ -1,8 +1,0 @@
-// SPDX-License-Identifier: BSD-3-Clause
-#include "fcl/registration.h"
-
-BOCST_FCL_COLLIDE_SOLVER(, double, GJKSolver_libccd)
-BOCST_FCL_COLLIDE_SOLVER(, double, GJKSolver_indep)
-// Not fcl::collide<double>: libfcl's own is what checkDispatch() has to see.
-
-template void bocst::fcl_room::registerCollide<double>();

@@ -1,8 +1,0 @@
-// SPDX-License-Identifier: BSD-3-Clause
-#include "fcl/registration.h"
-
-BOCST_FCL_COLLIDE_SOLVER(, float, GJKSolver_libccd)
-BOCST_FCL_COLLIDE_SOLVER(, float, GJKSolver_indep)
-BOCST_FCL_COLLIDE(, float)
-
-template void bocst::fcl_room::registerCollide<float>();

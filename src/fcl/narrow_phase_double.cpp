@@ -1,6 +1,0 @@
-// SPDX-License-Identifier: BSD-3-Clause
-#include "fcl/narrow_phase-inl.h"
-
-template void bocst::fcl_room::withNarrowPhase<double>(const BroughtSolver<double>&,
-                                                       const fcl::CollisionRequest<double>&,
-                                                       const std::function<void(const NarrowPhase<double>&)>&);

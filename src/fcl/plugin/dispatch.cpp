@@ -1,0 +1,197 @@
+// SPDX-License-Identifier: BSD-3-Clause
+// clang-format off
+#include "fcl/plugin/registration.h"  // First, see there.
+// clang-format on
+
+#include "fcl/plugin/dispatch.h"
+
+#include <cxxabi.h>
+#include <dlfcn.h>
+
+#include <cstdlib>
+#include <cstring>
+#include <memory>
+#include <stdexcept>
+#include <string>
+#include <type_traits>
+#include <typeinfo>
+
+namespace bocst {
+namespace fcl_adapter {
+namespace {
+
+const char* scalarName(float) { return "float"; }
+const char* scalarName(double) { return "double"; }
+
+/// Is it libfcl's own copy that the dynamic linker found? It reads a table that nobody else can reach.
+bool isInLibfcl(const void* address) {
+  Dl_info info;
+  if (dladdr(address, &info) == 0 || info.dli_fname == nullptr) return false;
+  const char* slash = std::strrchr(info.dli_fname, '/');
+  const char* file = slash != nullptr ? slash + 1 : info.dli_fname;
+  return std::strncmp(file, "libfcl.", 7) == 0;
+}
+
+template <typename S>
+std::string complaint() {
+  return std::string("bocst: fcl::collide<") + scalarName(S()) +
+         "> in this process does not reach bocst, so code that was compiled without <bocst/fcl.h> would be told that "
+         "nothing collides. Either let libbocst come before libfcl in the link order (CMake: target_link_libraries(app "
+         "bocst::bocst ...) with bocst::bocst before fcl) or LD_PRELOAD=libbocst.so; and where code makes its own "
+         "copies of FCL's templates (anything in float, a query with a solver), compile it without "
+         "-fvisibility=hidden; or include <bocst/fcl.h> wherever FCL's queries are called, and set "
+         "BOCST_DISPATCH_CHECK=off";
+}
+
+/// Calls through a volatile pointer, so that it is the dynamic linker that says whose code runs, and not the compiler.
+template <typename F>
+struct Symbol {
+  explicit Symbol(F* f) : pointer(f) {}
+  const void* address() const {
+    F* f = pointer;
+    const void* p = nullptr;
+    static_assert(sizeof p == sizeof f, "function pointers are addresses");
+    std::memcpy(&p, &f, sizeof p);
+    return p;
+  }
+  F* volatile pointer;
+};
+
+/// Empty when all is well, else what is wrong.
+template <typename S>
+std::string probe() {
+  registerCollide<S>();
+  registerDistance<S>();
+  if (std::is_same<S, double>::value) registerContinuous();
+  const char* check = std::getenv("BOCST_DISPATCH_CHECK");
+  if (check != nullptr && std::strcmp(check, "off") == 0) return {};
+
+  using Geometry = const fcl::CollisionGeometry<S>*;
+  using Pose = const fcl::Transform3<S>&;
+  using Object = const fcl::CollisionObject<S>*;
+  using Request = const fcl::CollisionRequest<S>&;
+  using Result = fcl::CollisionResult<S>&;
+  using Libccd = fcl::detail::GJKSolver_libccd<S>;
+  const Symbol<std::size_t(Geometry, Pose, Geometry, Pose, Request, Result)> geometries(&fcl::collide<S>);
+  const Symbol<std::size_t(Object, Object, Request, Result)> objects(&fcl::collide<S>);
+  const Symbol<std::size_t(Geometry, Pose, Geometry, Pose, const Libccd*, Request, Result)> solver(
+      &fcl::collide<S, Libccd>);
+  const Symbol<S(Object, Object, const fcl::DistanceRequest<S>&, fcl::DistanceResult<S>&)> distances(&fcl::distance<S>);
+
+  // Asking would only print FCL's warning.
+  if (isInLibfcl(solver.address())) return complaint<S>();
+
+  const auto sentinel = std::make_shared<Sentinel<S>>();
+  const fcl::Transform3<S> pose = fcl::Transform3<S>::Identity();
+  const fcl::CollisionObject<S> object(sentinel);
+  for (const fcl::GJKSolverType type : {fcl::GST_LIBCCD, fcl::GST_INDEP}) {
+    fcl::CollisionRequest<S> request;
+    request.gjk_solver_type = type;
+    fcl::CollisionResult<S> result;
+    fcl::DistanceRequest<S> distance_request;
+    distance_request.gjk_solver_type = type;
+    fcl::DistanceResult<S> distance_result;
+    if (geometries.pointer(sentinel.get(), pose, sentinel.get(), pose, request, result) != Sentinel<S>::kReached ||
+        objects.pointer(&object, &object, request, result) != Sentinel<S>::kReached ||
+        distances.pointer(&object, &object, distance_request, distance_result) != Sentinel<S>::kReached) {
+      return complaint<S>();
+    }
+  }
+  return {};
+}
+
+}  // namespace
+
+template <typename S>
+void checkDispatch() {
+  static const std::string wrong = probe<S>();
+  if (!wrong.empty()) throw std::runtime_error(wrong);
+}
+template void checkDispatch<float>();
+template void checkDispatch<double>();
+
+template <typename S>
+std::string typeName(const fcl::CollisionGeometry<S>* geometry) {
+  if (geometry == nullptr) return "null";
+  const char* mangled = typeid(*geometry).name();
+  int status = 0;
+  const std::unique_ptr<char, void (*)(void*)> name(abi::__cxa_demangle(mangled, nullptr, nullptr, &status), std::free);
+  return status == 0 ? name.get() : mangled;
+}
+template std::string typeName<float>(const fcl::CollisionGeometry<float>*);
+template std::string typeName<double>(const fcl::CollisionGeometry<double>*);
+
+}  // namespace fcl_adapter
+
+template <typename S>
+bool isModel(const fcl::CollisionGeometry<S>* geometry) {
+  return fcl_adapter::asModel<S>(geometry) != nullptr;
+}
+
+namespace {
+
+template <typename S>
+std::size_t collideModel(const fcl::CollisionGeometry<S>* o1, const fcl::Transform3<S>& X_W1,
+                         const fcl::CollisionGeometry<S>* o2, const fcl::Transform3<S>& X_W2,
+                         const fcl_adapter::BroughtSolver<S>& solver, const fcl::CollisionRequest<S>& request,
+                         fcl::CollisionResult<S>& result) {
+  if (request.num_max_contacts == 0) {
+    std::cerr << "Warning: should stop early as num_max_contact is 0 !\n";
+    return 0;
+  }
+  return fcl_adapter::collidePair<S>(o1, X_W1, o2, X_W2, solver, request, result);
+}
+
+}  // namespace
+
+template <typename S>
+std::size_t collide(const fcl::CollisionGeometry<S>* o1, const fcl::Transform3<S>& X_W1,
+                    const fcl::CollisionGeometry<S>* o2, const fcl::Transform3<S>& X_W2,
+                    const fcl::CollisionRequest<S>& request, fcl::CollisionResult<S>& result) {
+  if (!isModel<S>(o1) && !isModel<S>(o2)) return fcl::collide<S>(o1, X_W1, o2, X_W2, request, result);
+  return collideModel<S>(o1, X_W1, o2, X_W2, {}, request, result);
+}
+
+template <typename S, typename Solver>
+std::size_t collide(const fcl::CollisionGeometry<S>* o1, const fcl::Transform3<S>& X_W1,
+                    const fcl::CollisionGeometry<S>* o2, const fcl::Transform3<S>& X_W2, const Solver* solver,
+                    const fcl::CollisionRequest<S>& request, fcl::CollisionResult<S>& result) {
+  if (isModel<S>(o1) || isModel<S>(o2)) return collideModel<S>(o1, X_W1, o2, X_W2, solver, request, result);
+  return fcl::collide<S, Solver>(o1, X_W1, o2, X_W2, solver, request, result);
+}
+
+template <typename S>
+S distance(const fcl::CollisionGeometry<S>* o1, const fcl::Transform3<S>& X_W1, const fcl::CollisionGeometry<S>* o2,
+           const fcl::Transform3<S>& X_W2, const fcl::DistanceRequest<S>& request, fcl::DistanceResult<S>& result) {
+  if (isModel<S>(o1) || isModel<S>(o2)) return fcl_adapter::distancePair<S>(o1, X_W1, o2, X_W2, request, result);
+  return fcl::distance<S>(o1, X_W1, o2, X_W2, request, result);
+}
+
+template <typename S, typename Solver>
+S distance(const fcl::CollisionGeometry<S>* o1, const fcl::Transform3<S>& X_W1, const fcl::CollisionGeometry<S>* o2,
+           const fcl::Transform3<S>& X_W2, const Solver* solver, const fcl::DistanceRequest<S>& request,
+           fcl::DistanceResult<S>& result) {
+  if (isModel<S>(o1) || isModel<S>(o2)) return bocst::distance<S>(o1, X_W1, o2, X_W2, request, result);
+  return fcl::distance<Solver>(o1, X_W1, o2, X_W2, solver, request, result);
+}
+
+#define BOCST_INSTANTIATE_SOLVER(S, Solver)                                                                          \
+  template std::size_t collide(const fcl::CollisionGeometry<S>*, const fcl::Transform3<S>&,                          \
+                               const fcl::CollisionGeometry<S>*, const fcl::Transform3<S>&, const Solver*,           \
+                               const fcl::CollisionRequest<S>&, fcl::CollisionResult<S>&);                           \
+  template S distance(const fcl::CollisionGeometry<S>*, const fcl::Transform3<S>&, const fcl::CollisionGeometry<S>*, \
+                      const fcl::Transform3<S>&, const Solver*, const fcl::DistanceRequest<S>&,                      \
+                      fcl::DistanceResult<S>&);
+#define BOCST_INSTANTIATE(S)                                                                                         \
+  template bool isModel(const fcl::CollisionGeometry<S>*);                                                           \
+  template std::size_t collide(const fcl::CollisionGeometry<S>*, const fcl::Transform3<S>&,                          \
+                               const fcl::CollisionGeometry<S>*, const fcl::Transform3<S>&,                          \
+                               const fcl::CollisionRequest<S>&, fcl::CollisionResult<S>&);                           \
+  template S distance(const fcl::CollisionGeometry<S>*, const fcl::Transform3<S>&, const fcl::CollisionGeometry<S>*, \
+                      const fcl::Transform3<S>&, const fcl::DistanceRequest<S>&, fcl::DistanceResult<S>&);           \
+  BOCST_INSTANTIATE_SOLVER(S, fcl::detail::GJKSolver_libccd<S>)                                                      \
+  BOCST_INSTANTIATE_SOLVER(S, fcl::detail::GJKSolver_indep<S>)
+BOCST_INSTANTIATE(float)
+BOCST_INSTANTIATE(double)
+
+}  // namespace bocst

@@ -1,0 +1,118 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#include <bocst/model.h>
+
+#include <chrono>
+#include <cmath>
+#include <limits>
+
+#include "fcl/plugin/dispatch.h"
+#include "tree/tree.h"
+
+namespace bocst {
+namespace {
+
+// A double as an S that is not below (up) or not above (down) it.
+template <typename S>
+S roundUp(double x) {
+  const S s = static_cast<S>(x);
+  return static_cast<double>(s) < x ? std::nextafter(s, std::numeric_limits<S>::infinity()) : s;
+}
+template <typename S>
+S roundDown(double x) {
+  return -roundUp<S>(-x);
+}
+
+}  // namespace
+
+template <typename S>
+Model<S>::Model(std::shared_ptr<const Mesh> mesh, const Options& options)
+    : tree_(std::make_unique<tree::Tree>(std::move(mesh), options)) {
+  fcl_adapter::checkDispatch<S>();
+  computeLocalAABB();
+}
+
+template <typename S>
+Model<S>::~Model() = default;
+
+template <typename S>
+const Options& Model<S>::options() const {
+  return tree_->options();
+}
+
+template <typename S>
+std::shared_ptr<const Mesh> Model<S>::mesh() const {
+  return tree_->mesh();
+}
+
+template <typename S>
+void Model<S>::releaseMesh() {
+  tree_->releaseMesh();
+}
+
+template <typename S>
+std::string Model<S>::oracleName() const {
+  return tree_->oracle().name();
+}
+
+template <typename S>
+Statistics Model<S>::statistics() const {
+  return tree_->statistics();
+}
+
+template <typename S>
+void Model<S>::expandAll(int depth) {
+  tree_->expandAll(depth);
+}
+
+template <typename S>
+void Model<S>::visit(const std::function<void(const NodeView&)>& f) const {
+  tree_->visit(f);
+}
+
+template <typename S>
+void Model<S>::prune(Clock::time_point now) {
+  tree_->prune(now);
+}
+
+template <typename S>
+void Model<S>::prune() {
+  tree_->prune(Clock::time_point(std::chrono::nanoseconds(tree_->now())));
+}
+
+template <typename S>
+void Model<S>::updateVertices(std::vector<Eigen::Vector3d> vertices) {
+  tree_->updateVertices(std::move(vertices));
+  computeLocalAABB();
+}
+
+template <typename S>
+void Model<S>::computeLocalAABB() {
+  // What is within the margin touches, so broadphase managers must not leave it out.
+  Eigen::AlignedBox3d b = tree_->bounds();
+  const Eigen::Vector3d margin = Eigen::Vector3d::Constant(tree_->options().margin * (1 + 4e-16));
+  b = Eigen::AlignedBox3d(b.min() - margin, b.max() + margin);
+  for (int k = 0; k < 3; ++k) {
+    this->aabb_local.min_[k] = roundDown<S>(b.min()[k]);
+    this->aabb_local.max_[k] = roundUp<S>(b.max()[k]);
+  }
+  // CollisionObject bounds a turned geometry by a cube about aabb_center: the radius must reach every corner.
+  this->aabb_center = this->aabb_local.center();
+  const Eigen::Vector3d center = this->aabb_center.template cast<double>();
+  const Eigen::Vector3d extent = (b.max() - center).cwiseMax(center - b.min());
+  this->aabb_radius = roundUp<S>(extent.norm() * (1 + 4e-16));
+}
+
+template <typename S>
+fcl::OBJECT_TYPE Model<S>::getObjectType() const {
+  return fcl::OT_UNKNOWN;
+}
+
+template <typename S>
+fcl::NODE_TYPE Model<S>::getNodeType() const {
+  return fcl::GEOM_TRIANGLE;
+}
+
+template class Model<float>;
+template class Model<double>;
+
+}  // namespace bocst

@@ -1,0 +1,240 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#pragma once
+
+#include <fcl/math/bv/AABB.h>
+
+#include <algorithm>
+#include <limits>
+#include <type_traits>
+
+#include "fcl/adapters/narrow_phase.h"
+#include "fcl/queries/collide_query.h"
+#include "fcl/queries/convex_pair.h"
+#include "fcl/queries/inside.h"
+#include "fcl/queries/inside_contact.h"
+#include "query/collide/pair_walk.h"
+#include "query/leaf/pair_set.h"
+#include "query/sides/visitor.h"
+
+namespace bocst::fcl_adapter {
+
+/// Turns what a walk of a model and solid bodies finds into contacts and cost sources. Partner is the side of the
+/// bodies, and knows them as FCL does:
+///   bool fclOverlaps(node, narrow_phase, corners, X_WM)  FCL's test of the body and a triangle of the model
+///   fcl::AABB<S> worldBox(node), S density(node)   for cost sources
+///   bool occupied(node)                            it makes contacts, and not only costs
+///
+/// A triangle touches a body when they meet or are no farther apart than the margin, in double, or when FCL's test, in
+/// S and with the solver's tolerance, says so.
+template <typename S, typename Partner>
+class ConvexCollector final : public query::ConvexVisitor<typename Partner::Node> {
+ public:
+  using Node = typename Partner::Node;
+
+  /// `swapped`: the partner is the caller's first geometry.
+  ConvexCollector(const CollideQuery<S>& q, const Partner& partner, const ConvexFrame<S>& frame,
+                  const oracle::Surface& surface, const NarrowPhase<S>& narrow_phase, bool swapped, bool costs)
+      : q_(q),
+        partner_(partner),
+        frame_(frame),
+        surface_(surface),
+        narrow_phase_(narrow_phase),
+        X_WM_(swapped ? q.X_W2 : q.X_W1),
+        X_WB_((swapped ? q.X_W1 : q.X_W2).template cast<double>()),
+        tolerance_(frame.rounding() + narrow_phase.tolerance()),
+        swapped_(swapped),
+        costs_(costs),
+        once_(q.request.num_max_contacts > 1 || costs),
+        seen_(pairs()) {
+    if (once_) seen_.clear();
+  }
+
+  /// Bodies within so much of the surface, or of its cells' spheres, are to be visited.
+  double tolerance(bool spheres) const { return tolerance_ + q_.cullingMargin(spheres); }
+
+  bool endsAtFirst() const override { return q_.endsAtFirst(); }
+
+  /// Cost sources of the bodies below a node that the box about the model meets, as FCL's approximate costs are.
+  void addApproximateCosts(const Node& b) const {
+    const Eigen::AlignedBox3d box = surface_.mesh->bounds();
+    Eigen::Vector3d corners[8];
+    Eigen::AlignedBox3d in_world;
+    for (int k = 0; k < 8; ++k) {
+      corners[k] = frame_ * box.corner(static_cast<Eigen::AlignedBox3d::CornerType>(k));
+      in_world.extend(X_WB_ * corners[k]);
+    }
+    addApproximateCosts(b, {corners, 8},
+                        fcl::AABB<S>(in_world.min().template cast<S>(), in_world.max().template cast<S>()));
+  }
+
+  bool triangle(std::uint32_t t, const Node& b) override {
+    const auto& i = surface_.mesh->indices(t);
+    const Eigen::Vector3d corners[3] = {frame_ * surface_.mesh->vertex(i[0]), frame_ * surface_.mesh->vertex(i[1]),
+                                        frame_ * surface_.mesh->vertex(i[2])};
+    const query::PointSet points{corners, 3};
+    const double near = std::max(tolerance_, q_.margin);
+    const query::SeparationResult gap = partner_.gap(b, points, near);
+    if (gap.atLeast > near) return false;
+    if (once_ && !seen_.insert(partner_.id(b), t)) return false;
+
+    if (!gap.isTouching() && gap.atLeast > q_.margin) {
+      fcl::Vector3<S> c[3];
+      for (std::size_t k = 0; k < 3; ++k) c[k] = surface_.mesh->vertex(i[k]).template cast<S>();
+      if (!partner_.fclOverlaps(b, narrow_phase_, c, X_WM_)) return false;
+    }
+    if (costs_) {
+      const fcl::Vector3<S> p = X_WM_ * surface_.mesh->vertex(i[0]).template cast<S>();
+      const fcl::Vector3<S> r = X_WM_ * surface_.mesh->vertex(i[1]).template cast<S>();
+      const fcl::Vector3<S> s = X_WM_ * surface_.mesh->vertex(i[2]).template cast<S>();
+      addCost(fcl::AABB<S>(p, r, s), b);
+    }
+    if (!q_.request.enable_contact) return add(t, b, nullptr);
+    // With a margin the way must be known, and of what is nearly in touch it is not.
+    query::ContactPoint contact;
+    if (gap.isTouching() || (q_.margin > 0 && gap.distance <= frame_.rounding())) {
+      contact = partner_.penetration(b, points, gap);
+      contact.depth += q_.margin;
+    } else {
+      contact = bridge(gap, points, b);
+      contact.depth = std::max(q_.margin - gap.distance, 0.0);
+    }
+    contact = inWorld(contact);
+    return add(t, b, &contact);
+  }
+
+  bool cell(const query::CellLeaf& a, const Node& b) override {
+    const lattice::Lattice& lattice = surface_.lattice;
+    const Eigen::Vector3d in_model = lattice.origin() + lattice.unit() * a.sphere.center, center = frame_ * in_model;
+    const double radius = lattice.unit() * a.sphere.radius;
+    if (costs_) {
+      const fcl::Vector3<S> c = (X_WB_ * center).template cast<S>();
+      const fcl::Vector3<S> r = fcl::Vector3<S>::Constant(static_cast<S>(radius));
+      addCost(fcl::AABB<S>(c - r, c + r), b);
+    }
+    if (!q_.request.enable_contact) return add(a.id, b, nullptr);
+    const query::ContactPoint contact = inWorld(ballPenetration(center, radius, b));
+    return add(a.id, b, &contact);
+  }
+
+ private:
+  static query::PairSet<std::uint64_t>& pairs() {
+    thread_local query::PairSet<std::uint64_t> set;
+    return set;
+  }
+
+  /// Of points that are just off the body: the way between the nearest ones, of no depth.
+  query::ContactPoint bridge(const query::SeparationResult& gap, const query::PointSet& points, const Node& b) const {
+    const Eigen::Vector3d displacement = gap.on_points - gap.on_body;
+    query::ContactPoint contact;
+    // The shortest ways are rounding, and lead anywhere.
+    const double size = gap.on_points.norm() + gap.on_body.norm();
+    contact.normal =
+        displacement.norm() > 1e-12 * size ? displacement.normalized() : partner_.penetration(b, points, gap).normal;
+    contact.point = (gap.on_points + gap.on_body) / 2;
+    return contact;
+  }
+
+  query::ContactPoint ballPenetration(const Eigen::Vector3d& center, double radius, const Node& b) const {
+    const query::PointSet point{&center, 1};
+    const query::SeparationResult gap = partner_.gap(b, point, std::numeric_limits<double>::infinity());
+    query::ContactPoint contact;
+    if (gap.isTouching()) {
+      contact = partner_.penetration(b, point, gap);
+      contact.depth += radius + q_.margin;
+      contact.point -= contact.normal * (radius / 2);
+    } else {
+      const double overlap = radius - gap.distance;  // negative: a gap, within the margin
+      contact.normal = (center - gap.on_body).normalized();
+      contact.depth = std::max(overlap + q_.margin, 0.0);
+      contact.point = gap.on_body - contact.normal * (overlap / 2);
+    }
+    return contact;
+  }
+
+  query::ContactPoint inWorld(query::ContactPoint contact) const {
+    contact.normal = X_WB_.linear() * contact.normal;
+    contact.point = X_WB_ * contact.point;
+    return contact;
+  }
+
+  void addApproximateCosts(const Node& b, const query::PointSet& box, const fcl::AABB<S>& in_world) const {
+    if (!partner_.gap(b, box, 0).isTouching()) return;
+    if (partner_.state(b) == query::State::kLeaf) return addCost(in_world, b);
+    partner_.children(b, [&](const Node& c) { addApproximateCosts(c, box, in_world); });
+  }
+
+  void addCost(const fcl::AABB<S>& box, const Node& b) const {
+    q_.addCost(box, partner_.worldBox(b), partner_.density(b));
+  }
+
+  // `contact` has the normal from the body to the model.
+  bool add(std::uint64_t id, const Node& b, const query::ContactPoint* contact) const {
+    if (!partner_.occupied(b)) return q_.request.isSatisfied(q_.result);
+    const std::intptr_t model = static_cast<std::intptr_t>(id), body = static_cast<std::intptr_t>(partner_.id(b));
+    if (swapped_ || contact == nullptr) return q_.addContact(swapped_ ? body : model, swapped_ ? model : body, contact);
+    query::ContactPoint turned = *contact;
+    turned.normal = -turned.normal;
+    return q_.addContact(model, body, &turned);
+  }
+
+  const CollideQuery<S>& q_;
+  const Partner& partner_;
+  const ConvexFrame<S>& frame_;
+  const oracle::Surface& surface_;
+  const NarrowPhase<S>& narrow_phase_;
+  const fcl::Transform3<S>& X_WM_;
+  const fcl::Transform3<double> X_WB_;
+  const double tolerance_;
+  const bool swapped_, costs_, once_;
+  query::PairSet<std::uint64_t>& seen_;
+};
+
+/// The collision of a model and the bodies of a partner, the first geometry when `swapped`: with_partner(frame,
+/// costs, f) makes the partner's side, with what has no contacts but costs or without, and calls f with it.
+template <typename S, typename F>
+void collideConvex(const CollideQuery<S>& q, tree::Tree& tree, bool swapped, const NarrowPhase<S>& narrow_phase,
+                   F&& with_partner) {
+  // As FCL does for meshes: contacts first, and then the costs of the box about the mesh.
+  const bool approximate = q.request.enable_cost && q.request.use_approximate_cost;
+  fcl::CollisionRequest<S> request(q.request);
+  request.enable_cost = q.request.enable_cost && !approximate;
+  const CollideQuery<S> first{q.o1, q.o2, q.X_W1, q.X_W2, request, q.result, q.margin};
+  const std::size_t before = q.result.numContacts();
+  std::int64_t now;
+  {
+    const ReadLock lock(tree, nullptr);
+    const query::TreeSide a(tree);
+    now = a.now();
+    const oracle::Surface& surface = tree.surface();
+    const ConvexFrame<S> frame(swapped ? q.X_W2 : q.X_W1, swapped ? q.X_W1 : q.X_W2, surface);
+    const auto with_collector = [&](bool costs, auto&& f) {
+      with_partner(frame, costs, [&](const auto& partner) {
+        using Partner = std::remove_cv_t<std::remove_reference_t<decltype(partner)>>;
+        ConvexCollector<S, Partner> collector(first, partner, frame, surface, narrow_phase, swapped,
+                                              request.enable_cost);
+        f(partner, collector);
+      });
+    };
+    if (q.occupied() || request.enable_cost) {
+      with_collector(request.enable_cost, [&](const auto& partner, auto& collector) {
+        using Partner = std::remove_cv_t<std::remove_reference_t<decltype(partner)>>;
+        using Visitor = query::ConvexVisitor<typename Partner::Node>;
+        const query::SimilarityTransform b_in_a =
+            frame.toLattice(surface.lattice, collector.tolerance(a.isConservative()));
+        query::PairWalk<query::TreeSide, Partner, Visitor>(a, partner, b_in_a, collector).run();
+      });
+    }
+    if (tree.solid() != nullptr && q.mayBeInside(before)) {
+      with_partner(frame, false, [&](const auto& partner) {
+        if (!contains(a, frame, partner)) return;
+        addInside(q, a, partner, frame.toLattice(surface.lattice, 0), swapped);
+      });
+    }
+    if (approximate) {
+      with_collector(true, [](const auto& partner, auto& collector) { collector.addApproximateCosts(partner.root()); });
+    }
+  }
+  tree.afterQuery(now);
+}
+
+}  // namespace bocst::fcl_adapter

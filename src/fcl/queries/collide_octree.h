@@ -1,0 +1,15 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#pragma once
+
+#include "fcl/adapters/narrow_phase.h"
+#include "fcl/queries/collide_query.h"
+#include "tree/tree.h"
+
+namespace bocst::fcl_adapter {
+
+/// collidePair() for a model and an fcl::OcTree, which is the first geometry when `swapped`. There is none where FCL
+/// was built without octomap.
+template <typename S>
+void collideOcTree(const CollideQuery<S>& q, tree::Tree& tree, bool swapped, const BroughtSolver<S>& solver);
+
+}  // namespace bocst::fcl_adapter

@@ -1,0 +1,80 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#pragma once
+
+#include <fcl/narrowphase/collision_request.h>
+#include <fcl/narrowphase/collision_result.h>
+
+#include <algorithm>
+#include <cstddef>
+#include <cstdint>
+#include <limits>
+
+#include "geometry/triangle.h"
+
+namespace bocst::fcl_adapter {
+
+/// The caller's question about a collision, in the caller's order.
+template <typename S>
+struct CollideQuery {
+  const fcl::CollisionGeometry<S>*o1, *o2;
+  const fcl::Transform3<S>&X_W1, &X_W2;
+  const fcl::CollisionRequest<S>& request;
+  fcl::CollisionResult<S>& result;
+  double margin = 0;  ///< Surfaces no farther apart than this touch.
+
+  /// Only between occupied geometries are there contacts.
+  bool occupied() const { return o1->isOccupied() && o2->isOccupied(); }
+
+  /// By how much culling must be wider for the margin: slabs are measured along normals up to a hundredth too long.
+  double cullingMargin(bool spheres) const { return margin * (spheres ? 1 : 1.02); }
+
+  /// No surfaces met, and a contact would be reported.
+  bool mayBeInside(std::size_t contacts_before) const {
+    return result.numContacts() == contacts_before && contacts_before < request.num_max_contacts && occupied();
+  }
+
+  /// How many contacts are still asked for.
+  std::size_t contactsLeft() const {
+    return request.num_max_contacts - std::min(request.num_max_contacts, result.numContacts());
+  }
+
+  /// The next contact is the last that is asked for.
+  bool endsAtFirst() const {
+    return occupied() && !request.enable_cost && result.numContacts() + 1 >= request.num_max_contacts;
+  }
+
+  /// Adds a contact if there is room; `contact` (world frame) may be null where contacts are not enabled. True when
+  /// nothing more is asked for.
+  bool addContact(std::intptr_t b1, std::intptr_t b2, const query::ContactPoint* contact) const {
+    if (occupied() && result.numContacts() < request.num_max_contacts) {
+      fcl::Contact<S> c;
+      c.o1 = o1;
+      c.o2 = o2;
+      c.b1 = b1;
+      c.b2 = b2;
+      if (request.enable_contact && contact != nullptr) {
+        c.normal = contact->normal.template cast<S>();
+        c.pos = contact->point.template cast<S>();
+        c.penetration_depth = static_cast<S>(contact->depth);
+      } else {
+        c.normal.setConstant(std::numeric_limits<S>::quiet_NaN());
+        c.pos = c.normal;
+        c.penetration_depth = std::numeric_limits<S>::quiet_NaN();
+      }
+      result.addContact(c);
+    }
+    return request.isSatisfied(result);
+  }
+
+  /// Adds the overlap of two world boxes as a cost source. What is apart, within the margin, shares no room.
+  void addCost(const fcl::AABB<S>& a, const fcl::AABB<S>& b, S density) const {
+    if (margin > 0 && !a.overlap(b)) return;
+    fcl::AABB<S> overlap;
+    overlap.min_ = a.min_.cwiseMax(b.min_);
+    // Boxes of what touches overlap, but for rounding.
+    overlap.max_ = a.max_.cwiseMin(b.max_).cwiseMax(overlap.min_);
+    result.addCostSource(fcl::CostSource<S>(overlap, density), request.num_max_cost_sources);
+  }
+};
+
+}  // namespace bocst::fcl_adapter

@@ -1,0 +1,15 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#pragma once
+
+#include "fcl/adapters/convex_shapes.h"
+#include "fcl/adapters/narrow_phase.h"
+#include "fcl/queries/collide_query.h"
+#include "tree/tree.h"
+
+namespace bocst::fcl_adapter {
+
+/// collidePair() for a model and a shape (see isShape()), which is the first geometry when `swapped`.
+template <typename S>
+void collideShape(const CollideQuery<S>& q, tree::Tree& tree, bool swapped, const BroughtSolver<S>& solver);
+
+}  // namespace bocst::fcl_adapter

@@ -1,0 +1,260 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#include <bocst/fcl.h>
+
+#include <algorithm>
+#include <cmath>
+#include <limits>
+
+#include "fcl/adapters/motion.h"
+#include "fcl/adapters/octree_side.h"
+#include "fcl/adapters/pair.h"
+#include "fcl/plugin/dispatch.h"
+#include "fcl/queries/collide_pair.h"
+#include "fcl/queries/convex_pair.h"
+#include "query/ccd/contact_time_walk.h"
+
+namespace bocst::fcl_adapter {
+namespace {
+
+using query::ContactGoal;
+using query::Motion;
+using query::SimilarityTransform;
+using query::TreeSide;
+
+/// The caller's question, in the caller's order.
+template <typename S>
+struct ContinuousQuery {
+  const fcl::CollisionGeometry<S>* o1;
+  const Motion& motion1;
+  const fcl::CollisionGeometry<S>* o2;
+  const Motion& motion2;
+  const fcl::ContinuousCollisionRequest<S>& request;
+};
+
+template <typename S>
+fcl::Transform3<S> poseAt(const Motion& motion, double time) {
+  const Eigen::Isometry3d X = motion.at(time);
+  fcl::Transform3<S> Y = fcl::Transform3<S>::Identity();
+  Y.linear() = X.linear().template cast<S>();
+  Y.translation() = X.translation().template cast<S>();
+  return Y;
+}
+
+SimilarityTransform inBody(const tree::Tree& tree) {
+  SimilarityTransform p;
+  p.scale = tree.surface().lattice.unit();
+  p.translation = tree.surface().lattice.origin();
+  return p;
+}
+
+/// A shape or an octree?
+template <typename S>
+bool isBodies(const fcl::CollisionGeometry<S>* geometry) {
+#if FCL_HAVE_OCTOMAP
+  if (geometry->getNodeType() == fcl::GEOM_OCTREE) return true;
+#endif
+  return isShape(geometry);
+}
+
+/// What is to be taken for a contact. The bodies are at most so far from their origins; `largest` coordinate of all.
+template <typename S>
+ContactGoal goalOf(const ContinuousQuery<S>& q, double size1, double size2, double margin) {
+  double largest = size1 + size2;
+  for (const Motion* m : {&q.motion1, &q.motion2}) {
+    const Eigen::Vector3d p = m->at(0).translation();
+    largest = std::max(largest, p.norm() + m->fastest(p, size1 + size2, 0));
+  }
+  ContactGoal goal;
+  goal.margin = margin;
+  // FCL's triangle test in S, and this walk's coordinates in the world; a billionth of the smaller body so that a pair
+  // that passes at no distance at all does not take for ever.
+  goal.rounding = std::max({1e-9 * std::min(size1, size2), 1e-14 * largest,
+                            32 * static_cast<double>(std::numeric_limits<S>::epsilon()) * largest,
+                            std::numeric_limits<double>::min()});
+  goal.time_error = static_cast<double>(q.request.toc_err);
+  return goal;
+}
+
+/// The mesh of a model as it is now, null for another geometry.
+template <typename S>
+std::shared_ptr<const Mesh> meshOf(const Model<S>* model) {
+  return model != nullptr ? model->mesh() : nullptr;
+}
+
+/// A ball about the origin of the partner that holds the model on all of its way, in the partner's frame. What is kept
+/// by all motions is the distance of a partner's point from its origin, so nothing beyond matters.
+query::Sphere regionOf(const Motion& of_model, const Eigen::AlignedBox3d& bounds, const Motion& of_partner) {
+  const Eigen::Vector3d center = of_model.at(0) * bounds.center(), origin = of_partner.at(0).translation();
+  // Spheres of cells stick out of the bounds.
+  const double radius = 2 * bounds.diagonal().norm();
+  return {Eigen::Vector3d::Zero(),
+          (center - origin).norm() + radius + of_model.fastest(center, radius, 0) + of_partner.fastest(origin, 0, 0)};
+}
+
+/// The distance at which collide() may call bodies touching, see ConvexFrame and NarrowPhase, on all of the way.
+template <typename S>
+double toleranceOfCollide(const ContinuousQuery<S>& q, double model_size, double region) {
+  double largest = region + 2 * model_size;
+  for (const Motion* m : {&q.motion1, &q.motion2}) {
+    const Eigen::Vector3d p = m->at(0).translation();
+    largest += p.norm() + m->fastest(p, 0, 0);
+  }
+  return 32 * static_cast<double>(std::numeric_limits<S>::epsilon()) * largest +
+         static_cast<double>(fcl::CollisionRequest<S>().gjk_tolerance);
+}
+
+/// When a model and a shape or an octree, the first geometry when `swapped`, first touch; see walk().
+template <typename S>
+double walkConvex(const ContinuousQuery<S>& q, tree::Tree& tree, const Mesh* mesh, bool swapped, double margin,
+                  bool& same) {
+  const fcl::CollisionGeometry<S>* partner = swapped ? q.o1 : q.o2;
+  const Motion &of_model = swapped ? q.motion2 : q.motion1, &of_partner = swapped ? q.motion1 : q.motion2;
+  double time = std::numeric_limits<double>::infinity();
+  std::int64_t now;
+  {
+    const ReadLock lock(tree, nullptr);
+    const TreeSide a(tree);
+    now = a.now();
+    const oracle::Surface& surface = tree.surface();
+    same = surface.mesh.get() == mesh;
+    const query::Sphere region = regionOf(of_model, surface.bounds, of_partner);
+    const auto run = [&](const auto& b) {
+      const query::Sphere ball = b.sphere(b.root());
+      const double size = std::min(ball.center.norm() + ball.radius, region.radius);
+      query::ContactTimeWalk<TreeSide, std::decay_t<decltype(b)>> walk(a, inBody(tree), of_model, b,
+                                                                       SimilarityTransform(), of_partner);
+      const double model_size = magnitudeOf(surface.bounds);
+      ContactGoal goal = goalOf(q, model_size, size, margin);
+      // The walk stops between a half of it and all of it.
+      goal.rounding = std::max(goal.rounding, 2 * toleranceOfCollide(q, model_size, region.radius));
+      time = walk.run(goal);
+    };
+    if (same && isShape(partner)) {
+      withConvexShape(static_cast<const fcl::ShapeBase<S>&>(*partner), region,
+                      [&](const query::ConvexShape& body) { run(query::ConvexSide(body)); });
+    }
+#if FCL_HAVE_OCTOMAP
+    if (same && partner->getNodeType() == fcl::GEOM_OCTREE) {
+      const fcl::Transform3<S> X_WO = poseAt<S>(of_partner, 0);
+      const OcTreeSide<S> side(static_cast<const fcl::OcTree<S>&>(*partner), X_WO, 1, false);
+      if (!side.empty()) run(side);
+    }
+#endif
+  }
+  tree.afterQuery(now);
+  return time;
+}
+
+/// When the two first touch, if they do not at the begin; infinite without contact. False in `same` when a mesh is not
+/// the one it is said to be.
+template <typename S>
+double walk(const ContinuousQuery<S>& q, const Mesh* mesh1, const Mesh* mesh2, bool& same) {
+  const auto* model1 = asModel<S>(q.o1);
+  const auto* model2 = asModel<S>(q.o2);
+  const fcl::Transform3<S> X_W1 = poseAt<S>(q.motion1, 0), X_W2 = poseAt<S>(q.motion2, 0);
+  const double margin = marginOf(model1, model2);
+  double time = std::numeric_limits<double>::infinity();
+  if (model1 != nullptr && model2 != nullptr) {
+    betweenTrees(X_W1, model1->tree(), X_W2, model2->tree(),
+                 [&](const TreeSide& a, const TreeSide& b, const SimilarityTransform&, double) {
+                   const oracle::Surface &s1 = a.tree().surface(), &s2 = b.tree().surface();
+                   same = s1.mesh.get() == mesh1 && s2.mesh.get() == mesh2;
+                   query::ContactTimeWalk<TreeSide, TreeSide> walk(a, inBody(a.tree()), q.motion1, b, inBody(b.tree()),
+                                                                   q.motion2);
+                   if (same) time = walk.run(goalOf(q, magnitudeOf(s1.bounds), magnitudeOf(s2.bounds), margin));
+                 });
+    return time;
+  }
+  const bool swapped = model1 == nullptr;
+  const Motion &motion_a = swapped ? q.motion2 : q.motion1, &motion_b = swapped ? q.motion1 : q.motion2;
+  if (isBodies(swapped ? q.o1 : q.o2)) {
+    return walkConvex(q, (swapped ? model2 : model1)->tree(), swapped ? mesh2 : mesh1, swapped, margin, same);
+  }
+  withBvh<S>("continuousCollide", swapped ? q.o1 : q.o2, [&](const auto& bvh) {
+    betweenTreeAndBvh(swapped ? X_W2 : X_W1, (swapped ? model2 : model1)->tree(), swapped ? X_W1 : X_W2, bvh,
+                      [&](const TreeSide& a, const auto& b, const SimilarityTransform&, double) {
+                        const oracle::Surface& surface = a.tree().surface();
+                        same = surface.mesh.get() == (swapped ? mesh2 : mesh1);
+                        query::ContactTimeWalk<TreeSide, std::decay_t<decltype(b)>> walk(
+                            a, inBody(a.tree()), motion_a, b, SimilarityTransform(), motion_b);
+                        if (same) time = walk.run(goalOf(q, magnitudeOf(surface.bounds), b.magnitude(), margin));
+                      });
+  });
+  return time;
+}
+
+/// @throws std::invalid_argument for partners that are not supported, wherever they are.
+template <typename S>
+void checkPartner(const ContinuousQuery<S>& q) {
+  for (const auto* o : {q.o1, q.o2}) {
+    if (asModel<S>(o) == nullptr && !isBodies(o)) {
+      withBvh<S>("continuousCollide", o, [](const auto&) {});
+    }
+  }
+}
+
+template <typename S>
+double firstContact(const ContinuousQuery<S>& q) {
+  checkPartner(q);
+  const fcl::Transform3<S> X_W1 = poseAt<S>(q.motion1, 0), X_W2 = poseAt<S>(q.motion2, 0);
+  for (;;) {
+    // DeviceResource, so that another mesh does not get the address of one of these.
+    const auto mesh1 = meshOf(asModel<S>(q.o1)), mesh2 = meshOf(asModel<S>(q.o2));
+    fcl::CollisionResult<S> begin;
+    if (collidePair<S>(q.o1, X_W1, q.o2, X_W2, {}, fcl::CollisionRequest<S>(), begin) > 0) return 0;
+    if (!q.o1->isOccupied() || !q.o2->isOccupied()) return std::numeric_limits<double>::infinity();
+    // What the begin was asked of must be what moves on.
+    bool same = true;
+    const double time = walk(q, mesh1.get(), mesh2.get(), same);
+    if (same) return time;
+  }
+}
+
+template <typename S>
+S answer(const ContinuousQuery<S>& q, fcl::ContinuousCollisionResult<S>& result) {
+  if (!(q.request.toc_err >= 0)) {
+    throw std::invalid_argument("bocst::continuousCollide: toc_err is " + std::to_string(q.request.toc_err));
+  }
+  const double time = firstContact(q);
+  result.is_collide = time <= 1;
+  // Rounded, if at all, to what is earlier.
+  result.time_of_contact = result.is_collide ? static_cast<S>(time) : S(1);
+  if (static_cast<double>(result.time_of_contact) > time) {
+    result.time_of_contact = std::nextafter(result.time_of_contact, S(0));
+  }
+  result.contact_tf1 = poseAt<S>(q.motion1, static_cast<double>(result.time_of_contact));
+  result.contact_tf2 = poseAt<S>(q.motion2, static_cast<double>(result.time_of_contact));
+  return result.time_of_contact;
+}
+
+}  // namespace
+
+template <typename S>
+S continuousPair(const fcl::CollisionGeometry<S>* o1, const fcl::MotionBase<S>* motion1,
+                 const fcl::CollisionGeometry<S>* o2, const fcl::MotionBase<S>* motion2,
+                 const fcl::ContinuousCollisionRequest<S>& request, fcl::ContinuousCollisionResult<S>& result) {
+  const auto m1 = motionOf<S>(motion1), m2 = motionOf<S>(motion2);
+  return answer(ContinuousQuery<S>{o1, *m1, o2, *m2, request}, result);
+}
+
+template <typename S>
+S continuousPair(const fcl::CollisionGeometry<S>* o1, const fcl::Transform3<S>& X_W1_begin,
+                 const fcl::Transform3<S>& X_W1_end, const fcl::CollisionGeometry<S>* o2,
+                 const fcl::Transform3<S>& X_W2_begin, const fcl::Transform3<S>& X_W2_end,
+                 const fcl::ContinuousCollisionRequest<S>& request, fcl::ContinuousCollisionResult<S>& result) {
+  const auto m1 = motionOf<S>(X_W1_begin, X_W1_end, request.ccd_motion_type);
+  const auto m2 = motionOf<S>(X_W2_begin, X_W2_end, request.ccd_motion_type);
+  return answer(ContinuousQuery<S>{o1, *m1, o2, *m2, request}, result);
+}
+
+#define BOCST_INSTANTIATE(S)                                                                                        \
+  template S continuousPair(const fcl::CollisionGeometry<S>*, const fcl::MotionBase<S>*,                            \
+                            const fcl::CollisionGeometry<S>*, const fcl::MotionBase<S>*,                            \
+                            const fcl::ContinuousCollisionRequest<S>&, fcl::ContinuousCollisionResult<S>&);         \
+  template S continuousPair(const fcl::CollisionGeometry<S>*, const fcl::Transform3<S>&, const fcl::Transform3<S>&, \
+                            const fcl::CollisionGeometry<S>*, const fcl::Transform3<S>&, const fcl::Transform3<S>&, \
+                            const fcl::ContinuousCollisionRequest<S>&, fcl::ContinuousCollisionResult<S>&);
+BOCST_INSTANTIATE(float)
+BOCST_INSTANTIATE(double)
+
+}  // namespace bocst::fcl_adapter

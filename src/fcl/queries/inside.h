@@ -1,0 +1,81 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#pragma once
+
+#include <algorithm>
+#include <limits>
+#include <vector>
+
+#include "fcl/adapters/pair.h"
+#include "fcl/queries/convex_pair.h"
+#include "query/sides/component_points.h"
+
+// What lies wholly inside a solid (Options::solid), for surfaces that do not meet: each connected component is then
+// inside or outside as any of its points is. While the query locks are held.
+
+namespace bocst::fcl_adapter {
+
+/// From the frame of the one to that of the other.
+template <typename S>
+Eigen::Isometry3d relative(const fcl::Transform3<S>& X_WA, const fcl::Transform3<S>& X_WB) {
+  return isometryOf<S>(X_WA).inverse(Eigen::Isometry) * isometryOf<S>(X_WB);
+}
+
+inline bool containsOne(const Solid& solid, const std::vector<Eigen::Vector3d>& points, const Eigen::Isometry3d& X,
+                        double tolerance) {
+  return std::any_of(points.begin(), points.end(),
+                     [&](const Eigen::Vector3d& p) { return solid.mayContain(X * p, tolerance); });
+}
+
+/// Can something within this ball be inside a mesh with these bounds?
+inline bool reaches(const Eigen::AlignedBox3d& bounds, const Eigen::Vector3d& center, double radius) {
+  return bounds.exteriorDistance(center) <= radius * (1 + 1e-9);
+}
+
+template <typename S>
+double toleranceOf(double magnitude) {
+  return 32 * static_cast<double>(std::numeric_limits<S>::epsilon()) * magnitude;
+}
+
+/// Is a piece of B inside the solid A?
+template <typename S>
+bool contains(const tree::Tree& a, const fcl::Transform3<S>& X_WA, const tree::Tree& b, const fcl::Transform3<S>& X_WB,
+              double magnitude) {
+  if (a.solid() == nullptr) return false;
+  const Eigen::Isometry3d X_AB = relative<S>(X_WA, X_WB);
+  const Eigen::AlignedBox3d& box = b.surface().bounds;
+  const double tolerance = toleranceOf<S>(magnitude);
+  if (!reaches(a.surface().bounds, X_AB * box.center(), box.diagonal().norm() / 2 + tolerance)) return false;
+  return containsOne(*a.solid(), b.componentPoints(), X_AB, tolerance);
+}
+
+/// A BVHModel does not remember its pieces: a query whose balls meet takes time linear in its triangles.
+template <typename BV>
+bool contains(const tree::Tree& a, const fcl::Transform3<typename BV::S>& X_WA, const fcl::BVHModel<BV>& bvh,
+              const fcl::Transform3<typename BV::S>& X_WB, double magnitude) {
+  using S = typename BV::S;
+  if (a.solid() == nullptr) return false;
+  const Eigen::Isometry3d X_AB = relative<S>(X_WA, X_WB);
+  const query::OrientedVolume root = volumeOf(bvh.getBV(0).bv);
+  const double tolerance = toleranceOf<S>(magnitude);
+  if (!reaches(a.surface().bounds, X_AB * root.center, root.half.norm() + tolerance)) return false;
+  std::vector<Eigen::Vector3d> vertices(static_cast<std::size_t>(bvh.num_vertices));
+  for (std::size_t i = 0; i < vertices.size(); ++i) vertices[i] = bvh.vertices[i].template cast<double>();
+  std::vector<Mesh::Indices> triangles(static_cast<std::size_t>(bvh.num_tris));
+  for (std::size_t t = 0; t < triangles.size(); ++t) {
+    for (std::size_t k = 0; k < 3; ++k) triangles[t][k] = static_cast<std::uint32_t>(bvh.tri_indices[t][k]);
+  }
+  return containsOne(*a.solid(), pointOfEachComponent(vertices, triangles), X_AB, tolerance);
+}
+
+/// Is a body of the partner, none of which meets the surface, inside the solid?
+template <typename S, typename Partner>
+bool contains(const query::TreeSide& a, const ConvexFrame<S>& frame, const Partner& partner) {
+  const Solid* solid = a.tree().solid();
+  if (solid == nullptr) return false;
+  const query::SimilarityTransform b_in_a = frame.toLattice(a.tree().surface().lattice, frame.rounding());
+  return query::ComponentPoints<query::TreeSide, Partner>(a, partner, b_in_a).any([&](const Eigen::Vector3d& p) {
+    return solid->mayContain(frame.toModel(p), frame.rounding());
+  });
+}
+
+}  // namespace bocst::fcl_adapter

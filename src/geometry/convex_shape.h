@@ -1,0 +1,231 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#pragma once
+
+#include <Eigen/Core>
+#include <cstddef>
+#include <limits>
+#include <optional>
+
+#include "geometry/triangle.h"
+#include "geometry/volume.h"
+
+// Solid convex bodies against the convex hull of a few points (a triangle, a point, a box), in the frame of the body.
+// All in double.
+
+namespace bocst::query {
+
+/// A few points; what is meant is their convex hull.
+struct PointSet {
+  const Eigen::Vector3d* x;
+  int count;
+
+  Eigen::Vector3d middle() const {
+    Eigen::Vector3d m = x[0];
+    for (int i = 1; i < count; ++i) m += x[i];
+    return m / count;
+  }
+  /// The point that is farthest along d.
+  const Eigen::Vector3d& support(const Eigen::Vector3d& d) const {
+    int best = 0;
+    double most = d.dot(x[0]);
+    for (int i = 1; i < count; ++i) {
+      const double h = d.dot(x[i]);
+      if (h > most) most = h, best = i;
+    }
+    return x[best];
+  }
+};
+
+/// How far points are from a body.
+struct SeparationResult {
+  /// The distance is surely no less, up to 4e-15 of the coordinates, which is taken off: where it is not positive, the
+  /// two may touch.
+  double atLeast = 0;
+  /// Of the nearest points; 0 where the two touch, at a point of both. Not looked for when `atLeast` was found to be
+  /// enough.
+  double distance = std::numeric_limits<double>::infinity();
+  Eigen::Vector3d on_body = Eigen::Vector3d::Zero(), on_points = Eigen::Vector3d::Zero();
+  /// The unit direction, from the body to the points, along which they are apart by `atLeast`. Where `atLeast` was more
+  /// than enough, it may be zero.
+  Eigen::Vector3d normal = Eigen::Vector3d::Zero();
+  /// Where cores overlap: points of the difference (body minus points) in whose hull the origin is, for penetration().
+  Eigen::Vector3d around[4];
+  int around_count = 0;
+
+  bool isTouching() const { return !(atLeast > 0 && distance > 0); }
+};
+
+/// A few points in whose hull, blown up by a radius, a body lies: what bounds how fast any point of it moves.
+struct SweptHull {
+  Eigen::Vector3d corners[8];
+  std::size_t count = 0;
+  double radius = 0;
+};
+
+/// That of a box.
+SweptHull sweptHullOf(const OrientedVolume& box);
+
+class ConvexShape {
+ public:
+  virtual ~ConvexShape() = default;
+
+  /// A box about the body; of an unbounded one, about as much of it as its maker was told to care for.
+  const OrientedVolume& box() const { return box_; }
+
+  /// The box is the body, or as good: what meets the one is worth a look at the other.
+  virtual bool isBox() const { return false; }
+
+  /// The distance of the points. More than `cutoff` is not looked at closely.
+  virtual SeparationResult gap(const PointSet& points, double cutoff) const = 0;
+
+  /// A point of the body; none of what has no end.
+  virtual std::optional<Eigen::Vector3d> point() const = 0;
+
+  /// That of its box, if nothing better is known.
+  virtual SweptHull hull() const { return sweptHullOf(box_); }
+
+  /// How points that touch the body get away from it, in a straight line: normal from the body to the points, depth >=
+  /// 0 so that moving the points by depth * normal leaves them touching at most, and a point in or beside the overlap.
+  /// Of boxes, balls, planes, half-spaces and triangles the shortest way; of other bodies one that is seldom longer by
+  /// more than a tenth. `gap` is what gap() says of these points.
+  virtual ContactPoint penetration(const PointSet& points, const SeparationResult& gap) const = 0;
+  ContactPoint penetration(const PointSet& points) const {
+    return penetration(points, gap(points, std::numeric_limits<double>::infinity()));
+  }
+
+ protected:
+  OrientedVolume box_;
+};
+
+/// A convex core, blown up by a radius.
+class SupportShape : public ConvexShape {
+ public:
+  SeparationResult gap(const PointSet& points, double cutoff) const override;
+  using ConvexShape::penetration;
+  ContactPoint penetration(const PointSet& points, const SeparationResult& gap) const override;
+  std::optional<Eigen::Vector3d> point() const override { return support(Eigen::Vector3d::UnitX()); }
+
+ protected:
+  SupportShape(const Eigen::Vector3d& center, const Eigen::Vector3d& half_of_core, double radius);
+
+  /// The point of the core that is farthest along d, which has any length but zero.
+  virtual Eigen::Vector3d support(const Eigen::Vector3d& d) const = 0;
+
+  /// Is the point surely in the core? False where that is not known at a glance.
+  virtual bool contains(const Eigen::Vector3d&) const { return false; }
+
+  const double radius_;
+
+ private:
+  double boxGap(const PointSet& points) const;
+  SeparationResult coreGap(const PointSet& points, double cutoff) const;
+  ContactPoint along(const Eigen::Vector3d& normal, const PointSet& points) const;
+  ContactPoint shorten(ContactPoint contact, const PointSet& points) const;
+};
+
+/// From half sizes, at the origin.
+class BoxShape final : public SupportShape {
+ public:
+  explicit BoxShape(const Eigen::Vector3d& half);
+
+  bool isBox() const override { return true; }
+  using ConvexShape::penetration;
+  ContactPoint penetration(const PointSet& points, const SeparationResult& gap) const override;
+
+ protected:
+  Eigen::Vector3d support(const Eigen::Vector3d& d) const override;
+  bool contains(const Eigen::Vector3d& x) const override;
+
+ private:
+  const Eigen::Vector3d half_;
+};
+
+/// What is within `radius` of a segment of the given length along z, about the origin: a capsule, or a ball.
+class CapsuleShape final : public SupportShape {
+ public:
+  CapsuleShape(double radius, double length);
+
+  SweptHull hull() const override;
+
+ protected:
+  Eigen::Vector3d support(const Eigen::Vector3d& d) const override;
+
+ private:
+  const double half_length_;
+};
+
+class EllipsoidShape final : public SupportShape {
+ public:
+  explicit EllipsoidShape(const Eigen::Vector3d& radii);
+
+ protected:
+  Eigen::Vector3d support(const Eigen::Vector3d& d) const override;
+  bool contains(const Eigen::Vector3d& x) const override;
+
+ private:
+  const Eigen::Vector3d radii_;
+};
+
+/// About z, from -length / 2 with radius `bottom` to length / 2 with radius `top`: a cylinder, or a cone.
+class RoundShape final : public SupportShape {
+ public:
+  RoundShape(double bottom, double top, double length);
+
+ protected:
+  Eigen::Vector3d support(const Eigen::Vector3d& d) const override;
+  bool contains(const Eigen::Vector3d& x) const override;
+
+ private:
+  const double bottom_, top_, half_length_;
+};
+
+/// A triangle, which parts as triangles do.
+class TriangleShape final : public SupportShape {
+ public:
+  explicit TriangleShape(const Corners& corners);
+
+  SeparationResult gap(const PointSet& points, double cutoff) const override;
+  using ConvexShape::penetration;
+  ContactPoint penetration(const PointSet& points, const SeparationResult& gap) const override;
+  SweptHull hull() const override;
+
+ protected:
+  Eigen::Vector3d support(const Eigen::Vector3d& d) const override;
+
+ private:
+  Corners corners_;
+};
+
+/// What lies at or below a height along a unit normal: n.x <= height. Its box reaches as far as the region does.
+class HalfspaceShape final : public ConvexShape {
+ public:
+  HalfspaceShape(const Eigen::Vector3d& normal, double height, const Sphere& region);
+
+  bool isBox() const override { return true; }
+  SeparationResult gap(const PointSet& points, double cutoff) const override;
+  using ConvexShape::penetration;
+  ContactPoint penetration(const PointSet& points, const SeparationResult& gap) const override;
+  std::optional<Eigen::Vector3d> point() const override { return std::nullopt; }
+
+ private:
+  const Eigen::Vector3d normal_;
+  const double height_;
+};
+
+/// n.x == height.
+class PlaneShape final : public ConvexShape {
+ public:
+  PlaneShape(const Eigen::Vector3d& normal, double height, const Sphere& region);
+
+  bool isBox() const override { return true; }
+  SeparationResult gap(const PointSet& points, double cutoff) const override;
+  using ConvexShape::penetration;
+  ContactPoint penetration(const PointSet& points, const SeparationResult& gap) const override;
+  std::optional<Eigen::Vector3d> point() const override { return std::nullopt; }
+
+ private:
+  const Eigen::Vector3d normal_;
+  const double height_;
+};
+
+}  // namespace bocst::query

@@ -1,0 +1,116 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#pragma once
+
+#include <Eigen/Core>
+#include <algorithm>
+#include <cmath>
+#include <cstdint>
+
+#include "geometry/triangle.h"
+#include "geometry/volume.h"
+
+// How far bodies are from each other, from below: for distance queries. All in double, in one frame.
+
+namespace bocst::query {
+
+/// What bounds the surface of a node, placed in the common frame: a box of any direction AND a slab.
+struct NodeExtent {
+  Eigen::Vector3d center;
+  Eigen::Matrix3d axes;  ///< Columns.
+  Eigen::Vector3d half;
+  Eigen::Vector3d normal = Eigen::Vector3d::Zero();
+  double slab_offset = 0, slab_half = 0;  ///< Along normal, from center.
+
+  NodeExtent(const Volume& v, const SimilarityTransform& to) : axes(to.rotation) {
+    center = to * Eigen::Vector3d(v.center[0], v.center[1], v.center[2]);
+    // All but the centre was rounded to float: twice over is enough.
+    constexpr double round = 0x1p-22;
+    half = Eigen::Vector3d(v.half[0], v.half[1], v.half[2]) * (to.scale * (1 + round));
+    normal = to.rotation * Eigen::Vector3d(v.normal[0], v.normal[1], v.normal[2]);
+    slab_offset = v.slab_offset * to.scale;
+    slab_half = v.slab_half * to.scale + round * (std::abs(slab_offset) + half.sum());
+  }
+  NodeExtent(const OrientedVolume& v, const SimilarityTransform& to)
+      : center(to * v.center), axes(to.rotation * v.axes), half(v.half * to.scale) {}
+
+  /// Along a unit direction the node reaches from lo to hi, counted from its centre.
+  void along(const Eigen::Vector3d& direction, double& lo, double& hi) const {
+    hi = (axes.transpose() * direction).cwiseAbs().dot(half);
+    lo = -hi;
+    const double nn = normal.squaredNorm();
+    if (!(nn > 0)) return;
+    const double a = direction.dot(normal) / nn, middle = a * slab_offset;
+    const double extent = std::abs(a) * slab_half + (axes.transpose() * (direction - a * normal)).cwiseAbs().dot(half);
+    lo = std::max(lo, middle - extent);
+    hi = std::min(hi, middle + extent);
+  }
+};
+
+/// No point of a is nearer to any of b than this, up to a part of 1e-12 of the sizes, which is taken off. `guess` is a
+/// direction in which the bound is likely to be good, or zero; a bound of `cutoff` or more is not made better.
+inline double distanceBound(const NodeExtent& a, const NodeExtent& b, const Eigen::Vector3d& guess, double cutoff) {
+  const Eigen::Vector3d t = b.center - a.center;
+  const double apart = t.norm(), rounding_margin = 1e-12 * (apart + a.half.sum() + b.half.sum());
+  double best = 0;
+  const auto reachesCutoff = [&](const Eigen::Vector3d& direction) {
+    double lo_a, hi_a, lo_b, hi_b;
+    a.along(direction, lo_a, hi_a);
+    b.along(direction, lo_b, hi_b);
+    const double d = direction.dot(t);
+    best = std::max({best, d + lo_b - hi_a, lo_a - d - hi_b});
+    return best - rounding_margin >= cutoff;
+  };
+  if (guess.squaredNorm() > 0 && reachesCutoff(guess)) return best - rounding_margin;
+  if (apart > 0 && reachesCutoff(t / apart)) return best - rounding_margin;
+  // On three axes at right angles, gaps add up as the sides of a box.
+  const Eigen::Matrix3d s = (a.axes.transpose() * b.axes).cwiseAbs();
+  const Eigen::Vector3d gap_a = ((a.axes.transpose() * t).cwiseAbs() - a.half - s * b.half).cwiseMax(0);
+  const Eigen::Vector3d gap_b = ((b.axes.transpose() * t).cwiseAbs() - b.half - s.transpose() * a.half).cwiseMax(0);
+  best = std::max(best, std::sqrt(std::max(gap_a.squaredNorm(), gap_b.squaredNorm())));
+  if (best - rounding_margin >= cutoff) return best - rounding_margin;
+  for (const NodeExtent* n : {&a, &b}) {
+    const double length = n->normal.norm();
+    if (length > 0 && reachesCutoff(n->normal / length)) break;
+  }
+  return best - rounding_margin;
+}
+
+/// Some point of a is no farther from one of b than this.
+inline double farthest(const NodeExtent& a, const NodeExtent& b) {
+  return ((b.center - a.center).norm() + a.half.norm() + b.half.norm()) * (1 + 1e-12);
+}
+
+/// A triangle and its box.
+struct TriangleExtent {
+  Corners corners;
+  Eigen::Vector3d lo, hi;
+  double lowest = 0, highest = 0;  ///< Along a direction, see along().
+  std::uint32_t id = 0;
+
+  void ready() {
+    lo = corners[0].cwiseMin(corners[1]).cwiseMin(corners[2]);
+    hi = corners[0].cwiseMax(corners[1]).cwiseMax(corners[2]);
+  }
+  Eigen::Vector3d middle() const { return corners[0] + corners[1] + corners[2]; }  ///< Times three.
+  void along(const Eigen::Vector3d& direction) {
+    const double x = direction.dot(corners[0]), y = direction.dot(corners[1]), z = direction.dot(corners[2]);
+    lowest = std::min({x, y, z});
+    highest = std::max({x, y, z});
+  }
+};
+
+/// Is the one at least this far from the other, by their boxes or along the line of their middles?
+inline bool isBeyond(const TriangleExtent& a, const TriangleExtent& b, double distance) {
+  const double least = distance * (1 + 1e-12);
+  if ((b.lo - a.hi).cwiseMax(a.lo - b.hi).cwiseMax(0).squaredNorm() >= least * least) return true;
+  const Eigen::Vector3d line = b.middle() - a.middle();
+  double highest = line.dot(a.corners[0]), lowest = line.dot(b.corners[0]);
+  for (int k = 1; k < 3; ++k) {
+    highest = std::max(highest, line.dot(a.corners[k]));
+    lowest = std::min(lowest, line.dot(b.corners[k]));
+  }
+  const double size = a.corners[0].lpNorm<1>() + b.corners[0].lpNorm<1>();
+  return lowest - highest >= line.norm() * (least + 1e-14 * size);
+}
+
+}  // namespace bocst::query

@@ -1,0 +1,175 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#include "geometry/motion.h"
+
+#include <algorithm>
+#include <cmath>
+#include <limits>
+
+namespace bocst::query {
+
+using Eigen::AngleAxisd;
+using Eigen::Isometry3d;
+using Eigen::Vector3d;
+
+double ClosingSpeed::timeFor(double gap) const {
+  const double never = std::numeric_limits<double>::infinity();
+  const double by_speed = ever > 0 ? gap / ever : never;
+  if (!(change > 0)) return std::max(by_speed, now > 0 ? gap / now : never);
+  const double root = std::sqrt(now * now + 2 * change * gap);
+  return std::max(by_speed, now > 0 ? 2 * gap / (now + root) : (root - now) / change);
+}
+
+AxisMotion::AxisMotion(const Isometry3d& begin, const Vector3d& velocity)
+    : AxisMotion(begin, velocity, Vector3d::Zero(), Vector3d::UnitX(), 0) {}
+
+AxisMotion::AxisMotion(const Isometry3d& begin, const Vector3d& velocity, const Vector3d& arm, const Vector3d& axis,
+                       double angle)
+    : begin_(begin), velocity_(velocity), arm_(arm), axis_(axis), angle_(angle) {}
+
+Isometry3d AxisMotion::at(double time) const {
+  Isometry3d X = begin_;
+  if (angle_ != 0) {
+    const double turn = time * angle_, half = std::sin(turn / 2);
+    X.linear() = AngleAxisd(turn, axis_).toRotationMatrix() * begin_.linear();
+    // What the turn does to the arm, which may be long, with a small angle.
+    const Vector3d across = axis_.cross(arm_);
+    X.translation() += std::sin(turn) * across + 2 * half * half * axis_.cross(across);
+  }
+  X.translation() += time * velocity_;
+  return X;
+}
+
+// The axis times the way from it to a point: the direction in which the point moves.
+Vector3d AxisMotion::around(const Vector3d& point, double time) const {
+  return axis_.cross(point - begin_.translation() - time * velocity_) + axis_.cross(arm_);
+}
+
+ClosingSpeed AxisMotion::closingSpeed(const Vector3d& direction, double blur, const Vector3d& center, double radius,
+                                      double time) const {
+  const double straight = direction.dot(velocity_) + blur * velocity_.norm();
+  if (angle_ == 0) return {straight, straight, 0};
+  // Each point keeps its distance from the axis, moves across it, and is drawn towards it.
+  const double speed = std::abs(angle_);
+  const Vector3d displacement = around(center, time);
+  const double distance = displacement.norm() + radius, across = direction.cross(axis_).norm() + blur;
+  const double now = angle_ * direction.dot(displacement) + speed * (across * radius + blur * distance);
+  return {straight + speed * across * distance, straight + now, speed * speed * across * distance};
+}
+
+double AxisMotion::fastest(const Vector3d& center, double radius, double time) const {
+  return velocity_.norm() + std::abs(angle_) * (around(center, time).norm() + radius);
+}
+
+SplineMotion::SplineMotion(const Points& positions, const Points& rotations)
+    : positions_(positions), rotations_(rotations) {
+  // The derivatives of a B-spline are those of its differences, so they stay in their convex hull. exp'(W) has norm
+  // |W'| at most, as W is skew, and exp''(W) has |W''| + |W'|^2: each is an integral over products of rotations with
+  // these.
+  for (std::size_t i = 0; i < 3; ++i) {
+    velocities_[i] = positions[i + 1] - positions[i];
+    turns_[i] = rotations[i + 1] - rotations[i];
+    turn_ = std::max(turn_, turns_[i].norm());
+  }
+  for (std::size_t i = 0; i < 2; ++i) {
+    accelerations_[i] = velocities_[i + 1] - velocities_[i];
+    turn_change_ = std::max(turn_change_, (turns_[i + 1] - turns_[i]).norm());
+  }
+  turn_change_ += turn_ * turn_;
+}
+
+namespace {
+
+Vector3d onSpline(const SplineMotion::Points& p, double t) {
+  const double s = 1 - t;
+  return (s * s * s * p[0] + (4 - 6 * t * t + 3 * t * t * t) * p[1] + (4 - 6 * s * s + 3 * s * s * s) * p[2] +
+          t * t * t * p[3]) /
+         6;
+}
+
+Vector3d derivative(const std::array<Vector3d, 3>& d, double t) {
+  const double s = 1 - t;
+  return (s * s * d[0] + (1 + 2 * t * s) * d[1] + t * t * d[2]) / 2;
+}
+
+// The angular velocity of exp(w) when w changes by dw.
+Vector3d angularVelocity(const Vector3d& w, const Vector3d& dw) {
+  const double t = w.norm(), tt = t * t;
+  const double a = t > 1e-4 ? (1 - std::cos(t)) / tt : 0.5 - tt / 24;
+  const double b = t > 1e-2 ? (t - std::sin(t)) / (tt * t) : 1.0 / 6 - tt / 120;
+  return dw + a * w.cross(dw) + b * w.cross(w.cross(dw));
+}
+
+}  // namespace
+
+Isometry3d SplineMotion::at(double time) const {
+  const Vector3d turn = onSpline(rotations_, time);
+  const double angle = turn.norm();
+  Isometry3d X = Isometry3d::Identity();
+  if (angle > 0) X.linear() = AngleAxisd(angle, turn / angle).toRotationMatrix();
+  X.translation() = onSpline(positions_, time);
+  return X;
+}
+
+ClosingSpeed SplineMotion::closingSpeed(const Vector3d& direction, double blur, const Vector3d& center, double radius,
+                                        double time) const {
+  double straight = direction.dot(velocities_[0]), fastest = 0, change = direction.dot(accelerations_[0]);
+  for (const Vector3d& v : velocities_) {
+    straight = std::max(straight, direction.dot(v));
+    fastest = std::max(fastest, v.norm());
+  }
+  change = std::max(change, direction.dot(accelerations_[1]));
+  change += blur * std::max(accelerations_[0].norm(), accelerations_[1].norm());
+  const Vector3d arm = center - onSpline(positions_, time);
+  const double distance = arm.norm() + radius;
+  const Vector3d turn = angularVelocity(onSpline(rotations_, time), derivative(turns_, time));
+  const double now = direction.dot(derivative(velocities_, time) + turn.cross(arm)) +
+                     direction.cross(turn).norm() * radius + 1e-12 * (fastest + turn_ * distance);
+  return {straight + blur * fastest + turn_ * distance, now + blur * (fastest + turn_ * distance),
+          change + turn_change_ * distance};
+}
+
+double SplineMotion::fastest(const Vector3d& center, double radius, double time) const {
+  double straight = 0;
+  for (const Vector3d& v : velocities_) straight = std::max(straight, v.norm());
+  return straight + turn_ * ((center - onSpline(positions_, time)).norm() + radius);
+}
+
+AxisMotion translation(const Isometry3d& begin, const Isometry3d& end) {
+  return {begin, end.translation() - begin.translation()};
+}
+
+AxisMotion interpolation(const Isometry3d& begin, const Isometry3d& end) {
+  const AngleAxisd turn(Eigen::Matrix3d(end.linear() * begin.linear().transpose()));
+  return {begin, end.translation() - begin.translation(), Vector3d::Zero(), turn.axis(), turn.angle()};
+}
+
+AxisMotion screw(const Isometry3d& begin, const Isometry3d& end) {
+  const AngleAxisd turn(Eigen::Matrix3d(end.linear() * begin.linear().transpose()));
+  const Vector3d displacement = end.translation() - begin.translation(), axis = turn.axis();
+  // Below, the two motions are the same up to rounding.
+  if (std::abs(turn.angle()) < 1e-14) return interpolation(begin, end);
+  const Vector3d across = displacement - axis.dot(displacement) * axis;
+  const Vector3d arm = -(across + axis.cross(displacement) / std::tan(turn.angle() / 2)) / 2;
+  return {begin, axis.dot(displacement) * axis, arm, axis, turn.angle()};
+}
+
+SplineMotion spline(const Isometry3d& begin, const Isometry3d& end) {
+  const auto vectorOf = [](const Isometry3d& X) {
+    const AngleAxisd turn(X.linear());
+    return Vector3d(turn.angle() * turn.axis());
+  };
+  Vector3d first = vectorOf(begin), last = vectorOf(end);
+  // Of the rotation vectors that mean the same, the nearest.
+  if (last.norm() > 0) {
+    const Vector3d axis = last.normalized();
+    const double around = 2 * std::acos(-1.0);
+    last += axis * around * std::round((first - last).dot(axis) / around);
+  }
+  // Evenly spaced on a line, the four points make a spline that runs from the second to the third.
+  const auto line = [](const Vector3d& p, const Vector3d& q) {
+    return SplineMotion::Points{p - (q - p), p, q, q + (q - p)};
+  };
+  return {line(begin.translation(), end.translation()), line(first, last)};
+}
+
+}  // namespace bocst::query

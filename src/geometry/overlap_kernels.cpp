@@ -1,0 +1,449 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#include "geometry/overlap_kernels.h"
+
+#include <algorithm>
+#include <cmath>
+
+#undef HWY_TARGET_INCLUDE
+#define HWY_TARGET_INCLUDE "geometry/overlap_kernels.cpp"
+#include <hwy/foreach_target.h>
+#include <hwy/highway.h>
+
+#include "simd/octants-inl.h"
+#include "simd/vectors-inl.h"
+
+HWY_BEFORE_NAMESPACE();
+namespace bocst::query::HWY_NAMESPACE {
+
+std::uint8_t OverlappingOctants(const oracle::OctantBounds& octants, const OneVolume& b) {
+  const D d;
+  const V rounding_margin = hn::Set(d, b.rounding_margin), byte = hn::Set(d, 1.0f / 510), half = hn::Set(d, 0.5f);
+  const V per127 = hn::Set(d, 1.0f / 127), per254 = hn::Set(d, 1.0f / 254);
+  std::uint8_t result = 0;
+  for (std::size_t i = 0; i < 8; i += hn::Lanes(d)) {
+    // The octant's box: middle and half extents; delta is the way to the volume's middle.
+    V middle[3], h[3], delta[3];
+    BOCST_UNROLL
+    for (int k = 0; k < 3; ++k) {
+      const V lo = fromBytes(d, octants.lo[k] + i), hi = fromBytes(d, octants.hi[k] + i);
+      middle[k] = hn::MulAdd(hn::Add(lo, hi), byte, hn::Load(d, kOctantCorner[k] + i));
+      h[k] = hn::Mul(hn::Sub(hi, lo), byte);
+      delta[k] = hn::Sub(hn::Set(d, b.center[k]), middle[k]);
+    }
+    M apart = hn::MaskFromVec(hn::Zero(d));
+    BOCST_UNROLL
+    for (int k = 0; k < 3; ++k) {
+      V r = hn::Add(h[k], rounding_margin);
+      BOCST_UNROLL
+      for (int j = 0; j < 3; ++j) {
+        r = hn::MulAdd(hn::Abs(hn::Set(d, b.axes[j][k])), hn::Set(d, b.half[j]), r);
+      }
+      apart = hn::Or(apart, hn::Gt(hn::Abs(delta[k]), r));
+    }
+    BOCST_UNROLL
+    for (int j = 0; j < 3; ++j) {
+      V t = hn::Zero(d), r = hn::Add(hn::Set(d, b.half[j]), rounding_margin);
+      BOCST_UNROLL
+      for (int k = 0; k < 3; ++k) {
+        const V a = hn::Set(d, b.axes[j][k]);
+        t = hn::MulAdd(a, delta[k], t);
+        r = hn::MulAdd(hn::Abs(a), h[k], r);
+      }
+      apart = hn::Or(apart, hn::Gt(hn::Abs(t), r));
+    }
+
+    // Slabs: for z in a box with |m.z - offset| <= w, any a gives n.z in a * offset +- (|a| w + |n - a m| over the
+    // box).
+    V n[3], along = hn::Zero(d);
+    BOCST_UNROLL
+    for (int k = 0; k < 3; ++k) {
+      n[k] = hn::Mul(fromBytes(d, octants.normal[k] + i), per127);
+      along = hn::MulAdd(n[k], hn::Set(d, b.normal[k]), along);
+    }
+    const V center = hn::Mul(fromBytes(d, octants.slab_center + i), per127);
+    const V w = hn::Mul(fromBytes(d, octants.slab_half + i), per254);
+    const V abs_along = hn::Abs(along), bw = hn::Set(d, b.slab_half), boffset = hn::Set(d, b.slab_offset);
+    {
+      // Along the octant's normal; its slab is measured from the octant's centre.
+      V t = hn::MulSub(along, boffset, center), r = hn::MulAdd(abs_along, bw, hn::Add(w, rounding_margin));
+      BOCST_UNROLL
+      for (int k = 0; k < 3; ++k) {
+        const V from = hn::Sub(hn::Set(d, b.center[k]), hn::Add(hn::Load(d, kOctantCorner[k] + i), half));
+        t = hn::MulAdd(n[k], from, t);
+      }
+      V rest[3];
+      BOCST_UNROLL
+      for (int k = 0; k < 3; ++k) rest[k] = hn::NegMulAdd(along, hn::Set(d, b.normal[k]), n[k]);
+      BOCST_UNROLL
+      for (int j = 0; j < 3; ++j) {
+        V p = hn::Mul(rest[0], hn::Set(d, b.axes[j][0]));
+        p = hn::MulAdd(rest[1], hn::Set(d, b.axes[j][1]), p);
+        p = hn::MulAdd(rest[2], hn::Set(d, b.axes[j][2]), p);
+        r = hn::MulAdd(hn::Abs(p), hn::Set(d, b.half[j]), r);
+      }
+      apart = hn::Or(apart, hn::Gt(hn::Abs(t), r));
+    }
+    {
+      // Along the volume's normal; the octant's slab counted from its box's middle.
+      V own = center, r = hn::MulAdd(abs_along, w, hn::Add(bw, rounding_margin)), t = boffset;
+      BOCST_UNROLL
+      for (int k = 0; k < 3; ++k) {
+        const V m = hn::Set(d, b.normal[k]);
+        own = hn::NegMulAdd(n[k], hn::Sub(middle[k], hn::Add(hn::Load(d, kOctantCorner[k] + i), half)), own);
+        t = hn::MulAdd(m, delta[k], t);
+        r = hn::MulAdd(hn::Abs(hn::NegMulAdd(along, n[k], m)), h[k], r);
+      }
+      t = hn::NegMulAdd(along, own, t);
+      apart = hn::Or(apart, hn::Gt(hn::Abs(t), r));
+    }
+    result = static_cast<std::uint8_t>(result | maskBits(hn::Not(apart)) << i);
+  }
+  return result;
+}
+
+void PlaceTriangles(RawTriangles& raw, std::size_t count, const PackTransform& place, TrianglePack& pack) {
+  const hn::CappedTag<double, 8> dd;
+  const hn::Rebind<float, decltype(dd)> df;
+  pack.count = count;
+  // Whole vectors are read: copies of the first triangle change no maximum.
+  const std::size_t whole = (count + 7) / 8 * 8;
+  for (auto& row : raw.xyz) {
+    for (std::size_t i = count; i < whole; ++i) row[i] = row[0];
+  }
+  auto size = hn::Zero(df);
+  for (std::size_t i = 0; i < whole; i += hn::Lanes(dd)) {
+    BOCST_UNROLL
+    for (std::size_t k = 0; k < 3; ++k) {
+      BOCST_UNROLL
+      for (std::size_t c = 0; c < 3; ++c) {
+        auto x =
+            hn::MulAdd(hn::Set(dd, place.linear[c][0]), hn::Load(dd, raw.xyz[3 * k] + i), hn::Set(dd, place.offset[c]));
+        x = hn::MulAdd(hn::Set(dd, place.linear[c][1]), hn::Load(dd, raw.xyz[3 * k + 1] + i), x);
+        x = hn::MulAdd(hn::Set(dd, place.linear[c][2]), hn::Load(dd, raw.xyz[3 * k + 2] + i), x);
+        const auto f = hn::DemoteTo(df, x);
+        hn::Store(f, df, pack.xyz[3 * k + c] + i);
+        size = hn::Max(size, hn::Abs(f));
+      }
+    }
+  }
+  pack.size = hn::GetLane(hn::MaxOfLanes(df, size));
+}
+
+std::uint32_t BoundTriangles(const RawTriangles& raw, std::uint32_t which, const PackTransform& place, double unit,
+                             double far, RawTriangles& placed, TriangleBounds& bounds) {
+  const hn::CappedTag<double, 8> dd;
+  const hn::Rebind<float, decltype(dd)> df;
+  using VD = hn::Vec<decltype(dd)>;
+  const VD most = hn::Set(dd, far), least = hn::Set(dd, -far), scale = hn::Set(dd, unit);
+  const auto put = [&](VD x, float* to)
+                       HWY_ATTR { hn::Store(hn::DemoteTo(df, hn::Min(hn::Max(x, least), most)), df, to); };
+  const std::uint32_t lanes = (1u << hn::Lanes(dd)) - 1;
+  std::uint32_t done = 0;
+  for (std::size_t i = 0; i < TriangleBounds::kCapacity; i += hn::Lanes(dd)) {
+    if ((which >> i & lanes) == 0) continue;
+    done |= lanes << i;
+    Vec3Of<VD> v[3];
+    BOCST_UNROLL
+    for (std::size_t k = 0; k < 3; ++k) {
+      const VD from[3] = {hn::Load(dd, raw.xyz[3 * k] + i), hn::Load(dd, raw.xyz[3 * k + 1] + i),
+                          hn::Load(dd, raw.xyz[3 * k + 2] + i)};
+      VD at[3];
+      BOCST_UNROLL
+      for (std::size_t c = 0; c < 3; ++c) {
+        at[c] = hn::MulAdd(hn::Set(dd, place.linear[c][0]), from[0], hn::Set(dd, place.offset[c]));
+        at[c] = hn::MulAdd(hn::Set(dd, place.linear[c][1]), from[1], at[c]);
+        at[c] = hn::MulAdd(hn::Set(dd, place.linear[c][2]), from[2], at[c]);
+        hn::Store(at[c], dd, placed.xyz[3 * k + c] + i);
+      }
+      v[k] = scaled(Vec3Of<VD>{at[0], at[1], at[2]}, scale);
+    }
+    put(min3(v[0].x, v[1].x, v[2].x), bounds.low[0] + i);
+    put(min3(v[0].y, v[1].y, v[2].y), bounds.low[1] + i);
+    put(min3(v[0].z, v[1].z, v[2].z), bounds.low[2] + i);
+    put(max3(v[0].x, v[1].x, v[2].x), bounds.high[0] + i);
+    put(max3(v[0].y, v[1].y, v[2].y), bounds.high[1] + i);
+    put(max3(v[0].z, v[1].z, v[2].z), bounds.high[2] + i);
+
+    // A direction as floats of unit sum, and as these are in double.
+    const auto direction = [&](Vec3Of<VD> along, float(*to)[TriangleBounds::kCapacity]) HWY_ATTR {
+      const VD size = hn::Add(hn::Add(hn::Abs(along.x), hn::Abs(along.y)), hn::Abs(along.z));
+      const auto is = hn::And(hn::Gt(size, hn::Set(dd, 1e-100)), hn::Lt(size, hn::Set(dd, 1e100)));
+      const VD by = hn::IfThenElseZero(is, hn::Div(hn::Set(dd, 1.0), size));
+      const Vec3Of<VD> n = scaled(along, by);
+      const auto x = hn::DemoteTo(df, n.x), y = hn::DemoteTo(df, n.y), z = hn::DemoteTo(df, n.z);
+      hn::Store(x, df, to[0] + i);
+      hn::Store(y, df, to[1] + i);
+      hn::Store(z, df, to[2] + i);
+      return Vec3Of<VD>{hn::PromoteTo(dd, x), hn::PromoteTo(dd, y), hn::PromoteTo(dd, z)};
+    };
+    const Vec3Of<VD> e[3] = {sub(v[1], v[0]), sub(v[2], v[1]), sub(v[0], v[2])};
+    const Vec3Of<VD> across = cross(e[0], e[1]), n = direction(across, bounds.normal);
+    const VD n0 = dot(n, v[0]), n1 = dot(n, v[1]), n2 = dot(n, v[2]);
+    put(min3(n0, n1, n2), bounds.normal_low + i);
+    put(max3(n0, n1, n2), bounds.normal_high + i);
+    BOCST_UNROLL
+    for (std::size_t k = 0; k < 3; ++k) {
+      const Vec3Of<VD> out = direction(cross(e[k], across), bounds.edge[k]);
+      put(max3(dot(out, v[0]), dot(out, v[1]), dot(out, v[2])), bounds.edge_high[k] + i);
+    }
+  }
+  return done;
+}
+
+std::uint32_t TrianglesWithin(const TrianglePack& pack, const PackRegion& region) {
+  const D d;
+  std::uint32_t result = 0;
+  for (std::size_t i = 0; i < pack.count; i += hn::Lanes(d)) {
+    const Vec3 v[3] = {corner(pack, 0, i), corner(pack, 1, i), corner(pack, 2, i)};
+    const Vec3 lo = min3(v), hi = max3(v), n = broadcast(region.normal[0], region.normal[1], region.normal[2]);
+    const V along[3] = {dot(n, v[0]), dot(n, v[1]), dot(n, v[2])};
+    M in = hn::And(hn::Le(lo.x, hn::Set(d, region.high[0])), hn::Ge(hi.x, hn::Set(d, region.low[0])));
+    in = hn::And(in, hn::And(hn::Le(lo.y, hn::Set(d, region.high[1])), hn::Ge(hi.y, hn::Set(d, region.low[1]))));
+    in = hn::And(in, hn::And(hn::Le(lo.z, hn::Set(d, region.high[2])), hn::Ge(hi.z, hn::Set(d, region.low[2]))));
+    in = hn::And(in, hn::And(hn::Le(min3(along[0], along[1], along[2]), hn::Set(d, region.slab_high)),
+                             hn::Ge(max3(along[0], along[1], along[2]), hn::Set(d, region.slab_low))));
+    result |= maskBits(in) << i;
+  }
+  return pack.count < 32 ? result & ((1u << pack.count) - 1) : result;
+}
+
+void MoveTriangles(const TrianglePack& pack, std::uint32_t which, const PackMotion& motion, TrianglePack& moved) {
+  const D d;
+  moved.count = 0;
+  for (std::size_t i = 0; i < pack.count; i += hn::Lanes(d)) {
+    // Those wanted to the front. (Highway's Compress may be slow: with AVX2 it copies its table at each use.)
+    alignas(32) std::int32_t from[8] = {};
+    std::size_t count = 0;
+    for (std::uint32_t left = which >> i & ((1u << hn::Lanes(d)) - 1); left != 0; left &= left - 1) {
+      from[count++] = __builtin_ctz(left);
+    }
+    if (count == 0) continue;
+    const auto order = hn::SetTableIndices(d, from);
+    BOCST_UNROLL
+    for (std::size_t k = 0; k < 3; ++k) {
+      const Vec3 v = corner(pack, k, i);
+      BOCST_UNROLL
+      for (std::size_t c = 0; c < 3; ++c) {
+        V x = hn::MulAdd(hn::Set(d, motion.linear[c][0]), v.x, hn::Set(d, motion.offset[c]));
+        x = hn::MulAdd(hn::Set(d, motion.linear[c][1]), v.y, x);
+        x = hn::MulAdd(hn::Set(d, motion.linear[c][2]), v.z, x);
+        // Whole vectors are written, but never beyond the place where they were read.
+        hn::StoreU(hn::TableLookupLanes(x, order), d, moved.xyz[3 * k + c] + moved.count);
+      }
+    }
+    moved.count += count;
+  }
+  float square = 0, offset = 0;
+  for (int c = 0; c < 3; ++c) {
+    const float(&r)[3] = motion.linear[c];
+    square = std::max(square, r[0] * r[0] + r[1] * r[1] + r[2] * r[2]);
+    offset = std::max(offset, std::abs(motion.offset[c]));
+  }
+  moved.size = (std::sqrt(3 * square) * pack.size + offset) * 1.0001f;
+}
+
+// The corner of a triangle that is alone on its side of a plane, and its edges; `above` as the corners are over it.
+struct Fork {
+  Vec3 corner, edge[2];
+};
+
+HWY_INLINE Fork forkOf(const Vec3 (&t)[3], V above0, V above1, V above2) {
+  const V zero = hn::Zero(D());
+  const M below = hn::Lt(above0, zero);
+  const M other1 = hn::Xor(below, hn::Lt(above1, zero)), other2 = hn::Xor(below, hn::Lt(above2, zero));
+  const M alone1 = hn::AndNot(other2, other1), alone2 = hn::AndNot(other1, other2);
+  const Vec3 corner = choose(alone1, t[1], choose(alone2, t[2], t[0]));
+  // The others: that after it comes in place 0 or 1 of two, either will do.
+  return {corner, {sub(choose(alone1, t[0], t[1]), corner), sub(choose(alone2, t[0], t[2]), corner)}};
+}
+
+// Triangles of a pack, those wanted one after the other, and their boxes as far as they matter.
+struct PickedRows {
+  alignas(64) float xyz[9][TrianglePack::kCapacity];
+  alignas(64) float low[3][TrianglePack::kCapacity], high[3][TrianglePack::kCapacity];
+  std::uint8_t row[TrianglePack::kCapacity];
+  std::size_t count = 0;
+};
+
+HWY_INLINE void pickRows(const TrianglePack& rows, std::uint32_t which, const PackRegion& region, V extent,
+                         PickedRows& picked) {
+  const D d;
+  for (std::size_t i = 0; i < rows.count; i += hn::Lanes(d)) {
+    const std::uint32_t wanted = which >> i & ((1u << hn::Lanes(d)) - 1);
+    if (wanted == 0) continue;
+    alignas(32) std::int32_t from[8] = {};
+    std::size_t count = 0;
+    for (std::uint32_t left = wanted; left != 0; left &= left - 1) {
+      const int lane = __builtin_ctz(left);
+      picked.row[picked.count + count] = static_cast<std::uint8_t>(i + static_cast<std::size_t>(lane));
+      from[count++] = lane;
+    }
+    const auto order = hn::SetTableIndices(d, from);
+    // Whole vectors are written, but never beyond the place where they were read.
+    BOCST_UNROLL
+    for (std::size_t k = 0; k < 9; ++k) {
+      hn::StoreU(hn::TableLookupLanes(hn::Load(d, rows.xyz[k] + i), order), d, picked.xyz[k] + picked.count);
+    }
+    picked.count += count;
+  }
+  for (std::size_t i = 0; i < picked.count; i += hn::Lanes(d)) {
+    BOCST_UNROLL
+    for (int c = 0; c < 3; ++c) {
+      const V a = hn::Load(d, picked.xyz[c] + i), b = hn::Load(d, picked.xyz[3 + c] + i),
+              e = hn::Load(d, picked.xyz[6 + c] + i);
+      const V low = hn::Max(min3(a, b, e), hn::Set(d, region.low[c]));
+      const V high = hn::Min(max3(a, b, e), hn::Set(d, region.high[c]));
+      hn::Store(hn::Sub(low, extent), d, picked.low[c] + i);
+      hn::Store(hn::Add(high, extent), d, picked.high[c] + i);
+    }
+  }
+}
+
+std::size_t TouchingPairs(const TrianglePack& rows, std::uint32_t which, const TrianglePack& lanes,
+                          const PackRegion& region, float tolerance, PackPair* pairs) {
+  const D d;
+  const hn::RebindToSigned<D> di;
+  constexpr std::size_t kMost = hn::MaxLanes(D());
+  const float size = std::max(rows.size, lanes.size) * 1.0001f, u = 0x1p-24f;
+  const float moved = 25 * u * size + tolerance;
+  const V extent = hn::Set(d, 64 * u * size + tolerance);
+  const V tiny = hn::Set(d, 1e-30f);  // products below have lost bits
+  std::size_t found = 0;
+  PickedRows picked;
+  pickRows(rows, which, region, extent, picked);
+  for (std::size_t i = 0; i < lanes.count; i += hn::Lanes(d)) {
+    const std::uint32_t filled = lanes.count - i < hn::Lanes(d) ? (1u << (lanes.count - i)) - 1 : 0xff;
+    const Vec3 lane_corner[3] = {corner(lanes, 0, i), corner(lanes, 1, i), corner(lanes, 2, i)};
+    const Vec3 qmin = min3(lane_corner), qmax = max3(lane_corner);
+    for (std::size_t j = 0; j < picked.count; j += hn::Lanes(d)) {
+      // Pairs whose boxes meet, eight bits a row: one of them in three or four, so they are gathered before what costs
+      // more.
+      std::uint64_t meeting = 0;
+      const std::size_t end = std::min(hn::Lanes(d), picked.count - j);
+      for (std::size_t r = 0; r < end; ++r) {
+        M near = hn::And(hn::Le(qmin.x, hn::Set(d, picked.high[0][j + r])),
+                         hn::Ge(qmax.x, hn::Set(d, picked.low[0][j + r])));
+        near = hn::And(near, hn::And(hn::Le(qmin.y, hn::Set(d, picked.high[1][j + r])),
+                                     hn::Ge(qmax.y, hn::Set(d, picked.low[1][j + r]))));
+        near = hn::And(near, hn::And(hn::Le(qmin.z, hn::Set(d, picked.high[2][j + r])),
+                                     hn::Ge(qmax.z, hn::Set(d, picked.low[2][j + r]))));
+        meeting |= std::uint64_t{maskBits(near) & filled} << 8 * r;
+      }
+      if (meeting == 0) continue;
+      alignas(64) std::int32_t which_pair[kMost * 8 + kMost];
+      std::size_t count = 0;
+      for (; meeting != 0; meeting &= meeting - 1) which_pair[count++] = __builtin_ctzll(meeting);
+      hn::StoreU(hn::Zero(di), di, which_pair + count);
+
+      for (std::size_t at = 0; at < count; at += hn::Lanes(d)) {
+        const auto pair = hn::Load(di, which_pair + at);
+        const auto row = hn::IndicesFromVec(d, hn::ShiftRight<3>(pair));
+        const auto lane = hn::IndicesFromVec(d, hn::And(pair, hn::Set(di, 7)));
+        Vec3 p[3], q[3];
+        BOCST_UNROLL
+        for (std::size_t k = 0; k < 3; ++k) {
+          p[k] = {hn::TableLookupLanes(hn::Load(d, picked.xyz[3 * k] + j), row),
+                  hn::TableLookupLanes(hn::Load(d, picked.xyz[3 * k + 1] + j), row),
+                  hn::TableLookupLanes(hn::Load(d, picked.xyz[3 * k + 2] + j), row)};
+          q[k] = {hn::TableLookupLanes(lane_corner[k].x, lane), hn::TableLookupLanes(lane_corner[k].y, lane),
+                  hn::TableLookupLanes(lane_corner[k].z, lane)};
+        }
+        M near = hn::FirstN(d, count - at);
+        const Vec3 f[3] = {sub(q[1], q[0]), sub(q[2], q[1]), sub(q[0], q[2])};
+        const Vec3 m = cross(f[0], f[1]);
+        const V flong = hn::Sqrt(max3(dot(f[0], f[0]), dot(f[1], f[1]), dot(f[2], f[2])));
+        // The products of a normal are at most the product of the edges' sizes.
+        const V m_margin = hn::MulAdd(extent, hn::MulAdd(norm1(f[0]), norm1(f[1]), norm1(m)), tiny);
+        const Vec3 e[3] = {sub(p[1], p[0]), sub(p[2], p[1]), sub(p[0], p[2])};
+        const Vec3 n = cross(e[0], e[1]);
+        const V elong = hn::Sqrt(max3(dot(e[0], e[0]), dot(e[1], e[1]), dot(e[2], e[2])));
+        const V n_margin = hn::MulAdd(extent, hn::MulAdd(norm1(e[0]), norm1(e[1]), norm1(n)), tiny);
+        const Vec3 w[3] = {sub(q[0], p[0]), sub(q[1], p[0]), sub(q[2], p[0])};
+        const V n0 = dot(n, w[0]), n1 = dot(n, w[1]), n2 = dot(n, w[2]);
+        const V m0 = dot(m, sub(p[0], q[0])), m1 = dot(m, sub(p[1], q[0])), m2 = dot(m, sub(p[2], q[0]));
+        // How far the one reaches to the nearer side of the other's plane.
+        const V by_n = hn::Min(max3(n0, n1, n2), hn::Neg(min3(n0, n1, n2)));
+        const V by_m = hn::Min(max3(m0, m1, m2), hn::Neg(min3(m0, m1, m2)));
+        near = hn::And(near, hn::And(hn::Ge(by_n, hn::Neg(n_margin)), hn::Ge(by_m, hn::Neg(m_margin))));
+        if (hn::AllFalse(d, near)) continue;
+
+        // How far the determinants below may be off: those with a plane's normal, and those of an edge of each.
+        const V span = hn::Add(elong, hn::Sqrt(max3(dot(w[0], w[0]), dot(w[1], w[1]), dot(w[2], w[2]))));
+        const V span4 = hn::Mul(hn::Set(d, 4.0f), span), moves = hn::Set(d, 1.125f * moved),
+                rounds = hn::Set(d, 42 * u);
+        const V n_off = hn::MulAdd(hn::Mul(elong, hn::MulAdd(rounds, elong, moves)), hn::Add(span4, elong), tiny);
+        const V m_off = hn::MulAdd(hn::Mul(flong, hn::MulAdd(rounds, flong, moves)), hn::Add(span4, flong), tiny);
+        const V longer = hn::Max(elong, flong), shorter = hn::Min(elong, flong);
+        const V edges_off = hn::MulAdd(hn::Mul(longer, hn::MulAdd(rounds, shorter, moves)),
+                                       hn::Add(hn::Add(span, span), shorter), tiny);
+        M clear = hn::Gt(min3(hn::Abs(n0), hn::Abs(n1), hn::Abs(n2)), n_off);
+        clear = hn::And(clear, hn::Gt(min3(hn::Abs(m0), hn::Abs(m1), hn::Abs(m2)), m_off));
+        clear = hn::And(clear, hn::Gt(shorter, hn::Set(d, 64 * moved)));
+
+        // Each cuts the other's plane with the edges from its corner that is alone on its side, in an interval of the
+        // line of both planes. Where an end of the one lies to an end of the other, the determinant of these edges
+        // says; the intervals share no point when all ends of the one lie to one side of all of the other.
+        const Fork fp = forkOf(p, m0, m1, m2), fq = forkOf(q, n0, n1, n2);
+        const Vec3 between = sub(fq.corner, fp.corner), c0 = cross(between, fp.edge[0]),
+                   c1 = cross(between, fp.edge[1]);
+        const V d00 = dot(c0, fq.edge[0]), d01 = dot(c0, fq.edge[1]), d10 = dot(c1, fq.edge[0]),
+                d11 = dot(c1, fq.edge[1]);
+        const V low = hn::Min(hn::Min(d00, d01), hn::Min(d10, d11)),
+                high = hn::Max(hn::Max(d00, d01), hn::Max(d10, d11));
+        const M beside = hn::Or(hn::Gt(low, edges_off), hn::Lt(high, hn::Neg(edges_off)));
+        const M across = hn::And(hn::Lt(low, hn::Neg(edges_off)), hn::Gt(high, edges_off));
+        const M cut = hn::Gt(hn::Min(by_n, by_m), hn::Zero(d));
+        const std::uint32_t bits = maskBits(hn::AndNot(hn::And(clear, hn::Or(hn::Not(cut), beside)), near));
+        const std::uint32_t certain = maskBits(hn::And(clear, hn::And(cut, across)));
+        for (std::uint32_t k = bits; k != 0; k &= k - 1) {
+          const auto in = static_cast<std::size_t>(__builtin_ctz(k));
+          const auto met = static_cast<std::size_t>(which_pair[at + in]);
+          pairs[found++] = {picked.row[j + met / 8], static_cast<std::uint8_t>(i + met % 8), (certain >> in & 1) != 0};
+        }
+      }
+    }
+  }
+  return found;
+}
+
+}  // namespace bocst::query::HWY_NAMESPACE
+HWY_AFTER_NAMESPACE();
+
+#if HWY_ONCE
+namespace bocst::query {
+
+HWY_EXPORT(OverlappingOctants);
+HWY_EXPORT(PlaceTriangles);
+HWY_EXPORT(BoundTriangles);
+HWY_EXPORT(TrianglesWithin);
+HWY_EXPORT(MoveTriangles);
+HWY_EXPORT(TouchingPairs);
+
+std::uint8_t overlappingOctants(const oracle::OctantBounds& octants, const OneVolume& volume) {
+  return HWY_DYNAMIC_DISPATCH(OverlappingOctants)(octants, volume);
+}
+
+void placeTriangles(RawTriangles& raw, std::size_t count, const PackTransform& place, TrianglePack& pack) {
+  HWY_DYNAMIC_DISPATCH(PlaceTriangles)(raw, count, place, pack);
+}
+
+std::uint32_t boundTriangles(const RawTriangles& raw, std::uint32_t which, const PackTransform& place, double unit,
+                             double far, RawTriangles& placed, TriangleBounds& bounds) {
+  return HWY_DYNAMIC_DISPATCH(BoundTriangles)(raw, which, place, unit, far, placed, bounds);
+}
+
+std::uint32_t trianglesWithin(const TrianglePack& pack, const PackRegion& region) {
+  return HWY_DYNAMIC_DISPATCH(TrianglesWithin)(pack, region);
+}
+
+void moveTriangles(const TrianglePack& pack, std::uint32_t which, const PackMotion& motion, TrianglePack& moved) {
+  HWY_DYNAMIC_DISPATCH(MoveTriangles)(pack, which, motion, moved);
+}
+
+std::size_t touchingPairs(const TrianglePack& rows, std::uint32_t which, const TrianglePack& lanes,
+                          const PackRegion& region, float tolerance, PackPair* pairs) {
+  return HWY_DYNAMIC_DISPATCH(TouchingPairs)(rows, which, lanes, region, tolerance, pairs);
+}
+
+}  // namespace bocst::query
+#endif

@@ -1,0 +1,117 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#pragma once
+
+#include <cstddef>
+#include <cstdint>
+
+#include "oracle/oracle.h"
+
+namespace bocst::query {
+
+/// One node's volume seen from the eight octants of another: box AND slab, in coordinates with the minimum corner of
+/// the other's cell at the origin and the side of its octants as unit.
+struct OneVolume {
+  float center[3];         ///< Of the box.
+  const float (*axes)[3];  ///< axes[j]: unit vector of box axis j.
+  float half[3];           ///< Half extents along axes[j].
+  float normal[3];         ///< Of the slab, about unit length; zero: no slab.
+  float slab_offset;       ///< Middle of the slab along normal, from center.
+  float slab_half;         ///< Half its thickness.
+  float rounding_margin;   ///< Covers all rounding, see separatedOctants().
+};
+
+/// Bit o is set unless octant o is surely separated from the volume, by one of eight axes: the faces of both boxes, the
+/// slab normal of the octant and that of the volume. No edge axes: with slabs they gain nothing.
+///
+/// Every axis projects with sums of at most 24 terms, each rounded at most 4 times and, with Q = |center|_1 + |half|_1
+/// + |slab_offset| + slab_half + 4, at most Q in size; so an error is at most 96 Q 2^-24 and volumes must be given with
+/// rounding margin >= 128 Q 2^-24, to which the caller adds what its own coordinates are off by.
+std::uint8_t overlappingOctants(const oracle::OctantBounds& octants, const OneVolume& volume);
+
+/// Corners of up to kCapacity triangles as structure of arrays, in one frame, near the origin.
+struct TrianglePack {
+  static constexpr std::size_t kCapacity = 32;
+  alignas(64) float xyz[9][kCapacity];  ///< Coordinate c of corner k at [3 * k + c].
+  std::size_t count = 0;
+  float size = 0;  ///< Largest coordinate, in absolute value.
+};
+
+/// Corners as given, to be placed: coordinate c of corner k at [3 * k + c].
+struct RawTriangles {
+  alignas(64) double xyz[9][TrianglePack::kCapacity];
+};
+
+/// Corners are linear * v + offset: computed in double, rounded once.
+struct PackTransform {
+  double linear[3][3];
+  double offset[3];
+};
+
+/// Fills the pack with `count` triangles, 1 to kCapacity. What is in `raw` beyond is overwritten.
+void placeTriangles(RawTriangles& raw, std::size_t count, const PackTransform& place, TrianglePack& pack);
+
+/// Where up to TrianglePack::kCapacity triangles are, for tests against boxes that are not larger than them: between
+/// two bounds along each axis, along their normals, and behind their edges in their planes.
+///
+/// Directions are rounded to float first and the bounds computed along what they are then, so whatever a direction is,
+/// its bounds hold. The sum of its entries' sizes is 1, or 0 where there is none.
+struct TriangleBounds {
+  static constexpr std::size_t kCapacity = TrianglePack::kCapacity;
+  alignas(64) float low[3][kCapacity], high[3][kCapacity];
+  float normal[3][kCapacity], normal_low[kCapacity], normal_high[kCapacity];
+  float edge[3][3][kCapacity], edge_high[3][kCapacity];  ///< [edge]: out of the triangle; [axis].
+};
+
+/// Places at least those triangles in `which`, in double, and finds the bounds of what is placed, times `unit`, cut off
+/// at `far`. `raw` must have been placed in a pack. Returns which triangles are done; the places of others may be, too.
+std::uint32_t boundTriangles(const RawTriangles& raw, std::uint32_t which, const PackTransform& place, double unit,
+                             double far, RawTriangles& placed, TriangleBounds& bounds);
+
+/// Where triangles of a pack can meet those of another leaf: a box and a slab, all in the pack's frame and padded.
+struct PackRegion {
+  float low[3], high[3];
+  float normal[3];            ///< Of the slab; zero: no slab.
+  float slab_low, slab_high;  ///< Along normal.
+};
+
+/// Bit i is set unless triangle i is surely outside of the region.
+std::uint32_t trianglesWithin(const TrianglePack& pack, const PackRegion& region);
+
+/// Corners are linear * v + offset, in float.
+struct PackMotion {
+  float linear[3][3];
+  float offset[3];
+};
+
+/// Fills `moved` with the triangles of `pack` in `which`, in that order. With s the largest sum of squares in a row of
+/// linear, rooted, its size is at least B = sqrt(3) s pack.size + |offset|, and corners are off by no more than 6 u B:
+/// the coordinates given, linear, offset and three sums of products.
+void moveTriangles(const TrianglePack& pack, std::uint32_t which, const PackMotion& motion, TrianglePack& moved);
+
+/// Two triangles that may touch, as positions in their packs.
+struct PackPair {
+  std::uint8_t row, lane;
+  bool certain;  ///< They surely meet.
+};
+
+/// Writes the pairs (a triangle of rows, of those in `which`, and a triangle of lanes) that are not surely apart, by
+/// their boxes, their planes and where they cut the line of both planes; at most rows.count * lanes.count. Returns how
+/// many. What the rows have outside of the box of `region` is not looked at. `tolerance` is a distance that still
+/// counts as touching: what the caller's coordinates are off by.
+///
+/// With M the larger size of the packs and u = 2^-24, corners are off by 6 u M along each axis.
+///
+/// Boxes and planes part alone: along a plane's normal, corners and the dot products' rounding are off by 34 u M times
+/// its length, and the equation by 12 u M times the sizes of its products before they cancel. The rounding margin is 64
+/// u M + tolerance times those sizes.
+///
+/// Else a pair is certain to meet, or to be apart, when it is however the corners of both were moved, by s = 25 u M +
+/// tolerance in sum. Let E and F be the longest edges, each more than 64 s, G the longer, W no less than a way between
+/// corners. Determinants of two edges of one triangle and a way change by s (4 E W + E^2) to first order, those of an
+/// edge of each and a way by s (2 G W + E F), and both by less than a tenth more; rounding is 42 u times the three
+/// lengths. Where the former are more, all corners are on known sides of the other's plane; so are the ends of the
+/// intervals in which the two cut the line of both planes to each other, by the latter.
+std::size_t touchingPairs(const TrianglePack& rows, std::uint32_t which, const TrianglePack& lanes,
+                          const PackRegion& region, float tolerance, PackPair* pairs);
+
+}  // namespace bocst::query

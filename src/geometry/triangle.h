@@ -1,0 +1,45 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#pragma once
+
+#include <Eigen/Core>
+#include <cstdint>
+
+#include "geometry/penetration_kernels.h"
+
+namespace bocst::query {
+
+using Corners = Eigen::Vector3d[3];
+
+/// Where two primitives touch: unit normal from the first to the second, depth >= 0 such that moving the second by
+/// depth * normal ends the overlap, and a point midway in it.
+struct ContactPoint {
+  Eigen::Vector3d normal = Eigen::Vector3d::UnitX();
+  Eigen::Vector3d point = Eigen::Vector3d::Zero();
+  double depth = 0;
+};
+
+/// The shortest way to part two triangles that touch: the separating axis (face normals, edge cross products, in-plane
+/// edge normals) with the least overlap. point is the middle of the segment in which they cut, of the overlap of their
+/// boxes when they are coplanar or degenerate, or between their nearest points when they do not meet.
+ContactPoint trianglePenetrations(const Corners& p, const Corners& q);
+
+/// What the depths of many pairs say, a bit each: whether FCL's test surely finds that they meet, or that they do not.
+struct PenetrationVerdicts {
+  std::uint32_t meet, apart;
+};
+
+/// The same for many pairs at once, whether they touch or not; touches has room for pairs.count. `tolerance` is a
+/// length that corners may be off by without that meet or apart is wrong.
+PenetrationVerdicts trianglePenetrations(const TrianglePairs& pairs, double tolerance, ContactPoint* contacts);
+
+/// The point of a closed triangle, degenerate or not, that is nearest to x.
+Eigen::Vector3d closestPoint(const Eigen::Vector3d& x, const Corners& triangle);
+
+/// Has the triangle no area, up to rounding of its own corners?
+bool isDegenerate(const Corners& triangle);
+
+/// The distance between two closed triangles, degenerate or not, 0 where they cross, and a point of each that is as
+/// near to the other.
+double nearestPoints(const Corners& p, const Corners& q, Eigen::Vector3d& on_p, Eigen::Vector3d& on_q);
+
+}  // namespace bocst::query

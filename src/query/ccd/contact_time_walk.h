@@ -1,0 +1,372 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#pragma once
+
+#include <algorithm>
+#include <cmath>
+#include <cstddef>
+#include <limits>
+#include <type_traits>
+#include <vector>
+
+#include "geometry/convex_shape.h"
+#include "geometry/extent.h"
+#include "geometry/motion.h"
+#include "geometry/triangle.h"
+#include "query/distance/best_first.h"
+#include "query/sides/side.h"
+
+namespace bocst::query {
+
+/// What counts as contact of two bodies that move, and how well its time must be known.
+struct ContactGoal {
+  double margin = 0;      ///< What is no farther than this touches.
+  double rounding = 0;    ///< And what is no farther than margin + rounding, for the sake of rounding; more than 0.
+  double time_error = 0;  ///< The answer may be earlier than the contact by so much.
+};
+
+/// When do two moving sides first touch? Conservative advancement, for each pair of nodes by itself: apart by a gap
+/// along a direction, they cannot touch before the gap is closed at the largest speed along it that any of their points
+/// can have. Best first by that time, so a pair is looked at again at the time when it might touch, and only its parts
+/// from there on. No contact is stepped over, whatever the motions are.
+///
+/// Where leaves of side B are solid bodies (B::kBodies), what is inside one touches it.
+///
+/// All in world coordinates, in the unit of the meshes.
+template <typename A, typename B>
+class ContactTimeWalk : private BestFirst<ContactTimeWalk<A, B>, A, B> {
+ public:
+  /// `a_in_body` and `b_in_body` lead from the sides' frames to those of the bodies that the motions are about, without
+  /// turning.
+  ContactTimeWalk(const A& a, const SimilarityTransform& a_in_body, const Motion& motion_a, const B& b,
+                  const SimilarityTransform& b_in_body, const Motion& motion_b)
+      : Base(a, b, scratch()), a_in_body_(a_in_body), b_in_body_(b_in_body), motion_a_(motion_a), motion_b_(motion_b) {}
+
+  /// The time of the first contact, at most goal.time_error too early and never too late; infinite without contact.
+  double run(const ContactGoal& goal) {
+    goal_ = goal;
+    first_ = std::numeric_limits<double>::infinity();
+    at(0);
+    this->search();
+    return first_;
+  }
+
+ private:
+  using Base = BestFirst<ContactTimeWalk<A, B>, A, B>;
+  friend Base;
+  using Pair = typename Base::Pair;
+  using Base::a_;
+  using Base::b_;
+  using Base::push;
+  using Base::spheres;
+
+  // A pair that can be put off by this much is looked at again before its parts are.
+  static constexpr double kWorthWaiting = 1.0 / 64;
+
+  // How far two leaves go between two looks at their primitives, in their sizes; but for so long at least.
+  static constexpr double kShareOfLeaves = 0.25, kLeastWindow = 1e-6;
+
+  static constexpr double kFar = std::numeric_limits<double>::infinity();
+
+  // Unit directions are off by less.
+  static constexpr double kBlur = 1e-15;
+
+  struct Primitive {
+    Corners corners;
+    std::size_t count = 0;  // 3: a triangle, 1: a ball about its first corner
+    double radius = 0;
+  };
+  struct Convex : SweptHull {
+    typename B::Node node;
+  };
+  using PrimitiveOfB = std::conditional_t<B::kBodies, Convex, Primitive>;
+  struct Scratch : Base::Heap {
+    std::vector<Primitive> a;
+    std::vector<PrimitiveOfB> b;
+    std::vector<Eigen::AlignedBox3d> boxes_a, boxes_b;
+  };
+  static Scratch& scratch() {
+    thread_local Scratch s;
+    return s;
+  }
+
+  double contactDistance() const { return goal_.margin + goal_.rounding; }
+  bool worthIt(double time) const { return time <= 1 && time < first_; }
+  bool settled() const { return !(first_ > 0); }
+  double scaleOfB() const { return b_in_body_.scale / a_in_body_.scale; }
+
+  static SimilarityTransform placed(const SimilarityTransform& in_body, const Motion& motion, double time) {
+    const Eigen::Isometry3d X = motion.at(time);
+    SimilarityTransform p;
+    p.rotation = X.linear();
+    p.scale = in_body.scale;
+    p.translation = X * in_body.translation;
+    return p;
+  }
+
+  void at(double time) {
+    if (time == now_) return;
+    now_ = time;
+    a_in_world_ = placed(a_in_body_, motion_a_, time);
+    b_in_world_ = placed(b_in_body_, motion_b_, time);
+    if constexpr (B::kBodies) world_in_b_ = b_in_world_.inverse();
+  }
+
+  // The time at which a gap along a direction, between what lies in two balls, may be closed.
+  double timeToClose(double gap, const Eigen::Vector3d& direction, const Eigen::Vector3d& center_a, double radius_a,
+                     const Eigen::Vector3d& center_b, double radius_b) const {
+    return advanced(gap, motion_a_.closingSpeed(direction, kBlur, center_a, radius_a, now_) +
+                             motion_b_.closingSpeed(-direction, kBlur, center_b, radius_b, now_));
+  }
+
+  double advanced(double gap, const ClosingSpeed& closing_speed) const {
+    return gap > 0 ? now_ + closing_speed.timeFor(gap) * (1 - 1e-12) : now_;
+  }
+
+  double boundOf(const NodeExtent& a, const NodeExtent& b) const {
+    const Eigen::Vector3d t = b.center - a.center;
+    const double apart = t.norm(), radius_a = a.half.norm(), radius_b = b.half.norm();
+    const double rounding_margin = 1e-12 * (apart + radius_a + radius_b) + contactDistance();
+    double best = now_;
+    const auto consider = [&](Eigen::Vector3d direction) {
+      double lo_a, hi_a, lo_b, hi_b, along = direction.dot(t);
+      if (along < 0) {
+        direction = -direction;
+        along = -along;
+      }
+      a.along(direction, lo_a, hi_a);
+      b.along(direction, lo_b, hi_b);
+      const double gap = along + lo_b - hi_a - rounding_margin;
+      if (gap > 0) best = std::max(best, timeToClose(gap, direction, a.center, radius_a, b.center, radius_b));
+      return !worthIt(best);
+    };
+    if (apart > 0 && consider(t / apart)) return best;
+    const Eigen::Matrix3d s = (a.axes.transpose() * b.axes).cwiseAbs();
+    const Eigen::Vector3d in_a = a.axes.transpose() * t, in_b = b.axes.transpose() * t;
+    const Eigen::Vector3d gap_a = (in_a.cwiseAbs() - a.half - s * b.half).cwiseMax(0);
+    const Eigen::Vector3d gap_b = (in_b.cwiseAbs() - b.half - s.transpose() * a.half).cwiseMax(0);
+    // Where boxes are apart on several of a box's axes, the way between them is a mixture of these.
+    const double length_a = gap_a.norm(), length_b = gap_b.norm();
+    if (length_a > 0 && consider(a.axes * (gap_a.cwiseProduct(in_a.cwiseSign()) / length_a))) return best;
+    if (length_b > 0 && consider(b.axes * (gap_b.cwiseProduct(in_b.cwiseSign()) / length_b))) return best;
+    for (const NodeExtent* n : {&a, &b}) {
+      const double length = n->normal.norm();
+      if (length > 0 && consider(n->normal / length)) break;
+    }
+    return best;
+  }
+
+  // Two balls stay apart as long as their middles do: turning does not matter to a ball.
+  double boundOf(const Sphere& a, const Sphere& b) const {
+    const Eigen::Vector3d t = b.center - a.center;
+    const double apart = t.norm();
+    const double gap = apart * (1 - 1e-12) - (a.radius + b.radius) * (1 + 1e-12) - contactDistance();
+    return gap > 0 ? timeToClose(gap, t / apart, a.center, 0, b.center, 0) : now_;
+  }
+
+  // What lies in a ball and a node of bodies, apart by a gap of the ball's middle or of other points in it.
+  double boundOf(const SeparationResult& gap, double radius, const Sphere& ball, double radius_of_turn,
+                 const Convex& b) const {
+    const double far = gap.atLeast * b_in_world_.scale;
+    const double free = far * (1 - 1e-12) - radius * (1 + 1e-12) - contactDistance();
+    if (!(free > 0)) return now_;
+    const Eigen::Vector3d direction = -(b_in_world_.rotation * gap.normal);
+    return advanced(free, motion_a_.closingSpeed(direction, kBlur, ball.center, radius_of_turn, now_) +
+                              closingSpeedOf(motion_b_, inWorld(b, b_in_world_), -direction, kBlur, now_));
+  }
+
+  // Of bodies the ball would be a poor bound: they are asked themselves.
+  double boundOf(const Sphere& a, typename B::Node b) const {
+    const Eigen::Vector3d center = world_in_b_ * a.center;
+    return boundOf(b_.gap(b, {&center, 1}, kFar), a.radius, a, 0, convexOf(b));
+  }
+
+  // A body may be much smaller than the box about it.
+  double bodyBound(const Pair& pair) const {
+    const OrientedVolume box = oriented(a_.volume(pair.a));
+    Eigen::Vector3d corners[8];
+    cornersOf(box, a_in_world_, corners);
+    for (Eigen::Vector3d& x : corners) x = world_in_b_ * x;
+    const Sphere ball{a_in_world_ * box.center, box.half.norm() * a_in_world_.scale};
+    return boundOf(b_.gap(pair.b, {corners, 8}, kFar), 0, ball, ball.radius, convexOf(pair.b));
+  }
+
+  Convex convexOf(typename B::Node node) const {
+    Convex convex;
+    static_cast<SweptHull&>(convex) = b_.hull(node);
+    convex.node = node;
+    return convex;
+  }
+
+  NodeExtent reachOfA(typename A::Node n) const { return NodeExtent(a_.volume(n), a_in_world_); }
+  NodeExtent reachOfB(typename B::Node n) const { return NodeExtent(b_.volume(n), b_in_world_); }
+  Sphere ballOfA(typename A::Node n) const { return query::placed(a_.sphere(n), a_in_world_); }
+  auto ballOfB(typename B::Node n) const {
+    if constexpr (B::kBodies) {
+      return n;
+    } else {
+      return query::placed(b_.sphere(n), b_in_world_);
+    }
+  }
+
+  bool again(const Pair& pair) {
+    at(pair.bound);
+    double time = Base::boundOf(pair);
+    if constexpr (B::kBodies) {
+      if (!spheres() && !b_.isBox(pair.b) && worthIt(time)) time = std::max(time, bodyBound(pair));
+    }
+    if (time < now_ + kWorthWaiting) return !worthIt(time);
+    push({time, pair.a, pair.b});
+    return true;
+  }
+
+  // The primitives of a leaf, in the frame of their side.
+  void fill(const B&, typename B::Node node, std::vector<Convex>& out) const { out.assign(1, convexOf(node)); }
+  template <typename Side>
+  void fill(const Side& side, typename Side::Node node, std::vector<Primitive>& out) const {
+    if (side.isConservative()) {
+      const Sphere s = side.cellSphere(node);
+      out.resize(1);
+      out[0].corners[0] = s.center;
+      out[0].count = 1;
+      out[0].radius = s.radius;
+      return;
+    }
+    out.resize(side.triangleCount(node));
+    for (std::size_t i = 0; i < out.size(); ++i) {
+      const std::uint32_t t = side.triangle(node, i);
+      for (int k = 0; k < 3; ++k) out[i].corners[k] = side.corner(t, k);
+      out[i].count = 3;
+      out[i].radius = 0;
+    }
+  }
+
+  // The primitives of two leaves, for as long as these take to go a part of their size: most are too far from each
+  // other for that. Then the pair waits for its next turn.
+  void leaves(const Pair& pair) {
+    Scratch& s = scratch();
+    fill(a_, pair.a, s.a);
+    fill(b_, pair.b, s.b);
+    const Sphere a = boundsOf(s.a, a_in_world_, s.boxes_a), b = boundsOf(s.b, b_in_world_, s.boxes_b);
+    const double speed =
+        motion_a_.fastest(a.center, a.radius, pair.bound) + motion_b_.fastest(b.center, b.radius, pair.bound);
+    const double gap = std::max(0.0, (a.center - b.center).norm() - a.radius - b.radius);
+    const double window =
+        speed > 0 ? std::max(kLeastWindow, (gap + kShareOfLeaves * (a.radius + b.radius)) / speed) : 2;
+    const double until = pair.bound + window;
+    const double near =
+        (window * speed + contactDistance()) * (1 + 1e-12) + 1e-15 * (a.center.norm() + b.center.norm());
+    for (std::size_t i = 0; i < s.a.size(); ++i) {
+      for (std::size_t j = 0; j < s.b.size(); ++j) {
+        if (s.boxes_a[i].squaredExteriorDistance(s.boxes_b[j]) > near * near) continue;
+        first_ = std::min(first_, firstContact(s.a[i], s.b[j], pair.bound, until));
+      }
+    }
+    push({until, pair.a, pair.b});
+  }
+
+  // Boxes of all bodies in the world, and a ball about these.
+  template <typename T>
+  static Sphere boundsOf(const std::vector<T>& primitives, const SimilarityTransform& to,
+                         std::vector<Eigen::AlignedBox3d>& boxes) {
+    boxes.clear();
+    Eigen::AlignedBox3d all;
+    for (const T& primitive : primitives) {
+      const T w = inWorld(primitive, to);
+      Eigen::AlignedBox3d box(w.corners[0]);
+      for (std::size_t k = 1; k < w.count; ++k) box.extend(w.corners[k]);
+      const Eigen::Vector3d r = Eigen::Vector3d::Constant(w.radius);
+      boxes.emplace_back(box.min() - r, box.max() + r);
+      all.extend(boxes.back());
+    }
+    return {all.center(), all.diagonal().norm() / 2};
+  }
+
+  template <typename T>
+  static T inWorld(const T& primitive, const SimilarityTransform& to) {
+    T w = primitive;
+    for (std::size_t k = 0; k < w.count; ++k) w.corners[k] = to * w.corners[k];
+    w.radius *= to.scale;
+    return w;
+  }
+
+  // How far two primitives are apart, and the unit way from p to q.
+  double distanceOf(const Primitive& p, const Primitive& q, Eigen::Vector3d& direction) const {
+    Eigen::Vector3d on_p = p.corners[0], on_q = q.corners[0];
+    if (p.count == 3 && q.count == 3) {
+      nearestPoints(p.corners, q.corners, on_p, on_q);
+    } else if (p.count == 3) {
+      on_p = closestPoint(on_q, p.corners);
+    } else if (q.count == 3) {
+      on_q = closestPoint(on_p, q.corners);
+    }
+    direction = on_q - on_p;
+    const double length = direction.norm();
+    if (length > 0) direction /= length;
+    return std::max(0.0, length - p.radius - q.radius);
+  }
+  double distanceOf(const Primitive& p, const Convex& q, Eigen::Vector3d& direction) const {
+    Corners x;
+    for (std::size_t k = 0; k < p.count; ++k) x[k] = world_in_b_ * p.corners[k];
+    const SeparationResult gap = b_.gap(q.node, {x, static_cast<int>(p.count)}, kFar);
+    direction = -(b_in_world_.rotation * gap.normal);
+    return gap.isTouching() ? 0 : std::max(0.0, gap.atLeast * b_in_world_.scale - p.radius);
+  }
+
+  // Velocities are affine in position, so a hull's extremes are at its corners; a ball goes with its middle.
+  template <typename T>
+  static ClosingSpeed closingSpeedOf(const Motion& motion, const T& primitive, const Eigen::Vector3d& direction,
+                                     double blur, double time) {
+    ClosingSpeed most = motion.closingSpeed(direction, blur, primitive.corners[0], 0, time);
+    for (std::size_t k = 1; k < primitive.count; ++k) {
+      most = ClosingSpeed::most(most, motion.closingSpeed(direction, blur, primitive.corners[k], 0, time));
+    }
+    return most;
+  }
+
+  template <typename T>
+  static double sizeOf(const T& b) {
+    double size = b.radius;
+    for (std::size_t k = 1; k < b.count; ++k) size = std::max(size, (b.corners[k] - b.corners[0]).norm());
+    return size;
+  }
+
+  bool isContact(const Primitive& p, const PrimitiveOfB& q, double time) {
+    at(time);
+    Eigen::Vector3d direction;
+    return distanceOf(inWorld(p, a_in_world_), inWorld(q, b_in_world_), direction) <= contactDistance();
+  }
+
+  // When two convex primitives that do not touch before `time` first do, if before `until`.
+  double firstContact(const Primitive& p, const PrimitiveOfB& q, double time, double until) {
+    while (worthIt(time) && time < until) {
+      at(time);
+      const Primitive pw = inWorld(p, a_in_world_);
+      const PrimitiveOfB qw = inWorld(q, b_in_world_);
+      Eigen::Vector3d direction;
+      const double distance = distanceOf(pw, qw, direction);
+      if (distance <= contactDistance()) return time;
+      // The way is known as well as rounding lets it be.
+      const double size = sizeOf(pw) + sizeOf(qw) + pw.corners[0].norm() + qw.corners[0].norm();
+      const double blur = std::min(1.0, 8 * std::numeric_limits<double>::epsilon() * size / distance);
+      // To half of what counts as contact, so that steps do not shrink for ever.
+      const double later = advanced(
+          distance - contactDistance() + goal_.rounding / 2,
+          closingSpeedOf(motion_a_, pw, direction, blur, time) + closingSpeedOf(motion_b_, qw, -direction, blur, time));
+      if (!(later > time)) return time;
+      // Close to a contact: if it is certain to come soon, the rest of the way need not be gone.
+      if (later - time < goal_.time_error && time + goal_.time_error <= 1 && isContact(p, q, time + goal_.time_error)) {
+        return time;
+      }
+      time = later;
+    }
+    return std::numeric_limits<double>::infinity();
+  }
+
+  const SimilarityTransform a_in_body_, b_in_body_;
+  const Motion &motion_a_, &motion_b_;
+  ContactGoal goal_;
+  double now_ = -1, first_ = 0;
+  SimilarityTransform a_in_world_, b_in_world_, world_in_b_;  // at the time now_; the last for bodies only
+};
+
+}  // namespace bocst::query

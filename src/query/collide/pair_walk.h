@@ -1,0 +1,260 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#pragma once
+
+#include <cstdint>
+#include <utility>
+#include <vector>
+
+#include "geometry/triangle.h"
+#include "query/collide/deferred_pairs.h"
+#include "query/leaf/leaf_pairs.h"
+#include "query/sides/visitor.h"
+
+namespace bocst::query {
+
+/// The walk over pairs of nodes. Resident pairs first, depth first; a pair that needs an unexpanded node is deferred.
+/// When the resident pairs do not settle the question, nodes deferred grow in one batch and the walk goes on with
+/// their pairs, one level down.
+///
+/// Triangles against triangles are culled by boxes and slabs; as soon as a side answers with cells, both are culled by
+/// spheres, in double and on integer cells, so a conservative verdict does not depend on what is resident.
+///
+/// Where leaves of side B are solid bodies (B::kBodies), the visitor V is a ConvexVisitor, and spheres meet the bodies
+/// themselves.
+template <typename A, typename B, typename V = Visitor>
+class PairWalk {
+ public:
+  /// `b_in_a` places side B's frame in side A's. Scratch memory is kept by the thread between walks.
+  PairWalk(const A& a, const B& b, const SimilarityTransform& b_in_a, V& visitor)
+      : a_(a),
+        b_(b),
+        b_in_a_(b_in_a),
+        a_in_b_(b_in_a.inverse()),
+        visitor_(visitor),
+        spheres_(a.isConservative() || b.isConservative()) {}
+
+  /// A leaf so many times larger (squared) than the node it meets is taken triangle by triangle.
+
+  /// True when the visitor ended it.
+  bool run() {
+    Scratch& s = scratch();
+    s.stack.clear();
+    s.deferred.clear();
+    s.leaves.start(b_in_a_, a_in_b_);
+    s.large_a.clear();
+    s.large_b.clear();
+    const Pair root{a_.root(), b_.root()};
+    if (!rootsMeet(root)) return false;
+    s.stack.push_back(root);
+    for (;;) {
+      while (!s.stack.empty()) {
+        const Pair pair = s.stack.back();
+        s.stack.pop_back();
+        if (spheres_ ? stepSpheres(pair, s) : stepBoxes(pair, s)) return true;
+      }
+      if (s.deferred.empty()) return false;
+      s.deferred.grow(a_, b_, b_in_a_, visitor_.endsAtFirst(), [&s](const Pair& pair) { s.stack.push_back(pair); });
+      seen_a_.valid = seen_b_.valid = false;
+    }
+  }
+
+ private:
+  using Pair = typename DeferredPairs<A, B>::Pair;
+  struct Scratch {
+    std::vector<Pair> stack;
+    DeferredPairs<A, B> deferred;
+    LeafPairs<A, B> leaves;
+    LargeTriangleLeaf<A> large_a;
+    LargeTriangleLeaf<B> large_b;
+  };
+  static Scratch& scratch() {
+    thread_local Scratch s;
+    return s;
+  }
+
+  bool rootsMeet(const Pair& root) const {
+    return spheres_ ? sphereMeets(a_.sphere(root.a), root.b)
+                    : !boxesApart(oriented(a_.volume(root.a)), oriented(b_.volume(root.b)), b_in_a_);
+  }
+
+  Sphere inA(const Sphere& s) const { return placed(s, b_in_a_); }
+
+  bool spheresMeet(const Sphere& a, const Sphere& b) const {
+    const double extent = (a.radius + b.radius) * (1 + 1e-12) + b_in_a_.tolerance;
+    return (a.center - b.center).squaredNorm() <= extent * extent;
+  }
+
+  bool sphereMeets(const Sphere& a, typename B::Node b) const {
+    if constexpr (B::kBodies) {
+      return b_.meets(b, placed(a, a_in_b_), a_in_b_.tolerance);
+    } else {
+      return spheresMeet(a, inA(b_.sphere(b)));
+    }
+  }
+
+  // May the box of a node meet the body itself, and not only the box about it?
+  bool boxMeets(typename A::Node a, typename B::Node b) const {
+    if (b_.isBox(b)) return true;
+    Eigen::Vector3d corners[8];
+    cornersOf(oriented(a_.volume(a)), a_in_b_, corners);
+    const double tolerance = a_in_b_.tolerance + 4 * a_in_b_.orthogonality_error * a_in_b_.translation.norm();
+    return !(b_.gap(b, {corners, 8}, tolerance).atLeast > tolerance);
+  }
+
+  // The larger of two nodes is expanded, unless it is a leaf.
+  static bool expandsA(State sa, State sb, double size_a, double size_b) {
+    return sb == State::kLeaf || (sa != State::kLeaf && size_a >= size_b);
+  }
+
+  bool stepBoxes(const Pair& pair, Scratch& s) {
+    // Depth first, most steps share a node with the one before.
+    seeNode(a_, pair.a, seen_a_);
+    seeNode(b_, pair.b, seen_b_);
+    const State sa = seen_a_.state, sb = seen_b_.state;
+    if (sa == State::kLeaf && sb == State::kLeaf) return leafTriangles(pair, s);
+    if (waits(sa, sb)) {
+      s.deferred.add(pair);
+      return false;
+    }
+    const double size_b = seen_b_.size * b_in_a_.scale * b_in_a_.scale;
+    if (expandsA(sa, sb, seen_a_.size, size_b)) {
+      if (sa == State::kGrows) {
+        s.deferred.add(pair);
+      } else {
+        const auto push = [&](typename A::Node c) { s.stack.push_back({c, pair.b}); };
+        if constexpr (!B::kBodies) {
+          if (sb == State::kLeaf && seen_a_.size < size_b) {
+            a_.childrenMeeting(pair.a, volumeOf(b_, seen_b_), b_in_a_, s.large_b, b_, pair.b, push);
+            return false;
+          }
+        }
+        if constexpr (B::kBodies) {
+          a_.overlappingChildren(pair.a, volumeOf(b_, seen_b_), b_in_a_, [&](typename A::Node c) {
+            if (boxMeets(c, pair.b)) push(c);
+          });
+        } else {
+          a_.overlappingChildren(pair.a, volumeOf(b_, seen_b_), b_in_a_, push);
+        }
+      }
+    } else if (sb == State::kGrows) {
+      s.deferred.add(pair);
+    } else {
+      const auto push = [&](typename B::Node c) { s.stack.push_back({pair.a, c}); };
+      if (sa == State::kLeaf && size_b < seen_a_.size) {
+        b_.childrenMeeting(pair.b, volumeOf(a_, seen_a_), a_in_b_, s.large_a, a_, pair.a, push);
+      } else {
+        b_.overlappingChildren(pair.b, volumeOf(a_, seen_a_), a_in_b_, push);
+      }
+    }
+    return false;
+  }
+
+  bool leafTriangles(const Pair& pair, Scratch& s) {
+    if constexpr (B::kBodies) {
+      for (std::size_t i = 0; i < a_.triangleCount(pair.a); ++i) {
+        if (visitor_.triangle(a_.triangle(pair.a, i), pair.b)) return true;
+      }
+      return false;
+    } else {
+      return s.leaves.test(a_, pair.a, b_, pair.b, [this](std::uint32_t t, std::uint32_t u, bool certain) {
+        return visitor_.triangles(t, u, certain);
+      });
+    }
+  }
+
+  // Neither side has children to go on with.
+  static bool waits(State sa, State sb) { return sa != State::kInner && sb != State::kInner; }
+
+  bool stepSpheres(const Pair& pair, Scratch& s) {
+    const State sa = a_.state(pair.a), sb = b_.state(pair.b);
+    if (sa == State::kLeaf && sb == State::kLeaf) return leafSpheres(pair);
+    const Sphere ball_a = a_.sphere(pair.a), ball_b = inA(b_.sphere(pair.b));
+    if (expandsA(sa, sb, ball_a.radius, ball_b.radius)) {
+      if (sa == State::kGrows) {
+        s.deferred.add(pair);
+      } else {
+        a_.children(pair.a, [&](typename A::Node c) {
+          if (sphereMeets(a_.sphere(c), pair.b)) s.stack.push_back({c, pair.b});
+        });
+      }
+    } else if (sb == State::kGrows) {
+      s.deferred.add(pair);
+    } else {
+      b_.children(pair.b, [&](typename B::Node c) {
+        if (sphereMeets(ball_a, c)) s.stack.push_back({pair.a, c});
+      });
+    }
+    return false;
+  }
+
+  bool leafSpheres(const Pair& pair) {
+    if constexpr (B::kBodies) {
+      const CellLeaf a{a_.cellId(pair.a), a_.cellSphere(pair.a)};
+      return sphereMeets(a.sphere, pair.b) && visitor_.cell(a, pair.b);
+    } else {
+      return leafCells(pair);
+    }
+  }
+
+  bool leafCells(const Pair& pair) {
+    if (a_.isConservative() && b_.isConservative()) {
+      const CellLeaf a{a_.cellId(pair.a), a_.cellSphere(pair.a)};
+      const CellLeaf b{b_.cellId(pair.b), inA(b_.cellSphere(pair.b))};
+      return spheresMeet(a.sphere, b.sphere) && visitor_.cells(a, b);
+    }
+    if (a_.isConservative()) {
+      const CellLeaf a{a_.cellId(pair.a), a_.cellSphere(pair.a)};
+      for (std::size_t i = 0; i < b_.triangleCount(pair.b); ++i) {
+        const std::uint32_t t = b_.triangle(pair.b, i);
+        const Corners corners = {b_in_a_ * b_.corner(t, 0), b_in_a_ * b_.corner(t, 1), b_in_a_ * b_.corner(t, 2)};
+        const Eigen::Vector3d point = closestPoint(a.sphere.center, corners);
+        if (spheresMeet(a.sphere, {point, 0}) && visitor_.cellOfA(a, t, point)) return true;
+      }
+      return false;
+    }
+    const CellLeaf b{b_.cellId(pair.b), inA(b_.cellSphere(pair.b))};
+    for (std::size_t i = 0; i < a_.triangleCount(pair.a); ++i) {
+      const std::uint32_t t = a_.triangle(pair.a, i);
+      const Corners corners = {a_.corner(t, 0), a_.corner(t, 1), a_.corner(t, 2)};
+      const Eigen::Vector3d point = closestPoint(b.sphere.center, corners);
+      if (spheresMeet(b.sphere, {point, 0}) && visitor_.cellOfB(t, b, point)) return true;
+    }
+    return false;
+  }
+
+  template <typename Side>
+  struct Seen {
+    typename Side::Node node{};
+    bool valid = false;
+    State state = State::kLeaf;
+    decltype(std::declval<const Side&>().volume(node)) volume;
+    bool volume_valid = false;
+    double size = 0;  // half diagonal, squared
+  };
+  template <typename Side>
+  static void seeNode(const Side& side, typename Side::Node node, Seen<Side>& seen) {
+    if (seen.valid && seen.node == node) return;
+    seen.valid = true;
+    seen.node = node;
+    seen.state = side.state(node);
+    seen.size = side.size(node);
+    seen.volume_valid = false;
+  }
+  // Only the side that is not expanded is looked at closely.
+  template <typename Side>
+  static auto& volumeOf(const Side& side, Seen<Side>& seen) {
+    if (!seen.volume_valid) seen.volume = side.volume(seen.node);
+    seen.volume_valid = true;
+    return seen.volume;
+  }
+
+  Seen<A> seen_a_;
+  Seen<B> seen_b_;
+  const A& a_;
+  const B& b_;
+  const SimilarityTransform b_in_a_, a_in_b_;
+  V& visitor_;
+  const bool spheres_;
+};
+
+}  // namespace bocst::query

@@ -1,0 +1,138 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#pragma once
+
+#include <cmath>
+#include <cstddef>
+#include <cstdint>
+
+#include "query/cull/frames.h"
+#include "query/leaf/large_triangles.h"
+#include "tree/tree.h"
+
+namespace bocst::query {
+
+/// A node as the walk knows it.
+struct StepNode {
+  static constexpr std::uint32_t kNoLane = 0xffffffff;
+
+  tree::NodeRef node;
+  tree::ChildRef ref;
+  std::uint32_t level = 1;
+  std::uint32_t lane = kNoLane;  ///< 8 * frame + octant: where the node's volume is, if it is.
+};
+
+/// Octants of one block against one node of the other side, still to be walked. Words of one size, written and read one
+/// by one: a processor is slow to read a wide word that was just written in parts.
+struct StepGroup {
+  static constexpr std::uint32_t kNoFrame = 0xffffffff;
+
+  StepNode other;
+  const tree::Block* at;  ///< The block, or null where there is none.
+  std::uint32_t side;     ///< That of the block.
+  std::uint32_t block;    ///< As NodeRef names it, so the root is octant 7 of a block that there is not.
+  std::uint32_t frame;    ///< Where the block's octants are, if they are; those below it are in use, too.
+  std::uint32_t level;    ///< Of the octants.
+  std::uint32_t octants;
+  std::uint32_t late;  ///< Those of them that wait until the others are gone.
+  /// For each of them: how far it overlaps the other node, as the bits of a float whose lowest three are the octant. As
+  /// the step wrote it: what is written to in parts is slow to be read as a whole.
+  std::uint32_t order[8];
+  std::uint32_t large;         ///< Which side's node is a larger leaf whose triangles were asked about the octants ...
+  std::uint32_t triangles[8];  ///< ... and which of them, a bit each, may meet each octant.
+  static constexpr std::uint32_t kNone = 2;
+};
+
+/// The depth-first walk over resident pairs of two trees, exact answers: up to the next pair of leaves.
+struct PairSteps {
+  /// Frames alive at once: to look up the nodes of a pair that comes without, and one more each level of either side.
+  static constexpr std::size_t kFrames = 2 + 2 * lattice::kMaxLevel + 1;
+  /// What a walk below one pair can add to the stack: one more each level of either side, eight of two levels at once.
+  static constexpr std::size_t kStackRoom = 8 * lattice::kMaxLevel + 1;
+
+  enum Event {
+    kDone,      ///< The stack is empty.
+    kLeaves,    ///< `pair` is two leaves, to be tested.
+    kDeferred,  ///< `pair` needs a node that is not expanded.
+    /// `pair` is a leaf and a smaller node, `expanded`, whose octants in `mask` overlap the leaf's volume; of the
+    /// leaf's triangles those in `triangles` may meet the node, if they were asked, but are not known.
+    kLargeTriangles,
+  };
+
+  const tree::Tree* tree[2];
+  std::int64_t now;
+  PairFrames geometry;
+  Frame* frames;     ///< kFrames of them.
+  StepGroup* stack;  ///< With room for kStackRoom more.
+  std::size_t depth = 0;
+
+  /// A node of side 0 is not smaller (is larger) than one of side 1 that is at least so many levels deeper.
+  int not_smaller, larger;
+
+  /// A hit is not expected, or does not end the walk, so all octants of a node go down the other side at once: their
+  /// tests overlap in time, where a walk that ends at its first hit would not make most of them.
+  bool all_at_once = false;
+
+  /// No hit ends the walk: what is on the stack will be walked, so it is fetched ahead.
+  bool sees_all = false;
+
+  StepNode pair[2];                        ///< Of the event.
+  std::uint32_t large = StepGroup::kNone;  ///< As in StepGroup, of the pair.
+  std::uint32_t triangles = 0;
+  const LargeTriangles* leaf[2] = {nullptr, nullptr};  ///< Those of a larger leaf of each side.
+  std::uint32_t frames_used = 0;
+  int expanded = 0;
+  unsigned mask = 0;
+
+  std::uint64_t holds[kFrames];  ///< Which block of which side is in a frame.
+  static constexpr std::uint64_t kNothing = ~std::uint64_t{0};
+  static constexpr std::uint64_t name(int side, std::uint32_t block) {
+    return std::uint64_t{block} << 1 | static_cast<std::uint64_t>(side);
+  }
+
+  PairSteps(const tree::Tree* a, const tree::Tree* b, std::int64_t now_, const PairFrames& geometry_, Frame* frames_)
+      : tree{a, b}, now(now_), geometry(geometry_), frames(frames_), stack(nullptr) {
+    // 2^deeper against the ratio of units, exactly.
+    int exponent = 0;
+    const bool even = std::frexp(geometry.side[1].unit / geometry.side[0].unit, &exponent) == 0.5f;
+    not_smaller = even ? exponent - 1 : exponent;
+    larger = exponent;
+    for (std::uint64_t& h : holds) h = kNothing;
+  }
+};
+
+/// Goes on to the next event. Chosen at run time for the machine's instruction set.
+PairSteps::Event nextEvent(PairSteps& steps);
+
+/// The octants of a cell, wherever they come from.
+struct CellOctants {
+  lattice::Cell cell;
+  oracle::OctantBounds octants;
+};
+
+/// What a step computes, by itself: bit o is set unless octant o of a cell of side `own` is surely apart from octant
+/// `octant` of a cell of the other side.
+std::uint8_t overlappingOctants(const PairFrames& geometry, int own, const CellOctants& cell, const CellOctants& other,
+                                int octant);
+
+/// After kCoarse: puts those octants of the expanded node on the stack that the leaf's triangles in steps.triangles may
+/// meet. These are known.
+void pushMeeting(PairSteps& steps);
+
+/// The test of pushMeeting() by itself, for at most 32 triangles: bit t of met[o] is set unless triangle t surely
+/// misses octant o of a cell of side `own`.
+///
+/// Along the axes of the octants, the triangle's normal and those of its edges in its plane; along the normal the
+/// octant's slab counts, too. With Q half a root's side and u = 2^-24, a centre is off by 6 u Q, an extent by 3, a
+/// projection on an axis of unit sum by 4 and a radius by 4 more, sums of both by 3, a bound by 2: 22 u Q. Slabs add
+/// 41: their offset 11, their normal 3, what the normals differ by 5, sums 22. PairFrames::Side::rounding margin takes
+/// 128.
+void octantsMeeting(const PairFrames& geometry, int own, const CellOctants& cell, const TriangleBounds& triangles,
+                    std::size_t count, std::uint32_t (&met)[8]);
+
+/// After kCoarse: puts the octants in `mask` of the expanded node of steps.pair on the stack.
+void pushOctants(PairSteps& steps, unsigned mask);
+
+/// Puts a pair of nodes on the stack that comes without frames.
+void pushPair(PairSteps& steps, tree::NodeRef node_a, tree::NodeRef node_b);
+
+}  // namespace bocst::query

@@ -1,0 +1,48 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#pragma once
+
+#include <vector>
+
+#include "query/collide/deferred_pairs.h"
+#include "query/collide/tree_steps.h"
+#include "query/cull/separation.h"
+#include "query/leaf/leaf_pairs.h"
+#include "query/sides/visitor.h"
+
+namespace bocst::query {
+
+/// The walk of PairWalk for two trees with exact answers, where a query spends its time: the same order, with volumes
+/// in float about the roots (see PairFrames) that are decoded once for all that meets them.
+class TreeWalk {
+ public:
+  static bool fits(const TreeSide& a, const TreeSide& b, const SimilarityTransform& b_in_a) {
+    return !a.isConservative() && !b.isConservative() && PairFrames::fits(b_in_a.scale);
+  }
+
+  TreeWalk(const TreeSide& a, const TreeSide& b, const SimilarityTransform& b_in_a) : a_(a), b_(b), b_in_a_(b_in_a) {}
+
+  /// Are the two so surely apart that nobody need walk? To be asked first, before anything is made ready for run().
+  bool isNeedless() { return areSeparate(a_.tree().supports(), b_.tree().supports(), b_in_a_, near_); }
+
+  /// True when the visitor ended it.
+  bool run(Visitor& visitor);
+
+ private:
+  struct Scratch;
+
+  bool search(Scratch& s);
+  bool stepAll(PairSteps& steps, Scratch& s);
+  void testLargeTriangles(PairSteps& steps, Scratch& s);
+  bool testLeaves(const PairSteps& steps, Scratch& s);
+  void defer(const PairSteps& steps, Scratch& s);
+  const SimilarityTransform& aInB();
+
+  const TreeSide &a_, &b_;
+  const SimilarityTransform& b_in_a_;
+  SimilarityTransform a_in_b_;  // once asked for
+  bool inverted_ = false;
+  NearDirections near_;
+  Visitor* visitor_ = nullptr;
+};
+
+}  // namespace bocst::query

@@ -1,0 +1,80 @@
+// SPDX-License-Identifier: BSD-3-Clause
+// Fills frames, once for each instruction set; see Highway's -inl.h headers.
+#if defined(BOCST_QUERY_FRAMES_INL_H) == defined(HWY_TARGET_TOGGLE)
+#ifdef BOCST_QUERY_FRAMES_INL_H
+#undef BOCST_QUERY_FRAMES_INL_H
+#else
+#define BOCST_QUERY_FRAMES_INL_H
+#endif
+
+#include "query/cull/frames.h"
+#include "simd/octants-inl.h"
+
+HWY_BEFORE_NAMESPACE();
+namespace bocst::query::HWY_NAMESPACE {
+
+// Writes the volumes of eight octants of sides `length`, of which the first has its corner at `corner`, in such sides,
+// from the middle of the root.
+HWY_INLINE void decode(const PairFrames::Side& g, const oracle::OctantBounds& octants, const float (&corner)[3],
+                       float length, Frame& f) {
+  const D d;
+  const V byte = hn::Set(d, length * (1.0f / 510)), side = hn::Set(d, length), half_side = hn::Set(d, 0.5f * length);
+  const V per127 = hn::Set(d, 1.0f / 127);
+  for (std::size_t i = 0; i < 8; i += hn::Lanes(d)) {
+    V c[3], h[3], n[3];
+    V offset = hn::Mul(fromBytes(d, octants.slab_center + i), hn::Set(d, length * (1.0f / 127)));
+    BOCST_UNROLL
+    for (int k = 0; k < 3; ++k) {
+      const V lo = fromBytes(d, octants.lo[k] + i), hi = fromBytes(d, octants.hi[k] + i);
+      const V from_middle = hn::MulSub(hn::Add(lo, hi), byte, half_side);
+      const V middle = hn::Add(hn::Set(d, corner[k] + 0.5f), hn::Load(d, kOctantCorner[k] + i));
+      c[k] = hn::MulAdd(middle, side, from_middle);
+      h[k] = hn::Mul(hn::Sub(hi, lo), byte);
+      n[k] = hn::Mul(fromBytes(d, octants.normal[k] + i), per127);
+      // The slab is given from the octant's middle and wanted from its box's.
+      offset = hn::NegMulAdd(n[k], from_middle, offset);
+      hn::Store(c[k], d, f.center[0][k] + i);
+      hn::Store(h[k], d, f.half[0][k] + i);
+      hn::Store(n[k], d, f.normal[0][k] + i);
+    }
+    hn::Store(offset, d, f.slab_center + i);
+    hn::Store(hn::Mul(fromBytes(d, octants.slab_half + i), hn::Set(d, length * (1.0f / 254))), d, f.slab_half + i);
+    BOCST_UNROLL
+    for (int j = 0; j < 3; ++j) {
+      V cj = hn::Set(d, g.shift[j]), hj = hn::Zero(d), nj = hn::Zero(d);
+      BOCST_UNROLL
+      for (int k = 0; k < 3; ++k) {
+        const V r = hn::Set(d, g.to_other[j][k]);
+        cj = hn::MulAdd(r, c[k], cj);
+        nj = hn::MulAdd(r, n[k], nj);
+        hj = hn::MulAdd(hn::Set(d, g.abs_to_other[j][k]), h[k], hj);
+      }
+      hn::Store(cj, d, f.center[1][j] + i);
+      hn::Store(hj, d, f.half[1][j] + i);
+      hn::Store(nj, d, f.normal[1][j] + i);
+    }
+  }
+}
+
+template <typename Position>
+HWY_INLINE void decodeCell(const PairFrames& g, int own, int level, const Position& at,
+                           const oracle::OctantBounds& octants, Frame& f) {
+  const int middle = 1 << (level - 1);
+  float corner[3];
+  BOCST_UNROLL
+  for (int k = 0; k < 3; ++k) corner[k] = static_cast<float>(2 * static_cast<int>(at[k]) - middle);
+  const int side = 1 << (lattice::kMaxLevel - 1 - level);
+  decode(g.side[own], octants, corner, static_cast<float>(side) * g.side[own].unit, f);
+}
+
+HWY_INLINE void decodeRoot(const PairFrames& g, int own, const oracle::CellBounds& bounds, Frame& f) {
+  oracle::OctantBounds root;
+  root.set(0, bounds);
+  const float corner[3] = {-0.5f, -0.5f, -0.5f};
+  decode(g.side[own], root, corner, 2 * static_cast<float>(lattice::kMiddle) * g.side[own].unit, f);
+}
+
+}  // namespace bocst::query::HWY_NAMESPACE
+HWY_AFTER_NAMESPACE();
+
+#endif

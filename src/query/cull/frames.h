@@ -1,0 +1,53 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#pragma once
+
+#include <cstdint>
+
+#include "geometry/volume.h"
+#include "oracle/oracle.h"
+
+namespace bocst::query {
+
+/// The volumes of eight octants as both sides of a pair see them: [0] along the axes of their own side and [1] along
+/// those of the other, in lattice units of side 0 about the middle of each side's root. Structure of arrays: lane o is
+/// octant o.
+struct alignas(64) Frame {
+  float center[2][3][8];  ///< Middle of the box.
+  float half[2][3][8];    ///< Half extents of the box [0] or of what holds it [1].
+  float normal[2][3][8];  ///< Of the slab, about unit length; zero: no slab.
+  float slab_center[8];   ///< Middle of the slab along normal, from center.
+  float slab_half[8];
+};
+
+/// How the frames of two trees lie to each other, in float, and what that loses.
+///
+/// With u = 2^-24 and M = |t| + sqrt(3) (Q0 + Q1), Q half a root's side, no coordinate is larger than M. A centre is
+/// off by 6 u Q in its own frame (bytes to units 4, corner 2) and by 11 u M in the other (that turned, rotation 1, sums
+/// 4); an extent by 7 u M. Two centres, two extents and the comparison: 42 u M; `rounding margin` takes 48. Along a
+/// normal (length below 1.01, off by 10 u an entry) the way between centres is off by 42 u M, 18 by the normal and 9 by
+/// sums; offsets 11; the radius 38 by the normals and 15 by sums: 133 u M; `slab_rounding_margin` takes 160. To both
+/// comes the defect of the rotation, 4 M of it, and the tolerance.
+///
+/// What sees octants in their own frame only, along axes whose entries' sizes sum up to 1, is off by less: see
+/// octantsMeeting().
+struct PairFrames {
+  PairFrames(double scale_of_1, const SimilarityTransform& one_in_zero);
+
+  /// Beyond these, one side's rounding is too coarse for the other's nodes.
+  static bool fits(double scale) { return scale >= 0x1p-10 && scale <= 0x1p10; }
+
+  /// Are rounding margins small beside both sides? What is far away is no pair for collisions; for distances it is one.
+  static bool isFine(const SimilarityTransform& one_in_zero);
+
+  struct Side {
+    float unit;            ///< A lattice unit, in those of side 0.
+    float shift[3];        ///< Coordinate j in the other frame is this ...
+    float to_other[3][3];  ///< ... and row j by the own coordinates.
+    float abs_to_other[3][3];
+    float rounding_margin;  ///< For what is in double beside octants in their own frame: 128 u Q, defect and tolerance.
+  };
+  Side side[2];
+  float rounding_margin, slab_rounding_margin;
+};
+
+}  // namespace bocst::query

@@ -1,0 +1,182 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#pragma once
+
+#include <algorithm>
+#include <cstddef>
+#include <vector>
+
+#include "query/sides/side.h"
+
+namespace bocst::query {
+
+/// The walk of queries that look for the least of something (a distance, a time) over all pairs of leaves. Best first:
+/// pairs of nodes lie in a heap by a lower bound, and what cannot beat the best answer is never looked at. Pairs that
+/// need a node that is not expanded wait, the nearest first, while what is resident may still make them superfluous;
+/// then they grow in one batch, each twice as large as the one before.
+///
+/// A query (Walk) derives from this and has, for this base: worthIt(bound); settled(); again(pair), true when it pushed
+/// the pair with a better bound instead; reachOfA(node) and reachOfB(node), or ballOfA(node) and ballOfB(node) when a
+/// side answers with cells; boundOf() of two of these; leaves(pair); scaleOfB(), the unit of B in that of A.
+template <typename Walk, typename A, typename B>
+class BestFirst {
+ protected:
+  struct Pair {
+    double bound;
+    typename A::Node a;
+    typename B::Node b;
+  };
+  /// Kept by the thread between walks.
+  struct Heap {
+    std::vector<Pair> heap, waiting;
+    std::vector<tree::Tree::Growth> growths;
+  };
+
+  BestFirst(const A& a, const B& b, Heap& heap) : a_(a), b_(b), heap_(heap) {
+    heap_.heap.clear();
+    heap_.waiting.clear();
+  }
+
+  /// Looks at pairs, from that of the roots on, until nothing can be better than what was found.
+  void search() {
+    const Pair root{0, a_.root(), b_.root()};
+    push({boundOf(root), root.a, root.b});
+    std::size_t batch = kFirstBatch;
+    for (;;) {
+      while (heap_.waiting.size() < batch && next()) {
+        const Pair pair = next_;
+        has_next_ = false;
+        step(pair);
+        if (walk().settled()) return;
+      }
+      const auto end = std::remove_if(heap_.waiting.begin(), heap_.waiting.end(),
+                                      [this](const Pair& p) { return !walk().worthIt(p.bound); });
+      heap_.waiting.erase(end, heap_.waiting.end());
+      if (heap_.waiting.empty()) {
+        if (!next()) return;
+        continue;
+      }
+      grow();
+      batch *= 2;
+    }
+  }
+
+  /// Puts a pair on the heap, if it is worth it.
+  void push(const Pair& pair) {
+    if (walk().worthIt(pair.bound)) put(pair);
+  }
+
+  double boundOf(const Pair& pair) {
+    return spheres() ? walk().boundOf(walk().ballOfA(pair.a), walk().ballOfB(pair.b))
+                     : walk().boundOf(walk().reachOfA(pair.a), walk().reachOfB(pair.b));
+  }
+
+  /// Pushes the pairs of one node's children and the other node. A query may have a faster way of its own.
+  void expand(const Pair& pair, bool expands_a) {
+    if (expands_a) {
+      expandA(pair);
+    } else {
+      expandB(pair);
+    }
+  }
+
+  /// Which node of a pair that is not two leaves is expanded, given their states: the larger that can be.
+  bool expandsA(const Pair& pair, State sa, State sb) const {
+    const double scale = walk().scaleOfB();
+    return sb == State::kLeaf || (sa != State::kLeaf && a_.size(pair.a) >= b_.size(pair.b) * scale * scale);
+  }
+
+  bool spheres() const { return a_.isConservative() || b_.isConservative(); }
+
+  const A& a_;
+  const B& b_;
+
+ private:
+  static constexpr std::size_t kFirstBatch = 4;
+
+  Walk& walk() { return static_cast<Walk&>(*this); }
+  const Walk& walk() const { return static_cast<const Walk&>(*this); }
+  struct Later {
+    bool operator()(const Pair& x, const Pair& y) const { return x.bound > y.bound; }
+  };
+
+  // The least of what was put lately stays out of the heap: mostly it is the next.
+  void put(Pair pair) {
+    if (!has_next_) {
+      next_ = pair;
+      has_next_ = true;
+      return;
+    }
+    if (pair.bound < next_.bound) std::swap(pair, next_);
+    heap_.heap.push_back(pair);
+    std::push_heap(heap_.heap.begin(), heap_.heap.end(), Later());
+  }
+
+  // Makes the pair of the least bound the next; false when it is not worth it, or there is none.
+  bool next() {
+    if (!heap_.heap.empty() && (!has_next_ || heap_.heap.front().bound < next_.bound)) {
+      std::pop_heap(heap_.heap.begin(), heap_.heap.end(), Later());
+      Pair least = heap_.heap.back();
+      heap_.heap.pop_back();
+      if (has_next_) {
+        heap_.heap.push_back(next_);
+        std::push_heap(heap_.heap.begin(), heap_.heap.end(), Later());
+      }
+      next_ = least;
+      has_next_ = true;
+    }
+    return has_next_ && walk().worthIt(next_.bound);
+  }
+
+  void step(const Pair& pair) {
+    if (walk().again(pair)) return;
+    const State sa = a_.state(pair.a), sb = b_.state(pair.b);
+    if (sa == State::kLeaf && sb == State::kLeaf) {
+      walk().leaves(pair);
+      return;
+    }
+    const bool expands_a = expandsA(pair, sa, sb);
+    if ((expands_a ? sa : sb) == State::kGrows) {
+      heap_.waiting.push_back(pair);
+    } else {
+      walk().expand(pair, expands_a);
+    }
+  }
+
+  void expandA(const Pair& pair) {
+    if (spheres()) {
+      const auto b = walk().ballOfB(pair.b);
+      a_.children(pair.a, [&](typename A::Node c) { push({walk().boundOf(walk().ballOfA(c), b), c, pair.b}); });
+    } else {
+      const auto b = walk().reachOfB(pair.b);
+      a_.children(pair.a, [&](typename A::Node c) { push({walk().boundOf(walk().reachOfA(c), b), c, pair.b}); });
+    }
+  }
+
+  void expandB(const Pair& pair) {
+    if (spheres()) {
+      const auto a = walk().ballOfA(pair.a);
+      b_.children(pair.b, [&](typename B::Node c) { push({walk().boundOf(a, walk().ballOfB(c)), pair.a, c}); });
+    } else {
+      const auto a = walk().reachOfA(pair.a);
+      b_.children(pair.b, [&](typename B::Node c) { push({walk().boundOf(a, walk().reachOfB(c)), pair.a, c}); });
+    }
+  }
+
+  void grow() {
+    heap_.growths.clear();
+    for (const Pair& p : heap_.waiting) {
+      if (a_.state(p.a) == State::kGrows) a_.grow(p.a, heap_.growths);
+      if (b_.state(p.b) == State::kGrows) b_.grow(p.b, heap_.growths);
+    }
+    uniqueGrowths(heap_.growths);
+    if (!heap_.growths.empty()) tree::Tree::grow(heap_.growths);
+    for (const Pair& p : heap_.waiting) put(p);
+    heap_.waiting.clear();
+  }
+
+  Heap& heap_;
+  Pair next_{};
+  bool has_next_ = false;
+};
+
+}  // namespace bocst::query

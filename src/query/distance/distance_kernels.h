@@ -1,0 +1,57 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#pragma once
+
+#include <cstddef>
+#include <cstdint>
+
+#include "geometry/overlap_kernels.h"
+#include "query/cull/frames.h"
+#include "tree/block.h"
+
+// What a distance query computes in float, eight at once: bounds only, never the answer.
+
+namespace bocst::query {
+
+/// Fills the frame with the octants of a block of side `own`.
+void fillFrame(const PairFrames& geometry, int own, const tree::Block& block, Frame& frame);
+/// Fills lane 0 of the frame with the root of side `own`.
+void fillFrame(const PairFrames& geometry, int own, const oracle::CellBounds& root, Frame& frame);
+
+/// A direction in the frames of both sides, of unit length or zero.
+struct FrameDirection {
+  float in[2][3] = {};
+};
+
+/// How far eight octants are from a node of the other side, in lattice units of side 0.
+struct OctantGaps {
+  alignas(64) float at_least[8];
+  alignas(64) float at_most[8];  ///< Some point of the one is no farther from some point of the other.
+};
+
+/// Along the faces of both boxes, both slabs' normals, the line of the middles and `direction`, which should be where
+/// the nearest points are expected. The octants are those of frame f, side `own`; the node is lane `lane` of frame y.
+///
+/// With M and u as at PairFrames, a gap along a direction of unit length: the way between centres is off by 59 u M and
+/// its sum by 7; each of two reaches by 72, as the slab test's; the two spellings of the direction by 16: 226 u M,
+/// which is less than 2 * slab_rounding_margin. That is taken off, and 8 u of the gap for the direction's length.
+void octantGaps(const PairFrames& geometry, int own, const Frame& f, const Frame& y, std::size_t lane,
+                const FrameDirection& direction, OctantGaps& gaps);
+
+/// Two triangles that may be the nearest.
+struct NearPair {
+  float at_least;  ///< They are no nearer than this.
+  std::uint8_t row, lane;
+};
+
+/// Writes the pairs (a triangle of rows, a triangle of lanes) that may be the nearest of all and less than `cutoff`
+/// apart, at most rows.count * lanes.count of them. Returns how many. `direction` is a unit vector from rows to lanes,
+/// where the nearest points are expected, or zero.
+///
+/// A triangle pair is at least as far apart as along any direction: those of both normals and that between the nearest
+/// points of their edges, found by sloppy arithmetic, are looked at; one of them is exact but for rounding. Nine edge
+/// pairs find vertices too. With M the larger size of the packs and u = 2^-24, corners are off by u M and a corner's
+/// projection on a unit vector by 7 u M more: 18 u M for a gap; 32 u M is taken off.
+std::size_t nearPairs(const TrianglePack& rows, const TrianglePack& lanes, const float direction[3], float cutoff,
+                      NearPair* pairs);
+
+}  // namespace bocst::query

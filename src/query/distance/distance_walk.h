@@ -1,0 +1,340 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#pragma once
+
+#include <algorithm>
+#include <cmath>
+#include <cstddef>
+#include <cstdint>
+#include <limits>
+#include <optional>
+#include <type_traits>
+#include <vector>
+
+#include "geometry/convex_shape.h"
+#include "geometry/extent.h"
+#include "geometry/triangle.h"
+#include "query/distance/best_first.h"
+#include "query/distance/tree_gaps.h"
+#include "query/sides/side.h"
+
+namespace bocst::query {
+
+/// The nearest primitives of two sides that a walk has seen, in the frame of side A.
+struct Nearest {
+  double distance = std::numeric_limits<double>::infinity();
+  std::uint64_t a = 0, b = 0;  ///< Triangles, or names of cells.
+  Eigen::Vector3d on_a = Eigen::Vector3d::Zero(), on_b = Eigen::Vector3d::Zero();
+};
+
+/// How far a walk has to go.
+struct DistanceGoal {
+  double below = std::numeric_limits<double>::infinity();  ///< Only what is nearer is of interest.
+  double absolute = 0, relative = 0;  ///< An answer that is too large by so much will do, as in FCL's canStop().
+};
+
+/// Looks for the nearest primitives of two sides: triangles with exact answers, spheres of the collision depth with
+/// conservative ones.
+template <typename A, typename B>
+class DistanceWalk : private BestFirst<DistanceWalk<A, B>, A, B> {
+ public:
+  DistanceWalk(const A& a, const B& b, const SimilarityTransform& b_in_a)
+      : Base(a, b, scratch()), b_in_a_(b_in_a), a_in_b_(b_in_a.inverse()) {
+    if constexpr (kTrees) {
+      if (!spheres() && PairFrames::isFine(b_in_a)) gaps_.emplace(a, b, b_in_a);
+    }
+  }
+
+  Nearest run(const DistanceGoal& goal) {
+    goal_ = goal;
+    limit_ = goal.below;
+    if (gaps_.has_value()) descendGreedily();
+    if (!settled()) this->search();
+    return best_;
+  }
+
+ private:
+  using Base = BestFirst<DistanceWalk<A, B>, A, B>;
+  friend Base;
+  using Pair = typename Base::Pair;
+  using Base::a_;
+  using Base::b_;
+  using Base::spheres;
+  static constexpr bool kTrees = std::is_same<A, TreeSide>::value && std::is_same<B, TreeSide>::value;
+
+  struct Scratch : Base::Heap {
+    std::vector<TriangleExtent> a, b;
+  };
+  static Scratch& scratch() {
+    thread_local Scratch s;
+    return s;
+  }
+
+  // What is at this distance or beyond does not improve the answer by more than the caller lets go.
+  double cutoff() const {
+    return std::min(limit_, std::max(best_.distance - goal_.absolute, best_.distance / (1 + goal_.relative)));
+  }
+  bool worthIt(double bound) const { return bound < cutoff(); }
+  bool settled() const { return !(limit_ > 0); }
+  // A body may be much smaller than the box about it: what is worth a look is bounded by the body itself, once.
+  bool again(const Pair& pair) {
+    if constexpr (B::kBodies) {
+      if (spheres() || b_.isBox(pair.b)) return false;
+      Eigen::Vector3d corners[8];
+      cornersOf(oriented(a_.volume(pair.a)), a_in_b_, corners);
+      const double bound = b_.gap(pair.b, {corners, 8}, cutoff() * a_in_b_.scale).atLeast * b_in_a_.scale;
+      if (!(bound > pair.bound * (1 + 1e-9))) return false;
+      this->push({bound, pair.a, pair.b});
+      return true;
+    } else {
+      return false;
+    }
+  }
+  double scaleOfB() const { return b_in_a_.scale; }
+
+  NodeExtent reachOfA(typename A::Node n) const { return NodeExtent(a_.volume(n), SimilarityTransform()); }
+  NodeExtent reachOfB(typename B::Node n) const { return NodeExtent(b_.volume(n), b_in_a_); }
+
+  double boundOf(const NodeExtent& a, const NodeExtent& b) {
+    // Where each node holds a piece of surface, something is no farther than this.
+    if (B::kNodesContainSurface) limit_ = std::min(limit_, farthest(a, b));
+    return distanceBound(a, b, way_, cutoff());
+  }
+
+  Sphere ballOfA(typename A::Node n) const { return a_.sphere(n); }
+  // Of bodies the ball would be a poor bound: they are asked themselves.
+  auto ballOfB(typename B::Node n) const {
+    if constexpr (B::kBodies) {
+      return n;
+    } else {
+      return placed(b_.sphere(n), b_in_a_);
+    }
+  }
+
+  static double boundOf(const Sphere& a, const Sphere& b) {
+    return (a.center - b.center).norm() * (1 - 1e-12) - (a.radius + b.radius) * (1 + 1e-12);
+  }
+  double boundOf(const Sphere& a, typename B::Node body) const {
+    const Sphere ball = placed(a, a_in_b_);
+    const double extent = ball.radius * (1 + 1e-12);
+    return (b_.gap(body, {&ball.center, 1}, cutoff() * a_in_b_.scale + extent).atLeast - extent) * b_in_a_.scale;
+  }
+
+  // Two trees have their bounds in SIMD.
+  OctantGaps gapsOf(const Pair& pair, bool expands_a) {
+    return expands_a ? gaps_->ofOctants(0, pair.a, pair.b) : gaps_->ofOctants(1, pair.b, pair.a);
+  }
+  template <typename F>
+  void children(const Pair& pair, bool expands_a, F&& f) const {
+    if (expands_a) {
+      a_.children(pair.a, [&](typename A::Node c) { f(c.octant(), c, pair.b); });
+    } else {
+      b_.children(pair.b, [&](typename B::Node c) { f(c.octant(), pair.a, c); });
+    }
+  }
+
+  void expand(const Pair& pair, bool expands_a) {
+    if constexpr (kTrees) {
+      if (gaps_.has_value()) {
+        const OctantGaps gaps = gapsOf(pair, expands_a);
+        children(pair, expands_a, [&](int o, tree::NodeRef a, tree::NodeRef b) {
+          limit_ = std::min(limit_, double{gaps.at_most[o]});
+          this->push({gaps.at_least[o], a, b});
+        });
+        return;
+      }
+    }
+    Base::expand(pair, expands_a);
+  }
+
+  // Straight down to a pair of leaves, if they are resident. With its answer in hand, and the direction in which it
+  // was found, the search from the root on leaves most pairs out at once.
+  void descendGreedily() {
+    if constexpr (kTrees) {
+      Pair pair{0, a_.root(), b_.root()};
+      for (;;) {
+        const State sa = a_.state(pair.a), sb = b_.state(pair.b);
+        if (sa == State::kLeaf && sb == State::kLeaf) return leaves(pair);
+        const bool expands_a = this->expandsA(pair, sa, sb);
+        if ((expands_a ? sa : sb) == State::kGrows) return;
+        const OctantGaps gaps = gapsOf(pair, expands_a);
+        float least = std::numeric_limits<float>::infinity();
+        Pair next = pair;
+        children(pair, expands_a, [&](int o, tree::NodeRef a, tree::NodeRef b) {
+          const float guess = gaps.at_least[o] + gaps.at_most[o];
+          if (!(guess < least)) return;
+          least = guess;
+          next = {gaps.at_least[o], a, b};
+        });
+        // A cell at the edge of what is grey may have no grey octants.
+        if (!std::isfinite(least)) return;
+        pair = next;
+      }
+    }
+  }
+
+  void found(const Nearest& n) {
+    if (!(n.distance < std::min(best_.distance, goal_.below))) return;
+    best_ = n;
+    limit_ = std::min(limit_, n.distance);
+    if (!(n.distance > 0)) return;
+    way_ = (n.on_b - n.on_a) / n.distance;
+    if constexpr (kTrees) {
+      if (gaps_.has_value()) gaps_->expect(way_);
+    }
+  }
+
+  void leaves(const Pair& pair) {
+    if constexpr (B::kBodies) {
+      leafBody(pair);
+    } else {
+      leafPair(pair);
+    }
+  }
+
+  void leafBody(const Pair& pair) {
+    if (a_.isConservative()) {
+      const Sphere in_a = a_.cellSphere(pair.a), ball = placed(in_a, a_in_b_);
+      const SeparationResult gap = b_.gap(pair.b, {&ball.center, 1}, cutoff() * a_in_b_.scale + ball.radius);
+      if (std::isfinite(gap.distance)) bodyFound(a_.cellId(pair.a), pair.b, gap, ball.center, ball.radius);
+      return;
+    }
+    for (std::size_t i = 0; i < a_.triangleCount(pair.a); ++i) {
+      const std::uint32_t t = a_.triangle(pair.a, i);
+      const Corners corners = {a_in_b_ * a_.corner(t, 0), a_in_b_ * a_.corner(t, 1), a_in_b_ * a_.corner(t, 2)};
+      const PointSet points{corners, 3};
+      const SeparationResult gap = b_.gap(pair.b, points, cutoff() * a_in_b_.scale);
+      if (std::isfinite(gap.distance)) bodyFound(t, pair.b, gap, gap.on_points, 0);
+    }
+  }
+
+  // What is within `radius` of `point`, in the frame of B, is the gap away from a body.
+  void bodyFound(std::uint64_t a, typename B::Node b, const SeparationResult& gap, const Eigen::Vector3d& point,
+                 double radius) {
+    Nearest n;
+    n.a = a;
+    n.b = b_.id(b);
+    const double distance = std::max(gap.distance - radius, 0.0);
+    const Eigen::Vector3d on_body = gap.isTouching() ? point : gap.on_body;
+    n.distance = distance * b_in_a_.scale;
+    n.on_b = b_in_a_ * on_body;
+    // Straight on towards the body, by the radius at most.
+    const double part = gap.distance > 0 ? std::min(radius / gap.distance, 1.0) : 0;
+    n.on_a = b_in_a_ * Eigen::Vector3d(point + part * (on_body - point));
+    found(n);
+  }
+
+  void leafPair(const Pair& pair) {
+    if (spheres()) {
+      leafSpheres(pair);
+      return;
+    }
+    if constexpr (kTrees) {
+      if (gaps_.has_value()) {
+        for (const TreeGaps::Candidate& c : gaps_->ofTriangles(pair.a, pair.b, cutoff())) {
+          if (!worthIt(c.at_least)) break;
+          triangles(c.a, c.b);
+        }
+        return;
+      }
+    }
+    Scratch& s = scratch();
+    fill(a_, pair.a, SimilarityTransform(), s.a);
+    fill(b_, pair.b, b_in_a_, s.b);
+    // The pair of nearest middles first: a good answer makes most of the others superfluous.
+    std::size_t first_a = 0, first_b = 0;
+    double nearest = std::numeric_limits<double>::infinity();
+    for (std::size_t i = 0; i < s.a.size(); ++i) {
+      for (std::size_t j = 0; j < s.b.size(); ++j) {
+        const double d = (s.a[i].middle() - s.b[j].middle()).squaredNorm();
+        if (d < nearest) nearest = d, first_a = i, first_b = j;
+      }
+    }
+    triangles(s.a[first_a], s.b[first_b]);
+    for (TriangleExtent& t : s.a) t.along(way_);
+    for (TriangleExtent& t : s.b) t.along(way_);
+    for (const TriangleExtent& t : s.a) {
+      for (const TriangleExtent& u : s.b) {
+        if (worthIt(u.lowest - t.highest) && !isBeyond(t, u, cutoff())) triangles(t, u);
+      }
+    }
+  }
+
+  template <typename Side, typename Node>
+  static void fill(const Side& side, Node node, const SimilarityTransform& place, std::vector<TriangleExtent>& out) {
+    out.resize(side.triangleCount(node));
+    for (std::size_t i = 0; i < out.size(); ++i) {
+      out[i].id = side.triangle(node, i);
+      for (int k = 0; k < 3; ++k) out[i].corners[k] = place * side.corner(out[i].id, k);
+      out[i].ready();
+    }
+  }
+
+  void triangles(const TriangleExtent& t, const TriangleExtent& u) { triangles(t.id, t.corners, u.id, u.corners); }
+
+  void triangles(std::uint32_t t, std::uint32_t u) {
+    const Corners in_a = {a_.corner(t, 0), a_.corner(t, 1), a_.corner(t, 2)};
+    const Corners of_b = {b_in_a_ * b_.corner(u, 0), b_in_a_ * b_.corner(u, 1), b_in_a_ * b_.corner(u, 2)};
+    triangles(t, in_a, u, of_b);
+  }
+
+  void triangles(std::uint32_t t, const Corners& in_a, std::uint32_t u, const Corners& of_b) {
+    Nearest n;
+    n.a = t;
+    n.b = u;
+    n.distance = nearestPoints(in_a, of_b, n.on_a, n.on_b);
+    found(n);
+  }
+
+  void leafSpheres(const Pair& pair) {
+    const SimilarityTransform here;
+    if (a_.isConservative() && b_.isConservative()) {
+      spheresFound({a_.cellId(pair.a), a_.cellSphere(pair.a)},
+                   {b_.cellId(pair.b), placed(b_.cellSphere(pair.b), b_in_a_)});
+    } else if (a_.isConservative()) {
+      const Ball ball{a_.cellId(pair.a), a_.cellSphere(pair.a)};
+      for (std::size_t i = 0; i < b_.triangleCount(pair.b); ++i) {
+        spheresFound(ball, pointOf(b_, b_.triangle(pair.b, i), b_in_a_, ball.sphere.center));
+      }
+    } else {
+      const Ball ball{b_.cellId(pair.b), placed(b_.cellSphere(pair.b), b_in_a_)};
+      for (std::size_t i = 0; i < a_.triangleCount(pair.a); ++i) {
+        spheresFound(pointOf(a_, a_.triangle(pair.a, i), here, ball.sphere.center), ball);
+      }
+    }
+  }
+
+  struct Ball {
+    std::uint64_t id;
+    Sphere sphere;
+  };
+
+  // A triangle is a sphere without radius, at its point nearest to the other.
+  template <typename Side>
+  static Ball pointOf(const Side& side, std::uint32_t t, const SimilarityTransform& place, const Eigen::Vector3d& to) {
+    const Corners corners = {place * side.corner(t, 0), place * side.corner(t, 1), place * side.corner(t, 2)};
+    return {t, {closestPoint(to, corners), 0}};
+  }
+
+  void spheresFound(const Ball& a, const Ball& b) {
+    Nearest n;
+    n.a = a.id;
+    n.b = b.id;
+    const Eigen::Vector3d displacement = b.sphere.center - a.sphere.center;
+    const double apart = displacement.norm();
+    const Eigen::Vector3d direction = apart > 0 ? Eigen::Vector3d(displacement / apart) : Eigen::Vector3d::UnitX();
+    n.distance = std::max(apart - a.sphere.radius - b.sphere.radius, 0.0);
+    n.on_a = a.sphere.center + std::min(a.sphere.radius, apart) * direction;
+    n.on_b = n.on_a + n.distance * direction;
+    found(n);
+  }
+
+  const SimilarityTransform& b_in_a_;
+  const SimilarityTransform a_in_b_;
+  std::optional<TreeGaps> gaps_;  // of two trees with exact answers
+  DistanceGoal goal_;
+  Nearest best_;
+  double limit_ = 0;                               // something at least this near exists, or nobody asks for more
+  Eigen::Vector3d way_ = Eigen::Vector3d::Zero();  // from side A to side B where they are nearest so far, unit length
+};
+
+}  // namespace bocst::query

@@ -1,0 +1,102 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#include "query/distance/tree_gaps.h"
+
+namespace bocst::query {
+
+/// Frames and corners of one thread. Pairs come best first, so what was used lately is often used again.
+struct TreeGaps::Scratch {
+  static constexpr std::size_t kFrames = 64;
+  static constexpr std::size_t kLeaves = 16;
+  static constexpr std::uint32_t kNoBlock = 0xffffffff;
+
+  std::uint32_t blocks[2][kFrames];
+  Frame frames[2][kFrames];
+  Frame roots[2];
+  LeafCorners<TreeSide> corners[2][kLeaves];
+  TrianglePack packs[2];
+  NearPair found[TrianglePack::kCapacity * TrianglePack::kCapacity];
+  std::vector<Candidate> candidates;
+};
+
+TreeGaps::Scratch& TreeGaps::scratch() {
+  thread_local Scratch s;
+  return s;
+}
+
+TreeGaps::TreeGaps(const TreeSide& a, const TreeSide& b, const SimilarityTransform& b_in_a)
+    : side_{&a, &b}, b_in_a_(b_in_a), geometry_(b_in_a.scale, b_in_a) {
+  Scratch& s = scratch();
+  for (int side = 0; side < 2; ++side) {
+    std::fill(std::begin(s.blocks[side]), std::end(s.blocks[side]), Scratch::kNoBlock);
+    fillFrame(geometry_, side, side_[side]->tree().rootBounds(), s.roots[side]);
+    for (LeafCorners<TreeSide>& leaf : s.corners[side]) leaf.clear();
+  }
+}
+
+void TreeGaps::expect(const Eigen::Vector3d& direction) {
+  const Eigen::Vector3d back = b_in_a_.rotation.transpose() * direction;
+  for (int k = 0; k < 3; ++k) {
+    direction_.in[0][k] = static_cast<float>(direction[k]);
+    direction_.in[1][k] = static_cast<float>(back[k]);
+  }
+}
+
+const Frame& TreeGaps::frame(int side, std::uint32_t block) {
+  Scratch& s = scratch();
+  const std::size_t at = block % Scratch::kFrames;
+  if (s.blocks[side][at] != block) {
+    s.blocks[side][at] = block;
+    fillFrame(geometry_, side, side_[side]->tree().block(block), s.frames[side][at]);
+  }
+  return s.frames[side][at];
+}
+
+const Frame& TreeGaps::frameOf(int side, tree::NodeRef node, std::size_t& lane) {
+  if (node.isRoot()) {
+    lane = 0;
+    return scratch().roots[side];
+  }
+  lane = static_cast<std::size_t>(node.octant());
+  return frame(side, node.block());
+}
+
+OctantGaps TreeGaps::ofOctants(int own, tree::NodeRef x, tree::NodeRef y) {
+  std::size_t lane = 0;
+  const Frame& f = frame(own, side_[own]->tree().childRef(x).index());
+  const Frame& other = frameOf(1 - own, y, lane);
+  OctantGaps gaps;
+  octantGaps(geometry_, own, f, other, lane, direction_, gaps);
+  return gaps;
+}
+
+const std::vector<TreeGaps::Candidate>& TreeGaps::ofTriangles(tree::NodeRef leaf_a, tree::NodeRef leaf_b,
+                                                              double cutoff) {
+  Scratch& s = scratch();
+  s.candidates.clear();
+  const TreeSide &a = *side_[0], &b = *side_[1];
+  const Eigen::Vector3d center = a.cellSphere(leaf_a).center;
+  const PackTransform to_a = packTransform(a, SimilarityTransform(), center, 1),
+                      to_b = packTransform(b, b_in_a_, center, 1);
+  const std::size_t count_a = a.triangleCount(leaf_a), count_b = b.triangleCount(leaf_b);
+  LeafCorners<TreeSide>&corners_a = s.corners[0][leaf_a.bits % Scratch::kLeaves],
+  &corners_b = s.corners[1][leaf_b.bits % Scratch::kLeaves];
+  const auto limit = static_cast<float>(cutoff * (1 + 0x1p-22));
+  for (std::size_t i = 0; i < count_a; i += TrianglePack::kCapacity) {
+    corners_a.take(a, leaf_a, i);
+    corners_a.place(to_a, s.packs[0]);
+    for (std::size_t j = 0; j < count_b; j += TrianglePack::kCapacity) {
+      corners_b.take(b, leaf_b, j);
+      corners_b.place(to_b, s.packs[1]);
+      const std::size_t found = nearPairs(s.packs[0], s.packs[1], direction_.in[0], limit, s.found);
+      for (std::size_t k = 0; k < found; ++k) {
+        const NearPair& p = s.found[k];
+        s.candidates.push_back({p.at_least, corners_a.id(p.row), corners_b.id(p.lane)});
+      }
+    }
+  }
+  std::sort(s.candidates.begin(), s.candidates.end(),
+            [](const Candidate& x, const Candidate& y) { return x.at_least < y.at_least; });
+  return s.candidates;
+}
+
+}  // namespace bocst::query

@@ -1,0 +1,49 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#pragma once
+
+#include <algorithm>
+#include <cstddef>
+#include <cstdint>
+#include <vector>
+
+#include "geometry/triangle.h"
+#include "query/distance/distance_kernels.h"
+#include "query/leaf/leaf_pairs.h"
+#include "query/sides/side.h"
+
+namespace bocst::query {
+
+/// Bounds for the distances of two trees' nodes and triangles, exact answers. Lengths are those of side A's lattice.
+class TreeGaps {
+ public:
+  TreeGaps(const TreeSide& a, const TreeSide& b, const SimilarityTransform& b_in_a);
+
+  /// Expects the nearest points along this direction from A to B, a unit vector in A's frame.
+  void expect(const Eigen::Vector3d& direction);
+
+  /// The gaps between the octants of an inner node x of side `own` and a node y of the other side.
+  OctantGaps ofOctants(int own, tree::NodeRef x, tree::NodeRef y);
+
+  /// Triangles of two leaves, and no more than their distance.
+  struct Candidate {
+    double at_least;
+    std::uint32_t a, b;
+  };
+  /// The pairs of triangles of two leaves that may be nearer than `cutoff`, the nearest bound first. Valid until the
+  /// next call.
+  const std::vector<Candidate>& ofTriangles(tree::NodeRef leaf_a, tree::NodeRef leaf_b, double cutoff);
+
+ private:
+  struct Scratch;
+  static Scratch& scratch();
+
+  const Frame& frame(int side, std::uint32_t block);
+  const Frame& frameOf(int side, tree::NodeRef node, std::size_t& lane);
+
+  const TreeSide* side_[2];
+  const SimilarityTransform& b_in_a_;
+  const PairFrames geometry_;
+  FrameDirection direction_;
+};
+
+}  // namespace bocst::query

@@ -1,0 +1,362 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#pragma once
+
+#include <algorithm>
+#include <cmath>
+#include <cstddef>
+#include <cstdint>
+#include <type_traits>
+#include <vector>
+
+#include "oracle/cpu/kernels.h"
+#include "query/leaf/large_triangles.h"
+#include "query/leaf/leaf_corners.h"
+#include "query/leaf/unpack.h"
+#include "query/sides/side.h"
+
+namespace bocst::query {
+
+/// The triangles of a leaf against the octants of smaller nodes of the other side: with large triangles the leaf's
+/// volume says little.
+template <typename Other>
+class LargeTriangleLeaf {
+ public:
+  /// To be called before the first use in a walk.
+  void clear() { leaf_.clear(); }
+
+  /// The octants in `mask` of an inner node that a triangle of `leaf` meets.
+  unsigned octantsMeeting(const TreeSide& side, tree::NodeRef node, unsigned mask, const Other& other,
+                          typename Other::Node leaf, const SimilarityTransform& other_in_side) {
+    Eigen::Vector3d center;
+    const double half = side.octantsOf(node, center), scale = 1 / half;
+    const PackTransform place = packTransform(other, other_in_side, center, scale);
+    const auto tolerance = static_cast<float>(other_in_side.tolerance * scale * 1.001);
+    const std::size_t count = other.triangleCount(leaf);
+    unsigned met = 0;
+    for (std::size_t begin = 0; begin < count && (mask & ~met) != 0; begin += TrianglePack::kCapacity) {
+      leaf_.take(other, leaf, begin);
+      leaf_.place(place, pack_);
+      if (!inRange(pack_)) return mask;
+      std::uint8_t masks[TrianglePack::kCapacity];
+      oracle::octantMasks(pack_.xyz[0], TrianglePack::kCapacity, leaf_.count(), tolerance, masks);
+      for (std::size_t i = 0; i < leaf_.count(); ++i) met |= masks[i];
+    }
+    return mask & met;
+  }
+
+ private:
+  LeafCorners<Other> leaf_;
+  TrianglePack pack_;
+};
+
+/// What bounds a leaf's triangles, as far as they are its own: a box and a slab, in its own frame [0] and, once placed
+/// there, in that of the other side [1].
+struct LeafVolume {
+  LeafVolume() = default;
+
+  explicit LeafVolume(const Volume& v) : slab{v.slab_offset, v.slab_half} {
+    for (int k = 0; k < 3; ++k) {
+      center[0][k] = v.center[k];
+      half[0][k] = v.half[k];
+      normal[0][k] = v.normal[k];
+    }
+  }
+
+  explicit LeafVolume(const OrientedVolume& v) {
+    const Eigen::Vector3d own = v.axes.cwiseAbs() * v.half;
+    for (int k = 0; k < 3; ++k) {
+      center[0][k] = v.center[k];
+      half[0][k] = own[k];
+    }
+  }
+
+  void place(const SimilarityTransform& to_other) {
+    const Eigen::Matrix3d turn = to_other.rotation.cwiseAbs();
+    const Eigen::Vector3d c = to_other * Eigen::Vector3d(center[0][0], center[0][1], center[0][2]);
+    for (int k = 0; k < 3; ++k) {
+      center[1][k] = c[k];
+      half[1][k] = to_other.scale * (turn(k, 0) * half[0][0] + turn(k, 1) * half[0][1] + turn(k, 2) * half[0][2]);
+      normal[1][k] = 0;
+      for (int j = 0; j < 3; ++j) normal[1][k] += to_other.rotation(k, j) * normal[0][j];
+    }
+    placed = true;
+  }
+
+  double center[2][3];
+  double half[2][3];
+  double normal[2][3] = {};  ///< Of the slab, about unit length; zero: no slab.
+  double slab[2] = {};       ///< Along normal, from center: its middle and half its thickness, in own units.
+  bool placed = false;
+};
+
+/// The leaves of one side that a walk has met, packed: triangles are about the middle of their leaf's box.
+template <typename Side>
+class LeafPacks {
+ public:
+  struct Leaf {
+    typename Side::Node node{};
+    std::size_t begin = 0;
+    std::size_t all = 0;  ///< Triangles of the leaf, those in other packs included.
+    std::uint64_t walk = 0;
+    float error = 0;  ///< Corners may be so far from where they are, beside the rounding of floats.
+    LeafVolume volume;
+    TrianglePack pack;
+    tree::TriangleIds listed;  ///< The triangles' numbers where the tree keeps them, else in `own`.
+    std::uint32_t own[TrianglePack::kCapacity];
+
+    void prefetchIds() const {
+      if (listed.areKnown()) listed.prefetch();
+    }
+    std::uint32_t id(std::size_t i) const { return listed.areKnown() ? listed[i] : own[i]; }
+  };
+
+  /// To be called before the first use in a walk.
+  void clear() {
+    ++walk_;
+    used_ = 0;
+    loose_.clear();
+  }
+
+  /// Leaves met in this walk whose corners the tree does not keep packed.
+  const std::vector<typename Side::Node>& loose() const { return loose_; }
+
+  /// At most a pack of the leaf's triangles, from the one at `begin`; good until the next call.
+  const Leaf& get(const Side& side, typename Side::Node node, std::size_t begin, const SimilarityTransform& to_other) {
+    Leaf& leaf = find(side, node, begin);
+    if (!leaf.volume.placed) leaf.volume.place(to_other);
+    return leaf;
+  }
+
+  /// The same for who asks nothing of it in the other side's frame.
+  const Leaf& get(const Side& side, typename Side::Node node, std::size_t begin) { return find(side, node, begin); }
+
+ private:
+  static constexpr std::size_t kLeaves = 256;
+
+  Leaf& find(const Side& side, typename Side::Node node, std::size_t begin) {
+    std::uint16_t& slot = slots_[(number(node) + begin) % (4 * kLeaves)];
+    if (slot < leaves_.size() && leaves_[slot].walk == walk_ && leaves_[slot].node == node &&
+        leaves_[slot].begin == begin) {
+      return leaves_[slot];
+    }
+    // A walk that meets few leaves stays in the first, which are in the processor's cache.
+    slot = static_cast<std::uint16_t>(used_++ % kLeaves);
+    if (slot == leaves_.size()) leaves_.emplace_back();
+    Leaf& leaf = leaves_[slot];
+    leaf.node = node;
+    leaf.begin = begin;
+    leaf.walk = walk_;
+    leaf.volume = LeafVolume(side.volume(node));
+    fill(side, leaf);
+    return leaf;
+  }
+
+  void fill(const Side& side, Leaf& leaf) {
+    const double(&c)[3] = leaf.volume.center[0];
+    if constexpr (std::is_same<Side, TreeSide>::value) {
+      tree::PackedTriangles packed;
+      if (side.packed(leaf.node, packed, leaf.listed)) {
+        unpackTriangles(packed, c, leaf.pack);
+        leaf.all = packed.count;
+        // Half a step along each axis, and what unpacking rounds more than placing does; the middle lies in the box,
+        // but for a unit or a byte of the cell, and less than a hundredth of a step covers those.
+        leaf.error = 1.7321f * (0.504f * packed.step + 2 * 0x1p-24f * leaf.pack.size);
+        return;
+      }
+      loose_.push_back(leaf.node);
+    }
+    corners_.clear();
+    corners_.take(side, leaf.node, leaf.begin);
+    corners_.place(packTransform(side, SimilarityTransform(), Eigen::Vector3d(c[0], c[1], c[2]), 1), leaf.pack);
+    leaf.all = side.triangleCount(leaf.node);
+    leaf.error = 0;
+    leaf.listed = {};
+    for (std::size_t i = 0; i < leaf.pack.count; ++i) leaf.own[i] = corners_.id(i);
+  }
+
+  static std::size_t number(tree::NodeRef node) { return node.bits; }
+  static std::size_t number(int node) { return static_cast<std::size_t>(node); }
+
+  std::vector<Leaf> leaves_;
+  std::uint16_t slots_[4 * kLeaves] = {};
+  std::size_t used_ = 0;
+  std::uint64_t walk_ = 1;
+  LeafCorners<Side> corners_;
+  std::vector<typename Side::Node> loose_;
+};
+
+/// Leaves against leaves, triangle by triangle.
+template <typename A, typename B>
+class LeafPairs {
+ public:
+  /// To be called before the first test of a walk.
+  void start(const SimilarityTransform& b_in_a, const SimilarityTransform& a_in_b) {
+    leaves_a_.clear();
+    leaves_b_.clear();
+    for (int r = 0; r < 3; ++r) {
+      for (int c = 0; c < 3; ++c) to_a_.linear[r][c] = static_cast<float>(b_in_a.scale * b_in_a.rotation(r, c));
+    }
+    b_in_a_ = &b_in_a;
+    a_in_b_ = &a_in_b;
+  }
+
+  /// Calls f(triangle of a, triangle of b, whether they surely meet) for the pairs that are not surely apart, until it
+  /// returns true. A pair may be left to other leaves where it touches, too.
+  template <typename F>
+  bool test(const A& a, typename A::Node node_a, const B& b, typename B::Node node_b, F&& f) {
+    for (std::size_t i = 0;;) {
+      const auto& leaf_a = leaves_a_.get(a, node_a, i, *a_in_b_);
+      for (std::size_t j = 0;;) {
+        const auto& leaf_b = leaves_b_.get(b, node_b, j, *b_in_a_);
+        if (testPacks(leaf_a, leaf_b, f)) return true;
+        j += TrianglePack::kCapacity;
+        if (j >= leaf_b.all) break;
+      }
+      i += TrianglePack::kCapacity;
+      if (i >= leaf_a.all) return false;
+    }
+  }
+
+  /// The same for a leaf of one side and those triangles of a larger one of the other that may meet it, a bit each.
+  template <typename F>
+  bool testLargeA(const LargeTriangles& a, std::uint32_t which, const B& b, typename B::Node node_b, F&& f) {
+    return testLarge(leaves_b_, b, node_b, a, which, *a_in_b_,
+                     [&f](std::uint32_t t, std::uint32_t u, bool certain) { return f(u, t, certain); });
+  }
+  template <typename F>
+  bool testLargeB(const A& a, typename A::Node node_a, const LargeTriangles& b, std::uint32_t which, F&& f) {
+    return testLarge(leaves_a_, a, node_a, b, which, *b_in_a_, f);
+  }
+
+  /// Leaves met in this walk that are worth to be packed.
+  const std::vector<typename A::Node>& looseOfA() const { return leaves_a_.loose(); }
+  const std::vector<typename B::Node>& looseOfB() const { return leaves_b_.loose(); }
+
+ private:
+  template <typename F>
+  bool testPacks(const typename LeafPacks<A>::Leaf& a, const typename LeafPacks<B>::Leaf& b, F&& f) {
+    if (!inRange(a.pack) || !inRange(b.pack)) return allPairs(a, b, f);
+    a.prefetchIds();
+    b.prefetchIds();
+    // What touches within both leaves does so within both boxes and both slabs.
+    PackRegion region;
+    fillRegion(b.volume, a.volume, *a_in_b_, b.pack.size, b.error, region);
+    const std::uint32_t lanes = trianglesWithin(b.pack, region);
+    if (lanes == 0) return false;
+    fillRegion(a.volume, b.volume, *b_in_a_, a.pack.size, a.error, region);
+    const std::uint32_t rows = trianglesWithin(a.pack, region);
+    if (rows == 0) return false;
+    for (int k = 0; k < 3; ++k) to_a_.offset[k] = static_cast<float>(b.volume.center[1][k] - a.volume.center[0][k]);
+    moveTriangles(b.pack, lanes, to_a_, lanes_);
+    if (!inRange(lanes_)) return allPairs(a, b, f);
+    std::uint32_t ids[TrianglePack::kCapacity], *id = ids;
+    for (std::uint32_t left = lanes; left != 0; left &= left - 1)
+      *id++ = b.id(static_cast<std::size_t>(__builtin_ctz(left)));
+    const auto tolerance = static_cast<float>(
+        (b_in_a_->tolerance + static_cast<double>(a.error) + b_in_a_->scale * static_cast<double>(b.error)) * 1.001);
+    const std::size_t found = touchingPairs(a.pack, rows, lanes_, region, tolerance, found_);
+    for (std::size_t k = 0; k < found; ++k) {
+      if (f(a.id(found_[k].row), ids[found_[k].lane], found_[k].certain)) return true;
+    }
+    return false;
+  }
+
+  // About the middle of the smaller leaf, as its corners are packed; calls f(triangle of the leaf, coarse triangle,
+  // ...).
+  template <typename Side, typename F>
+  bool testLarge(LeafPacks<Side>& leaves, const Side& side, typename Side::Node node, const LargeTriangles& large,
+                 std::uint32_t which, const SimilarityTransform& to, F&& f) {
+    for (std::size_t begin = 0;; begin += TrianglePack::kCapacity) {
+      const auto& leaf = leaves.get(side, node, begin);
+      std::uint32_t ids[TrianglePack::kCapacity];
+      const double(&c)[3] = leaf.volume.center[0];
+      const Eigen::Vector3d middle(c[0], c[1], c[2]);
+      rows_.count = 0;
+      rows_.size = 0;
+      for (std::uint32_t left = which; left != 0; left &= left - 1) {
+        const auto t = static_cast<std::size_t>(__builtin_ctz(left));
+        for (std::size_t k = 0; k < 3; ++k) {
+          const Eigen::Vector3d v = large.corner(t, k) - (middle.array() - LargeTriangles::kMiddle).matrix();
+          for (std::size_t x = 0; x < 3; ++x) {
+            const auto at = static_cast<float>(v[static_cast<int>(x)]);
+            rows_.xyz[3 * k + x][rows_.count] = at;
+            rows_.size = std::max(rows_.size, std::abs(at));
+          }
+        }
+        ids[rows_.count++] = large.id(t);
+      }
+      if (testRows(leaf, to, ids, f)) return true;
+      if (begin + TrianglePack::kCapacity >= leaf.all) return false;
+    }
+  }
+
+  template <typename Leaf, typename F>
+  bool testRows(const Leaf& leaf, const SimilarityTransform& to, const std::uint32_t* ids, F&& f) {
+    if (!inRange(rows_) || !inRange(leaf.pack)) {
+      for (std::size_t i = 0; i < rows_.count; ++i) {
+        for (std::size_t j = 0; j < leaf.pack.count; ++j) {
+          if (f(leaf.id(j), ids[i], false)) return true;
+        }
+      }
+      return false;
+    }
+    PackRegion region{};
+    const double size = static_cast<double>(leaf.pack.size), error = static_cast<double>(leaf.error);
+    const double rounding_margin = (32 * 0x1p-24 + 4 * to.orthogonality_error) * size + 1.02 * (to.tolerance + error);
+    for (int k = 0; k < 3; ++k) {
+      region.high[k] = static_cast<float>(leaf.volume.half[0][k] + rounding_margin);
+      region.low[k] = -region.high[k];
+    }
+    const std::uint32_t all = rows_.count < 32 ? (1u << rows_.count) - 1 : ~0u;
+    const auto tolerance = static_cast<float>((to.tolerance + error) * 1.001);
+    const std::size_t found = touchingPairs(rows_, all, leaf.pack, region, tolerance, found_);
+    for (std::size_t k = 0; k < found; ++k) {
+      if (f(leaf.id(found_[k].lane), ids[found_[k].row], found_[k].certain)) return true;
+    }
+    return false;
+  }
+
+  /// Nothing is known of them.
+  template <typename F>
+  static bool allPairs(const typename LeafPacks<A>::Leaf& a, const typename LeafPacks<B>::Leaf& b, F&& f) {
+    for (std::size_t i = 0; i < a.pack.count; ++i) {
+      for (std::size_t j = 0; j < b.pack.count; ++j) {
+        if (f(a.id(i), b.id(j), false)) return true;
+      }
+    }
+    return false;
+  }
+
+  /// Where the triangles of a leaf can meet those of another, which `to` places in its frame. With M = `reach`, what is
+  /// computed here and by trianglesWithin() is off by 15 u M: corners 2, the normal 3, sums along it 10.
+  static void fillRegion(const LeafVolume& own, const LeafVolume& other, const SimilarityTransform& to, double size,
+                         float error, PackRegion& region) {
+    double displacement[3], extent = size, offset = to.scale * other.slab[0];
+    for (int k = 0; k < 3; ++k) {
+      displacement[k] = other.center[1][k] - own.center[0][k];
+      extent = std::max(extent, std::abs(displacement[k]) + other.half[1][k]);
+      offset += other.normal[1][k] * displacement[k];
+      region.normal[k] = static_cast<float>(other.normal[1][k]);
+    }
+    const double rounding_margin =
+        (32 * 0x1p-24 + 4 * to.orthogonality_error) * extent + 1.02 * (to.tolerance + static_cast<double>(error));
+    for (int k = 0; k < 3; ++k) {
+      region.low[k] =
+          static_cast<float>(std::max(-own.half[0][k], displacement[k] - other.half[1][k]) - rounding_margin);
+      region.high[k] =
+          static_cast<float>(std::min(own.half[0][k], displacement[k] + other.half[1][k]) + rounding_margin);
+    }
+    const double half = to.scale * other.slab[1] + rounding_margin;
+    region.slab_low = static_cast<float>(offset - half);
+    region.slab_high = static_cast<float>(offset + half);
+  }
+
+  LeafPacks<A> leaves_a_;
+  LeafPacks<B> leaves_b_;
+  PackMotion to_a_;
+  TrianglePack lanes_, rows_;
+  const SimilarityTransform *b_in_a_ = nullptr, *a_in_b_ = nullptr;
+  PackPair found_[TrianglePack::kCapacity * TrianglePack::kCapacity];
+};
+
+}  // namespace bocst::query

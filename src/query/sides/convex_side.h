@@ -1,0 +1,63 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#pragma once
+
+#include <cstdint>
+#include <optional>
+#include <vector>
+
+#include "geometry/convex_shape.h"
+#include "query/sides/side.h"
+
+namespace bocst::query {
+
+/// One solid body as a side of a walk: a single leaf, in the frame of the body.
+class ConvexSide {
+ public:
+  using Node = int;
+  static constexpr bool kBodies = true;
+  static constexpr bool kNodesContainSurface = true;
+
+  explicit ConvexSide(const ConvexShape& body) : body_(body) {}
+
+  Node root() const { return 0; }
+  bool isConservative() const { return false; }
+  State state(Node) const { return State::kLeaf; }
+  bool growsFromGrid(Node) const { return true; }
+  void grow(Node, std::vector<tree::Tree::Growth>&) const {}
+
+  /// FCL's name for what has no parts.
+  std::uint64_t id(Node) const { return ~std::uint64_t{0}; }
+
+  double size(Node) const { return body_.box().half.squaredNorm(); }
+  OrientedVolume volume(Node) const { return body_.box(); }
+  Sphere sphere(Node) const { return {body_.box().center, body_.box().half.norm()}; }
+
+  bool isBox(Node) const { return body_.isBox(); }
+  SeparationResult gap(Node, const PointSet& points, double cutoff) const { return body_.gap(points, cutoff); }
+  ContactPoint penetration(Node, const PointSet& points, const SeparationResult& gap) const {
+    return body_.penetration(points, gap);
+  }
+
+  std::optional<Eigen::Vector3d> point(Node) const { return body_.point(); }
+  SweptHull hull(Node) const { return body_.hull(); }
+
+  /// Does a sphere in this frame come within `tolerance` of the body?
+  bool meets(Node node, const Sphere& s, double tolerance) const {
+    const double extent = s.radius * (1 + 1e-12) + tolerance;
+    return !(gap(node, {&s.center, 1}, extent).atLeast > extent);
+  }
+
+  // A leaf has no children.
+  template <typename F>
+  void children(Node, F&&) const {}
+  template <typename OtherVolume, typename F>
+  void overlappingChildren(Node, OtherVolume&, const SimilarityTransform&, F&&) const {}
+  template <typename OtherVolume, typename Large, typename Other, typename F>
+  void childrenMeeting(Node, OtherVolume&, const SimilarityTransform&, Large&, const Other&, typename Other::Node,
+                       F&&) const {}
+
+ private:
+  const ConvexShape& body_;
+};
+
+}  // namespace bocst::query

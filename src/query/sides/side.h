@@ -1,0 +1,259 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#pragma once
+
+#include <algorithm>
+#include <cstdint>
+#include <vector>
+
+#include "geometry/overlap_kernels.h"
+#include "geometry/volume.h"
+#include "tree/tree.h"
+
+namespace bocst::query {
+
+/// What a walk can do with a node.
+enum class State {
+  kInner,  ///< Has resident children.
+  kLeaf,   ///< Is tested itself: by its triangles, or as a sphere (cell).
+  kGrows,  ///< Needs the oracle first.
+};
+
+/// One side of a pair: a model's tree. A partner of another kind is another class with these members (BvhSide).
+/// The query lock of the tree is held shared for the life of this object.
+class TreeSide {
+ public:
+  using Node = tree::NodeRef;
+  static constexpr bool kBodies = false;
+  static constexpr bool kNodesContainSurface = true;
+
+  explicit TreeSide(tree::Tree& tree) : TreeSide(tree, tree.now()) {}
+  TreeSide(tree::Tree& tree, std::int64_t now) : tree_(tree), now_(now) {}
+
+  Node root() const { return Node(); }
+
+  /// Leaves are cells of the collision depth, not triangles.
+  bool isConservative() const { return tree_.conservative(); }
+
+  State state(Node node) const {
+    const tree::ChildRef ref = tree_.childRef(node);
+    if (ref.tag() == tree::ChildRef::kBlock && !(isConservative() && tree_.isDeepest(level(node))))
+      return State::kInner;
+    if (isConservative()) return tree_.isDeepest(level(node)) ? State::kLeaf : State::kGrows;
+    if (ref.tag() == tree::ChildRef::kShortList) return State::kLeaf;
+    return ref.tag() == tree::ChildRef::kList && tree_.isDeepest(level(node)) ? State::kLeaf : State::kGrows;
+  }
+
+  /// Growing this node needs no oracle.
+  bool growsFromGrid(Node node) const { return tree_.growsFromGrid(node); }
+
+  void grow(Node node, std::vector<tree::Tree::Growth>& batch) const {
+    batch.push_back({&tree_, node, !isConservative()});
+  }
+
+  /// Half the diagonal of the node's cell, squared: what decides which of two nodes is expanded.
+  double size(Node node) const {
+    const double side = 1 << (lattice::kMaxLevel - level(node));
+    return 0.75 * side * side;
+  }
+
+  Volume volume(Node node) const {
+    if (node.isRoot()) {
+      const oracle::CellBounds& b = tree_.rootBounds();
+      return decode(b.lo[0], b.lo[1], b.lo[2], b.hi[0], b.hi[1], b.hi[2], b.normal[0], b.normal[1], b.normal[2],
+                    b.slab_center, b.slab_half, 0, 0, 0, 1);
+    }
+    const tree::Block& parent = tree_.block(node.block());
+    const oracle::OctantBounds& b = parent.octants;
+    const int o = node.octant();
+    return decode(b.lo[0][o], b.lo[1][o], b.lo[2][o], b.hi[0][o], b.hi[1][o], b.hi[2][o], b.normal[0][o],
+                  b.normal[1][o], b.normal[2][o], b.slab_center[o], b.slab_half[o], 2 * parent.at[0] + (o & 1),
+                  2 * parent.at[1] + (o >> 1 & 1), 2 * parent.at[2] + (o >> 2 & 1), parent.level + 1);
+  }
+
+  /// Bounds the surface below a node, and the spheres of all cells below it: a cube's sphere holds those of its parts;
+  /// the sphere of a part of a clipped region may stick out, by less than the factor sqrt(2) about the region's centre,
+  /// as |h - h'| + |h'| <= sqrt(2) |h| for half extents 0 <= h' <= h.
+  Sphere sphere(Node node) const {
+    const lattice::Cell cell = tree_.cell(node);
+    Sphere s = sphereAbout(cell);
+    if (isConservative() && !tree_.isDeepest(cell.level) && isClipped(cell)) s.radius *= 1.4142135623730952;
+    return s;
+  }
+
+  /// The sphere about the node's cube: quickly had, for what only wants an order.
+  Sphere roughSphere(Node node) const {
+    const lattice::Cell cell = tree_.cell(node);
+    const double side = cell.side();
+    return {(Eigen::Vector3d(cell.at[0], cell.at[1], cell.at[2]).array() + 0.5) * side, 0.8660254037844387 * side};
+  }
+
+  /// The sphere about the node's actual region.
+  Sphere cellSphere(Node node) const { return sphereAbout(tree_.cell(node)); }
+
+  /// Names the cell of a leaf: its Morton code among those of its level.
+  std::uint64_t cellId(Node node) const { return tree_.cell(node).morton(); }
+
+  /// Calls f(child) for the children of an inner node that `other`, placed in this frame by `to`, may overlap.
+  template <typename OtherVolume, typename F>
+  void overlappingChildren(Node node, OtherVolume& other, const SimilarityTransform& to, F&& f) const {
+    const std::uint32_t index = tree_.childRef(node).index();
+    pushOctants(tree_.block(index), index, octantsOverlapping(index, other, to), f);
+  }
+
+  /// The same against the triangles of a leaf of the other side, see LargeTriangleLeaf: octants that no triangle meets
+  /// are left out too.
+  template <typename OtherVolume, typename Large, typename Other, typename F>
+  void childrenMeeting(Node node, OtherVolume& volume, const SimilarityTransform& to, Large& large, const Other& other,
+                       typename Other::Node leaf, F&& f) const {
+    const std::uint32_t index = tree_.childRef(node).index();
+    const unsigned mask = octantsOverlapping(index, volume, to);
+    if (mask != 0) pushOctants(tree_.block(index), index, large.octantsMeeting(*this, node, mask, other, leaf, to), f);
+  }
+
+  /// The centre of an inner node's cell and half its side, which is the side of its octants.
+  double octantsOf(Node node, Eigen::Vector3d& center) const {
+    const tree::Block& block = tree_.block(tree_.childRef(node).index());
+    const double half = 1 << (lattice::kMaxLevel - block.level - 1);
+    center = Eigen::Vector3d(2 * block.at[0] + 1, 2 * block.at[1] + 1, 2 * block.at[2] + 1) * half;
+    return half;
+  }
+
+  /// Calls f(child) for all children.
+  template <typename F>
+  void children(Node node, F&& f) const {
+    const std::uint32_t index = tree_.childRef(node).index();
+    const tree::Block& block = tree_.block(index);
+    tree_.markUsed(index, now_);
+    for (int mask = block.grey; mask != 0; mask &= mask - 1) {
+      f(Node::octant(index, __builtin_ctz(static_cast<unsigned>(mask))));
+    }
+  }
+
+  /// Triangles of a leaf that is not a cell.
+  std::size_t triangleCount(Node node) const { return tree_.list(tree_.childRef(node)).count; }
+  std::uint32_t triangle(Node node, std::size_t i) const { return tree_.list(tree_.childRef(node)).ids[i]; }
+
+  /// The corners of a leaf's triangles where the tree keeps them packed, and their numbers; else false.
+  bool packed(Node node, tree::PackedTriangles& triangles, tree::TriangleIds& ids) const {
+    const std::uint32_t list = tree_.childRef(node).index();
+    if (!tree_.lists().packed(list, triangles)) return false;
+    ids = tree_.lists()[list].ids;
+    return true;
+  }
+
+  /// Triangle t is about to be read.
+  void prefetch(std::uint32_t t) const { __builtin_prefetch(&tree_.surface().mesh->indices(t)); }
+
+  /// Corner k of triangle t as given; (v - origin()) * inverseUnit() is it in this side's frame.
+  const Eigen::Vector3d& vertex(std::uint32_t t, int k) const {
+    const Mesh& mesh = *tree_.surface().mesh;
+    return mesh.vertex(mesh.indices(t)[static_cast<std::size_t>(k)]);
+  }
+  const Eigen::Vector3d& origin() const { return tree_.surface().lattice.origin(); }
+  double inverseUnit() const { return 1 / tree_.surface().lattice.unit(); }
+
+  /// Corner k of triangle t in this side's frame.
+  Eigen::Vector3d corner(std::uint32_t t, int k) const { return tree_.surface().corner(t, k); }
+
+  std::int64_t now() const { return now_; }
+  tree::Tree& tree() const { return tree_; }
+
+ private:
+  template <typename OtherVolume>
+  unsigned octantsOverlapping(std::uint32_t index, OtherVolume& other, const SimilarityTransform& to) const {
+    const tree::Block& block = tree_.block(index);
+    tree_.markUsed(index, now_);
+    const double side = 1 << (lattice::kMaxLevel - block.level);
+    const double corner[3] = {block.at[0] * side, block.at[1] * side, block.at[2] * side};
+    return overlappingOctants(block.octants, seenFrom(other, to, corner, side / 2)) & block.grey;
+  }
+
+  // Calls f for the octants of a mask. What is still implicit comes first, so that a stack leaves it for last: a hit
+  // among resident nodes makes its growth unnecessary.
+  template <typename F>
+  static void pushOctants(const tree::Block& block, std::uint32_t index, unsigned mask, F&& f) {
+    unsigned resident = 0;
+    for (unsigned left = mask; left != 0; left &= left - 1) {
+      const int o = __builtin_ctz(left);
+      if (block.child[o].load(std::memory_order_relaxed).tag() == tree::ChildRef::kImplicit) {
+        f(Node::octant(index, o));
+      } else {
+        resident |= 1u << o;
+      }
+    }
+    for (; resident != 0; resident &= resident - 1) f(Node::octant(index, __builtin_ctz(resident)));
+  }
+
+  // Spelled out, one scalar each: this is the hottest code of a query after the pair test itself.
+  static Volume decode(int lo0, int lo1, int lo2, int hi0, int hi1, int hi2, int n0, int n1, int n2, int slab_center,
+                       int slab_half, int x, int y, int z, int level) {
+    const int cells = 1 << (lattice::kMaxLevel - level);
+    // Positions in double: beside a much smaller node, a rounding relative to this cell would be large.
+    const double side = cells, byte = side * (0.5 / 255), normal = 1.0 / 127, middle = side / 2;
+    const double c0 = (lo0 + hi0) * byte, c1 = (lo1 + hi1) * byte, c2 = (lo2 + hi2) * byte;
+    Volume v;
+    v.half[0] = static_cast<float>((hi0 - lo0) * byte);
+    v.half[1] = static_cast<float>((hi1 - lo1) * byte);
+    v.half[2] = static_cast<float>((hi2 - lo2) * byte);
+    v.center[0] = x * side + c0;
+    v.center[1] = y * side + c1;
+    v.center[2] = z * side + c2;
+    v.normal[0] = static_cast<float>(n0 * normal);
+    v.normal[1] = static_cast<float>(n1 * normal);
+    v.normal[2] = static_cast<float>(n2 * normal);
+    v.slab_offset = static_cast<float>(
+        (slab_center * side - (n0 * (c0 - middle) + n1 * (c1 - middle) + n2 * (c2 - middle))) * normal);
+    v.slab_half = static_cast<float>(slab_half * (side * normal / 2));
+    return v;
+  }
+
+  Sphere sphereAbout(const lattice::Cell& cell) const {
+    Sphere s;
+    Eigen::Vector3d half;
+    tree_.surface().lattice.region(cell, s.center, half);
+    s.radius = half.norm();
+    return s;
+  }
+
+  /// Is the actual region less than the cell? If not, none below it is.
+  bool isClipped(const lattice::Cell& cell) const {
+    const std::array<std::uint32_t, 3>& end = tree_.surface().lattice.extent();
+    const std::array<std::uint32_t, 3> corner = cell.corner();
+    for (std::size_t k = 0; k < 3; ++k) {
+      if (corner[k] + cell.side() > end[k]) return true;
+    }
+    return false;
+  }
+
+  int level(Node node) const { return node.isRoot() ? 1 : tree_.block(node.block()).level + 1; }
+
+  tree::Tree& tree_;
+  const std::int64_t now_;
+};
+
+/// Orders a batch, which is about one tree or two, so that each node is grown once.
+inline void uniqueGrowths(std::vector<tree::Tree::Growth>& batch) {
+  if (batch.size() < 2) return;
+  using Growth = tree::Tree::Growth;
+  tree::Tree* trees[2] = {batch[0].tree, batch[0].tree};
+  for (const Growth& g : batch) {
+    if (std::less<tree::Tree*>()(g.tree, trees[0])) trees[0] = g.tree;
+    if (std::less<tree::Tree*>()(trees[1], g.tree)) trees[1] = g.tree;
+  }
+  // Numbers, which sort several times as fast: tree, node, and what is wanted of it.
+  thread_local std::vector<std::uint64_t> keys;
+  keys.clear();
+  for (const Growth& g : batch) {
+    keys.push_back(std::uint64_t{g.tree != trees[0]} << 33 | std::uint64_t{g.node.bits} << 1 |
+                   std::uint64_t{g.list_suffices});
+  }
+  std::sort(keys.begin(), keys.end());
+  keys.erase(std::unique(keys.begin(), keys.end(), [](std::uint64_t a, std::uint64_t b) { return a >> 1 == b >> 1; }),
+             keys.end());
+  batch.clear();
+  for (const std::uint64_t key : keys) {
+    batch.push_back({trees[key >> 33], tree::NodeRef{static_cast<std::uint32_t>(key >> 1)}, (key & 1) != 0});
+  }
+}
+
+}  // namespace bocst::query

@@ -1,0 +1,49 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#pragma once
+
+#include <Eigen/Core>
+#include <cstdint>
+
+#include "geometry/volume.h"
+
+namespace bocst::query {
+
+/// A leaf that is a cell, as the visitor sees it: its sphere in the frame of side A.
+struct CellLeaf {
+  std::uint64_t id;
+  Sphere sphere;
+};
+
+/// What a query does with the pairs that a walk finds. Each function returns true to end the walk. A pair may come more
+/// than once.
+class Visitor {
+ public:
+  virtual ~Visitor() = default;
+
+  /// The first hit will end the walk.
+  virtual bool endsAtFirst() const = 0;
+  /// Triangle a of side A and b of side B may touch; everything that touches comes here. Where `certain`, they meet,
+  /// and FCL's test says so.
+  virtual bool triangles(std::uint32_t a, std::uint32_t b, bool certain) = 0;
+  /// The spheres of two cells overlap.
+  virtual bool cells(const CellLeaf& a, const CellLeaf& b) = 0;
+  /// A cell's sphere on one side meets a triangle on the other, whose point nearest to the sphere's centre is `point`
+  /// (frame of A).
+  virtual bool cellOfA(const CellLeaf& a, std::uint32_t b, const Eigen::Vector3d& point) = 0;
+  virtual bool cellOfB(std::uint32_t a, const CellLeaf& b, const Eigen::Vector3d& point) = 0;
+};
+
+/// The same where side B is made of solid bodies; `b` is the node of one.
+template <typename Node>
+class ConvexVisitor {
+ public:
+  virtual ~ConvexVisitor() = default;
+
+  virtual bool endsAtFirst() const = 0;
+  /// Triangle a of side A and body b may touch; everything that touches comes here.
+  virtual bool triangle(std::uint32_t a, const Node& b) = 0;
+  /// The sphere of a cell (frame of A) meets body b.
+  virtual bool cell(const CellLeaf& a, const Node& b) = 0;
+};
+
+}  // namespace bocst::query

@@ -1,0 +1,67 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#pragma once
+
+#include <Eigen/Core>
+#include <Eigen/Geometry>
+#include <array>
+#include <atomic>
+#include <cstdint>
+
+namespace bocst::tree {
+
+/// How far a surface reaches in any direction, from above: the support function of its convex hull, kept for the
+/// directions of a grid on the faces of a cube. As it is convex and scales with the direction, what is interpolated
+/// linearly between three of them is never too small.
+///
+/// Directions have largest entry 1; lengths are lattice units, positions count from the middle of the root's cube.
+///
+/// Threads: every value is an upper bound by itself, so they are read and lowered without a lock.
+class SupportTable {
+ public:
+  static constexpr int kCells = 6;  ///< Along the side of a face.
+  static constexpr int kRow = kCells + 1;
+  static constexpr int kCount = 6 * kRow * kRow;
+
+  /// Point (i, j) of face 2 * k + (1 if negative): entry k is 1 or -1, those after it run from -1 to 1 with i and j.
+  static constexpr int number(int face, int i, int j) { return (face * kRow + i) * kRow + j; }
+  static Eigen::Vector3d direction(int number);
+
+  /// All that is known is a box.
+  void start(const Eigen::AlignedBox3d& box);
+
+  /// The middle of that box.
+  const Eigen::Vector3f& center() const { return center_; }
+
+  /// About how far it is from there to the hull's surface, at least; for what only wants a guess.
+  float innerRadius() const { return inner_radius_.load(std::memory_order_relaxed); }
+
+  float value(int number) const { return values_[static_cast<std::size_t>(number)].load(std::memory_order_relaxed); }
+
+  /// All of them, for who reads several at once; each is a word of its own, so it is never read in parts.
+  const float* values() const {
+    static_assert(sizeof(std::atomic<float>) == sizeof(float) && std::atomic<float>::is_always_lock_free);
+    return reinterpret_cast<const float*>(values_.data());
+  }
+
+  /// Not yet as good as the tree can say.
+  bool isOpen(int number) const {
+    return states_[static_cast<std::size_t>(number)].load(std::memory_order_relaxed) == kOpen;
+  }
+
+  /// A tree that has grown by half since can say more of what is not exact. `expansions`: so many since start().
+  void reopen(std::uint64_t expansions);
+
+  /// The surface reaches no farther; `exact`: and as far, so the tree cannot say more when it has grown.
+  void lower(int number, double value, bool exact);
+
+ private:
+  enum State : std::uint8_t { kOpen, kAsked, kExact };
+
+  Eigen::Vector3f center_ = Eigen::Vector3f::Zero();
+  std::atomic<float> inner_radius_{0};
+  std::array<std::atomic<float>, kCount> values_{};
+  std::array<std::atomic<State>, kCount> states_{};
+  std::atomic<std::uint64_t> expansions_{0};
+};
+
+}  // namespace bocst::tree

@@ -1,0 +1,302 @@
+// SPDX-License-Identifier: BSD-3-Clause
+// What the supports of two surfaces say is never more than brute force over all vertices does, on every instruction set
+// that the dispatch can choose, and soon it is little less.
+#include "query/cull/separation.h"
+
+#include <bocst/bocst.h>
+#include <gtest/gtest.h>
+
+#include <algorithm>
+#include <cmath>
+#include <limits>
+
+#include "conformance/reference.h"
+#include "every_target.h"
+#include "meshes.h"
+#include "query/collide/tree_walk.h"
+#include "query/cull/support_refinement.h"
+
+namespace bocst::query {
+namespace {
+
+using Eigen::Vector3d;
+
+// A tree and the vertices of its mesh, counted from the middle of the root.
+struct Side {
+  explicit Side(const test::Raw& raw, const Options& options = Options())
+      : tree(raw.mesh(), options), middle(Vector3d::Constant(1 << (lattice::kBits - 1))) {
+    for (const auto& t : raw.triangles) {
+      for (std::size_t k = 0; k < 3; ++k) {
+        vertices.push_back(tree.surface().lattice.toLattice(raw.vertices[t[k]]) - middle);
+      }
+    }
+  }
+  double support(const Vector3d& u) const { return u.dot(extreme(u)); }
+  Vector3d extreme(const Vector3d& u) const {
+    const auto less = [&u](const Vector3d& v, const Vector3d& w) { return u.dot(v) < u.dot(w); };
+    return *std::max_element(vertices.begin(), vertices.end(), less);
+  }
+
+  mutable tree::Tree tree;
+  Vector3d middle;
+  std::vector<Vector3d> vertices;
+};
+
+SimilarityTransform placement(const Eigen::Matrix3d& R, double scale, const Vector3d& translation) {
+  SimilarityTransform to;
+  to.rotation = R;
+  to.scale = scale;
+  to.translation = translation;
+  to.orthogonality_error = (R.transpose() * R - Eigen::Matrix3d::Identity()).cwiseAbs().maxCoeff();
+  to.ready();
+  return to;
+}
+
+// Places b so that the middles of the roots are `way` apart.
+SimilarityTransform apartBy(const Side& a, const Side& b, const Eigen::Matrix3d& R, double scale,
+                            const Vector3d& displacement) {
+  return placement(R, scale, a.middle + displacement - scale * (R * b.middle));
+}
+
+// All kept directions of both, as well as trees can tell that have grown.
+void refineAll(const Side& a, const Side& b) {
+  a.tree.expandAll(6);
+  b.tree.expandAll(6);
+  const TreeSide side_a(a.tree), side_b(b.tree);
+  for (int number = 0; number < tree::SupportTable::kCount; ++number) {
+    NearDirections near;
+    near.lanes = 8;
+    for (auto* of : {&near.of_a, &near.of_b}) {
+      for (auto& row : *of) std::fill(std::begin(row), std::end(row), number);
+    }
+    refineSupports(side_a, side_b, near);
+  }
+}
+
+class Separation : public test::EveryTarget {};
+
+std::vector<test::Raw> surfaces() {
+  test::Raw rod = test::box({0, 0, 0}, {1, 0.001, 0.0003});
+  test::Raw point;
+  point.vertices = {{3, 4, 5}};
+  point.triangles.emplace_back(0, 0, 0);
+  return {
+      test::torus(50), test::torus(9, 0.3), test::box({-1, -2, -0.5}, {1, 2, 0.5}), rod, test::adversarial(), point};
+}
+
+TEST_P(Separation, NeverExceedsBruteForce) {
+  std::mt19937_64 g(31);
+  std::uniform_real_distribution<double> u(-1, 1);
+  const std::vector<test::Raw> raws = surfaces();
+  for (std::size_t i = 0; i < raws.size(); ++i) {
+    const Side a(raws[i]), b(raws[(i + 1) % raws.size()]);
+    for (const bool sharp : {false, true}) {
+      if (sharp) refineAll(a, b);
+      for (int round = 0; round < 60; ++round) {
+        const Eigen::Matrix3d R =
+            round % 4 == 0 ? Eigen::Matrix3d(Eigen::Matrix3d::Identity()) : test::randomRotation(g);
+        const double scale = std::exp2(10 * u(g));
+        const Vector3d displacement = test::randomDirection(g) * 32768 * (1 + scale) * 2 * std::abs(u(g));
+        const SimilarityTransform to = apartBy(a, b, R, scale, displacement);
+        EightSeparations eight;
+        for (int lane = 0; lane < 8; ++lane) {
+          Vector3d d = test::randomDirection(g);
+          // Along axes, edges and diagonals of the cube of directions, too.
+          if (lane >= 4) d = Vector3d(static_cast<int>(g() % 3) - 1, static_cast<int>(g() % 3) - 1, g() % 2 ? 1 : -1);
+          for (int k = 0; k < 3; ++k) eight.u[k][lane] = static_cast<float>(d[k]);
+        }
+        evaluate(a.tree.supports(), b.tree.supports(), to, eight);
+        for (int lane = 0; lane < 8; ++lane) {
+          const Vector3d d(eight.u[0][lane], eight.u[1][lane], eight.u[2][lane]);
+          const Vector3d in_b = -(R.transpose() * d);
+          const double exact = d.dot(displacement) - a.support(d) - scale * b.support(in_b);
+          const double size = 32768 * (1 + scale),
+                       rounding_margin = 64 * 0x1p-24 * (displacement.norm() + 2 * size) * d.norm();
+          ASSERT_LE(eight.value[lane], exact + rounding_margin)
+              << i << ' ' << round << ' ' << lane << " sharp " << sharp;
+          if (sharp) {
+            ASSERT_GE(eight.value[lane], exact - 0.16 * size) << i << ' ' << round << ' ' << lane;
+          }
+          for (int k = 0; k < 3; ++k) {
+            for (const std::int32_t at : {eight.near.of_a[k][lane], eight.near.of_b[k][lane]}) {
+              ASSERT_GE(at, 0);
+              ASSERT_LT(at, tree::SupportTable::kCount);
+            }
+          }
+        }
+      }
+    }
+  }
+}
+
+TEST_P(Separation, WhatTouchesIsNotSeparate) {
+  std::mt19937_64 g(32);
+  std::uniform_real_distribution<double> u(-1, 1);
+  const std::vector<test::Raw> raws = surfaces();
+  int found = 0, looked = 0;
+  for (std::size_t i = 0; i < raws.size(); ++i) {
+    const Side a(raws[i]), b(raws[(i + 1) % raws.size()]);
+    refineAll(a, b);
+    for (int round = 0; round < 300; ++round) {
+      const Eigen::Matrix3d R = test::randomRotation(g);
+      const double scale = round % 2 ? 1 : std::exp2(10 * u(g)), size = 32768 * (1 + scale);
+      // The farthest vertex of each lies on that of the other.
+      const Vector3d d = test::randomDirection(g);
+      const Vector3d displacement = a.extreme(d) - scale * (R * b.extreme(-(R.transpose() * d)));
+      NearDirections near;
+      EXPECT_FALSE(areSeparate(a.tree.supports(), b.tree.supports(), apartBy(a, b, R, scale, displacement), near)) << i;
+      // A little apart may be found so, and far apart must.
+      found += areSeparate(a.tree.supports(), b.tree.supports(), apartBy(a, b, R, scale, displacement + 0.1 * size * d),
+                           near);
+      ++looked;
+      EXPECT_TRUE(areSeparate(a.tree.supports(), b.tree.supports(),
+                              apartBy(a, b, R, scale, displacement + 8 * size * d), near));
+      // Slack counts as contact.
+      SimilarityTransform loose = apartBy(a, b, R, scale, displacement + 0.1 * size * d);
+      loose.tolerance = 0.1001 * size;
+      EXPECT_FALSE(areSeparate(a.tree.supports(), b.tree.supports(), loose, near)) << i;
+    }
+  }
+  EXPECT_GT(found, looked / 2);
+}
+
+TEST_P(Separation, WhatIsNoNumberIsNotSeparate) {
+  const Side a(test::torus(20)), b(test::torus(20));
+  const double nan = std::numeric_limits<double>::quiet_NaN(), inf = std::numeric_limits<double>::infinity();
+  for (const double x : {nan, inf, -inf, 0.0}) {
+    NearDirections near;
+    const SimilarityTransform to = apartBy(a, b, Eigen::Matrix3d::Identity(), 1, Vector3d(x, 0, 0));
+    EXPECT_FALSE(areSeparate(a.tree.supports(), b.tree.supports(), to, near)) << x;
+    EXPECT_EQ(near.lanes, 0) << x;
+    // Directions that are none lie among the kept ones, too.
+    EightSeparations eight;
+    for (int lane = 0; lane < 8; ++lane) {
+      for (int k = 0; k < 3; ++k) eight.u[k][lane] = static_cast<float>((lane >> k & 1) != 0 ? x : 0);
+    }
+    evaluate(a.tree.supports(), b.tree.supports(), apartBy(a, b, Eigen::Matrix3d::Identity(), 1, {9, 9, 9}), eight);
+    for (const auto* of : {&eight.near.of_a, &eight.near.of_b}) {
+      for (const auto& row : *of) {
+        for (const std::int32_t at : row) {
+          EXPECT_GE(at, 0) << x;
+          EXPECT_LT(at, tree::SupportTable::kCount) << x;
+        }
+      }
+    }
+  }
+}
+
+INSTANTIATE_TEST_SUITE_P(Targets, Separation, testing::ValuesIn(test::EveryTarget::targets()), test::EveryTarget::name);
+
+TEST(SupportTable, AreExactWhereATreeHasGrown) {
+  for (const std::size_t n : {std::size_t{20}, std::size_t{100}}) {  // without and with a root grid
+    const Side a(test::torus(n, 0.2)), b(test::torus(n, 0.2));
+    const TreeSide side(a.tree);
+    NearDirections near{};
+    near.lanes = 8;
+    refineSupports(side, side, near);
+    const Vector3d first = tree::SupportTable::direction(0);
+    EXPECT_GT(a.tree.supports().value(0), a.support(first) + 1000) << "all that is known of a tree at rest is a box";
+    EXPECT_EQ(a.tree.statistics().resident_nodes, 1u) << "and it does not grow for more";
+    refineAll(a, b);
+    for (int number = 0; number < tree::SupportTable::kCount; ++number) {
+      const double exact = a.support(tree::SupportTable::direction(number)), value = a.tree.supports().value(number);
+      ASSERT_GE(value, exact) << number;
+      ASSERT_LE(value, exact + 0.02) << number;  // two steps of float
+    }
+  }
+}
+
+// Answers by a walk, of which there must be none once supports part the two.
+struct NoContact : Visitor {
+  bool endsAtFirst() const override { return true; }
+  bool triangles(std::uint32_t, std::uint32_t, bool) override { return false; }
+  bool cells(const CellLeaf&, const CellLeaf&) override { return false; }
+  bool cellOfA(const CellLeaf&, std::uint32_t, const Vector3d&) override { return false; }
+  bool cellOfB(std::uint32_t, const CellLeaf&, const Vector3d&) override { return false; }
+};
+
+TEST(SupportTable, MissesSharpenThemAndAskNoOracle) {
+  const Side a(test::torus(100, 0.2)), b(test::torus(100, 0.2));
+  // Where the boxes' corners would meet, but not what is in them.
+  const Eigen::Matrix3d R = Eigen::AngleAxisd(0.3, Vector3d::UnitZ()).toRotationMatrix();
+  const Vector3d d = Vector3d(1, 1, 0.2).normalized();
+  const SimilarityTransform to = apartBy(a, b, R, 1, a.extreme(d) - R * b.extreme(-(R.transpose() * d)) + 2500 * d);
+  const auto ask = [&] {
+    const TreeSide side_a(a.tree), side_b(b.tree);
+    TreeWalk walk(side_a, side_b, to);
+    if (walk.isNeedless()) return true;
+    NoContact visitor;
+    EXPECT_FALSE(walk.run(visitor));
+    return false;
+  };
+  EXPECT_FALSE(ask()) << "the first must walk, and grow";
+  Statistics before = a.tree.statistics();
+  int walks = 1;
+  for (; walks < 40 && !ask(); ++walks) {
+    const Statistics now = a.tree.statistics();
+    EXPECT_EQ(now.oracle_batches, before.oracle_batches) << walks;
+    before = now;
+  }
+  EXPECT_LT(walks, 40);
+}
+
+TEST(SupportTable, EffortForOneMissIsBounded) {
+  // A cluster of all triangles in one cell of the grid, far from three others: the cluster is bounded by its cell.
+  test::Raw raw = test::torus(200);
+  raw.scale(1e-4);
+  for (const Vector3d& p : {Vector3d(1, 0, 0), Vector3d(0, 1, 0), Vector3d(0, 0, 1)}) {
+    raw.add(test::Raw(test::torus(4)).scale(1e-3).move(p));
+  }
+  const Side a(raw), b(test::torus(20));
+  refineAll(a, b);
+  std::size_t exact = 0;
+  for (int number = 0; number < tree::SupportTable::kCount; ++number) {
+    const double extent = a.support(tree::SupportTable::direction(number)), value = a.tree.supports().value(number);
+    ASSERT_GE(value, extent) << number;
+    exact += value <= extent + 0.02;
+  }
+  EXPECT_GT(exact, 100u);
+  EXPECT_LT(exact, static_cast<std::size_t>(tree::SupportTable::kCount))
+      << "all triangles of the cluster were looked at";
+}
+
+TEST(SupportTable, ANewSurfaceHasNewOnes) {
+  const test::Raw raw = test::torus(60);
+  Modeld a(raw.mesh());
+  const Modeld b(raw.mesh());
+  const auto I = fcl::Transform3d(fcl::Transform3d::Identity());
+  const auto X = test::pose<double>(Eigen::Matrix3d::Identity(), {1.61, 1.61, 0});
+  for (int i = 0; i < 50; ++i) EXPECT_FALSE(test::touching<double>(a, I, b, X));
+  // A bulge inside the same bounds, so that only the supports change.
+  test::Raw bulged = raw;
+  const auto less = [](const Vector3d& v, const Vector3d& w) { return v.x() + v.y() < w.x() + w.y(); };
+  *std::max_element(bulged.vertices.begin(), bulged.vertices.end(), less) = Vector3d(1.04, 1.04, 0);
+  a.updateVertices(bulged.vertices);
+  EXPECT_TRUE(test::touching<double>(a, I, b, X));
+  a.updateVertices(raw.vertices);
+  EXPECT_FALSE(test::touching<double>(a, I, b, X));
+}
+
+TEST(SupportTable, ShallowContactsAreFclsPairByPair) {
+  // Hulls that overlap by little: supports all but part them, and the walk does not expect a hit.
+  const test::Raw ra = test::torus(50, 0.2), rb = test::torus(33, 0.3);
+  const auto fa = test::bvh<fcl::OBBRSSd>(ra), fb = test::bvh<fcl::OBBRSSd>(rb);
+  const Modeld a(ra.mesh()), b(rb.mesh());
+  const auto I = fcl::Transform3d(fcl::Transform3d::Identity());
+  std::mt19937_64 g(34);
+  int hits = 0, misses = 0;
+  for (int i = 0; i < 400; ++i) {
+    const auto X = test::pose<double>(test::randomRotation(g),
+                                      test::randomDirection(g) * std::uniform_real_distribution<double>(1.2, 2.4)(g));
+    const test::Pairs want = test::pairs<double>(*fa, I, *fb, X);
+    (want.empty() ? misses : hits)++;
+    ASSERT_EQ(test::touching<double>(a, I, b, X), !want.empty()) << i;
+    ASSERT_EQ(test::touching<double>(b, X, a, I), !want.empty()) << i;
+    ASSERT_EQ(test::pairs<double>(a, I, b, X), want) << i;
+  }
+  EXPECT_GT(hits, 80);
+  EXPECT_GT(misses, 80);
+}
+
+}  // namespace
+}  // namespace bocst::query

@@ -1,0 +1,211 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#include "bench/bench_oracles.h"
+
+#include <bocst/bocst.h>
+#include <bocst/io.h>
+
+#include <algorithm>
+#include <cmath>
+#include <iostream>
+#include <memory>
+#include <set>
+#include <utility>
+
+#include "mesh/subdivide.h"
+#include "oracle/oracle.h"
+
+namespace bocst::program {
+namespace {
+
+using oracle::ExpansionRequest;
+
+/// What one oracle needed for one mesh; times in microseconds.
+struct Figures {
+  std::size_t cells = 0, pairs = 0;  ///< Of the batch: cells to expand, and triangles times octants.
+  double hold = 0, batch = 0, first_answer = 0;
+  double host_bytes = 0, device_bytes = 0;
+  oracle::Oracle::Cost cost;
+};
+
+/// The grey cells of the last level with at most this many.
+constexpr std::size_t kMostCells = 10000;
+constexpr std::uint32_t kLeaf = 32;
+
+/// Lists that a level's questions refer to.
+struct Level {
+  std::vector<ExpansionRequest> requests;
+  std::vector<std::vector<std::uint32_t>> ids;
+};
+
+Level childrenOf(std::vector<ExpansionRequest>& answers) {
+  Level next;
+  for (const ExpansionRequest& e : answers) {
+    for (std::size_t o = 0; o < 8; ++o) {
+      if ((e.grey >> o & 1) == 0) continue;
+      ExpansionRequest child;
+      child.surface = e.surface;
+      child.cell = e.cell.octant(static_cast<int>(o));
+      child.ids_up_to = kLeaf;
+      child.count = e.listSize(static_cast<int>(o));
+      next.ids.emplace_back();
+      if (e.device_lists[o].count > 0) {
+        child.resource = e.kept_resource;
+        child.resource_begin = e.device_lists[o].begin;
+      } else {
+        const auto list = e.lists.begin();
+        next.ids.back().assign(list + static_cast<std::ptrdiff_t>(e.list_begin[o]),
+                               list + static_cast<std::ptrdiff_t>(e.list_begin[o + 1]));
+      }
+      next.requests.push_back(std::move(child));
+    }
+  }
+  for (std::size_t i = 0; i < next.requests.size(); ++i) {
+    if (next.requests[i].resource == nullptr) next.requests[i].ids = next.ids[i].data();
+  }
+  return next;
+}
+
+std::vector<ExpansionRequest> answersTo(oracle::Oracle& oracle, std::vector<ExpansionRequest> requests) {
+  oracle.submit(requests);
+  oracle.wait(requests);
+  return requests;
+}
+
+/// @return false when growing took longer than the limit.
+bool measureBatch(oracle::Oracle& oracle, const std::shared_ptr<const Mesh>& mesh, double limit_seconds, Figures& f) {
+  oracle::Surface surface{mesh, lattice::Lattice(mesh->bounds(), Subdivision::kBono, 0)};
+  {
+    const Stopwatch watch;
+    surface.device = oracle.makeResident(surface);
+    f.hold = surface.device != nullptr ? watch.microseconds() : 0;
+  }
+  const Stopwatch all;
+  Level level;
+  level.requests.resize(1);
+  level.requests[0].surface = &surface;
+  level.requests[0].count = surface.triangle_count;
+  level.requests[0].ids_up_to = kLeaf;
+  for (;;) {
+    std::vector<ExpansionRequest> answers = answersTo(oracle, level.requests);
+    if (1e-6 * all.microseconds() > limit_seconds) return false;
+    Level next = childrenOf(answers);
+    if (next.requests.size() > kMostCells || next.requests.empty()) break;
+    const bool deepest = next.requests[0].cell.level == lattice::kMaxLevel;
+    level = std::move(next);
+    if (deepest) break;
+  }
+  f.cells = level.requests.size();
+  for (const ExpansionRequest& e : level.requests) f.pairs += 8 * e.count;
+  struct Sample {
+    double time;
+    oracle::Oracle::Cost cost;
+  };
+  std::vector<Sample> samples;
+  for (int i = 0; i < 7; ++i) {
+    std::vector<ExpansionRequest> batch = level.requests;
+    const Stopwatch watch;
+    oracle.submit(batch);
+    oracle.wait(batch);
+    samples.push_back({watch.microseconds(), oracle.lastCost()});
+  }
+  std::sort(samples.begin(), samples.end(), [](const Sample& a, const Sample& b) { return a.time < b.time; });
+  f.batch = samples[samples.size() / 2].time;
+  f.cost = samples[samples.size() / 2].cost;
+  return true;
+}
+
+/// Two new models, the meshes already where the oracle works, and one exact query.
+void measureFirstAnswer(OracleKind kind, const std::shared_ptr<const Mesh>& mesh, Figures& f) {
+  Options options;
+  options.oracle = kind;
+  const Eigen::Vector3d size = mesh->bounds().sizes();
+  fcl::Transform3d X = fcl::Transform3d::Identity();
+  X.linear() = Eigen::AngleAxisd(0.7, Eigen::Vector3d(1, 2, 3).normalized()).toRotationMatrix();
+  X.translation() = Eigen::Vector3d(0.6 * size.x(), 0.1 * size.y(), 0.1 * size.z());
+  const fcl::Transform3d I = fcl::Transform3d::Identity();
+  const fcl::CollisionRequest<double> request;
+  const Modeld holds(mesh, options);  // keeps the mesh on the device
+  std::vector<double> times;
+  for (int i = 0; i < 6; ++i) {
+    fcl::CollisionResult<double> result;
+    const Stopwatch watch;
+    const Modeld a(mesh, options), b(mesh, options);
+    fcl::collide(&a, I, &b, X, request, result);
+    if (i > 0) times.push_back(watch.microseconds());  // the first brings the mesh there
+    if (i == 0) fcl::collide(&holds, I, &a, X, request, result);
+    f.host_bytes = static_cast<double>(a.statistics().resident_bytes + b.statistics().resident_bytes);
+    f.device_bytes = static_cast<double>(a.statistics().device_bytes);
+  }
+  f.first_answer = quantile(times, 0.5);
+}
+
+}  // namespace
+
+int OracleBench::run(const Output& output) const {
+  std::shared_ptr<const Mesh> mesh = loadMesh(file);
+  std::set<std::string> slow, seen;
+  std::vector<OracleInfo> oracles;
+  for (const OracleInfo& info : availableOracles()) {
+    // The default device of each kind.
+    if (info.why_not.empty() && info.kind != OracleKind::kSampled && seen.insert(info.name).second) {
+      oracles.push_back(info);
+    }
+  }
+  Json report = {{"mesh", file}, {"rows", Json::array()}};
+  Table table;
+  table.row({"triangles", "oracle", "upload", "first answer", "batch: cells", "pairs", "time", "cells/s", "pairs/s",
+             "device: upload", "kernels", "read-back", "bytes host", "device"});
+  Progress progress("row", sizes.size() * oracles.size());
+  std::size_t last = 0;
+  for (const std::size_t size : sizes) {
+    // As near as whole subdivisions come.
+    while (static_cast<double>(mesh->triangleCount()) * 2 < static_cast<double>(size)) mesh = subdivided(*mesh);
+    if (std::exchange(last, mesh->triangleCount()) == mesh->triangleCount()) continue;
+    for (const OracleInfo& info : oracles) {
+      progress.step();
+      if (slow.count(info.name) != 0) continue;
+      const std::shared_ptr<oracle::Oracle> oracle = oracle::makeOracle(info.kind);
+      Figures f;
+      if (!measureBatch(*oracle, mesh, limit_seconds, f)) {
+        slow.insert(info.name);
+        continue;
+      }
+      measureFirstAnswer(info.kind, mesh, f);
+      const double cells_per_second = 1e6 * static_cast<double>(f.cells) / f.batch;
+      const double pairs_per_second = 1e6 * static_cast<double>(f.pairs) / f.batch;
+      report["rows"].push_back({{"triangles", mesh->triangleCount()},
+                                {"oracle", info.name},
+                                {"device", info.device},
+                                {"hardware", info.hardware},
+                                {"upload_us", f.hold},
+                                {"first_answer_us", f.first_answer},
+                                {"batch", {{"cells", f.cells}, {"pairs", f.pairs}, {"time_us", f.batch}}},
+                                {"cells_per_second", cells_per_second},
+                                {"pairs_per_second", pairs_per_second},
+                                {"device_us",
+                                 {{"upload", 1e6 * f.cost.upload},
+                                  {"kernels", 1e6 * f.cost.kernels},
+                                  {"read_back", 1e6 * f.cost.read_back}}},
+                                {"bytes", {{"host", f.host_bytes}, {"device", f.device_bytes}}}});
+      const bool device = f.hold > 0;
+      const auto part = [&](double seconds) { return f.cost.kernels > 0 ? formatTime(1e6 * seconds) : "-"; };
+      table.row({std::to_string(mesh->triangleCount()), info.name, device ? formatTime(f.hold) : "-",
+                 formatTime(f.first_answer), std::to_string(f.cells), std::to_string(f.pairs), formatTime(f.batch),
+                 formatNumber(cells_per_second), formatNumber(pairs_per_second), part(f.cost.upload),
+                 part(f.cost.kernels), part(f.cost.read_back), formatBytes(f.host_bytes),
+                 device ? formatBytes(f.device_bytes) : "-"});
+    }
+  }
+  if (output.wantsJson()) {
+    output.write(report);
+  } else {
+    table.print();
+    for (const OracleInfo& info : oracles) std::cout << '\n' << info.name << ": " << info.device;
+    std::cout << '\n';
+    for (const std::string& name : slow)
+      std::cout << name << ": left out where it took over " << limit_seconds << " s\n";
+  }
+  return 0;
+}
+
+}  // namespace bocst::program

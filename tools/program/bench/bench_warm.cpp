@@ -1,0 +1,141 @@
+// SPDX-License-Identifier: BSD-3-Clause
+// What is asked of models that have grown already.
+#include <cmath>
+
+#include "bench/bench_scenarios.h"
+#include "bench/bench_turns.h"
+
+namespace bocst::program {
+namespace {
+
+std::vector<double> where(const std::vector<bool>& verdicts, bool wanted, const std::vector<double>& values) {
+  std::vector<double> result;
+  for (std::size_t i = 0; i < values.size(); ++i) {
+    if (verdicts[i] == wanted) result.push_back(values[i]);
+  }
+  return result;
+}
+
+/// The same figures of those poses only that touch, or that do not.
+void comparePenetration(BenchReport& report, const std::string& key, const std::string& name,
+                        const std::vector<double>& ours, const std::vector<double>& theirs) {
+  if (ours.empty()) return report.skip(key, "there is no such pose");
+  report.compareTimes(key, name, ours, theirs);
+}
+
+void noteWorst(BenchSetting& setting, BenchReport& report, const std::vector<double>& ours,
+               const std::vector<double>& theirs) {
+  std::size_t worst = 0;
+  for (std::size_t i = 0; i < ours.size(); ++i) {
+    if (ours[i] * theirs[worst] > ours[worst] * theirs[i]) worst = i;
+  }
+  report.note("worst warm query: " + formatTime(ours[worst]) + " against " + formatTime(theirs[worst]) + " at --pose " +
+              setting.queryPoses()[worst].text());
+}
+
+/// FCL's turn may take longer than ttl, after which all would grow anew: the models' clock stands still.
+std::unique_ptr<BocstPair> makeAgeless(const BenchSetting& setting) {
+  Options options;
+  options.clock = [] { return Clock::time_point(); };
+  return setting.makeBocst(options);
+}
+
+/// As many of the poses, from the first on, as FCL can be asked about in ten seconds or so: it takes some 4 us a pair.
+std::vector<Eigen::Isometry3d> posesForContacts(BenchSetting& setting) {
+  constexpr std::size_t kMostPairs = 2000000;
+  const std::size_t most = kMostPairs / (2 * setting.request().rounds + 1);
+  std::vector<Eigen::Isometry3d> poses;
+  std::size_t pairs = 0;
+  for (const Eigen::Isometry3d& X_AB : setting.queryTransforms()) {
+    poses.push_back(X_AB);
+    pairs += setting.fcl().countContacts(X_AB);
+    if (pairs > most) break;
+  }
+  return poses;
+}
+
+bool sameDistances(const std::vector<double>& ours, const std::vector<double>& theirs) {
+  for (std::size_t i = 0; i < ours.size(); ++i) {
+    if (!(std::abs(theirs[i] - ours[i]) <= 1e-9 * theirs[i])) return false;
+  }
+  return true;
+}
+
+/// A first distance of both sides, where the meshes are apart. FCL's trees are the same whatever is asked, so they are
+/// not built once more.
+void benchFirstDistance(BenchSetting& setting, BenchReport& report) {
+  std::vector<double> ours, theirs, our_distances, fcl_distances;
+  for (const Eigen::Isometry3d& X_AB : setting.apartPoses()) {
+    const Stopwatch fcl_watch;
+    fcl_distances.push_back(setting.fcl().distance(X_AB));
+    theirs.push_back(setting.fclBuildTime() + fcl_watch.microseconds());
+    HandedOver a(*setting.meshA()), b(*setting.meshB());
+    const Stopwatch watch;
+    const std::unique_ptr<BocstPair> bocst = makeBocstPair(std::move(a), std::move(b), Options{});
+    our_distances.push_back(bocst->distance(X_AB));
+    ours.push_back(watch.microseconds());
+  }
+  if (ours.empty()) return report.skip("first_distance", "all poses touch");
+  report.mustBeEqual(sameDistances(our_distances, fcl_distances), "first distances");
+  report.compare("first_distance", "first distance, median", BenchRow::Unit::kMicroseconds, quantile(ours, 0.5),
+                 quantile(theirs, 0.5));
+}
+
+}  // namespace
+
+void benchWarm(BenchSetting& setting, BenchReport& report) {
+  const std::unique_ptr<BocstPair> pair = setting.makeBocst();
+  const std::vector<Eigen::Isometry3d>& X_ABs = setting.queryTransforms();
+  warmUp(*pair, X_ABs);
+  Side<bool> bocst(X_ABs, [&](const Eigen::Isometry3d& X_AB) { return pair->touch(X_AB); });
+  Side<bool> fcl(X_ABs, [&](const Eigen::Isometry3d& X_AB) { return setting.fcl().touch(X_AB); });
+  takeTurns(bocst, fcl, setting.request().rounds, "warm");
+  report.verdicts(bocst.answers(), fcl.answers());
+
+  const std::vector<double> ours = bocst.medians(), theirs = fcl.medians();
+  const std::vector<bool>& hits = fcl.answers();
+  report.compareTimes("query", "query", ours, theirs);
+  comparePenetration(report, "query_miss", "query without contact", where(hits, false, ours),
+                     where(hits, false, theirs));
+  comparePenetration(report, "query_hit", "query with contact", where(hits, true, ours), where(hits, true, theirs));
+  noteWorst(setting, report, ours, theirs);
+}
+
+void benchContacts(BenchSetting& setting, BenchReport& report) {
+  const std::vector<Eigen::Isometry3d> X_ABs = posesForContacts(setting);
+  const std::unique_ptr<BocstPair> pair = makeAgeless(setting);
+  bool same = true;
+  std::size_t count = 0;
+  for (const Eigen::Isometry3d& X_AB : X_ABs) {
+    const std::vector<QueryPair::Contact> contacts = pair->contacts(X_AB);
+    count += contacts.size();
+    same &= contacts == setting.fcl().contacts(X_AB);
+  }
+  report.mustBeEqual(same, "pairs of triangles");
+
+  warmUp(*pair, X_ABs, [&pair](const Eigen::Isometry3d& X_AB) { pair->countContacts(X_AB); });
+  Side<std::size_t> bocst(X_ABs, [&](const Eigen::Isometry3d& X_AB) { return pair->countContacts(X_AB); });
+  Side<std::size_t> fcl(X_ABs, [&](const Eigen::Isometry3d& X_AB) { return setting.fcl().countContacts(X_AB); });
+  takeTurns(bocst, fcl, setting.request().rounds, "contacts");
+  report.compareTimes("contacts", "all contacts", bocst.medians(), fcl.medians());
+  report.set("contacts", {{"poses", X_ABs.size()}, {"pairs", count}});
+  report.note("contacts: " + std::to_string(X_ABs.size()) + " poses, " + std::to_string(count) + " pairs of triangles");
+}
+
+void benchDistance(BenchSetting& setting, BenchReport& report) {
+  benchFirstDistance(setting, report);
+  std::vector<Eigen::Isometry3d> apart;
+  for (std::size_t i = 0; i < setting.queryTransforms().size(); ++i) {
+    if (!setting.queryVerdicts()[i]) apart.push_back(setting.queryTransforms()[i]);
+  }
+  if (apart.empty()) return report.skip("distance", "all poses touch");
+  const std::unique_ptr<BocstPair> pair = makeAgeless(setting);
+  warmUp(*pair, apart, [&pair](const Eigen::Isometry3d& X_AB) { pair->distance(X_AB); });
+  Side<double> bocst(apart, [&](const Eigen::Isometry3d& X_AB) { return pair->distance(X_AB); });
+  Side<double> fcl(apart, [&](const Eigen::Isometry3d& X_AB) { return setting.fcl().distance(X_AB); });
+  takeTurns(bocst, fcl, setting.request().rounds, "distance");
+  report.mustBeEqual(sameDistances(bocst.answers(), fcl.answers()), "distances");
+  report.compareTimes("distance", "distance", bocst.medians(), fcl.medians());
+}
+
+}  // namespace bocst::program

@@ -1,0 +1,102 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#include "cli/arguments.h"
+
+#include <CLI/CLI.hpp>
+
+namespace bocst::program {
+
+void ModelArguments::addShape(CLI::App& command) {
+  command.add_option("--subdivision", subdivision, "how cells are divided: octree (O-BOCST) or bono (B-BOCST)")
+      ->check(CLI::IsMember({"octree", "bono"}))
+      ->capture_default_str();
+  command
+      .add_option("--dimension", dimension,
+                  "the paper's d_t: the largest extent in lattice units, 1 to 65536; 0: chosen for the mesh")
+      ->check(CLI::Range(0.0, 65536.0))
+      ->capture_default_str();
+}
+
+void ModelArguments::addDepth(CLI::App& command) {
+  command.add_option("--depth", depth, "collision depth: the level of the spheres that answer; the root is level 1")
+      ->check(CLI::Range(1, 17))
+      ->capture_default_str();
+}
+
+void ModelArguments::addOracle(CLI::App& command) {
+  command
+      .add_option("--oracle", oracle,
+                  "who finds the octants that the surface meets; see `bocst oracles`; sampled is the "
+                  "paper's, which misses some")
+      ->check(CLI::IsMember({"auto", "cpu", "occlusion", "compute", "sampled"}))
+      ->capture_default_str();
+  command.add_option("--viewport", viewport, "pixels a side of the views that --oracle sampled draws")
+      ->check(CLI::Range(1, 4096))
+      ->capture_default_str();
+}
+
+void ModelArguments::addAnswer(CLI::App& command) {
+  command
+      .add_option("--answer", answer, "exact: triangle tests; conservative: the spheres of --depth, as in the paper")
+      ->check(CLI::IsMember({"exact", "conservative"}))
+      ->capture_default_str();
+  command.add_option("--scalar", scalar, "the scalar type of models and queries")
+      ->check(CLI::IsMember({"double", "float"}))
+      ->capture_default_str();
+}
+
+void ModelArguments::addAll(CLI::App& command) {
+  addAnswer(command);
+  addDepth(command);
+  addShape(command);
+  addOracle(command);
+}
+
+Options ModelArguments::options() const {
+  Options options;
+  options.subdivision = subdivision == "octree" ? Subdivision::kOctree : Subdivision::kBono;
+  options.dimension = dimension;
+  options.answer = exact() ? Answer::kExact : Answer::kConservative;
+  options.depth = depth;
+  options.viewport = viewport;
+  options.oracle = oracle == "cpu"         ? OracleKind::kCpu
+                   : oracle == "occlusion" ? OracleKind::kOcclusion
+                   : oracle == "compute"   ? OracleKind::kCompute
+                   : oracle == "sampled"   ? OracleKind::kSampled
+                                           : OracleKind::kAuto;
+  return options;
+}
+
+Json ModelArguments::json() const {
+  return {{"answer", answer},       {"depth", depth},   {"subdivision", subdivision},
+          {"dimension", dimension}, {"oracle", oracle}, {"scalar", scalar}};
+}
+
+void ImageArguments::add(CLI::App& command) {
+  CLI::Option* image =
+      command.add_option("--image", file, "write a picture that shows it (PNG); drawn without a display")
+          ->type_name("FILE");
+  command.add_option("--image-nodes", nodes, "what stands for nodes in the picture: their spheres, or boxes")
+      ->check(CLI::IsMember({"spheres", "boxes"}))
+      ->capture_default_str()
+      ->needs(image);
+  command.add_option("--image-up", up, "the axis that points upwards in the picture")
+      ->check(CLI::IsMember({"y", "z"}))
+      ->capture_default_str()
+      ->needs(image);
+  command.add_option("--image-width", width, "pixels; the height follows")
+      ->check(CLI::Range(200, 8000))
+      ->capture_default_str()
+      ->needs(image);
+}
+
+void addJson(CLI::App& command, Output& output) {
+  command.add_option("--json", output.json_file, "write a report as JSON into this file, or to stdout with -")
+      ->type_name("FILE|-");
+}
+
+void addHtml(CLI::App& command, std::string& file) {
+  command.add_option("--html", file, "write a page that shows it in 3D; it needs a browser with WebGL 2, no network")
+      ->type_name("FILE");
+}
+
+}  // namespace bocst::program

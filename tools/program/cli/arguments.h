@@ -1,0 +1,75 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#pragma once
+
+#include <bocst/options.h>
+
+#include <cstddef>
+#include <cstdint>
+#include <functional>
+#include <string>
+
+#include "cli/report.h"
+#include "pairs/query_pair.h"
+#include "render/renderer.h"
+
+namespace CLI {
+class App;
+}
+
+namespace bocst::program {
+
+/// What the command line asked for; returns the exit code.
+using Job = std::function<int()>;
+
+/// Each adds its subcommand to the program; choosing it sets `job`.
+void addCollide(CLI::App& program, Job& job);
+void addInspect(CLI::App& program, Job& job);
+void addValidate(CLI::App& program, Job& job);
+void addMerge(CLI::App& program, Job& job);
+void addBench(CLI::App& program, Job& job);
+void addPaper(CLI::App& program, Job& job);
+void addOracles(CLI::App& program, Job& job);
+void addManual(CLI::App& program, Job& job);  ///< After all others.
+
+/// The options of a model as the command line spells them.
+struct ModelArguments {
+  std::string subdivision = "bono";
+  double dimension = 0;
+  std::string answer = "exact";
+  int depth = Options{}.depth;
+  std::string oracle = "auto";
+  int viewport = Options{}.viewport;
+  std::string scalar = "double";
+
+  void addShape(CLI::App& command);   ///< --subdivision --dimension
+  void addDepth(CLI::App& command);   ///< --depth
+  void addOracle(CLI::App& command);  ///< --oracle --viewport
+  void addAnswer(CLI::App& command);  ///< --answer --scalar
+  void addAll(CLI::App& command);
+
+  Options options() const;
+  Scalar scalarKind() const { return scalar == "float" ? Scalar::kFloat : Scalar::kDouble; }
+  bool exact() const { return answer == "exact"; }
+  std::string answerText() const { return exact() ? "exact" : "conservative, depth " + std::to_string(depth); }
+  Json json() const;
+};
+
+/// A picture of what a command looks at.
+struct ImageArguments {
+  std::string file;
+  std::string nodes = "spheres";
+  std::string up = "z";
+  int width = 1600;
+
+  void add(CLI::App& command);  ///< --image --image-nodes --image-up --image-width
+  bool wanted() const { return !file.empty(); }
+  render::Volumes::Shape shape() const {
+    return nodes == "boxes" ? render::Volumes::Shape::kBoxes : render::Volumes::Shape::kSpheres;
+  }
+  render::Up upAxis() const { return up == "y" ? render::Up::kY : render::Up::kZ; }
+};
+
+void addJson(CLI::App& command, Output& output);     ///< --json
+void addHtml(CLI::App& command, std::string& file);  ///< --html
+
+}  // namespace bocst::program

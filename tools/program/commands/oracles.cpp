@@ -1,0 +1,53 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#include <bocst/oracle.h>
+
+#include <CLI/CLI.hpp>
+#include <iostream>
+#include <memory>
+#include <string>
+
+#include "cli/arguments.h"
+#include "oracle/oracle.h"
+
+namespace bocst::program {
+
+void addOracles(CLI::App& program, Job& job) {
+  auto output = std::make_shared<Output>();
+  CLI::App* command = program.add_subcommand("oracles", "list the oracles of this machine, and why others are missing");
+  addJson(*command, *output);
+  command->callback([output, &job] {
+    job = [output] {
+      output->check();
+      Json report = {{"oracles", Json::array()}};
+      Table table(Table::Others::kLeft);
+      table.row({"oracle", "hardware", "usable", "device"});
+      for (const OracleInfo& oracle : availableOracles()) {
+        report["oracles"].push_back({{"name", oracle.name},
+                                     {"device", oracle.device},
+                                     {"hardware", oracle.hardware},
+                                     {"usable", oracle.why_not.empty()},
+                                     {"why_not", oracle.why_not}});
+        table.row({oracle.name, oracle.hardware ? "yes" : "no",
+                   oracle.why_not.empty() ? "yes" : "no: " + oracle.why_not, oracle.device});
+      }
+      // What a model takes that leaves the choice open.
+      std::string automatic, why_not;
+      try {
+        automatic = oracle::makeOracle(OracleKind::kAuto)->name();
+      } catch (const OracleError& e) {
+        why_not = e.what();
+      }
+      report["auto"] = automatic.empty() ? Json() : Json(automatic);
+      if (!why_not.empty()) report["auto_why_not"] = why_not;
+      if (output->wantsJson()) {
+        output->write(report);
+      } else {
+        table.print();
+        std::cout << "\nauto takes " << (automatic.empty() ? "none: " + why_not : automatic) << '\n';
+      }
+      return 0;
+    };
+  });
+}
+
+}  // namespace bocst::program

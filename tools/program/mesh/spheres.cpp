@@ -1,0 +1,75 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#include "mesh/spheres.h"
+
+#include <algorithm>
+#include <cstdio>
+#include <filesystem>
+#include <stdexcept>
+
+#include "cli/report.h"
+
+namespace bocst::program {
+namespace {
+
+enum class Format { kJson, kPly, kYaml };
+
+Format formatOf(const std::string& file) {
+  std::string ending = std::filesystem::path(file).extension().string();
+  std::transform(ending.begin(), ending.end(), ending.begin(), [](unsigned char c) { return std::tolower(c); });
+  if (ending == ".json") return Format::kJson;
+  if (ending == ".ply") return Format::kPly;
+  if (ending == ".yaml" || ending == ".yml") return Format::kYaml;
+  throw std::invalid_argument(file + ": not a .ply, .json, .yaml or .yml file");
+}
+
+/// All digits, so that a sphere still holds what it held. YAML readers take 1e-05 for text, so a point is put in.
+std::string number(double value) {
+  char text[40];
+  std::snprintf(text, sizeof(text), "%.17g", value);
+  std::string result = text;
+  const std::size_t exponent = result.find('e');
+  if (exponent != std::string::npos && result.find('.') == std::string::npos) result.insert(exponent, ".0");
+  return result;
+}
+
+/// Each sphere as before + x, y, z with commas or spaces between + middle + radius + after.
+std::string list(const std::vector<NodeView>& nodes, const char* before, const char* comma, const char* middle,
+                 const char* after) {
+  std::string text;
+  for (const NodeView& node : nodes) {
+    text += before + number(node.center.x()) + comma + number(node.center.y()) + comma + number(node.center.z()) +
+            middle + number(node.radius) + after;
+  }
+  return text;
+}
+
+}  // namespace
+
+std::vector<NodeView> leavesAt(const std::vector<NodeView>& nodes, int level) {
+  std::vector<NodeView> leaves;
+  std::copy_if(nodes.begin(), nodes.end(), std::back_inserter(leaves), [level](const NodeView& node) {
+    return node.level == level || (node.level < level && node.children.empty());
+  });
+  return leaves;
+}
+
+void checkSphereFile(const std::string& file) { formatOf(file); }
+
+std::string sphereFile(const std::string& file, const std::vector<NodeView>& nodes, const std::string& link) {
+  switch (formatOf(file)) {
+    case Format::kPly:
+      return "ply\nformat ascii 1.0\nelement vertex " + std::to_string(nodes.size()) +
+             "\nproperty double x\nproperty double y\nproperty double z\nproperty double radius\nend_header\n" +
+             list(nodes, "", " ", " ", "\n");
+    case Format::kYaml:
+      return "collision_spheres:\n  " + Json(link).dump(-1, ' ', true, Json::error_handler_t::replace) + ":\n" +
+             list(nodes, "    - \"center\": [", ", ", "]\n      \"radius\": ", "\n");
+    case Format::kJson:
+      break;
+  }
+  std::string text = list(nodes, "  {\"center\": [", ", ", "], \"radius\": ", "},\n");
+  text.resize(text.size() - 2);  // the last comma; a tree has a root at least
+  return "[\n" + text + "\n]\n";
+}
+
+}  // namespace bocst::program

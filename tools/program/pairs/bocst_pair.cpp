@@ -1,0 +1,90 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#include <bocst/fcl.h>
+#include <bocst/model.h>
+
+#include "pairs/pair_of.h"
+#include "pairs/query_pair.h"
+
+namespace bocst::program {
+namespace {
+
+template <typename S>
+struct BocstQueries {
+  using Geometry = fcl::CollisionGeometry<S>;
+  using Pose = fcl::Transform3<S>;
+
+  static void collide(const Geometry* o1, const Pose& X_W1, const Geometry* o2, const Pose& X_W2,
+                      const fcl::CollisionRequest<S>& request, fcl::CollisionResult<S>& result) {
+    fcl::collide(o1, X_W1, o2, X_W2, request, result);
+  }
+  static void distance(const Geometry* o1, const Pose& X_W1, const Geometry* o2, const Pose& X_W2,
+                       const fcl::DistanceRequest<S>& request, fcl::DistanceResult<S>& result) {
+    fcl::distance(o1, X_W1, o2, X_W2, request, result);
+  }
+};
+
+template <typename S>
+class ModelPair : public PairOf<S, Model<S>, BocstPair, BocstQueries<S>> {
+ public:
+  using PairOf<S, Model<S>, BocstPair, BocstQueries<S>>::PairOf;
+
+  std::vector<TouchingPoint> touchingPoints(const Eigen::Isometry3d& X_AB, std::size_t limit) const override {
+    const fcl::CollisionRequest<S> request(limit, true);
+    fcl::CollisionResult<S> result;
+    this->collide(X_AB, QueryPair::Order::kAB, request, result);
+    std::vector<TouchingPoint> points;
+    points.reserve(result.numContacts());
+    for (std::size_t i = 0; i < result.numContacts(); ++i) {
+      const fcl::Contact<S>& c = result.getContact(i);
+      points.push_back({c.pos.template cast<double>(), c.normal.template cast<double>(), c.penetration_depth});
+    }
+    return points;
+  }
+
+  void updateA(std::vector<Eigen::Vector3d> vertices) override { this->a().updateVertices(std::move(vertices)); }
+
+  std::vector<NodeView> nodesA() const override { return nodesOf(this->a()); }
+  std::vector<NodeView> nodesB() const override { return nodesOf(this->b()); }
+  Statistics statisticsA() const override { return this->a().statistics(); }
+  Statistics statisticsB() const override { return this->b().statistics(); }
+  std::string oracleName() const override { return this->a().oracleName(); }
+
+ private:
+  static std::vector<NodeView> nodesOf(const Model<S>& model) {
+    std::vector<NodeView> nodes;
+    model.visit([&nodes](const NodeView& node) { nodes.push_back(node); });
+    return nodes;
+  }
+};
+
+template <typename S>
+std::unique_ptr<BocstPair> makePair(const MeshArrays& a, const MeshArrays& b, const Options& options) {
+  const auto make = [&options](const MeshArrays& mesh) {
+    return std::make_unique<Model<S>>(std::make_shared<const Mesh>(mesh.vertices, mesh.triangles), options);
+  };
+  return std::make_unique<ModelPair<S>>(make(a), make(b));
+}
+
+}  // namespace
+
+MeshArrays::MeshArrays(const Mesh& mesh, Scalar scalar) : vertices(mesh.vertices()) {
+  if (scalar == Scalar::kFloat) {
+    for (Eigen::Vector3d& v : vertices) v = v.cast<float>().cast<double>();
+  }
+  triangles.reserve(mesh.triangleCount());
+  for (std::size_t t = 0; t < mesh.triangleCount(); ++t) triangles.push_back(mesh.triangle(t));
+}
+
+std::unique_ptr<BocstPair> makeBocstPair(Scalar scalar, const MeshArrays& a, const MeshArrays& b,
+                                         const Options& options) {
+  return scalar == Scalar::kFloat ? makePair<float>(a, b, options) : makePair<double>(a, b, options);
+}
+
+std::unique_ptr<BocstPair> makeBocstPair(HandedOver&& a, HandedOver&& b, const Options& options) {
+  const auto make = [&options](HandedOver& mesh) {
+    return std::make_unique<Modeld>(Mesh::fromIndices(std::move(mesh.vertices), std::move(mesh.triangles)), options);
+  };
+  return std::make_unique<ModelPair<double>>(make(a), make(b));
+}
+
+}  // namespace bocst::program

@@ -1,0 +1,129 @@
+// SPDX-License-Identifier: BSD-3-Clause
+// The only file that builds FCL's trees; its headers take long to compile. No bocst overload is in sight here.
+#include <fcl/geometry/bvh/BVH_model.h>
+#include <fcl/math/bv/OBB.h>
+#include <fcl/math/bv/OBBRSS.h>
+#include <fcl/math/bv/RSS.h>
+#include <fcl/math/geometry.h>
+#include <fcl/narrowphase/collision.h>
+#include <fcl/narrowphase/detail/traversal/collision/intersect.h>
+#include <fcl/narrowphase/distance.h>
+
+#include <stdexcept>
+
+#include "pairs/pair_of.h"
+#include "pairs/query_pair.h"
+
+namespace bocst::program {
+namespace {
+
+template <typename S>
+struct FclQueries {
+  using Geometry = fcl::CollisionGeometry<S>;
+  using Pose = fcl::Transform3<S>;
+
+  static void collide(const Geometry* o1, const Pose& X_W1, const Geometry* o2, const Pose& X_W2,
+                      const fcl::CollisionRequest<S>& request, fcl::CollisionResult<S>& result) {
+    fcl::collide(o1, X_W1, o2, X_W2, request, result);
+  }
+  static void distance(const Geometry* o1, const Pose& X_W1, const Geometry* o2, const Pose& X_W2,
+                       const fcl::DistanceRequest<S>& request, fcl::DistanceResult<S>& result) {
+    fcl::distance(o1, X_W1, o2, X_W2, request, result);
+  }
+};
+
+void check(int code) {
+  if (code != fcl::BVH_OK) throw std::runtime_error("FCL refuses the mesh, code " + std::to_string(code));
+}
+
+const std::vector<fcl::Vector3d>& verticesFor(const std::vector<Eigen::Vector3d>& vertices, double) { return vertices; }
+
+std::vector<fcl::Vector3f> verticesFor(const std::vector<Eigen::Vector3d>& vertices, float) {
+  std::vector<fcl::Vector3f> rounded;
+  rounded.reserve(vertices.size());
+  for (const Eigen::Vector3d& v : vertices) rounded.push_back(v.cast<float>());
+  return rounded;
+}
+
+template <typename BV>
+std::unique_ptr<fcl::BVHModel<BV>> build(const MeshArrays& mesh) {
+  auto model = std::make_unique<fcl::BVHModel<BV>>();
+  check(model->beginModel(static_cast<int>(mesh.triangles.size()), static_cast<int>(mesh.vertices.size())));
+  check(model->addSubModel(verticesFor(mesh.vertices, typename BV::S{}), mesh.triangles));
+  check(model->endModel());
+  return model;
+}
+
+template <typename BV>
+class BvhPair : public PairOf<typename BV::S, fcl::BVHModel<BV>, FclPair, FclQueries<typename BV::S>> {
+  using S = typename BV::S;
+
+ public:
+  using PairOf<S, fcl::BVHModel<BV>, FclPair, FclQueries<S>>::PairOf;
+
+  bool trianglesTouch(QueryPair::Contact triangles, const Eigen::Isometry3d& X_AB,
+                      QueryPair::Order order) const override {
+    // In the caller's order and in the first one's frame: so FCL rounds when it asks.
+    const bool ab = order == QueryPair::Order::kAB;
+    const fcl::BVHModel<BV>& first = ab ? this->a() : this->b();
+    const fcl::BVHModel<BV>& second = ab ? this->b() : this->a();
+    const fcl::Transform3<S> X_WA = fcl::Transform3<S>::Identity();
+    const fcl::Transform3<S> X_WB = X_AB.cast<S>();
+    fcl::Matrix3<S> R;
+    fcl::Vector3<S> T;
+    fcl::relativeTransform(ab ? X_WA : X_WB, ab ? X_WB : X_WA, R, T);
+    const fcl::Triangle& p = first.tri_indices[ab ? triangles.first : triangles.second];
+    const fcl::Triangle& q = second.tri_indices[ab ? triangles.second : triangles.first];
+    return fcl::detail::Intersect<S>::intersect_Triangle(first.vertices[p[0]], first.vertices[p[1]],
+                                                         first.vertices[p[2]], second.vertices[q[0]],
+                                                         second.vertices[q[1]], second.vertices[q[2]], R, T);
+  }
+
+  void rebuildA(const MeshArrays& mesh) override { this->replaceA(build<BV>(mesh)); }
+
+  void refitA(const std::vector<Eigen::Vector3d>& vertices, FclPair::Refit refit) override {
+    fcl::BVHModel<BV>& model = this->a();
+    const auto& positions = verticesFor(vertices, S{});
+    if (refit == FclPair::Refit::kNewPositions) {
+      check(model.beginReplaceModel());
+      check(model.replaceSubModel(positions));
+      check(model.endReplaceModel(true, true));
+    } else {
+      check(model.beginUpdateModel());
+      check(model.updateSubModel(positions));
+      check(model.endUpdateModel(true, true));
+    }
+  }
+};
+
+template <typename BV>
+std::unique_ptr<FclPair> buildPair(const MeshArrays& a, const MeshArrays& b) {
+  return std::make_unique<BvhPair<BV>>(build<BV>(a), build<BV>(b));
+}
+
+template <typename S>
+std::unique_ptr<FclPair> buildPair(FclTree tree, const MeshArrays& a, const MeshArrays& b) {
+  switch (tree) {
+    case FclTree::kObbRss:
+      return buildPair<fcl::OBBRSS<S>>(a, b);
+    case FclTree::kObb:
+      return buildPair<fcl::OBB<S>>(a, b);
+    case FclTree::kRss:
+      return buildPair<fcl::RSS<S>>(a, b);
+  }
+  return nullptr;
+}
+
+}  // namespace
+
+std::unique_ptr<FclPair> buildFclPair(FclTree tree, Scalar scalar, const MeshArrays& a, const MeshArrays& b) {
+  return scalar == Scalar::kFloat ? buildPair<float>(tree, a, b) : buildPair<double>(tree, a, b);
+}
+
+std::size_t fclTreeBytes(Scalar scalar, std::size_t triangles) {
+  const std::size_t node =
+      scalar == Scalar::kFloat ? sizeof(fcl::BVNode<fcl::OBBRSS<float>>) : sizeof(fcl::BVNode<fcl::OBBRSS<double>>);
+  return triangles == 0 ? 0 : (2 * triangles - 1) * node;
+}
+
+}  // namespace bocst::program

@@ -1,0 +1,155 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#include "pairs/poses.h"
+
+#include <algorithm>
+#include <charconv>
+#include <cmath>
+#include <cstdio>
+#include <stdexcept>
+#include <system_error>
+
+namespace bocst::program {
+
+Pose Pose::parse(const std::string& text) {
+  Pose pose;
+  const char* at = text.data();
+  const char* const end = at + text.size();
+  for (std::size_t i = 0; i < pose.numbers.size(); ++i) {
+    if (i > 0) {
+      if (at == end || *at != ',') throw std::invalid_argument("seven numbers x,y,z,qw,qx,qy,qz expected");
+      ++at;
+    }
+    while (at != end && (*at == ' ' || *at == '+')) ++at;
+    const auto [next, error] = std::from_chars(at, end, pose.numbers[i]);
+    if (error != std::errc()) throw std::invalid_argument("seven numbers x,y,z,qw,qx,qy,qz expected");
+    if (!std::isfinite(pose.numbers[i])) throw std::invalid_argument("a pose has finite numbers");
+    at = next;
+  }
+  if (at != end) throw std::invalid_argument("seven numbers x,y,z,qw,qx,qy,qz expected");
+  const Eigen::Map<const Eigen::Vector4d> q(pose.numbers.data() + 3);
+  if (!(q.norm() > 1e-100) || !std::isfinite(q.norm()))
+    throw std::invalid_argument("the quaternion cannot be normalised");
+  return pose;
+}
+
+Eigen::Isometry3d Pose::transform() const {
+  const auto& [x, y, z, qw, qx, qy, qz] = numbers;
+  const double norm = std::sqrt(((qw * qw + qx * qx) + qy * qy) + qz * qz);
+  const Eigen::Quaterniond q(qw / norm, qx / norm, qy / norm, qz / norm);
+  Eigen::Isometry3d X = Eigen::Isometry3d::Identity();
+  X.linear() = q.toRotationMatrix();
+  X.translation() = Eigen::Vector3d(x, y, z);
+  return X;
+}
+
+std::string Pose::text() const {
+  std::string text;
+  for (const double number : numbers) {
+    char buffer[64];
+    const std::to_chars_result r = std::to_chars(buffer, buffer + sizeof(buffer), number);
+    text += (text.empty() ? "" : ",") + std::string(buffer, r.ptr);
+  }
+  return text;
+}
+
+std::uint64_t Random::bits() {
+  std::uint64_t z = (state_ += 0x9e3779b97f4a7c15u);
+  z = (z ^ (z >> 30)) * 0xbf58476d1ce4e5b9u;
+  z = (z ^ (z >> 27)) * 0x94d049bb133111ebu;
+  return z ^ (z >> 31);
+}
+
+double Random::uniform() { return static_cast<double>(bits() >> 11) * 0x1p-53; }
+
+template <int N>
+std::array<double, N> Random::direction() {
+  while (true) {
+    std::array<double, N> v;
+    double square = 0;
+    for (double& x : v) {
+      x = between(-1, 1);
+      square += x * x;
+    }
+    if (square > 1 || square < 1e-4) continue;
+    const double norm = std::sqrt(square);
+    for (double& x : v) x /= norm;
+    return v;
+  }
+}
+
+PoseSampler::PoseSampler(const Mesh& a, const Mesh& b, const QueryPair& reference, std::uint64_t seed)
+    : reference_(reference),
+      seed_(seed),
+      random_(seed),
+      center_a_(a.bounds().center()),
+      center_b_(b.bounds().center()),
+      radius_a_(a.bounds().sizes().norm() / 2),
+      radius_b_(b.bounds().sizes().norm() / 2) {}
+
+Pose PoseSampler::at(double distance) const {
+  // B's centre lies on the ray from A's centre.
+  Pose pose;
+  std::copy(rotation_.begin(), rotation_.end(), pose.numbers.begin() + 3);
+  const Eigen::Matrix3d rotation = pose.transform().linear();
+  for (int i = 0; i < 3; ++i) {
+    const double turned =
+        (rotation(i, 0) * center_b_[0] + rotation(i, 1) * center_b_[1]) + rotation(i, 2) * center_b_[2];
+    pose.numbers[static_cast<std::size_t>(i)] = (center_a_[i] - turned) + distance * ray_[i];
+  }
+  return pose;
+}
+
+bool PoseSampler::touches(double distance) const { return reference_.touch(at(distance).transform()); }
+
+Pose PoseSampler::anywhereOnRay() { return at(inner_ + random_.between(0, 1.5) * (contact_ - inner_)); }
+
+void PoseSampler::nextRay(int steps) {
+  for (int attempt = 0; attempt < 1000; ++attempt) {
+    rotation_ = random_.direction<4>();
+    const std::array<double, 3> ray = random_.direction<3>();
+    ray_ = Eigen::Vector3d(ray[0], ray[1], ray[2]);
+    double free = (radius_a_ + radius_b_) * 1.01;
+    // Surfaces may miss each other when their centres meet (hollow, or bent around one another): then look outwards.
+    constexpr int kLooks = 16;
+    double inner = 0;
+    double touching = -1;
+    for (int k = 0; k < kLooks && touching < 0; ++k) {
+      const double distance = free * k / kLooks;
+      (touches(distance) ? touching : inner) = distance;
+    }
+    if (touching < 0) continue;
+    double inner_touching = touching;
+    for (int step = 0; step < steps; ++step) {
+      const double middle = (touching + free) / 2;
+      (touches(middle) ? touching : free) = middle;
+    }
+    for (int step = 0; step < 8 && inner_touching > inner; ++step) {
+      const double middle = (inner_touching + inner) / 2;
+      (touches(middle) ? inner_touching : inner) = middle;
+    }
+    contact_ = (touching + free) / 2;
+    inner_ = inner;
+    return;
+  }
+  throw std::runtime_error("no pose found in which the two meshes touch");
+}
+
+std::array<Pose, PoseSampler::kPosesOnRay> PoseSampler::aroundContact(std::uint64_t ray) {
+  random_ = Random(Random(seed_).bits() ^ Random(ray).bits());
+  nextRay(40);
+  std::array<Pose, kPosesOnRay> poses;
+  for (std::size_t i = 0; i < 6; ++i) {
+    const int exponent = -30 + static_cast<int>(random_.bits() % 27);  // 2^-30 to 2^-3
+    const double gap = std::ldexp(1 + random_.uniform(), exponent) * smallerRadius();
+    poses[i] = at(contact_ + (i % 2 == 0 ? -gap : gap));
+  }
+  for (std::size_t i = 6; i < kPosesOnRay; ++i) poses[i] = anywhereOnRay();
+  return poses;
+}
+
+Pose PoseSampler::nextAnywhere() {
+  nextRay(12);
+  return anywhereOnRay();
+}
+
+}  // namespace bocst::program

@@ -1,0 +1,54 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#pragma once
+
+#include <bocst/mesh.h>
+#include <bocst/node_view.h>
+#include <bocst/options.h>
+
+#include <Eigen/Geometry>
+#include <cstddef>
+#include <string>
+#include <vector>
+
+#include "cli/report.h"
+#include "mesh/sphere_error.h"
+#include "pairs/query_pair.h"
+
+namespace bocst::program {
+
+/// One HTML file that shows meshes with their sphere-trees in any browser with WebGL 2: all in itself, nothing is
+/// fetched. Coordinates are shown as they are given; the frame of the page is that of the first object.
+class Page {
+ public:
+  /// What is larger than these is shown in part, and the page says so.
+  static constexpr std::size_t kMaxTriangles = 250000;  ///< Of an object: coarser triangles.
+  static constexpr std::size_t kMaxNodes = 250000;      ///< Of a tree: the finest levels are left out.
+  static constexpr std::size_t kMaxContacts = 20000;    ///< The first ones.
+
+  explicit Page(std::string title);
+
+  /// A line of the table on the page.
+  void fact(const std::string& name, const std::string& value);
+
+  /// A mesh at a pose in the page's frame; trees added next are this object's.
+  void object(const std::string& name, const Mesh& mesh, const Eigen::Isometry3d& pose = Eigen::Isometry3d::Identity());
+
+  /// A tree of the last object, as Model::visit() gives it. @param errors by level, or empty.
+  /// @param dimension Options::dimension of the tree.
+  void tree(const Mesh& mesh, const std::vector<NodeView>& nodes, Subdivision subdivision, double dimension,
+            const std::vector<LevelError>& errors = {});
+
+  /// In the page's frame.
+  void contacts(const std::vector<TouchingPoint>& contacts);
+
+  std::string html() const;
+
+ private:
+  Json scene_;
+};
+
+/// Half the extents of the region of a node that its sphere is about: the cell's cube, or, with kBono, what of it is
+/// inside the mesh's bounds.
+Eigen::Vector3d halfRegion(const NodeView& node, const Mesh& mesh, Subdivision subdivision, double dimension);
+
+}  // namespace bocst::program
