@@ -38,6 +38,9 @@ struct NodeView {
 
   int level = 1;                        ///< 1 is the root.
   std::array<std::uint32_t, 3> cell{};  ///< Integer coordinates among the 2^(level-1) cells of an axis.
+  /// False for what exact answers build below cells: center and radius are those of a box of some triangles, level
+  /// counts from the cell above, n follows from level, and cell says nothing.
+  bool is_cell = true;
 };
 
 }  // namespace bocst

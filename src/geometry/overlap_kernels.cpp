@@ -15,10 +15,14 @@
 HWY_BEFORE_NAMESPACE();
 namespace bocst::query::HWY_NAMESPACE {
 
-std::uint8_t OverlappingOctants(const oracle::OctantBounds& octants, const OneVolume& b) {
+// kLoose: the boxes lie in a frame of sides 510 * byte; else each in an octant of its own, of side 1. Slabs count from
+// the middle of the box, or of the octant.
+template <bool kLoose>
+HWY_INLINE std::uint8_t overlapping(const oracle::OctantBounds& octants, const float (&byte)[3], float slab_unit,
+                                    const OneVolume& b) {
   const D d;
-  const V rounding_margin = hn::Set(d, b.rounding_margin), byte = hn::Set(d, 1.0f / 510), half = hn::Set(d, 0.5f);
-  const V per127 = hn::Set(d, 1.0f / 127), per254 = hn::Set(d, 1.0f / 254);
+  const V rounding_margin = hn::Set(d, b.rounding_margin), half = hn::Set(d, 0.5f);
+  const V per127 = hn::Set(d, 1.0f / 127), per_slab = hn::Set(d, slab_unit), per_half = hn::Set(d, slab_unit / 2);
   std::uint8_t result = 0;
   for (std::size_t i = 0; i < 8; i += hn::Lanes(d)) {
     // The octant's box: middle and half extents; delta is the way to the volume's middle.
@@ -26,8 +30,9 @@ std::uint8_t OverlappingOctants(const oracle::OctantBounds& octants, const OneVo
     BOCST_UNROLL
     for (int k = 0; k < 3; ++k) {
       const V lo = fromBytes(d, octants.lo[k] + i), hi = fromBytes(d, octants.hi[k] + i);
-      middle[k] = hn::MulAdd(hn::Add(lo, hi), byte, hn::Load(d, kOctantCorner[k] + i));
-      h[k] = hn::Mul(hn::Sub(hi, lo), byte);
+      const V corner = kLoose ? hn::Zero(d) : hn::Load(d, kOctantCorner[k] + i);
+      middle[k] = hn::MulAdd(hn::Add(lo, hi), hn::Set(d, byte[k]), corner);
+      h[k] = hn::Mul(hn::Sub(hi, lo), hn::Set(d, byte[k]));
       delta[k] = hn::Sub(hn::Set(d, b.center[k]), middle[k]);
     }
     M apart = hn::MaskFromVec(hn::Zero(d));
@@ -60,16 +65,18 @@ std::uint8_t OverlappingOctants(const oracle::OctantBounds& octants, const OneVo
       n[k] = hn::Mul(fromBytes(d, octants.normal[k] + i), per127);
       along = hn::MulAdd(n[k], hn::Set(d, b.normal[k]), along);
     }
-    const V center = hn::Mul(fromBytes(d, octants.slab_center + i), per127);
-    const V w = hn::Mul(fromBytes(d, octants.slab_half + i), per254);
+    const V center = hn::Mul(fromBytes(d, octants.slab_center + i), per_slab);
+    const V w = hn::Mul(fromBytes(d, octants.slab_half + i), per_half);
+    V slab_from[3];  // where slabs count from
+    BOCST_UNROLL
+    for (int k = 0; k < 3; ++k) slab_from[k] = kLoose ? middle[k] : hn::Add(hn::Load(d, kOctantCorner[k] + i), half);
     const V abs_along = hn::Abs(along), bw = hn::Set(d, b.slab_half), boffset = hn::Set(d, b.slab_offset);
     {
-      // Along the octant's normal; its slab is measured from the octant's centre.
+      // Along the octant's normal.
       V t = hn::MulSub(along, boffset, center), r = hn::MulAdd(abs_along, bw, hn::Add(w, rounding_margin));
       BOCST_UNROLL
       for (int k = 0; k < 3; ++k) {
-        const V from = hn::Sub(hn::Set(d, b.center[k]), hn::Add(hn::Load(d, kOctantCorner[k] + i), half));
-        t = hn::MulAdd(n[k], from, t);
+        t = hn::MulAdd(n[k], hn::Sub(hn::Set(d, b.center[k]), slab_from[k]), t);
       }
       V rest[3];
       BOCST_UNROLL
@@ -89,7 +96,7 @@ std::uint8_t OverlappingOctants(const oracle::OctantBounds& octants, const OneVo
       BOCST_UNROLL
       for (int k = 0; k < 3; ++k) {
         const V m = hn::Set(d, b.normal[k]);
-        own = hn::NegMulAdd(n[k], hn::Sub(middle[k], hn::Add(hn::Load(d, kOctantCorner[k] + i), half)), own);
+        if (!kLoose) own = hn::NegMulAdd(n[k], hn::Sub(middle[k], slab_from[k]), own);
         t = hn::MulAdd(m, delta[k], t);
         r = hn::MulAdd(hn::Abs(hn::NegMulAdd(along, n[k], m)), h[k], r);
       }
@@ -99,6 +106,19 @@ std::uint8_t OverlappingOctants(const oracle::OctantBounds& octants, const OneVo
     result = static_cast<std::uint8_t>(result | maskBits(hn::Not(apart)) << i);
   }
   return result;
+}
+
+std::uint8_t OverlappingOctants(const oracle::OctantBounds& octants, const OneVolume& volume) {
+  constexpr float kByte = 1.0f / 510;
+  return overlapping<false>(octants, {kByte, kByte, kByte}, 1.0f / 127, volume);
+}
+
+std::uint8_t OverlappingLanes(const bounds::LooseFrame& frame, const oracle::OctantBounds& lanes,
+                              const OneVolume& volume) {
+  const double unit = frame.longest() / 2;
+  float byte[3];
+  for (std::size_t k = 0; k < 3; ++k) byte[k] = static_cast<float>(frame.side(k) / unit) * (1.0f / 510);
+  return overlapping<true>(lanes, byte, 2.0f / 256, volume);
 }
 
 void PlaceTriangles(RawTriangles& raw, std::size_t count, const PackTransform& place, TrianglePack& pack) {
@@ -413,11 +433,17 @@ HWY_AFTER_NAMESPACE();
 namespace bocst::query {
 
 HWY_EXPORT(OverlappingOctants);
+HWY_EXPORT(OverlappingLanes);
 HWY_EXPORT(PlaceTriangles);
 HWY_EXPORT(BoundTriangles);
 HWY_EXPORT(TrianglesWithin);
 HWY_EXPORT(MoveTriangles);
 HWY_EXPORT(TouchingPairs);
+
+std::uint8_t overlappingLanes(const bounds::LooseFrame& frame, const oracle::OctantBounds& lanes,
+                              const OneVolume& volume) {
+  return HWY_DYNAMIC_DISPATCH(OverlappingLanes)(frame, lanes, volume);
+}
 
 std::uint8_t overlappingOctants(const oracle::OctantBounds& octants, const OneVolume& volume) {
   return HWY_DYNAMIC_DISPATCH(OverlappingOctants)(octants, volume);

@@ -1,12 +1,21 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #pragma once
 
+#include <Eigen/Geometry>
 #include <atomic>
 #include <cstdint>
 
+#include "bounds/loose_frame.h"
 #include "oracle/oracle.h"
 
 namespace bocst::tree {
+
+/// An exact answer tests the triangles of a node with at most so many.
+constexpr std::uint32_t kLeafTriangles = 32;
+
+/// Loose blocks below one another in one tree, at most. A lane of many triangles shares more bits of a key of 30 than
+/// its block does; of few, it has less than half of its block's (see BulkBuilder::split()).
+constexpr std::size_t kMostLooseDepth = 30 + 30;
 
 /// Says where the triangles or the children of a resident node are: two bits of tag, thirty of index.
 class ChildRef {
@@ -30,24 +39,62 @@ class ChildRef {
   std::uint32_t bits_ = 0;
 };
 
-/// What a walk reads of an expanded node: its eight octants, published all at once. Two cache lines.
+/// What a walk reads of an expanded node: its children, published all at once. Two cache lines.
+///
+/// A block of cells holds the eight octants of one cell, as an oracle answered. A loose block, which BulkBuilder makes
+/// for exact answers, holds up to eight lanes that each bound some triangles; it follows no cell.
 ///
 /// | bytes | what |
 /// |---|---|
-/// | 0..87 | octants: box and slab of each (oracle.h, OctantBounds) |
-/// | 88 | grey: bit o says octant o is a node |
-/// | 89..95 | cell: level, then x, y, z of the expanded node (16 bits each) |
+/// | 0..87 | octants: box and slab of each (oracle.h, OctantBounds; for a loose block, loose_frame.h) |
+/// | 88 | grey: bit o says octant or lane o is a node |
+/// | 89..95 | cell: level, then x, y, z of the expanded node (16 bits each); or kLoose and a LooseFrame (55 bits) |
 /// | 96..127 | child: the child reference of each octant |
 struct alignas(64) Block {
   static constexpr std::uint32_t kNone = 0xffffffffu;
 
   oracle::OctantBounds octants;
   std::uint8_t grey = 0;
-  std::uint8_t level = 1;
+  std::uint8_t shape = 1;
   std::uint16_t at[3] = {0, 0, 0};
   std::atomic<ChildRef> child[8] = {};
 
-  lattice::Cell cell() const { return {level, {at[0], at[1], at[2]}}; }
+  static constexpr std::uint8_t kLoose = 0x80;
+  bool isLoose() const { return (shape & kLoose) != 0; }
+
+  /// Of a block of cells.
+  lattice::Cell cell() const { return {shape, {at[0], at[1], at[2]}}; }
+  void setCell(const lattice::Cell& cell) {
+    shape = static_cast<std::uint8_t>(cell.level);
+    for (std::size_t k = 0; k < 3; ++k) at[k] = static_cast<std::uint16_t>(cell.at[k]);
+  }
+
+  /// Of a loose block.
+  bounds::LooseFrame frame() const {
+    return bounds::LooseFrame::unpack((shape & 0x7fu) | std::uint64_t{at[0]} << 7 | std::uint64_t{at[1]} << 23 |
+                                      std::uint64_t{at[2]} << 39);
+  }
+  void setFrame(const bounds::LooseFrame& frame) {
+    const std::uint64_t bits = frame.pack();
+    shape = static_cast<std::uint8_t>(kLoose | (bits & 0x7f));
+    for (std::size_t k = 0; k < 3; ++k) at[k] = static_cast<std::uint16_t>(bits >> (7 + 16 * k));
+  }
+
+  /// The box of a loose block's lane, in lattice units.
+  Eigen::AlignedBox3d looseBox(int o) const {
+    const bounds::LooseFrame f = frame();
+    Eigen::Vector3d lo, hi;
+    for (std::size_t k = 0; k < 3; ++k) {
+      lo[static_cast<int>(k)] = f.origin[k] + octants.lo[k][o] * (f.side(k) / 255);
+      hi[static_cast<int>(k)] = f.origin[k] + octants.hi[k][o] * (f.side(k) / 255);
+    }
+    return {lo, hi};
+  }
+
+  /// The level of the children: that of cells half as large as the expanded cell, or as the frame.
+  int childLevel() const {
+    return isLoose() ? lattice::kMaxLevel + 1 - bounds::LooseFrame::kLeastExponent - (shape & 15) : shape + 1;
+  }
 };
 static_assert(sizeof(Block) == 128);
 static_assert(sizeof(oracle::CellBounds) == 11);

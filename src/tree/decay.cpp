@@ -66,6 +66,10 @@ void Tree::keepOnly(const std::vector<std::uint8_t>& keep) {
   }
   nodes_at_[1] = 1;
 
+  if (old_root.tag() == ChildRef::kBlock && blocks_[old_root.index()].isLoose()) {
+    grid_known_.store(nullptr, std::memory_order_relaxed);  // its cells are not those of the tree any more
+    grid_.reset();
+  }
   struct Move {
     ChildRef from;
     NodeRef to;
@@ -78,6 +82,7 @@ void Tree::keepOnly(const std::vector<std::uint8_t>& keep) {
     grid_known_.store(nullptr, std::memory_order_relaxed);
     grid_.reset();
     grid_tried_ = false;
+    growth_work_ = 0;
     root_.store(ChildRef(), std::memory_order_relaxed);
     blocks_.clear();
     records_.clear();
@@ -106,13 +111,13 @@ void Tree::keepOnly(const std::vector<std::uint8_t>& keep) {
         Block& to = blocks[index];
         to.octants = from.octants;
         to.grey = from.grey;
-        to.level = from.level;
+        to.shape = from.shape;
         std::copy_n(from.at, 3, to.at);
         records[index].own = records_[ref.index()].own;
         if (own_list != Block::kNone) records[index].own_list = lists.addCopy(lists_, own_list);
         records[index].parent = move.to;
         last_use[index].store(last_use_[ref.index()].load(std::memory_order_relaxed), std::memory_order_relaxed);
-        nodes_at_[from.level + 1] += __builtin_popcount(from.grey);
+        nodes_at_[countedLevel(move.cell.level + 1)] += __builtin_popcount(from.grey);
         for (int o = 0; o < 8; ++o) {
           if (from.grey >> o & 1) {
             moves.push_back(

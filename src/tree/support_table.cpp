@@ -26,17 +26,16 @@ Eigen::Vector3d SupportTable::direction(int number) {
 void SupportTable::start(const Eigen::AlignedBox3d& box) {
   const Eigen::Vector3d center = box.center(), half = box.sizes() / 2;
   center_ = center.cast<float>();
-  expansions_.store(0, std::memory_order_relaxed);
   inner_radius_.store(static_cast<float>(half.minCoeff()), std::memory_order_relaxed);
   for (int n = 0; n < kCount; ++n) {
     const Eigen::Vector3d d = direction(n);
     const auto i = static_cast<std::size_t>(n);
     values_[i].store(roundedUp(d.dot(center) + d.cwiseAbs().dot(half)), std::memory_order_relaxed);
-    states_[i].store(kOpen, std::memory_order_relaxed);
+    known_[i].store(false, std::memory_order_relaxed);
   }
 }
 
-void SupportTable::lower(int number, double value, bool exact) {
+void SupportTable::lower(int number, double value) {
   const auto i = static_cast<std::size_t>(number);
   const float rounded = roundedUp(value);
   float known = values_[i].load(std::memory_order_relaxed);
@@ -45,17 +44,7 @@ void SupportTable::lower(int number, double value, bool exact) {
   const Eigen::Vector3f d = direction(number).cast<float>();
   const float radius = (rounded - d.dot(center_)) / d.norm();
   if (radius < innerRadius()) inner_radius_.store(radius, std::memory_order_relaxed);
-  states_[i].store(exact ? kExact : kAsked, std::memory_order_relaxed);
-}
-
-void SupportTable::reopen(std::uint64_t expansions) {
-  const std::uint64_t before = expansions_.load(std::memory_order_relaxed);
-  if (expansions <= before + before / 2) return;
-  expansions_.store(expansions, std::memory_order_relaxed);
-  for (std::atomic<State>& state : states_) {
-    State asked = kAsked;
-    state.compare_exchange_strong(asked, kOpen, std::memory_order_relaxed);
-  }
+  known_[i].store(true, std::memory_order_relaxed);
 }
 
 }  // namespace bocst::tree

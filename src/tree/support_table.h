@@ -44,24 +44,16 @@ class SupportTable {
   }
 
   /// Not yet as good as the tree can say.
-  bool isOpen(int number) const {
-    return states_[static_cast<std::size_t>(number)].load(std::memory_order_relaxed) == kOpen;
-  }
+  bool isOpen(int number) const { return !known_[static_cast<std::size_t>(number)].load(std::memory_order_relaxed); }
 
-  /// A tree that has grown by half since can say more of what is not exact. `expansions`: so many since start().
-  void reopen(std::uint64_t expansions);
-
-  /// The surface reaches no farther; `exact`: and as far, so the tree cannot say more when it has grown.
-  void lower(int number, double value, bool exact);
+  /// The surface reaches no farther; the tree can say no more of it.
+  void lower(int number, double value);
 
  private:
-  enum State : std::uint8_t { kOpen, kAsked, kExact };
-
   Eigen::Vector3f center_ = Eigen::Vector3f::Zero();
   std::atomic<float> inner_radius_{0};
   std::array<std::atomic<float>, kCount> values_{};
-  std::array<std::atomic<State>, kCount> states_{};
-  std::atomic<std::uint64_t> expansions_{0};
+  std::array<std::atomic<bool>, kCount> known_{};
 };
 
 }  // namespace bocst::tree

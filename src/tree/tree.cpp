@@ -12,8 +12,15 @@
 #include <stdexcept>
 #include <string>
 
+#include "tree/bulk.h"
+
 namespace bocst::tree {
 namespace {
+
+// Growth by parts costs about twice as much a triangle as building all at once.
+constexpr std::size_t kRent = 2;
+// A device is not asked about fewer triangles: the host builds what is below them sooner than a batch comes back.
+constexpr std::size_t kHostTriangles = 512;
 
 Options checked(const Options& o) {
   const auto bad = [](const std::string& what) { throw std::invalid_argument("bocst::Options: " + what); };
@@ -56,6 +63,23 @@ void setBox(const Eigen::AlignedBox3d& box, const lattice::Cell& cell, oracle::C
   }
 }
 
+// Box and slab of a cell's surface as bytes of the cell.
+oracle::CellBounds cellBounds(const BulkBuilder::Own& own, const lattice::Cell& cell) {
+  oracle::CellBounds b;
+  setBox(own.box, cell, b);
+  double middle = 0;
+  const double side = cell.side();
+  for (std::size_t k = 0; k < 3; ++k) middle += own.normal[k] * (cell.corner()[k] + side / 2);
+  const double least = (own.least - middle) / side, most = (own.most - middle) / side;
+  const double at = std::round((least + most) / 2), half = std::ceil(2 * std::max(most - at, at - least) + 1e-6);
+  if (std::all_of(own.normal, own.normal + 3, [](int n) { return n == 0; })) return b;
+  if (!(half <= 255) || !(std::abs(at) <= 127)) return b;
+  std::copy_n(own.normal, 3, b.normal.begin());
+  b.slab_center = static_cast<std::int8_t>(at);
+  b.slab_half = static_cast<std::uint8_t>(half);
+  return b;
+}
+
 Eigen::AlignedBox3d latticeBounds(const oracle::Surface& surface) {
   const Eigen::AlignedBox3d& b = surface.bounds;
   return {surface.lattice.toLattice(b.min()), surface.lattice.toLattice(b.max())};
@@ -95,7 +119,6 @@ void Tree::reset(std::shared_ptr<const Mesh> mesh) {
   setBox(box, lattice::Cell{}, root_bounds_);
   const Eigen::Vector3d middle = Eigen::Vector3d::Constant(lattice::kMiddle);
   supports_.start({box.min() - middle, box.max() - middle});
-  expansions_before_ = expansions_;
   keepOnly({});
 }
 
@@ -159,6 +182,7 @@ void Tree::grow(std::vector<Growth>& batch, bool wait) {
 
   std::vector<oracle::ExpansionRequest> requests;
   std::vector<Growth> asked;
+  thread_local std::vector<std::uint32_t> scratch;
   std::vector<std::vector<std::uint32_t>> gathered;
   gathered.reserve(batch.size());
   for (const Growth& g : batch) {
@@ -167,6 +191,10 @@ void Tree::grow(std::vector<Growth>& batch, bool wait) {
     if (ref.tag() == ChildRef::kBlock) continue;
     if (g.list_suffices && ref.tag() == ChildRef::kShortList) continue;
     if (g.node.isRoot()) tree.growRoot();
+    if (g.list_suffices) {
+      if (tree.growth_work_ > tree.surface_.triangle_count / kRent && !tree.isWhole()) tree.growWhole();
+      if (tree.growInBulk(g.node, scratch)) continue;
+    }
     const lattice::Cell cell = tree.cell(g.node);
     if (tree.grid_ != nullptr && cell.level < tree.grid_->level()) {
       tree.growFromGrid(g.node);
@@ -252,17 +280,6 @@ void Tree::askFor(std::uint32_t list, oracle::ExpansionRequest& request, std::ve
   request.ids = ids.data();
 }
 
-void Tree::tightenBounds(const std::vector<NodeRef>& nodes) {
-  const std::unique_lock<std::mutex> lock(growth_, std::try_to_lock);
-  if (!lock.owns_lock() || grid_ == nullptr) return;
-  for (const NodeRef node : nodes) {
-    const lattice::Cell cell = this->cell(node);
-    if (cell.level != grid_->level() || childRef(node).tag() != ChildRef::kImplicit) continue;
-    refits_.push_back({node, grid_->tightBounds(surface_, cell)});
-    refits_wait_.store(true, std::memory_order_relaxed);
-  }
-}
-
 void Tree::growRoot() {
   if (surface_.device == nullptr) surface_.device = oracle_->makeResident(surface_);
   if (grid_tried_ || oracle_->kind() != OracleKind::kCpu) return;
@@ -280,8 +297,10 @@ void Tree::growFromGrid(NodeRef node) {
   for (int o = 0; o < 8; ++o) {
     if (grid_->grey(surface_, cell.octant(o))) grey |= 1 << o;
   }
-  const std::uint32_t index = addBlock(node, cell, grey);
+  const std::uint32_t index = addBlock(node, cell.level, grey);
+  for (int o = 0; o < 8; ++o) octants_ += surface_.lattice.exists(cell.octant(o));
   Block& block = blocks_[index];
+  block.setCell(cell);
   const Eigen::AlignedBox3d all = latticeBounds(surface_);
   Eigen::AlignedBox3d own;
   for (int o = 0; o < 8; ++o) {
@@ -299,21 +318,101 @@ void Tree::growFromGrid(NodeRef node) {
   setChild(node, ChildRef(ChildRef::kBlock, index));
 }
 
-std::uint32_t Tree::addBlock(NodeRef node, const lattice::Cell& cell, std::uint8_t grey) {
+// The cell of a node; of a lane only the level, which counts from the cell that was built in bulk.
+lattice::Cell Tree::cellOrDepth(NodeRef node) const {
+  int deeper = 0;
+  for (; isLoose(node); ++deeper) node = records_[node.block()].parent;
+  lattice::Cell cell = this->cell(node);
+  cell.level += deeper;
+  return cell;
+}
+
+// What exact answers need below a node whose triangles are known here. False where the oracle is to be asked: for what
+// the root grid or a device knows.
+bool Tree::growInBulk(NodeRef node, std::vector<std::uint32_t>& ids) {
+  const ChildRef ref = this->childRef(node);
+  ids.clear();
+  if (ref.isList()) {
+    const TriangleList list = this->list(ref);
+    if (!list.ids.areKnown() || (oracle_->kind() != OracleKind::kCpu && list.count > kHostTriangles)) return false;
+    list.appendTo(ids);
+  } else if (oracle_->kind() != OracleKind::kCpu) {
+    return false;
+  } else if (grid_ != nullptr) {
+    if (cell(node).level < grid_->level()) return false;
+    grid_->gather(surface_, cell(node), ids);
+  } else {
+    growWhole();
+    return true;
+  }
+  growth_work_ += ids.size();
+  const bool is_loose = isLoose(node);
+  Eigen::AlignedBox3d region;
+  if (is_loose) {
+    region = blocks_[node.block()].looseBox(node.octant());
+  } else {
+    const lattice::Cell cell = this->cell(node);
+    const Eigen::Vector3d corner(cell.corner()[0], cell.corner()[1], cell.corner()[2]);
+    region = Eigen::AlignedBox3d(corner, corner.array() + cell.side());
+  }
+  thread_local BulkBuilder bulk;
+  bulk.build(surface_, ids.data(), ids.size(), region);
+  if (!is_loose && !bulk.ids().empty()) {
+    refits_.push_back({node, cellBounds(bulk.own(), cell(node))});
+    refits_wait_.store(true, std::memory_order_relaxed);
+  }
+  setChild(node, bulk.blocks().empty() ? addList(bulk.ids().data(), bulk.ids().size(), true)
+                                       : addBulk(node, bulk, 0, cellOrDepth(node).level));
+  return true;
+}
+
+// All of the tree that exact answers need. Queries under way go on in the old blocks.
+void Tree::growWhole() {
+  thread_local BulkBuilder bulk;
+  bulk.buildAll(surface_);
+  for (auto& n : nodes_at_) n = 0;
+  nodes_at_[1] = 1;
+  setChild(NodeRef(), bulk.blocks().empty() ? addList(bulk.ids().data(), bulk.ids().size(), true)
+                                            : addBulk(NodeRef(), bulk, 0, 1));
+  refits_.push_back({NodeRef(), cellBounds(bulk.own(), lattice::Cell{})});
+  refits_wait_.store(true, std::memory_order_relaxed);
+}
+
+// Block `number` of what was built, and all below it; `level` is the node's, as counted.
+ChildRef Tree::addBulk(NodeRef node, const BulkBuilder& bulk, std::uint32_t number, int level) {
+  const BulkBuilder::Block& built = bulk.blocks()[number];
+  const std::uint32_t index = addBlock(node, level, static_cast<std::uint8_t>(0xff >> (8 - built.lanes)));
+  octants_ += built.lanes;
+  blocks_[index].setFrame(built.frame);
+  for (std::uint32_t o = 0; o < built.lanes; ++o) {
+    const BulkBuilder::Lane& lane = built.lane[o];
+    const bounds::LooseBounds& b = built.bounds[o];
+    oracle::OctantBounds& octants = blocks_[index].octants;
+    for (std::size_t k = 0; k < 3; ++k) {
+      octants.lo[k][o] = b.lo[k];
+      octants.hi[k][o] = b.hi[k];
+      octants.normal[k][o] = b.normal[k];
+    }
+    octants.slab_center[o] = b.slab_center;
+    octants.slab_half[o] = b.slab_half;
+    const ChildRef child = lane.block == BulkBuilder::kNone
+                               ? addList(bulk.ids().data() + lane.begin, lane.count, false)
+                               : addBulk(NodeRef::octant(index, static_cast<int>(o)), bulk, lane.block, level + 1);
+    blocks_[index].child[o].store(child, std::memory_order_relaxed);
+  }
+  return ChildRef(ChildRef::kBlock, index);
+}
+
+// Appends a block whose children are one level below `level`.
+std::uint32_t Tree::addBlock(NodeRef node, int level, std::uint8_t grey) {
   const std::uint32_t index = blocks_.append(1);
-  Block& block = blocks_[index];
-  block.grey = grey;
-  block.level = static_cast<std::uint8_t>(cell.level);
-  for (int k = 0; k < 3; ++k) block.at[k] = static_cast<std::uint16_t>(cell.at[k]);
+  blocks_[index].grey = grey;
   records_.append(1);
   records_[index].parent = node;
   last_use_.append(1);
   last_use_[index].store(now(), std::memory_order_relaxed);
-  nodes_at_[cell.level + 1] += __builtin_popcount(grey);
+  nodes_at_[countedLevel(level + 1)] += __builtin_popcount(grey);
   ++expansions_;
-  std::uint64_t octants = 0;
-  for (int o = 0; o < 8; ++o) octants += surface_.lattice.exists(cell.octant(o));
-  octants_ += octants;
   return index;
 }
 
@@ -386,8 +485,10 @@ void Tree::publish(NodeRef node, const oracle::ExpansionRequest& answer) {
     setChild(node, addList(answer.lists.data(), answer.lists.size(), true));
     return;
   }
-  const std::uint32_t index = addBlock(node, answer.cell, answer.grey);
+  const std::uint32_t index = addBlock(node, answer.cell.level, answer.grey);
+  for (int o = 0; o < 8; ++o) octants_ += surface_.lattice.exists(answer.cell.octant(o));
   Block& block = blocks_[index];
+  block.setCell(answer.cell);
   block.octants = answer.octants;
   records_[index].own = answer.own;
   if (answer.kept_resource != nullptr) {
@@ -415,8 +516,9 @@ bool Tree::trianglesOf(NodeRef node, std::size_t most, std::vector<std::uint32_t
     return true;
   }
   const oracle::RootGrid* grid = grid_known_.load(std::memory_order_acquire);
+  if (grid == nullptr || isLoose(node)) return false;
   const lattice::Cell cell = this->cell(node);
-  if (ref.tag() != ChildRef::kImplicit || grid == nullptr || cell.level != grid->level()) return false;
+  if (ref.tag() != ChildRef::kImplicit || cell.level != grid->level()) return false;
   return grid->gather(surface_, cell, most, ids);
 }
 
@@ -473,23 +575,31 @@ void Tree::visit(const std::function<void(const NodeView&)>& f) const {
   struct Entry {
     NodeRef node;
     std::uint32_t parent;
+    int level;
   };
-  std::vector<Entry> stack{{NodeRef{}, NodeView::kNone}};
+  std::vector<Entry> stack{{NodeRef{}, NodeView::kNone, 1}};
   while (!stack.empty()) {
     const Entry e = stack.back();
     stack.pop_back();
-    const lattice::Cell cell = this->cell(e.node);
     NodeView view;
     view.id = id(e.node);
     view.parent = e.parent;
     view.object = surface_.mesh.get();
-    view.n = surface_.lattice.rootExponent() - (cell.level - 1);
+    view.n = surface_.lattice.rootExponent() - (e.level - 1);
+    view.level = e.level;
     Eigen::Vector3d center, half;
-    surface_.lattice.region(cell, center, half);
+    if (isLoose(e.node)) {
+      const Eigen::AlignedBox3d box = blocks_[e.node.block()].looseBox(e.node.octant());
+      center = box.center();
+      half = box.sizes() / 2;
+      view.is_cell = false;
+    } else {
+      const lattice::Cell cell = this->cell(e.node);
+      surface_.lattice.region(cell, center, half);
+      view.cell = cell.at;
+    }
     view.center = surface_.lattice.origin() + surface_.lattice.unit() * center;
     view.radius = surface_.lattice.unit() * half.norm();
-    view.level = cell.level;
-    view.cell = cell.at;
     const ChildRef ref = this->childRef(e.node);
     if (ref.tag() == ChildRef::kBlock) {
       const Block& block = blocks_[ref.index()];
@@ -497,7 +607,7 @@ void Tree::visit(const std::function<void(const NodeView&)>& f) const {
         if ((block.grey >> o & 1) == 0) continue;
         const NodeRef child = NodeRef::octant(ref.index(), o);
         view.children.ids[view.children.count++] = id(child);
-        stack.push_back({child, view.id});
+        stack.push_back({child, view.id, e.level + 1});
       }
     }
     f(view);

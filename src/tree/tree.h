@@ -6,6 +6,7 @@
 #include <bocst/options.h>
 #include <bocst/statistics.h>
 
+#include <algorithm>
 #include <array>
 #include <atomic>
 #include <cstddef>
@@ -26,6 +27,8 @@
 
 namespace bocst::tree {
 
+class BulkBuilder;
+
 /// The sphere-tree of one model: resident nodes, how they grow and how they go.
 ///
 /// Threads: a query holds the query lock shared while it looks at nodes. Growth appends blocks and publishes each by
@@ -34,10 +37,6 @@ namespace bocst::tree {
 /// held shared.
 class Tree {
  public:
-  /// An exact answer tests the triangles of a node with at most so many instead of expanding it; and those of a node
-  /// whose triangles are so large that its octants would just repeat them.
-  static constexpr std::uint32_t kLeafTriangles = 32;
-
   /// @throws std::invalid_argument for options out of range, OracleError.
   Tree(std::shared_ptr<const Mesh> mesh, const Options& options);
 
@@ -54,6 +53,11 @@ class Tree {
                          : blocks_[node.block()].child[node.octant()].load(std::memory_order_acquire);
   }
   const Block& block(std::uint32_t index) const { return blocks_[index]; }
+  /// Is it a lane of a loose block? Else it is a cell.
+  bool isLoose(NodeRef node) const { return !node.isRoot() && blocks_[node.block()].isLoose(); }
+  /// That of a cell of about the node's size.
+  int level(NodeRef node) const { return node.isRoot() ? 1 : blocks_[node.block()].childLevel(); }
+  /// Of a node that is no lane.
   lattice::Cell cell(NodeRef node) const {
     return node.isRoot() ? lattice::Cell{} : blocks_[node.block()].cell().octant(node.octant());
   }
@@ -66,8 +70,11 @@ class Tree {
   const TriangleLists& lists() const { return lists_; }
   /// How far the surface reaches in any direction; what is known of it, for queries to use and to better.
   SupportTable& supports() const { return supports_; }
-  /// How often this surface's tree has grown by a block.
-  std::uint64_t growth() const { return expansions_.load(std::memory_order_relaxed) - expansions_before_; }
+  /// Has all been built at once, so that nothing grows any more unless branches are dropped?
+  bool isWhole() const {
+    const ChildRef root = childRef(NodeRef());
+    return root.tag() == ChildRef::kShortList || (root.tag() == ChildRef::kBlock && block(root.index()).isLoose());
+  }
   /// No more expansions below this node: a single lattice unit, or the collision depth of conservative answers.
   bool isDeepest(int level) const { return level >= deepest_; }
   int deepest() const { return deepest_; }
@@ -90,7 +97,7 @@ class Tree {
   /// The root grid knows the children of this frontier node.
   bool growsFromGrid(NodeRef node) const {
     const oracle::RootGrid* grid = grid_known_.load(std::memory_order_acquire);
-    return grid != nullptr && cell(node).level < grid->level();
+    return grid != nullptr && !isLoose(node) && cell(node).level < grid->level();
   }
 
   /// A node to grow, and whether a list of at most kLeafTriangles is enough (exact answers).
@@ -107,10 +114,6 @@ class Tree {
 
   /// Growth that no answer needs is welcome: it would not bring the tree near its memory budget.
   bool hasBudget() const { return options_.memory_budget == 0 || bytes_ < options_.memory_budget / 2; }
-
-  /// Learns bounds of frontier nodes that a query met and could do without, so that later ones leave them out sooner;
-  /// does nothing while another thread grows the tree. Nodes that the root grid does not know are passed over.
-  void tightenBounds(const std::vector<NodeRef>& nodes);
 
   /// Packs the corners of leaves that are come to the second time, as many as a query hardly feels. Does nothing while
   /// another thread grows the tree.
@@ -131,19 +134,22 @@ class Tree {
   void afterQuery(std::int64_t now);
 
  private:
-  using Dropped = std::vector<std::uint8_t>;
-
   void reset(std::shared_ptr<const Mesh> mesh);
 
   void askFor(std::uint32_t list, oracle::ExpansionRequest& request, std::vector<std::uint32_t>& ids) const;
+  static std::size_t countedLevel(int level) { return static_cast<std::size_t>(std::min(level, lattice::kMaxLevel)); }
   ChildRef addDeviceList(const std::shared_ptr<const oracle::DeviceResource>& resource,
                          oracle::ExpansionRequest::DeviceList list);
   ChildRef addOctantList(const oracle::ExpansionRequest& answer, int octant);
   static void ask(std::vector<Growth>& asked, std::vector<oracle::ExpansionRequest>& requests);
   void growRoot();
   void growFromGrid(NodeRef node);
+  bool growInBulk(NodeRef node, std::vector<std::uint32_t>& ids);
+  void growWhole();
+  ChildRef addBulk(NodeRef node, const BulkBuilder& bulk, std::uint32_t number, int level);
+  lattice::Cell cellOrDepth(NodeRef node) const;
   void publish(NodeRef node, const oracle::ExpansionRequest& answer);
-  std::uint32_t addBlock(NodeRef node, const lattice::Cell& cell, std::uint8_t grey);
+  std::uint32_t addBlock(NodeRef node, int level, std::uint8_t grey);
   ChildRef addList(const std::uint32_t* ids, std::size_t count, bool leaf);
   void setChild(NodeRef node, ChildRef ref);
   void refit();
@@ -173,6 +179,7 @@ class Tree {
   std::unique_ptr<oracle::RootGrid> grid_;
   std::atomic<const oracle::RootGrid*> grid_known_{nullptr};  // grid_, for readers
   bool grid_tried_ = false;
+  std::size_t growth_work_ = 0;  // triangles that growth has looked at since the tree was its root
   std::atomic<ChildRef> root_{ChildRef()};
   // Of each block: what walks read, what growth and decay know, and when a query last went through it, in ns of the
   // model's clock. Apart, so that walks have few lines to read.
@@ -193,7 +200,6 @@ class Tree {
 
   std::array<std::atomic<std::size_t>, lattice::kMaxLevel + 1> nodes_at_{};
   std::atomic<std::size_t> bytes_{0}, device_bytes_{0};
-  std::uint64_t expansions_before_ = 0;  // of former surfaces
   std::atomic<std::uint64_t> expansions_{0}, octants_{0}, batches_{0}, cells_{0}, pruned_{0};
   std::atomic<std::int64_t> next_prune_{0};
 };

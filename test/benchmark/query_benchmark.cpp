@@ -68,7 +68,7 @@ void gapsOfOctants(benchmark::State& state) {
     frames[side].resize(kMany);
     for (std::size_t i = 0; i < kMany; ++i) {
       tree::Block block;
-      block.level = 6;
+      block.shape = 6;
       block.octants = c.cells[side][i].octants;
       fillFrame(c.geometry, side, block, frames[side][i]);
     }

@@ -593,8 +593,7 @@ TEST_P(EveryTarget, GapsOfOctantsHoldTheDistancesOfTheirPoints) {
       lattice::Cell cell;
       cell.level = 1 + static_cast<int>(g() % 14);
       for (auto& x : cell.at) x = static_cast<std::uint32_t>(g() % (1u << (cell.level - 1)));
-      blocks[side].level = static_cast<std::uint8_t>(cell.level);
-      for (std::size_t k = 0; k < 3; ++k) blocks[side].at[k] = static_cast<decltype(+blocks[side].at[k])>(cell.at[k]);
+      blocks[side].setCell(cell);
       for (int o = 0; o < 8; ++o) blocks[side].octants.set(o, randomBounds(g));
       octants[side] = static_cast<int>(g() % 8);
       const lattice::Cell octant = cell.octant(octants[side]);

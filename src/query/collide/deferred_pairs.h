@@ -22,22 +22,12 @@ class DeferredPairs {
   /// Pairs in the first batch of a walk that may end early; a few oracle answers cost less than one too many.
   static constexpr std::size_t kFirstBatch = 2;
 
-  /// Pairs that a hit grows for the next query.
-  static constexpr std::size_t kInvestment = 2;
-
   void clear() {
     waiting_.clear();
     batch_ = kFirstBatch;
   }
   bool empty() const { return waiting_.empty(); }
   void add(const Pair& pair) { waiting_.push_back({pair, kUnknown}); }
-
-  /// Grows what the first few pairs need, in one batch, for later queries; does not wait for other threads.
-  void growFirst(const A& a, const B& b) {
-    growths_.clear();
-    for (std::size_t i = 0; i < std::min(waiting_.size(), kInvestment); ++i) add(a, b, waiting_[i].pair);
-    growAll(false);
-  }
 
   /// Makes what some pairs need resident, in one batch, and gives these pairs to f. A walk that has to see everything
   /// grows all that is deferred, so it makes one batch a level. One that ends at its first hit takes the deepest
@@ -63,7 +53,7 @@ class DeferredPairs {
     }
     growths_.clear();
     for (auto w = end; w != waiting_.end(); ++w) add(a, b, w->pair);
-    growAll(true);
+    growAll();
     for (auto w = end; w != waiting_.end(); ++w) f(w->pair);
     waiting_.erase(end, waiting_.end());
   }
@@ -82,9 +72,9 @@ class DeferredPairs {
     if (b.state(pair.b) == State::kGrows) b.grow(pair.b, growths_);
   }
 
-  void growAll(bool wait) {
+  void growAll() {
     uniqueGrowths(growths_);
-    if (!growths_.empty()) tree::Tree::grow(growths_, wait);
+    if (!growths_.empty()) tree::Tree::grow(growths_);
   }
 
   template <typename Side>

@@ -20,6 +20,8 @@ inline bool isLeaf(const StepNode& n) {
   return tag == tree::ChildRef::kShortList || (tag == tree::ChildRef::kList && n.level == lattice::kMaxLevel);
 }
 
+inline std::uint32_t childLevel(const tree::Block& block) { return static_cast<std::uint32_t>(block.childLevel()); }
+
 // The order is there already: overlapping() writes it to where the group will be.
 inline void push(PairSteps& s, int side, const tree::Block* at, std::uint32_t block, std::uint32_t level,
                  std::uint32_t frame, const StepNode& other, unsigned octants, std::uint32_t large = StepGroup::kNone) {
@@ -145,7 +147,7 @@ HWY_INLINE bool decodeBlock(PairSteps& s, int own, std::uint32_t index, const tr
   const std::uint64_t name = PairSteps::name(own, index);
   if (s.holds[frame] == name) return false;
   s.holds[frame] = name;
-  decodeCell(s.geometry, own, block.level, block.at, block.octants, s.frames[frame]);
+  decodeBlock(s.geometry, own, block, s.frames[frame]);
   return true;
 }
 
@@ -308,8 +310,8 @@ HWY_NOINLINE void pushThose(PairSteps& s) {
                                     HWY_ATTR { hn::StoreU(met, du, top.triangles + i); });
   if (mask == 0) return;
   const std::uint32_t index = s.pair[x].ref.index();
-  push(s, x, &s.tree[x]->block(index), index, s.pair[x].level + 1, s.frames_used, s.pair[y], mask,
-       static_cast<std::uint32_t>(y));
+  const tree::Block& block = s.tree[x]->block(index);
+  push(s, x, &block, index, childLevel(block), s.frames_used, s.pair[y], mask, static_cast<std::uint32_t>(y));
 }
 
 void PushMeeting(PairSteps& s) { pushThose(s); }
@@ -348,7 +350,7 @@ HWY_INLINE bool expandOther(PairSteps& s, int x, const tree::Block& own, std::ui
     n.level = level;
     n.lane = 8 * frame + o;
     if (!s.sees_all) fetch(*s.tree[x], n.ref);
-    push(s, y, &block, other_index, other.level + 1, frame + 1, n, left);
+    push(s, y, &block, other_index, childLevel(block), frame + 1, n, left);
   }
   if (fetch_other) fetchAll(*s.tree[y], block, met);
   return true;
@@ -422,9 +424,10 @@ PairSteps::Event NextEvent(PairSteps& s) {
       pushThose(s);
       continue;
     }
-    if (!s.all_at_once || !expandOther(s, x, block, index, own.level + 1, other, frames, mask, fetch_own)) {
+    const std::uint32_t level = childLevel(block);
+    if (!s.all_at_once || !expandOther(s, x, block, index, level, other, frames, mask, fetch_own)) {
       if (fetch_own) fetchAll(*s.tree[x], block, mask);
-      known = pushOthers(s, x, block, index, own.level + 1, frames, other, mask, p);
+      known = pushOthers(s, x, block, index, level, frames, other, mask, p);
     }
   }
   return PairSteps::kDone;
@@ -459,18 +462,19 @@ void pushOctants(PairSteps& s, unsigned mask) {
   if (mask == 0) return;
   const int x = s.expanded;
   const std::uint32_t index = s.pair[x].ref.index();
-  push(s, x, &s.tree[x]->block(index), index, s.pair[x].level + 1, s.frames_used, s.pair[1 - x], mask);
+  const tree::Block& block = s.tree[x]->block(index);
+  push(s, x, &block, index, childLevel(block), s.frames_used, s.pair[1 - x], mask);
 }
 
 void pushPair(PairSteps& s, tree::NodeRef node_a, tree::NodeRef node_b) {
   StepNode other;
   other.node = node_b;
   other.ref = s.tree[1]->childRef(node_b);
-  other.level = static_cast<std::uint32_t>(s.tree[1]->cell(node_b).level);
+  other.level = static_cast<std::uint32_t>(s.tree[1]->level(node_b));
   const auto o = static_cast<std::uint32_t>(node_a.octant());
   std::fill_n(s.stack[s.depth].order, 8, o);
   push(s, 0, node_a.isRoot() ? nullptr : &s.tree[0]->block(node_a.block()), node_a.block(),
-       static_cast<std::uint32_t>(s.tree[0]->cell(node_a).level), StepGroup::kNoFrame, other, 1u << o);
+       static_cast<std::uint32_t>(s.tree[0]->level(node_a)), StepGroup::kNoFrame, other, 1u << o);
 }
 
 }  // namespace bocst::query

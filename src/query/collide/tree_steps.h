@@ -44,10 +44,12 @@ struct StepGroup {
 
 /// The depth-first walk over resident pairs of two trees, exact answers: up to the next pair of leaves.
 struct PairSteps {
-  /// Frames alive at once: to look up the nodes of a pair that comes without, and one more each level of either side.
-  static constexpr std::size_t kFrames = 2 + 2 * lattice::kMaxLevel + 1;
-  /// What a walk below one pair can add to the stack: one more each level of either side, eight of two levels at once.
-  static constexpr std::size_t kStackRoom = 8 * lattice::kMaxLevel + 1;
+  /// Blocks below one another: of cells, then loose ones.
+  static constexpr std::size_t kMostDepth = lattice::kMaxLevel + tree::kMostLooseDepth;
+  /// Frames alive at once: to look up the nodes of a pair that comes without, and one more each block of either side.
+  static constexpr std::size_t kFrames = 2 + 2 * kMostDepth + 1;
+  /// What a walk below one pair can add to the stack: one more each block of either side, eight of two at once.
+  static constexpr std::size_t kStackRoom = 8 * kMostDepth + 1;
 
   enum Event {
     kDone,      ///< The stack is empty.

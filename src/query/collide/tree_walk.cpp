@@ -5,12 +5,6 @@
 
 namespace bocst::query {
 
-namespace {
-
-constexpr std::size_t kUnseen = 8;  // nodes to look at, at most so many of each tree after one query
-
-}  // namespace
-
 struct TreeWalk::Scratch {
   std::vector<StepGroup> stack;
   Frame frames[PairSteps::kFrames];
@@ -20,7 +14,6 @@ struct TreeWalk::Scratch {
   LargeTriangles large[2];
   LargeTriangleLeaf<TreeSide> long_a, long_b;  // leaves of more triangles than those hold
   bool grew = false;
-  std::vector<tree::NodeRef> unseen[2];  // deferred, and with no slab yet
 };
 
 bool TreeWalk::run(Visitor& visitor) {
@@ -31,8 +24,6 @@ bool TreeWalk::run(Visitor& visitor) {
   for (LargeTriangles& large : s.large) large.clear();
   s.long_a.clear();
   s.long_b.clear();
-  s.unseen[0].clear();
-  s.unseen[1].clear();
   s.grew = false;
   const bool ended = search(s);
   // A first answer has enough to do; what a later one needs again is worth to be packed.
@@ -40,15 +31,8 @@ bool TreeWalk::run(Visitor& visitor) {
     a_.tree().packLeaves(s.leaves.looseOfA());
     b_.tree().packLeaves(s.leaves.looseOfB());
   }
-  if (!ended) {
-    if (!s.grew) refineSupports(a_, b_, near_);
-    return false;
-  }
-  // What a query could do without, the next one meets again: a look is cheaper than growing it.
-  a_.tree().tightenBounds(s.unseen[0]);
-  b_.tree().tightenBounds(s.unseen[1]);
-  if (!s.deferred.empty() && !s.grew && a_.tree().hasBudget() && b_.tree().hasBudget()) s.deferred.growFirst(a_, b_);
-  return true;
+  if (!ended && !s.grew) refineSupports(a_, b_, near_);
+  return ended;
 }
 
 bool TreeWalk::search(Scratch& s) {
@@ -82,7 +66,7 @@ bool TreeWalk::stepAll(PairSteps& steps, Scratch& s) {
       case PairSteps::kDone:
         return false;
       case PairSteps::kDeferred:
-        defer(steps, s);
+        s.deferred.add({steps.pair[0].node, steps.pair[1].node});
         break;
       case PairSteps::kLargeTriangles:
         testLargeTriangles(steps, s);
@@ -104,6 +88,8 @@ void TreeWalk::testLargeTriangles(PairSteps& steps, Scratch& s) {
     const std::uint32_t asked = steps.large == StepGroup::kNone ? ~0u : steps.triangles;
     steps.triangles = s.large[y].meeting(small, node, large, leaf, asked, to, unit);
     if (steps.triangles != 0) pushMeeting(steps);
+  } else if (!small.hasOctants(node)) {
+    pushOctants(steps, steps.mask);
   } else {
     pushOctants(steps, (x == 0 ? s.long_b : s.long_a).octantsMeeting(small, node, steps.mask, large, leaf, to));
   }
@@ -127,18 +113,6 @@ const SimilarityTransform& TreeWalk::aInB() {
   if (!inverted_) a_in_b_ = b_in_a_.inverse();
   inverted_ = true;
   return a_in_b_;
-}
-
-void TreeWalk::defer(const PairSteps& steps, Scratch& s) {
-  s.deferred.add({steps.pair[0].node, steps.pair[1].node});
-  for (int side = 0; side < 2; ++side) {
-    const StepNode& n = steps.pair[side];
-    if (s.unseen[side].size() == kUnseen || n.ref.tag() != tree::ChildRef::kImplicit) continue;
-    if (n.lane == StepNode::kNoLane) continue;
-    const auto& normal = steps.frames[n.lane / 8].normal[0];
-    const std::size_t o = n.lane % 8;
-    if (normal[0][o] == 0 && normal[1][o] == 0 && normal[2][o] == 0) s.unseen[side].push_back(n.node);
-  }
 }
 
 }  // namespace bocst::query

@@ -34,7 +34,6 @@ class TreeWalk {
   bool stepAll(PairSteps& steps, Scratch& s);
   void testLargeTriangles(PairSteps& steps, Scratch& s);
   bool testLeaves(const PairSteps& steps, Scratch& s);
-  void defer(const PairSteps& steps, Scratch& s);
   const SimilarityTransform& aInB();
 
   const TreeSide &a_, &b_;

@@ -9,9 +9,30 @@
 
 #include "query/cull/frames.h"
 #include "simd/octants-inl.h"
+#include "tree/block.h"
 
 HWY_BEFORE_NAMESPACE();
 namespace bocst::query::HWY_NAMESPACE {
+
+// Writes what the other side sees of some lanes.
+HWY_INLINE void turnLanes(const PairFrames::Side& g, const V (&c)[3], const V (&h)[3], const V (&n)[3], std::size_t i,
+                          Frame& f) {
+  const D d;
+  BOCST_UNROLL
+  for (int j = 0; j < 3; ++j) {
+    V cj = hn::Set(d, g.shift[j]), hj = hn::Zero(d), nj = hn::Zero(d);
+    BOCST_UNROLL
+    for (int k = 0; k < 3; ++k) {
+      const V r = hn::Set(d, g.to_other[j][k]);
+      cj = hn::MulAdd(r, c[k], cj);
+      nj = hn::MulAdd(r, n[k], nj);
+      hj = hn::MulAdd(hn::Set(d, g.abs_to_other[j][k]), h[k], hj);
+    }
+    hn::Store(cj, d, f.center[1][j] + i);
+    hn::Store(hj, d, f.half[1][j] + i);
+    hn::Store(nj, d, f.normal[1][j] + i);
+  }
+}
 
 // Writes the volumes of eight octants of sides `length`, of which the first has its corner at `corner`, in such sides,
 // from the middle of the root.
@@ -39,20 +60,38 @@ HWY_INLINE void decode(const PairFrames::Side& g, const oracle::OctantBounds& oc
     }
     hn::Store(offset, d, f.slab_center + i);
     hn::Store(hn::Mul(fromBytes(d, octants.slab_half + i), hn::Set(d, length * (1.0f / 254))), d, f.slab_half + i);
+    turnLanes(g, c, h, n, i, f);
+  }
+}
+
+// Writes the volumes of a loose block. Whole numbers and powers of two are exact: a middle is off by 8 u Q.
+HWY_INLINE void decodeLoose(const PairFrames::Side& g, const bounds::LooseFrame& frame,
+                            const oracle::OctantBounds& octants, Frame& f) {
+  const D d;
+  const float longest = static_cast<float>(frame.longest()) * g.unit;
+  const V per127 = hn::Set(d, 1.0f / 127), slab = hn::Set(d, longest * (1.0f / 256));
+  const V slab_half = hn::Set(d, longest * (1.0f / 512));
+  V base[3], byte[3];
+  BOCST_UNROLL
+  for (std::size_t k = 0; k < 3; ++k) {
+    base[k] = hn::Set(d, static_cast<float>(frame.origin[k] - lattice::kMiddle) * g.unit);
+    byte[k] = hn::Set(d, static_cast<float>(frame.side(k)) * g.unit * (1.0f / 510));
+  }
+  for (std::size_t i = 0; i < 8; i += hn::Lanes(d)) {
+    V c[3], h[3], n[3];
     BOCST_UNROLL
-    for (int j = 0; j < 3; ++j) {
-      V cj = hn::Set(d, g.shift[j]), hj = hn::Zero(d), nj = hn::Zero(d);
-      BOCST_UNROLL
-      for (int k = 0; k < 3; ++k) {
-        const V r = hn::Set(d, g.to_other[j][k]);
-        cj = hn::MulAdd(r, c[k], cj);
-        nj = hn::MulAdd(r, n[k], nj);
-        hj = hn::MulAdd(hn::Set(d, g.abs_to_other[j][k]), h[k], hj);
-      }
-      hn::Store(cj, d, f.center[1][j] + i);
-      hn::Store(hj, d, f.half[1][j] + i);
-      hn::Store(nj, d, f.normal[1][j] + i);
+    for (int k = 0; k < 3; ++k) {
+      const V lo = fromBytes(d, octants.lo[k] + i), hi = fromBytes(d, octants.hi[k] + i);
+      c[k] = hn::MulAdd(hn::Add(lo, hi), byte[k], base[k]);
+      h[k] = hn::Mul(hn::Sub(hi, lo), byte[k]);
+      n[k] = hn::Mul(fromBytes(d, octants.normal[k] + i), per127);
+      hn::Store(c[k], d, f.center[0][k] + i);
+      hn::Store(h[k], d, f.half[0][k] + i);
+      hn::Store(n[k], d, f.normal[0][k] + i);
     }
+    hn::Store(hn::Mul(fromBytes(d, octants.slab_center + i), slab), d, f.slab_center + i);
+    hn::Store(hn::Mul(fromBytes(d, octants.slab_half + i), slab_half), d, f.slab_half + i);
+    turnLanes(g, c, h, n, i, f);
   }
 }
 
@@ -65,6 +104,14 @@ HWY_INLINE void decodeCell(const PairFrames& g, int own, int level, const Positi
   for (int k = 0; k < 3; ++k) corner[k] = static_cast<float>(2 * static_cast<int>(at[k]) - middle);
   const int side = 1 << (lattice::kMaxLevel - 1 - level);
   decode(g.side[own], octants, corner, static_cast<float>(side) * g.side[own].unit, f);
+}
+
+HWY_INLINE void decodeBlock(const PairFrames& g, int own, const tree::Block& block, Frame& f) {
+  if (block.isLoose()) {
+    decodeLoose(g.side[own], block.frame(), block.octants, f);
+  } else {
+    decodeCell(g, own, block.shape, block.at, block.octants, f);
+  }
 }
 
 HWY_INLINE void decodeRoot(const PairFrames& g, int own, const oracle::CellBounds& bounds, Frame& f) {

@@ -22,11 +22,12 @@ struct alignas(64) Frame {
 /// How the frames of two trees lie to each other, in float, and what that loses.
 ///
 /// With u = 2^-24 and M = |t| + sqrt(3) (Q0 + Q1), Q half a root's side, no coordinate is larger than M. A centre is
-/// off by 6 u Q in its own frame (bytes to units 4, corner 2) and by 11 u M in the other (that turned, rotation 1, sums
-/// 4); an extent by 7 u M. Two centres, two extents and the comparison: 42 u M; `rounding margin` takes 48. Along a
-/// normal (length below 1.01, off by 10 u an entry) the way between centres is off by 42 u M, 18 by the normal and 9 by
-/// sums; offsets 11; the radius 38 by the normals and 15 by sums: 133 u M; `slab_rounding_margin` takes 160. To both
-/// comes the defect of the rotation, 4 M of it, and the tolerance.
+/// off by 8 u Q in its own frame (an octant's by 6: bytes to units 4, corner 2; a loose lane's by 8: origin 1, bytes to
+/// units 3 of twice the length, sum 1) and by 13 u M in the other (that turned, rotation 1, sums 4); an extent by 7 u
+/// M. Two centres, two extents and the comparison: 46 u M; `rounding margin` takes 48. Along a normal (length
+/// below 1.01, off by 10 u an entry) the way between centres is off by 46 u M, 18 by the normal and 9 by sums; offsets
+/// 11; the radius 38 by the normals and 15 by sums: 137 u M; `slab_rounding_margin` takes 160. To both comes the defect
+/// of the rotation, 4 M of it, and the tolerance.
 ///
 /// What sees octants in their own frame only, along axes whose entries' sizes sum up to 1, is off by less: see
 /// octantsMeeting().

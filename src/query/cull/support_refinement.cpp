@@ -12,16 +12,14 @@ namespace {
 
 using tree::SupportTable;
 
-// What a miss pays for later ones, on each side: so much as to look at some thousands of triangles. To grow a node by
-// what the root grid knows is as much as a thousand.
-constexpr std::size_t kEffort = 1 << 13, kGrowthEffort = 1 << 10;
+// What a miss pays for later ones, on each side: triangles looked at.
+constexpr std::size_t kEffort = 1 << 13;
 
 // A part of the surface and how far it may reach.
 struct Part {
   double extent;
   tree::NodeRef node;
-  bool known = false;    // the tree can say no more
-  bool reached = false;  // by a vertex
+  bool known = false;  // the tree can say no more
   bool operator<(const Part& other) const { return extent < other.extent; }
 };
 
@@ -42,10 +40,9 @@ class SupportRefinement {
       const Part part = scratch_.parts.back();
       scratch_.parts.pop_back();
       if (part.known) {
-        supports.lower(number, part.extent, part.reached);
+        supports.lower(number, part.extent);
         return true;
       }
-      if (growsFromGrid(part.node) && !grow(part.node)) return false;
       if (side_.state(part.node) == State::kInner) {
         side_.children(part.node, [this](tree::NodeRef node) { addNode(node); });
       } else if (!addTriangles(part)) {
@@ -53,7 +50,7 @@ class SupportRefinement {
       }
     }
     // A sampled oracle has lost all of the surface.
-    supports.lower(number, supports.value(number), false);
+    supports.lower(number, supports.value(number));
     return true;
   }
 
@@ -62,7 +59,6 @@ class SupportRefinement {
   struct Scratch {
     std::vector<Part> parts;  // a heap
     std::vector<std::uint32_t> triangles;
-    std::vector<tree::Tree::Growth> growth;
   };
   static Scratch& scratch() {
     thread_local Scratch scratch;
@@ -88,30 +84,15 @@ class SupportRefinement {
     left_ -= std::min(left_, scratch_.triangles.size());
     if (!are_known) {
       // Perhaps they only are too many for what is left now.
-      if (has_all_effort_) add({part.extent, part.node, true, false});
+      if (has_all_effort_) add({part.extent, part.node, true});
       return has_all_effort_;
     }
     double extent = -std::numeric_limits<double>::infinity();
     for (const std::uint32_t t : scratch_.triangles) {
       for (int k = 0; k < 3; ++k) extent = std::max(extent, direction_.dot(side_.corner(t, k) - middle_));
     }
-    add({extent, part.node, true, true});
+    add({extent, part.node, true});
     return true;
-  }
-
-  bool growsFromGrid(tree::NodeRef node) const {
-    return side_.state(node) == State::kGrows && side_.growsFromGrid(node) && side_.tree().hasBudget();
-  }
-
-  // Unless another thread grows the tree just now.
-  bool grow(tree::NodeRef node) {
-    if (left_ < kGrowthEffort) return false;
-    left_ -= kGrowthEffort;
-    has_all_effort_ = false;
-    scratch_.growth.clear();
-    side_.grow(node, scratch_.growth);
-    tree::Tree::grow(scratch_.growth, false);
-    return side_.state(node) == State::kInner;
   }
 
   const TreeSide& side_;
@@ -124,7 +105,6 @@ class SupportRefinement {
 
 void sharpen(const TreeSide& side, const std::int32_t (&near)[3][8]) {
   tree::SupportTable& supports = side.tree().supports();
-  supports.reopen(side.tree().growth());
   SupportRefinement sharpening(side);
   for (int lane = 0; lane < 8; ++lane) {
     // The last look is at directions so close to each other that most are between the same.
@@ -139,8 +119,9 @@ void sharpen(const TreeSide& side, const std::int32_t (&near)[3][8]) {
 
 void refineSupports(const TreeSide& a, const TreeSide& b, const NearDirections& near) {
   if (near.lanes == 0) return;
-  sharpen(a, near.of_a);
-  sharpen(b, near.of_b);
+  // A tree that still grows by parts says little.
+  if (a.tree().isWhole()) sharpen(a, near.of_a);
+  if (b.tree().isWhole()) sharpen(b, near.of_b);
 }
 
 }  // namespace bocst::query

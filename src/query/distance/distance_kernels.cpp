@@ -13,7 +13,7 @@ HWY_BEFORE_NAMESPACE();
 namespace bocst::query::HWY_NAMESPACE {
 
 void FillFrame(const PairFrames& geometry, int own, const tree::Block& block, Frame& frame) {
-  decodeCell(geometry, own, block.level, block.at, block.octants, frame);
+  decodeBlock(geometry, own, block, frame);
 }
 
 void FillRootFrame(const PairFrames& geometry, int own, const oracle::CellBounds& root, Frame& frame) {

@@ -74,7 +74,7 @@ const std::vector<TreeGaps::Candidate>& TreeGaps::ofTriangles(tree::NodeRef leaf
   Scratch& s = scratch();
   s.candidates.clear();
   const TreeSide &a = *side_[0], &b = *side_[1];
-  const Eigen::Vector3d center = a.cellSphere(leaf_a).center;
+  const Eigen::Vector3d center = a.roughSphere(leaf_a).center;
   const PackTransform to_a = packTransform(a, SimilarityTransform(), center, 1),
                       to_b = packTransform(b, b_in_a_, center, 1);
   const std::size_t count_a = a.triangleCount(leaf_a), count_b = b.triangleCount(leaf_b);

@@ -63,17 +63,19 @@ class TreeSide {
                     b.slab_center, b.slab_half, 0, 0, 0, 1);
     }
     const tree::Block& parent = tree_.block(node.block());
+    if (parent.isLoose()) return looseVolume(parent, node.octant());
     const oracle::OctantBounds& b = parent.octants;
     const int o = node.octant();
     return decode(b.lo[0][o], b.lo[1][o], b.lo[2][o], b.hi[0][o], b.hi[1][o], b.hi[2][o], b.normal[0][o],
                   b.normal[1][o], b.normal[2][o], b.slab_center[o], b.slab_half[o], 2 * parent.at[0] + (o & 1),
-                  2 * parent.at[1] + (o >> 1 & 1), 2 * parent.at[2] + (o >> 2 & 1), parent.level + 1);
+                  2 * parent.at[1] + (o >> 1 & 1), 2 * parent.at[2] + (o >> 2 & 1), parent.shape + 1);
   }
 
   /// Bounds the surface below a node, and the spheres of all cells below it: a cube's sphere holds those of its parts;
   /// the sphere of a part of a clipped region may stick out, by less than the factor sqrt(2) about the region's centre,
   /// as |h - h'| + |h'| <= sqrt(2) |h| for half extents 0 <= h' <= h.
   Sphere sphere(Node node) const {
+    if (tree_.isLoose(node)) return sphereAbout(volume(node));
     const lattice::Cell cell = tree_.cell(node);
     Sphere s = sphereAbout(cell);
     if (isConservative() && !tree_.isDeepest(cell.level) && isClipped(cell)) s.radius *= 1.4142135623730952;
@@ -82,6 +84,7 @@ class TreeSide {
 
   /// The sphere about the node's cube: quickly had, for what only wants an order.
   Sphere roughSphere(Node node) const {
+    if (tree_.isLoose(node)) return sphereAbout(volume(node));
     const lattice::Cell cell = tree_.cell(node);
     const double side = cell.side();
     return {(Eigen::Vector3d(cell.at[0], cell.at[1], cell.at[2]).array() + 0.5) * side, 0.8660254037844387 * side};
@@ -106,14 +109,19 @@ class TreeSide {
   void childrenMeeting(Node node, OtherVolume& volume, const SimilarityTransform& to, Large& large, const Other& other,
                        typename Other::Node leaf, F&& f) const {
     const std::uint32_t index = tree_.childRef(node).index();
-    const unsigned mask = octantsOverlapping(index, volume, to);
-    if (mask != 0) pushOctants(tree_.block(index), index, large.octantsMeeting(*this, node, mask, other, leaf, to), f);
+    const tree::Block& block = tree_.block(index);
+    unsigned mask = octantsOverlapping(index, volume, to);
+    if (mask != 0 && !block.isLoose()) mask = large.octantsMeeting(*this, node, mask, other, leaf, to);
+    pushOctants(block, index, mask, f);
   }
+
+  /// Are the children of an inner node octants of a cell, rather than lanes of a loose block?
+  bool hasOctants(Node node) const { return !tree_.block(tree_.childRef(node).index()).isLoose(); }
 
   /// The centre of an inner node's cell and half its side, which is the side of its octants.
   double octantsOf(Node node, Eigen::Vector3d& center) const {
     const tree::Block& block = tree_.block(tree_.childRef(node).index());
-    const double half = 1 << (lattice::kMaxLevel - block.level - 1);
+    const double half = 1 << (lattice::kMaxLevel - block.shape - 1);
     center = Eigen::Vector3d(2 * block.at[0] + 1, 2 * block.at[1] + 1, 2 * block.at[2] + 1) * half;
     return half;
   }
@@ -163,7 +171,12 @@ class TreeSide {
   unsigned octantsOverlapping(std::uint32_t index, OtherVolume& other, const SimilarityTransform& to) const {
     const tree::Block& block = tree_.block(index);
     tree_.markUsed(index, now_);
-    const double side = 1 << (lattice::kMaxLevel - block.level);
+    if (block.isLoose()) {
+      const bounds::LooseFrame frame = block.frame();
+      const double corner[3] = {double(frame.origin[0]), double(frame.origin[1]), double(frame.origin[2])};
+      return overlappingLanes(frame, block.octants, seenFrom(other, to, corner, frame.longest() / 2)) & block.grey;
+    }
+    const double side = 1 << (lattice::kMaxLevel - block.shape);
     const double corner[3] = {block.at[0] * side, block.at[1] * side, block.at[2] * side};
     return overlappingOctants(block.octants, seenFrom(other, to, corner, side / 2)) & block.grey;
   }
@@ -207,6 +220,28 @@ class TreeSide {
     return v;
   }
 
+  static Volume looseVolume(const tree::Block& block, int o) {
+    const bounds::LooseFrame frame = block.frame();
+    const oracle::OctantBounds& b = block.octants;
+    Volume v;
+    for (std::size_t k = 0; k < 3; ++k) {
+      const double byte = frame.side(k) / 510;
+      v.half[k] = static_cast<float>((b.hi[k][o] - b.lo[k][o]) * byte);
+      v.center[k] = frame.origin[k] + (b.lo[k][o] + b.hi[k][o]) * byte;
+      v.normal[k] = static_cast<float>(b.normal[k][o] * (1.0 / 127));
+    }
+    v.slab_offset = static_cast<float>(b.slab_center[o] * (frame.longest() / 256));
+    v.slab_half = static_cast<float>(b.slab_half[o] * (frame.longest() / 512));
+    return v;
+  }
+
+  static Sphere sphereAbout(const Volume& v) {
+    Sphere s;
+    s.center = {v.center[0], v.center[1], v.center[2]};
+    s.radius = Eigen::Vector3d(double(v.half[0]), double(v.half[1]), double(v.half[2])).norm() * (1 + 0x1p-22);
+    return s;
+  }
+
   Sphere sphereAbout(const lattice::Cell& cell) const {
     Sphere s;
     Eigen::Vector3d half;
@@ -225,7 +260,7 @@ class TreeSide {
     return false;
   }
 
-  int level(Node node) const { return node.isRoot() ? 1 : tree_.block(node.block()).level + 1; }
+  int level(Node node) const { return tree_.level(node); }
 
   tree::Tree& tree_;
   const std::int64_t now_;

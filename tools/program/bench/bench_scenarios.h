@@ -11,6 +11,12 @@ namespace bocst::program {
 /// Two new models and one query, beside one streaming pass over both meshes.
 void benchFirst(BenchSetting& setting, BenchReport& report);
 
+/// Poses that are asked once, by windows, and totals from the arrays.
+void benchFresh(BenchSetting& setting, BenchReport& report);
+
+/// Meshes that cubes divide badly, whatever the files: build and queries beside FCL's.
+void benchCliffs(BenchSetting& setting, BenchReport& report);
+
 /// Do they touch? On poses that were asked until the trees stopped growing.
 void benchWarm(BenchSetting& setting, BenchReport& report);
 
