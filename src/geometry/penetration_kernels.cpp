@@ -94,6 +94,9 @@ void PenetrationsOfPairs(const TrianglePairs& pairs, double tolerance, PairPenet
     const Vd tiny = hn::Set(d, 1e-20);  // a cross product of edges so short, squared, is their rounding
     const Vd n_shortest = hn::Mul(tiny, hn::Mul(ee[0], ee[1])), m_shortest = hn::Mul(tiny, hn::Mul(ff[0], ff[1]));
 
+    // Of what has no area the plane is rounding.
+    const Md areas = hn::And(hn::Gt(nn, n_shortest), hn::Gt(mm, m_shortest));
+
     LeastOverlap least;
     least.depth = hn::Set(d, 1e300);
     least.normal = {hn::Set(d, 1.0), zero, zero};
@@ -105,7 +108,7 @@ void PenetrationsOfPairs(const TrianglePairs& pairs, double tolerance, PairPenet
     }
     // Between triangles with an area and no common plane, the difference of the two has no other faces; in a common
     // plane the overlap along its normal is 0.
-    if (!hn::AllTrue(d, hn::And(hn::Gt(nn, n_shortest), hn::Gt(mm, m_shortest)))) {
+    if (!hn::AllTrue(d, areas)) {
       for (int a = 0; a < 3; ++a) {
         consider(t, cross(e[a], n), hn::Mul(tiny, hn::Mul(ee[a], nn)), least);
         consider(t, cross(f[a], m), hn::Mul(tiny, hn::Mul(ff[a], mm)), least);
@@ -135,7 +138,7 @@ void PenetrationsOfPairs(const TrianglePairs& pairs, double tolerance, PairPenet
     hn::Store(point.x, d, contacts.point[0] + i);
     hn::Store(point.y, d, contacts.point[1] + i);
     hn::Store(point.z, d, contacts.point[2] + i);
-    const Md slanted = hn::Gt(squared, hn::Mul(hn::Set(d, 1e-24), hn::Mul(nn, mm)));
+    const Md slanted = hn::And(areas, hn::Gt(squared, hn::Mul(hn::Set(d, 1e-24), hn::Mul(nn, mm))));
     contacts.no_point |= (bitsOf(hn::Not(hn::And(hn::And(cuts, slanted), hn::Le(lo, hi))))) << i;
   }
   if (pairs.count < 32) {

@@ -5,17 +5,12 @@
 #include <algorithm>
 #include <cmath>
 #include <limits>
+#include <type_traits>
 
 namespace bocst::query {
 namespace {
 
 using Eigen::Vector3d;
-
-Vector3d closestOnSegment(const Vector3d& x, const Vector3d& a, const Vector3d& b) {
-  const Vector3d d = b - a;
-  const double dd = d.squaredNorm();
-  return dd > 0 ? Vector3d(a + std::clamp(d.dot(x - a) / dd, 0.0, 1.0) * d) : a;
-}
 
 // Where the closed triangle t cuts the plane through o with normal n; false when it does not cross it.
 bool cutByPlane(const Corners& t, const Vector3d& o, const Vector3d& n, Vector3d& a, Vector3d& b) {
@@ -39,6 +34,10 @@ Vector3d middleOfOverlap(const Corners& p, const Corners& q) {
   const Vector3d n = (p[1] - p[0]).cross(p[2] - p[0]), m = (q[1] - q[0]).cross(q[2] - q[0]);
   const Vector3d line = n.cross(m);
   Vector3d a, b, c, d;
+  if (isDegenerate(p) || isDegenerate(q)) {
+    nearestPoints(p, q, a, b);
+    return (a + b) / 2;
+  }
   if (line.squaredNorm() > 1e-24 * n.squaredNorm() * m.squaredNorm() && cutByPlane(p, q[0], m, a, b) &&
       cutByPlane(q, p[0], n, c, d)) {
     // Both segments lie on the line of the two planes: the middle of what they share.
@@ -56,30 +55,253 @@ Vector3d middleOfOverlap(const Corners& p, const Corners& q) {
   return (lo + hi) / 2;
 }
 
-bool segmentCutsTriangle(const Vector3d& a, const Vector3d& b, const Corners& t, Vector3d& at) {
-  const Vector3d n = (t[1] - t[0]).cross(t[2] - t[0]);
-  const double da = n.dot(a - t[0]), db = n.dot(b - t[0]);
-  if ((da > 0 && db > 0) || (da < 0 && db < 0) || da == db) return false;
-  at = a + da / (da - db) * (b - a);
+// The sum of two doubles, the second no more than half a unit of the first: 106 bits (Dekker 1971, Knuth 1969).
+struct Twice {
+  double high = 0, low = 0;
+
+  Twice() = default;
+  Twice(double x) : high(x) {}  // NOLINT: a double is one of these
+  Twice(double h, double l) : high(h), low(l) {}
+  explicit operator double() const { return high; }
+
+  static Twice quickSum(double a, double b) {  // |a| >= |b|
+    const double s = a + b;
+    return {s, b - (s - a)};
+  }
+  static Twice sum(double a, double b) {
+    const double s = a + b, t = s - a;
+    return {s, (a - (s - t)) + (b - t)};
+  }
+  static Twice product(double a, double b) {
+    const auto halves = [](double x, double& h, double& l) {
+      const double c = 134217729.0 * x;  // 2^27 + 1
+      h = c - (c - x);
+      l = x - h;
+    };
+    double ah, al, bh, bl;
+    halves(a, ah, al);
+    halves(b, bh, bl);
+    const double p = a * b;
+    return {p, ((ah * bh - p) + ah * bl + al * bh) + al * bl};
+  }
+};
+Twice operator-(const Twice& a) { return {-a.high, -a.low}; }
+Twice operator+(const Twice& a, const Twice& b) {
+  const Twice s = Twice::sum(a.high, b.high), t = Twice::sum(a.low, b.low);
+  const Twice u = Twice::quickSum(s.high, s.low + t.high);
+  return Twice::quickSum(u.high, u.low + t.low);
+}
+Twice operator-(const Twice& a, const Twice& b) { return a + -b; }
+Twice operator*(const Twice& a, const Twice& b) {
+  const Twice p = Twice::product(a.high, b.high);
+  return Twice::quickSum(p.high, p.low + (a.high * b.low + a.low * b.high));
+}
+Twice operator/(const Twice& a, const Twice& b) {
+  const double x = a.high / b.high;
+  const Twice rest = a - b * Twice(x);
+  const double y = rest.high / b.high;
+  return Twice::quickSum(x, y) + Twice((rest - b * Twice(y)).high / b.high);
+}
+bool operator<(const Twice& a, const Twice& b) { return a.high < b.high || (a.high == b.high && a.low < b.low); }
+bool operator>(const Twice& a, const Twice& b) { return b < a; }
+
+template <typename T>
+struct Vec {
+  T x[3] = {T(0), T(0), T(0)};
+  Vec() = default;
+  Vec(const T& a, const T& b, const T& c) : x{a, b, c} {}
+  explicit Vec(const Vector3d& v) : x{v[0], v[1], v[2]} {}
+  friend Vec operator+(const Vec& a, const Vec& b) { return {a.x[0] + b.x[0], a.x[1] + b.x[1], a.x[2] + b.x[2]}; }
+  friend Vec operator-(const Vec& a, const Vec& b) { return {a.x[0] - b.x[0], a.x[1] - b.x[1], a.x[2] - b.x[2]}; }
+  friend Vec operator*(const T& s, const Vec& a) { return {s * a.x[0], s * a.x[1], s * a.x[2]}; }
+};
+template <typename T>
+T dot(const Vec<T>& a, const Vec<T>& b) {
+  return a.x[0] * b.x[0] + a.x[1] * b.x[1] + a.x[2] * b.x[2];
+}
+template <typename T>
+Vec<T> cross(const Vec<T>& a, const Vec<T>& b) {
+  return {a.x[1] * b.x[2] - a.x[2] * b.x[1], a.x[2] * b.x[0] - a.x[0] * b.x[2], a.x[0] * b.x[1] - a.x[1] * b.x[0]};
+}
+template <typename T>
+T clampToUnit(const T& x) {
+  return x < T(0) ? T(0) : x > T(1) ? T(1) : x;
+}
+
+// A triangle with what is computed from it once. The normal is that of the two shorter edges: its direction is off by
+// 4 roundings over the sine of their angle, and that sine says what the three corners are.
+template <typename T>
+struct Face {
+  Vec<T> v[3], e[3], n;
+  T ee[3], nn;
+  double sine2 = 0;  // of the angle between the two shorter edges, squared; 0 for a segment or a point
+
+  Face(const Vec<T>& a, const Vec<T>& b, const Vec<T>& c) : v{a, b, c}, e{b - a, c - b, a - c} {
+    for (int i = 0; i < 3; ++i) ee[i] = dot(e[i], e[i]);
+    const int longest = ee[1] > ee[0] ? (ee[2] > ee[1] ? 2 : 1) : (ee[2] > ee[0] ? 2 : 0);
+    const int i = (longest + 1) % 3, j = (longest + 2) % 3;
+    n = cross(e[i], e[j]);
+    nn = dot(n, n);
+    const double sizes = static_cast<double>(ee[i]) * static_cast<double>(ee[j]);
+    if (sizes > 1e-280 && sizes < 1e280) sine2 = static_cast<double>(nn) / sizes;
+  }
+
+  T above(const Vec<T>& x) const { return dot(n, x - v[0]); }
+};
+
+// A face whose normal is good to the last digits but two. In double, others are looked at in twice the digits.
+constexpr double kWellShaped = 1e-3;
+// Farther apart, squared, products of lengths may overflow.
+constexpr double kFarthest = 1e150;
+
+// In twice the digits a face is less than this only if its width is less than a rounding of its length in double: then
+// the edges are all of it.
+constexpr double kHasFace = 1e-32;
+
+template <typename T>
+bool hasFace(const Face<T>& f) {
+  return f.sine2 > (std::is_same<T, double>::value ? kWellShaped : kHasFace);
+}
+
+// Is a point of the plane over the inside?
+template <typename T>
+bool isInside(const Face<T>& t, const Vec<T>& at) {
   for (int i = 0; i < 3; ++i) {
-    if (n.dot((t[(i + 1) % 3] - t[i]).cross(at - t[i])) < 0) return false;
+    if (dot(t.n, cross(t.e[i], at - t.v[i])) < T(0)) return false;
   }
   return true;
 }
 
-double clampToUnit(double x) { return std::clamp(x, 0.0, 1.0); }
-
-// The foot of a point, `above` = n.(x - t[0]) over the plane of a triangle with edges e and normal n, if it is inside.
-// That of a sliver is left to its edges: its normal is mostly rounding.
-bool footInside(const Vector3d& x, const Corners& t, const Vector3d (&e)[3], const Vector3d& n, double nn, double above,
-                Vector3d& foot) {
-  if (!(nn > 1e-16 * e[0].squaredNorm() * e[1].squaredNorm())) return false;
-  foot = x - n * (above / nn);
-  for (int i = 0; i < 3; ++i) {
-    if (n.dot(e[i].cross(foot - t[i])) < 0) return false;
-  }
-  return true;
+// Where an edge whose ends are `from` and `to` over the plane of t cuts it.
+template <typename T>
+bool cuts(const Vec<T>& a, const Vec<T>& b, const T& from, const T& to, const Face<T>& t, Vec<T>& at) {
+  const T zero(0);
+  if ((from > zero && to > zero) || (from < zero && to < zero) || !(from < to || to < from)) return false;
+  at = a + (from / (from - to)) * (b - a);
+  return isInside(t, at);
 }
+
+template <typename T>
+Vec<T> onSegment(const Vec<T>& x, const Vec<T>& a, const Vec<T>& e, const T& ee) {
+  return ee > T(0) ? a + clampToUnit<T>(dot(e, x - a) / ee) * e : a;
+}
+
+/// The least distance so far, squared, and its points.
+template <typename T>
+struct Closest {
+  T squared = std::numeric_limits<double>::infinity();
+  Vec<T> p, q;
+  void consider(const Vec<T>& a, const Vec<T>& b) {
+    const Vec<T> displacement = a - b;
+    const T d = dot(displacement, displacement);
+    if (!(d < squared)) return;
+    squared = d;
+    p = a;
+    q = b;
+  }
+};
+
+template <typename T>
+void considerEdges(const Face<T>& p, int i, const Face<T>& q, int j, Closest<T>& closest) {
+  const T zero(0);
+  const Vec<T>&a = p.v[i], &b = q.v[j], &e = p.e[i], &f = q.e[j];
+  const T &ee = p.ee[i], &ff = q.ee[j];
+  const Vec<T> w = a - b;
+  const T ew = dot(e, w), fw = dot(f, w), ef = dot(e, f), both = ee * ff, det = both - ef * ef;
+  T s = det > zero ? clampToUnit<T>((ef * fw - ff * ew) / det) : zero;
+  const T t = ff > zero ? clampToUnit<T>((ef * s + fw) / ff) : zero;
+  s = ee > zero ? clampToUnit<T>((ef * t - ew) / ee) : zero;
+  closest.consider(a + s * e, b + t * f);
+  if (det > T(1e-6) * both) return;
+  // All but parallel, the quotient is inaccurate; so may the nearest points be, unless the ends are looked at too.
+  const Vec<T>&a2 = p.v[(i + 1) % 3], &b2 = q.v[(j + 1) % 3];
+  closest.consider(a, onSegment(a, b, f, ff));
+  closest.consider(a2, onSegment(a2, b, f, ff));
+  closest.consider(onSegment(b, a, e, ee), b);
+  closest.consider(onSegment(b2, a, e, ee), b2);
+}
+
+template <typename T>
+Closest<T> closestOf(const Face<T>& p, const Face<T>& q) {
+  Closest<T> closest;
+  const bool p_has = hasFace(p), q_has = hasFace(q);
+  const T zero(0);
+  T above_p[3], above_q[3];
+  const auto measure = [zero](const Face<T>& face, const Face<T>& other, T(&above)[3]) {
+    bool up = false, down = false;
+    for (int i = 0; i < 3; ++i) {
+      above[i] = face.above(other.v[i]);
+      up |= !(above[i] < zero);
+      down |= !(above[i] > zero);
+    }
+    return up && down;
+  };
+  const bool straddles_p = !p_has || measure(p, q, above_p), straddles_q = !q_has || measure(q, p, above_q);
+  // An edge through the other's inside. On one side of the other's plane, neither cuts the other.
+  if (straddles_p && straddles_q) {
+    for (int i = 0; i < 3; ++i) {
+      const int k = (i + 1) % 3;
+      Vec<T> at;
+      if ((q_has && cuts(p.v[i], p.v[k], above_q[i], above_q[k], q, at)) ||
+          (p_has && cuts(q.v[i], q.v[k], above_p[i], above_p[k], p, at))) {
+        closest.squared = zero;
+        closest.p = closest.q = at;
+        return closest;
+      }
+    }
+  }
+  // A corner over the inside of the other, or a point of an edge and one of the other's.
+  for (int i = 0; i < 3; ++i) {
+    if (p_has) {
+      const Vec<T> foot = q.v[i] - (above_p[i] / p.nn) * p.n;
+      if (isInside(p, foot)) closest.consider(foot, q.v[i]);
+    }
+    if (q_has) {
+      const Vec<T> foot = p.v[i] - (above_q[i] / q.nn) * q.n;
+      if (isInside(q, foot)) closest.consider(p.v[i], foot);
+    }
+  }
+  for (int i = 0; i < 3; ++i) {
+    for (int j = 0; j < 3; ++j) considerEdges(p, i, q, j, closest);
+  }
+  return closest;
+}
+
+template <typename T>
+Vec<T> closestTo(const Vec<T>& x, const Face<T>& t) {
+  if (hasFace(t)) {
+    const Vec<T> foot = x - (t.above(x) / t.nn) * t.n;
+    if (isInside(t, foot)) return foot;
+  }
+  Closest<T> closest;
+  for (int i = 0; i < 3; ++i) closest.consider(onSegment(x, t.v[i], t.e[i], t.ee[i]), x);
+  return closest.p;
+}
+
+Vector3d toVector(const Vec<double>& v) { return {v.x[0], v.x[1], v.x[2]}; }
+
+// In twice the digits, scaled by a power of two so that no square overflows, and none that matters vanishes.
+class Scale {
+ public:
+  void take(const Vector3d& v) { largest_ = std::max(largest_, v.cwiseAbs().maxCoeff()); }
+  void take(const Corners& t) {
+    for (const Vector3d& v : t) take(v);
+  }
+  bool isZero() const { return !(largest_ > 0); }
+  Vector3d down(const Vector3d& v) const {
+    const int by = -std::ilogb(largest_);
+    return {std::ldexp(v[0], by), std::ldexp(v[1], by), std::ldexp(v[2], by)};
+  }
+  Vec<Twice> operator()(const Vector3d& v) const { return Vec<Twice>(down(v)); }
+  Face<Twice> operator()(const Corners& t) const { return {(*this)(t[0]), (*this)(t[1]), (*this)(t[2])}; }
+  double back(double x) const { return std::ldexp(x, std::ilogb(largest_)); }
+  Vector3d back(const Vec<Twice>& v) const { return {back(v.x[0].high), back(v.x[1].high), back(v.x[2].high)}; }
+
+ private:
+  double largest_ = 0;
+};
+
+Face<double> faceOf(const Corners& t) { return {Vec<double>(t[0]), Vec<double>(t[1]), Vec<double>(t[2])}; }
 
 }  // namespace
 
@@ -109,71 +331,46 @@ PenetrationVerdicts trianglePenetrations(const TrianglePairs& pairs, double tole
 }
 
 Vector3d closestPoint(const Vector3d& x, const Corners& t) {
-  const Vector3d e[3] = {t[1] - t[0], t[2] - t[1], t[0] - t[2]}, n = e[0].cross(e[1]);
-  Vector3d foot;
-  if (footInside(x, t, e, n, n.squaredNorm(), n.dot(x - t[0]), foot)) return foot;
-  Vector3d best = closestOnSegment(x, t[0], t[1]);
-  for (int i = 1; i < 3; ++i) {
-    const Vector3d c = closestOnSegment(x, t[i], t[(i + 1) % 3]);
-    if ((c - x).squaredNorm() < (best - x).squaredNorm()) best = c;
-  }
-  return best;
+  const Face<double> face = faceOf(t);
+  if (hasFace(face) && (x - t[0]).squaredNorm() < kFarthest) return toVector(closestTo(Vec<double>(x), face));
+  Scale scale;
+  scale.take(x);
+  scale.take(t);
+  return scale.isZero() ? t[0] : scale.back(closestTo(scale(x), scale(t)));
 }
 
-bool isDegenerate(const Corners& t) {
-  const Vector3d e = t[1] - t[0], f = t[2] - t[0];
-  return e.cross(f).norm() <= 1e-14 * e.norm() * f.norm();
+bool isDegenerate(const Corners& t, double width) {
+  Face<double> face = faceOf(t);
+  if (face.sine2 == 0) {
+    Scale scale;
+    scale.take(t);
+    if (scale.isZero()) return true;
+    const Corners scaled = {scale.down(t[0]), scale.down(t[1]), scale.down(t[2])};
+    face = faceOf(scaled);
+  }
+  // The height over the longest edge is twice the area over it.
+  const double longest = std::max({face.ee[0], face.ee[1], face.ee[2]});
+  return !(face.nn > width * width * longest * longest);
 }
 
 double nearestPoints(const Corners& p, const Corners& q, Vector3d& on_p, Vector3d& on_q) {
-  double best = std::numeric_limits<double>::infinity();  // squared
-  const auto consider = [&](const Vector3d& a, const Vector3d& b) {
-    const double d = (a - b).squaredNorm();
-    if (!(d < best)) return;
-    best = d;
-    on_p = a;
-    on_q = b;
-  };
-  const Vector3d e[3] = {p[1] - p[0], p[2] - p[1], p[0] - p[2]}, f[3] = {q[1] - q[0], q[2] - q[1], q[0] - q[2]};
-  const Vector3d n = e[0].cross(e[1]), m = f[0].cross(f[1]);
-  const Vector3d above_p(n.dot(q[0] - p[0]), n.dot(q[1] - p[0]), n.dot(q[2] - p[0]));
-  const Vector3d above_q(m.dot(p[0] - q[0]), m.dot(p[1] - q[0]), m.dot(p[2] - q[0]));
-  // On one side of the other's plane, neither cuts the other.
-  if (above_p.minCoeff() <= 0 && above_p.maxCoeff() >= 0 && above_q.minCoeff() <= 0 && above_q.maxCoeff() >= 0) {
-    for (int i = 0; i < 3; ++i) {
-      Vector3d at;
-      if (segmentCutsTriangle(p[i], p[(i + 1) % 3], q, at) || segmentCutsTriangle(q[i], q[(i + 1) % 3], p, at)) {
-        on_p = on_q = at;
-        return 0;
-      }
-    }
+  const Face<double> face_p = faceOf(p), face_q = faceOf(q);
+  if (hasFace(face_p) && hasFace(face_q) && (p[0] - q[0]).squaredNorm() < kFarthest) {
+    const Closest<double> closest = closestOf(face_p, face_q);
+    on_p = toVector(closest.p);
+    on_q = toVector(closest.q);
+    return std::sqrt(closest.squared);
   }
-  // A corner over the inside of the other, or a point of an edge and one of the other's.
-  const double nn = n.squaredNorm(), mm = m.squaredNorm();
-  for (int i = 0; i < 3; ++i) {
-    Vector3d foot;
-    if (footInside(q[i], p, e, n, nn, above_p[i], foot)) consider(foot, q[i]);
-    if (footInside(p[i], q, f, m, mm, above_q[i], foot)) consider(p[i], foot);
-  }
-  const double ee[3] = {e[0].squaredNorm(), e[1].squaredNorm(), e[2].squaredNorm()};
-  const double ff[3] = {f[0].squaredNorm(), f[1].squaredNorm(), f[2].squaredNorm()};
-  for (int i = 0; i < 3; ++i) {
-    for (int j = 0; j < 3; ++j) {
-      const Vector3d w = p[i] - q[j];
-      const double ew = e[i].dot(w), fw = f[j].dot(w), ef = e[i].dot(f[j]), det = ee[i] * ff[j] - ef * ef;
-      double s = det > 0 ? clampToUnit((ef * fw - ff[j] * ew) / det) : 0;
-      const double t = ff[j] > 0 ? clampToUnit((ef * s + fw) / ff[j]) : 0;
-      s = ee[i] > 0 ? clampToUnit((ef * t - ew) / ee[i]) : 0;
-      consider(p[i] + s * e[i], q[j] + t * f[j]);
-      if (det > 1e-6 * ee[i] * ff[j]) continue;
-      // All but parallel, the quotient is inaccurate; so may the nearest points be, unless the ends are looked at too.
-      consider(p[i], closestOnSegment(p[i], q[j], q[(j + 1) % 3]));
-      consider(p[(i + 1) % 3], closestOnSegment(p[(i + 1) % 3], q[j], q[(j + 1) % 3]));
-      consider(closestOnSegment(q[j], p[i], p[(i + 1) % 3]), q[j]);
-      consider(closestOnSegment(q[(j + 1) % 3], p[i], p[(i + 1) % 3]), q[(j + 1) % 3]);
-    }
-  }
-  return std::sqrt(best);
+  Scale scale;
+  scale.take(p);
+  scale.take(q);
+  on_p = p[0];
+  on_q = q[0];
+  if (scale.isZero()) return 0;
+  const Closest<Twice> closest = closestOf(scale(p), scale(q));
+  on_p = scale.back(closest.p);
+  on_q = scale.back(closest.q);
+  return scale.back(std::sqrt(closest.squared.high));
 }
 
 }  // namespace bocst::query

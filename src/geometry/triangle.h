@@ -20,7 +20,7 @@ struct ContactPoint {
 
 /// The shortest way to part two triangles that touch: the separating axis (face normals, edge cross products, in-plane
 /// edge normals) with the least overlap. point is the middle of the segment in which they cut, of the overlap of their
-/// boxes when they are coplanar or degenerate, or between their nearest points when they do not meet.
+/// boxes when they are coplanar, or between their nearest points when they do not meet or one is degenerate.
 ContactPoint trianglePenetrations(const Corners& p, const Corners& q);
 
 /// What the depths of many pairs say, a bit each: whether FCL's test surely finds that they meet, or that they do not.
@@ -35,11 +35,13 @@ PenetrationVerdicts trianglePenetrations(const TrianglePairs& pairs, double tole
 /// The point of a closed triangle, degenerate or not, that is nearest to x.
 Eigen::Vector3d closestPoint(const Eigen::Vector3d& x, const Corners& triangle);
 
-/// Has the triangle no area, up to rounding of its own corners?
-bool isDegenerate(const Corners& triangle);
+/// Is its height over the longest edge at most this part of that edge? Then it is the segment or the point that it is,
+/// up to rounding. Known to 1e-15, whatever the order of the corners and the unit.
+bool isDegenerate(const Corners& triangle, double width = 1e-14);
 
-/// The distance between two closed triangles, degenerate or not, 0 where they cross, and a point of each that is as
-/// near to the other.
+/// The distance between two closed triangles, degenerate or not, 0 where an edge cuts the inside of the other, and a
+/// point of each that is as near to the other. It is off by a few roundings of the coordinates, also of triangles that
+/// are all but segments: where doubles have too few digits, twice as many are used.
 double nearestPoints(const Corners& p, const Corners& q, Eigen::Vector3d& on_p, Eigen::Vector3d& on_q);
 
 }  // namespace bocst::query

@@ -3,12 +3,14 @@
 
 #include <algorithm>
 #include <cmath>
-#include <limits>
 
 namespace bocst::lattice {
 namespace {
 
 constexpr double kSide = 1 << kBits;
+
+// No cube is smaller: coordinates of up to 1e75 are less than 2e151 of its units, so their squares are finite.
+constexpr double kLeastSide = 0x1p-236;
 
 std::uint64_t spread(std::uint64_t v) {
   v &= 0x1fffff;
@@ -29,7 +31,9 @@ Lattice::Lattice(const Eigen::AlignedBox3d& bounds, Subdivision subdivision, dou
   double largest = sizes.maxCoeff();
   // A mesh that is one point still needs a cube: one that its coordinates can tell from the point.
   const double magnitude = std::max(bounds.min().cwiseAbs().maxCoeff(), bounds.max().cwiseAbs().maxCoeff());
-  largest = std::max({largest, magnitude * 1e-13, std::numeric_limits<double>::min() * 0x1p40});
+  largest = std::max(largest, magnitude * 1e-13);
+  const bool vanishes = largest < kLeastSide;
+  if (vanishes) largest = kLeastSide;
 
   double units = kSide;  // the largest extent in lattice units
   if (dimension > 0) {
@@ -41,7 +45,8 @@ Lattice::Lattice(const Eigen::AlignedBox3d& bounds, Subdivision subdivision, dou
   unit_ = largest / units;
   inverse_unit_ = units / largest;
   if (subdivision == Subdivision::kOctree) {
-    origin_ = bounds.center() - Eigen::Vector3d::Constant(largest / 2);
+    // In the middle of a cube that is much larger, differences would be rounded away.
+    origin_ = vanishes ? bounds.min() : Eigen::Vector3d(bounds.center() - Eigen::Vector3d::Constant(largest / 2));
     extent_.fill(1u << kBits);
     return;
   }

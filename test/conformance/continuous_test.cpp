@@ -445,6 +445,84 @@ TEST(ContinuousDouble, DegenerateMeshes) {
   }
 }
 
+// With a margin, contact is where collide() first says so on the way, for triangles and for spheres.
+TEST(ContinuousDouble, MarginsAreReachedInTime) {
+  const Raw ra = test::torus(14), rb = test::box({-0.3, -0.2, -0.25}, {0.3, 0.2, 0.25});
+  std::mt19937_64 g(14);
+  int hits = 0;
+  for (const Answer answer : {Answer::kExact, Answer::kConservative}) {
+    Options options;
+    options.answer = answer;
+    options.margin = 0.4;
+    const Modeld a(ra.mesh(), options), b(rb.mesh());
+    for (int i = 0; i < 12; ++i) {
+      const fcl::CCDMotionType type = kTypes[i % 4];
+      const Ways<double> ways = randomWays<double>(g, a, b, 4);
+      const Result<double> result = ways.ask(request<double>(type));
+      const auto m1 = motionOf<double>(ways.begin1, ways.end1, type),
+                 m2 = motionOf<double>(ways.begin2, ways.end2, type);
+      constexpr int kSteps = 400;
+      double first = 2;
+      for (int k = 0; k <= kSteps && first > 1; ++k) {
+        const double t = static_cast<double>(k) / kSteps;
+        if (test::touching<double>(a, poseAt<double>(*m1, t), b, poseAt<double>(*m2, t))) first = t;
+      }
+      if (first > 1) continue;
+      ++hits;
+      ASSERT_TRUE(result.is_collide) << i;
+      ASSERT_LE(result.time_of_contact, first) << i;
+      ASSERT_GE(result.time_of_contact, first - 1.0 / kSteps - 1e-4 - 1e-9) << i;
+    }
+  }
+  EXPECT_GT(hits, 8);
+}
+
+// What comes within toc_err of the end, but not in time, is no contact.
+TEST(ContinuousDouble, StopsJustShort) {
+  const auto I = identity<double>();
+  for (const double short_of : {1e-5, 1e-4}) {
+    const double end = std::acos(-1.0) / 4 - 0.1, reach = std::sqrt(2.0) * std::cos(0.1);
+    const Modeld turning(test::box({-1, -1, -1}, {1, 1, 1}).mesh());
+    const Modeld wall(test::box({reach + short_of, -3, -3}, {reach + 1, 3, 3}).mesh());
+    const auto turned =
+        test::pose<double>(Eigen::AngleAxisd(end, Eigen::Vector3d::UnitZ()).toRotationMatrix(), {0, 0, 0});
+    for (const fcl::CCDMotionType type : {fcl::CCDM_LINEAR, fcl::CCDM_SCREW}) {
+      const Ways<double> ways{&turning, I, turned, &wall, I, I};
+      EXPECT_FALSE(ways.ask(request<double>(type, 0.01)).is_collide) << type;
+      EXPECT_FALSE(ways.swapped().ask(request<double>(type, 0.01)).is_collide) << type;
+      const auto further =
+          test::pose<double>(Eigen::AngleAxisd(end + 1e-3, Eigen::Vector3d::UnitZ()).toRotationMatrix(), {0, 0, 0});
+      EXPECT_TRUE((Ways<double>{&turning, I, further, &wall, I, I}.ask(request<double>(type, 0.01)).is_collide))
+          << type;
+    }
+  }
+}
+
+// A long body turns onto a plane, with which only its far end meets.
+TEST(ContinuousDouble, ANeedleTurnsOntoAPlane) {
+  const Modeld needle(test::box({-10, -0.01, -0.01}, {10, 0.01, 0.01}).mesh());
+  const fcl::Planed plane(Eigen::Vector3d::UnitZ(), 0);
+  const fcl::Halfspaced half_space(Eigen::Vector3d::UnitZ(), 0);
+  const auto begin = test::pose<double>(Eigen::Matrix3d::Identity(), {0, 0, 5});
+  const auto end = test::pose<double>(Eigen::AngleAxisd(1.2, Eigen::Vector3d::UnitY()).toRotationMatrix(), {0, 0, 5});
+  const auto I = identity<double>();
+  // The lowest corner: 5 - 10 sin(a) - 0.01 cos(a) = 0.
+  double lo = 0, hi = 1.2;
+  for (int i = 0; i < 60; ++i) {
+    const double middle = (lo + hi) / 2;
+    (5 - 10 * std::sin(middle) - 0.01 * std::cos(middle) > 0 ? lo : hi) = middle;
+  }
+  for (const fcl::CollisionGeometryd* shape : {static_cast<const fcl::CollisionGeometryd*>(&plane),
+                                               static_cast<const fcl::CollisionGeometryd*>(&half_space)}) {
+    for (const fcl::CCDMotionType type : {fcl::CCDM_LINEAR, fcl::CCDM_SCREW}) {
+      const Result<double> result = Ways<double>{&needle, begin, end, shape, I, I}.ask(request<double>(type));
+      EXPECT_TRUE(result.is_collide);
+      EXPECT_LE(result.time_of_contact, lo / 1.2 + 1e-9) << type;
+      EXPECT_NEAR(result.time_of_contact, lo / 1.2, 2e-4) << type;
+    }
+  }
+}
+
 // Spheres of the collision depth: never later than the surfaces, and as conservative collide() says on the way.
 TEST(ContinuousConservative, IsNeverLater) {
   const Raw ra = test::torus(24), rb = test::torus(17, 0.3);

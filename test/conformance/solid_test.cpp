@@ -122,6 +122,49 @@ std::string refusal(const Raw& raw) {
   return "none";
 }
 
+// Off the middle of a face that leads no axis straight to it, by less than the tolerance.
+TEST(Solid, SlantedFacesHaveTheToleranceToo) {
+  Raw raw;
+  for (int k = 0; k < 3; ++k) {
+    raw.vertices.push_back(Eigen::Vector3d::Unit(k));
+    raw.vertices.push_back(-Eigen::Vector3d::Unit(k));
+  }
+  for (int i = 0; i < 8; ++i) {
+    const std::size_t x = i & 1, y = 2 + (i >> 1 & 1), z = 4 + (i >> 2 & 1);
+    const bool turned = (__builtin_popcount(static_cast<unsigned>(i)) & 1) != 0;
+    raw.triangles.emplace_back(x, turned ? z : y, turned ? y : z);
+  }
+  const Solid solid(raw.mesh());
+  for (const double tolerance : {1e-2, 1e-6}) {
+    for (int i = 0; i < 8; ++i) {
+      const Eigen::Vector3d out = Eigen::Vector3d(i & 1 ? -1 : 1, i & 2 ? -1 : 1, i & 4 ? -1 : 1) / std::sqrt(3.0);
+      EXPECT_TRUE(solid.mayContain(out * (1 / std::sqrt(3.0) + 0.9 * tolerance), tolerance)) << i;
+      EXPECT_FALSE(solid.mayContain(out * (1 / std::sqrt(3.0) + 4 * tolerance), tolerance)) << i;
+    }
+  }
+}
+
+// From the first geometry to the second, in either order, though a BVHModel is always side B of a walk.
+TEST(SolidModel, NormalsFromInsideAreInTheCallersOrder) {
+  const Modeld outer(test::box({-2, -2, -2}, {2, 2, 2}).mesh(), solid());
+  const Raw small = test::box({0.5, -0.1, -0.1}, {0.7, 0.1, 0.1});
+  const Modeld model(small.mesh());
+  const auto bvh = test::bvh<fcl::OBBRSSd>(small);
+  const auto I = test::pose<double>(Eigen::Matrix3d::Identity(), {0, 0, 0});
+  for (const fcl::CollisionGeometryd* inner :
+       {static_cast<const fcl::CollisionGeometryd*>(&model), static_cast<const fcl::CollisionGeometryd*>(bvh.get())}) {
+    fcl::CollisionRequestd request(10, true);
+    fcl::CollisionResultd one, two;
+    ASSERT_EQ(fcl::collide(&outer, I, inner, I, request, one), 1u);
+    ASSERT_EQ(fcl::collide(inner, I, &outer, I, request, two), 1u);
+    // The inner one is nearest to the wall at x = 2, and comes nearer to it where it is moved along +x.
+    const Eigen::Vector3d n = one.getContact(0).normal;
+    EXPECT_NEAR(std::abs(n.x()), 1, 1e-9);
+    EXPECT_LT((two.getContact(0).normal + n).norm(), 1e-9);
+    EXPECT_NEAR(one.getContact(0).penetration_depth, two.getContact(0).penetration_depth, 1e-9);
+  }
+}
+
 TEST(SolidModel, OnlyOfWatertightMeshes) {
   for (const Raw& raw : {test::box({0, 0, 0}, {1, 1, 1}), test::torus(8), unwelded(test::torus(8)), cavity(),
                          turnedOver(test::torus(8))}) {
@@ -131,6 +174,12 @@ TEST(SolidModel, OnlyOfWatertightMeshes) {
   degenerate.triangles.emplace_back(0, 0, 5);
   degenerate.triangles.emplace_back(3, 3, 3);
   EXPECT_EQ(refusal(degenerate), "none");
+
+  Raw signs = unwelded(test::box({-1, 0, 0}, {1, 1, 1}));
+  for (std::size_t i = 0; i < signs.vertices.size(); i += 2) {
+    for (double& x : signs.vertices[i]) x = x == 0 ? -0.0 : x;
+  }
+  EXPECT_EQ(refusal(signs), "none") << "-0.0 is 0.0";
 
   Raw open = test::torus(8);
   open.triangles.erase(open.triangles.begin() + 17);

@@ -92,6 +92,22 @@ TEST(Lattice, APointHasACell) {
   EXPECT_TRUE(lattice.toLattice(p).isZero());
 }
 
+// Coordinates of any partner in its frame, and their squares, are finite; its own are not rounded away.
+TEST(Lattice, OfTheLeastSize) {
+  for (const double size : {0.0, 1e-300, 1e-150, 1e-72}) {
+    for (const Subdivision subdivision : {Subdivision::kOctree, Subdivision::kBono}) {
+      const Eigen::Vector3d lo(-size, size / 3, 0), hi(size, size / 2, size / 7);
+      const Lattice lattice(Eigen::AlignedBox3d(lo, hi), subdivision, 0);
+      const double far = lattice.toLattice(Eigen::Vector3d(1e75, -1e75, 1e75)).squaredNorm();
+      EXPECT_TRUE(std::isfinite(far)) << size;
+      const Eigen::Vector3d way = (lattice.toLattice(hi) - lattice.toLattice(lo)) * lattice.unit();
+      EXPECT_LE((way - (hi - lo)).cwiseAbs().maxCoeff(), 1e-10 * size) << size;
+      const Eigen::AlignedBox3d root = lattice.region(Cell{});
+      EXPECT_TRUE(root.contains(lattice.toLattice(lo)) && root.contains(lattice.toLattice(hi))) << size;
+    }
+  }
+}
+
 TEST(Lattice, MortonNamesEachCellOfALevelOnce) {
   std::vector<bool> seen(512, false);
   for (std::uint32_t x = 0; x < 8; ++x) {

@@ -215,10 +215,19 @@ void collideConvex(const CollideQuery<S>& q, tree::Tree& tree, bool swapped, con
         f(partner, collector);
       });
     };
+    const auto isOutOfSight = [&](const auto& partner) {
+      const query::Sphere ball = partner.sphere(partner.root());
+      const double size = surface.bounds.diagonal().norm();
+      if (frame.rounding() < 1e15 * size) return false;
+      const Eigen::Vector3d half_way = (frame * surface.bounds.center()) / 2 - ball.center / 2;
+      return half_way.cwiseAbs().maxCoeff() > 8 * (size + ball.radius) + q.margin;
+    };
     if (q.occupied() || request.enable_cost) {
       with_collector(request.enable_cost, [&](const auto& partner, auto& collector) {
         using Partner = std::remove_cv_t<std::remove_reference_t<decltype(partner)>>;
         using Visitor = query::ConvexVisitor<typename Partner::Node>;
+        // What is farther away than can be computed with touches nothing.
+        if (isOutOfSight(partner)) return;
         const query::SimilarityTransform b_in_a =
             frame.toLattice(surface.lattice, collector.tolerance(a.isConservative()));
         query::PairWalk<query::TreeSide, Partner, Visitor>(a, partner, b_in_a, collector).run();

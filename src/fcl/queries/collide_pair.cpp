@@ -153,6 +153,15 @@ class Collector : public query::Visitor {
   // In float, FCL's axes between slivers' all but parallel edges are rubbish, and it may say that they meet.
   static constexpr bool kTrustsApart = std::is_same<S, double>::value;
 
+  // A triangle so narrow, of its length, is a segment or a point but for rounding in S, or so small that products of
+  // four lengths vanish in S.
+  static constexpr double kNarrow = std::is_same<S, double>::value ? 1e-14 : 45 * kEpsilon;
+  static constexpr double kSmallest = std::is_same<S, double>::value ? 1e-70 : 1e-8;
+  static bool isSliver(const Corners& t) {
+    return query::isDegenerate(t, kNarrow) ||
+           std::max((t[1] - t[0]).cwiseAbs().maxCoeff(), (t[2] - t[0]).cwiseAbs().maxCoeff()) < kSmallest;
+  }
+
   // What distances near 0 may be off by.
   double rounding() const { return magnitude_ * 16 * kEpsilon; }
 
@@ -235,19 +244,22 @@ class Collector : public query::Visitor {
 
   // FCL's test, and what it leaves open. `contact` is how the pair is parted, or null where nobody asks.
   void decide(std::size_t i, const query::ContactPoint* contact) {
+    if (now_->certain[i] && margin_ == 0) return addMet(i, contact);
     const std::uint32_t a = now_->ids[i][0], b = now_->ids[i][1];
-    const bool meet = now_->certain[i] || fcl::detail::Intersect<S>::intersect_Triangle(
-                                              t1_.corner(a, 0), t1_.corner(a, 1), t1_.corner(a, 2), t2_.corner(b, 0),
-                                              t2_.corner(b, 1), t2_.corner(b, 2), R_12_, p_12_);
-    if (!meet && margin_ == 0) return;
     Corners p, q;
     pairs_.get(i, p, q);
-    const bool degenerate = !now_->certain[i] && (query::isDegenerate(p) || query::isDegenerate(q));
-    if (!degenerate && margin_ == 0) return addMet(i, contact);
+    const bool sliver = !now_->certain[i] && (isSliver(p) || isSliver(q));
+    // FCL's axes do not separate segments and points from everything.
+    const bool degenerate = sliver && (query::isDegenerate(p) || query::isDegenerate(q));
+    const bool meet =
+        now_->certain[i] || (!degenerate && fcl::detail::Intersect<S>::intersect_Triangle(
+                                                t1_.corner(a, 0), t1_.corner(a, 1), t1_.corner(a, 2), t2_.corner(b, 0),
+                                                t2_.corner(b, 1), t2_.corner(b, 2), R_12_, p_12_));
+    if (!sliver && margin_ == 0) return meet ? addMet(i, contact) : void();
     Eigen::Vector3d on_p, on_q;
     const double distance = query::nearestPoints(p, q, on_p, on_q);
-    // FCL's axes do not separate segments and points from everything: there the distance decides.
-    if (degenerate ? distance > std::max(margin_, rounding()) : !meet && distance > margin_) return;
+    // Of slivers, its axes are rounding, and may part what touches.
+    if (!meet && distance > (sliver ? std::max(margin_, rounding()) : margin_)) return;
     if (contact == nullptr) return addMet(i, nullptr);
     if (distance > rounding()) {
       const query::ContactPoint gap{(on_q - on_p) / distance, (on_p + on_q) / 2, std::max(margin_ - distance, 0.0)};
@@ -341,6 +353,16 @@ SimilarityTransform withMargin(SimilarityTransform b_in_a, const TreeSide& a, co
   return b_in_a;
 }
 
+/// Are two meshes, and the spheres of their cells, apart because one of them is farther away than floats can say? Most
+/// queries compare one number. What is beyond would overflow in a walk, or be lost in its tolerance.
+template <typename S>
+bool isOutOfSight(const CollideQuery<S>& q, const SimilarityTransform& b_in_a, double size_a, double size_b) {
+  if (b_in_a.tolerance < 1e15) return false;
+  const Eigen::Vector3d half_way =
+      q.X_W1.translation().template cast<double>() / 2 - q.X_W2.translation().template cast<double>() / 2;
+  return half_way.cwiseAbs().maxCoeff() > 8 * (size_a + size_b) + q.margin;
+}
+
 // Is the second to be side A? The same whichever the caller names first; by address only where the poses are equal, so
 // that what a query grows does not depend on where models happen to lie.
 template <typename S>
@@ -364,6 +386,7 @@ void collideModels(const CollideQuery<S>& q, tree::Tree& tree1, tree::Tree& tree
     collector.finish();
   };
   const auto run = [&](const TreeSide& a, const TreeSide& b, const SimilarityTransform& b_in_a, double magnitude) {
+    if (isOutOfSight(q, b_in_a, magnitudeOf(a.tree().surface().bounds), magnitudeOf(b.tree().surface().bounds))) return;
     if (q.margin == 0 && query::TreeWalk::fits(a, b, b_in_a)) {
       query::TreeWalk trees(a, b, b_in_a);
       if (!trees.isNeedless()) walk(a, magnitude, [&](auto& collector) { trees.run(collector); });
@@ -389,6 +412,7 @@ void collideBvh(const CollideQuery<typename BV::S>& q, tree::Tree& tree, const f
   const std::size_t before = q.result.numContacts();
   const auto run = [&](const TreeSide& a, const BvhSide<BV>& b, const SimilarityTransform& b_in_a, double magnitude) {
     const oracle::Surface& s = tree.surface();
+    if (isOutOfSight(q, b_in_a, magnitudeOf(s.bounds), b.magnitude())) return;
     const ModelTriangles<S> model(tree);
     const BvhTriangles<BV> partner(bvh);
     const auto walk = [&](auto&& collector) {

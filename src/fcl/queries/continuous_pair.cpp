@@ -68,7 +68,7 @@ ContactGoal goalOf(const ContinuousQuery<S>& q, double size1, double size2, doub
   goal.margin = margin;
   // FCL's triangle test in S, and this walk's coordinates in the world; a billionth of the smaller body so that a pair
   // that passes at no distance at all does not take for ever.
-  goal.rounding = std::max({1e-9 * std::min(size1, size2), 1e-14 * largest,
+  goal.rounding = std::max({1e-9 * std::min(size1, size2), 1e-13 * largest,
                             32 * static_cast<double>(std::numeric_limits<S>::epsilon()) * largest,
                             std::numeric_limits<double>::min()});
   goal.time_error = static_cast<double>(q.request.toc_err);

@@ -5,6 +5,11 @@
 #include <fcl/narrowphase/collision_request.h>
 #include <fcl/narrowphase/collision_result.h>
 
+#include <functional>
+#include <limits>
+#include <type_traits>
+#include <utility>
+
 #include "fcl/adapters/octree_side.h"
 #include "fcl/adapters/pair.h"
 #include "fcl/plugin/dispatch.h"
@@ -38,26 +43,117 @@ query::DistanceGoal goalOf(const DistanceQuery<S>& q, double unit) {
   return goal;
 }
 
-/// Writes what a walk found; side A is the caller's first geometry, or the second when `swapped`.
+/// The nearest primitives, in the world; `swapped` when A is the caller's second geometry.
 template <typename S>
-void report(const DistanceQuery<S>& q, query::Nearest n, bool swapped, const Eigen::Vector3d& origin, double unit) {
-  const S distance = static_cast<S>(n.distance * unit);
+void report(const DistanceQuery<S>& q, double distance_found, query::Nearest in_world, bool swapped) {
+  const S distance = static_cast<S>(distance_found);
   if (!(distance < q.result.min_distance)) return;
-  const fcl::Transform3<double> X_WA = (swapped ? q.X_W2 : q.X_W1).template cast<double>();
-  for (Eigen::Vector3d* p : {&n.on_a, &n.on_b}) *p = X_WA * Eigen::Vector3d(origin + unit * *p);
   if (swapped) {
-    std::swap(n.a, n.b);
-    std::swap(n.on_a, n.on_b);
+    std::swap(in_world.a, in_world.b);
+    std::swap(in_world.on_a, in_world.on_b);
   }
   q.result.min_distance = distance;
   q.result.o1 = q.o1;
   q.result.o2 = q.o2;
-  q.result.b1 = static_cast<std::intptr_t>(n.a);
-  q.result.b2 = static_cast<std::intptr_t>(n.b);
+  q.result.b1 = static_cast<std::intptr_t>(in_world.a);
+  q.result.b2 = static_cast<std::intptr_t>(in_world.b);
   if (q.request.enable_nearest_points) {
-    q.result.nearest_points[0] = n.on_a.template cast<S>();
-    q.result.nearest_points[1] = n.on_b.template cast<S>();
+    q.result.nearest_points[0] = in_world.on_a.template cast<S>();
+    q.result.nearest_points[1] = in_world.on_b.template cast<S>();
   }
+}
+
+/// What a walk found; side A is the caller's first geometry, or the second when `swapped`.
+template <typename S>
+void report(const DistanceQuery<S>& q, query::Nearest n, bool swapped, const Eigen::Vector3d& origin, double unit) {
+  const fcl::Transform3<double> X_WA = (swapped ? q.X_W2 : q.X_W1).template cast<double>();
+  for (Eigen::Vector3d* p : {&n.on_a, &n.on_b}) *p = X_WA * Eigen::Vector3d(origin + unit * *p);
+  report(q, n.distance * unit, n, swapped);
+}
+
+/// A mesh in the world as it looks from far away: a ball about it, and its corners.
+struct Distant {
+  Eigen::Isometry3d X_WM;
+  Eigen::Vector3d center;  ///< Of the ball, in the mesh's frame.
+  double radius;
+  std::size_t triangles;
+  std::function<Eigen::Vector3d(std::uint32_t, int)> corner;
+
+  Distant(const Eigen::Isometry3d& X, const tree::Tree& tree)
+      : X_WM(X),
+        center(tree.surface().bounds.center()),
+        radius(tree.surface().bounds.diagonal().norm() / 2),
+        triangles(tree.surface().mesh == nullptr ? 0 : tree.surface().triangle_count),
+        corner([mesh = tree.surface().mesh.get()](std::uint32_t t, int k) {
+          return mesh->vertex(mesh->indices(t)[static_cast<std::size_t>(k)]);
+        }) {}
+  template <typename BV>
+  Distant(const Eigen::Isometry3d& X, const BvhSide<BV>& side, std::size_t count)
+      : X_WM(X), triangles(count), corner([&side](std::uint32_t t, int k) { return side.corner(t, k); }) {
+    const query::OrientedVolume box = side.volume(side.root());
+    center = box.center;
+    radius = box.half.norm();
+  }
+
+  /// Half of the position of a point in the world: the way between two does not overflow.
+  Eigen::Vector3d half(const Eigen::Vector3d& point) const {
+    return X_WM.linear() * (point / 2) + X_WM.translation() / 2;
+  }
+
+  /// The triangle that reaches farthest along a direction in the world, and the corner.
+  std::uint32_t farthest(const Eigen::Vector3d& direction, Eigen::Vector3d& tip) const {
+    const Eigen::Vector3d along = X_WM.linear().transpose() * direction;
+    double most = -std::numeric_limits<double>::infinity();
+    std::uint32_t farthest = 0;
+    for (std::uint32_t t = 0; t < triangles; ++t) {
+      for (int k = 0; k < 3; ++k) {
+        const Eigen::Vector3d v = corner(t, k);
+        const double d = along.dot(v - center);
+        if (!(d > most)) continue;
+        most = d;
+        farthest = t;
+        tip = v;
+      }
+    }
+    return farthest;
+  }
+};
+
+/// What is 2^27 times as far away as both are large: the tips along the way between the middles are the nearest, but
+/// for a part 2^-54 of the distance. False where that is not so.
+template <typename S>
+bool searchFar(const DistanceQuery<S>& q, const Distant& a, const Distant& b, bool swapped) {
+  const Eigen::Vector3d half_way = b.half(b.center) - a.half(a.center);
+  if (!(half_way.cwiseAbs().maxCoeff() > 0x1p26 * (a.radius + b.radius)) || a.triangles == 0 || b.triangles == 0) {
+    return false;
+  }
+  const Eigen::Vector3d direction = half_way.stableNormalized();
+  query::Nearest n;
+  Eigen::Vector3d tip_a, tip_b;
+  n.a = a.farthest(direction, tip_a);
+  n.b = b.farthest(-direction, tip_b);
+  n.on_a = 2 * a.half(tip_a);
+  n.on_b = 2 * b.half(tip_b);
+  report(q, 2 * (b.half(tip_b) - a.half(tip_a)).stableNorm(), n, swapped);
+  return true;
+}
+
+/// The same beside a solid body that is so far away that neither's size is more than a rounding of the distance.
+template <typename S>
+bool searchFar(const DistanceQuery<S>& q, const Distant& a, const fcl::Transform3<S>& X_WB, const query::ConvexSide& b,
+               bool swapped) {
+  const query::Sphere ball = b.sphere(b.root());
+  const Eigen::Isometry3d X = isometryOf<S>(X_WB);
+  const Eigen::Vector3d half = X.linear() * (ball.center / 2) + X.translation() / 2, half_way = half - a.half(a.center);
+  if (!(half_way.cwiseAbs().maxCoeff() > 0x1p53 * (a.radius + ball.radius)) || a.triangles == 0) return false;
+  query::Nearest n;
+  Eigen::Vector3d tip;
+  n.a = a.farthest(half_way.stableNormalized(), tip);
+  n.b = b.name(b.root());
+  n.on_a = 2 * a.half(tip);
+  n.on_b = 2 * half;
+  report(q, 2 * (half - a.half(tip)).stableNorm(), n, swapped);
+  return true;
 }
 
 /// Looks for the nearest primitives; side A is the caller's first geometry, or the second when `swapped`.
@@ -89,6 +185,10 @@ void searchConvex(const DistanceQuery<S>& q, tree::Tree& tree, bool swapped, F&&
     const ConvexFrame<S> frame(swapped ? q.X_W2 : q.X_W1, swapped ? q.X_W1 : q.X_W2, surface);
     const SimilarityTransform b_in_a = frame.toLattice(surface.lattice, 0);
     with_partner(frame, [&](const auto& b) {
+      if constexpr (std::is_same<std::decay_t<decltype(b)>, query::ConvexSide>::value) {
+        const Distant far(isometryOf<S>(swapped ? q.X_W2 : q.X_W1), tree);
+        if (searchFar(q, far, swapped ? q.X_W1 : q.X_W2, b, swapped)) return;
+      }
       search(q, a, b, b_in_a, swapped);
       if (q.result.min_distance > 0 && contains(a, frame, b)) notApart(q);
     });
@@ -116,11 +216,16 @@ void searchPartner(const DistanceQuery<S>& q, tree::Tree& tree, bool swapped) {
 #endif
   } else {
     withBvh<S>("distance", partner, [&](const auto& bvh) {
-      betweenTreeAndBvh(X_WM, tree, X_WP, bvh,
-                        [&](const TreeSide& a, const auto& b, const SimilarityTransform& b_in_a, double magnitude) {
-                          search(q, a, b, b_in_a, swapped);
-                          if (q.result.min_distance > 0 && contains(tree, X_WM, bvh, X_WP, magnitude)) notApart(q);
-                        });
+      betweenTreeAndBvh(
+          X_WM, tree, X_WP, bvh,
+          [&](const TreeSide& a, const auto& b, const SimilarityTransform& b_in_a, double magnitude) {
+            if (searchFar(q, Distant(isometryOf<S>(X_WM), tree),
+                          Distant(isometryOf<S>(X_WP), b, static_cast<std::size_t>(bvh.num_tris)), swapped)) {
+              return;
+            }
+            search(q, a, b, b_in_a, swapped);
+            if (q.result.min_distance > 0 && contains(tree, X_WM, bvh, X_WP, magnitude)) notApart(q);
+          });
     });
   }
 }
@@ -153,14 +258,18 @@ S distancePair(const fcl::CollisionGeometry<S>* o1, const fcl::Transform3<S>& X_
   if (request.isSatisfied(result)) return result.min_distance;
   const DistanceQuery<S> q{o1, o2, X_W1, X_W2, request, result};
   if (model1 != nullptr && model2 != nullptr) {
-    betweenTrees(X_W1, model1->tree(), X_W2, model2->tree(),
-                 [&](const TreeSide& a, const TreeSide& b, const SimilarityTransform& b_in_a, double magnitude) {
-                   search(q, a, b, b_in_a, false);
-                   if (result.min_distance > 0 && (contains<S>(a.tree(), X_W1, b.tree(), X_W2, magnitude) ||
-                                                   contains<S>(b.tree(), X_W2, a.tree(), X_W1, magnitude))) {
-                     notApart(q);
-                   }
-                 });
+    betweenTrees(
+        X_W1, model1->tree(), X_W2, model2->tree(),
+        [&](const TreeSide& a, const TreeSide& b, const SimilarityTransform& b_in_a, double magnitude) {
+          if (searchFar(q, Distant(isometryOf<S>(X_W1), a.tree()), Distant(isometryOf<S>(X_W2), b.tree()), false)) {
+            return;
+          }
+          search(q, a, b, b_in_a, false);
+          if (result.min_distance > 0 && (contains<S>(a.tree(), X_W1, b.tree(), X_W2, magnitude) ||
+                                          contains<S>(b.tree(), X_W2, a.tree(), X_W1, magnitude))) {
+            notApart(q);
+          }
+        });
   } else {
     const bool swapped = model1 == nullptr;
     searchPartner(q, (swapped ? model2 : model1)->tree(), swapped);

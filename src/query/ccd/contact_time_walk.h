@@ -19,8 +19,9 @@ namespace bocst::query {
 
 /// What counts as contact of two bodies that move, and how well its time must be known.
 struct ContactGoal {
-  double margin = 0;      ///< What is no farther than this touches.
-  double rounding = 0;    ///< And what is no farther than margin + rounding, for the sake of rounding; more than 0.
+  double margin = 0;    ///< What is no farther than this touches.
+  double rounding = 0;  ///< And what is no farther than margin + rounding, for the sake of rounding: at least 1e-13 of
+                        ///< the lengths on the way, and more than 0.
   double time_error = 0;  ///< The answer may be earlier than the contact by so much.
 };
 
@@ -67,6 +68,9 @@ class ContactTimeWalk : private BestFirst<ContactTimeWalk<A, B>, A, B> {
 
   static constexpr double kFar = std::numeric_limits<double>::infinity();
 
+  // What bounds lose of the lengths that they are made of: 40 roundings at most.
+  static constexpr double kRounding = 1e-14;
+
   // Unit directions are off by less.
   static constexpr double kBlur = 1e-15;
 
@@ -90,6 +94,9 @@ class ContactTimeWalk : private BestFirst<ContactTimeWalk<A, B>, A, B> {
   }
 
   double contactDistance() const { return goal_.margin + goal_.rounding; }
+  // Nodes go on to half of what counts as contact, as primitives do. So rounding, which is less than the other half,
+  // cannot stop them before their primitives touch, and the first that do settle all that is no nearer.
+  double clearance() const { return goal_.margin + goal_.rounding / 2; }
   bool worthIt(double time) const { return time <= 1 && time < first_; }
   bool settled() const { return !(first_ > 0); }
   double scaleOfB() const { return b_in_body_.scale / a_in_body_.scale; }
@@ -125,7 +132,7 @@ class ContactTimeWalk : private BestFirst<ContactTimeWalk<A, B>, A, B> {
   double boundOf(const NodeExtent& a, const NodeExtent& b) const {
     const Eigen::Vector3d t = b.center - a.center;
     const double apart = t.norm(), radius_a = a.half.norm(), radius_b = b.half.norm();
-    const double rounding_margin = 1e-12 * (apart + radius_a + radius_b) + contactDistance();
+    const double rounding_margin = kRounding * (apart + radius_a + radius_b) + clearance();
     double best = now_;
     const auto consider = [&](Eigen::Vector3d direction) {
       double lo_a, hi_a, lo_b, hi_b, along = direction.dot(t);
@@ -159,7 +166,7 @@ class ContactTimeWalk : private BestFirst<ContactTimeWalk<A, B>, A, B> {
   double boundOf(const Sphere& a, const Sphere& b) const {
     const Eigen::Vector3d t = b.center - a.center;
     const double apart = t.norm();
-    const double gap = apart * (1 - 1e-12) - (a.radius + b.radius) * (1 + 1e-12) - contactDistance();
+    const double gap = apart * (1 - kRounding) - (a.radius + b.radius) * (1 + kRounding) - clearance();
     return gap > 0 ? timeToClose(gap, t / apart, a.center, 0, b.center, 0) : now_;
   }
 
@@ -167,7 +174,7 @@ class ContactTimeWalk : private BestFirst<ContactTimeWalk<A, B>, A, B> {
   double boundOf(const SeparationResult& gap, double radius, const Sphere& ball, double radius_of_turn,
                  const Convex& b) const {
     const double far = gap.atLeast * b_in_world_.scale;
-    const double free = far * (1 - 1e-12) - radius * (1 + 1e-12) - contactDistance();
+    const double free = far * (1 - kRounding) - radius * (1 + kRounding) - clearance();
     if (!(free > 0)) return now_;
     const Eigen::Vector3d direction = -(b_in_world_.rotation * gap.normal);
     return advanced(free, motion_a_.closingSpeed(direction, kBlur, ball.center, radius_of_turn, now_) +

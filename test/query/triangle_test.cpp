@@ -1,0 +1,186 @@
+// SPDX-License-Identifier: BSD-3-Clause
+// Two triangles, segments or points against exact arithmetic.
+#include "geometry/triangle.h"
+
+#include <gtest/gtest.h>
+
+#include <algorithm>
+#include <cmath>
+#include <random>
+
+#include "exact.h"
+#include "meshes.h"
+
+namespace bocst::query {
+namespace {
+
+using Eigen::Vector3d;
+
+double largest(const Corners& p, const Corners& q) {
+  double size = 0;
+  for (int k = 0; k < 3; ++k) {
+    size = std::max({size, p[k].cwiseAbs().maxCoeff(), q[k].cwiseAbs().maxCoeff()});
+  }
+  return size;
+}
+
+double exactDistance(const Corners& p, const Corners& q) {
+  return static_cast<double>(std::sqrt(exact::squaredDistance(p, q)));
+}
+
+// The distance is right to `roundings` of the coordinates, its points lie on the triangles and are as far apart.
+void expectRight(const Corners& p, const Corners& q, double roundings) {
+  const double far = largest(p, q), least = roundings * 0x1p-53 * far, want = exactDistance(p, q);
+  Vector3d on_p = Vector3d::Constant(NAN), on_q = on_p;
+  const double distance = nearestPoints(p, q, on_p, on_q);
+  ASSERT_NEAR(distance, want, least) << p[0].transpose() << ", " << p[1].transpose() << ", " << p[2].transpose() << "; "
+                                     << q[0].transpose() << ", " << q[1].transpose() << ", " << q[2].transpose();
+  const Corners at_p = {on_p, on_p, on_p}, at_q = {on_q, on_q, on_q};
+  ASSERT_LE(exactDistance(at_p, p), least);
+  ASSERT_LE(exactDistance(at_q, q), least);
+  ASSERT_NEAR(exactDistance(at_p, at_q), want, least);
+  for (int k = 0; k < 3; ++k) {
+    const Corners x = {p[k], p[k], p[k]};
+    const Vector3d near = closestPoint(p[k], q);
+    const Corners at = {near, near, near};
+    ASSERT_LE(exactDistance(at, q), least);
+    ASSERT_NEAR(exactDistance(at, x), exactDistance(x, q), least);
+  }
+}
+
+// Collinear corners, or all but, in any order.
+void flatten(std::mt19937_64& g, Corners& t, double by) {
+  std::uniform_real_distribution<double> u(-1, 2);
+  t[2] = t[0] + u(g) * (t[1] - t[0]) + by * (t[2] - t[0]);
+  if (g() % 8 == 0) t[1] = t[0];
+  if (g() % 16 == 0) t[2] = t[1] = t[0];
+  std::shuffle(std::begin(t), std::end(t), g);
+}
+
+TEST(Exact, KnowsWhatIsPlain) {
+  const Corners t = {{0, 0, 0}, {2, 0, 0}, {0, 2, 0}};
+  const auto segment = [](const Vector3d& a, const Vector3d& b, exact::Corners& s) {
+    s[0] = a;
+    s[1] = b;
+    s[2] = a;
+  };
+  Corners s;
+  segment({0.5, 0.5, -1}, {0.5, 0.5, 1}, s);
+  EXPECT_TRUE(exact::intersect(t, s)) << "through the inside";
+  segment({1, 1, -1}, {1, 1, 1}, s);
+  EXPECT_TRUE(exact::intersect(t, s)) << "through an edge";
+  segment({1, 1 + 0x1p-52, -1}, {1, 1 + 0x1p-52, 1}, s);
+  EXPECT_EQ(exact::squaredDistance(t, s), 0x1p-105L) << "past it";
+  segment({0.5, 0.5, 1e-300}, {0.5, 0.5, 1e300}, s);
+  EXPECT_NEAR(static_cast<double>(std::sqrt(exact::squaredDistance(t, s)) / 1e-300L), 1, 1e-15);
+  segment({-1, 0.5, 0}, {3, 0.5, 0}, s);
+  EXPECT_TRUE(exact::intersect(t, s)) << "in the plane";
+  segment({-1, 3, 0}, {3, 3, 0}, s);
+  EXPECT_EQ(exact::squaredDistance(t, s), 1);
+  segment({0.5, 0.5, 0}, {0.5, 0.5, 0}, s);
+  EXPECT_TRUE(exact::intersect(t, s)) << "a point inside";
+  Eigen::Isometry3d X = Eigen::Isometry3d::Identity();
+  X.translation() = Vector3d(0.1, 0.2, 0.3);
+  EXPECT_EQ(exact::squaredDistance(t, X, t), 0.3L * 0.3L * 0 + static_cast<long double>(0.3) * 0.3);
+}
+
+// On grids touching is common. The same numbers go through 128 bits and, moved, through integers of any length.
+TEST(Exact, IsTheSameInBothArithmetics) {
+  std::mt19937_64 g(1);
+  const auto u = [&g] { return static_cast<double>(g() % 5) - 2; };
+  int hits = 0;
+  for (int i = 0; i < 20000; ++i) {
+    Corners p, q;
+    for (Corners* t : {&p, &q}) {
+      for (Vector3d& v : *t) v = Vector3d(u(), u(), u());
+    }
+    const Eigen::Isometry3d I = Eigen::Isometry3d::Identity();
+    const long double d = exact::squaredDistance(p, q);
+    ASSERT_EQ(exact::squaredDistance(p, I, q), d);
+    ASSERT_LE(std::abs(exact::squaredDistance(q, p) - d), 1e-18L * d);
+    hits += d == 0;
+  }
+  EXPECT_GT(hits, 5000);
+  EXPECT_LT(hits, 15000);
+}
+
+TEST(NearestPoints, OfGridTrianglesSegmentsAndPoints) {
+  std::mt19937_64 g(2);
+  int hits = 0;
+  for (int i = 0; i < 60000; ++i) {
+    const auto most = static_cast<double>(1 + g() % 6), unit = std::pow(0.1, g() % 2);
+    const auto u = [&] { return (static_cast<double>(g() % 1000) / 1000 * (2 * most + 1) - most); };
+    Corners p, q;
+    for (Corners* t : {&p, &q}) {
+      for (Vector3d& v : *t) v = Vector3d(std::floor(u()), std::floor(u()), std::floor(u())) * unit;
+      if (g() % 2) (*t)[2] = (*t)[0] + static_cast<double>(g() % 3) * ((*t)[1] - (*t)[0]);
+      if (g() % 4 == 0) (*t)[1] = (*t)[0];
+      std::shuffle(std::begin(*t), std::end(*t), g);
+    }
+    hits += exact::intersect(p, q);
+    Vector3d on_p, on_q;
+    ASSERT_NEAR(nearestPoints(p, q, on_p, on_q), exactDistance(p, q), 16 * 0x1p-53 * largest(p, q)) << "round " << i;
+    if (i % 16 == 0) {
+      ASSERT_NO_FATAL_FAILURE(expectRight(p, q, 16)) << "round " << i;
+    }
+  }
+  EXPECT_GT(hits, 6000);
+}
+
+TEST(NearestPoints, OfSliversThatTouchOrAllButTouch) {
+  std::mt19937_64 g(3);
+  std::uniform_real_distribution<double> u(-1, 1);
+  for (int i = 0; i < 10000; ++i) {
+    Corners p, q;
+    for (Corners* t : {&p, &q}) {
+      for (Vector3d& v : *t) v = Vector3d(u(g), u(g), u(g));
+      flatten(g, *t, std::pow(10.0, -20 * std::abs(u(g))));
+    }
+    // A point of each in one place, but for a gap.
+    const auto pointOf = [&](const Corners& t) {
+      const double a = std::abs(u(g)), b = (1 - a) * std::abs(u(g));
+      return Vector3d(t[0] + a * (t[1] - t[0]) + b * (t[2] - t[0]));
+    };
+    const Vector3d displacement =
+        pointOf(p) - pointOf(q) + test::randomDirection(g) * std::pow(10.0, -20 * std::abs(u(g)));
+    for (Vector3d& v : q) v += displacement;
+    ASSERT_NO_FATAL_FAILURE(expectRight(p, q, 64)) << "round " << i;
+  }
+}
+
+TEST(NearestPoints, OfAnySizeAnywhere) {
+  std::mt19937_64 g(4);
+  std::uniform_real_distribution<double> u(-1, 1);
+  for (int i = 0; i < 4000; ++i) {
+    Corners p, q;
+    // From 1e-150 to 1e150, of one size, or one of them of another.
+    const double size = std::pow(10.0, 150 * u(g)), other = g() % 2 ? size : std::pow(10.0, 150 * u(g));
+    const Vector3d far = Vector3d(u(g), u(g), u(g)) * size * std::pow(10.0, g() % 8);
+    for (Vector3d& v : p) v = size * Vector3d(u(g), u(g), u(g));
+    for (Vector3d& v : q) v = other * Vector3d(u(g), u(g), u(g)) + far;
+    if (g() % 4 == 0) flatten(g, p, 0);
+    if (g() % 4 == 0) flatten(g, q, 0);
+    ASSERT_NO_FATAL_FAILURE(expectRight(p, q, 64)) << "round " << i << " " << size << " " << other;
+  }
+}
+
+TEST(IsDegenerate, WhateverTheOrderAndTheUnit) {
+  std::mt19937_64 g(5);
+  std::uniform_real_distribution<double> u(-1, 1);
+  for (int i = 0; i < 20000; ++i) {
+    // One that is a part `width` of its length high, over any point of its longest edge.
+    const double width = std::pow(10.0, -10 - 8 * std::abs(u(g))), along = std::abs(u(g));
+    if (std::abs(width - 1e-14) < 3e-15) continue;
+    const double unit = std::ldexp(1.0, static_cast<int>(400 * u(g)));
+    Corners t = {{0, 0, 0}, {1, 0, 0}, {along, width, 0}};
+    std::shuffle(std::begin(t), std::end(t), g);
+    for (Vector3d& v : t) v *= unit;
+    ASSERT_EQ(isDegenerate(t), width < 1e-14) << width << " " << along << " " << unit;
+  }
+  const Corners point = {{1e-200, 0, 0}, {1e-200, 0, 0}, {1e-200, 0, 0}}, none = {{0, 0, 0}, {0, 0, 0}, {0, 0, 0}};
+  EXPECT_TRUE(isDegenerate(point));
+  EXPECT_TRUE(isDegenerate(none));
+}
+
+}  // namespace
+}  // namespace bocst::query
