@@ -9,9 +9,25 @@
 
 namespace bocst {
 
-/// Reads a triangle mesh: OBJ, PLY, STL, OFF, DAE. Faces with more corners are triangulated; all meshes of the file
-/// become one, transforms of its nodes applied; equal vertices of STL are joined. In target bocst::io.
-/// @throws std::runtime_error naming the file and what is wrong: not there, empty, truncated, no mesh, bad numbers.
+/// Reads a triangle mesh from a file, whose extension tells the format. In target bocst::io.
+///
+/// OBJ, PLY, STL, OFF and DAE have readers of their own here: whatever their bytes are, the result is a mesh or an
+/// exception. They open no other file; materials, normals, colours and texture coordinates are skipped. Coordinates
+/// are read as doubles, whatever the locale. Other formats (GLB, glTF, 3MF, ...) are read by assimp in this process,
+/// with its limits: floats, and no promise for malformed files. It may open regular files in the folder of the file.
+///
+/// Coordinates and axes are those of the file. Only DAE says what its unit is: its coordinates become metres
+/// (`<unit meter="...">`); its axes stay, too, whatever its up_axis says. Transforms of nodes are applied, and all
+/// meshes of the file become one. Of a DAE's `<controller>` the shape that it deforms is taken, undeformed.
+///
+/// Faces of more than three corners are cut into triangles; points and lines are skipped. Vertices and their order are
+/// those of the file, but equal vertices of STL and of assimp's formats are joined. Triangle strips of PLY and DAE
+/// lose the triangles with a repeated corner.
+///
+/// @throws std::runtime_error naming the file and what is wrong, with the line, or with the byte in binary data: no
+/// regular file (it never waits for a FIFO or a device), empty, truncated, no triangles, numbers that are none or not
+/// finite, indices that are fractional or out of range, anything after the end; binary OFF, polygons with holes
+/// (`<ph>`) and free-form surfaces are not supported.
 BOCST_EXPORT std::shared_ptr<const Mesh> loadMesh(const std::string& file);
 
 }  // namespace bocst

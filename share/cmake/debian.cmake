@@ -32,7 +32,7 @@ set(CPACK_DEBIAN_DEV_PACKAGE_NAME libbocst-dev)
 set(CPACK_DEBIAN_DEV_PACKAGE_SECTION libdevel)
 set(CPACK_DEBIAN_DEV_PACKAGE_DEPENDS ${needs_library} libfcl-dev libeigen3-dev)
 if(NOT BUILD_SHARED_LIBS)
-  list(APPEND CPACK_DEBIAN_DEV_PACKAGE_DEPENDS libhwy-dev libassimp-dev zlib1g-dev)
+  list(APPEND CPACK_DEBIAN_DEV_PACKAGE_DEPENDS libhwy-dev libassimp-dev zlib1g-dev libpugixml-dev)
 endif()
 list(JOIN CPACK_DEBIAN_DEV_PACKAGE_DEPENDS ", " CPACK_DEBIAN_DEV_PACKAGE_DEPENDS)
 set(CPACK_COMPONENT_DEV_DESCRIPTION "Headers, CMake's find_package(bocst) and pkg-config files.

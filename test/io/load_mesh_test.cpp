@@ -1,18 +1,25 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #include <bocst/io.h>
 #include <gtest/gtest.h>
+#include <sys/socket.h>
+#include <sys/stat.h>
+#include <sys/un.h>
 #include <unistd.h>
 
 #include <algorithm>
 #include <array>
+#include <clocale>
 #include <cmath>
 #include <cstdint>
+#include <cstdlib>
 #include <cstring>
 #include <filesystem>
 #include <fstream>
 #include <limits>
 #include <stdexcept>
 #include <string>
+#include <utility>
+#include <vector>
 
 namespace bocst {
 namespace {
@@ -131,6 +138,34 @@ std::string binaryStl() {
   return stl;
 }
 
+/// A ZIP archive of files that are stored as they are.
+std::string zip(const std::vector<std::pair<std::string, std::string>>& files) {
+  std::string archive;
+  std::string directory;
+  for (const auto& [name, content] : files) {
+    std::uint32_t crc = ~0u;
+    for (const char c : content) {
+      crc ^= static_cast<unsigned char>(c);
+      for (int bit = 0; bit < 8; ++bit) crc = (crc >> 1) ^ (crc & 1u ? 0xedb88320u : 0);
+    }
+    std::string head;  // what the file's own header and the directory have in common
+    for (const int field : {20, 0, 0, 0, 33}) append(head, static_cast<std::uint16_t>(field));
+    append(head, ~crc);
+    for (int i = 0; i < 2; ++i) append(head, static_cast<std::uint32_t>(content.size()));
+    append(head, static_cast<std::uint16_t>(name.size()));
+    append(head, std::uint16_t{0});
+    directory += std::string("PK\1\2\24\0", 6) + head + std::string(10, '\0');
+    append(directory, static_cast<std::uint32_t>(archive.size()));
+    directory += name;
+    archive += "PK\3\4" + head + name + content;
+  }
+  std::string end = std::string("PK\5\6\0\0\0\0", 8);
+  for (int i = 0; i < 2; ++i) append(end, static_cast<std::uint16_t>(files.size()));
+  append(end, static_cast<std::uint32_t>(directory.size()));
+  append(end, static_cast<std::uint32_t>(archive.size()));
+  return archive + directory + end + std::string(2, '\0');
+}
+
 TEST_F(LoadMesh, ReadsEachFormat) {
   expectSquare(*load("square.off", kOff));
   expectSquare(
@@ -205,6 +240,110 @@ TEST_F(LoadMesh, RefusesWhatIsNoFile) {
     fs::create_directory(folder_ / name);
     EXPECT_NE(complaint((folder_ / name).string()).find("directory"), std::string::npos);
   }
+}
+
+TEST_F(LoadMesh, NeverWaits) {
+  for (const char* name : {"fifo.off", "fifo.obj", "fifo.dae", "fifo.glb"}) {
+    ASSERT_EQ(mkfifo((folder_ / name).c_str(), 0600), 0);
+    EXPECT_NE(complaint((folder_ / name).string()).find("is a FIFO"), std::string::npos);
+  }
+  fs::create_symlink("/dev/zero", folder_ / "zero.ply");
+  EXPECT_NE(complaint((folder_ / "zero.ply").string()).find("is a device"), std::string::npos);
+  const int s = socket(AF_UNIX, SOCK_STREAM, 0);
+  sockaddr_un address{};
+  address.sun_family = AF_UNIX;
+  const std::string file = (folder_ / "socket.stl").string();
+  ASSERT_LT(file.size(), sizeof(address.sun_path));
+  std::copy(file.begin(), file.end(), address.sun_path);
+  ASSERT_EQ(bind(s, reinterpret_cast<const sockaddr*>(&address), sizeof(address)), 0);
+  EXPECT_NE(complaint(file).find("is a socket"), std::string::npos);
+  close(s);
+}
+
+TEST_F(LoadMesh, ReadsNoMaterials) {
+  ASSERT_EQ(mkfifo((folder_ / "fifo.mtl").c_str(), 0600), 0);
+  for (const char* library : {"fifo.mtl", "/dev/zero", ".", "missing.mtl"}) {
+    expectSquare(*load("m.obj", "mtllib " + std::string(library) + "\nusemtl a\n" + kObj));
+  }
+}
+
+TEST_F(LoadMesh, ReadsWhatAssimpReads) {
+  std::string buffer;
+  for (const float x : {0, 0, 0, 1, 0, 0, 1, 1, 0, 0, 1, 0}) append(buffer, x);
+  for (const std::uint16_t i : {0, 1, 2, 0, 2, 3}) append(buffer, i);
+  const auto gltf = [&](const std::string& uri) {
+    return R"({"asset":{"version":"2.0"},"scene":0,"scenes":[{"nodes":[0]}],"nodes":[{"mesh":0}],
+"meshes":[{"primitives":[{"attributes":{"POSITION":0},"indices":1}]}],
+"buffers":[{)" +
+           uri + R"("byteLength":60}],"bufferViews":[{"buffer":0,"byteLength":48},
+{"buffer":0,"byteOffset":48,"byteLength":12}],"accessors":[{"bufferView":0,"componentType":5126,"count":4,
+"type":"VEC3","min":[0,0,0],"max":[1,1,0]},{"bufferView":1,"componentType":5123,"count":6,"type":"SCALAR"}]})";
+  };
+  write("square.bin", buffer);
+  expectSquare(*load("square.gltf", gltf(R"("uri":"square.bin",)")));
+  std::string json = gltf("");
+  json.resize((json.size() + 3) / 4 * 4, ' ');
+  std::string glb = "glTF";
+  for (const std::size_t n : {std::size_t{2}, 12 + 8 + json.size() + 8 + buffer.size(), json.size()}) {
+    append(glb, static_cast<std::uint32_t>(n));
+  }
+  glb += "JSON" + json;
+  append(glb, static_cast<std::uint32_t>(buffer.size()));
+  glb += std::string("BIN\0", 4) + buffer;
+  expectSquare(*load("square.glb", glb));
+  expectSquare(*load(
+      "square.3mf",
+      zip({{"_rels/.rels",
+            R"(<?xml version="1.0"?><Relationships xmlns="http://schemas.openxmlformats.org/package/2006/relationships">
+<Relationship Target="/3D/3dmodel.model" Id="r" Type="http://schemas.microsoft.com/3dmanufacturing/2013/01/3dmodel"/>
+</Relationships>)"},
+           {"3D/3dmodel.model",
+            R"(<?xml version="1.0"?><model unit="meter"><resources><object id="1" type="model"><mesh><vertices>
+<vertex x="0" y="0" z="0"/><vertex x="1" y="0" z="0"/><vertex x="1" y="1" z="0"/><vertex x="0" y="1" z="0"/></vertices>
+<triangles><triangle v1="0" v2="1" v3="2"/><triangle v1="0" v2="2" v3="3"/></triangles></mesh></object></resources>
+<build><item objectid="1"/></build></model>)"}})));
+
+  // No way out of the folder, nor into what is no regular file.
+  fs::create_directory(folder_ / "inner");
+  complaint(write("inner/out.gltf", gltf(R"("uri":"../square.bin",)")));
+  complaint(write("inner/far.gltf", gltf("\"uri\":\"" + (folder_ / "square.bin").string() + "\",")));
+  ASSERT_EQ(mkfifo((folder_ / "fifo.bin").c_str(), 0600), 0);
+  complaint(write("fifo.gltf", gltf(R"("uri":"fifo.bin",)")));
+  // Nor past the readers here by another name.
+  complaint(write("square.xyz", kObj));
+  complaint(write("square", kDae));
+}
+
+TEST_F(LoadMesh, ReadsAPointInEveryLocale) {
+  // A locale whose decimals have a comma, made here.
+  const std::string source =
+      write("source", "LC_NUMERIC\ndecimal_point \",\"\nthousands_sep \".\"\ngrouping 3\nEND LC_NUMERIC\n");
+  const std::string make =
+      "localedef -c -i " + source + " -f ANSI_X3.4-1968 " + (folder_ / "comma").string() + " > " + source + ".log 2>&1";
+  if (std::system(make.c_str()) == -1) FAIL() << make;  // it misses categories
+  ASSERT_EQ(setenv("LOCPATH", folder_.c_str(), 1), 0);
+  ASSERT_NE(std::setlocale(LC_NUMERIC, "comma"), nullptr) << make << " (Debian: locales)";
+  ASSERT_EQ(std::string(std::localeconv()->decimal_point), ",");
+  const auto half = [](std::string text) {
+    for (std::size_t at = 0; (at = text.find("1 1 0", at)) != std::string::npos; at += 7) text.replace(at, 1, "0.5");
+    return text;
+  };
+  for (const auto& [name, content] : {std::pair("h.off", kOff), std::pair("h.obj", kObj), std::pair("h.ply", kPly),
+                                      std::pair("h.stl", kStl), std::pair("h.dae", kDae)}) {
+    const double shift = content == kDae ? 10 : 0;
+    EXPECT_EQ(load(name, half(content))->vertex(2), Eigen::Vector3d(0.5 + shift, 1, 0)) << name;
+  }
+  expectComplaint("large.off", "OFF\n3 1 0\n0 0 0\n1 1.5e999 0\n1 1 0\n3 0 1 2\n", "line 4: vertex 1");
+  const auto gltf = R"({"asset":{"version":"2.0"},"scene":0,"scenes":[{"nodes":[0]}],
+"nodes":[{"mesh":0,"translation":[0.5,0,0]}],"meshes":[{"primitives":[{"attributes":{"POSITION":0}}]}],
+"buffers":[{"uri":"h.bin","byteLength":36}],"bufferViews":[{"buffer":0,"byteLength":36}],
+"accessors":[{"bufferView":0,"componentType":5126,"count":3,"type":"VEC3","min":[0,0,0],"max":[1,1,0]}]})";
+  std::string buffer;
+  for (const float x : {0, 0, 0, 1, 0, 0, 1, 1, 0}) append(buffer, x);
+  write("h.bin", buffer);
+  EXPECT_EQ(load("h.gltf", gltf)->bounds().min(), Eigen::Vector3d(0.5, 0, 0));
+  std::setlocale(LC_NUMERIC, "C");
+  unsetenv("LOCPATH");
 }
 
 TEST_F(LoadMesh, RefusesWhatIsNoMesh) {

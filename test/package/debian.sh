@@ -37,7 +37,7 @@ depends() { # PACKAGE ON...
 depends libbocst-dev libfcl-dev libeigen3-dev
 if [[ $(cached BUILD_SHARED_LIBS) == ON ]]; then
   depends libbocst-dev "libbocst0 (= $version)"
-  depends libbocst0 libfcl0.7 libassimp5 libhwy1
+  depends libbocst0 libfcl0.7 libassimp5 libpugixml1v5 libhwy1
   [[ ! -s $work/bocst.files ]] || depends bocst "libbocst0 (= $version)" libfcl0.7 libcairo2 libmeshoptimizer2d
   if grep -E '\.(h|cmake|pc|so)$' "$work/libbocst0.files"; then fail "libbocst0 has files of the dev package"; fi
   dpkg-deb --ctrl-tarfile "$work/packages/libbocst0"_*.deb | tar -xO ./shlibs | grep -q "^libbocst 0 libbocst0" || fail "no shlibs"

@@ -1,0 +1,128 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#include "read_scene.h"
+
+#include <assimp/MemoryIOWrapper.h>
+#include <assimp/scene.h>
+#include <locale.h>
+
+#include <Eigen/Geometry>
+#include <algorithm>
+#include <assimp/IOSystem.hpp>
+#include <assimp/Importer.hpp>
+#include <cstdint>
+#include <exception>
+#include <filesystem>
+#include <memory>
+#include <stdexcept>
+#include <string_view>
+#include <utility>
+#include <vector>
+
+#include "file.h"
+#include "vertex_pool.h"
+
+namespace bocst::io {
+namespace {
+
+namespace fs = std::filesystem;
+
+/// What assimp may open: regular files in or below the folder of the file that it reads (the .bin of a glTF), to read.
+class Folder final : public Assimp::IOSystem {
+ public:
+  explicit Folder(const std::string& file) : folder_(fs::canonical(file).parent_path()) {}
+
+  bool Exists(const char* path) const override {
+    std::error_code error;
+    return isInside(path) && fs::is_regular_file(path, error);
+  }
+
+  Assimp::IOStream* Open(const char* path, const char* mode) override try {
+    if (!isInside(path) || std::string_view(mode).find_first_of("wa+") != std::string_view::npos) return nullptr;
+    const std::string content = readFile(path);
+    auto bytes = std::make_unique<std::uint8_t[]>(content.size());
+    std::copy(content.begin(), content.end(), bytes.get());
+    return new Assimp::MemoryIOStream(bytes.release(), content.size(), true);
+  } catch (const std::exception&) {
+    return nullptr;  // assimp says which file it wanted
+  }
+
+  char getOsSeparator() const override { return '/'; }
+  void Close(Assimp::IOStream* stream) override { delete stream; }
+  bool CreateDirectory(const std::string&) override { return false; }
+  bool ChangeDirectory(const std::string&) override { return false; }
+  bool DeleteFile(const std::string&) override { return false; }
+
+ private:
+  bool isInside(const char* path) const {
+    std::error_code error;
+    const fs::path whole = fs::canonical(path, error);
+    return !error && std::mismatch(folder_.begin(), folder_.end(), whole.begin(), whole.end()).first == folder_.end();
+  }
+
+  fs::path folder_;
+};
+
+/// Numbers with a point in this thread, whatever the program's locale.
+class CLocale {
+ public:
+  CLocale() : before_(uselocale(locale())) {}
+  ~CLocale() { uselocale(before_); }
+  CLocale(const CLocale&) = delete;
+  CLocale& operator=(const CLocale&) = delete;
+
+ private:
+  static locale_t locale() {
+    static const locale_t c = newlocale(LC_ALL_MASK, "C", nullptr);
+    return c;
+  }
+  locale_t before_;
+};
+
+}  // namespace
+
+Polygons readScene(const std::string& file) {
+  const CLocale c_locale;
+  Assimp::Importer importer;
+  importer.SetIOHandler(new Folder(file));  // the importer's own from here on
+  // What a reader here refuses must not get in by another name.
+  for (const char* extension : {"obj", "ply", "stl", "off", "dae"}) {
+    while (Assimp::BaseImporter* reader = importer.GetImporter(extension)) importer.UnregisterLoader(reader);
+  }
+  const aiScene* scene = importer.ReadFile(file, 0);
+  if (scene == nullptr) throw std::runtime_error(importer.GetErrorString());
+  if (scene->mRootNode == nullptr || scene->mNumMeshes == 0) throw std::runtime_error("no mesh in this file");
+
+  Polygons polygons;
+  VertexPool pool(polygons.vertices);
+  std::vector<std::pair<const aiNode*, Eigen::Matrix4d>> todo{{scene->mRootNode, Eigen::Matrix4d::Identity()}};
+  while (!todo.empty()) {
+    const auto [node, X_SP] = todo.back();
+    todo.pop_back();
+    const aiMatrix4x4& m = node->mTransformation;
+    Eigen::Matrix4d X_PN;
+    X_PN << m.a1, m.a2, m.a3, m.a4, m.b1, m.b2, m.b3, m.b4, m.c1, m.c2, m.c3, m.c4, m.d1, m.d2, m.d3, m.d4;
+    const Eigen::Matrix4d X_SN = X_SP * X_PN;
+    const bool identity = X_SN.isIdentity(0);
+    for (unsigned i = node->mNumChildren; i-- > 0;) todo.emplace_back(node->mChildren[i], X_SN);
+    for (unsigned i = 0; i < node->mNumMeshes; ++i) {
+      const aiMesh& mesh = *scene->mMeshes[node->mMeshes[i]];
+      for (unsigned f = 0; f < mesh.mNumFaces; ++f) {
+        const aiFace& face = mesh.mFaces[f];
+        if (face.mNumIndices < 3) continue;  // a point or a line
+        for (unsigned k = 0; k < face.mNumIndices; ++k) {
+          if (face.mIndices[k] >= mesh.mNumVertices) {
+            throw std::runtime_error("face " + std::to_string(f) + ": vertex index out of range");
+          }
+          const aiVector3D& v = mesh.mVertices[face.mIndices[k]];
+          Eigen::Vector3d p(v.x, v.y, v.z);
+          if (!identity) p = X_SN.topLeftCorner<3, 3>() * p + X_SN.topRightCorner<3, 1>();
+          polygons.corners.push_back(pool.indexOf(p));
+        }
+        polygons.ends.push_back(polygons.corners.size());
+      }
+    }
+  }
+  return polygons;
+}
+
+}  // namespace bocst::io
