@@ -7,4 +7,5 @@
 #include <bocst/node_view.h>
 #include <bocst/options.h>
 #include <bocst/oracle.h>
+#include <bocst/scene.h>
 #include <bocst/statistics.h>

@@ -1,0 +1,16 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#pragma once
+
+#include <bocst/model.h>
+
+// What a Scene asks of one pair of models beside the queries of <bocst/fcl.h>.
+
+namespace bocst::fcl_adapter {
+
+/// Are the convex hulls of the two surely farther apart than their margins and `gap` together? Looks for a direction
+/// between them, so it may miss one; false where an answer is conservative.
+template <typename S>
+bool hullsApart(const Model<S>& a, const fcl::Transform3<S>& X_WA, const Model<S>& b, const fcl::Transform3<S>& X_WB,
+                double gap);
+
+}  // namespace bocst::fcl_adapter

@@ -1,0 +1,169 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#include "scene/bounds.h"
+
+#include <fcl/config.h>
+#if FCL_HAVE_OCTOMAP
+#include <fcl/geometry/octree/octree.h>
+#endif
+
+#include <Eigen/Eigenvalues>
+#include <cmath>
+#include <limits>
+
+#include "fcl/adapters/pair.h"
+#include "fcl/adapters/shapes.h"
+
+namespace bocst::scene {
+namespace {
+
+/// Of two GJK solvers, whose default tolerance is 1e-6, absolute or of the sizes.
+constexpr double kSolverReach = 4e-6;
+
+/// The better of the box along the frame's axes and the one along the principal axes. each(f) calls f for all points.
+template <typename Each>
+Bounds fit(Each&& each) {
+  Eigen::AlignedBox3d box;
+  each([&](const Eigen::Vector3d& p) { box.extend(p); });
+  Bounds b;
+  if (box.isEmpty()) {
+    b.kind = Bounds::kNowhere;
+    return b;
+  }
+  const Eigen::Vector3d middle = box.center();
+  Eigen::Matrix3d moments = Eigen::Matrix3d::Zero();
+  Eigen::Vector3d sum = Eigen::Vector3d::Zero();
+  double count = 0;
+  each([&](const Eigen::Vector3d& p) {
+    const Eigen::Vector3d q = p - middle;
+    sum += q;
+    moments += q * q.transpose();
+    count += 1;
+  });
+  const auto area = [](const Eigen::Vector3d& h) { return h[0] * h[1] + h[1] * h[2] + h[2] * h[0]; };
+  b.center = middle;
+  b.half = box.sizes() / 2;
+  const Eigen::SelfAdjointEigenSolver<Eigen::Matrix3d> solver(moments - sum * sum.transpose() / count);
+  if (solver.info() == Eigen::Success && solver.eigenvectors().allFinite()) {
+    const Eigen::Matrix3d axes = solver.eigenvectors();
+    Eigen::AlignedBox3d turned;
+    each([&](const Eigen::Vector3d& p) { turned.extend(axes.transpose() * (p - middle)); });
+    if (area(turned.sizes() / 2) < area(b.half)) {
+      b.axes = axes;
+      b.center = middle + axes * turned.center();
+      b.half = turned.sizes() / 2;
+    }
+  }
+  // What rounding of the sums above may have cut off.
+  b.half.array() += 16 * std::numeric_limits<double>::epsilon() * (b.half.norm() + middle.norm());
+  return b;
+}
+
+template <typename S>
+Bounds aligned(const fcl::AABB<S>& box) {
+  Bounds b;
+  const Eigen::Vector3d lo = box.min_.template cast<double>(), hi = box.max_.template cast<double>();
+  b.center = (lo + hi) / 2;
+  b.half = (hi - lo) / 2;
+  return b;
+}
+
+template <typename S>
+Bounds boundsOfModel(const Model<S>& model) {
+  const tree::Tree& tree = model.tree();
+  const std::shared_ptr<const Mesh> mesh = model.mesh();
+  Bounds b;
+  if (mesh != nullptr) {
+    const Eigen::AlignedBox3d box = mesh->bounds();
+    // Vertices of no triangle may lie anywhere.
+    b = fit([&](auto&& f) {
+      for (std::size_t i = 0; i < mesh->vertexCount(); ++i) {
+        if (box.contains(mesh->vertex(i))) f(mesh->vertex(i));
+      }
+    });
+  } else {
+    const Eigen::AlignedBox3d box = tree.bounds();
+    b.center = box.center();
+    b.half = box.sizes() / 2;
+  }
+  const Options& o = model.options();
+  b.reach = o.margin;
+  if (o.answer == Answer::kConservative) {
+    // A sphere of the collision depth sticks out of the surface's box by at most its radius.
+    const int level = std::min(std::max(o.depth, 1), lattice::kMaxLevel);
+    const double size = b.radius() + b.center.norm();
+    const oracle::Surface& surface = tree.surface();
+    b.reach += std::sqrt(0.75) * surface.lattice.unit() * (1 << (lattice::kMaxLevel - level)) * 1.001 + 1e-12 * size;
+  }
+  return b;
+}
+
+#if FCL_HAVE_OCTOMAP
+template <typename S>
+Bounds boundsOfOcTree(const fcl::OcTree<S>& tree) {
+  Eigen::AlignedBox3d box;
+  // Cells that are occupied; no other makes a contact.
+  for (const auto& cell : tree.toBoxes()) {
+    const Eigen::Vector3d center(static_cast<double>(cell[0]), static_cast<double>(cell[1]),
+                                 static_cast<double>(cell[2]));
+    const Eigen::Vector3d half = Eigen::Vector3d::Constant(static_cast<double>(cell[3]) / 2);
+    box.extend(center - half).extend(center + half);
+  }
+  Bounds b;
+  if (box.isEmpty()) {
+    b.kind = Bounds::kNowhere;
+  } else {
+    b.center = box.center();
+    // FCL halves boxes in S all the way from the root.
+    b.half = box.sizes().array() / 2 +
+             32 * static_cast<double>(std::numeric_limits<S>::epsilon()) * (b.center.norm() + box.sizes().norm());
+  }
+  return b;
+}
+#endif
+
+template <typename S>
+Bounds boundsOfShape(fcl::CollisionGeometry<S>& shape) {
+  Bounds b;
+  const fcl::NODE_TYPE type = shape.getNodeType();
+  if (type == fcl::GEOM_PLANE || type == fcl::GEOM_HALFSPACE) {
+    b.kind = Bounds::kEverywhere;
+    return b;
+  }
+  shape.computeLocalAABB();
+  b = aligned(shape.aabb_local);
+  return b;
+}
+
+}  // namespace
+
+template <typename S>
+Bounds boundsOf(fcl::CollisionGeometry<S>& geometry) {
+  Bounds b;
+  if (const Model<S>* model = fcl_adapter::asModel<S>(&geometry)) {
+    b = boundsOfModel(*model);
+  } else if (fcl_adapter::isShape<S>(&geometry)) {
+    b = boundsOfShape(geometry);
+    b.reach = kSolverReach * (1 + b.radius());
+#if FCL_HAVE_OCTOMAP
+  } else if (geometry.getNodeType() == fcl::GEOM_OCTREE) {
+    b = boundsOfOcTree(static_cast<const fcl::OcTree<S>&>(geometry));
+    b.reach = kSolverReach * (1 + b.radius());
+#endif
+  } else {
+    fcl_adapter::withBvh<S>("Scene", &geometry, [&](const auto& bvh) {
+      b = fit([&](auto&& f) {
+        for (int t = 0; t < bvh.num_tris; ++t) {
+          for (std::size_t k = 0; k < 3; ++k) f(bvh.vertices[bvh.tri_indices[t][k]].template cast<double>().eval());
+        }
+      });
+    });
+  }
+  // Beyond this, single precision has no room for the squares.
+  if (b.kind == Bounds::kBox && !((b.center.norm() + b.radius()) < 1e12)) b.kind = Bounds::kEverywhere;
+  return b;
+}
+
+template Bounds boundsOf<float>(fcl::CollisionGeometry<float>&);
+template Bounds boundsOf<double>(fcl::CollisionGeometry<double>&);
+
+}  // namespace bocst::scene

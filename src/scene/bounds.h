@@ -1,0 +1,30 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#pragma once
+
+#include <bocst/model.h>
+
+#include <Eigen/Geometry>
+
+namespace bocst::scene {
+
+/// A box around a geometry G, in its frame.
+struct Bounds {
+  enum Kind {
+    kBox,
+    kEverywhere,  ///< It has no bounds: planes and half-spaces.
+    kNowhere,     ///< It has nothing to touch: an octree without occupied cells.
+  };
+  Kind kind = kBox;
+  Eigen::Vector3d center = Eigen::Vector3d::Zero();
+  Eigen::Matrix3d axes = Eigen::Matrix3d::Identity();  ///< Columns: unit vectors.
+  Eigen::Vector3d half = Eigen::Vector3d::Zero();      ///< Along them.
+  double reach = 0;  ///< It may touch what is so far from the box: margin, tolerance of FCL's solvers.
+
+  double radius() const { return half.norm(); }
+};
+
+/// @throws std::invalid_argument for a geometry that fcl::collide does not take.
+template <typename S>
+Bounds boundsOf(fcl::CollisionGeometry<S>& geometry);
+
+}  // namespace bocst::scene

@@ -1,0 +1,55 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#pragma once
+
+#include <cstddef>
+#include <cstdint>
+
+// Oriented boxes of placed objects, in float about the scene's origin, and which of them are near. Lengths are those of
+// the scene. Chosen at run time for the machine's instruction set.
+
+namespace bocst::scene {
+
+/// Around one object. `reach` is how much farther than the box it may touch: its margin, and all that rounding does.
+struct Box {
+  float center[3];
+  float axis[3][3];  ///< axis[k]: about unit vectors
+  float half[3];     ///< along them
+  float reach;
+  float lo[3], hi[3];  ///< The box along the axes of the world, reach included.
+};
+
+/// Eight of them, structure of arrays. A lane without an object has an empty lo/hi.
+struct alignas(64) BoxGroup {
+  float center[3][8];
+  float axis[3][3][8];
+  float half[3][8];
+  float reach[8];
+  float lo[3][8], hi[3][8];
+
+  BoxGroup();  ///< All lanes are empty.
+  void set(std::size_t lane, const Box& box);
+};
+
+/// Of the hierarchy: boxes along the axes of the world around eight nodes or groups.
+struct alignas(64) BoxNode {
+  float lo[3][8], hi[3][8];
+  std::int32_t child[8];  ///< A node, or ~group.
+};
+
+/// What is near one box among a group.
+struct NearGroup {
+  std::uint32_t box;    ///< The one; to be set by whoever asks.
+  std::uint32_t group;  ///< The others,
+  std::uint32_t mask;   ///< and which of them are near.
+  float gap[8];         ///< Not more than the distance less both reaches; negative where boxes overlap.
+};
+
+/// Which of the lanes in `mask` may be as near as `far` and the lane's own farB[] together; fills n.mask and n.gap.
+void nearInGroup(const Box& a, const BoxGroup& b, std::uint32_t mask, float far, const float* far_b, NearGroup& n);
+
+/// The same with all groups below a hierarchy's root, node 0; masks[group] are the lanes asked for. Writes at most as
+/// many as there are groups to `near` and returns how many; `stack` has room for all nodes.
+std::size_t nearInTree(const Box& a, const BoxNode* nodes, const BoxGroup* groups, const std::uint8_t* masks, float far,
+                       std::int32_t* stack, NearGroup* near);
+
+}  // namespace bocst::scene

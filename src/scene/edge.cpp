@@ -1,0 +1,205 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#include "scene/edge.h"
+
+#include <bocst/fcl.h>
+
+#include <algorithm>
+#include <limits>
+#include <stdexcept>
+#include <tuple>
+
+#include "fcl/adapters/motion.h"
+#include "fcl/plugin/dispatch.h"
+
+namespace bocst::scene {
+namespace {
+
+using query::Motion;
+
+/// Halvings of the way in search of what is near, before pairs are followed one by one.
+constexpr int kHalvings = 4;
+
+/// What passes closer than this share of the sizes is taken to touch, between two of FCL's geometries.
+constexpr double kTouch = 1e-5;
+
+template <typename S>
+fcl::Transform3<S> poseAt(const Motion& motion, double time) {
+  const Eigen::Isometry3d X = motion.at(time);
+  fcl::Transform3<S> Y = fcl::Transform3<S>::Identity();
+  Y.linear() = X.linear().template cast<S>();
+  Y.translation() = X.translation().template cast<S>();
+  return Y;
+}
+
+/// fcl::distance of a pair, no less than 0; any larger value where it is not less than `below`.
+template <typename S>
+S distanceBelow(const Object<S>& a, const fcl::Transform3<S>& X_WA, const Object<S>& b, const fcl::Transform3<S>& X_WB,
+                S below) {
+  static const fcl::DistanceRequest<S> request;
+  fcl::DistanceResult<S> result;
+  const bool has_model = a.model != nullptr || b.model != nullptr;
+  if (has_model) result.min_distance = below;
+  const S d = bocst::distance<S>(a.geometry.get(), X_WA, b.geometry.get(), X_WB, request, result);
+  if (!has_model && result.o1 == nullptr && !(d < std::numeric_limits<S>::max())) {
+    throw std::invalid_argument("bocst::Scene: FCL knows no distance of " + fcl_adapter::typeName<S>(a.geometry.get()) +
+                                " and " + fcl_adapter::typeName<S>(b.geometry.get()));
+  }
+  return std::max(d, S(0));
+}
+
+/// One way of all moving objects.
+template <typename S>
+class Edge {
+ public:
+  Edge(const World<S>& world, StateCheck<S>& check, const fcl::Transform3<S>* begin, const fcl::Transform3<S>* end,
+       fcl::CCDMotionType motion)
+      : world_(world), check_(check), begin_(begin), end_(end), type_(motion) {
+    check.start(world);
+    for (std::size_t i = 0; i < world.moving.size(); ++i) {
+      const Object<S>& o = world.moving[i];
+      motions_.push_back(fcl_adapter::motionOf<S>(begin[i], end[i], motion));
+      const Eigen::Vector3d center = motions_[i]->at(0) * o.bounds.center;
+      speeds_.push_back(motions_[i]->fastest(center, o.bounds.radius(), 0) * (1 + 1e-6));
+      double place = 0, orthogonality_error = 1e-12;
+      for (const fcl::Transform3<S>& X : {begin[i], end[i]}) {
+        place = std::max(place, static_cast<double>(X.translation().template lpNorm<1>()));
+        orthogonality_error = std::max(orthogonality_error, defectOf<S>(X));
+      }
+      const Eigen::Vector3d origin = motions_[i]->at(0).translation();
+      place += 2 * motions_[i]->fastest(origin, 0, 0);
+      // Poses on the way are rounded to S, which moves points by less than what is allowed for poses of such places.
+      check.reach[i] =
+          2 * world.reachWithin(o, place,
+                                2 * orthogonality_error + 8 * static_cast<double>(std::numeric_limits<S>::epsilon()));
+    }
+  }
+
+  bool isFree() {
+    poses_.resize(world_.moving.size());
+    if (touchesWithin(0, 1, nullptr, 0)) return false;
+    const auto key = [](const PairAt& p) { return std::tuple(p.moving, p.group, p.lane); };
+    std::sort(left_.begin(), left_.end(), [&](const PairAt& p, const PairAt& q) { return key(p) < key(q); });
+    left_.erase(
+        std::unique(left_.begin(), left_.end(), [&](const PairAt& p, const PairAt& q) { return key(p) == key(q); }),
+        left_.end());
+    return std::none_of(left_.begin(), left_.end(), [&](const PairAt& p) { return touchesOnWay(p); });
+  }
+
+ private:
+  // True when something touches in the middle of a part of the way, or of its parts; what may touch elsewhere is left.
+  bool touchesWithin(double from, double to, const std::vector<Entry>* list, int depth) {
+    const double middle = (from + to) / 2;
+    for (std::size_t i = 0; i < motions_.size(); ++i) {
+      poses_[i] = poseAt<S>(*motions_[i], middle);
+      check_.far[i] = speeds_[i] * (to - from) / 2;
+    }
+    std::vector<Entry> entries;
+    const bool touches = list == nullptr
+                             ? check_.runAll(poses_.data(), &entries, nullptr)
+                             : check_.run(poses_.data(), list->data(), list->data() + list->size(), &entries, nullptr);
+    if (touches) return true;
+    entries.erase(std::remove_if(entries.begin(), entries.end(), [](const Entry& e) { return e.mask == 0; }),
+                  entries.end());
+    if (entries.empty()) return false;
+    if (depth < kHalvings) {
+      return touchesWithin(from, middle, &entries, depth + 1) || touchesWithin(middle, to, &entries, depth + 1);
+    }
+    for (const Entry& e : entries) {
+      for (std::uint32_t lanes = e.mask; lanes != 0; lanes &= lanes - 1) {
+        left_.push_back({e.moving, e.group, static_cast<std::uint32_t>(__builtin_ctz(lanes))});
+      }
+    }
+    return false;
+  }
+
+  bool touchesOnWay(const PairAt& p) {
+    const Object<S>&a = world_.moving[p.moving], &b = world_.object(p.group, p.lane);
+    if (a.model == nullptr && b.model == nullptr) return advance(p, a, b);
+    fcl::ContinuousCollisionRequest<S> request;
+    request.ccd_motion_type = type_;
+    fcl::ContinuousCollisionResult<S> result;
+    bocst::continuousCollide<S>(a.geometry.get(), begin_[p.moving], end_[p.moving], b.geometry.get(),
+                                check_.pose(begin_, p.group, p.lane), check_.pose(end_, p.group, p.lane), request,
+                                result);
+    return result.is_collide;
+  }
+
+  // Conservative advancement: FCL's own steps over contacts of meshes.
+  bool advance(const PairAt& p, const Object<S>& a, const Object<S>& b) {
+    const bool fixed = world_.isFixed(p.group);
+    const std::size_t j = fixed ? 0 : world_.movingIndex(p.group, p.lane);
+    const double speed = speeds_[p.moving] + (fixed ? 0 : speeds_[j]);
+    double size = 0;
+    for (const Object<S>* o : {&a, &b}) {
+      if (o->bounds.kind == Bounds::kBox) size += o->bounds.radius();
+    }
+    for (double time = 0;;) {
+      const fcl::Transform3<S> X_WA = poseAt<S>(*motions_[p.moving], time);
+      const fcl::Transform3<S> X_WB = fixed ? b.X_WG : poseAt<S>(*motions_[j], time);
+      if (touch(a, X_WA, b, X_WB, result_)) return true;
+      if (!a.geometry->isOccupied() || !b.geometry->isOccupied()) return false;
+      const double gap = static_cast<double>(distanceBelow<S>(a, X_WA, b, X_WB, std::numeric_limits<S>::max()));
+      const double near = kTouch * size + a.bounds.reach + b.bounds.reach;
+      if (gap <= near) return true;
+      if (time >= 1 || gap >= speed * (1 - time) + near) return false;
+      time = std::min(1.0, time + (gap - near / 2) / speed);
+    }
+  }
+
+  const World<S>& world_;
+  StateCheck<S>& check_;
+  const fcl::Transform3<S>*begin_, *end_;
+  const fcl::CCDMotionType type_;
+  std::vector<std::unique_ptr<Motion>> motions_;
+  std::vector<double> speeds_;
+  std::vector<fcl::Transform3<S>> poses_;
+  std::vector<PairAt> left_;
+  fcl::CollisionResult<S> result_;
+};
+
+}  // namespace
+
+template <typename S>
+bool edgeIsFree(const World<S>& world, StateCheck<S>& check, const fcl::Transform3<S>* begin,
+                const fcl::Transform3<S>* end, fcl::CCDMotionType motion) {
+  return Edge<S>(world, check, begin, end, motion).isFree();
+}
+
+template <typename S>
+S clearance(const World<S>& world, StateCheck<S>& check, const fcl::Transform3<S>* X_WM, PairAt& nearest) {
+  check.start(world);
+  check.place(X_WM);
+  struct Candidate {
+    float gap;
+    PairAt pair;
+  };
+  thread_local std::vector<Candidate> candidates;
+  candidates.clear();
+  for (const NearGroup& n : check.findNear(std::numeric_limits<float>::max())) {
+    for (std::uint32_t left = n.mask; left != 0; left &= left - 1) {
+      const auto lane = static_cast<std::uint32_t>(__builtin_ctz(left));
+      candidates.push_back({n.gap[lane], {n.box, n.group, lane}});
+    }
+  }
+  std::sort(candidates.begin(), candidates.end(), [](const Candidate& p, const Candidate& q) { return p.gap < q.gap; });
+  S least = std::numeric_limits<S>::max();
+  for (const Candidate& c : candidates) {
+    if (static_cast<double>(c.gap) >= static_cast<double>(least)) break;
+    const Object<S>&a = world.moving[c.pair.moving], &b = world.object(c.pair.group, c.pair.lane);
+    const S d = distanceBelow<S>(a, X_WM[c.pair.moving], b, check.pose(X_WM, c.pair.group, c.pair.lane), least);
+    if (!(d < least)) continue;
+    least = d;
+    nearest = c.pair;
+    if (!(least > 0)) break;
+  }
+  return least;
+}
+
+#define BOCST_INSTANTIATE(S)                                                                                      \
+  template bool edgeIsFree(const World<S>&, StateCheck<S>&, const fcl::Transform3<S>*, const fcl::Transform3<S>*, \
+                           fcl::CCDMotionType);                                                                   \
+  template S clearance(const World<S>&, StateCheck<S>&, const fcl::Transform3<S>*, PairAt&);
+BOCST_INSTANTIATE(float)
+BOCST_INSTANTIATE(double)
+
+}  // namespace bocst::scene

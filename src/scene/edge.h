@@ -1,0 +1,20 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#pragma once
+
+#include <fcl/narrowphase/continuous_collision_request.h>
+
+#include "scene/state_check.h"
+
+namespace bocst::scene {
+
+/// Is the motion from one state to the other free? Poses are rigid.
+template <typename S>
+bool edgeIsFree(const World<S>& world, StateCheck<S>& check, const fcl::Transform3<S>* begin,
+                const fcl::Transform3<S>* end, fcl::CCDMotionType motion);
+
+/// The least fcl::distance of all pairs, no less than 0, and a pair that has it; the largest S without pairs.
+/// @throws std::invalid_argument where FCL knows no distance.
+template <typename S>
+S clearance(const World<S>& world, StateCheck<S>& check, const fcl::Transform3<S>* X_WM, PairAt& nearest);
+
+}  // namespace bocst::scene

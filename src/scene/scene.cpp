@@ -1,0 +1,353 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#include <bocst/scene.h>
+
+#include <algorithm>
+#include <atomic>
+#include <exception>
+#include <limits>
+#include <map>
+#include <mutex>
+#include <set>
+#include <shared_mutex>
+#include <stdexcept>
+#include <string>
+#include <thread>
+#include <vector>
+
+#include "fcl/plugin/dispatch.h"
+#include "scene/edge.h"
+#include "scene/pool.h"
+#include "scene/sweep.h"
+#include "tree/sharded_lock.h"
+
+namespace bocst {
+namespace {
+
+using scene::Object;
+using scene::World;
+
+/// States that one thread looks at in a row: enough of them to be alike, few enough to be shared out.
+constexpr std::size_t kRow = 128;
+/// An edge seldom has more; up to so many, middles come first among all.
+constexpr std::size_t kEdge = 512;
+
+std::uint32_t nextScene() {
+  static std::atomic<std::uint32_t> last{0};
+  return ++last;
+}
+
+unsigned threadsOf(const SceneOptions& options) {
+  return options.threads != 0 ? options.threads : std::max(1u, std::thread::hardware_concurrency());
+}
+
+/// What a thread keeps between queries.
+template <typename S>
+scene::Sweep<S>& sweepOfThread() {
+  thread_local scene::Sweep<S> sweep;
+  return sweep;
+}
+
+/// The numbers below `count`, middles before halves.
+std::vector<std::size_t> bisected(std::size_t count) {
+  std::vector<std::size_t> order;
+  std::vector<std::pair<std::size_t, std::size_t>> parts{{0, count}};
+  for (std::size_t i = 0; i < parts.size(); ++i) {
+    const auto [begin, end] = parts[i];
+    if (begin == end) continue;
+    const std::size_t middle = begin + (end - begin) / 2;
+    order.push_back(middle);
+    parts.emplace_back(begin, middle);
+    parts.emplace_back(middle + 1, end);
+  }
+  return order;
+}
+
+}  // namespace
+
+template <typename S>
+struct Scene<S>::Impl {
+  using Goal = typename scene::Sweep<S>::Goal;
+  using WorldPtr = std::shared_ptr<const World<S>>;
+
+  explicit Impl(const SceneOptions& o) : pool(threadsOf(o)) {}
+
+  // The world for a query. Made when it is asked for, so that many changes in a row cost little.
+  WorldPtr current() const {
+    {
+      const std::shared_lock<tree::ShardedLock> lock(sharded_lock);
+      if (world != nullptr) return world;
+    }
+    const std::lock_guard<std::mutex> lock(mutex);
+    if (world == nullptr) {
+      std::vector<Object<S>> moving, fixed;
+      for (const auto& [number, record] : objects) (record.moves ? moving : fixed).push_back(record.object);
+      publish(std::make_shared<const World<S>>(std::move(moving), std::move(fixed), ignored));
+    }
+    return world;
+  }
+
+  // To be called with the mutex held.
+  void publish(WorldPtr next) const {
+    {
+      const std::lock_guard<tree::ShardedLock> alone(sharded_lock);
+      std::swap(world, next);
+    }
+  }
+
+  struct Record {
+    Object<S> object;
+    bool moves;
+  };
+
+  Id add(const char* query, std::shared_ptr<Geometry> geometry, const Transform* X_WG) {
+    const std::string name = std::string("bocst::Scene::") + query;
+    if (geometry == nullptr) throw std::invalid_argument(name + ": the geometry is null");
+    if (X_WG != nullptr) scene::checkPose<S>(query, *X_WG);
+    Record record;
+    record.moves = X_WG == nullptr;
+    Object<S>& o = record.object;
+    o.geometry = std::move(geometry);
+    if (X_WG != nullptr) o.X_WG = *X_WG;
+    describe(o);
+    const std::lock_guard<std::mutex> lock(mutex);
+    const std::uint32_t number = next_number++;
+    o.id = Id(scene_number, number);
+    objects.emplace(number, std::move(record));
+    publish(nullptr);
+    return Id(scene_number, number);
+  }
+
+  static void describe(Object<S>& o) {
+    o.model = fcl_adapter::asModel<S>(o.geometry.get());
+    o.exact = o.model != nullptr && o.model->options().answer == Answer::kExact;
+    o.bounds = scene::boundsOf<S>(*o.geometry);
+  }
+
+  // To be called with the mutex held.
+  Record& find(const char* query, Id id) { return const_cast<Record&>(std::as_const(*this).find(query, id)); }
+  const Record& find(const char* query, Id id) const {
+    const std::string name = std::string("bocst::Scene::") + query;
+    if (!id.isValid()) throw std::invalid_argument(name + ": the Id names nothing");
+    if (id.scene_ != scene_number) throw std::invalid_argument(name + ": the Id is of another scene");
+    const auto found = objects.find(id.number_);
+    if (found == objects.end()) {
+      throw std::invalid_argument(name + ": object " + std::to_string(id.number_) + " was removed");
+    }
+    return found->second;
+  }
+
+  // Shares the rows of states out; work(row) is called for each, in this order, by any thread, until it says false.
+  template <typename Work>
+  void share(std::size_t rows, const Work& work) const {
+    std::atomic<std::size_t> next{0};
+    std::exception_ptr failure;
+    std::mutex failing;
+    const std::function<void()> some = [&] {
+      try {
+        for (std::size_t row; (row = next++) < rows;) {
+          if (!work(row)) break;
+        }
+      } catch (...) {
+        next = rows;
+        const std::lock_guard<std::mutex> lock(failing);
+        failure = std::current_exception();
+      }
+    };
+    if (rows > 1) {
+      pool.run(some);
+    } else {
+      some();
+    }
+    if (failure) std::rethrow_exception(failure);
+  }
+
+  std::size_t search(const char* query, const Transform* X_WM, std::size_t states, Goal goal, std::uint8_t* hit) const {
+    const WorldPtr w = current();
+    const std::size_t moving = w->moving.size();
+    scene::checkPoses<S>(query, X_WM, states, moving);
+    if (goal == Goal::kAll) std::fill(hit, hit + states, std::uint8_t{0});
+    if (states == 0 || moving == 0) return states;
+    const bool all_at_once = goal == Goal::kAny && states <= kEdge;
+    const std::size_t length = all_at_once ? states : kRow, rows = (states + length - 1) / length;
+    if (rows == 1) return sweepOfThread<S>().run(*w, X_WM, states, goal, hit);
+    const std::vector<std::size_t> order = goal == Goal::kAny ? bisected(rows) : std::vector<std::size_t>();
+    // Of rows, in their order, the first that has what is looked for; rows after it need not be looked at.
+    std::atomic<std::size_t> least{rows};
+    std::mutex finding;
+    std::size_t found = states;
+    share(rows, [&](std::size_t place) {
+      if (goal != Goal::kAll && place > least) return false;
+      const std::size_t row = order.empty() ? place : order[place];
+      const std::size_t begin = row * length, count = std::min(length, states - begin);
+      std::uint8_t* hits = hit == nullptr ? nullptr : hit + begin;
+      const std::size_t at = sweepOfThread<S>().run(*w, X_WM + begin * moving, count, goal, hits);
+      if (at == count || goal == Goal::kAll) return true;
+      const std::lock_guard<std::mutex> lock(finding);
+      if (place < least) {
+        least = place;
+        found = begin + at;
+      }
+      return false;
+    });
+    return found;
+  }
+
+  Pair named(const World<S>& w, const scene::PairAt& p) const {
+    return {w.moving[p.moving].id, w.object(p.group, p.lane).id};
+  }
+
+  mutable std::mutex mutex;  // of changes
+  std::uint32_t next_number = 0;
+  std::map<std::uint32_t, Record> objects;  // in the order of adding
+  std::set<std::pair<Id, Id>> ignored;      // the smaller Id first
+  mutable tree::ShardedLock sharded_lock;   // of `world`; held no longer than it takes to copy it
+  mutable WorldPtr world;                   // null after a change
+  const std::uint32_t scene_number = nextScene();
+  mutable scene::Pool pool;
+};
+
+template <typename S>
+Scene<S>::Scene(const SceneOptions& options) : impl_(std::make_unique<Impl>(options)) {}
+
+template <typename S>
+Scene<S>::~Scene() = default;
+
+template <typename S>
+Id Scene<S>::addFixed(std::shared_ptr<Geometry> geometry, const Transform& X_WG) {
+  return impl_->add("addFixed", std::move(geometry), &X_WG);
+}
+
+template <typename S>
+Id Scene<S>::addMoving(std::shared_ptr<Geometry> geometry) {
+  return impl_->add("addMoving", std::move(geometry), nullptr);
+}
+
+template <typename S>
+void Scene<S>::remove(Id object) {
+  const std::lock_guard<std::mutex> lock(impl_->mutex);
+  impl_->find("remove", object);
+  impl_->objects.erase(object.number_);
+  auto& ignored = impl_->ignored;
+  for (auto i = ignored.begin(); i != ignored.end();) {
+    i = i->first == object || i->second == object ? ignored.erase(i) : std::next(i);
+  }
+  impl_->publish(nullptr);
+}
+
+template <typename S>
+void Scene<S>::setPose(Id fixed, const Transform& X_WG) {
+  scene::checkPose<S>("setPose", X_WG);
+  const std::lock_guard<std::mutex> lock(impl_->mutex);
+  typename Impl::Record& record = impl_->find("setPose", fixed);
+  if (record.moves) {
+    throw std::invalid_argument("bocst::Scene::setPose: the object moves; its pose comes with each state");
+  }
+  record.object.X_WG = X_WG;
+  impl_->publish(nullptr);
+}
+
+template <typename S>
+void Scene<S>::ignore(Id a, Id b, bool ignored) {
+  const std::lock_guard<std::mutex> lock(impl_->mutex);
+  impl_->find("ignore", a);
+  impl_->find("ignore", b);
+  if (a == b) throw std::invalid_argument("bocst::Scene::ignore: an object makes no pair with itself");
+  if (ignored) {
+    impl_->ignored.insert(std::minmax(a, b));
+  } else {
+    impl_->ignored.erase(std::minmax(a, b));
+  }
+  impl_->publish(nullptr);
+}
+
+template <typename S>
+void Scene<S>::update(Id object) {
+  const std::lock_guard<std::mutex> lock(impl_->mutex);
+  typename Impl::Record& record = impl_->find("update", object);
+  Impl::describe(record.object);
+  impl_->publish(nullptr);
+}
+
+template <typename S>
+bool Scene<S>::collides(const Transform* X_WM, Pair* first) const {
+  const auto w = impl_->current();
+  scene::checkPoses<S>("collides", X_WM, 1, w->moving.size());
+  scene::StateCheck<S>& check = sweepOfThread<S>().check();
+  check.start(*w);
+  scene::PairAt hit;
+  if (!check.runAll(X_WM, nullptr, &hit)) return false;
+  if (first != nullptr) *first = impl_->named(*w, hit);
+  return true;
+}
+
+template <typename S>
+std::size_t Scene<S>::firstCollision(const Transform* X_WM, std::size_t states) const {
+  return impl_->search("firstCollision", X_WM, states, Impl::Goal::kFirst, nullptr);
+}
+
+template <typename S>
+bool Scene<S>::anyCollision(const Transform* X_WM, std::size_t states, std::size_t* where) const {
+  const std::size_t found = impl_->search("anyCollision", X_WM, states, Impl::Goal::kAny, nullptr);
+  if (where != nullptr && found != states) *where = found;
+  return found != states;
+}
+
+template <typename S>
+void Scene<S>::collisions(const Transform* X_WM, std::size_t states, std::uint8_t* hit) const {
+  if (states != 0 && hit == nullptr) throw std::invalid_argument("bocst::Scene::collisions: hit is null");
+  impl_->search("collisions", X_WM, states, Impl::Goal::kAll, hit);
+}
+
+template <typename S>
+S Scene<S>::clearance(const Transform* X_WM, Pair* nearest) const {
+  const auto w = impl_->current();
+  scene::checkPoses<S>("clearance", X_WM, 1, w->moving.size());
+  scene::PairAt pair;
+  const S least = scene::clearance(*w, sweepOfThread<S>().check(), X_WM, pair);
+  if (nearest != nullptr) *nearest = least < std::numeric_limits<S>::max() ? impl_->named(*w, pair) : Pair();
+  return least;
+}
+
+template <typename S>
+bool Scene<S>::edgeIsFree(const Transform* X_WM_begin, const Transform* X_WM_end, fcl::CCDMotionType motion) const {
+  const auto w = impl_->current();
+  scene::checkPoses<S>("edgeIsFree", X_WM_begin, 1, w->moving.size());
+  scene::checkPoses<S>("edgeIsFree", X_WM_end, 1, w->moving.size());
+  return scene::edgeIsFree<S>(*w, sweepOfThread<S>().check(), X_WM_begin, X_WM_end, motion);
+}
+
+template <typename S>
+std::size_t Scene<S>::movingCount() const {
+  return impl_->current()->moving.size();
+}
+
+template <typename S>
+std::size_t Scene<S>::fixedCount() const {
+  const std::lock_guard<std::mutex> lock(impl_->mutex);
+  return static_cast<std::size_t>(std::count_if(impl_->objects.begin(), impl_->objects.end(),
+                                                [](const auto& entry) { return !entry.second.moves; }));
+}
+
+template <typename S>
+std::size_t Scene<S>::pairCount() const {
+  return impl_->current()->pair_count;
+}
+
+template <typename S>
+std::size_t Scene<S>::movingIndex(Id moving) const {
+  const std::lock_guard<std::mutex> lock(impl_->mutex);
+  if (!impl_->find("movingIndex", moving).moves) {
+    throw std::invalid_argument("bocst::Scene::movingIndex: the object is fixed");
+  }
+  std::size_t index = 0;
+  for (const auto& [number, record] : impl_->objects) {
+    if (number == moving.number_) break;
+    index += record.moves;
+  }
+  return index;
+}
+
+template class Scene<float>;
+template class Scene<double>;
+
+}  // namespace bocst

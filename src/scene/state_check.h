@@ -1,0 +1,84 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#pragma once
+
+#include <fcl/narrowphase/collision_result.h>
+
+#include <cstdint>
+#include <vector>
+
+#include "scene/world.h"
+
+namespace bocst::scene {
+
+/// Lanes of a group that make pairs with a moving object.
+struct Entry {
+  std::uint32_t moving, group, mask;
+};
+
+/// A moving object and another one, a lane of a group.
+struct PairAt {
+  std::uint32_t moving, group, lane;
+};
+
+/// Does fcl::collide say so? `scratch` is a result to write to.
+template <typename S>
+bool touch(const Object<S>& a, const fcl::Transform3<S>& X_WA, const Object<S>& b, const fcl::Transform3<S>& X_WB,
+           fcl::CollisionResult<S>& scratch);
+
+/// Looks at one state for itself and for all states near it. Kept by a thread between queries, for the memory it has.
+///
+/// What is said of a state holds for others while no point of moving object i (of the box around it) is farther than
+/// far[i] from where it is in this one: objects whose boxes or hulls are farther apart than both may come nearer stay
+/// apart.
+template <typename S>
+class StateCheck {
+ public:
+  /// To be called before other queries about a world.
+  void start(const World<S>& world);
+
+  /// For each moving object; to be set by whoever asks for more than one state. As is `reach`, the least reach of each
+  /// box: that of the other states, where it is larger.
+  std::vector<double> far, reach;
+
+  /// Places the objects, and finds pairs that may be near: among the entries [begin, end) of the list, or, without one,
+  /// among all. Where `entries` is not null, pairs that may touch in one of the states are added to it.
+  /// True when a pair touches in this state itself, which `hit` then is; then more pairs may be added than needed.
+  bool run(const fcl::Transform3<S>* X_WM, const Entry* begin, const Entry* end, std::vector<Entry>* entries,
+           PairAt* hit);
+  bool runAll(const fcl::Transform3<S>* X_WM, std::vector<Entry>* entries, PairAt* hit);
+
+  /// Where an object is, in the state that was asked for.
+  const fcl::Transform3<S>& pose(const fcl::Transform3<S>* X_WM, std::size_t group, std::size_t lane) const {
+    return world_->isFixed(group) ? world_->object(group, lane).X_WG : X_WM[world_->movingIndex(group, lane)];
+  }
+
+  /// Places the objects alone; all groups that are no farther from moving object i than `most` are then in near().
+  void place(const fcl::Transform3<S>* X_WM);
+  const std::vector<NearGroup>& findNear(float most);
+
+ private:
+  struct Candidate {
+    float gap;
+    PairAt pair;
+    std::size_t entry;
+  };
+
+  void addNear(std::size_t i, float far_a, const float* far_of_moving);
+  bool look(const fcl::Transform3<S>* X_WM, std::size_t count, std::vector<Entry>* entries, PairAt* hit);
+  void spread();
+
+  const World<S>* world_ = nullptr;
+  std::uint64_t serial_ = 0;
+  std::vector<Box> boxes_;
+  std::vector<BoxGroup> groups_;  // of moving objects
+  std::vector<float> far_;        // as far, rounded up, eight a group
+  std::vector<NearGroup> near_;
+  std::size_t near_count_ = 0;
+  std::vector<std::int32_t> stack_;
+  std::vector<Candidate> candidates_;
+  PairAt last_{};  // that touched
+  bool has_last_ = false;
+  fcl::CollisionResult<S> result_;
+};
+
+}  // namespace bocst::scene

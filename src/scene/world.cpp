@@ -1,0 +1,249 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#include "scene/world.h"
+
+#include <algorithm>
+#include <atomic>
+#include <cmath>
+#include <limits>
+#include <numeric>
+#include <sstream>
+#include <stdexcept>
+
+namespace bocst::scene {
+namespace {
+
+template <typename S>
+[[noreturn]] void refuse(const char* query, const std::string& which, const fcl::Transform3<S>& X) {
+  std::ostringstream text;
+  text << "bocst::Scene::" << query << ": the pose" << which << " is not rigid:\n" << X.matrix();
+  throw std::invalid_argument(text.str());
+}
+
+std::uint64_t nextSerial() {
+  static std::atomic<std::uint64_t> last{0};
+  return ++last;
+}
+
+}  // namespace
+
+template <typename S>
+double defectOf(const fcl::Transform3<S>& X) {
+  const S* m = X.matrix().data();  // columns of four
+  const double a0 = m[0], a1 = m[1], a2 = m[2], b0 = m[4], b1 = m[5], b2 = m[6], c0 = m[8], c1 = m[9], c2 = m[10];
+  const double aa = a0 * a0 + a1 * a1 + a2 * a2, bb = b0 * b0 + b1 * b1 + b2 * b2, cc = c0 * c0 + c1 * c1 + c2 * c2;
+  const double ab = a0 * b0 + a1 * b1 + a2 * b2, bc = b0 * c0 + b1 * c1 + b2 * c2, ca = c0 * a0 + c1 * a1 + c2 * a2;
+  const double determinant = a0 * (b1 * c2 - b2 * c1) + a1 * (b2 * c0 - b0 * c2) + a2 * (b0 * c1 - b1 * c0);
+  // x - x is 0, and NaN for what is not finite.
+  const double nothing = (m[12] - m[12]) + (m[13] - m[13]) + (m[14] - m[14]);
+  const double off = std::max(std::max(std::max(std::abs(aa - 1), std::abs(bb - 1)), std::abs(cc - 1)),
+                              std::max(std::max(std::abs(ab), std::abs(bc)), std::abs(ca)));
+  // std::max may lose a NaN; a sum does not.
+  const bool finite = aa + bb + cc + nothing < std::numeric_limits<double>::infinity();
+  return finite && determinant > 0 ? off : std::numeric_limits<double>::infinity();
+}
+
+template <typename S>
+void checkPoses(const char* query, const fcl::Transform3<S>* X_WM, std::size_t states, std::size_t moving) {
+  if (states != 0 && moving != 0 && X_WM == nullptr) {
+    throw std::invalid_argument(std::string("bocst::Scene::") + query + ": the poses are null");
+  }
+  for (std::size_t k = 0; k < states * moving; ++k) {
+    if (defectOf<S>(X_WM[k]) <= kMaxDefect) continue;
+    refuse<S>(query, " of moving object " + std::to_string(k % moving) + " in state " + std::to_string(k / moving),
+              X_WM[k]);
+  }
+}
+
+template <typename S>
+void checkPose(const char* query, const fcl::Transform3<S>& X) {
+  if (!(defectOf<S>(X) <= kMaxDefect)) refuse<S>(query, "", X);
+}
+
+// What may be called a contact farther than the boxes are apart: FCL computes relative poses in S (64 roundings of
+// everything that is added up); where rotations are off by `defect`, lengths along them are, of either object; and the
+// box is in float (see nearLanes()).
+template <typename S>
+double reachOf(const Bounds& b, double largest, double place, double displacement, double orthogonality_error) {
+  const double radius = b.radius(), size = radius + b.center.norm();
+  return b.reach + 64 * static_cast<double>(std::numeric_limits<S>::epsilon()) * (place + size) +
+         4 * orthogonality_error * (largest + size) + 128 * 0x1p-24 * (displacement + radius);
+}
+
+template <typename S>
+double World<S>::reachWithin(const Object<S>& object, double place, double orthogonality_error) const {
+  const Bounds& b = object.bounds;
+  if (b.kind != Bounds::kBox) return 0;
+  const double displacement = place + 2 * b.center.norm() + origin_.lpNorm<1>();
+  return reachOf<S>(b, largest_, place, displacement, orthogonality_error) * (1 + 1e-12);
+}
+
+template <typename S>
+Box World<S>::boxAt(const Object<S>& object, const fcl::Transform3<S>& X_WG, double reach) const {
+  const Bounds& b = object.bounds;
+  Box box;
+  if (b.kind != Bounds::kBox) {
+    const bool everywhere = b.kind == Bounds::kEverywhere;
+    for (int k = 0; k < 3; ++k) {
+      for (int j = 0; j < 3; ++j) box.axis[k][j] = j == k;
+      box.center[k] = 0;
+      box.half[k] = everywhere ? 1e15f : 0;
+      box.hi[k] = everywhere ? 1e30f : -std::numeric_limits<float>::infinity();
+      box.lo[k] = -box.hi[k];
+    }
+    box.reach = 0;
+    return box;
+  }
+  const S* m = X_WG.matrix().data();  // columns of four
+  double center[3], axis[3][3], displacement = 0, place = 0;
+  for (int j = 0; j < 3; ++j) {
+    const double at = m[12 + j];
+    center[j] = m[j] * b.center[0] + m[4 + j] * b.center[1] + m[8 + j] * b.center[2] + at;
+    place += std::abs(at);
+    center[j] -= origin_[j];
+    displacement += std::abs(center[j]);
+    for (int k = 0; k < 3; ++k) axis[k][j] = m[j] * b.axes(0, k) + m[4 + j] * b.axes(1, k) + m[8 + j] * b.axes(2, k);
+  }
+  const double radius = b.radius();
+  reach = std::max(reach, reachOf<S>(b, largest_, place, displacement, defectOf<S>(X_WG)));
+  // Where half extents do not fit a float, nothing near does.
+  if (!(displacement + radius + reach < 1e12)) {
+    Object<S> far;
+    far.bounds.kind = Bounds::kEverywhere;
+    return boxAt(far, X_WG);
+  }
+  box.reach = static_cast<float>(reach);
+  for (int j = 0; j < 3; ++j) {
+    const double half =
+        std::abs(axis[0][j]) * b.half[0] + std::abs(axis[1][j]) * b.half[1] + std::abs(axis[2][j]) * b.half[2] + reach;
+    box.center[j] = static_cast<float>(center[j]);
+    box.half[j] = static_cast<float>(b.half[j]);
+    box.lo[j] = static_cast<float>(center[j] - half);
+    box.hi[j] = static_cast<float>(center[j] + half);
+    for (int k = 0; k < 3; ++k) box.axis[k][j] = static_cast<float>(axis[k][j]);
+  }
+  return box;
+}
+
+// The parts of [begin, end) become the children of a node: halved, along the widest extent of their middles, until
+// there are eight or each fits a group.
+template <typename S>
+std::int32_t World<S>::build(std::vector<std::uint32_t>& order, std::vector<std::pair<std::size_t, std::size_t>> parts,
+                             const std::vector<Box>& boxes, const std::vector<Object<S>>& objects) {
+  const auto size = [](const std::pair<std::size_t, std::size_t>& p) { return p.second - p.first; };
+  while (parts.size() < 8) {
+    const auto largest =
+        std::max_element(parts.begin(), parts.end(), [&](const auto& p, const auto& q) { return size(p) < size(q); });
+    if (size(*largest) <= 8) break;
+    const auto [begin, end] = *largest;
+    float lo[3], hi[3];
+    for (int k = 0; k < 3; ++k) {
+      lo[k] = hi[k] = boxes[order[begin]].center[k];
+      for (std::size_t i = begin; i < end; ++i) {
+        lo[k] = std::min(lo[k], boxes[order[i]].center[k]);
+        hi[k] = std::max(hi[k], boxes[order[i]].center[k]);
+      }
+    }
+    int k = 0;
+    for (int j = 1; j < 3; ++j) k = hi[j] - lo[j] > hi[k] - lo[k] ? j : k;
+    const std::size_t middle = begin + ((end - begin) / 2 + 7) / 8 * 8;
+    std::nth_element(order.begin() + static_cast<std::ptrdiff_t>(begin),
+                     order.begin() + static_cast<std::ptrdiff_t>(middle),
+                     order.begin() + static_cast<std::ptrdiff_t>(end), [&](std::uint32_t p, std::uint32_t q) {
+                       return std::pair(boxes[p].center[k], p) < std::pair(boxes[q].center[k], q);
+                     });
+    largest->second = middle;
+    parts.emplace_back(middle, end);
+  }
+  const auto index = static_cast<std::int32_t>(nodes.size());
+  nodes.emplace_back();
+  BoxNode node;
+  for (std::size_t lane = 0; lane < 8; ++lane) {
+    node.child[lane] = 0;
+    for (int k = 0; k < 3; ++k) {
+      node.lo[k][lane] = std::numeric_limits<float>::infinity();
+      node.hi[k][lane] = -std::numeric_limits<float>::infinity();
+    }
+    if (lane >= parts.size()) continue;
+    const auto [begin, end] = parts[lane];
+    for (std::size_t i = begin; i < end; ++i) {
+      for (int k = 0; k < 3; ++k) {
+        node.lo[k][lane] = std::min(node.lo[k][lane], boxes[order[i]].lo[k]);
+        node.hi[k][lane] = std::max(node.hi[k][lane], boxes[order[i]].hi[k]);
+      }
+    }
+    if (end - begin > 8) {
+      node.child[lane] = build(order, {{begin, end}}, boxes, objects);
+    } else {
+      node.child[lane] = ~static_cast<std::int32_t>(groups.size());
+      BoxGroup group;
+      for (std::size_t i = begin; i < end; ++i) {
+        group.set(i - begin, boxes[order[i]]);
+        fixed.push_back(objects[order[i]]);
+      }
+      groups.push_back(group);
+      fixed.resize(8 * groups.size());
+    }
+  }
+  nodes[static_cast<std::size_t>(index)] = node;
+  return index;
+}
+
+template <typename S>
+World<S>::World(std::vector<Object<S>> moving_objects, std::vector<Object<S>> fixed_objects,
+                const std::set<std::pair<Id, Id>>& ignored_pairs)
+    : moving(std::move(moving_objects)), serial(nextSerial()) {
+  const auto ignored = [&](Id a, Id b) { return ignored_pairs.count(std::minmax(a, b)) != 0; };
+  const auto sizeOf = [](const Object<S>& o) {
+    return o.bounds.kind == Bounds::kBox ? o.bounds.radius() + o.bounds.center.norm() : 0;
+  };
+  for (const Object<S>& o : moving) largest_ = std::max(largest_, sizeOf(o));
+  Eigen::AlignedBox3d middles;
+  for (const Object<S>& o : fixed_objects) {
+    largest_ = std::max(largest_, sizeOf(o));
+    if (o.bounds.kind == Bounds::kBox) middles.extend(o.X_WG.template cast<double>() * o.bounds.center);
+  }
+  if (!middles.isEmpty()) origin_ = middles.center();
+
+  // What is everywhere has a part of its own, what is nowhere none.
+  std::vector<Box> boxes;
+  std::vector<std::uint32_t> order;
+  for (const bool everywhere : {true, false}) {
+    for (std::uint32_t i = 0; i < fixed_objects.size(); ++i) {
+      const Bounds::Kind kind = fixed_objects[i].bounds.kind;
+      if (kind != Bounds::kNowhere && (kind == Bounds::kEverywhere) == everywhere) order.push_back(i);
+    }
+  }
+  for (const Object<S>& o : fixed_objects) boxes.push_back(boxAt(o, o.X_WG));
+  const auto unbounded =
+      static_cast<std::size_t>(std::count_if(fixed_objects.begin(), fixed_objects.end(),
+                                             [](const Object<S>& o) { return o.bounds.kind == Bounds::kEverywhere; }));
+  std::vector<std::pair<std::size_t, std::size_t>> parts;
+  if (unbounded > 0) parts.emplace_back(0, unbounded);
+  if (order.size() > unbounded) parts.emplace_back(unbounded, order.size());
+  if (!parts.empty()) build(order, parts, boxes, fixed_objects);
+
+  masks.assign(moving.size() * allGroups(), 0);
+  for (std::size_t i = 0; i < moving.size(); ++i) {
+    for (const Object<S>& o : fixed_objects) pair_count += !ignored(moving[i].id, o.id);
+    for (std::size_t j = i + 1; j < moving.size(); ++j) pair_count += !ignored(moving[i].id, moving[j].id);
+    if (moving[i].bounds.kind == Bounds::kNowhere) continue;
+    for (std::size_t group = 0; group < allGroups(); ++group) {
+      for (std::size_t lane = 0; lane < 8; ++lane) {
+        if (!isFixed(group) && (movingIndex(group, lane) <= i || movingIndex(group, lane) >= moving.size())) continue;
+        const Object<S>& o = object(group, lane);
+        if (o.geometry == nullptr || o.bounds.kind == Bounds::kNowhere || ignored(moving[i].id, o.id)) continue;
+        masks[i * allGroups() + group] |= static_cast<std::uint8_t>(1u << lane);
+      }
+    }
+  }
+}
+
+#define BOCST_INSTANTIATE(S)                                                                     \
+  template class World<S>;                                                                       \
+  template double defectOf<S>(const fcl::Transform3<S>&);                                        \
+  template void checkPoses<S>(const char*, const fcl::Transform3<S>*, std::size_t, std::size_t); \
+  template void checkPose<S>(const char*, const fcl::Transform3<S>&);
+BOCST_INSTANTIATE(float)
+BOCST_INSTANTIATE(double)
+
+}  // namespace bocst::scene

@@ -1,0 +1,84 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#pragma once
+
+#include <bocst/model.h>
+#include <bocst/scene.h>
+
+#include <cstdint>
+#include <memory>
+#include <set>
+#include <utility>
+#include <vector>
+
+#include "scene/bounds.h"
+#include "scene/boxes.h"
+
+namespace bocst::scene {
+
+template <typename S>
+struct Object {
+  std::shared_ptr<fcl::CollisionGeometry<S>> geometry;  ///< Null: a lane without an object.
+  const Model<S>* model = nullptr;                      ///< It, if it is one.
+  bool exact = false;                                   ///< A model with exact answers.
+  Bounds bounds;
+  Id id;
+  fcl::Transform3<S> X_WG = fcl::Transform3<S>::Identity();  ///< Where it is, if it is fixed.
+};
+
+/// The largest entry of R^T R - 1 of a pose that is rigid up to rounding; infinite where it is not finite, or reflects.
+template <typename S>
+double defectOf(const fcl::Transform3<S>& X);
+
+/// Poses with a larger one are refused: those of floats that were multiplied some thousand times are below.
+constexpr double kMaxDefect = 1e-3;
+
+/// @throws std::invalid_argument that names the first pose that is not rigid.
+template <typename S>
+void checkPoses(const char* query, const fcl::Transform3<S>* X_WM, std::size_t states, std::size_t moving);
+template <typename S>
+void checkPose(const char* query, const fcl::Transform3<S>& X);
+
+/// A scene as a query sees it: never changed once it is made.
+template <typename S>
+class World {
+ public:
+  /// Pairs that are `ignored`, the smaller Id first.
+  World(std::vector<Object<S>> moving_objects, std::vector<Object<S>> fixed_objects,
+        const std::set<std::pair<Id, Id>>& ignored);
+
+  std::size_t fixedGroups() const { return groups.size(); }
+  std::size_t movingGroups() const { return (moving.size() + 7) / 8; }
+  std::size_t allGroups() const { return fixedGroups() + movingGroups(); }
+
+  /// Of a lane of a group: fixed groups are first.
+  const Object<S>& object(std::size_t group, std::size_t lane) const {
+    return group < fixedGroups() ? fixed[8 * group + lane] : moving[8 * (group - fixedGroups()) + lane];
+  }
+  bool isFixed(std::size_t group) const { return group < fixedGroups(); }
+  std::size_t movingIndex(std::size_t group, std::size_t lane) const { return 8 * (group - fixedGroups()) + lane; }
+
+  /// The box of an object at a pose, with at least `reach`; without an extent for what is nowhere.
+  Box boxAt(const Object<S>& object, const fcl::Transform3<S>& X_WG, double reach = 0) const;
+
+  /// At least the reach of that box, while no coordinates of the pose's translation add up to more than `place`, and
+  /// its defect is not larger.
+  double reachWithin(const Object<S>& object, double place, double orthogonality_error) const;
+
+  std::vector<Object<S>> moving;
+  std::vector<Object<S>> fixed;  ///< Eight a group.
+  std::vector<BoxNode> nodes;    ///< Over the groups; none without a fixed object that is somewhere.
+  std::vector<BoxGroup> groups;
+  /// [i * allGroups() + group]: lanes that make a pair with moving object i; of two moving objects in row of the first.
+  std::vector<std::uint8_t> masks;
+  std::size_t pair_count = 0;
+  std::uint64_t serial;  ///< No other world has it.
+
+ private:
+  std::int32_t build(std::vector<std::uint32_t>& order, std::vector<std::pair<std::size_t, std::size_t>> parts,
+                     const std::vector<Box>& boxes, const std::vector<Object<S>>& objects);
+
+  Eigen::Vector3d origin_ = Eigen::Vector3d::Zero();  // coordinates of boxes count from here
+  double largest_ = 0;                                // radius about the origin of its own frame
+};
+
+}  // namespace bocst::scene

@@ -1,0 +1,590 @@
+// SPDX-License-Identifier: BSD-3-Clause
+// Scene against fcl::collide and fcl::distance of every pair.
+#include <bocst/bocst.h>
+#include <fcl/geometry/bvh/BVH_model.h>
+#include <gtest/gtest.h>
+
+#include <atomic>
+#include <cstdint>
+#include <limits>
+#include <memory>
+#include <random>
+#include <set>
+#include <string>
+#include <thread>
+#include <vector>
+
+#include "conformance/octrees.h"
+#include "conformance/reference.h"
+
+namespace bocst {
+namespace {
+
+using test::Raw;
+
+template <typename S>
+using Geometry = std::shared_ptr<fcl::CollisionGeometry<S>>;
+template <typename S>
+using States = std::vector<fcl::Transform3<S>>;
+
+/// A scene, and all that it was told.
+template <typename S>
+struct World {
+  struct Object {
+    Geometry<S> geometry;
+    Id id;
+    fcl::Transform3<S> X_WG;
+  };
+
+  explicit World(unsigned threads = 1) : scene(SceneOptions{threads}) {}
+
+  Id fix(Geometry<S> g, const fcl::Transform3<S>& X) {
+    fixed.push_back({g, scene.addFixed(g, X), X});
+    return fixed.back().id;
+  }
+  Id move(Geometry<S> g) {
+    moving.push_back({g, scene.addMoving(g), {}});
+    return moving.back().id;
+  }
+  void ignore(Id a, Id b) {
+    scene.ignore(a, b);
+    ignored.insert({a, b});
+    ignored.insert({b, a});
+  }
+
+  /// Calls f(a, X_WA, b, X_WB) for all pairs in the state at X_WM that are not ignored.
+  template <typename F>
+  void pairs(const fcl::Transform3<S>* X_WM, F&& f) const {
+    for (std::size_t i = 0; i < moving.size(); ++i) {
+      for (const Object& o : fixed) {
+        if (ignored.count({moving[i].id, o.id}) == 0) f(moving[i], X_WM[i], o, o.X_WG);
+      }
+      for (std::size_t j = i + 1; j < moving.size(); ++j) {
+        if (ignored.count({moving[i].id, moving[j].id}) == 0) f(moving[i], X_WM[i], moving[j], X_WM[j]);
+      }
+    }
+  }
+
+  std::set<std::pair<Id, Id>> hits(const fcl::Transform3<S>* X_WM) const {
+    std::set<std::pair<Id, Id>> all;
+    pairs(X_WM, [&](const Object& a, const auto& X_WA, const Object& b, const auto& X_WB) {
+      if (test::touching<S>(*a.geometry, X_WA, *b.geometry, X_WB)) all.insert({a.id, b.id});
+    });
+    return all;
+  }
+
+  S clearance(const fcl::Transform3<S>* X_WM) const {
+    S least = std::numeric_limits<S>::max();
+    pairs(X_WM, [&](const Object& a, const auto& X_WA, const Object& b, const auto& X_WB) {
+      fcl::DistanceResult<S> result;
+      const S d = fcl::distance(a.geometry.get(), X_WA, b.geometry.get(), X_WB, fcl::DistanceRequest<S>(), result);
+      least = std::min(least, std::max(d, S(0)));
+    });
+    return least;
+  }
+
+  Scene<S> scene;
+  std::vector<Object> fixed, moving;
+  std::set<std::pair<Id, Id>> ignored;
+};
+
+template <typename S>
+fcl::Transform3<S> randomPose(std::mt19937_64& g, double spread) {
+  std::uniform_real_distribution<double> u(-spread, spread);
+  return test::pose<S>(test::randomRotation(g), {u(g), u(g), u(g)});
+}
+
+/// One of all kinds.
+template <typename S>
+Geometry<S> geometry(std::size_t kind, std::mt19937_64& g) {
+  std::uniform_real_distribution<double> u(0.2, 0.7);
+  Raw raw = kind % 2 == 0 ? test::torus(8 + kind % 5) : test::box({-0.5, -0.2, -0.3}, {0.5, 0.4, 0.3});
+  raw.scale(u(g));
+  const S x = static_cast<S>(u(g)), y = static_cast<S>(u(g)), z = static_cast<S>(u(g));
+  Options options;
+  switch (kind % 10) {
+    case 0:
+    case 1:
+    case 2:
+      return std::make_shared<Model<S>>(raw.mesh());
+    case 3:
+      options.margin = 0.05;
+      return std::make_shared<Model<S>>(raw.mesh(), options);
+    case 4:
+      options.answer = Answer::kConservative;
+      options.depth = 4;
+      return std::make_shared<Model<S>>(raw.mesh(), options);
+    case 5:
+      options.solid = true;
+      return std::make_shared<Model<S>>(raw.mesh(), options);
+    case 6:
+      return test::bvh<fcl::OBBRSS<S>>(raw);
+    case 7:
+      return std::make_shared<fcl::Box<S>>(x, y, z);
+    case 8:
+      return std::make_shared<fcl::Sphere<S>>(x / 2);
+    default:
+      return std::make_shared<fcl::Capsule<S>>(x / 3, y);
+  }
+}
+
+template <typename S>
+void populate(World<S>& w, std::size_t moving, std::size_t fixed, double spread, unsigned seed) {
+  std::mt19937_64 g(seed);
+  for (std::size_t i = 0; i < fixed; ++i) w.fix(geometry<S>(i, g), randomPose<S>(g, spread));
+  for (std::size_t i = 0; i < moving; ++i) w.move(geometry<S>(3 * i, g));
+  for (std::size_t i = 0; i + 1 < moving; i += 2) w.ignore(w.moving[i].id, w.moving[i + 1].id);
+  if (moving > 0 && fixed > 2) w.ignore(w.fixed[2].id, w.moving[0].id);
+}
+
+/// Rows of states that go from one random state to the next in small steps, and some far from each other.
+template <typename S>
+States<S> walk(std::size_t states, std::size_t moving, double spread, double step, unsigned seed) {
+  std::mt19937_64 g(seed);
+  std::normal_distribution<double> n;
+  States<S> all(states * moving);
+  for (std::size_t k = 0; k < states; ++k) {
+    for (std::size_t i = 0; i < moving; ++i) {
+      fcl::Transform3<S>& X = all[k * moving + i];
+      if (k % 40 == 0) {
+        X = randomPose<S>(g, spread);
+        continue;
+      }
+      const fcl::Transform3<double> last = all[(k - 1) * moving + i].template cast<double>();
+      const Eigen::AngleAxisd turn(step * n(g), test::randomDirection(g));
+      Eigen::Quaterniond q(Eigen::Matrix3d(turn * last.linear()));
+      X = test::pose<S>(q.normalized().toRotationMatrix(), last.translation() + step * test::randomDirection(g));
+    }
+  }
+  return all;
+}
+
+template <typename S>
+class SceneTest : public testing::Test {};
+using Scalars = testing::Types<float, double>;
+TYPED_TEST_SUITE(SceneTest, Scalars);
+
+template <typename S>
+void checkVerdicts(const World<S>& w, const States<S>& X, std::size_t states, std::size_t& hits) {
+  const std::size_t moving = w.moving.size();
+  std::vector<std::uint8_t> expected(states), hit(states, 7);
+  for (std::size_t k = 0; k < states; ++k) {
+    const auto touching = w.hits(X.data() + k * moving);
+    expected[k] = !touching.empty();
+    hits += expected[k];
+    Pair pair;
+    ASSERT_EQ(w.scene.collides(X.data() + k * moving, &pair), expected[k] != 0) << "state " << k;
+    ASSERT_EQ(w.scene.collides(X.data() + k * moving), expected[k] != 0);
+    if (expected[k]) {
+      EXPECT_EQ(touching.count({pair.a, pair.b}), 1u);
+    }
+  }
+  w.scene.collisions(X.data(), states, hit.data());
+  EXPECT_EQ(hit, expected);
+  // Parts of the row, of many lengths.
+  for (std::size_t begin = 0, length = 1; begin + length <= states; begin += length, length += 3) {
+    const auto first = std::find(expected.begin() + begin, expected.begin() + begin + length, 1) - expected.begin();
+    const auto* from = X.data() + begin * moving;
+    EXPECT_EQ(w.scene.firstCollision(from, length), static_cast<std::size_t>(first) - begin);
+    std::size_t where = length;
+    ASSERT_EQ(w.scene.anyCollision(from, length, &where), static_cast<std::size_t>(first) < begin + length);
+    if (where < length) {
+      EXPECT_TRUE(expected[begin + where]);
+    }
+    std::vector<std::uint8_t> part(length, 7);
+    w.scene.collisions(from, length, part.data());
+    EXPECT_TRUE(std::equal(part.begin(), part.end(), expected.begin() + begin));
+  }
+  const auto first = std::find(expected.begin(), expected.end(), 1) - expected.begin();
+  EXPECT_EQ(w.scene.firstCollision(X.data(), states), static_cast<std::size_t>(first));
+}
+
+TYPED_TEST(SceneTest, VerdictsAreThoseOfAllPairs) {
+  using S = TypeParam;
+  for (const auto& [moving, fixed, spread, step] :
+       {std::tuple(4, 20, 3.0, 0.05), std::tuple(1, 9, 0.8, 0.01), std::tuple(11, 3, 2.0, 0.02),
+        std::tuple(2, 150, 7.0, 0.2), std::tuple(3, 0, 0.6, 0.03)}) {
+    SCOPED_TRACE(fixed);
+    for (const unsigned threads : {1u, 3u}) {
+      World<S> w(threads);
+      populate(w, static_cast<std::size_t>(moving), static_cast<std::size_t>(fixed), spread, 7);
+      const std::size_t states = 400;
+      std::size_t hits = 0;
+      checkVerdicts(w, walk<S>(states, w.moving.size(), spread, step, threads), states, hits);
+      EXPECT_GT(hits, states / 50);
+      EXPECT_LT(hits, states - states / 50);
+    }
+  }
+}
+
+TYPED_TEST(SceneTest, OctreesPlanesAndMapsWithoutCells) {
+  using S = TypeParam;
+  World<S> w;
+  std::mt19937_64 g(5);
+  w.fix(test::cloud<S>(3, 60), test::pose<S>(Eigen::Matrix3d::Identity(), {0.5, 0, 0}));
+  w.fix(test::cloud<S>(std::make_shared<octomap::OcTree>(0.1)), fcl::Transform3<S>::Identity());
+  w.fix(std::make_shared<fcl::Halfspace<S>>(fcl::Vector3<S>::UnitZ(), S(-1.5)), randomPose<S>(g, 0.1));
+  w.fix(std::make_shared<fcl::Plane<S>>(fcl::Vector3<S>::UnitX(), S(2)), fcl::Transform3<S>::Identity());
+  w.fix(geometry<S>(0, g), randomPose<S>(g, 1));
+  w.move(geometry<S>(0, g));
+  w.move(geometry<S>(7, g));
+  const std::size_t states = 400;
+  std::size_t hits = 0;
+  checkVerdicts(w, walk<S>(states, 2, 3, 0.05, 9), states, hits);
+  EXPECT_GT(hits, states / 10);
+  EXPECT_LT(hits, states - states / 10);
+}
+
+// Contacts are found where they begin, and far from the origin of the world.
+TYPED_TEST(SceneTest, VerdictsOnTheBrinkOfContact) {
+  using S = TypeParam;
+  const double digits = std::is_same<S, double>::value ? 1e-15 : 1e-6;
+  for (const double far : {0.0, 30.0, 4000.0}) {
+    for (const std::size_t kind : {0, 3, 6, 7, 8}) {
+      World<S> w;
+      std::mt19937_64 g(11);
+      const Eigen::Vector3d away = far * test::randomDirection(g);
+      w.fix(geometry<S>(kind, g), test::pose<S>(test::randomRotation(g), away));
+      w.move(geometry<S>(1, g));
+      States<S> X;
+      for (int turn = 0; turn < 8; ++turn) {
+        const Eigen::Vector3d direction = test::randomDirection(g);
+        const Eigen::Matrix3d R = test::randomRotation(g);
+        const auto at = [&](double d) { return test::pose<S>(R, away + d * direction); };
+        const double contact = test::contactDistance(
+            [&](double d) {
+              const auto pose = at(d);
+              return !w.hits(&pose).empty();
+            },
+            4, 60);
+        for (int k = -20; k <= 20; ++k) X.push_back(at(contact + k * (1 + far) * digits));
+      }
+      std::size_t hits = 0;
+      checkVerdicts(w, X, X.size(), hits);
+      EXPECT_GT(hits, X.size() / 20);
+      EXPECT_LT(hits, X.size() - X.size() / 20);
+    }
+  }
+}
+
+TYPED_TEST(SceneTest, AnswersDoNotDependOnThreadsOrHistory) {
+  using S = TypeParam;
+  const std::size_t states = 3000;
+  const States<S> X = walk<S>(states, 4, 3, 0.03, 21);
+  std::vector<std::uint8_t> expected;
+  std::size_t where_expected = 0, first_expected = 0;
+  for (const unsigned threads : {1u, 2u, 3u, 4u, 0u}) {
+    World<S> w(threads);
+    populate(w, 4, 30, 3, 8);
+    for (int again = 0; again < 2; ++again) {
+      std::vector<std::uint8_t> hit(states);
+      w.scene.collisions(X.data(), states, hit.data());
+      std::size_t where = states;
+      EXPECT_TRUE(w.scene.anyCollision(X.data(), states, &where));
+      const std::size_t first = w.scene.firstCollision(X.data(), states);
+      if (expected.empty()) {
+        expected = hit;
+        where_expected = where;
+        first_expected = first;
+      }
+      EXPECT_EQ(hit, expected);
+      EXPECT_EQ(where, where_expected);
+      EXPECT_EQ(first, first_expected);
+    }
+    // The same states one by one, in another order.
+    std::mt19937_64 g(3);
+    for (int k = 0; k < 300; ++k) {
+      const std::size_t state = g() % states;
+      EXPECT_EQ(w.scene.collides(X.data() + 4 * state), expected[state] != 0);
+    }
+  }
+}
+
+TYPED_TEST(SceneTest, Changes) {
+  using S = TypeParam;
+  World<S> w;
+  populate(w, 4, 12, 2, 5);
+  std::mt19937_64 g(17);
+  std::size_t hits = 0;
+  const std::size_t all_pairs = 4 * 12 + 6 - w.ignored.size() / 2;
+  EXPECT_EQ(w.scene.pairCount(), all_pairs);
+  const auto check = [&](unsigned seed) {
+    const std::size_t states = 60;
+    EXPECT_EQ(w.scene.movingCount(), w.moving.size());
+    EXPECT_EQ(w.scene.fixedCount(), w.fixed.size());
+    for (std::size_t i = 0; i < w.moving.size(); ++i) EXPECT_EQ(w.scene.movingIndex(w.moving[i].id), i);
+    checkVerdicts(w, walk<S>(states, w.moving.size(), 2, 0.05, seed), states, hits);
+  };
+  check(1);
+  w.fixed[3].X_WG = randomPose<S>(g, 2);
+  w.scene.setPose(w.fixed[3].id, w.fixed[3].X_WG);
+  check(2);
+  w.scene.remove(w.moving[1].id);
+  w.moving.erase(w.moving.begin() + 1);
+  check(3);
+  w.scene.remove(w.fixed[0].id);
+  w.fixed.erase(w.fixed.begin());
+  w.move(geometry<S>(8, g));
+  check(4);
+  w.ignore(w.moving[0].id, w.fixed[5].id);
+  check(5);
+  w.scene.ignore(w.fixed[5].id, w.moving[0].id, false);
+  w.ignored.erase({w.moving[0].id, w.fixed[5].id});
+  check(6);
+  while (!w.fixed.empty()) {
+    w.scene.remove(w.fixed.back().id);
+    w.fixed.pop_back();
+  }
+  check(7);
+  EXPECT_GT(hits, 20u);
+}
+
+TYPED_TEST(SceneTest, DeformedMesh) {
+  using S = TypeParam;
+  World<S> w;
+  Raw raw = test::torus(10);
+  auto model = std::make_shared<Model<S>>(raw.mesh());
+  const Id id = w.fix(model, fcl::Transform3<S>::Identity());
+  w.move(std::make_shared<fcl::Sphere<S>>(S(0.2)));
+  const auto at = test::pose<S>(Eigen::Matrix3d::Identity(), {5, 0, 0});
+  EXPECT_FALSE(w.scene.collides(&at));
+  raw.move({4, 0, 0});
+  model->updateVertices(raw.vertices);
+  w.scene.update(id);
+  EXPECT_TRUE(w.scene.collides(&at));
+}
+
+TYPED_TEST(SceneTest, ScenesWithoutPairs) {
+  using S = TypeParam;
+  std::mt19937_64 g(1);
+  Scene<S> scene;
+  std::uint8_t hit[3] = {7, 7, 7};
+  std::size_t where = 9;
+  const auto isFree = [&](const fcl::Transform3<S>* X) {
+    EXPECT_FALSE(scene.collides(X));
+    EXPECT_EQ(scene.firstCollision(X, 3), 3u);
+    EXPECT_FALSE(scene.anyCollision(X, 3, &where));
+    EXPECT_EQ(where, 9u);
+    scene.collisions(X, 3, hit);
+    EXPECT_EQ(hit[0] + hit[1] + hit[2], 0);
+    Pair nearest;
+    EXPECT_EQ(scene.clearance(X, &nearest), std::numeric_limits<S>::max());
+    EXPECT_FALSE(nearest.a.isValid() || nearest.b.isValid());
+    EXPECT_TRUE(scene.edgeIsFree(X, X));
+    EXPECT_EQ(scene.pairCount(), 0u);
+  };
+  isFree(nullptr);
+  const Id fixed = scene.addFixed(geometry<S>(0, g), randomPose<S>(g, 1));
+  scene.addFixed(geometry<S>(0, g), randomPose<S>(g, 1));
+  isFree(nullptr);
+  scene.remove(fixed);
+  EXPECT_EQ(scene.fixedCount(), 1u);
+  Scene<S> alone;
+  alone.addMoving(geometry<S>(0, g));
+  const States<S> X(3, randomPose<S>(g, 1));
+  EXPECT_FALSE(alone.collides(X.data()));
+  EXPECT_EQ(alone.clearance(X.data()), std::numeric_limits<S>::max());
+  EXPECT_EQ(alone.firstCollision(X.data(), 0), 0u);
+}
+
+TYPED_TEST(SceneTest, ClearanceIsTheLeastDistance) {
+  using S = TypeParam;
+  World<S> w;
+  std::mt19937_64 g(2);
+  for (std::size_t i = 0; i < 25; ++i) w.fix(geometry<S>(i % 3 == 2 ? 6 : 0, g), randomPose<S>(g, 3));
+  for (const std::size_t kind : {0, 1, 8}) w.move(geometry<S>(kind, g));
+  w.ignore(w.moving[0].id, w.fixed[4].id);
+  const double tolerance = std::is_same<S, double>::value ? 1e-5 : 1e-4;  // of FCL's pairs
+  int near = 0, apart = 0;
+  for (int k = 0; k < 60; ++k) {
+    States<S> X;
+    for (std::size_t i = 0; i < 3; ++i) X.push_back(randomPose<S>(g, k % 2 == 0 ? 3 : 6));
+    Pair nearest;
+    const S expected = w.clearance(X.data());
+    ASSERT_NEAR(w.scene.clearance(X.data(), &nearest), expected, tolerance);
+    (expected > 0 ? apart : near) += 1;
+    w.pairs(X.data(), [&](const auto& a, const auto& X_WA, const auto& b, const auto& X_WB) {
+      if (a.id != nearest.a || b.id != nearest.b) return;
+      fcl::DistanceResult<S> result;
+      const S d = fcl::distance(a.geometry.get(), X_WA, b.geometry.get(), X_WB, fcl::DistanceRequest<S>(), result);
+      EXPECT_NEAR(std::max(d, S(0)), expected, tolerance);
+    });
+  }
+  EXPECT_GT(near, 5);
+  EXPECT_GT(apart, 5);
+}
+
+// No sample between touches where an edge is free; where it is not, something comes very close.
+TYPED_TEST(SceneTest, EdgesNeverStepOverAContact) {
+  using S = TypeParam;
+  int free = 0, blocked = 0;
+  for (const unsigned seed : {1u, 2u}) {
+    World<S> w;
+    std::mt19937_64 g(seed);
+    for (std::size_t i = 0; i < 8; ++i) w.fix(geometry<S>(i % 2 == 0 ? 0 : 6 + i % 3, g), randomPose<S>(g, 2.5));
+    w.move(geometry<S>(0, g));
+    w.move(geometry<S>(8, g));
+    for (int k = 0; k < 30; ++k) {
+      States<S> begin, end;
+      for (std::size_t i = 0; i < 2; ++i) begin.push_back(randomPose<S>(g, 3)), end.push_back(randomPose<S>(g, 3));
+      const int samples = 200;
+      bool touches = false;
+      double nearest = 1;
+      for (int s = 0; s <= samples; ++s) {
+        States<S> X;
+        const double t = static_cast<double>(s) / samples;
+        for (std::size_t i = 0; i < 2; ++i) {
+          const Eigen::Matrix3d R0 = begin[i].linear().template cast<double>(),
+                                R1 = end[i].linear().template cast<double>();
+          const Eigen::Quaterniond q = Eigen::Quaterniond(R0).slerp(t, Eigen::Quaterniond(R1));
+          X.push_back(test::pose<S>(q.toRotationMatrix(), (1 - t) * begin[i].translation().template cast<double>() +
+                                                              t * end[i].translation().template cast<double>()));
+        }
+        if (w.scene.collides(X.data())) {
+          touches = true;
+          break;
+        }
+        nearest = std::min(nearest, static_cast<double>(w.scene.clearance(X.data())));
+      }
+      const bool is_free = w.scene.edgeIsFree(begin.data(), end.data());
+      EXPECT_FALSE(is_free && touches) << k;
+      // Between two samples, objects come no nearer than this.
+      if (!is_free && !touches) {
+        EXPECT_LT(nearest, 0.1);
+      }
+      (is_free ? free : blocked) += 1;
+    }
+  }
+  EXPECT_GT(free, 5);
+  EXPECT_GT(blocked, 5);
+}
+
+// A thin wall that samples would step over.
+TYPED_TEST(SceneTest, EdgesThroughAThinWall) {
+  using S = TypeParam;
+  for (const bool is_model : {true, false}) {
+    World<S> w;
+    const Raw wall = test::box({-1, -1, -1e-4}, {1, 1, 1e-4});
+    if (is_model) {
+      w.fix(std::make_shared<Model<S>>(wall.mesh()), fcl::Transform3<S>::Identity());
+    } else {
+      w.fix(std::make_shared<fcl::Box<S>>(S(2), S(2), S(2e-4)), fcl::Transform3<S>::Identity());
+    }
+    w.move(std::make_shared<fcl::Sphere<S>>(S(0.001)));
+    const auto at = [](double x, double z) { return test::pose<S>(Eigen::Matrix3d::Identity(), {x, 0, z}); };
+    const auto above = at(0.3, 3), below = at(0.3, -4), beside = at(1.2, 3), under = at(1.2, -4);
+    EXPECT_FALSE(w.scene.edgeIsFree(&above, &below));
+    EXPECT_TRUE(w.scene.edgeIsFree(&beside, &under));
+    EXPECT_TRUE(w.scene.edgeIsFree(&above, &above));
+    EXPECT_FALSE(w.scene.edgeIsFree(&above, &below, fcl::CCDM_TRANS));
+  }
+}
+
+template <typename F>
+std::string complaintOf(F&& f) {
+  try {
+    f();
+  } catch (const std::invalid_argument& e) {
+    return e.what();
+  }
+  return "nothing thrown";
+}
+
+TYPED_TEST(SceneTest, MisuseThrows) {
+  using S = TypeParam;
+  std::mt19937_64 g(1);
+  Scene<S> scene, other;
+  const auto good = fcl::Transform3<S>::Identity();
+  const Id fixed = scene.addFixed(geometry<S>(0, g), good), moving = scene.addMoving(geometry<S>(0, g));
+  const Id gone = scene.addMoving(geometry<S>(0, g)), foreign = other.addFixed(geometry<S>(0, g), good);
+  scene.remove(gone);
+  EXPECT_NE(scene.addMoving(geometry<S>(0, g)), gone);
+  for (const Id bad : {Id(), gone, foreign}) {
+    EXPECT_THROW(scene.remove(bad), std::invalid_argument);
+    EXPECT_THROW(scene.setPose(bad, good), std::invalid_argument);
+    EXPECT_THROW(scene.ignore(fixed, bad), std::invalid_argument);
+    EXPECT_THROW(scene.ignore(bad, fixed), std::invalid_argument);
+    EXPECT_THROW(scene.update(bad), std::invalid_argument);
+    EXPECT_THROW(scene.movingIndex(bad), std::invalid_argument);
+  }
+  EXPECT_THROW(scene.setPose(moving, good), std::invalid_argument);
+  EXPECT_THROW(scene.movingIndex(fixed), std::invalid_argument);
+  EXPECT_THROW(scene.ignore(fixed, fixed), std::invalid_argument);
+  EXPECT_THROW(scene.addFixed(nullptr, good), std::invalid_argument);
+  EXPECT_THROW(scene.addMoving(nullptr), std::invalid_argument);
+  EXPECT_THROW(scene.collides(nullptr), std::invalid_argument);
+  EXPECT_THROW(scene.collisions(nullptr, 1, nullptr), std::invalid_argument);
+
+  const S nan = std::numeric_limits<S>::quiet_NaN(), inf = std::numeric_limits<S>::infinity();
+  std::vector<fcl::Transform3<S>> bad(6, good);
+  bad[0].translation()[1] = nan;
+  bad[1].translation()[2] = -inf;
+  bad[2].linear()(1, 2) = nan;
+  bad[3].linear() *= S(1.01);
+  bad[4].linear().col(0) *= S(-1);
+  bad[5].linear().setZero();
+  for (const fcl::Transform3<S>& X : bad) {
+    EXPECT_THROW(scene.addFixed(geometry<S>(0, g), X), std::invalid_argument);
+    EXPECT_THROW(scene.setPose(fixed, X), std::invalid_argument);
+    for (std::size_t at = 0; at < 6; ++at) {
+      States<S> states(6, test::pose<S>(Eigen::Matrix3d::Identity(), {9, 9, 9}));
+      states[at] = X;
+      std::uint8_t hit[3];
+      const std::string name = "object " + std::to_string(at % 2) + " in state " + std::to_string(at / 2);
+      for (const std::string& said : {complaintOf([&] { scene.firstCollision(states.data(), 3); }),
+                                      complaintOf([&] { scene.anyCollision(states.data(), 3); }),
+                                      complaintOf([&] { scene.collisions(states.data(), 3, hit); })}) {
+        EXPECT_NE(said.find(name), std::string::npos) << said;
+      }
+      if (at >= 2) continue;
+      EXPECT_THROW(scene.collides(states.data()), std::invalid_argument);
+      EXPECT_THROW(scene.clearance(states.data()), std::invalid_argument);
+      EXPECT_THROW(scene.edgeIsFree(states.data(), states.data() + 2), std::invalid_argument);
+      EXPECT_THROW(scene.edgeIsFree(states.data() + 2, states.data()), std::invalid_argument);
+    }
+  }
+  EXPECT_EQ(scene.fixedCount(), 1u);
+}
+
+// What the tests run under ThreadSanitizer looks at: queries from several threads beside changes.
+TEST(SceneThreads, ChangesBesideQueries) {
+  std::mt19937_64 g(4);
+  SceneOptions options;
+  options.threads = 2;
+  Scened scene(options);
+  std::vector<Id> fixed;
+  for (int i = 0; i < 12; ++i) fixed.push_back(scene.addFixed(geometry<double>(0, g), randomPose<double>(g, 3)));
+  scene.addMoving(geometry<double>(0, g));
+  scene.addMoving(geometry<double>(1, g));
+  // This one touches in all states.
+  const auto wall = std::make_shared<fcl::Box<double>>(100, 100, 100);
+  const States<double> X = walk<double>(300, 2, 3, 0.02, 6);
+  scene.addFixed(wall, fcl::Transform3d::Identity());
+  std::atomic<bool> stop{false};
+  std::atomic<int> asked{0};
+  std::vector<std::thread> threads;
+  for (int t = 0; t < 3; ++t) {
+    threads.emplace_back([&, t] {
+      std::vector<std::uint8_t> hit(300);
+      for (int k = t; !stop || k < t + 3; ++k) {
+        scene.collisions(X.data(), 300, hit.data());
+        EXPECT_EQ(std::count(hit.begin(), hit.end(), 1), 300);
+        EXPECT_TRUE(scene.collides(X.data() + 2 * (k % 300)));
+        EXPECT_EQ(scene.firstCollision(X.data(), 300), 0u);
+        ++asked;
+      }
+    });
+  }
+  while (asked < 3) std::this_thread::yield();
+  for (int k = 0; k < 40; ++k) {
+    scene.setPose(fixed[static_cast<std::size_t>(k) % fixed.size()], randomPose<double>(g, 3));
+    const Id id = scene.addFixed(geometry<double>(2, g), randomPose<double>(g, 3));
+    if (k % 2 == 0) scene.remove(id);
+  }
+  stop = true;
+  for (std::thread& t : threads) t.join();
+  EXPECT_EQ(scene.fixedCount(), 12u + 1 + 20);
+}
+
+}  // namespace
+}  // namespace bocst
