@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #pragma once
 
+#include <bocst/dispatch_check.h>
 #include <bocst/fcl.h>
 #include <bocst/mesh.h>
 #include <bocst/model.h>

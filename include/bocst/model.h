@@ -32,6 +32,11 @@ class Tree;
 /// updateVertices() may run beside queries too; a query sees the mesh from before or after, never a mixture. What
 /// CollisionGeometry itself leaves unguarded (cost_density, aabb_local, ...) stays unguarded.
 ///
+/// After fork() a child may use the models that it makes itself, and those of the parent that no other thread was using
+/// at the fork (with a GPU, on the CPU). Of a model that another thread was using, what needs to wait for that thread
+/// or would change what it may have left half done throws std::runtime_error: a query while the tree was being grown or
+/// pruned, and prune(), expandAll(), updateVertices(). Nothing waits for a thread that is not there.
+///
 /// The mesh is a surface, as FCL's BVHModel is: what is wholly inside it does not touch it (but see Options::solid).
 template <typename S>
 class BOCST_EXPORT Model : public fcl::CollisionGeometry<S> {
@@ -81,6 +86,14 @@ class BOCST_EXPORT Model : public fcl::CollisionGeometry<S> {
   /// @throws std::invalid_argument for a wrong count, a bad vertex, or what is not watertight if solid,
   /// std::logic_error after releaseMesh(); the model is then as before.
   void updateVertices(std::vector<Eigen::Vector3d> vertices);
+
+  /// What the surface encloses, by the sums over its triangles that fcl::BVHModel makes: the volume (negative where the
+  /// surface is turned inside out), its centre of mass, and the moments of inertia about the mesh's origin for the
+  /// density 1. For a surface that is not closed, the numbers of FCL, which depend on where the origin is.
+  /// @throws std::logic_error after releaseMesh().
+  S computeVolume() const override;
+  fcl::Vector3<S> computeCOM() const override;              ///< See computeVolume(); NaN without a volume.
+  fcl::Matrix3<S> computeMomentofInertia() const override;  ///< See computeVolume().
 
   // What FCL asks of a geometry.
   void computeLocalAABB() override;                 ///< Constant time: the mesh's bounds and the root sphere.

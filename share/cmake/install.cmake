@@ -36,10 +36,11 @@ install(FILES ${PROJECT_BINARY_DIR}/ament_marker RENAME bocst COMPONENT dev
 # The .pc files speak of their own place, so that the prefix can be chosen at install time, too.
 file(RELATIVE_PATH pc_to_include ${CMAKE_INSTALL_FULL_LIBDIR}/pkgconfig ${CMAKE_INSTALL_FULL_INCLUDEDIR})
 if(BUILD_SHARED_LIBS)
-  set(pc_bocst_static "")
+  # One word, so that no tool puts its parts in another order.
+  set(pc_bocst_libs "-lbocst -Wl,--push-state,--no-as-needed,-lbocst,--pop-state")
   set(pc_io_static "")
 else()
-  set(pc_bocst_static " -lhwy -lepoxy -ldl")
+  set(pc_bocst_libs "-lbocst -lhwy -lepoxy -ldl")
   set(pc_io_static " -lassimp -lpugixml")
 endif()
 foreach(name bocst bocst-io)

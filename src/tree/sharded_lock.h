@@ -7,6 +7,8 @@
 #include <cstddef>
 #include <mutex>
 
+#include "tree/fork.h"
+
 namespace bocst::tree {
 
 /// Readers pass together; a writer gets in between them, and is not starved by readers that keep coming.
@@ -14,6 +16,9 @@ namespace bocst::tree {
 ///
 /// Readers count themselves on cache lines of their own, so that threads that only read do not slow each other down.
 /// Either a reader sees that somebody writes, or the writer sees the reader: that takes sequential consistency.
+///
+/// In a child after fork() the threads that stayed in the parent are not waited for: what cannot be had without them
+/// throws std::runtime_error.
 class ShardedLock {
  public:
   /// Where this thread counts itself; to be told to who takes several query locks.
@@ -26,6 +31,7 @@ class ShardedLock {
   void lock_shared() { lock_shared(shard()); }
   void unlock_shared() { unlock_shared(shard()); }
   void lock_shared(std::size_t shard) {
+    if (isForked() && !adopt()) throwForked();
     std::atomic<int>& readers = shards_[shard].readers;
     readers.fetch_add(1);
     while (writing_.load()) {
@@ -37,12 +43,14 @@ class ShardedLock {
   void unlock_shared(std::size_t shard) { leave(shards_[shard].readers); }
 
   void lock() {
+    if ((isForked() && !adopt()) || readers_stayed_) throwForked();
     turnstile_.lock();
     writing_.store(true);
     std::unique_lock<std::mutex> lock(leaving_);
     left_.wait(lock, [this] { return isEmpty(); });
   }
   bool try_lock() {
+    if ((isForked() && !adopt()) || readers_stayed_) return false;
     if (!isEmpty() || !turnstile_.try_lock()) return false;
     writing_.store(true);
     if (isEmpty()) return true;
@@ -68,6 +76,23 @@ class ShardedLock {
     left_.notify_all();
   }
 
+  bool isForked() const { return forks_.load() != forks.load(std::memory_order_relaxed); }
+
+  // False when a thread that stayed in the parent was writing, or about to. Readers that stayed there do not count any
+  // more; but what they may have left half grown is never to be changed.
+  bool adopt() {
+    const std::lock_guard<std::mutex> lock(forkMutex());
+    if (!isForked()) return true;
+    if (writing_ || !turnstile_.try_lock()) return false;
+    turnstile_.unlock();
+    if (!leaving_.try_lock()) return false;
+    leaving_.unlock();
+    readers_stayed_ = readers_stayed_ || !isEmpty();
+    for (Shard& shard : shards_) shard.readers = 0;
+    forks_ = forks.load();
+    return true;
+  }
+
   bool isEmpty() const {
     for (const Shard& shard : shards_) {
       if (shard.readers.load() != 0) return false;
@@ -77,8 +102,10 @@ class ShardedLock {
 
   std::array<Shard, kShards> shards_;
   std::atomic<bool> writing_{false};
-  std::mutex turnstile_;  // held while somebody writes
-  std::mutex leaving_;    // between the last reader that leaves and a writer that waits
+  std::atomic<unsigned> forks_{forks.load()};
+  std::atomic<bool> readers_stayed_{false};  // in the parent, at a fork
+  std::mutex turnstile_;                     // held while somebody writes
+  std::mutex leaving_;                       // between the last reader that leaves and a writer that waits
   std::condition_variable left_;
 };
 

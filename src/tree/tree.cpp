@@ -24,6 +24,14 @@ constexpr std::size_t kHostTriangles = 512;
 
 Options checked(const Options& o) {
   const auto bad = [](const std::string& what) { throw std::invalid_argument("bocst::Options: " + what); };
+  const auto badEnum = [&](const char* name, int value) {
+    bad(std::string(name) + " is " + std::to_string(value) + ", which is none of its values");
+  };
+  if (o.subdivision != Subdivision::kOctree && o.subdivision != Subdivision::kBono) {
+    badEnum("subdivision", static_cast<int>(o.subdivision));
+  }
+  if (o.answer != Answer::kExact && o.answer != Answer::kConservative) badEnum("answer", static_cast<int>(o.answer));
+  if (o.oracle < OracleKind::kAuto || o.oracle > OracleKind::kSampled) badEnum("oracle", static_cast<int>(o.oracle));
   if (o.depth < 1 || o.depth > lattice::kMaxLevel) {
     bad("depth is " + std::to_string(o.depth) + ", not 1 to " + std::to_string(lattice::kMaxLevel));
   }
@@ -126,7 +134,7 @@ std::int64_t Tree::now() const { return options_.clock ? nanoseconds(options_.cl
 
 const std::vector<Eigen::Vector3d>& Tree::componentPoints() const {
   if (const auto* known = component_points_known_.load(std::memory_order_acquire)) return *known;
-  const std::lock_guard<std::mutex> lock(component_mutex_);
+  const std::lock_guard<ForkAwareMutex> lock(component_mutex_);
   if (component_points_ == nullptr) {
     component_points_ = std::make_unique<const std::vector<Eigen::Vector3d>>(
         pointOfEachComponent(surface_.mesh->vertices(), surface_.mesh->triangles()));
@@ -169,10 +177,10 @@ void Tree::grow(std::vector<Growth>& batch, bool wait) {
     if (g.tree != trees[0]) trees[1] = g.tree;
   }
   if (trees[1] != nullptr && std::less<Tree*>()(trees[1], trees[0])) std::swap(trees[0], trees[1]);
-  std::array<std::unique_lock<std::mutex>, 2> locks;
+  std::array<std::unique_lock<ForkAwareMutex>, 2> locks;
   for (int i = 0; i < 2; ++i) {
     if (trees[i] == nullptr) continue;
-    locks[i] = std::unique_lock<std::mutex>(trees[i]->growth_, std::defer_lock);
+    locks[i] = std::unique_lock<ForkAwareMutex>(trees[i]->growth_, std::defer_lock);
     if (wait) {
       locks[i].lock();
     } else if (!locks[i].try_lock()) {
@@ -423,7 +431,7 @@ ChildRef Tree::addList(const std::uint32_t* ids, std::size_t count, bool leaf) {
 
 void Tree::packLeaves(const std::vector<NodeRef>& leaves) {
   if (leaves.empty() || !hasBudget()) return;
-  const std::unique_lock<std::mutex> lock(growth_, std::try_to_lock);
+  const std::unique_lock<ForkAwareMutex> lock(growth_, std::try_to_lock);
   if (!lock.owns_lock() || lists_.isHalfFull()) return;
   std::size_t left = 16 + leaves.size() / 4;
   for (const NodeRef leaf : leaves) {

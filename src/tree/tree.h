@@ -13,7 +13,6 @@
 #include <cstdint>
 #include <functional>
 #include <memory>
-#include <mutex>
 #include <vector>
 
 #include "mesh/solid.h"
@@ -167,11 +166,11 @@ class Tree {
   const std::shared_ptr<oracle::Oracle> oracle_;
   const int deepest_;
   mutable ShardedLock query_lock_;
-  std::mutex growth_;  // guards what grow() appends to
+  ForkAwareMutex growth_;  // guards what grow() appends to
 
   oracle::Surface surface_;
   std::shared_ptr<const Solid> solid_;
-  mutable std::mutex component_mutex_;  // guards pieces_ while they are found
+  mutable ForkAwareMutex component_mutex_;  // guards pieces_ while they are found
   mutable std::unique_ptr<const std::vector<Eigen::Vector3d>> component_points_;
   mutable std::atomic<const std::vector<Eigen::Vector3d>*> component_points_known_{nullptr};  // pieces_, for readers
   oracle::CellBounds root_bounds_;

@@ -101,6 +101,8 @@ done
 # The remedies that the complaint names.
 check preload-O2-without-after answers env LD_PRELOAD="$shared_lib" "$work/shared-O2-without-after"
 check check-off-O2-with-after answers env BOCST_DISPATCH_CHECK=off "$work/shared-O2-with-after"
+check code-off-O2-with-after answers env CHECK_OFF=1 "$work/shared-O2-with-after"
 # And what the check is for: without it, FCL's own table says "free".
 check check-off-O2-without-after misses env BOCST_DISPATCH_CHECK=off "$work/shared-O2-without-after"
+check code-off-O2-without-after misses env CHECK_OFF=1 "$work/shared-O2-without-after"
 exit $failed

@@ -1,14 +1,15 @@
 // SPDX-License-Identifier: BSD-3-Clause
 //
 // A planner in small: it makes two models and asks FCL about them, with <bocst/fcl.h> (-DWITH_HEADER) or without.
-// Exits with 0 when every answer was right, 1 when one was wrong, 3 with the complaint when bocst refused.
+// Exits with 0 when every answer was right, 1 when one was wrong, 3 with the complaint when bocst refused. As a plugin
+// it has planner() for main(). With CHECK_OFF in the environment it turns the check off from code.
 
 #ifdef WITH_HEADER
 #include <bocst/bocst.h>
 #else
 #include <bocst/model.h>
 #endif
-
+#include <bocst/dispatch_check.h>
 #include <fcl/broadphase/broadphase_dynamic_AABB_tree.h>
 #include <fcl/broadphase/default_broadphase_callbacks.h>
 #include <fcl/geometry/bvh/BVH_model.h>
@@ -20,6 +21,7 @@
 #include <fcl/narrowphase/distance.h>
 
 #include <cstdio>
+#include <cstdlib>
 #include <functional>
 #include <memory>
 #include <stdexcept>
@@ -222,8 +224,9 @@ void run() {
 
 }  // namespace
 
-int main() {
+extern "C" __attribute__((visibility("default"))) int planner() {
   try {
+    if (std::getenv("CHECK_OFF") != nullptr) bocst::setDispatchCheck(false);
     run();
   } catch (const std::exception& e) {
     std::printf("complaint: %s\n", e.what());
@@ -231,3 +234,5 @@ int main() {
   }
   return failures == 0 ? 0 : 1;
 }
+
+int main() { return planner(); }

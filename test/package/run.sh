@@ -13,6 +13,8 @@ cached() { sed -n "s/^$1:[A-Z]*=//p" "$build/CMakeCache.txt"; }
 compiler=$(cached CMAKE_CXX_COMPILER)
 sanitize=$(cached BOCST_SANITIZE)
 export CXXFLAGS="${sanitize:+-fsanitize=$sanitize}"
+# As distributions link: what seems to be unused is dropped.
+export LDFLAGS="-Wl,--as-needed"
 
 work=$(mktemp -d)
 trap 'rm -rf "$work"' EXIT
@@ -37,14 +39,17 @@ echo "-- find_package"
 build_project "$source"
 (cd "$work" && package/consumer)
 check_order "$work/package/consumer"
+check_order "$work/package/host"
 
 echo "-- pkg-config"
 libdir=$(dirname "$(find "$prefix" -name pkgconfig -type d)")
 export PKG_CONFIG_PATH=$libdir/pkgconfig
 read -ra flags <<<"$CXXFLAGS $(pkg-config --cflags --libs bocst-io bocst)"
-"$compiler" -std=c++17 -O1 "$source/main.cpp" "${flags[@]}" -Wl,-rpath,"$libdir" -o "$work/consumer"
+"$compiler" -std=c++17 -O1 $LDFLAGS "$source/main.cpp" "${flags[@]}" -Wl,-rpath,"$libdir" -o "$work/consumer"
 (cd "$work" && ./consumer)
 check_order "$work/consumer"
+"$compiler" -std=c++17 $LDFLAGS "$source/host.cpp" "${flags[@]}" -o "$work/host"
+check_order "$work/host"
 
 echo "-- the example planner"
 share=$source/../../share

@@ -137,6 +137,17 @@ TEST_F(Program, PlacesBWhereThePoseSays) {
   }
 }
 
+TEST_F(Program, SaysThatAQuaternionIsNormalised) {
+  const std::string pair = "collide " + cube() + " " + cube() + " --pose ";
+  for (const char* pose : {"0,0,0,1.002,0,0,0", "0,0,0,0,0,0,-7"}) {
+    const Result result = run(pair + pose);
+    EXPECT_EQ(result.code, 0);
+    EXPECT_NE(result.err.find("--pose"), std::string::npos) << pose << result.err;
+    EXPECT_NE(result.err.find("norm"), std::string::npos) << pose << result.err;
+  }
+  EXPECT_EQ(run(pair + "0,0,0,1.0005,0,0,0").err, "");
+}
+
 TEST_F(Program, AnswersConservatively) {
   const std::string pair =
       "collide " + cube() + " " + cube() + " --answer conservative --pose 1.05,0,0,1,0,0,0 --depth ";

@@ -3,10 +3,10 @@
 
 #include <fcl/geometry/bvh/BVH_model.h>
 
-#include <limits>
 #include <stdexcept>
 #include <string>
 
+#include "fcl/adapters/rounding.h"
 #include "query/sides/side.h"
 
 namespace bocst::fcl_adapter {
@@ -71,9 +71,9 @@ class BvhSide {
   static constexpr bool kNodesContainSurface = true;
 
   /// @throws std::invalid_argument when the model is no finished triangle mesh.
-  explicit BvhSide(const fcl::BVHModel<BV>& bvh) : bvh_(bvh) {
+  BvhSide(const char* query, const fcl::BVHModel<BV>& bvh) : bvh_(bvh) {
     if (bvh.getModelType() != fcl::BVH_MODEL_TRIANGLES || bvh.num_tris <= 0 || bvh.getNumBVs() <= 0) {
-      throw std::invalid_argument("bocst::collide: the BVHModel is not a finished triangle mesh");
+      throw std::invalid_argument(std::string("bocst::") + query + ": the BVHModel is not a finished triangle mesh");
     }
     const query::OrientedVolume v = volumeOf(bvh.getBV(0).bv);
     magnitude_ = v.center.cwiseAbs().maxCoeff() + v.half.norm();
@@ -93,7 +93,7 @@ class BvhSide {
   query::OrientedVolume volume(Node node) const {
     query::OrientedVolume v = volumeOf(bvh_.getBV(node).bv);
     // FCL rounds its volumes to nearest: widen each by what that may have lost.
-    v.half.array() += magnitude_ * 32 * static_cast<double>(std::numeric_limits<S>::epsilon());
+    v.half.array() += roundingOf<S>(magnitude_);
     return v;
   }
 

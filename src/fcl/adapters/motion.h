@@ -14,7 +14,9 @@
 #include <typeinfo>
 #include <utility>
 
+#include "fcl/adapters/models.h"
 #include "fcl/adapters/pair.h"
+#include "fcl/adapters/validate.h"
 #include "geometry/motion.h"
 
 // FCL's motions, as the walks know them. Nothing here writes to a motion, so threads may share one that nobody else
@@ -85,23 +87,23 @@ std::unique_ptr<query::Motion> readAs(const fcl::MotionBase<S>& motion) {
   return nullptr;
 }
 
-/// @throws std::invalid_argument when it is none of FCL's own, since nobody else says how fast it can get, or has no
-/// finite poses.
+/// @throws std::invalid_argument that names the argument when it is none of FCL's own, since nobody else says how fast
+/// it can get, or has no rigid poses.
 template <typename S>
-std::unique_ptr<query::Motion> motionOf(const fcl::MotionBase<S>* motion) {
-  const auto bad = [](const std::string& what) { throw std::invalid_argument("bocst::continuousCollide: " + what); };
-  if (motion == nullptr) bad("a motion is null");
+std::unique_ptr<query::Motion> motionOf(const char* argument, const fcl::MotionBase<S>* motion) {
+  const auto bad = [argument](const std::string& what) {
+    throw std::invalid_argument(std::string("bocst::continuousCollide: ") + argument + " " + what);
+  };
+  if (motion == nullptr) bad("is null");
   std::unique_ptr<query::Motion> m = readAs<fcl::TranslationMotion<S>>(*motion);
   if (!m) m = readAs<fcl::InterpMotion<S>>(*motion);
   if (!m) m = readAs<fcl::ScrewMotion<S>>(*motion);
   if (!m) m = readAs<fcl::SplineMotion<S>>(*motion);
   if (!m) {
-    bad(std::string("motions are fcl's TranslationMotion, InterpMotion, ScrewMotion and SplineMotion, not ") +
-        typeid(*motion).name());
+    bad("is none of fcl's TranslationMotion, InterpMotion, ScrewMotion and SplineMotion, but " +
+        typeName(typeid(*motion)));
   }
-  for (const double time : {0.0, 1.0}) {
-    if (!m->at(time).matrix().allFinite()) bad("a motion has no finite pose at its begin or end");
-  }
+  for (const double time : {0.0, 1.0}) refuseUnlessRigid("continuousCollide", argument, m->at(time));
   return m;
 }
 
@@ -111,9 +113,6 @@ template <typename S>
 std::unique_ptr<query::Motion> motionOf(const fcl::Transform3<S>& begin, const fcl::Transform3<S>& end,
                                         fcl::CCDMotionType type) {
   const Eigen::Isometry3d X = isometryOf<S>(begin), Y = isometryOf<S>(end);
-  if (!X.matrix().allFinite() || !Y.matrix().allFinite()) {
-    throw std::invalid_argument("bocst::continuousCollide: a pose is not finite");
-  }
   switch (type) {
     case fcl::CCDM_TRANS:
       return std::make_unique<query::AxisMotion>(query::translation(X, Y));

@@ -8,6 +8,7 @@
 
 #include "fcl/adapters/narrow_phase.h"
 #include "fcl/adapters/shapes.h"
+#include "fcl/adapters/validate.h"
 
 // FCL's solvers are slow to compile: one scalar a file.
 
@@ -56,12 +57,14 @@ void withNarrowPhase(const BroughtSolver<S>& brought, const fcl::CollisionReques
     Indep own;
     if (none) own.gjk_tolerance = own.epa_tolerance = request.gjk_tolerance;
     const Indep& solver = given != nullptr ? *given : own;
+    checkTolerance("collide", "solver->gjk_tolerance", static_cast<double>(solver.gjk_tolerance));
     f(NarrowPhaseOf<S, Indep>(solver, static_cast<double>(solver.gjk_tolerance)));
   } else {
     const Libccd* given = none ? nullptr : std::get<const Libccd*>(brought);
     Libccd own;
     if (none) own.collision_tolerance = request.gjk_tolerance;
     const Libccd& solver = given != nullptr ? *given : own;
+    checkTolerance("collide", "solver->collision_tolerance", static_cast<double>(solver.collision_tolerance));
     f(NarrowPhaseOf<S, Libccd>(solver, static_cast<double>(solver.collision_tolerance)));
   }
 }

@@ -7,16 +7,14 @@
 
 #include <algorithm>
 #include <cmath>
-#include <functional>
-#include <limits>
 #include <stdexcept>
 #include <string>
 #include <type_traits>
 
 #include "fcl/adapters/bvh_side.h"
-#include "fcl/plugin/dispatch.h"
+#include "fcl/adapters/models.h"
+#include "fcl/adapters/rounding.h"
 #include "geometry/volume.h"
-#include "tree/tree.h"
 
 // What the queries about a pair of geometries share.
 
@@ -84,7 +82,7 @@ query::SimilarityTransform similarityOf(const RelativePose<S>& X_AB, const Eigen
   }
   p.scale = unit_b / unit_a;
   // What FCL's triangle test, which computes R q + t in S, may take for a contact.
-  p.tolerance = magnitude * 32 * static_cast<double>(std::numeric_limits<S>::epsilon()) * per_unit;
+  p.tolerance = roundingOf<S>(magnitude) * per_unit;
   const auto dot = [&p](int c, int d) {
     return p.rotation(0, c) * p.rotation(0, d) + p.rotation(1, c) * p.rotation(1, d) +
            p.rotation(2, c) * p.rotation(2, d);
@@ -96,67 +94,6 @@ query::SimilarityTransform similarityOf(const RelativePose<S>& X_AB, const Eigen
              larger(larger(std::abs(dot(0, 1)), std::abs(dot(0, 2))), std::abs(dot(1, 2))));
   p.ready();
   return p;
-}
-
-/// Holds the query locks of one or two trees shared, taken in address order.
-class ReadLock {
- public:
-  ReadLock(tree::Tree& a, tree::Tree* b) : a_(&a), b_(b == &a ? nullptr : b), shard_(tree::ShardedLock::shard()) {
-    if (b_ != nullptr && std::less<tree::Tree*>()(b_, a_)) std::swap(a_, b_);
-    a_->queryLock().lock_shared(shard_);
-    if (b_ != nullptr) b_->queryLock().lock_shared(shard_);
-  }
-  ~ReadLock() {
-    if (b_ != nullptr) b_->queryLock().unlock_shared(shard_);
-    a_->queryLock().unlock_shared(shard_);
-  }
-  ReadLock(const ReadLock&) = delete;
-  ReadLock& operator=(const ReadLock&) = delete;
-
- private:
-  tree::Tree *a_, *b_;
-  std::size_t shard_;
-};
-
-/// Calls f(a, b, b_in_a, magnitude) with two trees as the sides of a walk, while nobody takes nodes away.
-template <typename S, typename F>
-void betweenTrees(const fcl::Transform3<S>& X_WA, tree::Tree& tree_a, const fcl::Transform3<S>& X_WB,
-                  tree::Tree& tree_b, F&& f) {
-  std::int64_t now;
-  {
-    const ReadLock lock(tree_a, &tree_b);
-    now = tree_a.now();
-    // The system's clock need not be read twice.
-    const bool has_clock = tree_a.options().clock || tree_b.options().clock;
-    const query::TreeSide a(tree_a, now), b(tree_b, has_clock ? tree_b.now() : now);
-    const oracle::Surface &sa = tree_a.surface(), &sb = tree_b.surface();
-    const RelativePose<S> X_AB(X_WA, X_WB);
-    const double magnitude = X_AB.magnitude(magnitudeOf(sa.bounds), magnitudeOf(sb.bounds));
-    f(a, b,
-      similarityOf(X_AB, sa.lattice.origin(), sa.lattice.unit(), sb.lattice.origin(), sb.lattice.unit(), magnitude),
-      magnitude);
-  }
-  tree_a.afterQuery(now);
-  if (&tree_b != &tree_a) tree_b.afterQuery(now);
-}
-
-/// The same with a tree as side A and an FCL mesh as side B.
-template <typename BV, typename F>
-void betweenTreeAndBvh(const fcl::Transform3<typename BV::S>& X_WA, tree::Tree& tree,
-                       const fcl::Transform3<typename BV::S>& X_WB, const fcl::BVHModel<BV>& bvh, F&& f) {
-  std::int64_t now;
-  {
-    const ReadLock lock(tree, nullptr);
-    const query::TreeSide a(tree);
-    const BvhSide<BV> b(bvh);
-    now = a.now();
-    const oracle::Surface& s = tree.surface();
-    const RelativePose<typename BV::S> X_AB(X_WA, X_WB);
-    const double magnitude = X_AB.magnitude(magnitudeOf(s.bounds), b.magnitude());
-    const Eigen::Vector3d origin = Eigen::Vector3d::Zero();
-    f(a, b, similarityOf(X_AB, s.lattice.origin(), s.lattice.unit(), origin, 1.0, magnitude), magnitude);
-  }
-  tree.afterQuery(now);
 }
 
 /// Calls f with the partner of a model as the BVHModel that it is.

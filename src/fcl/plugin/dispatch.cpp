@@ -5,16 +5,18 @@
 
 #include "fcl/plugin/dispatch.h"
 
-#include <cxxabi.h>
+#include <bocst/dispatch_check.h>
 #include <dlfcn.h>
 
+#include <atomic>
 #include <cstdlib>
 #include <cstring>
 #include <memory>
 #include <stdexcept>
 #include <string>
 #include <type_traits>
-#include <typeinfo>
+
+#include "fcl/adapters/models.h"
 
 namespace bocst {
 namespace fcl_adapter {
@@ -36,11 +38,14 @@ template <typename S>
 std::string complaint() {
   return std::string("bocst: fcl::collide<") + scalarName(S()) +
          "> in this process does not reach bocst, so code that was compiled without <bocst/fcl.h> would be told that "
-         "nothing collides. Either let libbocst come before libfcl in the link order (CMake: target_link_libraries(app "
-         "bocst::bocst ...) with bocst::bocst before fcl) or LD_PRELOAD=libbocst.so; and where code makes its own "
+         "nothing collides. Either let the executable link libbocst before libfcl and keep it (CMake: "
+         "target_link_libraries(app bocst::bocst ...) with bocst::bocst before fcl; else -Wl,--no-as-needed -lbocst "
+         "-lfcl), also where only a plugin of it uses bocst; or load libbocst first (LD_PRELOAD=libbocst.so; in "
+         "Python, "
+         "before anything that loads libfcl); and where code makes its own "
          "copies of FCL's templates (anything in float, a query with a solver), compile it without "
-         "-fvisibility=hidden; or include <bocst/fcl.h> wherever FCL's queries are called, and set "
-         "BOCST_DISPATCH_CHECK=off";
+         "-fvisibility=hidden; or include <bocst/fcl.h> wherever FCL's queries are called, and turn "
+         "this check off: bocst::setDispatchCheck(false) or BOCST_DISPATCH_CHECK=off";
 }
 
 /// Calls through a volatile pointer, so that it is the dynamic linker that says whose code runs, and not the compiler.
@@ -57,15 +62,19 @@ struct Symbol {
   F* volatile pointer;
 };
 
+std::atomic<bool> check_is_on{true};
+
+bool checkIsOn() {
+  static const bool allowed = [] {
+    const char* check = std::getenv("BOCST_DISPATCH_CHECK");
+    return check == nullptr || std::strcmp(check, "off") != 0;
+  }();
+  return allowed && check_is_on.load(std::memory_order_relaxed);
+}
+
 /// Empty when all is well, else what is wrong.
 template <typename S>
 std::string probe() {
-  registerCollide<S>();
-  registerDistance<S>();
-  if (std::is_same<S, double>::value) registerContinuous();
-  const char* check = std::getenv("BOCST_DISPATCH_CHECK");
-  if (check != nullptr && std::strcmp(check, "off") == 0) return {};
-
   using Geometry = const fcl::CollisionGeometry<S>*;
   using Pose = const fcl::Transform3<S>&;
   using Object = const fcl::CollisionObject<S>*;
@@ -104,24 +113,22 @@ std::string probe() {
 
 template <typename S>
 void checkDispatch() {
+  static const bool registered = [] {
+    registerCollide<S>();
+    registerDistance<S>();
+    if (std::is_same<S, double>::value) registerContinuous();
+    return true;
+  }();
+  if (!registered || !checkIsOn()) return;
   static const std::string wrong = probe<S>();
   if (!wrong.empty()) throw std::runtime_error(wrong);
 }
 template void checkDispatch<float>();
 template void checkDispatch<double>();
 
-template <typename S>
-std::string typeName(const fcl::CollisionGeometry<S>* geometry) {
-  if (geometry == nullptr) return "null";
-  const char* mangled = typeid(*geometry).name();
-  int status = 0;
-  const std::unique_ptr<char, void (*)(void*)> name(abi::__cxa_demangle(mangled, nullptr, nullptr, &status), std::free);
-  return status == 0 ? name.get() : mangled;
-}
-template std::string typeName<float>(const fcl::CollisionGeometry<float>*);
-template std::string typeName<double>(const fcl::CollisionGeometry<double>*);
-
 }  // namespace fcl_adapter
+
+void setDispatchCheck(bool on) { fcl_adapter::check_is_on = on; }
 
 template <typename S>
 bool isModel(const fcl::CollisionGeometry<S>* geometry) {

@@ -4,6 +4,7 @@
 #include <chrono>
 #include <cmath>
 #include <limits>
+#include <stdexcept>
 
 #include "fcl/plugin/dispatch.h"
 #include "tree/tree.h"
@@ -100,6 +101,46 @@ void Model<S>::computeLocalAABB() {
   const Eigen::Vector3d center = this->aabb_center.template cast<double>();
   const Eigen::Vector3d extent = (b.max() - center).cwiseMax(center - b.min());
   this->aabb_radius = roundUp<S>(extent.norm() * (1 + 4e-16));
+}
+
+namespace {
+
+/// The mesh's integrals over the cone from the origin to each triangle: of 1, x, and x x^T.
+struct Integrals {
+  explicit Integrals(const std::shared_ptr<const Mesh>& mesh) {
+    if (mesh == nullptr) throw std::logic_error("bocst::Model: the mesh was released, so its volume is not known");
+    for (std::size_t t = 0; t < mesh->triangleCount(); ++t) {
+      const Mesh::Indices& i = mesh->indices(t);
+      const Eigen::Vector3d &a = mesh->vertex(i[0]), &b = mesh->vertex(i[1]), &c = mesh->vertex(i[2]), sum = a + b + c;
+      const double six = a.cross(b).dot(c);
+      volume += six / 6;
+      first += six / 24 * sum;
+      second += six / 120 * (a * a.transpose() + b * b.transpose() + c * c.transpose() + sum * sum.transpose());
+    }
+  }
+
+  double volume = 0;
+  Eigen::Vector3d first = Eigen::Vector3d::Zero();
+  Eigen::Matrix3d second = Eigen::Matrix3d::Zero();
+};
+
+}  // namespace
+
+template <typename S>
+S Model<S>::computeVolume() const {
+  return static_cast<S>(Integrals(mesh()).volume);
+}
+
+template <typename S>
+fcl::Vector3<S> Model<S>::computeCOM() const {
+  const Integrals integrals(mesh());
+  return (integrals.first / integrals.volume).template cast<S>();
+}
+
+template <typename S>
+fcl::Matrix3<S> Model<S>::computeMomentofInertia() const {
+  const Eigen::Matrix3d second = Integrals(mesh()).second;
+  return (second.trace() * Eigen::Matrix3d::Identity() - second).template cast<S>();
 }
 
 template <typename S>

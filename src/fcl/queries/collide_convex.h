@@ -6,12 +6,14 @@
 #include <algorithm>
 #include <limits>
 #include <type_traits>
+#include <vector>
 
 #include "fcl/adapters/narrow_phase.h"
 #include "fcl/queries/collide_query.h"
 #include "fcl/queries/convex_pair.h"
 #include "fcl/queries/inside.h"
 #include "fcl/queries/inside_contact.h"
+#include "fcl/queries/query_scope.h"
 #include "query/collide/pair_walk.h"
 #include "query/leaf/pair_set.h"
 #include "query/sides/visitor.h"
@@ -31,28 +33,27 @@ class ConvexCollector final : public query::ConvexVisitor<typename Partner::Node
  public:
   using Node = typename Partner::Node;
 
-  /// `swapped`: the partner is the caller's first geometry.
   ConvexCollector(const CollideQuery<S>& q, const Partner& partner, const ConvexFrame<S>& frame,
-                  const oracle::Surface& surface, const NarrowPhase<S>& narrow_phase, bool swapped, bool costs)
+                  const oracle::Surface& surface, const NarrowPhase<S>& narrow_phase, bool costs)
       : q_(q),
         partner_(partner),
         frame_(frame),
         surface_(surface),
         narrow_phase_(narrow_phase),
-        X_WM_(swapped ? q.X_W2 : q.X_W1),
-        X_WB_((swapped ? q.X_W1 : q.X_W2).template cast<double>()),
+        X_WM_(q.X_WA()),
+        X_WB_(q.X_WB().template cast<double>()),
         tolerance_(frame.rounding() + narrow_phase.tolerance()),
-        swapped_(swapped),
         costs_(costs),
-        once_(q.request.num_max_contacts > 1 || costs),
-        seen_(pairs()) {
-    if (once_) seen_.clear();
+        ends_at_first_(q.endsAtFirst()),
+        s_(scratch()) {
+    s_.seen.clear();
+    s_.found.clear();
   }
 
   /// Bodies within so much of the surface, or of its cells' spheres, are to be visited.
   double tolerance(bool spheres) const { return tolerance_ + q_.cullingMargin(spheres); }
 
-  bool endsAtFirst() const override { return q_.endsAtFirst(); }
+  bool endsAtFirst() const override { return ends_at_first_; }
 
   /// Cost sources of the bodies below a node that the box about the model meets, as FCL's approximate costs are.
   void addApproximateCosts(const Node& b) const {
@@ -68,6 +69,51 @@ class ConvexCollector final : public query::ConvexVisitor<typename Partner::Node
   }
 
   bool triangle(std::uint32_t t, const Node& b) override {
+    if (ends_at_first_) return addTriangle(t, b);
+    if (s_.seen.insert(partner_.id(b), t)) gather({t, {Eigen::Vector3d::Zero(), 0}}, b);
+    return false;
+  }
+
+  bool cell(const query::CellLeaf& a, const Node& b) override {
+    if (ends_at_first_) return addCell(a, b);
+    gather(a, b);
+    return false;
+  }
+
+  /// To be called at the end of the walk: as in the Collector of meshes, pairs are looked at in the order of their ids,
+  /// and not in that in which the walk found them. `cells`: those are what it found.
+  void finish(bool cells) {
+    std::sort(s_.found.begin(), s_.found.end(),
+              [](const Found& x, const Found& y) { return x.b1 != y.b1 ? x.b1 < y.b1 : x.b2 < y.b2; });
+    for (const Found& f : s_.found) {
+      if (cells ? addCell(f.leaf, f.body) : addTriangle(static_cast<std::uint32_t>(f.leaf.id), f.body)) return;
+    }
+  }
+
+ private:
+  struct Found {
+    std::intptr_t b1, b2;  // as the caller gets them
+    query::CellLeaf leaf;  // of a triangle, its id alone
+    Node body;
+  };
+  // Kept by the thread between queries.
+  struct Scratch {
+    query::PairSet<std::uint64_t> seen;
+    std::vector<Found> found;
+  };
+  static Scratch& scratch() {
+    thread_local Scratch scratch;
+    return scratch;
+  }
+
+  void gather(const query::CellLeaf& a, const Node& b) {
+    auto b1 = static_cast<std::intptr_t>(a.id), b2 = static_cast<std::intptr_t>(partner_.id(b));
+    q_.inCallersOrder(b1, b2);
+    s_.found.push_back({b1, b2, a, b});
+  }
+
+  // True when nothing more is asked for.
+  bool addTriangle(std::uint32_t t, const Node& b) {
     const auto& i = surface_.mesh->indices(t);
     const Eigen::Vector3d corners[3] = {frame_ * surface_.mesh->vertex(i[0]), frame_ * surface_.mesh->vertex(i[1]),
                                         frame_ * surface_.mesh->vertex(i[2])};
@@ -75,8 +121,6 @@ class ConvexCollector final : public query::ConvexVisitor<typename Partner::Node
     const double near = std::max(tolerance_, q_.margin);
     const query::SeparationResult gap = partner_.gap(b, points, near);
     if (gap.atLeast > near) return false;
-    if (once_ && !seen_.insert(partner_.id(b), t)) return false;
-
     if (!gap.isTouching() && gap.atLeast > q_.margin) {
       fcl::Vector3<S> c[3];
       for (std::size_t k = 0; k < 3; ++k) c[k] = surface_.mesh->vertex(i[k]).template cast<S>();
@@ -102,7 +146,7 @@ class ConvexCollector final : public query::ConvexVisitor<typename Partner::Node
     return add(t, b, &contact);
   }
 
-  bool cell(const query::CellLeaf& a, const Node& b) override {
+  bool addCell(const query::CellLeaf& a, const Node& b) {
     const lattice::Lattice& lattice = surface_.lattice;
     const Eigen::Vector3d in_model = lattice.origin() + lattice.unit() * a.sphere.center, center = frame_ * in_model;
     const double radius = lattice.unit() * a.sphere.radius;
@@ -114,12 +158,6 @@ class ConvexCollector final : public query::ConvexVisitor<typename Partner::Node
     if (!q_.request.enable_contact) return add(a.id, b, nullptr);
     const query::ContactPoint contact = inWorld(ballPenetration(center, radius, b));
     return add(a.id, b, &contact);
-  }
-
- private:
-  static query::PairSet<std::uint64_t>& pairs() {
-    thread_local query::PairSet<std::uint64_t> set;
-    return set;
   }
 
   /// Of points that are just off the body: the way between the nearest ones, of no depth.
@@ -170,11 +208,12 @@ class ConvexCollector final : public query::ConvexVisitor<typename Partner::Node
   // `contact` has the normal from the body to the model.
   bool add(std::uint64_t id, const Node& b, const query::ContactPoint* contact) const {
     if (!partner_.occupied(b)) return q_.request.isSatisfied(q_.result);
-    const std::intptr_t model = static_cast<std::intptr_t>(id), body = static_cast<std::intptr_t>(partner_.id(b));
-    if (swapped_ || contact == nullptr) return q_.addContact(swapped_ ? body : model, swapped_ ? model : body, contact);
+    auto id1 = static_cast<std::intptr_t>(id), id2 = static_cast<std::intptr_t>(partner_.id(b));
+    q_.inCallersOrder(id1, id2);
+    if (contact == nullptr) return q_.addContact(id1, id2, nullptr);
     query::ContactPoint turned = *contact;
-    turned.normal = -turned.normal;
-    return q_.addContact(model, body, &turned);
+    if (!q_.swapped) turned.normal = -turned.normal;
+    return q_.addContact(id1, id2, &turned);
   }
 
   const CollideQuery<S>& q_;
@@ -185,65 +224,58 @@ class ConvexCollector final : public query::ConvexVisitor<typename Partner::Node
   const fcl::Transform3<S>& X_WM_;
   const fcl::Transform3<double> X_WB_;
   const double tolerance_;
-  const bool swapped_, costs_, once_;
-  query::PairSet<std::uint64_t>& seen_;
+  const bool costs_, ends_at_first_;
+  Scratch& s_;
 };
 
-/// The collision of a model and the bodies of a partner, the first geometry when `swapped`: with_partner(frame,
-/// costs, f) makes the partner's side, with what has no contacts but costs or without, and calls f with it.
+/// The collision of a model, side A, and the bodies of a partner: with_partner(frame, costs, f) makes the partner's
+/// side, with what has no contacts but costs or without, and calls f with it.
 template <typename S, typename F>
-void collideConvex(const CollideQuery<S>& q, tree::Tree& tree, bool swapped, const NarrowPhase<S>& narrow_phase,
-                   F&& with_partner) {
+void collideConvex(const CollideQuery<S>& q, tree::Tree& tree, const NarrowPhase<S>& narrow_phase, F&& with_partner) {
   // As FCL does for meshes: contacts first, and then the costs of the box about the mesh.
   const bool approximate = q.request.enable_cost && q.request.use_approximate_cost;
   fcl::CollisionRequest<S> request(q.request);
   request.enable_cost = q.request.enable_cost && !approximate;
-  const CollideQuery<S> first{q.o1, q.o2, q.X_W1, q.X_W2, request, q.result, q.margin};
+  const CollideQuery<S> first{q, request, q.result, q.margin};
   const std::size_t before = q.result.numContacts();
-  std::int64_t now;
-  {
-    const ReadLock lock(tree, nullptr);
-    const query::TreeSide a(tree);
-    now = a.now();
-    const oracle::Surface& surface = tree.surface();
-    const ConvexFrame<S> frame(swapped ? q.X_W2 : q.X_W1, swapped ? q.X_W1 : q.X_W2, surface);
-    const auto with_collector = [&](bool costs, auto&& f) {
-      with_partner(frame, costs, [&](const auto& partner) {
-        using Partner = std::remove_cv_t<std::remove_reference_t<decltype(partner)>>;
-        ConvexCollector<S, Partner> collector(first, partner, frame, surface, narrow_phase, swapped,
-                                              request.enable_cost);
-        f(partner, collector);
-      });
-    };
-    const auto isOutOfSight = [&](const auto& partner) {
-      const query::Sphere ball = partner.sphere(partner.root());
-      const double size = surface.bounds.diagonal().norm();
-      if (frame.rounding() < 1e15 * size) return false;
-      const Eigen::Vector3d half_way = (frame * surface.bounds.center()) / 2 - ball.center / 2;
-      return half_way.cwiseAbs().maxCoeff() > 8 * (size + ball.radius) + q.margin;
-    };
-    if (q.occupied() || request.enable_cost) {
-      with_collector(request.enable_cost, [&](const auto& partner, auto& collector) {
-        using Partner = std::remove_cv_t<std::remove_reference_t<decltype(partner)>>;
-        using Visitor = query::ConvexVisitor<typename Partner::Node>;
-        // What is farther away than can be computed with touches nothing.
-        if (isOutOfSight(partner)) return;
-        const query::SimilarityTransform b_in_a =
-            frame.toLattice(surface.lattice, collector.tolerance(a.isConservative()));
-        query::PairWalk<query::TreeSide, Partner, Visitor>(a, partner, b_in_a, collector).run();
-      });
-    }
-    if (tree.solid() != nullptr && q.mayBeInside(before)) {
-      with_partner(frame, false, [&](const auto& partner) {
-        if (!contains(a, frame, partner)) return;
-        addInside(q, a, partner, frame.toLattice(surface.lattice, 0), swapped);
-      });
-    }
-    if (approximate) {
-      with_collector(true, [](const auto& partner, auto& collector) { collector.addApproximateCosts(partner.root()); });
-    }
+  const QueryScope scope(tree);
+  const query::TreeSide& a = scope.a();
+  const oracle::Surface& surface = tree.surface();
+  const ConvexFrame<S> frame(q.X_WA(), q.X_WB(), surface);
+  const auto with_collector = [&](bool costs, auto&& f) {
+    with_partner(frame, costs, [&](const auto& partner) {
+      using Partner = std::remove_cv_t<std::remove_reference_t<decltype(partner)>>;
+      ConvexCollector<S, Partner> collector(first, partner, frame, surface, narrow_phase, request.enable_cost);
+      f(partner, collector);
+    });
+  };
+  const auto isOutOfSight = [&](const auto& partner) {
+    const query::Sphere ball = partner.sphere(partner.root());
+    const double size = surface.bounds.diagonal().norm();
+    if (frame.rounding() < 1e15 * size) return false;
+    const Eigen::Vector3d half_way = (frame * surface.bounds.center()) / 2 - ball.center / 2;
+    return half_way.cwiseAbs().maxCoeff() > 8 * (size + ball.radius) + q.margin;
+  };
+  if (q.occupied() || request.enable_cost) {
+    with_collector(request.enable_cost, [&](const auto& partner, auto& collector) {
+      using Partner = std::remove_cv_t<std::remove_reference_t<decltype(partner)>>;
+      using Visitor = query::ConvexVisitor<typename Partner::Node>;
+      // What is farther away than can be computed with touches nothing.
+      if (isOutOfSight(partner)) return;
+      const query::SimilarityTransform b_in_a =
+          frame.toLattice(surface.lattice, collector.tolerance(a.isConservative()));
+      query::PairWalk<query::TreeSide, Partner, Visitor>(a, partner, b_in_a, collector).run();
+      collector.finish(a.isConservative());
+    });
   }
-  tree.afterQuery(now);
+  if (tree.solid() != nullptr && q.mayBeInside(before)) {
+    with_partner(frame, false, [&](const auto& partner) {
+      if (contains(a, frame, partner)) addInside(q, a, partner, frame.toLattice(surface.lattice, 0));
+    });
+  }
+  if (approximate) {
+    with_collector(true, [](const auto& partner, auto& collector) { collector.addApproximateCosts(partner.root()); });
+  }
 }
 
 }  // namespace bocst::fcl_adapter

@@ -10,20 +10,18 @@
 namespace bocst::fcl_adapter {
 
 template <typename S>
-void collideOcTree(const CollideQuery<S>& q, tree::Tree& tree, bool swapped, const BroughtSolver<S>& brought) {
-  const auto& octree = static_cast<const fcl::OcTree<S>&>(*(swapped ? q.o1 : q.o2));
-  const fcl::Transform3<S>& X_WO = swapped ? q.X_W1 : q.X_W2;
-  const S density = (swapped ? q.o2 : q.o1)->cost_density;
+void collideOcTree(const CollideQuery<S>& q, tree::Tree& tree, const BroughtSolver<S>& brought) {
+  const auto& octree = static_cast<const fcl::OcTree<S>&>(*q.b());
   withNarrowPhase<S>(brought, q.request, [&](const NarrowPhase<S>& narrow_phase) {
-    collideConvex(q, tree, swapped, narrow_phase, [&](const ConvexFrame<S>&, bool costs, auto&& f) {
-      const OcTreeSide<S> side(octree, X_WO, density, costs);
+    collideConvex(q, tree, narrow_phase, [&](const ConvexFrame<S>&, bool costs, auto&& f) {
+      const OcTreeSide<S> side(octree, q.X_WB(), q.a()->cost_density, costs);
       if (!side.empty()) f(side);
     });
   });
 }
 
-template void collideOcTree<float>(const CollideQuery<float>&, tree::Tree&, bool, const BroughtSolver<float>&);
-template void collideOcTree<double>(const CollideQuery<double>&, tree::Tree&, bool, const BroughtSolver<double>&);
+template void collideOcTree<float>(const CollideQuery<float>&, tree::Tree&, const BroughtSolver<float>&);
+template void collideOcTree<double>(const CollideQuery<double>&, tree::Tree&, const BroughtSolver<double>&);
 
 }  // namespace bocst::fcl_adapter
 

@@ -7,9 +7,8 @@
 
 namespace bocst::fcl_adapter {
 
-/// collidePair() for a model and an fcl::OcTree, which is the first geometry when `swapped`. There is none where FCL
-/// was built without octomap.
+/// collidePair() for a model, side A, and an fcl::OcTree. There is none where FCL was built without octomap.
 template <typename S>
-void collideOcTree(const CollideQuery<S>& q, tree::Tree& tree, bool swapped, const BroughtSolver<S>& solver);
+void collideOcTree(const CollideQuery<S>& q, tree::Tree& tree, const BroughtSolver<S>& solver);
 
 }  // namespace bocst::fcl_adapter

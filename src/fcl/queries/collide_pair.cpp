@@ -9,18 +9,20 @@
 #include <algorithm>
 #include <functional>
 #include <limits>
-#include <shared_mutex>
 #include <stdexcept>
 #include <string>
 #include <type_traits>
+#include <vector>
 
+#include "fcl/adapters/models.h"
 #include "fcl/adapters/pair.h"
-#include "fcl/plugin/dispatch.h"
+#include "fcl/adapters/validate.h"
 #include "fcl/queries/collide_octree.h"
 #include "fcl/queries/collide_query.h"
 #include "fcl/queries/collide_shape.h"
 #include "fcl/queries/inside.h"
 #include "fcl/queries/inside_contact.h"
+#include "fcl/queries/query_scope.h"
 #include "geometry/triangle.h"
 #include "query/collide/pair_walk.h"
 #include "query/collide/tree_walk.h"
@@ -74,31 +76,37 @@ class BvhTriangles {
   const fcl::BVHModel<BV>& bvh_;
 };
 
-/// Turns the pairs of a walk into contacts and cost sources. Side A of the walk is the caller's first geometry, or,
-/// when `swapped`, the second.
+/// A contact before it is one of FCL's: ids in the caller's order, and how the two touch, in the world.
+struct Met {
+  std::uint64_t b1, b2;
+  query::ContactPoint contact;
+
+  bool operator<(const Met& other) const { return b1 != other.b1 ? b1 < other.b1 : b2 < other.b2; }
+};
+
+/// Turns the pairs of a walk into contacts and cost sources; triangles are those of the caller's first and second
+/// geometry.
+///
+/// A walk finds pairs in an order that depends on what is resident. So unless any contact will do, pairs are gathered
+/// and, at the end of the walk, looked at in the order of their ids until there are enough contacts.
 template <typename S, typename Triangles1, typename Triangles2>
 class Collector : public query::Visitor {
  public:
-  Collector(const CollideQuery<S>& q, const Triangles1& t1, const Triangles2& t2, bool swapped, double magnitude)
+  Collector(const CollideQuery<S>& q, const Triangles1& t1, const Triangles2& t2, double magnitude)
       : q_(q),
         t1_(t1),
         t2_(t2),
-        swapped_(swapped),
         magnitude_(magnitude),
         margin_(q.margin),
-        seen_(scratch().seen),
-        seen_cells_(scratch().seen_cells),
-        pairs_(scratch().pairs),
-        now_(&scratch().found[0]),
-        later_(&scratch().found[1]) {
-    // A boolean query ends at the first contact, so it meets no pair twice.
-    left_ = q.contactsLeft();
-    once_ = q.request.num_max_contacts > 1 || q.request.enable_cost;
-    if (once_) {
-      seen_.clear();
-      seen_cells_.clear();
-    }
-    now_->count = later_->count = 0;
+        ends_at_first_(q.endsAtFirst()),
+        left_(q.contactsLeft()),
+        most_(std::max<std::size_t>(kMost, left_ < kUnlimited ? 4 * left_ : kUnlimited)),
+        s_(scratch()) {
+    if (ends_at_first_) return;
+    s_.seen.clear();
+    s_.seen_cells.clear();
+    s_.found.clear();
+    s_.met.clear();
   }
 
   /// Where cells lie in the world: from the lattice frame of side A.
@@ -107,31 +115,16 @@ class Collector : public query::Visitor {
     unit_ = unit;
   }
 
-  bool endsAtFirst() const override { return q_.endsAtFirst(); }
+  bool endsAtFirst() const override { return ends_at_first_; }
 
   bool triangles(std::uint32_t a, std::uint32_t b, bool certain) override {
-    if (swapped_) std::swap(a, b);
-    if (once_ && !seen_.insert(a, b)) return false;
-    if (certain && !needsCorners()) return add(a, b, nullptr);
-    later_->add(a, b, certain);
-    t1_.prefetch(a);
-    t2_.prefetch(b);
-    // Several at once are cheaper, but the last contact that is asked for is not to be missed.
-    if (now_->count + later_->count >= left_) {
-      finish();
-    } else if (later_->count == Found::kCapacity) {
-      turn();
-    } else {
-      return false;
-    }
-    return q_.request.isSatisfied(q_.result);
-  }
-
-  /// To be called at the end of the walk.
-  void finish() {
-    if (now_->count + later_->count == 0) return;
-    turn();
-    turn();
+    q_.inCallersOrder(a, b);
+    if (ends_at_first_) return meets(a, b, certain) && q_.addContact(a, b, nullptr);
+    const std::uint64_t key = keyOf(a, b, certain);
+    if (key > last_ || !s_.seen.insert(a, b)) return false;
+    s_.found.push_back(key);
+    if (s_.found.size() >= most_) lookAtFound();
+    return false;
   }
 
   bool cells(const query::CellLeaf& a, const query::CellLeaf& b) override {
@@ -139,19 +132,52 @@ class Collector : public query::Visitor {
   }
 
   bool cellOfA(const query::CellLeaf& a, std::uint32_t b, const Eigen::Vector3d& point) override {
-    if (once_ && !seen_cells_.insert(a.id, b)) return false;
+    if (!ends_at_first_ && !s_.seen_cells.insert(a.id, b)) return false;
     return addSpheres(a.id, a.sphere, b, {point, 0});
   }
 
   bool cellOfB(std::uint32_t a, const query::CellLeaf& b, const Eigen::Vector3d& point) override {
-    if (once_ && !seen_cells_.insert(b.id, a)) return false;
+    if (!ends_at_first_ && !s_.seen_cells.insert(b.id, a)) return false;
     return addSpheres(a, {point, 0}, b.id, b.sphere);
+  }
+
+  /// To be called at the end of the walk.
+  void finish() {
+    if (ends_at_first_) return;
+    lookAtFound();
+    keepFirst();
+    for (const Met& m : s_.met) {
+      q_.addContact(static_cast<std::intptr_t>(m.b1), static_cast<std::intptr_t>(m.b2), &m.contact);
+    }
   }
 
  private:
   static constexpr double kEpsilon = static_cast<double>(std::numeric_limits<S>::epsilon());
   // In float, FCL's axes between slivers' all but parallel edges are rubbish, and it may say that they meet.
   static constexpr bool kTrustsApart = std::is_same<S, double>::value;
+  // So many pairs are gathered before the ones too many are dropped.
+  static constexpr std::size_t kMost = std::size_t{1} << 16, kUnlimited = std::size_t{1} << 40;
+
+  // Orders pairs by their ids; triangle ids of the first geometry have at most 31 bits.
+  static std::uint64_t keyOf(std::uint32_t a, std::uint32_t b, bool certain) {
+    return std::uint64_t{a} << 33 | std::uint64_t{b} << 1 | std::uint64_t{!certain};
+  }
+  static std::uint32_t first(std::uint64_t key) { return static_cast<std::uint32_t>(key >> 33); }
+  static std::uint32_t second(std::uint64_t key) { return static_cast<std::uint32_t>(key >> 1); }
+  static bool isCertain(std::uint64_t key) { return (key & 1) == 0; }
+
+  // Kept by the thread between queries.
+  struct Scratch {
+    query::PairSet<std::uint32_t> seen;
+    query::PairSet<std::uint64_t> seen_cells;
+    query::TrianglePairs pairs;
+    std::vector<std::uint64_t> found;  // keys of pairs of triangles that were not looked at yet
+    std::vector<Met> met;              // the first that touch, of those that were
+  };
+  static Scratch& scratch() {
+    thread_local Scratch scratch;
+    return scratch;
+  }
 
   // A triangle so narrow, of its length, is a segment or a point but for rounding in S, or so small that products of
   // four lengths vanish in S.
@@ -163,13 +189,14 @@ class Collector : public query::Visitor {
   }
 
   // What distances near 0 may be off by.
-  double rounding() const { return magnitude_ * 16 * kEpsilon; }
+  double rounding() const { return roundingOf<S>(magnitude_) / 2; }
 
   // Of triangles that certainly meet.
-  bool needsCorners() const { return q_.request.enable_contact || q_.request.enable_cost || margin_ > 0; }
+  bool needsCorners() const { return q_.request.enable_contact || q_.request.enable_cost; }
 
   // Most queries that miss never come here.
   void place() {
+    if (placed_) return;
     fcl::relativeTransform(q_.X_W1.linear(), q_.X_W1.translation(), q_.X_W2.linear(), q_.X_W2.translation(), R_12_,
                            p_12_);
     place_.linear() = R_12_.template cast<double>();
@@ -177,133 +204,140 @@ class Collector : public query::Visitor {
     placed_ = true;
   }
 
-  // Pairs that are still to be looked at, several at once.
-  struct Found {
-    static constexpr std::size_t kCapacity = query::TrianglePairs::kCapacity;
-
-    void add(std::uint32_t a, std::uint32_t b, bool is_certain) {
-      ids[count][0] = a;
-      ids[count][1] = b;
-      certain[count++] = is_certain;
-    }
-
-    std::uint32_t ids[kCapacity][2];
-    bool certain[kCapacity];
-    std::size_t count = 0;
-  };
-  // Kept by the thread between queries.
-  struct Scratch {
-    query::PairSet<std::uint32_t> seen;
-    query::PairSet<std::uint64_t> seen_cells;
-    query::TrianglePairs pairs;
-    Found found[2];
-  };
-  static Scratch& scratch() {
-    thread_local Scratch scratch;
-    return scratch;
+  bool meets(std::uint32_t a, std::uint32_t b, bool certain) {
+    if (certain) return true;
+    const std::uint64_t key = keyOf(a, b, certain);
+    getCorners(&key, 1);
+    return decide(key, 0, nullptr);
   }
 
-  // Looks at the pairs found before the last ones, whose corners are fetched: the walk goes on until they are there.
-  void turn() {
-    for (std::size_t i = 0; i < later_->count; ++i) {
-      t1_.prefetchCorners(later_->ids[i][0]);
-      t2_.prefetchCorners(later_->ids[i][1]);
+  // Moves the first of what was found and touches to `met`, and forgets the rest of it.
+  void lookAtFound() {
+    constexpr std::size_t kBatch = query::TrianglePairs::kCapacity;
+    std::vector<std::uint64_t>& found = s_.found;
+    std::sort(found.begin(), found.end());
+    const std::size_t before = s_.met.size();
+    for (std::size_t i = 0; i < found.size(); i += kBatch) {
+      const std::size_t count = std::min(kBatch, found.size() - i);
+      for (std::size_t k = i + kBatch; k < std::min(i + 2 * kBatch, found.size()); ++k) {
+        t1_.prefetchCorners(first(found[k]));
+        t2_.prefetchCorners(second(found[k]));
+      }
+      for (std::size_t k = i + 2 * kBatch; k < std::min(i + 3 * kBatch, found.size()); ++k) {
+        t1_.prefetch(first(found[k]));
+        t2_.prefetch(second(found[k]));
+      }
+      decidePairs(&found[i], count);
+      if (q_.request.enable_cost || s_.met.size() - before < left_) continue;
+      break;  // What comes later comes behind what there is.
     }
-    if (now_->count != 0) decidePairs();
-    std::swap(now_, later_);
-    later_->count = 0;
+    found.clear();
+    keepFirst();
+    if (s_.met.size() < left_ || q_.request.enable_cost) return;
+    last_ = keyOf(static_cast<std::uint32_t>(s_.met.back().b1), static_cast<std::uint32_t>(s_.met.back().b2), true);
   }
 
-  void decidePairs() {
-    getCorners();
-    if (now_->count == 1 && !now_->certain[0] && !q_.request.enable_contact) return decide(0, nullptr);
-    query::ContactPoint contacts[Found::kCapacity];
-    const query::PenetrationVerdicts verdicts = query::trianglePenetrations(pairs_, 2 * rounding(), contacts);
-    for (std::size_t i = 0; i < now_->count; ++i) {
-      const bool meet = now_->certain[i] || (verdicts.meet >> i & 1);
+  // Of what touches, only as much as is asked for.
+  void keepFirst() {
+    std::vector<Met>& met = s_.met;
+    if (!std::is_sorted(met.begin(), met.end())) std::sort(met.begin(), met.end());
+    if (met.size() > left_) met.resize(left_);
+  }
+
+  void decidePairs(const std::uint64_t* keys, std::size_t count) {
+    if (!needsCorners() && std::all_of(keys, keys + count, isCertain)) {
+      for (std::size_t i = 0; i < count; ++i) s_.met.push_back({first(keys[i]), second(keys[i]), {}});
+      return;
+    }
+    getCorners(keys, count);
+    query::ContactPoint contacts[query::TrianglePairs::kCapacity];
+    const query::PenetrationVerdicts verdicts = query::trianglePenetrations(s_.pairs, 2 * rounding(), contacts);
+    for (std::size_t i = 0; i < count; ++i) {
+      const bool meet = isCertain(keys[i]) || (verdicts.meet >> i & 1);
       if (meet && margin_ == 0) {
-        addMet(i, &contacts[i]);
+        addMet(keys[i], contacts[i]);
       } else if (margin_ > 0 || !kTrustsApart || !(verdicts.apart >> i & 1)) {
-        decide(i, &contacts[i]);
+        if (decide(keys[i], i, &contacts[i])) addMet(keys[i], contacts[i]);
       }
     }
   }
 
-  void getCorners() {
-    if (!placed_) place();
-    pairs_.count = now_->count;
-    for (std::size_t i = 0; i < now_->count; ++i) {
+  void getCorners(const std::uint64_t* keys, std::size_t count) {
+    place();
+    s_.pairs.count = count;
+    for (std::size_t i = 0; i < count; ++i) {
       Corners p, q;
       for (int k = 0; k < 3; ++k) {
-        p[k] = t1_.corner(now_->ids[i][0], k).template cast<double>();
-        q[k] = place_ * t2_.corner(now_->ids[i][1], k).template cast<double>().eval();
+        p[k] = t1_.corner(first(keys[i]), k).template cast<double>();
+        q[k] = place_ * t2_.corner(second(keys[i]), k).template cast<double>().eval();
       }
-      pairs_.put(i, p, q);
+      s_.pairs.put(i, p, q);
     }
   }
 
-  // FCL's test, and what it leaves open. `contact` is how the pair is parted, or null where nobody asks.
-  void decide(std::size_t i, const query::ContactPoint* contact) {
-    if (now_->certain[i] && margin_ == 0) return addMet(i, contact);
-    const std::uint32_t a = now_->ids[i][0], b = now_->ids[i][1];
+  // FCL's test, and what it leaves open: does the pair touch, whose corners are pair i of s_.pairs? Betters `contact`,
+  // which is how the two are parted, or null where nobody asks.
+  bool decide(std::uint64_t key, std::size_t i, query::ContactPoint* contact) {
+    const std::uint32_t a = first(key), b = second(key);
+    if (isCertain(key) && margin_ == 0) return true;
     Corners p, q;
-    pairs_.get(i, p, q);
-    const bool sliver = !now_->certain[i] && (isSliver(p) || isSliver(q));
+    s_.pairs.get(i, p, q);
+    const bool sliver = !isCertain(key) && (isSliver(p) || isSliver(q));
     // FCL's axes do not separate segments and points from everything.
     const bool degenerate = sliver && (query::isDegenerate(p) || query::isDegenerate(q));
     const bool meet =
-        now_->certain[i] || (!degenerate && fcl::detail::Intersect<S>::intersect_Triangle(
-                                                t1_.corner(a, 0), t1_.corner(a, 1), t1_.corner(a, 2), t2_.corner(b, 0),
-                                                t2_.corner(b, 1), t2_.corner(b, 2), R_12_, p_12_));
-    if (!sliver && margin_ == 0) return meet ? addMet(i, contact) : void();
+        isCertain(key) || (!degenerate && fcl::detail::Intersect<S>::intersect_Triangle(
+                                              t1_.corner(a, 0), t1_.corner(a, 1), t1_.corner(a, 2), t2_.corner(b, 0),
+                                              t2_.corner(b, 1), t2_.corner(b, 2), R_12_, p_12_));
+    if (!sliver && margin_ == 0) return meet;
     Eigen::Vector3d on_p, on_q;
     const double distance = query::nearestPoints(p, q, on_p, on_q);
     // Of slivers, its axes are rounding, and may part what touches.
-    if (!meet && distance > (sliver ? std::max(margin_, rounding()) : margin_)) return;
-    if (contact == nullptr) return addMet(i, nullptr);
+    if (!meet && distance > (sliver ? std::max(margin_, rounding()) : margin_)) return false;
+    if (contact == nullptr) return true;
     if (distance > rounding()) {
-      const query::ContactPoint gap{(on_q - on_p) / distance, (on_p + on_q) / 2, std::max(margin_ - distance, 0.0)};
-      return addMet(i, &gap);
+      *contact = {(on_q - on_p) / distance, (on_p + on_q) / 2, std::max(margin_ - distance, 0.0)};
+    } else {
+      contact->depth += margin_;
     }
-    query::ContactPoint deeper = *contact;
-    deeper.depth += margin_;
-    addMet(i, &deeper);
+    return true;
   }
 
-  void addMet(std::size_t i, const query::ContactPoint* contact) {
-    const std::uint32_t a = now_->ids[i][0], b = now_->ids[i][1];
+  void addMet(std::uint64_t key, const query::ContactPoint& contact) {
+    const std::uint32_t a = first(key), b = second(key);
     if (q_.request.enable_cost) addCost(a, b);
-    if (contact == nullptr || !q_.request.enable_contact) {
-      add(a, b, nullptr);
-      return;
+    Met met{a, b, {}};
+    if (q_.request.enable_contact) {
+      const fcl::Transform3<double> X_W1 = q_.X_W1.template cast<double>();
+      met.contact = {X_W1.linear() * contact.normal, X_W1 * contact.point, contact.depth};
     }
-    const fcl::Transform3<double> X_W1 = q_.X_W1.template cast<double>();
-    const query::ContactPoint in_world{X_W1.linear() * contact->normal, X_W1 * contact->point, contact->depth};
-    add(a, b, &in_world);
+    s_.met.push_back(met);
   }
 
-  bool addSpheres(std::uint64_t id_a, query::Sphere a, std::uint64_t id_b, query::Sphere b) {
-    if (swapped_) {
-      std::swap(id_a, id_b);
-      std::swap(a, b);
+  bool addSpheres(std::uint64_t id1, query::Sphere a, std::uint64_t id2, query::Sphere b) {
+    q_.inCallersOrder(id1, id2);
+    if (ends_at_first_) {
+      return q_.addContact(static_cast<std::intptr_t>(id1), static_cast<std::intptr_t>(id2), nullptr);
     }
-    const fcl::Transform3<double> X_WA = (swapped_ ? q_.X_W2 : q_.X_W1).template cast<double>();
+    q_.inCallersOrder(a, b);
+    const fcl::Transform3<double> X_WA = q_.X_WA().template cast<double>();
     for (query::Sphere* s : {&a, &b}) {
       s->center = X_WA * Eigen::Vector3d(origin_ + unit_ * s->center);
       s->radius *= unit_;
     }
-    if (q_.request.enable_cost) {
-      addCost(boxOf(a), boxOf(b));
+    if (q_.request.enable_cost) addCost(boxOf(a), boxOf(b));
+    Met met{id1, id2, {}};
+    if (q_.request.enable_contact) {
+      const Eigen::Vector3d displacement = b.center - a.center;
+      const double distance = displacement.norm();
+      if (distance > 0) met.contact.normal = displacement / distance;
+      const double overlap = a.radius + b.radius - distance;  // negative: a gap, within the margin
+      met.contact.depth = std::max(overlap + margin_, 0.0);
+      met.contact.point = a.center + met.contact.normal * (a.radius - overlap / 2);
     }
-    if (!q_.request.enable_contact) return add(id_a, id_b, nullptr);
-    query::ContactPoint contact;
-    const Eigen::Vector3d displacement = b.center - a.center;
-    const double distance = displacement.norm();
-    if (distance > 0) contact.normal = displacement / distance;
-    const double overlap = a.radius + b.radius - distance;  // negative: a gap, within the margin
-    contact.depth = std::max(overlap + margin_, 0.0);
-    contact.point = a.center + contact.normal * (a.radius - overlap / 2);
-    return add(id_a, id_b, &contact);
+    s_.met.push_back(met);
+    if (s_.met.size() >= most_) keepFirst();
+    return false;
   }
 
   static fcl::AABB<S> boxOf(const query::Sphere& s) {
@@ -320,28 +354,20 @@ class Collector : public query::Visitor {
     q_.addCost(a, b, q_.o1->cost_density * q_.o2->cost_density);
   }
 
-  bool add(std::uint64_t b1, std::uint64_t b2, const query::ContactPoint* contact) {
-    const bool ends = q_.addContact(static_cast<std::intptr_t>(b1), static_cast<std::intptr_t>(b2), contact);
-    left_ = q_.contactsLeft();
-    return ends;
-  }
-
   const CollideQuery<S>& q_;
   const Triangles1& t1_;
   const Triangles2& t2_;
-  const bool swapped_;
   const double magnitude_;  // of positions in the frame of the first geometry
   const double margin_;
-  query::PairSet<std::uint32_t>& seen_;
-  query::PairSet<std::uint64_t>& seen_cells_;
-  query::TrianglePairs& pairs_;
-  Found *now_, *later_;
+  const bool ends_at_first_;
+  const std::size_t left_;  // contacts that are asked for
+  const std::size_t most_;  // pairs to gather
+  Scratch& s_;
+  std::uint64_t last_ = ~std::uint64_t{0};                               // keys behind it are too many
   fcl::Transform3<double> place_ = fcl::Transform3<double>::Identity();  // the same in double
   fcl::Matrix3<S> R_12_;
   fcl::Vector3<S> p_12_;
   bool placed_ = false;  // R_12_ and p_12_ are set
-  bool once_;
-  std::size_t left_;  // contacts that are still asked for
   Eigen::Vector3d origin_ = Eigen::Vector3d::Zero();
   double unit_ = 1;
 };
@@ -363,73 +389,57 @@ bool isOutOfSight(const CollideQuery<S>& q, const SimilarityTransform& b_in_a, d
   return half_way.cwiseAbs().maxCoeff() > 8 * (size_a + size_b) + q.margin;
 }
 
-// Is the second to be side A? The same whichever the caller names first; by address only where the poses are equal, so
-// that what a query grows does not depend on where models happen to lie.
 template <typename S>
-bool turnsRound(const CollideQuery<S>& q, const tree::Tree& tree1, const tree::Tree& tree2) {
-  const S *x1 = q.X_W1.matrix().data(), *x2 = q.X_W2.matrix().data();
-  const auto differ = std::mismatch(x1, x1 + 16, x2);
-  return differ.first == x1 + 16 ? std::less<const tree::Tree*>()(&tree2, &tree1) : *differ.second < *differ.first;
-}
-
-template <typename S>
-void collideModels(const CollideQuery<S>& q, tree::Tree& tree1, tree::Tree& tree2) {
+void collideModels(const CollideQuery<S>& q, tree::Tree& tree_a, tree::Tree& tree_b) {
   const std::size_t before = q.result.numContacts();
-  // Conservative verdicts must not depend on the argument order, so the walk has an order of its own.
-  const bool swapped = (tree1.conservative() || tree2.conservative()) && turnsRound(q, tree1, tree2);
-  const auto walk = [&](const TreeSide& a, double magnitude, auto&& with_collector) {
-    const oracle::Surface& s = a.tree().surface();
-    const ModelTriangles<S> t1(tree1), t2(tree2);
-    Collector<S, ModelTriangles<S>, ModelTriangles<S>> collector(q, t1, t2, swapped, magnitude);
-    collector.setFrame(s.lattice.origin(), s.lattice.unit());
+  const QueryScope scope(tree_a, tree_b);
+  const TreeSide &a = scope.a(), &b = scope.b();
+  const auto [b_in_a, magnitude] = relate<S>(q, a, b);
+  if (isOutOfSight(q, b_in_a, magnitudeOf(tree_a.surface().bounds), magnitudeOf(tree_b.surface().bounds))) return;
+  const auto walk = [&, magnitude = magnitude](auto&& with_collector) {
+    const lattice::Lattice& lattice = tree_a.surface().lattice;
+    const ModelTriangles<S> t1(q.swapped ? tree_b : tree_a), t2(q.swapped ? tree_a : tree_b);
+    Collector<S, ModelTriangles<S>, ModelTriangles<S>> collector(q, t1, t2, magnitude);
+    collector.setFrame(lattice.origin(), lattice.unit());
     with_collector(collector);
     collector.finish();
   };
-  const auto run = [&](const TreeSide& a, const TreeSide& b, const SimilarityTransform& b_in_a, double magnitude) {
-    if (isOutOfSight(q, b_in_a, magnitudeOf(a.tree().surface().bounds), magnitudeOf(b.tree().surface().bounds))) return;
-    if (q.margin == 0 && query::TreeWalk::fits(a, b, b_in_a)) {
-      query::TreeWalk trees(a, b, b_in_a);
-      if (!trees.isNeedless()) walk(a, magnitude, [&](auto& collector) { trees.run(collector); });
-    } else {
-      const SimilarityTransform near = withMargin(b_in_a, a, q, a.isConservative() || b.isConservative());
-      walk(a, magnitude, [&](auto& collector) { query::PairWalk<TreeSide, TreeSide>(a, b, near, collector).run(); });
-    }
-    if (q.mayBeInside(before) && (contains<S>(tree1, q.X_W1, tree2, q.X_W2, magnitude) ||
-                                  contains<S>(tree2, q.X_W2, tree1, q.X_W1, magnitude))) {
-      addInside(q, a, b, b_in_a, swapped);
-    }
-  };
-  if (swapped) {
-    betweenTrees(q.X_W2, tree2, q.X_W1, tree1, run);
+  if (q.margin == 0 && query::TreeWalk::fits(a, b, b_in_a)) {
+    query::TreeWalk trees(a, b, b_in_a);
+    if (!trees.isNeedless()) walk([&](auto& collector) { trees.run(collector); });
   } else {
-    betweenTrees(q.X_W1, tree1, q.X_W2, tree2, run);
+    const SimilarityTransform near = withMargin(b_in_a, a, q, a.isConservative() || b.isConservative());
+    walk([&](auto& collector) { query::PairWalk<TreeSide, TreeSide>(a, b, near, collector).run(); });
+  }
+  if (q.mayBeInside(before) && (contains<S>(tree_a, q.X_WA(), tree_b, q.X_WB(), magnitude) ||
+                                contains<S>(tree_b, q.X_WB(), tree_a, q.X_WA(), magnitude))) {
+    addInside(q, a, b, b_in_a);
   }
 }
 
 template <typename BV>
-void collideBvh(const CollideQuery<typename BV::S>& q, tree::Tree& tree, const fcl::BVHModel<BV>& bvh, bool swapped) {
+void collideBvh(const CollideQuery<typename BV::S>& q, tree::Tree& tree, const fcl::BVHModel<BV>& bvh) {
   using S = typename BV::S;
   const std::size_t before = q.result.numContacts();
-  const auto run = [&](const TreeSide& a, const BvhSide<BV>& b, const SimilarityTransform& b_in_a, double magnitude) {
-    const oracle::Surface& s = tree.surface();
-    if (isOutOfSight(q, b_in_a, magnitudeOf(s.bounds), b.magnitude())) return;
-    const ModelTriangles<S> model(tree);
-    const BvhTriangles<BV> partner(bvh);
-    const auto walk = [&](auto&& collector) {
-      collector.setFrame(s.lattice.origin(), s.lattice.unit());
-      query::PairWalk<TreeSide, BvhSide<BV>>(a, b, withMargin(b_in_a, a, q, a.isConservative()), collector).run();
-      collector.finish();
-    };
-    if (swapped) {
-      walk(Collector<S, BvhTriangles<BV>, ModelTriangles<S>>(q, partner, model, true, magnitude));
-    } else {
-      walk(Collector<S, ModelTriangles<S>, BvhTriangles<BV>>(q, model, partner, false, magnitude));
-    }
-    if (q.mayBeInside(before) && contains(tree, swapped ? q.X_W2 : q.X_W1, bvh, swapped ? q.X_W1 : q.X_W2, magnitude)) {
-      addInside(q, a, b, b_in_a, swapped);
-    }
+  const QueryScope scope(tree);
+  const TreeSide& a = scope.a();
+  const BvhSide<BV> b("collide", bvh);
+  const auto [b_in_a, magnitude] = relate<S>(q, a, b);
+  if (isOutOfSight(q, b_in_a, magnitudeOf(tree.surface().bounds), b.magnitude())) return;
+  const ModelTriangles<S> model(tree);
+  const BvhTriangles<BV> partner(bvh);
+  const auto walk = [&, &to_a = b_in_a](auto&& collector) {
+    const lattice::Lattice& lattice = tree.surface().lattice;
+    collector.setFrame(lattice.origin(), lattice.unit());
+    query::PairWalk<TreeSide, BvhSide<BV>>(a, b, withMargin(to_a, a, q, a.isConservative()), collector).run();
+    collector.finish();
   };
-  betweenTreeAndBvh(swapped ? q.X_W2 : q.X_W1, tree, swapped ? q.X_W1 : q.X_W2, bvh, run);
+  if (q.swapped) {
+    walk(Collector<S, BvhTriangles<BV>, ModelTriangles<S>>(q, partner, model, magnitude));
+  } else {
+    walk(Collector<S, ModelTriangles<S>, BvhTriangles<BV>>(q, model, partner, magnitude));
+  }
+  if (q.mayBeInside(before) && contains(tree, q.X_WA(), bvh, q.X_WB(), magnitude)) addInside(q, a, b, b_in_a);
 }
 
 /// The models among two geometries, of which one at least is one.
@@ -444,25 +454,38 @@ struct Models {
   const Model<S>*first, *second;
 };
 
+// Is the second to be side A? Without a choice, only where the first is no model. Conservative verdicts must not depend
+// on the argument order, so there the walk has an order of its own: by address only where the poses are equal, so that
+// what a query grows does not depend on where models happen to lie.
+template <typename S>
+bool turnsRound(const Models<S>& models, const fcl::Transform3<S>& X_W1, const fcl::Transform3<S>& X_W2) {
+  if (models.first == nullptr || models.second == nullptr) return models.first == nullptr;
+  const tree::Tree &tree1 = models.first->tree(), &tree2 = models.second->tree();
+  if (!tree1.conservative() && !tree2.conservative()) return false;
+  const S *x1 = X_W1.matrix().data(), *x2 = X_W2.matrix().data();
+  const auto differ = std::mismatch(x1, x1 + 16, x2);
+  return differ.first == x1 + 16 ? std::less<const tree::Tree*>()(&tree2, &tree1) : *differ.second < *differ.first;
+}
+
 template <typename S>
 std::size_t answer(const CollideQuery<S>& q, const Models<S>& models, const BroughtSolver<S>& solver) {
+  checkPose("collide", "tf1", q.X_W1);
+  checkPose("collide", "tf2", q.X_W2);
+  checkRequest(q.request);
   if (q.request.isSatisfied(q.result)) return q.result.numContacts();
   if (!q.occupied() && (q.o1->isFree() || q.o2->isFree() || !q.request.enable_cost)) return q.result.numContacts();
-  if (models.first != nullptr && models.second != nullptr) {
-    collideModels(q, models.first->tree(), models.second->tree());
-    return q.result.numContacts();
-  }
-  const bool swapped = models.first == nullptr;
-  const fcl::CollisionGeometry<S>* partner = swapped ? q.o1 : q.o2;
-  tree::Tree& tree = (swapped ? models.second : models.first)->tree();
-  if (isShape(partner)) {
-    collideShape(q, tree, swapped, solver);
+  const Model<S>*a = models.first, *b = models.second;
+  q.inCallersOrder(a, b);
+  if (b != nullptr) {
+    collideModels(q, a->tree(), b->tree());
+  } else if (isShape(q.b())) {
+    collideShape(q, a->tree(), solver);
 #if FCL_HAVE_OCTOMAP
-  } else if (partner->getNodeType() == fcl::GEOM_OCTREE) {
-    collideOcTree(q, tree, swapped, solver);
+  } else if (q.b()->getNodeType() == fcl::GEOM_OCTREE) {
+    collideOcTree(q, a->tree(), solver);
 #endif
   } else {
-    withBvh<S>("collide", partner, [&](const auto& bvh) { collideBvh(q, tree, bvh, swapped); });
+    withBvh<S>("collide", q.b(), [&](const auto& bvh) { collideBvh(q, a->tree(), bvh); });
   }
   return q.result.numContacts();
 }
@@ -476,14 +499,17 @@ std::size_t collidePair(const fcl::CollisionGeometry<S>* o1, const fcl::Transfor
                         fcl::CollisionResult<S>& result) {
   const Models<S> models(o1, o2);
   const double margin = marginOf(models.first, models.second);
-  return answer(CollideQuery<S>{o1, o2, X_W1, X_W2, request, result, margin}, models, solver);
+  return answer(CollideQuery<S>{{o1, X_W1, o2, X_W2, turnsRound(models, X_W1, X_W2)}, request, result, margin}, models,
+                solver);
 }
 
 template <typename S>
 std::size_t collidePair(const fcl::CollisionGeometry<S>* o1, const fcl::Transform3<S>& X_W1,
                         const fcl::CollisionGeometry<S>* o2, const fcl::Transform3<S>& X_W2,
                         const fcl::CollisionRequest<S>& request, fcl::CollisionResult<S>& result, double margin) {
-  return answer(CollideQuery<S>{o1, o2, X_W1, X_W2, request, result, margin}, Models<S>(o1, o2), BroughtSolver<S>());
+  const Models<S> models(o1, o2);
+  return answer(CollideQuery<S>{{o1, X_W1, o2, X_W2, turnsRound(models, X_W1, X_W2)}, request, result, margin}, models,
+                BroughtSolver<S>());
 }
 
 #define BOCST_INSTANTIATE(S)                                                                                          \

@@ -9,21 +9,20 @@
 #include <cstdint>
 #include <limits>
 
+#include "fcl/queries/ordered_pair.h"
 #include "geometry/triangle.h"
 
 namespace bocst::fcl_adapter {
 
 /// The caller's question about a collision, in the caller's order.
 template <typename S>
-struct CollideQuery {
-  const fcl::CollisionGeometry<S>*o1, *o2;
-  const fcl::Transform3<S>&X_W1, &X_W2;
+struct CollideQuery : OrderedPair<S> {
   const fcl::CollisionRequest<S>& request;
   fcl::CollisionResult<S>& result;
-  double margin = 0;  ///< Surfaces no farther apart than this touch.
+  double margin;  ///< Surfaces no farther apart than this touch.
 
   /// Only between occupied geometries are there contacts.
-  bool occupied() const { return o1->isOccupied() && o2->isOccupied(); }
+  bool occupied() const { return this->o1->isOccupied() && this->o2->isOccupied(); }
 
   /// By how much culling must be wider for the margin: slabs are measured along normals up to a hundredth too long.
   double cullingMargin(bool spheres) const { return margin * (spheres ? 1 : 1.02); }
@@ -38,9 +37,10 @@ struct CollideQuery {
     return request.num_max_contacts - std::min(request.num_max_contacts, result.numContacts());
   }
 
-  /// The next contact is the last that is asked for.
+  /// Only whether there is a contact is asked for: any will do, so which one it is may depend on what is resident. All
+  /// other questions get the contacts with the least (b1, b2), in this order.
   bool endsAtFirst() const {
-    return occupied() && !request.enable_cost && result.numContacts() + 1 >= request.num_max_contacts;
+    return request.num_max_contacts == 1 && !request.enable_contact && !request.enable_cost && occupied();
   }
 
   /// Adds a contact if there is room; `contact` (world frame) may be null where contacts are not enabled. True when
@@ -48,8 +48,8 @@ struct CollideQuery {
   bool addContact(std::intptr_t b1, std::intptr_t b2, const query::ContactPoint* contact) const {
     if (occupied() && result.numContacts() < request.num_max_contacts) {
       fcl::Contact<S> c;
-      c.o1 = o1;
-      c.o2 = o2;
+      c.o1 = this->o1;
+      c.o2 = this->o2;
       c.b1 = b1;
       c.b2 = b2;
       if (request.enable_contact && contact != nullptr) {

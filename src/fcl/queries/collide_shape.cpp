@@ -38,19 +38,18 @@ class ShapeSide : public query::ConvexSide {
 }  // namespace
 
 template <typename S>
-void collideShape(const CollideQuery<S>& q, tree::Tree& tree, bool swapped, const BroughtSolver<S>& brought) {
-  const auto& shape = static_cast<const fcl::ShapeBase<S>&>(*(swapped ? q.o1 : q.o2));
-  const fcl::Transform3<S>& X_WS = swapped ? q.X_W1 : q.X_W2;
+void collideShape(const CollideQuery<S>& q, tree::Tree& tree, const BroughtSolver<S>& brought) {
+  const auto& shape = static_cast<const fcl::ShapeBase<S>&>(*q.b());
   withNarrowPhase<S>(brought, q.request, [&](const NarrowPhase<S>& narrow_phase) {
-    collideConvex(q, tree, swapped, narrow_phase, [&](const ConvexFrame<S>& frame, bool, auto&& f) {
+    collideConvex(q, tree, narrow_phase, [&](const ConvexFrame<S>& frame, bool, auto&& f) {
       withConvexShape(shape, frame.region(), [&](const query::ConvexShape& body) {
-        f(ShapeSide<S>(body, shape, X_WS, q.o1->cost_density * q.o2->cost_density));
+        f(ShapeSide<S>(body, shape, q.X_WB(), q.o1->cost_density * q.o2->cost_density));
       });
     });
   });
 }
 
-template void collideShape<float>(const CollideQuery<float>&, tree::Tree&, bool, const BroughtSolver<float>&);
-template void collideShape<double>(const CollideQuery<double>&, tree::Tree&, bool, const BroughtSolver<double>&);
+template void collideShape<float>(const CollideQuery<float>&, tree::Tree&, const BroughtSolver<float>&);
+template void collideShape<double>(const CollideQuery<double>&, tree::Tree&, const BroughtSolver<double>&);
 
 }  // namespace bocst::fcl_adapter

@@ -8,8 +8,8 @@
 
 namespace bocst::fcl_adapter {
 
-/// collidePair() for a model and a shape (see isShape()), which is the first geometry when `swapped`.
+/// collidePair() for a model, side A, and a shape (see isShape()).
 template <typename S>
-void collideShape(const CollideQuery<S>& q, tree::Tree& tree, bool swapped, const BroughtSolver<S>& solver);
+void collideShape(const CollideQuery<S>& q, tree::Tree& tree, const BroughtSolver<S>& solver);
 
 }  // namespace bocst::fcl_adapter

@@ -4,13 +4,16 @@
 #include <algorithm>
 #include <cmath>
 #include <limits>
+#include <optional>
 
+#include "fcl/adapters/models.h"
 #include "fcl/adapters/motion.h"
 #include "fcl/adapters/octree_side.h"
 #include "fcl/adapters/pair.h"
-#include "fcl/plugin/dispatch.h"
+#include "fcl/adapters/validate.h"
 #include "fcl/queries/collide_pair.h"
 #include "fcl/queries/convex_pair.h"
+#include "fcl/queries/query_scope.h"
 #include "query/ccd/contact_time_walk.h"
 
 namespace bocst::fcl_adapter {
@@ -23,11 +26,7 @@ using query::TreeSide;
 
 /// The caller's question, in the caller's order.
 template <typename S>
-struct ContinuousQuery {
-  const fcl::CollisionGeometry<S>* o1;
-  const Motion& motion1;
-  const fcl::CollisionGeometry<S>* o2;
-  const Motion& motion2;
+struct ContinuousQuery : OrderedPair<S, Motion> {
   const fcl::ContinuousCollisionRequest<S>& request;
 };
 
@@ -60,7 +59,7 @@ bool isBodies(const fcl::CollisionGeometry<S>* geometry) {
 template <typename S>
 ContactGoal goalOf(const ContinuousQuery<S>& q, double size1, double size2, double margin) {
   double largest = size1 + size2;
-  for (const Motion* m : {&q.motion1, &q.motion2}) {
+  for (const Motion* m : {&q.X_W1, &q.X_W2}) {
     const Eigen::Vector3d p = m->at(0).translation();
     largest = std::max(largest, p.norm() + m->fastest(p, size1 + size2, 0));
   }
@@ -68,9 +67,8 @@ ContactGoal goalOf(const ContinuousQuery<S>& q, double size1, double size2, doub
   goal.margin = margin;
   // FCL's triangle test in S, and this walk's coordinates in the world; a billionth of the smaller body so that a pair
   // that passes at no distance at all does not take for ever.
-  goal.rounding = std::max({1e-9 * std::min(size1, size2), 1e-13 * largest,
-                            32 * static_cast<double>(std::numeric_limits<S>::epsilon()) * largest,
-                            std::numeric_limits<double>::min()});
+  goal.rounding = std::max(
+      {1e-9 * std::min(size1, size2), 1e-13 * largest, roundingOf<S>(largest), std::numeric_limits<double>::min()});
   goal.time_error = static_cast<double>(q.request.toc_err);
   return goal;
 }
@@ -95,90 +93,67 @@ query::Sphere regionOf(const Motion& of_model, const Eigen::AlignedBox3d& bounds
 template <typename S>
 double toleranceOfCollide(const ContinuousQuery<S>& q, double model_size, double region) {
   double largest = region + 2 * model_size;
-  for (const Motion* m : {&q.motion1, &q.motion2}) {
+  for (const Motion* m : {&q.X_W1, &q.X_W2}) {
     const Eigen::Vector3d p = m->at(0).translation();
     largest += p.norm() + m->fastest(p, 0, 0);
   }
-  return 32 * static_cast<double>(std::numeric_limits<S>::epsilon()) * largest +
-         static_cast<double>(fcl::CollisionRequest<S>().gjk_tolerance);
+  return roundingOf<S>(largest) + static_cast<double>(fcl::CollisionRequest<S>().gjk_tolerance);
 }
 
-/// When a model and a shape or an octree, the first geometry when `swapped`, first touch; see walk().
+/// When a model and a shape or an octree first touch; see timeOfContact().
 template <typename S>
-double walkConvex(const ContinuousQuery<S>& q, tree::Tree& tree, const Mesh* mesh, bool swapped, double margin,
-                  bool& same) {
-  const fcl::CollisionGeometry<S>* partner = swapped ? q.o1 : q.o2;
-  const Motion &of_model = swapped ? q.motion2 : q.motion1, &of_partner = swapped ? q.motion1 : q.motion2;
+double walkConvex(const ContinuousQuery<S>& q, const TreeSide& a, double margin) {
+  const oracle::Surface& surface = a.tree().surface();
+  const query::Sphere region = regionOf(q.X_WA(), surface.bounds, q.X_WB());
   double time = std::numeric_limits<double>::infinity();
-  std::int64_t now;
-  {
-    const ReadLock lock(tree, nullptr);
-    const TreeSide a(tree);
-    now = a.now();
-    const oracle::Surface& surface = tree.surface();
-    same = surface.mesh.get() == mesh;
-    const query::Sphere region = regionOf(of_model, surface.bounds, of_partner);
-    const auto run = [&](const auto& b) {
-      const query::Sphere ball = b.sphere(b.root());
-      const double size = std::min(ball.center.norm() + ball.radius, region.radius);
-      query::ContactTimeWalk<TreeSide, std::decay_t<decltype(b)>> walk(a, inBody(tree), of_model, b,
-                                                                       SimilarityTransform(), of_partner);
-      const double model_size = magnitudeOf(surface.bounds);
-      ContactGoal goal = goalOf(q, model_size, size, margin);
-      // The walk stops between a half of it and all of it.
-      goal.rounding = std::max(goal.rounding, 2 * toleranceOfCollide(q, model_size, region.radius));
-      time = walk.run(goal);
-    };
-    if (same && isShape(partner)) {
-      withConvexShape(static_cast<const fcl::ShapeBase<S>&>(*partner), region,
-                      [&](const query::ConvexShape& body) { run(query::ConvexSide(body)); });
-    }
-#if FCL_HAVE_OCTOMAP
-    if (same && partner->getNodeType() == fcl::GEOM_OCTREE) {
-      const fcl::Transform3<S> X_WO = poseAt<S>(of_partner, 0);
-      const OcTreeSide<S> side(static_cast<const fcl::OcTree<S>&>(*partner), X_WO, 1, false);
-      if (!side.empty()) run(side);
-    }
-#endif
+  const auto run = [&](const auto& b) {
+    const query::Sphere ball = b.sphere(b.root());
+    const double size = std::min(ball.center.norm() + ball.radius, region.radius);
+    query::ContactTimeWalk<TreeSide, std::decay_t<decltype(b)>> walk(a, inBody(a.tree()), q.X_WA(), b,
+                                                                     SimilarityTransform(), q.X_WB());
+    const double model_size = magnitudeOf(a);
+    ContactGoal goal = goalOf(q, model_size, size, margin);
+    // The walk stops between a half of it and all of it.
+    goal.rounding = std::max(goal.rounding, 2 * toleranceOfCollide(q, model_size, region.radius));
+    time = walk.run(goal);
+  };
+  if (isShape(q.b())) {
+    withConvexShape(static_cast<const fcl::ShapeBase<S>&>(*q.b()), region,
+                    [&](const query::ConvexShape& body) { run(query::ConvexSide(body)); });
   }
-  tree.afterQuery(now);
+#if FCL_HAVE_OCTOMAP
+  if (q.b()->getNodeType() == fcl::GEOM_OCTREE) {
+    const fcl::Transform3<S> X_WO = poseAt<S>(q.X_WB(), 0);
+    const OcTreeSide<S> side(static_cast<const fcl::OcTree<S>&>(*q.b()), X_WO, 1, false);
+    if (!side.empty()) run(side);
+  }
+#endif
   return time;
 }
 
-/// When the two first touch, if they do not at the begin; infinite without contact. False in `same` when a mesh is not
-/// the one it is said to be.
+/// When the two first touch, if they do not at the begin; infinite without contact. Nothing when a mesh, that of side A
+/// or of side B, is not the one that it is said to be.
 template <typename S>
-double walk(const ContinuousQuery<S>& q, const Mesh* mesh1, const Mesh* mesh2, bool& same) {
-  const auto* model1 = asModel<S>(q.o1);
-  const auto* model2 = asModel<S>(q.o2);
-  const fcl::Transform3<S> X_W1 = poseAt<S>(q.motion1, 0), X_W2 = poseAt<S>(q.motion2, 0);
-  const double margin = marginOf(model1, model2);
-  double time = std::numeric_limits<double>::infinity();
-  if (model1 != nullptr && model2 != nullptr) {
-    betweenTrees(X_W1, model1->tree(), X_W2, model2->tree(),
-                 [&](const TreeSide& a, const TreeSide& b, const SimilarityTransform&, double) {
-                   const oracle::Surface &s1 = a.tree().surface(), &s2 = b.tree().surface();
-                   same = s1.mesh.get() == mesh1 && s2.mesh.get() == mesh2;
-                   query::ContactTimeWalk<TreeSide, TreeSide> walk(a, inBody(a.tree()), q.motion1, b, inBody(b.tree()),
-                                                                   q.motion2);
-                   if (same) time = walk.run(goalOf(q, magnitudeOf(s1.bounds), magnitudeOf(s2.bounds), margin));
-                 });
-    return time;
+std::optional<double> timeOfContact(const ContinuousQuery<S>& q, const Mesh* mesh_a, const Mesh* mesh_b) {
+  const Model<S>*model_a = asModel<S>(q.a()), *model_b = asModel<S>(q.b());
+  const double margin = marginOf(model_a, model_b);
+  const auto walk = [&](const TreeSide& a, const auto& b, const SimilarityTransform& b_in_body) {
+    query::ContactTimeWalk<TreeSide, std::decay_t<decltype(b)>> times(a, inBody(a.tree()), q.X_WA(), b, b_in_body,
+                                                                      q.X_WB());
+    return times.run(goalOf(q, magnitudeOf(a), magnitudeOf(b), margin));
+  };
+  tree::Tree& tree = model_a->tree();
+  if (model_b != nullptr) {
+    const QueryScope scope(tree, model_b->tree());
+    if (tree.surface().mesh.get() != mesh_a || model_b->tree().surface().mesh.get() != mesh_b) return {};
+    return walk(scope.a(), scope.b(), inBody(scope.b().tree()));
   }
-  const bool swapped = model1 == nullptr;
-  const Motion &motion_a = swapped ? q.motion2 : q.motion1, &motion_b = swapped ? q.motion1 : q.motion2;
-  if (isBodies(swapped ? q.o1 : q.o2)) {
-    return walkConvex(q, (swapped ? model2 : model1)->tree(), swapped ? mesh2 : mesh1, swapped, margin, same);
-  }
-  withBvh<S>("continuousCollide", swapped ? q.o1 : q.o2, [&](const auto& bvh) {
-    betweenTreeAndBvh(swapped ? X_W2 : X_W1, (swapped ? model2 : model1)->tree(), swapped ? X_W1 : X_W2, bvh,
-                      [&](const TreeSide& a, const auto& b, const SimilarityTransform&, double) {
-                        const oracle::Surface& surface = a.tree().surface();
-                        same = surface.mesh.get() == (swapped ? mesh2 : mesh1);
-                        query::ContactTimeWalk<TreeSide, std::decay_t<decltype(b)>> walk(
-                            a, inBody(a.tree()), motion_a, b, SimilarityTransform(), motion_b);
-                        if (same) time = walk.run(goalOf(q, magnitudeOf(surface.bounds), b.magnitude(), margin));
-                      });
+  const QueryScope scope(tree);
+  if (tree.surface().mesh.get() != mesh_a) return {};
+  if (isBodies(q.b())) return walkConvex(q, scope.a(), margin);
+  double time = 0;
+  withBvh<S>("continuousCollide", q.b(), [&](const auto& bvh) {
+    time = walk(scope.a(), BvhSide("continuousCollide", bvh), SimilarityTransform());
   });
   return time;
 }
@@ -196,25 +171,21 @@ void checkPartner(const ContinuousQuery<S>& q) {
 template <typename S>
 double firstContact(const ContinuousQuery<S>& q) {
   checkPartner(q);
-  const fcl::Transform3<S> X_W1 = poseAt<S>(q.motion1, 0), X_W2 = poseAt<S>(q.motion2, 0);
+  const fcl::Transform3<S> X_W1 = poseAt<S>(q.X_W1, 0), X_W2 = poseAt<S>(q.X_W2, 0);
   for (;;) {
     // DeviceResource, so that another mesh does not get the address of one of these.
-    const auto mesh1 = meshOf(asModel<S>(q.o1)), mesh2 = meshOf(asModel<S>(q.o2));
+    const auto mesh_a = meshOf(asModel<S>(q.a())), mesh_b = meshOf(asModel<S>(q.b()));
     fcl::CollisionResult<S> begin;
     if (collidePair<S>(q.o1, X_W1, q.o2, X_W2, {}, fcl::CollisionRequest<S>(), begin) > 0) return 0;
     if (!q.o1->isOccupied() || !q.o2->isOccupied()) return std::numeric_limits<double>::infinity();
     // What the begin was asked of must be what moves on.
-    bool same = true;
-    const double time = walk(q, mesh1.get(), mesh2.get(), same);
-    if (same) return time;
+    const std::optional<double> time = timeOfContact(q, mesh_a.get(), mesh_b.get());
+    if (time) return *time;
   }
 }
 
 template <typename S>
 S answer(const ContinuousQuery<S>& q, fcl::ContinuousCollisionResult<S>& result) {
-  if (!(q.request.toc_err >= 0)) {
-    throw std::invalid_argument("bocst::continuousCollide: toc_err is " + std::to_string(q.request.toc_err));
-  }
   const double time = firstContact(q);
   result.is_collide = time <= 1;
   // Rounded, if at all, to what is earlier.
@@ -222,8 +193,8 @@ S answer(const ContinuousQuery<S>& q, fcl::ContinuousCollisionResult<S>& result)
   if (static_cast<double>(result.time_of_contact) > time) {
     result.time_of_contact = std::nextafter(result.time_of_contact, S(0));
   }
-  result.contact_tf1 = poseAt<S>(q.motion1, static_cast<double>(result.time_of_contact));
-  result.contact_tf2 = poseAt<S>(q.motion2, static_cast<double>(result.time_of_contact));
+  result.contact_tf1 = poseAt<S>(q.X_W1, static_cast<double>(result.time_of_contact));
+  result.contact_tf2 = poseAt<S>(q.X_W2, static_cast<double>(result.time_of_contact));
   return result.time_of_contact;
 }
 
@@ -233,8 +204,9 @@ template <typename S>
 S continuousPair(const fcl::CollisionGeometry<S>* o1, const fcl::MotionBase<S>* motion1,
                  const fcl::CollisionGeometry<S>* o2, const fcl::MotionBase<S>* motion2,
                  const fcl::ContinuousCollisionRequest<S>& request, fcl::ContinuousCollisionResult<S>& result) {
-  const auto m1 = motionOf<S>(motion1), m2 = motionOf<S>(motion2);
-  return answer(ContinuousQuery<S>{o1, *m1, o2, *m2, request}, result);
+  checkRequest(request);
+  const auto m1 = motionOf<S>("motion1", motion1), m2 = motionOf<S>("motion2", motion2);
+  return answer(ContinuousQuery<S>{{o1, *m1, o2, *m2, !isModel<S>(o1)}, request}, result);
 }
 
 template <typename S>
@@ -242,9 +214,14 @@ S continuousPair(const fcl::CollisionGeometry<S>* o1, const fcl::Transform3<S>& 
                  const fcl::Transform3<S>& X_W1_end, const fcl::CollisionGeometry<S>* o2,
                  const fcl::Transform3<S>& X_W2_begin, const fcl::Transform3<S>& X_W2_end,
                  const fcl::ContinuousCollisionRequest<S>& request, fcl::ContinuousCollisionResult<S>& result) {
+  checkRequest(request);
+  checkPose("continuousCollide", "tf1_beg", X_W1_begin);
+  checkPose("continuousCollide", "tf1_end", X_W1_end);
+  checkPose("continuousCollide", "tf2_beg", X_W2_begin);
+  checkPose("continuousCollide", "tf2_end", X_W2_end);
   const auto m1 = motionOf<S>(X_W1_begin, X_W1_end, request.ccd_motion_type);
   const auto m2 = motionOf<S>(X_W2_begin, X_W2_end, request.ccd_motion_type);
-  return answer(ContinuousQuery<S>{o1, *m1, o2, *m2, request}, result);
+  return answer(ContinuousQuery<S>{{o1, *m1, o2, *m2, !isModel<S>(o1)}, request}, result);
 }
 
 #define BOCST_INSTANTIATE(S)                                                                                        \

@@ -3,8 +3,6 @@
 
 #include <fcl/common/types.h>
 
-#include <limits>
-
 #include "fcl/adapters/convex_shapes.h"
 #include "fcl/adapters/pair.h"
 #include "query/sides/convex_side.h"
@@ -28,9 +26,9 @@ class ConvexFrame {
     region_.center = *this * bounds.center();
     region_.radius = bounds.diagonal().norm() / 2;
     // FCL computes in the world, with world coordinates of either.
-    rounding_ = 32 * static_cast<double>(std::numeric_limits<S>::epsilon()) *
-                (X_WM.translation().template cast<double>().norm() + X_WB.translation().template cast<double>().norm() +
-                 region_.center.norm() + 2 * magnitudeOf(bounds));
+    rounding_ = roundingOf<S>(X_WM.translation().template cast<double>().norm() +
+                              X_WB.translation().template cast<double>().norm() + region_.center.norm() +
+                              2 * magnitudeOf(bounds));
     region_.radius = region_.radius * 1.001 + rounding_;
   }
 

@@ -8,14 +8,15 @@
 #include <functional>
 #include <limits>
 #include <type_traits>
-#include <utility>
 
+#include "fcl/adapters/models.h"
 #include "fcl/adapters/octree_side.h"
 #include "fcl/adapters/pair.h"
-#include "fcl/plugin/dispatch.h"
+#include "fcl/adapters/validate.h"
 #include "fcl/queries/collide_pair.h"
 #include "fcl/queries/convex_pair.h"
 #include "fcl/queries/inside.h"
+#include "fcl/queries/query_scope.h"
 #include "query/distance/distance_walk.h"
 
 namespace bocst::fcl_adapter {
@@ -26,9 +27,7 @@ using query::TreeSide;
 
 /// The caller's question, in the caller's order.
 template <typename S>
-struct DistanceQuery {
-  const fcl::CollisionGeometry<S>*o1, *o2;
-  const fcl::Transform3<S>&X_W1, &X_W2;
+struct DistanceQuery : OrderedPair<S> {
   const fcl::DistanceRequest<S>& request;
   fcl::DistanceResult<S>& result;
 };
@@ -43,15 +42,13 @@ query::DistanceGoal goalOf(const DistanceQuery<S>& q, double unit) {
   return goal;
 }
 
-/// The nearest primitives, in the world; `swapped` when A is the caller's second geometry.
+/// Writes the nearest primitives, given in the world.
 template <typename S>
-void report(const DistanceQuery<S>& q, double distance_found, query::Nearest in_world, bool swapped) {
+void report(const DistanceQuery<S>& q, double distance_found, query::Nearest in_world) {
   const S distance = static_cast<S>(distance_found);
   if (!(distance < q.result.min_distance)) return;
-  if (swapped) {
-    std::swap(in_world.a, in_world.b);
-    std::swap(in_world.on_a, in_world.on_b);
-  }
+  q.inCallersOrder(in_world.a, in_world.b);
+  q.inCallersOrder(in_world.on_a, in_world.on_b);
   q.result.min_distance = distance;
   q.result.o1 = q.o1;
   q.result.o2 = q.o2;
@@ -63,12 +60,12 @@ void report(const DistanceQuery<S>& q, double distance_found, query::Nearest in_
   }
 }
 
-/// What a walk found; side A is the caller's first geometry, or the second when `swapped`.
+/// Writes what a walk found in the lattice of side A.
 template <typename S>
-void report(const DistanceQuery<S>& q, query::Nearest n, bool swapped, const Eigen::Vector3d& origin, double unit) {
-  const fcl::Transform3<double> X_WA = (swapped ? q.X_W2 : q.X_W1).template cast<double>();
+void report(const DistanceQuery<S>& q, query::Nearest n, const Eigen::Vector3d& origin, double unit) {
+  const fcl::Transform3<double> X_WA = q.X_WA().template cast<double>();
   for (Eigen::Vector3d* p : {&n.on_a, &n.on_b}) *p = X_WA * Eigen::Vector3d(origin + unit * *p);
-  report(q, n.distance * unit, n, swapped);
+  report(q, n.distance * unit, n);
 }
 
 /// A mesh in the world as it looks from far away: a ball about it, and its corners.
@@ -122,7 +119,7 @@ struct Distant {
 /// What is 2^27 times as far away as both are large: the tips along the way between the middles are the nearest, but
 /// for a part 2^-54 of the distance. False where that is not so.
 template <typename S>
-bool searchFar(const DistanceQuery<S>& q, const Distant& a, const Distant& b, bool swapped) {
+bool searchFar(const DistanceQuery<S>& q, const Distant& a, const Distant& b) {
   const Eigen::Vector3d half_way = b.half(b.center) - a.half(a.center);
   if (!(half_way.cwiseAbs().maxCoeff() > 0x1p26 * (a.radius + b.radius)) || a.triangles == 0 || b.triangles == 0) {
     return false;
@@ -134,16 +131,15 @@ bool searchFar(const DistanceQuery<S>& q, const Distant& a, const Distant& b, bo
   n.b = b.farthest(-direction, tip_b);
   n.on_a = 2 * a.half(tip_a);
   n.on_b = 2 * b.half(tip_b);
-  report(q, 2 * (b.half(tip_b) - a.half(tip_a)).stableNorm(), n, swapped);
+  report(q, 2 * (b.half(tip_b) - a.half(tip_a)).stableNorm(), n);
   return true;
 }
 
 /// The same beside a solid body that is so far away that neither's size is more than a rounding of the distance.
 template <typename S>
-bool searchFar(const DistanceQuery<S>& q, const Distant& a, const fcl::Transform3<S>& X_WB, const query::ConvexSide& b,
-               bool swapped) {
+bool searchFar(const DistanceQuery<S>& q, const Distant& a, const query::ConvexSide& b) {
   const query::Sphere ball = b.sphere(b.root());
-  const Eigen::Isometry3d X = isometryOf<S>(X_WB);
+  const Eigen::Isometry3d X = isometryOf<S>(q.X_WB());
   const Eigen::Vector3d half = X.linear() * (ball.center / 2) + X.translation() / 2, half_way = half - a.half(a.center);
   if (!(half_way.cwiseAbs().maxCoeff() > 0x1p53 * (a.radius + ball.radius)) || a.triangles == 0) return false;
   query::Nearest n;
@@ -152,16 +148,16 @@ bool searchFar(const DistanceQuery<S>& q, const Distant& a, const fcl::Transform
   n.b = b.name(b.root());
   n.on_a = 2 * a.half(tip);
   n.on_b = 2 * half;
-  report(q, 2 * (half - a.half(tip)).stableNorm(), n, swapped);
+  report(q, 2 * (half - a.half(tip)).stableNorm(), n);
   return true;
 }
 
-/// Looks for the nearest primitives; side A is the caller's first geometry, or the second when `swapped`.
+/// Looks for the nearest primitives.
 template <typename S, typename B>
-void search(const DistanceQuery<S>& q, const TreeSide& a, const B& b, const SimilarityTransform& b_in_a, bool swapped) {
+void search(const DistanceQuery<S>& q, const TreeSide& a, const B& b, const SimilarityTransform& b_in_a) {
   const lattice::Lattice& lattice = a.tree().surface().lattice;
   query::DistanceWalk<TreeSide, B> walk(a, b, b_in_a);
-  report(q, walk.run(goalOf(q, lattice.unit())), swapped, lattice.origin(), lattice.unit());
+  report(q, walk.run(goalOf(q, lattice.unit())), lattice.origin(), lattice.unit());
 }
 
 /// What is inside a solid is not apart from it. There are no points where they touch; the nearest of the surfaces, if
@@ -175,57 +171,60 @@ void notApart(const DistanceQuery<S>& q) {
 
 /// The same between a tree and solid bodies: with_partner(frame, f) makes the side of the bodies and calls f with it.
 template <typename S, typename F>
-void searchConvex(const DistanceQuery<S>& q, tree::Tree& tree, bool swapped, F&& with_partner) {
-  std::int64_t now;
-  {
-    const ReadLock lock(tree, nullptr);
-    const TreeSide a(tree);
-    now = a.now();
-    const oracle::Surface& surface = tree.surface();
-    const ConvexFrame<S> frame(swapped ? q.X_W2 : q.X_W1, swapped ? q.X_W1 : q.X_W2, surface);
-    const SimilarityTransform b_in_a = frame.toLattice(surface.lattice, 0);
-    with_partner(frame, [&](const auto& b) {
-      if constexpr (std::is_same<std::decay_t<decltype(b)>, query::ConvexSide>::value) {
-        const Distant far(isometryOf<S>(swapped ? q.X_W2 : q.X_W1), tree);
-        if (searchFar(q, far, swapped ? q.X_W1 : q.X_W2, b, swapped)) return;
-      }
-      search(q, a, b, b_in_a, swapped);
-      if (q.result.min_distance > 0 && contains(a, frame, b)) notApart(q);
-    });
-  }
-  tree.afterQuery(now);
+void searchConvex(const DistanceQuery<S>& q, tree::Tree& tree, F&& with_partner) {
+  const QueryScope scope(tree);
+  const TreeSide& a = scope.a();
+  const oracle::Surface& surface = tree.surface();
+  const ConvexFrame<S> frame(q.X_WA(), q.X_WB(), surface);
+  const SimilarityTransform b_in_a = frame.toLattice(surface.lattice, 0);
+  with_partner(frame, [&](const auto& b) {
+    if constexpr (std::is_same<std::decay_t<decltype(b)>, query::ConvexSide>::value) {
+      if (searchFar(q, Distant(isometryOf<S>(q.X_WA()), tree), b)) return;
+    }
+    search(q, a, b, b_in_a);
+    if (q.result.min_distance > 0 && contains(a, frame, b)) notApart(q);
+  });
 }
 
-/// Between a tree and whatever is no model, the first geometry when `swapped`.
+template <typename S>
+void searchModels(const DistanceQuery<S>& q, tree::Tree& tree_a, tree::Tree& tree_b) {
+  const QueryScope scope(tree_a, tree_b);
+  const auto [b_in_a, magnitude] = relate<S>(q, scope.a(), scope.b());
+  if (searchFar(q, Distant(isometryOf<S>(q.X_WA()), tree_a), Distant(isometryOf<S>(q.X_WB()), tree_b))) return;
+  search(q, scope.a(), scope.b(), b_in_a);
+  if (q.result.min_distance > 0 && (contains<S>(tree_a, q.X_WA(), tree_b, q.X_WB(), magnitude) ||
+                                    contains<S>(tree_b, q.X_WB(), tree_a, q.X_WA(), magnitude))) {
+    notApart(q);
+  }
+}
+
+/// Between a tree and whatever is no model.
 /// @throws std::invalid_argument for a partner that is not supported.
 template <typename S>
-void searchPartner(const DistanceQuery<S>& q, tree::Tree& tree, bool swapped) {
-  const fcl::CollisionGeometry<S>* partner = swapped ? q.o1 : q.o2;
-  const fcl::Transform3<S>&X_WM = swapped ? q.X_W2 : q.X_W1, &X_WP = swapped ? q.X_W1 : q.X_W2;
-  if (isShape(partner)) {
-    const auto& shape = static_cast<const fcl::ShapeBase<S>&>(*partner);
-    searchConvex(q, tree, swapped, [&](const ConvexFrame<S>& frame, auto&& f) {
+void searchPartner(const DistanceQuery<S>& q, tree::Tree& tree) {
+  if (isShape(q.b())) {
+    const auto& shape = static_cast<const fcl::ShapeBase<S>&>(*q.b());
+    searchConvex(q, tree, [&](const ConvexFrame<S>& frame, auto&& f) {
       withConvexShape(shape, frame.region(), [&](const query::ConvexShape& body) { f(query::ConvexSide(body)); });
     });
 #if FCL_HAVE_OCTOMAP
-  } else if (partner->getNodeType() == fcl::GEOM_OCTREE) {
-    searchConvex(q, tree, swapped, [&](const ConvexFrame<S>&, auto&& f) {
-      const OcTreeSide<S> side(static_cast<const fcl::OcTree<S>&>(*partner), X_WP, 1, false);
+  } else if (q.b()->getNodeType() == fcl::GEOM_OCTREE) {
+    searchConvex(q, tree, [&](const ConvexFrame<S>&, auto&& f) {
+      const OcTreeSide<S> side(static_cast<const fcl::OcTree<S>&>(*q.b()), q.X_WB(), 1, false);
       if (!side.empty()) f(side);
     });
 #endif
   } else {
-    withBvh<S>("distance", partner, [&](const auto& bvh) {
-      betweenTreeAndBvh(
-          X_WM, tree, X_WP, bvh,
-          [&](const TreeSide& a, const auto& b, const SimilarityTransform& b_in_a, double magnitude) {
-            if (searchFar(q, Distant(isometryOf<S>(X_WM), tree),
-                          Distant(isometryOf<S>(X_WP), b, static_cast<std::size_t>(bvh.num_tris)), swapped)) {
-              return;
-            }
-            search(q, a, b, b_in_a, swapped);
-            if (q.result.min_distance > 0 && contains(tree, X_WM, bvh, X_WP, magnitude)) notApart(q);
-          });
+    withBvh<S>("distance", q.b(), [&](const auto& bvh) {
+      const QueryScope scope(tree);
+      const BvhSide b("distance", bvh);
+      const auto [b_in_a, magnitude] = relate<S>(q, scope.a(), b);
+      if (searchFar(q, Distant(isometryOf<S>(q.X_WA()), tree),
+                    Distant(isometryOf<S>(q.X_WB()), b, static_cast<std::size_t>(bvh.num_tris)))) {
+        return;
+      }
+      search(q, scope.a(), b, b_in_a);
+      if (q.result.min_distance > 0 && contains(tree, q.X_WA(), bvh, q.X_WB(), magnitude)) notApart(q);
     });
   }
 }
@@ -255,24 +254,15 @@ S distancePair(const fcl::CollisionGeometry<S>* o1, const fcl::Transform3<S>& X_
   if (model1 == nullptr && model2 == nullptr) {
     throw std::logic_error("bocst::distance: neither geometry is a bocst::Model");
   }
+  checkPose("distance", "tf1", X_W1);
+  checkPose("distance", "tf2", X_W2);
+  checkRequest(request, result);
   if (request.isSatisfied(result)) return result.min_distance;
-  const DistanceQuery<S> q{o1, o2, X_W1, X_W2, request, result};
+  const DistanceQuery<S> q{{o1, X_W1, o2, X_W2, model1 == nullptr}, request, result};
   if (model1 != nullptr && model2 != nullptr) {
-    betweenTrees(
-        X_W1, model1->tree(), X_W2, model2->tree(),
-        [&](const TreeSide& a, const TreeSide& b, const SimilarityTransform& b_in_a, double magnitude) {
-          if (searchFar(q, Distant(isometryOf<S>(X_W1), a.tree()), Distant(isometryOf<S>(X_W2), b.tree()), false)) {
-            return;
-          }
-          search(q, a, b, b_in_a, false);
-          if (result.min_distance > 0 && (contains<S>(a.tree(), X_W1, b.tree(), X_W2, magnitude) ||
-                                          contains<S>(b.tree(), X_W2, a.tree(), X_W1, magnitude))) {
-            notApart(q);
-          }
-        });
+    searchModels(q, model1->tree(), model2->tree());
   } else {
-    const bool swapped = model1 == nullptr;
-    searchPartner(q, (swapped ? model2 : model1)->tree(), swapped);
+    searchPartner(q, (model1 != nullptr ? model1 : model2)->tree());
   }
   if (request.enable_signed_distance && !(result.min_distance > 0)) sign(q);
   return result.min_distance;

@@ -2,7 +2,6 @@
 #pragma once
 
 #include <algorithm>
-#include <limits>
 #include <vector>
 
 #include "fcl/adapters/pair.h"
@@ -31,11 +30,6 @@ inline bool reaches(const Eigen::AlignedBox3d& bounds, const Eigen::Vector3d& ce
   return bounds.exteriorDistance(center) <= radius * (1 + 1e-9);
 }
 
-template <typename S>
-double toleranceOf(double magnitude) {
-  return 32 * static_cast<double>(std::numeric_limits<S>::epsilon()) * magnitude;
-}
-
 /// Is a piece of B inside the solid A?
 template <typename S>
 bool contains(const tree::Tree& a, const fcl::Transform3<S>& X_WA, const tree::Tree& b, const fcl::Transform3<S>& X_WB,
@@ -43,7 +37,7 @@ bool contains(const tree::Tree& a, const fcl::Transform3<S>& X_WA, const tree::T
   if (a.solid() == nullptr) return false;
   const Eigen::Isometry3d X_AB = relative<S>(X_WA, X_WB);
   const Eigen::AlignedBox3d& box = b.surface().bounds;
-  const double tolerance = toleranceOf<S>(magnitude);
+  const double tolerance = roundingOf<S>(magnitude);
   if (!reaches(a.surface().bounds, X_AB * box.center(), box.diagonal().norm() / 2 + tolerance)) return false;
   return containsOne(*a.solid(), b.componentPoints(), X_AB, tolerance);
 }
@@ -56,7 +50,7 @@ bool contains(const tree::Tree& a, const fcl::Transform3<typename BV::S>& X_WA, 
   if (a.solid() == nullptr) return false;
   const Eigen::Isometry3d X_AB = relative<S>(X_WA, X_WB);
   const query::OrientedVolume root = volumeOf(bvh.getBV(0).bv);
-  const double tolerance = toleranceOf<S>(magnitude);
+  const double tolerance = roundingOf<S>(magnitude);
   if (!reaches(a.surface().bounds, X_AB * root.center, root.half.norm() + tolerance)) return false;
   std::vector<Eigen::Vector3d> vertices(static_cast<std::size_t>(bvh.num_vertices));
   for (std::size_t i = 0; i < vertices.size(); ++i) vertices[i] = bvh.vertices[i].template cast<double>();

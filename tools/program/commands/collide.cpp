@@ -3,6 +3,7 @@
 
 #include <CLI/CLI.hpp>
 #include <algorithm>
+#include <cmath>
 #include <iostream>
 #include <memory>
 #include <optional>
@@ -174,6 +175,10 @@ void addCollide(CLI::App& program, Job& job) {
           [collide](const std::string& text) {
             try {
               collide->pose = Pose::parse(text);
+              const double norm = collide->pose.quaternionNorm();
+              if (std::abs(norm - 1) > 1e-3) {
+                std::cerr << "bocst: --pose: the quaternion has the norm " << norm << "; it is divided by it\n";
+              }
             } catch (const std::invalid_argument& e) {
               throw CLI::ValidationError("--pose", e.what());
             }

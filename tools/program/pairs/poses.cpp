@@ -26,15 +26,19 @@ Pose Pose::parse(const std::string& text) {
     at = next;
   }
   if (at != end) throw std::invalid_argument("seven numbers x,y,z,qw,qx,qy,qz expected");
-  const Eigen::Map<const Eigen::Vector4d> q(pose.numbers.data() + 3);
-  if (!(q.norm() > 1e-100) || !std::isfinite(q.norm()))
-    throw std::invalid_argument("the quaternion cannot be normalised");
+  const double norm = pose.quaternionNorm();
+  if (!(norm > 1e-100) || !std::isfinite(norm)) throw std::invalid_argument("the quaternion cannot be normalised");
   return pose;
+}
+
+double Pose::quaternionNorm() const {
+  const double qw = numbers[3], qx = numbers[4], qy = numbers[5], qz = numbers[6];
+  return std::sqrt(((qw * qw + qx * qx) + qy * qy) + qz * qz);
 }
 
 Eigen::Isometry3d Pose::transform() const {
   const auto& [x, y, z, qw, qx, qy, qz] = numbers;
-  const double norm = std::sqrt(((qw * qw + qx * qx) + qy * qy) + qz * qz);
+  const double norm = quaternionNorm();
   const Eigen::Quaterniond q(qw / norm, qx / norm, qy / norm, qz / norm);
   Eigen::Isometry3d X = Eigen::Isometry3d::Identity();
   X.linear() = q.toRotationMatrix();

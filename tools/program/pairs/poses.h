@@ -22,7 +22,8 @@ struct Pose {
   /// @throws std::invalid_argument when the text is not seven finite numbers with a quaternion that can be normalised.
   static Pose parse(const std::string& text);
 
-  Eigen::Isometry3d transform() const;
+  double quaternionNorm() const;
+  Eigen::Isometry3d transform() const;  ///< Of the quaternion divided by its norm.
   std::string text() const;
 };
 

@@ -1,0 +1,39 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#pragma once
+
+#include <atomic>
+#include <mutex>
+
+// After fork() a child has only the thread that called it. A lock that another thread of the parent held is never given
+// back there, and what that thread was changing stays half changed.
+
+namespace bocst::tree {
+
+/// How often this process, or an ancestor of it, was forked from another.
+extern std::atomic<unsigned> forks;
+
+/// DeviceResource while the first thread of a child that comes to a lock finds out who held it.
+std::mutex& forkMutex();
+
+[[noreturn]] void throwForked();
+
+/// A mutex that in a child refuses to wait for a thread that stayed in the parent.
+class ForkAwareMutex {
+ public:
+  /// @throws std::runtime_error when a thread of the parent held it at the fork.
+  void lock() {
+    if (!isAdopted()) throwForked();
+    mutex_.lock();
+  }
+  bool try_lock() { return isAdopted() && mutex_.try_lock(); }
+  void unlock() { mutex_.unlock(); }
+
+ private:
+  bool isAdopted() { return forks_.load() == forks.load(std::memory_order_relaxed) || adopt(); }
+  bool adopt();
+
+  std::mutex mutex_;
+  std::atomic<unsigned> forks_{forks.load()};
+};
+
+}  // namespace bocst::tree

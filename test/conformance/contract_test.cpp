@@ -1,0 +1,397 @@
+// SPDX-License-Identifier: BSD-3-Clause
+// The same question gets the same contacts in the same order, whatever happened before; the integrals are FCL's; a
+// child after fork() never waits for threads that stayed in the parent.
+#include <bocst/bocst.h>
+#include <fcl/geometry/octree/octree.h>
+#include <fcl/geometry/shape/box.h>
+#include <fcl/geometry/shape/capsule.h>
+#include <gtest/gtest.h>
+#include <sys/wait.h>
+#include <unistd.h>
+
+#include <algorithm>
+#include <atomic>
+#include <csignal>
+#include <cstring>
+#include <functional>
+#include <random>
+#include <thread>
+#include <tuple>
+
+#include "meshes.h"
+#include "reference.h"
+
+namespace bocst {
+namespace {
+
+/// All that a caller sees of a contact, to the last bit.
+struct Seen {
+  bool first_is_o1;
+  std::intptr_t b1, b2;
+  double numbers[7];
+
+  bool operator==(const Seen& other) const {
+    return first_is_o1 == other.first_is_o1 && b1 == other.b1 && b2 == other.b2 &&
+           std::memcmp(numbers, other.numbers, sizeof numbers) == 0;
+  }
+  friend std::ostream& operator<<(std::ostream& out, const Seen& s) { return out << '(' << s.b1 << ' ' << s.b2 << ')'; }
+};
+
+template <typename S>
+struct Question {
+  std::shared_ptr<fcl::CollisionGeometry<S>> a, b;
+  fcl::Transform3<S> X, Y;
+
+  std::vector<Seen> ask(const fcl::CollisionRequest<S>& request) const {
+    fcl::CollisionResult<S> result;
+    fcl::collide(a.get(), X, b.get(), Y, request, result);
+    std::vector<Seen> seen;
+    for (std::size_t i = 0; i < result.numContacts(); ++i) {
+      const auto& c = result.getContact(i);
+      Seen s{c.o1 == a.get() && c.o2 == b.get(), c.b1, c.b2, {}};
+      for (int k = 0; k < 3; ++k) {
+        s.numbers[k] = static_cast<double>(c.normal[k]);
+        s.numbers[3 + k] = static_cast<double>(c.pos[k]);
+      }
+      s.numbers[6] = static_cast<double>(c.penetration_depth);
+      if (!request.enable_contact) std::fill(s.numbers, s.numbers + 7, 0.0);  // any NaN
+      seen.push_back(s);
+    }
+    return seen;
+  }
+};
+
+template <typename S>
+class Contacts : public ::testing::Test {
+ protected:
+  using Geometry = std::shared_ptr<fcl::CollisionGeometry<S>>;
+  using Make = std::function<Geometry(const Options&)>;
+
+  static Make model(const test::Raw& raw, Answer answer, double margin = 0) {
+    return [mesh = raw.mesh(), answer, margin](Options options) {
+      options.answer = answer;
+      options.margin = margin;
+      options.depth = 5;
+      return std::make_shared<Model<S>>(mesh, options);
+    };
+  }
+  static Make fixed(Geometry geometry) {
+    return [geometry](const Options&) { return geometry; };
+  }
+
+  Contacts() {
+    const test::Raw torus = test::torus(24), other = test::torus(17, 0.2);
+    const Make exact = model(torus, Answer::kExact), spheres = model(torus, Answer::kConservative);
+    const Make far = model(other, Answer::kExact, 0.02);
+    pairs = {{exact, model(other, Answer::kExact)},
+             {exact, exact},
+             {exact, far},
+             {exact, model(test::adversarial(), Answer::kExact)},
+             {spheres, model(other, Answer::kConservative)},
+             {spheres, model(other, Answer::kExact)},
+             {model(other, Answer::kExact), spheres}};
+    std::vector<Geometry> partners = {test::bvh<fcl::OBBRSS<S>>(other), std::make_shared<fcl::Box<S>>(S(1), S(1), S(1)),
+                                      std::make_shared<fcl::Capsule<S>>(S(0.4), S(1))};
+#if FCL_HAVE_OCTOMAP
+    auto octomap = std::make_shared<octomap::OcTree>(0.2);
+    for (int i = 0; i < 500; ++i) {
+      const auto x = static_cast<float>(i % 10) / 5 - 1, y = static_cast<float>(i / 10 % 10) / 5 - 1;
+      if (i % 3 != 0) octomap->updateNode(octomap::point3d(x, y, static_cast<float>(i / 100) / 5 - 0.5f), true);
+    }
+    partners.push_back(std::make_shared<fcl::OcTree<S>>(octomap));
+#endif
+    for (const Geometry& partner : partners) {
+      pairs.push_back({exact, fixed(partner)});
+      pairs.push_back({fixed(partner), exact});
+      pairs.push_back({fixed(partner), spheres});
+    }
+    std::mt19937 g(3);
+    std::normal_distribution<double> n;
+    for (int i = 0; i < 4; ++i) {
+      const Eigen::Matrix3d R = Eigen::Quaterniond(n(g), n(g), n(g), n(g)).normalized().toRotationMatrix();
+      poses.push_back(test::pose<S>(R, Eigen::Vector3d(n(g), n(g), n(g)) / 3));
+    }
+    for (const std::size_t most : {1, 2, 7, 100000}) {
+      for (const bool contact : {true, false}) {
+        if (most > 1 || contact) requests.emplace_back(most, contact);
+      }
+    }
+  }
+
+  static Model<S>* asModel(const Geometry& g) { return dynamic_cast<Model<S>*>(g.get()); }
+
+  /// Everything there is, in the order of ids; and each request gets the first of it.
+  void expectFirstOfAll(const Question<S>& q, const std::string& what) const {
+    const auto all = q.ask(fcl::CollisionRequest<S>(100000, true));
+    for (std::size_t i = 0; i < all.size(); ++i) {
+      ASSERT_TRUE(all[i].first_is_o1) << what;
+      if (i > 0) {
+        ASSERT_LT(std::tie(all[i - 1].b1, all[i - 1].b2), std::tie(all[i].b1, all[i].b2)) << what;
+      }
+    }
+    for (const auto& request : requests) {
+      auto expected = all;
+      if (!request.enable_contact) {
+        for (Seen& s : expected) std::fill(s.numbers, s.numbers + 7, 0.0);
+      }
+      expected.resize(std::min(all.size(), request.num_max_contacts));
+      ASSERT_EQ(q.ask(request), expected) << what << ", at most " << request.num_max_contacts << " contacts";
+    }
+    fcl::CollisionResult<S> verdict;
+    fcl::collide(q.a.get(), q.X, q.b.get(), q.Y, fcl::CollisionRequest<S>(), verdict);
+    ASSERT_EQ(verdict.isCollision(), !all.empty()) << what;
+  }
+
+  std::vector<std::pair<Make, Make>> pairs;
+  std::vector<fcl::Transform3<S>> poses;
+  std::vector<fcl::CollisionRequest<S>> requests;
+};
+using Scalars = ::testing::Types<float, double>;
+TYPED_TEST_SUITE(Contacts, Scalars);
+
+TYPED_TEST(Contacts, DoNotDependOnWhatHappenedBefore) {
+  using S = TypeParam;
+  std::vector<Options> ways(4);
+  ways[1].memory_budget = 20000;
+  ways[2].ttl = std::chrono::milliseconds(1);
+  std::int64_t ticks = 0;
+  ways[2].clock = [&ticks] { return Clock::time_point(std::chrono::milliseconds(ticks += 7)); };
+  ways[3].subdivision = Subdivision::kOctree;
+  std::size_t contacts = 0;
+  for (std::size_t p = 0; p < this->pairs.size(); ++p) {
+    const auto& [make_a, make_b] = this->pairs[p];
+    const Question<S> reference{make_a({}), make_b({}), this->poses[0], this->poses[1]};
+    for (const auto& request : this->requests) {
+      const auto expected = reference.ask(request);
+      contacts += expected.size();
+      const auto cold = Question<S>{make_a({}), make_b({}), this->poses[0], this->poses[1]};
+      ASSERT_EQ(cold.ask(request), expected) << "pair " << p << ", cold";
+      ASSERT_EQ(cold.ask(request), expected) << "pair " << p << ", warm";
+      for (const auto& geometry : {cold.a, cold.b}) {
+        if (Model<S>* m = this->asModel(geometry)) m->prune(Clock::now() + std::chrono::hours(1));
+      }
+      ASSERT_EQ(cold.ask(request), expected) << "pair " << p << ", after prune";
+      std::vector<Seen> elsewhere;
+      std::thread([&] { elsewhere = cold.ask(request); }).join();
+      ASSERT_EQ(elsewhere, expected) << "pair " << p << ", on another thread";
+    }
+    this->expectFirstOfAll(reference, "pair " + std::to_string(p));
+    for (std::size_t w = 0; w < ways.size(); ++w) {
+      Question<S> other{make_a(ways[w]), make_b(ways[w]), this->poses[2], this->poses[3]};
+      other.ask(fcl::CollisionRequest<S>());
+      other.ask(this->requests.back());
+      if (w % 2 == 1) {
+        for (const auto& geometry : {other.a, other.b}) {
+          if (Model<S>* m = this->asModel(geometry)) m->expandAll(4);
+        }
+      }
+      other.X = this->poses[0];
+      other.Y = this->poses[1];
+      for (const auto& request : this->requests) {
+        auto expected = reference.ask(request);
+        // The cells of the two subdivisions are others.
+        const auto* a = this->asModel(other.a);
+        const auto* b = this->asModel(other.b);
+        const bool cells = (a != nullptr && a->options().answer == Answer::kConservative) ||
+                           (b != nullptr && b->options().answer == Answer::kConservative);
+        if (cells && w == 3) {
+          this->expectFirstOfAll(other, "pair " + std::to_string(p) + ", octree");
+        } else {
+          ASSERT_EQ(other.ask(request), expected) << "pair " << p << ", way " << w;
+        }
+      }
+    }
+  }
+  EXPECT_GT(contacts, 1000u);
+}
+
+TYPED_TEST(Contacts, DoNotDependOnTheOracle) {
+  using S = TypeParam;
+  for (const OracleInfo& oracle : availableOracles()) {
+    if (!oracle.why_not.empty() || oracle.kind == OracleKind::kSampled) continue;
+    Options options;
+    options.oracle = oracle.kind;
+    for (std::size_t p = 0; p < this->pairs.size(); p += 2) {
+      const auto& [make_a, make_b] = this->pairs[p];
+      Options cpu;
+      cpu.oracle = OracleKind::kCpu;
+      const Question<S> reference{make_a(cpu), make_b(cpu), this->poses[0], this->poses[1]};
+      for (const auto& request : this->requests) {
+        const Question<S> q{make_a(options), make_b(options), this->poses[0], this->poses[1]};
+        ASSERT_EQ(q.ask(request), reference.ask(request)) << oracle.name << ", pair " << p;
+      }
+    }
+  }
+}
+
+// More pairs than are gathered at a time: the first of them are found all the same.
+TYPED_TEST(Contacts, AreTheFirstOfVeryMany) {
+  using S = TypeParam;
+  test::Raw fan;
+  for (int i = 0; i < 400; ++i) {
+    const double z = i * 1e-4;
+    const std::size_t n = fan.vertices.size();
+    fan.vertices.insert(fan.vertices.end(), {{-1, -1, z}, {1, -1, -z}, {0, 1, 0.01}});
+    fan.triangles.emplace_back(n, n + 1, n + 2);
+  }
+  std::mt19937 g(9);
+  std::shuffle(fan.triangles.begin(), fan.triangles.end(), g);
+  Question<S> q{std::make_shared<Model<S>>(fan.mesh()), std::make_shared<Model<S>>(fan.mesh()),
+                fcl::Transform3<S>::Identity(), test::pose<S>(Eigen::Matrix3d::Identity(), {0.01, 0.02, 0})};
+  const auto all = q.ask(fcl::CollisionRequest<S>(10000000, true));
+  ASSERT_GT(all.size(), std::size_t{1} << 16);
+  for (const std::size_t most : {1, 10, 1000}) {
+    auto expected = all;
+    expected.resize(most);
+    EXPECT_EQ(q.ask(fcl::CollisionRequest<S>(most, true)), expected);
+  }
+}
+
+TYPED_TEST(Contacts, AccumulateInOrder) {
+  using S = TypeParam;
+  const auto& [make_a, make_b] = this->pairs[0];
+  const Question<S> q{make_a({}), make_b({}), this->poses[0], this->poses[1]};
+  const auto all = q.ask(fcl::CollisionRequest<S>(100000, true));
+  ASSERT_GT(all.size(), 5u);
+  fcl::CollisionResult<S> result;
+  fcl::collide(q.a.get(), q.X, q.b.get(), q.Y, fcl::CollisionRequest<S>(3, true), result);
+  fcl::collide(q.a.get(), q.X, q.b.get(), q.Y, fcl::CollisionRequest<S>(5, true), result);
+  ASSERT_EQ(result.numContacts(), 5u);
+  for (std::size_t i = 0; i < 5; ++i) {
+    EXPECT_EQ(result.getContact(i).b1, all[i % 3].b1);
+    EXPECT_EQ(result.getContact(i).b2, all[i % 3].b2);
+  }
+}
+
+TYPED_TEST(Contacts, IntegralsAreThoseOfFcl) {
+  using S = TypeParam;
+  test::Raw open = test::torus(13), turned = test::box({1, 2, 3}, {4, 4, 4});
+  open.triangles.resize(open.triangles.size() / 2);
+  for (auto& t : turned.triangles) std::swap(t[0], t[1]);
+  test::Raw far = test::torus(20);
+  far.move({10, -7, 3});
+  for (const test::Raw& raw : {test::box({0, 0, 0}, {1, 2, 3}), test::torus(20), open, turned, far}) {
+    const Model<S> model(raw.mesh());
+    const auto bvh = test::bvh<fcl::OBBRSS<S>>(raw);
+    const double size = raw.mesh()->bounds().diagonal().norm() + raw.mesh()->bounds().center().norm();
+    const double error = 100 * static_cast<double>(std::numeric_limits<S>::epsilon()) * std::pow(size, 3);
+    EXPECT_NEAR(model.computeVolume(), bvh->computeVolume(), error);
+    EXPECT_NE(model.computeVolume(), S(0));
+    EXPECT_LT((model.computeCOM() - bvh->computeCOM()).norm(), error * size / std::abs(bvh->computeVolume()));
+    EXPECT_LT((model.computeMomentofInertia() - bvh->computeMomentofInertia()).norm(), error * size * size);
+    EXPECT_LT((model.computeMomentofInertiaRelatedToCOM() - bvh->computeMomentofInertiaRelatedToCOM()).norm(),
+              10 * error * size * size);
+  }
+  const Model<S> unit(test::box({0, 0, 0}, {1, 1, 1}).mesh());
+  EXPECT_NEAR(unit.computeVolume(), 1, 1e-6);
+  EXPECT_LT((unit.computeCOM() - fcl::Vector3<S>::Constant(S(0.5))).norm(), 1e-6);
+  EXPECT_NEAR(unit.computeMomentofInertia()(0, 0), 2.0 / 3, 1e-6);
+  EXPECT_NEAR(unit.computeMomentofInertia()(0, 1), -0.25, 1e-6);
+}
+
+/// Runs f in a child, which has so many seconds. 0: f returned true.
+int inChild(const std::function<bool()>& f) {
+  const pid_t child = fork();
+  if (child == 0) {
+    alarm(30);  // a child that hangs is killed by it
+    bool right = false;
+    try {
+      right = f();
+    } catch (const std::exception& e) {
+      std::fprintf(stderr, "in the child: %s\n", e.what());
+    }
+    _exit(right ? 0 : 1);
+  }
+  int status = -1;
+  waitpid(child, &status, 0);
+  return status;
+}
+
+using ModelPtr = std::shared_ptr<Modeld>;
+
+bool touches(const ModelPtr& a, const ModelPtr& b, double x) {
+  fcl::Transform3d X = fcl::Transform3d::Identity();
+  X.translation()[0] = x;
+  return test::touching<double>(*a, fcl::Transform3d::Identity(), *b, X);
+}
+
+ModelPtr cpuModel(const std::shared_ptr<const Mesh>& mesh) {
+  Options options;
+  options.oracle = OracleKind::kCpu;
+  return std::make_shared<Modeld>(mesh, options);
+}
+
+TEST(Fork, AChildUsesModelsOfAQuietParent) {
+  const auto mesh = test::torus(30).mesh();
+  const ModelPtr a = cpuModel(mesh), b = cpuModel(mesh);
+  EXPECT_TRUE(touches(a, b, 0.1));
+  EXPECT_EQ(inChild([&] {
+              const bool right = touches(a, b, 0.2) && !touches(a, b, 4);
+              a->prune(Clock::now() + std::chrono::hours(1));
+              b->expandAll(4);
+              b->updateVertices(mesh->vertices());
+              // And a child of the child.
+              return right && touches(a, b, 0.3) && inChild([&] { return touches(a, b, 0.3); }) == 0;
+            }),
+            0);
+  EXPECT_TRUE(touches(a, b, 0.3));
+}
+
+// Threads query, grow, prune and deform; at any moment a child begins.
+TEST(Fork, AChildOfABusyParentNeverHangs) {
+  const auto mesh = test::torus(40).mesh();
+  const ModelPtr a = cpuModel(mesh), b = cpuModel(mesh);
+  std::atomic<bool> stop{false};
+  std::vector<std::thread> threads;
+  for (int t = 0; t < 3; ++t) {
+    threads.emplace_back([&, t] {
+      std::mt19937 g(static_cast<unsigned>(t));
+      std::uniform_real_distribution<double> u(0, 2);
+      while (!stop) touches(a, b, u(g));
+    });
+  }
+  threads.emplace_back([&] {
+    while (!stop) {
+      a->prune(Clock::now() + std::chrono::hours(1));
+      b->updateVertices(mesh->vertices());
+    }
+  });
+  int answered = 0, refused = 0;
+  for (int round = 0; round < 40; ++round) {
+    std::this_thread::sleep_for(std::chrono::microseconds(300 * round));
+    // Models of its own always serve.
+    EXPECT_EQ(inChild([&] {
+                const ModelPtr own = cpuModel(mesh), other = cpuModel(test::torus(20).mesh());
+                return touches(own, other, 0.1) && !touches(own, other, 4);
+              }),
+              0);
+    // The parent's answer rightly or refuse, and so does all else that waits for locks.
+    const int status = inChild([&] {
+      int said_no = 0;
+      const auto attempt = [&](const std::function<bool()>& f) {
+        try {
+          return f();
+        } catch (const std::runtime_error& e) {
+          ++said_no;
+          return std::string(e.what()).find("fork") != std::string::npos;
+        }
+      };
+      const bool right = attempt([&] { return touches(a, b, 0.1); }) && attempt([&] { return !touches(a, b, 4); }) &&
+                         attempt([&] { return a->statistics().resident_nodes > 0; }) &&
+                         attempt([&] { return a->prune(), true; }) &&
+                         attempt([&] { return b->updateVertices(mesh->vertices()), true; }) &&
+                         attempt([&] { return touches(b, a, 0.1); });
+      if (right && said_no > 0) _exit(7);
+      return right;
+    });
+    ASSERT_TRUE(WIFEXITED(status)) << "killed by signal " << WTERMSIG(status) << " in round " << round;
+    ASSERT_TRUE(WEXITSTATUS(status) == 0 || WEXITSTATUS(status) == 7) << WEXITSTATUS(status);
+    (WEXITSTATUS(status) == 0 ? answered : refused)++;
+  }
+  stop = true;
+  for (std::thread& t : threads) t.join();
+  EXPECT_GT(refused, 0) << "no child began while the models were in use: " << answered << " answered";
+}
+
+}  // namespace
+}  // namespace bocst

@@ -1,0 +1,75 @@
+#!/bin/bash
+# SPDX-License-Identifier: BSD-3-Clause
+#
+# A planner as a plugin: the process that opens it knows nothing of bocst. Builds program.cpp, which does not include
+# <bocst/fcl.h>, as a plugin that links libbocst before libfcl, and opens it from programs that are linked in several
+# ways, and from Python. Each must answer rightly, or refuse with the remedy.
+#
+# plugins.sh SOURCE_DIR WORK LIBBOCST LIBFCL PYTHON CXX [FLAG...]
+set -euo pipefail
+
+source=$1 work=$2 libbocst=$3 libfcl=$4 python=$5
+shift 5
+compiler=("$1")
+shift
+flags=("$@")
+if command -v ccache > /dev/null; then launcher=(ccache); else launcher=(); fi
+mkdir -p "$work"
+failed=0
+
+"${launcher[@]}" "${compiler[@]}" -std=c++17 -O2 -fPIC "${flags[@]}" -c "$source/program.cpp" -o "$work/planner.o"
+"${compiler[@]}" -shared "$work/planner.o" -o "$work/planner.so" "$libbocst" "$libfcl" -lccd -loctomap -loctomath \
+  "-Wl,-rpath,$(dirname "$libbocst")"
+
+check() { # name must command...
+  local name=$1 must=$2 status=0 got verdict=ok
+  shift 2
+  "$@" > "$work/$name.txt" 2>&1 || status=$?
+  case $status in
+    0) got=answers ;;
+    1) if grep -q 'overlapping models are told to be free' "$work/$name.txt"; then got=misses; else got=WRONG; fi ;;
+    3) if grep -q -- '-Wl,--no-as-needed -lbocst' "$work/$name.txt"; then got=refuses; else got="refuses without the remedy"; fi ;;
+    *) got="exit $status" ;;
+  esac
+  [[ $got == "$must" ]] || { verdict=FAILED; failed=1; }
+  printf '%-28s %-10s %s\n' "$name" "$got" "$verdict"
+  if [[ $verdict == FAILED ]]; then sed 's/^/    /' "$work/$name.txt"; fi
+}
+
+host() { # name flags...: a program that is linked so; --as-needed is what many linkers are told first
+  local name=$1
+  shift
+  "${compiler[@]}" -std=c++17 "$source/host.cpp" -o "$work/$name" -Wl,--as-needed "$@" -ldl "-Wl,-rpath,$(dirname "$libbocst")"
+}
+needs() { readelf -d "$1" | grep -q "NEEDED.*$2" || { echo "FAILED: $1 does not need $2"; failed=1; }; }
+keep() { echo "-Wl,--push-state,--no-as-needed,$1,--pop-state"; }
+
+# Nobody loaded libfcl before: the plugin's own order counts.
+host bare
+check bare answers "$work/bare" "$work/planner.so"
+
+# The program has libfcl, and without the remedy the linker drops libbocst.
+host dropped "$libbocst" "$(keep "$libfcl")"
+if readelf -d "$work/dropped" | grep -q 'NEEDED.*libbocst'; then echo "FAILED: libbocst was not dropped"; failed=1; fi
+check dropped refuses "$work/dropped" "$work/planner.so"
+check dropped-preload answers env LD_PRELOAD="$libbocst" "$work/dropped" "$work/planner.so"
+check dropped-check-off misses env CHECK_OFF=1 "$work/dropped" "$work/planner.so"
+
+# The remedy of the message, and what pkg-config says.
+host remedy -Wl,--no-as-needed "$libbocst" "$libfcl"
+needs "$work/remedy" libbocst
+check remedy answers "$work/remedy" "$work/planner.so"
+host kept "$libbocst" "$(keep "$libbocst")" "$(keep "$libfcl")"
+needs "$work/kept" libbocst
+check kept answers "$work/kept" "$work/planner.so"
+
+# Python, with us first and with FCL first.
+call='import ctypes, sys; [ctypes.CDLL(l, mode) for l, mode in zip(sys.argv[2:], [getattr(ctypes, sys.argv[1])] * 9)];
+sys.exit(ctypes.CDLL(sys.argv[-1]).planner())'
+for mode in RTLD_LOCAL RTLD_GLOBAL; do
+  check "python-bocst-first-$mode" answers "$python" -c "$call" $mode "$libbocst" "$libfcl" "$work/planner.so"
+  check "python-fcl-first-$mode" refuses "$python" -c "$call" $mode "$libfcl" "$work/planner.so"
+done
+check python-alone answers "$python" -c "$call" RTLD_LOCAL "$work/planner.so"
+check python-preload answers env LD_PRELOAD="$libbocst" "$python" -c "$call" RTLD_LOCAL "$libfcl" "$work/planner.so"
+exit $failed
