@@ -98,8 +98,12 @@ for line in "${objects[@]}"; do
   done
 done
 
-# The remedies that the complaint names.
-check preload-O2-without-after answers env LD_PRELOAD="$shared_lib" "$work/shared-O2-without-after"
+# The remedies that the complaint names. A sanitizer's own library wants to be the first.
+preload=$shared_lib
+if [[ " ${compile_flags[*]}" == *-fsanitize=address* ]]; then
+  preload="$("${compiler[@]}" -print-file-name=libasan.so) $preload"
+fi
+check preload-O2-without-after answers env LD_PRELOAD="$preload" "$work/shared-O2-without-after"
 check check-off-O2-with-after answers env BOCST_DISPATCH_CHECK=off "$work/shared-O2-with-after"
 check code-off-O2-with-after answers env CHECK_OFF=1 "$work/shared-O2-with-after"
 # And what the check is for: without it, FCL's own table says "free".

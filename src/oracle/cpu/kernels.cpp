@@ -23,12 +23,8 @@ using M = hn::Mask<D>;
 // Triangles at once: two where vectors are short, else four.
 constexpr std::size_t kSpanLanes = 16;
 
-struct Alive {
-  M octant[8];
-};
-
 // Edge e = b - a against the axis e x k: only the coordinates p = k + 1 and q = k + 2 matter.
-HWY_INLINE void edgeAxis(D d, V ep, V eq, V ap, V aq, V bp, V bq, V half, int p, int q, Alive& alive) {
+HWY_INLINE void edgeAxis(D d, V ep, V eq, V ap, V aq, V bp, V bq, V half, int p, int q, M (&alive)[8]) {
   const V fa = hn::Sub(hn::Mul(ep, aq), hn::Mul(eq, ap));
   const V fb = hn::Sub(hn::Mul(ep, bq), hn::Mul(eq, bp));
   const V lo = hn::Min(fa, fb), hi = hn::Max(fa, fb);
@@ -46,7 +42,7 @@ HWY_INLINE void edgeAxis(D d, V ep, V eq, V ap, V aq, V bp, V bq, V half, int p,
       const M meets = hn::And(hn::Le(lo_r, c), hn::Ge(hi_r, c));
       BOCST_UNROLL
       for (int o = 0; o < 8; ++o) {
-        if ((o >> p & 1) == sp && (o >> q & 1) == sq) alive.octant[o] = hn::And(alive.octant[o], meets);
+        if ((o >> p & 1) == sp && (o >> q & 1) == sq) alive[o] = hn::And(alive[o], touch);
       }
     }
   }
@@ -81,10 +77,10 @@ void OctantMasks(const float* xyz, std::size_t stride, std::size_t count, float 
       side[c][0] = hn::And(hn::Le(lo, rounding_margin), hn::Ge(hi, low_outer));
       side[c][1] = hn::And(hn::Ge(hi, low_margin), hn::Le(lo, outer));
     }
-    Alive alive;
+    M alive[8];
     BOCST_UNROLL
     for (int o = 0; o < 8; ++o) {
-      alive.octant[o] = hn::And(hn::And(side[0][o & 1], side[1][o >> 1 & 1]), side[2][o >> 2 & 1]);
+      alive[o] = hn::And(hn::And(side[0][o & 1], side[1][o >> 1 & 1]), side[2][o >> 2 & 1]);
     }
 
     V e[3][3];
@@ -113,7 +109,7 @@ void OctantMasks(const float* xyz, std::size_t stride, std::size_t count, float 
       V c = (o & 1) ? nx : hn::Neg(nx);
       c = (o >> 1 & 1) ? hn::Add(c, ny) : hn::Sub(c, ny);
       c = (o >> 2 & 1) ? hn::Add(c, nz) : hn::Sub(c, nz);
-      alive.octant[o] = hn::And(alive.octant[o], hn::Le(hn::Abs(hn::Sub(dist, c)), reach));
+      alive[o] = hn::And(alive[o], hn::Le(hn::Abs(hn::Sub(dist, c)), reach));
     }
 
     BOCST_UNROLL
@@ -128,7 +124,7 @@ void OctantMasks(const float* xyz, std::size_t stride, std::size_t count, float 
     auto bits = hn::Zero(di);
     BOCST_UNROLL
     for (int o = 0; o < 8; ++o) {
-      bits = hn::Or(bits, hn::IfThenElseZero(hn::RebindMask(di, alive.octant[o]), hn::Set(di, 1 << o)));
+      bits = hn::Or(bits, hn::IfThenElseZero(hn::RebindMask(di, alive[o]), hn::Set(di, 1 << o)));
     }
     HWY_ALIGN std::int32_t lanes[8];
     hn::Store(bits, di, lanes);
@@ -193,7 +189,7 @@ HWY_INLINE hn::Vec<D16> cornersOf(D16 d, const std::int16_t* vertices, const std
 
 // a times b, each two neighbours added up; the products fit in 15 bits.
 template <class D16>
-HWY_INLINE auto sumsOfPairs(D16 d, hn::Vec<D16> a, hn::Vec<D16> b) {
+HWY_INLINE auto sumsOfPairs([[maybe_unused]] D16 d, hn::Vec<D16> a, hn::Vec<D16> b) {
   const hn::Repartition<std::int32_t, D16> d32;
 #if HWY_ARCH_X86 && HWY_TARGET != HWY_EMU128
   auto unused = hn::Zero(d32);
