@@ -2,6 +2,7 @@
 #pragma once
 
 #include <bocst/fcl.h>
+#include <bocst/log.h>
 #include <bocst/mesh.h>
 #include <bocst/model.h>
 #include <bocst/node_view.h>
