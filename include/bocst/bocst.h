@@ -3,6 +3,7 @@
 
 #include <bocst/dispatch_check.h>
 #include <bocst/fcl.h>
+#include <bocst/log.h>
 #include <bocst/mesh.h>
 #include <bocst/model.h>
 #include <bocst/node_view.h>

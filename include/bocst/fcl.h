@@ -29,38 +29,48 @@
 
 namespace bocst {
 
-/// Do the two geometries at these poses (world from geometry) touch? As fcl::collide: returns result.numContacts(),
-/// which accumulates; stops at request.num_max_contacts; adds nothing when request.isSatisfied(result) already.
+/// Do the two geometries collide at the poses X_W1 and X_W2 (world from geometry)? As fcl::collide: returns
+/// result.numContacts(), which accumulates; stops at request.num_max_contacts; adds nothing when
+/// request.isSatisfied(result) already.
 ///
-/// A pair with a Model: partners are another Model, fcl::BVHModel<BV> of any BV, FCL's shapes (Box, Sphere, Ellipsoid,
-/// Capsule, Cone, Cylinder, Convex, Plane, Halfspace, TriangleP) and OcTree. With exact answers there is one contact
-/// for each pair of primitives that touch: triangles, shapes, occupied cells of an octree. Between meshes the set of
-/// pairs is the one that FCL reports for BVHModel<OBBRSS>; FCL may list a pair more than once, we do not. Shapes and
-/// cells are solid; to a triangle they touch when the two meet, or when FCL's own test says so, which may be where they
-/// are apart by less than its tolerance (gjk_tolerance, and rounding in S).
-/// - o1, o2: the caller's order, whatever the geometries are.
-/// - b1, b2: triangle ids; on the side of a Model with conservative answers, the Morton code of the cell at its
-///   collision depth (x in the lowest bit of each triple); Contact::NONE for shapes; for octrees the query cell id of
-///   FCL, whole.
-/// - with enable_contact: normal is a unit vector from o1 to o2 in world frame, penetration_depth >= 0 the length of a
-///   translation of o2's primitive along normal that ends the contact of these two primitives, pos a point in or beside
-///   their overlap. The translation is the shortest between triangles, and between triangles and boxes, balls, cells,
-///   planes and half-spaces; with other shapes seldom longer. It is about two primitives, not about two solids.
-/// - with a margin (Options::margin, the sum of both models'; other partners have none of their own), a contact is a
-///   pair of primitives no farther apart than that; penetration_depth is the margin minus their distance (plus the
-///   depth above, when they meet), normal the way between their nearest points, and pos the middle of it.
-/// - solid (Options::solid): where no primitives touch but one geometry (a connected piece of it, an occupied cell) is
-///   inside the other, there is one contact, with Contact::NONE for b1 and b2; penetration_depth is the distance of the
-///   surfaces (plus the margin), which is what it takes at least to part them, normal the way for o2 (that brings the
-///   surfaces together there), pos between the nearest points. Beside a BVHModel, a query whose bounding balls meet
-///   takes time linear in its triangles for that. Planes and half-spaces have no end, so they are inside nothing.
-/// - without enable_contact: normal, pos and penetration_depth are NaN.
-/// - enable_cost adds the overlap of the primitives' world boxes, as FCL does; with shapes and octrees, and
-///   use_approximate_cost, that of the box about the whole mesh (unlike FCL, for occupied cells too).
-/// Collisions are reported between occupied geometries only (cost_density >= threshold_occupied), as in FCL.
+/// **Pairs.** One of the two is a Model; its partner is a Model, an fcl::BVHModel<BV> of any BV, one of FCL's shapes
+/// (Box, Sphere, Ellipsoid, Capsule, Cone, Cylinder, Convex, Plane, Halfspace, TriangleP) or an OcTree. o1 and o2 keep
+/// the caller's order. As in FCL, only occupied geometries collide (cost_density >= threshold_occupied).
 ///
-/// The verdict does not depend on the argument order, nor on what is resident, nor on the GJK solver, but for a
-/// triangle and a shape or a cell that are apart by less than the solver's tolerance.
+/// **Contacts.** With exact answers, one for each pair of primitives that meet: triangles, shapes, occupied cells of an
+/// octree. Between meshes the set of pairs is the one that FCL reports for BVHModel<OBBRSS>, each pair once. Shapes and
+/// cells are solid. A triangle and a shape or cell also make a contact where FCL's own test says so, which may be where
+/// they are apart by less than its tolerance (gjk_tolerance, and rounding in S).
+///
+/// **Ids.** b1 belongs to o1, b2 to o2: the triangle's index; for a Model with conservative answers the Morton code of
+/// the cell at its collision depth (x in the lowest bit of each triple); for an octree FCL's query cell id; for a shape
+/// Contact::NONE.
+///
+/// **Normal, depth, position**, with enable_contact (else all three are NaN), in world frame. P1 and P2 are the two
+/// primitives as point sets, n the normal, a unit vector from o1 to o2, and d >= 0 the penetration_depth:
+///     P1 and P2 + d n do not overlap: they touch at most.
+/// Between triangles, and between triangles and boxes, spheres, cells, planes and half-spaces, d is the least of all
+/// directions; with other shapes it is seldom larger than that. pos is a point in their overlap or beside it. All three
+/// are about these two primitives, not about the two bodies.
+///
+/// **Margin** (Options::margin; m is the sum of both models', other partners have none). A contact is a pair of
+/// primitives at a distance <= m. With p1 and p2 the nearest points of P1 and P2,
+///     apart:       n = (p2 - p1) / |p2 - p1|,   d = m - |p2 - p1|,   pos = (p1 + p2) / 2
+///     overlapping: n and pos as without margin,  d = m + the depth without margin
+///
+/// **Solids** (Options::solid). Where no primitives meet but one geometry (a connected component of it, an occupied
+/// cell) is inside the other, there is one contact with Contact::NONE for b1 and b2. With p1 and p2 the nearest points
+/// of the two surfaces,
+///     n = (p1 - p2) / |p1 - p2|,   d = |p1 - p2| + m,   pos = (p1 + p2) / 2
+/// so moving o2 by |p1 - p2| n brings the surfaces together; to part them takes at least d. With a BVHModel such a
+/// query takes time linear in its triangles where the bounding spheres meet. Planes and half-spaces are unbounded, so
+/// they are inside nothing.
+///
+/// **Costs.** enable_cost adds the overlap of the primitives' world boxes, as FCL does; with shapes and octrees, and
+/// use_approximate_cost, that of the box about the whole mesh (unlike FCL, for occupied cells too).
+///
+/// The verdict does not depend on the argument order, on what is resident, or on the GJK solver, except for a triangle
+/// and a shape or cell that are apart by less than the solver's tolerance.
 /// @throws std::invalid_argument for a partner that is not supported (FCL would answer 0, "free").
 /// Thread rule: any number of threads on the same models, each with its own request and result.
 template <typename S>

@@ -19,7 +19,7 @@ enum class Answer {
   kConservative,  ///< The spheres of Options::depth, as in the paper: never misses, overestimates by the sphere size.
 };
 
-/// Who answers "which octants does the surface meet?".
+/// The backend that subdivides cells: it finds the octants that the surface meets.
 enum class OracleKind {
   kAuto,       ///< BOCST_ORACLE where it is set; else compute on a hardware GPU, else the CPU.
   kCpu,        ///< SIMD on the calling thread.
@@ -61,11 +61,12 @@ struct Options {
   /// distance() stays that of the surfaces.
   double margin = 0;
 
-  /// The mesh also collides with what is wholly inside it, either way round: with the other geometry, if a connected
-  /// piece of it is inside. The mesh must be watertight: each edge is run through as often in one direction as in the
-  /// other (vertices at the same place are one; triangles without area do not matter), else std::invalid_argument, also
-  /// from updateVertices(). Inside is what the surface winds about, whichever way round: pieces may overlap, and one
-  /// turned over within another is a cavity. Costs a sort of the edges and 12 to 40 bytes a triangle.
+  /// The mesh also collides with what is wholly inside it, in both argument orders: with the other geometry, if a
+  /// connected component of that is inside. A point is inside if its winding number is not zero: components may
+  /// overlap, and one with the opposite orientation inside another is a cavity. The mesh must be watertight: each edge
+  /// occurs as often in one direction as in the other (vertices at the same position count as one; triangles without
+  /// area do not matter), else std::invalid_argument, also from updateVertices(). Costs a sort of the edges and 12 to
+  /// 40 bytes a triangle.
   bool solid = false;
 
   /// The paper's level rule (5.3): with kBono and 2^n + 2 <= d_t < 2^n + 2^(n-1), n = nbits(d_t) - 1, the collision

@@ -43,7 +43,7 @@ set(CPACK_DEBIAN_TOOLS_PACKAGE_SECTION science)
 set(CPACK_DEBIAN_TOOLS_PACKAGE_DEPENDS ${needs_library})
 set(CPACK_DEBIAN_TOOLS_PACKAGE_SHLIBDEPS ON)
 set(CPACK_COMPONENT_TOOLS_DESCRIPTION "The program bocst: the health of a mesh, its sphere-tree
-as a page in 3D, single queries, and validation and timing beside FCL.")
+as a page in 3D, single queries, and validation and timing compared with FCL.")
 # The tools' own libraries are in another of these packages.
 set(CPACK_DEBIAN_PACKAGE_SHLIBDEPS_PRIVATE_DIRS ${PROJECT_BINARY_DIR}/src)
 

@@ -13,7 +13,7 @@ struct OracleSelection {
   int device = gl::ContextRequest::kAnyDevice;
 };
 
-/// With kAuto, BOCST_ORACLE has its say. @throws OracleError when it says what is not known.
+/// With kAuto, the environment variable BOCST_ORACLE overrides. @throws OracleError for a value that is not known.
 OracleSelection oracleSelectionOf(OracleKind kind);
 
 }  // namespace bocst::oracle

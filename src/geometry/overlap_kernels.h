@@ -5,6 +5,7 @@
 #include <cstdint>
 
 #include "bounds/loose_frame.h"
+#include "lattice/limits.h"
 #include "oracle/oracle.h"
 
 namespace bocst::query {
@@ -36,7 +37,7 @@ std::uint8_t overlappingLanes(const bounds::LooseFrame& frame, const oracle::Oct
 
 /// Corners of up to kCapacity triangles as structure of arrays, in one frame, near the origin.
 struct TrianglePack {
-  static constexpr std::size_t kCapacity = 32;
+  static constexpr std::size_t kCapacity = kMaxLeafTriangles;
   alignas(64) float xyz[9][kCapacity];  ///< Coordinate c of corner k at [3 * k + c].
   std::size_t count = 0;
   float size = 0;  ///< Largest coordinate, in absolute value.

@@ -4,17 +4,21 @@
 #include <cstddef>
 #include <cstdint>
 
+#include "log/assert.h"
+
 namespace bocst::query {
 
 /// Pairs of triangles in one frame, as structure of arrays: coordinate c of corner k of the first at [3 * k + c], of
 /// the second at [9 + 3 * k + c].
 struct TrianglePairs {
   static constexpr std::size_t kCapacity = 32;
+  static_assert(kCapacity <= 32, "results have a bit a pair, see PairPenetrations");
   alignas(64) double xyz[18][kCapacity];
   std::size_t count = 0;
 
   template <typename Corners>
   void put(std::size_t i, const Corners& p, const Corners& q) {
+    BOCST_ASSERT(i < kCapacity);
     for (int k = 0; k < 9; ++k) {
       xyz[k][i] = p[k / 3][k % 3];
       xyz[9 + k][i] = q[k / 3][k % 3];

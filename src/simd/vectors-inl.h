@@ -7,7 +7,6 @@
 #define BOCST_QUERY_VECTORS_INL_H
 #endif
 
-#include "geometry/overlap_kernels.h"
 #include "simd/octants-inl.h"
 
 HWY_BEFORE_NAMESPACE();
@@ -84,8 +83,9 @@ HWY_INLINE void store(Vec3 v, float (&xyz)[3][N], std::size_t i) {
   hn::Store(v.z, d, xyz[2] + i);
 }
 
-/// Corner k of the triangles from number i on.
-HWY_INLINE Vec3 corner(const TrianglePack& pack, std::size_t k, std::size_t i) {
+/// Corner k of the triangles from number i on, of a pack that has coordinate c of corner k at xyz[3 * k + c].
+template <typename Pack>
+HWY_INLINE Vec3 corner(const Pack& pack, std::size_t k, std::size_t i) {
   const D d;
   return {hn::Load(d, pack.xyz[3 * k] + i), hn::Load(d, pack.xyz[3 * k + 1] + i), hn::Load(d, pack.xyz[3 * k + 2] + i)};
 }

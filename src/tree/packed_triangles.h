@@ -5,6 +5,7 @@
 #include <cstdint>
 #include <vector>
 
+#include "lattice/limits.h"
 #include "oracle/oracle.h"
 
 namespace bocst::tree {
@@ -16,7 +17,7 @@ namespace bocst::tree {
 /// exact in float but for q, which is off by half a step.
 class PackedTriangles {
  public:
-  static constexpr std::size_t kMostTriangles = 32, kMostPlaces = 3 * kMostTriangles;
+  static constexpr std::size_t kMostTriangles = kMaxLeafTriangles, kMostPlaces = 3 * kMostTriangles;
 
   /// The words of at most kMostTriangles, at least one.
   static std::vector<std::uint32_t> pack(const oracle::Surface& surface, const std::vector<std::uint32_t>& ids);

@@ -4,6 +4,8 @@
 #include <algorithm>
 #include <stdexcept>
 
+#include "log/assert.h"
+
 namespace bocst::tree {
 
 void TriangleList::appendTo(std::vector<std::uint32_t>& all) const {
@@ -53,6 +55,7 @@ std::uint32_t TriangleLists::addDeviceList(std::size_t count, Place place) {
 std::uint32_t TriangleLists::addPacked(const oracle::Surface& surface, std::uint32_t list) {
   std::vector<std::uint32_t> ids;
   (*this)[list].appendTo(ids);
+  BOCST_ASSERT(!ids.empty() && ids.size() <= PackedTriangles::kMostTriangles);
   const std::vector<std::uint32_t> packed = PackedTriangles::pack(surface, ids);
   const std::uint32_t index = words_.append(kPackedHeader + packed.size());
   std::uint32_t* const words = &words_[index];

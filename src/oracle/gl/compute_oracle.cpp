@@ -49,9 +49,10 @@ void ComputeOracle::answer(const std::vector<ExpansionRequest*>& requests, std::
                       sorted.begin() + static_cast<std::ptrdiff_t>(first + count)},
                      *thread_);
       for (std::size_t i = first; i < first + count; ++i) verdicts[order[i]].kind = Verdict::Kind::kAnswer;
-    } catch (const std::exception&) {
+    } catch (const std::exception& e) {
       // No memory, or no context any more: what has no answer yet is the CPU's.
       if (thread_->isLost()) return;
+      reportFailure("a batch", e);
     }
     first += count;
   }
@@ -64,7 +65,8 @@ bool ComputeOracle::fetch(const DeviceResource&, ExpansionRequest::DeviceList li
       thread_->checkReset();
     });
     return true;
-  } catch (const OracleError&) {
+  } catch (const OracleError& e) {
+    reportFailure("a triangle list that only the device has", e);
     return false;
   }
 }

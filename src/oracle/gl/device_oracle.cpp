@@ -2,7 +2,10 @@
 #include "oracle/gl/device_oracle.h"
 
 #include <algorithm>
+#include <new>
+#include <string>
 
+#include "log/log.h"
 #include "oracle/cpu/cpu_oracle.h"
 
 namespace bocst::oracle::gl {
@@ -67,8 +70,19 @@ void DeviceOracle::wait(std::vector<ExpansionRequest>& batch) {
 std::shared_ptr<const DeviceResource> DeviceOracle::makeResident(const Surface& surface) {
   try {
     return meshes_.makeResident(surface);
-  } catch (const OracleError&) {
+  } catch (const OracleError& e) {
+    reportFailure("a mesh", e);
     return nullptr;
+  }
+}
+
+void DeviceOracle::reportFailure(const char* what, const std::exception& why) noexcept {
+  if (thread_->isLost() || reported_.exchange(true)) return;
+  try {
+    log(LogLevel::kWarning, "oracle " + name() + ": " + what + " is left to the CPU (" + why.what() +
+                                "); further failures of this device are not reported");
+  } catch (const std::bad_alloc&) {
+    // The answer matters more than the report.
   }
 }
 

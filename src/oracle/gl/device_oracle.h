@@ -4,6 +4,7 @@
 #include <atomic>
 #include <condition_variable>
 #include <cstdint>
+#include <exception>
 #include <list>
 #include <memory>
 #include <mutex>
@@ -26,11 +27,11 @@ class DeviceOracle : public Oracle {
 
   Thread& thread() { return *thread_; }
 
-  /// How many questions the CPU had to answer alone.
+  /// How many requests the CPU had to answer alone.
   std::uint64_t leftToCpu() const { return left_to_cpu_.load(std::memory_order_relaxed); }
 
  protected:
-  /// What the device has to say to a question.
+  /// What the device answers to one request.
   struct Verdict {
     enum class Kind { kNone, kCandidates, kAnswer } kind = Kind::kNone;
     std::uint8_t candidates = 0xff;  ///< kCandidates: octants that may be grey; the CPU does the rest.
@@ -45,6 +46,10 @@ class DeviceOracle : public Oracle {
   /// In the thread of the context; must not throw. Answers as much as it can.
   virtual void answer(const std::vector<ExpansionRequest*>& requests, std::vector<Verdict>& verdicts) = 0;
 
+  /// Reports the first failure of this oracle that is not the loss of its device, which the thread reports itself.
+  /// `what`: what the CPU does in its stead.
+  void reportFailure(const char* what, const std::exception& why) noexcept;
+
   const std::shared_ptr<Thread> thread_;
 
  private:
@@ -58,6 +63,7 @@ class DeviceOracle : public Oracle {
 
   DeviceMeshes meshes_;
   std::atomic<std::uint64_t> left_to_cpu_{0};
+  std::atomic<bool> reported_{false};
   std::mutex mutex_;  // of what follows
   std::condition_variable answered_;
   std::list<Ticket> tickets_;

@@ -191,8 +191,9 @@ void OcclusionOracle::answer(const std::vector<ExpansionRequest*>& requests, std
   std::vector<std::uint8_t> candidates(asked.size(), 0);
   try {
     queries_->ask(asked, candidates, *thread_);
-  } catch (const std::exception&) {
-    return;  // without candidates the CPU looks at all octants
+  } catch (const std::exception& e) {
+    reportFailure("a batch", e);
+    return;  // without candidates the CPU tests all octants
   }
   for (std::size_t i = 0; i < order.size(); ++i) verdicts[order[i]] = {Verdict::Kind::kCandidates, candidates[i]};
 }

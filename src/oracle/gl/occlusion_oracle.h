@@ -32,7 +32,7 @@ class OcclusionOracle : public DeviceOracle {
 
   OracleKind kind() const override { return form_ == Form::kSampled ? OracleKind::kSampled : OracleKind::kOcclusion; }
 
-  /// Which octants the device sees, before the CPU has its say; surfaces must be held. @throws OracleError
+  /// Which octants the device sees, before the CPU decides the rest; the surfaces must be resident. @throws OracleError
   std::vector<std::uint8_t> candidates(const std::vector<ExpansionRequest*>& requests);
 
   std::uint64_t queries() const override { return asked_; }

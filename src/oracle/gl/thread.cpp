@@ -6,9 +6,10 @@
 #include <signal.h>
 #include <unistd.h>
 
-#include <cstdio>
 #include <exception>
 #include <utility>
+
+#include "log/log.h"
 
 namespace bocst::oracle::gl {
 
@@ -104,7 +105,7 @@ bool Thread::isLost() const { return lost_.load(std::memory_order_relaxed) || is
 
 void Thread::lose(const std::string& why) {
   if (lost_.exchange(true)) return;
-  std::fprintf(stderr, "bocst: %s was lost (%s); queries go on on the CPU\n", info_.renderer.c_str(), why.c_str());
+  log(LogLevel::kWarning, info_.renderer + " was lost (" + why + "); queries go on on the CPU");
 }
 
 void Thread::checkReset() {

@@ -43,7 +43,7 @@ class Thread {
   /// Is there no context to work with any more?
   bool isLost() const;
 
-  /// Gives the context up, and says so once on stderr.
+  /// Gives the context up, and reports it once (bocst::setLogger).
   void lose(const std::string& why);
 
   /// In a job: looks whether the driver has lost the context.

@@ -4,6 +4,8 @@
 #include <algorithm>
 #include <cmath>
 
+#include "log/assert.h"
+
 namespace bocst::query {
 namespace {
 
@@ -39,10 +41,11 @@ std::uint32_t LargeTriangles::meeting(const TreeSide& side, tree::NodeRef node, 
     known_ = 0;
     raw_.take(other, leaf, 0);
     count_ = raw_.count();
+    BOCST_ASSERT(0 < count_ && count_ <= kCapacity);
     place_ = packTransform(other, other_in_side, Eigen::Vector3d::Constant(kMiddle), 1);
     raw_.place(place_, pack_);
   }
-  std::uint32_t met = which & (count_ < 32 ? (1u << count_) - 1 : ~0u);
+  std::uint32_t met = which & (count_ < 8 * sizeof(which) ? (1u << count_) - 1 : ~0u);
   if (inRange(pack_)) {
     met &= trianglesWithin(pack_, regionOf(side.volume(node), other_in_side, static_cast<double>(pack_.size)));
   }

@@ -7,6 +7,7 @@
 
 #include "geometry/overlap_kernels.h"
 #include "geometry/volume.h"
+#include "log/assert.h"
 
 namespace bocst::query {
 
@@ -23,6 +24,7 @@ class LeafCorners {
     if (count_ != 0 && leaf_ == leaf && begin_ == begin) return false;
     leaf_ = leaf;
     begin_ = begin;
+    BOCST_ASSERT(begin < side.triangleCount(leaf));
     count_ = std::min(side.triangleCount(leaf) - begin, TrianglePack::kCapacity);
     // Triangles and vertices lie anywhere in memory: ask for all of them before any is waited for.
     for (std::size_t i = 0; i < count_; ++i) {

@@ -6,6 +6,7 @@
 #include <hwy/foreach_target.h>
 #include <hwy/highway.h>
 
+#include "log/assert.h"
 #include "simd/octants-inl.h"
 
 HWY_BEFORE_NAMESPACE();
@@ -64,6 +65,8 @@ namespace bocst::query {
 HWY_EXPORT(UnpackTriangles);
 
 void unpackTriangles(const tree::PackedTriangles& packed, const double* center, TrianglePack& pack) {
+  BOCST_ASSERT(0 < packed.count && packed.count <= TrianglePack::kCapacity);
+  BOCST_ASSERT(0 < packed.places && packed.places <= tree::PackedTriangles::kMostPlaces);
   HWY_DYNAMIC_DISPATCH(UnpackTriangles)(packed, center, pack);
 }
 

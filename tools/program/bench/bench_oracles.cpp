@@ -11,6 +11,7 @@
 #include <set>
 #include <utility>
 
+#include "lattice/limits.h"
 #include "mesh/subdivide.h"
 #include "oracle/oracle.h"
 
@@ -29,7 +30,7 @@ struct Figures {
 
 /// The grey cells of the last level with at most this many.
 constexpr std::size_t kMostCells = 10000;
-constexpr std::uint32_t kLeaf = 32;
+constexpr std::size_t kLeaf = kMaxLeafTriangles;
 
 /// Lists that a level's questions refer to.
 struct Level {

@@ -25,7 +25,7 @@ void ModelArguments::addDepth(CLI::App& command) {
 void ModelArguments::addOracle(CLI::App& command) {
   command
       .add_option("--oracle", oracle,
-                  "who finds the octants that the surface meets; see `bocst oracles`; sampled is the "
+                  "backend that subdivides cells; see `bocst oracles`; sampled is the "
                   "paper's, which misses some")
       ->check(CLI::IsMember({"auto", "cpu", "occlusion", "compute", "sampled"}))
       ->capture_default_str();

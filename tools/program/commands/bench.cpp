@@ -136,7 +136,8 @@ void addOracleBench(CLI::App& command, Bench& bench) {
 
 void addBench(CLI::App& program, Job& job) {
   auto bench = std::make_shared<Bench>();
-  CLI::App* command = program.add_subcommand("bench", "time and memory beside FCL's BVHModel<OBBRSS>, in one run");
+  CLI::App* command =
+      program.add_subcommand("bench", "time and memory, compared with FCL's BVHModel<OBBRSS> in one run");
   command->footer(
       "Ratios are FCL's figure over bocst's: above 1 bocst is better. About two poses of three touch.\n"
       "first: two new models and one query, from vertex and index arrays, which FCL copies and bocst takes over; the "

@@ -166,7 +166,7 @@ struct Collide {
 
 void addCollide(CLI::App& program, Job& job) {
   auto collide = std::make_shared<Collide>();
-  CLI::App* command = program.add_subcommand("collide", "one query between two meshes, beside FCL's build and query");
+  CLI::App* command = program.add_subcommand("collide", "check two meshes for collision and compare with FCL");
   command->add_option("a", collide->file_a, "mesh A: OBJ, PLY, STL, OFF or DAE file")->required();
   command->add_option("b", collide->file_b, "mesh B")->required();
   command

@@ -34,7 +34,8 @@ constexpr std::pair<const char*, const char*> kExamples[] = {
     {"bocst collide link.obj gripper.obj --image pair.png", "A picture of where they touch and of what grew."},
     {"bocst inspect link.obj --depth 5 --spheres link.yaml", "Collision spheres for a GPU planner."},
     {"bocst paper bunny00.off ChineseDragon-10kv.off --out paper", "The paper's tables and figures beside ours."},
-    {"bocst bench link.obj gripper.obj --scenarios all --csv figures.csv", "Time and memory beside FCL's, as a table."},
+    {"bocst bench link.obj gripper.obj --scenarios all --csv figures.csv",
+     "Time and memory compared with FCL's, as a table."},
     {"bocst validate link.obj gripper.obj --poses 10000 --shard 1/4 --json 1.json", "A quarter of a validation."},
 };
 
