@@ -21,7 +21,7 @@ namespace {
 
 // A few lines of XML that instantiate each other could ask for any amount of geometry.
 constexpr std::size_t kMostElements = std::size_t{1} << 21;  // of nodes, each time that they are instantiated
-constexpr std::size_t kMostCorners = std::size_t{1} << 26;  // and vertices
+constexpr std::size_t kMostCorners = std::size_t{1} << 26;   // and vertices
 constexpr int kDeepest = 256;
 
 /// COLLADA's geometry: the triangles, polygons, fans and strips that the visual scene instantiates.

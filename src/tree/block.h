@@ -6,12 +6,10 @@
 #include <cstdint>
 
 #include "bounds/loose_frame.h"
+#include "lattice/limits.h"
 #include "oracle/oracle.h"
 
 namespace bocst::tree {
-
-/// An exact answer tests the triangles of a node with at most so many.
-constexpr std::uint32_t kLeafTriangles = 32;
 
 /// Loose blocks below one another in one tree, at most. A lane of many triangles shares more bits of a key of 30 than
 /// its block does; of few, it has less than half of its block's (see BulkBuilder::split()).

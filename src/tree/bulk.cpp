@@ -77,7 +77,7 @@ void BulkBuilder::build(const oracle::Surface& surface, const std::uint32_t* ids
   }
   sorted_ = false;
   blocks_.clear();
-  if (items_.size() > kLeafTriangles) addBlock({0, static_cast<std::uint32_t>(items_.size())});
+  if (items_.size() > kMaxLeafTriangles) addBlock({0, static_cast<std::uint32_t>(items_.size())});
   fillRows(surface, false);
   finish();
 }
@@ -110,7 +110,7 @@ void BulkBuilder::buildAll(const oracle::Surface& surface) {
   sortItems();
   sorted_ = true;
   blocks_.clear();
-  if (count > kLeafTriangles) addBlock({0, static_cast<std::uint32_t>(count)});
+  if (count > kMaxLeafTriangles) addBlock({0, static_cast<std::uint32_t>(count)});
   fillRows(surface, true);
   finish();
 }
@@ -229,22 +229,22 @@ std::uint32_t BulkBuilder::split(Piece piece) {
 }
 
 std::uint32_t BulkBuilder::addBlock(Piece piece) {
-  Piece componentPoints[8] = {piece};
+  Piece parts[8] = {piece};
   std::uint32_t count = 1;
   while (count < 8) {
-    Piece& largest = *std::max_element(componentPoints, componentPoints + count,
-                                       [](const Piece& x, const Piece& y) { return x.count < y.count; });
+    Piece& largest =
+        *std::max_element(parts, parts + count, [](const Piece& x, const Piece& y) { return x.count < y.count; });
     if (largest.count <= kSmallPiece) break;
     const std::uint32_t first = split(largest);
-    componentPoints[count++] = {largest.begin + first, largest.count - first};
+    parts[count++] = {largest.begin + first, largest.count - first};
     largest.count = first;
   }
   const auto number = static_cast<std::uint32_t>(blocks_.size());
   blocks_.emplace_back();
   blocks_[number].lanes = count;
   for (std::uint32_t o = 0; o < count; ++o) {
-    const std::uint32_t child = componentPoints[o].count <= kLeafTriangles ? kNone : addBlock(componentPoints[o]);
-    blocks_[number].lane[o] = {componentPoints[o].begin, componentPoints[o].count, child};
+    const std::uint32_t child = parts[o].count <= kMaxLeafTriangles ? kNone : addBlock(parts[o]);
+    blocks_[number].lane[o] = {parts[o].begin, parts[o].count, child};
   }
   return number;
 }

@@ -14,7 +14,7 @@ namespace bocst::tree {
 
 /// Builds the blocks below a node at once, for exact answers: each triangle goes to one lane, by the middle of its box,
 /// and nothing is clipped at octants, so lanes may overlap and no triangle is listed twice. Lanes of at most
-/// kLeafTriangles are leaves, the others have a block.
+/// kMaxLeafTriangles are leaves, the others have a block.
 ///
 /// Threads: one build at a time for each object.
 class BulkBuilder {

@@ -26,14 +26,14 @@ ChildRef Tree::regained(ChildRef block, const lattice::Cell& cell, TriangleLists
   if (grid_ != nullptr && cell.level <= grid_->level()) return ChildRef();
   const std::uint32_t own = records_[block.index()].own_list;
   if (own != Block::kNone) {
-    const bool is_short = !lists_.isOnDevice(own) && lists_[own].count <= kLeafTriangles;
+    const bool is_short = !lists_.isOnDevice(own) && lists_[own].count <= kMaxLeafTriangles;
     return ChildRef(is_short ? ChildRef::kShortList : ChildRef::kList, lists.addCopy(lists_, own));
   }
   std::vector<std::uint32_t> ids;
   collectTriangles(block, cell, ids);
   std::sort(ids.begin(), ids.end());
   ids.erase(std::unique(ids.begin(), ids.end()), ids.end());
-  return ChildRef(ids.size() <= kLeafTriangles ? ChildRef::kShortList : ChildRef::kList,
+  return ChildRef(ids.size() <= kMaxLeafTriangles ? ChildRef::kShortList : ChildRef::kList,
                   lists.add(ids.data(), ids.size()));
 }
 

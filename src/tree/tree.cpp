@@ -214,25 +214,25 @@ void Tree::grow(std::vector<Growth>& batch, bool wait) {
     // Leaves are tested here; who answers conservatively has none.
     request.ids_up_to = tree.conservative()              ? 0
                         : tree.isDeepest(cell.level + 1) ? oracle::ExpansionRequest::kAll
-                                                         : kLeafTriangles;
+                                                         : kMaxLeafTriangles;
     if (ref.isList()) {
       gathered.emplace_back();
       tree.askFor(ref.index(), request, gathered.back());
     } else if (g.node.isRoot()) {
       request.count = tree.surface_.triangle_count;
-      if (g.list_suffices && request.count <= kLeafTriangles) {
-        std::array<std::uint32_t, kLeafTriangles> ids;
+      if (g.list_suffices && request.count <= kMaxLeafTriangles) {
+        std::array<std::uint32_t, kMaxLeafTriangles> ids;
         std::iota(ids.begin(), ids.end(), 0u);
         tree.setChild(g.node, tree.addList(ids.data(), request.count, true));
         continue;
       }
     } else {
       gathered.emplace_back();
-      gathered.back().reserve(4 * kLeafTriangles);
+      gathered.back().reserve(4 * kMaxLeafTriangles);
       tree.gatherNode(g.node, cell, gathered.back());
       request.ids = gathered.back().data();
       request.count = gathered.back().size();
-      request.own_only = g.list_suffices && request.count <= kLeafTriangles;
+      request.own_only = g.list_suffices && request.count <= kMaxLeafTriangles;
     }
     requests.push_back(std::move(request));
     asked.push_back(g);
@@ -426,7 +426,7 @@ std::uint32_t Tree::addBlock(NodeRef node, int level, std::uint8_t grey) {
 
 ChildRef Tree::addList(const std::uint32_t* ids, std::size_t count, bool leaf) {
   const std::uint32_t index = lists_.add(ids, count);
-  return ChildRef(leaf || count <= kLeafTriangles ? ChildRef::kShortList : ChildRef::kList, index);
+  return ChildRef(leaf || count <= kMaxLeafTriangles ? ChildRef::kShortList : ChildRef::kList, index);
 }
 
 void Tree::packLeaves(const std::vector<NodeRef>& leaves) {
@@ -438,7 +438,7 @@ void Tree::packLeaves(const std::vector<NodeRef>& leaves) {
     const ChildRef list = childRef(leaf);
     if (!list.isList() || lists_.isPacked(list.index())) continue;
     const std::uint32_t count = lists_[list.index()].count;
-    if (count == 0 || count > kLeafTriangles) continue;
+    if (count == 0 || count > kMaxLeafTriangles) continue;
     if (!leaf.isRoot()) {
       // Half of the leaves are met but once in hundreds of queries: the second time is early enough.
       std::uint8_t& came = records_[leaf.block()].came;

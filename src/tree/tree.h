@@ -99,7 +99,7 @@ class Tree {
     return grid != nullptr && !isLoose(node) && cell(node).level < grid->level();
   }
 
-  /// A node to grow, and whether a list of at most kLeafTriangles is enough (exact answers).
+  /// A node to grow, and whether a list of at most kMaxLeafTriangles is enough (exact answers).
   struct Growth {
     Tree* tree;
     NodeRef node;
