@@ -214,7 +214,7 @@ void Tree::grow(std::vector<Growth>& batch, bool wait) {
     // Leaves are tested here; who answers conservatively has none.
     request.ids_up_to = tree.conservative()              ? 0
                         : tree.isDeepest(cell.level + 1) ? oracle::ExpansionRequest::kAll
-                                                         : kMaxLeafTriangles;
+                                                         : kHostTriangles;
     if (ref.isList()) {
       gathered.emplace_back();
       tree.askFor(ref.index(), request, gathered.back());
@@ -354,6 +354,7 @@ bool Tree::growInBulk(NodeRef node, std::vector<std::uint32_t>& ids) {
     return true;
   }
   growth_work_ += ids.size();
+  built_ += ids.size();
   const bool is_loose = isLoose(node);
   Eigen::AlignedBox3d region;
   if (is_loose) {
@@ -378,6 +379,7 @@ bool Tree::growInBulk(NodeRef node, std::vector<std::uint32_t>& ids) {
 void Tree::growWhole() {
   thread_local BulkBuilder bulk;
   bulk.buildAll(surface_);
+  built_ += surface_.triangle_count;
   for (auto& n : nodes_at_) n = 0;
   nodes_at_[1] = 1;
   setChild(NodeRef(), bulk.blocks().empty() ? addList(bulk.ids().data(), bulk.ids().size(), true)
@@ -635,6 +637,7 @@ Statistics Tree::statistics() const {
   s.oracle_batches = batches_;
   s.oracle_cells = cells_;
   s.pruned_nodes = pruned_;
+  s.built_triangles = built_;
   s.mesh_bytes = (surface_.mesh != nullptr ? surface_.mesh->bytes() : 0) + (solid_ != nullptr ? solid_->bytes() : 0);
   s.device_bytes = device_bytes_;
   return s;

@@ -199,7 +199,7 @@ class Tree {
 
   std::array<std::atomic<std::size_t>, lattice::kMaxLevel + 1> nodes_at_{};
   std::atomic<std::size_t> bytes_{0}, device_bytes_{0};
-  std::atomic<std::uint64_t> expansions_{0}, octants_{0}, batches_{0}, cells_{0}, pruned_{0};
+  std::atomic<std::uint64_t> expansions_{0}, octants_{0}, batches_{0}, cells_{0}, pruned_{0}, built_{0};
   std::atomic<std::int64_t> next_prune_{0};
 };
 

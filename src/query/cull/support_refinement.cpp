@@ -120,8 +120,9 @@ void sharpen(const TreeSide& side, const std::int32_t (&near)[3][8]) {
 void refineSupports(const TreeSide& a, const TreeSide& b, const NearDirections& near) {
   if (near.lanes == 0) return;
   // A tree that still grows by parts says little.
-  if (a.tree().isWhole()) sharpen(a, near.of_a);
-  if (b.tree().isWhole()) sharpen(b, near.of_b);
+  const auto says_enough = [](const tree::Tree& t) { return t.isWhole() || t.oracle().kind() != OracleKind::kCpu; };
+  if (says_enough(a.tree())) sharpen(a, near.of_a);
+  if (says_enough(b.tree())) sharpen(b, near.of_b);
 }
 
 }  // namespace bocst::query
