@@ -273,30 +273,30 @@ class DaeReader {
     }
     Polygons polygons;
     const pugi::xml_node mesh = geometry.child("mesh");
+    const pugi::xml_node vertices = mesh.child("vertices");  // a mesh has one; looked for once, there may be many faces
+    bool has_read = false;
     for (const pugi::xml_node& primitive : mesh.children()) {
       const std::string_view name = primitive.name();
       if (name == "triangles" || name == "polylist" || name == "polygons" || name == "trifans" || name == "tristrips") {
-        if (polygons.vertices.empty()) polygons.vertices = readVertices(mesh);
-        readPrimitive(primitive, mesh, polygons);
+        if (!std::exchange(has_read, true)) polygons.vertices = readVertices(mesh, vertices);
+        readPrimitive(primitive, vertices, polygons);
       }
     }
     return polygons;
   }
 
-  /// The element of the mesh with the id that the attribute names.
-  pugi::xml_node within(const pugi::xml_node& mesh, const char* name, const pugi::xml_node& referrer) const {
-    const std::string_view url = referrer.attribute("source").value();
-    for (const pugi::xml_node& node : mesh.children(name)) {
+  pugi::xml_node sourceOf(const pugi::xml_node& input, const pugi::xml_node& mesh) const {
+    const std::string_view url = input.attribute("source").value();
+    for (const pugi::xml_node& node : mesh.children("source")) {
       if (!url.empty() && url[0] == '#' && url.substr(1) == node.attribute("id").value()) return node;
     }
-    fail(referrer, std::string("its mesh has no <") + name + "> " + quoted(url));
+    fail(input, "its mesh has no <source> " + quoted(url));
   }
 
-  std::vector<Eigen::Vector3d> readVertices(const pugi::xml_node& mesh) const {
-    const pugi::xml_node vertices = mesh.child("vertices");
+  std::vector<Eigen::Vector3d> readVertices(const pugi::xml_node& mesh, const pugi::xml_node& vertices) const {
     const pugi::xml_node input = vertices.find_child_by_attribute("input", "semantic", "POSITION");
     if (!input) fail(mesh, "no <vertices> with an <input> for POSITION");
-    const pugi::xml_node source = within(mesh, "source", input);
+    const pugi::xml_node source = sourceOf(input, mesh);
     const pugi::xml_node accessor = source.child("technique_common").child("accessor");
     if (!accessor) fail(source, "no <accessor>");
     const pugi::xml_node array = source.child("float_array");
@@ -340,14 +340,16 @@ class DaeReader {
     return result;
   }
 
-  void readPrimitive(const pugi::xml_node& primitive, const pugi::xml_node& mesh, Polygons& polygons) const {
+  void readPrimitive(const pugi::xml_node& primitive, const pugi::xml_node& vertices, Polygons& polygons) const {
     const pugi::xml_node vertex = primitive.find_child_by_attribute("input", "semantic", "VERTEX");
     const std::size_t promised = count(primitive, "count", 0);
     if (!vertex) {
       if (promised == 0 && !primitive.child("p")) return;
       fail(primitive, "no <input> for VERTEX");
     }
-    within(mesh, "vertices", vertex);
+    if (vertex.attribute("source").value() != "#" + std::string(vertices.attribute("id").value())) {
+      fail(vertex, "its mesh has no <vertices> " + quoted(vertex.attribute("source").value()));
+    }
     std::size_t stride = 1;
     for (const pugi::xml_node& input : primitive.children("input")) {
       stride = std::max(stride, count(input, "offset", 0) + 1);

@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #include "read_scene.h"
 
+#include <assimp/BaseImporter.h>
 #include <assimp/MemoryIOWrapper.h>
 #include <assimp/scene.h>
 #include <locale.h>
@@ -86,7 +87,9 @@ Polygons readScene(const std::string& file) {
   importer.SetIOHandler(new Folder(file));  // the importer's own from here on
   // What a reader here refuses must not get in by another name.
   for (const char* extension : {"obj", "ply", "stl", "off", "dae"}) {
-    while (Assimp::BaseImporter* reader = importer.GetImporter(extension)) importer.UnregisterLoader(reader);
+    while (const std::unique_ptr<Assimp::BaseImporter> reader{importer.GetImporter(extension)}) {
+      importer.UnregisterLoader(reader.get());  // it is ours from here on
+    }
   }
   const aiScene* scene = importer.ReadFile(file, 0);
   if (scene == nullptr) throw std::runtime_error(importer.GetErrorString());
