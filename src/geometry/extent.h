@@ -62,12 +62,20 @@ inline double distanceBound(const NodeExtent& a, const NodeExtent& b, const Eige
   };
   if (guess.squaredNorm() > 0 && reachesCutoff(guess)) return best - rounding_margin;
   if (apart > 0 && reachesCutoff(t / apart)) return best - rounding_margin;
-  // On three axes at right angles, gaps add up as the sides of a box.
+  // On three axes at right angles, gaps add up as the sides of a box. Axes in float are not quite at right angles,
+  // which matters far away, so the bound is that along the diagonal.
   const Eigen::Matrix3d s = (a.axes.transpose() * b.axes).cwiseAbs();
-  const Eigen::Vector3d gap_a = ((a.axes.transpose() * t).cwiseAbs() - a.half - s * b.half).cwiseMax(0);
-  const Eigen::Vector3d gap_b = ((b.axes.transpose() * t).cwiseAbs() - b.half - s.transpose() * a.half).cwiseMax(0);
-  best = std::max(best, std::sqrt(std::max(gap_a.squaredNorm(), gap_b.squaredNorm())));
-  if (best - rounding_margin >= cutoff) return best - rounding_margin;
+  const Eigen::Vector3d in_a = a.axes.transpose() * t, in_b = b.axes.transpose() * t;
+  const Eigen::Vector3d gap_a = (in_a.cwiseAbs() - a.half - s * b.half).cwiseMax(0);
+  const Eigen::Vector3d gap_b = (in_b.cwiseAbs() - b.half - s.transpose() * a.half).cwiseMax(0);
+  if (gap_a.squaredNorm() > best * best &&
+      reachesCutoff((a.axes * gap_a.cwiseProduct(in_a.cwiseSign())).normalized())) {
+    return best - rounding_margin;
+  }
+  if (gap_b.squaredNorm() > best * best &&
+      reachesCutoff((b.axes * gap_b.cwiseProduct(in_b.cwiseSign())).normalized())) {
+    return best - rounding_margin;
+  }
   for (const NodeExtent* n : {&a, &b}) {
     const double length = n->normal.norm();
     if (length > 0 && reachesCutoff(n->normal / length)) break;

@@ -149,8 +149,9 @@ struct Face {
   T above(const Vec<T>& x) const { return dot(n, x - v[0]); }
 };
 
-// A face whose normal is good to the last digits but two. In double, others are looked at in twice the digits.
-constexpr double kWellShaped = 1e-3;
+// A face whose normal is good to the last digits but three. In double, others are looked at in twice the digits, which
+// takes twenty times as long.
+constexpr double kWellShaped = 1e-5;
 // Farther apart, squared, products of lengths may overflow.
 constexpr double kFarthest = 1e150;
 

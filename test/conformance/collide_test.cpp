@@ -5,6 +5,7 @@
 
 #include <algorithm>
 #include <array>
+#include <map>
 
 #include "conformance/reference.h"
 #include "geometry/triangle.h"
@@ -449,6 +450,39 @@ TEST(CollideFloat, SliversAreJudgedByFclHoweverItIsAsked) {
   }
 }
 
+// Two large triangles through a fine mesh, far from the world's origin: every pair that FCL's test sees, and no other.
+TEST(CollideFloat, LargeBesideFineFarAway) {
+  Raw ra;
+  ra.vertices = {{-9, -8, 0.1}, {9, -7, -0.2}, {0.3, 9, 0.05}, {-8, 0.2, -9}, {9, -0.1, -7}, {0.5, 0.15, 9}};
+  ra.triangles.emplace_back(0, 1, 2);
+  ra.triangles.emplace_back(3, 4, 5);
+  const Raw rb = test::torus(36, 0.3);
+  const Modelf a(ra.mesh()), b(rb.mesh());
+  std::mt19937_64 g(21);
+  std::size_t found = 0;
+  for (int i = 0; i < 24; ++i) {
+    const Eigen::Vector3d far = 3e3 * test::randomDirection(g);
+    const auto X = test::pose<float>(test::randomRotation(g), far);
+    const auto Y = test::pose<float>(test::randomRotation(g), far + 0.5 * test::randomDirection(g));
+    fcl::Matrix3f R;
+    fcl::Vector3f T;
+    fcl::relativeTransform(X.linear(), X.translation(), Y.linear(), Y.translation(), R, T);
+    Pairs want;
+    for (std::size_t t = 0; t < ra.triangles.size(); ++t) {
+      for (std::size_t u = 0; u < rb.triangles.size(); ++u) {
+        const auto p = [&](std::size_t k) { return fcl::Vector3f(ra.vertices[ra.triangles[t][k]].cast<float>()); };
+        const auto q = [&](std::size_t k) { return fcl::Vector3f(rb.vertices[rb.triangles[u][k]].cast<float>()); };
+        if (fcl::detail::Intersect<float>::intersect_Triangle(p(0), p(1), p(2), q(0), q(1), q(2), R, T)) {
+          want.insert({static_cast<int>(t), static_cast<int>(u)});
+        }
+      }
+    }
+    found += want.size();
+    for (int round = 0; round < 2; ++round) EXPECT_EQ(test::pairs<float>(a, X, b, Y), want) << i;
+  }
+  EXPECT_GT(found, 2000u);
+}
+
 TEST(CollideConservative, NeverMissesAndTightensWithDepth) {
   const Raw ra = test::torus(40), rb = test::torus(28, 0.3);
   const auto fa = test::bvh<fcl::OBBRSSd>(ra), fb = test::bvh<fcl::OBBRSSd>(rb);
@@ -514,6 +548,42 @@ TEST(CollideConservative, ContactsAreSpheresOfTheDepth) {
 }
 
 // The request and the contacts.
+
+// Where spheres meet in the world does not depend on which model is named first.
+TEST(CollideConservative, ContactsLieWhereTheyDoInBothOrders) {
+  Options options;
+  options.answer = Answer::kConservative;
+  options.depth = 4;
+  const Modeld a(test::torus(20).mesh(), options), b(test::torus(13, 0.3).mesh(), options);
+  std::mt19937_64 g(22);
+  std::size_t found = 0;
+  for (int i = 0; i < 12; ++i) {
+    const auto X = test::pose<double>(test::randomRotation(g), 2 * test::randomDirection(g));
+    const auto Y = test::pose<double>(test::randomRotation(g), X.translation() + 0.8 * test::randomDirection(g));
+    const fcl::CollisionRequestd request(100000, true);
+    fcl::CollisionResultd one, two;
+    fcl::collide(&a, X, &b, Y, request, one);
+    fcl::collide(&b, Y, &a, X, request, two);
+    ASSERT_EQ(one.numContacts(), two.numContacts());
+    std::map<std::pair<std::intptr_t, std::intptr_t>, fcl::Contactd> swapped;
+    for (std::size_t k = 0; k < two.numContacts(); ++k) {
+      const fcl::Contactd& c = two.getContact(k);
+      swapped[{c.b2, c.b1}] = c;
+    }
+    for (std::size_t k = 0; k < one.numContacts(); ++k) {
+      const fcl::Contactd& c = one.getContact(k);
+      const auto other = swapped.find({c.b1, c.b2});
+      ASSERT_TRUE(other != swapped.end());
+      ASSERT_LT((c.pos - other->second.pos).norm(), 1e-9);
+      ASSERT_LT((c.normal + other->second.normal).norm(), 1e-9);
+      // In the balls of both meshes.
+      ASSERT_LT((c.pos - X.translation()).norm(), 2.5);
+      ASSERT_LT((c.pos - Y.translation()).norm(), 2.5);
+      ++found;
+    }
+  }
+  EXPECT_GT(found, 100u);
+}
 
 TEST(CollideRequest, ContactsAreWhatTheHeaderSays) {
   const Raw raw = test::torus(40);

@@ -92,9 +92,10 @@ struct Distant {
     radius = box.half.norm();
   }
 
-  /// Half of the position of a point in the world: the way between two does not overflow.
-  Eigen::Vector3d half(const Eigen::Vector3d& point) const {
-    return X_WM.linear() * (point / 2) + X_WM.translation() / 2;
+  /// Half of the way in the world between points of two: the whole may overflow.
+  static Eigen::Vector3d halfWay(const Eigen::Isometry3d& X, const Eigen::Vector3d& from, const Eigen::Isometry3d& Y,
+                                 const Eigen::Vector3d& to) {
+    return (Y.translation() / 2 - X.translation() / 2) + (Y.linear() * (to / 2) - X.linear() * (from / 2));
   }
 
   /// The triangle that reaches farthest along a direction in the world, and the corner.
@@ -120,7 +121,7 @@ struct Distant {
 /// for a part 2^-54 of the distance. False where that is not so.
 template <typename S>
 bool searchFar(const DistanceQuery<S>& q, const Distant& a, const Distant& b) {
-  const Eigen::Vector3d half_way = b.half(b.center) - a.half(a.center);
+  const Eigen::Vector3d half_way = Distant::halfWay(a.X_WM, a.center, b.X_WM, b.center);
   if (!(half_way.cwiseAbs().maxCoeff() > 0x1p26 * (a.radius + b.radius)) || a.triangles == 0 || b.triangles == 0) {
     return false;
   }
@@ -129,9 +130,9 @@ bool searchFar(const DistanceQuery<S>& q, const Distant& a, const Distant& b) {
   Eigen::Vector3d tip_a, tip_b;
   n.a = a.farthest(direction, tip_a);
   n.b = b.farthest(-direction, tip_b);
-  n.on_a = 2 * a.half(tip_a);
-  n.on_b = 2 * b.half(tip_b);
-  report(q, 2 * (b.half(tip_b) - a.half(tip_a)).stableNorm(), n);
+  n.on_a = a.X_WM * tip_a;
+  n.on_b = b.X_WM * tip_b;
+  report(q, 2 * Distant::halfWay(a.X_WM, tip_a, b.X_WM, tip_b).stableNorm(), n);
   return true;
 }
 
@@ -140,15 +141,15 @@ template <typename S>
 bool searchFar(const DistanceQuery<S>& q, const Distant& a, const query::ConvexSide& b) {
   const query::Sphere ball = b.sphere(b.root());
   const Eigen::Isometry3d X = isometryOf<S>(q.X_WB());
-  const Eigen::Vector3d half = X.linear() * (ball.center / 2) + X.translation() / 2, half_way = half - a.half(a.center);
+  const Eigen::Vector3d half_way = Distant::halfWay(a.X_WM, a.center, X, ball.center);
   if (!(half_way.cwiseAbs().maxCoeff() > 0x1p53 * (a.radius + ball.radius)) || a.triangles == 0) return false;
   query::Nearest n;
   Eigen::Vector3d tip;
   n.a = a.farthest(half_way.stableNormalized(), tip);
   n.b = b.name(b.root());
-  n.on_a = 2 * a.half(tip);
-  n.on_b = 2 * half;
-  report(q, 2 * (half - a.half(tip)).stableNorm(), n);
+  n.on_a = a.X_WM * tip;
+  n.on_b = X * ball.center;
+  report(q, 2 * Distant::halfWay(a.X_WM, tip, X, ball.center).stableNorm(), n);
   return true;
 }
 
