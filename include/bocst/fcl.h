@@ -30,8 +30,9 @@
 namespace bocst {
 
 /// Do the two geometries collide at the poses X_W1 and X_W2 (world from geometry)? As fcl::collide: returns
-/// result.numContacts(), which accumulates; stops at request.num_max_contacts; adds nothing when
-/// request.isSatisfied(result) already.
+/// result.numContacts(), which accumulates; has at most request.num_max_contacts; adds nothing when
+/// request.isSatisfied(result) already. Contacts are those with the least (b1, b2), in this order, whatever is resident,
+/// whatever the clock, the oracle and the thread; but a request for one contact ends at any.
 ///
 /// **Pairs.** One of the two is a Model; its partner is a Model, an fcl::BVHModel<BV> of any BV, one of FCL's shapes
 /// (Box, Sphere, Ellipsoid, Capsule, Cone, Cylinder, Convex, Plane, Halfspace, TriangleP) or an OcTree. o1 and o2 keep
@@ -71,7 +72,9 @@ namespace bocst {
 ///
 /// The verdict does not depend on the argument order, on what is resident, or on the GJK solver, except for a triangle
 /// and a shape or cell that are apart by less than the solver's tolerance.
-/// @throws std::invalid_argument for a partner that is not supported (FCL would answer 0, "free").
+/// @throws std::invalid_argument for a partner that is not supported (FCL would answer 0, "free"), and for a pose that
+/// is not rigid, a tolerance or a solver type that does not exist; it names the argument and its value. See
+/// share/doc/guarantees.md.
 /// Thread rule: any number of threads on the same models, each with its own request and result.
 template <typename S>
 BOCST_EXPORT std::size_t collide(const fcl::CollisionGeometry<S>* o1, const fcl::Transform3<S>& X_W1,
@@ -103,7 +106,7 @@ BOCST_EXPORT std::size_t collide(const fcl::CollisionGeometry<S>* o1, const fcl:
 ///   inside a solid is at minus the depth of the contact that collide() makes of it: the distance of the surfaces.
 /// Errors of the answer are below 1e-11 of the sizes, with ellipsoids, cones and cylinders below 1e-8, and rounding of
 /// S; it does not depend on the solver, nor on what is resident.
-/// @throws std::invalid_argument for a partner that is not supported.
+/// @throws std::invalid_argument as collide(), and for a min_distance brought along that is NaN.
 /// Thread rule: as collide().
 template <typename S>
 BOCST_EXPORT S distance(const fcl::CollisionGeometry<S>* o1, const fcl::Transform3<S>& X_W1,
@@ -149,9 +152,9 @@ BOCST_EXPORT S continuousPair(const fcl::CollisionGeometry<S>* o1, const fcl::Tr
 /// exist for double only); they are not written to. From poses, ccd_motion_type says how: CCDM_TRANS keeps the rotation
 /// of the begin; CCDM_LINEAR moves the geometry's origin on a line and turns about a fixed axis; CCDM_SCREW turns about
 /// and moves along one axis; CCDM_SPLINE moves the origin on a line and takes rotation vectors on a line.
-/// @throws std::invalid_argument for a partner or a motion that is not supported, a pose that is not finite, a toc_err
-/// that is negative or NaN; and, with float, from poses, for a pair without a Model: FCL 0.7 has no such query.
-/// Thread rule: as collide(); motions may be shared while nobody calls their integrate().
+/// @throws std::invalid_argument as collide(), and for a motion that is not supported or has no rigid pose at its begin
+/// or end, a toc_err that is no tolerance; and, with float, from poses, for a pair without a Model: FCL 0.7 has no such
+/// query. Thread rule: as collide(); motions may be shared while nobody calls their integrate().
 template <typename S>
 S continuousCollide(const fcl::CollisionGeometry<S>* o1, const fcl::MotionBase<S>* motion1,
                     const fcl::CollisionGeometry<S>* o2, const fcl::MotionBase<S>* motion2,

@@ -111,10 +111,8 @@ class Contacts : public ::testing::Test {
       const Eigen::Matrix3d R = Eigen::Quaterniond(n(g), n(g), n(g), n(g)).normalized().toRotationMatrix();
       poses.push_back(test::pose<S>(R, Eigen::Vector3d(n(g), n(g), n(g)) / 3));
     }
-    for (const std::size_t most : {1, 2, 7, 100000}) {
-      for (const bool contact : {true, false}) {
-        if (most > 1 || contact) requests.emplace_back(most, contact);
-      }
+    for (const std::size_t most : {2, 7, 100000}) {
+      for (const bool contact : {true, false}) requests.emplace_back(most, contact);
     }
   }
 
@@ -140,6 +138,10 @@ class Contacts : public ::testing::Test {
     fcl::CollisionResult<S> verdict;
     fcl::collide(q.a.get(), q.X, q.b.get(), q.Y, fcl::CollisionRequest<S>(), verdict);
     ASSERT_EQ(verdict.isCollision(), !all.empty()) << what;
+    // A single contact may be any of them, with the same numbers.
+    const auto one = q.ask(fcl::CollisionRequest<S>(1, true));
+    ASSERT_EQ(one.empty(), all.empty()) << what;
+    ASSERT_TRUE(one.empty() || std::find(all.begin(), all.end(), one[0]) != all.end()) << what;
   }
 
   std::vector<std::pair<Make, Make>> pairs;
@@ -240,7 +242,7 @@ TYPED_TEST(Contacts, AreTheFirstOfVeryMany) {
                 fcl::Transform3<S>::Identity(), test::pose<S>(Eigen::Matrix3d::Identity(), {0.01, 0.02, 0})};
   const auto all = q.ask(fcl::CollisionRequest<S>(10000000, true));
   ASSERT_GT(all.size(), std::size_t{1} << 16);
-  for (const std::size_t most : {1, 10, 1000}) {
+  for (const std::size_t most : {2, 10, 1000}) {
     auto expected = all;
     expected.resize(most);
     EXPECT_EQ(q.ask(fcl::CollisionRequest<S>(most, true)), expected);
@@ -384,8 +386,9 @@ TEST(Fork, AChildOfABusyParentNeverHangs) {
       if (right && said_no > 0) _exit(7);
       return right;
     });
-    ASSERT_TRUE(WIFEXITED(status)) << "killed by signal " << WTERMSIG(status) << " in round " << round;
-    ASSERT_TRUE(WEXITSTATUS(status) == 0 || WEXITSTATUS(status) == 7) << WEXITSTATUS(status);
+    EXPECT_TRUE(WIFEXITED(status)) << "killed by signal " << WTERMSIG(status) << " in round " << round;
+    if (!WIFEXITED(status)) break;
+    EXPECT_TRUE(WEXITSTATUS(status) == 0 || WEXITSTATUS(status) == 7) << WEXITSTATUS(status);
     (WEXITSTATUS(status) == 0 ? answered : refused)++;
   }
   stop = true;

@@ -92,9 +92,13 @@ class Validate : public ::testing::Test {
                         {"continuousCollide", "tf" + n + "_beg", what});
           expectRefusal([&, a = a, b = b] { fcl::continuousCollide(a, I, X, b, I, Y, request, result); },
                         {"continuousCollide", "tf" + n + "_end", what});
+          // FCL's motions keep rotations as quaternions, and so make others of what is none.
+          if (bad.translation().allFinite()) continue;
+          // By this name, since FCL's own code for motions in float is very slow to compile.
           const fcl::TranslationMotion<S> motion1(X, X), motion2(Y, Y);
-          expectRefusal([&, a = a, b = b] { fcl::continuousCollide(a, &motion1, b, &motion2, request, result); },
-                        {"continuousCollide", "motion" + n, what});
+          expectRefusal(
+              [&, a = a, b = b] { fcl_adapter::continuousPair<S>(a, &motion1, b, &motion2, request, result); },
+              {"continuousCollide", "motion" + n});
         }
       }
     }
@@ -210,7 +214,9 @@ TYPED_TEST(Validate, DecidesByTheStatedBound) {
       accepts = false;
     }
     ASSERT_EQ(accepts, is_rigid) << X.matrix();
-    if (fcl_adapter::isSurelyRigid(X)) ASSERT_LE(orthogonalityError(X), 3e-4);
+    if (fcl_adapter::isSurelyRigid(X)) {
+      ASSERT_LE(orthogonalityError(X), 3e-4);
+    }
     (is_rigid ? taken : refused)++;
     quick += fcl_adapter::isSurelyRigid(X);
   }

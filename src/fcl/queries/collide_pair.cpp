@@ -102,11 +102,11 @@ class Collector : public query::Visitor {
         left_(q.contactsLeft()),
         most_(std::max<std::size_t>(kMost, left_ < kUnlimited ? 4 * left_ : kUnlimited)),
         s_(scratch()) {
+    s_.met.clear();
     if (ends_at_first_) return;
     s_.seen.clear();
     s_.seen_cells.clear();
     s_.found.clear();
-    s_.met.clear();
   }
 
   /// Where cells lie in the world: from the lattice frame of side A.
@@ -119,8 +119,8 @@ class Collector : public query::Visitor {
 
   bool triangles(std::uint32_t a, std::uint32_t b, bool certain) override {
     q_.inCallersOrder(a, b);
-    if (ends_at_first_) return meets(a, b, certain) && q_.addContact(a, b, nullptr);
     const std::uint64_t key = keyOf(a, b, certain);
+    if (ends_at_first_) return endsWith(key);
     if (key > last_ || !s_.seen.insert(a, b)) return false;
     s_.found.push_back(key);
     if (s_.found.size() >= most_) lookAtFound();
@@ -146,9 +146,7 @@ class Collector : public query::Visitor {
     if (ends_at_first_) return;
     lookAtFound();
     keepFirst();
-    for (const Met& m : s_.met) {
-      q_.addContact(static_cast<std::intptr_t>(m.b1), static_cast<std::intptr_t>(m.b2), &m.contact);
-    }
+    emit();
   }
 
  private:
@@ -204,11 +202,26 @@ class Collector : public query::Visitor {
     placed_ = true;
   }
 
-  bool meets(std::uint32_t a, std::uint32_t b, bool certain) {
-    if (certain) return true;
-    const std::uint64_t key = keyOf(a, b, certain);
-    getCorners(&key, 1);
-    return decide(key, 0, nullptr);
+  // Any contact will do: is this one?
+  bool endsWith(std::uint64_t key) {
+    if (q_.request.enable_contact) {
+      decidePairs(&key, 1);
+      return emit();
+    }
+    if (!isCertain(key)) {
+      getCorners(&key, 1);
+      if (!decide(key, 0, nullptr)) return false;
+    }
+    return q_.addContact(first(key), second(key), nullptr);
+  }
+
+  // True when nothing more is asked for.
+  bool emit() {
+    bool ends = false;
+    for (const Met& m : s_.met) {
+      ends = q_.addContact(static_cast<std::intptr_t>(m.b1), static_cast<std::intptr_t>(m.b2), &m.contact);
+    }
+    return ends;
   }
 
   // Moves the first of what was found and touches to `met`, and forgets the rest of it.
@@ -316,9 +329,6 @@ class Collector : public query::Visitor {
 
   bool addSpheres(std::uint64_t id1, query::Sphere a, std::uint64_t id2, query::Sphere b) {
     q_.inCallersOrder(id1, id2);
-    if (ends_at_first_) {
-      return q_.addContact(static_cast<std::intptr_t>(id1), static_cast<std::intptr_t>(id2), nullptr);
-    }
     q_.inCallersOrder(a, b);
     const fcl::Transform3<double> X_WA = q_.X_WA().template cast<double>();
     for (query::Sphere* s : {&a, &b}) {
@@ -336,6 +346,7 @@ class Collector : public query::Visitor {
       met.contact.point = a.center + met.contact.normal * (a.radius - overlap / 2);
     }
     s_.met.push_back(met);
+    if (ends_at_first_) return emit();
     if (s_.met.size() >= most_) keepFirst();
     return false;
   }
