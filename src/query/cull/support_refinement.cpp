@@ -12,8 +12,8 @@ namespace {
 
 using tree::SupportTable;
 
-// What a miss pays for later ones, on each side: so much as to look at some thousands of triangles. To grow a node by
-// what the root grid knows is as much as a thousand.
+// What a miss may spend on each side for later misses, in triangles that are projected. Growing a node from the root
+// grid counts as kGrowthEffort of them.
 constexpr std::size_t kEffort = 1 << 13, kGrowthEffort = 1 << 10;
 
 // A part of the surface and how far it may reach.
