@@ -23,8 +23,9 @@ struct NearDirections {
 bool areSeparate(const tree::SupportTable& a, const tree::SupportTable& b, const SimilarityTransform& b_in_a,
                  NearDirections& near);
 
-/// What a look came upon: f(u) = u.t - h_a(u) - h_b(-R^T u) of eight directions u in a's frame, each h as interpolated.
-/// Positive, beyond the rounding margin, means apart. For tests; chosen at run time for the machine's instruction set.
+/// What one iteration evaluates: f(u) = u.t - h_a(u) - h_b(-R^T u) of eight directions u in a's frame, each h as
+/// interpolated. Positive, beyond the rounding margin, means apart. For tests; chosen at run time for the machine's
+/// instruction set.
 struct EightSeparations {
   float u[3][8];  ///< in
   float value[8];
