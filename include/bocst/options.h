@@ -32,6 +32,16 @@ enum class OracleKind {
 /// The clock that ttl is measured with.
 using Clock = std::chrono::steady_clock;
 
+/// What only repeats experiments of the paper.
+struct PaperOptions {
+  /// Pixels a side of the views that kSampled draws, from 1 to 4096.
+  int viewport = 16;
+
+  /// The paper's level rule (5.3): with kBono and 2^n + 2 <= d_t < 2^n + 2^(n-1), n = nbits(d_t) - 1, the collision
+  /// depth is one more than Options::depth.
+  bool level_rule = false;
+};
+
 /// How a model grows, answers and forgets. Fixed when the model is made.
 struct Options {
   Subdivision subdivision = Subdivision::kBono;  ///< How cells are divided.
@@ -45,9 +55,6 @@ struct Options {
   double dimension = 0;
 
   OracleKind oracle = OracleKind::kAuto;  ///< kAuto: BOCST_ORACLE if set, else the fastest that there is.
-
-  /// Pixels a side of the views that kSampled draws, from 1 to 4096.
-  int viewport = 16;
 
   /// The paper's Max. time (3.1): a deepest level unused for longer is dropped; 0: never.
   std::chrono::milliseconds ttl{2000};
@@ -69,9 +76,7 @@ struct Options {
   /// 40 bytes a triangle.
   bool solid = false;
 
-  /// The paper's level rule (5.3): with kBono and 2^n + 2 <= d_t < 2^n + 2^(n-1), n = nbits(d_t) - 1, the collision
-  /// depth is one more than `depth`.
-  bool level_rule = false;
+  PaperOptions paper;  ///< For experiments.
 
   /// What queries read the time from; empty: Clock, as of the system's last tick (some milliseconds). Tests inject
   /// their own.

@@ -72,7 +72,7 @@ class ConvexShape {
   /// A box about the body; of an unbounded one, about as much of it as its maker was told to care for.
   const OrientedVolume& box() const { return box_; }
 
-  /// The box is the body, or as good: what meets the one is worth a look at the other.
+  /// The box bounds the body tightly: what meets the box nearly always meets the body, so the box alone culls.
   virtual bool isBox() const { return false; }
 
   /// The distance of the points. More than `cutoff` is not looked at closely.

@@ -25,7 +25,7 @@ HWY_INLINE std::uint8_t overlapping(const oracle::OctantBounds& octants, const f
   const V per127 = hn::Set(d, 1.0f / 127), per_slab = hn::Set(d, slab_unit), per_half = hn::Set(d, slab_unit / 2);
   std::uint8_t result = 0;
   for (std::size_t i = 0; i < 8; i += hn::Lanes(d)) {
-    // The octant's box: middle and half extents; delta is the way to the volume's middle.
+    // The octant's box: middle and half extents; delta is the displacement to the volume's center.
     V middle[3], h[3], delta[3];
     BOCST_UNROLL
     for (int k = 0; k < 3; ++k) {

@@ -19,7 +19,7 @@ struct OneVolume {
   float normal[3];         ///< Of the slab, about unit length; zero: no slab.
   float slab_offset;       ///< Middle of the slab along normal, from center.
   float slab_half;         ///< Half its thickness.
-  float rounding_margin;   ///< Covers all rounding, see separatedOctants().
+  float rounding_margin;   ///< Covers all rounding, see overlappingOctants().
 };
 
 /// Bit o is set unless octant o is surely separated from the volume, by one of eight axes: the faces of both boxes, the

@@ -119,8 +119,8 @@ class Oracle {
 };
 
 /// The oracle for these options: BOCST_ORACLE overrides kAuto; else compute on a hardware GPU, else the CPU. Shared by
-/// all models. viewport: Options::viewport.
+/// all models. viewport: PaperOptions::viewport.
 /// @throws OracleError for one asked for by name that cannot be had.
-BOCST_EXPORT std::shared_ptr<Oracle> makeOracle(OracleKind kind, int viewport = Options{}.viewport);
+BOCST_EXPORT std::shared_ptr<Oracle> makeOracle(OracleKind kind, int viewport = PaperOptions{}.viewport);
 
 }  // namespace bocst::oracle

@@ -40,7 +40,8 @@ Options checked(const Options& o) {
     bad("dimension is " + std::to_string(o.dimension) + ", not 0 or 1 to 65536");
   }
   if (o.ttl.count() < 0) bad("ttl is negative");
-  if (o.viewport < 1 || o.viewport > 4096) bad("viewport is " + std::to_string(o.viewport) + ", not 1 to 4096");
+  if (o.paper.viewport < 1 || o.paper.viewport > 4096)
+    bad("viewport is " + std::to_string(o.paper.viewport) + ", not 1 to 4096");
   if (!(o.margin >= 0) || !std::isfinite(o.margin)) {
     bad("margin is " + std::to_string(o.margin) + ", not a length of 0 or more");
   }
@@ -49,7 +50,7 @@ Options checked(const Options& o) {
 
 int deepestLevel(const Options& o) {
   if (o.answer == Answer::kExact) return lattice::kMaxLevel;
-  const bool more = o.level_rule && o.subdivision == Subdivision::kBono && lattice::oneLevelMore(o.dimension);
+  const bool more = o.paper.level_rule && o.subdivision == Subdivision::kBono && lattice::oneLevelMore(o.dimension);
   return std::min(o.depth + (more ? 1 : 0), lattice::kMaxLevel);
 }
 
@@ -111,7 +112,7 @@ std::int64_t coarseNow() {
 
 Tree::Tree(std::shared_ptr<const Mesh> mesh, const Options& options)
     : options_(checked(options)),
-      oracle_(oracle::makeOracle(options.oracle, options.viewport)),
+      oracle_(oracle::makeOracle(options.oracle, options.paper.viewport)),
       deepest_(deepestLevel(options)),
       surface_(surfaceOf(mesh, options)) {
   reset(std::move(mesh));

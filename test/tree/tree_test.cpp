@@ -377,7 +377,7 @@ TEST(Tree, ConservativeTreesStopAtTheirDepth) {
     options.answer = Answer::kConservative;
     options.depth = 5;
     options.dimension = 600;
-    options.level_rule = rule;  // 514 <= 600 < 768: one level more
+    options.paper.level_rule = rule;  // 514 <= 600 < 768: one level more
     Modeld a(test::torus(100).mesh(), options), b(test::torus(100).mesh(), options);
     EXPECT_TRUE(touching(a, b, kHit));
     EXPECT_EQ(a.statistics().nodes_per_level.size(), rule ? 6u : 5u);
@@ -421,7 +421,7 @@ TEST(Tree, BadOptionsAreNamed) {
   EXPECT_NE(message([](Options& o) { o.margin = std::nan(""); }).find("margin"), std::string::npos);
   EXPECT_NE(message([](Options& o) { o.margin = 1 / 0.0; }).find("margin"), std::string::npos);
   EXPECT_THROW(Modeld(nullptr), std::invalid_argument);
-  EXPECT_NE(message([](Options& o) { o.viewport = 0; }).find("viewport"), std::string::npos);
+  EXPECT_NE(message([](Options& o) { o.paper.viewport = 0; }).find("viewport"), std::string::npos);
   Modeld model(mesh);
   EXPECT_THROW(model.expandAll(0), std::invalid_argument);
   EXPECT_THROW(model.expandAll(18), std::invalid_argument);

@@ -18,8 +18,8 @@
 namespace bocst::oracle::gl {
 namespace {
 
-// To load OpenGL only to learn that it is software would cost much; a look at device files, little. Once a process:
-// each model asks.
+// Loading OpenGL to learn that it is a software device takes long; testing for the device files of a GPU does not. The
+// result is kept for the process, since each model asks.
 bool mayHaveHardware() {
   const char* const files[] = {"/dev/dri", "/dev/nvidiactl", "/dev/dxg"};
   static const bool may =

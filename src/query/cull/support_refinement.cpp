@@ -12,7 +12,7 @@ namespace {
 
 using tree::SupportTable;
 
-// What a miss pays for later ones, on each side: triangles looked at.
+// What a miss may spend on each side for later misses, in triangles that are projected.
 constexpr std::size_t kEffort = 1 << 13;
 
 // A part of the surface and how far it may reach.

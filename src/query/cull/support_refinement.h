@@ -6,7 +6,8 @@
 
 namespace bocst::query {
 
-/// Asks the trees how far their surfaces reach in the directions that a look was between, a few of them each time.
+/// Makes the supports of both trees exact in some of the directions that areSeparate() interpolated between; a few of
+/// them each time.
 void refineSupports(const TreeSide& a, const TreeSide& b, const NearDirections& near);
 
 }  // namespace bocst::query

@@ -75,7 +75,7 @@ class DistanceWalk : private BestFirst<DistanceWalk<A, B>, A, B> {
   }
   bool worthIt(double bound) const { return bound < cutoff(); }
   bool settled() const { return !(limit_ > 0); }
-  // A body may be much smaller than the box about it: what is worth a look is bounded by the body itself, once.
+  // A body may be much smaller than its box: pairs that pass the box's bound are bounded once more, by the body itself.
   bool again(const Pair& pair) {
     if constexpr (B::kBodies) {
       if (spheres() || b_.isBox(pair.b)) return false;

@@ -9,8 +9,9 @@
 namespace bocst::query {
 namespace {
 
-// Where a pack about the middle of the root can meet a node's volume. With M = `reach`, what is computed here and by
-// trianglesWithin() is off by 15 u M, as for LeafPairs.
+// The region in which triangles of a pack can meet a node's volume v. The pack's frame has its origin at the middle of
+// the root of v's tree, in lattice units. With M = `extent`, region and trianglesWithin() are off by 15 u M, as for
+// LeafPairs.
 PackRegion regionOf(const Volume& v, const SimilarityTransform& other_in_side, double size) {
   PackRegion region;
   double displacement[3], extent = size, offset = v.slab_offset;

@@ -57,7 +57,7 @@ Options ModelArguments::options() const {
   options.dimension = dimension;
   options.answer = exact() ? Answer::kExact : Answer::kConservative;
   options.depth = depth;
-  options.viewport = viewport;
+  options.paper.viewport = viewport;
   options.oracle = oracle == "cpu"         ? OracleKind::kCpu
                    : oracle == "occlusion" ? OracleKind::kOcclusion
                    : oracle == "compute"   ? OracleKind::kCompute

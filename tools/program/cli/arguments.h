@@ -38,7 +38,7 @@ struct ModelArguments {
   std::string answer = "exact";
   int depth = Options{}.depth;
   std::string oracle = "auto";
-  int viewport = Options{}.viewport;
+  int viewport = PaperOptions{}.viewport;
   std::string scalar = "double";
 
   void addShape(CLI::App& command);   ///< --subdivision --dimension
