@@ -23,6 +23,7 @@ extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size
 #else
 
 #include <fcntl.h>
+#include <sys/time.h>
 #include <unistd.h>
 
 #include <algorithm>
@@ -65,17 +66,25 @@ extern "C" void onCrash(int signal) {
   std::raise(signal);
 }
 
+// Of processor time, as machines are shared; what waits for ever is ended later. 0: no limit.
+void limitTime(unsigned seconds) {
+  itimerval timer{};
+  timer.it_value.tv_sec = seconds;
+  setitimer(ITIMER_PROF, &timer, nullptr);
+  alarm(30 * seconds);
+}
+
 /// Empty when all is well, else what is wrong.
 std::string test(const Input& input, unsigned seconds) {
   current = input;
-  alarm(seconds);
+  limitTime(seconds);
   std::string wrong;
   try {
     bocst::fuzz::testOneInput(current.data(), current.size());
   } catch (const std::exception& e) {
     wrong = e.what();
   }
-  alarm(0);
+  limitTime(0);
   return wrong;
 }
 
@@ -87,7 +96,8 @@ class Mutator {
 
   Input next() {
     Input input;
-    if (corpus_.empty() || below(8) == 0) {
+    // Where inputs are no text, random ones are as good as others.
+    if (corpus_.empty() || below(tokens_.empty() ? 2 : 8) == 0) {
       input.resize(below(400));
       for (auto& byte : input) byte = static_cast<std::uint8_t>(below(256));
     } else {
@@ -198,7 +208,7 @@ int main(int argc, char** argv) {
     const fs::path out = options["--out"];
     fs::create_directories(out);
     std::snprintf(crash_file, sizeof crash_file, "%s", (out / "crash.input").c_str());
-    for (const int signal : {SIGSEGV, SIGABRT, SIGFPE, SIGBUS, SIGALRM}) std::signal(signal, onCrash);
+    for (const int signal : {SIGSEGV, SIGABRT, SIGFPE, SIGBUS, SIGALRM, SIGPROF}) std::signal(signal, onCrash);
 
     std::size_t failures = 0;
     const auto report = [&](const std::string& name, const std::string& wrong) {

@@ -131,8 +131,18 @@ class Scene {
     return d;
   }
   double roundedDistance(std::size_t i, std::size_t j) const;
-  // What touches on the grid does so, rounded to doubles, up to rounding.
-  bool touches(std::size_t ij) { return rounded_ ? distance(ij) <= 4 * 0x1p-52 * reach_ : meet(ij); }
+  // What touches on the grid does so, rounded to doubles, up to rounding; but a segment far from the partner's origin
+  // is, rounded there, a triangle.
+  bool touches(std::size_t ij) {
+    if (!rounded_) return meet(ij);
+    return staysFlat(first_[ij / second_.size()]) && staysFlat(second_[ij % second_.size()]) &&
+           distance(ij) <= 4 * 0x1p-52 * magnitude_;
+  }
+  bool staysFlat(const Corners& t) const {
+    const double length = std::sqrt(static_cast<double>(
+        std::max({dot(t[1] - t[0], t[1] - t[0]), dot(t[2] - t[1], t[2] - t[1]), dot(t[0] - t[2], t[0] - t[2])})));
+    return length == 0 || 8 * length >= magnitude_;
+  }
   bool hasArea(std::size_t ij) const {
     return fuzz::hasArea(first_[ij / second_.size()]) && fuzz::hasArea(second_[ij % second_.size()]);
   }
@@ -159,7 +169,6 @@ class Scene {
   std::vector<double> distance_;
   const GridMesh *mesh_a_ = nullptr, *mesh_b_ = nullptr;
   GridPose pose_;
-  double reach_ = 0;  // the largest coordinate, without the pose
   double least_ = -1, magnitude_ = 0;
 };
 
@@ -274,14 +283,13 @@ void Scene::compute(const GridMesh& a, const GridMesh& b, const GridPose& pose) 
                        note(pose.turned(c[2]) + pose.h * pose.t)});
   }
   if (largest > kMaxCoordinate) throw std::logic_error("the harness made coordinates that its arithmetic cannot take");
+  // What the meshes' own coordinates and the pose round is as large as they are.
+  for (const GridMesh* m : {&a, &b}) {
+    for (const Point& c : m->vertices) note(pose.h * c);
+  }
+  note(pose.h * pose.t);
   fineness_ = static_cast<double>(pose.h);
   magnitude_ = static_cast<double>(largest) / fineness_ + 1;
-  reach_ = 1;
-  for (const GridMesh* m : {&a, &b}) {
-    for (const Point& c : m->vertices) {
-      reach_ = std::max(reach_, static_cast<double>(std::max({std::abs(c.x), std::abs(c.y), std::abs(c.z)})));
-    }
-  }
   distance_.assign(first_.size() * second_.size(), -1);
   least_ = -1;
 }

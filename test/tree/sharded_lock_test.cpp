@@ -49,6 +49,56 @@ TEST(ShardedLock, ReadersSeeWhatWritersWroteWhole) {
   EXPECT_GE(numbers[0], 500);
 }
 
+TEST(ShardedLock, WritersWaitUntilReadersHaveLeft) {
+  ShardedLock sharded_lock;
+  std::atomic<bool> in{false};
+  sharded_lock.lock_shared();
+  std::thread writer([&] {
+    const std::lock_guard<ShardedLock> alone(sharded_lock);
+    in = true;
+  });
+  std::this_thread::sleep_for(std::chrono::milliseconds(50));
+  EXPECT_FALSE(in);
+  sharded_lock.unlock_shared();
+  writer.join();
+  EXPECT_TRUE(in);
+}
+
+TEST(ShardedLock, NobodyIsBesideAWriter) {
+  ShardedLock sharded_lock;
+  std::atomic<int> readers{0}, writers{0}, met{0};
+  std::atomic<bool> done{false};
+  const auto read = [&] {
+    while (!done) {
+      const std::shared_lock<ShardedLock> lock(sharded_lock);
+      ++readers;
+      for (int i = 0; i < 20; ++i) met += writers != 0;
+      --readers;
+    }
+  };
+  const auto write = [&](bool only_try) {
+    while (!done) {
+      std::unique_lock<ShardedLock> alone(sharded_lock, std::defer_lock);
+      if (!only_try) {
+        alone.lock();
+      } else if (!alone.try_lock()) {
+        continue;
+      }
+      met += ++writers != 1;
+      for (int i = 0; i < 200; ++i) met += readers != 0;
+      --writers;
+    }
+  };
+  std::vector<std::thread> threads;
+  for (int i = 0; i < 2; ++i) threads.emplace_back(read);
+  threads.emplace_back(write, true);
+  threads.emplace_back(write, false);
+  std::this_thread::sleep_for(std::chrono::seconds(2));
+  done = true;
+  for (std::thread& t : threads) t.join();
+  EXPECT_EQ(met, 0);
+}
+
 TEST(ShardedLock, TryingGivesUpWhereOthersAre) {
   ShardedLock sharded_lock;
   const auto tried = [&sharded_lock] {
