@@ -56,8 +56,9 @@ struct SceneOptions {
 ///
 /// Threads: any number of threads may query one scene, also while another thread changes it: each query sees the scene
 /// from before or after a change, never a mixture. Changes wait for each other. The first query after changes prepares
-/// what they need, and queries at the same time wait for it; apart from that, no query waits for another, and
-/// none allocates memory once the thread has asked similar ones (but FCL's own code does, where a pair has no Model).
+/// what they need, and queries at the same time wait for it; apart from that, no query waits for another. Where models
+/// need not grow, collides() and rows of up to 128 states allocate no memory once the thread has asked similar ones,
+/// but for what FCL's own code does for a pair without a Model.
 template <typename S>
 class BOCST_EXPORT Scene {
  public:

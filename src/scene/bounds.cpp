@@ -90,7 +90,7 @@ Bounds boundsOfModel(const Model<S>& model) {
   if (o.answer == Answer::kConservative) {
     // A sphere of the collision depth sticks out of the surface's box by at most its radius.
     const int level = std::min(std::max(o.depth, 1), lattice::kMaxLevel);
-    const double size = b.radius() + b.center.norm();
+    const double size = b.half.norm() + b.center.norm();
     const oracle::Surface& surface = tree.surface();
     b.reach += std::sqrt(0.75) * surface.lattice.unit() * (1 << (lattice::kMaxLevel - level)) * 1.001 + 1e-12 * size;
   }
@@ -143,11 +143,11 @@ Bounds boundsOf(fcl::CollisionGeometry<S>& geometry) {
     b = boundsOfModel(*model);
   } else if (fcl_adapter::isShape<S>(&geometry)) {
     b = boundsOfShape(geometry);
-    b.reach = kSolverReach * (1 + b.radius());
+    b.reach = kSolverReach * (1 + b.half.norm());
 #if FCL_HAVE_OCTOMAP
   } else if (geometry.getNodeType() == fcl::GEOM_OCTREE) {
     b = boundsOfOcTree(static_cast<const fcl::OcTree<S>&>(geometry));
-    b.reach = kSolverReach * (1 + b.radius());
+    b.reach = kSolverReach * (1 + b.half.norm());
 #endif
   } else {
     fcl_adapter::withBvh<S>("Scene", &geometry, [&](const auto& bvh) {
@@ -158,8 +158,10 @@ Bounds boundsOf(fcl::CollisionGeometry<S>& geometry) {
       });
     });
   }
+  b.radius = b.half.norm();
+  b.size = b.radius + b.center.norm();
   // Beyond this, single precision has no room for the squares.
-  if (b.kind == Bounds::kBox && !((b.center.norm() + b.radius()) < 1e12)) b.kind = Bounds::kEverywhere;
+  if (b.kind == Bounds::kBox && !(b.size < 1e12)) b.kind = Bounds::kEverywhere;
   return b;
 }
 

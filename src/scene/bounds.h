@@ -20,7 +20,8 @@ struct Bounds {
   Eigen::Vector3d half = Eigen::Vector3d::Zero();      ///< Along them.
   double reach = 0;  ///< It may touch what is so far from the box: margin, tolerance of FCL's solvers.
 
-  double radius() const { return half.norm(); }
+  double radius = 0;  ///< About the center; set by boundsOf(), as
+  double size = 0;    ///< that about the frame's origin.
 };
 
 /// @throws std::invalid_argument for a geometry that fcl::collide does not take.

@@ -59,7 +59,7 @@ class Edge {
       const Object<S>& o = world.moving[i];
       motions_.push_back(fcl_adapter::motionOf<S>(begin[i], end[i], motion));
       const Eigen::Vector3d center = motions_[i]->at(0) * o.bounds.center;
-      speeds_.push_back(motions_[i]->fastest(center, o.bounds.radius(), 0) * (1 + 1e-6));
+      speeds_.push_back(motions_[i]->fastest(center, o.bounds.radius, 0) * (1 + 1e-6));
       double place = 0, orthogonality_error = 1e-12;
       for (const fcl::Transform3<S>& X : {begin[i], end[i]}) {
         place = std::max(place, static_cast<double>(X.translation().template lpNorm<1>()));
@@ -131,7 +131,7 @@ class Edge {
     const double speed = speeds_[p.moving] + (fixed ? 0 : speeds_[j]);
     double size = 0;
     for (const Object<S>* o : {&a, &b}) {
-      if (o->bounds.kind == Bounds::kBox) size += o->bounds.radius();
+      if (o->bounds.kind == Bounds::kBox) size += o->bounds.radius;
     }
     for (double time = 0;;) {
       const fcl::Transform3<S> X_WA = poseAt<S>(*motions_[p.moving], time);

@@ -164,12 +164,14 @@ struct Scene<S>::Impl {
   std::size_t search(const char* query, const Transform* X_WM, std::size_t states, Goal goal, std::uint8_t* hit) const {
     const WorldPtr w = current();
     const std::size_t moving = w->moving.size();
-    scene::checkPoses<S>(query, X_WM, states, moving);
+    thread_local std::vector<double> defects_of_thread;
+    std::vector<double>& defects = defects_of_thread;
+    scene::checkPoses<S>(query, X_WM, states, moving, defects);
     if (goal == Goal::kAll) std::fill(hit, hit + states, std::uint8_t{0});
     if (states == 0 || moving == 0) return states;
     const bool all_at_once = goal == Goal::kAny && states <= kEdge;
     const std::size_t length = all_at_once ? states : kRow, rows = (states + length - 1) / length;
-    if (rows == 1) return sweepOfThread<S>().run(*w, X_WM, states, goal, hit);
+    if (rows == 1) return sweepOfThread<S>().run(*w, X_WM, states, goal, hit, defects);
     const std::vector<std::size_t> order = goal == Goal::kAny ? bisected(rows) : std::vector<std::size_t>();
     // Of rows, in their order, the first that has what is looked for; rows after it need not be looked at.
     std::atomic<std::size_t> least{rows};
@@ -180,7 +182,7 @@ struct Scene<S>::Impl {
       const std::size_t row = order.empty() ? place : order[place];
       const std::size_t begin = row * length, count = std::min(length, states - begin);
       std::uint8_t* hits = hit == nullptr ? nullptr : hit + begin;
-      const std::size_t at = sweepOfThread<S>().run(*w, X_WM + begin * moving, count, goal, hits);
+      const std::size_t at = sweepOfThread<S>().run(*w, X_WM + begin * moving, count, goal, hits, defects);
       if (at == count || goal == Goal::kAll) return true;
       const std::lock_guard<std::mutex> lock(finding);
       if (place < least) {
@@ -271,8 +273,8 @@ void Scene<S>::update(Id object) {
 template <typename S>
 bool Scene<S>::collides(const Transform* X_WM, Pair* first) const {
   const auto w = impl_->current();
-  scene::checkPoses<S>("collides", X_WM, 1, w->moving.size());
   scene::StateCheck<S>& check = sweepOfThread<S>().check();
+  scene::checkPoses<S>("collides", X_WM, 1, w->moving.size(), check.defects);
   check.start(*w);
   scene::PairAt hit;
   if (!check.runAll(X_WM, nullptr, &hit)) return false;
@@ -301,9 +303,10 @@ void Scene<S>::collisions(const Transform* X_WM, std::size_t states, std::uint8_
 template <typename S>
 S Scene<S>::clearance(const Transform* X_WM, Pair* nearest) const {
   const auto w = impl_->current();
-  scene::checkPoses<S>("clearance", X_WM, 1, w->moving.size());
+  scene::StateCheck<S>& check = sweepOfThread<S>().check();
+  scene::checkPoses<S>("clearance", X_WM, 1, w->moving.size(), check.defects);
   scene::PairAt pair;
-  const S least = scene::clearance(*w, sweepOfThread<S>().check(), X_WM, pair);
+  const S least = scene::clearance(*w, check, X_WM, pair);
   if (nearest != nullptr) *nearest = least < std::numeric_limits<S>::max() ? impl_->named(*w, pair) : Pair();
   return least;
 }
@@ -311,9 +314,10 @@ S Scene<S>::clearance(const Transform* X_WM, Pair* nearest) const {
 template <typename S>
 bool Scene<S>::edgeIsFree(const Transform* X_WM_begin, const Transform* X_WM_end, fcl::CCDMotionType motion) const {
   const auto w = impl_->current();
-  scene::checkPoses<S>("edgeIsFree", X_WM_begin, 1, w->moving.size());
-  scene::checkPoses<S>("edgeIsFree", X_WM_end, 1, w->moving.size());
-  return scene::edgeIsFree<S>(*w, sweepOfThread<S>().check(), X_WM_begin, X_WM_end, motion);
+  scene::StateCheck<S>& check = sweepOfThread<S>().check();
+  scene::checkPoses<S>("edgeIsFree", X_WM_begin, 1, w->moving.size(), check.defects);
+  scene::checkPoses<S>("edgeIsFree", X_WM_end, 1, w->moving.size(), check.defects);
+  return scene::edgeIsFree<S>(*w, check, X_WM_begin, X_WM_end, motion);
 }
 
 template <typename S>

@@ -21,19 +21,20 @@ template <typename S>
 void StateCheck<S>::start(const World<S>& world) {
   world_ = &world;
   if (serial_ != world.serial) has_last_ = false;
-  serial_ = world.serial;
   boxes_.resize(world.moving.size());
-  groups_.assign(world.movingGroups(), BoxGroup());
+  // Each state fills all lanes with an object.
+  if (serial_ != world.serial) groups_.assign(world.movingGroups(), BoxGroup());
   stack_.resize(world.nodes.size() + 1);
   far.assign(world.moving.size(), 0);
   reach.assign(world.moving.size(), 0);
   far_.assign(8 * world.movingGroups(), 0);
+  serial_ = world.serial;
 }
 
 template <typename S>
 void StateCheck<S>::place(const fcl::Transform3<S>* X_WM) {
   for (std::size_t i = 0; i < boxes_.size(); ++i) {
-    boxes_[i] = world_->boxAt(world_->moving[i], X_WM[i], reach[i]);
+    boxes_[i] = world_->boxAt(world_->moving[i], X_WM[i], defects[i], reach[i]);
     groups_[i / 8].set(i % 8, boxes_[i]);
   }
 }
@@ -134,7 +135,7 @@ bool StateCheck<S>::look(const fcl::Transform3<S>* X_WM, std::size_t count, std:
       double apart = far[c.pair.moving];
       if (!world_->isFixed(c.pair.group)) apart += far[world_->movingIndex(c.pair.group, c.pair.lane)];
       // A larger gap between hulls whose boxes overlap is seldom.
-      if (apart < std::min(a.bounds.radius(), b.bounds.radius()) &&
+      if (apart < std::min(a.bounds.radius, b.bounds.radius) &&
           fcl_adapter::hullsApart(*a.model, X_WA, *b.model, X_WB, apart * (1 + 1e-4))) {
         (*entries)[c.entry].mask &= ~(1u << c.pair.lane);
         continue;

@@ -36,9 +36,12 @@ class StateCheck {
   /// To be called before other queries about a world.
   void start(const World<S>& world);
 
-  /// For each moving object; to be set by whoever asks for more than one state. As is `reach`, the least reach of each
-  /// box: that of the other states, where it is larger.
+  /// For each moving object; to be set by whoever asks for more than one state. As is `reach`, which is that of its box
+  /// in all of them, where it is not 0.
   std::vector<double> far, reach;
+
+  /// Of the poses of each moving object, at least; to be set before anything is asked.
+  std::vector<double> defects;
 
   /// Places the objects, and finds pairs that may be near: among the entries [begin, end) of the list, or, without one,
   /// among all. Where `entries` is not null, pairs that may touch in one of the states are added to it.

@@ -21,11 +21,12 @@ void Sweep<S>::measure(const World<S>& world, const fcl::Transform3<S>* X_WM, st
   path_.resize(moving * states);
   for (std::size_t i = 0; i < moving; ++i) {
     const Bounds& b = world.moving[i].bounds;
-    const double radius = b.radius(), c0 = b.center[0], c1 = b.center[1], c2 = b.center[2];
+    const double radius = b.radius, c0 = b.center[0], c1 = b.center[1], c2 = b.center[2];
     const auto placeOf = [&](std::size_t k) {
       return static_cast<double>(X_WM[k * moving + i].translation().template lpNorm<1>());
     };
-    double sum = 0, orthogonality_error = defectOf<S>(X_WM[i]), worst = orthogonality_error, place = placeOf(0);
+    const double orthogonality_error = check_.defects[i];
+    double sum = 0, place = placeOf(0);
     double* path = path_.data() + i * states;
     path[0] = 0;
     for (std::size_t k = 1; k < states; ++k) {
@@ -40,15 +41,12 @@ void Sweep<S>::measure(const World<S>& world, const fcl::Transform3<S>* X_WM, st
         displacement += d * d;
         turn += d0 * d0 + d1 * d1 + d2 * d2;
       }
-      const double next = defectOf<S>(X_WM[k * moving + i]);
-      sum += (std::sqrt(displacement) + radius * (std::sqrt(turn / 2) + 4 * (orthogonality_error + next))) * (1 + 1e-6);
-      orthogonality_error = next;
+      sum += (std::sqrt(displacement) + radius * (std::sqrt(turn / 2) + 8 * orthogonality_error)) * (1 + 1e-6);
       path[k] = sum;
-      worst = std::max(worst, orthogonality_error);
       place = std::max(place, placeOf(k));
     }
     // Of all states, as what is said of one holds for others.
-    if (states > 1) check_.reach[i] = world.reachWithin(world.moving[i], place, worst);
+    if (states > 1) check_.reach[i] = world.reachWithin(world.moving[i], place, orthogonality_error);
   }
 }
 
@@ -62,18 +60,19 @@ bool Sweep<S>::setFar(const World<S>& world, std::size_t states, const Part& par
     check_.far[i] = far;
     // Differences of sums.
     if (far > 0) check_.far[i] += 1e-15 * path[states - 1] * static_cast<double>(states);
-    if (far > kFarthest * world.moving[i].bounds.radius() && world.moving[i].bounds.kind == Bounds::kBox) near = false;
+    if (far > kFarthest * world.moving[i].bounds.radius && world.moving[i].bounds.kind == Bounds::kBox) near = false;
   }
   return near;
 }
 
 template <typename S>
 std::size_t Sweep<S>::run(const World<S>& world, const fcl::Transform3<S>* X_WM, std::size_t states, Goal goal,
-                          std::uint8_t* hit) {
+                          std::uint8_t* hit, const std::vector<double>& defects) {
   const std::size_t moving = world.moving.size();
   if (goal == Goal::kAll) std::fill(hit, hit + states, std::uint8_t{0});
   if (states == 0 || moving == 0) return states;
   check_.start(world);
+  check_.defects.assign(defects.begin(), defects.end());
   measure(world, X_WM, states);
   std::size_t found = states;
   parts_.clear();

@@ -43,14 +43,24 @@ double defectOf(const fcl::Transform3<S>& X) {
 }
 
 template <typename S>
-void checkPoses(const char* query, const fcl::Transform3<S>* X_WM, std::size_t states, std::size_t moving) {
+void refusePose(const char* query, const fcl::Transform3<S>* X_WM, std::size_t k, std::size_t moving) {
+  refuse<S>(query, " of moving object " + std::to_string(k % moving) + " in state " + std::to_string(k / moving),
+            X_WM[k]);
+}
+
+template <typename S>
+void checkPoses(const char* query, const fcl::Transform3<S>* X_WM, std::size_t states, std::size_t moving,
+                std::vector<double>& defects) {
+  defects.assign(moving, 0);
   if (states != 0 && moving != 0 && X_WM == nullptr) {
     throw std::invalid_argument(std::string("bocst::Scene::") + query + ": the poses are null");
   }
-  for (std::size_t k = 0; k < states * moving; ++k) {
-    if (defectOf<S>(X_WM[k]) <= kMaxDefect) continue;
-    refuse<S>(query, " of moving object " + std::to_string(k % moving) + " in state " + std::to_string(k / moving),
-              X_WM[k]);
+  for (std::size_t k = 0; k < states; ++k) {
+    for (std::size_t i = 0; i < moving; ++i) {
+      const double orthogonality_error = defectOf<S>(X_WM[k * moving + i]);
+      if (!(orthogonality_error <= kMaxDefect)) refusePose<S>(query, X_WM, k * moving + i, moving);
+      defects[i] = std::max(defects[i], orthogonality_error);
+    }
   }
 }
 
@@ -64,21 +74,21 @@ void checkPose(const char* query, const fcl::Transform3<S>& X) {
 // box is in float (see nearLanes()).
 template <typename S>
 double reachOf(const Bounds& b, double largest, double place, double displacement, double orthogonality_error) {
-  const double radius = b.radius(), size = radius + b.center.norm();
-  return b.reach + 64 * static_cast<double>(std::numeric_limits<S>::epsilon()) * (place + size) +
-         4 * orthogonality_error * (largest + size) + 128 * 0x1p-24 * (displacement + radius);
+  return b.reach + 64 * static_cast<double>(std::numeric_limits<S>::epsilon()) * (place + b.size) +
+         4 * orthogonality_error * (largest + b.size) + 128 * 0x1p-24 * (displacement + b.radius);
 }
 
 template <typename S>
 double World<S>::reachWithin(const Object<S>& object, double place, double orthogonality_error) const {
   const Bounds& b = object.bounds;
   if (b.kind != Bounds::kBox) return 0;
-  const double displacement = place + 2 * b.center.norm() + origin_.lpNorm<1>();
+  const double displacement = place + 2 * b.size + origin_.lpNorm<1>();
   return reachOf<S>(b, largest_, place, displacement, orthogonality_error) * (1 + 1e-12);
 }
 
 template <typename S>
-Box World<S>::boxAt(const Object<S>& object, const fcl::Transform3<S>& X_WG, double reach) const {
+Box World<S>::boxAt(const Object<S>& object, const fcl::Transform3<S>& X_WG, double orthogonality_error,
+                    double reach) const {
   const Bounds& b = object.bounds;
   Box box;
   if (b.kind != Bounds::kBox) {
@@ -103,13 +113,12 @@ Box World<S>::boxAt(const Object<S>& object, const fcl::Transform3<S>& X_WG, dou
     displacement += std::abs(center[j]);
     for (int k = 0; k < 3; ++k) axis[k][j] = m[j] * b.axes(0, k) + m[4 + j] * b.axes(1, k) + m[8 + j] * b.axes(2, k);
   }
-  const double radius = b.radius();
-  reach = std::max(reach, reachOf<S>(b, largest_, place, displacement, defectOf<S>(X_WG)));
+  if (reach == 0) reach = reachOf<S>(b, largest_, place, displacement, orthogonality_error);
   // Where half extents do not fit a float, nothing near does.
-  if (!(displacement + radius + reach < 1e12)) {
+  if (!(displacement + b.radius + reach < 1e12)) {
     Object<S> far;
     far.bounds.kind = Bounds::kEverywhere;
-    return boxAt(far, X_WG);
+    return boxAt(far, X_WG, 0);
   }
   box.reach = static_cast<float>(reach);
   for (int j = 0; j < 3; ++j) {
@@ -193,9 +202,7 @@ World<S>::World(std::vector<Object<S>> moving_objects, std::vector<Object<S>> fi
                 const std::set<std::pair<Id, Id>>& ignored_pairs)
     : moving(std::move(moving_objects)), serial(nextSerial()) {
   const auto ignored = [&](Id a, Id b) { return ignored_pairs.count(std::minmax(a, b)) != 0; };
-  const auto sizeOf = [](const Object<S>& o) {
-    return o.bounds.kind == Bounds::kBox ? o.bounds.radius() + o.bounds.center.norm() : 0;
-  };
+  const auto sizeOf = [](const Object<S>& o) { return o.bounds.kind == Bounds::kBox ? o.bounds.size : 0; };
   for (const Object<S>& o : moving) largest_ = std::max(largest_, sizeOf(o));
   Eigen::AlignedBox3d middles;
   for (const Object<S>& o : fixed_objects) {
@@ -213,7 +220,7 @@ World<S>::World(std::vector<Object<S>> moving_objects, std::vector<Object<S>> fi
       if (kind != Bounds::kNowhere && (kind == Bounds::kEverywhere) == everywhere) order.push_back(i);
     }
   }
-  for (const Object<S>& o : fixed_objects) boxes.push_back(boxAt(o, o.X_WG));
+  for (const Object<S>& o : fixed_objects) boxes.push_back(boxAt(o, o.X_WG, defectOf<S>(o.X_WG)));
   const auto unbounded =
       static_cast<std::size_t>(std::count_if(fixed_objects.begin(), fixed_objects.end(),
                                              [](const Object<S>& o) { return o.bounds.kind == Bounds::kEverywhere; }));
@@ -238,10 +245,10 @@ World<S>::World(std::vector<Object<S>> moving_objects, std::vector<Object<S>> fi
   }
 }
 
-#define BOCST_INSTANTIATE(S)                                                                     \
-  template class World<S>;                                                                       \
-  template double defectOf<S>(const fcl::Transform3<S>&);                                        \
-  template void checkPoses<S>(const char*, const fcl::Transform3<S>*, std::size_t, std::size_t); \
+#define BOCST_INSTANTIATE(S)                                                                                           \
+  template class World<S>;                                                                                             \
+  template double defectOf<S>(const fcl::Transform3<S>&);                                                              \
+  template void checkPoses<S>(const char*, const fcl::Transform3<S>*, std::size_t, std::size_t, std::vector<double>&); \
   template void checkPose<S>(const char*, const fcl::Transform3<S>&);
 BOCST_INSTANTIATE(float)
 BOCST_INSTANTIATE(double)

@@ -5,9 +5,12 @@
 #include <gtest/gtest.h>
 
 #include <atomic>
+#include <cstddef>
 #include <cstdint>
+#include <cstdlib>
 #include <limits>
 #include <memory>
+#include <new>
 #include <random>
 #include <set>
 #include <string>
@@ -16,6 +19,26 @@
 
 #include "conformance/octrees.h"
 #include "conformance/reference.h"
+
+namespace {
+
+thread_local std::size_t allocations = 0;
+
+void* allocate(std::size_t size, std::size_t alignment) {
+  ++allocations;
+  void* p = std::aligned_alloc(alignment, (size + alignment) / alignment * alignment);
+  if (p == nullptr) throw std::bad_alloc();
+  return p;
+}
+
+}  // namespace
+
+void* operator new(std::size_t size) { return allocate(size, alignof(std::max_align_t)); }
+void* operator new(std::size_t size, std::align_val_t a) { return allocate(size, static_cast<std::size_t>(a)); }
+void operator delete(void* p) noexcept { std::free(p); }
+void operator delete(void* p, std::size_t) noexcept { std::free(p); }
+void operator delete(void* p, std::align_val_t) noexcept { std::free(p); }
+void operator delete(void* p, std::size_t, std::align_val_t) noexcept { std::free(p); }
 
 namespace bocst {
 namespace {
@@ -544,6 +567,26 @@ TYPED_TEST(SceneTest, MisuseThrows) {
     }
   }
   EXPECT_EQ(scene.fixedCount(), 1u);
+}
+
+TYPED_TEST(SceneTest, WarmQueriesAllocateNothing) {
+  using S = TypeParam;
+  World<S> w;
+  std::mt19937_64 g(9);
+  for (std::size_t i = 0; i < 30; ++i) w.fix(geometry<S>(i % 3, g), randomPose<S>(g, 2));
+  for (std::size_t i = 0; i < 3; ++i) w.move(geometry<S>(i, g));
+  const States<S> X = walk<S>(120, 3, 2, 0.03, 31);
+  std::uint8_t hit[120];
+  const auto ask = [&] {
+    for (std::size_t k = 0; k < 120; ++k) w.scene.collides(X.data() + 3 * k);
+    w.scene.collisions(X.data(), 120, hit);
+    w.scene.firstCollision(X.data(), 120);
+    w.scene.anyCollision(X.data(), 120);
+  };
+  for (int k = 0; k < 40; ++k) ask();
+  const std::size_t before = allocations;
+  ask();
+  EXPECT_EQ(allocations, before);
 }
 
 // What the tests run under ThreadSanitizer looks at: queries from several threads beside changes.
