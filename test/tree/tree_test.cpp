@@ -6,6 +6,7 @@
 #include <gtest/gtest.h>
 
 #include <map>
+#include <random>
 #include <set>
 
 #include "lattice/lattice.h"
@@ -56,18 +57,45 @@ TEST(Tree, GrowsOnlyWhatAQueryNeedsAndSettles) {
   Modeld whole(a.mesh());
   whole.expandAll(static_cast<int>(first.nodes_per_level.size()));
   EXPECT_LT(first.resident_nodes, whole.statistics().resident_nodes / 2);
-  // A hit that passes pairs by grows two of them for the next query, until there are none.
-  Statistics before = first;
-  int repeats = 0;
-  for (int unchanged = 0; unchanged < 3 && repeats < 100; ++repeats) {
-    EXPECT_TRUE(touching(a, b, kHit));
-    const Statistics now = a.statistics();
-    EXPECT_LE(now.expansions, before.expansions + 2);
-    unchanged = now.expansions == before.expansions ? unchanged + 1 : 0;
-    before = now;
+  // The same query needs no more.
+  for (int repeat = 0; repeat < 3; ++repeat) EXPECT_TRUE(touching(a, b, kHit));
+  EXPECT_EQ(a.statistics().expansions, first.expansions);
+}
+
+// Whatever is asked, all growth together costs no more than about twice a build of the whole tree: what is built by
+// parts is half of the triangles at most, then all are built at once.
+TEST(Tree, GrowthCostsAtMostTwiceABuild) {
+  for (const std::size_t n : {std::size_t{20}, std::size_t{60}, std::size_t{150}}) {
+    Options options;
+    options.ttl = milliseconds(0);
+    Modeld a(test::torus(n).mesh(), options), b(test::torus(n).mesh(), options);
+    std::mt19937_64 g(n);
+    std::uniform_real_distribution<double> u(-2.5, 2.5);
+    for (int i = 0; i < 3000; ++i) touching(a, b, {u(g), u(g), u(g) / 2});
+    const Statistics asked = a.statistics();
+    const std::size_t triangles = a.mesh()->triangleCount();
+    EXPECT_GE(asked.built_triangles, triangles) << "so much is asked that all is built";
+    EXPECT_LE(asked.built_triangles, 2 * triangles);
+    for (int i = 0; i < 3000; ++i) touching(a, b, {u(g), u(g), u(g) / 2});
+    EXPECT_EQ(a.statistics().built_triangles, asked.built_triangles) << "what is whole does not grow";
   }
-  EXPECT_LT(repeats, 100);
-  EXPECT_LT(before.resident_nodes, whole.statistics().resident_nodes / 2);
+}
+
+// A sphere about the leaf of two large triangles meets far more cells than they do.
+TEST(Tree, MixedAnswersGrowAlongTheTrianglesOnly) {
+  const std::vector<Eigen::Vector3d> corners{{-50, -50, 0}, {50, -50, 0}, {50, 50, 0}, {-50, 50, 0}};
+  const std::vector<fcl::Triangle> wall{{0, 1, 2}, {0, 2, 3}};
+  Options conservative;
+  conservative.answer = Answer::kConservative;
+  conservative.depth = 10;
+  const Modeld exact(std::make_shared<Mesh>(corners, wall));
+  Modeld ring(test::torus(60).mesh(), conservative);
+  const double lowest = ring.mesh()->bounds().min().z();
+  EXPECT_FALSE(touching(exact, ring, {0.3, 0.2, 0.05 - lowest}));
+  EXPECT_LT(ring.statistics().resident_nodes, 5000u);
+  EXPECT_TRUE(touching(exact, ring, {0.3, 0.2, -0.01 - lowest}));
+  EXPECT_TRUE(touching(ring, exact, {-0.3, -0.2, lowest + 0.01}));
+  EXPECT_LT(ring.statistics().resident_nodes, 20000u);
 }
 
 TEST(Tree, DecaysLevelByLevelToItsRoot) {

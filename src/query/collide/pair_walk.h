@@ -174,17 +174,46 @@ class PairWalk {
         s.deferred.add(pair);
       } else {
         a_.children(pair.a, [&](typename A::Node c) {
-          if (sphereMeets(a_.sphere(c), pair.b)) s.stack.push_back({c, pair.b});
+          const Sphere ball = a_.sphere(c);
+          if (sphereMeets(ball, pair.b) && (sb != State::kLeaf || meetsLeafOfB(ball, pair.b))) {
+            s.stack.push_back({c, pair.b});
+          }
         });
       }
     } else if (sb == State::kGrows) {
       s.deferred.add(pair);
     } else {
       b_.children(pair.b, [&](typename B::Node c) {
-        if (sphereMeets(ball_a, c)) s.stack.push_back({pair.a, c});
+        if (!sphereMeets(ball_a, c)) return;
+        if (sa == State::kLeaf && !meetsLeafOfA(inA(b_.sphere(c)), pair.a)) return;
+        s.stack.push_back({pair.a, c});
       });
     }
     return false;
+  }
+
+  // Beside a large triangle, the sphere about its leaf meets far more cells than the triangle does: without this test a
+  // conservative tree would grow all of them. `ball` is in the frame of A.
+  bool meetsLeafOfA(const Sphere& ball, typename A::Node leaf) const {
+    if (a_.isConservative()) return true;
+    for (std::size_t i = 0; i < a_.triangleCount(leaf); ++i) {
+      const std::uint32_t t = a_.triangle(leaf, i);
+      const Corners corners = {a_.corner(t, 0), a_.corner(t, 1), a_.corner(t, 2)};
+      if (spheresMeet(ball, {closestPoint(ball.center, corners), 0})) return true;
+    }
+    return false;
+  }
+  bool meetsLeafOfB(const Sphere& ball, typename B::Node leaf) const {
+    if constexpr (!B::kBodies) {
+      if (b_.isConservative()) return true;
+      for (std::size_t i = 0; i < b_.triangleCount(leaf); ++i) {
+        const std::uint32_t t = b_.triangle(leaf, i);
+        const Corners corners = {b_in_a_ * b_.corner(t, 0), b_in_a_ * b_.corner(t, 1), b_in_a_ * b_.corner(t, 2)};
+        if (spheresMeet(ball, {closestPoint(ball.center, corners), 0})) return true;
+      }
+      return false;
+    }
+    return true;
   }
 
   bool leafSpheres(const Pair& pair) {
