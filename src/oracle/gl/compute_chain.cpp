@@ -51,7 +51,7 @@ ComputeChain::ComputeChain(Limits limits, Arena& arena) : limits_(clamped(limits
     auto program = std::make_unique<Program>(std::vector<Program::Stage>{{GL_COMPUTE_SHADER, source(name, clips)}});
     const Program& p = *program;
     steps_.push_back({std::move(program), p.uniform("u_pairs"), p.uniform("u_cells"), p.uniform("u_cell_count"),
-                      p.uniform("u_list_room"), p.uniform("u_id_room")});
+                      p.uniform("u_list_capacity"), p.uniform("u_id_capacity")});
   }
 }
 
