@@ -9,7 +9,7 @@
 #include <tuple>
 
 #include "fcl/adapters/motion.h"
-#include "fcl/plugin/dispatch.h"
+#include "fcl/adapters/models.h"
 
 namespace bocst::scene {
 namespace {

@@ -14,7 +14,7 @@
 #include <thread>
 #include <vector>
 
-#include "fcl/plugin/dispatch.h"
+#include "fcl/adapters/models.h"
 #include "scene/edge.h"
 #include "scene/pool.h"
 #include "scene/sweep.h"

@@ -146,7 +146,7 @@ bool searchFar(const DistanceQuery<S>& q, const Distant& a, const query::ConvexS
   query::Nearest n;
   Eigen::Vector3d tip;
   n.a = a.farthest(half_way.stableNormalized(), tip);
-  n.b = b.name(b.root());
+  n.b = b.id(b.root());
   n.on_a = a.X_WM * tip;
   n.on_b = X * ball.center;
   report(q, 2 * Distant::halfWay(a.X_WM, tip, X, ball.center).stableNorm(), n);

@@ -2,6 +2,7 @@
 #include "fcl/queries/scene_pair.h"
 
 #include "fcl/adapters/pair.h"
+#include "fcl/queries/query_scope.h"
 #include "query/collide/tree_walk.h"
 
 namespace bocst::fcl_adapter {
@@ -9,16 +10,12 @@ namespace bocst::fcl_adapter {
 template <typename S>
 bool hullsApart(const Model<S>& a, const fcl::Transform3<S>& X_WA, const Model<S>& b, const fcl::Transform3<S>& X_WB,
                 double gap) {
-  bool apart = false;
-  const double more = marginOf(&a, &b) + gap;
-  betweenTrees(
-      X_WA, a.tree(), X_WB, b.tree(),
-      [&](const query::TreeSide& side_a, const query::TreeSide& side_b, query::SimilarityTransform b_in_a, double) {
-        if (!query::TreeWalk::fits(side_a, side_b, b_in_a)) return;
-        b_in_a.tolerance += more / side_a.tree().surface().lattice.unit();
-        apart = query::TreeWalk(side_a, side_b, b_in_a).isNeedless();
-      });
-  return apart;
+  const QueryScope scope(a.tree(), b.tree());
+  const OrderedPair<S> pair{&a, X_WA, &b, X_WB, false};
+  query::SimilarityTransform b_in_a = relate<S>(pair, scope.a(), scope.b()).b_in_a;
+  if (!query::TreeWalk::fits(scope.a(), scope.b(), b_in_a)) return false;
+  b_in_a.tolerance += (marginOf(&a, &b) + gap) / unitOf(scope.a());
+  return query::TreeWalk(scope.a(), scope.b(), b_in_a).isNeedless();
 }
 
 template bool hullsApart<float>(const Model<float>&, const fcl::Transform3<float>&, const Model<float>&,

@@ -42,7 +42,7 @@ HWY_INLINE void edgeAxis(D d, V ep, V eq, V ap, V aq, V bp, V bq, V half, int p,
       const M meets = hn::And(hn::Le(lo_r, c), hn::Ge(hi_r, c));
       BOCST_UNROLL
       for (int o = 0; o < 8; ++o) {
-        if ((o >> p & 1) == sp && (o >> q & 1) == sq) alive[o] = hn::And(alive[o], touch);
+        if ((o >> p & 1) == sp && (o >> q & 1) == sq) alive[o] = hn::And(alive[o], meets);
       }
     }
   }
