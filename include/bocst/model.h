@@ -96,7 +96,8 @@ class BOCST_EXPORT Model : public fcl::CollisionGeometry<S> {
   fcl::Matrix3<S> computeMomentofInertia() const override;  ///< See computeVolume().
 
   // What FCL asks of a geometry.
-  void computeLocalAABB() override;                 ///< Constant time: the mesh's bounds and the root sphere.
+  void computeLocalAABB() override;                 ///< The mesh's bounds, and the sphere about their middle
+                                                    ///< that holds all vertices; these are looked through once.
   fcl::OBJECT_TYPE getObjectType() const override;  ///< OT_UNKNOWN: FCL never swaps the arguments.
   fcl::NODE_TYPE getNodeType() const override;      ///< GEOM_TRIANGLE: a slot FCL leaves empty.
 

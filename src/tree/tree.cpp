@@ -123,6 +123,7 @@ void Tree::reset(std::shared_ptr<const Mesh> mesh) {
   component_points_known_ = nullptr;
   component_points_ = nullptr;
   surface_ = surfaceOf(std::move(mesh), options_);
+  radius_ = -1;
   root_bounds_ = oracle::CellBounds();
   const Eigen::AlignedBox3d box = latticeBounds(surface_);
   setBox(box, lattice::Cell{}, root_bounds_);
@@ -152,6 +153,23 @@ std::shared_ptr<const Mesh> Tree::mesh() const {
 Eigen::AlignedBox3d Tree::bounds() const {
   const std::shared_lock<ShardedLock> lock(query_lock_);
   return surface_.bounds;
+}
+
+double Tree::radius() const {
+  const std::shared_lock<ShardedLock> lock(query_lock_);
+  const double known = radius_.load(std::memory_order_relaxed);
+  if (known >= 0) return known;
+  const Eigen::Vector3d center = surface_.bounds.center();
+  const double corner = (surface_.bounds.max() - center).cwiseMax(center - surface_.bounds.min()).norm();
+  double radius = corner;
+  if (surface_.mesh != nullptr) {
+    double squared = 0;
+    for (const Eigen::Vector3d& v : surface_.mesh->vertices()) squared = std::max(squared, (v - center).squaredNorm());
+    // Vertices of no triangle may lie outside of the bounds.
+    if (std::isfinite(squared)) radius = std::min(corner, std::sqrt(squared));
+  }
+  radius_.store(radius, std::memory_order_relaxed);
+  return radius;
 }
 
 void Tree::releaseMesh() {

@@ -128,6 +128,9 @@ class Tree {
   void releaseMesh();
   std::shared_ptr<const Mesh> mesh() const;
   Eigen::AlignedBox3d bounds() const;  ///< Of the mesh, in its frame.
+  /// How far the surface extends from the middle of bounds(), at most: to the farthest vertex. Found when first asked
+  /// for.
+  double radius() const;
 
   /// Takes up what the query taught about bounds, and prunes when it is time; puts it off when others are in the way.
   void afterQuery(std::int64_t now);
@@ -173,6 +176,7 @@ class Tree {
   mutable ForkAwareMutex component_mutex_;  // guards pieces_ while they are found
   mutable std::unique_ptr<const std::vector<Eigen::Vector3d>> component_points_;
   mutable std::atomic<const std::vector<Eigen::Vector3d>*> component_points_known_{nullptr};  // pieces_, for readers
+  mutable std::atomic<double> radius_{-1};                                                    // negative: not known yet
   oracle::CellBounds root_bounds_;
   mutable SupportTable supports_;
   std::unique_ptr<oracle::RootGrid> grid_;

@@ -25,11 +25,34 @@ S roundDown(double x) {
 
 }  // namespace
 
+namespace {
+
+/// The box of the surface and its margin, which broadphase managers must not leave out, and a sphere about its middle
+/// that holds the surface however it is turned: no larger than `radius` and the box's.
+template <typename S>
+void setBounds(fcl::CollisionGeometry<S>& geometry, Eigen::AlignedBox3d b, double margin, double radius) {
+  const Eigen::Vector3d middle = b.center();
+  margin *= 1 + 4e-16;
+  b = Eigen::AlignedBox3d(b.min().array() - margin, b.max().array() + margin);
+  for (int k = 0; k < 3; ++k) {
+    geometry.aabb_local.min_[k] = roundDown<S>(b.min()[k]);
+    geometry.aabb_local.max_[k] = roundUp<S>(b.max()[k]);
+  }
+  geometry.aabb_center = geometry.aabb_local.center();
+  const Eigen::Vector3d center = geometry.aabb_center.template cast<double>();
+  const double to_corner = (b.max() - center).cwiseMax(center - b.min()).norm();
+  const double to_vertex = (center - middle).norm() + radius + margin;
+  geometry.aabb_radius = roundUp<S>(std::min(to_corner, to_vertex) * (1 + 1e-15));
+}
+
+}  // namespace
+
 template <typename S>
 Model<S>::Model(std::shared_ptr<const Mesh> mesh, const Options& options)
     : tree_(std::make_unique<tree::Tree>(std::move(mesh), options)) {
   fcl_adapter::checkDispatch<S>();
-  computeLocalAABB();
+  // Who asks geometries and poses needs no radius, so vertices are not looked through yet.
+  setBounds(*this, tree_->bounds(), tree_->options().margin, HUGE_VAL);
 }
 
 template <typename S>
@@ -83,24 +106,12 @@ void Model<S>::prune() {
 template <typename S>
 void Model<S>::updateVertices(std::vector<Eigen::Vector3d> vertices) {
   tree_->updateVertices(std::move(vertices));
-  computeLocalAABB();
+  setBounds(*this, tree_->bounds(), tree_->options().margin, HUGE_VAL);
 }
 
 template <typename S>
 void Model<S>::computeLocalAABB() {
-  // What is within the margin touches, so broadphase managers must not leave it out.
-  Eigen::AlignedBox3d b = tree_->bounds();
-  const Eigen::Vector3d margin = Eigen::Vector3d::Constant(tree_->options().margin * (1 + 4e-16));
-  b = Eigen::AlignedBox3d(b.min() - margin, b.max() + margin);
-  for (int k = 0; k < 3; ++k) {
-    this->aabb_local.min_[k] = roundDown<S>(b.min()[k]);
-    this->aabb_local.max_[k] = roundUp<S>(b.max()[k]);
-  }
-  // CollisionObject bounds a turned geometry by a cube about aabb_center: the radius must reach every corner.
-  this->aabb_center = this->aabb_local.center();
-  const Eigen::Vector3d center = this->aabb_center.template cast<double>();
-  const Eigen::Vector3d extent = (b.max() - center).cwiseMax(center - b.min());
-  this->aabb_radius = roundUp<S>(extent.norm() * (1 + 4e-16));
+  setBounds(*this, tree_->bounds(), tree_->options().margin, tree_->radius());
 }
 
 namespace {

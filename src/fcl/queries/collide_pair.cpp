@@ -295,9 +295,12 @@ class Collector : public query::Visitor {
     if (isCertain(key) && margin_ == 0) return true;
     Corners p, q;
     s_.pairs.get(i, p, q);
-    const bool sliver = !isCertain(key) && (isSliver(p) || isSliver(q));
+    // Each in its own frame: where it is placed, rounding may give it a width.
+    Corners own;
+    for (int k = 0; k < 3; ++k) own[k] = t2_.corner(b, k).template cast<double>();
+    const bool sliver = !isCertain(key) && (isSliver(p) || isSliver(own));
     // FCL's axes do not separate segments and points from everything.
-    const bool degenerate = sliver && (query::isDegenerate(p) || query::isDegenerate(q));
+    const bool degenerate = sliver && (query::isDegenerate(p) || query::isDegenerate(own));
     const bool meet =
         isCertain(key) || (!degenerate && fcl::detail::Intersect<S>::intersect_Triangle(
                                               t1_.corner(a, 0), t1_.corner(a, 1), t1_.corner(a, 2), t2_.corner(b, 0),
