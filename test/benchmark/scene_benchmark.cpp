@@ -9,7 +9,6 @@
 #include <fcl/geometry/bvh/BVH_model.h>
 
 #include <algorithm>
-#include <chrono>
 #include <cstdio>
 #include <cstdlib>
 #include <ctime>
@@ -160,11 +159,9 @@ struct Both {
     options.threads = threads;
     scene = std::make_unique<Scened>(options);
     std::vector<Id> ids;
-    Options lasting;
-    lasting.ttl = std::chrono::milliseconds(0);  // FCL takes its turns meanwhile
     for (std::size_t i = 0; i < things.size(); ++i)
-      scene->addFixed(std::make_shared<Modeld>(things[i].mesh(), lasting), X_WT[i]);
-    for (const Raw& r : links) ids.push_back(scene->addMoving(std::make_shared<Modeld>(r.mesh(), lasting)));
+      scene->addFixed(std::make_shared<Modeld>(things[i].mesh()), X_WT[i]);
+    for (const Raw& r : links) ids.push_back(scene->addMoving(std::make_shared<Modeld>(r.mesh())));
     std::printf("  set-up: FCL %.0f ms, bocst %.1f ms\n", 1e3 * fcl_time, 1e3 * (now() - start));
     // Neighbours, and next ones, as an SRDF has them.
     for (std::size_t i = 0; i < links.size(); ++i) {
