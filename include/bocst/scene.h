@@ -19,8 +19,10 @@ class Id {
   Id() = default;  ///< Names nothing.
 
   bool isValid() const { return scene_ != 0; }  ///< False for an Id that names nothing.
+  /// Do both name the same object?
   friend bool operator==(Id a, Id b) { return a.scene_ == b.scene_ && a.number_ == b.number_; }
-  friend bool operator!=(Id a, Id b) { return !(a == b); }
+  friend bool operator!=(Id a, Id b) { return !(a == b); }  ///< Do they name different objects?
+  /// Any order, for containers.
   friend bool operator<(Id a, Id b) { return a.scene_ != b.scene_ ? a.scene_ < b.scene_ : a.number_ < b.number_; }
 
  private:
@@ -34,9 +36,11 @@ class Id {
 
 /// Two objects of a scene: `a` moves; `b` is fixed, or moves and was added after `a`.
 struct Pair {
-  Id a, b;
+  Id a;  ///< The moving object, of two that was added first.
+  Id b;  ///< The other.
 };
 
+/// How a scene works; answers do not depend on it.
 struct SceneOptions {
   /// Threads that share the states of one call with many states, the calling one included; 0: as many as the machine
   /// runs at once. Answers do not depend on it.
@@ -45,7 +49,7 @@ struct SceneOptions {
 
 /// All that a planner asks about a robot among obstacles, for whole states and edges in one call.
 ///
-/// An object is a geometry that is fixed in the world or moves. Geometries are Model<S> and all that fcl::collide
+/// An object is a geometry that is fixed in the world or moves. Geometries are bocst::Model and all that fcl::collide
 /// takes: FCL's shapes, BVHModel and OcTree. A scene holds pairs of a moving object and any other object; two fixed
 /// objects are no pair. A state is the poses of all moving objects, world from geometry, in the order of adding: that
 /// of moving object i in state k is X_WM[k * movingCount() + i].
@@ -62,9 +66,10 @@ struct SceneOptions {
 template <typename S>
 class BOCST_EXPORT Scene {
  public:
-  using Geometry = fcl::CollisionGeometry<S>;
-  using Transform = fcl::Transform3<S>;
+  using Geometry = fcl::CollisionGeometry<S>;  ///< What an object is.
+  using Transform = fcl::Transform3<S>;        ///< Where it is: world from geometry.
 
+  /// An empty scene.
   explicit Scene(const SceneOptions& options = {});
   ~Scene();
   Scene(const Scene&) = delete;
@@ -79,6 +84,7 @@ class BOCST_EXPORT Scene {
   Id addMoving(std::shared_ptr<Geometry> geometry);
   /// The order of the other moving objects stays.
   void remove(Id object);
+  /// Another place for a fixed object.
   void setPose(Id fixed, const Transform& X_WG);
   /// The two may touch (allowed collision, SRDF's disabled pairs); `ignored` false takes that back.
   void ignore(Id a, Id b, bool ignored = true);
@@ -108,9 +114,9 @@ class BOCST_EXPORT Scene {
   bool edgeIsFree(const Transform* X_WM_begin, const Transform* X_WM_end,
                   fcl::CCDMotionType motion = fcl::CCDM_LINEAR) const;
 
-  std::size_t movingCount() const;
-  std::size_t fixedCount() const;
-  std::size_t pairCount() const;  ///< That are not ignored.
+  std::size_t movingCount() const;  ///< Poses of a state.
+  std::size_t fixedCount() const;   ///< Objects that are fixed in the world.
+  std::size_t pairCount() const;    ///< That are not ignored.
   /// The place of a moving object among the poses of a state.
   std::size_t movingIndex(Id moving) const;
 
@@ -127,8 +133,10 @@ extern template class Scene<double>;
 
 }  // namespace bocst
 
+/// For unordered containers.
 template <>
 struct std::hash<bocst::Id> {
+  /// Of one Id.
   std::size_t operator()(bocst::Id id) const {
     return std::hash<std::uint64_t>()(std::uint64_t{id.scene_} << 32 | id.number_);
   }

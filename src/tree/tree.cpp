@@ -361,7 +361,9 @@ bool Tree::growInBulk(NodeRef node, std::vector<std::uint32_t>& ids) {
   ids.clear();
   if (ref.isList()) {
     const TriangleList list = this->list(ref);
-    if (!list.ids.areKnown() || (oracle_->kind() != OracleKind::kCpu && list.count > kHostTriangles)) return false;
+    // A lane is no cell, so an oracle can't be asked about it.
+    const bool is_for_host = oracle_->kind() == OracleKind::kCpu || isLoose(node) || list.count <= kHostTriangles;
+    if (!list.ids.areKnown() || !is_for_host) return false;
     list.appendTo(ids);
   } else if (oracle_->kind() != OracleKind::kCpu) {
     return false;

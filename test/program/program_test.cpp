@@ -333,7 +333,7 @@ TEST_F(Program, ComparesWithFcl) {
   }
   EXPECT_GT(report.at("ratio").at("distance_median").get<double>(), 0);
   EXPECT_GT(report.at("ratio").at("first_distance").get<double>(), 0);
-  EXPECT_EQ(report.at("scenarios"), Json({"first", "warm", "distance", "memory"}));
+  EXPECT_EQ(report.at("scenarios"), Json({"first", "fresh", "warm", "distance", "memory"}));
   EXPECT_EQ(report.at("verdicts").at("equal"), true);
   EXPECT_EQ(report.at("verdicts").at("bocst"), report.at("verdicts").at("fcl"));
   EXPECT_GT(report.at("hits"), 0);

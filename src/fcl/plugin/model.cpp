@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #include <bocst/model.h>
 
+#include <algorithm>
 #include <chrono>
 #include <cmath>
 #include <limits>

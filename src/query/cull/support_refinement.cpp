@@ -12,8 +12,9 @@ namespace {
 
 using tree::SupportTable;
 
-// What a miss may spend on each side for later misses, in triangles that are projected.
-constexpr std::size_t kEffort = 1 << 13;
+// What a miss may spend on each side for later misses, in triangles that are projected. Growing a node from the root
+// grid counts as kGrowthEffort of them.
+constexpr std::size_t kEffort = 1 << 13, kGrowthEffort = 1 << 10;
 
 // A part of the surface and how far it may reach.
 struct Part {
@@ -28,11 +29,13 @@ class SupportRefinement {
  public:
   explicit SupportRefinement(const TreeSide& side) : side_(side), scratch_(scratch()) {}
 
-  /// Of a kept direction; false when that takes more effort than is left.
+  /// Of a kept direction; false when that takes more effort than is left, and a later miss can do better: with all of
+  /// the effort, or with the nodes that were grown now.
   bool ask(int number) {
     tree::SupportTable& supports = side_.tree().supports();
     direction_ = SupportTable::direction(number);
     has_all_effort_ = left_ == kEffort;
+    grew_ = false;
     scratch_.parts.clear();
     addNode(side_.root());
     while (!scratch_.parts.empty()) {
@@ -42,6 +45,11 @@ class SupportRefinement {
       if (part.known) {
         supports.lower(number, part.extent);
         return true;
+      }
+      if (growsFromGrid(part.node) && !grow(part.node)) {
+        // No part extends farther. A direction that can't be known better must not be asked about for ever.
+        if (has_all_effort_ && !grew_ && left_ < kGrowthEffort) supports.lower(number, part.extent);
+        return false;
       }
       if (side_.state(part.node) == State::kInner) {
         side_.children(part.node, [this](tree::NodeRef node) { addNode(node); });
@@ -59,6 +67,7 @@ class SupportRefinement {
   struct Scratch {
     std::vector<Part> parts;  // a heap
     std::vector<std::uint32_t> triangles;
+    std::vector<tree::Tree::Growth> growth;
   };
   static Scratch& scratch() {
     thread_local Scratch scratch;
@@ -95,12 +104,28 @@ class SupportRefinement {
     return true;
   }
 
+  bool growsFromGrid(tree::NodeRef node) const {
+    return side_.state(node) == State::kGrows && side_.growsFromGrid(node) && side_.tree().hasBudget();
+  }
+
+  // Unless another thread grows the tree just now.
+  bool grow(tree::NodeRef node) {
+    if (left_ < kGrowthEffort) return false;
+    left_ -= kGrowthEffort;
+    grew_ = true;
+    scratch_.growth.clear();
+    side_.grow(node, scratch_.growth);
+    tree::Tree::grow(scratch_.growth, false);
+    return side_.state(node) == State::kInner;
+  }
+
   const TreeSide& side_;
   Scratch& scratch_;
   const Eigen::Vector3d middle_ = Eigen::Vector3d::Constant(lattice::kMiddle);
   Eigen::Vector3d direction_;
   std::size_t left_ = kEffort;
   bool has_all_effort_ = true;  // for the direction that is asked about
+  bool grew_ = false;           // for it
 };
 
 void sharpen(const TreeSide& side, const std::int32_t (&near)[3][8]) {
@@ -119,10 +144,8 @@ void sharpen(const TreeSide& side, const std::int32_t (&near)[3][8]) {
 
 void refineSupports(const TreeSide& a, const TreeSide& b, const NearDirections& near) {
   if (near.lanes == 0) return;
-  // A tree that still grows by parts says little.
-  const auto says_enough = [](const tree::Tree& t) { return t.isWhole() || t.oracle().kind() != OracleKind::kCpu; };
-  if (says_enough(a.tree())) sharpen(a, near.of_a);
-  if (says_enough(b.tree())) sharpen(b, near.of_b);
+  sharpen(a, near.of_a);
+  sharpen(b, near.of_b);
 }
 
 }  // namespace bocst::query
