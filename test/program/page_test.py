@@ -132,7 +132,9 @@ class PageTest(unittest.TestCase):
                     browser.choose("level", level)
                     at_level.append(int(browser.text("count").split()[0].replace(",", "")))
                 self.assertEqual(at_level[0], 2)
-                self.assertEqual(sorted(at_level), at_level)
+                # Deeper, exact answers have lanes of triangles, of which there may be fewer than cells.
+                self.assertEqual(sorted(at_level[:3]), at_level[:3])
+                self.assertTrue(all(count > 0 for count in at_level))
                 self.keep(browser, "collide" + str(len(extra)))
                 browser.choose("cut", "leaves")
                 self.assertGreater(int(browser.text("count").split()[0].replace(",", "")), at_level[-1])

@@ -93,8 +93,9 @@ class SupportRefinement {
     left_ -= std::min(left_, scratch_.triangles.size());
     if (!are_known) {
       // Perhaps they only are too many for what is left now.
-      if (has_all_effort_) add({part.extent, part.node, true});
-      return has_all_effort_;
+      const bool are_too_many = has_all_effort_ && hasTriangles(part.node);
+      if (are_too_many) add({part.extent, part.node, true});
+      return are_too_many;
     }
     double extent = -std::numeric_limits<double>::infinity();
     for (const std::uint32_t t : scratch_.triangles) {
@@ -102,6 +103,12 @@ class SupportRefinement {
     }
     add({extent, part.node, true});
     return true;
+  }
+
+  // Does the host know which triangles they are?
+  bool hasTriangles(tree::NodeRef node) const {
+    const tree::ChildRef ref = side_.tree().childRef(node);
+    return ref.isList() ? side_.tree().list(ref).ids.areKnown() : !node.isRoot() && !growsFromGrid(node);
   }
 
   bool growsFromGrid(tree::NodeRef node) const {

@@ -59,6 +59,9 @@ class LeafCorners {
 /// is out of range, too.
 inline bool inRange(const TrianglePack& pack) { return pack.size > 1e-9f && pack.size < 1e9f; }
 
+/// And with this tolerance? A margin in the frame of a mesh without extent is beyond all floats.
+inline bool inRange(double tolerance) { return tolerance < 1e9; }
+
 /// Corners straight from the vertices into the frame that `place` leads to, about `center` there and `scale` times as
 /// large. Vertices of a side lie at (v - origin) * inverse_unit in its frame.
 template <typename Side>

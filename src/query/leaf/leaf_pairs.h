@@ -30,6 +30,7 @@ class LargeTriangleLeaf {
     Eigen::Vector3d center;
     const double half = side.octantsOf(node, center), scale = 1 / half;
     const PackTransform place = packTransform(other, other_in_side, center, scale);
+    if (!inRange(other_in_side.tolerance * scale)) return mask;
     const auto tolerance = static_cast<float>(other_in_side.tolerance * scale * 1.001);
     const std::size_t count = other.triangleCount(leaf);
     unsigned met = 0;
@@ -235,7 +236,7 @@ class LeafPairs {
  private:
   template <typename F>
   bool testPacks(const typename LeafPacks<A>::Leaf& a, const typename LeafPacks<B>::Leaf& b, F&& f) {
-    if (!inRange(a.pack) || !inRange(b.pack)) return allPairs(a, b, f);
+    if (!inRange(a.pack) || !inRange(b.pack) || !inRange(b_in_a_->tolerance)) return allPairs(a, b, f);
     a.prefetchIds();
     b.prefetchIds();
     // What touches within both leaves does so within both boxes and both slabs.
@@ -292,7 +293,7 @@ class LeafPairs {
 
   template <typename Leaf, typename F>
   bool testRows(const Leaf& leaf, const SimilarityTransform& to, const std::uint32_t* ids, F&& f) {
-    if (!inRange(rows_) || !inRange(leaf.pack)) {
+    if (!inRange(rows_) || !inRange(leaf.pack) || !inRange(to.tolerance)) {
       for (std::size_t i = 0; i < rows_.count; ++i) {
         for (std::size_t j = 0; j < leaf.pack.count; ++j) {
           if (f(leaf.id(j), ids[i], false)) return true;
