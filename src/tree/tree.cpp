@@ -17,8 +17,11 @@
 namespace bocst::tree {
 namespace {
 
-// Growth by parts costs about twice as much a triangle as building all at once.
-constexpr std::size_t kRent = 2;
+// Growth by parts costs some two to four times as much a triangle as building all at once, the wider walks between
+// bounds that are still loose included.
+constexpr std::size_t kRent = 4;
+// What a thread keeps of a build's memory for the next one, in triangles.
+constexpr std::size_t kMostKept = 1 << 17;
 // A device is not asked about fewer triangles: the host builds what is below them sooner than a batch comes back.
 constexpr std::size_t kHostTriangles = 512;
 
@@ -407,6 +410,7 @@ void Tree::growWhole() {
                                             : addBulk(NodeRef(), bulk, 0, 1));
   refits_.push_back({NodeRef(), cellBounds(bulk.own(), lattice::Cell{})});
   refits_wait_.store(true, std::memory_order_relaxed);
+  if (surface_.triangle_count > kMostKept) bulk = BulkBuilder();
 }
 
 // Block `number` of what was built, and all below it; `level` is the node's, as counted.

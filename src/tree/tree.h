@@ -69,6 +69,10 @@ class Tree {
   const TriangleLists& lists() const { return lists_; }
   /// How far the surface reaches in any direction; what is known of it, for queries to use and to better.
   SupportTable& supports() const { return supports_; }
+  /// Triangles were looked at that a whole tree would have spared: they bring the time nearer at which it is built.
+  void payRent(std::size_t triangles) const {
+    if (!isWhole()) growth_work_.fetch_add(triangles, std::memory_order_relaxed);
+  }
   /// Has all been built at once, so that nothing grows any more unless branches are dropped?
   bool isWhole() const {
     const ChildRef root = childRef(NodeRef());
@@ -182,7 +186,7 @@ class Tree {
   std::unique_ptr<oracle::RootGrid> grid_;
   std::atomic<const oracle::RootGrid*> grid_known_{nullptr};  // grid_, for readers
   bool grid_tried_ = false;
-  std::size_t growth_work_ = 0;  // triangles that growth has looked at since the tree was its root
+  mutable std::atomic<std::size_t> growth_work_{0};  // triangles that were looked at because the tree is not whole
   std::atomic<ChildRef> root_{ChildRef()};
   // Of each block: what walks read, what growth and decay know, and when a query last went through it, in ns of the
   // model's clock. Apart, so that walks have few lines to read.

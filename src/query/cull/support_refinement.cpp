@@ -91,6 +91,7 @@ class SupportRefinement {
     const bool are_known =
         side_.tree().trianglesOf(part.node, left_, scratch_.triangles) && !scratch_.triangles.empty();
     left_ -= std::min(left_, scratch_.triangles.size());
+    side_.tree().payRent(scratch_.triangles.size());
     if (!are_known) {
       // Perhaps they only are too many for what is left now.
       const bool are_too_many = has_all_effort_ && hasTriangles(part.node);
