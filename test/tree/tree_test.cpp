@@ -63,7 +63,7 @@ TEST(Tree, GrowsOnlyWhatAQueryNeedsAndSettles) {
 }
 
 // Whatever is asked, all growth together costs no more than about twice a build of the whole tree: what is built by
-// parts is half of the triangles at most, then all are built at once.
+// parts is a quarter of the triangles at most, then all are built at once.
 TEST(Tree, GrowthCostsAtMostTwiceABuild) {
   for (const std::size_t n : {std::size_t{20}, std::size_t{60}, std::size_t{150}}) {
     Options options;
