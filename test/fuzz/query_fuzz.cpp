@@ -31,6 +31,11 @@ struct GridMesh {
   }
 };
 
+bool hasExtent(const GridMesh& mesh) {
+  const auto differ = [&](const Point& p) { return !(p == mesh.vertices.front()); };
+  return std::any_of(mesh.vertices.begin(), mesh.vertices.end(), differ);
+}
+
 /// p -> (m p) / h + t, exactly; m / h is a rotation.
 struct GridPose {
   std::array<Point, 3> m{{{1, 0, 0}, {0, 1, 0}, {0, 0, 1}}};  // rows
@@ -497,6 +502,7 @@ void Scene::changeSide(Side<S>& side, int what) {
       for (Point& p : side.mesh.vertices) {
         if (in_.flip()) p = readPoint(range_a_);
       }
+      if (!hasExtent(side.mesh)) side.mesh.vertices.front().x += 1;
       side.model->updateVertices(positions(side.mesh));
       break;
     default:
@@ -539,6 +545,8 @@ void Scene::run() {
   }
   a.mesh = readMesh(range_a_, nullptr, pose);
   b.mesh = readMesh(range_b_, &a.mesh, pose);
+  // All cells of a mesh without extent are within any margin of the partner's: nobody wants their pairs.
+  if (conservative && !(hasExtent(a.mesh) && hasExtent(b.mesh))) a.margin_eighths = b.margin_eighths = 0;
   a.options.margin = scale_ * static_cast<double>(a.margin_eighths) / 8;
   b.options.margin = scale_ * static_cast<double>(b.margin_eighths) / 8;
   a.geometry = a.model = std::make_shared<Model<S>>(meshOf<S>(a.mesh), a.options);
