@@ -31,8 +31,8 @@ namespace bocst {
 
 /// Do the two geometries collide at the poses X_W1 and X_W2 (world from geometry)? As fcl::collide: returns
 /// result.numContacts(), which accumulates; has at most request.num_max_contacts; adds nothing when
-/// request.isSatisfied(result) already. Contacts are those with the least (b1, b2), in this order, whatever is resident,
-/// whatever the clock, the oracle and the thread; but a request for one contact ends at any.
+/// request.isSatisfied(result) already. Contacts are those with the least (b1, b2), in this order, whatever is
+/// resident, whatever the clock, the oracle and the thread; but a request for one contact ends at any.
 ///
 /// **Pairs.** One of the two is a Model; its partner is a Model, an fcl::BVHModel<BV> of any BV, one of FCL's shapes
 /// (Box, Sphere, Ellipsoid, Capsule, Cone, Cylinder, Convex, Plane, Halfspace, TriangleP) or an OcTree. o1 and o2 keep

@@ -17,12 +17,12 @@ struct Statistics {
   std::uint64_t oracle_cells = 0;            ///< Cells the oracle was asked about (eight octants a plain expansion).
   std::uint64_t expanded_octants = 0;        ///< Octants of expanded nodes that have an actual region; the paper makes
                                              ///< an occlusion query for each (5.4), from up to three sides.
-  std::uint64_t built_triangles = 0;         ///< Triangles that exact answers have sorted into the tree so far; from one
-                                             ///< time that the model is its root to the next at most 1.25 times as many
-                                             ///< as it has, and what one growth sorts.
-  std::uint64_t pruned_nodes = 0;            ///< Nodes dropped by ttl, budget, prune() or updateVertices().
-  std::size_t mesh_bytes = 0;    ///< Heap bytes of the mesh, which other models may share and which are 0 after
-                                 ///< releaseMesh(), and of `solid`.
+  std::uint64_t built_triangles = 0;  ///< Triangles that exact answers have sorted into the tree so far; from one
+                                      ///< time that the model is its root to the next at most 1.25 times as many
+                                      ///< as it has, and what one growth sorts.
+  std::uint64_t pruned_nodes = 0;     ///< Nodes dropped by ttl, budget, prune() or updateVertices().
+  std::size_t mesh_bytes = 0;         ///< Heap bytes of the mesh, which other models may share and which are 0 after
+                                      ///< releaseMesh(), and of `solid`.
   std::size_t device_bytes = 0;  ///< Bytes on a GPU: the mesh, which other models may share, and triangle lists; what
                                  ///< was grown together for two models counts for both. 0 with the CPU oracle.
 };

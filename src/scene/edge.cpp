@@ -8,8 +8,8 @@
 #include <stdexcept>
 #include <tuple>
 
-#include "fcl/adapters/motion.h"
 #include "fcl/adapters/models.h"
+#include "fcl/adapters/motion.h"
 
 namespace bocst::scene {
 namespace {

@@ -94,7 +94,8 @@ TEST_P(OnDevice, BranchesThatWentGrowAgain) {
     const Modeld c(raw.mesh(), cpu), d(raw.mesh(), cpu);
     for (const auto& X : poses(60, 2.2)) {
       now += std::chrono::milliseconds(700);
-      ASSERT_EQ(test::touching<double>(a, kIdentity, b, X), test::touching<double>(c, kIdentity, d, X)) << static_cast<int>(answer);
+      ASSERT_EQ(test::touching<double>(a, kIdentity, b, X), test::touching<double>(c, kIdentity, d, X))
+          << static_cast<int>(answer);
     }
     EXPECT_GT(a.statistics().pruned_nodes, 0u);
     now += std::chrono::hours(1);

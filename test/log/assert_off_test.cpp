@@ -1,8 +1,8 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #undef BOCST_ASSERTIONS
-#include "log/assert.h"
-
 #include <gtest/gtest.h>
+
+#include "log/assert.h"
 
 namespace bocst {
 namespace {
