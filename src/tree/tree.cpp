@@ -222,7 +222,9 @@ void Tree::grow(std::vector<Growth>& batch, bool wait) {
     if (g.list_suffices && ref.tag() == ChildRef::kShortList) continue;
     if (g.node.isRoot()) tree.growRoot();
     if (g.list_suffices) {
-      if (tree.growth_work_ > tree.surface_.triangle_count / kRent && !tree.isWhole()) tree.growWhole();
+      // A device has grown what is above the parts, so that the host has little to gain.
+      const bool on_host = tree.oracle_->kind() == OracleKind::kCpu;
+      if (on_host && tree.growth_work_ > tree.surface_.triangle_count / kRent && !tree.isWhole()) tree.growWhole();
       if (tree.growInBulk(g.node, scratch)) continue;
     }
     const lattice::Cell cell = tree.cell(g.node);
