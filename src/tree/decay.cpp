@@ -82,7 +82,7 @@ void Tree::keepOnly(const std::vector<std::uint8_t>& keep) {
     grid_known_.store(nullptr, std::memory_order_relaxed);
     grid_.reset();
     grid_tried_ = false;
-    growth_work_ = 0;
+    startRent();
     root_.store(ChildRef(), std::memory_order_relaxed);
     blocks_.clear();
     records_.clear();
