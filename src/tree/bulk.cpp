@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #include "tree/bulk.h"
 
+#include <Eigen/Eigenvalues>
 #include <algorithm>
 #include <array>
 #include <cmath>
@@ -81,6 +82,7 @@ void BulkBuilder::build(const oracle::Surface& surface, const std::uint32_t* ids
     own_corners_.push_back({first, first + 1, first + 2});
   }
   count_ = kept;
+  place_count_ = 3 * kept;
   divide();
   finish(own_corners_.data(), order_);
 }
@@ -137,6 +139,7 @@ void BulkBuilder::makeRoom(std::size_t triangles, std::size_t places) {
     take(rows_, 9 * (triangles + kRowPad));
   };
   count_ = triangles;
+  place_count_ = places;
   takeAll();
   if (bytes <= room_) return;
   room_ = bytes;
@@ -356,7 +359,9 @@ void BulkBuilder::boundBlocks() {
   }
 }
 
-void BulkBuilder::findSupports(SupportTable& supports) const {
+// Calls f with the pieces that supports are sought by.
+template <typename F>
+void BulkBuilder::withEnds(F&& f) const {
   const std::size_t stride = ends_.size() + kRowPad;
   std::vector<float> center(3 * stride, 0), half(3 * stride, -kInfinity);
   std::vector<std::array<std::uint32_t, 2>> pieces;
@@ -368,17 +373,77 @@ void BulkBuilder::findSupports(SupportTable& supports) const {
       half[c * stride + i] = (b.hi[c] - b.lo[c]) / 2;
     }
   }
-  const BoundedPieces bounded{pieces.data(), pieces.size(), stride, center.data(), half.data()};
+  f(BoundedPieces{pieces.data(), pieces.size(), stride, center.data(), half.data()});
+}
+
+void BulkBuilder::findSupports(SupportTable& supports) const {
   const CornerRows rows = this->rows();
   const double margin = 3 * marginOf(size_);
   const Eigen::Vector3d base = base_.array() - lattice::kMiddle;
-  for (int number = 0; number < SupportTable::kCount; ++number) {
-    const Eigen::Vector3d direction = SupportTable::direction(number);
-    const float n[3] = {static_cast<float>(direction[0]), static_cast<float>(direction[1]),
-                        static_cast<float>(direction[2])};
-    const auto most = static_cast<double>(farthestAlong(rows, bounded, n));
-    supports.lower(number, most + direction.dot(base) + margin);
+  withEnds([&](const BoundedPieces& ends) {
+    for (int number = 0; number < SupportTable::kCount; ++number) {
+      const Eigen::Vector3d direction = SupportTable::direction(number);
+      const float n[3] = {static_cast<float>(direction[0]), static_cast<float>(direction[1]),
+                          static_cast<float>(direction[2])};
+      const auto most = static_cast<double>(farthestAlong(rows, ends, n));
+      supports.lower(number, most + direction.dot(base) + margin);
+    }
+  });
+}
+
+Eigen::Matrix3d BulkBuilder::principalAxes() const {
+  Eigen::Vector3d sum = Eigen::Vector3d::Zero();
+  Eigen::Matrix3d products = Eigen::Matrix3d::Zero();
+  constexpr std::size_t kFew = 256;  // sums of more would be lost in float
+  for (std::size_t begin = 0; begin < place_count_; begin += kFew) {
+    V4 first = all(0), square = all(0), turned = all(0);
+    for (std::size_t i = begin; i < std::min(begin + kFew, place_count_); ++i) {
+      const V4 p = Eigen::Map<const V4>(places_ + 4 * i);
+      first += p;
+      square += p * p;
+      turned += p * V4(p[1], p[2], p[0], 0);
+    }
+    sum += first.head<3>().matrix().cast<double>();
+    for (int k = 0; k < 3; ++k) {
+      products(k, k) += static_cast<double>(square[k]);
+      products(k, (k + 1) % 3) += static_cast<double>(turned[k]);
+      products((k + 1) % 3, k) += static_cast<double>(turned[k]);
+    }
   }
+  const auto count = static_cast<double>(place_count_);
+  return Eigen::SelfAdjointEigenSolver<Eigen::Matrix3d>(products / count - sum * sum.transpose() / (count * count))
+      .eigenvectors();
+}
+
+Outline::Box BulkBuilder::findOutline(const lattice::Lattice& lattice) const {
+  const CornerRows rows = this->rows();
+  Outline::Box best;
+  double best_area = std::numeric_limits<double>::infinity();
+  withEnds([&](const BoundedPieces& ends) {
+    for (const Eigen::Matrix3d& axes : {Eigen::Matrix3d(Eigen::Matrix3d::Identity()), principalAxes()}) {
+      if (!axes.allFinite()) continue;
+      Outline::Box box;
+      Eigen::Vector3d center = base_;
+      for (int k = 0; k < 3; ++k) {
+        double ends_at[2];
+        for (const int sign : {-1, 1}) {
+          float n[3];
+          for (int c = 0; c < 3; ++c) n[c] = static_cast<float>(sign * axes(c, k));
+          ends_at[sign > 0] = sign * (static_cast<double>(farthestAlong(rows, ends, n)) + 3 * marginOf(size_));
+        }
+        center += axes.col(k) * (ends_at[0] + ends_at[1]) / 2;
+        box.half[k] = (ends_at[1] - ends_at[0]) / 2 * lattice.unit();
+        for (int c = 0; c < 3; ++c) box.axis[k][c] = axes(c, k);
+      }
+      const Eigen::Vector3d in_mesh = lattice.origin() + lattice.unit() * center;
+      const Eigen::Map<const Eigen::Vector3d> half(box.half);
+      Eigen::Map<Eigen::Vector3d>(box.center) = in_mesh;
+      box.reach = in_mesh.norm() + half.norm();
+      const double area = half[0] * half[1] + half[1] * half[2] + half[2] * half[0];
+      if (area < best_area) best_area = area, best = box;
+    }
+  });
+  return best;
 }
 
 void BulkBuilder::finish(const Mesh::Indices* indices, const std::uint32_t* numbers) {

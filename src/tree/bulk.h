@@ -12,6 +12,7 @@
 #include "tree/block.h"
 #include "tree/bulk_kernels.h"
 #include "tree/huge_pages.h"
+#include "tree/outline.h"
 #include "tree/support_table.h"
 
 namespace bocst::tree {
@@ -57,6 +58,9 @@ class BulkBuilder {
   /// Lowers all supports to those of the triangles that were built.
   void findSupports(SupportTable& supports) const;
 
+  /// A box along the principal axes of their vertices or along those of the frame, which is smaller.
+  Outline::Box findOutline(const lattice::Lattice& lattice) const;
+
   const std::vector<std::uint32_t>& ids() const { return ids_; }
   /// Parents come before their children; the first is the node's.
   const std::vector<Block>& blocks() const { return blocks_; }
@@ -79,6 +83,9 @@ class BulkBuilder {
   std::uint32_t splitByArea(Piece piece);
   void finish(const Mesh::Indices* indices, const std::uint32_t* numbers);
   CornerRows rows() const;
+  template <typename F>
+  void withEnds(F&& f) const;
+  Eigen::Matrix3d principalAxes() const;
   PieceBounds boundsOf(Piece piece) const;
   void boundBlocks();
 
@@ -86,7 +93,7 @@ class BulkBuilder {
   std::unique_ptr<std::byte[]> few_pages_;
   oracle::HugePages huge_pages_;
   std::byte* memory_ = nullptr;
-  std::size_t room_ = 0, count_ = 0;
+  std::size_t room_ = 0, count_ = 0, place_count_ = 0;
   float* places_;  // four each: of vertices, or of corners
   SortKey *keys_, *keys_room_;
   std::uint32_t* given_;                    // triangles, before they are divided

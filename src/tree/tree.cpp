@@ -133,6 +133,11 @@ void Tree::reset(std::shared_ptr<const Mesh> mesh) {
   const Eigen::Vector3d middle = Eigen::Vector3d::Constant(lattice::kMiddle);
   supports_.start({box.min() - middle, box.max() - middle});
   supports_known_ = false;
+  Outline::Box outline;
+  Eigen::Map<Eigen::Vector3d>(outline.center) = surface_.bounds.center();
+  Eigen::Map<Eigen::Vector3d>(outline.half) = surface_.bounds.sizes() / 2;
+  outline.reach = surface_.bounds.center().norm() + surface_.bounds.sizes().norm() / 2;
+  outline_.set(outline);
   keepOnly({});
 }
 
@@ -422,8 +427,11 @@ void Tree::growWhole() {
   }
   built_ += surface_.triangle_count;
   price_ = kNever;
-  if (!supports_known_) bulk.findSupports(supports_);
-  supports_known_ = true;
+  if (!supports_known_) {
+    bulk.findSupports(supports_);
+    outline_.set(bulk.findOutline(surface_.lattice));
+    supports_known_ = true;
+  }
   // A device has grown what is above the parts, so the host would gain little by new blocks.
   if (!growsOnHost()) return;
   for (auto& n : nodes_at_) n = 0;

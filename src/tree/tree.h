@@ -18,6 +18,7 @@
 #include "mesh/solid.h"
 #include "oracle/oracle.h"
 #include "tree/block.h"
+#include "tree/outline.h"
 #include "tree/pool.h"
 #include "tree/root_grid.h"
 #include "tree/sharded_lock.h"
@@ -42,6 +43,15 @@ class Tree {
   const Options& options() const { return options_; }
   const oracle::Oracle& oracle() const { return *oracle_; }
   ShardedLock& queryLock() const { return query_lock_; }
+
+  /// A box about the surface; without a lock.
+  const Outline& outline() const { return outline_; }
+  /// Is it time that a query looks for branches to drop? Without a lock.
+  bool isPruneDue(std::int64_t now) const {
+    return options_.ttl.count() > 0 && now >= next_prune_.load(std::memory_order_relaxed);
+  }
+  /// Has nodes beside the root? Without a lock.
+  bool hasBranches() const { return root_.load(std::memory_order_relaxed).tag() == ChildRef::kBlock; }
 
   // While the query lock is held, shared or alone.
 
@@ -185,6 +195,7 @@ class Tree {
   mutable std::atomic<double> radius_{-1};                                                    // negative: not known yet
   oracle::CellBounds root_bounds_;
   SupportTable supports_;
+  Outline outline_;
   bool supports_known_ = false;
   std::unique_ptr<oracle::RootGrid> grid_;
   std::atomic<const oracle::RootGrid*> grid_known_{nullptr};  // grid_, for readers

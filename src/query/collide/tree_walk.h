@@ -16,7 +16,8 @@ namespace bocst::query {
 class TreeWalk {
  public:
   static bool fits(const TreeSide& a, const TreeSide& b, const SimilarityTransform& b_in_a) {
-    return !a.isConservative() && !b.isConservative() && PairFrames::fits(b_in_a.scale);
+    // A margin that is large beside a model of tiny extent would overflow in float.
+    return !a.isConservative() && !b.isConservative() && PairFrames::fits(b_in_a.scale) && b_in_a.tolerance < 1e9;
   }
 
   TreeWalk(const TreeSide& a, const TreeSide& b, const SimilarityTransform& b_in_a) : a_(a), b_(b), b_in_a_(b_in_a) {}
