@@ -178,7 +178,7 @@ TEST(SupportTable, AreExactOnceATreeIsWhole) {
     for (int number = 0; number < tree::SupportTable::kCount; ++number) {
       const double exact = a.support(tree::SupportTable::direction(number)), value = a.tree.supports().value(number);
       ASSERT_GE(value, exact) << number;
-      ASSERT_LE(value, exact + 0.1) << number;  // lattice units: the margin of float coordinates
+      ASSERT_LE(value, exact + 0.2) << number;  // lattice units: the margin of float coordinates
     }
   }
 }
