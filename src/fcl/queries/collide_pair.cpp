@@ -404,6 +404,17 @@ bool isOutOfSight(const CollideQuery<S>& q, const SimilarityTransform& b_in_a, d
   return half_way.cwiseAbs().maxCoeff() > 8 * (size_a + size_b) + q.margin;
 }
 
+// Is a surface so long and thin that the float walk's rounding, which is a part of its length, is as wide as it is? The
+// walk in double parts what that one cannot.
+bool isNeedle(const tree::Tree& tree) {
+  constexpr double kThin = 0x1p-12;
+  return tree.outline().read([](const tree::Outline::Reader& box) {
+    const double x = box.half(0), y = box.half(1), z = box.half(2);
+    const double most = std::max({x, y, z}), least = std::min({x, y, z}), middle = x + y + z - most - least;
+    return middle < kThin * most;
+  });
+}
+
 template <typename S>
 void collideModels(const CollideQuery<S>& q, tree::Tree& tree_a, tree::Tree& tree_b) {
   const std::size_t before = q.result.numContacts();
@@ -420,7 +431,7 @@ void collideModels(const CollideQuery<S>& q, tree::Tree& tree_a, tree::Tree& tre
     collector.finish();
   };
   const SimilarityTransform near = withMargin(b_in_a, a, q, a.isConservative() || b.isConservative());
-  if (query::TreeWalk::fits(a, b, near)) {
+  if (query::TreeWalk::fits(a, b, near) && !isNeedle(tree_a) && !isNeedle(tree_b)) {
     query::TreeWalk trees(a, b, near);
     if (!trees.isNeedless()) walk([&](auto& collector) { trees.run(collector); });
   } else {
