@@ -41,6 +41,8 @@ bool areFarApart(const tree::Outline::Reader& a, const tree::Outline::Reader& b,
              static_cast<double>(translation[r]) - a.center(r);
   }
   const double squared = dot(way, way), length = std::sqrt(squared);
+  // Squares of less underflow. Not true of what is not a number.
+  if (!(length > 1e-120)) return false;
   const double least = margin + 5e-3 * (length + 2 * (a.reach() + b.reach()));
   inB(way, turned);
   if (squared - extent(a, way) - extent(b, turned) > least * length) return true;

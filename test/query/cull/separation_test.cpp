@@ -14,6 +14,7 @@
 #include "every_target.h"
 #include "meshes.h"
 #include "query/collide/tree_walk.h"
+#include "query/cull/far_apart.h"
 
 namespace bocst::query {
 namespace {
@@ -181,6 +182,104 @@ TEST(SupportTable, AreExactOnceATreeIsWhole) {
       ASSERT_LE(value, exact + 0.2) << number;  // lattice units: the margin of float coordinates
     }
   }
+}
+
+using Outline = tree::Outline;
+
+Outline::Box boxOf(const tree::Tree& tree) {
+  Outline::Box box;
+  EXPECT_TRUE(tree.outline().read([&box](const Outline::Reader& reader) {
+    for (std::size_t k = 0; k < 3; ++k) {
+      box.center[k] = reader.center(k);
+      box.half[k] = reader.half(k);
+      for (std::size_t c = 0; c < 3; ++c) box.axis[k][c] = reader.axis(k, c);
+    }
+    box.reach = reader.reach();
+    return true;
+  }));
+  return box;
+}
+
+TEST(Outline, HoldsTheSurfaceBeforeAndAfterTheWholeBuild) {
+  for (const test::Raw& raw : surfaces()) {
+    const Side a(raw), b(test::torus(9));
+    for (const bool is_whole : {false, true}) {
+      if (is_whole) learnSupports(a, b);
+      const Outline::Box box = boxOf(a.tree);
+      const Vector3d center(box.center[0], box.center[1], box.center[2]);
+      for (const auto& t : raw.triangles) {
+        for (std::size_t k = 0; k < 3; ++k) {
+          const Vector3d v = raw.vertices[t[k]];
+          ASSERT_LE(v.norm(), box.reach * (1 + 1e-12));
+          for (std::size_t j = 0; j < 3; ++j) {
+            const Vector3d axis(box.axis[j][0], box.axis[j][1], box.axis[j][2]);
+            ASSERT_NEAR(axis.norm(), 1, 1e-12);
+            ASSERT_LE(std::abs(axis.dot(v - center)), box.half[j] * (1 + 1e-12) + 1e-15) << is_whole;
+          }
+        }
+      }
+    }
+  }
+  // A rod along a diagonal of its frame is far thinner than its box.
+  test::Raw rod = test::box({0, 0, 0}, {1, 0.01, 0.01});
+  const Eigen::Matrix3d R = Eigen::Quaterniond::FromTwoVectors(Vector3d::UnitX(), Vector3d(1, 1, 1)).toRotationMatrix();
+  for (Vector3d& v : rod.vertices) v = R * v;
+  const Side a(rod), b(rod);
+  learnSupports(a, b);
+  const Outline::Box box = boxOf(a.tree);
+  EXPECT_LT(box.half[0] * box.half[1] * box.half[2], 1e-4);
+}
+
+// A point of one box comes to lie within the margin of a point of the other, however off the rotation is.
+TEST(Outline, BoxesThatMeetAreNotFarApart) {
+  std::mt19937_64 g(35);
+  std::uniform_real_distribution<double> u(-1, 1);
+  const auto box = [&](double size, Vector3d& point) {
+    Outline::Box b;
+    const Eigen::Matrix3d axes = test::randomRotation(g);
+    const Vector3d center = size * test::randomDirection(g) * (g() % 2 ? 1 : 0);
+    point = center;
+    Vector3d half;
+    for (int k = 0; k < 3; ++k) {
+      half[k] = size * std::exp2(4 * u(g) - 4);
+      b.half[k] = half[k];
+      b.center[k] = center[k];
+      for (int c = 0; c < 3; ++c) b.axis[k][c] = axes(c, k);
+      point += axes.col(k) * half[k] * (g() % 2 ? 1 : -1);
+    }
+    b.reach = center.norm() + half.norm();
+    return b;
+  };
+  int far = 0;
+  for (int round = 0; round < 20000; ++round) {
+    const double size = std::pow(10.0, 75 * u(g));
+    Vector3d p, q;
+    Outline a, b;
+    const Outline::Box box_a = box(size, p), box_b = box(size * std::exp2(8 * u(g)), q);
+    a.set(box_a);
+    b.set(box_b);
+    Eigen::Matrix3d R = test::randomRotation(g);
+    if (round % 2) R += 4e-4 * Eigen::Matrix3d::NullaryExpr([&] { return u(g); });
+    const double margin = round % 3 ? 0 : size * std::abs(u(g));
+    for (const bool apart : {false, true}) {
+      const Vector3d t =
+          p - R * q + test::randomDirection(g) * (apart ? 9 * (box_a.reach + box_b.reach + margin) : 0.99 * margin);
+      double rotation[3][3], translation[3];
+      for (int r = 0; r < 3; ++r) {
+        translation[r] = t[r];
+        for (int c = 0; c < 3; ++c) rotation[r][c] = R(r, c);
+      }
+      const bool found = a.read([&](const Outline::Reader& x) {
+        return b.read([&](const Outline::Reader& y) { return areFarApart(x, y, rotation, translation, margin); });
+      });
+      if (apart) {
+        far += found;
+      } else {
+        ASSERT_FALSE(found) << round;
+      }
+    }
+  }
+  EXPECT_EQ(far, 20000);
 }
 
 // Answers by a walk, of which there must be none once supports part the two.
