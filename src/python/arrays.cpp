@@ -116,16 +116,17 @@ const fcl::Transform3d* Poses::get(std::size_t begin, std::size_t end, std::vect
   for (std::size_t k = begin; k < end; ++k) {
     const double* m = poses[k - begin].matrix().data();
     if ((m[3] == 0) & (m[7] == 0) & (m[11] == 0) & (m[15] == 1)) continue;
-    throw std::invalid_argument(std::string("bocst: ") + name_ + ": matrix " + std::to_string(k) + " has the last row " +
-                                std::to_string(m[3]) + " " + std::to_string(m[7]) + " " + std::to_string(m[11]) + " " +
-                                std::to_string(m[15]) + "; 0 0 0 1 is expected");
+    throw std::invalid_argument(std::string("bocst: ") + name_ + ": matrix " + std::to_string(k) +
+                                " has the last row " + std::to_string(m[3]) + " " + std::to_string(m[7]) + " " +
+                                std::to_string(m[11]) + " " + std::to_string(m[15]) + "; 0 0 0 1 is expected");
   }
   return poses;
 }
 
 fcl::Transform3d pose(const char* name, const py::handle& object) {
   const Poses poses(name, object);
-  if (!poses.shape().empty()) refuse(name, "has the shape " + shapeText(py::array::ensure(object)) + "; (4, 4) is expected");
+  if (!poses.shape().empty())
+    refuse(name, "has the shape " + shapeText(py::array::ensure(object)) + "; (4, 4) is expected");
   std::vector<fcl::Transform3d> copy;
   return *poses.get(0, 1, copy);
 }
