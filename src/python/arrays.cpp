@@ -59,7 +59,7 @@ std::vector<std::array<std::uint32_t, 3>> indices(const char* name, const py::ha
     for (std::size_t k = 0; k < 3; ++k) {
       const std::int64_t i = from[3 * t + k];
       if (i < 0 || i > 0xffffffff) {
-        refuse(name, "[" + std::to_string(t) + "] has the index " + std::to_string(i) + ", which no vertex has");
+        refuse(name, "has the index " + std::to_string(i) + " in row " + std::to_string(t) + ", which no vertex has");
       }
       result[t][k] = static_cast<std::uint32_t>(i);
     }

@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #include <bocst/fcl.h>
+#include <bocst/unchecked_dispatch.h>
 #include <fcl/broadphase/broadphase_dynamic_AABB_tree.h>
 #include <fcl/geometry/bvh/BVH_model.h>
 #include <fcl/geometry/octree/octree.h>
@@ -933,6 +934,7 @@ distance: the same, with callbacks that return (done, least distance so far).)")
 }  // namespace
 
 std::shared_ptr<Modeld> makeModel(std::shared_ptr<const Mesh> mesh, const Options& options) {
+  const UncheckedDispatch in_any_order;
   return std::make_shared<Modeld>(std::move(mesh), options);
 }
 

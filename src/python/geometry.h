@@ -37,7 +37,6 @@ class ModelGeometry : public Geometry {
 /// All queries of this module include <bocst/fcl.h>, so they reach bocst in whatever order libraries were loaded.
 std::shared_ptr<Modeld> makeModel(std::shared_ptr<const Mesh> mesh, const Options& options);
 
-/// A model's own Geometry in Python, if it is still there.
 void bindFcl(pybind11::module_ m);
 
 }  // namespace bocst::python

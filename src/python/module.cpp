@@ -127,7 +127,8 @@ solid: a watertight mesh also collides with what is wholly inside it.)");
       .def("__eq__", [](const Options& a, const Options& b) { return asDict(a).equal(asDict(b)); });
   for (const auto item : asDict(Options())) {
     const std::string key = py::str(item.first);
-    options.def_property_readonly(key.c_str(), [key](const Options& o) { return asDict(o)[key.c_str()]; });
+    options.def_property_readonly(key.c_str(),
+                                  [key](const Options& o) -> py::object { return asDict(o)[key.c_str()]; });
   }
 }
 
@@ -357,7 +358,13 @@ py::array_t<bool> posesOf(const ModelGeometry& a, const ModelGeometry& b, const 
   const std::size_t chunk = chunkOf(threads);
   for (std::size_t begin = 0; begin < poses.count(); begin += chunk) {
     const std::size_t end = std::min(begin + chunk, poses.count());
-    collidePoses(*model_a, *model_b, poses.get(begin, end, copy), end - begin, hit + begin, threads);
+    try {
+      collidePoses(*model_a, *model_b, poses.get(begin, end, copy), end - begin, hit + begin, threads);
+    } catch (const std::invalid_argument&) {
+      // Again from the first on, so that the pose has its number among all.
+      collidePoses(*model_a, *model_b, poses.get(0, end, copy), end, hit, threads);
+      throw;
+    }
   }
   return hits;
 }
