@@ -107,7 +107,9 @@ const fcl::Transform3d* Poses::get(std::size_t begin, std::size_t end, std::vect
     for (std::size_t k = begin; k < end; ++k) {
       const double* row = data_ + 16 * k;
       double* to = copy[k - begin].matrix().data();
+#pragma GCC unroll 4
       for (int i = 0; i < 4; ++i) {
+#pragma GCC unroll 4
         for (int j = 0; j < 4; ++j) to[4 * j + i] = row[4 * i + j];
       }
     }

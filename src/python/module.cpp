@@ -345,7 +345,7 @@ Returns (centers (k, 3), radii (k,)) in the mesh's frame and length unit.)");
 
 /// Poses that are copied at a time where the array's layout is not C++'s: they stay in a cache. More where threads are
 /// to be started for them.
-std::size_t chunkOf(unsigned threads) { return threads == 1 ? 2048 : 65536; }
+std::size_t chunkOf(unsigned threads) { return threads == 1 ? 256 : 65536; }
 
 py::array_t<bool> posesOf(const ModelGeometry& a, const ModelGeometry& b, const py::object& X_AB, unsigned threads) {
   const Poses poses("X_AB", X_AB);

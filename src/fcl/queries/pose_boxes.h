@@ -24,6 +24,8 @@ class PoseBoxes {
     const Eigen::Vector3d middle_a = box_a.center(), middle_b = box_b.center();
     const Eigen::Vector3d to_a = (box_a.max() - middle_a).cwiseMax(middle_a - box_a.min()),
                           to_b = (box_b.max() - middle_b).cwiseMax(middle_b - box_b.min());
+    // However b is turned, it is no farther from its origin than this.
+    reach_ = to_a.norm() + 1.002 * (middle_b.norm() + to_b.norm());
     for (int i = 0; i < 3; ++i) {
       middle_a_[i] = middle_a[i];
       middle_b_[i] = middle_b[i];
@@ -33,25 +35,31 @@ class PoseBoxes {
     }
   }
 
-  /// Are the surfaces farther apart than their margins, by the six axes of the boxes? The axes of b are the columns u
-  /// of R, which need not be quite orthogonal: as entries of R^T R are off the identity's by 1e-3 at most, along u box
-  /// b reaches no farther than along_b_, and margins are no longer than 1.001 times what they are. FCL's test, and this
-  /// one, are off by no more than roundingOf() each.
+  /// Are the surfaces farther apart than their margins, by the spheres about the boxes or the six axes of these? The
+  /// axes of b are the columns u of R, which need not be quite orthogonal: as entries of R^T R are off the identity's
+  /// by 1e-3 at most, along u box b reaches no farther than along_b_, and margins are no longer than 1.001 times what
+  /// they are. FCL's test, and this one, are off by no more than roundingOf() each.
   bool areApart(const fcl::Transform3<S>& X_AB) const {
     const S* m = X_AB.matrix().data();  // columns of four
-    double R[3][3], turned[3][3], d[3], lengths = 0;
+    double R[3][3], turned[3][3], d[3], lengths = 0, squares = 0;
     for (int i = 0; i < 3; ++i) {
       d[i] = static_cast<double>(m[12 + i]);
       lengths += std::abs(d[i]);
+      d[i] -= middle_a_[i];
+      squares += d[i] * d[i];
+    }
+    const double allowed = margin_ + 1.001 * 2 * roundingOf<S>(lengths + size_), far = reach_ + allowed;
+    // Most of a planner's poses end here.
+    if (squares > far * far) return true;
+    for (int i = 0; i < 3; ++i) {
       for (int j = 0; j < 3; ++j) {
         R[i][j] = static_cast<double>(m[4 * j + i]);
         turned[i][j] = std::abs(R[i][j]);
       }
     }
-    const double allowed = margin_ + 1.001 * 2 * roundingOf<S>(lengths + size_);
     bool apart = false;
     for (int i = 0; i < 3; ++i) {
-      d[i] += R[i][0] * middle_b_[0] + R[i][1] * middle_b_[1] + R[i][2] * middle_b_[2] - middle_a_[i];
+      d[i] += R[i][0] * middle_b_[0] + R[i][1] * middle_b_[1] + R[i][2] * middle_b_[2];
       const double b = turned[i][0] * half_b_[0] + turned[i][1] * half_b_[1] + turned[i][2] * half_b_[2];
       apart |= std::abs(d[i]) > half_a_[i] + b + allowed;
     }
@@ -64,7 +72,7 @@ class PoseBoxes {
   }
 
  private:
-  double margin_, size_;
+  double margin_, size_, reach_;
   double middle_a_[3], middle_b_[3], half_a_[3], half_b_[3], along_b_[3];
 };
 
