@@ -119,19 +119,36 @@ TYPED_TEST(CollidePoses, HasThemWhereBoxesBarelyTouch) {
   EXPECT_LT(hits, poses * 9 / 10);
 }
 
-// Rotations that are only nearly ones, as float's are after many products.
+// Rotations that are only nearly ones, as float's are after many products: a cube near the face of a skewed plate.
 TYPED_TEST(CollidePoses, HasThemForPosesThatAreNotQuiteRigid) {
   using S = TypeParam;
-  const Model<S> a(test::box({-1, -1, -1}, {1, 1, 1}).mesh()), b(test::box({-1, -2, -3}, {1, 2, 3}).mesh());
+  const Model<S> a(test::box({-0.02, -0.02, -0.02}, {0.02, 0.02, 0.02}).mesh());
+  const Model<S> b(test::box({-0.01, -9, -9}, {0.01, 9, 9}).mesh());
   std::mt19937_64 g(4);
   std::uniform_real_distribution<double> u(-1, 1);
-  Poses<S> X = randomPoses<S>(4000, 3.4, 6);
+  Poses<S> X = randomPoses<S>(6000, 0, 6);
   for (fcl::Transform3<S>& x : X) {
-    for (int i = 0; i < 9; ++i) x.linear().data()[i] += static_cast<S>(1.2e-4 * u(g));
+    for (int i = 0; i < 9; ++i) x.linear()(i % 3, i / 3) += static_cast<S>(1.2e-4 * u(g));
+    const Eigen::Matrix3d R = x.linear().template cast<double>();
+    const double reach = 0.01 + 0.02 * R.col(0).cwiseAbs().sum() + 2e-3 * u(g);
+    x.translation() = (-R * Vector3d(reach, 8.5 * u(g), 8.5 * u(g))).template cast<S>();
   }
   const auto expected = oneByOne(a, b, X);
   EXPECT_EQ(atOnce(a, b, X), expected);
+  EXPECT_GT(count(expected), 1000u);
+  EXPECT_LT(count(expected), 5000u);
+}
+
+TYPED_TEST(CollidePoses, HasThemForMeshesFarFromTheirOrigins) {
+  using S = TypeParam;
+  const Vector3d m(3, -20, 5), n(-7, 1, 4);
+  const Model<S> a(test::torus(12).move(m).mesh()), b(test::torus(10).move(n).mesh());
+  Poses<S> X = randomPoses<S>(2000, 1.6, 11, m);
+  for (fcl::Transform3<S>& x : X) x.translation() -= x.linear() * n.cast<S>();
+  const auto expected = oneByOne(a, b, X);
+  EXPECT_EQ(atOnce(a, b, X), expected);
   EXPECT_GT(count(expected), 400u);
+  EXPECT_LT(count(expected), 1600u);
 }
 
 TYPED_TEST(CollidePoses, NamesTheFirstPoseThatIsNone) {
