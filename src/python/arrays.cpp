@@ -101,28 +101,28 @@ Poses::Poses(const char* name, const py::handle& object) : name_(name) {
 }
 
 const fcl::Transform3d* Poses::get(std::size_t begin, std::size_t end, std::vector<fcl::Transform3d>& copy) const {
-  const fcl::Transform3d* poses = reinterpret_cast<const fcl::Transform3d*>(data_) + begin;
-  if (!in_place_) {
-    copy.resize(end - begin);
-    for (std::size_t k = begin; k < end; ++k) {
-      const double* row = data_ + 16 * k;
-      double* to = copy[k - begin].matrix().data();
-#pragma GCC unroll 4
-      for (int i = 0; i < 4; ++i) {
-#pragma GCC unroll 4
-        for (int j = 0; j < 4; ++j) to[4 * j + i] = row[4 * i + j];
-      }
-    }
-    poses = copy.data();
-  }
+  // The last row of a matrix starts at the last number of the first column, or of the third row.
+  const std::size_t first = in_place_ ? 3 : 12, step = in_place_ ? 4 : 1;
   for (std::size_t k = begin; k < end; ++k) {
-    const double* m = poses[k - begin].matrix().data();
-    if ((m[3] == 0) & (m[7] == 0) & (m[11] == 0) & (m[15] == 1)) continue;
+    const double* m = data_ + 16 * k + first;
+    if ((m[0] == 0) & (m[step] == 0) & (m[2 * step] == 0) & (m[3 * step] == 1)) continue;
     throw std::invalid_argument(std::string("bocst: ") + name_ + ": matrix " + std::to_string(k) +
-                                " has the last row " + std::to_string(m[3]) + " " + std::to_string(m[7]) + " " +
-                                std::to_string(m[11]) + " " + std::to_string(m[15]) + "; 0 0 0 1 is expected");
+                                " has the last row " + std::to_string(m[0]) + " " + std::to_string(m[step]) + " " +
+                                std::to_string(m[2 * step]) + " " + std::to_string(m[3 * step]) +
+                                "; 0 0 0 1 is expected");
   }
-  return poses;
+  if (in_place_) return reinterpret_cast<const fcl::Transform3d*>(data_) + begin;
+  copy.resize(end - begin);
+  for (std::size_t k = begin; k < end; ++k) {
+    const double* from = data_ + 16 * k;
+    double* to = copy[k - begin].matrix().data();
+#pragma GCC unroll 4
+    for (int j = 0; j < 4; ++j) {
+#pragma GCC unroll 4
+      for (int i = 0; i < 4; ++i) to[4 * j + i] = from[4 * i + j];
+    }
+  }
+  return copy.data();
 }
 
 fcl::Transform3d pose(const char* name, const py::handle& object) {
