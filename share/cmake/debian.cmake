@@ -19,6 +19,9 @@ endif()
 if(TARGET bocst_program)
   list(APPEND CPACK_COMPONENTS_ALL tools)
 endif()
+if(TARGET bocst_python)
+  list(APPEND CPACK_COMPONENTS_ALL python)
+endif()
 
 set(CPACK_DEBIAN_LIBRARY_PACKAGE_NAME libbocst0)
 set(CPACK_DEBIAN_LIBRARY_PACKAGE_SECTION libs)
@@ -44,11 +47,20 @@ set(CPACK_DEBIAN_TOOLS_PACKAGE_DEPENDS ${needs_library})
 set(CPACK_DEBIAN_TOOLS_PACKAGE_SHLIBDEPS ON)
 set(CPACK_COMPONENT_TOOLS_DESCRIPTION "The program bocst: the health of a mesh, its sphere-tree
 as a page in 3D, single queries, and validation and timing compared with FCL.")
-# The tools' own libraries are in another of these packages.
+
+set(CPACK_DEBIAN_PYTHON_PACKAGE_NAME python3-bocst)
+set(CPACK_DEBIAN_PYTHON_PACKAGE_SECTION python)
+# The module is for one version of Python only.
+set(CPACK_DEBIAN_PYTHON_PACKAGE_DEPENDS ${needs_library} ${BOCST_PYTHON_DEPENDS})
+list(JOIN CPACK_DEBIAN_PYTHON_PACKAGE_DEPENDS ", " CPACK_DEBIAN_PYTHON_PACKAGE_DEPENDS)
+set(CPACK_DEBIAN_PYTHON_PACKAGE_SHLIBDEPS ON)
+set(CPACK_COMPONENT_PYTHON_DESCRIPTION "The Python module bocst: models, many poses and whole states
+from NumPy arrays, and FCL's queries under the names of python-fcl.")
+# Their own libraries are in another of these packages.
 set(CPACK_DEBIAN_PACKAGE_SHLIBDEPS_PRIVATE_DIRS ${PROJECT_BINARY_DIR}/src)
 
 # Each package says under which terms it is; a plain installation has the LICENSE once.
-foreach(component library dev tools)
+foreach(component library dev tools python)
   string(TOUPPER ${component} name)
   install(FILES LICENSE DESTINATION ${CMAKE_INSTALL_DATADIR}/doc/${CPACK_DEBIAN_${name}_PACKAGE_NAME} RENAME copyright
     COMPONENT ${component} EXCLUDE_FROM_ALL)

@@ -4,6 +4,7 @@
 namespace bocst::scene {
 
 Pool::Pool(unsigned threads) {
+  if (threads == 0) threads = std::max(1u, std::thread::hardware_concurrency());
   for (unsigned i = 1; i < threads; ++i) threads_.emplace_back([this] { wait(); });
 }
 

@@ -1,8 +1,11 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #pragma once
 
+#include <algorithm>
+#include <atomic>
 #include <condition_variable>
 #include <cstddef>
+#include <exception>
 #include <functional>
 #include <mutex>
 #include <thread>
@@ -13,7 +16,7 @@ namespace bocst::scene {
 /// Threads that wait for work. One query at a time has them; another that comes meanwhile works alone.
 class Pool {
  public:
-  /// `threads` work, the calling one included.
+  /// `threads` work, the calling one included; 0: as many as the machine runs at once.
   explicit Pool(unsigned threads);
   ~Pool();
   Pool(const Pool&) = delete;
@@ -22,6 +25,34 @@ class Pool {
   /// Calls work() here, and beside it on the other threads if they are free; returns when all have returned.
   /// work() throws nothing.
   void run(const std::function<void()>& work);
+
+  /// Shares rows out: work(row) is called for each, in this order, by any thread, until it says false or throws. Of
+  /// several exceptions the one of the least row is thrown.
+  template <typename Work>
+  void share(std::size_t rows, const Work& work) {
+    std::atomic<std::size_t> next{0};
+    std::exception_ptr failure;
+    std::size_t failed = rows;
+    std::mutex failing;
+    const std::function<void()> some = [&] {
+      for (std::size_t row; (row = next++) < rows;) {
+        try {
+          if (!work(row)) break;
+        } catch (...) {
+          next = rows;
+          const std::lock_guard<std::mutex> lock(failing);
+          if (row < failed) failure = std::current_exception();
+          failed = std::min(row, failed);
+        }
+      }
+    };
+    if (rows > 1) {
+      run(some);
+    } else {
+      some();
+    }
+    if (failure) std::rethrow_exception(failure);
+  }
 
   unsigned threads() const { return static_cast<unsigned>(threads_.size()) + 1; }
 

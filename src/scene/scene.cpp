@@ -3,7 +3,6 @@
 
 #include <algorithm>
 #include <atomic>
-#include <exception>
 #include <limits>
 #include <map>
 #include <mutex>
@@ -11,7 +10,6 @@
 #include <shared_mutex>
 #include <stdexcept>
 #include <string>
-#include <thread>
 #include <vector>
 
 #include "fcl/adapters/models.h"
@@ -34,10 +32,6 @@ constexpr std::size_t kEdge = 512;
 std::uint32_t nextScene() {
   static std::atomic<std::uint32_t> last{0};
   return ++last;
-}
-
-unsigned threadsOf(const SceneOptions& options) {
-  return options.threads != 0 ? options.threads : std::max(1u, std::thread::hardware_concurrency());
 }
 
 /// What a thread keeps between queries.
@@ -69,7 +63,7 @@ struct Scene<S>::Impl {
   using Goal = typename scene::Sweep<S>::Goal;
   using WorldPtr = std::shared_ptr<const World<S>>;
 
-  explicit Impl(const SceneOptions& o) : pool(threadsOf(o)) {}
+  explicit Impl(const SceneOptions& o) : pool(o.threads) {}
 
   // The world for a query. Made when it is asked for, so that many changes in a row cost little.
   WorldPtr current() const {
@@ -136,31 +130,6 @@ struct Scene<S>::Impl {
     return found->second;
   }
 
-  // Shares the rows of states out; work(row) is called for each, in this order, by any thread, until it says false.
-  template <typename Work>
-  void share(std::size_t rows, const Work& work) const {
-    std::atomic<std::size_t> next{0};
-    std::exception_ptr failure;
-    std::mutex failing;
-    const std::function<void()> some = [&] {
-      try {
-        for (std::size_t row; (row = next++) < rows;) {
-          if (!work(row)) break;
-        }
-      } catch (...) {
-        next = rows;
-        const std::lock_guard<std::mutex> lock(failing);
-        failure = std::current_exception();
-      }
-    };
-    if (rows > 1) {
-      pool.run(some);
-    } else {
-      some();
-    }
-    if (failure) std::rethrow_exception(failure);
-  }
-
   std::size_t search(const char* query, const Transform* X_WM, std::size_t states, Goal goal, std::uint8_t* hit) const {
     const WorldPtr w = current();
     const std::size_t moving = w->moving.size();
@@ -177,7 +146,7 @@ struct Scene<S>::Impl {
     std::atomic<std::size_t> least{rows};
     std::mutex finding;
     std::size_t found = states;
-    share(rows, [&](std::size_t place) {
+    pool.share(rows, [&](std::size_t place) {
       if (goal != Goal::kAll && place > least) return false;
       const std::size_t row = order.empty() ? place : order[place];
       const std::size_t begin = row * length, count = std::min(length, states - begin);

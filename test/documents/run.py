@@ -55,7 +55,14 @@ def run(document, source, build):
             return fail(document.name, error)
         if not script:
             return 0
-        environment = dict(os.environ, HOME=name, PATH=f"{build}/tools:{os.environ['PATH']}")
+        # `python3` is the interpreter that the Python module was built for.
+        python = re.search(r"^BOCST_PYTHON:\w+=(.*)$", (build / "CMakeCache.txt").read_text(), re.M).group(1)
+        (folder.parent / "bin").mkdir()
+        if python:
+            shim = folder.parent / "bin" / "python3"
+            shim.write_text(f'#!/bin/sh\nexec {python} "$@"\n')
+            shim.chmod(0o755)
+        environment = dict(os.environ, HOME=name, PATH=f"{folder.parent}/bin:{build}/tools:{os.environ['PATH']}")
         done = subprocess.run(["bash", "-euo", "pipefail", "-x", "-c", "".join(script)], cwd=folder, env=environment,
                               stdin=subprocess.DEVNULL, stdout=subprocess.PIPE, stderr=subprocess.STDOUT, text=True,
                               check=False)

@@ -11,7 +11,7 @@ export DEBIAN_FRONTEND=noninteractive
 
 apt-get update -qq
 apt-get install -qq -y --no-install-recommends "$packages"/*.deb
-for package in libbocst0 libbocst-dev bocst; do dpkg -s "$package" | grep '^Status: install ok installed'; done
+for package in libbocst0 libbocst-dev bocst python3-bocst; do dpkg -s "$package" | grep '^Status: install ok installed'; done
 
 work=$(mktemp -d)
 trap 'rm -rf "$work"' EXIT
@@ -19,6 +19,8 @@ cd "$work"
 bocst --version
 printf 'OFF\n4 4 0\n0 0 0\n1 0 0\n0 1 0\n0 0 1\n3 0 2 1\n3 0 1 3\n3 1 2 3\n3 2 0 3\n' >tetrahedron.off
 bocst collide tetrahedron.off tetrahedron.off --json - | grep '"collide": true'
+
+/usr/bin/python3 -c 'import bocst; print(bocst.load_mesh("tetrahedron.off").health().watertight)' | grep True
 
 # Only what a user needs who has libbocst-dev: a compiler and the tool that builds.
 apt-get install -qq -y --no-install-recommends g++ cmake make pkg-config

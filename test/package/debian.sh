@@ -15,6 +15,7 @@ cpack -G DEB --config "$build/CPackConfig.cmake" -B "$work/packages" >"$work/log
 names=(libbocst-dev)
 [[ $(cached BUILD_SHARED_LIBS) != ON ]] || names+=(libbocst0)
 [[ $(cached BOCST_BUILD_TOOLS) != ON ]] || names+=(bocst)
+[[ $(cached BOCST_BUILD_PYTHON) != ON ]] || names+=(python3-bocst)
 
 field() { dpkg-deb -f "$work/packages/$1"_*.deb "$2"; }
 version=$(field libbocst-dev Version)
@@ -46,6 +47,25 @@ if [[ -s $work/bocst.files ]]; then
   for file in bin/bocst share/man/man1/bocst.1.gz share/bash-completion/completions/bocst; do
     grep -qx "./usr/$file" "$work/bocst.files" || fail "bocst has no $file"
   done
+fi
+
+if [[ $(cached BOCST_BUILD_PYTHON) == ON ]]; then
+  # Where Debian's interpreter looks; another interpreter has its own folder.
+  python=$(cached BOCST_PYTHON)
+  folder=$("$python" -c 'import sys; print("python3/dist-packages" if sys.executable.startswith("/usr/bin/")
+    else "python%d.%d/site-packages" % sys.version_info[:2])')
+  for file in __init__.py __init__.pyi fcl.py fcl.pyi py.typed; do
+    grep -qx "./usr/lib/$folder/bocst/$file" "$work/python3-bocst.files" || fail "python3-bocst has no $file"
+  done
+  depends python3-bocst python3 python3-numpy libfcl0.7
+  [[ $(cached BUILD_SHARED_LIBS) != ON ]] || depends python3-bocst "libbocst0 (= $version)"
+  if [[ -z $(cached BOCST_SANITIZE) ]]; then
+    (cd "$work" && PYTHONPATH="$work/unpacked/usr/lib/$folder" "$python" -c '
+import bocst, bocst.fcl
+a = bocst.fcl.CollisionObject(bocst.Model(bocst.Mesh([[0, 0, 0], [1, 0, 0], [0, 1, 0]], [[0, 1, 2]])))
+assert bocst.fcl.collide(a, a) == 1
+print("python3-bocst:", bocst.__file__, bocst.__version__)')
+  fi
 fi
 
 "$here/run.sh" "$build" "$work/unpacked/usr"

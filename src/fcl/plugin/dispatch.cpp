@@ -6,6 +6,7 @@
 #include "fcl/plugin/dispatch.h"
 
 #include <bocst/dispatch_check.h>
+#include <bocst/unchecked_dispatch.h>
 #include <dlfcn.h>
 
 #include <atomic>
@@ -63,13 +64,14 @@ struct Symbol {
 };
 
 std::atomic<bool> check_is_on{true};
+thread_local int unchecked = 0;  // UncheckedDispatch of this thread
 
 bool checkIsOn() {
   static const bool allowed = [] {
     const char* check = std::getenv("BOCST_DISPATCH_CHECK");
     return check == nullptr || std::strcmp(check, "off") != 0;
   }();
-  return allowed && check_is_on.load(std::memory_order_relaxed);
+  return allowed && unchecked == 0 && check_is_on.load(std::memory_order_relaxed);
 }
 
 /// Empty when all is well, else what is wrong.
@@ -129,6 +131,9 @@ template void checkDispatch<double>();
 }  // namespace fcl_adapter
 
 void setDispatchCheck(bool on) { fcl_adapter::check_is_on = on; }
+
+UncheckedDispatch::UncheckedDispatch() { ++fcl_adapter::unchecked; }
+UncheckedDispatch::~UncheckedDispatch() { --fcl_adapter::unchecked; }
 
 template <typename S>
 bool isModel(const fcl::CollisionGeometry<S>* geometry) {

@@ -19,9 +19,11 @@
 #include "fcl/adapters/validate.h"
 #include "fcl/queries/collide_octree.h"
 #include "fcl/queries/collide_query.h"
+#include "fcl/queries/collide_row.h"
 #include "fcl/queries/collide_shape.h"
 #include "fcl/queries/inside.h"
 #include "fcl/queries/inside_contact.h"
+#include "fcl/queries/pose_boxes.h"
 #include "fcl/queries/query_scope.h"
 #include "geometry/triangle.h"
 #include "query/collide/pair_walk.h"
@@ -416,10 +418,9 @@ bool isNeedle(const tree::Tree& tree) {
 }
 
 template <typename S>
-void collideModels(const CollideQuery<S>& q, tree::Tree& tree_a, tree::Tree& tree_b) {
+void collideTrees(const CollideQuery<S>& q, const TreeSide& a, const TreeSide& b) {
   const std::size_t before = q.result.numContacts();
-  const QueryScope scope(tree_a, tree_b);
-  const TreeSide &a = scope.a(), &b = scope.b();
+  tree::Tree &tree_a = a.tree(), &tree_b = b.tree();
   const auto [b_in_a, magnitude] = relate<S>(q, a, b);
   if (isOutOfSight(q, b_in_a, magnitudeOf(tree_a.surface().bounds), magnitudeOf(tree_b.surface().bounds))) return;
   const auto walk = [&, magnitude = magnitude](auto&& with_collector) {
@@ -523,7 +524,8 @@ std::size_t answer(const CollideQuery<S>& q, const Models<S>& models, const Brou
   if (a != nullptr && b != nullptr && areFarApart(q, models)) return q.result.numContacts();
   q.inCallersOrder(a, b);
   if (b != nullptr) {
-    collideModels(q, a->tree(), b->tree());
+    const QueryScope scope(a->tree(), b->tree());
+    collideTrees(q, scope.a(), scope.b());
   } else if (isShape(q.b())) {
     collideShape(q, a->tree(), solver);
 #if FCL_HAVE_OCTOMAP
@@ -558,7 +560,37 @@ std::size_t collidePair(const fcl::CollisionGeometry<S>* o1, const fcl::Transfor
                 BroughtSolver<S>());
 }
 
+template <typename S>
+void collideRow(const Model<S>& a, const Model<S>& b, const fcl::Transform3<S>* X_AB, std::size_t count,
+                std::uint8_t* hit) {
+  static const fcl::Transform3<S> identity = fcl::Transform3<S>::Identity();
+  static const fcl::CollisionRequest<S> request;
+  thread_local fcl::CollisionResult<S> result;
+  thread_local std::vector<std::size_t> near;
+  std::fill(hit, hit + count, std::uint8_t{0});
+  near.clear();
+  {
+    const QueryScope scope(a.tree(), b.tree());
+    const PoseBoxes boxes(a, b);
+    for (std::size_t k = 0; k < count; ++k) {
+      if (!boxes.areApart(X_AB[k])) near.push_back(k);
+    }
+  }
+  if (!a.isOccupied() || !b.isOccupied()) return;
+  const Models<S> models(&a, &b);
+  const double margin = marginOf(&a, &b);
+  for (const std::size_t k : near) {
+    const CollideQuery<S> q{
+        {&a, identity, &b, X_AB[k], turnsRound(models, identity, X_AB[k])}, request, result, margin};
+    result.clear();
+    const QueryScope scope(a.tree(), b.tree());
+    collideTrees(q, q.swapped ? scope.b() : scope.a(), q.swapped ? scope.a() : scope.b());
+    hit[k] = result.isCollision();
+  }
+}
+
 #define BOCST_INSTANTIATE(S)                                                                                          \
+  template void collideRow(const Model<S>&, const Model<S>&, const fcl::Transform3<S>*, std::size_t, std::uint8_t*);  \
   template std::size_t collidePair(                                                                                   \
       const fcl::CollisionGeometry<S>*, const fcl::Transform3<S>&, const fcl::CollisionGeometry<S>*,                  \
       const fcl::Transform3<S>&, const BroughtSolver<S>&, const fcl::CollisionRequest<S>&, fcl::CollisionResult<S>&); \

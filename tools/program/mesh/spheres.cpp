@@ -45,14 +45,6 @@ std::string list(const std::vector<NodeView>& nodes, const char* before, const c
 
 }  // namespace
 
-std::vector<NodeView> leavesAt(const std::vector<NodeView>& nodes, int level) {
-  std::vector<NodeView> leaves;
-  std::copy_if(nodes.begin(), nodes.end(), std::back_inserter(leaves), [level](const NodeView& node) {
-    return node.level == level || (node.level < level && node.children.empty());
-  });
-  return leaves;
-}
-
 void checkSphereFile(const std::string& file) { formatOf(file); }
 
 std::string sphereFile(const std::string& file, const std::vector<NodeView>& nodes, const std::string& link) {

@@ -3,13 +3,21 @@
 
 #include <bocst/node_view.h>
 
+#include <algorithm>
+#include <iterator>
 #include <string>
 #include <vector>
 
 namespace bocst::program {
 
 /// The nodes of a tree that ends at this level: together their spheres hold the whole surface.
-std::vector<NodeView> leavesAt(const std::vector<NodeView>& nodes, int level);
+inline std::vector<NodeView> leavesAt(const std::vector<NodeView>& nodes, int level) {
+  std::vector<NodeView> leaves;
+  std::copy_if(nodes.begin(), nodes.end(), std::back_inserter(leaves), [level](const NodeView& node) {
+    return node.level == level || (node.level < level && node.children.empty());
+  });
+  return leaves;
+}
 
 /// The spheres of nodes as a file, in the mesh's frame and length unit, by its ending:
 ///  .json         a list of {"center": [x, y, z], "radius": r}

@@ -1,0 +1,17 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#pragma once
+
+#include <bocst/model.h>
+
+#include <cstddef>
+#include <cstdint>
+
+namespace bocst::fcl_adapter {
+
+/// hit[k] is 1 where fcl::collide says with the default request that b touches a at the pose X_AB[k], else 0. Poses are
+/// rigid.
+template <typename S>
+void collideRow(const Model<S>& a, const Model<S>& b, const fcl::Transform3<S>* X_AB, std::size_t count,
+                std::uint8_t* hit);
+
+}  // namespace bocst::fcl_adapter

@@ -1,0 +1,143 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#include "python/arrays.h"
+
+#include <array>
+#include <cmath>
+#include <cstring>
+#include <stdexcept>
+
+namespace bocst::python {
+namespace {
+
+[[noreturn]] void refuse(const char* name, const std::string& what) {
+  throw py::value_error(std::string("bocst: ") + name + " " + what);
+}
+
+std::string shapeText(const py::array& a) { return py::str(a.attr("shape")); }
+
+/// The object as an array of numbers whose dtype has one of these kinds.
+py::array numbers(const char* name, const py::handle& object, const char* kinds, const char* expected) {
+  const py::array a = py::array::ensure(object);
+  if (!a || std::strchr(kinds, a.dtype().kind()) == nullptr) {
+    PyErr_Clear();
+    const std::string got = a ? "dtype " + std::string(py::str(a.dtype())) : std::string(py::str(py::type::of(object)));
+    throw py::type_error(std::string("bocst: ") + name + " must be an array of " + expected + ", not " + got);
+  }
+  return a;
+}
+
+void checkFinite(const char* name, const double* values, std::size_t count) {
+  for (std::size_t i = 0; i < count; ++i) {
+    if (!std::isfinite(values[i])) refuse(name, "has the value " + std::to_string(values[i]) + ", which is not finite");
+  }
+}
+
+}  // namespace
+
+py::array_t<double, py::array::c_style> doubles(const char* name, const py::handle& object) {
+  return py::array_t<double, py::array::c_style | py::array::forcecast>::ensure(
+      numbers(name, object, "fiu", "real numbers"));
+}
+
+std::vector<Eigen::Vector3d> vectors(const char* name, const py::handle& object) {
+  const py::array a = numbers(name, object, "fiu", "real numbers");
+  if (a.ndim() != 2 || a.shape(1) != 3) refuse(name, "has the shape " + shapeText(a) + "; (n, 3) is expected");
+  std::vector<Eigen::Vector3d> result(static_cast<std::size_t>(a.shape(0)));
+  // NumPy converts and copies, whatever the dtype and the strides, straight to where the vectors are.
+  const py::array_t<double> to({a.shape(0), py::ssize_t{3}}, reinterpret_cast<double*>(result.data()), py::none());
+  py::module_::import("numpy").attr("copyto")(to, a);
+  return result;
+}
+
+std::vector<std::array<std::uint32_t, 3>> indices(const char* name, const py::handle& object) {
+  const py::array a = numbers(name, object, "iu", "integers");
+  if (a.ndim() != 2 || a.shape(1) != 3) refuse(name, "has the shape " + shapeText(a) + "; (n, 3) is expected");
+  const auto wide = py::array_t<std::int64_t, py::array::c_style | py::array::forcecast>::ensure(a);
+  const std::int64_t* from = wide.data();
+  std::vector<std::array<std::uint32_t, 3>> result(static_cast<std::size_t>(a.shape(0)));
+  for (std::size_t t = 0; t < result.size(); ++t) {
+    for (std::size_t k = 0; k < 3; ++k) {
+      const std::int64_t i = from[3 * t + k];
+      if (i < 0 || i > 0xffffffff) {
+        refuse(name, "has the index " + std::to_string(i) + " in row " + std::to_string(t) + ", which no vertex has");
+      }
+      result[t][k] = static_cast<std::uint32_t>(i);
+    }
+  }
+  return result;
+}
+
+Eigen::Vector3d vector3(const char* name, const py::handle& object) {
+  const auto a = doubles(name, object);
+  if (a.ndim() != 1 || a.shape(0) != 3) refuse(name, "has the shape " + shapeText(a) + "; (3,) is expected");
+  checkFinite(name, a.data(), 3);
+  return Eigen::Vector3d(a.data());
+}
+
+Eigen::Matrix3d matrix3(const char* name, const py::handle& object) {
+  const auto a = doubles(name, object);
+  if (a.ndim() != 2 || a.shape(0) != 3 || a.shape(1) != 3) {
+    refuse(name, "has the shape " + shapeText(a) + "; (3, 3) is expected");
+  }
+  checkFinite(name, a.data(), 9);
+  return Eigen::Map<const Eigen::Matrix<double, 3, 3, Eigen::RowMajor>>(a.data());
+}
+
+Poses::Poses(const char* name, const py::handle& object) : name_(name) {
+  static_assert(sizeof(fcl::Transform3d) == 16 * sizeof(double), "a pose is its matrix");
+  array_ = numbers(name, object, "fiu", "real numbers");
+  const py::ssize_t n = array_.ndim();
+  if (n < 2 || array_.shape(n - 1) != 4 || array_.shape(n - 2) != 4) {
+    refuse(name, "has the shape " + shapeText(array_) + "; (..., 4, 4) is expected");
+  }
+  shape_.assign(array_.shape(), array_.shape() + n - 2);
+  for (const py::ssize_t s : shape_) count_ *= static_cast<std::size_t>(s);
+  // Each matrix is its own transpose's rows: what np.swapaxes(X, -1, -2) of an array in C order looks like.
+  const py::array turned = array_.attr("swapaxes")(n - 2, n - 1);
+  in_place_ = array_.dtype().is(py::dtype::of<double>()) && (turned.flags() & py::array::c_style) != 0 &&
+              reinterpret_cast<std::uintptr_t>(array_.data()) % alignof(fcl::Transform3d) == 0;
+  if (!in_place_) array_ = doubles(name, array_);
+  data_ = static_cast<const double*>(array_.data());
+}
+
+const fcl::Transform3d* Poses::get(std::size_t begin, std::size_t end, std::vector<fcl::Transform3d>& copy) const {
+  // The last row of a matrix starts at the last number of the first column, or of the third row.
+  const std::size_t first = in_place_ ? 3 : 12, step = in_place_ ? 4 : 1;
+  for (std::size_t k = begin; k < end; ++k) {
+    const double* m = data_ + 16 * k + first;
+    if ((m[0] == 0) & (m[step] == 0) & (m[2 * step] == 0) & (m[3 * step] == 1)) continue;
+    throw std::invalid_argument(std::string("bocst: ") + name_ + ": matrix " + std::to_string(k) +
+                                " has the last row " + std::to_string(m[0]) + " " + std::to_string(m[step]) + " " +
+                                std::to_string(m[2 * step]) + " " + std::to_string(m[3 * step]) +
+                                "; 0 0 0 1 is expected");
+  }
+  if (in_place_) return reinterpret_cast<const fcl::Transform3d*>(data_) + begin;
+  copy.resize(end - begin);
+  for (std::size_t k = begin; k < end; ++k) {
+    const double* from = data_ + 16 * k;
+    double* to = copy[k - begin].matrix().data();
+#pragma GCC unroll 4
+    for (int j = 0; j < 4; ++j) {
+#pragma GCC unroll 4
+      for (int i = 0; i < 4; ++i) to[4 * j + i] = from[4 * i + j];
+    }
+  }
+  return copy.data();
+}
+
+fcl::Transform3d pose(const char* name, const py::handle& object) {
+  const Poses poses(name, object);
+  if (!poses.shape().empty())
+    refuse(name, "has the shape " + shapeText(py::array::ensure(object)) + "; (4, 4) is expected");
+  std::vector<fcl::Transform3d> copy;
+  return *poses.get(0, 1, copy);
+}
+
+py::array_t<double> arrayOf(const Eigen::Vector3d& v) { return py::array_t<double>(3, v.data()); }
+
+py::array_t<double> arrayOf(const Eigen::Matrix3d& m) {
+  const Eigen::Matrix<double, 3, 3, Eigen::RowMajor> rows = m;
+  return py::array_t<double>({3, 3}, rows.data());
+}
+
+}  // namespace bocst::python

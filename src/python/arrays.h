@@ -1,0 +1,62 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#pragma once
+
+#include <fcl/common/types.h>
+#include <pybind11/numpy.h>
+#include <pybind11/pybind11.h>
+
+#include <cstddef>
+#include <cstdint>
+#include <string>
+#include <vector>
+
+// NumPy arrays as C++ wants them. What does not fit is refused with the argument's name: TypeError for what holds no
+// numbers, ValueError for shapes and values.
+
+namespace bocst::python {
+
+namespace py = pybind11;
+
+/// Doubles in C order, of any real or integer dtype and any layout; the array itself where it is that already.
+py::array_t<double, py::array::c_style> doubles(const char* name, const py::handle& object);
+
+/// An (n, 3) array as vectors; `bytes` of the copy that Eigen wants, and no other.
+std::vector<Eigen::Vector3d> vectors(const char* name, const py::handle& object);
+
+/// (3,) and (3, 3), finite.
+Eigen::Vector3d vector3(const char* name, const py::handle& object);
+Eigen::Matrix3d matrix3(const char* name, const py::handle& object);
+
+/// An (n, 3) array of integers >= 0 as the indices of a mesh.
+std::vector<std::array<std::uint32_t, 3>> indices(const char* name, const py::handle& object);
+
+/// Poses as 4x4 matrices in an array of shape (..., 4, 4): the array's own memory where each matrix lies there column
+/// after column, else a copy. Holds the array.
+class Poses {
+ public:
+  Poses(const char* name, const py::handle& object);
+
+  std::size_t count() const { return count_; }
+  const std::vector<py::ssize_t>& shape() const { return shape_; }  ///< Without the last (4, 4).
+
+  /// Poses begin to end - 1, written to `copy` where the array's layout is another. Needs no GIL.
+  /// @throws std::invalid_argument unless the last row of each is 0 0 0 1.
+  const fcl::Transform3d* get(std::size_t begin, std::size_t end, std::vector<fcl::Transform3d>& copy) const;
+
+ private:
+  const char* name_;
+  py::array array_;
+  const double* data_;
+  std::size_t count_ = 1;
+  bool in_place_;
+  std::vector<py::ssize_t> shape_;
+};
+
+/// One of them, of shape (4, 4).
+fcl::Transform3d pose(const char* name, const py::handle& object);
+
+/// A copy as a NumPy array.
+py::array_t<double> arrayOf(const Eigen::Vector3d& v);
+py::array_t<double> arrayOf(const Eigen::Matrix3d& m);
+
+}  // namespace bocst::python

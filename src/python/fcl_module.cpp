@@ -1,0 +1,950 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#include <bocst/fcl.h>
+#include <bocst/unchecked_dispatch.h>
+#include <fcl/broadphase/broadphase_dynamic_AABB_tree.h>
+#include <fcl/geometry/bvh/BVH_model.h>
+#include <fcl/geometry/octree/octree.h>
+#include <pybind11/pybind11.h>
+#include <pybind11/stl.h>
+
+#include <algorithm>
+#include <cmath>
+#include <exception>
+#include <limits>
+#include <optional>
+#include <sstream>
+
+#include "python/arrays.h"
+#include "python/geometry.h"
+
+// bocst.fcl: FCL's queries under python-fcl's names.
+
+namespace bocst::python {
+namespace {
+
+using namespace pybind11::literals;
+using Eigen::Vector3d;
+using fcl::Transform3d;
+using NoGil = py::gil_scoped_release;
+using GeometryPtr = std::shared_ptr<fcl::CollisionGeometryd>;
+
+double number(const char* name, double value) {
+  if (!std::isfinite(value)) throw py::value_error(std::string("bocst: ") + name + " is not finite");
+  return value;
+}
+double length(const char* name, double value) {
+  if (!(number(name, value) >= 0)) throw py::value_error(std::string("bocst: ") + name + " is negative");
+  return value;
+}
+Vector3d lengths(const char* name, const py::object& value) {
+  const Vector3d v = vector3(name, value);
+  for (int k = 0; k < 3; ++k) length(name, v[k]);
+  return v;
+}
+Vector3d normal(const py::object& value) {
+  const Vector3d n = vector3("n", value);
+  if (n.isZero()) throw py::value_error("bocst: n has no direction");
+  return n;
+}
+
+// Poses ---------------------------------------------------------------------------------------------------------------
+
+Eigen::Matrix3d rotation(const py::object& value) {
+  const Eigen::Matrix3d R = matrix3("the rotation", value);
+  const double error = (R.transpose() * R - Eigen::Matrix3d::Identity()).cwiseAbs().maxCoeff();
+  if (!(error <= 1e-3) || R.determinant() < 0) {
+    throw py::value_error("bocst: the rotation is none: R^T R is off the identity by " + std::to_string(error) +
+                          ", the determinant is " + std::to_string(R.determinant()));
+  }
+  return R;
+}
+
+Eigen::Matrix3d quaternion(const py::object& value) {
+  const auto q = doubles("the quaternion", value);
+  if (q.ndim() != 1 || q.shape(0) != 4) throw py::value_error("bocst: the quaternion must be (4,): w, x, y, z");
+  const Eigen::Quaterniond Q(q.at(0), q.at(1), q.at(2), q.at(3));
+  if (!(Q.norm() > 0) || !std::isfinite(Q.norm())) throw py::value_error("bocst: the quaternion is no rotation");
+  return Q.normalized().toRotationMatrix();
+}
+
+py::array_t<double> quaternionOf(const Eigen::Matrix3d& R) {
+  const Eigen::Quaterniond q(R);
+  const double values[4] = {q.w(), q.x(), q.y(), q.z()};
+  return py::array_t<double>(4, values);
+}
+
+/// (3, 3) or a quaternion.
+Eigen::Matrix3d anyRotation(const py::object& value) {
+  return py::array::ensure(value).ndim() == 1 ? quaternion(value) : rotation(value);
+}
+
+/// A translation as python-fcl takes it, also (1, 3) or (3, 1).
+Vector3d translation(const py::object& value) {
+  return vector3("the translation", doubles("the translation", value).squeeze());
+}
+
+Transform3d transformOf(const py::object& R, const py::object& t) {
+  Transform3d X = Transform3d::Identity();
+  X.linear() = anyRotation(R);
+  X.translation() = translation(t);
+  return X;
+}
+
+Transform3d transformOf(const py::object& value) {
+  if (py::isinstance<Transform3d>(value)) return value.cast<Transform3d>();
+  Transform3d X = Transform3d::Identity();
+  const auto a = doubles("the argument of Transform", value);
+  if (a.ndim() == 1 && a.shape(0) == 3) {
+    X.translation() = vector3("the translation", a);
+  } else {
+    X.linear() = anyRotation(a);
+  }
+  return X;
+}
+
+void bindTransform(py::module_& m) {
+  py::class_<Transform3d>(m, "Transform", R"(A rigid pose: world from geometry.
+
+Transform(), Transform(t), Transform(R), Transform(q), Transform(R, t), Transform(q, t) or Transform(other), with a
+translation t (3,), a rotation R (3, 3), a quaternion q (4,): w, x, y, z, which is normalised.)")
+      .def(py::init([] { return Transform3d(Transform3d::Identity()); }))
+      .def(py::init([](const py::object& value) { return transformOf(value); }), "value"_a)
+      .def(py::init([](const py::object& R, const py::object& t) { return transformOf(R, t); }), "R"_a, "t"_a)
+      .def(
+          "getRotation", [](const Transform3d& X) { return arrayOf(Eigen::Matrix3d(X.linear())); }, "(3, 3)")
+      .def(
+          "getTranslation", [](const Transform3d& X) { return arrayOf(Vector3d(X.translation())); }, "(3,)")
+      .def(
+          "getQuatRotation", [](const Transform3d& X) { return quaternionOf(X.linear()); }, "(4,): w, x, y, z")
+      .def(
+          "setRotation", [](Transform3d& X, const py::object& R) { X.linear() = rotation(R); }, "R"_a)
+      .def(
+          "setTranslation", [](Transform3d& X, const py::object& t) { X.translation() = translation(t); }, "T"_a)
+      .def(
+          "setQuatRotation", [](Transform3d& X, const py::object& q) { X.linear() = quaternion(q); }, "q"_a);
+}
+
+// Geometries ----------------------------------------------------------------------------------------------------------
+
+template <typename T>
+class Shape : public Geometry {
+ public:
+  template <typename... Args>
+  explicit Shape(const Args&... args) : Geometry(std::make_shared<T>(args...)) {}
+  T& shape() const { return static_cast<T&>(*geometry_); }
+};
+
+template <typename T>
+using ShapeClass = py::class_<Shape<T>, Geometry, std::shared_ptr<Shape<T>>>;
+
+/// A member of the shape as a property; `check` turns what Python gives into a value.
+template <typename T, typename Member, typename Check>
+void member(ShapeClass<T>& c, const char* name, Member T::*at, Check check) {
+  const auto get = [at](const Shape<T>& s) {
+    if constexpr (std::is_same_v<Member, double>) {
+      return s.shape().*at;
+    } else {
+      return arrayOf(Vector3d(s.shape().*at));
+    }
+  };
+  c.def_property(name, get, [name, at, check](const Shape<T>& s, const py::object& value) {
+    if constexpr (std::is_same_v<Member, double>) {
+      s.shape().*at = check(name, value.cast<double>());
+    } else {
+      s.shape().*at = check(name, value);
+    }
+    s.shape().computeLocalAABB();
+  });
+}
+
+template <typename T>
+void bindRound(py::module_& m, const char* name, const char* text) {
+  ShapeClass<T> c(m, name, text);
+  c.def(py::init([](double r, double lz) { return std::make_shared<Shape<T>>(length("radius", r), length("lz", lz)); }),
+        "radius"_a, "lz"_a);
+  member(c, "radius", &T::radius, length);
+  member(c, "lz", &T::lz, length);
+}
+
+template <typename T>
+void bindHalf(py::module_& m, const char* name, const char* text) {
+  ShapeClass<T> c(m, name, text);
+  c.def(py::init([](const py::object& n, double d) { return std::make_shared<Shape<T>>(normal(n), number("d", d)); }),
+        "n"_a, "d"_a);
+  member(c, "n", &T::n, [](const char*, const py::object& n) { return normal(n); });
+  member(c, "d", &T::d, number);
+}
+
+/// FCL goes through the faces without looking where they end.
+std::shared_ptr<const std::vector<int>> facesOf(const py::object& faces, int count, std::size_t vertices) {
+  std::vector<int> f;
+  for (const auto& face : py::array::ensure(faces).attr("ravel")().attr("tolist")()) f.push_back(face.cast<int>());
+  std::size_t at = 0;
+  for (int k = 0; k < count; ++k) {
+    const int corners = at < f.size() ? f[at] : 0;
+    if (corners < 3 || f.size() - at <= static_cast<std::size_t>(corners)) {
+      throw py::value_error("bocst: face " + std::to_string(k) +
+                            " of the Convex does not have its number of corners and that many indices");
+    }
+    for (int i = 1; i <= corners; ++i) {
+      const int v = f[at + static_cast<std::size_t>(i)];
+      if (v < 0 || static_cast<std::size_t>(v) >= vertices) {
+        throw py::value_error("bocst: face " + std::to_string(k) + " of the Convex has the index " + std::to_string(v) +
+                              ", which no vertex has");
+      }
+    }
+    at += static_cast<std::size_t>(corners) + 1;
+  }
+  if (count < 1 || at != f.size())
+    throw py::value_error("bocst: the Convex has another number of faces than num_faces");
+  return std::make_shared<const std::vector<int>>(std::move(f));
+}
+
+std::shared_ptr<Shape<fcl::Convexd>> makeConvex(const py::object& vertices, int num_faces, const py::object& faces) {
+  auto v = std::make_shared<std::vector<Vector3d>>(vectors("vertices", vertices));
+  for (const Vector3d& p : *v) {
+    if (!p.allFinite()) throw py::value_error("bocst: a vertex of the Convex is not finite");
+  }
+  const auto f = facesOf(faces, num_faces, v->size());
+  return std::make_shared<Shape<fcl::Convexd>>(std::shared_ptr<const std::vector<Vector3d>>(v), num_faces, f);
+}
+
+/// Gathers a mesh as FCL's BVHModel does, and then makes what it is for.
+template <typename Make>
+class Builder : public Geometry {
+ public:
+  Builder() : Geometry(nullptr) {}
+
+  GeometryPtr get() const override {
+    if (geometry_ == nullptr) throw py::value_error("bocst: the BVHModel is not built; call endModel()");
+    return geometry_;
+  }
+  std::size_t triangles() const { return mesh_ != nullptr ? mesh_->triangleCount() : indices_.size(); }
+  int state() const {
+    return begun_      ? fcl::BVH_BUILD_STATE_BEGUN
+           : geometry_ ? fcl::BVH_BUILD_STATE_PROCESSED
+                       : fcl::BVH_BUILD_STATE_EMPTY;
+  }
+
+  int begin(std::size_t triangles, std::size_t vertices) {
+    geometry_ = nullptr;
+    mesh_ = nullptr;
+    vertices_.clear();
+    indices_.clear();
+    vertices_.reserve(vertices);
+    indices_.reserve(triangles);
+    begun_ = true;
+    return fcl::BVH_OK;
+  }
+  bool addVertex(double x, double y, double z) {
+    inSequence();
+    vertices_.emplace_back(x, y, z);
+    return true;
+  }
+  bool addTriangle(const py::object& v1, const py::object& v2, const py::object& v3) {
+    inSequence();
+    Mesh::Indices t;
+    std::size_t k = 0;
+    for (const py::object* v : {&v1, &v2, &v3}) {
+      t[k++] = static_cast<std::uint32_t>(vertices_.size());
+      vertices_.push_back(vector3("a corner", *v));
+    }
+    indices_.push_back(t);
+    return true;
+  }
+  bool addSubModel(const py::object& verts, const py::object& triangles) {
+    inSequence();
+    const std::vector<Vector3d> v = vectors("verts", verts);
+    std::vector<Mesh::Indices> t = indices("triangles", triangles);
+    for (Mesh::Indices& triangle : t) {
+      for (std::uint32_t& i : triangle) {
+        if (i >= v.size()) {
+          throw py::value_error("bocst: triangles has the index " + std::to_string(i) +
+                                ", which no vertex of verts has");
+        }
+        i += static_cast<std::uint32_t>(vertices_.size());
+      }
+    }
+    vertices_.insert(vertices_.end(), v.begin(), v.end());
+    indices_.insert(indices_.end(), t.begin(), t.end());
+    return true;
+  }
+  int end() {
+    inSequence();
+    const NoGil free;
+    mesh_ = Mesh::fromIndices(std::move(vertices_), std::move(indices_));
+    vertices_.clear();
+    indices_.clear();
+    begun_ = false;
+    geometry_ = Make()(mesh_);
+    return fcl::BVH_OK;
+  }
+
+ private:
+  void inSequence() const {
+    if (!begun_) throw py::value_error("bocst: the BVHModel is not being built; call beginModel()");
+  }
+
+  bool begun_ = false;
+  std::vector<Vector3d> vertices_;
+  std::vector<Mesh::Indices> indices_;
+  std::shared_ptr<const Mesh> mesh_;
+};
+
+struct MakeModel {
+  GeometryPtr operator()(const std::shared_ptr<const Mesh>& mesh) const { return makeModel(mesh, Options()); }
+};
+struct MakeObbrss {
+  GeometryPtr operator()(const std::shared_ptr<const Mesh>& mesh) const {
+    std::vector<fcl::Triangle> triangles(mesh->triangleCount());
+    for (std::size_t t = 0; t < triangles.size(); ++t) triangles[t] = mesh->triangle(t);
+    auto bvh = std::make_shared<fcl::BVHModel<fcl::OBBRSSd>>();
+    bvh->beginModel(static_cast<int>(triangles.size()), static_cast<int>(mesh->vertexCount()));
+    bvh->addSubModel(mesh->vertices(), triangles);
+    bvh->endModel();
+    return bvh;
+  }
+};
+
+template <typename Make>
+void bindBuilder(py::module_& m, const char* name, const char* text) {
+  using B = Builder<Make>;
+  py::class_<B, Geometry, std::shared_ptr<B>>(m, name, text)
+      .def(py::init<>())
+      .def("num_tries_", &B::triangles)
+      .def("buildState", &B::state)
+      .def("beginModel", &B::begin, "num_tris_"_a = 0, "num_vertices_"_a = 0)
+      .def("addVertex", &B::addVertex, "x"_a, "y"_a, "z"_a)
+      .def("addTriangle", &B::addTriangle, "v1"_a, "v2"_a, "v3"_a, "Three corners, (3,) each.")
+      .def("addSubModel", &B::addSubModel, "verts"_a, "triangles"_a, "(n, 3) numbers and (m, 3) indices of them.")
+      .def("endModel", &B::end);
+}
+
+#if FCL_HAVE_OCTOMAP
+class Octree : public Geometry {
+ public:
+  explicit Octree(double resolution) : Geometry(nullptr), resolution_(length("r", resolution)) {
+    set(std::make_shared<octomap::OcTree>(resolution));
+  }
+
+  void read(const std::string& data) {
+    const auto tree = std::make_shared<octomap::OcTree>(resolution_);
+    std::istringstream in(data);
+    if (!tree->readBinaryData(in)) throw py::value_error("bocst: data is no octree");
+    set(tree);
+  }
+  void insert(const py::object& points, const py::object& origin, double maxrange, bool lazy_eval, bool discretize) {
+    octomap::Pointcloud cloud;
+    for (const Vector3d& p : vectors("points", points)) {
+      if (!p.allFinite()) throw py::value_error("bocst: a point is not finite");
+      cloud.push_back(static_cast<float>(p.x()), static_cast<float>(p.y()), static_cast<float>(p.z()));
+    }
+    const Vector3d o = origin.is_none() ? Vector3d::Zero().eval() : vector3("origin", origin);
+    // Queries may be reading the tree that there is.
+    const auto tree = std::make_shared<octomap::OcTree>(*tree_);
+    tree->insertPointCloud(
+        cloud, octomap::point3d(static_cast<float>(o.x()), static_cast<float>(o.y()), static_cast<float>(o.z())),
+        maxrange, lazy_eval, discretize);
+    set(tree);
+  }
+
+ private:
+  void set(std::shared_ptr<octomap::OcTree> tree) {
+    tree_ = std::move(tree);
+    geometry_ = std::make_shared<fcl::OcTreed>(tree_);
+  }
+
+  double resolution_;
+  std::shared_ptr<octomap::OcTree> tree_;
+};
+#endif
+
+void bindGeometries(py::module_& m) {
+  py::class_<Geometry, std::shared_ptr<Geometry>>(m, "CollisionGeometry", "What collides, in a frame of its own.")
+      .def("getNodeType", [](const Geometry& g) { return g.get()->getNodeType(); })
+      .def("computeLocalAABB", [](const Geometry& g) { g.get()->computeLocalAABB(); })
+      .def_property(
+          "aabb_center", [](const Geometry& g) { return arrayOf(g.get()->aabb_center); },
+          [](const Geometry& g, const py::object& c) { g.get()->aabb_center = vector3("aabb_center", c); },
+          "(3,): the middle of its box.");
+
+  ShapeClass<fcl::TrianglePd> triangle(m, "TriangleP", "A triangle of three points, (3,) each.");
+  triangle.def(py::init([](const py::object& a, const py::object& b, const py::object& c) {
+                 return std::make_shared<Shape<fcl::TrianglePd>>(vector3("a", a), vector3("b", b), vector3("c", c));
+               }),
+               "a"_a, "b"_a, "c"_a);
+  const auto point = [](const char* name, const py::object& p) { return vector3(name, p); };
+  member(triangle, "a", &fcl::TrianglePd::a, point);
+  member(triangle, "b", &fcl::TrianglePd::b, point);
+  member(triangle, "c", &fcl::TrianglePd::c, point);
+
+  ShapeClass<fcl::Boxd> box(m, "Box", "A box about the origin with these side lengths.");
+  box.def(py::init([](double x, double y, double z) {
+            return std::make_shared<Shape<fcl::Boxd>>(length("x", x), length("y", y), length("z", z));
+          }),
+          "x"_a, "y"_a, "z"_a);
+  member(box, "side", &fcl::Boxd::side, lengths);
+
+  ShapeClass<fcl::Sphered> sphere(m, "Sphere", "A sphere about the origin.");
+  sphere.def(py::init([](double r) { return std::make_shared<Shape<fcl::Sphered>>(length("radius", r)); }), "radius"_a);
+  member(sphere, "radius", &fcl::Sphered::radius, length);
+
+  ShapeClass<fcl::Ellipsoidd> ellipsoid(m, "Ellipsoid", "An ellipsoid about the origin with these radii.");
+  ellipsoid.def(py::init([](double a, double b, double c) {
+                  return std::make_shared<Shape<fcl::Ellipsoidd>>(length("a", a), length("b", b), length("c", c));
+                }),
+                "a"_a, "b"_a, "c"_a);
+  member(ellipsoid, "radii", &fcl::Ellipsoidd::radii, lengths);
+
+  bindRound<fcl::Capsuled>(m, "Capsule", "A cylinder of length lz along z about the origin, with round ends.");
+  bindRound<fcl::Coned>(m, "Cone", "A cone of height lz along z about the origin.");
+  bindRound<fcl::Cylinderd>(m, "Cylinder", "A cylinder of height lz along z about the origin.");
+  bindHalf<fcl::Halfspaced>(m, "Halfspace", "All x with n.x <= d. n (3,) is normalised, and d with it.");
+  bindHalf<fcl::Planed>(m, "Plane", "All x with n.x = d. n (3,) is normalised, and d with it.");
+
+  ShapeClass<fcl::Convexd>(m, "Convex", R"(A convex polyhedron.
+
+vertices: (n, 3). faces: one after the other, each its number of corners and their indices, in one flat array.)")
+      .def(py::init(&makeConvex), "vertices"_a, "num_faces"_a, "faces"_a)
+      .def_property_readonly("num_faces", [](const Shape<fcl::Convexd>& s) { return s.shape().getFaceCount(); });
+
+  bindBuilder<MakeModel>(m, "BVHModel",
+                         R"(A triangle mesh: a bocst.Model that is built as python-fcl builds its BVHModel.
+
+Answers are those of FCL's BVHModel<OBBRSS>, which is BVHModelOBBRSS here.)");
+  bindBuilder<MakeObbrss>(m, "BVHModelOBBRSS", "A triangle mesh with FCL's own tree, which endModel() builds.");
+
+#if FCL_HAVE_OCTOMAP
+  py::class_<Octree, Geometry, std::shared_ptr<Octree>>(m, "OcTree", R"(An octomap of this resolution.
+
+data: bytes of octomap's binary format. points: (n, 3), which are inserted as seen from origin (3,).)")
+      .def(py::init([](double r, const std::optional<py::bytes>& data, const py::object& points,
+                       const py::object& origin, double maxrange, bool lazy_eval, bool discretize) {
+             auto tree = std::make_shared<Octree>(r);
+             if (data) {
+               tree->read(*data);
+             } else if (!points.is_none()) {
+               tree->insert(points, origin, maxrange, lazy_eval, discretize);
+             }
+             return tree;
+           }),
+           "r"_a, "data"_a = py::none(), "points"_a = py::none(), "origin"_a = py::none(), "maxrange"_a = -1.0,
+           "lazy_eval"_a = false, "discretize"_a = false)
+      .def(
+          "readBinaryData", [](Octree& o, const py::bytes& data) { o.read(data); }, "data"_a)
+      .def("insertPointCloud", &Octree::insert, "points"_a, "origin"_a = py::none(), "maxrange"_a = -1.0,
+           "lazy_eval"_a = false, "discretize"_a = false);
+#endif
+}
+
+// Objects -------------------------------------------------------------------------------------------------------------
+
+/// FCL's object, and the geometry as Python gave it, which contacts name.
+class Object : public fcl::CollisionObjectd {
+ public:
+  Object(const GeometryPtr& shared, py::object of_python)
+      : fcl::CollisionObjectd(shared), geometry_(shared), python_(std::move(of_python)) {}
+
+  const GeometryPtr& shared() const { return geometry_; }
+  const py::object& python() const { return python_; }
+  void place(const Transform3d& X) {
+    setTransform(X);
+    computeAABB();
+  }
+
+ private:
+  GeometryPtr geometry_;
+  py::object python_;
+};
+
+/// What a query needs of an object; nobody else changes it.
+struct Placed {
+  explicit Placed(const Object& o) : geometry(o.shared()), X_WG(o.getTransform()) {}
+  const GeometryPtr geometry;
+  const Transform3d X_WG;
+};
+
+void bindObject(py::module_& m) {
+  py::class_<Object>(m, "CollisionObject", "A geometry and its pose in the world.")
+      .def(py::init([](const Geometry& geom, const std::optional<Transform3d>& tf) {
+             auto object = std::make_unique<Object>(geom.get(), py::cast(&geom, py::return_value_policy::reference));
+             object->place(tf ? *tf : Transform3d(Transform3d::Identity()));
+             return object;
+           }),
+           "geom"_a, "tf"_a = py::none())
+      .def("getObjectType", [](const Object& o) { return o.getObjectType(); })
+      .def("getNodeType", [](const Object& o) { return o.getNodeType(); })
+      .def(
+          "collisionGeometry", [](const Object& o) { return o.python(); }, "As it was given.")
+      .def("getTransform", [](const Object& o) { return Transform3d(o.getTransform()); })
+      .def(
+          "setTransform", [](Object& o, const Transform3d& tf) { o.place(tf); }, "tf"_a)
+      .def(
+          "getTranslation", [](const Object& o) { return arrayOf(Vector3d(o.getTranslation())); }, "(3,)")
+      .def(
+          "setTranslation",
+          [](Object& o, const py::object& t) {
+            o.setTranslation(translation(t));
+            o.computeAABB();
+          },
+          "vec"_a)
+      .def(
+          "getRotation", [](const Object& o) { return arrayOf(Eigen::Matrix3d(o.getRotation())); }, "(3, 3)")
+      .def(
+          "setRotation",
+          [](Object& o, const py::object& R) {
+            o.setRotation(rotation(R));
+            o.computeAABB();
+          },
+          "mat"_a)
+      .def(
+          "getQuatRotation", [](const Object& o) { return quaternionOf(o.getRotation()); }, "(4,): w, x, y, z")
+      .def(
+          "setQuatRotation",
+          [](Object& o, const py::object& q) {
+            o.setRotation(quaternion(q));
+            o.computeAABB();
+          },
+          "q"_a)
+      .def("computeAABB", [](Object& o) { o.computeAABB(); })
+      .def("isOccupied", [](const Object& o) { return o.isOccupied(); })
+      .def("isFree", [](const Object& o) { return o.isFree(); })
+      .def("isUncertain", [](const Object& o) { return o.isUncertain(); });
+}
+
+// Queries -------------------------------------------------------------------------------------------------------------
+
+struct Contact {
+  py::object o1 = py::none(), o2 = py::none();
+  std::intptr_t b1 = fcl::Contactd::NONE, b2 = fcl::Contactd::NONE;
+  Vector3d normal = Vector3d::Zero(), pos = Vector3d::Zero();
+  double penetration_depth = 0;
+};
+struct CostSource {
+  Vector3d aabb_min = Vector3d::Zero(), aabb_max = Vector3d::Zero();
+  double cost_density = 0, total_cost = 0;
+};
+struct CollisionResult {
+  bool is_collision = false;
+  py::list contacts, cost_sources;
+};
+struct DistanceResult {
+  double min_distance = std::numeric_limits<double>::max();
+  py::object nearest_points = py::none(), o1 = py::none(), o2 = py::none();
+  std::intptr_t b1 = fcl::DistanceResultd::NONE, b2 = fcl::DistanceResultd::NONE;
+};
+struct ContinuousResult {
+  bool is_collide = false;
+  double time_of_contact = 1;
+};
+
+/// The geometry of Python that one of FCL's is.
+const py::object& named(const fcl::CollisionGeometryd* g, const Object& o1, const Object& o2) {
+  return g == o1.shared().get() ? o1.python() : o2.python();
+}
+
+std::size_t collideObjects(const Object& o1, const Object& o2, const std::optional<fcl::CollisionRequestd>& asked,
+                           CollisionResult* result) {
+  const fcl::CollisionRequestd request = asked.value_or(fcl::CollisionRequestd());
+  const Placed a(o1), b(o2);
+  fcl::CollisionResultd r;
+  std::size_t count;
+  {
+    const NoGil free;
+    count = bocst::collide<double>(a.geometry.get(), a.X_WG, b.geometry.get(), b.X_WG, request, r);
+  }
+  if (result == nullptr) return count;
+  result->is_collision |= r.isCollision();
+  for (std::size_t i = 0; i < r.numContacts(); ++i) {
+    const fcl::Contactd& c = r.getContact(i);
+    result->contacts.append(
+        Contact{named(c.o1, o1, o2), named(c.o2, o1, o2), c.b1, c.b2, c.normal, c.pos, c.penetration_depth});
+  }
+  std::vector<fcl::CostSourced> costs;
+  r.getCostSources(costs);
+  for (const fcl::CostSourced& c : costs) {
+    result->cost_sources.append(CostSource{c.aabb_min, c.aabb_max, c.cost_density, c.total_cost});
+  }
+  return count;
+}
+
+double distanceOf(const Object& o1, const Object& o2, const std::optional<fcl::DistanceRequestd>& asked,
+                  DistanceResult* result) {
+  const fcl::DistanceRequestd request = asked.value_or(fcl::DistanceRequestd());
+  const Placed a(o1), b(o2);
+  fcl::DistanceResultd r;
+  double distance;
+  {
+    const NoGil free;
+    distance = bocst::distance<double>(a.geometry.get(), a.X_WG, b.geometry.get(), b.X_WG, request, r);
+  }
+  if (result == nullptr || !(r.min_distance < result->min_distance)) return distance;
+  result->min_distance = r.min_distance;
+  py::list points;
+  for (const Vector3d& p : r.nearest_points) points.append(arrayOf(p));
+  result->nearest_points = points;
+  result->o1 = named(r.o1, o1, o2);
+  result->o2 = named(r.o2, o1, o2);
+  result->b1 = r.b1;
+  result->b2 = r.b2;
+  return distance;
+}
+
+double continuousOf(const Object& o1, const Transform3d& X_W1_end, const Object& o2, const Transform3d& X_W2_end,
+                    const std::optional<fcl::ContinuousCollisionRequestd>& asked, ContinuousResult* result) {
+  const fcl::ContinuousCollisionRequestd request = asked.value_or(fcl::ContinuousCollisionRequestd());
+  const Placed a(o1), b(o2);
+  fcl::ContinuousCollisionResultd r;
+  double time;
+  {
+    const NoGil free;
+    time = bocst::continuousCollide<double>(a.geometry.get(), a.X_WG, X_W1_end, b.geometry.get(), b.X_WG, X_W2_end,
+                                            request, r);
+  }
+  if (result != nullptr) {
+    result->is_collide |= r.is_collide;
+    result->time_of_contact = std::min(result->time_of_contact, r.time_of_contact);
+  }
+  return time;
+}
+
+template <typename C, typename Struct>
+void vectorMember(py::class_<C>& c, const char* name, Vector3d Struct::*at) {
+  c.def_property(
+      name, [at](const C& s) { return arrayOf(Vector3d(s.*at)); },
+      [name, at](C& s, const py::object& v) { s.*at = vector3(name, v); }, "(3,)");
+}
+
+/// Ints are taken for them, as python-fcl has them.
+template <typename E>
+py::enum_<E> bindEnum(py::module_& m, const char* name) {
+  return py::enum_<E>(m, name, py::arithmetic());
+}
+
+void bindQueries(py::module_& m) {
+  bindEnum<fcl::NODE_TYPE>(m, "NODE_TYPE")
+      .value("BV_UNKNOWN", fcl::BV_UNKNOWN)
+      .value("BV_OBBRSS", fcl::BV_OBBRSS)
+      .value("GEOM_BOX", fcl::GEOM_BOX)
+      .value("GEOM_SPHERE", fcl::GEOM_SPHERE)
+      .value("GEOM_ELLIPSOID", fcl::GEOM_ELLIPSOID)
+      .value("GEOM_CAPSULE", fcl::GEOM_CAPSULE)
+      .value("GEOM_CONE", fcl::GEOM_CONE)
+      .value("GEOM_CYLINDER", fcl::GEOM_CYLINDER)
+      .value("GEOM_CONVEX", fcl::GEOM_CONVEX)
+      .value("GEOM_PLANE", fcl::GEOM_PLANE)
+      .value("GEOM_HALFSPACE", fcl::GEOM_HALFSPACE)
+      .value("GEOM_TRIANGLE", fcl::GEOM_TRIANGLE)
+      .value("GEOM_OCTREE", fcl::GEOM_OCTREE);
+  bindEnum<fcl::OBJECT_TYPE>(m, "OBJECT_TYPE")
+      .value("OT_UNKNOWN", fcl::OT_UNKNOWN)
+      .value("OT_BVH", fcl::OT_BVH)
+      .value("OT_GEOM", fcl::OT_GEOM)
+      .value("OT_OCTREE", fcl::OT_OCTREE);
+  bindEnum<fcl::GJKSolverType>(m, "GJKSolverType")
+      .value("GST_LIBCCD", fcl::GST_LIBCCD)
+      .value("GST_INDEP", fcl::GST_INDEP);
+  bindEnum<fcl::CCDMotionType>(m, "CCDMotionType")
+      .value("CCDM_TRANS", fcl::CCDM_TRANS)
+      .value("CCDM_LINEAR", fcl::CCDM_LINEAR)
+      .value("CCDM_SCREW", fcl::CCDM_SCREW)
+      .value("CCDM_SPLINE", fcl::CCDM_SPLINE);
+  bindEnum<fcl::CCDSolverType>(m, "CCDSolverType")
+      .value("CCDC_NAIVE", fcl::CCDC_NAIVE)
+      .value("CCDC_CONSERVATIVE_ADVANCEMENT", fcl::CCDC_CONSERVATIVE_ADVANCEMENT)
+      .value("CCDC_RAY_SHOOTING", fcl::CCDC_RAY_SHOOTING)
+      .value("CCDC_POLYNOMIAL_SOLVER", fcl::CCDC_POLYNOMIAL_SOLVER);
+  py::implicitly_convertible<int, fcl::GJKSolverType>();
+  py::implicitly_convertible<int, fcl::CCDMotionType>();
+  py::implicitly_convertible<int, fcl::CCDSolverType>();
+
+  using Request = fcl::CollisionRequestd;
+  py::class_<Request>(m, "CollisionRequest",
+                      "What is asked of collide(). Without enable_contact, contacts say only who touches.")
+      .def(py::init<std::size_t, bool, std::size_t, bool, bool, fcl::GJKSolverType>(), "num_max_contacts"_a = 1,
+           "enable_contact"_a = false, "num_max_cost_sources"_a = 1, "enable_cost"_a = false,
+           "use_approximate_cost"_a = true, "gjk_solver_type"_a = fcl::GST_LIBCCD)
+      .def_readwrite("num_max_contacts", &Request::num_max_contacts)
+      .def_readwrite("enable_contact", &Request::enable_contact)
+      .def_readwrite("num_max_cost_sources", &Request::num_max_cost_sources)
+      .def_readwrite("enable_cost", &Request::enable_cost)
+      .def_readwrite("use_approximate_cost", &Request::use_approximate_cost)
+      .def_readwrite("gjk_solver_type", &Request::gjk_solver_type)
+      .def_readwrite("gjk_tolerance", &Request::gjk_tolerance);
+
+  py::class_<Contact> contact(m, "Contact", R"(Two primitives that touch.
+
+o1, o2: the geometries as they were given. b1, b2: indices of the primitives, -1 for a shape.
+normal (3,): unit, from o1 to o2; pos (3,): a point in the world; penetration_depth >= 0. NaN without enable_contact.)");
+  contact.def(py::init<>())
+      .def_readwrite("o1", &Contact::o1)
+      .def_readwrite("o2", &Contact::o2)
+      .def_readwrite("b1", &Contact::b1)
+      .def_readwrite("b2", &Contact::b2)
+      .def_readwrite("penetration_depth", &Contact::penetration_depth);
+  vectorMember(contact, "normal", &Contact::normal);
+  vectorMember(contact, "pos", &Contact::pos);
+
+  py::class_<CostSource> cost(m, "CostSource", "A box in which two geometries overlap, in the world.");
+  cost.def(py::init<>())
+      .def_readwrite("cost_density", &CostSource::cost_density)
+      .def_readwrite("total_cost", &CostSource::total_cost);
+  vectorMember(cost, "aabb_min", &CostSource::aabb_min);
+  vectorMember(cost, "aabb_max", &CostSource::aabb_max);
+
+  py::class_<CollisionResult>(m, "CollisionResult", "What collide() found; calls add to it.")
+      .def(py::init([](const py::object& contacts, const py::object& costs) {
+             CollisionResult r;
+             if (!contacts.is_none()) r.contacts = py::list(contacts);
+             if (!costs.is_none()) r.cost_sources = py::list(costs);
+             return r;
+           }),
+           "contacts"_a = py::none(), "cost_sources"_a = py::none())
+      .def_readwrite("is_collision", &CollisionResult::is_collision)
+      .def_readwrite("contacts", &CollisionResult::contacts)
+      .def_readwrite("cost_sources", &CollisionResult::cost_sources);
+  m.def("collide", &collideObjects, "o1"_a, "o2"_a, "request"_a = py::none(), "result"_a = py::none(),
+        R"(Do two objects collide?
+
+Returns how many contacts this call has found, at most request.num_max_contacts, and adds them to the result.)");
+
+  using DRequest = fcl::DistanceRequestd;
+  py::class_<DRequest>(m, "DistanceRequest", "What is asked of distance().")
+      .def(py::init([](bool nearest, bool with_sign, fcl::GJKSolverType solver) {
+             DRequest r(nearest, with_sign);
+             r.gjk_solver_type = solver;
+             return r;
+           }),
+           "enable_nearest_points"_a = false, "enable_signed_distance"_a = false, "gjk_solver_type"_a = fcl::GST_LIBCCD)
+      .def_readwrite("enable_nearest_points", &DRequest::enable_nearest_points)
+      .def_readwrite("enable_signed_distance", &DRequest::enable_signed_distance)
+      .def_readwrite("rel_err", &DRequest::rel_err)
+      .def_readwrite("abs_err", &DRequest::abs_err)
+      .def_readwrite("gjk_solver_type", &DRequest::gjk_solver_type);
+  py::class_<DistanceResult>(m, "DistanceResult", R"(The least distance that calls of distance() have found.
+
+nearest_points: a list of two points (3,), on o1 and on o2, in the world.)")
+      .def(py::init([](const std::optional<double>& least) {
+             DistanceResult r;
+             if (least) r.min_distance = *least;
+             return r;
+           }),
+           "min_distance_"_a = py::none())
+      .def_readwrite("min_distance", &DistanceResult::min_distance)
+      .def_readwrite("nearest_points", &DistanceResult::nearest_points)
+      .def_readwrite("o1", &DistanceResult::o1)
+      .def_readwrite("o2", &DistanceResult::o2)
+      .def_readwrite("b1", &DistanceResult::b1)
+      .def_readwrite("b2", &DistanceResult::b2);
+  m.def("distance", &distanceOf, "o1"_a, "o2"_a, "request"_a = py::none(), "result"_a = py::none(),
+        R"(How far are two objects apart?
+
+Returns the distance of this pair, in the length unit of the geometries; the result keeps the least of all calls.)");
+
+  using CRequest = fcl::ContinuousCollisionRequestd;
+  py::class_<CRequest>(m, "ContinuousCollisionRequest", "What is asked of continuousCollide().")
+      .def(py::init<std::size_t, double, fcl::CCDMotionType, fcl::GJKSolverType, fcl::CCDSolverType>(),
+           "num_max_iterations"_a = 10, "toc_err"_a = 0.0001, "ccd_motion_type"_a = fcl::CCDM_TRANS,
+           "gjk_solver_type"_a = fcl::GST_LIBCCD, "ccd_solver_type"_a = fcl::CCDC_NAIVE)
+      .def_readwrite("num_max_iterations", &CRequest::num_max_iterations)
+      .def_readwrite("toc_err", &CRequest::toc_err)
+      .def_readwrite("ccd_motion_type", &CRequest::ccd_motion_type)
+      .def_readwrite("gjk_solver_type", &CRequest::gjk_solver_type)
+      .def_readwrite("ccd_solver_type", &CRequest::ccd_solver_type);
+  py::class_<ContinuousResult>(m, "ContinuousCollisionResult", "What continuousCollide() found; calls add to it.")
+      .def(py::init([](bool is_collide, double time) {
+             return ContinuousResult{is_collide, time};
+           }),
+           "is_collide"_a = false, "time_of_contact"_a = 1.0)
+      .def_readwrite("is_collide", &ContinuousResult::is_collide)
+      .def_readwrite("time_of_contact", &ContinuousResult::time_of_contact);
+  m.def("continuousCollide", &continuousOf, "o1"_a, "tf1_end"_a, "o2"_a, "tf2_end"_a, "request"_a = py::none(),
+        "result"_a = py::none(), R"(When do two objects first touch on their way from their poses to these?
+
+Returns the time from 0 to 1; 1 where they do not.)");
+}
+
+// Managers ------------------------------------------------------------------------------------------------------------
+
+/// A callback of Python. What it throws ends the query and is thrown again when FCL is done.
+struct Callback {
+  const py::object& data;
+  const py::object& function;
+  std::exception_ptr failure = nullptr;
+
+  py::object operator()(fcl::CollisionObjectd* o1, fcl::CollisionObjectd* o2) const {
+    return function(py::cast(static_cast<Object*>(o1), py::return_value_policy::reference),
+                    py::cast(static_cast<Object*>(o2), py::return_value_policy::reference), data);
+  }
+  static bool collide(fcl::CollisionObjectd* o1, fcl::CollisionObjectd* o2, void* self) {
+    auto& c = *static_cast<Callback*>(self);
+    try {
+      return c(o1, o2).cast<bool>();
+    } catch (...) {
+      c.failure = std::current_exception();
+      return true;
+    }
+  }
+  static bool distance(fcl::CollisionObjectd* o1, fcl::CollisionObjectd* o2, void* self, double& least) {
+    auto& c = *static_cast<Callback*>(self);
+    try {
+      const auto [done, dist] = c(o1, o2).cast<std::pair<bool, double>>();
+      least = dist;
+      return done;
+    } catch (...) {
+      c.failure = std::current_exception();
+      return true;
+    }
+  }
+};
+
+class Manager {
+ public:
+  void add(Object& object) {
+    change();
+    const py::object o = named(object);
+    if (objects_.contains(o)) throw py::value_error("bocst: the object is registered already");
+    manager_.registerObject(&object);
+    objects_[o] = py::none();
+  }
+  void addAll(const std::vector<Object*>& objects) {
+    for (Object* o : objects) add(*o);
+  }
+  void remove(Object& object) {
+    change();
+    const py::object o = named(object);
+    if (!objects_.contains(o)) return;
+    manager_.unregisterObject(&object);
+    objects_.attr("pop")(o);
+  }
+  void clear() {
+    change();
+    manager_.clear();
+    objects_.clear();
+  }
+  void setup() {
+    change();
+    manager_.setup();
+  }
+  void update(const py::object& what) {
+    change();
+    if (what.is_none()) return manager_.update();
+    if (py::isinstance<Object>(what)) return manager_.update(registered(what));
+    std::vector<fcl::CollisionObjectd*> all;
+    for (const auto& o : what) all.push_back(registered(o));
+    manager_.update(all);
+  }
+
+  // The GIL is held: callbacks are Python's. What they ask lets go of it.
+  template <typename... With>
+  void collide(const py::object& data, const py::object& callback, With*... with) const {
+    Callback c{data, callback};
+    const Asked asked(*this);
+    manager_.collide(with..., &c, &Callback::collide);
+    if (c.failure) std::rethrow_exception(c.failure);
+  }
+  template <typename... With>
+  void distance(const py::object& data, const py::object& callback, With*... with) const {
+    Callback c{data, callback};
+    const Asked asked(*this);
+    manager_.distance(with..., &c, &Callback::distance);
+    if (c.failure) std::rethrow_exception(c.failure);
+  }
+  void collideWith(Manager& other, const py::object& data, const py::object& callback) const {
+    const Asked asked(other);
+    collide(data, callback, &other.manager_);
+  }
+  void distanceTo(Manager& other, const py::object& data, const py::object& callback) const {
+    const Asked asked(other);
+    distance(data, callback, &other.manager_);
+  }
+
+  py::list objects() const { return py::list(objects_); }
+  fcl::DynamicAABBTreeCollisionManagerd& fcl() { return manager_; }
+
+ private:
+  /// While a callback runs, another thread may come by.
+  struct Asked {
+    explicit Asked(const Manager& m) : manager(m) { ++manager.asked_; }
+    ~Asked() { --manager.asked_; }
+    const Manager& manager;
+  };
+  void change() const {
+    if (asked_ > 0) throw std::runtime_error("bocst: the manager cannot be changed while it is asked");
+  }
+  static py::object named(Object& o) { return py::cast(&o, py::return_value_policy::reference); }
+  Object* registered(const py::handle& object) const {
+    if (!objects_.contains(object)) throw py::value_error("bocst: the object is not registered");
+    return object.cast<Object*>();
+  }
+
+  fcl::DynamicAABBTreeCollisionManagerd manager_;
+  py::dict objects_;  // as keys, in the order of registering
+  mutable int asked_ = 0;
+};
+
+void bindManager(py::module_& m) {
+  auto c =
+      py::class_<Manager>(m, "DynamicAABBTreeCollisionManager", R"(FCL's manager of many objects.
+
+collide(data, callback): all pairs in it; collide(object, data, callback): the object and all in it;
+collide(manager, data, callback): all pairs of one here and one there. callback(o1, o2, data) returns True to end.
+distance: the same, with callbacks that return (done, least distance so far).)")
+          .def(py::init<>())
+          .def("registerObject", &Manager::add, "obj"_a)
+          .def("registerObjects", &Manager::addAll, "other_objs"_a)
+          .def("unregisterObject", &Manager::remove, "obj"_a)
+          .def("setup", &Manager::setup)
+          .def("update", &Manager::update, "arg"_a = py::none(), "One object, several, or all; after they were moved.")
+          .def("getObjects", &Manager::objects)
+          .def("clear", &Manager::clear)
+          .def("empty", [](const Manager& s) { return s.objects().empty(); })
+          .def("size", [](const Manager& s) { return s.objects().size(); })
+          .def("collide", &Manager::collideWith, "other_manager"_a, "cdata"_a, "callback"_a)
+          .def(
+              "collide",
+              [](const Manager& s, Object& o, const py::object& d, const py::object& f) { s.collide(d, f, &o); },
+              "obj"_a, "cdata"_a, "callback"_a)
+          .def(
+              "collide", [](const Manager& s, const py::object& d, const py::object& f) { s.collide(d, f); }, "cdata"_a,
+              "callback"_a)
+          .def("distance", &Manager::distanceTo, "other_manager"_a, "cdata"_a, "callback"_a)
+          .def(
+              "distance",
+              [](const Manager& s, Object& o, const py::object& d, const py::object& f) { s.distance(d, f, &o); },
+              "obj"_a, "cdata"_a, "callback"_a)
+          .def(
+              "distance", [](const Manager& s, const py::object& d, const py::object& f) { s.distance(d, f); },
+              "cdata"_a, "callback"_a);
+  using Fcl = fcl::DynamicAABBTreeCollisionManagerd;
+  const auto option = [&c](const char* name, auto at) {
+    using Value = std::remove_reference_t<decltype(at(std::declval<Fcl&>()))>;
+    c.def_property(
+        name, [at](Manager& s) { return at(s.fcl()); }, [at](Manager& s, Value value) { at(s.fcl()) = value; });
+  };
+  option("max_tree_nonbalanced_level", [](Fcl& f) -> int& { return f.max_tree_nonbalanced_level; });
+  option("tree_incremental_balance_pass", [](Fcl& f) -> int& { return f.tree_incremental_balance_pass; });
+  option("tree_topdown_balance_threshold", [](Fcl& f) -> int& { return f.tree_topdown_balance_threshold; });
+  option("tree_topdown_level", [](Fcl& f) -> int& { return f.tree_topdown_level; });
+  option("tree_init_level", [](Fcl& f) -> int& { return f.tree_init_level; });
+  option("octree_as_geometry_collide", [](Fcl& f) -> bool& { return f.octree_as_geometry_collide; });
+  option("octree_as_geometry_distance", [](Fcl& f) -> bool& { return f.octree_as_geometry_distance; });
+}
+
+}  // namespace
+
+std::shared_ptr<Modeld> makeModel(std::shared_ptr<const Mesh> mesh, const Options& options) {
+  const UncheckedDispatch in_any_order;
+  return std::make_shared<Modeld>(std::move(mesh), options);
+}
+
+void bindFcl(py::module_ m) {
+  m.doc() = "FCL's queries under python-fcl's names.";
+  bindTransform(m);
+  bindGeometries(m);
+  bindObject(m);
+  bindQueries(m);
+  bindManager(m);
+}
+
+}  // namespace bocst::python

@@ -1,0 +1,570 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#include <bocst/collide_poses.h>
+#include <bocst/io.h>
+#include <bocst/model.h>
+#include <bocst/oracle.h>
+#include <bocst/scene.h>
+#include <pybind11/operators.h>
+#include <pybind11/pybind11.h>
+#include <pybind11/stl.h>
+
+#include <algorithm>
+#include <cmath>
+#include <mutex>
+#include <optional>
+#include <shared_mutex>
+#include <utility>
+
+#include "mesh/health.h"
+#include "mesh/spheres.h"
+#include "python/arrays.h"
+#include "python/geometry.h"
+
+namespace bocst::python {
+namespace {
+
+using namespace pybind11::literals;
+using NoGil = py::gil_scoped_release;
+using MeshPtr = std::shared_ptr<Mesh>;
+
+/// pybind11 holds what is not const; nothing here changes a mesh.
+MeshPtr forPython(const std::shared_ptr<const Mesh>& mesh) { return std::const_pointer_cast<Mesh>(mesh); }
+
+/// The rows of a C++ vector as a read-only array that keeps `owner` alive.
+template <typename T, typename Row>
+py::array_t<T> rows(const std::vector<Row>& of, py::ssize_t width, const py::object& owner) {
+  py::array_t<T> a({static_cast<py::ssize_t>(of.size()), width}, reinterpret_cast<const T*>(of.data()), owner);
+  a.attr("setflags")("write"_a = false);
+  return a;
+}
+
+// Options -------------------------------------------------------------------------------------------------------------
+
+template <typename Enum>
+struct Name {
+  Enum value;
+  const char* name;
+};
+constexpr Name<Subdivision> kSubdivisions[] = {{Subdivision::kOctree, "octree"}, {Subdivision::kBono, "bono"}};
+constexpr Name<Answer> kAnswers[] = {{Answer::kExact, "exact"}, {Answer::kConservative, "conservative"}};
+constexpr Name<OracleKind> kOracles[] = {{OracleKind::kAuto, "auto"},
+                                         {OracleKind::kCpu, "cpu"},
+                                         {OracleKind::kOcclusion, "occlusion"},
+                                         {OracleKind::kCompute, "compute"},
+                                         {OracleKind::kSampled, "sampled"}};
+constexpr Name<fcl::CCDMotionType> kMotions[] = {{fcl::CCDM_TRANS, "translation"},
+                                                 {fcl::CCDM_LINEAR, "linear"},
+                                                 {fcl::CCDM_SCREW, "screw"},
+                                                 {fcl::CCDM_SPLINE, "spline"}};
+
+template <typename Enum, std::size_t N>
+Enum valueOf(const char* what, const std::string& text, const Name<Enum> (&names)[N]) {
+  std::string all;
+  for (const Name<Enum>& n : names) {
+    if (text == n.name) return n.value;
+    all += std::string(all.empty() ? "" : ", ") + n.name;
+  }
+  throw py::value_error(std::string("bocst: ") + what + " is '" + text + "'; one of " + all + " is expected");
+}
+template <typename Enum, std::size_t N>
+std::string nameOf(Enum value, const Name<Enum> (&names)[N]) {
+  return std::find_if(std::begin(names), std::end(names), [value](const Name<Enum>& n) { return n.value == value; })
+      ->name;
+}
+
+std::chrono::milliseconds milliseconds(double seconds) {
+  if (!(std::abs(seconds) < 1e12)) throw py::value_error("bocst: ttl is " + std::to_string(seconds) + " seconds");
+  return std::chrono::milliseconds(std::llround(seconds * 1e3));
+}
+
+Options makeOptions(const std::string& subdivision, const std::string& answer, int depth, double dimension,
+                    const std::string& oracle, double ttl, std::size_t memory_budget, double margin, bool solid) {
+  Options o;
+  o.subdivision = valueOf("subdivision", subdivision, kSubdivisions);
+  o.answer = valueOf("answer", answer, kAnswers);
+  o.depth = depth;
+  o.dimension = dimension;
+  o.oracle = valueOf("oracle", oracle, kOracles);
+  o.ttl = milliseconds(ttl);
+  o.memory_budget = memory_budget;
+  o.margin = margin;
+  o.solid = solid;
+  return o;
+}
+
+py::dict asDict(const Options& o) {
+  return py::dict("subdivision"_a = nameOf(o.subdivision, kSubdivisions), "answer"_a = nameOf(o.answer, kAnswers),
+                  "depth"_a = o.depth, "dimension"_a = o.dimension, "oracle"_a = nameOf(o.oracle, kOracles),
+                  "ttl"_a = static_cast<double>(o.ttl.count()) / 1e3, "memory_budget"_a = o.memory_budget,
+                  "margin"_a = o.margin, "solid"_a = o.solid);
+}
+
+std::string repr(const char* name, const py::dict& values) {
+  std::string text;
+  for (const auto& [key, value] : values) {
+    text += (text.empty() ? "" : ", ") + std::string(py::str(key)) + "=" + std::string(py::repr(value));
+  }
+  return std::string("bocst.") + name + "(" + text + ")";
+}
+
+void bindOptions(py::module_& m) {
+  py::class_<Options> options(m, "Options", R"(How a model grows, answers and forgets. Fixed when the model is made.
+
+subdivision: 'bono' (B-BOCST) or 'octree' (O-BOCST).
+answer: 'exact' (FCL's mesh-mesh answer) or 'conservative' (spheres of the collision depth).
+depth: collision depth from 1 to 17, the level at which conservative answers are given; the root is level 1.
+dimension: the paper's d_t in lattice units, from 1 to 65536; 0: the finest lattice.
+oracle: 'auto', 'cpu', 'occlusion', 'compute' or 'sampled'.
+ttl: seconds after which unused deepest levels are dropped; 0: never.
+memory_budget: bytes of resident tree; 0: no limit.
+margin: surfaces no farther apart than this collide, in the length unit of the mesh.
+solid: a watertight mesh also collides with what is wholly inside it.)");
+  options
+      .def(py::init(&makeOptions), py::kw_only(), "subdivision"_a = "bono", "answer"_a = "exact", "depth"_a = 6,
+           "dimension"_a = 0.0, "oracle"_a = "auto", "ttl"_a = 2.0, "memory_budget"_a = 0, "margin"_a = 0.0,
+           "solid"_a = false)
+      .def("__repr__", [](const Options& o) { return repr("Options", asDict(o)); })
+      .def("__eq__", [](const Options& a, const Options& b) { return asDict(a).equal(asDict(b)); });
+  for (const auto item : asDict(Options())) {
+    const std::string key = py::str(item.first);
+    options.def_property_readonly(key.c_str(),
+                                  [key](const Options& o) -> py::object { return asDict(o)[key.c_str()]; });
+  }
+}
+
+// Mesh and model ------------------------------------------------------------------------------------------------------
+
+MeshPtr makeMesh(const py::object& vertices, const py::object& triangles) {
+  std::vector<Eigen::Vector3d> v = vectors("vertices", vertices);
+  std::vector<Mesh::Indices> t = indices("triangles", triangles);
+  const NoGil free;
+  return forPython(Mesh::fromIndices(std::move(v), std::move(t)));
+}
+
+MeshPtr loadMeshOf(const py::object& file) {
+  const std::string name = py::module_::import("os").attr("fsdecode")(file).cast<std::string>();
+  const NoGil free;
+  return forPython(loadMesh(name));
+}
+
+void bindMesh(py::module_& m) {
+  py::class_<program::Health>(m, "Health", R"(What is well with a mesh as a surface, and what is not.
+
+Vertices with equal coordinates count as one. area is in the square of the mesh's length unit, volume in its cube:
+signed, and only where the mesh is watertight and oriented.)")
+      .def_readonly("components", &program::Health::components)
+      .def_readonly("open_edges", &program::Health::open_edges)
+      .def_readonly("non_manifold_edges", &program::Health::non_manifold_edges)
+      .def_readonly("flipped_edges", &program::Health::flipped_edges)
+      .def_readonly("degenerate_triangles", &program::Health::degenerate_triangles)
+      .def_readonly("duplicate_triangles", &program::Health::duplicate_triangles)
+      .def_readonly("repeated_vertices", &program::Health::repeated_vertices)
+      .def_readonly("unused_vertices", &program::Health::unused_vertices)
+      .def_readonly("area", &program::Health::area)
+      .def_property_readonly("volume",
+                             [](const program::Health& h) {
+                               return h.watertight() && h.oriented() ? std::optional<double>(h.volume) : std::nullopt;
+                             })
+      .def_property_readonly("watertight", &program::Health::watertight)
+      .def_property_readonly("oriented", &program::Health::oriented);
+
+  py::class_<Mesh, MeshPtr>(m, "Mesh", R"(A triangle mesh: validated once, immutable, shared by any number of models.
+
+vertices: (n, 3) real numbers in any length unit, of any dtype and layout; copied once, into doubles.
+triangles: (m, 3) integers, 0 <= i < n.
+Raises ValueError that names the first bad vertex or triangle.)")
+      .def(py::init(&makeMesh), "vertices"_a, "triangles"_a)
+      .def_property_readonly(
+          "vertices", [](const py::object& self) { return rows<double>(self.cast<const Mesh&>().vertices(), 3, self); },
+          "(n, 3) float64 in the mesh's frame; read-only, the mesh's own memory.")
+      .def_property_readonly(
+          "triangles",
+          [](const py::object& self) { return rows<std::uint32_t>(self.cast<const Mesh&>().triangles(), 3, self); },
+          "(m, 3) uint32; read-only, the mesh's own memory.")
+      .def_property_readonly(
+          "bounds",
+          [](const Mesh& mesh) {
+            py::array_t<double> a({2, 3});
+            std::copy_n(mesh.bounds().min().data(), 3, a.mutable_data());
+            std::copy_n(mesh.bounds().max().data(), 3, a.mutable_data() + 3);
+            return a;
+          },
+          "(2, 3): least and greatest corner of the box about all triangles, in the mesh's frame.")
+      .def(
+          "with_vertices",
+          [](const Mesh& mesh, const py::object& vertices) {
+            std::vector<Eigen::Vector3d> v = vectors("vertices", vertices);
+            const NoGil free;
+            return forPython(mesh.withVertices(std::move(v)));
+          },
+          "vertices"_a, "The same triangles between other vertices, (n, 3); both meshes share the indices.")
+      .def("health", &program::healthOf, py::call_guard<NoGil>(), "Looks at the mesh as a surface.")
+      .def("__repr__", [](const Mesh& mesh) {
+        return "<bocst.Mesh of " + std::to_string(mesh.vertexCount()) + " vertices and " +
+               std::to_string(mesh.triangleCount()) + " triangles>";
+      });
+
+  m.def("load_mesh", &loadMeshOf, "file"_a, R"(Reads a Mesh from an OBJ, PLY, STL, OFF or DAE file, or by assimp.
+
+Coordinates and axes are those of the file; DAE becomes metres. Raises RuntimeError that names the file and its fault.)");
+}
+
+/// The nodes as arrays, one row each, parents before children.
+py::dict nodesOf(const Modeld& model) {
+  std::vector<NodeView> nodes;
+  {
+    const NoGil free;
+    model.visit([&nodes](const NodeView& node) { nodes.push_back(node); });
+  }
+  const auto count = static_cast<py::ssize_t>(nodes.size());
+  py::array_t<double> center({count, py::ssize_t{3}}), radius(count);
+  py::array_t<std::int64_t> parent(count);
+  py::array_t<std::int32_t> level(count), n(count), children(count);
+  py::array_t<bool> is_cell(count);
+  for (py::ssize_t i = 0; i < count; ++i) {
+    const NodeView& node = nodes[static_cast<std::size_t>(i)];
+    for (int k = 0; k < 3; ++k) center.mutable_at(i, k) = node.center[k];
+    radius.mutable_at(i) = node.radius;
+    parent.mutable_at(i) = node.parent == NodeView::kNone ? -1 : static_cast<std::int64_t>(node.parent);
+    level.mutable_at(i) = node.level;
+    n.mutable_at(i) = node.n;
+    children.mutable_at(i) = static_cast<std::int32_t>(node.children.size());
+    is_cell.mutable_at(i) = node.is_cell;
+  }
+  return py::dict("center"_a = center, "radius"_a = radius, "parent"_a = parent, "level"_a = level, "n"_a = n,
+                  "children"_a = children, "is_cell"_a = is_cell);
+}
+
+std::pair<py::array_t<double>, py::array_t<double>> spheresOf(const MeshPtr& mesh, int depth,
+                                                              const std::string& subdivision) {
+  Options options;
+  options.subdivision = valueOf("subdivision", subdivision, kSubdivisions);
+  options.depth = depth;
+  options.ttl = std::chrono::milliseconds(0);
+  std::vector<NodeView> leaves;
+  {
+    const NoGil free;
+    const std::shared_ptr<Modeld> model = makeModel(mesh, options);
+    model->expandAll(depth);
+    std::vector<NodeView> nodes;
+    model->visit([&nodes](const NodeView& node) { nodes.push_back(node); });
+    leaves = program::leavesAt(nodes, depth);
+  }
+  const auto count = static_cast<py::ssize_t>(leaves.size());
+  py::array_t<double> centers({count, py::ssize_t{3}}), radii(count);
+  for (py::ssize_t i = 0; i < count; ++i) {
+    const NodeView& leaf = leaves[static_cast<std::size_t>(i)];
+    for (int k = 0; k < 3; ++k) centers.mutable_at(i, k) = leaf.center[k];
+    radii.mutable_at(i) = leaf.radius;
+  }
+  return {centers, radii};
+}
+
+void bindModel(py::module_& m) {
+  const auto statistics = py::class_<Statistics>(m, "Statistics", "A snapshot of what a model holds and has done.")
+                              .def_readonly("resident_nodes", &Statistics::resident_nodes)
+                              .def_readonly("resident_bytes", &Statistics::resident_bytes)
+                              .def_readonly("nodes_per_level", &Statistics::nodes_per_level)
+                              .def_readonly("expansions", &Statistics::expansions)
+                              .def_readonly("oracle_batches", &Statistics::oracle_batches)
+                              .def_readonly("oracle_cells", &Statistics::oracle_cells)
+                              .def_readonly("expanded_octants", &Statistics::expanded_octants)
+                              .def_readonly("built_triangles", &Statistics::built_triangles)
+                              .def_readonly("pruned_nodes", &Statistics::pruned_nodes)
+                              .def_readonly("mesh_bytes", &Statistics::mesh_bytes)
+                              .def_readonly("device_bytes", &Statistics::device_bytes);
+
+  py::class_<ModelGeometry, Geometry, std::shared_ptr<ModelGeometry>>(m, "Model", R"(A sphere-tree as a geometry.
+
+One sphere at first, grown by the queries that touch it. Any number of threads may query one model.
+Model(mesh, options), or options as keyword arguments: Model(mesh, margin=0.01). See Options.)")
+      .def(py::init([](const MeshPtr& mesh, const std::optional<Options>& options, const py::kwargs& keywords) {
+             if (options && !keywords.empty()) {
+               throw py::type_error("bocst: Model takes options, or their names as keyword arguments, not both");
+             }
+             const Options o = options ? *options : py::type::of<Options>()(**keywords).cast<Options>();
+             const NoGil free;
+             return std::make_shared<ModelGeometry>(makeModel(mesh, o));
+           }),
+           "mesh"_a, "options"_a = py::none())
+      .def_property_readonly(
+          "mesh", [](const ModelGeometry& g) { return forPython(g.model().mesh()); },
+          "The Mesh as it is now; None after release_mesh().")
+      .def_property_readonly("options", [](const ModelGeometry& g) { return g.model().options(); })
+      .def_property_readonly(
+          "oracle_name", [](const ModelGeometry& g) { return g.model().oracleName(); },
+          "'cpu', 'occlusion', 'sampled' or 'compute'.")
+      .def(
+          "statistics", [](const ModelGeometry& g) { return g.model().statistics(); }, py::call_guard<NoGil>(),
+          "A snapshot.")
+      .def(
+          "expand_all", [](const ModelGeometry& g, int depth) { g.model().expandAll(depth); }, "depth"_a,
+          py::call_guard<NoGil>(), "Makes the whole tree down to this level (1 to 17) resident. For inspection.")
+      .def(
+          "nodes", [](const ModelGeometry& g) { return nodesOf(g.model()); },
+          R"(The resident nodes as a dict of arrays, one row each, parents before children.
+
+center (k, 3) and radius (k,) of the sphere in the mesh's frame and length unit; parent (k,), -1 of the root; level (k,),
+1 of the root; n (k,): 2^n is the side of the node's cube in lattice units; children (k,): how many; is_cell (k,).)")
+      .def(
+          "prune", [](const ModelGeometry& g) { g.model().prune(); }, py::call_guard<NoGil>(),
+          "Drops what was unused for longer than ttl, and what is over the memory budget. Queries do it by themselves.")
+      .def(
+          "update_vertices",
+          [](const ModelGeometry& g, const py::object& vertices) {
+            std::vector<Eigen::Vector3d> v = vectors("vertices", vertices);
+            const NoGil free;
+            g.model().updateVertices(std::move(v));
+          },
+          "vertices"_a, "New positions, (n, 3), for all vertices; nothing is rebuilt.")
+      .def(
+          "release_mesh", [](const ModelGeometry& g) { g.model().releaseMesh(); }, py::call_guard<NoGil>(),
+          "Lets go of the mesh in host memory; conservative answers of the compute oracle only.")
+      .def("__repr__", [](const ModelGeometry& g) {
+        const std::shared_ptr<const Mesh> mesh = g.model().mesh();
+        return "<bocst.Model" +
+               (mesh ? " of " + std::to_string(mesh->triangleCount()) + " triangles" : " without a mesh") + ">";
+      });
+
+  m.def("spheres", &spheresOf, "mesh"_a, "depth"_a = 6, "subdivision"_a = "bono",
+        R"(Spheres that together hold the whole surface: the tree that ends at level `depth` (1 to 17).
+
+Returns (centers (k, 3), radii (k,)) in the mesh's frame and length unit.)");
+
+  py::class_<OracleInfo>(m, "OracleInfo", "One oracle this build knows of; why_not is empty when it can be used.")
+      .def_property_readonly("kind", [](const OracleInfo& o) { return nameOf(o.kind, kOracles); })
+      .def_readonly("name", &OracleInfo::name)
+      .def_readonly("device", &OracleInfo::device)
+      .def_readonly("hardware", &OracleInfo::hardware)
+      .def_readonly("why_not", &OracleInfo::why_not);
+  m.def("available_oracles", &availableOracles, py::call_guard<NoGil>(), "What is there, and why not the others.");
+  py::register_exception<OracleError>(m, "OracleError", PyExc_RuntimeError);
+}
+
+// Many poses ----------------------------------------------------------------------------------------------------------
+
+/// Poses that are copied at a time where the array's layout is not C++'s: they stay in a cache. More where threads are
+/// to be started for them.
+std::size_t chunkOf(unsigned threads) { return threads == 1 ? 256 : 65536; }
+
+py::array_t<bool> posesOf(const ModelGeometry& a, const ModelGeometry& b, const py::object& X_AB, unsigned threads) {
+  const Poses poses("X_AB", X_AB);
+  if (poses.shape().size() != 1) throw py::value_error("bocst: X_AB must have the shape (n, 4, 4)");
+  py::array_t<bool> hits(poses.shape());
+  auto* hit = reinterpret_cast<std::uint8_t*>(hits.mutable_data());
+  const std::shared_ptr<Modeld> model_a = a.shared(), model_b = b.shared();
+  const NoGil free;
+  std::vector<fcl::Transform3d> copy;
+  const std::size_t chunk = chunkOf(threads);
+  for (std::size_t begin = 0; begin < poses.count(); begin += chunk) {
+    const std::size_t end = std::min(begin + chunk, poses.count());
+    try {
+      collidePoses(*model_a, *model_b, poses.get(begin, end, copy), end - begin, hit + begin, threads);
+    } catch (const std::invalid_argument&) {
+      // Again from the first on, so that the pose has its number among all.
+      collidePoses(*model_a, *model_b, poses.get(0, end, copy), end, hit, threads);
+      throw;
+    }
+  }
+  return hits;
+}
+
+/// A scene whose number of moving objects does not change while a query reads the poses of a state.
+struct PyScene {
+  explicit PyScene(const SceneOptions& options) : scene(options) {}
+  Scened scene;
+  mutable std::shared_mutex changing;
+};
+
+/// Changes of that number wait for queries. Needs no GIL.
+template <typename F>
+auto change(PyScene& s, const F& f) {
+  const NoGil free;
+  const std::lock_guard<std::shared_mutex> alone(s.changing);
+  return f(s.scene);
+}
+
+/// How many states there are in an array of shape (..., moving, 4, 4); with one moving object also (..., 4, 4).
+std::size_t statesIn(const char* name, const Poses& poses, std::size_t moving, bool many) {
+  const std::vector<py::ssize_t>& shape = poses.shape();
+  const std::size_t dimensions = many ? 2 : 1;
+  const bool has_moving = shape.size() == dimensions && shape.back() == static_cast<py::ssize_t>(moving);
+  if (!has_moving && !(moving == 1 && shape.size() == dimensions - 1)) {
+    std::string got;
+    for (const py::ssize_t n : shape) got += std::to_string(n) + ", ";
+    throw py::value_error("bocst: " + std::string(name) + " has the shape (" + got + "4, 4); (" + (many ? "n, " : "") +
+                          std::to_string(moving) + ", 4, 4) is expected");
+  }
+  return many ? static_cast<std::size_t>(shape.front()) : 1;
+}
+
+/// Calls f(scene, poses, states) without the GIL.
+template <typename F>
+auto ask(const PyScene& s, const py::object& X_WM, bool many, const F& f) {
+  const Poses poses("X_WM", X_WM);
+  const NoGil free;
+  const std::shared_lock<std::shared_mutex> lock(s.changing);
+  const std::size_t states = statesIn("X_WM", poses, s.scene.movingCount(), many);
+  std::vector<fcl::Transform3d> copy;
+  return f(s.scene, poses.get(0, poses.count(), copy), states);
+}
+
+using Xs = const fcl::Transform3d*;
+
+std::optional<std::pair<Id, Id>> idsOf(const Pair& pair) {
+  return pair.a.isValid() ? std::optional<std::pair<Id, Id>>({pair.a, pair.b}) : std::nullopt;
+}
+
+void bindScene(py::module_& m) {
+  m.def("collide_poses", &posesOf, "a"_a, "b"_a, "X_AB"_a, py::kw_only(), "threads"_a = 1,
+        R"(Which of many poses of one pair collide? A bool array (n,), each as of fcl.collide.
+
+a, b: Model.
+X_AB: (n, 4, 4) poses of b in the frame of a, in the length unit of the meshes. Arrays whose matrices lie in memory column
+after column, as np.swapaxes(X, 1, 2) of an array in C order, are read where they are.
+threads: share the poses; 0: as many as the machine runs at once.)");
+
+  py::class_<Id>(m, "Id", "Names an object of one Scene.")
+      .def("__bool__", &Id::isValid)
+      .def("__hash__", [](Id id) { return std::hash<Id>()(id); })
+      .def(py::self == py::self)
+      .def(py::self != py::self)
+      .def(py::self < py::self);
+
+  py::class_<PyScene>(m, "Scene",
+                      R"(All that a planner asks about a robot among obstacles, for whole states in one call.
+
+Geometries are bocst.Model and those of bocst.fcl. A state is an array (m, 4, 4): the poses of all m moving objects, world
+from geometry, in the order of adding. Many states are (n, m, 4, 4); with m = 1 also (n, 4, 4).
+Verdicts are those of fcl.collide on each pair of a moving object and another one that is not ignored.
+threads: share the states of one call; 0: as many as the machine runs at once.)")
+      .def(py::init([](unsigned threads) {
+             SceneOptions options;
+             options.threads = threads;
+             return std::make_unique<PyScene>(options);
+           }),
+           py::kw_only(), "threads"_a = 1)
+      .def(
+          "add_fixed",
+          [](PyScene& s, const Geometry& geometry, const py::object& X_WG) {
+            const fcl::Transform3d X = pose("X_WG", X_WG);
+            return change(s, [&, g = geometry.get()](Scened& scene) { return scene.addFixed(g, X); });
+          },
+          "geometry"_a, "X_WG"_a, "An object that stays at X_WG, (4, 4), world from geometry.")
+      .def(
+          "add_moving",
+          [](PyScene& s, const Geometry& geometry) {
+            return change(s, [g = geometry.get()](Scened& scene) { return scene.addMoving(g); });
+          },
+          "geometry"_a, "An object whose pose comes with each state.")
+      .def(
+          "remove", [](PyScene& s, Id id) { change(s, [id](Scened& scene) { scene.remove(id); }); }, "object"_a,
+          "The order of the other moving objects stays.")
+      .def(
+          "set_pose",
+          [](PyScene& s, Id fixed, const py::object& X_WG) {
+            const fcl::Transform3d X = pose("X_WG", X_WG);
+            const NoGil free;
+            s.scene.setPose(fixed, X);
+          },
+          "fixed"_a, "X_WG"_a, "Another place, (4, 4), for a fixed object.")
+      .def(
+          "ignore", [](PyScene& s, Id a, Id b, bool ignored) { s.scene.ignore(a, b, ignored); }, "a"_a, "b"_a,
+          "ignored"_a = true, py::call_guard<NoGil>(), "The two may touch; ignored=False takes that back.")
+      .def(
+          "update", [](PyScene& s, Id id) { s.scene.update(id); }, "object"_a, py::call_guard<NoGil>(),
+          "To be called when a geometry has changed its form.")
+      .def(
+          "collides",
+          [](const PyScene& s, const py::object& X_WM) {
+            return ask(s, X_WM, false, [](const Scened& scene, Xs X, std::size_t) { return scene.collides(X); });
+          },
+          "X_WM"_a, "Does this state, (m, 4, 4), collide?")
+      .def(
+          "colliding_pair",
+          [](const PyScene& s, const py::object& X_WM) {
+            return ask(s, X_WM, false, [](const Scened& scene, Xs X, std::size_t) {
+              Pair pair;
+              scene.collides(X, &pair);
+              return idsOf(pair);
+            });
+          },
+          "X_WM"_a, "A pair of Ids that collides in this state, (m, 4, 4), or None.")
+      .def(
+          "collisions",
+          [](const PyScene& s, const py::object& X_WM) {
+            std::vector<std::uint8_t> hits;
+            ask(s, X_WM, true, [&hits](const Scened& scene, Xs X, std::size_t states) {
+              hits.resize(states);
+              scene.collisions(X, states, hits.data());
+            });
+            return py::array_t<bool>(static_cast<py::ssize_t>(hits.size()), reinterpret_cast<const bool*>(hits.data()));
+          },
+          "X_WM"_a, "A bool array (n,): which of the states, (n, m, 4, 4), collide?")
+      .def(
+          "first_collision",
+          [](const PyScene& s, const py::object& X_WM) {
+            return ask(s, X_WM, true,
+                       [](const Scened& scene, Xs X, std::size_t states) { return scene.firstCollision(X, states); });
+          },
+          "X_WM"_a, "The least index of a state that collides, or n. The states are (n, m, 4, 4).")
+      .def(
+          "any_collision",
+          [](const PyScene& s, const py::object& X_WM) {
+            return ask(s, X_WM, true,
+                       [](const Scened& scene, Xs X, std::size_t states) { return scene.anyCollision(X, states); });
+          },
+          "X_WM"_a, "Does any of the states, (n, m, 4, 4), collide? Middles are looked at before halves.")
+      .def(
+          "clearance",
+          [](const PyScene& s, const py::object& X_WM) {
+            return ask(s, X_WM, false, [](const Scened& scene, Xs X, std::size_t) { return scene.clearance(X); });
+          },
+          "X_WM"_a, "The least distance of all pairs in this state, (m, 4, 4); 0 where a pair touches.")
+      .def(
+          "nearest_pair",
+          [](const PyScene& s, const py::object& X_WM) {
+            return ask(s, X_WM, false, [](const Scened& scene, Xs X, std::size_t) {
+              Pair pair;
+              scene.clearance(X, &pair);
+              return idsOf(pair);
+            });
+          },
+          "X_WM"_a, "A pair of Ids that is nearest in this state, (m, 4, 4), or None without pairs.")
+      .def(
+          "edge_is_free",
+          [](const PyScene& s, const py::object& begin, const py::object& end, const std::string& motion) {
+            const auto type = valueOf("motion", motion, kMotions);
+            const Poses last("X_WM_end", end);
+            return ask(s, begin, false, [&](const Scened& scene, Xs X, std::size_t) {
+              statesIn("X_WM_end", last, scene.movingCount(), false);
+              std::vector<fcl::Transform3d> copy;
+              return scene.edgeIsFree(X, last.get(0, last.count(), copy), type);
+            });
+          },
+          "X_WM_begin"_a, "X_WM_end"_a, "motion"_a = "linear",
+          R"(Is the motion from one state to another, both (m, 4, 4), free at all times?
+
+motion: 'linear', 'translation', 'screw' or 'spline', see fcl.CCDMotionType.)")
+      .def_property_readonly("moving_count", [](const PyScene& s) { return s.scene.movingCount(); })
+      .def_property_readonly("fixed_count", [](const PyScene& s) { return s.scene.fixedCount(); })
+      .def_property_readonly(
+          "pair_count", [](const PyScene& s) { return s.scene.pairCount(); }, "Pairs that are not ignored.")
+      .def(
+          "moving_index", [](const PyScene& s, Id moving) { return s.scene.movingIndex(moving); }, "moving"_a,
+          "The place of a moving object among those of a state.");
+}
+
+}  // namespace
+
+PYBIND11_MODULE(_bocst, m) {
+  m.doc() = "The C++ part of bocst.";
+  m.attr("__version__") = BOCST_VERSION;
+  bindOptions(m);
+  bindMesh(m);
+  bindFcl(m.def_submodule("fcl"));
+  bindModel(m);
+  bindScene(m);
+}
+
+}  // namespace bocst::python

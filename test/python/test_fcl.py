@@ -1,0 +1,457 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""python-fcl's names: what its documents show gives the same answers here, known in closed form or from FCL's own tree."""
+import gc
+
+import bocst
+import bocst.fcl as fcl
+import numpy as np
+import pytest
+from shapes import box, poses, shift, torus
+
+
+def built(kind, vertices, triangles):
+    model = kind()
+    model.beginModel(num_tris_=len(triangles), num_vertices_=len(vertices))
+    assert model.addSubModel(verts=vertices, triangles=triangles)
+    assert model.endModel() == 0
+    return model
+
+
+def placed(geometry, X=np.eye(4)):
+    return fcl.CollisionObject(geometry, fcl.Transform(X[:3, :3], X[:3, 3]))
+
+
+def at(geometry, *t):
+    return fcl.CollisionObject(geometry, fcl.Transform(np.array(t or (0, 0, 0), dtype=float)))
+
+
+TETRAHEDRON = np.array([[1.0, 1, 1], [2, 1, 1], [1, 2, 1], [1, 1, 2]]), np.array([[0, 2, 1], [0, 3, 2], [0, 1, 3], [1, 2, 3]])
+MESHES = [fcl.BVHModel, fcl.BVHModelOBBRSS]
+
+
+def test_geometries_and_their_members():
+    triangle = fcl.TriangleP(*np.eye(3))
+    assert np.array_equal([triangle.a, triangle.b, triangle.c], np.eye(3))
+    assert np.array_equal(fcl.Box(1, 2, 3).side, [1, 2, 3])
+    assert np.array_equal(fcl.Ellipsoid(1, 2, 3).radii, [1, 2, 3])
+    for kind in (fcl.Capsule, fcl.Cone, fcl.Cylinder):
+        shape = kind(1.0, 3.0)
+        assert (shape.radius, shape.lz) == (1, 3)
+        shape.lz = 5
+        assert shape.lz == 5
+    for kind in (fcl.Halfspace, fcl.Plane):
+        shape = kind(np.array([0.0, 3.0, 0.0]), 6.0)
+        assert np.array_equal(shape.n, [0, 1, 0]) and shape.d == 2
+    sphere = fcl.Sphere(1)
+    sphere.radius = 2.5
+    assert sphere.radius == 2.5
+    with pytest.raises(ValueError):
+        sphere.radius = -1
+    assert sphere.radius == 2.5
+    assert fcl.Sphere(1).getNodeType() == fcl.NODE_TYPE.GEOM_SPHERE
+    cube = fcl.Convex(box()[0], 12, np.column_stack([np.full(12, 3), box()[1]]).ravel())
+    assert cube.num_faces == 12
+    assert isinstance(cube, fcl.CollisionGeometry) and isinstance(fcl.BVHModel(), fcl.CollisionGeometry)
+    assert isinstance(bocst.Model(bocst.Mesh(*box())), fcl.CollisionGeometry)
+    assert np.allclose(built(fcl.BVHModel, *TETRAHEDRON).aabb_center, 1.5)
+
+
+def test_a_changed_shape_collides_as_what_it_is():
+    sphere = fcl.Sphere(1)
+    assert fcl.collide(at(sphere), at(fcl.Sphere(1), 3, 0, 0)) == 0
+    sphere.radius = 2.5
+    assert fcl.collide(at(sphere), at(fcl.Sphere(1), 3, 0, 0)) == 1
+
+
+def test_transforms():
+    quarter = np.array([[0.0, -1, 0], [1, 0, 0], [0, 0, 1]])
+    t, q = np.array([1.0, 2, 3]), np.array([0.707, 0, 0, 0.707])
+    for transform, R, p in [(fcl.Transform(), np.eye(3), 0 * t), (fcl.Transform(q), quarter, 0 * t),
+                            (fcl.Transform(quarter), quarter, 0 * t), (fcl.Transform(t), np.eye(3), t),
+                            (fcl.Transform(q, t), quarter, t), (fcl.Transform(quarter, t), quarter, t),
+                            (fcl.Transform(quarter, t[None]), quarter, t),
+                            (fcl.Transform(fcl.Transform(quarter, t)), quarter, t),
+                            (fcl.Transform(quarter.astype(np.float32).tolist(), t.tolist()), quarter, t)]:
+        assert np.allclose(transform.getRotation(), R) and np.array_equal(transform.getTranslation(), p)
+    transform = fcl.Transform()
+    transform.setRotation(quarter)
+    transform.setTranslation(t)
+    assert np.allclose(np.abs(transform.getQuatRotation()), [0.5**0.5, 0, 0, 0.5**0.5])
+    transform.setQuatRotation([1, 0, 0, 0])
+    assert np.array_equal(transform.getRotation(), np.eye(3))
+    thing = fcl.CollisionObject(fcl.Sphere(1))
+    thing.setTransform(fcl.Transform(quarter, t))
+    assert np.array_equal(thing.getTranslation(), t) and np.allclose(thing.getRotation(), quarter)
+    thing.setRotation(np.eye(3))
+    thing.setTranslation(2 * t)
+    thing.setQuatRotation(q)
+    assert np.array_equal(thing.getTransform().getTranslation(), 2 * t) and np.allclose(thing.getRotation(), quarter)
+    assert np.allclose(np.abs(thing.getQuatRotation()), [0.5**0.5, 0, 0, 0.5**0.5])
+    assert thing.isOccupied() and not thing.isFree() and not thing.isUncertain()
+    with pytest.raises(TypeError):
+        thing.setTransform(np.eye(4))
+
+
+@pytest.mark.parametrize("kind", MESHES)
+def test_building_step_by_step(kind):
+    vertices, triangles = TETRAHEDRON
+    model = kind()
+    assert model.buildState() == 0
+    with pytest.raises(ValueError):
+        model.addVertex(0, 0, 0)
+    model.beginModel()
+    assert model.buildState() == 1
+    for t in triangles:
+        model.addTriangle(*vertices[t])
+    model.addSubModel(vertices + 5, triangles)
+    assert model.endModel() == 0 and model.num_tries_() == 8 and model.buildState() == 2
+    for x in (1.1, 6.1):
+        assert fcl.collide(fcl.CollisionObject(model), at(fcl.Sphere(0.2), x, x, x)) == 1
+    assert fcl.collide(fcl.CollisionObject(model), at(fcl.Sphere(0.2), 4, 4, 4)) == 0
+    thing = fcl.CollisionObject(model)
+    model.beginModel()
+    model.addSubModel(vertices - 9, triangles)
+    with pytest.raises(ValueError, match="no vertex of verts"):
+        model.addSubModel(vertices, [[0, 1, 4]])
+    model.endModel()
+    assert fcl.collide(thing, at(fcl.Sphere(0.2), 1.1, 1.1, 1.1)) == 1, "an object keeps what it was made of"
+    assert fcl.collide(fcl.CollisionObject(model), at(fcl.Sphere(0.2), -7.9, -7.9, -7.9)) == 1
+
+
+@pytest.mark.parametrize("kind", MESHES)
+def test_pairwise_collision(kind):
+    mesh = built(kind, *TETRAHEDRON)
+    request, result = fcl.CollisionRequest(enable_contact=True), fcl.CollisionResult()
+    assert fcl.collide(at(fcl.Box(1, 2, 3)), at(fcl.Cone(5, 6)), request, result) == 1
+    assert result.is_collision and len(result.contacts) == 1
+    result = fcl.CollisionResult()
+    assert fcl.collide(at(fcl.Box(1, 2, 3)), at(fcl.Cylinder(2, 2), 6, 0, 0), request, result) == 0
+    assert not result.is_collision and result.contacts == []
+    cylinder = fcl.Cylinder(2, 2)
+    assert fcl.collide(at(mesh, 0, 0, -1), at(cylinder), request, result) == 1
+    contact = result.contacts[0]
+    assert contact.o1 is mesh and contact.o2 is cylinder and 0 <= contact.b1 < 4 and contact.b2 == -1
+    assert np.linalg.norm(contact.normal) == pytest.approx(1) and contact.penetration_depth >= 0
+    assert contact.pos.shape == (3,)
+    fcl.collide(at(cylinder), at(mesh, 0, 0, -1), request, result)
+    assert result.is_collision and len(result.contacts) == 2, "a result gathers"
+    # FCL itself puts the mesh first.
+    names = [cylinder, mesh] if kind is fcl.BVHModel else [mesh, cylinder]
+    assert [result.contacts[1].o1, result.contacts[1].o2] == names
+    assert fcl.collide(at(mesh), at(mesh)) == 1
+
+
+def test_all_contacts_equal_those_of_fcls_own_tree():
+    a, b = torus(), torus(10)
+    request = fcl.CollisionRequest(num_max_contacts=100000, enable_contact=True)
+    found = 0
+    for X in poses(40, 1.2, seed=3):
+        pairs = []
+        for kind in MESHES:
+            result = fcl.CollisionResult()
+            count = fcl.collide(placed(built(kind, *a)), placed(built(kind, *b), X), request, result)
+            assert count == len(result.contacts)
+            pairs.append(sorted((c.b1, c.b2) for c in result.contacts))
+        assert pairs[0] == pairs[1]
+        found += len(pairs[0])
+    assert found > 100
+
+
+@pytest.mark.parametrize("kind", MESHES)
+def test_pairwise_distance(kind):
+    request, result = fcl.DistanceRequest(enable_nearest_points=True), fcl.DistanceResult()
+    cube = built(kind, *box(0.5))
+    sphere = fcl.Sphere(1)
+    assert fcl.distance(at(cube), at(sphere, 4, 0, 0), request, result) == pytest.approx(2.5)
+    assert result.min_distance == pytest.approx(2.5) and result.o1 is cube and result.o2 is sphere
+    if kind is fcl.BVHModel:  # FCL's own point on the sphere is in the sphere's frame.
+        assert np.allclose(result.nearest_points, [[0.5, 0, 0], [3, 0, 0]], atol=1e-5)
+    assert fcl.distance(at(cube), at(sphere, 9, 0, 0), request, result) == pytest.approx(7.5)
+    assert result.min_distance == pytest.approx(2.5), "a result keeps the least"
+    assert fcl.distance(at(cube), at(cube, 0, 1.75, 0), request, result) == pytest.approx(0.75)
+    assert result.min_distance == pytest.approx(0.75) and result.o2 is cube
+    assert fcl.distance(at(fcl.Box(1, 2, 3)), at(fcl.Box(1, 2, 3), 1.01, 0, 0)) == pytest.approx(0.01)
+    assert fcl.distance(at(cube), at(sphere, 1, 0, 0), request, result) <= 0
+
+
+def test_continuous_collision():
+    request = fcl.ContinuousCollisionRequest(num_max_iterations=1000)
+    result = fcl.ContinuousCollisionResult()
+    ball, cube = at(fcl.Sphere(1), -5, 0, 0), at(built(fcl.BVHModel, *box(0.5)), 5, 0, 0)
+    end = fcl.Transform(np.array([5.0, 0, 0])), fcl.Transform(np.array([-5.0, 0, 0]))
+    time = fcl.continuousCollide(ball, end[0], cube, end[1], request, result)
+    assert result.is_collide and time == result.time_of_contact == pytest.approx(8.5 / 20, abs=2e-4)
+    assert fcl.continuousCollide(ball, ball.getTransform(), cube, cube.getTransform()) == 1
+    request.ccd_motion_type = fcl.CCDMotionType.CCDM_LINEAR
+    assert fcl.continuousCollide(ball, end[0], cube, end[1], request) == pytest.approx(8.5 / 20, abs=2e-4)
+    shapes = fcl.ContinuousCollisionResult()
+    fcl.continuousCollide(at(fcl.Box(1, 2, 3)), fcl.Transform(np.array([5.0, 0, 0])), at(fcl.Cylinder(2, 2), 5, 0, 0),
+                          fcl.Transform(), request, shapes)
+    assert shapes.is_collide and 0 < shapes.time_of_contact < 1
+
+
+def test_options_by_number_as_python_fcl_has_them():
+    request = fcl.CollisionRequest(1, True, 1, False, True, 1)
+    assert request.gjk_solver_type == fcl.GJKSolverType.GST_INDEP == 1
+    assert fcl.collide(at(fcl.Sphere(1)), at(fcl.Sphere(1), 1, 0, 0), request) == 1
+    assert fcl.DistanceRequest(True).enable_nearest_points
+    assert fcl.ContinuousCollisionRequest(10, 1e-4, 1).ccd_motion_type == fcl.CCDMotionType.CCDM_LINEAR
+    with pytest.raises(TypeError):
+        fcl.CollisionRequest(gjk_solver_type="libccd")
+
+
+def test_costs():
+    request = fcl.CollisionRequest(num_max_cost_sources=5, enable_cost=True)
+    result = fcl.CollisionResult()
+    fcl.collide(at(built(fcl.BVHModel, *box(0.5))), at(built(fcl.BVHModel, *box(0.5)), 0.5, 0.1, 0.1), request, result)
+    assert 0 < len(result.cost_sources) <= 5
+    assert np.all(result.cost_sources[0].aabb_min <= result.cost_sources[0].aabb_max)
+
+
+def managers():
+    cube, ball, cone, mesh = fcl.Box(1, 2, 3), fcl.Sphere(4), fcl.Cone(5, 6), built(fcl.BVHModel, *TETRAHEDRON)
+    groups = [[at(cube, 20, 0, 0), at(ball)], [at(cone), at(mesh)], [at(cube), at(ball)]]
+    all = []
+    for group in groups:
+        manager = fcl.DynamicAABBTreeCollisionManager()
+        manager.registerObjects(group)
+        manager.setup()
+        all.append(manager)
+    return all, mesh, groups
+
+
+def test_managed_collision():
+    (first, second, third), mesh, _ = managers()
+
+    def ask(manager, *what, request=None):
+        data = fcl.CollisionData(request=request)
+        manager.collide(*what, data, fcl.defaultCollisionCallback)
+        return data.result
+
+    assert not ask(first).is_collision
+    assert ask(second).is_collision and ask(third).is_collision
+    many = fcl.CollisionRequest(num_max_contacts=100, enable_contact=True)
+    result = ask(first, fcl.CollisionObject(mesh), request=many)
+    assert result.is_collision and len(result.contacts) >= 1
+    assert all(mesh in (c.o1, c.o2) for c in result.contacts)
+    assert ask(third, second, request=many).is_collision
+    assert not ask(first, at(mesh, 100, 0, 0)).is_collision
+
+
+def test_managed_distance():
+    (first, second, _), mesh, _ = managers()
+    data = fcl.DistanceData()
+    first.distance(data, fcl.defaultDistanceCallback)
+    assert data.result.min_distance == pytest.approx(20 - 0.5 - 4, abs=1e-5)
+    data = fcl.DistanceData(fcl.DistanceRequest(enable_nearest_points=True), fcl.DistanceResult())
+    first.distance(at(mesh, 10, 0, 0), data, fcl.defaultDistanceCallback)
+    assert data.result.min_distance == pytest.approx(123**0.5 - 4, abs=1e-5) and mesh in (data.result.o1, data.result.o2)
+    data = fcl.DistanceData()
+    first.distance(second, data, fcl.defaultDistanceCallback)
+    assert data.result.min_distance <= 0
+
+
+def test_callbacks_of_ones_own():
+    (first, second, third), _, groups = managers()
+    seen = []
+
+    def gather(o1, o2, data):
+        data.append({o1, o2})
+        return False
+
+    third.collide(seen, gather)
+    assert seen == [set(groups[2])], "the very objects that were registered"
+
+    class Callable:
+        def __call__(self, o1, o2, data):
+            data.append((o1, o2))
+            return len(data) == 1
+
+    seen = []
+    third.collide(second, seen, Callable())
+    assert len(seen) == 1
+    distances = []
+
+    def least(o1, o2, data):
+        data.append(fcl.distance(o1, o2))
+        return False, min(data)
+
+    first.distance(distances, least)
+    assert min(distances) == pytest.approx(15.5, abs=1e-5)
+
+    def broken(o1, o2, data):
+        raise KeyError("mine")
+
+    for query in (third.collide, first.distance):
+        with pytest.raises(KeyError, match="mine"):
+            query(None, broken)
+        with pytest.raises(RuntimeError):
+            query(None, lambda *_: "neither")
+
+
+def test_a_manager_is_not_changed_while_it_is_asked():
+    (first, _, third), _, groups = managers()
+
+    def meddles(o1, o2, manager):
+        manager.unregisterObject(o1)
+
+    with pytest.raises(RuntimeError, match="while it is asked"):
+        third.collide(third, meddles)
+    assert third.size() == 2
+    third.unregisterObject(groups[2][0])
+    assert third.size() == 1 and third.getObjects() == [groups[2][1]]
+
+
+def test_moving_objects_of_a_manager():
+    manager = fcl.DynamicAABBTreeCollisionManager()
+    things = [at(built(fcl.BVHModel, *box(0.5)), 3 * i, 0, 0) for i in range(10)]
+    for thing in things:
+        manager.registerObject(thing)
+    manager.setup()
+
+    def collides():
+        data = fcl.CollisionData()
+        manager.collide(data, fcl.defaultCollisionCallback)
+        return data.result.is_collision
+
+    assert not collides() and manager.size() == 10 and not manager.empty()
+    for update in (lambda: manager.update(things[3]), lambda: manager.update([things[3]]), manager.update):
+        things[3].setTranslation(np.array([6.5, 0, 0]))
+        update()
+        assert collides()
+        things[3].setTranslation(np.array([9.0, 0, 0]))
+        update()
+        assert not collides()
+    with pytest.raises(ValueError, match="already"):
+        manager.registerObject(things[0])
+    with pytest.raises(ValueError, match="not registered"):
+        manager.update(at(fcl.Sphere(1)))
+    manager.unregisterObject(at(fcl.Sphere(1)))
+    manager.clear()
+    assert manager.empty() and manager.getObjects() == []
+    manager.max_tree_nonbalanced_level = 7
+    assert manager.max_tree_nonbalanced_level == 7
+
+
+def test_a_manager_keeps_what_it_has():
+    manager = fcl.DynamicAABBTreeCollisionManager()
+    for i in range(20):
+        manager.registerObject(at(built(fcl.BVHModel, *box(0.5)), 0.9 * i, 0, 0))
+    manager.setup()
+    gc.collect()
+    data = fcl.CollisionData(request=fcl.CollisionRequest(num_max_contacts=1000))
+    manager.collide(data, fcl.defaultCollisionCallback)
+    assert len(data.result.contacts) > 19
+    assert all(isinstance(c.o1, fcl.BVHModel) for c in data.result.contacts)
+    contacts = data.result.contacts
+    del manager, data
+    gc.collect()
+    assert contacts[0].o1.num_tries_() == 12
+
+
+def test_octrees():
+    points = 0.05 + 0.1 * np.stack(np.meshgrid(*3 * [np.arange(-3, 3)]), -1).reshape(-1, 3)
+    tree = fcl.OcTree(0.1, points=points, origin=np.array([0.05, 0.05, 5.0]))
+    assert fcl.collide(at(tree), at(fcl.Sphere(0.1))) == 1
+    assert fcl.collide(at(tree), at(fcl.Sphere(0.1), 2, 0, 0)) == 0
+    mesh = bocst.Model(bocst.Mesh(*box(0.2)))
+    assert fcl.collide(at(tree), at(mesh)) == 1
+    assert fcl.collide(at(tree), at(mesh, 1, 0, 0)) == 0
+    with pytest.raises(ValueError):
+        fcl.OcTree(0.1, data=b"no octree")
+
+
+# What trimesh's CollisionManager does with python-fcl, written anew.
+
+class Collisions:
+    """Names meshes and asks one manager about them, telling geometries apart by id()."""
+
+    def __init__(self):
+        self.objects, self.names = {}, {}
+        self.manager = fcl.DynamicAABBTreeCollisionManager()
+        self.manager.setup()
+
+    def add(self, name, mesh, X=np.eye(4)):
+        geometry = built(fcl.BVHModel, *mesh)
+        if name in self.objects:
+            self.manager.unregisterObject(self.objects[name][0])
+        X = np.asanyarray(X, dtype=np.float32)
+        thing = fcl.CollisionObject(geometry, fcl.Transform(X[:3, :3], X[:3, 3]))
+        self.objects[name] = thing, geometry
+        self.names[id(geometry)] = name
+        self.manager.registerObject(thing)
+        self.manager.update()
+
+    def remove(self, name):
+        self.manager.unregisterObject(self.objects[name][0])
+        self.manager.update()
+        del self.names[id(self.objects.pop(name)[1])]
+
+    def move(self, name, X):
+        thing = self.objects[name][0]
+        thing.setRotation(X[:3, :3])
+        thing.setTranslation(X[:3, 3])
+        self.manager.update(thing)
+
+    def name(self, geometry):
+        return self.names[id(geometry)]
+
+    def internal(self):
+        data = fcl.CollisionData(request=fcl.CollisionRequest(num_max_contacts=100000, enable_contact=True))
+        self.manager.collide(data, fcl.defaultCollisionCallback)
+        pairs = {tuple(sorted((self.name(c.o1), self.name(c.o2)))) for c in data.result.contacts}
+        assert data.result.is_collision == bool(pairs)
+        return pairs, data.result.contacts
+
+    def single(self, mesh, X):
+        geometry = built(fcl.BVHModel, *mesh)
+        thing = fcl.CollisionObject(geometry, fcl.Transform(X[:3, :3], X[:3, 3]))
+        data = fcl.CollisionData(request=fcl.CollisionRequest(num_max_contacts=100000, enable_contact=True))
+        self.manager.collide(thing, data, fcl.defaultCollisionCallback)
+        return {self.name(c.o2 if c.o1 == geometry else c.o1) for c in data.result.contacts}
+
+    def nearest(self, mesh, X):
+        geometry = built(fcl.BVHModel, *mesh)
+        thing = fcl.CollisionObject(geometry, fcl.Transform(X[:3, :3], X[:3, 3]))
+        data = fcl.DistanceData(fcl.DistanceRequest(enable_nearest_points=True), fcl.DistanceResult())
+        self.manager.distance(thing, data, fcl.defaultDistanceCallback)
+        result = data.result
+        return result.min_distance, self.name(result.o2 if result.o1 == geometry else result.o1), result
+
+    def nearest_other(self, other):
+        data = fcl.DistanceData()
+        self.manager.distance(other.manager, data, fcl.defaultDistanceCallback)
+        return data.result.min_distance
+
+    def other(self, other):
+        data = fcl.CollisionData()
+        self.manager.collide(other.manager, data, fcl.defaultCollisionCallback)
+        return data.result.is_collision
+
+
+def test_as_trimesh_uses_it():
+    scene = Collisions()
+    scene.add("torus", torus())
+    scene.add("far", box(0.5), shift(5))
+    assert scene.internal()[0] == set()
+    scene.add("near", box(0.5), shift(0.8))
+    pairs, contacts = scene.internal()
+    assert pairs == {("near", "torus")}
+    for contact in contacts:
+        assert contact.b1 >= 0 and contact.b2 >= 0 and np.isfinite(contact.pos).all() and contact.penetration_depth >= 0
+    assert scene.single(box(0.6), shift(4.5)) == {"far"} and scene.single(box(9), np.eye(4)) == set()
+    assert scene.single(box(2.25), shift(2.75)) == {"torus", "near", "far"}
+    distance, name, result = scene.nearest(box(0.5), shift(8))
+    assert distance == pytest.approx(2) and name == "far"
+    assert sorted(p[0] for p in result.nearest_points) == pytest.approx([5.5, 7.5])
+    scene.move("near", shift(5, 0.5))
+    assert scene.internal()[0] == {("far", "near")}
+    scene.remove("far")
+    assert scene.internal()[0] == set()
+    scene.add("near", box(0.5), shift(-0.8))
+    assert scene.internal()[0] == {("near", "torus")}
+    other = Collisions()
+    other.add("cube", box(0.5), shift(0, 4))
+    assert not scene.other(other) and scene.nearest_other(other) == pytest.approx(4 - 0.5 - torus()[0][:, 1].max(), abs=0.05)
+    other.move("cube", shift(-0.9))
+    assert scene.other(other)

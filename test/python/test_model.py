@@ -1,0 +1,227 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""Models, many poses of a pair, scenes, and what inspect says."""
+import pathlib
+
+import bocst
+import bocst.fcl as fcl
+import numpy as np
+import pytest
+from shapes import box, poses, shift, torus
+
+
+def touches(a, X, b):
+    """One query of FCL's kind."""
+    tf = fcl.Transform(X[:3, :3], X[:3, 3])
+    return fcl.collide(fcl.CollisionObject(a), fcl.CollisionObject(b, tf)) > 0
+
+
+def obbrss(vertices, triangles):
+    bvh = fcl.BVHModelOBBRSS()
+    bvh.beginModel(len(triangles), len(vertices))
+    bvh.addSubModel(vertices, triangles)
+    bvh.endModel()
+    return bvh
+
+
+@pytest.mark.parametrize("options", [{}, dict(subdivision="octree"), dict(answer="conservative", depth=5),
+                                     dict(margin=0.1), dict(solid=True)])
+def test_poses_have_the_verdicts_of_collide(options):
+    a, b = bocst.Model(bocst.Mesh(*torus()), **options), bocst.Model(bocst.Mesh(*torus(10)), **options)
+    X = poses(3000, 2.2)
+    expected = np.array([touches(a, x, b) for x in X])
+    assert 300 < expected.sum() < 2700
+    for threads in (1, 2, 0):
+        assert np.array_equal(bocst.collide_poses(a, b, X, threads=threads), expected)
+
+
+def test_exact_answers_are_those_of_fcls_own_tree():
+    mesh_a, mesh_b = torus(), torus(10)
+    X = poses(2000, 1.8, seed=5)
+    hits = bocst.collide_poses(bocst.Model(bocst.Mesh(*mesh_a)), bocst.Model(bocst.Mesh(*mesh_b)), X)
+    bvh_a, bvh_b = obbrss(*mesh_a), obbrss(*mesh_b)
+    assert np.array_equal(hits, [touches(bvh_a, x, bvh_b) for x in X])
+
+
+def test_a_model_grows_and_says_so():
+    a, b = bocst.Model(bocst.Mesh(*torus())), bocst.Model(bocst.Mesh(*torus()))
+    assert a.statistics().resident_nodes == 1
+    assert a.oracle_name in ("cpu", "occlusion", "compute")
+    bocst.collide_poses(a, b, poses(50, 1.0))
+    after = a.statistics()
+    assert after.resident_nodes > 1 and after.expansions > 0 and after.resident_bytes > 0
+    assert sum(after.nodes_per_level) <= after.resident_nodes
+    nodes = a.nodes()
+    assert len(nodes["radius"]) == len(nodes["center"]) == len(nodes["parent"])
+    assert nodes["parent"][0] == -1 and nodes["level"][0] == 1 and np.all(nodes["parent"][1:] >= 0)
+
+
+def test_options_come_back():
+    options = bocst.Options(subdivision="octree", answer="conservative", depth=4, dimension=100.0, oracle="cpu", ttl=0.5,
+                            memory_budget=1 << 20, margin=0.25, solid=False)
+    model = bocst.Model(bocst.Mesh(*box()), options)
+    assert model.options == options and options != bocst.Options()
+    assert model.options.ttl == 0.5 and model.options.margin == 0.25 and model.options.oracle == "cpu"
+    assert "depth=4" in repr(options)
+    with pytest.raises(AttributeError):
+        options.depth = 5
+
+
+def test_deforming():
+    a, b = bocst.Model(bocst.Mesh(*box())), bocst.Model(bocst.Mesh(*box()))
+    X = shift(3)[None]
+    assert not bocst.collide_poses(a, b, X)[0]
+    a.update_vertices(2.5 * box()[0])
+    assert bocst.collide_poses(a, b, X)[0]
+    assert np.array_equal(a.mesh.vertices, 2.5 * box()[0])
+    with pytest.raises(ValueError):
+        a.update_vertices(box()[0][:5])
+    with pytest.raises(ValueError):
+        a.update_vertices(np.full((8, 3), np.nan))
+    assert bocst.collide_poses(a, b, X)[0]
+    a.prune()
+    with pytest.raises(RuntimeError):
+        a.release_mesh()
+
+
+def test_spheres_hold_the_surface():
+    mesh = bocst.Mesh(*torus())
+    inside = mesh.vertices[mesh.triangles].mean(axis=1)
+    for subdivision in ("bono", "octree"):
+        for depth in (1, 4):
+            centers, radii = bocst.spheres(mesh, depth, subdivision)
+            gap = np.linalg.norm(inside[:, None] - centers[None], axis=2) - radii
+            assert gap.min(axis=1).max() <= 1e-12
+            assert len(radii) == (1 if depth == 1 else len(centers))
+    assert len(bocst.spheres(mesh, 6)[1]) > len(bocst.spheres(mesh, 4)[1])
+
+
+def test_health():
+    health = bocst.Mesh(*box()).health()
+    assert health.watertight and health.oriented and health.components == 1
+    assert health.area == pytest.approx(24) and abs(health.volume) == pytest.approx(8)
+    vertices, triangles = box()
+    health = bocst.Mesh(vertices, np.concatenate([triangles[1:], triangles[-1:]])).health()
+    assert not health.watertight and health.volume is None and health.duplicate_triangles == 1
+
+
+def test_files(tmp_path):
+    file = tmp_path / "triangle.obj"
+    file.write_text("v 0 0 0\nv 1 0 0\nv 0 1 0\nf 1 2 3\n")
+    for name in (file, str(file), str(file).encode()):
+        mesh = bocst.load_mesh(name)
+        assert np.array_equal(mesh.vertices, [[0, 0, 0], [1, 0, 0], [0, 1, 0]])
+    assert np.array_equal(mesh.bounds, [[0, 0, 0], [1, 1, 0]])
+    file.write_text("v 0 0 0\nf 1 2 3\n")
+    with pytest.raises(RuntimeError, match="triangle.obj"):
+        bocst.load_mesh(file)
+    assert mesh.with_vertices(2 * mesh.vertices).bounds[1, 0] == 2
+
+
+def test_oracles():
+    assert "cpu" in [o.name for o in bocst.available_oracles() if not o.why_not]
+    for oracle in bocst.available_oracles():
+        if oracle.why_not:
+            with pytest.raises(bocst.OracleError):
+                bocst.Model(bocst.Mesh(*box()), oracle=oracle.kind)
+
+
+def robot():
+    """A scene of fixed shapes and two moving ones, and the pairs as fcl.collide sees them."""
+    scene = bocst.Scene(threads=2)
+    fixed = [(bocst.Model(bocst.Mesh(*torus())), shift(2)), (fcl.Box(1, 1, 1), shift(-2)), (fcl.Sphere(0.5), shift(0, 2))]
+    moving = [bocst.Model(bocst.Mesh(*box(0.2))), fcl.Capsule(0.2, 1.0)]
+    ids = [scene.add_fixed(g, X) for g, X in fixed], [scene.add_moving(g) for g in moving]
+
+    def collides(state, ignored=()):
+        placed = [(g, X, id) for (g, X), id in zip(fixed, ids[0])] + list(zip(moving, state, ids[1]))
+        objects = [(fcl.CollisionObject(g, fcl.Transform(X[:3, :3], X[:3, 3])), id) for g, X, id in placed]
+        return any(fcl.collide(objects[i][0], objects[j][0]) > 0
+                   for i in range(3, 5) for j in range(i) if {objects[i][1], objects[j][1]} not in ignored)
+
+    return scene, ids, collides
+
+
+def test_scene():
+    scene, (fixed, moving), collides = robot()
+    assert (scene.fixed_count, scene.moving_count, scene.pair_count) == (3, 2, 7)
+    X = poses(1200, 2.5).reshape(600, 2, 4, 4)
+    expected = np.array([collides(state) for state in X])
+    assert 60 < expected.sum() < 540
+    assert np.array_equal(scene.collisions(X), expected)
+    assert scene.first_collision(X) == np.argmax(expected) and scene.any_collision(X)
+    assert scene.first_collision(X[~expected]) == (~expected).sum() and not scene.any_collision(X[~expected])
+    for state, hit in zip(X[:100], expected):
+        assert scene.collides(state) == hit
+        pair = scene.colliding_pair(state)
+        assert (pair is not None) == hit and (not hit or set(pair) & set(moving))
+        assert (scene.clearance(state) <= 0) == hit
+        assert len(scene.nearest_pair(state)) == 2
+    scene.ignore(moving[0], fixed[0])
+    assert scene.pair_count == 6
+    ignored = [{moving[0], fixed[0]}]
+    assert np.array_equal(scene.collisions(X), [collides(state, ignored) for state in X])
+    scene.ignore(moving[0], fixed[0], False)
+    assert np.array_equal(scene.collisions(X), expected)
+
+
+def test_scene_changes():
+    scene, (fixed, moving), _ = robot()
+    state = np.stack([shift(0, 0, 3), shift(0, 0, -3)])
+    assert not scene.collides(state)
+    scene.set_pose(fixed[0], shift(0, 0, 3))
+    assert scene.colliding_pair(state) is None, "the torus has a hole"
+    scene.set_pose(fixed[1], shift(0, 0, 3))
+    assert scene.colliding_pair(state) == (moving[0], fixed[1])
+    scene.remove(fixed[1])
+    assert not scene.collides(state)
+    assert scene.edge_is_free(state, state)
+    far = state.copy()
+    far[0, :3, 3] = 4, 0, 3
+    assert not scene.edge_is_free(state, far)
+    for motion in ("translation", "screw", "spline"):
+        assert not scene.edge_is_free(state, far, motion)
+    with pytest.raises(ValueError, match="motion is 'walk'"):
+        scene.edge_is_free(state, far, "walk")
+    assert scene.moving_index(moving[1]) == 1
+    scene.remove(moving[0])
+    assert scene.moving_index(moving[1]) == 0
+    with pytest.raises(ValueError, match="removed"):
+        scene.remove(moving[0])
+    with pytest.raises(ValueError, match="another scene"):
+        bocst.Scene().remove(fixed[0])
+    with pytest.raises(ValueError, match="not rigid"):
+        scene.set_pose(fixed[0], np.diag([2.0, 1, 1, 1]))
+
+
+def test_scene_keeps_its_geometries():
+    scene = bocst.Scene()
+    scene.add_fixed(bocst.Model(bocst.Mesh(*box())), np.eye(4))
+    scene.add_moving(fcl.Sphere(0.2))
+    assert scene.collides(shift(1)[None]) and not scene.collides(shift(3)[None])
+
+
+def test_the_stubs_know_the_package():
+    """What the .pyi files say is there, is there; and the other way round."""
+    import ast
+    for module, file in ((bocst, "__init__.pyi"), (fcl, "fcl.pyi")):
+        tree = ast.parse((pathlib.Path(bocst.__file__).parent / file).read_text())
+        said = {}
+        for node in tree.body:
+            if isinstance(node, ast.ClassDef):
+                said[node.name] = {n.name if isinstance(n, ast.FunctionDef) else n.target.id for n in node.body
+                                   if isinstance(n, (ast.FunctionDef, ast.AnnAssign))}
+            elif isinstance(node, ast.FunctionDef):
+                said[node.name] = set()
+        public = {name for name in vars(module) if not name.startswith("_")} - {"fcl"}
+        assert public - set(said) - {"Model" if module is fcl else ""} == set(), module
+        for name, members in said.items():
+            assert hasattr(module, name), name
+            thing = getattr(module, name)
+            if not isinstance(thing, type):
+                assert thing.__doc__, name
+                continue
+            there = {m for m in vars(thing) if not m.startswith("_")}
+            there -= {"name", "value"} if hasattr(thing, "__members__") else set()
+            instance = set() if not name.endswith("Data") else {"request", "result", "done"}
+            assert there | instance == {m for m in members if not m.startswith("_")}, name
+    assert (pathlib.Path(bocst.__file__).parent / "py.typed").exists()

@@ -1,0 +1,215 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#include <bocst/bocst.h>
+#include <bocst/collide_poses.h>
+#include <gtest/gtest.h>
+
+#include <random>
+#include <string>
+#include <thread>
+#include <vector>
+
+#include "meshes.h"
+
+namespace bocst {
+namespace {
+
+using Eigen::Vector3d;
+using test::Raw;
+
+template <typename S>
+using Poses = std::vector<fcl::Transform3<S>, Eigen::aligned_allocator<fcl::Transform3<S>>>;
+
+template <typename S>
+Poses<S> randomPoses(std::size_t count, double spread, unsigned seed, const Vector3d& middle = Vector3d::Zero()) {
+  std::mt19937_64 g(seed);
+  std::normal_distribution<double> n;
+  std::uniform_real_distribution<double> u(-spread, spread);
+  Poses<S> poses(count, fcl::Transform3<S>::Identity());
+  for (fcl::Transform3<S>& X : poses) {
+    const Eigen::Quaterniond q = Eigen::Quaterniond(n(g), n(g), n(g), n(g)).normalized();
+    X.linear() = q.toRotationMatrix().template cast<S>();
+    X.translation() = (middle + Vector3d(u(g), u(g), u(g))).template cast<S>();
+  }
+  return poses;
+}
+
+template <typename S>
+std::vector<std::uint8_t> oneByOne(const Model<S>& a, const Model<S>& b, const Poses<S>& X_AB) {
+  std::vector<std::uint8_t> hits;
+  for (const fcl::Transform3<S>& X : X_AB) {
+    fcl::CollisionResult<S> result;
+    hits.push_back(fcl::collide(&a, fcl::Transform3<S>(fcl::Transform3<S>::Identity()), &b, X,
+                                fcl::CollisionRequest<S>(), result) > 0);
+  }
+  return hits;
+}
+
+template <typename S>
+std::vector<std::uint8_t> atOnce(const Model<S>& a, const Model<S>& b, const Poses<S>& X_AB, unsigned threads = 1) {
+  std::vector<std::uint8_t> hits(X_AB.size(), 7);
+  collidePoses(a, b, X_AB.data(), X_AB.size(), hits.data(), threads);
+  return hits;
+}
+
+std::size_t count(const std::vector<std::uint8_t>& hits) {
+  return static_cast<std::size_t>(std::count(hits.begin(), hits.end(), 1));
+}
+
+Options optionsOf(Answer answer, double margin, bool solid) {
+  Options options;
+  options.answer = answer;
+  options.depth = 5;
+  options.margin = margin;
+  options.solid = solid;
+  return options;
+}
+
+template <typename S>
+class CollidePoses : public testing::Test {};
+using Scalars = testing::Types<float, double>;
+TYPED_TEST_SUITE(CollidePoses, Scalars);
+
+TYPED_TEST(CollidePoses, HasTheVerdictsOfCollide) {
+  using S = TypeParam;
+  const auto mesh_a = test::torus(20).mesh(), mesh_b = test::box({-0.1, 0.2, 0.3}, {0.4, 0.6, 0.4}).mesh();
+  for (const Options& options :
+       {Options(), optionsOf(Answer::kConservative, 0, false), optionsOf(Answer::kExact, 0.1, false),
+        optionsOf(Answer::kExact, 0, true), optionsOf(Answer::kConservative, 0.05, true)}) {
+    const Model<S> a(mesh_a, options), b(mesh_b, options);
+    const Poses<S> X = randomPoses<S>(1500, 1.6, 1);
+    const auto expected = oneByOne(a, b, X);
+    EXPECT_GT(count(expected), 100u);
+    EXPECT_LT(count(expected), 1400u);
+    for (const unsigned threads : {1u, 2u, 3u, 0u}) EXPECT_EQ(atOnce(a, b, X, threads), expected) << threads;
+    EXPECT_EQ(atOnce(a, a, X), oneByOne(a, a, X));
+  }
+}
+
+// Where boxes just touch, and where they just do not: rounding must not part what meets.
+TYPED_TEST(CollidePoses, HasThemWhereBoxesBarelyTouch) {
+  using S = TypeParam;
+  std::mt19937_64 g(3);
+  std::uniform_real_distribution<double> u(-1, 1);
+  std::size_t hits = 0, poses = 0;
+  for (const double away : {0.0, 10.0, 1e4}) {
+    for (const double margin : {0.0, 0.01}) {
+      const auto options = optionsOf(Answer::kExact, margin, false);
+      // Corner, edge and face against face, of boxes that are turned and far from their own origins.
+      const Model<S> a(test::box({away, away, away}, {away + 1, away + 2, away + 3}).mesh(), options);
+      const Model<S> b(test::box({-1, -1, -1}, {1, 1, 1}).mesh(), options);
+      Poses<S> X = randomPoses<S>(600, 0, 5);
+      for (std::size_t k = 0; k < X.size(); ++k) {
+        if (k % 3 == 0) X[k].linear().setIdentity();
+        const auto R = X[k].linear().template cast<double>();
+        const int axis = static_cast<int>(k % 2);
+        const double reach = R.row(axis).cwiseAbs().sum() + 2 * margin;
+        const double epsilon = static_cast<double>(std::numeric_limits<S>::epsilon()) * (away + 4);
+        const double gap = epsilon * std::round(40 * u(g) * u(g) * u(g));
+        Vector3d p(away + 0.5 + 0.3 * u(g), away + 1 + 0.5 * u(g), away + 1.5 + u(g));
+        p[axis] = away - reach - gap;
+        X[k].translation() = p.template cast<S>();
+      }
+      const auto expected = oneByOne(a, b, X);
+      EXPECT_EQ(atOnce(a, b, X), expected) << away << " " << margin;
+      hits += count(expected);
+      poses += X.size();
+    }
+  }
+  EXPECT_GT(hits, poses / 10);
+  EXPECT_LT(hits, poses * 9 / 10);
+}
+
+// Rotations that are only nearly ones, as float's are after many products: a cube near the face of a skewed plate.
+TYPED_TEST(CollidePoses, HasThemForPosesThatAreNotQuiteRigid) {
+  using S = TypeParam;
+  const Model<S> a(test::box({-0.02, -0.02, -0.02}, {0.02, 0.02, 0.02}).mesh());
+  const Model<S> b(test::box({-0.01, -9, -9}, {0.01, 9, 9}).mesh());
+  std::mt19937_64 g(4);
+  std::uniform_real_distribution<double> u(-1, 1);
+  Poses<S> X = randomPoses<S>(6000, 0, 6);
+  for (fcl::Transform3<S>& x : X) {
+    for (int i = 0; i < 9; ++i) x.linear()(i % 3, i / 3) += static_cast<S>(1.2e-4 * u(g));
+    const Eigen::Matrix3d R = x.linear().template cast<double>();
+    const double reach = 0.01 + 0.02 * R.col(0).cwiseAbs().sum() + 2e-3 * u(g);
+    x.translation() = (-R * Vector3d(reach, 8.5 * u(g), 8.5 * u(g))).template cast<S>();
+  }
+  const auto expected = oneByOne(a, b, X);
+  EXPECT_EQ(atOnce(a, b, X), expected);
+  EXPECT_GT(count(expected), 1000u);
+  EXPECT_LT(count(expected), 5000u);
+}
+
+TYPED_TEST(CollidePoses, HasThemForMeshesFarFromTheirOrigins) {
+  using S = TypeParam;
+  const Vector3d m(3, -20, 5), n(-7, 1, 4);
+  const Model<S> a(test::torus(12).move(m).mesh()), b(test::torus(10).move(n).mesh());
+  Poses<S> X = randomPoses<S>(2000, 1.6, 11, m);
+  for (fcl::Transform3<S>& x : X) x.translation() -= x.linear() * n.cast<S>();
+  const auto expected = oneByOne(a, b, X);
+  EXPECT_EQ(atOnce(a, b, X), expected);
+  EXPECT_GT(count(expected), 400u);
+  EXPECT_LT(count(expected), 1600u);
+}
+
+TYPED_TEST(CollidePoses, NamesTheFirstPoseThatIsNone) {
+  using S = TypeParam;
+  const Model<S> a(test::torus(6).mesh());
+  for (const unsigned threads : {1u, 2u}) {
+    Poses<S> X = randomPoses<S>(3000, 2, 7);
+    X[2500].linear()(0, 0) = 9;
+    X[1234].translation()[1] = std::numeric_limits<S>::quiet_NaN();
+    std::vector<std::uint8_t> hits(X.size());
+    try {
+      collidePoses(a, a, X.data(), X.size(), hits.data(), threads);
+      FAIL();
+    } catch (const std::invalid_argument& e) {
+      EXPECT_NE(std::string(e.what()).find("collidePoses: pose 1234 "), std::string::npos) << e.what();
+    }
+  }
+  std::uint8_t hit = 7;
+  const fcl::Transform3<S> X = fcl::Transform3<S>::Identity();
+  EXPECT_THROW(collidePoses<S>(a, a, nullptr, 1, &hit), std::invalid_argument);
+  EXPECT_THROW(collidePoses<S>(a, a, &X, 1, nullptr), std::invalid_argument);
+  collidePoses<S>(a, a, nullptr, 0, nullptr);
+  EXPECT_EQ(hit, 7);
+}
+
+TYPED_TEST(CollidePoses, OnlyOccupiedModelsCollide) {
+  using S = TypeParam;
+  const Model<S> a(test::torus(6).mesh());
+  Model<S> b(test::torus(6).mesh());
+  b.cost_density = 0;
+  const Poses<S> X = randomPoses<S>(300, 0.5, 8);
+  EXPECT_EQ(atOnce(a, b, X), oneByOne(a, b, X));
+  EXPECT_EQ(count(atOnce(a, b, X)), 0u);
+}
+
+TYPED_TEST(CollidePoses, FarAwayAndHugePoses) {
+  using S = TypeParam;
+  const Model<S> a(test::torus(6).mesh());
+  Poses<S> X = randomPoses<S>(6, 0, 9);
+  X[0].translation()[0] = std::numeric_limits<S>::max();
+  X[1].translation().setConstant(-std::numeric_limits<S>::max() / 2);
+  X[2].translation()[2] = static_cast<S>(1e20);
+  X[3].translation()[1] = static_cast<S>(-1e9);
+  const auto hits = atOnce(a, a, X);
+  EXPECT_EQ(hits, oneByOne(a, a, X));
+  EXPECT_EQ(count(std::vector<std::uint8_t>(hits.begin(), hits.begin() + 4)), 0u);
+}
+
+TYPED_TEST(CollidePoses, BesideOtherThreadsAndADeformingMesh) {
+  using S = TypeParam;
+  const Raw raw = test::torus(12);
+  Model<S> a(raw.mesh());
+  const Model<S> b(raw.mesh());
+  const Poses<S> X = randomPoses<S>(2000, 1.6, 10);
+  const auto expected = oneByOne(Model<S>(raw.mesh()), b, X);
+  std::thread changes([&] {
+    for (int i = 0; i < 50; ++i) a.updateVertices(raw.vertices);
+  });
+  for (int i = 0; i < 5; ++i) EXPECT_EQ(atOnce(a, b, X, 2), expected);
+  changes.join();
+}
+
+}  // namespace
+}  // namespace bocst
