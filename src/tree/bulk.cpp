@@ -422,8 +422,7 @@ Outline::Box BulkBuilder::findOutline(const lattice::Lattice& lattice) const {
   withEnds([&](const BoundedPieces& ends) {
     for (const Eigen::Matrix3d& axes : {Eigen::Matrix3d(Eigen::Matrix3d::Identity()), principalAxes()}) {
       if (!axes.allFinite()) continue;
-      Outline::Box box;
-      Eigen::Vector3d center = base_;
+      Eigen::Vector3d center = base_, half;
       for (int k = 0; k < 3; ++k) {
         double ends_at[2];
         for (const int sign : {-1, 1}) {
@@ -432,15 +431,12 @@ Outline::Box BulkBuilder::findOutline(const lattice::Lattice& lattice) const {
           ends_at[sign > 0] = sign * (static_cast<double>(farthestAlong(rows, ends, n)) + 3 * marginOf(size_));
         }
         center += axes.col(k) * (ends_at[0] + ends_at[1]) / 2;
-        box.half[k] = (ends_at[1] - ends_at[0]) / 2 * lattice.unit();
-        for (int c = 0; c < 3; ++c) box.axis[k][c] = axes(c, k);
+        half[k] = (ends_at[1] - ends_at[0]) / 2;
       }
-      const Eigen::Vector3d in_mesh = lattice.origin() + lattice.unit() * center;
-      const Eigen::Map<const Eigen::Vector3d> half(box.half);
-      Eigen::Map<Eigen::Vector3d>(box.center) = in_mesh;
-      box.reach = in_mesh.norm() + half.norm();
       const double area = half[0] * half[1] + half[1] * half[2] + half[2] * half[0];
-      if (area < best_area) best_area = area, best = box;
+      if (!(area < best_area)) continue;
+      best_area = area;
+      best = Outline::boxOf(lattice.origin() + lattice.unit() * center, axes, lattice.unit() * half);
     }
   });
   return best;

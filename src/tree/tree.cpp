@@ -133,11 +133,7 @@ void Tree::reset(std::shared_ptr<const Mesh> mesh) {
   const Eigen::Vector3d middle = Eigen::Vector3d::Constant(lattice::kMiddle);
   supports_.start({box.min() - middle, box.max() - middle});
   supports_known_ = false;
-  Outline::Box outline;
-  Eigen::Map<Eigen::Vector3d>(outline.center) = surface_.bounds.center();
-  Eigen::Map<Eigen::Vector3d>(outline.half) = surface_.bounds.sizes() / 2;
-  outline.reach = surface_.bounds.center().norm() + surface_.bounds.sizes().norm() / 2;
-  outline_.set(outline);
+  outline_.set(Outline::boxOf(surface_.bounds.center(), Eigen::Matrix3d::Identity(), surface_.bounds.sizes() / 2));
   keepOnly({});
 }
 

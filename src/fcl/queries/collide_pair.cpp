@@ -409,12 +409,12 @@ bool isOutOfSight(const CollideQuery<S>& q, const SimilarityTransform& b_in_a, d
 // Is a surface so long and thin that the float walk's rounding, which is a part of its length, is as wide as it is? The
 // walk in double parts what that one cannot.
 bool isNeedle(const tree::Tree& tree) {
-  constexpr double kThin = 0x1p-12;
-  return tree.outline().read([](const tree::Outline::Reader& box) {
-    const double x = box.half(0), y = box.half(1), z = box.half(2);
-    const double most = std::max({x, y, z}), least = std::min({x, y, z}), middle = x + y + z - most - least;
-    return middle < kThin * most;
-  });
+  constexpr float kThin = 0x1p-12f;
+  tree::Outline::Box box;
+  if (!tree.outline().read(box)) return false;
+  const float x = box.half[0], y = box.half[1], z = box.half[2];
+  const float most = std::max({x, y, z}), least = std::min({x, y, z}), middle = x + y + z - most - least;
+  return middle < kThin * most;
 }
 
 template <typename S>
@@ -500,13 +500,10 @@ template <typename S>
 bool areFarApart(const CollideQuery<S>& q, const Models<S>& models) {
   const tree::Tree &tree1 = models.first->tree(), &tree2 = models.second->tree();
   if (tree1.conservative() || tree2.conservative()) return false;
+  tree::Outline::Box box1, box2;
+  if (!tree1.outline().read(box1) || !tree2.outline().read(box2)) return false;
   const RelativePose<S> X_12(q.X_W1, q.X_W2);
-  const bool are_far = tree1.outline().read([&](const tree::Outline::Reader& box1) {
-    return tree2.outline().read([&](const tree::Outline::Reader& box2) {
-      return query::areFarApart(box1, box2, X_12.rotation, X_12.translation, q.margin);
-    });
-  });
-  if (!are_far) return false;
+  if (!query::areFarApart(box1, box2, X_12.rotation, X_12.translation, q.margin)) return false;
   for (const tree::Tree* tree : {&tree1, &tree2}) {
     if (tree->options().ttl.count() > 0 && tree->hasBranches() && tree->isPruneDue(tree->now())) return false;
   }

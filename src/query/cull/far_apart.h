@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #pragma once
 
+#include <Eigen/Core>
 #include <cmath>
 
 #include "tree/outline.h"
@@ -8,51 +9,42 @@
 namespace bocst::query {
 
 /// Are two oriented boxes surely farther apart than `margin`? Those that are far apart are found, not all: along the
-/// line of their middles and their own axes. `rotation` and `translation` place b's frame in a's.
+/// line of their middles and their own axes. `rotation` and `translation` place b's frame in a's; all in float, whose
+/// range ends where sizes are not within 1e-15 to 1e15: these are never far apart.
 ///
 /// A rotation whose entries of R^T R - 1 reach 1e-3 changes positions by 3e-3 of their size and lengths by half of
 /// that; rounding in float is far less. So a gap counts beyond 5e-3 of all sizes.
 template <typename S>
-bool areFarApart(const tree::Outline::Reader& a, const tree::Outline::Reader& b, const S (&rotation)[3][3],
+bool areFarApart(const tree::Outline::Box& a, const tree::Outline::Box& b, const S (&rotation)[3][3],
                  const S (&translation)[3], double margin) {
-  using Vector = double[3];
-  double R[3][3];
+  using V4 = Eigen::Array4f;
+  const auto load = [](const float(&x)[4]) { return V4(Eigen::Map<const V4, Eigen::Aligned16>(x)); };
+  const auto sum = [](const V4& x) { return x[0] + x[1] + x[2]; };
+  V4 columns[3], rows[3], at;
   for (int r = 0; r < 3; ++r) {
-    for (int c = 0; c < 3; ++c) R[r][c] = static_cast<double>(rotation[r][c]);
+    for (int c = 0; c < 3; ++c) columns[c][r] = rows[r][c] = static_cast<float>(rotation[r][c]);
+    columns[r][3] = rows[r][3] = 0;
+    at[r] = static_cast<float>(translation[r]);
   }
-  const auto dot = [](const Vector& x, const Vector& y) { return x[0] * y[0] + x[1] * y[1] + x[2] * y[2]; };
-  // How far a box reaches from its middle along d, in its own frame.
-  const auto extent = [](const tree::Outline::Reader& box, const Vector& d) {
-    double sum = 0;
-#pragma GCC unroll 3
-    for (std::size_t k = 0; k < 3; ++k) {
-      sum += box.half(k) * std::abs(box.axis(k, 0) * d[0] + box.axis(k, 1) * d[1] + box.axis(k, 2) * d[2]);
-    }
-    return sum;
+  at[3] = 0;
+  const auto combined = [](const V4(&v)[3], const V4& by) { return V4(v[0] * by[0] + v[1] * by[1] + v[2] * by[2]); };
+  const V4 axes_a[3] = {load(a.axes[0]), load(a.axes[1]), load(a.axes[2])},
+           axes_b[3] = {load(b.axes[0]), load(b.axes[1]), load(b.axes[2])}, half_a = load(a.half),
+           half_b = load(b.half);
+  const V4 way = combined(columns, load(b.center)) + at - load(a.center);
+  // How far the boxes reach along a direction of a's frame, in sum.
+  const auto extent = [&](const V4& d) {
+    return sum(combined(axes_a, d).abs() * half_a + combined(axes_b, combined(rows, d)).abs() * half_b);
   };
-  const auto inB = [&R](const Vector& d, Vector& to) {
-#pragma GCC unroll 3
-    for (int c = 0; c < 3; ++c) to[c] = R[0][c] * d[0] + R[1][c] * d[1] + R[2][c] * d[2];
-  };
-  Vector way, turned;
-#pragma GCC unroll 3
-  for (std::size_t r = 0; r < 3; ++r) {
-    way[r] = R[r][0] * b.center(0) + R[r][1] * b.center(1) + R[r][2] * b.center(2) +
-             static_cast<double>(translation[r]) - a.center(r);
-  }
-  const double squared = dot(way, way), length = std::sqrt(squared);
-  // Squares of less underflow. Not true of what is not a number.
-  if (!(length > 1e-120)) return false;
-  const double least = margin + 5e-3 * (length + 2 * (a.reach() + b.reach()));
-  inB(way, turned);
-  if (squared - extent(a, way) - extent(b, turned) > least * length) return true;
-  for (std::size_t k = 0; k < 3; ++k) {
-    const Vector of_a = {a.axis(k, 0), a.axis(k, 1), a.axis(k, 2)};
-    inB(of_a, turned);
-    if (std::abs(dot(of_a, way)) - a.half(k) - extent(b, turned) > least) return true;
-    const Vector of_b = {b.axis(k, 0), b.axis(k, 1), b.axis(k, 2)};
-    for (int r = 0; r < 3; ++r) turned[r] = dot(R[r], of_b);
-    if (std::abs(dot(turned, way)) - b.half(k) - extent(a, turned) > least) return true;
+  const float squared = sum(way * way), length = std::sqrt(squared);
+  if (!(length > 1e-15f && squared < 1e30f)) return false;
+  const float least = static_cast<float>(margin) * 1.001f + 5e-3f * (length + 2 * (a.reach[0] + b.reach[0]));
+  if (squared - extent(way) > least * length) return true;
+  for (int k = 0; k < 3; ++k) {
+    const V4 of_a(axes_a[0][k], axes_a[1][k], axes_a[2][k], 0);
+    if (std::abs(sum(of_a * way)) - extent(of_a) > least) return true;
+    const V4 of_b = combined(columns, V4(axes_b[0][k], axes_b[1][k], axes_b[2][k], 0));
+    if (std::abs(sum(of_b * way)) - extent(of_b) > least) return true;
   }
   return false;
 }
