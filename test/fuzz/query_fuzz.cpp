@@ -547,6 +547,11 @@ void Scene::run() {
   b.mesh = readMesh(range_b_, &a.mesh, pose);
   // All cells of a mesh without extent are within any margin of the partner's: nobody wants their pairs.
   if (conservative && !(hasExtent(a.mesh) && hasExtent(b.mesh))) a.margin_eighths = b.margin_eighths = 0;
+  // A margin may make pairs of all cells of both: 10^8 and more at depth 7.
+  if (conservative && a.margin_eighths + b.margin_eighths > 0) {
+    a.options.depth = std::min(a.options.depth, 5);
+    b.options.depth = std::min(b.options.depth, 5);
+  }
   a.options.margin = scale_ * static_cast<double>(a.margin_eighths) / 8;
   b.options.margin = scale_ * static_cast<double>(b.margin_eighths) / 8;
   a.geometry = a.model = std::make_shared<Model<S>>(meshOf<S>(a.mesh), a.options);
