@@ -1,0 +1,68 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#include "query/collide/sphere_walk.h"
+
+#include <vector>
+
+#include "query/collide/deferred_pairs.h"
+
+namespace bocst::query {
+
+struct SphereWalk::Scratch {
+  std::vector<SphereGroup> stack;
+  DeferredPairs<TreeSide, TreeSide> deferred;
+};
+
+bool SphereWalk::run(Visitor& visitor) {
+  thread_local Scratch s;
+  s.deferred.clear();
+  SphereSteps steps(a_, b_, b_in_a_);
+  steps.nearest_first = visitor.endsAtFirst();
+  const auto push = [&](const DeferredPairs<TreeSide, TreeSide>::Pair& pair) {
+    if (s.stack.size() < steps.depth + 1 + SphereSteps::kStackRoom) {
+      s.stack.resize(2 * (steps.depth + SphereSteps::kStackRoom));
+    }
+    steps.stack = s.stack.data();
+    pushPair(steps, pair.a, pair.b);
+  };
+  push({a_.root(), b_.root()});
+  for (;;) {
+    if (stepAll(steps, s, visitor)) return true;
+    if (s.deferred.empty()) return false;
+    s.deferred.grow(a_, b_, b_in_a_, visitor.endsAtFirst(), push);
+  }
+}
+
+bool SphereWalk::stepAll(SphereSteps& steps, Scratch& s, Visitor& visitor) const {
+  for (;;) {
+    switch (nextEvent(steps)) {
+      case SphereSteps::kDone:
+        return false;
+      case SphereSteps::kDeferred:
+        s.deferred.add({steps.pair[0], steps.pair[1]});
+        break;
+      case SphereSteps::kLeaves:
+        if (visitLeaves(steps, visitor)) return true;
+        break;
+    }
+  }
+}
+
+bool SphereWalk::visitLeaves(const SphereSteps& steps, Visitor& visitor) const {
+  const auto leaf = [](const TreeSide& side, tree::NodeRef node) {
+    return CellLeaf{side.cellId(node), side.cellSphere(node)};
+  };
+  CellLeaf leaves[2];
+  const int x = steps.expanded, y = 1 - x;
+  const auto set = [&](int side, tree::NodeRef node) {
+    leaves[side] = leaf(side == 0 ? a_ : b_, node);
+    if (side == 1) leaves[1].sphere = placed(leaves[1].sphere, b_in_a_);
+  };
+  set(y, steps.pair[y]);
+  for (unsigned mask = steps.mask; mask != 0; mask &= mask - 1) {
+    set(x, tree::NodeRef::octant(steps.pair[x].block(), __builtin_ctz(mask)));
+    if (visitor.cells(leaves[0], leaves[1])) return true;
+  }
+  return false;
+}
+
+}  // namespace bocst::query
