@@ -9,7 +9,7 @@
 #include <algorithm>
 #include <cmath>
 
-#include "simd/octants-inl.h"
+#include "query/cull/frames-inl.h"
 
 #ifndef BOCST_SPHERE_STEPS_ONCE
 #define BOCST_SPHERE_STEPS_ONCE
@@ -166,6 +166,27 @@ HWY_INLINE std::uint32_t nearest(const SphereGroup& group, std::uint32_t octants
   return hn::GetLane(hn::MinOfLanes(du, least)) & 7;
 }
 
+void DecodeRoots(SphereSteps& s) {
+  for (int side = 0; side < 2; ++side) {
+    decodeRoot(s.geometry, side, s.side[side]->tree().rootBounds(), s.volumes[side]);
+  }
+}
+
+// Where the volume of a node is, for pairs that come without frames.
+HWY_INLINE std::uint32_t lookUp(SphereSteps& s, int side, tree::NodeRef node, std::uint32_t& frames) {
+  const std::uint32_t frame = frames++;
+  const tree::Tree& tree = s.side[side]->tree();
+  if (node.isRoot()) {
+    decodeRoot(s.geometry, side, tree.rootBounds(), s.volumes[frame]);
+    s.holds[frame] = ~std::uint64_t{0};
+    return 8 * frame;
+  }
+  const std::uint64_t name = std::uint64_t{node.block()} << 1 | static_cast<std::uint64_t>(side);
+  if (s.holds[frame] != name) decodeBlock(s.geometry, side, tree.block(node.block()), s.volumes[frame]);
+  s.holds[frame] = name;
+  return 8 * frame + static_cast<std::uint32_t>(node.octant());
+}
+
 SphereSteps::Event NextEvent(SphereSteps& s) {
   while (s.depth != 0) {
     SphereGroup& top = s.stack[s.depth - 1];
@@ -197,22 +218,43 @@ SphereSteps::Event NextEvent(SphereSteps& s) {
     const tree::Tree& tree = s.side[x]->tree();
     const tree::Block& block = tree.block(index);
     RoughSphere y;
+    std::uint32_t lane, frames = top.frames;
     if (expands_own) {
+      lane = top.other_lane;
       BOCST_UNROLL
       for (int k = 0; k < 3; ++k) y.center[k] = top.center[k];
       y.radius = top.radius;
     } else {
       y = seenByOther(s, side, sphereOfOctant(s, side, top.at, own.level, o));
+      lane = top.frame == SphereGroup::kNone ? SphereGroup::kNone : 8 * top.frame + (top.at == nullptr ? 0 : o);
     }
     const SphereNode still = expands_own ? other : own;
     tree.markUsed(index, s.side[0]->now());
     SphereGroup& next = s.stack[s.depth];
-    const Met met = meeting(s, x, block, y, next.order);
-    unsigned mask = met.maybe;
-    if (met.doubtful != 0) mask = (mask & ~met.doubtful) | decideMeeting(s, x, index, met.doubtful, still.node);
-    if (mask == 0) continue;
     const std::uint32_t level = block.shape + 1u;
-    if (level >= s.deepest[x] && (expands_own ? other_leaf : own_leaf)) {
+    const bool leaves = level >= s.deepest[x] && (expands_own ? other_leaf : own_leaf);
+    unsigned mask = block.grey;
+    if (leaves || !s.touching_only) {
+      const Met met = meeting(s, x, block, y, next.order);
+      mask = met.maybe;
+      if (met.doubtful != 0) mask = (mask & ~met.doubtful) | decideMeeting(s, x, index, met.doubtful, still.node);
+      if (mask == 0) continue;
+    }
+    std::uint32_t frame = SphereGroup::kNone;
+    if (s.touching_only ? !leaves : level <= s.last_volumes[x] && lane != SphereGroup::kNone) {
+      if (lane == SphereGroup::kNone) lane = lookUp(s, 1 - x, still.node, frames);
+      frame = frames++;
+      const std::uint64_t name = std::uint64_t{index} << 1 | static_cast<std::uint64_t>(x);
+      if (s.holds[frame] != name) decodeBlock(s.geometry, x, block, s.volumes[frame]);
+      s.holds[frame] = name;
+      mask = overlapping(s.geometry, s.volumes[frame], s.volumes[lane / 8], lane % 8, mask, next.order);
+      if (mask == 0) continue;
+      const hn::RebindToUnsigned<D> du;
+      for (std::size_t i = 0; i < 8; i += hn::Lanes(du)) {
+        hn::StoreU(hn::Xor(hn::LoadU(du, next.order + i), hn::Set(du, ~7u)), du, next.order + i);
+      }
+    }
+    if (leaves) {
       s.pair[x] = tree::NodeRef::octant(index, 0);
       s.pair[1 - x] = still.node;
       s.expanded = x;
@@ -229,6 +271,9 @@ SphereSteps::Event NextEvent(SphereSteps& s) {
     next.block = index;
     next.level = level;
     next.octants = mask;
+    next.other_lane = lane;
+    next.frame = frame;
+    next.frames = frames;
   }
   return SphereSteps::kDone;
 }
@@ -247,6 +292,7 @@ HWY_AFTER_NAMESPACE();
 #if HWY_ONCE
 namespace bocst::query {
 
+HWY_EXPORT(DecodeRoots);
 HWY_EXPORT(NextEvent);
 HWY_EXPORT(OctantsMeeting);
 
@@ -269,16 +315,36 @@ SphereFrames::SphereFrames(const SimilarityTransform& one_in_zero) {
   tolerance = static_cast<float>(one_in_zero.tolerance);
 }
 
-SphereSteps::SphereSteps(const TreeSide& a, const TreeSide& b, const SimilarityTransform& b_in_a_)
-    : side{&a, &b}, b_in_a(b_in_a_), frames(b_in_a_) {
+SphereSteps::SphereSteps(const TreeSide& a, const TreeSide& b, const SimilarityTransform& b_in_a_, Frame* volumes_)
+    : side{&a, &b},
+      b_in_a(b_in_a_),
+      frames(b_in_a_),
+      geometry(b_in_a_.scale, withReach(a, b, b_in_a_)),
+      volumes(volumes_) {
+  const PairFrames tight(b_in_a.scale, b_in_a);
+  margins[0][0] = geometry.rounding_margin;
+  margins[0][1] = geometry.slab_rounding_margin;
+  margins[1][0] = tight.rounding_margin;
+  margins[1][1] = tight.slab_rounding_margin;
+  std::fill_n(holds, kVolumes, ~std::uint64_t{0});
+  static int skip = getenv("SKIP") ? atoi(getenv("SKIP")) : 1;
   for (int s = 0; s < 2; ++s) {
     const tree::Tree& tree = side[s]->tree();
     std::copy_n(tree.surface().lattice.extent().data(), 3, extent[s]);
     deepest[s] = static_cast<std::uint32_t>(tree.deepest());
+    last_volumes[s] = PairFrames::fits(b_in_a.scale) && int(deepest[s]) > skip ? deepest[s] - skip : 0;
   }
   // 2^deeper against the ratio of units, exactly.
   const bool even = std::frexp(b_in_a.scale, &not_smaller) == 0.5;
   if (even) --not_smaller;
+}
+
+SimilarityTransform withReach(const TreeSide& a, const TreeSide& b, SimilarityTransform b_in_a) {
+  const auto diameter = [](const TreeSide& side) {
+    return std::sqrt(3.0) * (1 << (lattice::kMaxLevel - side.tree().deepest()));
+  };
+  b_in_a.tolerance += (diameter(a) + diameter(b) * b_in_a.scale) * (1 + 1e-9);
+  return b_in_a;
 }
 
 unsigned decideMeeting(const SphereSteps& s, int own, std::uint32_t index, unsigned mask, tree::NodeRef other) {
@@ -310,6 +376,15 @@ void pushPair(SphereSteps& s, tree::NodeRef node_a, tree::NodeRef node_b) {
   top.block = node_a.block();
   top.level = static_cast<std::uint32_t>(a.level(node_a));
   top.octants = 1u << node_a.octant();
+  top.other_lane = top.frame = SphereGroup::kNone;
+  top.frames = 0;
+  if (node_a.isRoot() && node_b.isRoot() && s.last_volumes[0] > 0 && s.last_volumes[1] > 0) {
+    HWY_DYNAMIC_DISPATCH(DecodeRoots)(s);
+    for (int side = 0; side < 2; ++side) s.holds[side] = ~std::uint64_t{0};
+    top.other_lane = 8;
+    top.frame = 0;
+    top.frames = 2;
+  }
 }
 
 unsigned octantsMeeting(const SphereSteps& s, int own, std::uint32_t index, tree::NodeRef other, unsigned& doubtful) {

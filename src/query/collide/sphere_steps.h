@@ -5,6 +5,7 @@
 #include <cstdint>
 #include <limits>
 
+#include "query/cull/frames.h"
 #include "query/sides/side.h"
 #include "query/sides/visitor.h"
 
@@ -28,7 +29,12 @@ struct SphereGroup {
   std::uint32_t block;     ///< As NodeRef names it, so the root is octant 7 of a block that there is not.
   std::uint32_t level;     ///< Of the octants.
   std::uint32_t octants;   ///< A bit each.
-  std::uint32_t order[8];  ///< Of each: the squared distance of the centres, as a float whose lowest bits are the octant.
+  std::uint32_t other_lane;  ///< 8 * frame + octant: where the other's volume is, or kNone.
+  std::uint32_t frame;       ///< Where the block's octants are, or kNone.
+  std::uint32_t frames;      ///< So many are in use, by the octants and what is above them.
+  /// As in StepGroup: of each octant a float whose lowest three bits are the octant; the least comes first.
+  std::uint32_t order[8];
+  static constexpr std::uint32_t kNone = 0xffffffff;
 };
 
 /// How the roots of two trees lie to each other, in float: what side s sees about the middle of its root.
@@ -67,13 +73,25 @@ struct SphereSteps {
     kDeferred,  ///< `pair` needs a node that is not expanded.
   };
 
-  SphereSteps(const TreeSide& a, const TreeSide& b, const SimilarityTransform& b_in_a);
+  SphereSteps(const TreeSide& a, const TreeSide& b, const SimilarityTransform& b_in_a, Frame* volumes);
 
   const TreeSide* side[2];
   const SimilarityTransform& b_in_a;
   SphereFrames frames;
+  PairFrames geometry;  ///< Of boxes and slabs, whose tolerance is reach() more.
+  bool touching_only = false;  ///< Only nodes whose boxes and slabs touch; leaves by their spheres all the same.
+  float margins[2][2];
+  void setTouchingOnly(bool t) {
+    touching_only = t;
+    geometry.rounding_margin = margins[t][0];
+    geometry.slab_rounding_margin = margins[t][1];
+  }
+  Frame* volumes;       ///< kVolumes of them.
+  static constexpr std::size_t kVolumes = 2 * lattice::kMaxLevel + 3;
+  std::uint64_t holds[kVolumes];
   std::uint32_t extent[2][3];  ///< Where the actual regions end.
   std::uint32_t deepest[2];    ///< The level of each side's leaves.
+  std::uint32_t last_volumes[2];  ///< From this level on, spheres are as good as boxes.
   int not_smaller;             ///< A node of side 0 is not smaller than one of side 1 so many levels deeper.
   bool nearest_first = true;   ///< A hit ends the walk.
 
@@ -84,6 +102,9 @@ struct SphereSteps {
   int expanded = 0;
   unsigned mask = 0;
 };
+
+/// The tolerance of boxes and slabs: a leaf's sphere is within its diameter of surface in the leaf.
+SimilarityTransform withReach(const TreeSide& a, const TreeSide& b, SimilarityTransform b_in_a);
 
 /// Goes on to the next event. Chosen at run time for the machine's instruction set.
 SphereSteps::Event nextEvent(SphereSteps& steps);

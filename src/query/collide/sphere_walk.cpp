@@ -9,13 +9,14 @@ namespace bocst::query {
 
 struct SphereWalk::Scratch {
   std::vector<SphereGroup> stack;
+  Frame volumes[SphereSteps::kVolumes];
   DeferredPairs<TreeSide, TreeSide> deferred;
 };
 
 bool SphereWalk::run(Visitor& visitor) {
   thread_local Scratch s;
   s.deferred.clear();
-  SphereSteps steps(a_, b_, b_in_a_);
+  SphereSteps steps(a_, b_, b_in_a_, s.volumes);
   steps.nearest_first = visitor.endsAtFirst();
   const auto push = [&](const DeferredPairs<TreeSide, TreeSide>::Pair& pair) {
     if (s.stack.size() < steps.depth + 1 + SphereSteps::kStackRoom) {
@@ -24,12 +25,18 @@ bool SphereWalk::run(Visitor& visitor) {
     steps.stack = s.stack.data();
     pushPair(steps, pair.a, pair.b);
   };
-  push({a_.root(), b_.root()});
-  for (;;) {
-    if (stepAll(steps, s, visitor)) return true;
-    if (s.deferred.empty()) return false;
-    s.deferred.grow(a_, b_, b_in_a_, visitor.endsAtFirst(), push);
-  }
+  const auto walk = [&](bool touching_only) {
+    s.deferred.clear();
+    steps.setTouchingOnly(touching_only);
+    push({a_.root(), b_.root()});
+    for (;;) {
+      if (stepAll(steps, s, visitor)) return true;
+      if (s.deferred.empty()) return false;
+      s.deferred.grow(a_, b_, b_in_a_, visitor.endsAtFirst(), push);
+    }
+  };
+  if (visitor.endsAtFirst() && !getenv("ONE") && walk(true)) return true;
+  return walk(false);
 }
 
 bool SphereWalk::stepAll(SphereSteps& steps, Scratch& s, Visitor& visitor) const {
