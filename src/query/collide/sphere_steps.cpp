@@ -20,60 +20,12 @@ unsigned decideMeeting(const SphereSteps& s, int own, std::uint32_t index, unsig
 
 namespace {
 
-constexpr float kHalfDiagonal = 0.8660254f;  // of a cube of side 1
+constexpr float kHalfDiagonal = 0.8660254f;   // of a cube of side 1
 constexpr float kClippedFactor = 1.4142136f;  // see TreeSide::sphere()
+constexpr std::uint64_t kNothing = ~std::uint64_t{0};
 
-/// A sphere in float, about the middle of its side's root or of the other's.
-struct RoughSphere {
-  float center[3];
-  float radius;
-};
-
-// The sphere of a cell in the frame of its side, as TreeSide::sphere() has it.
-inline RoughSphere sphereOf(const SphereSteps& s, int side, std::uint32_t level, const std::uint32_t (&at)[3]) {
-  const std::uint32_t length = 1u << (lattice::kMaxLevel - static_cast<int>(level));
-  const float unit = s.frames.side[side].unit;
-  RoughSphere sphere;
-  std::uint32_t sum = 0, sizes[3];
-  BOCST_UNROLL
-  for (int k = 0; k < 3; ++k) {
-    const std::uint32_t low = at[k] * length, high = std::min(low + length, s.extent[side][k]);
-    sizes[k] = high - low;
-    sum += sizes[k];
-    sphere.center[k] = static_cast<float>(static_cast<std::int32_t>(low + high) - 2 * lattice::kMiddle) * (0.5f * unit);
-  }
-  if (sum == 3 * length) {
-    sphere.radius = kHalfDiagonal * (static_cast<float>(length) * unit);
-    return sphere;
-  }
-  float squared = 0;
-  BOCST_UNROLL
-  for (int k = 0; k < 3; ++k) squared += static_cast<float>(sizes[k]) * static_cast<float>(sizes[k]);
-  sphere.radius = std::sqrt(squared) * (0.5f * unit);
-  if (level < s.deepest[side]) sphere.radius *= kClippedFactor;
-  return sphere;
-}
-
-inline RoughSphere seenByOther(const SphereSteps& s, int side, const RoughSphere& sphere) {
-  const SphereFrames::Side& f = s.frames.side[side];
-  RoughSphere seen;
-  BOCST_UNROLL
-  for (int j = 0; j < 3; ++j) {
-    seen.center[j] = f.shift[j] + (f.to_other[j][0] * sphere.center[0] + f.to_other[j][1] * sphere.center[1] +
-                                   f.to_other[j][2] * sphere.center[2]);
-  }
-  seen.radius = sphere.radius;
-  return seen;
-}
-
-inline RoughSphere sphereOfOctant(const SphereSteps& s, int side, const tree::Block* block, std::uint32_t level,
-                                  std::uint32_t o) {
-  std::uint32_t at[3] = {0, 0, 0};
-  if (block != nullptr) {
-    BOCST_UNROLL
-    for (int k = 0; k < 3; ++k) at[k] = 2u * block->at[k] + (o >> k & 1);
-  }
-  return sphereOf(s, side, level, at);
+inline std::uint64_t nameOf(int side, std::uint32_t block) {
+  return std::uint64_t{block} << 1 | static_cast<std::uint64_t>(side);
 }
 
 }  // namespace
@@ -83,205 +35,295 @@ inline RoughSphere sphereOfOctant(const SphereSteps& s, int side, const tree::Bl
 HWY_BEFORE_NAMESPACE();
 namespace bocst::query::HWY_NAMESPACE {
 
-// Which octants of a block may meet the sphere `y`, in the frame of the block's side, and of which of them that is in
-// doubt.
+// Writes what the other side sees of some spheres.
+HWY_INLINE void turnSpheres(const SphereFrames::Side& g, const V (&c)[3], std::size_t i, SphereFrame& f) {
+  const D d;
+  BOCST_UNROLL
+  for (int j = 0; j < 3; ++j) {
+    V cj = hn::Set(d, g.shift[j]);
+    BOCST_UNROLL
+    for (int k = 0; k < 3; ++k) cj = hn::MulAdd(hn::Set(d, g.to_other[j][k]), c[k], cj);
+    hn::Store(c[j], d, f.center[0][j] + i);
+    hn::Store(cj, d, f.center[1][j] + i);
+  }
+}
+
+// Writes the spheres of the octants of a cell, as TreeSide::sphere() has them. Numbers of units are exact.
+template <typename Position>
+HWY_INLINE void decodeSpheres(const SphereSteps& s, int side, int level, const Position& at, SphereFrame& f) {
+  const D d;
+  const SphereFrames::Side& g = s.frames.side[side];
+  const std::int32_t length = 1 << (lattice::kMaxLevel - 1 - level);
+  std::int32_t corner[3], end[3];  // of the first octant and of the regions, from the middle of the root
+  bool whole = true;
+  BOCST_UNROLL
+  for (int k = 0; k < 3; ++k) {
+    corner[k] = static_cast<std::int32_t>(at[k]) * (2 * length) - lattice::kMiddle;
+    end[k] = static_cast<std::int32_t>(s.extent[side][k]) - lattice::kMiddle;
+    whole &= corner[k] + 2 * length <= end[k];
+  }
+  const V size = hn::Set(d, static_cast<float>(length)), half_unit = hn::Set(d, 0.5f * g.unit);
+  V c[3];
+  if (whole) {
+    const V radius = hn::Set(d, static_cast<float>(length) * g.unit * kHalfDiagonal);
+    for (std::size_t i = 0; i < 8; i += hn::Lanes(d)) {
+      BOCST_UNROLL
+      for (int k = 0; k < 3; ++k) {
+        const V twice = hn::MulAdd(hn::Load(d, kOctantCorner[k] + i), hn::Set(d, static_cast<float>(2 * length)),
+                                   hn::Set(d, static_cast<float>(2 * corner[k] + length)));
+        c[k] = hn::Mul(twice, half_unit);
+      }
+      turnSpheres(g, c, i, f);
+      hn::Store(radius, d, f.radius + i);
+    }
+    return;
+  }
+  const bool leaves = static_cast<std::uint32_t>(level) + 1 >= s.deepest[side];
+  const V of_clipped = hn::Set(d, leaves ? 1.0f : kClippedFactor);
+  for (std::size_t i = 0; i < 8; i += hn::Lanes(d)) {
+    V squared = hn::Zero(d), least = size;
+    BOCST_UNROLL
+    for (int k = 0; k < 3; ++k) {
+      const V low = hn::MulAdd(hn::Load(d, kOctantCorner[k] + i), size, hn::Set(d, static_cast<float>(corner[k])));
+      const V high = hn::Min(hn::Add(low, size), hn::Set(d, static_cast<float>(end[k]))), extent = hn::Sub(high, low);
+      least = hn::Min(least, extent);
+      squared = hn::MulAdd(extent, extent, squared);
+      c[k] = hn::Mul(hn::Add(low, high), half_unit);
+    }
+    const V factor = hn::IfThenElse(hn::Lt(least, size), of_clipped, hn::Set(d, 1.0f));
+    turnSpheres(g, c, i, f);
+    hn::Store(hn::Mul(hn::Mul(hn::Sqrt(squared), half_unit), factor), d, f.radius + i);
+  }
+}
+
+// The octants of a block into a frame, which holds them already where the last pair had the same block.
+HWY_INLINE void decodeBlockSpheres(SphereSteps& s, int side, std::uint32_t index, const tree::Block& block,
+                                   std::uint32_t frame) {
+  if (s.holds_spheres[frame] == nameOf(side, index)) return;
+  s.holds_spheres[frame] = nameOf(side, index);
+  decodeSpheres(s, side, block.shape, block.at, s.scratch.spheres[frame]);
+}
+HWY_INLINE void decodeBlockVolumes(SphereSteps& s, int side, std::uint32_t index, const tree::Block& block,
+                                   std::uint32_t frame) {
+  if (s.holds_volumes[frame] == nameOf(side, index)) return;
+  s.holds_volumes[frame] = nameOf(side, index);
+  decodeBlock(s.geometry, side, block, s.scratch.volumes[frame]);
+}
+
+// Which octants of frame f may meet lane l of frame y, of the other side, and of which it is in doubt.
 struct Met {
   unsigned maybe, doubtful;
 };
-HWY_INLINE Met meeting(const SphereSteps& s, int own, const tree::Block& block, const RoughSphere& y,
+HWY_INLINE Met meeting(const SphereFrames& g, const SphereFrame& f, const SphereFrame& y, std::size_t l,
                        std::uint32_t* order) {
   const D d;
   const hn::RebindToUnsigned<D> du;
-  const std::uint32_t length = 1u << (lattice::kMaxLevel - 1 - block.shape);
-  const float unit = s.frames.side[own].unit;
-  const float more = s.frames.tolerance + s.frames.rounding_margin, less = s.frames.tolerance - s.frames.rounding_margin;
-  bool whole = true;
-  std::int32_t corner[3];  // of the first octant, from the middle of the root
-  BOCST_UNROLL
-  for (int k = 0; k < 3; ++k) {
-    const std::uint32_t low = block.at[k] * (2 * length);
-    whole &= low + 2 * length <= s.extent[own][k];
-    corner[k] = static_cast<std::int32_t>(low) - lattice::kMiddle;
-  }
+  const V more = hn::Set(d, y.radius[l] + (g.tolerance + g.rounding_margin));
+  const V less = hn::Set(d, y.radius[l] + (g.tolerance - g.rounding_margin));
   Met met{0, 0};
-  const auto compare = [&](std::size_t i, V squared, V high, V low) HWY_ATTR {
-    const M apart = hn::Gt(squared, hn::Mul(high, high));
-    const M certain = hn::And(hn::Gt(low, hn::Zero(d)), hn::Le(squared, hn::Mul(low, low)));
+  for (std::size_t i = 0; i < 8; i += hn::Lanes(d)) {
+    V squared = hn::Zero(d);
+    BOCST_UNROLL
+    for (int k = 0; k < 3; ++k) {
+      const V way = hn::Sub(hn::Set(d, y.center[1][k][l]), hn::Load(d, f.center[0][k] + i));
+      squared = hn::MulAdd(way, way, squared);
+    }
+    const V radius = hn::Load(d, f.radius + i);
+    const V most = hn::Add(radius, more), least = hn::Max(hn::Add(radius, less), hn::Zero(d));
+    // Not true of what is not a number.
+    const M apart = hn::Gt(squared, hn::Mul(most, most)), certain = hn::Lt(squared, hn::Mul(least, least));
     const auto depth =
         hn::Or(hn::And(hn::BitCast(du, squared), hn::Set(du, ~7u)), hn::Iota(du, static_cast<std::uint32_t>(i)));
     hn::StoreU(depth, du, order + i);
-    met.maybe |= (maskBits(hn::Not(apart)) & ((1u << hn::Lanes(d)) - 1)) << i;
-    met.doubtful |= (maskBits(hn::Not(hn::Or(apart, certain))) & ((1u << hn::Lanes(d)) - 1)) << i;
-  };
-  if (whole) {
-    const float side = static_cast<float>(length) * unit, sum = kHalfDiagonal * side + y.radius;
-    float first[3];  // from the centre of the first octant's sphere
-    BOCST_UNROLL
-    for (int k = 0; k < 3; ++k) {
-      first[k] = y.center[k] - (static_cast<float>(2 * corner[k] + static_cast<std::int32_t>(length))) * (0.5f * unit);
-    }
-    for (std::size_t i = 0; i < 8; i += hn::Lanes(d)) {
-      V squared = hn::Zero(d);
-      BOCST_UNROLL
-      for (int k = 0; k < 3; ++k) {
-        const V way = hn::NegMulAdd(hn::Load(d, kOctantCorner[k] + i), hn::Set(d, side), hn::Set(d, first[k]));
-        squared = hn::MulAdd(way, way, squared);
-      }
-      compare(i, squared, hn::Set(d, sum + more), hn::Set(d, sum + less));
-    }
-  } else {
-    const float factor = block.shape + 1u < s.deepest[own] ? kClippedFactor : 1.0f;
-    const V side = hn::Set(d, static_cast<float>(length));
-    for (std::size_t i = 0; i < 8; i += hn::Lanes(d)) {
-      V squared = hn::Zero(d), diagonal = hn::Zero(d), cut = hn::Zero(d);
-      BOCST_UNROLL
-      for (int k = 0; k < 3; ++k) {
-        const V end = hn::Set(d, static_cast<float>(static_cast<std::int32_t>(s.extent[own][k]) - lattice::kMiddle));
-        const V low = hn::MulAdd(hn::Load(d, kOctantCorner[k] + i), side, hn::Set(d, static_cast<float>(corner[k])));
-        const V high = hn::Min(hn::Add(low, side), end), size = hn::Sub(high, low);
-        cut = hn::Max(cut, hn::Sub(side, size));
-        diagonal = hn::MulAdd(size, size, diagonal);
-        const V way = hn::NegMulAdd(hn::Add(low, high), hn::Set(d, 0.5f * unit), hn::Set(d, y.center[k]));
-        squared = hn::MulAdd(way, way, squared);
-      }
-      const V per_size = hn::IfThenElse(hn::Gt(cut, hn::Zero(d)), hn::Set(d, factor * 0.5f * unit),
-                                        hn::Set(d, 0.5f * unit));
-      const V sum = hn::MulAdd(hn::Sqrt(diagonal), per_size, hn::Set(d, y.radius));
-      compare(i, squared, hn::Add(sum, hn::Set(d, more)), hn::Add(sum, hn::Set(d, less)));
-    }
+    const unsigned bits_apart = maskBits(apart), bits_certain = maskBits(certain);
+    met.maybe |= bits_apart << i;
+    met.doubtful |= (bits_apart | bits_certain) << i;
   }
-  met.maybe &= block.grey;
-  met.doubtful &= block.grey;
+  met.maybe = ~met.maybe & 0xff;
+  met.doubtful = ~met.doubtful & 0xff;
   return met;
 }
 
-// Which of a group's octants is the nearest.
-HWY_INLINE std::uint32_t nearest(const SphereGroup& group, std::uint32_t octants) {
+// Of the octants of a block in a frame, those that are to be walked with lane `lane` of the other side, and their order.
+// `leaves`: both are.
+HWY_INLINE unsigned octantsToWalk(SphereSteps& s, int x, std::uint32_t index, const tree::Block& block,
+                                  std::uint32_t frame, tree::NodeRef other, std::uint32_t lane, bool volumes,
+                                  bool leaves, std::uint32_t* order) {
+  unsigned mask = block.grey;
+  if (!volumes || !s.only_touching) {
+    const Met met = meeting(s.frames, s.scratch.spheres[frame], s.scratch.spheres[lane / 8], lane % 8, order);
+    const unsigned doubtful = met.doubtful & mask;
+    mask &= met.maybe;
+    if (doubtful != 0) mask = (mask & ~doubtful) | decideMeeting(s, x, index, doubtful, other);
+  }
+  if (mask == 0 || !volumes || leaves) return mask;
+  const hn::RebindToUnsigned<D> du;
+  mask = overlapping(s.geometry, s.scratch.volumes[frame], s.scratch.volumes[lane / 8], lane % 8, mask, order);
+  // The deepest overlap first.
+  for (std::size_t i = 0; i < 8; i += hn::Lanes(du)) {
+    hn::StoreU(hn::Xor(hn::LoadU(du, order + i), hn::Set(du, ~7u)), du, order + i);
+  }
+  return mask;
+}
+
+// The first in the order of a group.
+HWY_INLINE std::uint32_t first(const SphereGroup& group, std::uint32_t octants) {
   const hn::RebindToUnsigned<D> du;
   auto least = hn::Set(du, ~0u);
   for (std::size_t i = 0; i < 8; i += hn::Lanes(du)) {
     const std::uint8_t wanted[8] = {static_cast<std::uint8_t>(octants >> i)};
-    least = hn::Min(least, hn::IfThenElse(hn::LoadMaskBits(du, wanted), hn::LoadU(du, group.order + i), hn::Set(du, ~0u)));
+    const auto order = hn::LoadU(du, group.order + i);
+    least = hn::Min(least, hn::IfThenElse(hn::LoadMaskBits(du, wanted), order, hn::Set(du, ~0u)));
   }
-  return hn::GetLane(hn::MinOfLanes(du, least)) & 7;
+  return hn::GetLane(hn::MinOfLanes(du, least));
 }
 
-void DecodeRoots(SphereSteps& s) {
-  for (int side = 0; side < 2; ++side) {
-    decodeRoot(s.geometry, side, s.side[side]->tree().rootBounds(), s.volumes[side]);
-  }
-}
-
-// Where the volume of a node is, for pairs that come without frames.
-HWY_INLINE std::uint32_t lookUp(SphereSteps& s, int side, tree::NodeRef node, std::uint32_t& frames) {
-  const std::uint32_t frame = frames++;
+// Where a node is, for pairs that come without frames.
+HWY_NOINLINE std::uint32_t lookUp(SphereSteps& s, int side, tree::NodeRef node, std::uint32_t frame) {
   const tree::Tree& tree = s.side[side]->tree();
-  if (node.isRoot()) {
-    decodeRoot(s.geometry, side, tree.rootBounds(), s.volumes[frame]);
-    s.holds[frame] = ~std::uint64_t{0};
-    return 8 * frame;
+  const std::uint32_t root[3] = {0, 0, 0};
+  if (!node.isRoot()) {
+    const tree::Block& block = tree.block(node.block());
+    decodeBlockSpheres(s, side, node.block(), block, frame);
+    decodeBlockVolumes(s, side, node.block(), block, frame);
+    return 8 * frame + static_cast<std::uint32_t>(node.octant());
   }
-  const std::uint64_t name = std::uint64_t{node.block()} << 1 | static_cast<std::uint64_t>(side);
-  if (s.holds[frame] != name) decodeBlock(s.geometry, side, tree.block(node.block()), s.volumes[frame]);
-  s.holds[frame] = name;
-  return 8 * frame + static_cast<std::uint32_t>(node.octant());
+  s.holds_spheres[frame] = s.holds_volumes[frame] = kNothing;
+  // The root as the first octant of a cell that is twice as large, whose other octants nobody asks for.
+  decodeSpheres(s, side, 0, root, s.scratch.spheres[frame]);
+  decodeRoot(s.geometry, side, tree.rootBounds(), s.scratch.volumes[frame]);
+  return 8 * frame;
+}
+
+HWY_INLINE bool isLeaf(const SphereSteps& s, int side, std::uint32_t level) { return level >= s.deepest[side]; }
+
+// Of two nodes that are no leaves, is that of side x, at `level`, to be expanded before the other?
+HWY_INLINE bool isLarger(const SphereSteps& s, int x, std::uint32_t level, std::uint32_t other_level) {
+  const int deeper = static_cast<int>(other_level) - static_cast<int>(level);
+  return x == 0 ? deeper >= s.not_smaller : -deeper < s.not_smaller;
+}
+
+HWY_INLINE void push(SphereSteps& s, int side, const tree::Block& block, std::uint32_t index, std::uint32_t frame,
+                     std::uint32_t frames, const SphereGroup::Node& other, unsigned octants) {
+  SphereGroup& top = s.stack[s.depth++];
+  top.other = other;
+  top.at = &block;
+  top.side = static_cast<std::uint32_t>(side);
+  top.block = index;
+  top.level = block.shape + 1u;
+  top.frame = frame;
+  top.frames = frames;
+  top.octants = octants;
+}
+
+// Expands the other node of a pair for all octants in `mask` of block `index`, in frame `frame`, so that their tests
+// overlap in time. False where it is not the next to be expanded.
+HWY_INLINE bool expandOther(SphereSteps& s, int x, const tree::Block& own, std::uint32_t index, std::uint32_t frame,
+                            const SphereGroup::Node& other, unsigned mask, bool volumes) {
+  const int y = 1 - x;
+  const std::uint32_t level = own.shape + 1u;
+  if (isLeaf(s, y, other.level) || other.ref.tag() != tree::ChildRef::kBlock) return false;
+  if (!isLeaf(s, x, level) && !isLarger(s, y, other.level, level)) return false;
+  const std::uint32_t other_index = other.ref.index(), other_frame = frame + 1;
+  const tree::Tree& tree = s.side[y]->tree();
+  const tree::Block& block = tree.block(other_index);
+  tree.markUsed(other_index, s.side[0]->now());
+  decodeBlockSpheres(s, y, other_index, block, other_frame);
+  const bool leaves = isLeaf(s, x, level) && isLeaf(s, y, block.shape + 1u);
+  const bool with_volumes = volumes && !leaves && block.shape + 1u <= s.last_volumes[y];
+  if (with_volumes) decodeBlockVolumes(s, y, other_index, block, other_frame);
+  const std::size_t start = s.depth;
+  for (; mask != 0; mask &= mask - 1) {
+    const auto o = static_cast<std::uint32_t>(__builtin_ctz(mask));
+    SphereGroup::Node n;
+    n.node = tree::NodeRef::octant(index, static_cast<int>(o));
+    n.level = level;
+    n.lane = 8 * frame + o;
+    const unsigned left = octantsToWalk(s, y, other_index, block, other_frame, n.node, n.lane, with_volumes, leaves,
+                                        s.stack[s.depth].order);
+    if (left == 0) continue;
+    n.ref = own.child[o].load(std::memory_order_acquire);
+    push(s, y, block, other_index, other_frame, other_frame + 1, n, left);
+  }
+  // The best of them on top.
+  if (s.depth - start < 2 || !s.nearest_first) return true;
+  std::size_t best = start;
+  std::uint32_t least = ~0u;
+  for (std::size_t i = start; i < s.depth; ++i) {
+    const std::uint32_t order = first(s.stack[i], s.stack[i].octants);
+    if (order < least) least = order, best = i;
+  }
+  if (best != s.depth - 1) std::swap(s.stack[best], s.stack[s.depth - 1]);
+  return true;
 }
 
 SphereSteps::Event NextEvent(SphereSteps& s) {
   while (s.depth != 0) {
     SphereGroup& top = s.stack[s.depth - 1];
     const int side = static_cast<int>(top.side);
+    SphereGroup::Node other = top.other;
+    const bool own_leaf = isLeaf(s, side, top.level), other_leaf = isLeaf(s, 1 - side, other.level);
+    if (own_leaf && other_leaf) {
+      --s.depth;
+      s.pair[side] = tree::NodeRef::octant(top.block, 0);
+      s.pair[1 - side] = other.node;
+      s.expanded = side;
+      s.mask = top.octants;
+      return SphereSteps::kLeaves;
+    }
     const std::uint32_t o = s.nearest_first && (top.octants & (top.octants - 1)) != 0
-                                ? nearest(top, top.octants)
+                                ? first(top, top.octants) & 7
                                 : static_cast<std::uint32_t>(__builtin_ctz(top.octants));
     top.octants &= ~(1u << o);
     if (top.octants == 0) --s.depth;
-    SphereNode own;
+    SphereGroup::Node own;
     own.node = tree::NodeRef::octant(top.block, static_cast<int>(o));
     own.level = top.level;
-    const SphereNode other = top.other;
-    const bool own_leaf = own.level >= s.deepest[side], other_leaf = other.level >= s.deepest[1 - side];
     own.ref = top.at != nullptr ? top.at->child[o].load(std::memory_order_acquire)
                                 : s.side[side]->tree().childRef(own.node);
+    std::uint32_t frames = top.frames;
+    if (frames == 0) {
+      own.lane = lookUp(s, side, own.node, frames++);
+      other.lane = lookUp(s, 1 - side, other.node, frames++);
+    } else {
+      own.lane = 8 * top.frame + o;
+    }
     // The larger of two nodes is expanded, unless it is a leaf.
-    const int below = static_cast<int>(other.level) - static_cast<int>(own.level);
-    const bool own_larger = side == 0 ? below >= s.not_smaller : -below < s.not_smaller;
-    const bool expands_own = other_leaf || (!own_leaf && own_larger);
-    const SphereNode& expanded = expands_own ? own : other;
-    if (expanded.ref.tag() != tree::ChildRef::kBlock) {
+    const bool expands_own = other_leaf || (!own_leaf && isLarger(s, side, own.level, other.level));
+    const int x = expands_own ? side : 1 - side;
+    const SphereGroup::Node& gone = expands_own ? own : other;
+    const SphereGroup::Node& still = expands_own ? other : own;
+    if (gone.ref.tag() != tree::ChildRef::kBlock) {
       s.pair[side] = own.node;
       s.pair[1 - side] = other.node;
       return SphereSteps::kDeferred;
     }
-    const int x = expands_own ? side : 1 - side;
-    const std::uint32_t index = expanded.ref.index();
+    const std::uint32_t index = gone.ref.index(), frame = frames++;
     const tree::Tree& tree = s.side[x]->tree();
     const tree::Block& block = tree.block(index);
-    RoughSphere y;
-    std::uint32_t lane, frames = top.frames;
-    if (expands_own) {
-      lane = top.other_lane;
-      BOCST_UNROLL
-      for (int k = 0; k < 3; ++k) y.center[k] = top.center[k];
-      y.radius = top.radius;
-    } else {
-      y = seenByOther(s, side, sphereOfOctant(s, side, top.at, own.level, o));
-      lane = top.frame == SphereGroup::kNone ? SphereGroup::kNone : 8 * top.frame + (top.at == nullptr ? 0 : o);
-    }
-    const SphereNode still = expands_own ? other : own;
     tree.markUsed(index, s.side[0]->now());
-    SphereGroup& next = s.stack[s.depth];
     const std::uint32_t level = block.shape + 1u;
-    const bool leaves = level >= s.deepest[x] && (expands_own ? other_leaf : own_leaf);
-    unsigned mask = block.grey;
-    if (leaves || !s.touching_only) {
-      const Met met = meeting(s, x, block, y, next.order);
-      mask = met.maybe;
-      if (met.doubtful != 0) mask = (mask & ~met.doubtful) | decideMeeting(s, x, index, met.doubtful, still.node);
-      if (mask == 0) continue;
+    const bool leaves = isLeaf(s, x, level) && isLeaf(s, 1 - x, still.level);
+    const bool volumes =
+        !leaves && level <= s.last_volumes[x] && s.holds_volumes[still.lane / 8] == s.holds_spheres[still.lane / 8];
+    decodeBlockSpheres(s, x, index, block, frame);
+    if (volumes) decodeBlockVolumes(s, x, index, block, frame);
+    const unsigned mask =
+        octantsToWalk(s, x, index, block, frame, still.node, still.lane, volumes, leaves, s.stack[s.depth].order);
+    if (mask == 0) continue;
+    if (leaves || !expandOther(s, x, block, index, frame, still, mask, volumes)) {
+      push(s, x, block, index, frame, frames, still, mask);
     }
-    std::uint32_t frame = SphereGroup::kNone;
-    if (s.touching_only ? !leaves : level <= s.last_volumes[x] && lane != SphereGroup::kNone) {
-      if (lane == SphereGroup::kNone) lane = lookUp(s, 1 - x, still.node, frames);
-      frame = frames++;
-      const std::uint64_t name = std::uint64_t{index} << 1 | static_cast<std::uint64_t>(x);
-      if (s.holds[frame] != name) decodeBlock(s.geometry, x, block, s.volumes[frame]);
-      s.holds[frame] = name;
-      mask = overlapping(s.geometry, s.volumes[frame], s.volumes[lane / 8], lane % 8, mask, next.order);
-      if (mask == 0) continue;
-      const hn::RebindToUnsigned<D> du;
-      for (std::size_t i = 0; i < 8; i += hn::Lanes(du)) {
-        hn::StoreU(hn::Xor(hn::LoadU(du, next.order + i), hn::Set(du, ~7u)), du, next.order + i);
-      }
-    }
-    if (leaves) {
-      s.pair[x] = tree::NodeRef::octant(index, 0);
-      s.pair[1 - x] = still.node;
-      s.expanded = x;
-      s.mask = mask;
-      return SphereSteps::kLeaves;
-    }
-    ++s.depth;
-    next.other = still;
-    BOCST_UNROLL
-    for (int k = 0; k < 3; ++k) next.center[k] = y.center[k];
-    next.radius = y.radius;
-    next.at = &block;
-    next.side = static_cast<std::uint32_t>(x);
-    next.block = index;
-    next.level = level;
-    next.octants = mask;
-    next.other_lane = lane;
-    next.frame = frame;
-    next.frames = frames;
   }
   return SphereSteps::kDone;
 }
 
-unsigned OctantsMeeting(const SphereSteps& s, int own, const tree::Block& block, const RoughSphere& y,
+unsigned OctantsMeeting(SphereSteps& s, int own, std::uint32_t block, std::uint32_t other, int octant,
                         unsigned& doubtful) {
+  lookUp(s, own, tree::NodeRef::octant(block, 0), 0);
+  const std::uint32_t lane = lookUp(s, 1 - own, tree::NodeRef::octant(other, octant), 1);
   std::uint32_t order[8];
-  const Met met = meeting(s, own, block, y, order);
+  const Met met = meeting(s.frames, s.scratch.spheres[0], s.scratch.spheres[1], lane % 8, order);
   doubtful = met.doubtful;
   return met.maybe;
 }
@@ -292,7 +334,6 @@ HWY_AFTER_NAMESPACE();
 #if HWY_ONCE
 namespace bocst::query {
 
-HWY_EXPORT(DecodeRoots);
 HWY_EXPORT(NextEvent);
 HWY_EXPORT(OctantsMeeting);
 
@@ -315,36 +356,44 @@ SphereFrames::SphereFrames(const SimilarityTransform& one_in_zero) {
   tolerance = static_cast<float>(one_in_zero.tolerance);
 }
 
-SphereSteps::SphereSteps(const TreeSide& a, const TreeSide& b, const SimilarityTransform& b_in_a_, Frame* volumes_)
-    : side{&a, &b},
-      b_in_a(b_in_a_),
-      frames(b_in_a_),
-      geometry(b_in_a_.scale, withReach(a, b, b_in_a_)),
-      volumes(volumes_) {
-  const PairFrames tight(b_in_a.scale, b_in_a);
-  margins[0][0] = geometry.rounding_margin;
-  margins[0][1] = geometry.slab_rounding_margin;
-  margins[1][0] = tight.rounding_margin;
-  margins[1][1] = tight.slab_rounding_margin;
-  std::fill_n(holds, kVolumes, ~std::uint64_t{0});
-  static int skip = getenv("SKIP") ? atoi(getenv("SKIP")) : 1;
-  for (int s = 0; s < 2; ++s) {
-    const tree::Tree& tree = side[s]->tree();
-    std::copy_n(tree.surface().lattice.extent().data(), 3, extent[s]);
-    deepest[s] = static_cast<std::uint32_t>(tree.deepest());
-    last_volumes[s] = PairFrames::fits(b_in_a.scale) && int(deepest[s]) > skip ? deepest[s] - skip : 0;
-  }
-  // 2^deeper against the ratio of units, exactly.
-  const bool even = std::frexp(b_in_a.scale, &not_smaller) == 0.5;
-  if (even) --not_smaller;
-}
-
-SimilarityTransform withReach(const TreeSide& a, const TreeSide& b, SimilarityTransform b_in_a) {
+static SimilarityTransform withReach(const TreeSide& a, const TreeSide& b, SimilarityTransform b_in_a) {
   const auto diameter = [](const TreeSide& side) {
     return std::sqrt(3.0) * (1 << (lattice::kMaxLevel - side.tree().deepest()));
   };
   b_in_a.tolerance += (diameter(a) + diameter(b) * b_in_a.scale) * (1 + 1e-9);
   return b_in_a;
+}
+
+SphereSteps::SphereSteps(const TreeSide& a, const TreeSide& b, const SimilarityTransform& b_in_a_, Scratch& scratch_)
+    : side{&a, &b},
+      b_in_a(b_in_a_),
+      frames(b_in_a_),
+      geometry(b_in_a_.scale, withReach(a, b, b_in_a_)),
+      scratch(scratch_) {
+  const PairFrames tight(b_in_a.scale, b_in_a);
+  margins[0][0] = geometry.rounding_margin;
+  margins[0][1] = geometry.slab_rounding_margin;
+  margins[1][0] = tight.rounding_margin;
+  margins[1][1] = tight.slab_rounding_margin;
+  for (int s = 0; s < 2; ++s) {
+    const tree::Tree& tree = side[s]->tree();
+    std::copy_n(tree.surface().lattice.extent().data(), 3, extent[s]);
+    deepest[s] = static_cast<std::uint32_t>(tree.deepest());
+  }
+  // 2^deeper against the ratio of units, exactly.
+  const bool even = std::frexp(b_in_a.scale, &not_smaller) == 0.5;
+  if (even) --not_smaller;
+  for (std::size_t i = 0; i < kFrames; ++i) holds_spheres[i] = holds_volumes[i] = kNothing;
+  lookForTouching(false);
+}
+
+void SphereSteps::lookForTouching(bool only) {
+  only_touching = only;
+  static int skip[2] = {getenv("SKIP") ? atoi(getenv("SKIP")) : 1, getenv("SKIP1") ? atoi(getenv("SKIP1")) : 0};
+  for (int s = 0; s < 2; ++s)
+    last_volumes[s] = PairFrames::fits(b_in_a.scale) && int(deepest[s]) > skip[only] ? deepest[s] - skip[only] : 0;
+  geometry.rounding_margin = margins[only][0];
+  geometry.slab_rounding_margin = margins[only][1];
 }
 
 unsigned decideMeeting(const SphereSteps& s, int own, std::uint32_t index, unsigned mask, tree::NodeRef other) {
@@ -366,33 +415,17 @@ void pushPair(SphereSteps& s, tree::NodeRef node_a, tree::NodeRef node_b) {
   top.other.node = node_b;
   top.other.ref = b.childRef(node_b);
   top.other.level = static_cast<std::uint32_t>(b.level(node_b));
-  const tree::Block* block = node_b.isRoot() ? nullptr : &b.block(node_b.block());
-  const auto octant = static_cast<std::uint32_t>(node_b.octant());
-  const RoughSphere seen = seenByOther(s, 1, sphereOfOctant(s, 1, block, top.other.level, octant));
-  std::copy_n(seen.center, 3, top.center);
-  top.radius = seen.radius;
   top.side = 0;
   top.at = node_a.isRoot() ? nullptr : &a.block(node_a.block());
   top.block = node_a.block();
   top.level = static_cast<std::uint32_t>(a.level(node_a));
   top.octants = 1u << node_a.octant();
-  top.other_lane = top.frame = SphereGroup::kNone;
   top.frames = 0;
-  if (node_a.isRoot() && node_b.isRoot() && s.last_volumes[0] > 0 && s.last_volumes[1] > 0) {
-    HWY_DYNAMIC_DISPATCH(DecodeRoots)(s);
-    for (int side = 0; side < 2; ++side) s.holds[side] = ~std::uint64_t{0};
-    top.other_lane = 8;
-    top.frame = 0;
-    top.frames = 2;
-  }
 }
 
-unsigned octantsMeeting(const SphereSteps& s, int own, std::uint32_t index, tree::NodeRef other, unsigned& doubtful) {
-  const tree::Tree &tree = s.side[own]->tree(), &partner = s.side[1 - own]->tree();
-  const tree::Block* of_other = other.isRoot() ? nullptr : &partner.block(other.block());
-  const auto level = static_cast<std::uint32_t>(partner.level(other)), octant = static_cast<std::uint32_t>(other.octant());
-  const RoughSphere y = seenByOther(s, 1 - own, sphereOfOctant(s, 1 - own, of_other, level, octant));
-  return HWY_DYNAMIC_DISPATCH(OctantsMeeting)(s, own, tree.block(index), y, doubtful);
+unsigned octantsMeeting(SphereSteps& steps, int own, std::uint32_t block, std::uint32_t other, int octant,
+                        unsigned& doubtful) {
+  return HWY_DYNAMIC_DISPATCH(OctantsMeeting)(steps, own, block, other, octant, doubtful);
 }
 
 }  // namespace bocst::query

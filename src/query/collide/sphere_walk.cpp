@@ -9,14 +9,14 @@ namespace bocst::query {
 
 struct SphereWalk::Scratch {
   std::vector<SphereGroup> stack;
-  Frame volumes[SphereSteps::kVolumes];
+  SphereSteps::Scratch steps;
   DeferredPairs<TreeSide, TreeSide> deferred;
 };
 
 bool SphereWalk::run(Visitor& visitor) {
   thread_local Scratch s;
   s.deferred.clear();
-  SphereSteps steps(a_, b_, b_in_a_, s.volumes);
+  SphereSteps steps(a_, b_, b_in_a_, s.steps);
   steps.nearest_first = visitor.endsAtFirst();
   const auto push = [&](const DeferredPairs<TreeSide, TreeSide>::Pair& pair) {
     if (s.stack.size() < steps.depth + 1 + SphereSteps::kStackRoom) {
@@ -27,7 +27,7 @@ bool SphereWalk::run(Visitor& visitor) {
   };
   const auto walk = [&](bool touching_only) {
     s.deferred.clear();
-    steps.setTouchingOnly(touching_only);
+    steps.lookForTouching(touching_only);
     push({a_.root(), b_.root()});
     for (;;) {
       if (stepAll(steps, s, visitor)) return true;
