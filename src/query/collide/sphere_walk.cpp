@@ -10,14 +10,24 @@ namespace bocst::query {
 struct SphereWalk::Scratch {
   std::vector<SphereGroup> stack;
   SphereSteps::Scratch steps;
+  std::size_t rent = 0;
   DeferredPairs<TreeSide, TreeSide> deferred;
 };
 
 bool SphereWalk::run(Visitor& visitor) {
   thread_local Scratch s;
-  s.deferred.clear();
   SphereSteps steps(a_, b_, b_in_a_, s.steps);
   steps.nearest_first = visitor.endsAtFirst();
+  if (visitor.endsAtFirst()) {
+    // Where surfaces touch, a hit is found sooner if only that is looked for; if there is none, spheres may still meet.
+    steps.lookForTouching(true);
+    if (search(steps, s, visitor)) return true;
+    steps.lookForTouching(false);
+  }
+  return search(steps, s, visitor);
+}
+
+bool SphereWalk::search(SphereSteps& steps, Scratch& s, Visitor& visitor) const {
   const auto push = [&](const DeferredPairs<TreeSide, TreeSide>::Pair& pair) {
     if (s.stack.size() < steps.depth + 1 + SphereSteps::kStackRoom) {
       s.stack.resize(2 * (steps.depth + SphereSteps::kStackRoom));
@@ -25,31 +35,30 @@ bool SphereWalk::run(Visitor& visitor) {
     steps.stack = s.stack.data();
     pushPair(steps, pair.a, pair.b);
   };
-  const auto walk = [&](bool touching_only) {
-    s.deferred.clear();
-    steps.lookForTouching(touching_only);
-    push({a_.root(), b_.root()});
-    for (;;) {
-      if (stepAll(steps, s, visitor)) return true;
-      if (s.deferred.empty()) return false;
-      s.deferred.grow(a_, b_, b_in_a_, visitor.endsAtFirst(), push);
-    }
-  };
-  if (visitor.endsAtFirst() && !getenv("ONE") && walk(true)) return true;
-  return walk(false);
-}
-
-bool SphereWalk::stepAll(SphereSteps& steps, Scratch& s, Visitor& visitor) const {
+  const auto grow = [&] { s.deferred.grow(a_, b_, b_in_a_, visitor.endsAtFirst(), push); };
+  s.deferred.clear();
+  push({a_.root(), b_.root()});
+  std::size_t paid_for = steps.count;  // steps before that are no detour, or are paid for
   for (;;) {
     switch (nextEvent(steps)) {
       case SphereSteps::kDone:
-        return false;
+        if (s.deferred.empty()) return false;
+        grow();
+        paid_for = steps.count;
+        break;
       case SphereSteps::kDeferred:
+        if (s.deferred.empty()) paid_for = steps.count;
         s.deferred.add({steps.pair[0], steps.pair[1]});
+        if (!visitor.endsAtFirst() || s.rent + (steps.count - paid_for) < kPrice) break;
+        s.rent = 0;
+        steps.forgetFrames();
+        grow();
+        paid_for = steps.count;
         break;
       case SphereSteps::kLeaves:
-        if (visitLeaves(steps, visitor)) return true;
-        break;
+        if (!visitLeaves(steps, visitor)) break;
+        if (!s.deferred.empty()) s.rent += steps.count - paid_for;
+        return true;
     }
   }
 }

@@ -25,7 +25,10 @@ class SphereWalk {
  private:
   struct Scratch;
 
-  bool stepAll(SphereSteps& steps, Scratch& s, Visitor& visitor) const;
+  // Steps that pairs took because what is nearer to a hit was not expanded: for so many, some of that is.
+  static inline const std::size_t kPrice = getenv("PRICE") ? atoi(getenv("PRICE")) : 400;
+
+  bool search(SphereSteps& steps, Scratch& s, Visitor& visitor) const;
   bool visitLeaves(const SphereSteps& steps, Visitor& visitor) const;
 
   const TreeSide &a_, &b_;
