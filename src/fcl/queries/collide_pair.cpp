@@ -25,6 +25,7 @@
 #include "fcl/queries/query_scope.h"
 #include "geometry/triangle.h"
 #include "query/collide/pair_walk.h"
+#include "query/collide/sphere_walk.h"
 #include "query/collide/tree_walk.h"
 #include "query/leaf/pair_set.h"
 
@@ -423,7 +424,12 @@ void collideModels(const CollideQuery<S>& q, tree::Tree& tree_a, tree::Tree& tre
     if (!trees.isNeedless()) walk([&](auto& collector) { trees.run(collector); });
   } else {
     const SimilarityTransform near = withMargin(b_in_a, a, q, a.isConservative() || b.isConservative());
-    walk([&](auto& collector) { query::PairWalk<TreeSide, TreeSide>(a, b, near, collector).run(); });
+    if (query::SphereWalk::fits(a, b)) {
+      query::SphereWalk spheres(a, b, near);
+      if (!spheres.isNeedless()) walk([&](auto& collector) { spheres.run(collector); });
+    } else {
+      walk([&](auto& collector) { query::PairWalk<TreeSide, TreeSide>(a, b, near, collector).run(); });
+    }
   }
   if (q.mayBeInside(before) && (contains<S>(tree_a, q.X_WA(), tree_b, q.X_WB(), magnitude) ||
                                 contains<S>(tree_b, q.X_WB(), tree_a, q.X_WA(), magnitude))) {

@@ -8,7 +8,6 @@
 
 #include <algorithm>
 #include <cmath>
-#include <cstdlib>
 
 #include "query/cull/frames-inl.h"
 
@@ -145,8 +144,8 @@ HWY_INLINE Met meeting(const SphereFrames& g, const SphereFrame& f, const Sphere
   return met;
 }
 
-// Of the octants of a block in a frame, those that are to be walked with lane `lane` of the other side, and their order.
-// `leaves`: both are.
+// Of the octants of a block in a frame, those that are to be walked with lane `lane` of the other side, and their
+// order. `leaves`: both are.
 HWY_INLINE unsigned octantsToWalk(SphereSteps& s, int x, std::uint32_t index, const tree::Block& block,
                                   std::uint32_t frame, tree::NodeRef other, std::uint32_t lane, bool volumes,
                                   bool leaves, std::uint32_t* order) {
@@ -280,8 +279,8 @@ SphereSteps::Event NextEvent(SphereSteps& s) {
     SphereGroup::Node own;
     own.node = tree::NodeRef::octant(top.block, static_cast<int>(o));
     own.level = top.level;
-    own.ref = top.at != nullptr ? top.at->child[o].load(std::memory_order_acquire)
-                                : s.side[side]->tree().childRef(own.node);
+    own.ref =
+        top.at != nullptr ? top.at->child[o].load(std::memory_order_acquire) : s.side[side]->tree().childRef(own.node);
     std::uint32_t frames = top.frames;
     if (frames == 0) {
       own.lane = lookUp(s, side, own.node, frames++);
@@ -358,44 +357,42 @@ SphereFrames::SphereFrames(const SimilarityTransform& one_in_zero) {
   tolerance = static_cast<float>(one_in_zero.tolerance);
 }
 
-static SimilarityTransform withReach(const TreeSide& a, const TreeSide& b, SimilarityTransform b_in_a) {
+double reachOfLeaves(const TreeSide& a, const TreeSide& b, double scale) {
   const auto diameter = [](const TreeSide& side) {
     return std::sqrt(3.0) * (1 << (lattice::kMaxLevel - side.tree().deepest()));
   };
-  b_in_a.tolerance += (diameter(a) + diameter(b) * b_in_a.scale) * (1 + 1e-9);
-  return b_in_a;
+  return (diameter(a) + diameter(b) * scale) * (1 + 1e-9);
 }
 
 SphereSteps::SphereSteps(const TreeSide& a, const TreeSide& b, const SimilarityTransform& b_in_a_, Scratch& scratch_)
     : side{&a, &b},
       b_in_a(b_in_a_),
       frames(b_in_a_),
-      geometry(b_in_a_.scale, withReach(a, b, b_in_a_)),
+      geometry(PairFrames::fits(b_in_a_.scale) ? PairFrames(b_in_a_.scale, b_in_a_)
+                                               : PairFrames(1, SimilarityTransform())),
+      only_touching(PairFrames::fits(b_in_a_.scale)),
       scratch(scratch_) {
-  const PairFrames tight(b_in_a.scale, b_in_a);
-  margins[0][0] = geometry.rounding_margin;
-  margins[0][1] = geometry.slab_rounding_margin;
-  margins[1][0] = tight.rounding_margin;
-  margins[1][1] = tight.slab_rounding_margin;
   for (int s = 0; s < 2; ++s) {
     const tree::Tree& tree = side[s]->tree();
     std::copy_n(tree.surface().lattice.extent().data(), 3, extent[s]);
     deepest[s] = static_cast<std::uint32_t>(tree.deepest());
+    last_volumes[s] = only_touching ? deepest[s] : 0;
   }
   // 2^deeper against the ratio of units, exactly.
   const bool even = std::frexp(b_in_a.scale, &not_smaller) == 0.5;
   if (even) --not_smaller;
-  for (std::size_t i = 0; i < kFrames; ++i) holds_spheres[i] = holds_volumes[i] = kNothing;
-  lookForTouching(false);
+  std::fill_n(holds_spheres, kFrames, kNothing);
+  std::fill_n(holds_volumes, kFrames, kNothing);
 }
 
-void SphereSteps::lookForTouching(bool only) {
-  only_touching = only;
-  static int skip[2] = {getenv("SKIP") ? atoi(getenv("SKIP")) : 1, getenv("SKIP1") ? atoi(getenv("SKIP1")) : 0};
-  for (int s = 0; s < 2; ++s)
-    last_volumes[s] = PairFrames::fits(b_in_a.scale) && int(deepest[s]) > skip[only] ? deepest[s] - skip[only] : 0;
-  geometry.rounding_margin = margins[only][0];
-  geometry.slab_rounding_margin = margins[only][1];
+void SphereSteps::lookForAll() {
+  if (!only_touching) return;
+  only_touching = false;
+  const double reach = reachOfLeaves(*side[0], *side[1], b_in_a.scale) * 1.0001;
+  geometry.rounding_margin += static_cast<float>(reach);
+  geometry.slab_rounding_margin += static_cast<float>(1.02 * reach);
+  // Beside leaves the reach is more than boxes leave out.
+  for (std::uint32_t& level : last_volumes) level = level > 0 ? level - 1 : 0;
 }
 
 unsigned decideMeeting(const SphereSteps& s, int own, std::uint32_t index, unsigned mask, tree::NodeRef other) {

@@ -23,10 +23,10 @@ struct alignas(64) SphereFrame {
 /// With u = 2^-24, Q0 and Q1 half the roots' sides and t the way between their middles, no coordinate, distance or
 /// radius is larger than M = |t| + sqrt(6) (Q0 + Q1). Cells are integers: in its own frame a centre is off by 2 u M, in
 /// the other's, along an axis, by 11 u M: the former turned, rotation 1, products and sums 7, t 1. So a difference is
-/// off by 14 u M, of three axes 25 u M; the squared distance by 5 u of it, which is 3 u M of the distance; the square of
-/// the limit by u M; the sum of the radii, by 4 u each and u by itself, by 5 u M, and the limit by 2 u M more. All is 36
-/// u M; `rounding_margin` takes 48. To that comes 6 M of the orthogonality error: R^T stands for the inverse of R, and R
-/// does not keep lengths.
+/// off by 14 u M, of three axes 25 u M; the squared distance by 5 u of it, which is 3 u M of the distance; the square
+/// of the limit by u M; the sum of the radii, by 4 u each and u by itself, by 5 u M, and the limit by 2 u M more. All
+/// is 36 u M; `rounding_margin` takes 48. To that comes 6 M of the orthogonality error: R^T stands for the inverse of
+/// R, and R does not keep lengths.
 struct SphereFrames {
   explicit SphereFrames(const SimilarityTransform& one_in_zero);
 
@@ -84,19 +84,19 @@ struct SphereSteps {
 
   SphereSteps(const TreeSide& a, const TreeSide& b, const SimilarityTransform& b_in_a, Scratch& scratch);
 
-  /// A first look for a hit: nodes whose boxes or slabs are apart are left out, though spheres below them may meet.
-  void lookForTouching(bool only_touching);
+  /// So far, nodes were left out whose boxes or slabs are apart, though spheres below them may meet. No more.
+  void lookForAll();
 
   const TreeSide* side[2];
   const SimilarityTransform& b_in_a;
   const SphereFrames frames;
-  PairFrames geometry;             ///< Of boxes and slabs.
-  std::uint32_t extent[2][3];      ///< Where the actual regions end.
-  std::uint32_t deepest[2];        ///< The level of each side's leaves.
-  std::uint32_t last_volumes[2];   ///< Below this level, boxes and slabs tell no more than spheres.
-  int not_smaller;                 ///< A node of side 0 is not smaller than one of side 1 so many levels deeper.
-  bool only_touching = false;      ///< See lookForTouching().
-  bool nearest_first = true;       ///< A hit ends the walk.
+  PairFrames geometry;            ///< Of boxes and slabs.
+  std::uint32_t extent[2][3];     ///< Where the actual regions end.
+  std::uint32_t deepest[2];       ///< The level of each side's leaves.
+  std::uint32_t last_volumes[2];  ///< Below this level, boxes and slabs tell no more than spheres.
+  int not_smaller;                ///< A node of side 0 is not smaller than one of side 1 so many levels deeper.
+  bool only_touching;             ///< See lookForAll(). False where boxes are of no use, see PairFrames::fits().
+  bool nearest_first = true;      ///< A hit ends the walk.
 
   Scratch& scratch;
   std::uint64_t holds_spheres[kFrames], holds_volumes[kFrames];  ///< Which block of which side is in a frame.
@@ -113,8 +113,12 @@ struct SphereSteps {
   tree::NodeRef pair[2];  ///< Of the event.
   int expanded = 0;
   unsigned mask = 0;
-  float margins[2][2];
 };
+
+/// How far the sphere of a leaf may be from the surface that is in the leaf, of both sides together: each leaf's cell
+/// meets the surface, so its sphere is within a diameter of that. What bounds two surfaces and parts them by more parts
+/// the spheres of their leaves, too.
+double reachOfLeaves(const TreeSide& a, const TreeSide& b, double scale);
 
 /// Goes on to the next event. Chosen at run time for the machine's instruction set.
 SphereSteps::Event nextEvent(SphereSteps& steps);
@@ -122,8 +126,8 @@ SphereSteps::Event nextEvent(SphereSteps& steps);
 /// Puts a pair of nodes on the stack.
 void pushPair(SphereSteps& steps, tree::NodeRef node_a, tree::NodeRef node_b);
 
-/// What a step computes, by itself: which octants of a block of side `own` meet octant `octant` of another's of the other
-/// side, in float; of those in `doubtful` it does not know. For tests.
+/// What a step computes, by itself: which octants of a block of side `own` meet octant `octant` of another's of the
+/// other side, in float; of those in `doubtful` it does not know. For tests.
 unsigned octantsMeeting(SphereSteps& steps, int own, std::uint32_t block, std::uint32_t other, int octant,
                         unsigned& doubtful);
 

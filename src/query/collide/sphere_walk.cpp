@@ -10,20 +10,25 @@ namespace bocst::query {
 struct SphereWalk::Scratch {
   std::vector<SphereGroup> stack;
   SphereSteps::Scratch steps;
-  std::size_t rent = 0;
+  /// Steps that walks made after they had set aside a pair that needs a node: the nearest hit may be below that pair, so
+  /// they may be a detour. Once they have cost as much as growth does, some nodes grow before the walk goes on.
+  std::size_t detour = 0;
   DeferredPairs<TreeSide, TreeSide> deferred;
 };
+
+bool SphereWalk::areBoxesApart() const {
+  SimilarityTransform wide = b_in_a_;
+  wide.tolerance += reachOfLeaves(a_, b_, b_in_a_.scale);
+  return facesApart(a_.volume(a_.root()), b_.volume(b_.root()), wide);
+}
 
 bool SphereWalk::run(Visitor& visitor) {
   thread_local Scratch s;
   SphereSteps steps(a_, b_, b_in_a_, s.steps);
   steps.nearest_first = visitor.endsAtFirst();
-  if (visitor.endsAtFirst()) {
-    // Where surfaces touch, a hit is found sooner if only that is looked for; if there is none, spheres may still meet.
-    steps.lookForTouching(true);
-    if (search(steps, s, visitor)) return true;
-    steps.lookForTouching(false);
-  }
+  // Where surfaces touch, a hit is found sooner if only that is looked for; if there is none, spheres may still meet.
+  if (visitor.endsAtFirst() && steps.only_touching && search(steps, s, visitor)) return true;
+  steps.lookForAll();
   return search(steps, s, visitor);
 }
 
@@ -49,15 +54,15 @@ bool SphereWalk::search(SphereSteps& steps, Scratch& s, Visitor& visitor) const 
       case SphereSteps::kDeferred:
         if (s.deferred.empty()) paid_for = steps.count;
         s.deferred.add({steps.pair[0], steps.pair[1]});
-        if (!visitor.endsAtFirst() || s.rent + (steps.count - paid_for) < kPrice) break;
-        s.rent = 0;
+        if (!visitor.endsAtFirst() || s.detour + (steps.count - paid_for) < kPrice) break;
+        s.detour = 0;
         steps.forgetFrames();
         grow();
         paid_for = steps.count;
         break;
       case SphereSteps::kLeaves:
         if (!visitLeaves(steps, visitor)) break;
-        if (!s.deferred.empty()) s.rent += steps.count - paid_for;
+        if (!s.deferred.empty()) s.detour += steps.count - paid_for;
         return true;
     }
   }

@@ -2,12 +2,12 @@
 #pragma once
 
 #include "query/collide/sphere_steps.h"
-#include "query/sides/visitor.h"
 
 namespace bocst::query {
 
-/// The walk of PairWalk for two trees with conservative answers: the same pairs by the same comparisons of spheres,
-/// eight octants at a time.
+/// The walk for two trees with conservative answers: finds the pairs of leaves whose spheres meet, see spheresMeet().
+/// They follow from the lattices and the pose, so boxes, slabs and the order of the walk may save time and decide
+/// nothing.
 class SphereWalk {
  public:
   static bool fits(const TreeSide& a, const TreeSide& b) { return a.isConservative() && b.isConservative(); }
@@ -16,17 +16,20 @@ class SphereWalk {
 
   /// Are the two so surely apart that nobody need walk? To be asked first, before anything is made ready for run().
   bool isNeedless() const {
-    return !spheresMeet(a_.sphere(a_.root()), placed(b_.sphere(b_.root()), b_in_a_), b_in_a_.tolerance);
+    return !spheresMeet(a_.sphere(a_.root()), placed(b_.sphere(b_.root()), b_in_a_), b_in_a_.tolerance) ||
+           areBoxesApart();
   }
+
+  /// The same by the boxes about the surfaces, whose rounding margin hides in which frame they were compared.
+  bool areBoxesApart() const;
 
   /// True when the visitor ended it.
   bool run(Visitor& visitor);
 
  private:
+  // So many steps cost about as much as to expand two nodes.
+  static constexpr std::size_t kPrice = 64;
   struct Scratch;
-
-  // Steps that pairs took because what is nearer to a hit was not expanded: for so many, some of that is.
-  static inline const std::size_t kPrice = getenv("PRICE") ? atoi(getenv("PRICE")) : 400;
 
   bool search(SphereSteps& steps, Scratch& s, Visitor& visitor) const;
   bool visitLeaves(const SphereSteps& steps, Visitor& visitor) const;
