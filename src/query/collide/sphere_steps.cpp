@@ -319,16 +319,6 @@ SphereSteps::Event NextEvent(SphereSteps& s) {
   return SphereSteps::kDone;
 }
 
-unsigned OctantsMeeting(SphereSteps& s, int own, std::uint32_t block, std::uint32_t other, int octant,
-                        unsigned& doubtful) {
-  lookUp(s, own, tree::NodeRef::octant(block, 0), 0);
-  const std::uint32_t lane = lookUp(s, 1 - own, tree::NodeRef::octant(other, octant), 1);
-  std::uint32_t order[8];
-  const Met met = meeting(s.frames, s.scratch.spheres[0], s.scratch.spheres[1], lane % 8, order);
-  doubtful = met.doubtful;
-  return met.maybe;
-}
-
 }  // namespace bocst::query::HWY_NAMESPACE
 HWY_AFTER_NAMESPACE();
 
@@ -336,7 +326,6 @@ HWY_AFTER_NAMESPACE();
 namespace bocst::query {
 
 HWY_EXPORT(NextEvent);
-HWY_EXPORT(OctantsMeeting);
 
 SphereFrames::SphereFrames(const SimilarityTransform& one_in_zero) {
   const double q0 = lattice::kMiddle, q1 = q0 * one_in_zero.scale;
@@ -420,11 +409,6 @@ void pushPair(SphereSteps& s, tree::NodeRef node_a, tree::NodeRef node_b) {
   top.level = static_cast<std::uint32_t>(a.level(node_a));
   top.octants = 1u << node_a.octant();
   top.frames = 0;
-}
-
-unsigned octantsMeeting(SphereSteps& steps, int own, std::uint32_t block, std::uint32_t other, int octant,
-                        unsigned& doubtful) {
-  return HWY_DYNAMIC_DISPATCH(OctantsMeeting)(steps, own, block, other, octant, doubtful);
 }
 
 }  // namespace bocst::query

@@ -126,9 +126,4 @@ SphereSteps::Event nextEvent(SphereSteps& steps);
 /// Puts a pair of nodes on the stack.
 void pushPair(SphereSteps& steps, tree::NodeRef node_a, tree::NodeRef node_b);
 
-/// What a step computes, by itself: which octants of a block of side `own` meet octant `octant` of another's of the
-/// other side, in float; of those in `doubtful` it does not know. For tests.
-unsigned octantsMeeting(SphereSteps& steps, int own, std::uint32_t block, std::uint32_t other, int octant,
-                        unsigned& doubtful);
-
 }  // namespace bocst::query

@@ -10,8 +10,8 @@ namespace bocst::query {
 struct SphereWalk::Scratch {
   std::vector<SphereGroup> stack;
   SphereSteps::Scratch steps;
-  /// Steps that walks made after they had set aside a pair that needs a node: the nearest hit may be below that pair, so
-  /// they may be a detour. Once they have cost as much as growth does, some nodes grow before the walk goes on.
+  /// Steps that walks made after they had set aside a pair that needs a node: the nearest hit may be below that pair,
+  /// so they may be a detour. Once they have cost as much as growth does, some nodes grow before the walk goes on.
   std::size_t detour = 0;
   DeferredPairs<TreeSide, TreeSide> deferred;
 };

@@ -23,7 +23,7 @@ class SphereWalk {
   /// The same by the boxes about the surfaces, whose rounding margin hides in which frame they were compared.
   bool areBoxesApart() const;
 
-  /// True when the visitor ended it.
+  /// Unless it is needless. True when the visitor ended it.
   bool run(Visitor& visitor);
 
  private:
