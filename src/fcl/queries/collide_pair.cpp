@@ -27,6 +27,7 @@
 #include "fcl/queries/query_scope.h"
 #include "geometry/triangle.h"
 #include "query/collide/pair_walk.h"
+#include "query/collide/sphere_walk.h"
 #include "query/collide/tree_walk.h"
 #include "query/cull/far_apart.h"
 #include "query/leaf/pair_set.h"
@@ -436,7 +437,12 @@ void collideTrees(const CollideQuery<S>& q, const TreeSide& a, const TreeSide& b
     query::TreeWalk trees(a, b, near);
     if (!trees.isNeedless()) walk([&](auto& collector) { trees.run(collector); });
   } else {
-    walk([&](auto& collector) { query::PairWalk<TreeSide, TreeSide>(a, b, near, collector).run(); });
+    if (query::SphereWalk::fits(a, b)) {
+      query::SphereWalk spheres(a, b, near);
+      if (!spheres.isNeedless()) walk([&](auto& collector) { spheres.run(collector); });
+    } else {
+      walk([&](auto& collector) { query::PairWalk<TreeSide, TreeSide>(a, b, near, collector).run(); });
+    }
   }
   if (q.mayBeInside(before) && (contains<S>(tree_a, q.X_WA(), tree_b, q.X_WB(), magnitude) ||
                                 contains<S>(tree_b, q.X_WB(), tree_a, q.X_WA(), magnitude))) {

@@ -79,10 +79,7 @@ class PairWalk {
 
   Sphere inA(const Sphere& s) const { return placed(s, b_in_a_); }
 
-  bool spheresMeet(const Sphere& a, const Sphere& b) const {
-    const double extent = (a.radius + b.radius) * (1 + 1e-12) + b_in_a_.tolerance;
-    return (a.center - b.center).squaredNorm() <= extent * extent;
-  }
+  bool spheresMeet(const Sphere& a, const Sphere& b) const { return query::spheresMeet(a, b, b_in_a_.tolerance); }
 
   bool sphereMeets(const Sphere& a, typename B::Node b) const {
     if constexpr (B::kBodies) {

@@ -8,6 +8,12 @@
 
 namespace bocst::query {
 
+/// Do two spheres of cells touch, in one frame? Conservative answers say so by this alone.
+inline bool spheresMeet(const Sphere& a, const Sphere& b, double tolerance) {
+  const double extent = (a.radius + b.radius) * (1 + 1e-12) + tolerance;
+  return (a.center - b.center).squaredNorm() <= extent * extent;
+}
+
 /// A leaf that is a cell, as the visitor sees it: its sphere in the frame of side A.
 struct CellLeaf {
   std::uint64_t id;

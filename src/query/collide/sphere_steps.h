@@ -1,0 +1,129 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#pragma once
+
+#include <cstddef>
+#include <cstdint>
+#include <limits>
+
+#include "query/cull/frames.h"
+#include "query/sides/side.h"
+#include "query/sides/visitor.h"
+
+namespace bocst::query {
+
+/// The spheres of eight octants as both sides of a pair see them, as in Frame.
+struct alignas(64) SphereFrame {
+  float center[2][3][8];
+  float radius[8];
+};
+
+/// How the roots of two trees lie to each other, in float: what side s sees about the middle of its root, in lattice
+/// units of side 0.
+///
+/// With u = 2^-24, Q0 and Q1 half the roots' sides and t the way between their middles, no coordinate, distance or
+/// radius is larger than M = |t| + sqrt(6) (Q0 + Q1). Cells are integers: in its own frame a centre is off by 2 u M, in
+/// the other's, along an axis, by 11 u M: the former turned, rotation 1, products and sums 7, t 1. So a difference is
+/// off by 14 u M, of three axes 25 u M; the squared distance by 5 u of it, which is 3 u M of the distance; the square
+/// of the limit by u M; the sum of the radii, by 4 u each and u by itself, by 5 u M, and the limit by 2 u M more. All
+/// is 36 u M; `rounding_margin` takes 48. To that comes 6 M of the orthogonality error: R^T stands for the inverse of
+/// R, and R does not keep lengths.
+struct SphereFrames {
+  explicit SphereFrames(const SimilarityTransform& one_in_zero);
+
+  struct Side {
+    float unit;            ///< A lattice unit, in those of side 0.
+    float shift[3];        ///< Coordinate j in the other frame is this ...
+    float to_other[3][3];  ///< ... and row j by the own coordinates.
+  };
+  Side side[2] = {};
+  /// Infinite where floats can't hold the pair: then each test is in doubt.
+  float rounding_margin = std::numeric_limits<float>::infinity();
+  float tolerance = 0;
+};
+
+/// Octants of one block that may meet one node of the other side, still to be walked. Words of one size, as in
+/// StepGroup.
+struct SphereGroup {
+  struct Node {
+    tree::NodeRef node;
+    tree::ChildRef ref;  ///< Not read of a leaf.
+    std::uint32_t level;
+    std::uint32_t lane;  ///< 8 * frame + octant.
+  };
+  Node other;
+  const tree::Block* at;  ///< The block, or null where there is none.
+  std::uint32_t side;     ///< That of the block.
+  std::uint32_t block;    ///< As NodeRef names it, so the root is octant 7 of a block that there is not.
+  std::uint32_t level;    ///< Of the octants.
+  std::uint32_t frame;    ///< Where they are.
+  std::uint32_t frames;   ///< So many are in use, by the octants and what is above both nodes.
+  std::uint32_t octants;  ///< A bit each.
+  /// Of each a number whose lowest three bits are the octant; the least comes first.
+  std::uint32_t order[8];
+};
+
+/// The depth-first walk over resident pairs of two trees with conservative answers: up to the next leaves whose spheres
+/// meet. Eight octants at a time in float; what that leaves in doubt of spheres is decided in double by spheresMeet(),
+/// so nothing depends on the instruction set.
+struct SphereSteps {
+  /// Frames alive at once: one for each block of either side, and the nodes of a pair that comes without.
+  static constexpr std::size_t kFrames = 2 * lattice::kMaxLevel + 2;
+  /// What a walk below one pair can add to the stack: eight groups for two blocks.
+  static constexpr std::size_t kStackRoom = 8 * lattice::kMaxLevel + 8;
+
+  enum Event {
+    kDone,      ///< The stack is empty.
+    kLeaves,    ///< The spheres of the octants in `mask` of a block, pair[expanded] the first, meet that of the other.
+    kDeferred,  ///< `pair` needs a node that is not expanded.
+  };
+
+  struct Scratch {
+    SphereFrame spheres[kFrames];
+    Frame volumes[kFrames];
+  };
+
+  SphereSteps(const TreeSide& a, const TreeSide& b, const SimilarityTransform& b_in_a, Scratch& scratch);
+
+  /// So far, nodes were left out whose boxes or slabs are apart, though spheres below them may meet. No more.
+  void lookForAll();
+
+  const TreeSide* side[2];
+  const SimilarityTransform& b_in_a;
+  const SphereFrames frames;
+  PairFrames geometry;            ///< Of boxes and slabs.
+  std::uint32_t extent[2][3];     ///< Where the actual regions end.
+  std::uint32_t deepest[2];       ///< The level of each side's leaves.
+  std::uint32_t last_volumes[2];  ///< Below this level, boxes and slabs tell no more than spheres.
+  int not_smaller;                ///< A node of side 0 is not smaller than one of side 1 so many levels deeper.
+  bool only_touching;             ///< See lookForAll(). False where boxes are of no use, see PairFrames::fits().
+  bool nearest_first = true;      ///< A hit ends the walk.
+
+  Scratch& scratch;
+  std::uint64_t holds_spheres[kFrames], holds_volumes[kFrames];  ///< Which block of which side is in a frame.
+
+  SphereGroup* stack = nullptr;  ///< With room for kStackRoom more.
+  std::size_t depth = 0;
+  std::size_t count = 0;  ///< Of nodes expanded for a pair.
+
+  /// Pairs may be pushed on what is left on the stack: all of it comes without frames then.
+  void forgetFrames() {
+    for (std::size_t i = 0; i < depth; ++i) stack[i].frames = 0;
+  }
+
+  tree::NodeRef pair[2];  ///< Of the event.
+  int expanded = 0;
+  unsigned mask = 0;
+};
+
+/// How far the sphere of a leaf may be from the surface that is in the leaf, of both sides together: each leaf's cell
+/// meets the surface, so its sphere is within a diameter of that. What bounds two surfaces and parts them by more parts
+/// the spheres of their leaves, too.
+double reachOfLeaves(const TreeSide& a, const TreeSide& b, double scale);
+
+/// Goes on to the next event. Chosen at run time for the machine's instruction set.
+SphereSteps::Event nextEvent(SphereSteps& steps);
+
+/// Puts a pair of nodes on the stack.
+void pushPair(SphereSteps& steps, tree::NodeRef node_a, tree::NodeRef node_b);
+
+}  // namespace bocst::query

@@ -1,0 +1,89 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#include "query/collide/sphere_walk.h"
+
+#include <vector>
+
+#include "query/collide/deferred_pairs.h"
+
+namespace bocst::query {
+
+struct SphereWalk::Scratch {
+  std::vector<SphereGroup> stack;
+  SphereSteps::Scratch steps;
+  /// Steps that walks made after they had set aside a pair that needs a node: the nearest hit may be below that pair,
+  /// so they may be a detour. Once they have cost as much as growth does, some nodes grow before the walk goes on.
+  std::size_t detour = 0;
+  DeferredPairs<TreeSide, TreeSide> deferred;
+};
+
+bool SphereWalk::areBoxesApart() const {
+  SimilarityTransform wide = b_in_a_;
+  wide.tolerance += reachOfLeaves(a_, b_, b_in_a_.scale);
+  return facesApart(a_.volume(a_.root()), b_.volume(b_.root()), wide);
+}
+
+bool SphereWalk::run(Visitor& visitor) {
+  thread_local Scratch s;
+  SphereSteps steps(a_, b_, b_in_a_, s.steps);
+  steps.nearest_first = visitor.endsAtFirst();
+  // Where surfaces touch, a hit is found sooner if only that is looked for; if there is none, spheres may still meet.
+  if (visitor.endsAtFirst() && steps.only_touching && search(steps, s, visitor)) return true;
+  steps.lookForAll();
+  return search(steps, s, visitor);
+}
+
+bool SphereWalk::search(SphereSteps& steps, Scratch& s, Visitor& visitor) const {
+  const auto push = [&](const DeferredPairs<TreeSide, TreeSide>::Pair& pair) {
+    if (s.stack.size() < steps.depth + 1 + SphereSteps::kStackRoom) {
+      s.stack.resize(2 * (steps.depth + SphereSteps::kStackRoom));
+    }
+    steps.stack = s.stack.data();
+    pushPair(steps, pair.a, pair.b);
+  };
+  const auto grow = [&] { s.deferred.grow(a_, b_, b_in_a_, visitor.endsAtFirst(), push); };
+  s.deferred.clear();
+  push({a_.root(), b_.root()});
+  std::size_t paid_for = steps.count;  // steps before that are no detour, or are paid for
+  for (;;) {
+    switch (nextEvent(steps)) {
+      case SphereSteps::kDone:
+        if (s.deferred.empty()) return false;
+        grow();
+        paid_for = steps.count;
+        break;
+      case SphereSteps::kDeferred:
+        if (s.deferred.empty()) paid_for = steps.count;
+        s.deferred.add({steps.pair[0], steps.pair[1]});
+        if (!visitor.endsAtFirst() || s.detour + (steps.count - paid_for) < kPrice) break;
+        s.detour = 0;
+        steps.forgetFrames();
+        grow();
+        paid_for = steps.count;
+        break;
+      case SphereSteps::kLeaves:
+        if (!visitLeaves(steps, visitor)) break;
+        if (!s.deferred.empty()) s.detour += steps.count - paid_for;
+        return true;
+    }
+  }
+}
+
+bool SphereWalk::visitLeaves(const SphereSteps& steps, Visitor& visitor) const {
+  const auto leaf = [](const TreeSide& side, tree::NodeRef node) {
+    return CellLeaf{side.cellId(node), side.cellSphere(node)};
+  };
+  CellLeaf leaves[2];
+  const int x = steps.expanded, y = 1 - x;
+  const auto set = [&](int side, tree::NodeRef node) {
+    leaves[side] = leaf(side == 0 ? a_ : b_, node);
+    if (side == 1) leaves[1].sphere = placed(leaves[1].sphere, b_in_a_);
+  };
+  set(y, steps.pair[y]);
+  for (unsigned mask = steps.mask; mask != 0; mask &= mask - 1) {
+    set(x, tree::NodeRef::octant(steps.pair[x].block(), __builtin_ctz(mask)));
+    if (visitor.cells(leaves[0], leaves[1])) return true;
+  }
+  return false;
+}
+
+}  // namespace bocst::query
