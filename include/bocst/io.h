@@ -6,6 +6,7 @@
 
 #include <memory>
 #include <string>
+#include <vector>
 
 namespace bocst {
 
@@ -29,5 +30,14 @@ namespace bocst {
 /// finite, indices that are fractional or out of range, anything after the end; binary OFF, polygons with holes
 /// (`<ph>`) and free-form surfaces are not supported.
 BOCST_EXPORT std::shared_ptr<const Mesh> loadMesh(const std::string& file);
+
+/// A format that loadMesh() reads.
+struct MeshFormat {
+  std::string ending;  ///< Of files, in small letters, without the dot: "obj".
+  bool by_assimp;      ///< Otherwise by a reader of bocst's own.
+};
+
+/// All formats: those with readers of their own, then those of the assimp that is there.
+BOCST_EXPORT std::vector<MeshFormat> meshFormats();
 
 }  // namespace bocst

@@ -33,6 +33,19 @@ class BOCST_EXPORT Mesh {
   /// The same from 32-bit indices, which are moved in rather than copied.
   static std::shared_ptr<const Mesh> fromIndices(std::vector<Eigen::Vector3d> vertices, std::vector<Indices> triangles);
 
+  /// The same from plain arrays: x, y, z of each vertex, and three indices of each triangle; they are copied. For
+  /// meshes of shape_msgs, geometric_shapes, numpy and the like.
+  static std::shared_ptr<const Mesh> fromArrays(const double* vertices, std::size_t vertex_count,
+                                                const std::uint32_t* triangles, std::size_t triangle_count);
+  static std::shared_ptr<const Mesh> fromArrays(const float* vertices, std::size_t vertex_count,
+                                                const std::uint32_t* triangles, std::size_t triangle_count);
+
+  /// Each vertex moved away from the mean of all vertices: to `scale` times its distance from there, plus `padding`. So
+  /// geometric_shapes (MoveIt's link scale and padding) does; both meshes share the indices. It is no offset of the
+  /// surface: where that is meant, ask for Options::margin.
+  /// @throws std::invalid_argument for a scale that is not above 0, or numbers that are not finite.
+  std::shared_ptr<const Mesh> scaledAndPadded(double scale, double padding) const;
+
   /// The same triangles between other vertices; both meshes share the indices.
   /// @throws std::invalid_argument naming the first bad vertex, or for another number of vertices than vertexCount().
   std::shared_ptr<const Mesh> withVertices(std::vector<Eigen::Vector3d> vertices) const;

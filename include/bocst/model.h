@@ -7,6 +7,7 @@
 #include <bocst/options.h>
 #include <bocst/oracle.h>
 #include <bocst/statistics.h>
+#include <fcl/geometry/bvh/BVH_internal.h>
 #include <fcl/geometry/collision_geometry.h>
 
 #include <functional>
@@ -46,17 +47,61 @@ class BOCST_EXPORT Model : public fcl::CollisionGeometry<S> {
   /// not reach this library (the message has the remedy; BOCST_DISPATCH_CHECK=off turns the check off).
   explicit Model(std::shared_ptr<const Mesh> mesh, const Options& options = {});
 
-  /// Takes the vertices and triangles of an FCL mesh, not its tree. BV::S must be S.
+  /// Takes the vertices and triangles of an FCL mesh, not its tree, which need not be built: addSubModel() without
+  /// endModel() will do. BV::S must be S. Of an empty BVHModel the model is empty, too.
   template <typename BV>
-  explicit Model(const fcl::BVHModel<BV>& bvh, const Options& options = {}) : Model(meshOf(bvh), options) {}
+  explicit Model(const fcl::BVHModel<BV>& bvh, const Options& options = {}) : Model(options) {
+    if (bvh.num_tris > 0 || bvh.num_vertices > 0) setMesh(meshOf(bvh));
+  }
+
+  /// An empty model: nothing touches it, and it is at no distance from anything, as an empty fcl::BVHModel. A mesh
+  /// comes by setMesh(), or by FCL's names from beginModel() on. A Scene takes no empty model.
+  Model() : Model(Options{}) {}
+  explicit Model(const Options& options);
 
   ~Model() override;
   Model(const Model&) = delete;
   Model& operator=(const Model&) = delete;
 
+  /// Has it no mesh yet? @throws std::logic_error between beginModel() and endModel(), as queries do.
+  bool empty() const;
+
+  /// Another mesh; the tree is one sphere again. Not beside queries. What throws is as for the constructor, and the
+  /// model is then as before.
+  void setMesh(std::shared_ptr<const Mesh> mesh);
+
+  // FCL's names, for code that was written for fcl::BVHModel. They return fcl::BVH_OK, or as there the code of what was
+  // called out of sequence. endModel() builds no tree; without any triangle it returns fcl::BVH_ERR_BUILD_EMPTY_MODEL
+  // and the model stays empty; what Mesh() refuses throws std::invalid_argument. Not beside queries.
+  int beginModel(int num_tris = 0, int num_vertices = 0);  ///< Drops the mesh that is there.
+  int addVertex(const fcl::Vector3<S>& p);
+  int addTriangle(const fcl::Vector3<S>& p1, const fcl::Vector3<S>& p2, const fcl::Vector3<S>& p3);
+  int addSubModel(const std::vector<fcl::Vector3<S>>& ps, const std::vector<fcl::Triangle>& ts);
+  int addSubModel(const std::vector<fcl::Vector3<S>>& ps);
+  int endModel();
+
+  // New positions in the order of the vertices, then updateVertices(). Fewer or more than there are vertices:
+  // fcl::BVH_ERR_INCORRECT_DATA, and the model is as before. There is no tree to refit, so the arguments do not matter.
+  int beginReplaceModel() { return beginUpdateModel(); }
+  int replaceVertex(const fcl::Vector3<S>& p) { return updateVertex(p); }
+  int replaceTriangle(const fcl::Vector3<S>& p1, const fcl::Vector3<S>& p2, const fcl::Vector3<S>& p3) {
+    return updateTriangle(p1, p2, p3);
+  }
+  int replaceSubModel(const std::vector<fcl::Vector3<S>>& ps) { return updateSubModel(ps); }
+  int endReplaceModel(bool refit = true, bool bottomup = true) { return endUpdateModel(refit, bottomup); }
+  int beginUpdateModel();
+  int updateVertex(const fcl::Vector3<S>& p);
+  int updateTriangle(const fcl::Vector3<S>& p1, const fcl::Vector3<S>& p2, const fcl::Vector3<S>& p3);
+  int updateSubModel(const std::vector<fcl::Vector3<S>>& ps);
+  int endUpdateModel(bool refit = true, bool bottomup = true);
+
+  /// fcl::BVH_MODEL_TRIANGLES; of an empty model fcl::BVH_MODEL_UNKNOWN.
+  fcl::BVHModelType getModelType() const;
+
   const Options& options() const;  ///< As given.
 
-  /// The mesh as it is now. Keeps it alive across updateVertices(). Null after releaseMesh().
+  /// The mesh as it is now. Keeps it alive across updateVertices(). Null after releaseMesh(), and
+  /// while the model is empty.
   std::shared_ptr<const Mesh> mesh() const;
 
   /// Lets go of the mesh in host memory; the compute oracle has it on its device (3: "the model need not be in core
@@ -102,7 +147,10 @@ class BOCST_EXPORT Model : public fcl::CollisionGeometry<S> {
   fcl::NODE_TYPE getNodeType() const override;      ///< GEOM_TRIANGLE: a slot FCL leaves empty.
 
   /// For the library itself.
-  tree::Tree& tree() const { return *tree_; }
+  tree::Tree& tree() const {
+    if (tree_ == nullptr) throwEmpty();
+    return *tree_;
+  }
 
  private:
   template <typename BV>
@@ -114,6 +162,11 @@ class BOCST_EXPORT Model : public fcl::CollisionGeometry<S> {
     return std::make_shared<const Mesh>(std::move(vertices), triangles);
   }
 
+  [[noreturn]] void throwEmpty() const;
+
+  struct Staged;  // What comes by FCL's names before the mesh is made of it.
+  Options options_;
+  std::unique_ptr<Staged> staged_;  // Between begin and end.
   std::unique_ptr<tree::Tree> tree_;
 };
 

@@ -7,19 +7,27 @@ include(CMakePackageConfigHelpers)
 set(bocst_config_dir ${CMAKE_INSTALL_LIBDIR}/cmake/bocst)
 
 # What runs programs is in the component library, what builds them in dev; tools/ has the third, tools.
-install(TARGETS bocst bocst_io EXPORT bocst-targets
+set(bocst_libraries bocst)
+if(BOCST_BUILD_IO)
+  list(APPEND bocst_libraries bocst_io)
+  # libbocst_io finds libbocst under any prefix.
+  set_target_properties(bocst_io PROPERTIES INSTALL_RPATH "$ORIGIN")
+endif()
+install(TARGETS ${bocst_libraries} EXPORT bocst-targets
   LIBRARY COMPONENT library NAMELINK_COMPONENT dev
   ARCHIVE COMPONENT dev)
 install(DIRECTORY include/bocst DESTINATION ${CMAKE_INSTALL_INCLUDEDIR} COMPONENT dev)
-install(FILES LICENSE DESTINATION ${CMAKE_INSTALL_DOCDIR} COMPONENT dev)
+# The documents keep their places to each other, so that their links lead somewhere.
+install(FILES README.md CHANGELOG.md CONTRIBUTING.md CITATION.cff DESTINATION ${CMAKE_INSTALL_DOCDIR} COMPONENT dev)
+install(DIRECTORY share/doc share/examples share/models DESTINATION ${CMAKE_INSTALL_DOCDIR}/share COMPONENT dev
+  PATTERN "*.in" EXCLUDE)
+# Debian's packages have it under a name of its own (debian.cmake).
+install(FILES LICENSE DESTINATION ${CMAKE_INSTALL_DOCDIR} COMPONENT not_debian)
 install(EXPORT bocst-targets NAMESPACE bocst:: FILE bocstTargets.cmake DESTINATION ${bocst_config_dir} COMPONENT dev)
-
-# libbocst_io finds libbocst under any prefix.
-set_target_properties(bocst_io PROPERTIES INSTALL_RPATH "$ORIGIN")
 
 configure_package_config_file(${CMAKE_CURRENT_LIST_DIR}/bocstConfig.cmake.in ${PROJECT_BINARY_DIR}/bocstConfig.cmake
   INSTALL_DESTINATION ${bocst_config_dir})
-write_basic_package_version_file(${PROJECT_BINARY_DIR}/bocstConfigVersion.cmake COMPATIBILITY SameMinorVersion)
+write_basic_package_version_file(${PROJECT_BINARY_DIR}/bocstConfigVersion.cmake COMPATIBILITY ${BOCST_COMPATIBILITY})
 install(FILES ${PROJECT_BINARY_DIR}/bocstConfig.cmake ${PROJECT_BINARY_DIR}/bocstConfigVersion.cmake
   DESTINATION ${bocst_config_dir} COMPONENT dev)
 
@@ -43,9 +51,15 @@ else()
   set(pc_bocst_libs "-lbocst -lhwy -lepoxy -ldl")
   set(pc_io_static " -lassimp -lpugixml")
 endif()
-foreach(name bocst bocst-io)
+set(pc_names bocst)
+if(BOCST_BUILD_IO)
+  list(APPEND pc_names bocst-io)
+endif()
+foreach(name IN LISTS pc_names)
   configure_file(${CMAKE_CURRENT_LIST_DIR}/${name}.pc.in ${PROJECT_BINARY_DIR}/${name}.pc @ONLY)
   install(FILES ${PROJECT_BINARY_DIR}/${name}.pc DESTINATION ${CMAKE_INSTALL_LIBDIR}/pkgconfig COMPONENT dev)
 endforeach()
 
-include(${CMAKE_CURRENT_LIST_DIR}/debian.cmake)
+if(PROJECT_IS_TOP_LEVEL)
+  include(${CMAKE_CURRENT_LIST_DIR}/debian.cmake)
+endif()

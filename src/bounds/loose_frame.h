@@ -4,6 +4,7 @@
 #include <algorithm>
 #include <cmath>
 #include <cstdint>
+#include <cstring>
 
 namespace bocst::bounds {
 
@@ -66,7 +67,13 @@ struct LooseFrame {
   static constexpr double kMargin = 1e-6;  ///< Lattice units; far above the rounding of toLattice().
 
  private:
-  static double side(int exponent) { return std::ldexp(1.0, exponent); }
+  // ldexp() takes as long as all else that a walk or a build does with a side.
+  static double side(int exponent) {
+    const std::uint64_t bits = static_cast<std::uint64_t>(1023 + exponent) << 52;
+    double side;
+    std::memcpy(&side, &bits, sizeof(side));
+    return side;
+  }
 };
 
 /// A direction as bytes of length about 127; false where it has none.

@@ -24,16 +24,17 @@ std::string extensionOf(const std::string& file) {
   return extension;
 }
 
+constexpr std::pair<const char*, io::Format> kFormats[] = {{"obj", io::Format::kObj},
+                                                           {"ply", io::Format::kPly},
+                                                           {"stl", io::Format::kStl},
+                                                           {"off", io::Format::kOff},
+                                                           {"dae", io::Format::kDae}};
+
 io::Polygons readPolygons(const std::string& file) {
   const std::string content = io::readFile(file);
-  const std::pair<const char*, io::Format> formats[] = {{".obj", io::Format::kObj},
-                                                        {".ply", io::Format::kPly},
-                                                        {".stl", io::Format::kStl},
-                                                        {".off", io::Format::kOff},
-                                                        {".dae", io::Format::kDae}};
   const std::string extension = extensionOf(file);
-  for (const auto& [name, format] : formats) {
-    if (extension == name) return io::readMesh(content, format);
+  for (const auto& [name, format] : kFormats) {
+    if (extension == std::string(".") + name) return io::readMesh(content, format);
   }
   return io::readScene(file);
 }
@@ -51,6 +52,13 @@ std::shared_ptr<const Mesh> loadMesh(const std::string& file) {
     std::replace(what.begin(), what.end(), '\n', ' ');
     throw std::runtime_error(file + ": " + what);
   }
+}
+
+std::vector<MeshFormat> meshFormats() {
+  std::vector<MeshFormat> formats;
+  for (const auto& [name, format] : kFormats) formats.push_back({name, false});
+  for (std::string& ending : io::sceneEndings()) formats.push_back({std::move(ending), true});
+  return formats;
 }
 
 }  // namespace bocst

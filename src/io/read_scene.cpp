@@ -14,7 +14,9 @@
 #include <exception>
 #include <filesystem>
 #include <memory>
+#include <sstream>
 #include <stdexcept>
+#include <string>
 #include <string_view>
 #include <utility>
 #include <vector>
@@ -79,18 +81,22 @@ class CLocale {
   locale_t before_;
 };
 
+/// What a reader here refuses must not get in by another name.
+void leaveOut(Assimp::Importer& importer) {
+  for (const char* extension : {"obj", "ply", "stl", "off", "dae"}) {
+    while (const std::unique_ptr<Assimp::BaseImporter> reader{importer.GetImporter(extension)}) {
+      importer.UnregisterLoader(reader.get());  // it is ours from here on
+    }
+  }
+}
+
 }  // namespace
 
 Polygons readScene(const std::string& file) {
   const CLocale c_locale;
   Assimp::Importer importer;
   importer.SetIOHandler(new Folder(file));  // the importer's own from here on
-  // What a reader here refuses must not get in by another name.
-  for (const char* extension : {"obj", "ply", "stl", "off", "dae"}) {
-    while (const std::unique_ptr<Assimp::BaseImporter> reader{importer.GetImporter(extension)}) {
-      importer.UnregisterLoader(reader.get());  // it is ours from here on
-    }
-  }
+  leaveOut(importer);
   const aiScene* scene = importer.ReadFile(file, 0);
   if (scene == nullptr) throw std::runtime_error(importer.GetErrorString());
   if (scene->mRootNode == nullptr || scene->mNumMeshes == 0) throw std::runtime_error("no mesh in this file");
@@ -126,6 +132,20 @@ Polygons readScene(const std::string& file) {
     }
   }
   return polygons;
+}
+
+std::vector<std::string> sceneEndings() {
+  Assimp::Importer importer;
+  leaveOut(importer);
+  std::string list;  // "*.3ds;*.glb;..."
+  importer.GetExtensionList(list);
+  std::vector<std::string> endings;
+  std::istringstream stream(list);
+  for (std::string pattern; std::getline(stream, pattern, ';');) {
+    if (pattern.rfind("*.", 0) == 0) endings.push_back(pattern.substr(2));
+  }
+  std::sort(endings.begin(), endings.end());
+  return endings;
 }
 
 }  // namespace bocst::io

@@ -2,6 +2,7 @@
 #pragma once
 
 #include <string>
+#include <vector>
 
 #include "polygons.h"
 
@@ -11,5 +12,8 @@ namespace bocst::io {
 /// each where its nodes put it; equal vertices are joined. Only regular files in the folder of `file` are opened.
 /// @throws std::runtime_error with assimp's reason.
 Polygons readScene(const std::string& file);
+
+/// The endings of files ("glb") that the assimp that is there reads, sorted.
+std::vector<std::string> sceneEndings();
 
 }  // namespace bocst::io

@@ -151,6 +151,48 @@ std::shared_ptr<const Mesh> Mesh::fromIndices(std::vector<Eigen::Vector3d> verti
   return mesh;
 }
 
+namespace {
+
+template <typename S>
+std::shared_ptr<const Mesh> fromArraysOf(const S* vertices, std::size_t vertex_count, const std::uint32_t* triangles,
+                                         std::size_t triangle_count) {
+  std::vector<Eigen::Vector3d> points(vertex_count);
+  for (std::size_t i = 0; i < vertex_count; ++i) {
+    for (int k = 0; k < 3; ++k) points[i][k] = static_cast<double>(vertices[3 * i + static_cast<std::size_t>(k)]);
+  }
+  std::vector<Mesh::Indices> indices(triangle_count);
+  for (std::size_t t = 0; t < triangle_count; ++t) {
+    indices[t] = {triangles[3 * t], triangles[3 * t + 1], triangles[3 * t + 2]};
+  }
+  return Mesh::fromIndices(std::move(points), std::move(indices));
+}
+
+}  // namespace
+
+std::shared_ptr<const Mesh> Mesh::fromArrays(const double* vertices, std::size_t vertex_count,
+                                             const std::uint32_t* triangles, std::size_t triangle_count) {
+  return fromArraysOf(vertices, vertex_count, triangles, triangle_count);
+}
+
+std::shared_ptr<const Mesh> Mesh::fromArrays(const float* vertices, std::size_t vertex_count,
+                                             const std::uint32_t* triangles, std::size_t triangle_count) {
+  return fromArraysOf(vertices, vertex_count, triangles, triangle_count);
+}
+
+std::shared_ptr<const Mesh> Mesh::scaledAndPadded(double scale, double padding) const {
+  if (!(scale > 0) || !std::isfinite(scale)) bad("the scale is " + std::to_string(scale) + ", not above 0");
+  if (!std::isfinite(padding)) bad("the padding is " + std::to_string(padding));
+  Eigen::Vector3d mean = Eigen::Vector3d::Zero();
+  for (const Eigen::Vector3d& v : vertices_) mean += v / static_cast<double>(vertices_.size());
+  std::vector<Eigen::Vector3d> moved(vertices_);
+  for (Eigen::Vector3d& v : moved) {
+    const Eigen::Vector3d away = v - mean;
+    const double length = away.norm();
+    if (length > 0) v = mean + (scale + padding / length) * away;
+  }
+  return withVertices(std::move(moved));
+}
+
 std::shared_ptr<const Mesh> Mesh::withVertices(std::vector<Eigen::Vector3d> vertices) const {
   if (vertices.size() != vertexCount()) {
     bad(std::to_string(vertices.size()) + " vertices, but the triangles are of a mesh with " +

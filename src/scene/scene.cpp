@@ -113,6 +113,7 @@ struct Scene<S>::Impl {
 
   static void describe(Object<S>& o) {
     o.model = fcl_adapter::asModel<S>(o.geometry.get());
+    if (o.model != nullptr && o.model->empty()) throw std::invalid_argument("bocst::Scene: the model is empty");
     o.exact = o.model != nullptr && o.model->options().answer == Answer::kExact;
     o.bounds = scene::boundsOf<S>(*o.geometry);
   }

@@ -1,53 +1,42 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #include "tree/bulk.h"
 
+#include <Eigen/Eigenvalues>
 #include <algorithm>
+#include <array>
 #include <cmath>
 #include <cstring>
 #include <limits>
-
-#include "tree/bulk_kernels.h"
+#include <numeric>
+#include <stdexcept>
+#include <type_traits>
 
 namespace bocst::tree {
 namespace {
 
 using V4 = Eigen::Array4f;  // three coordinates and bits that nobody computes with, in one register
 
-// Chosen by build time and by `bench --scenarios fresh`: 8 to 16 and 32 to 256 differ by less than 10 %.
-constexpr std::uint32_t kSmallPiece = 12;  // is not divided further where a block has lanes left
-constexpr std::uint32_t kMostSorted = 64;  // larger pieces are divided by their keys, which costs nothing
-constexpr std::size_t kMostInSlab = 4096;  // above, the surface is no slab and the pass over it is long
+// Chosen by build time and by `bench --scenarios fresh`: 8 to 16 and 64 to 256 differ by less than 10 %.
+constexpr std::uint32_t kSmallPiece = 12;            // is not divided further where a block has lanes left
+constexpr std::uint32_t kMostSorted = 64;            // larger pieces are divided by their keys, which costs nothing
+constexpr std::size_t kMostInSlab = 4096;            // above, the surface is no slab and the pass over it is long
+constexpr std::size_t kMostOnCoarseCurve = 1 << 18;  // a curve of 2^7 cells along each axis parts so many
+constexpr std::uint32_t kMostInEnd = 512;            // the finest pieces that supports are sought by
 constexpr int kBins = 8;
-constexpr int kKeyBits = 10;  // along each axis
 constexpr float kInfinity = std::numeric_limits<float>::infinity();
-constexpr std::size_t kRowPad = 16;  // kernels read whole vectors
+constexpr std::size_t kRowPad = 16;     // kernels read whole vectors
+constexpr std::size_t kFloats = 3 * 4;  // of a triangle's corners in places_
 
 V4 load(const float (&values)[4]) { return Eigen::Map<const V4>(values); }
+void store(const V4& from, float* to) {
+  Eigen::Map<V4> map(to);
+  map = from;
+}
 V4 all(float x) { return V4::Constant(x); }
 
 float areaOf(const V4& lo, const V4& hi) {
   const V4 e = hi - lo;
   return e[0] * e[1] + e[1] * e[2] + e[2] * e[0];
-}
-
-float fromBits(std::uint32_t bits) {
-  float x;
-  std::memcpy(&x, &bits, sizeof(x));
-  return x;
-}
-
-std::uint32_t bitsOf(float x) {
-  std::uint32_t bits;
-  std::memcpy(&bits, &x, sizeof(bits));
-  return bits;
-}
-
-// Every third bit.
-std::uint32_t spread(std::uint32_t x) {
-  x = (x | x << 16) & 0x030000ffu;
-  x = (x | x << 8) & 0x0300f00fu;
-  x = (x | x << 4) & 0x030c30c3u;
-  return (x | x << 2) & 0x09249249u;
 }
 
 // What float coordinates no larger than `size` are off by, and sums of products of three of them with bytes of a normal
@@ -58,7 +47,7 @@ double marginOf(float size) { return 8 * 0x1p-24 * static_cast<double>(size); }
 
 void BulkBuilder::build(const oracle::Surface& surface, const std::uint32_t* ids, std::size_t count,
                         const Eigen::AlignedBox3d& region) {
-  items_.clear();
+  is_sorted_ = false;
   base_ = region.min().array().floor();
   const Eigen::Vector3d lo = region.min() - base_, hi = region.max() - base_;
   least_ << (lo.array() - 0.01).cast<float>(), -kInfinity;
@@ -67,136 +56,178 @@ void BulkBuilder::build(const oracle::Surface& surface, const std::uint32_t* ids
   const Eigen::Vector3d origin = surface.lattice.origin();
   const double inverse_unit = surface.lattice.inverseUnit();
   const Mesh& mesh = *surface.mesh;
-  const auto place = [&](std::uint32_t v) {
-    const Eigen::Vector3d p = (mesh.vertex(v) - origin) * inverse_unit - base_;
-    return V4(static_cast<float>(p[0]), static_cast<float>(p[1]), static_cast<float>(p[2]), 0.0f);
-  };
+  // Each triangle has three places of its own.
+  makeRoom(count, 3 * count);
+  std::uint32_t kept = 0;
   for (std::size_t i = 0; i < count; ++i) {
     const Mesh::Indices& v = mesh.indices(ids[i]);
-    addItem(place(v[0]), place(v[1]), place(v[2]), ids[i]);
+    V4 least = all(kInfinity), most = all(-kInfinity);
+    for (std::size_t k = 0; k < 3; ++k) {
+      const Eigen::Vector3d p = (mesh.vertex(v[k]) - origin) * inverse_unit - base_;
+      const V4 at(static_cast<float>(p[0]), static_cast<float>(p[1]), static_cast<float>(p[2]), 0.0f);
+      store(at, &places_[kFloats * kept + 4 * k]);
+      least = least.min(at);
+      most = most.max(at);
+    }
+    size_ = std::max(size_, least.abs().max(most.abs()).maxCoeff());
+    least = least.max(least_);
+    most = most.min(most_);
+    if ((least > most).any()) continue;
+    store(least, items_[kept].lo);
+    store(most, items_[kept].hi);
+    given_[kept++] = ids[i];
   }
-  sorted_ = false;
-  blocks_.clear();
-  if (items_.size() > kMaxLeafTriangles) addBlock({0, static_cast<std::uint32_t>(items_.size())});
-  fillRows(surface, false);
-  finish();
+  for (std::size_t i = own_corners_.size(); i < kept; ++i) {
+    const auto first = static_cast<std::uint32_t>(3 * i);
+    own_corners_.push_back({first, first + 1, first + 2});
+  }
+  count_ = kept;
+  place_count_ = 3 * kept;
+  divide();
+  finish(own_corners_.data(), order_);
 }
 
 void BulkBuilder::buildAll(const oracle::Surface& surface) {
-  items_.clear();
   const Mesh& mesh = *surface.mesh;
   const std::size_t vertices = mesh.vertexCount(), count = mesh.triangleCount();
+  if (count < kLeastToSort || vertices > kMostToSort) throw std::length_error("bocst: a mesh that cannot be sorted");
+  is_sorted_ = true;
   base_.setConstant(lattice::kMiddle);
   least_.setConstant(-kInfinity);
   most_.setConstant(kInfinity);
-  size_ = 0;
-  items_.reserve(count);
   const Eigen::Vector3d origin = surface.lattice.origin();
   const double inverse_unit = surface.lattice.inverseUnit();
-  places_.resize(4 * vertices);
+  const auto place = [&](const Eigen::Vector3d& p) { return Eigen::Vector3d((p - origin) * inverse_unit - base_); };
+  const Eigen::Vector3d least = place(surface.bounds.min()), most = place(surface.bounds.max());
+  size_ = 1.001f * static_cast<float>(least.cwiseAbs().cwiseMax(most.cwiseAbs()).maxCoeff());
+  makeRoom(count, vertices);
   for (std::size_t v = 0; v < vertices; ++v) {
-    const Eigen::Vector3d& p = mesh.vertex(static_cast<std::uint32_t>(v));
-    for (std::size_t k = 0; k < 3; ++k) {
-      const auto c = static_cast<int>(k);
-      places_[4 * v + k] = static_cast<float>((p[c] - origin[c]) * inverse_unit - base_[c]);
-    }
-    places_[4 * v + 3] = 0;
+    const Eigen::Array3f p = place(mesh.vertex(v)).array().cast<float>();
+    store(V4(p[0], p[1], p[2], 0), &places_[4 * v]);
   }
-  const auto place = [this](std::uint32_t v) { return V4(Eigen::Map<const V4>(&places_[4 * std::size_t{v}])); };
-  for (std::uint32_t t = 0; t < count; ++t) {
-    const Mesh::Indices& i = mesh.indices(t);
-    addItem(place(i[0]), place(i[1]), place(i[2]), t);
-  }
-  sortItems();
-  sorted_ = true;
-  blocks_.clear();
-  if (count > kMaxLeafTriangles) addBlock({0, static_cast<std::uint32_t>(count)});
-  fillRows(surface, true);
-  finish();
+
+  CurveCells cells;
+  cells.bits = count <= kMostOnCoarseCurve ? 7 : 10;
+  for (int k = 0; k < 3; ++k) cells.corner[k] = static_cast<float>(least[k]);
+  const double longest = (most - least).maxCoeff();
+  cells.scale = longest > 0 ? static_cast<float>((1 << cells.bits) / longest) : 0;
+  curveKeys(mesh.triangles().data(), count, places_, cells, keys_);
+  sortKeys(cells.bits);
+  boxTriangles(mesh.triangles().data(), places_, keys_, count, given_, items_);
+  divide();
+  finish(mesh.triangles().data(), ids_.data());
 }
 
-void BulkBuilder::addItem(const V4& a, const V4& b, const V4& c, std::uint32_t id) {
-  const V4 lo = a.min(b).min(c), hi = a.max(b).max(c);
-  size_ = std::max(size_, lo.abs().max(hi.abs()).maxCoeff());
-  const V4 inner_lo = lo.max(least_), inner_hi = hi.min(most_);
-  if ((inner_lo > inner_hi).any()) return;
-  items_.emplace_back();
-  Item& item = items_.back();
-  Eigen::Map<V4>(item.lo) = inner_lo;
-  Eigen::Map<V4>(item.hi) = inner_hi;
-  item.lo[3] = fromBits(id);
+// Fresh memory costs more than what is done with it here, so all of it comes at once, in huge pages.
+void BulkBuilder::makeRoom(std::size_t triangles, std::size_t places) {
+  constexpr std::size_t kLine = 64, kMostOnSmallPages = 1 << 18;
+  std::size_t bytes = 0;
+  const auto take = [&bytes, this](auto*& values, std::size_t count) {
+    if (memory_ != nullptr) values = reinterpret_cast<std::remove_reference_t<decltype(values)>>(memory_ + bytes);
+    bytes += (count * sizeof(*values) + kLine - 1) / kLine * kLine;
+  };
+  const auto takeAll = [&] {
+    bytes = 0;
+    take(places_, 4 * places);
+    take(keys_, triangles);
+    take(keys_room_, triangles);
+    take(given_, triangles);
+    take(items_, triangles);
+    take(order_, triangles);
+    take(order_room_, triangles);
+    take(bins_, triangles);
+    take(rows_, 9 * (triangles + kRowPad));
+  };
+  count_ = triangles;
+  place_count_ = places;
+  takeAll();
+  if (bytes <= room_) return;
+  room_ = bytes;
+  huge_pages_ = oracle::HugePages();
+  few_pages_.reset();
+  if (bytes <= kMostOnSmallPages) {
+    few_pages_.reset(new std::byte[bytes]);
+    memory_ = few_pages_.get();
+  } else {
+    huge_pages_ = oracle::HugePages(bytes);
+    memory_ = static_cast<std::byte*>(huge_pages_.begin());
+  }
+  takeAll();
 }
 
-// By the middles of their boxes along a Z-order curve over the root cube: three passes of ten bits.
-void BulkBuilder::sortItems() {
-  constexpr std::size_t kBuckets = 1 << kKeyBits;
-  std::uint32_t starts[3][kBuckets] = {};
-  const std::size_t count = items_.size();
-  keys_.resize(count);
-  const float step = static_cast<float>(1 << kKeyBits) / (4.0f * lattice::kMiddle);
-  const V4 corner = all(2.0f * lattice::kMiddle), last = all((1 << kKeyBits) - 1.0f);
-  for (std::uint32_t i = 0; i < count; ++i) {
-    const V4 cell = ((load(items_[i].lo) + load(items_[i].hi) + corner) * step).max(0.0f).min(last);
-    const std::uint32_t code = spread(static_cast<std::uint32_t>(cell[0])) |
-                               spread(static_cast<std::uint32_t>(cell[1])) << 1 |
-                               spread(static_cast<std::uint32_t>(cell[2])) << 2;
-    keys_[i] = {code, i};
-    for (int pass = 0; pass < 3; ++pass) ++starts[pass][code >> (kKeyBits * pass) & (kBuckets - 1)];
+void BulkBuilder::sortKeys(int bits) {
+  const int passes = bits <= 7 ? 2 : 3, digit = (3 * bits + passes - 1) / passes;
+  const std::uint32_t most = (1u << digit) - 1;
+  std::uint32_t starts[3][1 << 11] = {};
+  for (std::size_t i = 0; i < count_; ++i) {
+    const SortKey key = keys_[i];
+    for (int pass = 0; pass < passes; ++pass) ++starts[pass][key.code >> (digit * pass) & most];
   }
-  keys_room_.resize(count);
-  for (int pass = 0; pass < 3; ++pass) {
+  for (int pass = 0; pass < passes; ++pass) {
     std::uint32_t sum = 0;
     for (std::uint32_t& start : starts[pass]) {
       const std::uint32_t size = start;
       start = sum;
       sum += size;
     }
-    for (const Key& key : keys_) keys_room_[starts[pass][key.code >> (kKeyBits * pass) & (kBuckets - 1)]++] = key;
-    keys_.swap(keys_room_);
+    for (std::size_t i = 0; i < count_; ++i) {
+      const SortKey key = keys_[i];
+      keys_room_[starts[pass][key.code >> (digit * pass) & most]++] = key;
+    }
+    std::swap(keys_, keys_room_);
   }
-  items_room_.resize(count);
-  for (std::size_t i = 0; i < count; ++i) items_room_[i] = items_[keys_[i].id];
-  items_.swap(items_room_);
+}
+
+// Makes the blocks over given_ and items_.
+void BulkBuilder::divide() {
+  const auto count = static_cast<std::uint32_t>(count_);
+  std::iota(order_, order_ + count, 0u);
+  blocks_.clear();
+  if (count > kMaxLeafTriangles) addBlock({0, count});
+  ids_.resize(count);
+  for (std::size_t i = 0; i < count; ++i) ids_[i] = given_[order_[i]];
 }
 
 // Divides a piece in two; returns how many come first. A large one is divided where its keys first differ, so that a
-// lane shares more of the key. A smaller one where the sum of areas times triangles is least, along the longest axis of
-// the middles; neither part has less than an eighth, so that seven divisions of the largest leave less than half.
+// lane shares more of the key.
 std::uint32_t BulkBuilder::split(Piece piece) {
-  if (sorted_ && piece.count > kMostSorted) {
-    const std::uint32_t differ = keys_[piece.begin].code ^ keys_[piece.begin + piece.count - 1].code;
-    if (differ != 0) {
-      const std::uint32_t bit = 1u << (31 - __builtin_clz(differ));
-      const auto begin = keys_.begin() + piece.begin;
-      return static_cast<std::uint32_t>(
-          std::partition_point(begin, begin + piece.count, [bit](const Key& key) { return (key.code & bit) == 0; }) -
-          begin);
-    }
-  }
-  Item* const begin = items_.data() + piece.begin;
-  Item* const end = begin + piece.count;
+  if (!is_sorted_ || piece.count <= kMostSorted) return splitByArea(piece);
+  const std::uint32_t differ = keys_[piece.begin].code ^ keys_[piece.begin + piece.count - 1].code;
+  if (differ == 0) return splitByArea(piece);
+  const std::uint32_t bit = 1u << (31 - __builtin_clz(differ));
+  const SortKey* const begin = keys_ + piece.begin;
+  const SortKey* const end =
+      std::partition_point(begin, begin + piece.count, [bit](const SortKey& key) { return (key.code & bit) == 0; });
+  return static_cast<std::uint32_t>(end - begin);
+}
+
+// Where the sum of areas times triangles is least, along the longest axis of the middles; neither part has less than an
+// eighth, so that seven divisions of the largest leave less than half.
+std::uint32_t BulkBuilder::splitByArea(Piece piece) {
+  std::uint32_t* const order = &order_[piece.begin];
   V4 least = all(kInfinity), most = all(-kInfinity);
-  for (const Item* i = begin; i != end; ++i) {
-    const V4 twice = load(i->lo) + load(i->hi);
+  for (std::uint32_t i = 0; i < piece.count; ++i) {
+    const TriangleBox& item = items_[order[i]];
+    const V4 twice = load(item.lo) + load(item.hi);
     least = least.min(twice);
     most = most.max(twice);
   }
   int axis = 0;
   for (int k = 1; k < 3; ++k) axis = most[k] - least[k] > most[axis] - least[axis] ? k : axis;
-  const auto twiceMiddle = [axis](const Item& i) { return i.lo[axis] + i.hi[axis]; };
   const float extent = most[axis] - least[axis];
   const std::uint32_t half = piece.count / 2, few = std::max(piece.count / 8, 1u);
   if (!(extent > 0)) return half;
 
   const float first = least[axis], per = 0.9999f * kBins / extent;
-  const auto binOf = [&](const Item& i) { return static_cast<int>((twiceMiddle(i) - first) * per); };
   V4 lo[kBins], hi[kBins];
   std::uint32_t counts[kBins] = {};
   for (int b = 0; b < kBins; ++b) lo[b] = all(kInfinity), hi[b] = all(-kInfinity);
-  for (const Item* i = begin; i != end; ++i) {
-    const int b = binOf(*i);
-    lo[b] = lo[b].min(load(i->lo));
-    hi[b] = hi[b].max(load(i->hi));
+  for (std::uint32_t i = 0; i < piece.count; ++i) {
+    const TriangleBox& item = items_[order[i]];
+    const auto b = static_cast<int>((item.lo[axis] + item.hi[axis] - first) * per);
+    bins_[i] = static_cast<std::uint8_t>(b);
+    lo[b] = lo[b].min(load(item.lo));
+    hi[b] = hi[b].max(load(item.hi));
     ++counts[b];
   }
   float after[kBins];
@@ -221,23 +252,37 @@ std::uint32_t BulkBuilder::split(Piece piece) {
     if (cost < best_cost) best_cost = cost, best = b;
   }
   if (best == 0) {
-    std::nth_element(begin, begin + half, end,
-                     [&](const Item& x, const Item& y) { return twiceMiddle(x) < twiceMiddle(y); });
+    const auto twiceMiddle = [&](std::uint32_t i) { return items_[i].lo[axis] + items_[i].hi[axis]; };
+    std::nth_element(order, order + half, order + piece.count,
+                     [&](std::uint32_t x, std::uint32_t y) { return twiceMiddle(x) < twiceMiddle(y); });
     return half;
   }
-  return static_cast<std::uint32_t>(std::partition(begin, end, [&](const Item& i) { return binOf(i) < best; }) - begin);
+  // Without a branch, which would be guessed wrong half of the time.
+  std::uint32_t before = 0, behind = 0;
+  for (std::uint32_t i = 0; i < piece.count; ++i) {
+    const bool is_before = bins_[i] < best;
+    const std::uint32_t item = order[i];
+    order[before] = item;
+    order_room_[behind] = item;
+    before += is_before;
+    behind += !is_before;
+  }
+  std::copy_n(order_room_, behind, order + before);
+  return before;
 }
 
 std::uint32_t BulkBuilder::addBlock(Piece piece) {
   Piece parts[8] = {piece};
   std::uint32_t count = 1;
   while (count < 8) {
-    Piece& largest =
-        *std::max_element(parts, parts + count, [](const Piece& x, const Piece& y) { return x.count < y.count; });
-    if (largest.count <= kSmallPiece) break;
-    const std::uint32_t first = split(largest);
-    parts[count++] = {largest.begin + first, largest.count - first};
-    largest.count = first;
+    Piece* largest = nullptr;
+    for (Piece& part : parts) {
+      if (part.count > (largest != nullptr ? largest->count : 0) && part.count > kSmallPiece) largest = &part;
+    }
+    if (largest == nullptr) break;
+    const std::uint32_t first = split(*largest);
+    parts[count++] = {largest->begin + first, largest->count - first};
+    largest->count = first;
   }
   const auto number = static_cast<std::uint32_t>(blocks_.size());
   blocks_.emplace_back();
@@ -249,53 +294,27 @@ std::uint32_t BulkBuilder::addBlock(Piece piece) {
   return number;
 }
 
-void BulkBuilder::fillRows(const oracle::Surface& surface, bool all) {
-  const std::size_t count = items_.size(), stride = count + kRowPad;
-  ids_.resize(count);
-  rows_.resize(9 * stride);
-  const Mesh& mesh = *surface.mesh;
-  const Eigen::Vector3d origin = surface.lattice.origin();
-  const double inverse_unit = surface.lattice.inverseUnit();
-  for (std::size_t i = 0; i < count; ++i) {
-    ids_[i] = bitsOf(items_[i].lo[3]);
-    const Mesh::Indices& v = mesh.indices(ids_[i]);
-    for (std::size_t k = 0; k < 3; ++k) {
-      if (all) {
-        const float* const place = &places_[4 * std::size_t{v[k]}];
-        for (std::size_t c = 0; c < 3; ++c) rows_[(3 * k + c) * stride + i] = place[c];
-      } else {
-        const Eigen::Vector3d p = (mesh.vertex(v[k]) - origin) * inverse_unit - base_;
-        for (std::size_t c = 0; c < 3; ++c)
-          rows_[(3 * k + c) * stride + i] = static_cast<float>(p[static_cast<int>(c)]);
-      }
-    }
-  }
+CornerRows BulkBuilder::rows() const {
+  CornerRows rows;
+  for (std::size_t k = 0; k < 9; ++k) rows.row[k] = rows_ + k * (count_ + kRowPad);
+  return rows;
 }
 
-BulkBuilder::Bounds BulkBuilder::boundsOf(Piece piece) const {
-  V4 lo = load(items_[piece.begin].lo), hi = load(items_[piece.begin].hi);
-  for (std::uint32_t i = piece.begin + 1; i < piece.begin + piece.count; ++i) {
-    lo = lo.min(load(items_[i].lo));
-    hi = hi.max(load(items_[i].hi));
-  }
-  Bounds b;
-  Eigen::Map<V4>(b.lo) = lo;
-  Eigen::Map<V4>(b.hi) = hi;
-  CornerRows rows;
-  for (std::size_t k = 0; k < 9; ++k) rows.row[k] = rows_.data() + k * (items_.size() + kRowPad);
-  sumNormals(rows, piece.begin, piece.count, b.normal);
+PieceBounds BulkBuilder::boundsOf(Piece piece) const {
+  PieceBounds b = boundPiece(rows(), piece.begin, piece.count);
+  Eigen::Map<V4>(b.lo) = load(b.lo).max(least_);
+  Eigen::Map<V4>(b.hi) = load(b.hi).min(most_);
   return b;
 }
 
 // Children come after their parents, so one backward pass sees them first.
 void BulkBuilder::boundBlocks() {
-  CornerRows rows;
-  for (std::size_t k = 0; k < 9; ++k) rows.row[k] = rows_.data() + k * (items_.size() + kRowPad);
+  const CornerRows rows = this->rows();
   block_bounds_.resize(blocks_.size());
   const double margin = marginOf(size_);
   for (std::size_t number = blocks_.size(); number-- > 0;) {
     Block& block = blocks_[number];
-    Bounds lanes[8], &own = block_bounds_[number];
+    PieceBounds lanes[8], &own = block_bounds_[number];
     for (std::uint32_t o = 0; o < block.lanes; ++o) {
       const Lane& lane = block.lane[o];
       lanes[o] = lane.block == kNone ? boundsOf({lane.begin, lane.count}) : block_bounds_[lane.block];
@@ -316,7 +335,12 @@ void BulkBuilder::boundBlocks() {
     corner(own.lo, -margin, lo);
     corner(own.hi, margin, hi);
     block.frame = bounds::LooseFrame::of(lo, hi);
+    std::uint32_t count = 0;
+    for (std::uint32_t o = 0; o < block.lanes; ++o) count += block.lane[o].count;
     for (std::uint32_t o = 0; o < block.lanes; ++o) {
+      if (count > kMostInEnd && block.lane[o].count <= kMostInEnd) {
+        ends_.push_back({{block.lane[o].begin, block.lane[o].count}, lanes[o]});
+      }
       bounds::LooseBounds& b = block.bounds[o];
       corner(lanes[o].lo, -margin, lo);
       corner(lanes[o].hi, margin, hi);
@@ -335,20 +359,105 @@ void BulkBuilder::boundBlocks() {
   }
 }
 
-void BulkBuilder::finish() {
+// Calls f with the pieces that supports are sought by.
+template <typename F>
+void BulkBuilder::withEnds(F&& f) const {
+  const std::size_t stride = ends_.size() + kRowPad;
+  std::vector<float> center(3 * stride, 0), half(3 * stride, -kInfinity);
+  std::vector<std::array<std::uint32_t, 2>> pieces;
+  for (std::size_t i = 0; i < ends_.size(); ++i) {
+    const PieceBounds& b = ends_[i].bounds;
+    pieces.push_back({ends_[i].piece.begin, ends_[i].piece.count});
+    for (std::size_t c = 0; c < 3; ++c) {
+      center[c * stride + i] = (b.lo[c] + b.hi[c]) / 2;
+      half[c * stride + i] = (b.hi[c] - b.lo[c]) / 2;
+    }
+  }
+  f(BoundedPieces{pieces.data(), pieces.size(), stride, center.data(), half.data()});
+}
+
+void BulkBuilder::findSupports(SupportTable& supports) const {
+  const CornerRows rows = this->rows();
+  const double margin = 3 * marginOf(size_);
+  const Eigen::Vector3d base = base_.array() - lattice::kMiddle;
+  withEnds([&](const BoundedPieces& ends) {
+    for (int number = 0; number < SupportTable::kCount; ++number) {
+      const Eigen::Vector3d direction = SupportTable::direction(number);
+      const float n[3] = {static_cast<float>(direction[0]), static_cast<float>(direction[1]),
+                          static_cast<float>(direction[2])};
+      const auto most = static_cast<double>(farthestAlong(rows, ends, n));
+      supports.lower(number, most + direction.dot(base) + margin);
+    }
+  });
+}
+
+Eigen::Matrix3d BulkBuilder::principalAxes() const {
+  Eigen::Vector3d sum = Eigen::Vector3d::Zero();
+  Eigen::Matrix3d products = Eigen::Matrix3d::Zero();
+  constexpr std::size_t kFew = 256;  // sums of more would be lost in float
+  for (std::size_t begin = 0; begin < place_count_; begin += kFew) {
+    V4 first = all(0), square = all(0), turned = all(0);
+    for (std::size_t i = begin; i < std::min(begin + kFew, place_count_); ++i) {
+      const V4 p = Eigen::Map<const V4>(places_ + 4 * i);
+      first += p;
+      square += p * p;
+      turned += p * V4(p[1], p[2], p[0], 0);
+    }
+    sum += first.head<3>().matrix().cast<double>();
+    for (int k = 0; k < 3; ++k) {
+      products(k, k) += static_cast<double>(square[k]);
+      products(k, (k + 1) % 3) += static_cast<double>(turned[k]);
+      products((k + 1) % 3, k) += static_cast<double>(turned[k]);
+    }
+  }
+  const auto count = static_cast<double>(place_count_);
+  return Eigen::SelfAdjointEigenSolver<Eigen::Matrix3d>(products / count - sum * sum.transpose() / (count * count))
+      .eigenvectors();
+}
+
+Outline::Box BulkBuilder::findOutline(const lattice::Lattice& lattice) const {
+  const CornerRows rows = this->rows();
+  Outline::Box best;
+  double best_area = std::numeric_limits<double>::infinity();
+  withEnds([&](const BoundedPieces& ends) {
+    for (const Eigen::Matrix3d& axes : {Eigen::Matrix3d(Eigen::Matrix3d::Identity()), principalAxes()}) {
+      if (!axes.allFinite()) continue;
+      Eigen::Vector3d center = base_, half;
+      for (int k = 0; k < 3; ++k) {
+        double ends_at[2];
+        for (const int sign : {-1, 1}) {
+          float n[3];
+          for (int c = 0; c < 3; ++c) n[c] = static_cast<float>(sign * axes(c, k));
+          ends_at[sign > 0] = sign * (static_cast<double>(farthestAlong(rows, ends, n)) + 3 * marginOf(size_));
+        }
+        center += axes.col(k) * (ends_at[0] + ends_at[1]) / 2;
+        half[k] = (ends_at[1] - ends_at[0]) / 2;
+      }
+      const double area = half[0] * half[1] + half[1] * half[2] + half[2] * half[0];
+      if (!(area < best_area)) continue;
+      best_area = area;
+      best = Outline::boxOf(lattice.origin() + lattice.unit() * center, axes, lattice.unit() * half);
+    }
+  });
+  return best;
+}
+
+void BulkBuilder::finish(const Mesh::Indices* indices, const std::uint32_t* numbers) {
   own_ = Own();
-  if (items_.empty()) return;
+  ends_.clear();
+  if (ids_.empty()) return;
+  gatherCorners(indices, places_, numbers, count_, rows_, count_ + kRowPad);
   boundBlocks();
-  const Piece whole{0, static_cast<std::uint32_t>(items_.size())};
-  const Bounds bounds = blocks_.empty() ? boundsOf(whole) : block_bounds_[0];
+  const Piece whole{0, static_cast<std::uint32_t>(ids_.size())};
+  const PieceBounds bounds = blocks_.empty() ? boundsOf(whole) : block_bounds_[0];
+  if (ends_.empty()) ends_.push_back({whole, bounds});
   const double margin = marginOf(size_);
   for (int k = 0; k < 3; ++k) {
     own_.box.min()[k] = static_cast<double>(bounds.lo[k]) + base_[k] - margin;
     own_.box.max()[k] = static_cast<double>(bounds.hi[k]) + base_[k] + margin;
   }
   if (whole.count > kMostInSlab || !bounds::byteNormal(bounds.normal, own_.normal)) return;
-  CornerRows rows;
-  for (std::size_t k = 0; k < 9; ++k) rows.row[k] = rows_.data() + k * (items_.size() + kRowPad);
+  const CornerRows rows = this->rows();
   float n[3], least, most;
   for (int k = 0; k < 3; ++k) n[k] = static_cast<float>(own_.normal[k]);
   extremesAlong(rows, 0, whole.count, n, least, most);

@@ -4,11 +4,16 @@
 #include <Eigen/Geometry>
 #include <cstddef>
 #include <cstdint>
+#include <memory>
 #include <vector>
 
 #include "bounds/loose_frame.h"
 #include "oracle/surface.h"
 #include "tree/block.h"
+#include "tree/bulk_kernels.h"
+#include "tree/huge_pages.h"
+#include "tree/outline.h"
+#include "tree/support_table.h"
 
 namespace bocst::tree {
 
@@ -39,13 +44,22 @@ class BulkBuilder {
     double least = 0, most = 0;  ///< normal . p, of points p in lattice units.
   };
 
-  /// Sorts those of `count` triangles that meet `region` (lattice units), and makes the blocks over them; none where
-  /// they fit a leaf.
+  /// Makes the blocks over those of `count` triangles that meet `region` (lattice units); none where they fit a leaf.
+  /// Boxes are divided by the surface area heuristic.
   void build(const oracle::Surface& surface, const std::uint32_t* ids, std::size_t count,
              const Eigen::AlignedBox3d& region);
 
-  /// The same for all triangles of the surface.
+  /// The same for all triangles of a larger surface, which are first sorted along a Z-order curve: only pieces of few
+  /// triangles are divided by the heuristic.
+  /// @throws std::length_error for less than kLeastToSort triangles, or more than kMostToSort vertices.
   void buildAll(const oracle::Surface& surface);
+  static constexpr std::size_t kLeastToSort = 4096, kMostToSort = std::size_t{1} << 29;
+
+  /// Lowers all supports to those of the triangles that were built.
+  void findSupports(SupportTable& supports) const;
+
+  /// A box along the principal axes of their vertices or along those of the frame, which is smaller.
+  Outline::Box findOutline(const lattice::Lattice& lattice) const;
 
   const std::vector<std::uint32_t>& ids() const { return ids_; }
   /// Parents come before their children; the first is the node's.
@@ -53,41 +67,51 @@ class BulkBuilder {
   const Own& own() const { return own_; }
 
  private:
-  struct Item {
-    float lo[4], hi[4];  // the box in the region; the last entries are the triangle's bits, and any
-  };
   struct Piece {
     std::uint32_t begin, count;
   };
-  struct Bounds {
-    float lo[4], hi[4];
-    float normal[3];
-  };
-  struct Key {
-    std::uint32_t code, id;
+  struct End {
+    Piece piece;
+    PieceBounds bounds;
   };
 
-  void addItem(const Eigen::Array4f& a, const Eigen::Array4f& b, const Eigen::Array4f& c, std::uint32_t id);
-  void sortItems();
-  void finish();
+  void makeRoom(std::size_t triangles, std::size_t places);
+  void sortKeys(int bits);
+  void divide();
   std::uint32_t addBlock(Piece piece);
   std::uint32_t split(Piece piece);
-  void fillRows(const oracle::Surface& surface, bool all);
+  std::uint32_t splitByArea(Piece piece);
+  void finish(const Mesh::Indices* indices, const std::uint32_t* numbers);
+  CornerRows rows() const;
+  template <typename F>
+  void withEnds(F&& f) const;
+  Eigen::Matrix3d principalAxes() const;
+  PieceBounds boundsOf(Piece piece) const;
   void boundBlocks();
-  Bounds boundsOf(Piece piece) const;
 
-  std::vector<Item> items_, items_room_;
-  std::vector<Key> keys_, keys_room_;
+  // Where what is below lies, for `count_` triangles.
+  std::unique_ptr<std::byte[]> few_pages_;
+  oracle::HugePages huge_pages_;
+  std::byte* memory_ = nullptr;
+  std::size_t room_ = 0, count_ = 0, place_count_ = 0;
+  float* places_;  // four each: of vertices, or of corners
+  SortKey *keys_, *keys_room_;
+  std::uint32_t* given_;                    // triangles, before they are divided
+  TriangleBox* items_;                      // and their boxes in the region
+  std::uint32_t *order_, *order_room_;      // of the items in the blocks
+  std::uint8_t* bins_;                      // of the items of a piece
+  float* rows_;                             // nine rows of corners
+  std::vector<Mesh::Indices> own_corners_;  // places of the corners where each triangle has its own
+
   std::vector<std::uint32_t> ids_;
-  std::vector<float> places_;  // of vertices, four floats each
-  std::vector<float> rows_;    // nine rows of corners
-  std::vector<Bounds> block_bounds_;
+  std::vector<PieceBounds> block_bounds_;
+  std::vector<End> ends_;  // pieces that supports are sought by
   std::vector<Block> blocks_;
   Own own_;
   Eigen::Vector3d base_;         // of the float coordinates, whole lattice units
   Eigen::Array4f least_, most_;  // the region
   float size_ = 0;               // largest float coordinate, in absolute value
-  bool sorted_ = false;          // keys_ are those of items_
+  bool is_sorted_ = false;       // items lie along keys_
 };
 
 }  // namespace bocst::tree

@@ -82,7 +82,7 @@ void Tree::keepOnly(const std::vector<std::uint8_t>& keep) {
     grid_known_.store(nullptr, std::memory_order_relaxed);
     grid_.reset();
     grid_tried_ = false;
-    growth_work_ = 0;
+    startRent();
     root_.store(ChildRef(), std::memory_order_relaxed);
     blocks_.clear();
     records_.clear();
@@ -203,7 +203,7 @@ void Tree::afterQuery(std::int64_t now) {
   const bool refits = refits_wait_.load(std::memory_order_relaxed);
   const bool over_budget = options_.memory_budget != 0 && bytes_ > options_.memory_budget;
   std::int64_t due = next_prune_.load(std::memory_order_relaxed);
-  bool time_to = options_.ttl.count() > 0 && now >= due;
+  bool time_to = isPruneDue(now);
   if (time_to) {
     // A quarter of ttl between looks keeps the cost away from queries; whoever moves the time does the work.
     const std::int64_t step = std::chrono::duration_cast<std::chrono::nanoseconds>(options_.ttl).count() / 4 + 1;

@@ -14,12 +14,36 @@ namespace {
 constexpr double kMost = 65535;
 constexpr int kExponentBias = 127;  // that of a float, 23 bits up
 
-using Place = std::array<std::uint16_t, 3>;
+// Numbers the different vertices of at most kMostPlaces corners in the order in which they come.
+class VertexNumbers {
+ public:
+  std::uint8_t number(std::uint32_t vertex) {
+    for (std::size_t at = vertex * 0x9e3779b1u >> 24;; at = (at + 1) % kSlots) {
+      const std::uint8_t found = slots_[at];
+      if (found == kFree) {
+        slots_[at] = static_cast<std::uint8_t>(count_);
+        vertices_[count_] = vertex;
+        return static_cast<std::uint8_t>(count_++);
+      }
+      if (vertices_[found] == vertex) return found;
+    }
+  }
+  std::size_t count() const { return count_; }
+  std::uint32_t vertex(std::size_t number) const { return vertices_[number]; }
 
-Place placeOf(const Eigen::Vector3d& at) {
-  const auto q = [&at](int c) { return static_cast<std::uint16_t>(std::clamp(std::round(at[c]), 0.0, kMost)); };
-  return {q(0), q(1), q(2)};
-}
+ private:
+  static constexpr std::size_t kSlots = 256;
+  static constexpr std::uint8_t kFree = 0xff;
+  std::array<std::uint8_t, kSlots> slots_ = filled();
+  std::array<std::uint32_t, PackedTriangles::kMostPlaces> vertices_;
+  std::size_t count_ = 0;
+
+  static std::array<std::uint8_t, kSlots> filled() {
+    std::array<std::uint8_t, kSlots> slots;
+    slots.fill(kFree);
+    return slots;
+  }
+};
 
 }  // namespace
 
@@ -43,9 +67,19 @@ std::size_t PackedTriangles::words(std::size_t count, std::size_t places) {
 
 std::vector<std::uint32_t> PackedTriangles::pack(const oracle::Surface& surface,
                                                  const std::vector<std::uint32_t>& ids) {
+  VertexNumbers numbers;
+  std::array<std::uint8_t, kMostPlaces> corners;
+  for (std::size_t k = 0; k < 3; ++k) {
+    for (std::size_t i = 0; i < ids.size(); ++i) {
+      corners[k * ids.size() + i] = numbers.number(surface.mesh->indices(ids[i])[k]);
+    }
+  }
+  const std::size_t count = numbers.count();
+  std::array<Eigen::Vector3d, kMostPlaces> places;
   Eigen::AlignedBox3d box;
-  for (const std::uint32_t t : ids) {
-    for (int k = 0; k < 3; ++k) box.extend(surface.corner(t, k));
+  for (std::size_t i = 0; i < count; ++i) {
+    places[i] = surface.lattice.toLattice(surface.mesh->vertex(numbers.vertex(i)));
+    box.extend(places[i]);
   }
   // The surface lies in the lattice, but for rounding.
   const Eigen::Vector3d origin = box.min().array().floor().max(0.0).min(kMost);
@@ -53,31 +87,21 @@ std::vector<std::uint32_t> PackedTriangles::pack(const oracle::Surface& surface,
   const int exponent = static_cast<int>(std::ceil(std::log2(std::max(extent, 0x1p-8) / kMost)));
   const double inverse_step = std::ldexp(1.0, -exponent);
 
-  std::vector<Place> places;
-  std::vector<std::uint8_t> corners;
-  places.reserve(kMostPlaces);
-  for (int k = 0; k < 3; ++k) {
-    for (const std::uint32_t t : ids) {
-      const Place place = placeOf((surface.corner(t, k) - origin) * inverse_step);
-      const auto known = std::find(places.begin(), places.end(), place);
-      corners.push_back(static_cast<std::uint8_t>(known - places.begin()));
-      if (known == places.end()) places.push_back(place);
-    }
-  }
-
-  std::vector<std::uint32_t> words(PackedTriangles::words(ids.size(), places.size()));
+  std::vector<std::uint32_t> words(PackedTriangles::words(ids.size(), count));
   const auto at = [&origin](int k) { return static_cast<std::uint32_t>(origin[k]); };
-  words[0] = static_cast<std::uint32_t>(places.size()) | static_cast<std::uint32_t>(exponent + kExponentBias) << 8 |
-             at(0) << 16;
+  words[0] =
+      static_cast<std::uint32_t>(count) | static_cast<std::uint32_t>(exponent + kExponentBias) << 8 | at(0) << 16;
   words[1] = at(1) | at(2) << 16;
   auto* to = reinterpret_cast<char*>(words.data() + kHeader);
-  for (std::size_t c = 0; c < 3; ++c) {
-    for (const Place& place : places) {
-      std::memcpy(to, &place[c], sizeof(place[c]));
-      to += sizeof(place[c]);
+  for (int c = 0; c < 3; ++c) {
+    for (std::size_t i = 0; i < count; ++i) {
+      const double steps = std::min(std::max((places[i][c] - origin[c]) * inverse_step, 0.0), kMost);
+      const auto rounded = static_cast<std::uint16_t>(steps + 0.5);
+      std::memcpy(to, &rounded, sizeof(rounded));
+      to += sizeof(rounded);
     }
   }
-  std::memcpy(to, corners.data(), corners.size());
+  std::memcpy(to, corners.data(), 3 * ids.size());
   return words;
 }
 

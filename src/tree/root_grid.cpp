@@ -355,43 +355,6 @@ void RootGrid::gather(const Surface& surface, const lattice::Cell& cell, std::ve
   });
 }
 
-bool RootGrid::gather(const Surface& surface, const lattice::Cell& cell, std::size_t most,
-                      std::vector<std::uint32_t>& ids) const {
-  return !anyCandidate(surface, cell, [&ids, most](std::uint32_t t) {
-    if (ids.size() == most) return true;
-    ids.push_back(t);
-    return false;
-  });
-}
-
-CellBounds RootGrid::tightBounds(const Surface& surface, const lattice::Cell& cell) const {
-  const double half = cell.side() / 2.0;
-  const auto corner = cell.corner();
-  const Eigen::Vector3d center(corner[0] + half, corner[1] + half, corner[2] + half);
-  thread_local OctantAccumulator seen;
-  seen.clear();
-  anyCandidate(surface, cell, [&](std::uint32_t t) {
-    Polygon<LocalPoint> whole;
-    for (int k = 0; k < 3; ++k) {
-      LocalPoint p = LocalPoint::Zero();
-      p.head<3>() = ((surface.corner(t, k) - center) / half).cast<float>();
-      whole.add(p);
-    }
-    seen.add(whole, true);
-    return false;
-  });
-  const OctantAccumulator* const all[] = {&seen};
-  CellBounds b = OctantAccumulator::bounds(all, 1, Eigen::Vector3d::Zero(), 2);
-  if (b.normal == CellBounds().normal) {
-    // No slab is thinner than the cell: the box is one, too, and says that we have looked.
-    const double lo = 127 * (b.lo[0] / 255.0 - 0.5), hi = 127 * (b.hi[0] / 255.0 - 0.5);
-    b.normal[0] = 127;
-    b.slab_center = static_cast<std::int8_t>(std::round((lo + hi) / 2));
-    b.slab_half = static_cast<std::uint8_t>(std::min(std::ceil(hi - lo) + 2, 255.0));
-  }
-  return b;
-}
-
 std::size_t RootGrid::bytes() const {
   return sizeof(*this) + rows_.capacity() * sizeof(Row) + roundedUp(triangle_count_) * sizeof(back_[0]) +
          far_.capacity() * sizeof(Far) +

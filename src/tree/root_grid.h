@@ -38,14 +38,6 @@ class RootGrid {
   /// Appends the triangles that may meet a cell of the finest level (a superset), each once, in no order.
   void gather(const Surface& surface, const lattice::Cell& cell, std::vector<std::uint32_t>& ids) const;
 
-  /// The same, but false when `ids` would come to hold more than `most`.
-  bool gather(const Surface& surface, const lattice::Cell& cell, std::size_t most,
-              std::vector<std::uint32_t>& ids) const;
-
-  /// Box and slab of the surface in a cell of the finest level, without expanding it: of whole triangles, so not as
-  /// tight as an oracle's, and never without a slab.
-  CellBounds tightBounds(const Surface& surface, const lattice::Cell& cell) const;
-
   /// Heap bytes.
   std::size_t bytes() const;
 

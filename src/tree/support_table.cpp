@@ -30,8 +30,9 @@ void SupportTable::start(const Eigen::AlignedBox3d& box) {
   for (int n = 0; n < kCount; ++n) {
     const Eigen::Vector3d d = direction(n);
     const auto i = static_cast<std::size_t>(n);
-    values_[i].store(roundedUp(d.dot(center) + d.cwiseAbs().dot(half)), std::memory_order_relaxed);
-    known_[i].store(false, std::memory_order_relaxed);
+    // The terms may cancel, their rounding does not.
+    const double margin = 1e-9 * d.cwiseAbs().dot(center.cwiseAbs() + half);
+    values_[i].store(roundedUp(d.dot(center) + d.cwiseAbs().dot(half) + margin), std::memory_order_relaxed);
   }
 }
 
@@ -44,7 +45,6 @@ void SupportTable::lower(int number, double value) {
   const Eigen::Vector3f d = direction(number).cast<float>();
   const float radius = (rounded - d.dot(center_)) / d.norm();
   if (radius < innerRadius()) inner_radius_.store(radius, std::memory_order_relaxed);
-  known_[i].store(true, std::memory_order_relaxed);
 }
 
 }  // namespace bocst::tree

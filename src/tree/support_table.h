@@ -43,17 +43,13 @@ class SupportTable {
     return reinterpret_cast<const float*>(values_.data());
   }
 
-  /// Not yet as good as the tree can say.
-  bool isOpen(int number) const { return !known_[static_cast<std::size_t>(number)].load(std::memory_order_relaxed); }
-
-  /// The surface reaches no farther; the tree can say no more of it.
+  /// The surface reaches no farther.
   void lower(int number, double value);
 
  private:
   Eigen::Vector3f center_ = Eigen::Vector3f::Zero();
   std::atomic<float> inner_radius_{0};
   std::array<std::atomic<float>, kCount> values_{};
-  std::array<std::atomic<bool>, kCount> known_{};
 };
 
 }  // namespace bocst::tree

@@ -17,9 +17,9 @@
 namespace bocst::tree {
 namespace {
 
-// Growth by parts costs some two to four times as much a triangle as building all at once, the wider walks between
-// bounds that are still loose included.
-constexpr std::size_t kRent = 4;
+// Growth by parts costs some four times as much a triangle as building all at once, the wider walks between bounds that
+// are still loose included; `bench --scenarios fresh` is the same to 5 % from 6 to 16.
+constexpr std::size_t kRent = 8;
 // What a thread keeps of a build's memory for the next one, in triangles.
 constexpr std::size_t kMostKept = 1 << 17;
 // A device is not asked about fewer triangles: the host builds what is below them sooner than a batch comes back.
@@ -132,6 +132,8 @@ void Tree::reset(std::shared_ptr<const Mesh> mesh) {
   setBox(box, lattice::Cell{}, root_bounds_);
   const Eigen::Vector3d middle = Eigen::Vector3d::Constant(lattice::kMiddle);
   supports_.start({box.min() - middle, box.max() - middle});
+  supports_known_ = false;
+  outline_.set(Outline::boxOf(surface_.bounds.center(), Eigen::Matrix3d::Identity(), surface_.bounds.sizes() / 2));
   keepOnly({});
 }
 
@@ -221,12 +223,7 @@ void Tree::grow(std::vector<Growth>& batch, bool wait) {
     if (ref.tag() == ChildRef::kBlock) continue;
     if (g.list_suffices && ref.tag() == ChildRef::kShortList) continue;
     if (g.node.isRoot()) tree.growRoot();
-    if (g.list_suffices) {
-      // A device has grown what is above the parts, so that the host has little to gain.
-      const bool on_host = tree.oracle_->kind() == OracleKind::kCpu;
-      if (on_host && tree.growth_work_ > tree.surface_.triangle_count / kRent && !tree.isWhole()) tree.growWhole();
-      if (tree.growInBulk(g.node, scratch)) continue;
-    }
+    if (g.list_suffices && tree.growInBulk(g.node, scratch)) continue;
     const lattice::Cell cell = tree.cell(g.node);
     if (tree.grid_ != nullptr && cell.level < tree.grid_->level()) {
       tree.growFromGrid(g.node);
@@ -314,7 +311,7 @@ void Tree::askFor(std::uint32_t list, oracle::ExpansionRequest& request, std::ve
 
 void Tree::growRoot() {
   if (surface_.device == nullptr) surface_.device = oracle_->makeResident(surface_);
-  if (grid_tried_ || oracle_->kind() != OracleKind::kCpu) return;
+  if (grid_tried_ || !growsOnHost()) return;
   grid_tried_ = true;
   grid_ = oracle::RootGrid::make(surface_, deepest_);
   if (grid_ == nullptr) return;
@@ -367,10 +364,10 @@ bool Tree::growInBulk(NodeRef node, std::vector<std::uint32_t>& ids) {
   if (ref.isList()) {
     const TriangleList list = this->list(ref);
     // A lane is no cell, so an oracle can't be asked about it.
-    const bool is_for_host = oracle_->kind() == OracleKind::kCpu || isLoose(node) || list.count <= kHostTriangles;
+    const bool is_for_host = growsOnHost() || isLoose(node) || list.count <= kHostTriangles;
     if (!list.ids.areKnown() || !is_for_host) return false;
     list.appendTo(ids);
-  } else if (oracle_->kind() != OracleKind::kCpu) {
+  } else if (!growsOnHost()) {
     return false;
   } else if (grid_ != nullptr) {
     if (cell(node).level < grid_->level()) return false;
@@ -379,7 +376,7 @@ bool Tree::growInBulk(NodeRef node, std::vector<std::uint32_t>& ids) {
     growWhole();
     return true;
   }
-  growth_work_ += ids.size();
+  payRent(ids.size());
   built_ += ids.size();
   const bool is_loose = isLoose(node);
   Eigen::AlignedBox3d region;
@@ -401,11 +398,38 @@ bool Tree::growInBulk(NodeRef node, std::vector<std::uint32_t>& ids) {
   return true;
 }
 
+void Tree::startRent() {
+  rent_ = 0;
+  price_ = conservative() ? kNever : surface_.triangle_count / kRent;
+}
+
+void Tree::buildNow() {
+  const std::unique_lock<ForkAwareMutex> lock(growth_, std::try_to_lock);
+  if (!lock.owns_lock() || !isBuildDue()) return;
+  growWhole();
+  countBytes();
+}
+
 // All of the tree that exact answers need. Queries under way go on in the old blocks.
 void Tree::growWhole() {
   thread_local BulkBuilder bulk;
-  bulk.buildAll(surface_);
+  if (surface_.triangle_count >= BulkBuilder::kLeastToSort &&
+      surface_.mesh->vertexCount() <= BulkBuilder::kMostToSort) {
+    bulk.buildAll(surface_);
+  } else {
+    std::vector<std::uint32_t> ids(surface_.triangle_count);
+    std::iota(ids.begin(), ids.end(), 0u);
+    bulk.build(surface_, ids.data(), ids.size(), latticeBounds(surface_));
+  }
   built_ += surface_.triangle_count;
+  price_ = kNever;
+  if (!supports_known_) {
+    bulk.findSupports(supports_);
+    outline_.set(bulk.findOutline(surface_.lattice));
+    supports_known_ = true;
+  }
+  // A device has grown what is above the parts, so the host would gain little by new blocks.
+  if (!growsOnHost()) return;
   for (auto& n : nodes_at_) n = 0;
   nodes_at_[1] = 1;
   setChild(NodeRef(), bulk.blocks().empty() ? addList(bulk.ids().data(), bulk.ids().size(), true)
@@ -541,22 +565,6 @@ void Tree::publish(NodeRef node, const oracle::ExpansionRequest& answer) {
 void Tree::gatherNode(NodeRef node, const lattice::Cell& cell, std::vector<std::uint32_t>& ids) const {
   if (node.isRoot() || grid_ == nullptr) throw std::logic_error("bocst: an implicit list without a grid");
   grid_->gather(surface_, cell, ids);
-}
-
-bool Tree::trianglesOf(NodeRef node, std::size_t most, std::vector<std::uint32_t>& ids) const {
-  ids.clear();
-  const ChildRef ref = this->childRef(node);
-  if (ref.isList()) {
-    const TriangleList list = this->list(ref);
-    if (!list.ids.areKnown() || list.count > most) return false;
-    list.appendTo(ids);
-    return true;
-  }
-  const oracle::RootGrid* grid = grid_known_.load(std::memory_order_acquire);
-  if (grid == nullptr || isLoose(node)) return false;
-  const lattice::Cell cell = this->cell(node);
-  if (ref.tag() != ChildRef::kImplicit || cell.level != grid->level()) return false;
-  return grid->gather(surface_, cell, most, ids);
 }
 
 void Tree::prune(Clock::time_point now) {

@@ -18,6 +18,7 @@
 #include "mesh/solid.h"
 #include "oracle/oracle.h"
 #include "tree/block.h"
+#include "tree/outline.h"
 #include "tree/pool.h"
 #include "tree/root_grid.h"
 #include "tree/sharded_lock.h"
@@ -43,6 +44,15 @@ class Tree {
   const oracle::Oracle& oracle() const { return *oracle_; }
   ShardedLock& queryLock() const { return query_lock_; }
 
+  /// A box about the surface; without a lock.
+  const Outline& outline() const { return outline_; }
+  /// Is it time that a query looks for branches to drop? Without a lock.
+  bool isPruneDue(std::int64_t now) const {
+    return options_.ttl.count() > 0 && now >= next_prune_.load(std::memory_order_relaxed);
+  }
+  /// Has nodes beside the root? Without a lock.
+  bool hasBranches() const { return root_.load(std::memory_order_relaxed).tag() == ChildRef::kBlock; }
+
   // While the query lock is held, shared or alone.
 
   const oracle::Surface& surface() const { return surface_; }
@@ -63,20 +73,18 @@ class Tree {
   /// Box and slab of the root; those of other nodes are in their parents' blocks.
   const oracle::CellBounds& rootBounds() const { return root_bounds_; }
   TriangleList list(ChildRef ref) const { return lists_[ref.index()]; }
-  /// Fills `ids` with the triangles of a node without children, or a superset; false where they are not known here or
-  /// more than `most`.
-  bool trianglesOf(NodeRef node, std::size_t most, std::vector<std::uint32_t>& ids) const;
   const TriangleLists& lists() const { return lists_; }
-  /// How far the surface reaches in any direction; what is known of it, for queries to use and to better.
-  SupportTable& supports() const { return supports_; }
-  /// Triangles were looked at that a whole tree would have spared: they bring the time nearer at which it is built.
+  /// How far the surface reaches in any direction: that of its box, or exact once all was built at once.
+  const SupportTable& supports() const { return supports_; }
+  /// Work was done that a whole tree would have spared, in triangles grown by parts: it brings the time nearer at
+  /// which the tree is built at once. A walk between bounds that are still loose costs as much as kWalkRent of them.
+  static constexpr std::size_t kWalkRent = 64;
   void payRent(std::size_t triangles) const {
-    if (!isWhole()) growth_work_.fetch_add(triangles, std::memory_order_relaxed);
+    if (price_.load(std::memory_order_relaxed) != kNever) rent_.fetch_add(triangles, std::memory_order_relaxed);
   }
-  /// Has all been built at once, so that nothing grows any more unless branches are dropped?
-  bool isWhole() const {
-    const ChildRef root = childRef(NodeRef());
-    return root.tag() == ChildRef::kShortList || (root.tag() == ChildRef::kBlock && block(root.index()).isLoose());
+  /// Builds the whole tree when queries have paid as much as that costs. Unless another thread grows it.
+  void buildIfDue() {
+    if (isBuildDue()) buildNow();
   }
   /// No more expansions below this node: a single lattice unit, or the collision depth of conservative answers.
   bool isDeepest(int level) const { return level >= deepest_; }
@@ -148,6 +156,10 @@ class Tree {
                          oracle::ExpansionRequest::DeviceList list);
   ChildRef addOctantList(const oracle::ExpansionRequest& answer, int octant);
   static void ask(std::vector<Growth>& asked, std::vector<oracle::ExpansionRequest>& requests);
+  bool growsOnHost() const { return oracle_->kind() == OracleKind::kCpu; }
+  bool isBuildDue() const { return rent_.load(std::memory_order_relaxed) > price_.load(std::memory_order_relaxed); }
+  void buildNow();
+  void startRent();
   void growRoot();
   void growFromGrid(NodeRef node);
   bool growInBulk(NodeRef node, std::vector<std::uint32_t>& ids);
@@ -182,11 +194,15 @@ class Tree {
   mutable std::atomic<const std::vector<Eigen::Vector3d>*> component_points_known_{nullptr};  // pieces_, for readers
   mutable std::atomic<double> radius_{-1};                                                    // negative: not known yet
   oracle::CellBounds root_bounds_;
-  mutable SupportTable supports_;
+  SupportTable supports_;
+  Outline outline_;
+  bool supports_known_ = false;
   std::unique_ptr<oracle::RootGrid> grid_;
   std::atomic<const oracle::RootGrid*> grid_known_{nullptr};  // grid_, for readers
   bool grid_tried_ = false;
-  mutable std::atomic<std::size_t> growth_work_{0};  // triangles that were looked at because the tree is not whole
+  static constexpr std::size_t kNever = ~std::size_t{0};
+  mutable std::atomic<std::size_t> rent_{0};  // see payRent()
+  std::atomic<std::size_t> price_{kNever};    // the whole tree is built when rent_ is more; kNever once it is
   std::atomic<ChildRef> root_{ChildRef()};
   // Of each block: what walks read, what growth and decay know, and when a query last went through it, in ns of the
   // model's clock. Apart, so that walks have few lines to read.

@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: BSD-3-Clause
 // Margins: surfaces no farther apart than the margin collide. Against distances, and against brute force over
 // triangles.
+#include <bocst/is_closer_than.h>
 #include <fcl/broadphase/broadphase_dynamic_AABB_tree.h>
 #include <fcl/broadphase/default_broadphase_callbacks.h>
 #include <gtest/gtest.h>
@@ -61,6 +62,10 @@ TYPED_TEST(Margin, IsTheDistanceUpToWhichTheyCollide) {
       ASSERT_EQ(test::touching<S>(b, Y, a, X), hit);
       ASSERT_EQ(test::touching<S>(all, X, *bvh, Y), hit);
       ASSERT_EQ(test::touching<S>(*bvh, Y, all, X), hit);
+      const S least = static_cast<S>(margin);
+      ASSERT_EQ(isCloserThan<S>(&a, X, &plain_b, Y, least), hit) << "which knows no margin of the models";
+      ASSERT_EQ(isCloserThan<S>(&plain_b, Y, &plain_a, X, least), hit);
+      ASSERT_EQ(isCloserThan<S>(bvh.get(), Y, &plain_a, X, least), hit);
       ASSERT_EQ(distanceOf<S>(a, X, b, Y), distanceOf<S>(plain_a, X, plain_b, Y)) << "distances know no margin";
     }
   }
@@ -435,6 +440,15 @@ TEST(MarginDouble, SignedDistancesAreThoseOfTheSurfaces) {
       EXPECT_EQ(p.min_distance, w.min_distance);
     }
   }
+}
+
+TEST(IsCloserThan, RefusesWhatIsNoDistance) {
+  const Modeld a(test::torus(9).mesh());
+  const auto I = fcl::Transform3d(fcl::Transform3d::Identity());
+  for (const double bad : {-1.0, std::nan(""), std::numeric_limits<double>::infinity()}) {
+    EXPECT_THROW(isCloserThan<double>(&a, I, &a, I, bad), std::invalid_argument) << bad;
+  }
+  EXPECT_TRUE(isCloserThan<double>(&a, I, &a, I, 0.0));
 }
 
 }  // namespace

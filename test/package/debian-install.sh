@@ -11,7 +11,8 @@ export DEBIAN_FRONTEND=noninteractive
 
 apt-get update -qq
 apt-get install -qq -y --no-install-recommends "$packages"/*.deb
-for package in libbocst0 libbocst-dev bocst python3-bocst; do dpkg -s "$package" | grep '^Status: install ok installed'; done
+library=$(basename "$(echo "$packages"/libbocst[0-9]*.deb)" | cut -d_ -f1)
+for package in "$library" libbocst-dev bocst python3-bocst; do dpkg -s "$package" | grep '^Status: install ok installed'; done
 
 work=$(mktemp -d)
 trap 'rm -rf "$work"' EXIT
@@ -31,6 +32,6 @@ read -ra flags <<<"$(pkg-config --cflags --libs bocst-io bocst)"
 g++ -std=c++17 "$here/main.cpp" "${flags[@]}" -o consumer
 ./consumer
 
-apt-get remove -qq -y libbocst0
+apt-get remove -qq -y "$library"
 for left in /usr/bin/bocst /usr/include/bocst; do [[ ! -e $left ]] || { echo "FAILED: $left is left"; exit 1; }; done
 echo "installed, used and removed"

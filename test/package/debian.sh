@@ -13,7 +13,8 @@ work=$(mktemp -d)
 trap 'rm -rf "$work"' EXIT
 cpack -G DEB --config "$build/CPackConfig.cmake" -B "$work/packages" >"$work/log" 2>&1 || { cat "$work/log"; exit 1; }
 names=(libbocst-dev)
-[[ $(cached BUILD_SHARED_LIBS) != ON ]] || names+=(libbocst0)
+library=libbocst$(sed -n 's/^set(PACKAGE_VERSION "\([0-9]*\.[0-9]*\)\..*/\1/p' "$build/bocstConfigVersion.cmake")
+[[ $(cached BUILD_SHARED_LIBS) != ON ]] || names+=("$library")
 [[ $(cached BOCST_BUILD_TOOLS) != ON ]] || names+=(bocst)
 [[ $(cached BOCST_BUILD_PYTHON) != ON ]] || names+=(python3-bocst)
 
@@ -33,15 +34,19 @@ twice=$(sort "$work"/*.files | uniq -d)
 
 depends() { # PACKAGE ON...
   local on
-  for on in "${@:2}"; do [[ ", $(field "$1" Depends)," == *", $on"[\ ,]* ]] || fail "$1 does not depend on $on"; done
+  for on in "${@:2}"; do [[ ", $(field "$1" Depends)," == *", "${on}[\ ,]* ]] || fail "$1 does not depend on $on"; done
 }
 depends libbocst-dev libfcl-dev libeigen3-dev
 if [[ $(cached BUILD_SHARED_LIBS) == ON ]]; then
-  depends libbocst-dev "libbocst0 (= $version)"
-  depends libbocst0 libfcl0.7 libassimp5 libpugixml1v5 libhwy1
-  [[ ! -s $work/bocst.files ]] || depends bocst "libbocst0 (= $version)" libfcl0.7 libcairo2 libmeshoptimizer2d
-  if grep -E '\.(h|cmake|pc|so)$' "$work/libbocst0.files"; then fail "libbocst0 has files of the dev package"; fi
-  dpkg-deb --ctrl-tarfile "$work/packages/libbocst0"_*.deb | tar -xO ./shlibs | grep -q "^libbocst 0 libbocst0" || fail "no shlibs"
+  depends libbocst-dev "$library (= $version)"
+  depends "$library" "libfcl0.7*" "libassimp5*" "libpugixml1v5*" "libhwy1*"
+  [[ ! -s $work/bocst.files ]] || depends bocst "$library (= $version)" "libfcl0.7*" "libcairo2*" "libmeshoptimizer2*"
+  if grep -E '\.(h|cmake|pc|so)$' "$work/$library.files"; then fail "$library has files of the dev package"; fi
+  dpkg-deb --ctrl-tarfile "$work/packages/$library"_*.deb | tar -xO ./shlibs >"$work/shlibs" || fail "no shlibs"
+  for name in libbocst libbocst_io; do
+    grep -qx "$name ${library#libbocst} $library (>= $version)" "$work/shlibs" || fail "no shlibs of $name"
+    grep -q "/$name\.so\.${library#libbocst}$" "$work/$library.files" || fail "no $name of this soname"
+  done
 fi
 if [[ -s $work/bocst.files ]]; then
   for file in bin/bocst share/man/man1/bocst.1.gz share/bash-completion/completions/bocst; do
@@ -67,5 +72,13 @@ assert bocst.fcl.collide(a, a) == 1
 print("python3-bocst:", bocst.__file__, bocst.__version__)')
   fi
 fi
+
+# Documents and examples, with their places to each other.
+for file in README.md share/doc/design.md share/doc/pictures/pair.png share/examples/planner/planner.cpp; do
+  grep -qx "./usr/share/doc/bocst/$file" "$work/libbocst-dev.files" || fail "libbocst-dev has no $file"
+done
+
+# lintian finds no error and no warning, but for the scripts that CPack adds beside our trigger: they call ldconfig, too.
+lintian --allow-root --suppress-tags maintscript-calls-ldconfig --fail-on error,warning --tag-display-limit 0 "$work/packages"/*.deb || fail "lintian"
 
 "$here/run.sh" "$build" "$work/unpacked/usr"

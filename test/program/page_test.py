@@ -104,6 +104,26 @@ class PageTest(unittest.TestCase):
             self.assertNotEqual(browser.value(COVERAGE), covered[2])
             self.assertEqual(browser.complaints, [])
 
+    def test_faults_are_marked(self):
+        self.report("inspect", LINK, "--depth", "2", "--no-error")
+        with Browser() as browser:
+            browser.open(self.page)
+            self.assertEqual(browser.value("document.getElementById('faults-row').hidden"), True)
+        mesh = os.path.join(self.folder.name, "open.off")
+        with open(mesh, "w", encoding="ascii") as out:  # far from the origin, which must not matter
+            out.write("OFF\n4 2 0\n1000 0 0\n1001 0 0\n1001 1 0\n1000 1 0\n3 0 1 2\n3 0 2 3\n")
+        self.assertEqual(self.report("inspect", mesh, "--depth", "2")["health"]["open_edges"], 4)
+        with Browser() as browser:
+            browser.open(self.page)
+            self.assertEqual(browser.value("document.getElementById('faults-row').hidden"), False)
+            browser.choose("volume", "none")
+            self.keep(browser, "faults")
+            browser.choose("mesh", False)
+            self.assertGreater(browser.value(COVERAGE), 300)
+            browser.choose("faults", False)
+            self.assertEqual(browser.value(COVERAGE), 0)
+            self.assertEqual(browser.complaints, [])
+
     def test_a_large_mesh_is_shown_coarser(self):
         mesh = os.path.join(self.folder.name, "<img src=x onerror=alert(1)>.off")
         torus(mesh, 400)

@@ -5,16 +5,22 @@
 
 #include <algorithm>
 #include <array>
+#include <cmath>
+#include <cstdint>
 #include <map>
 #include <random>
 #include <set>
 #include <string>
 #include <vector>
 
+#include "cli/report.h"
+#include "cli/suggest.h"
 #include "commands/validation.h"
 #include "mesh/health.h"
+#include "mesh/sphere_fit.h"
 #include "mesh/spheres.h"
 #include "meshes.h"
+#include "pairs/poses.h"
 #include "picture/display_mesh.h"
 #include "picture/page.h"
 
@@ -101,6 +107,36 @@ TEST(Health, CountsEachFault) {
   EXPECT_EQ(healthOfRaw(raw).components, 2u);
   EXPECT_EQ(healthOfRaw(test::adversarial()).degenerate_triangles,
             healthOfRaw(exploded(test::adversarial())).degenerate_triangles);
+}
+
+TEST(Health, LocatesEachFault) {
+  test::Raw raw = cube();
+  raw.triangles.pop_back();
+  const fcl::Triangle first = raw.triangles[0];
+  raw.triangles.emplace_back(first[2], first[0], first[1]);
+  raw.triangles.emplace_back(0, 0, 1);
+  raw.vertices.emplace_back(9, 9, 9);
+  raw.vertices.push_back(raw.vertices[3]);
+  const program::Health health = healthOfRaw(raw);
+  const program::Faults& faults = health.faults;
+  const std::uint32_t count = static_cast<std::uint32_t>(raw.triangles.size());
+  EXPECT_EQ(faults.duplicate_triangles, std::vector<std::uint32_t>{count - 2});
+  EXPECT_EQ(faults.degenerate_triangles, std::vector<std::uint32_t>{count - 1});
+  EXPECT_EQ(faults.unused_vertices, (std::vector<std::uint32_t>{8, 9}));
+  EXPECT_EQ(faults.repeated_vertices, std::vector<std::uint32_t>{9});
+  ASSERT_EQ(faults.open_edges.size(), health.open_edges);
+  for (const program::FaultyEdge& edge : faults.open_edges) {
+    ASSERT_EQ(edge.triangles.size(), 1u);
+    const fcl::Triangle& t = raw.triangles[edge.triangles[0]];
+    const std::set<std::size_t> corners{t[0], t[1], t[2]};
+    EXPECT_TRUE(corners.count(edge.vertices[0]) == 1 && corners.count(edge.vertices[1]) == 1);
+  }
+  for (const program::FaultyEdge& edge : faults.non_manifold_edges) {
+    EXPECT_EQ(std::count(edge.triangles.begin(), edge.triangles.end(), 0u), 1);
+    EXPECT_EQ(std::count(edge.triangles.begin(), edge.triangles.end(), count - 2), 1);
+  }
+  // An edge each of the open and the crowded, three of either triangle.
+  EXPECT_EQ(program::faultLines(faults, *raw.mesh()).size(), health.open_edges + health.non_manifold_edges + 6);
 }
 
 TEST(Health, AgreesWithACountByMaps) {
@@ -236,11 +272,73 @@ TEST(Spheres, HoldTheSurface) {
   }
 }
 
+TEST(SphereFit, HoldsTheSurfaceAndKeepsTheTolerance) {
+  for (const test::Raw& raw : {cube(), test::torus(12), test::adversarial()}) {
+    const auto mesh = raw.mesh();
+    const double size = mesh->bounds().sizes().norm();
+    double before = size;
+    for (const std::size_t count : {1u, 2u, 7u, 50u}) {
+      const program::SphereFit fit = program::fitSpheres(*mesh, count, 0);
+      EXPECT_LE(fit.spheres.size(), count);
+      EXPECT_EQ(fit.coverage, 1);
+      EXPECT_LE(fit.protrusion, before * 1.1) << "more spheres protrude less";
+      EXPECT_LE(fit.average_protrusion, fit.protrusion);
+      before = fit.protrusion;
+      // Each corner of each triangle, its centre and its edges' middles are held.
+      for (std::size_t t = 0; t < mesh->triangleCount(); ++t) {
+        const fcl::Triangle c = mesh->triangle(t);
+        for (int i = 0; i < 7; ++i) {
+          Eigen::Vector3d p = (mesh->vertex(c[0]) + mesh->vertex(c[1]) + mesh->vertex(c[2])) / 3;
+          if (i < 3) p = mesh->vertex(c[i]);
+          if (i >= 4) p = (mesh->vertex(c[i - 4]) + mesh->vertex(c[(i - 3) % 3])) / 2;
+          double outside = size;
+          for (const program::Sphere& s : fit.spheres) outside = std::min(outside, (p - s.center).norm() - s.radius);
+          EXPECT_LE(outside, 1e-9 * size);
+        }
+      }
+    }
+    const program::SphereFit fine = program::fitSpheres(*mesh, 0, size / 10);
+    EXPECT_LE(fine.protrusion, size / 10);
+  }
+  // The ball about a cube: its corners are on it, and it protrudes most above the middle of a face.
+  const program::SphereFit one = program::fitSpheres(*test::box({4, 4, 4}, {6, 6, 6}).mesh(), 1, 0);
+  EXPECT_NEAR(one.spheres.at(0).radius, std::sqrt(3.0), 0.05);
+  EXPECT_NEAR(one.protrusion, std::sqrt(3.0) - 1, 0.1);
+}
+
+TEST(Progress, SaysHowLongItTakesYet) {
+  EXPECT_EQ(program::timeLeft(1, 100, 1), "");
+  EXPECT_EQ(program::timeLeft(0, 100, 10), "");
+  EXPECT_EQ(program::timeLeft(10, 100, 5), ", about 45 s left");
+  EXPECT_EQ(program::timeLeft(10, 100, 60), ", about 9 min left");
+  EXPECT_EQ(program::timeLeft(1, 100, 3600), ", about 99 h left");
+  EXPECT_EQ(program::timeLeft(100, 100, 60), "");
+}
+
+TEST(Suggestion, IsTheNearestName) {
+  const std::vector<std::string> names{"collide", "inspect", "--pose", "--poses"};
+  EXPECT_EQ(program::suggestion("colide", names), " Did you mean collide?");
+  EXPECT_EQ(program::suggestion("clolide", names), " Did you mean collide?");
+  EXPECT_EQ(program::suggestion("--psoes", names), " Did you mean --poses?");
+  EXPECT_EQ(program::suggestion("insp", names), " Did you mean inspect?");
+  EXPECT_EQ(program::suggestion("fly", names), "");
+  EXPECT_EQ(program::suggestion("", names), "");
+}
+
+TEST(Pose, SaysItsRotationInWords) {
+  const auto words = [](const std::string& rpy) {
+    return program::Pose::parse(rpy, program::RotationFormat::kRpy).rotationText();
+  };
+  EXPECT_EQ(words("1,2,3,0,0,0"), "not turned");
+  EXPECT_EQ(words("0,0,0,0,0,-1.5707963267948966"), "turned by -90 degrees about (0, 0, 1)");
+  EXPECT_EQ(words("0,0,0,3.1415926535897931,0,0"), "turned by 180 degrees about (1, 0, 0)");
+}
+
 TEST(Spheres, KeepFloatsFloatsInYaml) {
   NodeView node;
   node.center = {1e-5, 1e22, -3};
   node.radius = 0.5;
-  const std::string text = program::sphereFile("a.yaml", {node}, "a \"b\"");
+  const std::string text = program::sphereFile("a.yaml", program::spheresOf({node}), "a \"b\"");
   EXPECT_NE(text.find("1.0e+22, -3]"), std::string::npos) << text;
   EXPECT_NE(text.find("\"a \\\"b\\\"\":"), std::string::npos) << text;
   EXPECT_THROW(program::checkSphereFile("a.txt"), std::invalid_argument);

@@ -5,6 +5,7 @@
 #include <sys/wait.h>
 #include <unistd.h>
 
+#include <algorithm>
 #include <array>
 #include <chrono>
 #include <cmath>
@@ -148,6 +149,117 @@ TEST_F(Program, SaysThatAQuaternionIsNormalised) {
   EXPECT_EQ(run(pair + "0,0,0,1.0005,0,0,0").err, "");
 }
 
+TEST_F(Program, SaysWhereTheyTouch) {
+  const std::string pair = "collide " + cube() + " " + cube() + " --pose 0.9,0.2,0.1,1,0,0,0";
+  const Json report = json(pair);
+  ASSERT_EQ(report.at("contact_points").size(), report.at("contacts"));
+  std::set<std::pair<int, int>> ids;
+  for (const Json& point : report.at("contact_points")) {
+    ids.emplace(point.at("triangle_a"), point.at("triangle_b"));
+    double square = 0;
+    for (const double x : point.at("normal")) square += x * x;
+    EXPECT_NEAR(square, 1, 1e-12);
+    EXPECT_GE(point.at("depth"), 0);
+    // In the box that both share.
+    EXPECT_GE(point.at("position")[0], 0.4 - 1e-9);
+    EXPECT_LE(point.at("position")[0], 0.5 + 1e-9);
+  }
+  EXPECT_EQ(ids.size(), report.at("contacts"));
+  EXPECT_TRUE(report.at("distance").is_null());
+  EXPECT_EQ(report.at("extents").at("b").at("max"), Json({0.5, 0.5, 0.5}));
+
+  const std::string file = (folder_ / "contacts.csv").string();
+  const Result table = run(pair + " --csv " + file);
+  EXPECT_NE(table.out.find("triangle of A"), std::string::npos) << table.out;
+  std::istringstream csv(read(file));
+  std::string line;
+  std::getline(csv, line);
+  EXPECT_EQ(line, "triangle_a,triangle_b,x,y,z,normal_x,normal_y,normal_z,depth");
+  std::size_t rows = 0;
+  while (std::getline(csv, line)) {
+    EXPECT_EQ(std::count(line.begin(), line.end(), ','), 8) << line;
+    ++rows;
+  }
+  EXPECT_EQ(rows, report.at("contacts"));
+  // The first ten are for people.
+  EXPECT_NE(run("collide " + model("link") + " " + model("gripper")).out.find("82 more"), std::string::npos);
+}
+
+TEST_F(Program, SaysHowFarApartTheyAre) {
+  const Json report = json("collide " + cube() + " " + cube() + " --pose 3,0,0,1,0,0,0");
+  EXPECT_NEAR(report.at("distance"), 2, 1e-12);
+  EXPECT_NEAR(report.at("nearest").at("on_a")[0], 0.5, 1e-12);
+  EXPECT_NEAR(report.at("nearest").at("on_b")[0], 2.5, 1e-12);
+  EXPECT_TRUE(report.at("contact_points").empty());
+  const Result table = run("collide " + cube() + " " + cube() + " --pose 3,0,0,1,0,0,0");
+  EXPECT_NE(table.out.find("nearest point of B  (2.50000"), std::string::npos) << table.out;
+}
+
+TEST_F(Program, TakesRotationsAsTheyComeInRos) {
+  const std::string pair = "collide " + cube() + " " + cube() + " --pose ";
+  // An eighth of a turn about z: the corner of B reaches to 1.1 - 0.707.
+  for (const std::string pose :
+       {"1.1,0,0,0.92387953251128674,0,0,0.38268343236508978",
+        "1.1,0,0,0,0,0.38268343236508978,0.92387953251128674 --xyzw", "1.1,0,0,0,0,0.78539816339744828 --rpy"}) {
+    const Json report = json(pair + pose);
+    EXPECT_EQ(report.at("collide"), true) << pose;
+    EXPECT_EQ(report.at("rotation"), "turned by 45 degrees about (0, 0, 1)") << pose;
+    EXPECT_NEAR(report.at("pose")[3], std::cos(0.125 * M_PI), 1e-15) << pose;
+  }
+  // Fixed axes x, y, z in turn: a quarter about x brings y to z, then a quarter about z leaves it there.
+  const Json turned = json(pair + "0,0,0,1.5707963267948966,0,1.5707963267948966 --rpy");
+  for (const std::size_t k : {3, 4, 5, 6}) EXPECT_NEAR(turned.at("pose")[k], 0.5, 1e-15);
+  expectComplaint(pair + "1,0,0,1,0,0,0 --rpy", kUsage, "x,y,z,roll,pitch,yaw");
+  expectComplaint(pair + "1,0,0,1,0,0 --xyzw", kUsage, "x,y,z,qx,qy,qz,qw");
+  expectComplaint(pair + "1,0,0,1,0,0 --xyzw --rpy", kUsage);
+}
+
+TEST_F(Program, WarnsOfOtherUnits) {
+  std::string large = "OFF\n4 4 0\n";
+  for (const char* p : {"0 0 0", "100 0 0", "0 100 0", "0 0 100"}) large += std::string(p) + "\n";
+  large += "3 0 2 1\n3 0 1 3\n3 1 2 3\n3 2 0 3\n";
+  const std::string file = write("large.off", large);
+  EXPECT_NE(run("collide " + cube() + " " + file).err.find("B is 100 times as large as A"), std::string::npos);
+  EXPECT_EQ(json("collide " + file + " " + cube()).at("warnings").size(), 1u);
+  EXPECT_TRUE(json("collide " + cube() + " " + cube()).at("warnings").empty());
+}
+
+TEST_F(Program, AsksForEachPoseOfAFile) {
+  const std::string list = write("poses.csv",
+                                 "x,y,z,qw,qx,qy,qz\r\n0.9,0,0,1,0,0,0\r\n\n# far\n3 0 0 1 0 0 0 # blanks\n"
+                                 "1.1;0;0;0.92387953251128674;0;0;0.38268343236508978\n");
+  const std::string command = "collide " + cube() + " " + cube() + " --poses " + list;
+  const Json report = json(command + " --distance");
+  EXPECT_EQ(report.at("asked"), 3);
+  EXPECT_EQ(report.at("collisions"), 2);
+  const Json& poses = report.at("poses");
+  ASSERT_EQ(poses.size(), 3u);
+  const std::array<int, 3> lines = {2, 5, 6};
+  for (std::size_t i = 0; i < 3; ++i) {
+    EXPECT_EQ(poses[i].at("line"), lines[i]);
+    EXPECT_EQ(poses[i].at("collide"), i != 1);
+  }
+  EXPECT_NEAR(poses[1].at("distance"), 2, 1e-12);
+  EXPECT_EQ(run(command + " --csv -").out,
+            "line,x,y,z,qw,qx,qy,qz,collide\n2,0.90000000000000002,0,0,1,0,0,0,1\n5,3,0,0,1,0,0,0,0\n"
+            "6,1.1000000000000001,0,0,0.92387953251128674,0,0,0.38268343236508978,1\n");
+  EXPECT_NE(run(command).out.find("2 of 3 poses collide"), std::string::npos);
+  expectComplaint("collide " + cube() + " " + cube() + " --poses " + write("bad.csv", "0,0,0,1,0,0,0\n0,0,0,1,0,0\n"),
+                  kFailed, "bad.csv: line 2: 7 numbers");
+  expectComplaint("collide " + cube() + " " + cube() + " --poses " + write("none.csv", "# none\n"), kFailed,
+                  "no poses");
+  expectComplaint(command + " --pose 0,0,0,1,0,0,0", kUsage, "--pose");
+  expectComplaint(command + " --html p.html", kUsage, "--poses");
+}
+
+TEST_F(Program, SaysThatConservativeAnswersMayBeWrong) {
+  const std::string pair =
+      "collide " + cube() + " " + cube() + " --answer conservative --depth 2 --pose 1.05,0,0,1,0,0,0";
+  const Result table = run(pair);
+  EXPECT_NE(table.out.find("They may touch. FCL's triangles do not."), std::string::npos) << table.out;
+  EXPECT_NE(table.out.find("cell of A"), std::string::npos) << table.out;
+}
+
 TEST_F(Program, AnswersConservatively) {
   const std::string pair =
       "collide " + cube() + " " + cube() + " --answer conservative --pose 1.05,0,0,1,0,0,0 --depth ";
@@ -209,7 +321,20 @@ TEST_F(Program, InspectsTheHealthOfAMesh) {
   EXPECT_EQ(faulty.at("watertight"), false);
   EXPECT_EQ(faulty.at("open_edges"), 4);
   EXPECT_TRUE(faulty.at("volume").is_null());
-  EXPECT_NE(run("inspect " + open + " --depth 1").out.find("open edges 4"), std::string::npos);
+  EXPECT_EQ(faulty.at("faults").at("open_edges").size(), 4u);
+  EXPECT_EQ(faulty.at("faults").at("open_edges")[0], Json({{"vertices", {0, 1}}, {"triangles", {0}}}));
+  const std::string table = run("inspect " + open + " --depth 1").out;
+  EXPECT_NE(table.find("open edges 4"), std::string::npos) << table;
+  EXPECT_NE(table.find("0-1 of triangle 0, 0-3 of triangle 1, 1-2 of triangle 0, ..."), std::string::npos) << table;
+
+  const Json report = json("inspect " + cube() + " --depth 3");
+  EXPECT_EQ(report.at("minimum"), Json({-0.5, -0.5, -0.5}));
+  EXPECT_EQ(report.at("maximum"), Json({0.5, 0.5, 0.5}));
+  EXPECT_EQ(report.at("center"), Json({0.0, 0.0, 0.0}));
+  for (const Json& level : report.at("levels")) {
+    EXPECT_NEAR(level.at("error_max_length").get<double>(),
+                2 * report.at("root_radius").get<double>() * level.at("error_max").get<double>(), 1e-12);
+  }
 }
 
 TEST_F(Program, WritesTheSpheresOfALevel) {
@@ -255,6 +380,22 @@ TEST_F(Program, WritesTheSpheresOfALevel) {
   EXPECT_TRUE(ply >> std::ws && ply.eof());
   EXPECT_FALSE(std::getline(yaml, line));
   expectComplaint(inspect + "--spheres " + file(".txt"), kUsage, "--spheres");
+}
+
+TEST_F(Program, FitsAsManySpheresAsAreAskedFor) {
+  const std::string file = (folder_ / "fit.json").string();
+  const std::string inspect = "inspect " + model("gripper") + " --depth 2 --no-error --spheres " + file;
+  const Json fit = json(inspect + " --count 40").at("spheres");
+  EXPECT_EQ(fit.at("count"), 40);
+  EXPECT_EQ(Json::parse(read(file)).size(), 40u);
+  EXPECT_EQ(fit.at("coverage"), 1);
+  const Json finer = json(inspect + " --tolerance 0.01").at("spheres");
+  EXPECT_LE(finer.at("protrusion_max"), 0.01);
+  EXPECT_GT(fit.at("protrusion_max"), 0.01);
+  EXPECT_GT(finer.at("count"), 40);
+  EXPECT_NE(run(inspect + " --count 5").out.find("5, they hold 100.0 % of the surface"), std::string::npos);
+  expectComplaint(inspect + " --count 0", kUsage, "--count");
+  expectComplaint(inspect + " --tolerance -1", kUsage, "--tolerance");
 }
 
 TEST_F(Program, ValidatesAgainstFcl) {
@@ -571,6 +712,34 @@ TEST_F(Program, ExplainsWrongCommandLines) {
   expectComplaint("validate " + cube() + " " + cube() + " --poses 0", kUsage, "--poses");
   expectComplaint("validate " + cube() + " " + cube() + " --answer conservative --contacts", kUsage, "--contacts");
   expectComplaint("validate " + cube() + " " + cube() + " --reference kdop", kUsage, "--reference");
+}
+
+TEST_F(Program, SuggestsWhatWasMeant) {
+  expectComplaint("colide a b", kUsage, "Did you mean collide?");
+  expectComplaint("inspec a", kUsage, "Did you mean inspect?");
+  expectComplaint("fly", kUsage, "there is no command fly. See");
+  expectComplaint("", kUsage, "one of: collide, inspect");
+  expectComplaint("--versoin", kUsage, "--versoin");
+  expectComplaint("collide " + cube() + " " + cube() + " --pos 1", kUsage, "Did you mean --pose?");
+  expectComplaint("collide " + cube() + " " + cube() + " more", kUsage, "more: unexpected");
+  expectComplaint("validate " + cube() + " " + cube() + " --poses 0", kUsage, "0 is not a number above 0");
+  EXPECT_EQ(run("help").out, run("--help").out);
+  EXPECT_EQ(run("help collide").out, run("collide --help").out);
+  EXPECT_NE(run("help").out.find("glb"), std::string::npos) << "all formats are named";
+  for (const std::string command : {"collide", "inspect", "validate", "bench", "paper"}) {
+    const std::string help = run(command + " --help").out;
+    EXPECT_FALSE(std::regex_search(help, std::regex("[0-9]{20}"))) << help;
+  }
+}
+
+TEST_F(Program, RefusesOutputsOfAnotherKind) {
+  const std::string inspect = "inspect " + cube() + " --depth 1 ";
+  expectComplaint(inspect + "--image x.jpg", kUsage, "--image");
+  expectComplaint(inspect + "--image -", kUsage, "--image");
+  expectComplaint(inspect + "--html -", kUsage, "--html");
+  expectComplaint(inspect + "--html x.png", kUsage, "--html");
+  expectComplaint(inspect + "--json x.csv", kUsage, "--json");
+  expectComplaint("collide " + cube() + " " + cube() + " --csv x.json", kUsage, "--csv");
 }
 
 TEST_F(Program, ExplainsWhatFails) {

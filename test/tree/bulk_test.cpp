@@ -6,6 +6,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <numeric>
 #include <random>
 
 #include "meshes.h"
@@ -124,10 +125,21 @@ std::vector<std::shared_ptr<const Mesh>> hardMeshes() {
     return Eigen::Vector3d(uniform(g, 0, 1e4), 0, 0) + point(1e-3);
   });                                                                                           // needles
   add(5000, [&](std::size_t i) -> Eigen::Vector3d { return i < 4 ? point(1) : point(1e-6); });  // a speck
+  add(5000, [&](std::size_t) { return Eigen::Vector3d(7, 7, 7); });                             // one point, sorted
   add(33, [&](std::size_t) { return point(1); });
   add(32, [&](std::size_t) { return point(1); });
   add(1, [&](std::size_t) { return point(1); });
   return meshes;
+}
+
+// As Tree does.
+void buildAll(BulkBuilder& bulk, const oracle::Surface& s) {
+  const std::size_t count = s.mesh->triangleCount();
+  if (count >= BulkBuilder::kLeastToSort) return bulk.buildAll(s);
+  std::vector<std::uint32_t> ids(count);
+  std::iota(ids.begin(), ids.end(), 0u);
+  bulk.build(s, ids.data(), count,
+             {s.lattice.toLattice(s.mesh->bounds().min()), s.lattice.toLattice(s.mesh->bounds().max())});
 }
 
 // The triangles below a lane, each with its corners in lattice units.
@@ -165,24 +177,27 @@ void expectBounds(const BulkBuilder& bulk, const oracle::Surface& s, const Eigen
   }
 }
 
-TEST(Bulk, EveryTriangleIsOnceInALeafAndInAllBoundsAboveIt) {
-  for (const std::shared_ptr<const Mesh>& mesh : hardMeshes()) {
-    const oracle::Surface s = surfaceOf(mesh);
-    BulkBuilder bulk;
-    bulk.buildAll(s);
-    std::vector<std::uint32_t> ids = bulk.ids();
-    std::sort(ids.begin(), ids.end());
-    ASSERT_EQ(ids.size(), mesh->triangleCount());
-    for (std::uint32_t t = 0; t < ids.size(); ++t) ASSERT_EQ(ids[t], t);
-    EXPECT_EQ(bulk.blocks().empty(), mesh->triangleCount() <= kMaxLeafTriangles);
-    expectBounds(bulk, s, nullptr);
-  }
+void expectAllOnce(const oracle::Surface& s) {
+  BulkBuilder bulk;
+  buildAll(bulk, s);
+  std::vector<std::uint32_t> ids = bulk.ids();
+  std::sort(ids.begin(), ids.end());
+  ASSERT_EQ(ids.size(), s.mesh->triangleCount());
+  for (std::uint32_t t = 0; t < ids.size(); ++t) ASSERT_EQ(ids[t], t);
+  EXPECT_EQ(bulk.blocks().empty(), ids.size() <= kMaxLeafTriangles);
+  expectBounds(bulk, s, nullptr);
 }
+
+TEST(Bulk, EveryTriangleIsOnceInALeafAndInAllBoundsAboveIt) {
+  for (const std::shared_ptr<const Mesh>& mesh : hardMeshes()) expectAllOnce(surfaceOf(mesh));
+}
+
+TEST(Bulk, ManyTrianglesAreSortedAlongAFinerCurve) { expectAllOnce(surfaceOf(test::torus(370).mesh())); }
 
 TEST(Bulk, LanesPartitionTheirBlock) {
   for (const std::shared_ptr<const Mesh>& mesh : hardMeshes()) {
     BulkBuilder bulk;
-    bulk.buildAll(surfaceOf(mesh));
+    buildAll(bulk, surfaceOf(mesh));
     for (const BulkBuilder::Block& block : bulk.blocks()) {
       for (std::uint32_t o = 0; o < block.lanes; ++o) {
         const BulkBuilder::Lane& lane = block.lane[o];

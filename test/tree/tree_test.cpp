@@ -63,7 +63,7 @@ TEST(Tree, GrowsOnlyWhatAQueryNeedsAndSettles) {
 }
 
 // Whatever is asked, all growth together costs no more than about twice a build of the whole tree: what is built by
-// parts is a quarter of the triangles at most, then all are built at once.
+// parts is an eighth of the triangles and one query's more, then all are built at once.
 TEST(Tree, GrowthCostsAtMostTwiceABuild) {
   for (const std::size_t n : {std::size_t{20}, std::size_t{60}, std::size_t{150}}) {
     Options options;
@@ -74,7 +74,7 @@ TEST(Tree, GrowthCostsAtMostTwiceABuild) {
     for (int i = 0; i < 3000; ++i) touching(a, b, {u(g), u(g), u(g) / 2});
     const Statistics asked = a.statistics();
     const std::size_t triangles = a.mesh()->triangleCount();
-    EXPECT_GT(asked.built_triangles, triangles / 4);
+    EXPECT_GT(asked.built_triangles, triangles / 8);
     EXPECT_LE(asked.built_triangles, 2 * triangles);
     if (asked.built_triangles < triangles) continue;
     for (int i = 0; i < 3000; ++i) touching(a, b, {u(g), u(g), u(g) / 2});

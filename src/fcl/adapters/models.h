@@ -18,6 +18,21 @@ const Model<S>* asModel(const fcl::CollisionGeometry<S>* geometry) {
   return dynamic_cast<const Model<S>*>(geometry);
 }
 
+enum class PairKind {
+  kForeign,  ///< Neither is a Model.
+  kNothing,  ///< An empty Model is among them: nothing touches it.
+  kModel,
+};
+
+/// @throws std::logic_error for a Model that is being built.
+template <typename S>
+PairKind kindOf(const fcl::CollisionGeometry<S>* o1, const fcl::CollisionGeometry<S>* o2) {
+  const Model<S>*model1 = asModel<S>(o1), *model2 = asModel<S>(o2);
+  if (model1 == nullptr && model2 == nullptr) return PairKind::kForeign;
+  const bool nothing = (model1 != nullptr && model1->empty()) || (model2 != nullptr && model2->empty());
+  return nothing ? PairKind::kNothing : PairKind::kModel;
+}
+
 /// The C++ name of a type, for messages.
 std::string typeName(const std::type_info& type);
 

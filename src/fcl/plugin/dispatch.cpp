@@ -125,6 +125,19 @@ void checkDispatch() {
   static const std::string wrong = probe<S>();
   if (!wrong.empty()) throw std::runtime_error(wrong);
 }
+template <typename S>
+bool touchesNothing(const fcl::CollisionGeometry<S>* o1, const fcl::CollisionGeometry<S>* o2,
+                    fcl::ContinuousCollisionResult<S>& result) {
+  if (kindOf<S>(o1, o2) != PairKind::kNothing) return false;
+  result.is_collide = false;
+  result.time_of_contact = 1;
+  return true;
+}
+template bool touchesNothing(const fcl::CollisionGeometry<float>*, const fcl::CollisionGeometry<float>*,
+                             fcl::ContinuousCollisionResult<float>&);
+template bool touchesNothing(const fcl::CollisionGeometry<double>*, const fcl::CollisionGeometry<double>*,
+                             fcl::ContinuousCollisionResult<double>&);
+
 template void checkDispatch<float>();
 template void checkDispatch<double>();
 
@@ -147,6 +160,7 @@ std::size_t collideModel(const fcl::CollisionGeometry<S>* o1, const fcl::Transfo
                          const fcl::CollisionGeometry<S>* o2, const fcl::Transform3<S>& X_W2,
                          const fcl_adapter::BroughtSolver<S>& solver, const fcl::CollisionRequest<S>& request,
                          fcl::CollisionResult<S>& result) {
+  if (fcl_adapter::kindOf<S>(o1, o2) == fcl_adapter::PairKind::kNothing) return 0;
   if (request.num_max_contacts == 0) {
     std::cerr << "Warning: should stop early as num_max_contact is 0 !\n";
     return 0;
@@ -175,7 +189,14 @@ std::size_t collide(const fcl::CollisionGeometry<S>* o1, const fcl::Transform3<S
 template <typename S>
 S distance(const fcl::CollisionGeometry<S>* o1, const fcl::Transform3<S>& X_W1, const fcl::CollisionGeometry<S>* o2,
            const fcl::Transform3<S>& X_W2, const fcl::DistanceRequest<S>& request, fcl::DistanceResult<S>& result) {
-  if (isModel<S>(o1) || isModel<S>(o2)) return fcl_adapter::distancePair<S>(o1, X_W1, o2, X_W2, request, result);
+  switch (fcl_adapter::kindOf<S>(o1, o2)) {
+    case fcl_adapter::PairKind::kModel:
+      return fcl_adapter::distancePair<S>(o1, X_W1, o2, X_W2, request, result);
+    case fcl_adapter::PairKind::kNothing:
+      return result.min_distance;
+    case fcl_adapter::PairKind::kForeign:
+      break;
+  }
   return fcl::distance<S>(o1, X_W1, o2, X_W2, request, result);
 }
 

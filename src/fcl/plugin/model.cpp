@@ -49,11 +49,133 @@ void setBounds(fcl::CollisionGeometry<S>& geometry, Eigen::AlignedBox3d b, doubl
 }  // namespace
 
 template <typename S>
+struct Model<S>::Staged {
+  bool update;  // of the vertices alone
+  std::vector<Eigen::Vector3d> vertices;
+  std::vector<fcl::Triangle> triangles;
+
+  void add(const fcl::Vector3<S>& p) { vertices.push_back(p.template cast<double>()); }
+  void add(const std::vector<fcl::Vector3<S>>& ps) {
+    vertices.reserve(vertices.size() + ps.size());
+    for (const fcl::Vector3<S>& p : ps) add(p);
+  }
+};
+
+template <typename S>
 Model<S>::Model(std::shared_ptr<const Mesh> mesh, const Options& options)
-    : tree_(std::make_unique<tree::Tree>(std::move(mesh), options)) {
+    : options_(options), tree_(std::make_unique<tree::Tree>(std::move(mesh), options)) {
   fcl_adapter::checkDispatch<S>();
   // Who asks geometries and poses needs no radius, so vertices are not looked through yet.
   setBounds(*this, tree_->bounds(), tree_->options().margin, HUGE_VAL);
+}
+
+template <typename S>
+Model<S>::Model(const Options& options) : options_(options) {
+  fcl_adapter::checkDispatch<S>();
+  computeLocalAABB();
+}
+
+template <typename S>
+void Model<S>::setMesh(std::shared_ptr<const Mesh> mesh) {
+  tree_ = std::make_unique<tree::Tree>(std::move(mesh), options_);
+  staged_.reset();
+  setBounds(*this, tree_->bounds(), tree_->options().margin, HUGE_VAL);
+}
+
+template <typename S>
+bool Model<S>::empty() const {
+  if (tree_ != nullptr) return false;
+  if (staged_ != nullptr) throw std::logic_error("bocst::Model: endModel() was not called");
+  return true;
+}
+
+template <typename S>
+void Model<S>::throwEmpty() const {
+  throw std::logic_error("bocst::Model: the model is empty");
+}
+
+template <typename S>
+int Model<S>::beginModel(int num_tris, int num_vertices) {
+  tree_.reset();
+  staged_ = std::make_unique<Staged>(Staged{false, {}, {}});
+  if (num_vertices > 0) staged_->vertices.reserve(static_cast<std::size_t>(num_vertices));
+  if (num_tris > 0) staged_->triangles.reserve(static_cast<std::size_t>(num_tris));
+  computeLocalAABB();
+  return fcl::BVH_OK;
+}
+
+template <typename S>
+int Model<S>::addVertex(const fcl::Vector3<S>& p) {
+  if (staged_ == nullptr || staged_->update) return fcl::BVH_ERR_BUILD_OUT_OF_SEQUENCE;
+  staged_->add(p);
+  return fcl::BVH_OK;
+}
+
+template <typename S>
+int Model<S>::addTriangle(const fcl::Vector3<S>& p1, const fcl::Vector3<S>& p2, const fcl::Vector3<S>& p3) {
+  return addSubModel({p1, p2, p3}, {fcl::Triangle(0, 1, 2)});
+}
+
+template <typename S>
+int Model<S>::addSubModel(const std::vector<fcl::Vector3<S>>& ps, const std::vector<fcl::Triangle>& ts) {
+  if (staged_ == nullptr || staged_->update) return fcl::BVH_ERR_BUILD_OUT_OF_SEQUENCE;
+  const std::size_t first = staged_->vertices.size();
+  staged_->add(ps);
+  for (const fcl::Triangle& t : ts) staged_->triangles.emplace_back(first + t[0], first + t[1], first + t[2]);
+  return fcl::BVH_OK;
+}
+
+template <typename S>
+int Model<S>::addSubModel(const std::vector<fcl::Vector3<S>>& ps) {
+  return addSubModel(ps, {});
+}
+
+template <typename S>
+int Model<S>::endModel() {
+  if (staged_ == nullptr || staged_->update) return fcl::BVH_ERR_BUILD_OUT_OF_SEQUENCE;
+  const std::unique_ptr<Staged> staged = std::move(staged_);
+  if (staged->vertices.empty() && staged->triangles.empty()) return fcl::BVH_ERR_BUILD_EMPTY_MODEL;
+  setMesh(std::make_shared<const Mesh>(std::move(staged->vertices), staged->triangles));
+  return fcl::BVH_OK;
+}
+
+template <typename S>
+int Model<S>::beginUpdateModel() {
+  if (tree_ == nullptr || staged_ != nullptr) return fcl::BVH_ERR_BUILD_OUT_OF_SEQUENCE;
+  staged_ = std::make_unique<Staged>(Staged{true, {}, {}});
+  return fcl::BVH_OK;
+}
+
+template <typename S>
+int Model<S>::updateVertex(const fcl::Vector3<S>& p) {
+  return updateSubModel({p});
+}
+
+template <typename S>
+int Model<S>::updateTriangle(const fcl::Vector3<S>& p1, const fcl::Vector3<S>& p2, const fcl::Vector3<S>& p3) {
+  return updateSubModel({p1, p2, p3});
+}
+
+template <typename S>
+int Model<S>::updateSubModel(const std::vector<fcl::Vector3<S>>& ps) {
+  if (staged_ == nullptr || !staged_->update) return fcl::BVH_ERR_BUILD_OUT_OF_SEQUENCE;
+  staged_->add(ps);
+  return fcl::BVH_OK;
+}
+
+template <typename S>
+int Model<S>::endUpdateModel(bool, bool) {
+  if (staged_ == nullptr || !staged_->update) return fcl::BVH_ERR_BUILD_OUT_OF_SEQUENCE;
+  const std::unique_ptr<Staged> staged = std::move(staged_);
+  const std::shared_ptr<const Mesh> before = mesh();
+  if (before != nullptr && staged->vertices.size() != before->vertexCount()) return fcl::BVH_ERR_INCORRECT_DATA;
+  updateVertices(std::move(staged->vertices));
+  return fcl::BVH_OK;
+}
+
+template <typename S>
+fcl::BVHModelType Model<S>::getModelType() const {
+  return tree_ != nullptr ? fcl::BVH_MODEL_TRIANGLES : fcl::BVH_MODEL_UNKNOWN;
 }
 
 template <typename S>
@@ -61,57 +183,64 @@ Model<S>::~Model() = default;
 
 template <typename S>
 const Options& Model<S>::options() const {
-  return tree_->options();
+  return options_;
 }
 
 template <typename S>
 std::shared_ptr<const Mesh> Model<S>::mesh() const {
-  return tree_->mesh();
+  return tree_ != nullptr ? tree_->mesh() : nullptr;
 }
 
 template <typename S>
 void Model<S>::releaseMesh() {
-  tree_->releaseMesh();
+  tree().releaseMesh();
 }
 
 template <typename S>
 std::string Model<S>::oracleName() const {
-  return tree_->oracle().name();
+  return tree().oracle().name();
 }
 
 template <typename S>
 Statistics Model<S>::statistics() const {
-  return tree_->statistics();
+  return tree_ != nullptr ? tree_->statistics() : Statistics{};
 }
 
 template <typename S>
 void Model<S>::expandAll(int depth) {
-  tree_->expandAll(depth);
+  tree().expandAll(depth);
 }
 
 template <typename S>
 void Model<S>::visit(const std::function<void(const NodeView&)>& f) const {
-  tree_->visit(f);
+  if (tree_ != nullptr) tree_->visit(f);
 }
 
 template <typename S>
 void Model<S>::prune(Clock::time_point now) {
-  tree_->prune(now);
+  if (tree_ != nullptr) tree_->prune(now);
 }
 
 template <typename S>
 void Model<S>::prune() {
-  tree_->prune(Clock::time_point(std::chrono::nanoseconds(tree_->now())));
+  if (tree_ != nullptr) tree_->prune(Clock::time_point(std::chrono::nanoseconds(tree_->now())));
 }
 
 template <typename S>
 void Model<S>::updateVertices(std::vector<Eigen::Vector3d> vertices) {
-  tree_->updateVertices(std::move(vertices));
+  tree().updateVertices(std::move(vertices));
   setBounds(*this, tree_->bounds(), tree_->options().margin, HUGE_VAL);
 }
 
 template <typename S>
 void Model<S>::computeLocalAABB() {
+  if (tree_ == nullptr) {
+    // A point, so that managers may sort it.
+    this->aabb_local = fcl::AABB<S>(fcl::Vector3<S>::Zero().eval());
+    this->aabb_center.setZero();
+    this->aabb_radius = 0;
+    return;
+  }
   setBounds(*this, tree_->bounds(), tree_->options().margin, tree_->radius());
 }
 
@@ -120,7 +249,8 @@ namespace {
 /// The mesh's integrals over the cone from the origin to each triangle: of 1, x, and x x^T.
 struct Integrals {
   explicit Integrals(const std::shared_ptr<const Mesh>& mesh) {
-    if (mesh == nullptr) throw std::logic_error("bocst::Model: the mesh was released, so its volume is not known");
+    if (mesh == nullptr)
+      throw std::logic_error("bocst::Model: no mesh (released, or empty), so its volume is not known");
     for (std::size_t t = 0; t < mesh->triangleCount(); ++t) {
       const Mesh::Indices& i = mesh->indices(t);
       const Eigen::Vector3d &a = mesh->vertex(i[0]), &b = mesh->vertex(i[1]), &c = mesh->vertex(i[2]), sum = a + b + c;

@@ -10,6 +10,7 @@
 #include <iostream>
 #include <limits>
 
+#include "fcl/adapters/models.h"
 #include "fcl/queries/collide_pair.h"
 #include "fcl/queries/distance_pair.h"
 
@@ -44,7 +45,9 @@ template <typename S, typename Solver>
 std::size_t collideEntry(const fcl::CollisionGeometry<S>* o1, const fcl::Transform3<S>& X_W1,
                          const fcl::CollisionGeometry<S>* o2, const fcl::Transform3<S>& X_W2, const Solver* solver,
                          const fcl::CollisionRequest<S>& request, fcl::CollisionResult<S>& result) {
-  if (isModel<S>(o1) || isModel<S>(o2)) return collidePair<S>(o1, X_W1, o2, X_W2, solver, request, result);
+  const PairKind kind = kindOf<S>(o1, o2);
+  if (kind == PairKind::kNothing) return 0;
+  if (kind == PairKind::kModel) return collidePair<S>(o1, X_W1, o2, X_W2, solver, request, result);
   if (isSentinel<S>(o1)) return Sentinel<S>::kReached;
   warnAsFcl<S>("collision", o1, o2);
   return 0;
@@ -54,7 +57,9 @@ template <typename S, typename Solver>
 S distanceEntry(const fcl::CollisionGeometry<S>* o1, const fcl::Transform3<S>& X_W1,
                 const fcl::CollisionGeometry<S>* o2, const fcl::Transform3<S>& X_W2, const Solver*,
                 const fcl::DistanceRequest<S>& request, fcl::DistanceResult<S>& result) {
-  if (isModel<S>(o1) || isModel<S>(o2)) return distancePair<S>(o1, X_W1, o2, X_W2, request, result);
+  const PairKind kind = kindOf<S>(o1, o2);
+  if (kind == PairKind::kNothing) return result.min_distance;
+  if (kind == PairKind::kModel) return distancePair<S>(o1, X_W1, o2, X_W2, request, result);
   if (isSentinel<S>(o1)) return Sentinel<S>::kReached;
   warnAsFcl<S>("distance", o1, o2);
   return std::numeric_limits<S>::max();
@@ -64,7 +69,9 @@ template <typename S, typename Solver>
 S advancementEntry(const fcl::CollisionGeometry<S>* o1, const fcl::MotionBase<S>* motion1,
                    const fcl::CollisionGeometry<S>* o2, const fcl::MotionBase<S>* motion2, const Solver*,
                    const fcl::ContinuousCollisionRequest<S>& request, fcl::ContinuousCollisionResult<S>& result) {
-  if (isModel<S>(o1) || isModel<S>(o2)) return continuousPair<S>(o1, motion1, o2, motion2, request, result);
+  const PairKind kind = kindOf<S>(o1, o2);
+  if (kind == PairKind::kNothing && touchesNothing<S>(o1, o2, result)) return result.time_of_contact;
+  if (kind == PairKind::kModel) return continuousPair<S>(o1, motion1, o2, motion2, request, result);
   warnAsFcl<S>("collision", o1, o2);
   return -1;
 }

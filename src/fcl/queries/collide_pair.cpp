@@ -28,6 +28,7 @@
 #include "geometry/triangle.h"
 #include "query/collide/pair_walk.h"
 #include "query/collide/tree_walk.h"
+#include "query/cull/far_apart.h"
 #include "query/leaf/pair_set.h"
 
 namespace bocst::fcl_adapter {
@@ -405,6 +406,17 @@ bool isOutOfSight(const CollideQuery<S>& q, const SimilarityTransform& b_in_a, d
   return half_way.cwiseAbs().maxCoeff() > 8 * (size_a + size_b) + q.margin;
 }
 
+// Is a surface so long and thin that the float walk's rounding, which is a part of its length, is as wide as it is? The
+// walk in double parts what that one cannot.
+bool isNeedle(const tree::Tree& tree) {
+  constexpr float kThin = 0x1p-12f;
+  tree::Outline::Box box;
+  if (!tree.outline().read(box)) return false;
+  const float x = box.half[0], y = box.half[1], z = box.half[2];
+  const float most = std::max({x, y, z}), least = std::min({x, y, z}), middle = x + y + z - most - least;
+  return middle < kThin * most;
+}
+
 template <typename S>
 void collideTrees(const CollideQuery<S>& q, const TreeSide& a, const TreeSide& b) {
   const std::size_t before = q.result.numContacts();
@@ -419,11 +431,11 @@ void collideTrees(const CollideQuery<S>& q, const TreeSide& a, const TreeSide& b
     with_collector(collector);
     collector.finish();
   };
-  if (q.margin == 0 && query::TreeWalk::fits(a, b, b_in_a)) {
-    query::TreeWalk trees(a, b, b_in_a);
+  const SimilarityTransform near = withMargin(b_in_a, a, q, a.isConservative() || b.isConservative());
+  if (query::TreeWalk::fits(a, b, near) && !isNeedle(tree_a) && !isNeedle(tree_b)) {
+    query::TreeWalk trees(a, b, near);
     if (!trees.isNeedless()) walk([&](auto& collector) { trees.run(collector); });
   } else {
-    const SimilarityTransform near = withMargin(b_in_a, a, q, a.isConservative() || b.isConservative());
     walk([&](auto& collector) { query::PairWalk<TreeSide, TreeSide>(a, b, near, collector).run(); });
   }
   if (q.mayBeInside(before) && (contains<S>(tree_a, q.X_WA(), tree_b, q.X_WB(), magnitude) ||
@@ -482,6 +494,22 @@ bool turnsRound(const Models<S>& models, const fcl::Transform3<S>& X_W1, const f
   return differ.first == x1 + 16 ? std::less<const tree::Tree*>()(&tree2, &tree1) : *differ.second < *differ.first;
 }
 
+// Are two models with exact answers so far apart that nothing need be locked? Time that passes counts here, too: who
+// has branches to drop goes the ordinary way.
+template <typename S>
+bool areFarApart(const CollideQuery<S>& q, const Models<S>& models) {
+  const tree::Tree &tree1 = models.first->tree(), &tree2 = models.second->tree();
+  if (tree1.conservative() || tree2.conservative()) return false;
+  tree::Outline::Box box1, box2;
+  if (!tree1.outline().read(box1) || !tree2.outline().read(box2)) return false;
+  const RelativePose<S> X_12(q.X_W1, q.X_W2);
+  if (!query::areFarApart(box1, box2, X_12.rotation, X_12.translation, q.margin)) return false;
+  for (const tree::Tree* tree : {&tree1, &tree2}) {
+    if (tree->options().ttl.count() > 0 && tree->hasBranches() && tree->isPruneDue(tree->now())) return false;
+  }
+  return true;
+}
+
 template <typename S>
 std::size_t answer(const CollideQuery<S>& q, const Models<S>& models, const BroughtSolver<S>& solver) {
   checkPose("collide", "tf1", q.X_W1);
@@ -490,6 +518,7 @@ std::size_t answer(const CollideQuery<S>& q, const Models<S>& models, const Brou
   if (q.request.isSatisfied(q.result)) return q.result.numContacts();
   if (!q.occupied() && (q.o1->isFree() || q.o2->isFree() || !q.request.enable_cost)) return q.result.numContacts();
   const Model<S>*a = models.first, *b = models.second;
+  if (a != nullptr && b != nullptr && areFarApart(q, models)) return q.result.numContacts();
   q.inCallersOrder(a, b);
   if (b != nullptr) {
     const QueryScope scope(a->tree(), b->tree());

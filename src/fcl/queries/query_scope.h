@@ -16,12 +16,15 @@ namespace bocst::fcl_adapter {
 /// when it ends, with or without an exception, the locks are given back and the trees do what the query left to do.
 class QueryScope {
  public:
-  explicit QueryScope(tree::Tree& a) : locks_(a, a), a_(a), b_(a_) {}
+  explicit QueryScope(tree::Tree& a) : locks_(a, a), a_(a), b_(a_) { a.buildIfDue(); }
   QueryScope(tree::Tree& a, tree::Tree& b)
       : locks_(a, b),
         a_(a),
         // The system's clock need not be read twice.
-        b_(b, a.options().clock || b.options().clock ? b.now() : a_.now()) {}
+        b_(b, a.options().clock || b.options().clock ? b.now() : a_.now()) {
+    a.buildIfDue();
+    b.buildIfDue();
+  }
   ~QueryScope() {
     locks_.release();
     afterQuery(a_);

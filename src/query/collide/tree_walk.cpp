@@ -1,8 +1,6 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #include "query/collide/tree_walk.h"
 
-#include "query/cull/support_refinement.h"
-
 namespace bocst::query {
 
 struct TreeWalk::Scratch {
@@ -25,13 +23,13 @@ bool TreeWalk::run(Visitor& visitor) {
   s.long_a.clear();
   s.long_b.clear();
   s.grew = false;
+  for (const TreeSide* side : {&a_, &b_}) side->tree().payRent(tree::Tree::kWalkRent);
   const bool ended = search(s);
   // A first answer has enough to do; what a later one needs again is worth to be packed.
   if (s.leaves_started && !s.grew) {
     a_.tree().packLeaves(s.leaves.looseOfA());
     b_.tree().packLeaves(s.leaves.looseOfB());
   }
-  if (!ended && !s.grew) refineSupports(a_, b_, near_);
   return ended;
 }
 
@@ -43,7 +41,7 @@ bool TreeWalk::search(Scratch& s) {
   PairSteps steps(&a_.tree(), &b_.tree(), a_.now(), PairFrames(b_in_a_.scale, b_in_a_), s.frames);
   for (int side = 0; side < 2; ++side) steps.leaf[side] = &s.large[side];
   steps.sees_all = !visitor_->endsAtFirst();
-  steps.all_at_once = near_.shallow || steps.sees_all;
+  steps.all_at_once = is_shallow_ || steps.sees_all;
   const auto push = [&](const DeferredPairs<TreeSide, TreeSide>::Pair& pair) {
     if (s.stack.size() < steps.depth + 1 + PairSteps::kStackRoom) {
       s.stack.resize(2 * (steps.depth + PairSteps::kStackRoom));

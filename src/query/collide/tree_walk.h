@@ -16,13 +16,14 @@ namespace bocst::query {
 class TreeWalk {
  public:
   static bool fits(const TreeSide& a, const TreeSide& b, const SimilarityTransform& b_in_a) {
-    return !a.isConservative() && !b.isConservative() && PairFrames::fits(b_in_a.scale);
+    // A margin that is large beside a model of tiny extent would overflow in float.
+    return !a.isConservative() && !b.isConservative() && PairFrames::fits(b_in_a.scale) && b_in_a.tolerance < 1e9;
   }
 
   TreeWalk(const TreeSide& a, const TreeSide& b, const SimilarityTransform& b_in_a) : a_(a), b_(b), b_in_a_(b_in_a) {}
 
   /// Are the two so surely apart that nobody need walk? To be asked first, before anything is made ready for run().
-  bool isNeedless() { return areSeparate(a_.tree().supports(), b_.tree().supports(), b_in_a_, near_); }
+  bool isNeedless() { return areSeparate(a_.tree().supports(), b_.tree().supports(), b_in_a_, is_shallow_); }
 
   /// True when the visitor ended it.
   bool run(Visitor& visitor);
@@ -40,7 +41,7 @@ class TreeWalk {
   const SimilarityTransform& b_in_a_;
   SimilarityTransform a_in_b_;  // once asked for
   bool inverted_ = false;
-  NearDirections near_;
+  bool is_shallow_ = false;  // see areSeparate()
   Visitor* visitor_ = nullptr;
 };
 

@@ -78,14 +78,8 @@ HWY_INLINE void cornersOf(const SupportTable& supports, VI at, V (&corner)[4]) {
 #endif
 }
 
-/// The support of a surface in some directions: where they lie among the kept ones, between three of them, and what is
-/// interpolated.
-struct Support {
-  VI at[3];
-  V value;
-};
-
-HWY_INLINE Support supportOf(const SupportTable& supports, const V (&u)[3]) {
+/// The support of a surface in some directions, interpolated between three of the kept ones.
+HWY_INLINE V supportOf(const SupportTable& supports, const V (&u)[3]) {
   const D d;
   const hn::RebindToSigned<D> di;
   const V zero = hn::Zero(d), one = hn::Set(d, 1), half = hn::Set(d, SupportTable::kCells / 2.0f);
@@ -106,17 +100,11 @@ HWY_INLINE Support supportOf(const SupportTable& supports, const V (&u)[3]) {
   const V high = hn::Max(rest_i, rest_j), low = hn::Min(rest_i, rest_j);
   const V face = hn::Add(choose(zero, hn::Set(d, 2), hn::Set(d, 4)), hn::IfThenElseZero(hn::Lt(major, zero), one));
   const V row = hn::Set(d, SupportTable::kRow);
-  const auto aside = hn::ConvertTo(di, hn::IfThenElse(hn::Ge(rest_i, rest_j), row, one));
-  Support s;
-  s.at[0] = hn::ConvertTo(di, hn::MulAdd(hn::MulAdd(face, row, i), row, j));
-  s.at[1] = hn::Add(s.at[0], aside);
-  s.at[2] = hn::Add(s.at[0], hn::Set(di, SupportTable::kRow + 1));
   V corner[4];
-  cornersOf(supports, s.at[0], corner);
+  cornersOf(supports, hn::ConvertTo(di, hn::MulAdd(hn::MulAdd(face, row, i), row, j)), corner);
   const V inner = hn::Mul(hn::Sub(one, high), corner[0]), outer = hn::Mul(low, corner[3]);
   const V middle = hn::Mul(hn::Sub(high, low), hn::IfThenElse(hn::Ge(rest_i, rest_j), corner[2], corner[1]));
-  s.value = hn::Mul(size, hn::Add(hn::Add(inner, middle), outer));
-  return s;
+  return hn::Mul(size, hn::Add(hn::Add(inner, middle), outer));
 }
 
 /// Where the pair's lattices lie to each other, in float; t is the way between the middles of the roots.
@@ -126,13 +114,10 @@ struct Between {
   float scale, tolerance, orthogonality_error;
 };
 
-// f of EightSeparations, the largest of it, and between which kept directions it looked. direction(lane, v) gives the
-// directions.
+// f of EightSeparations, and the largest of it. direction(lane, v) gives the directions.
 template <typename F>
-HWY_INLINE float values(const SupportTable& a, const SupportTable& b, const Between& g, F&& direction,
-                        NearDirections& near, float* value) {
+HWY_INLINE float values(const SupportTable& a, const SupportTable& b, const Between& g, F&& direction, float* value) {
   const D d;
-  const hn::RebindToSigned<D> di;
   V most = hn::Set(d, -1e30f);
   for (std::size_t lane = 0; lane < 8; lane += hn::Lanes(d)) {
     V v[3], w[3], along = hn::Zero(d);
@@ -145,13 +130,7 @@ HWY_INLINE float values(const SupportTable& a, const SupportTable& b, const Betw
       w[j] = hn::MulAdd(hn::Set(d, g.rotation[j][1]), v[1], w[j]);
       w[j] = hn::Neg(hn::MulAdd(hn::Set(d, g.rotation[j][2]), v[2], w[j]));
     }
-    const Support of_a = supportOf(a, v), of_b = supportOf(b, w);
-    BOCST_UNROLL
-    for (int k = 0; k < 3; ++k) {
-      hn::StoreU(of_a.at[k], di, near.of_a[k] + lane);
-      hn::StoreU(of_b.at[k], di, near.of_b[k] + lane);
-    }
-    const V f = hn::NegMulAdd(hn::Set(d, g.scale), of_b.value, hn::Sub(along, of_a.value));
+    const V f = hn::NegMulAdd(hn::Set(d, g.scale), supportOf(b, w), hn::Sub(along, supportOf(a, v)));
     hn::StoreU(f, d, value + lane);
     most = hn::Max(most, f);
   }
@@ -239,10 +218,8 @@ HWY_INLINE float displacementBetweenMiddles(const SupportTable& a, const Support
   return length;
 }
 
-bool AreSeparate(const SupportTable& a, const SupportTable& b, const SimilarityTransform& b_in_a,
-                 NearDirections& near) {
-  near.lanes = 0;
-  near.shallow = false;
+bool AreSeparate(const SupportTable& a, const SupportTable& b, const SimilarityTransform& b_in_a, bool& shallow) {
+  shallow = false;
   const Between g = between(b_in_a);
   const float size = static_cast<float>(lattice::kMiddle) * (1 + g.scale);
   const float smaller = 2 * lattice::kMiddle * std::min(1.0f, g.scale);
@@ -259,7 +236,7 @@ bool AreSeparate(const SupportTable& a, const SupportTable& b, const SimilarityT
   for (int iteration = 0; iteration < kIterations; ++iteration) {
     const Ring ring(n, radius, iteration == 0 ? kSevenAndMiddle : kEight);
     const auto directions = [&ring](std::size_t lane, V(&v)[3]) HWY_ATTR { ring.directions(lane, v); };
-    const float most = values(a, b, g, directions, near, value);
+    const float most = values(a, b, g, directions, value);
     if (most > rounding_margin) return true;
     const std::size_t lane = largest(value, most);
     if (lane == 8) return false;
@@ -275,8 +252,7 @@ bool AreSeparate(const SupportTable& a, const SupportTable& b, const SimilarityT
     if (best < hopeless) break;
     hopeless *= kHopelessLater;
   }
-  near.lanes = 8;
-  near.shallow = best > -kShallow * smaller;
+  shallow = best > -kShallow * smaller;
   return false;
 }
 
@@ -285,7 +261,7 @@ void Evaluate(const SupportTable& a, const SupportTable& b, const SimilarityTran
   const auto directions = [&eight](std::size_t lane, V(&v)[3]) HWY_ATTR {
     for (int k = 0; k < 3; ++k) v[k] = hn::LoadU(D(), eight.u[k] + lane);
   };
-  values(a, b, between(b_in_a), directions, eight.near, eight.value);
+  values(a, b, between(b_in_a), directions, eight.value);
 }
 
 }  // namespace bocst::query::HWY_NAMESPACE
@@ -297,9 +273,8 @@ namespace bocst::query {
 HWY_EXPORT(AreSeparate);
 HWY_EXPORT(Evaluate);
 
-bool areSeparate(const SupportTable& a, const SupportTable& b, const SimilarityTransform& b_in_a,
-                 NearDirections& near) {
-  return HWY_DYNAMIC_DISPATCH(AreSeparate)(a, b, b_in_a, near);
+bool areSeparate(const SupportTable& a, const SupportTable& b, const SimilarityTransform& b_in_a, bool& shallow) {
+  return HWY_DYNAMIC_DISPATCH(AreSeparate)(a, b, b_in_a, shallow);
 }
 
 void evaluate(const SupportTable& a, const SupportTable& b, const SimilarityTransform& b_in_a,

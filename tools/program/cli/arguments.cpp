@@ -1,7 +1,13 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #include "cli/arguments.h"
 
+#include <bocst/io.h>
+
 #include <CLI/CLI.hpp>
+#include <algorithm>
+#include <cctype>
+#include <charconv>
+#include <filesystem>
 
 namespace bocst::program {
 
@@ -74,7 +80,8 @@ Json ModelArguments::json() const {
 void ImageArguments::add(CLI::App& command) {
   CLI::Option* image =
       command.add_option("--image", file, "write a picture that shows it (PNG); drawn without a display")
-          ->type_name("FILE");
+          ->type_name("FILE")
+          ->check(outputFile(".png"));
   command.add_option("--image-nodes", nodes, "what stands for nodes in the picture: their spheres, or boxes")
       ->check(CLI::IsMember({"spheres", "boxes"}))
       ->capture_default_str()
@@ -89,14 +96,48 @@ void ImageArguments::add(CLI::App& command) {
       ->needs(image);
 }
 
+std::string meshFormats() {
+  std::string own, others;
+  for (const MeshFormat& format : bocst::meshFormats()) {
+    std::string& list = format.by_assimp ? others : own;
+    list += (list.empty() ? "" : ", ") + format.ending;
+  }
+  return "Mesh files: " + own + ". Read by assimp, in floats: " + others + ".";
+}
+
+CLI::Validator positive() {
+  CLI::Validator validator("POSITIVE");
+  validator.operation([](std::string& text) {
+    double value = 0;
+    const auto [end, error] = std::from_chars(text.data(), text.data() + text.size(), value);
+    const bool holds = error == std::errc() && end == text.data() + text.size() && value > 0;
+    return holds ? std::string() : text + " is not a number above 0";
+  });
+  return validator;
+}
+
+CLI::Validator outputFile(const std::string& ending, bool stdout_too) {
+  CLI::Validator validator("");
+  validator.operation([ending, stdout_too](std::string& file) {
+    if (file == "-" && !stdout_too) return std::string("- is no file here; /dev/stdout is one");
+    std::string found = std::filesystem::path(file).extension().string();
+    std::transform(found.begin(), found.end(), found.begin(), [](unsigned char c) { return std::tolower(c); });
+    const bool fits = found.empty() || found == ending;
+    return fits ? std::string() : file + ": a " + ending + " file is written here, not a " + found + " file";
+  });
+  return validator;
+}
+
 void addJson(CLI::App& command, Output& output) {
   command.add_option("--json", output.json_file, "write a report as JSON into this file, or to stdout with -")
-      ->type_name("FILE|-");
+      ->type_name("FILE|-")
+      ->check(outputFile(".json", true));
 }
 
 void addHtml(CLI::App& command, std::string& file) {
   command.add_option("--html", file, "write a page that shows it in 3D; it needs a browser with WebGL 2, no network")
-      ->type_name("FILE");
+      ->type_name("FILE")
+      ->check(outputFile(".html"));
 }
 
 }  // namespace bocst::program

@@ -14,7 +14,8 @@
 
 namespace CLI {
 class App;
-}
+class Validator;
+}  // namespace CLI
 
 namespace bocst::program {
 
@@ -68,6 +69,18 @@ struct ImageArguments {
   }
   render::Up upAxis() const { return up == "y" ? render::Up::kY : render::Up::kZ; }
 };
+
+/// Help of an argument that is a mesh file. All formats: meshFormats().
+inline constexpr const char* kMeshFile = "mesh file: OBJ, PLY, STL, OFF, DAE or another format (see `bocst --help`)";
+
+/// The endings of mesh files that can be read, in sentences.
+std::string meshFormats();
+
+/// A number above 0; CLI11's own complaint has 309 digits.
+CLI::Validator positive();
+
+/// A file that is written and has this ending (".png"), or none. "-", which is stdout, only where `stdout_too`.
+CLI::Validator outputFile(const std::string& ending, bool stdout_too = false);
 
 void addJson(CLI::App& command, Output& output);     ///< --json
 void addHtml(CLI::App& command, std::string& file);  ///< --html

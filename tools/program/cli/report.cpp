@@ -50,7 +50,8 @@ Progress::Progress(std::string what, std::size_t total)
     : what_(std::move(what)),
       total_(total),
       terminal_(::isatty(STDERR_FILENO) == 1),
-      next_(std::chrono::steady_clock::now() + std::chrono::milliseconds(300)) {}
+      start_(std::chrono::steady_clock::now()),
+      next_(start_ + std::chrono::milliseconds(300)) {}
 
 Progress::~Progress() {
   if (terminal_) std::fprintf(stderr, "\r\033[K");
@@ -62,8 +63,18 @@ void Progress::step() {
   const auto now = std::chrono::steady_clock::now();
   if (now < next_) return;
   next_ = now + std::chrono::milliseconds(100);
-  std::fprintf(stderr, "\r%s %zu of %zu", what_.c_str(), done_, total_);
+  const double seconds = std::chrono::duration<double>(now - start_).count();
+  std::fprintf(stderr, "\r%s %zu of %zu%s\033[K", what_.c_str(), done_, total_,
+               timeLeft(done_, total_, seconds).c_str());
   std::fflush(stderr);
+}
+
+std::string timeLeft(std::size_t done, std::size_t total, double seconds_so_far) {
+  if (done == 0 || done >= total || seconds_so_far < 2) return "";
+  const double left = seconds_so_far * static_cast<double>(total - done) / static_cast<double>(done);
+  if (left < 90) return ", about " + std::to_string(std::lround(left)) + " s left";
+  if (left < 5400) return ", about " + std::to_string(std::lround(left / 60)) + " min left";
+  return ", about " + std::to_string(std::lround(left / 3600)) + " h left";
 }
 
 double quantile(std::vector<double> samples, double q) {

@@ -43,7 +43,8 @@ class Table {
   std::vector<std::vector<std::string>> rows_;
 };
 
-/// A line on stderr that counts up while long work runs; nothing when stderr is no terminal.
+/// A line on stderr that counts up while long work runs, after a while with an estimate of the time left; nothing when
+/// stderr is no terminal.
 class Progress {
  public:
   Progress(std::string what, std::size_t total);
@@ -58,6 +59,7 @@ class Progress {
   std::size_t total_;
   std::size_t done_ = 0;
   bool terminal_;
+  std::chrono::steady_clock::time_point start_;
   std::chrono::steady_clock::time_point next_;
 };
 
@@ -71,6 +73,9 @@ class Stopwatch {
  private:
   std::chrono::steady_clock::time_point start_ = std::chrono::steady_clock::now();
 };
+
+/// ", about 40 s left" once enough is done to tell, else empty.
+std::string timeLeft(std::size_t done, std::size_t total, double seconds_so_far);
 
 /// The value below which the fraction q of the samples lies; 0.5 is the median. Takes a copy to sort.
 double quantile(std::vector<double> samples, double q);

@@ -117,7 +117,7 @@ void addSizes(CLI::App& command, Bench& bench) {
           "--triangles", bench.sizes,
           "the sizes that growth and --oracles come near to; without it 10k, 100k, 1 M and 10 M, with --oracles "
           "5k, 75k, 1 M and 10 M")
-      ->check(CLI::PositiveNumber)
+      ->check(positive())
       ->delimiter(',')
       ->allow_extra_args(false);
 }
@@ -128,7 +128,7 @@ void addOracleBench(CLI::App& command, Bench& bench) {
   command
       .add_option("--limit", bench.oracles.limit_seconds,
                   "with --oracles: seconds; an oracle that needs more to grow a tree is left out from there on")
-      ->check(CLI::PositiveNumber)
+      ->check(positive())
       ->capture_default_str();
 }
 
@@ -155,7 +155,7 @@ void addBench(CLI::App& program, Job& job) {
       "two.\n"
       "growth: A with itself, without FCL; ratios are the growth of the triangles (first answer) or of their logarithm "
       "(warm query) over that of the time, since the first size.");
-  command->add_option("a", bench->request.file_a, "mesh A: OBJ, PLY, STL, OFF or DAE file")->required();
+  command->add_option("a", bench->request.file_a, std::string("A: ") + kMeshFile)->required();
   command->add_option("b", bench->request.file_b, "mesh B; A again if not given");
   command->add_option("--scenarios", bench->scenarios, "what is measured")
       ->check(CLI::IsMember(choices()))
@@ -163,11 +163,11 @@ void addBench(CLI::App& program, Job& job) {
       ->allow_extra_args(false)
       ->capture_default_str();
   command->add_option("--poses", bench->request.poses, "number of random poses")
-      ->check(CLI::PositiveNumber)
+      ->check(positive())
       ->capture_default_str();
   command->add_option("--seed", bench->request.seed, "the same seed gives the same poses")->capture_default_str();
   command->add_option("--rounds", bench->request.rounds, "first answers, and rounds over all poses and frames")
-      ->check(CLI::PositiveNumber)
+      ->check(positive())
       ->capture_default_str();
   command->add_option("--frames", bench->request.frames, "of the path of moving")
       ->check(CLI::Range(2, 10000000))

@@ -4,6 +4,7 @@
 #include <CLI/CLI.hpp>
 #include <algorithm>
 #include <cmath>
+#include <cstdio>
 #include <iostream>
 #include <memory>
 #include <optional>
@@ -54,22 +55,234 @@ void measureWarm(const QueryPair& pair, const Eigen::Isometry3d& X_AB, Run& run)
   run.warm_us = quantile(times, 0.5);
 }
 
+Json list(const Eigen::Vector3d& v) { return {v.x(), v.y(), v.z()}; }
+
+std::string tuple(const Eigen::Vector3d& v) {
+  return "(" + formatNumber(v.x(), 6) + ", " + formatNumber(v.y(), 6) + ", " + formatNumber(v.z(), 6) + ")";
+}
+
+Json extentsJson(const Mesh& mesh) {
+  const Eigen::AlignedBox3d& box = mesh.bounds();
+  return {{"min", list(box.min())}, {"max", list(box.max())}, {"size", list(box.sizes())}};
+}
+
+/// What is probably a mistake, though it can be answered.
+std::vector<std::string> warningsAbout(const Mesh& a, const Mesh& b) {
+  constexpr double kRatio = 100;
+  const double size_a = a.bounds().sizes().maxCoeff(), size_b = b.bounds().sizes().maxCoeff();
+  if (!(size_a > 0 && size_b > 0) || std::max(size_a, size_b) < kRatio * std::min(size_a, size_b)) return {};
+  const bool larger_b = size_b > size_a;
+  return {std::string(larger_b ? "B" : "A") + " is " + formatNumber(larger_b ? size_b / size_a : size_a / size_b, 3) +
+          " times as large as " + (larger_b ? "A" : "B") + "; are both in the same length unit?"};
+}
+
+/// The numbers of a line of CSV, with all digits.
+std::string csv(const std::vector<double>& numbers) {
+  std::string text;
+  for (const double number : numbers) {
+    char buffer[64];
+    std::snprintf(buffer, sizeof(buffer), ",%.17g", number);
+    text += buffer;
+  }
+  return text;
+}
+
+std::string csvIds(const QueryPair::Contact& ids) {
+  return std::to_string(ids.first) + "," + std::to_string(ids.second);
+}
+
 struct Collide {
   std::string file_a;
   std::string file_b;
+  std::string pose_text;
+  std::string poses_file;
+  bool rpy = false;
+  bool xyzw = false;
+  bool distances = false;
   Pose pose;
   std::size_t max_contacts = QueryPair::kAll;
   ModelArguments model;
+  std::string csv_file;
   std::string html_file;
   ImageArguments image;
   Output output;
 
+  RotationFormat format() const {
+    return rpy ? RotationFormat::kRpy : xyzw ? RotationFormat::kXyzw : RotationFormat::kWxyz;
+  }
+
   int run() const {
-    output.check({file_a, file_b}, {html_file, image.file});
+    output.check({file_a, file_b, poses_file}, {csv_file, html_file, image.file});
+    return poses_file.empty() ? runOne() : runList();
+  }
+
+ private:
+  /// What the ids of a contact are.
+  std::string idName() const { return model.exact() ? "triangle" : "cell"; }
+
+  std::string verdict(bool touching) const {
+    return !touching ? "They do not collide." : model.exact() ? "They collide." : "They may touch.";
+  }
+
+  static void warn(const std::vector<std::string>& warnings) {
+    for (const std::string& warning : warnings) std::cerr << "bocst: " << warning << '\n';
+  }
+
+  Json nearestJson(const NearestPoints& nearest) const {
+    return {{idName() + "_a", nearest.triangles.first},
+            {idName() + "_b", nearest.triangles.second},
+            {"on_a", list(nearest.on_a)},
+            {"on_b", list(nearest.on_b)}};
+  }
+
+  Json contactsJson(const std::vector<TouchingPoint>& points) const {
+    Json contacts = Json::array();
+    for (const TouchingPoint& point : points) {
+      contacts.push_back({{idName() + "_a", point.triangles.first},
+                          {idName() + "_b", point.triangles.second},
+                          {"position", list(point.position)},
+                          {"normal", list(point.normal)},
+                          {"depth", point.depth}});
+    }
+    return contacts;
+  }
+
+  std::string contactsCsv(const std::vector<TouchingPoint>& points) const {
+    std::string text = idName() + "_a," + idName() + "_b,x,y,z,normal_x,normal_y,normal_z,depth\n";
+    for (const TouchingPoint& p : points) {
+      text += csvIds(p.triangles) +
+              csv({p.position.x(), p.position.y(), p.position.z(), p.normal.x(), p.normal.y(), p.normal.z(), p.depth}) +
+              "\n";
+    }
+    return text;
+  }
+
+  /// The first ten: ids, position, normal, depth.
+  void printContacts(const std::vector<TouchingPoint>& points) const {
+    constexpr std::size_t kShown = 10;
+    std::cout << "Positions and normals (from A to B) in A's frame, in the meshes' length unit:\n";
+    Table table(Table::Others::kLeft);
+    table.row({"contact", idName() + " of A", idName() + " of B", "position", "normal", "depth"});
+    for (std::size_t i = 0; i < std::min(points.size(), kShown); ++i) {
+      const TouchingPoint& p = points[i];
+      table.row({std::to_string(i + 1), std::to_string(p.triangles.first), std::to_string(p.triangles.second),
+                 tuple(p.position), tuple(p.normal), formatNumber(p.depth, 4)});
+    }
+    table.print();
+    if (points.size() > kShown) {
+      std::cout << points.size() - kShown << " more: --csv FILE or --json FILE writes all.\n";
+    }
+    std::cout << '\n';
+  }
+
+  void printNearest(const NearestPoints& nearest) const {
+    Table table(Table::Others::kLeft);
+    table.row({model.exact() ? "distance" : "distance of the spheres", formatNumber(nearest.distance, 6)});
+    table.row({"nearest point of A", tuple(nearest.on_a), idName() + " " + std::to_string(nearest.triangles.first)});
+    table.row({"nearest point of B", tuple(nearest.on_b),
+               idName() + " " + std::to_string(nearest.triangles.second) + ", in A's frame"});
+    table.print();
+    std::cout << '\n';
+  }
+
+  void printHead(const MeshArrays& a, const Mesh& mesh_a, const MeshArrays& b, const Mesh& mesh_b) const {
+    Table head(Table::Others::kLeft);
+    const auto described = [](const std::string& file, const MeshArrays& mesh, const Mesh& shape) {
+      const Eigen::Vector3d size = shape.bounds().sizes();
+      return file + ", " + std::to_string(mesh.triangles.size()) + " triangles, " + formatNumber(size.x(), 4) + " x " +
+             formatNumber(size.y(), 4) + " x " + formatNumber(size.z(), 4);
+    };
+    head.row({"A", described(file_a, a, mesh_a)});
+    head.row({"B", described(file_b, b, mesh_b)});
+    if (poses_file.empty()) head.row({"B in A", pose.text() + ", " + pose.rotationText()});
+    head.row({"answer", model.answerText()});
+    head.print();
+  }
+
+  /// All poses of a file, asked of one pair of models; FCL is not asked.
+  int runList() const {
+    const std::vector<ListedPose> poses = parsePoses(readFile(poses_file), format(), poses_file);
+    for (const ListedPose& listed : poses)
+      warnOfNorm(listed.pose, poses_file + ": line " + std::to_string(listed.line));
+    const std::shared_ptr<const Mesh> mesh_a = loadMesh(file_a);
+    const std::shared_ptr<const Mesh> mesh_b = loadMesh(file_b);
+    const std::vector<std::string> warnings = warningsAbout(*mesh_a, *mesh_b);
+    warn(warnings);
+    const MeshArrays a(*mesh_a, model.scalarKind());
+    const MeshArrays b(*mesh_b, model.scalarKind());
+    const auto pair = makeBocstPair(model.scalarKind(), a, b, model.options());
+
+    Json rows = Json::array();
+    std::string text = "line,x,y,z,qw,qx,qy,qz,collide";
+    if (distances) text += ",distance," + idName() + "_a," + idName() + "_b,ax,ay,az,bx,by,bz";
+    text += "\n";
+    Table table(Table::Others::kLeft);
+    table.row({"line", model.exact() ? "they collide" : "they may touch", distances ? "distance" : ""});
+    std::size_t touching = 0;
+    double microseconds = 0;
+    {
+      Progress progress("pose", poses.size());
+      for (const auto& [line, X] : poses) {
+        const Stopwatch watch;
+        const bool hit = pair->touch(X.transform());
+        std::optional<NearestPoints> nearest;
+        if (distances && !hit) nearest = pair->nearest(X.transform());
+        microseconds += watch.microseconds();
+        touching += hit;
+        Json row = {{"line", line}, {"pose", X.numbers}, {"collide", hit}};
+        text += std::to_string(line) + csv({X.numbers.begin(), X.numbers.end()}) + (hit ? ",1" : ",0");
+        if (distances) {
+          row["distance"] = nearest ? Json(nearest->distance) : Json();
+          row["nearest"] = nearest ? nearestJson(*nearest) : Json();
+          text += nearest ? csv({nearest->distance}) + "," + csvIds(nearest->triangles) +
+                                csv({nearest->on_a.x(), nearest->on_a.y(), nearest->on_a.z(), nearest->on_b.x(),
+                                     nearest->on_b.y(), nearest->on_b.z()})
+                          : std::string(9, ',');
+        }
+        text += '\n';
+        table.row({std::to_string(line), hit ? "yes" : "no", nearest ? formatNumber(nearest->distance, 6) : ""});
+        rows.push_back(std::move(row));
+        progress.step();
+      }
+    }
+    if (!csv_file.empty()) writeText(csv_file, text);
+    if (output.wantsJson()) {
+      output.write({{"a", file_a},
+                    {"b", file_b},
+                    {"extents", {{"a", extentsJson(*mesh_a)}, {"b", extentsJson(*mesh_b)}}},
+                    {"warnings", warnings},
+                    {"options", model.json()},
+                    {"oracle", pair->oracleName()},
+                    {"asked", poses.size()},
+                    {"collisions", touching},
+                    {"total_us", microseconds},
+                    {"poses", rows}});
+    } else if (csv_file.empty()) {
+      printHead(a, *mesh_a, b, *mesh_b);
+      std::cout << '\n';
+      table.print();
+      std::cout << '\n'
+                << touching << " of " << poses.size() << " poses " << (model.exact() ? "collide" : "may touch") << ", "
+                << formatTime(microseconds / static_cast<double>(poses.size())) << " a pose.\n";
+    }
+    return 0;
+  }
+
+  static void warnOfNorm(const Pose& pose, const std::string& where) {
+    const double norm = pose.quaternionNorm();
+    if (std::abs(norm - 1) > 1e-3) {
+      std::cerr << "bocst: " << where << ": the quaternion has the norm " << norm << "; it is divided by it\n";
+    }
+  }
+
+  int runOne() const {
+    warnOfNorm(pose, "--pose");
     std::optional<render::Renderer> renderer;
     if (image.wanted()) renderer.emplace(model.options().oracle);
     const std::shared_ptr<const Mesh> mesh_a = loadMesh(file_a);
     const std::shared_ptr<const Mesh> mesh_b = loadMesh(file_b);
+    const std::vector<std::string> warnings = warningsAbout(*mesh_a, *mesh_b);
+    warn(warnings);
     const MeshArrays a(*mesh_a, model.scalarKind());
     const MeshArrays b(*mesh_b, model.scalarKind());
     const Eigen::Isometry3d X_AB = pose.transform();
@@ -84,6 +297,9 @@ struct Collide {
     ours.contacts = our_contacts.size();
     const std::size_t nodes_in_the_end = bocst_pair->nodes();
     const std::size_t bytes_in_the_end = bocst_pair->bytes();
+    const std::vector<TouchingPoint> points = bocst_pair->touchingPoints(X_AB, max_contacts);
+    std::optional<NearestPoints> nearest;
+    if (!ours.touching) nearest = bocst_pair->nearest(X_AB);
 
     Run theirs;
     const auto fcl_pair =
@@ -108,16 +324,23 @@ struct Collide {
       if (!html_file.empty()) writeFile(html_file, pairPage(grown).html());
       if (renderer) writePng(image.file, pairPicture(*renderer, grown, image));
     }
+    if (!csv_file.empty()) writeText(csv_file, contactsCsv(points));
     if (output.wantsJson()) {
       const auto compare = [](double bocst, double fcl) { return Json{{"bocst", bocst}, {"fcl", fcl}}; };
       const auto count = [](std::size_t bocst, std::size_t fcl) { return Json{{"bocst", bocst}, {"fcl", fcl}}; };
       Json report = {{"a", file_a},
                      {"b", file_b},
                      {"pose", pose.numbers},
+                     {"rotation", pose.rotationText()},
+                     {"extents", {{"a", extentsJson(*mesh_a)}, {"b", extentsJson(*mesh_b)}}},
+                     {"warnings", warnings},
                      {"options", model.json()},
                      {"oracle", bocst_pair->oracleName()},
                      {"collide", ours.touching},
                      {"contacts", ours.contacts},
+                     {"contact_points", contactsJson(points)},
+                     {"distance", nearest ? Json(nearest->distance) : Json()},
+                     {"nearest", nearest ? nearestJson(*nearest) : Json()},
                      {"fcl", {{"collide", theirs.touching}, {"contacts", theirs.contacts}}},
                      {"agree", agree},
                      {"nodes", nodes},
@@ -131,17 +354,17 @@ struct Collide {
                        {"warm_query", theirs.warm_us / ours.warm_us},
                        {"memory", static_cast<double>(fcl_bytes) / static_cast<double>(bytes)}}}};
       output.write(report);
-    } else {
-      Table head(Table::Others::kLeft);
-      head.row({"A", file_a + ", " + std::to_string(a.triangles.size()) + " triangles"});
-      head.row({"B", file_b + ", " + std::to_string(b.triangles.size()) + " triangles"});
-      head.row({"B in A", pose.text()});
-      head.row({"answer", model.answerText()});
-      head.print();
-      std::cout << '\n' << (ours.touching ? "They collide." : "They do not collide.") << "\n\n";
+    } else if (csv_file != "-") {
+      printHead(a, *mesh_a, b, *mesh_b);
+      std::cout << '\n' << verdict(ours.touching);
+      if (!model.exact() && ours.touching != theirs.touching) std::cout << " FCL's triangles do not.";
+      std::cout << "\n\n";
+      if (!points.empty()) printContacts(points);
+      if (nearest) printNearest(*nearest);
       Table table;
       table.row({"", "bocst", "FCL OBBRSS", "ratio"});
-      table.row({"collide", ours.touching ? "yes" : "no", theirs.touching ? "yes" : "no"});
+      table.row({model.exact() ? "collide" : "may touch, collide", ours.touching ? "yes" : "no",
+                 theirs.touching ? "yes" : "no"});
       const auto limited = [this](std::size_t n) { return std::to_string(n) + (n == max_contacts ? " (limit)" : ""); };
       table.row({"contacts", limited(ours.contacts), limited(theirs.contacts)});
       table.row({"first answer from arrays", formatTime(ours.first_us), formatTime(theirs.first_us),
@@ -167,31 +390,53 @@ struct Collide {
 void addCollide(CLI::App& program, Job& job) {
   auto collide = std::make_shared<Collide>();
   CLI::App* command = program.add_subcommand("collide", "check two meshes for collision and compare with FCL");
-  command->add_option("a", collide->file_a, "mesh A: OBJ, PLY, STL, OFF or DAE file")->required();
-  command->add_option("b", collide->file_b, "mesh B")->required();
+  command->footer(
+      "Lengths are in the meshes' unit, which must be the same. Contacts of conservative answers are pairs of "
+      "spheres:\n"
+      "they may touch where the surfaces do not, and their ids are those of cells.\n"
+      "--poses asks bocst alone, one pair of models; `bocst validate` compares many poses with FCL.");
+  command->add_option("a", collide->file_a, std::string("A: ") + kMeshFile)->required();
+  command->add_option("b", collide->file_b, "B: mesh file")->required();
+  CLI::Option* pose = command->add_option("--pose", collide->pose_text, "pose of B in A's frame, identity if not given")
+                          ->type_name("x,y,z,qw,qx,qy,qz");
   command
-      ->add_option_function<std::string>(
-          "--pose",
-          [collide](const std::string& text) {
-            try {
-              collide->pose = Pose::parse(text);
-              const double norm = collide->pose.quaternionNorm();
-              if (std::abs(norm - 1) > 1e-3) {
-                std::cerr << "bocst: --pose: the quaternion has the norm " << norm << "; it is divided by it\n";
-              }
-            } catch (const std::invalid_argument& e) {
-              throw CLI::ValidationError("--pose", e.what());
-            }
-          },
-          "pose of B in A's frame, identity if not given")
-      ->type_name("x,y,z,qw,qx,qy,qz");
+      ->add_option("--poses", collide->poses_file,
+                   "ask for each pose of a file, one a line (CSV, or with blanks; the first line may have names)")
+      ->type_name("FILE")
+      ->excludes(pose);
+  CLI::Option* rpy =
+      command->add_flag("--rpy", collide->rpy,
+                        "poses are x,y,z,roll,pitch,yaw: radians about the fixed axes x, y, z in turn, as in URDF");
+  command->add_flag("--xyzw", collide->xyzw, "poses are x,y,z,qx,qy,qz,qw, as in ROS")->excludes(rpy);
+  command->add_flag("--distance", collide->distances,
+                    "with --poses: the distance and the nearest points of poses without contact, too");
   command->add_option("--max-contacts", collide->max_contacts, "stop after so many contacts; all if not given")
-      ->check(CLI::PositiveNumber);
+      ->check(positive());
+  command
+      ->add_option("--csv", collide->csv_file,
+                   "write the contacts, or with --poses a line for each pose, to this file, or to stdout with -")
+      ->type_name("FILE|-")
+      ->check(outputFile(".csv", true));
   collide->model.addAll(*command);
   addHtml(*command, collide->html_file);
   collide->image.add(*command);
   addJson(*command, collide->output);
-  command->callback([collide, &job] { job = [collide] { return collide->run(); }; });
+  command->callback([collide, &job] {
+    try {
+      if (!collide->pose_text.empty()) collide->pose = Pose::parse(collide->pose_text, collide->format());
+    } catch (const std::invalid_argument& e) {
+      throw CLI::ValidationError("--pose", e.what());
+    }
+    const bool shown =
+        !collide->html_file.empty() || collide->image.wanted() || collide->max_contacts != QueryPair::kAll;
+    if (!collide->poses_file.empty() && shown) {
+      throw CLI::ValidationError("--poses", "--html, --image and --max-contacts are for one pose");
+    }
+    if (collide->poses_file.empty() && collide->distances) {
+      throw CLI::ValidationError("--distance", "is for --poses; one pose has it always");
+    }
+    job = [collide] { return collide->run(); };
+  });
 }
 
 }  // namespace bocst::program

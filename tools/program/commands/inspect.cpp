@@ -15,6 +15,7 @@
 #include "cli/file.h"
 #include "mesh/health.h"
 #include "mesh/sphere_error.h"
+#include "mesh/sphere_fit.h"
 #include "mesh/spheres.h"
 #include "picture/inspect_picture.h"
 #include "picture/page.h"
@@ -66,6 +67,56 @@ std::string watertightText(const Health& health) {
   return health.volume < 0 ? "yes, inside out" : "yes";
 }
 
+std::string text(const Eigen::Vector3d& v) {
+  return formatNumber(v.x(), 6) + ", " + formatNumber(v.y(), 6) + ", " + formatNumber(v.z(), 6);
+}
+
+Json list(const Eigen::Vector3d& v) { return {v.x(), v.y(), v.z()}; }
+
+/// The first few of a list, as text.
+template <typename T, typename Text>
+std::string firstFew(const std::vector<T>& all, const Text& text) {
+  constexpr std::size_t kShown = 3;
+  std::string few;
+  for (std::size_t i = 0; i < std::min(all.size(), kShown); ++i) few += (i > 0 ? ", " : "") + text(all[i]);
+  return few + (all.size() > kShown ? ", ..." : "");
+}
+
+/// Rows that say where the faults are.
+void addFaults(Table& table, const Faults& faults) {
+  const auto edge = [](const FaultyEdge& e) {
+    return std::to_string(e.vertices[0]) + "-" + std::to_string(e.vertices[1]) + " of triangle " +
+           std::to_string(e.triangles.front());
+  };
+  const auto id = [](std::uint32_t i) { return std::to_string(i); };
+  const auto row = [&table](const char* name, const std::string& where) {
+    if (!where.empty()) table.row({name, where});
+  };
+  row("  open edges", firstFew(faults.open_edges, edge));
+  row("  non-manifold edges", firstFew(faults.non_manifold_edges, edge));
+  row("  flipped edges", firstFew(faults.flipped_edges, edge));
+  row("  degenerate triangles", firstFew(faults.degenerate_triangles, id));
+  row("  duplicate triangles", firstFew(faults.duplicate_triangles, id));
+  row("  repeated vertices", firstFew(faults.repeated_vertices, id));
+  row("  unused vertices", firstFew(faults.unused_vertices, id));
+}
+
+Json json(const std::vector<FaultyEdge>& edges) {
+  Json all = Json::array();
+  for (const FaultyEdge& edge : edges) all.push_back({{"vertices", edge.vertices}, {"triangles", edge.triangles}});
+  return all;
+}
+
+Json json(const Faults& faults) {
+  return {{"open_edges", json(faults.open_edges)},
+          {"non_manifold_edges", json(faults.non_manifold_edges)},
+          {"flipped_edges", json(faults.flipped_edges)},
+          {"degenerate_triangles", faults.degenerate_triangles},
+          {"duplicate_triangles", faults.duplicate_triangles},
+          {"repeated_vertices", faults.repeated_vertices},
+          {"unused_vertices", faults.unused_vertices}};
+}
+
 /// What is wrong with a mesh, in words.
 std::string faultsText(const Health& health) {
   std::string text;
@@ -95,7 +146,8 @@ Json json(const Health& health) {
           {"repeated_vertices", health.repeated_vertices},
           {"unused_vertices", health.unused_vertices},
           {"area", health.area},
-          {"volume", has_volume ? Json(health.volume) : Json()}};
+          {"volume", has_volume ? Json(health.volume) : Json()},
+          {"faults", json(health.faults)}};
 }
 
 struct Inspect {
@@ -104,6 +156,8 @@ struct Inspect {
   bool no_error = false;
   std::string spheres_file;
   std::string link;
+  std::size_t sphere_count = 0;
+  double tolerance = 0;
   std::string html_file;
   ImageArguments image;
   Output output;
@@ -115,21 +169,27 @@ struct Inspect {
     const std::shared_ptr<const Mesh> mesh = loadMesh(file);
     const Health health = healthOf(*mesh);
     const Grown grown = grow(mesh, model.options(), !no_error), other = grow(mesh, otherOptions(), !no_error);
+    std::optional<SphereFit> fit;
+    if (fitted()) fit = fitSpheres(*mesh, sphere_count, tolerance);
     if (!spheres_file.empty()) {
       const std::string name = link.empty() ? std::filesystem::path(file).stem().string() : link;
-      writeFile(spheres_file, sphereFile(spheres_file, leavesAt(grown.nodes, model.depth), name));
+      const std::vector<Sphere> spheres = fit ? fit->spheres : spheresOf(leavesAt(grown.nodes, model.depth));
+      writeFile(spheres_file, sphereFile(spheres_file, spheres, name));
     }
     if (!html_file.empty()) writeFile(html_file, page(*mesh, health, grown, other).html());
-    if (renderer) writePng(image.file, inspectPicture(*renderer, file, *mesh, grown.nodes, model.options(), image));
+    if (renderer)
+      writePng(image.file, inspectPicture(*renderer, file, *mesh, grown.nodes, health.faults, model.options(), image));
     if (output.wantsJson()) {
-      output.write(report(*mesh, health, grown, other));
+      output.write(report(*mesh, health, grown, other, fit));
     } else {
-      print(*mesh, health, grown, other);
+      print(*mesh, health, grown, other, fit);
     }
     return 0;
   }
 
  private:
+  bool fitted() const { return sphere_count > 0 || tolerance > 0; }
+
   /// The same with the other subdivision, for comparison.
   Options otherOptions() const {
     Options options = model.options();
@@ -145,17 +205,22 @@ struct Inspect {
       level["error_min"] = no_error ? Json() : Json(error.min);
       level["error_avg"] = no_error ? Json() : Json(error.average);
       level["error_max"] = no_error ? Json() : Json(error.max);
+      level["error_max_length"] = no_error ? Json() : Json(error.max * 2 * grown.nodes.front().radius);
       levels.push_back(level);
     }
     return levels;
   }
 
-  Json report(const Mesh& mesh, const Health& health, const Grown& grown, const Grown& other) const {
+  Json report(const Mesh& mesh, const Health& health, const Grown& grown, const Grown& other,
+              const std::optional<SphereFit>& fit) const {
     const Eigen::Vector3d extent = mesh.bounds().sizes();
     Json report = {{"mesh", file},
                    {"vertices", mesh.vertexCount()},
                    {"triangles", mesh.triangleCount()},
-                   {"extents", {extent.x(), extent.y(), extent.z()}},
+                   {"extents", list(extent)},
+                   {"minimum", list(mesh.bounds().min())},
+                   {"maximum", list(mesh.bounds().max())},
+                   {"center", list(mesh.bounds().center())},
                    {"health", json(health)},
                    {"subdivision", model.subdivision},
                    {"dimension", model.dimension},
@@ -170,22 +235,39 @@ struct Inspect {
                        {"nodes", other.nodes.size()},
                        {"tree_bytes", other.bytes.back()},
                        {"levels", levels(other)}};
+    if (fit) {
+      report["spheres"] = {{"count", fit->spheres.size()},
+                           {"coverage", fit->coverage},
+                           {"protrusion_max", fit->protrusion},
+                           {"protrusion_avg", fit->average_protrusion}};
+    }
     return report;
   }
 
-  void print(const Mesh& mesh, const Health& health, const Grown& grown, const Grown& other) const {
+  void print(const Mesh& mesh, const Health& health, const Grown& grown, const Grown& other,
+             const std::optional<SphereFit>& fit) const {
     Table summary(Table::Others::kLeft);
     summary.row({"mesh", file});
     summary.row({"vertices", std::to_string(mesh.vertexCount())});
     summary.row({"triangles", std::to_string(mesh.triangleCount())});
     summary.row({"extents", extentsText(mesh)});
+    summary.row({"minimum", text(mesh.bounds().min())});
+    summary.row({"maximum", text(mesh.bounds().max())});
+    summary.row({"centre", text(mesh.bounds().center())});
     summary.row({"components", std::to_string(health.components)});
     summary.row({"watertight", watertightText(health)});
     summary.row({"faults", faultsText(health)});
+    addFaults(summary, health.faults);
     summary.row({"area", formatNumber(health.area, 6)});
     if (health.watertight() && health.oriented()) summary.row({"volume", formatNumber(health.volume, 6)});
     summary.row({"tree", model.subdivision + ", depth " + std::to_string(model.depth) + ", oracle " + grown.oracle});
     summary.row({"grown in", formatTime(grown.microseconds)});
+    if (fit) {
+      summary.row({"spheres", std::to_string(fit->spheres.size()) + ", they hold " +
+                                  formatNumber(100 * fit->coverage, 4) + " % of the surface and protrude " +
+                                  formatNumber(fit->protrusion, 4) + " at most, " +
+                                  formatNumber(fit->average_protrusion, 4) + " on average"});
+    }
     summary.print();
     print(model.options().subdivision, grown);
     print(otherOptions().subdivision, other);
@@ -197,7 +279,7 @@ struct Inspect {
     if (no_error) {
       table.row({"level", "nodes", "bytes"});
     } else {
-      table.row({"level", "nodes", "bytes", "error min", "average", "max"});
+      table.row({"level", "nodes", "bytes", "error min", "average", "max", "max as a length"});
     }
     for (std::size_t i = 0; i < grown.levels.size(); ++i) {
       const LevelError& error = grown.levels[i];
@@ -207,6 +289,7 @@ struct Inspect {
         row.push_back(formatNumber(error.min));
         row.push_back(formatNumber(error.average));
         row.push_back(formatNumber(error.max));
+        row.push_back(formatNumber(error.max * 2 * grown.nodes.front().radius));
       }
       table.row(row);
     }
@@ -223,6 +306,7 @@ struct Inspect {
     page.fact("watertight", watertightText(health));
     page.fact("faults", faultsText(health));
     page.object(std::filesystem::path(file).filename().string(), mesh);
+    page.faults(mesh, health.faults);
     const auto add = [&](const Grown& tree, Subdivision subdivision) {
       page.tree(mesh, tree.nodes, subdivision, model.dimension, no_error ? std::vector<LevelError>() : tree.levels);
     };
@@ -239,6 +323,13 @@ void addInspect(CLI::App& program, Job& job) {
   CLI::App* command =
       program.add_subcommand("inspect", "the health of a mesh; grow its whole tree and measure, export and show it");
   command->footer(
+      "Lengths are in the mesh's unit. The first faults of each kind are named by their ids; the JSON report has all "
+      "up to\n" +
+      std::to_string(Faults::kMost) +
+      " of a kind, the page and the picture mark them in red.\n"
+      "--count and --tolerance fit spheres to the surface itself: it is cut where spheres protrude most. They hold "
+      "the\n"
+      "whole surface, not the inside of a solid.\n"
       "The error of a node (paper, 5.2) is the greatest distance from a point of its sphere to the surface inside "
       "that\n"
       "sphere, divided by the diameter of the root's sphere. Each level is shown as if the tree ended there.\n"
@@ -247,7 +338,7 @@ void addInspect(CLI::App& program, Job& job) {
       "The page shows at most " +
       std::to_string(Page::kMaxTriangles) + " triangles (a larger mesh is made coarser) and " +
       std::to_string(Page::kMaxNodes) + " nodes of a tree.");
-  command->add_option("mesh", inspect->file, "OBJ, PLY, STL, OFF or DAE file")->required();
+  command->add_option("mesh", inspect->file, kMeshFile)->required();
   inspect->model.addDepth(*command);
   inspect->model.addShape(*command);
   inspect->model.addOracle(*command);
@@ -258,6 +349,14 @@ void addInspect(CLI::App& program, Job& job) {
       ->type_name("FILE");
   command->add_option("--link", inspect->link, "the link's name in the .yaml file; the mesh's if not given")
       ->type_name("NAME");
+  CLI::Option* count = command->add_option("--count", inspect->sphere_count,
+                                           "fit at most so many spheres, instead of those of the collision depth");
+  count->check(positive())->type_name("N");
+  command
+      ->add_option("--tolerance", inspect->tolerance,
+                   "fit as many spheres as are needed to protrude from the surface by no more than this length")
+      ->check(positive())
+      ->type_name("L");
   addHtml(*command, inspect->html_file);
   inspect->image.add(*command);
   addJson(*command, inspect->output);

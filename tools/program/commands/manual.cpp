@@ -1,6 +1,8 @@
 // SPDX-License-Identifier: BSD-3-Clause
 // The man page and the completion of the shell, both made from the options themselves. Hidden commands; the build runs
 // them.
+#include <bocst/io.h>
+
 #include <CLI/CLI.hpp>
 #include <algorithm>
 #include <iostream>
@@ -22,8 +24,7 @@ constexpr const char* kDescription =
     "FCL. This program inspects meshes, asks single queries, and compares answers, time and memory with FCL's.";
 constexpr const char* kExitStatus =
     "0 when all is well, 1 when something failed or was missed, 2 for a wrong command line.";
-constexpr const char* kFiles =
-    "Meshes are OBJ, PLY, STL, OFF or DAE files. Files that are written appear whole or not at all.";
+constexpr const char* kFiles = "Files that are written appear whole or not at all.";
 constexpr std::pair<const char*, const char*> kEnvironment[] = {
     {"BOCST_ORACLE", "cpu, occlusion, compute or the number of a device: decides where --oracle auto is given."},
     {"BOCST_DISPATCH_CHECK", "off: do not check that FCL's entry points reach bocst when the first model is made."},
@@ -158,7 +159,7 @@ std::string manPage(const CLI::App& program) {
           entry(".B \\-\\-version", "The version of the program.");
   text += ".SH \"EXIT STATUS\"\n" + roff(kExitStatus) + "\n.SH ENVIRONMENT\n";
   for (const auto& [name, meaning] : kEnvironment) text += entry(std::string(".B ") + name, meaning);
-  text += ".SH FILES\n" + roff(kFiles) + "\n.SH EXAMPLES\n";
+  text += ".SH FILES\n" + roff(meshFormats() + " " + kFiles) + "\n.SH EXAMPLES\n";
   for (const auto& [line, meaning] : kExamples) text += entry(".B " + roff(line), meaning);
   return text;
 }
@@ -166,6 +167,12 @@ std::string manPage(const CLI::App& program) {
 std::string words(const std::vector<std::string>& list) {
   std::string text;
   for (const std::string& word : list) text += (text.empty() ? "" : " ") + word;
+  return text;
+}
+
+std::string meshEndings() {
+  std::string text;
+  for (const MeshFormat& format : bocst::meshFormats()) text += (text.empty() ? "" : " ") + format.ending;
   return text;
 }
 
@@ -211,7 +218,8 @@ _bocst() {
 )" + values +
          R"(  esac
   if [[ $word != -* ]]; then
-    if [[ $command == merge ]]; then _bocst_files json; else _bocst_files obj ply stl off dae; fi
+    if [[ $command == merge ]]; then _bocst_files json; else _bocst_files )" +
+         meshEndings() + R"(; fi
     return
   fi
   case $command in

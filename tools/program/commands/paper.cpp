@@ -138,7 +138,9 @@ void addPaper(CLI::App& program, Job& job) {
       "4\n"
       "to 6 the first mesh is moved over three objects: the other meshes in turn, or itself if it is the only one.\n"
       "The report is DIR/paper.md, with its pictures in DIR/pictures.");
-  command->add_option("mesh", paper->files, "one to four OBJ, PLY, STL, OFF or DAE files")->required()->expected(1, 4);
+  command->add_option("mesh", paper->files, std::string("one to four times a ") + kMeshFile)
+      ->required()
+      ->expected(1, 4);
   command
       ->add_option("--out", paper->folder,
                    "the folder of the report, made if it is not there; paper if not given, with --json alone none")

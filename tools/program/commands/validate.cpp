@@ -214,9 +214,9 @@ void addValidate(CLI::App& program, Job& job) {
       "count.\n"
       "--html and --image show the first mismatch, else the pose that conservative answers overestimate most (with\n"
       "--histogram), else the first pose. Exit code 0 means that there was no mismatch.");
-  command->add_option("a", validate->file_a, "mesh A: OBJ, PLY, STL, OFF or DAE file")->required();
+  command->add_option("a", validate->file_a, std::string("A: ") + kMeshFile)->required();
   command->add_option("b", validate->file_b, "mesh B")->required();
-  command->add_option("--poses", validate->poses, "number of poses")->check(CLI::PositiveNumber)->capture_default_str();
+  command->add_option("--poses", validate->poses, "number of poses")->check(positive())->capture_default_str();
   command->add_option("--seed", validate->seed, "the same seed gives the same poses")->capture_default_str();
   command->add_flag("--contacts", validate->compare_contacts, "compare the sets of triangle pairs too");
   command->add_option("--reference", validate->references, "FCL's trees to compare with: obbrss, obb, rss (slow)")

@@ -32,27 +32,51 @@ std::vector<Id> firstOfEqual(const std::vector<Eigen::Vector3d>& vertices) {
 /// An edge of a triangle; backwards when the triangle runs from the larger id to the smaller.
 struct Edge {
   Id a, b;
+  Id triangle;
   bool backwards;
 };
 
+template <typename T>
+void note(std::size_t& count, std::vector<T>& list, T fault) {
+  ++count;
+  if (list.size() < Faults::kMost) list.push_back(std::move(fault));
+}
+
 void countEdges(std::vector<Edge>& edges, Health& health) {
-  std::sort(edges.begin(), edges.end(),
-            [](const Edge& x, const Edge& y) { return std::tie(x.a, x.b) < std::tie(y.a, y.b); });
+  std::sort(edges.begin(), edges.end(), [](const Edge& x, const Edge& y) {
+    return std::tie(x.a, x.b, x.triangle) < std::tie(y.a, y.b, y.triangle);
+  });
   for (std::size_t i = 0; i < edges.size();) {
     std::size_t end = i + 1;
     while (end < edges.size() && edges[end].a == edges[i].a && edges[end].b == edges[i].b) ++end;
-    health.open_edges += end - i == 1;
-    health.non_manifold_edges += end - i > 2;
-    health.flipped_edges += end - i == 2 && edges[i].backwards == edges[i + 1].backwards;
+    const bool open = end - i == 1, crowded = end - i > 2;
+    if (open || crowded || edges[i].backwards == edges[i + 1].backwards) {
+      FaultyEdge fault{{edges[i].a, edges[i].b}, {}};
+      for (std::size_t k = i; k < end; ++k) fault.triangles.push_back(edges[k].triangle);
+      Faults& faults = health.faults;
+      if (open) {
+        note(health.open_edges, faults.open_edges, std::move(fault));
+      } else if (crowded) {
+        note(health.non_manifold_edges, faults.non_manifold_edges, std::move(fault));
+      } else {
+        note(health.flipped_edges, faults.flipped_edges, std::move(fault));
+      }
+    }
     i = end;
   }
 }
 
-std::size_t countDuplicates(std::vector<std::array<Id, 3>>& triangles) {
+void countDuplicates(std::vector<std::array<Id, 3>> triangles, Health& health) {
   for (std::array<Id, 3>& t : triangles) std::sort(t.begin(), t.end());
-  std::sort(triangles.begin(), triangles.end());
-  const auto end = std::unique(triangles.begin(), triangles.end());
-  return static_cast<std::size_t>(triangles.end() - end);
+  std::vector<Id> order(triangles.size());
+  std::iota(order.begin(), order.end(), Id{0});
+  std::sort(order.begin(), order.end(),
+            [&](Id a, Id b) { return std::tie(triangles[a], a) < std::tie(triangles[b], b); });
+  for (std::size_t i = 1; i < order.size(); ++i) {
+    if (triangles[order[i]] != triangles[order[i - 1]]) continue;
+    note(health.duplicate_triangles, health.faults.duplicate_triangles, order[i]);
+  }
+  std::sort(health.faults.duplicate_triangles.begin(), health.faults.duplicate_triangles.end());
 }
 
 std::size_t countComponents(const std::vector<std::array<Id, 3>>& triangles, std::size_t vertices) {
@@ -81,7 +105,9 @@ std::size_t countComponents(const std::vector<std::array<Id, 3>>& triangles, std
 Health healthOf(const Mesh& mesh) {
   Health health;
   const std::vector<Id> first = firstOfEqual(mesh.vertices());
-  for (std::size_t i = 0; i < first.size(); ++i) health.repeated_vertices += first[i] != i;
+  for (Id i = 0; i < first.size(); ++i) {
+    if (first[i] != i) note(health.repeated_vertices, health.faults.repeated_vertices, i);
+  }
 
   std::vector<bool> used(mesh.vertexCount());
   std::vector<std::array<Id, 3>> triangles;
@@ -100,19 +126,38 @@ Health healthOf(const Mesh& mesh) {
     health.area += area2 / 2;
     volume6 += p.dot(q.cross(r));
     // The limit that exact answers have, too (share/doc/guarantees.md).
-    health.degenerate_triangles += !(area2 > 1e-14 * (q - p).norm() * (r - p).norm());
+    const Id triangle = static_cast<Id>(triangles.size() - 1);
+    if (!(area2 > 1e-14 * (q - p).norm() * (r - p).norm())) {
+      note(health.degenerate_triangles, health.faults.degenerate_triangles, triangle);
+    }
     if (c[0] == c[1] || c[1] == c[2] || c[2] == c[0]) continue;
     for (std::size_t k = 0; k < 3; ++k) {
       const auto [a, b] = std::minmax(c[k], c[(k + 1) % 3]);
-      edges.push_back({a, b, c[k] > c[(k + 1) % 3]});
+      edges.push_back({a, b, triangle, c[k] > c[(k + 1) % 3]});
     }
   }
-  health.unused_vertices = static_cast<std::size_t>(std::count(used.begin(), used.end(), false));
+  for (Id i = 0; i < used.size(); ++i) {
+    if (!used[i]) note(health.unused_vertices, health.faults.unused_vertices, i);
+  }
   health.components = countComponents(triangles, mesh.vertexCount());
-  health.duplicate_triangles = countDuplicates(triangles);
+  countDuplicates(std::move(triangles), health);
   countEdges(edges, health);
   if (health.watertight() && health.oriented()) health.volume = volume6 / 6;
   return health;
+}
+
+std::vector<std::pair<std::size_t, std::size_t>> faultLines(const Faults& faults, const Mesh& mesh) {
+  std::vector<std::pair<std::size_t, std::size_t>> lines;
+  for (const auto* edges : {&faults.open_edges, &faults.non_manifold_edges, &faults.flipped_edges}) {
+    for (const FaultyEdge& edge : *edges) lines.emplace_back(edge.vertices[0], edge.vertices[1]);
+  }
+  for (const auto* triangles : {&faults.degenerate_triangles, &faults.duplicate_triangles}) {
+    for (const std::uint32_t t : *triangles) {
+      const Mesh::Indices& corners = mesh.triangles()[t];
+      for (std::size_t k = 0; k < 3; ++k) lines.emplace_back(corners[k], corners[(k + 1) % 3]);
+    }
+  }
+  return lines;
 }
 
 }  // namespace bocst::program

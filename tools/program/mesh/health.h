@@ -3,9 +3,28 @@
 
 #include <bocst/mesh.h>
 
+#include <array>
 #include <cstddef>
+#include <cstdint>
+#include <utility>
+#include <vector>
 
 namespace bocst::program {
+
+/// An edge that is not between two triangles that agree.
+struct FaultyEdge {
+  std::array<std::uint32_t, 2> vertices;  ///< Of several with the same coordinates, the first.
+  std::vector<std::uint32_t> triangles;   ///< All that have this edge.
+};
+
+/// Where a mesh is faulty: the first of each kind.
+struct Faults {
+  static constexpr std::size_t kMost = 100000;  ///< Of a kind.
+
+  std::vector<FaultyEdge> open_edges, non_manifold_edges, flipped_edges;
+  std::vector<std::uint32_t> degenerate_triangles, duplicate_triangles;
+  std::vector<std::uint32_t> repeated_vertices, unused_vertices;
+};
 
 /// What is well with a mesh as a surface, and what is not. Vertices with equal coordinates count as one, so meshes
 /// whose triangles keep their own corners are judged by their shape.
@@ -21,10 +40,16 @@ struct Health {
   double area = 0;                       ///< Square of the mesh's length unit.
   double volume = 0;                     ///< Signed; only where watertight() and oriented(). Negative: inside out.
 
+  Faults faults;  ///< Where; counts above are of all.
+
   bool watertight() const { return open_edges == 0 && non_manifold_edges == 0; }
   bool oriented() const { return flipped_edges == 0; }
 };
 
 Health healthOf(const Mesh& mesh);
+
+/// What is to be marked where faults are shown: pairs of vertices, those of faulty edges and of the edges of degenerate
+/// and duplicate triangles.
+std::vector<std::pair<std::size_t, std::size_t>> faultLines(const Faults& faults, const Mesh& mesh);
 
 }  // namespace bocst::program

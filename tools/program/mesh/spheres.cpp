@@ -33,34 +33,41 @@ std::string number(double value) {
 }
 
 /// Each sphere as before + x, y, z with commas or spaces between + middle + radius + after.
-std::string list(const std::vector<NodeView>& nodes, const char* before, const char* comma, const char* middle,
+std::string list(const std::vector<Sphere>& spheres, const char* before, const char* comma, const char* middle,
                  const char* after) {
   std::string text;
-  for (const NodeView& node : nodes) {
-    text += before + number(node.center.x()) + comma + number(node.center.y()) + comma + number(node.center.z()) +
-            middle + number(node.radius) + after;
+  for (const Sphere& sphere : spheres) {
+    text += before + number(sphere.center.x()) + comma + number(sphere.center.y()) + comma + number(sphere.center.z()) +
+            middle + number(sphere.radius) + after;
   }
   return text;
 }
 
 }  // namespace
 
+std::vector<Sphere> spheresOf(const std::vector<NodeView>& nodes) {
+  std::vector<Sphere> spheres;
+  spheres.reserve(nodes.size());
+  for (const NodeView& node : nodes) spheres.push_back({node.center, node.radius});
+  return spheres;
+}
+
 void checkSphereFile(const std::string& file) { formatOf(file); }
 
-std::string sphereFile(const std::string& file, const std::vector<NodeView>& nodes, const std::string& link) {
+std::string sphereFile(const std::string& file, const std::vector<Sphere>& spheres, const std::string& link) {
   switch (formatOf(file)) {
     case Format::kPly:
-      return "ply\nformat ascii 1.0\nelement vertex " + std::to_string(nodes.size()) +
+      return "ply\nformat ascii 1.0\nelement vertex " + std::to_string(spheres.size()) +
              "\nproperty double x\nproperty double y\nproperty double z\nproperty double radius\nend_header\n" +
-             list(nodes, "", " ", " ", "\n");
+             list(spheres, "", " ", " ", "\n");
     case Format::kYaml:
       return "collision_spheres:\n  " + Json(link).dump(-1, ' ', true, Json::error_handler_t::replace) + ":\n" +
-             list(nodes, "    - \"center\": [", ", ", "]\n      \"radius\": ", "\n");
+             list(spheres, "    - \"center\": [", ", ", "]\n      \"radius\": ", "\n");
     case Format::kJson:
       break;
   }
-  std::string text = list(nodes, "  {\"center\": [", ", ", "], \"radius\": ", "},\n");
-  text.resize(text.size() - 2);  // the last comma; a tree has a root at least
+  std::string text = list(spheres, "  {\"center\": [", ", ", "], \"radius\": ", "},\n");
+  text.resize(text.size() - 2);  // the last comma; there is one sphere at least
   return "[\n" + text + "\n]\n";
 }
 

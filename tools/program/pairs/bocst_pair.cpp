@@ -36,9 +36,26 @@ class ModelPair : public PairOf<S, Model<S>, BocstPair, BocstQueries<S>> {
     points.reserve(result.numContacts());
     for (std::size_t i = 0; i < result.numContacts(); ++i) {
       const fcl::Contact<S>& c = result.getContact(i);
-      points.push_back({c.pos.template cast<double>(), c.normal.template cast<double>(), c.penetration_depth});
+      points.push_back({c.pos.template cast<double>(),
+                        c.normal.template cast<double>(),
+                        c.penetration_depth,
+                        {static_cast<int>(c.b1), static_cast<int>(c.b2)}});
     }
     return points;
+  }
+
+  NearestPoints nearest(const Eigen::Isometry3d& X_AB) const override {
+    const fcl::DistanceRequest<S> request(true);
+    fcl::DistanceResult<S> result;
+    const fcl::Transform3<S> X_WA = fcl::Transform3<S>::Identity();
+    const fcl::Transform3<S> X_WB = X_AB.cast<S>();
+    const fcl::CollisionGeometry<S>* a = &this->a();
+    const fcl::CollisionGeometry<S>* b = &this->b();
+    fcl::distance(a, X_WA, b, X_WB, request, result);
+    return {result.min_distance,
+            result.nearest_points[0].template cast<double>(),
+            result.nearest_points[1].template cast<double>(),
+            {static_cast<int>(result.b1), static_cast<int>(result.b2)}};
   }
 
   void updateA(std::vector<Eigen::Vector3d> vertices) override { this->a().updateVertices(std::move(vertices)); }

@@ -1,5 +1,7 @@
 // SPDX-License-Identifier: BSD-3-Clause
-// The only file that builds FCL's trees; its headers take long to compile. No bocst overload is in sight here.
+// The only file that builds FCL's trees; its headers take long to compile. No bocst overload is in sight here, and
+// FCL's functions for float, which libfcl does not have, are those in libbocst: compiling them takes a minute.
+#include <bocst/fcl_templates.h>
 #include <fcl/geometry/bvh/BVH_model.h>
 #include <fcl/math/bv/OBB.h>
 #include <fcl/math/bv/OBBRSS.h>

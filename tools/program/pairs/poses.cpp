@@ -2,33 +2,101 @@
 #include "pairs/poses.h"
 
 #include <algorithm>
+#include <cctype>
 #include <charconv>
 #include <cmath>
 #include <cstdio>
+#include <sstream>
 #include <stdexcept>
 #include <system_error>
 
 namespace bocst::program {
 
-Pose Pose::parse(const std::string& text) {
-  Pose pose;
+namespace {
+
+std::array<double, 4> quaternionOf(double roll, double pitch, double yaw) {
+  const Eigen::Quaterniond q = Eigen::AngleAxisd(yaw, Eigen::Vector3d::UnitZ()) *
+                               Eigen::AngleAxisd(pitch, Eigen::Vector3d::UnitY()) *
+                               Eigen::AngleAxisd(roll, Eigen::Vector3d::UnitX());
+  return {q.w(), q.x(), q.y(), q.z()};
+}
+
+std::string shortest(double number) {
+  char buffer[64];
+  const std::to_chars_result r = std::to_chars(buffer, buffer + sizeof(buffer), number);
+  return {buffer, r.ptr};
+}
+
+}  // namespace
+
+std::string spelling(RotationFormat format) {
+  return format == RotationFormat::kWxyz   ? "x,y,z,qw,qx,qy,qz"
+         : format == RotationFormat::kXyzw ? "x,y,z,qx,qy,qz,qw"
+                                           : "x,y,z,roll,pitch,yaw";
+}
+
+Pose Pose::parse(const std::string& text, RotationFormat format) {
+  const std::size_t count = format == RotationFormat::kRpy ? 6 : 7;
+  const std::string expected = std::to_string(count) + " numbers " + spelling(format) + " expected";
+  std::array<double, 7> read{};
   const char* at = text.data();
   const char* const end = at + text.size();
-  for (std::size_t i = 0; i < pose.numbers.size(); ++i) {
+  for (std::size_t i = 0; i < count; ++i) {
     if (i > 0) {
-      if (at == end || *at != ',') throw std::invalid_argument("seven numbers x,y,z,qw,qx,qy,qz expected");
+      if (at == end || *at != ',') throw std::invalid_argument(expected);
       ++at;
     }
     while (at != end && (*at == ' ' || *at == '+')) ++at;
-    const auto [next, error] = std::from_chars(at, end, pose.numbers[i]);
-    if (error != std::errc()) throw std::invalid_argument("seven numbers x,y,z,qw,qx,qy,qz expected");
-    if (!std::isfinite(pose.numbers[i])) throw std::invalid_argument("a pose has finite numbers");
+    const auto [next, error] = std::from_chars(at, end, read[i]);
+    if (error != std::errc()) throw std::invalid_argument(expected);
+    if (!std::isfinite(read[i])) throw std::invalid_argument("a pose has finite numbers");
     at = next;
   }
-  if (at != end) throw std::invalid_argument("seven numbers x,y,z,qw,qx,qy,qz expected");
+  if (at != end) throw std::invalid_argument(expected);
+  const auto& [x, y, z, r0, r1, r2, r3] = read;
+  Pose pose;
+  pose.numbers = read;
+  if (format == RotationFormat::kXyzw) pose.numbers = {x, y, z, r3, r0, r1, r2};
+  if (format == RotationFormat::kRpy) {
+    const auto [qw, qx, qy, qz] = quaternionOf(r0, r1, r2);
+    pose.numbers = {x, y, z, qw, qx, qy, qz};
+  }
   const double norm = pose.quaternionNorm();
   if (!(norm > 1e-100) || !std::isfinite(norm)) throw std::invalid_argument("the quaternion cannot be normalised");
   return pose;
+}
+
+std::vector<ListedPose> parsePoses(const std::string& text, RotationFormat format, const std::string& name) {
+  std::vector<ListedPose> poses;
+  std::istringstream stream(text);
+  std::string line;
+  for (std::size_t number = 1; std::getline(stream, line); ++number) {
+    line.erase(std::min(line.find('#'), line.size()));
+    std::string list;
+    bool gap = false;
+    for (const char c : line) {
+      const bool blank = c == ' ' || c == '\t' || c == '\r';
+      if (c == ',' || c == ';') {
+        list += ',';
+      } else if (!blank) {
+        if (gap && !list.empty() && list.back() != ',') list += ',';
+        list += c;
+      }
+      gap = blank;
+    }
+    if (list.empty()) continue;
+    const bool names = poses.empty() &&
+                       (std::isalpha(static_cast<unsigned char>(list.front())) != 0 || list[0] == '"') &&
+                       list.rfind("nan", 0) != 0 && list.rfind("inf", 0) != 0;
+    if (names && number == 1) continue;
+    try {
+      poses.push_back({number, Pose::parse(list, format)});
+    } catch (const std::invalid_argument& e) {
+      throw std::runtime_error(name + ": line " + std::to_string(number) + ": " + e.what());
+    }
+  }
+  if (poses.empty()) throw std::runtime_error(name + ": no poses");
+  return poses;
 }
 
 double Pose::quaternionNorm() const {
@@ -48,11 +116,26 @@ Eigen::Isometry3d Pose::transform() const {
 
 std::string Pose::text() const {
   std::string text;
-  for (const double number : numbers) {
-    char buffer[64];
-    const std::to_chars_result r = std::to_chars(buffer, buffer + sizeof(buffer), number);
-    text += (text.empty() ? "" : ",") + std::string(buffer, r.ptr);
+  for (const double number : numbers) text += (text.empty() ? "" : ",") + shortest(number);
+  return text;
+}
+
+std::string Pose::rotationText() const {
+  const Eigen::AngleAxisd turn(transform().linear());
+  if (turn.angle() < 1e-12) return "not turned";
+  // The axis with its largest coordinate positive, so that a quarter turn about z is never called one about -z by 270.
+  Eigen::Vector3d axis = turn.axis();
+  double angle = turn.angle();
+  int largest = 0;
+  axis.cwiseAbs().maxCoeff(&largest);
+  if (axis[largest] < 0) {
+    axis = -axis;
+    angle = -angle;
   }
+  char text[160];
+  const auto tidy = [](double x) { return std::abs(x) < 5e-7 ? 0.0 : x; };
+  std::snprintf(text, sizeof(text), "turned by %.6g degrees about (%.6g, %.6g, %.6g)", angle * 180 / M_PI,
+                tidy(axis.x()), tidy(axis.y()), tidy(axis.z()));
   return text;
 }
 

@@ -9,23 +9,49 @@
 #include <cstddef>
 #include <cstdint>
 #include <string>
+#include <vector>
 
 #include "pairs/query_pair.h"
 
 namespace bocst::program {
+
+/// How the rotation of a pose is written.
+enum class RotationFormat {
+  kWxyz,  ///< qw,qx,qy,qz
+  kXyzw,  ///< qx,qy,qz,qw, as in ROS
+  kRpy,   ///< roll,pitch,yaw in radians: about the fixed axes x, y, z in turn, as in URDF
+};
+
+/// "x,y,z,qw,qx,qy,qz" and so on.
+std::string spelling(RotationFormat format);
 
 /// The pose of B in A's frame as the command line spells it: x,y,z,qw,qx,qy,qz. Every transform is made from these
 /// seven numbers in one way, so a pose that was printed can be run again bit by bit.
 struct Pose {
   std::array<double, 7> numbers{0, 0, 0, 1, 0, 0, 0};
 
-  /// @throws std::invalid_argument when the text is not seven finite numbers with a quaternion that can be normalised.
-  static Pose parse(const std::string& text);
+  /// @throws std::invalid_argument when the text is not seven (six with kRpy) finite numbers with commas between, or
+  /// the quaternion cannot be normalised.
+  static Pose parse(const std::string& text, RotationFormat format = RotationFormat::kWxyz);
 
   double quaternionNorm() const;
   Eigen::Isometry3d transform() const;  ///< Of the quaternion divided by its norm.
   std::string text() const;
+
+  /// The rotation in words: "turned by 90 degrees about (0, 0, 1)".
+  std::string rotationText() const;
 };
+
+/// A pose of a list and the line that it came from; the first line is 1.
+struct ListedPose {
+  std::size_t line;
+  Pose pose;
+};
+
+/// The poses of a text, one a line, the numbers with commas, semicolons or blanks between. Empty lines, what follows #,
+/// and a first line of names are skipped.
+/// @param name of the file, for messages. @throws std::runtime_error that names the line that is no pose.
+std::vector<ListedPose> parsePoses(const std::string& text, RotationFormat format, const std::string& name);
 
 /// splitmix64, and only operations that IEEE 754 rounds correctly: the same poses on every machine.
 class Random {

@@ -84,8 +84,16 @@ std::size_t fclTreeBytes(Scalar scalar, std::size_t triangles);
 /// Where two geometries touch, in A's frame.
 struct TouchingPoint {
   Eigen::Vector3d position;
-  Eigen::Vector3d normal;  ///< A unit vector from A to B.
-  double depth = 0;        ///< In the meshes' length unit.
+  Eigen::Vector3d normal;                ///< A unit vector from A to B.
+  double depth = 0;                      ///< In the meshes' length unit.
+  QueryPair::Contact triangles{-1, -1};  ///< With conservative answers: Morton codes of cells.
+};
+
+/// What of two geometries that do not touch is nearest, in A's frame.
+struct NearestPoints {
+  double distance = 0;  ///< In the meshes' length unit.
+  Eigen::Vector3d on_a, on_b;
+  QueryPair::Contact triangles{-1, -1};  ///< As of TouchingPoint.
 };
 
 /// Two fresh bocst models.
@@ -93,6 +101,8 @@ class BocstPair : public QueryPair {
  public:
   /// As contacts(), in the order found, by their geometry.
   virtual std::vector<TouchingPoint> touchingPoints(const Eigen::Isometry3d& X_AB, std::size_t limit = kAll) const = 0;
+
+  virtual NearestPoints nearest(const Eigen::Isometry3d& X_AB) const = 0;
 
   /// A's vertices move.
   virtual void updateA(std::vector<Eigen::Vector3d> vertices) = 0;

@@ -6,6 +6,7 @@
 
 #include "cli/report.h"
 #include "mesh/spheres.h"
+#include "picture/marks.h"
 #include "picture/picture_scene.h"
 
 namespace bocst::program {
@@ -20,7 +21,8 @@ render::View viewOf(const NodeView& root, render::Up up) {
 }
 
 Picture inspectPicture(render::Renderer& renderer, const std::string& file, const Mesh& mesh,
-                       const std::vector<NodeView>& nodes, const Options& options, const ImageArguments& image) {
+                       const std::vector<NodeView>& nodes, const Faults& faults, const Options& options,
+                       const ImageArguments& image) {
   Sheet sheet;
   sheet.title = std::filesystem::path(file).filename().string();
   sheet.subtitle = counted(mesh.triangleCount(), "triangle") + " · " + nameOf(options.subdivision) + ", " +
@@ -38,7 +40,9 @@ Picture inspectPicture(render::Renderer& renderer, const std::string& file, cons
     return renderer.draw(scene, view, sheet.side(), sheet.side());
   };
   Progress progress("view", static_cast<std::size_t>(levels));
-  sheet.panels.push_back({draw({}), "the mesh", {}});
+  const std::size_t marked = faultLines(faults, mesh).size();
+  sheet.panels.push_back({draw({}), marked == 0 ? "the mesh" : "the mesh · faults in red",
+                          [&](cairo_t* pen) { markFaults(pen, faults, mesh, view, sheet.side()); }});
   for (int level = 1; level <= levels; ++level) {
     const auto count =
         std::count_if(nodes.begin(), nodes.end(), [level](const NodeView& n) { return n.level == level; });

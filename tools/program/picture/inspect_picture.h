@@ -9,6 +9,7 @@
 #include <vector>
 
 #include "cli/arguments.h"
+#include "mesh/health.h"
 #include "picture/picture.h"
 #include "render/renderer.h"
 
@@ -20,6 +21,7 @@ render::View viewOf(const NodeView& root, render::Up up);
 /// The mesh, then the tree of it as it ends at each level, all from one side and at one scale.
 /// @param nodes the whole tree down to the level options.depth, the root first.
 Picture inspectPicture(render::Renderer& renderer, const std::string& file, const Mesh& mesh,
-                       const std::vector<NodeView>& nodes, const Options& options, const ImageArguments& image);
+                       const std::vector<NodeView>& nodes, const Faults& faults, const Options& options,
+                       const ImageArguments& image);
 
 }  // namespace bocst::program

@@ -48,6 +48,19 @@ void markContacts(cairo_t* pen, const std::vector<TouchingPoint>& contacts, cons
   }
 }
 
+void markFaults(cairo_t* pen, const Faults& faults, const Mesh& mesh, const render::View& view, int side) {
+  cairo_set_source_rgb(pen, kFaultColor.red, kFaultColor.green, kFaultColor.blue);
+  cairo_set_line_width(pen, 1.2 * unitOf(side));
+  cairo_set_line_cap(pen, CAIRO_LINE_CAP_ROUND);  // so that a point is seen, too
+  for (const auto& [a, b] : faultLines(faults, mesh)) {
+    const Eigen::Vector2d from = view.toPixel(mesh.vertex(a), side, side);
+    const Eigen::Vector2d to = view.toPixel(mesh.vertex(b), side, side);
+    cairo_move_to(pen, from.x(), from.y());
+    cairo_line_to(pen, to.x(), to.y());
+    cairo_stroke(pen);
+  }
+}
+
 void markFrame(cairo_t* pen, const render::View& all, const render::View& near, int side) {
   const Eigen::Vector2d middle = all.toPixel(near.center, side, side);
   const double half = near.radius / all.radius * side / 2;

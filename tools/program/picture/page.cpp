@@ -114,6 +114,19 @@ void Page::tree(const Mesh& mesh, const std::vector<NodeView>& nodes, Subdivisio
                                                {"is_leaf", base64(is_leaf)}});
 }
 
+void Page::faults(const Mesh& mesh, const Faults& faults) {
+  // Lines in the mesh's frame, which is the object's.
+  std::vector<double> numbers;
+  std::size_t lines = 0;
+  for (const auto& [a, b] : faultLines(faults, mesh)) {
+    if (++lines > kMaxFaults) break;
+    const Eigen::Vector3d& p = mesh.vertex(a);
+    const Eigen::Vector3d& q = mesh.vertex(b);
+    numbers.insert(numbers.end(), {p.x(), p.y(), p.z(), q.x(), q.y(), q.z()});
+  }
+  scene_["objects"].back()["faults"] = base64(numbers);
+}
+
 void Page::contacts(const std::vector<TouchingPoint>& contacts) {
   std::vector<double> numbers;
   for (std::size_t i = 0; i < std::min(contacts.size(), kMaxContacts); ++i) {

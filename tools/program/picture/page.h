@@ -11,6 +11,7 @@
 #include <vector>
 
 #include "cli/report.h"
+#include "mesh/health.h"
 #include "mesh/sphere_error.h"
 #include "pairs/query_pair.h"
 
@@ -24,6 +25,7 @@ class Page {
   static constexpr std::size_t kMaxTriangles = 250000;  ///< Of an object: coarser triangles.
   static constexpr std::size_t kMaxNodes = 250000;      ///< Of a tree: the finest levels are left out.
   static constexpr std::size_t kMaxContacts = 20000;    ///< The first ones.
+  static constexpr std::size_t kMaxFaults = 100000;     ///< Lines of faulty edges and triangles: the first ones.
 
   explicit Page(std::string title);
 
@@ -37,6 +39,9 @@ class Page {
   /// @param dimension Options::dimension of the tree.
   void tree(const Mesh& mesh, const std::vector<NodeView>& nodes, Subdivision subdivision, double dimension,
             const std::vector<LevelError>& errors = {});
+
+  /// Edges and triangles of the last object that are faulty.
+  void faults(const Mesh& mesh, const Faults& faults);
 
   /// In the page's frame.
   void contacts(const std::vector<TouchingPoint>& contacts);

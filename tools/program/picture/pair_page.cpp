@@ -12,7 +12,7 @@ Page pairPage(const GrownPair& grown) {
   page.fact("B", grown.name_b + ", " + std::to_string(mesh_b.triangleCount()) + " triangles");
   page.fact("B in A", grown.pose.text());
   page.fact("answer", grown.model.answerText());
-  page.fact("they", grown.contacts.empty() ? "do not collide" : "collide");
+  page.fact("they", grown.contacts.empty() ? "do not collide" : grown.model.exact() ? "collide" : "may touch");
   page.fact("contacts", std::to_string(grown.contacts.size()));
   page.fact("nodes grown", std::to_string(grown.pair->statisticsA().resident_nodes) + " in A, " +
                                std::to_string(grown.pair->statisticsB().resident_nodes) + " in B");

@@ -166,7 +166,8 @@ const gl = canvas.getContext('webgl2', {alpha: false, antialias: true});
 const camera = {turn: 0.7, tilt: 0.45, distance: 2.5, aim: [0, 0]};
 const objectColors = [[0.62, 0.68, 0.74], [0.80, 0.70, 0.56]];
 const volumeColors = [[0.16, 0.47, 0.84], [0.90, 0.47, 0.13]];
-let programs, meshes, corners, instances, marks;
+const decodedFaults = (object) => object.faults ? decoded(object.faults, Float64Array) : new Float64Array();
+let faulty, programs, meshes, corners, instances, marks;
 
 function program([vertex, fragment]) {
   const linked = gl.createProgram();
@@ -231,6 +232,12 @@ function prepare() {
     points.push(...p);
     lines.push(...p, ...p.map((x, k) => x + length * contacts[i + 3 + k]));
   }
+  faulty = scene.objects.map((object) => {
+    const list = decodedFaults(object), ends = [];
+    const toObjectBall = matrix.product(toBall, object.pose);
+    for (let i = 0; i < list.length; i += 3) ends.push(...matrix.applied(toObjectBall, list.subarray(i, i + 3)));
+    return {count: ends.length / 3, array: vertexArray([[0, buffer(new Float32Array(ends)), 3, gl.FLOAT, false, 0, 0, 0]])};
+  });
   marks = [points, lines].map((list) => ({count: list.length / 3,
     array: vertexArray([[0, buffer(new Float32Array(list)), 3, gl.FLOAT, false, 0, 0, 0]])}));
 }
@@ -298,6 +305,16 @@ function draw() {
     });
   }
   scene.objects.forEach((object, o) => drawVolumes(o, eyes[o]));
+  if (byId('faults').checked && faulty.some(({count}) => count > 0)) {
+    gl.disable(gl.DEPTH_TEST);
+    const p = use('marks', viewMatrix());
+    gl.uniform4f(p.at('color'), 0.85, 0.0, 0.1, 1);
+    for (const {array, count} of faulty) {
+      gl.bindVertexArray(array);
+      gl.drawArrays(gl.LINES, 0, count);
+      gl.drawArrays(gl.POINTS, 0, count);
+    }
+  }
   if (byId('contacts').checked && marks[0].count > 0) {
     gl.disable(gl.DEPTH_TEST);
     const p = use('marks', viewMatrix());
@@ -456,6 +473,7 @@ function start() {
   for (const name of kinds) byId('tree').add(new Option(name));
   byId('tree-row').hidden = kinds.length < 2;
   byId('contacts-row').hidden = contacts.length === 0;
+  byId('faults-row').hidden = !scene.objects.some((object) => decodedFaults(object).length > 0);
   // A tree that queries grew ends at many levels; one grown whole ends at one.
   byId('cut-row').hidden = !scene.contacts;
   byId('level').max = Math.max(1, ...treesShown().map((tree) => tree ? tree.levels : 1));
@@ -473,7 +491,7 @@ function start() {
   }
   byId('tree').addEventListener('input', treeChosen);
   for (const id of ['level', 'cut']) byId(id).addEventListener('input', refill);
-  for (const id of ['volume', 'opacity', 'mesh', 'contacts', 'up']) byId(id).addEventListener('input', drawSoon);
+  for (const id of ['volume', 'opacity', 'mesh', 'faults', 'contacts', 'up']) byId(id).addEventListener('input', drawSoon);
   notes();
   refill();
 }

@@ -1,0 +1,117 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#include "commands/run.h"
+
+#include <CLI/CLI.hpp>
+#include <algorithm>
+#include <exception>
+#include <iostream>
+#include <new>
+#include <stdexcept>
+#include <string>
+#include <vector>
+
+#include "cli/arguments.h"
+#include "cli/file.h"
+#include "cli/suggest.h"
+
+namespace bocst::program {
+namespace {
+
+int complain(std::string what, int code) {
+  std::replace(what.begin(), what.end(), '\n', ' ');
+  std::cerr << "bocst: " << what << std::endl;
+  return code;
+}
+
+/// The names of commands that are shown.
+std::vector<std::string> commandNames(const CLI::App& program) {
+  std::vector<std::string> names;
+  for (const CLI::App* command : program.get_subcommands(nullptr)) {
+    if (!command->get_group().empty()) names.push_back(command->get_name());
+  }
+  return names;
+}
+
+std::string commandList(const CLI::App& program) {
+  std::string list;
+  for (const std::string& name : commandNames(program)) list += (list.empty() ? "" : ", ") + name;
+  return list;
+}
+
+/// The complaint about a word that is no command, no option or too much.
+std::string unexpected(const CLI::App& program) {
+  const std::vector<CLI::App*> given = program.get_subcommands();
+  const std::vector<std::string> left = program.remaining(true);
+  if (left.empty()) return "wrong command line; see `bocst --help`";
+  const std::string word = left.front().substr(0, left.front().find('='));
+  if (given.empty()) {
+    if (word.front() == '-') return "there is no option " + word + "; see `bocst --help`";
+    return "there is no command " + word + "." + suggestion(word, commandNames(program)) + " See `bocst --help`";
+  }
+  const std::string command = given.front()->get_name();
+  const std::string help = " See `bocst " + command + " --help`";
+  if (word.front() != '-') return command + ": " + word + ": unexpected." + help;
+  std::vector<std::string> names{"--help"};
+  for (const CLI::Option* option : given.front()->get_options()) {
+    for (const std::string& name : option->get_lnames()) names.push_back("--" + name);
+  }
+  return command + ": there is no option " + word + "." + suggestion(word, names) + help;
+}
+
+/// "bocst help" and "bocst help COMMAND" are the same as with --help.
+std::vector<std::string> argumentsOf(int argc, char** argv) {
+  std::vector<std::string> words(argv + 1, argv + argc);
+  if (!words.empty() && words[0] == "help") {
+    words.erase(words.begin());
+    words.insert(words.begin() + (words.empty() ? 0 : 1), "--help");
+  }
+  return {words.rbegin(), words.rend()};  // as CLI11 takes them
+}
+
+}  // namespace
+
+int run(int argc, char** argv, const std::string& version) {
+  cleanUpOnSignals();
+  constexpr int kFailed = 1;
+  constexpr int kUsage = 2;
+  Job job;
+  CLI::App program("Sphere-trees that grow on demand: collision queries, measurements and comparisons with FCL.",
+                   "bocst");
+  program.require_subcommand(1);
+  program.set_version_flag("--version", "bocst " + version);
+  program.footer(
+      "`bocst COMMAND --help` lists the options of a command; `bocst man` writes the manual, `bocst completion` the\n"
+      "completion for bash. " +
+      meshFormats() +
+      "\n"
+      "Exit code: 0 when all is well, 1 when something failed or was missed, 2 for a wrong command line.");
+  addCollide(program, job);
+  addInspect(program, job);
+  addValidate(program, job);
+  addMerge(program, job);
+  addBench(program, job);
+  addPaper(program, job);
+  addOracles(program, job);
+  addManual(program, job);
+  try {
+    program.parse(argumentsOf(argc, argv));
+    const int code = job();
+    if (!std::cout.flush()) throw std::runtime_error("stdout: cannot be written");
+    return code;
+  } catch (const CLI::ParseError& e) {
+    if (e.get_exit_code() == 0) return program.exit(e);  // --help, --version
+    // CLI11 looks for a command before it looks at words that are left.
+    if (argc > 1 && (dynamic_cast<const CLI::ExtrasError*>(&e) != nullptr || program.get_subcommands().empty())) {
+      return complain(unexpected(program), kUsage);
+    }
+    if (argc == 1)
+      return complain("a command is missing, one of: " + commandList(program) + "; see `bocst --help`", kUsage);
+    return complain(e.what(), kUsage);
+  } catch (const std::bad_alloc&) {
+    return complain("out of memory", kFailed);
+  } catch (const std::exception& e) {
+    return complain(e.what(), kFailed);
+  }
+}
+
+}  // namespace bocst::program
