@@ -878,8 +878,8 @@ class Manager {
     return object.cast<Object*>();
   }
 
+  py::dict objects_;  // as keys, in the order of registering; they outlive what FCL knows of them
   fcl::DynamicAABBTreeCollisionManagerd manager_;
-  py::dict objects_;  // as keys, in the order of registering
   mutable int asked_ = 0;
 };
 

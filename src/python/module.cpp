@@ -150,7 +150,9 @@ MeshPtr loadMeshOf(const py::object& file) {
 void bindMesh(py::module_& m) {
   py::class_<program::Health>(m, "Health", R"(What is well with a mesh as a surface, and what is not.
 
-Vertices with equal coordinates count as one. area is in the square of the mesh's length unit, volume in its cube:
+Vertices with equal coordinates count as one. components: pieces that share no vertex; open_edges: of one triangle;
+non_manifold_edges: of more than two; flipped_edges: two triangles run along it in the same direction; watertight: none of
+the first two; oriented: none of the third. area is in the square of the mesh's length unit, volume in its cube:
 signed, and only where the mesh is watertight and oriented.)")
       .def_readonly("components", &program::Health::components)
       .def_readonly("open_edges", &program::Health::open_edges)
@@ -261,18 +263,24 @@ std::pair<py::array_t<double>, py::array_t<double>> spheresOf(const MeshPtr& mes
 }
 
 void bindModel(py::module_& m) {
-  const auto statistics = py::class_<Statistics>(m, "Statistics", "A snapshot of what a model holds and has done.")
-                              .def_readonly("resident_nodes", &Statistics::resident_nodes)
-                              .def_readonly("resident_bytes", &Statistics::resident_bytes)
-                              .def_readonly("nodes_per_level", &Statistics::nodes_per_level)
-                              .def_readonly("expansions", &Statistics::expansions)
-                              .def_readonly("oracle_batches", &Statistics::oracle_batches)
-                              .def_readonly("oracle_cells", &Statistics::oracle_cells)
-                              .def_readonly("expanded_octants", &Statistics::expanded_octants)
-                              .def_readonly("built_triangles", &Statistics::built_triangles)
-                              .def_readonly("pruned_nodes", &Statistics::pruned_nodes)
-                              .def_readonly("mesh_bytes", &Statistics::mesh_bytes)
-                              .def_readonly("device_bytes", &Statistics::device_bytes);
+  const auto statistics =
+      py::class_<Statistics>(m, "Statistics", R"(A snapshot of what a model holds and has done since it was made.
+
+resident_nodes and resident_bytes (heap bytes of the tree) are what is in memory now, nodes_per_level the nodes of level 1
+(the root), 2, ...; mesh_bytes and device_bytes are those of the mesh in host memory and of all on a GPU. The others count
+what happened: expansions of nodes, batches and cells that the oracle was asked about, triangles sorted into the tree, nodes
+dropped.)")
+          .def_readonly("resident_nodes", &Statistics::resident_nodes)
+          .def_readonly("resident_bytes", &Statistics::resident_bytes)
+          .def_readonly("nodes_per_level", &Statistics::nodes_per_level)
+          .def_readonly("expansions", &Statistics::expansions)
+          .def_readonly("oracle_batches", &Statistics::oracle_batches)
+          .def_readonly("oracle_cells", &Statistics::oracle_cells)
+          .def_readonly("expanded_octants", &Statistics::expanded_octants)
+          .def_readonly("built_triangles", &Statistics::built_triangles)
+          .def_readonly("pruned_nodes", &Statistics::pruned_nodes)
+          .def_readonly("mesh_bytes", &Statistics::mesh_bytes)
+          .def_readonly("device_bytes", &Statistics::device_bytes);
 
   py::class_<ModelGeometry, Geometry, std::shared_ptr<ModelGeometry>>(m, "Model", R"(A sphere-tree as a geometry.
 

@@ -55,12 +55,17 @@ def run(document, source, build):
             return fail(document.name, error)
         if not script:
             return 0
-        # `python3` is the interpreter that the Python module was built for.
-        python = re.search(r"^BOCST_PYTHON:\w+=(.*)$", (build / "CMakeCache.txt").read_text(), re.M).group(1)
+        # `python3` is the interpreter that the Python module was built for; a sanitizer's library wants to be the first.
+        cache = (build / "CMakeCache.txt").read_text()
+        python = re.search(r"^BOCST_PYTHON:\w+=(.*)$", cache, re.M)
+        preload = ""
+        if re.search(r"^BOCST_SANITIZE:\w+=.*address", cache, re.M):
+            preload = ('export LD_PRELOAD="$(g++ -print-file-name=libasan.so):libstdc++.so.6" '
+                       'ASAN_OPTIONS="$ASAN_OPTIONS:detect_leaks=0"\n')
         (folder.parent / "bin").mkdir()
         if python:
             shim = folder.parent / "bin" / "python3"
-            shim.write_text(f'#!/bin/sh\nexec {python} "$@"\n')
+            shim.write_text(f'#!/bin/sh\n{preload}exec {python[1]} "$@"\n')
             shim.chmod(0o755)
         environment = dict(os.environ, HOME=name, PATH=f"{folder.parent}/bin:{build}/tools:{os.environ['PATH']}")
         done = subprocess.run(["bash", "-euo", "pipefail", "-x", "-c", "".join(script)], cwd=folder, env=environment,

@@ -224,8 +224,8 @@ class CollisionRequest:
     ) -> None: ...
 
 class Contact:
-    o1: Optional[CollisionGeometry]
-    o2: Optional[CollisionGeometry]
+    o1: Any
+    o2: Any
     b1: int
     b2: int
     penetration_depth: float
@@ -276,8 +276,8 @@ class DistanceRequest:
 class DistanceResult:
     min_distance: float
     nearest_points: Optional[List[Floats]]
-    o1: Optional[CollisionGeometry]
-    o2: Optional[CollisionGeometry]
+    o1: Any
+    o2: Any
     b1: int
     b2: int
     def __init__(self, min_distance_: Optional[float] = None) -> None: ...
