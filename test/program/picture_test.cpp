@@ -375,7 +375,7 @@ TEST_F(Pictures, InspectShowsTheSpheresOfEachLevel) {
 
       program::ImageArguments image;
       image.width = kWidth;
-      const Pixels pixels(program::inspectPicture(renderer(), "a.off", *mesh, nodes, options, image));
+      const Pixels pixels(program::inspectPicture(renderer(), "a.off", *mesh, nodes, {}, options, image));
       ASSERT_EQ(pixels.width, kWidth);
       const program::Sheet sheet = layout(kWidth, static_cast<std::size_t>(levels) + 1);
       const View view = program::viewOf(nodes.front(), render::Up::kZ);
