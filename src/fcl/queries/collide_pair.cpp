@@ -436,13 +436,11 @@ void collideTrees(const CollideQuery<S>& q, const TreeSide& a, const TreeSide& b
   if (query::TreeWalk::fits(a, b, near) && !isNeedle(tree_a) && !isNeedle(tree_b)) {
     query::TreeWalk trees(a, b, near);
     if (!trees.isNeedless()) walk([&](auto& collector) { trees.run(collector); });
+  } else if (query::SphereWalk::fits(a, b)) {
+    query::SphereWalk spheres(a, b, near);
+    if (!spheres.isNeedless()) walk([&](auto& collector) { spheres.run(collector); });
   } else {
-    if (query::SphereWalk::fits(a, b)) {
-      query::SphereWalk spheres(a, b, near);
-      if (!spheres.isNeedless()) walk([&](auto& collector) { spheres.run(collector); });
-    } else {
-      walk([&](auto& collector) { query::PairWalk<TreeSide, TreeSide>(a, b, near, collector).run(); });
-    }
+    walk([&](auto& collector) { query::PairWalk<TreeSide, TreeSide>(a, b, near, collector).run(); });
   }
   if (q.mayBeInside(before) && (contains<S>(tree_a, q.X_WA(), tree_b, q.X_WB(), magnitude) ||
                                 contains<S>(tree_b, q.X_WB(), tree_a, q.X_WA(), magnitude))) {
