@@ -1,7 +1,6 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #pragma once
 
-#include <Eigen/Core>
 #include <cmath>
 
 #include "tree/outline.h"
@@ -17,34 +16,44 @@ namespace bocst::query {
 template <typename S>
 bool areFarApart(const tree::Outline::Box& a, const tree::Outline::Box& b, const S (&rotation)[3][3],
                  const S (&translation)[3], double margin) {
-  using V4 = Eigen::Array4f;
-  const auto load = [](const float(&x)[4]) { return V4(Eigen::Map<const V4, Eigen::Aligned16>(x)); };
-  const auto sum = [](const V4& x) { return x[0] + x[1] + x[2]; };
-  V4 columns[3], rows[3], at;
+  using Vector = float[3];
+  // One number at a time: what was just written in parts is slow to be read as a vector.
+  float R[3][3];
   for (int r = 0; r < 3; ++r) {
-    for (int c = 0; c < 3; ++c) columns[c][r] = rows[r][c] = static_cast<float>(rotation[r][c]);
-    columns[r][3] = rows[r][3] = 0;
-    at[r] = static_cast<float>(translation[r]);
+    for (int c = 0; c < 3; ++c) R[r][c] = static_cast<float>(rotation[r][c]);
   }
-  at[3] = 0;
-  const auto combined = [](const V4(&v)[3], const V4& by) { return V4(v[0] * by[0] + v[1] * by[1] + v[2] * by[2]); };
-  const V4 axes_a[3] = {load(a.axes[0]), load(a.axes[1]), load(a.axes[2])},
-           axes_b[3] = {load(b.axes[0]), load(b.axes[1]), load(b.axes[2])}, half_a = load(a.half),
-           half_b = load(b.half);
-  const V4 way = combined(columns, load(b.center)) + at - load(a.center);
-  // How far the boxes reach along a direction of a's frame, in sum.
-  const auto extent = [&](const V4& d) {
-    return sum(combined(axes_a, d).abs() * half_a + combined(axes_b, combined(rows, d)).abs() * half_b);
+  const auto dot = [](const Vector& x, const Vector& y) { return x[0] * y[0] + x[1] * y[1] + x[2] * y[2]; };
+  // How far a box reaches from its middle along d, in its own frame.
+  const auto extent = [](const tree::Outline::Box& box, const Vector& d) {
+    float sum = 0;
+#pragma GCC unroll 3
+    for (int k = 0; k < 3; ++k) {
+      sum += box.half[k] * std::abs(box.axes[0][k] * d[0] + box.axes[1][k] * d[1] + box.axes[2][k] * d[2]);
+    }
+    return sum;
   };
-  const float squared = sum(way * way), length = std::sqrt(squared);
+  const auto inB = [&R](const Vector& d, Vector& to) {
+#pragma GCC unroll 3
+    for (int c = 0; c < 3; ++c) to[c] = R[0][c] * d[0] + R[1][c] * d[1] + R[2][c] * d[2];
+  };
+  Vector way, turned;
+#pragma GCC unroll 3
+  for (int r = 0; r < 3; ++r) {
+    way[r] = R[r][0] * b.center[0] + R[r][1] * b.center[1] + R[r][2] * b.center[2] +
+             static_cast<float>(translation[r]) - a.center[r];
+  }
+  const float squared = dot(way, way), length = std::sqrt(squared);
   if (!(length > 1e-15f && squared < 1e30f)) return false;
   const float least = static_cast<float>(margin) * 1.001f + 5e-3f * (length + 2 * (a.reach[0] + b.reach[0]));
-  if (squared - extent(way) > least * length) return true;
+  inB(way, turned);
+  if (squared - extent(a, way) - extent(b, turned) > least * length) return true;
   for (int k = 0; k < 3; ++k) {
-    const V4 of_a(axes_a[0][k], axes_a[1][k], axes_a[2][k], 0);
-    if (std::abs(sum(of_a * way)) - extent(of_a) > least) return true;
-    const V4 of_b = combined(columns, V4(axes_b[0][k], axes_b[1][k], axes_b[2][k], 0));
-    if (std::abs(sum(of_b * way)) - extent(of_b) > least) return true;
+    const Vector of_a = {a.axes[0][k], a.axes[1][k], a.axes[2][k]};
+    inB(of_a, turned);
+    if (std::abs(dot(of_a, way)) - extent(a, of_a) - extent(b, turned) > least) return true;
+    const Vector axis_b = {b.axes[0][k], b.axes[1][k], b.axes[2][k]};
+    const Vector of_b = {dot(R[0], axis_b), dot(R[1], axis_b), dot(R[2], axis_b)};
+    if (std::abs(dot(of_b, way)) - extent(a, of_b) - b.half[k] * 1.01f > least) return true;
   }
   return false;
 }
