@@ -6,6 +6,7 @@
 #include <vector>
 
 #include "geometry/triangle.h"
+#include "log/assert.h"
 #include "query/collide/deferred_pairs.h"
 #include "query/leaf/leaf_pairs.h"
 #include "query/sides/visitor.h"
@@ -16,8 +17,9 @@ namespace bocst::query {
 /// When the resident pairs do not settle the question, nodes deferred grow in one batch and the walk goes on with
 /// their pairs, one level down.
 ///
-/// Triangles against triangles are culled by boxes and slabs; as soon as a side answers with cells, both are culled by
-/// spheres, in double and on integer cells, so a conservative verdict does not depend on what is resident.
+/// Triangles against triangles are culled by boxes and slabs; where a side answers with cells, both are culled by
+/// spheres, in double and on integer cells, so a conservative verdict does not depend on what is resident. Two such
+/// sides have SphereWalk.
 ///
 /// Where leaves of side B are solid bodies (B::kBodies), the visitor V is a ConvexVisitor, and spheres meet the bodies
 /// themselves.
@@ -31,9 +33,9 @@ class PairWalk {
         b_in_a_(b_in_a),
         a_in_b_(b_in_a.inverse()),
         visitor_(visitor),
-        spheres_(a.isConservative() || b.isConservative()) {}
-
-  /// A leaf so many times larger (squared) than the node it meets is taken triangle by triangle.
+        spheres_(a.isConservative() || b.isConservative()) {
+    if constexpr (!B::kBodies) BOCST_ASSERT(!a.isConservative() || !b.isConservative());
+  }
 
   /// True when the visitor ended it.
   bool run() {
@@ -223,11 +225,6 @@ class PairWalk {
   }
 
   bool leafCells(const Pair& pair) {
-    if (a_.isConservative() && b_.isConservative()) {
-      const CellLeaf a{a_.cellId(pair.a), a_.cellSphere(pair.a)};
-      const CellLeaf b{b_.cellId(pair.b), inA(b_.cellSphere(pair.b))};
-      return spheresMeet(a.sphere, b.sphere) && visitor_.cells(a, b);
-    }
     if (a_.isConservative()) {
       const CellLeaf a{a_.cellId(pair.a), a_.cellSphere(pair.a)};
       for (std::size_t i = 0; i < b_.triangleCount(pair.b); ++i) {

@@ -27,7 +27,8 @@ bool SphereWalk::run(Visitor& visitor) {
   SphereSteps steps(a_, b_, b_in_a_, s.steps);
   steps.nearest_first = visitor.endsAtFirst();
   // Where surfaces touch, a hit is found sooner if only that is looked for; if there is none, spheres may still meet.
-  if (visitor.endsAtFirst() && steps.only_touching && search(steps, s, visitor)) return true;
+  const bool may_touch = !facesApart(a_.volume(a_.root()), b_.volume(b_.root()), b_in_a_);
+  if (visitor.endsAtFirst() && steps.only_touching && may_touch && search(steps, s, visitor)) return true;
   steps.lookForAll();
   return search(steps, s, visitor);
 }
