@@ -171,7 +171,8 @@ bool Solid::windsAbout(const Vector3d& point) const {
       passes = true;
       const Vector3d &lo = goes_up ? a : b, &hi = goes_up ? b : a;
       const double s = (point.y() - lo.y()) / (hi.y() - lo.y());
-      (goes_up ? up : down) = {lo.x() + s * (hi.x() - lo.x()) - point.x(), lo.z() + s * (hi.z() - lo.z()) - point.z()};
+      (goes_up ? up : down) =
+          Eigen::Vector2d(lo.x() + s * (hi.x() - lo.x()) - point.x(), lo.z() + s * (hi.z() - lo.z()) - point.z());
     }
     if (!passes) continue;
     const Eigen::Vector2d side = down - up;
