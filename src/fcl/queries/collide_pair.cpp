@@ -411,11 +411,11 @@ bool isOutOfSight(const CollideQuery<S>& q, const SimilarityTransform& b_in_a, d
 // walk in double parts what that one cannot.
 bool isNeedle(const tree::Tree& tree) {
   constexpr float kThin = 0x1p-12f;
-  tree::Outline::Box box;
-  if (!tree.outline().read(box)) return false;
-  const float x = box.half[0], y = box.half[1], z = box.half[2];
-  const float most = std::max({x, y, z}), least = std::min({x, y, z}), middle = x + y + z - most - least;
-  return middle < kThin * most;
+  return tree.outline().read([](const tree::Outline::Reader& box) {
+    const float x = box.half(0), y = box.half(1), z = box.half(2);
+    const float most = std::max({x, y, z}), least = std::min({x, y, z}), middle = x + y + z - most - least;
+    return middle < kThin * most;
+  });
 }
 
 template <typename S>
@@ -504,10 +504,13 @@ template <typename S>
 bool areFarApart(const CollideQuery<S>& q, const Models<S>& models) {
   const tree::Tree &tree1 = models.first->tree(), &tree2 = models.second->tree();
   if (tree1.conservative() || tree2.conservative()) return false;
-  tree::Outline::Box box1, box2;
-  if (!tree1.outline().read(box1) || !tree2.outline().read(box2)) return false;
   const RelativePose<S> X_12(q.X_W1, q.X_W2);
-  if (!query::areFarApart(box1, box2, X_12.rotation, X_12.translation, q.margin)) return false;
+  const bool are_far = tree1.outline().read([&](const tree::Outline::Reader& box1) {
+    return tree2.outline().read([&](const tree::Outline::Reader& box2) {
+      return query::areFarApart(box1, box2, X_12.rotation, X_12.translation, q.margin);
+    });
+  });
+  if (!are_far) return false;
   for (const tree::Tree* tree : {&tree1, &tree2}) {
     if (tree->options().ttl.count() > 0 && tree->hasBranches() && tree->isPruneDue(tree->now())) return false;
   }
@@ -583,6 +586,7 @@ void collideRow(const Model<S>& a, const Model<S>& b, const fcl::Transform3<S>* 
   for (const std::size_t k : near) {
     const CollideQuery<S> q{
         {&a, identity, &b, X_AB[k], turnsRound(models, identity, X_AB[k])}, request, result, margin};
+    if (areFarApart(q, models)) continue;
     result.clear();
     const QueryScope scope(a.tree(), b.tree());
     collideTrees(q, q.swapped ? scope.b() : scope.a(), q.swapped ? scope.a() : scope.b());

@@ -8,7 +8,7 @@
 namespace bocst::fcl_adapter {
 
 /// Are the convex hulls of the two surely farther apart than their margins and `gap` together? Looks for a direction
-/// between them, so it may miss one; false where an answer is conservative.
+/// between them, so it may miss one. Of two models with conservative answers: their root boxes, widened by the spheres.
 template <typename S>
 bool hullsApart(const Model<S>& a, const fcl::Transform3<S>& X_WA, const Model<S>& b, const fcl::Transform3<S>& X_WB,
                 double gap);

@@ -188,7 +188,15 @@ using Outline = tree::Outline;
 
 Outline::Box boxOf(const tree::Tree& tree) {
   Outline::Box box;
-  EXPECT_TRUE(tree.outline().read(box));
+  EXPECT_TRUE(tree.outline().read([&box](const Outline::Reader& reader) {
+    for (std::size_t k = 0; k < 3; ++k) {
+      box.center[k] = reader.center(k);
+      box.half[k] = reader.half(k);
+      for (std::size_t c = 0; c < 3; ++c) box.axes[c][k] = reader.axis(c, k);
+    }
+    box.reach = reader.reach();
+    return true;
+  }));
   return box;
 }
 
@@ -202,11 +210,11 @@ TEST(Outline, HoldsTheSurfaceBeforeAndAfterTheWholeBuild) {
       for (const auto& t : raw.triangles) {
         for (std::size_t k = 0; k < 3; ++k) {
           const Vector3d v = raw.vertices[t[k]];
-          ASSERT_LE(v.norm(), static_cast<double>(box.reach[0]) * (1 + 1e-6));
+          ASSERT_LE(v.norm(), static_cast<double>(box.reach) * (1 + 1e-6));
           for (std::size_t j = 0; j < 3; ++j) {
             const Vector3d axis(box.axes[0][j], box.axes[1][j], box.axes[2][j]);
             ASSERT_NEAR(axis.norm(), 1, 1e-6);
-            const double least = static_cast<double>(box.half[j]) + 1e-6 * static_cast<double>(box.reach[0]);
+            const double least = static_cast<double>(box.half[j]) + 1e-6 * static_cast<double>(box.reach);
             ASSERT_LE(std::abs(axis.dot(v - center)), least) << is_whole;
           }
         }
@@ -241,21 +249,26 @@ TEST(Outline, BoxesThatMeetAreNotFarApart) {
     // Floats end within these; what is farther apart is not known to be.
     const double exponent = 45 * u(g), size = std::pow(10.0, exponent);
     Vector3d p, q;
-    const Outline::Box a = box(size, p), b = box(size * std::exp2(8 * u(g)), q);
+    const Outline::Box box_a = box(size, p), box_b = box(size * std::exp2(8 * u(g)), q);
+    Outline a, b;
+    a.set(box_a);
+    b.set(box_b);
     Eigen::Matrix3d R = test::randomRotation(g);
     if (round % 2) R += 4e-4 * Eigen::Matrix3d::NullaryExpr([&] { return u(g); });
     const double margin = round % 3 ? 0 : size * std::abs(u(g));
     for (const bool apart : {false, true}) {
       const Vector3d t = p - R * q +
                          test::randomDirection(g) *
-                             (apart ? 9 * (static_cast<double>(a.reach[0]) + static_cast<double>(b.reach[0]) + margin)
+                             (apart ? 9 * (static_cast<double>(box_a.reach) + static_cast<double>(box_b.reach) + margin)
                                     : 0.99 * margin);
       double rotation[3][3], translation[3];
       for (int r = 0; r < 3; ++r) {
         translation[r] = t[r];
         for (int c = 0; c < 3; ++c) rotation[r][c] = R(r, c);
       }
-      const bool found = areFarApart(a, b, rotation, translation, margin);
+      const bool found = a.read([&](const Outline::Reader& x) {
+        return b.read([&](const Outline::Reader& y) { return areFarApart(x, y, rotation, translation, margin); });
+      });
       if (apart) {
         far += found;
         expected += std::abs(exponent) < 10;
