@@ -37,6 +37,7 @@ class BOCST_EXPORT Mesh {
   /// meshes of shape_msgs, geometric_shapes, numpy and the like.
   static std::shared_ptr<const Mesh> fromArrays(const double* vertices, std::size_t vertex_count,
                                                 const std::uint32_t* triangles, std::size_t triangle_count);
+  /// The same from floats.
   static std::shared_ptr<const Mesh> fromArrays(const float* vertices, std::size_t vertex_count,
                                                 const std::uint32_t* triangles, std::size_t triangle_count);
 

@@ -57,7 +57,7 @@ class BOCST_EXPORT Model : public fcl::CollisionGeometry<S> {
   /// An empty model: nothing touches it, and it is at no distance from anything, as an empty fcl::BVHModel. A mesh
   /// comes by setMesh(), or by FCL's names from beginModel() on. A Scene takes no empty model.
   Model() : Model(Options{}) {}
-  explicit Model(const Options& options);
+  explicit Model(const Options& options);  ///< An empty model with options.
 
   ~Model() override;
   Model(const Model&) = delete;
@@ -74,26 +74,31 @@ class BOCST_EXPORT Model : public fcl::CollisionGeometry<S> {
   // called out of sequence. endModel() builds no tree; without any triangle it returns fcl::BVH_ERR_BUILD_EMPTY_MODEL
   // and the model stays empty; what Mesh() refuses throws std::invalid_argument. Not beside queries.
   int beginModel(int num_tris = 0, int num_vertices = 0);  ///< Drops the mesh that is there.
-  int addVertex(const fcl::Vector3<S>& p);
+  int addVertex(const fcl::Vector3<S>& p);                 ///< In the mesh's frame.
+  /// Adds three vertices and the triangle between them.
   int addTriangle(const fcl::Vector3<S>& p1, const fcl::Vector3<S>& p2, const fcl::Vector3<S>& p3);
+  /// Adds vertices and triangles, whose indices count from the first of these vertices.
   int addSubModel(const std::vector<fcl::Vector3<S>>& ps, const std::vector<fcl::Triangle>& ts);
-  int addSubModel(const std::vector<fcl::Vector3<S>>& ps);
-  int endModel();
+  int addSubModel(const std::vector<fcl::Vector3<S>>& ps);  ///< Adds vertices only.
+  int endModel();                                           ///< Takes what was added as the mesh.
 
   // New positions in the order of the vertices, then updateVertices(). Fewer or more than there are vertices:
   // fcl::BVH_ERR_INCORRECT_DATA, and the model is as before. There is no tree to refit, so the arguments do not matter.
-  int beginReplaceModel() { return beginUpdateModel(); }
-  int replaceVertex(const fcl::Vector3<S>& p) { return updateVertex(p); }
+  int beginReplaceModel() { return beginUpdateModel(); }                   ///< As beginUpdateModel().
+  int replaceVertex(const fcl::Vector3<S>& p) { return updateVertex(p); }  ///< As updateVertex().
+  /// As updateTriangle().
   int replaceTriangle(const fcl::Vector3<S>& p1, const fcl::Vector3<S>& p2, const fcl::Vector3<S>& p3) {
     return updateTriangle(p1, p2, p3);
   }
-  int replaceSubModel(const std::vector<fcl::Vector3<S>>& ps) { return updateSubModel(ps); }
+  int replaceSubModel(const std::vector<fcl::Vector3<S>>& ps) { return updateSubModel(ps); }  ///< As updateSubModel().
+  /// As endUpdateModel().
   int endReplaceModel(bool refit = true, bool bottomup = true) { return endUpdateModel(refit, bottomup); }
-  int beginUpdateModel();
-  int updateVertex(const fcl::Vector3<S>& p);
+  int beginUpdateModel();                      ///< Begins with the first vertex.
+  int updateVertex(const fcl::Vector3<S>& p);  ///< Where the next vertex is, in the mesh's frame.
+  /// Where the next three vertices are.
   int updateTriangle(const fcl::Vector3<S>& p1, const fcl::Vector3<S>& p2, const fcl::Vector3<S>& p3);
-  int updateSubModel(const std::vector<fcl::Vector3<S>>& ps);
-  int endUpdateModel(bool refit = true, bool bottomup = true);
+  int updateSubModel(const std::vector<fcl::Vector3<S>>& ps);   ///< Where the next vertices are.
+  int endUpdateModel(bool refit = true, bool bottomup = true);  ///< Takes the new positions.
 
   /// fcl::BVH_MODEL_TRIANGLES; of an empty model fcl::BVH_MODEL_UNKNOWN.
   fcl::BVHModelType getModelType() const;

@@ -14,28 +14,28 @@ namespace {
 constexpr double kMost = 65535;
 constexpr int kExponentBias = 127;  // that of a float, 23 bits up
 
-// Numbers the different vertices of at most kMostPlaces corners in the order in which they come.
-class VertexNumbers {
+// Numbers at most kMostPlaces different keys in the order in which they come.
+class Numbers {
  public:
-  std::uint8_t number(std::uint32_t vertex) {
-    for (std::size_t at = vertex * 0x9e3779b1u >> 24;; at = (at + 1) % kSlots) {
+  std::uint8_t number(std::uint64_t key) {
+    for (std::size_t at = key * 0x9e3779b97f4a7c15u >> 56;; at = (at + 1) % kSlots) {
       const std::uint8_t found = slots_[at];
       if (found == kFree) {
         slots_[at] = static_cast<std::uint8_t>(count_);
-        vertices_[count_] = vertex;
+        keys_[count_] = key;
         return static_cast<std::uint8_t>(count_++);
       }
-      if (vertices_[found] == vertex) return found;
+      if (keys_[found] == key) return found;
     }
   }
   std::size_t count() const { return count_; }
-  std::uint32_t vertex(std::size_t number) const { return vertices_[number]; }
+  std::uint64_t key(std::size_t number) const { return keys_[number]; }
 
  private:
   static constexpr std::size_t kSlots = 256;
   static constexpr std::uint8_t kFree = 0xff;
   std::array<std::uint8_t, kSlots> slots_ = filled();
-  std::array<std::uint32_t, PackedTriangles::kMostPlaces> vertices_;
+  std::array<std::uint64_t, PackedTriangles::kMostPlaces> keys_;
   std::size_t count_ = 0;
 
   static std::array<std::uint8_t, kSlots> filled() {
@@ -67,18 +67,18 @@ std::size_t PackedTriangles::words(std::size_t count, std::size_t places) {
 
 std::vector<std::uint32_t> PackedTriangles::pack(const oracle::Surface& surface,
                                                  const std::vector<std::uint32_t>& ids) {
-  VertexNumbers numbers;
+  // Each vertex is placed once; vertices of soups share places, too.
+  Numbers vertices;
   std::array<std::uint8_t, kMostPlaces> corners;
   for (std::size_t k = 0; k < 3; ++k) {
     for (std::size_t i = 0; i < ids.size(); ++i) {
-      corners[k * ids.size() + i] = numbers.number(surface.mesh->indices(ids[i])[k]);
+      corners[k * ids.size() + i] = vertices.number(surface.mesh->indices(ids[i])[k]);
     }
   }
-  const std::size_t count = numbers.count();
   std::array<Eigen::Vector3d, kMostPlaces> places;
   Eigen::AlignedBox3d box;
-  for (std::size_t i = 0; i < count; ++i) {
-    places[i] = surface.lattice.toLattice(surface.mesh->vertex(numbers.vertex(i)));
+  for (std::size_t i = 0; i < vertices.count(); ++i) {
+    places[i] = surface.lattice.toLattice(surface.mesh->vertex(vertices.key(i)));
     box.extend(places[i]);
   }
   // The surface lies in the lattice, but for rounding.
@@ -86,6 +86,19 @@ std::vector<std::uint32_t> PackedTriangles::pack(const oracle::Surface& surface,
   const double extent = (box.max() - origin).maxCoeff();
   const int exponent = static_cast<int>(std::ceil(std::log2(std::max(extent, 0x1p-8) / kMost)));
   const double inverse_step = std::ldexp(1.0, -exponent);
+
+  const auto stepsOf = [&](const Eigen::Vector3d& place) {
+    std::uint64_t steps = 0;
+    for (int c = 2; c >= 0; --c) {
+      const double exact = std::min(std::max((place[c] - origin[c]) * inverse_step, 0.0), kMost);
+      steps = steps << 16 | static_cast<std::uint16_t>(exact + 0.5);
+    }
+    return steps;
+  };
+  Numbers different;
+  std::array<std::uint8_t, kMostPlaces> place_of;
+  for (std::size_t i = 0; i < vertices.count(); ++i) place_of[i] = different.number(stepsOf(places[i]));
+  const std::size_t count = different.count();
 
   std::vector<std::uint32_t> words(PackedTriangles::words(ids.size(), count));
   const auto at = [&origin](int k) { return static_cast<std::uint32_t>(origin[k]); };
@@ -95,13 +108,12 @@ std::vector<std::uint32_t> PackedTriangles::pack(const oracle::Surface& surface,
   auto* to = reinterpret_cast<char*>(words.data() + kHeader);
   for (int c = 0; c < 3; ++c) {
     for (std::size_t i = 0; i < count; ++i) {
-      const double steps = std::min(std::max((places[i][c] - origin[c]) * inverse_step, 0.0), kMost);
-      const auto rounded = static_cast<std::uint16_t>(steps + 0.5);
-      std::memcpy(to, &rounded, sizeof(rounded));
-      to += sizeof(rounded);
+      const auto step = static_cast<std::uint16_t>(different.key(i) >> 16 * c);
+      std::memcpy(to, &step, sizeof(step));
+      to += sizeof(step);
     }
   }
-  std::memcpy(to, corners.data(), 3 * ids.size());
+  for (std::size_t i = 0; i < 3 * ids.size(); ++i) *to++ = static_cast<char>(place_of[corners[i]]);
   return words;
 }
 

@@ -421,7 +421,6 @@ void Tree::growWhole() {
     std::iota(ids.begin(), ids.end(), 0u);
     bulk.build(surface_, ids.data(), ids.size(), latticeBounds(surface_));
   }
-  built_ += surface_.triangle_count;
   price_ = kNever;
   if (!supports_known_) {
     bulk.findSupports(supports_);
@@ -430,6 +429,7 @@ void Tree::growWhole() {
   }
   // A device has grown what is above the parts, so the host would gain little by new blocks.
   if (!growsOnHost()) return;
+  built_ += surface_.triangle_count;
   for (auto& n : nodes_at_) n = 0;
   nodes_at_[1] = 1;
   setChild(NodeRef(), bulk.blocks().empty() ? addList(bulk.ids().data(), bulk.ids().size(), true)

@@ -302,7 +302,6 @@ SphereSteps::Event NextEvent(SphereSteps& s) {
     const tree::Tree& tree = s.side[x]->tree();
     const tree::Block& block = tree.block(index);
     tree.markUsed(index, s.side[0]->now());
-    ++s.count;
     const std::uint32_t level = block.shape + 1u;
     const bool leaves = isLeaf(s, x, level) && isLeaf(s, 1 - x, still.level);
     const bool volumes =

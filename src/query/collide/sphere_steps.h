@@ -103,12 +103,6 @@ struct SphereSteps {
 
   SphereGroup* stack = nullptr;  ///< With room for kStackRoom more.
   std::size_t depth = 0;
-  std::size_t count = 0;  ///< Of nodes expanded for a pair.
-
-  /// Pairs may be pushed on what is left on the stack: all of it comes without frames then.
-  void forgetFrames() {
-    for (std::size_t i = 0; i < depth; ++i) stack[i].frames = 0;
-  }
 
   tree::NodeRef pair[2];  ///< Of the event.
   int expanded = 0;

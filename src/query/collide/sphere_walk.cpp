@@ -10,9 +10,6 @@ namespace bocst::query {
 struct SphereWalk::Scratch {
   std::vector<SphereGroup> stack;
   SphereSteps::Scratch steps;
-  /// Steps that walks made after they had set aside a pair that needs a node: the nearest hit may be below that pair,
-  /// so they may be a detour. Once they have cost as much as growth does, some nodes grow before the walk goes on.
-  std::size_t detour = 0;
   DeferredPairs<TreeSide, TreeSide> deferred;
 };
 
@@ -41,30 +38,19 @@ bool SphereWalk::search(SphereSteps& steps, Scratch& s, Visitor& visitor) const 
     steps.stack = s.stack.data();
     pushPair(steps, pair.a, pair.b);
   };
-  const auto grow = [&] { s.deferred.grow(a_, b_, b_in_a_, visitor.endsAtFirst(), push); };
   s.deferred.clear();
   push({a_.root(), b_.root()});
-  std::size_t paid_for = steps.count;  // steps before that are no detour, or are paid for
   for (;;) {
     switch (nextEvent(steps)) {
       case SphereSteps::kDone:
         if (s.deferred.empty()) return false;
-        grow();
-        paid_for = steps.count;
+        s.deferred.grow(a_, b_, b_in_a_, visitor.endsAtFirst(), push);
         break;
       case SphereSteps::kDeferred:
-        if (s.deferred.empty()) paid_for = steps.count;
         s.deferred.add({steps.pair[0], steps.pair[1]});
-        if (!visitor.endsAtFirst() || s.detour + (steps.count - paid_for) < kPrice) break;
-        s.detour = 0;
-        steps.forgetFrames();
-        grow();
-        paid_for = steps.count;
         break;
       case SphereSteps::kLeaves:
-        if (!visitLeaves(steps, visitor)) break;
-        if (!s.deferred.empty()) s.detour += steps.count - paid_for;
-        return true;
+        if (visitLeaves(steps, visitor)) return true;
     }
   }
 }

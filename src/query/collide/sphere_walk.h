@@ -27,8 +27,6 @@ class SphereWalk {
   bool run(Visitor& visitor);
 
  private:
-  // So many steps cost about as much as to expand two nodes.
-  static constexpr std::size_t kPrice = 64;
   struct Scratch;
 
   bool search(SphereSteps& steps, Scratch& s, Visitor& visitor) const;

@@ -233,24 +233,20 @@ TEST_P(SphereWalks, FindWhatMeetsWithinTolerance) {
   EXPECT_GT(counts.pairs, 10000u);
 }
 
-// A hit that is found far from where the surfaces are deepest, as that is not resident, pays for growth there; in the
-// end nothing grows any more.
-TEST(SphereWalk, HitsSettle) {
+// What resident pairs settle grows nothing, however long the walk to the hit is.
+TEST(SphereWalk, AHitThatIsAskedAgainGrowsNothing) {
   std::mt19937_64 g(54);
   const Model a(test::torus(60, 0.2), Subdivision::kBono, 7), b(test::torus(40, 0.3), Subdivision::kBono, 7);
   const auto lazy_a = a.fresh(), lazy_b = b.fresh();
   std::vector<SimilarityTransform> poses;
   for (int i = 0; i < 50; ++i) poses.push_back(touching(a, b, 1, -0.9, false, g));
-  const auto ask = [&](int times) {
+  const auto ask = [&] {
     const std::size_t before = lazy_a->statistics().expansions + lazy_b->statistics().expansions;
-    for (int i = 0; i < times; ++i) {
-      for (const SimilarityTransform& b_in_a : poses) EXPECT_FALSE(walk(*lazy_a, *lazy_b, b_in_a, true).pairs.empty());
-    }
+    for (const SimilarityTransform& b_in_a : poses) EXPECT_FALSE(walk(*lazy_a, *lazy_b, b_in_a, true).pairs.empty());
     return lazy_a->statistics().expansions + lazy_b->statistics().expansions - before;
   };
-  EXPECT_GT(ask(1), 0u);
-  EXPECT_GT(ask(100), 0u);
-  EXPECT_EQ(ask(1), 0u);
+  EXPECT_GT(ask(), 0u);
+  EXPECT_EQ(ask(), 0u);
   EXPECT_LT(lazy_a->statistics().expansions, a.whole->statistics().expansions / 2);
 }
 
