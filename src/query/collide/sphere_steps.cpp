@@ -358,7 +358,8 @@ SphereSteps::SphereSteps(const TreeSide& a, const TreeSide& b, const SimilarityT
       frames(b_in_a_),
       geometry(PairFrames::fits(b_in_a_.scale) ? PairFrames(b_in_a_.scale, b_in_a_)
                                                : PairFrames(1, SimilarityTransform())),
-      only_touching(PairFrames::fits(b_in_a_.scale)),
+      // Off: boxes and slabs are as tight as an oracle's arithmetic has them, and so what grows would depend on it.
+      only_touching(false),
       scratch(scratch_) {
   for (int s = 0; s < 2; ++s) {
     const tree::Tree& tree = side[s]->tree();

@@ -23,10 +23,6 @@ bool SphereWalk::run(Visitor& visitor) {
   thread_local Scratch s;
   SphereSteps steps(a_, b_, b_in_a_, s.steps);
   steps.nearest_first = visitor.endsAtFirst();
-  // Where surfaces touch, a hit is found sooner if only that is looked for; if there is none, spheres may still meet.
-  const bool may_touch = !facesApart(a_.volume(a_.root()), b_.volume(b_.root()), b_in_a_);
-  if (visitor.endsAtFirst() && steps.only_touching && may_touch && search(steps, s, visitor)) return true;
-  steps.lookForAll();
   return search(steps, s, visitor);
 }
 

@@ -16,8 +16,7 @@ class SphereWalk {
 
   /// Are the two so surely apart that nobody need walk? To be asked first, before anything is made ready for run().
   bool isNeedless() const {
-    return !spheresMeet(a_.sphere(a_.root()), placed(b_.sphere(b_.root()), b_in_a_), b_in_a_.tolerance) ||
-           areBoxesApart();
+    return !spheresMeet(a_.sphere(a_.root()), placed(b_.sphere(b_.root()), b_in_a_), b_in_a_.tolerance);
   }
 
   /// The same by the boxes about the surfaces, whose rounding margin hides in which frame they were compared.
