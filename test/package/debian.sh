@@ -63,7 +63,7 @@ if [[ $(cached BOCST_BUILD_PYTHON) == ON ]]; then
     grep -qx "./usr/lib/$folder/bocst/$file" "$work/python3-bocst.files" || fail "python3-bocst has no $file"
   done
   depends python3-bocst python3 python3-numpy libfcl0.7
-  [[ $(cached BUILD_SHARED_LIBS) != ON ]] || depends python3-bocst "libbocst0 (= $version)"
+  [[ $(cached BUILD_SHARED_LIBS) != ON ]] || depends python3-bocst "$library (= $version)"
   if [[ -z $(cached BOCST_SANITIZE) ]]; then
     (cd "$work" && PYTHONPATH="$work/unpacked/usr/lib/$folder" "$python" -c '
 import bocst, bocst.fcl
