@@ -6,12 +6,11 @@
 #include <cstdint>
 #include <cstring>
 
+#include "bounds/node_bounds.h"
+
 namespace bocst::bounds {
 
-/// Where the eight boxes of a bulk-built block lie: bytes of a frame of its own, which follows no cell of the lattice.
-/// Box k of lane o spans origin[k] + lo * side(k) / 255 to origin[k] + hi * side(k) / 255, in lattice units. The slab
-/// of a lane counts from the middle of its box, in units of the longest side: |normal / 127 . (p - middle) -
-/// slab_center * side / 256| <= slab_half * side / 512; a zero normal is no bound.
+/// The frame of the bounds of a bulk-built block's lanes, in lattice units; it follows no cell of the lattice.
 ///
 /// Sides are powers of two, so a thin axis may be finer than the longest by one of four factors. 63 bits in all.
 struct LooseFrame {
@@ -64,6 +63,41 @@ struct LooseFrame {
   double side(std::size_t k) const { return side(exponent - kShifts[thin[k]]); }
   double longest() const { return side(int{exponent}); }
 
+  /// Of the box of a lane.
+  double lower(const NodeBounds& b, std::size_t k) const { return origin[k] + b.lo[k] * (side(k) / kBoxSteps); }
+  double upper(const NodeBounds& b, std::size_t k) const { return origin[k] + b.hi[k] * (side(k) / kBoxSteps); }
+  double middle(const NodeBounds& b, std::size_t k) const {
+    return origin[k] + (b.lo[k] + b.hi[k]) * (side(k) * (0.5 / kBoxSteps));
+  }
+
+  /// The box that the frame was made for, or one inside that; kMargin is added.
+  void encodeBox(const double (&lo)[3], const double (&hi)[3], NodeBounds& b) const {
+    for (std::size_t k = 0; k < 3; ++k) {
+      const double steps = kBoxSteps / side(k);
+      b.setBox(k, (lo[k] - kMargin - origin[k]) * steps, (hi[k] + kMargin - origin[k]) * steps);
+    }
+  }
+
+  /// The slab along `n`: n . (p - middle of the box) is `least` to `most` for the points p.
+  void encodeSlab(const std::int8_t* n, double least, double most, NodeBounds& b) const {
+    const double units = kLooseSlabSteps / longest() / kNormalLength;
+    b.setSlab(n, least * units, most * units);
+  }
+
+  Volume decode(const NodeBounds& b) const {
+    Volume v;
+    for (std::size_t k = 0; k < 3; ++k) {
+      const double half_step = side(k) * (0.5 / kBoxSteps);
+      v.center[k] = origin[k] + (b.lo[k] + b.hi[k]) * half_step;
+      v.half[k] = static_cast<float>((b.hi[k] - b.lo[k]) * half_step);
+      v.normal[k] = static_cast<float>(b.normal[k] * (1.0 / kNormalLength));
+    }
+    const double unit = longest() / kLooseSlabSteps;
+    v.slab_offset = static_cast<float>(b.slab_center * unit);
+    v.slab_half = static_cast<float>(b.slab_half * (unit / 2));
+    return v;
+  }
+
   static constexpr double kMargin = 1e-6;  ///< Lattice units; far above the rounding of toLattice().
 
  private:
@@ -73,47 +107,6 @@ struct LooseFrame {
     double side;
     std::memcpy(&side, &bits, sizeof(side));
     return side;
-  }
-};
-
-/// A direction as bytes of length about 127; false where it has none.
-inline bool byteNormal(const float (&direction)[3], std::int8_t (&bytes)[3]) {
-  const float* const d = direction;
-  const float length = std::sqrt(d[0] * d[0] + d[1] * d[1] + d[2] * d[2]);
-  if (!(length > 0) || !std::isfinite(length)) return false;
-  for (int k = 0; k < 3; ++k) bytes[k] = static_cast<std::int8_t>(std::lrint(d[k] / length * 127));
-  return true;
-}
-
-/// What a lane of a LooseFrame says, as bytes.
-struct LooseBounds {
-  std::uint8_t lo[3] = {0, 0, 0}, hi[3] = {0, 0, 0};
-  std::int8_t normal[3] = {0, 0, 0};
-  std::int8_t slab_center = 0;
-  std::uint8_t slab_half = 255;
-
-  /// The box, rounded outwards.
-  void setBox(const LooseFrame& f, const double (&lo_)[3], const double (&hi_)[3]) {
-    for (std::size_t k = 0; k < 3; ++k) {
-      const double scale = 255 / f.side(k);
-      const double least = (lo_[k] - LooseFrame::kMargin - f.origin[k]) * scale;
-      const double most = (hi_[k] + LooseFrame::kMargin - f.origin[k]) * scale;
-      lo[k] = static_cast<std::uint8_t>(std::clamp(std::floor(least), 0.0, 255.0));
-      hi[k] = static_cast<std::uint8_t>(std::clamp(std::ceil(most), 0.0, 255.0));
-    }
-  }
-
-  /// The middle of the box as it is stored, in lattice units.
-  double middle(const LooseFrame& f, std::size_t k) const { return f.origin[k] + (lo[k] + hi[k]) * (f.side(k) / 510); }
-
-  /// The slab along `n` (bytes) that holds the interval, which counts from the middle; none where bytes do not reach.
-  void setSlab(const LooseFrame& f, const std::int8_t (&n)[3], double least, double most) {
-    const double center = std::round((least + most) / 2 * (256 / f.longest())), at = center * (f.longest() / 256);
-    const double half = std::ceil(std::max(most - at, at - least) * (512 / f.longest()));
-    if (!(std::abs(center) <= 127) || !(half <= 255)) return;
-    std::copy_n(n, 3, normal);
-    slab_center = static_cast<std::int8_t>(center);
-    slab_half = static_cast<std::uint8_t>(half);
   }
 };
 

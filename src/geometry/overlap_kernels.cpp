@@ -9,30 +9,30 @@
 #include <hwy/foreach_target.h>
 #include <hwy/highway.h>
 
+#include "bounds/decode-inl.h"
 #include "simd/octants-inl.h"
 #include "simd/vectors-inl.h"
 
 HWY_BEFORE_NAMESPACE();
 namespace bocst::query::HWY_NAMESPACE {
 
-// kLoose: the boxes lie in a frame of sides 510 * byte; else each in an octant of its own, of side 1. Slabs count from
-// the middle of the box, or of the octant.
+namespace codec = bounds::HWY_NAMESPACE;
+
+// kLoose: the boxes lie in one frame, slabs count from the middle of the box; else each lies in an octant of its own,
+// of side 1, and slabs count from the middle of that.
 template <bool kLoose>
-HWY_INLINE std::uint8_t overlapping(const oracle::OctantBounds& octants, const float (&byte)[3], float slab_unit,
+HWY_INLINE std::uint8_t overlapping(const bounds::OctantBounds& octants, const float (&half_step)[3], float slab_unit,
                                     const OneVolume& b) {
   const D d;
   const V rounding_margin = hn::Set(d, b.rounding_margin), half = hn::Set(d, 0.5f);
-  const V per127 = hn::Set(d, 1.0f / 127), per_slab = hn::Set(d, slab_unit), per_half = hn::Set(d, slab_unit / 2);
   std::uint8_t result = 0;
   for (std::size_t i = 0; i < 8; i += hn::Lanes(d)) {
     // The octant's box: middle and half extents; delta is the displacement to the volume's center.
     V middle[3], h[3], delta[3];
     BOCST_UNROLL
     for (int k = 0; k < 3; ++k) {
-      const V lo = fromBytes(d, octants.lo[k] + i), hi = fromBytes(d, octants.hi[k] + i);
       const V corner = kLoose ? hn::Zero(d) : hn::Load(d, kOctantCorner[k] + i);
-      middle[k] = hn::MulAdd(hn::Add(lo, hi), hn::Set(d, byte[k]), corner);
-      h[k] = hn::Mul(hn::Sub(hi, lo), hn::Set(d, byte[k]));
+      codec::decodeBox(octants, k, i, corner, hn::Set(d, half_step[k]), middle[k], h[k]);
       delta[k] = hn::Sub(hn::Set(d, b.center[k]), middle[k]);
     }
     M apart = hn::MaskFromVec(hn::Zero(d));
@@ -62,11 +62,11 @@ HWY_INLINE std::uint8_t overlapping(const oracle::OctantBounds& octants, const f
     V n[3], along = hn::Zero(d);
     BOCST_UNROLL
     for (int k = 0; k < 3; ++k) {
-      n[k] = hn::Mul(fromBytes(d, octants.normal[k] + i), per127);
+      n[k] = codec::decodeNormal(octants, k, i);
       along = hn::MulAdd(n[k], hn::Set(d, b.normal[k]), along);
     }
-    const V center = hn::Mul(fromBytes(d, octants.slab_center + i), per_slab);
-    const V w = hn::Mul(fromBytes(d, octants.slab_half + i), per_half);
+    V center, w;
+    codec::decodeSlab(octants, i, slab_unit, center, w);
     V slab_from[3];  // where slabs count from
     BOCST_UNROLL
     for (int k = 0; k < 3; ++k) slab_from[k] = kLoose ? middle[k] : hn::Add(hn::Load(d, kOctantCorner[k] + i), half);
@@ -108,17 +108,17 @@ HWY_INLINE std::uint8_t overlapping(const oracle::OctantBounds& octants, const f
   return result;
 }
 
-std::uint8_t OverlappingOctants(const oracle::OctantBounds& octants, const OneVolume& volume) {
-  constexpr float kByte = 1.0f / 510;
-  return overlapping<false>(octants, {kByte, kByte, kByte}, 1.0f / 127, volume);
+std::uint8_t OverlappingOctants(const bounds::OctantBounds& octants, const OneVolume& volume) {
+  const float half_step = codec::halfStep(1);
+  return overlapping<false>(octants, {half_step, half_step, half_step}, codec::cellSlabUnit(1), volume);
 }
 
-std::uint8_t OverlappingLanes(const bounds::LooseFrame& frame, const oracle::OctantBounds& lanes,
+std::uint8_t OverlappingLanes(const bounds::LooseFrame& frame, const bounds::OctantBounds& lanes,
                               const OneVolume& volume) {
   const double unit = frame.longest() / 2;
-  float byte[3];
-  for (std::size_t k = 0; k < 3; ++k) byte[k] = static_cast<float>(frame.side(k) / unit) * (1.0f / 510);
-  return overlapping<true>(lanes, byte, 2.0f / 256, volume);
+  float half_step[3];
+  for (std::size_t k = 0; k < 3; ++k) half_step[k] = codec::halfStep(static_cast<float>(frame.side(k) / unit));
+  return overlapping<true>(lanes, half_step, codec::looseSlabUnit(2), volume);
 }
 
 void PlaceTriangles(RawTriangles& raw, std::size_t count, const PackTransform& place, TrianglePack& pack) {
@@ -440,12 +440,12 @@ HWY_EXPORT(TrianglesWithin);
 HWY_EXPORT(MoveTriangles);
 HWY_EXPORT(TouchingPairs);
 
-std::uint8_t overlappingLanes(const bounds::LooseFrame& frame, const oracle::OctantBounds& lanes,
+std::uint8_t overlappingLanes(const bounds::LooseFrame& frame, const bounds::OctantBounds& lanes,
                               const OneVolume& volume) {
   return HWY_DYNAMIC_DISPATCH(OverlappingLanes)(frame, lanes, volume);
 }
 
-std::uint8_t overlappingOctants(const oracle::OctantBounds& octants, const OneVolume& volume) {
+std::uint8_t overlappingOctants(const bounds::OctantBounds& octants, const OneVolume& volume) {
   return HWY_DYNAMIC_DISPATCH(OverlappingOctants)(octants, volume);
 }
 

@@ -28,11 +28,11 @@ struct OneVolume {
 /// Every axis projects with sums of at most 24 terms, each rounded at most 4 times and, with Q = |center|_1 + |half|_1
 /// + |slab_offset| + slab_half + 4, at most Q in size; so an error is at most 96 Q 2^-24 and volumes must be given with
 /// rounding margin >= 128 Q 2^-24, to which the caller adds what its own coordinates are off by.
-std::uint8_t overlappingOctants(const oracle::OctantBounds& octants, const OneVolume& volume);
+std::uint8_t overlappingOctants(const bounds::OctantBounds& octants, const OneVolume& volume);
 
 /// The same for the lanes of a loose block; the volume is given with the frame's origin at the origin and half its
 /// longest side as unit.
-std::uint8_t overlappingLanes(const bounds::LooseFrame& frame, const oracle::OctantBounds& lanes,
+std::uint8_t overlappingLanes(const bounds::LooseFrame& frame, const bounds::OctantBounds& lanes,
                               const OneVolume& volume);
 
 /// Corners of up to kCapacity triangles as structure of arrays, in one frame, near the origin.

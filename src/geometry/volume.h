@@ -4,22 +4,15 @@
 #include <Eigen/Core>
 #include <cmath>
 
+#include "bounds/node_bounds.h"
 #include "geometry/overlap_kernels.h"
 #include "lattice/lattice.h"
 
 namespace bocst::query {
 
-/// What bounds the surface of a node of a tree: box AND slab, in lattice units, axes those of the lattice.
-/// Plain numbers: this and what is made of it are the hottest data of a query.
-struct Volume {
-  double center[3];
-  float half[3];
-  float normal[3];    ///< About unit length; zero: no slab.
-  float slab_offset;  ///< Middle of the slab along normal, from center.
-  float slab_half;
-};
+using bounds::Volume;
 
-/// The same with axes of its own and no slab: the volume of a partner's node.
+/// A box with axes of its own and no slab: the volume of a partner's node.
 struct OrientedVolume {
   Eigen::Vector3d center;
   Eigen::Matrix3d axes = Eigen::Matrix3d::Identity();  ///< Columns: the box's unit axes.

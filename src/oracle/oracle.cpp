@@ -23,28 +23,6 @@ const char* nameOf(OracleKind kind) {
 
 }  // namespace
 
-void OctantBounds::set(int octant, const CellBounds& b) {
-  for (int k = 0; k < 3; ++k) {
-    lo[k][octant] = b.lo[k];
-    hi[k][octant] = b.hi[k];
-    normal[k][octant] = b.normal[k];
-  }
-  slab_center[octant] = b.slab_center;
-  slab_half[octant] = b.slab_half;
-}
-
-CellBounds OctantBounds::get(int octant) const {
-  CellBounds b;
-  for (int k = 0; k < 3; ++k) {
-    b.lo[k] = lo[k][octant];
-    b.hi[k] = hi[k][octant];
-    b.normal[k] = normal[k][octant];
-  }
-  b.slab_center = slab_center[octant];
-  b.slab_half = slab_half[octant];
-  return b;
-}
-
 std::shared_ptr<Oracle> makeOracle(OracleKind kind, int viewport) {
   static const std::shared_ptr<Oracle> cpu = std::make_shared<CpuOracle>();
   const OracleSelection selection = oracleSelectionOf(kind);

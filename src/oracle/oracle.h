@@ -11,6 +11,7 @@
 #include <string>
 #include <vector>
 
+#include "bounds/node_bounds.h"
 #include "lattice/lattice.h"
 #include "oracle/surface.h"
 
@@ -22,32 +23,6 @@ class DeviceResource {
   virtual ~DeviceResource() = default;
   virtual std::size_t bytes() const = 0;
 };
-
-/// A bound of the surface inside one cell of side s, as bytes: a box AND a slab.
-/// Box: from corner + lo / 255 * s to corner + hi / 255 * s. Slab: |normal . (p - c) / s - slab_center| <=
-/// slab_half / 2 for every surface point p of the cell with centre c; a zero normal is no bound. Rounded outwards.
-struct CellBounds {
-  std::array<std::uint8_t, 3> lo{0, 0, 0}, hi{255, 255, 255};
-  std::array<std::int8_t, 3> normal{0, 0, 0};
-  std::int8_t slab_center = 0;
-  std::uint8_t slab_half = 255;
-
-  bool operator==(const CellBounds& b) const {
-    return lo == b.lo && hi == b.hi && normal == b.normal && slab_center == b.slab_center && slab_half == b.slab_half;
-  }
-};
-
-/// The bounds of eight octants, as structure of arrays for the pair test.
-struct OctantBounds {
-  std::uint8_t lo[3][8] = {}, hi[3][8] = {};
-  std::int8_t normal[3][8] = {};
-  std::int8_t slab_center[8] = {};
-  std::uint8_t slab_half[8] = {};
-
-  void set(int octant, const CellBounds& b);
-  CellBounds get(int octant) const;
-};
-static_assert(sizeof(OctantBounds) == 88);
 
 /// One node to expand: the question and the answer.
 struct ExpansionRequest {
@@ -71,8 +46,8 @@ struct ExpansionRequest {
 
   // Answered.
   std::uint8_t grey = 0;  ///< Bit o: the surface meets octant o (reference.h), which has an actual region.
-  OctantBounds octants;
-  CellBounds own;                           ///< Of the cell itself: what the octants taught about it.
+  bounds::OctantBounds octants;
+  bounds::NodeBounds own;                   ///< Of the cell itself: what the octants taught about it.
   std::vector<std::uint32_t> lists;         ///< Triangles of octant 0, of octant 1, ...
   std::array<std::size_t, 9> list_begin{};  ///< Octant o has lists[list_begin[o]] to lists[list_begin[o + 1]];
                                             ///< with own_only all of lists is the cell's.

@@ -5,6 +5,7 @@
 #include <atomic>
 #include <cstdint>
 
+#include "bounds/cell_frame.h"
 #include "bounds/loose_frame.h"
 #include "lattice/limits.h"
 #include "oracle/oracle.h"
@@ -14,6 +15,12 @@ namespace bocst::tree {
 /// Loose blocks below one another in one tree, at most. A lane of many triangles shares more bits of a key of 30 than
 /// its block does; of few, it has less than half of its block's (see BulkBuilder::split()).
 constexpr std::size_t kMostLooseDepth = 30 + 30;
+
+/// A cell as the frame of bounds.
+inline bounds::CellFrame frameOf(const lattice::Cell& cell) {
+  const auto corner = cell.corner();
+  return {{double(corner[0]), double(corner[1]), double(corner[2])}, double(cell.side())};
+}
 
 /// Says where the triangles or the children of a resident node are: two bits of tag, thirty of index.
 class ChildRef {
@@ -44,14 +51,14 @@ class ChildRef {
 ///
 /// | bytes | what |
 /// |---|---|
-/// | 0..87 | octants: box and slab of each (oracle.h, OctantBounds; for a loose block, loose_frame.h) |
+/// | 0..87 | octants: box and slab of each (bounds/node_bounds.h) |
 /// | 88 | grey: bit o says octant or lane o is a node |
 /// | 89..95 | cell: level, then x, y, z of the expanded node (16 bits each); or kLoose and a LooseFrame (55 bits) |
 /// | 96..127 | child: the child reference of each octant |
 struct alignas(64) Block {
   static constexpr std::uint32_t kNone = 0xffffffffu;
 
-  oracle::OctantBounds octants;
+  bounds::OctantBounds octants;
   std::uint8_t grey = 0;
   std::uint8_t shape = 1;
   std::uint16_t at[3] = {0, 0, 0};
@@ -65,6 +72,12 @@ struct alignas(64) Block {
   void setCell(const lattice::Cell& cell) {
     shape = static_cast<std::uint8_t>(cell.level);
     for (std::size_t k = 0; k < 3; ++k) at[k] = static_cast<std::uint16_t>(cell.at[k]);
+  }
+
+  /// Where the bounds of its octant o count from.
+  bounds::CellFrame octantFrame(int o) const {
+    const double side = 1 << (lattice::kMaxLevel - shape - 1);
+    return {{(2 * at[0] + (o & 1)) * side, (2 * at[1] + (o >> 1 & 1)) * side, (2 * at[2] + (o >> 2 & 1)) * side}, side};
   }
 
   /// Of a loose block.
@@ -81,10 +94,11 @@ struct alignas(64) Block {
   /// The box of a loose block's lane, in lattice units.
   Eigen::AlignedBox3d looseBox(int o) const {
     const bounds::LooseFrame f = frame();
+    const bounds::NodeBounds b = octants.get(static_cast<std::size_t>(o));
     Eigen::Vector3d lo, hi;
     for (std::size_t k = 0; k < 3; ++k) {
-      lo[static_cast<int>(k)] = f.origin[k] + octants.lo[k][o] * (f.side(k) / 255);
-      hi[static_cast<int>(k)] = f.origin[k] + octants.hi[k][o] * (f.side(k) / 255);
+      lo[static_cast<int>(k)] = f.lower(b, k);
+      hi[static_cast<int>(k)] = f.upper(b, k);
     }
     return {lo, hi};
   }
@@ -95,7 +109,6 @@ struct alignas(64) Block {
   }
 };
 static_assert(sizeof(Block) == 128);
-static_assert(sizeof(oracle::CellBounds) == 11);
 static_assert(std::atomic<ChildRef>::is_always_lock_free);
 
 /// A resident node: the root, or an octant of a block.
@@ -114,7 +127,7 @@ struct NodeRef {
 
 /// What growth and decay know of a block beside; its number is the block's.
 struct BlockRecord {
-  oracle::CellBounds own;                 ///< Box and slab of the expanded node itself, as its octants showed it.
+  bounds::NodeBounds own;                 ///< Box and slab of the expanded node itself, as its octants showed it.
   std::uint8_t came = 0;                  ///< Bit o: a query came to octant o, a leaf that is not packed yet.
   std::uint32_t own_list = Block::kNone;  ///< Where its list is; only where an oracle keeps its octants'.
   NodeRef parent;                         ///< Which node was expanded.

@@ -27,6 +27,10 @@ constexpr float kInfinity = std::numeric_limits<float>::infinity();
 constexpr std::size_t kRowPad = 16;     // kernels read whole vectors
 constexpr std::size_t kFloats = 3 * 4;  // of a triangle's corners in places_
 
+bool encodeNormal(const float (&direction)[3], std::int8_t (&bytes)[3]) {
+  return bounds::encodeNormal(direction[0], direction[1], direction[2], bytes);
+}
+
 V4 load(const float (&values)[4]) { return Eigen::Map<const V4>(values); }
 void store(const V4& from, float* to) {
   Eigen::Map<V4> map(to);
@@ -40,7 +44,7 @@ float areaOf(const V4& lo, const V4& hi) {
 }
 
 // What float coordinates no larger than `size` are off by, and sums of products of three of them with bytes of a normal
-// in multiples of 3 * 127.
+// in multiples of kMostNormalNorm1.
 double marginOf(float size) { return 8 * 0x1p-24 * static_cast<double>(size); }
 
 }  // namespace
@@ -341,20 +345,20 @@ void BulkBuilder::boundBlocks() {
       if (count > kMostInEnd && block.lane[o].count <= kMostInEnd) {
         ends_.push_back({{block.lane[o].begin, block.lane[o].count}, lanes[o]});
       }
-      bounds::LooseBounds& b = block.bounds[o];
+      bounds::NodeBounds& b = block.bounds[o];
       corner(lanes[o].lo, -margin, lo);
       corner(lanes[o].hi, margin, hi);
-      b.setBox(block.frame, lo, hi);
+      block.frame.encodeBox(lo, hi, b);
       std::int8_t normal[3];
-      if (block.lane[o].count > kMostInSlab || !bounds::byteNormal(lanes[o].normal, normal)) continue;
+      if (block.lane[o].count > kMostInSlab || !encodeNormal(lanes[o].normal, normal)) continue;
       const float n[3] = {static_cast<float>(normal[0]), static_cast<float>(normal[1]), static_cast<float>(normal[2])};
       float least, most;
       extremesAlong(rows, block.lane[o].begin, block.lane[o].count, n, least, most);
       double middle = 0;
-      for (std::size_t k = 0; k < 3; ++k) middle += normal[k] * (b.middle(block.frame, k) - base_[static_cast<int>(k)]);
-      const double off = 3 * 127 * margin;
-      b.setSlab(block.frame, normal, (static_cast<double>(least) - middle - off) / 127,
-                (static_cast<double>(most) - middle + off) / 127);
+      for (std::size_t k = 0; k < 3; ++k) middle += normal[k] * (block.frame.middle(b, k) - base_[static_cast<int>(k)]);
+      const double off = bounds::kMostNormalNorm1 * margin;
+      block.frame.encodeSlab(normal, static_cast<double>(least) - middle - off,
+                             static_cast<double>(most) - middle + off, b);
     }
   }
 }
@@ -456,15 +460,15 @@ void BulkBuilder::finish(const Mesh::Indices* indices, const std::uint32_t* numb
     own_.box.min()[k] = static_cast<double>(bounds.lo[k]) + base_[k] - margin;
     own_.box.max()[k] = static_cast<double>(bounds.hi[k]) + base_[k] + margin;
   }
-  if (whole.count > kMostInSlab || !bounds::byteNormal(bounds.normal, own_.normal)) return;
+  if (whole.count > kMostInSlab || !encodeNormal(bounds.normal, own_.normal)) return;
   const CornerRows rows = this->rows();
   float n[3], least, most;
   for (int k = 0; k < 3; ++k) n[k] = static_cast<float>(own_.normal[k]);
   extremesAlong(rows, 0, whole.count, n, least, most);
   double base = 0;
   for (int k = 0; k < 3; ++k) base += own_.normal[k] * base_[k];
-  own_.least = static_cast<double>(least) + base - 3 * 127 * margin;
-  own_.most = static_cast<double>(most) + base + 3 * 127 * margin;
+  own_.least = static_cast<double>(least) + base - bounds::kMostNormalNorm1 * margin;
+  own_.most = static_cast<double>(most) + base + bounds::kMostNormalNorm1 * margin;
 }
 
 }  // namespace bocst::tree

@@ -34,10 +34,10 @@ class BulkBuilder {
     bounds::LooseFrame frame;
     std::uint32_t lanes = 0;  ///< The first so many are in use.
     Lane lane[8];
-    bounds::LooseBounds bounds[8];
+    bounds::NodeBounds bounds[8];
   };
 
-  /// The surface of a node: a box, and a slab along `normal` (bytes, of length about 127; zero: none).
+  /// The surface of a node: a box, and a slab along `normal` (bytes as of NodeBounds; zero: none).
   struct Own {
     Eigen::AlignedBox3d box;  ///< Lattice units.
     std::int8_t normal[3] = {0, 0, 0};

@@ -63,32 +63,25 @@ oracle::Surface surfaceOf(std::shared_ptr<const Mesh> mesh, const Options& o) {
   return {std::move(mesh), lattice};
 }
 
-// A box in lattice units as bytes of a cell, rounded outwards; the margin is far above the rounding of toLattice.
-void setBox(const Eigen::AlignedBox3d& box, const lattice::Cell& cell, oracle::CellBounds& bounds) {
-  const double scale = 255.0 / cell.side(), margin = 1e-6;
-  // What is clamped is not negative, so to truncate is to round down.
-  const auto byte = [](double x) { return static_cast<int>(std::min(std::max(x, 0.0), 255.0)); };
+// A box in lattice units as bytes of a cell; the margin is far above the rounding of toLattice().
+void encodeBox(const Eigen::AlignedBox3d& box, const lattice::Cell& cell, bounds::NodeBounds& b) {
+  constexpr double kMargin = 1e-6;
+  const bounds::CellFrame frame = frameOf(cell);
   for (int k = 0; k < 3; ++k) {
-    const double corner = cell.corner()[k];
-    bounds.lo[k] = static_cast<std::uint8_t>(byte((box.min()[k] - margin - corner) * scale));
-    bounds.hi[k] = static_cast<std::uint8_t>(255 - byte(255 - (box.max()[k] + margin - corner) * scale));
+    frame.encodeBox(static_cast<std::size_t>(k), box.min()[k] - kMargin, box.max()[k] + kMargin, b);
   }
 }
 
 // Box and slab of a cell's surface as bytes of the cell.
-oracle::CellBounds cellBounds(const BulkBuilder::Own& own, const lattice::Cell& cell) {
-  oracle::CellBounds b;
-  setBox(own.box, cell, b);
-  double middle = 0;
-  const double side = cell.side();
-  for (std::size_t k = 0; k < 3; ++k) middle += own.normal[k] * (cell.corner()[k] + side / 2);
-  const double least = (own.least - middle) / side, most = (own.most - middle) / side;
-  const double at = std::round((least + most) / 2), half = std::ceil(2 * std::max(most - at, at - least) + 1e-6);
+bounds::NodeBounds encode(const BulkBuilder::Own& own, const lattice::Cell& cell) {
+  bounds::NodeBounds b;
+  encodeBox(own.box, cell, b);
   if (std::all_of(own.normal, own.normal + 3, [](int n) { return n == 0; })) return b;
-  if (!(half <= 255) || !(std::abs(at) <= 127)) return b;
-  std::copy_n(own.normal, 3, b.normal.begin());
-  b.slab_center = static_cast<std::int8_t>(at);
-  b.slab_half = static_cast<std::uint8_t>(half);
+  const bounds::CellFrame frame = frameOf(cell);
+  double middle = 0;
+  for (std::size_t k = 0; k < 3; ++k) middle += own.normal[k] * frame.middle(k);
+  const double margin = 1e-6 * frame.side;
+  frame.encodeSlab(own.normal, own.least - middle - margin, own.most - middle + margin, b);
   return b;
 }
 
@@ -127,9 +120,9 @@ void Tree::reset(std::shared_ptr<const Mesh> mesh) {
   component_points_ = nullptr;
   surface_ = surfaceOf(std::move(mesh), options_);
   radius_ = -1;
-  root_bounds_ = oracle::CellBounds();
+  root_bounds_ = bounds::NodeBounds();
   const Eigen::AlignedBox3d box = latticeBounds(surface_);
-  setBox(box, lattice::Cell{}, root_bounds_);
+  encodeBox(box, lattice::Cell{}, root_bounds_);
   const Eigen::Vector3d middle = Eigen::Vector3d::Constant(lattice::kMiddle);
   supports_.start({box.min() - middle, box.max() - middle});
   supports_known_ = false;
@@ -335,13 +328,13 @@ void Tree::growFromGrid(NodeRef node) {
   for (int o = 0; o < 8; ++o) {
     if ((grey >> o & 1) == 0) continue;
     const Eigen::AlignedBox3d box = grid_->bounds(cell.octant(o)).intersection(all);
-    oracle::CellBounds bounds;
-    setBox(box, cell.octant(o), bounds);
-    block.octants.set(o, bounds);
+    bounds::NodeBounds bounds;
+    encodeBox(box, cell.octant(o), bounds);
+    block.octants.set(static_cast<std::size_t>(o), bounds);
     own.extend(box);
   }
-  oracle::CellBounds& bounds_of_all = records_[index].own;
-  setBox(own, cell, bounds_of_all);
+  bounds::NodeBounds& bounds_of_all = records_[index].own;
+  encodeBox(own, cell, bounds_of_all);
   refits_.push_back({node, bounds_of_all});
   refits_wait_.store(true, std::memory_order_relaxed);
   setChild(node, ChildRef(ChildRef::kBlock, index));
@@ -390,7 +383,7 @@ bool Tree::growInBulk(NodeRef node, std::vector<std::uint32_t>& ids) {
   thread_local BulkBuilder bulk;
   bulk.build(surface_, ids.data(), ids.size(), region);
   if (!is_loose && !bulk.ids().empty()) {
-    refits_.push_back({node, cellBounds(bulk.own(), cell(node))});
+    refits_.push_back({node, encode(bulk.own(), cell(node))});
     refits_wait_.store(true, std::memory_order_relaxed);
   }
   setChild(node, bulk.blocks().empty() ? addList(bulk.ids().data(), bulk.ids().size(), true)
@@ -434,7 +427,7 @@ void Tree::growWhole() {
   nodes_at_[1] = 1;
   setChild(NodeRef(), bulk.blocks().empty() ? addList(bulk.ids().data(), bulk.ids().size(), true)
                                             : addBulk(NodeRef(), bulk, 0, 1));
-  refits_.push_back({NodeRef(), cellBounds(bulk.own(), lattice::Cell{})});
+  refits_.push_back({NodeRef(), encode(bulk.own(), lattice::Cell{})});
   refits_wait_.store(true, std::memory_order_relaxed);
   if (surface_.triangle_count > kMostKept) bulk = BulkBuilder();
 }
@@ -447,15 +440,7 @@ ChildRef Tree::addBulk(NodeRef node, const BulkBuilder& bulk, std::uint32_t numb
   blocks_[index].setFrame(built.frame);
   for (std::uint32_t o = 0; o < built.lanes; ++o) {
     const BulkBuilder::Lane& lane = built.lane[o];
-    const bounds::LooseBounds& b = built.bounds[o];
-    oracle::OctantBounds& octants = blocks_[index].octants;
-    for (std::size_t k = 0; k < 3; ++k) {
-      octants.lo[k][o] = b.lo[k];
-      octants.hi[k][o] = b.hi[k];
-      octants.normal[k][o] = b.normal[k];
-    }
-    octants.slab_center[o] = b.slab_center;
-    octants.slab_half[o] = b.slab_half;
+    blocks_[index].octants.set(o, built.bounds[o]);
     const ChildRef child = lane.block == BulkBuilder::kNone
                                ? addList(bulk.ids().data() + lane.begin, lane.count, false)
                                : addBulk(NodeRef::octant(index, static_cast<int>(o)), bulk, lane.block, level + 1);

@@ -71,7 +71,7 @@ class Tree {
     return node.isRoot() ? lattice::Cell{} : blocks_[node.block()].cell().octant(node.octant());
   }
   /// Box and slab of the root; those of other nodes are in their parents' blocks.
-  const oracle::CellBounds& rootBounds() const { return root_bounds_; }
+  const bounds::NodeBounds& rootBounds() const { return root_bounds_; }
   TriangleList list(ChildRef ref) const { return lists_[ref.index()]; }
   const TriangleLists& lists() const { return lists_; }
   /// How far the surface reaches in any direction: that of its box, or exact once all was built at once.
@@ -193,7 +193,7 @@ class Tree {
   mutable std::unique_ptr<const std::vector<Eigen::Vector3d>> component_points_;
   mutable std::atomic<const std::vector<Eigen::Vector3d>*> component_points_known_{nullptr};  // pieces_, for readers
   mutable std::atomic<double> radius_{-1};                                                    // negative: not known yet
-  oracle::CellBounds root_bounds_;
+  bounds::NodeBounds root_bounds_;
   SupportTable supports_;
   Outline outline_;
   bool supports_known_ = false;
@@ -216,7 +216,7 @@ class Tree {
   // for a moment alone.
   struct Refit {
     NodeRef node;
-    oracle::CellBounds bounds;
+    bounds::NodeBounds bounds;
   };
   std::vector<Refit> refits_;
   std::atomic<bool> refits_wait_{false};

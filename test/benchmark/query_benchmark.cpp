@@ -19,7 +19,7 @@ CellOctants randomCell(std::mt19937_64& g) {
   c.cell.level = 6;
   for (auto& x : c.cell.at) x = 14 + static_cast<std::uint32_t>(g() % 4);
   for (int o = 0; o < 8; ++o) {
-    oracle::CellBounds b;
+    bounds::NodeBounds b;
     const Eigen::Vector3d n = 127 * test::randomDirection(g);
     for (std::size_t k = 0; k < 3; ++k) {
       b.lo[k] = static_cast<std::uint8_t>(g() % 100);

@@ -29,7 +29,7 @@ Surface residentOn(Oracle& oracle, Surface surface) {
 }
 
 // Is p, in lattice units, inside the bounds of the octant?
-bool contains(const CellBounds& b, const Cell& cell, const Eigen::Vector3d& p) {
+bool contains(const bounds::NodeBounds& b, const Cell& cell, const Eigen::Vector3d& p) {
   const double side = cell.side(), tolerance = side * 1e-6 + 1e-9;
   const Eigen::Vector3d center = centerOf(cell);
   double along = 0;

@@ -26,8 +26,8 @@ namespace {
 using EveryTarget = test::EveryTarget;
 
 // Random bounds of an octant, and points of the surface that they allow.
-oracle::CellBounds randomBounds(std::mt19937_64& g) {
-  oracle::CellBounds b;
+bounds::NodeBounds randomBounds(std::mt19937_64& g) {
+  bounds::NodeBounds b;
   for (std::size_t k = 0; k < 3; ++k) {
     const auto x = static_cast<std::uint8_t>(g() % 256), y = static_cast<std::uint8_t>(g() % 256);
     b.lo[k] = std::min(x, y);
@@ -42,7 +42,7 @@ oracle::CellBounds randomBounds(std::mt19937_64& g) {
   return b;
 }
 
-bool randomPoint(std::mt19937_64& g, const oracle::CellBounds& b, const Eigen::Vector3d& corner, double side,
+bool randomPoint(std::mt19937_64& g, const bounds::NodeBounds& b, const Eigen::Vector3d& corner, double side,
                  Eigen::Vector3d& p) {
   std::uniform_real_distribution<double> u(0, 1);
   for (int i = 0; i < 20; ++i) {
@@ -65,11 +65,11 @@ TEST_P(EveryTarget, NoOctantIsLostThatSharesAPoint) {
   std::uniform_real_distribution<double> u(-1, 1);
   int shared = 0, parted = 0;
   for (int round = 0; round < 20000; ++round) {
-    oracle::OctantBounds octants;
+    bounds::OctantBounds octants;
     for (int o = 0; o < 8; ++o) octants.set(o, randomBounds(g));
     // A volume of another tree, its own cell at the origin with side 1, placed so that a point of it is a point of
     // ours.
-    const oracle::CellBounds other = randomBounds(g);
+    const bounds::NodeBounds other = randomBounds(g);
     Volume v;
     Eigen::Vector3d n, box_middle;
     for (int k = 0; k < 3; ++k) {
@@ -188,7 +188,7 @@ TEST_P(EveryTarget, NoTriangleIsLostThatMeetsAnOctant) {
     c.cell.level = 1 + static_cast<int>(g() % 14);
     for (auto& x : c.cell.at) x = static_cast<std::uint32_t>(g() % (1u << (c.cell.level - 1)));
     for (int o = 0; o < 8; ++o) c.octants.set(o, randomBounds(g));
-    c.octants.set(0, oracle::CellBounds());  // one has points for sure
+    c.octants.set(0, bounds::NodeBounds());  // one has points for sure
     const int own = static_cast<int>(g() % 2);
     SimilarityTransform to;
     to.rotation = test::randomRotation(g);

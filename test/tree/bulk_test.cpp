@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: BSD-3-Clause
-// Bulk building: what the bytes of a loose frame hold, and that no triangle is lost, on its own and in a tree.
+// Bulk building: no triangle is lost, on its own and in a tree.
 #include "tree/bulk.h"
 
 #include <gtest/gtest.h>
@@ -14,8 +14,6 @@
 namespace bocst::tree {
 namespace {
 
-using bounds::LooseBounds;
-using bounds::LooseFrame;
 using Random = std::mt19937_64;
 
 double uniform(Random& g, double lo, double hi) { return std::uniform_real_distribution<double>(lo, hi)(g); }
@@ -27,75 +25,6 @@ void randomBox(Random& g, double (&lo)[3], double (&hi)[3]) {
     lo[k] = uniform(g, 0, 65536 - extent);
     hi[k] = lo[k] + (g() % 8 == 0 ? 0 : extent);
   }
-}
-
-TEST(LooseFrame, PacksIntoFiftyFiveBits) {
-  Random g(1);
-  for (int i = 0; i < 100000; ++i) {
-    double lo[3], hi[3];
-    randomBox(g, lo, hi);
-    const LooseFrame f = LooseFrame::of(lo, hi), back = LooseFrame::unpack(f.pack());
-    ASSERT_EQ(f.pack() >> 55, 0u);
-    ASSERT_EQ(back.exponent, f.exponent);
-    for (int k = 0; k < 3; ++k) {
-      ASSERT_EQ(back.origin[k], f.origin[k]);
-      ASSERT_EQ(back.thin[k], f.thin[k]);
-    }
-  }
-}
-
-TEST(LooseFrame, AllFramesComeBackFromTheirBits) {
-  for (int exponent = LooseFrame::kLeastExponent; exponent <= LooseFrame::kMostExponent; ++exponent) {
-    for (unsigned thin = 0; thin < 64; ++thin) {
-      LooseFrame f;
-      f.exponent = static_cast<std::uint8_t>(exponent);
-      for (int k = 0; k < 3; ++k) {
-        f.thin[k] = static_cast<std::uint8_t>(thin >> 2 * k & 3);
-        f.origin[k] = static_cast<std::uint16_t>(65534u >> k & ~1u);
-      }
-      EXPECT_EQ(LooseFrame::unpack(f.pack()).pack(), f.pack());
-    }
-  }
-}
-
-TEST(LooseFrame, BoxesAreHeldAndHardlyLarger) {
-  Random g(2);
-  for (int i = 0; i < 100000; ++i) {
-    double lo[3], hi[3];
-    randomBox(g, lo, hi);
-    const LooseFrame f = LooseFrame::of(lo, hi);
-    LooseBounds b;
-    b.setBox(f, lo, hi);
-    for (std::size_t k = 0; k < 3; ++k) {
-      const double byte = f.side(k) / 255;
-      ASSERT_LE(f.origin[k] + b.lo[k] * byte, lo[k]);
-      ASSERT_GE(f.origin[k] + b.hi[k] * byte, hi[k]);
-      const double most = 1.01 * byte + 2 * LooseFrame::kMargin;
-      ASSERT_LE(lo[k] - (f.origin[k] + b.lo[k] * byte), most);
-      ASSERT_LE(f.origin[k] + b.hi[k] * byte - hi[k], most);
-    }
-  }
-}
-
-TEST(LooseFrame, SlabsHoldTheirIntervals) {
-  Random g(3);
-  int kept = 0;
-  for (int i = 0; i < 100000; ++i) {
-    double lo[3], hi[3];
-    randomBox(g, lo, hi);
-    const LooseFrame f = LooseFrame::of(lo, hi);
-    LooseBounds b;
-    b.setBox(f, lo, hi);
-    const std::int8_t n[3] = {100, -70, 30};
-    const double least = uniform(g, -0.6, 0.4) * f.longest(), most = least + uniform(g, 0, 0.7) * f.longest();
-    b.setSlab(f, n, least, most);
-    if (b.normal[0] == 0) continue;
-    ++kept;
-    const double at = b.slab_center * f.longest() / 256, half = b.slab_half * f.longest() / 512;
-    ASSERT_LE(at - half, least);
-    ASSERT_GE(at + half, most);
-  }
-  EXPECT_GT(kept, 30000);
 }
 
 oracle::Surface surfaceOf(const std::shared_ptr<const Mesh>& mesh) {
@@ -157,7 +86,7 @@ void expectBounds(const BulkBuilder& bulk, const oracle::Surface& s, const Eigen
       below(bulk, n, o, ids);
       ASSERT_FALSE(ids.empty());
       ASSERT_EQ(block.lane[o].block == BulkBuilder::kNone, ids.size() <= kMaxLeafTriangles);
-      const LooseBounds& b = block.bounds[o];
+      const bounds::NodeBounds& b = block.bounds[o];
       for (const std::uint32_t t : ids) {
         for (int k = 0; k < 3; ++k) {
           const Eigen::Vector3d p = s.corner(t, k);
@@ -167,7 +96,7 @@ void expectBounds(const BulkBuilder& bulk, const oracle::Surface& s, const Eigen
             const double byte = block.frame.side(c) / 255, x = p[static_cast<int>(c)];
             ASSERT_LE(block.frame.origin[c] + b.lo[c] * byte, x);
             ASSERT_GE(block.frame.origin[c] + b.hi[c] * byte, x);
-            along += b.normal[c] / 127.0 * (x - b.middle(block.frame, c));
+            along += b.normal[c] / 127.0 * (x - block.frame.middle(b, c));
           }
           const double unit = block.frame.longest() / 512;
           ASSERT_LE(std::abs(along - b.slab_center * 2 * unit), b.slab_half * unit);

@@ -363,7 +363,7 @@ TEST(Tree, BoundsHoldTheSurfaceHoweverTheyWereLearnt) {
     int loose = 0;
     for (const Modeld* model : {&a, &b}) {
       const tree::Tree& tree = model->tree();
-      const auto contains = [](const oracle::CellBounds& bounds, const lattice::Cell& cell, const Eigen::Vector3d& p) {
+      const auto contains = [](const bounds::NodeBounds& bounds, const lattice::Cell& cell, const Eigen::Vector3d& p) {
         constexpr double kRounding = 1e-9;  // of p, in lattice units; bounds are rounded outwards
         double along = 0;
         for (std::size_t k = 0; k < 3; ++k) {
@@ -372,7 +372,7 @@ TEST(Tree, BoundsHoldTheSurfaceHoweverTheyWereLearnt) {
           along += bounds.normal[k] * (x / cell.side() - 0.5);
         }
         return std::abs(along - bounds.slab_center) <= bounds.slab_half / 2.0 + 400 * kRounding / cell.side() ||
-               bounds.normal == oracle::CellBounds().normal;
+               bounds.normal == bounds::NodeBounds().normal;
       };
       for (int i = 0; i < 20000; ++i) {
         // A point of the surface, and the way down to it.
@@ -414,9 +414,9 @@ TEST(Tree, BoundsHoldTheSurfaceHoweverTheyWereLearnt) {
           for (int k = 0; k < 3; ++k) o |= (p[k] >= cell.corner()[static_cast<std::size_t>(k)] + cell.side() / 2) << k;
           ASSERT_TRUE(block.grey >> o & 1);
           cell = cell.octant(o);
-          const oracle::CellBounds bounds = block.octants.get(o);
+          const bounds::NodeBounds bounds = block.octants.get(o);
           ASSERT_TRUE(contains(bounds, cell, p)) << "level " << cell.level;
-          slabs[cell.level] += bounds.normal != oracle::CellBounds().normal;
+          slabs[cell.level] += bounds.normal != bounds::NodeBounds().normal;
           ref = block.child[o].load();
         }
       }

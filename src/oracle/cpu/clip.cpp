@@ -58,8 +58,8 @@ void OctantAccumulator::extremesAlong(const LocalPoint& normal, float& lo, float
   hi = std::max(hi, along.maxCoeff());
 }
 
-CellBounds OctantAccumulator::bounds(const OctantAccumulator* const* parts, std::size_t count,
-                                     const Eigen::Vector3d& center, double side) {
+bounds::NodeBounds OctantAccumulator::bounds(const OctantAccumulator* const* parts, std::size_t count,
+                                             const bounds::CellFrame& frame) {
   LocalPoint lo = parts[0]->lo_, hi = parts[0]->hi_, area = parts[0]->area_;
   bool slab = parts[0]->slab_;
   for (std::size_t i = 1; i < count; ++i) {
@@ -68,33 +68,21 @@ CellBounds OctantAccumulator::bounds(const OctantAccumulator* const* parts, std:
     slab = slab && parts[i]->slab_;
     area += area.dot(parts[i]->area_) < 0 ? LocalPoint(-parts[i]->area_) : parts[i]->area_;
   }
-  CellBounds b;
-  const double scale = 255 / side, margin = 2 * kClipMargin;
-  // What is clamped is not negative, so to truncate is to round down.
-  const auto byte = [](double x) { return static_cast<int>(std::min(std::max(x, 0.0), 255.0)); };
-  for (int k = 0; k < 3; ++k) {
-    const double corner = center[k] - side / 2;
-    b.lo[static_cast<std::size_t>(k)] = static_cast<std::uint8_t>(byte((lo[k] - margin - corner) * scale));
-    b.hi[static_cast<std::size_t>(k)] = static_cast<std::uint8_t>(255 - byte(255 - (hi[k] + margin - corner) * scale));
-  }
-  const float length = area.norm();
-  if (!slab || !(length > 0)) return b;
-  LocalPoint n = LocalPoint::Zero();
-  for (int k = 0; k < 3; ++k) n[k] = std::round(area[k] / length * 127);
+  bounds::NodeBounds b;
+  constexpr double kMargin = 2 * kClipMargin;
+  for (int k = 0; k < 3; ++k) frame.encodeBox(static_cast<std::size_t>(k), lo[k] - kMargin, hi[k] + kMargin, b);
+  std::int8_t normal[3];
+  if (!slab || !bounds::encodeNormal(area[0], area[1], area[2], normal)) return b;
+  const LocalPoint n(normal[0], normal[1], normal[2], 0);
   float least = std::numeric_limits<float>::infinity(), most = -least;
   for (std::size_t i = 0; i < count; ++i) parts[i]->extremesAlong(n, least, most);
   // Corners are within half the margin on each axis; their sums in float: at most 8 roundings of values below
-  // 3 * 127 * size.
+  // kMostNormalNorm1 * size.
   const double size = std::max(lo.head<3>().cwiseAbs().maxCoeff(), hi.head<3>().cwiseAbs().maxCoeff());
-  const double round = 8 * 0x1p-24 * 3 * 127 * size + n.head<3>().lpNorm<1>() * kClipMargin;
-  const double middle_of_cell = n.head<3>().cast<double>().dot(center);
-  const double below = (least - middle_of_cell - round) / side, above = (most - middle_of_cell + round) / side;
-  const double middle = std::round((below + above) / 2);
-  const double half = std::ceil(2 * std::max(above - middle, middle - below));
-  if (!(half <= 255) || !(std::abs(middle) <= 127)) return b;
-  for (int k = 0; k < 3; ++k) b.normal[static_cast<std::size_t>(k)] = static_cast<std::int8_t>(n[k]);
-  b.slab_center = static_cast<std::int8_t>(middle);
-  b.slab_half = static_cast<std::uint8_t>(half);
+  const double round = 8 * 0x1p-24 * bounds::kMostNormalNorm1 * size + n.head<3>().lpNorm<1>() * kClipMargin;
+  double middle = 0;
+  for (std::size_t k = 0; k < 3; ++k) middle += normal[k] * frame.middle(k);
+  frame.encodeSlab(normal, least - middle - round, most - middle + round, b);
   return b;
 }
 

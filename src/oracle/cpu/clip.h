@@ -8,6 +8,7 @@
 #include <cstdint>
 #include <vector>
 
+#include "bounds/cell_frame.h"
 #include "oracle/oracle.h"
 
 namespace bocst::oracle {
@@ -50,9 +51,9 @@ class OctantAccumulator {
   /// A part of the surface whose clipped form is not known beyond this box.
   void addBox(const LocalPoint& lo, const LocalPoint& hi);
 
-  /// The bounds of all that the accumulators have seen, in a cell of the given centre and side.
-  static CellBounds bounds(const OctantAccumulator* const* parts, std::size_t count, const Eigen::Vector3d& center,
-                           double side);
+  /// The bounds of all that the accumulators have seen, in a cell.
+  static bounds::NodeBounds bounds(const OctantAccumulator* const* parts, std::size_t count,
+                                   const bounds::CellFrame& frame);
 
  private:
   void extremesAlong(const LocalPoint& normal, float& lo, float& hi) const;

@@ -62,6 +62,10 @@ class Expander {
     return LocalPoint::Map(kCenters[o]);
   }
 
+  static bounds::CellFrame localOctant(int o) {
+    return {{o & 1 ? 0.0 : -1.0, o & 2 ? 0.0 : -1.0, o & 4 ? 0.0 : -1.0}, 1};
+  }
+
   static bool allUpTo(float most, const LocalPoint& p) { return p[0] <= most && p[1] <= most && p[2] <= most; }
 
   void block(std::size_t begin, std::size_t count) {
@@ -172,10 +176,10 @@ class Expander {
     for (int o = 0; o < 8; ++o) {
       if ((proven_ >> o & 1) == 0) continue;
       grey[count] = &s_.octants[o];
-      if (!e_.own_only) e_.octants.set(o, OctantAccumulator::bounds(&grey[count], 1, octantCenter(o, 0.5), 1));
+      if (!e_.own_only) e_.octants.set(o, OctantAccumulator::bounds(&grey[count], 1, localOctant(o)));
       ++count;
     }
-    if (count != 0) e_.own = OctantAccumulator::bounds(grey.data(), count, Eigen::Vector3d::Zero(), 2);
+    if (count != 0) e_.own = OctantAccumulator::bounds(grey.data(), count, {{-1, -1, -1}, 2});
   }
 
   ExpansionRequest& e_;

@@ -7,24 +7,19 @@
 #include <cstring>
 #include <string>
 
+#include "oracle/gl/layout.h"
 #include "oracle/gl/shaders.h"
 
 namespace bocst::oracle::gl {
 namespace {
 
-// The layout that the shaders share (shaders/common.glsl).
-constexpr std::uint32_t kGroup = 128;
-constexpr std::uint32_t kImplicit = 0xffffffffu;
-constexpr std::size_t kStateWords = 18 + 8 * 15;
-constexpr std::size_t kHeader = 2, kRow = 35, kRowSizes = 25, kRowList = 33, kRowIds = 34;
-constexpr std::size_t kBoundsBytes = 100;
-static_assert(sizeof(OctantBounds) + sizeof(CellBounds) + 1 == kBoundsBytes);
+using namespace layout;
 
 constexpr std::size_t kWord = sizeof(std::uint32_t);
 constexpr std::uint64_t kMostGroups = 1 << 15;  // in one dimension; 65535 is the least that drivers must allow
 
 std::string source(const std::string& name, bool clips) {
-  return "#version 430 core\n" + shader("common") + (clips ? shader("clip") : "") + shader(name);
+  return "#version 430 core\n" + constants() + shader("common") + (clips ? shader("clip") : "") + shader(name);
 }
 
 const DeviceMesh* meshOf(const ExpansionRequest& e) { return static_cast<const DeviceMesh*>(e.surface->device.get()); }
@@ -98,7 +93,7 @@ void ComputeChain::upload(const std::vector<ExpansionRequest*>& requests) {
     for (std::size_t k = 0; k < 3; ++k) row.center[k] = static_cast<float>(e.cell.corner()[k] + half);
     row.half_side = static_cast<float>(half);
     row.first_pair = pairs;
-    row.list = kImplicit;
+    row.list = kAll;
     if (e.ids != nullptr) {
       row.list = uploaded_->begin() + narrow(ids.size());
       ids.insert(ids.end(), e.ids, e.ids + e.count);
@@ -170,11 +165,11 @@ void ComputeChain::readBack(const std::vector<ExpansionRequest*>& requests) {
   for (std::size_t i = 0; i < requests.size(); ++i) {
     ExpansionRequest& e = *requests[i];
     const std::uint32_t* row = &words_[kHeader + i * kRow];
-    unsigned char bytes[kBoundsBytes];
-    std::memcpy(bytes, row, sizeof(bytes));
-    std::memcpy(&e.octants, bytes, sizeof(e.octants));
-    std::memcpy(&e.own, bytes + sizeof(e.octants), sizeof(e.own));
-    e.grey = bytes[kBoundsBytes - 1];
+    CellAnswer answer;
+    std::memcpy(static_cast<void*>(&answer), row, sizeof(answer));
+    e.octants = answer.octants;
+    e.own = answer.own;
+    e.grey = answer.grey;
     const std::uint32_t* ids = &words_[kHeader + requests.size() * kRow] + row[kRowIds];
     std::uint32_t list = row[kRowList];
     e.lists.clear();
@@ -229,20 +224,20 @@ void ComputeChain::answer(const std::vector<ExpansionRequest*>& requests, Thread
     answers_.read(first * kWord, (end - first) * kWord, words_.data() + first);
   };
   readFrom(0, read);
-  if (words_[0] > list_capacity_ || words_[1] > id_capacity_) {
-    list_capacity_ = words_[0];
-    id_capacity_ = words_[1];
+  if (words_[kListWords] > list_capacity_ || words_[kIdWords] > id_capacity_) {
+    list_capacity_ = words_[kListWords];
+    id_capacity_ = words_[kIdWords];
     placed_ = nullptr;
     placed_ = arena_.take(list_capacity_);
     placeAndFill();
     read = 0;
   }
-  const std::size_t all = fixed + (read == 0 ? id_capacity_ : words_[1]);
+  const std::size_t all = fixed + (read == 0 ? id_capacity_ : words_[kIdWords]);
   if (all > read) readFrom(read, all);
   const GLenum error = glGetError();
   thread.checkReset();
   if (error != GL_NO_ERROR) throw OracleError("OpenGL error " + std::to_string(error));
-  placed_->trim(words_[0]);
+  placed_->trim(words_[kListWords]);
   readBack(requests);
   std::array<GLuint64, 3> times{};
   for (std::size_t i = 0; i < times.size(); ++i) glGetQueryObjectui64v(times_[i], GL_QUERY_RESULT, &times[i]);

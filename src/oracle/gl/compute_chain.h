@@ -11,7 +11,7 @@
 
 namespace bocst::oracle::gl {
 
-/// The programs and tables of one compute chain (shaders/common.glsl has their layout). In the thread of the context.
+/// The programs and tables of one compute chain (layout.h). In the thread of the context.
 class ComputeChain {
  public:
   /// What one chain may hold; tests make it small.

@@ -108,7 +108,7 @@ PairSteps::Event nextEvent(PairSteps& steps);
 /// The octants of a cell, wherever they come from.
 struct CellOctants {
   lattice::Cell cell;
-  oracle::OctantBounds octants;
+  bounds::OctantBounds octants;
 };
 
 /// What a step computes, by itself: bit o is set unless octant o of a cell of side `own` is surely apart from octant

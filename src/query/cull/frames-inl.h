@@ -7,6 +7,7 @@
 #define BOCST_QUERY_FRAMES_INL_H
 #endif
 
+#include "bounds/decode-inl.h"
 #include "query/cull/frames.h"
 #include "simd/octants-inl.h"
 #include "tree/block.h"
@@ -14,9 +15,11 @@
 HWY_BEFORE_NAMESPACE();
 namespace bocst::query::HWY_NAMESPACE {
 
-// Writes what the other side sees of some lanes.
-HWY_INLINE void turnLanes(const PairFrames::Side& g, const V (&c)[3], const V (&h)[3], const V (&n)[3], std::size_t i,
-                          Frame& f) {
+namespace codec = bounds::HWY_NAMESPACE;
+
+// Writes some lanes, and what the other side sees of them.
+HWY_INLINE void storeLanes(const PairFrames::Side& g, const V (&c)[3], const V (&h)[3], const V (&n)[3], V slab_center,
+                           V slab_half, std::size_t i, Frame& f) {
   const D d;
   BOCST_UNROLL
   for (int j = 0; j < 3; ++j) {
@@ -28,76 +31,67 @@ HWY_INLINE void turnLanes(const PairFrames::Side& g, const V (&c)[3], const V (&
       nj = hn::MulAdd(r, n[k], nj);
       hj = hn::MulAdd(hn::Set(d, g.abs_to_other[j][k]), h[k], hj);
     }
+    hn::Store(c[j], d, f.center[0][j] + i);
+    hn::Store(h[j], d, f.half[0][j] + i);
+    hn::Store(n[j], d, f.normal[0][j] + i);
     hn::Store(cj, d, f.center[1][j] + i);
     hn::Store(hj, d, f.half[1][j] + i);
     hn::Store(nj, d, f.normal[1][j] + i);
   }
+  hn::Store(slab_center, d, f.slab_center + i);
+  hn::Store(slab_half, d, f.slab_half + i);
 }
 
 // Writes the volumes of eight octants of sides `length`, of which the first has its corner at `corner`, in such sides,
 // from the middle of the root.
-HWY_INLINE void decode(const PairFrames::Side& g, const oracle::OctantBounds& octants, const float (&corner)[3],
+HWY_INLINE void decode(const PairFrames::Side& g, const bounds::OctantBounds& octants, const float (&corner)[3],
                        float length, Frame& f) {
   const D d;
-  const V byte = hn::Set(d, length * (1.0f / 510)), side = hn::Set(d, length), half_side = hn::Set(d, 0.5f * length);
-  const V per127 = hn::Set(d, 1.0f / 127);
+  const V half_step = hn::Set(d, codec::halfStep(length)), side = hn::Set(d, length),
+          half_side = hn::Set(d, -0.5f * length);
   for (std::size_t i = 0; i < 8; i += hn::Lanes(d)) {
-    V c[3], h[3], n[3];
-    V offset = hn::Mul(fromBytes(d, octants.slab_center + i), hn::Set(d, length * (1.0f / 127)));
+    V c[3], h[3], n[3], offset, slab_half;
+    codec::decodeSlab(octants, i, codec::cellSlabUnit(length), offset, slab_half);
     BOCST_UNROLL
     for (int k = 0; k < 3; ++k) {
-      const V lo = fromBytes(d, octants.lo[k] + i), hi = fromBytes(d, octants.hi[k] + i);
-      const V from_middle = hn::MulSub(hn::Add(lo, hi), byte, half_side);
+      V from_middle;
+      codec::decodeBox(octants, k, i, half_side, half_step, from_middle, h[k]);
       const V middle = hn::Add(hn::Set(d, corner[k] + 0.5f), hn::Load(d, kOctantCorner[k] + i));
       c[k] = hn::MulAdd(middle, side, from_middle);
-      h[k] = hn::Mul(hn::Sub(hi, lo), byte);
-      n[k] = hn::Mul(fromBytes(d, octants.normal[k] + i), per127);
+      n[k] = codec::decodeNormal(octants, k, i);
       // The slab is given from the octant's middle and wanted from its box's.
       offset = hn::NegMulAdd(n[k], from_middle, offset);
-      hn::Store(c[k], d, f.center[0][k] + i);
-      hn::Store(h[k], d, f.half[0][k] + i);
-      hn::Store(n[k], d, f.normal[0][k] + i);
     }
-    hn::Store(offset, d, f.slab_center + i);
-    hn::Store(hn::Mul(fromBytes(d, octants.slab_half + i), hn::Set(d, length * (1.0f / 254))), d, f.slab_half + i);
-    turnLanes(g, c, h, n, i, f);
+    storeLanes(g, c, h, n, offset, slab_half, i, f);
   }
 }
 
 // Writes the volumes of a loose block. Whole numbers and powers of two are exact: a middle is off by 8 u Q.
 HWY_INLINE void decodeLoose(const PairFrames::Side& g, const bounds::LooseFrame& frame,
-                            const oracle::OctantBounds& octants, Frame& f) {
+                            const bounds::OctantBounds& octants, Frame& f) {
   const D d;
-  const float longest = static_cast<float>(frame.longest()) * g.unit;
-  const V per127 = hn::Set(d, 1.0f / 127), slab = hn::Set(d, longest * (1.0f / 256));
-  const V slab_half = hn::Set(d, longest * (1.0f / 512));
-  V base[3], byte[3];
+  const float slab_unit = codec::looseSlabUnit(static_cast<float>(frame.longest()) * g.unit);
+  V corner[3], half_step[3];
   BOCST_UNROLL
   for (std::size_t k = 0; k < 3; ++k) {
-    base[k] = hn::Set(d, static_cast<float>(frame.origin[k] - lattice::kMiddle) * g.unit);
-    byte[k] = hn::Set(d, static_cast<float>(frame.side(k)) * g.unit * (1.0f / 510));
+    corner[k] = hn::Set(d, static_cast<float>(frame.origin[k] - lattice::kMiddle) * g.unit);
+    half_step[k] = hn::Set(d, codec::halfStep(static_cast<float>(frame.side(k)) * g.unit));
   }
   for (std::size_t i = 0; i < 8; i += hn::Lanes(d)) {
-    V c[3], h[3], n[3];
+    V c[3], h[3], n[3], slab_center, slab_half;
     BOCST_UNROLL
     for (int k = 0; k < 3; ++k) {
-      const V lo = fromBytes(d, octants.lo[k] + i), hi = fromBytes(d, octants.hi[k] + i);
-      c[k] = hn::MulAdd(hn::Add(lo, hi), byte[k], base[k]);
-      h[k] = hn::Mul(hn::Sub(hi, lo), byte[k]);
-      n[k] = hn::Mul(fromBytes(d, octants.normal[k] + i), per127);
-      hn::Store(c[k], d, f.center[0][k] + i);
-      hn::Store(h[k], d, f.half[0][k] + i);
-      hn::Store(n[k], d, f.normal[0][k] + i);
+      codec::decodeBox(octants, k, i, corner[k], half_step[k], c[k], h[k]);
+      n[k] = codec::decodeNormal(octants, k, i);
     }
-    hn::Store(hn::Mul(fromBytes(d, octants.slab_center + i), slab), d, f.slab_center + i);
-    hn::Store(hn::Mul(fromBytes(d, octants.slab_half + i), slab_half), d, f.slab_half + i);
-    turnLanes(g, c, h, n, i, f);
+    codec::decodeSlab(octants, i, slab_unit, slab_center, slab_half);
+    storeLanes(g, c, h, n, slab_center, slab_half, i, f);
   }
 }
 
 template <typename Position>
 HWY_INLINE void decodeCell(const PairFrames& g, int own, int level, const Position& at,
-                           const oracle::OctantBounds& octants, Frame& f) {
+                           const bounds::OctantBounds& octants, Frame& f) {
   const int middle = 1 << (level - 1);
   float corner[3];
   BOCST_UNROLL
@@ -114,9 +108,9 @@ HWY_INLINE void decodeBlock(const PairFrames& g, int own, const tree::Block& blo
   }
 }
 
-HWY_INLINE void decodeRoot(const PairFrames& g, int own, const oracle::CellBounds& bounds, Frame& f) {
-  oracle::OctantBounds root;
-  root.set(0, bounds);
+HWY_INLINE void decodeRoot(const PairFrames& g, int own, const bounds::NodeBounds& bounds, Frame& f) {
+  bounds::OctantBounds root;
+  root.fill(bounds);
   const float corner[3] = {-0.5f, -0.5f, -0.5f};
   decode(g.side[own], root, corner, 2 * static_cast<float>(lattice::kMiddle) * g.side[own].unit, f);
 }

@@ -16,7 +16,7 @@ void FillFrame(const PairFrames& geometry, int own, const tree::Block& block, Fr
   decodeBlock(geometry, own, block, frame);
 }
 
-void FillRootFrame(const PairFrames& geometry, int own, const oracle::CellBounds& root, Frame& frame) {
+void FillRootFrame(const PairFrames& geometry, int own, const bounds::NodeBounds& root, Frame& frame) {
   decodeRoot(geometry, own, root, frame);
 }
 
@@ -262,7 +262,7 @@ void fillFrame(const PairFrames& geometry, int own, const tree::Block& block, Fr
   HWY_DYNAMIC_DISPATCH(FillFrame)(geometry, own, block, frame);
 }
 
-void fillFrame(const PairFrames& geometry, int own, const oracle::CellBounds& root, Frame& frame) {
+void fillFrame(const PairFrames& geometry, int own, const bounds::NodeBounds& root, Frame& frame) {
   HWY_DYNAMIC_DISPATCH(FillRootFrame)(geometry, own, root, frame);
 }
 

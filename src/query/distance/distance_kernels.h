@@ -15,7 +15,7 @@ namespace bocst::query {
 /// Fills the frame with the octants of a block of side `own`.
 void fillFrame(const PairFrames& geometry, int own, const tree::Block& block, Frame& frame);
 /// Fills lane 0 of the frame with the root of side `own`.
-void fillFrame(const PairFrames& geometry, int own, const oracle::CellBounds& root, Frame& frame);
+void fillFrame(const PairFrames& geometry, int own, const bounds::NodeBounds& root, Frame& frame);
 
 /// A direction in the frames of both sides, of unit length or zero.
 struct FrameDirection {

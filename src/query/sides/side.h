@@ -57,18 +57,10 @@ class TreeSide {
   }
 
   Volume volume(Node node) const {
-    if (node.isRoot()) {
-      const oracle::CellBounds& b = tree_.rootBounds();
-      return decode(b.lo[0], b.lo[1], b.lo[2], b.hi[0], b.hi[1], b.hi[2], b.normal[0], b.normal[1], b.normal[2],
-                    b.slab_center, b.slab_half, 0, 0, 0, 1);
-    }
+    if (node.isRoot()) return tree::frameOf(lattice::Cell{}).decode(tree_.rootBounds());
     const tree::Block& parent = tree_.block(node.block());
-    if (parent.isLoose()) return looseVolume(parent, node.octant());
-    const oracle::OctantBounds& b = parent.octants;
-    const int o = node.octant();
-    return decode(b.lo[0][o], b.lo[1][o], b.lo[2][o], b.hi[0][o], b.hi[1][o], b.hi[2][o], b.normal[0][o],
-                  b.normal[1][o], b.normal[2][o], b.slab_center[o], b.slab_half[o], 2 * parent.at[0] + (o & 1),
-                  2 * parent.at[1] + (o >> 1 & 1), 2 * parent.at[2] + (o >> 2 & 1), parent.shape + 1);
+    const bounds::NodeBounds b = parent.octants.get(static_cast<std::size_t>(node.octant()));
+    return parent.isLoose() ? parent.frame().decode(b) : parent.octantFrame(node.octant()).decode(b);
   }
 
   /// Bounds the surface below a node, and the spheres of all cells below it: a cube's sphere holds those of its parts;
@@ -195,44 +187,6 @@ class TreeSide {
       }
     }
     for (; resident != 0; resident &= resident - 1) f(Node::octant(index, __builtin_ctz(resident)));
-  }
-
-  // Spelled out, one scalar each: this is the hottest code of a query after the pair test itself.
-  static Volume decode(int lo0, int lo1, int lo2, int hi0, int hi1, int hi2, int n0, int n1, int n2, int slab_center,
-                       int slab_half, int x, int y, int z, int level) {
-    const int cells = 1 << (lattice::kMaxLevel - level);
-    // Positions in double: beside a much smaller node, a rounding relative to this cell would be large.
-    const double side = cells, byte = side * (0.5 / 255), normal = 1.0 / 127, middle = side / 2;
-    const double c0 = (lo0 + hi0) * byte, c1 = (lo1 + hi1) * byte, c2 = (lo2 + hi2) * byte;
-    Volume v;
-    v.half[0] = static_cast<float>((hi0 - lo0) * byte);
-    v.half[1] = static_cast<float>((hi1 - lo1) * byte);
-    v.half[2] = static_cast<float>((hi2 - lo2) * byte);
-    v.center[0] = x * side + c0;
-    v.center[1] = y * side + c1;
-    v.center[2] = z * side + c2;
-    v.normal[0] = static_cast<float>(n0 * normal);
-    v.normal[1] = static_cast<float>(n1 * normal);
-    v.normal[2] = static_cast<float>(n2 * normal);
-    v.slab_offset = static_cast<float>(
-        (slab_center * side - (n0 * (c0 - middle) + n1 * (c1 - middle) + n2 * (c2 - middle))) * normal);
-    v.slab_half = static_cast<float>(slab_half * (side * normal / 2));
-    return v;
-  }
-
-  static Volume looseVolume(const tree::Block& block, int o) {
-    const bounds::LooseFrame frame = block.frame();
-    const oracle::OctantBounds& b = block.octants;
-    Volume v;
-    for (std::size_t k = 0; k < 3; ++k) {
-      const double byte = frame.side(k) / 510;
-      v.half[k] = static_cast<float>((b.hi[k][o] - b.lo[k][o]) * byte);
-      v.center[k] = frame.origin[k] + (b.lo[k][o] + b.hi[k][o]) * byte;
-      v.normal[k] = static_cast<float>(b.normal[k][o] * (1.0 / 127));
-    }
-    v.slab_offset = static_cast<float>(b.slab_center[o] * (frame.longest() / 256));
-    v.slab_half = static_cast<float>(b.slab_half[o] * (frame.longest() / 512));
-    return v;
   }
 
   static Sphere sphereAbout(const Volume& v) {

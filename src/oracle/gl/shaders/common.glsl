@@ -2,11 +2,10 @@
 //
 // A *pair* is a triangle and a cell to expand whose list it is on. Pairs are numbered through the whole batch, cell by
 // cell; an invocation works on one pair, so lanes stay busy however short the lists are.
+//
+// The constants of the tables (States, Answers) and of the bytes of bounds stand before this text: see oracle/gl/layout.h.
 
-#define GROUP 128
 layout(local_size_x = GROUP) in;
-
-const uint kAll = 0xffffffffu;  // as a list: the triangles of the mesh, in order
 
 struct Cell {
   vec3 center;      // in lattice units
@@ -17,30 +16,7 @@ struct Cell {
   uint ids_up_to;   // longer lists are not wanted by the host
 };
 
-// Per cell, in words. Maxima of values that are never negative start at 0, so a cleared table is an empty one.
-const uint kGrey = 0u;     // octants that a triangle surely meets
-const uint kLoose = 1u;    // octants with a part that only its box bounds: no slab
-const uint kCounts = 2u;   // 8: lengths of the octants' lists
-const uint kNext = 10u;    // 8: where the next triangle of each list goes
-const uint kOctants = 18u; // 8 times kOctantWords
-const uint kOctantWords = 15u;
-const uint kBox = 0u;      // 3 times 255 - lo, 3 times hi, in 1/255 of the octant's side
-const uint kTensor = 6u;   // sum of area * normal * normal^T: xx yy zz xy yz zx, as fixed point
-const uint kNormal = 12u;  // the slab's, in bytes
-const uint kSlab = 13u;    // how far the surface reaches along -normal and normal, as fixed point
-const uint kStateWords = kOctants + 8u * kOctantWords;
-
 const uint kSlabTriangles = 4096u;  // longer lists belong to cells whose slabs cull nothing
-
-// The answer: a header, a row per cell, then the ids of lists that the host wants.
-const uint kListWords = 0u;  // header: words taken from the room for lists
-const uint kIdWords = 1u;    // words taken from the room for ids
-const uint kHeader = 2u;
-const uint kRowBounds = 0u;  // 100 bytes: OctantBounds, own CellBounds, grey
-const uint kRowSizes = 25u;
-const uint kRowList = 33u;   // where octant 0's list begins; the others follow
-const uint kRowIds = 34u;    // where the ids begin, likewise
-const uint kRow = 35u;
 
 layout(std430, binding = 0) readonly buffer Vertices { float vertices[]; };  // 3 x high, 3 x low part
 layout(std430, binding = 1) readonly buffer Indices { uint indices[]; };

@@ -34,11 +34,12 @@ void addPart(bool together, uint cell, int o, vec3 v[3]) {
     hi = clamp(max(max(v[0], v[1]), v[2]), center - 0.5, center + 0.5);
     atomicOr(states[state(cell, kLoose)], 1u << o);
   }
+  const float kSteps = float(kBoxSteps);
   // 1e-3 of a byte covers the rounding of the product.
-  vec3 first = clamp(floor((lo - margin - (center - 0.5)) * 255.0 - 1e-3), 0.0, 255.0);
-  vec3 last = clamp(ceil((hi + margin - (center - 0.5)) * 255.0 + 1e-3), 0.0, 255.0);
+  vec3 first = clamp(floor((lo - margin - (center - 0.5)) * kSteps - 1e-3), 0.0, kSteps);
+  vec3 last = clamp(ceil((hi + margin - (center - 0.5)) * kSteps + 1e-3), 0.0, kSteps);
   for (uint k = 0u; k < 3u; ++k) {
-    addBox(together, cell, o, k, uint(255.0 - first[k]));
+    addBox(together, cell, o, k, uint(kSteps - first[k]));
     addBox(together, cell, o, 3u + k, uint(last[k]));
   }
   if (sizeOf(cell, o) > kSlabTriangles) return;

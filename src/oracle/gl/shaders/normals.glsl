@@ -50,7 +50,7 @@ void main() {
   if (dot(m[2], m[2]) > dot(n, n)) n = m[2];
   float size = length(n);
   if (!(size > 0.0)) return;
-  ivec3 bytes = ivec3(round(n / size * 127.0));
+  ivec3 bytes = ivec3(round(n / size * float(kNormalLength)));
   states[octantState(cell, o, kNormal)] =
       uint(bytes.x & 0xff) | uint(bytes.y & 0xff) << 8 | uint(bytes.z & 0xff) << 16;
 }

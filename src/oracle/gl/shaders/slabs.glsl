@@ -26,10 +26,10 @@ void main() {
       lo = min(lo, t);
       hi = max(hi, t);
     }
-    float tolerance = 3.0 * 127.0 * margin;
-    // |t| <= 127 * sqrt(3) / 2 and a little: 512 keeps it positive, and 2^13 within float's 24 bits.
-    uint below = uint(clamp(ceil((512.0 - lo + tolerance) * 8192.0) + 1.0, 0.0, 8388608.0));
-    uint above = uint(clamp(ceil((512.0 + hi + tolerance) * 8192.0) + 1.0, 0.0, 8388608.0));
+    float tolerance = float(kMostNormalNorm1) * margin;
+    const float shift = float(kSlabShift), scale = float(kSlabScale), most = 2.0 * shift * scale;
+    uint below = uint(clamp(ceil((shift - lo + tolerance) * scale) + 1.0, 0.0, most));
+    uint above = uint(clamp(ceil((shift + hi + tolerance) * scale) + 1.0, 0.0, most));
     atomicMax(states[octantState(cell, o, kSlab)], below);
     atomicMax(states[octantState(cell, o, kSlab + 1u)], above);
   }

@@ -1,0 +1,66 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#include "oracle/gl/layout.h"
+
+namespace bocst::oracle::gl::layout {
+namespace {
+
+struct Constant {
+  const char* name;
+  std::uint32_t value;
+};
+
+using namespace bounds;
+#define BOCST_NAMED(name) \
+  { #name, static_cast < std::uint32_t>(name) }
+constexpr Constant kConstants[] = {
+    BOCST_NAMED(kAll),
+    BOCST_NAMED(kGrey),
+    BOCST_NAMED(kLoose),
+    BOCST_NAMED(kCounts),
+    BOCST_NAMED(kNext),
+    BOCST_NAMED(kOctants),
+    BOCST_NAMED(kBox),
+    BOCST_NAMED(kTensor),
+    BOCST_NAMED(kNormal),
+    BOCST_NAMED(kSlab),
+    BOCST_NAMED(kOctantWords),
+    BOCST_NAMED(kStateWords),
+    BOCST_NAMED(kSlabShift),
+    BOCST_NAMED(kSlabScale),
+    BOCST_NAMED(kLoBytes),
+    BOCST_NAMED(kHiBytes),
+    BOCST_NAMED(kNormalBytes),
+    BOCST_NAMED(kSlabCenterBytes),
+    BOCST_NAMED(kSlabHalfBytes),
+    BOCST_NAMED(kOwnLoBytes),
+    BOCST_NAMED(kOwnHiBytes),
+    BOCST_NAMED(kOwnSlabHalfBytes),
+    BOCST_NAMED(kGreyBytes),
+    BOCST_NAMED(kListWords),
+    BOCST_NAMED(kIdWords),
+    BOCST_NAMED(kHeader),
+    BOCST_NAMED(kBoundsWords),
+    BOCST_NAMED(kRowSizes),
+    BOCST_NAMED(kRowList),
+    BOCST_NAMED(kRowIds),
+    BOCST_NAMED(kRow),
+    BOCST_NAMED(kBoxSteps),
+    BOCST_NAMED(kNormalLength),
+    BOCST_NAMED(kMostNormalNorm1),
+    BOCST_NAMED(kMostSlabCenter),
+    BOCST_NAMED(kMostSlabHalf),
+};
+#undef BOCST_NAMED
+
+}  // namespace
+
+std::string constants() {
+  // A layout qualifier takes a literal, so a macro.
+  std::string text = "#define GROUP " + std::to_string(kGroup) + "\n";
+  for (const Constant& c : kConstants) {
+    text += std::string("const uint ") + c.name + " = " + std::to_string(c.value) + "u;\n";
+  }
+  return text;
+}
+
+}  // namespace bocst::oracle::gl::layout
