@@ -33,7 +33,8 @@ class PairWalk {
         b_in_a_(b_in_a),
         a_in_b_(b_in_a.inverse()),
         visitor_(visitor),
-        spheres_(a.isConservative() || b.isConservative()) {
+        spheres_(a.isConservative() || b.isConservative()),
+        cut_(spheres_ ? nullptr : visitor.cut()) {
     if constexpr (!B::kBodies) BOCST_ASSERT(!a.isConservative() || !b.isConservative());
   }
 
@@ -54,8 +55,10 @@ class PairWalk {
         s.stack.pop_back();
         if (spheres_ ? stepSpheres(pair, s) : stepBoxes(pair, s)) return true;
       }
+      if (cut_ != nullptr) s.deferred.dropIf([this](const Pair& pair) { return isBeyondCut(pair); });
       if (s.deferred.empty()) return false;
-      s.deferred.grow(a_, b_, b_in_a_, visitor_.endsAtFirst(), [&s](const Pair& pair) { s.stack.push_back(pair); });
+      const bool may_end = visitor_.endsAtFirst() || cut_ != nullptr;
+      s.deferred.grow(a_, b_, b_in_a_, may_end, [&s](const Pair& pair) { s.stack.push_back(pair); });
       seen_a_.valid = seen_b_.valid = false;
     }
   }
@@ -73,6 +76,8 @@ class PairWalk {
     thread_local Scratch s;
     return s;
   }
+
+  bool isBeyondCut(const Pair& pair) const { return cut_->isBeyond(a_.volume(pair.a)); }
 
   bool rootsMeet(const Pair& root) const {
     return spheres_ ? sphereMeets(a_.sphere(root.a), root.b)
@@ -106,6 +111,7 @@ class PairWalk {
   }
 
   bool stepBoxes(const Pair& pair, Scratch& s) {
+    if (cut_ != nullptr && isBeyondCut(pair)) return false;
     // Depth first, most steps share a node with the one before.
     seeNode(a_, pair.a, seen_a_);
     seeNode(b_, pair.b, seen_b_);
@@ -278,6 +284,7 @@ class PairWalk {
   const SimilarityTransform b_in_a_, a_in_b_;
   V& visitor_;
   const bool spheres_;
+  const Cut* const cut_;
 };
 
 }  // namespace bocst::query
