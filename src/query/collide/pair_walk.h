@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #pragma once
 
+#include <algorithm>
 #include <cstdint>
 #include <utility>
 #include <vector>
@@ -77,6 +78,16 @@ class PairWalk {
     return s;
   }
 
+  // Of the pairs pushed last, those whose nodes of A reach back the farthest are to be popped first.
+  void orderAlongCut(Scratch& s, std::size_t before) const {
+    std::pair<double, Pair> order[8];
+    const std::size_t count = s.stack.size() - before;
+    BOCST_ASSERT(count <= 8);
+    for (std::size_t i = 0; i < count; ++i) order[i] = {cut_->leastOf(a_.volume(s.stack[before + i].a)), s.stack[before + i]};
+    std::sort(order, order + count, [](const auto& x, const auto& y) { return x.first > y.first; });
+    for (std::size_t i = 0; i < count; ++i) s.stack[before + i] = order[i].second;
+  }
+
   bool isBeyondCut(const Pair& pair) const { return cut_->isBeyond(a_.volume(pair.a)); }
 
   bool rootsMeet(const Pair& root) const {
@@ -126,10 +137,12 @@ class PairWalk {
       if (sa == State::kGrows) {
         s.deferred.add(pair);
       } else {
+        const std::size_t before = s.stack.size();
         const auto push = [&](typename A::Node c) { s.stack.push_back({c, pair.b}); };
         if constexpr (!B::kBodies) {
           if (sb == State::kLeaf && seen_a_.size < size_b) {
             a_.childrenMeeting(pair.a, volumeOf(b_, seen_b_), b_in_a_, s.large_b, b_, pair.b, push);
+            if (cut_ != nullptr) orderAlongCut(s, before);
             return false;
           }
         }
@@ -140,6 +153,7 @@ class PairWalk {
         } else {
           a_.overlappingChildren(pair.a, volumeOf(b_, seen_b_), b_in_a_, push);
         }
+        if (cut_ != nullptr) orderAlongCut(s, before);
       }
     } else if (sb == State::kGrows) {
       s.deferred.add(pair);

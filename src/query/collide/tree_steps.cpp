@@ -7,7 +7,6 @@
 #include <hwy/highway.h>
 
 #include <algorithm>
-#include <cstring>
 
 #include "query/cull/frames-inl.h"
 
@@ -319,12 +318,13 @@ HWY_INLINE bool isBeyondCut(const PairSteps& s, const StepNode& of_side_0) {
 
 // The order of octants by how far they reach back along the axis of the cut.
 HWY_INLINE void orderAlongCut(const PairSteps& s, const Frame& f, std::uint32_t (&order)[8]) {
-  constexpr float kBeyond = 4 * lattice::kMiddle;  // keeps the numbers positive, whose bits are then in their order
-  for (std::uint32_t o = 0; o < 8; ++o) {
-    const float back = kBeyond - leastAlongCut(s, f, o);
-    std::uint32_t bits;
-    std::memcpy(&bits, &back, sizeof bits);
-    order[o] = (bits & ~7u) | o;
+  const D d;
+  const hn::RebindToUnsigned<D> du;
+  const V beyond = hn::Set(d, 4.0f * lattice::kMiddle);  // keeps the numbers positive: their bits are in their order
+  for (std::size_t i = 0; i < 8; i += hn::Lanes(d)) {
+    const V least = hn::Sub(hn::Load(d, f.center[0][s.cut_axis] + i), hn::Load(d, f.half[0][s.cut_axis] + i));
+    const auto octant = hn::Iota(du, static_cast<std::uint32_t>(i));
+    hn::StoreU(hn::Or(hn::AndNot(hn::Set(du, 7), hn::BitCast(du, hn::Sub(beyond, least))), octant), du, order + i);
   }
 }
 

@@ -28,11 +28,12 @@ struct Cut {
   int axis = 0;
   double last = std::numeric_limits<double>::infinity();
 
-  bool isBeyond(const Volume& v) const {
-    // Half extents are rounded to float: by less than 2^-8 of a lattice unit, as is the middle.
+  double leastOf(const Volume& v) const {
     const auto k = static_cast<std::size_t>(axis);
-    return v.center[k] - static_cast<double>(v.half[k]) > last + 0x1p-6;
+    return v.center[k] - static_cast<double>(v.half[k]);
   }
+  /// Half extents are rounded to float: by less than 2^-8 of a lattice unit, as is the middle.
+  bool isBeyond(const Volume& v) const { return leastOf(v) > last + 0x1p-6; }
 };
 
 /// What a query does with the pairs that a walk finds. Each function returns true to end the walk. A pair may come more
