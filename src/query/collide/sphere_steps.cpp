@@ -9,7 +9,7 @@
 #include <algorithm>
 #include <cmath>
 
-#include "query/cull/frames-inl.h"
+#include "simd/octants-inl.h"
 
 #ifndef BOCST_SPHERE_STEPS_ONCE
 #define BOCST_SPHERE_STEPS_ONCE
@@ -97,17 +97,11 @@ HWY_INLINE void decodeSpheres(const SphereSteps& s, int side, int level, const P
 }
 
 // The octants of a block into a frame, which holds them already where the last pair had the same block.
-HWY_INLINE void decodeBlockSpheres(SphereSteps& s, int side, std::uint32_t index, const tree::Block& block,
-                                   std::uint32_t frame) {
-  if (s.holds_spheres[frame] == nameOf(side, index)) return;
-  s.holds_spheres[frame] = nameOf(side, index);
-  decodeSpheres(s, side, block.shape, block.at, s.scratch.spheres[frame]);
-}
-HWY_INLINE void decodeBlockVolumes(SphereSteps& s, int side, std::uint32_t index, const tree::Block& block,
-                                   std::uint32_t frame) {
-  if (s.holds_volumes[frame] == nameOf(side, index)) return;
-  s.holds_volumes[frame] = nameOf(side, index);
-  decodeBlock(s.geometry, side, block, s.scratch.volumes[frame]);
+HWY_INLINE void decodeBlock(SphereSteps& s, int side, std::uint32_t index, const tree::Block& block,
+                            std::uint32_t frame) {
+  if (s.holds[frame] == nameOf(side, index)) return;
+  s.holds[frame] = nameOf(side, index);
+  decodeSpheres(s, side, block.shape, block.at, s.spheres[frame]);
 }
 
 // Which octants of frame f may meet lane l of frame y, of the other side, and of which it is in doubt.
@@ -144,26 +138,13 @@ HWY_INLINE Met meeting(const SphereFrames& g, const SphereFrame& f, const Sphere
   return met;
 }
 
-// Of the octants of a block in a frame, those that are to be walked with lane `lane` of the other side, and their
-// order. `leaves`: both are.
-HWY_INLINE unsigned octantsToWalk(SphereSteps& s, int x, std::uint32_t index, const tree::Block& block,
-                                  std::uint32_t frame, tree::NodeRef other, std::uint32_t lane, bool volumes,
-                                  bool leaves, std::uint32_t* order) {
-  unsigned mask = block.grey;
-  if (!volumes || !s.only_touching) {
-    const Met met = meeting(s.frames, s.scratch.spheres[frame], s.scratch.spheres[lane / 8], lane % 8, order);
-    const unsigned doubtful = met.doubtful & mask;
-    mask &= met.maybe;
-    if (doubtful != 0) mask = (mask & ~doubtful) | decideMeeting(s, x, index, doubtful, other);
-  }
-  if (mask == 0 || !volumes || leaves) return mask;
-  const hn::RebindToUnsigned<D> du;
-  mask = overlapping(s.geometry, s.scratch.volumes[frame], s.scratch.volumes[lane / 8], lane % 8, mask, order);
-  // The deepest overlap first.
-  for (std::size_t i = 0; i < 8; i += hn::Lanes(du)) {
-    hn::StoreU(hn::Xor(hn::LoadU(du, order + i), hn::Set(du, ~7u)), du, order + i);
-  }
-  return mask;
+// The octants of a block in a frame whose spheres meet that of lane `lane` of the other side, and their order.
+HWY_INLINE unsigned meetingOctants(SphereSteps& s, int x, std::uint32_t index, const tree::Block& block,
+                                   std::uint32_t frame, tree::NodeRef other, std::uint32_t lane, std::uint32_t* order) {
+  const Met met = meeting(s.frames, s.spheres[frame], s.spheres[lane / 8], lane % 8, order);
+  const unsigned mask = met.maybe & block.grey, doubtful = met.doubtful & block.grey;
+  if (doubtful == 0) return mask;
+  return (mask & ~doubtful) | decideMeeting(s, x, index, doubtful, other);
 }
 
 // The first in the order of a group.
@@ -184,14 +165,12 @@ HWY_NOINLINE std::uint32_t lookUp(SphereSteps& s, int side, tree::NodeRef node, 
   const std::uint32_t root[3] = {0, 0, 0};
   if (!node.isRoot()) {
     const tree::Block& block = tree.block(node.block());
-    decodeBlockSpheres(s, side, node.block(), block, frame);
-    decodeBlockVolumes(s, side, node.block(), block, frame);
+    decodeBlock(s, side, node.block(), block, frame);
     return 8 * frame + static_cast<std::uint32_t>(node.octant());
   }
-  s.holds_spheres[frame] = s.holds_volumes[frame] = kNothing;
+  s.holds[frame] = kNothing;
   // The root as the first octant of a cell that is twice as large, whose other octants nobody asks for.
-  decodeSpheres(s, side, 0, root, s.scratch.spheres[frame]);
-  decodeRoot(s.geometry, side, tree.rootBounds(), s.scratch.volumes[frame]);
+  decodeSpheres(s, side, 0, root, s.spheres[frame]);
   return 8 * frame;
 }
 
@@ -219,7 +198,7 @@ HWY_INLINE void push(SphereSteps& s, int side, const tree::Block& block, std::ui
 // Expands the other node of a pair for all octants in `mask` of block `index`, in frame `frame`, so that their tests
 // overlap in time. False where it is not the next to be expanded.
 HWY_INLINE bool expandOther(SphereSteps& s, int x, const tree::Block& own, std::uint32_t index, std::uint32_t frame,
-                            const SphereGroup::Node& other, unsigned mask, bool volumes) {
+                            const SphereGroup::Node& other, unsigned mask) {
   const int y = 1 - x;
   const std::uint32_t level = own.shape + 1u;
   if (isLeaf(s, y, other.level) || other.ref.tag() != tree::ChildRef::kBlock) return false;
@@ -228,10 +207,7 @@ HWY_INLINE bool expandOther(SphereSteps& s, int x, const tree::Block& own, std::
   const tree::Tree& tree = s.side[y]->tree();
   const tree::Block& block = tree.block(other_index);
   tree.markUsed(other_index, s.side[0]->now());
-  decodeBlockSpheres(s, y, other_index, block, other_frame);
-  const bool leaves = isLeaf(s, x, level) && isLeaf(s, y, block.shape + 1u);
-  const bool with_volumes = volumes && !leaves && block.shape + 1u <= s.last_volumes[y];
-  if (with_volumes) decodeBlockVolumes(s, y, other_index, block, other_frame);
+  decodeBlock(s, y, other_index, block, other_frame);
   const std::size_t start = s.depth;
   for (; mask != 0; mask &= mask - 1) {
     const auto o = static_cast<std::uint32_t>(__builtin_ctz(mask));
@@ -239,8 +215,7 @@ HWY_INLINE bool expandOther(SphereSteps& s, int x, const tree::Block& own, std::
     n.node = tree::NodeRef::octant(index, static_cast<int>(o));
     n.level = level;
     n.lane = 8 * frame + o;
-    const unsigned left = octantsToWalk(s, y, other_index, block, other_frame, n.node, n.lane, with_volumes, leaves,
-                                        s.stack[s.depth].order);
+    const unsigned left = meetingOctants(s, y, other_index, block, other_frame, n.node, n.lane, s.stack[s.depth].order);
     if (left == 0) continue;
     n.ref = own.child[o].load(std::memory_order_acquire);
     push(s, y, block, other_index, other_frame, other_frame + 1, n, left);
@@ -304,14 +279,10 @@ SphereSteps::Event NextEvent(SphereSteps& s) {
     tree.markUsed(index, s.side[0]->now());
     const std::uint32_t level = block.shape + 1u;
     const bool leaves = isLeaf(s, x, level) && isLeaf(s, 1 - x, still.level);
-    const bool volumes =
-        !leaves && level <= s.last_volumes[x] && s.holds_volumes[still.lane / 8] == s.holds_spheres[still.lane / 8];
-    decodeBlockSpheres(s, x, index, block, frame);
-    if (volumes) decodeBlockVolumes(s, x, index, block, frame);
-    const unsigned mask =
-        octantsToWalk(s, x, index, block, frame, still.node, still.lane, volumes, leaves, s.stack[s.depth].order);
+    decodeBlock(s, x, index, block, frame);
+    const unsigned mask = meetingOctants(s, x, index, block, frame, still.node, still.lane, s.stack[s.depth].order);
     if (mask == 0) continue;
-    if (leaves || !expandOther(s, x, block, index, frame, still, mask, volumes)) {
+    if (leaves || !expandOther(s, x, block, index, frame, still, mask)) {
       push(s, x, block, index, frame, frames, still, mask);
     }
   }
@@ -345,43 +316,18 @@ SphereFrames::SphereFrames(const SimilarityTransform& one_in_zero) {
   tolerance = static_cast<float>(one_in_zero.tolerance);
 }
 
-double reachOfLeaves(const TreeSide& a, const TreeSide& b, double scale) {
-  const auto diameter = [](const TreeSide& side) {
-    return std::sqrt(3.0) * (1 << (lattice::kMaxLevel - side.tree().deepest()));
-  };
-  return (diameter(a) + diameter(b) * scale) * (1 + 1e-9);
-}
-
-SphereSteps::SphereSteps(const TreeSide& a, const TreeSide& b, const SimilarityTransform& b_in_a_, Scratch& scratch_)
-    : side{&a, &b},
-      b_in_a(b_in_a_),
-      frames(b_in_a_),
-      geometry(PairFrames::fits(b_in_a_.scale) ? PairFrames(b_in_a_.scale, b_in_a_)
-                                               : PairFrames(1, SimilarityTransform())),
-      // Off: boxes and slabs are as tight as an oracle's arithmetic has them, and so what grows would depend on it.
-      only_touching(false),
-      scratch(scratch_) {
+SphereSteps::SphereSteps(const TreeSide& a, const TreeSide& b, const SimilarityTransform& b_in_a_,
+                         SphereFrame* spheres_)
+    : side{&a, &b}, b_in_a(b_in_a_), frames(b_in_a_), spheres(spheres_) {
   for (int s = 0; s < 2; ++s) {
     const tree::Tree& tree = side[s]->tree();
     std::copy_n(tree.surface().lattice.extent().data(), 3, extent[s]);
     deepest[s] = static_cast<std::uint32_t>(tree.deepest());
-    last_volumes[s] = only_touching ? deepest[s] : 0;
   }
   // 2^deeper against the ratio of units, exactly.
   const bool even = std::frexp(b_in_a.scale, &not_smaller) == 0.5;
   if (even) --not_smaller;
-  std::fill_n(holds_spheres, kFrames, kNothing);
-  std::fill_n(holds_volumes, kFrames, kNothing);
-}
-
-void SphereSteps::lookForAll() {
-  if (!only_touching) return;
-  only_touching = false;
-  const double reach = reachOfLeaves(*side[0], *side[1], b_in_a.scale) * 1.0001;
-  geometry.rounding_margin += static_cast<float>(reach);
-  geometry.slab_rounding_margin += static_cast<float>(1.02 * reach);
-  // Beside leaves the reach is more than boxes leave out.
-  for (std::uint32_t& level : last_volumes) level = level > 0 ? level - 1 : 0;
+  std::fill_n(holds, kFrames, kNothing);
 }
 
 unsigned decideMeeting(const SphereSteps& s, int own, std::uint32_t index, unsigned mask, tree::NodeRef other) {

@@ -5,7 +5,6 @@
 #include <cstdint>
 #include <limits>
 
-#include "query/cull/frames.h"
 #include "query/sides/side.h"
 #include "query/sides/visitor.h"
 
@@ -77,29 +76,19 @@ struct SphereSteps {
     kDeferred,  ///< `pair` needs a node that is not expanded.
   };
 
-  struct Scratch {
-    SphereFrame spheres[kFrames];
-    Frame volumes[kFrames];
-  };
-
-  SphereSteps(const TreeSide& a, const TreeSide& b, const SimilarityTransform& b_in_a, Scratch& scratch);
-
-  /// So far, nodes were left out whose boxes or slabs are apart, though spheres below them may meet. No more.
-  void lookForAll();
+  /// `spheres`: kFrames of them.
+  SphereSteps(const TreeSide& a, const TreeSide& b, const SimilarityTransform& b_in_a, SphereFrame* spheres);
 
   const TreeSide* side[2];
   const SimilarityTransform& b_in_a;
   const SphereFrames frames;
-  PairFrames geometry;            ///< Of boxes and slabs.
-  std::uint32_t extent[2][3];     ///< Where the actual regions end.
-  std::uint32_t deepest[2];       ///< The level of each side's leaves.
-  std::uint32_t last_volumes[2];  ///< Below this level, boxes and slabs tell no more than spheres.
-  int not_smaller;                ///< A node of side 0 is not smaller than one of side 1 so many levels deeper.
-  bool only_touching;             ///< See lookForAll(). False where boxes are of no use, see PairFrames::fits().
-  bool nearest_first = true;      ///< A hit ends the walk.
+  std::uint32_t extent[2][3];  ///< Where the actual regions end.
+  std::uint32_t deepest[2];    ///< The level of each side's leaves.
+  int not_smaller;             ///< A node of side 0 is not smaller than one of side 1 so many levels deeper.
+  bool nearest_first = true;   ///< A hit ends the walk.
 
-  Scratch& scratch;
-  std::uint64_t holds_spheres[kFrames], holds_volumes[kFrames];  ///< Which block of which side is in a frame.
+  SphereFrame* const spheres;
+  std::uint64_t holds[kFrames];  ///< Which block of which side is in a frame.
 
   SphereGroup* stack = nullptr;  ///< With room for kStackRoom more.
   std::size_t depth = 0;
@@ -108,11 +97,6 @@ struct SphereSteps {
   int expanded = 0;
   unsigned mask = 0;
 };
-
-/// How far the sphere of a leaf may be from the surface that is in the leaf, of both sides together: each leaf's cell
-/// meets the surface, so its sphere is within a diameter of that. What bounds two surfaces and parts them by more parts
-/// the spheres of their leaves, too.
-double reachOfLeaves(const TreeSide& a, const TreeSide& b, double scale);
 
 /// Goes on to the next event. Chosen at run time for the machine's instruction set.
 SphereSteps::Event nextEvent(SphereSteps& steps);

@@ -1,15 +1,29 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #include "query/collide/sphere_walk.h"
 
+#include <cmath>
 #include <vector>
 
 #include "query/collide/deferred_pairs.h"
 
 namespace bocst::query {
 
+namespace {
+
+// How far the sphere of a leaf may be from the surface that is in the leaf, of both sides together: each leaf's cell
+// meets the surface, so its sphere is within a diameter of that.
+double reachOfLeaves(const TreeSide& a, const TreeSide& b, double scale) {
+  const auto diameter = [](const TreeSide& side) {
+    return std::sqrt(3.0) * (1 << (lattice::kMaxLevel - side.tree().deepest()));
+  };
+  return (diameter(a) + diameter(b) * scale) * (1 + 1e-9);
+}
+
+}  // namespace
+
 struct SphereWalk::Scratch {
   std::vector<SphereGroup> stack;
-  SphereSteps::Scratch steps;
+  SphereFrame spheres[SphereSteps::kFrames];
   DeferredPairs<TreeSide, TreeSide> deferred;
 };
 
@@ -21,7 +35,7 @@ bool SphereWalk::areBoxesApart() const {
 
 bool SphereWalk::run(Visitor& visitor) {
   thread_local Scratch s;
-  SphereSteps steps(a_, b_, b_in_a_, s.steps);
+  SphereSteps steps(a_, b_, b_in_a_, s.spheres);
   steps.nearest_first = visitor.endsAtFirst();
   return search(steps, s, visitor);
 }

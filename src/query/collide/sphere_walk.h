@@ -6,8 +6,7 @@
 namespace bocst::query {
 
 /// The walk for two trees with conservative answers: finds the pairs of leaves whose spheres meet, see spheresMeet().
-/// They follow from the lattices and the pose, so boxes, slabs and the order of the walk may save time and decide
-/// nothing.
+/// Spheres follow from the lattices and the pose alone, so the verdict and what grows are the same with every oracle.
 class SphereWalk {
  public:
   static bool fits(const TreeSide& a, const TreeSide& b) { return a.isConservative() && b.isConservative(); }
@@ -19,7 +18,8 @@ class SphereWalk {
     return !spheresMeet(a_.sphere(a_.root()), placed(b_.sphere(b_.root()), b_in_a_), b_in_a_.tolerance);
   }
 
-  /// The same by the boxes about the surfaces, whose rounding margin hides in which frame they were compared.
+  /// Are the boxes about the surfaces so far apart that no spheres of leaves meet? The rounding margin hides in which
+  /// frame they were compared.
   bool areBoxesApart() const;
 
   /// Unless it is needless. True when the visitor ended it.

@@ -105,7 +105,7 @@ Cells walk(tree::Tree& tree_a, tree::Tree& tree_b, const SimilarityTransform& b_
 }
 
 struct Counts {
-  std::size_t hits = 0, misses = 0, pairs = 0;
+  std::size_t hits = 0, misses = 0, pairs = 0, boxes_apart = 0;
 };
 
 void compare(const Model& a, const Model& b, tree::Tree& lazy_a, tree::Tree& lazy_b, const SimilarityTransform& b_in_a,
@@ -113,6 +113,10 @@ void compare(const Model& a, const Model& b, tree::Tree& lazy_a, tree::Tree& laz
   const CellPairs expected = meetingCells(a, b, b_in_a);
   counts.pairs += expected.size();
   ++(expected.empty() ? counts.misses : counts.hits);
+  if (SphereWalk(TreeSide(*a.whole), TreeSide(*b.whole), b_in_a).areBoxesApart()) {
+    ASSERT_TRUE(expected.empty());
+    ++counts.boxes_apart;
+  }
   const auto checkFirst = [&](const Cells& first, const char* trees) {
     ASSERT_EQ(first.pairs.empty(), expected.empty()) << trees;
     if (expected.empty()) return;
@@ -231,6 +235,7 @@ TEST_P(SphereWalks, FindWhatMeetsWithinTolerance) {
   EXPECT_GT(counts.hits, 10u);
   EXPECT_GT(counts.misses, 10u);
   EXPECT_GT(counts.pairs, 10000u);
+  EXPECT_GT(counts.boxes_apart, 3u);
 }
 
 // What resident pairs settle grows nothing, however long the walk to the hit is.
