@@ -4,12 +4,15 @@
 #include <fcl/math/bv/AABB.h>
 
 #include <algorithm>
+#include <array>
 #include <limits>
+#include <tuple>
 #include <type_traits>
 #include <vector>
 
 #include "fcl/adapters/narrow_phase.h"
 #include "fcl/queries/collide_query.h"
+#include "fcl/queries/contact_order.h"
 #include "fcl/queries/convex_pair.h"
 #include "fcl/queries/inside.h"
 #include "fcl/queries/inside_contact.h"
@@ -34,26 +37,30 @@ class ConvexCollector final : public query::ConvexVisitor<typename Partner::Node
   using Node = typename Partner::Node;
 
   ConvexCollector(const CollideQuery<S>& q, const Partner& partner, const ConvexFrame<S>& frame,
-                  const oracle::Surface& surface, const NarrowPhase<S>& narrow_phase, bool costs)
+                  const tree::Tree& model, const NarrowPhase<S>& narrow_phase, bool costs)
       : q_(q),
+        order_(model),
         partner_(partner),
         frame_(frame),
-        surface_(surface),
+        surface_(model.surface()),
         narrow_phase_(narrow_phase),
         X_WM_(q.X_WA()),
         X_WB_(q.X_WB().template cast<double>()),
         tolerance_(frame.rounding() + narrow_phase.tolerance()),
         costs_(costs),
         ends_at_first_(q.endsAtFirst()),
+        is_cut_(!ends_at_first_ && !costs && q.contactsLeft() > 0 && q.contactsLeft() <= FirstFound::kMost),
         s_(scratch()) {
     s_.seen.clear();
     s_.found.clear();
+    if (is_cut_) s_.first.start(q.contactsLeft());
   }
 
   /// Bodies within so much of the surface, or of its cells' spheres, are to be visited.
   double tolerance(bool spheres) const { return tolerance_ + q_.cullingMargin(spheres); }
 
   bool endsAtFirst() const override { return ends_at_first_; }
+  const query::Cut* cut() const override { return is_cut_ ? &cut_ : nullptr; }
 
   /// Cost sources of the bodies below a node that the box about the model meets, as FCL's approximate costs are.
   void addApproximateCosts(const Node& b) const {
@@ -70,21 +77,28 @@ class ConvexCollector final : public query::ConvexVisitor<typename Partner::Node
 
   bool triangle(std::uint32_t t, const Node& b) override {
     if (ends_at_first_) return addTriangle(t, b);
-    if (s_.seen.insert(partner_.id(b), t)) gather({t, {Eigen::Vector3d::Zero(), 0}}, b);
+    const Found found = placed(order_.placeOf(t), {t, {Eigen::Vector3d::Zero(), 0}}, b);
+    if (is_cut_ && !s_.first.wants(found)) return false;
+    if (!s_.seen.insert(partner_.id(b), t)) return false;
+    if (is_cut_) {
+      addFirst(found);
+    } else {
+      s_.found.push_back(found);
+    }
     return false;
   }
 
   bool cell(const query::CellLeaf& a, const Node& b) override {
     if (ends_at_first_) return addCell(a, b);
-    gather(a, b);
+    s_.found.push_back(placed(0, a, b));
     return false;
   }
 
-  /// To be called at the end of the walk: as in the Collector of meshes, pairs are looked at in the order of their ids,
-  /// and not in that in which the walk found them. `cells`: those are what it found.
+  /// To be called at the end of the walk: as in the Collector of meshes, contacts are in ContactOrder and not in that in
+  /// which the walk found them. `cells`: those are what it found.
   void finish(bool cells) {
-    std::sort(s_.found.begin(), s_.found.end(),
-              [](const Found& x, const Found& y) { return x.b1 != y.b1 ? x.b1 < y.b1 : x.b2 < y.b2; });
+    if (is_cut_ && !cells) s_.found = s_.first.sort();
+    std::sort(s_.found.begin(), s_.found.end());
     for (const Found& f : s_.found) {
       if (cells ? addCell(f.leaf, f.body) : addTriangle(static_cast<std::uint32_t>(f.leaf.id), f.body)) return;
     }
@@ -92,13 +106,20 @@ class ConvexCollector final : public query::ConvexVisitor<typename Partner::Node
 
  private:
   struct Found {
+    double place;          // see ContactOrder; 0 of a cell
     std::intptr_t b1, b2;  // as the caller gets them
     query::CellLeaf leaf;  // of a triangle, its id alone
     Node body;
+
+    bool operator<(const Found& other) const {
+      return std::tie(place, b1, b2) < std::tie(other.place, other.b1, other.b2);
+    }
   };
+  using FirstFound = FirstItems<Found>;
   // Kept by the thread between queries.
   struct Scratch {
     query::PairSet<std::uint64_t> seen;
+    FirstFound first;
     std::vector<Found> found;
   };
   static Scratch& scratch() {
@@ -106,26 +127,46 @@ class ConvexCollector final : public query::ConvexVisitor<typename Partner::Node
     return scratch;
   }
 
-  void gather(const query::CellLeaf& a, const Node& b) {
+  Found placed(double place, const query::CellLeaf& a, const Node& b) const {
     auto b1 = static_cast<std::intptr_t>(a.id), b2 = static_cast<std::intptr_t>(partner_.id(b));
     q_.inCallersOrder(b1, b2);
-    s_.found.push_back({b1, b2, a, b});
+    return {place, b1, b2, a, b};
+  }
+
+  // Only the first so many contacts are wanted: is this one of them?
+  void addFirst(const Found& found) {
+    query::SeparationResult gap;
+    const auto t = static_cast<std::uint32_t>(found.leaf.id);
+    if (!partner_.occupied(found.body) || !touches(t, cornersOf(t).data(), found.body, gap)) return;
+    s_.first.add(found);
+    if (s_.first.isFull()) cut_ = order_.cutAfter(s_.first.last().place);
+  }
+
+  std::array<Eigen::Vector3d, 3> cornersOf(std::uint32_t t) const {
+    const auto& i = surface_.mesh->indices(t);
+    return {frame_ * surface_.mesh->vertex(i[0]), frame_ * surface_.mesh->vertex(i[1]),
+            frame_ * surface_.mesh->vertex(i[2])};
+  }
+
+  // Does a triangle touch a body? Sets the gap between them.
+  bool touches(std::uint32_t t, const Eigen::Vector3d* corners, const Node& b, query::SeparationResult& gap) const {
+    const double near = std::max(tolerance_, q_.margin);
+    gap = partner_.gap(b, {corners, 3}, near);
+    if (gap.atLeast > near) return false;
+    if (gap.isTouching() || gap.atLeast <= q_.margin) return true;
+    const auto& i = surface_.mesh->indices(t);
+    fcl::Vector3<S> c[3];
+    for (std::size_t k = 0; k < 3; ++k) c[k] = surface_.mesh->vertex(i[k]).template cast<S>();
+    return partner_.fclOverlaps(b, narrow_phase_, c, X_WM_);
   }
 
   // True when nothing more is asked for.
   bool addTriangle(std::uint32_t t, const Node& b) {
+    const std::array<Eigen::Vector3d, 3> corners = cornersOf(t);
+    const query::PointSet points{corners.data(), 3};
+    query::SeparationResult gap;
+    if (!touches(t, corners.data(), b, gap)) return false;
     const auto& i = surface_.mesh->indices(t);
-    const Eigen::Vector3d corners[3] = {frame_ * surface_.mesh->vertex(i[0]), frame_ * surface_.mesh->vertex(i[1]),
-                                        frame_ * surface_.mesh->vertex(i[2])};
-    const query::PointSet points{corners, 3};
-    const double near = std::max(tolerance_, q_.margin);
-    const query::SeparationResult gap = partner_.gap(b, points, near);
-    if (gap.atLeast > near) return false;
-    if (!gap.isTouching() && gap.atLeast > q_.margin) {
-      fcl::Vector3<S> c[3];
-      for (std::size_t k = 0; k < 3; ++k) c[k] = surface_.mesh->vertex(i[k]).template cast<S>();
-      if (!partner_.fclOverlaps(b, narrow_phase_, c, X_WM_)) return false;
-    }
     if (costs_) {
       const fcl::Vector3<S> p = X_WM_ * surface_.mesh->vertex(i[0]).template cast<S>();
       const fcl::Vector3<S> r = X_WM_ * surface_.mesh->vertex(i[1]).template cast<S>();
@@ -217,6 +258,7 @@ class ConvexCollector final : public query::ConvexVisitor<typename Partner::Node
   }
 
   const CollideQuery<S>& q_;
+  const ContactOrder order_;
   const Partner& partner_;
   const ConvexFrame<S>& frame_;
   const oracle::Surface& surface_;
@@ -224,8 +266,9 @@ class ConvexCollector final : public query::ConvexVisitor<typename Partner::Node
   const fcl::Transform3<S>& X_WM_;
   const fcl::Transform3<double> X_WB_;
   const double tolerance_;
-  const bool costs_, ends_at_first_;
+  const bool costs_, ends_at_first_, is_cut_;
   Scratch& s_;
+  query::Cut cut_;
 };
 
 /// The collision of a model, side A, and the bodies of a partner: with_partner(frame, costs, f) makes the partner's
@@ -245,7 +288,7 @@ void collideConvex(const CollideQuery<S>& q, tree::Tree& tree, const NarrowPhase
   const auto with_collector = [&](bool costs, auto&& f) {
     with_partner(frame, costs, [&](const auto& partner) {
       using Partner = std::remove_cv_t<std::remove_reference_t<decltype(partner)>>;
-      ConvexCollector<S, Partner> collector(first, partner, frame, surface, narrow_phase, request.enable_cost);
+      ConvexCollector<S, Partner> collector(first, partner, frame, tree, narrow_phase, request.enable_cost);
       f(partner, collector);
     });
   };

@@ -11,6 +11,7 @@
 #include <limits>
 #include <stdexcept>
 #include <string>
+#include <tuple>
 #include <type_traits>
 #include <vector>
 
@@ -21,6 +22,7 @@
 #include "fcl/queries/collide_query.h"
 #include "fcl/queries/collide_row.h"
 #include "fcl/queries/collide_shape.h"
+#include "fcl/queries/contact_order.h"
 #include "fcl/queries/inside.h"
 #include "fcl/queries/inside_contact.h"
 #include "fcl/queries/pose_boxes.h"
@@ -82,22 +84,37 @@ class BvhTriangles {
 
 /// A contact before it is one of FCL's: ids in the caller's order, and how the two touch, in the world.
 struct Met {
+  double place;  // see ContactOrder; 0 where cells touch
   std::uint64_t b1, b2;
   query::ContactPoint contact;
 
-  bool operator<(const Met& other) const { return b1 != other.b1 ? b1 < other.b1 : b2 < other.b2; }
+  bool operator<(const Met& other) const {
+    return std::tie(place, b1, b2) < std::tie(other.place, other.b1, other.b2);
+  }
+};
+
+/// A pair of triangles and its place in the order of contacts.
+struct PlacedPair {
+  double place;
+  std::uint64_t key;
+
+  bool operator<(const PlacedPair& other) const {
+    return place != other.place ? place < other.place : key < other.key;
+  }
 };
 
 /// Turns the pairs of a walk into contacts and cost sources; triangles are those of the caller's first and second
 /// geometry.
 ///
-/// A walk finds pairs in an order that depends on what is resident. So unless any contact will do, pairs are gathered
-/// and, at the end of the walk, looked at in the order of their ids until there are enough contacts.
+/// A walk finds pairs in an order that depends on what is resident. So unless any pair will do, contacts are put in
+/// ContactOrder: few of them by cutting the walk at the place of the last that is asked for, many by gathering pairs and
+/// sorting them until there are enough.
 template <typename S, typename Triangles1, typename Triangles2>
 class Collector : public query::Visitor {
  public:
-  Collector(const CollideQuery<S>& q, const Triangles1& t1, const Triangles2& t2, double magnitude)
+  Collector(const CollideQuery<S>& q, const tree::Tree& a, const Triangles1& t1, const Triangles2& t2, double magnitude)
       : q_(q),
+        order_(a),
         t1_(t1),
         t2_(t2),
         magnitude_(magnitude),
@@ -105,12 +122,14 @@ class Collector : public query::Visitor {
         ends_at_first_(q.endsAtFirst()),
         left_(q.contactsLeft()),
         most_(std::max<std::size_t>(kMost, left_ < kUnlimited ? 4 * left_ : kUnlimited)),
+        is_cut_(!ends_at_first_ && left_ > 0 && left_ <= FirstPairs::kMost && !q.request.enable_cost),
         s_(scratch()) {
     s_.met.clear();
     if (ends_at_first_) return;
     s_.seen.clear();
     s_.seen_cells.clear();
     s_.found.clear();
+    if (is_cut_) s_.first.start(left_);
   }
 
   /// Where cells lie in the world: from the lattice frame of side A.
@@ -120,14 +139,19 @@ class Collector : public query::Visitor {
   }
 
   bool endsAtFirst() const override { return ends_at_first_; }
+  const query::Cut* cut() const override { return is_cut_ ? &cut_ : nullptr; }
 
   bool triangles(std::uint32_t a, std::uint32_t b, bool certain) override {
+    const std::uint32_t of_model = a;
     q_.inCallersOrder(a, b);
     const std::uint64_t key = keyOf(a, b, certain);
     if (ends_at_first_) return endsWith(key);
-    if (key > last_ || !s_.seen.insert(a, b)) return false;
-    s_.found.push_back(key);
-    if (s_.found.size() >= most_) lookAtFound();
+    if (is_cut_) {
+      addFirst({order_.placeOf(of_model), key});
+    } else if (s_.seen.insert(a, b)) {
+      s_.found.push_back({0, key});
+      if (s_.found.size() >= most_) lookAtFound();
+    }
     return false;
   }
 
@@ -148,6 +172,7 @@ class Collector : public query::Visitor {
   /// To be called at the end of the walk.
   void finish() {
     if (ends_at_first_) return;
+    if (is_cut_) s_.found = s_.first.sort();
     lookAtFound();
     keepFirst();
     emit();
@@ -168,13 +193,15 @@ class Collector : public query::Visitor {
   static std::uint32_t second(std::uint64_t key) { return static_cast<std::uint32_t>(key >> 1); }
   static bool isCertain(std::uint64_t key) { return (key & 1) == 0; }
 
+  using FirstPairs = FirstItems<PlacedPair>;
   // Kept by the thread between queries.
   struct Scratch {
     query::PairSet<std::uint32_t> seen;
     query::PairSet<std::uint64_t> seen_cells;
     query::TrianglePairs pairs;
-    std::vector<std::uint64_t> found;  // keys of pairs of triangles that were not looked at yet
-    std::vector<Met> met;              // the first that touch, of those that were
+    FirstPairs first;               // that touch, where the walk is cut
+    std::vector<PlacedPair> found;  // pairs of triangles that were not tested yet
+    std::vector<Met> met;           // the first that touch, of those that were
   };
   static Scratch& scratch() {
     thread_local Scratch scratch;
@@ -206,17 +233,26 @@ class Collector : public query::Visitor {
     placed_ = true;
   }
 
-  // Any contact will do: is this one?
+  // Any pair that touches will do: does this one?
   bool endsWith(std::uint64_t key) {
-    if (q_.request.enable_contact) {
-      decidePairs(&key, 1);
-      return emit();
-    }
     if (!isCertain(key)) {
       getCorners(&key, 1);
       if (!decide(key, 0, nullptr)) return false;
     }
     return q_.addContact(first(key), second(key), nullptr);
+  }
+
+  // Only the first so many that touch are wanted: is this one of them?
+  void addFirst(const PlacedPair& pair) {
+    if (!s_.first.wants(pair) || !s_.seen.insert(first(pair.key), second(pair.key))) return;
+    if (!isCertain(pair.key)) {
+      s_.met.clear();
+      decidePairs(&pair, 1);
+      if (s_.met.empty()) return;
+      s_.met.clear();
+    }
+    s_.first.add(pair);
+    if (s_.first.isFull()) cut_ = order_.cutAfter(s_.first.last().place);
   }
 
   // True when nothing more is asked for.
@@ -231,18 +267,18 @@ class Collector : public query::Visitor {
   // Moves the first of what was found and touches to `met`, and forgets the rest of it.
   void lookAtFound() {
     constexpr std::size_t kBatch = query::TrianglePairs::kCapacity;
-    std::vector<std::uint64_t>& found = s_.found;
-    std::sort(found.begin(), found.end());
+    std::vector<PlacedPair>& found = s_.found;
+    if (!is_cut_) sortFound();
     const std::size_t before = s_.met.size();
     for (std::size_t i = 0; i < found.size(); i += kBatch) {
       const std::size_t count = std::min(kBatch, found.size() - i);
       for (std::size_t k = i + kBatch; k < std::min(i + 2 * kBatch, found.size()); ++k) {
-        t1_.prefetchCorners(first(found[k]));
-        t2_.prefetchCorners(second(found[k]));
+        t1_.prefetchCorners(first(found[k].key));
+        t2_.prefetchCorners(second(found[k].key));
       }
       for (std::size_t k = i + 2 * kBatch; k < std::min(i + 3 * kBatch, found.size()); ++k) {
-        t1_.prefetch(first(found[k]));
-        t2_.prefetch(second(found[k]));
+        t1_.prefetch(first(found[k].key));
+        t2_.prefetch(second(found[k].key));
       }
       decidePairs(&found[i], count);
       if (q_.request.enable_cost || s_.met.size() - before < left_) continue;
@@ -250,8 +286,18 @@ class Collector : public query::Visitor {
     }
     found.clear();
     keepFirst();
-    if (s_.met.size() < left_ || q_.request.enable_cost) return;
-    last_ = keyOf(static_cast<std::uint32_t>(s_.met.back().b1), static_cast<std::uint32_t>(s_.met.back().b2), true);
+  }
+
+  void sortFound() {
+    std::vector<PlacedPair>& found = s_.found;
+    constexpr std::size_t kAhead = 16;
+    const auto of_model = [this](const PlacedPair& pair) { return q_.swapped ? second(pair.key) : first(pair.key); };
+    for (std::size_t i = 0; i < found.size(); ++i) {
+      if (i + 2 * kAhead < found.size()) order_.prefetch(of_model(found[i + 2 * kAhead]));
+      if (i + kAhead < found.size()) order_.prefetchCorners(of_model(found[i + kAhead]));
+      found[i].place = order_.placeOf(of_model(found[i]));
+    }
+    std::sort(found.begin(), found.end());
   }
 
   // Of what touches, only as much as is asked for.
@@ -261,9 +307,13 @@ class Collector : public query::Visitor {
     if (met.size() > left_) met.resize(left_);
   }
 
-  void decidePairs(const std::uint64_t* keys, std::size_t count) {
+  void decidePairs(const PlacedPair* pairs, std::size_t count) {
+    std::uint64_t keys[query::TrianglePairs::kCapacity];
+    for (std::size_t i = 0; i < count; ++i) keys[i] = pairs[i].key;
     if (!needsCorners() && std::all_of(keys, keys + count, isCertain)) {
-      for (std::size_t i = 0; i < count; ++i) s_.met.push_back({first(keys[i]), second(keys[i]), {}});
+      for (std::size_t i = 0; i < count; ++i) {
+        s_.met.push_back({pairs[i].place, first(keys[i]), second(keys[i]), {}});
+      }
       return;
     }
     getCorners(keys, count);
@@ -272,9 +322,9 @@ class Collector : public query::Visitor {
     for (std::size_t i = 0; i < count; ++i) {
       const bool meet = isCertain(keys[i]) || (verdicts.meet >> i & 1);
       if (meet && margin_ == 0) {
-        addMet(keys[i], contacts[i]);
+        addMet(pairs[i], contacts[i]);
       } else if (margin_ > 0 || !kTrustsApart || !(verdicts.apart >> i & 1)) {
-        if (decide(keys[i], i, &contacts[i])) addMet(keys[i], contacts[i]);
+        if (decide(keys[i], i, &contacts[i])) addMet(pairs[i], contacts[i]);
       }
     }
   }
@@ -323,10 +373,10 @@ class Collector : public query::Visitor {
     return true;
   }
 
-  void addMet(std::uint64_t key, const query::ContactPoint& contact) {
-    const std::uint32_t a = first(key), b = second(key);
+  void addMet(const PlacedPair& pair, const query::ContactPoint& contact) {
+    const std::uint32_t a = first(pair.key), b = second(pair.key);
     if (q_.request.enable_cost) addCost(a, b);
-    Met met{a, b, {}};
+    Met met{pair.place, a, b, {}};
     if (q_.request.enable_contact) {
       const fcl::Transform3<double> X_W1 = q_.X_W1.template cast<double>();
       met.contact = {X_W1.linear() * contact.normal, X_W1 * contact.point, contact.depth};
@@ -343,7 +393,7 @@ class Collector : public query::Visitor {
       s->radius *= unit_;
     }
     if (q_.request.enable_cost) addCost(boxOf(a), boxOf(b));
-    Met met{id1, id2, {}};
+    Met met{0, id1, id2, {}};
     if (q_.request.enable_contact) {
       const Eigen::Vector3d displacement = b.center - a.center;
       const double distance = displacement.norm();
@@ -373,6 +423,7 @@ class Collector : public query::Visitor {
   }
 
   const CollideQuery<S>& q_;
+  const ContactOrder order_;
   const Triangles1& t1_;
   const Triangles2& t2_;
   const double magnitude_;  // of positions in the frame of the first geometry
@@ -380,8 +431,9 @@ class Collector : public query::Visitor {
   const bool ends_at_first_;
   const std::size_t left_;  // contacts that are asked for
   const std::size_t most_;  // pairs to gather
+  const bool is_cut_;
   Scratch& s_;
-  std::uint64_t last_ = ~std::uint64_t{0};                               // keys behind it are too many
+  query::Cut cut_;
   fcl::Transform3<double> place_ = fcl::Transform3<double>::Identity();  // the same in double
   fcl::Matrix3<S> R_12_;
   fcl::Vector3<S> p_12_;
@@ -427,7 +479,7 @@ void collideTrees(const CollideQuery<S>& q, const TreeSide& a, const TreeSide& b
   const auto walk = [&, magnitude = magnitude](auto&& with_collector) {
     const lattice::Lattice& lattice = tree_a.surface().lattice;
     const ModelTriangles<S> t1(q.swapped ? tree_b : tree_a), t2(q.swapped ? tree_a : tree_b);
-    Collector<S, ModelTriangles<S>, ModelTriangles<S>> collector(q, t1, t2, magnitude);
+    Collector<S, ModelTriangles<S>, ModelTriangles<S>> collector(q, tree_a, t1, t2, magnitude);
     collector.setFrame(lattice.origin(), lattice.unit());
     with_collector(collector);
     collector.finish();
@@ -466,9 +518,9 @@ void collideBvh(const CollideQuery<typename BV::S>& q, tree::Tree& tree, const f
     collector.finish();
   };
   if (q.swapped) {
-    walk(Collector<S, BvhTriangles<BV>, ModelTriangles<S>>(q, partner, model, magnitude));
+    walk(Collector<S, BvhTriangles<BV>, ModelTriangles<S>>(q, tree, partner, model, magnitude));
   } else {
-    walk(Collector<S, ModelTriangles<S>, BvhTriangles<BV>>(q, model, partner, magnitude));
+    walk(Collector<S, ModelTriangles<S>, BvhTriangles<BV>>(q, tree, model, partner, magnitude));
   }
   if (q.mayBeInside(before) && contains(tree, q.X_WA(), bvh, q.X_WB(), magnitude)) addInside(q, a, b, b_in_a);
 }

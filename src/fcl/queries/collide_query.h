@@ -37,9 +37,11 @@ struct CollideQuery : OrderedPair<S> {
     return request.num_max_contacts - std::min(request.num_max_contacts, result.numContacts());
   }
 
-  /// One contact is asked for: any will do, so which one it is may depend on what is resident. All other questions get
-  /// the contacts with the least (b1, b2), in this order; that takes the whole walk, some hundred times as long.
-  bool endsAtFirst() const { return request.num_max_contacts == 1 && !request.enable_cost && occupied(); }
+  /// Yes or no: any pair that touches will do, so which one it is may depend on what is resident. All other questions
+  /// get the first contacts in ContactOrder.
+  bool endsAtFirst() const {
+    return request.num_max_contacts == 1 && !request.enable_contact && !request.enable_cost && occupied();
+  }
 
   /// Adds a contact if there is room; `contact` (world frame) may be null where contacts are not enabled. True when
   /// nothing more is asked for.

@@ -29,6 +29,13 @@ class DeferredPairs {
   bool empty() const { return waiting_.empty(); }
   void add(const Pair& pair) { waiting_.push_back({pair, kUnknown}); }
 
+  /// Forgets the pairs of which f says that nobody asks for them any more.
+  template <typename F>
+  void dropIf(F&& f) {
+    waiting_.erase(std::remove_if(waiting_.begin(), waiting_.end(), [&](const Waiting& w) { return f(w.pair); }),
+                   waiting_.end());
+  }
+
   /// Makes what some pairs need resident, in one batch, and gives these pairs to f. A walk that has to see everything
   /// grows all that is deferred, so it makes one batch a level. One that ends at its first hit takes the deepest
   /// overlaps first, and twice as many each time: a hit deep inside costs one small batch a level, a miss at most the

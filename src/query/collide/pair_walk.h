@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #pragma once
 
+#include <algorithm>
 #include <cstdint>
 #include <utility>
 #include <vector>
@@ -33,7 +34,8 @@ class PairWalk {
         b_in_a_(b_in_a),
         a_in_b_(b_in_a.inverse()),
         visitor_(visitor),
-        spheres_(a.isConservative() || b.isConservative()) {
+        spheres_(a.isConservative() || b.isConservative()),
+        cut_(spheres_ ? nullptr : visitor.cut()) {
     if constexpr (!B::kBodies) BOCST_ASSERT(!a.isConservative() || !b.isConservative());
   }
 
@@ -54,8 +56,10 @@ class PairWalk {
         s.stack.pop_back();
         if (spheres_ ? stepSpheres(pair, s) : stepBoxes(pair, s)) return true;
       }
+      if (cut_ != nullptr) s.deferred.dropIf([this](const Pair& pair) { return isBeyondCut(pair); });
       if (s.deferred.empty()) return false;
-      s.deferred.grow(a_, b_, b_in_a_, visitor_.endsAtFirst(), [&s](const Pair& pair) { s.stack.push_back(pair); });
+      const bool may_end = visitor_.endsAtFirst() || cut_ != nullptr;
+      s.deferred.grow(a_, b_, b_in_a_, may_end, [&s](const Pair& pair) { s.stack.push_back(pair); });
       seen_a_.valid = seen_b_.valid = false;
     }
   }
@@ -73,6 +77,18 @@ class PairWalk {
     thread_local Scratch s;
     return s;
   }
+
+  // Of the pairs pushed last, those whose nodes of A reach back the farthest are to be popped first.
+  void orderAlongCut(Scratch& s, std::size_t before) const {
+    std::pair<double, Pair> order[8];
+    const std::size_t count = s.stack.size() - before;
+    BOCST_ASSERT(count <= 8);
+    for (std::size_t i = 0; i < count; ++i) order[i] = {cut_->leastOf(a_.volume(s.stack[before + i].a)), s.stack[before + i]};
+    std::sort(order, order + count, [](const auto& x, const auto& y) { return x.first > y.first; });
+    for (std::size_t i = 0; i < count; ++i) s.stack[before + i] = order[i].second;
+  }
+
+  bool isBeyondCut(const Pair& pair) const { return cut_->isBeyond(a_.volume(pair.a)); }
 
   bool rootsMeet(const Pair& root) const {
     return spheres_ ? sphereMeets(a_.sphere(root.a), root.b)
@@ -106,6 +122,7 @@ class PairWalk {
   }
 
   bool stepBoxes(const Pair& pair, Scratch& s) {
+    if (cut_ != nullptr && isBeyondCut(pair)) return false;
     // Depth first, most steps share a node with the one before.
     seeNode(a_, pair.a, seen_a_);
     seeNode(b_, pair.b, seen_b_);
@@ -120,10 +137,12 @@ class PairWalk {
       if (sa == State::kGrows) {
         s.deferred.add(pair);
       } else {
+        const std::size_t before = s.stack.size();
         const auto push = [&](typename A::Node c) { s.stack.push_back({c, pair.b}); };
         if constexpr (!B::kBodies) {
           if (sb == State::kLeaf && seen_a_.size < size_b) {
             a_.childrenMeeting(pair.a, volumeOf(b_, seen_b_), b_in_a_, s.large_b, b_, pair.b, push);
+            if (cut_ != nullptr) orderAlongCut(s, before);
             return false;
           }
         }
@@ -134,6 +153,7 @@ class PairWalk {
         } else {
           a_.overlappingChildren(pair.a, volumeOf(b_, seen_b_), b_in_a_, push);
         }
+        if (cut_ != nullptr) orderAlongCut(s, before);
       }
     } else if (sb == State::kGrows) {
       s.deferred.add(pair);
@@ -278,6 +298,7 @@ class PairWalk {
   const SimilarityTransform b_in_a_, a_in_b_;
   V& visitor_;
   const bool spheres_;
+  const Cut* const cut_;
 };
 
 }  // namespace bocst::query

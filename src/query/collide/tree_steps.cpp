@@ -306,6 +306,28 @@ HWY_INLINE bool pushOthers(PairSteps& s, int side, const tree::Block& block, std
   return !waits;
 }
 
+// How far a node reaches back along the axis of the cut, in the frame of side 0.
+HWY_INLINE float leastAlongCut(const PairSteps& s, const Frame& f, std::uint32_t o) {
+  return f.center[0][s.cut_axis][o] - f.half[0][s.cut_axis][o];
+}
+
+HWY_INLINE bool isBeyondCut(const PairSteps& s, const StepNode& of_side_0) {
+  if (!s.isCut() || of_side_0.lane == StepNode::kNoLane) return false;
+  return leastAlongCut(s, s.frames[of_side_0.lane / 8], of_side_0.lane % 8) > s.cut;
+}
+
+// The order of octants by how far they reach back along the axis of the cut.
+HWY_INLINE void orderAlongCut(const PairSteps& s, const Frame& f, std::uint32_t (&order)[8]) {
+  const D d;
+  const hn::RebindToUnsigned<D> du;
+  const V beyond = hn::Set(d, 4.0f * lattice::kMiddle);  // keeps the numbers positive: their bits are in their order
+  for (std::size_t i = 0; i < 8; i += hn::Lanes(d)) {
+    const V least = hn::Sub(hn::Load(d, f.center[0][s.cut_axis] + i), hn::Load(d, f.half[0][s.cut_axis] + i));
+    const auto octant = hn::Iota(du, static_cast<std::uint32_t>(i));
+    hn::StoreU(hn::Or(hn::AndNot(hn::Set(du, 7), hn::BitCast(du, hn::Sub(beyond, least))), octant), du, order + i);
+  }
+}
+
 PairSteps::Event NextEvent(PairSteps& s) {
   Popped p;
   bool known = false;  // what comes next
@@ -318,6 +340,7 @@ PairSteps::Event NextEvent(PairSteps& s) {
     const int side = p.side;
     s.pair[side] = p.own;
     s.pair[1 - side] = p.other;
+    if (isBeyondCut(s, s.pair[0])) continue;
     const bool own_leaf = isLeaf(p.own), other_leaf = isLeaf(p.other);
     if (own_leaf && other_leaf) {
       if (!s.sees_all) {
@@ -347,6 +370,7 @@ PairSteps::Event NextEvent(PairSteps& s) {
     const unsigned mask = overlapping(s.geometry, s.frames[frames], s.frames[other.lane / 8], other.lane % 8,
                                       block.grey, s.stack[s.depth].order);
     if (mask == 0) continue;
+    if (s.isCut() && x == 0) orderAlongCut(s, s.frames[frames], s.stack[s.depth].order);
     if (y == 0 ? leaf0 && deeper >= s.larger : leaf1 && deeper < s.not_smaller) {
       s.frames_used = frames;
       s.expanded = x;

@@ -7,6 +7,7 @@
 
 #include "query/cull/frames.h"
 #include "query/leaf/large_triangles.h"
+#include "query/sides/visitor.h"
 #include "tree/tree.h"
 
 namespace bocst::query {
@@ -76,6 +77,16 @@ struct PairSteps {
 
   /// No hit ends the walk: what is on the stack will be walked, so it is fetched ahead.
   bool sees_all = false;
+
+  /// What of side 0 lies beyond this along the axis, in its frame, is left out; octants of side 0 that reach less far
+  /// come first. Axis 3: nothing is.
+  std::uint32_t cut_axis = 3;
+  float cut = 0;
+  bool isCut() const { return cut_axis < 3; }
+  void setCut(const Cut& c) {
+    cut_axis = static_cast<std::uint32_t>(c.axis);
+    cut = static_cast<float>(c.last - lattice::kMiddle) + geometry.rounding_margin;
+  }
 
   StepNode pair[2];                        ///< Of the event.
   std::uint32_t large = StepGroup::kNone;  ///< As in StepGroup, of the pair.

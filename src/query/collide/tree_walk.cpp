@@ -40,8 +40,11 @@ bool TreeWalk::search(Scratch& s) {
 
   PairSteps steps(&a_.tree(), &b_.tree(), a_.now(), PairFrames(b_in_a_.scale, b_in_a_), s.frames);
   for (int side = 0; side < 2; ++side) steps.leaf[side] = &s.large[side];
-  steps.sees_all = !visitor_->endsAtFirst();
-  steps.all_at_once = is_shallow_ || steps.sees_all;
+  const Cut* const cut = visitor_->cut();
+  const bool may_end = visitor_->endsAtFirst() || cut != nullptr;
+  steps.sees_all = !may_end;
+  steps.all_at_once = cut == nullptr && (is_shallow_ || steps.sees_all);
+  if (cut != nullptr) steps.setCut(*cut);
   const auto push = [&](const DeferredPairs<TreeSide, TreeSide>::Pair& pair) {
     if (s.stack.size() < steps.depth + 1 + PairSteps::kStackRoom) {
       s.stack.resize(2 * (steps.depth + PairSteps::kStackRoom));
@@ -52,9 +55,12 @@ bool TreeWalk::search(Scratch& s) {
   push({a_.root(), b_.root()});
   for (;;) {
     if (stepAll(steps, s)) return true;
+    if (cut != nullptr) {
+      s.deferred.dropIf([&](const auto& pair) { return cut->isBeyond(a_.volume(pair.a)); });
+    }
     if (s.deferred.empty()) return false;
     s.grew = true;
-    s.deferred.grow(a_, b_, b_in_a_, visitor_->endsAtFirst(), push);
+    s.deferred.grow(a_, b_, b_in_a_, may_end, push);
   }
 }
 
@@ -71,6 +77,7 @@ bool TreeWalk::stepAll(PairSteps& steps, Scratch& s) {
         break;
       case PairSteps::kLeaves:
         if (testLeaves(steps, s)) return true;
+        if (steps.isCut()) steps.setCut(*visitor_->cut());
         break;
     }
   }

@@ -2,7 +2,9 @@
 #pragma once
 
 #include <Eigen/Core>
+#include <cstddef>
 #include <cstdint>
+#include <limits>
 
 #include "geometry/volume.h"
 
@@ -20,6 +22,20 @@ struct CellLeaf {
   Sphere sphere;
 };
 
+/// What of side A lies beyond a plane need not be visited: nodes whose least coordinate along `axis` is larger than
+/// `last`, in the frame of A. A visitor that looks for the first of many pairs along that axis moves the plane.
+struct Cut {
+  int axis = 0;
+  double last = std::numeric_limits<double>::infinity();
+
+  double leastOf(const Volume& v) const {
+    const auto k = static_cast<std::size_t>(axis);
+    return v.center[k] - static_cast<double>(v.half[k]);
+  }
+  /// Half extents are rounded to float: by less than 2^-8 of a lattice unit, as is the middle.
+  bool isBeyond(const Volume& v) const { return leastOf(v) > last + 0x1p-6; }
+};
+
 /// What a query does with the pairs that a walk finds. Each function returns true to end the walk. A pair may come more
 /// than once.
 class Visitor {
@@ -28,6 +44,8 @@ class Visitor {
 
   /// The first hit will end the walk.
   virtual bool endsAtFirst() const = 0;
+  /// Where the plane lies that cuts side A, or null; the walk looks again whenever it has called the visitor.
+  virtual const Cut* cut() const { return nullptr; }
   /// Triangle a of side A and b of side B may touch; everything that touches comes here. Where `certain`, they meet,
   /// and FCL's test says so.
   virtual bool triangles(std::uint32_t a, std::uint32_t b, bool certain) = 0;
@@ -46,6 +64,7 @@ class ConvexVisitor {
   virtual ~ConvexVisitor() = default;
 
   virtual bool endsAtFirst() const = 0;
+  virtual const Cut* cut() const { return nullptr; }
   /// Triangle a of side A and body b may touch; everything that touches comes here.
   virtual bool triangle(std::uint32_t a, const Node& b) = 0;
   /// The sphere of a cell (frame of A) meets body b.
