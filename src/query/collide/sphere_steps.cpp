@@ -9,6 +9,7 @@
 #include <algorithm>
 #include <cmath>
 
+#include "log/assert.h"
 #include "simd/octants-inl.h"
 
 #ifndef BOCST_SPHERE_STEPS_ONCE
@@ -184,6 +185,7 @@ HWY_INLINE bool isLarger(const SphereSteps& s, int x, std::uint32_t level, std::
 
 HWY_INLINE void push(SphereSteps& s, int side, const tree::Block& block, std::uint32_t index, std::uint32_t frame,
                      std::uint32_t frames, const SphereGroup::Node& other, unsigned octants) {
+  BOCST_ASSERT(frames <= SphereSteps::kFrames && s.stack + s.depth < s.stack_end);
   SphereGroup& top = s.stack[s.depth++];
   top.other = other;
   top.at = &block;

@@ -90,7 +90,8 @@ struct SphereSteps {
   SphereFrame* const spheres;
   std::uint64_t holds[kFrames];  ///< Which block of which side is in a frame.
 
-  SphereGroup* stack = nullptr;  ///< With room for kStackRoom more.
+  SphereGroup* stack = nullptr;  ///< With room for kStackRoom more, below `stack_end`.
+  const SphereGroup* stack_end = nullptr;
   std::size_t depth = 0;
 
   tree::NodeRef pair[2];  ///< Of the event.

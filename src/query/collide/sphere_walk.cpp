@@ -46,6 +46,7 @@ bool SphereWalk::search(SphereSteps& steps, Scratch& s, Visitor& visitor) const 
       s.stack.resize(2 * (steps.depth + SphereSteps::kStackRoom));
     }
     steps.stack = s.stack.data();
+    steps.stack_end = steps.stack + s.stack.size();
     pushPair(steps, pair.a, pair.b);
   };
   s.deferred.clear();

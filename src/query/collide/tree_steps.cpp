@@ -8,6 +8,7 @@
 
 #include <algorithm>
 
+#include "log/assert.h"
 #include "query/cull/frames-inl.h"
 
 #ifndef BOCST_TREE_STEPS_ONCE
@@ -20,24 +21,39 @@ inline bool isLeaf(const StepNode& n) {
   return tag == tree::ChildRef::kShortList || (tag == tree::ChildRef::kList && n.level == lattice::kMaxLevel);
 }
 
-inline std::uint32_t childLevel(const tree::Block& block) { return static_cast<std::uint32_t>(block.childLevel()); }
+// A block of side x whose octants are in a frame.
+inline BlockView viewOf(const PairSteps& s, int x, std::uint32_t index, std::uint32_t frame) {
+  const tree::Block& block = s.tree[x]->block(index);
+  return {&block, index, static_cast<std::uint32_t>(block.childLevel()), frame, static_cast<std::uint32_t>(x)};
+}
+
+// Octant o of a block in a frame.
+inline StepNode octantOf(const BlockView& b, std::uint32_t o) {
+  StepNode n;
+  n.node = tree::NodeRef::octant(b.index, static_cast<int>(o));
+  n.ref = b.at->child[o].load(std::memory_order_acquire);
+  n.level = b.level;
+  n.lane = 8 * b.frame + o;
+  return n;
+}
 
 // The order is there already: overlapping() writes it to where the group will be.
-inline void push(PairSteps& s, int side, const tree::Block* at, std::uint32_t block, std::uint32_t level,
-                 std::uint32_t frame, const StepNode& other, unsigned octants, std::uint32_t large = StepGroup::kNone) {
+inline void push(PairSteps& s, const BlockView& own, const StepNode& other, unsigned octants,
+                 std::uint32_t asked = AskedLeaf::kNone) {
+  BOCST_ASSERT(s.stack + s.depth < s.stack_end);
   StepGroup& top = s.stack[s.depth++];
-  top.at = at;
+  top.own.at = own.at;
+  top.own.index = own.index;
+  top.own.level = own.level;
+  top.own.frame = own.frame;
+  top.own.side = own.side;
   top.other.node = other.node;
   top.other.ref = other.ref;
   top.other.level = other.level;
   top.other.lane = other.lane;
-  top.side = static_cast<std::uint32_t>(side);
-  top.block = block;
-  top.frame = frame;
-  top.level = level;
   top.octants = octants;
   top.late = 0;
-  top.large = large;
+  top.asked = asked;
 }
 
 // Most of a leaf's corners, and all of them.
@@ -57,9 +73,10 @@ inline void fetch(const tree::Tree& tree, tree::ChildRef ref, std::size_t leaf_l
 }
 
 // The same for octants that are all to be walked, so that there is time until they are asked for: a leaf as a whole.
-inline void fetchAll(const tree::Tree& tree, const tree::Block& block, unsigned octants) {
+inline void fetchAll(const PairSteps& s, const BlockView& block, unsigned octants) {
+  const tree::Tree& tree = *s.tree[block.side];
   for (; octants != 0; octants &= octants - 1) {
-    const tree::ChildRef ref = block.child[__builtin_ctz(octants)].load(std::memory_order_acquire);
+    const tree::ChildRef ref = block.at->child[__builtin_ctz(octants)].load(std::memory_order_acquire);
     fetch(tree, ref, kLeafLines);
     if (ref.tag() == tree::ChildRef::kBlock) tree.prefetchLastUse(ref.index());
   }
@@ -82,7 +99,7 @@ HWY_INLINE bool decodeBlock(PairSteps& s, int own, std::uint32_t index, const tr
   return true;
 }
 
-// Where the volume of a pair's node on one side is; for pairs that come without frames.
+// Where the volume of a pair's node on one side is; for pairs that come without frames. Takes a frame.
 HWY_INLINE void lookUp(PairSteps& s, StepNode& n, int side, std::uint32_t& frames) {
   const tree::Tree& tree = *s.tree[side];
   if (n.node.isRoot()) {
@@ -95,6 +112,15 @@ HWY_INLINE void lookUp(PairSteps& s, StepNode& n, int side, std::uint32_t& frame
     n.lane = 8 * frames + static_cast<std::uint32_t>(n.node.octant());
   }
   ++frames;
+}
+
+// The block of a node of side x that is expanded, its octants in a frame. `is_new`: they were not there before.
+HWY_INLINE BlockView open(PairSteps& s, int x, const StepNode& node, std::uint32_t frame, bool& is_new) {
+  BOCST_ASSERT(frame < PairSteps::kFrames);
+  const BlockView block = viewOf(s, x, node.ref.index(), frame);
+  s.tree[x]->markUsed(block.index, s.now);
+  is_new = decodeBlock(s, x, block.index, *block.at, frame);
+  return block;
 }
 
 std::uint8_t OverlappingOctants(const PairFrames& geometry, int own, const CellOctants& cell, const CellOctants& other,
@@ -123,6 +149,7 @@ struct Popped {
   StepNode own, other;
   int side;
   std::uint32_t frames;
+  AskedLeaf asked;
 };
 
 // Takes the next pair off the stack: the deepest, or, where all are wanted, the first, which is known sooner. A step is
@@ -135,27 +162,99 @@ HWY_INLINE Popped pop(PairSteps& s) {
     const std::uint32_t o = s.all_at_once ? static_cast<std::uint32_t>(__builtin_ctz(which)) : deepest(top, which);
     const std::uint32_t rest = top.octants & ~(1u << o);
     Popped p;
-    p.side = static_cast<int>(top.side);
-    p.own.node = tree::NodeRef::octant(top.block, static_cast<int>(o));
-    p.own.ref =
-        top.at != nullptr ? top.at->child[o].load(std::memory_order_acquire) : s.tree[p.side]->childRef(p.own.node);
+    p.side = static_cast<int>(top.own.side);
+    p.own.node = tree::NodeRef::octant(top.own.index, static_cast<int>(o));
+    p.own.ref = top.own.at != nullptr ? top.own.at->child[o].load(std::memory_order_acquire)
+                                      : s.tree[p.side]->childRef(p.own.node);
     if (p.own.ref.tag() == tree::ChildRef::kImplicit && rest != 0 && soon != 0) {
       top.late |= 1u << o;
       continue;
     }
     top.octants = rest;
     if (rest == 0) --s.depth;
-    p.own.level = top.level;
-    p.own.lane = top.frame == StepGroup::kNoFrame ? StepNode::kNoLane : 8 * top.frame + o;
+    p.own.level = top.own.level;
+    p.own.lane = top.own.frame == BlockView::kNoFrame ? StepNode::kNoLane : 8 * top.own.frame + o;
     p.other.node = top.other.node;
     p.other.ref = top.other.ref;
     p.other.level = top.other.level;
     p.other.lane = top.other.lane;
-    p.frames = top.frame + 1;  // 0 without a frame
-    s.large = top.large;
-    s.triangles = top.triangles[o];
+    p.frames = top.own.frame + 1;  // 0 without a frame
+    p.asked.side = top.asked;
+    p.asked.triangles = top.triangles[o];
     return p;
   }
+}
+
+// Eight octants of a frame, in their own frame; `low` and `high` are the rounding margin beyond their boxes.
+struct OctantLanes {
+  V center[3], half[3], normal[3], slab_center, slab_half, low[3], high[3], rounding_margin;
+};
+
+HWY_INLINE void load(const Frame& f, std::size_t i, float rounding_margin, OctantLanes& o) {
+  const D d;
+  o.rounding_margin = hn::Set(d, rounding_margin);
+  BOCST_UNROLL
+  for (int k = 0; k < 3; ++k) {
+    o.center[k] = hn::Load(d, f.center[0][k] + i);
+    o.half[k] = hn::Load(d, f.half[0][k] + i);
+    o.normal[k] = hn::Load(d, f.normal[0][k] + i);
+    const V extent = hn::Add(o.half[k], o.rounding_margin);
+    o.low[k] = hn::Sub(o.center[k], extent);
+    o.high[k] = hn::Add(o.center[k], extent);
+  }
+  o.slab_center = hn::Load(d, f.slab_center + i);
+  o.slab_half = hn::Load(d, f.slab_half + i);
+}
+
+// Do the octants meet triangle t's box?
+HWY_INLINE M meetsBox(const OctantLanes& o, const TriangleBounds& b, int t, M meet) {
+  const D d;
+  BOCST_UNROLL
+  for (int k = 0; k < 3; ++k) {
+    meet =
+        hn::And(meet, hn::And(hn::Le(o.low[k], hn::Set(d, b.high[k][t])), hn::Ge(o.high[k], hn::Set(d, b.low[k][t]))));
+  }
+  return meet;
+}
+
+// Do they reach triangle t's plane? How far an octant reaches along the normal: its box, and its slab as in
+// overlapping().
+HWY_INLINE M meetsPlane(const OctantLanes& o, const TriangleBounds& b, int t, M meet) {
+  const D d;
+  V n[3], at = hn::Zero(d), r = o.rounding_margin, along = hn::Zero(d);
+  BOCST_UNROLL
+  for (int k = 0; k < 3; ++k) {
+    n[k] = hn::Set(d, b.normal[k][t]);
+    at = hn::MulAdd(n[k], o.center[k], at);
+    r = hn::MulAdd(hn::Abs(n[k]), o.half[k], r);
+    along = hn::MulAdd(n[k], o.normal[k], along);
+  }
+  V slab_r = hn::MulAdd(hn::Abs(along), o.slab_half, o.rounding_margin);
+  BOCST_UNROLL
+  for (int k = 0; k < 3; ++k) {
+    slab_r = hn::MulAdd(hn::Abs(hn::NegMulAdd(along, o.normal[k], n[k])), o.half[k], slab_r);
+  }
+  const V slab_at = hn::MulAdd(along, o.slab_center, at);
+  const V least = hn::Max(hn::Sub(at, r), hn::Sub(slab_at, slab_r));
+  const V most = hn::Min(hn::Add(at, r), hn::Add(slab_at, slab_r));
+  return hn::And(meet, hn::And(hn::Le(least, hn::Set(d, b.normal_high[t])), hn::Ge(most, hn::Set(d, b.normal_low[t]))));
+}
+
+// Do they reach behind triangle t's edges, in its plane?
+HWY_INLINE M meetsEdges(const OctantLanes& o, const TriangleBounds& b, int t, M meet) {
+  const D d;
+  BOCST_UNROLL
+  for (int e = 0; e < 3; ++e) {
+    V at = hn::Zero(d), r = o.rounding_margin;
+    BOCST_UNROLL
+    for (int k = 0; k < 3; ++k) {
+      const V a = hn::Set(d, b.edge[e][k][t]);
+      at = hn::MulAdd(a, o.center[k], at);
+      r = hn::MulAdd(hn::Abs(a), o.half[k], r);
+    }
+    meet = hn::And(meet, hn::Le(hn::Sub(at, r), hn::Set(d, b.edge_high[e][t])));
+  }
+  return meet;
 }
 
 // The octants of a frame against triangles, see octantsMeeting(). Of the octants in `mask`, and the triangles in
@@ -165,62 +264,18 @@ HWY_INLINE unsigned meeting(const PairFrames& g, int own, const Frame& f, unsign
                             const TriangleBounds& b, F&& store) {
   const D d;
   const hn::RebindToUnsigned<D> du;
-  const V rounding_margin = hn::Set(d, g.side[own].rounding_margin);
   unsigned result = 0;
   for (std::size_t i = 0; i < 8; i += hn::Lanes(d)) {
     const std::uint8_t wanted[8] = {static_cast<std::uint8_t>(mask >> i)};
     const M in = hn::LoadMaskBits(d, wanted);
-    V c[3], h[3], m[3], low[3], high[3];
-    BOCST_UNROLL
-    for (int k = 0; k < 3; ++k) {
-      c[k] = hn::Load(d, f.center[0][k] + i);
-      h[k] = hn::Load(d, f.half[0][k] + i);
-      m[k] = hn::Load(d, f.normal[0][k] + i);
-      const V extent = hn::Add(h[k], rounding_margin);
-      low[k] = hn::Sub(c[k], extent);
-      high[k] = hn::Add(c[k], extent);
-    }
-    const V slab = hn::Load(d, f.slab_center + i), thick = hn::Load(d, f.slab_half + i);
+    OctantLanes octants;
+    load(f, i, g.side[own].rounding_margin, octants);
     auto triangles = hn::Zero(du);
     for (std::uint32_t left = which; left != 0; left &= left - 1) {
       const int t = __builtin_ctz(left);
-      M meet = in;
-      BOCST_UNROLL
-      for (int k = 0; k < 3; ++k) {
-        meet =
-            hn::And(meet, hn::And(hn::Le(low[k], hn::Set(d, b.high[k][t])), hn::Ge(high[k], hn::Set(d, b.low[k][t]))));
-      }
-      {
-        // How far the octant reaches along the normal: its box, and its slab as in overlapping().
-        V n[3], at = hn::Zero(d), r = rounding_margin, along = hn::Zero(d);
-        BOCST_UNROLL
-        for (int k = 0; k < 3; ++k) {
-          n[k] = hn::Set(d, b.normal[k][t]);
-          at = hn::MulAdd(n[k], c[k], at);
-          r = hn::MulAdd(hn::Abs(n[k]), h[k], r);
-          along = hn::MulAdd(n[k], m[k], along);
-        }
-        V slab_r = hn::MulAdd(hn::Abs(along), thick, rounding_margin);
-        BOCST_UNROLL
-        for (int k = 0; k < 3; ++k) slab_r = hn::MulAdd(hn::Abs(hn::NegMulAdd(along, m[k], n[k])), h[k], slab_r);
-        const V slab_at = hn::MulAdd(along, slab, at);
-        const V least = hn::Max(hn::Sub(at, r), hn::Sub(slab_at, slab_r));
-        const V most = hn::Min(hn::Add(at, r), hn::Add(slab_at, slab_r));
-        meet = hn::And(meet,
-                       hn::And(hn::Le(least, hn::Set(d, b.normal_high[t])), hn::Ge(most, hn::Set(d, b.normal_low[t]))));
-      }
+      M meet = meetsPlane(octants, b, t, meetsBox(octants, b, t, in));
       if (hn::AllFalse(d, meet)) continue;
-      BOCST_UNROLL
-      for (int e = 0; e < 3; ++e) {
-        V at = hn::Zero(d), r = rounding_margin;
-        BOCST_UNROLL
-        for (int k = 0; k < 3; ++k) {
-          const V a = hn::Set(d, b.edge[e][k][t]);
-          at = hn::MulAdd(a, c[k], at);
-          r = hn::MulAdd(hn::Abs(a), h[k], r);
-        }
-        meet = hn::And(meet, hn::Le(hn::Sub(at, r), hn::Set(d, b.edge_high[e][t])));
-      }
+      meet = meetsEdges(octants, b, t, meet);
       triangles = hn::Or(triangles, hn::IfThenElseZero(hn::RebindMask(du, meet), hn::Set(du, 1u << t)));
     }
     store(i, triangles);
@@ -231,21 +286,21 @@ HWY_INLINE unsigned meeting(const PairFrames& g, int own, const Frame& f, unsign
   return result;
 }
 
-// The octants of the pair's smaller node that the larger leaf's triangles may meet, onto the stack.
-HWY_NOINLINE void pushThose(PairSteps& s) {
+// The octants in `mask` of a block that a larger leaf's triangles may meet, onto the stack.
+HWY_NOINLINE void pushThose(PairSteps& s, const BlockView& block, const StepNode& leaf, unsigned mask,
+                            std::uint32_t triangles) {
   const hn::RebindToUnsigned<D> du;
-  const int x = s.expanded, y = 1 - x;
+  const int x = static_cast<int>(block.side), y = 1 - x;
   StepGroup& top = s.stack[s.depth];
-  const unsigned mask = meeting(s.geometry, x, s.frames[s.frames_used], s.mask, s.triangles, s.leaf[y]->bounds(),
-                                [&top, du](std::size_t i, hn::Vec<hn::RebindToUnsigned<D>> met)
-                                    HWY_ATTR { hn::StoreU(met, du, top.triangles + i); });
-  if (mask == 0) return;
-  const std::uint32_t index = s.pair[x].ref.index();
-  const tree::Block& block = s.tree[x]->block(index);
-  push(s, x, &block, index, childLevel(block), s.frames_used, s.pair[y], mask, static_cast<std::uint32_t>(y));
+  mask = meeting(s.geometry, x, s.frames[block.frame], mask, triangles, s.leaf[y]->bounds(),
+                 [&top, du](std::size_t i, hn::Vec<hn::RebindToUnsigned<D>> met)
+                     HWY_ATTR { hn::StoreU(met, du, top.triangles + i); });
+  if (mask != 0) push(s, block, leaf, mask, static_cast<std::uint32_t>(y));
 }
 
-void PushMeeting(PairSteps& s) { pushThose(s); }
+void PushMeeting(PairSteps& s, const StepEvent& e, std::uint32_t triangles) {
+  pushThose(s, e.block, e.pair[1 - e.block.side], e.mask, triangles);
+}
 
 void OctantsMeeting(const PairFrames& geometry, int own, const CellOctants& cell, const TriangleBounds& triangles,
                     std::size_t count, std::uint32_t (&met)[8]) {
@@ -256,53 +311,43 @@ void OctantsMeeting(const PairFrames& geometry, int own, const CellOctants& cell
           [&met, du](std::size_t i, hn::Vec<hn::RebindToUnsigned<D>> m) HWY_ATTR { hn::StoreU(m, du, met + i); });
 }
 
-// Expands the other node of the pair for all octants in `mask` of block `index`, in frame `frame`; false where it is
-// not the next to be expanded. `fetch_own`: nobody has fetched what is below that block.
-HWY_INLINE bool expandOther(PairSteps& s, int x, const tree::Block& own, std::uint32_t index, std::uint32_t level,
-                            const StepNode& other, std::uint32_t frame, unsigned mask, bool fetch_own) {
-  const int y = 1 - x;
+// Expands the other node of the pair for all octants in `mask` of a block; false where it is not the next to be
+// expanded. `fetch_own`: nobody has fetched what is below that block.
+HWY_INLINE bool expandOther(PairSteps& s, const BlockView& own, const StepNode& other, unsigned mask, bool fetch_own) {
+  const int x = static_cast<int>(own.side), y = 1 - x;
   if (other.ref.tag() != tree::ChildRef::kBlock) return false;
-  const int deeper = static_cast<int>(other.level) - static_cast<int>(level);
+  const int deeper = static_cast<int>(other.level) - static_cast<int>(own.level);
   if (x == 0 ? deeper >= s.not_smaller : -deeper < s.not_smaller) return false;
-  const std::uint32_t other_index = other.ref.index();
-  const tree::Block& block = s.tree[y]->block(other_index);
-  s.tree[y]->markUsed(other_index, s.now);
-  const bool fetch_other = decodeBlock(s, y, other_index, block, frame + 1) && s.sees_all;
-  if (fetch_own) fetchAll(*s.tree[x], own, mask);
+  bool is_new;
+  const BlockView block = open(s, y, other, own.frame + 1, is_new);
+  if (fetch_own) fetchAll(s, own, mask);
   unsigned met = 0;
   for (; mask != 0; mask &= mask - 1) {
     const auto o = static_cast<std::uint32_t>(__builtin_ctz(mask));
-    const unsigned left = overlapping(s.geometry, s.frames[frame + 1], s.frames[frame], o, block.grey, nullptr);
+    const unsigned left =
+        overlapping(s.geometry, s.frames[block.frame], s.frames[own.frame], o, block.at->grey, nullptr);
     if (left == 0) continue;
     met |= left;
-    StepNode n;
-    n.node = tree::NodeRef::octant(index, static_cast<int>(o));
-    n.ref = own.child[o].load(std::memory_order_acquire);
-    n.level = level;
-    n.lane = 8 * frame + o;
+    const StepNode n = octantOf(own, o);
     if (!s.sees_all) fetch(*s.tree[x], n.ref);
-    push(s, y, &block, other_index, childLevel(block), frame + 1, n, left);
+    push(s, block, n, left);
   }
-  if (fetch_other) fetchAll(*s.tree[y], block, met);
+  if (is_new && s.sees_all) fetchAll(s, block, met);
   return true;
 }
 
 // Puts some octants of a block on the stack, but for the one that is next: true where that is in `next`, at once.
-HWY_INLINE bool pushOthers(PairSteps& s, int side, const tree::Block& block, std::uint32_t index, std::uint32_t level,
-                           std::uint32_t frame, const StepNode& other, unsigned octants, Popped& next) {
+HWY_INLINE bool pushOthers(PairSteps& s, const BlockView& own, const StepNode& other, unsigned octants, Popped& next) {
   const std::uint32_t o =
       s.all_at_once ? static_cast<std::uint32_t>(__builtin_ctz(octants)) : deepest(s.stack[s.depth], octants);
   const std::uint32_t rest = octants & ~(1u << o);
-  next.side = side;
-  next.own.node = tree::NodeRef::octant(index, static_cast<int>(o));
-  next.own.ref = block.child[o].load(std::memory_order_acquire);
-  next.own.level = level;
-  next.own.lane = 8 * frame + o;
+  next.side = static_cast<int>(own.side);
+  next.own = octantOf(own, o);
   next.other = other;
-  next.frames = frame + 1;
-  s.large = StepGroup::kNone;
+  next.frames = own.frame + 1;
+  next.asked.side = AskedLeaf::kNone;
   const bool waits = rest != 0 && next.own.ref.tag() == tree::ChildRef::kImplicit;
-  if (rest != 0) push(s, side, &block, index, level, frame, other, waits ? octants : rest);
+  if (rest != 0) push(s, own, other, waits ? octants : rest);
   return !waits;
 }
 
@@ -311,9 +356,10 @@ HWY_INLINE float leastAlongCut(const PairSteps& s, const Frame& f, std::uint32_t
   return f.center[0][s.cut_axis][o] - f.half[0][s.cut_axis][o];
 }
 
-HWY_INLINE bool isBeyondCut(const PairSteps& s, const StepNode& of_side_0) {
-  if (!s.isCut() || of_side_0.lane == StepNode::kNoLane) return false;
-  return leastAlongCut(s, s.frames[of_side_0.lane / 8], of_side_0.lane % 8) > s.cut;
+HWY_INLINE bool isBeyondCut(const PairSteps& s, const Popped& p) {
+  const std::uint32_t lane = p.side == 0 ? p.own.lane : p.other.lane;
+  if (!s.isCut() || lane == StepNode::kNoLane) return false;
+  return leastAlongCut(s, s.frames[lane / 8], lane % 8) > s.cut;
 }
 
 // The order of octants by how far they reach back along the axis of the cut.
@@ -328,64 +374,76 @@ HWY_INLINE void orderAlongCut(const PairSteps& s, const Frame& f, std::uint32_t 
   }
 }
 
-PairSteps::Event NextEvent(PairSteps& s) {
+// Which node of a pair is expanded, and is the other a leaf that is larger?
+struct Choice {
+  int side;
+  bool has_larger_leaf;
+};
+
+// The larger of two nodes is expanded, unless it is a leaf. At most one is.
+HWY_INLINE Choice choose(const PairSteps& s, const Popped& p, bool own_leaf, bool other_leaf) {
+  const bool leaf0 = p.side == 0 ? own_leaf : other_leaf, leaf1 = p.side == 0 ? other_leaf : own_leaf;
+  const int below = static_cast<int>(p.own.level) - static_cast<int>(p.other.level);
+  const int deeper = p.side == 0 ? -below : below;  // side 1's node than side 0's
+  if (leaf1 || (!leaf0 && deeper >= s.not_smaller)) return {0, leaf1 && deeper < s.not_smaller};
+  return {1, leaf0 && deeper >= s.larger};
+}
+
+HWY_INLINE StepEvent eventOf(StepEvent::Kind kind, const Popped& p) {
+  StepEvent e;
+  e.kind = kind;
+  e.pair[p.side] = p.own;
+  e.pair[1 - p.side] = p.other;
+  e.asked = p.asked;
+  return e;
+}
+
+StepEvent NextEvent(PairSteps& s) {
   Popped p;
   bool known = false;  // what comes next
-  for (;;) {
-    if (!known) {
-      if (s.depth == 0) break;
-      p = pop(s);
-    }
+  while (known || s.depth != 0) {
+    if (!known) p = pop(s);
     known = false;
-    const int side = p.side;
-    s.pair[side] = p.own;
-    s.pair[1 - side] = p.other;
-    if (isBeyondCut(s, s.pair[0])) continue;
+    if (isBeyondCut(s, p)) continue;
     const bool own_leaf = isLeaf(p.own), other_leaf = isLeaf(p.other);
     if (own_leaf && other_leaf) {
       if (!s.sees_all) {
-        fetch(*s.tree[side], p.own.ref);
-        fetch(*s.tree[1 - side], p.other.ref);
+        fetch(*s.tree[p.side], p.own.ref);
+        fetch(*s.tree[1 - p.side], p.other.ref);
       }
-      return PairSteps::kLeaves;
+      return eventOf(StepEvent::kLeaves, p);
     }
-    // The larger of two nodes is expanded, unless it is a leaf.
-    const bool leaf0 = side == 0 ? own_leaf : other_leaf, leaf1 = side == 0 ? other_leaf : own_leaf;
-    const int below = static_cast<int>(p.own.level) - static_cast<int>(p.other.level);
-    const int deeper = side == 0 ? -below : below;
-    const int x = leaf1 || (!leaf0 && deeper >= s.not_smaller) ? 0 : 1, y = 1 - x;
-    const StepNode own = x == side ? p.own : p.other;
-    StepNode other = x == side ? p.other : p.own;
-    if (own.ref.tag() != tree::ChildRef::kBlock) return PairSteps::kDeferred;
+    const Choice choice = choose(s, p, own_leaf, other_leaf);
+    const int x = choice.side, y = 1 - x;
+    const StepNode node = x == p.side ? p.own : p.other;
+    StepNode other = x == p.side ? p.other : p.own;
+    if (node.ref.tag() != tree::ChildRef::kBlock) return eventOf(StepEvent::kDeferred, p);
     if (!s.sees_all && other.ref.tag() == tree::ChildRef::kBlock) fetch(*s.tree[y], other.ref);
-    std::uint32_t frames = p.frames;
-    if (other.lane == StepNode::kNoLane) {
-      lookUp(s, other, y, frames);
-      s.pair[y].lane = other.lane;
-    }
-    const std::uint32_t index = own.ref.index();
-    const tree::Block& block = s.tree[x]->block(index);
-    s.tree[x]->markUsed(index, s.now);
-    const bool fetch_own = decodeBlock(s, x, index, block, frames) && s.sees_all;
-    const unsigned mask = overlapping(s.geometry, s.frames[frames], s.frames[other.lane / 8], other.lane % 8,
-                                      block.grey, s.stack[s.depth].order);
+    if (other.lane == StepNode::kNoLane) lookUp(s, other, y, p.frames);
+    bool is_new;
+    const BlockView block = open(s, x, node, p.frames, is_new);
+    std::uint32_t(&order)[8] = s.stack[s.depth].order;
+    const unsigned mask =
+        overlapping(s.geometry, s.frames[block.frame], s.frames[other.lane / 8], other.lane % 8, block.at->grey, order);
     if (mask == 0) continue;
-    if (s.isCut() && x == 0) orderAlongCut(s, s.frames[frames], s.stack[s.depth].order);
-    if (y == 0 ? leaf0 && deeper >= s.larger : leaf1 && deeper < s.not_smaller) {
-      s.frames_used = frames;
-      s.expanded = x;
-      s.mask = mask;
-      if (s.large == StepGroup::kNone || !s.leaf[y]->know(other.node, s.triangles)) return PairSteps::kLargeTriangles;
-      pushThose(s);
+    if (s.isCut() && x == 0) orderAlongCut(s, s.frames[block.frame], order);
+    if (choice.has_larger_leaf) {
+      if (p.asked.side == AskedLeaf::kNone || !s.leaf[y]->know(other.node, p.asked.triangles)) {
+        StepEvent e = eventOf(StepEvent::kLargeTriangles, p);
+        e.pair[y] = other;
+        e.block = block;
+        e.mask = mask;
+        return e;
+      }
+      pushThose(s, block, other, mask, p.asked.triangles);
       continue;
     }
-    const std::uint32_t level = childLevel(block);
-    if (!s.all_at_once || !expandOther(s, x, block, index, level, other, frames, mask, fetch_own)) {
-      if (fetch_own) fetchAll(*s.tree[x], block, mask);
-      known = pushOthers(s, x, block, index, level, frames, other, mask, p);
-    }
+    const bool fetch_own = is_new && s.sees_all;
+    if (s.all_at_once && expandOther(s, block, other, mask, fetch_own)) continue;
+    if (fetch_own) fetchAll(s, block, mask);
+    known = pushOthers(s, block, other, mask, p);
   }
-  return PairSteps::kDone;
+  return StepEvent();
 }
 
 }  // namespace bocst::query::HWY_NAMESPACE
@@ -404,21 +462,19 @@ std::uint8_t overlappingOctants(const PairFrames& geometry, int own, const CellO
   return HWY_DYNAMIC_DISPATCH(OverlappingOctants)(geometry, own, cell, other, octant);
 }
 
-PairSteps::Event nextEvent(PairSteps& steps) { return HWY_DYNAMIC_DISPATCH(NextEvent)(steps); }
+StepEvent nextEvent(PairSteps& steps) { return HWY_DYNAMIC_DISPATCH(NextEvent)(steps); }
 
-void pushMeeting(PairSteps& steps) { HWY_DYNAMIC_DISPATCH(PushMeeting)(steps); }
+void pushMeeting(PairSteps& steps, const StepEvent& event, std::uint32_t triangles) {
+  HWY_DYNAMIC_DISPATCH(PushMeeting)(steps, event, triangles);
+}
 
 void octantsMeeting(const PairFrames& geometry, int own, const CellOctants& cell, const TriangleBounds& triangles,
                     std::size_t count, std::uint32_t (&met)[8]) {
   HWY_DYNAMIC_DISPATCH(OctantsMeeting)(geometry, own, cell, triangles, count, met);
 }
 
-void pushOctants(PairSteps& s, unsigned mask) {
-  if (mask == 0) return;
-  const int x = s.expanded;
-  const std::uint32_t index = s.pair[x].ref.index();
-  const tree::Block& block = s.tree[x]->block(index);
-  push(s, x, &block, index, childLevel(block), s.frames_used, s.pair[1 - x], mask);
+void pushOctants(PairSteps& s, const StepEvent& event, unsigned mask) {
+  if (mask != 0) push(s, event.block, event.pair[1 - event.block.side], mask);
 }
 
 void pushPair(PairSteps& s, tree::NodeRef node_a, tree::NodeRef node_b) {
@@ -428,8 +484,13 @@ void pushPair(PairSteps& s, tree::NodeRef node_a, tree::NodeRef node_b) {
   other.level = static_cast<std::uint32_t>(s.tree[1]->level(node_b));
   const auto o = static_cast<std::uint32_t>(node_a.octant());
   std::fill_n(s.stack[s.depth].order, 8, o);
-  push(s, 0, node_a.isRoot() ? nullptr : &s.tree[0]->block(node_a.block()), node_a.block(),
-       static_cast<std::uint32_t>(s.tree[0]->level(node_a)), StepGroup::kNoFrame, other, 1u << o);
+  BlockView own;
+  own.at = node_a.isRoot() ? nullptr : &s.tree[0]->block(node_a.block());
+  own.index = node_a.block();
+  own.level = static_cast<std::uint32_t>(s.tree[0]->level(node_a));
+  own.frame = BlockView::kNoFrame;
+  own.side = 0;
+  push(s, own, other, 1u << o);
 }
 
 }  // namespace bocst::query

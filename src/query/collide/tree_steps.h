@@ -22,28 +22,58 @@ struct StepNode {
   std::uint32_t lane = kNoLane;  ///< 8 * frame + octant: where the node's volume is, if it is.
 };
 
+/// A block whose octants (or lanes) take part in a walk.
+struct BlockView {
+  static constexpr std::uint32_t kNoFrame = 0xffffffff;
+
+  const tree::Block* at;  ///< Null: the root, which no block has.
+  std::uint32_t index;    ///< As NodeRef names it.
+  std::uint32_t level;    ///< Of the octants.
+  std::uint32_t frame;    ///< Where the octants are, if they are; those below it are in use, too.
+  std::uint32_t side;     ///< Whose tree has the block.
+};
+
+/// A leaf of large triangles that was asked which of them may meet a node of the other side.
+struct AskedLeaf {
+  static constexpr std::uint32_t kNone = 2;
+
+  std::uint32_t side = kNone;   ///< Whose leaf it is, if one was asked.
+  std::uint32_t triangles = 0;  ///< Those that may meet, a bit each.
+};
+
 /// Octants of one block against one node of the other side, still to be walked. Words of one size, written and read one
 /// by one: a processor is slow to read a wide word that was just written in parts.
 struct StepGroup {
-  static constexpr std::uint32_t kNoFrame = 0xffffffff;
-
   StepNode other;
-  const tree::Block* at;  ///< The block, or null where there is none.
-  std::uint32_t side;     ///< That of the block.
-  std::uint32_t block;    ///< As NodeRef names it, so the root is octant 7 of a block that there is not.
-  std::uint32_t frame;    ///< Where the block's octants are, if they are; those below it are in use, too.
-  std::uint32_t level;    ///< Of the octants.
-  std::uint32_t octants;
-  std::uint32_t late;  ///< Those of them that wait until the others are gone.
+  BlockView own;
+  std::uint32_t octants;  ///< A bit each.
+  std::uint32_t late;     ///< Those of them that wait until the others are gone.
   /// For each of them: how far it overlaps the other node, as the bits of a float whose lowest three are the octant. As
   /// the step wrote it: what is written to in parts is slow to be read as a whole.
   std::uint32_t order[8];
-  std::uint32_t large;         ///< Which side's node is a larger leaf whose triangles were asked about the octants ...
-  std::uint32_t triangles[8];  ///< ... and which of them, a bit each, may meet each octant.
-  static constexpr std::uint32_t kNone = 2;
+  std::uint32_t asked;         ///< AskedLeaf::side of each octant and the other node ...
+  std::uint32_t triangles[8];  ///< ... and AskedLeaf::triangles.
 };
 
-/// The depth-first walk over resident pairs of two trees, exact answers: up to the next pair of leaves.
+/// What a walk came to.
+struct StepEvent {
+  enum Kind {
+    kDone,      ///< The stack is empty; nothing else is set.
+    kLeaves,    ///< `pair` is two leaves, to be tested; see `asked`.
+    kDeferred,  ///< `pair` needs a node that is not expanded.
+    /// `pair` is a leaf and a smaller node: the octants in `mask` of `block`, the smaller node's, overlap the
+    /// volume of the leaf, whose triangles are to be asked. `asked` says which of them are left, if they were before.
+    kLargeTriangles,
+  };
+
+  Kind kind = kDone;
+  StepNode pair[2];
+  AskedLeaf asked;
+  BlockView block;    ///< kLargeTriangles only.
+  unsigned mask = 0;  ///< kLargeTriangles only.
+};
+
+/// The state of the depth-first walk over resident pairs of two trees, exact answers.
 struct PairSteps {
   /// Blocks below one another: of cells, then loose ones.
   static constexpr std::size_t kMostDepth = lattice::kMaxLevel + tree::kMostLooseDepth;
@@ -52,20 +82,12 @@ struct PairSteps {
   /// What a walk below one pair can add to the stack: one more each block of either side, eight of two at once.
   static constexpr std::size_t kStackRoom = 8 * kMostDepth + 1;
 
-  enum Event {
-    kDone,      ///< The stack is empty.
-    kLeaves,    ///< `pair` is two leaves, to be tested.
-    kDeferred,  ///< `pair` needs a node that is not expanded.
-    /// `pair` is a leaf and a smaller node, `expanded`, whose octants in `mask` overlap the leaf's volume; of the
-    /// leaf's triangles those in `triangles` may meet the node, if they were asked, but are not known.
-    kLargeTriangles,
-  };
-
   const tree::Tree* tree[2];
   std::int64_t now;
   PairFrames geometry;
   Frame* frames;     ///< kFrames of them.
-  StepGroup* stack;  ///< With room for kStackRoom more.
+  StepGroup* stack;  ///< With room for kStackRoom more, below `stack_end`.
+  const StepGroup* stack_end = nullptr;
   std::size_t depth = 0;
 
   /// A node of side 0 is not smaller (is larger) than one of side 1 that is at least so many levels deeper.
@@ -88,13 +110,7 @@ struct PairSteps {
     cut = static_cast<float>(c.last - lattice::kMiddle) + geometry.rounding_margin;
   }
 
-  StepNode pair[2];                        ///< Of the event.
-  std::uint32_t large = StepGroup::kNone;  ///< As in StepGroup, of the pair.
-  std::uint32_t triangles = 0;
   const LargeTriangles* leaf[2] = {nullptr, nullptr};  ///< Those of a larger leaf of each side.
-  std::uint32_t frames_used = 0;
-  int expanded = 0;
-  unsigned mask = 0;
 
   std::uint64_t holds[kFrames];  ///< Which block of which side is in a frame.
   static constexpr std::uint64_t kNothing = ~std::uint64_t{0};
@@ -114,7 +130,17 @@ struct PairSteps {
 };
 
 /// Goes on to the next event. Chosen at run time for the machine's instruction set.
-PairSteps::Event nextEvent(PairSteps& steps);
+StepEvent nextEvent(PairSteps& steps);
+
+/// After kLargeTriangles: puts those octants on the stack that the leaf's triangles in `triangles` may meet, of which
+/// LargeTriangles knows the places.
+void pushMeeting(PairSteps& steps, const StepEvent& event, std::uint32_t triangles);
+
+/// After kLargeTriangles: puts the octants in `mask` on the stack.
+void pushOctants(PairSteps& steps, const StepEvent& event, unsigned mask);
+
+/// Puts a pair of nodes on the stack that comes without frames.
+void pushPair(PairSteps& steps, tree::NodeRef node_a, tree::NodeRef node_b);
 
 /// The octants of a cell, wherever they come from.
 struct CellOctants {
@@ -127,10 +153,6 @@ struct CellOctants {
 std::uint8_t overlappingOctants(const PairFrames& geometry, int own, const CellOctants& cell, const CellOctants& other,
                                 int octant);
 
-/// After kCoarse: puts those octants of the expanded node on the stack that the leaf's triangles in steps.triangles may
-/// meet. These are known.
-void pushMeeting(PairSteps& steps);
-
 /// The test of pushMeeting() by itself, for at most 32 triangles: bit t of met[o] is set unless triangle t surely
 /// misses octant o of a cell of side `own`.
 ///
@@ -141,11 +163,5 @@ void pushMeeting(PairSteps& steps);
 /// 128.
 void octantsMeeting(const PairFrames& geometry, int own, const CellOctants& cell, const TriangleBounds& triangles,
                     std::size_t count, std::uint32_t (&met)[8]);
-
-/// After kCoarse: puts the octants in `mask` of the expanded node of steps.pair on the stack.
-void pushOctants(PairSteps& steps, unsigned mask);
-
-/// Puts a pair of nodes on the stack that comes without frames.
-void pushPair(PairSteps& steps, tree::NodeRef node_a, tree::NodeRef node_b);
 
 }  // namespace bocst::query

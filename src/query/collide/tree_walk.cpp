@@ -50,6 +50,7 @@ bool TreeWalk::search(Scratch& s) {
       s.stack.resize(2 * (steps.depth + PairSteps::kStackRoom));
     }
     steps.stack = s.stack.data();
+    steps.stack_end = steps.stack + s.stack.size();
     pushPair(steps, pair.a, pair.b);
   };
   push({a_.root(), b_.root()});
@@ -66,41 +67,42 @@ bool TreeWalk::search(Scratch& s) {
 
 bool TreeWalk::stepAll(PairSteps& steps, Scratch& s) {
   for (;;) {
-    switch (nextEvent(steps)) {
-      case PairSteps::kDone:
+    const StepEvent event = nextEvent(steps);
+    switch (event.kind) {
+      case StepEvent::kDone:
         return false;
-      case PairSteps::kDeferred:
-        s.deferred.add({steps.pair[0].node, steps.pair[1].node});
+      case StepEvent::kDeferred:
+        s.deferred.add({event.pair[0].node, event.pair[1].node});
         break;
-      case PairSteps::kLargeTriangles:
-        testLargeTriangles(steps, s);
+      case StepEvent::kLargeTriangles:
+        testLargeTriangles(steps, event, s);
         break;
-      case PairSteps::kLeaves:
-        if (testLeaves(steps, s)) return true;
+      case StepEvent::kLeaves:
+        if (testLeaves(event, s)) return true;
         if (steps.isCut()) steps.setCut(*visitor_->cut());
         break;
     }
   }
 }
 
-void TreeWalk::testLargeTriangles(PairSteps& steps, Scratch& s) {
-  const int x = steps.expanded, y = 1 - x;
+void TreeWalk::testLargeTriangles(PairSteps& steps, const StepEvent& event, Scratch& s) {
+  const auto x = static_cast<int>(event.block.side), y = 1 - x;
   const TreeSide &small = x == 0 ? a_ : b_, &large = x == 0 ? b_ : a_;
   const SimilarityTransform& to = x == 0 ? b_in_a_ : aInB();
-  const tree::NodeRef node = steps.pair[x].node, leaf = steps.pair[y].node;
+  const tree::NodeRef node = event.pair[x].node, leaf = event.pair[y].node;
   if (large.triangleCount(leaf) <= LargeTriangles::kCapacity) {
     const auto unit = static_cast<double>(steps.geometry.side[x].unit);
-    const std::uint32_t asked = steps.large == StepGroup::kNone ? ~0u : steps.triangles;
-    steps.triangles = s.large[y].meeting(small, node, large, leaf, asked, to, unit);
-    if (steps.triangles != 0) pushMeeting(steps);
+    const std::uint32_t asked = event.asked.side == AskedLeaf::kNone ? ~0u : event.asked.triangles;
+    const std::uint32_t triangles = s.large[y].meeting(small, node, large, leaf, asked, to, unit);
+    if (triangles != 0) pushMeeting(steps, event, triangles);
   } else if (!small.hasOctants(node)) {
-    pushOctants(steps, steps.mask);
+    pushOctants(steps, event, event.mask);
   } else {
-    pushOctants(steps, (x == 0 ? s.long_b : s.long_a).octantsMeeting(small, node, steps.mask, large, leaf, to));
+    pushOctants(steps, event, (x == 0 ? s.long_b : s.long_a).octantsMeeting(small, node, event.mask, large, leaf, to));
   }
 }
 
-bool TreeWalk::testLeaves(const PairSteps& steps, Scratch& s) {
+bool TreeWalk::testLeaves(const StepEvent& event, Scratch& s) {
   if (!s.leaves_started) {
     s.leaves.start(b_in_a_, aInB());
     s.leaves_started = true;
@@ -108,10 +110,11 @@ bool TreeWalk::testLeaves(const PairSteps& steps, Scratch& s) {
   const auto visit = [this](std::uint32_t t, std::uint32_t u, bool certain) {
     return visitor_->triangles(t, u, certain);
   };
-  const tree::NodeRef a = steps.pair[0].node, b = steps.pair[1].node;
-  if (steps.large == StepGroup::kNone) return s.leaves.test(a_, a, b_, b, visit);
-  return steps.large == 0 ? s.leaves.testLargeA(s.large[0], steps.triangles, b_, b, visit)
-                          : s.leaves.testLargeB(a_, a, s.large[1], steps.triangles, visit);
+  const tree::NodeRef a = event.pair[0].node, b = event.pair[1].node;
+  const std::uint32_t triangles = event.asked.triangles;
+  if (event.asked.side == AskedLeaf::kNone) return s.leaves.test(a_, a, b_, b, visit);
+  return event.asked.side == 0 ? s.leaves.testLargeA(s.large[0], triangles, b_, b, visit)
+                               : s.leaves.testLargeB(a_, a, s.large[1], triangles, visit);
 }
 
 const SimilarityTransform& TreeWalk::aInB() {

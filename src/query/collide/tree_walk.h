@@ -33,8 +33,8 @@ class TreeWalk {
 
   bool search(Scratch& s);
   bool stepAll(PairSteps& steps, Scratch& s);
-  void testLargeTriangles(PairSteps& steps, Scratch& s);
-  bool testLeaves(const PairSteps& steps, Scratch& s);
+  void testLargeTriangles(PairSteps& steps, const StepEvent& event, Scratch& s);
+  bool testLeaves(const StepEvent& event, Scratch& s);
   const SimilarityTransform& aInB();
 
   const TreeSide &a_, &b_;

@@ -25,24 +25,26 @@ class Walk {
         stack_(PairSteps::kStackRoom + 1),
         steps_(&a, &b, a.now(), PairFrames(b_in_a.scale, b_in_a), frames_.data()) {
     steps_.stack = stack_.data();
+    steps_.stack_end = stack_.data() + stack_.size();
     steps_.all_at_once = all_at_once;
     pushPair(steps_, tree::NodeRef(), tree::NodeRef());
   }
 
   // Up to the next pair that is not a larger leaf with a smaller node.
-  PairSteps::Event next() {
+  StepEvent::Kind next() {
     for (;;) {
-      const PairSteps::Event event = nextEvent(steps_);
-      if (event != PairSteps::kLargeTriangles) return event;
-      pushOctants(steps_, steps_.mask);
+      event_ = nextEvent(steps_);
+      if (event_.kind != StepEvent::kLargeTriangles) return event_.kind;
+      pushOctants(steps_, event_, event_.mask);
     }
   }
-  tree::NodeRef node(int side) const { return steps_.pair[side].node; }
+  tree::NodeRef node(int side) const { return event_.pair[side].node; }
 
  private:
   std::vector<Frame> frames_;
   std::vector<StepGroup> stack_;
   PairSteps steps_;
+  StepEvent event_;
 };
 
 SimilarityTransform placed(const Eigen::Matrix3d& R, double scale, const Eigen::Vector3d& displacement) {
@@ -69,8 +71,8 @@ TEST_P(Steps, MeetTheSamePairsInEitherOrder) {
     Met met[2], aside[2];
     for (const bool all_at_once : {false, true}) {
       Walk walk(a, b, to, all_at_once);
-      for (PairSteps::Event event = walk.next(); event != PairSteps::kDone; event = walk.next()) {
-        Met& of = (event == PairSteps::kLeaves ? met : aside)[all_at_once];
+      for (StepEvent::Kind event = walk.next(); event != StepEvent::kDone; event = walk.next()) {
+        Met& of = (event == StepEvent::kLeaves ? met : aside)[all_at_once];
         EXPECT_TRUE(of.insert({walk.node(0).bits, walk.node(1).bits}).second) << "a pair came twice";
       }
     }
@@ -107,7 +109,7 @@ TEST_P(Steps, LeaveWhatIsImplicitForLast) {
       Walk walk(a, b, placed(test::randomRotation(g), 1, test::randomDirection(g) * 9000), false);
       bool late = false;
       std::size_t of_grown = 0;
-      for (PairSteps::Event event = walk.next(); event != PairSteps::kDone; event = walk.next()) {
+      for (StepEvent::Kind event = walk.next(); event != StepEvent::kDone; event = walk.next()) {
         const bool of_root = walk.node(0).block() == grown.block();
         late |= of_root;
         of_grown += !of_root;
