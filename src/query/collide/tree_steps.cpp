@@ -28,13 +28,11 @@ inline BlockView viewOf(const PairSteps& s, int x, std::uint32_t index, std::uin
 }
 
 // Octant o of a block in a frame.
-inline StepNode octantOf(const BlockView& b, std::uint32_t o) {
-  StepNode n;
+inline void setOctant(StepNode& n, const BlockView& b, std::uint32_t o) {
   n.node = tree::NodeRef::octant(b.index, static_cast<int>(o));
   n.ref = b.at->child[o].load(std::memory_order_acquire);
   n.level = b.level;
   n.lane = 8 * b.frame + o;
-  return n;
 }
 
 // The order is there already: overlapping() writes it to where the group will be.
@@ -328,7 +326,8 @@ HWY_INLINE bool expandOther(PairSteps& s, const BlockView& own, const StepNode& 
         overlapping(s.geometry, s.frames[block.frame], s.frames[own.frame], o, block.at->grey, nullptr);
     if (left == 0) continue;
     met |= left;
-    const StepNode n = octantOf(own, o);
+    StepNode n;
+    setOctant(n, own, o);
     if (!s.sees_all) fetch(*s.tree[x], n.ref);
     push(s, block, n, left);
   }
@@ -342,7 +341,7 @@ HWY_INLINE bool pushOthers(PairSteps& s, const BlockView& own, const StepNode& o
       s.all_at_once ? static_cast<std::uint32_t>(__builtin_ctz(octants)) : deepest(s.stack[s.depth], octants);
   const std::uint32_t rest = octants & ~(1u << o);
   next.side = static_cast<int>(own.side);
-  next.own = octantOf(own, o);
+  setOctant(next.own, own, o);
   next.other = other;
   next.frames = own.frame + 1;
   next.asked.side = AskedLeaf::kNone;
@@ -389,16 +388,14 @@ HWY_INLINE Choice choose(const PairSteps& s, const Popped& p, bool own_leaf, boo
   return {1, leaf0 && deeper >= s.larger};
 }
 
-HWY_INLINE StepEvent eventOf(StepEvent::Kind kind, const Popped& p) {
-  StepEvent e;
+HWY_INLINE void fill(StepEvent& e, StepEvent::Kind kind, const Popped& p) {
   e.kind = kind;
   e.pair[p.side] = p.own;
   e.pair[1 - p.side] = p.other;
   e.asked = p.asked;
-  return e;
 }
 
-StepEvent NextEvent(PairSteps& s) {
+void NextEvent(PairSteps& s, StepEvent& event) {
   Popped p;
   bool known = false;  // what comes next
   while (known || s.depth != 0) {
@@ -411,13 +408,13 @@ StepEvent NextEvent(PairSteps& s) {
         fetch(*s.tree[p.side], p.own.ref);
         fetch(*s.tree[1 - p.side], p.other.ref);
       }
-      return eventOf(StepEvent::kLeaves, p);
+      return fill(event, StepEvent::kLeaves, p);
     }
     const Choice choice = choose(s, p, own_leaf, other_leaf);
     const int x = choice.side, y = 1 - x;
     const StepNode node = x == p.side ? p.own : p.other;
     StepNode other = x == p.side ? p.other : p.own;
-    if (node.ref.tag() != tree::ChildRef::kBlock) return eventOf(StepEvent::kDeferred, p);
+    if (node.ref.tag() != tree::ChildRef::kBlock) return fill(event, StepEvent::kDeferred, p);
     if (!s.sees_all && other.ref.tag() == tree::ChildRef::kBlock) fetch(*s.tree[y], other.ref);
     if (other.lane == StepNode::kNoLane) lookUp(s, other, y, p.frames);
     bool is_new;
@@ -429,11 +426,11 @@ StepEvent NextEvent(PairSteps& s) {
     if (s.isCut() && x == 0) orderAlongCut(s, s.frames[block.frame], order);
     if (choice.has_larger_leaf) {
       if (p.asked.side == AskedLeaf::kNone || !s.leaf[y]->know(other.node, p.asked.triangles)) {
-        StepEvent e = eventOf(StepEvent::kLargeTriangles, p);
-        e.pair[y] = other;
-        e.block = block;
-        e.mask = mask;
-        return e;
+        fill(event, StepEvent::kLargeTriangles, p);
+        event.pair[y] = other;
+        event.block = block;
+        event.mask = mask;
+        return;
       }
       pushThose(s, block, other, mask, p.asked.triangles);
       continue;
@@ -443,7 +440,7 @@ StepEvent NextEvent(PairSteps& s) {
     if (fetch_own) fetchAll(s, block, mask);
     known = pushOthers(s, block, other, mask, p);
   }
-  return StepEvent();
+  event.kind = StepEvent::kDone;
 }
 
 }  // namespace bocst::query::HWY_NAMESPACE
@@ -462,7 +459,7 @@ std::uint8_t overlappingOctants(const PairFrames& geometry, int own, const CellO
   return HWY_DYNAMIC_DISPATCH(OverlappingOctants)(geometry, own, cell, other, octant);
 }
 
-StepEvent nextEvent(PairSteps& steps) { return HWY_DYNAMIC_DISPATCH(NextEvent)(steps); }
+void nextEvent(PairSteps& steps, StepEvent& event) { HWY_DYNAMIC_DISPATCH(NextEvent)(steps, event); }
 
 void pushMeeting(PairSteps& steps, const StepEvent& event, std::uint32_t triangles) {
   HWY_DYNAMIC_DISPATCH(PushMeeting)(steps, event, triangles);

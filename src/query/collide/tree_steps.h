@@ -130,7 +130,7 @@ struct PairSteps {
 };
 
 /// Goes on to the next event. Chosen at run time for the machine's instruction set.
-StepEvent nextEvent(PairSteps& steps);
+void nextEvent(PairSteps& steps, StepEvent& event);
 
 /// After kLargeTriangles: puts those octants on the stack that the leaf's triangles in `triangles` may meet, of which
 /// LargeTriangles knows the places.

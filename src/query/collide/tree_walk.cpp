@@ -66,8 +66,9 @@ bool TreeWalk::search(Scratch& s) {
 }
 
 bool TreeWalk::stepAll(PairSteps& steps, Scratch& s) {
+  StepEvent event;
   for (;;) {
-    const StepEvent event = nextEvent(steps);
+    nextEvent(steps, event);
     switch (event.kind) {
       case StepEvent::kDone:
         return false;

@@ -33,7 +33,7 @@ class Walk {
   // Up to the next pair that is not a larger leaf with a smaller node.
   StepEvent::Kind next() {
     for (;;) {
-      event_ = nextEvent(steps_);
+      nextEvent(steps_, event_);
       if (event_.kind != StepEvent::kLargeTriangles) return event_.kind;
       pushOctants(steps_, event_, event_.mask);
     }
