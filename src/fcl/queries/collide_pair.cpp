@@ -25,7 +25,6 @@
 #include "fcl/queries/contact_order.h"
 #include "fcl/queries/inside.h"
 #include "fcl/queries/inside_contact.h"
-#include "fcl/queries/pose_boxes.h"
 #include "fcl/queries/query_scope.h"
 #include "geometry/triangle.h"
 #include "query/collide/pair_walk.h"
@@ -632,20 +631,11 @@ void collideRow(const Model<S>& a, const Model<S>& b, const fcl::Transform3<S>* 
   static const fcl::Transform3<S> identity = fcl::Transform3<S>::Identity();
   static const fcl::CollisionRequest<S> request;
   thread_local fcl::CollisionResult<S> result;
-  thread_local std::vector<std::size_t> near;
   std::fill(hit, hit + count, std::uint8_t{0});
-  near.clear();
-  {
-    const QueryScope scope(a.tree(), b.tree());
-    const PoseBoxes boxes(a, b);
-    for (std::size_t k = 0; k < count; ++k) {
-      if (!boxes.areApart(X_AB[k])) near.push_back(k);
-    }
-  }
   if (!a.isOccupied() || !b.isOccupied()) return;
   const Models<S> models(&a, &b);
   const double margin = marginOf(&a, &b);
-  for (const std::size_t k : near) {
+  for (std::size_t k = 0; k < count; ++k) {
     const CollideQuery<S> q{
         {&a, identity, &b, X_AB[k], turnsRound(models, identity, X_AB[k])}, request, result, margin};
     if (areFarApart(q, models)) continue;
