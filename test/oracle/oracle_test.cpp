@@ -7,6 +7,8 @@
 #include <hwy/targets.h>
 
 #include <algorithm>
+#include <array>
+#include <cmath>
 #include <cstdlib>
 #include <random>
 
@@ -438,6 +440,49 @@ void checkStepsBack() {
   }
 }
 
+// A triangle beside an octant, parted from it by less than the tolerance, is still taken to meet it.
+void checkTolerance() {
+  std::mt19937_64 g(14);
+  std::uniform_real_distribution<double> u(-1, 1);
+  for (const double tolerance : {1e-3, 0.05, 0.4}) {
+    constexpr std::size_t kCount = LocalTriangles::kCapacity;
+    static LocalTriangles triangles;
+    std::array<int, kCount> octants;
+    for (std::size_t i = 0; i < kCount; ++i) {
+      octants[i] = static_cast<int>(g() % 8);
+      // A point of the octant's surface, and a way out that leads straight away from all of the octant.
+      Eigen::Vector3d p, out = Eigen::Vector3d::Zero();
+      while (out.isZero()) {
+        for (int k = 0; k < 3; ++k) {
+          const bool at_end = g() % 4 != 0, upper = g() % 2 != 0;
+          p[k] = ((octants[i] >> k & 1) != 0 ? 0.5 : -0.5) + (at_end ? (upper ? 0.5 : -0.5) : u(g) / 2);
+          out[k] = at_end ? (upper ? 1 : -1) * (1.01 + u(g)) : 0;
+        }
+      }
+      out.normalize();
+      const Eigen::Vector3d a = out.unitOrthogonal(), b = out.cross(a);
+      // Across the way out, about the point; or with a corner there and the others farther out.
+      const bool across = g() % 2 != 0;
+      for (std::size_t k = 0; k < 3; ++k) {
+        const double angle = 2.1 * static_cast<double>(k) + 0.5 * u(g), reach = 1.01 + u(g);
+        Eigen::Vector3d v = p + 0.99 * tolerance * out;
+        if (across || k > 0) v += reach * (std::cos(angle) * a + std::sin(angle) * b);
+        if (!across && k > 0) v += (1 + u(g)) * out;
+        for (std::size_t c = 0; c < 3; ++c) triangles.xyz[3 * k + c][i] = static_cast<float>(v[static_cast<int>(c)]);
+      }
+    }
+    std::array<std::uint8_t, kCount> masks, without;
+    octantMasks(triangles, kCount, static_cast<float>(tolerance), masks.data());
+    octantMasks(triangles, kCount, 0, without.data());
+    int kept_without = 0;
+    for (std::size_t i = 0; i < kCount; ++i) {
+      ASSERT_TRUE(masks[i] >> octants[i] & 1) << instructionSet() << " triangle " << i << " tolerance " << tolerance;
+      kept_without += without[i] >> octants[i] & 1;
+    }
+    EXPECT_EQ(kept_without, 0) << instructionSet() << " tolerance " << tolerance;
+  }
+}
+
 TEST(Kernels, EveryInstructionSetAgreesOnGreySets) {
   const Surface surface = surfaceOf(test::soup(500, 3));
   ExpansionRequest root = rootOf(surface);
@@ -461,6 +506,7 @@ TEST(Kernels, EveryInstructionSetAgreesOnGreySets) {
     checkGridSpans();
     checkBitsOfOthers();
     checkStepsBack();
+    checkTolerance();
   }
   hwy::SetSupportedTargetsForTest(0);
   hwy::GetChosenTarget().Update(hwy::SupportedTargets());
@@ -536,6 +582,48 @@ TEST(RootGrid, KnowsFineMeshesWithSomeLargeTriangles) {
       }
     }
     EXPECT_GT(grey, 3u);
+  }
+}
+
+// Triangles whose boxes end on faces of cells, or beside them by less than the grid's step, above a fine mesh.
+TEST(RootGrid, KnowsWhatTouchesFacesOfCells) {
+  std::mt19937_64 g(15);
+  for (int round = 0; round < 6; ++round) {
+    test::Raw raw = test::torus(50);
+    raw.scale(1000).move({2000, 2000, 2000});
+    // The bounds are that of cells: half as many along two axes as along the third.
+    const auto triangle = [&raw](const Eigen::Vector3d& a, const Eigen::Vector3d& b, const Eigen::Vector3d& c) {
+      raw.vertices.insert(raw.vertices.end(), {a, b, c});
+      raw.triangles.emplace_back(raw.vertices.size() - 3, raw.vertices.size() - 2, raw.vertices.size() - 1);
+    };
+    Eigen::Vector3d most(32768, 32768, 32768);
+    most[round % 3] = 65536;
+    triangle({0, 0, 0}, {0, 0, 0}, {0, 0, 0});
+    triangle(most, most, most);
+    const double side = 8192;
+    const auto cornerOfCell = [&] {
+      Eigen::Vector3d p;
+      for (int k = 0; k < 3; ++k) p[k] = static_cast<double>(g() % (k == round % 3 ? 9 : 5)) * side;
+      return p;
+    };
+    for (int i = 0; i < 2; ++i) triangle(cornerOfCell(), cornerOfCell(), cornerOfCell());
+    for (int i = 0; i < 12; ++i) {
+      Eigen::Vector3d p = cornerOfCell().cwiseMax(side).cwiseMin(most - Eigen::Vector3d::Constant(side));
+      const double off = g() % 2 != 0 ? 0.5 : -0.5;
+      for (int k = 0; k < 3; ++k) p[k] += g() % 2 != 0 ? side / 2 : off;
+      triangle(p, p + Eigen::Vector3d(off, 0, off), p + Eigen::Vector3d(0, off, off));
+    }
+    const Surface surface = surfaceOf(raw);
+    ASSERT_EQ(surface.lattice.unit(), 1);
+    const auto grid = RootGrid::make(surface, lattice::kMaxLevel);
+    ASSERT_NE(grid, nullptr);
+    ASSERT_EQ(grid->level(), 4);
+    for (std::uint32_t at = 0; at < 512; ++at) {
+      const Cell cell{4, {at % 8, at / 8 % 8, at / 64}};
+      const bool grey = grid->grey(surface, cell);
+      ASSERT_EQ(grey, referenceGrey(surface, cell)) << "cell " << cell.at[0] << " " << cell.at[1] << " " << cell.at[2];
+      if (grey) ASSERT_NO_FATAL_FAILURE(gathersAllOnce(*grid, surface, cell));
+    }
   }
 }
 
