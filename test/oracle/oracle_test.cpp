@@ -622,7 +622,8 @@ TEST(RootGrid, KnowsWhatTouchesFacesOfCells) {
       const Cell cell{4, {at % 8, at / 8 % 8, at / 64}};
       const bool grey = grid->grey(surface, cell);
       ASSERT_EQ(grey, referenceGrey(surface, cell)) << "cell " << cell.at[0] << " " << cell.at[1] << " " << cell.at[2];
-      if (grey) ASSERT_NO_FATAL_FAILURE(gathersAllOnce(*grid, surface, cell));
+      if (!grey) continue;
+      ASSERT_NO_FATAL_FAILURE(gathersAllOnce(*grid, surface, cell));
     }
   }
 }
