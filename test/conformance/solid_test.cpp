@@ -111,6 +111,37 @@ TEST(Solid, PointsBesideTheSurfaceAreTakenToBeInside) {
   EXPECT_TRUE(s.mayContain({-1e-9, 0.3, 0.3}, 1e-9));
   EXPECT_TRUE(s.mayContain({0.3, 1 + 1e-9, 0.3}, 1e-9));
   EXPECT_TRUE(s.mayContain({0.5, 0.5, 0.5}, 0));
+  // Without a tolerance, no farther than rounding goes.
+  for (const double far : {0.0, 300.0}) {
+    const Eigen::Vector3d corner = Eigen::Vector3d::Constant(far);
+    const Solid box(test::box(corner, corner + Eigen::Vector3d(1, 1, 1)).mesh());
+    for (int face = 0; face < 6; ++face) {
+      Eigen::Vector3d p = corner + Eigen::Vector3d(0.3, 0.4, 0.6);
+      p[face % 3] = corner[face % 3] + (face < 3 ? -1e-12 : 1 + 1e-12) + (face < 3 ? -1 : 1) * 1e-13 * far;
+      EXPECT_FALSE(box.mayContain(p, 0)) << p.transpose();
+    }
+  }
+}
+
+TEST(Solid, PiecesHaveOnePointEach) {
+  Raw raw = unwelded(test::torus(12));
+  std::vector<Raw> pieces{raw};
+  for (int i = 1; i < 6; ++i) {
+    pieces.push_back(i % 2 == 0 ? unwelded(test::torus(5)) : test::box({0, 0, 0}, {1, 1, 1}));
+    pieces.back().move({3.0 * i, 0, 0});
+    raw.add(pieces.back());
+  }
+  std::mt19937_64 g(7);
+  for (int round = 0; round < 5; ++round) {
+    std::shuffle(raw.triangles.begin(), raw.triangles.end(), g);
+    const auto mesh = raw.mesh();
+    const std::vector<Eigen::Vector3d> points = pointOfEachComponent(mesh->vertices(), mesh->triangles());
+    ASSERT_EQ(points.size(), pieces.size());
+    for (const Raw& piece : pieces) {
+      const auto of_piece = [&](const Eigen::Vector3d& p) { return distanceTo(piece, p) < 1e-12; };
+      EXPECT_EQ(std::count_if(points.begin(), points.end(), of_piece), 1);
+    }
+  }
 }
 
 std::string refusal(const Raw& raw) {

@@ -157,6 +157,22 @@ TEST(Tree, WhatIsUsedStays) {
   EXPECT_GT(a.statistics().pruned_nodes, 0u);
 }
 
+// Also queries that no branch has a part in, because the boxes are far apart.
+TEST(Tree, FarMissesLetBranchesGo) {
+  FakeClock clock;
+  Options options;
+  options.clock = clock.function();
+  Modeld a(test::torus(60).mesh(), options), b(test::torus(60).mesh(), options);
+  EXPECT_TRUE(touching(a, b, kHit));
+  ASSERT_GT(a.statistics().resident_nodes, 1u);
+  for (int i = 0; i < 100; ++i) {
+    clock.now += milliseconds(700);
+    EXPECT_FALSE(touching(a, b, kMiss));
+  }
+  EXPECT_EQ(a.statistics().resident_nodes, 1u);
+  EXPECT_EQ(b.statistics().resident_nodes, 1u);
+}
+
 TEST(Tree, TtlZeroKeepsEverything) {
   FakeClock clock;
   Options options;
