@@ -62,15 +62,13 @@ HWY_INLINE LanesOfPoses load(const double* X, bool rows) {
       {{m[0], m[1], m[2]}, {m[4], m[5], m[6]}, {m[8], m[9], m[10]}}, {m[12], m[13], m[14]}, {m[3], m[7], m[11]}, m[15]};
 }
 
-HWY_INLINE Md areSurelyRigid(const LanesOfPoses& X) {
+HWY_INLINE Md haveRotations(const LanesOfPoses& X) {
   const Dd d;
   const Vd one = hn::Set(d, 1.0);
   const Vd squares =
       hn::Add(dot(X.column[0], X.column[0]), hn::Add(dot(X.column[1], X.column[1]), dot(X.column[2], X.column[2])));
   const Vd determinant = dot(X.column[0], cross(X.column[1], X.column[2]));
-  // x - x is 0, and NaN for what is not finite.
-  const Vec3d zeros = sub(X.translation, X.translation);
-  const Vd stretch = hn::Abs(hn::Add(hn::Sub(squares, hn::Set(d, 3.0)), hn::Add(zeros.x, hn::Add(zeros.y, zeros.z))));
+  const Vd stretch = hn::Abs(hn::Sub(squares, hn::Set(d, 3.0)));
   const Vd shear = hn::Sub(hn::Sub(squares, hn::Add(determinant, determinant)), one);
   const Md rigid = hn::And(hn::Le(stretch, hn::Set(d, 1e-4)), hn::Le(shear, hn::Set(d, 1e-8)));
   return hn::And(rigid, hn::And(hn::Eq(norm1(X.last_row), hn::Zero(d)), hn::Eq(X.last, one)));
@@ -108,6 +106,7 @@ std::size_t find(const PoseBoxes& boxes, const S* X_AB, bool rows, std::size_t c
     if (from == copy) std::copy(X_AB + 16 * first, X_AB + 16 * (first + poses), copy);
     const LanesOfPoses X = load(from, rows);
     const Vec3d way = sub(X.translation, broadcast(boxes.middle_a));
+    // Of a translation that is not finite, this is not, so it parts nothing.
     const Vd allowed =
         hn::MulAdd(hn::Set(d, boxes.allowed_per_length), norm1(X.translation), hn::Set(d, boxes.allowed));
     const Vd far = hn::Add(hn::Set(d, boxes.reach), allowed);
@@ -115,7 +114,7 @@ std::size_t find(const PoseBoxes& boxes, const S* X_AB, bool rows, std::size_t c
     // Most of a planner's poses end here.
     if (!hn::AllTrue(d, apart)) apart = hn::Or(apart, areApartByAxes(boxes, X, way, allowed));
     std::uint8_t settled[8] = {};
-    hn::StoreMaskBits(d, hn::And(apart, areSurelyRigid(X)), settled);
+    hn::StoreMaskBits(d, hn::And(apart, haveRotations(X)), settled);
     for (unsigned left = ~settled[0] & ((1u << poses) - 1); left != 0; left &= left - 1) {
       near[found++] = static_cast<std::uint32_t>(first) + static_cast<std::uint32_t>(__builtin_ctz(left));
     }

@@ -21,7 +21,7 @@ using Eigen::Matrix4d;
 using Eigen::Vector3d;
 
 PoseBoxes someBoxes() {
-  PoseBoxes boxes = {{0.1, -0.2, 0.3}, {1, 0.5, -2}, {1, 0.2, 0.4}, {0.3, 2, 0.1}, {0.3, 2, 0.1}, 0, 0.25, 0};
+  PoseBoxes boxes = {{0.1, -0.2, 0.3}, {1, 0.5, -2}, {1, 0.2, 0.4}, {0.3, 2, 0.1}, {0.3, 2, 0.1}, 0, 0.25, 1e-9};
   boxes.reach = Vector3d(boxes.half_a).norm() + Vector3d(boxes.middle_b).norm() + Vector3d(boxes.half_b).norm();
   return boxes;
 }
