@@ -55,7 +55,7 @@ single = max(count // 50, 1)
 futures = concurrent.futures.ThreadPoolExecutor(2)
 print(f"{mesh}, {count} poses a call, {single} single calls")
 print("radii   hits |  rows columns | wall: 1      2  futures |  FCL's  model's loop | of C++  as fast  2 threads")
-for spread in (0.5, 1, 2, 4, 8, 30):
+for spread in (1, 2, 4, 8, 30):
     X = random_poses(count, spread * radius, middle, np.random.default_rng(1))
     columns = np.swapaxes(np.ascontiguousarray(np.swapaxes(X, 1, 2)), 1, 2)
     a, b = bocst.Model(mesh), bocst.Model(mesh)
@@ -68,7 +68,7 @@ for spread in (0.5, 1, 2, 4, 8, 30):
         (lambda: bocst.collide_poses(a, b, X, threads=2), time.perf_counter),
         (lambda: np.concatenate(list(futures.map(lambda part: bocst.collide_poses(a, b, part), parts))), time.perf_counter))
     turns = []
-    end = time.perf_counter() + 8
+    end = time.perf_counter() + 5
     while len(turns) < 2 or time.perf_counter() < end:
         turns.append([seconds(*way) for way in ways])
         assert all(np.array_equal(hits, expected) for _, hits in turns[-1])
