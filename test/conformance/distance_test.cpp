@@ -233,6 +233,33 @@ TEST(DistanceRequest, MinimaRunAndErrorsAreTaken) {
   }
 }
 
+// The first answer of a walk is often off by more than these.
+TEST(DistanceRequest, SmallErrorsAreInTheCallersUnit) {
+  std::mt19937_64 g(8);
+  const auto I = fcl::Transform3d(fcl::Transform3d::Identity());
+  for (const double scale : {1e-3, 1e3}) {
+    Raw ra = test::torus(30, 0.2), rb = test::torus(31, 0.3);
+    const auto ma = ra.scale(scale).mesh(), mb = rb.scale(scale).mesh();
+    const Modeld a(ma), b(mb);
+    const auto bvh = test::bvh<fcl::OBBRSSd>(rb);
+    for (int i = 0; i < 40; ++i) {
+      const auto Y = test::pose<double>(test::randomRotation(g), test::randomDirection(g) * 3 * scale);
+      const double exact = ask<double>(a, I, b, Y).min_distance;
+      for (const fcl::CollisionGeometryd* partner :
+           {static_cast<const fcl::CollisionGeometryd*>(&b), static_cast<const fcl::CollisionGeometryd*>(bvh.get())}) {
+        for (const double error : {1e-6, 1e-5, 1e-4, 1e-3}) {
+          const double absolute = error * scale;
+          fcl::DistanceResultd with_absolute, with_relative;
+          fcl::distance(&a, I, partner, Y, fcl::DistanceRequestd(true, false, 0, absolute), with_absolute);
+          EXPECT_NEAR(with_absolute.min_distance, exact + absolute / 2, absolute * 0.501);
+          fcl::distance(&a, I, partner, Y, fcl::DistanceRequestd(true, false, error, 0), with_relative);
+          EXPECT_NEAR(with_relative.min_distance, exact * (1 + error / 2), exact * error * 0.501);
+        }
+      }
+    }
+  }
+}
+
 TEST(DistanceRequest, TouchingIsZeroOrTheDepthOfAContact) {
   const Modeld a(test::torus(40).mesh()), b(test::torus(40).mesh());
   const auto I = fcl::Transform3d(fcl::Transform3d::Identity());
