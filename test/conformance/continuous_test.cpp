@@ -603,17 +603,23 @@ TYPED_TEST(Continuous, NoShapeIsSteppedOverOnRandomWays) {
   }
 }
 
-// A plane or a half-space that the tip of a long rod meets, far from the plane's origin.
+// A plane or a half-space that the tip of a long rod meets, far from the foot of its origin.
 TYPED_TEST(Continuous, TipsMeetUnboundedShapes) {
   using S = TypeParam;
-  const Model<S> rod(test::box({-0.1, -0.1, 0.1}, {0.1, 0.1, 9.9}).mesh());
-  const fcl::Plane<S> plane(fcl::Vector3<S>(0, 0, 1), 10);
-  const fcl::Halfspace<S> half_space(fcl::Vector3<S>(0, 0, -1), -10);
+  Raw raw = test::torus(40);
+  const Eigen::Matrix3d tilt = Eigen::AngleAxisd(0.2, Eigen::Vector3d::UnitY()).toRotationMatrix();
+  for (Eigen::Vector3d& v : raw.vertices) v = tilt * Eigen::Vector3d(5 * v.x() + 5.3, 0.1 * v.y(), 0.1 * v.z());
+  const Model<S> rod(raw.mesh());
+  const double lowest = rod.mesh()->bounds().min().z();
+  const fcl::Plane<S> plane(fcl::Vector3<S>(0, 0, 1), 0);
+  const fcl::Halfspace<S> half_space(fcl::Vector3<S>(0, 0, 1), 0);
   for (const fcl::CollisionGeometry<S>* shape : {static_cast<const fcl::CollisionGeometry<S>*>(&plane),
                                                  static_cast<const fcl::CollisionGeometry<S>*>(&half_space)}) {
     for (const auto type : kTypes) {
-      const auto end = test::pose<S>(Eigen::Matrix3d::Identity(), {0, 0, 0.2});
-      const Ways<S> ways{&rod, identity<S>(), end, shape, identity<S>(), identity<S>()};
+      const auto at = [&](double height) {
+        return test::pose<S>(Eigen::Matrix3d::Identity(), {0, 0, height - lowest});
+      };
+      const Ways<S> ways{&rod, at(0.1), at(-0.1), shape, identity<S>(), identity<S>()};
       for (const Ways<S>& w : {ways, ways.swapped()}) {
         const Result<S> result = w.ask(request<S>(type));
         EXPECT_TRUE(result.is_collide);

@@ -312,6 +312,25 @@ TEST(SolidModel, WhatReachesInWithItsFarthestPieceCollides) {
   }
 }
 
+TEST(SolidModel, NewVerticesHaveNewPieces) {
+  const Modeld box(test::box({0, 0, 0}, {1, 1, 1}).mesh(), solid());
+  const fcl::Transform3d I = fcl::Transform3d::Identity();
+  for (const bool is_solid : {false, true}) {
+    const Raw inside = test::box({0.2, 0.2, 0.2}, {0.3, 0.3, 0.3});
+    Raw outside = inside;
+    outside.move({0.5, 0, 2});
+    Modeld grain(inside.mesh(), is_solid ? solid() : Options());
+    for (int round = 0; round < 2; ++round) {
+      EXPECT_TRUE(test::touching<double>(box, I, grain, I));
+      grain.updateVertices(outside.vertices);
+      EXPECT_FALSE(test::touching<double>(box, I, grain, test::pose<double>(I.linear(), {0, 0, -1.2})));
+      EXPECT_TRUE(test::touching<double>(box, I, grain, test::pose<double>(I.linear(), {0, 0, -2})));
+      grain.updateVertices(inside.vertices);
+      EXPECT_FALSE(test::touching<double>(box, I, grain, test::pose<double>(I.linear(), {0, 0, -2})));
+    }
+  }
+}
+
 TEST(SolidModel, EachPieceCounts) {
   const Modeld box(test::box({0, 0, 0}, {1, 1, 1}).mesh(), solid());
   Raw dust;
