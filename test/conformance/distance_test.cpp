@@ -326,6 +326,33 @@ TEST(DistanceConservative, IsNeverMoreAndNearerWithDepth) {
   }
 }
 
+TEST(DistanceConservative, OfShapesIsNeverMoreAndLittleLess) {
+  const auto mesh = test::torus(40).mesh();
+  const Modeld exact(mesh);
+  std::mt19937_64 g(9);
+  const auto I = fcl::Transform3d(fcl::Transform3d::Identity());
+  const fcl::Sphered sphere(0.3);
+  const fcl::Boxd box(0.2, 0.3, 0.4);
+  for (const int depth : {5, 7}) {
+    Options options;
+    options.answer = Answer::kConservative;
+    options.depth = depth;
+    const Modeld a(mesh, options);
+    const double diameter = mesh->bounds().sizes().maxCoeff() * std::sqrt(3.0) / (1 << (depth - 1));
+    for (const fcl::CollisionGeometryd* shape :
+         {static_cast<const fcl::CollisionGeometryd*>(&sphere), static_cast<const fcl::CollisionGeometryd*>(&box)}) {
+      for (int i = 0; i < 20; ++i) {
+        const auto Y = test::pose<double>(test::randomRotation(g), test::randomDirection(g) * (1.8 + 0.1 * i));
+        const double expected = ask<double>(exact, I, *shape, Y).min_distance;
+        const double d = ask<double>(a, I, *shape, Y).min_distance;
+        EXPECT_LE(d, expected + 1e-9);
+        EXPECT_GE(d, expected - diameter - 1e-9);
+        EXPECT_NEAR(ask<double>(*shape, Y, a, I).min_distance, d, 1e-9);
+      }
+    }
+  }
+}
+
 TEST(DistanceGrowth, OnlyWhatTheBoundNeedsAndNothingTwice) {
   const Raw raw = test::torus(100);
   Modeld a(raw.mesh()), b(raw.mesh());
