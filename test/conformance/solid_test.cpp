@@ -286,6 +286,51 @@ TYPED_TEST(SolidQueries, WhatIsInsideCollidesEitherWayRound) {
   }
 }
 
+// What is inside by the least, at the end of a ball about a long partner.
+TEST(SolidModel, WhatReachesInWithItsFarthestPieceCollides) {
+  const Modeld box(test::box({0, 0, 0}, {1, 1, 1}).mesh(), solid());
+  const Eigen::Vector3d direction = Eigen::Vector3d(3, 2, 1).normalized();
+  // Grains on a diagonal of their bounds, of which only the last is inside.
+  Raw grains;
+  for (int i = 0; i < 10; ++i) {
+    Raw grain = test::box({-1e-3, -1e-3, -1e-3}, {1e-3, 1e-3, 1e-3});
+    grains.add(grain.move(i * direction));
+  }
+  const Modeld model(grains.mesh());
+  const auto bvh = test::bvh<fcl::OBBRSSd>(grains);
+  const fcl::Transform3d I = fcl::Transform3d::Identity();
+  for (const double depth : {-0.01, 0.01}) {
+    // The way leads along x, into the face at 0.
+    const Eigen::Matrix3d R =
+        Eigen::Quaterniond::FromTwoVectors(direction, Eigen::Vector3d::UnitX()).toRotationMatrix();
+    const auto X = test::pose<double>(R, Eigen::Vector3d(depth, 0.5, 0.5) - R * (9 * direction));
+    for (const fcl::CollisionGeometryd* partner : {static_cast<const fcl::CollisionGeometryd*>(&model),
+                                                   static_cast<const fcl::CollisionGeometryd*>(bvh.get())}) {
+      EXPECT_EQ(test::touching<double>(box, I, *partner, X), depth > 0);
+      EXPECT_EQ(test::touching<double>(*partner, X, box, I), depth > 0);
+    }
+  }
+}
+
+TEST(SolidModel, NewVerticesHaveNewPieces) {
+  const Modeld box(test::box({0, 0, 0}, {1, 1, 1}).mesh(), solid());
+  const fcl::Transform3d I = fcl::Transform3d::Identity();
+  for (const bool is_solid : {false, true}) {
+    const Raw inside = test::box({0.2, 0.2, 0.2}, {0.3, 0.3, 0.3});
+    Raw outside = inside;
+    outside.move({0.5, 0, 2});
+    Modeld grain(inside.mesh(), is_solid ? solid() : Options());
+    for (int round = 0; round < 2; ++round) {
+      EXPECT_TRUE(test::touching<double>(box, I, grain, I));
+      grain.updateVertices(outside.vertices);
+      EXPECT_FALSE(test::touching<double>(box, I, grain, test::pose<double>(I.linear(), {0, 0, -1.2})));
+      EXPECT_TRUE(test::touching<double>(box, I, grain, test::pose<double>(I.linear(), {0, 0, -2})));
+      grain.updateVertices(inside.vertices);
+      EXPECT_FALSE(test::touching<double>(box, I, grain, test::pose<double>(I.linear(), {0, 0, -2})));
+    }
+  }
+}
+
 TEST(SolidModel, EachPieceCounts) {
   const Modeld box(test::box({0, 0, 0}, {1, 1, 1}).mesh(), solid());
   Raw dust;

@@ -441,6 +441,30 @@ TEST(Tree, BoundsHoldTheSurfaceHoweverTheyWereLearnt) {
   }
 }
 
+TEST(Tree, RootBoundsHoldWhatEndsBesideWholeBytes) {
+  for (const Subdivision subdivision : {Subdivision::kOctree, Subdivision::kBono}) {
+    Options options;
+    options.subdivision = subdivision;
+    for (int byte = 1; byte < 127; ++byte) {
+      for (const double off : {-0.1, 0.1}) {  // lattice units, of which a byte has 257
+        Eigen::Vector3d size = Eigen::Vector3d::Constant(65536);
+        const int k = byte % 3;
+        size[k] = off + (subdivision == Subdivision::kBono ? 65536.0 * byte / 255 : 65536.0 - 131072.0 * byte / 255);
+        const tree::Tree tree(test::box({0, 0, 0}, size).mesh(), options);
+        const lattice::Lattice& lattice = tree.surface().lattice;
+        const Eigen::Vector3d lo = lattice.toLattice({0, 0, 0}), hi = lattice.toLattice(size);
+        const oracle::CellBounds& bounds = tree.rootBounds();
+        for (int c = 0; c < 3; ++c) {
+          ASSERT_LE(bounds.lo[static_cast<std::size_t>(c)] * 65536.0 / 255, lo[c] + 1e-9) << byte;
+          ASSERT_GE(bounds.hi[static_cast<std::size_t>(c)] * 65536.0 / 255, hi[c] - 1e-9) << byte;
+        }
+        ASSERT_LE(bounds.hi[static_cast<std::size_t>(k)] - bounds.lo[static_cast<std::size_t>(k)],
+                  size[k] * 255 / 65536 + 2.01);
+      }
+    }
+  }
+}
+
 TEST(Tree, ConservativeTreesStopAtTheirDepth) {
   for (const bool rule : {false, true}) {
     Options options;
