@@ -32,9 +32,24 @@ template <typename S>
 BOCST_EXPORT void collidePoses(const Model<S>& a, const Model<S>& b, const fcl::Transform3<S>* X_AB, std::size_t count,
                                std::uint8_t* hit, unsigned threads = 1);
 
+/// How the 16 numbers of a 4x4 matrix lie in memory: column after column, as Eigen has them, or row after row, as
+/// arrays in C and NumPy.
+enum class MatrixOrder { kColumns, kRows };
+
+/// The same for matrices that are bare numbers, of no alignment but that of S: X_AB[16 * k] is the first of pose k.
+/// They are read where they are.
+/// @throws std::invalid_argument as above, and for a matrix whose last row is not 0 0 0 1.
+template <typename S>
+BOCST_EXPORT void collidePoses(const Model<S>& a, const Model<S>& b, const S* X_AB, MatrixOrder order,
+                               std::size_t count, std::uint8_t* hit, unsigned threads = 1);
+
 extern template void collidePoses(const Model<float>&, const Model<float>&, const fcl::Transform3<float>*, std::size_t,
                                   std::uint8_t*, unsigned);
 extern template void collidePoses(const Model<double>&, const Model<double>&, const fcl::Transform3<double>*,
                                   std::size_t, std::uint8_t*, unsigned);
+extern template void collidePoses(const Model<float>&, const Model<float>&, const float*, MatrixOrder, std::size_t,
+                                  std::uint8_t*, unsigned);
+extern template void collidePoses(const Model<double>&, const Model<double>&, const double*, MatrixOrder, std::size_t,
+                                  std::uint8_t*, unsigned);
 
 }  // namespace bocst

@@ -35,10 +35,10 @@ namespace bocst {
 ///
 /// **Order.** Which contacts are reported and in which order depends on meshes, poses and request alone, not on what is
 /// resident, the clock, the oracle or the thread. Contacts are sorted by the place of the model's triangle (o1's, where
-/// both are models), then by (b1, b2); those of cells by (b1, b2). The place is the largest coordinate of the triangle's
-/// corners along the longest axis of its mesh's bounding box, in the mesh's frame. A request for fewer gets the first of
-/// these, sooner. The default request (one contact, enable_contact false) asks for yes or no: its ids are those of any
-/// pair that touches.
+/// both are models), then by (b1, b2); those of cells by the Morton code of the cell (o1's, where both answer with
+/// cells). The place is the largest coordinate of the triangle's corners along the longest axis of its mesh's bounding
+/// box, in the mesh's frame. A request for fewer gets the first of these, sooner. The default request (one contact,
+/// enable_contact false) asks for yes or no: its ids are those of any pair that touches.
 ///
 /// **Pairs.** One of the two is a Model; its partner is a Model, an fcl::BVHModel<BV> of any BV, one of FCL's shapes
 /// (Box, Sphere, Ellipsoid, Capsule, Cone, Cylinder, Convex, Plane, Halfspace, TriangleP) or an OcTree. o1 and o2 keep

@@ -35,8 +35,9 @@ void checkFinite(const char* name, const double* values, std::size_t count) {
 }  // namespace
 
 py::array_t<double, py::array::c_style> doubles(const char* name, const py::handle& object) {
-  return py::array_t<double, py::array::c_style | py::array::forcecast>::ensure(
-      numbers(name, object, "fiu", "real numbers"));
+  return py::array_t<double, py::array::c_style | py::array::forcecast |
+                                 py::detail::npy_api::NPY_ARRAY_ALIGNED_>::ensure(numbers(name, object, "fiu",
+                                                                                          "real numbers"));
 }
 
 std::vector<Eigen::Vector3d> vectors(const char* name, const py::handle& object) {
@@ -84,7 +85,6 @@ Eigen::Matrix3d matrix3(const char* name, const py::handle& object) {
 }
 
 Poses::Poses(const char* name, const py::handle& object) : name_(name) {
-  static_assert(sizeof(fcl::Transform3d) == 16 * sizeof(double), "a pose is its matrix");
   array_ = numbers(name, object, "fiu", "real numbers");
   const py::ssize_t n = array_.ndim();
   if (n < 2 || array_.shape(n - 1) != 4 || array_.shape(n - 2) != 4) {
@@ -92,18 +92,22 @@ Poses::Poses(const char* name, const py::handle& object) : name_(name) {
   }
   shape_.assign(array_.shape(), array_.shape() + n - 2);
   for (const py::ssize_t s : shape_) count_ *= static_cast<std::size_t>(s);
-  // Each matrix is its own transpose's rows: what np.swapaxes(X, -1, -2) of an array in C order looks like.
+  // What np.swapaxes(X, -1, -2) of an array in C order looks like.
   const py::array turned = array_.attr("swapaxes")(n - 2, n - 1);
-  in_place_ = array_.dtype().is(py::dtype::of<double>()) && (turned.flags() & py::array::c_style) != 0 &&
-              reinterpret_cast<std::uintptr_t>(array_.data()) % alignof(fcl::Transform3d) == 0;
-  if (!in_place_) array_ = doubles(name, array_);
+  constexpr int kInPlace = py::array::c_style | py::detail::npy_api::NPY_ARRAY_ALIGNED_;
+  if (array_.dtype().is(py::dtype::of<double>()) && (turned.flags() & kInPlace) == kInPlace) {
+    order_ = MatrixOrder::kColumns;
+  } else {
+    array_ = doubles(name, array_);
+  }
   data_ = static_cast<const double*>(array_.data());
 }
 
-const fcl::Transform3d* Poses::get(std::size_t begin, std::size_t end, std::vector<fcl::Transform3d>& copy) const {
+const fcl::Transform3d* Poses::transforms(std::vector<fcl::Transform3d>& copy) const {
+  const bool columns = order_ == MatrixOrder::kColumns;
   // The last row of a matrix starts at the last number of the first column, or of the third row.
-  const std::size_t first = in_place_ ? 3 : 12, step = in_place_ ? 4 : 1;
-  for (std::size_t k = begin; k < end; ++k) {
+  const std::size_t first = columns ? 3 : 12, step = columns ? 4 : 1;
+  for (std::size_t k = 0; k < count_; ++k) {
     const double* m = data_ + 16 * k + first;
     if ((m[0] == 0) & (m[step] == 0) & (m[2 * step] == 0) & (m[3 * step] == 1)) continue;
     throw std::invalid_argument(std::string("bocst: ") + name_ + ": matrix " + std::to_string(k) +
@@ -111,16 +115,14 @@ const fcl::Transform3d* Poses::get(std::size_t begin, std::size_t end, std::vect
                                 std::to_string(m[2 * step]) + " " + std::to_string(m[3 * step]) +
                                 "; 0 0 0 1 is expected");
   }
-  if (in_place_) return reinterpret_cast<const fcl::Transform3d*>(data_) + begin;
-  copy.resize(end - begin);
-  for (std::size_t k = begin; k < end; ++k) {
-    const double* from = data_ + 16 * k;
-    double* to = copy[k - begin].matrix().data();
-#pragma GCC unroll 4
-    for (int j = 0; j < 4; ++j) {
-#pragma GCC unroll 4
-      for (int i = 0; i < 4; ++i) to[4 * j + i] = from[4 * i + j];
-    }
+  if (columns && reinterpret_cast<std::uintptr_t>(data_) % alignof(fcl::Transform3d) == 0) {
+    return reinterpret_cast<const fcl::Transform3d*>(data_);
+  }
+  using Rows = Eigen::Map<const Eigen::Matrix<double, 4, 4, Eigen::RowMajor>>;
+  copy.resize(count_);
+  for (std::size_t k = 0; k < count_; ++k) {
+    const double* m = data_ + 16 * k;
+    copy[k].matrix() = columns ? Eigen::Matrix4d(Eigen::Map<const Eigen::Matrix4d>(m)) : Eigen::Matrix4d(Rows(m));
   }
   return copy.data();
 }
@@ -130,7 +132,7 @@ fcl::Transform3d pose(const char* name, const py::handle& object) {
   if (!poses.shape().empty())
     refuse(name, "has the shape " + shapeText(py::array::ensure(object)) + "; (4, 4) is expected");
   std::vector<fcl::Transform3d> copy;
-  return *poses.get(0, 1, copy);
+  return *poses.transforms(copy);
 }
 
 py::array_t<double> arrayOf(const Eigen::Vector3d& v) { return py::array_t<double>(3, v.data()); }

@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #pragma once
 
+#include <bocst/collide_poses.h>
 #include <fcl/common/types.h>
 #include <pybind11/numpy.h>
 #include <pybind11/pybind11.h>
@@ -17,7 +18,7 @@ namespace bocst::python {
 
 namespace py = pybind11;
 
-/// Doubles in C order, of any real or integer dtype and any layout; the array itself where it is that already.
+/// Doubles in C order, aligned, of any real or integer dtype and any layout; the array itself where it is that already.
 py::array_t<double, py::array::c_style> doubles(const char* name, const py::handle& object);
 
 /// An (n, 3) array as vectors; `bytes` of the copy that Eigen wants, and no other.
@@ -30,8 +31,8 @@ Eigen::Matrix3d matrix3(const char* name, const py::handle& object);
 /// An (n, 3) array of integers >= 0 as the indices of a mesh.
 std::vector<std::array<std::uint32_t, 3>> indices(const char* name, const py::handle& object);
 
-/// Poses as 4x4 matrices in an array of shape (..., 4, 4): the array's own memory where each matrix lies there column
-/// after column, else a copy. Holds the array.
+/// Poses as 4x4 matrices in an array of shape (..., 4, 4): the array's own memory where that is doubles and each matrix
+/// lies there row after row or column after column, else a copy. Holds the array.
 class Poses {
  public:
   Poses(const char* name, const py::handle& object);
@@ -39,16 +40,20 @@ class Poses {
   std::size_t count() const { return count_; }
   const std::vector<py::ssize_t>& shape() const { return shape_; }  ///< Without the last (4, 4).
 
-  /// Poses begin to end - 1, written to `copy` where the array's layout is another. Needs no GIL.
+  /// The numbers of all, and how they lie.
+  const double* data() const { return data_; }
+  MatrixOrder order() const { return order_; }
+
+  /// As C++ has them, written to `copy` where the array's layout is another. Needs no GIL.
   /// @throws std::invalid_argument unless the last row of each is 0 0 0 1.
-  const fcl::Transform3d* get(std::size_t begin, std::size_t end, std::vector<fcl::Transform3d>& copy) const;
+  const fcl::Transform3d* transforms(std::vector<fcl::Transform3d>& copy) const;
 
  private:
   const char* name_;
   py::array array_;
   const double* data_;
   std::size_t count_ = 1;
-  bool in_place_;
+  MatrixOrder order_ = MatrixOrder::kRows;
   std::vector<py::ssize_t> shape_;
 };
 

@@ -351,10 +351,6 @@ Returns (centers (k, 3), radii (k,)) in the mesh's frame and length unit.)");
 
 // Many poses ----------------------------------------------------------------------------------------------------------
 
-/// Poses that are copied at a time where the array's layout is not C++'s: they stay in a cache. More where threads are
-/// to be started for them.
-std::size_t chunkOf(unsigned threads) { return threads == 1 ? 256 : 65536; }
-
 py::array_t<bool> posesOf(const ModelGeometry& a, const ModelGeometry& b, const py::object& X_AB, unsigned threads) {
   const Poses poses("X_AB", X_AB);
   if (poses.shape().size() != 1) throw py::value_error("bocst: X_AB must have the shape (n, 4, 4)");
@@ -362,18 +358,7 @@ py::array_t<bool> posesOf(const ModelGeometry& a, const ModelGeometry& b, const 
   auto* hit = reinterpret_cast<std::uint8_t*>(hits.mutable_data());
   const std::shared_ptr<Modeld> model_a = a.shared(), model_b = b.shared();
   const NoGil free;
-  std::vector<fcl::Transform3d> copy;
-  const std::size_t chunk = chunkOf(threads);
-  for (std::size_t begin = 0; begin < poses.count(); begin += chunk) {
-    const std::size_t end = std::min(begin + chunk, poses.count());
-    try {
-      collidePoses(*model_a, *model_b, poses.get(begin, end, copy), end - begin, hit + begin, threads);
-    } catch (const std::invalid_argument&) {
-      // Again from the first on, so that the pose has its number among all.
-      collidePoses(*model_a, *model_b, poses.get(0, end, copy), end, hit, threads);
-      throw;
-    }
-  }
+  collidePoses(*model_a, *model_b, poses.data(), poses.order(), poses.count(), hit, threads);
   return hits;
 }
 
@@ -414,7 +399,7 @@ auto ask(const PyScene& s, const py::object& X_WM, bool many, const F& f) {
   const std::shared_lock<std::shared_mutex> lock(s.changing);
   const std::size_t states = statesIn("X_WM", poses, s.scene.movingCount(), many);
   std::vector<fcl::Transform3d> copy;
-  return f(s.scene, poses.get(0, poses.count(), copy), states);
+  return f(s.scene, poses.transforms(copy), states);
 }
 
 using Xs = const fcl::Transform3d*;
@@ -428,8 +413,8 @@ void bindScene(py::module_& m) {
         R"(Which of many poses of one pair collide? A bool array (n,), each as of fcl.collide.
 
 a, b: Model.
-X_AB: (n, 4, 4) poses of b in the frame of a, in the length unit of the meshes. Arrays whose matrices lie in memory column
-after column, as np.swapaxes(X, 1, 2) of an array in C order, are read where they are.
+X_AB: (n, 4, 4) poses of b in the frame of a, in the length unit of the meshes. float64 arrays in C order are read where
+they are, as are those whose matrices lie in memory column after column (np.swapaxes(X, 1, 2) of one in C order).
 threads: share the poses; 0: as many as the machine runs at once.)");
 
   py::class_<Id>(m, "Id", "Names an object of one Scene.")
@@ -547,7 +532,7 @@ threads: share the states of one call; 0: as many as the machine runs at once.)"
             return ask(s, begin, false, [&](const Scened& scene, Xs X, std::size_t) {
               statesIn("X_WM_end", last, scene.movingCount(), false);
               std::vector<fcl::Transform3d> copy;
-              return scene.edgeIsFree(X, last.get(0, last.count(), copy), type);
+              return scene.edgeIsFree(X, last.transforms(copy), type);
             });
           },
           "X_WM_begin"_a, "X_WM_end"_a, "motion"_a = "linear",

@@ -2,11 +2,16 @@
 #include <bocst/collide_poses.h>
 
 #include <algorithm>
+#include <array>
+#include <sstream>
 #include <stdexcept>
 #include <string>
+#include <vector>
 
 #include "fcl/adapters/validate.h"
 #include "fcl/queries/collide_row.h"
+#include "fcl/queries/pose_boxes.h"
+#include "fcl/queries/query_scope.h"
 #include "scene/pool.h"
 
 namespace bocst {
@@ -15,12 +20,73 @@ namespace {
 /// Poses that a thread takes at a time: enough that taking them costs nothing, few enough to be shared out.
 constexpr std::size_t kRow = 256;
 
+enum class LastRow { kChecked, kIgnored };
+
 template <typename S>
-void checkPoses(const fcl::Transform3<S>* X_AB, std::size_t begin, std::size_t end) {
-  for (std::size_t k = begin; k < end; ++k) {
-    if (__builtin_expect(fcl_adapter::isSurelyRigid(X_AB[k]), 1)) continue;
-    fcl_adapter::checkPose("collidePoses", ("pose " + std::to_string(k)).c_str(), X_AB[k]);
+class Poses {
+ public:
+  Poses(const S* numbers, MatrixOrder order, LastRow last_row)
+      : numbers_(numbers), last_row_(last_row), rows_(order == MatrixOrder::kRows) {}
+
+  const S* numbers(std::size_t k) const { return numbers_ + 16 * k; }
+  bool rows() const { return rows_; }
+
+  /// @throws std::invalid_argument unless pose k is rigid.
+  fcl::Transform3<S> operator[](std::size_t k) const {
+    const auto at = [m = numbers(k), this](int i, int j) { return rows_ ? m[4 * i + j] : m[4 * j + i]; };
+    const auto name = [k] { return "pose " + std::to_string(k); };
+    if (last_row_ == LastRow::kChecked && !(at(3, 0) == 0 && at(3, 1) == 0 && at(3, 2) == 0 && at(3, 3) == 1)) {
+      std::ostringstream row;
+      for (int j = 0; j < 4; ++j) row << at(3, j) << " ";
+      throw std::invalid_argument("bocst::collidePoses: " + name() + " has the last row " + row.str() +
+                                  "where 0 0 0 1 is expected");
+    }
+    fcl::Transform3<S> X = fcl::Transform3<S>::Identity();
+    S* to = X.matrix().data();  // columns of four
+    for (int j = 0; j < 4; ++j) {
+      for (int i = 0; i < 3; ++i) to[4 * j + i] = at(i, j);
+    }
+    if (!fcl_adapter::isSurelyRigid(X)) fcl_adapter::checkPose("collidePoses", name().c_str(), X);
+    return X;
   }
+
+ private:
+  const S* numbers_;
+  LastRow last_row_;
+  bool rows_;
+};
+
+template <typename S>
+void collideSome(const Model<S>& a, const Model<S>& b, const Poses<S>& X_AB, std::size_t begin, std::size_t end,
+                 std::uint8_t* hit) {
+  thread_local std::vector<fcl::Transform3<S>> near_poses;
+  std::array<std::uint32_t, kRow> near;
+  std::array<std::uint8_t, kRow> hits;
+  std::fill(hit + begin, hit + end, std::uint8_t{0});
+  std::size_t count;
+  {
+    const fcl_adapter::QueryScope scope(a.tree(), b.tree());
+    count =
+        query::findNearPoses(fcl_adapter::boxesOf(a, b), X_AB.numbers(begin), X_AB.rows(), end - begin, near.data());
+  }
+  near_poses.clear();
+  for (std::size_t i = 0; i < count; ++i) near_poses.push_back(X_AB[begin + near[i]]);
+  fcl_adapter::collideRow(a, b, near_poses.data(), count, hits.data());
+  for (std::size_t i = 0; i < count; ++i) hit[begin + near[i]] = hits[i];
+}
+
+template <typename S>
+void collideAll(const Model<S>& a, const Model<S>& b, const Poses<S>& X_AB, std::size_t count, std::uint8_t* hit,
+                unsigned threads) {
+  if (count == 0) return;
+  if (X_AB.numbers(0) == nullptr) throw std::invalid_argument("bocst::collidePoses: X_AB is null");
+  if (hit == nullptr) throw std::invalid_argument("bocst::collidePoses: hit is null");
+  const std::size_t rows = (count + kRow - 1) / kRow;
+  const auto work = [&](std::size_t row) {
+    collideSome(a, b, X_AB, row * kRow, std::min((row + 1) * kRow, count), hit);
+    return true;
+  };
+  scene::Pool(rows > 1 ? threads : 1).share(rows, work);
 }
 
 }  // namespace
@@ -28,22 +94,23 @@ void checkPoses(const fcl::Transform3<S>* X_AB, std::size_t begin, std::size_t e
 template <typename S>
 void collidePoses(const Model<S>& a, const Model<S>& b, const fcl::Transform3<S>* X_AB, std::size_t count,
                   std::uint8_t* hit, unsigned threads) {
-  if (count == 0) return;
-  if (X_AB == nullptr) throw std::invalid_argument("bocst::collidePoses: X_AB is null");
-  if (hit == nullptr) throw std::invalid_argument("bocst::collidePoses: hit is null");
-  const std::size_t rows = (count + kRow - 1) / kRow;
-  const auto work = [&](std::size_t row) {
-    const std::size_t begin = row * kRow, end = std::min(begin + kRow, count);
-    checkPoses(X_AB, begin, end);
-    fcl_adapter::collideRow(a, b, X_AB + begin, end - begin, hit + begin);
-    return true;
-  };
-  scene::Pool(rows > 1 ? threads : 1).share(rows, work);
+  static_assert(sizeof(fcl::Transform3<S>) == 16 * sizeof(S), "a pose is its matrix");
+  const S* numbers = X_AB == nullptr ? nullptr : X_AB->matrix().data();
+  collideAll(a, b, Poses<S>(numbers, MatrixOrder::kColumns, LastRow::kIgnored), count, hit, threads);
 }
 
-template void collidePoses(const Model<float>&, const Model<float>&, const fcl::Transform3<float>*, std::size_t,
-                           std::uint8_t*, unsigned);
-template void collidePoses(const Model<double>&, const Model<double>&, const fcl::Transform3<double>*, std::size_t,
-                           std::uint8_t*, unsigned);
+template <typename S>
+void collidePoses(const Model<S>& a, const Model<S>& b, const S* X_AB, MatrixOrder order, std::size_t count,
+                  std::uint8_t* hit, unsigned threads) {
+  collideAll(a, b, Poses<S>(X_AB, order, LastRow::kChecked), count, hit, threads);
+}
+
+#define BOCST_INSTANTIATE(S)                                                                                          \
+  template void collidePoses(const Model<S>&, const Model<S>&, const fcl::Transform3<S>*, std::size_t, std::uint8_t*, \
+                             unsigned);                                                                               \
+  template void collidePoses(const Model<S>&, const Model<S>&, const S*, MatrixOrder, std::size_t, std::uint8_t*,     \
+                             unsigned);
+BOCST_INSTANTIATE(float)
+BOCST_INSTANTIATE(double)
 
 }  // namespace bocst

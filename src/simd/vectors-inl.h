@@ -50,7 +50,10 @@ HWY_INLINE Vec3 min3(const Vec3 (&v)[3]) {
 HWY_INLINE Vec3 max3(const Vec3 (&v)[3]) {
   return {max3(v[0].x, v[1].x, v[2].x), max3(v[0].y, v[1].y, v[2].y), max3(v[0].z, v[1].z, v[2].z)};
 }
-HWY_INLINE Vec3 abs(Vec3 a) { return {hn::Abs(a.x), hn::Abs(a.y), hn::Abs(a.z)}; }
+template <typename T>
+HWY_INLINE Vec3Of<T> abs(Vec3Of<T> a) {
+  return {hn::Abs(a.x), hn::Abs(a.y), hn::Abs(a.z)};
+}
 template <typename T>
 HWY_INLINE Vec3Of<T> scaled(Vec3Of<T> a, T by) {
   return {hn::Mul(a.x, by), hn::Mul(a.y, by), hn::Mul(a.z, by)};

@@ -524,6 +524,39 @@ TEST(CollideConservative, NeverMissesAndTightensWithDepth) {
   }
 }
 
+// Where spheres just touch, the relative pose is rounded one way from the one model and another way from the other.
+TEST(CollideConservative, OrderDoesNotMatterAtTheEdge) {
+  Options options;
+  options.answer = Answer::kConservative;
+  options.depth = 5;
+  const Modelf a(test::torus(20).mesh(), options), b(test::torus(17, 0.3).mesh(), options);
+  std::mt19937_64 g(12);
+  int hits = 0, misses = 0;
+  for (int i = 0; i < 60; ++i) {
+    const Eigen::Vector3d place = 10 * test::randomDirection(g), direction = test::randomDirection(g);
+    const Eigen::Matrix3d R = test::randomRotation(g), Q = test::randomRotation(g);
+    const auto X = test::pose<float>(R, place);
+    const auto verdict = [&](double distance, bool turned) {
+      const auto Y = test::pose<float>(Q, place + distance * direction);
+      return turned ? test::touching<float>(b, Y, a, X) : test::touching<float>(a, X, b, Y);
+    };
+    double free = 4, touching = free;
+    while (touching > 0 && !verdict(touching, false)) touching -= 0.1;
+    for (int step = 0; step < 30; ++step) {
+      const double middle = (free + touching) / 2;
+      (verdict(middle, false) ? touching : free) = middle;
+    }
+    for (int step = -20; step <= 20; ++step) {
+      const double distance = touching + step * 2e-7;
+      const bool hit = verdict(distance, false);
+      (hit ? hits : misses)++;
+      ASSERT_EQ(verdict(distance, true), hit) << i << ' ' << step;
+    }
+  }
+  EXPECT_GT(hits, 500);
+  EXPECT_GT(misses, 500);
+}
+
 TEST(CollideConservative, ContactsAreSpheresOfTheDepth) {
   Options options;
   options.answer = Answer::kConservative;

@@ -327,6 +327,24 @@ TYPED_TEST(Continuous, AThinPlateStopsAFastBullet) {
   EXPECT_TRUE(miss.contact_tf2.isApprox(there));
 }
 
+// Far from the origin, float takes what glides past for touching now and then; no such pose may come before the answer.
+TEST(ContinuousFloat, WhatGlidesPastWithinRoundingTouches) {
+  const Raw plate = test::box({-1, -1, -0.1}, {1, 1, 0}), slider = test::box({-0.2, -0.2, 0}, {0.2, 0.2, 0.3});
+  const Modelf a(plate.mesh()), b(slider.mesh());
+  const auto fa = test::bvh<fcl::OBBRSSf>(plate), fb = test::bvh<fcl::OBBRSSf>(slider);
+  std::mt19937_64 g(13);
+  for (int i = 0; i < 12; ++i) {
+    const Eigen::Matrix3d R = test::randomRotation(g);
+    const Eigen::Vector3d place = 300 * test::randomDirection(g);
+    const auto at = [&](double x, double z) { return test::pose<float>(R, place + R * Eigen::Vector3d(x, 0.1, z)); };
+    const auto here = test::pose<float>(R, place);
+    const double gap = 1e-5 * (i % 4);
+    const Ways<float> ways{&a, here, here, &b, at(-3, gap), at(3, gap)};
+    checkBySampling<float>(ways, *fa, *fb, fcl::CCDM_TRANS, 1e-4, ways.ask(request<float>(fcl::CCDM_TRANS)), 200);
+    if (HasFatalFailure()) return;
+  }
+}
+
 TEST(ContinuousDouble, FclsMotionsAreTakenAsTheyAre) {
   // A bar about the z axis meets a peg after a known angle, whatever its reference point is.
   const Modeld bar(test::box({0, -0.05, -0.05}, {1, 0.05, 0.05}).mesh());
@@ -582,6 +600,32 @@ TYPED_TEST(Continuous, NoShapeIsSteppedOverOnRandomWays) {
     }
     // A plane or a half-space is touched at the begin, mostly.
     EXPECT_GE(hits, name == "plane" || name == "half-space" ? 1 : rounds / 4);
+  }
+}
+
+// A plane or a half-space that the tip of a long rod meets, far from the foot of its origin.
+TYPED_TEST(Continuous, TipsMeetUnboundedShapes) {
+  using S = TypeParam;
+  Raw raw = test::torus(40);
+  const Eigen::Matrix3d tilt = Eigen::AngleAxisd(0.2, Eigen::Vector3d::UnitY()).toRotationMatrix();
+  for (Eigen::Vector3d& v : raw.vertices) v = tilt * Eigen::Vector3d(5 * v.x() + 5.3, 0.1 * v.y(), 0.1 * v.z());
+  const Model<S> rod(raw.mesh());
+  const double lowest = rod.mesh()->bounds().min().z();
+  const fcl::Plane<S> plane(fcl::Vector3<S>(0, 0, 1), 0);
+  const fcl::Halfspace<S> half_space(fcl::Vector3<S>(0, 0, 1), 0);
+  for (const fcl::CollisionGeometry<S>* shape : {static_cast<const fcl::CollisionGeometry<S>*>(&plane),
+                                                 static_cast<const fcl::CollisionGeometry<S>*>(&half_space)}) {
+    for (const auto type : kTypes) {
+      const auto at = [&](double height) {
+        return test::pose<S>(Eigen::Matrix3d::Identity(), {0, 0, height - lowest});
+      };
+      const Ways<S> ways{&rod, at(0.1), at(-0.1), shape, identity<S>(), identity<S>()};
+      for (const Ways<S>& w : {ways, ways.swapped()}) {
+        const Result<S> result = w.ask(request<S>(type));
+        EXPECT_TRUE(result.is_collide);
+        EXPECT_NEAR(result.time_of_contact, 0.5, 1e-3);
+      }
+    }
   }
 }
 

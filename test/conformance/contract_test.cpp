@@ -120,12 +120,11 @@ class Contacts : public ::testing::Test {
 
   static Model<S>* asModel(const Geometry& g) { return dynamic_cast<Model<S>*>(g.get()); }
 
-  /// How far a triangle reaches along the longest axis of the model's box; 0 where answers are conservative.
+  /// How far a triangle reaches along the longest axis of the model's box; of a cell its number.
   static double placeOf(const Question<S>& q, const Seen& s) {
     const Model<S>*a = asModel(q.a), *b = asModel(q.b);
-    for (const Model<S>* m : {a, b}) {
-      if (m != nullptr && m->options().answer == Answer::kConservative) return 0;
-    }
+    if (a != nullptr && a->options().answer == Answer::kConservative) return static_cast<double>(s.b1);
+    if (b != nullptr && b->options().answer == Answer::kConservative) return static_cast<double>(s.b2);
     const Mesh& mesh = a != nullptr ? *a->mesh() : *b->mesh();
     const Eigen::Vector3d extent = mesh.bounds().diagonal();
     const int axis = extent[2] > std::max(extent[0], extent[1]) ? 2 : extent[1] > extent[0] ? 1 : 0;

@@ -233,6 +233,33 @@ TEST(DistanceRequest, MinimaRunAndErrorsAreTaken) {
   }
 }
 
+// The first answer of a walk is often off by more than these; the smaller of the two errors counts, as for FCL.
+TEST(DistanceRequest, SmallErrorsAreInTheCallersUnit) {
+  std::mt19937_64 g(8);
+  const auto I = fcl::Transform3d(fcl::Transform3d::Identity());
+  for (const double scale : {1e-3, 1e3}) {
+    Raw ra = test::torus(30, 0.2), rb = test::torus(31, 0.3);
+    const auto ma = ra.scale(scale).mesh(), mb = rb.scale(scale).mesh();
+    const Modeld a(ma), b(mb);
+    const auto bvh = test::bvh<fcl::OBBRSSd>(rb);
+    for (int i = 0; i < 40; ++i) {
+      const auto Y = test::pose<double>(test::randomRotation(g), test::randomDirection(g) * 3 * scale);
+      const double exact = ask<double>(a, I, b, Y).min_distance;
+      for (const fcl::CollisionGeometryd* partner :
+           {static_cast<const fcl::CollisionGeometryd*>(&b), static_cast<const fcl::CollisionGeometryd*>(bvh.get())}) {
+        for (const double error : {1e-6, 1e-5, 1e-4, 1e-3}) {
+          const double absolute = error * scale;
+          fcl::DistanceResultd with_absolute, with_relative;
+          fcl::distance(&a, I, partner, Y, fcl::DistanceRequestd(true, false, 1e9, absolute), with_absolute);
+          EXPECT_NEAR(with_absolute.min_distance, exact + absolute / 2, absolute * 0.501);
+          fcl::distance(&a, I, partner, Y, fcl::DistanceRequestd(true, false, error, 1e9), with_relative);
+          EXPECT_NEAR(with_relative.min_distance, exact * (1 + error / 2), exact * error * 0.501);
+        }
+      }
+    }
+  }
+}
+
 TEST(DistanceRequest, TouchingIsZeroOrTheDepthOfAContact) {
   const Modeld a(test::torus(40).mesh()), b(test::torus(40).mesh());
   const auto I = fcl::Transform3d(fcl::Transform3d::Identity());
@@ -295,6 +322,33 @@ TEST(DistanceConservative, IsNeverMoreAndNearerWithDepth) {
         before = d;
       }
       EXPECT_NEAR(before, exact, 0.1);
+    }
+  }
+}
+
+TEST(DistanceConservative, OfShapesIsNeverMoreAndLittleLess) {
+  const auto mesh = test::torus(40).mesh();
+  const Modeld exact(mesh);
+  std::mt19937_64 g(9);
+  const auto I = fcl::Transform3d(fcl::Transform3d::Identity());
+  const fcl::Sphered sphere(0.3);
+  const fcl::Boxd box(0.2, 0.3, 0.4);
+  for (const int depth : {5, 7}) {
+    Options options;
+    options.answer = Answer::kConservative;
+    options.depth = depth;
+    const Modeld a(mesh, options);
+    const double diameter = mesh->bounds().sizes().maxCoeff() * std::sqrt(3.0) / (1 << (depth - 1));
+    for (const fcl::CollisionGeometryd* shape :
+         {static_cast<const fcl::CollisionGeometryd*>(&sphere), static_cast<const fcl::CollisionGeometryd*>(&box)}) {
+      for (int i = 0; i < 20; ++i) {
+        const auto Y = test::pose<double>(test::randomRotation(g), test::randomDirection(g) * (1.8 + 0.1 * i));
+        const double expected = ask<double>(exact, I, *shape, Y).min_distance;
+        const double d = ask<double>(a, I, *shape, Y).min_distance;
+        EXPECT_LE(d, expected + 1e-9);
+        EXPECT_GE(d, expected - diameter - 1e-9);
+        EXPECT_NEAR(ask<double>(*shape, Y, a, I).min_distance, d, 1e-9);
+      }
     }
   }
 }

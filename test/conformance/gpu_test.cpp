@@ -58,6 +58,32 @@ TEST_P(OnDevice, ExactAnswersAreThoseOfTheCpu) {
   EXPECT_EQ(deviceOf(a).leftToCpu(), 0u);
 }
 
+// What is a leaf at once, and what division only copies: leaves of any number of triangles.
+TEST_P(OnDevice, SmallAndDenseMeshesAnswerAsOnTheCpu) {
+  Raw dense;
+  for (std::size_t i = 0; i < 700; ++i) {
+    const double z = 1e-4 * static_cast<double>(i);
+    dense.vertices.insert(dense.vertices.end(), {{-1, -1, z}, {1, -1, -z}, {0, 1.5, z}});
+    dense.triangles.emplace_back(3 * i, 3 * i + 1, 3 * i + 2);
+  }
+  const Raw few = test::box({-0.4, -0.5, -0.6}, {0.4, 0.5, 0.6}), many = test::torus(20);
+  std::size_t found = 0;
+  for (const Raw* raw : std::vector<const Raw*>{&few, &dense}) {
+    for (const Raw* partner : std::vector<const Raw*>{&few, &many, &dense}) {
+      if (raw == &dense && partner == &dense) continue;
+      const Modeld a(raw->mesh(), with(GetParam())), b(partner->mesh(), with(GetParam()));
+      const Modeld c(raw->mesh(), with(OracleKind::kCpu)), d(partner->mesh(), with(OracleKind::kCpu));
+      for (const auto& X : poses(4, 1)) {
+        const test::Pairs expected = test::pairs<double>(c, kIdentity, d, X);
+        ASSERT_EQ(test::pairs<double>(a, kIdentity, b, X), expected);
+        ASSERT_EQ(test::pairs<double>(b, X, a, kIdentity), test::pairs<double>(d, X, c, kIdentity));
+        found += expected.size();
+      }
+    }
+  }
+  EXPECT_GT(found, 2000u);
+}
+
 TEST_P(OnDevice, ConservativeVerdictsAreThoseOfTheCpu) {
   const Raw ra = test::torus(30), rb = test::torus(23, 0.3);
   for (const Subdivision s : {Subdivision::kOctree, Subdivision::kBono}) {

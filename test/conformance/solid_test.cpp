@@ -111,6 +111,37 @@ TEST(Solid, PointsBesideTheSurfaceAreTakenToBeInside) {
   EXPECT_TRUE(s.mayContain({-1e-9, 0.3, 0.3}, 1e-9));
   EXPECT_TRUE(s.mayContain({0.3, 1 + 1e-9, 0.3}, 1e-9));
   EXPECT_TRUE(s.mayContain({0.5, 0.5, 0.5}, 0));
+  // Without a tolerance, no farther than rounding goes.
+  for (const double far : {0.0, 300.0}) {
+    const Eigen::Vector3d corner = Eigen::Vector3d::Constant(far);
+    const Solid box(test::box(corner, corner + Eigen::Vector3d(1, 1, 1)).mesh());
+    for (int face = 0; face < 6; ++face) {
+      Eigen::Vector3d p = corner + Eigen::Vector3d(0.3, 0.4, 0.6);
+      p[face % 3] = corner[face % 3] + (face < 3 ? -1e-12 : 1 + 1e-12) + (face < 3 ? -1 : 1) * 1e-13 * far;
+      EXPECT_FALSE(box.mayContain(p, 0)) << p.transpose();
+    }
+  }
+}
+
+TEST(Solid, PiecesHaveOnePointEach) {
+  Raw raw = unwelded(test::torus(12));
+  std::vector<Raw> pieces{raw};
+  for (int i = 1; i < 6; ++i) {
+    pieces.push_back(i % 2 == 0 ? unwelded(test::torus(5)) : test::box({0, 0, 0}, {1, 1, 1}));
+    pieces.back().move({3.0 * i, 0, 0});
+    raw.add(pieces.back());
+  }
+  std::mt19937_64 g(7);
+  for (int round = 0; round < 5; ++round) {
+    std::shuffle(raw.triangles.begin(), raw.triangles.end(), g);
+    const auto mesh = raw.mesh();
+    const std::vector<Eigen::Vector3d> points = pointOfEachComponent(mesh->vertices(), mesh->triangles());
+    ASSERT_EQ(points.size(), pieces.size());
+    for (const Raw& piece : pieces) {
+      const auto of_piece = [&](const Eigen::Vector3d& p) { return distanceTo(piece, p) < 1e-12; };
+      EXPECT_EQ(std::count_if(points.begin(), points.end(), of_piece), 1);
+    }
+  }
 }
 
 std::string refusal(const Raw& raw) {
@@ -252,6 +283,51 @@ TYPED_TEST(SolidQueries, WhatIsInsideCollidesEitherWayRound) {
     }
     EXPECT_GT(held, 20);
     EXPECT_TRUE(answer == Answer::kConservative || is_free > 20);
+  }
+}
+
+// What is inside by the least, at the end of a ball about a long partner.
+TEST(SolidModel, WhatReachesInWithItsFarthestPieceCollides) {
+  const Modeld box(test::box({0, 0, 0}, {1, 1, 1}).mesh(), solid());
+  const Eigen::Vector3d direction = Eigen::Vector3d(3, 2, 1).normalized();
+  // Grains on a diagonal of their bounds, of which only the last is inside.
+  Raw grains;
+  for (int i = 0; i < 10; ++i) {
+    Raw grain = test::box({-1e-3, -1e-3, -1e-3}, {1e-3, 1e-3, 1e-3});
+    grains.add(grain.move(i * direction));
+  }
+  const Modeld model(grains.mesh());
+  const auto bvh = test::bvh<fcl::OBBRSSd>(grains);
+  const fcl::Transform3d I = fcl::Transform3d::Identity();
+  for (const double depth : {-0.01, 0.01}) {
+    // The way leads along x, into the face at 0.
+    const Eigen::Matrix3d R =
+        Eigen::Quaterniond::FromTwoVectors(direction, Eigen::Vector3d::UnitX()).toRotationMatrix();
+    const auto X = test::pose<double>(R, Eigen::Vector3d(depth, 0.5, 0.5) - R * (9 * direction));
+    for (const fcl::CollisionGeometryd* partner : {static_cast<const fcl::CollisionGeometryd*>(&model),
+                                                   static_cast<const fcl::CollisionGeometryd*>(bvh.get())}) {
+      EXPECT_EQ(test::touching<double>(box, I, *partner, X), depth > 0);
+      EXPECT_EQ(test::touching<double>(*partner, X, box, I), depth > 0);
+    }
+  }
+}
+
+TEST(SolidModel, NewVerticesHaveNewPieces) {
+  const Modeld box(test::box({0, 0, 0}, {1, 1, 1}).mesh(), solid());
+  const fcl::Transform3d I = fcl::Transform3d::Identity();
+  for (const bool is_solid : {false, true}) {
+    const Raw inside = test::box({0.2, 0.2, 0.2}, {0.3, 0.3, 0.3});
+    Raw outside = inside;
+    outside.move({0.5, 0, 2});
+    Modeld grain(inside.mesh(), is_solid ? solid() : Options());
+    for (int round = 0; round < 2; ++round) {
+      EXPECT_TRUE(test::touching<double>(box, I, grain, I));
+      grain.updateVertices(outside.vertices);
+      EXPECT_FALSE(test::touching<double>(box, I, grain, test::pose<double>(I.linear(), {0, 0, -1.1})));
+      EXPECT_TRUE(test::touching<double>(box, I, grain, test::pose<double>(I.linear(), {0, 0, -2})));
+      grain.updateVertices(inside.vertices);
+      EXPECT_FALSE(test::touching<double>(box, I, grain, test::pose<double>(I.linear(), {0, 0, -2})));
+    }
   }
 }
 

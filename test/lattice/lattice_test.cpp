@@ -3,6 +3,9 @@
 
 #include <gtest/gtest.h>
 
+#include <cmath>
+#include <random>
+
 namespace bocst::lattice {
 namespace {
 
@@ -49,12 +52,48 @@ TEST(Lattice, RegionsOfOctantsTileTheRegionOfTheCell) {
             if (!lattice.exists(cell.octant(o))) continue;
             next.push_back(cell.octant(o));
             volume += lattice.region(next.back()).volume();
+            EXPECT_GT(lattice.region(next.back()).volume(), 0);  // closed cells that only touch the mesh's are none
             EXPECT_TRUE(lattice.region(cell).contains(lattice.region(next.back())));
           }
           EXPECT_EQ(volume, lattice.region(cell).volume());
         }
         cells.swap(next);
       }
+    }
+  }
+}
+
+TEST(Lattice, RoundingAddsNoUnit) {
+  std::mt19937_64 g(3);
+  std::uniform_real_distribution<double> u(0.01, 100);
+  for (int i = 0; i < 20000; ++i) {
+    const std::uint32_t dimension = 3 + static_cast<std::uint32_t>(g() % 1000);
+    const double side = u(g);
+    Eigen::Vector3d sizes(side, 0, 0);
+    std::uint32_t whole[3] = {dimension, 0, 0};
+    for (int k = 1; k < 3; ++k) {
+      whole[k] = 1 + static_cast<std::uint32_t>(g() % dimension);
+      sizes[k] = side * whole[k] / dimension;
+    }
+    const Lattice lattice({Eigen::Vector3d::Zero(), sizes}, Subdivision::kBono, dimension);
+    const std::uint32_t unit = 1u << (kBits - lattice.rootExponent());
+    for (std::size_t k = 0; k < 3; ++k)
+      ASSERT_EQ(lattice.extent()[k], whole[k] * unit) << whole[k] << " of " << dimension;
+  }
+}
+
+TEST(Lattice, EveryCornerOfAnyBoundsIsInside) {
+  std::mt19937_64 g(4);
+  std::uniform_real_distribution<double> u(-1, 1);
+  for (int i = 0; i < 3000; ++i) {
+    const double far = std::pow(10.0, i % 12);
+    const Eigen::Vector3d corner = far * Eigen::Vector3d(u(g), u(g), u(g));
+    const Eigen::AlignedBox3d bounds(corner, corner + Eigen::Vector3d(2 + u(g), 2 + u(g), 2 + u(g)));
+    for (const Subdivision s : {Subdivision::kOctree, Subdivision::kBono}) {
+      const Lattice lattice(bounds, s, 0);
+      const Eigen::AlignedBox3d root = lattice.region(Cell{});
+      ASSERT_LT((root.min() - lattice.toLattice(bounds.min())).maxCoeff(), 1e-10) << "about " << far << " away";
+      ASSERT_LT((lattice.toLattice(bounds.max()) - root.max()).maxCoeff(), 1e-10) << "about " << far << " away";
     }
   }
 }

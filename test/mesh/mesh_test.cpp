@@ -1,9 +1,14 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #include <gtest/gtest.h>
 
+#include <algorithm>
+#include <cmath>
 #include <limits>
+#include <random>
 #include <string>
 
+#include "every_target.h"
+#include "mesh/scan.h"
 #include "meshes.h"
 
 namespace bocst {
@@ -128,6 +133,20 @@ TEST(Mesh, NamesWhatIsBad) {
   }
 }
 
+TEST(Mesh, CoordinatesUpToTheLimitAreLegal) {
+  for (const Raw& raw : {test::box({0, 0, 0}, {1, 1, 1}), test::torus(50)}) {
+    for (const double sign : {1.0, -1.0}) {
+      for (std::size_t i = 0; i < raw.vertices.size(); i += 1 + raw.vertices.size() / 7) {
+        Raw large = raw;
+        large.vertices[i].y() = sign * 1e75;
+        EXPECT_EQ(messageOf(large), "");
+        large.vertices[i].y() = sign * std::nextafter(1e75, 1e76);
+        EXPECT_NE(messageOf(large).find("vertex " + std::to_string(i) + " "), std::string::npos) << messageOf(large);
+      }
+    }
+  }
+}
+
 TEST(Mesh, DegenerateTrianglesAreLegal) {
   EXPECT_EQ(messageOf(test::adversarial()), "");
   Raw point;
@@ -135,6 +154,57 @@ TEST(Mesh, DegenerateTrianglesAreLegal) {
   point.triangles.emplace_back(0, 1, 2);
   EXPECT_EQ(messageOf(point), "");
 }
+
+using test::EveryTarget;
+
+TEST_P(EveryTarget, ValuesAreFoundWhereverTheyAre) {
+  for (std::uint32_t count = 0; count <= 70; ++count) {
+    std::vector<std::uint32_t> values(count);
+    for (std::uint32_t i = 0; i < count; ++i) values[i] = 2 * i + 1;
+    ASSERT_FALSE(contains(values.data(), count, 0x80000001u));
+    ASSERT_EQ(largest(values.data(), count), count == 0 ? 0 : 2 * count - 1);
+    for (std::uint32_t i = 0; i < count; ++i) {
+      ASSERT_TRUE(contains(values.data(), count, values[i])) << "value " << i << " of " << count;
+      ASSERT_FALSE(contains(values.data(), count, values[i] + 1));
+      std::vector<std::uint32_t> one = values;
+      one[i] = 0xffff0000u + i;
+      ASSERT_EQ(largest(one.data(), count), one[i]) << "value " << i << " of " << count;
+    }
+  }
+}
+
+TEST_P(EveryTarget, BoxesOfPointsAreThoseOfTheirCoordinates) {
+  std::mt19937_64 g(6);
+  std::uniform_real_distribution<double> u(-3, 3);
+  for (std::size_t count = 0; count <= 30; ++count) {
+    std::vector<double> points(3 * count);
+    for (double& x : points) x = u(g);
+    double lo[3] = {0.5, -2, 1}, hi[3] = {0.75, -1, 2}, expected_lo[3], expected_hi[3];
+    for (std::size_t k = 0; k < 3; ++k) {
+      expected_lo[k] = lo[k];
+      expected_hi[k] = hi[k];
+      for (std::size_t i = k; i < points.size(); i += 3) {
+        expected_lo[k] = std::min(expected_lo[k], points[i]);
+        expected_hi[k] = std::max(expected_hi[k], points[i]);
+      }
+    }
+    ASSERT_TRUE(widenByPoints(points.data(), count, 3, lo, hi));
+    for (std::size_t k = 0; k < 3; ++k) {
+      ASSERT_EQ(lo[k], expected_lo[k]) << count << " points";
+      ASSERT_EQ(hi[k], expected_hi[k]) << count << " points";
+    }
+    for (std::size_t i = 0; i < points.size(); ++i) {
+      for (const double bad : {3.0000001, -3.0000001, std::numeric_limits<double>::quiet_NaN()}) {
+        std::vector<double> other = points;
+        other[i] = bad;
+        ASSERT_FALSE(widenByPoints(other.data(), count, 3, lo, hi))
+            << "coordinate " << i << " of " << count << " points";
+      }
+    }
+  }
+}
+
+INSTANTIATE_TEST_SUITE_P(Targets, EveryTarget, testing::ValuesIn(EveryTarget::targets()), EveryTarget::name);
 
 }  // namespace
 }  // namespace bocst

@@ -7,6 +7,8 @@
 #include <hwy/targets.h>
 
 #include <algorithm>
+#include <array>
+#include <cmath>
 #include <cstdlib>
 #include <random>
 
@@ -29,8 +31,8 @@ Surface residentOn(Oracle& oracle, Surface surface) {
 }
 
 // Is p, in lattice units, inside the bounds of the octant?
-bool contains(const bounds::NodeBounds& b, const Cell& cell, const Eigen::Vector3d& p) {
-  const double side = cell.side(), tolerance = side * 1e-6 + 1e-9;
+bool contains(const bounds::NodeBounds& b, const Cell& cell, const Eigen::Vector3d& p, double relative = 1e-6) {
+  const double side = cell.side(), tolerance = side * relative + 1e-9;
   const Eigen::Vector3d center = centerOf(cell);
   double along = 0;
   for (int k = 0; k < 3; ++k) {
@@ -39,7 +41,7 @@ bool contains(const bounds::NodeBounds& b, const Cell& cell, const Eigen::Vector
     if (x > b.hi[static_cast<std::size_t>(k)] * side / 255 + tolerance) return false;
     along += b.normal[static_cast<std::size_t>(k)] * (p[k] - center[k]) / side;
   }
-  return std::abs(along - b.slab_center) <= b.slab_half / 2.0 + 127e-6;
+  return std::abs(along - b.slab_center) <= b.slab_half / 2.0 + 127 * relative;
 }
 
 class EveryOracle : public testing::TestWithParam<OracleKind> {
@@ -350,6 +352,189 @@ TEST_P(EveryOracle, LongSliversThroughDeepCells) {
   }
 }
 
+/// Triangles one by one, in a mesh whose lattice unit is 1.
+struct SingleTriangles {
+  SingleTriangles() {
+    // Two triangles that pin the bounds to the whole cube.
+    for (const double x : {0.0, 65536.0})
+      add(Eigen::Vector3d(x, x, x), Eigen::Vector3d(x, x, x), Eigen::Vector3d(x, x, x));
+  }
+  std::uint32_t add(const Eigen::Vector3d& a, const Eigen::Vector3d& b, const Eigen::Vector3d& c) {
+    raw.vertices.insert(raw.vertices.end(), {a, b, c});
+    raw.triangles.emplace_back(raw.vertices.size() - 3, raw.vertices.size() - 2, raw.vertices.size() - 1);
+    return static_cast<std::uint32_t>(raw.triangles.size() - 1);
+  }
+  test::Raw raw;
+};
+
+// In float a coordinate beside a whole byte, or beside half a step of a slab, is on either side of it.
+TEST_P(EveryOracle, BoundsHoldWhatLiesBesideWholeBytes) {
+  std::mt19937_64 g(16);
+  std::uniform_real_distribution<double> u(-1e-9, 1e-9);
+  for (const int level : {1, 9}) {
+    SingleTriangles triangles;
+    std::vector<Cell> octants;
+    for (int i = 0; i < 500; ++i) {
+      const Cell cell = level == 1 ? Cell{} : cellNearMiddle(level, g), octant = cell.octant(static_cast<int>(g() % 8));
+      octants.push_back(octant);
+      const double side = octant.side();
+      Eigen::Vector3d corners[3];
+      for (Eigen::Vector3d& p : corners) {
+        for (int k = 0; k < 3; ++k) {
+          p[k] =
+              octant.corner()[static_cast<std::size_t>(k)] + side * (static_cast<double>(1 + g() % 254) / 255 + u(g));
+        }
+      }
+      if (i % 2 == 0) {
+        const int k = static_cast<int>(g() % 3);
+        const double steps = static_cast<double>(g() % 240) / 2 - 60;
+        for (Eigen::Vector3d& p : corners) p[k] = centerOf(octant)[k] + side * (steps / 127 + u(g));
+      }
+      triangles.add(corners[0], corners[1], corners[2]);
+    }
+    const Surface surface = residentOn(*oracle_, surfaceOf(triangles.raw));
+    ASSERT_EQ(surface.lattice.unit(), 1);
+    std::vector<std::uint32_t> ids(octants.size());
+    std::vector<ExpansionRequest> batch(octants.size());
+    for (std::uint32_t i = 0; i < octants.size(); ++i) {
+      ids[i] = i + 2;
+      const auto& at = octants[i].at;
+      batch[i].surface = &surface;
+      batch[i].cell = Cell{level, {at[0] / 2, at[1] / 2, at[2] / 2}};
+      batch[i].ids = &ids[i];
+      batch[i].count = 1;
+    }
+    const std::vector<ExpansionRequest> answers = ask(*oracle_, batch);
+    for (std::uint32_t i = 0; i < octants.size(); ++i) {
+      const auto& at = octants[i].at;
+      const int o = static_cast<int>((at[0] & 1) | (at[1] & 1) << 1 | (at[2] & 1) << 2);
+      ASSERT_TRUE(answers[i].grey >> o & 1);
+      for (int k = 0; k < 3; ++k) {
+        const Eigen::Vector3d p = surface.corner(i + 2, k);
+        ASSERT_TRUE(contains(answers[i].octants.get(o), octants[i], p, 1e-13))
+            << "triangle " << i << " level " << level;
+        ASSERT_TRUE(contains(answers[i].own, answers[i].cell, p, 1e-13)) << "triangle " << i << " level " << level;
+      }
+    }
+  }
+}
+
+// A leaf's one list is that of its octants together.
+TEST(CpuOracle, OwnListsAreThoseOfAllOctants) {
+  const auto oracle = makeOracle(OracleKind::kCpu);
+  const Surface surface = surfaceOf(test::soup(900, 17));
+  std::vector<ExpansionRequest> batch(1, rootOf(surface));
+  for (int o = 0; o < 8; ++o) {
+    for (int p = 0; p < 8; ++p) {
+      batch.push_back(rootOf(surface));
+      batch.back().cell = Cell{}.octant(o).octant(p);
+    }
+  }
+  const std::vector<ExpansionRequest> whole = ask(*oracle, batch);
+  for (ExpansionRequest& e : batch) e.own_only = true;
+  const std::vector<ExpansionRequest> own = ask(*oracle, batch);
+  std::size_t left_out = 0;
+  for (std::size_t i = 0; i < batch.size(); ++i) {
+    EXPECT_EQ(own[i].grey, whole[i].grey);
+    EXPECT_EQ(own[i].own, whole[i].own);
+    std::vector<std::uint32_t> expected = whole[i].lists, list = own[i].lists;
+    std::sort(expected.begin(), expected.end());
+    expected.erase(std::unique(expected.begin(), expected.end()), expected.end());
+    std::sort(list.begin(), list.end());
+    EXPECT_EQ(list, expected);
+    left_out += surface.triangle_count - expected.size();
+  }
+  EXPECT_GT(left_out, 1000u);
+}
+
+std::vector<Eigen::Vector3d> clipped(std::vector<Eigen::Vector3d> polygon, const Eigen::AlignedBox3d& box) {
+  for (int face = 0; face < 6 && !polygon.empty(); ++face) {
+    const int k = face % 3;
+    const auto inside = [&](const Eigen::Vector3d& p) { return face < 3 ? p[k] - box.min()[k] : box.max()[k] - p[k]; };
+    std::vector<Eigen::Vector3d> next;
+    for (std::size_t i = 0; i < polygon.size(); ++i) {
+      const Eigen::Vector3d &a = polygon[i], &b = polygon[(i + 1) % polygon.size()];
+      const double da = inside(a), db = inside(b);
+      if (da >= 0) next.push_back(a);
+      if ((da > 0 && db < 0) || (da < 0 && db > 0)) next.push_back(a + da / (da - db) * (b - a));
+    }
+    polygon.swap(next);
+  }
+  return polygon;
+}
+
+// Flat pieces of surface, both sides of each, many in planes between octants: boxes and slabs are as thin as bytes
+// allow.
+TEST(CpuOracle, BoundsAreHardlyLargerThanTheSurface) {
+  const auto oracle = makeOracle(OracleKind::kCpu);
+  std::mt19937_64 g(18);
+  SingleTriangles triangles;
+  constexpr std::uint32_t kCount = 1000;
+  std::vector<Cell> cells;
+  for (std::uint32_t i = 0; i < kCount; ++i) {
+    cells.push_back(cellNearMiddle(3 + static_cast<int>(g() % 6), g));
+    Eigen::Vector3d corners[3];
+    for (Eigen::Vector3d& p : corners) {
+      for (int k = 0; k < 3; ++k) {
+        p[k] = centerOf(cells.back())[k] + cells.back().side() * (static_cast<double>(g() % 33) - 16) / 16;
+      }
+    }
+    if (i % 2 == 0) {
+      const int k = static_cast<int>(g() % 3);
+      corners[1][k] = corners[2][k] = corners[0][k] = i % 4 == 0 ? centerOf(cells.back())[k] : corners[0][k];
+    }
+    triangles.add(corners[0], corners[1], corners[2]);
+    triangles.add(corners[0], corners[2], corners[1]);
+  }
+  const Surface surface = surfaceOf(triangles.raw);
+  ASSERT_EQ(surface.lattice.unit(), 1);
+  std::vector<std::uint32_t> ids(2 * kCount);
+  std::vector<ExpansionRequest> batch(kCount);
+  for (std::uint32_t i = 0; i < kCount; ++i) {
+    ids[2 * i] = 2 * i + 2;
+    ids[2 * i + 1] = 2 * i + 3;
+    batch[i].surface = &surface;
+    batch[i].cell = cells[i];
+    batch[i].ids = &ids[2 * i];
+    batch[i].count = 2;
+  }
+  std::size_t slabs = 0;
+  const auto expectThin = [&](const bounds::NodeBounds& b, const Cell& cell,
+                              const std::vector<Eigen::Vector3d>& corners) {
+    // Clipping is outwards by little.
+    const double side = cell.side(), off = 0x1p-12 * side;
+    const Eigen::AlignedBox3d box(centerOf(cell).array() - side / 2, centerOf(cell).array() + side / 2);
+    const auto outer = clipped(corners, {box.min().array() - off, box.max().array() + off});
+    const auto inner = clipped(corners, box);
+    ASSERT_FALSE(outer.empty());
+    Eigen::AlignedBox3d bounds;
+    for (const Eigen::Vector3d& p : outer) bounds.extend(p);
+    for (int k = 0; k < 3; ++k) {
+      const auto c = static_cast<std::size_t>(k);
+      EXPECT_GE(box.min()[k] + b.lo[c] * side / 255, std::max(bounds.min()[k], box.min()[k]) - 1.01 * side / 255 - off);
+      EXPECT_LE(box.min()[k] + b.hi[c] * side / 255, std::min(bounds.max()[k], box.max()[k]) + 1.01 * side / 255 + off);
+    }
+    Eigen::Vector3d area = Eigen::Vector3d::Zero();
+    for (std::size_t i = 2; i < inner.size(); ++i) area += (inner[i - 1] - inner[0]).cross(inner[i] - inner[0]) / 2;
+    if (area.norm() < 0.01 * side * side) return;
+    ++slabs;
+    const Eigen::Vector3d normal(b.normal[0], b.normal[1], b.normal[2]);
+    EXPECT_GT(std::abs(normal.dot(area)), 126 * area.norm());
+    EXPECT_LE(b.slab_half, 8);
+  };
+  const std::vector<ExpansionRequest> answers = ask(*oracle, batch);
+  for (std::uint32_t i = 0; i < kCount && !HasFailure(); ++i) {
+    SCOPED_TRACE(testing::Message() << "triangle " << i);
+    const std::uint32_t t = ids[2 * i];
+    const std::vector<Eigen::Vector3d> corners = {surface.corner(t, 0), surface.corner(t, 1), surface.corner(t, 2)};
+    for (int o = 0; o < 8; ++o) {
+      if (answers[i].grey >> o & 1) expectThin(answers[i].octants.get(o), cells[i].octant(o), corners);
+    }
+    if (answers[i].grey != 0) expectThin(answers[i].own, cells[i], corners);
+  }
+  EXPECT_GT(slabs, 1000u);
+}
+
 const char* nameOf(OracleKind kind) {
   return kind == OracleKind::kCpu ? "cpu" : kind == OracleKind::kOcclusion ? "occlusion" : "compute";
 }
@@ -438,6 +623,49 @@ void checkStepsBack() {
   }
 }
 
+// A triangle beside an octant, parted from it by less than the tolerance, is still taken to meet it.
+void checkTolerance() {
+  std::mt19937_64 g(14);
+  std::uniform_real_distribution<double> u(-1, 1);
+  for (const double tolerance : {1e-3, 0.05, 0.4}) {
+    constexpr std::size_t kCount = LocalTriangles::kCapacity;
+    static LocalTriangles triangles;
+    std::array<int, kCount> octants;
+    for (std::size_t i = 0; i < kCount; ++i) {
+      octants[i] = static_cast<int>(g() % 8);
+      // A point of the octant's surface, and a way out that leads straight away from all of the octant.
+      Eigen::Vector3d p, out = Eigen::Vector3d::Zero();
+      while (out.isZero()) {
+        for (int k = 0; k < 3; ++k) {
+          const bool at_end = g() % 4 != 0, upper = g() % 2 != 0;
+          p[k] = ((octants[i] >> k & 1) != 0 ? 0.5 : -0.5) + (at_end ? (upper ? 0.5 : -0.5) : u(g) / 2);
+          out[k] = at_end ? (upper ? 1 : -1) * (1.01 + u(g)) : 0;
+        }
+      }
+      out.normalize();
+      const Eigen::Vector3d a = out.unitOrthogonal(), b = out.cross(a);
+      // Across the way out, about the point; or with a corner there and the others farther out.
+      const bool across = g() % 2 != 0;
+      for (std::size_t k = 0; k < 3; ++k) {
+        const double angle = 2.1 * static_cast<double>(k) + 0.5 * u(g), reach = 1.01 + u(g);
+        Eigen::Vector3d v = p + 0.99 * tolerance * out;
+        if (across || k > 0) v += reach * (std::cos(angle) * a + std::sin(angle) * b);
+        if (!across && k > 0) v += (1 + u(g)) * out;
+        for (std::size_t c = 0; c < 3; ++c) triangles.xyz[3 * k + c][i] = static_cast<float>(v[static_cast<int>(c)]);
+      }
+    }
+    std::array<std::uint8_t, kCount> masks, without;
+    octantMasks(triangles, kCount, static_cast<float>(tolerance), masks.data());
+    octantMasks(triangles, kCount, 0, without.data());
+    int kept_without = 0;
+    for (std::size_t i = 0; i < kCount; ++i) {
+      ASSERT_TRUE(masks[i] >> octants[i] & 1) << instructionSet() << " triangle " << i << " tolerance " << tolerance;
+      kept_without += without[i] >> octants[i] & 1;
+    }
+    EXPECT_EQ(kept_without, 0) << instructionSet() << " tolerance " << tolerance;
+  }
+}
+
 TEST(Kernels, EveryInstructionSetAgreesOnGreySets) {
   const Surface surface = surfaceOf(test::soup(500, 3));
   ExpansionRequest root = rootOf(surface);
@@ -461,6 +689,7 @@ TEST(Kernels, EveryInstructionSetAgreesOnGreySets) {
     checkGridSpans();
     checkBitsOfOthers();
     checkStepsBack();
+    checkTolerance();
   }
   hwy::SetSupportedTargetsForTest(0);
   hwy::GetChosenTarget().Update(hwy::SupportedTargets());
@@ -539,6 +768,49 @@ TEST(RootGrid, KnowsFineMeshesWithSomeLargeTriangles) {
   }
 }
 
+// Triangles whose boxes end on faces of cells, or beside them by less than the grid's step, above a fine mesh.
+TEST(RootGrid, KnowsWhatTouchesFacesOfCells) {
+  std::mt19937_64 g(15);
+  for (int round = 0; round < 6; ++round) {
+    test::Raw raw = test::torus(50);
+    raw.scale(1000).move({2000, 2000, 2000});
+    // The bounds are that of cells: half as many along two axes as along the third.
+    const auto triangle = [&raw](const Eigen::Vector3d& a, const Eigen::Vector3d& b, const Eigen::Vector3d& c) {
+      raw.vertices.insert(raw.vertices.end(), {a, b, c});
+      raw.triangles.emplace_back(raw.vertices.size() - 3, raw.vertices.size() - 2, raw.vertices.size() - 1);
+    };
+    Eigen::Vector3d most(32768, 32768, 32768);
+    most[round % 3] = 65536;
+    triangle({0, 0, 0}, {0, 0, 0}, {0, 0, 0});
+    triangle(most, most, most);
+    const double side = 8192;
+    const auto cornerOfCell = [&] {
+      Eigen::Vector3d p;
+      for (int k = 0; k < 3; ++k) p[k] = static_cast<double>(g() % (k == round % 3 ? 9 : 5)) * side;
+      return p;
+    };
+    for (int i = 0; i < 2; ++i) triangle(cornerOfCell(), cornerOfCell(), cornerOfCell());
+    for (int i = 0; i < 12; ++i) {
+      Eigen::Vector3d p = cornerOfCell().cwiseMax(side).cwiseMin(most - Eigen::Vector3d::Constant(side));
+      const double off = g() % 2 != 0 ? 0.5 : -0.5;
+      for (int k = 0; k < 3; ++k) p[k] += g() % 2 != 0 ? side / 2 : off;
+      triangle(p, p + Eigen::Vector3d(off, 0, off), p + Eigen::Vector3d(0, off, off));
+    }
+    const Surface surface = surfaceOf(raw);
+    ASSERT_EQ(surface.lattice.unit(), 1);
+    const auto grid = RootGrid::make(surface, lattice::kMaxLevel);
+    ASSERT_NE(grid, nullptr);
+    ASSERT_EQ(grid->level(), 4);
+    for (std::uint32_t at = 0; at < 512; ++at) {
+      const Cell cell{4, {at % 8, at / 8 % 8, at / 64}};
+      const bool grey = grid->grey(surface, cell);
+      ASSERT_EQ(grey, referenceGrey(surface, cell)) << "cell " << cell.at[0] << " " << cell.at[1] << " " << cell.at[2];
+      if (!grey) continue;
+      ASSERT_NO_FATAL_FAILURE(gathersAllOnce(*grid, surface, cell));
+    }
+  }
+}
+
 TEST(RootGrid, FollowsListsOverAnyDistance) {
   // Three triangles in a cell of their own, so far apart in the mesh that steps back just fit, or just do not.
   const test::Raw torus = test::torus(260);
@@ -597,6 +869,18 @@ TEST(MakeOracle, SaysWhyNot) {
     setenv("BOCST_ORACLE", bad, 1);
     EXPECT_THROW(makeOracle(OracleKind::kAuto), OracleError) << bad;
     EXPECT_EQ(makeOracle(OracleKind::kCpu)->name(), "cpu");
+  }
+  setenv("BOCST_ORACLE", "", 1);
+  EXPECT_EQ(makeOracle(OracleKind::kAuto)->name(), "cpu") << "as if it were not set";
+  // Any index is understood, but there are not so many devices; what is no index is named as such.
+  for (const auto& [value, is_index] : {std::pair("9999", true), std::pair("12345", false), std::pair("1a", false)}) {
+    setenv("BOCST_ORACLE", value, 1);
+    try {
+      makeOracle(OracleKind::kAuto);
+      ADD_FAILURE() << value;
+    } catch (const OracleError& e) {
+      EXPECT_EQ(std::string(e.what()).find("not one of") == std::string::npos, is_index) << e.what();
+    }
   }
   unsetenv("BOCST_ORACLE");
 }

@@ -327,6 +327,46 @@ TEST(Suggestion, IsTheNearestName) {
   EXPECT_EQ(program::suggestion("", names), "");
 }
 
+TEST(Pose, IsSevenNumbersAndNothingElse) {
+  using program::Pose;
+  EXPECT_EQ(Pose::parse("1,2,3,0,1,0,0").text(), "1,2,3,0,1,0,0");
+  for (const char* bad :
+       {"1,2,3,0,1,0,0,", "1,2,3,0,1,0,0 ", "1,2,3,0,1,0,0x", "1,2,3,0,1,0,0,4", "1,2,3,0,1,0", "", "1,2,3,0,1,0,",
+        "1,2,3,0,1,0,nan", "inf,2,3,0,1,0,0", "1,2,3,0,0,0,0", "1,2,3,1e-200,0,0,0", "1,2,3,1e200,0,0,0"}) {
+    EXPECT_THROW(Pose::parse(bad), std::invalid_argument) << bad;
+  }
+}
+
+/// Touches where the origins of A and B are near, whatever the meshes are.
+class Near : public program::QueryPair {
+ public:
+  static constexpr double kDistance = 1.25;
+  bool touch(const Eigen::Isometry3d& X_AB, Order) const override { return X_AB.translation().norm() <= kDistance; }
+  std::vector<Contact> contacts(const Eigen::Isometry3d&, std::size_t, Order) const override { return {}; }
+  std::size_t countContacts(const Eigen::Isometry3d&) const override { return 0; }
+  double distance(const Eigen::Isometry3d&) const override { return 0; }
+};
+
+TEST(PoseSampler, LiesToBothSidesOfContact) {
+  const Near reference;
+  const auto a = test::box({-1, -1, -1}, {1, 1, 1}).mesh(), b = test::box({-2, -1, -1}, {2, 1, 1}).mesh();
+  program::PoseSampler sampler(*a, *b, reference, 5);
+  double nearest = 1, farthest = 0;
+  for (std::uint64_t ray = 0; ray < 50; ++ray) {
+    const auto poses = sampler.aroundContact(ray);
+    for (std::size_t i = 0; i < 6; ++i) {
+      const double off = poses[i].transform().translation().norm() - Near::kDistance;
+      EXPECT_EQ(off > 0, i % 2 != 0) << off;
+      EXPECT_GE(std::abs(off), 0x1p-31 * sampler.smallerRadius());
+      EXPECT_LE(std::abs(off), 0x1p-2 * sampler.smallerRadius());
+      nearest = std::min(nearest, std::abs(off));
+      farthest = std::max(farthest, std::abs(off));
+    }
+  }
+  EXPECT_LT(nearest, 1e-8);
+  EXPECT_GT(farthest, 1e-2);
+}
+
 TEST(Pose, SaysItsRotationInWords) {
   const auto words = [](const std::string& rpy) {
     return program::Pose::parse(rpy, program::RotationFormat::kRpy).rotationText();

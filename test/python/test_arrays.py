@@ -154,7 +154,7 @@ def reflected():
     (nan_in(np.tile(np.eye(4), (3, 1, 1)), (2, 0, 0)), ValueError, "pose 2 has the rotation .*not finite"),
     (np.stack([np.eye(4), np.diag([2.0, 2, 2, 1])]), ValueError, "pose 1 has the rotation"),
     (np.stack([np.eye(4), reflected()]), ValueError, "pose 1 has the rotation .* a reflection"),
-    (np.stack([np.eye(4), shift(1, 2, 3).T]), ValueError, "matrix 1 has the last row 1.0+ 2.0+ 3.0+ 1.0+"),
+    (np.stack([np.eye(4), shift(1, 2, 3).T]), ValueError, "pose 1 has the last row 1 2 3 1 "),
 ])
 def test_what_is_no_pose(X, error, words):
     a, b = models()

@@ -51,6 +51,16 @@ std::vector<std::uint8_t> atOnce(const Model<S>& a, const Model<S>& b, const Pos
   return hits;
 }
 
+/// The 16 numbers of each pose in one order, `skip` numbers into a buffer.
+template <typename S>
+std::vector<S> numbersOf(const Poses<S>& X_AB, MatrixOrder order, std::size_t skip = 0) {
+  std::vector<S> numbers(skip);
+  for (const fcl::Transform3<S>& X : X_AB) {
+    for (int k = 0; k < 16; ++k) numbers.push_back(order == MatrixOrder::kRows ? X(k / 4, k % 4) : X(k % 4, k / 4));
+  }
+  return numbers;
+}
+
 std::size_t count(const std::vector<std::uint8_t>& hits) {
   return static_cast<std::size_t>(std::count(hits.begin(), hits.end(), 1));
 }
@@ -172,6 +182,67 @@ TYPED_TEST(CollidePoses, NamesTheFirstPoseThatIsNone) {
   EXPECT_THROW(collidePoses<S>(a, a, &X, 1, nullptr), std::invalid_argument);
   collidePoses<S>(a, a, nullptr, 0, nullptr);
   EXPECT_EQ(hit, 7);
+}
+
+TYPED_TEST(CollidePoses, ReadsNumbersInBothOrders) {
+  using S = TypeParam;
+  const Model<S> a(test::torus(20).mesh()), b(test::box({-0.1, 0.2, 0.3}, {0.4, 0.6, 0.4}).mesh());
+  const Poses<S> X = randomPoses<S>(1501, 1.6, 12);
+  const auto expected = atOnce(a, b, X);
+  EXPECT_GT(count(expected), 100u);
+  for (const MatrixOrder order : {MatrixOrder::kColumns, MatrixOrder::kRows}) {
+    for (const std::size_t skip : {0u, 1u, 3u}) {
+      const std::vector<S> numbers = numbersOf<S>(X, order, skip);
+      for (const unsigned threads : {1u, 2u}) {
+        std::vector<std::uint8_t> hits(X.size(), 7);
+        collidePoses(a, b, numbers.data() + skip, order, X.size(), hits.data(), threads);
+        EXPECT_EQ(hits, expected) << skip << " " << threads;
+      }
+    }
+  }
+}
+
+TYPED_TEST(CollidePoses, NamesTheFirstMatrixThatIsNoPose) {
+  using S = TypeParam;
+  Model<S> a(test::torus(6).mesh());
+  const Poses<S> X = randomPoses<S>(3000, 9, 13);
+  for (const bool occupied : {true, false}) {
+    a.cost_density = occupied ? 1 : 0;
+    for (const MatrixOrder order : {MatrixOrder::kColumns, MatrixOrder::kRows}) {
+      const auto words = [&](const std::vector<S>& numbers, unsigned threads) -> std::string {
+        std::vector<std::uint8_t> hits(X.size());
+        try {
+          collidePoses(a, a, numbers.data(), order, X.size(), hits.data(), threads);
+        } catch (const std::invalid_argument& e) {
+          return e.what();
+        }
+        return "";
+      };
+      for (const unsigned threads : {1u, 2u}) {
+        const std::vector<S> right = numbersOf<S>(X, order);
+        EXPECT_EQ(words(right, threads), "");
+        for (int i = 0; i < 4; ++i) {
+          for (int j = 0; j < 4; ++j) {
+            std::vector<S> wrong = right;
+            const std::size_t at = static_cast<std::size_t>(order == MatrixOrder::kRows ? 4 * i + j : 4 * j + i);
+            wrong[16 * 2345 + at] = std::numeric_limits<S>::quiet_NaN();
+            wrong[16 * 2999] = 9;
+            const std::string what = i == 3 ? "last row" : j == 3 ? "translation" : "rotation";
+            EXPECT_EQ(words(wrong, threads).find("bocst::collidePoses: pose 2345 has the " + what), 0u)
+                << words(wrong, threads);
+          }
+        }
+      }
+    }
+  }
+  std::vector<S> numbers = numbersOf<S>(X, MatrixOrder::kRows);
+  numbers[16 * 7 + 13] = static_cast<S>(0.25);
+  std::uint8_t hits[9];
+  EXPECT_THROW(collidePoses<S>(a, a, nullptr, MatrixOrder::kRows, 1, hits), std::invalid_argument);
+  EXPECT_THROW(collidePoses<S>(a, a, numbers.data(), MatrixOrder::kRows, 9, nullptr), std::invalid_argument);
+  EXPECT_THROW(collidePoses<S>(a, a, numbers.data(), MatrixOrder::kRows, 9, hits), std::invalid_argument);
+  collidePoses<S>(a, a, numbers.data(), MatrixOrder::kRows, 7, hits);
+  collidePoses<S>(a, a, nullptr, MatrixOrder::kRows, 0, nullptr);
 }
 
 TYPED_TEST(CollidePoses, OnlyOccupiedModelsCollide) {

@@ -162,8 +162,11 @@ TEST(Bulk, ARegionKeepsWhatMeetsIt) {
       for (const std::uint32_t t : all) {
         Eigen::AlignedBox3d box;
         for (int k = 0; k < 3; ++k) box.extend(s.corner(t, k));
+        const bool is_kept = std::binary_search(kept.begin(), kept.end(), t);
         if (box.intersects(region)) {
-          EXPECT_TRUE(std::binary_search(kept.begin(), kept.end(), t));
+          EXPECT_TRUE(is_kept);
+        } else if (is_kept) {
+          ASSERT_LT(box.squaredExteriorDistance(region), 0.1) << "in lattice units";
         }
       }
       expectBounds(bulk, s, &region);

@@ -123,6 +123,36 @@ TEST(ShardedLock, TryingGivesUpWhereOthersAre) {
   EXPECT_TRUE(tried());
 }
 
+// Readers that come between the two looks of a writer that tries.
+TEST(ShardedLock, TryingSeesReadersThatComeMeanwhile) {
+  ShardedLock sharded_lock;
+  std::atomic<bool> done{false};
+  std::atomic<int> readers{0};
+  std::thread reader([&] {
+    for (unsigned i = 0; !done; ++i) {
+      sharded_lock.lock_shared();
+      ++readers;
+      --readers;
+      sharded_lock.unlock_shared();
+      for (std::atomic<unsigned> wait{i % 16}; wait > 0;) --wait;
+    }
+  });
+  int met = 0, had = 0;
+  const auto end = std::chrono::steady_clock::now() + std::chrono::seconds(4);
+  while (std::chrono::steady_clock::now() < end && met == 0) {
+    for (int i = 0; i < 1000; ++i) {
+      if (!sharded_lock.try_lock()) continue;
+      ++had;
+      for (int k = 0; k < 10; ++k) met += readers != 0;
+      sharded_lock.unlock();
+    }
+  }
+  done = true;
+  reader.join();
+  EXPECT_EQ(met, 0);
+  EXPECT_GT(had, 0);
+}
+
 TEST(ShardedLock, ReadersWaitForTheWriter) {
   ShardedLock sharded_lock;
   int value = 0;

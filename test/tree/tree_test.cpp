@@ -157,6 +157,22 @@ TEST(Tree, WhatIsUsedStays) {
   EXPECT_GT(a.statistics().pruned_nodes, 0u);
 }
 
+// Also queries that no branch has a part in, because the boxes are far apart.
+TEST(Tree, FarMissesLetBranchesGo) {
+  FakeClock clock;
+  Options options;
+  options.clock = clock.function();
+  Modeld a(test::torus(60).mesh(), options), b(test::torus(60).mesh(), options);
+  EXPECT_TRUE(touching(a, b, kHit));
+  ASSERT_GT(a.statistics().resident_nodes, 1u);
+  for (int i = 0; i < 100; ++i) {
+    clock.now += milliseconds(700);
+    EXPECT_FALSE(touching(a, b, kMiss));
+  }
+  EXPECT_EQ(a.statistics().resident_nodes, 1u);
+  EXPECT_EQ(b.statistics().resident_nodes, 1u);
+}
+
 TEST(Tree, TtlZeroKeepsEverything) {
   FakeClock clock;
   Options options;
@@ -422,6 +438,30 @@ TEST(Tree, BoundsHoldTheSurfaceHoweverTheyWereLearnt) {
       }
     }
     EXPECT_GT(loose, 1000);
+  }
+}
+
+TEST(Tree, RootBoundsHoldWhatEndsBesideWholeBytes) {
+  for (const Subdivision subdivision : {Subdivision::kOctree, Subdivision::kBono}) {
+    Options options;
+    options.subdivision = subdivision;
+    for (int byte = 1; byte < 127; ++byte) {
+      for (const double off : {-0.1, 0.1}) {  // lattice units, of which a byte has 257
+        Eigen::Vector3d size = Eigen::Vector3d::Constant(65536);
+        const int k = byte % 3;
+        size[k] = off + (subdivision == Subdivision::kBono ? 65536.0 * byte / 255 : 65536.0 - 131072.0 * byte / 255);
+        const tree::Tree tree(test::box({0, 0, 0}, size).mesh(), options);
+        const lattice::Lattice& lattice = tree.surface().lattice;
+        const Eigen::Vector3d lo = lattice.toLattice({0, 0, 0}), hi = lattice.toLattice(size);
+        const bounds::NodeBounds& bounds = tree.rootBounds();
+        for (int c = 0; c < 3; ++c) {
+          ASSERT_LE(bounds.lo[static_cast<std::size_t>(c)] * 65536.0 / 255, lo[c] + 1e-9) << byte;
+          ASSERT_GE(bounds.hi[static_cast<std::size_t>(c)] * 65536.0 / 255, hi[c] - 1e-9) << byte;
+        }
+        ASSERT_LE(bounds.hi[static_cast<std::size_t>(k)] - bounds.lo[static_cast<std::size_t>(k)],
+                  size[k] * 255 / 65536 + 2.01);
+      }
+    }
   }
 }
 

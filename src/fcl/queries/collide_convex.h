@@ -90,14 +90,20 @@ class ConvexCollector final : public query::ConvexVisitor<typename Partner::Node
 
   bool cell(const query::CellLeaf& a, const Node& b) override {
     if (ends_at_first_) return addCell(a, b);
-    s_.found.push_back(placed(0, a, b));
+    const Found found = placed(static_cast<double>(a.id), a, b);
+    if (!is_cut_) {
+      s_.found.push_back(found);
+    } else if (partner_.occupied(b) && s_.first.wants(found)) {
+      s_.first.add(found);
+      if (s_.first.isFull()) cut_.last_cell = static_cast<std::uint64_t>(s_.first.last().place);
+    }
     return false;
   }
 
-  /// To be called at the end of the walk: as in the Collector of meshes, contacts are in ContactOrder and not in that in
-  /// which the walk found them. `cells`: those are what it found.
+  /// To be called at the end of the walk: as in the Collector of meshes, contacts are in ContactOrder and not in that
+  /// in which the walk found them. `cells`: those are what it found.
   void finish(bool cells) {
-    if (is_cut_ && !cells) s_.found = s_.first.sort();
+    if (is_cut_) s_.found = s_.first.sort();
     std::sort(s_.found.begin(), s_.found.end());
     for (const Found& f : s_.found) {
       if (cells ? addCell(f.leaf, f.body) : addTriangle(static_cast<std::uint32_t>(f.leaf.id), f.body)) return;
@@ -106,7 +112,7 @@ class ConvexCollector final : public query::ConvexVisitor<typename Partner::Node
 
  private:
   struct Found {
-    double place;          // see ContactOrder; 0 of a cell
+    double place;          // see ContactOrder
     std::intptr_t b1, b2;  // as the caller gets them
     query::CellLeaf leaf;  // of a triangle, its id alone
     Node body;
@@ -139,7 +145,7 @@ class ConvexCollector final : public query::ConvexVisitor<typename Partner::Node
     const auto t = static_cast<std::uint32_t>(found.leaf.id);
     if (!partner_.occupied(found.body) || !touches(t, cornersOf(t).data(), found.body, gap)) return;
     s_.first.add(found);
-    if (s_.first.isFull()) cut_ = order_.cutAfter(s_.first.last().place);
+    if (s_.first.isFull()) order_.setCut(s_.first.last().place, cut_);
   }
 
   std::array<Eigen::Vector3d, 3> cornersOf(std::uint32_t t) const {

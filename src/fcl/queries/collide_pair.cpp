@@ -25,7 +25,6 @@
 #include "fcl/queries/contact_order.h"
 #include "fcl/queries/inside.h"
 #include "fcl/queries/inside_contact.h"
-#include "fcl/queries/pose_boxes.h"
 #include "fcl/queries/query_scope.h"
 #include "geometry/triangle.h"
 #include "query/collide/pair_walk.h"
@@ -84,13 +83,11 @@ class BvhTriangles {
 
 /// A contact before it is one of FCL's: ids in the caller's order, and how the two touch, in the world.
 struct Met {
-  double place;  // see ContactOrder; 0 where cells touch
+  double place;  // see ContactOrder
   std::uint64_t b1, b2;
   query::ContactPoint contact;
 
-  bool operator<(const Met& other) const {
-    return std::tie(place, b1, b2) < std::tie(other.place, other.b1, other.b2);
-  }
+  bool operator<(const Met& other) const { return std::tie(place, b1, b2) < std::tie(other.place, other.b1, other.b2); }
 };
 
 /// A pair of triangles and its place in the order of contacts.
@@ -98,17 +95,15 @@ struct PlacedPair {
   double place;
   std::uint64_t key;
 
-  bool operator<(const PlacedPair& other) const {
-    return place != other.place ? place < other.place : key < other.key;
-  }
+  bool operator<(const PlacedPair& other) const { return place != other.place ? place < other.place : key < other.key; }
 };
 
 /// Turns the pairs of a walk into contacts and cost sources; triangles are those of the caller's first and second
 /// geometry.
 ///
 /// A walk finds pairs in an order that depends on what is resident. So unless any pair will do, contacts are put in
-/// ContactOrder: few of them by cutting the walk at the place of the last that is asked for, many by gathering pairs and
-/// sorting them until there are enough.
+/// ContactOrder: few of them by cutting the walk at the place of the last that is asked for, many by gathering pairs
+/// and sorting them until there are enough.
 template <typename S, typename Triangles1, typename Triangles2>
 class Collector : public query::Visitor {
  public:
@@ -129,7 +124,11 @@ class Collector : public query::Visitor {
     s_.seen.clear();
     s_.seen_cells.clear();
     s_.found.clear();
-    if (is_cut_) s_.first.start(left_);
+    if (is_cut_) {
+      s_.first.start(left_);
+      s_.first_cells.start(left_);
+      cut_.cell_side = q.swapped ? 1 : 0;
+    }
   }
 
   /// Where cells lie in the world: from the lattice frame of side A.
@@ -156,23 +155,26 @@ class Collector : public query::Visitor {
   }
 
   bool cells(const query::CellLeaf& a, const query::CellLeaf& b) override {
-    return addSpheres(a.id, a.sphere, b.id, b.sphere);
+    return addSpheres(q_.swapped ? b.id : a.id, a.id, a.sphere, b.id, b.sphere);
   }
 
   bool cellOfA(const query::CellLeaf& a, std::uint32_t b, const Eigen::Vector3d& point) override {
     if (!ends_at_first_ && !s_.seen_cells.insert(a.id, b)) return false;
-    return addSpheres(a.id, a.sphere, b, {point, 0});
+    return addSpheres(a.id, a.id, a.sphere, b, {point, 0});
   }
 
   bool cellOfB(std::uint32_t a, const query::CellLeaf& b, const Eigen::Vector3d& point) override {
     if (!ends_at_first_ && !s_.seen_cells.insert(b.id, a)) return false;
-    return addSpheres(a, {point, 0}, b.id, b.sphere);
+    return addSpheres(b.id, a, {point, 0}, b.id, b.sphere);
   }
 
   /// To be called at the end of the walk.
   void finish() {
     if (ends_at_first_) return;
-    if (is_cut_) s_.found = s_.first.sort();
+    if (is_cut_) {
+      s_.found = s_.first.sort();
+      s_.met = s_.first_cells.sort();
+    }
     lookAtFound();
     keepFirst();
     emit();
@@ -200,6 +202,7 @@ class Collector : public query::Visitor {
     query::PairSet<std::uint64_t> seen_cells;
     query::TrianglePairs pairs;
     FirstPairs first;               // that touch, where the walk is cut
+    FirstItems<Met> first_cells;    // the same where cells are in the pairs
     std::vector<PlacedPair> found;  // pairs of triangles that were not tested yet
     std::vector<Met> met;           // the first that touch, of those that were
   };
@@ -252,7 +255,7 @@ class Collector : public query::Visitor {
       s_.met.clear();
     }
     s_.first.add(pair);
-    if (s_.first.isFull()) cut_ = order_.cutAfter(s_.first.last().place);
+    if (s_.first.isFull()) order_.setCut(s_.first.last().place, cut_);
   }
 
   // True when nothing more is asked for.
@@ -384,8 +387,10 @@ class Collector : public query::Visitor {
     s_.met.push_back(met);
   }
 
-  bool addSpheres(std::uint64_t id1, query::Sphere a, std::uint64_t id2, query::Sphere b) {
+  bool addSpheres(std::uint64_t cell, std::uint64_t id1, query::Sphere a, std::uint64_t id2, query::Sphere b) {
     q_.inCallersOrder(id1, id2);
+    Met met{static_cast<double>(cell), id1, id2, {}};
+    if (is_cut_ && !s_.first_cells.wants(met)) return false;
     q_.inCallersOrder(a, b);
     const fcl::Transform3<double> X_WA = q_.X_WA().template cast<double>();
     for (query::Sphere* s : {&a, &b}) {
@@ -393,7 +398,6 @@ class Collector : public query::Visitor {
       s->radius *= unit_;
     }
     if (q_.request.enable_cost) addCost(boxOf(a), boxOf(b));
-    Met met{0, id1, id2, {}};
     if (q_.request.enable_contact) {
       const Eigen::Vector3d displacement = b.center - a.center;
       const double distance = displacement.norm();
@@ -401,6 +405,11 @@ class Collector : public query::Visitor {
       const double overlap = a.radius + b.radius - distance;  // negative: a gap, within the margin
       met.contact.depth = std::max(overlap + margin_, 0.0);
       met.contact.point = a.center + met.contact.normal * (a.radius - overlap / 2);
+    }
+    if (is_cut_) {
+      s_.first_cells.add(met);
+      if (s_.first_cells.isFull()) cut_.last_cell = static_cast<std::uint64_t>(s_.first_cells.last().place);
+      return false;
     }
     s_.met.push_back(met);
     if (ends_at_first_) return emit();
@@ -622,20 +631,11 @@ void collideRow(const Model<S>& a, const Model<S>& b, const fcl::Transform3<S>* 
   static const fcl::Transform3<S> identity = fcl::Transform3<S>::Identity();
   static const fcl::CollisionRequest<S> request;
   thread_local fcl::CollisionResult<S> result;
-  thread_local std::vector<std::size_t> near;
   std::fill(hit, hit + count, std::uint8_t{0});
-  near.clear();
-  {
-    const QueryScope scope(a.tree(), b.tree());
-    const PoseBoxes boxes(a, b);
-    for (std::size_t k = 0; k < count; ++k) {
-      if (!boxes.areApart(X_AB[k])) near.push_back(k);
-    }
-  }
   if (!a.isOccupied() || !b.isOccupied()) return;
   const Models<S> models(&a, &b);
   const double margin = marginOf(&a, &b);
-  for (const std::size_t k : near) {
+  for (std::size_t k = 0; k < count; ++k) {
     const CollideQuery<S> q{
         {&a, identity, &b, X_AB[k], turnsRound(models, identity, X_AB[k])}, request, result, margin};
     if (areFarApart(q, models)) continue;

@@ -12,9 +12,10 @@
 
 namespace bocst::fcl_adapter {
 
-/// The order of contacts: by the place of the model's triangle, then by the ids. The place is the largest coordinate of
-/// the triangle's corners along the longest axis of its mesh's bounding box, in the mesh's frame and length unit. So the
-/// order is a property of mesh, pose and request, and a walk that wants the first few can leave out what lies beyond.
+/// The order of contacts: by place, then by the ids. The place of a triangle of a model is the largest coordinate of
+/// its corners along the longest axis of its mesh's bounding box, in the mesh's frame and length unit; that of a cell
+/// is its Morton code, which has at most 48 bits. So the order is a property of mesh, pose and request, and a walk that
+/// wants the first few can leave out what lies beyond.
 class ContactOrder {
  public:
   explicit ContactOrder(const tree::Tree& model) : surface_(model.surface()) {
@@ -23,8 +24,8 @@ class ContactOrder {
 
   double placeOf(std::uint32_t t) const {
     const auto& i = surface_.mesh->indices(t);
-    return std::max({surface_.mesh->vertex(i[0])[axis_], surface_.mesh->vertex(i[1])[axis_],
-                     surface_.mesh->vertex(i[2])[axis_]});
+    return std::max(
+        {surface_.mesh->vertex(i[0])[axis_], surface_.mesh->vertex(i[1])[axis_], surface_.mesh->vertex(i[2])[axis_]});
   }
 
   /// Triangle t is about to be asked for, and now its corners.
@@ -34,9 +35,10 @@ class ContactOrder {
   }
 
   /// Nodes whose triangles all lie at places after this one may be left out of a walk in the model's lattice frame.
-  query::Cut cutAfter(double place) const {
+  void setCut(double place, query::Cut& cut) const {
     const lattice::Lattice& lattice = surface_.lattice;
-    return {axis_, (place - lattice.origin()[axis_]) / lattice.unit()};
+    cut.axis = axis_;
+    cut.last = (place - lattice.origin()[axis_]) / lattice.unit();
   }
 
  private:

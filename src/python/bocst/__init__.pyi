@@ -8,10 +8,10 @@ from numpy.typing import ArrayLike, NDArray
 from . import fcl as fcl
 from .fcl import CollisionGeometry
 
-Subdivision = Literal["octree", "bono"]
-Answer = Literal["exact", "conservative"]
-Oracle = Literal["auto", "cpu", "occlusion", "compute", "sampled"]
-Motion = Literal["linear", "translation", "screw", "spline"]
+_Subdivision = Literal["octree", "bono"]
+_Answer = Literal["exact", "conservative"]
+_Oracle = Literal["auto", "cpu", "occlusion", "compute", "sampled"]
+_Motion = Literal["linear", "translation", "screw", "spline"]
 
 __version__: str
 
@@ -21,26 +21,26 @@ class Options:
     def __init__(
         self,
         *,
-        subdivision: Subdivision = "bono",
-        answer: Answer = "exact",
+        subdivision: _Subdivision = "bono",
+        answer: _Answer = "exact",
         depth: int = 6,
         dimension: float = 0.0,
-        oracle: Oracle = "auto",
+        oracle: _Oracle = "auto",
         ttl: float = 2.0,
         memory_budget: int = 0,
         margin: float = 0.0,
         solid: bool = False,
     ) -> None: ...
     @property
-    def subdivision(self) -> Subdivision: ...
+    def subdivision(self) -> _Subdivision: ...
     @property
-    def answer(self) -> Answer: ...
+    def answer(self) -> _Answer: ...
     @property
     def depth(self) -> int: ...
     @property
     def dimension(self) -> float: ...
     @property
-    def oracle(self) -> Oracle: ...
+    def oracle(self) -> _Oracle: ...
     @property
     def ttl(self) -> float: ...
     @property
@@ -119,11 +119,11 @@ class Model(CollisionGeometry):
         self,
         mesh: Mesh,
         *,
-        subdivision: Subdivision = "bono",
-        answer: Answer = "exact",
+        subdivision: _Subdivision = "bono",
+        answer: _Answer = "exact",
         depth: int = 6,
         dimension: float = 0.0,
-        oracle: Oracle = "auto",
+        oracle: _Oracle = "auto",
         ttl: float = 2.0,
         memory_budget: int = 0,
         margin: float = 0.0,
@@ -144,7 +144,7 @@ class Model(CollisionGeometry):
 
 class OracleInfo:
     @property
-    def kind(self) -> Oracle: ...
+    def kind(self) -> _Oracle: ...
     @property
     def name(self) -> str: ...
     @property
@@ -174,7 +174,7 @@ class Scene:
     def any_collision(self, X_WM: ArrayLike) -> bool: ...
     def clearance(self, X_WM: ArrayLike) -> float: ...
     def nearest_pair(self, X_WM: ArrayLike) -> Optional[Tuple[Id, Id]]: ...
-    def edge_is_free(self, X_WM_begin: ArrayLike, X_WM_end: ArrayLike, motion: Motion = "linear") -> bool: ...
+    def edge_is_free(self, X_WM_begin: ArrayLike, X_WM_end: ArrayLike, motion: _Motion = "linear") -> bool: ...
     def moving_index(self, moving: Id) -> int: ...
     @property
     def moving_count(self) -> int: ...
@@ -185,7 +185,7 @@ class Scene:
 
 def load_mesh(file: Union[str, bytes, PathLike[str]]) -> Mesh: ...
 def spheres(
-    mesh: Mesh, depth: int = 6, subdivision: Subdivision = "bono"
+    mesh: Mesh, depth: int = 6, subdivision: _Subdivision = "bono"
 ) -> Tuple[NDArray[np.float64], NDArray[np.float64]]: ...
 def collide_poses(a: Model, b: Model, X_AB: ArrayLike, *, threads: int = 1) -> NDArray[np.bool_]: ...
 def available_oracles() -> List[OracleInfo]: ...

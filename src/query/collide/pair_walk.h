@@ -3,6 +3,7 @@
 
 #include <algorithm>
 #include <cstdint>
+#include <type_traits>
 #include <utility>
 #include <vector>
 
@@ -35,7 +36,7 @@ class PairWalk {
         a_in_b_(b_in_a.inverse()),
         visitor_(visitor),
         spheres_(a.isConservative() || b.isConservative()),
-        cut_(spheres_ ? nullptr : visitor.cut()) {
+        cut_(visitor.cut()) {
     if constexpr (!B::kBodies) BOCST_ASSERT(!a.isConservative() || !b.isConservative());
   }
 
@@ -83,12 +84,23 @@ class PairWalk {
     std::pair<double, Pair> order[8];
     const std::size_t count = s.stack.size() - before;
     BOCST_ASSERT(count <= 8);
-    for (std::size_t i = 0; i < count; ++i) order[i] = {cut_->leastOf(a_.volume(s.stack[before + i].a)), s.stack[before + i]};
+    for (std::size_t i = 0; i < count; ++i) {
+      order[i] = {cut_->leastOf(a_.volume(s.stack[before + i].a)), s.stack[before + i]};
+    }
     std::sort(order, order + count, [](const auto& x, const auto& y) { return x.first > y.first; });
     for (std::size_t i = 0; i < count; ++i) s.stack[before + i] = order[i].second;
   }
 
-  bool isBeyondCut(const Pair& pair) const { return cut_->isBeyond(a_.volume(pair.a)); }
+  bool isBeyondCut(const Pair& pair) const {
+    if (!spheres_) return cut_->isBeyond(a_.volume(pair.a));
+    if constexpr (std::is_same<A, TreeSide>::value) {
+      if (a_.isConservative()) return a_.firstCellId(pair.a) > cut_->last_cell;
+    }
+    if constexpr (std::is_same<B, TreeSide>::value) {
+      if (b_.isConservative()) return b_.firstCellId(pair.b) > cut_->last_cell;
+    }
+    return false;
+  }
 
   bool rootsMeet(const Pair& root) const {
     return spheres_ ? sphereMeets(a_.sphere(root.a), root.b)
@@ -185,6 +197,15 @@ class PairWalk {
   static bool waits(State sa, State sb) { return sa != State::kInner && sb != State::kInner; }
 
   bool stepSpheres(const Pair& pair, Scratch& s) {
+    if (cut_ != nullptr && isBeyondCut(pair)) return false;
+    const std::size_t before = s.stack.size();
+    const bool ended = stepInSpheres(pair, s);
+    // Children were pushed in the order of their ids; the first is to be popped first.
+    if (cut_ != nullptr) std::reverse(s.stack.begin() + static_cast<std::ptrdiff_t>(before), s.stack.end());
+    return ended;
+  }
+
+  bool stepInSpheres(const Pair& pair, Scratch& s) {
     const State sa = a_.state(pair.a), sb = b_.state(pair.b);
     if (sa == State::kLeaf && sb == State::kLeaf) return leafSpheres(pair);
     const Sphere ball_a = a_.sphere(pair.a), ball_b = inA(b_.sphere(pair.b));

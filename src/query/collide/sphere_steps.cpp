@@ -255,6 +255,9 @@ SphereSteps::Event NextEvent(SphereSteps& s) {
     if (top.octants == 0) --s.depth;
     SphereGroup::Node own;
     own.node = tree::NodeRef::octant(top.block, static_cast<int>(o));
+    if (s.cut != nullptr && s.isBeyondCut(side == 0 ? own.node : other.node, side == 0 ? other.node : own.node)) {
+      continue;
+    }
     own.level = top.level;
     own.ref =
         top.at != nullptr ? top.at->child[o].load(std::memory_order_acquire) : s.side[side]->tree().childRef(own.node);
@@ -284,7 +287,8 @@ SphereSteps::Event NextEvent(SphereSteps& s) {
     decodeBlock(s, x, index, block, frame);
     const unsigned mask = meetingOctants(s, x, index, block, frame, still.node, still.lane, s.stack[s.depth].order);
     if (mask == 0) continue;
-    if (leaves || !expandOther(s, x, block, index, frame, still, mask)) {
+    // Which puts octants on the stack in the opposite order.
+    if (leaves || s.cut != nullptr || !expandOther(s, x, block, index, frame, still, mask)) {
       push(s, x, block, index, frame, frames, still, mask);
     }
   }

@@ -86,6 +86,10 @@ struct SphereSteps {
   std::uint32_t deepest[2];    ///< The level of each side's leaves.
   int not_smaller;             ///< A node of side 0 is not smaller than one of side 1 so many levels deeper.
   bool nearest_first = true;   ///< A hit ends the walk.
+  const Cut* cut = nullptr;    ///< What is left out; octants then come in the order of their ids.
+  bool isBeyondCut(tree::NodeRef a, tree::NodeRef b) const {
+    return side[cut->cell_side]->firstCellId(cut->cell_side == 0 ? a : b) > cut->last_cell;
+  }
 
   SphereFrame* const spheres;
   std::uint64_t holds[kFrames];  ///< Which block of which side is in a frame.

@@ -37,6 +37,7 @@ bool SphereWalk::run(Visitor& visitor) {
   thread_local Scratch s;
   SphereSteps steps(a_, b_, b_in_a_, s.spheres);
   steps.nearest_first = visitor.endsAtFirst();
+  steps.cut = visitor.cut();
   return search(steps, s, visitor);
 }
 
@@ -54,8 +55,11 @@ bool SphereWalk::search(SphereSteps& steps, Scratch& s, Visitor& visitor) const 
   for (;;) {
     switch (nextEvent(steps)) {
       case SphereSteps::kDone:
+        if (steps.cut != nullptr) {
+          s.deferred.dropIf([&](const auto& pair) { return steps.isBeyondCut(pair.a, pair.b); });
+        }
         if (s.deferred.empty()) return false;
-        s.deferred.grow(a_, b_, b_in_a_, visitor.endsAtFirst(), push);
+        s.deferred.grow(a_, b_, b_in_a_, visitor.endsAtFirst() || steps.cut != nullptr, push);
         break;
       case SphereSteps::kDeferred:
         s.deferred.add({steps.pair[0], steps.pair[1]});

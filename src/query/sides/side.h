@@ -85,6 +85,12 @@ class TreeSide {
   /// The sphere about the node's actual region.
   Sphere cellSphere(Node node) const { return sphereAbout(tree_.cell(node)); }
 
+  /// The least id of the cells at and below a node with conservative answers.
+  std::uint64_t firstCellId(Node node) const {
+    const lattice::Cell cell = tree_.cell(node);
+    return cell.morton() << 3 * (tree_.deepest() - cell.level);
+  }
+
   /// Names the cell of a leaf: its Morton code among those of its level.
   std::uint64_t cellId(Node node) const { return tree_.cell(node).morton(); }
 

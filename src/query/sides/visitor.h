@@ -22,11 +22,15 @@ struct CellLeaf {
   Sphere sphere;
 };
 
-/// What of side A lies beyond a plane need not be visited: nodes whose least coordinate along `axis` is larger than
-/// `last`, in the frame of A. A visitor that looks for the first of many pairs along that axis moves the plane.
+/// What need not be visited, for a visitor that looks for the first of many pairs and moves the cut: of side A with
+/// exact answers, nodes whose least coordinate along `axis` is larger than `last`, in the frame of A; where leaves are
+/// cells, nodes whose cells all have ids larger than `last_cell`, on side `cell_side` (0: A) where both sides have
+/// cells.
 struct Cut {
   int axis = 0;
   double last = std::numeric_limits<double>::infinity();
+  int cell_side = 0;
+  std::uint64_t last_cell = ~std::uint64_t{0};
 
   double leastOf(const Volume& v) const {
     const auto k = static_cast<std::size_t>(axis);
@@ -44,7 +48,7 @@ class Visitor {
 
   /// The first hit will end the walk.
   virtual bool endsAtFirst() const = 0;
-  /// Where the plane lies that cuts side A, or null; the walk looks again whenever it has called the visitor.
+  /// Null where all are to be visited. The walk looks at it again whenever it has called the visitor.
   virtual const Cut* cut() const { return nullptr; }
   /// Triangle a of side A and b of side B may touch; everything that touches comes here. Where `certain`, they meet,
   /// and FCL's test says so.

@@ -238,6 +238,22 @@ TEST_P(SphereWalks, FindWhatMeetsWithinTolerance) {
   EXPECT_GT(counts.boxes_apart, 3u);
 }
 
+TEST(Spheres, MeetWhereTheyTouch) {
+  std::mt19937_64 g(55);
+  std::uniform_real_distribution<double> u(0, 1);
+  for (int i = 0; i < 2000; ++i) {
+    const double tolerance = i % 3 == 0 ? u(g) : 0;
+    const Sphere a{1e3 * test::randomDirection(g), 1 + 99 * u(g)};
+    Sphere b{Eigen::Vector3d::Zero(), 1 + 99 * u(g)};
+    const double distance = a.radius + b.radius + tolerance;
+    const Eigen::Vector3d direction = test::randomDirection(g);
+    b.center = a.center + distance * (1 + 1e-10) * direction;
+    EXPECT_FALSE(spheresMeet(a, b, tolerance));
+    b.center = a.center + distance * (1 - 1e-14) * direction;
+    EXPECT_TRUE(spheresMeet(a, b, tolerance));
+  }
+}
+
 // What resident pairs settle grows nothing, however long the walk to the hit is.
 TEST(SphereWalk, AHitThatIsAskedAgainGrowsNothing) {
   std::mt19937_64 g(54);
