@@ -95,7 +95,7 @@ test::Raw large(std::size_t count, unsigned seed) {
 }
 
 void findsWhatTouches(const std::vector<test::Raw>& meshes, const std::vector<double>& exponents, int rounds,
-                      unsigned seed, bool with_defects = false) {
+                      unsigned seed) {
   std::mt19937_64 g(seed);
   std::uniform_real_distribution<double> u(-1, 1);
   std::vector<std::unique_ptr<Model>> models;
@@ -105,15 +105,10 @@ void findsWhatTouches(const std::vector<test::Raw>& meshes, const std::vector<do
     SimilarityTransform to;
     to.rotation = test::randomRotation(g);
     if (round % 4 == 0) to.rotation = Eigen::AngleAxisd(1e-6 * u(g), Vector3d::UnitX()).toRotationMatrix();
-    if (with_defects && round % 5 == 0) {
-      to.rotation += 1e-5 * Eigen::Matrix3d::NullaryExpr([&] { return u(g); });
-      to.orthogonality_error =
-          (to.rotation.transpose() * to.rotation - Eigen::Matrix3d::Identity()).cwiseAbs().maxCoeff();
-    }
     to.scale = std::exp2(exponents[g() % exponents.size()] + u(g));
     // What placing itself rounds away, and a margin.
     const double rounding = 0x1p-49 * 2 * lattice::kMiddle * 2 * std::max(1.0, to.scale);
-    const double margin = round % 3 == 0 ? 0 : std::pow(10.0, 3 * u(g)) * std::max(1.0, to.scale);
+    const double margin = round % 3 == 0 ? 0 : std::pow(10.0, 1 + 3 * u(g)) * std::max(1.0, to.scale);
     to.tolerance = rounding + margin;
     to.ready();
     const Vector3d direction = test::randomDirection(g);
@@ -124,6 +119,8 @@ void findsWhatTouches(const std::vector<test::Raw>& meshes, const std::vector<do
     const std::size_t t = outside ? b.farthest(-(to.rotation.transpose() * direction), q) : b.any(g, q);
     to.translation = p + 0.999 * margin * direction - to.scale * (to.rotation * q);
     const std::pair<std::uint32_t, std::uint32_t> expected(s, t);
+    SCOPED_TRACE(testing::Message() << "triangle " << s << " of " << a.mesh->triangleCount() << " at " << p.transpose()
+                                    << ", " << t << " of " << b.mesh->triangleCount() << " at " << q.transpose());
     const auto find = [&](tree::Tree& tree_a, tree::Tree& tree_b, const char* what) {
       const TreeSide side_a(tree_a), side_b(tree_b);
       TreeWalk walk(side_a, side_b, to);
@@ -146,9 +143,10 @@ TEST_P(TreeWalks, FindWhatTouches) {
                    {0, 0, -2, 3, -8}, 1500, 61);
 }
 
-// Leaves of large triangles among nodes far smaller, down to where float does not reach.
+// Leaves of large triangles among nodes far smaller, and boxes that hold nothing but their surface.
 TEST_P(TreeWalks, FindWhatTouchesLargeTriangles) {
-  findsWhatTouches({large(1, 3), large(5, 4), large(32, 5), test::torus(30)}, {0, -5, 6, -12, 12, -45, 45}, 1500, 62);
+  findsWhatTouches({large(1, 3), large(5, 4), large(32, 5), test::torus(30), test::box({0, 0, 0}, {1, 1, 1})},
+                   {0, -4, 5, -8.9, 8.9}, 2500, 62);
 }
 
 INSTANTIATE_TEST_SUITE_P(Targets, TreeWalks, testing::ValuesIn(test::EveryTarget::targets()), test::EveryTarget::name);
