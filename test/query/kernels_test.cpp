@@ -130,7 +130,27 @@ TEST_P(EveryTarget, NoOctantIsLostThatSharesAPointInFramesOfTheRoots) {
     SimilarityTransform to;
     to.rotation = test::randomRotation(g);
     to.scale = std::pow(2.0, 10 * u(g));
+    if (round % 3 == 0) {
+      // The middles of the roots coincide, so that only sizes are left to round.
+      const Eigen::Vector3d middle = Eigen::Vector3d::Constant(lattice::kMiddle);
+      const Eigen::Vector3d v = points[0] - middle, w = points[1] - middle;
+      const double scale = v.norm() / w.norm();
+      if (PairFrames::fits(scale)) {
+        to.scale = scale;
+        to.rotation =
+            (Eigen::Quaterniond::FromTwoVectors(w, v) * Eigen::AngleAxisd(3 * u(g), w.normalized())).toRotationMatrix();
+      }
+    }
+    if (round % 4 == 0) {
+      to.rotation += 1e-4 * Eigen::Matrix3d::NullaryExpr([&] { return u(g); });
+      to.orthogonality_error =
+          (to.rotation.transpose() * to.rotation - Eigen::Matrix3d::Identity()).cwiseAbs().maxCoeff();
+    }
     to.translation = points[0] - to.scale * (to.rotation * points[1]);
+    if (round % 5 == 0) {
+      to.tolerance = std::pow(10.0, 3 * u(g));
+      to.translation += 0.999 * to.tolerance * test::randomDirection(g);
+    }
     to.ready();
     ASSERT_TRUE(PairFrames::fits(to.scale));
     const PairFrames frames(to.scale, to);

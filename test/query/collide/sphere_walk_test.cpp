@@ -211,6 +211,40 @@ TEST_P(SphereWalks, FindWhatMeetsOnLatticesOfAnySize) {
   }
 }
 
+// Along the axes spheres stick out of the boxes about the surface the farthest, most where it but begins to reach into
+// a cell.
+TEST_P(SphereWalks, FindWhatMeetsAlongTheAxes) {
+  std::mt19937_64 g(56);
+  for (int depth = 2; depth <= 6; ++depth) {
+    const double more = std::ldexp(0.1, -depth);
+    for (const Subdivision subdivision : {Subdivision::kOctree, Subdivision::kBono}) {
+      const Model a(test::box({0, 0, 0}, {1, 0.5 + more, 0.25 + more}), subdivision, depth);
+      const Model b(test::box({0, 0, 0}, {0.5 + more, 1, 0.75 + more}), subdivision, depth);
+      const auto lazy_a = a.fresh(), lazy_b = b.fresh();
+      Counts counts;
+      for (int face = 0; face < 6; ++face) {
+        const Eigen::Vector3d direction = (face < 3 ? -1 : 1) * Eigen::Vector3d::Unit(face % 3);
+        const auto outermost = [](const Model& model, const Eigen::Vector3d& along) {
+          const auto less = [&along](const CellLeaf& x, const CellLeaf& y) {
+            return along.dot(x.sphere.center) + x.sphere.radius < along.dot(y.sphere.center) + y.sphere.radius;
+          };
+          return std::max_element(model.leaves.begin(), model.leaves.end(), less)->sphere;
+        };
+        const Sphere of_a = outermost(a, direction), of_b = outermost(b, -direction);
+        for (const double gap : {-1e-9, 1e-9}) {
+          SimilarityTransform b_in_a;
+          b_in_a.ready();
+          b_in_a.translation = of_a.center + (of_a.radius + of_b.radius) * (1 + gap) * direction - of_b.center;
+          SCOPED_TRACE(testing::Message() << "depth " << depth << " face " << face << " gap " << gap);
+          compare(a, b, *lazy_a, *lazy_b, b_in_a, counts);
+          if (HasFatalFailure()) return;
+        }
+      }
+      EXPECT_GE(counts.hits, 6u);
+    }
+  }
+}
+
 // Margins come as tolerance, poses may be no rotations, and most pairs of a planner are far.
 TEST_P(SphereWalks, FindWhatMeetsWithinTolerance) {
   std::mt19937_64 g(53);
