@@ -13,6 +13,7 @@
 #include <string>
 #include <vector>
 
+#include "exact.h"
 #include "meshes.h"
 
 namespace bocst::query {
@@ -136,6 +137,29 @@ void checkGap(const Known& k, const PointSet& p, double tolerance) {
   const SeparationResult quick = k.body->gap(p, gap.distance / 2);
   ASSERT_GT(quick.atLeast, gap.distance / 2);
   ASSERT_LE(quick.atLeast, gap.distance + tolerance);
+}
+
+// Against exact arithmetic, far from the origin and near to each other, where rounding is all there is.
+TEST(ConvexShape, TrianglesAreNoNearerThanTheySay) {
+  std::mt19937_64 g(21);
+  std::uniform_real_distribution<double> u(-1, 1);
+  int apart = 0;
+  for (int i = 0; i < 5000; ++i) {
+    const Vector3d at = std::pow(10.0, 3 * std::abs(u(g))) * Vector3d(u(g), u(g), u(g)),
+                   gap = std::pow(10.0, -8 * std::abs(u(g))) * Vector3d(u(g), u(g), u(g));
+    exact::Corners p, q;
+    for (int k = 0; k < 3; ++k) {
+      p[k] = at + Vector3d(u(g), u(g), u(g));
+      q[k] = at + gap + Vector3d(u(g), u(g), u(g));
+    }
+    if (i % 2 == 0) q[0] = p[0] + gap;
+    const SeparationResult found = TriangleShape(p).gap({q, 3}, kFar);
+    ASSERT_LE(found.atLeast, found.distance);
+    const long double distance = std::sqrt(exact::squaredDistance(p, q));
+    ASSERT_LE(static_cast<long double>(found.atLeast), distance * (1 + 1e-17L)) << i;
+    apart += distance > 0;
+  }
+  EXPECT_GT(apart, 2000);
 }
 
 TEST(ConvexShape, GapsOfTrianglesAreProvedBothWays) {

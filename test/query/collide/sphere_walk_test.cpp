@@ -125,6 +125,10 @@ void compare(const Model& a, const Model& b, tree::Tree& lazy_a, tree::Tree& laz
   checkFirst(walk(lazy_a, lazy_b, b_in_a, true), "as queries left them");
   checkFirst(walk(*a.fresh(), *b.fresh(), b_in_a, true), "fresh");
   checkFirst(walk(*a.whole, *b.whole, b_in_a, true), "whole");
+  if (!expected.empty()) {
+    const TreeSide side_a(*a.whole), side_b(*b.whole);
+    ASSERT_FALSE(SphereWalk(side_a, side_b, b_in_a).areBoxesApart());
+  }
   for (tree::Tree* tree : {&lazy_a, a.whole.get()}) {
     Cells all = walk(*tree, tree == &lazy_a ? lazy_b : *b.whole, b_in_a, false);
     for (const auto& [sphere_a, sphere_b] : all.spheres) {

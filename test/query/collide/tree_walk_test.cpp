@@ -138,7 +138,7 @@ void findsWhatTouches(const std::vector<test::Raw>& meshes, const std::vector<do
 }
 
 TEST_P(TreeWalks, FindWhatTouches) {
-  findsWhatTouches({test::torus(40), test::torus(9, 0.3), test::adversarial(), large(20, 1), large(300, 2),
+  findsWhatTouches({test::torus(50), test::torus(9, 0.3), test::adversarial(), large(20, 1), large(300, 2),
                     test::box({0, 0, 0}, {1, 1e-3, 3e-4})},
                    {0, 0, -2, 3, -8}, 1500, 61);
 }

@@ -156,6 +156,11 @@ TEST_P(Separation, WhatIsNoNumberIsNotSeparate) {
     const SimilarityTransform to = apartBy(a, b, Eigen::Matrix3d::Identity(), 1, Vector3d(x, 0, 0));
     EXPECT_FALSE(areSeparate(a.tree.supports(), b.tree.supports(), to, shallow)) << x;
     EXPECT_FALSE(shallow) << x;
+    // Nor is what is far from a rotation, however far apart the two are.
+    SimilarityTransform crooked = apartBy(a, b, Eigen::Matrix3d::Identity(), 1, Vector3d(1e6, 0, 0));
+    EXPECT_TRUE(areSeparate(a.tree.supports(), b.tree.supports(), crooked, shallow));
+    crooked.orthogonality_error = 2e-3;
+    EXPECT_FALSE(areSeparate(a.tree.supports(), b.tree.supports(), crooked, shallow));
     // Directions that are none lie among the kept ones, too.
     EightSeparations eight;
     for (int lane = 0; lane < 8; ++lane) {
