@@ -128,6 +128,20 @@ TEST(Motions, SplinesGoWhereFclsGo) {
   }
 }
 
+TEST(Motions, SplinesTurnTheShorterWay) {
+  std::mt19937_64 g(14);
+  for (int i = 0; i < 20; ++i) {
+    const Eigen::Vector3d axis = test::randomDirection(g);
+    const auto turned = [&](double angle) {
+      return test::pose<double>(Eigen::AngleAxisd(angle, axis).toRotationMatrix(), {0, 0, 0});
+    };
+    // Through half a turn, where the rotation vector changes its sign.
+    const auto spline = motionOf<double>(turned(3), turned(-3), fcl::CCDM_SPLINE);
+    const double half_turn = std::acos(-1.0);
+    EXPECT_LT((spline->at(0.5).matrix() - turned(half_turn).matrix()).cwiseAbs().maxCoeff(), 1e-9);
+  }
+}
+
 TEST(Motions, NothingIsFasterThanTheyClaim) {
   std::mt19937_64 g(3);
   std::uniform_real_distribution<double> u(0, 1);
