@@ -894,6 +894,48 @@ TEST(CollideSelf, OneModelOnBothSides) {
   }
 }
 
+// A rotation may be off by as much as is allowed: then its transpose is not its inverse, and what lies far from the
+// origins is not where a walk that takes it for the inverse would place it.
+TEST(CollideRigid, NoPairIsLostToARotationThatIsNotQuiteOne) {
+  std::mt19937_64 g(11);
+  std::uniform_real_distribution<double> u(-1, 1);
+  const auto anywhere = [&] { return Eigen::Vector3d(u(g), u(g), u(g)); };
+  std::size_t pairs = 0;
+  for (const double defect : {1e-12, 1e-9, 1e-7, 1e-5, 2e-4}) {
+    for (int round = 0; round < 20; ++round) {
+      auto X = test::pose<double>(test::randomRotation(g), anywhere());
+      for (int k = 0; k < 9; ++k) X.linear()(k / 3, k % 3) += defect * u(g);
+      const Eigen::Matrix3d back = X.linear().inverse();
+      Raw a, b;
+      Eigen::Vector3d cluster = anywhere();
+      for (std::size_t i = 0; i < 100; ++i) {
+        if (i % 20 == 0) cluster = anywhere();
+        const Eigen::Vector3d c = cluster + 4e-3 * anywhere(), e = 1e-3 * anywhere(), f = 1e-3 * anywhere(),
+                              n = e.cross(f).normalized();
+        const Eigen::Vector3d of_b[3] = {c - 1e-8 * n, c + 1e-3 * n + 0.3 * e, c + 1e-3 * n - 0.3 * e};
+        for (const Eigen::Vector3d& v : {Eigen::Vector3d(c + e), Eigen::Vector3d(c + f), Eigen::Vector3d(c - e - f)}) {
+          a.vertices.push_back(v);
+        }
+        for (const Eigen::Vector3d& v : of_b) b.vertices.push_back(back * (v - X.translation()));
+        a.triangles.emplace_back(3 * i, 3 * i + 1, 3 * i + 2);
+        b.triangles.emplace_back(3 * i, 3 * i + 1, 3 * i + 2);
+      }
+      const Modeld model_a(a.mesh()), model_b(b.mesh());
+      const auto found = test::pairs<double>(model_a, fcl::Transform3d::Identity(), model_b, X);
+      for (std::size_t i = 0; i < 100; ++i) {
+        const auto *p = &a.vertices[3 * i], *q = &b.vertices[3 * i];
+        if (!fcl::detail::Intersect<double>::intersect_Triangle(p[0], p[1], p[2], q[0], q[1], q[2], X.linear(),
+                                                                Eigen::Vector3d(X.translation()))) {
+          continue;
+        }
+        ++pairs;
+        ASSERT_EQ(found.count({i, i}), 1u) << "defect " << defect << ", triangle " << i;
+      }
+    }
+  }
+  EXPECT_GT(pairs, 9000u);
+}
+
 TEST(CollideBatches, AtMostOneALevelWhenEverythingIsAsked) {
   const Modeld a(test::torus(120).mesh()), b(test::torus(120).mesh());
   const auto X = test::pose<double>(Eigen::Matrix3d::Identity(), {0, 0, 0});

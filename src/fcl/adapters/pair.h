@@ -92,6 +92,8 @@ query::SimilarityTransform similarityOf(const RelativePose<S>& X_AB, const Eigen
   p.orthogonality_error =
       larger(larger(larger(std::abs(dot(0, 0) - 1), std::abs(dot(1, 1) - 1)), std::abs(dot(2, 2) - 1)),
              larger(larger(std::abs(dot(0, 1)), std::abs(dot(0, 2))), std::abs(dot(1, 2))));
+  // Walks take the transposed rotation for the inverse, which moves what is far from an origin.
+  p.tolerance += 4 * p.orthogonality_error * magnitude * per_unit;
   p.ready();
   return p;
 }

@@ -5,7 +5,9 @@
 
 #include <algorithm>
 #include <array>
+#include <cstdint>
 #include <limits>
+#include <numeric>
 #include <tuple>
 #include <type_traits>
 #include <vector>
@@ -104,8 +106,12 @@ class ConvexCollector final : public query::ConvexVisitor<typename Partner::Node
   /// in which the walk found them. `cells`: those are what it found.
   void finish(bool cells) {
     if (is_cut_) s_.found = s_.first.sort();
-    std::sort(s_.found.begin(), s_.found.end());
-    for (const Found& f : s_.found) {
+    s_.order.resize(s_.found.size());
+    std::iota(s_.order.begin(), s_.order.end(), 0u);
+    std::sort(s_.order.begin(), s_.order.end(),
+              [this](std::uint32_t i, std::uint32_t j) { return s_.found[i] < s_.found[j]; });
+    for (const std::uint32_t i : s_.order) {
+      const Found& f = s_.found[i];
       if (cells ? addCell(f.leaf, f.body) : addTriangle(static_cast<std::uint32_t>(f.leaf.id), f.body)) return;
     }
   }
@@ -127,6 +133,7 @@ class ConvexCollector final : public query::ConvexVisitor<typename Partner::Node
     query::PairSet<std::uint64_t> seen;
     FirstFound first;
     std::vector<Found> found;
+    std::vector<std::uint32_t> order;  // of what was found, which is too large to be moved about
   };
   static Scratch& scratch() {
     thread_local Scratch scratch;
