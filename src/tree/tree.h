@@ -107,7 +107,7 @@ class Tree {
 
   /// The root grid knows the children of this frontier node.
   bool growsFromGrid(NodeRef node) const {
-    const oracle::RootGrid* grid = grid_known_.load(std::memory_order_acquire);
+    const RootGrid* grid = grid_known_.load(std::memory_order_acquire);
     return grid != nullptr && !isLoose(node) && cell(node).level < grid->level();
   }
 
@@ -197,8 +197,8 @@ class Tree {
   SupportTable supports_;
   Outline outline_;
   bool supports_known_ = false;
-  std::unique_ptr<oracle::RootGrid> grid_;
-  std::atomic<const oracle::RootGrid*> grid_known_{nullptr};  // grid_, for readers
+  std::unique_ptr<RootGrid> grid_;
+  std::atomic<const RootGrid*> grid_known_{nullptr};  // grid_, for readers
   bool grid_tried_ = false;
   static constexpr std::size_t kNever = ~std::size_t{0};
   mutable std::atomic<std::size_t> rent_{0};  // see payRent()

@@ -211,13 +211,16 @@ class Collector : public query::Visitor {
     return scratch;
   }
 
-  // A triangle so narrow, of its length, is a segment or a point but for rounding in S, or so small that products of
-  // four lengths vanish in S.
+  // A triangle so narrow, of its length or of its corners' coordinates, is a segment or a point but for rounding in S;
+  // one so small has products of four lengths that vanish in S.
   static constexpr double kNarrow = std::is_same<S, double>::value ? 1e-14 : 45 * kEpsilon;
   static constexpr double kSmallest = std::is_same<S, double>::value ? 1e-70 : 1e-8;
   static bool isSliver(const Corners& t) {
-    return query::isDegenerate(t, kNarrow) ||
-           std::max((t[1] - t[0]).cwiseAbs().maxCoeff(), (t[2] - t[0]).cwiseAbs().maxCoeff()) < kSmallest;
+    const double length = std::max((t[1] - t[0]).cwiseAbs().maxCoeff(), (t[2] - t[0]).cwiseAbs().maxCoeff());
+    if (length < kSmallest) return true;
+    const double rounding =
+        4 * kEpsilon * std::max({t[0].cwiseAbs().maxCoeff(), t[1].cwiseAbs().maxCoeff(), t[2].cwiseAbs().maxCoeff()});
+    return query::isDegenerate(t, std::max(kNarrow, rounding / length));
   }
 
   // What distances near 0 may be off by.
@@ -552,7 +555,7 @@ struct Models {
 template <typename S>
 bool turnsRound(const Models<S>& models, const fcl::Transform3<S>& X_W1, const fcl::Transform3<S>& X_W2) {
   if (models.first == nullptr || models.second == nullptr) return models.first == nullptr;
-  const tree::Tree &tree1 = models.first->tree(), &tree2 = models.second->tree();
+  const tree::Tree &tree1 = treeOf(*models.first), &tree2 = treeOf(*models.second);
   if (!tree1.conservative() && !tree2.conservative()) return false;
   const S *x1 = X_W1.matrix().data(), *x2 = X_W2.matrix().data();
   const auto differ = std::mismatch(x1, x1 + 16, x2);
@@ -563,7 +566,7 @@ bool turnsRound(const Models<S>& models, const fcl::Transform3<S>& X_W1, const f
 // has branches to drop goes the ordinary way.
 template <typename S>
 bool areFarApart(const CollideQuery<S>& q, const Models<S>& models) {
-  const tree::Tree &tree1 = models.first->tree(), &tree2 = models.second->tree();
+  const tree::Tree &tree1 = treeOf(*models.first), &tree2 = treeOf(*models.second);
   if (tree1.conservative() || tree2.conservative()) return false;
   const RelativePose<S> X_12(q.X_W1, q.X_W2);
   const bool are_far = tree1.outline().read([&](const tree::Outline::Reader& box1) {
@@ -589,16 +592,16 @@ std::size_t answer(const CollideQuery<S>& q, const Models<S>& models, const Brou
   if (a != nullptr && b != nullptr && areFarApart(q, models)) return q.result.numContacts();
   q.inCallersOrder(a, b);
   if (b != nullptr) {
-    const QueryScope scope(a->tree(), b->tree());
+    const QueryScope scope(treeOf(*a), treeOf(*b));
     collideTrees(q, scope.a(), scope.b());
   } else if (isShape(q.b())) {
-    collideShape(q, a->tree(), solver);
+    collideShape(q, treeOf(*a), solver);
 #if FCL_HAVE_OCTOMAP
   } else if (q.b()->getNodeType() == fcl::GEOM_OCTREE) {
-    collideOcTree(q, a->tree(), solver);
+    collideOcTree(q, treeOf(*a), solver);
 #endif
   } else {
-    withBvh<S>("collide", q.b(), [&](const auto& bvh) { collideBvh(q, a->tree(), bvh); });
+    withBvh<S>("collide", q.b(), [&](const auto& bvh) { collideBvh(q, treeOf(*a), bvh); });
   }
   return q.result.numContacts();
 }
@@ -640,7 +643,7 @@ void collideRow(const Model<S>& a, const Model<S>& b, const fcl::Transform3<S>* 
         {&a, identity, &b, X_AB[k], turnsRound(models, identity, X_AB[k])}, request, result, margin};
     if (areFarApart(q, models)) continue;
     result.clear();
-    const QueryScope scope(a.tree(), b.tree());
+    const QueryScope scope(treeOf(a), treeOf(b));
     collideTrees(q, q.swapped ? scope.b() : scope.a(), q.swapped ? scope.a() : scope.b());
     hit[k] = result.isCollision();
   }

@@ -57,7 +57,7 @@ bool TreeWalk::search(Scratch& s) {
   for (;;) {
     if (stepAll(steps, s)) return true;
     if (cut != nullptr) {
-      s.deferred.dropIf([&](const auto& pair) { return cut->isBeyond(a_.volume(pair.a)); });
+      s.deferred.dropIf([&](const auto& pair) { return cut->isBeyond(cut->leastOf(a_.volume(pair.a))); });
     }
     if (s.deferred.empty()) return false;
     s.grew = true;

@@ -37,7 +37,7 @@ struct Cut {
     return v.center[k] - static_cast<double>(v.half[k]);
   }
   /// Half extents are rounded to float: by less than 2^-8 of a lattice unit, as is the middle.
-  bool isBeyond(const Volume& v) const { return leastOf(v) > last + 0x1p-6; }
+  bool isBeyond(double least) const { return least > last + 0x1p-6; }
 };
 
 /// What a query does with the pairs that a walk finds. Each function returns true to end the walk. A pair may come more
