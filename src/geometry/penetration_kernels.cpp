@@ -81,6 +81,7 @@ struct Edges {
 HWY_INLINE Edges edgesOf(const Vec3d (&t)[3]) {
   Edges e;
   e.edge[0] = sub(t[1], t[0]), e.edge[1] = sub(t[2], t[1]), e.edge[2] = sub(t[0], t[2]);
+  BOCST_UNROLL
   for (int k = 0; k < 3; ++k) e.squared[k] = dot(e.edge[k], e.edge[k]);
   e.normal = cross(e.edge[0], e.edge[1]);
   e.normal_squared = dot(e.normal, e.normal);

@@ -118,7 +118,8 @@ class Collector : public query::Visitor {
         left_(q.contactsLeft()),
         most_(std::max<std::size_t>(kMost, left_ < kUnlimited ? 4 * left_ : kUnlimited)),
         is_cut_(!ends_at_first_ && left_ > 0 && left_ <= FirstPairs::kMost && !q.request.enable_cost),
-        s_(scratch()) {
+        s_(scratch()),
+        cut_(order_.startCut()) {
     s_.met.clear();
     if (ends_at_first_) return;
     s_.seen.clear();

@@ -182,11 +182,13 @@ struct Lanes {
 HWY_INLINE Lanes lanesOf(const TrianglePack& pack, std::size_t i, V tiny) {
   const D d;
   Lanes t;
+  BOCST_UNROLL
   for (std::size_t k = 0; k < 3; ++k) t.corner[k] = corner(pack, k, i);
   t.edge[0] = sub(t.corner[1], t.corner[0]), t.edge[1] = sub(t.corner[2], t.corner[1]),
   t.edge[2] = sub(t.corner[0], t.corner[2]);
   t.normal = cross(t.edge[0], t.edge[1]);
   t.normal_inverse = hn::Div(hn::Set(d, 1.0f), hn::Max(hn::Sqrt(dot(t.normal, t.normal)), tiny));
+  BOCST_UNROLL
   for (int k = 0; k < 3; ++k) t.edge_squared[k] = dot(t.edge[k], t.edge[k]), t.above[k] = dot(t.normal, t.corner[k]);
   return t;
 }
