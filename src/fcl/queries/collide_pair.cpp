@@ -563,8 +563,8 @@ bool turnsRound(const Models<S>& models, const fcl::Transform3<S>& X_W1, const f
   return differ.first == x1 + 16 ? std::less<const tree::Tree*>()(&tree2, &tree1) : *differ.second < *differ.first;
 }
 
-// Are two models with exact answers so far apart that nothing need be locked? Time that passes counts here, too: who
-// has branches to drop goes the ordinary way.
+// Are two models with exact answers so far apart that nothing need be locked? False where branches are due to be
+// dropped, since only a query that holds the locks drops them, at its end.
 template <typename S>
 bool areFarApart(const CollideQuery<S>& q, const Models<S>& models) {
   const tree::Tree &tree1 = treeOf(*models.first), &tree2 = treeOf(*models.second);

@@ -314,7 +314,7 @@ class PairWalk {
     seen.size = side.size(node);
     seen.volume_valid = false;
   }
-  // Only the side that is not expanded is looked at closely.
+  // The volume is decoded for the side that is not expanded only.
   template <typename Side>
   static auto& volumeOf(const Side& side, Seen<Side>& seen) {
     if (!seen.volume_valid) seen.volume = side.volume(seen.node);

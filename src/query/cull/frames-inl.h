@@ -17,7 +17,7 @@ namespace bocst::query::HWY_NAMESPACE {
 
 namespace codec = bounds::HWY_NAMESPACE;
 
-// Writes some lanes, and what the other side sees of them.
+// Writes some lanes, along the axes of their own side and of the other.
 HWY_INLINE void storeLanes(const PairFrames::Side& g, const V (&c)[3], const V (&h)[3], const V (&n)[3], V slab_center,
                            V slab_half, std::size_t i, Frame& f) {
   const D d;
@@ -176,8 +176,8 @@ HWY_INLINE M apartBySlabs(const Frame& f, std::size_t i, const Frame& y, std::si
 }
 
 // Bit o is set unless octant o of frame f is surely apart from the volume in lane l of frame y, of the other side, by
-// one of eight axes: the faces of both boxes and both slab normals. No edge axes: with slabs they gain nothing. Of
-// `octants` only; order as in StepGroup, by the faces, where it is asked for.
+// one of eight axes: the faces of both boxes and both slab normals. No edge axes: with slabs they gain nothing. Bits of
+// octants that are not in `octants` are 0. `order`, unless null: see StepGroup; the overlap is that along the faces.
 HWY_INLINE unsigned overlapping(const PairFrames& g, const Frame& f, const Frame& y, std::size_t l, unsigned octants,
                                 std::uint32_t* order) {
   const D d;
