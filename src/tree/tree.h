@@ -33,8 +33,8 @@ class BulkBuilder;
 ///
 /// Threads: a query holds the query lock shared while it looks at nodes. Growth appends blocks and publishes each by
 /// one store of its child reference, so readers are never in its way; one growth a tree at a time. What removes nodes
-/// (pruning, new vertices) holds the query lock alone. Links only go implicit -> list -> block while the query lock is
-/// held shared.
+/// (pruning, new vertices) holds the query lock alone. Child references only go implicit -> list -> block while the
+/// query lock is held shared.
 class Tree {
  public:
   /// @throws std::invalid_argument for options out of range, OracleError.
@@ -189,10 +189,11 @@ class Tree {
 
   oracle::Surface surface_;
   std::shared_ptr<const Solid> solid_;
-  mutable ForkAwareMutex component_mutex_;  // guards pieces_ while they are found
+  mutable ForkAwareMutex component_mutex_;  // guards component_points_ while they are found
   mutable std::unique_ptr<const std::vector<Eigen::Vector3d>> component_points_;
-  mutable std::atomic<const std::vector<Eigen::Vector3d>*> component_points_known_{nullptr};  // pieces_, for readers
-  mutable std::atomic<double> radius_{-1};                                                    // negative: not known yet
+  mutable std::atomic<const std::vector<Eigen::Vector3d>*> component_points_known_{
+      nullptr};                             // component_points_, for readers
+  mutable std::atomic<double> radius_{-1};  // negative: not known yet
   bounds::NodeBounds root_bounds_;
   SupportTable supports_;
   Outline outline_;

@@ -157,8 +157,8 @@ std::uint8_t overlappingOctants(const PairFrames& geometry, int own, const CellO
 /// misses octant o of a cell of side `own`.
 ///
 /// Along the axes of the octants, the triangle's normal and those of its edges in its plane; along the normal the
-/// octant's slab counts, too. With Q half a root's side and u = 2^-24, a centre is off by 8 u Q, an extent by 3, a
-/// projection on an axis of unit sum by 4 and a radius by 4 more, sums of both by 3, a bound by 2: 24 u Q. Slabs add
+/// octant's slab counts, too. With Q half a root's side and u = 2^-24, a centre is off by 9 u Q, an extent by 3, a
+/// projection on an axis of unit sum by 4 and a radius by 4 more, sums of both by 3, a bound by 2: 25 u Q. Slabs add
 /// 41: their offset 11, their normal 3, what the normals differ by 5, sums 22. PairFrames::Side::rounding_margin takes
 /// 128.
 void octantsMeeting(const PairFrames& geometry, int own, const CellOctants& cell, const TriangleBounds& triangles,

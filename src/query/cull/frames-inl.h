@@ -66,7 +66,7 @@ HWY_INLINE void decode(const PairFrames::Side& g, const bounds::OctantBounds& oc
   }
 }
 
-// Writes the volumes of a loose block. Whole numbers and powers of two are exact: a middle is off by 8 u Q.
+// Writes the volumes of a loose block. Whole numbers and powers of two are exact: a middle is off by 9 u Q.
 HWY_INLINE void decodeLoose(const PairFrames::Side& g, const bounds::LooseFrame& frame,
                             const bounds::OctantBounds& octants, Frame& f) {
   const D d;
