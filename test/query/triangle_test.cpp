@@ -178,6 +178,8 @@ TEST(IsDegenerate, WhateverTheOrderAndTheUnit) {
     ASSERT_EQ(isDegenerate(t), width < 1e-14) << width << " " << along << " " << unit;
   }
   const Corners point = {{1e-200, 0, 0}, {1e-200, 0, 0}, {1e-200, 0, 0}}, none = {{0, 0, 0}, {0, 0, 0}, {0, 0, 0}};
+  const Corners small_far_away = {{1, 1e-80, 0}, {1, 3e-80, 0}, {1, 1e-80, 2e-80}};
+  EXPECT_NEAR(relativeWidth(small_far_away), 0.5, 1e-15);
   EXPECT_TRUE(isDegenerate(point));
   EXPECT_TRUE(isDegenerate(none));
 }

@@ -216,12 +216,12 @@ class Collector : public query::Visitor {
   // one so small has products of four lengths that vanish in S.
   static constexpr double kNarrow = std::is_same<S, double>::value ? 1e-14 : 45 * kEpsilon;
   static constexpr double kSmallest = std::is_same<S, double>::value ? 1e-70 : 1e-8;
-  static bool isSliver(const Corners& t) {
+  static bool isSliver(const Corners& t, double relative_width) {
     const double length = std::max((t[1] - t[0]).cwiseAbs().maxCoeff(), (t[2] - t[0]).cwiseAbs().maxCoeff());
     if (length < kSmallest) return true;
     const double rounding =
         4 * kEpsilon * std::max({t[0].cwiseAbs().maxCoeff(), t[1].cwiseAbs().maxCoeff(), t[2].cwiseAbs().maxCoeff()});
-    return query::isDegenerate(t, std::max(kNarrow, rounding / length));
+    return relative_width <= std::max(kNarrow, rounding / length);
   }
 
   // What distances near 0 may be off by.
@@ -359,14 +359,16 @@ class Collector : public query::Visitor {
     // Each in its own frame: where it is placed, rounding may give it a width.
     Corners own;
     for (int k = 0; k < 3; ++k) own[k] = t2_.corner(b, k).template cast<double>();
-    const bool sliver = !isCertain(key) && (isSliver(p) || isSliver(own));
+    const double width_p = query::relativeWidth(p), width_q = query::relativeWidth(own);
+    const bool sliver = !isCertain(key) && (isSliver(p, width_p) || isSliver(own, width_q));
     // FCL's axes do not separate segments and points from everything.
-    const bool degenerate = sliver && (query::isDegenerate(p) || query::isDegenerate(own));
+    const bool degenerate = sliver && std::min(width_p, width_q) <= query::kDegenerate;
     const bool meet =
         isCertain(key) || (!degenerate && fcl::detail::Intersect<S>::intersect_Triangle(
                                               t1_.corner(a, 0), t1_.corner(a, 1), t1_.corner(a, 2), t2_.corner(b, 0),
                                               t2_.corner(b, 1), t2_.corner(b, 2), R_12_, p_12_));
     if (!sliver && margin_ == 0) return meet;
+    if (!meet && query::areApart(p, q, std::max(margin_, rounding()))) return false;
     Eigen::Vector3d on_p, on_q;
     const double distance = query::nearestPoints(p, q, on_p, on_q);
     // Of slivers, its axes are rounding, and may part what touches.
