@@ -26,6 +26,7 @@
 #include "fcl/queries/inside.h"
 #include "fcl/queries/inside_contact.h"
 #include "fcl/queries/query_scope.h"
+#include "fcl/queries/sphere_reach.h"
 #include "geometry/triangle.h"
 #include "query/collide/pair_walk.h"
 #include "query/collide/sphere_walk.h"
@@ -565,16 +566,21 @@ bool turnsRound(const Models<S>& models, const fcl::Transform3<S>& X_W1, const f
   return differ.first == x1 + 16 ? std::less<const tree::Tree*>()(&tree2, &tree1) : *differ.second < *differ.first;
 }
 
-// Are two models with exact answers so far apart that nothing need be locked? False where branches are due to be
+// Are two models so far apart that nothing need be locked? False where branches are due to be
 // dropped, since only a query that holds the locks drops them, at its end.
 template <typename S>
 bool areFarApart(const CollideQuery<S>& q, const Models<S>& models) {
   const tree::Tree &tree1 = treeOf(*models.first), &tree2 = treeOf(*models.second);
-  if (tree1.conservative() || tree2.conservative()) return false;
+  // No side of a mesh's bounding box is longer than the diagonal of any box about the mesh.
+  const auto spheres = [](const tree::Tree& tree, const tree::Outline::Reader& box) {
+    return sphereReach(
+        tree, 2 * std::sqrt(box.half(0) * box.half(0) + box.half(1) * box.half(1) + box.half(2) * box.half(2)));
+  };
   const RelativePose<S> X_12(q.X_W1, q.X_W2);
   const bool are_far = tree1.outline().read([&](const tree::Outline::Reader& box1) {
     return tree2.outline().read([&](const tree::Outline::Reader& box2) {
-      return query::areFarApart(box1, box2, X_12.rotation, X_12.translation, q.margin);
+      const double margin = q.margin + spheres(tree1, box1) + spheres(tree2, box2);
+      return query::areFarApart(box1, box2, X_12.rotation, X_12.translation, margin);
     });
   });
   if (!are_far) return false;
