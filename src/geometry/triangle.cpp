@@ -357,7 +357,7 @@ double relativeWidth(const Corners& t) {
 
 // With x the points from p[0] on, rounded, and s the largest of them, a product with an axis a is off by less than 4
 // eps |a| s, and two of them by 8; 16 cover the sizes' own rounding. That holds for any axis, whatever it was computed
-// from. What overflows or vanishes makes no gap.
+// from. An axis whose square is no good double says nothing.
 bool areApart(const Corners& p, const Corners& q, double distance) {
   const Vector3d o = p[0], x[3] = {Vector3d::Zero(), p[1] - o, p[2] - o}, y[3] = {q[0] - o, q[1] - o, q[2] - o};
   const Vector3d e[3] = {x[1], x[2] - x[1], -x[2]}, f[3] = {y[1] - y[0], y[2] - y[1], y[0] - y[2]};
@@ -368,7 +368,8 @@ bool areApart(const Corners& p, const Corners& q, double distance) {
     const double px[3] = {0, a.dot(x[1]), a.dot(x[2])}, qx[3] = {a.dot(y[0]), a.dot(y[1]), a.dot(y[2])};
     const double gap = std::max(std::min({qx[0], qx[1], qx[2]}) - std::max({px[0], px[1], px[2]}),
                                 std::min({px[0], px[1], px[2]}) - std::max({qx[0], qx[1], qx[2]}));
-    return gap > 0 && gap * gap > least * least * a.squaredNorm();
+    const double squared = a.squaredNorm();
+    return squared > 1e-280 && squared < 1e280 && gap > least * std::sqrt(squared);
   };
   if (parts(f[0].cross(f[1])) || parts(e[0].cross(e[1]))) return true;
   for (const Vector3d& u : e) {
