@@ -374,7 +374,28 @@ struct PairBits {
   std::uint32_t possible, certain;
 };
 
-HWY_INLINE PairBits testPairs(const Vec3 (&p)[3], const Vec3 (&q)[3], V extent, float moved, M pairs) {
+// Are p and q apart along a cross product of their edges? w: the corners of q from p[0] on. Any axis will do, whatever
+// it was computed from: with u = 2^-24, corners are off by 25 u of the size and the tolerance, what w and the two
+// products round is below 16 u times the sum of the axis's entries; `extent` is 64 u of the size and the tolerance.
+HWY_INLINE M apartByEdges(const Plane& of_p, const Plane& of_q, const Vec3 (&w)[3], V extent, V tiny) {
+  const V zero = hn::Zero(D());
+  M apart = hn::MaskFromVec(zero);
+  for (int a = 0; a < 3; ++a) {
+    BOCST_UNROLL
+    for (int b = 0; b < 3; ++b) {
+      const Vec3 axis = cross(of_p.edge[a], of_q.edge[b]);
+      const V p1 = dot(axis, of_p.edge[0]), p2 = hn::Neg(dot(axis, of_p.edge[2]));
+      const V q0 = dot(axis, w[0]), q1 = dot(axis, w[1]), q2 = dot(axis, w[2]);
+      const V gap =
+          hn::Max(hn::Sub(min3(q0, q1, q2), max3(zero, p1, p2)), hn::Sub(min3(zero, p1, p2), max3(q0, q1, q2)));
+      apart = hn::Or(apart, hn::Gt(gap, hn::MulAdd(extent, norm1(axis), tiny)));
+    }
+  }
+  return apart;
+}
+
+// `wide`: the tolerance is a margin, beside which FCL's rounding does not matter.
+HWY_INLINE PairBits testPairs(const Vec3 (&p)[3], const Vec3 (&q)[3], V extent, float moved, bool wide, M pairs) {
   const D d;
   const float u = 0x1p-24f;
   const V tiny = hn::Set(d, 1e-30f);  // products below have lost bits
@@ -384,8 +405,9 @@ HWY_INLINE PairBits testPairs(const Vec3 (&p)[3], const Vec3 (&q)[3], V extent, 
   const V n0 = dot(n, w[0]), n1 = dot(n, w[1]), n2 = dot(n, w[2]);
   const V m0 = dot(m, sub(p[0], q[0])), m1 = dot(m, sub(p[1], q[0])), m2 = dot(m, sub(p[2], q[0]));
   const V by_n = reachAcross(n0, n1, n2), by_m = reachAcross(m0, m1, m2);
-  const M near =
-      hn::And(pairs, hn::And(hn::Ge(by_n, hn::Neg(of_p.rounding_margin)), hn::Ge(by_m, hn::Neg(of_q.rounding_margin))));
+  const M planes = hn::And(hn::Ge(by_n, hn::Neg(of_p.rounding_margin)), hn::Ge(by_m, hn::Neg(of_q.rounding_margin)));
+  M near = hn::And(pairs, planes);
+  if (wide && !hn::AllFalse(d, near)) near = hn::AndNot(apartByEdges(of_p, of_q, w, extent, tiny), near);
   if (hn::AllFalse(d, near)) return {0, 0};
 
   // How far the determinants below may be off: those with a plane's normal, and those of an edge of each.
@@ -423,6 +445,7 @@ std::size_t TouchingPairs(const TrianglePack& rows, std::uint32_t which, const T
   const float size = std::max(rows.size, lanes.size) * 1.0001f, u = 0x1p-24f;
   const float moved = 25 * u * size + tolerance;
   const V extent = hn::Set(d, 64 * u * size + tolerance);
+  const bool wide = tolerance > 64 * u * size;
   std::size_t found = 0;
   PickedRows picked;
   pickRows(rows, which, region, extent, picked);
@@ -451,7 +474,7 @@ std::size_t TouchingPairs(const TrianglePack& rows, std::uint32_t which, const T
           q[k] = {hn::TableLookupLanes(lane_corner[k].x, lane), hn::TableLookupLanes(lane_corner[k].y, lane),
                   hn::TableLookupLanes(lane_corner[k].z, lane)};
         }
-        const PairBits bits = testPairs(p, q, extent, moved, hn::FirstN(d, count - at));
+        const PairBits bits = testPairs(p, q, extent, moved, wide, hn::FirstN(d, count - at));
         for (std::uint32_t k = bits.possible; k != 0; k &= k - 1) {
           const auto in = static_cast<std::size_t>(__builtin_ctz(k));
           const auto met = static_cast<std::size_t>(which_pair[at + in]);

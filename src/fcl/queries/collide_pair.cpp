@@ -357,6 +357,7 @@ class Collector : public query::Visitor {
     if (isCertain(key) && margin_ == 0) return true;
     Corners p, q;
     s_.pairs.get(i, p, q);
+    if (margin_ > rounding()) return isWithinMargin(isCertain(key), p, q, contact);
     // Each in its own frame: where it is placed, rounding may give it a width.
     Corners own;
     for (int k = 0; k < 3; ++k) own[k] = t2_.corner(b, k).template cast<double>();
@@ -369,18 +370,34 @@ class Collector : public query::Visitor {
                                               t1_.corner(a, 0), t1_.corner(a, 1), t1_.corner(a, 2), t2_.corner(b, 0),
                                               t2_.corner(b, 1), t2_.corner(b, 2), R_12_, p_12_));
     if (!sliver && margin_ == 0) return meet;
-    if (!meet && query::areApart(p, q, std::max(margin_, rounding()))) return false;
+    // Of slivers, its axes are rounding, and may part what touches.
+    const double touching = sliver ? rounding() : margin_;
+    if (!meet && query::areApart(p, q, touching)) return false;
     Eigen::Vector3d on_p, on_q;
     const double distance = query::nearestPoints(p, q, on_p, on_q);
-    // Of slivers, its axes are rounding, and may part what touches.
-    if (!meet && distance > (sliver ? std::max(margin_, rounding()) : margin_)) return false;
-    if (contact == nullptr) return true;
-    if (distance > rounding()) {
-      *contact = {(on_q - on_p) / distance, (on_p + on_q) / 2, std::max(margin_ - distance, 0.0)};
-    } else {
-      contact->depth += margin_;
-    }
+    if (!meet && distance > touching) return false;
+    if (contact != nullptr) setContact(distance, on_p, on_q, *contact);
     return true;
+  }
+
+  // FCL's test says nothing about what is apart by more than rounding, so distances alone decide.
+  bool isWithinMargin(bool certain, const Corners& p, const Corners& q, query::ContactPoint* contact) const {
+    if (!certain && query::areApart(p, q, margin_)) return false;
+    Eigen::Vector3d on_p, on_q;
+    const double distance = query::nearestPoints(p, q, on_p, on_q);
+    if (!certain && distance > margin_) return false;
+    if (contact != nullptr) setContact(distance, on_p, on_q, *contact);
+    return true;
+  }
+
+  // Where the two are apart, the contact is about their nearest points; else its depth is more by the margin.
+  void setContact(double distance, const Eigen::Vector3d& on_p, const Eigen::Vector3d& on_q,
+                  query::ContactPoint& contact) const {
+    if (distance > rounding()) {
+      contact = {(on_q - on_p) / distance, (on_p + on_q) / 2, std::max(margin_ - distance, 0.0)};
+    } else {
+      contact.depth += margin_;
+    }
   }
 
   void addMet(const PlacedPair& pair, const query::ContactPoint& contact) {
