@@ -37,6 +37,8 @@ constexpr std::pair<const char*, const char*> kExamples[] = {
     {"bocst paper bunny00.off ChineseDragon-10kv.off --out paper", "The paper's tables and figures beside ours."},
     {"bocst bench link.obj gripper.obj --scenarios all --csv figures.csv",
      "Time and memory compared with FCL's, as a table."},
+    {"bocst scene arm.urdf --srdf arm.srdf --states path.csv --html arm.html",
+     "Which states of a robot collide, and with what; a page that shows them."},
     {"bocst validate link.obj gripper.obj --poses 10000 --shard 1/4 --json 1.json", "A quarter of a validation."},
 };
 
