@@ -84,8 +84,10 @@ class SceneFile : public ::testing::Test {
     return readUrdf(file, packages, meshes);
   }
 
-  SceneSetup scene(const std::string& json) const {
+  SceneSetup scene(const std::string& json,
+                   SceneArguments::Adjacent adjacent = SceneArguments::Adjacent::kAsSrdf) const {
     SceneArguments arguments;
+    arguments.adjacent = adjacent;
     arguments.file = write("scene.json", json);
     return readScene(arguments);
   }
@@ -236,15 +238,25 @@ TEST_F(SceneFile, SaysWhereAUrdfIsWrong) {
   complains(two + link("c") + joint("k", "fixed", "a", "c") + joint("j", "continuous", "a", "b", "<mimic joint='k'/>"),
             {"joint j mimics k, which is fixed"});
   complains(link("a") + link("b", "<mesh filename='none.stl'/>") + joint("j", "fixed", "a", "b"),
-            {"line 3", "link b", "mesh none.stl", "No such file"});
+            {"line 3", "link b", "mesh none.stl", "no such file"});
   complains(link("b", "<mesh filename='package://robots/none.stl'/>"),
             {"line 2", "link b", "package robots is not found", "--package robots="});
   complains(link("b", "<mesh filename='http://host/none.stl'/>"), {"line 2", "link b", "package://"});
   complains(link("b", "<mesh filename='tetra.off' scale='1 0 1'/>"), {"line 2", "link b", "scale"});
   complains(link("b", "<sphere radius='-1'/>"), {"line 2", "link b", "above 0"});
-  complains(link("b", "<capsule radius='1' length='1'/>"), {"b"});
+  complains(link("b", "<capsule radius='1' length='1'/>"), {"line 2", "capsule", "[b]"});
+  complains("<link name='b'><collision/></link>", {"line 2", "[b]"});
+  complains("<link name='b'><collision><origin xyz='1 x 0'/><geometry>" + kSphere + "</geometry></collision></link>",
+            {"line 2", "[x]", "[b]"});
+  complains(link("b", "<box size='1 2'/>"), {"line 2", "[1 2]", "[b]"});
   complains("<xacro:property name='x' value='1'/>\n" + link("a"), {"line 2", "xacro"});
   complains("<link name='a'>\n</robot>", {"line 3", "no XML"});
+  // What is not asked about may be wrong.
+  EXPECT_EQ(read(robot("<link name='a'><inertial><mass value='x'/></inertial><visual><geometry><capsule/></geometry>"
+                       "<material name='none'/></visual></link>"))
+                .links()
+                .size(),
+            1u);
   const std::string other = write("other.urdf", "<sdf></sdf>");
   expectComplaint([&] { read(other); }, {other + ": line 1", "<sdf>", "<robot>"});
   expectComplaint([&] { read("/nowhere/r.urdf"); }, {"/nowhere/r.urdf", "No such file"});
@@ -431,7 +443,7 @@ TEST_F(SceneFile, SaysWhereASceneIsWrong) {
   complains(objects(R"({"name": "a", "box": [1, 2]})"), "objects[0].box: a list of 3 numbers expected");
   complains(objects(R"({"name": "a", "box": [1, 2, "3"]})"), "objects[0].box[2]: a number expected");
   complains(objects(R"({"name": "a", "mesh": "none.stl"})"), "objects[0].mesh: ");
-  complains(objects(R"({"name": "a", "mesh": "none.stl"})"), "No such file");
+  complains(objects(R"({"name": "a", "mesh": "none.stl"})"), "no such file");
   complains(objects(R"({"name": "a", "sphere": 1, "scale": 2})"), "\"scale\" is for meshes");
   complains(objects(R"({"name": "a", "sphere": 1, "pose": [1, 2, 3, 4]})"),
             "objects[0].pose: a list of 7 numbers expected");
@@ -449,7 +461,6 @@ TEST_F(SceneFile, SaysWhereASceneIsWrong) {
   complains(objects(ball, R"(, "states": [{"bal": [1, 2, 3]}])"),
             "states[0]: nothing that moves is called bal. Did you mean ball?");
   complains(objects(R"({"name": "a", "sphere": 1, "moving": true})", R"(, "states": [{}])"), "states[0]: missing: a");
-  complains(R"({"robot": {"urdf": "none.urdf"}})", "");
   expectComplaint([&] { scene(R"({"robot": {"urdf": "none.urdf"}})"); }, {"none.urdf", "No such file"});
   expectComplaint([&] { scene(objects(ball, R"(, "states": "none.csv")")); }, {"none.csv", "No such file"});
 }
@@ -474,7 +485,8 @@ class Slides : public SceneFile {
     return scene(R"({"robot": {"urdf": "robot.urdf", "pose": [0, 0, 1]},
       "objects": [{"name": "fixed", "sphere": 0.2, "pose": [1, 0, 1]}, {"name": "wall", "box": [0.1, 0.1, 0.1], "pose": [0, 1, 1]}],
       "allowed": [["twin", "fixed"]], "states": )" +
-                 states + "}");
+                     states + "}",
+                 SceneArguments::Adjacent::kCheck);
   }
 };
 
@@ -540,7 +552,7 @@ TEST_F(SceneFile, AnswersAreThoseOfFcl) {
   std::string objects, states;
   for (int i = 0; i < 6; ++i) {
     objects += "{\"name\": \"f" + std::to_string(i) +
-               "\", \"mesh\": \"tetra.off\", \"scale\": [1, 2, -1], \"pose\": {\"xyz\": [" + std::to_string(i) +
+               "\", \"mesh\": \"tetra.off\", \"scale\": [1, 2, -1], \"pose\": {\"xyz\": [" + std::to_string(2 * i) +
                ", 0.3, 0.1], \"rpy\": [" + std::to_string(i) + ", 1, 2]}},";
   }
   objects +=
@@ -552,7 +564,7 @@ TEST_F(SceneFile, AnswersAreThoseOfFcl) {
     for (const int m : {0, 1, 2}) {
       const double t = 0.1 * k + m;
       states += (m == 0 ? "{" : ",") + std::string("\"m") + std::to_string(m) + "\": {\"xyz\": [" +
-                std::to_string(3 + 4 * std::sin(t * 1.3)) + "," + std::to_string(1.5 * std::cos(t * 2.1)) + "," +
+                std::to_string(6 + 7 * std::sin(t * 1.3)) + "," + std::to_string(1.5 * std::cos(t * 2.1)) + "," +
                 std::to_string(std::sin(t * 0.7)) + "], \"rpy\": [" + std::to_string(t) + ",0.3," +
                 std::to_string(2 * t) + "]}";
     }

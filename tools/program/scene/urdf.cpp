@@ -8,6 +8,7 @@
 #include <algorithm>
 #include <cmath>
 #include <filesystem>
+#include <sstream>
 #include <stdexcept>
 #include <utility>
 #include <vector>
@@ -26,14 +27,14 @@ class Listener final : public console_bridge::OutputHandler {
   Listener& operator=(const Listener&) = delete;
 
   void log(const std::string& text, console_bridge::LogLevel level, const char*, int) override {
-    if (level >= console_bridge::CONSOLE_BRIDGE_LOG_ERROR && first_.empty()) first_ = text;
+    if (level >= console_bridge::CONSOLE_BRIDGE_LOG_ERROR) complaints_ += (complaints_.empty() ? "" : "; ") + text;
   }
 
-  /// The first complaint is the one nearest to the cause.
-  const std::string& complaint() const { return first_; }
+  /// All errors, the one nearest to the cause first; also of what urdfdom leaves out and goes on.
+  const std::string& complaints() const { return complaints_; }
 
  private:
-  std::string first_;
+  std::string complaints_;
 };
 
 class Reader {
@@ -61,19 +62,34 @@ class Reader {
     }
   }
 
+  /// The robot without what nobody asks about here, so that faults of that do not matter.
+  std::string withoutLooks() const {
+    pugi::xml_document robot;
+    robot.append_copy(xml_.root());
+    for (pugi::xml_node link : robot.document_element().children("link")) {
+      for (const char* name : {"visual", "inertial"}) {
+        while (link.remove_child(name)) {
+        }
+      }
+    }
+    std::ostringstream text;
+    robot.save(text);
+    return text.str();
+  }
+
   urdf::ModelInterfaceSharedPtr parse() const {
     const Listener listener;
     urdf::ModelInterfaceSharedPtr model;
     std::string complaint;
     try {
-      model = urdf::parseURDF(xml_.text());
+      model = urdf::parseURDF(withoutLooks());
     } catch (const std::exception& e) {
       complaint = e.what();
     }
-    if (model != nullptr && model->root_link_ != nullptr) return model;
-    if (!listener.complaint().empty()) complaint = listener.complaint();
-    if (complaint.empty()) complaint = "urdfdom cannot read it";
-    throw std::runtime_error(placeOfNamed(complaint) + ": " + complaint);
+    if (!listener.complaints().empty()) complaint = listener.complaints();
+    if (complaint.empty() && (model == nullptr || model->root_link_ == nullptr)) complaint = "urdfdom cannot read it";
+    if (!complaint.empty()) throw std::runtime_error(placeOfNamed(complaint) + ": " + complaint);
+    return model;
   }
 
   /// Of the first link or joint whose name stands in brackets or quotes in the text.
