@@ -181,7 +181,7 @@ class SceneReport {
 
   std::string clearanceText(const Clearance& clearance) const {
     if (!clearance.nearest) return "";
-    return formatNumber(clearance.distance, 4) + " " + nameOf(clearance.nearest->first) + " - " +
+    return (clearance.distance > 0 ? formatNumber(clearance.distance, 4) : "0") + " " + nameOf(clearance.nearest->first) + " - " +
            nameOf(clearance.nearest->second);
   }
 
@@ -254,7 +254,7 @@ struct SceneCommand {
     if (setup.robot) head.row({"robot", robotText(*setup.robot)});
     if (!setup.objects.empty()) head.row({"objects", objectsText(setup)});
     head.row({"meshes", shapesText(bodies)});
-    head.row({"pairs", std::to_string(bodies.pairCount()) + " of shapes"});
+    head.row({"pairs", std::to_string(bodies.pairCount()) + " of shapes are checked"});
     head.row({"states", std::to_string(report.states()) + ", " + setup.states_from});
     head.row({"answer", model.answerText()});
     head.print();
@@ -282,6 +282,7 @@ struct SceneCommand {
     row("set-up, from the arrays", ours.set_up, theirs.set_up, formatTime);
     row("all states, first time", ours.first, theirs.first, formatTime);
     row("all states, once more", ours.again, theirs.again, formatTime);
+    row("set-up and first time", ours.set_up + ours.first, theirs.set_up + theirs.first, formatTime);
     row("a state, once more", ours.again / states, theirs.again / states, formatTime);
     row("tree bytes", static_cast<double>(answers.bytes), static_cast<double>(answers.fcl_bytes), formatBytes);
     table.print();

@@ -37,8 +37,9 @@ Surface turned(const std::vector<Eigen::Vector2d>& profile) {
   for (std::uint32_t ring = 0; ring + 1 < profile.size(); ++ring) {
     for (std::uint32_t i = 0; i < kSides; ++i) {
       const std::uint32_t a = ring * kSides + i, b = ring * kSides + (i + 1) % kSides;
-      surface.triangles.push_back({a, b, b + kSides});
-      surface.triangles.push_back({a, b + kSides, a + kSides});
+      // At the axis a ring is a point.
+      if (profile[ring].x() > 0) surface.triangles.push_back({a, b, b + kSides});
+      if (profile[ring + 1].x() > 0) surface.triangles.push_back({a, b + kSides, a + kSides});
     }
   }
   return surface;
@@ -47,11 +48,12 @@ Surface turned(const std::vector<Eigen::Vector2d>& profile) {
 /// Two half balls with a straight part of this length between them.
 Surface capsuleOf(double radius, double length) {
   constexpr int kRings = 8;
-  std::vector<Eigen::Vector2d> profile;
+  std::vector<Eigen::Vector2d> profile;  // without a straight part the two equators are one ring
   for (const double side : {-1.0, 1.0}) {
-    for (int i = 0; i <= kRings; ++i) {
+    for (int i = side > 0 && length == 0 ? 1 : 0; i <= kRings; ++i) {
+      const bool pole = i == (side < 0 ? 0 : kRings);
       const double angle = M_PI / 2 * (side < 0 ? i - kRings : i) / kRings;
-      profile.emplace_back(radius * std::cos(angle), side * length / 2 + radius * std::sin(angle));
+      profile.emplace_back(pole ? 0 : radius * std::cos(angle), side * length / 2 + radius * std::sin(angle));
     }
   }
   return turned(profile);

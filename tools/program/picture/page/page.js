@@ -52,18 +52,18 @@ for (const state of states) state.poses = decoded(state.poses, Float64Array);
 const moveTo = (state) => movers.forEach((object, i) => place(object, state.poses.subarray(16 * i, 16 * i + 16)));
 const contacts = scene.contacts ? decoded(scene.contacts.numbers, Float64Array) : new Float64Array();
 
+function boxCornersOf(object) {
+  return [0, 1, 2, 3, 4, 5, 6, 7].map((i) => matrix.applied(object.toPage, [i & 1, i >> 1 & 1, i >> 2].map((x) => x - 0.5)));
+}
+
+/** About all objects, or about what moves, in all states. */
 function ballOfScene() {
   const low = [Infinity, Infinity, Infinity], high = [-Infinity, -Infinity, -Infinity];
-  const extend = (object) => {
-    for (let corner = 0; corner < 8; ++corner) {
-      const p = matrix.applied(object.toPage, [corner & 1, corner >> 1 & 1, corner >> 2].map((x) => x - 0.5));
-      for (let k = 0; k < 3; ++k) {
-        low[k] = Math.min(low[k], p[k]);
-        high[k] = Math.max(high[k], p[k]);
-      }
-    }
-  };
-  scene.objects.forEach(extend);
+  const extend = (object) => boxCornersOf(object).forEach((p) => p.forEach((x, k) => {
+    low[k] = Math.min(low[k], x);
+    high[k] = Math.max(high[k], x);
+  }));
+  if (states.length === 0) scene.objects.forEach(extend);
   for (const state of states) {
     moveTo(state);
     movers.forEach(extend);
@@ -72,6 +72,9 @@ function ballOfScene() {
   return {center: low.map((x, k) => (x + high[k]) / 2), radius: Math.hypot(...size) / 2 || 1};
 }
 const ball = ballOfScene();
+// How far objects reach from its middle, in its radius.
+const reach = Math.max(...scene.objects.flatMap(boxCornersOf).map((p) => Math.hypot(...p.map((x, k) => x - ball.center[k])))) /
+  ball.radius;
 const toBall = matrix.product(matrix.scaled(1 / ball.radius), matrix.moved(ball.center.map((x) => -x)));
 
 // ---- what is chosen
@@ -307,7 +310,7 @@ function draw() {
   canvas.width = Math.max(1, Math.round(canvas.clientWidth * ratio));
   canvas.height = Math.max(1, Math.round(canvas.clientHeight * ratio));
   gl.viewport(0, 0, canvas.width, canvas.height);
-  camera.projection = matrix.perspective(0.8, canvas.width / canvas.height, 0.02, camera.distance + 20);
+  camera.projection = matrix.perspective(0.8, canvas.width / canvas.height, 0.02, camera.distance + Math.max(20, reach));
   gl.clearColor(0.957, 0.965, 0.973, 1);
   gl.clear(gl.COLOR_BUFFER_BIT | gl.DEPTH_BUFFER_BIT);
   gl.enable(gl.DEPTH_TEST);
@@ -318,6 +321,7 @@ function draw() {
   const eyes = scene.objects.map((object) => matrix.product(view, object.toPage));
   if (byId('mesh').checked) {
     scene.objects.forEach((object, o) => {
+      if (states.length > 0 && !byId('fixed').checked && !movers.includes(object)) return;
       const p = use('mesh', eyes[o], object);
       gl.uniform4f(p.at('color'), ...colorOf(object, o), 1);
       gl.bindVertexArray(meshes[o].array);
@@ -387,7 +391,7 @@ function stateChosen() {
   moveTo(state);
   byId('state-shown').textContent = `${chosen.state + 1} of ${number(states.length)} (${state.name})`;
   const room = state.clearance === null ? '' : `, clearance ${state.clearance.toPrecision(4)}`;
-  byId('verdict').textContent = (state.contacts.length > 0 ? 'collides' : 'free') + room;
+  byId('verdict').textContent = state.contacts.length > 0 ? 'collides' : 'free' + room;
   byId('pairs').replaceChildren(...state.contacts.map((pair) => {
     const line = document.createElement('li');
     line.textContent = pair.map((o) => scene.objects[o].name).join(' - ');
@@ -545,7 +549,7 @@ function start() {
   byId('state').addEventListener('input', stateChosen);
   byId('next').addEventListener('click', nextCollision);
   for (const id of ['level', 'cut']) byId(id).addEventListener('input', refill);
-  for (const id of ['volume', 'opacity', 'mesh', 'faults', 'contacts', 'up']) byId(id).addEventListener('input', drawSoon);
+  for (const id of ['volume', 'opacity', 'mesh', 'fixed', 'faults', 'contacts', 'up']) byId(id).addEventListener('input', drawSoon);
   notes();
   if (states.length > 0) stateChosen();
   refill();
