@@ -16,10 +16,10 @@
 #include <utility>
 #include <vector>
 
+#include "robot/packages.h"
+#include "robot/urdf.h"
 #include "scene/ask_scene.h"
-#include "scene/packages.h"
 #include "scene/shape_mesh.h"
-#include "scene/urdf.h"
 
 namespace bocst {
 namespace {
@@ -347,6 +347,7 @@ TEST(States, AreATableWithNames) {
   EXPECT_EQ(some[1].joints, (std::vector<double>{2, 1}));
   EXPECT_EQ(some[0].place, "line 4");
   expectNear(some[0].objects.at(0), *names.X_WO[0], "where the scene has it");
+  EXPECT_EQ(statesOfTable("\xEF\xBB\xBFq1,elbow\r\n1,2\r\n", names, "f").at(0).joints, (std::vector<double>{1, 2}));
   const State placed =
       statesOfTable("q1\telbow\tbox.yaw\tbox.x\tbox.y\tbox.z\tbox.roll\tbox.pitch\n0\t0\t0.3\t1\t2\t3\t0.1\t0.2", names,
                     "f")

@@ -220,8 +220,12 @@ _bocst() {
 )" + values +
          R"(  esac
   if [[ $word != -* ]]; then
-    if [[ $command == merge ]]; then _bocst_files json; else _bocst_files )" +
-         meshEndings() + R"(; fi
+    case $command in
+      merge) _bocst_files json ;;
+      scene) _bocst_files json urdf xml ;;
+      *) _bocst_files )" +
+         meshEndings() + R"( ;;
+    esac
     return
   fi
   case $command in

@@ -9,8 +9,8 @@
 
 #include "cli/arguments.h"
 #include "cli/file.h"
+#include "robot/packages.h"
 #include "scene/ask_scene.h"
-#include "scene/packages.h"
 #include "scene/scene_file.h"
 #include "scene/scene_page.h"
 
@@ -181,8 +181,8 @@ class SceneReport {
 
   std::string clearanceText(const Clearance& clearance) const {
     if (!clearance.nearest) return "";
-    return (clearance.distance > 0 ? formatNumber(clearance.distance, 4) : "0") + " " + nameOf(clearance.nearest->first) + " - " +
-           nameOf(clearance.nearest->second);
+    return (clearance.distance > 0 ? formatNumber(clearance.distance, 4) : "0") + " " +
+           nameOf(clearance.nearest->first) + " - " + nameOf(clearance.nearest->second);
   }
 
   const SceneSetup& setup_;

@@ -24,7 +24,7 @@ template <typename S>
 class Side final : public BocstSide {
  public:
   Side(const Bodies& bodies, const std::vector<Eigen::Isometry3d>& poses, const Options& options)
-      : bodies_(bodies), poses_(cast<S>(poses)) {
+      : bodies_(bodies), poses_(poses, bodies.moving) {
     for (const Shape& shape : bodies.shapes) geometries_.push_back(geometryOf(shape, options));
     std::vector<Id> ids;
     for (std::size_t i = 0; i < bodies.bodies.size(); ++i) {
@@ -44,14 +44,14 @@ class Side final : public BocstSide {
   }
 
   std::vector<std::uint8_t> collisions() override {
-    std::vector<std::uint8_t> hit(poses_.size() / bodies_.moving);
-    scene_.collisions(poses_.data(), hit.size(), hit.data());
+    std::vector<std::uint8_t> hit(poses_.states());
+    scene_.collisions(poses_.state(0), hit.size(), hit.data());
     return hit;
   }
 
   /// Scene stops at the first pair, so each one is asked that comes near.
   std::vector<BodyPair> pairs(std::size_t state) override {
-    for (std::size_t i = 0; i < bodies_.moving; ++i) place(objects_[i], poses_[state * bodies_.moving + i]);
+    for (std::size_t i = 0; i < bodies_.moving; ++i) place(objects_[i], poses_.state(state)[i]);
     std::vector<BodyPair> found;
     for (std::size_t a = 0; a < bodies_.moving; ++a) {
       for (std::size_t b = a + 1; b < objects_.size(); ++b) {
@@ -71,7 +71,7 @@ class Side final : public BocstSide {
   Clearance clearance(std::size_t state) override {
     Pair nearest;
     Clearance result;
-    result.distance = scene_.clearance(&poses_[state * bodies_.moving], &nearest);
+    result.distance = scene_.clearance(poses_.state(state), &nearest);
     if (nearest.a.isValid()) result.nearest = std::minmax(body_of_.at(nearest.a), body_of_.at(nearest.b));
     return result;
   }
@@ -105,7 +105,7 @@ class Side final : public BocstSide {
   }
 
   const Bodies& bodies_;
-  std::vector<fcl::Transform3<S>> poses_;
+  ScenePoses<S> poses_;
   std::vector<std::shared_ptr<Model<S>>> models_;
   std::vector<std::shared_ptr<fcl::CollisionGeometry<S>>> geometries_;
   Scene<S> scene_;

@@ -112,19 +112,18 @@ template <typename S>
 class Side final : public SceneSide {
  public:
   Side(const Bodies& bodies, const std::vector<Eigen::Isometry3d>& poses)
-      : bodies_(bodies), poses_(cast<S>(poses)), managers_(bodies, geometriesOf<S>(bodies)) {}
+      : bodies_(bodies), poses_(poses, bodies.moving), managers_(bodies, geometriesOf<S>(bodies)) {}
 
   std::vector<std::uint8_t> collisions() override {
-    std::vector<std::uint8_t> hit(poses_.size() / bodies_.moving);
+    std::vector<std::uint8_t> hit(poses_.states());
     for (std::size_t k = 0; k < hit.size(); ++k) {
-      hit[k] = !managers_.collisions(&poses_[k * bodies_.moving], 1).empty();
+      hit[k] = !managers_.collisions(poses_.state(k), 1).empty();
     }
     return hit;
   }
 
   std::vector<BodyPair> pairs(std::size_t state) override {
-    std::vector<BodyPair> found =
-        managers_.collisions(&poses_[state * bodies_.moving], std::numeric_limits<std::size_t>::max());
+    std::vector<BodyPair> found = managers_.collisions(poses_.state(state), std::numeric_limits<std::size_t>::max());
     std::sort(found.begin(), found.end());
     return found;
   }
@@ -140,7 +139,7 @@ class Side final : public SceneSide {
 
  private:
   const Bodies& bodies_;
-  std::vector<fcl::Transform3<S>> poses_;
+  ScenePoses<S> poses_;
   Managers<S> managers_;
 };
 

@@ -9,11 +9,11 @@
 
 #include "cli/file.h"
 #include "cli/suggest.h"
+#include "robot/mesh_store.h"
+#include "robot/packages.h"
+#include "robot/srdf.h"
+#include "robot/urdf.h"
 #include "scene/json_element.h"
-#include "scene/mesh_store.h"
-#include "scene/packages.h"
-#include "scene/srdf.h"
-#include "scene/urdf.h"
 
 namespace bocst::program {
 namespace {

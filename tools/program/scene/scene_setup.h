@@ -9,8 +9,8 @@
 #include <utility>
 #include <vector>
 
-#include "scene/parts.h"
-#include "scene/robot.h"
+#include "robot/parts.h"
+#include "robot/robot.h"
 #include "scene/states.h"
 
 namespace bocst::program {

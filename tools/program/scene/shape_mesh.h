@@ -5,7 +5,7 @@
 
 #include <memory>
 
-#include "scene/parts.h"
+#include "robot/parts.h"
 
 namespace bocst::program {
 

@@ -7,10 +7,13 @@
 #include <fcl/geometry/shape/cylinder.h>
 #include <fcl/geometry/shape/sphere.h>
 
+#include <Eigen/Geometry>
+#include <cstddef>
 #include <memory>
+#include <type_traits>
 #include <vector>
 
-#include "scene/parts.h"
+#include "robot/parts.h"
 
 namespace bocst::program {
 
@@ -30,13 +33,32 @@ std::shared_ptr<fcl::CollisionGeometry<S>> solidOf(const Shape& shape) {
   }
 }
 
-/// Poses in the scalar of queries.
+/// Poses in the scalar of queries. Keeps a reference to those of double.
 template <typename S>
-std::vector<fcl::Transform3<S>> cast(const std::vector<Eigen::Isometry3d>& poses) {
-  std::vector<fcl::Transform3<S>> result;
-  result.reserve(poses.size());
-  for (const Eigen::Isometry3d& X : poses) result.push_back(X.cast<S>());
-  return result;
-}
+class ScenePoses {
+ public:
+  ScenePoses(const std::vector<Eigen::Isometry3d>& poses, std::size_t moving) : moving_(moving), given_(poses) {
+    if constexpr (!std::is_same_v<S, double>) {
+      own_.reserve(poses.size());
+      for (const Eigen::Isometry3d& X : poses) own_.push_back(X.cast<S>());
+    }
+  }
+
+  std::size_t states() const { return given_.size() / moving_; }
+
+  /// X_WB of each moving body.
+  const fcl::Transform3<S>* state(std::size_t k) const {
+    if constexpr (std::is_same_v<S, double>) {
+      return given_.data() + k * moving_;
+    } else {
+      return own_.data() + k * moving_;
+    }
+  }
+
+ private:
+  std::size_t moving_;
+  const std::vector<Eigen::Isometry3d>& given_;
+  std::vector<fcl::Transform3<S>> own_;
+};
 
 }  // namespace bocst::program

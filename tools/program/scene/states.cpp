@@ -174,6 +174,8 @@ std::vector<State> statesOfTable(const std::string& text, const StateNames& name
   std::istringstream stream(text);
   std::string line;
   for (std::size_t number = 1; std::getline(stream, line); ++number) {
+    const std::string mark = "\xEF\xBB\xBF";  // of UTF-8, as spreadsheets write it
+    if (number == 1 && line.rfind(mark, 0) == 0) line.erase(0, mark.size());
     line.erase(std::min(line.find('#'), line.size()));
     if (trimmed(line).empty()) continue;
     const std::vector<std::string> cells = cellsOf(line);

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: BSD-3-Clause
-#include "scene/robot.h"
+#include "robot/robot.h"
 
 #include <map>
 #include <set>

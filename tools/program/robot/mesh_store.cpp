@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: BSD-3-Clause
-#include "scene/mesh_store.h"
+#include "robot/mesh_store.h"
 
 #include <bocst/io.h>
 

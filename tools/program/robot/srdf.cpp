@@ -1,10 +1,10 @@
 // SPDX-License-Identifier: BSD-3-Clause
-#include "scene/srdf.h"
+#include "robot/srdf.h"
 
 #include <algorithm>
 #include <optional>
 
-#include "scene/xml_file.h"
+#include "robot/xml_file.h"
 
 namespace bocst::program {
 namespace {

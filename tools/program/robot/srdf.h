@@ -7,7 +7,7 @@
 #include <utility>
 #include <vector>
 
-#include "scene/robot.h"
+#include "robot/robot.h"
 
 namespace bocst::program {
 

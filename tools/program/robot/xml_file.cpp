@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: BSD-3-Clause
-#include "scene/xml_file.h"
+#include "robot/xml_file.h"
 
 #include <algorithm>
 #include <stdexcept>

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: BSD-3-Clause
-#include "scene/urdf.h"
+#include "robot/urdf.h"
 
 #include <console_bridge/console.h>
 #include <urdf_model/model.h>
@@ -13,7 +13,7 @@
 #include <utility>
 #include <vector>
 
-#include "scene/xml_file.h"
+#include "robot/xml_file.h"
 
 namespace bocst::program {
 namespace {

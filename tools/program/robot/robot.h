@@ -8,7 +8,7 @@
 #include <utility>
 #include <vector>
 
-#include "scene/parts.h"
+#include "robot/parts.h"
 
 namespace bocst::program {
 

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: BSD-3-Clause
-#include "scene/packages.h"
+#include "robot/packages.h"
 
 #include <algorithm>
 #include <cstdlib>

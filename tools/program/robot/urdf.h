@@ -3,9 +3,9 @@
 
 #include <string>
 
-#include "scene/mesh_store.h"
-#include "scene/packages.h"
-#include "scene/robot.h"
+#include "robot/mesh_store.h"
+#include "robot/packages.h"
+#include "robot/robot.h"
 
 namespace bocst::program {
 
