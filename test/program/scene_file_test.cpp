@@ -594,6 +594,14 @@ TEST_F(SceneFile, AnswersAreThoseOfFcl) {
   EXPECT_FALSE(askScene(s, bodies, questions).fcl.has_value());
 }
 
+TEST(SceneDifferences, AreFaultsWhereFclIsRight) {
+  EXPECT_TRUE(isFault(true, true, true)) << "an invented contact of two meshes";
+  EXPECT_TRUE(isFault(true, false, true)) << "a missed one";
+  EXPECT_TRUE(isFault(true, false, false)) << "a missed one, with conservative answers";
+  EXPECT_FALSE(isFault(true, true, false)) << "conservative answers find more";
+  for (const bool bocst : {false, true}) EXPECT_FALSE(isFault(false, bocst, true)) << "FCL's solver for a shape";
+}
+
 TEST(ShapeMesh, IsAsLargeAsTheShape) {
   const auto sizesOf = [](Shape::Kind kind, const Vector3d& size) {
     Part part;

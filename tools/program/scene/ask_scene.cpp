@@ -64,7 +64,7 @@ SceneAnswers askScene(const SceneSetup& setup, const Bodies& bodies, const Scene
     }
     for (const BodyPair& pair : different) {
       const bool found = contains(pairs, pair);
-      answers.differences.push_back({k, pair, found, bodies.meshes(pair.first, pair.second) && (equal || !found)});
+      answers.differences.push_back({k, pair, found, isFault(bodies.meshes(pair.first, pair.second), found, equal)});
     }
     answers.pairs.push_back(std::move(pairs));
     if (questions.clearance) answers.clearance.push_back(ours->clearance(k));

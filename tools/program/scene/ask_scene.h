@@ -28,6 +28,10 @@ struct SceneDifference {
   bool fault;  ///< Else it is explained: by the answer, or by FCL's solver for a shape.
 };
 
+/// Is it bocst's fault that only one of the two finds a pair? `meshes`: of two meshes; `bocst`: bocst finds it;
+/// `equal`: verdicts must be FCL's, otherwise bocst may find more.
+inline bool isFault(bool meshes, bool bocst, bool equal) { return meshes && (equal || !bocst); }
+
 struct SceneAnswers {
   std::vector<std::uint8_t> hit;             ///< Of each state.
   std::vector<std::vector<BodyPair>> pairs;  ///< All that collide, of each state.
