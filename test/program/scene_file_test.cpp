@@ -425,6 +425,29 @@ TEST_F(SceneFile, ReadsObjectsOfAllKinds) {
   EXPECT_EQ(bodies.pairCount(), 2u * 2u);  // with both meshes
 }
 
+TEST_F(SceneFile, AnAttachedObjectMovesWithItsLink) {
+  robot(link("base", kSphere) + link("hand", kSphere) +
+        joint("q", "continuous", "base", "hand", "<origin xyz='1 0 0'/><axis xyz='0 0 1'/>"));
+  const auto with = [&](const std::string& object) {
+    return scene(R"({"robot": {"urdf": "robot.urdf", "pose": [0, 0, 3]}, "objects": [{"name": "wall", "sphere": 1}, )" +
+                 object + R"(], "states": [{"q": 0.7}]})");
+  };
+  const SceneSetup s = with(R"({"name": "tool", "sphere": 0.1, "attached": "hand", "pose": [0.5, 0, 0]})");
+  EXPECT_TRUE(s.moves(3));
+  EXPECT_TRUE(s.names().objects.empty());
+  EXPECT_EQ(s.allowed.count({1, 3}), 1u);
+  EXPECT_EQ(s.allowed.count({0, 3}), 0u);
+  expectNear(s.partPoses(s.states[0])[3], pose(rpy(0, 0, 0.7), {1 + 0.5 * std::cos(0.7), 0.5 * std::sin(0.7), 3}),
+             "tool");
+  const Bodies bodies(s);
+  EXPECT_EQ(bodies.moving, 3u);
+  EXPECT_EQ(bodies.pairCount(), 4u);  // tool and base, and all three with the wall
+  expectComplaint([&] { with(R"({"name": "tool", "sphere": 0.1, "attached": "hant"})"); },
+                  {"objects[1].attached: the robot has no link hant. Did you mean hand?"});
+  expectComplaint([&] { with(R"({"name": "tool", "sphere": 0.1, "attached": "hand", "moving": true})"); },
+                  {"objects[1]", "not both"});
+}
+
 TEST_F(SceneFile, SaysWhereASceneIsWrong) {
   const std::string ball = R"({"name": "ball", "sphere": 1, "moving": true, "pose": [0, 0, 0]})";
   const auto complains = [&](const std::string& json, const std::string& what) {

@@ -234,10 +234,13 @@ struct SceneCommand {
   }
 
   static std::string objectsText(const SceneSetup& setup) {
-    const auto moving =
-        std::count_if(setup.objects.begin(), setup.objects.end(), [](const SceneObject& o) { return o.moving; });
-    return std::to_string(setup.objects.size() - static_cast<std::size_t>(moving)) + " fixed, " +
-           std::to_string(moving) + " moving";
+    std::size_t moving = 0, attached = 0;
+    for (const SceneObject& object : setup.objects) {
+      moving += object.moving;
+      attached += object.link.has_value();
+    }
+    return std::to_string(setup.objects.size() - moving - attached) + " fixed, " + std::to_string(moving) + " moving" +
+           (attached > 0 ? ", " + std::to_string(attached) + " attached" : "");
   }
 
   static std::string shapesText(const Bodies& bodies) {
@@ -343,14 +346,12 @@ void addScene(CLI::App& program, Job& job) {
   auto scene = std::make_shared<SceneCommand>();
   CLI::App* command = program.add_subcommand("scene", "check states of a robot or of other objects among obstacles");
   command->footer(
-      "FILE is a scene file (JSON: objects, a robot, pairs that may touch, states; `share/doc/scene.md` describes it) "
-      "or "
-      "a\n"
-      "URDF. States are lines of a table (CSV) whose first line names the columns: the joints that move and mimic no "
-      "other,\n"
-      "and of moving objects NAME.x, .y, .z with .qw, .qx, .qy, .qz or .roll, .pitch, .yaw. Without states, joints are "
-      "at 0.\n"
-      "All links of a robot are checked with each other and with all objects, but for pairs that may touch.");
+      "FILE is a scene file (JSON: objects, a robot, pairs that may touch, states; share/doc/scene.md describes it) "
+      "or\n"
+      "a URDF. States are lines of a table (CSV) whose first line names the columns: the joints that move and mimic "
+      "no\n"
+      "other, and of moving objects NAME.x, .y, .z with .qw, .qx, .qy, .qz or .roll, .pitch, .yaw. Without states,\n"
+      "joints are at 0. All links are checked with each other and with all objects, but for pairs that may touch.");
   command->add_option("file", scene->scene.file, "scene file (JSON) or robot (URDF)")->type_name("FILE")->required();
   command->add_option("--states", scene->scene.states, "the states to check, one a line (CSV)")->type_name("FILE");
   command->add_option("--srdf", scene->scene.srdf, "pairs of links that may touch (SRDF's disable_collisions)")

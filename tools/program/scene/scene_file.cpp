@@ -108,13 +108,18 @@ class Reader {
 
   void readObject(const JsonElement& element) {
     std::vector<std::string> keys = kShapes;
-    keys.insert(keys.end(), {"name", "shapes", "scale", "pose", "moving"});
+    keys.insert(keys.end(), {"name", "shapes", "scale", "pose", "moving", "attached"});
     element.allowKeys(keys);
     SceneObject object;
     object.part.name = element.at("name").text();
     if (object.part.name.empty()) element.complain("the name is empty");
     object.moving = element.has("moving") && element.at("moving").boolean();
     if (element.has("pose")) object.X_WO = element.at("pose").pose();
+    if (element.has("attached")) {
+      if (object.moving) element.complain("an object is moving or attached, not both");
+      object.link = linkOf(element.at("attached"));
+      setup_.allowed.emplace(*object.link, setup_.partCount());
+    }
     if (!object.moving && !object.X_WO) object.X_WO = Eigen::Isometry3d::Identity();
     if (element.has("shapes")) {
       if (!kindsOf(element).empty()) element.complain("either \"shapes\" or one shape is expected");
@@ -130,6 +135,14 @@ class Reader {
       object.part.shapes.push_back({readShape(element), Eigen::Isometry3d::Identity()});
     }
     setup_.objects.push_back(std::move(object));
+  }
+
+  std::size_t linkOf(const JsonElement& name) const {
+    std::vector<std::string> links;
+    for (std::size_t i = 0; i < setup_.linkCount(); ++i) links.push_back(setup_.part(i).name);
+    const auto found = std::find(links.begin(), links.end(), name.text());
+    if (found != links.end()) return static_cast<std::size_t>(found - links.begin());
+    name.complain("the robot has no link " + name.text() + "." + suggestion(name.text(), links));
   }
 
   static std::vector<std::string> kindsOf(const JsonElement& element) {

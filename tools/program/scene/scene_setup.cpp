@@ -30,7 +30,11 @@ std::vector<Eigen::Isometry3d> SceneSetup::partPoses(const State& state) const {
     for (const Eigen::Isometry3d& X_RL : robot->linkPoses(state.joints)) X_WP.push_back(X_WR * X_RL);
   }
   std::size_t moving = 0;
-  for (const SceneObject& object : objects) X_WP.push_back(object.moving ? state.objects[moving++] : *object.X_WO);
+  for (const SceneObject& object : objects) {
+    X_WP.push_back(object.moving ? state.objects[moving++]
+                   : object.link ? X_WP[*object.link] * *object.X_WO
+                                 : *object.X_WO);
+  }
   return X_WP;
 }
 

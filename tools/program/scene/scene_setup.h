@@ -18,8 +18,10 @@ namespace bocst::program {
 /// What is no robot.
 struct SceneObject {
   Part part;
-  bool moving = false;
-  std::optional<Eigen::Isometry3d> X_WO;  ///< Of a moving object: where it is if a state does not say.
+  bool moving = false;              ///< States say where it is.
+  std::optional<std::size_t> link;  ///< That it is attached to.
+  std::optional<Eigen::Isometry3d>
+      X_WO;  ///< Moving: where it is if a state does not say. Attached: in the link's frame.
 };
 
 /// A joint's value outside of its limits.
@@ -43,7 +45,9 @@ struct SceneSetup {
   std::size_t linkCount() const { return robot ? robot->links().size() : 0; }
   std::size_t partCount() const { return linkCount() + objects.size(); }
   const Part& part(std::size_t i) const { return i < linkCount() ? robot->links()[i] : objects[i - linkCount()].part; }
-  bool moves(std::size_t part) const { return part < linkCount() || objects[part - linkCount()].moving; }
+  bool moves(std::size_t part) const {
+    return part < linkCount() || objects[part - linkCount()].moving || objects[part - linkCount()].link;
+  }
 
   StateNames names() const;
   std::vector<Eigen::Isometry3d> partPoses(const State& state) const;  ///< X_WP.
