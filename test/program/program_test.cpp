@@ -615,6 +615,7 @@ TEST_F(SceneProgram, ChecksARobotAmongObstacles) {
   EXPECT_EQ(report.at("joints"), Json({"shoulder_pan", "shoulder_lift", "elbow", "finger_left_joint"}));
   EXPECT_EQ(report.at("asked"), 10);
   EXPECT_EQ(report.at("collisions"), 4);
+  EXPECT_EQ(report.at("outside_limits"), 1);
   EXPECT_EQ(report.at("agree"), true);
   EXPECT_EQ(report.at("differences"), Json::array());
   for (const char* key : {"set_up", "first", "again"}) {

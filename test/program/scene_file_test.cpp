@@ -19,6 +19,7 @@
 #include "robot/packages.h"
 #include "robot/urdf.h"
 #include "scene/ask_scene.h"
+#include "scene/scene_page.h"
 #include "scene/shape_mesh.h"
 
 namespace bocst {
@@ -569,6 +570,20 @@ TEST_F(Slides, LimitsAreReportedAndNotApplied) {
   EXPECT_NEAR(above[1].value, 2.05, 1e-15);
   EXPECT_EQ(s.outsideLimits(s.states[2]).size(), 1u);
   EXPECT_NEAR(s.partPoses(s.states[1])[1].translation().x(), 3.5, 1e-15);
+}
+
+TEST_F(Slides, APageHasTheFirstStatesAndSaysHowManyThereAre) {
+  const std::size_t count = Page::kMaxStates + 7;
+  std::string states;
+  for (std::size_t k = 0; k < count; ++k) states += (k == 0 ? "[" : ",") + std::string("{\"x\": 0.001}");
+  const SceneSetup s = setup(states + "]");
+  const Bodies bodies(s);
+  const std::string html = scenePage("<b>.json", s, bodies, askScene(s, bodies, {})).html();
+  std::size_t shown = 0;
+  for (std::size_t at = 0; (at = html.find("\"poses\":", at)) != std::string::npos; ++at) ++shown;
+  EXPECT_EQ(shown, Page::kMaxStates);
+  EXPECT_NE(html.find("\"total\":" + std::to_string(count)), std::string::npos);
+  EXPECT_EQ(html.find("<b>.json"), std::string::npos);
 }
 
 /// Meshes and shapes at random places: pairs of meshes are FCL's, those of shapes differ at most where it is explained.

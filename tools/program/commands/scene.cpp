@@ -49,6 +49,12 @@ class SceneReport {
     return static_cast<std::size_t>(std::count(answers_.hit.begin(), answers_.hit.end(), 1));
   }
 
+  std::size_t statesOutsideLimits() const {
+    return static_cast<std::size_t>(
+        std::count_if(setup_.states.begin(), setup_.states.end(),
+                      [this](const State& state) { return !setup_.outsideLimits(state).empty(); }));
+  }
+
   Names namesOf(const BodyPair& pair) const { return {nameOf(pair.first), nameOf(pair.second)}; }
 
   /// The pairs of parts that collide, each once.
@@ -266,6 +272,10 @@ struct SceneCommand {
     report.printStates();
     std::cout << report.collisions() << " of " << counted(report.states(), "state")
               << (model.exact() ? " collide.\n" : " may collide.\n");
+    if (report.statesOutsideLimits() > 0) {
+      std::cout << "In " << report.statesOutsideLimits() << " of " << report.states()
+                << " a joint is outside of its limits.\n";
+    }
     const std::string differences = report.explainedDifferences(model);
     if (!differences.empty()) std::cout << differences << ".\n";
     std::cout << '\n';
@@ -318,7 +328,8 @@ struct SceneCommand {
                    {"options", options},
                    {"oracle", answers.oracle},
                    {"asked", report.states()},
-                   {"collisions", report.collisions()}};
+                   {"collisions", report.collisions()},
+                   {"outside_limits", report.statesOutsideLimits()}};
     result["bytes"] = {{"bocst", answers.bytes}};
     result["times_us"] = {{"bocst", timesJson(answers.bocst)}};
     if (answers.fcl) {

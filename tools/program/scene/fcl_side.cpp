@@ -11,6 +11,7 @@
 #include <limits>
 #include <stdexcept>
 
+#include "cli/report.h"
 #include "scene/scene_side.h"
 #include "scene/solids.h"
 
@@ -116,8 +117,10 @@ class Side final : public SceneSide {
 
   std::vector<std::uint8_t> collisions() override {
     std::vector<std::uint8_t> hit(poses_.states());
+    Progress progress("FCL: state", hit.size());
     for (std::size_t k = 0; k < hit.size(); ++k) {
       hit[k] = !managers_.collisions(poses_.state(k), 1).empty();
+      progress.step();
     }
     return hit;
   }
