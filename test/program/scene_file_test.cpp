@@ -164,6 +164,33 @@ TEST_F(SceneFile, EachKindOfJointMovesAsUrdfSays) {
   expectNear(X[4], X4, "l4");
 }
 
+/// A seven-joint arm by the Denavit-Hartenberg parameters of Franka's documentation, and where it says that the flange
+/// is.
+TEST_F(SceneFile, AKnownArmIsWhereItsMakerSays) {
+  const char* origins[] = {"xyz='0 0 0.333'",
+                           "rpy='-1.5707963267948966 0 0'",
+                           "xyz='0 -0.316 0' rpy='1.5707963267948966 0 0'",
+                           "xyz='0.0825 0 0' rpy='1.5707963267948966 0 0'",
+                           "xyz='-0.0825 0.384 0' rpy='-1.5707963267948966 0 0'",
+                           "rpy='1.5707963267948966 0 0'",
+                           "xyz='0.088 0 0' rpy='1.5707963267948966 0 0'"};
+  std::string text = link("l0");
+  for (int i = 1; i <= 7; ++i) {
+    const std::string n = std::to_string(i);
+    text += link("l" + n) + joint("j" + n, "continuous", "l" + std::to_string(i - 1), "l" + n,
+                                  std::string("<origin ") + origins[i - 1] + "/><axis xyz='0 0 1'/>");
+  }
+  // As xacro writes fixed joints, with an axis that means nothing.
+  text += link("flange") + joint("j8", "fixed", "l7", "flange", "<origin xyz='0 0 0.107'/><axis xyz='0 0 0'/>");
+  const Robot arm = read(robot(text));
+  Matrix3d down;
+  down << 1, 0, 0, 0, -1, 0, 0, 0, -1;
+  expectNear(arm.linkPoses({0, 0, 0, 0, 0, 0, 0}).back(), pose(down, {0.088, 0, 0.926}), "upright", 1e-12);
+  const double quarter = M_PI / 4;
+  const Isometry3d ready = arm.linkPoses({0, -quarter, 0, -3 * quarter, 0, 2 * quarter, quarter}).back();
+  EXPECT_LT((ready.translation() - Vector3d(0.3069, 0, 0.5903)).norm(), 1e-4) << ready.translation().transpose();
+}
+
 TEST_F(SceneFile, MimicJointsFollowAlsoByWayOfOthers) {
   const std::string axis = "<axis xyz='0 0 1'/>";
   const Robot r = read(robot(
