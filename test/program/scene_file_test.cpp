@@ -496,6 +496,8 @@ TEST_F(SceneFile, SaysWhereASceneIsWrong) {
   complains(objects(R"({"name": "a", "box": [1, 2, "3"]})"), "objects[0].box[2]: a number expected");
   complains(objects(R"({"name": "a", "mesh": "none.stl"})"), "objects[0].mesh: ");
   complains(objects(R"({"name": "a", "mesh": "none.stl"})"), "no such file");
+  complains(objects(R"({"name": "a", "mesh": "tetra.off", "scale": 1e100})"), "objects[0].mesh: ");
+  complains(objects(R"({"name": "a", "mesh": "tetra.off", "scale": [1, 0, 1]})"), "objects[0].mesh: a scale is");
   complains(objects(R"({"name": "a", "sphere": 1, "scale": 2})"), "\"scale\" is for meshes");
   complains(objects(R"({"name": "a", "sphere": 1, "pose": [1, 2, 3, 4]})"),
             "objects[0].pose: a list of 7 numbers expected");

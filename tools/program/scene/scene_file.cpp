@@ -193,7 +193,7 @@ class Reader {
     }
     try {
       return meshes_.get(packages_.resolve(file.text(), fs::path(arguments_.file).parent_path().string()), scale);
-    } catch (const std::runtime_error& e) {
+    } catch (const std::exception& e) {
       file.complain(e.what());
     }
   }
