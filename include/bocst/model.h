@@ -25,6 +25,9 @@ namespace bocst {
 namespace tree {
 class Tree;
 }
+namespace fcl_adapter {
+struct ModelTree;
+}
 
 /// A Branch On-collide Sphere-tree as an FCL geometry: one sphere at first, grown by the queries that touch it
 /// (Rodríguez and Franquesa, section 3).
@@ -151,13 +154,9 @@ class BOCST_EXPORT Model : public fcl::CollisionGeometry<S> {
   fcl::OBJECT_TYPE getObjectType() const override;  ///< OT_UNKNOWN: FCL never swaps the arguments.
   fcl::NODE_TYPE getNodeType() const override;      ///< GEOM_TRIANGLE: a slot FCL leaves empty.
 
-  /// For the library itself.
-  tree::Tree& tree() const {
-    if (tree_ == nullptr) throwEmpty();
-    return *tree_;
-  }
-
  private:
+  friend struct fcl_adapter::ModelTree;
+
   template <typename BV>
   static std::shared_ptr<const Mesh> meshOf(const fcl::BVHModel<BV>& bvh) {
     static_assert(std::is_same<typename BV::S, S>::value, "the scalar of the BVHModel must be the model's");
@@ -166,8 +165,6 @@ class BOCST_EXPORT Model : public fcl::CollisionGeometry<S> {
     std::vector<fcl::Triangle> triangles(bvh.tri_indices, bvh.tri_indices + (bvh.num_tris > 0 ? bvh.num_tris : 0));
     return std::make_shared<const Mesh>(std::move(vertices), triangles);
   }
-
-  [[noreturn]] void throwEmpty() const;
 
   struct Staged;  // What comes by FCL's names before the mesh is made of it.
   Options options_;

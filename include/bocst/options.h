@@ -54,7 +54,7 @@ struct Options {
   /// Only kBono's cells depend on it (4.4): its root cube has the smallest power of two that is >= d_t as its side.
   double dimension = 0;
 
-  OracleKind oracle = OracleKind::kAuto;  ///< kAuto: BOCST_ORACLE if set, else the fastest that there is.
+  OracleKind oracle = OracleKind::kAuto;  ///< Who tests octants.
 
   /// The paper's Max. time (3.1): a deepest level unused for longer is dropped; 0: never.
   std::chrono::milliseconds ttl{2000};

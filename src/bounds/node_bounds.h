@@ -43,8 +43,8 @@ inline std::uint8_t roundedUp(double steps) {
   return static_cast<std::uint8_t>(whole + int{whole < within});
 }
 
-/// A direction as bytes; false where it has none. The arguments are floats, or as large: their squares are sums in
-/// double without underflow.
+/// A direction as bytes; false where it has none. The arguments are within the range of float, so their squares do not
+/// underflow in double.
 inline bool encodeNormal(double x, double y, double z, std::int8_t* bytes) {
   const double length = std::sqrt(x * x + y * y + z * z);
   if (!(length > 0) || !std::isfinite(length)) return false;
@@ -75,8 +75,8 @@ struct NodeBounds {
   }
 
   /// The slab along `n` that holds an interval: how far points reach along n / kNormalLength from where the frame's
-  /// slabs count from, in its slab units. Nothing is set where bytes cannot say it. What the sums here round is below
-  /// 2^-44 units.
+  /// slabs count from, in its slab units. False, and nothing is set, where bytes cannot hold it. The sums here are
+  /// rounded by less than 2^-44 units.
   bool setSlab(const std::int8_t* n, double least, double most) {
     const double center = std::round((least + most) / 2);
     const double half = std::ceil(2 * std::max(most - center, center - least));

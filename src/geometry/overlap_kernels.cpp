@@ -18,91 +18,104 @@ namespace bocst::query::HWY_NAMESPACE {
 
 namespace codec = bounds::HWY_NAMESPACE;
 
+// A vector of octants' boxes: middles, half extents, and the displacements from the middles to the volume's center.
+struct Boxes {
+  V middle[3], half[3], delta[3];
+};
+
+// Apart along an axis of the octants or of the volume's box?
+HWY_INLINE M apartByFaces(const Boxes& boxes, const OneVolume& b) {
+  const D d;
+  const V rounding_margin = hn::Set(d, b.rounding_margin);
+  M apart = hn::MaskFromVec(hn::Zero(d));
+  BOCST_UNROLL
+  for (int k = 0; k < 3; ++k) {
+    V r = hn::Add(boxes.half[k], rounding_margin);
+    BOCST_UNROLL
+    for (int j = 0; j < 3; ++j) r = hn::MulAdd(hn::Abs(hn::Set(d, b.axes[j][k])), hn::Set(d, b.half[j]), r);
+    apart = hn::Or(apart, hn::Gt(hn::Abs(boxes.delta[k]), r));
+  }
+  BOCST_UNROLL
+  for (int j = 0; j < 3; ++j) {
+    V t = hn::Zero(d), r = hn::Add(hn::Set(d, b.half[j]), rounding_margin);
+    BOCST_UNROLL
+    for (int k = 0; k < 3; ++k) {
+      const V a = hn::Set(d, b.axes[j][k]);
+      t = hn::MulAdd(a, boxes.delta[k], t);
+      r = hn::MulAdd(hn::Abs(a), boxes.half[k], r);
+    }
+    apart = hn::Or(apart, hn::Gt(hn::Abs(t), r));
+  }
+  return apart;
+}
+
+// A vector of octants' slabs: z is within `half` of `center` along the normal n, counted from the point `from`. For z
+// in a box with |m.z - offset| <= w, any a gives n.z in a * offset +- (|a| w + |n - a m| over the box); `along` is n.m
+// with the volume's normal m, which is the best a.
+struct Slabs {
+  V normal[3], along, center, half, from[3];
+};
+
+HWY_INLINE M apartAlongOctantNormal(const Slabs& slabs, const OneVolume& b) {
+  const D d;
+  const V bw = hn::Set(d, b.slab_half), rounding_margin = hn::Set(d, b.rounding_margin);
+  V t = hn::MulSub(slabs.along, hn::Set(d, b.slab_offset), slabs.center);
+  V r = hn::MulAdd(hn::Abs(slabs.along), bw, hn::Add(slabs.half, rounding_margin)), rest[3];
+  BOCST_UNROLL
+  for (int k = 0; k < 3; ++k) {
+    t = hn::MulAdd(slabs.normal[k], hn::Sub(hn::Set(d, b.center[k]), slabs.from[k]), t);
+    rest[k] = hn::NegMulAdd(slabs.along, hn::Set(d, b.normal[k]), slabs.normal[k]);
+  }
+  BOCST_UNROLL
+  for (int j = 0; j < 3; ++j) {
+    V p = hn::Mul(rest[0], hn::Set(d, b.axes[j][0]));
+    p = hn::MulAdd(rest[1], hn::Set(d, b.axes[j][1]), p);
+    p = hn::MulAdd(rest[2], hn::Set(d, b.axes[j][2]), p);
+    r = hn::MulAdd(hn::Abs(p), hn::Set(d, b.half[j]), r);
+  }
+  return hn::Gt(hn::Abs(t), r);
+}
+
+// `own`: the centers of the octants' slabs, counted from the middles of their boxes.
+HWY_INLINE M apartAlongVolumeNormal(const Boxes& boxes, const Slabs& slabs, V own, const OneVolume& b) {
+  const D d;
+  const V bw = hn::Set(d, b.slab_half), rounding_margin = hn::Set(d, b.rounding_margin);
+  V r = hn::MulAdd(hn::Abs(slabs.along), slabs.half, hn::Add(bw, rounding_margin)), t = hn::Set(d, b.slab_offset);
+  BOCST_UNROLL
+  for (int k = 0; k < 3; ++k) {
+    const V m = hn::Set(d, b.normal[k]);
+    t = hn::MulAdd(m, boxes.delta[k], t);
+    r = hn::MulAdd(hn::Abs(hn::NegMulAdd(slabs.along, slabs.normal[k], m)), boxes.half[k], r);
+  }
+  return hn::Gt(hn::Abs(hn::NegMulAdd(slabs.along, own, t)), r);
+}
+
 // kLoose: the boxes lie in one frame, slabs count from the middle of the box; else each lies in an octant of its own,
 // of side 1, and slabs count from the middle of that.
 template <bool kLoose>
 HWY_INLINE std::uint8_t overlapping(const bounds::OctantBounds& octants, const float (&half_step)[3], float slab_unit,
                                     const OneVolume& b) {
   const D d;
-  const V rounding_margin = hn::Set(d, b.rounding_margin), half = hn::Set(d, 0.5f);
   std::uint8_t result = 0;
   for (std::size_t i = 0; i < 8; i += hn::Lanes(d)) {
-    // The octant's box: middle and half extents; delta is the displacement to the volume's center.
-    V middle[3], h[3], delta[3];
+    Boxes boxes;
+    Slabs slabs;
+    slabs.along = hn::Zero(d);
+    codec::decodeSlab(octants, i, slab_unit, slabs.center, slabs.half);
+    V own = slabs.center;
     BOCST_UNROLL
     for (int k = 0; k < 3; ++k) {
       const V corner = kLoose ? hn::Zero(d) : hn::Load(d, kOctantCorner[k] + i);
-      codec::decodeBox(octants, k, i, corner, hn::Set(d, half_step[k]), middle[k], h[k]);
-      delta[k] = hn::Sub(hn::Set(d, b.center[k]), middle[k]);
+      codec::decodeBox(octants, k, i, corner, hn::Set(d, half_step[k]), boxes.middle[k], boxes.half[k]);
+      boxes.delta[k] = hn::Sub(hn::Set(d, b.center[k]), boxes.middle[k]);
+      slabs.normal[k] = codec::decodeNormal(octants, k, i);
+      slabs.along = hn::MulAdd(slabs.normal[k], hn::Set(d, b.normal[k]), slabs.along);
+      slabs.from[k] = kLoose ? boxes.middle[k] : hn::Add(corner, hn::Set(d, 0.5f));
+      if (!kLoose) own = hn::NegMulAdd(slabs.normal[k], hn::Sub(boxes.middle[k], slabs.from[k]), own);
     }
-    M apart = hn::MaskFromVec(hn::Zero(d));
-    BOCST_UNROLL
-    for (int k = 0; k < 3; ++k) {
-      V r = hn::Add(h[k], rounding_margin);
-      BOCST_UNROLL
-      for (int j = 0; j < 3; ++j) {
-        r = hn::MulAdd(hn::Abs(hn::Set(d, b.axes[j][k])), hn::Set(d, b.half[j]), r);
-      }
-      apart = hn::Or(apart, hn::Gt(hn::Abs(delta[k]), r));
-    }
-    BOCST_UNROLL
-    for (int j = 0; j < 3; ++j) {
-      V t = hn::Zero(d), r = hn::Add(hn::Set(d, b.half[j]), rounding_margin);
-      BOCST_UNROLL
-      for (int k = 0; k < 3; ++k) {
-        const V a = hn::Set(d, b.axes[j][k]);
-        t = hn::MulAdd(a, delta[k], t);
-        r = hn::MulAdd(hn::Abs(a), h[k], r);
-      }
-      apart = hn::Or(apart, hn::Gt(hn::Abs(t), r));
-    }
-
-    // Slabs: for z in a box with |m.z - offset| <= w, any a gives n.z in a * offset +- (|a| w + |n - a m| over the
-    // box).
-    V n[3], along = hn::Zero(d);
-    BOCST_UNROLL
-    for (int k = 0; k < 3; ++k) {
-      n[k] = codec::decodeNormal(octants, k, i);
-      along = hn::MulAdd(n[k], hn::Set(d, b.normal[k]), along);
-    }
-    V center, w;
-    codec::decodeSlab(octants, i, slab_unit, center, w);
-    V slab_from[3];  // where slabs count from
-    BOCST_UNROLL
-    for (int k = 0; k < 3; ++k) slab_from[k] = kLoose ? middle[k] : hn::Add(hn::Load(d, kOctantCorner[k] + i), half);
-    const V abs_along = hn::Abs(along), bw = hn::Set(d, b.slab_half), boffset = hn::Set(d, b.slab_offset);
-    {
-      // Along the octant's normal.
-      V t = hn::MulSub(along, boffset, center), r = hn::MulAdd(abs_along, bw, hn::Add(w, rounding_margin));
-      BOCST_UNROLL
-      for (int k = 0; k < 3; ++k) {
-        t = hn::MulAdd(n[k], hn::Sub(hn::Set(d, b.center[k]), slab_from[k]), t);
-      }
-      V rest[3];
-      BOCST_UNROLL
-      for (int k = 0; k < 3; ++k) rest[k] = hn::NegMulAdd(along, hn::Set(d, b.normal[k]), n[k]);
-      BOCST_UNROLL
-      for (int j = 0; j < 3; ++j) {
-        V p = hn::Mul(rest[0], hn::Set(d, b.axes[j][0]));
-        p = hn::MulAdd(rest[1], hn::Set(d, b.axes[j][1]), p);
-        p = hn::MulAdd(rest[2], hn::Set(d, b.axes[j][2]), p);
-        r = hn::MulAdd(hn::Abs(p), hn::Set(d, b.half[j]), r);
-      }
-      apart = hn::Or(apart, hn::Gt(hn::Abs(t), r));
-    }
-    {
-      // Along the volume's normal; the octant's slab counted from its box's middle.
-      V own = center, r = hn::MulAdd(abs_along, w, hn::Add(bw, rounding_margin)), t = boffset;
-      BOCST_UNROLL
-      for (int k = 0; k < 3; ++k) {
-        const V m = hn::Set(d, b.normal[k]);
-        if (!kLoose) own = hn::NegMulAdd(n[k], hn::Sub(middle[k], slab_from[k]), own);
-        t = hn::MulAdd(m, delta[k], t);
-        r = hn::MulAdd(hn::Abs(hn::NegMulAdd(along, n[k], m)), h[k], r);
-      }
-      t = hn::NegMulAdd(along, own, t);
-      apart = hn::Or(apart, hn::Gt(hn::Abs(t), r));
-    }
+    M apart = apartByFaces(boxes, b);
+    apart = hn::Or(apart, apartAlongOctantNormal(slabs, b));
+    apart = hn::Or(apart, apartAlongVolumeNormal(boxes, slabs, own, b));
     result = static_cast<std::uint8_t>(result | maskBits(hn::Not(apart)) << i);
   }
   return result;
@@ -319,6 +332,89 @@ HWY_INLINE void pickRows(const TrianglePack& rows, std::uint32_t which, const Pa
   }
 }
 
+// Which of the lanes' boxes meet that of each picked row from j on: eight bits a row. One pair in three or four does.
+HWY_INLINE std::uint64_t meetingBoxes(const Vec3& low, const Vec3& high, std::uint32_t filled, const PickedRows& picked,
+                                      std::size_t j) {
+  const D d;
+  std::uint64_t meeting = 0;
+  const std::size_t end = std::min(hn::Lanes(d), picked.count - j);
+  for (std::size_t r = 0; r < end; ++r) {
+    M near =
+        hn::And(hn::Le(low.x, hn::Set(d, picked.high[0][j + r])), hn::Ge(high.x, hn::Set(d, picked.low[0][j + r])));
+    near = hn::And(near, hn::And(hn::Le(low.y, hn::Set(d, picked.high[1][j + r])),
+                                 hn::Ge(high.y, hn::Set(d, picked.low[1][j + r]))));
+    near = hn::And(near, hn::And(hn::Le(low.z, hn::Set(d, picked.high[2][j + r])),
+                                 hn::Ge(high.z, hn::Set(d, picked.low[2][j + r]))));
+    meeting |= std::uint64_t{maskBits(near) & filled} << 8 * r;
+  }
+  return meeting;
+}
+
+// A vector of triangles: their edges, normals, longest edges, and how far a determinant with the normal may be off.
+struct Plane {
+  Vec3 edge[3], normal;
+  V longest, rounding_margin;
+};
+
+HWY_INLINE Plane planeOf(const Vec3 (&t)[3], V extent, V tiny) {
+  Plane p;
+  p.edge[0] = sub(t[1], t[0]), p.edge[1] = sub(t[2], t[1]), p.edge[2] = sub(t[0], t[2]);
+  p.normal = cross(p.edge[0], p.edge[1]);
+  p.longest = hn::Sqrt(max3(dot(p.edge[0], p.edge[0]), dot(p.edge[1], p.edge[1]), dot(p.edge[2], p.edge[2])));
+  // The products of a normal are at most the product of the edges' sizes.
+  p.rounding_margin = hn::MulAdd(extent, hn::MulAdd(norm1(p.edge[0]), norm1(p.edge[1]), norm1(p.normal)), tiny);
+  return p;
+}
+
+// How far triangles reach to the nearer side of a plane, from their corners' heights above it.
+HWY_INLINE V reachAcross(V h0, V h1, V h2) { return hn::Min(max3(h0, h1, h2), hn::Neg(min3(h0, h1, h2))); }
+
+// Bit k: may triangles p and q of lane k meet, and do they surely?
+struct PairBits {
+  std::uint32_t possible, certain;
+};
+
+HWY_INLINE PairBits testPairs(const Vec3 (&p)[3], const Vec3 (&q)[3], V extent, float moved, M pairs) {
+  const D d;
+  const float u = 0x1p-24f;
+  const V tiny = hn::Set(d, 1e-30f);  // products below have lost bits
+  const Plane of_p = planeOf(p, extent, tiny), of_q = planeOf(q, extent, tiny);
+  const Vec3 &n = of_p.normal, &m = of_q.normal;
+  const Vec3 w[3] = {sub(q[0], p[0]), sub(q[1], p[0]), sub(q[2], p[0])};
+  const V n0 = dot(n, w[0]), n1 = dot(n, w[1]), n2 = dot(n, w[2]);
+  const V m0 = dot(m, sub(p[0], q[0])), m1 = dot(m, sub(p[1], q[0])), m2 = dot(m, sub(p[2], q[0]));
+  const V by_n = reachAcross(n0, n1, n2), by_m = reachAcross(m0, m1, m2);
+  const M near =
+      hn::And(pairs, hn::And(hn::Ge(by_n, hn::Neg(of_p.rounding_margin)), hn::Ge(by_m, hn::Neg(of_q.rounding_margin))));
+  if (hn::AllFalse(d, near)) return {0, 0};
+
+  // How far the determinants below may be off: those with a plane's normal, and those of an edge of each.
+  const V span = hn::Add(of_p.longest, hn::Sqrt(max3(dot(w[0], w[0]), dot(w[1], w[1]), dot(w[2], w[2]))));
+  const V span4 = hn::Mul(hn::Set(d, 4.0f), span), moves = hn::Set(d, 1.125f * moved), rounds = hn::Set(d, 42 * u);
+  const auto offNormal = [&](V longest) HWY_ATTR {
+    return hn::MulAdd(hn::Mul(longest, hn::MulAdd(rounds, longest, moves)), hn::Add(span4, longest), tiny);
+  };
+  const V longer = hn::Max(of_p.longest, of_q.longest), shorter = hn::Min(of_p.longest, of_q.longest);
+  const V edges_off =
+      hn::MulAdd(hn::Mul(longer, hn::MulAdd(rounds, shorter, moves)), hn::Add(hn::Add(span, span), shorter), tiny);
+  M clear = hn::Gt(min3(hn::Abs(n0), hn::Abs(n1), hn::Abs(n2)), offNormal(of_p.longest));
+  clear = hn::And(clear, hn::Gt(min3(hn::Abs(m0), hn::Abs(m1), hn::Abs(m2)), offNormal(of_q.longest)));
+  clear = hn::And(clear, hn::Gt(shorter, hn::Set(d, 64 * moved)));
+
+  // Each cuts the other's plane with the edges from its corner that is alone on its side, in an interval of the line of
+  // both planes. The determinant of two such edges says where an end of the one lies to an end of the other; the
+  // intervals share no point when all ends of the one lie to one side of all of the other.
+  const Fork fp = forkOf(p, m0, m1, m2), fq = forkOf(q, n0, n1, n2);
+  const Vec3 between = sub(fq.corner, fp.corner), c0 = cross(between, fp.edge[0]), c1 = cross(between, fp.edge[1]);
+  const V d00 = dot(c0, fq.edge[0]), d01 = dot(c0, fq.edge[1]), d10 = dot(c1, fq.edge[0]), d11 = dot(c1, fq.edge[1]);
+  const V low = hn::Min(hn::Min(d00, d01), hn::Min(d10, d11)), high = hn::Max(hn::Max(d00, d01), hn::Max(d10, d11));
+  const M beside = hn::Or(hn::Gt(low, edges_off), hn::Lt(high, hn::Neg(edges_off)));
+  const M across = hn::And(hn::Lt(low, hn::Neg(edges_off)), hn::Gt(high, edges_off));
+  const M cut = hn::Gt(hn::Min(by_n, by_m), hn::Zero(d));
+  return {maskBits(hn::AndNot(hn::And(clear, hn::Or(hn::Not(cut), beside)), near)),
+          maskBits(hn::And(clear, hn::And(cut, across)))};
+}
+
 std::size_t TouchingPairs(const TrianglePack& rows, std::uint32_t which, const TrianglePack& lanes,
                           const PackRegion& region, float tolerance, PackPair* pairs) {
   const D d;
@@ -327,34 +423,21 @@ std::size_t TouchingPairs(const TrianglePack& rows, std::uint32_t which, const T
   const float size = std::max(rows.size, lanes.size) * 1.0001f, u = 0x1p-24f;
   const float moved = 25 * u * size + tolerance;
   const V extent = hn::Set(d, 64 * u * size + tolerance);
-  const V tiny = hn::Set(d, 1e-30f);  // products below have lost bits
   std::size_t found = 0;
   PickedRows picked;
   pickRows(rows, which, region, extent, picked);
   for (std::size_t i = 0; i < lanes.count; i += hn::Lanes(d)) {
     const std::uint32_t filled = lanes.count - i < hn::Lanes(d) ? (1u << (lanes.count - i)) - 1 : 0xff;
     const Vec3 lane_corner[3] = {corner(lanes, 0, i), corner(lanes, 1, i), corner(lanes, 2, i)};
-    const Vec3 qmin = min3(lane_corner), qmax = max3(lane_corner);
+    const Vec3 low = min3(lane_corner), high = max3(lane_corner);
     for (std::size_t j = 0; j < picked.count; j += hn::Lanes(d)) {
-      // Pairs whose boxes meet, eight bits a row: one of them in three or four, so they are gathered before what costs
-      // more.
-      std::uint64_t meeting = 0;
-      const std::size_t end = std::min(hn::Lanes(d), picked.count - j);
-      for (std::size_t r = 0; r < end; ++r) {
-        M near = hn::And(hn::Le(qmin.x, hn::Set(d, picked.high[0][j + r])),
-                         hn::Ge(qmax.x, hn::Set(d, picked.low[0][j + r])));
-        near = hn::And(near, hn::And(hn::Le(qmin.y, hn::Set(d, picked.high[1][j + r])),
-                                     hn::Ge(qmax.y, hn::Set(d, picked.low[1][j + r]))));
-        near = hn::And(near, hn::And(hn::Le(qmin.z, hn::Set(d, picked.high[2][j + r])),
-                                     hn::Ge(qmax.z, hn::Set(d, picked.low[2][j + r]))));
-        meeting |= std::uint64_t{maskBits(near) & filled} << 8 * r;
-      }
+      // Pairs whose boxes meet are gathered before what costs more.
+      std::uint64_t meeting = meetingBoxes(low, high, filled, picked, j);
       if (meeting == 0) continue;
       alignas(64) std::int32_t which_pair[kMost * 8 + kMost];
       std::size_t count = 0;
       for (; meeting != 0; meeting &= meeting - 1) which_pair[count++] = __builtin_ctzll(meeting);
       hn::StoreU(hn::Zero(di), di, which_pair + count);
-
       for (std::size_t at = 0; at < count; at += hn::Lanes(d)) {
         const auto pair = hn::Load(di, which_pair + at);
         const auto row = hn::IndicesFromVec(d, hn::ShiftRight<3>(pair));
@@ -368,57 +451,12 @@ std::size_t TouchingPairs(const TrianglePack& rows, std::uint32_t which, const T
           q[k] = {hn::TableLookupLanes(lane_corner[k].x, lane), hn::TableLookupLanes(lane_corner[k].y, lane),
                   hn::TableLookupLanes(lane_corner[k].z, lane)};
         }
-        M near = hn::FirstN(d, count - at);
-        const Vec3 f[3] = {sub(q[1], q[0]), sub(q[2], q[1]), sub(q[0], q[2])};
-        const Vec3 m = cross(f[0], f[1]);
-        const V flong = hn::Sqrt(max3(dot(f[0], f[0]), dot(f[1], f[1]), dot(f[2], f[2])));
-        // The products of a normal are at most the product of the edges' sizes.
-        const V m_margin = hn::MulAdd(extent, hn::MulAdd(norm1(f[0]), norm1(f[1]), norm1(m)), tiny);
-        const Vec3 e[3] = {sub(p[1], p[0]), sub(p[2], p[1]), sub(p[0], p[2])};
-        const Vec3 n = cross(e[0], e[1]);
-        const V elong = hn::Sqrt(max3(dot(e[0], e[0]), dot(e[1], e[1]), dot(e[2], e[2])));
-        const V n_margin = hn::MulAdd(extent, hn::MulAdd(norm1(e[0]), norm1(e[1]), norm1(n)), tiny);
-        const Vec3 w[3] = {sub(q[0], p[0]), sub(q[1], p[0]), sub(q[2], p[0])};
-        const V n0 = dot(n, w[0]), n1 = dot(n, w[1]), n2 = dot(n, w[2]);
-        const V m0 = dot(m, sub(p[0], q[0])), m1 = dot(m, sub(p[1], q[0])), m2 = dot(m, sub(p[2], q[0]));
-        // How far the one reaches to the nearer side of the other's plane.
-        const V by_n = hn::Min(max3(n0, n1, n2), hn::Neg(min3(n0, n1, n2)));
-        const V by_m = hn::Min(max3(m0, m1, m2), hn::Neg(min3(m0, m1, m2)));
-        near = hn::And(near, hn::And(hn::Ge(by_n, hn::Neg(n_margin)), hn::Ge(by_m, hn::Neg(m_margin))));
-        if (hn::AllFalse(d, near)) continue;
-
-        // How far the determinants below may be off: those with a plane's normal, and those of an edge of each.
-        const V span = hn::Add(elong, hn::Sqrt(max3(dot(w[0], w[0]), dot(w[1], w[1]), dot(w[2], w[2]))));
-        const V span4 = hn::Mul(hn::Set(d, 4.0f), span), moves = hn::Set(d, 1.125f * moved),
-                rounds = hn::Set(d, 42 * u);
-        const V n_off = hn::MulAdd(hn::Mul(elong, hn::MulAdd(rounds, elong, moves)), hn::Add(span4, elong), tiny);
-        const V m_off = hn::MulAdd(hn::Mul(flong, hn::MulAdd(rounds, flong, moves)), hn::Add(span4, flong), tiny);
-        const V longer = hn::Max(elong, flong), shorter = hn::Min(elong, flong);
-        const V edges_off = hn::MulAdd(hn::Mul(longer, hn::MulAdd(rounds, shorter, moves)),
-                                       hn::Add(hn::Add(span, span), shorter), tiny);
-        M clear = hn::Gt(min3(hn::Abs(n0), hn::Abs(n1), hn::Abs(n2)), n_off);
-        clear = hn::And(clear, hn::Gt(min3(hn::Abs(m0), hn::Abs(m1), hn::Abs(m2)), m_off));
-        clear = hn::And(clear, hn::Gt(shorter, hn::Set(d, 64 * moved)));
-
-        // Each cuts the other's plane with the edges from its corner that is alone on its side, in an interval of the
-        // line of both planes. Where an end of the one lies to an end of the other, the determinant of these edges
-        // says; the intervals share no point when all ends of the one lie to one side of all of the other.
-        const Fork fp = forkOf(p, m0, m1, m2), fq = forkOf(q, n0, n1, n2);
-        const Vec3 between = sub(fq.corner, fp.corner), c0 = cross(between, fp.edge[0]),
-                   c1 = cross(between, fp.edge[1]);
-        const V d00 = dot(c0, fq.edge[0]), d01 = dot(c0, fq.edge[1]), d10 = dot(c1, fq.edge[0]),
-                d11 = dot(c1, fq.edge[1]);
-        const V low = hn::Min(hn::Min(d00, d01), hn::Min(d10, d11)),
-                high = hn::Max(hn::Max(d00, d01), hn::Max(d10, d11));
-        const M beside = hn::Or(hn::Gt(low, edges_off), hn::Lt(high, hn::Neg(edges_off)));
-        const M across = hn::And(hn::Lt(low, hn::Neg(edges_off)), hn::Gt(high, edges_off));
-        const M cut = hn::Gt(hn::Min(by_n, by_m), hn::Zero(d));
-        const std::uint32_t bits = maskBits(hn::AndNot(hn::And(clear, hn::Or(hn::Not(cut), beside)), near));
-        const std::uint32_t certain = maskBits(hn::And(clear, hn::And(cut, across)));
-        for (std::uint32_t k = bits; k != 0; k &= k - 1) {
+        const PairBits bits = testPairs(p, q, extent, moved, hn::FirstN(d, count - at));
+        for (std::uint32_t k = bits.possible; k != 0; k &= k - 1) {
           const auto in = static_cast<std::size_t>(__builtin_ctz(k));
           const auto met = static_cast<std::size_t>(which_pair[at + in]);
-          pairs[found++] = {picked.row[j + met / 8], static_cast<std::uint8_t>(i + met % 8), (certain >> in & 1) != 0};
+          pairs[found++] = {picked.row[j + met / 8], static_cast<std::uint8_t>(i + met % 8),
+                            (bits.certain >> in & 1) != 0};
         }
       }
     }

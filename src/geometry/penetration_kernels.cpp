@@ -22,6 +22,9 @@ HWY_INLINE std::uint32_t bitsOf(Md mask) {
   return bits[0];
 }
 
+// A cross product of edges so short, squared and as a share of the edges' squares, is their rounding.
+constexpr double kShortest = 1e-20;
+
 struct LeastOverlap {
   Vd depth;
   Vec3d normal;
@@ -68,6 +71,75 @@ HWY_INLINE Md cut(const Vec3d (&t)[3], const Vd (&above)[3], Vec3d& a, Vec3d& b)
   return hn::AndNot(none, hn::Or(other1, other2));
 }
 
+// Edges, normal and squared lengths of a vector of triangles.
+struct Edges {
+  Vec3d edge[3], normal;
+  Vd squared[3], normal_squared;
+  Vd shortest;  ///< A squared normal of edges so short is their rounding.
+};
+
+HWY_INLINE Edges edgesOf(const Vec3d (&t)[3]) {
+  Edges e;
+  e.edge[0] = sub(t[1], t[0]), e.edge[1] = sub(t[2], t[1]), e.edge[2] = sub(t[0], t[2]);
+  BOCST_UNROLL
+  for (int k = 0; k < 3; ++k) e.squared[k] = dot(e.edge[k], e.edge[k]);
+  e.normal = cross(e.edge[0], e.edge[1]);
+  e.normal_squared = dot(e.normal, e.normal);
+  e.shortest = hn::Mul(hn::Set(Dd(), kShortest), hn::Mul(e.squared[0], e.squared[1]));
+  return e;
+}
+
+// The axis of least overlap among the normals and the cross products of edges. `areas`: both triangles have one.
+HWY_INLINE LeastOverlap leastOverlap(const BothTriangles& t, const Edges& e, const Edges& f, Md areas) {
+  const Dd d;
+  const Vd zero = hn::Zero(d), tiny = hn::Set(d, kShortest);
+  LeastOverlap least;
+  least.depth = hn::Set(d, 1e300);
+  least.normal = {hn::Set(d, 1.0), zero, zero};
+  consider(t, e.normal, e.shortest, least);
+  consider(t, f.normal, f.shortest, least);
+  for (int a = 0; a < 3; ++a) {
+    BOCST_UNROLL
+    for (int b = 0; b < 3; ++b) {
+      consider(t, cross(e.edge[a], f.edge[b]), hn::Mul(tiny, hn::Mul(e.squared[a], f.squared[b])), least);
+    }
+  }
+  // Between triangles with an area and no common plane, the difference of the two has no other faces; in a common
+  // plane the overlap along its normal is 0.
+  if (hn::AllTrue(d, areas)) return least;
+  for (int a = 0; a < 3; ++a) {
+    consider(t, cross(e.edge[a], e.normal), hn::Mul(tiny, hn::Mul(e.squared[a], e.normal_squared)), least);
+    consider(t, cross(f.edge[a], f.normal), hn::Mul(tiny, hn::Mul(f.squared[a], f.normal_squared)), least);
+  }
+  return least;
+}
+
+// Each triangle cuts the other's plane in a segment of the line of the two planes: the middle of what they share, and
+// whether there is one.
+struct CutMiddle {
+  Vec3d point;
+  Md exists;
+};
+
+HWY_INLINE CutMiddle cutMiddle(const BothTriangles& t, const Edges& e, const Edges& f, Md areas) {
+  const Dd d;
+  const Vd zero = hn::Zero(d);
+  const Vec3d &n = e.normal, &m = f.normal;
+  const Vd above_q[3] = {dot(m, sub(t.p[0], t.q[0])), dot(m, sub(t.p[1], t.q[0])), dot(m, sub(t.p[2], t.q[0]))};
+  const Vd above_p[3] = {dot(n, t.q[0]), dot(n, t.q[1]), dot(n, t.q[2])};
+  Vec3d a, b, c, g;
+  const Md cuts = hn::And(cut(t.p, above_q, a, b), cut(t.q, above_p, c, g));
+  const Vec3d line = cross(n, m);
+  const Vd squared = dot(line, line);
+  const Vec3d direction = scaled(line, hn::Div(hn::Set(d, 1.0), hn::Sqrt(squared)));
+  const Vd pb = dot(direction, sub(b, a)), qc = dot(direction, sub(c, a)), qd = dot(direction, sub(g, a));
+  const Vd lo = hn::Max(hn::Min(pb, zero), hn::Min(qc, qd)), hi = hn::Min(hn::Max(pb, zero), hn::Max(qc, qd));
+  const Vd least = hn::Mul(hn::Set(d, 1e-24), hn::Mul(e.normal_squared, f.normal_squared));
+  const Md slanted = hn::And(areas, hn::Gt(squared, least));
+  return {along(a, hn::Mul(hn::Add(lo, hi), hn::Set(d, 0.5)), direction),
+          hn::And(hn::And(cuts, slanted), hn::Le(lo, hi))};
+}
+
 void PenetrationsOfPairs(const TrianglePairs& pairs, double tolerance, PairPenetrations& contacts) {
   const Dd d;
   const Vd zero = hn::Zero(d);
@@ -85,38 +157,15 @@ void PenetrationsOfPairs(const TrianglePairs& pairs, double tolerance, PairPenet
       if (k > 0) t.p[k] = sub(at(k), origin);
       t.q[k] = sub(at(3 + k), origin);
     }
-    const Vec3d e[3] = {t.p[1], sub(t.p[2], t.p[1]), sub(t.p[0], t.p[2])};
-    const Vec3d f[3] = {sub(t.q[1], t.q[0]), sub(t.q[2], t.q[1]), sub(t.q[0], t.q[2])};
-    const Vd ee[3] = {dot(e[0], e[0]), dot(e[1], e[1]), dot(e[2], e[2])};
-    const Vd ff[3] = {dot(f[0], f[0]), dot(f[1], f[1]), dot(f[2], f[2])};
-    const Vec3d n = cross(e[0], e[1]), m = cross(f[0], f[1]);
-    const Vd nn = dot(n, n), mm = dot(m, m);
-    const Vd tiny = hn::Set(d, 1e-20);  // a cross product of edges so short, squared, is their rounding
-    const Vd n_shortest = hn::Mul(tiny, hn::Mul(ee[0], ee[1])), m_shortest = hn::Mul(tiny, hn::Mul(ff[0], ff[1]));
-
+    const Edges e = edgesOf(t.p), f = edgesOf(t.q);
     // Of what has no area the plane is rounding.
-    const Md areas = hn::And(hn::Gt(nn, n_shortest), hn::Gt(mm, m_shortest));
+    const Md areas = hn::And(hn::Gt(e.normal_squared, e.shortest), hn::Gt(f.normal_squared, f.shortest));
 
-    LeastOverlap least;
-    least.depth = hn::Set(d, 1e300);
-    least.normal = {hn::Set(d, 1.0), zero, zero};
-    consider(t, n, n_shortest, least);
-    consider(t, m, m_shortest, least);
-    for (int a = 0; a < 3; ++a) {
-      BOCST_UNROLL
-      for (int b = 0; b < 3; ++b) consider(t, cross(e[a], f[b]), hn::Mul(tiny, hn::Mul(ee[a], ff[b])), least);
-    }
-    // Between triangles with an area and no common plane, the difference of the two has no other faces; in a common
-    // plane the overlap along its normal is 0.
-    if (!hn::AllTrue(d, areas)) {
-      for (int a = 0; a < 3; ++a) {
-        consider(t, cross(e[a], n), hn::Mul(tiny, hn::Mul(ee[a], nn)), least);
-        consider(t, cross(f[a], m), hn::Mul(tiny, hn::Mul(ff[a], mm)), least);
-      }
-    }
+    const LeastOverlap least = leastOverlap(t, e, f, areas);
     const Vd depth = hn::IfThenElse(hn::Lt(least.depth, hn::Set(d, 1e300)), least.depth, zero);
     hn::Store(depth, d, contacts.depth + i);
-    const Vd longest = hn::Sqrt(hn::Max(max3(ee[0], ee[1], ee[2]), max3(ff[0], ff[1], ff[2])));
+    const Vd longest = hn::Sqrt(
+        hn::Max(max3(e.squared[0], e.squared[1], e.squared[2]), max3(f.squared[0], f.squared[1], f.squared[2])));
     const Vd cutoff = hn::MulAdd(hn::Set(d, 1e-4), longest, hn::Set(d, tolerance));
     contacts.meet |= bitsOf(hn::Gt(depth, cutoff)) << i;
     contacts.apart |= bitsOf(hn::Gt(hn::Neg(depth), cutoff)) << i;
@@ -124,22 +173,12 @@ void PenetrationsOfPairs(const TrianglePairs& pairs, double tolerance, PairPenet
     hn::Store(least.normal.y, d, contacts.normal[1] + i);
     hn::Store(least.normal.z, d, contacts.normal[2] + i);
 
-    // Each cuts the other's plane in a segment of the line of the two planes: the middle of what they share.
-    const Vd above_q[3] = {dot(m, sub(t.p[0], t.q[0])), dot(m, sub(t.p[1], t.q[0])), dot(m, sub(t.p[2], t.q[0]))};
-    const Vd above_p[3] = {dot(n, t.q[0]), dot(n, t.q[1]), dot(n, t.q[2])};
-    Vec3d a, b, c, g;
-    const Md cuts = hn::And(cut(t.p, above_q, a, b), cut(t.q, above_p, c, g));
-    const Vec3d line = cross(n, m);
-    const Vd squared = dot(line, line);
-    const Vec3d direction = scaled(line, hn::Div(hn::Set(d, 1.0), hn::Sqrt(squared)));
-    const Vd pb = dot(direction, sub(b, a)), qc = dot(direction, sub(c, a)), qd = dot(direction, sub(g, a));
-    const Vd lo = hn::Max(hn::Min(pb, zero), hn::Min(qc, qd)), hi = hn::Min(hn::Max(pb, zero), hn::Max(qc, qd));
-    const Vec3d point = along(along(origin, hn::Set(d, 1.0), a), hn::Mul(hn::Add(lo, hi), hn::Set(d, 0.5)), direction);
+    const CutMiddle middle = cutMiddle(t, e, f, areas);
+    const Vec3d point = along(origin, hn::Set(d, 1.0), middle.point);
     hn::Store(point.x, d, contacts.point[0] + i);
     hn::Store(point.y, d, contacts.point[1] + i);
     hn::Store(point.z, d, contacts.point[2] + i);
-    const Md slanted = hn::And(areas, hn::Gt(squared, hn::Mul(hn::Set(d, 1e-24), hn::Mul(nn, mm))));
-    contacts.no_point |= (bitsOf(hn::Not(hn::And(hn::And(cuts, slanted), hn::Le(lo, hi))))) << i;
+    contacts.no_point |= bitsOf(hn::Not(middle.exists)) << i;
   }
   if (pairs.count < 32) {
     const std::uint32_t all = (1u << pairs.count) - 1;

@@ -340,18 +340,44 @@ Vector3d closestPoint(const Vector3d& x, const Corners& t) {
   return scale.isZero() ? t[0] : scale.back(closestTo(scale(x), scale(t)));
 }
 
-bool isDegenerate(const Corners& t, double width) {
-  Face<double> face = faceOf(t);
-  if (face.sine2 == 0) {
-    Scale scale;
-    scale.take(t);
-    if (scale.isZero()) return true;
-    const Corners scaled = {scale.down(t[0]), scale.down(t[1]), scale.down(t[2])};
-    face = faceOf(scaled);
+double relativeWidth(const Corners& t) {
+  const Vector3d e[3] = {t[1] - t[0], t[2] - t[1], t[0] - t[2]};
+  const double ee[3] = {e[0].squaredNorm(), e[1].squaredNorm(), e[2].squaredNorm()};
+  const int longest = ee[1] > ee[0] ? (ee[2] > ee[1] ? 2 : 1) : (ee[2] > ee[0] ? 2 : 0);
+  // The height is twice the area over the longest edge; that of the shorter edges rounds least.
+  if (ee[longest] > 1e-140 && ee[longest] < 1e140) {
+    return e[(longest + 1) % 3].cross(e[(longest + 2) % 3]).norm() / ee[longest];
   }
-  // The height over the longest edge is twice the area over it.
-  const double longest = std::max({face.ee[0], face.ee[1], face.ee[2]});
-  return !(face.nn > width * width * longest * longest);
+  // The edges alone, so that they are of size 1 afterwards.
+  Scale scale;
+  scale.take(e[0]);
+  scale.take(e[2]);
+  return scale.isZero() ? 0 : relativeWidth({Vector3d::Zero(), scale.down(e[0]), scale.down(-e[2])});
+}
+
+// With x the points from p[0] on, rounded, and s the largest of them, a product with an axis a is off by less than 4
+// eps |a| s, and two of them by 8; 16 cover the sizes' own rounding. That holds for any axis, whatever it was computed
+// from. An axis whose square is no good double says nothing.
+bool areApart(const Corners& p, const Corners& q, double distance) {
+  const Vector3d o = p[0], x[3] = {Vector3d::Zero(), p[1] - o, p[2] - o}, y[3] = {q[0] - o, q[1] - o, q[2] - o};
+  const Vector3d e[3] = {x[1], x[2] - x[1], -x[2]}, f[3] = {y[1] - y[0], y[2] - y[1], y[0] - y[2]};
+  double largest = 0;
+  for (int k = 0; k < 3; ++k) largest = std::max({largest, x[k].squaredNorm(), y[k].squaredNorm()});
+  const double least = distance + 16 * std::numeric_limits<double>::epsilon() * std::sqrt(largest);
+  const auto parts = [&](const Vector3d& a) {
+    const double px[3] = {0, a.dot(x[1]), a.dot(x[2])}, qx[3] = {a.dot(y[0]), a.dot(y[1]), a.dot(y[2])};
+    const double gap = std::max(std::min({qx[0], qx[1], qx[2]}) - std::max({px[0], px[1], px[2]}),
+                                std::min({px[0], px[1], px[2]}) - std::max({qx[0], qx[1], qx[2]}));
+    const double squared = a.squaredNorm();
+    return squared > 1e-280 && squared < 1e280 && gap > least * std::sqrt(squared);
+  };
+  if (parts(f[0].cross(f[1])) || parts(e[0].cross(e[1]))) return true;
+  for (const Vector3d& u : e) {
+    for (const Vector3d& v : f) {
+      if (parts(u.cross(v))) return true;
+    }
+  }
+  return false;
 }
 
 double nearestPoints(const Corners& p, const Corners& q, Vector3d& on_p, Vector3d& on_q) {

@@ -35,9 +35,17 @@ PenetrationVerdicts trianglePenetrations(const TrianglePairs& pairs, double tole
 /// The point of a closed triangle, degenerate or not, that is nearest to x.
 Eigen::Vector3d closestPoint(const Eigen::Vector3d& x, const Corners& triangle);
 
-/// Is its height over the longest edge at most this part of that edge? Then it is the segment or the point that it is,
-/// up to rounding. Known to 1e-15, whatever the order of the corners and the unit.
-bool isDegenerate(const Corners& triangle, double width = 1e-14);
+/// Its height over the longest edge, as a part of that edge; 0 for a point. Known to 1e-15, whatever the order of the
+/// corners and the unit.
+double relativeWidth(const Corners& triangle);
+
+/// Below this relative width a triangle is the segment or the point that it is up to rounding.
+constexpr double kDegenerate = 1e-14;
+inline bool isDegenerate(const Corners& triangle) { return relativeWidth(triangle) <= kDegenerate; }
+
+/// Are two closed triangles, degenerate or not, surely farther apart than `distance`? Looks for an axis among their
+/// normals and the cross products of their edges; a fiftieth of the time of nearestPoints() on slivers.
+bool areApart(const Corners& p, const Corners& q, double distance);
 
 /// The distance between two closed triangles, degenerate or not, 0 where an edge cuts the inside of the other, and a
 /// point of each that is as near to the other. It is off by a few roundings of the coordinates, also of triangles that

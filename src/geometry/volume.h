@@ -36,7 +36,7 @@ struct SimilarityTransform {
   float axes[3][3] = {};           ///< axes[j]: column j of rotation; set by ready().
   float rounding_margin = 0;       ///< Per unit of size, see overlappingOctants(); set by ready().
 
-  /// To be called when rotation and defect are set.
+  /// To be called when rotation and orthogonality_error are set.
   void ready() {
 #pragma GCC unroll 3
     for (int j = 0; j < 3; ++j) {

@@ -73,7 +73,7 @@ class Oracle {
   virtual void wait(std::vector<ExpansionRequest>& batch) = 0;
 
   /// Brings the surface to where the oracle works, if that is elsewhere, for as long as the result is held; null where
-  /// it cannot. An oracle brings what nobody holds anew for each batch.
+  /// it cannot. A surface that nobody keeps resident is brought again for each batch.
   virtual std::shared_ptr<const DeviceResource> makeResident(const Surface&) { return nullptr; }
 
   /// Does it need the mesh on the host, too?

@@ -5,10 +5,10 @@
 
 namespace bocst::oracle {
 
-/// Does the closed triangle meet the closed cube? A separating-axis test in double over the 13 axes, padded so that
-/// rounding never separates what touches: box and edge axes by kBoxPad on the half side, the plane axis by kPlanePad on
-/// the sum of its products' sizes. Both rounding margins are twice what the first-order bound of the operations needs
-/// (6.5 and 11 units of 2^-53, plus 2 for the rounding of toLattice).
+/// Does the closed triangle meet the closed cube? A separating-axis test in double over the 13 axes. Rounding never
+/// separates what touches: the half side is kBoxRoundingMargin longer on box and edge axes, and the plane axis has a
+/// margin of kPlaneRoundingMargin times the sum of its products' sizes (reference.cpp). Both are twice what the
+/// first-order bound of the operations needs (6.5 and 11 units of 2^-53, plus 2 for the rounding of toLattice).
 ///
 /// This is bocst's definition of grey: every oracle decides by it whatever its own arithmetic leaves in doubt, so grey
 /// sets are the same for all oracles and instruction sets.

@@ -15,7 +15,7 @@ class DeviceResource;
 struct Surface {
   std::shared_ptr<const Mesh> mesh;  ///< Null when only the device has it.
   lattice::Lattice lattice;
-  std::shared_ptr<const DeviceResource> device = nullptr;  ///< What Oracle::hold() gave.
+  std::shared_ptr<const DeviceResource> device = nullptr;  ///< What Oracle::makeResident() gave.
   std::size_t triangle_count = mesh->triangleCount();
   Eigen::AlignedBox3d bounds = mesh->bounds();  ///< In the mesh's frame.
 

@@ -19,6 +19,7 @@
 
 // bocst.fcl: FCL's queries under python-fcl's names.
 
+// Functions named bind... are lists with a line or two for each name of Python, so they are as long as that list.
 namespace bocst::python {
 namespace {
 

@@ -20,6 +20,7 @@
 #include "python/arrays.h"
 #include "python/geometry.h"
 
+// Functions named bind... are lists with a line or two for each name of Python, so they are as long as that list.
 namespace bocst::python {
 namespace {
 

@@ -10,6 +10,7 @@
 #include <cmath>
 #include <limits>
 
+#include "fcl/adapters/models.h"
 #include "fcl/adapters/pair.h"
 #include "fcl/adapters/shapes.h"
 
@@ -69,7 +70,7 @@ Bounds aligned(const fcl::AABB<S>& box) {
 
 template <typename S>
 Bounds boundsOfModel(const Model<S>& model) {
-  const tree::Tree& tree = model.tree();
+  const tree::Tree& tree = fcl_adapter::treeOf(model);
   const std::shared_ptr<const Mesh> mesh = model.mesh();
   Bounds b;
   if (mesh != nullptr) {

@@ -54,6 +54,30 @@ HWY_INLINE V ofFaces(V s0, V s1, V s2) {
 // of what is near it is in the reach.
 constexpr float kShare = 0.995f;
 
+// The largest gap along a cross product of an axis of box a and one of boxes b. r[k][j] is the product of a's axis k
+// and b's axis j, `size` its amount, t the displacement along the axes of a.
+HWY_INLINE V gapAlongEdges(const V (&r)[3][3], const V (&size)[3][3], const V (&t)[3], const V (&half_a)[3],
+                           const V (&half_b)[3]) {
+  const D d;
+  const V one = hn::Set(d, 1.0f), least = hn::Set(d, 0.0625f), none = hn::Set(d, -1e30f);
+  V most = none;
+  BOCST_UNROLL
+  for (int k = 0; k < 3; ++k) {
+    const int k1 = (k + 1) % 3, k2 = (k + 2) % 3;
+    BOCST_UNROLL
+    for (int j = 0; j < 3; ++j) {
+      const int j1 = (j + 1) % 3, j2 = (j + 2) % 3;
+      const V along = hn::Abs(hn::NegMulAdd(t[k1], r[k2][j], hn::Mul(t[k2], r[k1][j])));
+      const V of_a = hn::MulAdd(half_a[k1], size[k2][j], hn::Mul(half_a[k2], size[k1][j]));
+      const V of_b = hn::MulAdd(half_b[j1], size[k][j2], hn::Mul(half_b[j2], size[k][j1]));
+      const V squared = hn::NegMulAdd(r[k][j], r[k][j], one);
+      const V apart = hn::Div(hn::Sub(along, hn::Add(of_a, of_b)), hn::Sqrt(hn::Max(squared, least)));
+      most = hn::Max(most, hn::IfThenElse(hn::Gt(squared, least), apart, none));
+    }
+  }
+  return most;
+}
+
 HWY_INLINE std::uint32_t nearLanes(const Box& a, const BoxGroup& b, std::uint32_t mask, float far, const float* far_b,
                                    float* gap) {
   const D d;
@@ -98,21 +122,7 @@ HWY_INLINE std::uint32_t nearLanes(const Box& a, const BoxGroup& b, std::uint32_
     V g = hn::Sub(hn::Mul(share, most), reach);
     std::uint32_t near = maskBits(hn::Le(g, more)) & lanes;
     if (near != 0) {
-      const V one = hn::Set(d, 1.0f), least = hn::Set(d, 0.0625f), none = hn::Set(d, -1e30f);
-      BOCST_UNROLL
-      for (int k = 0; k < 3; ++k) {
-        const int k1 = (k + 1) % 3, k2 = (k + 2) % 3;
-        BOCST_UNROLL
-        for (int j = 0; j < 3; ++j) {
-          const int j1 = (j + 1) % 3, j2 = (j + 2) % 3;
-          const V along = hn::Abs(hn::NegMulAdd(t[k1], r[k2][j], hn::Mul(t[k2], r[k1][j])));
-          const V of_a = hn::MulAdd(half_a[k1], size[k2][j], hn::Mul(half_a[k2], size[k1][j]));
-          const V of_b = hn::MulAdd(half_b[j1], size[k][j2], hn::Mul(half_b[j2], size[k][j1]));
-          const V squared = hn::NegMulAdd(r[k][j], r[k][j], one);
-          const V apart = hn::Div(hn::Sub(along, hn::Add(of_a, of_b)), hn::Sqrt(hn::Max(squared, least)));
-          most = hn::Max(most, hn::IfThenElse(hn::Gt(squared, least), apart, none));
-        }
-      }
+      most = hn::Max(most, gapAlongEdges(r, size, t, half_a, half_b));
       g = hn::Sub(hn::Mul(share, most), reach);
       near = maskBits(hn::Le(g, more)) & lanes;
     }

@@ -8,6 +8,7 @@
 #include <string>
 #include <vector>
 
+#include "fcl/adapters/models.h"
 #include "fcl/adapters/validate.h"
 #include "fcl/queries/collide_row.h"
 #include "fcl/queries/pose_boxes.h"
@@ -65,7 +66,7 @@ void collideSome(const Model<S>& a, const Model<S>& b, const Poses<S>& X_AB, std
   std::fill(hit + begin, hit + end, std::uint8_t{0});
   std::size_t count;
   {
-    const fcl_adapter::QueryScope scope(a.tree(), b.tree());
+    const fcl_adapter::QueryScope scope(fcl_adapter::treeOf(a), fcl_adapter::treeOf(b));
     count =
         query::findNearPoses(fcl_adapter::boxesOf(a, b), X_AB.numbers(begin), X_AB.rows(), end - begin, near.data());
   }

@@ -63,7 +63,7 @@ class Edge {
       double place = 0, orthogonality_error = 1e-12;
       for (const fcl::Transform3<S>& X : {begin[i], end[i]}) {
         place = std::max(place, static_cast<double>(X.translation().template lpNorm<1>()));
-        orthogonality_error = std::max(orthogonality_error, defectOf<S>(X));
+        orthogonality_error = std::max(orthogonality_error, orthogonalityErrorOf<S>(X));
       }
       const Eigen::Vector3d origin = motions_[i]->at(0).translation();
       place += 2 * motions_[i]->fastest(origin, 0, 0);

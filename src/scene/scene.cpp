@@ -134,14 +134,14 @@ struct Scene<S>::Impl {
   std::size_t search(const char* query, const Transform* X_WM, std::size_t states, Goal goal, std::uint8_t* hit) const {
     const WorldPtr w = current();
     const std::size_t moving = w->moving.size();
-    thread_local std::vector<double> defects_of_thread;
-    std::vector<double>& defects = defects_of_thread;
-    scene::checkPoses<S>(query, X_WM, states, moving, defects);
+    thread_local std::vector<double> errors_of_thread;
+    std::vector<double>& orthogonality_errors = errors_of_thread;
+    scene::checkPoses<S>(query, X_WM, states, moving, orthogonality_errors);
     if (goal == Goal::kAll) std::fill(hit, hit + states, std::uint8_t{0});
     if (states == 0 || moving == 0) return states;
     const bool all_at_once = goal == Goal::kAny && states <= kEdge;
     const std::size_t length = all_at_once ? states : kRow, rows = (states + length - 1) / length;
-    if (rows == 1) return sweepOfThread<S>().run(*w, X_WM, states, goal, hit, defects);
+    if (rows == 1) return sweepOfThread<S>().run(*w, X_WM, states, goal, hit, orthogonality_errors);
     const std::vector<std::size_t> order = goal == Goal::kAny ? bisected(rows) : std::vector<std::size_t>();
     // Of rows, in their order, the first that has what is looked for; rows after it need not be looked at.
     std::atomic<std::size_t> least{rows};
@@ -152,7 +152,7 @@ struct Scene<S>::Impl {
       const std::size_t row = order.empty() ? place : order[place];
       const std::size_t begin = row * length, count = std::min(length, states - begin);
       std::uint8_t* hits = hit == nullptr ? nullptr : hit + begin;
-      const std::size_t at = sweepOfThread<S>().run(*w, X_WM + begin * moving, count, goal, hits, defects);
+      const std::size_t at = sweepOfThread<S>().run(*w, X_WM + begin * moving, count, goal, hits, orthogonality_errors);
       if (at == count || goal == Goal::kAll) return true;
       const std::lock_guard<std::mutex> lock(finding);
       if (place < least) {
@@ -244,7 +244,7 @@ template <typename S>
 bool Scene<S>::collides(const Transform* X_WM, Pair* first) const {
   const auto w = impl_->current();
   scene::StateCheck<S>& check = sweepOfThread<S>().check();
-  scene::checkPoses<S>("collides", X_WM, 1, w->moving.size(), check.defects);
+  scene::checkPoses<S>("collides", X_WM, 1, w->moving.size(), check.orthogonality_errors);
   check.start(*w);
   scene::PairAt hit;
   if (!check.runAll(X_WM, nullptr, &hit)) return false;
@@ -274,7 +274,7 @@ template <typename S>
 S Scene<S>::clearance(const Transform* X_WM, Pair* nearest) const {
   const auto w = impl_->current();
   scene::StateCheck<S>& check = sweepOfThread<S>().check();
-  scene::checkPoses<S>("clearance", X_WM, 1, w->moving.size(), check.defects);
+  scene::checkPoses<S>("clearance", X_WM, 1, w->moving.size(), check.orthogonality_errors);
   scene::PairAt pair;
   const S least = scene::clearance(*w, check, X_WM, pair);
   if (nearest != nullptr) *nearest = least < std::numeric_limits<S>::max() ? impl_->named(*w, pair) : Pair();
@@ -285,8 +285,8 @@ template <typename S>
 bool Scene<S>::edgeIsFree(const Transform* X_WM_begin, const Transform* X_WM_end, fcl::CCDMotionType motion) const {
   const auto w = impl_->current();
   scene::StateCheck<S>& check = sweepOfThread<S>().check();
-  scene::checkPoses<S>("edgeIsFree", X_WM_begin, 1, w->moving.size(), check.defects);
-  scene::checkPoses<S>("edgeIsFree", X_WM_end, 1, w->moving.size(), check.defects);
+  scene::checkPoses<S>("edgeIsFree", X_WM_begin, 1, w->moving.size(), check.orthogonality_errors);
+  scene::checkPoses<S>("edgeIsFree", X_WM_end, 1, w->moving.size(), check.orthogonality_errors);
   return scene::edgeIsFree<S>(*w, check, X_WM_begin, X_WM_end, motion);
 }
 

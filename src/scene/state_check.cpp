@@ -34,7 +34,7 @@ void StateCheck<S>::start(const World<S>& world) {
 template <typename S>
 void StateCheck<S>::place(const fcl::Transform3<S>* X_WM) {
   for (std::size_t i = 0; i < boxes_.size(); ++i) {
-    boxes_[i] = world_->boxAt(world_->moving[i], X_WM[i], defects[i], reach[i]);
+    boxes_[i] = world_->boxAt(world_->moving[i], X_WM[i], orthogonality_errors[i], reach[i]);
     groups_[i / 8].set(i % 8, boxes_[i]);
   }
 }

@@ -41,7 +41,7 @@ class StateCheck {
   std::vector<double> far, reach;
 
   /// Of the poses of each moving object, at least; to be set before anything is asked.
-  std::vector<double> defects;
+  std::vector<double> orthogonality_errors;
 
   /// Places the objects, and finds pairs that may be near: among the entries [begin, end) of the list, or, without one,
   /// among all. Where `entries` is not null, pairs that may touch in one of the states are added to it.

@@ -13,8 +13,8 @@ constexpr double kFarthest = 4;
 }  // namespace
 
 // From one pose to the next, a point at c + x of the box's centre c moves by (Y - X) c + (R_Y - R_X) x. For rotations
-// the norm of R_Y - R_X is 1/sqrt(2) of its Frobenius norm; where they are off by `defect`, it is more by less than
-// 4 of it. Sums of roundings are far below the millionth that is added.
+// the norm of R_Y - R_X is 1/sqrt(2) of its Frobenius norm; where they are off by `orthogonality_error`, it is more by
+// less than 4 of it. Sums of roundings are far below the millionth that is added.
 template <typename S>
 void Sweep<S>::measure(const World<S>& world, const fcl::Transform3<S>* X_WM, std::size_t states) {
   const std::size_t moving = world.moving.size();
@@ -25,7 +25,7 @@ void Sweep<S>::measure(const World<S>& world, const fcl::Transform3<S>* X_WM, st
     const auto placeOf = [&](std::size_t k) {
       return static_cast<double>(X_WM[k * moving + i].translation().template lpNorm<1>());
     };
-    const double orthogonality_error = check_.defects[i];
+    const double orthogonality_error = check_.orthogonality_errors[i];
     double sum = 0, place = placeOf(0);
     double* path = path_.data() + i * states;
     path[0] = 0;
@@ -65,14 +65,15 @@ bool Sweep<S>::setFar(const World<S>& world, std::size_t states, const Part& par
   return near;
 }
 
+// In one function: the three goals differ in what comes next and when it ends, but share each state's check.
 template <typename S>
 std::size_t Sweep<S>::run(const World<S>& world, const fcl::Transform3<S>* X_WM, std::size_t states, Goal goal,
-                          std::uint8_t* hit, const std::vector<double>& defects) {
+                          std::uint8_t* hit, const std::vector<double>& orthogonality_errors) {
   const std::size_t moving = world.moving.size();
   if (goal == Goal::kAll) std::fill(hit, hit + states, std::uint8_t{0});
   if (states == 0 || moving == 0) return states;
   check_.start(world);
-  check_.defects.assign(defects.begin(), defects.end());
+  check_.orthogonality_errors.assign(orthogonality_errors.begin(), orthogonality_errors.end());
   measure(world, X_WM, states);
   std::size_t found = states;
   parts_.clear();

@@ -20,10 +20,10 @@ class Sweep {
     kAll,    ///< Each; written to hit[].
   };
 
-  /// `defects`: of the poses of each moving object, at least. Returns the index of the state that was looked for;
-  /// `states` if there is none.
+  /// `orthogonality_errors`: of the poses of each moving object, at least. Returns the index of the state that was
+  /// looked for; `states` if there is none.
   std::size_t run(const World<S>& world, const fcl::Transform3<S>* X_WM, std::size_t states, Goal goal,
-                  std::uint8_t* hit, const std::vector<double>& defects);
+                  std::uint8_t* hit, const std::vector<double>& orthogonality_errors);
 
   StateCheck<S>& check() { return check_; }
 

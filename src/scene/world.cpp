@@ -27,7 +27,7 @@ std::uint64_t nextSerial() {
 }  // namespace
 
 template <typename S>
-double defectOf(const fcl::Transform3<S>& X) {
+double orthogonalityErrorOf(const fcl::Transform3<S>& X) {
   const S* m = X.matrix().data();  // columns of four
   const double a0 = m[0], a1 = m[1], a2 = m[2], b0 = m[4], b1 = m[5], b2 = m[6], c0 = m[8], c1 = m[9], c2 = m[10];
   const double aa = a0 * a0 + a1 * a1 + a2 * a2, bb = b0 * b0 + b1 * b1 + b2 * b2, cc = c0 * c0 + c1 * c1 + c2 * c2;
@@ -50,28 +50,28 @@ void refusePose(const char* query, const fcl::Transform3<S>* X_WM, std::size_t k
 
 template <typename S>
 void checkPoses(const char* query, const fcl::Transform3<S>* X_WM, std::size_t states, std::size_t moving,
-                std::vector<double>& defects) {
-  defects.assign(moving, 0);
+                std::vector<double>& orthogonality_errors) {
+  orthogonality_errors.assign(moving, 0);
   if (states != 0 && moving != 0 && X_WM == nullptr) {
     throw std::invalid_argument(std::string("bocst::Scene::") + query + ": the poses are null");
   }
   for (std::size_t k = 0; k < states; ++k) {
     for (std::size_t i = 0; i < moving; ++i) {
-      const double orthogonality_error = defectOf<S>(X_WM[k * moving + i]);
-      if (!(orthogonality_error <= kMaxDefect)) refusePose<S>(query, X_WM, k * moving + i, moving);
-      defects[i] = std::max(defects[i], orthogonality_error);
+      const double orthogonality_error = orthogonalityErrorOf<S>(X_WM[k * moving + i]);
+      if (!(orthogonality_error <= kMaxOrthogonalityError)) refusePose<S>(query, X_WM, k * moving + i, moving);
+      orthogonality_errors[i] = std::max(orthogonality_errors[i], orthogonality_error);
     }
   }
 }
 
 template <typename S>
 void checkPose(const char* query, const fcl::Transform3<S>& X) {
-  if (!(defectOf<S>(X) <= kMaxDefect)) refuse<S>(query, "", X);
+  if (!(orthogonalityErrorOf<S>(X) <= kMaxOrthogonalityError)) refuse<S>(query, "", X);
 }
 
 // What may be called a contact farther than the boxes are apart: FCL computes relative poses in S (64 roundings of
-// everything that is added up); where rotations are off by `defect`, lengths along them are, of either object; and the
-// box is in float (see nearLanes()).
+// everything that is added up); where rotations are off by `orthogonality_error`, lengths along them are, of either
+// object; and the box is in float (see nearLanes()).
 template <typename S>
 double reachOf(const Bounds& b, double largest, double place, double displacement, double orthogonality_error) {
   return b.reach + 64 * static_cast<double>(std::numeric_limits<S>::epsilon()) * (place + b.size) +
@@ -220,7 +220,7 @@ World<S>::World(std::vector<Object<S>> moving_objects, std::vector<Object<S>> fi
       if (kind != Bounds::kNowhere && (kind == Bounds::kEverywhere) == everywhere) order.push_back(i);
     }
   }
-  for (const Object<S>& o : fixed_objects) boxes.push_back(boxAt(o, o.X_WG, defectOf<S>(o.X_WG)));
+  for (const Object<S>& o : fixed_objects) boxes.push_back(boxAt(o, o.X_WG, orthogonalityErrorOf<S>(o.X_WG)));
   const auto unbounded =
       static_cast<std::size_t>(std::count_if(fixed_objects.begin(), fixed_objects.end(),
                                              [](const Object<S>& o) { return o.bounds.kind == Bounds::kEverywhere; }));
@@ -247,7 +247,7 @@ World<S>::World(std::vector<Object<S>> moving_objects, std::vector<Object<S>> fi
 
 #define BOCST_INSTANTIATE(S)                                                                                           \
   template class World<S>;                                                                                             \
-  template double defectOf<S>(const fcl::Transform3<S>&);                                                              \
+  template double orthogonalityErrorOf<S>(const fcl::Transform3<S>&);                                                  \
   template void checkPoses<S>(const char*, const fcl::Transform3<S>*, std::size_t, std::size_t, std::vector<double>&); \
   template void checkPose<S>(const char*, const fcl::Transform3<S>&);
 BOCST_INSTANTIATE(float)

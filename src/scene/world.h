@@ -27,16 +27,16 @@ struct Object {
 
 /// The largest entry of R^T R - 1 of a pose that is rigid up to rounding; infinite where it is not finite, or reflects.
 template <typename S>
-double defectOf(const fcl::Transform3<S>& X);
+double orthogonalityErrorOf(const fcl::Transform3<S>& X);
 
 /// Poses with a larger one are refused: those of floats that were multiplied some thousand times are below.
-constexpr double kMaxDefect = 1e-3;
+constexpr double kMaxOrthogonalityError = 1e-3;
 
-/// Writes the largest defect of the poses of each moving object to `defects`.
+/// Writes the largest orthogonality error of the poses of each moving object to `orthogonality_errors`.
 /// @throws std::invalid_argument that names the first pose that is not rigid.
 template <typename S>
 void checkPoses(const char* query, const fcl::Transform3<S>* X_WM, std::size_t states, std::size_t moving,
-                std::vector<double>& defects);
+                std::vector<double>& orthogonality_errors);
 template <typename S>
 void checkPose(const char* query, const fcl::Transform3<S>& X);
 
@@ -59,13 +59,13 @@ class World {
   bool isFixed(std::size_t group) const { return group < fixedGroups(); }
   std::size_t movingIndex(std::size_t group, std::size_t lane) const { return 8 * (group - fixedGroups()) + lane; }
 
-  /// The box of an object at a pose of this defect, without an extent for what is nowhere. `reach`: the box's, if it is
-  /// known.
+  /// The box of an object at a pose of this orthogonality error, without an extent for what is nowhere. `reach`: the
+  /// box's, if it is known.
   Box boxAt(const Object<S>& object, const fcl::Transform3<S>& X_WG, double orthogonality_error,
             double reach = 0) const;
 
   /// At least the reach of that box, while no coordinates of the pose's translation add up to more than `place`, and
-  /// its defect is not larger.
+  /// its orthogonality error is not larger.
   double reachWithin(const Object<S>& object, double place, double orthogonality_error) const;
 
   std::vector<Object<S>> moving;

@@ -147,13 +147,13 @@ void BulkBuilder::makeRoom(std::size_t triangles, std::size_t places) {
   takeAll();
   if (bytes <= room_) return;
   room_ = bytes;
-  huge_pages_ = oracle::HugePages();
+  huge_pages_ = HugePages();
   few_pages_.reset();
   if (bytes <= kMostOnSmallPages) {
     few_pages_.reset(new std::byte[bytes]);
     memory_ = few_pages_.get();
   } else {
-    huge_pages_ = oracle::HugePages(bytes);
+    huge_pages_ = HugePages(bytes);
     memory_ = static_cast<std::byte*>(huge_pages_.begin());
   }
   takeAll();
@@ -205,35 +205,14 @@ std::uint32_t BulkBuilder::split(Piece piece) {
   return static_cast<std::uint32_t>(end - begin);
 }
 
-// Where the sum of areas times triangles is least, along the longest axis of the middles; neither part has less than an
-// eighth, so that seven divisions of the largest leave less than half.
-std::uint32_t BulkBuilder::splitByArea(Piece piece) {
-  std::uint32_t* const order = &order_[piece.begin];
-  V4 least = all(kInfinity), most = all(-kInfinity);
-  for (std::uint32_t i = 0; i < piece.count; ++i) {
-    const TriangleBox& item = items_[order[i]];
-    const V4 twice = load(item.lo) + load(item.hi);
-    least = least.min(twice);
-    most = most.max(twice);
-  }
-  int axis = 0;
-  for (int k = 1; k < 3; ++k) axis = most[k] - least[k] > most[axis] - least[axis] ? k : axis;
-  const float extent = most[axis] - least[axis];
-  const std::uint32_t half = piece.count / 2, few = std::max(piece.count / 8, 1u);
-  if (!(extent > 0)) return half;
+namespace {
 
-  const float first = least[axis], per = 0.9999f * kBins / extent;
-  V4 lo[kBins], hi[kBins];
-  std::uint32_t counts[kBins] = {};
-  for (int b = 0; b < kBins; ++b) lo[b] = all(kInfinity), hi[b] = all(-kInfinity);
-  for (std::uint32_t i = 0; i < piece.count; ++i) {
-    const TriangleBox& item = items_[order[i]];
-    const auto b = static_cast<int>((item.lo[axis] + item.hi[axis] - first) * per);
-    bins_[i] = static_cast<std::uint8_t>(b);
-    lo[b] = lo[b].min(load(item.lo));
-    hi[b] = hi[b].max(load(item.hi));
-    ++counts[b];
-  }
+// The first bin of the second part where the sum of areas times triangles is least, of `count` triangles in bins;
+// neither part has less than an eighth, so that seven divisions of the largest leave less than half. 0 where there is
+// none.
+int bestSplit(const V4 (&lo)[kBins], const V4 (&hi)[kBins], const std::uint32_t (&counts)[kBins],
+              std::uint32_t all_in) {
+  const std::uint32_t few = std::max(all_in / 8, 1u);
   float after[kBins];
   V4 box_lo = all(kInfinity), box_hi = all(-kInfinity);
   std::uint32_t count = 0;
@@ -251,10 +230,44 @@ std::uint32_t BulkBuilder::splitByArea(Piece piece) {
     box_lo = box_lo.min(lo[b - 1]);
     box_hi = box_hi.max(hi[b - 1]);
     count += counts[b - 1];
-    if (count < few || piece.count - count < few) continue;
+    if (count < few || all_in - count < few) continue;
     const float cost = areaOf(box_lo, box_hi) * static_cast<float>(count) + after[b];
     if (cost < best_cost) best_cost = cost, best = b;
   }
+  return best;
+}
+
+}  // namespace
+
+// Where the areas are least (bestSplit) along the longest axis of the middles, else in the middle.
+std::uint32_t BulkBuilder::splitByArea(Piece piece) {
+  std::uint32_t* const order = &order_[piece.begin];
+  V4 least = all(kInfinity), most = all(-kInfinity);
+  for (std::uint32_t i = 0; i < piece.count; ++i) {
+    const TriangleBox& item = items_[order[i]];
+    const V4 twice = load(item.lo) + load(item.hi);
+    least = least.min(twice);
+    most = most.max(twice);
+  }
+  int axis = 0;
+  for (int k = 1; k < 3; ++k) axis = most[k] - least[k] > most[axis] - least[axis] ? k : axis;
+  const float extent = most[axis] - least[axis];
+  const std::uint32_t half = piece.count / 2;
+  if (!(extent > 0)) return half;
+
+  const float first = least[axis], per = 0.9999f * kBins / extent;
+  V4 lo[kBins], hi[kBins];
+  std::uint32_t counts[kBins] = {};
+  for (int b = 0; b < kBins; ++b) lo[b] = all(kInfinity), hi[b] = all(-kInfinity);
+  for (std::uint32_t i = 0; i < piece.count; ++i) {
+    const TriangleBox& item = items_[order[i]];
+    const auto b = static_cast<int>((item.lo[axis] + item.hi[axis] - first) * per);
+    bins_[i] = static_cast<std::uint8_t>(b);
+    lo[b] = lo[b].min(load(item.lo));
+    hi[b] = hi[b].max(load(item.hi));
+    ++counts[b];
+  }
+  const int best = bestSplit(lo, hi, counts, piece.count);
   if (best == 0) {
     const auto twiceMiddle = [&](std::uint32_t i) { return items_[i].lo[axis] + items_[i].hi[axis]; };
     std::nth_element(order, order + half, order + piece.count,

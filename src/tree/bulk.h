@@ -91,7 +91,7 @@ class BulkBuilder {
 
   // Where what is below lies, for `count_` triangles.
   std::unique_ptr<std::byte[]> few_pages_;
-  oracle::HugePages huge_pages_;
+  HugePages huge_pages_;
   std::byte* memory_ = nullptr;
   std::size_t room_ = 0, count_ = 0, place_count_ = 0;
   float* places_;  // four each: of vertices, or of corners

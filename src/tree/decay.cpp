@@ -56,7 +56,8 @@ void Tree::dropUnusedResources() {
   }
 }
 
-// Copies what stays into fresh pools: what goes leaves no holes, and nothing of it is looked at again.
+// Copies what stays into fresh pools: what goes leaves no holes, and nothing of it is looked at again. In one
+// function, as a node is copied whole: its children, list, record and times belong to one move.
 void Tree::keepOnly(const std::vector<std::uint8_t>& keep) {
   const ChildRef old_root = root_.load(std::memory_order_relaxed);
   std::size_t before = 0, after = 0;

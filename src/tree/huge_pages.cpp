@@ -6,7 +6,7 @@
 #include <cstdint>
 #include <new>
 
-namespace bocst::oracle {
+namespace bocst::tree {
 namespace {
 
 constexpr std::size_t kHugePage = std::size_t{1} << 21;
@@ -30,4 +30,4 @@ HugePages::HugePages(std::size_t bytes) : memory_(::operator new(roundedUp(bytes
 
 void HugePages::Delete::operator()(void* memory) const { ::operator delete(memory, std::align_val_t(kHugePage)); }
 
-}  // namespace bocst::oracle
+}  // namespace bocst::tree

@@ -17,7 +17,7 @@ namespace bocst::tree {
 template <typename T, int kChunkBits>
 class Pool {
  public:
-  static constexpr std::size_t kMost = std::size_t{1} << 30;  ///< Links have thirty bits.
+  static constexpr std::size_t kMost = std::size_t{1} << 30;  ///< a ChildRef has thirty bits.
   static constexpr std::size_t kChunk = std::size_t{1} << kChunkBits;
   /// It grows by a chunk, or by the 16th part, but not by so many bytes that who appends would feel it.
   static constexpr std::size_t kShare = 16, kLargestShare = 1 << 16;

@@ -10,7 +10,7 @@
 #include "oracle/reference.h"
 #include "tree/huge_pages.h"
 
-namespace bocst::oracle {
+namespace bocst::tree {
 namespace {
 
 constexpr std::uint32_t kNone = 0x7f7f7f7fu;  // more triangles than a grid is made for; of equal bytes, so quickly set
@@ -61,26 +61,26 @@ class ScratchMemory {
 /// The vertices in steps of two lattice units.
 class QuantisedMesh {
  public:
-  static std::size_t values(const Surface& surface) { return 3 * surface.mesh->vertexCount() + 1; }
+  static std::size_t values(const oracle::Surface& surface) { return 3 * surface.mesh->vertexCount() + 1; }
 
-  QuantisedMesh(const Surface& surface, int bits, std::int16_t* room)
+  QuantisedMesh(const oracle::Surface& surface, int bits, std::int16_t* room)
       : triangles_(surface.mesh->triangles().data()), bits_(bits), vertices_(room) {
     const Mesh& mesh = *surface.mesh;
     // ScratchMemory for a step of margin on both sides.
-    quantise(mesh.vertices().data()->data(), mesh.vertexCount(), surface.lattice.origin().data(),
-             surface.lattice.inverseUnit() / kMargin, (1 << kGridSpanBits) - 2, vertices_);
+    oracle::quantise(mesh.vertices().data()->data(), mesh.vertexCount(), surface.lattice.origin().data(),
+             surface.lattice.inverseUnit() / kMargin, (1 << oracle::kGridSpanBits) - 2, vertices_);
     vertices_[values(surface) - 1] = 0;
   }
 
   /// Of `count` triangles from t on. One step of margin covers the rounding of toLattice and closed cells that only
   /// touch.
-  void spans(std::size_t t, std::size_t count, GridSpan* out) const {
-    gridSpans(vertices_, triangles_[t].data(), count, bits_, out);
+  void spans(std::size_t t, std::size_t count, oracle::GridSpan* out) const {
+    oracle::gridSpans(vertices_, triangles_[t].data(), count, bits_, out);
   }
 
   /// The first and the last cell of a triangle's box along each axis.
   void box(std::size_t t, std::uint32_t first[3], std::uint32_t last[3]) const {
-    const int shift = kGridSpanBits - bits_;
+    const int shift = oracle::kGridSpanBits - bits_;
     for (std::size_t k = 0; k < 3; ++k) {
       const auto at = [&](std::size_t corner) { return vertices_[3 * std::size_t{triangles_[t][corner]} + k]; };
       const std::int16_t a = at(0), b = at(1), c = at(2);
@@ -97,7 +97,7 @@ class QuantisedMesh {
 
 }  // namespace
 
-std::unique_ptr<RootGrid> RootGrid::make(const Surface& surface, int max_level) {
+std::unique_ptr<RootGrid> RootGrid::make(const oracle::Surface& surface, int max_level) {
   const std::size_t count = surface.mesh->triangleCount();
   if (count < kSmallest || count >= kNone) return nullptr;
   const int bits = std::min(count < 10000 ? 3 : count < 300000 ? 4 : 5, max_level - 1);
@@ -109,7 +109,7 @@ std::unique_ptr<RootGrid> RootGrid::make(const Surface& surface, int max_level) 
   return nullptr;
 }
 
-bool RootGrid::build(const Surface& surface) {
+bool RootGrid::build(const oracle::Surface& surface) {
   const std::size_t count = surface.mesh->triangleCount(), most_large = count / kLargeShare;
   const std::size_t lists = std::size_t{8} << 3 * bits_;
   ScratchMemory room(lists * sizeof(std::uint32_t) + QuantisedMesh::values(surface) * sizeof(std::int16_t) + lists / 8);
@@ -119,7 +119,7 @@ bool RootGrid::build(const Surface& surface) {
   back_.reset(new std::uint16_t[roundedUp(count)]);
   adviseHugePages(back_.get(), count * sizeof(back_[0]));
   triangle_count_ = count;
-  GridSpan spans[kBlock];
+  oracle::GridSpan spans[kBlock];
   for (std::size_t begin = 0; begin < count; begin += kBlock) {
     const std::size_t size = std::min(kBlock, count - begin);
     mesh.spans(begin, size, spans);
@@ -144,8 +144,8 @@ bool RootGrid::build(const Surface& surface) {
   return true;
 }
 
-void RootGrid::link(std::uint32_t begin, std::uint32_t end, const GridSpan* spans, std::uint32_t* heads) {
-  const std::uint32_t first_large = kGridSpanLarge << 3 * bits_;
+void RootGrid::link(std::uint32_t begin, std::uint32_t end, const oracle::GridSpan* spans, std::uint32_t* heads) {
+  const std::uint32_t first_large = oracle::kGridSpanLarge << 3 * bits_;
   std::uint32_t next[kBlock] = {};
 #pragma GCC unroll 4
   for (std::uint32_t t = begin; t < end; ++t) {
@@ -158,7 +158,7 @@ void RootGrid::link(std::uint32_t begin, std::uint32_t end, const GridSpan* span
     next[t - begin] = heads[list];
     heads[list] = t;
   }
-  if (!stepsBack(next, begin, end - begin, &back_[begin])) return;
+  if (!oracle::stepsBack(next, begin, end - begin, &back_[begin])) return;
   for (std::uint32_t t = begin; t < end; ++t) {
     if (next[t - begin] != kNone && t - next[t - begin] >= kFar) far_.push_back({t, next[t - begin]});
   }
@@ -172,7 +172,7 @@ std::uint32_t RootGrid::farNext(std::uint32_t triangle) const {
 void RootGrid::keepLists(const std::uint32_t* heads, std::uint8_t* bits) {
   const std::size_t side = std::size_t{1} << bits_, bytes = side / 8;
   rows_.resize(8 * side * side);
-  bitsOfOthers(heads, rows_.size() * side, kNone, bits);
+  oracle::bitsOfOthers(heads, rows_.size() * side, kNone, bits);
   std::uint32_t count = 0;
   for (Row& row : rows_) {
     row = {0, count};
@@ -207,7 +207,7 @@ void RootGrid::markCells() {
   }
 }
 
-void RootGrid::dropMissingCells(const Surface& surface) {
+void RootGrid::dropMissingCells(const oracle::Surface& surface) {
   const std::uint32_t side = 1u << bits_, unit = lattice::Cell{level(), {}}.side();
   const auto& extent = surface.lattice.extent();
   const auto cells = [&](std::size_t k) { return (extent[k] + unit - 1) / unit; };
@@ -242,7 +242,7 @@ void RootGrid::markCoarseCells() {
   }
 }
 
-bool RootGrid::grey(const Surface& surface, const lattice::Cell& cell) {
+bool RootGrid::grey(const oracle::Surface& surface, const lattice::Cell& cell) {
   const std::size_t w = word(cell.level - 1, cell.at[1], cell.at[2]);
   const std::uint32_t bit = 1u << cell.at[0];
   if ((may_be_grey_[w] & bit) == 0 || (is_grey_[w] & bit) != 0) return (may_be_grey_[w] & bit) != 0;
@@ -255,7 +255,7 @@ bool RootGrid::grey(const Surface& surface, const lattice::Cell& cell) {
   return is_grey;
 }
 
-bool RootGrid::decide(const Surface& surface, const lattice::Cell& cell) {
+bool RootGrid::decide(const oracle::Surface& surface, const lattice::Cell& cell) {
   if (cell.level < level()) {
     for (int o = 0; o < 8; ++o) {
       if (grey(surface, cell.octant(o))) return true;
@@ -267,7 +267,7 @@ bool RootGrid::decide(const Surface& surface, const lattice::Cell& cell) {
   const Eigen::Vector3d center(corner[0] + half, corner[1] + half, corner[2] + half);
   return anyCandidate(surface, cell, [&](std::uint32_t t) {
     const Eigen::Vector3d corners[3] = {surface.corner(t, 0), surface.corner(t, 1), surface.corner(t, 2)};
-    return triangleMeetsCube(corners, center, half);
+    return oracle::triangleMeetsCube(corners, center, half);
   });
 }
 
@@ -297,7 +297,7 @@ Eigen::AlignedBox3d RootGrid::bounds(const lattice::Cell& cell) const {
 
 // Calls f for each triangle that may meet a cell of the finest level, until one returns true.
 template <typename F>
-bool RootGrid::anyCandidate(const Surface& surface, const lattice::Cell& cell, F&& f) const {
+bool RootGrid::anyCandidate(const oracle::Surface& surface, const lattice::Cell& cell, F&& f) const {
   for (unsigned q = 0; q < 8; ++q) {
     std::array<std::uint32_t, 3> from = cell.at;
     bool outside = false;
@@ -348,7 +348,7 @@ bool RootGrid::anyCandidate(const Surface& surface, const lattice::Cell& cell, F
   return false;
 }
 
-void RootGrid::gather(const Surface& surface, const lattice::Cell& cell, std::vector<std::uint32_t>& ids) const {
+void RootGrid::gather(const oracle::Surface& surface, const lattice::Cell& cell, std::vector<std::uint32_t>& ids) const {
   anyCandidate(surface, cell, [&ids](std::uint32_t t) {
     ids.push_back(t);
     return false;
@@ -361,4 +361,4 @@ std::size_t RootGrid::bytes() const {
          (head_.capacity() + large_.capacity() + may_be_grey_.capacity() + is_grey_.capacity()) * sizeof(head_[0]);
 }
 
-}  // namespace bocst::oracle
+}  // namespace bocst::tree

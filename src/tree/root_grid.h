@@ -10,7 +10,7 @@
 #include "oracle/cpu/kernels.h"
 #include "oracle/oracle.h"
 
-namespace bocst::oracle {
+namespace bocst::tree {
 
 /// The first levels of a large mesh in one streaming pass: which cells of the levels 2 to level() may be grey, and for
 /// each of the finest a list of the triangles that may meet it, gathered when asked for.
@@ -23,20 +23,20 @@ namespace bocst::oracle {
 class RootGrid {
  public:
   /// Null when the mesh is too small or its triangles too large for the pass to pay, or max_level is below 4.
-  static std::unique_ptr<RootGrid> make(const Surface& surface, int max_level);
+  static std::unique_ptr<RootGrid> make(const oracle::Surface& surface, int max_level);
 
   /// The finest level that is known.
   int level() const { return bits_ + 1; }
 
   /// Is this cell, of level 2 to level(), grey? Remembers the answer, so one thread at a time.
-  bool grey(const Surface& surface, const lattice::Cell& cell);
+  bool grey(const oracle::Surface& surface, const lattice::Cell& cell);
 
   /// A box of the surface inside a grey cell, in lattice units: that of its finest cells which are not known to be
   /// white.
   Eigen::AlignedBox3d bounds(const lattice::Cell& cell) const;
 
   /// Appends the triangles that may meet a cell of the finest level (a superset), each once, in no order.
-  void gather(const Surface& surface, const lattice::Cell& cell, std::vector<std::uint32_t>& ids) const;
+  void gather(const oracle::Surface& surface, const lattice::Cell& cell, std::vector<std::uint32_t>& ids) const;
 
   /// Heap bytes.
   std::size_t bytes() const;
@@ -47,16 +47,16 @@ class RootGrid {
   using Bits = std::vector<std::uint32_t>;
 
   explicit RootGrid(int bits) : bits_(bits) {}
-  bool build(const Surface& surface);
-  void link(std::uint32_t begin, std::uint32_t end, const GridSpan* spans, std::uint32_t* heads);
+  bool build(const oracle::Surface& surface);
+  void link(std::uint32_t begin, std::uint32_t end, const oracle::GridSpan* spans, std::uint32_t* heads);
   void keepLists(const std::uint32_t* heads, std::uint8_t* bits);
   void markCells();
-  void dropMissingCells(const Surface& surface);
+  void dropMissingCells(const oracle::Surface& surface);
   void markCoarseCells();
   std::uint32_t farNext(std::uint32_t triangle) const;
-  bool decide(const Surface& surface, const lattice::Cell& cell);
+  bool decide(const oracle::Surface& surface, const lattice::Cell& cell);
   template <typename F>
-  bool anyCandidate(const Surface& surface, const lattice::Cell& cell, F&& f) const;
+  bool anyCandidate(const oracle::Surface& surface, const lattice::Cell& cell, F&& f) const;
   std::size_t row(unsigned axes, std::size_t y, std::size_t z) const { return (axes << bits_ | z) << bits_ | y; }
   static std::size_t word(int b, std::size_t y, std::size_t z) {
     return ((std::size_t{1} << 2 * b) - 4) / 3 + (z << b | y);
@@ -82,4 +82,4 @@ class RootGrid {
   Bits may_be_grey_, is_grey_;  // the first without the second is to be decided
 };
 
-}  // namespace bocst::oracle
+}  // namespace bocst::tree

@@ -186,6 +186,7 @@ void Tree::releaseMesh() {
 
 // Growth.
 
+// In one function, as what a node asks for depends on what the nodes before it have grown.
 void Tree::grow(std::vector<Growth>& batch, bool wait) {
   // Every growth locks the trees of its pair in address order.
   std::array<Tree*, 2> trees{};
@@ -306,7 +307,7 @@ void Tree::growRoot() {
   if (surface_.device == nullptr) surface_.device = oracle_->makeResident(surface_);
   if (grid_tried_ || !growsOnHost()) return;
   grid_tried_ = true;
-  grid_ = oracle::RootGrid::make(surface_, deepest_);
+  grid_ = RootGrid::make(surface_, deepest_);
   if (grid_ == nullptr) return;
   grid_known_.store(grid_.get(), std::memory_order_release);
   ++batches_;

@@ -33,8 +33,8 @@ class BulkBuilder;
 ///
 /// Threads: a query holds the query lock shared while it looks at nodes. Growth appends blocks and publishes each by
 /// one store of its child reference, so readers are never in its way; one growth a tree at a time. What removes nodes
-/// (pruning, new vertices) holds the query lock alone. Links only go implicit -> list -> block while the query lock is
-/// held shared.
+/// (pruning, new vertices) holds the query lock alone. Child references only go implicit -> list -> block while the
+/// query lock is held shared.
 class Tree {
  public:
   /// @throws std::invalid_argument for options out of range, OracleError.
@@ -107,7 +107,7 @@ class Tree {
 
   /// The root grid knows the children of this frontier node.
   bool growsFromGrid(NodeRef node) const {
-    const oracle::RootGrid* grid = grid_known_.load(std::memory_order_acquire);
+    const RootGrid* grid = grid_known_.load(std::memory_order_acquire);
     return grid != nullptr && !isLoose(node) && cell(node).level < grid->level();
   }
 
@@ -189,16 +189,17 @@ class Tree {
 
   oracle::Surface surface_;
   std::shared_ptr<const Solid> solid_;
-  mutable ForkAwareMutex component_mutex_;  // guards pieces_ while they are found
+  mutable ForkAwareMutex component_mutex_;  // guards component_points_ while they are found
   mutable std::unique_ptr<const std::vector<Eigen::Vector3d>> component_points_;
-  mutable std::atomic<const std::vector<Eigen::Vector3d>*> component_points_known_{nullptr};  // pieces_, for readers
-  mutable std::atomic<double> radius_{-1};                                                    // negative: not known yet
+  mutable std::atomic<const std::vector<Eigen::Vector3d>*> component_points_known_{
+      nullptr};                             // component_points_, for readers
+  mutable std::atomic<double> radius_{-1};  // negative: not known yet
   bounds::NodeBounds root_bounds_;
   SupportTable supports_;
   Outline outline_;
   bool supports_known_ = false;
-  std::unique_ptr<oracle::RootGrid> grid_;
-  std::atomic<const oracle::RootGrid*> grid_known_{nullptr};  // grid_, for readers
+  std::unique_ptr<RootGrid> grid_;
+  std::atomic<const RootGrid*> grid_known_{nullptr};  // grid_, for readers
   bool grid_tried_ = false;
   static constexpr std::size_t kNever = ~std::size_t{0};
   mutable std::atomic<std::size_t> rent_{0};  // see payRent()

@@ -11,6 +11,8 @@
 namespace bocst::oracle {
 namespace {
 
+using tree::RootGrid;
+
 void perTriangle(benchmark::State& state, std::size_t triangles) {
   state.SetItemsProcessed(static_cast<std::int64_t>(triangles) * state.iterations());
 }

@@ -557,6 +557,71 @@ TEST(CollideConservative, OrderDoesNotMatterAtTheEdge) {
   EXPECT_GT(misses, 500);
 }
 
+TEST(CollideConservative, EqualsItsSpheresWhereTheyBeginToMeet) {
+  std::mt19937_64 g(31);
+  std::normal_distribution<double> n;
+  int hits = 0, misses = 0;
+  for (const Subdivision subdivision : {Subdivision::kOctree, Subdivision::kBono}) {
+    for (const double dimension : {0.0, 17.0}) {
+      Options options;
+      options.answer = Answer::kConservative;
+      options.depth = 4;
+      options.subdivision = subdivision;
+      options.dimension = dimension;
+      const auto mesh_a = test::torus(9).mesh(), mesh_b = test::torus(7).scale(0.4).move({3, 0, 1}).mesh();
+      const Modeld a(mesh_a, options), b(mesh_b, options);
+      struct Sphere {
+        Eigen::Vector3d center;
+        double radius;
+      };
+      std::vector<Sphere> spheres[2];
+      for (int side = 0; side < 2; ++side) {
+        Modeld whole(side == 0 ? mesh_a : mesh_b, options);
+        whole.expandAll(options.depth);
+        whole.visit([&](const NodeView& v) {
+          if (v.children.empty()) spheres[side].push_back({v.center, v.radius});
+        });
+      }
+      const auto gap = [&](const fcl::Transform3d& X) {
+        double least = std::numeric_limits<double>::infinity();
+        for (const Sphere& s : spheres[0]) {
+          for (const Sphere& t : spheres[1])
+            least = std::min(least, (s.center - X * t.center).norm() - s.radius - t.radius);
+        }
+        return least;
+      };
+      for (int i = 0; i < 40; ++i) {
+        fcl::Transform3d X = test::pose<double>(test::randomRotation(g), {0, 0, 0});
+        const Eigen::Vector3d way = Eigen::Vector3d(n(g), n(g), n(g)).normalized();
+        const auto place = [&](double t) { X.translation() = t * way - X.linear() * Eigen::Vector3d(3, 0, 1); };
+        double in = 6, out = 12;
+        for (; in > 0; in -= 0.1) {
+          place(in);
+          if (gap(X) < 0) break;
+        }
+        if (in <= 0) continue;
+        for (int k = 0; k < 40; ++k) {
+          place((in + out) / 2);
+          (gap(X) > 0 ? out : in) = (in + out) / 2;
+        }
+        for (const double t : {in - 1e-6, in, out + 1e-6, out + 0.1, out + 1, out + 3}) {
+          place(t);
+          const double least = gap(X);
+          if (std::abs(least) < 1e-9) continue;
+          const fcl::CollisionRequestd request;
+          fcl::CollisionResultd result;
+          ASSERT_EQ(fcl::collide(&a, fcl::Transform3d(fcl::Transform3d::Identity()), &b, X, request, result) > 0,
+                    least < 0)
+              << "gap " << least << ", dimension " << dimension;
+          ++(least < 0 ? hits : misses);
+        }
+      }
+    }
+  }
+  EXPECT_GT(hits, 100);
+  EXPECT_GT(misses, 300);
+}
+
 TEST(CollideConservative, ContactsAreSpheresOfTheDepth) {
   Options options;
   options.answer = Answer::kConservative;

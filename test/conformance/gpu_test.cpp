@@ -6,6 +6,7 @@
 
 #include "conformance/reference.h"
 #include "oracle/gl/device_oracle.h"
+#include "fcl/adapters/models.h"
 #include "tree/tree.h"
 
 namespace bocst {
@@ -22,7 +23,7 @@ Options with(OracleKind oracle, Answer answer = Answer::kExact, int depth = 6) {
 }
 
 oracle::gl::DeviceOracle& deviceOf(const Modeld& model) {
-  return dynamic_cast<oracle::gl::DeviceOracle&>(const_cast<oracle::Oracle&>(model.tree().oracle()));
+  return dynamic_cast<oracle::gl::DeviceOracle&>(const_cast<oracle::Oracle&>(fcl_adapter::treeOf(model).oracle()));
 }
 
 const fcl::Transform3d kIdentity = fcl::Transform3d::Identity();

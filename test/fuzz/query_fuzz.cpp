@@ -136,18 +136,8 @@ class Scene {
     return d;
   }
   double roundedDistance(std::size_t i, std::size_t j) const;
-  // What touches on the grid does so, rounded to doubles, up to rounding; but a segment far from the partner's origin
-  // is, rounded there, a triangle.
-  bool touches(std::size_t ij) {
-    if (!rounded_) return meet(ij);
-    return staysFlat(first_[ij / second_.size()]) && staysFlat(second_[ij % second_.size()]) &&
-           distance(ij) <= 4 * 0x1p-52 * magnitude_;
-  }
-  bool staysFlat(const Corners& t) const {
-    const double length = std::sqrt(static_cast<double>(
-        std::max({dot(t[1] - t[0], t[1] - t[0]), dot(t[2] - t[1], t[2] - t[1]), dot(t[0] - t[2], t[0] - t[2])})));
-    return length == 0 || 8 * length >= magnitude_;
-  }
+  // What touches on the grid does so, rounded to doubles, up to rounding.
+  bool touches(std::size_t ij) { return rounded_ ? distance(ij) <= 4 * 0x1p-52 * magnitude_ : meet(ij); }
   bool hasArea(std::size_t ij) const {
     return fuzz::hasArea(first_[ij / second_.size()]) && fuzz::hasArea(second_[ij % second_.size()]);
   }

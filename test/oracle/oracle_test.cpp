@@ -22,6 +22,7 @@ namespace {
 
 using lattice::Cell;
 using lattice::Lattice;
+using tree::RootGrid;
 
 // Where the oracle works.
 Surface residentOn(Oracle& oracle, Surface surface) {

@@ -35,6 +35,8 @@ void expectRight(const Corners& p, const Corners& q, double roundings) {
   const double distance = nearestPoints(p, q, on_p, on_q);
   ASSERT_NEAR(distance, want, least) << p[0].transpose() << ", " << p[1].transpose() << ", " << p[2].transpose() << "; "
                                      << q[0].transpose() << ", " << q[1].transpose() << ", " << q[2].transpose();
+  ASSERT_FALSE(areApart(p, q, want)) << "at " << want;
+  ASSERT_FALSE(areApart(q, p, want * (1 - 1e-15))) << "at " << want;
   const Corners at_p = {on_p, on_p, on_p}, at_q = {on_q, on_q, on_q};
   ASSERT_LE(exactDistance(at_p, p), least);
   ASSERT_LE(exactDistance(at_q, q), least);
@@ -164,6 +166,29 @@ TEST(NearestPoints, OfAnySizeAnywhere) {
   }
 }
 
+TEST(AreApart, FindsWhatIsApartByFacesOrEdges) {
+  std::mt19937_64 g(12);
+  std::normal_distribution<double> n;
+  int found = 0, apart = 0;
+  for (int i = 0; i < 5000; ++i) {
+    Corners p, q;
+    for (Vector3d& v : p) v = {n(g), n(g), n(g)};
+    for (Vector3d& v : q) v = {n(g) + 2, n(g), n(g)};
+    if (i % 2 != 0) p[2] = (p[0] + p[1]) / 2;  // a segment
+    const double distance = exactDistance(p, q);
+    ASSERT_FALSE(areApart(p, q, distance));
+    if (distance < 1e-3) continue;
+    ++apart;
+    // Where a corner is nearest to a corner or an edge, no such axis has all of the distance, but nearly all have some.
+    found += areApart(p, q, 0);
+  }
+  EXPECT_GT(apart, 1000);
+  EXPECT_EQ(found, apart);
+  const Corners huge = {{1e200, 0, 0}, {1e200, 1e200, 0}, {1e200, 0, 1e200}},
+                far = {{-1e200, 0, 0}, {-1e200, 1e200, 0}, {-1e200, 0, 1e200}};
+  EXPECT_FALSE(areApart(huge, far, 3e200));
+}
+
 TEST(IsDegenerate, WhateverTheOrderAndTheUnit) {
   std::mt19937_64 g(5);
   std::uniform_real_distribution<double> u(-1, 1);
@@ -178,6 +203,8 @@ TEST(IsDegenerate, WhateverTheOrderAndTheUnit) {
     ASSERT_EQ(isDegenerate(t), width < 1e-14) << width << " " << along << " " << unit;
   }
   const Corners point = {{1e-200, 0, 0}, {1e-200, 0, 0}, {1e-200, 0, 0}}, none = {{0, 0, 0}, {0, 0, 0}, {0, 0, 0}};
+  const Corners small_far_away = {{1, 1e-80, 0}, {1, 3e-80, 0}, {1, 1e-80, 2e-80}};
+  EXPECT_NEAR(relativeWidth(small_far_away), 0.5, 1e-15);
   EXPECT_TRUE(isDegenerate(point));
   EXPECT_TRUE(isDegenerate(none));
 }

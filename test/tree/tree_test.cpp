@@ -9,6 +9,7 @@
 #include <random>
 #include <set>
 
+#include "fcl/adapters/models.h"
 #include "lattice/lattice.h"
 #include "meshes.h"
 #include "oracle/reference.h"
@@ -343,8 +344,8 @@ TEST(Tree, SpheresHoldThoseOfAllCellsBelow) {
       options.answer = Answer::kConservative;
       Modeld model(test::torus(24).scale(0.37).mesh(), options);
       model.expandAll(options.depth);
-      const tree::Tree& tree = model.tree();
-      const query::TreeSide side(model.tree());
+      const tree::Tree& tree = fcl_adapter::treeOf(model);
+      const query::TreeSide side(fcl_adapter::treeOf(model));
       std::size_t exact = 0, inner = 0;
       const auto visit = [&](const auto& self, tree::NodeRef node, std::vector<query::Sphere> above) -> void {
         const query::Sphere cell = side.cellSphere(node), bound = side.sphere(node);
@@ -378,7 +379,7 @@ TEST(Tree, BoundsHoldTheSurfaceHoweverTheyWereLearnt) {
     std::map<int, int> slabs;
     int loose = 0;
     for (const Modeld* model : {&a, &b}) {
-      const tree::Tree& tree = model->tree();
+      const tree::Tree& tree = fcl_adapter::treeOf(*model);
       const auto contains = [](const bounds::NodeBounds& bounds, const lattice::Cell& cell, const Eigen::Vector3d& p) {
         constexpr double kRounding = 1e-9;  // of p, in lattice units; bounds are rounded outwards
         double along = 0;

@@ -4,6 +4,7 @@
 #include <bocst/model.h>
 #include <fcl/geometry/collision_geometry.h>
 
+#include <stdexcept>
 #include <string>
 #include <typeinfo>
 
@@ -16,6 +17,21 @@ const Model<S>* asModel(const fcl::CollisionGeometry<S>* geometry) {
   if (geometry == nullptr || geometry->getNodeType() != fcl::GEOM_TRIANGLE) return nullptr;
   if (typeid(*geometry) == typeid(Model<S>)) return static_cast<const Model<S>*>(geometry);
   return dynamic_cast<const Model<S>*>(geometry);
+}
+
+struct ModelTree {
+  template <typename S>
+  static tree::Tree* of(const Model<S>& model) {
+    return model.tree_.get();
+  }
+};
+
+/// The tree of a model. @throws std::logic_error for an empty one.
+template <typename S>
+tree::Tree& treeOf(const Model<S>& model) {
+  tree::Tree* const tree = ModelTree::of(model);
+  if (tree == nullptr) throw std::logic_error("bocst::Model: the model is empty");
+  return *tree;
 }
 
 enum class PairKind {

@@ -17,9 +17,9 @@ namespace bocst::fcl_adapter {
 template <typename S, typename Solver>
 class NarrowPhaseOf final : public NarrowPhase<S> {
  public:
-  NarrowPhaseOf(const Solver& solver, double extent) : solver_(solver), extent_(extent) {}
+  NarrowPhaseOf(const Solver& solver, double tolerance) : solver_(solver), tolerance_(tolerance) {}
 
-  double tolerance() const override { return extent_; }
+  double tolerance() const override { return tolerance_; }
 
   bool fclOverlaps(const fcl::ShapeBase<S>& shape, const fcl::Transform3<S>& X_WS, const fcl::Vector3<S> (&corners)[3],
                    const fcl::Transform3<S>& X_WM) const override {
@@ -43,7 +43,7 @@ class NarrowPhaseOf final : public NarrowPhase<S> {
   }
 
   const Solver& solver_;
-  const double extent_;
+  const double tolerance_;
 };
 
 template <typename S>

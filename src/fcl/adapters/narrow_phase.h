@@ -32,7 +32,7 @@ class NarrowPhase {
   virtual bool fclOverlaps(const fcl::ShapeBase<S>& shape, const fcl::Transform3<S>& X_WS,
                            const fcl::Vector3<S> (&corners)[3], const fcl::Transform3<S>& X_WM) const = 0;
 
-  /// The distance at which touch() may still say yes, but for rounding.
+  /// fclOverlaps() may be true of what is apart by this, and by the rounding of positions.
   virtual double tolerance() const = 0;
 };
 

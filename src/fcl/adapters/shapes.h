@@ -12,6 +12,8 @@
 #include <fcl/geometry/shape/sphere.h>
 #include <fcl/geometry/shape/triangle_p.h>
 
+#include <stdexcept>
+
 namespace bocst::fcl_adapter {
 
 /// One of FCL's shapes that are partners, TriangleP too (but not Model, which shares its node type)?
@@ -57,8 +59,10 @@ auto withShape(const fcl::ShapeBase<S>& shape, F&& f) {
       return f(static_cast<const fcl::Plane<S>&>(shape));
     case fcl::GEOM_HALFSPACE:
       return f(static_cast<const fcl::Halfspace<S>&>(shape));
-    default:
+    case fcl::GEOM_TRIANGLE:
       return f(static_cast<const fcl::TriangleP<S>&>(shape));
+    default:
+      throw std::logic_error("bocst: a shape of isShape() is missing in withShape()");
   }
 }
 

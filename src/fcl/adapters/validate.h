@@ -16,7 +16,7 @@
 namespace bocst::fcl_adapter {
 
 /// A rotation R is refused where an entry of R^T R - 1 is larger. Rotations of floats that were multiplied some
-/// thousand times stay below; what a walk allows for grows with it (SimilarityTransform::defect).
+/// thousand times stay below; what a walk allows for grows with it (SimilarityTransform::orthogonality_error).
 constexpr double kMaxOrthogonalityError = 1e-3;
 
 /// Is the pose rigid for sure? Seldom false where it is. With singular values s of R, the sum of s^2 is 3 and their

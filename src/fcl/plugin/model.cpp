@@ -7,6 +7,7 @@
 #include <limits>
 #include <stdexcept>
 
+#include "fcl/adapters/models.h"
 #include "fcl/plugin/dispatch.h"
 #include "tree/tree.h"
 
@@ -87,11 +88,6 @@ bool Model<S>::empty() const {
   if (tree_ != nullptr) return false;
   if (staged_ != nullptr) throw std::logic_error("bocst::Model: endModel() was not called");
   return true;
-}
-
-template <typename S>
-void Model<S>::throwEmpty() const {
-  throw std::logic_error("bocst::Model: the model is empty");
 }
 
 template <typename S>
@@ -193,12 +189,12 @@ std::shared_ptr<const Mesh> Model<S>::mesh() const {
 
 template <typename S>
 void Model<S>::releaseMesh() {
-  tree().releaseMesh();
+  fcl_adapter::treeOf(*this).releaseMesh();
 }
 
 template <typename S>
 std::string Model<S>::oracleName() const {
-  return tree().oracle().name();
+  return fcl_adapter::treeOf(*this).oracle().name();
 }
 
 template <typename S>
@@ -208,7 +204,7 @@ Statistics Model<S>::statistics() const {
 
 template <typename S>
 void Model<S>::expandAll(int depth) {
-  tree().expandAll(depth);
+  fcl_adapter::treeOf(*this).expandAll(depth);
 }
 
 template <typename S>
@@ -228,7 +224,7 @@ void Model<S>::prune() {
 
 template <typename S>
 void Model<S>::updateVertices(std::vector<Eigen::Vector3d> vertices) {
-  tree().updateVertices(std::move(vertices));
+  fcl_adapter::treeOf(*this).updateVertices(std::move(vertices));
   setBounds(*this, tree_->bounds(), tree_->options().margin, HUGE_VAL);
 }
 

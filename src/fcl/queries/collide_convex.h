@@ -52,7 +52,8 @@ class ConvexCollector final : public query::ConvexVisitor<typename Partner::Node
         costs_(costs),
         ends_at_first_(q.endsAtFirst()),
         is_cut_(!ends_at_first_ && !costs && q.contactsLeft() > 0 && q.contactsLeft() <= FirstFound::kMost),
-        s_(scratch()) {
+        s_(scratch()),
+        cut_(order_.startCut()) {
     s_.seen.clear();
     s_.found.clear();
     if (is_cut_) s_.first.start(q.contactsLeft());

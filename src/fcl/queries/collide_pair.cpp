@@ -26,6 +26,7 @@
 #include "fcl/queries/inside.h"
 #include "fcl/queries/inside_contact.h"
 #include "fcl/queries/query_scope.h"
+#include "fcl/queries/sphere_reach.h"
 #include "geometry/triangle.h"
 #include "query/collide/pair_walk.h"
 #include "query/collide/sphere_walk.h"
@@ -118,7 +119,8 @@ class Collector : public query::Visitor {
         left_(q.contactsLeft()),
         most_(std::max<std::size_t>(kMost, left_ < kUnlimited ? 4 * left_ : kUnlimited)),
         is_cut_(!ends_at_first_ && left_ > 0 && left_ <= FirstPairs::kMost && !q.request.enable_cost),
-        s_(scratch()) {
+        s_(scratch()),
+        cut_(order_.startCut()) {
     s_.met.clear();
     if (ends_at_first_) return;
     s_.seen.clear();
@@ -211,13 +213,16 @@ class Collector : public query::Visitor {
     return scratch;
   }
 
-  // A triangle so narrow, of its length, is a segment or a point but for rounding in S, or so small that products of
-  // four lengths vanish in S.
+  // A triangle so narrow, of its length or of its corners' coordinates, is a segment or a point but for rounding in S;
+  // one so small has products of four lengths that vanish in S.
   static constexpr double kNarrow = std::is_same<S, double>::value ? 1e-14 : 45 * kEpsilon;
   static constexpr double kSmallest = std::is_same<S, double>::value ? 1e-70 : 1e-8;
-  static bool isSliver(const Corners& t) {
-    return query::isDegenerate(t, kNarrow) ||
-           std::max((t[1] - t[0]).cwiseAbs().maxCoeff(), (t[2] - t[0]).cwiseAbs().maxCoeff()) < kSmallest;
+  static bool isSliver(const Corners& t, double relative_width) {
+    const double length = std::max((t[1] - t[0]).cwiseAbs().maxCoeff(), (t[2] - t[0]).cwiseAbs().maxCoeff());
+    if (length < kSmallest) return true;
+    const double rounding =
+        4 * kEpsilon * std::max({t[0].cwiseAbs().maxCoeff(), t[1].cwiseAbs().maxCoeff(), t[2].cwiseAbs().maxCoeff()});
+    return relative_width <= std::max(kNarrow, rounding / length);
   }
 
   // What distances near 0 may be off by.
@@ -355,14 +360,16 @@ class Collector : public query::Visitor {
     // Each in its own frame: where it is placed, rounding may give it a width.
     Corners own;
     for (int k = 0; k < 3; ++k) own[k] = t2_.corner(b, k).template cast<double>();
-    const bool sliver = !isCertain(key) && (isSliver(p) || isSliver(own));
+    const double width_p = query::relativeWidth(p), width_q = query::relativeWidth(own);
+    const bool sliver = !isCertain(key) && (isSliver(p, width_p) || isSliver(own, width_q));
     // FCL's axes do not separate segments and points from everything.
-    const bool degenerate = sliver && (query::isDegenerate(p) || query::isDegenerate(own));
+    const bool degenerate = sliver && std::min(width_p, width_q) <= query::kDegenerate;
     const bool meet =
         isCertain(key) || (!degenerate && fcl::detail::Intersect<S>::intersect_Triangle(
                                               t1_.corner(a, 0), t1_.corner(a, 1), t1_.corner(a, 2), t2_.corner(b, 0),
                                               t2_.corner(b, 1), t2_.corner(b, 2), R_12_, p_12_));
     if (!sliver && margin_ == 0) return meet;
+    if (!meet && query::areApart(p, q, std::max(margin_, rounding()))) return false;
     Eigen::Vector3d on_p, on_q;
     const double distance = query::nearestPoints(p, q, on_p, on_q);
     // Of slivers, its axes are rounding, and may part what touches.
@@ -552,23 +559,28 @@ struct Models {
 template <typename S>
 bool turnsRound(const Models<S>& models, const fcl::Transform3<S>& X_W1, const fcl::Transform3<S>& X_W2) {
   if (models.first == nullptr || models.second == nullptr) return models.first == nullptr;
-  const tree::Tree &tree1 = models.first->tree(), &tree2 = models.second->tree();
+  const tree::Tree &tree1 = treeOf(*models.first), &tree2 = treeOf(*models.second);
   if (!tree1.conservative() && !tree2.conservative()) return false;
   const S *x1 = X_W1.matrix().data(), *x2 = X_W2.matrix().data();
   const auto differ = std::mismatch(x1, x1 + 16, x2);
   return differ.first == x1 + 16 ? std::less<const tree::Tree*>()(&tree2, &tree1) : *differ.second < *differ.first;
 }
 
-// Are two models with exact answers so far apart that nothing need be locked? Time that passes counts here, too: who
-// has branches to drop goes the ordinary way.
+// Are two models so far apart that nothing need be locked? False where branches are due to be
+// dropped, since only a query that holds the locks drops them, at its end.
 template <typename S>
 bool areFarApart(const CollideQuery<S>& q, const Models<S>& models) {
-  const tree::Tree &tree1 = models.first->tree(), &tree2 = models.second->tree();
-  if (tree1.conservative() || tree2.conservative()) return false;
+  const tree::Tree &tree1 = treeOf(*models.first), &tree2 = treeOf(*models.second);
+  // No side of a mesh's bounding box is longer than the diagonal of any box about the mesh.
+  const auto spheres = [](const tree::Tree& tree, const tree::Outline::Reader& box) {
+    return sphereReach(
+        tree, 2 * std::sqrt(box.half(0) * box.half(0) + box.half(1) * box.half(1) + box.half(2) * box.half(2)));
+  };
   const RelativePose<S> X_12(q.X_W1, q.X_W2);
   const bool are_far = tree1.outline().read([&](const tree::Outline::Reader& box1) {
     return tree2.outline().read([&](const tree::Outline::Reader& box2) {
-      return query::areFarApart(box1, box2, X_12.rotation, X_12.translation, q.margin);
+      const double margin = q.margin + spheres(tree1, box1) + spheres(tree2, box2);
+      return query::areFarApart(box1, box2, X_12.rotation, X_12.translation, margin);
     });
   });
   if (!are_far) return false;
@@ -589,16 +601,16 @@ std::size_t answer(const CollideQuery<S>& q, const Models<S>& models, const Brou
   if (a != nullptr && b != nullptr && areFarApart(q, models)) return q.result.numContacts();
   q.inCallersOrder(a, b);
   if (b != nullptr) {
-    const QueryScope scope(a->tree(), b->tree());
+    const QueryScope scope(treeOf(*a), treeOf(*b));
     collideTrees(q, scope.a(), scope.b());
   } else if (isShape(q.b())) {
-    collideShape(q, a->tree(), solver);
+    collideShape(q, treeOf(*a), solver);
 #if FCL_HAVE_OCTOMAP
   } else if (q.b()->getNodeType() == fcl::GEOM_OCTREE) {
-    collideOcTree(q, a->tree(), solver);
+    collideOcTree(q, treeOf(*a), solver);
 #endif
   } else {
-    withBvh<S>("collide", q.b(), [&](const auto& bvh) { collideBvh(q, a->tree(), bvh); });
+    withBvh<S>("collide", q.b(), [&](const auto& bvh) { collideBvh(q, treeOf(*a), bvh); });
   }
   return q.result.numContacts();
 }
@@ -640,7 +652,7 @@ void collideRow(const Model<S>& a, const Model<S>& b, const fcl::Transform3<S>* 
         {&a, identity, &b, X_AB[k], turnsRound(models, identity, X_AB[k])}, request, result, margin};
     if (areFarApart(q, models)) continue;
     result.clear();
-    const QueryScope scope(a.tree(), b.tree());
+    const QueryScope scope(treeOf(a), treeOf(b));
     collideTrees(q, q.swapped ? scope.b() : scope.a(), q.swapped ? scope.a() : scope.b());
     hit[k] = result.isCollision();
   }

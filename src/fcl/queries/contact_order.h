@@ -34,10 +34,15 @@ class ContactOrder {
     for (const std::uint32_t v : surface_.mesh->indices(t)) __builtin_prefetch(&surface_.mesh->vertex(v)[axis_]);
   }
 
-  /// Nodes whose triangles all lie at places after this one may be left out of a walk in the model's lattice frame.
+  /// The cut of a walk in the model's lattice frame that has found nothing yet: it leaves nothing out.
+  query::Cut startCut() const {
+    query::Cut cut;
+    cut.axis = axis_;
+    return cut;
+  }
+  /// Nodes whose triangles all lie at places after this one may be left out of the walk.
   void setCut(double place, query::Cut& cut) const {
     const lattice::Lattice& lattice = surface_.lattice;
-    cut.axis = axis_;
     cut.last = (place - lattice.origin()[axis_]) / lattice.unit();
   }
 

@@ -142,10 +142,10 @@ std::optional<double> timeOfContact(const ContinuousQuery<S>& q, const Mesh* mes
                                                                       q.X_WB());
     return times.run(goalOf(q, magnitudeOf(a), magnitudeOf(b), margin));
   };
-  tree::Tree& tree = model_a->tree();
+  tree::Tree& tree = treeOf(*model_a);
   if (model_b != nullptr) {
-    const QueryScope scope(tree, model_b->tree());
-    if (tree.surface().mesh.get() != mesh_a || model_b->tree().surface().mesh.get() != mesh_b) return {};
+    const QueryScope scope(tree, treeOf(*model_b));
+    if (tree.surface().mesh.get() != mesh_a || treeOf(*model_b).surface().mesh.get() != mesh_b) return {};
     return walk(scope.a(), scope.b(), inBody(scope.b().tree()));
   }
   const QueryScope scope(tree);

@@ -261,9 +261,9 @@ S distancePair(const fcl::CollisionGeometry<S>* o1, const fcl::Transform3<S>& X_
   if (request.isSatisfied(result)) return result.min_distance;
   const DistanceQuery<S> q{{o1, X_W1, o2, X_W2, model1 == nullptr}, request, result};
   if (model1 != nullptr && model2 != nullptr) {
-    searchModels(q, model1->tree(), model2->tree());
+    searchModels(q, treeOf(*model1), treeOf(*model2));
   } else {
-    searchPartner(q, (model1 != nullptr ? model1 : model2)->tree());
+    searchPartner(q, treeOf(model1 != nullptr ? *model1 : *model2));
   }
   if (request.enable_signed_distance && !(result.min_distance > 0)) sign(q);
   return result.min_distance;

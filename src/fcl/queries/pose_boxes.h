@@ -3,9 +3,9 @@
 
 #include <bocst/model.h>
 
-#include <limits>
-
+#include "fcl/adapters/models.h"
 #include "fcl/adapters/pair.h"
+#include "fcl/queries/sphere_reach.h"
 #include "query/cull/near_poses.h"
 #include "tree/tree.h"
 
@@ -19,13 +19,12 @@ namespace bocst::fcl_adapter {
 /// the boxes, are off by no more than roundingOf() each.
 template <typename S>
 query::PoseBoxes boxesOf(const Model<S>& a, const Model<S>& b) {
-  const Eigen::AlignedBox3d box_a = a.tree().bounds(), box_b = b.tree().bounds();
+  const Eigen::AlignedBox3d box_a = treeOf(a).bounds(), box_b = treeOf(b).bounds();
   const Eigen::Vector3d middle_a = box_a.center(), middle_b = box_b.center();
   const Eigen::Vector3d to_a = (box_a.max() - middle_a).cwiseMax(middle_a - box_a.min()),
                         to_b = (box_b.max() - middle_b).cwiseMax(middle_b - box_b.min());
-  double margin = 1.001 * marginOf(&a, &b);
-  // Spheres of conservative answers stick out of the boxes.
-  if (a.tree().conservative() || b.tree().conservative()) margin = std::numeric_limits<double>::infinity();
+  const double margin = 1.001 * (marginOf(&a, &b) + sphereReach(treeOf(a), 2 * to_a.maxCoeff()) +
+                                 sphereReach(treeOf(b), 2 * to_b.maxCoeff()));
   query::PoseBoxes boxes;
   // However b is turned, it is no farther from its origin than this.
   boxes.reach = to_a.norm() + 1.002 * (middle_b.norm() + to_b.norm());

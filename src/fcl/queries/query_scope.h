@@ -12,8 +12,8 @@
 
 namespace bocst::fcl_adapter {
 
-/// The session of one query about one or two trees. While it lives their read locks are held, so nobody removes nodes;
-/// when it ends, with or without an exception, the locks are given back and the trees do what the query left to do.
+/// The session of one query about one or two trees. While it lives, it holds their query locks shared, so nobody
+/// removes nodes; when it ends, also by an exception, it gives the locks back and calls Tree::afterQuery() of both.
 class QueryScope {
  public:
   explicit QueryScope(tree::Tree& a) : locks_(a, a), a_(a), b_(a_) { a.buildIfDue(); }
@@ -37,7 +37,7 @@ class QueryScope {
   const query::TreeSide& b() const { return b_; }  ///< a() where there is one tree.
 
  private:
-  /// The read locks of two trees, or of one that is given twice, taken in address order.
+  /// The query locks of two trees, or of one that is given twice, taken shared in address order.
   class ReadLocks {
    public:
     ReadLocks(tree::Tree& a, tree::Tree& b) : ReadLocks(std::less<tree::Tree*>()(&b, &a) ? b : a) {

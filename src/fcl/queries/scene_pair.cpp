@@ -11,7 +11,7 @@ namespace bocst::fcl_adapter {
 template <typename S>
 bool hullsApart(const Model<S>& a, const fcl::Transform3<S>& X_WA, const Model<S>& b, const fcl::Transform3<S>& X_WB,
                 double gap) {
-  const QueryScope scope(a.tree(), b.tree());
+  const QueryScope scope(treeOf(a), treeOf(b));
   const OrderedPair<S> pair{&a, X_WA, &b, X_WB, false};
   query::SimilarityTransform b_in_a = relate<S>(pair, scope.a(), scope.b()).b_in_a;
   const bool spheres = query::SphereWalk::fits(scope.a(), scope.b());

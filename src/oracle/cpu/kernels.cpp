@@ -48,14 +48,56 @@ HWY_INLINE void edgeAxis(D d, V ep, V eq, V ap, V aq, V bp, V bq, V half, int p,
   }
 }
 
+// Which octants does the triangle's box meet? v[corner][axis], the cell is [-1, 1]^3.
+HWY_INLINE void boxAxes(const V (&v)[3][3], V rounding_margin, M (&alive)[8]) {
+  const D d;
+  const V outer = hn::Add(hn::Set(d, 1.0f), rounding_margin);
+  const V low_outer = hn::Neg(outer), low_margin = hn::Neg(rounding_margin);
+  M side[3][2];  // the halves of the cell along an axis
+  BOCST_UNROLL
+  for (int c = 0; c < 3; ++c) {
+    const V lo = hn::Min(hn::Min(v[0][c], v[1][c]), v[2][c]);
+    const V hi = hn::Max(hn::Max(v[0][c], v[1][c]), v[2][c]);
+    side[c][0] = hn::And(hn::Le(lo, rounding_margin), hn::Ge(hi, low_outer));
+    side[c][1] = hn::And(hn::Ge(hi, low_margin), hn::Le(lo, outer));
+  }
+  BOCST_UNROLL
+  for (int o = 0; o < 8; ++o) {
+    alive[o] = hn::And(hn::And(side[0][o & 1], side[1][o >> 1 & 1]), side[2][o >> 2 & 1]);
+  }
+}
+
+// Which of these does the triangle's plane meet? e[edge][axis]; h is half an octant's side, with the margin.
+HWY_INLINE void planeAxis(const V (&v)[3][3], const V (&e)[3][3], V h, M (&alive)[8]) {
+  const D d;
+  const V one = hn::Set(d, 1.0f), half = hn::Set(d, 0.5f);
+  V n[3], dist = hn::Zero(d), reach = hn::Zero(d), round = hn::Zero(d);
+  BOCST_UNROLL
+  for (int c = 0; c < 3; ++c) {
+    const int p = (c + 1) % 3, q = (c + 2) % 3;
+    const V a = hn::Mul(e[0][p], e[1][q]), b = hn::Mul(e[0][q], e[1][p]);
+    n[c] = hn::Sub(a, b);
+    dist = hn::MulAdd(n[c], v[0][c], dist);
+    reach = hn::MulAdd(h, hn::Abs(n[c]), reach);
+    round = hn::MulAdd(hn::Add(hn::Abs(a), hn::Abs(b)), hn::Add(hn::Abs(v[0][c]), one), round);
+  }
+  reach = hn::MulAdd(hn::Set(d, 24 * 0x1p-24f), round, reach);
+  const V nx = hn::Mul(half, n[0]), ny = hn::Mul(half, n[1]), nz = hn::Mul(half, n[2]);
+  BOCST_UNROLL
+  for (int o = 0; o < 8; ++o) {
+    V c = (o & 1) ? nx : hn::Neg(nx);
+    c = (o >> 1 & 1) ? hn::Add(c, ny) : hn::Sub(c, ny);
+    c = (o >> 2 & 1) ? hn::Add(c, nz) : hn::Sub(c, nz);
+    alive[o] = hn::And(alive[o], hn::Le(hn::Abs(hn::Sub(dist, c)), reach));
+  }
+}
+
 void OctantMasks(const float* xyz, std::size_t stride, std::size_t count, float tolerance, std::uint8_t* masks) {
   const D d;
   const hn::RebindToSigned<D> di;
-  const V one = hn::Set(d, 1.0f), half = hn::Set(d, 0.5f), zero = hn::Zero(d);
-  const V u16 = hn::Set(d, 16 * 0x1p-24f), u24 = hn::Set(d, 24 * 0x1p-24f);
   for (std::size_t i = 0; i < count; i += hn::Lanes(d)) {
     V v[3][3];
-    V size = one;
+    V size = hn::Set(d, 1.0f);
     BOCST_UNROLL
     for (int k = 0; k < 3; ++k) {
       BOCST_UNROLL
@@ -64,25 +106,11 @@ void OctantMasks(const float* xyz, std::size_t stride, std::size_t count, float 
         size = hn::Max(size, hn::Abs(v[k][c]));
       }
     }
-    const V rounding_margin = hn::MulAdd(u16, size, hn::Set(d, tolerance));
-    const V h = hn::Add(half, rounding_margin);
+    const V rounding_margin = hn::MulAdd(hn::Set(d, 16 * 0x1p-24f), size, hn::Set(d, tolerance));
+    const V h = hn::Add(hn::Set(d, 0.5f), rounding_margin);
 
-    // Box axes: which halves of the cell does the triangle's box meet?
-    const V outer = hn::Add(one, rounding_margin), low_outer = hn::Neg(outer), low_margin = hn::Neg(rounding_margin);
-    M side[3][2];
-    BOCST_UNROLL
-    for (int c = 0; c < 3; ++c) {
-      const V lo = hn::Min(hn::Min(v[0][c], v[1][c]), v[2][c]);
-      const V hi = hn::Max(hn::Max(v[0][c], v[1][c]), v[2][c]);
-      side[c][0] = hn::And(hn::Le(lo, rounding_margin), hn::Ge(hi, low_outer));
-      side[c][1] = hn::And(hn::Ge(hi, low_margin), hn::Le(lo, outer));
-    }
     M alive[8];
-    BOCST_UNROLL
-    for (int o = 0; o < 8; ++o) {
-      alive[o] = hn::And(hn::And(side[0][o & 1], side[1][o >> 1 & 1]), side[2][o >> 2 & 1]);
-    }
-
+    boxAxes(v, rounding_margin, alive);
     V e[3][3];
     BOCST_UNROLL
     for (int c = 0; c < 3; ++c) {
@@ -90,28 +118,7 @@ void OctantMasks(const float* xyz, std::size_t stride, std::size_t count, float 
       e[1][c] = hn::Sub(v[2][c], v[1][c]);
       e[2][c] = hn::Sub(v[0][c], v[2][c]);
     }
-
-    // Plane.
-    V n[3], dist = zero, reach = zero, round = zero;
-    BOCST_UNROLL
-    for (int c = 0; c < 3; ++c) {
-      const int p = (c + 1) % 3, q = (c + 2) % 3;
-      const V a = hn::Mul(e[0][p], e[1][q]), b = hn::Mul(e[0][q], e[1][p]);
-      n[c] = hn::Sub(a, b);
-      dist = hn::MulAdd(n[c], v[0][c], dist);
-      reach = hn::MulAdd(h, hn::Abs(n[c]), reach);
-      round = hn::MulAdd(hn::Add(hn::Abs(a), hn::Abs(b)), hn::Add(hn::Abs(v[0][c]), one), round);
-    }
-    reach = hn::MulAdd(u24, round, reach);
-    const V nx = hn::Mul(half, n[0]), ny = hn::Mul(half, n[1]), nz = hn::Mul(half, n[2]);
-    BOCST_UNROLL
-    for (int o = 0; o < 8; ++o) {
-      V c = (o & 1) ? nx : hn::Neg(nx);
-      c = (o >> 1 & 1) ? hn::Add(c, ny) : hn::Sub(c, ny);
-      c = (o >> 2 & 1) ? hn::Add(c, nz) : hn::Sub(c, nz);
-      alive[o] = hn::And(alive[o], hn::Le(hn::Abs(hn::Sub(dist, c)), reach));
-    }
-
+    planeAxis(v, e, h, alive);
     BOCST_UNROLL
     for (int k = 0; k < 3; ++k) {
       BOCST_UNROLL

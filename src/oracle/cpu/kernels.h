@@ -15,8 +15,8 @@ struct LocalTriangles {
 
 /// For each of the first `count` triangles: bit o of masks[i] is set unless triangle i surely misses octant o.
 ///
-/// The 13-axis separating test of all eight octants at once, eight triangles a step, in float. Pads, with u = 2^-24 and
-/// M = max(1, largest coordinate of the triangle): 16 u M on the octant's half side covers the rounding of the corners
+/// The 13-axis separating test of all eight octants, for a vector of triangles a step, in float. With u = 2^-24 and
+/// M = max(1, largest coordinate of the triangle): a margin of 16 u M on the half side covers the rounding of corners
 /// (1 M), of edges, products and differences (4 (M + 1/2)) and of the radius (3/2), 8.5 M u at most; 24 u on the sizes
 /// of the products in the plane equation before they cancel covers normal (4), point (1), product (1), sums (5).
 /// Chosen at run time for the machine's instruction set; all choices keep these bounds, with or without fused

@@ -42,7 +42,7 @@ class DeferredPairs {
   /// logarithm of its pairs more.
   template <typename F>
   void grow(const A& a, const B& b, const SimilarityTransform& b_in_a, bool ends_at_first, F&& f) {
-    // What a tree knows already comes at once and costs nothing.
+    // What root grids know grows first and alone: it needs no oracle.
     auto end = std::partition(waiting_.begin(), waiting_.end(),
                               [&](const Waiting& w) { return asks(a, w.pair.a) || asks(b, w.pair.b); });
     if (end == waiting_.end()) {
@@ -73,7 +73,7 @@ class DeferredPairs {
     double gap;
   };
 
-  // Both sides where both must grow: the smaller is the next to be expanded.
+  // Both nodes where both must grow: the smaller one is expanded next.
   void add(const A& a, const B& b, const Pair& pair) {
     if (a.state(pair.a) == State::kGrows) a.grow(pair.a, growths_);
     if (b.state(pair.b) == State::kGrows) b.grow(pair.b, growths_);

@@ -15,9 +15,10 @@
 
 namespace bocst::query {
 
-/// The walk over pairs of nodes. Resident pairs first, depth first; a pair that needs an unexpanded node is deferred.
-/// When the resident pairs do not settle the question, nodes deferred grow in one batch and the walk goes on with
-/// their pairs, one level down.
+/// The walk over pairs of nodes. Resident pairs first, depth first, or in the order of the visitor's cut where it has
+/// one, so that nothing is visited that lies beyond the last pair wanted; a pair that needs an unexpanded node is
+/// deferred. When the resident pairs do not settle the question, nodes deferred grow in one batch and the walk goes on
+/// with their pairs, one level down.
 ///
 /// Triangles against triangles are culled by boxes and slabs; where a side answers with cells, both are culled by
 /// spheres, in double and on integer cells, so a conservative verdict does not depend on what is resident. Two such
@@ -44,6 +45,7 @@ class PairWalk {
   bool run() {
     Scratch& s = scratch();
     s.stack.clear();
+    s.ordered.clear();
     s.deferred.clear();
     s.leaves.start(b_in_a_, a_in_b_);
     s.large_a.clear();
@@ -52,23 +54,28 @@ class PairWalk {
     if (!rootsMeet(root)) return false;
     s.stack.push_back(root);
     for (;;) {
-      while (!s.stack.empty()) {
-        const Pair pair = s.stack.back();
-        s.stack.pop_back();
+      Pair pair;
+      while (cut_ != nullptr ? popFirst(s, pair) : popLast(s, pair)) {
         if (spheres_ ? stepSpheres(pair, s) : stepBoxes(pair, s)) return true;
       }
-      if (cut_ != nullptr) s.deferred.dropIf([this](const Pair& pair) { return isBeyondCut(pair); });
+      if (cut_ != nullptr) s.deferred.dropIf([this](const Pair& p) { return isBeyond(placeOf(p)); });
       if (s.deferred.empty()) return false;
       const bool may_end = visitor_.endsAtFirst() || cut_ != nullptr;
-      s.deferred.grow(a_, b_, b_in_a_, may_end, [&s](const Pair& pair) { s.stack.push_back(pair); });
+      s.deferred.grow(a_, b_, b_in_a_, may_end, [&s](const Pair& p) { s.stack.push_back(p); });
       seen_a_.valid = seen_b_.valid = false;
     }
   }
 
  private:
   using Pair = typename DeferredPairs<A, B>::Pair;
+  struct PlacedPair {
+    double place;
+    Pair pair;
+    bool operator<(const PlacedPair& other) const { return place > other.place; }  // the front of a heap is the first
+  };
   struct Scratch {
     std::vector<Pair> stack;
+    std::vector<PlacedPair> ordered;  // a heap; the walk's pairs where the visitor has a cut
     DeferredPairs<A, B> deferred;
     LeafPairs<A, B> leaves;
     LargeTriangleLeaf<A> large_a;
@@ -79,27 +86,43 @@ class PairWalk {
     return s;
   }
 
-  // Of the pairs pushed last, those whose nodes of A reach back the farthest are to be popped first.
-  void orderAlongCut(Scratch& s, std::size_t before) const {
-    std::pair<double, Pair> order[8];
-    const std::size_t count = s.stack.size() - before;
-    BOCST_ASSERT(count <= 8);
-    for (std::size_t i = 0; i < count; ++i) {
-      order[i] = {cut_->leastOf(a_.volume(s.stack[before + i].a)), s.stack[before + i]};
-    }
-    std::sort(order, order + count, [](const auto& x, const auto& y) { return x.first > y.first; });
-    for (std::size_t i = 0; i < count; ++i) s.stack[before + i] = order[i].second;
+  static bool popLast(Scratch& s, Pair& pair) {
+    if (s.stack.empty()) return false;
+    pair = s.stack.back();
+    s.stack.pop_back();
+    return true;
   }
 
-  bool isBeyondCut(const Pair& pair) const {
-    if (!spheres_) return cut_->isBeyond(a_.volume(pair.a));
+  // Takes what was pushed into the heap, and the first of that, unless it is beyond the cut.
+  bool popFirst(Scratch& s, Pair& pair) const {
+    for (const Pair& pushed : s.stack) {
+      const double place = placeOf(pushed);
+      if (isBeyond(place)) continue;
+      s.ordered.push_back({place, pushed});
+      std::push_heap(s.ordered.begin(), s.ordered.end());
+    }
+    s.stack.clear();
+    if (s.ordered.empty() || isBeyond(s.ordered.front().place)) return false;
+    std::pop_heap(s.ordered.begin(), s.ordered.end());
+    pair = s.ordered.back().pair;
+    s.ordered.pop_back();
+    return true;
+  }
+
+  // The least that Cut knows of a pair: along its axis, or the least id of its cells.
+  double placeOf(const Pair& pair) const {
+    if (!spheres_) return cut_->leastOf(a_.volume(pair.a));
     if constexpr (std::is_same<A, TreeSide>::value) {
-      if (a_.isConservative()) return a_.firstCellId(pair.a) > cut_->last_cell;
+      if (a_.isConservative()) return static_cast<double>(a_.firstCellId(pair.a));
     }
     if constexpr (std::is_same<B, TreeSide>::value) {
-      if (b_.isConservative()) return b_.firstCellId(pair.b) > cut_->last_cell;
+      if (b_.isConservative()) return static_cast<double>(b_.firstCellId(pair.b));
     }
-    return false;
+    return 0;
+  }
+
+  bool isBeyond(double place) const {
+    return spheres_ ? place > static_cast<double>(cut_->last_cell) : cut_->isBeyond(place);
   }
 
   bool rootsMeet(const Pair& root) const {
@@ -134,7 +157,6 @@ class PairWalk {
   }
 
   bool stepBoxes(const Pair& pair, Scratch& s) {
-    if (cut_ != nullptr && isBeyondCut(pair)) return false;
     // Depth first, most steps share a node with the one before.
     seeNode(a_, pair.a, seen_a_);
     seeNode(b_, pair.b, seen_b_);
@@ -149,12 +171,10 @@ class PairWalk {
       if (sa == State::kGrows) {
         s.deferred.add(pair);
       } else {
-        const std::size_t before = s.stack.size();
         const auto push = [&](typename A::Node c) { s.stack.push_back({c, pair.b}); };
         if constexpr (!B::kBodies) {
           if (sb == State::kLeaf && seen_a_.size < size_b) {
             a_.childrenMeeting(pair.a, volumeOf(b_, seen_b_), b_in_a_, s.large_b, b_, pair.b, push);
-            if (cut_ != nullptr) orderAlongCut(s, before);
             return false;
           }
         }
@@ -165,7 +185,6 @@ class PairWalk {
         } else {
           a_.overlappingChildren(pair.a, volumeOf(b_, seen_b_), b_in_a_, push);
         }
-        if (cut_ != nullptr) orderAlongCut(s, before);
       }
     } else if (sb == State::kGrows) {
       s.deferred.add(pair);
@@ -197,15 +216,6 @@ class PairWalk {
   static bool waits(State sa, State sb) { return sa != State::kInner && sb != State::kInner; }
 
   bool stepSpheres(const Pair& pair, Scratch& s) {
-    if (cut_ != nullptr && isBeyondCut(pair)) return false;
-    const std::size_t before = s.stack.size();
-    const bool ended = stepInSpheres(pair, s);
-    // Children were pushed in the order of their ids; the first is to be popped first.
-    if (cut_ != nullptr) std::reverse(s.stack.begin() + static_cast<std::ptrdiff_t>(before), s.stack.end());
-    return ended;
-  }
-
-  bool stepInSpheres(const Pair& pair, Scratch& s) {
     const State sa = a_.state(pair.a), sb = b_.state(pair.b);
     if (sa == State::kLeaf && sb == State::kLeaf) return leafSpheres(pair);
     const Sphere ball_a = a_.sphere(pair.a), ball_b = inA(b_.sphere(pair.b));
@@ -304,7 +314,7 @@ class PairWalk {
     seen.size = side.size(node);
     seen.volume_valid = false;
   }
-  // Only the side that is not expanded is looked at closely.
+  // The volume is decoded for the side that is not expanded only.
   template <typename Side>
   static auto& volumeOf(const Side& side, Seen<Side>& seen) {
     if (!seen.volume_valid) seen.volume = side.volume(seen.node);

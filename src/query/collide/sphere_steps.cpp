@@ -36,7 +36,7 @@ inline std::uint64_t nameOf(int side, std::uint32_t block) {
 HWY_BEFORE_NAMESPACE();
 namespace bocst::query::HWY_NAMESPACE {
 
-// Writes what the other side sees of some spheres.
+// Writes the centres of some spheres, in their own frame and in the other.
 HWY_INLINE void turnSpheres(const SphereFrames::Side& g, const V (&c)[3], std::size_t i, SphereFrame& f) {
   const D d;
   BOCST_UNROLL
@@ -49,7 +49,7 @@ HWY_INLINE void turnSpheres(const SphereFrames::Side& g, const V (&c)[3], std::s
   }
 }
 
-// Writes the spheres of the octants of a cell, as TreeSide::sphere() has them. Numbers of units are exact.
+// Writes the spheres of the octants of a cell, as TreeSide::sphere() has them. Whole lattice units are exact.
 template <typename Position>
 HWY_INLINE void decodeSpheres(const SphereSteps& s, int side, int level, const Position& at, SphereFrame& f) {
   const D d;
@@ -97,7 +97,7 @@ HWY_INLINE void decodeSpheres(const SphereSteps& s, int side, int level, const P
   }
 }
 
-// The octants of a block into a frame, which holds them already where the last pair had the same block.
+// Decodes the octants of a block into a frame, unless it holds them: the last pair may have had the same block.
 HWY_INLINE void decodeBlock(SphereSteps& s, int side, std::uint32_t index, const tree::Block& block,
                             std::uint32_t frame) {
   if (s.holds[frame] == nameOf(side, index)) return;
@@ -105,7 +105,7 @@ HWY_INLINE void decodeBlock(SphereSteps& s, int side, std::uint32_t index, const
   decodeSpheres(s, side, block.shape, block.at, s.spheres[frame]);
 }
 
-// Which octants of frame f may meet lane l of frame y, of the other side, and of which it is in doubt.
+// Octants of frame f: which may meet lane l of frame y, of the other side, and of which float does not tell.
 struct Met {
   unsigned maybe, doubtful;
 };
@@ -125,7 +125,7 @@ HWY_INLINE Met meeting(const SphereFrames& g, const SphereFrame& f, const Sphere
     }
     const V radius = hn::Load(d, f.radius + i);
     const V most = hn::Add(radius, more), least = hn::Max(hn::Add(radius, less), hn::Zero(d));
-    // Not true of what is not a number.
+    // Both are false for NaN.
     const M apart = hn::Gt(squared, hn::Mul(most, most)), certain = hn::Lt(squared, hn::Mul(least, least));
     const auto depth =
         hn::Or(hn::And(hn::BitCast(du, squared), hn::Set(du, ~7u)), hn::Iota(du, static_cast<std::uint32_t>(i)));
@@ -160,7 +160,7 @@ HWY_INLINE std::uint32_t first(const SphereGroup& group, std::uint32_t octants) 
   return hn::GetLane(hn::MinOfLanes(du, least));
 }
 
-// Where a node is, for pairs that come without frames.
+// Decodes a node of a pair that was pushed without frames into a frame, and returns its lane.
 HWY_NOINLINE std::uint32_t lookUp(SphereSteps& s, int side, tree::NodeRef node, std::uint32_t frame) {
   const tree::Tree& tree = s.side[side]->tree();
   const std::uint32_t root[3] = {0, 0, 0};
@@ -222,7 +222,7 @@ HWY_INLINE bool expandOther(SphereSteps& s, int x, const tree::Block& own, std::
     n.ref = own.child[o].load(std::memory_order_acquire);
     push(s, y, block, other_index, other_frame, other_frame + 1, n, left);
   }
-  // The best of them on top.
+  // The group with the nearest octant goes on top.
   if (s.depth - start < 2 || !s.nearest_first) return true;
   std::size_t best = start;
   std::uint32_t least = ~0u;
@@ -287,7 +287,7 @@ SphereSteps::Event NextEvent(SphereSteps& s) {
     decodeBlock(s, x, index, block, frame);
     const unsigned mask = meetingOctants(s, x, index, block, frame, still.node, still.lane, s.stack[s.depth].order);
     if (mask == 0) continue;
-    // Which puts octants on the stack in the opposite order.
+    // Not expandOther() with a cut: it puts octants on the stack in the opposite order.
     if (leaves || s.cut != nullptr || !expandOther(s, x, block, index, frame, still, mask)) {
       push(s, x, block, index, frame, frames, still, mask);
     }
@@ -330,7 +330,7 @@ SphereSteps::SphereSteps(const TreeSide& a, const TreeSide& b, const SimilarityT
     std::copy_n(tree.surface().lattice.extent().data(), 3, extent[s]);
     deepest[s] = static_cast<std::uint32_t>(tree.deepest());
   }
-  // 2^deeper against the ratio of units, exactly.
+  // As in PairSteps.
   const bool even = std::frexp(b_in_a.scale, &not_smaller) == 0.5;
   if (even) --not_smaller;
   std::fill_n(holds, kFrames, kNothing);

@@ -16,10 +16,10 @@ struct alignas(64) SphereFrame {
   float radius[8];
 };
 
-/// How the roots of two trees lie to each other, in float: what side s sees about the middle of its root, in lattice
-/// units of side 0.
+/// The pose of one root relative to the other, in float: side[s] leads from coordinates about the middle of root s to
+/// those about the middle of the other root, in lattice units of side 0.
 ///
-/// With u = 2^-24, Q0 and Q1 half the roots' sides and t the way between their middles, no coordinate, distance or
+/// With u = 2^-24, Q0 and Q1 half the roots' sides and t the vector between their middles, no coordinate, distance or
 /// radius is larger than M = |t| + sqrt(6) (Q0 + Q1). Cells are integers: in its own frame a centre is off by 2 u M, in
 /// the other's, along an axis, by 11 u M: the former turned, rotation 1, products and sums 7, t 1. So a difference is
 /// off by 14 u M, of three axes 25 u M; the squared distance by 5 u of it, which is 3 u M of the distance; the square
@@ -55,7 +55,7 @@ struct SphereGroup {
   std::uint32_t block;    ///< As NodeRef names it, so the root is octant 7 of a block that there is not.
   std::uint32_t level;    ///< Of the octants.
   std::uint32_t frame;    ///< Where they are.
-  std::uint32_t frames;   ///< So many are in use, by the octants and what is above both nodes.
+  std::uint32_t frames;   ///< How many are in use: for the octants, and for what is above both nodes.
   std::uint32_t octants;  ///< A bit each.
   /// Of each a number whose lowest three bits are the octant; the least comes first.
   std::uint32_t order[8];
@@ -65,9 +65,9 @@ struct SphereGroup {
 /// meet. Eight octants at a time in float; what that leaves in doubt of spheres is decided in double by spheresMeet(),
 /// so nothing depends on the instruction set.
 struct SphereSteps {
-  /// Frames alive at once: one for each block of either side, and the nodes of a pair that comes without.
+  /// Frames in use at once: one for each block of either side, two for the nodes of a pair that was pushed without.
   static constexpr std::size_t kFrames = 2 * lattice::kMaxLevel + 2;
-  /// What a walk below one pair can add to the stack: eight groups for two blocks.
+  /// Groups that a walk below one pair can add to the stack: eight for two blocks.
   static constexpr std::size_t kStackRoom = 8 * lattice::kMaxLevel + 8;
 
   enum Event {
@@ -84,7 +84,7 @@ struct SphereSteps {
   const SphereFrames frames;
   std::uint32_t extent[2][3];  ///< Where the actual regions end.
   std::uint32_t deepest[2];    ///< The level of each side's leaves.
-  int not_smaller;             ///< A node of side 0 is not smaller than one of side 1 so many levels deeper.
+  int not_smaller;             ///< As in PairSteps.
   bool nearest_first = true;   ///< A hit ends the walk.
   const Cut* cut = nullptr;    ///< What is left out; octants then come in the order of their ids.
   bool isBeyondCut(tree::NodeRef a, tree::NodeRef b) const {

@@ -13,13 +13,13 @@ class SphereWalk {
 
   SphereWalk(const TreeSide& a, const TreeSide& b, const SimilarityTransform& b_in_a) : a_(a), b_(b), b_in_a_(b_in_a) {}
 
-  /// Are the two so surely apart that nobody need walk? To be asked first, before anything is made ready for run().
+  /// Are the spheres about the roots apart, so that no walk is needed? Costs little; to be asked before run().
   bool isNeedless() const {
     return !spheresMeet(a_.sphere(a_.root()), placed(b_.sphere(b_.root()), b_in_a_), b_in_a_.tolerance);
   }
 
-  /// Are the boxes about the surfaces so far apart that no spheres of leaves meet? The rounding margin hides in which
-  /// frame they were compared.
+  /// Are the boxes about the surfaces so far apart that no spheres of leaves meet? It does not matter in whose
+  /// frame they are compared: the margin is far larger than the rounding.
   bool areBoxesApart() const;
 
   /// Unless it is needless. True when the visitor ended it.

@@ -35,7 +35,7 @@ inline void setOctant(StepNode& n, const BlockView& b, std::uint32_t o) {
   n.lane = 8 * b.frame + o;
 }
 
-// The order is there already: overlapping() writes it to where the group will be.
+// StepGroup::order is set before: overlapping() writes it to the place on the stack that the group takes.
 inline void push(PairSteps& s, const BlockView& own, const StepNode& other, unsigned octants,
                  std::uint32_t asked = AskedLeaf::kNone) {
   BOCST_ASSERT(s.stack + s.depth < s.stack_end);
@@ -54,10 +54,10 @@ inline void push(PairSteps& s, const BlockView& own, const StepNode& other, unsi
   top.asked = asked;
 }
 
-// Most of a leaf's corners, and all of them.
+// Cache lines that hold most of a packed leaf, and all of it.
 constexpr std::size_t kNextLeafLines = 4, kLeafLines = 10;
 
-// Brings to the processor what the next steps will read of a node, or, of a leaf, its corners: so many lines of them.
+// Prefetches what the next steps read of a node: its block, or so many cache lines of a leaf's corners.
 inline void fetch(const tree::Tree& tree, tree::ChildRef ref, std::size_t leaf_lines = kNextLeafLines) {
   constexpr std::size_t kLine = 64;
   if (ref.tag() == tree::ChildRef::kBlock) {
@@ -87,8 +87,8 @@ inline void fetchAll(const PairSteps& s, const BlockView& block, unsigned octant
 HWY_BEFORE_NAMESPACE();
 namespace bocst::query::HWY_NAMESPACE {
 
-// The octants of a block. Pairs that differ in the other node only come one after the other and find the frame filled:
-// then it is false.
+// Decodes the octants of a block into a frame. False where the frame holds them already: pairs that differ in the other
+// node only come one after the other.
 HWY_INLINE bool decodeBlock(PairSteps& s, int own, std::uint32_t index, const tree::Block& block, std::uint32_t frame) {
   const std::uint64_t name = PairSteps::name(own, index);
   if (s.holds[frame] == name) return false;
@@ -97,7 +97,7 @@ HWY_INLINE bool decodeBlock(PairSteps& s, int own, std::uint32_t index, const tr
   return true;
 }
 
-// Where the volume of a pair's node on one side is; for pairs that come without frames. Takes a frame.
+// Decodes the volume of one node of a pair that was pushed without frames into the next frame, and sets its lane.
 HWY_INLINE void lookUp(PairSteps& s, StepNode& n, int side, std::uint32_t& frames) {
   const tree::Tree& tree = *s.tree[side];
   if (n.node.isRoot()) {
@@ -112,7 +112,7 @@ HWY_INLINE void lookUp(PairSteps& s, StepNode& n, int side, std::uint32_t& frame
   ++frames;
 }
 
-// The block of a node of side x that is expanded, its octants in a frame. `is_new`: they were not there before.
+// Decodes the block of an expanded node of side x into a frame. `is_new`: the frame did not hold it before.
 HWY_INLINE BlockView open(PairSteps& s, int x, const StepNode& node, std::uint32_t frame, bool& is_new) {
   BOCST_ASSERT(frame < PairSteps::kFrames);
   const BlockView block = viewOf(s, x, node.ref.index(), frame);
@@ -130,7 +130,7 @@ std::uint8_t OverlappingOctants(const PairFrames& geometry, int own, const CellO
   return static_cast<std::uint8_t>(overlapping(geometry, f, y, static_cast<std::size_t>(octant), 0xff, order));
 }
 
-// Which of a group's octants overlaps the most.
+// The one of these octants of a group that overlaps the other node the most.
 HWY_INLINE std::uint32_t deepest(const StepGroup& group, std::uint32_t octants) {
   const hn::RebindToUnsigned<D> du;
   auto most = hn::Zero(du);
@@ -150,9 +150,9 @@ struct Popped {
   AskedLeaf asked;
 };
 
-// Takes the next pair off the stack: the deepest, or, where all are wanted, the first, which is known sooner. A step is
-// mostly a chain of what waits for each other, from a child reference to the next one, so what is handed on stays in
-// registers. What is still implicit is left for last: a hit among resident nodes makes its growth unnecessary.
+// Takes the next pair off the stack: the octant that overlaps the most, or, with all_at_once, the first, which needs no
+// search. The pair is returned, not stored: loads of a step wait for each other, from one child reference to the next.
+// Octants that are still implicit come last: a hit among resident nodes makes their growth unnecessary.
 HWY_INLINE Popped pop(PairSteps& s) {
   for (;;) {
     StepGroup& top = s.stack[s.depth - 1];
@@ -183,7 +183,7 @@ HWY_INLINE Popped pop(PairSteps& s) {
   }
 }
 
-// Eight octants of a frame, in their own frame; `low` and `high` are the rounding margin beyond their boxes.
+// As many octants of a frame as a vector has, along their own axes; `low` to `high` is the box and the rounding margin.
 struct OctantLanes {
   V center[3], half[3], normal[3], slab_center, slab_half, low[3], high[3], rounding_margin;
 };
@@ -255,8 +255,8 @@ HWY_INLINE M meetsEdges(const OctantLanes& o, const TriangleBounds& b, int t, M 
   return meet;
 }
 
-// The octants of a frame against triangles, see octantsMeeting(). Of the octants in `mask`, and the triangles in
-// `which`; f(lane, which triangles) is called for each vector. Returns the octants that a triangle may meet.
+// Tests the octants in `mask` of a frame against the triangles in `which`, see octantsMeeting(). Calls store(first
+// octant, triangles that each may meet) for each vector. Returns the octants that a triangle may meet.
 template <typename F>
 HWY_INLINE unsigned meeting(const PairFrames& g, int own, const Frame& f, unsigned mask, std::uint32_t which,
                             const TriangleBounds& b, F&& store) {
@@ -284,7 +284,7 @@ HWY_INLINE unsigned meeting(const PairFrames& g, int own, const Frame& f, unsign
   return result;
 }
 
-// The octants in `mask` of a block that a larger leaf's triangles may meet, onto the stack.
+// Puts those octants in `mask` of a block on the stack that a larger leaf's triangles may meet.
 HWY_NOINLINE void pushThose(PairSteps& s, const BlockView& block, const StepNode& leaf, unsigned mask,
                             std::uint32_t triangles) {
   const hn::RebindToUnsigned<D> du;
@@ -335,7 +335,8 @@ HWY_INLINE bool expandOther(PairSteps& s, const BlockView& own, const StepNode& 
   return true;
 }
 
-// Puts some octants of a block on the stack, but for the one that is next: true where that is in `next`, at once.
+// Sets `next` to the pair of the next octant and puts the others on the stack. False where that octant is implicit and
+// there are others: then all are on the stack, so that pop() takes it last.
 HWY_INLINE bool pushOthers(PairSteps& s, const BlockView& own, const StepNode& other, unsigned octants, Popped& next) {
   const std::uint32_t o =
       s.all_at_once ? static_cast<std::uint32_t>(__builtin_ctz(octants)) : deepest(s.stack[s.depth], octants);
@@ -350,7 +351,7 @@ HWY_INLINE bool pushOthers(PairSteps& s, const BlockView& own, const StepNode& o
   return !waits;
 }
 
-// How far a node reaches back along the axis of the cut, in the frame of side 0.
+// The least coordinate of a node of side 0 along the axis of the cut, in the frame of side 0.
 HWY_INLINE float leastAlongCut(const PairSteps& s, const Frame& f, std::uint32_t o) {
   return f.center[0][s.cut_axis][o] - f.half[0][s.cut_axis][o];
 }
@@ -361,7 +362,7 @@ HWY_INLINE bool isBeyondCut(const PairSteps& s, const Popped& p) {
   return leastAlongCut(s, s.frames[lane / 8], lane % 8) > s.cut;
 }
 
-// The order of octants by how far they reach back along the axis of the cut.
+// Orders octants by their least coordinates along the axis of the cut: that with the smallest is taken first.
 HWY_INLINE void orderAlongCut(const PairSteps& s, const Frame& f, std::uint32_t (&order)[8]) {
   const D d;
   const hn::RebindToUnsigned<D> du;
@@ -397,7 +398,7 @@ HWY_INLINE void fill(StepEvent& e, StepEvent::Kind kind, const Popped& p) {
 
 void NextEvent(PairSteps& s, StepEvent& event) {
   Popped p;
-  bool known = false;  // what comes next
+  bool known = false;  // p is set already
   while (known || s.depth != 0) {
     if (!known) p = pop(s);
     known = false;

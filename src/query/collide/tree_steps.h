@@ -19,7 +19,7 @@ struct StepNode {
   tree::NodeRef node;
   tree::ChildRef ref;
   std::uint32_t level = 1;
-  std::uint32_t lane = kNoLane;  ///< 8 * frame + octant: where the node's volume is, if it is.
+  std::uint32_t lane = kNoLane;  ///< 8 * frame + octant: where its volume is decoded; or kNoLane.
 };
 
 /// A block whose octants (or lanes) take part in a walk.
@@ -29,7 +29,7 @@ struct BlockView {
   const tree::Block* at;  ///< Null: the root, which no block has.
   std::uint32_t index;    ///< As NodeRef names it.
   std::uint32_t level;    ///< Of the octants.
-  std::uint32_t frame;    ///< Where the octants are, if they are; those below it are in use, too.
+  std::uint32_t frame;    ///< Has the octants, or kNoFrame; frames of lower number are in use, too.
   std::uint32_t side;     ///< Whose tree has the block.
 };
 
@@ -48,8 +48,8 @@ struct StepGroup {
   BlockView own;
   std::uint32_t octants;  ///< A bit each.
   std::uint32_t late;     ///< Those of them that wait until the others are gone.
-  /// For each of them: how far it overlaps the other node, as the bits of a float whose lowest three are the octant. As
-  /// the step wrote it: what is written to in parts is slow to be read as a whole.
+  /// Of each octant: how far it overlaps the other node, as the bits of a float, of which the lowest three are the
+  /// octant. Not changed when octants are taken: what was just written in parts is slow to be read as a whole.
   std::uint32_t order[8];
   std::uint32_t asked;         ///< AskedLeaf::side of each octant and the other node ...
   std::uint32_t triangles[8];  ///< ... and AskedLeaf::triangles.
@@ -77,9 +77,9 @@ struct StepEvent {
 struct PairSteps {
   /// Blocks below one another: of cells, then loose ones.
   static constexpr std::size_t kMostDepth = lattice::kMaxLevel + tree::kMostLooseDepth;
-  /// Frames alive at once: to look up the nodes of a pair that comes without, and one more each block of either side.
+  /// Frames in use at once: two for the nodes of a pair that was pushed without, and one for each block of either side.
   static constexpr std::size_t kFrames = 2 + 2 * kMostDepth + 1;
-  /// What a walk below one pair can add to the stack: one more each block of either side, eight of two at once.
+  /// Groups that a walk below one pair can add: one for each block of either side, eight where two blocks go at once.
   static constexpr std::size_t kStackRoom = 8 * kMostDepth + 1;
 
   const tree::Tree* tree[2];
@@ -90,18 +90,18 @@ struct PairSteps {
   const StepGroup* stack_end = nullptr;
   std::size_t depth = 0;
 
-  /// A node of side 0 is not smaller (is larger) than one of side 1 that is at least so many levels deeper.
+  /// By how many levels a node of side 1 must at least be deeper, for one of side 0 to be not smaller, or larger.
   int not_smaller, larger;
 
-  /// A hit is not expected, or does not end the walk, so all octants of a node go down the other side at once: their
-  /// tests overlap in time, where a walk that ends at its first hit would not make most of them.
+  /// The other node of a pair is expanded for all octants of a group at once, so that their tests overlap in time. Set
+  /// where a hit is not expected or does not end the walk; else the first hit makes most of these tests unnecessary.
   bool all_at_once = false;
 
   /// No hit ends the walk: what is on the stack will be walked, so it is fetched ahead.
   bool sees_all = false;
 
-  /// What of side 0 lies beyond this along the axis, in its frame, is left out; octants of side 0 that reach less far
-  /// come first. Axis 3: nothing is.
+  /// Nodes of side 0 whose least coordinate along this axis, in their own frame, is larger than `cut` are left out;
+  /// octants of side 0 come in the order of these coordinates. Axis 3: nothing is left out.
   std::uint32_t cut_axis = 3;
   float cut = 0;
   bool isCut() const { return cut_axis < 3; }
@@ -110,7 +110,7 @@ struct PairSteps {
     cut = static_cast<float>(c.last - lattice::kMiddle) + geometry.rounding_margin;
   }
 
-  const LargeTriangles* leaf[2] = {nullptr, nullptr};  ///< Those of a larger leaf of each side.
+  const LargeTriangles* leaf[2] = {nullptr, nullptr};  ///< Of each side, those of the larger leaf placed last.
 
   std::uint64_t holds[kFrames];  ///< Which block of which side is in a frame.
   static constexpr std::uint64_t kNothing = ~std::uint64_t{0};
@@ -120,7 +120,7 @@ struct PairSteps {
 
   PairSteps(const tree::Tree* a, const tree::Tree* b, std::int64_t now_, const PairFrames& geometry_, Frame* frames_)
       : tree{a, b}, now(now_), geometry(geometry_), frames(frames_), stack(nullptr) {
-    // 2^deeper against the ratio of units, exactly.
+    // The least d for which 2^d is at least the ratio of the units, or more than that; exact.
     int exponent = 0;
     const bool even = std::frexp(geometry.side[1].unit / geometry.side[0].unit, &exponent) == 0.5f;
     not_smaller = even ? exponent - 1 : exponent;
@@ -157,9 +157,9 @@ std::uint8_t overlappingOctants(const PairFrames& geometry, int own, const CellO
 /// misses octant o of a cell of side `own`.
 ///
 /// Along the axes of the octants, the triangle's normal and those of its edges in its plane; along the normal the
-/// octant's slab counts, too. With Q half a root's side and u = 2^-24, a centre is off by 6 u Q, an extent by 3, a
-/// projection on an axis of unit sum by 4 and a radius by 4 more, sums of both by 3, a bound by 2: 22 u Q. Slabs add
-/// 41: their offset 11, their normal 3, what the normals differ by 5, sums 22. PairFrames::Side::rounding margin takes
+/// octant's slab counts, too. With Q half a root's side and u = 2^-24, a centre is off by 9 u Q, an extent by 3, a
+/// projection on an axis of unit sum by 4 and a radius by 4 more, sums of both by 3, a bound by 2: 25 u Q. Slabs add
+/// 41: their offset 11, their normal 3, what the normals differ by 5, sums 22. PairFrames::Side::rounding_margin takes
 /// 128.
 void octantsMeeting(const PairFrames& geometry, int own, const CellOctants& cell, const TriangleBounds& triangles,
                     std::size_t count, std::uint32_t (&met)[8]);

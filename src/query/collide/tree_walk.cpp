@@ -23,9 +23,10 @@ bool TreeWalk::run(Visitor& visitor) {
   s.long_a.clear();
   s.long_b.clear();
   s.grew = false;
+  // Each walk in a tree that is not whole brings the query nearer that builds it whole: see Tree::payRent().
   for (const TreeSide* side : {&a_, &b_}) side->tree().payRent(tree::Tree::kWalkRent);
   const bool ended = search(s);
-  // A first answer has enough to do; what a later one needs again is worth to be packed.
+  // A query that grew nodes packs no leaves. Others pack what is met again: see Tree::packLeaves().
   if (s.leaves_started && !s.grew) {
     a_.tree().packLeaves(s.leaves.looseOfA());
     b_.tree().packLeaves(s.leaves.looseOfB());
@@ -34,7 +35,7 @@ bool TreeWalk::run(Visitor& visitor) {
 }
 
 bool TreeWalk::search(Scratch& s) {
-  // Nothing grows for what is far away.
+  // A root is not expanded for a pair whose root boxes are apart.
   const bool new_root = a_.state(a_.root()) == State::kGrows || b_.state(b_.root()) == State::kGrows;
   if (new_root && facesApart(a_.volume(a_.root()), b_.volume(b_.root()), b_in_a_)) return false;
 
@@ -57,7 +58,7 @@ bool TreeWalk::search(Scratch& s) {
   for (;;) {
     if (stepAll(steps, s)) return true;
     if (cut != nullptr) {
-      s.deferred.dropIf([&](const auto& pair) { return cut->isBeyond(a_.volume(pair.a)); });
+      s.deferred.dropIf([&](const auto& pair) { return cut->isBeyond(cut->leastOf(a_.volume(pair.a))); });
     }
     if (s.deferred.empty()) return false;
     s.grew = true;

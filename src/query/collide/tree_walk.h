@@ -11,8 +11,8 @@
 
 namespace bocst::query {
 
-/// The walk of PairWalk for two trees with exact answers, where a query spends its time: the same order, with volumes
-/// in float about the roots (see PairFrames) that are decoded once for all that meets them.
+/// The walk of PairWalk for two trees with exact answers, where queries spend most of their time. Volumes are in float
+/// about the middles of the roots (see PairFrames); a block is decoded once for all nodes that it is tested against.
 class TreeWalk {
  public:
   static bool fits(const TreeSide& a, const TreeSide& b, const SimilarityTransform& b_in_a) {
@@ -22,7 +22,7 @@ class TreeWalk {
 
   TreeWalk(const TreeSide& a, const TreeSide& b, const SimilarityTransform& b_in_a) : a_(a), b_(b), b_in_a_(b_in_a) {}
 
-  /// Are the two so surely apart that nobody need walk? To be asked first, before anything is made ready for run().
+  /// Are the two surely apart by their supports, so that no walk is needed? Costs little; to be asked before run().
   bool isNeedless() { return areSeparate(a_.tree().supports(), b_.tree().supports(), b_in_a_, is_shallow_); }
 
   /// True when the visitor ended it.

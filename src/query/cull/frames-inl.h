@@ -17,7 +17,7 @@ namespace bocst::query::HWY_NAMESPACE {
 
 namespace codec = bounds::HWY_NAMESPACE;
 
-// Writes some lanes, and what the other side sees of them.
+// Writes some lanes, along the axes of their own side and of the other.
 HWY_INLINE void storeLanes(const PairFrames::Side& g, const V (&c)[3], const V (&h)[3], const V (&n)[3], V slab_center,
                            V slab_half, std::size_t i, Frame& f) {
   const D d;
@@ -66,7 +66,7 @@ HWY_INLINE void decode(const PairFrames::Side& g, const bounds::OctantBounds& oc
   }
 }
 
-// Writes the volumes of a loose block. Whole numbers and powers of two are exact: a middle is off by 8 u Q.
+// Writes the volumes of a loose block. Whole numbers and powers of two are exact: a middle is off by 9 u Q.
 HWY_INLINE void decodeLoose(const PairFrames::Side& g, const bounds::LooseFrame& frame,
                             const bounds::OctantBounds& octants, Frame& f) {
   const D d;
@@ -115,9 +115,69 @@ HWY_INLINE void decodeRoot(const PairFrames& g, int own, const bounds::NodeBound
   decode(g.side[own], root, corner, 2 * static_cast<float>(lattice::kMiddle) * g.side[own].unit, f);
 }
 
+// The octants from i on of frame f beside the volume in lane l of frame y, of the other side: displacements from the
+// octants' middles to the volume's along the axes of [0] the octants' side, and by how much the boxes overlap along the
+// axis where that is least; below 0 they are apart.
+struct FaceGaps {
+  V displacement[2][3], least;
+};
+
+HWY_INLINE FaceGaps faceGaps(const Frame& f, std::size_t i, const Frame& y, std::size_t l, V rounding_margin) {
+  const D d;
+  FaceGaps gaps;
+  V extent[2][3];
+  BOCST_UNROLL
+  for (int s = 0; s < 2; ++s) {
+    BOCST_UNROLL
+    for (int k = 0; k < 3; ++k) {
+      gaps.displacement[s][k] = hn::Sub(hn::Set(d, y.center[1 - s][k][l]), hn::Load(d, f.center[s][k] + i));
+      const V both = hn::Add(hn::Load(d, f.half[s][k] + i), hn::Set(d, y.half[1 - s][k][l]));
+      extent[s][k] = hn::Sub(both, hn::Abs(gaps.displacement[s][k]));
+    }
+  }
+  gaps.least = hn::Add(hn::Min(hn::Min(hn::Min(extent[0][0], extent[0][1]), hn::Min(extent[0][2], extent[1][0])),
+                               hn::Min(extent[1][1], extent[1][2])),
+                       rounding_margin);
+  return gaps;
+}
+
+// Are the octants from i on apart from the volume along one of both slab normals? For z in a box with |m.z - offset| <=
+// w, any a gives n.z in a * offset +- (|a| w + |n - a m| over the box).
+HWY_INLINE M apartBySlabs(const Frame& f, std::size_t i, const Frame& y, std::size_t l, const V (&displacement)[2][3],
+                          V rounding_margin) {
+  const D d;
+  const V x_center = hn::Load(d, f.slab_center + i), x_half = hn::Load(d, f.slab_half + i);
+  const V y_center = hn::Set(d, y.slab_center[l]), y_half = hn::Set(d, y.slab_half[l]);
+  V n[3], m[3], along = hn::Zero(d);
+  BOCST_UNROLL
+  for (int k = 0; k < 3; ++k) {
+    n[k] = hn::Load(d, f.normal[1][k] + i);
+    m[k] = hn::Set(d, y.normal[0][k][l]);
+    along = hn::MulAdd(n[k], m[k], along);
+  }
+  const V abs_along = hn::Abs(along);
+  V t = hn::MulSub(along, y_center, x_center), r = hn::MulAdd(abs_along, y_half, hn::Add(x_half, rounding_margin));
+  BOCST_UNROLL
+  for (int k = 0; k < 3; ++k) {
+    t = hn::MulAdd(n[k], displacement[1][k], t);
+    r = hn::MulAdd(hn::Set(d, y.half[0][k][l]), hn::Abs(hn::NegMulAdd(along, m[k], n[k])), r);
+  }
+  const M apart = hn::Gt(hn::Abs(t), r);
+  t = hn::NegMulAdd(along, x_center, y_center);
+  r = hn::MulAdd(abs_along, x_half, hn::Add(y_half, rounding_margin));
+  BOCST_UNROLL
+  for (int k = 0; k < 3; ++k) {
+    const V mk = hn::Set(d, y.normal[1][k][l]);
+    t = hn::MulAdd(mk, displacement[0][k], t);
+    r = hn::MulAdd(hn::Load(d, f.half[0][k] + i), hn::Abs(hn::NegMulAdd(along, hn::Load(d, f.normal[0][k] + i), mk)),
+                   r);
+  }
+  return hn::Or(apart, hn::Gt(hn::Abs(t), r));
+}
+
 // Bit o is set unless octant o of frame f is surely apart from the volume in lane l of frame y, of the other side, by
-// one of eight axes: the faces of both boxes and both slab normals. No edge axes: with slabs they gain nothing. Of
-// `octants` only; order as in StepGroup, by the faces, where it is asked for.
+// one of eight axes: the faces of both boxes and both slab normals. No edge axes: with slabs they gain nothing. Bits of
+// octants that are not in `octants` are 0. `order`, unless null: see StepGroup; the overlap is that along the faces.
 HWY_INLINE unsigned overlapping(const PairFrames& g, const Frame& f, const Frame& y, std::size_t l, unsigned octants,
                                 std::uint32_t* order) {
   const D d;
@@ -125,56 +185,14 @@ HWY_INLINE unsigned overlapping(const PairFrames& g, const Frame& f, const Frame
   const V rounding_margin = hn::Set(d, g.rounding_margin), slab_rounding_margin = hn::Set(d, g.slab_rounding_margin);
   unsigned result = 0;
   for (std::size_t i = 0; i < 8; i += hn::Lanes(d)) {
-    V displacement[2][3],
-        extent[2][3];  // from the octants' middles to the volume's, along the axes of [0] the octants' side
-    BOCST_UNROLL
-    for (int s = 0; s < 2; ++s) {
-      BOCST_UNROLL
-      for (int k = 0; k < 3; ++k) {
-        displacement[s][k] = hn::Sub(hn::Set(d, y.center[1 - s][k][l]), hn::Load(d, f.center[s][k] + i));
-        const V both = hn::Add(hn::Load(d, f.half[s][k] + i), hn::Set(d, y.half[1 - s][k][l]));
-        extent[s][k] = hn::Sub(both, hn::Abs(displacement[s][k]));
-      }
-    }
-    const V least = hn::Add(hn::Min(hn::Min(hn::Min(extent[0][0], extent[0][1]), hn::Min(extent[0][2], extent[1][0])),
-                                    hn::Min(extent[1][1], extent[1][2])),
-                            rounding_margin);
-    M apart = hn::Lt(least, hn::Zero(d));
-    // Slabs: for z in a box with |m.z - offset| <= w, any a gives n.z in a * offset +- (|a| w + |n - a m| over the
-    // box).
-    const V x_center = hn::Load(d, f.slab_center + i), x_half = hn::Load(d, f.slab_half + i);
-    const V y_center = hn::Set(d, y.slab_center[l]), y_half = hn::Set(d, y.slab_half[l]);
-    V n[3], m[3], along = hn::Zero(d);
-    BOCST_UNROLL
-    for (int k = 0; k < 3; ++k) {
-      n[k] = hn::Load(d, f.normal[1][k] + i);
-      m[k] = hn::Set(d, y.normal[0][k][l]);
-      along = hn::MulAdd(n[k], m[k], along);
-    }
-    const V abs_along = hn::Abs(along);
-    V t = hn::MulSub(along, y_center, x_center),
-      r = hn::MulAdd(abs_along, y_half, hn::Add(x_half, slab_rounding_margin));
-    BOCST_UNROLL
-    for (int k = 0; k < 3; ++k) {
-      t = hn::MulAdd(n[k], displacement[1][k], t);
-      r = hn::MulAdd(hn::Set(d, y.half[0][k][l]), hn::Abs(hn::NegMulAdd(along, m[k], n[k])), r);
-    }
-    apart = hn::Or(apart, hn::Gt(hn::Abs(t), r));
-    t = hn::NegMulAdd(along, x_center, y_center);
-    r = hn::MulAdd(abs_along, x_half, hn::Add(y_half, slab_rounding_margin));
-    BOCST_UNROLL
-    for (int k = 0; k < 3; ++k) {
-      const V mk = hn::Set(d, y.normal[1][k][l]);
-      t = hn::MulAdd(mk, displacement[0][k], t);
-      r = hn::MulAdd(hn::Load(d, f.half[0][k] + i), hn::Abs(hn::NegMulAdd(along, hn::Load(d, f.normal[0][k] + i), mk)),
-                     r);
-    }
-    apart = hn::Or(apart, hn::Gt(hn::Abs(t), r));
+    const FaceGaps gaps = faceGaps(f, i, y, l, rounding_margin);
+    const M apart =
+        hn::Or(hn::Lt(gaps.least, hn::Zero(d)), apartBySlabs(f, i, y, l, gaps.displacement, slab_rounding_margin));
     const std::uint8_t wanted[8] = {static_cast<std::uint8_t>(octants >> i)};
     const M left = hn::AndNot(apart, hn::LoadMaskBits(d, wanted));
     if (order != nullptr) {
       const auto depth =
-          hn::Or(hn::And(hn::BitCast(du, least), hn::Set(du, ~7u)), hn::Iota(du, static_cast<std::uint32_t>(i)));
+          hn::Or(hn::And(hn::BitCast(du, gaps.least), hn::Set(du, ~7u)), hn::Iota(du, static_cast<std::uint32_t>(i)));
       hn::StoreU(depth, du, order + i);
     }
     std::uint8_t bits[8] = {};

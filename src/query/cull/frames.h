@@ -19,15 +19,15 @@ struct alignas(64) Frame {
   float slab_half[8];
 };
 
-/// How the frames of two trees lie to each other, in float, and what that loses.
+/// From the frame of each of two trees to that of the other, in float, and the rounding margins that this needs.
 ///
 /// With u = 2^-24 and M = |t| + sqrt(3) (Q0 + Q1), Q half a root's side, no coordinate is larger than M. A centre is
-/// off by 8 u Q in its own frame (an octant's by 6: bytes to units 4, corner 2; a loose lane's by 8: origin 1, bytes to
-/// units 3 of twice the length, sum 1) and by 13 u M in the other (that turned, rotation 1, sums 4); an extent by 7 u
-/// M. Two centres, two extents and the comparison: 46 u M; `rounding margin` takes 48. Along a normal (length
-/// below 1.01, off by 10 u an entry) the way between centres is off by 46 u M, 18 by the normal and 9 by sums; offsets
-/// 11; the radius 38 by the normals and 15 by sums: 137 u M; `slab_rounding_margin` takes 160. To both comes the defect
-/// of the rotation, 4 M of it, and the tolerance.
+/// off by 9 u Q in its own frame (an octant's by 6: bytes to units 4, corner 2; a loose lane's by 9: unit 1, origin 1,
+/// bytes to units 2 and product 1 of twice the length, sum 1) and by 14 u M in the other (that turned, rotation 1, sums
+/// 4); an extent by 7 u M. Two centres, two extents and the comparison: 48 u M, which `rounding_margin` takes. Along a
+/// normal (length below 1.01, off by 10 u an entry) the way between centres is off by 48 u M, 18 by the normal and 9 by
+/// sums; offsets 11; the radius 38 by the normals and 15 by sums: 139 u M; `slab_rounding_margin` takes 160. Added to
+/// both are the tolerance and 4 M (8 M for slabs) times the orthogonality error.
 ///
 /// What sees octants in their own frame only, along axes whose entries' sizes sum up to 1, is off by less: see
 /// octantsMeeting().
@@ -45,7 +45,7 @@ struct PairFrames {
     float shift[3];        ///< Coordinate j in the other frame is this ...
     float to_other[3][3];  ///< ... and row j by the own coordinates.
     float abs_to_other[3][3];
-    float rounding_margin;  ///< For what is in double beside octants in their own frame: 128 u Q, defect and tolerance.
+    float rounding_margin;  ///< Of tests in the octants' own frame: 128 u Q, and the same.
   };
   Side side[2];
   float rounding_margin, slab_rounding_margin;

@@ -48,69 +48,73 @@ HWY_INLINE V gapOf(V apart, const Interval& x, const Interval& y) {
   return hn::Max(hn::Sub(hn::Add(apart, y.lo), x.hi), hn::Sub(hn::Sub(x.lo, apart), y.hi));
 }
 
+// Displacements from the middles of the octants from i on of f to that of the node in lane l of y, along the axes of
+// the octants' side, and how far the boxes are apart at least.
+struct BoxGaps {
+  Vec3 displacement;
+  V at_least;
+};
+
+HWY_INLINE BoxGaps boxGaps(const Frame& f, std::size_t i, const Frame& y, std::size_t l) {
+  const D d;
+  Vec3 displacement[2];  // along the axes of [0] the octants' side
+  V squares[2];
+  BOCST_UNROLL
+  for (int s = 0; s < 2; ++s) {
+    V w[3], gap[3];
+    BOCST_UNROLL
+    for (int k = 0; k < 3; ++k) {
+      w[k] = hn::Sub(hn::Set(d, y.center[1 - s][k][l]), hn::Load(d, f.center[s][k] + i));
+      const V extent = hn::Add(hn::Load(d, f.half[s][k] + i), hn::Set(d, y.half[1 - s][k][l]));
+      gap[k] = hn::Max(hn::Sub(hn::Abs(w[k]), extent), hn::Zero(d));
+    }
+    displacement[s] = {w[0], w[1], w[2]};
+    // On three axes at right angles gaps add up as the sides of a box.
+    squares[s] = hn::MulAdd(gap[0], gap[0], hn::MulAdd(gap[1], gap[1], hn::Mul(gap[2], gap[2])));
+  }
+  return {displacement[0], hn::Sqrt(hn::Max(squares[0], squares[1]))};
+}
+
+// The larger of `best` and the gap along the normal n, which may be shorter than one by what its bytes round; no normal
+// gives no gap.
+HWY_INLINE V orAlongNormal(V best, const Vec3& n, V apart, const Interval& x, const Interval& y) {
+  const D d;
+  const V norm = hn::Max(hn::Sqrt(dot(n, n)), hn::Set(d, 0.5f)), gap = hn::Div(gapOf(apart, x, y), norm);
+  return hn::IfThenElse(hn::Gt(dot(n, n), hn::Zero(d)), hn::Max(best, gap), best);
+}
+
 void OctantGapsOf(const PairFrames& g, int own, const Frame& f, const Frame& y, std::size_t l,
                   const FrameDirection& along, OctantGaps& gaps) {
   const D d;
   const int other = 1 - own;
-  const V zero = hn::Zero(d), one = hn::Set(d, 1.0f), tiny = hn::Set(d, 1e-12f);
   const Vec3 y_half = broadcast(y.half[0][0][l], y.half[0][1][l], y.half[0][2][l]);
   const Vec3 y_normal = broadcast(y.normal[0][0][l], y.normal[0][1][l], y.normal[0][2][l]);
+  const Vec3 y_normal_there = broadcast(y.normal[1][0][l], y.normal[1][1][l], y.normal[1][2][l]);
   const V y_slab_center = hn::Set(d, y.slab_center[l]), y_slab_half = hn::Set(d, y.slab_half[l]);
+  const Interval y_slab{hn::Sub(y_slab_center, y_slab_half), hn::Add(y_slab_center, y_slab_half)};
+  const auto ofNode = [&](const Vec3& direction)
+                          HWY_ATTR { return intervalAlong(direction, y_half, y_normal, y_slab_center, y_slab_half); };
   const Vec3 along_own = broadcast(along.in[own][0], along.in[own][1], along.in[own][2]);
-  const Vec3 along_other = broadcast(along.in[other][0], along.in[other][1], along.in[other][2]);
-  const Interval y_along = intervalAlong(along_other, y_half, y_normal, y_slab_center, y_slab_half);
-  const V y_radius = hn::Sqrt(dot(y_half, y_half));
+  const Interval y_along = ofNode(broadcast(along.in[other][0], along.in[other][1], along.in[other][2]));
+  const V y_radius = hn::Sqrt(dot(y_half, y_half)), rounding_margin = hn::Set(d, 2 * g.slab_rounding_margin);
   for (std::size_t i = 0; i < 8; i += hn::Lanes(d)) {
-    Vec3 displacement[2];  // from the octants' middles to the node's, along the axes of [0] the octants' side
-    V squares[2];
-    BOCST_UNROLL
-    for (int s = 0; s < 2; ++s) {
-      V w[3], gap[3];
-      BOCST_UNROLL
-      for (int k = 0; k < 3; ++k) {
-        w[k] = hn::Sub(hn::Set(d, y.center[1 - s][k][l]), hn::Load(d, f.center[s][k] + i));
-        const V extent = hn::Add(hn::Load(d, f.half[s][k] + i), hn::Set(d, y.half[1 - s][k][l]));
-        gap[k] = hn::Max(hn::Sub(hn::Abs(w[k]), extent), zero);
-      }
-      displacement[s] = {w[0], w[1], w[2]};
-      // On three axes at right angles gaps add up as the sides of a box.
-      squares[s] = hn::MulAdd(gap[0], gap[0], hn::MulAdd(gap[1], gap[1], hn::Mul(gap[2], gap[2])));
-    }
-    V best = hn::Sqrt(hn::Max(squares[0], squares[1]));
-
-    const Vec3& w = displacement[0];
     const Vec3 half = load(f.half[0], i), normal = load(f.normal[0], i);
     const V slab_center = hn::Load(d, f.slab_center + i), slab_half = hn::Load(d, f.slab_half + i);
-    const auto extent = [&](const Vec3& direction) {
-      return intervalAlong(direction, half, normal, slab_center, slab_half);
-    };
-    best = hn::Max(best, gapOf(dot(along_own, w), extent(along_own), y_along));
+    const Interval slab{hn::Sub(slab_center, slab_half), hn::Add(slab_center, slab_half)};
+    const auto ofOctants = [&](const Vec3& direction)
+                               HWY_ATTR { return intervalAlong(direction, half, normal, slab_center, slab_half); };
+    const BoxGaps boxes = boxGaps(f, i, y, l);
+    const Vec3& w = boxes.displacement;
+    V best = hn::Max(boxes.at_least, gapOf(dot(along_own, w), ofOctants(along_own), y_along));
 
-    const V length = hn::Sqrt(dot(w, w)), inverse = hn::Div(one, hn::Max(length, tiny));
+    const V length = hn::Sqrt(dot(w, w)), inverse = hn::Div(hn::Set(d, 1.0f), hn::Max(length, hn::Set(d, 1e-12f)));
     const Vec3 line = scaled(w, inverse), line_other = turned(g.side[own].to_other, line);
-    const Interval y_line = intervalAlong(line_other, y_half, y_normal, y_slab_center, y_slab_half);
-    best = hn::Max(best, gapOf(dot(line, w), extent(line), y_line));
+    best = hn::Max(best, gapOf(dot(line, w), ofOctants(line), ofNode(line_other)));
 
-    // Along the normals, which may be shorter than one by what their bytes round; no normal gives no gap.
-    const V shortest = hn::Set(d, 0.5f);
-    {
-      const Vec3 n = load(f.normal[1], i);
-      const Interval y_interval = intervalAlong(n, y_half, y_normal, y_slab_center, y_slab_half);
-      const Interval own_interval{hn::Sub(slab_center, slab_half), hn::Add(slab_center, slab_half)};
-      const V norm = hn::Max(hn::Sqrt(dot(normal, normal)), shortest);
-      const V gap = hn::Div(gapOf(dot(normal, w), own_interval, y_interval), norm);
-      best = hn::IfThenElse(hn::Gt(dot(normal, normal), zero), hn::Max(best, gap), best);
-    }
-    {
-      const Vec3 m = broadcast(y.normal[1][0][l], y.normal[1][1][l], y.normal[1][2][l]);
-      const Interval y_interval{hn::Sub(y_slab_center, y_slab_half), hn::Add(y_slab_center, y_slab_half)};
-      const V norm = hn::Max(hn::Sqrt(dot(y_normal, y_normal)), shortest);
-      const V gap = hn::Div(gapOf(dot(m, w), extent(m), y_interval), norm);
-      best = hn::IfThenElse(hn::Gt(dot(y_normal, y_normal), zero), hn::Max(best, gap), best);
-    }
-    const V rounding_margin = hn::Set(d, 2 * g.slab_rounding_margin);
+    best = orAlongNormal(best, normal, dot(normal, w), slab, ofNode(load(f.normal[1], i)));
+    best = orAlongNormal(best, y_normal_there, dot(y_normal_there, w), ofOctants(y_normal_there), y_slab);
     best = hn::Sub(hn::Mul(best, hn::Set(d, 1 - 16 * 0x1p-24f)), rounding_margin);
-    hn::Store(hn::Max(best, zero), d, gaps.at_least + i);
+    hn::Store(hn::Max(best, hn::Zero(d)), d, gaps.at_least + i);
     const V most = hn::Add(length, hn::Add(hn::Sqrt(dot(half, half)), y_radius));
     hn::Store(hn::MulAdd(most, hn::Set(d, 1 + 16 * 0x1p-24f), rounding_margin), d, gaps.at_most + i);
   }
@@ -126,63 +130,135 @@ HWY_INLINE V clampToUnit(V x) {
   return hn::Min(hn::Max(x, hn::Zero(d)), hn::Set(d, 1.0f));
 }
 
+// The square of the distance of boxes.
+HWY_INLINE V squareOfGap(const Vec3& low, const Vec3& high, const Vec3& lo, const Vec3& hi) {
+  const V zero = hn::Zero(D());
+  const V x = hn::Max(hn::Max(hn::Sub(low.x, hi.x), hn::Sub(lo.x, high.x)), zero);
+  const V y = hn::Max(hn::Max(hn::Sub(low.y, hi.y), hn::Sub(lo.y, high.y)), zero);
+  const V z = hn::Max(hn::Max(hn::Sub(low.z, hi.z), hn::Sub(lo.z, high.z)), zero);
+  return hn::MulAdd(x, x, hn::MulAdd(y, y, hn::Mul(z, z)));
+}
+
+// The rows' boxes and how far they reach along a direction, once for all lanes.
+struct RowBoxes {
+  alignas(64) float low[3][TrianglePack::kCapacity], high[3][TrianglePack::kCapacity];
+  alignas(64) float extent[TrianglePack::kCapacity];
+};
+
+HWY_INLINE void boundRows(const TrianglePack& rows, const Vec3& along, RowBoxes& boxes) {
+  const D d;
+  for (std::size_t i = 0; i < rows.count; i += hn::Lanes(d)) {
+    const Vec3 p[3] = {corner(rows, 0, i), corner(rows, 1, i), corner(rows, 2, i)};
+    store(min3(p), boxes.low, i);
+    store(max3(p), boxes.high, i);
+    hn::Store(max3(dot(along, p[0]), dot(along, p[1]), dot(along, p[2])), d, boxes.extent + i);
+  }
+}
+
+// Bit r: row r comes nearer than `far` to the box about all lanes, and along the direction.
+HWY_INLINE std::uint64_t nearRows(const RowBoxes& boxes, std::size_t count, const Vec3& lanes_low,
+                                  const Vec3& lanes_high, V lanes_along, V far, V far_squared) {
+  const D d;
+  const Vec3 low{hn::MinOfLanes(d, lanes_low.x), hn::MinOfLanes(d, lanes_low.y), hn::MinOfLanes(d, lanes_low.z)};
+  const Vec3 high{hn::MaxOfLanes(d, lanes_high.x), hn::MaxOfLanes(d, lanes_high.y), hn::MaxOfLanes(d, lanes_high.z)};
+  const V lowest = hn::MinOfLanes(d, lanes_along);
+  std::uint64_t rows = 0;
+  for (std::size_t row = 0; row < count; row += hn::Lanes(d)) {
+    const V square = squareOfGap(low, high, load(boxes.low, row), load(boxes.high, row));
+    const M in = hn::And(hn::Lt(square, far_squared), hn::Lt(hn::Sub(lowest, hn::Load(d, boxes.extent + row)), far));
+    std::uint8_t bits[8] = {};
+    hn::StoreMaskBits(d, in, bits);
+    rows |= std::uint64_t{bits[0]} << row;
+  }
+  return rows & ((std::uint64_t{1} << count) - 1);
+}
+
+// A vector of triangles and what does not depend on their partners.
+struct Lanes {
+  Vec3 corner[3], edge[3], normal;
+  V edge_squared[3], normal_inverse, above[3];  // along the normal
+};
+
+HWY_INLINE Lanes lanesOf(const TrianglePack& pack, std::size_t i, V tiny) {
+  const D d;
+  Lanes t;
+  BOCST_UNROLL
+  for (std::size_t k = 0; k < 3; ++k) t.corner[k] = corner(pack, k, i);
+  t.edge[0] = sub(t.corner[1], t.corner[0]), t.edge[1] = sub(t.corner[2], t.corner[1]),
+  t.edge[2] = sub(t.corner[0], t.corner[2]);
+  t.normal = cross(t.edge[0], t.edge[1]);
+  t.normal_inverse = hn::Div(hn::Set(d, 1.0f), hn::Max(hn::Sqrt(dot(t.normal, t.normal)), tiny));
+  BOCST_UNROLL
+  for (int k = 0; k < 3; ++k) t.edge_squared[k] = dot(t.edge[k], t.edge[k]), t.above[k] = dot(t.normal, t.corner[k]);
+  return t;
+}
+
+// How far the triangle p, with edges e, and those of the lanes are apart along either normal.
+HWY_INLINE V gapAlongNormals(const Vec3 (&p)[3], const Vec3 (&e)[3], const Lanes& q, V tiny) {
+  const Vec3 n = cross(e[0], e[1]), &m = q.normal;
+  const V n_inverse = hn::Div(hn::Set(D(), 1.0f), hn::Max(hn::Sqrt(dot(n, n)), tiny));
+  const V along_n =
+      gapAlong(dot(n, p[0]), dot(n, p[1]), dot(n, p[2]), dot(n, q.corner[0]), dot(n, q.corner[1]), dot(n, q.corner[2]));
+  const V along_m = gapAlong(dot(m, p[0]), dot(m, p[1]), dot(m, p[2]), q.above[0], q.above[1], q.above[2]);
+  return hn::Max(hn::Mul(along_n, n_inverse), hn::Mul(along_m, q.normal_inverse));
+}
+
+// Where an edge of p and one of the lanes' triangles are nearest: the displacement, and its square.
+struct NearestEdges {
+  Vec3 line;
+  V square;
+};
+
+HWY_INLINE NearestEdges nearestEdges(const Vec3 (&p)[3], const Vec3 (&e)[3], const Lanes& q, V tiny) {
+  const D d;
+  const V zero = hn::Zero(d);
+  NearestEdges nearest{{zero, zero, zero}, hn::Set(d, 3e38f)};
+  BOCST_UNROLL
+  for (int a = 0; a < 3; ++a) {
+    const V ee = dot(e[a], e[a]), ee_inverse = hn::Div(hn::Set(d, 1.0f), hn::Max(ee, tiny));
+    BOCST_UNROLL
+    for (int b = 0; b < 3; ++b) {
+      const Vec3 r = sub(p[a], q.corner[b]), &f = q.edge[b];
+      const V er = dot(e[a], r), fr = dot(f, r), ef = dot(e[a], f), ff = q.edge_squared[b];
+      const V det = hn::Max(hn::MulSub(ee, ff, hn::Mul(ef, ef)), tiny);
+      V s = clampToUnit(hn::Div(hn::MulSub(ef, fr, hn::Mul(er, ff)), det));
+      const V t = clampToUnit(hn::Div(hn::MulAdd(ef, s, fr), hn::Max(ff, tiny)));
+      s = clampToUnit(hn::Mul(hn::MulSub(ef, t, er), ee_inverse));
+      const Vec3 between{hn::NegMulAdd(s, e[a].x, hn::MulSub(t, f.x, r.x)),
+                         hn::NegMulAdd(s, e[a].y, hn::MulSub(t, f.y, r.y)),
+                         hn::NegMulAdd(s, e[a].z, hn::MulSub(t, f.z, r.z))};
+      const V square = dot(between, between);
+      const M better = hn::Lt(square, nearest.square);
+      nearest.square = hn::IfThenElse(better, square, nearest.square);
+      nearest.line = choose(better, between, nearest.line);
+    }
+  }
+  return nearest;
+}
+
 std::size_t NearPairs(const TrianglePack& rows, const TrianglePack& lanes, const float direction[3], float cutoff,
                       NearPair* pairs) {
   const D d;
   const float size = (rows.size > lanes.size ? rows.size : lanes.size) * 1.0001f;
   const V rounding_margin = hn::Set(d, 32 * 0x1p-24f * size), zero = hn::Zero(d), tiny = hn::Set(d, 1e-12f);
-  const V more = hn::Set(d, 1 + 16 * 0x1p-24f);
+  const V more = hn::Set(d, 1 + 16 * 0x1p-24f), huge = hn::Set(d, 3e38f);
   V far = hn::MulAdd(hn::Set(d, cutoff), more, rounding_margin), far_squared = hn::Mul(far, hn::Mul(far, more));
   const Vec3 along = broadcast(direction[0], direction[1], direction[2]);
+  RowBoxes boxes;
+  boundRows(rows, along, boxes);
   std::size_t found = 0;
-  // The rows' boxes and how far they reach, once for all lanes.
-  alignas(64) float lows[3][TrianglePack::kCapacity], highs[3][TrianglePack::kCapacity];
-  alignas(64) float extent[TrianglePack::kCapacity];
-  for (std::size_t i = 0; i < rows.count; i += hn::Lanes(d)) {
-    const Vec3 p[3] = {corner(rows, 0, i), corner(rows, 1, i), corner(rows, 2, i)};
-    const Vec3 lo = min3(p), hi = max3(p);
-    store(lo, lows, i);
-    store(hi, highs, i);
-    hn::Store(max3(dot(along, p[0]), dot(along, p[1]), dot(along, p[2])), d, extent + i);
-  }
-  const auto squareOfGap = [&](const Vec3& low, const Vec3& high, const Vec3& lo, const Vec3& hi) {
-    const V x = hn::Max(hn::Max(hn::Sub(low.x, hi.x), hn::Sub(lo.x, high.x)), zero);
-    const V y = hn::Max(hn::Max(hn::Sub(low.y, hi.y), hn::Sub(lo.y, high.y)), zero);
-    const V z = hn::Max(hn::Max(hn::Sub(low.z, hi.z), hn::Sub(lo.z, high.z)), zero);
-    return hn::MulAdd(x, x, hn::MulAdd(y, y, hn::Mul(z, z)));
-  };
   for (std::size_t i = 0; i < lanes.count; i += hn::Lanes(d)) {
-    const Vec3 q[3] = {corner(lanes, 0, i), corner(lanes, 1, i), corner(lanes, 2, i)};
-    const Vec3 qmin = min3(q), qmax = max3(q);
-    const V qlow = min3(dot(along, q[0]), dot(along, q[1]), dot(along, q[2]));
-    const Vec3 f[3] = {sub(q[1], q[0]), sub(q[2], q[1]), sub(q[0], q[2])};
-    const Vec3 m = cross(f[0], f[1]);
-    const V m_inverse = hn::Div(hn::Set(d, 1.0f), hn::Max(hn::Sqrt(dot(m, m)), tiny));
-    const V ff[3] = {dot(f[0], f[0]), dot(f[1], f[1]), dot(f[2], f[2])};
-    const V mq[3] = {dot(m, q[0]), dot(m, q[1]), dot(m, q[2])};
-
+    const Lanes q = lanesOf(lanes, i, tiny);
+    const Vec3 low = min3(q.corner), high = max3(q.corner);
+    const V q_along = min3(dot(along, q.corner[0]), dot(along, q.corner[1]), dot(along, q.corner[2]));
     const M is_triangle = hn::FirstN(d, lanes.count - i);
-
-    // Rows that come near to the box of these lanes.
-    const Vec3 low{hn::MinOfLanes(d, qmin.x), hn::MinOfLanes(d, qmin.y), hn::MinOfLanes(d, qmin.z)};
-    const Vec3 high{hn::MaxOfLanes(d, qmax.x), hn::MaxOfLanes(d, qmax.y), hn::MaxOfLanes(d, qmax.z)};
-    const V lowest = hn::MinOfLanes(d, qlow);
-    std::uint64_t near_rows = 0;
-    for (std::size_t row = 0; row < rows.count; row += hn::Lanes(d)) {
-      const V square = squareOfGap(low, high, load(lows, row), load(highs, row));
-      const M in = hn::And(hn::Lt(square, far_squared), hn::Lt(hn::Sub(lowest, hn::Load(d, extent + row)), far));
-      std::uint8_t bits[8] = {};
-      hn::StoreMaskBits(d, in, bits);
-      near_rows |= std::uint64_t{bits[0]} << row;
-    }
-    near_rows &= (std::uint64_t{1} << rows.count) - 1;
-
+    std::uint64_t near_rows = nearRows(boxes, rows.count, low, high, q_along, far, far_squared);
     for (; near_rows != 0; near_rows &= near_rows - 1) {
       const auto row = static_cast<std::size_t>(__builtin_ctzll(near_rows));
-      const Vec3 row_low = broadcast(lows[0][row], lows[1][row], lows[2][row]);
-      const Vec3 row_high = broadcast(highs[0][row], highs[1][row], highs[2][row]);
-      M near = hn::And(hn::Lt(squareOfGap(qmin, qmax, row_low, row_high), far_squared),
-                       hn::And(hn::Lt(hn::Sub(qlow, hn::Set(d, extent[row])), far), is_triangle));
+      const Vec3 row_low = broadcast(boxes.low[0][row], boxes.low[1][row], boxes.low[2][row]);
+      const Vec3 row_high = broadcast(boxes.high[0][row], boxes.high[1][row], boxes.high[2][row]);
+      M near = hn::And(hn::Lt(squareOfGap(low, high, row_low, row_high), far_squared),
+                       hn::And(hn::Lt(hn::Sub(q_along, hn::Set(d, boxes.extent[row])), far), is_triangle));
       if (hn::AllFalse(d, near)) continue;
 
       Vec3 p[3];
@@ -191,49 +267,22 @@ std::size_t NearPairs(const TrianglePack& rows, const TrianglePack& lanes, const
         p[k] = broadcast(rows.xyz[3 * k][row], rows.xyz[3 * k + 1][row], rows.xyz[3 * k + 2][row]);
       }
       const Vec3 e[3] = {sub(p[1], p[0]), sub(p[2], p[1]), sub(p[0], p[2])};
-      const Vec3 n = cross(e[0], e[1]);
-      const V n_inverse = hn::Div(hn::Set(d, 1.0f), hn::Max(hn::Sqrt(dot(n, n)), tiny));
-      V at_least = hn::Mul(gapAlong(dot(n, p[0]), dot(n, p[1]), dot(n, p[2]), dot(n, q[0]), dot(n, q[1]), dot(n, q[2])),
-                           n_inverse);
-      at_least = hn::Max(at_least,
-                         hn::Mul(gapAlong(dot(m, p[0]), dot(m, p[1]), dot(m, p[2]), mq[0], mq[1], mq[2]), m_inverse));
+      V at_least = gapAlongNormals(p, e, q, tiny);
       near = hn::And(near, hn::Lt(at_least, far));
       if (hn::AllFalse(d, near)) continue;
 
-      // Where the edges are nearest.
-      Vec3 line{zero, zero, zero};
-      V nearest = hn::Set(d, 3e38f);
-      BOCST_UNROLL
-      for (int a = 0; a < 3; ++a) {
-        const V ee = dot(e[a], e[a]), ee_inverse = hn::Div(hn::Set(d, 1.0f), hn::Max(ee, tiny));
-        BOCST_UNROLL
-        for (int b = 0; b < 3; ++b) {
-          const Vec3 r = sub(p[a], q[b]);
-          const V er = dot(e[a], r), fr = dot(f[b], r), ef = dot(e[a], f[b]);
-          const V det = hn::Max(hn::MulSub(ee, ff[b], hn::Mul(ef, ef)), tiny);
-          V s = clampToUnit(hn::Div(hn::MulSub(ef, fr, hn::Mul(er, ff[b])), det));
-          const V t = clampToUnit(hn::Div(hn::MulAdd(ef, s, fr), hn::Max(ff[b], tiny)));
-          s = clampToUnit(hn::Mul(hn::MulSub(ef, t, er), ee_inverse));
-          const Vec3 between{hn::NegMulAdd(s, e[a].x, hn::MulSub(t, f[b].x, r.x)),
-                             hn::NegMulAdd(s, e[a].y, hn::MulSub(t, f[b].y, r.y)),
-                             hn::NegMulAdd(s, e[a].z, hn::MulSub(t, f[b].z, r.z))};
-          const V square = dot(between, between);
-          const M better = hn::Lt(square, nearest);
-          nearest = hn::IfThenElse(better, square, nearest);
-          line = {hn::IfThenElse(better, between.x, line.x), hn::IfThenElse(better, between.y, line.y),
-                  hn::IfThenElse(better, between.z, line.z)};
-        }
-      }
-      const V gap = gapAlong(dot(line, p[0]), dot(line, p[1]), dot(line, p[2]), dot(line, q[0]), dot(line, q[1]),
-                             dot(line, q[2]));
-      at_least = hn::Max(at_least, hn::Div(gap, hn::Max(hn::Sqrt(nearest), tiny)));
+      const NearestEdges nearest = nearestEdges(p, e, q, tiny);
+      const Vec3& line = nearest.line;
+      const V gap = gapAlong(dot(line, p[0]), dot(line, p[1]), dot(line, p[2]), dot(line, q.corner[0]),
+                             dot(line, q.corner[1]), dot(line, q.corner[2]));
+      at_least = hn::Max(at_least, hn::Div(gap, hn::Max(hn::Sqrt(nearest.square), tiny)));
       near = hn::And(near, hn::Lt(at_least, far));
       std::uint8_t bits[8] = {};
       hn::StoreMaskBits(d, near, bits);
       if (bits[0] == 0) continue;
       // The edges are no farther apart than where they were found, so nothing farther is of interest any more.
-      far = hn::Min(far, hn::MulAdd(hn::Sqrt(hn::MinOfLanes(d, hn::IfThenElse(near, nearest, hn::Set(d, 3e38f)))), more,
-                                    hn::Add(rounding_margin, rounding_margin)));
+      const V least_square = hn::MinOfLanes(d, hn::IfThenElse(near, nearest.square, huge));
+      far = hn::Min(far, hn::MulAdd(hn::Sqrt(least_square), more, hn::Add(rounding_margin, rounding_margin)));
       far_squared = hn::Mul(far, hn::Mul(far, more));
       alignas(64) float least[8];
       hn::Store(hn::Max(hn::Sub(hn::Mul(at_least, hn::Set(d, 1 - 16 * 0x1p-24f)), rounding_margin), zero), d, least);

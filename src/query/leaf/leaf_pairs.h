@@ -262,8 +262,8 @@ class LeafPairs {
     return false;
   }
 
-  // About the middle of the smaller leaf, as its corners are packed; calls f(triangle of the leaf, coarse triangle,
-  // ...).
+  // All about the middle of the smaller leaf's box, as its packed corners are. Calls f(triangle of that leaf, large
+  // triangle, whether they surely meet).
   template <typename Side, typename F>
   bool testLarge(LeafPacks<Side>& leaves, const Side& side, typename Side::Node node, const LargeTriangles& large,
                  std::uint32_t which, const SimilarityTransform& to, F&& f) {

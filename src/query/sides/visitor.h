@@ -22,10 +22,10 @@ struct CellLeaf {
   Sphere sphere;
 };
 
-/// What need not be visited, for a visitor that looks for the first of many pairs and moves the cut: of side A with
-/// exact answers, nodes whose least coordinate along `axis` is larger than `last`, in the frame of A; where leaves are
-/// cells, nodes whose cells all have ids larger than `last_cell`, on side `cell_side` (0: A) where both sides have
-/// cells.
+/// What need not be visited, for a visitor that looks for the first of many pairs and lowers `last` and `last_cell` as
+/// it finds them: of side A with exact answers, nodes whose least coordinate along `axis` is larger than `last`, in the
+/// frame of A; where leaves are cells, nodes whose cells all have ids larger than `last_cell`, on side `cell_side` (0:
+/// A) where both sides have cells.
 struct Cut {
   int axis = 0;
   double last = std::numeric_limits<double>::infinity();
@@ -37,7 +37,7 @@ struct Cut {
     return v.center[k] - static_cast<double>(v.half[k]);
   }
   /// Half extents are rounded to float: by less than 2^-8 of a lattice unit, as is the middle.
-  bool isBeyond(const Volume& v) const { return leastOf(v) > last + 0x1p-6; }
+  bool isBeyond(double least) const { return least > last + 0x1p-6; }
 };
 
 /// What a query does with the pairs that a walk finds. Each function returns true to end the walk. A pair may come more

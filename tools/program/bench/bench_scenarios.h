@@ -17,6 +17,9 @@ void benchFresh(BenchSetting& setting, BenchReport& report);
 /// Meshes that cubes divide badly, whatever the files: build and queries beside FCL's.
 void benchCliffs(BenchSetting& setting, BenchReport& report);
 
+/// An arm among shelves and both meshes under FCL's broad phase: pairs one by one, states, modes.
+void benchPlanner(BenchSetting& setting, BenchReport& report);
+
 /// Do they touch? On poses that were asked until the trees stopped growing.
 void benchWarm(BenchSetting& setting, BenchReport& report);
 

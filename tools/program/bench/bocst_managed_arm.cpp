@@ -1,0 +1,45 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#include <bocst/fcl.h>
+
+#include "bench/managed_arm_of.h"
+
+namespace bocst::program {
+namespace {
+
+struct BocstQueries {
+  template <typename... Arguments>
+  static void collide(Arguments&&... arguments) {
+    fcl::collide(std::forward<Arguments>(arguments)...);
+  }
+  template <typename... Arguments>
+  static void distance(Arguments&&... arguments) {
+    fcl::distance(std::forward<Arguments>(arguments)...);
+  }
+};
+
+class BocstArm final : public ManagedArmOf<BocstManagedArm, BocstQueries> {
+ public:
+  using ManagedArmOf::ManagedArmOf;
+
+  void rest(double seconds) override {
+    const auto later =
+        Clock::now() + std::chrono::duration_cast<Clock::duration>(std::chrono::duration<double>(seconds));
+    for (const auto& geometry : geometries()) static_cast<Modeld&>(*geometry).prune(later);
+  }
+};
+
+}  // namespace
+
+std::unique_ptr<BocstManagedArm> manageBocstArm(const ArmWorld& world, const Options& options) {
+  std::vector<std::shared_ptr<fcl::CollisionGeometryd>> geometries;
+  for (const auto* bodies : {&world.links(), &world.things()}) {
+    for (const ArmWorld::Thing& body : *bodies) {
+      auto model = std::make_shared<Modeld>(body.mesh, options);
+      model->computeLocalAABB();
+      geometries.push_back(std::move(model));
+    }
+  }
+  return std::make_unique<BocstArm>(world, std::move(geometries));
+}
+
+}  // namespace bocst::program

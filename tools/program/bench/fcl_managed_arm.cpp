@@ -1,0 +1,43 @@
+// SPDX-License-Identifier: BSD-3-Clause
+// No bocst overload is in sight here, see pairs/fcl_pair.cpp.
+#include <bocst/fcl_templates.h>
+#include <fcl/geometry/bvh/BVH_model.h>
+#include <fcl/narrowphase/collision.h>
+#include <fcl/narrowphase/distance.h>
+
+#include "bench/managed_arm_of.h"
+
+namespace bocst::program {
+namespace {
+
+struct FclQueries {
+  template <typename... Arguments>
+  static void collide(Arguments&&... arguments) {
+    fcl::collide(std::forward<Arguments>(arguments)...);
+  }
+  template <typename... Arguments>
+  static void distance(Arguments&&... arguments) {
+    fcl::distance(std::forward<Arguments>(arguments)...);
+  }
+};
+
+std::shared_ptr<fcl::CollisionGeometryd> build(const std::shared_ptr<const Mesh>& mesh) {
+  const MeshArrays arrays(*mesh, Scalar::kDouble);
+  auto model = std::make_shared<fcl::BVHModel<fcl::OBBRSSd>>();
+  model->beginModel(static_cast<int>(arrays.triangles.size()), static_cast<int>(arrays.vertices.size()));
+  model->addSubModel(arrays.vertices, arrays.triangles);
+  model->endModel();
+  model->computeLocalAABB();
+  return model;
+}
+
+}  // namespace
+
+std::unique_ptr<ManagedArm> manageFclArm(const ArmWorld& world) {
+  std::vector<std::shared_ptr<fcl::CollisionGeometryd>> geometries;
+  for (const ArmWorld::Thing& link : world.links()) geometries.push_back(build(link.mesh));
+  for (const ArmWorld::Thing& thing : world.things()) geometries.push_back(build(thing.mesh));
+  return std::make_unique<ManagedArmOf<ManagedArm, FclQueries>>(world, std::move(geometries));
+}
+
+}  // namespace bocst::program
