@@ -274,7 +274,7 @@ struct SceneCommand {
               << (model.exact() ? " collide.\n" : " may collide.\n");
     if (report.statesOutsideLimits() > 0) {
       std::cout << "In " << report.statesOutsideLimits() << " of " << report.states()
-                << " a joint is outside of its limits.\n";
+                << " states a joint is outside of its limits.\n";
     }
     const std::string differences = report.explainedDifferences(model);
     if (!differences.empty()) std::cout << differences << ".\n";
