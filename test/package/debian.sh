@@ -40,7 +40,7 @@ depends libbocst-dev libfcl-dev libeigen3-dev
 if [[ $(cached BUILD_SHARED_LIBS) == ON ]]; then
   depends libbocst-dev "$library (= $version)"
   depends "$library" "libfcl0.7*" "libassimp5*" "libpugixml1v5*" "libhwy1*"
-  [[ ! -s $work/bocst.files ]] || depends bocst "$library (= $version)" "libfcl0.7*" "libcairo2*" "libmeshoptimizer2*"
+  [[ ! -s $work/bocst.files ]] || depends bocst "$library (= $version)" "libfcl0.7*" "libcairo2*" "libmeshoptimizer2*" "liburdfdom-model*"
   if grep -E '\.(h|cmake|pc|so)$' "$work/$library.files"; then fail "$library has files of the dev package"; fi
   dpkg-deb --ctrl-tarfile "$work/packages/$library"_*.deb | tar -xO ./shlibs >"$work/shlibs" || fail "no shlibs"
   for name in libbocst libbocst_io; do

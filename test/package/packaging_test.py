@@ -30,6 +30,7 @@ NAMES = {
     "nlohmann_json": ("nlohmann-json", "nlohmann_json"),
     "meshoptimizer": ("meshoptimizer", "meshoptimizer"),
     "cairo": ("cairo", "cairo"),
+    "urdfdom": ("urdfdom", "urdfdom"),
 }
 
 # Stand-ins for vcpkg's functions: the port file runs with them and leaves what it would do in variables.

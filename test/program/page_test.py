@@ -1,7 +1,7 @@
 #!/usr/bin/env python3
 # SPDX-License-Identifier: BSD-3-Clause
 """Usage: page_test.py PROGRAM MODELS [PICTURES]
-Opens the pages of `bocst inspect --html` and `bocst collide --html` in Chromium and uses them as a person would.
+Opens the pages of `bocst inspect --html`, `bocst collide --html` and so on in Chromium and uses them as a person would.
 PICTURES: a folder for screenshots."""
 
 import json
@@ -16,6 +16,7 @@ from browser import Browser
 
 PROGRAM, MODELS = sys.argv[1:3]
 PICTURES = sys.argv[3] if len(sys.argv) > 3 else None
+CELL = os.path.join(MODELS, "..", "examples", "scene", "cell.json")
 LINK, GRIPPER = (os.path.join(MODELS, name + ".obj") for name in ("link", "gripper"))
 
 # Pixels of the 3D view that are not background, in the frame that a change of `volume` causes.
@@ -32,6 +33,10 @@ COVERAGE = """new Promise(done => {
     done(covered);
   });
 })"""
+
+# The same of pixels in the colour of what touches.
+REDS = COVERAGE.replace("Math.abs(pixels[i] - 244) > 3 || Math.abs(pixels[i + 2] - 248) > 3",
+                        "pixels[i] > 90 && pixels[i] > 2.5 * pixels[i + 1]")
 
 
 def torus(file, n):
@@ -185,6 +190,49 @@ class PageTest(unittest.TestCase):
             self.assertIn("theydo not collide", browser.text("facts"))
             self.assertEqual(browser.value("document.getElementById('contacts-row').hidden"), True)
             self.assertEqual(browser.complaints, [])
+
+    def test_scene_shows_each_state_and_what_touches(self):
+        report = self.report("scene", CELL, "--clearance")
+        self.assertGreater(report["collisions"], 1)
+        self.assertLess(report["collisions"], report["asked"])
+        with Browser() as browser:
+            browser.open(self.page)
+            self.assertEqual(browser.value("document.getElementById('volumes-row').hidden"), True)
+            self.assertEqual(browser.value("document.getElementById('tree-row').hidden"), True)
+            covered = set()
+            for k, state in enumerate(report["states"]):
+                browser.choose("state", k)
+                self.assertEqual(browser.text("state-shown"), f"{k + 1} of {report['asked']} ({state['place']})")
+                shown = browser.value("[...document.querySelectorAll('#pairs li')].map(line => line.textContent)")
+                self.assertEqual(shown, [" - ".join(pair) for pair in state["pairs"]])
+                verdict = "collides" if state["collide"] else f"free, clearance {float('%.4g' % state['clearance'])}"
+                self.assertEqual(browser.text("verdict").rstrip("0"), verdict.rstrip("0"))
+                covered.add(browser.value(COVERAGE))
+                self.keep(browser, f"scene_{k}")
+                browser.choose("fixed", False)  # it may stand before what touches
+                self.assertEqual(browser.value(REDS) > 100, state["collide"])
+                browser.choose("fixed", True)
+            self.assertGreater(len(covered), 3)  # the arm moves
+            browser.choose("fixed", False)
+            arm = browser.value(COVERAGE)
+            self.assertGreater(arm, 1000)
+            self.assertLess(arm, min(covered) / 2)
+            # From one collision to the next, and round.
+            hits = [k for k, state in enumerate(report["states"]) if state["collide"]]
+            browser.choose("state", hits[0])
+            for k in hits[1:] + hits[:1]:
+                browser.value("document.getElementById('next').click()")
+                self.assertTrue(browser.text("state-shown").startswith(f"{k + 1} of"))
+            self.assertEqual(browser.complaints, [])
+
+    def test_scene_without_webgl_names_the_pairs(self):
+        report = self.report("scene", CELL)
+        first = next(state for state in report["states"] if state["collide"])
+        with Browser(webgl=False) as browser:
+            browser.open(self.page)
+            browser.choose("state", first["index"])
+            self.assertEqual(browser.text("verdict"), "collides")
+            self.assertIn(" - ".join(first["pairs"][0]), browser.text("pairs"))
 
     def test_without_webgl_the_figures_remain(self):
         report = self.report("inspect", LINK, "--depth", "4")

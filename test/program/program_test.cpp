@@ -593,6 +593,134 @@ TEST_F(Program, MeasuresTheScenariosThatAreNamed) {
   expectComplaint(bench + " --csv " + (folder_ / "none" / "f.csv").string(), kFailed, "none/f.csv");
 }
 
+class SceneProgram : public Program {
+ protected:
+  static std::string example(const std::string& name) {
+    return std::string("'") + BOCST_MODELS + "/../examples/scene/" + name + "'";
+  }
+  static std::string package() { return std::string(" --package 'bocst_models=") + BOCST_MODELS + "'"; }
+
+  static std::set<std::string> pairsOf(const Json& state) {
+    std::set<std::string> names;
+    for (const Json& pair : state.at("pairs")) {
+      names.insert(pair.at(0).get<std::string>() + " " + pair.at(1).get<std::string>());
+    }
+    return names;
+  }
+};
+
+TEST_F(SceneProgram, ChecksARobotAmongObstacles) {
+  const Json report = json("scene " + example("cell.json") + " --clearance");
+  EXPECT_EQ(report.at("robot"), "arm");
+  EXPECT_EQ(report.at("joints"), Json({"shoulder_pan", "shoulder_lift", "elbow", "finger_left_joint"}));
+  EXPECT_EQ(report.at("asked"), 10);
+  EXPECT_EQ(report.at("collisions"), 4);
+  EXPECT_EQ(report.at("outside_limits"), 1);
+  EXPECT_EQ(report.at("agree"), true);
+  EXPECT_EQ(report.at("differences"), Json::array());
+  for (const char* key : {"set_up", "first", "again"}) {
+    for (const char* side : {"bocst", "fcl"}) EXPECT_GT(report.at("times_us").at(side).at(key), 0) << key;
+    EXPECT_GT(report.at("ratio").at(key), 0) << key;
+  }
+  const Json& states = report.at("states");
+  EXPECT_EQ(states.at(0).at("place"), "line 4");
+  for (const Json& state : states) EXPECT_EQ(state.at("clearance") == 0, state.at("collide")) << state;
+  EXPECT_EQ(pairsOf(states.at(4)), (std::set<std::string>{"forearm table", "palm table", "finger_right table"}));
+  EXPECT_EQ(pairsOf(states.at(7)), std::set<std::string>{"parcel wall"});
+  EXPECT_EQ(pairsOf(states.at(9)), std::set<std::string>{"column palm"});
+  // What mimics is outside, too.
+  const Json& outside = states.at(4).at("outside_limits");
+  ASSERT_EQ(outside.size(), 2u);
+  EXPECT_EQ(outside.at(0).at("joint"), "finger_left_joint");
+  EXPECT_EQ(outside.at(1).at("value"), -0.06);
+  EXPECT_EQ(outside.at(1).at("lower"), -0.05);
+
+  const Result people = run("scene " + example("cell.json"));
+  EXPECT_EQ(people.code, 0);
+  EXPECT_EQ(people.err, "");
+  for (const char* words : {"4 of 10 states collide.", "parcel - wall", "finger_left_joint 0.06 is not in 0 to 0.05",
+                            "FCL's managers", "line 8   yes"}) {
+    EXPECT_NE(people.out.find(words), std::string::npos) << words << '\n' << people.out;
+  }
+  const Result alone = run("scene " + example("cell.json") + " --no-fcl");
+  EXPECT_EQ(alone.out.find("FCL"), std::string::npos) << alone.out;
+}
+
+TEST_F(SceneProgram, WritesALineForEachState) {
+  const Result result = run("scene " + example("cell.json") + " --clearance --csv -");
+  EXPECT_EQ(result.code, 0) << result.err;
+  std::istringstream stream(result.out);
+  std::vector<std::string> lines;
+  for (std::string line; std::getline(stream, line);) lines.push_back(line);
+  ASSERT_EQ(lines.size(), 11u);
+  EXPECT_EQ(lines[0], "index,place,collide,pairs,clearance,nearest_a,nearest_b,outside_limits");
+  EXPECT_EQ(lines[8], "7,line 11,1,parcel - wall,0.0,parcel,wall,");
+  EXPECT_EQ(lines[1].rfind("0,line 4,0,,0.0", 0), 0u) << lines[1];
+  EXPECT_NE(lines[5].find("; finger_right_joint -0.06 is not in -0.05 to 0"), std::string::npos) << lines[5];
+}
+
+TEST_F(SceneProgram, TakesAUrdfWithATableOfStates) {
+  const std::string table =
+      write("states.csv", "elbow,shoulder_lift,shoulder_pan,finger_left_joint\n0,0,0,0.02\n-0.34,1.45,0.14,0.02\n");
+  const std::string arm = "scene " + example("arm.urdf") + package();
+  const Json report = json(arm + " --states " + table);
+  EXPECT_EQ(report.at("collisions"), 1);
+  EXPECT_EQ(pairsOf(report.at("states").at(1)), std::set<std::string>{"column palm"});
+  EXPECT_EQ(report.at("notes").size(), 1u);
+  EXPECT_NE(report.at("notes").at(0).get<std::string>().find("without an SRDF"), std::string::npos);
+  EXPECT_EQ(json(arm + " --states " + table + " --srdf " + example("arm.srdf")).at("notes").size(), 0u);
+  // Joined links touch each other.
+  const Json adjacent = json(arm + " --adjacent check");
+  EXPECT_EQ(adjacent.at("asked"), 1);
+  EXPECT_EQ(pairsOf(adjacent.at("states").at(0)).count("column shoulder"), 1u);
+  const std::string srdf = write("all.srdf",
+                                 "<robot name='arm'><disable_collisions link1='column' link2='palm'/>"
+                                 "<disable_collisions link1='column' link2='gone'/></robot>");
+  const Result result = run(arm + " --adjacent ignore --states " + table + " --srdf " + srdf);
+  EXPECT_NE(result.out.find("0 of 2 states collide"), std::string::npos) << result.out;
+  EXPECT_NE(result.err.find("no link gone"), std::string::npos) << result.err;
+}
+
+TEST_F(SceneProgram, TakesTheOptionsOfAModel) {
+  const std::string cell = "scene " + example("cell.json");
+  const Json exact = json(cell);
+  for (const std::string options : {"--scalar float", "--answer conservative --depth 4", "--margin 0.02"}) {
+    const Json report = json(cell + " " + options);
+    EXPECT_EQ(report.at("agree"), true) << options;
+    for (std::size_t k = 0; k < 10; ++k) {
+      EXPECT_GE(report.at("states").at(k).at("collide"), exact.at("states").at(k).at("collide")) << options << k;
+    }
+  }
+  EXPECT_GT(json(cell + " --margin 0.02").at("collisions"), 4);
+  // Two cubes 0.1 apart, each with a margin.
+  const std::string cubes = write("cubes.json", "{\"objects\": [{\"name\": \"a\", \"mesh\": \"" + cube() +
+                                                    "\"}, {\"name\": \"b\", \"mesh\": \"" + cube() +
+                                                    "\", \"moving\": true, \"pose\": [1.1, 0, 0]}]}");
+  EXPECT_EQ(json("scene " + cubes + " --margin 0.049").at("collisions"), 0);
+  const Json margin = json("scene " + cubes + " --margin 0.051");
+  EXPECT_EQ(margin.at("collisions"), 1);
+  EXPECT_EQ(margin.at("differences").at(0).at("fault"), false);
+  EXPECT_NEAR(json("scene " + cubes + " --clearance").at("states").at(0).at("clearance"), 0.1, 1e-12);
+}
+
+TEST_F(SceneProgram, SaysWhatIsWrong) {
+  const std::string arm = "scene " + example("arm.urdf");
+  expectComplaint(arm, kFailed, "line 31: link upper_arm: mesh package://bocst_models/link.obj: package bocst_models");
+  expectComplaint(arm + " --package bocst_models", kUsage, "--package: bocst_models: name=folder expected");
+  expectComplaint(arm + " --package bocst_models=/nowhere", kFailed, "/nowhere/link.obj: no such file");
+  expectComplaint(arm + package() + " --adjacent maybe", kUsage, "--adjacent");
+  expectComplaint(arm + package() + " --margin -1", kUsage, "--margin");
+  expectComplaint(arm + package() + " --states " + write("states.csv", "elbow\n1\n"), kFailed,
+                  "states.csv: line 1: columns are missing: shoulder_pan, shoulder_lift, finger_left_joint");
+  expectComplaint(arm + package() + " --states " + (folder_ / "none.csv").string(), kFailed,
+                  "none.csv: cannot be read");
+  expectComplaint(arm + package() + " --srdf " + write("wrong.srdf", "<robot>"), kFailed, "wrong.srdf: line 1: no XML");
+  expectComplaint("scene " + (folder_ / "none.json").string(), kFailed, "none.json: cannot be read");
+  const std::string scene = write("scene.json", "{\"objects\": []}");
+  expectComplaint("scene " + scene, kFailed, "scene.json: nothing moves");
+  expectComplaint("scene " + scene + " --json " + scene, kFailed, "would be written over");
+}
+
 TEST_F(Program, ListsOracles) {
   const Json report = json("oracles");
   bool cpu = false;
@@ -728,7 +856,7 @@ TEST_F(Program, SuggestsWhatWasMeant) {
   EXPECT_EQ(run("help").out, run("--help").out);
   EXPECT_EQ(run("help collide").out, run("collide --help").out);
   EXPECT_NE(run("help").out.find("glb"), std::string::npos) << "all formats are named";
-  for (const std::string command : {"collide", "inspect", "validate", "bench", "paper"}) {
+  for (const std::string command : {"collide", "inspect", "validate", "scene", "bench", "paper"}) {
     const std::string help = run(command + " --help").out;
     EXPECT_FALSE(std::regex_search(help, std::regex("[0-9]{20}"))) << help;
   }

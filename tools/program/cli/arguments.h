@@ -27,6 +27,7 @@ void addCollide(CLI::App& program, Job& job);
 void addInspect(CLI::App& program, Job& job);
 void addValidate(CLI::App& program, Job& job);
 void addMerge(CLI::App& program, Job& job);
+void addScene(CLI::App& program, Job& job);
 void addBench(CLI::App& program, Job& job);
 void addPaper(CLI::App& program, Job& job);
 void addOracles(CLI::App& program, Job& job);

@@ -37,6 +37,8 @@ constexpr std::pair<const char*, const char*> kExamples[] = {
     {"bocst paper bunny00.off ChineseDragon-10kv.off --out paper", "The paper's tables and figures beside ours."},
     {"bocst bench link.obj gripper.obj --scenarios all --csv figures.csv",
      "Time and memory compared with FCL's, as a table."},
+    {"bocst scene arm.urdf --srdf arm.srdf --states path.csv --html arm.html",
+     "Which states of a robot collide, and with what; a page that shows them."},
     {"bocst validate link.obj gripper.obj --poses 10000 --shard 1/4 --json 1.json", "A quarter of a validation."},
 };
 
@@ -218,8 +220,12 @@ _bocst() {
 )" + values +
          R"(  esac
   if [[ $word != -* ]]; then
-    if [[ $command == merge ]]; then _bocst_files json; else _bocst_files )" +
-         meshEndings() + R"(; fi
+    case $command in
+      merge) _bocst_files json ;;
+      scene) _bocst_files json urdf xml ;;
+      *) _bocst_files )" +
+         meshEndings() + R"( ;;
+    esac
     return
   fi
   case $command in

@@ -89,6 +89,7 @@ int run(int argc, char** argv, const std::string& version) {
   addInspect(program, job);
   addValidate(program, job);
   addMerge(program, job);
+  addScene(program, job);
   addBench(program, job);
   addPaper(program, job);
   addOracles(program, job);

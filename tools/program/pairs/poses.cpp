@@ -49,13 +49,19 @@ Pose Pose::parse(const std::string& text, RotationFormat format) {
     while (at != end && (*at == ' ' || *at == '+')) ++at;
     const auto [next, error] = std::from_chars(at, end, read[i]);
     if (error != std::errc()) throw std::invalid_argument(expected);
-    if (!std::isfinite(read[i])) throw std::invalid_argument("a pose has finite numbers");
     at = next;
   }
   if (at != end) throw std::invalid_argument(expected);
-  const auto& [x, y, z, r0, r1, r2, r3] = read;
+  return of(read, format);
+}
+
+Pose Pose::of(const std::array<double, 7>& given, RotationFormat format) {
+  const auto& [x, y, z, r0, r1, r2, r3] = given;
+  for (const double number : given) {
+    if (!std::isfinite(number)) throw std::invalid_argument("a pose has finite numbers");
+  }
   Pose pose;
-  pose.numbers = read;
+  pose.numbers = given;
   if (format == RotationFormat::kXyzw) pose.numbers = {x, y, z, r3, r0, r1, r2};
   if (format == RotationFormat::kRpy) {
     const auto [qw, qx, qy, qz] = quaternionOf(r0, r1, r2);

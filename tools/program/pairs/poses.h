@@ -34,6 +34,9 @@ struct Pose {
   /// the quaternion cannot be normalised.
   static Pose parse(const std::string& text, RotationFormat format = RotationFormat::kWxyz);
 
+  /// Of numbers in that order; kRpy has six, and the last does not count. @throws std::invalid_argument as parse().
+  static Pose of(const std::array<double, 7>& numbers, RotationFormat format = RotationFormat::kWxyz);
+
   double quaternionNorm() const;
   Eigen::Isometry3d transform() const;  ///< Of the quaternion divided by its norm.
   std::string text() const;

@@ -137,6 +137,24 @@ void Page::contacts(const std::vector<TouchingPoint>& contacts) {
   scene_["contacts"] = {{"total", contacts.size()}, {"numbers", base64(numbers)}};
 }
 
+void Page::moving(const std::vector<std::size_t>& objects, std::size_t states) {
+  scene_["states"] = {{"moving", objects}, {"total", states}, {"list", Json::array()}};
+}
+
+void Page::state(const PageState& state) {
+  std::vector<double> numbers;  // 4x4, by columns
+  for (const Eigen::Isometry3d& X : state.poses) {
+    const Eigen::Matrix4d matrix = X.matrix();
+    numbers.insert(numbers.end(), matrix.data(), matrix.data() + 16);
+  }
+  Json contacts = Json::array();
+  for (const auto& [a, b] : state.contacts) contacts.push_back({a, b});
+  scene_["states"]["list"].push_back({{"name", state.name},
+                                      {"poses", base64(numbers)},
+                                      {"contacts", contacts},
+                                      {"clearance", state.clearance ? Json(*state.clearance) : Json()}});
+}
+
 std::string Page::html() const {
   std::string scene = scene_.dump(-1, ' ', true, Json::error_handler_t::replace);
   // Nothing in a name may end the element that holds the scene.

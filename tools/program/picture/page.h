@@ -7,7 +7,9 @@
 
 #include <Eigen/Geometry>
 #include <cstddef>
+#include <optional>
 #include <string>
+#include <utility>
 #include <vector>
 
 #include "cli/report.h"
@@ -16,6 +18,14 @@
 #include "pairs/query_pair.h"
 
 namespace bocst::program {
+
+/// Where the moving objects of a page are at once, chosen by a slider.
+struct PageState {
+  std::string name;
+  std::vector<Eigen::Isometry3d> poses;                       ///< Of each moving object, in the page's frame.
+  std::vector<std::pair<std::size_t, std::size_t>> contacts;  ///< Objects that touch each other.
+  std::optional<double> clearance;
+};
 
 /// One HTML file that shows meshes with their sphere-trees in any browser with WebGL 2: all in itself, nothing is
 /// fetched. Coordinates are shown as they are given; the frame of the page is that of the first object.
@@ -26,6 +36,8 @@ class Page {
   static constexpr std::size_t kMaxNodes = 250000;      ///< Of a tree: the finest levels are left out.
   static constexpr std::size_t kMaxContacts = 20000;    ///< The first ones.
   static constexpr std::size_t kMaxFaults = 100000;     ///< Lines of faulty edges and triangles: the first ones.
+
+  static constexpr std::size_t kMaxStates = 2000;  ///< The first ones.
 
   explicit Page(std::string title);
 
@@ -45,6 +57,10 @@ class Page {
 
   /// In the page's frame.
   void contacts(const std::vector<TouchingPoint>& contacts);
+
+  /// Objects that move, by their numbers, and the states that there are; those to be shown follow by state().
+  void moving(const std::vector<std::size_t>& objects, std::size_t states);
+  void state(const PageState& state);
 
   std::string html() const;
 

@@ -32,8 +32,12 @@ const matrix = {
 };
 
 // Positions of an object are in [-1/2, 1/2]; this is the way to the page's frame, then to the unit ball about the scene.
+function place(object, pose) {
+  object.pose = pose;
+  object.toPage = matrix.product(pose, matrix.product(matrix.moved(object.center), matrix.scaled(object.size)));
+}
 for (const object of scene.objects) {
-  object.toPage = matrix.product(object.pose, matrix.product(matrix.moved(object.center), matrix.scaled(object.size)));
+  place(object, object.pose);
   object.positions = decoded(object.positions, Uint16Array);
   object.indices = decoded(object.indices, Uint32Array);
   for (const tree of object.trees) {
@@ -42,23 +46,35 @@ for (const object of scene.objects) {
     tree.is_leaf = decoded(tree.is_leaf, Uint8Array);
   }
 }
+const states = scene.states ? scene.states.list : [];
+const movers = scene.states ? scene.states.moving.map((o) => scene.objects[o]) : [];
+for (const state of states) state.poses = decoded(state.poses, Float64Array);
+const moveTo = (state) => movers.forEach((object, i) => place(object, state.poses.subarray(16 * i, 16 * i + 16)));
 const contacts = scene.contacts ? decoded(scene.contacts.numbers, Float64Array) : new Float64Array();
 
+function boxCornersOf(object) {
+  return [0, 1, 2, 3, 4, 5, 6, 7].map((i) => matrix.applied(object.toPage, [i & 1, i >> 1 & 1, i >> 2].map((x) => x - 0.5)));
+}
+
+/** About all objects, or about what moves, in all states. */
 function ballOfScene() {
   const low = [Infinity, Infinity, Infinity], high = [-Infinity, -Infinity, -Infinity];
-  for (const object of scene.objects) {
-    for (let corner = 0; corner < 8; ++corner) {
-      const p = matrix.applied(object.toPage, [corner & 1, corner >> 1 & 1, corner >> 2].map((x) => x - 0.5));
-      for (let k = 0; k < 3; ++k) {
-        low[k] = Math.min(low[k], p[k]);
-        high[k] = Math.max(high[k], p[k]);
-      }
-    }
+  const extend = (object) => boxCornersOf(object).forEach((p) => p.forEach((x, k) => {
+    low[k] = Math.min(low[k], x);
+    high[k] = Math.max(high[k], x);
+  }));
+  if (states.length === 0) scene.objects.forEach(extend);
+  for (const state of states) {
+    moveTo(state);
+    movers.forEach(extend);
   }
   const size = high.map((x, k) => x - low[k]);
   return {center: low.map((x, k) => (x + high[k]) / 2), radius: Math.hypot(...size) / 2 || 1};
 }
 const ball = ballOfScene();
+// How far objects reach from its middle, in its radius.
+const reach = Math.max(...scene.objects.flatMap(boxCornersOf).map((p) => Math.hypot(...p.map((x, k) => x - ball.center[k])))) /
+  ball.radius;
 const toBall = matrix.product(matrix.scaled(1 / ball.radius), matrix.moved(ball.center.map((x) => -x)));
 
 // ---- what is chosen
@@ -66,7 +82,7 @@ const toBall = matrix.product(matrix.scaled(1 / ball.radius), matrix.moved(ball.
 const kinds = [...new Set(scene.objects.flatMap((object) => object.trees.map((tree) => tree.name)))];
 const chosen = {get tree() { return byId('tree').value; }, get volume() { return byId('volume').value; },
   get cut() { return byId('cut').value; }, get level() { return Number(byId('level').value); },
-  get opacity() { return Number(byId('opacity').value); }};
+  get opacity() { return Number(byId('opacity').value); }, get state() { return Number(byId('state').value); }};
 const treesShown = () => scene.objects.map((object) => object.trees.find((tree) => tree.name === chosen.tree));
 const number = (x) => x.toLocaleString('en');
 
@@ -165,6 +181,13 @@ const canvas = byId('view');
 const gl = canvas.getContext('webgl2', {alpha: false, antialias: true});
 const camera = {turn: 0.7, tilt: 0.45, distance: 2.5, aim: [0, 0]};
 const objectColors = [[0.62, 0.68, 0.74], [0.80, 0.70, 0.56]];
+const touchColor = [0.87, 0.27, 0.20];
+/** Of two meshes one after the other; in a scene what moves and what does not. */
+function colorOf(object, o) {
+  if (states.length === 0) return objectColors[o % 2];
+  if (states[chosen.state].contacts.some((pair) => pair.includes(o))) return touchColor;
+  return objectColors[movers.includes(object) ? 0 : 1];
+}
 const volumeColors = [[0.16, 0.47, 0.84], [0.90, 0.47, 0.13]];
 const decodedFaults = (object) => object.faults ? decoded(object.faults, Float64Array) : new Float64Array();
 let faulty, programs, meshes, corners, instances, marks;
@@ -287,7 +310,7 @@ function draw() {
   canvas.width = Math.max(1, Math.round(canvas.clientWidth * ratio));
   canvas.height = Math.max(1, Math.round(canvas.clientHeight * ratio));
   gl.viewport(0, 0, canvas.width, canvas.height);
-  camera.projection = matrix.perspective(0.8, canvas.width / canvas.height, 0.02, camera.distance + 20);
+  camera.projection = matrix.perspective(0.8, canvas.width / canvas.height, 0.02, camera.distance + Math.max(20, reach));
   gl.clearColor(0.957, 0.965, 0.973, 1);
   gl.clear(gl.COLOR_BUFFER_BIT | gl.DEPTH_BUFFER_BIT);
   gl.enable(gl.DEPTH_TEST);
@@ -298,8 +321,9 @@ function draw() {
   const eyes = scene.objects.map((object) => matrix.product(view, object.toPage));
   if (byId('mesh').checked) {
     scene.objects.forEach((object, o) => {
+      if (states.length > 0 && !byId('fixed').checked && !movers.includes(object)) return;
       const p = use('mesh', eyes[o], object);
-      gl.uniform4f(p.at('color'), ...objectColors[o % 2], 1);
+      gl.uniform4f(p.at('color'), ...colorOf(object, o), 1);
       gl.bindVertexArray(meshes[o].array);
       gl.drawElements(gl.TRIANGLES, meshes[o].count, gl.UNSIGNED_INT, 0);
     });
@@ -362,6 +386,30 @@ function treeChosen() {
   refill();
 }
 
+function stateChosen() {
+  const state = states[chosen.state];
+  moveTo(state);
+  byId('state-shown').textContent = `${chosen.state + 1} of ${number(states.length)} (${state.name})`;
+  const room = state.clearance === null ? '' : `, clearance ${state.clearance.toPrecision(4)}`;
+  byId('verdict').textContent = state.contacts.length > 0 ? 'collides' : 'free' + room;
+  byId('pairs').replaceChildren(...state.contacts.map((pair) => {
+    const line = document.createElement('li');
+    line.textContent = pair.map((o) => scene.objects[o].name).join(' - ');
+    return line;
+  }));
+  drawSoon();
+}
+
+/** From here on, and again from the first. */
+function nextCollision() {
+  for (let i = 1; i <= states.length; ++i) {
+    const at = (chosen.state + i) % states.length;
+    if (states[at].contacts.length === 0) continue;
+    byId('state').value = at;
+    return stateChosen();
+  }
+}
+
 function element(name, attributes, text) {
   const made = document.createElementNS('http://www.w3.org/2000/svg', name);
   for (const [key, value] of Object.entries(attributes)) made.setAttribute(key, value);
@@ -414,6 +462,9 @@ function notes() {
         lines.push(`${tree.name} of ${object.name}: levels below ${tree.levels} have too many nodes to show.`);
       }
     }
+  }
+  if (states.length > 0 && scene.states.total > states.length) {
+    lines.push(`${number(states.length)} of ${number(scene.states.total)} states are shown.`);
   }
   if (scene.contacts && scene.contacts.total > contacts.length / 7) {
     lines.push(`${number(contacts.length / 7)} of ${number(scene.contacts.total)} contacts are shown.`);
@@ -473,6 +524,11 @@ function start() {
   for (const name of kinds) byId('tree').add(new Option(name));
   byId('tree-row').hidden = kinds.length < 2;
   byId('contacts-row').hidden = contacts.length === 0;
+  byId('volumes-row').hidden = kinds.length === 0;
+  byId('states-row').hidden = states.length === 0;
+  byId('state').max = Math.max(0, states.length - 1);
+  byId('state').value = 0;
+  byId('next').disabled = !states.some((state) => state.contacts.length > 0);
   byId('faults-row').hidden = !scene.objects.some((object) => decodedFaults(object).length > 0);
   // A tree that queries grew ends at many levels; one grown whole ends at one.
   byId('cut-row').hidden = !scene.contacts;
@@ -490,9 +546,12 @@ function start() {
     byId('problem').hidden = false;
   }
   byId('tree').addEventListener('input', treeChosen);
+  byId('state').addEventListener('input', stateChosen);
+  byId('next').addEventListener('click', nextCollision);
   for (const id of ['level', 'cut']) byId(id).addEventListener('input', refill);
-  for (const id of ['volume', 'opacity', 'mesh', 'faults', 'contacts', 'up']) byId(id).addEventListener('input', drawSoon);
+  for (const id of ['volume', 'opacity', 'mesh', 'fixed', 'faults', 'contacts', 'up']) byId(id).addEventListener('input', drawSoon);
   notes();
+  if (states.length > 0) stateChosen();
   refill();
 }
 

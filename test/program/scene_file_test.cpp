@@ -1,0 +1,687 @@
+// SPDX-License-Identifier: BSD-3-Clause
+// What `bocst scene` reads, the kinematics of robots against closed forms, and what it answers where that is known.
+#include "scene/scene_file.h"
+
+#include <gtest/gtest.h>
+#include <unistd.h>
+
+#include <Eigen/Geometry>
+#include <cmath>
+#include <cstdlib>
+#include <filesystem>
+#include <fstream>
+#include <set>
+#include <stdexcept>
+#include <string>
+#include <utility>
+#include <vector>
+
+#include "robot/packages.h"
+#include "robot/urdf.h"
+#include "scene/ask_scene.h"
+#include "scene/scene_page.h"
+#include "scene/shape_mesh.h"
+
+namespace bocst {
+namespace {
+
+namespace fs = std::filesystem;
+using namespace program;
+using Eigen::Isometry3d;
+using Eigen::Matrix3d;
+using Eigen::Vector3d;
+
+/// The rotation about a unit vector by its closed form.
+Matrix3d turned(const Vector3d& axis, double angle) {
+  const double c = std::cos(angle), s = std::sin(angle), x = axis.x(), y = axis.y(), z = axis.z();
+  Matrix3d R;
+  R << c + x * x * (1 - c), x * y * (1 - c) - z * s, x * z * (1 - c) + y * s,  //
+      y * x * (1 - c) + z * s, c + y * y * (1 - c), y * z * (1 - c) - x * s,   //
+      z * x * (1 - c) - y * s, z * y * (1 - c) + x * s, c + z * z * (1 - c);
+  return R;
+}
+
+Matrix3d rpy(double roll, double pitch, double yaw) {
+  return turned(Vector3d::UnitZ(), yaw) * turned(Vector3d::UnitY(), pitch) * turned(Vector3d::UnitX(), roll);
+}
+
+Isometry3d pose(const Matrix3d& R, const Vector3d& p) {
+  Isometry3d X = Isometry3d::Identity();
+  X.linear() = R;
+  X.translation() = p;
+  return X;
+}
+
+void expectNear(const Isometry3d& X, const Isometry3d& wanted, const std::string& what, double tolerance = 1e-14) {
+  EXPECT_LT((X.matrix() - wanted.matrix()).cwiseAbs().maxCoeff(), tolerance) << what << '\n'
+                                                                             << X.matrix() << "\nwanted\n"
+                                                                             << wanted.matrix();
+}
+
+class SceneFile : public ::testing::Test {
+ protected:
+  SceneFile() {
+    std::string pattern = (fs::temp_directory_path() / "bocst_scene_XXXXXX").string();
+    if (mkdtemp(pattern.data()) == nullptr) throw std::runtime_error("no temporary folder");
+    folder_ = pattern;
+    for (const char* name : {"ROS_PACKAGE_PATH", "AMENT_PREFIX_PATH"}) unsetenv(name);
+    write("tetra.off", "OFF\n4 4 0\n0 0 0\n1 0 0\n0 1 0\n0 0 1\n3 0 2 1\n3 0 1 3\n3 1 2 3\n3 2 0 3\n");
+  }
+  ~SceneFile() override { fs::remove_all(folder_); }
+
+  std::string write(const std::string& name, const std::string& text) const {
+    const fs::path file = folder_ / name;
+    fs::create_directories(file.parent_path());
+    std::ofstream(file) << text;
+    return file.string();
+  }
+
+  std::string robot(const std::string& text) const {
+    return write("robot.urdf", "<robot name='r'>\n" + text + "</robot>\n");
+  }
+
+  static Robot read(const std::string& file, const Packages& packages = Packages()) {
+    MeshStore meshes;
+    return readUrdf(file, packages, meshes);
+  }
+
+  SceneSetup scene(const std::string& json,
+                   SceneArguments::Adjacent adjacent = SceneArguments::Adjacent::kAsSrdf) const {
+    SceneArguments arguments;
+    arguments.adjacent = adjacent;
+    arguments.file = write("scene.json", json);
+    return readScene(arguments);
+  }
+
+  template <typename Action>
+  static void expectComplaint(const Action& action, const std::vector<std::string>& pieces) {
+    try {
+      action();
+      ADD_FAILURE() << "no complaint: " << pieces.front();
+    } catch (const std::exception& e) {
+      for (const std::string& piece : pieces) {
+        EXPECT_NE(std::string(e.what()).find(piece), std::string::npos) << e.what() << "\nlacks: " << piece;
+      }
+    }
+  }
+
+  fs::path folder_;
+};
+
+std::string link(const std::string& name, const std::string& geometry = "") {
+  return "<link name='" + name + "'>" +
+         (geometry.empty() ? "" : "<collision><geometry>" + geometry + "</geometry></collision>") + "</link>\n";
+}
+
+std::string joint(const std::string& name, const std::string& type, const std::string& parent, const std::string& child,
+                  const std::string& more = "") {
+  return "<joint name='" + name + "' type='" + type + "'><parent link='" + parent + "'/><child link='" + child + "'/>" +
+         more + "</joint>\n";
+}
+
+const std::string kLimit = "<limit lower='-1' upper='2' effort='1' velocity='1'/>";
+const std::string kSphere = "<sphere radius='0.1'/>";
+
+TEST_F(SceneFile, APlanarArmIsWhereTrigonometrySays) {
+  const double a = 0.7, b = 0.4;
+  const Robot arm =
+      read(robot(link("base") + link("upper") + link("lower") + link("hand") +
+                 joint("q1", "continuous", "base", "upper", "<axis xyz='0 0 1'/>") +
+                 joint("q2", "revolute", "upper", "lower", "<origin xyz='0.7 0 0'/><axis xyz='0 0 1'/>" + kLimit) +
+                 joint("grip", "fixed", "lower", "hand", "<origin xyz='0.4 0 0'/>")));
+  ASSERT_EQ(arm.links().size(), 4u);
+  ASSERT_EQ(arm.freeJoints().size(), 2u);
+  for (const auto& [q1, q2] : {std::pair(0.0, 0.0), {0.3, -0.9}, {-2.5, 1.7}, {1e4, 0.1}}) {
+    const std::vector<Isometry3d> X = arm.linkPoses({q1, q2});
+    EXPECT_NEAR(X[3].translation().x(), a * std::cos(q1) + b * std::cos(q1 + q2), 1e-12);
+    EXPECT_NEAR(X[3].translation().y(), a * std::sin(q1) + b * std::sin(q1 + q2), 1e-12);
+    EXPECT_NEAR(std::remainder(std::atan2(X[3](1, 0), X[3](0, 0)) - q1 - q2, 2 * M_PI), 0, 1e-11);
+  }
+}
+
+TEST_F(SceneFile, EachKindOfJointMovesAsUrdfSays) {
+  // Axes need not be unit vectors, and are in the joint's own frame.
+  const Robot r = read(robot(
+      link("l0") + link("l1") + link("l2") + link("l3") + link("l4") +
+      joint("turn", "revolute", "l0", "l1", "<origin xyz='1 2 3' rpy='0.1 0.2 0.3'/><axis xyz='2 0 0'/>" + kLimit) +
+      joint("slide", "prismatic", "l1", "l2", "<origin xyz='0 0.5 0' rpy='0 0 1.2'/><axis xyz='0 3 4'/>" + kLimit) +
+      joint("bolt", "fixed", "l2", "l3", "<origin xyz='0.1 0 0' rpy='-0.4 0.5 0'/>") +
+      joint("spin", "continuous", "l3", "l4", "<axis xyz='1 1 1'/>")));
+  EXPECT_EQ(r.joints()[0].limits->lower, -1);
+  EXPECT_EQ(r.joints()[0].limits->upper, 2);
+  EXPECT_FALSE(r.joints()[3].limits.has_value());
+  const std::vector<double> q{0.8, -0.25, 5.0};
+  const std::vector<Isometry3d> X = r.linkPoses(q);
+  const Isometry3d X1 = pose(rpy(0.1, 0.2, 0.3), {1, 2, 3}) * pose(turned(Vector3d::UnitX(), q[0]), Vector3d::Zero());
+  const Isometry3d X2 =
+      X1 * pose(rpy(0, 0, 1.2), {0, 0.5, 0}) * pose(Matrix3d::Identity(), q[1] * Vector3d(0, 0.6, 0.8));
+  const Isometry3d X3 = X2 * pose(rpy(-0.4, 0.5, 0), {0.1, 0, 0});
+  const Isometry3d X4 = X3 * pose(turned(Vector3d(1, 1, 1).normalized(), q[2]), Vector3d::Zero());
+  expectNear(X[0], Isometry3d::Identity(), "l0");
+  expectNear(X[1], X1, "l1");
+  expectNear(X[2], X2, "l2");
+  expectNear(X[3], X3, "l3");
+  expectNear(X[4], X4, "l4");
+}
+
+/// A seven-joint arm by the Denavit-Hartenberg parameters of Franka's documentation, and where it says that the flange
+/// is.
+TEST_F(SceneFile, AKnownArmIsWhereItsMakerSays) {
+  const char* origins[] = {"xyz='0 0 0.333'",
+                           "rpy='-1.5707963267948966 0 0'",
+                           "xyz='0 -0.316 0' rpy='1.5707963267948966 0 0'",
+                           "xyz='0.0825 0 0' rpy='1.5707963267948966 0 0'",
+                           "xyz='-0.0825 0.384 0' rpy='-1.5707963267948966 0 0'",
+                           "rpy='1.5707963267948966 0 0'",
+                           "xyz='0.088 0 0' rpy='1.5707963267948966 0 0'"};
+  std::string text = link("l0");
+  for (int i = 1; i <= 7; ++i) {
+    const std::string n = std::to_string(i);
+    text += link("l" + n) + joint("j" + n, "continuous", "l" + std::to_string(i - 1), "l" + n,
+                                  std::string("<origin ") + origins[i - 1] + "/><axis xyz='0 0 1'/>");
+  }
+  // As xacro writes fixed joints, with an axis that means nothing.
+  text += link("flange") + joint("j8", "fixed", "l7", "flange", "<origin xyz='0 0 0.107'/><axis xyz='0 0 0'/>");
+  const Robot arm = read(robot(text));
+  Matrix3d down;
+  down << 1, 0, 0, 0, -1, 0, 0, 0, -1;
+  expectNear(arm.linkPoses({0, 0, 0, 0, 0, 0, 0}).back(), pose(down, {0.088, 0, 0.926}), "upright", 1e-12);
+  const double quarter = M_PI / 4;
+  const Isometry3d ready = arm.linkPoses({0, -quarter, 0, -3 * quarter, 0, 2 * quarter, quarter}).back();
+  EXPECT_LT((ready.translation() - Vector3d(0.3069, 0, 0.5903)).norm(), 1e-4) << ready.translation().transpose();
+}
+
+TEST_F(SceneFile, MimicJointsFollowAlsoByWayOfOthers) {
+  const std::string axis = "<axis xyz='0 0 1'/>";
+  const Robot r = read(robot(
+      link("base") + link("a") + link("b") + link("c") +
+      joint("third", "prismatic", "base", "c", axis + "<mimic joint='second' multiplier='-3' offset='0.5'/>" + kLimit) +
+      joint("second", "prismatic", "base", "b", axis + "<mimic joint='first' multiplier='2' offset='0.1'/>" + kLimit) +
+      joint("first", "prismatic", "base", "a", axis + kLimit)));
+  ASSERT_EQ(r.freeJoints().size(), 1u);
+  EXPECT_EQ(r.joints()[r.freeJoints()[0]].name, "first");
+  const double q = 0.7;
+  const std::vector<Isometry3d> X = r.linkPoses({q});
+  for (std::size_t i = 0; i < r.joints().size(); ++i) {
+    const std::string& name = r.joints()[i].name;
+    const double wanted = name == "first" ? q : name == "second" ? 2 * q + 0.1 : -3 * (2 * q + 0.1) + 0.5;
+    EXPECT_NEAR(X[i + 1].translation().z(), wanted, 1e-15) << name;
+    EXPECT_NEAR(r.jointValues({q})[i], wanted, 1e-15) << name;
+  }
+}
+
+TEST_F(SceneFile, ReadsTheCollisionGeometriesOfALink) {
+  const Robot r =
+      read(robot("<link name='l'>"
+                 "<visual><geometry><mesh filename='nowhere.stl'/></geometry></visual>"
+                 "<collision><origin xyz='1 0 0' rpy='0 0 0.5'/><geometry><box size='1 2 3'/></geometry></collision>"
+                 "<collision><geometry><cylinder radius='0.2' length='0.6'/></geometry></collision>"
+                 "<collision><geometry><sphere radius='0.3'/></geometry></collision>"
+                 "<collision><geometry><mesh filename='tetra.off' scale='2 3 -4'/></geometry></collision>"
+                 "<collision><geometry><mesh filename='file://" +
+                 (folder_ / "tetra.off").string() +
+                 "'/></geometry></collision>"
+                 "</link>"));
+  ASSERT_EQ(r.links().at(0).shapes.size(), 5u);
+  const std::vector<PlacedShape>& shapes = r.links()[0].shapes;
+  EXPECT_EQ(shapes[0].shape.kind, Shape::Kind::kBox);
+  EXPECT_EQ(shapes[0].shape.size, Vector3d(1, 2, 3));
+  expectNear(shapes[0].X_PS, pose(rpy(0, 0, 0.5), {1, 0, 0}), "box");
+  EXPECT_EQ(shapes[1].shape.kind, Shape::Kind::kCylinder);
+  EXPECT_EQ(shapes[1].shape.size.head<2>(), Eigen::Vector2d(0.2, 0.6));
+  EXPECT_EQ(shapes[2].shape.kind, Shape::Kind::kSphere);
+  EXPECT_EQ(shapes[2].shape.size[0], 0.3);
+  EXPECT_EQ(shapes[3].shape.mesh->bounds().min(), Vector3d(0, 0, -4));
+  EXPECT_EQ(shapes[3].shape.mesh->bounds().max(), Vector3d(2, 3, 0));
+  EXPECT_EQ(shapes[4].shape.mesh->bounds().max(), Vector3d(1, 1, 1));
+}
+
+TEST_F(SceneFile, OneFileAndScaleIsOneMesh) {
+  MeshStore meshes;
+  const std::string file = (folder_ / "tetra.off").string();
+  const auto plain = meshes.get(file, Vector3d::Ones()), twice = meshes.get(file, {2, 2, 2});
+  EXPECT_EQ(plain, meshes.get((folder_ / "." / "tetra.off").string(), Vector3d::Ones()));
+  EXPECT_EQ(twice, meshes.get(file, {2, 2, 2}));
+  EXPECT_NE(plain, twice);
+  EXPECT_THROW(meshes.get(file, {1, 0, 1}), std::runtime_error);
+  EXPECT_THROW(meshes.get(file, {1, NAN, 1}), std::runtime_error);
+}
+
+TEST_F(SceneFile, SaysWhereAUrdfIsWrong) {
+  const std::string two = link("a", kSphere) + link("b", kSphere);
+  const auto complains = [&](const std::string& text, const std::vector<std::string>& pieces) {
+    const std::string file = robot(text);
+    std::vector<std::string> all = pieces;
+    all.push_back(file);
+    expectComplaint([&] { read(file); }, all);
+  };
+  complains(two + joint("j", "revolute", "a", "b"), {"line 4", "[j]", "limits"});
+  complains(two + joint("j", "floating", "a", "b"), {"line 4", "joint j", "fixed, revolute, continuous or prismatic"});
+  complains(two + joint("j", "screw", "a", "b"), {"line 4", "[j]"});
+  complains(two + joint("j", "continuous", "a", "nobody"), {"nobody"});
+  complains(two, {"root"});
+  complains(two + joint("j", "continuous", "a", "b", "<axis xyz='0 0 0'/>"), {"line 4", "joint j", "axis"});
+  complains(two + joint("j", "continuous", "a", "b", "<mimic joint='k'/>"), {"joint j mimics k, which is no joint"});
+  complains(two + joint("j", "continuous", "a", "b", "<mimic joint='j'/>"), {"joint j mimics itself"});
+  complains(two + link("c") + joint("k", "fixed", "a", "c") + joint("j", "continuous", "a", "b", "<mimic joint='k'/>"),
+            {"joint j mimics k, which is fixed"});
+  complains(link("a") + link("b", "<mesh filename='none.stl'/>") + joint("j", "fixed", "a", "b"),
+            {"line 3", "link b", "mesh none.stl", "no such file"});
+  complains(link("b", "<mesh filename='package://robots/none.stl'/>"),
+            {"line 2", "link b", "package robots is not found", "--package robots="});
+  complains(link("b", "<mesh filename='http://host/none.stl'/>"), {"line 2", "link b", "package://"});
+  complains(link("b", "<mesh filename='tetra.off' scale='1 0 1'/>"), {"line 2", "link b", "scale"});
+  complains(link("b", "<sphere radius='-1'/>"), {"line 2", "link b", "above 0"});
+  complains(link("b", "<capsule radius='1' length='1'/>"), {"line 2", "capsule", "[b]"});
+  complains("<link name='b'><collision/></link>", {"line 2", "[b]"});
+  complains("<link name='b'><collision><origin xyz='1 x 0'/><geometry>" + kSphere + "</geometry></collision></link>",
+            {"line 2", "[x]", "[b]"});
+  complains(link("b", "<box size='1 2'/>"), {"line 2", "[1 2]", "[b]"});
+  complains("<xacro:property name='x' value='1'/>\n" + link("a"), {"line 2", "xacro"});
+  complains("<link name='a'>\n</robot>", {"line 3", "no XML"});
+  // What is not asked about may be wrong.
+  EXPECT_EQ(read(robot("<link name='a'><inertial><mass value='x'/></inertial><visual><geometry><capsule/></geometry>"
+                       "<material name='none'/></visual></link>"))
+                .links()
+                .size(),
+            1u);
+  const std::string other = write("other.urdf", "<sdf></sdf>");
+  expectComplaint([&] { read(other); }, {other + ": line 1", "<sdf>", "<robot>"});
+  expectComplaint([&] { read("/nowhere/r.urdf"); }, {"/nowhere/r.urdf", "No such file"});
+}
+
+TEST_F(SceneFile, FindsPackages) {
+  for (const char* place : {"given", "ros/robots", "prefix/share/robots", "up/robots/urdf/deep"})
+    fs::create_directories(folder_ / place);
+  const std::string uri = "package://robots/meshes/a.stl";
+  const auto at = [&](const std::string& place) { return (folder_ / place / "meshes/a.stl").string(); };
+  const Packages none;
+  const std::string deep = (folder_ / "up/robots/urdf/deep").string();
+  EXPECT_EQ(none.resolve(uri, deep), at("up/robots"));
+  EXPECT_EQ(none.resolve(uri, (folder_ / "up").string()), at("up/robots"));
+  expectComplaint([&] { none.resolve(uri, (folder_ / "given").string()); },
+                  {"package robots is not found", "--package robots="});
+  setenv("AMENT_PREFIX_PATH", ("/nowhere:" + (folder_ / "prefix").string()).c_str(), 1);
+  EXPECT_EQ(none.resolve(uri, deep), at("prefix/share/robots"));
+  for (const char* path : {"ros", "ros/robots", "ros/robots/"}) {
+    setenv("ROS_PACKAGE_PATH", ("/nowhere::" + (folder_ / path).string()).c_str(), 1);
+    EXPECT_EQ(none.resolve(uri, deep), at("ros/robots")) << path;
+  }
+  const Packages given({"other=/x", "robots=" + (folder_ / "given").string()});
+  EXPECT_EQ(given.resolve(uri, deep), at("given"));
+  EXPECT_EQ(given.resolve("file:///a/b.stl", deep), "/a/b.stl");
+  EXPECT_EQ(given.resolve("/a/b.stl", deep), "/a/b.stl");
+  EXPECT_EQ(given.resolve("b.stl", "/c"), "/c/b.stl");
+  EXPECT_THROW(given.resolve("package://robots", deep), std::runtime_error);
+  for (const char* wrong : {"robots", "=x", "robots="}) EXPECT_THROW(Packages({wrong}), std::invalid_argument) << wrong;
+}
+
+TEST_F(SceneFile, LinksAreAdjacentAcrossLinksWithoutShapes) {
+  const Robot r =
+      read(robot(link("a", kSphere) + link("frame") + link("b", kSphere) + link("c", kSphere) + link("d", kSphere) +
+                 joint("j1", "fixed", "a", "frame") + joint("j2", "continuous", "frame", "b") +
+                 joint("j3", "continuous", "frame", "c") + joint("j4", "continuous", "c", "d")));
+  std::set<std::set<std::string>> names;
+  for (const auto& [a, b] : r.adjacentLinks()) names.insert({r.links()[a].name, r.links()[b].name});
+  EXPECT_EQ(names, (std::set<std::set<std::string>>{{"a", "b"}, {"a", "c"}, {"b", "c"}, {"c", "d"}}));
+}
+
+TEST_F(SceneFile, AnSrdfDecidesWhichLinksAreChecked) {
+  SceneArguments arguments;
+  arguments.file = robot(link("a", kSphere) + link("b", kSphere) + link("c", kSphere) +
+                         joint("j1", "continuous", "a", "b") + joint("j2", "continuous", "b", "c"));
+  using Pairs = std::set<std::pair<std::size_t, std::size_t>>;
+  const SceneSetup without = readScene(arguments);
+  EXPECT_EQ(without.allowed, (Pairs{{0, 1}, {1, 2}}));
+  ASSERT_EQ(without.notes.size(), 1u);
+  EXPECT_NE(without.notes[0].find("--adjacent check"), std::string::npos);
+  arguments.adjacent = SceneArguments::Adjacent::kCheck;
+  EXPECT_EQ(readScene(arguments).allowed, Pairs{});
+  EXPECT_TRUE(readScene(arguments).notes.empty());
+
+  arguments.srdf = write("r.srdf",
+                         "<robot name='r'>\n<disable_collisions link1='c' link2='a' reason='Never'/>\n"
+                         "<disable_collisions link1='a' link2='ghost'/>\n</robot>");
+  arguments.adjacent = SceneArguments::Adjacent::kAsSrdf;
+  const SceneSetup with = readScene(arguments);
+  EXPECT_EQ(with.allowed, (Pairs{{0, 2}}));
+  ASSERT_EQ(with.warnings.size(), 1u);
+  EXPECT_NE(with.warnings[0].find("line 3: the robot has no link ghost"), std::string::npos) << with.warnings[0];
+  arguments.adjacent = SceneArguments::Adjacent::kIgnore;
+  EXPECT_EQ(readScene(arguments).allowed, (Pairs{{0, 1}, {0, 2}, {1, 2}}));
+
+  arguments.adjacent = SceneArguments::Adjacent::kAsSrdf;
+  write("r.srdf",
+        "<robot name='r'><disable_default_collisions link='b'/><enable_collisions link1='b' link2='a'/></robot>");
+  EXPECT_EQ(readScene(arguments).allowed, (Pairs{{1, 2}}));
+  write("r.srdf", "<robot name='r'>\n\n<disable_collisions link1='c'/></robot>");
+  expectComplaint([&] { readScene(arguments); }, {"r.srdf: line 3", "link2"});
+}
+
+StateNames twoJointsAndABox() {
+  StateNames names;
+  names.joints = {"q1", "elbow"};
+  names.others = {{"f2", "mimics f1"}, {"weld", "is fixed"}};
+  names.objects = {"box"};
+  names.X_WO = {pose(Matrix3d::Identity(), {7, 8, 9})};
+  return names;
+}
+
+TEST(States, AreATableWithNames) {
+  const StateNames names = twoJointsAndABox();
+  const std::vector<State> some = statesOfTable("# a path\n\nelbow, \"q1\" # names\r\n0.5,-1e-3\n+1;2\n", names, "f");
+  ASSERT_EQ(some.size(), 2u);
+  EXPECT_EQ(some[0].joints, (std::vector<double>{-1e-3, 0.5}));
+  EXPECT_EQ(some[1].joints, (std::vector<double>{2, 1}));
+  EXPECT_EQ(some[0].place, "line 4");
+  expectNear(some[0].objects.at(0), *names.X_WO[0], "where the scene has it");
+  EXPECT_EQ(statesOfTable("\xEF\xBB\xBFq1,elbow\r\n1,2\r\n", names, "f").at(0).joints, (std::vector<double>{1, 2}));
+  const State placed =
+      statesOfTable("q1\telbow\tbox.yaw\tbox.x\tbox.y\tbox.z\tbox.roll\tbox.pitch\n0\t0\t0.3\t1\t2\t3\t0.1\t0.2", names,
+                    "f")
+          .at(0);
+  expectNear(placed.objects.at(0), pose(rpy(0.1, 0.2, 0.3), {1, 2, 3}), "roll, pitch, yaw");
+  const State turn =
+      statesOfTable("q1,elbow,box.x,box.y,box.z,box.qw,box.qx,box.qy,box.qz\n0,0,1,2,3,1,0,0,1", names, "f").at(0);
+  expectNear(turn.objects.at(0), pose(rpy(0, 0, M_PI / 2), {1, 2, 3}), "a quaternion, not normalised");
+  expectNear(statesOfTable("q1,elbow,box.x,box.y,box.z\n0,0,1,2,3", names, "f").at(0).objects.at(0),
+             pose(Matrix3d::Identity(), {1, 2, 3}), "not turned");
+}
+
+TEST(States, SayWhatIsWrongAndWhere) {
+  const StateNames names = twoJointsAndABox();
+  const auto complaint = [&](const std::string& text) -> std::string {
+    try {
+      statesOfTable(text, names, "path.csv");
+    } catch (const std::runtime_error& e) {
+      return e.what();
+    }
+    return "";
+  };
+  EXPECT_EQ(complaint("q1\n1"), "path.csv: line 1: columns are missing: elbow");
+  EXPECT_EQ(complaint("q1,elbo,elbow\n1,2,3"),
+            "path.csv: line 1: nothing that moves is called elbo. Did you mean elbow?");
+  EXPECT_EQ(complaint("q1,elbow,f2\n1,2,3"), "path.csv: line 1: joint f2 mimics f1, so it is not given");
+  EXPECT_EQ(complaint("q1,elbow,weld\n1,2,3"), "path.csv: line 1: joint weld is fixed, so it is not given");
+  EXPECT_EQ(complaint("q1,elbow,q1\n1,2,3"), "path.csv: line 1: column q1 is there twice");
+  EXPECT_EQ(complaint("q1,elbow\n1,2\n\n3,x"), "path.csv: line 4: column elbow: \"x\" is no finite number");
+  EXPECT_EQ(complaint("q1,elbow\n1,nan"), "path.csv: line 2: column elbow: \"nan\" is no finite number");
+  EXPECT_EQ(complaint("q1,elbow\n1,"), "path.csv: line 2: column elbow: \"\" is no finite number");
+  EXPECT_EQ(complaint("q1,elbow\n1,2,3"), "path.csv: line 2: 2 numbers expected, 3 found");
+  EXPECT_EQ(complaint("1,2\n"), "path.csv: line 1: the names of the columns come first");
+  EXPECT_EQ(complaint("q1,elbow\n"), "path.csv: no states");
+  EXPECT_NE(complaint("q1,elbow,box.x\n1,2,3").find("object box needs the columns"), std::string::npos);
+  EXPECT_NE(complaint("q1,elbow,box.x,box.y,box.z,box.qw\n1,2,3,4,5,6").find("object box needs"), std::string::npos);
+  EXPECT_NE(complaint("q1,elbow,box.x,box.y,box.z,box.qw,box.qx,box.qy,box.qz\n1,2,3,4,5,0,0,0,0")
+                .find("line 2: the quaternion"),
+            std::string::npos);
+  EXPECT_NE(complaint("q1,elbow,box.w\n1,2,3").find("nothing that moves is called box.w"), std::string::npos);
+}
+
+TEST_F(SceneFile, ReadsObjectsOfAllKinds) {
+  const SceneSetup setup = scene(R"({
+    // Comments may be there.
+    "objects": [
+      {"name": "mesh", "mesh": "tetra.off", "scale": 0.5, "pose": [1, 2, 3]},
+      {"name": "stretched", "mesh": "tetra.off", "scale": [1, 2, 3]},
+      {"name": "box", "box": [1, 2, 3], "pose": [0, 0, 0, 1, 0, 0, 1]},
+      {"name": "ball", "sphere": 0.5, "pose": {"xyz": [1, 0, 0], "rpy": [0.1, 0.2, 0.3]}},
+      {"name": "post", "cylinder": [0.1, 2], "pose": {"xyzw": [0, 0, 1, 1]}},
+      {"name": "pill", "capsule": [0.1, 2], "pose": {"wxyz": [1, 0, 0, 1]}},
+      {"name": "table", "moving": true, "pose": [0, 0, 1],
+       "shapes": [{"box": [1, 1, 0.1], "pose": [0, 0, 1]}, {"sphere": 0.1}]}
+    ],
+    "groups": {"round": ["ball", "post"], "more": ["round", "pill"]},
+    "allowed": [["more", "table"], ["box", "table"]],
+    "states": [{}, {"table": [0, 0, 2]}]
+  })");
+  ASSERT_EQ(setup.partCount(), 7u);
+  EXPECT_EQ(setup.part(0).shapes.at(0).shape.mesh->bounds().max(), Vector3d(0.5, 0.5, 0.5));
+  EXPECT_EQ(setup.part(1).shapes.at(0).shape.mesh->bounds().max(), Vector3d(1, 2, 3));
+  EXPECT_EQ(setup.part(5).shapes.at(0).shape.kind, Shape::Kind::kCapsule);
+  const std::vector<Isometry3d> X = setup.partPoses(setup.states.at(1));
+  expectNear(X[0], pose(Matrix3d::Identity(), {1, 2, 3}), "mesh");
+  expectNear(X[3], pose(rpy(0.1, 0.2, 0.3), {1, 0, 0}), "ball");
+  for (const std::size_t quarter : {2, 4, 5})
+    expectNear(X[quarter], pose(rpy(0, 0, M_PI / 2), {0, 0, 0}), "a quarter turn");
+  expectNear(X[6], pose(Matrix3d::Identity(), {0, 0, 2}), "table");
+  expectNear(setup.partPoses(setup.states[0])[6], pose(Matrix3d::Identity(), {0, 0, 1}), "table at the start");
+  EXPECT_EQ(setup.allowed, (std::set<std::pair<std::size_t, std::size_t>>{{2, 6}, {3, 6}, {4, 6}, {5, 6}}));
+  EXPECT_EQ(setup.states[1].place, "states[1]");
+  const Bodies bodies(setup);
+  EXPECT_EQ(bodies.moving, 2u);            // the table's shapes
+  EXPECT_EQ(bodies.pairCount(), 2u * 2u);  // with both meshes
+}
+
+TEST_F(SceneFile, AnAttachedObjectMovesWithItsLink) {
+  robot(link("base", kSphere) + link("hand", kSphere) +
+        joint("q", "continuous", "base", "hand", "<origin xyz='1 0 0'/><axis xyz='0 0 1'/>"));
+  const auto with = [&](const std::string& object) {
+    return scene(R"({"robot": {"urdf": "robot.urdf", "pose": [0, 0, 3]}, "objects": [{"name": "wall", "sphere": 1}, )" +
+                 object + R"(], "states": [{"q": 0.7}]})");
+  };
+  const SceneSetup s = with(R"({"name": "tool", "sphere": 0.1, "attached": "hand", "pose": [0.5, 0, 0]})");
+  EXPECT_TRUE(s.moves(3));
+  EXPECT_TRUE(s.names().objects.empty());
+  EXPECT_EQ(s.allowed.count({1, 3}), 1u);
+  EXPECT_EQ(s.allowed.count({0, 3}), 0u);
+  expectNear(s.partPoses(s.states[0])[3], pose(rpy(0, 0, 0.7), {1 + 0.5 * std::cos(0.7), 0.5 * std::sin(0.7), 3}),
+             "tool");
+  const Bodies bodies(s);
+  EXPECT_EQ(bodies.moving, 3u);
+  EXPECT_EQ(bodies.pairCount(), 4u);  // tool and base, and all three with the wall
+  expectComplaint([&] { with(R"({"name": "tool", "sphere": 0.1, "attached": "hant"})"); },
+                  {"objects[1].attached: the robot has no link hant. Did you mean hand?"});
+  expectComplaint([&] { with(R"({"name": "tool", "sphere": 0.1, "attached": "hand", "moving": true})"); },
+                  {"objects[1]", "not both"});
+}
+
+TEST_F(SceneFile, SaysWhereASceneIsWrong) {
+  const std::string ball = R"({"name": "ball", "sphere": 1, "moving": true, "pose": [0, 0, 0]})";
+  const auto complains = [&](const std::string& json, const std::string& what) {
+    expectComplaint([&] { scene(json); }, {"scene.json: ", what});
+  };
+  const auto objects = [&](const std::string& list, const std::string& more = "") {
+    return "{\"objects\": [" + list + "]" + more + "}";
+  };
+  complains("{\n\"objects\": [\n}", "line 3, column 1");
+  complains("{\"objects\": [{\"name\": \"a\", \"sphere\": 1e999}]}", "1e999");
+  complains("[]", "an object {...} expected");
+  complains(R"({"object": []})", "there is no key \"object\" here. Did you mean objects?");
+  complains(objects(R"({"sphere": 1})"), "objects[0]: \"name\" is missing");
+  complains(objects(ball + R"(, {"name": "a"})"), "objects[1]: one of mesh, box");
+  complains(objects(R"({"name": "a", "sphere": 1, "box": [1, 1, 1]})"), "objects[0]: one of mesh, box");
+  complains(objects(R"({"name": "a", "sphere": 0})"), "objects[0].sphere: sizes are above 0");
+  complains(objects(R"({"name": "a", "box": [1, 2]})"), "objects[0].box: a list of 3 numbers expected");
+  complains(objects(R"({"name": "a", "box": [1, 2, "3"]})"), "objects[0].box[2]: a number expected");
+  complains(objects(R"({"name": "a", "mesh": "none.stl"})"), "objects[0].mesh: ");
+  complains(objects(R"({"name": "a", "mesh": "none.stl"})"), "no such file");
+  complains(objects(R"({"name": "a", "mesh": "tetra.off", "scale": 1e100})"), "objects[0].mesh: ");
+  complains(objects(R"({"name": "a", "mesh": "tetra.off", "scale": [1, 0, 1]})"), "objects[0].mesh: a scale is");
+  complains(objects(R"({"name": "a", "sphere": 1, "scale": 2})"), "\"scale\" is for meshes");
+  complains(objects(R"({"name": "a", "sphere": 1, "pose": [1, 2, 3, 4]})"),
+            "objects[0].pose: a list of 7 numbers expected");
+  complains(objects(R"({"name": "a", "sphere": 1, "pose": [1, 2, 3, 0, 0, 0, 0]})"), "objects[0].pose: the quaternion");
+  complains(objects(R"({"name": "a", "sphere": 1, "pose": {"rpy": [0, 0, 0], "wxyz": [1, 0, 0, 0]}})"), "one rotation");
+  complains(objects(R"({"name": "a", "sphere": 1, "moving": 1})"), "objects[0].moving: true or false");
+  complains(objects(ball + "," + ball), "two parts are called ball");
+  complains(objects(R"({"name": "a", "sphere": 1})"), "nothing moves");
+  complains(objects(R"({"name": "a", "sphere": 1, "moving": true})"), "object a has no pose");
+  complains(objects(ball, R"(, "allowed": [["ball", "bal"]])"),
+            "allowed[0][1]: there is no link, object or group bal. Did you mean ball?");
+  complains(objects(ball, R"(, "allowed": [["ball"]])"), "allowed[0]: two names expected");
+  complains(objects(ball, R"(, "groups": {"ball": []})"), "groups.ball: the name is taken");
+  complains(objects(ball, R"(, "states": [])"), "states: the list is empty");
+  complains(objects(ball, R"(, "states": [{"bal": [1, 2, 3]}])"),
+            "states[0]: nothing that moves is called bal. Did you mean ball?");
+  complains(objects(R"({"name": "a", "sphere": 1, "moving": true})", R"(, "states": [{}])"), "states[0]: missing: a");
+  expectComplaint([&] { scene(R"({"robot": {"urdf": "none.urdf"}})"); }, {"none.urdf", "No such file"});
+  expectComplaint([&] { scene(objects(ball, R"(, "states": "none.csv")")); }, {"none.csv", "No such file"});
+}
+
+TEST_F(SceneFile, TakesAUrdfByItsContent) {
+  SceneArguments arguments;
+  arguments.file = write("description", "<robot name='r'>" + link("a", kSphere) + "</robot>");
+  EXPECT_EQ(readScene(arguments).robot->name(), "r");
+  arguments.file =
+      write("other", "{\"objects\": [{\"name\": \"a\", \"sphere\": 1, \"moving\": true, \"pose\": [0,0,0]}]}");
+  EXPECT_FALSE(readScene(arguments).robot.has_value());
+}
+
+/// A ball of radius 0.1 on a slide along x, whose twin mimics it along y, among a fixed ball and a box.
+class Slides : public SceneFile {
+ protected:
+  SceneSetup setup(const std::string& states) const {
+    robot(link("rail") + link("ball", kSphere) + link("twin", kSphere) +
+          joint("x", "prismatic", "rail", "ball", "<axis xyz='1 0 0'/>" + kLimit) +
+          joint("y", "prismatic", "rail", "twin",
+                "<axis xyz='0 1 0'/><mimic joint='x' multiplier='0.5' offset='0.3'/>" + kLimit));
+    return scene(R"({"robot": {"urdf": "robot.urdf", "pose": [0, 0, 1]},
+      "objects": [{"name": "fixed", "sphere": 0.2, "pose": [1, 0, 1]}, {"name": "wall", "box": [0.1, 0.1, 0.1], "pose": [0, 1, 1]}],
+      "allowed": [["twin", "fixed"]], "states": )" +
+                     states + "}",
+                 SceneArguments::Adjacent::kCheck);
+  }
+};
+
+TEST_F(Slides, CollideWhereTheirDistancesSay) {
+  std::string states;
+  std::vector<double> values;
+  for (int i = -40; i <= 80; ++i) {
+    values.push_back(0.025 * i + 0.0013);
+    states += (states.empty() ? "[" : ",") + std::string("{\"x\": ") + std::to_string(values.back()) + "}";
+  }
+  const SceneSetup s = setup(states + "]");
+  const Bodies bodies(s);
+  SceneQuestions questions;
+  questions.clearance = true;
+  for (const Scalar scalar : {Scalar::kDouble, Scalar::kFloat}) {
+    questions.scalar = scalar;
+    const SceneAnswers answers = askScene(s, bodies, questions);
+    EXPECT_TRUE(answers.differences.empty());
+    std::size_t hits = 0;
+    for (std::size_t k = 0; k < values.size(); ++k) {
+      const double x = s.states[k].joints[0], y = 0.5 * x + 0.3;
+      // Distances of ball and twin, ball and fixed, ball and wall, twin and wall.
+      const auto toBox = [](double px, double py) {
+        return std::hypot(std::max(std::abs(px) - 0.05, 0.0), std::max(std::abs(py - 1) - 0.05, 0.0)) - 0.1;
+      };
+      const std::vector<std::pair<std::string, double>> distances = {{"ball twin", std::hypot(x, y) - 0.2},
+                                                                     {"ball fixed", std::abs(x - 1) - 0.3},
+                                                                     {"ball wall", toBox(x, 0)},
+                                                                     {"twin wall", toBox(0, y)}};
+      std::set<std::string> wanted, found;
+      double least = 1e9;
+      for (const auto& [name, distance] : distances) {
+        ASSERT_GT(std::abs(distance), 1e-4) << "too near to tell";
+        if (distance < 0) wanted.insert(name);
+        least = std::min(least, std::max(distance, 0.0));
+      }
+      const auto nameOf = [&](std::size_t body) { return s.part(bodies.bodies[body].part).name; };
+      for (const auto& [a, b] : answers.pairs[k]) found.insert(nameOf(a) + " " + nameOf(b));
+      EXPECT_EQ(found, wanted) << "x = " << x;
+      EXPECT_EQ(answers.hit[k] != 0, !wanted.empty()) << "x = " << x;
+      EXPECT_NEAR(answers.clearance[k].distance, least, 1e-3 * (least + 1e-3)) << "x = " << x;
+      hits += answers.hit[k];
+    }
+    EXPECT_GT(hits, 10u);
+    EXPECT_LT(hits, values.size() - 10);
+  }
+}
+
+TEST_F(Slides, LimitsAreReportedAndNotApplied) {
+  const SceneSetup s = setup("[{\"x\": 0}, {\"x\": 3.5}, {\"x\": -1.5}]");
+  EXPECT_TRUE(s.outsideLimits(s.states[0]).empty());
+  const std::vector<OutsideLimits> above = s.outsideLimits(s.states[1]);  // y is at 2.05: it has the same limits
+  ASSERT_EQ(above.size(), 2u);
+  EXPECT_EQ(s.robot->joints()[above[0].joint].name, "x");
+  EXPECT_EQ(above[0].value, 3.5);
+  EXPECT_NEAR(above[1].value, 2.05, 1e-15);
+  EXPECT_EQ(s.outsideLimits(s.states[2]).size(), 1u);
+  EXPECT_NEAR(s.partPoses(s.states[1])[1].translation().x(), 3.5, 1e-15);
+}
+
+TEST_F(Slides, APageHasTheFirstStatesAndSaysHowManyThereAre) {
+  const std::size_t count = Page::kMaxStates + 7;
+  std::string states;
+  for (std::size_t k = 0; k < count; ++k) states += (k == 0 ? "[" : ",") + std::string("{\"x\": 0.001}");
+  const SceneSetup s = setup(states + "]");
+  const Bodies bodies(s);
+  const std::string html = scenePage("<b>.json", s, bodies, askScene(s, bodies, {})).html();
+  std::size_t shown = 0;
+  for (std::size_t at = 0; (at = html.find("\"poses\":", at)) != std::string::npos; ++at) ++shown;
+  EXPECT_EQ(shown, Page::kMaxStates);
+  EXPECT_NE(html.find("\"total\":" + std::to_string(count)), std::string::npos);
+  EXPECT_EQ(html.find("<b>.json"), std::string::npos);
+}
+
+/// Meshes and shapes at random places: pairs of meshes are FCL's, those of shapes differ at most where it is explained.
+TEST_F(SceneFile, AnswersAreThoseOfFcl) {
+  std::string objects, states;
+  for (int i = 0; i < 6; ++i) {
+    objects += "{\"name\": \"f" + std::to_string(i) +
+               "\", \"mesh\": \"tetra.off\", \"scale\": [1, 2, -1], \"pose\": {\"xyz\": [" + std::to_string(2 * i) +
+               ", 0.3, 0.1], \"rpy\": [" + std::to_string(i) + ", 1, 2]}},";
+  }
+  objects +=
+      "{\"name\": \"m0\", \"mesh\": \"tetra.off\", \"moving\": true}, {\"name\": \"m1\", \"mesh\": \"tetra.off\", "
+      "\"moving\": true, \"scale\": 0.7},"
+      "{\"name\": \"m2\", \"capsule\": [0.2, 0.5], \"moving\": true}";
+  for (int k = 0; k < 150; ++k) {
+    states += states.empty() ? "" : ",";
+    for (const int m : {0, 1, 2}) {
+      const double t = 0.1 * k + m;
+      states += (m == 0 ? "{" : ",") + std::string("\"m") + std::to_string(m) + "\": {\"xyz\": [" +
+                std::to_string(6 + 7 * std::sin(t * 1.3)) + "," + std::to_string(1.5 * std::cos(t * 2.1)) + "," +
+                std::to_string(std::sin(t * 0.7)) + "], \"rpy\": [" + std::to_string(t) + ",0.3," +
+                std::to_string(2 * t) + "]}";
+    }
+    states += "}";
+  }
+  const SceneSetup s = scene("{\"objects\": [" + objects + "], \"states\": [" + states + "]}");
+  const Bodies bodies(s);
+  EXPECT_EQ(bodies.shapes.size(), 4u);  // two scales, the plain mesh, and the capsule
+  SceneQuestions questions;
+  for (const Answer answer : {Answer::kExact, Answer::kConservative}) {
+    questions.options.answer = answer;
+    questions.options.depth = 3;
+    const SceneAnswers answers = askScene(s, bodies, questions);
+    std::size_t hits = 0, differences = 0;
+    for (const std::uint8_t hit : answers.hit) hits += hit;
+    for (const SceneDifference& d : answers.differences) {
+      EXPECT_FALSE(d.fault) << d.state;
+      differences += bodies.meshes(d.pair.first, d.pair.second);
+    }
+    EXPECT_GT(hits, 30u);
+    EXPECT_LT(hits, 145u);
+    EXPECT_EQ(differences > 0, answer == Answer::kConservative);
+    EXPECT_EQ(answers.fcl_bytes > 0, true);
+  }
+  questions.fcl = false;
+  EXPECT_FALSE(askScene(s, bodies, questions).fcl.has_value());
+}
+
+TEST(SceneDifferences, AreFaultsWhereFclIsRight) {
+  EXPECT_TRUE(isFault(true, true, true)) << "an invented contact of two meshes";
+  EXPECT_TRUE(isFault(true, false, true)) << "a missed one";
+  EXPECT_TRUE(isFault(true, false, false)) << "a missed one, with conservative answers";
+  EXPECT_FALSE(isFault(true, true, false)) << "conservative answers find more";
+  for (const bool bocst : {false, true}) EXPECT_FALSE(isFault(false, bocst, true)) << "FCL's solver for a shape";
+}
+
+TEST(ShapeMesh, IsAsLargeAsTheShape) {
+  const auto sizesOf = [](Shape::Kind kind, const Vector3d& size) {
+    Part part;
+    part.shapes.push_back({{kind, size, nullptr}, pose(Matrix3d::Identity(), {5, 0, 0})});
+    const auto mesh = program::meshOf(part);
+    EXPECT_NEAR((mesh->bounds().center() - Vector3d(5, 0, 0)).norm(), 0, 1e-12);
+    return mesh->bounds().sizes().eval();
+  };
+  EXPECT_LT((sizesOf(Shape::Kind::kBox, {1, 2, 3}) - Vector3d(1, 2, 3)).norm(), 1e-12);
+  EXPECT_LT((sizesOf(Shape::Kind::kSphere, {1, 1, 1}) - Vector3d(2, 2, 2)).norm(), 1e-12);
+  EXPECT_LT((sizesOf(Shape::Kind::kCylinder, {1, 3, 3}) - Vector3d(2, 2, 3)).norm(), 1e-12);
+  EXPECT_LT((sizesOf(Shape::Kind::kCapsule, {1, 3, 3}) - Vector3d(2, 2, 5)).norm(), 1e-12);
+}
+
+}  // namespace
+}  // namespace bocst

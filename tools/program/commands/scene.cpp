@@ -1,0 +1,408 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#include <CLI/CLI.hpp>
+#include <algorithm>
+#include <iostream>
+#include <memory>
+#include <string>
+#include <utility>
+#include <vector>
+
+#include "cli/arguments.h"
+#include "cli/file.h"
+#include "robot/packages.h"
+#include "scene/ask_scene.h"
+#include "scene/scene_file.h"
+#include "scene/scene_page.h"
+
+namespace bocst::program {
+namespace {
+
+using Names = std::pair<std::string, std::string>;
+
+std::string joined(const std::vector<std::string>& list, const std::string& between) {
+  std::string text;
+  for (const std::string& item : list) text += (text.empty() ? "" : between) + item;
+  return text;
+}
+
+/// "1 link", "2 links".
+std::string counted(std::size_t count, const std::string& what) {
+  return std::to_string(count) + " " + what + (count == 1 ? "" : "s");
+}
+
+/// A cell of CSV that may hold anything.
+std::string quoted(const std::string& text) {
+  if (text.find_first_of(",\"\n") == std::string::npos) return text;
+  std::string result = "\"";
+  for (const char c : text) result += c == '"' ? std::string("\"\"") : std::string(1, c);
+  return result + "\"";
+}
+
+/// What was asked and what was answered, in the words of the scene.
+class SceneReport {
+ public:
+  SceneReport(const SceneSetup& setup, const Bodies& bodies, const SceneAnswers& answers)
+      : setup_(setup), bodies_(bodies), answers_(answers) {}
+
+  std::size_t states() const { return answers_.hit.size(); }
+  std::size_t collisions() const {
+    return static_cast<std::size_t>(std::count(answers_.hit.begin(), answers_.hit.end(), 1));
+  }
+
+  std::size_t statesOutsideLimits() const {
+    return static_cast<std::size_t>(
+        std::count_if(setup_.states.begin(), setup_.states.end(),
+                      [this](const State& state) { return !setup_.outsideLimits(state).empty(); }));
+  }
+
+  Names namesOf(const BodyPair& pair) const { return {nameOf(pair.first), nameOf(pair.second)}; }
+
+  /// The pairs of parts that collide, each once.
+  std::vector<Names> pairsOf(std::size_t state) const {
+    std::vector<Names> names;
+    for (const BodyPair& pair : answers_.pairs[state]) {
+      const Names found = namesOf(pair);
+      if (std::find(names.begin(), names.end(), found) == names.end()) names.push_back(found);
+    }
+    return names;
+  }
+
+  /// "elbow 3.2 is not in -2.9 to 2.9".
+  std::vector<std::string> outsideLimits(std::size_t state) const {
+    std::vector<std::string> texts;
+    for (const OutsideLimits& outside : setup_.outsideLimits(setup_.states[state])) {
+      const Joint& joint = setup_.robot->joints()[outside.joint];
+      texts.push_back(joint.name + " " + formatPlain(outside.value) + " is not in " + formatPlain(joint.limits->lower) +
+                      " to " + formatPlain(joint.limits->upper));
+    }
+    return texts;
+  }
+
+  Json stateJson(std::size_t k) const {
+    Json pairs = Json::array();
+    for (const auto& [a, b] : pairsOf(k)) pairs.push_back({a, b});
+    Json row = {{"index", k}, {"place", setup_.states[k].place}, {"collide", answers_.hit[k] != 0}, {"pairs", pairs}};
+    if (!answers_.clearance.empty()) {
+      const Clearance& clearance = answers_.clearance[k];
+      row["clearance"] = clearance.nearest ? Json(clearance.distance) : Json();
+      row["nearest"] =
+          clearance.nearest ? Json{nameOf(clearance.nearest->first), nameOf(clearance.nearest->second)} : Json();
+    }
+    Json outside = Json::array();
+    for (const OutsideLimits& o : setup_.outsideLimits(setup_.states[k])) {
+      const Joint& joint = setup_.robot->joints()[o.joint];
+      outside.push_back(
+          {{"joint", joint.name}, {"value", o.value}, {"lower", joint.limits->lower}, {"upper", joint.limits->upper}});
+    }
+    row["outside_limits"] = outside;
+    return row;
+  }
+
+  std::string csv() const {
+    std::string text = "index,place,collide,pairs";
+    if (!answers_.clearance.empty()) text += ",clearance,nearest_a,nearest_b";
+    text += ",outside_limits\n";
+    for (std::size_t k = 0; k < states(); ++k) {
+      text += std::to_string(k) + "," + quoted(setup_.states[k].place) + (answers_.hit[k] != 0 ? ",1," : ",0,") +
+              quoted(pairsText(k));
+      if (!answers_.clearance.empty()) {
+        const Clearance& clearance = answers_.clearance[k];
+        text += "," + (clearance.nearest
+                           ? Json(clearance.distance).dump() + "," + quoted(nameOf(clearance.nearest->first)) + "," +
+                                 quoted(nameOf(clearance.nearest->second))
+                           : std::string(",,"));
+      }
+      text += "," + quoted(joined(outsideLimits(k), "; ")) + "\n";
+    }
+    return text;
+  }
+
+  /// "hand - table; wrist - table".
+  std::string pairsText(std::size_t state) const {
+    std::vector<std::string> texts;
+    for (const auto& [a, b] : pairsOf(state)) texts.push_back(a + " - " + b);
+    return joined(texts, "; ");
+  }
+
+  void printStates() const {
+    constexpr std::size_t kShown = 20;
+    const bool room = !answers_.clearance.empty();
+    Table table(Table::Others::kLeft);
+    std::vector<std::string> head = {"state", "collides", "pairs"};
+    if (room) head.insert(head.begin() + 2, "clearance");
+    head.push_back("outside limits");
+    table.row(head);
+    std::size_t listed = 0;
+    for (std::size_t k = 0; k < states(); ++k) {
+      const std::vector<std::string> outside = outsideLimits(k);
+      if (answers_.hit[k] == 0 && outside.empty() && !room) continue;
+      if (++listed > kShown) continue;
+      std::vector<std::string> row = {setup_.states[k].place, answers_.hit[k] != 0 ? "yes" : "no", pairsText(k)};
+      if (room) row.insert(row.begin() + 2, clearanceText(answers_.clearance[k]));
+      row.push_back(joined(outside, "; "));
+      table.row(row);
+    }
+    if (listed > 0) table.print();
+    if (listed > kShown) std::cout << listed - kShown << " more: --csv FILE or --json FILE writes all.\n";
+    if (listed > 0) std::cout << '\n';
+  }
+
+  /// How the answers differ from FCL's where that is explained.
+  std::string explainedDifferences(const ModelArguments& model) const {
+    const auto explained = std::count_if(answers_.differences.begin(), answers_.differences.end(),
+                                         [](const SceneDifference& d) { return !d.fault; });
+    if (explained == 0) return "";
+    return counted(static_cast<std::size_t>(explained), "pair") + " of all states differ from FCL's: " +
+           (model.exact() ? "with shapes FCL's solvers are approximate, and margins and floats are bocst's"
+                          : "conservative answers may be a collision where the surfaces are near") +
+           "; --json lists them";
+  }
+
+  Json differencesJson() const {
+    Json list = Json::array();
+    for (const SceneDifference& d : answers_.differences) {
+      const Names names = namesOf(d.pair);
+      list.push_back({{"index", d.state},
+                      {"a", names.first},
+                      {"b", names.second},
+                      {"bocst", d.bocst},
+                      {"fcl", !d.bocst},
+                      {"fault", d.fault}});
+    }
+    return list;
+  }
+
+  void throwIfWrong() const {
+    for (const SceneDifference& d : answers_.differences) {
+      if (!d.fault) continue;
+      const Names names = namesOf(d.pair);
+      throw std::runtime_error(setup_.states[d.state].place + ": " + names.first + " and " + names.second +
+                               (d.bocst ? " collide for bocst, not for FCL" : " collide for FCL, not for bocst") +
+                               "; please report the scene");
+    }
+  }
+
+ private:
+  const std::string& nameOf(std::size_t body) const { return setup_.part(bodies_.bodies[body].part).name; }
+
+  std::string clearanceText(const Clearance& clearance) const {
+    if (!clearance.nearest) return "";
+    return (clearance.distance > 0 ? formatNumber(clearance.distance, 4) : "0") + " " +
+           nameOf(clearance.nearest->first) + " - " + nameOf(clearance.nearest->second);
+  }
+
+  const SceneSetup& setup_;
+  const Bodies& bodies_;
+  const SceneAnswers& answers_;
+};
+
+struct SceneCommand {
+  SceneArguments scene;
+  std::string adjacent = "srdf";
+  double margin = 0;
+  bool clearance = false;
+  bool no_fcl = false;
+  ModelArguments model;
+  std::string csv_file;
+  std::string html_file;
+  Output output;
+
+  int run() const {
+    output.check({scene.file, scene.states, scene.srdf}, {csv_file, html_file});
+    const SceneSetup setup = readScene(scene);
+    for (const std::string& warning : setup.warnings) std::cerr << "bocst: " << warning << '\n';
+    const Bodies bodies(setup);
+    SceneQuestions questions;
+    questions.scalar = model.scalarKind();
+    questions.options = model.options();
+    questions.options.margin = margin;
+    questions.clearance = clearance;
+    questions.fcl = !no_fcl;
+    const SceneAnswers answers = askScene(setup, bodies, questions);
+    const SceneReport report(setup, bodies, answers);
+
+    if (!html_file.empty()) writeFile(html_file, scenePage(scene.file, setup, bodies, answers).html());
+    if (!csv_file.empty()) writeText(csv_file, report.csv());
+    if (output.wantsJson()) {
+      output.write(json(setup, bodies, answers, report));
+    } else if (csv_file != "-") {
+      print(setup, bodies, answers, report);
+    }
+    report.throwIfWrong();
+    return 0;
+  }
+
+ private:
+  static std::string robotText(const Robot& robot) {
+    std::vector<std::string> joints;
+    for (const std::size_t i : robot.freeJoints()) joints.push_back(robot.joints()[i].name);
+    return robot.name() + ", " + counted(robot.links().size(), "link") + "; joints: " + joined(joints, ", ");
+  }
+
+  static std::string objectsText(const SceneSetup& setup) {
+    std::size_t moving = 0, attached = 0;
+    for (const SceneObject& object : setup.objects) {
+      moving += object.moving;
+      attached += object.link.has_value();
+    }
+    return std::to_string(setup.objects.size() - moving - attached) + " fixed, " + std::to_string(moving) + " moving" +
+           (attached > 0 ? ", " + std::to_string(attached) + " attached" : "");
+  }
+
+  static std::string shapesText(const Bodies& bodies) {
+    std::size_t meshes = 0;
+    for (std::size_t i = 0; i < bodies.bodies.size(); ++i) meshes += bodies.isMesh(i);
+    return std::to_string(meshes) + " of " + counted(bodies.triangles(), "triangle") + ", and " +
+           counted(bodies.bodies.size() - meshes, "shape");
+  }
+
+  void print(const SceneSetup& setup, const Bodies& bodies, const SceneAnswers& answers,
+             const SceneReport& report) const {
+    Table head(Table::Others::kLeft);
+    head.row({"scene", scene.file});
+    if (setup.robot) head.row({"robot", robotText(*setup.robot)});
+    if (!setup.objects.empty()) head.row({"objects", objectsText(setup)});
+    head.row({"meshes", shapesText(bodies)});
+    head.row({"pairs", std::to_string(bodies.pairCount()) + " of shapes are checked"});
+    head.row({"states", std::to_string(report.states()) + ", " + setup.states_from});
+    head.row({"answer", model.answerText()});
+    head.print();
+    for (const std::string& note : setup.notes) std::cout << "Note: " << note << ".\n";
+    std::cout << '\n';
+    report.printStates();
+    std::cout << report.collisions() << " of " << counted(report.states(), "state")
+              << (model.exact() ? " collide.\n" : " may collide.\n");
+    if (report.statesOutsideLimits() > 0) {
+      std::cout << "In " << report.statesOutsideLimits() << " of " << report.states()
+                << " states a joint is outside of its limits.\n";
+    }
+    const std::string differences = report.explainedDifferences(model);
+    if (!differences.empty()) std::cout << differences << ".\n";
+    std::cout << '\n';
+    printTimes(answers);
+  }
+
+  static void printTimes(const SceneAnswers& answers) {
+    Table table;
+    const auto row = [&](const std::string& what, double ours, double theirs, std::string (*format)(double)) {
+      if (!answers.fcl) return table.row({what, format(ours)});
+      table.row({what, format(ours), format(theirs), ours > 0 && theirs > 0 ? formatRatio(theirs / ours) : ""});
+    };
+    const SceneTimes ours = answers.bocst, theirs = answers.fcl.value_or(SceneTimes{});
+    const auto states = static_cast<double>(answers.hit.size());
+    table.row(answers.fcl ? std::vector<std::string>{"", "bocst", "FCL's managers", "ratio"}
+                          : std::vector<std::string>{"", "bocst"});
+    row("set-up, from the arrays", ours.set_up, theirs.set_up, formatTime);
+    row("all states, first time", ours.first, theirs.first, formatTime);
+    row("all states, once more", ours.again, theirs.again, formatTime);
+    row("set-up and first time", ours.set_up + ours.first, theirs.set_up + theirs.first, formatTime);
+    row("a state, once more", ours.again / states, theirs.again / states, formatTime);
+    row("tree bytes", static_cast<double>(answers.bytes), static_cast<double>(answers.fcl_bytes), formatBytes);
+    table.print();
+  }
+
+  Json json(const SceneSetup& setup, const Bodies& bodies, const SceneAnswers& answers,
+            const SceneReport& report) const {
+    Json options = model.json();
+    options["margin"] = margin;
+    Json parts = Json::array();
+    for (std::size_t i = 0; i < setup.partCount(); ++i) {
+      parts.push_back({{"name", setup.part(i).name},
+                       {"link", i < setup.linkCount()},
+                       {"moving", setup.moves(i)},
+                       {"shapes", setup.part(i).shapes.size()}});
+    }
+    Json rows = Json::array();
+    for (std::size_t k = 0; k < report.states(); ++k) rows.push_back(report.stateJson(k));
+    const bool agree = std::none_of(answers.differences.begin(), answers.differences.end(),
+                                    [](const SceneDifference& d) { return d.fault; });
+    Json result = {{"scene", scene.file},
+                   {"robot", setup.robot ? Json(setup.robot->name()) : Json()},
+                   {"joints", setup.names().joints},
+                   {"parts", parts},
+                   {"pairs_asked", bodies.pairCount()},
+                   {"triangles", bodies.triangles()},
+                   {"states_from", setup.states_from},
+                   {"notes", setup.notes},
+                   {"warnings", setup.warnings},
+                   {"options", options},
+                   {"oracle", answers.oracle},
+                   {"asked", report.states()},
+                   {"collisions", report.collisions()},
+                   {"outside_limits", report.statesOutsideLimits()}};
+    result["bytes"] = {{"bocst", answers.bytes}};
+    result["times_us"] = {{"bocst", timesJson(answers.bocst)}};
+    if (answers.fcl) {
+      const SceneTimes& fcl = *answers.fcl;
+      result["agree"] = agree;
+      result["differences"] = report.differencesJson();
+      result["bytes"]["fcl"] = answers.fcl_bytes;
+      result["times_us"]["fcl"] = timesJson(fcl);
+      result["ratio"] = {{"set_up", fcl.set_up / answers.bocst.set_up},
+                         {"first", fcl.first / answers.bocst.first},
+                         {"again", fcl.again / answers.bocst.again}};
+    }
+    result["states"] = rows;
+    return result;
+  }
+
+  static Json timesJson(const SceneTimes& times) {
+    return {{"set_up", times.set_up}, {"first", times.first}, {"again", times.again}};
+  }
+};
+
+}  // namespace
+
+void addScene(CLI::App& program, Job& job) {
+  auto scene = std::make_shared<SceneCommand>();
+  CLI::App* command = program.add_subcommand("scene", "check states of a robot or of other objects among obstacles");
+  command->footer(
+      "FILE is a scene file (JSON: objects, a robot, pairs that may touch, states; share/doc/scene.md describes it) "
+      "or\n"
+      "a URDF. States are lines of a table (CSV) whose first line names the columns: the joints that move and mimic "
+      "no\n"
+      "other, and of moving objects NAME.x, .y, .z with .qw, .qx, .qy, .qz or .roll, .pitch, .yaw. Without states,\n"
+      "joints are at 0. All links are checked with each other and with all objects, but for pairs that may touch.");
+  command->add_option("file", scene->scene.file, "scene file (JSON) or robot (URDF)")->type_name("FILE")->required();
+  command->add_option("--states", scene->scene.states, "the states to check, one a line (CSV)")->type_name("FILE");
+  command->add_option("--srdf", scene->scene.srdf, "pairs of links that may touch (SRDF's disable_collisions)")
+      ->type_name("FILE");
+  command
+      ->add_option("--package", scene->scene.packages,
+                   "where package://name is; may be given several times; before ROS_PACKAGE_PATH and AMENT_PREFIX_PATH")
+      ->type_name("name=FOLDER")
+      ->allow_extra_args(false);
+  command
+      ->add_option("--adjacent", scene->adjacent,
+                   "links that a joint joins: as the SRDF says (without one they are ignored), ignore them, or check "
+                   "them")
+      ->check(CLI::IsMember({"srdf", "ignore", "check"}))
+      ->capture_default_str();
+  command->add_flag("--clearance", scene->clearance, "the least distance in each state and the pair that has it, too");
+  command
+      ->add_option("--margin", scene->margin,
+                   "surfaces of meshes no farther apart than this collide; of two meshes twice this counts")
+      ->check(CLI::Range(0.0, 1e9))
+      ->capture_default_str();
+  command->add_flag("--no-fcl", scene->no_fcl, "do not ask FCL, too");
+  command->add_option("--csv", scene->csv_file, "write a line for each state to this file, or to stdout with -")
+      ->type_name("FILE|-")
+      ->check(outputFile(".csv", true));
+  scene->model.addAll(*command);
+  addHtml(*command, scene->html_file);
+  addJson(*command, scene->output);
+  command->callback([scene, &job] {
+    try {
+      Packages(scene->scene.packages);
+    } catch (const std::invalid_argument& e) {
+      throw CLI::ValidationError("--package", e.what());
+    }
+    using Adjacent = SceneArguments::Adjacent;
+    scene->scene.adjacent = scene->adjacent == "ignore"  ? Adjacent::kIgnore
+                            : scene->adjacent == "check" ? Adjacent::kCheck
+                                                         : Adjacent::kAsSrdf;
+    job = [scene] { return scene->run(); };
+  });
+}
+
+}  // namespace bocst::program

@@ -1,0 +1,30 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#pragma once
+
+#include <map>
+#include <string>
+#include <vector>
+
+namespace bocst::program {
+
+/// Where ROS packages are.
+class Packages {
+ public:
+  /// @param given "name=folder" each. @throws std::invalid_argument for one that is not.
+  explicit Packages(const std::vector<std::string>& given = {});
+
+  /// A package that the command line does not name.
+  void add(const std::string& name, const std::string& folder) { folders_.emplace(name, folder); }
+
+  /// The file that a URI means in a file of this folder: package://name/path, file:///path, /path, path. Packages are
+  /// looked for among those given, in ROS_PACKAGE_PATH, AMENT_PREFIX_PATH, and from `folder` upwards.
+  /// @throws std::runtime_error that says where the package was looked for.
+  std::string resolve(const std::string& uri, const std::string& folder) const;
+
+ private:
+  std::string find(const std::string& name, const std::string& folder) const;
+
+  std::map<std::string, std::string> folders_;
+};
+
+}  // namespace bocst::program

@@ -1,0 +1,61 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#include "robot/srdf.h"
+
+#include <algorithm>
+#include <optional>
+
+#include "robot/xml_file.h"
+
+namespace bocst::program {
+namespace {
+
+class Reader {
+ public:
+  Reader(const XmlFile& xml, const Robot& robot) : xml_(xml), robot_(robot) {}
+
+  Srdf read() {
+    for (const pugi::xml_node& element : xml_.root().children("disable_default_collisions")) {
+      const std::optional<std::size_t> link = linkOf(element, "link");
+      for (std::size_t other = 0; link && other < robot_.links().size(); ++other) {
+        if (other != *link) srdf_.disabled.insert(std::minmax(*link, other));
+      }
+    }
+    for (const pugi::xml_node& element : xml_.root().children("enable_collisions")) {
+      if (const auto pair = pairOf(element)) srdf_.disabled.erase(*pair);
+    }
+    for (const pugi::xml_node& element : xml_.root().children("disable_collisions")) {
+      if (const auto pair = pairOf(element)) srdf_.disabled.insert(*pair);
+    }
+    return std::move(srdf_);
+  }
+
+ private:
+  std::optional<std::size_t> linkOf(const pugi::xml_node& element, const char* attribute) {
+    const std::string name = xml_.attribute(element, attribute);
+    const auto& links = robot_.links();
+    const auto found = std::find_if(links.begin(), links.end(), [&](const Part& link) { return link.name == name; });
+    if (found != links.end()) return static_cast<std::size_t>(found - links.begin());
+    srdf_.warnings.push_back(xml_.place(element) + ": the robot has no link " + name + "; the element is skipped");
+    return std::nullopt;
+  }
+
+  std::optional<std::pair<std::size_t, std::size_t>> pairOf(const pugi::xml_node& element) {
+    const std::optional<std::size_t> a = linkOf(element, "link1");
+    const std::optional<std::size_t> b = linkOf(element, "link2");
+    if (!a || !b) return std::nullopt;
+    return std::minmax(*a, *b);
+  }
+
+  const XmlFile& xml_;
+  const Robot& robot_;
+  Srdf srdf_;
+};
+
+}  // namespace
+
+Srdf readSrdf(const std::string& file, const Robot& robot) {
+  const XmlFile xml(file, "robot");
+  return Reader(xml, robot).read();
+}
+
+}  // namespace bocst::program

@@ -1,0 +1,24 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#pragma once
+
+#include <cstddef>
+#include <set>
+#include <string>
+#include <utility>
+#include <vector>
+
+#include "robot/robot.h"
+
+namespace bocst::program {
+
+/// What an SRDF says about pairs of links.
+struct Srdf {
+  std::set<std::pair<std::size_t, std::size_t>> disabled;  ///< Links of the robot, the smaller index first.
+  std::vector<std::string> warnings;                       ///< Of links that the robot does not have.
+};
+
+/// Reads <disable_collisions>, <disable_default_collisions> and <enable_collisions>; all else is skipped.
+/// @throws std::runtime_error that names the line.
+Srdf readSrdf(const std::string& file, const Robot& robot);
+
+}  // namespace bocst::program

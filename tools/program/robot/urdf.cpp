@@ -1,0 +1,234 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#include "robot/urdf.h"
+
+#include <console_bridge/console.h>
+#include <urdf_model/model.h>
+#include <urdf_parser/urdf_parser.h>
+
+#include <algorithm>
+#include <cmath>
+#include <filesystem>
+#include <sstream>
+#include <stdexcept>
+#include <utility>
+#include <vector>
+
+#include "robot/xml_file.h"
+
+namespace bocst::program {
+namespace {
+
+/// What urdfdom says, which it otherwise writes to stderr.
+class Listener final : public console_bridge::OutputHandler {
+ public:
+  Listener() { console_bridge::useOutputHandler(this); }
+  ~Listener() override { console_bridge::restorePreviousOutputHandler(); }
+  Listener(const Listener&) = delete;
+  Listener& operator=(const Listener&) = delete;
+
+  void log(const std::string& text, console_bridge::LogLevel level, const char*, int) override {
+    if (level >= console_bridge::CONSOLE_BRIDGE_LOG_ERROR) complaints_ += (complaints_.empty() ? "" : "; ") + text;
+  }
+
+  /// All errors, the one nearest to the cause first; also of what urdfdom leaves out and goes on.
+  const std::string& complaints() const { return complaints_; }
+
+ private:
+  std::string complaints_;
+};
+
+class Reader {
+ public:
+  Reader(const std::string& file, const Packages& packages, MeshStore& meshes)
+      : xml_(file, "robot"), packages_(packages), meshes_(meshes) {}
+
+  Robot read() {
+    refuseXacro();
+    const urdf::ModelInterfaceSharedPtr model = parse();
+    add(*model->root_link_);
+    try {
+      return Robot(model->name_, std::move(links_), std::move(joints_));
+    } catch (const std::runtime_error& e) {
+      throw std::runtime_error(xml_.name() + ": " + e.what());
+    }
+  }
+
+ private:
+  void refuseXacro() const {
+    for (const pugi::xml_node& element : xml_.root().children()) {
+      if (std::string(element.name()).rfind("xacro:", 0) != 0) continue;
+      throw std::runtime_error(xml_.place(element) + ": <" + element.name() +
+                               "> is of xacro; run `xacro FILE > robot.urdf` first");
+    }
+  }
+
+  /// The robot without what nobody asks about here, so that faults of that do not matter.
+  std::string withoutLooks() const {
+    pugi::xml_document robot;
+    robot.append_copy(xml_.root());
+    for (pugi::xml_node link : robot.document_element().children("link")) {
+      for (const char* name : {"visual", "inertial"}) {
+        while (link.remove_child(name)) {
+        }
+      }
+    }
+    std::ostringstream text;
+    robot.save(text);
+    return text.str();
+  }
+
+  urdf::ModelInterfaceSharedPtr parse() const {
+    const Listener listener;
+    urdf::ModelInterfaceSharedPtr model;
+    std::string complaint;
+    try {
+      model = urdf::parseURDF(withoutLooks());
+    } catch (const std::exception& e) {
+      complaint = e.what();
+    }
+    if (!listener.complaints().empty()) complaint = listener.complaints();
+    if (complaint.empty() && (model == nullptr || model->root_link_ == nullptr)) complaint = "urdfdom cannot read it";
+    if (!complaint.empty()) throw std::runtime_error(placeOfNamed(complaint) + ": " + complaint);
+    return model;
+  }
+
+  /// Of the first link or joint whose name stands in brackets or quotes in the text.
+  std::string placeOfNamed(const std::string& text) const {
+    for (const pugi::xml_node& element : xml_.root().children()) {
+      const std::string name = element.attribute("name").value();
+      if (name.empty()) continue;
+      for (const std::string& quoted : {"[" + name + "]", "'" + name + "'", "\"" + name + "\""}) {
+        if (text.find(quoted) != std::string::npos) return xml_.place(element);
+      }
+    }
+    return xml_.name();
+  }
+
+  std::string place(const char* kind, const std::string& name) const {
+    const pugi::xml_node element = xml_.root().find_child_by_attribute(kind, "name", name.c_str());
+    return (element ? xml_.place(element) : xml_.name()) + ": " + kind + " " + name;
+  }
+
+  [[noreturn]] void complain(const char* kind, const std::string& name, const std::string& what) const {
+    throw std::runtime_error(place(kind, name) + ": " + what);
+  }
+
+  Eigen::Isometry3d poseOf(const urdf::Pose& pose, const char* kind, const std::string& name) const {
+    Eigen::Quaterniond q;
+    pose.rotation.getQuaternion(q.x(), q.y(), q.z(), q.w());
+    Eigen::Isometry3d X = Eigen::Isometry3d::Identity();
+    X.linear() = q.normalized().toRotationMatrix();
+    X.translation() = Eigen::Vector3d(pose.position.x, pose.position.y, pose.position.z);
+    if (!X.matrix().allFinite()) complain(kind, name, "the origin has a number that is not finite");
+    return X;
+  }
+
+  /// The link and what hangs on it, parents before children.
+  void add(const urdf::Link& link) {
+    const std::size_t index = links_.size();
+    Part part;
+    part.name = link.name;
+    for (const urdf::CollisionSharedPtr& collision : link.collision_array) {
+      part.shapes.push_back({shapeOf(*collision->geometry, link.name), poseOf(collision->origin, "link", link.name)});
+    }
+    links_.push_back(std::move(part));
+    for (const urdf::JointSharedPtr& joint : link.child_joints) {
+      joints_.push_back(jointOf(*joint, index));
+      const auto child = std::find_if(link.child_links.begin(), link.child_links.end(),
+                                      [&](const auto& other) { return other->name == joint->child_link_name; });
+      add(**child);
+    }
+  }
+
+  Shape shapeOf(const urdf::Geometry& geometry, const std::string& link) {
+    Shape shape;
+    switch (geometry.type) {
+      case urdf::Geometry::BOX: {
+        const urdf::Vector3& dim = static_cast<const urdf::Box&>(geometry).dim;
+        shape.size = {dim.x, dim.y, dim.z};
+        break;
+      }
+      case urdf::Geometry::SPHERE:
+        shape.kind = Shape::Kind::kSphere;
+        shape.size.setConstant(static_cast<const urdf::Sphere&>(geometry).radius);
+        break;
+      case urdf::Geometry::CYLINDER: {
+        const auto& cylinder = static_cast<const urdf::Cylinder&>(geometry);
+        shape.kind = Shape::Kind::kCylinder;
+        shape.size = {cylinder.radius, cylinder.length, cylinder.length};
+        break;
+      }
+      case urdf::Geometry::MESH:
+        shape.kind = Shape::Kind::kMesh;
+        shape.mesh = meshOf(static_cast<const urdf::Mesh&>(geometry), link);
+        return shape;
+      default:
+        complain("link", link, "a geometry of a kind that is not known");
+    }
+    if (!shape.size.allFinite() || !(shape.size.minCoeff() > 0)) {
+      complain("link", link, "the sizes of a geometry are finite and above 0");
+    }
+    return shape;
+  }
+
+  std::shared_ptr<const Mesh> meshOf(const urdf::Mesh& mesh, const std::string& link) {
+    try {
+      const std::string file =
+          packages_.resolve(mesh.filename, std::filesystem::path(xml_.name()).parent_path().string());
+      return meshes_.get(file, {mesh.scale.x, mesh.scale.y, mesh.scale.z});
+    } catch (const std::exception& e) {
+      complain("link", link, "mesh " + mesh.filename + ": " + e.what());
+    }
+  }
+
+  Joint jointOf(const urdf::Joint& given, std::size_t parent) const {
+    Joint joint;
+    joint.name = given.name;
+    joint.parent = parent;
+    joint.X_PJ = poseOf(given.parent_to_joint_origin_transform, "joint", given.name);
+    joint.kind = kindOf(given);
+    if (joint.kind == Joint::Kind::kFixed) return joint;
+    joint.axis = {given.axis.x, given.axis.y, given.axis.z};
+    const double norm = joint.axis.norm();
+    if (!std::isfinite(norm) || !(norm > 1e-9)) complain("joint", given.name, "the axis has no direction");
+    joint.axis /= norm;
+    if (given.limits != nullptr && joint.kind != Joint::Kind::kContinuous) {
+      joint.limits = Joint::Limits{given.limits->lower, given.limits->upper};
+    }
+    if (given.mimic != nullptr) {
+      joint.mimic = Joint::Mimic{given.mimic->joint_name, given.mimic->multiplier, given.mimic->offset};
+    }
+    return joint;
+  }
+
+  Joint::Kind kindOf(const urdf::Joint& joint) const {
+    switch (joint.type) {
+      case urdf::Joint::FIXED:
+        return Joint::Kind::kFixed;
+      case urdf::Joint::REVOLUTE:
+        return Joint::Kind::kRevolute;
+      case urdf::Joint::CONTINUOUS:
+        return Joint::Kind::kContinuous;
+      case urdf::Joint::PRISMATIC:
+        return Joint::Kind::kPrismatic;
+      default:
+        complain("joint", joint.name,
+                 "joints are fixed, revolute, continuous or prismatic; a floating or planar base is made of three "
+                 "prismatic and the revolute ones that it needs");
+    }
+  }
+
+  XmlFile xml_;
+  const Packages& packages_;
+  MeshStore& meshes_;
+  std::vector<Part> links_;
+  std::vector<Joint> joints_;
+};
+
+}  // namespace
+
+Robot readUrdf(const std::string& file, const Packages& packages, MeshStore& meshes) {
+  return Reader(file, packages, meshes).read();
+}
+
+}  // namespace bocst::program

@@ -1,0 +1,36 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#include "robot/xml_file.h"
+
+#include <algorithm>
+#include <stdexcept>
+#include <utility>
+
+#include "cli/file.h"
+
+namespace bocst::program {
+
+XmlFile::XmlFile(std::string file, const std::string& root_name) : file_(std::move(file)), text_(readFile(file_)) {
+  const pugi::xml_parse_result result = document_.load_buffer(text_.data(), text_.size());
+  if (!result) throw std::runtime_error(placeOf(result.offset) + ": no XML: " + result.description());
+  if (root().name() != root_name) {
+    throw std::runtime_error(place(root()) + ": the root element is <" + root().name() + ">, not <" + root_name + ">");
+  }
+}
+
+std::string XmlFile::placeOf(std::ptrdiff_t offset) const {
+  const std::size_t end = std::min(static_cast<std::size_t>(std::max<std::ptrdiff_t>(offset, 0)), text_.size());
+  const auto lines = std::count(text_.begin(), text_.begin() + static_cast<std::ptrdiff_t>(end), '\n');
+  return file_ + ": line " + std::to_string(lines + 1);
+}
+
+std::string XmlFile::place(const pugi::xml_node& element) const { return placeOf(element.offset_debug()); }
+
+std::string XmlFile::attribute(const pugi::xml_node& element, const char* name) const {
+  const pugi::xml_attribute found = element.attribute(name);
+  if (!found || *found.value() == '\0') {
+    throw std::runtime_error(place(element) + ": <" + element.name() + "> without " + name + "=\"...\"");
+  }
+  return found.value();
+}
+
+}  // namespace bocst::program

@@ -1,0 +1,33 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#pragma once
+
+#include <pugixml.hpp>
+#include <string>
+
+namespace bocst::program {
+
+/// An XML file that knows the lines of its elements.
+class XmlFile {
+ public:
+  /// @throws std::runtime_error that names the line when it is no XML or its root has another name.
+  XmlFile(std::string file, const std::string& root);
+
+  const std::string& name() const { return file_; }
+  const std::string& text() const { return text_; }
+  pugi::xml_node root() const { return document_.document_element(); }
+
+  /// "FILE: line N", for complaints about this element.
+  std::string place(const pugi::xml_node& element) const;
+
+  /// An attribute that must be there. @throws std::runtime_error that names the line.
+  std::string attribute(const pugi::xml_node& element, const char* name) const;
+
+ private:
+  std::string placeOf(std::ptrdiff_t offset) const;
+
+  std::string file_;
+  std::string text_;
+  pugi::xml_document document_;
+};
+
+}  // namespace bocst::program

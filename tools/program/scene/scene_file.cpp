@@ -1,0 +1,295 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#include "scene/scene_file.h"
+
+#include <algorithm>
+#include <cctype>
+#include <filesystem>
+#include <map>
+#include <stdexcept>
+
+#include "cli/file.h"
+#include "cli/suggest.h"
+#include "robot/mesh_store.h"
+#include "robot/packages.h"
+#include "robot/srdf.h"
+#include "robot/urdf.h"
+#include "scene/json_element.h"
+
+namespace bocst::program {
+namespace {
+
+namespace fs = std::filesystem;
+
+/// By its ending, or by its first character.
+bool isUrdf(const std::string& file) {
+  std::string ending = fs::path(file).extension().string();
+  std::transform(ending.begin(), ending.end(), ending.begin(), [](unsigned char c) { return std::tolower(c); });
+  if (ending == ".json") return false;
+  if (ending == ".urdf" || ending == ".xml" || ending == ".xacro") return true;
+  const std::string text = readFile(file);
+  const std::size_t first = text.find_first_not_of(" \t\r\n\xEF\xBB\xBF");
+  return first != std::string::npos && text[first] == '<';
+}
+
+Json parseJson(const std::string& file) {
+  try {
+    return Json::parse(readFile(file), nullptr, true, true);
+  } catch (const Json::exception& e) {
+    std::string what = e.what();
+    what.erase(0, what.find("] ") + 2);
+    const std::string at = "parse error at ";
+    if (what.rfind(at, 0) == 0) what.erase(0, at.size());
+    throw std::runtime_error(file + ": " + what);
+  }
+}
+
+class Reader {
+ public:
+  explicit Reader(const SceneArguments& arguments) : arguments_(arguments), packages_(arguments.packages) {}
+
+  SceneSetup read() {
+    if (isUrdf(arguments_.file)) {
+      addRobot(arguments_.file, "");
+      readStates(nullptr);
+    } else {
+      const Json json = parseJson(arguments_.file);
+      const JsonElement root(json, arguments_.file);
+      readScene(root);
+      readStates(&root);
+    }
+    checkSomethingIsAsked();
+    return std::move(setup_);
+  }
+
+ private:
+  std::string path(const JsonElement& element) const {
+    return (fs::path(arguments_.file).parent_path() / element.text()).string();
+  }
+
+  void readScene(const JsonElement& root) {
+    root.allowKeys({"robot", "objects", "groups", "allowed", "states"});
+    if (root.has("robot")) readRobot(root.at("robot"));
+    if (!setup_.robot && !arguments_.srdf.empty()) root.complain("an SRDF is given, but no robot");
+    if (root.has("objects")) {
+      for (const JsonElement& object : root.at("objects").items()) readObject(object);
+    }
+    nameParts(root);
+    if (root.has("groups")) readGroups(root.at("groups"));
+    if (root.has("allowed")) readAllowed(root.at("allowed"));
+  }
+
+  void readRobot(const JsonElement& robot) {
+    if (robot.isText()) return addRobot(path(robot), "");
+    robot.allowKeys({"urdf", "srdf", "pose", "packages"});
+    if (robot.has("packages")) {
+      for (const auto& [name, folder] : robot.at("packages").members()) packages_.add(name, path(folder));
+    }
+    if (robot.has("pose")) setup_.X_WR = robot.at("pose").pose();
+    addRobot(path(robot.at("urdf")), robot.has("srdf") ? path(robot.at("srdf")) : "");
+  }
+
+  void addRobot(const std::string& urdf, const std::string& own_srdf) {
+    setup_.robot = readUrdf(urdf, packages_, meshes_);
+    const std::string& srdf = arguments_.srdf.empty() ? own_srdf : arguments_.srdf;
+    if (!srdf.empty()) {
+      Srdf read = readSrdf(srdf, *setup_.robot);
+      setup_.allowed = std::move(read.disabled);
+      setup_.warnings = std::move(read.warnings);
+    }
+    using Adjacent = SceneArguments::Adjacent;
+    if (arguments_.adjacent == Adjacent::kCheck || (arguments_.adjacent == Adjacent::kAsSrdf && !srdf.empty())) return;
+    const auto adjacent = setup_.robot->adjacentLinks();
+    setup_.allowed.insert(adjacent.begin(), adjacent.end());
+    if (arguments_.adjacent == Adjacent::kAsSrdf && !adjacent.empty()) {
+      setup_.notes.push_back("without an SRDF, links that a joint joins are not checked with each other (" +
+                             std::to_string(adjacent.size()) + " pairs); --adjacent check does that");
+    }
+  }
+
+  void readObject(const JsonElement& element) {
+    std::vector<std::string> keys = kShapes;
+    keys.insert(keys.end(), {"name", "shapes", "scale", "pose", "moving", "attached"});
+    element.allowKeys(keys);
+    SceneObject object;
+    object.part.name = element.at("name").text();
+    if (object.part.name.empty()) element.complain("the name is empty");
+    object.moving = element.has("moving") && element.at("moving").boolean();
+    if (element.has("pose")) object.X_WO = element.at("pose").pose();
+    if (element.has("attached")) {
+      if (object.moving) element.complain("an object is moving or attached, not both");
+      object.link = linkOf(element.at("attached"));
+      setup_.allowed.emplace(*object.link, setup_.partCount());
+    }
+    if (!object.moving && !object.X_WO) object.X_WO = Eigen::Isometry3d::Identity();
+    if (element.has("shapes")) {
+      if (!kindsOf(element).empty()) element.complain("either \"shapes\" or one shape is expected");
+      for (const JsonElement& shape : element.at("shapes").items()) {
+        std::vector<std::string> shape_keys = kShapes;
+        shape_keys.insert(shape_keys.end(), {"scale", "pose"});
+        shape.allowKeys(shape_keys);
+        object.part.shapes.push_back({readShape(shape), Eigen::Isometry3d::Identity()});
+        if (shape.has("pose")) object.part.shapes.back().X_PS = shape.at("pose").pose();
+      }
+      if (object.part.shapes.empty()) element.complain("\"shapes\" is empty");
+    } else {
+      object.part.shapes.push_back({readShape(element), Eigen::Isometry3d::Identity()});
+    }
+    setup_.objects.push_back(std::move(object));
+  }
+
+  std::size_t linkOf(const JsonElement& name) const {
+    std::vector<std::string> links;
+    for (std::size_t i = 0; i < setup_.linkCount(); ++i) links.push_back(setup_.part(i).name);
+    const auto found = std::find(links.begin(), links.end(), name.text());
+    if (found != links.end()) return static_cast<std::size_t>(found - links.begin());
+    name.complain("the robot has no link " + name.text() + "." + suggestion(name.text(), links));
+  }
+
+  static std::vector<std::string> kindsOf(const JsonElement& element) {
+    std::vector<std::string> kinds;
+    for (const std::string& kind : kShapes) {
+      if (element.has(kind.c_str())) kinds.push_back(kind);
+    }
+    return kinds;
+  }
+
+  Shape readShape(const JsonElement& element) {
+    const std::vector<std::string> kinds = kindsOf(element);
+    if (kinds.size() != 1) element.complain("one of mesh, box, sphere, cylinder, capsule is expected");
+    const std::string& kind = kinds.front();
+    const JsonElement value = element.at(kind);
+    if (kind != "mesh" && element.has("scale")) element.complain("\"scale\" is for meshes");
+    Shape shape;
+    if (kind == "mesh") {
+      shape.kind = Shape::Kind::kMesh;
+      shape.mesh = readMesh(element, value);
+      return shape;
+    }
+    if (kind == "sphere") {
+      shape.kind = Shape::Kind::kSphere;
+      shape.size.setConstant(value.number());
+    } else if (kind == "box") {
+      const std::vector<double> edges = value.numbers(3);
+      shape.size = {edges[0], edges[1], edges[2]};
+    } else {
+      shape.kind = kind == "cylinder" ? Shape::Kind::kCylinder : Shape::Kind::kCapsule;
+      const std::vector<double> sizes = value.numbers(2);  // radius, length
+      shape.size = {sizes[0], sizes[1], sizes[1]};
+    }
+    if (!(shape.size.minCoeff() > 0)) value.complain("sizes are above 0");
+    return shape;
+  }
+
+  std::shared_ptr<const Mesh> readMesh(const JsonElement& element, const JsonElement& file) {
+    Eigen::Vector3d scale = Eigen::Vector3d::Ones();
+    if (element.has("scale")) {
+      const JsonElement given = element.at("scale");
+      if (given.isNumber()) {
+        scale.setConstant(given.number());
+      } else {
+        const std::vector<double> numbers = given.numbers(3);
+        scale = {numbers[0], numbers[1], numbers[2]};
+      }
+    }
+    try {
+      return meshes_.get(packages_.resolve(file.text(), fs::path(arguments_.file).parent_path().string()), scale);
+    } catch (const std::exception& e) {
+      file.complain(e.what());
+    }
+  }
+
+  /// Names of parts, each of which is a group of one, "robot" for all links, and "*" for all.
+  void nameParts(const JsonElement& root) {
+    for (std::size_t i = 0; i < setup_.partCount(); ++i) {
+      if (!groups_.emplace(setup_.part(i).name, std::vector<std::size_t>{i}).second) {
+        root.complain("two parts are called " + setup_.part(i).name);
+      }
+      groups_["*"].push_back(i);
+    }
+    std::vector<std::size_t> links(setup_.linkCount());
+    for (std::size_t i = 0; i < links.size(); ++i) links[i] = i;
+    if (!links.empty()) groups_.emplace("robot", std::move(links));
+  }
+
+  const std::vector<std::size_t>& groupOf(const JsonElement& name) const {
+    const auto found = groups_.find(name.text());
+    if (found != groups_.end()) return found->second;
+    std::vector<std::string> known;
+    for (const auto& [group, parts] : groups_) known.push_back(group);
+    name.complain("there is no link, object or group " + name.text() + "." + suggestion(name.text(), known));
+  }
+
+  void readGroups(const JsonElement& groups) {
+    for (const auto& [name, members] : groups.members()) {
+      std::vector<std::size_t> parts;
+      for (const JsonElement& member : members.items()) {
+        const std::vector<std::size_t>& more = groupOf(member);
+        parts.insert(parts.end(), more.begin(), more.end());
+      }
+      if (!groups_.emplace(name, std::move(parts)).second) members.complain("the name is taken");
+    }
+  }
+
+  void readAllowed(const JsonElement& allowed) {
+    for (const JsonElement& pair : allowed.items()) {
+      const std::vector<JsonElement> sides = pair.items();
+      if (sides.size() != 2) pair.complain("two names expected");
+      for (const std::size_t a : groupOf(sides[0])) {
+        for (const std::size_t b : groupOf(sides[1])) {
+          if (a != b) setup_.allowed.insert(std::minmax(a, b));
+        }
+      }
+    }
+  }
+
+  void readStates(const JsonElement* root) {
+    const StateNames names = setup_.names();
+    const bool own = root != nullptr && root->has("states");
+    const std::string table = !arguments_.states.empty()           ? arguments_.states
+                              : own && root->at("states").isText() ? path(root->at("states"))
+                                                                   : "";
+    if (!table.empty()) {
+      setup_.states = statesOfTable(readFile(table), names, table);
+      setup_.states_from = table;
+    } else if (own) {
+      for (const JsonElement& element : root->at("states").items()) {
+        setup_.states.push_back(stateOfJson(element, names));
+        setup_.states.back().place = "states[" + std::to_string(setup_.states.size() - 1) + "]";
+      }
+      if (setup_.states.empty()) root->at("states").complain("the list is empty");
+      setup_.states_from = arguments_.file;
+    } else {
+      try {
+        setup_.states.push_back(startState(names));
+      } catch (const std::runtime_error& e) {
+        throw std::runtime_error(arguments_.file + ": " + e.what());
+      }
+      setup_.states_from = setup_.robot ? "none are given: all joints at 0" : "none are given: objects at their poses";
+    }
+  }
+
+  void checkSomethingIsAsked() const {
+    bool moving = false;
+    for (std::size_t i = 0; i < setup_.partCount(); ++i) moving |= setup_.moves(i) && !setup_.part(i).shapes.empty();
+    if (!moving) {
+      throw std::runtime_error(arguments_.file +
+                               ": nothing moves: no link has a <collision>, no object \"moving\": true");
+    }
+  }
+
+  static const std::vector<std::string> kShapes;
+
+  const SceneArguments& arguments_;
+  Packages packages_;
+  MeshStore meshes_;
+  SceneSetup setup_;
+  std::map<std::string, std::vector<std::size_t>> groups_;
+};
+
+const std::vector<std::string> Reader::kShapes = {"mesh", "box", "sphere", "cylinder", "capsule"};
+
+}  // namespace
+
+SceneSetup readScene(const SceneArguments& arguments) { return Reader(arguments).read(); }
+
+}  // namespace bocst::program

@@ -1,0 +1,228 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#include "scene/states.h"
+
+#include <algorithm>
+#include <array>
+#include <charconv>
+#include <cmath>
+#include <sstream>
+#include <stdexcept>
+#include <system_error>
+
+#include "cli/suggest.h"
+#include "pairs/poses.h"
+
+namespace bocst::program {
+namespace {
+
+constexpr std::array<const char*, 10> kFields = {"x", "y", "z", "qw", "qx", "qy", "qz", "roll", "pitch", "yaw"};
+constexpr unsigned kPosition = 0x007, kQuaternion = 0x078, kAngles = 0x380;  // bits of kFields
+
+std::string trimmed(const std::string& text) {
+  const std::size_t begin = text.find_first_not_of(" \r\"");
+  if (begin == std::string::npos) return "";
+  return text.substr(begin, text.find_last_not_of(" \r\"") + 1 - begin);
+}
+
+std::vector<std::string> cellsOf(const std::string& line) {
+  std::vector<std::string> cells(1);
+  for (const char c : line) {
+    if (c == ',' || c == ';' || c == '\t') {
+      cells.emplace_back();
+    } else {
+      cells.back() += c;
+    }
+  }
+  for (std::string& cell : cells) cell = trimmed(cell);
+  return cells;
+}
+
+std::optional<double> numberOf(const std::string& cell) {
+  double value = 0;
+  const char* begin = cell.data() + (!cell.empty() && cell.front() == '+');
+  const auto [end, error] = std::from_chars(begin, cell.data() + cell.size(), value);
+  const bool whole = error == std::errc() && end == cell.data() + cell.size() && std::isfinite(value);
+  return whole ? std::optional<double>(value) : std::nullopt;
+}
+
+std::string list(const std::vector<std::string>& names) {
+  std::string text;
+  for (const std::string& name : names) text += (text.empty() ? "" : ", ") + name;
+  return text;
+}
+
+std::string refusal(const std::string& name, const StateNames& names) {
+  const auto joint = names.others.find(name);
+  if (joint != names.others.end()) return "joint " + name + " " + joint->second + ", so it is not given";
+  std::vector<std::string> known = names.joints;
+  for (const std::string& object : names.objects) {
+    if (name.find('.') == std::string::npos) {
+      known.push_back(object);
+    } else {
+      for (const char* field : kFields) known.push_back(object + "." + field);
+    }
+  }
+  return "nothing that moves is called " + name + "." + suggestion(name, known);
+}
+
+/// The table, once its first line is read.
+class Columns {
+ public:
+  Columns(const std::vector<std::string>& head, const StateNames& names)
+      : names_(names), given_(names.objects.size(), 0u) {
+    for (const std::string& name : head) columns_.push_back(columnOf(name));
+    for (std::size_t i = 0; i < columns_.size(); ++i) {
+      for (std::size_t k = 0; k < i; ++k) {
+        if (head[i] == head[k]) throw std::invalid_argument("column " + head[i] + " is there twice");
+      }
+    }
+    std::vector<std::string> missing;
+    for (std::size_t j = 0; j < names.joints.size(); ++j) {
+      const auto is = [j](const Column& c) { return !c.object && c.index == j; };
+      if (std::none_of(columns_.begin(), columns_.end(), is)) missing.push_back(names.joints[j]);
+    }
+    if (!missing.empty()) throw std::invalid_argument("columns are missing: " + list(missing));
+    for (std::size_t i = 0; i < given_.size(); ++i) checkObject(i);
+  }
+
+  State read(const std::vector<std::string>& cells) const {
+    if (cells.size() != columns_.size()) {
+      throw std::invalid_argument(std::to_string(columns_.size()) + " numbers expected, " +
+                                  std::to_string(cells.size()) + " found");
+    }
+    State state;
+    state.joints.resize(names_.joints.size());
+    std::vector<std::array<double, kFields.size()>> fields(given_.size(), {0, 0, 0, 1, 0, 0, 0, 0, 0, 0});
+    for (std::size_t i = 0; i < cells.size(); ++i) {
+      const std::optional<double> number = numberOf(cells[i]);
+      if (!number)
+        throw std::invalid_argument("column " + nameOf(columns_[i]) + ": \"" + cells[i] + "\" is no finite number");
+      const Column& column = columns_[i];
+      (column.object ? fields[column.index][column.field] : state.joints[column.index]) = *number;
+    }
+    for (std::size_t i = 0; i < given_.size(); ++i) state.objects.push_back(poseOf(i, fields[i]));
+    return state;
+  }
+
+ private:
+  struct Column {
+    bool object;
+    std::size_t index, field;
+  };
+
+  Column columnOf(const std::string& name) {
+    const auto joint = std::find(names_.joints.begin(), names_.joints.end(), name);
+    if (joint != names_.joints.end()) return {false, static_cast<std::size_t>(joint - names_.joints.begin()), 0};
+    const std::size_t dot = name.rfind('.');
+    for (std::size_t i = 0; dot != std::string::npos && i < names_.objects.size(); ++i) {
+      if (names_.objects[i] != name.substr(0, dot)) continue;
+      const auto field = std::find(kFields.begin(), kFields.end(), name.substr(dot + 1));
+      if (field == kFields.end()) break;
+      const Column column{true, i, static_cast<std::size_t>(field - kFields.begin())};
+      given_[i] |= 1u << column.field;
+      return column;
+    }
+    throw std::invalid_argument(refusal(name, names_));
+  }
+
+  std::string nameOf(const Column& column) const {
+    if (!column.object) return names_.joints[column.index];
+    return names_.objects[column.index] + "." + kFields[column.field];
+  }
+
+  void checkObject(std::size_t i) const {
+    const unsigned given = given_[i];
+    const std::string& name = names_.objects[i];
+    if (given == 0 && !names_.X_WO[i]) throw std::invalid_argument("columns are missing: " + name + ".x and so on");
+    const bool whole =
+        given == 0 || given == kPosition || given == (kPosition | kQuaternion) || given == (kPosition | kAngles);
+    if (!whole) {
+      throw std::invalid_argument("object " + name +
+                                  " needs the columns .x, .y, .z, and of its rotation .qw, .qx, .qy, "
+                                  ".qz or .roll, .pitch, .yaw or none");
+    }
+  }
+
+  Eigen::Isometry3d poseOf(std::size_t i, const std::array<double, kFields.size()>& f) const {
+    if (given_[i] == 0) return *names_.X_WO[i];
+    if ((given_[i] & kAngles) != 0)
+      return Pose::of({f[0], f[1], f[2], f[7], f[8], f[9]}, RotationFormat::kRpy).transform();
+    return Pose::of({f[0], f[1], f[2], f[3], f[4], f[5], f[6]}).transform();
+  }
+
+  const StateNames& names_;
+  std::vector<Column> columns_;
+  std::vector<unsigned> given_;  ///< Bits of kFields, of each object.
+};
+
+}  // namespace
+
+State startState(const StateNames& names) {
+  State state;
+  state.place = "the start";
+  state.joints.assign(names.joints.size(), 0.0);
+  for (std::size_t i = 0; i < names.objects.size(); ++i) {
+    if (!names.X_WO[i]) throw std::runtime_error("no states, and object " + names.objects[i] + " has no pose");
+    state.objects.push_back(*names.X_WO[i]);
+  }
+  return state;
+}
+
+std::vector<State> statesOfTable(const std::string& text, const StateNames& names, const std::string& file) {
+  std::vector<State> states;
+  std::optional<Columns> columns;
+  std::istringstream stream(text);
+  std::string line;
+  for (std::size_t number = 1; std::getline(stream, line); ++number) {
+    const std::string mark = "\xEF\xBB\xBF";  // of UTF-8, as spreadsheets write it
+    if (number == 1 && line.rfind(mark, 0) == 0) line.erase(0, mark.size());
+    line.erase(std::min(line.find('#'), line.size()));
+    if (trimmed(line).empty()) continue;
+    const std::vector<std::string> cells = cellsOf(line);
+    const std::string place = "line " + std::to_string(number);
+    try {
+      if (columns) {
+        states.push_back(columns->read(cells));
+        states.back().place = place;
+        continue;
+      }
+      if (numberOf(cells.front())) throw std::invalid_argument("the names of the columns come first");
+      columns.emplace(cells, names);
+    } catch (const std::invalid_argument& e) {
+      throw std::runtime_error(file + ": " + place + ": " + e.what());
+    }
+  }
+  if (states.empty()) throw std::runtime_error(file + ": no states");
+  return states;
+}
+
+State stateOfJson(const JsonElement& element, const StateNames& names) {
+  State state;
+  state.joints.resize(names.joints.size());
+  std::vector<std::optional<double>> joints(names.joints.size());
+  std::vector<std::optional<Eigen::Isometry3d>> objects = names.X_WO;
+  for (const auto& [name, value] : element.members()) {
+    const auto joint = std::find(names.joints.begin(), names.joints.end(), name);
+    const auto object = std::find(names.objects.begin(), names.objects.end(), name);
+    if (joint != names.joints.end()) {
+      joints[static_cast<std::size_t>(joint - names.joints.begin())] = value.number();
+    } else if (object != names.objects.end()) {
+      objects[static_cast<std::size_t>(object - names.objects.begin())] = value.pose();
+    } else {
+      element.complain(refusal(name, names));
+    }
+  }
+  std::vector<std::string> missing;
+  for (std::size_t i = 0; i < joints.size(); ++i) {
+    if (!joints[i]) missing.push_back(names.joints[i]);
+    state.joints[i] = joints[i].value_or(0);
+  }
+  for (std::size_t i = 0; i < objects.size(); ++i) {
+    if (!objects[i]) missing.push_back(names.objects[i]);
+    state.objects.push_back(objects[i].value_or(Eigen::Isometry3d::Identity()));
+  }
+  if (!missing.empty()) element.complain("missing: " + list(missing));
+  return state;
+}
+
+}  // namespace bocst::program
