@@ -4,10 +4,10 @@
 #include <array>
 #include <numeric>
 
-#include "bench/arm_world.h"
 #include "bench/bench_scenarios.h"
-#include "bench/managed_arm.h"
 #include "cli/report.h"
+#include "planner/arm_world.h"
+#include "planner/managed_arm.h"
 
 namespace bocst::program {
 namespace {

@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #include <bocst/fcl.h>
 
-#include "bench/managed_arm_of.h"
+#include "planner/managed_arm_of.h"
 
 namespace bocst::program {
 namespace {

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: BSD-3-Clause
-#include "bench/arm_world.h"
+#include "planner/arm_world.h"
 
 #include <algorithm>
 #include <cmath>

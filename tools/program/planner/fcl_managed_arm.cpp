@@ -5,7 +5,7 @@
 #include <fcl/narrowphase/collision.h>
 #include <fcl/narrowphase/distance.h>
 
-#include "bench/managed_arm_of.h"
+#include "planner/managed_arm_of.h"
 
 namespace bocst::program {
 namespace {

@@ -9,7 +9,7 @@
 #include <utility>
 #include <vector>
 
-#include "bench/arm_world.h"
+#include "planner/arm_world.h"
 
 namespace bocst::program {
 

@@ -10,8 +10,8 @@
 
 #include <cstdint>
 
-#include "bench/managed_arm.h"
 #include "cli/report.h"
+#include "planner/managed_arm.h"
 
 namespace bocst::program {
 
