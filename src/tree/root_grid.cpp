@@ -68,7 +68,7 @@ class QuantisedMesh {
     const Mesh& mesh = *surface.mesh;
     // ScratchMemory for a step of margin on both sides.
     oracle::quantise(mesh.vertices().data()->data(), mesh.vertexCount(), surface.lattice.origin().data(),
-             surface.lattice.inverseUnit() / kMargin, (1 << oracle::kGridSpanBits) - 2, vertices_);
+                     surface.lattice.inverseUnit() / kMargin, (1 << oracle::kGridSpanBits) - 2, vertices_);
     vertices_[values(surface) - 1] = 0;
   }
 
@@ -348,7 +348,8 @@ bool RootGrid::anyCandidate(const oracle::Surface& surface, const lattice::Cell&
   return false;
 }
 
-void RootGrid::gather(const oracle::Surface& surface, const lattice::Cell& cell, std::vector<std::uint32_t>& ids) const {
+void RootGrid::gather(const oracle::Surface& surface, const lattice::Cell& cell,
+                      std::vector<std::uint32_t>& ids) const {
   anyCandidate(surface, cell, [&ids](std::uint32_t t) {
     ids.push_back(t);
     return false;
