@@ -5,8 +5,8 @@
 #include <unistd.h>
 
 #include "conformance/reference.h"
-#include "oracle/gl/device_oracle.h"
 #include "fcl/adapters/models.h"
+#include "oracle/gl/device_oracle.h"
 #include "tree/tree.h"
 
 namespace bocst {
