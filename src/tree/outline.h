@@ -8,33 +8,43 @@
 #include <cstdint>
 #include <cstring>
 
+#include "simd/float4.h"
+
 namespace bocst::tree {
 
-/// An oriented box about a surface, in the mesh's frame and unit. It can be read without a lock, so that a pair that is
-/// far apart is known as such before anything is locked. A cache line, and a word.
+/// An oriented box about all that a query may meet of a model, in the mesh's frame and unit: its surface or, with
+/// conservative answers, the spheres about it. It can be read without a lock, so that a pair that is far apart is known
+/// as such before anything is locked. A cache line, and a word.
 ///
 /// Threads: read() from any; set() from one at a time.
 class alignas(64) Outline {
  public:
   struct Box {
+    struct Axis {
+      float direction[3];
+      float half;  ///< Half the box's extent along it.
+    };
+    Axis axes[3] = {{{1, 0, 0}, 0}, {{0, 1, 0}, 0}, {{0, 0, 1}, 0}};
     float center[3] = {0, 0, 0};
-    float axes[3][3] = {{1, 0, 0}, {0, 1, 0}, {0, 0, 1}};  ///< axes[c][k]: coordinate c of direction k.
-    float half[3] = {0, 0, 0};                             ///< Half the extent along direction k.
-    float reach = 0;                                       ///< No point is farther from the frame's origin.
+    float reach = 0;  ///< No point is farther from the frame's origin.
   };
 
-  /// The members of Box where they lie. A copy of them would be slow: what was just written in small parts is.
+  /// The members of Box where they lie, four floats at once. A copy of them would be slow: what was just written in
+  /// small parts is.
   class Reader {
    public:
-    explicit Reader(const std::atomic<float>* values) : values_(values) {}
-    float center(std::size_t k) const { return at(k); }
-    float axis(std::size_t c, std::size_t k) const { return at(3 + 3 * c + k); }
-    float half(std::size_t k) const { return at(12 + k); }
-    float reach() const { return at(15); }
+    explicit Reader(const std::atomic<std::uint64_t>* words) : words_(words) {}
+    simd::Float4 axis(std::size_t k) const { return at(2 * k); }  ///< The direction, and half the extent along it.
+    simd::Float4 center() const { return at(6); }                 ///< And the reach.
+    float half(std::size_t k) const { return axis(k)[3]; }
 
    private:
-    float at(std::size_t i) const { return values_[i].load(std::memory_order_acquire); }
-    const std::atomic<float>* values_;
+    simd::Float4 at(std::size_t i) const {
+      using Words = std::uint64_t __attribute__((vector_size(16)));
+      return reinterpret_cast<simd::Float4>(
+          Words{words_[i].load(std::memory_order_acquire), words_[i + 1].load(std::memory_order_acquire)});
+    }
+    const std::atomic<std::uint64_t>* words_;
   };
 
   /// About `center`, with the columns of `axes` as directions of length 1. What rounding to float takes away is within
@@ -43,8 +53,8 @@ class alignas(64) Outline {
     Box box;
     for (int k = 0; k < 3; ++k) {
       box.center[k] = static_cast<float>(center[k]);
-      for (int c = 0; c < 3; ++c) box.axes[c][k] = static_cast<float>(axes(c, k));
-      box.half[k] = static_cast<float>(half[k]);
+      for (int c = 0; c < 3; ++c) box.axes[k].direction[c] = static_cast<float>(axes(c, k));
+      box.axes[k].half = static_cast<float>(half[k]);
     }
     box.reach = static_cast<float>(center.norm() + half.norm());
     return box;
@@ -53,11 +63,11 @@ class alignas(64) Outline {
   void set(const Box& box) {
     const std::uint32_t version = version_.load(std::memory_order_relaxed);
     version_.store(version + 1, std::memory_order_relaxed);
-    std::array<float, kCount> values;
-    static_assert(sizeof(Box) == sizeof(values));
-    std::memcpy(values.data(), &box, sizeof(box));
+    std::array<std::uint64_t, kWords> words;
+    static_assert(sizeof(Box) == sizeof(words));
+    std::memcpy(words.data(), &box, sizeof(box));
     // Who sees one of these sees that the version is odd, or a later one.
-    for (std::size_t i = 0; i < kCount; ++i) values_[i].store(values[i], std::memory_order_release);
+    for (std::size_t i = 0; i < kWords; ++i) words_[i].store(words[i], std::memory_order_release);
     version_.store(version + 2, std::memory_order_release);
   }
 
@@ -65,13 +75,13 @@ class alignas(64) Outline {
   template <typename F>
   bool read(F&& f) const {
     const std::uint32_t version = version_.load(std::memory_order_acquire);
-    const bool answer = f(Reader(values_.data()));
+    const bool answer = f(Reader(words_.data()));
     return answer && version % 2 == 0 && version_.load(std::memory_order_relaxed) == version;
   }
 
  private:
-  static constexpr std::size_t kCount = 16;
-  std::array<std::atomic<float>, kCount> values_{};
+  static constexpr std::size_t kWords = 8;
+  std::array<std::atomic<std::uint64_t>, kWords> words_{};
   std::atomic<std::uint32_t> version_{0};
 };
 

@@ -110,7 +110,8 @@ Tree::Tree(std::shared_ptr<const Mesh> mesh, const Options& options)
     : options_(checked(options)),
       oracle_(oracle::makeOracle(options.oracle, options.paper.viewport)),
       deepest_(deepestLevel(options)),
-      surface_(surfaceOf(mesh, options)) {
+      surface_(surfaceOf(mesh, options)),
+      next_prune_(options.ttl.count() > 0 ? 0 : kNeverDue) {
   reset(std::move(mesh));
 }
 
@@ -126,8 +127,19 @@ void Tree::reset(std::shared_ptr<const Mesh> mesh) {
   const Eigen::Vector3d middle = Eigen::Vector3d::Constant(lattice::kMiddle);
   supports_.start({box.min() - middle, box.max() - middle});
   supports_known_ = false;
-  outline_.set(Outline::boxOf(surface_.bounds.center(), Eigen::Matrix3d::Identity(), surface_.bounds.sizes() / 2));
+  outline_.set(Outline::boxOf(surface_.bounds.center(), Eigen::Matrix3d::Identity(),
+                              surface_.bounds.sizes() / 2 + Eigen::Vector3d::Constant(sphereReach())));
   keepOnly({});
+}
+
+double Tree::sphereReach() const {
+  if (!conservative()) return 0;
+  double units = std::ldexp(1.0, lattice::kBits);  // along the box's longest side, as in Lattice
+  if (options_.dimension > 0 && options_.subdivision == Subdivision::kBono) {
+    units = std::ldexp(options_.dimension, lattice::kBits - static_cast<int>(std::ceil(std::log2(options_.dimension))));
+  }
+  const int cell_side = 1 << (lattice::kMaxLevel - deepest_);
+  return std::sqrt(3.0) * (cell_side + 1) / units * surface_.bounds.sizes().maxCoeff();
 }
 
 std::int64_t Tree::now() const { return options_.clock ? nanoseconds(options_.clock()) : coarseNow(); }

@@ -12,6 +12,7 @@
 #include <cstddef>
 #include <cstdint>
 #include <functional>
+#include <limits>
 #include <memory>
 #include <vector>
 
@@ -44,18 +45,23 @@ class Tree {
   const oracle::Oracle& oracle() const { return *oracle_; }
   ShardedLock& queryLock() const { return query_lock_; }
 
-  /// A box about the surface; without a lock.
+  /// A box about the surface, or about the spheres of conservative answers; without a lock.
   const Outline& outline() const { return outline_; }
   /// Is it time that a query looks for branches to drop? Without a lock.
-  bool isPruneDue(std::int64_t now) const {
-    return options_.ttl.count() > 0 && now >= next_prune_.load(std::memory_order_relaxed);
+  bool isPruneDue(std::int64_t now) const { return now >= next_prune_.load(std::memory_order_relaxed); }
+  /// Are there branches that are dropped some time, if no query uses them? Without a lock.
+  bool hasDecay() const {
+    return root_.load(std::memory_order_relaxed).tag() == ChildRef::kBlock &&
+           next_prune_.load(std::memory_order_relaxed) != kNeverDue;
   }
-  /// Has nodes beside the root? Without a lock.
-  bool hasBranches() const { return root_.load(std::memory_order_relaxed).tag() == ChildRef::kBlock; }
 
   // While the query lock is held, shared or alone.
 
   const oracle::Surface& surface() const { return surface_; }
+  /// How far the spheres of conservative answers reach beyond the surface at most, in model units; 0 for exact answers.
+  /// A sphere is about a cell of the collision depth that the surface meets, so no point of it is farther from the
+  /// surface than the cell's diagonal. (Cells are decided to less than a lattice unit, which is added.)
+  double sphereReach() const;
 
   ChildRef childRef(NodeRef node) const {
     return node.isRoot() ? root_.load(std::memory_order_acquire)
@@ -196,7 +202,11 @@ class Tree {
   mutable std::atomic<double> radius_{-1};  // negative: not known yet
   bounds::NodeBounds root_bounds_;
   SupportTable supports_;
+  // Of a query of what is far apart, all that it reads.
   Outline outline_;
+  std::atomic<ChildRef> root_{ChildRef()};
+  static constexpr std::int64_t kNeverDue = std::numeric_limits<std::int64_t>::max();
+  std::atomic<std::int64_t> next_prune_;  // in ns of the model's clock
   bool supports_known_ = false;
   std::unique_ptr<RootGrid> grid_;
   std::atomic<const RootGrid*> grid_known_{nullptr};  // grid_, for readers
@@ -204,7 +214,6 @@ class Tree {
   static constexpr std::size_t kNever = ~std::size_t{0};
   mutable std::atomic<std::size_t> rent_{0};  // see payRent()
   std::atomic<std::size_t> price_{kNever};    // the whole tree is built when rent_ is more; kNever once it is
-  std::atomic<ChildRef> root_{ChildRef()};
   // Of each block: what walks read, what growth and decay know, and when a query last went through it, in ns of the
   // model's clock. Apart, so that walks have few lines to read.
   Pool<Block, 5> blocks_;
@@ -225,7 +234,6 @@ class Tree {
   std::array<std::atomic<std::size_t>, lattice::kMaxLevel + 1> nodes_at_{};
   std::atomic<std::size_t> bytes_{0}, device_bytes_{0};
   std::atomic<std::uint64_t> expansions_{0}, octants_{0}, batches_{0}, cells_{0}, pruned_{0}, built_{0};
-  std::atomic<std::int64_t> next_prune_{0};
 };
 
 }  // namespace bocst::tree

@@ -10,13 +10,19 @@
 
 namespace bocst::fcl_adapter {
 
+/// asModel() where the geometry's class is not Model itself.
+template <typename S>
+__attribute__((noinline)) const Model<S>* asDerivedModel(const fcl::CollisionGeometry<S>* geometry) {
+  return geometry->getNodeType() == fcl::GEOM_TRIANGLE ? dynamic_cast<const Model<S>*>(geometry) : nullptr;
+}
+
 /// The geometry as the Model that it is, else null.
 template <typename S>
 const Model<S>* asModel(const fcl::CollisionGeometry<S>* geometry) {
+  if (geometry == nullptr) return nullptr;
   // A dynamic_cast takes longer than a query of what is far apart; only classes made of Model need it.
-  if (geometry == nullptr || geometry->getNodeType() != fcl::GEOM_TRIANGLE) return nullptr;
-  if (typeid(*geometry) == typeid(Model<S>)) return static_cast<const Model<S>*>(geometry);
-  return dynamic_cast<const Model<S>*>(geometry);
+  if (&typeid(*geometry) == &typeid(Model<S>)) return static_cast<const Model<S>*>(geometry);
+  return asDerivedModel<S>(geometry);
 }
 
 struct ModelTree {
@@ -45,8 +51,10 @@ template <typename S>
 PairKind kindOf(const fcl::CollisionGeometry<S>* o1, const fcl::CollisionGeometry<S>* o2) {
   const Model<S>*model1 = asModel<S>(o1), *model2 = asModel<S>(o2);
   if (model1 == nullptr && model2 == nullptr) return PairKind::kForeign;
-  const bool nothing = (model1 != nullptr && model1->empty()) || (model2 != nullptr && model2->empty());
-  return nothing ? PairKind::kNothing : PairKind::kModel;
+  const auto is_empty = [](const Model<S>* model) {
+    return model != nullptr && ModelTree::of(*model) == nullptr && model->empty();
+  };
+  return is_empty(model1) || is_empty(model2) ? PairKind::kNothing : PairKind::kModel;
 }
 
 /// The C++ name of a type, for messages.

@@ -15,6 +15,7 @@
 #include "fcl/adapters/models.h"
 #include "fcl/adapters/rounding.h"
 #include "geometry/volume.h"
+#include "tree/tree.h"
 
 // What the queries about a pair of geometries share.
 
@@ -36,7 +37,9 @@ inline double magnitudeOf(const Eigen::AlignedBox3d& box) {
 /// What is no farther touches: the sum of what the two ask for.
 template <typename S>
 double marginOf(const Model<S>* model1, const Model<S>* model2) {
-  return (model1 != nullptr ? model1->options().margin : 0) + (model2 != nullptr ? model2->options().margin : 0);
+  // The trees' options: a query reads them anyway.
+  return (model1 != nullptr ? treeOf(*model1).options().margin : 0) +
+         (model2 != nullptr ? treeOf(*model2).options().margin : 0);
 }
 
 /// The pose of B in A's frame, computed in S as FCL does. Spelled out: Eigen's products of blocks are calls.

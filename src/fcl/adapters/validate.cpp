@@ -62,7 +62,7 @@ void checkTolerance(const char* query, const char* argument, double tolerance) {
 }
 
 template <typename S>
-void checkRequest(const fcl::CollisionRequest<S>& request) {
+void refuseUnlessSound(const fcl::CollisionRequest<S>& request) {
   checkTolerance("collide", "request.gjk_tolerance", static_cast<double>(request.gjk_tolerance));
   checkEnum("collide", "request.gjk_solver_type", request.gjk_solver_type, 2);
   if (request.enable_cached_gjk_guess && !request.cached_gjk_guess.allFinite()) {
@@ -88,8 +88,8 @@ void checkRequest(const fcl::ContinuousCollisionRequest<S>& request) {
   checkEnum("continuousCollide", "request.gjk_solver_type", request.gjk_solver_type, 2);
 }
 
-template void checkRequest<float>(const fcl::CollisionRequest<float>&);
-template void checkRequest<double>(const fcl::CollisionRequest<double>&);
+template void refuseUnlessSound<float>(const fcl::CollisionRequest<float>&);
+template void refuseUnlessSound<double>(const fcl::CollisionRequest<double>&);
 template void checkRequest<float>(const fcl::DistanceRequest<float>&, const fcl::DistanceResult<float>&);
 template void checkRequest<double>(const fcl::DistanceRequest<double>&, const fcl::DistanceResult<double>&);
 template void checkRequest<float>(const fcl::ContinuousCollisionRequest<float>&);

@@ -9,6 +9,7 @@
 
 #include <Eigen/Geometry>
 #include <cmath>
+#include <cstring>
 
 // What is no pose, no tolerance and no option is refused: nothing answers "free" to nonsense. Each function throws
 // std::invalid_argument that names the query, the argument and its value.
@@ -19,20 +20,39 @@ namespace bocst::fcl_adapter {
 /// thousand times stay below; what a walk allows for grows with it (SimilarityTransform::orthogonality_error).
 constexpr double kMaxOrthogonalityError = 1e-3;
 
-/// Is the pose rigid for sure? Seldom false where it is. With singular values s of R, the sum of s^2 is 3 and their
-/// product is 1 for rotations only, as the geometric mean of s^2 is below the arithmetic one. For s = 1 + e the sum of
-/// s^2 minus twice their product, minus 1, is 2 sum e^2 - (sum e)^2 up to third order; with both bounds below,
-/// sum e^2 < 1e-8, so no entry of R^T R - 1 is larger than 3e-4.
+/// No entry of R^T R - 1 is larger where isSurelyRigid() says so.
+constexpr double kSurelyRigidError = 2e-5;
+
+/// Is a pose rigid for sure? `m(i)` is entry i of its matrix, column after column; a Number may be a vector of several
+/// poses' numbers. Seldom false where it is rigid. With singular values 1 + e of R, the sum of their squares minus 3 is
+/// 2 (sum e) + sum e^2, and that sum minus twice their product, minus 1, is 2 sum e^2 - (sum e)^2, up to third order.
+/// With both bounds below no |e| is above 8e-6, and the product is positive, so R is no reflection.
+template <typename Number, typename Matrix>
+auto isSurelyRigid(const Matrix& m) {
+  const Number a0 = m(0), a1 = m(1), a2 = m(2), b0 = m(4), b1 = m(5), b2 = m(6), c0 = m(8), c1 = m(9), c2 = m(10);
+  const Number x = m(12), y = m(13), z = m(14);
+  const Number squares = (a0 * a0 + a1 * a1 + a2 * a2) + (b0 * b0 + b1 * b1 + b2 * b2) + (c0 * c0 + c1 * c1 + c2 * c2);
+  const Number determinant = a0 * (b1 * c2 - b2 * c1) + a1 * (b2 * c0 - b0 * c2) + a2 * (b0 * c1 - b1 * c0);
+  // x - x is 0, and NaN for what is not finite.
+  const Number stretch = squares - 3.0 + ((x - x) + (y - y) + (z - z)), shear = squares - 2.0 * determinant - 1.0;
+  return (stretch <= 1e-5) & (stretch >= -1e-5) & (shear <= 1e-10);
+}
+
 template <typename S>
 bool isSurelyRigid(const fcl::Transform3<S>& X) {
-  const S* m = X.matrix().data();  // columns of four
-  const double a0 = m[0], a1 = m[1], a2 = m[2], b0 = m[4], b1 = m[5], b2 = m[6], c0 = m[8], c1 = m[9], c2 = m[10];
-  const double squares = (a0 * a0 + a1 * a1 + a2 * a2) + (b0 * b0 + b1 * b1 + b2 * b2) + (c0 * c0 + c1 * c1 + c2 * c2);
-  const double determinant = a0 * (b1 * c2 - b2 * c1) + a1 * (b2 * c0 - b0 * c2) + a2 * (b0 * c1 - b1 * c0);
-  // x - x is 0, and NaN for what is not finite.
-  const double nothing = (m[12] - m[12]) + (m[13] - m[13]) + (m[14] - m[14]);
-  const double stretch = std::abs(squares - 3 + nothing), shear = squares - 2 * determinant - 1;
-  return (stretch <= 1e-4) & (shear <= 1e-8);
+  const S* m = X.matrix().data();
+  return isSurelyRigid<double>([m](int i) { return static_cast<double>(m[i]); });
+}
+
+/// Are both? In the time of one.
+template <typename S>
+bool areSurelyRigid(const fcl::Transform3<S>& X, const fcl::Transform3<S>& Y) {
+  using Two = double __attribute__((vector_size(16)));
+  const S *m = X.matrix().data(), *n = Y.matrix().data();
+  const auto rigid = isSurelyRigid<Two>([m, n](int i) {
+    return Two{static_cast<double>(m[i]), static_cast<double>(n[i])};
+  });
+  return (rigid[0] & rigid[1]) != 0;
 }
 
 /// @throws std::invalid_argument unless the translation is finite and the rotation is one, see kMaxOrthogonalityError.
@@ -48,7 +68,16 @@ void checkPose(const char* query, const char* argument, const fcl::Transform3<S>
 }
 
 template <typename S>
-void checkRequest(const fcl::CollisionRequest<S>& request);
+void refuseUnlessSound(const fcl::CollisionRequest<S>& request);
+
+template <typename S>
+void checkRequest(const fcl::CollisionRequest<S>& request) {
+  unsigned solver;  // An enum may not be read as what it is when it has no value of it.
+  static_assert(sizeof solver == sizeof request.gjk_solver_type);
+  std::memcpy(&solver, &request.gjk_solver_type, sizeof solver);
+  const bool sound = request.gjk_tolerance >= 0 && request.gjk_tolerance <= 1 && solver <= 1;
+  if (__builtin_expect(!sound || request.enable_cached_gjk_guess, 0)) refuseUnlessSound(request);
+}
 template <typename S>
 void checkRequest(const fcl::DistanceRequest<S>& request, const fcl::DistanceResult<S>& result);
 template <typename S>

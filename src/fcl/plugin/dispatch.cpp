@@ -155,17 +155,23 @@ bool isModel(const fcl::CollisionGeometry<S>* geometry) {
 
 namespace {
 
-template <typename S>
-std::size_t collideModel(const fcl::CollisionGeometry<S>* o1, const fcl::Transform3<S>& X_W1,
-                         const fcl::CollisionGeometry<S>* o2, const fcl::Transform3<S>& X_W2,
-                         const fcl_adapter::BroughtSolver<S>& solver, const fcl::CollisionRequest<S>& request,
-                         fcl::CollisionResult<S>& result) {
-  if (fcl_adapter::kindOf<S>(o1, o2) == fcl_adapter::PairKind::kNothing) return 0;
-  if (request.num_max_contacts == 0) {
-    std::cerr << "Warning: should stop early as num_max_contact is 0 !\n";
-    return 0;
+/// The collision query where a Model may be among the two; where there is none, what `foreign` says.
+template <typename S, typename Foreign>
+std::size_t collideOr(const Foreign& foreign, const fcl::CollisionGeometry<S>* o1, const fcl::Transform3<S>& X_W1,
+                      const fcl::CollisionGeometry<S>* o2, const fcl::Transform3<S>& X_W2,
+                      const fcl_adapter::BroughtSolver<S>& solver, const fcl::CollisionRequest<S>& request,
+                      fcl::CollisionResult<S>& result) {
+  switch (fcl_adapter::kindOf<S>(o1, o2)) {
+    case fcl_adapter::PairKind::kForeign:
+      return foreign();
+    case fcl_adapter::PairKind::kNothing:
+      return 0;
+    case fcl_adapter::PairKind::kModel:
+      break;
   }
-  return fcl_adapter::collidePair<S>(o1, X_W1, o2, X_W2, solver, request, result);
+  if (request.num_max_contacts > 0) return fcl_adapter::collidePair<S>(o1, X_W1, o2, X_W2, solver, request, result);
+  std::cerr << "Warning: should stop early as num_max_contact is 0 !\n";
+  return 0;
 }
 
 }  // namespace
@@ -174,16 +180,16 @@ template <typename S>
 std::size_t collide(const fcl::CollisionGeometry<S>* o1, const fcl::Transform3<S>& X_W1,
                     const fcl::CollisionGeometry<S>* o2, const fcl::Transform3<S>& X_W2,
                     const fcl::CollisionRequest<S>& request, fcl::CollisionResult<S>& result) {
-  if (!isModel<S>(o1) && !isModel<S>(o2)) return fcl::collide<S>(o1, X_W1, o2, X_W2, request, result);
-  return collideModel<S>(o1, X_W1, o2, X_W2, {}, request, result);
+  const auto by_fcl = [&] { return fcl::collide<S>(o1, X_W1, o2, X_W2, request, result); };
+  return collideOr<S>(by_fcl, o1, X_W1, o2, X_W2, {}, request, result);
 }
 
 template <typename S, typename Solver>
 std::size_t collide(const fcl::CollisionGeometry<S>* o1, const fcl::Transform3<S>& X_W1,
                     const fcl::CollisionGeometry<S>* o2, const fcl::Transform3<S>& X_W2, const Solver* solver,
                     const fcl::CollisionRequest<S>& request, fcl::CollisionResult<S>& result) {
-  if (isModel<S>(o1) || isModel<S>(o2)) return collideModel<S>(o1, X_W1, o2, X_W2, solver, request, result);
-  return fcl::collide<S, Solver>(o1, X_W1, o2, X_W2, solver, request, result);
+  const auto by_fcl = [&] { return fcl::collide<S, Solver>(o1, X_W1, o2, X_W2, solver, request, result); };
+  return collideOr<S>(by_fcl, o1, X_W1, o2, X_W2, solver, request, result);
 }
 
 template <typename S>

@@ -9,6 +9,7 @@
 #include <algorithm>
 #include <functional>
 #include <limits>
+#include <optional>
 #include <stdexcept>
 #include <string>
 #include <tuple>
@@ -26,7 +27,6 @@
 #include "fcl/queries/inside.h"
 #include "fcl/queries/inside_contact.h"
 #include "fcl/queries/query_scope.h"
-#include "fcl/queries/sphere_reach.h"
 #include "geometry/triangle.h"
 #include "query/collide/pair_walk.h"
 #include "query/collide/sphere_walk.h"
@@ -567,6 +567,7 @@ struct Models {
       throw std::logic_error("bocst::collide: neither geometry is a bocst::Model");
     }
   }
+  bool areTwo() const { return first != nullptr && second != nullptr; }
   const Model<S>*first, *second;
 };
 
@@ -583,39 +584,27 @@ bool turnsRound(const Models<S>& models, const fcl::Transform3<S>& X_W1, const f
   return differ.first == x1 + 16 ? std::less<const tree::Tree*>()(&tree2, &tree1) : *differ.second < *differ.first;
 }
 
-// Are two models so far apart that nothing need be locked? False where branches are due to be
-// dropped, since only a query that holds the locks drops them, at its end.
+// Are two models so far apart that nothing need be locked? For poses that are surely rigid. False where branches are
+// due to be dropped, since only a query that holds the locks drops them, at its end.
 template <typename S>
-bool areFarApart(const CollideQuery<S>& q, const Models<S>& models) {
+bool areFarApart(const Models<S>& models, const fcl::Transform3<S>& X_W1, const fcl::Transform3<S>& X_W2,
+                 double margin) {
+  static_assert(kSurelyRigidError <= 2e-5, "what query::areFarApart() allows for");
   const tree::Tree &tree1 = treeOf(*models.first), &tree2 = treeOf(*models.second);
-  // No side of a mesh's bounding box is longer than the diagonal of any box about the mesh.
-  const auto spheres = [](const tree::Tree& tree, const tree::Outline::Reader& box) {
-    return sphereReach(
-        tree, 2 * std::sqrt(box.half(0) * box.half(0) + box.half(1) * box.half(1) + box.half(2) * box.half(2)));
-  };
-  const RelativePose<S> X_12(q.X_W1, q.X_W2);
-  const bool are_far = tree1.outline().read([&](const tree::Outline::Reader& box1) {
-    return tree2.outline().read([&](const tree::Outline::Reader& box2) {
-      const double margin = q.margin + spheres(tree1, box1) + spheres(tree2, box2);
-      return query::areFarApart(box1, box2, X_12.rotation, X_12.translation, margin);
-    });
-  });
-  if (!are_far) return false;
-  for (const tree::Tree* tree : {&tree1, &tree2}) {
-    if (tree->options().ttl.count() > 0 && tree->hasBranches() && tree->isPruneDue(tree->now())) return false;
+  if (!query::areFarApart(tree1.outline(), X_W1.matrix().data(), tree2.outline(), X_W2.matrix().data(), margin)) {
+    return false;
   }
-  return true;
+  if (!tree1.hasDecay() && !tree2.hasDecay()) return true;
+  // The system's clock need not be read twice.
+  const std::int64_t now1 = tree1.now(), now2 = tree1.options().clock || tree2.options().clock ? tree2.now() : now1;
+  return !(tree1.hasDecay() && tree1.isPruneDue(now1)) && !(tree2.hasDecay() && tree2.isPruneDue(now2));
 }
 
 template <typename S>
 std::size_t answer(const CollideQuery<S>& q, const Models<S>& models, const BroughtSolver<S>& solver) {
-  checkPose("collide", "tf1", q.X_W1);
-  checkPose("collide", "tf2", q.X_W2);
-  checkRequest(q.request);
   if (q.request.isSatisfied(q.result)) return q.result.numContacts();
   if (!q.occupied() && (q.o1->isFree() || q.o2->isFree() || !q.request.enable_cost)) return q.result.numContacts();
   const Model<S>*a = models.first, *b = models.second;
-  if (a != nullptr && b != nullptr && areFarApart(q, models)) return q.result.numContacts();
   q.inCallersOrder(a, b);
   if (b != nullptr) {
     const QueryScope scope(treeOf(*a), treeOf(*b));
@@ -638,20 +627,19 @@ template <typename S>
 std::size_t collidePair(const fcl::CollisionGeometry<S>* o1, const fcl::Transform3<S>& X_W1,
                         const fcl::CollisionGeometry<S>* o2, const fcl::Transform3<S>& X_W2,
                         const BroughtSolver<S>& solver, const fcl::CollisionRequest<S>& request,
-                        fcl::CollisionResult<S>& result) {
+                        fcl::CollisionResult<S>& result, std::optional<double> margin) {
   const Models<S> models(o1, o2);
-  const double margin = marginOf(models.first, models.second);
-  return answer(CollideQuery<S>{{o1, X_W1, o2, X_W2, turnsRound(models, X_W1, X_W2)}, request, result, margin}, models,
+  const bool are_rigid = areSurelyRigid(X_W1, X_W2);
+  if (!are_rigid) {
+    checkPose("collide", "tf1", X_W1);
+    checkPose("collide", "tf2", X_W2);
+  }
+  checkRequest(request);
+  const double m = margin ? *margin : marginOf(models.first, models.second);
+  // Most of a planner's pairs end here.
+  if (are_rigid && models.areTwo() && areFarApart(models, X_W1, X_W2, m)) return result.numContacts();
+  return answer(CollideQuery<S>{{o1, X_W1, o2, X_W2, turnsRound(models, X_W1, X_W2)}, request, result, m}, models,
                 solver);
-}
-
-template <typename S>
-std::size_t collidePair(const fcl::CollisionGeometry<S>* o1, const fcl::Transform3<S>& X_W1,
-                        const fcl::CollisionGeometry<S>* o2, const fcl::Transform3<S>& X_W2,
-                        const fcl::CollisionRequest<S>& request, fcl::CollisionResult<S>& result, double margin) {
-  const Models<S> models(o1, o2);
-  return answer(CollideQuery<S>{{o1, X_W1, o2, X_W2, turnsRound(models, X_W1, X_W2)}, request, result, margin}, models,
-                BroughtSolver<S>());
 }
 
 template <typename S>
@@ -665,9 +653,9 @@ void collideRow(const Model<S>& a, const Model<S>& b, const fcl::Transform3<S>* 
   const Models<S> models(&a, &b);
   const double margin = marginOf(&a, &b);
   for (std::size_t k = 0; k < count; ++k) {
+    if (isSurelyRigid(X_AB[k]) && areFarApart(models, identity, X_AB[k], margin)) continue;
     const CollideQuery<S> q{
         {&a, identity, &b, X_AB[k], turnsRound(models, identity, X_AB[k])}, request, result, margin};
-    if (areFarApart(q, models)) continue;
     result.clear();
     const QueryScope scope(treeOf(a), treeOf(b));
     collideTrees(q, q.swapped ? scope.b() : scope.a(), q.swapped ? scope.a() : scope.b());
@@ -675,14 +663,12 @@ void collideRow(const Model<S>& a, const Model<S>& b, const fcl::Transform3<S>* 
   }
 }
 
-#define BOCST_INSTANTIATE(S)                                                                                          \
-  template void collideRow(const Model<S>&, const Model<S>&, const fcl::Transform3<S>*, std::size_t, std::uint8_t*);  \
-  template std::size_t collidePair(                                                                                   \
-      const fcl::CollisionGeometry<S>*, const fcl::Transform3<S>&, const fcl::CollisionGeometry<S>*,                  \
-      const fcl::Transform3<S>&, const BroughtSolver<S>&, const fcl::CollisionRequest<S>&, fcl::CollisionResult<S>&); \
-  template std::size_t collidePair(const fcl::CollisionGeometry<S>*, const fcl::Transform3<S>&,                       \
-                                   const fcl::CollisionGeometry<S>*, const fcl::Transform3<S>&,                       \
-                                   const fcl::CollisionRequest<S>&, fcl::CollisionResult<S>&, double);
+#define BOCST_INSTANTIATE(S)                                                                                           \
+  template void collideRow(const Model<S>&, const Model<S>&, const fcl::Transform3<S>*, std::size_t, std::uint8_t*);   \
+  template std::size_t collidePair(const fcl::CollisionGeometry<S>*, const fcl::Transform3<S>&,                        \
+                                   const fcl::CollisionGeometry<S>*, const fcl::Transform3<S>&,                        \
+                                   const BroughtSolver<S>&, const fcl::CollisionRequest<S>&, fcl::CollisionResult<S>&, \
+                                   std::optional<double>);
 BOCST_INSTANTIATE(float)
 BOCST_INSTANTIATE(double)
 

@@ -236,7 +236,7 @@ void sign(const DistanceQuery<S>& q) {
   fcl::CollisionRequest<S> request;
   request.enable_contact = true;
   fcl::CollisionResult<S> contacts;
-  collidePair<S>(q.o1, q.X_W1, q.o2, q.X_W2, request, contacts, 0);
+  collidePair<S>(q.o1, q.X_W1, q.o2, q.X_W2, {}, request, contacts, 0.0);
   if (!contacts.isCollision()) return;
   const fcl::Contact<S>& contact = contacts.getContact(0);
   q.result.min_distance = -contact.penetration_depth;

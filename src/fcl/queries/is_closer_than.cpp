@@ -12,7 +12,7 @@ bool isCloserThan(const fcl::CollisionGeometry<S>* o1, const fcl::Transform3<S>&
                   const fcl::CollisionGeometry<S>* o2, const fcl::Transform3<S>& X_W2, S distance) {
   fcl_adapter::checkTolerance("isCloserThan", "distance", static_cast<double>(distance));
   fcl::CollisionResult<S> result;
-  return fcl_adapter::collidePair<S>(o1, X_W1, o2, X_W2, fcl::CollisionRequest<S>(), result,
+  return fcl_adapter::collidePair<S>(o1, X_W1, o2, X_W2, {}, fcl::CollisionRequest<S>(), result,
                                      static_cast<double>(distance)) > 0;
 }
 

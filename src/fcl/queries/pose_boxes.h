@@ -5,7 +5,6 @@
 
 #include "fcl/adapters/models.h"
 #include "fcl/adapters/pair.h"
-#include "fcl/queries/sphere_reach.h"
 #include "query/cull/near_poses.h"
 #include "tree/tree.h"
 
@@ -23,8 +22,7 @@ query::PoseBoxes boxesOf(const Model<S>& a, const Model<S>& b) {
   const Eigen::Vector3d middle_a = box_a.center(), middle_b = box_b.center();
   const Eigen::Vector3d to_a = (box_a.max() - middle_a).cwiseMax(middle_a - box_a.min()),
                         to_b = (box_b.max() - middle_b).cwiseMax(middle_b - box_b.min());
-  const double margin = 1.001 * (marginOf(&a, &b) + sphereReach(treeOf(a), 2 * to_a.maxCoeff()) +
-                                 sphereReach(treeOf(b), 2 * to_b.maxCoeff()));
+  const double margin = 1.001 * (marginOf(&a, &b) + treeOf(a).sphereReach() + treeOf(b).sphereReach());
   query::PoseBoxes boxes;
   // However b is turned, it is no farther from its origin than this.
   boxes.reach = to_a.norm() + 1.002 * (middle_b.norm() + to_b.norm());

@@ -194,12 +194,12 @@ using Outline = tree::Outline;
 Outline::Box boxOf(const tree::Tree& tree) {
   Outline::Box box;
   EXPECT_TRUE(tree.outline().read([&box](const Outline::Reader& reader) {
-    for (std::size_t k = 0; k < 3; ++k) {
-      box.center[k] = reader.center(k);
-      box.half[k] = reader.half(k);
-      for (std::size_t c = 0; c < 3; ++c) box.axes[c][k] = reader.axis(c, k);
+    for (int c = 0; c < 3; ++c) {
+      for (std::size_t k = 0; k < 3; ++k) box.axes[k].direction[c] = reader.axis(k)[c];
+      box.center[c] = reader.center()[c];
     }
-    box.reach = reader.reach();
+    for (std::size_t k = 0; k < 3; ++k) box.axes[k].half = reader.half(k);
+    box.reach = reader.center()[3];
     return true;
   }));
   return box;
@@ -217,9 +217,10 @@ TEST(Outline, HoldsTheSurfaceBeforeAndAfterTheWholeBuild) {
           const Vector3d v = raw.vertices[t[k]];
           ASSERT_LE(v.norm(), static_cast<double>(box.reach) * (1 + 1e-6));
           for (std::size_t j = 0; j < 3; ++j) {
-            const Vector3d axis(box.axes[0][j], box.axes[1][j], box.axes[2][j]);
+            const auto& [direction, half] = box.axes[j];
+            const Vector3d axis(direction[0], direction[1], direction[2]);
             ASSERT_NEAR(axis.norm(), 1, 1e-6);
-            const double least = static_cast<double>(box.half[j]) + 1e-6 * static_cast<double>(box.reach);
+            const double least = static_cast<double>(half) + 1e-6 * static_cast<double>(box.reach);
             ASSERT_LE(std::abs(axis.dot(v - center)), least) << is_whole;
           }
         }
@@ -233,47 +234,61 @@ TEST(Outline, HoldsTheSurfaceBeforeAndAfterTheWholeBuild) {
   const Side a(rod), b(rod);
   learnSupports(a, b);
   const Outline::Box box = boxOf(a.tree);
-  EXPECT_LT(box.half[0] * box.half[1] * box.half[2], 1e-4f);
+  EXPECT_LT(box.axes[0].half * box.axes[1].half * box.axes[2].half, 1e-4f);
 }
 
-// A point of one box comes to lie within the margin of a point of the other, however off the rotation is.
+/// A box of that size about, and one of its corners.
+Outline::Box randomBox(std::mt19937_64& g, double size, Vector3d& corner) {
+  std::uniform_real_distribution<double> u(-1, 1);
+  const Eigen::Matrix3d axes = test::randomRotation(g);
+  const Vector3d center = size * test::randomDirection(g) * (g() % 2 ? 1 : 0);
+  Vector3d half;
+  for (double& h : half) h = size * std::exp2(4 * u(g) - 4);
+  corner = center;
+  for (int k = 0; k < 3; ++k) corner += axes.col(k) * half[k] * (g() % 2 ? 1 : -1);
+  return Outline::boxOf(center, axes, half);
+}
+
+/// A pose, its rotation off by `error` an entry of it at most.
+Eigen::Isometry3d randomPose(std::mt19937_64& g, double size, double error) {
+  std::uniform_real_distribution<double> u(-1, 1);
+  Eigen::Isometry3d X = Eigen::Isometry3d::Identity();
+  X.linear() = test::randomRotation(g) + error * Eigen::Matrix3d::NullaryExpr([&] { return u(g); });
+  X.translation() = size * test::randomDirection(g);
+  return X;
+}
+
+bool areFar(const Outline::Box& box_a, const Eigen::Isometry3d& X_WA, const Outline::Box& box_b,
+            const Eigen::Isometry3d& X_WB, double margin, bool in_float) {
+  Outline a, b;
+  a.set(box_a);
+  b.set(box_b);
+  if (!in_float) return areFarApart(a, X_WA.matrix().data(), b, X_WB.matrix().data(), margin);
+  const Eigen::Matrix4f X_A = X_WA.matrix().cast<float>(), X_B = X_WB.matrix().cast<float>();
+  return areFarApart(a, X_A.data(), b, X_B.data(), margin);
+}
+
+// A point of one box comes to lie within the margin of a point of the other, however off the rotations may be.
 TEST(Outline, BoxesThatMeetAreNotFarApart) {
   std::mt19937_64 g(35);
   std::uniform_real_distribution<double> u(-1, 1);
-  const auto box = [&](double size, Vector3d& point) {
-    const Eigen::Matrix3d axes = test::randomRotation(g);
-    const Vector3d center = size * test::randomDirection(g) * (g() % 2 ? 1 : 0);
-    Vector3d half;
-    for (double& h : half) h = size * std::exp2(4 * u(g) - 4);
-    point = center;
-    for (int k = 0; k < 3; ++k) point += axes.col(k) * half[k] * (g() % 2 ? 1 : -1);
-    return Outline::boxOf(center, axes, half);
-  };
   int far = 0, expected = 0;
-  for (int round = 0; round < 20000; ++round) {
+  for (int round = 0; round < 40000; ++round) {
     // Floats end within these; what is farther apart is not known to be.
     const double exponent = 45 * u(g), size = std::pow(10.0, exponent);
     Vector3d p, q;
-    const Outline::Box box_a = box(size, p), box_b = box(size * std::exp2(8 * u(g)), q);
-    Outline a, b;
-    a.set(box_a);
-    b.set(box_b);
-    Eigen::Matrix3d R = test::randomRotation(g);
-    if (round % 2) R += 4e-4 * Eigen::Matrix3d::NullaryExpr([&] { return u(g); });
-    const double margin = round % 3 ? 0 : size * std::abs(u(g));
+    const Outline::Box a = randomBox(g, size, p), b = randomBox(g, size * std::exp2(8 * u(g)), q);
+    // With 2e-6 an entry, one of R^T R - 1 is below 1e-5.
+    const double error = round % 2 ? 2e-6 : 0, margin = round % 3 ? 0 : size * std::abs(u(g));
+    const double reaches = static_cast<double>(a.reach) + static_cast<double>(b.reach);
+    const Eigen::Isometry3d X_WA = randomPose(g, size, error);
+    Eigen::Isometry3d X_WB = randomPose(g, size, error);
     for (const bool apart : {false, true}) {
-      const Vector3d t = p - R * q +
-                         test::randomDirection(g) *
-                             (apart ? 9 * (static_cast<double>(box_a.reach) + static_cast<double>(box_b.reach) + margin)
-                                    : 0.99 * margin);
-      double rotation[3][3], translation[3];
-      for (int r = 0; r < 3; ++r) {
-        translation[r] = t[r];
-        for (int c = 0; c < 3; ++c) rotation[r][c] = R(r, c);
-      }
-      const bool found = a.read([&](const Outline::Reader& x) {
-        return b.read([&](const Outline::Reader& y) { return areFarApart(x, y, rotation, translation, margin); });
-      });
+      const Vector3d touching = X_WA * p - X_WB.linear() * q;
+      X_WB.translation() = touching + test::randomDirection(g) * (apart ? 9 * (reaches + margin) : 0.99 * margin);
+      // What is far from the world's origin is rounded with it.
+      const bool in_float = round % 5 == 0 && std::abs(exponent) < 30,
+                 found = areFar(a, X_WA, b, X_WB, margin, in_float);
       if (apart) {
         far += found;
         expected += std::abs(exponent) < 10;
@@ -283,7 +298,53 @@ TEST(Outline, BoxesThatMeetAreNotFarApart) {
     }
   }
   EXPECT_GE(far, expected);
-  EXPECT_GT(expected, 3000);
+  EXPECT_GT(expected, 6000);
+}
+
+// Beside boxes whose distance is known: a direction between them is found where there is one of the fifteen.
+TEST(Outline, BoxesThatTheirAxesPartAreFarApart) {
+  std::mt19937_64 g(36);
+  std::uniform_real_distribution<double> u(-1, 1);
+  int apart_by_faces = 0, apart_by_edges = 0;
+  for (int round = 0; round < 20000; ++round) {
+    Vector3d p, q;
+    const Outline::Box a = randomBox(g, 1, p), b = randomBox(g, 1, q);
+    const Eigen::Isometry3d X_WA = randomPose(g, 1, 0);
+    Eigen::Isometry3d X_WB = randomPose(g, 1, 0);
+    Eigen::Matrix3d A, B;
+    Vector3d half_a, half_b;
+    for (int k = 0; k < 3; ++k) {
+      A.col(k) = X_WA.linear() * Eigen::Map<const Eigen::Vector3f>(a.axes[k].direction).cast<double>();
+      B.col(k) = X_WB.linear() * Eigen::Map<const Eigen::Vector3f>(b.axes[k].direction).cast<double>();
+      half_a[k] = static_cast<double>(a.axes[k].half);
+      half_b[k] = static_cast<double>(b.axes[k].half);
+    }
+    const Vector3d center_a = X_WA * Eigen::Map<const Eigen::Vector3f>(a.center).cast<double>(),
+                   center_b = X_WB * Eigen::Map<const Eigen::Vector3f>(b.center).cast<double>(),
+                   way = center_b - center_a;
+    const auto gap = [&](const Vector3d& direction) {
+      const double length = direction.norm();
+      if (length < 1e-3) return -1.0;
+      return (std::abs(way.dot(direction)) - (A.transpose() * direction).cwiseAbs().dot(half_a) -
+              (B.transpose() * direction).cwiseAbs().dot(half_b));
+    };
+    double by_faces = gap(way) / way.norm(), by_edges = -1;
+    for (int i = 0; i < 3; ++i) {
+      by_faces = std::max({by_faces, gap(A.col(i)), gap(B.col(i))});
+      for (int j = 0; j < 3; ++j) by_edges = std::max(by_edges, gap(A.col(i).cross(B.col(j))));
+    }
+    const bool found = areFar(a, X_WA, b, X_WB, 0, false);
+    if (std::max(by_faces, by_edges) > 0.005) {
+      ASSERT_TRUE(found) << round;
+    }
+    if (std::max(by_faces, by_edges) < 0) {
+      ASSERT_FALSE(found) << round;
+    }
+    apart_by_faces += by_faces > 0.005;
+    apart_by_edges += by_faces < 0 && by_edges > 0.005;
+  }
+  EXPECT_GT(apart_by_faces, 5000);
+  EXPECT_GT(apart_by_edges, 20);
 }
 
 // Answers by a walk, of which there must be none once supports part the two.

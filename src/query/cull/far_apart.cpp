@@ -1,0 +1,105 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#include "query/cull/far_apart.h"
+
+#include <cmath>
+
+#include "simd/float4.h"
+
+namespace bocst::query {
+namespace {
+
+using simd::Float4;
+using simd::lane;
+
+/// A box turned as in the world. Lane k of `half` is about axis k; lanes 3 are not used.
+struct TurnedBox {
+  Float4 axes[3], center, half;
+  float reach;
+};
+
+// The matrix of these columns times v.
+Float4 product(const Float4 (&columns)[3], Float4 v) {
+  return columns[0] * lane<0>(v) + columns[1] * lane<1>(v) + columns[2] * lane<2>(v);
+}
+
+// Inlined, or its answer goes through memory.
+template <typename S>
+__attribute__((always_inline)) inline TurnedBox turn(const tree::Outline::Reader& box, const S* X) {
+  const Float4 R[3] = {simd::load(X), simd::load(X + 4), simd::load(X + 8)};
+  const Float4 x = box.axis(0), y = box.axis(1), z = box.axis(2), center = box.center();
+  const Float4 half_xy = __builtin_shufflevector(x, y, 3, 7, 3, 7);
+  return {{product(R, x), product(R, y), product(R, z)},
+          product(R, center),
+          __builtin_shufflevector(half_xy, z, 0, 1, 7, 7),
+          center[3]};
+}
+
+// Lanes 1 2 0 and 2 0 1: the next of three, and the one after it.
+Float4 next(Float4 v) { return __builtin_shufflevector(v, v, 1, 2, 0, 3); }
+Float4 afterNext(Float4 v) { return __builtin_shufflevector(v, v, 2, 0, 1, 3); }
+
+// Along the product of any axis i of a, a lane each, and axis J of b. Their products are at most 1 long, so a gap along
+// them is no shorter than it looks. `cosines` are of the angles between axis i and each of b.
+template <int J>
+simd::Int4 areApartByProducts(Float4 way, Float4 half_a, const Float4 (&cosines)[3], Float4 half_b, Float4 least) {
+  constexpr int kNext = (J + 1) % 3, kAfter = (J + 2) % 3;
+  const Float4 cosine = cosines[J], size = simd::abs(cosine);
+  const Float4 distance = simd::abs(afterNext(way) * next(cosine) - next(way) * afterNext(cosine));
+  const Float4 extent_a = next(half_a) * afterNext(size) + afterNext(half_a) * next(size);
+  const Float4 extent_b =
+      lane<kNext>(half_b) * simd::abs(cosines[kAfter]) + lane<kAfter>(half_b) * simd::abs(cosines[kNext]);
+  return distance - extent_a - extent_b > least;
+}
+
+// `translation` is that of b minus that of a.
+__attribute__((always_inline)) inline bool areFarApart(const TurnedBox& a, const TurnedBox& b, Float4 translation,
+                                                       float margin) {
+  const Float4 way = translation + b.center - a.center;
+  const Float4 none = {0, 0, 0, 0};
+  // Row c: coordinate c of each axis of a. So what is a sum over rows has a lane for each axis, and 0 in lane 3.
+  Float4 rows_a[3] = {a.axes[0], a.axes[1], a.axes[2]}, rest = none;
+  simd::transpose(rows_a[0], rows_a[1], rows_a[2], rest);
+  const Float4 along_a = product(rows_a, way);
+  const Float4 squares = along_a * along_a;
+  const float squared = squares[0] + squares[1] + squares[2];
+  // No square may leave the range of floats; nor does what is no number.
+  if (!(squared > 1e-30f && squared < 1e30f)) return false;
+  const float length = std::sqrt(squared);
+  const float gap = 1.001f * margin + 2e-4f * (length + 2 * (a.reach + b.reach));
+  const Float4 least = {gap, gap, gap, gap};
+
+  const Float4 cosines[3] = {product(rows_a, b.axes[0]), product(rows_a, b.axes[1]), product(rows_a, b.axes[2])};
+  Float4 transposed[3] = {cosines[0], cosines[1], cosines[2]};
+  rest = none;
+  simd::transpose(transposed[0], transposed[1], transposed[2], rest);
+  const Float4 along_b = product(transposed, along_a);
+  const Float4 sizes[3] = {simd::abs(cosines[0]), simd::abs(cosines[1]), simd::abs(cosines[2])};
+  const Float4 transposed_sizes[3] = {simd::abs(transposed[0]), simd::abs(transposed[1]), simd::abs(transposed[2])};
+  const Float4 distance_a = simd::abs(along_a), distance_b = simd::abs(along_b);
+  if (simd::any((distance_a - a.half - product(sizes, b.half) > least) |
+                (distance_b - b.half - product(transposed_sizes, a.half) > least))) {
+    return true;
+  }
+  const Float4 extents = distance_a * a.half + distance_b * b.half;
+  if (squared - extents[0] - extents[1] - extents[2] > gap * length) return true;
+  return simd::any(areApartByProducts<0>(along_a, a.half, cosines, b.half, least) |
+                   areApartByProducts<1>(along_a, a.half, cosines, b.half, least) |
+                   areApartByProducts<2>(along_a, a.half, cosines, b.half, least));
+}
+
+}  // namespace
+
+template <typename S>
+bool areFarApart(const tree::Outline& a, const S* X_WA, const tree::Outline& b, const S* X_WB, double margin) {
+  const Float4 translation = simd::loadDifference(X_WB + 12, X_WA + 12);
+  return a.read([&](const tree::Outline::Reader& box_a) {
+    return b.read([&](const tree::Outline::Reader& box_b) {
+      return areFarApart(turn(box_a, X_WA), turn(box_b, X_WB), translation, static_cast<float>(margin));
+    });
+  });
+}
+
+template bool areFarApart(const tree::Outline&, const float*, const tree::Outline&, const float*, double);
+template bool areFarApart(const tree::Outline&, const double*, const tree::Outline&, const double*, double);
+
+}  // namespace bocst::query
