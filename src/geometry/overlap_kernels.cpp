@@ -407,7 +407,6 @@ HWY_INLINE PairBits testPairs(const Vec3 (&p)[3], const Vec3 (&q)[3], V extent, 
   const V by_n = reachAcross(n0, n1, n2), by_m = reachAcross(m0, m1, m2);
   const M planes = hn::And(hn::Ge(by_n, hn::Neg(of_p.rounding_margin)), hn::Ge(by_m, hn::Neg(of_q.rounding_margin)));
   M near = hn::And(pairs, planes);
-  if (wide && !hn::AllFalse(d, near)) near = hn::AndNot(apartByEdges(of_p, of_q, w, extent, tiny), near);
   if (hn::AllFalse(d, near)) return {0, 0};
 
   // How far the determinants below may be off: those with a plane's normal, and those of an edge of each.
@@ -422,6 +421,12 @@ HWY_INLINE PairBits testPairs(const Vec3 (&p)[3], const Vec3 (&q)[3], V extent, 
   M clear = hn::Gt(min3(hn::Abs(n0), hn::Abs(n1), hn::Abs(n2)), offNormal(of_p.longest));
   clear = hn::And(clear, hn::Gt(min3(hn::Abs(m0), hn::Abs(m1), hn::Abs(m2)), offNormal(of_q.longest)));
   clear = hn::And(clear, hn::Gt(shorter, hn::Set(d, 64 * moved)));
+  // What has no plane, as triangles without area, is never clear.
+  const M doubtful = wide ? near : hn::AndNot(clear, near);
+  if (!hn::AllFalse(d, doubtful)) {
+    near = hn::AndNot(hn::And(doubtful, apartByEdges(of_p, of_q, w, extent, tiny)), near);
+    if (hn::AllFalse(d, near)) return {0, 0};
+  }
 
   // Each cuts the other's plane with the edges from its corner that is alone on its side, in an interval of the line of
   // both planes. The determinant of two such edges says where an end of the one lies to an end of the other; the
