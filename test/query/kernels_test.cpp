@@ -449,6 +449,31 @@ TEST_P(EveryTarget, CertainMeansThatFclSaysSo) {
   certainMeansThatFclSaysSo<float>();
 }
 
+// A triangle without area has no plane, so only edges part it from another that its line's plane cuts.
+TEST_P(EveryTarget, TrianglesWithoutAreaArePartedByEdges) {
+  std::mt19937_64 g(37);
+  std::uniform_real_distribution<double> u(-1, 1);
+  const auto vector = [&] { return Eigen::Vector3d(u(g), u(g), u(g)); };
+  int apart = 0;
+  for (int round = 0; round < 20000; ++round) {
+    Corners p, q;
+    for (auto& v : p) v = vector();
+    for (auto& v : q) v = vector();
+    q[2] = q[0] + std::abs(u(g)) * (q[1] - q[0]);
+    const double distance = 1e-3;
+    if (!areApart(p, q, distance)) continue;
+    ++apart;
+    TrianglePack a, b;
+    a.count = b.count = 1;
+    put(a, 0, p);
+    put(b, 0, q);
+    PackPair found[1];
+    ASSERT_EQ(touchingPairs(a, 1, b, everywhere(), 0, found), 0u) << round;
+    ASSERT_EQ(touchingPairs(b, 1, a, everywhere(), 0, found), 0u) << round;
+  }
+  EXPECT_GT(apart, 10000);
+}
+
 TEST_P(EveryTarget, NoTriangleIsLostThatReachesIntoARegion) {
   std::mt19937_64 g(34);
   std::uniform_real_distribution<double> u(-1, 1);

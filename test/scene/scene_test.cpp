@@ -33,13 +33,16 @@ void* allocate(std::size_t size, std::size_t alignment) {
 
 }  // namespace
 
-void* operator new(std::size_t size) { return allocate(size, alignof(std::max_align_t)); }
-void* operator new(std::size_t size, std::align_val_t a) { return allocate(size, static_cast<std::size_t>(a)); }
-// Not inlined, or GCC takes them for a mistake where they are beside an operator new that it did not inline.
-__attribute__((noinline)) void operator delete(void* p) noexcept { std::free(p); }
-__attribute__((noinline)) void operator delete(void* p, std::size_t) noexcept { std::free(p); }
-__attribute__((noinline)) void operator delete(void* p, std::align_val_t) noexcept { std::free(p); }
-__attribute__((noinline)) void operator delete(void* p, std::size_t, std::align_val_t) noexcept { std::free(p); }
+// Not inlined, or GCC takes one of them beside the call of another for a mistake.
+#define BOCST_OPERATOR __attribute__((noinline))
+BOCST_OPERATOR void* operator new(std::size_t size) { return allocate(size, alignof(std::max_align_t)); }
+BOCST_OPERATOR void* operator new(std::size_t size, std::align_val_t alignment) {
+  return allocate(size, static_cast<std::size_t>(alignment));
+}
+BOCST_OPERATOR void operator delete(void* p) noexcept { std::free(p); }
+BOCST_OPERATOR void operator delete(void* p, std::size_t) noexcept { std::free(p); }
+BOCST_OPERATOR void operator delete(void* p, std::align_val_t) noexcept { std::free(p); }
+BOCST_OPERATOR void operator delete(void* p, std::size_t, std::align_val_t) noexcept { std::free(p); }
 
 namespace bocst {
 namespace {
