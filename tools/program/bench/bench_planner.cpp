@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <array>
 #include <numeric>
+#include <tuple>
 
 #include "bench/bench_scenarios.h"
 #include "cli/report.h"
@@ -21,6 +22,7 @@ constexpr double kNearGap = 0.02;         // metres: nearer misses are near ones
 constexpr std::size_t kSettle = 4;        // times that pairs are asked before they are timed
 constexpr std::size_t kFlushed = 200;     // pairs that are asked with flushed caches
 constexpr double kRest = 20;              // seconds, more than the default ttl
+constexpr std::size_t kRests = 200;       // states that are each asked after a rest
 
 enum class Kind { kFar, kNear, kHit };
 constexpr std::array<const char*, 3> kKindNames{"far misses", "near misses", "hits"};
@@ -237,15 +239,25 @@ class PlannerBench {
     row("copied", "random states, objects made anew for each", times.bocst, times.fcl);
   }
 
+  /// Each state is the first after a rest.
   void atRest() {
-    arms_.bocst->rest(kRest);
-    const ArmWorld::Poses& X_WL = random_states_.front();
-    const Stopwatch watch;
-    arms_.bocst->collides(X_WL);
-    const double ours = watch.microseconds();
-    const Stopwatch fcl_watch;
-    arms_.fcl->collides(X_WL);
-    row("rest", "first state after " + formatPlain(kRest) + " s at rest", ours, fcl_watch.microseconds());
+    std::vector<double> ours, theirs;
+    for (std::size_t i = 0; i < std::min(kRests, random_states_.size()); ++i) {
+      const ArmWorld::Poses& X_WL = random_states_[i];
+      arms_.bocst->rest(kRest);
+      const Stopwatch watch;
+      arms_.bocst->collides(X_WL);
+      ours.push_back(watch.microseconds());
+      const Stopwatch fcl_watch;
+      arms_.fcl->collides(X_WL);
+      theirs.push_back(fcl_watch.microseconds());
+    }
+    const std::string what = "first state after " + formatPlain(kRest) + " s at rest, ";
+    row("rest_mean", what + "mean", mean(ours), mean(theirs));
+    for (const auto& [key, name, q] :
+         {std::make_tuple("rest_p95", "95th percentile", 0.95), std::make_tuple("rest_worst", "worst", 1.0)}) {
+      row(key, what + name, quantile(ours, q), quantile(theirs, q));
+    }
   }
 
   /// Beside the time that the same models take without a margin.
