@@ -3,6 +3,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <limits>
 
 #undef HWY_TARGET_INCLUDE
 #define HWY_TARGET_INCLUDE "geometry/overlap_kernels.cpp"
@@ -350,19 +351,40 @@ HWY_INLINE std::uint64_t meetingBoxes(const Vec3& low, const Vec3& high, std::ui
   return meeting;
 }
 
+// What counts as apart. Along an axis that is a product of edges, a gap counts beyond per_size times the sizes of what
+// it was computed from and, with a margin, per_length times its length.
+struct Limits {
+  V per_size, per_length;
+  float moved;   // what two corners may be off by in sum, the tolerance included
+  float margin;  // corners no farther apart touch for sure; 0 where there is no margin
+  bool wide;     // the tolerance is more than rounding of these corners
+
+  V along(const Vec3& axis, V sizes) const {
+    const V rounding = hn::MulAdd(per_size, sizes, hn::Set(D(), 1e-30f));  // products have lost bits below
+    return margin > 0 ? hn::MulAdd(per_length, hn::Sqrt(dot(axis, axis)), rounding) : rounding;
+  }
+};
+
+HWY_INLINE Limits limitsOf(float size, float tolerance, float margin) {
+  const float u = 0x1p-24f, rounding = 64 * u * size;
+  // The tolerance is a length. Where it is what FCL rounds, which is no axis of ours, it counts with the sizes.
+  return {hn::Set(D(), margin > 0 ? rounding : rounding + tolerance), hn::Set(D(), tolerance),
+          25 * u * size + tolerance, std::max(margin - rounding, 0.0f), tolerance > rounding};
+}
+
 // A vector of triangles: their edges, normals, longest edges, and how far a determinant with the normal may be off.
 struct Plane {
   Vec3 edge[3], normal;
   V longest, rounding_margin;
 };
 
-HWY_INLINE Plane planeOf(const Vec3 (&t)[3], V extent, V tiny) {
+HWY_INLINE Plane planeOf(const Vec3 (&t)[3], const Limits& limits) {
   Plane p;
   p.edge[0] = sub(t[1], t[0]), p.edge[1] = sub(t[2], t[1]), p.edge[2] = sub(t[0], t[2]);
   p.normal = cross(p.edge[0], p.edge[1]);
   p.longest = hn::Sqrt(max3(dot(p.edge[0], p.edge[0]), dot(p.edge[1], p.edge[1]), dot(p.edge[2], p.edge[2])));
   // The products of a normal are at most the product of the edges' sizes.
-  p.rounding_margin = hn::MulAdd(extent, hn::MulAdd(norm1(p.edge[0]), norm1(p.edge[1]), norm1(p.normal)), tiny);
+  p.rounding_margin = limits.along(p.normal, hn::MulAdd(norm1(p.edge[0]), norm1(p.edge[1]), norm1(p.normal)));
   return p;
 }
 
@@ -376,8 +398,8 @@ struct PairBits {
 
 // Are p and q apart along a cross product of their edges? w: the corners of q from p[0] on. Any axis will do, whatever
 // it was computed from: with u = 2^-24, corners are off by 25 u of the size and the tolerance, what w and the two
-// products round is below 16 u times the sum of the axis's entries; `extent` is 64 u of the size and the tolerance.
-HWY_INLINE M apartByEdges(const Plane& of_p, const Plane& of_q, const Vec3 (&w)[3], V extent, V tiny) {
+// products round is below 16 u times the sum of the axis's entries; the limits have 64 u of the size and the tolerance.
+HWY_INLINE M apartByEdges(const Plane& of_p, const Plane& of_q, const Vec3 (&w)[3], const Limits& limits) {
   const V zero = hn::Zero(D());
   M apart = hn::MaskFromVec(zero);
   for (int a = 0; a < 3; ++a) {
@@ -388,18 +410,30 @@ HWY_INLINE M apartByEdges(const Plane& of_p, const Plane& of_q, const Vec3 (&w)[
       const V q0 = dot(axis, w[0]), q1 = dot(axis, w[1]), q2 = dot(axis, w[2]);
       const V gap =
           hn::Max(hn::Sub(min3(q0, q1, q2), max3(zero, p1, p2)), hn::Sub(min3(zero, p1, p2), max3(q0, q1, q2)));
-      apart = hn::Or(apart, hn::Gt(gap, hn::MulAdd(extent, norm1(axis), tiny)));
+      apart = hn::Or(apart, hn::Gt(gap, limits.along(axis, norm1(axis))));
     }
   }
   return apart;
 }
 
-// `wide`: the tolerance is a margin, beside which FCL's rounding does not matter.
-HWY_INLINE PairBits testPairs(const Vec3 (&p)[3], const Vec3 (&q)[3], V extent, float moved, bool wide, M pairs) {
+// The square of the least distance between corners.
+HWY_INLINE V squareBetweenCorners(const Vec3 (&p)[3], const Vec3 (&q)[3]) {
+  V least = hn::Set(D(), std::numeric_limits<float>::infinity());
+  for (int i = 0; i < 3; ++i) {
+    BOCST_UNROLL
+    for (int j = 0; j < 3; ++j) {
+      const Vec3 way = sub(q[j], p[i]);
+      least = hn::Min(least, dot(way, way));
+    }
+  }
+  return least;
+}
+
+HWY_INLINE PairBits testPairs(const Vec3 (&p)[3], const Vec3 (&q)[3], const Limits& limits, M pairs) {
   const D d;
   const float u = 0x1p-24f;
   const V tiny = hn::Set(d, 1e-30f);  // products below have lost bits
-  const Plane of_p = planeOf(p, extent, tiny), of_q = planeOf(q, extent, tiny);
+  const Plane of_p = planeOf(p, limits), of_q = planeOf(q, limits);
   const Vec3 &n = of_p.normal, &m = of_q.normal;
   const Vec3 w[3] = {sub(q[0], p[0]), sub(q[1], p[0]), sub(q[2], p[0])};
   const V n0 = dot(n, w[0]), n1 = dot(n, w[1]), n2 = dot(n, w[2]);
@@ -411,7 +445,8 @@ HWY_INLINE PairBits testPairs(const Vec3 (&p)[3], const Vec3 (&q)[3], V extent, 
 
   // How far the determinants below may be off: those with a plane's normal, and those of an edge of each.
   const V span = hn::Add(of_p.longest, hn::Sqrt(max3(dot(w[0], w[0]), dot(w[1], w[1]), dot(w[2], w[2]))));
-  const V span4 = hn::Mul(hn::Set(d, 4.0f), span), moves = hn::Set(d, 1.125f * moved), rounds = hn::Set(d, 42 * u);
+  const V span4 = hn::Mul(hn::Set(d, 4.0f), span), moves = hn::Set(d, 1.125f * limits.moved),
+          rounds = hn::Set(d, 42 * u);
   const auto offNormal = [&](V longest) HWY_ATTR {
     return hn::MulAdd(hn::Mul(longest, hn::MulAdd(rounds, longest, moves)), hn::Add(span4, longest), tiny);
   };
@@ -420,11 +455,15 @@ HWY_INLINE PairBits testPairs(const Vec3 (&p)[3], const Vec3 (&q)[3], V extent, 
       hn::MulAdd(hn::Mul(longer, hn::MulAdd(rounds, shorter, moves)), hn::Add(hn::Add(span, span), shorter), tiny);
   M clear = hn::Gt(min3(hn::Abs(n0), hn::Abs(n1), hn::Abs(n2)), offNormal(of_p.longest));
   clear = hn::And(clear, hn::Gt(min3(hn::Abs(m0), hn::Abs(m1), hn::Abs(m2)), offNormal(of_q.longest)));
-  clear = hn::And(clear, hn::Gt(shorter, hn::Set(d, 64 * moved)));
+  clear = hn::And(clear, hn::Gt(shorter, hn::Set(d, 64 * limits.moved)));
   // What has no plane, as triangles without area, is never clear.
-  const M doubtful = wide ? near : hn::AndNot(clear, near);
+  M doubtful = limits.wide ? near : hn::AndNot(clear, near), close = hn::MaskFromVec(hn::Zero(d));
+  if (limits.margin > 0) {
+    close = hn::And(near, hn::Le(squareBetweenCorners(p, q), hn::Set(d, limits.margin * limits.margin)));
+    doubtful = hn::AndNot(close, doubtful);
+  }
   if (!hn::AllFalse(d, doubtful)) {
-    near = hn::AndNot(hn::And(doubtful, apartByEdges(of_p, of_q, w, extent, tiny)), near);
+    near = hn::AndNot(hn::And(doubtful, apartByEdges(of_p, of_q, w, limits)), near);
     if (hn::AllFalse(d, near)) return {0, 0};
   }
 
@@ -438,19 +477,18 @@ HWY_INLINE PairBits testPairs(const Vec3 (&p)[3], const Vec3 (&q)[3], V extent, 
   const M beside = hn::Or(hn::Gt(low, edges_off), hn::Lt(high, hn::Neg(edges_off)));
   const M across = hn::And(hn::Lt(low, hn::Neg(edges_off)), hn::Gt(high, edges_off));
   const M cut = hn::Gt(hn::Min(by_n, by_m), hn::Zero(d));
-  return {maskBits(hn::AndNot(hn::And(clear, hn::Or(hn::Not(cut), beside)), near)),
-          maskBits(hn::And(clear, hn::And(cut, across)))};
+  const M possible = hn::AndNot(hn::And(clear, hn::Or(hn::Not(cut), beside)), near);
+  return {maskBits(hn::Or(possible, close)), maskBits(hn::Or(hn::And(clear, hn::And(cut, across)), close))};
 }
 
 std::size_t TouchingPairs(const TrianglePack& rows, std::uint32_t which, const TrianglePack& lanes,
-                          const PackRegion& region, float tolerance, PackPair* pairs) {
+                          const PackRegion& region, float tolerance, float margin, PackPair* pairs) {
   const D d;
   const hn::RebindToSigned<D> di;
   constexpr std::size_t kMost = hn::MaxLanes(D());
-  const float size = std::max(rows.size, lanes.size) * 1.0001f, u = 0x1p-24f;
-  const float moved = 25 * u * size + tolerance;
-  const V extent = hn::Set(d, 64 * u * size + tolerance);
-  const bool wide = tolerance > 64 * u * size;
+  const float size = std::max(rows.size, lanes.size) * 1.0001f;
+  const Limits limits = limitsOf(size, tolerance, margin);
+  const V extent = hn::Set(d, 64 * 0x1p-24f * size + tolerance);
   std::size_t found = 0;
   PickedRows picked;
   pickRows(rows, which, region, extent, picked);
@@ -479,7 +517,7 @@ std::size_t TouchingPairs(const TrianglePack& rows, std::uint32_t which, const T
           q[k] = {hn::TableLookupLanes(lane_corner[k].x, lane), hn::TableLookupLanes(lane_corner[k].y, lane),
                   hn::TableLookupLanes(lane_corner[k].z, lane)};
         }
-        const PairBits bits = testPairs(p, q, extent, moved, wide, hn::FirstN(d, count - at));
+        const PairBits bits = testPairs(p, q, limits, hn::FirstN(d, count - at));
         for (std::uint32_t k = bits.possible; k != 0; k &= k - 1) {
           const auto in = static_cast<std::size_t>(__builtin_ctz(k));
           const auto met = static_cast<std::size_t>(which_pair[at + in]);
@@ -533,8 +571,8 @@ void moveTriangles(const TrianglePack& pack, std::uint32_t which, const PackMoti
 }
 
 std::size_t touchingPairs(const TrianglePack& rows, std::uint32_t which, const TrianglePack& lanes,
-                          const PackRegion& region, float tolerance, PackPair* pairs) {
-  return HWY_DYNAMIC_DISPATCH(TouchingPairs)(rows, which, lanes, region, tolerance, pairs);
+                          const PackRegion& region, float tolerance, float margin, PackPair* pairs) {
+  return HWY_DYNAMIC_DISPATCH(TouchingPairs)(rows, which, lanes, region, tolerance, margin, pairs);
 }
 
 }  // namespace bocst::query

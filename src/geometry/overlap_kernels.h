@@ -104,7 +104,8 @@ struct PackPair {
 /// Writes the pairs (a triangle of rows, of those in `which`, and a triangle of lanes) that are not surely apart, by
 /// their boxes, their planes and where they cut the line of both planes; at most rows.count * lanes.count. Returns how
 /// many. What the rows have outside of the box of `region` is not looked at. `tolerance` is a distance that still
-/// counts as touching: what the caller's coordinates are off by.
+/// counts as touching: what the caller's coordinates are off by. What is no farther apart than `margin` is certain to
+/// touch; two corners are looked at for that.
 ///
 /// With M the larger size of the packs and u = 2^-24, corners are off by 6 u M along each axis.
 ///
@@ -119,6 +120,6 @@ struct PackPair {
 /// lengths. Where the former are more, all corners are on known sides of the other's plane; so are the ends of the
 /// intervals in which the two cut the line of both planes to each other, by the latter.
 std::size_t touchingPairs(const TrianglePack& rows, std::uint32_t which, const TrianglePack& lanes,
-                          const PackRegion& region, float tolerance, PackPair* pairs);
+                          const PackRegion& region, float tolerance, float margin, PackPair* pairs);
 
 }  // namespace bocst::query

@@ -380,7 +380,7 @@ bool areApart(const Corners& p, const Corners& q, double distance) {
   return false;
 }
 
-double nearestPoints(const Corners& p, const Corners& q, Vector3d& on_p, Vector3d& on_q) {
+double nearestPoints(const Corners& p, const Corners& q, Vector3d& on_p, Vector3d& on_q, double farthest) {
   const Face<double> face_p = faceOf(p), face_q = faceOf(q);
   if (hasFace(face_p) && hasFace(face_q) && (p[0] - q[0]).squaredNorm() < kFarthest) {
     const Closest<double> closest = closestOf(face_p, face_q);
@@ -388,11 +388,12 @@ double nearestPoints(const Corners& p, const Corners& q, Vector3d& on_p, Vector3
     on_q = toVector(closest.q);
     return std::sqrt(closest.squared);
   }
+  on_p = p[0];
+  on_q = q[0];
+  if (std::isfinite(farthest) && areApart(p, q, farthest)) return std::numeric_limits<double>::infinity();
   Scale scale;
   scale.take(p);
   scale.take(q);
-  on_p = p[0];
-  on_q = q[0];
   if (scale.isZero()) return 0;
   const Closest<Twice> closest = closestOf(scale(p), scale(q));
   on_p = scale.back(closest.p);

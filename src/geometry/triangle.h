@@ -3,6 +3,7 @@
 
 #include <Eigen/Core>
 #include <cstdint>
+#include <limits>
 
 #include "geometry/penetration_kernels.h"
 
@@ -49,7 +50,9 @@ bool areApart(const Corners& p, const Corners& q, double distance);
 
 /// The distance between two closed triangles, degenerate or not, 0 where an edge cuts the inside of the other, and a
 /// point of each that is as near to the other. It is off by a few roundings of the coordinates, also of triangles that
-/// are all but segments: where doubles have too few digits, twice as many are used.
-double nearestPoints(const Corners& p, const Corners& q, Eigen::Vector3d& on_p, Eigen::Vector3d& on_q);
+/// are all but segments: where doubles have too few digits, twice as many are used. Where these would be and areApart()
+/// knows that the two are farther apart than `farthest`, it is infinity, and the points are any.
+double nearestPoints(const Corners& p, const Corners& q, Eigen::Vector3d& on_p, Eigen::Vector3d& on_q,
+                     double farthest = std::numeric_limits<double>::infinity());
 
 }  // namespace bocst::query

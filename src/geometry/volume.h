@@ -32,6 +32,7 @@ struct SimilarityTransform {
   double scale = 1;
   Eigen::Vector3d translation = Eigen::Vector3d::Zero();
   double tolerance = 0;  ///< A length in the target frame: what positions may be off by; touching within it counts.
+  double margin = 0;  ///< A length in the target frame: what is no farther apart touches for sure. Part of tolerance.
   double orthogonality_error = 0;  ///< Largest entry of rotation^T rotation - 1: what the axes tests must allow for.
   float axes[3][3] = {};           ///< axes[j]: column j of rotation; set by ready().
   float rounding_margin = 0;       ///< Per unit of size, see overlappingOctants(); set by ready().
@@ -54,6 +55,7 @@ struct SimilarityTransform {
     p.scale = 1 / scale;
     p.translation = -p.scale * (p.rotation * translation);
     p.tolerance = tolerance * p.scale;
+    p.margin = margin * p.scale;
     p.orthogonality_error = orthogonality_error;
     p.ready();
     return p;

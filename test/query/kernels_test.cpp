@@ -317,7 +317,7 @@ TEST_P(EveryTarget, NoPairIsLostThatFclFinds) {
       put(b, i, t);
     }
     PackPair found[TrianglePack::kCapacity * TrianglePack::kCapacity];
-    const std::size_t count = touchingPairs(a, ~0u >> (32 - a.count), b, everywhere(), 0, found);
+    const std::size_t count = touchingPairs(a, ~0u >> (32 - a.count), b, everywhere(), 0, 0, found);
     std::map<std::pair<int, int>, bool> set;
     for (std::size_t k = 0; k < count; ++k) set[{found[k].row, found[k].lane}] = found[k].certain;
     ASSERT_EQ(set.size(), count);
@@ -407,7 +407,7 @@ void certainMeansThatFclSaysSo() {
     moveTriangles(b, 1, motion, moved);
     const auto tolerance = static_cast<float>(magnitude * 32 * static_cast<double>(std::numeric_limits<S>::epsilon()));
     PackPair found[1];
-    const std::size_t count = touchingPairs(a, 1, moved, everywhere(), tolerance, found);
+    const std::size_t count = touchingPairs(a, 1, moved, everywhere(), tolerance, 0, found);
     const bool meet = Exact::intersect_Triangle(p[0], p[1], p[2], q[0], q[1], q[2], R, T);
     const bool degenerate = isDegenerate(pd) || isDegenerate(qd);
     if (count == 1 && found[0].certain) {
@@ -468,10 +468,54 @@ TEST_P(EveryTarget, TrianglesWithoutAreaArePartedByEdges) {
     put(a, 0, p);
     put(b, 0, q);
     PackPair found[1];
-    ASSERT_EQ(touchingPairs(a, 1, b, everywhere(), 0, found), 0u) << round;
-    ASSERT_EQ(touchingPairs(b, 1, a, everywhere(), 0, found), 0u) << round;
+    ASSERT_EQ(touchingPairs(a, 1, b, everywhere(), 0, 0, found), 0u) << round;
+    ASSERT_EQ(touchingPairs(b, 1, a, everywhere(), 0, 0, found), 0u) << round;
   }
   EXPECT_GT(apart, 10000);
+}
+
+// With a margin, a pair is found where its distance is no longer, and certain only there.
+TEST_P(EveryTarget, PairsWithinAMarginAreFound) {
+  std::mt19937_64 g(38);
+  std::uniform_real_distribution<double> u(-1, 1);
+  const auto vector = [&] { return Eigen::Vector3d(u(g), u(g), u(g)); };
+  int certain = 0, within = 0, left_out = 0;
+  for (int round = 0; round < 30000; ++round) {
+    const double size = std::pow(10.0, 3 * u(g));
+    Corners p, q;
+    const Eigen::Vector3d way = 2 * vector();
+    for (auto& v : p) v = size * vector();
+    for (auto& v : q) v = size * (way + vector());
+    degenerateAtTimes(g, p, 8);
+    degenerateAtTimes(g, q, 8);
+    for (Corners* t : {&p, &q}) {
+      for (auto& v : *t) v = v.cast<float>().cast<double>();
+    }
+    Eigen::Vector3d on_p, on_q;
+    const double distance = nearestPoints(p, q, on_p, on_q);
+    // Often by a hair to either side of the distance.
+    const double margin =
+        round % 2 ? distance * (1 + std::pow(10.0, -3 + 2 * u(g)) * (g() % 2 ? 1 : -1)) : size * std::abs(u(g));
+    TrianglePack a, b;
+    a.count = b.count = 1;
+    put(a, 0, p);
+    put(b, 0, q);
+    PackPair found[1];
+    const std::size_t count = touchingPairs(a, 1, b, everywhere(), static_cast<float>(margin * 1.001),
+                                            static_cast<float>(margin * 0.9999), found);
+    if (distance <= margin) {
+      ASSERT_EQ(count, 1u) << round;
+    }
+    if (count == 1 && found[0].certain) {
+      ASSERT_LE(distance, margin) << round;
+      ++certain;
+    }
+    within += distance <= margin;
+    left_out += count == 0;
+  }
+  EXPECT_GT(certain, 3000);
+  EXPECT_GT(within, certain);
+  EXPECT_GT(left_out, 8000);
 }
 
 TEST_P(EveryTarget, NoTriangleIsLostThatReachesIntoARegion) {

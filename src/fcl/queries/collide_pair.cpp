@@ -372,9 +372,9 @@ class Collector : public query::Visitor {
     if (!sliver && margin_ == 0) return meet;
     // Of slivers, its axes are rounding, and may part what touches.
     const double touching = sliver ? rounding() : margin_;
-    if (!meet && query::areApart(p, q, touching)) return false;
     Eigen::Vector3d on_p, on_q;
-    const double distance = query::nearestPoints(p, q, on_p, on_q);
+    const double distance =
+        query::nearestPoints(p, q, on_p, on_q, meet ? std::numeric_limits<double>::infinity() : touching);
     if (!meet && distance > touching) return false;
     if (contact != nullptr) setContact(distance, on_p, on_q, *contact);
     return true;
@@ -382,9 +382,9 @@ class Collector : public query::Visitor {
 
   // FCL's test says nothing about what is apart by more than rounding, so distances alone decide.
   bool isWithinMargin(bool certain, const Corners& p, const Corners& q, query::ContactPoint* contact) const {
-    if (!certain && query::areApart(p, q, margin_)) return false;
     Eigen::Vector3d on_p, on_q;
-    const double distance = query::nearestPoints(p, q, on_p, on_q);
+    const double distance =
+        query::nearestPoints(p, q, on_p, on_q, certain ? std::numeric_limits<double>::infinity() : margin_);
     if (!certain && distance > margin_) return false;
     if (contact != nullptr) setContact(distance, on_p, on_q, *contact);
     return true;
@@ -475,10 +475,13 @@ class Collector : public query::Visitor {
   double unit_ = 1;
 };
 
-/// What is within the margin touches: the walk's tolerance, in units of side A, is so much more.
+/// What is within the margin touches: the walk's tolerance, in units of side A, is so much more. Positions may be off
+/// by the tolerance before.
 template <typename S>
 SimilarityTransform withMargin(SimilarityTransform b_in_a, const TreeSide& a, const CollideQuery<S>& q, bool spheres) {
-  b_in_a.tolerance += q.cullingMargin(spheres) / a.tree().surface().lattice.unit();
+  const double per_unit = 1 / a.tree().surface().lattice.unit();
+  b_in_a.margin = std::max(q.margin * per_unit - b_in_a.tolerance, 0.0);
+  b_in_a.tolerance += q.cullingMargin(spheres) * per_unit;
   return b_in_a;
 }
 

@@ -6,6 +6,7 @@
 #include <cstddef>
 #include <cstdint>
 #include <type_traits>
+#include <utility>
 #include <vector>
 
 #include "oracle/cpu/kernels.h"
@@ -253,9 +254,9 @@ class LeafPairs {
     std::uint32_t ids[TrianglePack::kCapacity], *id = ids;
     for (std::uint32_t left = lanes; left != 0; left &= left - 1)
       *id++ = b.id(static_cast<std::size_t>(__builtin_ctz(left)));
-    const auto tolerance = static_cast<float>(
-        (b_in_a_->tolerance + static_cast<double>(a.error) + b_in_a_->scale * static_cast<double>(b.error)) * 1.001);
-    const std::size_t found = touchingPairs(a.pack, rows, lanes_, region, tolerance, found_);
+    const double error = static_cast<double>(a.error) + b_in_a_->scale * static_cast<double>(b.error);
+    const auto [tolerance, margin] = limits(*b_in_a_, error);
+    const std::size_t found = touchingPairs(a.pack, rows, lanes_, region, tolerance, margin, found_);
     for (std::size_t k = 0; k < found; ++k) {
       if (f(a.id(found_[k].row), ids[found_[k].lane], found_[k].certain)) return true;
     }
@@ -309,12 +310,17 @@ class LeafPairs {
       region.low[k] = -region.high[k];
     }
     const std::uint32_t all = rows_.count < 32 ? (1u << rows_.count) - 1 : ~0u;
-    const auto tolerance = static_cast<float>((to.tolerance + error) * 1.001);
-    const std::size_t found = touchingPairs(rows_, all, leaf.pack, region, tolerance, found_);
+    const auto [tolerance, margin] = limits(to, error);
+    const std::size_t found = touchingPairs(rows_, all, leaf.pack, region, tolerance, margin, found_);
     for (std::size_t k = 0; k < found; ++k) {
       if (f(leaf.id(found_[k].lane), ids[found_[k].row], found_[k].certain)) return true;
     }
     return false;
+  }
+
+  /// Tolerance and margin of touchingPairs(), of corners that are off by `error`.
+  static std::pair<float, float> limits(const SimilarityTransform& to, double error) {
+    return {static_cast<float>((to.tolerance + error) * 1.001), static_cast<float>((to.margin - error) * 0.999)};
   }
 
   /// Nothing is known of them.
