@@ -84,6 +84,7 @@ class HandTree {
   std::size_t triangleCount(Node n) const { return at(n).end - at(n).begin; }
   std::uint32_t triangle(Node n, std::size_t i) const { return static_cast<std::uint32_t>(at(n).begin + i); }
   void prefetch(std::uint32_t) const {}
+  void prefetchCorners(std::uint32_t) const {}
   const Eigen::Vector3d& vertex(std::uint32_t t, int k) const { return triangles_[t].corners[k]; }
   Eigen::Vector3d corner(std::uint32_t t, int k) const { return triangles_[t].corners[k]; }
   Eigen::Vector3d origin() const { return Eigen::Vector3d::Zero(); }

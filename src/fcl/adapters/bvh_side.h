@@ -3,8 +3,10 @@
 
 #include <fcl/geometry/bvh/BVH_model.h>
 
+#include <cstddef>
 #include <stdexcept>
 #include <string>
+#include <vector>
 
 #include "fcl/adapters/rounding.h"
 #include "query/sides/side.h"
@@ -61,22 +63,27 @@ query::OrientedVolume volumeOf(const fcl::KDOP<S, N>& bv) {
   return v;
 }
 
-/// A prebuilt FCL mesh as a side of a walk. Its frame is the model's.
-template <typename BV>
+/// A prebuilt FCL mesh as a side of a walk. Its frame is the model's. One class for all of FCL's volumes and scalars,
+/// so that walks are compiled once. Lives no longer than the mesh.
 class BvhSide {
  public:
-  using S = typename BV::S;
   using Node = int;
   static constexpr bool kBodies = false;
   static constexpr bool kNodesContainSurface = true;
 
   /// @throws std::invalid_argument when the model is no finished triangle mesh.
-  BvhSide(const char* query, const fcl::BVHModel<BV>& bvh) : bvh_(bvh) {
-    if (bvh.getModelType() != fcl::BVH_MODEL_TRIANGLES || bvh.num_tris <= 0 || bvh.getNumBVs() <= 0) {
-      throw std::invalid_argument(std::string("bocst::") + query + ": the BVHModel is not a finished triangle mesh");
-    }
-    const query::OrientedVolume v = volumeOf(bvh.getBV(0).bv);
+  template <typename BV>
+  BvhSide(const char* query, const fcl::BVHModel<BV>& bvh)
+      : nodes_(nodesOf(query, bvh)),
+        node_size_(sizeof(fcl::BVNode<BV>)),
+        volume_([](const fcl::BVNodeBase& node) { return volumeOf(static_cast<const fcl::BVNode<BV>&>(node).bv); }),
+        triangles_(bvh.tri_indices),
+        triangle_count_(static_cast<std::size_t>(bvh.num_tris)),
+        vertex_count_(static_cast<std::size_t>(bvh.num_vertices)) {
+    setVertices(bvh.vertices);
+    const query::OrientedVolume v = volume_(node(0));
     magnitude_ = v.center.cwiseAbs().maxCoeff() + v.half.norm();
+    rounding_ = roundingOf<typename BV::S>(magnitude_);
   }
 
   /// No coordinate is larger, in absolute value.
@@ -84,63 +91,98 @@ class BvhSide {
 
   Node root() const { return 0; }
   bool isConservative() const { return false; }
-  query::State state(Node node) const { return bvh_.getBV(node).isLeaf() ? query::State::kLeaf : query::State::kInner; }
+  query::State state(Node n) const { return node(n).isLeaf() ? query::State::kLeaf : query::State::kInner; }
   bool growsFromGrid(Node) const { return true; }
   void grow(Node, std::vector<tree::Tree::Growth>&) const {}
 
-  double size(Node node) const { return volume(node).half.squaredNorm(); }
+  double size(Node n) const { return volume(n).half.squaredNorm(); }
 
-  query::OrientedVolume volume(Node node) const {
-    query::OrientedVolume v = volumeOf(bvh_.getBV(node).bv);
+  query::OrientedVolume volume(Node n) const {
+    query::OrientedVolume v = volume_(node(n));
     // FCL rounds its volumes to nearest: widen each by what that may have lost.
-    v.half.array() += roundingOf<S>(magnitude_);
+    v.half.array() += rounding_;
     return v;
   }
 
-  query::Sphere sphere(Node node) const {
-    const query::OrientedVolume v = volume(node);
+  query::Sphere sphere(Node n) const {
+    const query::OrientedVolume v = volume(n);
     return {v.center, v.half.norm()};
   }
 
   // Only a side that answers with cells is asked for these.
-  query::Sphere cellSphere(Node node) const { return sphere(node); }
-  std::uint64_t cellId(Node node) const { return static_cast<std::uint64_t>(node); }
+  query::Sphere cellSphere(Node n) const { return sphere(n); }
+  std::uint64_t cellId(Node n) const { return static_cast<std::uint64_t>(n); }
 
   template <typename F>
-  void overlappingChildren(Node node, const query::Volume& other, const query::SimilarityTransform& to, F&& f) const {
-    children(node, [&](Node child) {
+  void overlappingChildren(Node n, const query::Volume& other, const query::SimilarityTransform& to, F&& f) const {
+    children(n, [&](Node child) {
       if (!query::boxesApart(volume(child), query::oriented(other), to)) f(child);
     });
   }
 
   // A pair of children is not worth a look at each triangle.
   template <typename Large, typename Other, typename F>
-  void childrenMeeting(Node node, const query::Volume& volume, const query::SimilarityTransform& to, Large&,
-                       const Other&, typename Other::Node, F&& f) const {
-    overlappingChildren(node, volume, to, f);
+  void childrenMeeting(Node n, const query::Volume& volume, const query::SimilarityTransform& to, Large&, const Other&,
+                       typename Other::Node, F&& f) const {
+    overlappingChildren(n, volume, to, f);
   }
 
   template <typename F>
-  void children(Node node, F&& f) const {
-    f(bvh_.getBV(node).leftChild());
-    f(bvh_.getBV(node).rightChild());
+  void children(Node n, F&& f) const {
+    f(node(n).leftChild());
+    f(node(n).rightChild());
   }
 
   std::size_t triangleCount(Node) const { return 1; }
-  std::uint32_t triangle(Node node, std::size_t) const {
-    return static_cast<std::uint32_t>(bvh_.getBV(node).primitiveId());
+  std::uint32_t triangle(Node n, std::size_t) const { return static_cast<std::uint32_t>(node(n).primitiveId()); }
+  void prefetch(std::uint32_t t) const { __builtin_prefetch(&triangles_[t]); }
+  void prefetchCorners(std::uint32_t t) const {
+    for (int k = 0; k < 3; ++k) {
+      const std::size_t v = triangles_[t][static_cast<std::size_t>(k)];
+      // A vertex may lie in two cache lines.
+      const char* const at = doubles_ != nullptr ? reinterpret_cast<const char*>(&doubles_[v])
+                                                 : reinterpret_cast<const char*>(&floats_[v]);
+      __builtin_prefetch(at);
+      __builtin_prefetch(at + 16);
+    }
   }
-  void prefetch(std::uint32_t) const {}  // there is no other in the leaf
-  const fcl::Vector3<S>& vertex(std::uint32_t t, int k) const {
-    return bvh_.vertices[bvh_.tri_indices[t][static_cast<std::size_t>(k)]];
-  }
+  Eigen::Vector3d vertex(std::uint32_t t, int k) const { return vertex(triangles_[t][static_cast<std::size_t>(k)]); }
   Eigen::Vector3d origin() const { return Eigen::Vector3d::Zero(); }
   double inverseUnit() const { return 1; }
-  Eigen::Vector3d corner(std::uint32_t t, int k) const { return vertex(t, k).template cast<double>(); }
+  Eigen::Vector3d corner(std::uint32_t t, int k) const { return vertex(t, k); }
+
+  // Of the whole mesh.
+  std::size_t meshTriangles() const { return triangle_count_; }
+  const fcl::Triangle& indices(std::size_t t) const { return triangles_[t]; }
+  std::size_t meshVertices() const { return vertex_count_; }
+  Eigen::Vector3d vertex(std::size_t v) const {
+    return doubles_ != nullptr ? doubles_[v] : floats_[v].cast<double>().eval();
+  }
 
  private:
-  const fcl::BVHModel<BV>& bvh_;
-  double magnitude_ = 0;
+  template <typename BV>
+  static const char* nodesOf(const char* query, const fcl::BVHModel<BV>& bvh) {
+    if (bvh.getModelType() != fcl::BVH_MODEL_TRIANGLES || bvh.num_tris <= 0 || bvh.getNumBVs() <= 0) {
+      throw std::invalid_argument(std::string("bocst::") + query + ": the BVHModel is not a finished triangle mesh");
+    }
+    return reinterpret_cast<const char*>(static_cast<const fcl::BVNodeBase*>(&bvh.getBV(0)));
+  }
+
+  const fcl::BVNodeBase& node(Node n) const {
+    return *reinterpret_cast<const fcl::BVNodeBase*>(nodes_ + static_cast<std::size_t>(n) * node_size_);
+  }
+
+  void setVertices(const fcl::Vector3<double>* vertices) { doubles_ = vertices; }
+  void setVertices(const fcl::Vector3<float>* vertices) { floats_ = vertices; }
+
+  const char* nodes_;  // BVNode<BV> one after the other, of node_size_ bytes each
+  std::size_t node_size_;
+  query::OrientedVolume (*volume_)(const fcl::BVNodeBase&);
+  const fcl::Triangle* triangles_;
+  std::size_t triangle_count_, vertex_count_;
+  const fcl::Vector3<double>* doubles_ = nullptr;  // the vertices, one of the two
+  const fcl::Vector3<float>* floats_ = nullptr;
+  double magnitude_ = 0, rounding_ = 0;
 };
 
 }  // namespace bocst::fcl_adapter

@@ -7,6 +7,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <optional>
 #include <stdexcept>
 #include <string>
 #include <type_traits>
@@ -131,6 +132,15 @@ void withBvh(const char* query, const fcl::CollisionGeometry<S>* partner, F&& f)
                                   typeName<S>(partner) +
                                   " are not supported; partners are Model, BVHModel, FCL's shapes and OcTree");
   }
+}
+
+/// The partner of a model as a side of a walk. @throws std::invalid_argument when it is no finished BVHModel of
+/// triangles.
+template <typename S>
+BvhSide bvhSideOf(const char* query, const fcl::CollisionGeometry<S>* partner) {
+  std::optional<BvhSide> side;
+  withBvh<S>(query, partner, [&](const auto& bvh) { side.emplace(query, bvh); });
+  return *side;
 }
 
 }  // namespace bocst::fcl_adapter

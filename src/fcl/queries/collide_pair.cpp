@@ -41,45 +41,35 @@ using query::Corners;
 using query::SimilarityTransform;
 using query::TreeSide;
 
-/// A vertex may lie in two cache lines.
-template <typename Vertex>
-void prefetchVertex(const Vertex& v) {
-  __builtin_prefetch(&v[0]);
-  __builtin_prefetch(&v[2]);
-}
-
-/// The triangles of one side as FCL computes with them: corners in S, in the geometry's frame.
+/// The triangles of one side as FCL computes with them: corners in S, in the geometry's frame. Of a model or, where
+/// `bvh` is given, of that.
 template <typename S>
-class ModelTriangles {
+class Triangles {
  public:
-  explicit ModelTriangles(const tree::Tree& tree) : mesh_(tree.surface().mesh.get()) {}
+  explicit Triangles(const tree::Tree& tree) : mesh_(tree.surface().mesh.get()) {}
+  explicit Triangles(const BvhSide& bvh) : bvh_(&bvh) {}
+
   fcl::Vector3<S> corner(std::uint32_t t, int k) const {
+    if (bvh_ != nullptr) return bvh_->vertex(t, k).template cast<S>();
     return mesh_->vertex(mesh_->indices(t)[static_cast<std::size_t>(k)]).template cast<S>();
   }
   /// Triangle t is about to be asked for, and now its corners.
-  void prefetch(std::uint32_t t) const { __builtin_prefetch(&mesh_->indices(t)); }
+  void prefetch(std::uint32_t t) const {
+    if (bvh_ != nullptr) return bvh_->prefetch(t);
+    __builtin_prefetch(&mesh_->indices(t));
+  }
   void prefetchCorners(std::uint32_t t) const {
-    for (const std::uint32_t v : mesh_->indices(t)) prefetchVertex(mesh_->vertex(v));
+    if (bvh_ != nullptr) return bvh_->prefetchCorners(t);
+    for (const std::uint32_t v : mesh_->indices(t)) {
+      // A vertex may lie in two cache lines.
+      __builtin_prefetch(&mesh_->vertex(v)[0]);
+      __builtin_prefetch(&mesh_->vertex(v)[2]);
+    }
   }
 
  private:
-  const Mesh* mesh_;  // null where the host has none: conservative answers ask for no triangle
-};
-
-template <typename BV>
-class BvhTriangles {
- public:
-  explicit BvhTriangles(const fcl::BVHModel<BV>& bvh) : bvh_(bvh) {}
-  const fcl::Vector3<typename BV::S>& corner(std::uint32_t t, int k) const {
-    return bvh_.vertices[bvh_.tri_indices[t][static_cast<std::size_t>(k)]];
-  }
-  void prefetch(std::uint32_t t) const { __builtin_prefetch(&bvh_.tri_indices[t]); }
-  void prefetchCorners(std::uint32_t t) const {
-    for (int k = 0; k < 3; ++k) prefetchVertex(corner(t, k));
-  }
-
- private:
-  const fcl::BVHModel<BV>& bvh_;
+  const Mesh* mesh_ = nullptr;  // null where the host has none: conservative answers ask for no triangle
+  const BvhSide* bvh_ = nullptr;
 };
 
 /// A contact before it is one of FCL's: ids in the caller's order, and how the two touch, in the world.
@@ -105,10 +95,11 @@ struct PlacedPair {
 /// A walk finds pairs in an order that depends on what is resident. So unless any pair will do, contacts are put in
 /// ContactOrder: few of them by cutting the walk at the place of the last that is asked for, many by gathering pairs
 /// and sorting them until there are enough.
-template <typename S, typename Triangles1, typename Triangles2>
+template <typename S>
 class Collector : public query::Visitor {
  public:
-  Collector(const CollideQuery<S>& q, const tree::Tree& a, const Triangles1& t1, const Triangles2& t2, double magnitude)
+  Collector(const CollideQuery<S>& q, const tree::Tree& a, const Triangles<S>& t1, const Triangles<S>& t2,
+            double magnitude)
       : q_(q),
         order_(a),
         t1_(t1),
@@ -457,8 +448,8 @@ class Collector : public query::Visitor {
 
   const CollideQuery<S>& q_;
   const ContactOrder order_;
-  const Triangles1& t1_;
-  const Triangles2& t2_;
+  const Triangles<S>& t1_;
+  const Triangles<S>& t2_;
   const double magnitude_;  // of positions in the frame of the first geometry
   const double margin_;
   const bool ends_at_first_;
@@ -514,8 +505,8 @@ void collideTrees(const CollideQuery<S>& q, const TreeSide& a, const TreeSide& b
   if (isOutOfSight(q, b_in_a, magnitudeOf(tree_a.surface().bounds), magnitudeOf(tree_b.surface().bounds))) return;
   const auto walk = [&, magnitude = magnitude](auto&& with_collector) {
     const lattice::Lattice& lattice = tree_a.surface().lattice;
-    const ModelTriangles<S> t1(q.swapped ? tree_b : tree_a), t2(q.swapped ? tree_a : tree_b);
-    Collector<S, ModelTriangles<S>, ModelTriangles<S>> collector(q, tree_a, t1, t2, magnitude);
+    const Triangles<S> t1(q.swapped ? tree_b : tree_a), t2(q.swapped ? tree_a : tree_b);
+    Collector<S> collector(q, tree_a, t1, t2, magnitude);
     collector.setFrame(lattice.origin(), lattice.unit());
     with_collector(collector);
     collector.finish();
@@ -536,29 +527,20 @@ void collideTrees(const CollideQuery<S>& q, const TreeSide& a, const TreeSide& b
   }
 }
 
-template <typename BV>
-void collideBvh(const CollideQuery<typename BV::S>& q, tree::Tree& tree, const fcl::BVHModel<BV>& bvh) {
-  using S = typename BV::S;
+template <typename S>
+void collideBvh(const CollideQuery<S>& q, tree::Tree& tree, const BvhSide& b) {
   const std::size_t before = q.result.numContacts();
   const QueryScope scope(tree);
   const TreeSide& a = scope.a();
-  const BvhSide<BV> b("collide", bvh);
   const auto [b_in_a, magnitude] = relate<S>(q, a, b);
-  if (isOutOfSight(q, b_in_a, magnitudeOf(tree.surface().bounds), b.magnitude())) return;
-  const ModelTriangles<S> model(tree);
-  const BvhTriangles<BV> partner(bvh);
-  const auto walk = [&, &to_a = b_in_a](auto&& collector) {
-    const lattice::Lattice& lattice = tree.surface().lattice;
-    collector.setFrame(lattice.origin(), lattice.unit());
-    query::PairWalk<TreeSide, BvhSide<BV>>(a, b, withMargin(to_a, a, q, a.isConservative()), collector).run();
-    collector.finish();
-  };
-  if (q.swapped) {
-    walk(Collector<S, BvhTriangles<BV>, ModelTriangles<S>>(q, tree, partner, model, magnitude));
-  } else {
-    walk(Collector<S, ModelTriangles<S>, BvhTriangles<BV>>(q, tree, model, partner, magnitude));
-  }
-  if (q.mayBeInside(before) && contains(tree, q.X_WA(), bvh, q.X_WB(), magnitude)) addInside(q, a, b, b_in_a);
+  const oracle::Surface& surface = tree.surface();
+  if (isOutOfSight(q, b_in_a, magnitudeOf(surface.bounds), b.magnitude())) return;
+  const Triangles<S> of_model(tree), of_partner(b);
+  Collector<S> collector(q, tree, q.swapped ? of_partner : of_model, q.swapped ? of_model : of_partner, magnitude);
+  collector.setFrame(surface.lattice.origin(), surface.lattice.unit());
+  query::PairWalk<TreeSide, BvhSide>(a, b, withMargin(b_in_a, a, q, a.isConservative()), collector).run();
+  collector.finish();
+  if (q.mayBeInside(before) && contains<S>(tree, q.X_WA(), b, q.X_WB(), magnitude)) addInside(q, a, b, b_in_a);
 }
 
 /// The models among two geometries, of which one at least is one.
@@ -619,7 +601,7 @@ std::size_t answer(const CollideQuery<S>& q, const Models<S>& models, const Brou
     collideOcTree(q, treeOf(*a), solver);
 #endif
   } else {
-    withBvh<S>("collide", q.b(), [&](const auto& bvh) { collideBvh(q, treeOf(*a), bvh); });
+    collideBvh(q, treeOf(*a), bvhSideOf<S>("collide", q.b()));
   }
   return q.result.numContacts();
 }

@@ -151,11 +151,7 @@ std::optional<double> timeOfContact(const ContinuousQuery<S>& q, const Mesh* mes
   const QueryScope scope(tree);
   if (tree.surface().mesh.get() != mesh_a) return {};
   if (isBodies(q.b())) return walkConvex(q, scope.a(), margin);
-  double time = 0;
-  withBvh<S>("continuousCollide", q.b(), [&](const auto& bvh) {
-    time = walk(scope.a(), BvhSide("continuousCollide", bvh), SimilarityTransform());
-  });
-  return time;
+  return walk(scope.a(), bvhSideOf<S>("continuousCollide", q.b()), SimilarityTransform());
 }
 
 /// @throws std::invalid_argument for partners that are not supported, wherever they are.

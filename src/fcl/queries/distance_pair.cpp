@@ -84,9 +84,10 @@ struct Distant {
         corner([mesh = tree.surface().mesh.get()](std::uint32_t t, int k) {
           return mesh->vertex(mesh->indices(t)[static_cast<std::size_t>(k)]);
         }) {}
-  template <typename BV>
-  Distant(const Eigen::Isometry3d& X, const BvhSide<BV>& side, std::size_t count)
-      : X_WM(X), triangles(count), corner([&side](std::uint32_t t, int k) { return side.corner(t, k); }) {
+  Distant(const Eigen::Isometry3d& X, const BvhSide& side)
+      : X_WM(X),
+        triangles(side.meshTriangles()),
+        corner([&side](std::uint32_t t, int k) { return side.corner(t, k); }) {
     const query::OrientedVolume box = side.volume(side.root());
     center = box.center;
     radius = box.half.norm();
@@ -216,17 +217,12 @@ void searchPartner(const DistanceQuery<S>& q, tree::Tree& tree) {
     });
 #endif
   } else {
-    withBvh<S>("distance", q.b(), [&](const auto& bvh) {
-      const QueryScope scope(tree);
-      const BvhSide b("distance", bvh);
-      const auto [b_in_a, magnitude] = relate<S>(q, scope.a(), b);
-      if (searchFar(q, Distant(isometryOf<S>(q.X_WA()), tree),
-                    Distant(isometryOf<S>(q.X_WB()), b, static_cast<std::size_t>(bvh.num_tris)))) {
-        return;
-      }
-      search(q, scope.a(), b, b_in_a);
-      if (q.result.min_distance > 0 && contains(tree, q.X_WA(), bvh, q.X_WB(), magnitude)) notApart(q);
-    });
+    const BvhSide b = bvhSideOf<S>("distance", q.b());
+    const QueryScope scope(tree);
+    const auto [b_in_a, magnitude] = relate<S>(q, scope.a(), b);
+    if (searchFar(q, Distant(isometryOf<S>(q.X_WA()), tree), Distant(isometryOf<S>(q.X_WB()), b))) return;
+    search(q, scope.a(), b, b_in_a);
+    if (q.result.min_distance > 0 && contains<S>(tree, q.X_WA(), b, q.X_WB(), magnitude)) notApart(q);
   }
 }
 

@@ -43,20 +43,19 @@ bool contains(const tree::Tree& a, const fcl::Transform3<S>& X_WA, const tree::T
 }
 
 /// A BVHModel does not remember its pieces: a query whose balls meet takes time linear in its triangles.
-template <typename BV>
-bool contains(const tree::Tree& a, const fcl::Transform3<typename BV::S>& X_WA, const fcl::BVHModel<BV>& bvh,
-              const fcl::Transform3<typename BV::S>& X_WB, double magnitude) {
-  using S = typename BV::S;
+template <typename S>
+bool contains(const tree::Tree& a, const fcl::Transform3<S>& X_WA, const BvhSide& b, const fcl::Transform3<S>& X_WB,
+              double magnitude) {
   if (a.solid() == nullptr) return false;
   const Eigen::Isometry3d X_AB = relative<S>(X_WA, X_WB);
-  const query::OrientedVolume root = volumeOf(bvh.getBV(0).bv);
+  const query::OrientedVolume root = b.volume(b.root());
   const double tolerance = roundingOf<S>(magnitude);
   if (!reaches(a.surface().bounds, X_AB * root.center, root.half.norm() + tolerance)) return false;
-  std::vector<Eigen::Vector3d> vertices(static_cast<std::size_t>(bvh.num_vertices));
-  for (std::size_t i = 0; i < vertices.size(); ++i) vertices[i] = bvh.vertices[i].template cast<double>();
-  std::vector<Mesh::Indices> triangles(static_cast<std::size_t>(bvh.num_tris));
+  std::vector<Eigen::Vector3d> vertices(b.meshVertices());
+  for (std::size_t i = 0; i < vertices.size(); ++i) vertices[i] = b.vertex(i);
+  std::vector<Mesh::Indices> triangles(b.meshTriangles());
   for (std::size_t t = 0; t < triangles.size(); ++t) {
-    for (std::size_t k = 0; k < 3; ++k) triangles[t][k] = static_cast<std::uint32_t>(bvh.tri_indices[t][k]);
+    for (std::size_t k = 0; k < 3; ++k) triangles[t][k] = static_cast<std::uint32_t>(b.indices(t)[k]);
   }
   return containsOne(*a.solid(), pointOfEachComponent(vertices, triangles), X_AB, tolerance);
 }

@@ -84,18 +84,9 @@ inline double magnitudeOf(const query::TreeSide& side) { return magnitudeOf(side
 inline double unitOf(const query::TreeSide& side) { return side.tree().surface().lattice.unit(); }
 inline const Eigen::Vector3d& originOf(const query::TreeSide& side) { return side.tree().surface().lattice.origin(); }
 
-template <typename BV>
-double magnitudeOf(const BvhSide<BV>& side) {
-  return side.magnitude();
-}
-template <typename BV>
-double unitOf(const BvhSide<BV>&) {
-  return 1;
-}
-template <typename BV>
-Eigen::Vector3d originOf(const BvhSide<BV>&) {
-  return Eigen::Vector3d::Zero();
-}
+inline double magnitudeOf(const BvhSide& side) { return side.magnitude(); }
+inline double unitOf(const BvhSide&) { return 1; }
+inline Eigen::Vector3d originOf(const BvhSide& side) { return side.origin(); }
 
 /// Where side B is in the frame of side A.
 struct RelativeSides {

@@ -31,9 +31,7 @@ class LeafCorners {
       ids_[i] = side.triangle(leaf, begin + i);
       side.prefetch(ids_[i]);
     }
-    for (std::size_t i = 0; i < count_; ++i) {
-      for (int k = 0; k < 3; ++k) __builtin_prefetch(&side.vertex(ids_[i], k));
-    }
+    for (std::size_t i = 0; i < count_; ++i) side.prefetchCorners(ids_[i]);
     for (std::size_t i = 0; i < count_; ++i) {
       for (int k = 0; k < 3; ++k) {
         const auto& v = side.vertex(ids_[i], k);

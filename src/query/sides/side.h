@@ -149,6 +149,9 @@ class TreeSide {
 
   /// Triangle t is about to be read.
   void prefetch(std::uint32_t t) const { __builtin_prefetch(&tree_.surface().mesh->indices(t)); }
+  void prefetchCorners(std::uint32_t t) const {
+    for (int k = 0; k < 3; ++k) __builtin_prefetch(&vertex(t, k));
+  }
 
   /// Corner k of triangle t as given; (v - origin()) * inverseUnit() is it in this side's frame.
   const Eigen::Vector3d& vertex(std::uint32_t t, int k) const {
