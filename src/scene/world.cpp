@@ -8,6 +8,10 @@
 #include <numeric>
 #include <sstream>
 #include <stdexcept>
+#include <string>
+
+#include "fcl/adapters/validate.h"
+#include "simd/float4.h"
 
 namespace bocst::scene {
 namespace {
@@ -42,6 +46,12 @@ double orthogonalityErrorOf(const fcl::Transform3<S>& X) {
   return finite && determinant > 0 ? off : std::numeric_limits<double>::infinity();
 }
 
+// No entry of R^T R - 1 is larger, for a pose that is surely rigid: its eigenvalues are 2 e + e^2, sum e^2 follows from
+// both sums (fcl_adapter::RigidSums), and 4e-15 is what they may have lost by rounding.
+inline double orthogonalityBound(double stretch, double shear) {
+  return 2.001 * std::sqrt((std::abs(shear) + stretch * stretch / 4 + 4e-15) / 2);
+}
+
 template <typename S>
 void refusePose(const char* query, const fcl::Transform3<S>* X_WM, std::size_t k, std::size_t moving) {
   refuse<S>(query, " of moving object " + std::to_string(k % moving) + " in state " + std::to_string(k / moving),
@@ -55,11 +65,16 @@ void checkPoses(const char* query, const fcl::Transform3<S>* X_WM, std::size_t s
   if (states != 0 && moving != 0 && X_WM == nullptr) {
     throw std::invalid_argument(std::string("bocst::Scene::") + query + ": the poses are null");
   }
-  for (std::size_t k = 0; k < states; ++k) {
-    for (std::size_t i = 0; i < moving; ++i) {
-      const double orthogonality_error = orthogonalityErrorOf<S>(X_WM[k * moving + i]);
-      if (!(orthogonality_error <= kMaxOrthogonalityError)) refusePose<S>(query, X_WM, k * moving + i, moving);
-      orthogonality_errors[i] = std::max(orthogonality_errors[i], orthogonality_error);
+  const std::size_t count = states * moving;
+  for (std::size_t k = 0, i = 0; k < count; k += 2) {
+    const fcl::Transform3<S>&X = X_WM[k], &Y = X_WM[std::min(k + 1, count - 1)];
+    const auto sums = fcl_adapter::rigidSumsOf(X, Y);
+    const auto rigid = fcl_adapter::isSurelyRigid(sums);
+    for (std::size_t lane = 0; lane < std::min<std::size_t>(2, count - k); ++lane, i = i + 1 < moving ? i + 1 : 0) {
+      const double error = rigid[lane] != 0 ? orthogonalityBound(sums.stretch[lane], sums.shear[lane])
+                                            : orthogonalityErrorOf<S>(lane == 0 ? X : Y);
+      if (!(error <= kMaxOrthogonalityError)) refusePose<S>(query, X_WM, k + lane, moving);
+      orthogonality_errors[i] = std::max(orthogonality_errors[i], error);
     }
   }
 }
@@ -104,15 +119,13 @@ Box World<S>::boxAt(const Object<S>& object, const fcl::Transform3<S>& X_WG, dou
     return box;
   }
   const S* m = X_WG.matrix().data();  // columns of four
-  double center[3], axis[3][3], displacement = 0, place = 0;
-  for (int j = 0; j < 3; ++j) {
-    const double at = m[12 + j];
-    center[j] = m[j] * b.center[0] + m[4 + j] * b.center[1] + m[8 + j] * b.center[2] + at;
-    place += std::abs(at);
-    center[j] -= origin_[j];
-    displacement += std::abs(center[j]);
-    for (int k = 0; k < 3; ++k) axis[k][j] = m[j] * b.axes(0, k) + m[4 + j] * b.axes(1, k) + m[8 + j] * b.axes(2, k);
-  }
+  const simd::Double4 R[3] = {simd::loadDoubles(m), simd::loadDoubles(m + 4), simd::loadDoubles(m + 8)};
+  const simd::Double4 at = simd::loadDoubles(m + 12);
+  const simd::Double4 center = R[0] * b.center[0] + R[1] * b.center[1] + R[2] * b.center[2] + at -
+                               simd::Double4{origin_[0], origin_[1], origin_[2], 0};
+  const simd::Double4 places = simd::abs(at), displacements = simd::abs(center);
+  const double place = places[0] + places[1] + places[2];
+  const double displacement = displacements[0] + displacements[1] + displacements[2];
   if (reach == 0) reach = reachOf<S>(b, largest_, place, displacement, orthogonality_error);
   // Where half extents do not fit a float, nothing near does.
   if (!(displacement + b.radius + reach < 1e12)) {
@@ -121,15 +134,20 @@ Box World<S>::boxAt(const Object<S>& object, const fcl::Transform3<S>& X_WG, dou
     return boxAt(far, X_WG, 0);
   }
   box.reach = static_cast<float>(reach);
-  for (int j = 0; j < 3; ++j) {
-    const double half =
-        std::abs(axis[0][j]) * b.half[0] + std::abs(axis[1][j]) * b.half[1] + std::abs(axis[2][j]) * b.half[2] + reach;
-    box.center[j] = static_cast<float>(center[j]);
-    box.half[j] = static_cast<float>(b.half[j]);
-    box.lo[j] = static_cast<float>(center[j] - half);
-    box.hi[j] = static_cast<float>(center[j] + half);
-    for (int k = 0; k < 3; ++k) box.axis[k][j] = static_cast<float>(axis[k][j]);
+  simd::Double4 half = {reach, reach, reach, reach};
+  const auto store = [](simd::Double4 from, float(&to)[3]) {
+    const simd::Float4 v = simd::toFloats(from);
+    for (int j = 0; j < 3; ++j) to[j] = v[j];
+  };
+  for (int k = 0; k < 3; ++k) {
+    const simd::Double4 axis = R[0] * b.axes(0, k) + R[1] * b.axes(1, k) + R[2] * b.axes(2, k);
+    half += simd::abs(axis) * b.half[k];
+    store(axis, box.axis[k]);
+    box.half[k] = static_cast<float>(b.half[k]);
   }
+  store(center, box.center);
+  store(center - half, box.lo);
+  store(center + half, box.hi);
   return box;
 }
 

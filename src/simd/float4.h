@@ -4,14 +4,15 @@
 #include <cstdint>
 #include <cstring>
 
-// Four floats, by the compiler's own vectors: for code that is too short to be compiled for each instruction set and
-// called through a table.
+// Four floats or doubles, by the compiler's own vectors: for code that is too short to be compiled for each instruction
+// set and called through a table.
 
 namespace bocst::simd {
 
 using Float4 = float __attribute__((vector_size(16)));
 using Double4 = double __attribute__((vector_size(32)));
 using Int4 = std::int32_t __attribute__((vector_size(16)));
+using Long4 = std::int64_t __attribute__((vector_size(32)));
 
 template <int I>
 Float4 lane(Float4 v) {
@@ -21,6 +22,12 @@ Float4 lane(Float4 v) {
 inline Float4 abs(Float4 v) {
   constexpr std::int32_t kAllButSign = 0x7fffffff;
   return reinterpret_cast<Float4>(reinterpret_cast<Int4>(v) & Int4{kAllButSign, kAllButSign, kAllButSign, kAllButSign});
+}
+
+inline Double4 abs(Double4 v) {
+  constexpr std::int64_t kAllButSign = 0x7fffffffffffffff;
+  return reinterpret_cast<Double4>(reinterpret_cast<Long4>(v) &
+                                   Long4{kAllButSign, kAllButSign, kAllButSign, kAllButSign});
 }
 
 inline bool any(Int4 mask) {
@@ -50,6 +57,13 @@ inline Float4 load(const double* p) {
   std::memcpy(&v, p, sizeof v);
   return __builtin_convertvector(v, Float4);
 }
+inline Double4 loadDoubles(const double* p) {
+  Double4 v;
+  std::memcpy(&v, p, sizeof v);
+  return v;
+}
+inline Double4 loadDoubles(const float* p) { return __builtin_convertvector(load(p), Double4); }
+inline Float4 toFloats(Double4 v) { return __builtin_convertvector(v, Float4); }
 inline Float4 loadDifference(const float* p, const float* q) { return load(p) - load(q); }
 inline Float4 loadDifference(const double* p, const double* q) {
   Double4 v, w;

@@ -56,6 +56,8 @@ share=$source/../../share
 build_project "$share/examples/planner"
 check_order "$work/planner/planner"
 "$work/planner/planner" "$share/models/wall.obj" "$share/models/link.obj" 3
+"$source/../../tools/make-models" --arm 200 "$work/arm"
+"$work/planner/arm" "$work/arm" "$share/models/gripper.obj" --plans 3
 
 if [[ -x $prefix/bin/bocst ]]; then
   echo "-- the installed program"

@@ -23,35 +23,50 @@ constexpr double kMaxOrthogonalityError = 1e-3;
 /// No entry of R^T R - 1 is larger where isSurelyRigid() says so.
 constexpr double kSurelyRigidError = 2e-5;
 
-/// Is a pose rigid for sure? `m(i)` is entry i of its matrix, column after column; a Number may be a vector of several
-/// poses' numbers. Seldom false where it is rigid. With singular values 1 + e of R, the sum of their squares minus 3 is
-/// 2 (sum e) + sum e^2, and that sum minus twice their product, minus 1, is 2 sum e^2 - (sum e)^2, up to third order.
-/// With both bounds below no |e| is above 8e-6, and the product is positive, so R is no reflection.
+/// What tells rotations from other matrices. With singular values 1 + e, and products of three e left out,
+template <typename Number>
+struct RigidSums {
+  Number stretch;  ///< 2 sum e + sum e^2: the sum of the squares of all entries, minus 3
+  Number shear;    ///< 2 sum e^2 - (sum e)^2: the same sum minus twice the determinant, minus 1
+};
+
+/// `m(i)` is entry i of a pose's matrix, column after column; a Number may be a vector of several poses' numbers. Both
+/// are NaN for a translation that is not finite.
 template <typename Number, typename Matrix>
-auto isSurelyRigid(const Matrix& m) {
+RigidSums<Number> rigidSumsOf(const Matrix& m) {
   const Number a0 = m(0), a1 = m(1), a2 = m(2), b0 = m(4), b1 = m(5), b2 = m(6), c0 = m(8), c1 = m(9), c2 = m(10);
   const Number x = m(12), y = m(13), z = m(14);
-  const Number squares = (a0 * a0 + a1 * a1 + a2 * a2) + (b0 * b0 + b1 * b1 + b2 * b2) + (c0 * c0 + c1 * c1 + c2 * c2);
+  // x - x is 0, or NaN.
+  const Number squares = (a0 * a0 + a1 * a1 + a2 * a2) + (b0 * b0 + b1 * b1 + b2 * b2) + (c0 * c0 + c1 * c1 + c2 * c2) +
+                         ((x - x) + (y - y) + (z - z));
   const Number determinant = a0 * (b1 * c2 - b2 * c1) + a1 * (b2 * c0 - b0 * c2) + a2 * (b0 * c1 - b1 * c0);
-  // x - x is 0, and NaN for what is not finite.
-  const Number stretch = squares - 3.0 + ((x - x) + (y - y) + (z - z)), shear = squares - 2.0 * determinant - 1.0;
-  return (stretch <= 1e-5) & (stretch >= -1e-5) & (shear <= 1e-10);
+  return {squares - 3.0, squares - 2.0 * determinant - 1.0};
+}
+
+/// Is a pose rigid for sure? Seldom false where it is. With these bounds no |e| is above 8e-6, and the determinant is
+/// positive, so R is no reflection.
+template <typename Number>
+auto isSurelyRigid(const RigidSums<Number>& sums) {
+  return (sums.stretch <= 1e-5) & (sums.stretch >= -1e-5) & (sums.shear <= 1e-10);
 }
 
 template <typename S>
 bool isSurelyRigid(const fcl::Transform3<S>& X) {
   const S* m = X.matrix().data();
-  return isSurelyRigid<double>([m](int i) { return static_cast<double>(m[i]); });
+  return isSurelyRigid(rigidSumsOf<double>([m](int i) { return static_cast<double>(m[i]); }));
 }
 
-/// Are both? In the time of one.
+/// Of two poses in the time of one, a lane each.
+using Two = double __attribute__((vector_size(16)));
+template <typename S>
+RigidSums<Two> rigidSumsOf(const fcl::Transform3<S>& X, const fcl::Transform3<S>& Y) {
+  const S *m = X.matrix().data(), *n = Y.matrix().data();
+  return rigidSumsOf<Two>([m, n](int i) { return Two{static_cast<double>(m[i]), static_cast<double>(n[i])}; });
+}
+
 template <typename S>
 bool areSurelyRigid(const fcl::Transform3<S>& X, const fcl::Transform3<S>& Y) {
-  using Two = double __attribute__((vector_size(16)));
-  const S *m = X.matrix().data(), *n = Y.matrix().data();
-  const auto rigid = isSurelyRigid<Two>([m, n](int i) {
-    return Two{static_cast<double>(m[i]), static_cast<double>(n[i])};
-  });
+  const auto rigid = isSurelyRigid(rigidSumsOf(X, Y));
   return (rigid[0] & rigid[1]) != 0;
 }
 
