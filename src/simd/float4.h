@@ -10,9 +10,9 @@
 namespace bocst::simd {
 
 using Float4 = float __attribute__((vector_size(16)));
-using Double4 = double __attribute__((vector_size(32)));
 using Int4 = std::int32_t __attribute__((vector_size(16)));
-using Long4 = std::int64_t __attribute__((vector_size(32)));
+using Double2 = double __attribute__((vector_size(16)));
+using Long2 = std::int64_t __attribute__((vector_size(16)));
 
 template <int I>
 Float4 lane(Float4 v) {
@@ -24,14 +24,7 @@ inline Float4 abs(Float4 v) {
   return reinterpret_cast<Float4>(reinterpret_cast<Int4>(v) & Int4{kAllButSign, kAllButSign, kAllButSign, kAllButSign});
 }
 
-inline Double4 abs(Double4 v) {
-  constexpr std::int64_t kAllButSign = 0x7fffffffffffffff;
-  return reinterpret_cast<Double4>(reinterpret_cast<Long4>(v) &
-                                   Long4{kAllButSign, kAllButSign, kAllButSign, kAllButSign});
-}
-
 inline bool any(Int4 mask) {
-  using Long2 = std::int64_t __attribute__((vector_size(16)));
   const Long2 halves = reinterpret_cast<Long2>(mask);
   return (halves[0] | halves[1]) != 0;
 }
@@ -53,23 +46,39 @@ inline Float4 load(const float* p) {
   return v;
 }
 inline Float4 load(const double* p) {
-  Double4 v;
+  double __attribute__((vector_size(32))) v;
   std::memcpy(&v, p, sizeof v);
   return __builtin_convertvector(v, Float4);
 }
+inline Float4 loadDifference(const float* p, const float* q) { return load(p) - load(q); }
+inline Float4 loadDifference(const double* p, const double* q) {
+  double __attribute__((vector_size(32))) v, w;
+  std::memcpy(&v, p, sizeof v);
+  std::memcpy(&w, q, sizeof w);
+  return __builtin_convertvector(v - w, Float4);
+}
+
+/// Four doubles. (A vector of 32 bytes is not passed the same way by all compilers' settings.)
+struct Double4 {
+  Double2 low, high;
+
+  friend Double4 operator+(Double4 a, Double4 b) { return {a.low + b.low, a.high + b.high}; }
+  friend Double4 operator-(Double4 a, Double4 b) { return {a.low - b.low, a.high - b.high}; }
+  friend Double4 operator*(Double4 a, double b) { return {a.low * b, a.high * b}; }
+  double operator[](int i) const { return i < 2 ? low[i] : high[i - 2]; }
+};
+
 inline Double4 loadDoubles(const double* p) {
   Double4 v;
   std::memcpy(&v, p, sizeof v);
   return v;
 }
-inline Double4 loadDoubles(const float* p) { return __builtin_convertvector(load(p), Double4); }
-inline Float4 toFloats(Double4 v) { return __builtin_convertvector(v, Float4); }
-inline Float4 loadDifference(const float* p, const float* q) { return load(p) - load(q); }
-inline Float4 loadDifference(const double* p, const double* q) {
-  Double4 v, w;
-  std::memcpy(&v, p, sizeof v);
-  std::memcpy(&w, q, sizeof w);
-  return __builtin_convertvector(v - w, Float4);
+inline Double4 loadDoubles(const float* p) { return {{p[0], p[1]}, {p[2], p[3]}}; }
+
+inline Double4 abs(Double4 v) {
+  constexpr Long2 kAllButSign = {0x7fffffffffffffff, 0x7fffffffffffffff};
+  return {reinterpret_cast<Double2>(reinterpret_cast<Long2>(v.low) & kAllButSign),
+          reinterpret_cast<Double2>(reinterpret_cast<Long2>(v.high) & kAllButSign)};
 }
 
 }  // namespace bocst::simd
