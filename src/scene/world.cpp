@@ -122,7 +122,7 @@ Box World<S>::boxAt(const Object<S>& object, const fcl::Transform3<S>& X_WG, dou
   const simd::Double4 R[3] = {simd::loadDoubles(m), simd::loadDoubles(m + 4), simd::loadDoubles(m + 8)};
   const simd::Double4 at = simd::loadDoubles(m + 12);
   const simd::Double4 center = R[0] * b.center[0] + R[1] * b.center[1] + R[2] * b.center[2] + at -
-                               simd::Double4{{origin_[0], origin_[1]}, {origin_[2], 0}};
+                               simd::Double4{simd::Double2{origin_[0], origin_[1]}, simd::Double2{origin_[2], 0}};
   const simd::Double4 places = simd::abs(at), displacements = simd::abs(center);
   const double place = places[0] + places[1] + places[2];
   const double displacement = displacements[0] + displacements[1] + displacements[2];
@@ -134,7 +134,7 @@ Box World<S>::boxAt(const Object<S>& object, const fcl::Transform3<S>& X_WG, dou
     return boxAt(far, X_WG, 0);
   }
   box.reach = static_cast<float>(reach);
-  simd::Double4 half = {{reach, reach}, {reach, reach}};
+  simd::Double4 half = {simd::Double2{reach, reach}, simd::Double2{reach, reach}};
   const auto store = [](simd::Double4 from, float(&to)[3]) {
     for (int j = 0; j < 3; ++j) to[j] = static_cast<float>(from[j]);
   };

@@ -73,7 +73,10 @@ inline Double4 loadDoubles(const double* p) {
   std::memcpy(&v, p, sizeof v);
   return v;
 }
-inline Double4 loadDoubles(const float* p) { return {{p[0], p[1]}, {p[2], p[3]}}; }
+inline Double4 loadDoubles(const float* p) {
+  const double x = p[0], y = p[1], z = p[2], w = p[3];
+  return {Double2{x, y}, Double2{z, w}};
+}
 
 inline Double4 abs(Double4 v) {
   constexpr Long2 kAllButSign = {0x7fffffffffffffff, 0x7fffffffffffffff};

@@ -18,7 +18,8 @@ namespace bocst::fcl_adapter {
 /// the boxes, are off by no more than roundingOf() each.
 template <typename S>
 query::PoseBoxes boxesOf(const Model<S>& a, const Model<S>& b) {
-  const Eigen::AlignedBox3d box_a = treeOf(a).bounds(), box_b = treeOf(b).bounds();
+  // Not Tree::bounds(), which takes the lock that is held: behind a writer that waits, it would wait for ever.
+  const Eigen::AlignedBox3d &box_a = treeOf(a).surface().bounds, &box_b = treeOf(b).surface().bounds;
   const Eigen::Vector3d middle_a = box_a.center(), middle_b = box_b.center();
   const Eigen::Vector3d to_a = (box_a.max() - middle_a).cwiseMax(middle_a - box_a.min()),
                         to_b = (box_b.max() - middle_b).cwiseMax(middle_b - box_b.min());
