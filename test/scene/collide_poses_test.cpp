@@ -1,8 +1,13 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #include <bocst/bocst.h>
 #include <bocst/collide_poses.h>
+#include <bocst/is_closer_than.h>
 #include <gtest/gtest.h>
 
+#include <atomic>
+#include <chrono>
+#include <functional>
+#include <memory>
 #include <random>
 #include <string>
 #include <thread>
@@ -280,6 +285,56 @@ TYPED_TEST(CollidePoses, BesideOtherThreadsAndADeformingMesh) {
   });
   for (int i = 0; i < 5; ++i) EXPECT_EQ(atOnce(a, b, X, 2), expected);
   changes.join();
+}
+
+// The clock is read while a query holds its locks. A writer that comes just then waits for the query; one that took a
+// lock twice would wait behind the writer, for ever.
+TYPED_TEST(CollidePoses, NoQueryTakesALockTwice) {
+  using S = TypeParam;
+  const Raw raw = test::torus(12);
+  std::atomic<bool> comes{false};
+  std::thread writer;
+  Model<S>* deformed = nullptr;
+  Options options;
+  options.clock = [&] {
+    if (comes.exchange(false)) {
+      writer = std::thread([&] { deformed->updateVertices(raw.vertices); });
+      std::this_thread::sleep_for(std::chrono::milliseconds(20));
+    }
+    return Clock::now();
+  };
+  const auto a = std::make_shared<Model<S>>(raw.mesh(), options), b = std::make_shared<Model<S>>(raw.mesh());
+  deformed = a.get();
+  const fcl::Transform3<S> X_WA = fcl::Transform3<S>::Identity();
+  fcl::Transform3<S> X_WB = X_WA;
+  X_WB.translation()[0] = S(0.3);
+  Scene<S> scene;
+  scene.addMoving(a);
+  scene.addFixed(b, X_WB);
+  std::uint8_t hit = 0;
+  fcl::CollisionResult<S> contacts;
+  fcl::DistanceResult<S> nearest;
+  fcl::ContinuousCollisionResult<S> first;
+  const std::function<bool()> queries[] = {
+      [&] { return collidePoses<S>(*a, *b, &X_WB, 1, &hit), hit != 0; },
+      [&] { return collidePoses<S>(*b, *a, &X_WB, 1, &hit), hit != 0; },
+      [&] { return fcl::collide(a.get(), X_WA, b.get(), X_WB, fcl::CollisionRequest<S>(), contacts) > 0; },
+      [&] { return fcl::distance(a.get(), X_WA, b.get(), X_WB, fcl::DistanceRequest<S>(), nearest) <= 0; },
+      [&] { return isCloserThan<S>(a.get(), X_WA, b.get(), X_WB, S(0.1)); },
+      [&] {
+        bocst::continuousCollide<S>(a.get(), X_WA, X_WA, b.get(), X_WB, X_WB, fcl::ContinuousCollisionRequest<S>(),
+                                    first);
+        return first.is_collide;
+      },
+      [&] { return scene.collides(&X_WA); },
+      [&] { return scene.clearance(&X_WA) <= 0; },
+  };
+  for (const auto& touch : queries) {
+    comes = true;
+    EXPECT_TRUE(touch());
+    ASSERT_FALSE(comes);
+    writer.join();
+  }
 }
 
 }  // namespace
