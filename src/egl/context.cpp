@@ -8,6 +8,9 @@
 #include <unistd.h>
 
 #include <algorithm>
+#include <cctype>
+#include <iterator>
+#include <numeric>
 
 namespace bocst::oracle::gl {
 namespace {
@@ -74,9 +77,26 @@ std::string string(GLenum name) {
   return text != nullptr ? reinterpret_cast<const char*>(text) : "";
 }
 
-bool isSoftware(const std::string& renderer) {
-  const auto begins = [&](const char* with) { return renderer.rfind(with, 0) == 0; };
-  return begins("llvmpipe") || begins("softpipe") || begins("SWR");
+// Layered drivers name what is below them in brackets: "zink Vulkan 1.3(llvmpipe (LLVM 15.0.6, 256 bits))".
+bool isSoftware(std::string renderer) {
+  std::transform(renderer.begin(), renderer.end(), renderer.begin(), [](unsigned char c) { return std::tolower(c); });
+  const char* const names[] = {"llvmpipe", "lavapipe", "softpipe", "swrast", "swiftshader", "software", "swr"};
+  return std::any_of(std::begin(names), std::end(names),
+                     [&](const char* name) { return renderer.find(name) != std::string::npos; });
+}
+
+// Desktop OpenGL's attributes of robust contexts (EGL_KHR_create_context); those of EGL_EXT_create_context_robustness
+// are OpenGL ES's.
+constexpr EGLint kRobust[] = {EGL_CONTEXT_FLAGS_KHR, EGL_CONTEXT_OPENGL_ROBUST_ACCESS_BIT_KHR,
+                              EGL_CONTEXT_OPENGL_RESET_NOTIFICATION_STRATEGY_KHR, EGL_LOSE_CONTEXT_ON_RESET_KHR};
+
+EGLContext createContext(EGLDisplay display, const ContextRequest& request, bool robust) {
+  std::vector<EGLint> attributes = {EGL_CONTEXT_MAJOR_VERSION_KHR,       request.major,
+                                    EGL_CONTEXT_MINOR_VERSION_KHR,       request.minor,
+                                    EGL_CONTEXT_OPENGL_PROFILE_MASK_KHR, EGL_CONTEXT_OPENGL_CORE_PROFILE_BIT_KHR};
+  if (robust) attributes.insert(attributes.end(), std::begin(kRobust), std::end(kRobust));
+  attributes.push_back(EGL_NONE);
+  return eglCreateContext(display, EGL_NO_CONFIG_KHR, EGL_NO_CONTEXT, attributes.data());
 }
 
 }  // namespace
@@ -87,27 +107,22 @@ std::string Libraries::whyNot() const {
   return "";
 }
 
-int deviceCount() {
-  try {
-    return static_cast<int>(devices(Libraries()).size());
-  } catch (const OracleError&) {
-    return 0;
-  }
+std::vector<int> devicesInOrder(const Libraries& libraries) {
+  const std::vector<Device> all = devices(libraries);
+  std::vector<int> order(all.size());
+  std::iota(order.begin(), order.end(), 0);
+  std::stable_partition(order.begin(), order.end(), [&](int i) { return !all[static_cast<std::size_t>(i)].software; });
+  return order;
 }
 
 Context::Context(const ContextRequest& request) {
   const std::vector<Device> all = devices(request.libraries);
   if (all.empty()) throw OracleError("EGL knows no device");
-  std::size_t index = 0;
-  if (request.device == ContextRequest::kAnyDevice) {
-    while (index + 1 < all.size() && all[index].software) ++index;
-    if (all[index].software) index = 0;
-  } else {
-    index = static_cast<std::size_t>(request.device);
-    if (request.device < 0 || index >= all.size()) {
-      throw OracleError("there is no device " + std::to_string(request.device) + ": EGL knows " +
-                        std::to_string(all.size()));
-    }
+  const auto index = static_cast<std::size_t>(
+      request.device == ContextRequest::kAnyDevice ? devicesInOrder(request.libraries).front() : request.device);
+  if (index >= all.size()) {
+    throw OracleError("there is no device " + std::to_string(request.device) + ": EGL knows " +
+                      std::to_string(all.size()));
   }
   const std::string where = "device " + std::to_string(index) + ": ";
   EGLDisplay display = eglGetPlatformDisplayEXT(EGL_PLATFORM_DEVICE_EXT, all[index].handle, nullptr);
@@ -117,22 +132,8 @@ Context::Context(const ContextRequest& request) {
     if (!has(extensions, needed)) throw OracleError(where + "its driver lacks " + needed);
   }
   if (!eglBindAPI(EGL_OPENGL_API)) throw OracleError(where + "its driver has no desktop OpenGL");
-  std::vector<EGLint> attributes = {EGL_CONTEXT_MAJOR_VERSION_KHR,       request.major,
-                                    EGL_CONTEXT_MINOR_VERSION_KHR,       request.minor,
-                                    EGL_CONTEXT_OPENGL_PROFILE_MASK_KHR, EGL_CONTEXT_OPENGL_CORE_PROFILE_BIT_KHR};
-  if (has(extensions, "EGL_EXT_create_context_robustness")) {
-    attributes.insert(attributes.end(),
-                      {EGL_CONTEXT_OPENGL_ROBUST_ACCESS_EXT, EGL_TRUE,
-                       EGL_CONTEXT_OPENGL_RESET_NOTIFICATION_STRATEGY_EXT, EGL_LOSE_CONTEXT_ON_RESET_EXT});
-  }
-  attributes.push_back(EGL_NONE);
-  EGLContext context = eglCreateContext(display, EGL_NO_CONFIG_KHR, EGL_NO_CONTEXT, attributes.data());
-  if (context == EGL_NO_CONTEXT && attributes.size() > 7) {
-    // A driver may offer robustness, but not to this kind of context.
-    attributes.resize(6);
-    attributes.push_back(EGL_NONE);
-    context = eglCreateContext(display, EGL_NO_CONFIG_KHR, EGL_NO_CONTEXT, attributes.data());
-  }
+  EGLContext context = createContext(display, request, true);
+  if (context == EGL_NO_CONTEXT) context = createContext(display, request, false);
   if (context == EGL_NO_CONTEXT) {
     throw OracleError(where + "no OpenGL " + std::to_string(request.major) + "." + std::to_string(request.minor) +
                       " (" + eglError() + ")");
@@ -149,7 +150,11 @@ Context::Context(const ContextRequest& request) {
   info_.version = string(GL_VERSION);
   info_.computes = request.major >= 4;
   info_.hardware = !all[index].software && !isSoftware(info_.renderer);
-  robust_ = epoxy_gl_version() >= 45 || epoxy_has_gl_extension("GL_KHR_robustness");
+  if (epoxy_gl_version() >= 45 || epoxy_has_gl_extension("GL_KHR_robustness")) {
+    GLint strategy = GL_NO_RESET_NOTIFICATION;
+    glGetIntegerv(GL_RESET_NOTIFICATION_STRATEGY, &strategy);
+    info_.tells_resets = strategy == GL_LOSE_CONTEXT_ON_RESET;
+  }
 }
 
 Context::~Context() {
@@ -159,7 +164,7 @@ Context::~Context() {
 }
 
 bool Context::isLost() const {
-  if (!robust_) return false;
+  if (!info_.tells_resets) return false;
   return (epoxy_gl_version() >= 45 ? glGetGraphicsResetStatus() : glGetGraphicsResetStatusKHR()) != GL_NO_ERROR;
 }
 

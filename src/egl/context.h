@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #pragma once
 
+#include <chrono>
 #include <memory>
 #include <string>
 #include <vector>
@@ -21,22 +22,26 @@ struct Libraries {
 struct ContextRequest {
   static constexpr int kAnyDevice = -1;
 
-  int device = kAnyDevice;  ///< EGL device index; kAnyDevice: the first that is hardware, else the first.
+  int device = kAnyDevice;  ///< EGL device index; kAnyDevice: the first of devicesInOrder().
   int major = 4, minor = 3;
+  /// How long the device may take for what it was told before it counts as lost; 0: 10 s, and 10 minutes for a software
+  /// renderer, which no watchdog stops.
+  std::chrono::milliseconds wait_limit{0};
   Libraries libraries;
 };
 
 /// What runs a context.
 struct ContextInfo {
   int device = 0;
-  std::string renderer;   ///< GL_RENDERER.
-  std::string version;    ///< GL_VERSION, with the driver's own.
-  bool hardware = false;  ///< Not a software renderer.
-  bool computes = false;  ///< OpenGL 4.3 was asked for and is there.
+  std::string renderer;       ///< GL_RENDERER.
+  std::string version;        ///< GL_VERSION, with the driver's own.
+  bool hardware = false;      ///< Not a software renderer.
+  bool computes = false;      ///< OpenGL 4.3 was asked for and is there.
+  bool tells_resets = false;  ///< A reset of the device ends the context, and isLost() says so.
 };
 
-/// The number of EGL devices; 0 also when EGL itself is missing.
-int deviceCount();
+/// The indices of the EGL devices: those that EGL does not call software first. @throws OracleError without EGL.
+std::vector<int> devicesInOrder(const Libraries& libraries = Libraries());
 
 /// A core-profile context without surface, current in the thread that makes it; that thread must end it, too.
 ///
@@ -58,7 +63,6 @@ class Context {
   void* display_ = nullptr;
   void* context_ = nullptr;
   ContextInfo info_;
-  bool robust_ = false;
 };
 
 }  // namespace bocst::oracle::gl

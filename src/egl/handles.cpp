@@ -4,6 +4,7 @@
 #include <bocst/oracle.h>
 
 #include <algorithm>
+#include <cstring>
 
 namespace bocst::oracle::gl {
 namespace {
@@ -47,10 +48,68 @@ void Buffer::read(std::size_t offset, std::size_t bytes, void* data) const {
   glGetBufferSubData(kAnyTarget, static_cast<GLintptr>(offset), static_cast<GLsizeiptr>(bytes), data);
 }
 
+bool Buffer::holds(std::size_t offset, std::size_t bytes, const void* data) const {
+  char found[256];
+  const std::size_t some = std::min(bytes, sizeof(found));
+  for (const std::size_t at : {std::size_t{0}, (bytes - some) / 2, bytes - some}) {
+    read(offset + at, some, found);
+    if (std::memcmp(found, static_cast<const char*>(data) + at, some) != 0) return false;
+  }
+  return true;
+}
+
 void Buffer::clear(std::size_t bytes) {
   const GLuint zero = 0;
   glBindBuffer(kAnyTarget, name());
   glClearBufferSubData(kAnyTarget, GL_R32UI, 0, static_cast<GLsizeiptr>(bytes), GL_RED_INTEGER, GL_UNSIGNED_INT, &zero);
+}
+
+void Staging::copy(const Buffer& from, std::size_t offset, std::size_t bytes) {
+  if (mapped_ != nullptr && !stays_mapped_) {
+    glBindBuffer(kAnyTarget, name_);
+    glUnmapBuffer(kAnyTarget);
+    mapped_ = nullptr;
+  }
+  if (bytes > bytes_) {
+    release();
+    forgetErrors();
+    glGenBuffers(1, &name_);
+    glBindBuffer(kAnyTarget, name_);
+    const std::size_t room = std::max<std::size_t>(2 * bytes, 1 << 16);
+    stays_mapped_ = epoxy_gl_version() >= 44 || epoxy_has_gl_extension("GL_ARB_buffer_storage");
+    if (stays_mapped_) {
+      constexpr GLbitfield flags = GL_MAP_READ_BIT | GL_MAP_PERSISTENT_BIT | GL_MAP_COHERENT_BIT;
+      glBufferStorage(kAnyTarget, static_cast<GLsizeiptr>(room), nullptr, flags | GL_CLIENT_STORAGE_BIT);
+      mapped_ = glMapBufferRange(kAnyTarget, 0, static_cast<GLsizeiptr>(room), flags);
+    } else {
+      glBufferData(kAnyTarget, static_cast<GLsizeiptr>(room), nullptr, GL_STREAM_READ);
+    }
+    if (glGetError() != GL_NO_ERROR || (stays_mapped_ && mapped_ == nullptr)) {
+      throw OracleError("the GPU has no memory to read back " + std::to_string(room) + " bytes");
+    }
+    bytes_ = room;
+  }
+  copied_ = bytes;
+  glBindBuffer(GL_COPY_READ_BUFFER, from.name());
+  glBindBuffer(kAnyTarget, name_);
+  glCopyBufferSubData(GL_COPY_READ_BUFFER, kAnyTarget, static_cast<GLintptr>(offset), 0,
+                      static_cast<GLsizeiptr>(bytes));
+}
+
+const void* Staging::take() {
+  if (mapped_ == nullptr) {
+    glBindBuffer(kAnyTarget, name_);
+    mapped_ = glMapBufferRange(kAnyTarget, 0, static_cast<GLsizeiptr>(copied_), GL_MAP_READ_BIT);
+    if (mapped_ == nullptr) throw OracleError("the driver does not let the host read what was computed");
+  }
+  return mapped_;
+}
+
+void Staging::release() {
+  if (name_ != 0) glDeleteBuffers(1, &name_);  // which unmaps it
+  name_ = 0;
+  bytes_ = 0;
+  mapped_ = nullptr;
 }
 
 Queries::~Queries() {

@@ -57,12 +57,37 @@ class Buffer {
   void reserve(std::size_t bytes);
   void write(std::size_t offset, std::size_t bytes, const void* data);
   void read(std::size_t offset, std::size_t bytes, void* data) const;
+  /// Are the bytes there that were written? A few at both ends and in the middle are looked at.
+  bool holds(std::size_t offset, std::size_t bytes, const void* data) const;
   /// All bytes to zero from the start on.
   void clear(std::size_t bytes);
 
  private:
   Handle<detail::makeBuffer, detail::endBuffer> handle_;
   std::size_t bytes_ = 0;
+};
+
+/// Device memory that the host reads what was computed from, so that buffers of shaders stay where they are fast.
+/// Mapped once for all where the driver can (OpenGL 4.4), else at each read.
+class Staging {
+ public:
+  Staging() = default;
+  ~Staging() { release(); }
+  Staging(const Staging&) = delete;
+  Staging& operator=(const Staging&) = delete;
+
+  /// Starts to copy bytes of a buffer; what take() gave before is gone.
+  void copy(const Buffer& from, std::size_t offset, std::size_t bytes);
+  /// What was copied, once the device has done all that it was told. @throws OracleError when it cannot be mapped.
+  const void* take();
+
+ private:
+  void release();
+
+  GLuint name_ = 0;
+  std::size_t bytes_ = 0, copied_ = 0;
+  void* mapped_ = nullptr;
+  bool stays_mapped_ = false;
 };
 
 /// As many query objects as were ever asked for.

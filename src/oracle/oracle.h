@@ -80,7 +80,7 @@ class Oracle {
   virtual bool needsHostMesh() const { return true; }
 
   /// Where the time of the last batch went, in seconds, as the device measured it. read_back is what else passed until
-  /// the answers were there. All 0 without a device.
+  /// the answers were there. All 0 without a device, and for batches before the first call: timing takes time.
   struct Cost {
     double upload = 0, kernels = 0, read_back = 0;
   };

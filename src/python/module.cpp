@@ -345,7 +345,8 @@ Returns (centers (k, 3), radii (k,)) in the mesh's frame and length unit.)");
       .def_readonly("name", &OracleInfo::name)
       .def_readonly("device", &OracleInfo::device)
       .def_readonly("hardware", &OracleInfo::hardware)
-      .def_readonly("why_not", &OracleInfo::why_not);
+      .def_readonly("why_not", &OracleInfo::why_not)
+      .def_readonly("self_test", &OracleInfo::self_test);
   m.def("available_oracles", &availableOracles, py::call_guard<NoGil>(), "What is there, and why not the others.");
   py::register_exception<OracleError>(m, "OracleError", PyExc_RuntimeError);
 }

@@ -4,6 +4,8 @@
 #include <sys/wait.h>
 #include <unistd.h>
 
+#include <cstdlib>
+#include <filesystem>
 #include <fstream>
 #include <random>
 #include <set>
@@ -14,6 +16,7 @@
 #include "oracle/gl/compute_oracle.h"
 #include "oracle/gl/devices.h"
 #include "oracle/gl/occlusion_oracle.h"
+#include "oracle/gl/self_test.h"
 #include "surfaces.h"
 
 namespace bocst::oracle::gl {
@@ -21,7 +24,11 @@ namespace {
 
 using lattice::Cell;
 
-std::shared_ptr<Thread> newThread() { return std::make_shared<Thread>(ContextRequest()); }
+std::shared_ptr<Thread> newThread(int major = 4) {
+  ContextRequest request;
+  request.major = major;
+  return std::make_shared<Thread>(request);
+}
 
 Surface residentOn(Oracle& oracle, Surface surface) {
   surface.device = oracle.makeResident(surface);
@@ -382,8 +389,8 @@ TEST(Device, RoundsLeakNothing) {
   for (int i = 0; i < 20; ++i) last = round();
   const std::size_t before = residentBytes();
   for (int i = 0; i < 100; ++i) last = round();
-  // The mesh alone takes 300 kB a round.
-  EXPECT_LT(residentBytes(), before + (std::size_t{8} << 20));
+  // The mesh alone takes 300 kB a round; some drivers keep 130 kB of each context.
+  EXPECT_LT(residentBytes(), before + (std::size_t{16} << 20));
 }
 
 TEST(Device, MissingLibrariesAreNamed) {
@@ -412,6 +419,58 @@ TEST(Device, WhatIsNotThereIsSaid) {
   } catch (const OracleError& e) {
     EXPECT_NE(std::string(e.what()).find("OpenGL 9.3"), std::string::npos) << e.what();
   }
+}
+
+TEST(Device, ResetsAreTold) {
+  // Attributes of the wrong kind of OpenGL make a context that never tells of a reset.
+  EXPECT_TRUE(newThread()->info().tells_resets);
+}
+
+TEST(Device, SoftwareIsKnownForWhatItIs) {
+  // This machine's tests run on software, also where one driver is layered on another.
+  const ContextInfo info = newThread(3)->info();
+  const bool says_so = info.renderer.find("pipe") != std::string::npos;
+  EXPECT_TRUE(!says_so || !info.hardware) << info.renderer;
+}
+
+TEST(Device, PassesItsSelfTest) {
+  ComputeOracle compute(newThread());
+  EXPECT_EQ(selfTest(compute), "");
+  EXPECT_EQ(compute.leftToCpu(), 0u);
+}
+
+// Shaders as a compiler for Vulkan sees them: what one driver lets pass is an error for another.
+TEST(Shaders, AreValidForTheReferenceCompiler) {
+  if (std::system("command -v glslangValidator spirv-val >/dev/null") != 0) GTEST_SKIP() << "glslang is not installed";
+  const std::string folder = testing::TempDir() + "bocst_shaders_" + std::to_string(getpid());
+  std::filesystem::create_directory(folder);
+  std::vector<std::pair<std::string, std::string>> files;
+  for (const auto& [name, source] : ComputeChain::sources()) files.emplace_back(name + ".comp", source);
+  for (const auto form : {OcclusionOracle::Form::kConservative, OcclusionOracle::Form::kSampled}) {
+    for (const Program::Stage& stage : OcclusionOracle::sources(form)) {
+      const char* const ending = stage.type == GL_VERTEX_SHADER     ? ".vert"
+                                 : stage.type == GL_GEOMETRY_SHADER ? ".geom"
+                                                                    : ".frag";
+      files.emplace_back("occlusion" + std::to_string(static_cast<int>(form)) + ending, stage.source);
+    }
+  }
+  for (auto [name, source] : files) {
+    const std::string file = folder + "/" + name;
+    // glslang says that it has GL_ARB_gpu_shader5 in 3.30, but not its `precise`.
+    const std::size_t version = source.find("#version 330");
+    if (version != std::string::npos) source.replace(version, 12, "#version 400");
+    std::ofstream(file) << source;
+    EXPECT_EQ(std::system(("glslangValidator " + file + " >" + file + ".log 2>&1").c_str()), 0) << file;
+    // Names in place of numbers that SPIR-V asks for; OpenGL gives them itself.
+    if (name.find(".comp") == std::string::npos) continue;
+    const std::string spirv = file + ".spv";
+    EXPECT_EQ(std::system(("glslangValidator -G --aml -o " + spirv + " " + file + " >" + file +
+                           ".log 2>&1 && spirv-val " + spirv + " >>" + file + ".log 2>&1")
+                              .c_str()),
+              0)
+        << file;
+  }
+  if (!HasFailure()) std::filesystem::remove_all(folder);
 }
 
 TEST(Device, AShaderThatDoesNotCompileIsAnError) {
@@ -486,7 +545,7 @@ Seen lookAt(OcclusionOracle& oracle, const Surface& surface, int levels) {
 }
 
 TEST(Occlusion, ConservativeQueriesLoseNothingAndAddOnlyTheirPad) {
-  OcclusionOracle oracle(newThread(), OcclusionOracle::Form::kConservative, 16);
+  OcclusionOracle oracle(newThread(3), OcclusionOracle::Form::kConservative, 16);
   for (const test::Raw& raw : {test::torus(24), test::adversarial(), test::soup(300, 2)}) {
     const Surface surface = residentOn(oracle, surfaceOf(raw));
     const Seen seen = lookAt(oracle, surface, 5);
@@ -498,7 +557,7 @@ TEST(Occlusion, ConservativeQueriesLoseNothingAndAddOnlyTheirPad) {
 
 TEST(Occlusion, SampledQueriesLoseSurface) {
   // The paper's own form; more pixels lose less, and none is enough.
-  const auto thread = newThread();
+  const auto thread = newThread(3);
   std::vector<std::size_t> missed;
   for (const int viewport : {8, 64}) {
     OcclusionOracle oracle(thread, OcclusionOracle::Form::kSampled, viewport);

@@ -11,6 +11,7 @@ namespace {
 
 constexpr std::size_t kWord = sizeof(std::uint32_t);
 constexpr std::uint64_t kFirstWords = 1 << 16;
+constexpr std::size_t kSample = 64;  // words
 
 }  // namespace
 
@@ -51,8 +52,7 @@ std::shared_ptr<Arena::Range> Arena::take(std::uint64_t words) {
 void Arena::grow(std::uint64_t words) {
   const std::uint64_t before = buffer_->bytes() / kWord;
   if (before + words > most_words_) {
-    throw OracleError("triangle lists of " + std::to_string((before + words) * kWord) +
-                      " bytes are more than the device takes");
+    throw OracleError(std::to_string((before + words) * kWord) + " bytes are more than the device takes in one buffer");
   }
   const std::uint64_t after = std::min(most_words_, std::max({kFirstWords, 2 * before, before + words}));
   auto larger = std::make_unique<Buffer>();
@@ -61,6 +61,14 @@ void Arena::grow(std::uint64_t words) {
     glBindBuffer(GL_COPY_READ_BUFFER, buffer_->name());
     glBindBuffer(GL_COPY_WRITE_BUFFER, larger->name());
     glCopyBufferSubData(GL_COPY_READ_BUFFER, GL_COPY_WRITE_BUFFER, 0, 0, static_cast<GLsizeiptr>(before * kWord));
+    // A few words show whether it was done.
+    std::uint32_t sample[kSample];
+    for (const std::uint64_t at : {std::uint64_t{0}, before / 2, before - kSample}) {
+      buffer_->read(at * kWord, sizeof(sample), sample);
+      if (larger->holds(at * kWord, sizeof(sample), sample)) continue;
+      thread_->distrust("a copy did not arrive");
+      throw OracleError("the GPU context is lost");
+    }
   }
   buffer_ = std::move(larger);
   giveBack(static_cast<std::uint32_t>(before), static_cast<std::uint32_t>(after - before));

@@ -12,7 +12,8 @@
 
 namespace bocst::oracle::gl {
 
-/// Triangle lists in device memory: one buffer, parts of which are taken and come back when nobody holds them.
+/// Words of device memory, for triangle lists or for meshes: one buffer, parts of which are taken and come back when
+/// nobody holds them.
 class Arena : public std::enable_shared_from_this<Arena> {
  public:
   /// Words of the arena; they come back to it at the end.

@@ -5,6 +5,7 @@
 #include <array>
 #include <chrono>
 #include <cstring>
+#include <numeric>
 #include <string>
 
 #include "oracle/gl/layout.h"
@@ -16,11 +17,17 @@ namespace {
 using namespace layout;
 
 constexpr std::size_t kWord = sizeof(std::uint32_t);
-constexpr std::uint64_t kMostGroups = 1 << 15;  // in one dimension; 65535 is the least that drivers must allow
 
-std::string source(const std::string& name, bool clips) {
-  return "#version 430 core\n" + constants() + shader("common") + (clips ? shader("clip") : "") + shader(name);
-}
+struct PassSource {
+  const char* name;
+  bool clips;
+};
+// As in ComputeChain::Pass.
+constexpr PassSource kSources[] = {{"masks", false},   {"decide", false}, {"place", false}, {"fill", true},
+                                   {"normals", false}, {"slabs", true},   {"pack", false}};
+
+// A dispatch of more would take long enough for a watchdog of a slow device.
+constexpr std::uint64_t kMostInvocations = std::uint64_t{1} << 22;
 
 const DeviceMesh* meshOf(const ExpansionRequest& e) { return static_cast<const DeviceMesh*>(e.surface->device.get()); }
 
@@ -34,26 +41,31 @@ ComputeChain::Limits clamped(ComputeChain::Limits limits) {
 
 }  // namespace
 
+std::vector<std::pair<std::string, std::string>> ComputeChain::sources() {
+  std::vector<std::pair<std::string, std::string>> all;
+  for (const PassSource& pass : kSources) {
+    all.emplace_back(pass.name, "#version 430 core\n" + constants() +
+                                    "const uint kPass = " + std::to_string(all.size()) + "u;\n" + shader("common") +
+                                    (pass.clips ? shader("clip") : "") + shader(pass.name));
+  }
+  return all;
+}
+
 ComputeChain::ComputeChain(Limits limits, Arena& arena) : limits_(clamped(limits)), arena_(arena) {
   GLint bindings = 0;
   glGetIntegerv(GL_MAX_COMPUTE_SHADER_STORAGE_BLOCKS, &bindings);
-  if (bindings < 8) throw OracleError("the driver binds only " + std::to_string(bindings) + " storage buffers, not 8");
-  const std::pair<const char*, bool> passes[kPasses] = {{"masks", false}, {"decide", false},  {"place", false},
-                                                        {"fill", true},   {"normals", false}, {"slabs", true},
-                                                        {"pack", false}};
+  if (bindings < 6) throw OracleError("the driver binds only " + std::to_string(bindings) + " storage buffers, not 6");
   times_.reserve(3);
-  for (const auto& [name, clips] : passes) {
-    auto program = std::make_unique<Program>(std::vector<Program::Stage>{{GL_COMPUTE_SHADER, source(name, clips)}});
+  for (const auto& [name, source] : sources()) {
+    auto program = std::make_unique<Program>(std::vector<Program::Stage>{{GL_COMPUTE_SHADER, source}});
     const Program& p = *program;
-    steps_.push_back({std::move(program), p.uniform("u_pairs"), p.uniform("u_cells"), p.uniform("u_cell_count"),
-                      p.uniform("u_list_capacity"), p.uniform("u_id_capacity")});
+    steps_.push_back({std::move(program), p.uniform("u_pairs"), p.uniform("u_cell_count"), p.uniform("u_list_capacity"),
+                      p.uniform("u_id_capacity"), p.uniform("u_batch")});
   }
 }
 
 bool ComputeChain::fits(const ExpansionRequest& e) const {
-  const DeviceMesh& mesh = *meshOf(e);
-  const std::size_t largest = std::max(mesh.vertices().bytes(), std::max(mesh.indices().bytes(), mesh.exact().bytes()));
-  return e.count <= limits_.pairs && largest <= limits_.bytes && e.count * kWord <= limits_.bytes;
+  return e.count <= limits_.pairs && e.count * kWord <= limits_.bytes;
 }
 
 std::size_t ComputeChain::part(const std::vector<ExpansionRequest*>& requests, std::size_t first) const {
@@ -75,102 +87,139 @@ void ComputeChain::reserve(Buffer& buffer, std::size_t words) const {
   buffer.reserve(words * kWord);
 }
 
-void ComputeChain::upload(const std::vector<ExpansionRequest*>& requests) {
-  std::uint64_t uploads = 0;
-  for (const ExpansionRequest* e : requests) {
-    if (e->ids != nullptr) uploads += e->count;
-  }
-  uploaded_ = uploads > 0 ? arena_.take(uploads) : nullptr;
-  std::vector<std::uint32_t> ids;
-  ids.reserve(uploads);
+// All that is asked, on the host.
+void ComputeChain::describe(const std::vector<ExpansionRequest*>& requests) {
+  batch_ = (batch_ + 1) % kMostBatches;
   rows_.clear();
-  ranges_.clear();
-  std::uint32_t pairs = 0;
+  ids_.clear();
+  sums_.clear();
+  is_uploaded_.clear();
+  meshes_ = meshOf(*requests.front())->buffer().name();
+  std::uint64_t pairs = 0, ids = 0;
   for (const ExpansionRequest* request : requests) {
     const ExpansionRequest& e = *request;
+    const DeviceMesh& mesh = *meshOf(e);
     const double half = e.cell.side() / 2.0;
     Cell row{};
     for (std::size_t k = 0; k < 3; ++k) row.center[k] = static_cast<float>(e.cell.corner()[k] + half);
     row.half_side = static_cast<float>(half);
-    row.first_pair = pairs;
-    row.list = kAll;
-    if (e.ids != nullptr) {
-      row.list = uploaded_->begin() + narrow(ids.size());
-      ids.insert(ids.end(), e.ids, e.ids + e.count);
-    } else if (e.resource != nullptr) {
-      row.list = e.resource_begin;
-    }
+    row.first_pair = narrow(pairs);
+    row.list = e.ids != nullptr ? narrow(ids_.size()) : e.resource != nullptr ? e.resource_begin : kAll;
     for (int o = 0; o < 8; ++o) {
       if (e.surface->lattice.exists(e.cell.octant(o))) row.exists |= 1u << o;
     }
     row.ids_up_to = narrow(std::min<std::size_t>(e.ids_up_to, 0xffffffffu));
-    if (ranges_.empty() || ranges_.back().mesh != meshOf(e)) {
-      const std::uint32_t cell = narrow(rows_.size());
-      ranges_.push_back({meshOf(e), cell, cell, pairs, pairs});
-    }
+    row.indices = mesh.indices();
+    row.vertices = mesh.vertices();
+    row.exact = mesh.exact();
+    row.batch = batch_;
     rows_.push_back(row);
-    pairs += narrow(e.count);
-    ranges_.back().cell_end = narrow(rows_.size());
-    ranges_.back().pair_end = pairs;
+    std::uint32_t sum = 0;
+    if (e.ids != nullptr) {
+      ids_.insert(ids_.end(), e.ids, e.ids + e.count);
+      sum = std::accumulate(e.ids, e.ids + e.count, narrow(e.count));
+    } else if (e.resource == nullptr) {
+      sum = narrow(std::uint64_t{e.count} * (e.count + 1) / 2);
+    }
+    sums_.push_back(sum);
+    is_uploaded_.push_back(e.ids != nullptr);
+    pairs += e.count;
+    ids += std::min<std::uint64_t>(2 * e.count, 8 * std::min<std::uint64_t>(e.ids_up_to, 1u << 28));
   }
+  pairs_ = pairs;
+  list_capacity_ = 2 * pairs + 8 * requests.size();
+  id_capacity_ = ids + 64;
+}
+
+void ComputeChain::upload() {
+  uploaded_ = ids_.empty() ? nullptr : arena_.take(ids_.size());
+  for (std::size_t i = 0; i < rows_.size() && uploaded_ != nullptr; ++i) {
+    if (is_uploaded_[i]) rows_[i].list += uploaded_->begin();
+  }
+  placed_ = arena_.take(list_capacity_);
   reserve(cells_, rows_.size() * sizeof(Cell) / kWord);
   cells_.write(0, rows_.size() * sizeof(Cell), rows_.data());
   reserve(states_, rows_.size() * kStateWords);
   states_.clear(rows_.size() * kStateWords * kWord);
-  reserve(masks_, std::max<std::size_t>(pairs, 1));
-  if (uploaded_ != nullptr) arena_.buffer().write(uploaded_->begin() * kWord, ids.size() * kWord, ids.data());
+  reserve(masks_, std::max<std::size_t>(pairs_, 1));
+  if (uploaded_ != nullptr) arena_.buffer().write(uploaded_->begin() * kWord, ids_.size() * kWord, ids_.data());
+  clearAnswers();
 }
 
-void ComputeChain::dispatch(Pass pass, std::uint64_t invocations) const {
-  const std::uint64_t groups = (invocations + kGroup - 1) / kGroup;
-  if (groups == 0) return;
-  const std::uint64_t across = std::min(groups, kMostGroups);
+void ComputeChain::clearAnswers() {
+  groups_.fill(0);
+  reserve(answers_, kHeader + rows_.size() * kRow + id_capacity_ + 1);
+  answers_.clear(kHeader * kWord);
+  const GLuint bound[] = {meshes_,        arena_.buffer().name(), cells_.name(),
+                          states_.name(), masks_.name(),          answers_.name()};
+  for (GLuint i = 0; i < 6; ++i) glBindBufferBase(GL_SHADER_STORAGE_BUFFER, i, bound[i]);
+  glMemoryBarrier(GL_SHADER_STORAGE_BARRIER_BIT | GL_BUFFER_UPDATE_BARRIER_BIT);
+}
+
+// Passes over pairs get them in parts; those over cells and octants, of which there are fewer, all at once.
+void ComputeChain::run(Pass pass, std::uint64_t invocations) {
   const Step& step = steps_[pass];
   step.program->use();
   glUniform1ui(step.cell_count, narrow(rows_.size()));
   glUniform2ui(step.list_capacity, placed_->begin(), narrow(list_capacity_));
   glUniform1ui(step.id_capacity, narrow(id_capacity_));
-  glDispatchCompute(narrow(across), narrow((groups + across - 1) / across), 1);
-}
-
-void ComputeChain::dispatchPairs(Pass pass) const {
-  for (const Range& r : ranges_) {
-    glBindBufferBase(GL_SHADER_STORAGE_BUFFER, 0, r.mesh->vertices().name());
-    glBindBufferBase(GL_SHADER_STORAGE_BUFFER, 1, r.mesh->indices().name());
-    glBindBufferBase(GL_SHADER_STORAGE_BUFFER, 7, r.mesh->exact().name());
-    steps_[pass].program->use();
-    glUniform2ui(steps_[pass].pairs, r.pair_begin, r.pair_end);
-    glUniform2ui(steps_[pass].cells, r.cell_begin, r.cell_end);
-    dispatch(pass, r.pair_end - r.pair_begin);
+  glUniform1ui(step.batch, batch_);
+  for (std::uint64_t first = 0; first < invocations; first += kMostInvocations) {
+    const std::uint64_t end = std::min(invocations, first + kMostInvocations);
+    if (first > 0) glFlush();
+    glUniform2ui(step.pairs, narrow(first), narrow(end));
+    const std::uint32_t groups = narrow((end - first + kGroup - 1) / kGroup);
+    groups_[pass] += groups;
+    glDispatchCompute(groups, 1, 1);
   }
-  glMemoryBarrier(GL_SHADER_STORAGE_BARRIER_BIT);
+  glMemoryBarrier(GL_SHADER_STORAGE_BARRIER_BIT | GL_BUFFER_UPDATE_BARRIER_BIT);
 }
 
-void ComputeChain::placeAndFill() {
-  reserve(answers_, kHeader + rows_.size() * kRow + id_capacity_);
-  answers_.clear(kHeader * kWord);
-  const GLuint bound[] = {arena_.buffer().name(), cells_.name(), states_.name(), masks_.name(), answers_.name()};
-  for (GLuint i = 0; i < 5; ++i) glBindBufferBase(GL_SHADER_STORAGE_BUFFER, 2 + i, bound[i]);
-  dispatch(kPlace, rows_.size());
-  glMemoryBarrier(GL_SHADER_STORAGE_BARRIER_BIT);
-  dispatchPairs(kFill);
-  dispatch(kNormals, 8 * rows_.size());
-  glMemoryBarrier(GL_SHADER_STORAGE_BARRIER_BIT);
-  dispatchPairs(kSlabs);
-  dispatch(kPack, rows_.size());
-  glMemoryBarrier(GL_BUFFER_UPDATE_BARRIER_BIT | GL_SHADER_STORAGE_BARRIER_BIT);
+void ComputeChain::fill() {
+  run(kPlace, rows_.size());
+  run(kFill, pairs_);
+  run(kNormals, 8 * rows_.size());
+  run(kSlabs, pairs_);
+  run(kPack, rows_.size());
 }
 
-void ComputeChain::readBack(const std::vector<ExpansionRequest*>& requests) {
+const std::uint32_t* ComputeChain::read(std::size_t first, std::size_t end, Thread& thread) {
+  staging_.copy(answers_, first * kWord, (end - first) * kWord);
+  thread.awaitDevice();
+  return static_cast<const std::uint32_t*>(staging_.take());
+}
+
+// A driver that leaves out work in silence would make surface vanish: it is not asked again.
+void ComputeChain::require(bool holds, const char* what, Thread& thread) {
+  if (holds) return;
+  thread.distrust(what);
+  throw OracleError("the GPU context is lost");
+}
+
+void ComputeChain::checkHeader(const std::uint32_t* answers, Thread& thread) const {
+  require(std::equal(groups_.begin(), groups_.end(), answers + kGroups), "work groups did not run", thread);
+  require((answers[kFailed] & kMasksFailed) == 0, "a pass did not see what the one before it wrote", thread);
+  require((answers[kFailed] & kListsFailed) == 0, "a list was not filled", thread);
+}
+
+void ComputeChain::take(const std::vector<ExpansionRequest*>& requests, const std::uint32_t* answers,
+                        Thread& thread) const {
+  const std::uint32_t* const all_ids = answers + kHeader + requests.size() * kRow;
+  require(all_ids[answers[kIdWords]] == batch_, "what came back is not of this batch", thread);
+  for (std::size_t i = 0; i < requests.size(); ++i) {
+    const std::uint32_t* const row = answers + kHeader + i * kRow;
+    require(row[kRowCheck] == check(rows_[i]), "a cell was not answered", thread);
+    require(sums_[i] == 0 || row[kRowSum] == sums_[i], "it saw other triangles", thread);
+  }
   for (std::size_t i = 0; i < requests.size(); ++i) {
     ExpansionRequest& e = *requests[i];
-    const std::uint32_t* row = &words_[kHeader + i * kRow];
+    const std::uint32_t* const row = answers + kHeader + i * kRow;
     CellAnswer answer;
     std::memcpy(static_cast<void*>(&answer), row, sizeof(answer));
     e.octants = answer.octants;
     e.own = answer.own;
     e.grey = answer.grey;
-    const std::uint32_t* ids = &words_[kHeader + requests.size() * kRow] + row[kRowIds];
+    const std::uint32_t* ids = all_ids + row[kRowIds];
     std::uint32_t list = row[kRowList];
     e.lists.clear();
     e.kept_resource = nullptr;
@@ -180,6 +229,7 @@ void ComputeChain::readBack(const std::vector<ExpansionRequest*>& requests) {
       e.list_begin[o] = e.lists.size();
       e.device_lists[o] = here ? ExpansionRequest::DeviceList{} : ExpansionRequest::DeviceList{list, size};
       if (here) {
+        require(ids + size <= all_ids + answers[kIdWords], "a list is longer than what came back", thread);
         e.lists.insert(e.lists.end(), ids, ids + size);
         ids += size;
       } else {
@@ -195,58 +245,56 @@ void ComputeChain::answer(const std::vector<ExpansionRequest*>& requests, Thread
   while (glGetError() != GL_NO_ERROR) {
   }
   const auto begin = std::chrono::steady_clock::now();
-  glQueryCounter(times_[0], GL_TIMESTAMP);
-  upload(requests);
-  std::uint64_t pairs = 0, ids = 0;
-  for (const ExpansionRequest* e : requests) {
-    pairs += e->count;
-    ids += std::min<std::uint64_t>(2 * e->count, 8 * std::min<std::uint64_t>(e->ids_up_to, 1u << 28));
-  }
-  list_capacity_ = 2 * pairs + 8 * requests.size();
-  id_capacity_ = ids + 64;
-  placed_ = arena_.take(list_capacity_);
-  glQueryCounter(times_[1], GL_TIMESTAMP);
-
-  const GLuint bound[] = {arena_.buffer().name(), cells_.name(), states_.name(), masks_.name()};
-  for (GLuint i = 0; i < 4; ++i) glBindBufferBase(GL_SHADER_STORAGE_BUFFER, 2 + i, bound[i]);
-  glMemoryBarrier(GL_SHADER_STORAGE_BARRIER_BIT | GL_BUFFER_UPDATE_BARRIER_BIT);
-  dispatchPairs(kMasks);
-  dispatchPairs(kDecide);
-  placeAndFill();
-
-  glQueryCounter(times_[2], GL_TIMESTAMP);
+  const auto stamp = [this](std::size_t i) {
+    if (is_timed_) glQueryCounter(times_[i], GL_TIMESTAMP);
+  };
+  const bool is_timed = is_timed_;
+  // Whatever happens: a range holds its arena, and that the thread, which must not end in itself.
+  struct Release {
+    ComputeChain& chain;
+    ~Release() { chain.placed_ = chain.uploaded_ = nullptr; }
+  } release{*this};
+  stamp(0);
+  describe(requests);
+  upload();
+  stamp(1);
+  run(kMasks, pairs_);
+  run(kDecide, pairs_);
+  fill();
+  stamp(2);
 
   // Most answers fit into the first read; what does not is known from the header.
   const std::size_t fixed = kHeader + requests.size() * kRow;
-  std::size_t read = fixed + std::min<std::uint64_t>(id_capacity_, 64 * requests.size());
-  const auto readFrom = [&](std::size_t first, std::size_t end) {
-    words_.resize(end);
-    answers_.read(first * kWord, (end - first) * kWord, words_.data() + first);
-  };
-  readFrom(0, read);
-  if (words_[kListWords] > list_capacity_ || words_[kIdWords] > id_capacity_) {
-    list_capacity_ = words_[kListWords];
-    id_capacity_ = words_[kIdWords];
+  const std::size_t first_read = fixed + std::min<std::uint64_t>(id_capacity_, 64 * requests.size()) + 1;
+  const std::uint32_t* answers = read(0, first_read, thread);
+  checkHeader(answers, thread);
+  if (answers[kListWords] > list_capacity_ || answers[kIdWords] > id_capacity_) {
+    list_capacity_ = answers[kListWords];
+    id_capacity_ = answers[kIdWords];
     placed_ = nullptr;
     placed_ = arena_.take(list_capacity_);
-    placeAndFill();
-    read = 0;
+    clearAnswers();
+    fill();
+    answers = read(0, fixed + id_capacity_ + 1, thread);
+    checkHeader(answers, thread);
+    require(answers[kListWords] == list_capacity_ && answers[kIdWords] == id_capacity_, "lists changed", thread);
+  } else if (fixed + answers[kIdWords] + 1 > first_read) {
+    answers = read(0, fixed + answers[kIdWords] + 1, thread);
+    checkHeader(answers, thread);
   }
-  const std::size_t all = fixed + (read == 0 ? id_capacity_ : words_[kIdWords]);
-  if (all > read) readFrom(read, all);
   const GLenum error = glGetError();
-  thread.checkReset();
   if (error != GL_NO_ERROR) throw OracleError("OpenGL error " + std::to_string(error));
-  placed_->trim(words_[kListWords]);
-  readBack(requests);
+  placed_->trim(answers[kListWords]);
+  take(requests, answers, thread);
+  if (is_timed) findCost(std::chrono::steady_clock::now() - begin);
+}
+
+void ComputeChain::findCost(std::chrono::duration<double> all) {
   std::array<GLuint64, 3> times{};
   for (std::size_t i = 0; i < times.size(); ++i) glGetQueryObjectui64v(times_[i], GL_QUERY_RESULT, &times[i]);
-  const std::chrono::duration<double> all_time = std::chrono::steady_clock::now() - begin;
   cost_.upload = 1e-9 * static_cast<double>(times[1] - times[0]);
   cost_.kernels = 1e-9 * static_cast<double>(times[2] - times[1]);
-  cost_.read_back = all_time.count() - cost_.upload - cost_.kernels;
-  placed_ = nullptr;
-  uploaded_ = nullptr;
+  cost_.read_back = all.count() - cost_.upload - cost_.kernels;
 }
 
 }  // namespace bocst::oracle::gl

@@ -1,13 +1,18 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #pragma once
 
+#include <array>
+#include <chrono>
 #include <cstdint>
 #include <memory>
+#include <string>
+#include <utility>
 #include <vector>
 
 #include "egl/handles.h"
 #include "oracle/gl/arena.h"
 #include "oracle/gl/device_mesh.h"
+#include "oracle/gl/layout.h"
 
 namespace bocst::oracle::gl {
 
@@ -30,46 +35,55 @@ class ComputeChain {
   /// How many of the questions, from the first on, fit into one chain; at least one.
   std::size_t part(const std::vector<ExpansionRequest*>& requests, std::size_t first) const;
 
-  /// Answers them all; questions about one mesh follow each other. @throws OracleError
+  /// Answers them all. @throws OracleError; the context is lost then if the device left something out.
   void answer(const std::vector<ExpansionRequest*>& requests, Thread& thread);
 
-  const Oracle::Cost& cost() const { return cost_; }
+  /// Where the time of the last batch went; batches are timed from the first call on.
+  const Oracle::Cost& cost() {
+    is_timed_ = true;
+    return cost_;
+  }
+
+  /// What the driver gets, by name of the pass.
+  static std::vector<std::pair<std::string, std::string>> sources();
 
  private:
-  // As in the shaders.
-  struct Cell {
-    float center[3];
-    float half_side;
-    std::uint32_t first_pair, list, exists, ids_up_to;
-  };
-  struct Range {
-    const DeviceMesh* mesh;
-    std::uint32_t cell_begin, cell_end, pair_begin, pair_end;
-  };
   enum Pass { kMasks, kDecide, kPlace, kFill, kNormals, kSlabs, kPack, kPasses };
+  static_assert(kPasses == layout::kPassCount);
 
   /// A program and where its uniforms are; -1 for those that it does not have.
   struct Step {
     std::unique_ptr<Program> program;
-    GLint pairs, cells, cell_count, list_capacity, id_capacity;
+    GLint pairs, cell_count, list_capacity, id_capacity, batch;
   };
 
   void reserve(Buffer& buffer, std::size_t words) const;
-  void upload(const std::vector<ExpansionRequest*>& requests);
-  void dispatch(Pass pass, std::uint64_t invocations) const;
-  void dispatchPairs(Pass pass) const;
-  void placeAndFill();
-  void readBack(const std::vector<ExpansionRequest*>& requests);
+  void describe(const std::vector<ExpansionRequest*>& requests);
+  void upload();
+  void clearAnswers();
+  void run(Pass pass, std::uint64_t invocations);
+  void fill();
+  const std::uint32_t* read(std::size_t first, std::size_t end, Thread& thread);
+  static void require(bool holds, const char* what, Thread& thread);
+  void checkHeader(const std::uint32_t* answers, Thread& thread) const;
+  void take(const std::vector<ExpansionRequest*>& requests, const std::uint32_t* answers, Thread& thread) const;
+  void findCost(std::chrono::duration<double> all);
 
   const Limits limits_;
   Arena& arena_;
   std::vector<Step> steps_;
   Buffer cells_, states_, masks_, answers_;
-  std::vector<Cell> rows_;
-  std::vector<Range> ranges_;
-  std::vector<std::uint32_t> words_;  // of the answer
+  Staging staging_;
+  GLuint meshes_ = 0;  // the buffer that has all meshes
+  std::uint32_t batch_ = 0;
+  std::vector<layout::Cell> rows_;
+  std::vector<std::uint32_t> ids_;   // of lists that are uploaded
+  std::vector<std::uint32_t> sums_;  // of each cell's ids, as layout::kIds; 0 where the host does not know them
+  std::vector<bool> is_uploaded_;    // each cell's list
   std::shared_ptr<Arena::Range> uploaded_, placed_;
-  std::uint64_t list_capacity_ = 0, id_capacity_ = 0;
+  std::uint64_t pairs_ = 0, list_capacity_ = 0, id_capacity_ = 0;
+  std::array<std::uint32_t, kPasses> groups_{};  // that are to run, since answers_ was cleared
+  bool is_timed_ = false;
   Queries times_;
   Oracle::Cost cost_;
 };

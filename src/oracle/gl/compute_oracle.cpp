@@ -2,7 +2,6 @@
 #include "oracle/gl/compute_oracle.h"
 
 #include <algorithm>
-#include <functional>
 #include <utility>
 
 namespace bocst::oracle::gl {
@@ -10,16 +9,21 @@ namespace {
 
 const DeviceMesh* meshOf(const ExpansionRequest& e) { return static_cast<const DeviceMesh*>(e.surface->device.get()); }
 
+ComputeChain::Limits complete(ComputeChain::Limits limits, Thread& thread) {
+  if (limits.bytes == 0) {
+    GLint64 bytes = 0;
+    thread.run([&] { glGetInteger64v(GL_MAX_SHADER_STORAGE_BLOCK_SIZE, &bytes); });
+    limits.bytes = static_cast<std::size_t>(bytes);
+  }
+  return limits;
+}
+
 }  // namespace
 
-ComputeOracle::ComputeOracle(std::shared_ptr<Thread> thread, ComputeChain::Limits limits)
-    : DeviceOracle(std::move(thread), true) {
+ComputeOracle::ComputeOracle(const std::shared_ptr<Thread>& thread, ComputeChain::Limits limits)
+    : DeviceOracle(thread, true, complete(limits, *thread).bytes) {
+  limits = complete(limits, *thread_);
   thread_->run([&] {
-    if (limits.bytes == 0) {
-      GLint64 bytes = 0;
-      glGetInteger64v(GL_MAX_SHADER_STORAGE_BLOCK_SIZE, &bytes);
-      limits.bytes = static_cast<std::size_t>(bytes);
-    }
     arena_ = std::make_shared<Arena>(thread_, limits.bytes);
     chain_ = std::make_unique<ComputeChain>(limits, *arena_);
   });
@@ -31,22 +35,19 @@ ComputeOracle::~ComputeOracle() {
 }
 
 void ComputeOracle::answer(const std::vector<ExpansionRequest*>& requests, std::vector<Verdict>& verdicts) {
-  // Questions about one mesh follow each other.
   std::vector<std::size_t> order;
+  std::vector<ExpansionRequest*> asked;
   for (std::size_t i = 0; i < requests.size(); ++i) {
     const ExpansionRequest& e = *requests[i];
-    if (!e.own_only && meshOf(e) != nullptr && chain_->fits(e)) order.push_back(i);
+    if (e.own_only || meshOf(e) == nullptr || !chain_->fits(e)) continue;
+    order.push_back(i);
+    asked.push_back(requests[i]);
   }
-  std::stable_sort(order.begin(), order.end(), [&](std::size_t a, std::size_t b) {
-    return std::less<const DeviceMesh*>()(meshOf(*requests[a]), meshOf(*requests[b]));
-  });
-  std::vector<ExpansionRequest*> sorted;
-  for (const std::size_t i : order) sorted.push_back(requests[i]);
-  for (std::size_t first = 0; first < sorted.size();) {
-    const std::size_t count = chain_->part(sorted, first);
+  for (std::size_t first = 0; first < asked.size();) {
+    const std::size_t count = chain_->part(asked, first);
     try {
-      chain_->answer({sorted.begin() + static_cast<std::ptrdiff_t>(first),
-                      sorted.begin() + static_cast<std::ptrdiff_t>(first + count)},
+      chain_->answer({asked.begin() + static_cast<std::ptrdiff_t>(first),
+                      asked.begin() + static_cast<std::ptrdiff_t>(first + count)},
                      *thread_);
       for (std::size_t i = first; i < first + count; ++i) verdicts[order[i]].kind = Verdict::Kind::kAnswer;
     } catch (const std::exception& e) {

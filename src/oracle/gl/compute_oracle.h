@@ -17,7 +17,7 @@ namespace bocst::oracle::gl {
 class ComputeOracle : public DeviceOracle {
  public:
   /// @throws OracleError when a shader does not compile or the driver allows less than the chain needs.
-  explicit ComputeOracle(std::shared_ptr<Thread> thread, ComputeChain::Limits limits = {});
+  explicit ComputeOracle(const std::shared_ptr<Thread>& thread, ComputeChain::Limits limits = {});
   ~ComputeOracle() override;
 
   OracleKind kind() const override { return OracleKind::kCompute; }

@@ -2,43 +2,44 @@
 #include "oracle/gl/device_mesh.h"
 
 #include <algorithm>
+#include <cstring>
 #include <utility>
 
 namespace bocst::oracle::gl {
 
-DeviceMesh::DeviceMesh(std::shared_ptr<Thread> thread, const Surface& surface, bool exact)
-    : thread_(std::move(thread)), triangle_count_(surface.mesh->triangleCount()) {
+DeviceMesh::DeviceMesh(Thread& thread, std::shared_ptr<Arena> arena, const Surface& surface, bool exact)
+    : arena_(std::move(arena)), triangle_count_(surface.mesh->triangleCount()) {
+  const std::vector<Mesh::Indices>& triangles = surface.mesh->triangles();
   const std::vector<Eigen::Vector3d>& from = surface.mesh->vertices();
-  std::vector<float> parts(6 * from.size());
-  std::vector<double> whole(exact ? 3 * from.size() : 0);
+  const std::size_t vertices = 3 * triangles.size(), doubles = vertices + 6 * from.size();
+  std::vector<std::uint32_t> words(doubles + (exact ? 6 * from.size() : 0));
+  std::memcpy(words.data(), triangles.data(), triangles.size() * sizeof(triangles[0]));
   for (std::size_t i = 0; i < from.size(); ++i) {
     const Eigen::Vector3d p = surface.lattice.toLattice(from[i]);
     for (std::size_t k = 0; k < 3; ++k) {
       const double x = p[static_cast<Eigen::Index>(k)];
-      const auto high = static_cast<float>(x);
-      parts[6 * i + k] = high;
-      parts[6 * i + 3 + k] = static_cast<float>(x - static_cast<double>(high));
-      if (exact) whole[3 * i + k] = x;
+      const auto high = static_cast<float>(x), low = static_cast<float>(x - static_cast<double>(high));
+      std::memcpy(&words[vertices + 6 * i + k], &high, sizeof(high));
+      std::memcpy(&words[vertices + 6 * i + 3 + k], &low, sizeof(low));
+      if (exact) std::memcpy(&words[doubles + 6 * i + 2 * k], &x, sizeof(x));
     }
   }
-  const std::vector<Mesh::Indices>& triangles = surface.mesh->triangles();
-  try {
-    thread_->run([&] {
-      buffers_ = std::make_unique<Buffers>();
-      buffers_->vertices = Buffer(parts.size() * sizeof(float), parts.data());
-      buffers_->indices = Buffer(triangles.size() * sizeof(triangles[0]), triangles.data());
-      if (exact) buffers_->exact = Buffer(whole.size() * sizeof(double), whole.data());
-    });
-  } catch (...) {
-    if (buffers_ != nullptr) thread_->post([b = buffers_.release()] { delete b; });
-    throw;
-  }
-  bytes_ = buffers_->vertices.bytes() + buffers_->indices.bytes() + buffers_->exact.bytes();
+  thread.run([&] {
+    words_ = arena_->take(words.size());
+    const std::size_t at = words_->begin() * sizeof(words[0]), bytes = words.size() * sizeof(words[0]);
+    arena_->buffer().write(at, bytes, words.data());
+    if (!arena_->buffer().holds(at, bytes, words.data())) {
+      thread.distrust("a mesh did not arrive");
+      throw OracleError("the GPU context is lost");
+    }
+  });
+  vertices_ = words_->begin() + static_cast<std::uint32_t>(vertices);
+  exact_ = words_->begin() + static_cast<std::uint32_t>(doubles);
 }
 
-DeviceMesh::~DeviceMesh() {
-  // OpenGL names end in the thread of their context; with a context that is lost they are gone already.
-  thread_->post([b = buffers_.release()] { delete b; });
+DeviceMeshes::DeviceMeshes(std::shared_ptr<Thread> thread, bool exact, std::size_t most_bytes)
+    : thread_(std::move(thread)), exact_(exact) {
+  thread_->run([&] { arena_ = std::make_shared<Arena>(thread_, most_bytes); });
 }
 
 std::shared_ptr<DeviceMesh> DeviceMeshes::makeResident(const Surface& surface) {
@@ -50,7 +51,7 @@ std::shared_ptr<DeviceMesh> DeviceMeshes::makeResident(const Surface& surface) {
     if (e.mesh.lock() != surface.mesh || !(e.lattice == surface.lattice)) continue;
     if (std::shared_ptr<DeviceMesh> device = e.device.lock()) return device;
   }
-  auto device = std::make_shared<DeviceMesh>(thread_, surface, exact_);
+  auto device = std::make_shared<DeviceMesh>(*thread_, arena_, surface, exact_);
   entries_.push_back({surface.mesh, surface.lattice, device});
   return device;
 }

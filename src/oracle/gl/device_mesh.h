@@ -2,48 +2,51 @@
 #pragma once
 
 #include <cstddef>
+#include <cstdint>
 #include <memory>
 #include <mutex>
 #include <vector>
 
 #include "egl/handles.h"
+#include "oracle/gl/arena.h"
 #include "oracle/gl/thread.h"
 #include "oracle/oracle.h"
 
 namespace bocst::oracle::gl {
 
-/// A surface in device memory: its triangles, and its vertices in lattice units. Models of one mesh and one lattice
-/// share it. 12 bytes a triangle and 24 a vertex, with `exact` 48.
+/// A surface in device memory: its triangles, and its vertices in lattice units, in one arena with all others, so that
+/// nothing is bound anew from mesh to mesh. Models of one mesh and one lattice share it. 12 bytes a triangle and 24 a
+/// vertex, with `exact` 48.
 class DeviceMesh : public DeviceResource {
  public:
   /// Uploads; from any thread but that of the context. exact: also the vertices in double.
   /// @throws OracleError when there is no room.
-  DeviceMesh(std::shared_ptr<Thread> thread, const Surface& surface, bool exact);
-  ~DeviceMesh() override;
+  DeviceMesh(Thread& thread, std::shared_ptr<Arena> arena, const Surface& surface, bool exact);
 
-  std::size_t bytes() const override { return bytes_; }
+  std::size_t bytes() const override { return words_->bytes(); }
   std::size_t triangleCount() const { return triangle_count_; }
 
-  /// In the thread of the context.
-  const Buffer& vertices() const { return buffers_->vertices; }  ///< Six floats each: three high parts, three low.
-  const Buffer& indices() const { return buffers_->indices; }
-  const Buffer& exact() const { return buffers_->exact; }
+  /// In the thread of the context. The name changes when the arena grows.
+  const Buffer& buffer() const { return arena_->buffer(); }
+  /// Words of the buffer: three vertex numbers a triangle; six floats a vertex, three high parts and three low; three
+  /// doubles a vertex.
+  std::uint32_t indices() const { return words_->begin(); }
+  std::uint32_t vertices() const { return vertices_; }
+  std::uint32_t exact() const { return exact_; }
 
  private:
-  struct Buffers {
-    Buffer vertices, indices, exact;
-  };
-
-  std::shared_ptr<Thread> thread_;
-  std::unique_ptr<Buffers> buffers_;
-  std::size_t triangle_count_ = 0, bytes_ = 0;
+  std::shared_ptr<Arena> arena_;
+  std::shared_ptr<const Arena::Range> words_;
+  std::size_t triangle_count_ = 0;
+  std::uint32_t vertices_ = 0, exact_ = 0;
 };
 
 /// The device meshes of one context, found again by mesh and lattice as long as somebody holds them.
 /// Thread-safe.
 class DeviceMeshes {
  public:
-  DeviceMeshes(std::shared_ptr<Thread> thread, bool exact) : thread_(std::move(thread)), exact_(exact) {}
+  /// They take at most so many bytes together. @throws OracleError when the context is lost.
+  DeviceMeshes(std::shared_ptr<Thread> thread, bool exact, std::size_t most_bytes);
 
   /// @throws OracleError
   std::shared_ptr<DeviceMesh> makeResident(const Surface& surface);
@@ -56,6 +59,7 @@ class DeviceMeshes {
   };
 
   std::shared_ptr<Thread> thread_;
+  std::shared_ptr<Arena> arena_;
   const bool exact_;
   std::mutex mutex_;
   std::vector<Entry> entries_;

@@ -15,19 +15,35 @@ void DeviceOracle::submit(std::vector<ExpansionRequest>& batch) {
   const std::lock_guard<std::mutex> lock(mutex_);
   tickets_.push_back({&batch});
   if (flush_is_due_) return;
-  flush_is_due_ = true;
-  thread_->post([this] { flush(); });
+  try {
+    thread_->post([this] { flush(); });
+    flush_is_due_ = true;
+  } catch (...) {
+    tickets_.pop_back();  // nobody would come to answer it
+    throw;
+  }
 }
 
 void DeviceOracle::flush() {
   std::vector<Ticket*> taken;
+  try {
+    answerAll(taken);
+  } catch (const std::exception& e) {
+    reportFailure("a batch", e);  // no memory
+  }
+  // Whatever went wrong, who waits is told; what has no verdict is the CPU's.
+  const std::lock_guard<std::mutex> lock(mutex_);
+  for (Ticket& t : tickets_) t.done = t.done || t.taken;
+  answered_.notify_all();
+}
+
+void DeviceOracle::answerAll(std::vector<Ticket*>& taken) {
   {
     const std::lock_guard<std::mutex> lock(mutex_);
     flush_is_due_ = false;
+    for (Ticket& t : tickets_) t.taken = true;
     for (Ticket& t : tickets_) {
-      if (t.taken) continue;
-      t.taken = true;
-      taken.push_back(&t);
+      if (!t.done) taken.push_back(&t);
     }
   }
   std::vector<ExpansionRequest*> requests;
@@ -41,10 +57,8 @@ void DeviceOracle::flush() {
   for (Ticket* t : taken) {
     const auto end = next + static_cast<std::ptrdiff_t>(t->batch->size());
     t->verdicts.assign(next, end);
-    t->done = true;
     next = end;
   }
-  answered_.notify_all();
 }
 
 void DeviceOracle::wait(std::vector<ExpansionRequest>& batch) {

@@ -38,7 +38,9 @@ class DeviceOracle : public Oracle {
   };
 
   /// exact: device meshes have their vertices in double, too.
-  DeviceOracle(std::shared_ptr<Thread> thread, bool exact) : thread_(std::move(thread)), meshes_(thread_, exact) {}
+  /// Meshes take at most so many bytes of the device together.
+  DeviceOracle(std::shared_ptr<Thread> thread, bool exact, std::size_t mesh_bytes)
+      : thread_(std::move(thread)), meshes_(thread_, exact, mesh_bytes) {}
 
   /// Ends what is still going on; derived classes do so before anything else goes.
   void finish();
@@ -55,11 +57,12 @@ class DeviceOracle : public Oracle {
  private:
   struct Ticket {
     std::vector<ExpansionRequest>* batch;
-    bool taken = false, done = false;
+    bool taken = false, done = false;  // done: no thread but that which waits has to do with it
     std::vector<Verdict> verdicts = {};
   };
 
   void flush();
+  void answerAll(std::vector<Ticket*>& taken);
 
   DeviceMeshes meshes_;
   std::atomic<std::uint64_t> left_to_cpu_{0};

@@ -5,14 +5,18 @@
 
 #include <algorithm>
 #include <atomic>
+#include <chrono>
+#include <cmath>
 #include <iterator>
 #include <map>
 #include <mutex>
 #include <tuple>
 #include <utility>
 
+#include "log/log.h"
 #include "oracle/gl/compute_oracle.h"
 #include "oracle/gl/occlusion_oracle.h"
+#include "oracle/gl/self_test.h"
 #include "oracle/gl/thread.h"
 
 namespace bocst::oracle::gl {
@@ -48,43 +52,47 @@ class Registry {
 
   std::shared_ptr<Oracle> oracle(OracleKind kind, int device, int viewport) {
     const std::lock_guard<std::mutex> lock(mutex_);
-    std::shared_ptr<DeviceOracle>& known = oracles_[{kind, device, kind == OracleKind::kSampled ? viewport : 0}];
-    if (known != nullptr && !known->thread().isLost()) return known;
-    if (kind == OracleKind::kCompute) {
-      known = std::make_shared<ComputeOracle>(thread(device, 4));
-    } else {
-      const auto form =
-          kind == OracleKind::kSampled ? OcclusionOracle::Form::kSampled : OcclusionOracle::Form::kConservative;
-      known = std::make_shared<OcclusionOracle>(thread(device, 3), form, viewport);
+    if (device != ContextRequest::kAnyDevice) return on(kind, device, viewport);
+    const std::vector<int> devices = devicesInOrder();
+    if (devices.empty()) throw OracleError("EGL knows no device");
+    std::string why_not;
+    for (const int candidate : devices) {
+      try {
+        return on(kind, candidate, viewport);
+      } catch (const OracleError& e) {
+        why_not += (why_not.empty() ? "" : "; ") + std::string(e.what());
+      }
     }
-    return known;
+    throw OracleError(why_not);
   }
 
   std::shared_ptr<Oracle> onHardware() {
-    {
-      const std::lock_guard<std::mutex> lock(mutex_);
-      if (no_hardware_) return nullptr;
-      try {
-        no_hardware_ = !thread(ContextRequest::kAnyDevice, 4)->info().hardware;
-      } catch (const OracleError&) {
-        no_hardware_ = true;
+    const std::lock_guard<std::mutex> lock(mutex_);
+    if (no_hardware_) return nullptr;
+    try {
+      for (const int device : devicesInOrder()) {
+        const std::shared_ptr<Oracle> known = tryHardware(device);
+        if (known != nullptr) return known;
       }
-      if (no_hardware_) {
-        threads_.erase({ContextRequest::kAnyDevice, 4});
-        return nullptr;
-      }
+    } catch (const OracleError&) {
+      // No EGL.
     }
-    return oracle(OracleKind::kCompute, ContextRequest::kAnyDevice, 0);
+    no_hardware_ = true;
+    return nullptr;
   }
 
   const std::vector<DeviceReport>& reports() {
     const std::lock_guard<std::mutex> lock(mutex_);
     if (reports_.empty()) {
-      const int count = deviceCount();
-      for (int device = 0; device < std::max(count, 1); ++device) {
-        reports_.push_back(report(count > 0 ? device : ContextRequest::kAnyDevice));
+      std::vector<int> devices;
+      try {
+        devices = devicesInOrder();
+      } catch (const OracleError&) {
+        // The report of no device says why.
       }
-      // As Context chooses: hardware before software.
+      if (devices.empty()) devices.push_back(ContextRequest::kAnyDevice);
+      for (const int device : devices) reports_.push_back(report(device));
+      // What turned out to be software comes last.
       std::stable_sort(reports_.begin(), reports_.end(),
                        [](const DeviceReport& a, const DeviceReport& b) { return a.hardware && !b.hardware; });
     }
@@ -92,7 +100,77 @@ class Registry {
   }
 
  private:
+  using Key = std::tuple<OracleKind, int, int>;  // kind, device, viewport
+
   Registry() : process_(getpid()) {}
+
+  /// On one device, which has passed its test.
+  std::shared_ptr<DeviceOracle> on(OracleKind kind, int device, int viewport) {
+    const Key key{kind, device, kind == OracleKind::kSampled ? viewport : 0};
+    std::shared_ptr<DeviceOracle>& known = oracles_[key];
+    if (known != nullptr && known->thread().isDistrusted()) refused_[key] = "the device answered wrongly before";
+    const auto refused = refused_.find(key);
+    if (refused != refused_.end()) throw OracleError(refused->second);
+    if (known != nullptr && !known->thread().isLost()) return known;
+    known = nullptr;
+    const Tested tested = makeTested(kind, thread(device, kind == OracleKind::kCompute ? 4 : 3), viewport);
+    if (!tested.why_not.empty()) {
+      refused_[key] = tested.why_not;
+      throw OracleError(tested.why_not);
+    }
+    return known = tested.oracle;
+  }
+
+  /// Null for a device that is no hardware, or that is refused, which is reported.
+  std::shared_ptr<Oracle> tryHardware(int device) {
+    try {
+      const std::shared_ptr<Thread> its_thread = thread(device, 4);
+      if (its_thread->info().hardware) return on(OracleKind::kCompute, device, 0);
+      threads_.erase({device, its_thread->info().computes ? 4 : 3});
+    } catch (const OracleError& e) {
+      log(LogLevel::kWarning, std::string("a device is not used: ") + e.what());
+    }
+    return nullptr;
+  }
+
+  struct Tested {
+    std::shared_ptr<DeviceOracle> oracle;
+    std::string why_not;  // empty: it passed
+    double milliseconds = 0;
+  };
+
+  /// @throws OracleError where there is not even an oracle to test.
+  static Tested makeTested(OracleKind kind, const std::shared_ptr<Thread>& thread, int viewport) {
+    Tested tested;
+    std::string wrong;
+    const auto test = [&](auto& oracle) {
+      const auto begin = std::chrono::steady_clock::now();
+      wrong = selfTest(oracle);
+      tested.milliseconds = std::chrono::duration<double, std::milli>(std::chrono::steady_clock::now() - begin).count();
+    };
+    try {
+      if (kind == OracleKind::kCompute) {
+        const auto oracle = std::make_shared<ComputeOracle>(thread);
+        tested.oracle = oracle;
+        test(*oracle);
+      } else {
+        // The sampled form loses surface by its nature.
+        const bool is_sampled = kind == OracleKind::kSampled;
+        const auto form = is_sampled ? OcclusionOracle::Form::kSampled : OcclusionOracle::Form::kConservative;
+        const auto oracle = std::make_shared<OcclusionOracle>(thread, form, viewport);
+        tested.oracle = oracle;
+        if (!is_sampled) test(*oracle);
+      }
+    } catch (const OracleError& e) {
+      if (tested.oracle == nullptr) throw;
+      wrong = e.what();
+    }
+    if (!wrong.empty()) {
+      tested.why_not = "device " + std::to_string(thread->info().device) + ", " + thread->info().renderer +
+                       ", failed its self-test: " + wrong;
+    }
+    return tested;
+  }
 
   /// A context of at least that OpenGL: 4.3, or 3.3, for which one of 4.3 does, too.
   std::shared_ptr<Thread> thread(int device, int major) {
@@ -120,26 +198,31 @@ class Registry {
   static DeviceReport report(int device) {
     DeviceReport r;
     r.device = device;
-    const auto attempt = [&](int major) -> std::string {
+    const auto attempt = [&](OracleKind kind, int major, std::string& self_test) -> std::string {
       try {
-        const ContextInfo info = newThread(device, major)->info();  // for a moment: it takes memory of the device
+        const std::shared_ptr<Thread> its_thread = newThread(device, major);  // for a moment: it takes memory
+        const ContextInfo& info = its_thread->info();
         r.device = info.device;
         r.description = std::to_string(info.device) + ": " + info.renderer + ", OpenGL " + info.version;
         r.hardware = info.hardware;
+        const Tested tested = makeTested(kind, its_thread, PaperOptions{}.viewport);
+        if (!tested.why_not.empty()) return tested.why_not;
+        self_test = "passed in " + std::to_string(std::lround(tested.milliseconds)) + " ms";
         return "";
       } catch (const OracleError& e) {
         return e.what();
       }
     };
-    r.why_no_compute = attempt(4);
-    if (!r.why_no_compute.empty()) r.why_no_occlusion = attempt(3);
+    r.why_no_compute = attempt(OracleKind::kCompute, 4, r.compute_test);
+    r.why_no_occlusion = attempt(OracleKind::kOcclusion, 3, r.occlusion_test);
     return r;
   }
 
   const pid_t process_;
   std::mutex mutex_;
   std::map<std::pair<int, int>, std::shared_ptr<Thread>> threads_;
-  std::map<std::tuple<OracleKind, int, int>, std::shared_ptr<DeviceOracle>> oracles_;
+  std::map<Key, std::shared_ptr<DeviceOracle>> oracles_;
+  std::map<Key, std::string> refused_;  // and why
   std::vector<DeviceReport> reports_;
   bool no_hardware_ = false;
 };

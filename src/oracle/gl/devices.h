@@ -13,21 +13,22 @@
 namespace bocst::oracle::gl {
 
 /// What each EGL device offers, the one that is taken by default first. One entry without a device that says why not if
-/// there is none. Asked once a process.
+/// there is none. Each is tested (self_test.h). Asked once a process.
 struct DeviceReport {
   int device = 0;
   std::string description;  ///< Index, renderer and version, for people.
   bool hardware = false;
   std::string why_no_compute, why_no_occlusion;  ///< Empty when it can be used.
+  std::string compute_test, occlusion_test;      ///< What the self-test said of it then.
 };
 const std::vector<DeviceReport>& deviceReports();
 
-/// What kAuto takes: compute on a hardware GPU; null without. The first call takes what the driver needs to start, if
-/// there is a GPU.
+/// What kAuto takes: compute on the first hardware GPU that passes its self-test; null without. The first call takes
+/// what the driver and the test need, if there is a GPU.
 std::shared_ptr<Oracle> makeOracleOnHardware();
 
-/// The oracle of this kind on a device, shared by all who ask as long as its context is not lost.
-/// @throws OracleError that says why it cannot be had.
+/// The oracle of this kind on a device, shared by all who ask as long as its context is not lost; without a device, on
+/// the first that passes its self-test. @throws OracleError that says why it cannot be had.
 std::shared_ptr<Oracle> makeOracle(OracleKind kind, int device, int viewport);
 
 }  // namespace bocst::oracle::gl

@@ -3,6 +3,7 @@
 
 #include <cstddef>
 #include <cstdint>
+#include <cstring>
 #include <string>
 
 #include "bounds/node_bounds.h"
@@ -19,7 +20,8 @@ constexpr std::uint32_t kGrey = 0;              ///< Octants that a triangle sur
 constexpr std::uint32_t kLoose = 1;             ///< Octants with a part that only its box bounds: no slab.
 constexpr std::uint32_t kCounts = 2;            ///< 8: lengths of the octants' lists.
 constexpr std::uint32_t kNext = kCounts + 8;    ///< 8: where the next triangle of each list goes.
-constexpr std::uint32_t kOctants = kNext + 8;   ///< 8 times kOctantWords.
+constexpr std::uint32_t kIds = kNext + 8;       ///< Sum of the numbers of its triangles, each plus one.
+constexpr std::uint32_t kOctants = kIds + 1;    ///< 8 times kOctantWords.
 constexpr std::uint32_t kBox = 0;               ///< 3 times kBoxSteps - lo, 3 times hi, in steps of the octant's box.
 constexpr std::uint32_t kTensor = kBox + 6;     ///< Sum of area * normal * normal^T: xx yy zz xy yz zx, as fixed point.
 constexpr std::uint32_t kNormal = kTensor + 6;  ///< The slab's, in bytes.
@@ -53,12 +55,41 @@ constexpr std::uint32_t kGreyBytes = offsetof(CellAnswer, grey);
 // The answer, in words: a header, a row per cell, then the ids of lists that the host wants.
 constexpr std::uint32_t kListWords = 0;  ///< Header: words taken from the room for lists.
 constexpr std::uint32_t kIdWords = 1;    ///< Header: words taken from the room for ids.
-constexpr std::uint32_t kHeader = 2;
+constexpr std::uint32_t kFailed = 2;     ///< Header: bits of what a pass found undone by those before it, see below.
+constexpr std::uint32_t kGroups = 3;     ///< Header: the work groups that ran, of each pass.
+constexpr std::uint32_t kPassCount = 7;
+constexpr std::uint32_t kHeader = kGroups + kPassCount;
 constexpr std::uint32_t kBoundsWords = sizeof(CellAnswer) / 4;  ///< At the beginning of a row.
 constexpr std::uint32_t kRowSizes = kBoundsWords;               ///< 8: lengths of the octants' lists.
 constexpr std::uint32_t kRowList = kRowSizes + 8;               ///< Where octant 0's list begins; the others follow.
 constexpr std::uint32_t kRowIds = kRowList + 1;                 ///< Where the ids begin, likewise.
-constexpr std::uint32_t kRow = kRowIds + 1;
+constexpr std::uint32_t kRowSum = kRowIds + 1;                  ///< As kIds.
+constexpr std::uint32_t kRowCheck = kRowSum + 1;                ///< Of the cell and the batch, see check().
+constexpr std::uint32_t kRow = kRowCheck + 1;
+
+// What a driver leaves out must not be read as "white". So each pass counts its work groups; each word of masks has the
+// number of its batch, so that who reads it sees whether it was written; a list that is not full is seen when it is
+// packed; rows say which cell and batch they answer; and the batch's number stands behind the last id.
+constexpr std::uint32_t kMasksFailed = 1, kListsFailed = 2;  ///< In kFailed.
+constexpr std::uint32_t kMostBatches = 1u << 24;             ///< Batches have numbers below that.
+
+/// A cell to expand, as the shaders see it.
+struct Cell {
+  float center[3];  ///< Lattice units.
+  float half_side;
+  std::uint32_t first_pair, list, exists, ids_up_to;
+  std::uint32_t indices, vertices, exact;  ///< Where its mesh begins, see DeviceMesh.
+  std::uint32_t batch;
+};
+static_assert(sizeof(Cell) == 48, "std430 pads to 16 bytes");
+/// What answers say of a cell that they belong to; common.glsl has the same.
+constexpr std::uint32_t kCheckFactor = 0x9e3779b1u;
+inline std::uint32_t check(const Cell& cell) {
+  std::uint32_t words[sizeof(Cell) / 4], sum = 0;
+  std::memcpy(words, &cell, sizeof(cell));
+  for (const std::uint32_t word : words) sum = sum * kCheckFactor + word;
+  return sum;
+}
 
 /// All of these as constants of the shaders' language.
 std::string constants();

@@ -3,6 +3,7 @@
 
 #include <algorithm>
 #include <atomic>
+#include <limits>
 #include <utility>
 
 #include "oracle/gl/shaders.h"
@@ -13,23 +14,28 @@ namespace {
 constexpr std::size_t kMostQueries = 16384;                 // on their way at once
 constexpr std::size_t kMostIndices = std::size_t{3} << 24;  // of one upload
 
-Program programFor(OcclusionOracle::Form form) {
-  const auto text = [](const char* name) { return "#version 330 core\n" + shader(name); };
+}  // namespace
+
+std::vector<Program::Stage> OcclusionOracle::sources(Form form) {
+  // GLSL 3.30 has `precise` by an extension.
+  const auto text = [](const char* name) {
+    return "#version 330 core\n#extension GL_ARB_gpu_shader5 : enable\n#ifdef GL_ARB_gpu_shader5\n#define PRECISE "
+           "precise\n#else\n#define PRECISE\n#endif\n" +
+           shader(name);
+  };
   std::vector<Program::Stage> stages = {{GL_VERTEX_SHADER, text("occlusion_vertex")},
                                         {GL_FRAGMENT_SHADER, text("occlusion_fragment")}};
-  if (form == OcclusionOracle::Form::kConservative) {
-    stages.push_back({GL_GEOMETRY_SHADER, text("occlusion_geometry")});
-  }
-  return Program(stages);
+  if (form == Form::kConservative) stages.push_back({GL_GEOMETRY_SHADER, text("occlusion_geometry")});
+  return stages;
 }
-
-}  // namespace
 
 /// The OpenGL objects of an occlusion oracle. In the thread of the context.
 class OcclusionQueries {
  public:
   OcclusionQueries(OcclusionOracle::Form form, int viewport, std::atomic<std::uint64_t>& asked)
-      : asked_(asked), views_(form == OcclusionOracle::Form::kSampled ? 3 : 1), program_(programFor(form)) {
+      : asked_(asked),
+        views_(form == OcclusionOracle::Form::kSampled ? 3 : 1),
+        program_(OcclusionOracle::sources(form)) {
     center_ = program_.uniform("u_center");
     inverse_half_ = program_.uniform("u_inverse_half");
     axis_ = program_.uniform("u_axis");
@@ -60,7 +66,7 @@ class OcclusionQueries {
     for (std::size_t first = 0; first < requests.size();) {
       const std::size_t end = part(requests, first);
       uploadLists(requests, first, end);
-      for (GLint axis = 0; axis < views_; ++axis) askView(requests, first, end, axis, candidates);
+      for (GLint axis = 0; axis < views_; ++axis) askView(requests, first, end, axis, candidates, thread);
       first = end;
     }
     glColorMask(GL_TRUE, GL_TRUE, GL_TRUE, GL_TRUE);
@@ -101,18 +107,20 @@ class OcclusionQueries {
     lists_.write(0, indices.size() * sizeof(std::uint32_t), indices.data());
   }
 
+  static const void* at(std::size_t words) { return reinterpret_cast<const void*>(words * sizeof(std::uint32_t)); }
+
   void bind(const DeviceMesh& mesh) const {
-    glBindBuffer(GL_ARRAY_BUFFER, mesh.vertices().name());
+    glBindBuffer(GL_ARRAY_BUFFER, mesh.buffer().name());
     constexpr GLsizei stride = 6 * sizeof(float);
     for (GLuint i = 0; i < 2; ++i) {
       glEnableVertexAttribArray(i);
-      glVertexAttribPointer(i, 3, GL_FLOAT, GL_FALSE, stride, reinterpret_cast<const void*>(i * stride / 2));
+      glVertexAttribPointer(i, 3, GL_FLOAT, GL_FALSE, stride, at(mesh.vertices() + 3 * i));
     }
   }
 
   // Asks for all octants that no view has shown so far, then reads what it learned.
   void askView(const std::vector<ExpansionRequest*>& requests, std::size_t first, std::size_t end, GLint axis,
-               std::vector<std::uint8_t>& candidates) {
+               std::vector<std::uint8_t>& candidates, Thread& thread) {
     struct Asked {
       std::size_t request;
       int octant;
@@ -123,8 +131,8 @@ class OcclusionQueries {
     for (std::size_t i = first; i < end; ++i) {
       const ExpansionRequest& e = *requests[i];
       if (&meshOf(e) != bound) bind(*(bound = &meshOf(e)));
-      glBindBuffer(GL_ELEMENT_ARRAY_BUFFER, e.ids == nullptr ? meshOf(e).indices().name() : lists_.name());
-      const auto* begin = reinterpret_cast<const void*>(begins_[i - first] * sizeof(std::uint32_t));
+      glBindBuffer(GL_ELEMENT_ARRAY_BUFFER, e.ids == nullptr ? meshOf(e).buffer().name() : lists_.name());
+      const void* const begin = at(e.ids == nullptr ? meshOf(e).indices() : begins_[i - first]);
       for (int o = 0; o < 8; ++o) {
         const lattice::Cell octant = e.cell.octant(o);
         if ((candidates[i] >> o & 1) != 0 || !e.surface->lattice.exists(octant)) continue;
@@ -135,13 +143,13 @@ class OcclusionQueries {
         glUniform1f(inverse_half_, 1 / half);
         queries_.reserve(asked.size() + 1);
         glBeginQuery(GL_ANY_SAMPLES_PASSED, queries_[asked.size()]);
-        glDrawElements(GL_TRIANGLES, static_cast<GLsizei>(3 * e.count), GL_UNSIGNED_INT,
-                       e.ids == nullptr ? nullptr : begin);
+        glDrawElements(GL_TRIANGLES, static_cast<GLsizei>(3 * e.count), GL_UNSIGNED_INT, begin);
         glEndQuery(GL_ANY_SAMPLES_PASSED);
         asked.push_back({i, o});
       }
     }
     asked_ += asked.size();
+    thread.awaitDevice();
     for (std::size_t q = 0; q < asked.size(); ++q) {
       GLuint seen = 0;
       glGetQueryObjectuiv(queries_[q], GL_QUERY_RESULT, &seen);
@@ -163,7 +171,7 @@ class OcclusionQueries {
 };
 
 OcclusionOracle::OcclusionOracle(std::shared_ptr<Thread> thread, Form form, int viewport)
-    : DeviceOracle(std::move(thread), false), form_(form) {
+    : DeviceOracle(std::move(thread), false, std::numeric_limits<std::int32_t>::max()), form_(form) {
   thread_->run([&] { queries_ = std::make_unique<OcclusionQueries>(form, viewport, asked_); });
 }
 
@@ -195,7 +203,11 @@ void OcclusionOracle::answer(const std::vector<ExpansionRequest*>& requests, std
     reportFailure("a batch", e);
     return;  // without candidates the CPU tests all octants
   }
-  for (std::size_t i = 0; i < order.size(); ++i) verdicts[order[i]] = {Verdict::Kind::kCandidates, candidates[i]};
+  for (std::size_t i = 0; i < order.size(); ++i) {
+    // The triangles should meet the cell, so an octant should be seen: else the CPU looks at all of them.
+    const bool is_doubtful = form_ == Form::kConservative && candidates[i] == 0 && asked[i]->count > 0;
+    verdicts[order[i]] = {Verdict::Kind::kCandidates, is_doubtful ? std::uint8_t{0xff} : candidates[i]};
+  }
 }
 
 }  // namespace bocst::oracle::gl

@@ -32,6 +32,9 @@ class OcclusionOracle : public DeviceOracle {
 
   OracleKind kind() const override { return form_ == Form::kSampled ? OracleKind::kSampled : OracleKind::kOcclusion; }
 
+  /// What the driver gets.
+  static std::vector<Program::Stage> sources(Form form);
+
   /// Which octants the device sees, before the CPU decides the rest; the surfaces must be resident. @throws OracleError
   std::vector<std::uint8_t> candidates(const std::vector<ExpansionRequest*>& requests);
 

@@ -2,10 +2,12 @@
 #include "oracle/gl/thread.h"
 
 #include <bocst/oracle.h>
+#include <epoxy/gl.h>
 #include <pthread.h>
 #include <signal.h>
 #include <unistd.h>
 
+#include <algorithm>
 #include <exception>
 #include <utility>
 
@@ -13,7 +15,7 @@
 
 namespace bocst::oracle::gl {
 
-Thread::Thread(const ContextRequest& request) : process_(getpid()) {
+Thread::Thread(const ContextRequest& request) : process_(getpid()), wait_limit_(request.wait_limit) {
   // Signals are the application's: its handlers must not run on our thread.
   sigset_t all, before;
   sigfillset(&all);
@@ -49,6 +51,7 @@ void Thread::loop(const ContextRequest& request) {
   try {
     context = std::make_unique<Context>(request);
     info_ = context->info();
+    if (wait_limit_.count() == 0) wait_limit_ = info_.hardware ? std::chrono::seconds(10) : std::chrono::minutes(10);
     context_ = context.get();
     lock.lock();
   } catch (...) {
@@ -106,6 +109,31 @@ bool Thread::isLost() const { return lost_.load(std::memory_order_relaxed) || is
 void Thread::lose(const std::string& why) {
   if (lost_.exchange(true)) return;
   log(LogLevel::kWarning, info_.renderer + " was lost (" + why + "); queries go on on the CPU");
+}
+
+void Thread::distrust(const std::string& why) {
+  distrusted_ = true;
+  lose("it answered wrongly: " + why);
+}
+
+void Thread::awaitDevice() {
+  const auto begin = std::chrono::steady_clock::now();
+  const GLsync fence = glFenceSync(GL_SYNC_GPU_COMMANDS_COMPLETE, 0);
+  if (fence == nullptr) throw OracleError("the driver makes no fence");
+  // In slices, as drivers may have a limit of their own.
+  constexpr GLuint64 kSlice = 500'000'000;
+  GLenum state = GL_TIMEOUT_EXPIRED;
+  while (state == GL_TIMEOUT_EXPIRED) {
+    const std::chrono::nanoseconds left = begin + wait_limit_ - std::chrono::steady_clock::now();
+    if (left.count() <= 0) break;
+    state = glClientWaitSync(fence, GL_SYNC_FLUSH_COMMANDS_BIT, std::min(kSlice, static_cast<GLuint64>(left.count())));
+  }
+  glDeleteSync(fence);
+  checkReset();
+  if (state == GL_ALREADY_SIGNALED || state == GL_CONDITION_SATISFIED) return;
+  lose(state == GL_TIMEOUT_EXPIRED ? "it gave no answer for " + std::to_string(wait_limit_.count()) + " ms"
+                                   : "the driver cannot wait for it");
+  throw OracleError("the GPU context is lost");
 }
 
 void Thread::checkReset() {

@@ -4,6 +4,7 @@
 #include <sys/types.h>
 
 #include <atomic>
+#include <chrono>
 #include <condition_variable>
 #include <deque>
 #include <functional>
@@ -46,8 +47,16 @@ class Thread {
   /// Gives the context up, and reports it once (bocst::setLogger).
   void lose(const std::string& why);
 
-  /// In a job: looks whether the driver has lost the context.
+  /// The same for a device that answered wrongly, which nobody should ask again.
+  void distrust(const std::string& why);
+  bool isDistrusted() const { return distrusted_.load(std::memory_order_relaxed); }
+
+  /// In a job: looks whether the driver has lost the context. @throws OracleError if so.
   void checkReset();
+
+  /// In a job: waits until the device has done all that it was told. @throws OracleError, with the context lost, when
+  /// that takes longer than ContextRequest::wait_limit.
+  void awaitDevice();
 
  private:
   struct Job {
@@ -60,7 +69,8 @@ class Thread {
 
   ContextInfo info_;
   const pid_t process_;
-  std::atomic<bool> lost_{false};
+  std::chrono::milliseconds wait_limit_;
+  std::atomic<bool> lost_{false}, distrusted_{false};
   std::mutex mutex_;
   std::condition_variable work_, done_;
   std::deque<Job> jobs_;

@@ -20,15 +20,16 @@ void addOracles(CLI::App& program, Job& job) {
       output->check();
       Json report = {{"oracles", Json::array()}};
       Table table(Table::Others::kLeft);
-      table.row({"oracle", "hardware", "usable", "device"});
+      table.row({"oracle", "hardware", "usable", "self-test", "device"});
       for (const OracleInfo& oracle : availableOracles()) {
         report["oracles"].push_back({{"name", oracle.name},
                                      {"device", oracle.device},
                                      {"hardware", oracle.hardware},
                                      {"usable", oracle.why_not.empty()},
-                                     {"why_not", oracle.why_not}});
+                                     {"why_not", oracle.why_not},
+                                     {"self_test", oracle.self_test}});
         table.row({oracle.name, oracle.hardware ? "yes" : "no",
-                   oracle.why_not.empty() ? "yes" : "no: " + oracle.why_not, oracle.device});
+                   oracle.why_not.empty() ? "yes" : "no: " + oracle.why_not, oracle.self_test, oracle.device});
       }
       // What a model takes that leaves the choice open.
       std::string automatic, why_not;

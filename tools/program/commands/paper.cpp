@@ -98,7 +98,7 @@ struct Paper {
         if (info.name != name) continue;
         if (best == nullptr || (!best->why_not.empty() && info.why_not.empty())) best = &info;
       }
-      OracleInfo info = best != nullptr ? *best : OracleInfo{OracleKind::kAuto, name, "", false, "no device"};
+      OracleInfo info = best != nullptr ? *best : OracleInfo{OracleKind::kAuto, name, "", false, "no device", ""};
       if (!info.why_not.empty() && !oracles.empty()) throw OracleError("oracle " + name + ": " + info.why_not);
       wanted.push_back(std::move(info));
     }

@@ -14,31 +14,36 @@ struct Cell {
   uint list;        // where its list begins in `lists`, or kAll
   uint exists;      // octants that have an actual region
   uint ids_up_to;   // longer lists are not wanted by the host
+  uint indices;     // words of `meshes` where its mesh has vertex numbers,
+  uint vertices;    // vertices as three high and three low parts,
+  uint exact;       // and as doubles
+  uint batch;
 };
 
 const uint kSlabTriangles = 4096u;  // longer lists belong to cells whose slabs cull nothing
 
-layout(std430, binding = 0) readonly buffer Vertices { float vertices[]; };  // 3 x high, 3 x low part
-layout(std430, binding = 1) readonly buffer Indices { uint indices[]; };
-layout(std430, binding = 2) buffer Lists { uint lists[]; };
-layout(std430, binding = 3) readonly buffer Cells { Cell cells[]; };
-layout(std430, binding = 4) buffer States { uint states[]; };
-layout(std430, binding = 5) buffer Masks { uint masks[]; };
-layout(std430, binding = 6) buffer Answers { uint answers[]; };
-layout(std430, binding = 7) readonly buffer Exact { double exact[]; };  // vertices in lattice units
+layout(std430, binding = 0) readonly buffer Meshes { uint meshes[]; };
+layout(std430, binding = 1) buffer Lists { uint lists[]; };
+layout(std430, binding = 2) readonly buffer Cells { Cell cells[]; };
+layout(std430, binding = 3) buffer States { uint states[]; };
+layout(std430, binding = 4) buffer Masks { uint masks[]; };
+layout(std430, binding = 5) buffer Answers { uint answers[]; };
 
-uniform uvec2 u_pairs;      // first and end of the pairs of this surface
-uniform uvec2 u_cells;      // first and end of its cells
+uniform uvec2 u_pairs;      // first and end of the pairs of this dispatch
 uniform uint u_cell_count;  // of the batch
 uniform uvec2 u_list_capacity;  // first word and number of words
 uniform uint u_id_capacity;
+uniform uint u_batch;           // its number
 
-uint invocation() {
-  return (gl_WorkGroupID.y * gl_NumWorkGroups.x + gl_WorkGroupID.x) * GROUP + gl_LocalInvocationIndex;
+// The first line of each pass: see kGroups in layout.h.
+void countGroup() {
+  if (gl_LocalInvocationIndex == 0u) atomicAdd(answers[kGroups + kPass], 1u);
 }
 
+uint invocation() { return gl_GlobalInvocationID.x; }
+
 uint cellOf(uint pair) {
-  uint lo = u_cells.x, hi = u_cells.y;  // cells[lo].first_pair <= pair < cells[hi].first_pair
+  uint lo = 0u, hi = u_cell_count;  // cells[lo].first_pair <= pair < cells[hi].first_pair
   while (hi - lo > 1u) {
     uint middle = (lo + hi) / 2u;
     if (cells[middle].first_pair <= pair) lo = middle; else hi = middle;
@@ -59,16 +64,44 @@ uint octantState(uint cell, int octant, uint word) {
 // Did a list or the ids not find room? Then the host makes room and starts over from the placing of the lists.
 bool isOverflown() { return answers[kListWords] > u_list_capacity.y || answers[kIdWords] > u_id_capacity; }
 
+// What pass 1 wrote of a pair: the octants that it may meet.
+uint maskOf(uint pair) {
+  uint word = masks[pair];
+  if (word >> 8 != u_batch) atomicOr(answers[kFailed], kMasksFailed);
+  return word & 0xffu;
+}
+
+uint checkOf(uint cell) {
+  Cell c = cells[cell];
+  uint sum = floatBitsToUint(c.center.x);
+  sum = sum * kCheckFactor + floatBitsToUint(c.center.y);
+  sum = sum * kCheckFactor + floatBitsToUint(c.center.z);
+  sum = sum * kCheckFactor + floatBitsToUint(c.half_side);
+  sum = sum * kCheckFactor + c.first_pair;
+  sum = sum * kCheckFactor + c.list;
+  sum = sum * kCheckFactor + c.exists;
+  sum = sum * kCheckFactor + c.ids_up_to;
+  sum = sum * kCheckFactor + c.indices;
+  sum = sum * kCheckFactor + c.vertices;
+  sum = sum * kCheckFactor + c.exact;
+  return sum * kCheckFactor + c.batch;
+}
+
 uint sizeOf(uint cell, int octant) { return states[state(cell, kCounts + uint(octant))]; }
 
+vec3 partOf(uint at) {
+  return vec3(uintBitsToFloat(meshes[at]), uintBitsToFloat(meshes[at + 1u]), uintBitsToFloat(meshes[at + 2u]));
+}
+
 // Corners in the cell's own coordinates, centre 0 and half side 1: two roundings at most, as the rounding margins expect.
+// `precise`, since in another order the sum is off by what the lattice's coordinates round, not the cell's.
 void cornersOf(uint cell, uint triangle, out vec3 v[3]) {
   float inverse = 1.0 / cells[cell].half_side;  // a power of two
   for (int k = 0; k < 3; ++k) {
-    uint at = 6u * indices[3u * triangle + uint(k)];
-    vec3 high = vec3(vertices[at], vertices[at + 1u], vertices[at + 2u]);
-    vec3 low = vec3(vertices[at + 3u], vertices[at + 4u], vertices[at + 5u]);
-    v[k] = ((high - cells[cell].center) + low) * inverse;
+    uint at = cells[cell].vertices + 6u * meshes[cells[cell].indices + 3u * triangle + uint(k)];
+    precise vec3 from = partOf(at) - cells[cell].center;
+    precise vec3 corner = from + partOf(at + 3u);
+    v[k] = corner * inverse;
   }
 }
 

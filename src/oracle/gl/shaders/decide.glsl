@@ -45,10 +45,13 @@ bool triangleMeetsCube(dvec3 corners[3], dvec3 center, double side) {
   return true;
 }
 
+double doubleAt(uint at) { return packDouble2x32(uvec2(meshes[at], meshes[at + 1u])); }
+
 void main() {
+  countGroup();
   uint pair = u_pairs.x + invocation();
   if (pair >= u_pairs.y) return;
-  uint maybe = masks[pair];
+  uint maybe = maskOf(pair);
   if (maybe == 0u) return;
   uint cell = cellOf(pair);
   uint open = maybe & ~states[state(cell, kGrey)];
@@ -56,8 +59,8 @@ void main() {
   uint triangle = triangleOf(cell, pair);
   dvec3 corners[3];
   for (int k = 0; k < 3; ++k) {
-    uint at = 3u * indices[3u * triangle + uint(k)];
-    corners[k] = dvec3(exact[at], exact[at + 1u], exact[at + 2u]);
+    uint at = cells[cell].exact + 6u * meshes[cells[cell].indices + 3u * triangle + uint(k)];
+    corners[k] = dvec3(doubleAt(at), doubleAt(at + 2u), doubleAt(at + 4u));
   }
   double side = double(cells[cell].half_side) / 2.0lf;
   dvec3 center = dvec3(cells[cell].center);

@@ -59,6 +59,7 @@ void addPart(bool together, uint cell, int o, vec3 v[3]) {
 }
 
 void main() {
+  countGroup();
   if (isOverflown()) return;
   uint pair = u_pairs.x + invocation();
   bool has_pair = pair < u_pairs.y;
@@ -74,7 +75,7 @@ void main() {
   barrier();
   bool together = s_cells[0] == s_cells[1];
 
-  uint mask = has_pair ? masks[pair] & states[state(cell, kGrey)] : 0u;
+  uint mask = has_pair ? maskOf(pair) & states[state(cell, kGrey)] : 0u;
   uint triangle = has_pair ? triangleOf(cell, pair) : 0u;
   uint place[8];
   for (uint left = mask; left != 0u; left &= left - 1u) {

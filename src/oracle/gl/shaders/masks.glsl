@@ -6,6 +6,7 @@
 shared uint s_cells[2];
 shared uint s_counts[8];
 shared uint s_grey;
+shared uint s_ids;
 
 const uint kUpper[3] = uint[3](0xaau, 0xccu, 0xf0u);
 
@@ -63,11 +64,12 @@ void overlaps(vec3 v[3], out uint maybe, out uint surely) {
 }
 
 void main() {
+  countGroup();
   uint pair = u_pairs.x + invocation();
   bool has_pair = pair < u_pairs.y;
   uint lane = gl_LocalInvocationIndex;
   if (lane < 8u) s_counts[lane] = 0u;
-  if (lane == 0u) s_grey = 0u;
+  if (lane == 0u) s_grey = s_ids = 0u;
   uint cell = cellOf(min(pair, u_pairs.y - 1u));
   if (lane == 0u) s_cells[0] = cell;
   if (lane == GROUP - 1u) s_cells[1] = cell;
@@ -76,12 +78,15 @@ void main() {
 
   uint maybe = 0u, surely = 0u;
   if (has_pair) {
+    uint triangle = triangleOf(cell, pair);
+    if (together) atomicAdd(s_ids, triangle + 1u);
+    else atomicAdd(states[state(cell, kIds)], triangle + 1u);
     vec3 v[3];
-    cornersOf(cell, triangleOf(cell, pair), v);
+    cornersOf(cell, triangle, v);
     overlaps(v, maybe, surely);
     maybe &= cells[cell].exists;
     surely &= cells[cell].exists;
-    masks[pair] = maybe;
+    masks[pair] = maybe | u_batch << 8;
   }
   if (together) {
     for (uint left = maybe; left != 0u; left &= left - 1u) atomicAdd(s_counts[findLSB(left)], 1u);
@@ -96,4 +101,5 @@ void main() {
   if (!together) return;
   if (lane < 8u && s_counts[lane] != 0u) atomicAdd(states[state(cell, kCounts + lane)], s_counts[lane]);
   if (lane == 8u && s_grey != 0u) atomicOr(states[state(cell, kGrey)], s_grey);
+  if (lane == 9u) atomicAdd(states[state(cell, kIds)], s_ids);
 }

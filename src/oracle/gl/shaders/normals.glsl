@@ -26,6 +26,7 @@ void copyIds(uint cell, int octant) {
 }
 
 void main() {
+  countGroup();
   if (isOverflown()) return;
   uint index = invocation();
   uint cell = index / 8u;

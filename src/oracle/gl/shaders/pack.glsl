@@ -5,6 +5,7 @@ uint row[kBoundsWords];
 void put(uint at, uint byte) { row[at / 4u] |= (byte & 0xffu) << (at % 4u * 8u); }
 
 void main() {
+  countGroup();
   if (isOverflown()) return;
   uint cell = invocation();
   if (cell >= u_cell_count) return;
@@ -48,5 +49,13 @@ void main() {
   }
   put(kOwnSlabHalfBytes, kMostSlabHalf);  // the slab of the cell itself follows from those of its octants
   put(kGreyBytes, grey);
-  for (uint i = 0u; i < kBoundsWords; ++i) answers[kHeader + cell * kRow + i] = row[i];
+  uint at = kHeader + cell * kRow, end = answers[at + kRowList];
+  for (uint i = 0u; i < kBoundsWords; ++i) answers[at + i] = row[i];
+  for (int o = 0; o < 8; ++o) {
+    end += sizeOf(cell, o);
+    if (states[state(cell, kNext + uint(o))] != end) atomicOr(answers[kFailed], kListsFailed);
+  }
+  answers[at + kRowSum] = states[state(cell, kIds)];
+  answers[at + kRowCheck] = checkOf(cell);
+  if (cell == 0u) answers[kHeader + u_cell_count * kRow + answers[kIdWords]] = u_batch;
 }

@@ -1,6 +1,7 @@
 // Pass 3, one invocation a cell: room for the lists of its grey octants, and for the ids of those that the host wants.
 
 void main() {
+  countGroup();
   uint cell = invocation();
   if (cell >= u_cell_count) return;
   uint grey = states[state(cell, kGrey)];

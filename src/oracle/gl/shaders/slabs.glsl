@@ -1,10 +1,11 @@
 // Pass 6: how far the surface in each octant reaches along its slab's normal.
 
 void main() {
+  countGroup();
   if (isOverflown()) return;
   uint pair = u_pairs.x + invocation();
   if (pair >= u_pairs.y) return;
-  uint mask = masks[pair];
+  uint mask = maskOf(pair);
   if (mask == 0u) return;
   uint cell = cellOf(pair);
   mask &= states[state(cell, kGrey)] & ~states[state(cell, kLoose)];

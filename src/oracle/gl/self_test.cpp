@@ -1,0 +1,308 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#include "oracle/gl/self_test.h"
+
+#include <algorithm>
+#include <cmath>
+#include <cstddef>
+#include <cstdint>
+#include <memory>
+#include <utility>
+#include <vector>
+
+#include "bounds/cell_frame.h"
+#include "oracle/cpu/cpu_oracle.h"
+#include "oracle/reference.h"
+
+namespace bocst::oracle::gl {
+namespace {
+
+using lattice::Cell;
+using Ids = std::vector<std::uint32_t>;
+
+// A ball with waves: triangles of all directions, smaller towards the poles.
+std::shared_ptr<const Mesh> ball() {
+  constexpr int kRings = 14, kSides = 20;
+  constexpr double kPi = 3.14159265358979323846;
+  std::vector<Eigen::Vector3d> vertices;
+  std::vector<Mesh::Indices> triangles;
+  for (int i = 0; i <= kRings; ++i) {
+    for (int j = 0; j < kSides; ++j) {
+      const double a = kPi * (i + 0.3) / (kRings + 0.6), b = 2 * kPi * j / kSides;
+      const double r = 1 + 0.2 * std::sin(5 * b) * std::sin(3 * a);
+      vertices.emplace_back(r * std::sin(a) * std::cos(b), 1.3 * r * std::sin(a) * std::sin(b), 0.7 * r * std::cos(a));
+      if (i == kRings) continue;
+      const auto at = [j](int ring, int side) {
+        return static_cast<std::uint32_t>(ring * kSides + (j + side) % kSides);
+      };
+      triangles.push_back({at(i, 0), at(i, 1), at(i + 1, 0)});
+      triangles.push_back({at(i + 1, 0), at(i, 1), at(i + 1, 1)});
+    }
+  }
+  return Mesh::fromIndices(std::move(vertices), std::move(triangles));
+}
+
+// Triangles that meet all octants of the root.
+std::shared_ptr<const Mesh> star() {
+  constexpr int kRays = 64;
+  std::vector<Eigen::Vector3d> vertices;
+  std::vector<Mesh::Indices> triangles;
+  for (int i = 0; i < kRays; ++i) {
+    const double a = 0.1 + 0.37 * i;
+    const Eigen::Vector3d p(std::cos(a), std::sin(a), std::sin(1.7 * a)), q(std::sin(2.3 * a), std::cos(a), -p[2]);
+    for (const Eigen::Vector3d& v : {p, Eigen::Vector3d(-p), q}) vertices.push_back(v);
+    triangles.push_back({static_cast<std::uint32_t>(3 * i), static_cast<std::uint32_t>(3 * i + 1),
+                         static_cast<std::uint32_t>(3 * i + 2)});
+  }
+  return Mesh::fromIndices(std::move(vertices), std::move(triangles));
+}
+
+// A question, and what is known of its answer.
+struct Question {
+  const Surface* surface;
+  Cell cell;
+  Ids ids;
+};
+
+ExpansionRequest requestFor(const Question& question) {
+  ExpansionRequest e;
+  e.surface = question.surface;
+  e.cell = question.cell;
+  e.ids = question.ids.data();
+  e.count = question.ids.size();
+  return e;
+}
+
+std::vector<Eigen::Vector3d> cornersOf(const Surface& surface, std::uint32_t t) {
+  return {surface.corner(t, 0), surface.corner(t, 1), surface.corner(t, 2)};
+}
+
+Eigen::Vector3d centerOf(const Cell& cell) {
+  const auto at = cell.corner();
+  return Eigen::Vector3d(at[0], at[1], at[2]).array() + cell.side() / 2.0;
+}
+
+// Those of the ids that meet the octant, by the reference test.
+Ids meeting(const Surface& surface, const Ids& ids, const Cell& octant) {
+  Ids met;
+  if (!surface.lattice.exists(octant)) return met;
+  for (const std::uint32_t t : ids) {
+    if (triangleMeetsCube(cornersOf(surface, t).data(), centerOf(octant), octant.side() / 2.0)) met.push_back(t);
+  }
+  return met;
+}
+
+bool holds(const bounds::NodeBounds& b, const Cell& cell, const Eigen::Vector3d& p) {
+  const auto corner = cell.corner();
+  const bounds::CellFrame frame{{double(corner[0]), double(corner[1]), double(corner[2])}, double(cell.side())};
+  const bounds::Volume v = frame.decode(b);
+  const double tolerance = 1e-4 * frame.side;
+  double along = -static_cast<double>(v.slab_offset);
+  for (std::size_t k = 0; k < 3; ++k) {
+    const double d = p[static_cast<int>(k)] - v.center[k];
+    if (std::abs(d) > static_cast<double>(v.half[k]) + tolerance) return false;
+    along += static_cast<double>(v.normal[k]) * d;
+  }
+  return !b.hasSlab() || std::abs(along) <= static_cast<double>(v.slab_half) + tolerance;
+}
+
+// Points of the triangle in the octant must be within its bounds.
+bool areBounded(const Surface& surface, std::uint32_t t, const bounds::NodeBounds& b, const Cell& octant) {
+  const std::vector<Eigen::Vector3d> c = cornersOf(surface, t);
+  constexpr int kSteps = 6;
+  for (int i = 0; i <= kSteps; ++i) {
+    for (int j = 0; i + j <= kSteps; ++j) {
+      const Eigen::Vector3d p = c[0] + (c[1] - c[0]) * (double(i) / kSteps) + (c[2] - c[0]) * (double(j) / kSteps);
+      if ((p - centerOf(octant)).cwiseAbs().maxCoeff() <= octant.side() / 2.0 && !holds(b, octant, p)) return false;
+    }
+  }
+  return true;
+}
+
+// Compares answers with what the CPU knows; `lists`: of each octant, wherever they were.
+std::string compare(const Question& question, const ExpansionRequest& e, const std::vector<Ids>& lists) {
+  const std::string where = " at level " + std::to_string(question.cell.level);
+  const Surface& surface = *question.surface;
+  for (int o = 0; o < 8; ++o) {
+    const Cell octant = question.cell.octant(o);
+    Ids expected = meeting(surface, question.ids, octant);
+    std::sort(expected.begin(), expected.end());
+    Ids found = lists[static_cast<std::size_t>(o)];
+    if ((e.grey >> o & 1) != !expected.empty())
+      return (expected.empty() ? "an octant too many" : "an octant is lost") + where;
+    std::sort(found.begin(), found.end());
+    if (!std::includes(found.begin(), found.end(), expected.begin(), expected.end()))
+      return "a triangle is lost" + where;
+    if (found.size() > 2 * expected.size() + 8) return "triangles too many" + where;
+    const bounds::NodeBounds b = e.octants.get(static_cast<std::size_t>(o));
+    for (const std::uint32_t t : expected) {
+      if (!areBounded(surface, t, b, octant)) return "bounds that do not hold the surface" + where;
+    }
+  }
+  return "";
+}
+
+std::vector<Ids> listsOf(const ExpansionRequest& e) {
+  std::vector<Ids> lists;
+  for (std::size_t o = 0; o < 8; ++o) {
+    lists.emplace_back(e.lists.begin() + static_cast<std::ptrdiff_t>(e.list_begin[o]),
+                       e.lists.begin() + static_cast<std::ptrdiff_t>(e.list_begin[o + 1]));
+  }
+  return lists;
+}
+
+// Asks all in one batch, with lists that come back.
+std::string askAll(ComputeOracle& oracle, const std::vector<Question>& questions) {
+  std::vector<ExpansionRequest> batch;
+  for (const Question& q : questions) batch.push_back(requestFor(q));
+  const std::uint64_t left = oracle.leftToCpu();
+  oracle.submit(batch);
+  oracle.wait(batch);
+  if (oracle.leftToCpu() != left) return "a batch was not answered";
+  for (std::size_t i = 0; i < batch.size(); ++i) {
+    const std::string wrong = compare(questions[i], batch[i], listsOf(batch[i]));
+    if (!wrong.empty()) return wrong;
+  }
+  return "";
+}
+
+// The root and its octants, with lists that stay on the device.
+std::string askKept(ComputeOracle& oracle, const Question& root) {
+  std::vector<ExpansionRequest> batch{requestFor(root)};
+  std::vector<Question> questions{root};
+  for (int level = 0; level < 2; ++level) {
+    for (ExpansionRequest& e : batch) e.ids_up_to = 0;
+    const std::uint64_t left = oracle.leftToCpu();
+    oracle.submit(batch);
+    oracle.wait(batch);
+    if (oracle.leftToCpu() != left) return "a batch with lists of its own was not answered";
+    std::vector<ExpansionRequest> children;
+    std::vector<Question> next;
+    for (std::size_t i = 0; i < batch.size(); ++i) {
+      std::vector<Ids> lists(8);
+      for (std::size_t o = 0; o < 8; ++o) {
+        const ExpansionRequest::DeviceList& kept = batch[i].device_lists[o];
+        lists[o].resize(kept.count);
+        if (kept.count == 0) continue;
+        if (!oracle.fetch(*batch[i].kept_resource, kept, lists[o].data())) return "a list was lost";
+        next.push_back({root.surface, questions[i].cell.octant(static_cast<int>(o)), lists[o]});
+        ExpansionRequest child;
+        child.surface = root.surface;
+        child.cell = next.back().cell;
+        child.resource = batch[i].kept_resource;
+        child.resource_begin = kept.begin;
+        child.count = kept.count;
+        children.push_back(child);
+      }
+      const std::string wrong = compare(questions[i], batch[i], lists);
+      if (!wrong.empty()) return wrong;
+    }
+    batch.swap(children);
+    questions.swap(next);
+  }
+  return "";
+}
+
+Ids allOf(const Surface& surface) {
+  Ids ids(surface.triangle_count);
+  for (std::uint32_t i = 0; i < ids.size(); ++i) ids[i] = i;
+  return ids;
+}
+
+// Cells of a level about some corners of triangles, asked about all triangles that meet them.
+std::vector<Question> deepQuestions(const Surface& surface, int level) {
+  const Ids all = allOf(surface);
+  std::vector<Question> questions;
+  for (std::uint32_t t = 0; t < surface.triangle_count;
+       t += 1 + static_cast<std::uint32_t>(surface.triangle_count) / 6) {
+    const Eigen::Vector3d p = surface.corner(t, static_cast<int>(t % 3));
+    Cell cell;
+    cell.level = level;
+    for (int k = 0; k < 3; ++k) {
+      const double most = (1 << (level - 1)) - 1;
+      cell.at[static_cast<std::size_t>(k)] =
+          static_cast<std::uint32_t>(std::min(std::max(p[k] / cell.side(), 0.0), most));
+    }
+    const Ids ids = meeting(surface, all, cell);
+    if (!ids.empty()) questions.push_back({&surface, cell, ids});
+  }
+  return questions;
+}
+
+struct Meshes {
+  Surface ball, star;
+};
+
+// Both on the device. Empty where it has no room.
+std::unique_ptr<Meshes> residentOn(DeviceOracle& oracle) {
+  const auto surfaceOf = [&](std::shared_ptr<const Mesh> mesh) {
+    const lattice::Lattice lattice(mesh->bounds(), Subdivision::kBono, 0);
+    Surface surface{std::move(mesh), lattice};
+    surface.device = oracle.makeResident(surface);
+    return surface;
+  };
+  auto meshes = std::make_unique<Meshes>(Meshes{surfaceOf(ball()), surfaceOf(star())});
+  if (meshes->ball.device == nullptr || meshes->star.device == nullptr) return nullptr;
+  return meshes;
+}
+
+std::vector<std::vector<Question>> batchesOf(const Meshes& meshes) {
+  const Question of_ball{&meshes.ball, Cell{}, allOf(meshes.ball)}, of_star{&meshes.star, Cell{}, allOf(meshes.star)};
+  std::vector<std::vector<Question>> batches = {{of_ball, of_star}, {of_star, of_ball, of_star, of_star}};
+  batches.emplace_back();
+  for (int o = 0; o < 8; ++o) {
+    for (const Question& q : {of_ball, of_star}) {
+      batches.back().push_back({q.surface, q.cell.octant(o), meeting(*q.surface, q.ids, q.cell.octant(o))});
+    }
+  }
+  for (const int level : {9, 14, 15, 16}) {
+    batches.push_back(deepQuestions(meshes.ball, level));
+    const std::vector<Question> others = deepQuestions(meshes.star, level);
+    batches.back().insert(batches.back().end(), others.begin(), others.end());
+  }
+  return batches;
+}
+
+}  // namespace
+
+std::string selfTest(ComputeOracle& oracle) {
+  const std::unique_ptr<Meshes> meshes = residentOn(oracle);
+  if (meshes == nullptr) return "it takes no mesh";
+  for (const std::vector<Question>& batch : batchesOf(*meshes)) {
+    const std::string wrong = askAll(oracle, batch);
+    if (!wrong.empty()) return wrong;
+  }
+  // All triangles of the star in all octants: more than the room that is first taken.
+  for (const Surface* surface : {&meshes->star, &meshes->ball}) {
+    const std::string wrong = askKept(oracle, {surface, Cell{}, allOf(*surface)});
+    if (!wrong.empty()) return wrong;
+  }
+  return "";
+}
+
+std::string selfTest(OcclusionOracle& oracle) {
+  const std::unique_ptr<Meshes> meshes = residentOn(oracle);
+  if (meshes == nullptr) return "it takes no mesh";
+  for (const std::vector<Question>& questions : batchesOf(*meshes)) {
+    std::vector<ExpansionRequest> batch;
+    std::vector<ExpansionRequest*> requests;
+    for (const Question& q : questions) batch.push_back(requestFor(q));
+    for (ExpansionRequest& e : batch) requests.push_back(&e);
+    const std::vector<std::uint8_t> candidates = oracle.candidates(requests);
+    std::size_t asked = 0, seen = 0;
+    for (std::size_t i = 0; i < questions.size(); ++i) {
+      for (int o = 0; o < 8; ++o) {
+        const Cell octant = questions[i].cell.octant(o);
+        const bool is_seen = (candidates[i] >> o & 1) != 0;
+        asked += questions[i].surface->lattice.exists(octant);
+        seen += is_seen;
+        if (is_seen || meeting(*questions[i].surface, questions[i].ids, octant).empty()) continue;
+        return "an octant is lost at level " + std::to_string(octant.level);
+      }
+    }
+    // A device that sees something everywhere is right, but of no use.
+    if (questions.front().cell.level > 9 && seen == asked) return "it sees surface where none is";
+  }
+  return "";
+}
+
+}  // namespace bocst::oracle::gl

@@ -1,0 +1,296 @@
+// SPDX-License-Identifier: BSD-3-Clause
+// Drivers that lie, lose, or fail: each way is put between libepoxy and the driver, and queries must not notice.
+#include <epoxy/gl.h>
+#include <gtest/gtest.h>
+
+#include <atomic>
+#include <cstdlib>
+#include <cstring>
+#include <functional>
+#include <string>
+#include <vector>
+
+#include "bocst/log.h"
+#include "oracle/cpu/cpu_oracle.h"
+#include "oracle/gl/compute_oracle.h"
+#include "oracle/gl/occlusion_oracle.h"
+#include "oracle/gl/self_test.h"
+#include "surfaces.h"
+
+namespace bocst::oracle::gl {
+namespace {
+
+// Which call of its kind is broken, counted from 0 since start(); all of them with kEvery.
+constexpr int kNever = -1, kEvery = -2;
+struct Fault {
+  std::atomic<int> at{kNever}, calls{0};
+  bool stays = false;  // all after it, too
+  void start(int which) {
+    calls = 0;
+    at = which;
+  }
+  bool now() {
+    const int call = calls++;
+    return at == kEvery || at == call || (stays && at >= 0 && call > at);
+  }
+};
+Fault g_dispatch, g_half_dispatch, g_copy, g_write, g_clear, g_fence, g_reset, g_memory, g_map, g_draw, g_uniform;
+
+// The driver's own functions, once libepoxy has found them.
+PFNGLDISPATCHCOMPUTEPROC g_real_dispatch;
+PFNGLCOPYBUFFERSUBDATAPROC g_real_copy;
+PFNGLBUFFERSUBDATAPROC g_real_write;
+PFNGLCLEARBUFFERSUBDATAPROC g_real_clear;
+PFNGLCLIENTWAITSYNCPROC g_real_wait;
+PFNGLGETGRAPHICSRESETSTATUSPROC g_real_reset;
+PFNGLBUFFERDATAPROC g_real_data;
+PFNGLBUFFERSTORAGEPROC g_real_storage;
+PFNGLMAPBUFFERRANGEPROC g_real_map;
+PFNGLDRAWELEMENTSPROC g_real_draw;
+PFNGLUNIFORM2UIPROC g_real_uniform;
+PFNGLGETERRORPROC g_real_error;
+std::atomic<bool> g_out_of_memory{false};
+
+void dispatch(GLuint x, GLuint y, GLuint z) {
+  if (g_dispatch.now()) return;
+  g_real_dispatch(g_half_dispatch.now() ? x / 2 : x, y, z);
+}
+void copy(GLenum from, GLenum to, GLintptr a, GLintptr b, GLsizeiptr size) {
+  if (!g_copy.now()) g_real_copy(from, to, a, b, size);
+}
+void write(GLenum target, GLintptr at, GLsizeiptr size, const void* data) {
+  if (!g_write.now()) g_real_write(target, at, size, data);
+}
+void clear(GLenum target, GLenum internal, GLintptr at, GLsizeiptr size, GLenum format, GLenum type, const void* data) {
+  if (!g_clear.now()) g_real_clear(target, internal, at, size, format, type, data);
+}
+GLenum wait(GLsync sync, GLbitfield flags, GLuint64 time) {
+  if (!g_fence.now()) return g_real_wait(sync, flags, time);
+  g_real_wait(sync, flags, time);
+  return GL_TIMEOUT_EXPIRED;
+}
+GLenum reset() { return g_reset.now() ? GL_GUILTY_CONTEXT_RESET : g_real_reset(); }
+void data(GLenum target, GLsizeiptr size, const void* from, GLenum usage) {
+  if (g_memory.now()) {
+    g_out_of_memory = true;
+  } else {
+    g_real_data(target, size, from, usage);
+  }
+}
+void storage(GLenum target, GLsizeiptr size, const void* from, GLbitfield flags) {
+  if (g_memory.now()) {
+    g_out_of_memory = true;
+  } else {
+    g_real_storage(target, size, from, flags);
+  }
+}
+GLenum error() { return g_out_of_memory.exchange(false) ? GL_OUT_OF_MEMORY : g_real_error(); }
+void* map(GLenum target, GLintptr at, GLsizeiptr size, GLbitfield flags) {
+  return g_map.now() ? nullptr : g_real_map(target, at, size, flags);
+}
+void draw(GLenum mode, GLsizei count, GLenum type, const void* at) {
+  if (!g_draw.now()) g_real_draw(mode, count, type, at);
+}
+void uniform(GLint at, GLuint x, GLuint y) {
+  if (!g_uniform.now()) g_real_uniform(at, x, y);
+}
+
+template <typename F>
+void put(F& epoxy, F& real, F ours) {
+  real = epoxy;
+  epoxy = ours;
+}
+
+std::shared_ptr<Thread> newThread(int major = 4) {
+  ContextRequest request;
+  request.wait_limit = std::chrono::milliseconds(300);
+  request.major = major;
+  return std::make_shared<Thread>(request);
+}
+
+class BrokenDriver : public testing::Test {
+ protected:
+  static void SetUpTestSuite() {
+    // One oracle makes libepoxy look up what is replaced then.
+    ComputeOracle known(newThread());
+    ASSERT_EQ(selfTest(known), "");
+    OcclusionOracle also(newThread(3), OcclusionOracle::Form::kConservative, 16);
+    ASSERT_EQ(selfTest(also), "");
+    put(epoxy_glDispatchCompute, g_real_dispatch, &dispatch);
+    put(epoxy_glCopyBufferSubData, g_real_copy, &copy);
+    put(epoxy_glBufferSubData, g_real_write, &write);
+    put(epoxy_glClearBufferSubData, g_real_clear, &clear);
+    put(epoxy_glClientWaitSync, g_real_wait, &wait);
+    put(epoxy_glGetGraphicsResetStatus, g_real_reset, &reset);
+    put(epoxy_glBufferData, g_real_data, &data);
+    put(epoxy_glBufferStorage, g_real_storage, &storage);
+    put(epoxy_glMapBufferRange, g_real_map, &map);
+    put(epoxy_glDrawElements, g_real_draw, &draw);
+    put(epoxy_glUniform2ui, g_real_uniform, &uniform);
+    put(epoxy_glGetError, g_real_error, &error);
+    g_fence.stays = true;  // one wait that ends early is followed by another
+    setLogger([](LogLevel, const std::string& text) { notices() += text + "\n"; });
+  }
+  static void TearDownTestSuite() { setLogger({}); }
+  void SetUp() override { notices().clear(); }
+
+  void TearDown() override {
+    for (Fault* f : {&g_dispatch, &g_half_dispatch, &g_copy, &g_write, &g_clear, &g_fence, &g_reset, &g_memory, &g_map,
+                     &g_draw, &g_uniform}) {
+      f->start(kNever);
+    }
+  }
+
+  static std::string& notices() {
+    static std::string text;
+    return text;
+  }
+
+  static Surface residentOn(Oracle& oracle, Surface surface) {
+    surface.device = oracle.makeResident(surface);
+    return surface;
+  }
+};
+
+// Two meshes, uploaded lists and whole ones.
+std::vector<ExpansionRequest> questions(const Surface& a, const Surface& b, std::vector<std::uint32_t>& ids,
+                                        std::uint32_t first = 1) {
+  ids.resize(60);
+  for (std::uint32_t i = 0; i < ids.size(); ++i) ids[i] = 2 * i + first;
+  std::vector<ExpansionRequest> batch{rootOf(a), rootOf(b), rootOf(a), rootOf(b)};
+  for (int i = 2; i < 4; ++i) {
+    batch[static_cast<std::size_t>(i)].ids = ids.data();
+    batch[static_cast<std::size_t>(i)].count = ids.size();
+    batch[static_cast<std::size_t>(i)].cell = lattice::Cell{}.octant(3);
+  }
+  return batch;
+}
+
+void expectRight(const std::vector<ExpansionRequest>& answers, const std::string& what) {
+  for (const ExpansionRequest& e : answers) {
+    ExpansionRequest expected = e;
+    expand(expected);
+    EXPECT_EQ(e.grey, expected.grey) << what;
+    for (int o = 0; o < 8; ++o) EXPECT_GE(e.listSize(o), (expected.grey >> o & 1) != 0 ? 1u : 0u) << what;
+  }
+}
+
+// Each call that a batch makes is broken in turn. The answers must be right: noticed, or without effect.
+TEST_F(BrokenDriver, NoBrokenCallChangesAnAnswer) {
+  const struct {
+    const char* what;
+    Fault* fault;
+    bool must_be_noticed;  // some call of its kind
+  } ways[] = {{"a dispatch is dropped", &g_dispatch, true},
+              {"half of a dispatch is dropped", &g_half_dispatch, true},
+              {"a read returns what was there before", &g_copy, true},
+              {"a write is dropped", &g_write, true},
+              {"a table is not cleared", &g_clear, true},
+              {"the device does not come back", &g_fence, true},
+              {"the driver resets the device", &g_reset, true},
+              {"the driver cannot map", &g_map, false},
+              {"a uniform is not set", &g_uniform, false}};
+  for (const auto& way : ways) {
+    int noticed = 0;
+    for (int call = 0;; ++call) {
+      notices().clear();
+      ComputeOracle oracle(newThread());
+      const Surface a = residentOn(oracle, surfaceOf(test::torus(16))),
+                    b = residentOn(oracle, surfaceOf(test::torus(9)));
+      ASSERT_NE(a.device, nullptr);
+      std::vector<std::uint32_t> ids, others;
+      const std::vector<ExpansionRequest> first = questions(b, a, others, 0);
+      expectRight(ask(oracle, first), "before");  // something else is in every buffer
+      ASSERT_EQ(oracle.leftToCpu(), 0u);
+      const std::vector<ExpansionRequest> batch = questions(a, b, ids);
+      way.fault->start(call);
+      const std::vector<ExpansionRequest> answers = ask(oracle, batch);
+      const bool was_broken = way.fault->calls > call;
+      way.fault->start(kNever);
+      const std::string what = std::string(way.what) + ", call " + std::to_string(call);
+      expectRight(answers, what);
+      if (!was_broken) break;
+      const bool is_noticed = oracle.leftToCpu() > 0;
+      noticed += is_noticed;
+      EXPECT_TRUE(!is_noticed || !notices().empty()) << what;
+      expectRight(ask(oracle, batch), what + ", afterwards");
+    }
+    EXPECT_TRUE(noticed > 0 || !way.must_be_noticed) << way.what;
+  }
+}
+
+TEST_F(BrokenDriver, MeshesThatDoNotArrive) {
+  for (Fault* fault : {&g_write, &g_copy}) {
+    ComputeOracle oracle(newThread());
+    const Surface a = residentOn(oracle, surfaceOf(test::torus(16)));
+    fault->start(kEvery);
+    // Large enough for the arena to grow, by a copy.
+    const Surface b = residentOn(oracle, surfaceOf(test::torus(80)));
+    fault->start(kNever);
+    EXPECT_EQ(b.device, nullptr);
+    EXPECT_NE(notices().find("did not arrive"), std::string::npos) << notices();
+    expectRight(ask(oracle, {rootOf(a), rootOf(b)}), "after");
+    notices().clear();
+  }
+}
+
+TEST_F(BrokenDriver, NoMemory) {
+  // Each allocation fails in turn, from the first mesh on.
+  for (int call = 0;; ++call) {
+    ComputeOracle oracle(newThread());
+    g_memory.start(call);
+    Surface a = residentOn(oracle, surfaceOf(test::torus(16))), b = residentOn(oracle, surfaceOf(test::torus(9)));
+    std::vector<std::uint32_t> ids;
+    const std::vector<ExpansionRequest> batch = questions(a, b, ids);
+    const std::vector<ExpansionRequest> answers = ask(oracle, batch);
+    const bool was_broken = g_memory.calls > call;
+    g_memory.start(kNever);
+    expectRight(answers, "allocation " + std::to_string(call));
+    if (!was_broken) break;
+    EXPECT_GT(oracle.leftToCpu(), 0u) << call;
+    EXPECT_FALSE(oracle.thread().isLost());
+  }
+}
+
+TEST_F(BrokenDriver, WrongAnswersEndTheTrust) {
+  ComputeOracle oracle(newThread());
+  const Surface a = residentOn(oracle, surfaceOf(test::torus(16)));
+  g_dispatch.start(1);
+  ask(oracle, {rootOf(a)});
+  EXPECT_TRUE(oracle.thread().isLost());
+  EXPECT_TRUE(oracle.thread().isDistrusted());
+  EXPECT_NE(notices().find("work groups did not run"), std::string::npos) << notices();
+  // A device that is late or was reset is only lost: it may be taken again.
+  ComputeOracle late(newThread());
+  const Surface b = residentOn(late, surfaceOf(test::torus(16)));
+  g_fence.start(kEvery);
+  expectRight(ask(late, {rootOf(b)}), "late");
+  EXPECT_TRUE(late.thread().isLost());
+  EXPECT_FALSE(late.thread().isDistrusted());
+}
+
+TEST_F(BrokenDriver, FailsTheSelfTest) {
+  for (Fault* fault : {&g_dispatch, &g_copy, &g_write, &g_clear, &g_fence, &g_memory}) {
+    ComputeOracle oracle(newThread());
+    fault->start(kEvery);
+    EXPECT_NE(selfTest(oracle), "");
+    fault->start(kNever);
+  }
+}
+
+TEST_F(BrokenDriver, DrawsThatAreDropped) {
+  const auto thread = newThread(3);
+  OcclusionOracle oracle(thread, OcclusionOracle::Form::kConservative, 16);
+  g_draw.start(kEvery);
+  EXPECT_NE(selfTest(oracle), "");
+  const Surface a = residentOn(oracle, surfaceOf(test::torus(16))), b = residentOn(oracle, surfaceOf(test::torus(9)));
+  std::vector<std::uint32_t> ids;
+  expectRight(ask(oracle, questions(a, b, ids)), "no draw");
+  g_draw.start(kNever);
+  g_fence.start(kEvery);
+  expectRight(ask(oracle, questions(a, b, ids)), "late");
+  EXPECT_TRUE(thread->isLost());
+}
+
+}  // namespace
+}  // namespace bocst::oracle::gl
