@@ -64,7 +64,7 @@ void Buffer::clear(std::size_t bytes) {
   glClearBufferSubData(kAnyTarget, GL_R32UI, 0, static_cast<GLsizeiptr>(bytes), GL_RED_INTEGER, GL_UNSIGNED_INT, &zero);
 }
 
-void Staging::copy(const Buffer& from, std::size_t offset, std::size_t bytes) {
+void Staging::copy(const Buffer& from, std::size_t bytes) {
   if (mapped_ != nullptr && !stays_mapped_) {
     glBindBuffer(kAnyTarget, name_);
     glUnmapBuffer(kAnyTarget);
@@ -92,8 +92,7 @@ void Staging::copy(const Buffer& from, std::size_t offset, std::size_t bytes) {
   copied_ = bytes;
   glBindBuffer(GL_COPY_READ_BUFFER, from.name());
   glBindBuffer(kAnyTarget, name_);
-  glCopyBufferSubData(GL_COPY_READ_BUFFER, kAnyTarget, static_cast<GLintptr>(offset), 0,
-                      static_cast<GLsizeiptr>(bytes));
+  glCopyBufferSubData(GL_COPY_READ_BUFFER, kAnyTarget, 0, 0, static_cast<GLsizeiptr>(bytes));
 }
 
 const void* Staging::take() {

@@ -76,8 +76,8 @@ class Staging {
   Staging(const Staging&) = delete;
   Staging& operator=(const Staging&) = delete;
 
-  /// Starts to copy bytes of a buffer; what take() gave before is gone.
-  void copy(const Buffer& from, std::size_t offset, std::size_t bytes);
+  /// Starts to copy the first bytes of a buffer; what take() gave before is gone.
+  void copy(const Buffer& from, std::size_t bytes);
   /// What was copied, once the device has done all that it was told. @throws OracleError when it cannot be mapped.
   const void* take();
 

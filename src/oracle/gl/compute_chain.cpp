@@ -89,7 +89,7 @@ void ComputeChain::reserve(Buffer& buffer, std::size_t words) const {
 
 // All that is asked, on the host.
 void ComputeChain::describe(const std::vector<ExpansionRequest*>& requests) {
-  batch_ = (batch_ + 1) % kMostBatches;
+  batch_ = batch_ % (kMostBatches - 1) + 1;  // never that of fresh memory
   rows_.clear();
   ids_.clear();
   sums_.clear();
@@ -183,8 +183,8 @@ void ComputeChain::fill() {
   run(kPack, rows_.size());
 }
 
-const std::uint32_t* ComputeChain::read(std::size_t first, std::size_t end, Thread& thread) {
-  staging_.copy(answers_, first * kWord, (end - first) * kWord);
+const std::uint32_t* ComputeChain::read(std::size_t words, Thread& thread) {
+  staging_.copy(answers_, words * kWord);
   thread.awaitDevice();
   return static_cast<const std::uint32_t*>(staging_.take());
 }
@@ -266,7 +266,7 @@ void ComputeChain::answer(const std::vector<ExpansionRequest*>& requests, Thread
   // Most answers fit into the first read; what does not is known from the header.
   const std::size_t fixed = kHeader + requests.size() * kRow;
   const std::size_t first_read = fixed + std::min<std::uint64_t>(id_capacity_, 64 * requests.size()) + 1;
-  const std::uint32_t* answers = read(0, first_read, thread);
+  const std::uint32_t* answers = read(first_read, thread);
   checkHeader(answers, thread);
   if (answers[kListWords] > list_capacity_ || answers[kIdWords] > id_capacity_) {
     list_capacity_ = answers[kListWords];
@@ -275,11 +275,11 @@ void ComputeChain::answer(const std::vector<ExpansionRequest*>& requests, Thread
     placed_ = arena_.take(list_capacity_);
     clearAnswers();
     fill();
-    answers = read(0, fixed + id_capacity_ + 1, thread);
+    answers = read(fixed + id_capacity_ + 1, thread);
     checkHeader(answers, thread);
     require(answers[kListWords] == list_capacity_ && answers[kIdWords] == id_capacity_, "lists changed", thread);
   } else if (fixed + answers[kIdWords] + 1 > first_read) {
-    answers = read(0, fixed + answers[kIdWords] + 1, thread);
+    answers = read(fixed + answers[kIdWords] + 1, thread);
     checkHeader(answers, thread);
   }
   const GLenum error = glGetError();

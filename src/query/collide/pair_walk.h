@@ -62,7 +62,7 @@ class PairWalk {
       if (s.deferred.empty()) return false;
       const bool may_end = visitor_.endsAtFirst() || cut_ != nullptr;
       s.deferred.grow(a_, b_, b_in_a_, may_end, [&s](const Pair& p) { s.stack.push_back(p); });
-      seen_a_.valid = seen_b_.valid = false;
+      seen_a_.valid = seen_b_.valid = leaf_known_ = false;
     }
   }
 
@@ -73,6 +73,12 @@ class PairWalk {
     Pair pair;
     bool operator<(const PlacedPair& other) const { return place > other.place; }  // the front of a heap is the first
   };
+  struct LeafTriangle {
+    std::uint32_t id;
+    Corners corners;
+    Eigen::Vector3d lo, hi;
+  };
+
   struct Scratch {
     std::vector<Pair> stack;
     std::vector<PlacedPair> ordered;  // a heap; the walk's pairs where the visitor has a cut
@@ -80,6 +86,7 @@ class PairWalk {
     LeafPairs<A, B> leaves;
     LargeTriangleLeaf<A> large_a;
     LargeTriangleLeaf<B> large_b;
+    std::vector<LeafTriangle> leaf;  // beside bodies
   };
   static Scratch& scratch() {
     thread_local Scratch s;
@@ -199,10 +206,63 @@ class PairWalk {
     return false;
   }
 
+  // Of the leaf that was asked last: many bodies ask about one after another.
+  const std::vector<LeafTriangle>& trianglesOf(typename A::Node leaf, Scratch& s) {
+    if (leaf_known_ && leaf_ == leaf) return s.leaf;
+    leaf_known_ = true;
+    leaf_ = leaf;
+    s.leaf.resize(a_.triangleCount(leaf));
+    for (std::size_t i = 0; i < s.leaf.size(); ++i) {
+      LeafTriangle& t = s.leaf[i];
+      t.id = a_.triangle(leaf, i);
+      for (int k = 0; k < 3; ++k) t.corners[static_cast<std::size_t>(k)] = a_.corner(t.id, k);
+      t.lo = t.corners[0].cwiseMin(t.corners[1]).cwiseMin(t.corners[2]);
+      t.hi = t.corners[0].cwiseMax(t.corners[1]).cwiseMax(t.corners[2]);
+    }
+    return s.leaf;
+  }
+
+  // The box about a body, in the frame of A. What is apart along its axes or those of A need not be asked the body
+  // itself; the margin is that of boxesApart().
+  class BodyBox {
+   public:
+    BodyBox(const OrientedVolume& box, const SimilarityTransform& to)
+        : center_(to * box.center), axes_(to.rotation * box.axes), half_(to.scale * box.half) {
+      constexpr double kRoot = 3 * (1 << lattice::kBits);  // corners are in the root cube
+      const double margin = (center_.template lpNorm<1>() + kRoot + half_.template lpNorm<1>()) *
+                                (64 * 0x1p-53 + 4 * to.orthogonality_error) +
+                            to.tolerance;
+      half_.array() += margin;
+      const Eigen::Vector3d extent = axes_.cwiseAbs() * half_;
+      lo_ = center_ - extent;
+      hi_ = center_ + extent;
+    }
+
+    // Comparisons with what is infinite or none (of a plane's box) say no.
+    bool isApart(const LeafTriangle& t) const {
+      for (int k = 0; k < 3; ++k) {
+        if (t.hi[k] < lo_[k] || t.lo[k] > hi_[k]) return true;
+      }
+      for (int k = 0; k < 3; ++k) {
+        const Eigen::Vector3d axis = axes_.col(k);
+        const double middle = axis.dot(center_), p = axis.dot(t.corners[0]) - middle,
+                     q = axis.dot(t.corners[1]) - middle, r = axis.dot(t.corners[2]) - middle;
+        if (std::min({p, q, r}) > half_[k] || std::max({p, q, r}) < -half_[k]) return true;
+      }
+      return false;
+    }
+
+   private:
+    Eigen::Vector3d center_;
+    Eigen::Matrix3d axes_;
+    Eigen::Vector3d half_, lo_, hi_;
+  };
+
   bool leafTriangles(const Pair& pair, Scratch& s) {
     if constexpr (B::kBodies) {
-      for (std::size_t i = 0; i < a_.triangleCount(pair.a); ++i) {
-        if (visitor_.triangle(a_.triangle(pair.a, i), pair.b)) return true;
+      const BodyBox box(volumeOf(b_, seen_b_), b_in_a_);
+      for (const LeafTriangle& t : trianglesOf(pair.a, s)) {
+        if (!box.isApart(t) && visitor_.triangle(t.id, pair.b)) return true;
       }
       return false;
     } else {
@@ -324,6 +384,8 @@ class PairWalk {
 
   Seen<A> seen_a_;
   Seen<B> seen_b_;
+  typename A::Node leaf_{};  // whose triangles Scratch has, if that is known
+  bool leaf_known_ = false;
   const A& a_;
   const B& b_;
   const SimilarityTransform b_in_a_, a_in_b_;

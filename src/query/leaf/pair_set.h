@@ -52,8 +52,10 @@ class PairSet {
 
   // Triangles with numbers next to each other are often neighbours, and their pairs come together: to one cache line.
   static std::size_t first(const Slot& pair) {
-    const std::uint64_t a = pair.a / 4, b = pair.b / 4, key = (a << 32 ^ a >> 32 ^ b) * 0x9e3779b97f4a7c15ull;
-    return (key >> 20 & ~std::uint64_t{7}) | (pair.a % 4 * 4 + pair.b % 4) / 2;
+    const std::uint64_t a = pair.a / 4, b = pair.b / 4;
+    // Only the product's upper bits depend on all of both.
+    const std::uint64_t key = ((a << 32 ^ a >> 32 ^ b) * 0x9e3779b97f4a7c15ull) >> 32;
+    return (key & ~std::uint64_t{7}) | (pair.a % 4 * 4 + pair.b % 4) / 2;
   }
 
   void grow() {
