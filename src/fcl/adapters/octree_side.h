@@ -114,10 +114,16 @@ class OcTreeSide {
       f(child);
     }
   }
-  template <typename OtherVolume, typename F>
-  void overlappingChildren(const Node& n, const OtherVolume& other, const query::SimilarityTransform& to, F&& f) const {
+  template <typename F>
+  void overlappingChildren(const Node& n, const query::Volume& other, const query::SimilarityTransform& to,
+                           F&& f) const {
     children(n, [&](const Node& child) {
-      if (!query::boxesApart(volume(child), query::oriented(other), to)) f(child);
+      query::Volume box{};
+      for (int k = 0; k < 3; ++k) {
+        box.center[k] = child.center[k];
+        box.half[k] = static_cast<float>(child.half);
+      }
+      if (!query::facesApart(box, other, to)) f(child);
     });
   }
   // Eight cells are not worth a look at each triangle.
