@@ -45,7 +45,8 @@ namespace bocst {
 std::vector<OracleInfo> availableOracles() {
   std::vector<OracleInfo> all = {{OracleKind::kCpu, "cpu", oracle::CpuOracle::device(), false, "", ""}};
   for (const oracle::gl::DeviceReport& r : oracle::gl::deviceReports()) {
-    all.push_back({OracleKind::kOcclusion, "occlusion", r.description, r.hardware, r.why_no_occlusion, r.occlusion_test});
+    all.push_back(
+        {OracleKind::kOcclusion, "occlusion", r.description, r.hardware, r.why_no_occlusion, r.occlusion_test});
     all.push_back({OracleKind::kSampled, "sampled", r.description, r.hardware, r.why_no_occlusion, ""});
     all.push_back({OracleKind::kCompute, "compute", r.description, r.hardware, r.why_no_compute, r.compute_test});
   }
