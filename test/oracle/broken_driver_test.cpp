@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: BSD-3-Clause
 // Drivers that lie, lose, or fail: each way is put between libepoxy and the driver, and queries must not notice.
+#include <epoxy/egl.h>
 #include <epoxy/gl.h>
 #include <gtest/gtest.h>
 
@@ -13,6 +14,7 @@
 #include "bocst/log.h"
 #include "oracle/cpu/cpu_oracle.h"
 #include "oracle/gl/compute_oracle.h"
+#include "oracle/gl/devices.h"
 #include "oracle/gl/occlusion_oracle.h"
 #include "oracle/gl/self_test.h"
 #include "surfaces.h"
@@ -276,6 +278,57 @@ TEST_F(BrokenDriver, FailsTheSelfTest) {
     EXPECT_NE(selfTest(oracle), "");
     fault->start(kNever);
   }
+}
+
+// A dead device in front of the one that works: EGL says that it is hardware, and it has no driver.
+void* const kDead = &g_dispatch;
+PFNEGLQUERYDEVICESEXTPROC g_real_devices;
+PFNEGLQUERYDEVICESTRINGEXTPROC g_real_device_string;
+PFNEGLGETPLATFORMDISPLAYEXTPROC g_real_display;
+
+EGLBoolean devices(EGLint most, EGLDeviceEXT* found, EGLint* count) {
+  EGLint real = 0;
+  if (g_real_devices(most > 0 ? most - 1 : 0, found != nullptr ? found + 1 : nullptr, &real) == EGL_FALSE)
+    return EGL_FALSE;
+  if (found != nullptr) found[0] = kDead;
+  *count = real + 1;
+  return EGL_TRUE;
+}
+const char* deviceString(EGLDeviceEXT device, EGLint name) {
+  return device == kDead ? "" : g_real_device_string(device, name);
+}
+EGLDisplay display(EGLenum platform, void* device, const EGLint* attributes) {
+  return device == kDead ? EGL_NO_DISPLAY : g_real_display(platform, device, attributes);
+}
+
+TEST_F(BrokenDriver, DevicesAreTriedInTurn) {
+  put(epoxy_eglQueryDevicesEXT, g_real_devices, &devices);
+  put(epoxy_eglQueryDeviceStringEXT, g_real_device_string, &deviceString);
+  put(epoxy_eglGetPlatformDisplayEXT, g_real_display, &display);
+  const std::vector<int> order = devicesInOrder();
+  ASSERT_GE(order.size(), 2u);
+  EXPECT_EQ(order[0], 0);
+  EXPECT_THROW(makeOracle(OracleKind::kCompute, 0, 16), OracleError);
+  const std::shared_ptr<Oracle> found = makeOracle(OracleKind::kCompute, ContextRequest::kAnyDevice, 16);
+  EXPECT_EQ(dynamic_cast<DeviceOracle&>(*found).thread().info().device, 1);
+  const Surface a = residentOn(*found, surfaceOf(test::torus(16)));
+  expectRight(ask(*found, {rootOf(a)}), "device 1");
+  // What fails its self-test is refused by name, and stays so when the driver has recovered.
+  dynamic_cast<DeviceOracle&>(*found).thread().lose("a test says so");
+  g_dispatch.start(kEvery);
+  for (int i = 0; i < 2; ++i) {
+    try {
+      makeOracle(OracleKind::kCompute, ContextRequest::kAnyDevice, 16);
+      ADD_FAILURE();
+    } catch (const OracleError& e) {
+      EXPECT_NE(std::string(e.what()).find("failed its self-test"), std::string::npos) << e.what();
+    }
+    g_dispatch.start(kNever);
+  }
+  EXPECT_NO_THROW(makeOracle(OracleKind::kOcclusion, ContextRequest::kAnyDevice, 16));
+  epoxy_eglQueryDevicesEXT = g_real_devices;
+  epoxy_eglQueryDeviceStringEXT = g_real_device_string;
+  epoxy_eglGetPlatformDisplayEXT = g_real_display;
 }
 
 TEST_F(BrokenDriver, DrawsThatAreDropped) {
