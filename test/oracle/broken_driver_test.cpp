@@ -8,6 +8,7 @@
 #include <cstdlib>
 #include <cstring>
 #include <functional>
+#include <random>
 #include <string>
 #include <vector>
 
@@ -278,6 +279,87 @@ TEST_F(BrokenDriver, FailsTheSelfTest) {
     EXPECT_NE(selfTest(oracle), "");
     fault->start(kNever);
   }
+}
+
+// A compiler may order sums as it likes where nothing says `precise`. Here the text does it before the driver sees it.
+PFNGLSHADERSOURCEPROC g_real_source;
+std::vector<std::pair<std::string, std::string>> g_rewritten;
+std::atomic<int> g_rewrites{0};
+
+void source(GLuint shader, GLsizei count, const GLchar* const* texts, const GLint* lengths) {
+  std::string text = texts[0];
+  for (const auto& [from, to] : g_rewritten) {
+    for (std::size_t at = text.find(from); at != std::string::npos; at = text.find(from, at + to.size())) {
+      text.replace(at, from.size(), to);
+      ++g_rewrites;
+    }
+  }
+  const GLchar* const whole = text.c_str();
+  g_real_source(shader, count, &whole, lengths);
+}
+
+// How many octants of small cells about corners of triangles a device gets wrong.
+std::size_t wrongDeepOctants(ComputeOracle& oracle) {
+  std::mt19937_64 g(3);
+  Surface surface = surfaceOf(test::soup(2000, 3));
+  surface.device = oracle.makeResident(surface);
+  std::vector<std::uint32_t> ids(60000);
+  std::vector<ExpansionRequest> batch(ids.size());
+  for (std::size_t i = 0; i < batch.size(); ++i) {
+    ExpansionRequest& e = batch[i];
+    e.surface = &surface;
+    e.ids = &ids[i];
+    e.count = 1;
+    ids[i] = static_cast<std::uint32_t>(g() % surface.triangle_count);
+    const Eigen::Vector3d p = surface.corner(ids[i], static_cast<int>(i % 3));
+    e.cell.level = 14 + static_cast<int>(i % 3);
+    for (int k = 0; k < 3; ++k) {
+      e.cell.at[static_cast<std::size_t>(k)] =
+          std::min(static_cast<std::uint32_t>(p[k] / e.cell.side()), (1u << (e.cell.level - 1)) - 1);
+    }
+  }
+  std::size_t wrong = 0;
+  const std::vector<ExpansionRequest> answers = ask(oracle, batch);
+  EXPECT_EQ(oracle.leftToCpu(), 0u);
+  for (std::size_t i = 0; i < batch.size(); ++i) {
+    for (int o = 0; o < 8; ++o) {
+      const lattice::Cell octant = batch[i].cell.octant(o);
+      wrong += (answers[i].grey >> o & 1) != (surface.lattice.exists(octant) && meets(surface, ids[i], octant));
+    }
+  }
+  return wrong;
+}
+
+TEST_F(BrokenDriver, SumsInAnotherOrder) {
+  put(epoxy_glShaderSource, g_real_source, &source);
+  g_rewritten = {
+      {"vec3 n = a - b;",
+       "vec3 n = vec3(fma(e[0].y, e[1].z, -b.x), fma(e[0].z, e[1].x, -b.y), fma(e[0].x, e[1].y, -b.z));"},
+      {"float along = dot(n, v[0])", "float along = n.z * v[0].z + (n.y * v[0].y + n.x * v[0].x)"},
+      {"fa = ep * aq - eq * ap, fb = ep * bq - eq * bp", "fa = fma(ep, aq, -(eq * ap)), fb = fma(-eq, bp, ep * bq)"},
+      {"lo - r > c || hi + r < c", "lo - c > r || hi - c < -r"},
+      {"lo - rs <= c && hi + rs >= c", "lo - c <= rs && hi - c >= -rs"},
+      {"abs(along - dot(n, octantCenter(o)))", "abs(dot(n, v[0] - octantCenter(o)))"},
+      {"(0.5 + rounding_margin) * size", "0.5 * size + rounding_margin * size"},
+      {"x = a + (da / (da - db)) * (b - a)", "x = (a * (da - db) + da * (b - a)) / (da - db)"}};
+  {
+    ComputeOracle oracle(newThread());
+    EXPECT_EQ(g_rewrites, 9);  // clipping is in two passes
+    EXPECT_EQ(selfTest(oracle), "");
+    EXPECT_EQ(wrongDeepOctants(oracle), 0u);
+  }
+  // What `precise` forbids. The test would see it.
+  g_rewritten = {{"precise vec3 from = partOf(at) - cells[cell].center;", "vec3 from = partOf(at);"},
+                 {"precise vec3 corner = from + partOf(at + 3u);",
+                  "vec3 corner = from + (partOf(at + 3u) - cells[cell].center);"}};
+  g_rewrites = 0;
+  {
+    ComputeOracle oracle(newThread());
+    EXPECT_GE(g_rewrites, 2);
+    EXPECT_GT(wrongDeepOctants(oracle), 0u);
+  }
+  g_rewritten.clear();
+  epoxy_glShaderSource = g_real_source;
 }
 
 // A dead device in front of the one that works: EGL says that it is hardware, and it has no driver.
