@@ -168,8 +168,9 @@ def test_nothing_is_left_behind(make, capfd):
     try:
         leak_check = ctypes.CDLL(None).__lsan_do_recoverable_leak_check
     except AttributeError:
-        # A leak of one object, or of one array, a call would be 50 bytes at least.
-        assert leaks(make, 4000) < 40
+        # A leak of one object, or of one array, a call would be 50 bytes at least, each time. What the allocator takes once
+        # in a while is no leak.
+        assert any(leaks(make, 4000) < 40 for _ in range(3))
         return
     # AddressSanitizer keeps what is freed for a while, so memory in use tells nothing.
     make()
