@@ -101,8 +101,11 @@ void DeviceOracle::reportFailure(const char* what, const std::exception& why) no
 }
 
 void DeviceOracle::finish() {
-  if (thread_->isLost()) return;
-  thread_->run([] {});  // a flush may still be on its way out of this object
+  try {
+    if (!thread_->isLost()) thread_->run([] {});  // a flush may still be on its way out of this object
+  } catch (const OracleError&) {
+    // Lost meanwhile: who waited was told at the end of the flush, and destructors must not throw.
+  }
 }
 
 }  // namespace bocst::oracle::gl
