@@ -4,6 +4,7 @@
 #include <epoxy/gl.h>
 #include <gtest/gtest.h>
 
+#include <algorithm>
 #include <atomic>
 #include <cstdlib>
 #include <cstring>
@@ -177,7 +178,28 @@ void expectRight(const std::vector<ExpansionRequest>& answers, const std::string
     ExpansionRequest expected = e;
     expand(expected);
     EXPECT_EQ(e.grey, expected.grey) << what;
-    for (int o = 0; o < 8; ++o) EXPECT_GE(e.listSize(o), (expected.grey >> o & 1) != 0 ? 1u : 0u) << what;
+    for (int o = 0; o < 8; ++o) {
+      const lattice::Cell octant = e.cell.octant(o);
+      const bounds::NodeBounds b = e.octants.get(static_cast<std::size_t>(o));
+      const auto begin = e.lists.begin() + static_cast<std::ptrdiff_t>(e.list_begin[static_cast<std::size_t>(o)]),
+                 end = e.lists.begin() + static_cast<std::ptrdiff_t>(e.list_begin[static_cast<std::size_t>(o) + 1]);
+      for (std::size_t i = 0; i < e.count; ++i) {
+        const std::uint32_t t = e.ids != nullptr ? e.ids[i] : static_cast<std::uint32_t>(i);
+        if ((expected.grey >> o & 1) == 0 || !meets(*e.surface, t, octant)) continue;
+        ASSERT_NE(std::find(begin, end, t), end) << what << ": triangle " << t;
+        // The box holds the corners that lie in the octant.
+        const double step = octant.side() / 255.0;
+        for (int k = 0; k < 3; ++k) {
+          const Eigen::Vector3d from = e.surface->corner(t, k) - centerOf(octant);
+          if (from.cwiseAbs().maxCoeff() > octant.side() / 2.0) continue;
+          for (int axis = 0; axis < 3; ++axis) {
+            const double at = (from[axis] + octant.side() / 2.0) / step;
+            ASSERT_GE(at, b.lo[static_cast<std::size_t>(axis)] - 1e-3) << what;
+            ASSERT_LE(at, b.hi[static_cast<std::size_t>(axis)] + 1e-3) << what;
+          }
+        }
+      }
+    }
   }
 }
 
@@ -360,7 +382,7 @@ TEST_F(BrokenDriver, SumsInAnotherOrder) {
     ComputeOracle oracle(newThread());
     EXPECT_GE(g_rewrites, 2);
     const std::size_t wrong = wrongDeepOctants(oracle);
-    // Zink's compiler undoes it.
+    // On zink it was not seen to change an octant; why was not looked into.
     EXPECT_TRUE(wrong > 0 || oracle.thread().info().renderer.rfind("llvmpipe", 0) != 0);
   }
   g_rewritten.clear();
