@@ -118,7 +118,7 @@ class BOCST_EXPORT Model : public fcl::CollisionGeometry<S> {
   /// oracle of this model has no copy.
   void releaseMesh();
 
-  /// "cpu", "occlusion", "sampled" or "compute".
+  /// "cpu", "occlusion", "sampled", "compute", or "cpu and compute" (kAuto where there is a GPU).
   std::string oracleName() const;
 
   Statistics statistics() const;  ///< A snapshot.

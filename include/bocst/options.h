@@ -21,7 +21,7 @@ enum class Answer {
 
 /// The backend that subdivides cells: it finds the octants that the surface meets.
 enum class OracleKind {
-  kAuto,       ///< BOCST_ORACLE where it is set; else compute on a hardware GPU, else the CPU.
+  kAuto,       ///< BOCST_ORACLE where it is set; else the CPU, for conservative answers beside a GPU.
   kCpu,        ///< SIMD on the calling thread.
   kOcclusion,  ///< OpenGL 3.3: occlusion queries whose geometry shader tests exactly what the query is about.
   kCompute,    ///< OpenGL 4.3: compute shaders; triangle lists stay on the device.

@@ -23,14 +23,14 @@ const char* nameOf(OracleKind kind) {
 
 }  // namespace
 
-std::shared_ptr<Oracle> makeOracle(OracleKind kind, int viewport) {
+std::shared_ptr<Oracle> makeOracle(OracleKind kind, Answer answer, int viewport) {
   static const std::shared_ptr<Oracle> cpu = std::make_shared<CpuOracle>();
   const OracleSelection selection = oracleSelectionOf(kind);
-  if (selection.kind == OracleKind::kAuto) {
-    const std::shared_ptr<Oracle> hardware = gl::makeOracleOnHardware();
+  if (selection.kind == OracleKind::kAuto && answer == Answer::kConservative) {
+    const std::shared_ptr<Oracle> hardware = gl::makeOracleWithHardware(cpu);
     return hardware != nullptr ? hardware : cpu;
   }
-  if (selection.kind == OracleKind::kCpu) return cpu;
+  if (selection.kind == OracleKind::kAuto || selection.kind == OracleKind::kCpu) return cpu;
   try {
     return gl::makeOracle(selection.kind, selection.device, viewport);
   } catch (const OracleError& e) {

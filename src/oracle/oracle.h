@@ -93,9 +93,11 @@ class Oracle {
   virtual bool fetch(const DeviceResource&, ExpansionRequest::DeviceList, std::uint32_t*) { return false; }
 };
 
-/// The oracle for these options: BOCST_ORACLE overrides kAuto; else compute on a hardware GPU, else the CPU. Shared by
-/// all models. viewport: PaperOptions::viewport.
+/// The oracle for these options; shared by all models. BOCST_ORACLE overrides kAuto; else exact answers, whose trees
+/// the CPU builds in bulk, get the CPU; conservative ones get the CPU and, where there is one, a hardware GPU
+/// (AutoOracle). viewport: PaperOptions::viewport.
 /// @throws OracleError for one asked for by name that cannot be had.
-BOCST_EXPORT std::shared_ptr<Oracle> makeOracle(OracleKind kind, int viewport = PaperOptions{}.viewport);
+BOCST_EXPORT std::shared_ptr<Oracle> makeOracle(OracleKind kind, Answer answer = Answer::kExact,
+                                                int viewport = PaperOptions{}.viewport);
 
 }  // namespace bocst::oracle

@@ -12,7 +12,7 @@ namespace bocst::tree {
 /// How often this process, or an ancestor of it, was forked from another.
 extern std::atomic<unsigned> forks;
 
-/// DeviceResource while the first thread of a child that comes to a lock finds out who held it.
+/// Held while the first thread of a child that comes to a lock finds out who held it.
 std::mutex& forkMutex();
 
 [[noreturn]] void throwForked();

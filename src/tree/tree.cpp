@@ -108,7 +108,7 @@ std::int64_t coarseNow() {
 
 Tree::Tree(std::shared_ptr<const Mesh> mesh, const Options& options)
     : options_(checked(options)),
-      oracle_(oracle::makeOracle(options.oracle, options.paper.viewport)),
+      oracle_(oracle::makeOracle(options.oracle, options.answer, options.paper.viewport)),
       deepest_(deepestLevel(options)),
       surface_(surfaceOf(mesh, options)),
       next_prune_(options.ttl.count() > 0 ? 0 : kNeverDue) {

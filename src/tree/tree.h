@@ -162,7 +162,8 @@ class Tree {
                          oracle::ExpansionRequest::DeviceList list);
   ChildRef addOctantList(const oracle::ExpansionRequest& answer, int octant);
   static void ask(std::vector<Growth>& asked, std::vector<oracle::ExpansionRequest>& requests);
-  bool growsOnHost() const { return oracle_->kind() == OracleKind::kCpu; }
+  /// The host has all lists, so it can grow from the root grid and in bulk.
+  bool growsOnHost() const { return oracle_->kind() == OracleKind::kCpu || oracle_->kind() == OracleKind::kAuto; }
   bool isBuildDue() const { return rent_.load(std::memory_order_relaxed) > price_.load(std::memory_order_relaxed); }
   void buildNow();
   void startRent();

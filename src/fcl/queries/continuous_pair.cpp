@@ -169,7 +169,7 @@ double firstContact(const ContinuousQuery<S>& q) {
   checkPartner(q);
   const fcl::Transform3<S> X_W1 = poseAt<S>(q.X_W1, 0), X_W2 = poseAt<S>(q.X_W2, 0);
   for (;;) {
-    // DeviceResource, so that another mesh does not get the address of one of these.
+    // Held, so that another mesh does not get the address of one of these.
     const auto mesh_a = meshOf(asModel<S>(q.a())), mesh_b = meshOf(asModel<S>(q.b()));
     fcl::CollisionResult<S> begin;
     if (collidePair<S>(q.o1, X_W1, q.o2, X_W2, {}, fcl::CollisionRequest<S>(), begin) > 0) return 0;

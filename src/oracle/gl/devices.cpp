@@ -14,6 +14,7 @@
 #include <utility>
 
 #include "log/log.h"
+#include "oracle/auto_oracle.h"
 #include "oracle/gl/compute_oracle.h"
 #include "oracle/gl/occlusion_oracle.h"
 #include "oracle/gl/self_test.h"
@@ -66,13 +67,15 @@ class Registry {
     throw OracleError(why_not);
   }
 
-  std::shared_ptr<Oracle> onHardware() {
+  std::shared_ptr<Oracle> withHardware(const std::shared_ptr<Oracle>& host) {
     const std::lock_guard<std::mutex> lock(mutex_);
     if (no_hardware_) return nullptr;
     try {
       for (const int device : devicesInOrder()) {
         const std::shared_ptr<Oracle> known = tryHardware(device);
-        if (known != nullptr) return known;
+        if (known == nullptr) continue;
+        if (auto_ == nullptr || auto_->device() != known) auto_ = std::make_shared<AutoOracle>(host, known);
+        return auto_;
       }
     } catch (const OracleError&) {
       // No EGL.
@@ -223,6 +226,7 @@ class Registry {
   std::map<std::pair<int, int>, std::shared_ptr<Thread>> threads_;
   std::map<Key, std::shared_ptr<DeviceOracle>> oracles_;
   std::map<Key, std::string> refused_;  // and why
+  std::shared_ptr<AutoOracle> auto_;    // with the device that was found last
   std::vector<DeviceReport> reports_;
   bool no_hardware_ = false;
 };
@@ -231,8 +235,8 @@ class Registry {
 
 const std::vector<DeviceReport>& deviceReports() { return Registry::instance().reports(); }
 
-std::shared_ptr<Oracle> makeOracleOnHardware() {
-  return mayHaveHardware() ? Registry::instance().onHardware() : nullptr;
+std::shared_ptr<Oracle> makeOracleWithHardware(const std::shared_ptr<Oracle>& host) {
+  return mayHaveHardware() ? Registry::instance().withHardware(host) : nullptr;
 }
 
 std::shared_ptr<Oracle> makeOracle(OracleKind kind, int device, int viewport) {

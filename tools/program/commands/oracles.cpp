@@ -32,19 +32,26 @@ void addOracles(CLI::App& program, Job& job) {
                    oracle.why_not.empty() ? "yes" : "no: " + oracle.why_not, oracle.self_test, oracle.device});
       }
       // What a model takes that leaves the choice open.
-      std::string automatic, why_not;
+      std::string automatic, conservative, why_not;
       try {
         automatic = oracle::makeOracle(OracleKind::kAuto)->name();
+        conservative = oracle::makeOracle(OracleKind::kAuto, Answer::kConservative)->name();
       } catch (const OracleError& e) {
         why_not = e.what();
       }
-      report["auto"] = automatic.empty() ? Json() : Json(automatic);
+      report["auto"] = why_not.empty() ? Json(automatic) : Json();
+      report["auto_conservative"] = why_not.empty() ? Json(conservative) : Json();
       if (!why_not.empty()) report["auto_why_not"] = why_not;
       if (output->wantsJson()) {
         output->write(report);
       } else {
         table.print();
-        std::cout << "\nauto takes " << (automatic.empty() ? "none: " + why_not : automatic) << '\n';
+        std::cout << "\nauto takes "
+                  << (!why_not.empty() ? "none: " + why_not
+                      : automatic == conservative
+                          ? automatic
+                          : automatic + " for exact answers, " + conservative + " for conservative ones")
+                  << '\n';
       }
       return 0;
     };

@@ -1,0 +1,333 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#include "oracle/auto_oracle.h"
+
+#include <algorithm>
+#include <chrono>
+#include <cmath>
+#include <cstdint>
+#include <iterator>
+#include <limits>
+#include <utility>
+
+namespace bocst::oracle {
+namespace {
+
+// Before anything is measured: one core of a desktop machine, and a GPU beside it (share/doc/oracles.md).
+constexpr CostModel kHost{1e-7, 1e-6, 4e-8}, kDevice{1e-4, 4e-7, 2e-9}, kUpload{1e-4, 0, 2e-8};
+
+// How far one batch corrects what is expected, and the most that it may be taken to be off by: a thread that has to
+// wait for its core says nothing of the device.
+constexpr double kRate = 0.3, kMostOff = 8;
+
+// The host's part is chosen to be ready somewhat before the device's: one that has to wait learns what the device
+// takes.
+constexpr double kHostEarlier = 0.8;
+
+// What it takes to part a batch and to put it together again, in seconds a cell.
+constexpr double kMoving = 1.5e-7;
+
+// A share of the host's time above which a gain is within what the models are off by.
+constexpr double kWorthwhile = 0.95;
+
+// Of the time of all batches, what asking a slower device again may take, and what it may make of one batch's time:
+// devices that were busy get better. A trial counts as kLeastPrice of the batch's time at least.
+constexpr double kTrying = 0.02, kSlowestTry = 4, kMostCredit = 0.02, kLeastPrice = 0.25;
+
+// A surface with hills, and triangles of many sizes.
+Surface hills() {
+  constexpr std::uint32_t kSide = 64;
+  std::vector<Eigen::Vector3d> vertices;
+  std::vector<Mesh::Indices> triangles;
+  for (std::uint32_t y = 0; y <= kSide; ++y) {
+    for (std::uint32_t x = 0; x <= kSide; ++x) {
+      const double u = std::pow(x / double{kSide}, 1.5), v = y / double{kSide};
+      vertices.emplace_back(u, v, 0.2 * std::sin(9 * u) * std::cos(11 * v));
+      if (x == kSide || y == kSide) continue;
+      const std::uint32_t at = y * (kSide + 1) + x;
+      triangles.push_back({at, at + 1, at + kSide + 1});
+      triangles.push_back({at + 1, at + kSide + 2, at + kSide + 1});
+    }
+  }
+  auto mesh = Mesh::fromIndices(std::move(vertices), std::move(triangles));
+  const lattice::Lattice lattice(mesh->bounds(), Subdivision::kBono, 0);
+  return {std::move(mesh), lattice};
+}
+
+}  // namespace
+
+void CostModel::learn(double cells, double triangles, double seconds) {
+  const double expected = of(cells, triangles);
+  if (!(expected > 0)) return;
+  const double off = kRate * std::log(std::clamp(seconds / expected, 1 / kMostOff, kMostOff));
+  batch *= std::exp(off * batch / expected);
+  cell *= std::exp(off * cell * cells / expected);
+  triangle *= std::exp(off * triangle * triangles / expected);
+}
+
+double AutoOracle::steadySeconds() {
+  return std::chrono::duration<double>(std::chrono::steady_clock::now().time_since_epoch()).count();
+}
+
+void AutoOracle::Work::add(const ExpansionRequest& e) {
+  ++cells;
+  triangles += static_cast<double>(e.count);
+}
+
+AutoOracle::AutoOracle(std::shared_ptr<Oracle> host, std::shared_ptr<Oracle> device, Seconds clock)
+    : host_(std::move(host)),
+      device_(std::move(device)),
+      clock_(std::move(clock)),
+      host_cost_(kHost),
+      device_cost_(kDevice),
+      upload_cost_(kUpload) {
+  measure();
+}
+
+// Each level of a small tree, asked of both.
+void AutoOracle::measure() {
+  constexpr int kRounds = 3, kLevels = 6;
+  Surface surface = hills();
+  for (int round = 0; round < kRounds; ++round) {
+    surface.device = nullptr;
+    double begin = clock_();
+    surface.device = device_->makeResident(surface);
+    if (surface.device == nullptr) {
+      device_cost_.batch = std::numeric_limits<double>::infinity();  // it takes nothing
+      return;
+    }
+    upload_cost_.learn(0, static_cast<double>(surface.triangle_count), clock_() - begin);
+    ExpansionRequest root;
+    root.surface = &surface;
+    root.count = surface.triangle_count;
+    std::vector<ExpansionRequest> level{root}, next;
+    std::vector<std::vector<std::uint32_t>> lists, next_lists;
+    for (int l = 1; l <= kLevels; ++l) {
+      Work work;
+      for (const ExpansionRequest& e : level) work.add(e);
+      const auto timed = [&](Oracle& oracle, CostModel& cost) {
+        std::vector<ExpansionRequest> answers = level;
+        begin = clock_();
+        oracle.submit(answers);
+        oracle.wait(answers);
+        cost.learn(work.cells, work.triangles, clock_() - begin);
+        return answers;
+      };
+      timed(*device_, device_cost_);
+      next.clear();
+      next_lists.clear();
+      for (const ExpansionRequest& e : timed(*host_, host_cost_)) {
+        for (int o = 0; o < 8; ++o) {
+          if ((e.grey >> o & 1) == 0) continue;
+          const auto first = e.lists.begin();
+          next_lists.emplace_back(first + static_cast<std::ptrdiff_t>(e.list_begin[static_cast<std::size_t>(o)]),
+                                  first + static_cast<std::ptrdiff_t>(e.list_begin[static_cast<std::size_t>(o) + 1]));
+          next.push_back(root);
+          next.back().cell = e.cell.octant(o);
+          next.back().ids = next_lists.back().data();
+          next.back().count = next_lists.back().size();
+        }
+      }
+      level.swap(next);
+      lists.swap(next_lists);
+    }
+  }
+}
+
+// What the device should answer while the host answers the rest, at least so many. In the order of the candidates,
+// which come by how much sooner the device is done with them.
+AutoOracle::Share AutoOracle::bestShare(const Work& batch, const std::vector<Candidate>& candidates,
+                                        std::size_t least) const {
+  Share share;
+  const double alone = host_cost_.of(batch.cells, batch.triangles), moving = kMoving * batch.cells;
+  share.seconds = least == 0 ? kWorthwhile * alone : std::numeric_limits<double>::infinity();
+  double here = alone, there = device_cost_.batch;
+  for (std::size_t n = 1; n <= candidates.size(); ++n) {
+    const auto triangles = static_cast<double>(candidates[n - 1].triangles);
+    here -= host_cost_.cell + host_cost_.triangle * triangles;
+    there += device_cost_.cell + device_cost_.triangle * triangles;
+    if (there >= share.seconds) break;
+    const bool is_all = static_cast<double>(n) == batch.cells;
+    const double both = is_all ? there : std::max(here / kHostEarlier, there) + moving;
+    if (n < least || both >= share.seconds) continue;
+    share.count = n;
+    share.seconds = both;
+  }
+  return share;
+}
+
+AutoOracle::Known& AutoOracle::known(const Surface& surface) {
+  Known& its = meshes_[surface.mesh.get()];
+  if (its.mesh.lock() != surface.mesh) its = {surface.mesh, nullptr};  // a new mesh where another was
+  return its;
+}
+
+void AutoOracle::dropForgotten() {
+  for (auto i = meshes_.begin(); i != meshes_.end();) i = i->second.mesh.expired() ? meshes_.erase(i) : std::next(i);
+  live_meshes_ = meshes_.size();
+}
+
+void AutoOracle::upload(const Surface& surface, Known& its) {
+  const double begin = clock_();
+  its.device = device_->makeResident(surface);
+  its.refused = its.device == nullptr;
+  upload_cost_.learn(0, static_cast<double>(surface.triangle_count), clock_() - begin);
+}
+
+std::vector<AutoOracle::Candidate> AutoOracle::chooseShare(const std::vector<ExpansionRequest>& batch) {
+  Work work;
+  for (const ExpansionRequest& e : batch) work.add(e);
+  const double alone = host_cost_.of(work.cells, work.triangles);
+  credit_ = std::min(kMostCredit, credit_ + kTrying * alone);
+  if (device_cost_.batch > alone + std::min(credit_, (kSlowestTry - 1) * alone)) return {};
+
+  if (meshes_.size() > 2 * live_meshes_ + 8) dropForgotten();
+  std::vector<Candidate> candidates;
+  candidates.reserve(batch.size());
+  for (std::size_t i = 0; i < batch.size(); ++i) {
+    const ExpansionRequest& e = batch[i];
+    if (e.own_only || e.surface->mesh == nullptr) continue;
+    const bool is_next = !candidates.empty() && batch[candidates.back().place].surface == e.surface;
+    Known* const its = is_next ? candidates.back().mesh : &known(*e.surface);
+    if (!its->refused) candidates.push_back({e.count, i, its});
+  }
+  const bool large_first =
+      host_cost_.triangle * device_cost_.cell > host_cost_.cell * device_cost_.triangle;  // grows with the triangles
+  std::sort(candidates.begin(), candidates.end(), [large_first](const Candidate& a, const Candidate& b) {
+    return large_first ? a.triangles > b.triangles : a.triangles < b.triangles;
+  });
+  const Share wish = bestShare(work, candidates, 0);
+  for (std::size_t n = 0; n < wish.count; ++n) {
+    Known& its = *candidates[n].mesh;
+    if (its.device != nullptr || its.refused) continue;
+    its.saved += (alone - wish.seconds) / static_cast<double>(wish.count);
+    const Surface& surface = *batch[candidates[n].place].surface;
+    if (its.saved > upload_cost_.of(0, static_cast<double>(surface.triangle_count))) upload(surface, its);
+  }
+  const auto is_away = [](const Candidate& c) { return c.mesh->device == nullptr; };
+  candidates.erase(std::remove_if(candidates.begin(), candidates.end(), is_away), candidates.end());
+  Share share = bestShare(work, candidates, 0);
+  if (share.count == 0 && !candidates.empty()) {
+    const Share trial = bestShare(work, candidates, 1);
+    const double price = std::max(trial.seconds - alone, kLeastPrice * alone);
+    if (price < credit_ && trial.seconds < kSlowestTry * alone) {
+      credit_ -= price;
+      share = trial;
+    }
+  }
+  candidates.resize(share.count);
+  return candidates;
+}
+
+AutoOracle::Pending AutoOracle::makePending(std::vector<ExpansionRequest>& batch,
+                                            const std::vector<Candidate>& share) const {
+  Pending pending;
+  pending.oracle = this;
+  pending.batch = &batch;
+  const bool is_part = share.size() < batch.size();
+  for (const Candidate& candidate : share) {
+    ExpansionRequest& e = batch[candidate.place];
+    const auto has_same = [&](const auto& other) { return other->mesh == e.surface->mesh; };
+    auto found = std::find_if(pending.surfaces.begin(), pending.surfaces.end(), has_same);
+    if (found == pending.surfaces.end()) {
+      pending.surfaces.push_back(std::make_unique<Surface>(*e.surface));
+      found = std::prev(pending.surfaces.end());
+      (*found)->device = candidate.mesh->device;
+    }
+    pending.work.add(e);
+    pending.places.push_back({candidate.place, e.surface, e.ids_up_to});
+    e.surface = found->get();
+    e.ids_up_to = ExpansionRequest::kAll;
+    if (is_part) pending.part.push_back(std::move(e));
+  }
+  pending.expected = device_cost_.of(pending.work.cells, pending.work.triangles);
+  return pending;
+}
+
+void AutoOracle::learn(CostModel& model, const Work& work, double seconds) {
+  const std::unique_lock<std::mutex> lock(books_, std::try_to_lock);
+  if (lock.owns_lock()) model.learn(work.cells, work.triangles, seconds);
+}
+
+void AutoOracle::answerHere(std::vector<ExpansionRequest>& batch) {
+  Work work;
+  for (const ExpansionRequest& e : batch) work.add(e);
+  const double begin = clock_();
+  host_->submit(batch);
+  host_->wait(batch);
+  learn(host_cost_, work, clock_() - begin);
+}
+
+std::list<AutoOracle::Pending>& AutoOracle::pendingOfThread() {
+  thread_local std::list<Pending> pending;
+  return pending;
+}
+
+void AutoOracle::submit(std::vector<ExpansionRequest>& batch) {
+  std::list<Pending> made;
+  {
+    const std::unique_lock<std::mutex> lock(books_, std::try_to_lock);
+    if (lock.owns_lock()) {
+      const std::vector<Candidate> share = chooseShare(batch);
+      if (!share.empty()) made.push_back(makePending(batch, share));
+    }
+  }
+  if (made.empty()) {
+    answerHere(batch);
+    return;
+  }
+  // From here on the device may write to it, so it stays where it is.
+  std::list<Pending>& all = pendingOfThread();
+  all.splice(all.begin(), made);
+  Pending& mine = all.front();
+  mine.begin = clock_();
+  try {
+    device_->submit(asked(mine, batch));
+    if (mine.places.size() < batch.size()) answerRest(batch, mine);
+  } catch (...) {
+    device_->wait(asked(mine, batch));
+    all.pop_front();
+    throw;
+  }
+  mine.host_end = clock_();
+}
+
+void AutoOracle::answerRest(std::vector<ExpansionRequest>& batch, const Pending& pending) {
+  std::vector<bool> is_asked(batch.size(), false);
+  for (const Pending::Place& place : pending.places) is_asked[place.index] = true;
+  std::vector<ExpansionRequest> rest;
+  rest.reserve(batch.size() - pending.places.size());
+  for (std::size_t i = 0; i < batch.size(); ++i) {
+    if (!is_asked[i]) rest.push_back(std::move(batch[i]));
+  }
+  answerHere(rest);
+  auto next = rest.begin();
+  for (std::size_t i = 0; i < batch.size(); ++i) {
+    if (!is_asked[i]) batch[i] = std::move(*next++);
+  }
+}
+
+void AutoOracle::wait(std::vector<ExpansionRequest>& batch) {
+  std::list<Pending>& all = pendingOfThread();
+  const auto mine =
+      std::find_if(all.begin(), all.end(), [&](const Pending& p) { return p.oracle == this && p.batch == &batch; });
+  if (mine == all.end()) return;
+  try {
+    device_->wait(asked(*mine, batch));
+  } catch (...) {
+    all.erase(mine);
+    throw;
+  }
+  const double now = clock_(), took = now - mine->begin;
+  // Where the host was the slower, the device took less than this.
+  if (now - mine->host_end > 0.05 * took || took < mine->expected) learn(device_cost_, mine->work, took);
+  for (std::size_t i = 0; i < mine->places.size(); ++i) {
+    const Pending::Place& place = mine->places[i];
+    ExpansionRequest& e = batch[place.index];
+    if (!mine->part.empty()) e = std::move(mine->part[i]);
+    e.surface = place.surface;
+    e.ids_up_to = place.ids_up_to;
+  }
+  all.erase(mine);
+}
+
+}  // namespace bocst::oracle

@@ -1,0 +1,114 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#pragma once
+
+#include <cstddef>
+#include <functional>
+#include <list>
+#include <map>
+#include <memory>
+#include <mutex>
+#include <string>
+#include <vector>
+
+#include "oracle/oracle.h"
+
+namespace bocst::oracle {
+
+/// How long batches take somewhere, in seconds.
+struct CostModel {
+  double batch, cell, triangle;
+
+  double of(double cells, double triangles) const { return batch + cell * cells + triangle * triangles; }
+
+  /// A batch took so long there. Each term is corrected by its share of what was expected.
+  void learn(double cells, double triangles, double seconds);
+};
+
+/// Has each batch answered where that takes the least time (kAuto): by the host, by a device, or by both at once, each
+/// a part. What they take is measured at the start and with each batch that is answered. The nodes of a tree are the
+/// same wherever they were made; all lists come back to the host, so whoever made a node, either can go on below it.
+///
+/// A mesh is uploaded when batches would have taken less time, by as much as the upload takes, had it been there.
+///
+/// Threads: any number. A thread that finds another at the books below asks the host.
+class AutoOracle : public Oracle {
+ public:
+  using Seconds = std::function<double()>;  ///< A clock.
+
+  /// Measures both, which takes some milliseconds. host: answers in submit().
+  AutoOracle(std::shared_ptr<Oracle> host, std::shared_ptr<Oracle> device, Seconds clock = steadySeconds);
+
+  OracleKind kind() const override { return OracleKind::kAuto; }
+  std::string name() const override { return host_->name() + " and " + device_->name(); }
+  /// The device starts with its part; the host's is answered here.
+  void submit(std::vector<ExpansionRequest>& batch) override;
+  void wait(std::vector<ExpansionRequest>& batch) override;
+
+  const std::shared_ptr<Oracle>& device() const { return device_; }
+
+  static double steadySeconds();
+
+ private:
+  struct Work {
+    double cells = 0, triangles = 0;
+    void add(const ExpansionRequest& e);
+  };
+  /// A mesh, and what the device has of it.
+  struct Known {
+    std::weak_ptr<const Mesh> mesh;
+    std::shared_ptr<const DeviceResource> device;  // null: nothing yet
+    double saved = 0;                              // seconds that the device would have saved
+    bool refused = false;                          // the device cannot take it
+  };
+  /// A batch of which the device has a part.
+  struct Pending {
+    const AutoOracle* oracle = nullptr;
+    const std::vector<ExpansionRequest>* batch = nullptr;
+    struct Place {
+      std::size_t index;  // in the batch
+      const Surface* surface;
+      std::size_t ids_up_to;
+    };
+    std::vector<ExpansionRequest> part;  // what the device has of it, unless that is all: taken until it is answered
+    std::vector<Place> places;           // and whence
+    std::vector<std::unique_ptr<Surface>> surfaces;
+    Work work;
+    double expected = 0, begin = 0, host_end = 0;
+  };
+  /// A request that the device may answer.
+  struct Candidate {
+    std::size_t triangles, place;
+    Known* mesh;
+  };
+  /// The device's part, the first so many candidates, and what the whole batch takes then.
+  struct Share {
+    std::size_t count = 0;
+    double seconds = 0;
+  };
+  static std::list<Pending>& pendingOfThread();
+
+  void measure();
+  Share bestShare(const Work& batch, const std::vector<Candidate>& candidates, std::size_t least) const;
+  std::vector<Candidate> chooseShare(const std::vector<ExpansionRequest>& batch);
+  Known& known(const Surface& surface);
+  void upload(const Surface& surface, Known& its);
+  void dropForgotten();
+  Pending makePending(std::vector<ExpansionRequest>& batch, const std::vector<Candidate>& share) const;
+  static std::vector<ExpansionRequest>& asked(Pending& pending, std::vector<ExpansionRequest>& batch) {
+    return pending.part.empty() ? batch : pending.part;
+  }
+  void answerHere(std::vector<ExpansionRequest>& batch);
+  void answerRest(std::vector<ExpansionRequest>& batch, const Pending& pending);
+  void learn(CostModel& model, const Work& work, double seconds);
+
+  const std::shared_ptr<Oracle> host_, device_;
+  const Seconds clock_;
+  // What follows is the books. Nobody waits for them: a child after fork() may find them locked for ever.
+  std::mutex books_;
+  CostModel host_cost_, device_cost_, upload_cost_;
+  std::map<const Mesh*, Known> meshes_;
+  std::size_t live_meshes_ = 0;  // when forgotten ones were last dropped
+  double credit_ = 0;            // seconds that trying the device again may take
+};
+
+}  // namespace bocst::oracle

@@ -1,0 +1,321 @@
+// SPDX-License-Identifier: BSD-3-Clause
+// kAuto beside devices that are simulated: they answer as the CPU does, but on a clock of their own, with the latency,
+// the rates and the failures that a test sets. Nothing is timed, so every run does the same.
+#include "oracle/auto_oracle.h"
+
+#include <gtest/gtest.h>
+
+#include <algorithm>
+#include <cstdio>
+#include <cstdlib>
+#include <random>
+#include <thread>
+
+#include "egl/context.h"
+#include "oracle/cpu/cpu_oracle.h"
+#include "oracle/gl/compute_oracle.h"
+#include "surfaces.h"
+
+namespace bocst::oracle {
+namespace {
+
+using Lists = std::vector<std::vector<std::uint32_t>>;
+
+// Of one thread of a query.
+struct Time {
+  double now = 0;
+  AutoOracle::Seconds clock() {
+    return [this] { return now; };
+  }
+};
+
+struct Rates {
+  double cell = 0.8e-6, triangle = 6e-8;  // seconds; not in the ratio that is expected at the start
+  double of(const std::vector<ExpansionRequest>& batch) const {
+    double seconds = 0;
+    for (const ExpansionRequest& e : batch) seconds += cell + triangle * static_cast<double>(e.count);
+    return seconds;
+  }
+};
+
+class SimulatedHost : public CpuOracle {
+ public:
+  explicit SimulatedHost(Time& time) : time_(time) {}
+  void submit(std::vector<ExpansionRequest>& batch) override {
+    if (answers) CpuOracle::submit(batch);
+    time_.now += Rates().of(batch);
+    cells += batch.size();
+  }
+  std::size_t cells = 0;
+  bool answers = true;  // or only their time passes
+
+ private:
+  Time& time_;
+};
+
+class SimulatedDevice : public CpuOracle {
+ public:
+  struct Resource : DeviceResource {
+    std::size_t bytes() const override { return 1; }
+  };
+
+  SimulatedDevice(Time& time, double its_latency, double its_speed)
+      : latency(its_latency), faster(its_speed), time_(time) {}
+
+  OracleKind kind() const override { return OracleKind::kCompute; }
+  std::shared_ptr<const DeviceResource> makeResident(const Surface& surface) override {
+    time_.now += latency + 1e-8 * static_cast<double>(surface.triangle_count);
+    ++uploads;
+    return has_room ? std::make_shared<Resource>() : nullptr;
+  }
+  void submit(std::vector<ExpansionRequest>& batch) override {
+    if (is_lost) return;
+    for (const ExpansionRequest& e : batch) {
+      EXPECT_NE(e.surface->device, nullptr) << "a mesh that the device does not have";
+      EXPECT_EQ(e.ids_up_to, ExpansionRequest::kAll);
+    }
+    if (answers) CpuOracle::submit(batch);
+    ready_ = std::max(time_.now, ready_) + latency + Rates().of(batch) / faster;
+    cells += batch.size();
+    ++batches;
+  }
+  // As oracles on a device do it: what a lost one leaves is the CPU's.
+  void wait(std::vector<ExpansionRequest>& batch) override {
+    if (is_lost) {
+      if (!loss_is_known_) time_.now += 10;
+      loss_is_known_ = true;
+      if (answers) CpuOracle::submit(batch);
+      time_.now += Rates().of(batch);
+      ++batches;
+      return;
+    }
+    time_.now = std::max(time_.now, ready_);
+  }
+
+  double latency, faster;
+  bool has_room = true, is_lost = false, answers = true;
+  std::size_t cells = 0, batches = 0, uploads = 0;
+
+ private:
+  Time& time_;
+  double ready_ = 0;
+  bool loss_is_known_ = false;
+};
+
+// All batches of a surface, a level each, and the lists that they are about.
+struct Levels {
+  explicit Levels(const Surface& on, int most) : surface(on) {
+    CpuOracle cpu;
+    std::vector<ExpansionRequest> level{rootOf(surface)};
+    for (int l = 1; l <= most; ++l) {
+      lists.emplace_back();
+      std::vector<ExpansionRequest> next;
+      for (const ExpansionRequest& e : ask(cpu, level)) {
+        for (std::size_t o = 0; o < 8; ++o) {
+          if ((e.grey >> o & 1) == 0) continue;
+          lists.back().emplace_back(e.lists.begin() + static_cast<std::ptrdiff_t>(e.list_begin[o]),
+                                    e.lists.begin() + static_cast<std::ptrdiff_t>(e.list_begin[o + 1]));
+          next.push_back(rootOf(surface));
+          next.back().cell = e.cell.octant(static_cast<int>(o));
+          next.back().ids = lists.back().back().data();
+          next.back().count = lists.back().back().size();
+        }
+      }
+      all.push_back(level);
+      level = next;
+    }
+  }
+  Surface surface;
+  std::vector<Lists> lists;
+  std::vector<std::vector<ExpansionRequest>> all;
+};
+
+// What a query asks for: some nodes of one level.
+std::vector<ExpansionRequest> some(const Levels& levels, std::size_t level, std::size_t count, std::mt19937_64& g) {
+  const std::vector<ExpansionRequest>& all = levels.all[level];
+  std::vector<ExpansionRequest> batch;
+  for (std::size_t i = g() % all.size(), n = std::min(count, all.size()); n > 0; --n) {
+    batch.push_back(all[i]);
+    i = (i + 7919) % all.size();
+  }
+  return batch;
+}
+
+void expectSameAnswers(const std::vector<ExpansionRequest>& asked, const std::vector<ExpansionRequest>& answers) {
+  CpuOracle cpu;
+  const std::vector<ExpansionRequest> expected = ask(cpu, asked);
+  for (std::size_t i = 0; i < asked.size(); ++i) {
+    EXPECT_EQ(answers[i].grey, expected[i].grey);
+    EXPECT_EQ(answers[i].surface, asked[i].surface);
+    EXPECT_EQ(answers[i].list_begin, expected[i].list_begin);
+    EXPECT_EQ(answers[i].kept_resource, nullptr) << "the host has all lists";
+    // An order is not promised.
+    for (std::size_t o = 0; o < 8; ++o) {
+      const auto sorted = [o](const ExpansionRequest& e) {
+        std::vector<std::uint32_t> ids(e.lists.begin() + static_cast<std::ptrdiff_t>(e.list_begin[o]),
+                                       e.lists.begin() + static_cast<std::ptrdiff_t>(e.list_begin[o + 1]));
+        std::sort(ids.begin(), ids.end());
+        return ids;
+      };
+      EXPECT_EQ(sorted(answers[i]), sorted(expected[i]));
+    }
+  }
+}
+
+enum class Job { kPath, kLarge, kMixed };
+
+// How long a job takes: growth along a path (1 to 8 nodes a batch), large batches, or both in turns.
+double secondsOf(Oracle& oracle, const Time& time, const Levels& levels, Job job, SimulatedHost& host,
+                 SimulatedDevice& device) {
+  host.answers = device.answers = false;
+  std::mt19937_64 g(3);
+  const double begin = time.now;
+  for (int i = 0; i < 200; ++i) {
+    const bool is_large = job == Job::kLarge || (job == Job::kMixed && i % 8 == 0);
+    const std::size_t level = is_large ? levels.all.size() - 1 : 2 + g() % 3;
+    auto batch = some(levels, level, is_large ? 2000 : 1 + g() % 8, g);
+    for (ExpansionRequest& e : batch) e.surface = &levels.surface;
+    ask(oracle, std::move(batch));
+  }
+  host.answers = device.answers = true;
+  return time.now - begin;
+}
+
+TEST(AutoOracle, IsAsGoodAsTheBetterOnAnyDevice) {
+  const Levels levels(surfaceOf(test::torus(64)), 7);
+  std::printf("simulated: latency, times the CPU's rate: CPU alone, device alone, kAuto in ms; path | large | mixed\n");
+  for (const double latency : {0.0, 20e-6, 100e-6, 1e-3, 10e-3}) {
+    for (const double faster : {0.1, 1.0, 10.0, 100.0}) {
+      std::printf("%6.2f ms %5.1f:", 1e3 * latency, faster);
+      for (const Job job : {Job::kPath, Job::kLarge, Job::kMixed}) {
+        Time time;
+        const auto host = std::make_shared<SimulatedHost>(time);
+        const auto device = std::make_shared<SimulatedDevice>(time, latency, faster);
+        const double alone = secondsOf(*host, time, levels, job, *host, *device);
+        Levels there = levels;
+        there.surface.device = device->makeResident(there.surface);
+        for (auto& level : there.all) {
+          for (ExpansionRequest& e : level) e.ids_up_to = ExpansionRequest::kAll;
+        }
+        const double on_device = secondsOf(*device, time, there, job, *host, *device);
+        AutoOracle both(host, device, time.clock());
+        const double seconds = secondsOf(both, time, levels, job, *host, *device);
+        const double better = std::min(alone, on_device);
+        std::printf(" %8.1f %8.1f %8.1f |", 1e3 * alone, 1e3 * on_device, 1e3 * seconds);
+        // 0.5 ms: the mesh comes to the device when the host was asked for as long.
+        EXPECT_LE(seconds, 1.1 * better + 5e-4) << "latency " << latency << ", rate " << faster;
+        if (job == Job::kMixed && latency == 100e-6 && faster >= 1) {
+          EXPECT_LT(seconds, 0.95 * better);
+        }
+      }
+      std::printf("\n");
+    }
+  }
+}
+
+TEST(AutoOracle, AnswersAreTheSameWhoeverGivesThem) {
+  const Levels a(surfaceOf(test::torus(40)), 6), b(surfaceOf(test::soup(500, 2)), 6);
+  for (const double latency : {0.0, 100e-6}) {
+    Time time;
+    const auto host = std::make_shared<SimulatedHost>(time);
+    const auto device = std::make_shared<SimulatedDevice>(time, latency, 3);
+    AutoOracle both(host, device, time.clock());
+    host->cells = device->cells = 0;
+    std::mt19937_64 g(5);
+    for (int i = 0; i < 100; ++i) {
+      std::vector<ExpansionRequest> batch = some(a, 1 + g() % 5, 1 + g() % 400, g);
+      for (const ExpansionRequest& e : some(b, g() % 6, g() % 100, g)) batch.push_back(e);
+      std::shuffle(batch.begin(), batch.end(), g);
+      expectSameAnswers(batch, ask(both, batch));
+    }
+    EXPECT_GT(host->cells, 0u);
+    EXPECT_GT(device->cells, 0u);
+    EXPECT_EQ(device->uploads, 3u + 2u) << "each mesh once";
+  }
+}
+
+TEST(AutoOracle, ADeviceThatSlowsDownIsLeftAndFoundAgain) {
+  const Levels levels(surfaceOf(test::torus(64)), 7);
+  Time time;
+  const auto host = std::make_shared<SimulatedHost>(time);
+  const auto device = std::make_shared<SimulatedDevice>(time, 50e-6, 20);
+  const double alone = secondsOf(*host, time, levels, Job::kLarge, *host, *device);
+  AutoOracle both(host, device, time.clock());
+  const double fast = secondsOf(both, time, levels, Job::kLarge, *host, *device);
+  EXPECT_LT(fast, 0.2 * alone);
+  device->faster = 0.5;  // something else computes there
+  EXPECT_LT(secondsOf(both, time, levels, Job::kLarge, *host, *device), 1.1 * alone);
+  device->faster = 20;
+  secondsOf(both, time, levels, Job::kLarge, *host, *device);
+  EXPECT_LT(secondsOf(both, time, levels, Job::kLarge, *host, *device), 1.5 * fast);
+}
+
+TEST(AutoOracle, ALostDeviceIsNotAskedAgain) {
+  const Levels levels(surfaceOf(test::torus(64)), 7);
+  Time time;
+  const auto host = std::make_shared<SimulatedHost>(time);
+  const auto device = std::make_shared<SimulatedDevice>(time, 50e-6, 20);
+  AutoOracle both(host, device, time.clock());
+  secondsOf(both, time, levels, Job::kLarge, *host, *device);
+  device->is_lost = true;
+  std::mt19937_64 g(7);
+  const std::vector<ExpansionRequest> batch = some(levels, 6, 1000, g);
+  expectSameAnswers(batch, ask(both, batch));
+  secondsOf(both, time, levels, Job::kLarge, *host, *device);
+  device->batches = 0;
+  secondsOf(both, time, levels, Job::kLarge, *host, *device);
+  EXPECT_LT(device->batches, 20u) << "of 200: a trial now and then";
+}
+
+TEST(AutoOracle, WhatTheDeviceCannotTakeIsTheHosts) {
+  const Levels levels(surfaceOf(test::torus(64)), 7);
+  Time time;
+  const auto host = std::make_shared<SimulatedHost>(time);
+  const auto device = std::make_shared<SimulatedDevice>(time, 50e-6, 20);
+  AutoOracle both(host, device, time.clock());
+  device->has_room = false;
+  device->cells = device->uploads = 0;
+  secondsOf(both, time, levels, Job::kLarge, *host, *device);
+  EXPECT_EQ(device->cells, 0u);
+  EXPECT_EQ(device->uploads, 1u) << "it is not asked to take it again";
+
+  AutoOracle never(host, device, time.clock());
+  expectSameAnswers(levels.all[5], ask(never, levels.all[5]));
+  EXPECT_EQ(device->cells, 0u);
+}
+
+// A mesh at the address of one that is gone is another mesh.
+TEST(AutoOracle, MeshesComeAndGo) {
+  Time time;
+  const auto host = std::make_shared<SimulatedHost>(time);
+  const auto device = std::make_shared<SimulatedDevice>(time, 50e-6, 20);
+  AutoOracle both(host, device, time.clock());
+  for (int i = 0; i < 40; ++i) {
+    const Levels levels(surfaceOf(test::torus(24 + static_cast<std::size_t>(i) % 3)), 5);
+    device->uploads = 0;
+    for (int k = 0; k < 20; ++k) expectSameAnswers(levels.all[4], ask(both, levels.all[4]));
+    EXPECT_EQ(device->uploads, 1u);
+  }
+}
+
+TEST(AutoOracle, ThreadsShareTheDevice) {
+  const Levels levels(surfaceOf(test::torus(40)), 6);
+  const auto thread = std::make_shared<gl::Thread>(gl::ContextRequest());
+  const auto compute = std::make_shared<gl::ComputeOracle>(thread);
+  AutoOracle both(std::make_shared<CpuOracle>(), compute);
+  std::vector<std::thread> threads;
+  for (unsigned k = 0; k < 4; ++k) {
+    threads.emplace_back([&, k] {
+      std::mt19937_64 g(k);
+      for (int i = 0; i < 20; ++i) {
+        const auto batch = some(levels, 1 + g() % 5, 1 + g() % 300, g);
+        expectSameAnswers(batch, ask(both, batch));
+      }
+    });
+  }
+  for (std::thread& t : threads) t.join();
+  EXPECT_EQ(compute->leftToCpu(), 0u);
+}
+
+}  // namespace
+}  // namespace bocst::oracle
