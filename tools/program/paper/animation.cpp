@@ -138,7 +138,8 @@ Animation::Run Animation::runOnce(const Setting& setting) const {
   for (std::size_t i = 0; i < kObstacles; ++i) {
     obstacles[i] = std::make_unique<Modeld>(scaled(*obstacles_[i], setting.dimension), options);
   }
-  const std::shared_ptr<oracle::Oracle> oracle = oracle::makeOracle(setting.oracle, options.paper.viewport);
+  const std::shared_ptr<oracle::Oracle> oracle =
+      oracle::makeOracle(setting.oracle, options.answer, options.paper.viewport);
 
   Run run;
   run.seconds.resize(kSeconds);
