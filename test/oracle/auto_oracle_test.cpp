@@ -56,7 +56,10 @@ class SimulatedHost : public CpuOracle {
 class SimulatedDevice : public CpuOracle {
  public:
   struct Resource : DeviceResource {
+    explicit Resource(int& all) : count(all) { ++count; }
+    ~Resource() override { --count; }
     std::size_t bytes() const override { return 1; }
+    int& count;
   };
 
   SimulatedDevice(Time& time, double its_latency, double its_speed)
@@ -66,7 +69,7 @@ class SimulatedDevice : public CpuOracle {
   std::shared_ptr<const DeviceResource> makeResident(const Surface& surface) override {
     time_.now += latency + 1e-8 * static_cast<double>(surface.triangle_count);
     ++uploads;
-    return has_room ? std::make_shared<Resource>() : nullptr;
+    return has_room ? std::make_shared<Resource>(resources) : nullptr;
   }
   void submit(std::vector<ExpansionRequest>& batch) override {
     if (is_lost) return;
@@ -95,6 +98,7 @@ class SimulatedDevice : public CpuOracle {
   double latency, faster;
   bool has_room = true, is_lost = false, answers = true;
   std::size_t cells = 0, batches = 0, uploads = 0;
+  int resources = 0;  // that somebody holds
 
  private:
   Time& time_;
@@ -295,6 +299,7 @@ TEST(AutoOracle, MeshesComeAndGo) {
     device->uploads = 0;
     for (int k = 0; k < 20; ++k) expectSameAnswers(levels.all[4], ask(both, levels.all[4]));
     EXPECT_EQ(device->uploads, 1u);
+    EXPECT_LT(device->resources, 12) << "those of meshes that are gone go";
   }
 }
 

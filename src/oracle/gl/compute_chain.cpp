@@ -207,37 +207,34 @@ void ComputeChain::take(const std::vector<ExpansionRequest*>& requests, const st
   const std::uint32_t* const all_ids = answers + kHeader + requests.size() * kRow;
   require(all_ids[answers[kIdWords]] == batch_, "what came back is not of this batch", thread);
   for (std::size_t i = 0; i < requests.size(); ++i) {
+    ExpansionRequest& e = *requests[i];
     const std::uint32_t* const row = answers + kHeader + i * kRow;
     require(row[kRowCheck] == check(rows_[i]), "a cell was not answered", thread);
     require(sums_[i] == 0 || row[kRowSum] == sums_[i], "it saw other triangles", thread);
-  }
-  for (std::size_t i = 0; i < requests.size(); ++i) {
-    ExpansionRequest& e = *requests[i];
-    const std::uint32_t* const row = answers + kHeader + i * kRow;
     CellAnswer answer;
     std::memcpy(static_cast<void*>(&answer), row, sizeof(answer));
     e.octants = answer.octants;
     e.own = answer.own;
     e.grey = answer.grey;
-    const std::uint32_t* ids = all_ids + row[kRowIds];
+    const std::uint32_t* const ids = all_ids + row[kRowIds];
     std::uint32_t list = row[kRowList];
-    e.lists.clear();
+    std::size_t here = 0;  // ids of the lists that came back lie one after the other
     e.kept_resource = nullptr;
     for (std::size_t o = 0; o < 8; ++o) {
       const std::uint32_t size = row[kRowSizes + o];
-      const bool here = size <= e.ids_up_to;
-      e.list_begin[o] = e.lists.size();
-      e.device_lists[o] = here ? ExpansionRequest::DeviceList{} : ExpansionRequest::DeviceList{list, size};
-      if (here) {
-        require(ids + size <= all_ids + answers[kIdWords], "a list is longer than what came back", thread);
-        e.lists.insert(e.lists.end(), ids, ids + size);
-        ids += size;
+      const bool is_here = size <= e.ids_up_to;
+      e.list_begin[o] = here;
+      e.device_lists[o] = is_here ? ExpansionRequest::DeviceList{} : ExpansionRequest::DeviceList{list, size};
+      if (is_here) {
+        here += size;
       } else {
         e.kept_resource = placed_;
       }
       list += size;
     }
-    e.list_begin[8] = e.lists.size();
+    e.list_begin[8] = here;
+    require(row[kRowIds] + here <= answers[kIdWords], "a list is longer than what came back", thread);
+    e.lists.assign(ids, ids + here);
   }
 }
 

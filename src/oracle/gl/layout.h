@@ -85,9 +85,10 @@ static_assert(sizeof(Cell) == 48, "std430 pads to 16 bytes");
 /// What answers say of a cell that they belong to; common.glsl has the same.
 constexpr std::uint32_t kCheckFactor = 0x9e3779b1u;
 inline std::uint32_t check(const Cell& cell) {
-  std::uint32_t words[sizeof(Cell) / 4], sum = 0;
+  std::uint32_t words[sizeof(Cell) / 4], sum = 0, factor = 1;
   std::memcpy(words, &cell, sizeof(cell));
-  for (const std::uint32_t word : words) sum = sum * kCheckFactor + word;
+  // From the last: products that need not wait for each other.
+  for (std::size_t i = sizeof(Cell) / 4; i-- > 0; factor *= kCheckFactor) sum += words[i] * factor;
   return sum;
 }
 
