@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #pragma once
 
+#include <Eigen/Core>
 #include <chrono>
 #include <cstddef>
 #include <nlohmann/json.hpp>
@@ -11,6 +12,9 @@ namespace bocst::program {
 
 /// Insertion order is reading order.
 using Json = nlohmann::ordered_json;
+
+/// [x, y, z].
+inline Json list(const Eigen::Vector3d& v) { return {v.x(), v.y(), v.z()}; }
 
 /// Where a report goes: a table on stdout, or JSON into a file or ("-") stdout.
 class Output {

@@ -55,8 +55,6 @@ void measureWarm(const QueryPair& pair, const Eigen::Isometry3d& X_AB, Run& run)
   run.warm_us = quantile(times, 0.5);
 }
 
-Json list(const Eigen::Vector3d& v) { return {v.x(), v.y(), v.z()}; }
-
 std::string tuple(const Eigen::Vector3d& v) {
   return "(" + formatNumber(v.x(), 6) + ", " + formatNumber(v.y(), 6) + ", " + formatNumber(v.z(), 6) + ")";
 }

@@ -71,8 +71,6 @@ std::string text(const Eigen::Vector3d& v) {
   return formatNumber(v.x(), 6) + ", " + formatNumber(v.y(), 6) + ", " + formatNumber(v.z(), 6);
 }
 
-Json list(const Eigen::Vector3d& v) { return {v.x(), v.y(), v.z()}; }
-
 /// The first few of a list, as text.
 template <typename T, typename Text>
 std::string firstFew(const std::vector<T>& all, const Text& text) {

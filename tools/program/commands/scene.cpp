@@ -31,7 +31,7 @@ std::string counted(std::size_t count, const std::string& what) {
 }
 
 /// A cell of CSV that may hold anything.
-std::string quoted(const std::string& text) {
+std::string csvCell(const std::string& text) {
   if (text.find_first_of(",\"\n") == std::string::npos) return text;
   std::string result = "\"";
   for (const char c : text) result += c == '"' ? std::string("\"\"") : std::string(1, c);
@@ -103,16 +103,16 @@ class SceneReport {
     if (!answers_.clearance.empty()) text += ",clearance,nearest_a,nearest_b";
     text += ",outside_limits\n";
     for (std::size_t k = 0; k < states(); ++k) {
-      text += std::to_string(k) + "," + quoted(setup_.states[k].place) + (answers_.hit[k] != 0 ? ",1," : ",0,") +
-              quoted(pairsText(k));
+      text += std::to_string(k) + "," + csvCell(setup_.states[k].place) + (answers_.hit[k] != 0 ? ",1," : ",0,") +
+              csvCell(pairsText(k));
       if (!answers_.clearance.empty()) {
         const Clearance& clearance = answers_.clearance[k];
         text += "," + (clearance.nearest
-                           ? Json(clearance.distance).dump() + "," + quoted(nameOf(clearance.nearest->first)) + "," +
-                                 quoted(nameOf(clearance.nearest->second))
+                           ? Json(clearance.distance).dump() + "," + csvCell(nameOf(clearance.nearest->first)) + "," +
+                                 csvCell(nameOf(clearance.nearest->second))
                            : std::string(",,"));
       }
-      text += "," + quoted(joined(outsideLimits(k), "; ")) + "\n";
+      text += "," + csvCell(joined(outsideLimits(k), "; ")) + "\n";
     }
     return text;
   }

@@ -28,7 +28,7 @@ constexpr std::array<Row, Validation::kKeys> kRows = {{
     {"mismatches", "mismatches"},
 }};
 
-Json json(const Overestimate& over, std::size_t depth) {
+Json overestimateJson(const Overestimate& over, std::size_t depth) {
   return {{"depth", depth}, {"false_positives", over.count()}, {"largest", over.largest},
           {"at", over.at},  {"pose", over.pose.numbers},       {"bins", over.bins}};
 }
@@ -106,7 +106,7 @@ Json Validation::json() const {
     }
     report["overestimates"] = Json::array();
     for (std::size_t i = 0; i < overestimates.size(); ++i) {
-      report["overestimates"].push_back(program::json(overestimates[i], i + 1));
+      report["overestimates"].push_back(overestimateJson(overestimates[i], i + 1));
     }
   }
   return report;
