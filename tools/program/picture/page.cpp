@@ -32,8 +32,6 @@ std::string base64(const std::vector<T>& data) {
   return base64(data.data(), data.size() * sizeof(T));
 }
 
-Json list(const Eigen::Vector3d& v) { return {v.x(), v.y(), v.z()}; }
-
 /// All but the finest levels that are too many.
 int levelsToShow(const std::vector<std::size_t>& counts) {
   std::size_t sum = 0;
