@@ -409,11 +409,12 @@ void Tree::startRent() {
   price_ = conservative() ? kNever : surface_.triangle_count / kRent;
 }
 
-void Tree::buildNow() {
+bool Tree::buildNow() {
   const std::unique_lock<ForkAwareMutex> lock(growth_, std::try_to_lock);
-  if (!lock.owns_lock() || !isBuildDue()) return;
+  if (!lock.owns_lock() || !isBuildDue()) return false;
   growWhole();
   countBytes();
+  return true;
 }
 
 // All of the tree that exact answers need. Queries under way go on in the old blocks.

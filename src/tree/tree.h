@@ -88,10 +88,8 @@ class Tree {
   void payRent(std::size_t triangles) const {
     if (price_.load(std::memory_order_relaxed) != kNever) rent_.fetch_add(triangles, std::memory_order_relaxed);
   }
-  /// Builds the whole tree when queries have paid as much as that costs. Unless another thread grows it.
-  void buildIfDue() {
-    if (isBuildDue()) buildNow();
-  }
+  /// Builds the whole tree when queries have paid as much as that costs, unless another thread grows it; did it?
+  bool buildIfDue() { return isBuildDue() && buildNow(); }
   /// No more expansions below this node: a single lattice unit, or the collision depth of conservative answers.
   bool isDeepest(int level) const { return level >= deepest_; }
   int deepest() const { return deepest_; }
@@ -165,7 +163,7 @@ class Tree {
   /// The host has all lists, so it can grow from the root grid and in bulk.
   bool growsOnHost() const { return oracle_->kind() == OracleKind::kCpu || oracle_->kind() == OracleKind::kAuto; }
   bool isBuildDue() const { return rent_.load(std::memory_order_relaxed) > price_.load(std::memory_order_relaxed); }
-  void buildNow();
+  bool buildNow();
   void startRent();
   void growRoot();
   void growFromGrid(NodeRef node);

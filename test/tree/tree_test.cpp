@@ -83,6 +83,32 @@ TEST(Tree, GrowthCostsAtMostTwiceABuild) {
   }
 }
 
+// A whole tree takes milliseconds, so two of them are built in two queries.
+TEST(Tree, AQueryBuildsOneWholeTreeAtMost) {
+  const std::shared_ptr<const Mesh> mesh = test::torus(250).mesh();
+  const std::size_t triangles = mesh->triangleCount();
+  const fcl::CollisionRequestd all(1 << 20);
+  for (unsigned seed = 0; seed < 5; ++seed) {
+    Modeld a(mesh), b(mesh);
+    std::mt19937_64 g(seed);
+    std::uniform_real_distribution<double> u(-1, 1);
+    std::size_t built_a = 0, built_b = 0;
+    int builds = 0;
+    for (int i = 0; i < 30; ++i) {
+      fcl::CollisionResultd result;
+      const fcl::Transform3d X(Eigen::Translation3d(u(g), u(g), u(g)));
+      fcl::collide(&a, fcl::Transform3d::Identity(), &b, X, all, result);
+      const std::size_t now_a = a.statistics().built_triangles, now_b = b.statistics().built_triangles;
+      const bool is_a = now_a >= built_a + triangles, is_b = now_b >= built_b + triangles;
+      EXPECT_FALSE(is_a && is_b) << "query " << i;
+      builds += is_a + is_b;
+      built_a = now_a;
+      built_b = now_b;
+    }
+    EXPECT_EQ(builds, 2);
+  }
+}
+
 // A sphere about the leaf of two large triangles meets far more cells than they do.
 TEST(Tree, MixedAnswersGrowAlongTheTrianglesOnly) {
   const std::vector<Eigen::Vector3d> corners{{-50, -50, 0}, {50, -50, 0}, {50, 50, 0}, {-50, 50, 0}};

@@ -22,8 +22,7 @@ class QueryScope {
         a_(a),
         // The system's clock need not be read twice.
         b_(b, a.options().clock || b.options().clock ? b.now() : a_.now()) {
-    a.buildIfDue();
-    b.buildIfDue();
+    if (!a.buildIfDue()) b.buildIfDue();  // one a query, as each may take milliseconds
   }
   ~QueryScope() {
     locks_.release();
