@@ -31,7 +31,7 @@ struct CostModel {
 /// A mesh is uploaded when batches would have taken less time, by as much as the upload takes, had it been there.
 ///
 /// Threads: any number. A thread that finds another at the books below asks the host.
-class AutoOracle : public Oracle {
+class BOCST_EXPORT AutoOracle : public Oracle {
  public:
   using Seconds = std::function<double()>;  ///< A clock.
 

@@ -8,11 +8,13 @@
 #include <cmath>
 #include <iostream>
 #include <memory>
+#include <random>
 #include <set>
 #include <utility>
 
 #include "lattice/limits.h"
 #include "mesh/subdivide.h"
+#include "oracle/auto_oracle.h"
 #include "oracle/oracle.h"
 
 namespace bocst::program {
@@ -141,6 +143,88 @@ void measureFirstAnswer(OracleKind kind, const std::shared_ptr<const Mesh>& mesh
   f.first_answer = quantile(times, 0.5);
 }
 
+/// What kAuto chooses from, and what batches of conservative growth take: along a path (1 to 8 cells), large ones, or
+/// both in turns.
+class PlacementBench {
+ public:
+  PlacementBench(const std::shared_ptr<const Mesh>& mesh, const std::shared_ptr<oracle::Oracle>& device)
+      : host_(oracle::makeOracle(OracleKind::kCpu)),
+        device_(device),
+        surface_{mesh, lattice::Lattice(mesh->bounds(), Subdivision::kBono, 0)} {
+    Level level;
+    level.requests.resize(1);
+    level.requests[0].surface = &surface_;
+    level.requests[0].count = surface_.triangle_count;
+    while (!level.requests.empty() && level.requests[0].cell.level < lattice::kMaxLevel) {
+      std::vector<ExpansionRequest> answers = answersTo(*host_, level.requests);
+      levels_.push_back(std::move(level));
+      if (levels_.back().requests.size() >= kLarge) break;
+      level = childrenOf(answers);
+    }
+    resident_ = surface_;
+    resident_.device = device_->makeResident(surface_);
+  }
+
+  /// A row for each job.
+  void run(Table& table, Json& rows) {
+    oracle::AutoOracle both(host_, device_);
+    for (const auto& [name, every] : {std::pair("path", 0), std::pair("large", 1), std::pair("mixed", 8)}) {
+      const std::vector<std::vector<ExpansionRequest>> batches = job(every);
+      std::vector<double> host, device, each;
+      for (int round = 0; round < 4; ++round) {
+        const double times[] = {seconds(*host_, surface_, batches), seconds(*device_, resident_, batches),
+                                seconds(both, surface_, batches)};
+        if (round == 0) continue;  // kAuto brings the mesh to the device
+        host.push_back(times[0]);
+        device.push_back(times[1]);
+        each.push_back(times[2]);
+      }
+      const double h = quantile(host, 0.5), d = quantile(device, 0.5), e = quantile(each, 0.5);
+      rows.push_back({{"job", name}, {"batches", batches.size()}, {"cpu_us", h}, {"device_us", d}, {"auto_us", e}});
+      table.row({name, std::to_string(batches.size()), formatTime(h), formatTime(d), formatTime(e),
+                 formatNumber(std::min(h, d) / e, 3) + " x"});
+    }
+  }
+
+ private:
+  static constexpr std::size_t kLarge = 2000;
+
+  std::vector<std::vector<ExpansionRequest>> job(int every) const {
+    std::mt19937_64 g(3);
+    std::vector<std::vector<ExpansionRequest>> batches;
+    for (int i = 0; i < (every == 1 ? 8 : 64); ++i) {
+      const bool is_large = every != 0 && i % every == 0;
+      const std::size_t depth = is_large ? levels_.size() - 1 : std::min(levels_.size() - 1, 2 + g() % 3);
+      const std::vector<ExpansionRequest>& all = levels_[depth].requests;
+      std::size_t at = g() % all.size();
+      batches.emplace_back();
+      for (std::size_t n = is_large ? std::min(kLarge, all.size()) : 1 + g() % 8; n > 0; --n) {
+        batches.back().push_back(all[at]);
+        batches.back().back().ids_up_to = ExpansionRequest::kAll;
+        at = (at + 1) % all.size();
+      }
+    }
+    return batches;
+  }
+
+  static double seconds(oracle::Oracle& oracle, const oracle::Surface& surface,
+                        std::vector<std::vector<ExpansionRequest>> batches) {
+    double sum = 0;
+    for (std::vector<ExpansionRequest>& batch : batches) {
+      for (ExpansionRequest& e : batch) e.surface = &surface;
+      const Stopwatch watch;
+      oracle.submit(batch);
+      oracle.wait(batch);
+      sum += watch.microseconds();
+    }
+    return sum;
+  }
+
+  std::shared_ptr<oracle::Oracle> host_, device_;
+  oracle::Surface surface_, resident_{surface_};
+  std::vector<Level> levels_;
+};
+
 }  // namespace
 
 int OracleBench::run(const Output& output) const {
@@ -198,10 +282,20 @@ int OracleBench::run(const Output& output) const {
                  device ? formatBytes(f.device_bytes) : "-"});
     }
   }
+  Table placement;
+  placement.row({"conservative growth", "batches", "cpu", "compute", "auto", "better of both / auto"});
+  report["placement"] = Json::array();
+  if (seen.count("compute") != 0) {
+    PlacementBench(loadMesh(file), oracle::makeOracle(OracleKind::kCompute)).run(placement, report["placement"]);
+  }
   if (output.wantsJson()) {
     output.write(report);
   } else {
     table.print();
+    if (!report["placement"].empty()) {
+      std::cout << '\n';
+      placement.print();
+    }
     for (const OracleInfo& info : oracles) std::cout << '\n' << info.name << ": " << info.device;
     std::cout << '\n';
     for (const std::string& name : slow)
