@@ -19,7 +19,7 @@ namespace bocst {
 namespace {
 
 /// Poses that a thread takes at a time: enough that taking them costs nothing, few enough to be shared out.
-constexpr std::size_t kRow = 256;
+constexpr std::size_t kPosesAtOnce = 256;
 
 enum class LastRow { kChecked, kIgnored };
 
@@ -61,8 +61,8 @@ template <typename S>
 void collideSome(const Model<S>& a, const Model<S>& b, const Poses<S>& X_AB, std::size_t begin, std::size_t end,
                  std::uint8_t* hit) {
   thread_local std::vector<fcl::Transform3<S>> near_poses;
-  std::array<std::uint32_t, kRow> near;
-  std::array<std::uint8_t, kRow> hits;
+  std::array<std::uint32_t, kPosesAtOnce> near;
+  std::array<std::uint8_t, kPosesAtOnce> hits;
   std::fill(hit + begin, hit + end, std::uint8_t{0});
   std::size_t count;
   {
@@ -82,9 +82,9 @@ void collideAll(const Model<S>& a, const Model<S>& b, const Poses<S>& X_AB, std:
   if (count == 0) return;
   if (X_AB.numbers(0) == nullptr) throw std::invalid_argument("bocst::collidePoses: X_AB is null");
   if (hit == nullptr) throw std::invalid_argument("bocst::collidePoses: hit is null");
-  const std::size_t rows = (count + kRow - 1) / kRow;
+  const std::size_t rows = (count + kPosesAtOnce - 1) / kPosesAtOnce;
   const auto work = [&](std::size_t row) {
-    collideSome(a, b, X_AB, row * kRow, std::min((row + 1) * kRow, count), hit);
+    collideSome(a, b, X_AB, row * kPosesAtOnce, std::min((row + 1) * kPosesAtOnce, count), hit);
     return true;
   };
   scene::Pool(rows > 1 ? threads : 1).share(rows, work);
@@ -113,5 +113,6 @@ void collidePoses(const Model<S>& a, const Model<S>& b, const S* X_AB, MatrixOrd
                              unsigned);
 BOCST_INSTANTIATE(float)
 BOCST_INSTANTIATE(double)
+#undef BOCST_INSTANTIATE
 
 }  // namespace bocst

@@ -201,5 +201,6 @@ S clearance(const World<S>& world, StateCheck<S>& check, const fcl::Transform3<S
   template S clearance(const World<S>&, StateCheck<S>&, const fcl::Transform3<S>*, PairAt&);
 BOCST_INSTANTIATE(float)
 BOCST_INSTANTIATE(double)
+#undef BOCST_INSTANTIATE
 
 }  // namespace bocst::scene

@@ -25,7 +25,7 @@ using scene::Object;
 using scene::World;
 
 /// States that one thread looks at in a row: enough of them to be alike, few enough to be shared out.
-constexpr std::size_t kRow = 128;
+constexpr std::size_t kStatesAtOnce = 128;
 /// An edge seldom has more; up to so many, middles come first among all.
 constexpr std::size_t kEdge = 512;
 
@@ -140,7 +140,7 @@ struct Scene<S>::Impl {
     if (goal == Goal::kAll) std::fill(hit, hit + states, std::uint8_t{0});
     if (states == 0 || moving == 0) return states;
     const bool all_at_once = goal == Goal::kAny && states <= kEdge;
-    const std::size_t length = all_at_once ? states : kRow, rows = (states + length - 1) / length;
+    const std::size_t length = all_at_once ? states : kStatesAtOnce, rows = (states + length - 1) / length;
     if (rows == 1) return sweepOfThread<S>().run(*w, X_WM, states, goal, hit, orthogonality_errors);
     const std::vector<std::size_t> order = goal == Goal::kAny ? bisected(rows) : std::vector<std::size_t>();
     // Of rows, in their order, the first that has what is looked for; rows after it need not be looked at.

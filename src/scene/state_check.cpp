@@ -157,5 +157,6 @@ bool StateCheck<S>::look(const fcl::Transform3<S>* X_WM, std::size_t count, std:
   template class StateCheck<S>;
 BOCST_INSTANTIATE(float)
 BOCST_INSTANTIATE(double)
+#undef BOCST_INSTANTIATE
 
 }  // namespace bocst::scene

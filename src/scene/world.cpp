@@ -269,5 +269,6 @@ World<S>::World(std::vector<Object<S>> moving_objects, std::vector<Object<S>> fi
   template void checkPose<S>(const char*, const fcl::Transform3<S>&);
 BOCST_INSTANTIATE(float)
 BOCST_INSTANTIATE(double)
+#undef BOCST_INSTANTIATE
 
 }  // namespace bocst::scene

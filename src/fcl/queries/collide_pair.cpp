@@ -656,5 +656,6 @@ void collideRow(const Model<S>& a, const Model<S>& b, const fcl::Transform3<S>* 
                                    std::optional<double>);
 BOCST_INSTANTIATE(float)
 BOCST_INSTANTIATE(double)
+#undef BOCST_INSTANTIATE
 
 }  // namespace bocst::fcl_adapter

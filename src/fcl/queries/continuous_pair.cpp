@@ -229,5 +229,6 @@ S continuousPair(const fcl::CollisionGeometry<S>* o1, const fcl::Transform3<S>& 
                             const fcl::ContinuousCollisionRequest<S>&, fcl::ContinuousCollisionResult<S>&);
 BOCST_INSTANTIATE(float)
 BOCST_INSTANTIATE(double)
+#undef BOCST_INSTANTIATE
 
 }  // namespace bocst::fcl_adapter
