@@ -23,8 +23,8 @@ struct DeviceReport {
 };
 const std::vector<DeviceReport>& deviceReports();
 
-/// What kAuto takes: the host's oracle beside compute on the first hardware GPU that passes its self-test; null without.
-/// The first call takes what the driver, the test and the first measurements need, if there is a GPU.
+/// What kAuto takes: the host's oracle beside compute on the first hardware GPU that passes its self-test; null
+/// without. The first call takes what the driver, the test and the first measurements need, if there is a GPU.
 std::shared_ptr<Oracle> makeOracleWithHardware(const std::shared_ptr<Oracle>& host);
 
 /// The oracle of this kind on a device, shared by all who ask as long as its context is not lost; without a device, on
