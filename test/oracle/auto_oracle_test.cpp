@@ -168,22 +168,31 @@ void expectSameAnswers(const std::vector<ExpansionRequest>& asked, const std::ve
 
 enum class Job { kPath, kLarge, kMixed };
 
-// How long a job takes: growth along a path (1 to 8 nodes a batch), large batches, or both in turns.
-double secondsOf(Oracle& oracle, const Time& time, const Levels& levels, Job job, SimulatedHost& host,
-                 SimulatedDevice& device) {
-  host.answers = device.answers = false;
-  std::mt19937_64 g(3);
-  const double begin = time.now;
-  for (int i = 0; i < (job == Job::kLarge ? 50 : 200); ++i) {
-    const bool is_large = job == Job::kLarge || (job == Job::kMixed && i % 8 == 0);
-    const std::size_t level = is_large ? levels.all.size() - 1 : 2 + g() % 3;
-    auto batch = some(levels, level, is_large ? 2000 : 1 + g() % 8, g);
-    for (ExpansionRequest& e : batch) e.surface = &levels.surface;
-    ask(oracle, std::move(batch));
+// A host and a device on one clock.
+struct Simulation {
+  Simulation(double latency, double faster)
+      : host(std::make_shared<SimulatedHost>(time)), device(std::make_shared<SimulatedDevice>(time, latency, faster)) {}
+
+  // How long a job takes: growth along a path (1 to 8 nodes a batch), large batches, or both in turns.
+  double secondsOf(Oracle& oracle, const Levels& levels, Job job) {
+    host->answers = device->answers = false;
+    std::mt19937_64 g(3);
+    const double begin = time.now;
+    for (int i = 0; i < (job == Job::kLarge ? 50 : 200); ++i) {
+      const bool is_large = job == Job::kLarge || (job == Job::kMixed && i % 8 == 0);
+      const std::size_t level = is_large ? levels.all.size() - 1 : 2 + g() % 3;
+      auto batch = some(levels, level, is_large ? 2000 : 1 + g() % 8, g);
+      for (ExpansionRequest& e : batch) e.surface = &levels.surface;
+      ask(oracle, std::move(batch));
+    }
+    host->answers = device->answers = true;
+    return time.now - begin;
   }
-  host.answers = device.answers = true;
-  return time.now - begin;
-}
+
+  Time time;
+  std::shared_ptr<SimulatedHost> host;
+  std::shared_ptr<SimulatedDevice> device;
+};
 
 TEST(AutoOracle, IsAsGoodAsTheBetterOnAnyDevice) {
   const Levels levels(surfaceOf(test::torus(64)), 7);
@@ -198,13 +207,12 @@ TEST(AutoOracle, IsAsGoodAsTheBetterOnAnyDevice) {
     for (const double faster : {0.1, 1.0, 10.0, 100.0}) {
       std::printf("%6.2f ms %5.1f:", 1e3 * latency, faster);
       for (const Job job : {Job::kPath, Job::kLarge, Job::kMixed}) {
-        Time time;
-        const auto host = std::make_shared<SimulatedHost>(time);
-        const auto device = std::make_shared<SimulatedDevice>(time, latency, faster);
-        const double alone = secondsOf(*host, time, levels, job, *host, *device);
-        const double on_device = secondsOf(*device, time, there, job, *host, *device);
+        Simulation simulated(latency, faster);
+        auto& [time, host, device] = simulated;
+        const double alone = simulated.secondsOf(*host, levels, job);
+        const double on_device = simulated.secondsOf(*device, there, job);
         AutoOracle both(host, device, time.clock());
-        const double seconds = secondsOf(both, time, levels, job, *host, *device);
+        const double seconds = simulated.secondsOf(both, levels, job);
         const double better = std::min(alone, on_device);
         std::printf(" %8.1f %8.1f %8.1f |", 1e3 * alone, 1e3 * on_device, 1e3 * seconds);
         // 0.5 ms: the mesh comes to the device when the host was asked for as long.
@@ -221,9 +229,8 @@ TEST(AutoOracle, IsAsGoodAsTheBetterOnAnyDevice) {
 TEST(AutoOracle, AnswersAreTheSameWhoeverGivesThem) {
   const Levels a(surfaceOf(test::torus(40)), 6), b(surfaceOf(test::soup(500, 2)), 6);
   for (const double latency : {0.0, 100e-6}) {
-    Time time;
-    const auto host = std::make_shared<SimulatedHost>(time);
-    const auto device = std::make_shared<SimulatedDevice>(time, latency, 3);
+    Simulation simulated(latency, 3);
+    auto& [time, host, device] = simulated;
     AutoOracle both(host, device, time.clock());
     host->cells = device->cells = 0;
     std::mt19937_64 g(5);
@@ -241,46 +248,43 @@ TEST(AutoOracle, AnswersAreTheSameWhoeverGivesThem) {
 
 TEST(AutoOracle, ADeviceThatSlowsDownIsLeftAndFoundAgain) {
   const Levels levels(surfaceOf(test::torus(64)), 7);
-  Time time;
-  const auto host = std::make_shared<SimulatedHost>(time);
-  const auto device = std::make_shared<SimulatedDevice>(time, 50e-6, 20);
-  const double alone = secondsOf(*host, time, levels, Job::kLarge, *host, *device);
+  Simulation simulated(50e-6, 20);
+  auto& [time, host, device] = simulated;
+  const double alone = simulated.secondsOf(*host, levels, Job::kLarge);
   AutoOracle both(host, device, time.clock());
-  const double fast = secondsOf(both, time, levels, Job::kLarge, *host, *device);
+  const double fast = simulated.secondsOf(both, levels, Job::kLarge);
   EXPECT_LT(fast, 0.2 * alone);
   device->faster = 0.5;  // something else computes there
-  EXPECT_LT(secondsOf(both, time, levels, Job::kLarge, *host, *device), 1.1 * alone);
+  EXPECT_LT(simulated.secondsOf(both, levels, Job::kLarge), 1.1 * alone);
   device->faster = 20;
-  secondsOf(both, time, levels, Job::kLarge, *host, *device);
-  EXPECT_LT(secondsOf(both, time, levels, Job::kLarge, *host, *device), 1.5 * fast);
+  simulated.secondsOf(both, levels, Job::kLarge);
+  EXPECT_LT(simulated.secondsOf(both, levels, Job::kLarge), 1.5 * fast);
 }
 
 TEST(AutoOracle, ALostDeviceIsNotAskedAgain) {
   const Levels levels(surfaceOf(test::torus(64)), 7);
-  Time time;
-  const auto host = std::make_shared<SimulatedHost>(time);
-  const auto device = std::make_shared<SimulatedDevice>(time, 50e-6, 20);
+  Simulation simulated(50e-6, 20);
+  auto& [time, host, device] = simulated;
   AutoOracle both(host, device, time.clock());
-  secondsOf(both, time, levels, Job::kLarge, *host, *device);
+  simulated.secondsOf(both, levels, Job::kLarge);
   device->is_lost = true;
   std::mt19937_64 g(7);
   const std::vector<ExpansionRequest> batch = some(levels, 6, 1000, g);
   expectSameAnswers(batch, ask(both, batch));
-  secondsOf(both, time, levels, Job::kLarge, *host, *device);
+  simulated.secondsOf(both, levels, Job::kLarge);
   device->batches = 0;
-  secondsOf(both, time, levels, Job::kLarge, *host, *device);
+  simulated.secondsOf(both, levels, Job::kLarge);
   EXPECT_LT(device->batches, 5u) << "of 50: a trial now and then";
 }
 
 TEST(AutoOracle, WhatTheDeviceCannotTakeIsTheHosts) {
   const Levels levels(surfaceOf(test::torus(64)), 7);
-  Time time;
-  const auto host = std::make_shared<SimulatedHost>(time);
-  const auto device = std::make_shared<SimulatedDevice>(time, 50e-6, 20);
+  Simulation simulated(50e-6, 20);
+  auto& [time, host, device] = simulated;
   AutoOracle both(host, device, time.clock());
   device->has_room = false;
   device->cells = device->uploads = 0;
-  secondsOf(both, time, levels, Job::kLarge, *host, *device);
+  simulated.secondsOf(both, levels, Job::kLarge);
   EXPECT_EQ(device->cells, 0u);
   EXPECT_EQ(device->uploads, 1u) << "it is not asked to take it again";
 
@@ -291,9 +295,8 @@ TEST(AutoOracle, WhatTheDeviceCannotTakeIsTheHosts) {
 
 // A mesh at the address of one that is gone is another mesh.
 TEST(AutoOracle, MeshesComeAndGo) {
-  Time time;
-  const auto host = std::make_shared<SimulatedHost>(time);
-  const auto device = std::make_shared<SimulatedDevice>(time, 50e-6, 20);
+  Simulation simulated(50e-6, 20);
+  auto& [time, host, device] = simulated;
   AutoOracle both(host, device, time.clock());
   for (int i = 0; i < 40; ++i) {
     const Levels levels(surfaceOf(test::torus(24 + static_cast<std::size_t>(i) % 3)), 5);
