@@ -1,6 +1,6 @@
 #!/usr/bin/env python3
 # SPDX-License-Identifier: BSD-3-Clause
-"""Usage: test/documents/run.py SOURCE BUILD [DOCUMENT...]
+"""Usage: test/documents/run.py SOURCE BUILD DOCUMENT...
 Does what the documents say: runs the commands of each fenced `sh` block as written, in order, in a folder that looks
 like a clone after `tools/quickstart`; builds the programs that they show; looks whether links lead somewhere.
 
@@ -100,7 +100,6 @@ def broken_links(document):
 def main():
     source, build = (pathlib.Path(argument).resolve() for argument in sys.argv[1:3])
     documents = [pathlib.Path(argument).resolve() for argument in sys.argv[3:]]
-    documents = documents or [source / "README.md", source / "CHANGELOG.md", *sorted((source / "share/doc").glob("*.md"))]
     if shutil.which("cmake") is None or not documents:
         return fail("documents", "no cmake, or no documents")
     failures = 0
