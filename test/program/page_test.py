@@ -170,6 +170,101 @@ class PageTest(unittest.TestCase):
                 self.assertEqual(browser.value(COVERAGE), 0)
                 self.assertEqual(browser.complaints, [])
 
+    def test_objects_contacts_and_scale(self):
+        report = self.report("collide", LINK, GRIPPER)
+        for width in (420, 1600):
+            with Browser(width=width, height=900) as browser:
+                browser.open(self.page)
+                browser.settle()
+                self.keep(browser, f"pair_{width}")
+                # Nothing is wider than the window, and the panel's parts do not overlap.
+                self.assertLessEqual(browser.value("document.documentElement.scrollWidth"), width)
+                self.assertGreater(browser.value("document.getElementById('view').clientHeight"), 300)
+                legend = browser.text("legend")
+                for word in ("A: link.obj", "B: gripper.obj", "surface", "volumes", "contacts", "normals"):
+                    self.assertIn(word, legend)
+
+                # Each object alone, neither, and both.
+                browser.choose("volume", "none")
+                browser.choose("contacts", False)
+                both = browser.value(COVERAGE)
+                browser.choose("object-0", False)
+                b = browser.value(COVERAGE)
+                browser.choose("object-1", False)
+                self.assertEqual(browser.value(COVERAGE), 0)
+                self.assertEqual(browser.text("count").split()[0], "0")
+                browser.choose("object-0", True)
+                a = browser.value(COVERAGE)
+                self.assertTrue(0 < a < both and 0 < b < both and a + b >= both, (a, b, both))
+
+                # The wireframe covers less than the surface, of which it is a part.
+                browser.choose("wires", True)
+                self.assertAlmostEqual(browser.value(COVERAGE) / a, 1, delta=0.1)  # lines reach half a pixel out of it
+                browser.choose("mesh", False)
+                self.assertTrue(0.05 * a < browser.value(COVERAGE) < 1.1 * a)
+                self.keep(browser, f"wires_{width}")
+                browser.choose("object-1", True)
+                browser.choose("mesh", True)
+                browser.choose("wires", False)
+                browser.choose("contacts", True)
+
+                # The bar's length is of the size of the meshes.
+                bar = "[Number(document.getElementById('scale-text').textContent), document.getElementById('scale-bar').offsetWidth]"
+                length, pixels = browser.value(bar)
+                self.assertTrue(40 <= pixels <= 121, pixels)
+                sizes = [b - a for a, b in zip(report["meshes"][0]["min"], report["meshes"][0]["max"])] if "meshes" in report else [1]
+                self.assertLess(length, 2 * math.hypot(*sizes))
+                self.assertEqual(browser.value("document.querySelectorAll('#axes text').length"), 3)
+
+                # A contact is looked at, and then all again.
+                listed = browser.value("[...document.querySelectorAll('#contact-list button')].map(b => b.textContent)")
+                self.assertEqual(len(listed), min(200, report["contacts"]))
+                self.assertRegex(listed[0], r"^1: at .*, depth .*, triangles \d+ and \d+$")
+                browser.value("document.querySelectorAll('#contact-list button')[1].click()")
+                browser.settle()
+                self.keep(browser, f"contact_{width}")
+                self.assertEqual(browser.value("document.querySelectorAll('#contact-list [aria-current=true]').length"), 1)
+                near, _ = browser.value(bar)
+                self.assertLess(near, length / 4)
+                browser.value("document.getElementById('whole').click()")
+                browser.settle()
+                self.assertEqual(browser.value(bar)[0], length)
+                self.assertEqual(browser.complaints, [])
+
+    def test_boxes_do_not_flicker(self):
+        # Boxes in whose faces the cube's own faces lie: a turn by a thousandth of a degree must hardly change a pixel.
+        mesh = os.path.join(self.folder.name, "cube.off")
+        with open(mesh, "w", encoding="ascii") as out:
+            out.write("OFF\n8 12 0\n" + "".join(f"{i & 1} {i >> 1 & 1} {i >> 2}\n" for i in range(8)))
+            for a, b, c, d in ((0, 2, 3, 1), (4, 5, 7, 6), (0, 1, 5, 4), (2, 6, 7, 3), (0, 4, 6, 2), (1, 3, 7, 5)):
+                out.write(f"3 {a} {b} {c}\n3 {a} {c} {d}\n")
+        self.report("inspect", mesh, "--depth", "5", "--no-error")
+        picture = """new Promise(done => {
+          const view = document.getElementById('view'), at = {pointerId: 1, clientX: 300, bubbles: true};
+          const send = (type, y) => view.dispatchEvent(new PointerEvent(type, {...at, clientY: y}));
+          view.setPointerCapture = () => {};
+          send('pointerdown', 300); send('pointermove', 300 + MOVE); send('pointerup', 300 + MOVE);
+          requestAnimationFrame(() => {
+            const copy = document.createElement('canvas');
+            [copy.width, copy.height] = [view.width, view.height];
+            const context = copy.getContext('2d');
+            context.drawImage(view, 0, 0);
+            done(Array.from(context.getImageData(0, 0, copy.width, copy.height).data.filter((_, i) => i % 4 === 0)));
+          });
+        })"""
+        with Browser(width=700, height=420) as browser:
+            browser.open(self.page)
+            browser.choose("volume", "boxes")
+            browser.choose("level", 4)
+            first = browser.value(picture.replace("MOVE", "0.1"))
+            for _ in range(3):
+                second = browser.value(picture.replace("MOVE", "0.002"))
+                changed = sum(abs(a - b) > 8 for a, b in zip(first, second))
+                self.assertLess(changed, len(first) / 2000)
+                first = second
+            self.keep(browser, "flicker")
+            self.assertEqual(browser.complaints, [])
+
     def test_validate_shows_the_worst_case(self):
         report = self.report("validate", LINK, GRIPPER, "--poses", "60", "--answer", "conservative", "--depth", "5",
                              "--histogram")

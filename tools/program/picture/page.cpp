@@ -125,14 +125,16 @@ void Page::faults(const Mesh& mesh, const Faults& faults) {
   scene_["objects"].back()["faults"] = base64(numbers);
 }
 
-void Page::contacts(const std::vector<TouchingPoint>& contacts) {
+void Page::contacts(const std::vector<TouchingPoint>& contacts, bool exact) {
   std::vector<double> numbers;
   for (std::size_t i = 0; i < std::min(contacts.size(), kMaxContacts); ++i) {
     const TouchingPoint& c = contacts[i];
-    numbers.insert(numbers.end(),
-                   {c.position.x(), c.position.y(), c.position.z(), c.normal.x(), c.normal.y(), c.normal.z(), c.depth});
+    numbers.insert(numbers.end(), c.position.data(), c.position.data() + 3);
+    numbers.insert(numbers.end(), c.normal.data(), c.normal.data() + 3);
+    numbers.insert(numbers.end(), {c.depth, double(c.triangles.first), double(c.triangles.second)});
   }
-  scene_["contacts"] = {{"total", contacts.size()}, {"numbers", base64(numbers)}};
+  scene_["contacts"] = {
+      {"total", contacts.size()}, {"of", exact ? "triangles" : "cells"}, {"numbers", base64(numbers)}};
 }
 
 void Page::moving(const std::vector<std::size_t>& objects, std::size_t states) {

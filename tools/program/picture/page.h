@@ -55,8 +55,8 @@ class Page {
   /// Edges and triangles of the last object that are faulty.
   void faults(const Mesh& mesh, const Faults& faults);
 
-  /// In the page's frame.
-  void contacts(const std::vector<TouchingPoint>& contacts);
+  /// In the page's frame. @param exact they are of triangles, not of cells.
+  void contacts(const std::vector<TouchingPoint>& contacts, bool exact);
 
   /// Objects that move, by their numbers, and the states that there are; those to be shown follow by state().
   void moving(const std::vector<std::size_t>& objects, std::size_t states);

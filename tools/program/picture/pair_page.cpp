@@ -21,7 +21,7 @@ Page pairPage(const GrownPair& grown) {
   page.tree(mesh_a, grown.pair->nodesA(), options.subdivision, options.dimension);
   page.object("B: " + grown.name_b, mesh_b, grown.pose.transform());
   page.tree(mesh_b, grown.pair->nodesB(), options.subdivision, options.dimension);
-  page.contacts(grown.contacts);
+  page.contacts(grown.contacts, grown.model.exact());
   return page;
 }
 

@@ -50,7 +50,16 @@ const states = scene.states ? scene.states.list : [];
 const movers = scene.states ? scene.states.moving.map((o) => scene.objects[o]) : [];
 for (const state of states) state.poses = decoded(state.poses, Float64Array);
 const moveTo = (state) => movers.forEach((object, i) => place(object, state.poses.subarray(16 * i, 16 * i + 16)));
-const contacts = scene.contacts ? decoded(scene.contacts.numbers, Float64Array) : new Float64Array();
+/** Position, normal from A to B, depth, in the page's frame; the triangles (or cells) of A and B. */
+const contacts = [];
+if (scene.contacts) {
+  const list = decoded(scene.contacts.numbers, Float64Array);
+  for (let i = 0; i < list.length; i += 9) {
+    contacts.push({position: list.subarray(i, i + 3), normal: list.subarray(i + 3, i + 6), depth: list[i + 6],
+      a: list[i + 7], b: list[i + 8]});
+  }
+}
+let chosenContact = -1;
 
 function boxCornersOf(object) {
   return [0, 1, 2, 3, 4, 5, 6, 7].map((i) => matrix.applied(object.toPage, [i & 1, i >> 1 & 1, i >> 2].map((x) => x - 0.5)));
@@ -82,6 +91,7 @@ const toBall = matrix.product(matrix.scaled(1 / ball.radius), matrix.moved(ball.
 const kinds = [...new Set(scene.objects.flatMap((object) => object.trees.map((tree) => tree.name)))];
 const chosen = {get tree() { return byId('tree').value; }, get volume() { return byId('volume').value; },
   get cut() { return byId('cut').value; }, get level() { return Number(byId('level').value); },
+  shown: scene.objects.map(() => true),
   get opacity() { return Number(byId('opacity').value); }, get state() { return Number(byId('state').value); }};
 const treesShown = () => scene.objects.map((object) => object.trees.find((tree) => tree.name === chosen.tree));
 const number = (x) => x.toLocaleString('en');
@@ -134,6 +144,7 @@ const shaders = {
     in vec3 p;
     flat in vec4 sphere;
     uniform mat4 projection;
+    uniform float near;
     uniform vec4 color;
     out vec4 result;
     void main() {
@@ -142,7 +153,7 @@ const shaders = {
       float aside = dot(c - along * way, c - along * way), inside = sphere.w * sphere.w - aside;
       if (inside < 0.0) discard;
       vec3 hit = (along - sqrt(inside)) * way;
-      if (hit.z > -0.01) discard;
+      if (hit.z > -near) discard;
       vec4 clip = projection * vec4(hit, 1);
       gl_FragDepth = clip.z / clip.w * 0.5 + 0.5;
       vec3 n = (hit - c) / sphere.w;
@@ -168,10 +179,18 @@ const shaders = {
       vec3 n = normalize(cross(dFdx(p), dFdy(p)));
       result = vec4(color.rgb * mix(1.0, 0.5 + 0.5 * abs(n.z), shading), color.a);
     }`],
+  wires: [`
+    layout(location = 0) in vec3 position;
+    uniform mat4 toEye, projection;
+    void main() { gl_Position = projection * toEye * vec4(position - 0.5, 1); }`, `
+    uniform vec4 color;
+    out vec4 result;
+    void main() { result = color; }`],
   marks: [`
     layout(location = 0) in vec3 position;
     uniform mat4 toEye, projection;
-    void main() { gl_Position = projection * toEye * vec4(position, 1); gl_PointSize = 5.0; }`, `
+    uniform float size;
+    void main() { gl_Position = projection * toEye * vec4(position, 1); gl_PointSize = size; }`, `
     uniform vec4 color;
     out vec4 result;
     void main() { result = color; }`],
@@ -179,7 +198,8 @@ const shaders = {
 
 const canvas = byId('view');
 const gl = canvas.getContext('webgl2', {alpha: false, antialias: true});
-const camera = {turn: 0.7, tilt: 0.45, distance: 2.5, aim: [0, 0]};
+// It looks at `focus`, in the unit ball about the scene, from `distance`; `aim` is what was moved aside, in the image's plane.
+const camera = {turn: 0.7, tilt: 0.45, distance: 2.5, aim: [0, 0], focus: [0, 0, 0], angle: 0.8};
 const objectColors = [[0.62, 0.68, 0.74], [0.80, 0.70, 0.56]];
 const touchColor = [0.87, 0.27, 0.20];
 /** Of two meshes one after the other; in a scene what moves and what does not. */
@@ -189,6 +209,8 @@ function colorOf(object, o) {
   return objectColors[movers.includes(object) ? 0 : 1];
 }
 const volumeColors = [[0.16, 0.47, 0.84], [0.90, 0.47, 0.13]];
+const pointColor = [0.85, 0.0, 0.25], normalColor = [0.55, 0.05, 0.35], faultColor = [0.85, 0.0, 0.1];
+const isShown = (object, o) => chosen.shown[o] && (states.length === 0 || byId('fixed').checked || movers.includes(object));
 const decodedFaults = (object) => object.faults ? decoded(object.faults, Float64Array) : new Float64Array();
 let faulty, programs, meshes, corners, instances, marks;
 
@@ -238,7 +260,7 @@ function prepare() {
   meshes = scene.objects.map((object) => ({
     array: vertexArray([[0, buffer(object.positions), 3, gl.UNSIGNED_SHORT, true, 0, 0, 0]],
       buffer(object.indices, gl.ELEMENT_ARRAY_BUFFER)),
-    count: object.indices.length}));
+    count: object.indices.length, wires: null}));
   corners = {quad: buffer(new Float32Array([-1, -1, 1, -1, -1, 1, 1, 1])), box: buffer(boxCorners),
     faces: buffer(boxFaces, gl.ELEMENT_ARRAY_BUFFER), edges: buffer(boxEdges, gl.ELEMENT_ARRAY_BUFFER)};
   instances = scene.objects.map(() => {
@@ -249,11 +271,11 @@ function prepare() {
       quads: vertexArray([[0, corners.quad, 2, gl.FLOAT, false, 0, 0, 0], node(1, 3, 0), node(3, 1, 24)])};
   });
   const points = [], lines = [];
-  for (let i = 0; i < contacts.length; i += 7) {
-    const p = matrix.applied(toBall, contacts.subarray(i, i + 3));
-    const length = Math.max(0.06, contacts[i + 6] / ball.radius);
+  for (const contact of contacts) {
+    const p = matrix.applied(toBall, contact.position);
+    const length = Math.max(0.06, contact.depth / ball.radius);
     points.push(...p);
-    lines.push(...p, ...p.map((x, k) => x + length * contacts[i + 3 + k]));
+    lines.push(...p, ...p.map((x, k) => x + length * contact.normal[k]));
   }
   faulty = scene.objects.map((object) => {
     const list = decodedFaults(object), ends = [];
@@ -270,17 +292,40 @@ function use(name, eye, object) {
   gl.useProgram(p.linked);
   gl.uniformMatrix4fv(p.at('toEye'), false, new Float32Array(eye));
   gl.uniformMatrix4fv(p.at('projection'), false, new Float32Array(camera.projection));
-  if (name === 'spheres') gl.uniform1f(p.at('scale'), object.size / ball.radius);
+  if (name === 'spheres') {
+    gl.uniform1f(p.at('scale'), object.size / ball.radius);
+    gl.uniform1f(p.at('near'), camera.near);
+  }
   return p;
+}
+
+/** The edges of an object's triangles, made when they are first wanted. */
+function wiresOf(o) {
+  if (!meshes[o].wires) {
+    const {indices} = scene.objects[o], ends = new Uint32Array(2 * indices.length);
+    for (let i = 0; i < indices.length; ++i) {
+      ends[2 * i] = indices[i];
+      ends[2 * i + 1] = indices[i % 3 === 2 ? i - 2 : i + 1];
+    }
+    meshes[o].wires = vertexArray([[0, buffer(scene.objects[o].positions), 3, gl.UNSIGNED_SHORT, true, 0, 0, 0]],
+      buffer(ends, gl.ELEMENT_ARRAY_BUFFER));
+  }
+  return meshes[o].wires;
 }
 
 function drawVolumes(o, eye) {
   const object = scene.objects[o], drawn = instances[o], spheres = chosen.volume === 'spheres';
-  if (drawn.count === 0 || chosen.volume === 'none') return;
+  if (drawn.count === 0 || chosen.volume === 'none' || !isShown(object, o)) return;
   const p = use(spheres ? 'spheres' : 'boxes', eye, object);
   gl.uniform4f(p.at('color'), ...volumeColors[o % 2], chosen.opacity);
   gl.uniform1f(p.at('shading'), 1);
   gl.bindVertexArray(spheres ? drawn.quads : drawn.faces);
+  // Neighbours share faces, of which one looks away; edges and meshes that lie in a face are drawn before it.
+  if (!spheres) {
+    gl.enable(gl.CULL_FACE);
+    gl.enable(gl.POLYGON_OFFSET_FILL);
+    gl.polygonOffset(1, 2);
+  }
   // The nearest surface first, in depth alone; then only that is blended over the mesh, each pixel once.
   for (const depth_only of [true, false]) {
     gl.colorMask(!depth_only, !depth_only, !depth_only, !depth_only);
@@ -290,18 +335,41 @@ function drawVolumes(o, eye) {
   }
   gl.depthFunc(gl.LEQUAL);
   if (spheres) return;
+  gl.disable(gl.CULL_FACE);
+  gl.disable(gl.POLYGON_OFFSET_FILL);
   gl.uniform4f(p.at('color'), ...volumeColors[o % 2].map((x) => x * 0.5), Math.min(1, chosen.opacity + 0.3));
   gl.uniform1f(p.at('shading'), 0);
   gl.bindVertexArray(drawn.edges);
   gl.drawElementsInstanced(gl.LINES, 24, gl.UNSIGNED_SHORT, 0, drawn.count);
 }
 
-function viewMatrix() {
+/** The page's axes as seen: a rotation. */
+function turned() {
   const [ct, st, cp, sp] = [Math.cos(camera.turn), Math.sin(camera.turn), Math.cos(camera.tilt), Math.sin(camera.tilt)];
   // z is up: turn about it, then tilt.
   const turn = [-st, -sp * ct, cp * ct, 0, ct, -sp * st, cp * st, 0, 0, cp, sp, 0, 0, 0, 0, 1];
   const stand = byId('up').value === 'y' ? [1, 0, 0, 0, 0, 0, 1, 0, 0, -1, 0, 0, 0, 0, 0, 1] : matrix.scaled(1);
-  return matrix.product(matrix.moved([...camera.aim, -camera.distance]), matrix.product(turn, stand));
+  return matrix.product(turn, stand);
+}
+
+function viewMatrix() {
+  const about = matrix.product(turned(), matrix.moved(camera.focus.map((x) => -x)));
+  return matrix.product(matrix.moved([...camera.aim, -camera.distance]), about);
+}
+
+/** The directions of the axes, and a length of 1, 2 or 5 times a power of ten, which is right at the camera's focus. */
+function drawScale() {
+  const turn = turned();
+  const ends = ['x', 'y', 'z'].map((name, k) => ({name, x: 34 * turn[4 * k], y: -34 * turn[4 * k + 1], z: turn[4 * k + 2],
+    color: ['#c22a1f', '#2f8a2b', '#1f56c4'][k]})).sort((a, b) => a.z - b.z);
+  byId('axes').replaceChildren(...ends.flatMap(({name, x, y, color}) => [
+    element('line', {x1: 0, y1: 0, x2: x, y2: y, stroke: color, 'stroke-width': 2}),
+    element('text', {x: 1.22 * x, y: 1.22 * y + 3, 'text-anchor': 'middle', style: `fill: ${color}`}, name)]));
+  const pixel = 2 * Math.tan(camera.angle / 2) * camera.distance * ball.radius / Math.max(1, canvas.clientHeight);
+  const most = 120 * pixel, power = 10 ** Math.floor(Math.log10(most));
+  const length = [5, 2, 1].map((x) => x * power).find((x) => x <= most) || power;
+  byId('scale-text').textContent = String(Number(length.toPrecision(2)));
+  byId('scale-bar').style.width = `${length / pixel}px`;
 }
 
 function draw() {
@@ -310,7 +378,9 @@ function draw() {
   canvas.width = Math.max(1, Math.round(canvas.clientWidth * ratio));
   canvas.height = Math.max(1, Math.round(canvas.clientHeight * ratio));
   gl.viewport(0, 0, canvas.width, canvas.height);
-  camera.projection = matrix.perspective(0.8, canvas.width / canvas.height, 0.02, camera.distance + Math.max(20, reach));
+  camera.near = Math.min(0.02, 0.1 * camera.distance);
+  camera.projection = matrix.perspective(camera.angle, canvas.width / canvas.height, camera.near,
+    camera.distance + Math.max(20, reach));
   gl.clearColor(0.957, 0.965, 0.973, 1);
   gl.clear(gl.COLOR_BUFFER_BIT | gl.DEPTH_BUFFER_BIT);
   gl.enable(gl.DEPTH_TEST);
@@ -319,36 +389,54 @@ function draw() {
   gl.blendFunc(gl.SRC_ALPHA, gl.ONE_MINUS_SRC_ALPHA);
   const view = matrix.product(viewMatrix(), toBall);
   const eyes = scene.objects.map((object) => matrix.product(view, object.toPage));
-  if (byId('mesh').checked) {
-    scene.objects.forEach((object, o) => {
-      if (states.length > 0 && !byId('fixed').checked && !movers.includes(object)) return;
+  scene.objects.forEach((object, o) => {
+    if (!isShown(object, o)) return;
+    if (byId('mesh').checked) {
       const p = use('mesh', eyes[o], object);
       gl.uniform4f(p.at('color'), ...colorOf(object, o), 1);
       gl.bindVertexArray(meshes[o].array);
+      gl.enable(gl.POLYGON_OFFSET_FILL);
+      gl.polygonOffset(0.5, 1);
       gl.drawElements(gl.TRIANGLES, meshes[o].count, gl.UNSIGNED_INT, 0);
-    });
-  }
+      gl.disable(gl.POLYGON_OFFSET_FILL);
+    }
+    if (byId('wires').checked) {
+      const p = use('wires', eyes[o], object);
+      gl.uniform4f(p.at('color'), ...colorOf(object, o).map((x) => 0.45 * x), 1);
+      gl.bindVertexArray(wiresOf(o));
+      gl.drawElements(gl.LINES, 2 * meshes[o].count, gl.UNSIGNED_INT, 0);
+    }
+  });
   scene.objects.forEach((object, o) => drawVolumes(o, eyes[o]));
+  gl.disable(gl.DEPTH_TEST);
   if (byId('faults').checked && faulty.some(({count}) => count > 0)) {
-    gl.disable(gl.DEPTH_TEST);
     const p = use('marks', viewMatrix());
-    gl.uniform4f(p.at('color'), 0.85, 0.0, 0.1, 1);
-    for (const {array, count} of faulty) {
+    gl.uniform4f(p.at('color'), ...faultColor, 1);
+    gl.uniform1f(p.at('size'), 5);
+    faulty.forEach(({array, count}, o) => {
+      if (!isShown(scene.objects[o], o)) return;
       gl.bindVertexArray(array);
       gl.drawArrays(gl.LINES, 0, count);
       gl.drawArrays(gl.POINTS, 0, count);
-    }
+    });
   }
   if (byId('contacts').checked && marks[0].count > 0) {
-    gl.disable(gl.DEPTH_TEST);
     const p = use('marks', viewMatrix());
+    gl.uniform1f(p.at('size'), 5);
     marks.forEach(({array, count}, lines) => {
-      gl.uniform4f(p.at('color'), ...(lines ? [0.55, 0.05, 0.35] : [0.85, 0.0, 0.25]), 1);
+      gl.uniform4f(p.at('color'), ...(lines ? normalColor : pointColor), 1);
       gl.bindVertexArray(array);
       gl.drawArrays(lines ? gl.LINES : gl.POINTS, 0, count);
     });
+    if (chosenContact >= 0) {
+      gl.uniform1f(p.at('size'), 12);
+      gl.uniform4f(p.at('color'), ...pointColor, 1);
+      gl.bindVertexArray(marks[0].array);
+      gl.drawArrays(gl.POINTS, chosenContact, 1);
+    }
   }
   gl.bindVertexArray(null);
+  drawScale();
 }
 
 let waiting = false;
@@ -363,7 +451,7 @@ function drawSoon() {
 function refill() {
   let total = 0;
   treesShown().forEach((tree, o) => {
-    const nodes = tree ? nodesToDraw(tree) : [];
+    const nodes = tree && chosen.shown[o] ? nodesToDraw(tree) : [];
     total += nodes.length;
     if (!gl) return;
     const numbers = new Float32Array(7 * nodes.length);
@@ -466,9 +554,10 @@ function notes() {
   if (states.length > 0 && scene.states.total > states.length) {
     lines.push(`${number(states.length)} of ${number(scene.states.total)} states are shown.`);
   }
-  if (scene.contacts && scene.contacts.total > contacts.length / 7) {
-    lines.push(`${number(contacts.length / 7)} of ${number(scene.contacts.total)} contacts are shown.`);
+  if (scene.contacts && scene.contacts.total > contacts.length) {
+    lines.push(`${number(contacts.length)} of ${number(scene.contacts.total)} contacts are shown.`);
   }
+  if (contacts.length > listedContacts) lines.push(`The first ${listedContacts} contacts are listed.`);
   byId('notes').textContent = lines.join(' ');
 }
 
@@ -491,7 +580,7 @@ function pointer() {
     drawSoon();
   });
   const zoom = (factor) => {
-    camera.distance = Math.max(0.05, Math.min(30, camera.distance * factor));
+    camera.distance = Math.max(0.002, Math.min(30, camera.distance * factor));
     drawSoon();
   };
   canvas.addEventListener('wheel', (e) => { e.preventDefault(); zoom(Math.exp(e.deltaY * 0.0012)); }, {passive: false});
@@ -500,17 +589,86 @@ function pointer() {
   });
 }
 
-/** Contacts are looked at from their side of the scene. */
-function lookAtContacts() {
-  const middle = [0, 0, 0];
-  for (let i = 0; i < contacts.length; i += 7) {
-    const p = matrix.applied(toBall, contacts.subarray(i, i + 3));
-    for (let k = 0; k < 3; ++k) middle[k] += p[k] / (contacts.length / 7);
-  }
-  const distance = Math.hypot(...middle);
+/** A place in the unit ball is looked at from its side of the scene. */
+function lookFromTheSideOf(place) {
+  const distance = Math.hypot(...place);
   if (!(distance > 0.02)) return;
-  camera.turn = Math.atan2(middle[1], middle[0]) + 0.35;
-  camera.tilt = Math.max(-0.9, Math.min(1.2, Math.asin(middle[2] / distance) + 0.2));
+  camera.turn = Math.atan2(place[1], place[0]) + 0.35;
+  camera.tilt = Math.max(-0.9, Math.min(1.2, Math.asin(place[2] / distance) + 0.2));
+}
+
+function lookAtAll() {
+  Object.assign(camera, {distance: 2.5, aim: [0, 0], focus: [0, 0, 0]});
+  const middle = [0, 0, 0];
+  for (const {position} of contacts) {
+    matrix.applied(toBall, position).forEach((x, k) => { middle[k] += x / contacts.length; });
+  }
+  lookFromTheSideOf(middle);
+  choseContact(-1);
+}
+
+/** Zooms to a contact; -1: none. */
+function choseContact(at) {
+  chosenContact = at;
+  [...byId('contact-list').children].forEach((line, i) => {
+    line.firstChild.setAttribute('aria-current', String(i === at));
+  });
+  if (at >= 0) {
+    const place = matrix.applied(toBall, contacts[at].position);
+    Object.assign(camera, {distance: Math.min(camera.distance, 0.3), aim: [0, 0], focus: place});
+    lookFromTheSideOf(place);
+  }
+  drawSoon();
+}
+
+const listedContacts = 200;
+function listContacts() {
+  const digits = (x) => Number(x.toPrecision(4));
+  byId('contact-list').replaceChildren(...contacts.slice(0, listedContacts).map((contact, i) => {
+    const line = document.createElement('li'), button = document.createElement('button');
+    button.type = 'button';
+    button.textContent = `${i + 1}: at ${Array.from(contact.position, digits).join(', ')}, depth ${digits(contact.depth)}, ` +
+      `${scene.contacts.of} ${contact.a} and ${contact.b}`;
+    button.addEventListener('click', () => choseContact(i));
+    line.append(button);
+    return line;
+  }));
+}
+
+/** What is drawn in which colour; each of two objects is shown or not. */
+function legend() {
+  const css = (color) => `rgb(${color.map((x) => Math.round(255 * x)).join(' ')})`;
+  const swatch = (color, text) => {
+    const square = document.createElement('span');
+    square.className = 'swatch';
+    square.style.background = css(color);
+    return [square, text];
+  };
+  const row = (...parts) => {
+    const line = document.createElement('li');
+    line.append(...parts);
+    byId('legend').append(line);
+  };
+  if (states.length > 0) {
+    row(...swatch(objectColors[0], 'moves'), ...swatch(objectColors[1], 'does not move'), ...swatch(touchColor, 'touches'));
+    return;
+  }
+  scene.objects.forEach((object, o) => {
+    const label = document.createElement('label');
+    if (scene.objects.length > 1) {
+      const box = document.createElement('input');
+      Object.assign(box, {type: 'checkbox', id: `object-${o}`, checked: true});
+      box.addEventListener('input', () => {
+        chosen.shown[o] = box.checked;
+        refill();
+      });
+      label.append(box, ' ');
+    }
+    label.append(object.name);
+    row(label, ...swatch(objectColors[o % 2], 'surface'), ...(kinds.length > 0 ? swatch(volumeColors[o % 2], 'volumes') : []));
+  });
+  if (contacts.length > 0) row(...swatch(pointColor, 'contacts'), ...swatch(normalColor, 'normals, from A to B'));
+  if (scene.objects.some((object) => decodedFaults(object).length > 0)) row(...swatch(faultColor, 'faults'));
 }
 
 function start() {
@@ -530,11 +688,13 @@ function start() {
   byId('state').value = 0;
   byId('next').disabled = !states.some((state) => state.contacts.length > 0);
   byId('faults-row').hidden = !scene.objects.some((object) => decodedFaults(object).length > 0);
-  // A tree that queries grew ends at many levels; one grown whole ends at one.
+  // A tree that queries grew ends at many levels; a fully expanded one ends at one.
   byId('cut-row').hidden = !scene.contacts;
   byId('level').max = Math.max(1, ...treesShown().map((tree) => tree ? tree.levels : 1));
   byId('level').value = Math.min(Number(byId('level').max), 5);
-  lookAtContacts();
+  legend();
+  listContacts();
+  lookAtAll();
   if (gl) {
     prepare();
     pointer();
@@ -548,8 +708,9 @@ function start() {
   byId('tree').addEventListener('input', treeChosen);
   byId('state').addEventListener('input', stateChosen);
   byId('next').addEventListener('click', nextCollision);
+  byId('whole').addEventListener('click', lookAtAll);
   for (const id of ['level', 'cut']) byId(id).addEventListener('input', refill);
-  for (const id of ['volume', 'opacity', 'mesh', 'fixed', 'faults', 'contacts', 'up']) byId(id).addEventListener('input', drawSoon);
+  for (const id of ['volume', 'opacity', 'mesh', 'wires', 'fixed', 'faults', 'contacts', 'up']) byId(id).addEventListener('input', drawSoon);
   notes();
   if (states.length > 0) stateChosen();
   refill();
