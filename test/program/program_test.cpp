@@ -781,6 +781,14 @@ TEST_F(Program, SetsThePaperBesideIt) {
   EXPECT_EQ(shown.size(), 5u);
   EXPECT_EQ(shown, there);
   EXPECT_NE(text.find("--frames 70 --oracle cpu"), std::string::npos) << "how it was made";
+  // Table 3: what the runs were made with.
+  const std::size_t parameters = text.find("## Table 3");
+  ASSERT_NE(parameters, std::string::npos);
+  for (const char* row : {"| Coll. depth | 5 | 5 | 5, 6 | 5, 6 |", "| Max. time | 2.0 | 2 | 2.0 | 2 |",
+                          "| Anim. frames | 2200 | 70 | 2200 | 70 |",
+                          "| d_t | 514, 832, 1024 | 514, 832, 1024 | 514, 832, 1024 | 514, 832, 1024 |"}) {
+    EXPECT_NE(text.find(row, parameters), std::string::npos) << row;
+  }
 }
 
 TEST_F(Program, ExplainsWhyThereIsNoPaper) {

@@ -5,6 +5,7 @@
 #include <cmath>
 #include <filesystem>
 #include <initializer_list>
+#include <set>
 #include <sstream>
 #include <utility>
 
@@ -446,6 +447,33 @@ void writeAnimation(Text& text, const AnimationStudy& study) {
   text.table(rows, 2);
 }
 
+std::string joined(const std::set<double>& values) {
+  std::string text;
+  for (const double value : values) text += (text.empty() ? "" : ", ") + formatPlain(value);
+  return text;
+}
+
+/// The paper's parameters, and those that all runs of the study were made with.
+void writeParameters(Text& text, const AnimationStudy& study) {
+  text.heading(2, "Table 3: parameters of the animation");
+  std::vector<std::vector<std::string>> rows{{"", "O, paper", "bocst", "B, paper", "bocst"}};
+  for (const PaperParameter& p : paperParameters()) rows.push_back({p.name, p.octree, "", p.bono, ""});
+  for (const Subdivision subdivision : {Subdivision::kOctree, Subdivision::kBono}) {
+    std::set<double> depths, dimensions;
+    for (const PaperRun& run : paperRuns()) {
+      if (run.subdivision != subdivision) continue;
+      depths.insert(run.depth);
+      dimensions.insert(run.dimension);
+    }
+    const std::size_t column = subdivision == Subdivision::kOctree ? 2 : 4;
+    rows[1][column] = joined(depths);
+    rows[2][column] = formatPlain(static_cast<double>(Animation::kMaxTime.count()) / 1000);
+    rows[3][column] = std::to_string(study.frames);
+    rows[4][column] = joined(dimensions);
+  }
+  text.table(rows, 1);
+}
+
 // What the paper claims.
 
 std::string holds(bool it_does) { return it_does ? "yes" : "**no**"; }
@@ -532,6 +560,7 @@ PaperReport paperReport(const PaperStudy& study, const std::string& command) {
     writeErrors(text, trees, report.pictures);
   }
   writeAnimation(text, study.animation);
+  writeParameters(text, study.animation);
   if (const OfOracle* shown = shownOracle(study.animation)) {
     for (const int table : {4, 5, 6}) writeRun(text, study.animation, *shown, table, report.pictures);
     writeClaims(text, study.animation, *shown);

@@ -44,6 +44,21 @@ inline const std::vector<PaperMesh>& paperMeshes() {
   return meshes;
 }
 
+/// Table 3: what the animation was run with, by method.
+struct PaperParameter {
+  const char* name;
+  const char* octree;
+  const char* bono;
+};
+
+inline const std::vector<PaperParameter>& paperParameters() {
+  static const std::vector<PaperParameter> parameters = {{"Coll. depth", "5", "5, 6"},
+                                                         {"Max. time", "2.0", "2.0"},
+                                                         {"Anim. frames", "2200", "2200"},
+                                                         {"d_t", "514, 832, 1024", "514, 832, 1024"}};
+  return parameters;
+}
+
 /// Tables 4 to 6: one method's column.
 struct PaperRun {
   struct Second {
