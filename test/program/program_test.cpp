@@ -532,6 +532,9 @@ TEST_F(Program, HasARowForEachGoal) {
                                 "deforming_refit",
                                 "deforming_refit_replace"}) {
     ASSERT_EQ(rows.count(row), 1u) << row;
+#if defined(__SANITIZE_ADDRESS__) || defined(__SANITIZE_THREAD__)
+    if (std::string(row) == "heap") continue;  // a sanitizer's allocator does not tell mallinfo2()
+#endif
     EXPECT_GT(rows[row].at("ratio"), 0) << row;
   }
   for (const std::string row : {"first_over_streaming", "streaming_pass", "growth_first_2000", "growth_query_2000"}) {
@@ -561,6 +564,9 @@ TEST_F(Program, HasARowForEachGoal) {
   }
   for (const char* row : {"threads_one", "threads_two", "threads_gain", "threads_cold_two"}) {
     ASSERT_EQ(rows.count(row), 1u) << row;
+#if defined(__SANITIZE_ADDRESS__) || defined(__SANITIZE_THREAD__)
+    if (std::string(row) == "heap") continue;  // a sanitizer's allocator does not tell mallinfo2()
+#endif
     EXPECT_GT(rows[row].at("ratio"), 0) << row;
   }
 }
