@@ -236,7 +236,7 @@ TEST(Page, LeavesOutWhatIsTooMuchAndSaysSo) {
   page.tree(*mesh, nodes, Subdivision::kOctree, 0);
   nodes.pop_back();
   page.tree(*mesh, nodes, Subdivision::kBono, 0);
-  page.contacts(std::vector<program::TouchingPoint>(program::Page::kMaxContacts + 5));
+  page.contacts(std::vector<program::TouchingPoint>(program::Page::kMaxContacts + 5), false);
   const program::Json scene = sceneOf(page);
   EXPECT_EQ(scene.at("title"), "</script><b>");
   const program::Json& trees = scene.at("objects")[0].at("trees");
@@ -245,8 +245,9 @@ TEST(Page, LeavesOutWhatIsTooMuchAndSaysSo) {
   EXPECT_EQ(trees[1].at("levels"), 2);
   EXPECT_EQ(trees[1].at("level_of").get<std::string>().size(), (program::Page::kMaxNodes + 2) / 3 * 4);
   EXPECT_EQ(scene.at("contacts").at("total"), program::Page::kMaxContacts + 5);
+  EXPECT_EQ(scene.at("contacts").at("of"), "cells");
   EXPECT_EQ(scene.at("contacts").at("numbers").get<std::string>().size(),
-            (program::Page::kMaxContacts * 56 + 2) / 3 * 4);
+            (program::Page::kMaxContacts * 72 + 2) / 3 * 4);
 }
 
 TEST(Spheres, HoldTheSurface) {
