@@ -7,6 +7,7 @@
 #include <array>
 #include <cmath>
 #include <cstdint>
+#include <limits>
 #include <map>
 #include <random>
 #include <set>
@@ -223,6 +224,16 @@ program::Json sceneOf(const program::Page& page) {
   const std::string before = "<script type=\"application/json\" id=\"scene\">";
   const std::size_t begin = html.find(before) + before.size();
   return program::Json::parse(html.substr(begin, html.find("</script>", begin) - begin));
+}
+
+TEST(Numbers, AreWrittenWhateverTheyAre) {
+  const double infinity = std::numeric_limits<double>::infinity();
+  EXPECT_EQ(program::formatNumber(123.456), "123");
+  EXPECT_EQ(program::formatNumber(0), "0.00");
+  EXPECT_EQ(program::formatNumber(-infinity), "-inf");
+  EXPECT_EQ(program::formatRatio(12.34), "12.3 x");
+  EXPECT_EQ(program::formatRatio(infinity), "-");
+  EXPECT_EQ(program::formatRatio(infinity - infinity), "-");
 }
 
 TEST(Page, LeavesOutWhatIsTooMuchAndSaysSo) {

@@ -94,10 +94,10 @@ double mean(const std::vector<double>& samples) {
 std::string formatNumber(double value, int digits) {
   char text[64];
   const double size = std::abs(value);
-  const int before = size >= 1 ? static_cast<int>(std::floor(std::log10(size))) + 1 : 1;
-  if (size != 0 && (size < 1e-4 || size >= 1e15)) {
+  if (!std::isfinite(value) || (size != 0 && (size < 1e-4 || size >= 1e15))) {
     std::snprintf(text, sizeof(text), "%.*g", digits, value);
   } else {
+    const int before = size >= 1 ? static_cast<int>(std::floor(std::log10(size))) + 1 : 1;
     const int zeros = size > 0 && size < 1 ? static_cast<int>(-std::floor(std::log10(size))) : 0;
     std::snprintf(text, sizeof(text), "%.*f", std::max(0, digits - before + zeros), value);
   }
@@ -123,6 +123,6 @@ std::string formatBytes(double bytes) {
   return formatNumber(bytes / 1e9) + " GB";
 }
 
-std::string formatRatio(double ratio) { return formatNumber(ratio) + " x"; }
+std::string formatRatio(double ratio) { return std::isfinite(ratio) ? formatNumber(ratio) + " x" : "-"; }
 
 }  // namespace bocst::program

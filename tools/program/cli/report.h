@@ -89,6 +89,6 @@ std::string formatTime(double microseconds);
 std::string formatBytes(double bytes);
 std::string formatNumber(double value, int digits = 3);  ///< That many significant digits, no exponent if short.
 std::string formatPlain(double value);                   ///< "514", "0.05": up to twelve digits, no zeros after them.
-std::string formatRatio(double ratio);                   ///< "12.3 x"
+std::string formatRatio(double ratio);                   ///< "12.3 x"; "-" beside nothing.
 
 }  // namespace bocst::program
