@@ -212,8 +212,7 @@ class PageTest(unittest.TestCase):
                 bar = "[Number(document.getElementById('scale-text').textContent), document.getElementById('scale-bar').offsetWidth]"
                 length, pixels = browser.value(bar)
                 self.assertTrue(40 <= pixels <= 121, pixels)
-                sizes = [b - a for a, b in zip(report["meshes"][0]["min"], report["meshes"][0]["max"])] if "meshes" in report else [1]
-                self.assertLess(length, 2 * math.hypot(*sizes))
+                self.assertTrue(0.01 < length < 0.5, length)  # link and gripper together are some 0.4 m long
                 self.assertEqual(browser.value("document.querySelectorAll('#axes text').length"), 3)
 
                 # A contact is looked at, and then all again.
