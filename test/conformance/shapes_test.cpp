@@ -12,6 +12,7 @@
 
 #include "conformance/reference.h"
 #include "conformance/truth.h"
+#include "sanitized.h"
 
 namespace bocst {
 namespace {
@@ -306,7 +307,7 @@ TYPED_TEST(Shapes, ConservativeAnswersMissNothing) {
         models.push_back(std::make_unique<Model<S>>(raw.mesh(), options));
       }
       int hits[3] = {0, 0, 0}, expected = 0;
-      forPoses<S>(40, 4, truth, [&](int i, const auto& X, const auto& Y) {
+      forPoses<S>(test::repetitions(40), 4, truth, [&](int i, const auto& X, const auto& Y) {
         const double distance = truth.distance(X, Y);
         expected += distance == 0;
         for (std::size_t m = 0; m < models.size(); ++m) {

@@ -429,7 +429,7 @@ TEST(Tree, BoundsHoldTheSurfaceHoweverTheyWereLearnt) {
         lattice::Cell cell;
         ASSERT_TRUE(contains(tree.rootBounds(), cell, p));
         tree::ChildRef ref = tree.childRef(tree::NodeRef());
-        // Below loose blocks, the lane that has the triangle is found by looking into all.
+        // Below loose blocks each triangle is in one lane: of those that hold the point, one must lead to it.
         const auto isHeld = [&](auto& again, tree::ChildRef at) -> bool {
           if (at.isList()) {
             std::vector<std::uint32_t> ids;
@@ -438,13 +438,14 @@ TEST(Tree, BoundsHoldTheSurfaceHoweverTheyWereLearnt) {
           }
           const tree::Block& block = tree.block(at.index());
           for (int o = 0; o < 8; ++o) {
-            if ((block.grey >> o & 1) == 0 || !again(again, block.child[o].load())) continue;
+            if ((block.grey >> o & 1) == 0) continue;
             const Eigen::AlignedBox3d box = block.looseBox(o);
             const double unit = block.frame().longest() / 512;
             double along = 0;
             for (int k = 0; k < 3; ++k) along += block.octants.normal[k][o] / 127.0 * (p[k] - box.center()[k]);
-            return box.contains(p) &&
-                   std::abs(along - block.octants.slab_center[o] * 2 * unit) <= block.octants.slab_half[o] * unit;
+            const bool holds = box.contains(p) && std::abs(along - block.octants.slab_center[o] * 2 * unit) <=
+                                                      block.octants.slab_half[o] * unit;
+            if (holds && again(again, block.child[o].load())) return true;
           }
           return false;
         };
