@@ -71,7 +71,7 @@ class DaeReader {
     const pugi::xml_attribute meter = unit.attribute("meter");
     double size = 1;
     if (meter && !(toNumber(meter.value(), size) && size > 0 && std::isfinite(size))) {
-      fail(unit, "meter=" + quoted(meter.value()) + " is no positive number");
+      fail(unit, "meter=" + inQuotes(meter.value()) + " is no positive number");
     }
     return size;
   }
@@ -82,7 +82,7 @@ class DaeReader {
       const std::string_view name = node.name();
       if (name == "geometry" || name == "node" || name == "visual_scene" || name == "controller") {
         const std::string_view id = node.attribute("id").value();
-        if (!id.empty() && !ids_.emplace(id, node).second) fail(node, "twice the id " + quoted(id));
+        if (!id.empty() && !ids_.emplace(id, node).second) fail(node, "twice the id " + inQuotes(id));
       }
       if (node.first_child()) {
         node = node.first_child();
@@ -97,11 +97,11 @@ class DaeReader {
   pugi::xml_node target(const pugi::xml_node& node, const char* attribute,
                         std::initializer_list<std::string_view> names) const {
     const std::string_view url = node.attribute(attribute).value();
-    if (url.empty() || url[0] != '#') fail(node, quoted(url) + " is no place in this file");
+    if (url.empty() || url[0] != '#') fail(node, inQuotes(url) + " is no place in this file");
     const auto found = ids_.find(url.substr(1));
-    if (found == ids_.end()) fail(node, "there is no " + quoted(url));
+    if (found == ids_.end()) fail(node, "there is no " + inQuotes(url));
     if (std::find(names.begin(), names.end(), found->second.name()) == names.end()) {
-      fail(node, quoted(url) + " is a <" + found->second.name() + ">");
+      fail(node, inQuotes(url) + " is a <" + found->second.name() + ">");
     }
     return found->second;
   }
@@ -121,7 +121,7 @@ class DaeReader {
           continue;
         }
         const std::string what =
-            quoted(word) + (std::is_same_v<Number, double> ? " is no finite number" : " is no index");
+            inQuotes(word) + (std::is_same_v<Number, double> ? " is no finite number" : " is no index");
         const std::ptrdiff_t at = part.offset_debug();
         if (at < 0 || static_cast<std::size_t>(at) > bytes_.size()) fail(node, what);
         // Ends of lines are one byte each in the text, so lines are counted there and not in the file.
@@ -138,7 +138,7 @@ class DaeReader {
     long long number = 0;
     if (!given) return missing;
     if (!toNumber(given.value(), number) || number < 0) {
-      fail(node, std::string(attribute) + "=" + quoted(given.value()) + " is no count");
+      fail(node, std::string(attribute) + "=" + inQuotes(given.value()) + " is no count");
     }
     return static_cast<std::size_t>(number);
   }
@@ -290,7 +290,7 @@ class DaeReader {
     for (const pugi::xml_node& node : mesh.children("source")) {
       if (!url.empty() && url[0] == '#' && url.substr(1) == node.attribute("id").value()) return node;
     }
-    fail(input, "its mesh has no <source> " + quoted(url));
+    fail(input, "its mesh has no <source> " + inQuotes(url));
   }
 
   std::vector<Eigen::Vector3d> readVertices(const pugi::xml_node& mesh, const pugi::xml_node& vertices) const {
@@ -348,7 +348,7 @@ class DaeReader {
       fail(primitive, "no <input> for VERTEX");
     }
     if (vertex.attribute("source").value() != "#" + std::string(vertices.attribute("id").value())) {
-      fail(vertex, "its mesh has no <vertices> " + quoted(vertex.attribute("source").value()));
+      fail(vertex, "its mesh has no <vertices> " + inQuotes(vertex.attribute("source").value()));
     }
     std::size_t stride = 1;
     for (const pugi::xml_node& input : primitive.children("input")) {

@@ -65,7 +65,7 @@ class ObjReader {
       readFace(line, keyword.data());
     } else if (std::find(std::begin(kIgnored), std::end(kIgnored), keyword) == std::end(kIgnored)) {
       failAt(bytes_, keyword.data(),
-             keyword == "surf" ? "free-form surfaces are not supported" : "no OBJ statement: " + quoted(keyword));
+             keyword == "surf" ? "free-form surfaces are not supported" : "no OBJ statement: " + inQuotes(keyword));
     }
   }
 
@@ -101,7 +101,7 @@ class ObjReader {
         const bool may_miss = part == 0;  // v//vn; some write v/ and v//, too
         good = part < 2 && (toNumber(number, ignored) || (number.empty() && (may_miss || rest.empty())));
       }
-      if (!good) failAt(bytes_, word.data(), quoted(word) + " is no corner of a face");
+      if (!good) failAt(bytes_, word.data(), inQuotes(word) + " is no corner of a face");
       const long long absolute = index < 0 ? vertices() + index : index - 1;
       if (absolute < 0 || absolute >= std::numeric_limits<std::uint32_t>::max()) {
         failAt(bytes_, word.data(), outOfRange(index));

@@ -19,7 +19,7 @@ bool isBlank(std::string_view text) { return text.find_first_not_of(kBlanks) == 
 void checkExtras(std::string_view file, std::string_view line, int most) {
   for (double ignored = 0; !isBlank(line); --most) {
     std::string_view rest = line;
-    if (most == 0 || !takeNumber(line, ignored)) failAt(file, rest.data(), quoted(takeWord(rest)) + " not expected");
+    if (most == 0 || !takeNumber(line, ignored)) failAt(file, rest.data(), inQuotes(takeWord(rest)) + " not expected");
   }
 }
 

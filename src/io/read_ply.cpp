@@ -63,7 +63,7 @@ class PlyReader {
     for (int i = 0; i < 8; ++i) {
       if (name == kNames[i][0] || name == kNames[i][1]) return static_cast<Type>(i);
     }
-    fail(name.data(), "PLY header: unknown type " + quoted(name));
+    fail(name.data(), "PLY header: unknown type " + inQuotes(name));
   }
 
   Property propertyOf(const Element& element, std::string_view line) const {
@@ -88,7 +88,7 @@ class PlyReader {
     }
     for (const Property& other : element.properties) {
       const bool again = property.role != Role::kNone && other.role == property.role;
-      if (other.name == property.name || again) fail(name.data(), "PLY header: twice the property " + quoted(name));
+      if (other.name == property.name || again) fail(name.data(), "PLY header: twice the property " + inQuotes(name));
     }
     return property;
   }
@@ -108,23 +108,23 @@ class PlyReader {
         } else if (format == "binary_big_endian") {
           format_ = Format::kBigEndian;
         } else if (format != "ascii" || has_format) {
-          fail(format.data(), "PLY header: unknown format " + quoted(format));
+          fail(format.data(), "PLY header: unknown format " + inQuotes(format));
         }
         has_format = true;
       } else if (word == "element") {
         const std::string_view name = takeWord(line);
         for (const Element& other : elements_) {
-          if (other.name == name) fail(name.data(), "PLY header: twice the element " + quoted(name));
+          if (other.name == name) fail(name.data(), "PLY header: twice the element " + inQuotes(name));
         }
         long long count = -1;
         if (!takeNumber(line, count) || count < 0) {
-          fail(name.data(), "PLY header: number of elements expected after " + quoted(name));
+          fail(name.data(), "PLY header: number of elements expected after " + inQuotes(name));
         }
         elements_.push_back({std::string(name), static_cast<std::size_t>(count), {}});
       } else if (word == "property" && !elements_.empty()) {
         elements_.back().properties.push_back(propertyOf(elements_.back(), line));
       } else if (word != "comment" && word != "obj_info" && !word.empty()) {
-        fail(word.data(), "PLY header: unknown line " + quoted(word));
+        fail(word.data(), "PLY header: unknown line " + inQuotes(word));
       }
     }
     if (!has_format) throw std::runtime_error("PLY header: no format");
@@ -143,7 +143,7 @@ class PlyReader {
       }
       if (element.name == "face") polygons_.ends.reserve(std::min(element.count, rest_.size()));
       if (element.properties.empty() && element.count > 0) {
-        throw std::runtime_error("PLY header: element " + quoted(element.name) + " has no properties");
+        throw std::runtime_error("PLY header: element " + inQuotes(element.name) + " has no properties");
       }
     }
     if ((roles & 0b1110u) != 0b1110u) throw std::runtime_error("no vertices with x, y and z in this PLY file");
@@ -197,7 +197,7 @@ class PlyReader {
         if (toNumber(word, value)) {
           if (real || (value == std::floor(value) && value >= kLowest[t] && value <= kHighest[t])) return value;
         }
-        fail(last_, nameOf(element, i) + ": " + quoted(word) + " is no number of its property's type");
+        fail(last_, nameOf(element, i) + ": " + inQuotes(word) + " is no number of its property's type");
       }
     }
     throw std::runtime_error("truncated: the file ends in " + nameOf(element, i) + " of " +

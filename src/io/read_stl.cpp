@@ -56,7 +56,7 @@ Polygons readText(std::string_view bytes) {
     for (const std::string_view keyword : keywords) {
       if (!equal(word, keyword)) {
         if (word.empty()) failAt(bytes, word.data(), "truncated: '" + std::string(keyword) + "' expected");
-        failAt(bytes, word.data(), "'" + std::string(keyword) + "' expected, not " + quoted(word));
+        failAt(bytes, word.data(), "'" + std::string(keyword) + "' expected, not " + inQuotes(word));
       }
       if (keyword != *(keywords.end() - 1)) word = takeWord(rest);
     }

@@ -47,7 +47,7 @@ bool toNumber(std::string_view word, long long& number) {
   return r.ec == std::errc() && r.ptr == word.data() + word.size();
 }
 
-std::string quoted(std::string_view word) {
+std::string inQuotes(std::string_view word) {
   std::string shown(word.substr(0, 32));
   for (char& c : shown) {
     if (c < ' ' || c > '~') c = '?';
@@ -64,7 +64,7 @@ double takeFinite(std::string_view file, std::string_view& text, const std::stri
   const std::string_view word = takeWord(text);
   double number = 0;
   if (toNumber(word, number) && std::isfinite(number)) return number;
-  failAt(file, word.data(), what + ": " + (word.empty() ? "number missing" : quoted(word) + " is no finite number"));
+  failAt(file, word.data(), what + ": " + (word.empty() ? "number missing" : inQuotes(word) + " is no finite number"));
 }
 
 }  // namespace bocst::io

@@ -24,7 +24,7 @@ bool takeNumber(std::string_view& text, Number& number) {
 }
 
 /// The word for a message: in quotes, cut to 32 bytes, bytes that do not print replaced.
-std::string quoted(std::string_view word);
+std::string inQuotes(std::string_view word);
 
 /// @throws std::runtime_error "line N: what", where N is the line of `file` that `at` points into.
 [[noreturn]] void failAt(std::string_view file, const char* at, const std::string& what);

@@ -19,7 +19,7 @@ constexpr std::size_t kLargeShare = 256;      // at most one triangle in so many
 constexpr double kMargin = 2;                 // lattice units: one step
 constexpr std::size_t kBlock = 256;           // triangles that are linked at once
 
-std::size_t roundedUp(std::size_t triangles) { return (triangles + 7) / 8 * 8; }
+std::size_t inWholeGroups(std::size_t triangles) { return (triangles + 7) / 8 * 8; }
 
 /// ScratchMemory for what a grid is made from.
 class ScratchMemory {
@@ -116,7 +116,7 @@ bool RootGrid::build(const oracle::Surface& surface) {
   auto* const heads = room.take<std::uint32_t>(lists);
   std::memset(heads, kNone & 0xff, lists * sizeof(*heads));
   const QuantisedMesh mesh(surface, bits_, room.take<std::int16_t>(QuantisedMesh::values(surface)));
-  back_.reset(new std::uint16_t[roundedUp(count)]);
+  back_.reset(new std::uint16_t[inWholeGroups(count)]);
   adviseHugePages(back_.get(), count * sizeof(back_[0]));
   triangle_count_ = count;
   oracle::GridSpan spans[kBlock];
@@ -357,7 +357,7 @@ void RootGrid::gather(const oracle::Surface& surface, const lattice::Cell& cell,
 }
 
 std::size_t RootGrid::bytes() const {
-  return sizeof(*this) + rows_.capacity() * sizeof(Row) + roundedUp(triangle_count_) * sizeof(back_[0]) +
+  return sizeof(*this) + rows_.capacity() * sizeof(Row) + inWholeGroups(triangle_count_) * sizeof(back_[0]) +
          far_.capacity() * sizeof(Far) +
          (head_.capacity() + large_.capacity() + may_be_grey_.capacity() + is_grey_.capacity()) * sizeof(head_[0]);
 }

@@ -9,7 +9,6 @@
 namespace bocst::oracle::gl {
 namespace {
 
-constexpr std::size_t kWord = sizeof(std::uint32_t);
 constexpr std::uint64_t kFirstWords = 1 << 16;
 constexpr std::size_t kSample = 64;  // words
 

@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #pragma once
 
+#include <cstddef>
 #include <cstdint>
 #include <map>
 #include <memory>
@@ -11,6 +12,8 @@
 #include "oracle/oracle.h"
 
 namespace bocst::oracle::gl {
+
+constexpr std::size_t kWord = sizeof(std::uint32_t);  ///< Bytes of a word of device memory.
 
 /// Words of device memory, for triangle lists or for meshes: one buffer, parts of which are taken and come back when
 /// nobody holds them.
@@ -23,7 +26,7 @@ class Arena : public std::enable_shared_from_this<Arena> {
         : arena_(std::move(arena)), begin_(begin), words_(words) {}
     ~Range() override;
 
-    std::size_t bytes() const override { return words_ * sizeof(std::uint32_t); }
+    std::size_t bytes() const override { return words_ * kWord; }
     std::uint32_t begin() const { return begin_; }
     std::uint32_t words() const { return words_; }
     /// Gives back what is beyond the first `words`.

@@ -16,8 +16,6 @@ namespace {
 
 using namespace layout;
 
-constexpr std::size_t kWord = sizeof(std::uint32_t);
-
 struct PassSource {
   const char* name;
   bool clips;
@@ -28,8 +26,6 @@ constexpr PassSource kSources[] = {{"masks", false},   {"decide", false}, {"plac
 
 // A dispatch of more would take long enough for a watchdog of a slow device.
 constexpr std::uint64_t kMostInvocations = std::uint64_t{1} << 22;
-
-const DeviceMesh* meshOf(const ExpansionRequest& e) { return static_cast<const DeviceMesh*>(e.surface->device.get()); }
 
 std::uint32_t narrow(std::uint64_t n) { return static_cast<std::uint32_t>(n); }
 

@@ -7,8 +7,6 @@
 namespace bocst::oracle::gl {
 namespace {
 
-const DeviceMesh* meshOf(const ExpansionRequest& e) { return static_cast<const DeviceMesh*>(e.surface->device.get()); }
-
 ComputeChain::Limits complete(ComputeChain::Limits limits, Thread& thread) {
   if (limits.bytes == 0) {
     GLint64 bytes = 0;

@@ -41,6 +41,11 @@ class DeviceMesh : public DeviceResource {
   std::uint32_t vertices_ = 0, exact_ = 0;
 };
 
+/// The mesh that a request of an OpenGL oracle is about; null where the device does not have it.
+inline const DeviceMesh* meshOf(const ExpansionRequest& e) {
+  return static_cast<const DeviceMesh*>(e.surface->device.get());
+}
+
 /// The device meshes of one context, found again by mesh and lattice as long as somebody holds them.
 /// Thread-safe.
 class DeviceMeshes {

@@ -77,10 +77,6 @@ class OcclusionQueries {
   }
 
  private:
-  static const DeviceMesh& meshOf(const ExpansionRequest& e) {
-    return static_cast<const DeviceMesh&>(*e.surface->device);
-  }
-
   static std::size_t part(const std::vector<ExpansionRequest*>& requests, std::size_t first) {
     std::size_t indices = 0, end = first;
     while (end < requests.size() && 8 * (end - first + 1) <= kMostQueries) {
@@ -130,9 +126,9 @@ class OcclusionQueries {
     glUniform1i(axis_, axis);
     for (std::size_t i = first; i < end; ++i) {
       const ExpansionRequest& e = *requests[i];
-      if (&meshOf(e) != bound) bind(*(bound = &meshOf(e)));
-      glBindBuffer(GL_ELEMENT_ARRAY_BUFFER, e.ids == nullptr ? meshOf(e).buffer().name() : lists_.name());
-      const void* const begin = at(e.ids == nullptr ? meshOf(e).indices() : begins_[i - first]);
+      if (meshOf(e) != bound) bind(*(bound = meshOf(e)));
+      glBindBuffer(GL_ELEMENT_ARRAY_BUFFER, e.ids == nullptr ? meshOf(e)->buffer().name() : lists_.name());
+      const void* const begin = at(e.ids == nullptr ? meshOf(e)->indices() : begins_[i - first]);
       for (int o = 0; o < 8; ++o) {
         const lattice::Cell octant = e.cell.octant(o);
         if ((candidates[i] >> o & 1) != 0 || !e.surface->lattice.exists(octant)) continue;

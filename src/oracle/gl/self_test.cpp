@@ -16,7 +16,6 @@
 namespace bocst::oracle::gl {
 namespace {
 
-using lattice::Cell;
 using Ids = std::vector<std::uint32_t>;
 
 // A ball with waves: triangles of all directions, smaller towards the poles.
@@ -59,7 +58,7 @@ std::shared_ptr<const Mesh> star() {
 // A question, and what is known of its answer.
 struct Question {
   const Surface* surface;
-  Cell cell;
+  lattice::Cell cell;
   Ids ids;
 };
 
@@ -76,13 +75,13 @@ std::vector<Eigen::Vector3d> cornersOf(const Surface& surface, std::uint32_t t) 
   return {surface.corner(t, 0), surface.corner(t, 1), surface.corner(t, 2)};
 }
 
-Eigen::Vector3d centerOf(const Cell& cell) {
+Eigen::Vector3d centerOf(const lattice::Cell& cell) {
   const auto at = cell.corner();
   return Eigen::Vector3d(at[0], at[1], at[2]).array() + cell.side() / 2.0;
 }
 
 // Those of the ids that meet the octant, by the reference test.
-Ids meeting(const Surface& surface, const Ids& ids, const Cell& octant) {
+Ids meeting(const Surface& surface, const Ids& ids, const lattice::Cell& octant) {
   Ids met;
   if (!surface.lattice.exists(octant)) return met;
   for (const std::uint32_t t : ids) {
@@ -91,7 +90,7 @@ Ids meeting(const Surface& surface, const Ids& ids, const Cell& octant) {
   return met;
 }
 
-bool holds(const bounds::NodeBounds& b, const Cell& cell, const Eigen::Vector3d& p) {
+bool holds(const bounds::NodeBounds& b, const lattice::Cell& cell, const Eigen::Vector3d& p) {
   const auto corner = cell.corner();
   const bounds::CellFrame frame{{double(corner[0]), double(corner[1]), double(corner[2])}, double(cell.side())};
   const bounds::Volume v = frame.decode(b);
@@ -106,7 +105,7 @@ bool holds(const bounds::NodeBounds& b, const Cell& cell, const Eigen::Vector3d&
 }
 
 // Points of the triangle in the octant must be within its bounds.
-bool areBounded(const Surface& surface, std::uint32_t t, const bounds::NodeBounds& b, const Cell& octant) {
+bool areBounded(const Surface& surface, std::uint32_t t, const bounds::NodeBounds& b, const lattice::Cell& octant) {
   const std::vector<Eigen::Vector3d> c = cornersOf(surface, t);
   constexpr int kSteps = 6;
   for (int i = 0; i <= kSteps; ++i) {
@@ -123,7 +122,7 @@ std::string compare(const Question& question, const ExpansionRequest& e, const s
   const std::string where = " at level " + std::to_string(question.cell.level);
   const Surface& surface = *question.surface;
   for (int o = 0; o < 8; ++o) {
-    const Cell octant = question.cell.octant(o);
+    const lattice::Cell octant = question.cell.octant(o);
     Ids expected = meeting(surface, question.ids, octant);
     std::sort(expected.begin(), expected.end());
     Ids found = lists[static_cast<std::size_t>(o)];
@@ -215,7 +214,7 @@ std::vector<Question> deepQuestions(const Surface& surface, int level) {
   for (std::uint32_t t = 0; t < surface.triangle_count;
        t += 1 + static_cast<std::uint32_t>(surface.triangle_count) / 6) {
     const Eigen::Vector3d p = surface.corner(t, static_cast<int>(t % 3));
-    Cell cell;
+    lattice::Cell cell;
     cell.level = level;
     for (int k = 0; k < 3; ++k) {
       const double most = (1 << (level - 1)) - 1;
@@ -246,7 +245,8 @@ std::unique_ptr<Meshes> residentOn(DeviceOracle& oracle) {
 }
 
 std::vector<std::vector<Question>> batchesOf(const Meshes& meshes) {
-  const Question of_ball{&meshes.ball, Cell{}, allOf(meshes.ball)}, of_star{&meshes.star, Cell{}, allOf(meshes.star)};
+  const Question of_ball{&meshes.ball, lattice::Cell{}, allOf(meshes.ball)},
+      of_star{&meshes.star, lattice::Cell{}, allOf(meshes.star)};
   std::vector<std::vector<Question>> batches = {{of_ball, of_star}, {of_star, of_ball, of_star, of_star}};
   batches.emplace_back();
   for (int o = 0; o < 8; ++o) {
@@ -273,7 +273,7 @@ std::string selfTest(ComputeOracle& oracle) {
   }
   // All triangles of the star in all octants: more than the room that is first taken.
   for (const Surface* surface : {&meshes->star, &meshes->ball}) {
-    const std::string wrong = askKept(oracle, {surface, Cell{}, allOf(*surface)});
+    const std::string wrong = askKept(oracle, {surface, lattice::Cell{}, allOf(*surface)});
     if (!wrong.empty()) return wrong;
   }
   return "";
@@ -291,7 +291,7 @@ std::string selfTest(OcclusionOracle& oracle) {
     std::size_t asked = 0, seen = 0;
     for (std::size_t i = 0; i < questions.size(); ++i) {
       for (int o = 0; o < 8; ++o) {
-        const Cell octant = questions[i].cell.octant(o);
+        const lattice::Cell octant = questions[i].cell.octant(o);
         const bool is_seen = (candidates[i] >> o & 1) != 0;
         asked += questions[i].surface->lattice.exists(octant);
         seen += is_seen;

@@ -2,7 +2,6 @@
 // Poses that are asked once: what a planner asks.
 #include <algorithm>
 #include <array>
-#include <numeric>
 
 #include "bench/bench_scenarios.h"
 #include "cli/report.h"
@@ -14,19 +13,15 @@ namespace {
 /// Windows and totals end after so many poses.
 constexpr std::array<std::size_t, 5> kWindows{100, 1000, 5000, 20000, 100000};
 constexpr std::array<std::size_t, 6> kTotals{1, 100, 1000, 5000, 20000, 100000};
-constexpr std::size_t kTurn = 50;  // poses that one side is asked before the other is
+constexpr std::size_t kPosesInTurn = 50;  // poses that one side is asked before the other is
 
-struct Times {
+struct PoseTimes {
   std::vector<double> bocst, fcl;  // microseconds, by pose
 };
 
-double mean(const std::vector<double>& values) {
-  return std::accumulate(values.begin(), values.end(), 0.0) / static_cast<double>(values.size());
-}
-
 double worst(const std::vector<double>& values) { return *std::max_element(values.begin(), values.end()); }
 
-void addWindow(BenchReport& report, const Times& times, std::size_t begin, std::size_t end) {
+void addWindow(BenchReport& report, const PoseTimes& times, std::size_t begin, std::size_t end) {
   const auto part = [&](const std::vector<double>& all) {
     return std::vector<double>(all.begin() + static_cast<std::ptrdiff_t>(begin),
                                all.begin() + static_cast<std::ptrdiff_t>(end));
@@ -55,11 +50,11 @@ void benchFresh(BenchSetting& setting, BenchReport& report) {
   const Stopwatch making;
   const std::unique_ptr<BocstPair> bocst = makeBocstPair(std::move(a), std::move(b), Options{});
   const double bocst_build = making.microseconds();
-  Times times;
+  PoseTimes times;
   std::vector<bool> our_verdicts, fcl_verdicts;
   Progress progress("fresh: poses", X_ABs.size());
-  for (std::size_t begin = 0; begin < X_ABs.size(); begin += kTurn) {
-    const std::size_t end = std::min(begin + kTurn, X_ABs.size());
+  for (std::size_t begin = 0; begin < X_ABs.size(); begin += kPosesInTurn) {
+    const std::size_t end = std::min(begin + kPosesInTurn, X_ABs.size());
     const auto ask = [&](const QueryPair& pair, std::vector<double>& microseconds, std::vector<bool>& verdicts) {
       for (std::size_t i = begin; i < end; ++i) {
         const Stopwatch watch;

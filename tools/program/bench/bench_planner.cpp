@@ -16,13 +16,13 @@ namespace {
 using Joints = ArmWorld::Joints;
 using States = std::vector<ArmWorld::Poses>;
 
-constexpr std::size_t kTurn = 25;         // states, or pairs, that one side is asked before the other is
-constexpr std::size_t kMostPairs = 4000;  // that are timed one by one
-constexpr double kNearGap = 0.02;         // metres: nearer misses are near ones
-constexpr std::size_t kSettle = 4;        // times that pairs are asked before they are timed
-constexpr std::size_t kFlushed = 200;     // pairs that are asked with flushed caches
-constexpr double kRest = 20;              // seconds, more than the default ttl
-constexpr std::size_t kRests = 200;       // states that are each asked after a rest
+constexpr std::size_t kStatesInTurn = 25;  // states, or pairs, that one side is asked before the other is
+constexpr std::size_t kMostPairs = 4000;   // that are timed one by one
+constexpr double kNearGap = 0.02;          // metres: nearer misses are near ones
+constexpr std::size_t kSettle = 4;         // times that pairs are asked before they are timed
+constexpr std::size_t kFlushed = 200;      // pairs that are asked with flushed caches
+constexpr double kRest = 20;               // seconds, more than the default ttl
+constexpr std::size_t kRests = 200;        // states that are each asked after a rest
 
 enum class Kind { kFar, kNear, kHit };
 constexpr std::array<const char*, 3> kKindNames{"far misses", "near misses", "hits"};
@@ -40,17 +40,17 @@ struct Both {
   std::unique_ptr<BocstManagedArm> bocst;
 };
 
-struct Times {
+struct StateTimes {
   double bocst = 0, fcl = 0;
   std::vector<bool> bocst_hits, fcl_hits;
 };
 
 /// Asks both sides each state in turns.
 template <typename Ask>
-Times timeStates(Both& arms, const States& states, const Ask& ask) {
-  Times times;
-  for (std::size_t begin = 0; begin < states.size(); begin += kTurn) {
-    const std::size_t end = std::min(begin + kTurn, states.size());
+StateTimes timeStates(Both& arms, const States& states, const Ask& ask) {
+  StateTimes times;
+  for (std::size_t begin = 0; begin < states.size(); begin += kStatesInTurn) {
+    const std::size_t end = std::min(begin + kStatesInTurn, states.size());
     const auto turn = [&](ManagedArm& arm, double& microseconds, std::vector<bool>& hits) {
       const Stopwatch watch;
       for (std::size_t i = begin; i < end; ++i) hits.push_back(ask(arm, states[i]));
@@ -64,7 +64,7 @@ Times timeStates(Both& arms, const States& states, const Ask& ask) {
   return times;
 }
 
-Times timeStates(Both& arms, const States& states) {
+StateTimes timeStates(Both& arms, const States& states) {
   return timeStates(arms, states, [](ManagedArm& arm, const ArmWorld::Poses& X_WL) { return arm.collides(X_WL); });
 }
 
@@ -128,7 +128,7 @@ class PlannerBench {
 
   void states(const std::string& key, const std::string& name, const States& states) {
     for (const char* when : {"fresh", "again"}) {
-      const Times times = timeStates(arms_, states);
+      const StateTimes times = timeStates(arms_, states);
       report_.verdicts(times.bocst_hits, times.fcl_hits);
       row(key + "_" + when, name + ", " + when, times.bocst, times.fcl);
       set_up_.first += times.bocst * static_cast<double>(states.size());
@@ -162,8 +162,8 @@ class PlannerBench {
       for (const AskedPair& pair : asked) arms_.bocst->touch(pair);
     }
     const double overhead = clockOverhead();
-    for (std::size_t begin = 0; begin < asked.size(); begin += kTurn) {
-      const std::size_t end = std::min(begin + kTurn, asked.size());
+    for (std::size_t begin = 0; begin < asked.size(); begin += kStatesInTurn) {
+      const std::size_t end = std::min(begin + kStatesInTurn, asked.size());
       const auto turn = [&](const ManagedArm& arm, std::vector<double>& times) {
         for (std::size_t i = begin; i < end; ++i) {
           const Stopwatch watch;
@@ -232,7 +232,7 @@ class PlannerBench {
   }
 
   void copied() {
-    const Times times = timeStates(arms_, random_states_, [](ManagedArm& arm, const ArmWorld::Poses& X_WL) {
+    const StateTimes times = timeStates(arms_, random_states_, [](ManagedArm& arm, const ArmWorld::Poses& X_WL) {
       return arm.collidesWithNewObjects(X_WL);
     });
     report_.verdicts(times.bocst_hits, times.fcl_hits);
@@ -289,7 +289,7 @@ class PlannerBench {
       arms.fcl = std::move(arms_.fcl);
       arms.bocst = manageBocstArm(world_, options);
       for (std::size_t i = 0; i < kSettle; ++i) timeStates(arms, random_states_);
-      const Times times = timeStates(arms, random_states_);
+      const StateTimes times = timeStates(arms, random_states_);
       arms_.fcl = std::move(arms.fcl);
       const std::string key = "depth_" + std::to_string(depth), name = "conservative, depth " + std::to_string(depth);
       row(key, name + ", random states, settled", times.bocst, times.fcl);

@@ -12,13 +12,13 @@ namespace bocst::program {
 namespace {
 
 /// The k-th edge of triangle t goes from its k-th corner to the next: `at` is 3 t + k.
-struct Edge {
+struct DividedEdge {
   std::uint32_t low, high;  ///< Its vertices.
   std::uint32_t at;
 };
 
-std::vector<Edge> edgesOf(const Mesh& mesh) {
-  std::vector<Edge> edges;
+std::vector<DividedEdge> edgesOf(const Mesh& mesh) {
+  std::vector<DividedEdge> edges;
   edges.reserve(3 * mesh.triangleCount());
   for (const Mesh::Indices& t : mesh.triangles()) {
     for (std::size_t k = 0; k < 3; ++k) {
@@ -30,13 +30,14 @@ std::vector<Edge> edgesOf(const Mesh& mesh) {
 }
 
 /// For each edge, the first one between the same vertices.
-std::vector<std::uint32_t> firstOfEach(std::vector<Edge> edges) {
+std::vector<std::uint32_t> firstOfEach(std::vector<DividedEdge> edges) {
   // A map of the edges is many times slower on meshes of millions.
-  std::sort(edges.begin(), edges.end(),
-            [](const Edge& a, const Edge& b) { return std::tie(a.low, a.high, a.at) < std::tie(b.low, b.high, b.at); });
+  std::sort(edges.begin(), edges.end(), [](const DividedEdge& a, const DividedEdge& b) {
+    return std::tie(a.low, a.high, a.at) < std::tie(b.low, b.high, b.at);
+  });
   std::vector<std::uint32_t> first(edges.size());
   for (std::size_t i = 0; i < edges.size(); ++i) {
-    const Edge& e = edges[i];
+    const DividedEdge& e = edges[i];
     const bool same = i > 0 && edges[i - 1].low == e.low && edges[i - 1].high == e.high;
     first[e.at] = same ? first[edges[i - 1].at] : e.at;
   }
@@ -46,10 +47,10 @@ std::vector<std::uint32_t> firstOfEach(std::vector<Edge> edges) {
 }  // namespace
 
 std::shared_ptr<const Mesh> subdivided(const Mesh& mesh) {
-  std::vector<Edge> edges = edgesOf(mesh);
+  std::vector<DividedEdge> edges = edgesOf(mesh);
   std::vector<Eigen::Vector3d> vertices = mesh.vertices();
   std::vector<std::uint32_t> middles = firstOfEach(edges);
-  for (const Edge& e : edges) {
+  for (const DividedEdge& e : edges) {
     std::uint32_t& middle = middles[e.at];
     if (middle == e.at) {
       middle = static_cast<std::uint32_t>(vertices.size());

@@ -9,9 +9,9 @@
 namespace bocst::program {
 namespace {
 
-class Reader {
+class SrdfReader {
  public:
-  Reader(const XmlFile& xml, const Robot& robot) : xml_(xml), robot_(robot) {}
+  SrdfReader(const XmlFile& xml, const Robot& robot) : xml_(xml), robot_(robot) {}
 
   Srdf read() {
     for (const pugi::xml_node& element : xml_.root().children("disable_default_collisions")) {
@@ -55,7 +55,7 @@ class Reader {
 
 Srdf readSrdf(const std::string& file, const Robot& robot) {
   const XmlFile xml(file, "robot");
-  return Reader(xml, robot).read();
+  return SrdfReader(xml, robot).read();
 }
 
 }  // namespace bocst::program

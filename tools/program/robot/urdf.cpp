@@ -37,9 +37,9 @@ class Listener final : public console_bridge::OutputHandler {
   std::string complaints_;
 };
 
-class Reader {
+class UrdfReader {
  public:
-  Reader(const std::string& file, const Packages& packages, MeshStore& meshes)
+  UrdfReader(const std::string& file, const Packages& packages, MeshStore& meshes)
       : xml_(file, "robot"), packages_(packages), meshes_(meshes) {}
 
   Robot read() {
@@ -228,7 +228,7 @@ class Reader {
 }  // namespace
 
 Robot readUrdf(const std::string& file, const Packages& packages, MeshStore& meshes) {
-  return Reader(file, packages, meshes).read();
+  return UrdfReader(file, packages, meshes).read();
 }
 
 }  // namespace bocst::program

@@ -21,9 +21,9 @@ std::shared_ptr<const Mesh> rounded(const std::shared_ptr<const Mesh>& mesh, Sca
 }
 
 template <typename S>
-class Side final : public BocstSide {
+class ModelSide final : public BocstSide {
  public:
-  Side(const Bodies& bodies, const std::vector<Eigen::Isometry3d>& poses, const Options& options)
+  ModelSide(const Bodies& bodies, const std::vector<Eigen::Isometry3d>& poses, const Options& options)
       : bodies_(bodies), poses_(poses, bodies.moving) {
     for (const Shape& shape : bodies.shapes) geometries_.push_back(geometryOf(shape, options));
     std::vector<Id> ids;
@@ -117,8 +117,8 @@ class Side final : public BocstSide {
 
 std::unique_ptr<BocstSide> makeBocstSide(Scalar scalar, const Bodies& bodies,
                                          const std::vector<Eigen::Isometry3d>& poses, const Options& options) {
-  if (scalar == Scalar::kFloat) return std::make_unique<Side<float>>(bodies, poses, options);
-  return std::make_unique<Side<double>>(bodies, poses, options);
+  if (scalar == Scalar::kFloat) return std::make_unique<ModelSide<float>>(bodies, poses, options);
+  return std::make_unique<ModelSide<double>>(bodies, poses, options);
 }
 
 }  // namespace bocst::program

@@ -110,9 +110,9 @@ std::vector<std::shared_ptr<fcl::CollisionGeometry<S>>> geometriesOf(const Bodie
 }
 
 template <typename S>
-class Side final : public SceneSide {
+class FclSide final : public SceneSide {
  public:
-  Side(const Bodies& bodies, const std::vector<Eigen::Isometry3d>& poses)
+  FclSide(const Bodies& bodies, const std::vector<Eigen::Isometry3d>& poses)
       : bodies_(bodies), poses_(poses, bodies.moving), managers_(bodies, geometriesOf<S>(bodies)) {}
 
   std::vector<std::uint8_t> collisions() override {
@@ -150,8 +150,8 @@ class Side final : public SceneSide {
 
 std::unique_ptr<SceneSide> makeFclSide(Scalar scalar, const Bodies& bodies,
                                        const std::vector<Eigen::Isometry3d>& poses) {
-  if (scalar == Scalar::kFloat) return std::make_unique<Side<float>>(bodies, poses);
-  return std::make_unique<Side<double>>(bodies, poses);
+  if (scalar == Scalar::kFloat) return std::make_unique<FclSide<float>>(bodies, poses);
+  return std::make_unique<FclSide<double>>(bodies, poses);
 }
 
 }  // namespace bocst::program
