@@ -76,6 +76,11 @@ struct Options {
   /// 40 bytes a triangle.
   bool solid = false;
 
+  /// One thread, which all models of the process share, builds the model's tree while its first queries run, instead of
+  /// one of those queries that would take the time for it. Queries do not wait for that thread. For exact answers
+  /// of models without a memory budget whose cells the CPU divides (kCpu, kAuto); other models take no notice.
+  bool build_ahead = false;
+
   PaperOptions paper;  ///< For experiments.
 
   /// What queries read the time from; empty: Clock, as of the system's last tick (some milliseconds). Tests inject

@@ -79,7 +79,8 @@ std::chrono::milliseconds milliseconds(double seconds) {
 }
 
 Options makeOptions(const std::string& subdivision, const std::string& answer, int depth, double dimension,
-                    const std::string& oracle, double ttl, std::size_t memory_budget, double margin, bool solid) {
+                    const std::string& oracle, double ttl, std::size_t memory_budget, double margin, bool solid,
+                    bool build_ahead) {
   Options o;
   o.subdivision = valueOf("subdivision", subdivision, kSubdivisions);
   o.answer = valueOf("answer", answer, kAnswers);
@@ -90,6 +91,7 @@ Options makeOptions(const std::string& subdivision, const std::string& answer, i
   o.memory_budget = memory_budget;
   o.margin = margin;
   o.solid = solid;
+  o.build_ahead = build_ahead;
   return o;
 }
 
@@ -97,7 +99,7 @@ py::dict asDict(const Options& o) {
   return py::dict("subdivision"_a = nameOf(o.subdivision, kSubdivisions), "answer"_a = nameOf(o.answer, kAnswers),
                   "depth"_a = o.depth, "dimension"_a = o.dimension, "oracle"_a = nameOf(o.oracle, kOracles),
                   "ttl"_a = static_cast<double>(o.ttl.count()) / 1e3, "memory_budget"_a = o.memory_budget,
-                  "margin"_a = o.margin, "solid"_a = o.solid);
+                  "margin"_a = o.margin, "solid"_a = o.solid, "build_ahead"_a = o.build_ahead);
 }
 
 std::string repr(const char* name, const py::dict& values) {
@@ -119,11 +121,12 @@ oracle: 'auto', 'cpu', 'occlusion', 'compute' or 'sampled'.
 ttl: seconds after which unused deepest levels are dropped; 0: never.
 memory_budget: bytes of resident tree; 0: no limit.
 margin: surfaces no farther apart than this collide, in the length unit of the mesh.
-solid: a watertight mesh also collides with what is wholly inside it.)");
+solid: a watertight mesh also collides with what is wholly inside it.
+build_ahead: a thread that all models share builds the tree while the first queries run.)");
   options
       .def(py::init(&makeOptions), py::kw_only(), "subdivision"_a = "bono", "answer"_a = "exact", "depth"_a = 6,
            "dimension"_a = 0.0, "oracle"_a = "auto", "ttl"_a = 2.0, "memory_budget"_a = 0, "margin"_a = 0.0,
-           "solid"_a = false)
+           "solid"_a = false, "build_ahead"_a = false)
       .def("__repr__", [](const Options& o) { return repr("Options", asDict(o)); })
       .def("__eq__", [](const Options& a, const Options& b) { return asDict(a).equal(asDict(b)); });
   for (const auto item : asDict(Options())) {

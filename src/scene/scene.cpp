@@ -16,7 +16,7 @@
 #include "scene/edge.h"
 #include "scene/pool.h"
 #include "scene/sweep.h"
-#include "tree/sharded_lock.h"
+#include "thread/sharded_lock.h"
 
 namespace bocst {
 namespace {
@@ -68,7 +68,7 @@ struct Scene<S>::Impl {
   // The world for a query. Made when it is asked for, so that many changes in a row cost little.
   WorldPtr current() const {
     {
-      const std::shared_lock<tree::ShardedLock> lock(sharded_lock);
+      const std::shared_lock<thread::ShardedLock> lock(sharded_lock);
       if (world != nullptr) return world;
     }
     const std::lock_guard<std::mutex> lock(mutex);
@@ -83,7 +83,7 @@ struct Scene<S>::Impl {
   // To be called with the mutex held.
   void publish(WorldPtr next) const {
     {
-      const std::lock_guard<tree::ShardedLock> alone(sharded_lock);
+      const std::lock_guard<thread::ShardedLock> alone(sharded_lock);
       std::swap(world, next);
     }
   }
@@ -170,10 +170,10 @@ struct Scene<S>::Impl {
 
   mutable std::mutex mutex;  // of changes
   std::uint32_t next_number = 0;
-  std::map<std::uint32_t, Record> objects;  // in the order of adding
-  std::set<std::pair<Id, Id>> ignored;      // the smaller Id first
-  mutable tree::ShardedLock sharded_lock;   // of `world`; held no longer than it takes to copy it
-  mutable WorldPtr world;                   // null after a change
+  std::map<std::uint32_t, Record> objects;   // in the order of adding
+  std::set<std::pair<Id, Id>> ignored;       // the smaller Id first
+  mutable thread::ShardedLock sharded_lock;  // of `world`; held no longer than it takes to copy it
+  mutable WorldPtr world;                    // null after a change
   const std::uint32_t scene_number = nextScene();
   mutable scene::Pool pool;
 };

@@ -59,6 +59,7 @@ void Tree::dropUnusedResources() {
 // Copies what stays into fresh pools: what goes leaves no holes, and nothing of it is looked at again. In one
 // function, as a node is copied whole: its children, list, record and times belong to one move.
 void Tree::keepOnly(const std::vector<std::uint8_t>& keep) {
+  ++generation_;
   const ChildRef old_root = root_.load(std::memory_order_relaxed);
   std::size_t before = 0, after = 0;
   for (auto& n : nodes_at_) {
@@ -211,7 +212,7 @@ void Tree::afterQuery(std::int64_t now) {
     time_to = next_prune_.compare_exchange_strong(due, now + step, std::memory_order_relaxed);
   }
   if (!refits && !over_budget && !time_to) return;
-  const std::unique_lock<ShardedLock> alone(query_lock_, std::try_to_lock);
+  const std::unique_lock<thread::ShardedLock> alone(query_lock_, std::try_to_lock);
   if (!alone.owns_lock()) return;
   if (refits) refit();
   if (over_budget || time_to) pruneAlone(now, !time_to);

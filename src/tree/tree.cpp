@@ -12,18 +12,10 @@
 #include <stdexcept>
 #include <string>
 
-#include "tree/bulk.h"
+#include "tree/cell_bounds.h"
 
 namespace bocst::tree {
 namespace {
-
-// Growth by parts costs some four times as much a triangle as building all at once, the wider walks between bounds that
-// are still loose included; `bench --scenarios fresh` is the same to 5 % from 6 to 16.
-constexpr std::size_t kRent = 8;
-// What a thread keeps of a build's memory for the next one, in triangles.
-constexpr std::size_t kMostKept = 1 << 17;
-// A device is not asked about fewer triangles: the host builds what is below them sooner than a batch comes back.
-constexpr std::size_t kHostTriangles = 512;
 
 Options checked(const Options& o) {
   const auto bad = [](const std::string& what) { throw std::invalid_argument("bocst::Options: " + what); };
@@ -61,33 +53,6 @@ oracle::Surface surfaceOf(std::shared_ptr<const Mesh> mesh, const Options& o) {
   if (mesh == nullptr) throw std::invalid_argument("bocst::Model: the mesh is null");
   lattice::Lattice lattice(mesh->bounds(), o.subdivision, o.dimension);
   return {std::move(mesh), lattice};
-}
-
-// A box in lattice units as bytes of a cell; the margin is far above the rounding of toLattice().
-void encodeBox(const Eigen::AlignedBox3d& box, const lattice::Cell& cell, bounds::NodeBounds& b) {
-  constexpr double kMargin = 1e-6;
-  const bounds::CellFrame frame = frameOf(cell);
-  for (int k = 0; k < 3; ++k) {
-    frame.encodeBox(static_cast<std::size_t>(k), box.min()[k] - kMargin, box.max()[k] + kMargin, b);
-  }
-}
-
-// Box and slab of a cell's surface as bytes of the cell.
-bounds::NodeBounds encode(const BulkBuilder::Own& own, const lattice::Cell& cell) {
-  bounds::NodeBounds b;
-  encodeBox(own.box, cell, b);
-  if (std::all_of(own.normal, own.normal + 3, [](int n) { return n == 0; })) return b;
-  const bounds::CellFrame frame = frameOf(cell);
-  double middle = 0;
-  for (std::size_t k = 0; k < 3; ++k) middle += own.normal[k] * frame.middle(k);
-  const double margin = 1e-6 * frame.side;
-  frame.encodeSlab(own.normal, own.least - middle - margin, own.most - middle + margin, b);
-  return b;
-}
-
-Eigen::AlignedBox3d latticeBounds(const oracle::Surface& surface) {
-  const Eigen::AlignedBox3d& b = surface.bounds;
-  return {surface.lattice.toLattice(b.min()), surface.lattice.toLattice(b.max())};
 }
 
 std::int64_t nanoseconds(Clock::time_point t) {
@@ -146,7 +111,7 @@ std::int64_t Tree::now() const { return options_.clock ? nanoseconds(options_.cl
 
 const std::vector<Eigen::Vector3d>& Tree::componentPoints() const {
   if (const auto* known = component_points_known_.load(std::memory_order_acquire)) return *known;
-  const std::lock_guard<ForkAwareMutex> lock(component_mutex_);
+  const std::lock_guard<thread::ForkAwareMutex> lock(component_mutex_);
   if (component_points_ == nullptr) {
     component_points_ = std::make_unique<const std::vector<Eigen::Vector3d>>(
         pointOfEachComponent(surface_.mesh->vertices(), surface_.mesh->triangles()));
@@ -156,17 +121,17 @@ const std::vector<Eigen::Vector3d>& Tree::componentPoints() const {
 }
 
 std::shared_ptr<const Mesh> Tree::mesh() const {
-  const std::shared_lock<ShardedLock> lock(query_lock_);
+  const std::shared_lock<thread::ShardedLock> lock(query_lock_);
   return surface_.mesh;
 }
 
 Eigen::AlignedBox3d Tree::bounds() const {
-  const std::shared_lock<ShardedLock> lock(query_lock_);
+  const std::shared_lock<thread::ShardedLock> lock(query_lock_);
   return surface_.bounds;
 }
 
 double Tree::radius() const {
-  const std::shared_lock<ShardedLock> lock(query_lock_);
+  const std::shared_lock<thread::ShardedLock> lock(query_lock_);
   const double known = radius_.load(std::memory_order_relaxed);
   if (known >= 0) return known;
   const Eigen::Vector3d center = surface_.bounds.center();
@@ -187,7 +152,7 @@ void Tree::releaseMesh() {
     throw std::logic_error("bocst::Model::releaseMesh: exact answers test the triangles on the host");
   }
   if (options_.solid) throw std::logic_error("bocst::Model::releaseMesh: a solid looks at its triangles on the host");
-  const std::lock_guard<ShardedLock> alone(query_lock_);
+  const std::lock_guard<thread::ShardedLock> alone(query_lock_);
   if (surface_.device == nullptr) surface_.device = oracle_->makeResident(surface_);
   if (surface_.device == nullptr || oracle_->needsHostMesh()) {
     throw OracleError("bocst::Model::releaseMesh: the oracle " + oracle_->name() + " needs the mesh on the host");
@@ -207,10 +172,10 @@ void Tree::grow(std::vector<Growth>& batch, bool wait) {
     if (g.tree != trees[0]) trees[1] = g.tree;
   }
   if (trees[1] != nullptr && std::less<Tree*>()(trees[1], trees[0])) std::swap(trees[0], trees[1]);
-  std::array<std::unique_lock<ForkAwareMutex>, 2> locks;
+  std::array<std::unique_lock<thread::ForkAwareMutex>, 2> locks;
   for (int i = 0; i < 2; ++i) {
     if (trees[i] == nullptr) continue;
-    locks[i] = std::unique_lock<ForkAwareMutex>(trees[i]->growth_, std::defer_lock);
+    locks[i] = std::unique_lock<thread::ForkAwareMutex>(trees[i]->growth_, std::defer_lock);
     if (wait) {
       locks[i].lock();
     } else if (!locks[i].try_lock()) {
@@ -353,116 +318,6 @@ void Tree::growFromGrid(NodeRef node) {
   setChild(node, ChildRef(ChildRef::kBlock, index));
 }
 
-// The cell of a node; of a lane only the level, which counts from the cell that was built in bulk.
-lattice::Cell Tree::cellOrDepth(NodeRef node) const {
-  int deeper = 0;
-  for (; isLoose(node); ++deeper) node = records_[node.block()].parent;
-  lattice::Cell cell = this->cell(node);
-  cell.level += deeper;
-  return cell;
-}
-
-// What exact answers need below a node whose triangles are known here. False where the oracle is to be asked: for what
-// the root grid or a device knows.
-bool Tree::growInBulk(NodeRef node, std::vector<std::uint32_t>& ids) {
-  const ChildRef ref = this->childRef(node);
-  ids.clear();
-  if (ref.isList()) {
-    const TriangleList list = this->list(ref);
-    // A lane is no cell, so an oracle can't be asked about it.
-    const bool is_for_host = growsOnHost() || isLoose(node) || list.count <= kHostTriangles;
-    if (!list.ids.areKnown() || !is_for_host) return false;
-    list.appendTo(ids);
-  } else if (!growsOnHost()) {
-    return false;
-  } else if (grid_ != nullptr) {
-    if (cell(node).level < grid_->level()) return false;
-    grid_->gather(surface_, cell(node), ids);
-  } else {
-    growWhole();
-    return true;
-  }
-  payRent(ids.size());
-  built_ += ids.size();
-  const bool is_loose = isLoose(node);
-  Eigen::AlignedBox3d region;
-  if (is_loose) {
-    region = blocks_[node.block()].looseBox(node.octant());
-  } else {
-    const lattice::Cell cell = this->cell(node);
-    const Eigen::Vector3d corner(cell.corner()[0], cell.corner()[1], cell.corner()[2]);
-    region = Eigen::AlignedBox3d(corner, corner.array() + cell.side());
-  }
-  thread_local BulkBuilder bulk;
-  bulk.build(surface_, ids.data(), ids.size(), region);
-  if (!is_loose && !bulk.ids().empty()) {
-    refits_.push_back({node, encode(bulk.own(), cell(node))});
-    refits_wait_.store(true, std::memory_order_relaxed);
-  }
-  setChild(node, bulk.blocks().empty() ? addList(bulk.ids().data(), bulk.ids().size(), true)
-                                       : addBulk(node, bulk, 0, cellOrDepth(node).level));
-  return true;
-}
-
-void Tree::startRent() {
-  rent_ = 0;
-  price_ = conservative() ? kNever : surface_.triangle_count / kRent;
-}
-
-bool Tree::buildNow() {
-  const std::unique_lock<ForkAwareMutex> lock(growth_, std::try_to_lock);
-  if (!lock.owns_lock() || !isBuildDue()) return false;
-  growWhole();
-  countBytes();
-  return true;
-}
-
-// All of the tree that exact answers need. Queries under way go on in the old blocks.
-void Tree::growWhole() {
-  thread_local BulkBuilder bulk;
-  if (surface_.triangle_count >= BulkBuilder::kLeastToSort &&
-      surface_.mesh->vertexCount() <= BulkBuilder::kMostToSort) {
-    bulk.buildAll(surface_);
-  } else {
-    std::vector<std::uint32_t> ids(surface_.triangle_count);
-    std::iota(ids.begin(), ids.end(), 0u);
-    bulk.build(surface_, ids.data(), ids.size(), latticeBounds(surface_));
-  }
-  price_ = kNever;
-  if (!supports_known_) {
-    bulk.findSupports(supports_);
-    outline_.set(bulk.findOutline(surface_.lattice));
-    supports_known_ = true;
-  }
-  // A device has grown what is above the parts, so the host would gain little by new blocks.
-  if (!growsOnHost()) return;
-  built_ += surface_.triangle_count;
-  for (auto& n : nodes_at_) n = 0;
-  nodes_at_[1] = 1;
-  setChild(NodeRef(), bulk.blocks().empty() ? addList(bulk.ids().data(), bulk.ids().size(), true)
-                                            : addBulk(NodeRef(), bulk, 0, 1));
-  refits_.push_back({NodeRef(), encode(bulk.own(), lattice::Cell{})});
-  refits_wait_.store(true, std::memory_order_relaxed);
-  if (surface_.triangle_count > kMostKept) bulk = BulkBuilder();
-}
-
-// Block `number` of what was built, and all below it; `level` is the node's, as counted.
-ChildRef Tree::addBulk(NodeRef node, const BulkBuilder& bulk, std::uint32_t number, int level) {
-  const BulkBuilder::Block& built = bulk.blocks()[number];
-  const std::uint32_t index = addBlock(node, level, static_cast<std::uint8_t>(0xff >> (8 - built.lanes)));
-  octants_ += built.lanes;
-  blocks_[index].setFrame(built.frame);
-  for (std::uint32_t o = 0; o < built.lanes; ++o) {
-    const BulkBuilder::Lane& lane = built.lane[o];
-    blocks_[index].octants.set(o, built.bounds[o]);
-    const ChildRef child = lane.block == BulkBuilder::kNone
-                               ? addList(bulk.ids().data() + lane.begin, lane.count, false)
-                               : addBulk(NodeRef::octant(index, static_cast<int>(o)), bulk, lane.block, level + 1);
-    blocks_[index].child[o].store(child, std::memory_order_relaxed);
-  }
-  return ChildRef(ChildRef::kBlock, index);
-}
-
 // Appends a block whose children are one level below `level`.
 std::uint32_t Tree::addBlock(NodeRef node, int level, std::uint8_t grey) {
   const std::uint32_t index = blocks_.append(1);
@@ -483,7 +338,7 @@ ChildRef Tree::addList(const std::uint32_t* ids, std::size_t count, bool leaf) {
 
 void Tree::packLeaves(const std::vector<NodeRef>& leaves) {
   if (leaves.empty() || !hasBudget()) return;
-  const std::unique_lock<ForkAwareMutex> lock(growth_, std::try_to_lock);
+  const std::unique_lock<thread::ForkAwareMutex> lock(growth_, std::try_to_lock);
   if (!lock.owns_lock() || lists_.isHalfFull()) return;
   std::size_t left = 16 + leaves.size() / 4;
   for (const NodeRef leaf : leaves) {
@@ -567,12 +422,12 @@ void Tree::gatherNode(NodeRef node, const lattice::Cell& cell, std::vector<std::
 }
 
 void Tree::prune(Clock::time_point now) {
-  const std::lock_guard<ShardedLock> alone(query_lock_);
+  const std::lock_guard<thread::ShardedLock> alone(query_lock_);
   pruneAlone(nanoseconds(now), false);
 }
 
 void Tree::updateVertices(std::vector<Eigen::Vector3d> vertices) {
-  const std::lock_guard<ShardedLock> alone(query_lock_);
+  const std::lock_guard<thread::ShardedLock> alone(query_lock_);
   if (surface_.mesh == nullptr) throw std::logic_error("bocst::Model::updateVertices: the mesh was released");
   const Mesh& old = *surface_.mesh;
   if (vertices.size() != old.vertexCount()) {
@@ -590,7 +445,7 @@ void Tree::expandAll(int depth) {
                                 std::to_string(lattice::kMaxLevel));
   }
   // Queries never expand a leaf, and do not expect that somebody does.
-  const std::lock_guard<ShardedLock> alone(query_lock_);
+  const std::lock_guard<thread::ShardedLock> alone(query_lock_);
   keepOnly({});
   constexpr std::size_t kBatch = 1024;  // bounds the memory that answers take before they are published
   std::vector<NodeRef> level{NodeRef{}}, next;
@@ -614,7 +469,7 @@ void Tree::expandAll(int depth) {
 }
 
 void Tree::visit(const std::function<void(const NodeView&)>& f) const {
-  const std::shared_lock<ShardedLock> lock(query_lock_);
+  const std::shared_lock<thread::ShardedLock> lock(query_lock_);
   const auto id = [](NodeRef node) { return node.isRoot() ? 0 : node.bits + 1; };
   struct Entry {
     NodeRef node;
@@ -659,7 +514,7 @@ void Tree::visit(const std::function<void(const NodeView&)>& f) const {
 }
 
 Statistics Tree::statistics() const {
-  const std::shared_lock<ShardedLock> lock(query_lock_);
+  const std::shared_lock<thread::ShardedLock> lock(query_lock_);
   Statistics s;
   s.resident_bytes = bytes_;
   for (int level = 1; level <= lattice::kMaxLevel && nodes_at_[level] > 0; ++level) {

@@ -18,11 +18,11 @@
 
 #include "mesh/solid.h"
 #include "oracle/oracle.h"
+#include "thread/sharded_lock.h"
 #include "tree/block.h"
 #include "tree/outline.h"
 #include "tree/pool.h"
 #include "tree/root_grid.h"
-#include "tree/sharded_lock.h"
 #include "tree/support_table.h"
 #include "tree/triangle_lists.h"
 
@@ -40,10 +40,11 @@ class Tree {
  public:
   /// @throws std::invalid_argument for options out of range, OracleError.
   Tree(std::shared_ptr<const Mesh> mesh, const Options& options);
+  ~Tree();
 
   const Options& options() const { return options_; }
   const oracle::Oracle& oracle() const { return *oracle_; }
-  ShardedLock& queryLock() const { return query_lock_; }
+  thread::ShardedLock& queryLock() const { return query_lock_; }
 
   /// A box about the surface, or about the spheres of conservative answers; without a lock.
   const Outline& outline() const { return outline_; }
@@ -88,7 +89,8 @@ class Tree {
   void payRent(std::size_t triangles) const {
     if (price_.load(std::memory_order_relaxed) != kNever) rent_.fetch_add(triangles, std::memory_order_relaxed);
   }
-  /// Builds the whole tree when queries have paid as much as that costs, unless another thread grows it; did it?
+  /// Builds the whole tree when queries have paid as much as that costs, unless another thread grows it; did it? Of a
+  /// model that is built ahead, the first query that has paid anything has the helper thread do it.
   bool buildIfDue() { return isBuildDue() && buildNow(); }
   /// No more expansions below this node: a single lattice unit, or the collision depth of conservative answers.
   bool isDeepest(int level) const { return level >= deepest_; }
@@ -152,9 +154,19 @@ class Tree {
   void afterQuery(std::int64_t now);
 
  private:
+  struct AheadBuild;
+  /// Where a block of a build goes: below a node, whose level as counted this is; and its index, once it is added.
+  struct BulkPlace {
+    NodeRef node;
+    int level = 0;
+    std::uint32_t index = 0;
+  };
+
   void reset(std::shared_ptr<const Mesh> mesh);
 
   void askFor(std::uint32_t list, oracle::ExpansionRequest& request, std::vector<std::uint32_t>& ids) const;
+  // A device is not asked about fewer triangles: the host builds what is below them sooner than a batch comes back.
+  static constexpr std::size_t kHostTriangles = 512;
   static std::size_t countedLevel(int level) { return static_cast<std::size_t>(std::min(level, lattice::kMaxLevel)); }
   ChildRef addDeviceList(const std::shared_ptr<const oracle::DeviceResource>& resource,
                          oracle::ExpansionRequest::DeviceList list);
@@ -165,11 +177,17 @@ class Tree {
   bool isBuildDue() const { return rent_.load(std::memory_order_relaxed) > price_.load(std::memory_order_relaxed); }
   bool buildNow();
   void startRent();
+  bool buildsAhead() const;
+  void askForAheadBuild();
+  static void buildAhead(AheadBuild& ahead);
   void growRoot();
   void growFromGrid(NodeRef node);
   bool growInBulk(NodeRef node, std::vector<std::uint32_t>& ids);
   void growWhole();
-  ChildRef addBulk(NodeRef node, const BulkBuilder& bulk, std::uint32_t number, int level);
+  static void startPlaces(const BulkBuilder& bulk, NodeRef node, int level, std::vector<BulkPlace>& places);
+  void addBlocks(const BulkBuilder& bulk, std::vector<BulkPlace>& places, std::size_t begin, std::size_t end);
+  void publishBulk(const BulkBuilder& bulk, const std::vector<BulkPlace>& places);
+  void publishWhole(const BulkBuilder& bulk, const std::vector<BulkPlace>& places);
   lattice::Cell cellOrDepth(NodeRef node) const;
   void publish(NodeRef node, const oracle::ExpansionRequest& answer);
   std::uint32_t addBlock(NodeRef node, int level, std::uint8_t grey);
@@ -189,12 +207,12 @@ class Tree {
   const Options options_;
   const std::shared_ptr<oracle::Oracle> oracle_;
   const int deepest_;
-  mutable ShardedLock query_lock_;
-  ForkAwareMutex growth_;  // guards what grow() appends to
+  mutable thread::ShardedLock query_lock_;
+  thread::ForkAwareMutex growth_;  // guards what grow() appends to
 
   oracle::Surface surface_;
   std::shared_ptr<const Solid> solid_;
-  mutable ForkAwareMutex component_mutex_;  // guards component_points_ while they are found
+  mutable thread::ForkAwareMutex component_mutex_;  // guards component_points_ while they are found
   mutable std::unique_ptr<const std::vector<Eigen::Vector3d>> component_points_;
   mutable std::atomic<const std::vector<Eigen::Vector3d>*> component_points_known_{
       nullptr};                             // component_points_, for readers
@@ -213,6 +231,9 @@ class Tree {
   static constexpr std::size_t kNever = ~std::size_t{0};
   mutable std::atomic<std::size_t> rent_{0};  // see payRent()
   std::atomic<std::size_t> price_{kNever};    // the whole tree is built when rent_ is more; kNever once it is
+  bool is_ahead_build_due_ = false;           // then by the helper thread, which is to be asked; under growth_
+  std::shared_ptr<AheadBuild> ahead_build_;
+  std::uint64_t generation_ = 0;  // of the pools: indices of blocks are of one generation
   // Of each block: what walks read, what growth and decay know, and when a query last went through it, in ns of the
   // model's clock. Apart, so that walks have few lines to read.
   Pool<Block, 5> blocks_;

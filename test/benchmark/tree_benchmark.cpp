@@ -41,7 +41,7 @@ void growLevel(benchmark::State& state) {
   for (auto _ : state) {
     state.PauseTiming();
     const auto tree = torusTree(128);
-    const std::shared_lock<tree::ShardedLock> lock(tree->queryLock());
+    const std::shared_lock<thread::ShardedLock> lock(tree->queryLock());
     for (int level = 1; level < state.range(0); ++level) {
       auto batch = frontier(*tree);
       tree::Tree::grow(batch);
@@ -92,7 +92,7 @@ void warmWalk(benchmark::State& state, double x, bool first) {
   const auto tree_a = torusTree(128), tree_b = torusTree(128);
   const query::SimilarityTransform place = beside(*tree_a, *tree_b, x);
   Counter counter(first);
-  const std::shared_lock<tree::ShardedLock> lock_a(tree_a->queryLock()), lock_b(tree_b->queryLock());
+  const std::shared_lock<thread::ShardedLock> lock_a(tree_a->queryLock()), lock_b(tree_b->queryLock());
   const query::TreeSide a(*tree_a), b(*tree_b);
   for (int i = 0; i < 50; ++i) query::TreeWalk(a, b, place).run(counter);
   counter = Counter(first);
@@ -110,7 +110,7 @@ void separation(benchmark::State& state, double x) {
   const auto tree_a = torusTree(128), tree_b = torusTree(128);
   const query::SimilarityTransform place = beside(*tree_a, *tree_b, x);
   Counter counter(true);
-  const std::shared_lock<tree::ShardedLock> lock_a(tree_a->queryLock()), lock_b(tree_b->queryLock());
+  const std::shared_lock<thread::ShardedLock> lock_a(tree_a->queryLock()), lock_b(tree_b->queryLock());
   const query::TreeSide a(*tree_a), b(*tree_b);
   bool apart = false;
   for (int i = 0; i < 50 && !apart; ++i) {

@@ -57,7 +57,7 @@ def test_a_model_grows_and_says_so():
 
 def test_options_come_back():
     options = bocst.Options(subdivision="octree", answer="conservative", depth=4, dimension=100.0, oracle="cpu", ttl=0.5,
-                            memory_budget=1 << 20, margin=0.25, solid=False)
+                            memory_budget=1 << 20, margin=0.25, solid=False, build_ahead=True)
     model = bocst.Model(bocst.Mesh(*box()), options)
     assert model.options == options and options != bocst.Options()
     assert model.options.ttl == 0.5 and model.options.margin == 0.25 and model.options.oracle == "cpu"

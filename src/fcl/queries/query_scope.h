@@ -58,7 +58,7 @@ class QueryScope {
     }
 
    private:
-    explicit ReadLocks(tree::Tree& first) : first_(&first), shard_(tree::ShardedLock::shard()) {
+    explicit ReadLocks(tree::Tree& first) : first_(&first), shard_(thread::ShardedLock::shard()) {
       first_->queryLock().lock_shared(shard_);
     }
 

@@ -30,6 +30,7 @@ class Options:
         memory_budget: int = 0,
         margin: float = 0.0,
         solid: bool = False,
+        build_ahead: bool = False,
     ) -> None: ...
     @property
     def subdivision(self) -> _Subdivision: ...
@@ -49,6 +50,8 @@ class Options:
     def margin(self) -> float: ...
     @property
     def solid(self) -> bool: ...
+    @property
+    def build_ahead(self) -> bool: ...
 
 class Health:
     @property
@@ -128,6 +131,7 @@ class Model(CollisionGeometry):
         memory_budget: int = 0,
         margin: float = 0.0,
         solid: bool = False,
+        build_ahead: bool = False,
     ) -> None: ...
     @property
     def mesh(self) -> Optional[Mesh]: ...

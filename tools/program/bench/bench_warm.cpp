@@ -42,8 +42,8 @@ std::unique_ptr<BocstPair> makeAgeless(const BenchSetting& setting) {
 
 /// As many of the poses, from the first on, as FCL can be asked about in ten seconds or so: it takes some 4 us a pair.
 std::vector<Eigen::Isometry3d> posesForContacts(BenchSetting& setting) {
-  constexpr std::size_t kMostPairs = 2000000;
-  const std::size_t most = kMostPairs / (2 * setting.request().rounds + 1);
+  constexpr std::size_t kMostContacts = 2000000;
+  const std::size_t most = kMostContacts / (2 * setting.request().rounds + 1);
   std::vector<Eigen::Isometry3d> poses;
   std::size_t pairs = 0;
   for (const Eigen::Isometry3d& X_AB : setting.queryTransforms()) {

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: BSD-3-Clause
 // Who is in a query lock together, and who is not.
-#include "tree/sharded_lock.h"
+#include "thread/sharded_lock.h"
 
 #include <gtest/gtest.h>
 
@@ -12,7 +12,7 @@
 #include <thread>
 #include <vector>
 
-namespace bocst::tree {
+namespace bocst::thread {
 namespace {
 
 TEST(ShardedLock, ReadersSeeWhatWritersWroteWhole) {
@@ -174,4 +174,4 @@ TEST(ShardedLock, ReadersWaitForTheWriter) {
 }
 
 }  // namespace
-}  // namespace bocst::tree
+}  // namespace bocst::thread

@@ -1,12 +1,12 @@
 // SPDX-License-Identifier: BSD-3-Clause
-#include "tree/fork.h"
+#include "thread/fork.h"
 
 #include <pthread.h>
 
 #include <new>
 #include <stdexcept>
 
-namespace bocst::tree {
+namespace bocst::thread {
 
 std::atomic<unsigned> forks{0};
 
@@ -44,4 +44,4 @@ bool ForkAwareMutex::adopt() {
   return true;
 }
 
-}  // namespace bocst::tree
+}  // namespace bocst::thread

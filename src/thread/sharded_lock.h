@@ -7,9 +7,9 @@
 #include <cstddef>
 #include <mutex>
 
-#include "tree/fork.h"
+#include "thread/fork.h"
 
-namespace bocst::tree {
+namespace bocst::thread {
 
 /// Readers pass together; a writer gets in between them, and is not starved by readers that keep coming.
 /// A thread that needs several query locks takes them in address order, and gives back itself what it took.
@@ -109,4 +109,4 @@ class ShardedLock {
   std::condition_variable left_;
 };
 
-}  // namespace bocst::tree
+}  // namespace bocst::thread

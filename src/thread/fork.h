@@ -7,7 +7,7 @@
 // After fork() a child has only the thread that called it. A lock that another thread of the parent held is never given
 // back there, and what that thread was changing stays half changed.
 
-namespace bocst::tree {
+namespace bocst::thread {
 
 /// How often this process, or an ancestor of it, was forked from another.
 extern std::atomic<unsigned> forks;
@@ -36,4 +36,4 @@ class ForkAwareMutex {
   std::atomic<unsigned> forks_{forks.load()};
 };
 
-}  // namespace bocst::tree
+}  // namespace bocst::thread

@@ -1,0 +1,97 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#include "thread/helper_thread.h"
+
+#include <pthread.h>
+#include <signal.h>
+
+#include <condition_variable>
+#include <list>
+#include <mutex>
+#include <new>
+#include <thread>
+
+namespace bocst::thread {
+namespace {
+
+class HelperThread {
+ public:
+  void add(std::function<void()> job) {
+    {
+      const std::lock_guard<std::mutex> lock(mutex_);
+      if (!thread_.joinable()) start();
+      jobs_.push_back(std::move(job));
+    }
+    wake_.notify_one();
+  }
+
+  void stop() {
+    {
+      const std::lock_guard<std::mutex> lock(mutex_);
+      if (!thread_.joinable()) return;
+      stopped_ = true;
+      jobs_.clear();
+    }
+    wake_.notify_one();
+    thread_.join();
+  }
+
+ private:
+  // The thread takes no signals: they are for threads that the program made.
+  void start() {
+    sigset_t all, before;
+    sigfillset(&all);
+    pthread_sigmask(SIG_SETMASK, &all, &before);
+    try {
+      thread_ = std::thread([this] { work(); });
+    } catch (...) {
+      pthread_sigmask(SIG_SETMASK, &before, nullptr);
+      throw;
+    }
+    pthread_sigmask(SIG_SETMASK, &before, nullptr);
+  }
+
+  void work() {
+    for (;;) {
+      std::function<void()> job;
+      {
+        std::unique_lock<std::mutex> lock(mutex_);
+        wake_.wait(lock, [this] { return stopped_ || !jobs_.empty(); });
+        if (stopped_) return;
+        job = std::move(jobs_.front());
+        jobs_.pop_front();
+      }
+      job();
+    }
+  }
+
+  std::mutex mutex_;
+  std::condition_variable wake_;
+  std::list<std::function<void()>> jobs_;
+  bool stopped_ = false;
+  std::thread thread_;
+};
+
+HelperThread& helperThread() {
+  // Never destroyed: a child makes it anew in the same place.
+  alignas(HelperThread) static unsigned char storage[sizeof(HelperThread)];
+  static HelperThread* const helper = [] {
+    auto* const made = new (storage) HelperThread;
+    pthread_atfork(nullptr, nullptr, [] { new (storage) HelperThread; });
+    return made;
+  }();
+  return *helper;
+}
+
+struct StopAtExit {
+  ~StopAtExit() { helperThread().stop(); }
+};
+
+}  // namespace
+
+void runInHelperThread(std::function<void()> job) {
+  HelperThread& helper = helperThread();
+  static const StopAtExit stop_at_exit;
+  helper.add(std::move(job));
+}
+
+}  // namespace bocst::thread

@@ -1,0 +1,286 @@
+// SPDX-License-Identifier: BSD-3-Clause
+// Growth in bulk: what is below a node at once, and the whole tree, by a query or ahead of queries by the helper
+// thread.
+#include <algorithm>
+#include <exception>
+#include <mutex>
+#include <numeric>
+#include <shared_mutex>
+#include <stdexcept>
+#include <thread>
+
+#include "thread/helper_thread.h"
+#include "tree/bulk.h"
+#include "tree/cell_bounds.h"
+#include "tree/tree.h"
+
+namespace bocst::tree {
+namespace {
+
+// Growth by parts costs some four times as much a triangle as building all at once, the wider walks between bounds that
+// are still loose included; `bench --scenarios fresh` is the same to 5 % from 6 to 16.
+constexpr std::size_t kRent = 8;
+// What a thread keeps of a build's memory for the next one, in triangles.
+constexpr std::size_t kMostKept = 1 << 17;
+// Blocks that the helper thread adds while queries cannot grow the tree: some 20 microseconds.
+constexpr std::uint32_t kBlocksAtOnce = 64;
+
+/// Box and slab of a cell's surface as bytes of the cell.
+bounds::NodeBounds encode(const BulkBuilder::Own& own, const lattice::Cell& cell) {
+  bounds::NodeBounds b;
+  encodeBox(own.box, cell, b);
+  if (std::all_of(own.normal, own.normal + 3, [](int n) { return n == 0; })) return b;
+  const bounds::CellFrame frame = frameOf(cell);
+  double middle = 0;
+  for (std::size_t k = 0; k < 3; ++k) middle += own.normal[k] * frame.middle(k);
+  const double margin = 1e-6 * frame.side;
+  frame.encodeSlab(own.normal, own.least - middle - margin, own.most - middle + margin, b);
+  return b;
+}
+
+void buildWhole(const oracle::Surface& surface, BulkBuilder& bulk) {
+  if (surface.triangle_count >= BulkBuilder::kLeastToSort && surface.mesh->vertexCount() <= BulkBuilder::kMostToSort) {
+    bulk.buildAll(surface);
+    return;
+  }
+  std::vector<std::uint32_t> ids(surface.triangle_count);
+  std::iota(ids.begin(), ids.end(), 0u);
+  bulk.build(surface, ids.data(), ids.size(), latticeBounds(surface));
+}
+
+}  // namespace
+
+/// A build by the helper thread: it and the tree share this, as either may end first.
+struct Tree::AheadBuild {
+  thread::ForkAwareMutex mutex;  // of what follows
+  Tree* tree;                    // null when the tree is gone
+};
+
+Tree::~Tree() {
+  if (ahead_build_ == nullptr) return;
+  try {
+    const std::lock_guard<thread::ForkAwareMutex> lock(ahead_build_->mutex);
+    ahead_build_->tree = nullptr;
+  } catch (const std::runtime_error&) {
+    // A child after fork(): the thread that held the lock is not there.
+  }
+}
+
+// The cell of a node; of a lane only the level, which counts from the cell that was built in bulk.
+lattice::Cell Tree::cellOrDepth(NodeRef node) const {
+  int deeper = 0;
+  for (; isLoose(node); ++deeper) node = records_[node.block()].parent;
+  lattice::Cell cell = this->cell(node);
+  cell.level += deeper;
+  return cell;
+}
+
+// What exact answers need below a node whose triangles are known here. False where the oracle is to be asked: for what
+// the root grid or a device knows.
+bool Tree::growInBulk(NodeRef node, std::vector<std::uint32_t>& ids) {
+  const ChildRef ref = this->childRef(node);
+  ids.clear();
+  if (ref.isList()) {
+    const TriangleList list = this->list(ref);
+    // A lane is no cell, so an oracle can't be asked about it.
+    const bool is_for_host = growsOnHost() || isLoose(node) || list.count <= kHostTriangles;
+    if (!list.ids.areKnown() || !is_for_host) return false;
+    list.appendTo(ids);
+  } else if (!growsOnHost()) {
+    return false;
+  } else if (grid_ != nullptr) {
+    if (cell(node).level < grid_->level()) return false;
+    grid_->gather(surface_, cell(node), ids);
+  } else {
+    growWhole();
+    return true;
+  }
+  payRent(ids.size());
+  built_ += ids.size();
+  const bool is_loose = isLoose(node);
+  Eigen::AlignedBox3d region;
+  if (is_loose) {
+    region = blocks_[node.block()].looseBox(node.octant());
+  } else {
+    const lattice::Cell cell = this->cell(node);
+    const Eigen::Vector3d corner(cell.corner()[0], cell.corner()[1], cell.corner()[2]);
+    region = Eigen::AlignedBox3d(corner, corner.array() + cell.side());
+  }
+  thread_local BulkBuilder bulk;
+  thread_local std::vector<BulkPlace> places;
+  bulk.build(surface_, ids.data(), ids.size(), region);
+  if (!is_loose && !bulk.ids().empty()) {
+    refits_.push_back({node, encode(bulk.own(), cell(node))});
+    refits_wait_.store(true, std::memory_order_relaxed);
+  }
+  startPlaces(bulk, node, cellOrDepth(node).level, places);
+  addBlocks(bulk, places, 0, bulk.blocks().size());
+  publishBulk(bulk, places);
+  return true;
+}
+
+bool Tree::buildsAhead() const {
+  return options_.build_ahead && !conservative() && options_.memory_budget == 0 && growsOnHost();
+}
+
+void Tree::startRent() {
+  rent_ = 0;
+  is_ahead_build_due_ = buildsAhead();
+  price_ = conservative() ? kNever : is_ahead_build_due_ ? 0 : surface_.triangle_count / kRent;
+}
+
+bool Tree::buildNow() {
+  const std::unique_lock<thread::ForkAwareMutex> lock(growth_, std::try_to_lock);
+  if (!lock.owns_lock() || !isBuildDue()) return false;
+  if (is_ahead_build_due_) {
+    // Should the thread not come to it in time, a query still builds the tree.
+    is_ahead_build_due_ = false;
+    price_ = surface_.triangle_count / kRent;
+    askForAheadBuild();
+    return false;
+  }
+  growWhole();
+  countBytes();
+  return true;
+}
+
+// All of the tree that exact answers need. Queries under way go on in the old blocks.
+void Tree::growWhole() {
+  thread_local BulkBuilder bulk;
+  thread_local std::vector<BulkPlace> places;
+  buildWhole(surface_, bulk);
+  price_ = kNever;
+  if (!supports_known_) {
+    bulk.findSupports(supports_);
+    outline_.set(bulk.findOutline(surface_.lattice));
+    supports_known_ = true;
+  }
+  // A device has grown what is above the parts, so the host would gain little by new blocks.
+  if (!growsOnHost()) return;
+  startPlaces(bulk, NodeRef(), 1, places);
+  addBlocks(bulk, places, 0, bulk.blocks().size());
+  publishWhole(bulk, places);
+  if (surface_.triangle_count > kMostKept) {
+    bulk = BulkBuilder();
+    places = {};
+  }
+}
+
+void Tree::askForAheadBuild() {
+  try {
+    if (ahead_build_ == nullptr) {
+      ahead_build_ = std::make_shared<AheadBuild>();
+      ahead_build_->tree = this;
+    }
+    thread::runInHelperThread([build = ahead_build_] {
+      try {
+        buildAhead(*build);
+      } catch (const std::exception&) {
+        // Without memory for it, or in a child after fork(): queries build what they need.
+      }
+    });
+  } catch (const std::exception&) {
+    // No thread to be had.
+  }
+}
+
+// In the helper thread: builds from the mesh alone, then adds the blocks in parts between which queries grow the tree.
+void Tree::buildAhead(AheadBuild& ahead) {
+  std::unique_ptr<oracle::Surface> surface;
+  std::uint64_t generation = 0;
+  // Calls f(tree) unless the tree is gone, or is another by now, or was built by a query; did it?
+  const auto withTree = [&](auto&& f) {
+    const std::lock_guard<thread::ForkAwareMutex> exists(ahead.mutex);
+    if (ahead.tree == nullptr) return false;
+    Tree& tree = *ahead.tree;
+    const std::shared_lock<thread::ShardedLock> query(tree.query_lock_);
+    const std::lock_guard<thread::ForkAwareMutex> growth(tree.growth_);
+    if (tree.price_ == kNever || (surface != nullptr && tree.generation_ != generation)) return false;
+    f(tree);
+    return true;
+  };
+  const bool is_wanted = withTree([&](Tree& tree) {
+    surface.reset(new oracle::Surface{tree.surface_.mesh, tree.surface_.lattice});
+    generation = tree.generation_;
+  });
+  if (!is_wanted) return;
+
+  BulkBuilder bulk;
+  buildWhole(*surface, bulk);
+  SupportTable supports;
+  const Eigen::AlignedBox3d box = latticeBounds(*surface);
+  const Eigen::Vector3d middle = Eigen::Vector3d::Constant(lattice::kMiddle);
+  supports.start({box.min() - middle, box.max() - middle});
+  bulk.findSupports(supports);
+  const Outline::Box outline = bulk.findOutline(surface->lattice);
+
+  std::vector<BulkPlace> places;
+  startPlaces(bulk, NodeRef(), 1, places);
+  for (std::size_t begin = 0, end; begin < bulk.blocks().size(); begin = end) {
+    end = std::min(begin + kBlocksAtOnce, bulk.blocks().size());
+    if (!withTree([&](Tree& tree) { tree.addBlocks(bulk, places, begin, end); })) return;
+    std::this_thread::yield();
+  }
+  withTree([&](Tree& tree) {
+    tree.price_ = kNever;
+    if (!tree.supports_known_) {
+      for (int n = 0; n < SupportTable::kCount; ++n) tree.supports_.lower(n, static_cast<double>(supports.value(n)));
+      tree.outline_.set(outline);
+      tree.supports_known_ = true;
+    }
+    tree.publishWhole(bulk, places);
+    tree.countBytes();
+  });
+}
+
+// Below `node`, whose level as counted is `level`.
+void Tree::startPlaces(const BulkBuilder& bulk, NodeRef node, int level, std::vector<BulkPlace>& places) {
+  places.assign(std::max<std::size_t>(1, bulk.blocks().size()), BulkPlace());
+  places[0].node = node;
+  places[0].level = level;
+}
+
+// Adds blocks of what was built, from number `begin` on, after those before them. No reader sees them: all but the
+// first are put below their parents, and that one nowhere.
+void Tree::addBlocks(const BulkBuilder& bulk, std::vector<BulkPlace>& places, std::size_t begin, std::size_t end) {
+  for (std::size_t number = begin; number < end; ++number) {
+    const BulkBuilder::Block& built = bulk.blocks()[number];
+    BulkPlace& place = places[number];
+    place.index = addBlock(place.node, place.level, static_cast<std::uint8_t>(0xff >> (8 - built.lanes)));
+    octants_ += built.lanes;
+    Block& block = blocks_[place.index];
+    block.setFrame(built.frame);
+    for (std::uint32_t o = 0; o < built.lanes; ++o) {
+      const BulkBuilder::Lane& lane = built.lane[o];
+      block.octants.set(o, built.bounds[o]);
+      if (lane.block == BulkBuilder::kNone) {
+        block.child[o].store(addList(bulk.ids().data() + lane.begin, lane.count, false), std::memory_order_relaxed);
+      } else {
+        places[lane.block].node = NodeRef::octant(place.index, static_cast<int>(o));
+        places[lane.block].level = place.level + 1;
+      }
+    }
+    if (number > 0) setChild(place.node, ChildRef(ChildRef::kBlock, place.index));
+  }
+}
+
+// All blocks were added: readers see them from now on.
+void Tree::publishBulk(const BulkBuilder& bulk, const std::vector<BulkPlace>& places) {
+  setChild(places[0].node, bulk.blocks().empty() ? addList(bulk.ids().data(), bulk.ids().size(), true)
+                                                 : ChildRef(ChildRef::kBlock, places[0].index));
+}
+
+// Of the whole tree; what was grown before is not counted any more.
+void Tree::publishWhole(const BulkBuilder& bulk, const std::vector<BulkPlace>& places) {
+  built_ += surface_.triangle_count;
+  for (auto& n : nodes_at_) n = 0;
+  nodes_at_[1] = 1;
+  for (std::size_t number = 0; number < bulk.blocks().size(); ++number) {
+    nodes_at_[countedLevel(places[number].level + 1)] += bulk.blocks()[number].lanes;
+  }
+  publishBulk(bulk, places);
+  refits_.push_back({NodeRef(), encode(bulk.own(), lattice::Cell{})});
+  refits_wait_.store(true, std::memory_order_relaxed);
+}
+
+}  // namespace bocst::tree
