@@ -10,34 +10,34 @@
 
 namespace bocst {
 
-/// Which of many poses of one pair collide? hit[k] is set to 1 where b, at the pose X_AB[k], collides with a, else to
-/// 0, for 0 <= k < count.
+/// Checks one pair of models for collision at many poses. Sets hit[k] to 1 if b at the pose X_AB[k] collides with a,
+/// otherwise to 0, for 0 <= k < count.
 ///
-/// **Poses.** X_AB[k] is the pose of b in the frame of a: it takes points of b to where they are in a's frame, with
-/// translations in the length unit of the meshes. One after the other, as a Scene takes them whose fixed object is a,
-/// at the identity, and whose moving object is b. From poses in the world, X_AB = X_WA.inverse() * X_WB.
+/// **Poses.** X_AB[k] is the pose of b in the frame of a: p_A = X_AB[k] * p_B. Translations are in the length unit of
+/// the meshes. The array is the same as for the states of a Scene in which a is fixed at the identity pose and b is the
+/// only moving object. From poses in the world frame: X_AB = X_WA.inverse() * X_WB.
 ///
-/// **Verdicts** are those of fcl::collide(&a, Identity, &b, X_AB[k]) with the default request; margins, solids,
-/// conservative answers and occupancy count as there. They do not depend on threads, nor on what is resident. Poses
-/// whose boxes are apart cost some nanoseconds each.
+/// **Verdicts** equal those of fcl::collide(&a, Identity, &b, X_AB[k]) with the default request, including margins,
+/// solids, conservative answers and occupancy. They do not depend on `threads` or on which nodes are resident. A pose
+/// at which the bounding boxes are apart takes some nanoseconds.
 ///
-/// `threads` share the poses, the calling one included; 0: as many as the machine runs at once. They are started by
-/// this call, so more than one pays for some thousand poses.
+/// `threads`: number of threads that share the poses, including the calling thread; 0: one per hardware thread. Each
+/// call starts its threads, so more than one thread pays off only for some thousand poses.
 ///
-/// Thread rule: as collide(); models may be asked, pruned and deformed at the same time. Each pose sees a mesh from
-/// before or after a change.
-/// @throws std::invalid_argument for a null array, and for a pose that is not rigid, of which it names the first. What
-/// is in hit[] then means nothing.
+/// Thread rule: as collide(); the models may be queried, pruned and deformed at the same time. Each pose sees a mesh
+/// either before or after a change.
+/// @throws std::invalid_argument for a null array, and for a pose that is not rigid (the message names the first one).
+/// The contents of hit[] are then unspecified.
 template <typename S>
 BOCST_EXPORT void collidePoses(const Model<S>& a, const Model<S>& b, const fcl::Transform3<S>* X_AB, std::size_t count,
                                std::uint8_t* hit, unsigned threads = 1);
 
-/// How the 16 numbers of a 4x4 matrix lie in memory: column after column, as Eigen has them, or row after row, as
-/// arrays in C and NumPy.
+/// The order of the 16 numbers of a 4x4 matrix in memory: column by column, as in Eigen (kColumns), or row by row, as
+/// in C and NumPy arrays (kRows).
 enum class MatrixOrder { kColumns, kRows };
 
-/// The same for matrices that are bare numbers, of no alignment but that of S: X_AB[16 * k] is the first of pose k.
-/// They are read where they are.
+/// The same for 4x4 matrices as plain numbers: X_AB[16 * k] is the first number of pose k. The array needs no alignment
+/// other than that of S. It is not copied.
 /// @throws std::invalid_argument as above, and for a matrix whose last row is not 0 0 0 1.
 template <typename S>
 BOCST_EXPORT void collidePoses(const Model<S>& a, const Model<S>& b, const S* X_AB, MatrixOrder order,

@@ -5,9 +5,9 @@
 
 namespace bocst {
 
-/// Whether a Model that is made from now on checks that FCL's queries of this process reach bocst (see <bocst/fcl.h>);
-/// true at first. The environment's BOCST_DISPATCH_CHECK=off turns the check off whatever is said here. Without the
-/// check, code that was compiled without <bocst/fcl.h> may be told "free" about models that touch. Thread-safe.
+/// Turns a check on or off: each Model constructed from now on checks that FCL's queries in this process reach bocst
+/// (see <bocst/fcl.h>). The check is on by default. The environment variable BOCST_DISPATCH_CHECK=off turns it off in
+/// any case. Without the check, code compiled without <bocst/fcl.h> may get "free" for models that touch. Thread-safe.
 BOCST_EXPORT void setDispatchCheck(bool on);
 
 }  // namespace bocst

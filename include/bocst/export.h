@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #pragma once
 
-/// Marks what the shared library shows; everything else is hidden.
+/// Marks the symbols that the shared library exports; all other symbols are hidden.
 #define BOCST_EXPORT __attribute__((visibility("default")))

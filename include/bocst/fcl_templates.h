@@ -1,9 +1,9 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #pragma once
 
-// Says that these instances of FCL's templates are in libbocst: where bocst is registered in FCL's tables. So code that
-// includes <bocst/fcl.h> and yet names FCL's templates, as in fcl::collide<S>(...), makes no copies of its own, which
-// -fvisibility=hidden would cut off from those tables.
+// Declares that libbocst contains these instances of FCL's templates. In them, bocst is registered in FCL's tables. So
+// code that includes <bocst/fcl.h> but names FCL's templates, as in fcl::collide<S>(...), makes no copies of its own.
+// With -fvisibility=hidden, such copies would have tables without bocst.
 
 #include <bocst/export.h>
 #include <fcl/narrowphase/collision.h>

@@ -10,34 +10,34 @@
 
 namespace bocst {
 
-/// Reads a triangle mesh from a file, whose extension tells the format. In target bocst::io.
+/// Reads a triangle mesh from a file. The file extension selects the format. Needs the CMake target bocst::io.
 ///
-/// OBJ, PLY, STL, OFF and DAE have readers of their own here: whatever their bytes are, the result is a mesh or an
-/// exception. They open no other file; materials, normals, colours and texture coordinates are skipped. Coordinates
-/// are read as doubles, whatever the locale. Other formats (GLB, glTF, 3MF, ...) are read by assimp in this process,
-/// with its limits: floats, and no promise for malformed files. It may open regular files in the folder of the file.
+/// OBJ, PLY, STL, OFF and DAE are read by bocst's own readers: for any content the result is a mesh or an exception.
+/// They open no other file and skip materials, normals, colours and texture coordinates. Coordinates are read as
+/// doubles, in any locale. Other formats (GLB, glTF, 3MF, ...) are read by assimp in this process, with its limits:
+/// float coordinates, and no guarantee for malformed files. It may open regular files in the folder of the file.
 ///
-/// Coordinates and axes are those of the file. Only DAE says what its unit is: its coordinates become metres
-/// (`<unit meter="...">`); its axes stay, too, whatever its up_axis says. Transforms of nodes are applied, and all
-/// meshes of the file become one. Of a DAE's `<controller>` the shape that it deforms is taken, undeformed.
+/// Coordinates and axes are those of the file. Only DAE states a length unit (`<unit meter="...">`): its coordinates
+/// are converted to metres. Its axes stay as they are, also if up_axis is not z. Transforms of nodes are applied, and
+/// all meshes of the file become one. For a `<controller>` of DAE, the undeformed shape is read.
 ///
-/// Faces of more than three corners are cut into triangles; points and lines are skipped. Vertices and their order are
-/// those of the file, but equal vertices of STL and of assimp's formats are joined. Triangle strips of PLY and DAE
-/// lose the triangles with a repeated corner.
+/// Faces with more than three corners are divided into triangles; points and lines are skipped. Vertices and their
+/// order are those of the file, but equal vertices of STL and of assimp's formats are merged. In triangle strips of PLY
+/// and DAE, triangles with a repeated corner are removed.
 ///
-/// @throws std::runtime_error naming the file and what is wrong, with the line, or with the byte in binary data: no
-/// regular file (it never waits for a FIFO or a device), empty, truncated, no triangles, numbers that are none or not
-/// finite, indices that are fractional or out of range, anything after the end; binary OFF, polygons with holes
-/// (`<ph>`) and free-form surfaces are not supported.
+/// @throws std::runtime_error if the file cannot be read as a mesh. The message names the file, the fault and the line
+/// (the byte in binary data). Faults are: not a regular file (it never waits for a FIFO or a device), empty, truncated,
+/// no triangles, invalid or non-finite numbers, indices that are fractional or out of range, data after the end. Binary
+/// OFF, polygons with holes (`<ph>`) and free-form surfaces are not supported.
 BOCST_EXPORT std::shared_ptr<const Mesh> loadMesh(const std::string& file);
 
 /// A format that loadMesh() reads.
 struct MeshFormat {
-  std::string ending;  ///< Of files, in small letters, without the dot: "obj".
-  bool by_assimp;      ///< Otherwise by a reader of bocst's own.
+  std::string ending;  ///< File extension in lower case, without the dot: "obj".
+  bool by_assimp;      ///< True: read by assimp; false: by bocst's own reader.
 };
 
-/// All formats: those with readers of their own, then those of the assimp that is there.
+/// All formats: first those of bocst's own readers, then those of the assimp library in use.
 BOCST_EXPORT std::vector<MeshFormat> meshFormats();
 
 }  // namespace bocst

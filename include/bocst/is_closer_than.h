@@ -6,16 +6,16 @@
 
 namespace bocst {
 
-/// Are two geometries at the poses X_W1 and X_W2 (world from geometry) no farther apart than `distance`, a length in
-/// the world's unit? Ends as soon as that is known, so it takes far less time than fcl::distance. The answer is
-/// `fcl::distance(...) <= distance` up to rounding: 0 asks whether they touch. Solids and shapes count their insides.
+/// True if the distance between two geometries at the poses X_W1 and X_W2 (world from geometry) is at most `distance`,
+/// in the world's length unit. Stops once the answer is known, so it takes far less time than fcl::distance. The answer
+/// is `fcl::distance(...) <= distance` up to rounding; 0 tests for contact. Solids and shapes include their inside.
 ///
-/// Pairs are those of bocst::collide (<bocst/fcl.h>), and o1 and o2 may be in either order. For a model with
-/// conservative answers the spheres of its cells are its surface. Options::margin does not count here.
+/// Pairs are those of bocst::collide (<bocst/fcl.h>); o1 and o2 may be in either order. The surface of a model with
+/// conservative answers is the set of its cells' spheres. Options::margin has no effect here.
 ///
-/// Threads: as collide(); any number of queries at the same time.
-/// @throws std::invalid_argument for a pose that is none, or a distance that is negative, NaN or infinite;
-/// std::logic_error where neither geometry is a Model.
+/// Thread rule: as collide(); any number of queries may run at the same time.
+/// @throws std::invalid_argument for a pose that is not rigid, or a distance that is negative, NaN or infinite;
+/// std::logic_error if neither geometry is a Model.
 template <typename S>
 BOCST_EXPORT bool isCloserThan(const fcl::CollisionGeometry<S>* o1, const fcl::Transform3<S>& X_W1,
                                const fcl::CollisionGeometry<S>* o2, const fcl::Transform3<S>& X_W2, S distance);

@@ -10,16 +10,16 @@ namespace bocst {
 
 /// How serious a message of the library is.
 enum class LogLevel {
-  kInfo,     ///< For the curious.
-  kWarning,  ///< Something works otherwise or more slowly than was asked for; answers are as they should be.
-  kError,    ///< Something that was asked for is missing.
+  kInfo,     ///< Information only.
+  kWarning,  ///< Something works differently or more slowly than requested; answers are correct.
+  kError,    ///< Something that was requested is not available.
 };
 
-/// Sends what the library has to report, outside of exceptions, to `logger`: a GPU that was lost or that ran out of
-/// memory, for example. An empty function restores the default, which writes lines "bocst: ..." to stderr.
+/// Sends the library's messages to `logger`: for example, that a GPU was lost or ran out of memory. Exceptions are not
+/// messages. An empty function restores the default, which writes lines "bocst: ..." to stderr.
 ///
-/// Threads: may be called at any time. The logger is called from any thread, also from several at once and inside of
-/// queries, so it must be thread-safe and must not call back into the library. What it throws is ignored.
+/// Threads: may be called at any time. The library calls the logger from any thread, also from several at once and
+/// during queries, so the logger must be thread-safe and must not call the library. Exceptions from it are ignored.
 BOCST_EXPORT void setLogger(std::function<void(LogLevel, const std::string&)> logger);
 
 }  // namespace bocst

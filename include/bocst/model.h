@@ -29,53 +29,53 @@ namespace fcl_adapter {
 struct ModelTree;
 }
 
-/// A Branch On-collide Sphere-tree as an FCL geometry: one sphere at first, grown by the queries that touch it
-/// (Rodríguez and Franquesa, section 3).
+/// A triangle mesh as an FCL geometry, with a Branch On-collide Sphere-tree (Rodríguez and Franquesa, section 3). The
+/// tree starts as one sphere; queries expand the nodes that they touch.
 ///
 /// Threads: any number of threads may query one model, read its statistics, visit() and prune() it at the same time.
-/// updateVertices() may run beside queries too; a query sees the mesh from before or after, never a mixture. What
-/// CollisionGeometry itself leaves unguarded (cost_density, aabb_local, ...) stays unguarded.
+/// updateVertices() may run at the same time, too; a query sees the mesh before or after the update, never a mixture.
+/// The public members of CollisionGeometry (cost_density, aabb_local, ...) are not protected, as in FCL.
 ///
-/// After fork() a child may use the models that it makes itself, and those of the parent that no other thread was using
-/// at the fork (with a GPU, on the CPU). Of a model that another thread was using, what needs to wait for that thread
-/// or would change what it may have left half done throws std::runtime_error: a query while the tree was being grown or
-/// pruned, and prune(), expandAll(), updateVertices(). Nothing waits for a thread that is not there.
+/// After fork() a child process may use models that it makes itself, and models of the parent that no other thread was
+/// using at the fork (models on a GPU then use the CPU). For a model that another thread was using, these calls throw
+/// std::runtime_error: prune(), expandAll(), updateVertices(), and a query if that thread was expanding or pruning the
+/// tree. No call waits for a thread that does not exist in the child.
 ///
-/// The mesh is a surface, as FCL's BVHModel is: what is wholly inside it does not touch it (but see Options::solid).
+/// The mesh is a surface, as in FCL's BVHModel: a geometry inside it does not touch it (but see Options::solid).
 template <typename S>
 class BOCST_EXPORT Model : public fcl::CollisionGeometry<S> {
  public:
-  /// @throws std::invalid_argument for a null mesh, an option out of range, or a mesh that is not watertight if solid,
-  /// OracleError for an oracle that cannot be had, std::runtime_error when code compiled without <bocst/fcl.h> would
-  /// not reach this library (the message has the remedy; BOCST_DISPATCH_CHECK=off turns the check off).
+  /// @throws std::invalid_argument for a null mesh, an option out of range, or with Options::solid a mesh that is not
+  /// watertight; OracleError if the oracle is not available; std::runtime_error if code compiled without <bocst/fcl.h>
+  /// would not reach this library (the message says how to fix it; BOCST_DISPATCH_CHECK=off turns the check off).
   explicit Model(std::shared_ptr<const Mesh> mesh, const Options& options = {});
 
-  /// Takes the vertices and triangles of an FCL mesh, not its tree, which need not be built: addSubModel() without
-  /// endModel() will do. BV::S must be S. Of an empty BVHModel the model is empty, too.
+  /// Copies the vertices and triangles of an FCL mesh. FCL's tree is not used and need not be built: addSubModel()
+  /// without endModel() is enough. BV::S must be S. From an empty BVHModel, the model is empty, too.
   template <typename BV>
   explicit Model(const fcl::BVHModel<BV>& bvh, const Options& options = {}) : Model(options) {
     if (bvh.num_tris > 0 || bvh.num_vertices > 0) setMesh(meshOf(bvh));
   }
 
-  /// An empty model: nothing touches it, and it is at no distance from anything, as an empty fcl::BVHModel. A mesh
-  /// comes by setMesh(), or by FCL's names from beginModel() on. A Scene takes no empty model.
+  /// An empty model: it collides with nothing and has no distance to any geometry, as an empty fcl::BVHModel. Its mesh
+  /// is set by setMesh(), or by FCL's functions from beginModel() on. A Scene does not accept an empty model.
   Model() : Model(Options{}) {}
-  explicit Model(const Options& options);  ///< An empty model with options.
+  explicit Model(const Options& options);  ///< An empty model with these options.
 
   ~Model() override;
   Model(const Model&) = delete;
   Model& operator=(const Model&) = delete;
 
-  /// Has it no mesh yet? @throws std::logic_error between beginModel() and endModel(), as queries do.
+  /// True if the model has no mesh. @throws std::logic_error between beginModel() and endModel(), as queries do.
   bool empty() const;
 
-  /// Another mesh; the tree is one sphere again. Not beside queries. What throws is as for the constructor, and the
-  /// model is then as before.
+  /// Replaces the mesh; the tree is one sphere again. No query may run at the same time. Throws as the constructor
+  /// does; the model is then unchanged.
   void setMesh(std::shared_ptr<const Mesh> mesh);
 
-  // FCL's names, for code that was written for fcl::BVHModel. They return fcl::BVH_OK, or as there the code of what was
-  // called out of sequence. endModel() builds no tree; without any triangle it returns fcl::BVH_ERR_BUILD_EMPTY_MODEL
-  // and the model stays empty; what Mesh() refuses throws std::invalid_argument. Not beside queries.
+  // FCL's functions, for code that was written for fcl::BVHModel. They return fcl::BVH_OK, or FCL's code for a call out
+  // of sequence. endModel() builds no tree. If nothing was added, it returns fcl::BVH_ERR_BUILD_EMPTY_MODEL and the
+  // model stays empty. It throws std::invalid_argument if Mesh() does. No query may run at the same time.
   int beginModel(int num_tris = 0, int num_vertices = 0);  ///< Drops the mesh that is there.
   int addVertex(const fcl::Vector3<S>& p);                 ///< In the mesh's frame.
   /// Adds three vertices and the triangle between them.
@@ -85,8 +85,8 @@ class BOCST_EXPORT Model : public fcl::CollisionGeometry<S> {
   int addSubModel(const std::vector<fcl::Vector3<S>>& ps);  ///< Adds vertices only.
   int endModel();                                           ///< Takes what was added as the mesh.
 
-  // New positions in the order of the vertices, then updateVertices(). Fewer or more than there are vertices:
-  // fcl::BVH_ERR_INCORRECT_DATA, and the model is as before. There is no tree to refit, so the arguments do not matter.
+  // New positions in the order of the vertices, as updateVertices(). Another number of positions than of vertices gives
+  // fcl::BVH_ERR_INCORRECT_DATA and an unchanged model. The arguments have no effect: there is no tree to refit.
   int beginReplaceModel() { return beginUpdateModel(); }                   ///< As beginUpdateModel().
   int replaceVertex(const fcl::Vector3<S>& p) { return updateVertex(p); }  ///< As updateVertex().
   /// As updateTriangle().
@@ -97,25 +97,25 @@ class BOCST_EXPORT Model : public fcl::CollisionGeometry<S> {
   /// As endUpdateModel().
   int endReplaceModel(bool refit = true, bool bottomup = true) { return endUpdateModel(refit, bottomup); }
   int beginUpdateModel();                      ///< Begins with the first vertex.
-  int updateVertex(const fcl::Vector3<S>& p);  ///< Where the next vertex is, in the mesh's frame.
-  /// Where the next three vertices are.
+  int updateVertex(const fcl::Vector3<S>& p);  ///< Position of the next vertex, in the mesh's frame.
+  /// Positions of the next three vertices.
   int updateTriangle(const fcl::Vector3<S>& p1, const fcl::Vector3<S>& p2, const fcl::Vector3<S>& p3);
-  int updateSubModel(const std::vector<fcl::Vector3<S>>& ps);   ///< Where the next vertices are.
+  int updateSubModel(const std::vector<fcl::Vector3<S>>& ps);   ///< Positions of the next vertices.
   int endUpdateModel(bool refit = true, bool bottomup = true);  ///< Takes the new positions.
 
-  /// fcl::BVH_MODEL_TRIANGLES; of an empty model fcl::BVH_MODEL_UNKNOWN.
+  /// fcl::BVH_MODEL_TRIANGLES; for an empty model fcl::BVH_MODEL_UNKNOWN.
   fcl::BVHModelType getModelType() const;
 
-  const Options& options() const;  ///< As given.
+  const Options& options() const;  ///< As given to the constructor.
 
-  /// The mesh as it is now. Keeps it alive across updateVertices(). Null after releaseMesh(), and
-  /// while the model is empty.
+  /// The current mesh. The pointer keeps it alive also after updateVertices(). Null after releaseMesh(), and while the
+  /// model is empty.
   std::shared_ptr<const Mesh> mesh() const;
 
-  /// Lets go of the mesh in host memory; the compute oracle has it on its device (3: "the model need not be in core
-  /// memory"). It goes when nobody else holds it. From then on a query throws OracleError if the device is lost.
-  /// @throws std::logic_error for exact answers and for solids, which look at the triangles here; OracleError when the
-  /// oracle of this model has no copy.
+  /// Releases the mesh in host memory; the compute oracle has a copy on its device (3: "the model need not be in core
+  /// memory"). The memory is freed when no other owner is left. Later queries throw OracleError if the device is lost.
+  /// @throws std::logic_error for exact answers and for solids, which need the triangles in host memory; OracleError if
+  /// the oracle of this model has no copy.
   void releaseMesh();
 
   /// "cpu", "occlusion", "sampled", "compute", or "cpu and compute" (kAuto where there is a GPU).
@@ -123,36 +123,36 @@ class BOCST_EXPORT Model : public fcl::CollisionGeometry<S> {
 
   Statistics statistics() const;  ///< A snapshot.
 
-  /// Makes the complete tree down to level `depth` resident (1 to 17), as the paper's tables count it; branches that
-  /// queries have grown deeper are dropped first. For inspection: queries never need it.
+  /// Expands the complete tree down to level `depth` (1 to 17; the root is level 1, as in the paper's tables). Deeper
+  /// branches, grown by queries, are dropped first. For inspection; queries never need it.
   void expandAll(int depth);
 
   /// Calls f for every resident node, parents before children. f must not call back into this model.
   void visit(const std::function<void(const NodeView&)>& f) const;
 
-  /// Applies ttl and memory budget as of `now` (3.1): drops each deepest branch level whose last use is longer ago
-  /// than ttl; its parent's own time starts then. Queries do the same by themselves, now and then.
+  /// Applies ttl and memory_budget at the time `now` (paper, 3.1): drops each deepest branch level whose last use is
+  /// longer ago than ttl. The ttl of its parent starts then. Queries also do this from time to time.
   void prune(Clock::time_point now);
-  void prune();  ///< As of now.
+  void prune();  ///< With the current time.
 
-  /// New positions for all vertices, same triangles: the tree falls back to its root, nothing is rebuilt.
-  /// @throws std::invalid_argument for a wrong count, a bad vertex, or what is not watertight if solid,
-  /// std::logic_error after releaseMesh(); the model is then as before.
+  /// Sets new positions of all vertices; the triangles stay. The tree is reset to its root, nothing is rebuilt.
+  /// @throws std::invalid_argument for a wrong number of vertices, a bad vertex, or with Options::solid a mesh that is
+  /// not watertight; std::logic_error after releaseMesh(). The model is then unchanged.
   void updateVertices(std::vector<Eigen::Vector3d> vertices);
 
-  /// What the surface encloses, by the sums over its triangles that fcl::BVHModel makes: the volume (negative where the
-  /// surface is turned inside out), its centre of mass, and the moments of inertia about the mesh's origin for the
-  /// density 1. For a surface that is not closed, the numbers of FCL, which depend on where the origin is.
+  /// Volume inside the surface (negative if the surface is inside out), its centre of mass, and its moments of inertia
+  /// about the mesh's origin for density 1, by the same sums over triangles as fcl::BVHModel. For a surface that is not
+  /// closed, the values are those of FCL and depend on the position of the origin.
   /// @throws std::logic_error after releaseMesh().
   S computeVolume() const override;
   fcl::Vector3<S> computeCOM() const override;              ///< See computeVolume(); NaN without a volume.
   fcl::Matrix3<S> computeMomentofInertia() const override;  ///< See computeVolume().
 
-  // What FCL asks of a geometry.
-  void computeLocalAABB() override;                 ///< The mesh's bounds, and the sphere about their middle
-                                                    ///< that holds all vertices; these are looked through once.
+  // FCL's interface of a geometry.
+  void computeLocalAABB() override;                 ///< Box: the mesh's bounds. Sphere: about their centre,
+                                                    ///< around all vertices (searched only once).
   fcl::OBJECT_TYPE getObjectType() const override;  ///< OT_UNKNOWN: FCL never swaps the arguments.
-  fcl::NODE_TYPE getNodeType() const override;      ///< GEOM_TRIANGLE: a slot FCL leaves empty.
+  fcl::NODE_TYPE getNodeType() const override;      ///< GEOM_TRIANGLE: an empty row of FCL's tables.
 
  private:
   friend struct fcl_adapter::ModelTree;
@@ -166,7 +166,7 @@ class BOCST_EXPORT Model : public fcl::CollisionGeometry<S> {
     return std::make_shared<const Mesh>(std::move(vertices), triangles);
   }
 
-  struct Staged;  // What comes by FCL's names before the mesh is made of it.
+  struct Staged;  // What FCL's functions have added before the mesh is made of it.
   Options options_;
   std::unique_ptr<Staged> staged_;  // Between begin and end.
   std::unique_ptr<tree::Tree> tree_;

@@ -9,32 +9,32 @@ namespace bocst {
 
 /// How a cell is divided (paper, sections 4.2 and 4.3).
 enum class Subdivision {
-  kOctree,  ///< O-BOCST: the root is the centred bounding cube, every cell is halved.
+  kOctree,  ///< O-BOCST: the root is the centred bounding cube; every cell is halved.
   kBono,    ///< B-BOCST: branch-on-need; the lower side of every split is the largest exact power of two.
 };
 
-/// What a query answers.
+/// How a query tests for contact.
 enum class Answer {
-  kExact,         ///< Triangle tests at the bottom: FCL's mesh-mesh answer.
-  kConservative,  ///< The spheres of Options::depth, as in the paper: never misses, overestimates by the sphere size.
+  kExact,         ///< Triangle tests at the leaves: FCL's mesh-mesh answer.
+  kConservative,  ///< Sphere tests at Options::depth, as in the paper: no misses; overestimates by the sphere size.
 };
 
 /// The backend that subdivides cells: it finds the octants that the surface meets.
 enum class OracleKind {
-  kAuto,       ///< BOCST_ORACLE where it is set; else the CPU, for conservative answers beside a GPU.
+  kAuto,       ///< BOCST_ORACLE if it is set; else the CPU, and for conservative answers also a GPU.
   kCpu,        ///< SIMD on the calling thread.
-  kOcclusion,  ///< OpenGL 3.3: occlusion queries whose geometry shader tests exactly what the query is about.
+  kOcclusion,  ///< OpenGL 3.3: occlusion queries with an exact test in the geometry shader.
   kCompute,    ///< OpenGL 4.3: compute shaders; triangle lists stay on the device.
-  kSampled,    ///< The paper's occlusion queries as written (4.2). They miss surface, so answers may be false "free":
-               ///< for comparison only.
+  kSampled,    ///< The paper's occlusion queries as published (4.2). They can miss parts of the surface and so
+               ///< give a false "free": for comparison only.
 };
 
-/// The clock that ttl is measured with.
+/// The clock that measures ttl.
 using Clock = std::chrono::steady_clock;
 
-/// What only repeats experiments of the paper.
+/// Options that only serve to repeat experiments of the paper.
 struct PaperOptions {
-  /// Pixels a side of the views that kSampled draws, from 1 to 4096.
+  /// Width and height in pixels of the views that kSampled draws, from 1 to 4096.
   int viewport = 16;
 
   /// The paper's level rule (5.3): with kBono and 2^n + 2 <= d_t < 2^n + 2^(n-1), n = nbits(d_t) - 1, the collision
@@ -42,38 +42,38 @@ struct PaperOptions {
   bool level_rule = false;
 };
 
-/// How a model grows, answers and forgets. Fixed when the model is made.
+/// How a model expands its tree, answers queries and drops nodes. Fixed when the model is made.
 struct Options {
   Subdivision subdivision = Subdivision::kBono;  ///< How cells are divided.
   Answer answer = Answer::kExact;                ///< What a query answers.
 
-  /// Collision depth: the level at which kConservative answers; the root is level 1. From 1 to 17.
+  /// Collision depth: the level of the spheres that kConservative tests; the root is level 1. From 1 to 17.
   int depth = 6;
 
   /// The paper's d_t: the largest extent of the mesh in lattice units, from 1 to 65536; 0: 65536, the finest lattice.
-  /// Only kBono's cells depend on it (4.4): its root cube has the smallest power of two that is >= d_t as its side.
+  /// Only kBono's cells depend on it (4.4): the side of its root cube is the smallest power of two that is >= d_t.
   double dimension = 0;
 
-  OracleKind oracle = OracleKind::kAuto;  ///< Who tests octants.
+  OracleKind oracle = OracleKind::kAuto;  ///< Backend that subdivides cells.
 
-  /// The paper's Max. time (3.1): a deepest level unused for longer is dropped; 0: never.
+  /// The paper's Max. time (3.1): a deepest level that is unused for longer is dropped; 0: never.
   std::chrono::milliseconds ttl{2000};
 
-  /// Bytes of resident tree to stay under, least recently used branches go first; 0: no limit. A running query may
-  /// exceed it; what it grew is dropped when it ends.
+  /// Limit of the resident tree in bytes; the least recently used branches are dropped first; 0: no limit. A running
+  /// query may exceed it; branches are dropped when it ends.
   std::size_t memory_budget = 0;
 
-  /// Surfaces no farther apart than this collide, 0 or more, in the mesh's length unit. Of two models, the sum of both
-  /// margins counts. For collide() and continuousCollide(), and in the boxes that broadphase managers look at;
-  /// distance() stays that of the surfaces.
+  /// Surfaces at a distance of at most this collide; 0 or more, in the mesh's length unit. Between two models, the sum
+  /// of both margins counts. It applies to collide(), continuousCollide() and the bounding boxes for broadphase
+  /// managers, not to distance(), which measures between the surfaces.
   double margin = 0;
 
-  /// The mesh also collides with what is wholly inside it, in both argument orders: with the other geometry, if a
-  /// connected component of that is inside. A point is inside if its winding number is not zero: components may
-  /// overlap, and one with the opposite orientation inside another is a cavity. The mesh must be watertight: each edge
-  /// occurs as often in one direction as in the other (vertices at the same position count as one; triangles without
-  /// area do not matter), else std::invalid_argument, also from updateVertices(). Costs a sort of the edges and 12 to
-  /// 40 bytes a triangle.
+  /// The mesh also collides with a geometry if a connected component of that geometry is completely inside the mesh, in
+  /// both argument orders. A point is inside if its winding number is not zero: components may overlap, and one with
+  /// the opposite orientation inside another is a cavity. The mesh must be watertight: each edge occurs equally often
+  /// in both directions (vertices at the same position count as one; triangles without area are ignored). Otherwise the
+  /// constructor, setMesh() and updateVertices() throw std::invalid_argument. Costs a sort of the edges and 12 to 40
+  /// bytes per triangle.
   bool solid = false;
 
   /// One thread, which all models of the process share, builds the model's tree while its first queries run, instead of
@@ -83,8 +83,8 @@ struct Options {
 
   PaperOptions paper;  ///< For experiments.
 
-  /// What queries read the time from; empty: Clock, as of the system's last tick (some milliseconds). Tests inject
-  /// their own.
+  /// Source of the time for ttl; empty: Clock, with the resolution of the system's tick (some milliseconds). Tests can
+  /// set their own clock here.
   std::function<Clock::time_point()> clock;
 };
 

@@ -10,25 +10,25 @@
 
 namespace bocst {
 
-/// An oracle asked for by name that cannot be had; what() says why.
+/// Thrown if a requested oracle cannot be used; what() gives the reason.
 class BOCST_EXPORT OracleError : public std::runtime_error {
  public:
   using std::runtime_error::runtime_error;
 };
 
-/// One oracle this build knows of.
+/// One oracle that this build supports.
 struct OracleInfo {
-  OracleKind kind = OracleKind::kCpu;  ///< What Options::oracle takes.
-  std::string name;                    ///< "cpu", "occlusion" or "compute", as BOCST_ORACLE takes it; or "sampled".
-  std::string device;                  ///< What it runs on, for people.
-  bool hardware = false;               ///< Runs on a GPU.
-  std::string why_not;                 ///< Empty when it can be used; else the reason.
-  /// What came of asking the device what the CPU knows, as it is asked before it is used: "passed in 20 ms". Empty
-  /// where there was none: for the CPU, for "sampled", and where why_not says why not.
+  OracleKind kind = OracleKind::kCpu;  ///< The value for Options::oracle.
+  std::string name;                    ///< "cpu", "occlusion" or "compute", as for BOCST_ORACLE; or "sampled".
+  std::string device;                  ///< Name of the device, for display.
+  bool hardware = false;               ///< True if it runs on a GPU.
+  std::string why_not;                 ///< Empty if it can be used; else the reason why not.
+  /// Result of the self-test, which compares the device's answers with the CPU's before the device is used: "passed in
+  /// 20 ms". Empty if there was no test: for the CPU, for "sampled", and if why_not is not empty.
   std::string self_test = {};
 };
 
-/// What is there, and why not the others. Thread-safe.
+/// Lists all oracles; for those that cannot be used, the reason. Thread-safe.
 BOCST_EXPORT std::vector<OracleInfo> availableOracles();
 
 }  // namespace bocst

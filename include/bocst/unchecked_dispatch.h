@@ -5,9 +5,9 @@
 
 namespace bocst {
 
-/// While one lives, a Model that this thread makes does not check that FCL's queries of this process reach bocst (see
-/// setDispatchCheck()). For a module that is loaded in any order, as those of Python are, and all of whose queries
-/// include <bocst/fcl.h>: it must give its models to nobody else.
+/// While such an object exists, a Model that this thread makes does not check that FCL's queries in this process reach
+/// bocst (see setDispatchCheck()). For a module that is loaded in any order, as Python modules are, and whose queries
+/// all include <bocst/fcl.h>. Such a module must not pass its models to other code.
 class BOCST_EXPORT UncheckedDispatch {
  public:
   UncheckedDispatch();

@@ -70,8 +70,8 @@ void checkWatertight(const Mesh& mesh) {
       "bocst::Options: solid needs a watertight mesh, but the edge between vertices " + std::to_string(a) + " " +
       placeOf(mesh.vertex(a)) + " and " + std::to_string(b) + " " + placeOf(mesh.vertex(b)) +
       (there + back == 1 ? " has only one triangle"
-                         : " is run through " + std::to_string(there) + " times in one direction and " +
-                               std::to_string(back) + " times in the other: triangles are missing or turned over"));
+                         : " is used " + std::to_string(there) + " times in one direction and " + std::to_string(back) +
+                               " times in the other: triangles are missing or turned over"));
 }
 
 }  // namespace

@@ -44,7 +44,7 @@ Vector3d lengths(const char* name, const py::object& value) {
 }
 Vector3d normal(const py::object& value) {
   const Vector3d n = vector3("n", value);
-  if (n.isZero()) throw py::value_error("bocst: n has no direction");
+  if (n.isZero()) throw py::value_error("bocst: n is the zero vector");
   return n;
 }
 
@@ -54,8 +54,8 @@ Eigen::Matrix3d rotation(const py::object& value) {
   const Eigen::Matrix3d R = matrix3("the rotation", value);
   const double error = (R.transpose() * R - Eigen::Matrix3d::Identity()).cwiseAbs().maxCoeff();
   if (!(error <= 1e-3) || R.determinant() < 0) {
-    throw py::value_error("bocst: the rotation is none: R^T R is off the identity by " + std::to_string(error) +
-                          ", the determinant is " + std::to_string(R.determinant()));
+    throw py::value_error("bocst: the rotation is not a rotation matrix: R^T R differs from the identity by " +
+                          std::to_string(error) + ", the determinant is " + std::to_string(R.determinant()));
   }
   return R;
 }
@@ -64,7 +64,7 @@ Eigen::Matrix3d quaternion(const py::object& value) {
   const auto q = doubles("the quaternion", value);
   if (q.ndim() != 1 || q.shape(0) != 4) throw py::value_error("bocst: the quaternion must be (4,): w, x, y, z");
   const Eigen::Quaterniond Q(q.at(0), q.at(1), q.at(2), q.at(3));
-  if (!(Q.norm() > 0) || !std::isfinite(Q.norm())) throw py::value_error("bocst: the quaternion is no rotation");
+  if (!(Q.norm() > 0) || !std::isfinite(Q.norm())) throw py::value_error("bocst: the quaternion is zero or not finite");
   return Q.normalized().toRotationMatrix();
 }
 
@@ -184,8 +184,9 @@ std::shared_ptr<const std::vector<int>> facesOf(const py::object& faces, int cou
   for (int k = 0; k < count; ++k) {
     const int corners = at < f.size() ? f[at] : 0;
     if (corners < 3 || f.size() - at <= static_cast<std::size_t>(corners)) {
-      throw py::value_error("bocst: face " + std::to_string(k) +
-                            " of the Convex does not have its number of corners and that many indices");
+      throw py::value_error(
+          "bocst: face " + std::to_string(k) +
+          " of the Convex is incomplete: the number of corners (at least 3) is expected, then that many indices");
     }
     for (int i = 1; i <= corners; ++i) {
       const int v = f[at + static_cast<std::size_t>(i)];
@@ -196,8 +197,7 @@ std::shared_ptr<const std::vector<int>> facesOf(const py::object& faces, int cou
     }
     at += static_cast<std::size_t>(corners) + 1;
   }
-  if (count < 1 || at != f.size())
-    throw py::value_error("bocst: the Convex has another number of faces than num_faces");
+  if (count < 1 || at != f.size()) throw py::value_error("bocst: num_faces is not the number of faces of the Convex");
   return std::make_shared<const std::vector<int>>(std::move(f));
 }
 
@@ -331,7 +331,7 @@ class Octree : public Geometry {
   void read(const std::string& data) {
     const auto tree = std::make_shared<octomap::OcTree>(resolution_);
     std::istringstream in(data);
-    if (!tree->readBinaryData(in)) throw py::value_error("bocst: data is no octree");
+    if (!tree->readBinaryData(in)) throw py::value_error("bocst: data is not an octree in octomap's binary format");
     set(tree);
   }
   void insert(const py::object& points, const py::object& origin, double maxrange, bool lazy_eval, bool discretize) {
@@ -361,13 +361,14 @@ class Octree : public Geometry {
 #endif
 
 void bindGeometries(py::module_& m) {
-  py::class_<Geometry, std::shared_ptr<Geometry>>(m, "CollisionGeometry", "What collides, in a frame of its own.")
+  py::class_<Geometry, std::shared_ptr<Geometry>>(m, "CollisionGeometry",
+                                                  "A geometry that can collide, in its own frame.")
       .def("getNodeType", [](const Geometry& g) { return g.get()->getNodeType(); })
       .def("computeLocalAABB", [](const Geometry& g) { g.get()->computeLocalAABB(); })
       .def_property(
           "aabb_center", [](const Geometry& g) { return arrayOf(g.get()->aabb_center); },
           [](const Geometry& g, const py::object& c) { g.get()->aabb_center = vector3("aabb_center", c); },
-          "(3,): the middle of its box.");
+          "(3,): the centre of its bounding box.");
 
   ShapeClass<fcl::TrianglePd> triangle(m, "TriangleP", "A triangle of three points, (3,) each.");
   triangle.def(py::init([](const py::object& a, const py::object& b, const py::object& c) {
@@ -400,25 +401,26 @@ void bindGeometries(py::module_& m) {
   bindRound<fcl::Capsuled>(m, "Capsule", "A cylinder of length lz along z about the origin, with round ends.");
   bindRound<fcl::Coned>(m, "Cone", "A cone of height lz along z about the origin.");
   bindRound<fcl::Cylinderd>(m, "Cylinder", "A cylinder of height lz along z about the origin.");
-  bindHalf<fcl::Halfspaced>(m, "Halfspace", "All x with n.x <= d. n (3,) is normalised, and d with it.");
-  bindHalf<fcl::Planed>(m, "Plane", "All x with n.x = d. n (3,) is normalised, and d with it.");
+  bindHalf<fcl::Halfspaced>(m, "Halfspace",
+                            "All x with n.x <= d. n (3,) is normalised; d is divided by the same length.");
+  bindHalf<fcl::Planed>(m, "Plane", "All x with n.x = d. n (3,) is normalised; d is divided by the same length.");
 
   ShapeClass<fcl::Convexd>(m, "Convex", R"(A convex polyhedron.
 
-vertices: (n, 3). faces: one after the other, each its number of corners and their indices, in one flat array.)")
+vertices: (n, 3). faces: one flat array; each face is its number of corners, then their indices.)")
       .def(py::init(&makeConvex), "vertices"_a, "num_faces"_a, "faces"_a)
       .def_property_readonly("num_faces", [](const Shape<fcl::Convexd>& s) { return s.shape().getFaceCount(); });
 
   bindBuilder<MakeModel>(m, "BVHModel",
-                         R"(A triangle mesh: a bocst.Model that is built as python-fcl builds its BVHModel.
+                         R"(A triangle mesh: a bocst.Model with the functions of python-fcl's BVHModel.
 
-Answers are those of FCL's BVHModel<OBBRSS>, which is BVHModelOBBRSS here.)");
+Answers are those of FCL's BVHModel<OBBRSS>, which is called BVHModelOBBRSS here.)");
   bindBuilder<MakeObbrss>(m, "BVHModelOBBRSS", "A triangle mesh with FCL's own tree, which endModel() builds.");
 
 #if FCL_HAVE_OCTOMAP
-  py::class_<Octree, Geometry, std::shared_ptr<Octree>>(m, "OcTree", R"(An octomap of this resolution.
+  py::class_<Octree, Geometry, std::shared_ptr<Octree>>(m, "OcTree", R"(An octomap with the resolution r.
 
-data: bytes of octomap's binary format. points: (n, 3), which are inserted as seen from origin (3,).)")
+data: bytes in octomap's binary format. points: (n, 3), inserted as a point cloud seen from origin (3,).)")
       .def(py::init([](double r, const std::optional<py::bytes>& data, const py::object& points,
                        const py::object& origin, double maxrange, bool lazy_eval, bool discretize) {
              auto tree = std::make_shared<Octree>(r);
@@ -476,7 +478,7 @@ void bindObject(py::module_& m) {
       .def("getObjectType", [](const Object& o) { return o.getObjectType(); })
       .def("getNodeType", [](const Object& o) { return o.getNodeType(); })
       .def(
-          "collisionGeometry", [](const Object& o) { return o.python(); }, "As it was given.")
+          "collisionGeometry", [](const Object& o) { return o.python(); }, "The geometry as it was given.")
       .def("getTransform", [](const Object& o) { return Transform3d(o.getTransform()); })
       .def(
           "setTransform", [](Object& o, const Transform3d& tf) { o.place(tf); }, "tf"_a)
@@ -660,8 +662,9 @@ void bindQueries(py::module_& m) {
   py::implicitly_convertible<int, fcl::CCDSolverType>();
 
   using Request = fcl::CollisionRequestd;
-  py::class_<Request>(m, "CollisionRequest",
-                      "What is asked of collide(). Without enable_contact, contacts say only who touches.")
+  py::class_<Request>(
+      m, "CollisionRequest",
+      "The request of collide(). Without enable_contact, contacts only name the geometries and primitives that touch.")
       .def(py::init<std::size_t, bool, std::size_t, bool, bool, fcl::GJKSolverType>(), "num_max_contacts"_a = 1,
            "enable_contact"_a = false, "num_max_cost_sources"_a = 1, "enable_cost"_a = false,
            "use_approximate_cost"_a = true, "gjk_solver_type"_a = fcl::GST_LIBCCD)
@@ -676,7 +679,8 @@ void bindQueries(py::module_& m) {
   py::class_<Contact> contact(m, "Contact", R"(Two primitives that touch.
 
 o1, o2: the geometries as they were given. b1, b2: indices of the primitives, -1 for a shape.
-normal (3,): unit, from o1 to o2; pos (3,): a point in the world; penetration_depth >= 0. NaN without enable_contact.)");
+normal (3,): unit vector from o1 to o2; pos (3,); penetration_depth >= 0. They are in the world frame, and NaN without
+enable_contact.)");
   contact.def(py::init<>())
       .def_readwrite("o1", &Contact::o1)
       .def_readwrite("o2", &Contact::o2)
@@ -686,14 +690,14 @@ normal (3,): unit, from o1 to o2; pos (3,): a point in the world; penetration_de
   vectorMember(contact, "normal", &Contact::normal);
   vectorMember(contact, "pos", &Contact::pos);
 
-  py::class_<CostSource> cost(m, "CostSource", "A box in which two geometries overlap, in the world.");
+  py::class_<CostSource> cost(m, "CostSource", "A box in which two geometries overlap, in the world frame.");
   cost.def(py::init<>())
       .def_readwrite("cost_density", &CostSource::cost_density)
       .def_readwrite("total_cost", &CostSource::total_cost);
   vectorMember(cost, "aabb_min", &CostSource::aabb_min);
   vectorMember(cost, "aabb_max", &CostSource::aabb_max);
 
-  py::class_<CollisionResult>(m, "CollisionResult", "What collide() found; calls add to it.")
+  py::class_<CollisionResult>(m, "CollisionResult", "The result of collide(); each call adds to it.")
       .def(py::init([](const py::object& contacts, const py::object& costs) {
              CollisionResult r;
              if (!contacts.is_none()) r.contacts = py::list(contacts);
@@ -705,12 +709,12 @@ normal (3,): unit, from o1 to o2; pos (3,): a point in the world; penetration_de
       .def_readwrite("contacts", &CollisionResult::contacts)
       .def_readwrite("cost_sources", &CollisionResult::cost_sources);
   m.def("collide", &collideObjects, "o1"_a, "o2"_a, "request"_a = py::none(), "result"_a = py::none(),
-        R"(Do two objects collide?
+        R"(Checks two objects for collision.
 
-Returns how many contacts this call has found, at most request.num_max_contacts, and adds them to the result.)");
+Returns the number of contacts of this call, at most request.num_max_contacts, and adds them to the result.)");
 
   using DRequest = fcl::DistanceRequestd;
-  py::class_<DRequest>(m, "DistanceRequest", "What is asked of distance().")
+  py::class_<DRequest>(m, "DistanceRequest", "The request of distance().")
       .def(py::init([](bool nearest, bool with_sign, fcl::GJKSolverType solver) {
              DRequest r(nearest, with_sign);
              r.gjk_solver_type = solver;
@@ -722,9 +726,9 @@ Returns how many contacts this call has found, at most request.num_max_contacts,
       .def_readwrite("rel_err", &DRequest::rel_err)
       .def_readwrite("abs_err", &DRequest::abs_err)
       .def_readwrite("gjk_solver_type", &DRequest::gjk_solver_type);
-  py::class_<DistanceResult>(m, "DistanceResult", R"(The least distance that calls of distance() have found.
+  py::class_<DistanceResult>(m, "DistanceResult", R"(The minimum distance over all calls of distance() with this result.
 
-nearest_points: a list of two points (3,), on o1 and on o2, in the world.)")
+nearest_points: a list of two points (3,), on o1 and on o2, in the world frame.)")
       .def(py::init([](const std::optional<double>& least) {
              DistanceResult r;
              if (least) r.min_distance = *least;
@@ -738,12 +742,12 @@ nearest_points: a list of two points (3,), on o1 and on o2, in the world.)")
       .def_readwrite("b1", &DistanceResult::b1)
       .def_readwrite("b2", &DistanceResult::b2);
   m.def("distance", &distanceOf, "o1"_a, "o2"_a, "request"_a = py::none(), "result"_a = py::none(),
-        R"(How far are two objects apart?
+        R"(Computes the distance between two objects.
 
-Returns the distance of this pair, in the length unit of the geometries; the result keeps the least of all calls.)");
+Returns the distance of this pair, in the length unit of the geometries; the result keeps the minimum of all calls.)");
 
   using CRequest = fcl::ContinuousCollisionRequestd;
-  py::class_<CRequest>(m, "ContinuousCollisionRequest", "What is asked of continuousCollide().")
+  py::class_<CRequest>(m, "ContinuousCollisionRequest", "The request of continuousCollide().")
       .def(py::init<std::size_t, double, fcl::CCDMotionType, fcl::GJKSolverType, fcl::CCDSolverType>(),
            "num_max_iterations"_a = 10, "toc_err"_a = 0.0001, "ccd_motion_type"_a = fcl::CCDM_TRANS,
            "gjk_solver_type"_a = fcl::GST_LIBCCD, "ccd_solver_type"_a = fcl::CCDC_NAIVE)
@@ -752,7 +756,9 @@ Returns the distance of this pair, in the length unit of the geometries; the res
       .def_readwrite("ccd_motion_type", &CRequest::ccd_motion_type)
       .def_readwrite("gjk_solver_type", &CRequest::gjk_solver_type)
       .def_readwrite("ccd_solver_type", &CRequest::ccd_solver_type);
-  py::class_<ContinuousResult>(m, "ContinuousCollisionResult", "What continuousCollide() found; calls add to it.")
+  py::class_<ContinuousResult>(
+      m, "ContinuousCollisionResult",
+      "The result of continuousCollide(): True if any call found contact, and the earliest time of all calls.")
       .def(py::init([](bool is_collide, double time) {
              return ContinuousResult{is_collide, time};
            }),
@@ -760,9 +766,10 @@ Returns the distance of this pair, in the length unit of the geometries; the res
       .def_readwrite("is_collide", &ContinuousResult::is_collide)
       .def_readwrite("time_of_contact", &ContinuousResult::time_of_contact);
   m.def("continuousCollide", &continuousOf, "o1"_a, "tf1_end"_a, "o2"_a, "tf2_end"_a, "request"_a = py::none(),
-        "result"_a = py::none(), R"(When do two objects first touch on their way from their poses to these?
+        "result"_a = py::none(),
+        R"(Computes when two objects first touch, on the motion from their current poses to tf1_end and tf2_end.
 
-Returns the time from 0 to 1; 1 where they do not.)");
+Returns the time from 0 to 1; 1 if they do not touch.)");
 }
 
 // Managers ------------------------------------------------------------------------------------------------------------
@@ -871,7 +878,7 @@ class Manager {
     const Manager& manager;
   };
   void change() const {
-    if (asked_ > 0) throw std::runtime_error("bocst: the manager cannot be changed while it is asked");
+    if (asked_ > 0) throw std::runtime_error("bocst: the manager cannot be changed during a query");
   }
   static py::object named(Object& o) { return py::cast(&o, py::return_value_policy::reference); }
   Object* registered(const py::handle& object) const {
@@ -885,38 +892,38 @@ class Manager {
 };
 
 void bindManager(py::module_& m) {
-  auto c =
-      py::class_<Manager>(m, "DynamicAABBTreeCollisionManager", R"(FCL's manager of many objects.
+  auto c = py::class_<Manager>(m, "DynamicAABBTreeCollisionManager", R"(FCL's manager of many objects.
 
-collide(data, callback): all pairs in it; collide(object, data, callback): the object and all in it;
-collide(manager, data, callback): all pairs of one here and one there. callback(o1, o2, data) returns True to end.
-distance: the same, with callbacks that return (done, least distance so far).)")
-          .def(py::init<>())
-          .def("registerObject", &Manager::add, "obj"_a)
-          .def("registerObjects", &Manager::addAll, "other_objs"_a)
-          .def("unregisterObject", &Manager::remove, "obj"_a)
-          .def("setup", &Manager::setup)
-          .def("update", &Manager::update, "arg"_a = py::none(), "One object, several, or all; after they were moved.")
-          .def("getObjects", &Manager::objects)
-          .def("clear", &Manager::clear)
-          .def("empty", [](const Manager& s) { return s.objects().empty(); })
-          .def("size", [](const Manager& s) { return s.objects().size(); })
-          .def("collide", &Manager::collideWith, "other_manager"_a, "cdata"_a, "callback"_a)
-          .def(
-              "collide",
-              [](const Manager& s, Object& o, const py::object& d, const py::object& f) { s.collide(d, f, &o); },
-              "obj"_a, "cdata"_a, "callback"_a)
-          .def(
-              "collide", [](const Manager& s, const py::object& d, const py::object& f) { s.collide(d, f); }, "cdata"_a,
-              "callback"_a)
-          .def("distance", &Manager::distanceTo, "other_manager"_a, "cdata"_a, "callback"_a)
-          .def(
-              "distance",
-              [](const Manager& s, Object& o, const py::object& d, const py::object& f) { s.distance(d, f, &o); },
-              "obj"_a, "cdata"_a, "callback"_a)
-          .def(
-              "distance", [](const Manager& s, const py::object& d, const py::object& f) { s.distance(d, f); },
-              "cdata"_a, "callback"_a);
+collide(data, callback): all pairs of its objects; collide(object, data, callback): the object with each of its objects;
+collide(manager, data, callback): each object of this manager with each of the other. callback(o1, o2, data) returns True
+to stop. distance: the same, with callbacks that return (done, minimum distance so far).)")
+               .def(py::init<>())
+               .def("registerObject", &Manager::add, "obj"_a)
+               .def("registerObjects", &Manager::addAll, "other_objs"_a)
+               .def("unregisterObject", &Manager::remove, "obj"_a)
+               .def("setup", &Manager::setup)
+               .def("update", &Manager::update, "arg"_a = py::none(),
+                    "Call this after one object, several objects or all objects were moved.")
+               .def("getObjects", &Manager::objects)
+               .def("clear", &Manager::clear)
+               .def("empty", [](const Manager& s) { return s.objects().empty(); })
+               .def("size", [](const Manager& s) { return s.objects().size(); })
+               .def("collide", &Manager::collideWith, "other_manager"_a, "cdata"_a, "callback"_a)
+               .def(
+                   "collide",
+                   [](const Manager& s, Object& o, const py::object& d, const py::object& f) { s.collide(d, f, &o); },
+                   "obj"_a, "cdata"_a, "callback"_a)
+               .def(
+                   "collide", [](const Manager& s, const py::object& d, const py::object& f) { s.collide(d, f); },
+                   "cdata"_a, "callback"_a)
+               .def("distance", &Manager::distanceTo, "other_manager"_a, "cdata"_a, "callback"_a)
+               .def(
+                   "distance",
+                   [](const Manager& s, Object& o, const py::object& d, const py::object& f) { s.distance(d, f, &o); },
+                   "obj"_a, "cdata"_a, "callback"_a)
+               .def(
+                   "distance", [](const Manager& s, const py::object& d, const py::object& f) { s.distance(d, f); },
+                   "cdata"_a, "callback"_a);
   using Fcl = fcl::DynamicAABBTreeCollisionManagerd;
   const auto option = [&c](const char* name, auto at) {
     using Value = std::remove_reference_t<decltype(at(std::declval<Fcl&>()))>;

@@ -111,17 +111,18 @@ std::string repr(const char* name, const py::dict& values) {
 }
 
 void bindOptions(py::module_& m) {
-  py::class_<Options> options(m, "Options", R"(How a model grows, answers and forgets. Fixed when the model is made.
+  py::class_<Options> options(
+      m, "Options", R"(How a model expands its tree, answers queries and drops nodes. Fixed when the model is made.
 
 subdivision: 'bono' (B-BOCST) or 'octree' (O-BOCST).
-answer: 'exact' (FCL's mesh-mesh answer) or 'conservative' (spheres of the collision depth).
-depth: collision depth from 1 to 17, the level at which conservative answers are given; the root is level 1.
-dimension: the paper's d_t in lattice units, from 1 to 65536; 0: the finest lattice.
+answer: 'exact' (FCL's mesh-mesh answer) or 'conservative' (tests of the spheres at the collision depth).
+depth: collision depth from 1 to 17, the level of the spheres that conservative answers test; the root is level 1.
+dimension: the paper's d_t, the mesh's largest extent in lattice units, from 1 to 65536; 0: 65536, the finest lattice.
 oracle: 'auto', 'cpu', 'occlusion', 'compute' or 'sampled'.
 ttl: seconds after which unused deepest levels are dropped; 0: never.
-memory_budget: bytes of resident tree; 0: no limit.
-margin: surfaces no farther apart than this collide, in the length unit of the mesh.
-solid: a watertight mesh also collides with what is wholly inside it.
+memory_budget: limit of the resident tree in bytes; 0: no limit.
+margin: surfaces at a distance of at most this collide; in the length unit of the mesh.
+solid: a watertight mesh also collides with geometries that are completely inside it.
 build_ahead: a thread that all models share builds the tree while the first queries run.)");
   options
       .def(py::init(&makeOptions), py::kw_only(), "subdivision"_a = "bono", "answer"_a = "exact", "depth"_a = 6,
@@ -152,12 +153,12 @@ MeshPtr loadMeshOf(const py::object& file) {
 }
 
 void bindMesh(py::module_& m) {
-  py::class_<program::Health>(m, "Health", R"(What is well with a mesh as a surface, and what is not.
+  py::class_<program::Health>(m, "Health", R"(Faults, area and volume of a mesh as a surface.
 
-Vertices with equal coordinates count as one. components: pieces that share no vertex; open_edges: of one triangle;
-non_manifold_edges: of more than two; flipped_edges: two triangles run along it in the same direction; watertight: none of
-the first two; oriented: none of the third. area is in the square of the mesh's length unit, volume in its cube:
-signed, and only where the mesh is watertight and oriented.)")
+Vertices with equal coordinates count as one. components: pieces that share no vertex; open_edges: edges of one triangle;
+non_manifold_edges: edges of more than two triangles; flipped_edges: edges that two triangles have in the same direction;
+watertight: no open and no non-manifold edges; oriented: no flipped edges. area is in the square of the mesh's length
+unit. volume is in its cube, with a sign; None if the mesh is not watertight and oriented.)")
       .def_readonly("components", &program::Health::components)
       .def_readonly("open_edges", &program::Health::open_edges)
       .def_readonly("non_manifold_edges", &program::Health::non_manifold_edges)
@@ -195,7 +196,7 @@ Raises ValueError that names the first bad vertex or triangle.)")
             std::copy_n(mesh.bounds().max().data(), 3, a.mutable_data() + 3);
             return a;
           },
-          "(2, 3): least and greatest corner of the box about all triangles, in the mesh's frame.")
+          "(2, 3): minimum and maximum corner of the bounding box of all triangles, in the mesh's frame.")
       .def(
           "with_vertices",
           [](const Mesh& mesh, const py::object& vertices) {
@@ -203,16 +204,18 @@ Raises ValueError that names the first bad vertex or triangle.)")
             const NoGil free;
             return forPython(mesh.withVertices(std::move(v)));
           },
-          "vertices"_a, "The same triangles between other vertices, (n, 3); both meshes share the indices.")
-      .def("health", &program::healthOf, py::call_guard<NoGil>(), "Looks at the mesh as a surface.")
+          "vertices"_a, "A mesh with the same triangles and these vertices, (n, 3). Both meshes share the indices.")
+      .def("health", &program::healthOf, py::call_guard<NoGil>(), "Checks the mesh as a surface; see Health.")
       .def("__repr__", [](const Mesh& mesh) {
         return "<bocst.Mesh of " + std::to_string(mesh.vertexCount()) + " vertices and " +
                std::to_string(mesh.triangleCount()) + " triangles>";
       });
 
-  m.def("load_mesh", &loadMeshOf, "file"_a, R"(Reads a Mesh from an OBJ, PLY, STL, OFF or DAE file, or by assimp.
+  m.def("load_mesh", &loadMeshOf, "file"_a,
+        R"(Reads a Mesh from an OBJ, PLY, STL, OFF or DAE file; assimp reads other formats.
 
-Coordinates and axes are those of the file; DAE becomes metres. Raises RuntimeError that names the file and its fault.)");
+Coordinates and axes are those of the file; coordinates of DAE are converted to metres. Raises RuntimeError that names
+the file and its fault.)");
 }
 
 /// The nodes as arrays, one row each, parents before children.
@@ -268,12 +271,11 @@ std::pair<py::array_t<double>, py::array_t<double>> spheresOf(const MeshPtr& mes
 
 void bindModel(py::module_& m) {
   const auto statistics =
-      py::class_<Statistics>(m, "Statistics", R"(A snapshot of what a model holds and has done since it was made.
+      py::class_<Statistics>(m, "Statistics", R"(A snapshot of a model's memory and of its work since it was made.
 
-resident_nodes and resident_bytes (heap bytes of the tree) are what is in memory now, nodes_per_level the nodes of level 1
-(the root), 2, ...; mesh_bytes and device_bytes are those of the mesh in host memory and of all on a GPU. The others count
-what happened: expansions of nodes, batches and cells that the oracle was asked about, triangles sorted into the tree, nodes
-dropped.)")
+resident_nodes and resident_bytes (heap bytes of the tree) are in memory now; nodes_per_level: number of nodes of level 1
+(the root), 2, ...; mesh_bytes: the mesh in host memory; device_bytes: all data on a GPU. The others are counters:
+expansions of nodes, batches and cells that the oracle tested, triangles sorted into the tree, nodes dropped.)")
           .def_readonly("resident_nodes", &Statistics::resident_nodes)
           .def_readonly("resident_bytes", &Statistics::resident_bytes)
           .def_readonly("nodes_per_level", &Statistics::nodes_per_level)
@@ -286,9 +288,10 @@ dropped.)")
           .def_readonly("mesh_bytes", &Statistics::mesh_bytes)
           .def_readonly("device_bytes", &Statistics::device_bytes);
 
-  py::class_<ModelGeometry, Geometry, std::shared_ptr<ModelGeometry>>(m, "Model", R"(A sphere-tree as a geometry.
+  py::class_<ModelGeometry, Geometry, std::shared_ptr<ModelGeometry>>(
+      m, "Model", R"(A triangle mesh as a geometry, with a sphere-tree.
 
-One sphere at first, grown by the queries that touch it. Any number of threads may query one model.
+The tree starts as one sphere; queries expand the nodes that they touch. Any number of threads may query one model.
 Model(mesh, options), or options as keyword arguments: Model(mesh, margin=0.01). See Options.)")
       .def(py::init([](const MeshPtr& mesh, const std::optional<Options>& options, const py::kwargs& keywords) {
              if (options && !keywords.empty()) {
@@ -301,26 +304,27 @@ Model(mesh, options), or options as keyword arguments: Model(mesh, margin=0.01).
            "mesh"_a, "options"_a = py::none())
       .def_property_readonly(
           "mesh", [](const ModelGeometry& g) { return forPython(g.model().mesh()); },
-          "The Mesh as it is now; None after release_mesh().")
+          "The current Mesh; None after release_mesh().")
       .def_property_readonly("options", [](const ModelGeometry& g) { return g.model().options(); })
       .def_property_readonly(
           "oracle_name", [](const ModelGeometry& g) { return g.model().oracleName(); },
-          "'cpu', 'occlusion', 'sampled' or 'compute'.")
+          "'cpu', 'occlusion', 'sampled', 'compute', or 'cpu and compute' ('auto' with a GPU).")
       .def(
           "statistics", [](const ModelGeometry& g) { return g.model().statistics(); }, py::call_guard<NoGil>(),
-          "A snapshot.")
+          "A snapshot; see Statistics.")
       .def(
           "expand_all", [](const ModelGeometry& g, int depth) { g.model().expandAll(depth); }, "depth"_a,
-          py::call_guard<NoGil>(), "Makes the whole tree down to this level (1 to 17) resident. For inspection.")
+          py::call_guard<NoGil>(), "Expands the whole tree down to this level (1 to 17). For inspection.")
       .def(
           "nodes", [](const ModelGeometry& g) { return nodesOf(g.model()); },
           R"(The resident nodes as a dict of arrays, one row each, parents before children.
 
-center (k, 3) and radius (k,) of the sphere in the mesh's frame and length unit; parent (k,), -1 of the root; level (k,),
-1 of the root; n (k,): 2^n is the side of the node's cube in lattice units; children (k,): how many; is_cell (k,).)")
+center (k, 3) and radius (k,) of the sphere in the mesh's frame and length unit; parent (k,): id of the parent, -1 for the
+root; level (k,): 1 for the root; n (k,): 2^n is the side of the node's cube in lattice units; children (k,): number of
+resident children; is_cell (k,): False for a node that exact answers build below a cell.)")
       .def(
           "prune", [](const ModelGeometry& g) { g.model().prune(); }, py::call_guard<NoGil>(),
-          "Drops what was unused for longer than ttl, and what is over the memory budget. Queries do it by themselves.")
+          "Drops nodes that are unused for longer than ttl or exceed the memory budget. Queries also do this.")
       .def(
           "update_vertices",
           [](const ModelGeometry& g, const py::object& vertices) {
@@ -328,10 +332,11 @@ center (k, 3) and radius (k,) of the sphere in the mesh's frame and length unit;
             const NoGil free;
             g.model().updateVertices(std::move(v));
           },
-          "vertices"_a, "New positions, (n, 3), for all vertices; nothing is rebuilt.")
+          "vertices"_a,
+          "Sets new positions, (n, 3), of all vertices. The tree is reset to its root; nothing is rebuilt.")
       .def(
           "release_mesh", [](const ModelGeometry& g) { g.model().releaseMesh(); }, py::call_guard<NoGil>(),
-          "Lets go of the mesh in host memory; conservative answers of the compute oracle only.")
+          "Releases the mesh in host memory; only for conservative answers of the compute oracle.")
       .def("__repr__", [](const ModelGeometry& g) {
         const std::shared_ptr<const Mesh> mesh = g.model().mesh();
         return "<bocst.Model" +
@@ -339,18 +344,19 @@ center (k, 3) and radius (k,) of the sphere in the mesh's frame and length unit;
       });
 
   m.def("spheres", &spheresOf, "mesh"_a, "depth"_a = 6, "subdivision"_a = "bono",
-        R"(Spheres that together hold the whole surface: the tree that ends at level `depth` (1 to 17).
+        R"(Spheres that together contain the whole surface: the leaves of a tree that ends at level `depth` (1 to 17).
 
 Returns (centers (k, 3), radii (k,)) in the mesh's frame and length unit.)");
 
-  py::class_<OracleInfo>(m, "OracleInfo", "One oracle this build knows of; why_not is empty when it can be used.")
+  py::class_<OracleInfo>(m, "OracleInfo", "One oracle that this build supports; why_not is empty if it can be used.")
       .def_property_readonly("kind", [](const OracleInfo& o) { return nameOf(o.kind, kOracles); })
       .def_readonly("name", &OracleInfo::name)
       .def_readonly("device", &OracleInfo::device)
       .def_readonly("hardware", &OracleInfo::hardware)
       .def_readonly("why_not", &OracleInfo::why_not)
       .def_readonly("self_test", &OracleInfo::self_test);
-  m.def("available_oracles", &availableOracles, py::call_guard<NoGil>(), "What is there, and why not the others.");
+  m.def("available_oracles", &availableOracles, py::call_guard<NoGil>(),
+        "Lists all oracles; for those that cannot be used, the reason.");
   py::register_exception<OracleError>(m, "OracleError", PyExc_RuntimeError);
 }
 
@@ -415,14 +421,14 @@ std::optional<std::pair<Id, Id>> idsOf(const Pair& pair) {
 
 void bindScene(py::module_& m) {
   m.def("collide_poses", &posesOf, "a"_a, "b"_a, "X_AB"_a, py::kw_only(), "threads"_a = 1,
-        R"(Which of many poses of one pair collide? A bool array (n,), each as of fcl.collide.
+        R"(Checks one pair of models for collision at many poses. Returns a bool array (n,), as fcl.collide answers.
 
 a, b: Model.
-X_AB: (n, 4, 4) poses of b in the frame of a, in the length unit of the meshes. float64 arrays in C order are read where
-they are, as are those whose matrices lie in memory column after column (np.swapaxes(X, 1, 2) of one in C order).
-threads: share the poses; 0: as many as the machine runs at once.)");
+X_AB: (n, 4, 4) poses of b in the frame of a, in the length unit of the meshes. float64 arrays in C order are not copied,
+nor are those with matrices in column-major order (np.swapaxes(X, 1, 2) of an array in C order).
+threads: number of threads that share the poses; 0: one per hardware thread.)");
 
-  py::class_<Id>(m, "Id", "Names an object of one Scene.")
+  py::class_<Id>(m, "Id", "Identifies an object of one Scene.")
       .def("__bool__", &Id::isValid)
       .def("__hash__", [](Id id) { return std::hash<Id>()(id); })
       .def(py::self == py::self)
@@ -430,12 +436,12 @@ threads: share the poses; 0: as many as the machine runs at once.)");
       .def(py::self < py::self);
 
   py::class_<PyScene>(m, "Scene",
-                      R"(All that a planner asks about a robot among obstacles, for whole states in one call.
+                      R"(The collision queries of a planner for a robot among obstacles: one call checks whole states.
 
 Geometries are bocst.Model and those of bocst.fcl. A state is an array (m, 4, 4): the poses of all m moving objects, world
-from geometry, in the order of adding. Many states are (n, m, 4, 4); with m = 1 also (n, 4, 4).
-Verdicts are those of fcl.collide on each pair of a moving object and another one that is not ignored.
-threads: share the states of one call; 0: as many as the machine runs at once.)")
+from geometry, in the order in which they were added. Many states are (n, m, 4, 4); with m = 1 also (n, 4, 4).
+Verdicts are those of fcl.collide for each pair of a moving object and another object that is not ignored.
+threads: number of threads that share the states of one call; 0: one per hardware thread.)")
       .def(py::init([](unsigned threads) {
              SceneOptions options;
              options.threads = threads;
@@ -448,16 +454,16 @@ threads: share the states of one call; 0: as many as the machine runs at once.)"
             const fcl::Transform3d X = pose("X_WG", X_WG);
             return change(s, [&, g = geometry.get()](Scened& scene) { return scene.addFixed(g, X); });
           },
-          "geometry"_a, "X_WG"_a, "An object that stays at X_WG, (4, 4), world from geometry.")
+          "geometry"_a, "X_WG"_a, "Adds an object that stays at X_WG, (4, 4), world from geometry.")
       .def(
           "add_moving",
           [](PyScene& s, const Geometry& geometry) {
             return change(s, [g = geometry.get()](Scened& scene) { return scene.addMoving(g); });
           },
-          "geometry"_a, "An object whose pose comes with each state.")
+          "geometry"_a, "Adds an object whose pose is part of each state.")
       .def(
           "remove", [](PyScene& s, Id id) { change(s, [id](Scened& scene) { scene.remove(id); }); }, "object"_a,
-          "The order of the other moving objects stays.")
+          "Removes an object. The other moving objects keep their order.")
       .def(
           "set_pose",
           [](PyScene& s, Id fixed, const py::object& X_WG) {
@@ -465,19 +471,19 @@ threads: share the states of one call; 0: as many as the machine runs at once.)"
             const NoGil free;
             s.scene.setPose(fixed, X);
           },
-          "fixed"_a, "X_WG"_a, "Another place, (4, 4), for a fixed object.")
+          "fixed"_a, "X_WG"_a, "Moves a fixed object to another pose, (4, 4).")
       .def(
           "ignore", [](PyScene& s, Id a, Id b, bool ignored) { s.scene.ignore(a, b, ignored); }, "a"_a, "b"_a,
-          "ignored"_a = true, py::call_guard<NoGil>(), "The two may touch; ignored=False takes that back.")
+          "ignored"_a = true, py::call_guard<NoGil>(), "Allows the two to touch; ignored=False undoes this.")
       .def(
           "update", [](PyScene& s, Id id) { s.scene.update(id); }, "object"_a, py::call_guard<NoGil>(),
-          "To be called when a geometry has changed its form.")
+          "Call this after the shape of a geometry has changed.")
       .def(
           "collides",
           [](const PyScene& s, const py::object& X_WM) {
             return ask(s, X_WM, false, [](const Scened& scene, Xs X, std::size_t) { return scene.collides(X); });
           },
-          "X_WM"_a, "Does this state, (m, 4, 4), collide?")
+          "X_WM"_a, "True if this state, (m, 4, 4), collides.")
       .def(
           "colliding_pair",
           [](const PyScene& s, const py::object& X_WM) {
@@ -498,27 +504,28 @@ threads: share the states of one call; 0: as many as the machine runs at once.)"
             });
             return py::array_t<bool>(static_cast<py::ssize_t>(hits.size()), reinterpret_cast<const bool*>(hits.data()));
           },
-          "X_WM"_a, "A bool array (n,): which of the states, (n, m, 4, 4), collide?")
+          "X_WM"_a, "A bool array (n,): True for each of the states, (n, m, 4, 4), that collides.")
       .def(
           "first_collision",
           [](const PyScene& s, const py::object& X_WM) {
             return ask(s, X_WM, true,
                        [](const Scened& scene, Xs X, std::size_t states) { return scene.firstCollision(X, states); });
           },
-          "X_WM"_a, "The least index of a state that collides, or n. The states are (n, m, 4, 4).")
+          "X_WM"_a, "The smallest index of a state that collides; n if none does. The states are (n, m, 4, 4).")
       .def(
           "any_collision",
           [](const PyScene& s, const py::object& X_WM) {
             return ask(s, X_WM, true,
                        [](const Scened& scene, Xs X, std::size_t states) { return scene.anyCollision(X, states); });
           },
-          "X_WM"_a, "Does any of the states, (n, m, 4, 4), collide? Middles are looked at before halves.")
+          "X_WM"_a,
+          "True if any of the states, (n, m, 4, 4), collides. Checks the middle of each part before its halves.")
       .def(
           "clearance",
           [](const PyScene& s, const py::object& X_WM) {
             return ask(s, X_WM, false, [](const Scened& scene, Xs X, std::size_t) { return scene.clearance(X); });
           },
-          "X_WM"_a, "The least distance of all pairs in this state, (m, 4, 4); 0 where a pair touches.")
+          "X_WM"_a, "The minimum distance of all pairs in this state, (m, 4, 4); 0 if a pair touches.")
       .def(
           "nearest_pair",
           [](const PyScene& s, const py::object& X_WM) {
@@ -528,7 +535,7 @@ threads: share the states of one call; 0: as many as the machine runs at once.)"
               return idsOf(pair);
             });
           },
-          "X_WM"_a, "A pair of Ids that is nearest in this state, (m, 4, 4), or None without pairs.")
+          "X_WM"_a, "The pair of Ids at the minimum distance in this state, (m, 4, 4); None without pairs.")
       .def(
           "edge_is_free",
           [](const PyScene& s, const py::object& begin, const py::object& end, const std::string& motion) {
@@ -541,16 +548,16 @@ threads: share the states of one call; 0: as many as the machine runs at once.)"
             });
           },
           "X_WM_begin"_a, "X_WM_end"_a, "motion"_a = "linear",
-          R"(Is the motion from one state to another, both (m, 4, 4), free at all times?
+          R"(True if the motion from one state to another, both (m, 4, 4), is free of collisions at all times.
 
 motion: 'linear', 'translation', 'screw' or 'spline', see fcl.CCDMotionType.)")
       .def_property_readonly("moving_count", [](const PyScene& s) { return s.scene.movingCount(); })
       .def_property_readonly("fixed_count", [](const PyScene& s) { return s.scene.fixedCount(); })
       .def_property_readonly(
-          "pair_count", [](const PyScene& s) { return s.scene.pairCount(); }, "Pairs that are not ignored.")
+          "pair_count", [](const PyScene& s) { return s.scene.pairCount(); }, "Number of pairs that are not ignored.")
       .def(
           "moving_index", [](const PyScene& s, Id moving) { return s.scene.movingIndex(moving); }, "moving"_a,
-          "The place of a moving object among those of a state.");
+          "The index of a moving object among the poses of a state.");
 }
 
 }  // namespace

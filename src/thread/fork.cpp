@@ -31,8 +31,9 @@ namespace {
 
 void throwForked() {
   throw std::runtime_error(
-      "bocst: another thread was at work in this model when the process was forked, so the child cannot use it so; let "
-      "the child make a model of its own");
+      "bocst: another thread was at work in this model when the process was forked, so the child cannot make this "
+      "call; "
+      "create a new model in the child");
 }
 
 bool ForkAwareMutex::adopt() {

@@ -393,7 +393,7 @@ TEST_F(Program, FitsAsManySpheresAsAreAskedFor) {
   EXPECT_LE(finer.at("protrusion_max"), 0.01);
   EXPECT_GT(fit.at("protrusion_max"), 0.01);
   EXPECT_GT(finer.at("count"), 40);
-  EXPECT_NE(run(inspect + " --count 5").out.find("5, they hold 100.0 % of the surface"), std::string::npos);
+  EXPECT_NE(run(inspect + " --count 5").out.find("5, they contain 100.0 % of the surface"), std::string::npos);
   expectComplaint(inspect + " --count 0", kUsage, "--count");
   expectComplaint(inspect + " --tolerance -1", kUsage, "--tolerance");
 }
@@ -724,7 +724,7 @@ TEST_F(SceneProgram, SaysWhatIsWrong) {
   expectComplaint("scene " + (folder_ / "none.json").string(), kFailed, "none.json: cannot be read");
   const std::string scene = write("scene.json", "{\"objects\": []}");
   expectComplaint("scene " + scene, kFailed, "scene.json: nothing moves");
-  expectComplaint("scene " + scene + " --json " + scene, kFailed, "would be written over");
+  expectComplaint("scene " + scene + " --json " + scene, kFailed, "would be overwritten");
 }
 
 TEST_F(Program, ListsOracles) {
@@ -806,9 +806,9 @@ TEST_F(Program, ExplainsWhyThereIsNoPaper) {
   expectComplaint(paper + into + " --frames 0", kUsage, "--frames");
   expectComplaint(paper + into + " --triangles -3", kUsage, "--triangles");
   expectComplaint("paper " + (folder_ / "missing.obj").string() + into, kFailed, "missing.obj: no such file");
-  expectComplaint(paper + " --out " + cube(), kFailed, "cube.off: is no folder");
-  expectComplaint(paper + " --out " + cube() + "/below", kFailed, "cube.off: is no folder");
-  expectComplaint(paper + " --out /dev/full", kFailed, "/dev/full: is no folder");
+  expectComplaint(paper + " --out " + cube(), kFailed, "cube.off: is not a folder");
+  expectComplaint(paper + " --out " + cube() + "/below", kFailed, "cube.off: is not a folder");
+  expectComplaint(paper + " --out /dev/full", kFailed, "/dev/full: is not a folder");
   expectComplaint(paper + " --json /dev/full", kFailed, "/dev/full");
   const Result full = runTo("/dev/full", paper + " --json -");
   EXPECT_EQ(full.code, kFailed);

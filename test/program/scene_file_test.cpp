@@ -400,22 +400,22 @@ TEST(States, SayWhatIsWrongAndWhere) {
   };
   EXPECT_EQ(complaint("q1\n1"), "path.csv: line 1: columns are missing: elbow");
   EXPECT_EQ(complaint("q1,elbo,elbow\n1,2,3"),
-            "path.csv: line 1: nothing that moves is called elbo. Did you mean elbow?");
-  EXPECT_EQ(complaint("q1,elbow,f2\n1,2,3"), "path.csv: line 1: joint f2 mimics f1, so it is not given");
-  EXPECT_EQ(complaint("q1,elbow,weld\n1,2,3"), "path.csv: line 1: joint weld is fixed, so it is not given");
-  EXPECT_EQ(complaint("q1,elbow,q1\n1,2,3"), "path.csv: line 1: column q1 is there twice");
+            "path.csv: line 1: no moving joint or object is called elbo. Did you mean elbow?");
+  EXPECT_EQ(complaint("q1,elbow,f2\n1,2,3"), "path.csv: line 1: joint f2 mimics f1, so it must not be given");
+  EXPECT_EQ(complaint("q1,elbow,weld\n1,2,3"), "path.csv: line 1: joint weld is fixed, so it must not be given");
+  EXPECT_EQ(complaint("q1,elbow,q1\n1,2,3"), "path.csv: line 1: column q1 occurs twice");
   EXPECT_EQ(complaint("q1,elbow\n1,2\n\n3,x"), "path.csv: line 4: column elbow: \"x\" is no finite number");
   EXPECT_EQ(complaint("q1,elbow\n1,nan"), "path.csv: line 2: column elbow: \"nan\" is no finite number");
   EXPECT_EQ(complaint("q1,elbow\n1,"), "path.csv: line 2: column elbow: \"\" is no finite number");
   EXPECT_EQ(complaint("q1,elbow\n1,2,3"), "path.csv: line 2: 2 numbers expected, 3 found");
-  EXPECT_EQ(complaint("1,2\n"), "path.csv: line 1: the names of the columns come first");
+  EXPECT_EQ(complaint("1,2\n"), "path.csv: line 1: the first line must have the names of the columns");
   EXPECT_EQ(complaint("q1,elbow\n"), "path.csv: no states");
   EXPECT_NE(complaint("q1,elbow,box.x\n1,2,3").find("object box needs the columns"), std::string::npos);
   EXPECT_NE(complaint("q1,elbow,box.x,box.y,box.z,box.qw\n1,2,3,4,5,6").find("object box needs"), std::string::npos);
   EXPECT_NE(complaint("q1,elbow,box.x,box.y,box.z,box.qw,box.qx,box.qy,box.qz\n1,2,3,4,5,0,0,0,0")
                 .find("line 2: the quaternion"),
             std::string::npos);
-  EXPECT_NE(complaint("q1,elbow,box.w\n1,2,3").find("nothing that moves is called box.w"), std::string::npos);
+  EXPECT_NE(complaint("q1,elbow,box.w\n1,2,3").find("no moving joint or object is called box.w"), std::string::npos);
 }
 
 TEST_F(SceneFile, ReadsObjectsOfAllKinds) {
@@ -491,7 +491,7 @@ TEST_F(SceneFile, SaysWhereASceneIsWrong) {
   complains(objects(R"({"sphere": 1})"), "objects[0]: \"name\" is missing");
   complains(objects(ball + R"(, {"name": "a"})"), "objects[1]: one of mesh, box");
   complains(objects(R"({"name": "a", "sphere": 1, "box": [1, 1, 1]})"), "objects[0]: one of mesh, box");
-  complains(objects(R"({"name": "a", "sphere": 0})"), "objects[0].sphere: sizes are above 0");
+  complains(objects(R"({"name": "a", "sphere": 0})"), "objects[0].sphere: sizes must be above 0");
   complains(objects(R"({"name": "a", "box": [1, 2]})"), "objects[0].box: a list of 3 numbers expected");
   complains(objects(R"({"name": "a", "box": [1, 2, "3"]})"), "objects[0].box[2]: a number expected");
   complains(objects(R"({"name": "a", "mesh": "none.stl"})"), "objects[0].mesh: ");
@@ -510,10 +510,10 @@ TEST_F(SceneFile, SaysWhereASceneIsWrong) {
   complains(objects(ball, R"(, "allowed": [["ball", "bal"]])"),
             "allowed[0][1]: there is no link, object or group bal. Did you mean ball?");
   complains(objects(ball, R"(, "allowed": [["ball"]])"), "allowed[0]: two names expected");
-  complains(objects(ball, R"(, "groups": {"ball": []})"), "groups.ball: the name is taken");
+  complains(objects(ball, R"(, "groups": {"ball": []})"), "groups.ball: the name is already used");
   complains(objects(ball, R"(, "states": [])"), "states: the list is empty");
   complains(objects(ball, R"(, "states": [{"bal": [1, 2, 3]}])"),
-            "states[0]: nothing that moves is called bal. Did you mean ball?");
+            "states[0]: no moving joint or object is called bal. Did you mean ball?");
   complains(objects(R"({"name": "a", "sphere": 1, "moving": true})", R"(, "states": [{}])"), "states[0]: missing: a");
   expectComplaint([&] { scene(R"({"robot": {"urdf": "none.urdf"}})"); }, {"none.urdf", "No such file"});
   expectComplaint([&] { scene(objects(ball, R"(, "states": "none.csv")")); }, {"none.csv", "No such file"});

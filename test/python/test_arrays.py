@@ -201,7 +201,7 @@ def test_empty_states():
     (lambda: fcl.Box("1", 1, 1), TypeError, ""),
     (lambda: fcl.TriangleP([0, 0], [0, 0, 1], [1, 0, 0]), ValueError, r"a has the shape \(2,\)"),
     (lambda: fcl.TriangleP([0, 0, 0], [0, np.inf, 1], [1, 0, 0]), ValueError, "b has the value inf"),
-    (lambda: fcl.Plane(np.zeros(3), 1.0), ValueError, "n has no direction"),
+    (lambda: fcl.Plane(np.zeros(3), 1.0), ValueError, "n is the zero vector"),
     (lambda: fcl.Transform(np.ones((3, 3))), ValueError, "rotation"),
     (lambda: fcl.Transform(np.diag([1.0, 1, -1])), ValueError, "rotation"),
     (lambda: fcl.Transform(np.zeros(4)), ValueError, "quaternion"),

@@ -178,7 +178,7 @@ class Renderer::Drawing {
     glReadPixels(0, 0, w, h, format, type, samples.data());
     const GLenum error = glGetError();
     if (context_.isLost()) throw OracleError("the GPU context was lost while a picture was drawn");
-    if (error == GL_OUT_OF_MEMORY) throw OracleError("the GPU has no memory for this picture");
+    if (error == GL_OUT_OF_MEMORY) throw OracleError("the GPU has not enough memory for this picture");
     if (error != GL_NO_ERROR) throw OracleError("OpenGL error " + std::to_string(error) + " while a picture was drawn");
     return samples;
   }

@@ -39,14 +39,14 @@ template <typename S>
 std::string complaint() {
   return std::string("bocst: fcl::collide<") + scalarName(S()) +
          "> in this process does not reach bocst, so code that was compiled without <bocst/fcl.h> would be told that "
-         "nothing collides. Either let the executable link libbocst before libfcl and keep it (CMake: "
-         "target_link_libraries(app bocst::bocst ...) with bocst::bocst before fcl; else -Wl,--no-as-needed -lbocst "
-         "-lfcl), also where only a plugin of it uses bocst; or load libbocst first (LD_PRELOAD=libbocst.so; in "
-         "Python, "
-         "before anything that loads libfcl); and where code makes its own "
-         "copies of FCL's templates (anything in float, a query with a solver), compile it without "
-         "-fvisibility=hidden; or include <bocst/fcl.h> wherever FCL's queries are called, and turn "
-         "this check off: bocst::setDispatchCheck(false) or BOCST_DISPATCH_CHECK=off";
+         "nothing collides. There are three ways to fix this. (1) Link the executable with libbocst before libfcl, and "
+         "keep it, also if only a plugin of the executable uses bocst (CMake: target_link_libraries(app bocst::bocst "
+         "...) with bocst::bocst before fcl; else -Wl,--no-as-needed -lbocst -lfcl). (2) Load libbocst first "
+         "(LD_PRELOAD=libbocst.so; in Python, before anything that loads libfcl). With (1) and (2), code that makes "
+         "its "
+         "own copies of FCL's templates (anything in float, a query with a solver) must be compiled without "
+         "-fvisibility=hidden. (3) Include <bocst/fcl.h> wherever FCL's queries are called, and turn this check off: "
+         "bocst::setDispatchCheck(false) or BOCST_DISPATCH_CHECK=off";
 }
 
 /// Calls through a volatile pointer, so that it is the dynamic linker that says whose code runs, and not the compiler.

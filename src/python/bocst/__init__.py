@@ -3,8 +3,8 @@
 
 Mesh, load_mesh          triangle meshes
 Model, Options           a mesh as a collision geometry
-Scene, collide_poses     whole states, and many poses of a pair, in one call
-spheres, Mesh.health     what `bocst inspect` says of a mesh
+Scene, collide_poses     check whole states, or many poses of one pair, in one call
+spheres, Mesh.health     spheres and faults of a mesh, as in `bocst inspect`
 bocst.fcl                FCL's queries under python-fcl's names
 """
 from ._bocst import (

@@ -47,7 +47,7 @@ except ImportError:  # FCL was built without octomap.
 
 
 class CollisionData:
-    """What defaultCollisionCallback works on: a request, a result, and whether it is done."""
+    """The data of defaultCollisionCallback: a request, a result, and whether the query is done."""
 
     def __init__(self, request=None, result=None):
         self.request = CollisionRequest() if request is None else request
@@ -65,7 +65,7 @@ class ContinuousCollisionData:
 
 
 class DistanceData:
-    """What defaultDistanceCallback works on."""
+    """The same for defaultDistanceCallback."""
 
     def __init__(self, request=None, result=None):
         self.request = DistanceRequest() if request is None else request
@@ -74,7 +74,7 @@ class DistanceData:
 
 
 def defaultCollisionCallback(o1, o2, cdata):
-    """Adds this pair's contacts to cdata.result; True when as many as asked for are there."""
+    """Adds this pair's contacts to cdata.result; returns True when the requested number is reached."""
     if cdata.done:
         return True
     request, result = cdata.request, cdata.result
@@ -85,7 +85,7 @@ def defaultCollisionCallback(o1, o2, cdata):
 
 
 def defaultDistanceCallback(o1, o2, cdata):
-    """Lowers cdata.result to this pair's distance; returns whether it is done, and the least distance."""
+    """Lowers cdata.result to this pair's distance; returns whether the query is done, and the minimum distance."""
     result = cdata.result
     if cdata.done:
         return True, result.min_distance

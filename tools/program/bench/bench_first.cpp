@@ -21,7 +21,7 @@ double timeStreamingPass(const BenchSetting& setting) {
   const Stopwatch watch;
   const bool finite = (sumOf(a) + sumOf(b)).allFinite();
   const double time = watch.microseconds();
-  if (!finite) throw std::runtime_error("the vertices are too large to be added up");
+  if (!finite) throw std::runtime_error("the sum of the vertices is not finite: coordinates are too large");
   return time;
 }
 

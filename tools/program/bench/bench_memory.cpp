@@ -60,7 +60,7 @@ void benchMemory(BenchSetting& setting, BenchReport& report) {
             static_cast<double>(*setting.fclHeapBytes()));
   } else {
     report.figure("heap", "all heap of the models after all queries", BenchRow::Unit::kBytesPerTriangle, {});
-    report.skip("heap", "the allocator does not tell");
+    report.skip("heap", "the allocator does not report it");
   }
   report.set("bytes", {{"bocst_first", first}, {"bocst_all", all.tree_bytes}, {"fcl", fcl}});
 }

@@ -46,7 +46,7 @@ class Best {
     build_ = std::min(build_, run.build);
     for (std::size_t i = 0; i < frames_.size(); ++i) frames_[i] = std::min(frames_[i], run.frames[i]);
     raw_worst_ = std::max(raw_worst_, *std::max_element(run.frames.begin() + 1, run.frames.end()));
-    if (run.verdicts != verdicts_) throw std::runtime_error("the same query was answered differently later");
+    if (run.verdicts != verdicts_) throw std::runtime_error("the same query had a different answer later");
   }
 
   double first() const { return build_ + frames_.front(); }

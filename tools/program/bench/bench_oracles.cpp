@@ -299,7 +299,7 @@ int OracleBench::run(const Output& output) const {
     for (const OracleInfo& info : oracles) std::cout << '\n' << info.name << ": " << info.device;
     std::cout << '\n';
     for (const std::string& name : slow)
-      std::cout << name << ": left out where it took over " << limit_seconds << " s\n";
+      std::cout << name << ": left out from the size at which it took more than " << limit_seconds << " s\n";
   }
   return 0;
 }

@@ -203,7 +203,7 @@ class PlannerBench {
     }
     const auto count = static_cast<double>(ours.size());
     share(key + "_slower", name + ", share slower than FCL", static_cast<double>(slower) / count);
-    share(key + "_tails", name + ", share slower than twice FCL's time and 1 us", static_cast<double>(tails) / count);
+    share(key + "_tails", name + ", share slower than twice FCL's time + 1 us", static_cast<double>(tails) / count);
   }
 
   /// The same pairs where between two questions something else has taken all caches. The models' clock stands still:
@@ -236,7 +236,7 @@ class PlannerBench {
       return arm.collidesWithNewObjects(X_WL);
     });
     report_.verdicts(times.bocst_hits, times.fcl_hits);
-    row("copied", "random states, objects made anew for each", times.bocst, times.fcl);
+    row("copied", "random states, new objects for each state", times.bocst, times.fcl);
   }
 
   /// Each state is the first after a rest.
@@ -299,7 +299,7 @@ class PlannerBench {
         alarms += !times.fcl_hits[i] && times.bocst_hits[i];
         free += !times.fcl_hits[i];
       }
-      report_.mustBeEqual(missed == 0, name + ": states that collide and were called free");
+      report_.mustBeEqual(missed == 0, name + ": states that collide but were reported free");
       share(key + "_alarms", name + ", free states that may touch",
             free > 0 ? static_cast<double>(alarms) / static_cast<double>(free) : 0);
     }

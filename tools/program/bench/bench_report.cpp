@@ -166,7 +166,7 @@ void BenchReport::print() const {
   for (const Skip& skip : skipped_) std::cout << skip.scenario << ": no " << skip.key << ": " << skip.reason << '\n';
   for (const std::string& line : notes_) std::cout << line << '\n';
   if (verdict_count_ > 0) {
-    std::cout << verdict_count_ << " answers of FCL compared: " << (differences_.empty() ? "equal" : "DIFFERENT")
+    std::cout << verdict_count_ << " answers compared with FCL: " << (differences_.empty() ? "equal" : "DIFFERENT")
               << ", hash " << bocst_hash_.text() << '\n';
   }
 }
@@ -174,7 +174,7 @@ void BenchReport::print() const {
 void BenchReport::check() const {
   std::string all;
   for (const std::string& what : differences_) all += (all.empty() ? "" : ", ") + what;
-  if (!all.empty()) throw std::runtime_error("the answers are not FCL's: " + all);
+  if (!all.empty()) throw std::runtime_error("the answers differ from FCL's: " + all);
 }
 
 }  // namespace bocst::program

@@ -32,7 +32,7 @@ class Side {
       const Stopwatch watch;
       const Answer answer = ask_(X_ABs_[i]);
       times_[i].push_back(watch.microseconds());
-      if (answer != answers_[i]) throw std::runtime_error("the same query was answered differently later");
+      if (answer != answers_[i]) throw std::runtime_error("the same query had a different answer later");
     }
   }
 

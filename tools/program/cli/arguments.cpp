@@ -12,18 +12,23 @@
 namespace bocst::program {
 
 void ModelArguments::addShape(CLI::App& command) {
-  command.add_option("--subdivision", subdivision, "how cells are divided: octree (O-BOCST) or bono (B-BOCST)")
+  command
+      .add_option("--subdivision", subdivision,
+                  "subdivision of cells: octree (O-BOCST) or bono (B-BOCST, branch on need)")
       ->check(CLI::IsMember({"octree", "bono"}))
       ->capture_default_str();
   command
-      .add_option("--dimension", dimension,
-                  "the paper's d_t: the largest extent in lattice units, 1 to 65536; 0: chosen for the mesh")
+      .add_option(
+          "--dimension", dimension,
+          "the paper's d_t: the mesh's largest extent in lattice units, 1 to 65536; 0: 65536, the finest lattice")
       ->check(CLI::Range(0.0, 65536.0))
       ->capture_default_str();
 }
 
 void ModelArguments::addDepth(CLI::App& command) {
-  command.add_option("--depth", depth, "collision depth: the level of the spheres that answer; the root is level 1")
+  command
+      .add_option("--depth", depth,
+                  "collision depth: the level of the spheres that conservative answers test; the root is level 1")
       ->check(CLI::Range(1, 17))
       ->capture_default_str();
 }
@@ -31,18 +36,18 @@ void ModelArguments::addDepth(CLI::App& command) {
 void ModelArguments::addOracle(CLI::App& command) {
   command
       .add_option("--oracle", oracle,
-                  "backend that subdivides cells; see `bocst oracles`; sampled is the "
-                  "paper's, which misses some")
+                  "backend that subdivides cells; see `bocst oracles`; sampled is the paper's, which can miss contacts")
       ->check(CLI::IsMember({"auto", "cpu", "occlusion", "compute", "sampled"}))
       ->capture_default_str();
-  command.add_option("--viewport", viewport, "pixels a side of the views that --oracle sampled draws")
+  command.add_option("--viewport", viewport, "width and height in pixels of the views that --oracle sampled draws")
       ->check(CLI::Range(1, 4096))
       ->capture_default_str();
 }
 
 void ModelArguments::addAnswer(CLI::App& command) {
   command
-      .add_option("--answer", answer, "exact: triangle tests; conservative: the spheres of --depth, as in the paper")
+      .add_option("--answer", answer,
+                  "exact: triangle tests; conservative: tests of the spheres at --depth, as in the paper")
       ->check(CLI::IsMember({"exact", "conservative"}))
       ->capture_default_str();
   command.add_option("--scalar", scalar, "the scalar type of models and queries")
@@ -78,11 +83,10 @@ Json ModelArguments::json() const {
 }
 
 void ImageArguments::add(CLI::App& command) {
-  CLI::Option* image =
-      command.add_option("--image", file, "write a picture that shows it (PNG); drawn without a display")
-          ->type_name("FILE")
-          ->check(outputFile(".png"));
-  command.add_option("--image-nodes", nodes, "what stands for nodes in the picture: their spheres, or boxes")
+  CLI::Option* image = command.add_option("--image", file, "write a picture of the result (PNG); no display is needed")
+                           ->type_name("FILE")
+                           ->check(outputFile(".png"));
+  command.add_option("--image-nodes", nodes, "shape of the nodes in the picture")
       ->check(CLI::IsMember({"spheres", "boxes"}))
       ->capture_default_str()
       ->needs(image);
@@ -90,7 +94,7 @@ void ImageArguments::add(CLI::App& command) {
       ->check(CLI::IsMember({"y", "z"}))
       ->capture_default_str()
       ->needs(image);
-  command.add_option("--image-width", width, "pixels; the height follows")
+  command.add_option("--image-width", width, "width in pixels; the height is computed from it")
       ->check(CLI::Range(200, 8000))
       ->capture_default_str()
       ->needs(image);
@@ -102,7 +106,7 @@ std::string meshFormats() {
     std::string& list = format.by_assimp ? others : own;
     list += (list.empty() ? "" : ", ") + format.ending;
   }
-  return "Mesh files: " + own + ". Read by assimp, in floats: " + others + ".";
+  return "Mesh files: " + own + ". Read by assimp, with float coordinates: " + others + ".";
 }
 
 CLI::Validator positive() {
@@ -119,23 +123,25 @@ CLI::Validator positive() {
 CLI::Validator outputFile(const std::string& ending, bool stdout_too) {
   CLI::Validator validator("");
   validator.operation([ending, stdout_too](std::string& file) {
-    if (file == "-" && !stdout_too) return std::string("- is no file here; /dev/stdout is one");
+    if (file == "-" && !stdout_too) return std::string("stdout (-) is not supported here; use the file /dev/stdout");
     std::string found = std::filesystem::path(file).extension().string();
     std::transform(found.begin(), found.end(), found.begin(), [](unsigned char c) { return std::tolower(c); });
     const bool fits = found.empty() || found == ending;
-    return fits ? std::string() : file + ": a " + ending + " file is written here, not a " + found + " file";
+    return fits ? std::string() : file + ": this option writes a " + ending + " file, not a " + found + " file";
   });
   return validator;
 }
 
 void addJson(CLI::App& command, Output& output) {
-  command.add_option("--json", output.json_file, "write a report as JSON into this file, or to stdout with -")
+  command.add_option("--json", output.json_file, "write a report as JSON to this file; - is stdout")
       ->type_name("FILE|-")
       ->check(outputFile(".json", true));
 }
 
 void addHtml(CLI::App& command, std::string& file) {
-  command.add_option("--html", file, "write a page that shows it in 3D; it needs a browser with WebGL 2, no network")
+  command
+      .add_option("--html", file,
+                  "write a page that shows the result in 3D; it needs a browser with WebGL 2, but no network")
       ->type_name("FILE")
       ->check(outputFile(".html"));
 }

@@ -132,7 +132,7 @@ void checkOutputs(const std::vector<std::string>& outputs, const std::vector<std
     const fs::path target = targetOf(file);
     if (::access(folderOf(target).c_str(), W_OK) != 0) cannotWrite(file, errno);
     if (std::find(taken.begin(), taken.end(), target) != taken.end()) {
-      throw std::runtime_error(file + ": would be written over: it is another file of this command");
+      throw std::runtime_error(file + ": would be overwritten: it is also another file of this command");
     }
     taken.push_back(target);
   }

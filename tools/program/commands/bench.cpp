@@ -109,14 +109,15 @@ struct Bench {
 };
 
 void addSizes(CLI::App& command, Bench& bench) {
-  command.add_option("--subdivide", bench.request.subdivide, "first divide each triangle into four so many times")
+  command
+      .add_option("--subdivide", bench.request.subdivide,
+                  "divide each triangle into four, this number of times, before the measurements")
       ->check(CLI::Range(0, 6))
       ->capture_default_str();
   command
-      .add_option(
-          "--triangles", bench.sizes,
-          "the sizes that growth and --oracles come near to; without it 10k, 100k, 1 M and 10 M, with --oracles "
-          "5k, 75k, 1 M and 10 M")
+      .add_option("--triangles", bench.sizes,
+                  "approximate triangle counts for growth and --oracles; default: 10k, 100k, 1 M and 10 M; with "
+                  "--oracles: 5k, 75k, 1 M and 10 M")
       ->check(positive())
       ->delimiter(',')
       ->allow_extra_args(false);
@@ -124,10 +125,10 @@ void addSizes(CLI::App& command, Bench& bench) {
 
 void addOracleBench(CLI::App& command, Bench& bench) {
   command.add_flag("--oracles", bench.of_oracles,
-                   "instead: each oracle of this machine on mesh A, subdivided to several sizes");
+                   "measure instead each oracle of this machine on mesh A, subdivided to several sizes");
   command
       .add_option("--limit", bench.oracles.limit_seconds,
-                  "with --oracles: seconds; an oracle that needs more to grow a tree is left out from there on")
+                  "with --oracles: seconds; an oracle that takes longer to grow a tree is left out at larger sizes")
       ->check(positive())
       ->capture_default_str();
 }
@@ -137,32 +138,33 @@ void addOracleBench(CLI::App& command, Bench& bench) {
 void addBench(CLI::App& program, Job& job) {
   auto bench = std::make_shared<Bench>();
   CLI::App* command =
-      program.add_subcommand("bench", "time and memory, compared with FCL's BVHModel<OBBRSS> in one run");
+      program.add_subcommand("bench", "measure time and memory, compared with FCL's BVHModel<OBBRSS> in one run");
   command->footer(
-      "Ratios are FCL's figure over bocst's: above 1 bocst is better. About two poses of three touch.\n"
-      "first: two new models and one query, from vertex and index arrays, which FCL copies and bocst takes over; the "
-      "streaming pass adds up all vertices through the index arrays.\n"
-      "fresh: each pose is asked once, 50 at a time on each side in turn; FCL's trees are built before, and count in "
-      "the totals. Ask for 20000 poses to see all windows.\n"
-      "cliffs: rods, needles, equal triangles, fans and specks, whatever the files are.\n"
-      "warm, contacts, distance: the poses were asked until nothing grew any more, and once more before each turn; in "
-      "contacts and distance, where FCL's turn is longer than ttl, the models' clock stands still.\n"
-      "memory: heap is what the allocator says that both models hold, mesh copies included.\n"
-      "moving: one mesh slides over the other at 60 frames a second of the models' clock; of each frame the least of "
-      "all rounds counts.\n"
-      "deforming: all vertices of A move, then 10 queries.\n"
-      "threads: two on one pair of models, the best of all rounds; the last ratio is one thread's time over that of "
-      "two.\n"
-      "planner: an arm of seven joints and a hand, with links of 200 and of 20000 triangles, among shelves and three "
-      "of "
-      "each mesh, in FCL's DynamicAABBTreeCollisionManager; --poses random states and as many of edges. fresh: asked "
-      "for the first time; again: once more. Pairs are those that the broad phase lets through, one by one and "
-      "settled.\n"
-      "growth: A with itself, without FCL; ratios are the growth of the triangles (first answer) or of their logarithm "
-      "(warm query) over that of the time, since the first size.");
+      "A ratio above 1 means that bocst is better. For times and memory it is FCL's value divided by bocst's. The "
+      "meshes touch in about two of three poses.\n"
+      "first: two new models and one query, from vertex and index arrays; FCL copies the arrays, bocst moves them "
+      "in. The streaming pass reads both meshes once: it adds up all vertices through the index arrays.\n"
+      "fresh: each pose is queried once, in turns of 50 poses with bocst and with FCL. FCL's trees are built before; "
+      "the totals include their build time. Use 20000 poses to see all windows.\n"
+      "cliffs: difficult meshes that the program makes itself: rods, needles, equal triangles, fans and specks. The "
+      "files do not matter.\n"
+      "warm, contacts, distance: the poses are queried until the trees grow no more, and once more before each turn. "
+      "In contacts and distance the models' clock stands still, because FCL's turn can take longer than ttl.\n"
+      "memory: heap is the memory of both models as the allocator reports it, including mesh copies.\n"
+      "moving: one mesh slides over the other, with 60 frames per second on the models' clock. The time of a frame "
+      "is the minimum of all rounds.\n"
+      "deforming: all vertices of A move, then 10 queries follow.\n"
+      "threads: two threads query one pair of models; the best of all rounds counts. The last ratio is the time with "
+      "one thread divided by the time with two threads.\n"
+      "planner: an arm with seven joints and a hand, with links of 200 and of 20000 triangles, among shelves and "
+      "three copies of each mesh, in FCL's DynamicAABBTreeCollisionManager. As many random states as poses are "
+      "checked, and as many states of edges. fresh: first query of a state; again: second query. Pairs are those "
+      "that pass the broad phase; they are measured one by one after the trees have settled.\n"
+      "growth: A against itself, without FCL. Ratios compare with the first size: growth of the triangle count "
+      "(first answer) or of its logarithm (warm query), divided by the growth of the time.");
   command->add_option("a", bench->request.file_a, std::string("A: ") + kMeshFile)->required();
-  command->add_option("b", bench->request.file_b, "mesh B; A again if not given");
-  command->add_option("--scenarios", bench->scenarios, "what is measured")
+  command->add_option("b", bench->request.file_b, "B: mesh file; default: A");
+  command->add_option("--scenarios", bench->scenarios, "scenarios to measure")
       ->check(CLI::IsMember(choices()))
       ->delimiter(',')
       ->allow_extra_args(false)
@@ -171,23 +173,24 @@ void addBench(CLI::App& program, Job& job) {
       ->check(positive())
       ->capture_default_str();
   command->add_option("--seed", bench->request.seed, "the same seed gives the same poses")->capture_default_str();
-  command->add_option("--rounds", bench->request.rounds, "first answers, and rounds over all poses and frames")
+  command
+      ->add_option("--rounds", bench->request.rounds,
+                   "number of first answers, and of rounds over all poses and frames")
       ->check(positive())
       ->capture_default_str();
-  command->add_option("--frames", bench->request.frames, "of the path of moving")
+  command->add_option("--frames", bench->request.frames, "number of frames of the path in the scenario moving")
       ->check(CLI::Range(2, 10000000))
       ->capture_default_str();
   addSizes(*command, *bench);
   addOracleBench(*command, *bench);
   addJson(*command, bench->output);
-  command->add_option("--csv", bench->csv_file, "write the rows as CSV into this file, or to stdout with -")
-      ->type_name("FILE|-");
+  command->add_option("--csv", bench->csv_file, "write the rows as CSV to this file; - is stdout")->type_name("FILE|-");
   command->callback([bench, &job] {
     if (bench->csv_file == "-" && bench->output.json_file == "-") {
-      throw CLI::ValidationError("--csv", "stdout is taken by --json");
+      throw CLI::ValidationError("--csv", "--json already writes to stdout; give a file");
     }
     if (bench->of_oracles && !bench->csv_file.empty()) {
-      throw CLI::ValidationError("--csv", "--oracles has none");
+      throw CLI::ValidationError("--csv", "not available with --oracles; use --json");
     }
     job = [bench] { return bench->run(); };
   });

@@ -168,7 +168,7 @@ struct Collide {
     }
     table.print();
     if (points.size() > kShown) {
-      std::cout << points.size() - kShown << " more: --csv FILE or --json FILE writes all.\n";
+      std::cout << points.size() - kShown << " more; --csv FILE or --json FILE writes all contacts.\n";
     }
     std::cout << '\n';
   }
@@ -269,7 +269,7 @@ struct Collide {
   static void warnOfNorm(const Pose& pose, const std::string& where) {
     const double norm = pose.quaternionNorm();
     if (std::abs(norm - 1) > 1e-3) {
-      std::cerr << "bocst: " << where << ": the quaternion has the norm " << norm << "; it is divided by it\n";
+      std::cerr << "bocst: " << where << ": the quaternion has the norm " << norm << " and is normalised\n";
     }
   }
 
@@ -367,7 +367,7 @@ struct Collide {
       table.row({"contacts", limited(ours.contacts), limited(theirs.contacts)});
       table.row({"first answer from arrays", formatTime(ours.first_us), formatTime(theirs.first_us),
                  formatRatio(theirs.first_us / ours.first_us)});
-      table.row({"the same question again", formatTime(ours.warm_us), formatTime(theirs.warm_us),
+      table.row({"the same query again", formatTime(ours.warm_us), formatTime(theirs.warm_us),
                  formatRatio(theirs.warm_us / ours.warm_us)});
       const std::size_t fcl_nodes = 2 * (a.triangles.size() + b.triangles.size()) - 2;
       table.row({"tree nodes after first answer", std::to_string(nodes), std::to_string(fcl_nodes)});
@@ -378,7 +378,8 @@ struct Collide {
       table.print();
     }
     if (!agree)
-      throw std::runtime_error("the answer is not FCL's; please report both meshes and --pose " + pose.text());
+      throw std::runtime_error("the answers of bocst and FCL differ; please report both meshes and --pose " +
+                               pose.text());
     return 0;
   }
 };
@@ -389,30 +390,31 @@ void addCollide(CLI::App& program, Job& job) {
   auto collide = std::make_shared<Collide>();
   CLI::App* command = program.add_subcommand("collide", "check two meshes for collision and compare with FCL");
   command->footer(
-      "Lengths are in the meshes' unit, which must be the same. Contacts of conservative answers are pairs of "
-      "spheres:\n"
-      "they may touch where the surfaces do not, and their ids are those of cells.\n"
-      "--poses asks bocst alone, one pair of models; `bocst validate` compares many poses with FCL.");
+      "Both meshes must have the same length unit; all lengths are in this unit. With conservative answers,\n"
+      "contacts are pairs of spheres: the spheres can touch although the surfaces do not, and the ids are those of\n"
+      "cells.\n"
+      "--poses queries only bocst, with one pair of models; `bocst validate` compares many poses with FCL.");
   command->add_option("a", collide->file_a, std::string("A: ") + kMeshFile)->required();
   command->add_option("b", collide->file_b, "B: mesh file")->required();
-  CLI::Option* pose = command->add_option("--pose", collide->pose_text, "pose of B in A's frame, identity if not given")
+  CLI::Option* pose = command->add_option("--pose", collide->pose_text, "pose of B in A's frame; default: identity")
                           ->type_name("x,y,z,qw,qx,qy,qz");
   command
-      ->add_option("--poses", collide->poses_file,
-                   "ask for each pose of a file, one a line (CSV, or with blanks; the first line may have names)")
+      ->add_option(
+          "--poses", collide->poses_file,
+          "check each pose of a file, one per line (CSV, or separated by blanks; the first line may name the columns)")
       ->type_name("FILE")
       ->excludes(pose);
-  CLI::Option* rpy =
-      command->add_flag("--rpy", collide->rpy,
-                        "poses are x,y,z,roll,pitch,yaw: radians about the fixed axes x, y, z in turn, as in URDF");
+  CLI::Option* rpy = command->add_flag(
+      "--rpy", collide->rpy,
+      "poses are x,y,z,roll,pitch,yaw: radians about the fixed axes x, y, z in this order, as in URDF");
   command->add_flag("--xyzw", collide->xyzw, "poses are x,y,z,qx,qy,qz,qw, as in ROS")->excludes(rpy);
   command->add_flag("--distance", collide->distances,
-                    "with --poses: the distance and the nearest points of poses without contact, too");
-  command->add_option("--max-contacts", collide->max_contacts, "stop after so many contacts; all if not given")
+                    "with --poses: report also the distance and the nearest points of poses without contact");
+  command->add_option("--max-contacts", collide->max_contacts, "maximum number of contacts; default: all")
       ->check(positive());
   command
       ->add_option("--csv", collide->csv_file,
-                   "write the contacts, or with --poses a line for each pose, to this file, or to stdout with -")
+                   "write the contacts (with --poses: one line per pose) to this file; - is stdout")
       ->type_name("FILE|-")
       ->check(outputFile(".csv", true));
   collide->model.addAll(*command);
@@ -428,10 +430,10 @@ void addCollide(CLI::App& program, Job& job) {
     const bool shown =
         !collide->html_file.empty() || collide->image.wanted() || collide->max_contacts != QueryPair::kAll;
     if (!collide->poses_file.empty() && shown) {
-      throw CLI::ValidationError("--poses", "--html, --image and --max-contacts are for one pose");
+      throw CLI::ValidationError("--poses", "cannot be combined with --html, --image or --max-contacts; use --pose");
     }
     if (collide->poses_file.empty() && collide->distances) {
-      throw CLI::ValidationError("--distance", "is for --poses; one pose has it always");
+      throw CLI::ValidationError("--distance", "needs --poses; for a single pose the distance is always reported");
     }
     job = [collide] { return collide->run(); };
   });

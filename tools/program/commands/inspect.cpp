@@ -63,7 +63,7 @@ std::string extentsText(const Mesh& mesh) {
 
 std::string watertightText(const Health& health) {
   if (!health.watertight()) return "no";
-  if (!health.oriented()) return "yes, but triangles face both ways";
+  if (!health.oriented()) return "yes, but triangles have different orientations";
   return health.volume < 0 ? "yes, inside out" : "yes";
 }
 
@@ -261,9 +261,9 @@ struct Inspect {
     summary.row({"tree", model.subdivision + ", depth " + std::to_string(model.depth) + ", oracle " + grown.oracle});
     summary.row({"grown in", formatTime(grown.microseconds)});
     if (fit) {
-      summary.row({"spheres", std::to_string(fit->spheres.size()) + ", they hold " +
-                                  formatNumber(100 * fit->coverage, 4) + " % of the surface and protrude " +
-                                  formatNumber(fit->protrusion, 4) + " at most, " +
+      summary.row({"spheres", std::to_string(fit->spheres.size()) + ", they contain " +
+                                  formatNumber(100 * fit->coverage, 4) + " % of the surface and protrude by " +
+                                  formatNumber(fit->protrusion, 4) + " at most, by " +
                                   formatNumber(fit->average_protrusion, 4) + " on average"});
     }
     summary.print();
@@ -318,41 +318,40 @@ struct Inspect {
 
 void addInspect(CLI::App& program, Job& job) {
   auto inspect = std::make_shared<Inspect>();
-  CLI::App* command =
-      program.add_subcommand("inspect", "the health of a mesh; grow its whole tree and measure, export and show it");
+  CLI::App* command = program.add_subcommand(
+      "inspect", "check a mesh for faults; expand its whole sphere-tree, measure, export and show it");
   command->footer(
-      "Lengths are in the mesh's unit. The first faults of each kind are named by their ids; the JSON report has all "
-      "up to\n" +
+      "Lengths are in the mesh's length unit. The first faults of each kind are listed by id; the JSON report lists\n"
+      "up to " +
       std::to_string(Faults::kMost) +
-      " of a kind, the page and the picture mark them in red.\n"
-      "--count and --tolerance fit spheres to the surface itself: it is cut where spheres protrude most. They hold "
-      "the\n"
-      "whole surface, not the inside of a solid.\n"
-      "The error of a node (paper, 5.2) is the greatest distance from a point of its sphere to the surface inside "
-      "that\n"
-      "sphere, divided by the diameter of the root's sphere. Each level is shown as if the tree ended there.\n"
-      "Bytes are those of the tree when it had grown to that level. The other subdivision is measured for comparison.\n"
+      " of each kind; the page and the picture mark them in red.\n"
+      "--count and --tolerance fit spheres to the surface itself, which is divided where spheres protrude most. The\n"
+      "spheres contain the whole surface, but not the inside of a solid.\n"
+      "The error of a node (paper, 5.2) is the greatest distance from a point of its sphere to the surface inside\n"
+      "that sphere, divided by the diameter of the root's sphere. Each level is shown as if the tree ended there.\n"
+      "Bytes are the size of the tree when it is expanded to that level. The other subdivision is measured for\n"
+      "comparison.\n"
       "Vertices with equal coordinates count as one for components, edges and duplicates.\n"
       "The page shows at most " +
-      std::to_string(Page::kMaxTriangles) + " triangles (a larger mesh is made coarser) and " +
+      std::to_string(Page::kMaxTriangles) + " triangles (a larger mesh is simplified) and " +
       std::to_string(Page::kMaxNodes) + " nodes of a tree.");
   command->add_option("mesh", inspect->file, kMeshFile)->required();
   inspect->model.addDepth(*command);
   inspect->model.addShape(*command);
   inspect->model.addOracle(*command);
-  command->add_flag("--no-error", inspect->no_error, "count nodes only");
+  command->add_flag("--no-error", inspect->no_error, "count the nodes, do not measure errors");
   command
       ->add_option("--spheres", inspect->spheres_file,
-                   "write the spheres of the collision depth: .ply, .json or .yaml (cuRobo's sphere list)")
+                   "write the spheres at the collision depth to a .ply, .json or .yaml file (cuRobo's sphere list)")
       ->type_name("FILE");
-  command->add_option("--link", inspect->link, "the link's name in the .yaml file; the mesh's if not given")
+  command->add_option("--link", inspect->link, "name of the link in the .yaml file; default: the name of the mesh")
       ->type_name("NAME");
   CLI::Option* count = command->add_option("--count", inspect->sphere_count,
-                                           "fit at most so many spheres, instead of those of the collision depth");
+                                           "fit at most N spheres, instead of those at the collision depth");
   count->check(positive())->type_name("N");
   command
       ->add_option("--tolerance", inspect->tolerance,
-                   "fit as many spheres as are needed to protrude from the surface by no more than this length")
+                   "fit as many spheres as needed, so that none protrudes from the surface by more than this length")
       ->check(positive())
       ->type_name("L");
   addHtml(*command, inspect->html_file);

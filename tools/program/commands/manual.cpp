@@ -19,27 +19,28 @@ namespace {
 
 /// What the man page says beyond the options.
 constexpr const char* kDescription =
-    "A bocst model is a sphere-tree that starts as one sphere and grows where queries need it, a collision geometry "
-    "for "
-    "FCL. This program inspects meshes, asks single queries, and compares answers, time and memory with FCL's.";
+    "A bocst model is a collision geometry for FCL: a sphere-tree that starts as one sphere and grows where queries "
+    "need it. This program inspects meshes, runs single queries, and compares answers, time and memory with FCL's.";
 constexpr const char* kExitStatus =
-    "0 when all is well, 1 when something failed or was missed, 2 for a wrong command line.";
-constexpr const char* kFiles = "Files that are written appear whole or not at all.";
+    "0 for success, 1 if something failed or an answer was wrong, 2 for a wrong command line.";
+constexpr const char* kFiles = "An output file is written completely or not at all.";
 constexpr std::pair<const char*, const char*> kEnvironment[] = {
-    {"BOCST_ORACLE", "cpu, occlusion, compute or the number of a device: decides where --oracle auto is given."},
-    {"BOCST_DISPATCH_CHECK", "off: do not check that FCL's entry points reach bocst when the first model is made."},
+    {"BOCST_ORACLE", "cpu, occlusion, compute or the number of a device: the oracle that --oracle auto uses."},
+    {"BOCST_DISPATCH_CHECK", "off: do not check, when a model is made, that FCL's entry points reach bocst."},
 };
 constexpr std::pair<const char*, const char*> kExamples[] = {
-    {"bocst collide link.obj gripper.obj", "Do they touch where their frames coincide?"},
-    {"bocst inspect link.obj --depth 6 --html link.html", "A page that shows the sphere-tree."},
-    {"bocst collide link.obj gripper.obj --image pair.png", "A picture of where they touch and of what grew."},
-    {"bocst inspect link.obj --depth 5 --spheres link.yaml", "Collision spheres for a GPU planner."},
-    {"bocst paper bunny00.off ChineseDragon-10kv.off --out paper", "The paper's tables and figures beside ours."},
+    {"bocst collide link.obj gripper.obj", "Check two meshes for collision; their frames coincide."},
+    {"bocst inspect link.obj --depth 6 --html link.html", "Write a page that shows the sphere-tree."},
+    {"bocst collide link.obj gripper.obj --image pair.png",
+     "Draw the contacts and the nodes that the query has grown."},
+    {"bocst inspect link.obj --depth 5 --spheres link.yaml", "Write collision spheres for a GPU planner."},
+    {"bocst paper bunny00.off ChineseDragon-10kv.off --out paper",
+     "Compare the paper's tables and figures with bocst's."},
     {"bocst bench link.obj gripper.obj --scenarios all --csv figures.csv",
-     "Time and memory compared with FCL's, as a table."},
+     "Compare time and memory with FCL's, as a table."},
     {"bocst scene arm.urdf --srdf arm.srdf --states path.csv --html arm.html",
-     "Which states of a robot collide, and with what; a page that shows them."},
-    {"bocst validate link.obj gripper.obj --poses 10000 --shard 1/4 --json 1.json", "A quarter of a validation."},
+     "Check which states of a robot collide, and with which objects; write a page that shows them."},
+    {"bocst validate link.obj gripper.obj --poses 10000 --shard 1/4 --json 1.json", "Run a quarter of a validation."},
 };
 
 std::vector<const CLI::App*> commandsOf(const CLI::App& program) {
@@ -156,9 +157,10 @@ std::string manPage(const CLI::App& program) {
       text += entry(head, sentence(option->get_description()) + rangeOf(*option) + defaultOf(*option));
     }
   }
-  text += ".SH OPTIONS\n" +
-          entry(".B \\-h\\fR, \\fB\\-\\-help", "What a command takes; without a command, what there is.") +
-          entry(".B \\-\\-version", "The version of the program.");
+  text +=
+      ".SH OPTIONS\n" +
+      entry(".B \\-h\\fR, \\fB\\-\\-help", "Lists the options of a command; without a command, lists the commands.") +
+      entry(".B \\-\\-version", "Prints the version of the program.");
   text += ".SH \"EXIT STATUS\"\n" + roff(kExitStatus) + "\n.SH ENVIRONMENT\n";
   for (const auto& [name, meaning] : kEnvironment) text += entry(std::string(".B ") + name, meaning);
   text += ".SH FILES\n" + roff(meshFormats() + " " + kFiles) + "\n.SH EXAMPLES\n";
@@ -241,7 +243,7 @@ complete -o filenames -F _bocst bocst
 void add(CLI::App& program, Job& job, const char* name, std::string (*text)(const CLI::App&)) {
   auto file = std::make_shared<std::string>("-");
   CLI::App* command = program.add_subcommand(name)->group("");
-  command->add_option("file", *file, "where to; - is stdout");
+  command->add_option("file", *file, "output file; - is stdout");
   command->callback([&program, &job, file, text] {
     job = [&program, file, text] {
       if (*file != "-") {

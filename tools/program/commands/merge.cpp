@@ -45,11 +45,10 @@ struct Merge {
 
 void addMerge(CLI::App& program, Job& job) {
   auto merge = std::make_shared<Merge>();
-  CLI::App* command = program.add_subcommand("merge", "add up the reports of all shards of a validation");
+  CLI::App* command = program.add_subcommand("merge", "merge the reports of all shards of a validation");
   command->footer(
-      "The reports are those of `bocst validate ... --shard i/n --json REPORT` for i from 1 to n. Their sum is what "
-      "one\n"
-      "run without --shard reports, exit code included.");
+      "The reports are those of `bocst validate ... --shard i/n --json REPORT` for i from 1 to n. The result is the\n"
+      "same as that of one run without --shard, including the exit code.");
   command->add_option("report", merge->files, "JSON report of each shard of one run")->required()->type_name("REPORT");
   addJson(*command, merge->output);
   command->callback([merge, &job] { job = [merge] { return merge->run(); }; });

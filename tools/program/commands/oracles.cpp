@@ -13,7 +13,8 @@ namespace bocst::program {
 
 void addOracles(CLI::App& program, Job& job) {
   auto output = std::make_shared<Output>();
-  CLI::App* command = program.add_subcommand("oracles", "list the oracles of this machine, and why others are missing");
+  CLI::App* command = program.add_subcommand(
+      "oracles", "list the backends that subdivide cells (oracles), and why some cannot be used");
   addJson(*command, *output);
   command->callback([output, &job] {
     job = [output] {

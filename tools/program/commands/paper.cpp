@@ -29,8 +29,9 @@ void checkFolder(const fs::path& folder) {
   std::error_code error;
   while (!at.empty() && !fs::exists(at, error)) at = at.parent_path();
   if (at.empty()) at = ".";
-  if (!fs::is_directory(at, error)) throw std::runtime_error(at.string() + ": is no folder");
-  if (::access(at.c_str(), W_OK | X_OK) != 0) throw std::runtime_error(at.string() + ": cannot be written into");
+  if (!fs::is_directory(at, error)) throw std::runtime_error(at.string() + ": is not a folder");
+  if (::access(at.c_str(), W_OK | X_OK) != 0)
+    throw std::runtime_error(at.string() + ": is a folder that cannot be written to");
 }
 
 /// A word as the shell takes it.
@@ -120,7 +121,7 @@ struct Paper {
   static void write(const PaperReport& report, const fs::path& into) {
     std::error_code error;
     fs::create_directories(into / "pictures", error);
-    if (error) throw std::runtime_error(into.string() + ": cannot be made: " + error.message());
+    if (error) throw std::runtime_error(into.string() + ": cannot be created: " + error.message());
     for (const PaperReport::Named& picture : report.pictures) {
       writePng((into / picture.name).string(), drawPlots(picture.plots, PaperReport::kWidth, picture.height));
     }
@@ -132,30 +133,31 @@ struct Paper {
 
 void addPaper(CLI::App& program, Job& job) {
   auto paper = std::make_shared<Paper>();
-  CLI::App* command = program.add_subcommand("paper", "the paper's tables and figures beside ours, as a report");
+  CLI::App* command =
+      program.add_subcommand("paper", "write a report that compares the paper's tables and figures with bocst's");
   command->footer(
-      "Tables 1 and 2 and figures 3 and 4 are about the first two meshes, the paper's bunny and its dragon. In tables "
-      "4\n"
-      "to 6 the first mesh is moved over three objects: the other meshes in turn, or itself if it is the only one.\n"
+      "Tables 1 and 2 and figures 3 and 4 use the first two meshes, which should be the paper's bunny and dragon.\n"
+      "In tables 4 to 6 the first mesh moves over three objects: the other meshes in turn, or itself if it is the\n"
+      "only one.\n"
       "The report is DIR/paper.md, with its pictures in DIR/pictures.");
-  command->add_option("mesh", paper->files, std::string("one to four times a ") + kMeshFile)
+  command->add_option("mesh", paper->files, std::string("one to four files, each a ") + kMeshFile)
       ->required()
       ->expected(1, 4);
   command
       ->add_option("--out", paper->folder,
-                   "the folder of the report, made if it is not there; paper if not given, with --json alone none")
+                   "folder of the report, created if it does not exist; default: paper; with --json alone, no report")
       ->type_name("DIR");
   command
       ->add_option("--triangles", paper->triangles,
-                   "meshes with more triangles are decimated to about so many (the paper's have about 5100); 0: never")
+                   "decimate meshes with more triangles to about this number (the paper's have about 5100); 0: never")
       ->check(CLI::Range(0, 1000000000))
       ->capture_default_str();
-  command->add_option("--frames", paper->frames, "frames of the animation, which takes 7 s of its own clock")
+  command->add_option("--frames", paper->frames, "number of frames of the animation, which takes 7 s on its own clock")
       ->check(CLI::Range(1, 1000000))
       ->capture_default_str();
   command
       ->add_option("--oracle", paper->oracles,
-                   "only these, divided by commas; if not given, all that the machine has, and why others are missing")
+                   "use only these oracles, separated by commas; default: all; the report says why some cannot be used")
       ->delimiter(',')
       ->check(CLI::IsMember(kOracles));
   addJson(*command, paper->output);

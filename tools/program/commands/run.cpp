@@ -75,7 +75,7 @@ int run(int argc, char** argv, const std::string& version) {
   constexpr int kFailed = 1;
   constexpr int kUsage = 2;
   Job job;
-  CLI::App program("Sphere-trees that grow on demand: collision queries, measurements and comparisons with FCL.",
+  CLI::App program("Collision queries with sphere-trees that grow on demand, measurements and comparisons with FCL.",
                    "bocst");
   program.require_subcommand(1);
   program.set_version_flag("--version", "bocst " + version);
@@ -84,7 +84,7 @@ int run(int argc, char** argv, const std::string& version) {
       "completion for bash. " +
       meshFormats() +
       "\n"
-      "Exit code: 0 when all is well, 1 when something failed or was missed, 2 for a wrong command line.");
+      "Exit code: 0 for success, 1 if something failed or an answer was wrong, 2 for a wrong command line.");
   addCollide(program, job);
   addInspect(program, job);
   addValidate(program, job);

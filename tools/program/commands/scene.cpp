@@ -143,7 +143,7 @@ class SceneReport {
       table.row(row);
     }
     if (listed > 0) table.print();
-    if (listed > kShown) std::cout << listed - kShown << " more: --csv FILE or --json FILE writes all.\n";
+    if (listed > kShown) std::cout << listed - kShown << " more; --csv FILE or --json FILE writes all states.\n";
     if (listed > 0) std::cout << '\n';
   }
 
@@ -152,9 +152,11 @@ class SceneReport {
     const auto explained = std::count_if(answers_.differences.begin(), answers_.differences.end(),
                                          [](const SceneDifference& d) { return !d.fault; });
     if (explained == 0) return "";
-    return counted(static_cast<std::size_t>(explained), "pair") + " of all states differ from FCL's: " +
-           (model.exact() ? "with shapes FCL's solvers are approximate, and margins and floats are bocst's"
-                          : "conservative answers may be a collision where the surfaces are near") +
+    return counted(static_cast<std::size_t>(explained), "expected difference") +
+           " from FCL's answers for the pairs of all states: " +
+           (model.exact()
+                ? "FCL's solvers for shapes are approximate, FCL has no margins, and its tests in float differ"
+                : "conservative answers may report a collision where the surfaces are near") +
            "; --json lists them";
   }
 
@@ -177,7 +179,8 @@ class SceneReport {
       if (!d.fault) continue;
       const Names names = namesOf(d.pair);
       throw std::runtime_error(setup_.states[d.state].place + ": " + names.first + " and " + names.second +
-                               (d.bocst ? " collide for bocst, not for FCL" : " collide for FCL, not for bocst") +
+                               (d.bocst ? " collide according to bocst, but not according to FCL"
+                                        : " collide according to FCL, but not according to bocst") +
                                "; please report the scene");
     }
   }
@@ -263,7 +266,7 @@ struct SceneCommand {
     if (setup.robot) head.row({"robot", robotText(*setup.robot)});
     if (!setup.objects.empty()) head.row({"objects", objectsText(setup)});
     head.row({"meshes", shapesText(bodies)});
-    head.row({"pairs", std::to_string(bodies.pairCount()) + " of shapes are checked"});
+    head.row({"pairs", std::to_string(bodies.pairCount()) + " pairs of shapes are checked"});
     head.row({"states", std::to_string(report.states()) + ", " + setup.states_from});
     head.row({"answer", model.answerText()});
     head.print();
@@ -274,7 +277,7 @@ struct SceneCommand {
               << (model.exact() ? " collide.\n" : " may collide.\n");
     if (report.statesOutsideLimits() > 0) {
       std::cout << "In " << report.statesOutsideLimits() << " of " << report.states()
-                << " states a joint is outside of its limits.\n";
+                << " states a joint is outside its limits.\n";
     }
     const std::string differences = report.explainedDifferences(model);
     if (!differences.empty()) std::cout << differences << ".\n";
@@ -293,10 +296,10 @@ struct SceneCommand {
     table.row(answers.fcl ? std::vector<std::string>{"", "bocst", "FCL's managers", "ratio"}
                           : std::vector<std::string>{"", "bocst"});
     row("set-up, from the arrays", ours.set_up, theirs.set_up, formatTime);
-    row("all states, first time", ours.first, theirs.first, formatTime);
-    row("all states, once more", ours.again, theirs.again, formatTime);
-    row("set-up and first time", ours.set_up + ours.first, theirs.set_up + theirs.first, formatTime);
-    row("a state, once more", ours.again / states, theirs.again / states, formatTime);
+    row("all states, first query", ours.first, theirs.first, formatTime);
+    row("all states, second query", ours.again, theirs.again, formatTime);
+    row("set-up and first query", ours.set_up + ours.first, theirs.set_up + theirs.first, formatTime);
+    row("one state, second query", ours.again / states, theirs.again / states, formatTime);
     row("tree bytes", static_cast<double>(answers.bytes), static_cast<double>(answers.fcl_bytes), formatBytes);
     table.print();
   }
@@ -355,37 +358,40 @@ struct SceneCommand {
 
 void addScene(CLI::App& program, Job& job) {
   auto scene = std::make_shared<SceneCommand>();
-  CLI::App* command = program.add_subcommand("scene", "check states of a robot or of other objects among obstacles");
+  CLI::App* command = program.add_subcommand(
+      "scene", "check states of a robot or of other moving objects for collision with obstacles");
   command->footer(
-      "FILE is a scene file (JSON: objects, a robot, pairs that may touch, states; share/doc/scene.md describes it) "
-      "or\n"
-      "a URDF. States are lines of a table (CSV) whose first line names the columns: the joints that move and mimic "
-      "no\n"
-      "other, and of moving objects NAME.x, .y, .z with .qw, .qx, .qy, .qz or .roll, .pitch, .yaw. Without states,\n"
-      "joints are at 0. All links are checked with each other and with all objects, but for pairs that may touch.");
+      "FILE is a scene file (JSON with objects, a robot, pairs that may touch and states; see share/doc/scene.md)\n"
+      "or a URDF.\n"
+      "States are the lines of a table (CSV). Its first line names the columns: each movable joint that does not\n"
+      "mimic another, and for each moving object NAME.x, .y, .z with .qw, .qx, .qy, .qz or .roll, .pitch, .yaw.\n"
+      "Without states, joints are at 0.\n"
+      "All links are checked with each other and with all objects, except for pairs that may touch.");
   command->add_option("file", scene->scene.file, "scene file (JSON) or robot (URDF)")->type_name("FILE")->required();
-  command->add_option("--states", scene->scene.states, "the states to check, one a line (CSV)")->type_name("FILE");
+  command->add_option("--states", scene->scene.states, "states to check, one per line (CSV)")->type_name("FILE");
   command->add_option("--srdf", scene->scene.srdf, "pairs of links that may touch (SRDF's disable_collisions)")
       ->type_name("FILE");
   command
-      ->add_option("--package", scene->scene.packages,
-                   "where package://name is; may be given several times; before ROS_PACKAGE_PATH and AMENT_PREFIX_PATH")
+      ->add_option(
+          "--package", scene->scene.packages,
+          "folder of package://name, used before ROS_PACKAGE_PATH and AMENT_PREFIX_PATH; can be given several times")
       ->type_name("name=FOLDER")
       ->allow_extra_args(false);
   command
-      ->add_option("--adjacent", scene->adjacent,
-                   "links that a joint joins: as the SRDF says (without one they are ignored), ignore them, or check "
-                   "them")
+      ->add_option(
+          "--adjacent", scene->adjacent,
+          "pairs of links that a joint connects. srdf: as the SRDF says (without an SRDF: ignore); ignore; check")
       ->check(CLI::IsMember({"srdf", "ignore", "check"}))
       ->capture_default_str();
-  command->add_flag("--clearance", scene->clearance, "the least distance in each state and the pair that has it, too");
+  command->add_flag("--clearance", scene->clearance,
+                    "report also the least distance in each state and the pair that has it");
   command
       ->add_option("--margin", scene->margin,
-                   "surfaces of meshes no farther apart than this collide; of two meshes twice this counts")
+                   "surfaces of meshes at a distance of at most this collide; between two meshes, twice this counts")
       ->check(CLI::Range(0.0, 1e9))
       ->capture_default_str();
-  command->add_flag("--no-fcl", scene->no_fcl, "do not ask FCL, too");
-  command->add_option("--csv", scene->csv_file, "write a line for each state to this file, or to stdout with -")
+  command->add_flag("--no-fcl", scene->no_fcl, "do not compare with FCL");
+  command->add_option("--csv", scene->csv_file, "write a line for each state to this file; - is stdout")
       ->type_name("FILE|-")
       ->check(outputFile(".csv", true));
   scene->model.addAll(*command);

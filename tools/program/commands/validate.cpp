@@ -191,7 +191,7 @@ struct Validate {
       why = "mismatch: " + sum.failures.front().what;
     } else if (!sum.overestimates.empty() && sum.overestimates.back().count() > 0) {
       pose = sum.overestimates.back().pose;
-      why = "taken for touching though " + formatNumber(sum.overestimates.back().largest) +
+      why = "reported as touching although " + formatNumber(sum.overestimates.back().largest) +
             " of the smaller radius apart, the farthest of " + std::to_string(sum.count[Validation::kPoses]) + " poses";
     }
     GrownPair grown(file_a, mesh_a, file_b, mesh_b, model, pose, QueryPair::kAll);
@@ -206,26 +206,27 @@ void addValidate(CLI::App& program, Job& job) {
   auto validate = std::make_shared<Validate>();
   CLI::App* command = program.add_subcommand("validate", "compare answers with FCL's on many poses around contact");
   command->footer(
-      "Of eight poses, six are off contact by 1e-9 to 1e-1 of the smaller radius, to both sides; two are anywhere.\n"
-      "Every pose is asked in both argument orders, FCL too. A mismatch is a false negative; with exact answers also "
-      "a\n"
-      "false positive or another set of contacts; with conservative ones also a verdict that depends on the order.\n"
-      "With --scalar float, pairs that FCL's trees cull though its own triangle test finds them touching do not "
-      "count.\n"
-      "--html and --image show the first mismatch, else the pose that conservative answers overestimate most (with\n"
-      "--histogram), else the first pose. Exit code 0 means that there was no mismatch.");
+      "Of eight poses, six are at 1e-9 to 1e-1 of the smaller mesh's radius from the pose of contact, on both\n"
+      "sides; two are at random distances.\n"
+      "Each pose is checked in both argument orders, by bocst and by FCL. A mismatch is a false negative; with\n"
+      "exact answers also a false positive or a different set of contacts; with conservative answers also a verdict\n"
+      "that depends on the argument order.\n"
+      "With --scalar float, a pair is not counted if FCL's trees cull it although FCL's own triangle test finds\n"
+      "contact.\n"
+      "--html and --image show the first mismatch; without a mismatch, the pose that conservative answers\n"
+      "overestimate most (with --histogram), else the first pose. Exit code 0 means that there was no mismatch.");
   command->add_option("a", validate->file_a, std::string("A: ") + kMeshFile)->required();
-  command->add_option("b", validate->file_b, "mesh B")->required();
+  command->add_option("b", validate->file_b, "B: mesh file")->required();
   command->add_option("--poses", validate->poses, "number of poses")->check(positive())->capture_default_str();
   command->add_option("--seed", validate->seed, "the same seed gives the same poses")->capture_default_str();
-  command->add_flag("--contacts", validate->compare_contacts, "compare the sets of triangle pairs too");
-  command->add_option("--reference", validate->references, "FCL's trees to compare with: obbrss, obb, rss (slow)")
+  command->add_flag("--contacts", validate->compare_contacts, "compare also the sets of triangle pairs");
+  command->add_option("--reference", validate->references, "trees of FCL to compare with: obbrss, obb, rss (slow)")
       ->delimiter(',')
       ->check(CLI::IsMember({"obbrss", "obb", "rss"}))
       ->capture_default_str();
   command->add_flag(
       "--histogram", validate->histogram,
-      "how far apart the poses are that conservative answers of each depth up to --depth take for touching");
+      "for each depth up to --depth: histogram of the distances at which conservative answers report contact");
   command
       ->add_option_function<std::string>(
           "--shard",
@@ -236,7 +237,7 @@ void addValidate(CLI::App& program, Job& job) {
               throw CLI::ValidationError("--shard", e.what());
             }
           },
-          "ask only part i of n of the poses; `bocst merge` adds the reports up")
+          "check only part i of n of the poses; `bocst merge` merges the reports")
       ->type_name("i/n");
   validate->model.addAll(*command);
   addHtml(*command, validate->html_file);
@@ -244,10 +245,10 @@ void addValidate(CLI::App& program, Job& job) {
   addJson(*command, validate->output);
   command->callback([validate, &job] {
     if (validate->compare_contacts && !validate->model.exact()) {
-      throw CLI::ValidationError("--contacts", "only exact answers have triangle pairs");
+      throw CLI::ValidationError("--contacts", "needs --answer exact: only exact answers have triangle pairs");
     }
     if (validate->histogram && validate->model.exact()) {
-      throw CLI::ValidationError("--histogram", "only conservative answers overestimate");
+      throw CLI::ValidationError("--histogram", "needs --answer conservative: only conservative answers overestimate");
     }
     job = [validate] { return validate->run(); };
   });

@@ -157,9 +157,9 @@ Validation Validation::merged(const std::vector<Validation>& parts) {
     const std::string name = "shard " + std::to_string(part.shard.index) + "/" + std::to_string(part.shard.of);
     if (!sameSettings(part.settings, sum.settings) || part.shard.of != of ||
         part.overestimates.size() != sum.overestimates.size()) {
-      throw std::runtime_error(name + " is of another run: meshes, options, seed and poses must be the same");
+      throw std::runtime_error(name + " belongs to another run: meshes, options, seed and poses must be the same");
     }
-    if (seen[part.shard.index - 1]) throw std::runtime_error(name + " is there twice");
+    if (seen[part.shard.index - 1]) throw std::runtime_error(name + " is given twice");
     seen[part.shard.index - 1] = true;
     for (std::size_t i = 0; i < kKeys; ++i) sum.count[i] += part.count[i];
     sum.failures.insert(sum.failures.end(), part.failures.begin(), part.failures.end());
@@ -185,7 +185,7 @@ void Validation::print() const {
   }
   table.print();
   if (!overestimates.empty()) {
-    std::cout << "\nFalse positives by depth and by the distance over the smaller mesh's radius:\n";
+    std::cout << "\nFalse positives by depth and by distance divided by the smaller mesh's radius:\n";
     Table histogram;
     std::vector<std::string> head = {"depth", "all"};
     for (std::size_t bin = 0; bin < Overestimate::kBins; ++bin) head.push_back(Overestimate::binName(bin));

@@ -35,7 +35,7 @@ struct FclQueries {
 };
 
 void check(int code) {
-  if (code != fcl::BVH_OK) throw std::runtime_error("FCL refuses the mesh, code " + std::to_string(code));
+  if (code != fcl::BVH_OK) throw std::runtime_error("FCL does not accept the mesh, code " + std::to_string(code));
 }
 
 const std::vector<fcl::Vector3d>& verticesFor(const std::vector<Eigen::Vector3d>& vertices, double) { return vertices; }

@@ -58,7 +58,7 @@ Pose Pose::parse(const std::string& text, RotationFormat format) {
 Pose Pose::of(const std::array<double, 7>& given, RotationFormat format) {
   const auto& [x, y, z, r0, r1, r2, r3] = given;
   for (const double number : given) {
-    if (!std::isfinite(number)) throw std::invalid_argument("a pose has finite numbers");
+    if (!std::isfinite(number)) throw std::invalid_argument("a pose must have finite numbers");
   }
   Pose pose;
   pose.numbers = given;

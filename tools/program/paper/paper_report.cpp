@@ -189,24 +189,26 @@ void writeNodes(Text& text, const TreeStudy& study) {
   }
   text.table(rows, 3);
   const Deviation o = deviationOf(study, true), b = deviationOf(study, false);
-  text.paragraph("Over the levels where the paper has 32 nodes or more, O differs from it by " + percent(o.mean) +
-                 " on average and " + percent(o.most) + " at most, B by " + percent(b.mean) + " and " +
-                 percent(b.most) + ". What makes a difference:");
-  text.item("**The mesh.** The paper's file is not to be had; ours is " + fileName(study.mesh) + ", " +
+  text.paragraph(
+      "On the levels where the paper has 32 nodes or more, the numbers of nodes of O differ from the paper's by " +
+      percent(o.mean) + " on average and " + percent(o.most) + " at most, those of B by " + percent(b.mean) + " and " +
+      percent(b.most) + ". The differences have these causes:");
+  text.item("**The mesh.** The paper's file is not available. Our mesh is " + fileName(study.mesh) + ", " +
             std::to_string(study.mesh.mesh->triangleCount()) + " triangles" +
             (study.mesh.mesh->triangleCount() < study.mesh.triangles_of_file
                  ? " decimated from " + std::to_string(study.mesh.triangles_of_file)
                  : std::string()) +
-            ", the paper's has " + std::to_string(paper.triangles) + ".");
-  text.item("**Exact cells.** A cell is grey when the closed triangle meets the closed cell. The paper samples the " +
-            std::string("middles of pixels, which loses thin overlaps; ours lose none.") +
-            (sampled ? " *sampled* is the paper's own test on our mesh: at the deepest level it has between " +
+            "; the paper's mesh has " + std::to_string(paper.triangles) + ".");
+  text.item("**Exact cells.** A cell is grey if a closed triangle meets the closed cell. The paper samples the " +
+            std::string("centres of pixels, which misses thin overlaps; our test misses none.") +
+            (sampled ? " *sampled* is the paper's own test on our mesh: at the deepest level it finds between " +
                            percent(least_lost) + " and " + percent(most_lost) + " fewer nodes than there are."
                      : std::string()));
   text.item(
-      "**Where B is cut.** The mesh lies at the lower corner of the lattice, and the first split is at 512. With d_t "
-      "between 514 and 1023 the upper cells are narrow, and the surface often just reaches into them. At the first "
-      "levels a lost overlap, or another outline, is a node out of few, and it takes its octants along.");
+      "**Where B is split.** The mesh lies at the lower corner of the lattice, and the first split is at 512. With d_t "
+      "between 514 and 1023 the upper cells are narrow, and the surface often extends only a little into them. The "
+      "first levels have few nodes, so one missed overlap, or a different outline, changes their numbers by a large "
+      "part; the octants below that node change, too.");
 }
 
 // Figures 3 and 4.
@@ -255,10 +257,11 @@ void writeErrors(Text& text, const TreeStudy& study, std::vector<PaperReport::Na
   if (paper.figure == 3) {
     text.paragraph(
         "The error of a node (5.2) is the greatest distance from a point of its sphere to the surface inside that "
-        "sphere, over the diameter of the root's sphere: how far from the surface a conservative answer can be. It is "
-        "the reading of 5.2 in which \"the maximum error is equal to 1.0 when the root sphere is tangent to the object "
-        "surface\" holds. Each level is taken as if the tree ended there. The distance is exact, the point of the "
-        "sphere is found by search to about a hundredth. Minimum and maximum are in the output of `--json`.");
+        "sphere, divided by the diameter of the root's sphere. It states how far from the surface a conservative "
+        "answer can be. With this reading of 5.2, \"the maximum error is equal to 1.0 when the root sphere is tangent "
+        "to the object surface\" holds. The error of each level is that of a tree that ends at this level. The "
+        "distance is exact; the point of the sphere is found by a search, to about a hundredth. The output of `--json` "
+        "has minimum and maximum.");
   }
   std::vector<std::vector<std::string>> rows{levelHead({"d_t", "method"}, deepest(study))};
   for (const TreeStudy::Tree& tree : study.trees) {
@@ -274,10 +277,11 @@ void writeErrors(Text& text, const TreeStudy& study, std::vector<PaperReport::Na
   };
   const double o5 = average(0, 5);
   if (!(o5 > 0)) return;
-  text.paragraph("At level 5 O has an average error of " + formatNumber(o5) + "; B has " +
-                 formatNumber(average(514, 5) / o5) + " times as much at d_t 514 and " +
-                 formatNumber(average(1023, 5) / o5) + " times as much at 1023. The paper's rule (5.3) gives B one " +
-                 "level more below 768: at 514, B at level 6 has " + formatNumber(average(514, 6) / o5) +
+  text.paragraph("At level 5 the average error of O is " + formatNumber(o5) + "; that of B is " +
+                 formatNumber(average(514, 5) / o5) + " times as large at d_t 514 and " +
+                 formatNumber(average(1023, 5) / o5) +
+                 " times as large at 1023. The paper's rule (5.3) gives B one more " +
+                 "level below d_t 768: at 514, the error of B at level 6 is " + formatNumber(average(514, 6) / o5) +
                  " times the error of O at level 5.");
 }
 
@@ -391,7 +395,7 @@ void writeRun(Text& text, const AnimationStudy& study, const OfOracle& shown, in
       [](const Column& c) { return std::pair(formatPlain(c.paper->seconds) + " s", seconds(c.run.all.microseconds)); });
 
   text.paragraph("The surfaces touch in " + std::to_string(study.touchingFrames(dimension)) + " of " +
-                 std::to_string(study.frames) + " frames. By oracle:");
+                 std::to_string(study.frames) + " frames. Results of each oracle:");
   std::vector<std::vector<std::string>> rows{{"oracle", "run", "seconds", "frames/s", "queries", "by OpenGL",
                                               "frames that collide", "missed", "nodes at most", "at the end",
                                               "dropped"}};
@@ -413,32 +417,34 @@ void writeAnimation(Text& text, const AnimationStudy& study) {
   std::string obstacles;
   for (const StudyMesh& mesh : study.obstacles) obstacles += (obstacles.empty() ? "" : ", ") + fileName(mesh);
   text.paragraph(
-      "The paper moves an object of 5000 triangles over three objects on a path that it does not describe. Ours: " +
-      fileName(study.object) + " over " + obstacles + ", " + std::to_string(study.frames) + " frames, Max. time " +
-      formatPlain(static_cast<double>(Animation::kMaxTime.count()) / 1000) +
-      " s. It comes down on the first in second 2, goes on to the second in second 4 and to the third in second 6, "
-      "turning as it goes, and stands still in seconds 3, 5 and 7. The path is laid with objects of d_t 514: there it "
-      "sinks into the first and stays just clear of the others. The same path serves the larger objects, which "
-      "therefore meet more, as in the paper.");
+      "The paper moves an object of 5000 triangles over three objects on a path that it does not describe. Our "
+      "animation moves " +
+      fileName(study.object) + " over " + obstacles + ", in " + std::to_string(study.frames) +
+      " frames with a Max. time of " + formatPlain(static_cast<double>(Animation::kMaxTime.count()) / 1000) +
+      " s. The moving object comes down on the first object in second 2, moves to the second in second 4 and to the "
+      "third in second 6, rotating as it moves, and stands still in seconds 3, 5 and 7. The path is made with objects "
+      "of d_t 514: with these, the moving object enters the first object and just misses the others. The same path is "
+      "used with the larger objects, which therefore overlap more, as in the paper.");
   text.item(
-      "**Time.** The paper draws each frame, and that is what its rate is bound by. We draw nothing: *seconds* are "
-      "those of the queries alone, three `fcl::collide` with conservative answers a frame. Branches age on a clock of "
-      "the animation's own, in which it takes " +
+      "**Time.** The paper draws each frame, and drawing limits its frame rate. We draw nothing: *seconds* is the time "
+      "of the queries alone, three calls of `fcl::collide` with conservative answers a frame. The age of branches is "
+      "measured by a clock of the animation, by which the animation takes " +
       std::to_string(Animation::kSeconds) +
-      " s (the paper's took 6.5 to 8.8), whatever the machine. *Second* and Max. time are of that clock.");
+      " s on every machine (the paper's took 6.5 to 8.8 s). *Second* and Max. time refer to that clock.");
   text.item(
-      "**Queries.** One is an octant with an actual region whose parent is expanded (`Statistics::expanded_octants`): "
-      "what the paper's Algorithm 1 is run for, once. Seen from up to three sides, it takes the paper one to three "
-      "occlusion queries, and its tables do not say which it counts. *By OpenGL*: occlusion queries that were really "
-      "made. The oracle *occlusion* needs one an octant, *sampled* is Algorithm 1 itself and may need three. *cpu* "
-      "gets the first levels of a mesh of 4096 triangles or more from one pass over it, so it knows octants that "
-      "nobody would have asked for.");
+      "**Queries.** One query is one octant with an actual region whose parent is expanded "
+      "(`Statistics::expanded_octants`); the paper runs its Algorithm 1 once for each such octant. Algorithm 1 views "
+      "the octant from up to three sides, so it makes one to three occlusion queries, and the paper's tables do not "
+      "say which of the two numbers they give. *By OpenGL* is the number of occlusion queries that were made. The "
+      "oracle *occlusion* needs one for each octant; *sampled* is Algorithm 1 itself and may need three. *cpu* gets "
+      "the first levels of a mesh of 4096 triangles or more from one pass over the mesh, so its number includes "
+      "octants that no query needed.");
   text.item(
-      "**Order.** The paper asks for one node after another. bocst asks for several at once, 2, 4, 8, ... of a walk "
-      "that ends at its first hit: fewer waits, some more queries.");
+      "**Order.** The paper asks for one node after another. bocst asks for several at once (2, 4, 8, ... in a walk "
+      "that ends at its first hit), so it waits less often and makes some more queries.");
   text.item(
-      "**Missed** are frames in which the surfaces touch by FCL's exact test and no pair of models collides. "
-      "*Sampled* may miss; no other oracle may.");
+      "**Missed** is the number of frames in which the surfaces touch by FCL's exact test but no pair of models "
+      "collides. *Sampled* may miss collisions; no other oracle may.");
   std::vector<std::vector<std::string>> rows{{"oracle", "runs on"}};
   for (const OfOracle& of : study.oracles) {
     rows.push_back(
@@ -489,8 +495,8 @@ const Column* columnFor(const OfOracle& of, double dimension, Subdivision subdiv
 std::string pairText(std::uint64_t b, std::uint64_t o) { return std::to_string(b) + " : " + std::to_string(o); }
 
 void writeClaims(Text& text, const AnimationStudy& study, const OfOracle& shown) {
-  text.heading(2, "What holds");
-  text.paragraph("Of the oracle " + shown.oracle.name + ", where no other is named.");
+  text.heading(2, "Which of the paper's claims hold");
+  text.paragraph("The figures are those of the oracle " + shown.oracle.name + ", unless a row names another.");
   std::vector<std::vector<std::string>> rows{{"the paper's claim", "d_t", "paper", "bocst", "holds"}};
   const auto o5 = [&](double d) { return columnFor(shown, d, Subdivision::kOctree, 5); };
   const auto b5 = [&](double d) { return columnFor(shown, d, Subdivision::kBono, 5); };
@@ -536,12 +542,12 @@ void writeClaims(Text& text, const AnimationStudy& study, const OfOracle& shown)
     quiet += column.run.all.quiet_microseconds;
   }
   text.paragraph(
-      "Pairs are B : O. The paper's time follows its queries and its drawing. Of ours, " +
+      "Pairs of figures are B : O. The paper's time depends on its queries and its drawing. Of our time, " +
       percent(quiet / std::max(all, 1e-3)) +
-      " is spent in frames that ask nothing: walks over spheres that are there already. A walk takes as long "
-      "as it has pairs of spheres to look at, and the spheres of B are the larger ones at the same level, "
-      "the more so the less of its cube the object fills (d_t 514); where its regions are cut off, their "
-      "octants' spheres may stick out of theirs, so bocst culls by larger ones there.");
+      " is spent in frames without queries, in walks over spheres that are already resident. The time of a walk "
+      "depends on the number of pairs of spheres that it tests. At the same level, the spheres of B are larger than "
+      "those of O, and more so if the object fills less of its cube (d_t 514). If a region of B is clipped, the "
+      "spheres of its octants may extend beyond its own sphere, so bocst culls by a larger sphere there.");
 }
 
 }  // namespace
@@ -551,10 +557,12 @@ PaperReport paperReport(const PaperStudy& study, const std::string& command) {
   Text text;
   text.heading(1, "The paper's tables and figures, and ours");
   text.paragraph(
-      "Rodríguez and Franquesa, *BOCST: Branch On-collide Sphere-trees*; section numbers are the paper's. "
-      "All below is written by");
+      "This report compares bocst with the paper *BOCST: Branch On-collide Sphere-trees* by Rodríguez and Franquesa. "
+      "Section numbers are the paper's. The report is written by");
   text.block("sh", command + "\n");
-  text.paragraph("l is the level, with the root as level 1; O is the octree, B the branch-on-need octree.");
+  text.paragraph(
+      "l is the level, with the root as level 1. O is the octree, B the branch-on-need octree. d_t is the largest "
+      "extent of the mesh in lattice units.");
   for (const TreeStudy& trees : study.trees) {
     writeNodes(text, trees);
     writeErrors(text, trees, report.pictures);

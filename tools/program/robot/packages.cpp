@@ -78,7 +78,7 @@ std::string Packages::resolve(const std::string& uri, const std::string& folder)
   }
   if (startsWith(uri, "file://")) return uri.substr(7);
   if (uri.find("://") != std::string::npos) {
-    throw std::runtime_error("only package:// and file:// are known, and paths");
+    throw std::runtime_error("unknown kind of URI: use package://, model://, file:// or a path");
   }
   return (fs::path(folder) / uri).string();  // an absolute path stays as it is
 }

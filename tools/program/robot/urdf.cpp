@@ -58,7 +58,7 @@ class UrdfReader {
     for (const pugi::xml_node& element : xml_.root().children()) {
       if (std::string(element.name()).rfind("xacro:", 0) != 0) continue;
       throw std::runtime_error(xml_.place(element) + ": <" + element.name() +
-                               "> is of xacro; run `xacro FILE > robot.urdf` first");
+                               "> is a xacro element; run `xacro FILE > robot.urdf` first");
     }
   }
 
@@ -163,10 +163,10 @@ class UrdfReader {
         shape.mesh = meshOf(static_cast<const urdf::Mesh&>(geometry), link);
         return shape;
       default:
-        complain("link", link, "a geometry of a kind that is not known");
+        complain("link", link, "a geometry of unknown type");
     }
     if (!shape.size.allFinite() || !(shape.size.minCoeff() > 0)) {
-      complain("link", link, "the sizes of a geometry are finite and above 0");
+      complain("link", link, "the sizes of a geometry must be finite and above 0");
     }
     return shape;
   }
@@ -212,9 +212,10 @@ class UrdfReader {
       case urdf::Joint::PRISMATIC:
         return Joint::Kind::kPrismatic;
       default:
-        complain("joint", joint.name,
-                 "joints are fixed, revolute, continuous or prismatic; a floating or planar base is made of three "
-                 "prismatic and the revolute ones that it needs");
+        complain(
+            "joint", joint.name,
+            "the joint type must be fixed, revolute, continuous or prismatic; replace a floating or planar joint by "
+            "prismatic and revolute joints");
     }
   }
 

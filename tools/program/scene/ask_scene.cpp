@@ -52,9 +52,9 @@ SceneAnswers askScene(const SceneSetup& setup, const Bodies& bodies, const Scene
     std::vector<BodyPair> pairs, fcl_pairs;
     if (answers.hit[k] != 0 || fcl_hit[k] != 0) pairs = ours->pairs(k);
     if (pairs.empty() != (answers.hit[k] == 0)) {
-      throw std::runtime_error(setup.states[k].place + ": bocst::Scene says " +
+      throw std::runtime_error(setup.states[k].place + ": bocst::Scene reports " +
                                (answers.hit[k] != 0 ? "collision" : "free") +
-                               ", its pairs do not; please report the scene");
+                               ", but its pairs do not; please report the scene");
     }
     if (theirs != nullptr && (answers.hit[k] != 0 || fcl_hit[k] != 0)) fcl_pairs = theirs->pairs(k);
     std::vector<BodyPair> different;

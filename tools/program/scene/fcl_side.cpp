@@ -98,7 +98,7 @@ std::shared_ptr<fcl::CollisionGeometry<S>> geometryOf(const Shape& shape) {
   for (std::size_t t = 0; t < shape.mesh->triangleCount(); ++t) triangles.push_back(shape.mesh->triangle(t));
   const bool made = model->beginModel() == fcl::BVH_OK && model->addSubModel(vertices, triangles) == fcl::BVH_OK &&
                     model->endModel() == fcl::BVH_OK;
-  if (!made) throw std::runtime_error("FCL refuses a mesh");
+  if (!made) throw std::runtime_error("FCL does not accept a mesh");
   return model;
 }
 

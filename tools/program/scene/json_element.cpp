@@ -21,7 +21,7 @@ JsonElement JsonElement::part(const Json& json, const std::string& step) const {
 }
 
 std::string JsonElement::text() const {
-  if (!json_.is_string()) complain("a text expected");
+  if (!json_.is_string()) complain("a text (\"...\") expected");
   return json_.get<std::string>();
 }
 
@@ -76,7 +76,8 @@ Eigen::Isometry3d JsonElement::pose() const {
   } else {
     allowKeys({"xyz", "rpy", "wxyz", "xyzw"});
     if (has("xyz")) fill(at("xyz"), 0, 3);
-    if (has("rpy") + has("wxyz") + has("xyzw") > 1) complain("one rotation expected");
+    if (has("rpy") + has("wxyz") + has("xyzw") > 1)
+      complain("one rotation expected, not several of rpy, wxyz and xyzw");
     if (has("wxyz")) fill(at("wxyz"), 3, 4);
     if (has("xyzw")) fill(at("xyzw"), 3, 4);
     if (has("rpy")) fill(at("rpy"), 3, 3);

@@ -101,8 +101,8 @@ class Reader {
     const auto adjacent = setup_.robot->adjacentLinks();
     setup_.allowed.insert(adjacent.begin(), adjacent.end());
     if (arguments_.adjacent == Adjacent::kAsSrdf && !adjacent.empty()) {
-      setup_.notes.push_back("without an SRDF, links that a joint joins are not checked with each other (" +
-                             std::to_string(adjacent.size()) + " pairs); --adjacent check does that");
+      setup_.notes.push_back("without an SRDF, links that a joint connects are not checked with each other (" +
+                             std::to_string(adjacent.size()) + " pairs); --adjacent check checks them");
     }
   }
 
@@ -116,7 +116,7 @@ class Reader {
     object.moving = element.has("moving") && element.at("moving").boolean();
     if (element.has("pose")) object.X_WO = element.at("pose").pose();
     if (element.has("attached")) {
-      if (object.moving) element.complain("an object is moving or attached, not both");
+      if (object.moving) element.complain("an object can be moving or attached, not both");
       object.link = linkOf(element.at("attached"));
       setup_.allowed.emplace(*object.link, setup_.partCount());
     }
@@ -176,7 +176,7 @@ class Reader {
       const std::vector<double> sizes = value.numbers(2);  // radius, length
       shape.size = {sizes[0], sizes[1], sizes[1]};
     }
-    if (!(shape.size.minCoeff() > 0)) value.complain("sizes are above 0");
+    if (!(shape.size.minCoeff() > 0)) value.complain("sizes must be above 0");
     return shape;
   }
 
@@ -226,7 +226,7 @@ class Reader {
         const std::vector<std::size_t>& more = groupOf(member);
         parts.insert(parts.end(), more.begin(), more.end());
       }
-      if (!groups_.emplace(name, std::move(parts)).second) members.complain("the name is taken");
+      if (!groups_.emplace(name, std::move(parts)).second) members.complain("the name is already used");
     }
   }
 
@@ -264,7 +264,8 @@ class Reader {
       } catch (const std::runtime_error& e) {
         throw std::runtime_error(arguments_.file + ": " + e.what());
       }
-      setup_.states_from = setup_.robot ? "none are given: all joints at 0" : "none are given: objects at their poses";
+      setup_.states_from =
+          setup_.robot ? "no states given: all joints at 0" : "no states given: objects at their poses";
     }
   }
 
@@ -273,7 +274,7 @@ class Reader {
     for (std::size_t i = 0; i < setup_.partCount(); ++i) moving |= setup_.moves(i) && !setup_.part(i).shapes.empty();
     if (!moving) {
       throw std::runtime_error(arguments_.file +
-                               ": nothing moves: no link has a <collision>, no object \"moving\": true");
+                               ": nothing moves: no link has a <collision>, and no object has \"moving\": true");
     }
   }
 

@@ -53,7 +53,7 @@ std::string list(const std::vector<std::string>& names) {
 
 std::string refusal(const std::string& name, const StateNames& names) {
   const auto joint = names.others.find(name);
-  if (joint != names.others.end()) return "joint " + name + " " + joint->second + ", so it is not given";
+  if (joint != names.others.end()) return "joint " + name + " " + joint->second + ", so it must not be given";
   std::vector<std::string> known = names.joints;
   for (const std::string& object : names.objects) {
     if (name.find('.') == std::string::npos) {
@@ -62,7 +62,7 @@ std::string refusal(const std::string& name, const StateNames& names) {
       for (const char* field : kFields) known.push_back(object + "." + field);
     }
   }
-  return "nothing that moves is called " + name + "." + suggestion(name, known);
+  return "no moving joint or object is called " + name + "." + suggestion(name, known);
 }
 
 /// The table, once its first line is read.
@@ -73,7 +73,7 @@ class Columns {
     for (const std::string& name : head) columns_.push_back(columnOf(name));
     for (std::size_t i = 0; i < columns_.size(); ++i) {
       for (std::size_t k = 0; k < i; ++k) {
-        if (head[i] == head[k]) throw std::invalid_argument("column " + head[i] + " is there twice");
+        if (head[i] == head[k]) throw std::invalid_argument("column " + head[i] + " occurs twice");
       }
     }
     std::vector<std::string> missing;
@@ -138,8 +138,8 @@ class Columns {
         given == 0 || given == kPosition || given == (kPosition | kQuaternion) || given == (kPosition | kAngles);
     if (!whole) {
       throw std::invalid_argument("object " + name +
-                                  " needs the columns .x, .y, .z, and of its rotation .qw, .qx, .qy, "
-                                  ".qz or .roll, .pitch, .yaw or none");
+                                  " needs the columns .x, .y, .z, and for a rotation .qw, .qx, .qy, .qz "
+                                  "or .roll, .pitch, .yaw");
     }
   }
 
@@ -162,7 +162,8 @@ State startState(const StateNames& names) {
   state.place = "the start";
   state.joints.assign(names.joints.size(), 0.0);
   for (std::size_t i = 0; i < names.objects.size(); ++i) {
-    if (!names.X_WO[i]) throw std::runtime_error("no states, and object " + names.objects[i] + " has no pose");
+    if (!names.X_WO[i])
+      throw std::runtime_error("no states are given, and object " + names.objects[i] + " has no pose");
     state.objects.push_back(*names.X_WO[i]);
   }
   return state;
@@ -186,7 +187,7 @@ std::vector<State> statesOfTable(const std::string& text, const StateNames& name
         states.back().place = place;
         continue;
       }
-      if (numberOf(cells.front())) throw std::invalid_argument("the names of the columns come first");
+      if (numberOf(cells.front())) throw std::invalid_argument("the first line must have the names of the columns");
       columns.emplace(cells, names);
     } catch (const std::invalid_argument& e) {
       throw std::runtime_error(file + ": " + place + ": " + e.what());

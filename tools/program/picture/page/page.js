@@ -547,7 +547,7 @@ function notes() {
     }
     for (const tree of object.trees) {
       if (tree.levels < tree.counts.length) {
-        lines.push(`${tree.name} of ${object.name}: levels below ${tree.levels} have too many nodes to show.`);
+        lines.push(`${tree.name} of ${object.name}: levels deeper than ${tree.levels} have too many nodes to show.`);
       }
     }
   }
@@ -702,7 +702,7 @@ function start() {
     canvas.addEventListener('webglcontextlost', (e) => e.preventDefault());
     canvas.addEventListener('webglcontextrestored', () => { prepare(); refill(); });
   } else {
-    byId('problem').textContent = 'This browser has no WebGL 2, so only figures are shown.';
+    byId('problem').textContent = 'This browser has no WebGL 2, so the 3D view is not shown.';
     byId('problem').hidden = false;
   }
   byId('tree').addEventListener('input', treeChosen);
