@@ -48,7 +48,9 @@ void benchFresh(BenchSetting& setting, BenchReport& report) {
 
   HandedOver a(*setting.meshA()), b(*setting.meshB());
   const Stopwatch making;
-  const std::unique_ptr<BocstPair> bocst = makeBocstPair(std::move(a), std::move(b), Options{});
+  Options options;
+  options.build_ahead = setting.request().build_ahead;
+  const std::unique_ptr<BocstPair> bocst = makeBocstPair(std::move(a), std::move(b), options);
   const double bocst_build = making.microseconds();
   PoseTimes times;
   std::vector<bool> our_verdicts, fcl_verdicts;

@@ -91,20 +91,23 @@ States edgeStates(const ArmWorld& world, ManagedArm& arm, Random& random, std::s
 /// The report's rows about one size of links.
 class PlannerBench {
  public:
-  PlannerBench(BenchReport& report, const ArmWorld& world, std::size_t triangles, Random& random, std::size_t states)
+  PlannerBench(BenchReport& report, const ArmWorld& world, std::size_t triangles, Random& random,
+               const BenchRequest& request)
       : report_(report),
         world_(world),
         prefix_("planner_" + std::to_string(triangles) + "_"),
         name_(std::to_string(triangles) + " triangles a link, "),
-        random_states_(randomStates(world, random, states)) {
+        random_states_(randomStates(world, random, request.poses)) {
     const Stopwatch fcl_watch;
     arms_.fcl = manageFclArm(world);
     const double fcl = fcl_watch.microseconds();
     const Stopwatch bocst_watch;
-    arms_.bocst = manageBocstArm(world);
+    Options options;
+    options.build_ahead = request.build_ahead;
+    arms_.bocst = manageBocstArm(world, options);
     set_up_ = {bocst_watch.microseconds(), fcl};
     row("set_up", "set-up", set_up_.first, set_up_.second);
-    edge_states_ = edgeStates(world, *arms_.fcl, random, states);
+    edge_states_ = edgeStates(world, *arms_.fcl, random, request.poses);
   }
 
   void run() {
@@ -319,7 +322,7 @@ void benchPlanner(BenchSetting& setting, BenchReport& report) {
   for (const std::size_t triangles : {std::size_t{200}, std::size_t{20000}}) {
     Random random(setting.request().seed);
     const ArmWorld world(triangles, {setting.meshA(), setting.meshB()}, setting.request().seed);
-    PlannerBench(report, world, triangles, random, setting.request().poses).run();
+    PlannerBench(report, world, triangles, random, setting.request()).run();
   }
 }
 

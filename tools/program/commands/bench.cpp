@@ -101,6 +101,7 @@ struct Bench {
                  {"poses", request.poses},
                  {"seed", request.seed},
                  {"rounds", request.rounds},
+                 {"build_ahead", request.build_ahead},
                  {"scenarios", names}};
     head["hits"] = setting.hits() ? Json(*setting.hits()) : Json(nullptr);
     head["oracle"] = setting.oracleName();
@@ -181,6 +182,8 @@ void addBench(CLI::App& program, Job& job) {
   command->add_option("--frames", bench->request.frames, "number of frames of the path in the scenario moving")
       ->check(CLI::Range(2, 10000000))
       ->capture_default_str();
+  command->add_flag("--build-ahead", bench->request.build_ahead,
+                    "fresh, planner: a thread builds the trees while the first queries run; it needs a free core");
   addSizes(*command, *bench);
   addOracleBench(*command, *bench);
   addJson(*command, bench->output);
