@@ -2,6 +2,7 @@
 // Growth in bulk: what is below a node at once, and the whole tree, by a query or ahead of queries by the helper
 // thread.
 #include <algorithm>
+#include <chrono>
 #include <exception>
 #include <mutex>
 #include <numeric>
@@ -20,10 +21,13 @@ namespace {
 // Growth by parts costs some four times as much a triangle as building all at once, the wider walks between bounds that
 // are still loose included; `bench --scenarios fresh` is the same to 5 % from 6 to 16.
 constexpr std::size_t kRent = 8;
+// Queries grow parts for longer while the helper thread builds; should it not come to it, a query still builds the tree.
+constexpr std::size_t kRentAhead = 1;
 // What a thread keeps of a build's memory for the next one, in triangles.
 constexpr std::size_t kMostKept = 1 << 17;
 // Blocks that the helper thread adds while queries cannot grow the tree: some 20 microseconds.
 constexpr std::uint32_t kBlocksAtOnce = 64;
+constexpr std::chrono::microseconds kPause(50);
 
 /// Box and slab of a cell's surface as bytes of the cell.
 bounds::NodeBounds encode(const BulkBuilder::Own& own, const lattice::Cell& cell) {
@@ -133,9 +137,8 @@ bool Tree::buildNow() {
   const std::unique_lock<thread::ForkAwareMutex> lock(growth_, std::try_to_lock);
   if (!lock.owns_lock() || !isBuildDue()) return false;
   if (is_ahead_build_due_) {
-    // Should the thread not come to it in time, a query still builds the tree.
     is_ahead_build_due_ = false;
-    price_ = surface_.triangle_count / kRent;
+    price_ = surface_.triangle_count / kRentAhead;
     askForAheadBuild();
     return false;
   }
@@ -219,7 +222,8 @@ void Tree::buildAhead(AheadBuild& ahead) {
   for (std::size_t begin = 0, end; begin < bulk.blocks().size(); begin = end) {
     end = std::min(begin + kBlocksAtOnce, bulk.blocks().size());
     if (!withTree([&](Tree& tree) { tree.addBlocks(bulk, places, begin, end); })) return;
-    std::this_thread::yield();
+    // A mutex is not fair: without a pause, queries that wait for it would hardly get it.
+    std::this_thread::sleep_for(kPause);
   }
   withTree([&](Tree& tree) {
     tree.price_ = kNever;
