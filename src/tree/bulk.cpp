@@ -10,6 +10,7 @@
 #include <numeric>
 #include <stdexcept>
 #include <type_traits>
+#include <utility>
 
 namespace bocst::tree {
 namespace {
@@ -133,14 +134,18 @@ void BulkBuilder::makeRoom(std::size_t triangles, std::size_t places) {
   const auto takeAll = [&] {
     bytes = 0;
     take(places_, 4 * places);
+    take(given_, triangles);
+    take(order_, triangles);
+    // The rows are made when all is divided, and need the room that only the division used.
+    const std::size_t shared = bytes;
     take(keys_, triangles);
     take(keys_room_, triangles);
-    take(given_, triangles);
     take(items_, triangles);
-    take(order_, triangles);
     take(order_room_, triangles);
     take(bins_, triangles);
+    const std::size_t end = std::exchange(bytes, shared);
     take(rows_, 9 * (triangles + kRowPad));
+    bytes = std::max(bytes, end);
   };
   count_ = triangles;
   place_count_ = places;
