@@ -13,6 +13,7 @@
 #include <mutex>
 #include <optional>
 #include <shared_mutex>
+#include <unordered_map>
 #include <utility>
 
 #include "mesh/health.h"
@@ -230,11 +231,13 @@ py::dict nodesOf(const Modeld& model) {
   py::array_t<std::int64_t> parent(count);
   py::array_t<std::int32_t> level(count), n(count), children(count);
   py::array_t<bool> is_cell(count);
+  std::unordered_map<std::uint32_t, py::ssize_t> row_of_id;
   for (py::ssize_t i = 0; i < count; ++i) {
     const NodeView& node = nodes[static_cast<std::size_t>(i)];
+    row_of_id[node.id] = i;
     for (int k = 0; k < 3; ++k) center.mutable_at(i, k) = node.center[k];
     radius.mutable_at(i) = node.radius;
-    parent.mutable_at(i) = node.parent == NodeView::kNone ? -1 : static_cast<std::int64_t>(node.parent);
+    parent.mutable_at(i) = node.parent == NodeView::kNone ? -1 : row_of_id.at(node.parent);
     level.mutable_at(i) = node.level;
     n.mutable_at(i) = node.n;
     children.mutable_at(i) = static_cast<std::int32_t>(node.children.size());
@@ -319,7 +322,7 @@ Model(mesh, options), or options as keyword arguments: Model(mesh, margin=0.01).
           "nodes", [](const ModelGeometry& g) { return nodesOf(g.model()); },
           R"(The resident nodes as a dict of arrays, one row each, parents before children.
 
-center (k, 3) and radius (k,) of the sphere in the mesh's frame and length unit; parent (k,): id of the parent, -1 for the
+center (k, 3) and radius (k,) of the sphere in the mesh's frame and length unit; parent (k,): row of the parent, -1 for the
 root; level (k,): 1 for the root; n (k,): 2^n is the side of the node's cube in lattice units; children (k,): number of
 resident children; is_cell (k,): False for a node that exact answers build below a cell.)")
       .def(

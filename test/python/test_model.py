@@ -52,7 +52,11 @@ def test_a_model_grows_and_says_so():
     assert sum(after.nodes_per_level) <= after.resident_nodes
     nodes = a.nodes()
     assert len(nodes["radius"]) == len(nodes["center"]) == len(nodes["parent"])
-    assert nodes["parent"][0] == -1 and nodes["level"][0] == 1 and np.all(nodes["parent"][1:] >= 0)
+    parent, level = nodes["parent"], nodes["level"]
+    assert parent[0] == -1 and level[0] == 1
+    assert np.all(parent[1:] >= 0) and np.all(parent[1:] < np.arange(1, len(parent)))
+    assert np.array_equal(level[1:], level[parent[1:]] + 1)
+    assert np.array_equal(np.bincount(parent[1:], minlength=len(parent)), nodes["children"])
 
 
 def test_options_come_back():
