@@ -368,8 +368,9 @@ struct Limits {
 HWY_INLINE Limits limitsOf(float size, float tolerance, float margin) {
   const float u = 0x1p-24f, rounding = 64 * u * size;
   // The tolerance is a length. Where it is what FCL rounds, which is no axis of ours, it counts with the sizes.
-  return {hn::Set(D(), margin > 0 ? rounding : rounding + tolerance), hn::Set(D(), tolerance),
-          25 * u * size + tolerance, std::max(margin - rounding, 0.0f), tolerance > rounding};
+  const float sure_margin = std::max(margin - rounding, 0.0f);
+  return {hn::Set(D(), sure_margin > 0 ? rounding : rounding + tolerance), hn::Set(D(), tolerance),
+          25 * u * size + tolerance, sure_margin, tolerance > rounding};
 }
 
 // A vector of triangles: their edges, normals, longest edges, and how far a determinant with the normal may be off.

@@ -90,6 +90,40 @@ test::Pairs bruteForce(const Raw& ra, const Raw& rb, const fcl::Transform3d& Y, 
   return pairs;
 }
 
+// Corners of packed leaves are off by a 65536th of the leaf's size: about margins of that size, nothing is lost.
+TYPED_TEST(Margin, MayBeAsSmallAsTheRoundingOfPackedLeaves) {
+  using S = TypeParam;
+  const bool is_double = std::is_same<S, double>::value;
+  std::mt19937_64 g(17);
+  std::uniform_real_distribution<double> u(-1, 1);
+  for (int i = 0; i < 300; ++i) {
+    const double margin = 2e-7 * (i + (is_double ? 1 : 100));  // above what float rounds
+    // A triangle, or a segment, about the origin; what makes the leaf large is elsewhere.
+    const double width = i % 2 == 0 ? 0 : 0.003;
+    Raw large, small;
+    large.vertices = {{0, 0, 0}, {0.005, 0, 0}, {0.002, width, 0}, {1, u(g), u(g)}, {1, 1, u(g)}, {u(g), u(g), -1}};
+    large.triangles = {{0, 1, 2}, {3, 4, 5}};
+    // It rises from above the first corner.
+    const Eigen::Matrix3d R = test::randomRotation(g);
+    for (const bool touch : {true, false}) {
+      const double gap = margin * (touch ? 0.5 : 1.5);
+      small.vertices = {{0, 0, gap}, {0, 0, 0.01}, {width, 0, 0.01}, {0, 0, 0.02}};
+      small.triangles = {{0, 1, 2}, {0, 2, 3}};
+      for (auto& v : small.vertices) v = R * v;
+      const auto Y = test::pose<S>(R.transpose(), Eigen::Vector3d::Zero());
+      const auto X = test::pose<S>(Eigen::Matrix3d::Identity(), Eigen::Vector3d::Zero());
+      const Model<S> a(large.mesh(), with(margin)), b(small.mesh());
+      for (int times = 0; times < 3; ++times) {
+        ASSERT_EQ(test::touching<S>(a, X, b, Y), touch) << margin << ' ' << times;
+        ASSERT_EQ(test::touching<S>(b, Y, a, X), touch) << margin << ' ' << times;
+        fcl::CollisionResult<S> all;
+        fcl::collide(&a, X, &b, Y, fcl::CollisionRequest<S>(10), all);
+        ASSERT_EQ(all.numContacts(), touch ? 2u : 0u) << margin << ' ' << times;
+      }
+    }
+  }
+}
+
 TEST(MarginDouble, ContactsAreAllPairsWithinIt) {
   const Raw meshes[] = {test::adversarial(), test::soup(60, 4), test::torus(7), test::torus(14, 0.3)};
   std::mt19937_64 g(2);
