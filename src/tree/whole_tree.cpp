@@ -21,7 +21,8 @@ namespace {
 // Growth by parts costs some four times as much a triangle as building all at once, the wider walks between bounds that
 // are still loose included; `bench --scenarios fresh` is the same to 5 % from 6 to 16.
 constexpr std::size_t kRent = 8;
-// Queries grow parts for longer while the helper thread builds; should it not come to it, a query still builds the tree.
+// Queries grow parts for longer while the helper thread builds; should it not come to it, a query still builds the
+// tree.
 constexpr std::size_t kRentAhead = 1;
 // What a thread keeps of a build's memory for the next one, in triangles.
 constexpr std::size_t kMostKept = 1 << 17;

@@ -27,7 +27,7 @@ struct BenchRequest {
   std::uint64_t seed = 1;
   std::size_t rounds = 5;
   std::size_t frames = 2000;
-  bool build_ahead = false;  ///< Options::build_ahead, for fresh and planner.
+  bool build_ahead = false;                                          ///< Options::build_ahead, for fresh and planner.
   std::vector<std::size_t> sizes{10000, 100000, 1000000, 10000000};  ///< Of growth.
 };
 
