@@ -6,6 +6,7 @@
 #include <unistd.h>
 
 #include <chrono>
+#include <future>
 #include <mutex>
 #include <random>
 #include <shared_mutex>
@@ -14,6 +15,7 @@
 #include "fcl/adapters/models.h"
 #include "meshes.h"
 #include "sanitized.h"
+#include "thread/helper_thread.h"
 #include "tree/tree.h"
 
 namespace bocst {
@@ -78,6 +80,22 @@ TEST(BuildAhead, TwoQueriesAreEnough) {
     EXPECT_EQ(a.statistics().resident_nodes, c.statistics().resident_nodes);
     EXPECT_EQ(contacts(a, b, kHit), contacts(c, d, kHit)) << "and the same order";
   }
+}
+
+TEST(BuildAhead, AQueryBuildsTheTreeIfTheThreadIsBusyAndTheThreadDoesNotBuildItAgain) {
+  std::promise<void> go;
+  thread::runInHelperThread([busy = go.get_future().share()] { busy.wait(); });
+  const std::shared_ptr<const Mesh> mesh = test::torus(40).mesh();
+  const Modeld a(mesh, options(true)), b(mesh, options(true));
+  for (int i = 0; i < 5000 && !(isWhole(a) && isWhole(b)); ++i) contacts(a, b, at(1.3, 1e-4 * i, 0.1), 1);
+  EXPECT_TRUE(isWhole(a) && isWhole(b));
+  const std::size_t built_a = a.statistics().built_triangles, built_b = b.statistics().built_triangles;
+  go.set_value();
+  std::promise<void> done;
+  thread::runInHelperThread([&done] { done.set_value(); });
+  done.get_future().wait();
+  EXPECT_EQ(a.statistics().built_triangles, built_a);
+  EXPECT_EQ(b.statistics().built_triangles, built_b);
 }
 
 TEST(BuildAhead, WhatNobodyMeetsStaysARoot) {
