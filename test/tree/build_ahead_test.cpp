@@ -85,8 +85,10 @@ TEST(BuildAhead, TwoQueriesAreEnough) {
 TEST(BuildAhead, AQueryBuildsTheTreeIfTheThreadIsBusyAndTheThreadDoesNotBuildItAgain) {
   std::promise<void> go;
   thread::runInHelperThread([busy = go.get_future().share()] { busy.wait(); });
-  const std::shared_ptr<const Mesh> mesh = test::torus(40).mesh();
+  const std::shared_ptr<const Mesh> mesh = test::torus(60).mesh();
   const Modeld a(mesh, options(true)), b(mesh, options(true));
+  for (int i = 0; i < 3; ++i) contacts(a, b, kHit, 1);
+  EXPECT_FALSE(isWhole(a) || isWhole(b)) << "so the thread was asked";
   for (int i = 0; i < 5000 && !(isWhole(a) && isWhole(b)); ++i) contacts(a, b, at(1.3, 1e-4 * i, 0.1), 1);
   EXPECT_TRUE(isWhole(a) && isWhole(b));
   const std::size_t built_a = a.statistics().built_triangles, built_b = b.statistics().built_triangles;
