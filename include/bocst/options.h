@@ -76,9 +76,9 @@ struct Options {
   /// bytes per triangle.
   bool solid = false;
 
-  /// One thread, which all models of the process share, builds the model's tree while its first queries run, instead of
-  /// one of those queries that would take the time for it. Queries do not wait for that thread. For exact answers
-  /// of models without a memory budget whose cells the CPU divides (kCpu, kAuto); other models take no notice.
+  /// A thread that all models of the process share builds the whole tree while the model's first queries run; without
+  /// it, one of those queries does. A query that expands nodes may wait for that thread some tens of microseconds. No
+  /// effect with conservative answers, with a memory budget, or with an oracle other than kCpu and kAuto.
   bool build_ahead = false;
 
   PaperOptions paper;  ///< For experiments.

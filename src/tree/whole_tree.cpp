@@ -26,7 +26,7 @@ constexpr std::size_t kRent = 8;
 constexpr std::size_t kRentAhead = 1;
 // What a thread keeps of a build's memory for the next one, in triangles.
 constexpr std::size_t kMostKept = 1 << 17;
-// Blocks that the helper thread adds while queries cannot grow the tree: some 20 microseconds.
+// Blocks that the helper thread adds while queries cannot grow the tree: some tens of microseconds.
 constexpr std::uint32_t kBlocksAtOnce = 64;
 constexpr std::chrono::microseconds kPause(50);
 
