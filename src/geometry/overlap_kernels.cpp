@@ -361,7 +361,9 @@ struct Limits {
 
   V along(const Vec3& axis, V sizes) const {
     const V rounding = hn::MulAdd(per_size, sizes, hn::Set(D(), 1e-30f));  // products have lost bits below
-    return margin > 0 ? hn::MulAdd(per_length, hn::Sqrt(dot(axis, axis)), rounding) : rounding;
+    if (!(margin > 0)) return rounding;
+    const V length = hn::Add(hn::Sqrt(dot(axis, axis)), hn::Set(D(), 2e-19f));  // squares have lost bits below
+    return hn::MulAdd(per_length, length, rounding);
   }
 };
 

@@ -89,11 +89,7 @@ Bounds boundsOfModel(const Model<S>& model) {
   const Options& o = model.options();
   b.reach = o.margin;
   if (o.answer == Answer::kConservative) {
-    // A sphere of the collision depth sticks out of the surface's box by at most its radius.
-    const int level = std::min(std::max(o.depth, 1), lattice::kMaxLevel);
-    const double size = b.half.norm() + b.center.norm();
-    const oracle::Surface& surface = tree.surface();
-    b.reach += std::sqrt(0.75) * surface.lattice.unit() * (1 << (lattice::kMaxLevel - level)) * 1.001 + 1e-12 * size;
+    b.reach += 1.001 * tree.sphereReach() + 1e-12 * (b.half.norm() + b.center.norm());
   }
   return b;
 }

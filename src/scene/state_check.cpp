@@ -43,7 +43,8 @@ void StateCheck<S>::place(const fcl::Transform3<S>* X_WM) {
 template <typename S>
 void StateCheck<S>::spread() {
   for (std::size_t i = 0; i < far.size(); ++i) {
-    far_[i] = static_cast<float>(std::min(far[i] * (1 + 1e-6), 1e30));
+    const double more = far[i] * (1 + 1e-6);
+    far_[i] = more < 1e30 ? static_cast<float>(more) : 1e30f;  // NaN is far, too
   }
 }
 
