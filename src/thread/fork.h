@@ -3,6 +3,7 @@
 
 #include <atomic>
 #include <mutex>
+#include <new>
 
 // After fork() a child has only the thread that called it. A lock that another thread of the parent held is never given
 // back there, and what that thread was changing stays half changed.
@@ -16,6 +17,23 @@ extern std::atomic<unsigned> forks;
 std::mutex& forkMutex();
 
 [[noreturn]] void throwForked();
+
+/// What is not destroyed: a condition variable that a thread which stayed in the parent waits for waits, in turn, for
+/// that thread when it is destroyed.
+template <typename T>
+class NeverDestroyed {
+ public:
+  NeverDestroyed() { new (&value_) T; }
+  ~NeverDestroyed() {}
+  NeverDestroyed(const NeverDestroyed&) = delete;
+  NeverDestroyed& operator=(const NeverDestroyed&) = delete;
+  T* operator->() { return &value_; }
+
+ private:
+  union {
+    T value_;
+  };
+};
 
 /// A mutex that in a child refuses to wait for a thread that stayed in the parent.
 class ForkAwareMutex {

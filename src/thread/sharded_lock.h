@@ -47,7 +47,7 @@ class ShardedLock {
     turnstile_.lock();
     writing_.store(true);
     std::unique_lock<std::mutex> lock(leaving_);
-    left_.wait(lock, [this] { return isEmpty(); });
+    left_->wait(lock, [this] { return isEmpty(); });
   }
   bool try_lock() {
     if ((isForked() && !adopt()) || readers_stayed_) return false;
@@ -73,7 +73,7 @@ class ShardedLock {
     readers.fetch_sub(1);
     if (!writing_.load()) return;
     const std::lock_guard<std::mutex> lock(leaving_);
-    left_.notify_all();
+    left_->notify_all();
   }
 
   bool isForked() const { return forks_.load() != forks.load(std::memory_order_relaxed); }
@@ -106,7 +106,7 @@ class ShardedLock {
   std::atomic<bool> readers_stayed_{false};  // in the parent, at a fork
   std::mutex turnstile_;                     // held while somebody writes
   std::mutex leaving_;                       // between the last reader that leaves and a writer that waits
-  std::condition_variable left_;
+  NeverDestroyed<std::condition_variable> left_;
 };
 
 }  // namespace bocst::thread

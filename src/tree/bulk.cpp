@@ -151,7 +151,8 @@ void BulkBuilder::makeRoom(std::size_t triangles, std::size_t places) {
   place_count_ = places;
   takeAll();
   if (bytes <= room_) return;
-  room_ = bytes;
+  room_ = 0;  // should there be no memory
+  memory_ = nullptr;
   huge_pages_ = HugePages();
   few_pages_.reset();
   if (bytes <= kMostOnSmallPages) {
@@ -161,6 +162,7 @@ void BulkBuilder::makeRoom(std::size_t triangles, std::size_t places) {
     huge_pages_ = HugePages(bytes);
     memory_ = static_cast<std::byte*>(huge_pages_.begin());
   }
+  room_ = bytes;
   takeAll();
 }
 
@@ -258,7 +260,7 @@ std::uint32_t BulkBuilder::splitByArea(Piece piece) {
   for (int k = 1; k < 3; ++k) axis = most[k] - least[k] > most[axis] - least[axis] ? k : axis;
   const float extent = most[axis] - least[axis];
   const std::uint32_t half = piece.count / 2;
-  if (!(extent > 0)) return half;
+  if (!(extent > 1e-30f)) return half;  // of less, the inverse below is infinite
 
   const float first = least[axis], per = 0.9999f * kBins / extent;
   V4 lo[kBins], hi[kBins];

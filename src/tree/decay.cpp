@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: BSD-3-Clause
 // How branches go: by age and by budget, and where their triangles are then.
 #include <algorithm>
+#include <array>
 #include <mutex>
 #include <numeric>
 
@@ -61,12 +62,8 @@ void Tree::dropUnusedResources() {
 void Tree::keepOnly(const std::vector<std::uint8_t>& keep) {
   ++generation_;
   const ChildRef old_root = root_.load(std::memory_order_relaxed);
-  std::size_t before = 0, after = 0;
-  for (auto& n : nodes_at_) {
-    before += n;
-    n = 0;
-  }
-  nodes_at_[1] = 1;
+  std::array<std::size_t, lattice::kMaxLevel + 1> nodes_at{};
+  nodes_at[1] = 1;
 
   if (old_root.tag() == ChildRef::kBlock && blocks_[old_root.index()].isLoose()) {
     grid_known_.store(nullptr, std::memory_order_relaxed);  // its cells are not those of the tree any more
@@ -119,7 +116,7 @@ void Tree::keepOnly(const std::vector<std::uint8_t>& keep) {
         if (own_list != Block::kNone) records[index].own_list = lists.addCopy(lists_, own_list);
         records[index].parent = move.to;
         last_use[index].store(last_use_[ref.index()].load(std::memory_order_relaxed), std::memory_order_relaxed);
-        nodes_at_[countedLevel(move.cell.level + 1)] += __builtin_popcount(from.grey);
+        nodes_at[countedLevel(move.cell.level + 1)] += __builtin_popcount(from.grey);
         for (int o = 0; o < 8; ++o) {
           if (from.grey >> o & 1) {
             moves.push_back(
@@ -128,19 +125,26 @@ void Tree::keepOnly(const std::vector<std::uint8_t>& keep) {
         }
         ref = ChildRef(ChildRef::kBlock, index);
       }
-      std::atomic<ChildRef>& place = move.to.isRoot() ? root_ : blocks[move.to.block()].child[move.to.octant()];
-      place.store(ref, std::memory_order_relaxed);
+      if (move.to.isRoot()) {
+        root = ref;
+      } else {
+        blocks[move.to.block()].child[move.to.octant()].store(ref, std::memory_order_relaxed);
+      }
     }
+    // There was memory for all of it.
+    root_.store(root, std::memory_order_relaxed);
     blocks_.swap(blocks);
     records_.swap(records);
     last_use_.swap(last_use);
     lists_.swap(lists);
-    dropUnusedResources();
   }
   refits_.clear();  // they name nodes of the old pools
   refits_wait_.store(false, std::memory_order_relaxed);
-  for (const auto& n : nodes_at_) after += n;
+  const std::size_t before = std::accumulate(nodes_at_.begin(), nodes_at_.end(), std::size_t{0});
+  const std::size_t after = std::accumulate(nodes_at.begin(), nodes_at.end(), std::size_t{0});
+  std::copy(nodes_at.begin(), nodes_at.end(), nodes_at_.begin());
   if (before > after) pruned_ += before - after;
+  if (root_stays) dropUnusedResources();
   countBytes();
 }
 

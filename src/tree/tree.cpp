@@ -99,12 +99,8 @@ void Tree::reset(std::shared_ptr<const Mesh> mesh) {
 
 double Tree::sphereReach() const {
   if (!conservative()) return 0;
-  double units = std::ldexp(1.0, lattice::kBits);  // along the box's longest side, as in Lattice
-  if (options_.dimension > 0 && options_.subdivision == Subdivision::kBono) {
-    units = std::ldexp(options_.dimension, lattice::kBits - static_cast<int>(std::ceil(std::log2(options_.dimension))));
-  }
   const int cell_side = 1 << (lattice::kMaxLevel - deepest_);
-  return std::sqrt(3.0) * (cell_side + 1) / units * surface_.bounds.sizes().maxCoeff();
+  return std::sqrt(3.0) * (cell_side + 1) * surface_.lattice.unit();
 }
 
 std::int64_t Tree::now() const { return options_.clock ? nanoseconds(options_.clock()) : coarseNow(); }
@@ -297,7 +293,7 @@ void Tree::growFromGrid(NodeRef node) {
   for (int o = 0; o < 8; ++o) {
     if (grid_->grey(surface_, cell.octant(o))) grey |= 1 << o;
   }
-  const std::uint32_t index = addBlock(node, cell.level, grey);
+  const std::uint32_t index = addBlock(node, cell.level, grey, now());
   for (int o = 0; o < 8; ++o) octants_ += surface_.lattice.exists(cell.octant(o));
   Block& block = blocks_[index];
   block.setCell(cell);
@@ -319,13 +315,15 @@ void Tree::growFromGrid(NodeRef node) {
 }
 
 // Appends a block whose children are one level below `level`.
-std::uint32_t Tree::addBlock(NodeRef node, int level, std::uint8_t grey) {
-  const std::uint32_t index = blocks_.append(1);
+std::uint32_t Tree::addBlock(NodeRef node, int level, std::uint8_t grey, std::int64_t now) {
+  // Without memory for one of the three, the next block takes the places of those that there were.
+  const std::uint32_t index = blocks_.size();
+  if (records_.size() == index) records_.append(1);
+  if (last_use_.size() == index) last_use_.append(1);
+  blocks_.append(1);
   blocks_[index].grey = grey;
-  records_.append(1);
   records_[index].parent = node;
-  last_use_.append(1);
-  last_use_[index].store(now(), std::memory_order_relaxed);
+  last_use_[index].store(now, std::memory_order_relaxed);
   nodes_at_[countedLevel(level + 1)] += __builtin_popcount(grey);
   ++expansions_;
   return index;
@@ -400,7 +398,7 @@ void Tree::publish(NodeRef node, const oracle::ExpansionRequest& answer) {
     setChild(node, addList(answer.lists.data(), answer.lists.size(), true));
     return;
   }
-  const std::uint32_t index = addBlock(node, answer.cell.level, answer.grey);
+  const std::uint32_t index = addBlock(node, answer.cell.level, answer.grey, now());
   for (int o = 0; o < 8; ++o) octants_ += surface_.lattice.exists(answer.cell.octant(o));
   Block& block = blocks_[index];
   block.setCell(answer.cell);

@@ -185,12 +185,13 @@ class Tree {
   bool growInBulk(NodeRef node, std::vector<std::uint32_t>& ids);
   void growWhole();
   static void startPlaces(const BulkBuilder& bulk, NodeRef node, int level, std::vector<BulkPlace>& places);
-  void addBlocks(const BulkBuilder& bulk, std::vector<BulkPlace>& places, std::size_t begin, std::size_t end);
+  void addBlocks(const BulkBuilder& bulk, std::vector<BulkPlace>& places, std::size_t begin, std::size_t end,
+                 std::int64_t now);
   void publishBulk(const BulkBuilder& bulk, const std::vector<BulkPlace>& places);
   void publishWhole(const BulkBuilder& bulk, const std::vector<BulkPlace>& places);
   lattice::Cell cellOrDepth(NodeRef node) const;
   void publish(NodeRef node, const oracle::ExpansionRequest& answer);
-  std::uint32_t addBlock(NodeRef node, int level, std::uint8_t grey);
+  std::uint32_t addBlock(NodeRef node, int level, std::uint8_t grey, std::int64_t now);
   ChildRef addList(const std::uint32_t* ids, std::size_t count, bool leaf);
   void setChild(NodeRef node, ChildRef ref);
   void refit();

@@ -5,6 +5,7 @@
 #include <chrono>
 #include <exception>
 #include <mutex>
+#include <new>
 #include <numeric>
 #include <shared_mutex>
 #include <stdexcept>
@@ -59,6 +60,7 @@ void buildWhole(const oracle::Surface& surface, BulkBuilder& bulk) {
 struct Tree::AheadBuild {
   thread::ForkAwareMutex mutex;  // of what follows
   Tree* tree;                    // null when the tree is gone
+  std::int64_t asked;            // by Options::clock, which the helper thread does not call
 };
 
 Tree::~Tree() {
@@ -119,7 +121,7 @@ bool Tree::growInBulk(NodeRef node, std::vector<std::uint32_t>& ids) {
     refits_wait_.store(true, std::memory_order_relaxed);
   }
   startPlaces(bulk, node, cellOrDepth(node).level, places);
-  addBlocks(bulk, places, 0, bulk.blocks().size());
+  addBlocks(bulk, places, 0, bulk.blocks().size(), now());
   publishBulk(bulk, places);
   return true;
 }
@@ -131,7 +133,8 @@ bool Tree::buildsAhead() const {
 void Tree::startRent() {
   rent_ = 0;
   is_ahead_build_due_ = buildsAhead();
-  price_ = conservative() ? kNever : is_ahead_build_due_ ? 0 : surface_.triangle_count / kRent;
+  const bool is_built = !conservative() && 3 * surface_.triangle_count <= BulkBuilder::kMostToSort;
+  price_ = !is_built ? kNever : is_ahead_build_due_ ? 0 : surface_.triangle_count / kRent;
 }
 
 bool Tree::buildNow() {
@@ -143,7 +146,12 @@ bool Tree::buildNow() {
     askForAheadBuild();
     return false;
   }
-  growWhole();
+  try {
+    growWhole();
+  } catch (const std::bad_alloc&) {
+    price_ = kNever;  // the parts that queries need may still have room
+    return false;
+  }
   countBytes();
   return true;
 }
@@ -162,7 +170,7 @@ void Tree::growWhole() {
   // A device has grown what is above the parts, so the host would gain little by new blocks.
   if (!growsOnHost()) return;
   startPlaces(bulk, NodeRef(), 1, places);
-  addBlocks(bulk, places, 0, bulk.blocks().size());
+  addBlocks(bulk, places, 0, bulk.blocks().size(), now());
   publishWhole(bulk, places);
   if (surface_.triangle_count > kMostKept) {
     bulk = BulkBuilder();
@@ -176,6 +184,7 @@ void Tree::askForAheadBuild() {
       ahead_build_ = std::make_shared<AheadBuild>();
       ahead_build_->tree = this;
     }
+    ahead_build_->asked = now();
     thread::runInHelperThread([build = ahead_build_] {
       try {
         buildAhead(*build);
@@ -222,7 +231,7 @@ void Tree::buildAhead(AheadBuild& ahead) {
   startPlaces(bulk, NodeRef(), 1, places);
   for (std::size_t begin = 0, end; begin < bulk.blocks().size(); begin = end) {
     end = std::min(begin + kBlocksAtOnce, bulk.blocks().size());
-    if (!withTree([&](Tree& tree) { tree.addBlocks(bulk, places, begin, end); })) return;
+    if (!withTree([&](Tree& tree) { tree.addBlocks(bulk, places, begin, end, ahead.asked); })) return;
     // A mutex is not fair: without a pause, queries that wait for it would hardly get it.
     std::this_thread::sleep_for(kPause);
   }
@@ -247,11 +256,12 @@ void Tree::startPlaces(const BulkBuilder& bulk, NodeRef node, int level, std::ve
 
 // Adds blocks of what was built, from number `begin` on, after those before them. No reader sees them: all but the
 // first are put below their parents, and that one nowhere.
-void Tree::addBlocks(const BulkBuilder& bulk, std::vector<BulkPlace>& places, std::size_t begin, std::size_t end) {
+void Tree::addBlocks(const BulkBuilder& bulk, std::vector<BulkPlace>& places, std::size_t begin, std::size_t end,
+                     std::int64_t now) {
   for (std::size_t number = begin; number < end; ++number) {
     const BulkBuilder::Block& built = bulk.blocks()[number];
     BulkPlace& place = places[number];
-    place.index = addBlock(place.node, place.level, static_cast<std::uint8_t>(0xff >> (8 - built.lanes)));
+    place.index = addBlock(place.node, place.level, static_cast<std::uint8_t>(0xff >> (8 - built.lanes)), now);
     octants_ += built.lanes;
     Block& block = blocks_[place.index];
     block.setFrame(built.frame);

@@ -55,6 +55,9 @@ std::vector<std::shared_ptr<const Mesh>> hardMeshes() {
   });                                                                                           // needles
   add(5000, [&](std::size_t i) -> Eigen::Vector3d { return i < 4 ? point(1) : point(1e-6); });  // a speck
   add(5000, [&](std::size_t) { return Eigen::Vector3d(7, 7, 7); });                             // one point, sorted
+  add(41, [&](std::size_t i) -> Eigen::Vector3d {
+    return i == 40 ? point(1) : Eigen::Vector3d(static_cast<double>(i) * 1e-45, 0, 0);
+  });  // points so close that a scale to part them is infinite in float
   add(33, [&](std::size_t) { return point(1); });
   add(32, [&](std::size_t) { return point(1); });
   add(1, [&](std::size_t) { return point(1); });
