@@ -49,9 +49,11 @@ HWY_INLINE V ofFaces(V s0, V s1, V s2) {
 //
 // With u = 2^-24, C the largest coordinate and r the radius of each: centres are off by u C, so a way between them
 // along an axis by at most 12 u (Ca + Cb), radii by 16 u (ra + rb). An edge axis is used where its length is above 1/4,
-// so it is off by at most four times as much; a box's reach has 128 u (C + r) for that. Axes are off unit length by up
-// to 1e-3 / 2 and the angles between them by 1e-3, as poses are: of what is far off that takes a share, hence kShare;
-// of what is near it is in the reach.
+// so it is off by at most four times as much; a box's reach has 128 u (C + r) for that. Axes are those of a rotation
+// with entries of R^T R - 1 up to e = kFineError, see World::boxAt(). Their cross product, and sums of half sides along
+// it, are then off by up to 4.5 e d for a distance d of the centres and 6.4 e r for each box, four times as much after
+// the division. Beyond d = 4 (ra + rb) the faces' gap is more than d / 2, and kShare covers this; nearer, the reach
+// does.
 constexpr float kShare = 0.995f;
 
 // The largest gap along a cross product of an axis of box a and one of boxes b. r[k][j] is the product of a's axis k

@@ -60,7 +60,9 @@ class Edge {
       motions_.push_back(fcl_adapter::motionOf<S>(begin[i], end[i], motion));
       const Eigen::Vector3d center = motions_[i]->at(0) * o.bounds.center;
       speeds_.push_back(motions_[i]->fastest(center, o.bounds.radius, 0) * (1 + 1e-6));
-      double place = 0, orthogonality_error = 1e-12;
+      double place = 0;
+      double& orthogonality_error = check.orthogonality_errors[i];
+      orthogonality_error = 1e-12;
       for (const fcl::Transform3<S>& X : {begin[i], end[i]}) {
         place = std::max(place, static_cast<double>(X.translation().template lpNorm<1>()));
         orthogonality_error = std::max(orthogonality_error, orthogonalityErrorOf<S>(X));
@@ -68,9 +70,8 @@ class Edge {
       const Eigen::Vector3d origin = motions_[i]->at(0).translation();
       place += 2 * motions_[i]->fastest(origin, 0, 0);
       // Poses on the way are rounded to S, which moves points by less than what is allowed for poses of such places.
-      check.reach[i] =
-          2 * world.reachWithin(o, place,
-                                2 * orthogonality_error + 8 * static_cast<double>(std::numeric_limits<S>::epsilon()));
+      orthogonality_error = 2 * orthogonality_error + 8 * static_cast<double>(std::numeric_limits<S>::epsilon());
+      check.reach[i] = 2 * world.reachWithin(o, place, orthogonality_error);
     }
   }
 

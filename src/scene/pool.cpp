@@ -1,23 +1,36 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #include "scene/pool.h"
 
+#include <system_error>
+#include <utility>
+
 namespace bocst::scene {
 
 Pool::Pool(unsigned threads) {
   if (threads == 0) threads = std::max(1u, std::thread::hardware_concurrency());
-  for (unsigned i = 1; i < threads; ++i) threads_.emplace_back([this] { wait(); });
+  try {
+    for (unsigned i = 1; i < threads; ++i) threads_.emplace_back([this] { wait(); });
+  } catch (const std::system_error&) {
+    // The system has no more.
+  }
 }
 
 Pool::~Pool() {
+  if (isForked()) {
+    // They stayed in the parent, so they can neither be joined nor be destroyed.
+    new std::vector<std::thread>(std::move(threads_));
+    return;
+  }
   {
     const std::lock_guard<std::mutex> lock(mutex_);
     stop_ = true;
   }
-  start_.notify_all();
+  start_->notify_all();
   for (std::thread& t : threads_) t.join();
 }
 
 void Pool::run(const std::function<void()>& work) {
+  if (isForked()) return work();
   const std::unique_lock<std::mutex> mine(busy_, std::try_to_lock);
   if (!mine.owns_lock() || threads_.empty()) return work();
   {
@@ -26,10 +39,10 @@ void Pool::run(const std::function<void()>& work) {
     running_ = threads_.size();
     ++round_;
   }
-  start_.notify_all();
+  start_->notify_all();
   work();
   std::unique_lock<std::mutex> lock(mutex_);
-  end_.wait(lock, [this] { return running_ == 0; });
+  end_->wait(lock, [this] { return running_ == 0; });
 }
 
 void Pool::wait() {
@@ -38,7 +51,7 @@ void Pool::wait() {
     const std::function<void()>* work;
     {
       std::unique_lock<std::mutex> lock(mutex_);
-      start_.wait(lock, [&] { return stop_ || round_ != round; });
+      start_->wait(lock, [&] { return stop_ || round_ != round; });
       if (stop_) return;
       round = round_;
       work = work_;
@@ -49,7 +62,7 @@ void Pool::wait() {
       const std::lock_guard<std::mutex> lock(mutex_);
       last = --running_ == 0;
     }
-    if (last) end_.notify_one();
+    if (last) end_->notify_one();
   }
 }
 

@@ -11,12 +11,16 @@
 #include <thread>
 #include <vector>
 
+#include "thread/fork.h"
+
 namespace bocst::scene {
 
-/// Threads that wait for work. One query at a time has them; another that comes meanwhile works alone.
+/// Threads that wait for work. One query at a time has them; another that comes meanwhile works alone, as does a child
+/// after fork().
 class Pool {
  public:
-  /// `threads` work, the calling one included; 0: as many as the machine runs at once.
+  /// `threads` work, the calling one included, or as many as there are to be had; 0: as many as the machine runs at
+  /// once.
   explicit Pool(unsigned threads);
   ~Pool();
   Pool(const Pool&) = delete;
@@ -58,14 +62,16 @@ class Pool {
 
  private:
   void wait();
+  bool isForked() const { return forks_ != thread::forks.load(); }
 
   std::mutex busy_;  // held by who has the threads
   std::mutex mutex_;
-  std::condition_variable start_, end_;
+  thread::NeverDestroyed<std::condition_variable> start_, end_;
   const std::function<void()>* work_ = nullptr;
   std::size_t round_ = 0, running_ = 0;
   bool stop_ = false;
   std::vector<std::thread> threads_;
+  const unsigned forks_ = thread::forks.load();
 };
 
 }  // namespace bocst::scene

@@ -285,8 +285,8 @@ template <typename S>
 bool Scene<S>::edgeIsFree(const Transform* X_WM_begin, const Transform* X_WM_end, fcl::CCDMotionType motion) const {
   const auto w = impl_->current();
   scene::StateCheck<S>& check = sweepOfThread<S>().check();
-  scene::checkPoses<S>("edgeIsFree", X_WM_begin, 1, w->moving.size(), check.orthogonality_errors);
-  scene::checkPoses<S>("edgeIsFree", X_WM_end, 1, w->moving.size(), check.orthogonality_errors);
+  scene::checkPoses<S>("edgeIsFree", X_WM_begin, 1, w->moving.size(), check.orthogonality_errors, "X_WM_begin");
+  scene::checkPoses<S>("edgeIsFree", X_WM_end, 1, w->moving.size(), check.orthogonality_errors, "X_WM_end");
   return scene::edgeIsFree<S>(*w, check, X_WM_begin, X_WM_end, motion);
 }
 

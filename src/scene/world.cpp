@@ -53,14 +53,17 @@ inline double orthogonalityBound(double stretch, double shear) {
 }
 
 template <typename S>
-void refusePose(const char* query, const fcl::Transform3<S>* X_WM, std::size_t k, std::size_t moving) {
-  refuse<S>(query, " of moving object " + std::to_string(k % moving) + " in state " + std::to_string(k / moving),
+void refusePose(const char* query, const fcl::Transform3<S>* X_WM, std::size_t k, std::size_t moving,
+                const char* state) {
+  refuse<S>(query,
+            " of moving object " + std::to_string(k % moving) + " in " +
+                (state != nullptr ? state : "state " + std::to_string(k / moving)),
             X_WM[k]);
 }
 
 template <typename S>
 void checkPoses(const char* query, const fcl::Transform3<S>* X_WM, std::size_t states, std::size_t moving,
-                std::vector<double>& orthogonality_errors) {
+                std::vector<double>& orthogonality_errors, const char* state) {
   orthogonality_errors.assign(moving, 0);
   if (states != 0 && moving != 0 && X_WM == nullptr) {
     throw std::invalid_argument(std::string("bocst::Scene::") + query + ": the poses are null");
@@ -73,7 +76,7 @@ void checkPoses(const char* query, const fcl::Transform3<S>* X_WM, std::size_t s
     for (std::size_t lane = 0; lane < std::min<std::size_t>(2, count - k); ++lane, i = i + 1 < moving ? i + 1 : 0) {
       const double error = rigid[lane] != 0 ? orthogonalityBound(sums.stretch[lane], sums.shear[lane])
                                             : orthogonalityErrorOf<S>(lane == 0 ? X : Y);
-      if (!(error <= kMaxOrthogonalityError)) refusePose<S>(query, X_WM, k + lane, moving);
+      if (!(error <= kMaxOrthogonalityError)) refusePose<S>(query, X_WM, k + lane, moving, state);
       orthogonality_errors[i] = std::max(orthogonality_errors[i], error);
     }
   }
@@ -84,13 +87,17 @@ void checkPose(const char* query, const fcl::Transform3<S>& X) {
   if (!(orthogonalityErrorOf<S>(X) <= kMaxOrthogonalityError)) refuse<S>(query, "", X);
 }
 
+// Boxes of rotations that are off by more are boxes along the axes of the world, so that all axes are at right angles.
+constexpr double kFineError = 1e-5;
+
 // What may be called a contact farther than the boxes are apart: FCL computes relative poses in S (64 roundings of
 // everything that is added up); where rotations are off by `orthogonality_error`, lengths along them are, of either
-// object; and the box is in float (see nearLanes()).
+// object; and the box is in float, with axes that are off by as much (see nearLanes()).
 template <typename S>
 double reachOf(const Bounds& b, double largest, double place, double displacement, double orthogonality_error) {
   return b.reach + 64 * static_cast<double>(std::numeric_limits<S>::epsilon()) * (place + b.size) +
-         4 * orthogonality_error * (largest + b.size) + 128 * 0x1p-24 * (displacement + b.radius);
+         (orthogonality_error > kFineError ? 4 : 128) * orthogonality_error * (largest + b.size) +
+         128 * 0x1p-24 * (displacement + b.radius);
 }
 
 template <typename S>
@@ -134,7 +141,7 @@ Box World<S>::boxAt(const Object<S>& object, const fcl::Transform3<S>& X_WG, dou
     return boxAt(far, X_WG, 0);
   }
   box.reach = static_cast<float>(reach);
-  simd::Double4 half = {simd::Double2{reach, reach}, simd::Double2{reach, reach}};
+  simd::Double4 half = {};
   const auto store = [](simd::Double4 from, float(&to)[3]) {
     for (int j = 0; j < 3; ++j) to[j] = static_cast<float>(from[j]);
   };
@@ -144,6 +151,13 @@ Box World<S>::boxAt(const Object<S>& object, const fcl::Transform3<S>& X_WG, dou
     store(axis, box.axis[k]);
     box.half[k] = static_cast<float>(b.half[k]);
   }
+  if (orthogonality_error > kFineError) {
+    for (int k = 0; k < 3; ++k) {
+      for (int j = 0; j < 3; ++j) box.axis[k][j] = j == k;
+    }
+    store(half, box.half);
+  }
+  half = half + simd::Double4{simd::Double2{reach, reach}, simd::Double2{reach, reach}};
   store(center, box.center);
   store(center - half, box.lo);
   store(center + half, box.hi);
@@ -262,10 +276,11 @@ World<S>::World(std::vector<Object<S>> moving_objects, std::vector<Object<S>> fi
   }
 }
 
-#define BOCST_INSTANTIATE(S)                                                                                           \
-  template class World<S>;                                                                                             \
-  template double orthogonalityErrorOf<S>(const fcl::Transform3<S>&);                                                  \
-  template void checkPoses<S>(const char*, const fcl::Transform3<S>*, std::size_t, std::size_t, std::vector<double>&); \
+#define BOCST_INSTANTIATE(S)                                                                                          \
+  template class World<S>;                                                                                            \
+  template double orthogonalityErrorOf<S>(const fcl::Transform3<S>&);                                                 \
+  template void checkPoses<S>(const char*, const fcl::Transform3<S>*, std::size_t, std::size_t, std::vector<double>&, \
+                              const char*);                                                                           \
   template void checkPose<S>(const char*, const fcl::Transform3<S>&);
 BOCST_INSTANTIATE(float)
 BOCST_INSTANTIATE(double)

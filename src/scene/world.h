@@ -33,10 +33,10 @@ double orthogonalityErrorOf(const fcl::Transform3<S>& X);
 constexpr double kMaxOrthogonalityError = 1e-3;
 
 /// Writes the largest orthogonality error of the poses of each moving object to `orthogonality_errors`.
-/// @throws std::invalid_argument that names the first pose that is not rigid.
+/// @throws std::invalid_argument that names the first pose that is not rigid; `state`: the name of the only one.
 template <typename S>
 void checkPoses(const char* query, const fcl::Transform3<S>* X_WM, std::size_t states, std::size_t moving,
-                std::vector<double>& orthogonality_errors);
+                std::vector<double>& orthogonality_errors, const char* state = nullptr);
 template <typename S>
 void checkPose(const char* query, const fcl::Transform3<S>& X);
 

@@ -154,6 +154,22 @@ TYPED_TEST(CollidePoses, HasThemForPosesThatAreNotQuiteRigid) {
   EXPECT_LT(count(expected), 5000u);
 }
 
+TEST(CollidePosesConservative, HasThemWhereSpheresOfPointsBarelyTouch) {
+  Raw raw;
+  raw.vertices = {{1, 0, 0}, {1, 0, 0}, {1, 0, 0}};
+  raw.triangles.emplace_back(0, 1, 2);
+  Options options;
+  options.answer = Answer::kConservative;
+  options.subdivision = Subdivision::kOctree;
+  options.depth = 1;
+  const Modeld a(raw.mesh(), options), b(raw.mesh(), options);
+  Poses<double> X(400, fcl::Transform3d::Identity());
+  for (std::size_t i = 0; i < X.size(); ++i) {
+    X[i].translation().x() = 1.2e-13 * std::pow(1.05, static_cast<double>(i) - 200);
+  }
+  EXPECT_EQ(atOnce(a, b, X), oneByOne(a, b, X));
+}
+
 TYPED_TEST(CollidePoses, HasThemForMeshesFarFromTheirOrigins) {
   using S = TypeParam;
   const Vector3d m(3, -20, 5), n(-7, 1, 4);

@@ -3,11 +3,15 @@
 #include <bocst/bocst.h>
 #include <fcl/geometry/bvh/BVH_model.h>
 #include <gtest/gtest.h>
+#include <sys/resource.h>
+#include <sys/wait.h>
+#include <unistd.h>
 
 #include <atomic>
 #include <cstddef>
 #include <cstdint>
 #include <cstdlib>
+#include <fstream>
 #include <limits>
 #include <memory>
 #include <new>
@@ -19,6 +23,7 @@
 
 #include "conformance/octrees.h"
 #include "conformance/reference.h"
+#include "sanitized.h"
 
 namespace {
 
@@ -507,6 +512,86 @@ TYPED_TEST(SceneTest, EdgesThroughAThinWall) {
   }
 }
 
+// The spheres of conservative answers reach out of the tree's boxes, by up to two radii of a cell.
+TYPED_TEST(SceneTest, ConservativeSpheresReachOutOfTheBoxes) {
+  using S = TypeParam;
+  Raw slanted, plate = test::box({-1, -1, 0}, {1, 1, 0});
+  slanted.vertices = {{1, 0, 0}, {0, 1, 0}, {0, 0, 1}};
+  slanted.triangles.emplace_back(0, 1, 2);
+  int hits = 0;
+  for (const Raw& raw : {slanted, plate}) {
+    for (const Subdivision subdivision : {Subdivision::kBono, Subdivision::kOctree}) {
+      for (const int depth : {2, 3}) {
+        Options options;
+        options.answer = Answer::kConservative;
+        options.subdivision = subdivision;
+        options.depth = depth;
+        World<S> w;
+        w.fix(std::make_shared<Model<S>>(raw.mesh(), options), fcl::Transform3<S>::Identity());
+        w.move(std::make_shared<fcl::Sphere<S>>(S(0.01)));
+        std::mt19937_64 g(3);
+        std::uniform_real_distribution<double> u(-0.4, 0.4);
+        for (int i = 0; i < 300; ++i) {
+          const Eigen::Vector3d off = 1.5 * std::abs(u(g)) * Eigen::Vector3d(1, 1, 1).normalized();
+          const auto X =
+              test::pose<S>(Eigen::Matrix3d::Identity(), off + Eigen::Vector3d(0.375 + u(g) / 4, 0.375, 0.25));
+          const bool touches = !w.hits(&X).empty();
+          ASSERT_EQ(w.scene.collides(&X), touches) << i;
+          hits += touches;
+        }
+      }
+    }
+  }
+  EXPECT_GT(hits, 500);
+}
+
+// Where the first state is too far for any pose of FCL's, the others are answered as they are alone.
+TYPED_TEST(SceneTest, AStateBeyondAllNumbersHidesNone) {
+  using S = TypeParam;
+  World<S> w;
+  w.fix(std::make_shared<Model<S>>(test::box({-1, -1, -1}, {1, 1, 1}).mesh()), fcl::Transform3<S>::Identity());
+  w.move(std::make_shared<Model<S>>(test::torus(8).mesh()));
+  const double far = std::is_same<S, float>::value ? 1e30 : 1e160;
+  for (const std::size_t beyond : {0u, 2u, 4u}) {
+    States<S> X(5, fcl::Transform3<S>::Identity());
+    X[beyond].translation().x() = static_cast<S>(far);
+    std::vector<std::uint8_t> hit(5, 7), expected(5, 1);
+    expected[beyond] = 0;
+    w.scene.collisions(X.data(), 5, hit.data());
+    EXPECT_EQ(hit, expected);
+    EXPECT_EQ(w.scene.firstCollision(X.data(), 5), beyond == 0 ? 1u : 0u);
+    EXPECT_TRUE(w.scene.anyCollision(X.data(), 5));
+    EXPECT_FALSE(w.scene.collides(&X[beyond]));
+  }
+}
+
+// Rotations within the stated bound, but far from exact: boxes, reach and motions allow for them.
+TYPED_TEST(SceneTest, RotationsThatAreNotQuiteOrthogonal) {
+  using S = TypeParam;
+  const Raw a = test::box({-1, 0, -0.01}, {1, 0, 0.01}), b = test::box({-1, -0.01, 0}, {1, 0.01, 0});
+  for (const double stretch : {1.000499, 0.999501, 1.00001}) {
+    const Eigen::Matrix3d R =
+        stretch * Eigen::AngleAxisd(14.71 * std::acos(-1.0) / 180, Eigen::Vector3d::UnitZ()).toRotationMatrix();
+    World<S> w;
+    w.fix(std::make_shared<Model<S>>(b.mesh()), test::pose<S>(R, Eigen::Vector3d::Zero()));
+    w.move(std::make_shared<Model<S>>(a.mesh()));
+    const auto at = [&](double x, double z) { return test::pose<S>(stretch * Eigen::Matrix3d::Identity(), {x, 0, z}); };
+    const States<S> X = {at(0, 0), at(0, 3.9)};
+    EXPECT_FALSE(w.hits(X.data()).empty());
+    EXPECT_TRUE(w.scene.collides(X.data()));
+    EXPECT_TRUE(w.scene.anyCollision(X.data(), 2));
+    const auto above = at(0, 200), below = at(0, -1);
+    EXPECT_FALSE(w.scene.edgeIsFree(&above, X.data()));
+    EXPECT_FALSE(w.scene.edgeIsFree(&above, &below));
+    // All that touches by FCL's poses is seen.
+    std::size_t hits = 0;
+    States<S> row;
+    for (int i = -120; i <= 120; ++i) row.push_back(at(2.0 / 120 * i, 0.011 * (i % 3)));
+    checkVerdicts(w, row, row.size(), hits);
+    EXPECT_GT(hits, 10u);
+  }
+}
+
 template <typename F>
 std::string complaintOf(F&& f) {
   try {
@@ -594,6 +679,64 @@ TYPED_TEST(SceneTest, WarmQueriesAllocateNothing) {
 }
 
 // What the tests run under ThreadSanitizer looks at: queries from several threads beside changes.
+/// Runs f in a child, which has a minute.
+template <typename F>
+void expectInChild(F&& f) {
+  const pid_t child = fork();
+  if (child == 0) {
+    alarm(60);
+    _exit(f() ? 0 : 1);
+  }
+  int status = -1;
+  waitpid(child, &status, 0);
+  EXPECT_EQ(status, 0);
+}
+
+/// Three states of a ball at the face of a cube, of which the second collides.
+struct BallAndCube {
+  explicit BallAndCube(unsigned threads) : scene(SceneOptions{threads}) {
+    scene.addFixed(std::make_shared<Modeld>(test::box({-1, -1, -1}, {1, 1, 1}).mesh()),
+                   fcl::Transform3d(fcl::Transform3d::Identity()));
+    scene.addMoving(std::make_shared<fcl::Sphered>(0.25));
+  }
+
+  bool isRight() const {
+    States<double> X(300, test::pose<double>(Eigen::Matrix3d::Identity(), {3, 0, 0}));
+    X[177].translation().x() = 1.1;
+    std::vector<std::uint8_t> hit(X.size(), 7), expected(X.size(), 0);
+    expected[177] = 1;
+    scene.collisions(X.data(), X.size(), hit.data());
+    return hit == expected && scene.firstCollision(X.data(), X.size()) == 177;
+  }
+
+  Scened scene;
+};
+
+TEST(SceneThreads, AChildWorksAlone) {
+  auto scene = std::make_unique<BallAndCube>(3);
+  EXPECT_TRUE(scene->isRight());
+  expectInChild([&] {
+    if (!scene->isRight()) return false;
+    scene.reset();
+    return BallAndCube(2).isRight();
+  });
+  EXPECT_TRUE(scene->isRight());
+}
+
+// Where the system has not so many threads, the scene works with those that there are.
+TEST(SceneThreads, FewerThanAskedFor) {
+  if (test::kSanitized) return;  // Sanitizers need all of the address space.
+  expectInChild([] {
+    rlimit limit{};
+    getrlimit(RLIMIT_AS, &limit);
+    long pages = 0;
+    std::ifstream("/proc/self/statm") >> pages;
+    limit.rlim_cur = static_cast<rlim_t>(pages * sysconf(_SC_PAGESIZE)) + (rlim_t(1) << 28);
+    if (setrlimit(RLIMIT_AS, &limit) != 0) return false;
+    return BallAndCube(5000).isRight();
+  });
+}
+
 TEST(SceneThreads, ChangesBesideQueries) {
   std::mt19937_64 g(4);
   SceneOptions options;
