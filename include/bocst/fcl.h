@@ -112,7 +112,8 @@ BOCST_EXPORT std::size_t collide(const fcl::CollisionGeometry<S>* o1, const fcl:
 ///   inside a solid it is minus the distance between the surfaces (the depth of collide()'s contact without margin).
 /// The error of the answer is below 1e-11 of the geometries' sizes (1e-8 with ellipsoids, cones and cylinders), plus
 /// rounding to S. The answer does not depend on the solver or on the resident nodes.
-/// @throws std::invalid_argument as collide(), and if result.min_distance is NaN before the call.
+/// @throws std::invalid_argument as collide(), if result.min_distance is NaN before the call, and for a Plane or
+/// Halfspace if neither geometry is a Model.
 /// Thread rule: as collide().
 template <typename S>
 BOCST_EXPORT S distance(const fcl::CollisionGeometry<S>* o1, const fcl::Transform3<S>& X_W1,

@@ -11,7 +11,9 @@ namespace bocst {
 /// is `fcl::distance(...) <= distance` up to rounding; 0 tests for contact. Solids and shapes include their inside.
 ///
 /// Pairs are those of bocst::collide (<bocst/fcl.h>); o1 and o2 may be in either order. The surface of a model with
-/// conservative answers is the set of its cells' spheres. Options::margin has no effect here.
+/// conservative answers is the set of its cells' spheres. Options::margin has no effect here. An empty model and a
+/// geometry that is not occupied (CollisionGeometry::threshold_occupied) are closer to nothing, as collide() finds them
+/// in contact with nothing.
 ///
 /// Thread rule: as collide(); any number of queries may run at the same time.
 /// @throws std::invalid_argument for a pose that is not rigid, or a distance that is negative, NaN or infinite;

@@ -13,20 +13,25 @@
 
 namespace bocst::query {
 
-/// What bounds the surface of a node, placed in the common frame: a box of any direction AND a slab.
+/// Rotations may stretch a length by this factor, see SimilarityTransform::orthogonality_error: entries of R^T R - 1 of
+/// at most 1e-3 change the square of a length by at most 3e-3.
+constexpr double kMostStretch = 1.0016;
+
+/// What bounds the surface of a node, placed in the common frame: a box of any direction AND a slab. The placed axes
+/// need not be at right angles or of unit length.
 struct NodeExtent {
   Eigen::Vector3d center;
   Eigen::Matrix3d axes;  ///< Columns.
   Eigen::Vector3d half;
-  Eigen::Vector3d normal = Eigen::Vector3d::Zero();
-  double slab_offset = 0, slab_half = 0;  ///< Along normal, from center.
+  Eigen::Vector3d normal = Eigen::Vector3d::Zero();  ///< Of the slab, along the axes; zero without a slab.
+  double slab_offset = 0, slab_half = 0;             ///< Along normal, from center.
 
   NodeExtent(const Volume& v, const SimilarityTransform& to) : axes(to.rotation) {
     center = to * Eigen::Vector3d(v.center[0], v.center[1], v.center[2]);
     // All but the centre was rounded to float: twice over is enough.
     constexpr double round = 0x1p-22;
     half = Eigen::Vector3d(v.half[0], v.half[1], v.half[2]) * (to.scale * (1 + round));
-    normal = to.rotation * Eigen::Vector3d(v.normal[0], v.normal[1], v.normal[2]);
+    normal = Eigen::Vector3d(v.normal[0], v.normal[1], v.normal[2]);
     slab_offset = v.slab_offset * to.scale;
     slab_half = v.slab_half * to.scale + round * (std::abs(slab_offset) + half.sum());
   }
@@ -35,12 +40,13 @@ struct NodeExtent {
 
   /// Along a unit direction the node reaches from lo to hi, counted from its centre.
   void along(const Eigen::Vector3d& direction, double& lo, double& hi) const {
-    hi = (axes.transpose() * direction).cwiseAbs().dot(half);
+    const Eigen::Vector3d along_axes = axes.transpose() * direction;
+    hi = along_axes.cwiseAbs().dot(half);
     lo = -hi;
     const double nn = normal.squaredNorm();
     if (!(nn > 0)) return;
-    const double a = direction.dot(normal) / nn, middle = a * slab_offset;
-    const double extent = std::abs(a) * slab_half + (axes.transpose() * (direction - a * normal)).cwiseAbs().dot(half);
+    const double a = along_axes.dot(normal) / nn, middle = a * slab_offset;
+    const double extent = std::abs(a) * slab_half + (along_axes - a * normal).cwiseAbs().dot(half);
     lo = std::max(lo, middle - extent);
     hi = std::min(hi, middle + extent);
   }
@@ -77,16 +83,20 @@ inline double distanceBound(const NodeExtent& a, const NodeExtent& b, const Eige
     return best - rounding_margin;
   }
   for (const NodeExtent* n : {&a, &b}) {
-    const double length = n->normal.norm();
-    if (length > 0 && reachesCutoff(n->normal / length)) break;
+    const Eigen::Vector3d normal = n->axes * n->normal;
+    const double length = normal.norm();
+    if (length > 0 && reachesCutoff(normal / length)) break;
   }
   return best - rounding_margin;
 }
 
 /// Some point of a is no farther from one of b than this.
 inline double farthest(const NodeExtent& a, const NodeExtent& b) {
-  return ((b.center - a.center).norm() + a.half.norm() + b.half.norm()) * (1 + 1e-12);
+  return ((b.center - a.center).norm() + kMostStretch * (a.half.norm() + b.half.norm())) * (1 + 1e-12);
 }
+
+/// A ball that holds what `s` held before it was placed.
+inline Sphere stretched(const Sphere& s) { return {s.center, kMostStretch * s.radius}; }
 
 /// A triangle and its box.
 struct TriangleExtent {

@@ -2,6 +2,7 @@
 #pragma once
 
 #include <Eigen/Core>
+#include <Eigen/LU>
 #include <cmath>
 
 #include "bounds/node_bounds.h"
@@ -51,7 +52,8 @@ struct SimilarityTransform {
 
   SimilarityTransform inverse() const {
     SimilarityTransform p;
-    p.rotation = rotation.transpose();
+    // Not the transposed rotation: far from the origin, what that is off by would move things.
+    p.rotation = rotation.inverse();
     p.scale = 1 / scale;
     p.translation = -p.scale * (p.rotation * translation);
     p.tolerance = tolerance * p.scale;

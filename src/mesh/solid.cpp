@@ -183,7 +183,7 @@ bool Solid::windsAbout(const Vector3d& point) const {
     if (turns == 0) continue;
     // Does the side pass above the point? It is not near it, so this has a sign.
     const bool above = std::min(up.y(), down.y()) > 0 ||
-                       (std::max(up.y(), down.y()) > 0 && (side.x() * up.y() - side.y() * up.x()) * side.x() > 0);
+                       (std::max(up.y(), down.y()) > 0 && (side.x() * up.y() > side.y() * up.x()) == (side.x() > 0));
     if (above) winding += turns;
   }
   return winding != 0;

@@ -530,6 +530,36 @@ TEST(ContinuousDouble, StopsJustShort) {
   }
 }
 
+// A rotation that is within the stated bound, but sheared: what its transpose says of a normal is off.
+TEST(ContinuousDouble, ShearedRotationsStepOverNothing) {
+  for (const Subdivision subdivision : {Subdivision::kOctree, Subdivision::kBono}) {
+    Options options;
+    options.subdivision = subdivision;
+    const Modeld plate(test::box({-1, -1, -0.007863}, {1, 1, 0.007863}).mesh(), options);
+    for (const double shear : {9.9e-4, -9.9e-4}) {
+      auto sheared = identity<double>();
+      sheared.linear()(0, 2) = shear;
+      for (const double x : {-0.99, 0.0, 0.99}) {
+        Raw speck;
+        speck.vertices = {{x, 0, 0}, {x + 1e-5, 0, 0}, {x, 1e-5, 0}};
+        speck.triangles.emplace_back(0, 1, 2);
+        const Modeld small(speck.mesh());
+        const auto at = [](double z) { return test::pose<double>(Eigen::Matrix3d::Identity(), {0, 0, z}); };
+        for (const double end : {0.0074, -0.5}) {
+          const Ways<double> ways{&small, at(1), at(end), &plate, sheared, sheared};
+          const double first = (1 - 0.007863) / (1 - end);
+          for (const Ways<double>& w : {ways, ways.swapped()}) {
+            const Result<double> result = w.ask(request<double>(fcl::CCDM_TRANS, 1e-6));
+            EXPECT_TRUE(result.is_collide);
+            EXPECT_NEAR(result.time_of_contact, first, 2e-6);
+            EXPECT_LE(result.time_of_contact, first + 1e-9);
+          }
+        }
+      }
+    }
+  }
+}
+
 // A long body turns onto a plane, with which only its far end meets.
 TEST(ContinuousDouble, ANeedleTurnsOntoAPlane) {
   const Modeld needle(test::box({-10, -0.01, -0.01}, {10, 0.01, 0.01}).mesh());

@@ -289,6 +289,37 @@ TEST(DistanceRequest, TouchingIsZeroOrTheDepthOfAContact) {
   EXPECT_EQ(ask<double>(a, I, inside, I, true).min_distance, hole.min_distance);
 }
 
+// A result that was used before has all its fields of the pair that was asked last.
+TEST(DistanceRequest, ResultsOfEarlierPairsAreOverwritten) {
+  Options options;
+  options.solid = true;
+  const Modeld box(test::box({-1, -1, -1}, {1, 1, 1}).mesh(), options);
+  const Modeld inner(test::torus(8).scale(0.1).mesh()), other(test::torus(6).mesh());
+  const fcl::Sphered ball(0.1);
+  const fcl::Transform3d I = fcl::Transform3d::Identity();
+  const auto there = test::pose<double>(I.linear(), {0.5, 0.2, 0.3}), away = test::pose<double>(I.linear(), {9, 0, 0});
+  for (const fcl::CollisionGeometryd* partner :
+       {static_cast<const fcl::CollisionGeometryd*>(&inner), static_cast<const fcl::CollisionGeometryd*>(&ball)}) {
+    for (const bool is_signed : {false, true}) {
+      fcl::DistanceRequestd request;
+      request.enable_nearest_points = true;
+      request.enable_signed_distance = is_signed;
+      fcl::DistanceResultd fresh, used;
+      fcl::distance(&box, I, partner, there, request, fresh);
+      fcl::distance(&other, I, &other, away, request, used);
+      used.min_distance = std::numeric_limits<double>::max();
+      fcl::distance(&box, I, partner, there, request, used);
+      EXPECT_EQ(used.min_distance, fresh.min_distance);
+      EXPECT_EQ(used.o1, &box);
+      EXPECT_EQ(used.o2, partner);
+      EXPECT_EQ(used.b1, fresh.b1);
+      EXPECT_EQ(used.b2, fresh.b2);
+      EXPECT_EQ(used.nearest_points[0], fresh.nearest_points[0]);
+      EXPECT_EQ(used.nearest_points[1], fresh.nearest_points[1]);
+    }
+  }
+}
+
 TEST(DistanceConservative, IsNeverMoreAndNearerWithDepth) {
   const Raw ra = test::torus(60), rb = test::torus(31, 0.2);
   const Modeld exact_a(ra.mesh()), exact_b(rb.mesh());

@@ -439,6 +439,27 @@ TEST(MarginDouble, BroadphaseManagersSeeIt) {
   }
 }
 
+// An edge whose direction has a component with a square too small for a double.
+TYPED_TEST(Margin, AlongEdgesWithTinyComponents) {
+  using S = TypeParam;
+  Raw a, b;
+  a.vertices = {{-1, -1, 0}, {1, 0, 0}, {0, 1, 0}};
+  a.vertices[1].y() = -1;
+  a.triangles.emplace_back(0, 1, 2);
+  b.vertices = {{-1, 0, 0.1}, {1, 1e-33, 0.1}, {0, 0, 0.5}};
+  b.triangles.emplace_back(0, 1, 2);
+  const auto I = fcl::Transform3<S>(fcl::Transform3<S>::Identity());
+  const Model<S> narrow(a.mesh(), with(0.09)), wide(a.mesh(), with(0.2)), model(b.mesh());
+  const auto bvh = test::bvh<fcl::AABB<S>>(b);
+  for (const fcl::CollisionGeometry<S>* partner : {static_cast<const fcl::CollisionGeometry<S>*>(&model),
+                                                   static_cast<const fcl::CollisionGeometry<S>*>(bvh.get())}) {
+    EXPECT_TRUE(test::touching<S>(wide, I, *partner, I));
+    EXPECT_TRUE(test::touching<S>(*partner, I, wide, I));
+    EXPECT_FALSE(test::touching<S>(narrow, I, *partner, I));
+    EXPECT_NEAR(static_cast<double>(distanceOf<S>(wide, I, *partner, I)), 0.1, 1e-6);
+  }
+}
+
 TEST(MarginDouble, TimesOfContactAreThoseOfTheMargin) {
   const Modeld a(test::box({-1, -1, -1}, {0, 1, 1}).mesh(), with(0.25)), b(test::torus(12).mesh(), with(0.125));
   const double left = b.mesh()->bounds().min().x();

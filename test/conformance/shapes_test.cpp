@@ -569,6 +569,51 @@ TEST(ShapesDouble, ShapesWithoutExtent) {
   EXPECT_GT(hits, 60);
 }
 
+// A rotation within the stated bound is taken as it is: its transpose is not its inverse.
+TEST(ShapesDouble, RotationsThatAreNotQuiteOrthogonal) {
+  const fcl::Transform3d I = fcl::Transform3d::Identity();
+  Raw far;
+  far.vertices = {{1000, 0, 0}, {1001, 0, 0}, {1000, 1, 0}};
+  far.triangles.emplace_back(0, 1, 2);
+  const Modeld model(far.mesh());
+  const fcl::Sphered small(0.01), unit(1);
+  fcl::Transform3d X_WM = I, X_WB = test::pose<double>(I.linear(), {1000.8, 0.2, 0});
+  X_WM.linear() *= 1.000499;
+  fcl::DistanceResultd result;
+  EXPECT_TRUE(test::touching<double>(model, X_WM, small, X_WB));
+  EXPECT_TRUE(test::touching<double>(small, X_WB, model, X_WM));
+  EXPECT_LE(fcl::distance(&model, X_WM, &small, X_WB, fcl::DistanceRequestd(), result), 0);
+
+  const Modeld plate(test::box({-5, -5, 0}, {5, 5, 0}).mesh());
+  for (const double stretch : {1.000499, 0.999501}) {
+    fcl::Transform3d X = I;
+    X.linear() *= stretch;
+    for (const double off : {-1e-5, 1e-5}) {
+      X.translation().z() = stretch + off;
+      EXPECT_EQ(test::touching<double>(plate, I, unit, X), off < 0) << stretch;
+      EXPECT_EQ(test::touching<double>(unit, X, plate, I), off < 0) << stretch;
+    }
+  }
+}
+
+// Plane and Halfspace have open members, so their normals need not be unit vectors.
+TEST(ShapesDouble, NormalsOfAnyLength) {
+  const fcl::Transform3d I = fcl::Transform3d::Identity();
+  const Modeld cube(test::box({-1, -1, -1}, {1, 1, 1}).mesh());
+  for (const double length : {2.0, 1e-3, 1e9}) {
+    for (const double d : {-0.5, 0.5, -1.5, 1.5}) {
+      fcl::Halfspaced half(Eigen::Vector3d::UnitZ(), 0);
+      fcl::Planed plane(Eigen::Vector3d::UnitZ(), 0);
+      half.n = plane.n = length * Eigen::Vector3d::UnitZ();
+      half.d = plane.d = length * d;
+      EXPECT_EQ(test::touching<double>(cube, I, half, I), d > -1) << d;
+      EXPECT_EQ(test::touching<double>(half, I, cube, I), d > -1) << d;
+      EXPECT_EQ(test::touching<double>(cube, I, plane, I), std::abs(d) < 1) << d;
+      EXPECT_EQ(test::touching<double>(plane, I, cube, I), std::abs(d) < 1) << d;
+    }
+  }
+}
+
 TEST(ShapesDouble, WhatIsWhollyInsideASolidTouchesIt) {
   Raw raw = test::torus(12);
   raw.scale(0.01);

@@ -607,6 +607,20 @@ TEST(SolidModel, TimesOfContact) {
   EXPECT_NEAR(result.time_of_contact, (3 - 1 + raw.mesh()->bounds().min().x()) / 2.5, 1.1e-4);
 }
 
+TEST(Solid, OfAnySize) {
+  for (const double scale : {1e-110, 1e-150, 1e70}) {
+    Raw raw = test::box({-1, -1, -1}, {1, 1, 1});
+    raw.scale(scale);
+    const Solid s(raw.mesh());
+    std::mt19937_64 g(7);
+    std::uniform_real_distribution<double> u(-2, 2);
+    for (int i = 0; i < 100; ++i) {
+      const Eigen::Vector3d p(u(g), u(g), u(g));
+      ASSERT_EQ(s.mayContain(p * scale, 0), p.cwiseAbs().maxCoeff() < 1) << scale << ' ' << p.transpose();
+    }
+  }
+}
+
 TEST(SolidModel, OfManyTrianglesAndOfLargeOnes) {
   // Columns of a fine mesh, and one with a few triangles over all of them.
   Raw raw = test::torus(120);

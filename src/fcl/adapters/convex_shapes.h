@@ -2,6 +2,7 @@
 #pragma once
 
 #include <limits>
+#include <utility>
 
 #include "fcl/adapters/shapes.h"
 #include "geometry/convex_shape.h"
@@ -45,6 +46,15 @@ class PolytopeShape final : public query::SupportShape {
   const fcl::Convex<S>& convex_;
 };
 
+/// n . x = d of a plane or half-space, with n of unit length: FCL's constructors see to that, but n and d are public.
+template <typename Shape>
+std::pair<Eigen::Vector3d, double> equationOf(const Shape& s) {
+  const Eigen::Vector3d n = s.n.template cast<double>();
+  const double length = n.stableNorm();
+  if (!(length > 0)) return {Eigen::Vector3d::UnitX(), 0};  // as FCL's constructors do
+  return {n / length, static_cast<double>(s.d) / length};
+}
+
 /// A shape as a body in its own frame; unbounded ones reach as far as `region` (same frame) does.
 template <typename S>
 query::BoxShape bodyOf(const fcl::Box<S>& s, const query::Sphere&) {
@@ -76,11 +86,13 @@ PolytopeShape<S> bodyOf(const fcl::Convex<S>& s, const query::Sphere&) {
 }
 template <typename S>
 query::PlaneShape bodyOf(const fcl::Plane<S>& s, const query::Sphere& region) {
-  return query::PlaneShape(s.n.template cast<double>(), s.d, region);
+  const auto [n, d] = equationOf(s);
+  return query::PlaneShape(n, d, region);
 }
 template <typename S>
 query::HalfspaceShape bodyOf(const fcl::Halfspace<S>& s, const query::Sphere& region) {
-  return query::HalfspaceShape(s.n.template cast<double>(), s.d, region);
+  const auto [n, d] = equationOf(s);
+  return query::HalfspaceShape(n, d, region);
 }
 template <typename S>
 query::TriangleShape bodyOf(const fcl::TriangleP<S>& s, const query::Sphere&) {

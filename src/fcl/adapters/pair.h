@@ -7,6 +7,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <memory>
 #include <optional>
 #include <stdexcept>
 #include <string>
@@ -41,6 +42,12 @@ double marginOf(const Model<S>* model1, const Model<S>* model2) {
   // The trees' options: a query reads them anyway.
   return (model1 != nullptr ? treeOf(*model1).options().margin : 0) +
          (model2 != nullptr ? treeOf(*model2).options().margin : 0);
+}
+
+/// The mesh of a model as it is now, null for another geometry.
+template <typename S>
+std::shared_ptr<const Mesh> meshOf(const Model<S>* model) {
+  return model != nullptr ? model->mesh() : nullptr;
 }
 
 /// The pose of B in A's frame, computed in S as FCL does. Spelled out: Eigen's products of blocks are calls.
@@ -96,7 +103,7 @@ query::SimilarityTransform similarityOf(const RelativePose<S>& X_AB, const Eigen
   p.orthogonality_error =
       larger(larger(larger(std::abs(dot(0, 0) - 1), std::abs(dot(1, 1) - 1)), std::abs(dot(2, 2) - 1)),
              larger(larger(std::abs(dot(0, 1)), std::abs(dot(0, 2))), std::abs(dot(1, 2))));
-  // Walks take the transposed rotation for the inverse, which moves what is far from an origin.
+  // X_AB takes the transposed rotation of A for the inverse, as FCL does, which moves what is far from an origin.
   p.tolerance += 4 * p.orthogonality_error * magnitude * per_unit;
   p.ready();
   return p;

@@ -165,7 +165,7 @@ std::size_t collideOr(const Foreign& foreign, const fcl::CollisionGeometry<S>* o
     case fcl_adapter::PairKind::kForeign:
       return foreign();
     case fcl_adapter::PairKind::kNothing:
-      return 0;
+      return result.numContacts();
     case fcl_adapter::PairKind::kModel:
       break;
   }
@@ -192,6 +192,20 @@ std::size_t collide(const fcl::CollisionGeometry<S>* o1, const fcl::Transform3<S
   return collideOr<S>(by_fcl, o1, X_W1, o2, X_W2, solver, request, result);
 }
 
+namespace {
+
+// FCL would call a support function that these do not have.
+template <typename S>
+void refuseUnbounded(const fcl::CollisionGeometry<S>* o1, const fcl::CollisionGeometry<S>* o2) {
+  for (const fcl::CollisionGeometry<S>* o : {o1, o2}) {
+    if (o->getNodeType() != fcl::GEOM_PLANE && o->getNodeType() != fcl::GEOM_HALFSPACE) continue;
+    throw std::invalid_argument("bocst::distance: FCL knows no distance of " + fcl_adapter::typeName<S>(o1) + " and " +
+                                fcl_adapter::typeName<S>(o2) + "; a Plane or Halfspace needs a bocst::Model beside it");
+  }
+}
+
+}  // namespace
+
 template <typename S>
 S distance(const fcl::CollisionGeometry<S>* o1, const fcl::Transform3<S>& X_W1, const fcl::CollisionGeometry<S>* o2,
            const fcl::Transform3<S>& X_W2, const fcl::DistanceRequest<S>& request, fcl::DistanceResult<S>& result) {
@@ -203,6 +217,7 @@ S distance(const fcl::CollisionGeometry<S>* o1, const fcl::Transform3<S>& X_W1, 
     case fcl_adapter::PairKind::kForeign:
       break;
   }
+  refuseUnbounded<S>(o1, o2);
   return fcl::distance<S>(o1, X_W1, o2, X_W2, request, result);
 }
 
@@ -211,6 +226,7 @@ S distance(const fcl::CollisionGeometry<S>* o1, const fcl::Transform3<S>& X_W1, 
            const fcl::Transform3<S>& X_W2, const Solver* solver, const fcl::DistanceRequest<S>& request,
            fcl::DistanceResult<S>& result) {
   if (isModel<S>(o1) || isModel<S>(o2)) return bocst::distance<S>(o1, X_W1, o2, X_W2, request, result);
+  refuseUnbounded<S>(o1, o2);
   return fcl::distance<Solver>(o1, X_W1, o2, X_W2, solver, request, result);
 }
 

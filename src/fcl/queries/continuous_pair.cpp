@@ -73,12 +73,6 @@ ContactGoal goalOf(const ContinuousQuery<S>& q, double size1, double size2, doub
   return goal;
 }
 
-/// The mesh of a model as it is now, null for another geometry.
-template <typename S>
-std::shared_ptr<const Mesh> meshOf(const Model<S>* model) {
-  return model != nullptr ? model->mesh() : nullptr;
-}
-
 /// A ball about the origin of the partner that holds the model on all of its way, in the partner's frame. What is kept
 /// by all motions is the distance of a partner's point from its origin, so nothing beyond matters.
 query::Sphere regionOf(const Motion& of_model, const Eigen::AlignedBox3d& bounds, const Motion& of_partner) {

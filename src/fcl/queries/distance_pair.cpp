@@ -162,13 +162,18 @@ void search(const DistanceQuery<S>& q, const TreeSide& a, const B& b, const Simi
   report(q, walk.run(goalOf(q, lattice.unit())), lattice.origin(), lattice.unit());
 }
 
-/// What is inside a solid is not apart from it. There are no points where they touch; the nearest of the surfaces, if
-/// they are known, stay.
-template <typename S>
-void notApart(const DistanceQuery<S>& q) {
+/// What is inside a solid is not apart from it. There are no points where they touch: the points are those where the
+/// surfaces are nearest. search() looks for these, below q.result.min_distance.
+template <typename S, typename Search, typename IsInside>
+void searchSolid(const DistanceQuery<S>& q, Search&& search, IsInside&& is_inside) {
+  const S before = q.result.min_distance;
+  search();
+  if (!(q.result.min_distance > 0) || !is_inside()) return;
+  if (!(q.result.min_distance < before)) {
+    q.result.min_distance = std::numeric_limits<S>::max();
+    search();
+  }
   q.result.min_distance = 0;
-  q.result.o1 = q.o1;
-  q.result.o2 = q.o2;
 }
 
 /// The same between a tree and solid bodies: with_partner(frame, f) makes the side of the bodies and calls f with it.
@@ -183,21 +188,22 @@ void searchConvex(const DistanceQuery<S>& q, tree::Tree& tree, F&& with_partner)
     if constexpr (std::is_same<std::decay_t<decltype(b)>, query::ConvexSide>::value) {
       if (searchFar(q, Distant(isometryOf<S>(q.X_WA()), tree), b)) return;
     }
-    search(q, a, b, b_in_a);
-    if (q.result.min_distance > 0 && contains(a, frame, b)) notApart(q);
+    searchSolid(
+        q, [&] { search(q, a, b, b_in_a); }, [&] { return contains(a, frame, b); });
   });
 }
 
 template <typename S>
 void searchModels(const DistanceQuery<S>& q, tree::Tree& tree_a, tree::Tree& tree_b) {
   const QueryScope scope(tree_a, tree_b);
-  const auto [b_in_a, magnitude] = relate<S>(q, scope.a(), scope.b());
+  const RelativeSides sides = relate<S>(q, scope.a(), scope.b());
   if (searchFar(q, Distant(isometryOf<S>(q.X_WA()), tree_a), Distant(isometryOf<S>(q.X_WB()), tree_b))) return;
-  search(q, scope.a(), scope.b(), b_in_a);
-  if (q.result.min_distance > 0 && (contains<S>(tree_a, q.X_WA(), tree_b, q.X_WB(), magnitude) ||
-                                    contains<S>(tree_b, q.X_WB(), tree_a, q.X_WA(), magnitude))) {
-    notApart(q);
-  }
+  searchSolid(
+      q, [&] { search(q, scope.a(), scope.b(), sides.b_in_a); },
+      [&] {
+        return contains<S>(tree_a, q.X_WA(), tree_b, q.X_WB(), sides.magnitude) ||
+               contains<S>(tree_b, q.X_WB(), tree_a, q.X_WA(), sides.magnitude);
+      });
 }
 
 /// Between a tree and whatever is no model.
@@ -219,10 +225,11 @@ void searchPartner(const DistanceQuery<S>& q, tree::Tree& tree) {
   } else {
     const BvhSide b = bvhSideOf<S>("distance", q.b());
     const QueryScope scope(tree);
-    const auto [b_in_a, magnitude] = relate<S>(q, scope.a(), b);
+    const RelativeSides sides = relate<S>(q, scope.a(), b);
     if (searchFar(q, Distant(isometryOf<S>(q.X_WA()), tree), Distant(isometryOf<S>(q.X_WB()), b))) return;
-    search(q, scope.a(), b, b_in_a);
-    if (q.result.min_distance > 0 && contains<S>(tree, q.X_WA(), b, q.X_WB(), magnitude)) notApart(q);
+    searchSolid(
+        q, [&] { search(q, scope.a(), b, sides.b_in_a); },
+        [&] { return contains<S>(tree, q.X_WA(), b, q.X_WB(), sides.magnitude); });
   }
 }
 
@@ -256,13 +263,22 @@ S distancePair(const fcl::CollisionGeometry<S>* o1, const fcl::Transform3<S>& X_
   checkRequest(request, result);
   if (request.isSatisfied(result)) return result.min_distance;
   const DistanceQuery<S> q{{o1, X_W1, o2, X_W2, model1 == nullptr}, request, result};
-  if (model1 != nullptr && model2 != nullptr) {
-    searchModels(q, treeOf(*model1), treeOf(*model2));
-  } else {
-    searchPartner(q, treeOf(model1 != nullptr ? *model1 : *model2));
+  const bool is_signed = request.enable_signed_distance;
+  const fcl::DistanceResult<S> before = result;
+  for (;;) {
+    // Held, so that another mesh does not get the address of one of these.
+    const auto mesh1 = is_signed ? meshOf(model1) : nullptr, mesh2 = is_signed ? meshOf(model2) : nullptr;
+    if (model1 != nullptr && model2 != nullptr) {
+      searchModels(q, treeOf(*model1), treeOf(*model2));
+    } else {
+      searchPartner(q, treeOf(model1 != nullptr ? *model1 : *model2));
+    }
+    if (!is_signed || result.min_distance > 0) return result.min_distance;
+    sign(q);
+    // The depth must be that of the surfaces that touch.
+    if (meshOf(model1) == mesh1 && meshOf(model2) == mesh2) return result.min_distance;
+    result = before;
   }
-  if (request.enable_signed_distance && !(result.min_distance > 0)) sign(q);
-  return result.min_distance;
 }
 
 template float distancePair<float>(const fcl::CollisionGeometry<float>*, const fcl::Transform3<float>&,

@@ -16,7 +16,7 @@ namespace bocst::fcl_adapter {
 /// From the frame of the one to that of the other.
 template <typename S>
 Eigen::Isometry3d relative(const fcl::Transform3<S>& X_WA, const fcl::Transform3<S>& X_WB) {
-  return isometryOf<S>(X_WA).inverse(Eigen::Isometry) * isometryOf<S>(X_WB);
+  return isometryOf<S>(X_WA).inverse(Eigen::Affine) * isometryOf<S>(X_WB);
 }
 
 inline bool containsOne(const Solid& solid, const std::vector<Eigen::Vector3d>& points, const Eigen::Isometry3d& X,

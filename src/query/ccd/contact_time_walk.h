@@ -131,7 +131,7 @@ class ContactTimeWalk : private BestFirst<ContactTimeWalk<A, B>, A, B> {
 
   double boundOf(const NodeExtent& a, const NodeExtent& b) const {
     const Eigen::Vector3d t = b.center - a.center;
-    const double apart = t.norm(), radius_a = a.half.norm(), radius_b = b.half.norm();
+    const double apart = t.norm(), radius_a = kMostStretch * a.half.norm(), radius_b = kMostStretch * b.half.norm();
     const double rounding_margin = kRounding * (apart + radius_a + radius_b) + clearance();
     double best = now_;
     const auto consider = [&](Eigen::Vector3d direction) {
@@ -156,8 +156,9 @@ class ContactTimeWalk : private BestFirst<ContactTimeWalk<A, B>, A, B> {
     if (length_a > 0 && consider(a.axes * (gap_a.cwiseProduct(in_a.cwiseSign()) / length_a))) return best;
     if (length_b > 0 && consider(b.axes * (gap_b.cwiseProduct(in_b.cwiseSign()) / length_b))) return best;
     for (const NodeExtent* n : {&a, &b}) {
-      const double length = n->normal.norm();
-      if (length > 0 && consider(n->normal / length)) break;
+      const Eigen::Vector3d normal = n->axes * n->normal;
+      const double length = normal.norm();
+      if (length > 0 && consider(normal / length)) break;
     }
     return best;
   }
@@ -193,7 +194,7 @@ class ContactTimeWalk : private BestFirst<ContactTimeWalk<A, B>, A, B> {
     Eigen::Vector3d corners[8];
     cornersOf(box, a_in_world_, corners);
     for (Eigen::Vector3d& x : corners) x = world_in_b_ * x;
-    const Sphere ball{a_in_world_ * box.center, box.half.norm() * a_in_world_.scale};
+    const Sphere ball{a_in_world_ * box.center, kMostStretch * box.half.norm() * a_in_world_.scale};
     return boundOf(b_.gap(pair.b, {corners, 8}, kFar), 0, ball, ball.radius, convexOf(pair.b));
   }
 
@@ -206,12 +207,12 @@ class ContactTimeWalk : private BestFirst<ContactTimeWalk<A, B>, A, B> {
 
   NodeExtent reachOfA(typename A::Node n) const { return NodeExtent(a_.volume(n), a_in_world_); }
   NodeExtent reachOfB(typename B::Node n) const { return NodeExtent(b_.volume(n), b_in_world_); }
-  Sphere ballOfA(typename A::Node n) const { return query::placed(a_.sphere(n), a_in_world_); }
+  Sphere ballOfA(typename A::Node n) const { return stretched(query::placed(a_.sphere(n), a_in_world_)); }
   auto ballOfB(typename B::Node n) const {
     if constexpr (B::kBodies) {
       return n;
     } else {
-      return query::placed(b_.sphere(n), b_in_world_);
+      return stretched(query::placed(b_.sphere(n), b_in_world_));
     }
   }
 

@@ -106,7 +106,7 @@ class DistanceWalk : private BestFirst<DistanceWalk<A, B>, A, B> {
     if constexpr (B::kBodies) {
       return n;
     } else {
-      return placed(b_.sphere(n), b_in_a_);
+      return stretched(placed(b_.sphere(n), b_in_a_));
     }
   }
 
@@ -114,7 +114,7 @@ class DistanceWalk : private BestFirst<DistanceWalk<A, B>, A, B> {
     return (a.center - b.center).norm() * (1 - 1e-12) - (a.radius + b.radius) * (1 + 1e-12);
   }
   double boundOf(const Sphere& a, typename B::Node body) const {
-    const Sphere ball = placed(a, a_in_b_);
+    const Sphere ball = stretched(placed(a, a_in_b_));
     const double extent = ball.radius * (1 + 1e-12);
     return (b_.gap(body, {&ball.center, 1}, cutoff() * a_in_b_.scale + extent).atLeast - extent) * b_in_a_.scale;
   }

@@ -62,7 +62,7 @@ const Frame& TreeGaps::frameOf(int side, tree::NodeRef node, std::size_t& lane) 
 
 OctantGaps TreeGaps::ofOctants(int own, tree::NodeRef x, tree::NodeRef y) {
   std::size_t lane = 0;
-  const Frame& f = frame(own, side_[own]->tree().childRef(x).index());
+  const Frame& f = frame(own, side_[own]->block(x));
   const Frame& other = frameOf(1 - own, y, lane);
   OctantGaps gaps;
   octantGaps(geometry_, own, f, other, lane, direction_, gaps);

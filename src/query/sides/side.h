@@ -35,7 +35,7 @@ class TreeSide {
   bool isConservative() const { return tree_.conservative(); }
 
   State state(Node node) const {
-    const tree::ChildRef ref = tree_.childRef(node);
+    const tree::ChildRef ref = childRef(node);
     if (ref.tag() == tree::ChildRef::kBlock && !(isConservative() && tree_.isDeepest(level(node))))
       return State::kInner;
     if (isConservative()) return tree_.isDeepest(level(node)) ? State::kLeaf : State::kGrows;
@@ -97,7 +97,7 @@ class TreeSide {
   /// Calls f(child) for the children of an inner node that `other`, placed in this frame by `to`, may overlap.
   template <typename OtherVolume, typename F>
   void overlappingChildren(Node node, OtherVolume& other, const SimilarityTransform& to, F&& f) const {
-    const std::uint32_t index = tree_.childRef(node).index();
+    const std::uint32_t index = childRef(node).index();
     pushOctants(tree_.block(index), index, octantsOverlapping(index, other, to), f);
   }
 
@@ -106,19 +106,22 @@ class TreeSide {
   template <typename OtherVolume, typename Large, typename Other, typename F>
   void childrenMeeting(Node node, OtherVolume& volume, const SimilarityTransform& to, Large& large, const Other& other,
                        typename Other::Node leaf, F&& f) const {
-    const std::uint32_t index = tree_.childRef(node).index();
+    const std::uint32_t index = childRef(node).index();
     const tree::Block& block = tree_.block(index);
     unsigned mask = octantsOverlapping(index, volume, to);
     if (mask != 0 && !block.isLoose()) mask = large.octantsMeeting(*this, node, mask, other, leaf, to);
     pushOctants(block, index, mask, f);
   }
 
+  /// The block of an inner node.
+  std::uint32_t block(Node node) const { return childRef(node).index(); }
+
   /// Are the children of an inner node octants of a cell, rather than lanes of a loose block?
-  bool hasOctants(Node node) const { return !tree_.block(tree_.childRef(node).index()).isLoose(); }
+  bool hasOctants(Node node) const { return !tree_.block(childRef(node).index()).isLoose(); }
 
   /// The centre of an inner node's cell and half its side, which is the side of its octants.
   double octantsOf(Node node, Eigen::Vector3d& center) const {
-    const tree::Block& block = tree_.block(tree_.childRef(node).index());
+    const tree::Block& block = tree_.block(childRef(node).index());
     const double half = 1 << (lattice::kMaxLevel - block.shape - 1);
     center = Eigen::Vector3d(2 * block.at[0] + 1, 2 * block.at[1] + 1, 2 * block.at[2] + 1) * half;
     return half;
@@ -127,7 +130,7 @@ class TreeSide {
   /// Calls f(child) for all children.
   template <typename F>
   void children(Node node, F&& f) const {
-    const std::uint32_t index = tree_.childRef(node).index();
+    const std::uint32_t index = childRef(node).index();
     const tree::Block& block = tree_.block(index);
     tree_.markUsed(index, now_);
     for (int mask = block.grey; mask != 0; mask &= mask - 1) {
@@ -136,12 +139,12 @@ class TreeSide {
   }
 
   /// Triangles of a leaf that is not a cell.
-  std::size_t triangleCount(Node node) const { return tree_.list(tree_.childRef(node)).count; }
-  std::uint32_t triangle(Node node, std::size_t i) const { return tree_.list(tree_.childRef(node)).ids[i]; }
+  std::size_t triangleCount(Node node) const { return tree_.list(childRef(node)).count; }
+  std::uint32_t triangle(Node node, std::size_t i) const { return tree_.list(childRef(node)).ids[i]; }
 
   /// The corners of a leaf's triangles where the tree keeps them packed, and their numbers; else false.
   bool packed(Node node, tree::PackedTriangles& triangles, tree::TriangleIds& ids) const {
-    const std::uint32_t list = tree_.childRef(node).index();
+    const std::uint32_t list = childRef(node).index();
     if (!tree_.lists().packed(list, triangles)) return false;
     ids = tree_.lists()[list].ids;
     return true;
@@ -225,8 +228,19 @@ class TreeSide {
 
   int level(Node node) const { return tree_.level(node); }
 
+  // While a query runs, another thread may put a whole tree below the root. All that this query reads of the root is of
+  // the block or leaf that it saw first.
+  tree::ChildRef childRef(Node node) const {
+    if (!node.isRoot()) return tree_.childRef(node);
+    if (root_ref_.tag() != tree::ChildRef::kBlock && root_ref_.tag() != tree::ChildRef::kShortList) {
+      root_ref_ = tree_.childRef(node);
+    }
+    return root_ref_;
+  }
+
   tree::Tree& tree_;
   const std::int64_t now_;
+  mutable tree::ChildRef root_ref_;
 };
 
 /// Orders a batch, which is about one tree or two, so that each node is grown once.
