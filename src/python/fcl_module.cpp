@@ -11,8 +11,10 @@
 #include <cmath>
 #include <exception>
 #include <limits>
+#include <mutex>
 #include <optional>
 #include <sstream>
+#include <string_view>
 
 #include "python/arrays.h"
 #include "python/geometry.h"
@@ -26,7 +28,6 @@ namespace {
 using namespace pybind11::literals;
 using Eigen::Vector3d;
 using fcl::Transform3d;
-using NoGil = py::gil_scoped_release;
 using GeometryPtr = std::shared_ptr<fcl::CollisionGeometryd>;
 
 double number(const char* name, double value) {
@@ -46,6 +47,15 @@ Vector3d normal(const py::object& value) {
   const Vector3d n = vector3("n", value);
   if (n.isZero()) throw py::value_error("bocst: n is the zero vector");
   return n;
+}
+
+py::array arrayOfAny(const char* name, const py::object& value) {
+  const py::array a = py::array::ensure(value);
+  if (!a) {
+    PyErr_Clear();
+    throw py::value_error(std::string("bocst: ") + name + " is not an array of numbers");
+  }
+  return a;
 }
 
 // Poses ---------------------------------------------------------------------------------------------------------------
@@ -76,7 +86,7 @@ py::array_t<double> quaternionOf(const Eigen::Matrix3d& R) {
 
 /// (3, 3) or a quaternion.
 Eigen::Matrix3d anyRotation(const py::object& value) {
-  return py::array::ensure(value).ndim() == 1 ? quaternion(value) : rotation(value);
+  return arrayOfAny("the rotation", value).ndim() == 1 ? quaternion(value) : rotation(value);
 }
 
 /// A translation as python-fcl takes it, also (1, 3) or (3, 1).
@@ -172,14 +182,14 @@ void bindHalf(py::module_& m, const char* name, const char* text) {
   ShapeClass<T> c(m, name, text);
   c.def(py::init([](const py::object& n, double d) { return std::make_shared<Shape<T>>(normal(n), number("d", d)); }),
         "n"_a, "d"_a);
-  member(c, "n", &T::n, [](const char*, const py::object& n) { return normal(n); });
+  member(c, "n", &T::n, [](const char*, const py::object& n) { return normal(n).stableNormalized().eval(); });
   member(c, "d", &T::d, number);
 }
 
 /// FCL goes through the faces without looking where they end.
 std::shared_ptr<const std::vector<int>> facesOf(const py::object& faces, int count, std::size_t vertices) {
   std::vector<int> f;
-  for (const auto& face : py::array::ensure(faces).attr("ravel")().attr("tolist")()) f.push_back(face.cast<int>());
+  for (const auto& face : arrayOfAny("faces", faces).attr("ravel")().attr("tolist")()) f.push_back(face.cast<int>());
   std::size_t at = 0;
   for (int k = 0; k < count; ++k) {
     const int corners = at < f.size() ? f[at] : 0;
@@ -322,17 +332,46 @@ void bindBuilder(py::module_& m, const char* name, const char* text) {
 }
 
 #if FCL_HAVE_OCTOMAP
+/// Is this the data part of octomap's binary format, of a tree that is no deeper than octomap's? Its reader takes what
+/// is beyond the end for nodes, and calls itself for each level. A node is two bits for each child; both are set for a
+/// child that is a node again, which follows.
+bool isBinaryOctree(std::string_view data) {
+  constexpr int kDeepest = 16;
+  std::vector<int> levels{0};  // of the nodes to come, the next one last
+  while (!levels.empty()) {
+    const int level = levels.back();
+    levels.pop_back();
+    if (data.size() < 2) return false;
+    for (int child = 0; child < 8; ++child) {
+      if ((data[static_cast<std::size_t>(child / 4)] >> (2 * (child % 4)) & 3) != 3) continue;
+      if (level + 1 >= kDeepest) return false;
+      levels.push_back(level + 1);
+    }
+    data.remove_prefix(2);
+  }
+  return data.empty();
+}
+
 class Octree : public Geometry {
  public:
-  explicit Octree(double resolution) : Geometry(nullptr), resolution_(length("r", resolution)) {
-    set(std::make_shared<octomap::OcTree>(resolution));
-  }
+  explicit Octree(double resolution) : Octree(std::make_shared<octomap::OcTree>(length("r", resolution))) {}
 
   void read(const std::string& data) {
-    const auto tree = std::make_shared<octomap::OcTree>(resolution_);
+    octomap::OcTree tree(tree_->getResolution());
     std::istringstream in(data);
-    if (!tree->readBinaryData(in)) throw py::value_error("bocst: data is not an octree in octomap's binary format");
-    set(tree);
+    // A file has lines of text before the data.
+    constexpr std::string_view kFirst = "# Octomap OcTree binary file", kLast = "\ndata\n";
+    const bool is_file = data.compare(0, kFirst.size(), kFirst) == 0;
+    const std::size_t begin = is_file ? data.find(kLast) + kLast.size() : 0;
+    if ((is_file && data.find(kLast) == std::string::npos) || !isBinaryOctree(std::string_view(data).substr(begin)) ||
+        !(is_file ? tree.readBinary(in) : !tree.readBinaryData(in).fail())) {
+      throw py::value_error("bocst: data is not an octree in octomap's binary format");
+    }
+    if (std::abs(tree.getResolution() - tree_->getResolution()) > 1e-6 * tree_->getResolution()) {
+      throw py::value_error("bocst: the resolution of data is " + std::to_string(tree.getResolution()) +
+                            ", not r = " + std::to_string(tree_->getResolution()));
+    }
+    change([&] { tree_->swapContent(tree); });
   }
   void insert(const py::object& points, const py::object& origin, double maxrange, bool lazy_eval, bool discretize) {
     octomap::Pointcloud cloud;
@@ -341,22 +380,27 @@ class Octree : public Geometry {
       cloud.push_back(static_cast<float>(p.x()), static_cast<float>(p.y()), static_cast<float>(p.z()));
     }
     const Vector3d o = origin.is_none() ? Vector3d::Zero().eval() : vector3("origin", origin);
-    // Queries may be reading the tree that there is.
-    const auto tree = std::make_shared<octomap::OcTree>(*tree_);
-    tree->insertPointCloud(
-        cloud, octomap::point3d(static_cast<float>(o.x()), static_cast<float>(o.y()), static_cast<float>(o.z())),
-        maxrange, lazy_eval, discretize);
-    set(tree);
+    change([&] {
+      tree_->insertPointCloud(
+          cloud, octomap::point3d(static_cast<float>(o.x()), static_cast<float>(o.y()), static_cast<float>(o.z())),
+          maxrange, lazy_eval, discretize);
+    });
   }
 
  private:
-  void set(std::shared_ptr<octomap::OcTree> tree) {
-    tree_ = std::move(tree);
-    geometry_ = std::make_shared<fcl::OcTreed>(tree_);
+  explicit Octree(const std::shared_ptr<octomap::OcTree>& tree)
+      : Geometry(std::make_shared<fcl::OcTreed>(tree)), tree_(tree) {}
+
+  // Once no query is reading it.
+  template <typename F>
+  void change(F&& f) const {
+    const py::gil_scoped_release released;
+    const std::unique_lock<std::shared_mutex> alone(octreeMutex());
+    f();
+    geometry_->computeLocalAABB();
   }
 
-  double resolution_;
-  std::shared_ptr<octomap::OcTree> tree_;
+  std::shared_ptr<octomap::OcTree> tree_;  // what geometry_ reads
 };
 #endif
 
@@ -364,7 +408,12 @@ void bindGeometries(py::module_& m) {
   py::class_<Geometry, std::shared_ptr<Geometry>>(m, "CollisionGeometry",
                                                   "A geometry that can collide, in its own frame.")
       .def("getNodeType", [](const Geometry& g) { return g.get()->getNodeType(); })
-      .def("computeLocalAABB", [](const Geometry& g) { g.get()->computeLocalAABB(); })
+      .def("computeLocalAABB",
+           [](const Geometry& g) {
+             const auto geometry = g.get();
+             const NoGil free;
+             geometry->computeLocalAABB();
+           })
       .def_property(
           "aabb_center", [](const Geometry& g) { return arrayOf(g.get()->aabb_center); },
           [](const Geometry& g, const py::object& c) { g.get()->aabb_center = vector3("aabb_center", c); },
@@ -402,8 +451,11 @@ void bindGeometries(py::module_& m) {
   bindRound<fcl::Coned>(m, "Cone", "A cone of height lz along z about the origin.");
   bindRound<fcl::Cylinderd>(m, "Cylinder", "A cylinder of height lz along z about the origin.");
   bindHalf<fcl::Halfspaced>(m, "Halfspace",
-                            "All x with n.x <= d. n (3,) is normalised; d is divided by the same length.");
-  bindHalf<fcl::Planed>(m, "Plane", "All x with n.x = d. n (3,) is normalised; d is divided by the same length.");
+                            "All x with n.x <= d. The constructor normalises n (3,) and divides d by the same length; "
+                            "a new value of n is normalised, and d stays.");
+  bindHalf<fcl::Planed>(m, "Plane",
+                        "All x with n.x = d. The constructor normalises n (3,) and divides d by the same length; a new "
+                        "value of n is normalised, and d stays.");
 
   ShapeClass<fcl::Convexd>(m, "Convex", R"(A convex polyhedron.
 
@@ -420,7 +472,9 @@ Answers are those of FCL's BVHModel<OBBRSS>, which is called BVHModelOBBRSS here
 #if FCL_HAVE_OCTOMAP
   py::class_<Octree, Geometry, std::shared_ptr<Octree>>(m, "OcTree", R"(An octomap with the resolution r.
 
-data: bytes in octomap's binary format. points: (n, 3), inserted as a point cloud seen from origin (3,).)")
+data: bytes in octomap's binary format, with or without the header of a .bt file. points: (n, 3), inserted as a point
+cloud seen from origin (3,). After readBinaryData() or insertPointCloud(), call computeAABB() of the objects and update()
+of the managers and scenes that have this geometry.)")
       .def(py::init([](double r, const std::optional<py::bytes>& data, const py::object& points,
                        const py::object& origin, double maxrange, bool lazy_eval, bool discretize) {
              auto tree = std::make_shared<Octree>(r);
@@ -808,6 +862,9 @@ struct Callback {
 
 class Manager {
  public:
+  // Else FCL calls back with an object of its own for each cell, which Python does not know.
+  Manager() { manager_.octree_as_geometry_collide = manager_.octree_as_geometry_distance = true; }
+
   void add(Object& object) {
     change();
     const py::object o = named(object);
@@ -816,6 +873,9 @@ class Manager {
     objects_[o] = py::none();
   }
   void addAll(const std::vector<Object*>& objects) {
+    for (Object* o : objects) {
+      if (o == nullptr) throw py::type_error("bocst: None is not a CollisionObject");
+    }
     for (Object* o : objects) add(*o);
   }
   void remove(Object& object) {
@@ -935,11 +995,21 @@ to stop. distance: the same, with callbacks that return (done, minimum distance 
   option("tree_topdown_balance_threshold", [](Fcl& f) -> int& { return f.tree_topdown_balance_threshold; });
   option("tree_topdown_level", [](Fcl& f) -> int& { return f.tree_topdown_level; });
   option("tree_init_level", [](Fcl& f) -> int& { return f.tree_init_level; });
-  option("octree_as_geometry_collide", [](Fcl& f) -> bool& { return f.octree_as_geometry_collide; });
-  option("octree_as_geometry_distance", [](Fcl& f) -> bool& { return f.octree_as_geometry_distance; });
+  for (const char* name : {"octree_as_geometry_collide", "octree_as_geometry_distance"}) {
+    c.def_property(
+        name, [](const Manager&) { return true; },
+        [name](Manager&, bool value) {
+          if (!value) throw py::value_error(std::string("bocst: ") + name + " can only be True");
+        });
+  }
 }
 
 }  // namespace
+
+std::shared_mutex& octreeMutex() {
+  static std::shared_mutex mutex;
+  return mutex;
+}
 
 std::shared_ptr<Modeld> makeModel(std::shared_ptr<const Mesh> mesh, const Options& options) {
   const UncheckedDispatch in_any_order;

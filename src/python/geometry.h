@@ -6,9 +6,20 @@
 #include <pybind11/pybind11.h>
 
 #include <memory>
+#include <shared_mutex>
 #include <stdexcept>
 
 namespace bocst::python {
+
+/// Held shared by whatever runs without Python's lock and may read an octree, alone by what changes one.
+std::shared_mutex& octreeMutex();
+
+/// Gives Python's lock up while it lives. Calls nothing of Python.
+class NoGil {
+ private:
+  const pybind11::gil_scoped_release released_;
+  const std::shared_lock<std::shared_mutex> octrees_{octreeMutex()};
+};
 
 /// What Python sees as a collision geometry: shares one of FCL's, which a query may need longer than Python does.
 class Geometry {

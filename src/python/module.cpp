@@ -26,7 +26,6 @@ namespace bocst::python {
 namespace {
 
 using namespace pybind11::literals;
-using NoGil = py::gil_scoped_release;
 using MeshPtr = std::shared_ptr<Mesh>;
 
 /// pybind11 holds what is not const; nothing here changes a mesh.
@@ -148,7 +147,8 @@ MeshPtr makeMesh(const py::object& vertices, const py::object& triangles) {
 }
 
 MeshPtr loadMeshOf(const py::object& file) {
-  const std::string name = py::module_::import("os").attr("fsdecode")(file).cast<std::string>();
+  // As bytes: what is no UTF-8 in a name has no string of C++.
+  const std::string name = py::module_::import("os").attr("fsencode")(file).cast<std::string>();
   const NoGil free;
   return forPython(loadMesh(name));
 }

@@ -357,8 +357,81 @@ def test_octrees():
     mesh = bocst.Model(bocst.Mesh(*box(0.2)))
     assert fcl.collide(at(tree), at(mesh)) == 1
     assert fcl.collide(at(tree), at(mesh, 1, 0, 0)) == 0
+    # A scene and a manager that have it see what is inserted later.
+    scene = bocst.Scene()
+    fixed = scene.add_fixed(tree, np.eye(4))
+    scene.add_moving(fcl.Sphere(0.1))
+    manager, ball = fcl.DynamicAABBTreeCollisionManager(), at(fcl.Sphere(0.1), 2, 0, 0)
+    objects = [at(tree), ball]
+    manager.registerObjects(objects)
+    manager.setup()
+    state = np.eye(4)[None]
+    state[0, :3, 3] = 2, 0, 0
+    for seen in (False, True):
+        data = fcl.CollisionData()
+        manager.collide(data, fcl.defaultCollisionCallback)
+        assert data.result.is_collision == seen
+        assert scene.collides(state) == seen
+        if not seen:
+            tree.insertPointCloud(np.array([[2.0, 0, 0]]), np.array([0.05, 0.05, 5.0]))
+            objects[0].computeAABB()
+            manager.update()
+            scene.update(fixed)
+    near = fcl.DistanceData()
+    manager.distance(near, fcl.defaultDistanceCallback)
+    assert near.result.min_distance <= 0 and isinstance(near.result.o1, fcl.CollisionGeometry)
+    manager.octree_as_geometry_collide = True
     with pytest.raises(ValueError):
-        fcl.OcTree(0.1, data=b"no octree")
+        manager.octree_as_geometry_collide = False
+
+
+# The root has one child, which is occupied: two bits for each child, 10 is an occupied leaf.
+ONE_CELL = bytes([0b10, 0])
+HEADER = b"# Octomap OcTree binary file\nid OcTree\nsize 2\nres 0.1\ndata\n"
+
+
+def test_octrees_from_bytes():
+    tree = fcl.OcTree(0.1, data=ONE_CELL)
+    with_header = fcl.OcTree(0.1, data=HEADER + ONE_CELL)
+    for x in (-100, 100):
+        hits = [fcl.collide(at(t), at(fcl.Sphere(0.1), x, x, x)) for t in (tree, with_header)]
+        assert hits[0] == hits[1]
+    assert fcl.collide(at(tree), at(fcl.Sphere(0.1), -100, -100, -100)) \
+        + fcl.collide(at(tree), at(fcl.Sphere(0.1), 100, 100, 100)) == 1
+    deep = b"\x03\0" * 15 + ONE_CELL
+    fcl.OcTree(0.1, data=deep)
+    for bad in (b"", b"no octree", b"\xff" * 10**6, b"\xff", ONE_CELL[:1], ONE_CELL + b"\0", b"\x03\0" * 16 + ONE_CELL,
+                deep[:-1], HEADER, HEADER[:-5] + ONE_CELL, HEADER.replace(b"0.1", b"0.2") + ONE_CELL):
+        with pytest.raises(ValueError):
+            fcl.OcTree(0.1, data=bad)
+        with pytest.raises(ValueError):
+            tree.readBinaryData(bad)
+    assert fcl.collide(at(tree), at(fcl.Sphere(0.1), -100, -100, -100)) \
+        + fcl.collide(at(tree), at(fcl.Sphere(0.1), 100, 100, 100)) == 1
+
+
+def test_what_is_no_array_is_refused():
+    ragged = [[1.0, 0, 0], [0, 1.0], [0, 0, 1.0]]
+    for wrong in (lambda: fcl.Transform(ragged, np.zeros(3)), lambda: fcl.Transform(ragged),
+                  lambda: fcl.Convex(box()[0], 2, [[3, 0, 1, 2], [3, 0]])):
+        with pytest.raises(ValueError):
+            wrong()
+    manager = fcl.DynamicAABBTreeCollisionManager()
+    ball = at(fcl.Sphere(1))
+    with pytest.raises(TypeError):
+        manager.registerObjects([ball, None])
+    assert manager.size() == 0
+
+
+def test_normals_of_half_spaces_stay_unit_vectors():
+    cube = bocst.Model(bocst.Mesh(*box(1.0)))
+    for kind in (fcl.Halfspace, fcl.Plane):
+        shape = kind(np.array([0.0, 1.0, 0.0]), -0.5)
+        shape.n = np.array([0.0, 0.0, 2.0])
+        assert np.array_equal(shape.n, [0, 0, 1]) and shape.d == -0.5
+        assert fcl.collide(at(shape), at(cube)) == 1
+        shape.d = -1.5
+        assert fcl.collide(at(shape), at(cube)) == 0
 
 
 # What trimesh's CollisionManager does with python-fcl, written anew.
