@@ -29,8 +29,9 @@ class ObjReader {
     std::string_view rest = bytes_;
     while (!rest.empty()) {
       std::string_view line = takeLine(rest);
-      // A backslash at the end of a line takes the next one in; blanks and ends of lines are the same to takeWord.
-      while (!line.empty() && line.back() == '\\' && !rest.empty()) {
+      // A backslash at the end of a line, comments aside, takes the next one in; blanks and ends of lines are the same
+      // to takeWord.
+      while (!line.empty() && line.back() == '\\' && line.find('#') == line.npos && !rest.empty()) {
         const std::string_view more = takeLine(rest);
         line = {line.data(), static_cast<std::size_t>(more.data() + more.size() - line.data())};
       }

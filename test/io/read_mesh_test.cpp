@@ -416,6 +416,8 @@ TEST(ReadObj, ReadsGeometryOnly) {
   EXPECT_EQ(p.corners, (Corners{0, 1, 2, 3, 0, 1, 2, 0, 1, 4}));
   EXPECT_EQ(sizes(p), (Sizes{4, 3, 3}));
   EXPECT_EQ(readObj("v 0.1234567890123456 1e-300 0\n").vertices[0], Eigen::Vector3d(0.1234567890123456, 1e-300, 0));
+  // A comment ends with its line, whatever its last character is.
+  EXPECT_EQ(readObj("# C:\\meshes\\\nv 1 2 3\nv 4 5 6 # mm\\\nv 7 8 9\n").vertices.size(), 3u);
 }
 
 TEST(ReadObj, RefusesWhatIsNoNumberAndNoIndex) {

@@ -313,6 +313,13 @@ TEST_F(SceneFile, FindsPackages) {
   EXPECT_EQ(given.resolve("/a/b.stl", deep), "/a/b.stl");
   EXPECT_EQ(given.resolve("b.stl", "/c"), "/c/b.stl");
   EXPECT_THROW(given.resolve("package://robots", deep), std::runtime_error);
+  // A file that is named without a folder is in the working one.
+  unsetenv("ROS_PACKAGE_PATH");
+  unsetenv("AMENT_PREFIX_PATH");
+  const fs::path working = fs::current_path();
+  fs::current_path(deep);
+  EXPECT_TRUE(fs::equivalent(fs::path(none.resolve(uri, "")).parent_path().parent_path(), folder_ / "up/robots"));
+  fs::current_path(working);
   for (const char* wrong : {"robots", "=x", "robots="}) EXPECT_THROW(Packages({wrong}), std::invalid_argument) << wrong;
 }
 
@@ -486,6 +493,8 @@ TEST_F(SceneFile, SaysWhereASceneIsWrong) {
   };
   complains("{\n\"objects\": [\n}", "line 3, column 1");
   complains("{\"objects\": [{\"name\": \"a\", \"sphere\": 1e999}]}", "1e999");
+  complains(R"({"objects": [], "objects": []})", "\"objects\" is given twice in one object");
+  complains(objects(R"({"name": "a", "sphere": 1, "pose": {"xyz": [0, 0, 0], "xyz": [1, 0, 0]}})"), "\"xyz\" is given");
   complains("[]", "an object {...} expected");
   complains(R"({"object": []})", "there is no key \"object\" here. Did you mean objects?");
   complains(objects(R"({"sphere": 1})"), "objects[0]: \"name\" is missing");

@@ -59,7 +59,7 @@ std::string Packages::find(const std::string& name, const std::string& folder) c
     if (isFolder(prefix / "share" / name)) return (prefix / "share" / name).string();
   }
   std::error_code error;
-  for (fs::path at = fs::absolute(folder, error); !error; at = at.parent_path()) {
+  for (fs::path at = fs::absolute(folder.empty() ? "." : folder, error); !error; at = at.parent_path()) {
     const fs::path found = namedFolder(at.has_filename() ? at : at.parent_path(), name);
     if (!found.empty()) return found.string();
     if (at == at.parent_path()) break;

@@ -24,7 +24,7 @@ template <typename S>
 class ModelSide final : public BocstSide {
  public:
   ModelSide(const Bodies& bodies, const std::vector<Eigen::Isometry3d>& poses, const Options& options)
-      : bodies_(bodies), poses_(poses, bodies.moving) {
+      : bodies_(bodies), poses_(poses, bodies.moving), by_boxes_(options.answer == Answer::kExact) {
     for (const Shape& shape : bodies.shapes) geometries_.push_back(geometryOf(shape, options));
     std::vector<Id> ids;
     for (std::size_t i = 0; i < bodies.bodies.size(); ++i) {
@@ -55,8 +55,8 @@ class ModelSide final : public BocstSide {
     std::vector<BodyPair> found;
     for (std::size_t a = 0; a < bodies_.moving; ++a) {
       for (std::size_t b = a + 1; b < objects_.size(); ++b) {
-        if (bodies_.asked(a, b) && near(objects_[a], objects_[b]) && touch(objects_[a], objects_[b]))
-          found.emplace_back(a, b);
+        if (!bodies_.asked(a, b) || (by_boxes_ && !near(objects_[a], objects_[b]))) continue;
+        if (touch(objects_[a], objects_[b])) found.emplace_back(a, b);
       }
     }
     return found;
@@ -106,6 +106,7 @@ class ModelSide final : public BocstSide {
 
   const Bodies& bodies_;
   ScenePoses<S> poses_;
+  bool by_boxes_;  ///< The spheres of conservative answers reach out of the boxes.
   std::vector<std::shared_ptr<Model<S>>> models_;
   std::vector<std::shared_ptr<fcl::CollisionGeometry<S>>> geometries_;
   Scene<S> scene_;

@@ -5,7 +5,9 @@
 #include <cctype>
 #include <filesystem>
 #include <map>
+#include <set>
 #include <stdexcept>
+#include <vector>
 
 #include "cli/file.h"
 #include "cli/suggest.h"
@@ -32,8 +34,17 @@ bool isUrdf(const std::string& file) {
 }
 
 Json parseJson(const std::string& file) {
+  std::vector<std::set<std::string>> keys;  // Of the objects that are open.
+  const auto refuseRepeatedKeys = [&](int, Json::parse_event_t event, Json& parsed) {
+    if (event == Json::parse_event_t::object_start) keys.emplace_back();
+    if (event == Json::parse_event_t::object_end) keys.pop_back();
+    if (event == Json::parse_event_t::key && !keys.back().insert(parsed.get<std::string>()).second) {
+      throw std::runtime_error(file + ": \"" + parsed.get<std::string>() + "\" is given twice in one object");
+    }
+    return true;
+  };
   try {
-    return Json::parse(readFile(file), nullptr, true, true);
+    return Json::parse(readFile(file), refuseRepeatedKeys, true, true);
   } catch (const Json::exception& e) {
     std::string what = e.what();
     what.erase(0, what.find("] ") + 2);
