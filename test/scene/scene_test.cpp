@@ -658,6 +658,37 @@ TYPED_TEST(SceneTest, MisuseThrows) {
   EXPECT_EQ(scene.fixedCount(), 1u);
 }
 
+// FCL has no distance of them: its general algorithm would follow a support function that is null.
+TYPED_TEST(SceneTest, UnboundedShapesNeedAModelForDistances) {
+  using S = TypeParam;
+  std::mt19937_64 g(2);
+  const auto half = std::make_shared<fcl::Halfspace<S>>(fcl::Vector3<S>::UnitZ(), S(-5));
+  const auto plane = std::make_shared<fcl::Plane<S>>(fcl::Vector3<S>::UnitZ(), S(-5));
+  const auto at = fcl::Transform3<S>::Identity();
+  const States<S> state(1, at);
+  for (const Geometry<S>& floor : {Geometry<S>(half), Geometry<S>(plane)}) {
+    const bool is_half = floor == half;
+    const auto said = [&](const fcl::CollisionGeometry<S>* a, const fcl::CollisionGeometry<S>* b) {
+      return complaintOf([&] {
+        fcl::DistanceResult<S> result;
+        bocst::distance<S>(a, at, b, at, fcl::DistanceRequest<S>(), result);
+      });
+    };
+    const auto ball = std::make_shared<fcl::Sphere<S>>(S(1));
+    EXPECT_NE(said(ball.get(), floor.get()).find(is_half ? "Halfspace" : "Plane"), std::string::npos);
+    EXPECT_NE(said(floor.get(), ball.get()).find("bocst::Model"), std::string::npos);
+    Scene<S> scene;
+    scene.addFixed(floor, at);
+    const Id id = scene.addMoving(ball);
+    EXPECT_THROW(scene.clearance(state.data()), std::invalid_argument);
+    EXPECT_FALSE(scene.collides(state.data()));
+    scene.remove(id);
+    scene.addMoving(geometry<S>(0, g));
+    EXPECT_GT(scene.clearance(state.data()), S(0));
+    EXPECT_TRUE(scene.edgeIsFree(state.data(), state.data()));
+  }
+}
+
 TYPED_TEST(SceneTest, WarmQueriesAllocateNothing) {
   using S = TypeParam;
   World<S> w;
