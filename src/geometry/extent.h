@@ -13,9 +13,9 @@
 
 namespace bocst::query {
 
-/// Rotations may stretch a length by this factor, see SimilarityTransform::orthogonality_error: entries of R^T R - 1 of
-/// at most 1e-3 change the square of a length by at most 3e-3.
-constexpr double kMostStretch = 1.0016;
+/// A pose relative to another may stretch a length by this factor: entries of R^T R - 1 of at most 1e-3 change the
+/// square of a length by at most 3e-3, and either rotation may be so far off. 1.003 / 0.997 is less than its square.
+constexpr double kMostStretch = 1.0031;
 
 /// What bounds the surface of a node, placed in the common frame: a box of any direction AND a slab. The placed axes
 /// need not be at right angles or of unit length.

@@ -61,7 +61,8 @@ bool Sweep<S>::setFar(const World<S>& world, std::size_t states, const Part& par
     // Differences of sums.
     if (far > 0) check_.far[i] += 1e-15 * path[states - 1] * static_cast<double>(states);
     // NaN: the motion is too long for a double.
-    if (!(far <= kFarthest * world.moving[i].bounds.radius) && world.moving[i].bounds.kind == Bounds::kBox) near = false;
+    if (!(far <= kFarthest * world.moving[i].bounds.radius) && world.moving[i].bounds.kind == Bounds::kBox)
+      near = false;
   }
   return near;
 }

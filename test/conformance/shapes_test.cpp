@@ -7,6 +7,7 @@
 #include <fcl/broadphase/default_broadphase_callbacks.h>
 #include <gtest/gtest.h>
 
+#include <algorithm>
 #include <map>
 #include <thread>
 
@@ -588,10 +589,11 @@ TEST(ShapesDouble, RotationsThatAreNotQuiteOrthogonal) {
   for (const double stretch : {1.000499, 0.999501}) {
     fcl::Transform3d X = I;
     X.linear() *= stretch;
-    for (const double off : {-1e-5, 1e-5}) {
-      X.translation().z() = stretch + off;
-      EXPECT_EQ(test::touching<double>(plate, I, unit, X), off < 0) << stretch;
-      EXPECT_EQ(test::touching<double>(unit, X, plate, I), off < 0) << stretch;
+    // Between the two, a ball that the rotation stretches and one that it does not (as FCL's) differ.
+    for (const double z : {std::min(stretch, 1.0) - 1e-5, std::max(stretch, 1.0) + 1e-5}) {
+      X.translation().z() = z;
+      EXPECT_EQ(test::touching<double>(plate, I, unit, X), z < stretch) << stretch;
+      EXPECT_EQ(test::touching<double>(unit, X, plate, I), z < stretch) << stretch;
     }
   }
 }

@@ -95,8 +95,9 @@ class DistanceWalk : private BestFirst<DistanceWalk<A, B>, A, B> {
   NodeExtent reachOfB(typename B::Node n) const { return NodeExtent(b_.volume(n), b_in_a_); }
 
   double boundOf(const NodeExtent& a, const NodeExtent& b) {
-    // Where each node holds a piece of surface, something is no farther than this.
-    if (B::kNodesContainSurface) limit_ = std::min(limit_, farthest(a, b));
+    // Where each node holds a piece of surface, something is no farther than this. From bodies, distances are measured
+    // in their own frame.
+    if (B::kNodesContainSurface) limit_ = std::min(limit_, farthest(a, b) * (B::kBodies ? kMostStretch : 1));
     return distanceBound(a, b, way_, cutoff());
   }
 
