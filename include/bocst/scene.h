@@ -62,7 +62,8 @@ struct SceneOptions {
 /// before or after a change, never a mixture. Changes wait for each other. The first query after a change updates the
 /// scene's internal data, and other queries wait for that; apart from this, no query waits for another. If no model has
 /// to grow, collides() and calls with up to 128 states allocate no memory after the thread's first similar queries,
-/// except in FCL's own code for a pair without a Model.
+/// except in FCL's own code for a pair without a Model. A child of fork() works alone; calls throw std::runtime_error if
+/// another thread of the parent was at work in the scene or in one of its models at the fork.
 template <typename S>
 class BOCST_EXPORT Scene {
  public:
@@ -109,7 +110,9 @@ class BOCST_EXPORT Scene {
   /// True if the motion of all moving objects from one state to another is free of collisions at all times. Never steps
   /// over a contact. Geometries that pass closer than the resolution of fcl::continuousCollide (see bocst/fcl.h; for
   /// two of FCL's geometries 1e-5 of their sizes) count as touching. With CCDM_LINEAR, each object's origin moves on a
-  /// line, and the object turns about a fixed axis (slerp).
+  /// line, and the object turns about a fixed axis (slerp of the normalised quaternions, so a rotation that is off by
+  /// rounding is passed exact). Two of FCL's geometries that pass closer than the rounding of the motion's length also
+  /// count as touching.
   /// @throws std::invalid_argument as clearance().
   bool edgeIsFree(const Transform* X_WM_begin, const Transform* X_WM_end,
                   fcl::CCDMotionType motion = fcl::CCDM_LINEAR) const;

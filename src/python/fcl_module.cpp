@@ -282,12 +282,18 @@ class Builder : public Geometry {
   }
   int end() {
     inSequence();
-    const NoGil free;
-    mesh_ = Mesh::fromIndices(std::move(vertices_), std::move(indices_));
-    vertices_.clear();
-    indices_.clear();
-    begun_ = false;
-    geometry_ = Make()(mesh_);
+    begun_ = false;  // What another thread adds meanwhile is refused.
+    std::vector<Vector3d> vertices = std::move(vertices_);
+    std::vector<Mesh::Indices> triangles = std::move(indices_);
+    std::shared_ptr<const Mesh> mesh;
+    GeometryPtr geometry;
+    {
+      const NoGil free;
+      mesh = Mesh::fromIndices(std::move(vertices), std::move(triangles));
+      geometry = Make()(mesh);
+    }
+    mesh_ = std::move(mesh);
+    geometry_ = std::move(geometry);
     return fcl::BVH_OK;
   }
 
@@ -352,23 +358,47 @@ bool isBinaryOctree(std::string_view data) {
   return data.empty();
 }
 
+bool isFile(std::string_view data) {
+  constexpr std::string_view kFirst = "# Octomap OcTree binary file";
+  return data.substr(0, kFirst.size()) == kFirst;
+}
+
+/// Takes the header of a file off: lines of a key and a value up to "data", between comments. octomap's own reader
+/// would find other data after a header that it did not write.
+bool readHeader(std::string_view& data, double& resolution) {
+  bool has_resolution = false;
+  for (;;) {
+    const std::size_t end = data.find('\n');
+    if (end == std::string_view::npos) return false;
+    std::istringstream line{std::string(data.substr(0, end))};
+    data.remove_prefix(end + 1);
+    std::string key, id;
+    if (!(line >> key) || key[0] == '#' || key == "size") continue;
+    if (key == "data") return has_resolution;
+    if (key == "res") {
+      if (!(line >> resolution)) return false;
+      has_resolution = true;
+    } else if (key != "id" || !(line >> id) || id != "OcTree") {
+      return false;
+    }
+  }
+}
+
 class Octree : public Geometry {
  public:
   explicit Octree(double resolution) : Octree(std::make_shared<octomap::OcTree>(length("r", resolution))) {}
 
   void read(const std::string& data) {
     octomap::OcTree tree(tree_->getResolution());
-    std::istringstream in(data);
-    // A file has lines of text before the data.
-    constexpr std::string_view kFirst = "# Octomap OcTree binary file", kLast = "\ndata\n";
-    const bool is_file = data.compare(0, kFirst.size(), kFirst) == 0;
-    const std::size_t begin = is_file ? data.find(kLast) + kLast.size() : 0;
-    if ((is_file && data.find(kLast) == std::string::npos) || !isBinaryOctree(std::string_view(data).substr(begin)) ||
-        !(is_file ? tree.readBinary(in) : !tree.readBinaryData(in).fail())) {
+    std::string_view nodes = data;
+    double resolution = tree_->getResolution();
+    std::istringstream in;
+    if ((isFile(nodes) && !readHeader(nodes, resolution)) || !isBinaryOctree(nodes) ||
+        (in.str(std::string(nodes)), tree.readBinaryData(in).fail())) {
       throw py::value_error("bocst: data is not an octree in octomap's binary format");
     }
-    if (std::abs(tree.getResolution() - tree_->getResolution()) > 1e-6 * tree_->getResolution()) {
-      throw py::value_error("bocst: the resolution of data is " + std::to_string(tree.getResolution()) +
+    if (!(std::abs(resolution - tree_->getResolution()) <= 1e-6 * tree_->getResolution())) {
+      throw py::value_error("bocst: the resolution of data is " + std::to_string(resolution) +
                             ", not r = " + std::to_string(tree_->getResolution()));
     }
     change([&] { tree_->swapContent(tree); });
@@ -395,7 +425,7 @@ class Octree : public Geometry {
   template <typename F>
   void change(F&& f) const {
     const py::gil_scoped_release released;
-    const std::unique_lock<std::shared_mutex> alone(octreeMutex());
+    const std::lock_guard<FairSharedMutex> alone(octreeMutex());
     f();
     geometry_->computeLocalAABB();
   }
@@ -411,7 +441,7 @@ void bindGeometries(py::module_& m) {
       .def("computeLocalAABB",
            [](const Geometry& g) {
              const auto geometry = g.get();
-             const NoGil free;
+             const NoGilWithOctrees free;
              geometry->computeLocalAABB();
            })
       .def_property(
@@ -607,7 +637,7 @@ std::size_t collideObjects(const Object& o1, const Object& o2, const std::option
   fcl::CollisionResultd r;
   std::size_t count;
   {
-    const NoGil free;
+    const NoGilWithOctrees free;
     count = bocst::collide<double>(a.geometry.get(), a.X_WG, b.geometry.get(), b.X_WG, request, r);
   }
   if (result == nullptr) return count;
@@ -632,14 +662,17 @@ double distanceOf(const Object& o1, const Object& o2, const std::optional<fcl::D
   fcl::DistanceResultd r;
   double distance;
   {
-    const NoGil free;
+    const NoGilWithOctrees free;
     distance = bocst::distance<double>(a.geometry.get(), a.X_WG, b.geometry.get(), b.X_WG, request, r);
   }
   if (result == nullptr || !(r.min_distance < result->min_distance)) return distance;
   result->min_distance = r.min_distance;
-  py::list points;
-  for (const Vector3d& p : r.nearest_points) points.append(arrayOf(p));
-  result->nearest_points = points;
+  // FCL sets them only where they were asked for.
+  if (request.enable_nearest_points) {
+    py::list points;
+    for (const Vector3d& p : r.nearest_points) points.append(arrayOf(p));
+    result->nearest_points = points;
+  }
   result->o1 = named(r.o1, o1, o2);
   result->o2 = named(r.o2, o1, o2);
   result->b1 = r.b1;
@@ -647,14 +680,33 @@ double distanceOf(const Object& o1, const Object& o2, const std::optional<fcl::D
   return distance;
 }
 
+/// @throws for what FCL ends the process with, or reads memory that it has not set.
+void refuseWhatFclLacks(const fcl::CollisionGeometryd& g1, const fcl::CollisionGeometryd& g2,
+                        const fcl::ContinuousCollisionRequestd& request) {
+  if (isModel<double>(&g1) || isModel<double>(&g2)) return;
+  const auto is_unbounded = [](const fcl::CollisionGeometryd& g) {
+    return g.getNodeType() == fcl::GEOM_PLANE || g.getNodeType() == fcl::GEOM_HALFSPACE;
+  };
+  const bool advances = request.ccd_solver_type == fcl::CCDC_CONSERVATIVE_ADVANCEMENT;
+  if (request.ccd_motion_type != fcl::CCDM_SPLINE &&
+      !(advances && (is_unbounded(g1) || is_unbounded(g2) ||
+                     (g1.getObjectType() != fcl::OT_BVH && g2.getObjectType() == fcl::OT_BVH)))) {
+    return;
+  }
+  throw py::value_error(
+      "bocst: FCL has no continuous collision of these two geometries with this solver and motion; make one of them a "
+      "bocst.Model, or ask for CCDC_NAIVE and CCDM_LINEAR");
+}
+
 double continuousOf(const Object& o1, const Transform3d& X_W1_end, const Object& o2, const Transform3d& X_W2_end,
                     const std::optional<fcl::ContinuousCollisionRequestd>& asked, ContinuousResult* result) {
   const fcl::ContinuousCollisionRequestd request = asked.value_or(fcl::ContinuousCollisionRequestd());
   const Placed a(o1), b(o2);
+  refuseWhatFclLacks(*a.geometry, *b.geometry, request);
   fcl::ContinuousCollisionResultd r;
   double time;
   {
-    const NoGil free;
+    const NoGilWithOctrees free;
     time = bocst::continuousCollide<double>(a.geometry.get(), a.X_WG, X_W1_end, b.geometry.get(), b.X_WG, X_W2_end,
                                             request, r);
   }
@@ -869,21 +921,24 @@ class Manager {
     change();
     const py::object o = named(object);
     if (objects_.contains(o)) throw py::value_error("bocst: the object is registered already");
-    manager_.registerObject(&object);
     objects_[o] = py::none();
+    manager_.registerObject(&object);
   }
-  void addAll(const std::vector<Object*>& objects) {
-    for (Object* o : objects) {
-      if (o == nullptr) throw py::type_error("bocst: None is not a CollisionObject");
+  void addAll(const py::iterable& objects) {
+    std::vector<py::object> held;
+    for (const py::handle o : objects) {
+      if (!py::isinstance<Object>(o))
+        throw py::type_error("bocst: " + py::repr(o).cast<std::string>() + " is not a CollisionObject");
+      held.push_back(py::reinterpret_borrow<py::object>(o));
     }
-    for (Object* o : objects) add(*o);
+    for (const py::object& o : held) add(o.cast<Object&>());
   }
   void remove(Object& object) {
     change();
     const py::object o = named(object);
     if (!objects_.contains(o)) return;
-    manager_.unregisterObject(&object);
     objects_.attr("pop")(o);
+    manager_.unregisterObject(&object);
   }
   void clear() {
     change();
@@ -1006,8 +1061,8 @@ to stop. distance: the same, with callbacks that return (done, minimum distance 
 
 }  // namespace
 
-std::shared_mutex& octreeMutex() {
-  static std::shared_mutex mutex;
+FairSharedMutex& octreeMutex() {
+  static FairSharedMutex mutex;
   return mutex;
 }
 

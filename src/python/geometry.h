@@ -6,19 +6,42 @@
 #include <pybind11/pybind11.h>
 
 #include <memory>
+#include <mutex>
 #include <shared_mutex>
 #include <stdexcept>
 
 namespace bocst::python {
 
-/// Held shared by whatever runs without Python's lock and may read an octree, alone by what changes one.
-std::shared_mutex& octreeMutex();
+/// Gives Python's lock up while it lives.
+using NoGil = pybind11::gil_scoped_release;
 
-/// Gives Python's lock up while it lives. Calls nothing of Python.
-class NoGil {
+/// A shared mutex where a thread that waits to be alone goes before those that come later.
+class FairSharedMutex {
+ public:
+  void lock_shared() {
+    { const std::lock_guard<std::mutex> turn(turn_); }
+    mutex_.lock_shared();
+  }
+  void unlock_shared() { mutex_.unlock_shared(); }
+  void lock() {
+    const std::lock_guard<std::mutex> turn(turn_);
+    mutex_.lock();
+  }
+  void unlock() { mutex_.unlock(); }
+
  private:
-  const pybind11::gil_scoped_release released_;
-  const std::shared_lock<std::shared_mutex> octrees_{octreeMutex()};
+  std::mutex turn_;
+  std::shared_mutex mutex_;
+};
+
+/// Held shared by whatever runs without Python's lock and may read an octree, alone by what changes one.
+FairSharedMutex& octreeMutex();
+
+/// The same where octrees may be read. Calls nothing of Python.
+class NoGilWithOctrees {
+ private:
+  const NoGil released_;
+  const std::shared_lock<FairSharedMutex> octrees_{octreeMutex()};
 };
 
 /// What Python sees as a collision geometry: shares one of FCL's, which a query may need longer than Python does.

@@ -380,14 +380,14 @@ py::array_t<bool> posesOf(const ModelGeometry& a, const ModelGeometry& b, const 
 struct PyScene {
   explicit PyScene(const SceneOptions& options) : scene(options) {}
   Scened scene;
-  mutable std::shared_mutex changing;
+  mutable FairSharedMutex changing;
 };
 
 /// Changes of that number wait for queries. Needs no GIL.
 template <typename F>
 auto change(PyScene& s, const F& f) {
-  const NoGil free;
-  const std::lock_guard<std::shared_mutex> alone(s.changing);
+  const NoGilWithOctrees free;
+  const std::lock_guard<FairSharedMutex> alone(s.changing);
   return f(s.scene);
 }
 
@@ -409,8 +409,8 @@ std::size_t statesIn(const char* name, const Poses& poses, std::size_t moving, b
 template <typename F>
 auto ask(const PyScene& s, const py::object& X_WM, bool many, const F& f) {
   const Poses poses("X_WM", X_WM);
-  const NoGil free;
-  const std::shared_lock<std::shared_mutex> lock(s.changing);
+  const NoGilWithOctrees free;
+  const std::shared_lock<FairSharedMutex> lock(s.changing);
   const std::size_t states = statesIn("X_WM", poses, s.scene.movingCount(), many);
   std::vector<fcl::Transform3d> copy;
   return f(s.scene, poses.transforms(copy), states);
@@ -471,15 +471,15 @@ threads: number of threads that share the states of one call; 0: one per hardwar
           "set_pose",
           [](PyScene& s, Id fixed, const py::object& X_WG) {
             const fcl::Transform3d X = pose("X_WG", X_WG);
-            const NoGil free;
+            const NoGilWithOctrees free;
             s.scene.setPose(fixed, X);
           },
           "fixed"_a, "X_WG"_a, "Moves a fixed object to another pose, (4, 4).")
       .def(
           "ignore", [](PyScene& s, Id a, Id b, bool ignored) { s.scene.ignore(a, b, ignored); }, "a"_a, "b"_a,
-          "ignored"_a = true, py::call_guard<NoGil>(), "Allows the two to touch; ignored=False undoes this.")
+          "ignored"_a = true, py::call_guard<NoGilWithOctrees>(), "Allows the two to touch; ignored=False undoes this.")
       .def(
-          "update", [](PyScene& s, Id id) { s.scene.update(id); }, "object"_a, py::call_guard<NoGil>(),
+          "update", [](PyScene& s, Id id) { s.scene.update(id); }, "object"_a, py::call_guard<NoGilWithOctrees>(),
           "Call this after the shape of a geometry has changed.")
       .def(
           "collides",
@@ -565,6 +565,28 @@ motion: 'linear', 'translation', 'screw' or 'spline', see fcl.CCDMotionType.)")
 
 }  // namespace
 
+namespace {
+
+/// pickle's oldest protocols would make an object without calling its constructor, at which pybind11 ends the process.
+void refusePickling(const py::module_& m) {
+  for (const auto& item : m.attr("__dict__").cast<py::dict>()) {
+    const py::handle value = item.second;
+    if (py::isinstance<py::module_>(value)) {
+      refusePickling(value.cast<py::module_>());
+    } else if (PyType_Check(value.ptr()) != 0 && !py::hasattr(value, "__members__") &&
+               !PyExceptionClass_Check(value.ptr())) {
+      const auto refuse = [](const py::object& self, const py::args&) {
+        throw py::type_error("cannot pickle '" + std::string(Py_TYPE(self.ptr())->tp_name) + "' object");
+      };
+      for (const char* name : {"__reduce__", "__reduce_ex__"}) {
+        py::setattr(value, name, py::cpp_function(refuse, py::is_method(value), py::name(name)));
+      }
+    }
+  }
+}
+
+}  // namespace
+
 PYBIND11_MODULE(_bocst, m) {
   m.doc() = "The C++ part of bocst.";
   m.attr("__version__") = BOCST_VERSION;
@@ -573,6 +595,7 @@ PYBIND11_MODULE(_bocst, m) {
   bindFcl(m.def_submodule("fcl"));
   bindModel(m);
   bindScene(m);
+  refusePickling(m);
 }
 
 }  // namespace bocst::python

@@ -82,12 +82,16 @@ void collideAll(const Model<S>& a, const Model<S>& b, const Poses<S>& X_AB, std:
   if (count == 0) return;
   if (X_AB.numbers(0) == nullptr) throw std::invalid_argument("bocst::collidePoses: X_AB is null");
   if (hit == nullptr) throw std::invalid_argument("bocst::collidePoses: hit is null");
+  if (fcl_adapter::kindOf<S>(&a, &b) == fcl_adapter::PairKind::kNothing) {
+    std::fill(hit, hit + count, std::uint8_t{0});
+    return;
+  }
   const std::size_t rows = (count + kPosesAtOnce - 1) / kPosesAtOnce;
   const auto work = [&](std::size_t row) {
     collideSome(a, b, X_AB, row * kPosesAtOnce, std::min((row + 1) * kPosesAtOnce, count), hit);
     return true;
   };
-  scene::Pool(rows > 1 ? threads : 1).share(rows, work);
+  scene::Pool(threads, rows).share(rows, work);
 }
 
 }  // namespace

@@ -41,8 +41,9 @@ S distanceBelow(const Object<S>& a, const fcl::Transform3<S>& X_WA, const Object
   if (has_model) result.min_distance = below;
   const S d = bocst::distance<S>(a.geometry.get(), X_WA, b.geometry.get(), X_WB, request, result);
   if (!has_model && result.o1 == nullptr && !(d < std::numeric_limits<S>::max())) {
-    throw std::invalid_argument("bocst::Scene: FCL knows no distance of " + fcl_adapter::typeName<S>(a.geometry.get()) +
-                                " and " + fcl_adapter::typeName<S>(b.geometry.get()));
+    throw std::invalid_argument("bocst::Scene: FCL computes no distance of " +
+                                fcl_adapter::typeName<S>(a.geometry.get()) + " and " +
+                                fcl_adapter::typeName<S>(b.geometry.get()));
   }
   return std::max(d, S(0));
 }
@@ -115,7 +116,14 @@ class Edge {
 
   bool touchesOnWay(const PairAt& p) {
     const Object<S>&a = world_.moving[p.moving], &b = world_.object(p.group, p.lane);
-    if (a.model == nullptr && b.model == nullptr) return advance(p, a, b);
+    switch (fcl_adapter::kindOf<S>(a.geometry.get(), b.geometry.get())) {
+      case fcl_adapter::PairKind::kForeign:
+        return advance(p, a, b);
+      case fcl_adapter::PairKind::kNothing:
+        return false;
+      case fcl_adapter::PairKind::kModel:
+        break;
+    }
     fcl::ContinuousCollisionRequest<S> request;
     request.ccd_motion_type = type_;
     fcl::ContinuousCollisionResult<S> result;
@@ -143,7 +151,9 @@ class Edge {
       const double near = kTouch * size + a.bounds.reach + b.bounds.reach;
       if (gap <= near) return true;
       if (time >= 1 || gap >= speed * (1 - time) + near) return false;
-      time = std::min(1.0, time + (gap - near / 2) / speed);
+      const double next = std::min(1.0, time + (gap - near / 2) / speed);
+      if (!(next > time)) return true;  // nearer than the way is rounded
+      time = next;
     }
   }
 

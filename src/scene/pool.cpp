@@ -6,12 +6,12 @@
 
 namespace bocst::scene {
 
-Pool::Pool(unsigned threads) {
+Pool::Pool(unsigned threads, std::size_t most) {
   if (threads == 0) threads = std::max(1u, std::thread::hardware_concurrency());
   try {
-    for (unsigned i = 1; i < threads; ++i) threads_.emplace_back([this] { wait(); });
-  } catch (const std::system_error&) {
-    // The system has no more.
+    for (std::size_t i = 1; i < std::min<std::size_t>(threads, most); ++i) threads_.emplace_back([this] { wait(); });
+  } catch (const std::exception&) {
+    // The system has no more, or no memory for them.
   }
 }
 

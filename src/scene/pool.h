@@ -19,9 +19,9 @@ namespace bocst::scene {
 /// after fork().
 class Pool {
  public:
-  /// `threads` work, the calling one included, or as many as there are to be had; 0: as many as the machine runs at
-  /// once.
-  explicit Pool(unsigned threads);
+  /// `threads` work, the calling one included, or as many as there are to be had, but no more than `most`; 0: as many
+  /// as the machine runs at once.
+  explicit Pool(unsigned threads, std::size_t most = 1024);
   ~Pool();
   Pool(const Pool&) = delete;
   Pool& operator=(const Pool&) = delete;

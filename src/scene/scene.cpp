@@ -71,7 +71,7 @@ struct Scene<S>::Impl {
       const std::shared_lock<thread::ShardedLock> lock(sharded_lock);
       if (world != nullptr) return world;
     }
-    const std::lock_guard<std::mutex> lock(mutex);
+    const std::lock_guard<thread::ForkAwareMutex> lock(mutex);
     if (world == nullptr) {
       std::vector<Object<S>> moving, fixed;
       for (const auto& [number, record] : objects) (record.moves ? moving : fixed).push_back(record.object);
@@ -103,7 +103,7 @@ struct Scene<S>::Impl {
     o.geometry = std::move(geometry);
     if (X_WG != nullptr) o.X_WG = *X_WG;
     describe(o);
-    const std::lock_guard<std::mutex> lock(mutex);
+    const std::lock_guard<thread::ForkAwareMutex> lock(mutex);
     const std::uint32_t number = next_number++;
     o.id = Id(scene_number, number);
     objects.emplace(number, std::move(record));
@@ -168,7 +168,7 @@ struct Scene<S>::Impl {
     return {w.moving[p.moving].id, w.object(p.group, p.lane).id};
   }
 
-  mutable std::mutex mutex;  // of changes
+  mutable thread::ForkAwareMutex mutex;  // of changes
   std::uint32_t next_number = 0;
   std::map<std::uint32_t, Record> objects;   // in the order of adding
   std::set<std::pair<Id, Id>> ignored;       // the smaller Id first
@@ -196,7 +196,7 @@ Id Scene<S>::addMoving(std::shared_ptr<Geometry> geometry) {
 
 template <typename S>
 void Scene<S>::remove(Id object) {
-  const std::lock_guard<std::mutex> lock(impl_->mutex);
+  const std::lock_guard<thread::ForkAwareMutex> lock(impl_->mutex);
   impl_->find("remove", object);
   impl_->objects.erase(object.number_);
   auto& ignored = impl_->ignored;
@@ -209,7 +209,7 @@ void Scene<S>::remove(Id object) {
 template <typename S>
 void Scene<S>::setPose(Id fixed, const Transform& X_WG) {
   scene::checkPose<S>("setPose", X_WG);
-  const std::lock_guard<std::mutex> lock(impl_->mutex);
+  const std::lock_guard<thread::ForkAwareMutex> lock(impl_->mutex);
   typename Impl::Record& record = impl_->find("setPose", fixed);
   if (record.moves) {
     throw std::invalid_argument("bocst::Scene::setPose: the object moves; its pose comes with each state");
@@ -220,7 +220,7 @@ void Scene<S>::setPose(Id fixed, const Transform& X_WG) {
 
 template <typename S>
 void Scene<S>::ignore(Id a, Id b, bool ignored) {
-  const std::lock_guard<std::mutex> lock(impl_->mutex);
+  const std::lock_guard<thread::ForkAwareMutex> lock(impl_->mutex);
   impl_->find("ignore", a);
   impl_->find("ignore", b);
   if (a == b) throw std::invalid_argument("bocst::Scene::ignore: an object makes no pair with itself");
@@ -234,7 +234,7 @@ void Scene<S>::ignore(Id a, Id b, bool ignored) {
 
 template <typename S>
 void Scene<S>::update(Id object) {
-  const std::lock_guard<std::mutex> lock(impl_->mutex);
+  const std::lock_guard<thread::ForkAwareMutex> lock(impl_->mutex);
   typename Impl::Record& record = impl_->find("update", object);
   Impl::describe(record.object);
   impl_->publish(nullptr);
@@ -297,7 +297,7 @@ std::size_t Scene<S>::movingCount() const {
 
 template <typename S>
 std::size_t Scene<S>::fixedCount() const {
-  const std::lock_guard<std::mutex> lock(impl_->mutex);
+  const std::lock_guard<thread::ForkAwareMutex> lock(impl_->mutex);
   return static_cast<std::size_t>(std::count_if(impl_->objects.begin(), impl_->objects.end(),
                                                 [](const auto& entry) { return !entry.second.moves; }));
 }
@@ -309,7 +309,7 @@ std::size_t Scene<S>::pairCount() const {
 
 template <typename S>
 std::size_t Scene<S>::movingIndex(Id moving) const {
-  const std::lock_guard<std::mutex> lock(impl_->mutex);
+  const std::lock_guard<thread::ForkAwareMutex> lock(impl_->mutex);
   if (!impl_->find("movingIndex", moving).moves) {
     throw std::invalid_argument("bocst::Scene::movingIndex: the object is fixed");
   }

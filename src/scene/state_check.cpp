@@ -133,8 +133,16 @@ bool StateCheck<S>::look(const fcl::Transform3<S>* X_WM, std::size_t count, std:
     const Object<S>&a = world_->moving[c.pair.moving], &b = world_->object(c.pair.group, c.pair.lane);
     const fcl::Transform3<S>&X_WA = X_WM[c.pair.moving], &X_WB = pose(X_WM, c.pair.group, c.pair.lane);
     if (entries != nullptr && a.exact && b.exact) {
-      double apart = far[c.pair.moving];
-      if (!world_->isFixed(c.pair.group)) apart += far[world_->movingIndex(c.pair.group, c.pair.lane)];
+      double apart = far[c.pair.moving], orthogonality_error = orthogonality_errors[c.pair.moving];
+      if (world_->isFixed(c.pair.group)) {
+        orthogonality_error += world_->fixed_error;
+      } else {
+        const std::size_t j = world_->movingIndex(c.pair.group, c.pair.lane);
+        apart += far[j];
+        orthogonality_error += orthogonality_errors[j];
+      }
+      // Of all states, as in reachOf().
+      apart += 16 * orthogonality_error * (a.bounds.size + b.bounds.size + apart);
       // A larger gap between hulls whose boxes overlap is seldom.
       if (apart < std::min(a.bounds.radius, b.bounds.radius) &&
           fcl_adapter::hullsApart(*a.model, X_WA, *b.model, X_WB, apart * (1 + 1e-4))) {

@@ -57,11 +57,10 @@ bool Sweep<S>::setFar(const World<S>& world, std::size_t states, const Part& par
   for (std::size_t i = 0; i < world.moving.size(); ++i) {
     const double* path = path_.data() + i * states;
     const double far = std::max(path[middle] - path[part.begin], path[part.end - 1] - path[middle]);
-    check_.far[i] = far;
-    // Differences of sums.
-    if (far > 0) check_.far[i] += 1e-15 * path[states - 1] * static_cast<double>(states);
+    // Differences of sums: after a long way even 0 is rounded.
+    check_.far[i] = far + 1e-15 * path[states - 1] * static_cast<double>(states);
     // NaN: the motion is too long for a double.
-    if (!(far <= kFarthest * world.moving[i].bounds.radius) && world.moving[i].bounds.kind == Bounds::kBox)
+    if (!(check_.far[i] <= kFarthest * world.moving[i].bounds.radius) && world.moving[i].bounds.kind == Bounds::kBox)
       near = false;
   }
   return near;

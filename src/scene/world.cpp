@@ -90,14 +90,17 @@ void checkPose(const char* query, const fcl::Transform3<S>& X) {
 // Boxes of rotations that are off by more are boxes along the axes of the world, so that all axes are at right angles.
 constexpr double kFineError = 1e-5;
 
+/// Smaller numbers than this lose digits as floats.
+constexpr double kLeastReach = 1e-30;
+
 // What may be called a contact farther than the boxes are apart: FCL computes relative poses in S (64 roundings of
 // everything that is added up); where rotations are off by `orthogonality_error`, lengths along them are, of either
-// object; and the box is in float, with axes that are off by as much (see nearLanes()).
+// object, and walks tolerate four times that share of the frames' distance and of both sizes twice over; and the box is
+// in float, with axes that are off by as much (see nearLanes()).
 template <typename S>
 double reachOf(const Bounds& b, double largest, double place, double displacement, double orthogonality_error) {
   return b.reach + 64 * static_cast<double>(std::numeric_limits<S>::epsilon()) * (place + b.size) +
-         (orthogonality_error > kFineError ? 4 : 128) * orthogonality_error * (largest + b.size) +
-         128 * 0x1p-24 * (displacement + b.radius);
+         128 * orthogonality_error * (largest + b.size) + 128 * 0x1p-24 * (displacement + b.radius) + kLeastReach;
 }
 
 template <typename S>
@@ -251,7 +254,11 @@ World<S>::World(std::vector<Object<S>> moving_objects, std::vector<Object<S>> fi
       if (kind != Bounds::kNowhere && (kind == Bounds::kEverywhere) == everywhere) order.push_back(i);
     }
   }
-  for (const Object<S>& o : fixed_objects) boxes.push_back(boxAt(o, o.X_WG, orthogonalityErrorOf<S>(o.X_WG)));
+  for (const Object<S>& o : fixed_objects) {
+    const double orthogonality_error = orthogonalityErrorOf<S>(o.X_WG);
+    fixed_error = std::max(fixed_error, orthogonality_error);
+    boxes.push_back(boxAt(o, o.X_WG, orthogonality_error));
+  }
   const auto unbounded =
       static_cast<std::size_t>(std::count_if(fixed_objects.begin(), fixed_objects.end(),
                                              [](const Object<S>& o) { return o.bounds.kind == Bounds::kEverywhere; }));

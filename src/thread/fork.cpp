@@ -31,9 +31,8 @@ namespace {
 
 void throwForked() {
   throw std::runtime_error(
-      "bocst: another thread was at work in this model when the process was forked, so the child cannot make this "
-      "call; "
-      "create a new model in the child");
+      "bocst: another thread was at work in this model or scene when the process was forked, so the child cannot make "
+      "this call; create a new one in the child");
 }
 
 bool ForkAwareMutex::adopt() {

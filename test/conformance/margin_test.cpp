@@ -497,6 +497,56 @@ TEST(MarginDouble, SignedDistancesAreThoseOfTheSurfaces) {
   }
 }
 
+// As near as distance() says, also where FCL's tolerance is larger than the geometries, or squares overflow.
+TEST(IsCloserThan, IsThatOfDistancesAtAnySize) {
+  const auto I = fcl::Transform3d(fcl::Transform3d::Identity());
+  std::mt19937_64 g(12);
+  for (const double s : {1e-9, 1e-6, 1e-5, 1.0, 1e6}) {
+    const Modeld model(test::box(Eigen::Vector3d(-3, -3, 0) * s, Eigen::Vector3d(3, 4, 0) * s).mesh());
+    const fcl::Cylinderd cylinder(s, s);
+    const fcl::Boxd box(s, 2 * s, s);
+    const fcl::Sphered ball(s);
+    const fcl::Coned cone(s, s);
+    const fcl::Capsuled capsule(s, s);
+    for (const fcl::CollisionGeometryd* shape :
+         std::initializer_list<const fcl::CollisionGeometryd*>{&cylinder, &box, &ball, &cone, &capsule}) {
+      for (int i = 0; i < 20; ++i) {
+        auto X = test::pose<double>(test::randomRotation(g), Eigen::Vector3d(0, 0, 3 + i) * s);
+        fcl::DistanceResultd result;
+        const double d = bocst::distance<double>(&model, I, shape, X, fcl::DistanceRequestd(), result);
+        ASSERT_GT(d, 0);
+        ASSERT_TRUE(isCloserThan<double>(&model, I, shape, X, d * (1 + 1e-6))) << s;
+        ASSERT_FALSE(isCloserThan<double>(&model, I, shape, X, d * (1 - 1e-6))) << s;
+        ASSERT_FALSE(isCloserThan<double>(shape, X, &model, I, 0.0)) << s;
+      }
+    }
+  }
+  Options conservative;
+  conservative.answer = Answer::kConservative;
+  const Modeld exact(test::torus(9).mesh()), spheres(test::torus(9).mesh(), conservative);
+  const fcl::Sphered ball(1);
+  for (const double far : {1e60, 1e90, 1e155, 1e160, 1e300}) {
+    const auto X = test::pose<double>(Eigen::Matrix3d::Identity(), {far, 0, 0});
+    for (const fcl::CollisionGeometryd* a : {&exact, &spheres}) {
+      for (const fcl::CollisionGeometryd* b :
+           std::initializer_list<const fcl::CollisionGeometryd*>{&ball, &exact, &spheres}) {
+        EXPECT_FALSE(isCloserThan<double>(a, X, b, I, far / 2)) << far;
+        EXPECT_TRUE(isCloserThan<double>(b, I, a, X, far * 2)) << far;
+      }
+    }
+  }
+}
+
+TEST(IsCloserThan, NothingIsNearAnEmptyModel) {
+  const auto I = fcl::Transform3d(fcl::Transform3d::Identity());
+  const Modeld empty, model(test::torus(9).mesh());
+  const fcl::Sphered ball(1);
+  for (const double d : {0.0, 1.0, 1e100}) {
+    EXPECT_FALSE(isCloserThan<double>(&empty, I, &model, I, d));
+    EXPECT_FALSE(isCloserThan<double>(&ball, I, &empty, I, d));
+  }
+}
+
 TEST(IsCloserThan, RefusesWhatIsNoDistance) {
   const Modeld a(test::torus(9).mesh());
   const auto I = fcl::Transform3d(fcl::Transform3d::Identity());

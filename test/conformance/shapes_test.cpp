@@ -598,6 +598,30 @@ TEST(ShapesDouble, RotationsThatAreNotQuiteOrthogonal) {
   }
 }
 
+TEST(ShapesDouble, NormalsOfContactsAreUnitVectors) {
+  const Modeld model(test::torus(20).mesh()), other(test::box({-1, -1, -1}, {1, 1, 1}).mesh());
+  const fcl::Sphered ball(1);
+  const fcl::Boxd box(1, 2, 3);
+  fcl::Transform3d X = fcl::Transform3d::Identity();
+  X.linear() *= 1 + 4.9e-4;
+  fcl::CollisionRequestd request(1000, true);
+  std::size_t contacts = 0;
+  for (const fcl::CollisionGeometryd* partner :
+       std::initializer_list<const fcl::CollisionGeometryd*>{&ball, &box, &other}) {
+    for (const bool turned : {false, true}) {
+      fcl::CollisionResultd result;
+      const auto Y = test::pose<double>(Eigen::Matrix3d::Identity(), {0.9, 0.1, 0.2});
+      turned ? fcl::collide(partner, Y, &model, X, request, result)
+             : fcl::collide(&model, X, partner, Y, request, result);
+      for (std::size_t i = 0; i < result.numContacts(); ++i) {
+        ASSERT_NEAR(result.getContact(i).normal.norm(), 1, 1e-12);
+      }
+      contacts += result.numContacts();
+    }
+  }
+  EXPECT_GT(contacts, 100u);
+}
+
 // Plane and Halfspace have open members, so their normals need not be unit vectors.
 TEST(ShapesDouble, NormalsOfAnyLength) {
   const fcl::Transform3d I = fcl::Transform3d::Identity();

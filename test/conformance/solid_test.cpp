@@ -635,5 +635,21 @@ TEST(SolidModel, OfManyTrianglesAndOfLargeOnes) {
   }
 }
 
+// A rotation that is off widens what surfaces tolerate, but not what is inside.
+TEST(Solid, RotationsThatAreOffPutNothingInside) {
+  Options solid;
+  solid.solid = true;
+  const Eigen::Vector3d c(1000, 0, 0);
+  const Modeld model(test::box(c - Eigen::Vector3d::Ones(), c + Eigen::Vector3d::Ones()).mesh(), solid);
+  const fcl::Sphered ball(1);
+  auto X = test::pose<double>((1 + 4.9e-4) * Eigen::Matrix3d::Identity(), -(1 + 4.9e-4) * c);
+  for (const double y : {7.0, 22.0, 24.0, 26.0, 40.0}) {
+    const auto Y = test::pose<double>(Eigen::Matrix3d::Identity(), {0, y, 0});
+    EXPECT_FALSE(test::touching<double>(model, X, ball, Y)) << y;
+    fcl::DistanceResultd result;
+    EXPECT_NEAR(fcl::distance(&model, X, &ball, Y, fcl::DistanceRequestd(), result), y - 2, 0.02) << y;
+  }
+}
+
 }  // namespace
 }  // namespace bocst

@@ -1,6 +1,8 @@
 # SPDX-License-Identifier: BSD-3-Clause
 """python-fcl's names: what its documents show gives the same answers here, known in closed form or from FCL's own tree."""
 import gc
+import pickle
+import threading
 
 import bocst
 import bocst.fcl as fcl
@@ -528,3 +530,133 @@ def test_as_trimesh_uses_it():
     assert not scene.other(other) and scene.nearest_other(other) == pytest.approx(4 - 0.5 - torus()[0][:, 1].max(), abs=0.05)
     other.move("cube", shift(-0.9))
     assert scene.other(other)
+
+
+def test_octree_files_with_other_headers():
+    header = b'# Octomap OcTree binary file\n# (a comment)\n#\nid OcTree\nsize 1\nres 0.1\ndata\n'
+    tree = fcl.OcTree(0.1, data=header + b'\x00\x00')
+    assert tree.getNodeType() == fcl.NODE_TYPE.GEOM_OCTREE
+    for bad in (header[:-5] + b'\x00\x00',  # no data
+                header.replace(b'id OcTree', b'id ColorOcTree') + b'\x00\x00',
+                header.replace(b'res 0.1\n', b'') + b'\x00\x00',
+                header.replace(b'res 0.1', b'res 0.2') + b'\x00\x00',
+                header.replace(b'res 0.1\ndata\n', b'res 0.1 data\n') + b'\xff\xff' * 200000 + b'\ndata\n\x00\x00',
+                header + b'\xff\xff' * 200000):
+        with pytest.raises(ValueError):
+            fcl.OcTree(0.1, data=bad)
+
+
+def test_octrees_change_while_other_queries_run():
+    rng = np.random.default_rng(1)
+    c = rng.uniform(-1, 1, (500, 1, 3))
+    soup = bocst.Model(bocst.Mesh((c + rng.uniform(-.05, .05, (500, 3, 3))).reshape(-1, 3),
+                                  np.arange(1500).reshape(500, 3)))
+    tree = fcl.OcTree(0.1, points=np.zeros((1, 3)))
+    stop = threading.Event()
+
+    def ask():
+        while not stop.is_set():
+            fcl.collide(at(soup), at(tree))
+    threads = [threading.Thread(target=ask) for _ in range(4)]
+    for t in threads:
+        t.start()
+    for k in range(20):
+        tree.insertPointCloud(np.full((1, 3), 0.01 * k))
+    stop.set()
+    for t in threads:
+        t.join()
+
+
+def test_managers_hold_what_a_sequence_makes():
+    class Lazy:
+        def __len__(self):
+            return 30
+
+        def __getitem__(self, i):
+            if i >= 30:
+                raise IndexError
+            return fcl.CollisionObject(fcl.Box(1, 1, 1))
+
+    manager = fcl.DynamicAABBTreeCollisionManager()
+    manager.registerObjects(Lazy())
+    junk = [bytearray(b'\xff' * n) for n in range(150, 500) for _ in range(10)]
+    manager.setup()
+    hits = []
+    manager.collide(None, lambda a, b, d: hits.append(fcl.collide(a, b)))
+    assert hits == [1] * (30 * 29 // 2) and len(junk) == 3500
+    assert {type(o.collisionGeometry()) for o in manager.getObjects()} == {fcl.Box}
+
+    class Odd(fcl.CollisionObject):
+        asked = 0
+
+        def __hash__(self):
+            Odd.asked += 1
+            if Odd.asked % 2 == 0:
+                raise ValueError('hash')
+            return id(self)
+
+    manager = fcl.DynamicAABBTreeCollisionManager()
+    for _ in range(10):
+        with pytest.raises(ValueError):
+            manager.registerObject(Odd(fcl.Box(1, 1, 1)))
+    manager.setup()
+    manager.collide(None, lambda a, b, d: hits.clear())
+    assert len(hits) == 30 * 29 // 2 and manager.size() == 0
+
+
+def test_nothing_is_pickled():
+    for thing in (fcl.Sphere(1), fcl.Transform(), fcl.CollisionRequest(), bocst.Scene(), bocst.Mesh(*box())):
+        for protocol in range(pickle.HIGHEST_PROTOCOL + 1):
+            with pytest.raises(TypeError, match='cannot pickle'):
+                pickle.dumps(thing, protocol)
+        with pytest.raises(TypeError):
+            thing.__reduce__()
+    assert pickle.loads(pickle.dumps(fcl.NODE_TYPE.GEOM_BOX)) == fcl.NODE_TYPE.GEOM_BOX
+
+
+def test_builders_of_two_threads():
+    v = np.random.default_rng(0).uniform(-1, 1, (30000, 3))
+    f = np.arange(30000).reshape(-1, 3)
+    model = fcl.BVHModel()
+    stop = threading.Event()
+
+    def add():
+        while not stop.is_set():
+            try:
+                model.addVertex(1, 2, 3)
+            except ValueError:
+                pass
+    thread = threading.Thread(target=add)
+    thread.start()
+    for _ in range(30):
+        model.beginModel()
+        try:
+            model.addSubModel(v, f)
+            model.endModel()
+        except ValueError:
+            pass
+    stop.set()
+    thread.join()
+
+
+def test_what_fcl_would_end_the_process_with():
+    advance = fcl.CCDSolverType.CCDC_CONSERVATIVE_ADVANCEMENT
+    a, end = at(fcl.Box(1, 1, 1), 0.2, 0.1, 2.0), fcl.Transform(np.array([0, 0, -2.0]))
+    up = np.array([0, 0, 1.0])
+    for partner, request in ((fcl.Halfspace(up, 0), fcl.ContinuousCollisionRequest(ccd_solver_type=advance)),
+                             (fcl.Plane(up, 0), fcl.ContinuousCollisionRequest(ccd_solver_type=advance)),
+                             (fcl.Box(1, 1, 1), fcl.ContinuousCollisionRequest(
+                                 ccd_motion_type=fcl.CCDMotionType.CCDM_SPLINE))):
+        with pytest.raises(ValueError, match='bocst.Model'):
+            fcl.continuousCollide(a, end, at(partner), fcl.Transform(), request)
+    v, f = box()
+    convex = fcl.Convex(v, len(f), np.concatenate([[3, *t] for t in f]))
+    with pytest.raises(ValueError, match='Convex'):
+        fcl.collide(at(convex), at(fcl.Plane(up, 0)))
+
+
+def test_points_that_were_not_asked_for():
+    result = fcl.DistanceResult()
+    fcl.distance(at(fcl.Sphere(1)), at(fcl.Sphere(1), 3, 0, 0), fcl.DistanceRequest(), result)
+    before = fcl.DistanceResult().nearest_points
+    assert result.nearest_points == before

@@ -154,6 +154,16 @@ TYPED_TEST(CollidePoses, HasThemForPosesThatAreNotQuiteRigid) {
   EXPECT_LT(count(expected), 5000u);
 }
 
+TEST(CollidePosesModels, NothingTouchesAnEmptyOne) {
+  const Modeld empty, model(test::torus(9).mesh());
+  const std::vector<fcl::Transform3d> X(100, fcl::Transform3d::Identity());
+  std::vector<std::uint8_t> hit(100, 7);
+  collidePoses<double>(model, empty, X.data(), X.size(), hit.data(), 3);
+  EXPECT_EQ(hit, std::vector<std::uint8_t>(100, 0));
+  collidePoses<double>(model, model, X.data(), X.size(), hit.data(), 4000000000u);
+  EXPECT_EQ(hit, std::vector<std::uint8_t>(100, 1));
+}
+
 TEST(CollidePosesConservative, HasThemWhereSpheresOfPointsBarelyTouch) {
   Raw raw;
   raw.vertices = {{1, 0, 0}, {1, 0, 0}, {1, 0, 0}};

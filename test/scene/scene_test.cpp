@@ -592,6 +592,104 @@ TYPED_TEST(SceneTest, RotationsThatAreNotQuiteOrthogonal) {
   }
 }
 
+// A way so long that the rest of the row is below its rounding says nothing about the rest.
+TYPED_TEST(SceneTest, AFarStateBesideATouchHidesNone) {
+  using S = TypeParam;
+  World<S> w;
+  w.fix(std::make_shared<Model<S>>(test::box({-1, -1, -1}, {1, 1, 1}).mesh()), fcl::Transform3<S>::Identity());
+  w.move(std::make_shared<Model<S>>(test::box({-1, -1, -1}, {1, 1, 1}).mesh()));
+  const auto at = [](double x) { return test::pose<S>(Eigen::Matrix3d::Identity(), {x, 0, 0}); };
+  std::mt19937_64 g(7);
+  std::uniform_real_distribution<double> exponent(0, 20);
+  std::size_t hits = 0;
+  for (int i = 0; i < 400; ++i) {
+    const double far = std::pow(10.0, exponent(g)), d = std::pow(10.0, -exponent(g) / 6);
+    States<S> X = {at(9), at(9), at(far), at(2 - d / 2), at(2 + d / 2)};
+    if (i % 2 != 0) std::shuffle(X.begin(), X.end(), g);
+    checkVerdicts(w, X, X.size(), hits);
+  }
+  EXPECT_GT(hits, 300u);
+}
+
+// FCL's relative poses take the transpose for the inverse, so off its frame's origin a geometry moves by the error of
+// the rotation times their distance; and walks widen conservative answers by more.
+TYPED_TEST(SceneTest, RotationsThatAreOffFarFromTheOrigin) {
+  using S = TypeParam;
+  const Eigen::Vector3d c(1000, 0, 0);
+  const Raw far = test::box(c - Eigen::Vector3d::Ones(), c + Eigen::Vector3d::Ones()),
+            near = test::box({-1, -1, -1}, {1, 1, 1});
+  Options conservative;
+  conservative.answer = Answer::kConservative;
+  conservative.depth = 9;
+  std::size_t hits = 0;
+  for (const Options& options : {Options(), conservative}) {
+    World<S> w;
+    w.fix(std::make_shared<Model<S>>(near.mesh()), fcl::Transform3<S>::Identity());
+    w.move(std::make_shared<Model<S>>(far.mesh(), options));
+    std::mt19937_64 g(8);
+    std::uniform_real_distribution<double> u(-12, 12);
+    for (int i = 0; i < 100; ++i) {
+      States<S> X;
+      for (int k = 0; k < 5; ++k) {
+        const double stretch = 1 + (k == i % 5 || i % 3 == 0 ? 4.9e-4 : 0);
+        X.push_back(test::pose<S>(stretch * Eigen::Matrix3d::Identity(),
+                                  -stretch * c + Eigen::Vector3d(u(g), u(g) / 8, u(g) / 8)));
+      }
+      checkVerdicts(w, X, X.size(), hits);
+    }
+  }
+  EXPECT_GT(hits, 200u);
+}
+
+// Sizes at which floats have few digits left.
+TEST(SceneDouble, TinySizes) {
+  for (const double s : {2e-45, 1.2e-44, 3e-43, 1e-38, 1e-30}) {
+    const Eigen::Vector3d half = Eigen::Vector3d::Constant(s);
+    const auto cube = std::make_shared<Modeld>(test::box(-half, half).mesh());
+    World<double> w;
+    w.fix(cube, fcl::Transform3d::Identity());
+    w.move(cube);
+    std::size_t hits = 0;
+    States<double> X;
+    for (int k = 0; k < 100; ++k)
+      X.push_back(test::pose<double>(Eigen::Matrix3d::Identity(), {s * 0.04 * k + s * 1e-3, 0, 0}));
+    checkVerdicts(w, X, X.size(), hits);
+    EXPECT_EQ(hits, 50u) << s;
+    EXPECT_NEAR(w.scene.clearance(&X[75]) / s, 1.001, 1e-9) << s;
+  }
+}
+
+TYPED_TEST(SceneTest, AModelThatWasEmptied) {
+  using S = TypeParam;
+  const auto model = std::make_shared<Model<S>>(test::box({-1, -1, -1}, {1, 1, 1}).mesh());
+  Scene<S> scene;
+  scene.addFixed(model, fcl::Transform3<S>::Identity());
+  const Id id = scene.addMoving(std::make_shared<fcl::Sphere<S>>(S(1)));
+  const States<S> X(1, fcl::Transform3<S>::Identity());
+  EXPECT_TRUE(scene.collides(X.data()));
+  model->beginModel();
+  model->endModel();
+  EXPECT_FALSE(scene.collides(X.data()));
+  EXPECT_TRUE(scene.edgeIsFree(X.data(), X.data()));
+  EXPECT_EQ(scene.clearance(X.data()), std::numeric_limits<S>::max());
+  scene.remove(id);
+}
+
+// Steps of conservative advancement end where they are below the rounding of time.
+TEST(SceneDouble, LongEdgesBetweenShapes) {
+  Scened scene;
+  scene.addFixed(std::make_shared<fcl::Sphered>(1), fcl::Transform3d(fcl::Transform3d::Identity()));
+  scene.addMoving(std::make_shared<fcl::Sphered>(1));
+  const auto isFree = [&](double far, double off) {
+    const auto X = test::pose<double>(Eigen::Matrix3d::Identity(), {-far, off, 0}),
+               Y = test::pose<double>(Eigen::Matrix3d::Identity(), {1.3 * far, off, 0});
+    return scene.edgeIsFree(&X, &Y);
+  };
+  for (const double far : {10.0, 1e6, 1e13, 1e17}) EXPECT_FALSE(isFree(far, 1.5)) << far;
+  for (const double far : {10.0, 1e6}) EXPECT_TRUE(isFree(far, 2.01)) << far;
+  for (const double far : {1e13, 1e15, 1e18}) isFree(far, 2.0001);  // ends
+}
+
 template <typename F>
 std::string complaintOf(F&& f) {
   try {
@@ -709,6 +807,25 @@ TYPED_TEST(SceneTest, WarmQueriesAllocateNothing) {
   EXPECT_EQ(allocations, before);
 }
 
+// FCL would call a support function that a plane does not have.
+TYPED_TEST(SceneTest, RefusesPlanesBesideConvexes) {
+  using S = TypeParam;
+  const auto plane = std::make_shared<fcl::Plane<S>>(fcl::Vector3<S>::UnitZ(), S(0));
+  const auto corners = std::make_shared<const std::vector<fcl::Vector3<S>>>(
+      std::vector<fcl::Vector3<S>>{{0, 0, 0}, {1, 0, 0}, {0, 1, 0}, {0, 0, 1}});
+  const auto faces =
+      std::make_shared<const std::vector<int>>(std::vector<int>{3, 0, 2, 1, 3, 0, 1, 3, 3, 1, 2, 3, 3, 2, 0, 3});
+  const auto convex = std::make_shared<fcl::Convex<S>>(corners, 4, faces);
+  const States<S> X(1, fcl::Transform3<S>::Identity());
+  for (const bool turned : {false, true}) {
+    Scene<S> scene;
+    scene.addFixed(turned ? Geometry<S>(convex) : Geometry<S>(plane), X[0]);
+    scene.addMoving(turned ? Geometry<S>(plane) : Geometry<S>(convex));
+    EXPECT_NE(complaintOf([&] { scene.collides(X.data()); }).find("Convex"), std::string::npos);
+    EXPECT_THROW(scene.edgeIsFree(X.data(), X.data()), std::invalid_argument);
+  }
+}
+
 // What the tests run under ThreadSanitizer looks at: queries from several threads beside changes.
 /// Runs f in a child, which has a minute.
 template <typename F>
@@ -752,6 +869,32 @@ TEST(SceneThreads, AChildWorksAlone) {
     return BallAndCube(2).isRight();
   });
   EXPECT_TRUE(scene->isRight());
+}
+
+// A child that was forked during a change of another thread is told so, or works.
+TEST(SceneThreads, ForksBesideChanges) {
+  if (test::kSanitized) return;  // Their allocator may be locked at the fork.
+  Scened scene;
+  const auto ball = std::make_shared<fcl::Sphered>(1);
+  const fcl::Transform3d X = fcl::Transform3d::Identity();
+  const Id id = scene.addFixed(ball, X);
+  scene.addMoving(ball);
+  std::atomic<bool> stop{false};
+  std::thread other([&] {
+    while (!stop) scene.setPose(id, X);
+  });
+  for (int i = 0; i < 40; ++i) {
+    usleep(500);
+    expectInChild([&] {
+      try {
+        return scene.collides(&X);
+      } catch (const std::runtime_error&) {
+        return true;
+      }
+    });
+  }
+  stop = true;
+  other.join();
 }
 
 // Where the system has not so many threads, the scene works with those that there are.

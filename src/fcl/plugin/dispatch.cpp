@@ -155,6 +155,17 @@ bool isModel(const fcl::CollisionGeometry<S>* geometry) {
 
 namespace {
 
+/// FCL's table has a general test for this pair, which calls a support function that a plane does not have.
+template <typename S>
+void refusePlaneAndConvex(const fcl::CollisionGeometry<S>* o1, const fcl::CollisionGeometry<S>* o2) {
+  const fcl::NODE_TYPE type1 = o1->getNodeType(), type2 = o2->getNodeType();
+  if ((type1 == fcl::GEOM_PLANE && type2 == fcl::GEOM_CONVEX) ||
+      (type1 == fcl::GEOM_CONVEX && type2 == fcl::GEOM_PLANE)) {
+    throw std::invalid_argument("bocst::collide: FCL knows no collision of " + fcl_adapter::typeName<S>(o1) + " and " +
+                                fcl_adapter::typeName<S>(o2) + "; make the Convex a bocst::Model");
+  }
+}
+
 /// The collision query where a Model may be among the two; where there is none, what `foreign` says.
 template <typename S, typename Foreign>
 std::size_t collideOr(const Foreign& foreign, const fcl::CollisionGeometry<S>* o1, const fcl::Transform3<S>& X_W1,
@@ -163,6 +174,7 @@ std::size_t collideOr(const Foreign& foreign, const fcl::CollisionGeometry<S>* o
                       fcl::CollisionResult<S>& result) {
   switch (fcl_adapter::kindOf<S>(o1, o2)) {
     case fcl_adapter::PairKind::kForeign:
+      refusePlaneAndConvex<S>(o1, o2);
       return foreign();
     case fcl_adapter::PairKind::kNothing:
       return result.numContacts();

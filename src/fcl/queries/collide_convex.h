@@ -48,7 +48,7 @@ class ConvexCollector final : public query::ConvexVisitor<typename Partner::Node
         narrow_phase_(narrow_phase),
         X_WM_(q.X_WA()),
         X_WB_(q.X_WB().template cast<double>()),
-        tolerance_(frame.rounding() + narrow_phase.tolerance()),
+        tolerance_(frame.rounding() + (q.is_distance ? 0 : narrow_phase.tolerance())),
         costs_(costs),
         ends_at_first_(q.endsAtFirst()),
         is_cut_(!ends_at_first_ && !costs && q.contactsLeft() > 0 && q.contactsLeft() <= FirstFound::kMost),
@@ -168,6 +168,7 @@ class ConvexCollector final : public query::ConvexVisitor<typename Partner::Node
     gap = partner_.gap(b, {corners, 3}, near);
     if (gap.atLeast > near) return false;
     if (gap.isTouching() || gap.atLeast <= q_.margin) return true;
+    if (q_.is_distance) return false;
     const auto& i = surface_.mesh->indices(t);
     fcl::Vector3<S> c[3];
     for (std::size_t k = 0; k < 3; ++k) c[k] = surface_.mesh->vertex(i[k]).template cast<S>();
@@ -293,7 +294,7 @@ void collideConvex(const CollideQuery<S>& q, tree::Tree& tree, const NarrowPhase
   const bool approximate = q.request.enable_cost && q.request.use_approximate_cost;
   fcl::CollisionRequest<S> request(q.request);
   request.enable_cost = q.request.enable_cost && !approximate;
-  const CollideQuery<S> first{q, request, q.result, q.margin};
+  const CollideQuery<S> first{q, request, q.result, q.margin, q.is_distance};
   const std::size_t before = q.result.numContacts();
   const QueryScope scope(tree);
   const query::TreeSide& a = scope.a();

@@ -623,8 +623,9 @@ std::size_t collidePair(const fcl::CollisionGeometry<S>* o1, const fcl::Transfor
   const double m = margin ? *margin : marginOf(models.first, models.second);
   // Most of a planner's pairs end here.
   if (are_rigid && models.areTwo() && areFarApart(models, X_W1, X_W2, m)) return result.numContacts();
-  return answer(CollideQuery<S>{{o1, X_W1, o2, X_W2, turnsRound(models, X_W1, X_W2)}, request, result, m}, models,
-                solver);
+  return answer(
+      CollideQuery<S>{{o1, X_W1, o2, X_W2, turnsRound(models, X_W1, X_W2)}, request, result, m, margin.has_value()},
+      models, solver);
 }
 
 template <typename S>

@@ -19,7 +19,8 @@ template <typename S>
 struct CollideQuery : OrderedPair<S> {
   const fcl::CollisionRequest<S>& request;
   fcl::CollisionResult<S>& result;
-  double margin;  ///< Surfaces no farther apart than this touch.
+  double margin;             ///< Surfaces no farther apart than this touch.
+  bool is_distance = false;  ///< Only the margin counts, and not the tolerance of FCL's solvers.
 
   /// Only between occupied geometries are there contacts.
   bool occupied() const { return this->o1->isOccupied() && this->o2->isOccupied(); }
@@ -53,7 +54,8 @@ struct CollideQuery : OrderedPair<S> {
       c.b1 = b1;
       c.b2 = b2;
       if (request.enable_contact && contact != nullptr) {
-        c.normal = contact->normal.template cast<S>();
+        // Rotations may stretch it.
+        c.normal = contact->normal.normalized().template cast<S>();
         c.pos = contact->point.template cast<S>();
         c.penetration_depth = static_cast<S>(contact->depth);
       } else {

@@ -33,6 +33,7 @@ class ConvexFrame {
     rounding_ = roundingOf<S>(X_WM.translation().template cast<double>().norm() +
                               X_WB.translation().template cast<double>().norm() + region_.center.norm() +
                               2 * magnitudeOf(bounds));
+    rounding_of_positions_ = rounding_;
     // Nor is a body in the world what it is in its frame; FCL takes some of its sizes from the one, some from the
     // other.
     rounding_ += 4 * (orthogonalityError(R_WM) + orthogonalityError(R_WB)) * (p_BM_.norm() + 2 * magnitudeOf(bounds));
@@ -49,6 +50,9 @@ class ConvexFrame {
 
   /// What rounding in S, and rotations that are off, may do to positions.
   double rounding() const { return rounding_; }
+
+  /// What rounding in S alone may do to them.
+  double roundingOfPositions() const { return rounding_of_positions_; }
 
   /// From the frame of the bodies to the lattice of the model; touching within `tolerance` (model units) counts.
   query::SimilarityTransform toLattice(const lattice::Lattice& lattice, double tolerance) const {
@@ -71,7 +75,7 @@ class ConvexFrame {
   Eigen::Matrix3d R_BM_, R_MB_;
   Eigen::Vector3d p_BM_;
   query::Sphere region_;
-  double rounding_;
+  double rounding_, rounding_of_positions_;
 };
 
 }  // namespace bocst::fcl_adapter

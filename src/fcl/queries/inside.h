@@ -65,9 +65,10 @@ template <typename S, typename Partner>
 bool contains(const query::TreeSide& a, const ConvexFrame<S>& frame, const Partner& partner) {
   const Solid* solid = a.tree().solid();
   if (solid == nullptr) return false;
-  const query::SimilarityTransform b_in_a = frame.toLattice(a.tree().surface().lattice, frame.rounding());
+  const double rounding = frame.roundingOfPositions();
+  const query::SimilarityTransform b_in_a = frame.toLattice(a.tree().surface().lattice, rounding);
   return query::ComponentPoints<query::TreeSide, Partner>(a, partner, b_in_a).any([&](const Eigen::Vector3d& p) {
-    return solid->mayContain(frame.toModel(p), frame.rounding());
+    return solid->mayContain(frame.toModel(p), rounding);
   });
 }
 
