@@ -25,6 +25,8 @@ expect() {
 
 pair=("$models/link.obj" "$models/gripper.obj")
 mesa=(LIBGL_ALWAYS_SOFTWARE=1)
+# Without anything but what a sanitizer must leave out.
+bare=("${mesa[@]}" ${LSAN_OPTIONS:+"LSAN_OPTIONS=$LSAN_OPTIONS"})
 no_driver=(__EGL_VENDOR_LIBRARY_FILENAMES=/nonexistent.json)
 
 expect '^compute +no +yes' 0 "${mesa[@]}" "$bocst" oracles
@@ -65,7 +67,7 @@ expect_picture '^level' 0 "${mesa[@]}" BOCST_ORACLE=0 "$bocst" "${inspect[@]}"
 expect_picture '^level' 0 "${mesa[@]}" BOCST_ORACLE=99 "$bocst" "${inspect[@]}" --oracle cpu
 expect_picture '^level' 0 "${old[@]}" "$bocst" "${inspect[@]}"
 expect_picture '^level' 0 "${mesa[@]}" GALLIUM_DRIVER=softpipe "$bocst" "${inspect[@]}"
-expect_picture '^level' 0 -i "${mesa[@]}" "$bocst" "${inspect[@]}"
+expect_picture '^level' 0 -i "${bare[@]}" "$bocst" "${inspect[@]}"
 expect_no_picture '^bocst: no picture can be drawn: .*OpenGL 3\.3' 1 "${mesa[@]}" MESA_GL_VERSION_OVERRIDE=3.1 "$bocst" "${inspect[@]}"
 
 expect '^auto takes cpu' 0 "${no_driver[@]}" "$bocst" oracles
@@ -82,9 +84,9 @@ done
 expect '^bocst: oracle compute: ' 1 "${no_driver[@]}" "$bocst" paper "$models/gripper.obj" --oracle compute --out "$report"
 
 # No HOME, no DISPLAY, nothing; and as somebody who owns nothing.
-expect 'They collide' 0 -i "${mesa[@]}" "$bocst" collide "${pair[@]}" --oracle compute
+expect 'They collide' 0 -i "${bare[@]}" "$bocst" collide "${pair[@]}" --oracle compute
 if [[ $EUID -eq 0 ]]; then
-  expect 'They collide' 0 -i "${mesa[@]}" setpriv --reuid=65534 --regid=65534 --clear-groups "$bocst" collide "${pair[@]}" \
+  expect 'They collide' 0 -i "${bare[@]}" setpriv --reuid=65534 --regid=65534 --clear-groups "$bocst" collide "${pair[@]}" \
     --oracle compute
 fi
 
