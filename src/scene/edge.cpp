@@ -70,6 +70,7 @@ class Edge {
       }
       const Eigen::Vector3d origin = motions_[i]->at(0).translation();
       place += 2 * motions_[i]->fastest(origin, 0, 0);
+      places_.push_back(place);
       // Poses on the way are rounded to S, which moves points by less than what is allowed for poses of such places.
       orthogonality_error = 2 * orthogonality_error + 8 * static_cast<double>(std::numeric_limits<S>::epsilon());
       check.reach[i] = 2 * world.reachWithin(o, place, orthogonality_error);
@@ -142,13 +143,17 @@ class Edge {
     for (const Object<S>* o : {&a, &b}) {
       if (o->bounds.kind == Bounds::kBox) size += o->bounds.radius;
     }
+    // Poses on the way, and FCL's distances, are rounded to S.
+    const double place =
+        places_[p.moving] + (fixed ? static_cast<double>(b.X_WG.translation().template lpNorm<1>()) : places_[j]);
+    const double rounding = 64 * static_cast<double>(std::numeric_limits<S>::epsilon()) * place;
+    const double near = kTouch * size + a.bounds.reach + b.bounds.reach + rounding;
     for (double time = 0;;) {
       const fcl::Transform3<S> X_WA = poseAt<S>(*motions_[p.moving], time);
       const fcl::Transform3<S> X_WB = fixed ? b.X_WG : poseAt<S>(*motions_[j], time);
       if (touch(a, X_WA, b, X_WB, result_)) return true;
       if (!a.geometry->isOccupied() || !b.geometry->isOccupied()) return false;
       const double gap = static_cast<double>(distanceBelow<S>(a, X_WA, b, X_WB, std::numeric_limits<S>::max()));
-      const double near = kTouch * size + a.bounds.reach + b.bounds.reach;
       if (gap <= near) return true;
       if (time >= 1 || gap >= speed * (1 - time) + near) return false;
       const double next = std::min(1.0, time + (gap - near / 2) / speed);
@@ -163,6 +168,7 @@ class Edge {
   const fcl::CCDMotionType type_;
   std::vector<std::unique_ptr<Motion>> motions_;
   std::vector<double> speeds_;
+  std::vector<double> places_;  // none on the way has coordinates that add up to more
   std::vector<fcl::Transform3<S>> poses_;
   std::vector<PairAt> left_;
   fcl::CollisionResult<S> result_;

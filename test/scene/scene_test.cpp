@@ -688,6 +688,18 @@ TEST(SceneDouble, LongEdgesBetweenShapes) {
   for (const double far : {10.0, 1e6, 1e13, 1e17}) EXPECT_FALSE(isFree(far, 1.5)) << far;
   for (const double far : {10.0, 1e6}) EXPECT_TRUE(isFree(far, 2.01)) << far;
   for (const double far : {1e13, 1e15, 1e18}) isFree(far, 2.0001);  // ends
+  // A last state that touches is seen however far it is from the first one.
+  std::mt19937_64 g(9);
+  std::uniform_real_distribution<double> u(0, 1);
+  for (const double far : {1e3, 1e12, 1e13, 1e15, 1e17}) {
+    for (int i = 0; i < 100; ++i) {
+      const Eigen::Vector3d end = (2 - std::pow(10.0, -5 + 5 * u(g))) * test::randomDirection(g);
+      const auto X = test::pose<double>(Eigen::Matrix3d::Identity(), end + far * test::randomDirection(g)),
+                 Y = test::pose<double>(Eigen::Matrix3d::Identity(), end);
+      ASSERT_TRUE(scene.collides(&Y));
+      ASSERT_FALSE(scene.edgeIsFree(&X, &Y, fcl::CCDM_TRANS)) << far << ' ' << i;
+    }
+  }
 }
 
 template <typename F>
