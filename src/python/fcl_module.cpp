@@ -424,7 +424,7 @@ class Octree : public Geometry {
   // Once no query is reading it.
   template <typename F>
   void change(F&& f) const {
-    const py::gil_scoped_release released;
+    const NoGil released;
     const std::lock_guard<FairSharedMutex> alone(octreeMutex());
     f();
     geometry_->computeLocalAABB();
@@ -880,33 +880,47 @@ Returns the time from 0 to 1; 1 if they do not touch.)");
 
 // Managers ------------------------------------------------------------------------------------------------------------
 
-/// A callback of Python. What it throws ends the query and is thrown again when FCL is done.
+/// A callback of Python. Whatever it throws ends the query and is thrown again when FCL is done.
 struct Callback {
   const py::object& data;
   const py::object& function;
   std::exception_ptr failure = nullptr;
 
-  py::object operator()(fcl::CollisionObjectd* o1, fcl::CollisionObjectd* o2) const {
-    return function(py::cast(static_cast<Object*>(o1), py::return_value_policy::reference),
-                    py::cast(static_cast<Object*>(o2), py::return_value_policy::reference), data);
-  }
   static bool collide(fcl::CollisionObjectd* o1, fcl::CollisionObjectd* o2, void* self) {
-    auto& c = *static_cast<Callback*>(self);
-    try {
-      return c(o1, o2).cast<bool>();
-    } catch (...) {
-      c.failure = std::current_exception();
-      return true;
-    }
+    return static_cast<Callback*>(self)->stops(o1, o2, &isTrue);
   }
   static bool distance(fcl::CollisionObjectd* o1, fcl::CollisionObjectd* o2, void* self, double& least) {
-    auto& c = *static_cast<Callback*>(self);
+    return static_cast<Callback*>(self)->stops(o1, o2, [&least](const py::object& returned) {
+      const auto pair = py::reinterpret_steal<py::tuple>(pauseAtExit([&] { return PySequence_Tuple(returned.ptr()); }));
+      if (!pair) throw py::error_already_set();
+      if (pair.size() != 2) {
+        throw py::type_error("bocst: a callback of distance must return (done, distance), not " +
+                             py::repr(returned).cast<std::string>());
+      }
+      const double distance = pauseAtExit([&] { return PyFloat_AsDouble(PyTuple_GET_ITEM(pair.ptr(), 1)); });
+      if (PyErr_Occurred() != nullptr) throw py::error_already_set();
+      least = distance;
+      return isTrue(pair[0]);
+    });
+  }
+
+ private:
+  static bool isTrue(const py::object& o) {
+    const int truth = pauseAtExit([&o] { return PyObject_IsTrue(o.ptr()); });
+    if (truth < 0) throw py::error_already_set();
+    return truth != 0;
+  }
+  template <typename Read>
+  bool stops(fcl::CollisionObjectd* o1, fcl::CollisionObjectd* o2, const Read& read) {
     try {
-      const auto [done, dist] = c(o1, o2).cast<std::pair<bool, double>>();
-      least = dist;
-      return done;
+      const py::object a = py::cast(static_cast<Object*>(o1), py::return_value_policy::reference);
+      const py::object b = py::cast(static_cast<Object*>(o2), py::return_value_policy::reference);
+      const auto returned = py::reinterpret_steal<py::object>(pauseAtExit(
+          [&] { return PyObject_CallFunctionObjArgs(function.ptr(), a.ptr(), b.ptr(), data.ptr(), nullptr); }));
+      if (!returned) throw py::error_already_set();
+      return read(returned);
     } catch (...) {
-      c.failure = std::current_exception();
+      failure = std::current_exception();
       return true;
     }
   }

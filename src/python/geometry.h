@@ -2,18 +2,43 @@
 #pragma once
 
 #include <bocst/model.h>
+#include <cxxabi.h>
 #include <fcl/geometry/collision_geometry.h>
 #include <pybind11/pybind11.h>
 
+#include <chrono>
 #include <memory>
 #include <mutex>
 #include <shared_mutex>
 #include <stdexcept>
+#include <thread>
 
 namespace bocst::python {
 
-/// Gives Python's lock up while it lives.
-using NoGil = pybind11::gil_scoped_release;
+/// Returns f(), which may run Python's code. A daemon thread that Python ends in there because the process exits
+/// pauses: unwinding would release objects without the GIL. f itself holds no objects.
+template <typename F>
+auto pauseAtExit(const F& f) {
+  try {
+    return f();
+  } catch (const abi::__forced_unwind&) {
+    for (;;) std::this_thread::sleep_for(std::chrono::hours(1));
+  }
+}
+
+/// Releases the GIL while it lives. pybind11's own ends the process if Python ends the thread in the destructor.
+class NoGil {
+ public:
+  NoGil() = default;
+  NoGil(const NoGil&) = delete;
+  NoGil& operator=(const NoGil&) = delete;
+  ~NoGil() {
+    pauseAtExit([this] { PyEval_RestoreThread(state_); });
+  }
+
+ private:
+  PyThreadState* const state_ = PyEval_SaveThread();
+};
 
 /// A shared mutex where a thread that waits to be alone goes before those that come later.
 class FairSharedMutex {

@@ -567,14 +567,20 @@ motion: 'linear', 'translation', 'screw' or 'spline', see fcl.CCDMotionType.)")
 
 namespace {
 
-/// pickle's oldest protocols would make an object without calling its constructor, at which pybind11 ends the process.
-void refusePickling(const py::module_& m) {
+/// Objects that were made without __init__ raise TypeError. pickle's oldest protocols would make such an object, at
+/// which pybind11 ends the process; X.__new__(X) makes one for which pybind11 hands C++ memory that holds no object.
+void requireInit(const py::module_& m) {
   for (const auto& item : m.attr("__dict__").cast<py::dict>()) {
     const py::handle value = item.second;
     if (py::isinstance<py::module_>(value)) {
-      refusePickling(value.cast<py::module_>());
-    } else if (PyType_Check(value.ptr()) != 0 && !py::hasattr(value, "__members__") &&
-               !PyExceptionClass_Check(value.ptr())) {
+      requireInit(value.cast<py::module_>());
+      continue;
+    }
+    if (PyType_Check(value.ptr()) == 0 || PyExceptionClass_Check(value.ptr())) continue;
+    py::detail::get_type_info(reinterpret_cast<PyTypeObject*>(value.ptr()))->operator_new = [](std::size_t) -> void* {
+      throw py::type_error("bocst: __init__ of the object was not called");
+    };
+    if (!py::hasattr(value, "__members__")) {
       const auto refuse = [](const py::object& self, const py::args&) {
         throw py::type_error("cannot pickle '" + std::string(Py_TYPE(self.ptr())->tp_name) + "' object");
       };
@@ -595,7 +601,7 @@ PYBIND11_MODULE(_bocst, m) {
   bindFcl(m.def_submodule("fcl"));
   bindModel(m);
   bindScene(m);
-  refusePickling(m);
+  requireInit(m);
 }
 
 }  // namespace bocst::python

@@ -396,6 +396,8 @@ TEST_F(Program, FitsAsManySpheresAsAreAskedFor) {
   EXPECT_NE(run(inspect + " --count 5").out.find("5, they contain 100.0 % of the surface"), std::string::npos);
   expectComplaint(inspect + " --count 0", kUsage, "--count");
   expectComplaint(inspect + " --tolerance -1", kUsage, "--tolerance");
+  expectComplaint(inspect + " --dimension 0.5", kUsage, "--dimension");
+  expectComplaint(inspect + " --dimension 65537", kUsage, "--dimension");
 }
 
 TEST_F(Program, ValidatesAgainstFcl) {

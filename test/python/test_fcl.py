@@ -287,8 +287,8 @@ def test_callbacks_of_ones_own():
     for query in (third.collide, first.distance):
         with pytest.raises(KeyError, match="mine"):
             query(None, broken)
-        with pytest.raises(RuntimeError):
-            query(None, lambda *_: "neither")
+    with pytest.raises(TypeError, match="neither"):
+        first.distance(None, lambda *_: "neither")
 
 
 def test_a_manager_is_not_changed_while_it_is_asked():
@@ -612,6 +612,66 @@ def test_nothing_is_pickled():
         with pytest.raises(TypeError):
             thing.__reduce__()
     assert pickle.loads(pickle.dumps(fcl.NODE_TYPE.GEOM_BOX)) == fcl.NODE_TYPE.GEOM_BOX
+
+
+def classes(module):
+    return [value for value in vars(module).values() if isinstance(value, type) and not issubclass(value, Exception)]
+
+
+@pytest.mark.parametrize('cls', classes(bocst._bocst) + classes(bocst._bocst.fcl))
+def test_objects_without_init_raise(cls):
+    """pybind11 would hand C++ memory that holds no object."""
+    thing = cls.__new__(cls)
+    for name in dir(cls):
+        if not name.startswith('__') and not callable(getattr(cls, name)) and not hasattr(cls, '__members__'):
+            with pytest.raises(TypeError, match='__init__'):
+                getattr(thing, name)
+    ask = {'CollisionGeometry': fcl.CollisionObject, 'CollisionObject': fcl.DynamicAABBTreeCollisionManager().registerObject}
+    for base in cls.__mro__:
+        if base.__name__ in ask:
+            with pytest.raises((TypeError, RuntimeError)):
+                ask[base.__name__](thing)
+
+
+def test_objects_without_init_as_arguments():
+    with pytest.raises(TypeError):
+        bocst.Model(bocst.Mesh(*box()), options=bocst.Options.__new__(bocst.Options))
+    with pytest.raises((TypeError, RuntimeError)):
+        bocst.Model(bocst.Mesh.__new__(bocst.Mesh))
+    with pytest.raises(TypeError, match='__init__'):
+        bocst.Model.__new__(bocst.Model).statistics()
+    with pytest.raises(TypeError, match='__init__'):
+        repr(bocst.Mesh.__new__(bocst.Mesh))
+    with pytest.raises(TypeError, match='__init__'):
+        bocst.Scene.__new__(bocst.Scene).collides(np.eye(4))
+    scene = bocst.Scene()
+    with pytest.raises((TypeError, RuntimeError)):
+        scene.add_fixed(fcl.Sphere.__new__(fcl.Sphere), np.eye(4))
+
+
+def test_what_callbacks_return():
+    class Angry:
+        def __bool__(self):
+            raise KeyError('angry')
+
+    manager = fcl.DynamicAABBTreeCollisionManager()
+    manager.registerObjects([fcl.CollisionObject(fcl.Sphere(1)) for _ in range(3)])
+    manager.setup()
+    for returned, calls in ((None, 3), (0, 3), ([], 3), ('yes', 1), (1, 1), (np.bool_(True), 1)):
+        called = []
+        manager.collide(None, lambda a, b, d: [called.append(1), returned][1])
+        assert len(called) == calls
+    with pytest.raises(KeyError):
+        manager.collide(None, lambda a, b, d: Angry())
+    for returned in ((True, 1.0), [1, np.float64(1)], (np.bool_(True), 1)):
+        called = []
+        manager.distance(None, lambda a, b, d: [called.append(1), returned][1])
+        assert len(called) == 1
+    for returned in (None, True, (True,), (True, 'near'), (True, 1.0, 2)):
+        with pytest.raises(TypeError):
+            manager.distance(None, lambda a, b, d: returned)
+    with pytest.raises(KeyError):
+        manager.distance(None, lambda a, b, d: (Angry(), 1.0))
 
 
 def test_builders_of_two_threads():

@@ -226,3 +226,29 @@ def test_any_order_of_libraries(mode):
     found = libraries()
     for loaded in ([], found[:1], found[1:], found, found[::-1]):
         subprocess.run([sys.executable, "-c", CALL, mode, *loaded], check=True)
+
+
+@pytest.mark.parametrize("ask", ["bocst.collide_poses(model, model, X)", "scene.collisions(X[:, None])",
+                                 "manager.collide(None, lambda a, b, d: False)"])
+def test_a_daemon_thread_may_still_ask_at_exit(ask):
+    code = f"""
+import threading, time, numpy as np, bocst, bocst.fcl as fcl
+rng = np.random.default_rng(1)
+model = bocst.Model(bocst.Mesh(rng.uniform(-1, 1, (3000, 3)), np.arange(3000).reshape(-1, 3)))
+X = np.tile(np.eye(4), (200000, 1, 1))
+X[:, :3, 3] = rng.uniform(-2, 2, (200000, 3))
+scene = bocst.Scene()
+scene.add_fixed(model, np.eye(4))
+scene.add_moving(model)
+manager = fcl.DynamicAABBTreeCollisionManager()
+manager.registerObjects([fcl.CollisionObject(fcl.Sphere(1)) for _ in range(40)])
+manager.setup()
+def run():
+    while True:
+        {ask}
+for _ in range(3):
+    threading.Thread(target=run, daemon=True).start()
+time.sleep(0.3)
+"""
+    done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, timeout=300)
+    assert done.returncode == 0, done.stderr

@@ -10,6 +10,15 @@
 #include <filesystem>
 
 namespace bocst::program {
+namespace {
+
+std::string wrongDimension(const std::string& text) {
+  double d = 0;
+  std::from_chars(text.data(), text.data() + text.size(), d);
+  return d == 0 || (d >= 1 && d <= 65536) ? "" : text + " is not 0 or 1 to 65536";
+}
+
+}  // namespace
 
 void ModelArguments::addShape(CLI::App& command) {
   command
@@ -18,10 +27,9 @@ void ModelArguments::addShape(CLI::App& command) {
       ->check(CLI::IsMember({"octree", "bono"}))
       ->capture_default_str();
   command
-      .add_option(
-          "--dimension", dimension,
-          "the paper's d_t: the mesh's largest extent in lattice units, 1 to 65536; 0: 65536, the finest lattice")
-      ->check(CLI::Range(0.0, 65536.0))
+      .add_option("--dimension", dimension,
+                  "the paper's d_t: the mesh's largest extent in lattice units; 0: 65536, the finest lattice")
+      ->check(CLI::Validator(&wrongDimension, "0 or 1 to 65536"))
       ->capture_default_str();
 }
 
