@@ -254,7 +254,7 @@ double largest(const Raw& raw) {
 
 // Meshes of all sizes, points among them, beside meshes of all sizes: apart, or with a corner in common.
 template <typename S>
-void ofAnySize(const std::vector<double>& sizes, double smallest_of_fcl) {
+void ofAnySize(const std::vector<double>& sizes) {
   std::mt19937_64 g(10);
   std::uniform_real_distribution<double> u(-1, 1);
   const auto I = at<S>(Eigen::Isometry3d::Identity());
@@ -310,7 +310,7 @@ void ofAnySize(const std::vector<double>& sizes, double smallest_of_fcl) {
                 if (apart == 0) {
                   ASSERT_TRUE(touching) << exact;
                 }
-                if (exact && apart > rounding && std::min(size_a, size_b) >= smallest_of_fcl) {
+                if (exact && apart > rounding) {
                   ASSERT_FALSE(touching);
                 }
                 if (exact) {
@@ -327,8 +327,8 @@ void ofAnySize(const std::vector<double>& sizes, double smallest_of_fcl) {
   }
   EXPECT_GT(meeting, count / 3);
 }
-TEST(SizesDouble, AnyBesideAny) { ofAnySize<double>({1e-150, 1e-100, 1e-60, 1e-6, 1, 1e6, 1e40, 2e74}, 1e-60); }
-TEST(SizesFloat, AnyBesideAny) { ofAnySize<float>({1e-30, 1e-6, 1, 1e6}, 1e-6); }
+TEST(SizesDouble, AnyBesideAny) { ofAnySize<double>({1e-150, 1e-100, 1e-78, 1e-74, 1e-60, 1e-6, 1, 1e6, 1e40, 2e74}); }
+TEST(SizesFloat, AnyBesideAny) { ofAnySize<float>({1e-30, 1e-15, 1e-12, 1e-9, 1e-6, 1, 1e6}); }
 
 // However far away: at once, and right. What does not end in time is a fault, too.
 template <typename S>

@@ -204,17 +204,18 @@ class Collector : public query::Visitor {
     return scratch;
   }
 
-  // A triangle so narrow, of its length or of its corners' coordinates, is a segment or a point but for rounding in S;
-  // one so small has products of four lengths that vanish in S.
+  // A triangle so narrow, of its length or of its corners' coordinates, is a segment or a point but for rounding in S.
   static constexpr double kNarrow = std::is_same<S, double>::value ? 1e-14 : 45 * kEpsilon;
-  static constexpr double kSmallest = std::is_same<S, double>::value ? 1e-70 : 1e-8;
+  static double longest(const Corners& t) {
+    return std::max((t[1] - t[0]).cwiseAbs().maxCoeff(), (t[2] - t[0]).cwiseAbs().maxCoeff());
+  }
   static bool isSliver(const Corners& t, double relative_width) {
-    const double length = std::max((t[1] - t[0]).cwiseAbs().maxCoeff(), (t[2] - t[0]).cwiseAbs().maxCoeff());
-    if (length < kSmallest) return true;
     const double rounding =
         4 * kEpsilon * std::max({t[0].cwiseAbs().maxCoeff(), t[1].cwiseAbs().maxCoeff(), t[2].cwiseAbs().maxCoeff()});
-    return relative_width <= std::max(kNarrow, rounding / length);
+    return relative_width <= std::max(kNarrow, rounding / longest(t));
   }
+  // The squares of such products vanish in S, so FCL's axes separate nothing.
+  static constexpr double kSmallestProduct = std::is_same<S, double>::value ? 1e-140 : 1e-15;
 
   // What distances near 0 may be off by.
   double rounding() const { return roundingOf<S>(magnitude_) / 2; }
@@ -353,9 +354,10 @@ class Collector : public query::Visitor {
     Corners own;
     for (int k = 0; k < 3; ++k) own[k] = t2_.corner(b, k).template cast<double>();
     const double width_p = query::relativeWidth(p), width_q = query::relativeWidth(own);
-    const bool sliver = !isCertain(key) && (isSliver(p, width_p) || isSliver(own, width_q));
+    const bool tiny = longest(p) * longest(own) < kSmallestProduct;
+    const bool sliver = !isCertain(key) && (tiny || isSliver(p, width_p) || isSliver(own, width_q));
     // FCL's axes do not separate segments and points from everything.
-    const bool degenerate = sliver && std::min(width_p, width_q) <= query::kDegenerate;
+    const bool degenerate = sliver && (tiny || std::min(width_p, width_q) <= query::kDegenerate);
     const bool meet =
         isCertain(key) || (!degenerate && fcl::detail::Intersect<S>::intersect_Triangle(
                                               t1_.corner(a, 0), t1_.corner(a, 1), t1_.corner(a, 2), t2_.corner(b, 0),
