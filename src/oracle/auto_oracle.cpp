@@ -185,7 +185,7 @@ std::vector<AutoOracle::Candidate> AutoOracle::chooseShare(const std::vector<Exp
   candidates.reserve(batch.size());
   for (std::size_t i = 0; i < batch.size(); ++i) {
     const ExpansionRequest& e = batch[i];
-    if (e.own_only || e.surface->mesh == nullptr) continue;
+    if (e.surface->mesh == nullptr) continue;
     const bool is_next = !candidates.empty() && batch[candidates.back().place].surface == e.surface;
     Known* const its = is_next ? candidates.back().mesh : &known(*e.surface);
     if (!its->refused) candidates.push_back({e.count, i, its});

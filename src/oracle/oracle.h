@@ -41,7 +41,6 @@ struct ExpansionRequest {
   std::shared_ptr<const DeviceResource>
       resource;  ///< The list is one that this oracle keeps; null, and no ids: all of the mesh.
   std::uint32_t resource_begin = 0;
-  bool own_only = false;  ///< The node stays a leaf: only grey, own and one list (of the cell itself) are wanted.
   std::size_t ids_up_to = kAll;  ///< Longer lists may stay with the oracle.
 
   // Answered.
@@ -49,8 +48,7 @@ struct ExpansionRequest {
   bounds::OctantBounds octants;
   bounds::NodeBounds own;                   ///< Of the cell itself: what the octants taught about it.
   std::vector<std::uint32_t> lists;         ///< Triangles of octant 0, of octant 1, ...
-  std::array<std::size_t, 9> list_begin{};  ///< Octant o has lists[list_begin[o]] to lists[list_begin[o + 1]];
-                                            ///< with own_only all of lists is the cell's.
+  std::array<std::size_t, 9> list_begin{};  ///< Octant o has lists[list_begin[o]] to lists[list_begin[o + 1]].
   std::shared_ptr<const DeviceResource> kept_resource;  ///< Holds the lists that the oracle keeps.
   std::array<DeviceList, 8> device_lists{};  ///< Where it has octant o's, if count is not 0; it is then not in `lists`.
 

@@ -220,7 +220,6 @@ void Tree::grow(std::vector<Growth>& batch, bool wait) {
       tree.gatherNode(g.node, cell, gathered.back());
       request.ids = gathered.back().data();
       request.count = gathered.back().size();
-      request.own_only = g.list_suffices && request.count <= kMaxLeafTriangles;
     }
     requests.push_back(std::move(request));
     asked.push_back(g);
@@ -242,7 +241,7 @@ void Tree::ask(std::vector<Growth>& asked, std::vector<oracle::ExpansionRequest>
     oracle.wait(answers);
     for (std::size_t i = 0; i < answers.size(); ++i) {
       growths[i].tree->publish(growths[i].node, answers[i]);
-      growths[i].tree->cells_ += answers[i].own_only ? 1 : 8;
+      growths[i].tree->cells_ += 8;
     }
   };
   if (asked.empty()) return;
@@ -393,10 +392,6 @@ void Tree::publish(NodeRef node, const oracle::ExpansionRequest& answer) {
   if (answer.grey != 0) {
     refits_.push_back({node, answer.own});
     refits_wait_.store(true, std::memory_order_relaxed);
-  }
-  if (answer.own_only) {
-    setChild(node, addList(answer.lists.data(), answer.lists.size(), true));
-    return;
   }
   const std::uint32_t index = addBlock(node, answer.cell.level, answer.grey, now());
   for (int o = 0; o < 8; ++o) octants_ += surface_.lattice.exists(answer.cell.octant(o));

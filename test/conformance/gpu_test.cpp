@@ -85,6 +85,19 @@ TEST_P(OnDevice, SmallAndDenseMeshesAnswerAsOnTheCpu) {
   EXPECT_GT(found, 2000u);
 }
 
+TEST_P(OnDevice, WhatFitsALeafIsNotDivided) {
+  Raw fan;
+  for (std::size_t i = 0; i < kMaxLeafTriangles; ++i) {
+    const double z = 0.01 * static_cast<double>(i);
+    fan.vertices.insert(fan.vertices.end(), {{-1, -1, z}, {1, -1, z}, {0, 1, z}});
+    fan.triangles.emplace_back(3 * i, 3 * i + 1, 3 * i + 2);
+  }
+  const Modeld a(fan.mesh(), with(GetParam())), b(test::torus(12).mesh(), with(GetParam()));
+  EXPECT_TRUE(test::touching<double>(a, kIdentity, b, kIdentity));
+  EXPECT_EQ(a.statistics().resident_nodes, 1u);
+  EXPECT_EQ(a.statistics().expansions, 0u);
+}
+
 TEST_P(OnDevice, ConservativeVerdictsAreThoseOfTheCpu) {
   const Raw ra = test::torus(30), rb = test::torus(23, 0.3);
   for (const Subdivision s : {Subdivision::kOctree, Subdivision::kBono}) {

@@ -246,6 +246,73 @@ TEST(Tree, StaysWithinItsBudget) {
   EXPECT_GT(a.statistics().pruned_nodes, 0u);
 }
 
+// What a query of just now needed is there for the next one like it; what older ones needed goes first.
+TEST(Tree, ABudgetKeepsWhatWasUsedLast) {
+  Options options;
+  options.ttl = milliseconds(0);
+  options.oracle = OracleKind::kCpu;
+  const std::shared_ptr<const Mesh> mesh = test::torus(100).mesh();
+  const Modeld b(mesh);
+  const auto bytesAfter = [&](const std::vector<Eigen::Vector3d>& places) {
+    Modeld a(mesh, options);
+    for (const Eigen::Vector3d& p : places) EXPECT_TRUE(touching(a, b, p));
+    return a.statistics().resident_bytes;
+  };
+  const Eigen::Vector3d here = kHit, there = -kHit;
+  FakeClock clock;
+  options.clock = clock.function();
+  options.memory_budget = (std::max(bytesAfter({here}), bytesAfter({there})) + bytesAfter({here, there})) / 2;
+  Modeld a(mesh, options);
+  for (const Eigen::Vector3d& p : {here, there, here, there}) {
+    clock.now += milliseconds(10);
+    EXPECT_TRUE(touching(a, b, p));
+    clock.now += milliseconds(10);
+    EXPECT_TRUE(touching(a, b, p));
+    const Statistics before = a.statistics();
+    EXPECT_GT(before.resident_nodes, 1u);
+    EXPECT_TRUE(touching(a, b, p));
+    EXPECT_EQ(a.statistics().expansions, before.expansions);
+  }
+  EXPECT_GT(a.statistics().pruned_nodes, 0u);
+}
+
+TEST(Tree, WhatDecayLeavesIsSmallAndGrowsAgain) {
+  for (const Answer answer : {Answer::kExact, Answer::kConservative}) {
+    FakeClock clock;
+    Options options;
+    options.clock = clock.function();
+    options.oracle = OracleKind::kCpu;
+    options.answer = answer;
+    const std::shared_ptr<const Mesh> mesh = test::torus(30).mesh();
+    Modeld a(mesh, options), fresh(mesh, options);
+    a.expandAll(5);
+    fresh.expandAll(4);
+    const Statistics before = a.statistics();
+    clock.now += milliseconds(2001);
+    a.prune();
+    const Statistics pruned = a.statistics();
+    EXPECT_EQ(pruned.nodes_per_level, fresh.statistics().nodes_per_level);
+    EXPECT_LE(pruned.resident_bytes, fresh.statistics().resident_bytes) << "the lists are the same";
+    if (answer == Answer::kExact) continue;
+    a.expandAll(5);
+    EXPECT_EQ(a.statistics().nodes_per_level, before.nodes_per_level);
+  }
+  // Of exact answers, which build branches at once.
+  FakeClock clock;
+  Options options;
+  options.clock = clock.function();
+  options.oracle = OracleKind::kCpu;
+  Modeld a(test::torus(60).mesh(), options), b(test::torus(60).mesh(), options);
+  EXPECT_TRUE(touching(a, b, kHit));
+  const Statistics before = a.statistics();
+  clock.now += milliseconds(2001);
+  a.prune();
+  const Statistics pruned = a.statistics();
+  ASSERT_LT(pruned.resident_nodes, before.resident_nodes);
+  EXPECT_TRUE(touching(a, b, kHit));
+  EXPECT_GT(a.statistics().resident_nodes, pruned.resident_nodes) << "a leaf is as small as before";
+}
+
 TEST(Tree, UpdatedVerticesAreANewSurface) {
   const test::Raw raw = test::torus(60);
   Modeld a(raw.mesh()), b(raw.mesh());

@@ -42,12 +42,6 @@ void OctantAccumulator::add(const LocalPoint* corners, int count, const LocalPoi
   for (int k = 0; k < 3; ++k) area_[k] += sign * area[k];
 }
 
-void OctantAccumulator::addBox(const LocalPoint& lo, const LocalPoint& hi) {
-  lo_ = lo_.cwiseMin(lo);
-  hi_ = hi_.cwiseMax(hi);
-  slab_ = false;
-}
-
 void OctantAccumulator::extremesAlong(const LocalPoint& normal, float& lo, float& hi) const {
   if (count_ == 0) return;
   const auto coordinate = [this](std::size_t k) {

@@ -48,9 +48,6 @@ class OctantAccumulator {
   template <typename Point>
   void add(const Polygon<Point>& part, bool keep);
 
-  /// A part of the surface whose clipped form is not known beyond this box.
-  void addBox(const LocalPoint& lo, const LocalPoint& hi);
-
   /// The bounds of all that the accumulators have seen, in a cell.
   static bounds::NodeBounds bounds(const OctantAccumulator* const* parts, std::size_t count,
                                    const bounds::CellFrame& frame);

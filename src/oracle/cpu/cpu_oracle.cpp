@@ -40,11 +40,7 @@ class Expander {
       block(begin, std::min(e_.count - begin, LocalTriangles::kCapacity));
     }
     e_.grey = proven_;
-    if (e_.own_only) {
-      makeOwnList();
-    } else {
-      makeLists();
-    }
+    makeLists();
     makeBounds();
   }
 
@@ -115,24 +111,14 @@ class Expander {
         return;
       }
     }
-    std::uint8_t seen = 0;
-    const auto take = [&](int o, const auto& part) {
-      s_.octants[o].add(part, slab_);
-      seen |= 1 << o;
-    };
+    // kClipMargin is wider than the rounding of both, so what the test proves to meet an octant has a part there.
+    const auto take = [this](int o, const auto& part) { s_.octants[o].add(part, slab_); };
     if (allUpTo(kFloatReach, hi.cwiseMax(-lo))) {
       clipToOctants(corners, mask, take);
     } else {
       Eigen::Vector3d exact[3];
       for (int k = 0; k < 3; ++k) exact[k] = (e_.surface->corner(t, k) - center_) / half_;
       clipToOctants(exact, mask, take);
-    }
-    // The test's rounding margin may be wider than the clipper's: what only the test sees is bounded by the octant
-    // itself.
-    for (int missed = mask & ~seen, o = 0; missed != 0; ++o, missed >>= 1) {
-      if ((missed & 1) == 0) continue;
-      const LocalPoint c = localOctantCenter(o), h = LocalPoint(0.5f, 0.5f, 0.5f, 0);
-      s_.octants[o].addBox(lo.cwiseMax(c - h).cwiseMin(c + h), hi.cwiseMin(c + h).cwiseMax(c - h));
     }
   }
 
@@ -163,20 +149,13 @@ class Expander {
     }
   }
 
-  void makeOwnList() {
-    e_.lists.clear();
-    for (std::size_t i = 0; i < e_.count; ++i) {
-      if ((s_.masks[i] & proven_) != 0) e_.lists.push_back(id(i));
-    }
-  }
-
   void makeBounds() {
     std::array<const OctantAccumulator*, 8> grey;
     std::size_t count = 0;
     for (int o = 0; o < 8; ++o) {
       if ((proven_ >> o & 1) == 0) continue;
       grey[count] = &s_.octants[o];
-      if (!e_.own_only) e_.octants.set(o, OctantAccumulator::bounds(&grey[count], 1, localOctant(o)));
+      e_.octants.set(o, OctantAccumulator::bounds(&grey[count], 1, localOctant(o)));
       ++count;
     }
     if (count != 0) e_.own = OctantAccumulator::bounds(grey.data(), count, {{-1, -1, -1}, 2});

@@ -37,7 +37,7 @@ void ComputeOracle::answer(const std::vector<ExpansionRequest*>& requests, std::
   std::vector<ExpansionRequest*> asked;
   for (std::size_t i = 0; i < requests.size(); ++i) {
     const ExpansionRequest& e = *requests[i];
-    if (e.own_only || meshOf(e) == nullptr || !chain_->fits(e)) continue;
+    if (meshOf(e) == nullptr || !chain_->fits(e)) continue;
     order.push_back(i);
     asked.push_back(requests[i]);
   }
