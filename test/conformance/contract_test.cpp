@@ -88,6 +88,7 @@ class Contacts : public ::testing::Test {
              {exact, far},
              {exact, model(test::adversarial(), Answer::kExact)},
              {spheres, model(other, Answer::kConservative)},
+             {model(other, Answer::kConservative), spheres},
              {spheres, model(other, Answer::kExact)},
              {model(other, Answer::kExact), spheres}};
     std::vector<Geometry> partners = {test::bvh<fcl::OBBRSS<S>>(other), std::make_shared<fcl::Box<S>>(S(1), S(1), S(1)),
@@ -261,6 +262,39 @@ TYPED_TEST(Contacts, AreTheFirstOfVeryMany) {
     auto expected = all;
     expected.resize(most);
     EXPECT_EQ(q.ask(fcl::CollisionRequest<S>(most, true)), expected);
+  }
+}
+
+// Layers across the longest axis, far closer together than a lattice has units: where a walk is cut shows in each.
+TYPED_TEST(Contacts, AreTheFirstOfThinLayers) {
+  using S = TypeParam;
+  test::Raw layers;
+  for (int i = 0; i < 3000; ++i) {
+    const double x = i * 1e-3;
+    const std::size_t n = layers.vertices.size();
+    layers.vertices.insert(layers.vertices.end(), {{x, -1, -1}, {x, 1, -1}, {x, 0, 1}});
+    layers.triangles.emplace_back(n, n + 1, n + 2);
+  }
+  std::mt19937 g(10);
+  std::shuffle(layers.triangles.begin(), layers.triangles.end(), g);
+  const test::Raw rod = test::box({0.5, -0.1, -0.1}, {2.5, 0.1, 0.1});
+  const auto a = std::make_shared<Model<S>>(layers.mesh());
+  const auto X = fcl::Transform3<S>::Identity();
+  const auto Y = test::pose<S>(Eigen::AngleAxisd(0.02, Eigen::Vector3d::UnitZ()).toRotationMatrix(), {0, 0, 0});
+  const std::vector<std::shared_ptr<fcl::CollisionGeometry<S>>> partners = {
+      std::make_shared<Model<S>>(rod.mesh()), test::bvh<fcl::OBBRSS<S>>(rod),
+      std::make_shared<fcl::Box<S>>(S(4), S(0.2), S(0.2))};
+  for (const auto& b : partners) {
+    for (const bool swapped : {false, true}) {
+      const Question<S> q = swapped ? Question<S>{b, a, Y, X} : Question<S>{a, b, X, Y};
+      const auto all = q.ask(fcl::CollisionRequest<S>(100000, true));
+      ASSERT_GT(all.size(), 1500u);
+      for (std::size_t most = 2; most < 1000; most += 37) {
+        auto expected = all;
+        expected.resize(most);
+        ASSERT_EQ(q.ask(fcl::CollisionRequest<S>(most, true)), expected) << most;
+      }
+    }
   }
 }
 

@@ -83,6 +83,20 @@ TEST_P(OnDevice, SmallAndDenseMeshesAnswerAsOnTheCpu) {
     }
   }
   EXPECT_GT(found, 2000u);
+  // So small that no cell parts them, in a face of the box.
+  Raw cluster;
+  for (std::size_t i = 0; i < 2 * kMaxLeafTriangles; ++i) {
+    const double y = 1e-9 * static_cast<double>(i);
+    cluster.vertices.insert(cluster.vertices.end(), {{0.4 - 1e-8, y, 0}, {0.4 + 1e-8, y, 0}, {0.4, y, 1e-8}});
+    cluster.triangles.emplace_back(3 * i, 3 * i + 1, 3 * i + 2);
+  }
+  cluster.vertices.insert(cluster.vertices.end(), {{3, 3, 3}, {3, 4, 3}, {4, 3, 3}});
+  cluster.triangles.emplace_back(cluster.vertices.size() - 3, cluster.vertices.size() - 2, cluster.vertices.size() - 1);
+  const Modeld a(cluster.mesh(), with(GetParam())), b(few.mesh(), with(GetParam()));
+  const Modeld c(cluster.mesh(), with(OracleKind::kCpu)), d(few.mesh(), with(OracleKind::kCpu));
+  const test::Pairs expected = test::pairs<double>(c, kIdentity, d, kIdentity);
+  EXPECT_GE(expected.size(), 2 * kMaxLeafTriangles);
+  for (int i = 0; i < 3; ++i) ASSERT_EQ(test::pairs<double>(a, kIdentity, b, kIdentity), expected);
 }
 
 TEST_P(OnDevice, WhatFitsALeafIsNotDivided) {

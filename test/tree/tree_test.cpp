@@ -200,6 +200,18 @@ TEST(Tree, FarMissesLetBranchesGo) {
   }
   EXPECT_EQ(a.statistics().resident_nodes, 1u);
   EXPECT_EQ(b.statistics().resident_nodes, 1u);
+  // Beside a partner that keeps its own.
+  options.ttl = milliseconds(0);
+  Modeld keeps(a.mesh(), options);
+  for (const bool first : {true, false}) {
+    EXPECT_TRUE(touching(a, keeps, kHit));
+    ASSERT_GT(a.statistics().resident_nodes, 1u);
+    for (int i = 0; i < 100; ++i) {
+      clock.now += milliseconds(700);
+      EXPECT_FALSE(first ? touching(a, keeps, kMiss) : touching(keeps, a, kMiss));
+    }
+    EXPECT_EQ(a.statistics().resident_nodes, 1u);
+  }
 }
 
 TEST(Tree, TtlZeroKeepsEverything) {

@@ -62,8 +62,8 @@ __attribute__((always_inline)) inline bool areFarApart(const TurnedBox& a, const
   const Float4 along_a = product(rows_a, way);
   const Float4 squares = along_a * along_a;
   const float squared = squares[0] + squares[1] + squares[2];
-  // No square may leave the range of floats; nor does what is no number.
-  if (!(squared > 1e-30f && squared < 1e30f)) return false;
+  // The square may vanish. Where it is infinite, so is the gap that is asked for.
+  if (!(squared > 1e-30f)) return false;
   const float length = std::sqrt(squared);
   const float gap = 1.001f * margin + 2e-4f * (length + 2 * (a.reach + b.reach));
   const Float4 least = {gap, gap, gap, gap};
