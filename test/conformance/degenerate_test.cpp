@@ -331,6 +331,27 @@ TEST(SizesDouble, AnyBesideAny) { ofAnySize<double>({1e-150, 1e-100, 1e-78, 1e-7
 TEST(SizesFloat, AnyBesideAny) { ofAnySize<float>({1e-30, 1e-15, 1e-12, 1e-9, 1e-6, 1, 1e6}); }
 
 // However far away: at once, and right. What does not end in time is a fault, too.
+// One triangle through a torus, of any size: beyond some size no kernel in float can compute with it.
+TEST(SizesDouble, AWallThroughAFineMesh) {
+  const Modeld torus(test::torus(30).mesh());
+  const auto I = at<double>(Eigen::Isometry3d::Identity());
+  test::Pairs expected;
+  for (const double size : {1e1, 1e2, 1e4, 1e6, 1e9, 1e12, 1e15, 1e30, 1e60}) {
+    SCOPED_TRACE(size);
+    Raw raw;
+    raw.vertices = {{-2 * size, -size, 0}, {2 * size, -size, 0}, {0, 2 * size, 0}};
+    raw.triangles = {{0, 1, 2}};
+    const Modeld wall(raw.mesh());
+    for (int again = 0; again < 3; ++again) {
+      const test::Pairs pairs = test::pairs<double>(torus, I, wall, I);
+      if (expected.empty()) expected = pairs;
+      ASSERT_GT(pairs.size(), 100u);
+      ASSERT_EQ(pairs, expected);
+      ASSERT_EQ(test::pairs<double>(wall, I, torus, I).size(), expected.size());
+    }
+  }
+}
+
 template <typename S>
 void farAway(const std::vector<double>& distances) {
   const Raw ra = test::box({-1, -2, 0}, {1, 1, 0.5}), rb = test::box({0, 0, 0}, {0.3, 0.2, 0.7});
