@@ -219,7 +219,8 @@ class LeafPairs {
     }
   }
 
-  /// The same for a leaf of one side and those triangles of a larger one of the other that may meet it, a bit each.
+  /// The same for a leaf of one side and those triangles of a larger one of the other that may meet it, a bit each. For
+  /// pairs that PairFrames fits: so corners and tolerance are in range, and what is too small is never parted in float.
   template <typename F>
   bool testLargeA(const LargeTriangles& a, std::uint32_t which, const B& b, typename B::Node node_b, F&& f) {
     return testLarge(leaves_b_, b, node_b, a, which, *a_in_b_,
@@ -294,14 +295,6 @@ class LeafPairs {
 
   template <typename Leaf, typename F>
   bool testRows(const Leaf& leaf, const SimilarityTransform& to, const std::uint32_t* ids, F&& f) {
-    if (!inRange(rows_) || !inRange(leaf.pack) || !inRange(to.tolerance)) {
-      for (std::size_t i = 0; i < rows_.count; ++i) {
-        for (std::size_t j = 0; j < leaf.pack.count; ++j) {
-          if (f(leaf.id(j), ids[i], false)) return true;
-        }
-      }
-      return false;
-    }
     PackRegion region{};
     const double size = static_cast<double>(leaf.pack.size), error = static_cast<double>(leaf.error);
     const double rounding_margin = (32 * 0x1p-24 + 4 * to.orthogonality_error) * size + 1.02 * (to.tolerance + error);
