@@ -9,6 +9,12 @@ constexpr bool kSanitized = true;
 constexpr bool kSanitized = false;
 #endif
 
+#ifdef __SANITIZE_THREAD__
+constexpr bool kThreadSanitized = true;
+#else
+constexpr bool kThreadSanitized = false;
+#endif
+
 /// How often a test asks: a fifth of `times` under sanitizers, which take ten times as long and look for other faults.
 constexpr int repetitions(int times) { return kSanitized ? times / 5 : times; }
 
