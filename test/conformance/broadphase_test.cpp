@@ -222,7 +222,7 @@ TYPED_TEST(Broadphase, SameAsFclsMeshesWhereObjectsCrowd) {
 
 TYPED_TEST(Broadphase, SameAsFclsMeshesWhereObjectsAreScarce) {
   using S = typename ScalarOf<TypeParam>::type;
-  checkLayout<TypeParam>(layout<S>(10, 9, 3), layout<S>(10, 25, 7));
+  checkLayout<TypeParam>(layout<S>(10, 20, 3), layout<S>(10, 25, 7));
 }
 
 // FCL has an interface for managers of moving objects, but none; what such a manager would call is its callback.
@@ -275,7 +275,7 @@ TEST(BroadphaseLayouts, HaveHitsAndDistances) {
   // What the tests above rest on: the first layouts touch, the second do not.
   for (const auto& [l, touches] :
        {std::pair(layout<double>(16, 3, 1), true), std::pair(layout<double>(16, 3, 2), true),
-        std::pair(layout<double>(10, 9, 3), false), std::pair(layout<double>(10, 25, 7), false)}) {
+        std::pair(layout<double>(10, 20, 3), false), std::pair(layout<double>(10, 25, 7), false)}) {
     const Scene<double> meshes(l, Kind::kMeshes);
     Expected<double> among;
     for (std::size_t i = 0; i < meshes.size(); ++i) {

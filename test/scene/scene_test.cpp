@@ -134,11 +134,12 @@ Geometry<S> geometry(std::size_t kind, std::mt19937_64& g) {
   raw.scale(u(g));
   const S x = static_cast<S>(u(g)), y = static_cast<S>(u(g)), z = static_cast<S>(u(g));
   Options options;
+  options.ttl = std::chrono::milliseconds(0);  // on slow machines branches would go between two questions
   switch (kind % 10) {
     case 0:
     case 1:
     case 2:
-      return std::make_shared<Model<S>>(raw.mesh());
+      return std::make_shared<Model<S>>(raw.mesh(), options);
     case 3:
       options.margin = 0.05;
       return std::make_shared<Model<S>>(raw.mesh(), options);
@@ -233,6 +234,7 @@ void checkVerdicts(const World<S>& w, const States<S>& X, std::size_t states, st
 
 TYPED_TEST(SceneTest, VerdictsAreThoseOfAllPairs) {
   using S = TypeParam;
+  std::size_t all_hits = 0, all_states = 0;
   for (const auto& [moving, fixed, spread, step] :
        {std::tuple(4, 20, 3.0, 0.05), std::tuple(1, 9, 0.8, 0.01), std::tuple(11, 3, 2.0, 0.02),
         std::tuple(2, 150, 7.0, 0.2), std::tuple(3, 0, 0.6, 0.03)}) {
@@ -244,9 +246,11 @@ TYPED_TEST(SceneTest, VerdictsAreThoseOfAllPairs) {
       std::size_t hits = 0;
       checkVerdicts(w, walk<S>(states, w.moving.size(), spread, step, threads), states, hits);
       EXPECT_GT(hits, states / 50);
-      EXPECT_LT(hits, states - states / 50);
+      all_hits += hits;
+      all_states += states;
     }
   }
+  EXPECT_LT(all_hits, all_states - all_states / 10);
 }
 
 TYPED_TEST(SceneTest, OctreesPlanesAndMapsWithoutCells) {
