@@ -3,6 +3,7 @@
 #include <fcl/geometry/octree/octree.h>
 #include <gtest/gtest.h>
 
+#include <array>
 #include <atomic>
 #include <thread>
 
@@ -317,16 +318,21 @@ TEST(Threads, ShapesAndOctreesWhilePruningAndLooking) {
   struct Case {
     bool is_exact;
     std::size_t partner, pose;
-    ConvexAnswers expected;
+    std::array<ConvexAnswers, 2>
+        expected;  // of each solver: of cells that just touch, FCL's solvers count not the same
   };
   std::vector<Case> cases;
   int hits = 0;
   for (const bool is_exact : {true, false}) {
     for (std::size_t k = 0; k < others.size(); ++k) {
       for (std::size_t p = 0; p < poses.size(); ++p) {
+        const Modeld& model = is_exact ? calm_exact : calm_coarse;
         cases.push_back(
-            {is_exact, k, p, ConvexAnswers::of(is_exact ? calm_exact : calm_coarse, *others[k], poses[p], 0)});
-        hits += cases.back().expected.touches;
+            {is_exact,
+             k,
+             p,
+             {ConvexAnswers::of(model, *others[k], poses[p], 0), ConvexAnswers::of(model, *others[k], poses[p], 2)}});
+        hits += cases.back().expected[0].touches;
       }
     }
   }
@@ -350,7 +356,7 @@ TEST(Threads, ShapesAndOctreesWhilePruningAndLooking) {
       const Case& c = cases[(i * 5 + static_cast<std::size_t>(thread) * 17) % cases.size()];
       const ConvexAnswers x =
           ConvexAnswers::of(c.is_exact ? a : b, *others[c.partner], poses[c.pose], static_cast<unsigned>(thread));
-      wrong += !(x == c.expected);
+      wrong += !(x == c.expected[static_cast<std::size_t>(thread) / 2]);
     }
     --running;
   });
