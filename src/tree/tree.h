@@ -179,6 +179,7 @@ class Tree {
   void startRent();
   bool buildsAhead() const;
   void askForAheadBuild();
+  void leakPools();
   static void buildAhead(AheadBuild& ahead);
   void growRoot();
   void growFromGrid(NodeRef node);

@@ -64,13 +64,28 @@ struct Tree::AheadBuild {
 };
 
 Tree::~Tree() {
-  if (ahead_build_ == nullptr) return;
   try {
-    const std::lock_guard<thread::ForkAwareMutex> lock(ahead_build_->mutex);
-    ahead_build_->tree = nullptr;
+    if (ahead_build_ != nullptr) {
+      const std::lock_guard<thread::ForkAwareMutex> lock(ahead_build_->mutex);
+      ahead_build_->tree = nullptr;
+    }
+    const std::shared_lock<thread::ShardedLock> query(query_lock_);
+    const std::unique_lock<thread::ForkAwareMutex> growth(growth_, std::try_to_lock);
+    if (growth.owns_lock()) return;
   } catch (const std::runtime_error&) {
     // A child after fork(): the thread that held the lock is not there.
   }
+  leakPools();
+}
+
+// What a thread that stayed in the parent was changing may name memory that is free, so a child never frees it.
+void Tree::leakPools() {
+  (new decltype(blocks_))->swap(blocks_);
+  (new decltype(records_))->swap(records_);
+  (new decltype(last_use_))->swap(last_use_);
+  (new decltype(lists_))->swap(lists_);
+  (new decltype(resources_))->swap(resources_);
+  (new decltype(refits_))->swap(refits_);
 }
 
 // The cell of a node; of a lane only the level, which counts from the cell that was built in bulk.
