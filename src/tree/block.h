@@ -12,9 +12,9 @@
 
 namespace bocst::tree {
 
-/// Loose blocks below one another in one tree, at most. A lane of many triangles shares more bits of a key of 30 than
-/// its block does; of few, it has less than half of its block's (see BulkBuilder::split()).
-constexpr std::size_t kMostLooseDepth = 30 + 30;
+/// Loose blocks below one another in one tree, at most: a lane has less than half of its block's triangles (see
+/// bestSplit() in bulk.cpp).
+constexpr std::size_t kMostLooseDepth = 30;
 
 /// A cell as the frame of bounds.
 inline bounds::CellFrame frameOf(const lattice::Cell& cell) {

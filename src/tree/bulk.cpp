@@ -19,7 +19,8 @@ using V4 = Eigen::Array4f;  // three coordinates and bits that nobody computes w
 
 // Chosen by build time and by `bench --scenarios fresh`: 8 to 16 and 64 to 256 differ by less than 10 %.
 constexpr std::uint32_t kSmallPiece = 12;            // is not divided further where a block has lanes left
-constexpr std::uint32_t kMostSorted = 64;            // larger pieces are divided by their keys, which costs nothing
+constexpr std::uint32_t kMostInCluster = 16;         // neighbours along the curve that stay together in large pieces
+constexpr std::uint32_t kMostOneByOne = 64;          // smaller pieces are divided triangle by triangle
 constexpr std::size_t kMostInSlab = 4096;            // above, the surface is no slab and the pass over it is long
 constexpr std::size_t kMostOnCoarseCurve = 1 << 18;  // a curve of 2^7 cells along each axis parts so many
 constexpr std::uint32_t kMostInEnd = 512;            // the finest pieces that supports are sought by
@@ -52,7 +53,6 @@ double marginOf(float size) { return 8 * 0x1p-24 * static_cast<double>(size); }
 
 void BulkBuilder::build(const oracle::Surface& surface, const std::uint32_t* ids, std::size_t count,
                         const Eigen::AlignedBox3d& region) {
-  is_sorted_ = false;
   base_ = region.min().array().floor();
   const Eigen::Vector3d lo = region.min() - base_, hi = region.max() - base_;
   least_ << (lo.array() - 0.01).cast<float>(), -kInfinity;
@@ -62,7 +62,7 @@ void BulkBuilder::build(const oracle::Surface& surface, const std::uint32_t* ids
   const double inverse_unit = surface.lattice.inverseUnit();
   const Mesh& mesh = *surface.mesh;
   // Each triangle has three places of its own.
-  makeRoom(count, 3 * count);
+  makeRoom(count, 3 * count, 0);
   std::uint32_t kept = 0;
   for (std::size_t i = 0; i < count; ++i) {
     const Mesh::Indices& v = mesh.indices(ids[i]);
@@ -88,6 +88,7 @@ void BulkBuilder::build(const oracle::Surface& surface, const std::uint32_t* ids
   }
   count_ = kept;
   place_count_ = 3 * kept;
+  cluster_count_ = 0;
   divide();
   finish(own_corners_.data(), order_);
 }
@@ -96,7 +97,6 @@ void BulkBuilder::buildAll(const oracle::Surface& surface) {
   const Mesh& mesh = *surface.mesh;
   const std::size_t vertices = mesh.vertexCount(), count = mesh.triangleCount();
   if (count < kLeastToSort || vertices > kMostToSort) throw std::length_error("bocst: a mesh that cannot be sorted");
-  is_sorted_ = true;
   base_.setConstant(lattice::kMiddle);
   least_.setConstant(-kInfinity);
   most_.setConstant(kInfinity);
@@ -105,7 +105,7 @@ void BulkBuilder::buildAll(const oracle::Surface& surface) {
   const auto place = [&](const Eigen::Vector3d& p) { return Eigen::Vector3d((p - origin) * inverse_unit - base_); };
   const Eigen::Vector3d least = place(surface.bounds.min()), most = place(surface.bounds.max());
   size_ = 1.001f * static_cast<float>(least.cwiseAbs().cwiseMax(most.cwiseAbs()).maxCoeff());
-  makeRoom(count, vertices);
+  makeRoom(count, vertices, count);
   for (std::size_t v = 0; v < vertices; ++v) {
     const Eigen::Array3f p = place(mesh.vertex(v)).array().cast<float>();
     store(V4(p[0], p[1], p[2], 0), &places_[4 * v]);
@@ -119,12 +119,14 @@ void BulkBuilder::buildAll(const oracle::Surface& surface) {
   curveKeys(mesh.triangles().data(), count, places_, cells, keys_);
   sortKeys(cells.bits);
   boxTriangles(mesh.triangles().data(), places_, keys_, count, given_, items_);
+  cluster_count_ = 0;
+  cluster(0, static_cast<std::uint32_t>(count));
   divide();
   finish(mesh.triangles().data(), ids_.data());
 }
 
 // Fresh memory costs more than what is done with it here, so all of it comes at once, in huge pages.
-void BulkBuilder::makeRoom(std::size_t triangles, std::size_t places) {
+void BulkBuilder::makeRoom(std::size_t triangles, std::size_t places, std::size_t clusters) {
   constexpr std::size_t kLine = 64, kMostOnSmallPages = 1 << 18;
   std::size_t bytes = 0;
   const auto take = [&bytes, this](auto*& values, std::size_t count) {
@@ -143,6 +145,8 @@ void BulkBuilder::makeRoom(std::size_t triangles, std::size_t places) {
     take(items_, triangles);
     take(order_room_, triangles);
     take(bins_, triangles);
+    take(cluster_order_, clusters);
+    take(clusters_, clusters);
     const std::size_t end = std::exchange(bytes, shared);
     take(rows_, 9 * (triangles + kRowPad));
     bytes = std::max(bytes, end);
@@ -189,27 +193,45 @@ void BulkBuilder::sortKeys(int bits) {
   }
 }
 
+// Makes clusters of sorted triangles, divided where their keys first differ; those that no key parts stay alone.
+void BulkBuilder::cluster(std::uint32_t begin, std::uint32_t count) {
+  if (count <= kMostInCluster) return addCluster(begin, count);
+  const std::uint32_t differ = keys_[begin].code ^ keys_[begin + count - 1].code;
+  if (differ == 0) {
+    for (std::uint32_t i = begin; i < begin + count; ++i) addCluster(i, 1);
+    return;
+  }
+  const std::uint32_t bit = 1u << (31 - __builtin_clz(differ));
+  const SortKey* const first = keys_ + begin;
+  const SortKey* const second =
+      std::partition_point(first, first + count, [bit](const SortKey& key) { return (key.code & bit) == 0; });
+  const auto half = static_cast<std::uint32_t>(second - first);
+  cluster(begin, half);
+  cluster(begin + half, count - half);
+}
+
+void BulkBuilder::addCluster(std::uint32_t begin, std::uint32_t count) {
+  V4 lo = all(kInfinity), hi = all(-kInfinity);
+  for (std::uint32_t i = begin; i < begin + count; ++i) {
+    lo = lo.min(load(items_[i].lo));
+    hi = hi.max(load(items_[i].hi));
+  }
+  Cluster& cluster = clusters_[cluster_count_++];
+  store(lo, cluster.box.lo);
+  store(hi, cluster.box.hi);
+  cluster.begin = begin;
+  cluster.count = count;
+}
+
 // Makes the blocks over given_ and items_.
 void BulkBuilder::divide() {
   const auto count = static_cast<std::uint32_t>(count_);
-  std::iota(order_, order_ + count, 0u);
+  if (cluster_count_ == 0) std::iota(order_, order_ + count, 0u);
+  std::iota(cluster_order_, cluster_order_ + cluster_count_, 0u);
   blocks_.clear();
-  if (count > kMaxLeafTriangles) addBlock({0, count});
+  if (count > kMaxLeafTriangles) addBlock({0, count, 0, cluster_count_});
   ids_.resize(count);
   for (std::size_t i = 0; i < count; ++i) ids_[i] = given_[order_[i]];
-}
-
-// Divides a piece in two; returns how many come first. A large one is divided where its keys first differ, so that a
-// lane shares more of the key.
-std::uint32_t BulkBuilder::split(Piece piece) {
-  if (!is_sorted_ || piece.count <= kMostSorted) return splitByArea(piece);
-  const std::uint32_t differ = keys_[piece.begin].code ^ keys_[piece.begin + piece.count - 1].code;
-  if (differ == 0) return splitByArea(piece);
-  const std::uint32_t bit = 1u << (31 - __builtin_clz(differ));
-  const SortKey* const begin = keys_ + piece.begin;
-  const SortKey* const end =
-      std::partition_point(begin, begin + piece.count, [bit](const SortKey& key) { return (key.code & bit) == 0; });
-  return static_cast<std::uint32_t>(end - begin);
 }
 
 namespace {
@@ -246,56 +268,87 @@ int bestSplit(const V4 (&lo)[kBins], const V4 (&hi)[kBins], const std::uint32_t 
 
 }  // namespace
 
-// Where the areas are least (bestSplit) along the longest axis of the middles, else in the middle.
-std::uint32_t BulkBuilder::splitByArea(Piece piece) {
-  std::uint32_t* const order = &order_[piece.begin];
+// Divides items in two, where the areas are least (bestSplit) along the longest axis of the middles, else in the
+// middle. `order` has their numbers; they are `count` triangles.
+template <typename Items>
+BulkBuilder::Half BulkBuilder::split(std::uint32_t* order, std::uint32_t items, std::uint32_t count, Items all_items) {
   V4 least = all(kInfinity), most = all(-kInfinity);
-  for (std::uint32_t i = 0; i < piece.count; ++i) {
-    const TriangleBox& item = items_[order[i]];
-    const V4 twice = load(item.lo) + load(item.hi);
+  for (std::uint32_t i = 0; i < items; ++i) {
+    const TriangleBox& box = all_items.boxOf(order[i]);
+    const V4 twice = load(box.lo) + load(box.hi);
     least = least.min(twice);
     most = most.max(twice);
   }
   int axis = 0;
   for (int k = 1; k < 3; ++k) axis = most[k] - least[k] > most[axis] - least[axis] ? k : axis;
   const float extent = most[axis] - least[axis];
-  const std::uint32_t half = piece.count / 2;
-  if (!(extent > 1e-30f)) return half;  // of less, the inverse below is infinite
-
-  const float first = least[axis], per = 0.9999f * kBins / extent;
-  V4 lo[kBins], hi[kBins];
-  std::uint32_t counts[kBins] = {};
-  for (int b = 0; b < kBins; ++b) lo[b] = all(kInfinity), hi[b] = all(-kInfinity);
-  for (std::uint32_t i = 0; i < piece.count; ++i) {
-    const TriangleBox& item = items_[order[i]];
-    const auto b = static_cast<int>((item.lo[axis] + item.hi[axis] - first) * per);
-    bins_[i] = static_cast<std::uint8_t>(b);
-    lo[b] = lo[b].min(load(item.lo));
-    hi[b] = hi[b].max(load(item.hi));
-    ++counts[b];
+  int best = 0;
+  if (extent > 1e-30f) {  // of less, the inverse below is infinite
+    const float first = least[axis], per = 0.9999f * kBins / extent;
+    V4 lo[kBins], hi[kBins];
+    std::uint32_t counts[kBins] = {};
+    for (int b = 0; b < kBins; ++b) lo[b] = all(kInfinity), hi[b] = all(-kInfinity);
+    for (std::uint32_t i = 0; i < items; ++i) {
+      const TriangleBox& box = all_items.boxOf(order[i]);
+      const auto b = static_cast<int>((box.lo[axis] + box.hi[axis] - first) * per);
+      bins_[i] = static_cast<std::uint8_t>(b);
+      lo[b] = lo[b].min(load(box.lo));
+      hi[b] = hi[b].max(load(box.hi));
+      counts[b] += all_items.trianglesOf(order[i]);
+    }
+    best = bestSplit(lo, hi, counts, count);
   }
-  const int best = bestSplit(lo, hi, counts, piece.count);
+  Half half{0, 0};
   if (best == 0) {
-    const auto twiceMiddle = [&](std::uint32_t i) { return items_[i].lo[axis] + items_[i].hi[axis]; };
-    std::nth_element(order, order + half, order + piece.count,
-                     [&](std::uint32_t x, std::uint32_t y) { return twiceMiddle(x) < twiceMiddle(y); });
+    const auto twiceMiddle = [&](std::uint32_t i) { return all_items.boxOf(i).lo[axis] + all_items.boxOf(i).hi[axis]; };
+    if (extent > 0) {
+      std::sort(order, order + items,
+                [&](std::uint32_t x, std::uint32_t y) { return twiceMiddle(x) < twiceMiddle(y); });
+    }
+    do {
+      half.triangles += all_items.trianglesOf(order[half.items++]);
+    } while (half.items + 1 < items && 2 * half.triangles + all_items.trianglesOf(order[half.items]) <= count);
     return half;
   }
   // Without a branch, which would be guessed wrong half of the time.
-  std::uint32_t before = 0, behind = 0;
-  for (std::uint32_t i = 0; i < piece.count; ++i) {
+  std::uint32_t behind = 0;
+  for (std::uint32_t i = 0; i < items; ++i) {
     const bool is_before = bins_[i] < best;
     const std::uint32_t item = order[i];
-    order[before] = item;
+    order[half.items] = item;
     order_room_[behind] = item;
-    before += is_before;
+    half.items += is_before;
     behind += !is_before;
+    half.triangles += is_before ? all_items.trianglesOf(item) : 0;
   }
-  std::copy_n(order_room_, behind, order + before);
-  return before;
+  std::copy_n(order_room_, behind, order + half.items);
+  return half;
 }
 
-std::uint32_t BulkBuilder::addBlock(Piece piece) {
+// Replaces the clusters of a piece by their triangles.
+void BulkBuilder::layOut(Piece& piece) {
+  std::uint32_t* to = order_ + piece.begin;
+  for (; piece.clusters > 0; ++piece.cluster, --piece.clusters) {
+    const Cluster& cluster = clusters_[cluster_order_[piece.cluster]];
+    std::iota(to, to + cluster.count, cluster.begin);
+    to += cluster.count;
+  }
+}
+
+// Takes the first part off a piece and returns it.
+BulkBuilder::Piece BulkBuilder::takeHalf(Piece& piece) {
+  if (piece.count <= kMostOneByOne) layOut(piece);
+  const bool by_cluster = piece.clusters > 0;
+  const Half half = by_cluster ? split(cluster_order_ + piece.cluster, piece.clusters, piece.count, Clusters{clusters_})
+                               : split(order_ + piece.begin, piece.count, piece.count, Triangles{items_});
+  const std::uint32_t clusters = by_cluster ? half.items : 0;
+  const Piece first{piece.begin, half.triangles, piece.cluster, clusters};
+  piece = {piece.begin + half.triangles, piece.count - half.triangles, piece.cluster + clusters,
+           piece.clusters - clusters};
+  return first;
+}
+
+std::uint32_t BulkBuilder::addBlock(const Piece& piece) {
   Piece parts[8] = {piece};
   std::uint32_t count = 1;
   while (count < 8) {
@@ -304,15 +357,16 @@ std::uint32_t BulkBuilder::addBlock(Piece piece) {
       if (part.count > (largest != nullptr ? largest->count : 0) && part.count > kSmallPiece) largest = &part;
     }
     if (largest == nullptr) break;
-    const std::uint32_t first = split(*largest);
-    parts[count++] = {largest->begin + first, largest->count - first};
-    largest->count = first;
+    parts[count] = takeHalf(*largest);
+    ++count;
   }
   const auto number = static_cast<std::uint32_t>(blocks_.size());
   blocks_.emplace_back();
   blocks_[number].lanes = count;
   for (std::uint32_t o = 0; o < count; ++o) {
-    const std::uint32_t child = parts[o].count <= kMaxLeafTriangles ? kNone : addBlock(parts[o]);
+    const bool is_leaf = parts[o].count <= kMaxLeafTriangles;
+    if (is_leaf) layOut(parts[o]);
+    const std::uint32_t child = is_leaf ? kNone : addBlock(parts[o]);
     blocks_[number].lane[o] = {parts[o].begin, parts[o].count, child};
   }
   return number;
@@ -324,8 +378,8 @@ CornerRows BulkBuilder::rows() const {
   return rows;
 }
 
-PieceBounds BulkBuilder::boundsOf(Piece piece) const {
-  PieceBounds b = boundPiece(rows(), piece.begin, piece.count);
+PieceBounds BulkBuilder::boundsOf(std::uint32_t begin, std::uint32_t count) const {
+  PieceBounds b = boundPiece(rows(), begin, count);
   Eigen::Map<V4>(b.lo) = load(b.lo).max(least_);
   Eigen::Map<V4>(b.hi) = load(b.hi).min(most_);
   return b;
@@ -341,7 +395,7 @@ void BulkBuilder::boundBlocks() {
     PieceBounds lanes[8], &own = block_bounds_[number];
     for (std::uint32_t o = 0; o < block.lanes; ++o) {
       const Lane& lane = block.lane[o];
-      lanes[o] = lane.block == kNone ? boundsOf({lane.begin, lane.count}) : block_bounds_[lane.block];
+      lanes[o] = lane.block == kNone ? boundsOf(lane.begin, lane.count) : block_bounds_[lane.block];
       if (o == 0) {
         own = lanes[0];
         continue;
@@ -363,7 +417,7 @@ void BulkBuilder::boundBlocks() {
     for (std::uint32_t o = 0; o < block.lanes; ++o) count += block.lane[o].count;
     for (std::uint32_t o = 0; o < block.lanes; ++o) {
       if (count > kMostInEnd && block.lane[o].count <= kMostInEnd) {
-        ends_.push_back({{block.lane[o].begin, block.lane[o].count}, lanes[o]});
+        ends_.push_back({block.lane[o].begin, block.lane[o].count, lanes[o]});
       }
       bounds::NodeBounds& b = block.bounds[o];
       corner(lanes[o].lo, -margin, lo);
@@ -391,7 +445,7 @@ void BulkBuilder::withEnds(F&& f) const {
   std::vector<std::array<std::uint32_t, 2>> pieces;
   for (std::size_t i = 0; i < ends_.size(); ++i) {
     const PieceBounds& b = ends_[i].bounds;
-    pieces.push_back({ends_[i].piece.begin, ends_[i].piece.count});
+    pieces.push_back({ends_[i].begin, ends_[i].count});
     for (std::size_t c = 0; c < 3; ++c) {
       center[c * stride + i] = (b.lo[c] + b.hi[c]) / 2;
       half[c * stride + i] = (b.hi[c] - b.lo[c]) / 2;
@@ -472,19 +526,19 @@ void BulkBuilder::finish(const Mesh::Indices* indices, const std::uint32_t* numb
   if (ids_.empty()) return;
   gatherCorners(indices, places_, numbers, count_, rows_, count_ + kRowPad);
   boundBlocks();
-  const Piece whole{0, static_cast<std::uint32_t>(ids_.size())};
-  const PieceBounds bounds = blocks_.empty() ? boundsOf(whole) : block_bounds_[0];
-  if (ends_.empty()) ends_.push_back({whole, bounds});
+  const auto count = static_cast<std::uint32_t>(ids_.size());
+  const PieceBounds bounds = blocks_.empty() ? boundsOf(0, count) : block_bounds_[0];
+  if (ends_.empty()) ends_.push_back({0, count, bounds});
   const double margin = marginOf(size_);
   for (int k = 0; k < 3; ++k) {
     own_.box.min()[k] = static_cast<double>(bounds.lo[k]) + base_[k] - margin;
     own_.box.max()[k] = static_cast<double>(bounds.hi[k]) + base_[k] + margin;
   }
-  if (whole.count > kMostInSlab || !encodeNormal(bounds.normal, own_.normal)) return;
+  if (count > kMostInSlab || !encodeNormal(bounds.normal, own_.normal)) return;
   const CornerRows rows = this->rows();
   float n[3], least, most;
   for (int k = 0; k < 3; ++k) n[k] = static_cast<float>(own_.normal[k]);
-  extremesAlong(rows, 0, whole.count, n, least, most);
+  extremesAlong(rows, 0, count, n, least, most);
   double base = 0;
   for (int k = 0; k < 3; ++k) base += own_.normal[k] * base_[k];
   own_.least = static_cast<double>(least) + base - bounds::kMostNormalNorm1 * margin;

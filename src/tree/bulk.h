@@ -49,8 +49,8 @@ class BulkBuilder {
   void build(const oracle::Surface& surface, const std::uint32_t* ids, std::size_t count,
              const Eigen::AlignedBox3d& region);
 
-  /// The same for all triangles of a larger surface, which are first sorted along a Z-order curve: only pieces of few
-  /// triangles are divided by the heuristic.
+  /// The same for all triangles of a larger surface, which are first sorted along a Z-order curve. Clusters of
+  /// neighbours along the curve are divided by the heuristic, and in pieces of few triangles the triangles themselves.
   /// @throws std::length_error for less than kLeastToSort triangles, or more than kMostToSort vertices.
   void buildAll(const oracle::Surface& surface);
   static constexpr std::size_t kLeastToSort = 4096, kMostToSort = std::size_t{1} << 29;
@@ -67,26 +67,49 @@ class BulkBuilder {
   const Own& own() const { return own_; }
 
  private:
+  struct Cluster {
+    TriangleBox box;
+    std::uint32_t begin, count;  ///< Of the sorted triangles.
+  };
   struct Piece {
-    std::uint32_t begin, count;
+    std::uint32_t begin, count;       ///< Of ids().
+    std::uint32_t cluster, clusters;  ///< Of cluster_order_; none where order_ has its triangles.
+  };
+  // What is divided, one by one.
+  struct Clusters {
+    const Cluster* clusters;
+    const TriangleBox& boxOf(std::uint32_t i) const { return clusters[i].box; }
+    std::uint32_t trianglesOf(std::uint32_t i) const { return clusters[i].count; }
+  };
+  struct Triangles {
+    const TriangleBox* boxes;
+    const TriangleBox& boxOf(std::uint32_t i) const { return boxes[i]; }
+    std::uint32_t trianglesOf(std::uint32_t) const { return 1; }
+  };
+  struct Half {
+    std::uint32_t items, triangles;  ///< Of the first part.
   };
   struct End {
-    Piece piece;
+    std::uint32_t begin, count;  ///< Of ids().
     PieceBounds bounds;
   };
 
-  void makeRoom(std::size_t triangles, std::size_t places);
+  void makeRoom(std::size_t triangles, std::size_t places, std::size_t clusters);
   void sortKeys(int bits);
+  void cluster(std::uint32_t begin, std::uint32_t count);
+  void addCluster(std::uint32_t begin, std::uint32_t count);
   void divide();
-  std::uint32_t addBlock(Piece piece);
-  std::uint32_t split(Piece piece);
-  std::uint32_t splitByArea(Piece piece);
+  std::uint32_t addBlock(const Piece& piece);
+  void layOut(Piece& piece);
+  Piece takeHalf(Piece& piece);
+  template <typename Items>
+  Half split(std::uint32_t* order, std::uint32_t items, std::uint32_t count, Items all_items);
   void finish(const Mesh::Indices* indices, const std::uint32_t* numbers);
   CornerRows rows() const;
   template <typename F>
   void withEnds(F&& f) const;
   Eigen::Matrix3d principalAxes() const;
-  PieceBounds boundsOf(Piece piece) const;
+  PieceBounds boundsOf(std::uint32_t begin, std::uint32_t count) const;
   void boundBlocks();
 
   // Where what is below lies, for `count_` triangles.
@@ -94,10 +117,13 @@ class BulkBuilder {
   HugePages huge_pages_;
   std::byte* memory_ = nullptr;
   std::size_t room_ = 0, count_ = 0, place_count_ = 0;
+  std::uint32_t cluster_count_ = 0;
   float* places_;  // four each: of vertices, or of corners
   SortKey *keys_, *keys_room_;
   std::uint32_t* given_;                    // triangles, before they are divided
   TriangleBox* items_;                      // and their boxes in the region
+  std::uint32_t* cluster_order_;            // of the clusters in the blocks
+  Cluster* clusters_;                       // of sorted triangles
   std::uint32_t *order_, *order_room_;      // of the items in the blocks
   std::uint8_t* bins_;                      // of the items of a piece
   float* rows_;                             // nine rows of corners
@@ -111,7 +137,6 @@ class BulkBuilder {
   Eigen::Vector3d base_;         // of the float coordinates, whole lattice units
   Eigen::Array4f least_, most_;  // the region
   float size_ = 0;               // largest float coordinate, in absolute value
-  bool is_sorted_ = false;       // items lie along keys_
 };
 
 }  // namespace bocst::tree

@@ -141,10 +141,10 @@ HWY_INLINE FaceGaps faceGaps(const Frame& f, std::size_t i, const Frame& y, std:
   return gaps;
 }
 
-// Are the octants from i on apart from the volume along one of both slab normals? For z in a box with |m.z - offset| <=
-// w, any a gives n.z in a * offset +- (|a| w + |n - a m| over the box).
-HWY_INLINE M apartBySlabs(const Frame& f, std::size_t i, const Frame& y, std::size_t l, const V (&displacement)[2][3],
-                          V rounding_margin) {
+// By how much the octants from i on overlap the volume along the slab normal of either, the lesser; below 0 they are
+// apart. For z in a box with |m.z - offset| <= w, any a gives n.z in a * offset +- (|a| w + |n - a m| over the box).
+HWY_INLINE V slabOverlap(const Frame& f, std::size_t i, const Frame& y, std::size_t l, const V (&displacement)[2][3],
+                         V rounding_margin) {
   const D d;
   const V x_center = hn::Load(d, f.slab_center + i), x_half = hn::Load(d, f.slab_half + i);
   const V y_center = hn::Set(d, y.slab_center[l]), y_half = hn::Set(d, y.slab_half[l]);
@@ -162,7 +162,7 @@ HWY_INLINE M apartBySlabs(const Frame& f, std::size_t i, const Frame& y, std::si
     t = hn::MulAdd(n[k], displacement[1][k], t);
     r = hn::MulAdd(hn::Set(d, y.half[0][k][l]), hn::Abs(hn::NegMulAdd(along, m[k], n[k])), r);
   }
-  const M apart = hn::Gt(hn::Abs(t), r);
+  const V first = hn::Sub(r, hn::Abs(t));
   t = hn::NegMulAdd(along, x_center, y_center);
   r = hn::MulAdd(abs_along, x_half, hn::Add(y_half, rounding_margin));
   BOCST_UNROLL
@@ -172,12 +172,12 @@ HWY_INLINE M apartBySlabs(const Frame& f, std::size_t i, const Frame& y, std::si
     r = hn::MulAdd(hn::Load(d, f.half[0][k] + i), hn::Abs(hn::NegMulAdd(along, hn::Load(d, f.normal[0][k] + i), mk)),
                    r);
   }
-  return hn::Or(apart, hn::Gt(hn::Abs(t), r));
+  return hn::Min(first, hn::Sub(r, hn::Abs(t)));
 }
 
 // Bit o is set unless octant o of frame f is surely apart from the volume in lane l of frame y, of the other side, by
 // one of eight axes: the faces of both boxes and both slab normals. No edge axes: with slabs they gain nothing. Bits of
-// octants that are not in `octants` are 0. `order`, unless null: see StepGroup; the overlap is that along the faces.
+// octants that are not in `octants` are 0. `order`, unless null: see StepGroup; the overlap is the least of all axes.
 HWY_INLINE unsigned overlapping(const PairFrames& g, const Frame& f, const Frame& y, std::size_t l, unsigned octants,
                                 std::uint32_t* order) {
   const D d;
@@ -186,13 +186,13 @@ HWY_INLINE unsigned overlapping(const PairFrames& g, const Frame& f, const Frame
   unsigned result = 0;
   for (std::size_t i = 0; i < 8; i += hn::Lanes(d)) {
     const FaceGaps gaps = faceGaps(f, i, y, l, rounding_margin);
-    const M apart =
-        hn::Or(hn::Lt(gaps.least, hn::Zero(d)), apartBySlabs(f, i, y, l, gaps.displacement, slab_rounding_margin));
+    const V least = hn::Min(gaps.least, slabOverlap(f, i, y, l, gaps.displacement, slab_rounding_margin));
+    const M apart = hn::Lt(least, hn::Zero(d));
     const std::uint8_t wanted[8] = {static_cast<std::uint8_t>(octants >> i)};
     const M left = hn::AndNot(apart, hn::LoadMaskBits(d, wanted));
     if (order != nullptr) {
       const auto depth =
-          hn::Or(hn::And(hn::BitCast(du, gaps.least), hn::Set(du, ~7u)), hn::Iota(du, static_cast<std::uint32_t>(i)));
+          hn::Or(hn::And(hn::BitCast(du, least), hn::Set(du, ~7u)), hn::Iota(du, static_cast<std::uint32_t>(i)));
       hn::StoreU(depth, du, order + i);
     }
     std::uint8_t bits[8] = {};
