@@ -19,7 +19,7 @@ using States = std::vector<ArmWorld::Poses>;
 constexpr std::size_t kStatesInTurn = 25;  // states, or pairs, that one side is asked before the other is
 constexpr std::size_t kMostPairs = 4000;   // that are timed one by one
 constexpr double kNearGap = 0.02;          // metres: nearer misses are near ones
-constexpr std::size_t kSettle = 4;         // times that pairs are asked before they are timed
+constexpr std::size_t kSettle = 4;         // times that states are asked before they are timed as settled
 constexpr std::size_t kFlushed = 200;      // pairs that are asked with flushed caches
 constexpr double kRest = 20;               // seconds, more than the default ttl
 constexpr std::size_t kRests = 200;        // states that are each asked after a rest
@@ -153,6 +153,13 @@ class PlannerBench {
     return arms_.fcl->distance(pair) < kNearGap ? Kind::kNear : Kind::kFar;
   }
 
+  static void settle(const BocstManagedArm& arm, const std::vector<AskedPair>& asked) {
+    warmUp([&arm] { return arm.growth(); },
+           [&] {
+             for (const AskedPair& pair : asked) arm.touch(pair);
+           });
+  }
+
   /// Pairs as the broad phase gives them, asked one by one until nothing grows, then timed.
   void pairs() {
     std::vector<AskedPair> asked;
@@ -161,9 +168,7 @@ class PlannerBench {
       arms_.fcl->collides(edge_states_[i], &asked);
     }
     std::vector<double> ours(asked.size()), theirs(asked.size());
-    for (std::size_t i = 0; i < kSettle; ++i) {
-      for (const AskedPair& pair : asked) arms_.bocst->touch(pair);
-    }
+    settle(*arms_.bocst, asked);
     const double overhead = clockOverhead();
     for (std::size_t begin = 0; begin < asked.size(); begin += kStatesInTurn) {
       const std::size_t end = std::min(begin + kStatesInTurn, asked.size());
@@ -215,9 +220,7 @@ class PlannerBench {
     Options options;
     options.clock = [now = Clock::now()] { return now; };
     const auto bocst = manageBocstArm(world_, options);
-    for (std::size_t i = 0; i < kSettle; ++i) {
-      for (const AskedPair& pair : asked) bocst->touch(pair);
-    }
+    settle(*bocst, asked);
     std::vector<char> memory(std::size_t{1} << 28);
     double ours = 0, theirs = 0;
     const std::size_t count = std::min(kFlushed, asked.size());
@@ -273,9 +276,8 @@ class PlannerBench {
       for (const ArmWorld::Poses& X_WL : random_states_) arm.collides(X_WL);
       return watch.microseconds() / static_cast<double>(random_states_.size());
     };
-    for (std::size_t i = 0; i < kSettle; ++i) {
-      once(*with);
-      once(*arms_.bocst);
+    for (BocstManagedArm* arm : {with.get(), arms_.bocst.get()}) {
+      warmUp([arm] { return arm->growth(); }, [&] { once(*arm); });
     }
     const double with_margin = once(*with), without = once(*arms_.bocst);
     report_.figure(prefix_ + "margin", name_ + "random states, margin 10 mm between two models",

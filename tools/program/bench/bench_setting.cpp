@@ -113,21 +113,27 @@ std::optional<std::size_t> BenchSetting::hits() const {
 
 std::string BenchSetting::oracleName() const { return makeBocst()->oracleName(); }
 
-void warmUp(const BocstPair& pair, const std::vector<Eigen::Isometry3d>& X_ABs,
-            const std::function<void(const Eigen::Isometry3d&)>& ask) {
+void warmUp(const std::function<std::vector<std::uint64_t>()>& growth, const std::function<void()>& ask) {
   // Pools grow in steps, so a few rounds without a change say little; and ttl may take from the largest what was grown.
   constexpr int kMostRounds = 60, kQuietRounds = 8;
-  const auto state = [&pair] {
-    const Statistics a = pair.statisticsA(), b = pair.statisticsB();
-    return std::array<std::uint64_t, 3>{a.expansions, b.expansions, pair.bytes()};
-  };
-  auto before = state();
+  std::vector<std::uint64_t> before = growth();
   for (int round = 0, quiet = 0; round < kMostRounds && quiet < kQuietRounds; ++round) {
-    for (const Eigen::Isometry3d& X_AB : X_ABs) ask(X_AB);
-    const auto after = state();
+    ask();
+    const std::vector<std::uint64_t> after = growth();
     quiet = after == before ? quiet + 1 : 0;
     before = after;
   }
+}
+
+void warmUp(const BocstPair& pair, const std::vector<Eigen::Isometry3d>& X_ABs,
+            const std::function<void(const Eigen::Isometry3d&)>& ask) {
+  const auto growth = [&pair] {
+    const Statistics a = pair.statisticsA(), b = pair.statisticsB();
+    return std::vector<std::uint64_t>{a.expansions, b.expansions, pair.bytes()};
+  };
+  warmUp(growth, [&] {
+    for (const Eigen::Isometry3d& X_AB : X_ABs) ask(X_AB);
+  });
 }
 
 void warmUp(const BocstPair& pair, const std::vector<Eigen::Isometry3d>& X_ABs) {

@@ -79,7 +79,10 @@ class BenchSetting {
   std::vector<bool> query_verdicts_;
 };
 
-/// Asks until the trees have stopped growing; whether the two touch, if nothing else.
+/// Asks all, again and again, until the trees have stopped growing. `growth` changes when they grow.
+void warmUp(const std::function<std::vector<std::uint64_t>()>& growth, const std::function<void()>& ask);
+
+/// The same of a pair at some poses; whether the two touch, if nothing else.
 void warmUp(const BocstPair& pair, const std::vector<Eigen::Isometry3d>& X_ABs,
             const std::function<void(const Eigen::Isometry3d&)>& ask);
 void warmUp(const BocstPair& pair, const std::vector<Eigen::Isometry3d>& X_ABs);

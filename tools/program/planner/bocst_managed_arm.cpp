@@ -26,6 +26,16 @@ class BocstArm final : public ManagedArmOf<BocstManagedArm, BocstQueries> {
         Clock::now() + std::chrono::duration_cast<Clock::duration>(std::chrono::duration<double>(seconds));
     for (const auto& geometry : geometries()) static_cast<Modeld&>(*geometry).prune(later);
   }
+
+  std::vector<std::uint64_t> growth() const override {
+    std::vector<std::uint64_t> growth;
+    for (const auto& geometry : geometries()) {
+      const Statistics statistics = static_cast<const Modeld&>(*geometry).statistics();
+      growth.push_back(statistics.built_triangles);
+      growth.push_back(statistics.resident_bytes);
+    }
+    return growth;
+  }
 };
 
 }  // namespace

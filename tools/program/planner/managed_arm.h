@@ -5,6 +5,7 @@
 
 #include <Eigen/Geometry>
 #include <cstddef>
+#include <cstdint>
 #include <memory>
 #include <utility>
 #include <vector>
@@ -50,6 +51,9 @@ class BocstManagedArm : public ManagedArm {
  public:
   /// As after so many seconds without a query.
   virtual void rest(double seconds) = 0;
+
+  /// Changes whenever a tree grows: what each has built so far, and its size.
+  virtual std::vector<std::uint64_t> growth() const = 0;
 };
 std::unique_ptr<BocstManagedArm> manageBocstArm(const ArmWorld& world, const Options& options = {});
 
