@@ -158,14 +158,6 @@ Raw fan(std::mt19937_64& g) {
   return raw;
 }
 
-// Where Debian's libfcl fuses products and sums, which bocst's own code never does, the last bit of a pose decides
-// there.
-#ifdef __aarch64__
-constexpr double kAtContact = 1e-12;
-#else
-constexpr double kAtContact = 0;
-#endif
-
 TYPED_TEST(Collide, SmallMeshesBesideLargeTriangles) {
   using S = TypeParam;
   // As large as a few of the other's triangles, which it meets by their insides, their edges and their corners.
@@ -188,7 +180,7 @@ TYPED_TEST(Collide, SmallMeshesBesideLargeTriangles) {
       const auto at = [&](double x) { return test::pose<S>(R, from + d * x); };
       const double contact =
           test::contactDistance([&](double x) { return test::touching<S>(*fa, I, *fb, at(x)); }, 4, 52);
-      for (const double gap : {-0.3, -1e-2, -1e-4, -1e-6, kAtContact, 1e-6, 1e-4, 1e-2}) {
+      for (const double gap : {-0.3, -1e-2, -1e-4, -1e-6, test::kAtContact, 1e-6, 1e-4, 1e-2}) {
         const auto X = at(contact + gap);
         const Pairs found = test::pairs<S>(a, I, b, X), turned = test::pairs<S>(b, X, a, I);
         SCOPED_TRACE(testing::Message() << ra.vertices[1].norm() << " pose " << i << " gap " << gap);
