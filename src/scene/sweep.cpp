@@ -4,6 +4,8 @@
 #include <algorithm>
 #include <cmath>
 
+#include "fcl/queries/grow_together.h"
+
 namespace bocst::scene {
 namespace {
 
@@ -66,6 +68,28 @@ bool Sweep<S>::setFar(const World<S>& world, std::size_t states, const Part& par
   return near;
 }
 
+// What conservative answers to all states need grows in few batches, where an oracle is slow to answer.
+template <typename S>
+void Sweep<S>::growForAll(const World<S>& world, const fcl::Transform3<S>* X_WM, std::size_t states) {
+  std::vector<fcl_adapter::PosedPair<S>> pairs;
+  for (std::size_t k = 0; k < states; ++k) {
+    const fcl::Transform3<S>* X = X_WM + k * world.moving.size();
+    check_.place(X);
+    for (const NearGroup& n : check_.findNear(0)) {
+      const Object<S>& a = world.moving[n.box];
+      for (std::uint32_t left = n.mask; left != 0; left &= left - 1) {
+        const auto lane = static_cast<std::uint32_t>(__builtin_ctz(left));
+        const Object<S>& b = world.object(n.group, lane);
+        if (!(n.gap[lane] <= 0) || a.model == nullptr || b.model == nullptr) continue;
+        if (!a.model->isOccupied() || !b.model->isOccupied()) continue;
+        if (!fcl_adapter::growsTogether(*a.model, *b.model)) continue;
+        pairs.push_back({a.model, X[n.box], b.model, check_.pose(X, n.group, lane)});
+      }
+    }
+  }
+  if (!pairs.empty()) fcl_adapter::growTogether<S>(pairs, nullptr);
+}
+
 // In one function: the three goals differ in what comes next and when it ends, but share each state's check.
 template <typename S>
 std::size_t Sweep<S>::run(const World<S>& world, const fcl::Transform3<S>* X_WM, std::size_t states, Goal goal,
@@ -75,6 +99,7 @@ std::size_t Sweep<S>::run(const World<S>& world, const fcl::Transform3<S>* X_WM,
   if (states == 0 || moving == 0) return states;
   check_.start(world);
   check_.orthogonality_errors.assign(orthogonality_errors.begin(), orthogonality_errors.end());
+  if (goal == Goal::kAll && states > 1 && world.grows_together) growForAll(world, X_WM, states);
   measure(world, X_WM, states);
   std::size_t found = states;
   parts_.clear();

@@ -34,6 +34,7 @@ class Sweep {
     bool has_list;
   };
 
+  void growForAll(const World<S>& world, const fcl::Transform3<S>* X_WM, std::size_t states);
   void measure(const World<S>& world, const fcl::Transform3<S>* X_WM, std::size_t states);
   bool setFar(const World<S>& world, std::size_t states, const Part& part, std::size_t middle);
 

@@ -11,6 +11,7 @@
 #include <string>
 
 #include "fcl/adapters/validate.h"
+#include "fcl/queries/grow_together.h"
 #include "simd/float4.h"
 
 namespace bocst::scene {
@@ -266,6 +267,12 @@ World<S>::World(std::vector<Object<S>> moving_objects, std::vector<Object<S>> fi
   if (unbounded > 0) parts.emplace_back(0, unbounded);
   if (order.size() > unbounded) parts.emplace_back(unbounded, order.size());
   if (!parts.empty()) build(order, parts, boxes, fixed_objects);
+
+  const auto growsSlowly = [](const Object<S>& o) {
+    return o.model != nullptr && fcl_adapter::growsTogether(*o.model, *o.model);
+  };
+  grows_together = std::any_of(moving.begin(), moving.end(), growsSlowly) ||
+                   std::any_of(fixed_objects.begin(), fixed_objects.end(), growsSlowly);
 
   masks.assign(moving.size() * allGroups(), 0);
   for (std::size_t i = 0; i < moving.size(); ++i) {

@@ -75,8 +75,9 @@ class World {
   /// [i * allGroups() + group]: lanes that make a pair with moving object i; of two moving objects in row of the first.
   std::vector<std::uint8_t> masks;
   std::size_t pair_count = 0;
-  double fixed_error = 0;  ///< The largest orthogonality error of fixed objects.
-  std::uint64_t serial;    ///< No other world has it.
+  bool grows_together = false;  ///< A model is worth fcl_adapter::growTogether().
+  double fixed_error = 0;       ///< The largest orthogonality error of fixed objects.
+  std::uint64_t serial;         ///< No other world has it.
 
  private:
   std::int32_t build(std::vector<std::uint32_t>& order, std::vector<std::pair<std::size_t, std::size_t>> parts,

@@ -161,20 +161,19 @@ void Tree::releaseMesh() {
 
 // In one function, as what a node asks for depends on what the nodes before it have grown.
 void Tree::grow(std::vector<Growth>& batch, bool wait) {
-  // Every growth locks the trees of its pair in address order.
-  std::array<Tree*, 2> trees{};
+  // Every growth locks its trees in address order.
+  std::vector<Tree*> trees;
   for (const Growth& g : batch) {
-    if (trees[0] == nullptr) trees[0] = g.tree;
-    if (g.tree != trees[0]) trees[1] = g.tree;
+    if (trees.empty() || g.tree != trees.back()) trees.push_back(g.tree);
   }
-  if (trees[1] != nullptr && std::less<Tree*>()(trees[1], trees[0])) std::swap(trees[0], trees[1]);
-  std::array<std::unique_lock<thread::ForkAwareMutex>, 2> locks;
-  for (int i = 0; i < 2; ++i) {
-    if (trees[i] == nullptr) continue;
-    locks[i] = std::unique_lock<thread::ForkAwareMutex>(trees[i]->growth_, std::defer_lock);
+  std::sort(trees.begin(), trees.end(), std::less<Tree*>());
+  trees.erase(std::unique(trees.begin(), trees.end()), trees.end());
+  std::vector<std::unique_lock<thread::ForkAwareMutex>> locks;
+  for (Tree* tree : trees) {
+    locks.emplace_back(tree->growth_, std::defer_lock);
     if (wait) {
-      locks[i].lock();
-    } else if (!locks[i].try_lock()) {
+      locks.back().lock();
+    } else if (!locks.back().try_lock()) {
       return;
     }
   }
@@ -226,7 +225,6 @@ void Tree::grow(std::vector<Growth>& batch, bool wait) {
   }
   ask(asked, requests);
   for (Tree* tree : trees) {
-    if (tree == nullptr) continue;
     const auto mine = [tree](const Growth& g) { return g.tree == tree; };
     if (std::any_of(asked.begin(), asked.end(), mine)) ++tree->batches_;
     tree->countBytes();
@@ -235,7 +233,7 @@ void Tree::grow(std::vector<Growth>& batch, bool wait) {
 
 // The questions of one oracle go out together.
 void Tree::ask(std::vector<Growth>& asked, std::vector<oracle::ExpansionRequest>& requests) {
-  const auto publish_all = [&](std::vector<oracle::ExpansionRequest>& answers, const std::vector<Growth>& growths) {
+  const auto publish_all = [](std::vector<oracle::ExpansionRequest>& answers, const std::vector<Growth>& growths) {
     oracle::Oracle& oracle = *growths.front().tree->oracle_;
     oracle.submit(answers);
     oracle.wait(answers);
@@ -244,21 +242,22 @@ void Tree::ask(std::vector<Growth>& asked, std::vector<oracle::ExpansionRequest>
       growths[i].tree->cells_ += 8;
     }
   };
-  if (asked.empty()) return;
-  const oracle::Oracle* const first = asked.front().tree->oracle_.get();
-  const auto is_other = [first](const Growth& g) { return g.tree->oracle_.get() != first; };
-  if (std::none_of(asked.begin(), asked.end(), is_other)) {
-    publish_all(requests, asked);
-    return;
+  // Those of the first oracle, until none are left.
+  while (!asked.empty()) {
+    const oracle::Oracle* const first = asked.front().tree->oracle_.get();
+    const auto is_other = [first](const Growth& g) { return g.tree->oracle_.get() != first; };
+    if (std::none_of(asked.begin(), asked.end(), is_other)) return publish_all(requests, asked);
+    std::vector<oracle::ExpansionRequest> part, rest;
+    std::vector<Growth> growths, others;
+    for (std::size_t i = 0; i < asked.size(); ++i) {
+      const bool is_rest = is_other(asked[i]);
+      (is_rest ? rest : part).push_back(std::move(requests[i]));
+      (is_rest ? others : growths).push_back(asked[i]);
+    }
+    publish_all(part, growths);
+    asked.swap(others);
+    requests.swap(rest);
   }
-  std::array<std::vector<oracle::ExpansionRequest>, 2> parts;
-  std::array<std::vector<Growth>, 2> growths;
-  for (std::size_t i = 0; i < asked.size(); ++i) {
-    const std::size_t part = is_other(asked[i]);
-    parts[part].push_back(std::move(requests[i]));
-    growths[part].push_back(asked[i]);
-  }
-  for (std::size_t part = 0; part < 2; ++part) publish_all(parts[part], growths[part]);
 }
 
 void Tree::askFor(std::uint32_t list, oracle::ExpansionRequest& request, std::vector<std::uint32_t>& ids) const {

@@ -129,6 +129,9 @@ class Tree {
   /// while another thread grows one of the trees.
   static void grow(std::vector<Growth>& batch, bool wait = true);
 
+  /// A batch takes an oracle long, however small it is: walks that grow together ask it less often.
+  bool growsSlowly() const { return oracle_->kind() != OracleKind::kCpu; }
+
   /// Growth that no answer needs is welcome: it would not bring the tree near its memory budget.
   bool hasBudget() const { return options_.memory_budget == 0 || bytes_ < options_.memory_budget / 2; }
 

@@ -24,6 +24,7 @@
 #include "fcl/queries/collide_row.h"
 #include "fcl/queries/collide_shape.h"
 #include "fcl/queries/contact_order.h"
+#include "fcl/queries/grow_together.h"
 #include "fcl/queries/inside.h"
 #include "fcl/queries/inside_contact.h"
 #include "fcl/queries/query_scope.h"
@@ -558,17 +559,11 @@ struct Models {
   const Model<S>*first, *second;
 };
 
-// Is the second to be side A? Without a choice, only where the first is no model. Conservative verdicts must not depend
-// on the argument order, so there the walk has an order of its own: by address only where the poses are equal, so that
-// what a query grows does not depend on where models happen to lie.
+// Is the second to be side A? Without a choice, only where the first is no model.
 template <typename S>
 bool turnsRound(const Models<S>& models, const fcl::Transform3<S>& X_W1, const fcl::Transform3<S>& X_W2) {
-  if (models.first == nullptr || models.second == nullptr) return models.first == nullptr;
-  const tree::Tree &tree1 = treeOf(*models.first), &tree2 = treeOf(*models.second);
-  if (!tree1.conservative() && !tree2.conservative()) return false;
-  const S *x1 = X_W1.matrix().data(), *x2 = X_W2.matrix().data();
-  const auto differ = std::mismatch(x1, x1 + 16, x2);
-  return differ.first == x1 + 16 ? std::less<const tree::Tree*>()(&tree2, &tree1) : *differ.second < *differ.first;
+  if (!models.areTwo()) return models.first == nullptr;
+  return walksTurned(treeOf(*models.first), X_W1, treeOf(*models.second), X_W2);
 }
 
 // Are two models so far apart that nothing need be locked? For poses that are surely rigid. False where branches are
@@ -640,7 +635,15 @@ void collideRow(const Model<S>& a, const Model<S>& b, const fcl::Transform3<S>* 
   if (!a.isOccupied() || !b.isOccupied()) return;
   const Models<S> models(&a, &b);
   const double margin = marginOf(&a, &b);
+  const bool together = growsTogether(a, b);
+  if (together) {
+    std::vector<PosedPair<S>> pairs;
+    for (std::size_t k = 0; k < count; ++k) pairs.push_back({&a, identity, &b, X_AB[k]});
+    growTogether(pairs, hit);
+  }
   for (std::size_t k = 0; k < count; ++k) {
+    // Where their surfaces are apart, one may still be inside the other.
+    if (together && (hit[k] != 0 || (treeOf(a).solid() == nullptr && treeOf(b).solid() == nullptr))) continue;
     if (isSurelyRigid(X_AB[k]) && areFarApart(models, identity, X_AB[k], margin)) continue;
     const CollideQuery<S> q{
         {&a, identity, &b, X_AB[k], turnsRound(models, identity, X_AB[k])}, request, result, margin};

@@ -12,6 +12,15 @@
 
 namespace bocst::fcl_adapter {
 
+/// Has a tree do what waits for the end of a query. Without memory for it, that waits for a later query; the answer
+/// stands.
+inline void endQuery(const query::TreeSide& side) {
+  try {
+    side.tree().afterQuery(side.now());
+  } catch (const std::bad_alloc&) {
+  }
+}
+
 /// The session of one query about one or two trees. While it lives, it holds their query locks shared, so nobody
 /// removes nodes; when it ends, also by an exception, it gives the locks back and calls Tree::afterQuery() of both.
 class QueryScope {
@@ -26,8 +35,8 @@ class QueryScope {
   }
   ~QueryScope() {
     locks_.release();
-    afterQuery(a_);
-    if (&b_.tree() != &a_.tree()) afterQuery(b_);
+    endQuery(a_);
+    if (&b_.tree() != &a_.tree()) endQuery(b_);
   }
   QueryScope(const QueryScope&) = delete;
   QueryScope& operator=(const QueryScope&) = delete;
@@ -66,14 +75,6 @@ class QueryScope {
     tree::Tree* second_ = nullptr;
     std::size_t shard_;
   };
-
-  // Without memory for it, it waits for a later query; the answer stands.
-  static void afterQuery(const query::TreeSide& side) {
-    try {
-      side.tree().afterQuery(side.now());
-    } catch (const std::bad_alloc&) {
-    }
-  }
 
   ReadLocks locks_;
   query::TreeSide a_, b_;

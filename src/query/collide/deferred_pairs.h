@@ -42,6 +42,32 @@ class DeferredPairs {
   /// logarithm of its pairs more.
   template <typename F>
   void grow(const A& a, const B& b, const SimilarityTransform& b_in_a, bool ends_at_first, F&& f) {
+    const auto end = choose(a, b, b_in_a, ends_at_first);
+    growths_.clear();
+    for (auto w = end; w != waiting_.end(); ++w) add(a, b, w->pair, growths_);
+    growAll();
+    for (auto w = end; w != waiting_.end(); ++w) f(w->pair);
+    waiting_.erase(end, waiting_.end());
+  }
+
+  /// Adds to `growths` what the next batch would make resident, of at most `batch` pairs that ask an oracle.
+  void addGrowths(const A& a, const B& b, const SimilarityTransform& b_in_a, std::size_t batch,
+                  std::vector<tree::Tree::Growth>& growths) {
+    batch_ = batch;
+    for (auto w = choose(a, b, b_in_a, true); w != waiting_.end(); ++w) add(a, b, w->pair, growths);
+  }
+
+ private:
+  static constexpr double kUnknown = -1;
+
+  struct Waiting {
+    Pair pair;
+    double gap;
+  };
+
+  // Puts the pairs of the next batch last; returns the first of them.
+  typename std::vector<Waiting>::iterator choose(const A& a, const B& b, const SimilarityTransform& b_in_a,
+                                                 bool ends_at_first) {
     // What root grids know grows first and alone: it needs no oracle.
     auto end = std::partition(waiting_.begin(), waiting_.end(),
                               [&](const Waiting& w) { return asks(a, w.pair.a) || asks(b, w.pair.b); });
@@ -58,25 +84,13 @@ class DeferredPairs {
       }
       batch_ *= 2;
     }
-    growths_.clear();
-    for (auto w = end; w != waiting_.end(); ++w) add(a, b, w->pair);
-    growAll();
-    for (auto w = end; w != waiting_.end(); ++w) f(w->pair);
-    waiting_.erase(end, waiting_.end());
+    return end;
   }
 
- private:
-  static constexpr double kUnknown = -1;
-
-  struct Waiting {
-    Pair pair;
-    double gap;
-  };
-
   // Both nodes where both must grow: the smaller one is expanded next.
-  void add(const A& a, const B& b, const Pair& pair) {
-    if (a.state(pair.a) == State::kGrows) a.grow(pair.a, growths_);
-    if (b.state(pair.b) == State::kGrows) b.grow(pair.b, growths_);
+  static void add(const A& a, const B& b, const Pair& pair, std::vector<tree::Tree::Growth>& growths) {
+    if (a.state(pair.a) == State::kGrows) a.grow(pair.a, growths);
+    if (b.state(pair.b) == State::kGrows) b.grow(pair.b, growths);
   }
 
   void growAll() {

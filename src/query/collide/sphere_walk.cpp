@@ -33,8 +33,22 @@ bool SphereWalk::areBoxesApart() const {
   return facesApart(a_.volume(a_.root()), b_.volume(b_.root()), wide);
 }
 
-bool SphereWalk::run(Visitor& visitor) {
+SphereWalk::Scratch& SphereWalk::scratchOfThread() {
   thread_local Scratch s;
+  return s;
+}
+
+void SphereWalk::push(SphereSteps& steps, Scratch& s, tree::NodeRef node_a, tree::NodeRef node_b) {
+  if (s.stack.size() < steps.depth + 1 + SphereSteps::kStackRoom) {
+    s.stack.resize(2 * (steps.depth + SphereSteps::kStackRoom));
+  }
+  steps.stack = s.stack.data();
+  steps.stack_end = steps.stack + s.stack.size();
+  pushPair(steps, node_a, node_b);
+}
+
+bool SphereWalk::run(Visitor& visitor) {
+  Scratch& s = scratchOfThread();
   SphereSteps steps(a_, b_, b_in_a_, s.spheres);
   steps.nearest_first = visitor.endsAtFirst();
   steps.cut = visitor.cut();
@@ -42,16 +56,8 @@ bool SphereWalk::run(Visitor& visitor) {
 }
 
 bool SphereWalk::search(SphereSteps& steps, Scratch& s, Visitor& visitor) const {
-  const auto push = [&](const DeferredPairs<TreeSide, TreeSide>::Pair& pair) {
-    if (s.stack.size() < steps.depth + 1 + SphereSteps::kStackRoom) {
-      s.stack.resize(2 * (steps.depth + SphereSteps::kStackRoom));
-    }
-    steps.stack = s.stack.data();
-    steps.stack_end = steps.stack + s.stack.size();
-    pushPair(steps, pair.a, pair.b);
-  };
   s.deferred.clear();
-  push({a_.root(), b_.root()});
+  push(steps, s, a_.root(), b_.root());
   for (;;) {
     switch (nextEvent(steps)) {
       case SphereSteps::kDone:
@@ -59,13 +65,34 @@ bool SphereWalk::search(SphereSteps& steps, Scratch& s, Visitor& visitor) const 
           s.deferred.dropIf([&](const auto& pair) { return steps.isBeyondCut(pair.a, pair.b); });
         }
         if (s.deferred.empty()) return false;
-        s.deferred.grow(a_, b_, b_in_a_, visitor.endsAtFirst() || steps.cut != nullptr, push);
+        s.deferred.grow(a_, b_, b_in_a_, visitor.endsAtFirst() || steps.cut != nullptr,
+                        [&](const auto& pair) { push(steps, s, pair.a, pair.b); });
         break;
       case SphereSteps::kDeferred:
         s.deferred.add({steps.pair[0], steps.pair[1]});
         break;
       case SphereSteps::kLeaves:
         if (visitLeaves(steps, visitor)) return true;
+    }
+  }
+}
+
+SphereWalk::Outcome SphereWalk::look(std::size_t batch, std::vector<tree::Tree::Growth>& growths) const {
+  Scratch& s = scratchOfThread();
+  SphereSteps steps(a_, b_, b_in_a_, s.spheres);
+  s.deferred.clear();
+  push(steps, s, a_.root(), b_.root());
+  for (;;) {
+    switch (nextEvent(steps)) {
+      case SphereSteps::kDone:
+        if (s.deferred.empty()) return Outcome::kApart;
+        s.deferred.addGrowths(a_, b_, b_in_a_, batch, growths);
+        return Outcome::kNeedsGrowth;
+      case SphereSteps::kDeferred:
+        s.deferred.add({steps.pair[0], steps.pair[1]});
+        break;
+      case SphereSteps::kLeaves:
+        return Outcome::kMeet;
     }
   }
 }

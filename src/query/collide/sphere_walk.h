@@ -1,12 +1,16 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #pragma once
 
+#include <cstddef>
+#include <vector>
+
 #include "query/collide/sphere_steps.h"
 
 namespace bocst::query {
 
 /// The walk for two trees with conservative answers: finds the pairs of leaves whose spheres meet, see spheresMeet().
-/// Spheres follow from the lattices and the pose alone, so the verdict and what grows are the same with every oracle.
+/// Spheres follow from the lattices and the pose alone, so the verdict and what a walk grows are the same with every
+/// oracle.
 class SphereWalk {
  public:
   static bool fits(const TreeSide& a, const TreeSide& b) { return a.isConservative() && b.isConservative(); }
@@ -25,9 +29,16 @@ class SphereWalk {
   /// Unless it is needless. True when the visitor ended it.
   bool run(Visitor& visitor);
 
+  enum class Outcome { kApart, kMeet, kNeedsGrowth };
+  /// Do the spheres of any leaves meet, as far as resident nodes say? Unless it is needless. Where more must grow, adds
+  /// that to `growths`: of at most `batch` pairs, the deepest overlaps first.
+  Outcome look(std::size_t batch, std::vector<tree::Tree::Growth>& growths) const;
+
  private:
   struct Scratch;
 
+  static Scratch& scratchOfThread();
+  static void push(SphereSteps& steps, Scratch& s, tree::NodeRef node_a, tree::NodeRef node_b);
   bool search(SphereSteps& steps, Scratch& s, Visitor& visitor) const;
   bool visitLeaves(const SphereSteps& steps, Visitor& visitor) const;
 

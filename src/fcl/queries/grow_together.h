@@ -1,0 +1,46 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#pragma once
+
+#include <bocst/model.h>
+
+#include <algorithm>
+#include <cstdint>
+#include <functional>
+#include <vector>
+
+#include "tree/tree.h"
+
+namespace bocst::fcl_adapter {
+
+/// Two models and their poses.
+template <typename S>
+struct PosedPair {
+  const Model<S>* a;
+  fcl::Transform3<S> X_WA;
+  const Model<S>* b;
+  fcl::Transform3<S> X_WB;
+};
+
+/// Is growTogether() worth its walks: do both answer conservatively, and ask oracles that are slow to answer?
+template <typename S>
+bool growsTogether(const Model<S>& a, const Model<S>& b);
+
+/// Grows what fcl::collide with the default request asks for, of pairs of models that grow together; what all pairs
+/// need at a time is one batch, so a device is asked as often as for the pair that needs the most. meets[k] is 1 where
+/// spheres of pair k meet, else 0; `meets` may be null. Poses are rigid.
+template <typename S>
+void growTogether(const std::vector<PosedPair<S>>& pairs, std::uint8_t* meets);
+
+/// Is the second tree side A of a walk? Conservative verdicts must not depend on the argument order, so there the walk
+/// has an order of its own: by address only where the poses are equal, so that what a query grows does not depend on
+/// where models happen to lie.
+template <typename S>
+bool walksTurned(const tree::Tree& tree1, const fcl::Transform3<S>& X_W1, const tree::Tree& tree2,
+                 const fcl::Transform3<S>& X_W2) {
+  if (!tree1.conservative() && !tree2.conservative()) return false;
+  const S *x1 = X_W1.matrix().data(), *x2 = X_W2.matrix().data();
+  const auto differ = std::mismatch(x1, x1 + 16, x2);
+  return differ.first == x1 + 16 ? std::less<const tree::Tree*>()(&tree2, &tree1) : *differ.second < *differ.first;
+}
+
+}  // namespace bocst::fcl_adapter
