@@ -87,7 +87,7 @@ void Sweep<S>::growForAll(const World<S>& world, const fcl::Transform3<S>* X_WM,
       }
     }
   }
-  if (!pairs.empty()) fcl_adapter::growTogether<S>(pairs, nullptr);
+  if (!pairs.empty()) fcl_adapter::growTogether<S>(pairs);
 }
 
 // In one function: the three goals differ in what comes next and when it ends, but share each state's check.

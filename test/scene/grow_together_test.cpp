@@ -14,6 +14,7 @@
 namespace bocst {
 namespace {
 
+using test::Raw;
 using Transforms = std::vector<fcl::Transform3d, Eigen::aligned_allocator<fcl::Transform3d>>;
 
 Transforms randomPoses(std::size_t count, double spread) {
@@ -63,6 +64,26 @@ TEST_P(GrowTogether, PosesOfAPair) {
     EXPECT_GT(alone, 30u);
     EXPECT_LT(together, alone / 2);
   }
+}
+
+// A mesh so large that the other's lattice is lost in its rounding; and a model with itself.
+TEST_P(GrowTogether, AnySizes) {
+  Raw huge;
+  huge.vertices = {{-1e30, -1e30, 0}, {1e30, -1e30, 0}, {0, 1e30, 0}};
+  huge.triangles.emplace_back(0, 1, 2);
+  const auto small = test::torus(12).mesh();
+  const Modeld a(huge.mesh(), optionsOf(GetParam())), b(small, optionsOf(GetParam()));
+  const Transforms X = randomPoses(40, 0.3);
+  std::vector<std::uint8_t> hits(X.size()), of_cpu(X.size());
+  collidePoses(a, b, X.data(), X.size(), hits.data());
+  EXPECT_EQ(hits, std::vector<std::uint8_t>(X.size(), 1));
+  collidePoses(b, a, X.data(), X.size(), hits.data());
+  EXPECT_EQ(hits, std::vector<std::uint8_t>(X.size(), 1));
+  const Transforms far = randomPoses(40, 3);
+  const Modeld cpu(small, optionsOf(OracleKind::kCpu));
+  collidePoses(b, b, far.data(), far.size(), hits.data());
+  collidePoses(cpu, cpu, far.data(), far.size(), of_cpu.data());
+  EXPECT_EQ(hits, of_cpu);
 }
 
 TEST_P(GrowTogether, StatesOfAScene) {

@@ -635,15 +635,19 @@ void collideRow(const Model<S>& a, const Model<S>& b, const fcl::Transform3<S>* 
   if (!a.isOccupied() || !b.isOccupied()) return;
   const Models<S> models(&a, &b);
   const double margin = marginOf(&a, &b);
-  const bool together = growsTogether(a, b);
-  if (together) {
+  // Of solids whose surfaces are apart, one may still be inside the other.
+  const bool may_be_inside = treeOf(a).solid() != nullptr || treeOf(b).solid() != nullptr;
+  std::vector<Spheres> spheres;
+  if (growsTogether(a, b)) {
     std::vector<PosedPair<S>> pairs;
     for (std::size_t k = 0; k < count; ++k) pairs.push_back({&a, identity, &b, X_AB[k]});
-    growTogether(pairs, hit);
+    spheres = growTogether(pairs);
   }
   for (std::size_t k = 0; k < count; ++k) {
-    // Where their surfaces are apart, one may still be inside the other.
-    if (together && (hit[k] != 0 || (treeOf(a).solid() == nullptr && treeOf(b).solid() == nullptr))) continue;
+    if (!spheres.empty() && spheres[k] != Spheres::kUnknown && (spheres[k] == Spheres::kMeet || !may_be_inside)) {
+      hit[k] = spheres[k] == Spheres::kMeet;
+      continue;
+    }
     if (isSurelyRigid(X_AB[k]) && areFarApart(models, identity, X_AB[k], margin)) continue;
     const CollideQuery<S> q{
         {&a, identity, &b, X_AB[k], turnsRound(models, identity, X_AB[k])}, request, result, margin};

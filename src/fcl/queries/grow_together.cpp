@@ -75,8 +75,8 @@ bool growsTogether(const Model<S>& a, const Model<S>& b) {
 }
 
 template <typename S>
-void growTogether(const std::vector<PosedPair<S>>& pairs, std::uint8_t* meets) {
-  if (meets != nullptr) std::fill_n(meets, pairs.size(), std::uint8_t{0});
+std::vector<Spheres> growTogether(const std::vector<PosedPair<S>>& pairs) {
+  std::vector<Spheres> found(pairs.size(), Spheres::kApart);
   std::vector<tree::Tree*> trees;
   for (const PosedPair<S>& p : pairs) {
     trees.push_back(&treeOf(*p.a));
@@ -92,25 +92,29 @@ void growTogether(const std::vector<PosedPair<S>>& pairs, std::uint8_t* meets) {
     ordered.inCallersOrder(a, b);
     Walk walk{a, b, relate<S>(ordered, *a, *b).b_in_a, k};
     walk.b_in_a.tolerance += marginOf(p.a, p.b) / unitOf(*a);
-    // What is out of sight is no pair.
-    if (walk.b_in_a.tolerance < 1e15 && !walk.spheres().isNeedless()) walks.push_back(walk);
+    if (!(walk.b_in_a.tolerance < 1e15)) {
+      found[k] = Spheres::kUnknown;  // beyond this a query looks at the distance first
+    } else if (!walk.spheres().isNeedless()) {
+      walks.push_back(walk);
+    }
   }
   std::vector<tree::Tree::Growth> growths;
   for (std::size_t batch = kFirstBatch; !walks.empty(); batch *= 2) {
     growths.clear();
     const auto isDone = [&](const Walk& walk) {
       const Outcome outcome = walk.spheres().look(batch, growths);
-      if (outcome == Outcome::kMeet && meets != nullptr) meets[walk.pair] = 1;
+      if (outcome == Outcome::kMeet) found[walk.pair] = Spheres::kMeet;
       return outcome != Outcome::kNeedsGrowth;
     };
     walks.erase(std::remove_if(walks.begin(), walks.end(), isDone), walks.end());
     growAll(growths);
   }
+  return found;
 }
 
 #define BOCST_INSTANTIATE(S)                                     \
   template bool growsTogether(const Model<S>&, const Model<S>&); \
-  template void growTogether(const std::vector<PosedPair<S>>&, std::uint8_t*);
+  template std::vector<Spheres> growTogether(const std::vector<PosedPair<S>>&);
 BOCST_INSTANTIATE(float)
 BOCST_INSTANTIATE(double)
 #undef BOCST_INSTANTIATE

@@ -25,11 +25,13 @@ struct PosedPair {
 template <typename S>
 bool growsTogether(const Model<S>& a, const Model<S>& b);
 
+enum class Spheres : std::uint8_t { kApart, kMeet, kUnknown };
+
 /// Grows what fcl::collide with the default request asks for, of pairs of models that grow together; what all pairs
-/// need at a time is one batch, so a device is asked as often as for the pair that needs the most. meets[k] is 1 where
-/// spheres of pair k meet, else 0; `meets` may be null. Poses are rigid.
+/// need at a time is one batch, so a device is asked as often as for the pair that needs the most. Returns for each
+/// pair whether the spheres of any leaves meet; unknown where one model is too large for the other. Poses are rigid.
 template <typename S>
-void growTogether(const std::vector<PosedPair<S>>& pairs, std::uint8_t* meets);
+std::vector<Spheres> growTogether(const std::vector<PosedPair<S>>& pairs);
 
 /// Is the second tree side A of a walk? Conservative verdicts must not depend on the argument order, so there the walk
 /// has an order of its own: by address only where the poses are equal, so that what a query grows does not depend on
