@@ -22,9 +22,9 @@ class DeferredPairs {
   /// Pairs in the first batch of a walk that may end early; a few oracle answers cost less than one too many.
   static constexpr std::size_t kFirstBatch = 2;
 
-  void clear() {
+  void clear(std::size_t first_batch = kFirstBatch) {
     waiting_.clear();
-    batch_ = kFirstBatch;
+    batch_ = first_batch;
   }
   bool empty() const { return waiting_.empty(); }
   void add(const Pair& pair) { waiting_.push_back({pair, kUnknown}); }

@@ -21,6 +21,10 @@ double reachOfLeaves(const TreeSide& a, const TreeSide& b, double scale) {
 
 }  // namespace
 
+// Pairs in the first batch of a walk. Fewer leave later walks without the nodes that lead to their hits: against 2, ten
+// poses take a tenth longer, a thousand a fifth less, and settled ones a fifth less.
+constexpr std::size_t kFirstBatch = 16;
+
 struct SphereWalk::Scratch {
   std::vector<SphereGroup> stack;
   SphereFrame spheres[SphereSteps::kFrames];
@@ -56,7 +60,7 @@ bool SphereWalk::run(Visitor& visitor) {
 }
 
 bool SphereWalk::search(SphereSteps& steps, Scratch& s, Visitor& visitor) const {
-  s.deferred.clear();
+  s.deferred.clear(kFirstBatch);
   push(steps, s, a_.root(), b_.root());
   for (;;) {
     switch (nextEvent(steps)) {
