@@ -4,8 +4,6 @@
 #include <algorithm>
 #include <cmath>
 
-#include "fcl/queries/grow_together.h"
-
 namespace bocst::scene {
 namespace {
 
@@ -71,7 +69,7 @@ bool Sweep<S>::setFar(const World<S>& world, std::size_t states, const Part& par
 // What conservative answers to all states need grows in few batches, where an oracle is slow to answer.
 template <typename S>
 void Sweep<S>::growForAll(const World<S>& world, const fcl::Transform3<S>* X_WM, std::size_t states) {
-  std::vector<fcl_adapter::PosedPair<S>> pairs;
+  pairs_.clear();
   for (std::size_t k = 0; k < states; ++k) {
     const fcl::Transform3<S>* X = X_WM + k * world.moving.size();
     check_.place(X);
@@ -83,11 +81,11 @@ void Sweep<S>::growForAll(const World<S>& world, const fcl::Transform3<S>* X_WM,
         if (!(n.gap[lane] <= 0) || a.model == nullptr || b.model == nullptr) continue;
         if (!a.model->isOccupied() || !b.model->isOccupied()) continue;
         if (!fcl_adapter::growsTogether(*a.model, *b.model)) continue;
-        pairs.push_back({a.model, X[n.box], b.model, check_.pose(X, n.group, lane)});
+        pairs_.push_back({a.model, X[n.box], b.model, check_.pose(X, n.group, lane)});
       }
     }
   }
-  if (!pairs.empty()) fcl_adapter::growTogether<S>(pairs);
+  if (!pairs_.empty()) fcl_adapter::growTogether<S>(pairs_);
 }
 
 // In one function: the three goals differ in what comes next and when it ends, but share each state's check.

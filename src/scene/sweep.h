@@ -5,6 +5,7 @@
 #include <cstdint>
 #include <vector>
 
+#include "fcl/queries/grow_together.h"
 #include "scene/state_check.h"
 
 namespace bocst::scene {
@@ -39,6 +40,7 @@ class Sweep {
   bool setFar(const World<S>& world, std::size_t states, const Part& part, std::size_t middle);
 
   StateCheck<S> check_;
+  std::vector<fcl_adapter::PosedPair<S>> pairs_;  // of growForAll()
   std::vector<double> path_;  // [i * states + k]: how far points of moving object i have moved until state k, at most
   std::vector<Part> parts_;
   std::vector<Entry> entries_, found_;

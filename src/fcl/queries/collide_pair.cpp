@@ -637,17 +637,17 @@ void collideRow(const Model<S>& a, const Model<S>& b, const fcl::Transform3<S>* 
   const double margin = marginOf(&a, &b);
   // Of solids whose surfaces are apart, one may still be inside the other.
   const bool may_be_inside = treeOf(a).solid() != nullptr || treeOf(b).solid() != nullptr;
-  std::vector<Spheres> spheres;
+  const std::vector<Spheres>* spheres = nullptr;
   if (growsTogether(a, b)) {
-    std::vector<PosedPair<S>> pairs;
+    thread_local std::vector<PosedPair<S>> pairs;
+    pairs.clear();
     for (std::size_t k = 0; k < count; ++k) pairs.push_back({&a, identity, &b, X_AB[k]});
-    spheres = growTogether(pairs);
+    spheres = &growTogether(pairs);
   }
   for (std::size_t k = 0; k < count; ++k) {
-    if (!spheres.empty() && spheres[k] != Spheres::kUnknown && (spheres[k] == Spheres::kMeet || !may_be_inside)) {
-      hit[k] = spheres[k] == Spheres::kMeet;
-      continue;
-    }
+    const Spheres found = spheres != nullptr ? (*spheres)[k] : Spheres::kUnknown;
+    hit[k] = found == Spheres::kMeet;
+    if (found == Spheres::kMeet || (found == Spheres::kApart && !may_be_inside)) continue;
     if (isSurelyRigid(X_AB[k]) && areFarApart(models, identity, X_AB[k], margin)) continue;
     const CollideQuery<S> q{
         {&a, identity, &b, X_AB[k], turnsRound(models, identity, X_AB[k])}, request, result, margin};

@@ -30,8 +30,9 @@ enum class Spheres : std::uint8_t { kApart, kMeet, kUnknown };
 /// Grows what fcl::collide with the default request asks for, of pairs of models that grow together; what all pairs
 /// need at a time is one batch, so a device is asked as often as for the pair that needs the most. Returns for each
 /// pair whether the spheres of any leaves meet; unknown where one model is too large for the other. Poses are rigid.
+/// The result is good until the thread's next call.
 template <typename S>
-std::vector<Spheres> growTogether(const std::vector<PosedPair<S>>& pairs);
+const std::vector<Spheres>& growTogether(const std::vector<PosedPair<S>>& pairs);
 
 /// Is the second tree side A of a walk? Conservative verdicts must not depend on the argument order, so there the walk
 /// has an order of its own: by address only where the poses are equal, so that what a query grows does not depend on
