@@ -15,7 +15,6 @@
 #include <memory>
 #include <stdexcept>
 #include <string>
-#include <type_traits>
 
 #include "fcl/adapters/models.h"
 
@@ -118,7 +117,6 @@ void checkDispatch() {
   static const bool registered = [] {
     registerCollide<S>();
     registerDistance<S>();
-    if (std::is_same<S, double>::value) registerContinuous();
     return true;
   }();
   if (!registered || !checkIsOn()) return;
@@ -260,5 +258,7 @@ S distance(const fcl::CollisionGeometry<S>* o1, const fcl::Transform3<S>& X_W1, 
   BOCST_INSTANTIATE_SOLVER(S, fcl::detail::GJKSolver_indep<S>)
 BOCST_INSTANTIATE(float)
 BOCST_INSTANTIATE(double)
+#undef BOCST_INSTANTIATE
+#undef BOCST_INSTANTIATE_SOLVER
 
 }  // namespace bocst

@@ -6,7 +6,8 @@
 // libfcl hides its tables, but it calls its exported weak symbol fcl::collide<S, Solver> through the dynamic linker.
 // This library exports the same symbol, compiled over its own tables, in which bocst is registered. Where libbocst
 // precedes libfcl, everybody's collide ends there, libfcl's own included. FCL's distance<S, Solver> is not
-// exported by libfcl, so here the public distance and continuousCollide take libfcl's place.
+// exported by libfcl, so here the public distance and continuousCollide take libfcl's place. Pairs without a model go
+// back to libfcl's own functions (libfcl.h), but distances and all queries in float, which are compiled here.
 
 #include <bocst/export.h>
 #include <fcl/geometry/collision_geometry.h>
@@ -21,8 +22,6 @@ template <typename Solver>
 struct CollisionFunctionMatrix;
 template <typename Solver>
 struct DistanceFunctionMatrix;
-template <typename Solver>
-struct ConservativeAdvancementFunctionMatrix;
 }  // namespace detail
 
 // FCL does not say so, but an executable that instantiates FCL's code itself must share these tables with us.
@@ -30,12 +29,9 @@ template <typename Solver>
 __attribute__((visibility("default"))) detail::CollisionFunctionMatrix<Solver>& getCollisionFunctionLookTable();
 template <typename Solver>
 __attribute__((visibility("default"))) detail::DistanceFunctionMatrix<Solver>& getDistanceFunctionLookTable();
-template <typename Solver>
-__attribute__((visibility("default"))) detail::ConservativeAdvancementFunctionMatrix<Solver>&
-getConservativeAdvancementFunctionLookTable();
 
-// Three of its four solvers do not look into any table, and from poses it makes motions with unset members. So both
-// functions are ours, for double (float is in no libfcl); they must be declared before FCL says that they are libfcl's.
+// Three of its four solvers do not look into any table. So both functions are ours, for double (float is in no libfcl);
+// they must be declared before FCL says that they are libfcl's.
 template <typename S>
 S continuousCollide(const CollisionGeometry<S>*, const MotionBase<S>*, const CollisionGeometry<S>*,
                     const MotionBase<S>*, const ContinuousCollisionRequest<S>&, ContinuousCollisionResult<S>&);

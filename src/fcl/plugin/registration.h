@@ -7,10 +7,14 @@
 
 #include <bocst/fcl.h>
 
+#include <algorithm>
 #include <iostream>
+#include <iterator>
 #include <limits>
+#include <type_traits>
 
 #include "fcl/adapters/models.h"
+#include "fcl/plugin/libfcl.h"
 #include "fcl/queries/collide_pair.h"
 #include "fcl/queries/distance_pair.h"
 
@@ -49,8 +53,12 @@ std::size_t collideEntry(const fcl::CollisionGeometry<S>* o1, const fcl::Transfo
   if (kind == PairKind::kNothing) return 0;
   if (kind == PairKind::kModel) return collidePair<S>(o1, X_W1, o2, X_W2, solver, request, result);
   if (isSentinel<S>(o1)) return Sentinel<S>::kReached;
-  warnAsFcl<S>("collision", o1, o2);
-  return 0;
+  if constexpr (std::is_same<S, double>::value) {
+    return libfcl::collide<Solver>(o1, X_W1, o2, X_W2, solver, request, result);
+  } else {
+    warnAsFcl<S>("collision", o1, o2);
+    return 0;
+  }
 }
 
 template <typename S, typename Solver>
@@ -65,15 +73,10 @@ S distanceEntry(const fcl::CollisionGeometry<S>* o1, const fcl::Transform3<S>& X
   return std::numeric_limits<S>::max();
 }
 
-template <typename S, typename Solver>
-S advancementEntry(const fcl::CollisionGeometry<S>* o1, const fcl::MotionBase<S>* motion1,
-                   const fcl::CollisionGeometry<S>* o2, const fcl::MotionBase<S>* motion2, const Solver*,
-                   const fcl::ContinuousCollisionRequest<S>& request, fcl::ContinuousCollisionResult<S>& result) {
-  const PairKind kind = kindOf<S>(o1, o2);
-  if (kind == PairKind::kNothing && touchesNothing<S>(o1, o2, result)) return result.time_of_contact;
-  if (kind == PairKind::kModel) return continuousPair<S>(o1, motion1, o2, motion2, request, result);
-  warnAsFcl<S>("collision", o1, o2);
-  return -1;
+/// All of one of FCL's tables.
+template <typename Entry>
+void fillTable(Entry (&matrix)[fcl::NODE_COUNT][fcl::NODE_COUNT], Entry entry) {
+  for (auto& row : matrix) std::fill(std::begin(row), std::end(row), entry);
 }
 
 /// The row and the column of Model's node type in one of FCL's tables.
@@ -107,7 +110,12 @@ void registerDistance() {
 extern template void registerDistance<float>();
 extern template void registerDistance<double>();
 
-/// For double only: in float, FCL's own continuousCollide is incomplete and is not compiled here.
-void registerContinuous();
-
 }  // namespace bocst::fcl_adapter
+
+namespace fcl::detail {
+// Tables in double lead to libfcl's queries (collide_double.cpp); for other scalars FCL's constructor is compiled.
+template <>
+CollisionFunctionMatrix<GJKSolver_libccd<double>>::CollisionFunctionMatrix();
+template <>
+CollisionFunctionMatrix<GJKSolver_indep<double>>::CollisionFunctionMatrix();
+}  // namespace fcl::detail

@@ -12,7 +12,6 @@ namespace {
 
 using Eigen::Vector3d;
 
-constexpr double kPi = 3.14159265358979323846;
 
 struct Triangles {
   std::vector<Vector3d> vertices;

@@ -15,6 +15,8 @@
 
 namespace bocst::program {
 
+constexpr double kPi = 3.14159265358979323846;
+
 /// How the rotation of a pose is written.
 enum class RotationFormat {
   kWxyz,  ///< qw,qx,qy,qz

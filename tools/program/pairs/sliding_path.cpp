@@ -11,7 +11,6 @@
 namespace bocst::program {
 namespace {
 
-constexpr double kPi = 3.14159265358979323846;
 constexpr std::size_t kFramesOfKey = 4;  ///< Between two poses whose contact is looked for.
 constexpr double kStep = 0.01;           ///< Of the smaller radius, a frame.
 constexpr double kTurn = 2 * kPi / 2000;

@@ -11,7 +11,6 @@ namespace {
 
 using Eigen::Vector3d;
 
-constexpr double kPi = 3.14159265358979323846;
 constexpr std::array<double, ArmWorld::kJoints> kLength{0.25, 0.2, 0.28, 0.2, 0.24, 0.14, 0.1};
 constexpr double kFinger = 0.09;
 

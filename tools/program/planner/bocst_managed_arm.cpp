@@ -6,7 +6,7 @@
 namespace bocst::program {
 namespace {
 
-struct BocstQueries {
+struct BocstArmQueries {
   template <typename... Arguments>
   static void collide(Arguments&&... arguments) {
     fcl::collide(std::forward<Arguments>(arguments)...);
@@ -17,7 +17,7 @@ struct BocstQueries {
   }
 };
 
-class BocstArm final : public ManagedArmOf<BocstManagedArm, BocstQueries> {
+class BocstArm final : public ManagedArmOf<BocstManagedArm, BocstArmQueries> {
  public:
   using ManagedArmOf::ManagedArmOf;
 

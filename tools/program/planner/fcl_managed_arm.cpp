@@ -10,7 +10,7 @@
 namespace bocst::program {
 namespace {
 
-struct FclQueries {
+struct FclArmQueries {
   template <typename... Arguments>
   static void collide(Arguments&&... arguments) {
     fcl::collide(std::forward<Arguments>(arguments)...);
@@ -37,7 +37,7 @@ std::unique_ptr<ManagedArm> manageFclArm(const ArmWorld& world) {
   std::vector<std::shared_ptr<fcl::CollisionGeometryd>> geometries;
   for (const ArmWorld::Thing& link : world.links()) geometries.push_back(build(link.mesh));
   for (const ArmWorld::Thing& thing : world.things()) geometries.push_back(build(thing.mesh));
-  return std::make_unique<ManagedArmOf<ManagedArm, FclQueries>>(world, std::move(geometries));
+  return std::make_unique<ManagedArmOf<ManagedArm, FclArmQueries>>(world, std::move(geometries));
 }
 
 }  // namespace bocst::program
