@@ -5,6 +5,8 @@
 #include <cstring>
 #include <limits>
 
+#include "simd/float4.h"
+
 #undef HWY_TARGET_INCLUDE
 #define HWY_TARGET_INCLUDE "tree/bulk_kernels.cpp"
 #include <hwy/foreach_target.h>
@@ -16,99 +18,6 @@ namespace bocst::tree::HWY_NAMESPACE {
 namespace hn = hwy::HWY_NAMESPACE;
 using D = hn::CappedTag<float, 16>;
 using V = hn::Vec<D>;
-
-using DI = hn::Rebind<std::int32_t, D>;
-using VI = hn::Vec<DI>;
-
-// Every third bit of numbers below 2^10.
-HWY_INLINE VI spread(VI x) {
-  const DI di;
-  x = hn::And(hn::Or(x, hn::ShiftLeft<16>(x)), hn::Set(di, 0x030000ff));
-  x = hn::And(hn::Or(x, hn::ShiftLeft<8>(x)), hn::Set(di, 0x0300f00f));
-  x = hn::And(hn::Or(x, hn::ShiftLeft<4>(x)), hn::Set(di, 0x030c30c3));
-  return hn::And(hn::Or(x, hn::ShiftLeft<2>(x)), hn::Set(di, 0x09249249));
-}
-
-// The last vector ends with the last triangle, and overlaps the one before it.
-template <typename F>
-HWY_INLINE void overAll(std::size_t count, F&& f) {
-  const std::size_t lanes = hn::Lanes(D());
-  for (std::size_t i = 0; i + lanes < count; i += lanes) f(i);
-  f(count - lanes);
-}
-
-void CurveKeys(const Mesh::Indices* indices, std::size_t count, const float* places, const CurveCells& cells,
-               SortKey* keys) {
-  const D d;
-  const DI di;
-  const V scale = hn::Set(d, cells.scale / 2), zero = hn::Zero(d),
-          last = hn::Set(d, static_cast<float>((1 << cells.bits) - 1));
-  const auto* const all = reinterpret_cast<const std::int32_t*>(indices);
-  overAll(count, [&](std::size_t i) HWY_ATTR {
-    VI v[3];
-    hn::LoadInterleaved3(di, all + 3 * i, v[0], v[1], v[2]);
-    for (VI& x : v) x = hn::ShiftLeft<2>(x);
-    VI code = hn::Zero(di);
-    for (int c = 0; c < 3; ++c) {
-      const V p = hn::GatherIndex(d, places + c, v[0]), q = hn::GatherIndex(d, places + c, v[1]),
-              r = hn::GatherIndex(d, places + c, v[2]);
-      const V twice = hn::Add(hn::Min(hn::Min(p, q), r), hn::Max(hn::Max(p, q), r));
-      const V cell = hn::Min(hn::Max(hn::Mul(hn::Sub(twice, hn::Set(d, 2 * cells.corner[c])), scale), zero), last);
-      const VI bits = spread(hn::ConvertTo(di, cell));
-      code = hn::Or(code, c == 0 ? bits : c == 1 ? hn::ShiftLeft<1>(bits) : hn::ShiftLeft<2>(bits));
-    }
-    hn::StoreInterleaved2(code, hn::Iota(di, static_cast<std::int32_t>(i)), di,
-                          reinterpret_cast<std::int32_t*>(keys + i));
-  });
-}
-
-void BoxTriangles(const Mesh::Indices* indices, const float* places, const SortKey* keys, std::size_t count,
-                  std::uint32_t* ids, TriangleBox* boxes) {
-  const D d;
-  const DI di;
-  const auto* const all = reinterpret_cast<const std::int32_t*>(indices);
-  overAll(count, [&](std::size_t i) HWY_ATTR {
-    VI code, id;
-    hn::LoadInterleaved2(di, reinterpret_cast<const std::int32_t*>(keys + i), code, id);
-    hn::StoreU(id, di, reinterpret_cast<std::int32_t*>(ids + i));
-    const VI at = hn::Add(id, hn::ShiftLeft<1>(id));
-    VI v[3];
-    for (std::size_t k = 0; k < 3; ++k) v[k] = hn::ShiftLeft<2>(hn::GatherIndex(di, all + k, at));
-    V lo[3], hi[3];
-    for (std::size_t c = 0; c < 3; ++c) {
-      const V p = hn::GatherIndex(d, places + c, v[0]), q = hn::GatherIndex(d, places + c, v[1]),
-              r = hn::GatherIndex(d, places + c, v[2]);
-      lo[c] = hn::Min(hn::Min(p, q), r);
-      hi[c] = hn::Max(hn::Max(p, q), r);
-    }
-    // A box is as long as two of what is interleaved.
-    HWY_ALIGN float los[4 * HWY_MAX_BYTES / sizeof(float)], his[4 * HWY_MAX_BYTES / sizeof(float)];
-    hn::StoreInterleaved4(lo[0], lo[1], lo[2], lo[2], d, los);
-    hn::StoreInterleaved4(hi[0], hi[1], hi[2], hi[2], d, his);
-    for (std::size_t k = 0; k < hn::Lanes(d); ++k) {
-      std::memcpy(boxes[i + k].lo, los + 4 * k, sizeof(boxes->lo));
-      std::memcpy(boxes[i + k].hi, his + 4 * k, sizeof(boxes->hi));
-    }
-  });
-}
-
-void GatherCorners(const Mesh::Indices* indices, const float* places, const std::uint32_t* ids, std::size_t count,
-                   float* rows, std::size_t stride) {
-  const D d;
-  const DI di;
-  const auto* const all = reinterpret_cast<const std::int32_t*>(indices);
-  for (std::size_t i = 0; i < count; i += hn::Lanes(d)) {
-    const auto* const from = reinterpret_cast<const std::int32_t*>(ids + i);
-    const VI id = count - i >= hn::Lanes(d) ? hn::LoadU(di, from) : hn::MaskedLoad(hn::FirstN(di, count - i), di, from);
-    const VI at = hn::Add(id, hn::ShiftLeft<1>(id));
-    for (std::size_t k = 0; k < 3; ++k) {
-      const VI v = hn::ShiftLeft<2>(hn::GatherIndex(di, all + k, at));
-      for (std::size_t c = 0; c < 3; ++c) {
-        hn::StoreU(hn::GatherIndex(d, places + c, v), d, rows + (3 * k + c) * stride + i);
-      }
-    }
-  }
-}
 
 PieceBounds BoundPiece(const CornerRows& c, std::size_t begin, std::size_t count) {
   const D d;
@@ -227,26 +136,73 @@ HWY_AFTER_NAMESPACE();
 #if HWY_ONCE
 namespace bocst::tree {
 
-HWY_EXPORT(CurveKeys);
-HWY_EXPORT(BoxTriangles);
-HWY_EXPORT(GatherCorners);
 HWY_EXPORT(BoundPiece);
 HWY_EXPORT(ExtremesAlong);
 HWY_EXPORT(FarthestAlong);
 
+// Reading corners one by one, each as one vector of four, takes less time than gathering coordinates in wider vectors.
+namespace {
+
+using simd::Float4;
+using simd::Int4;
+
+Float4 all(float x) { return Float4{x, x, x, x}; }
+Float4 least(Float4 a, Float4 b) { return a < b ? a : b; }
+Float4 most(Float4 a, Float4 b) { return a > b ? a : b; }
+Float4 placeOf(const float* places, std::uint32_t vertex) { return simd::load(places + 4 * std::size_t{vertex}); }
+
+/// Every third bit of numbers below 2^10.
+Int4 spread(Int4 x) {
+  x = (x | x << 16) & 0x030000ff;
+  x = (x | x << 8) & 0x0300f00f;
+  x = (x | x << 4) & 0x030c30c3;
+  return (x | x << 2) & 0x09249249;
+}
+
+}  // namespace
+
 void curveKeys(const Mesh::Indices* indices, std::size_t count, const float* places, const CurveCells& cells,
                SortKey* keys) {
-  HWY_DYNAMIC_DISPATCH(CurveKeys)(indices, count, places, cells, keys);
+  const Float4 corner{2 * cells.corner[0], 2 * cells.corner[1], 2 * cells.corner[2], 0};
+  const Float4 scale = all(cells.scale / 2), last = all(static_cast<float>((1 << cells.bits) - 1));
+  for (std::size_t i = 0; i < count; ++i) {
+    const Mesh::Indices& v = indices[i];
+    const Float4 p = placeOf(places, v[0]), q = placeOf(places, v[1]), r = placeOf(places, v[2]);
+    const Float4 twice = least(least(p, q), r) + most(most(p, q), r);
+    const Float4 cell = least(most((twice - corner) * scale, all(0)), last);
+    const Int4 bits = spread(__builtin_convertvector(cell, Int4));
+    keys[i] = {static_cast<std::uint32_t>(bits[0] | bits[1] << 1 | bits[2] << 2), static_cast<std::uint32_t>(i)};
+  }
 }
 
 void boxTriangles(const Mesh::Indices* indices, const float* places, const SortKey* keys, std::size_t count,
                   std::uint32_t* ids, TriangleBox* boxes) {
-  HWY_DYNAMIC_DISPATCH(BoxTriangles)(indices, places, keys, count, ids, boxes);
+  for (std::size_t i = 0; i < count; ++i) {
+    const std::uint32_t id = keys[i].id;
+    const Mesh::Indices& v = indices[id];
+    const Float4 p = placeOf(places, v[0]), q = placeOf(places, v[1]), r = placeOf(places, v[2]);
+    const Float4 lo = least(least(p, q), r), hi = most(most(p, q), r);
+    ids[i] = id;
+    std::memcpy(boxes[i].lo, &lo, sizeof lo);
+    std::memcpy(boxes[i].hi, &hi, sizeof hi);
+  }
 }
 
 void gatherCorners(const Mesh::Indices* indices, const float* places, const std::uint32_t* ids, std::size_t count,
                    float* rows, std::size_t stride) {
-  HWY_DYNAMIC_DISPATCH(GatherCorners)(indices, places, ids, count, rows, stride);
+  for (std::size_t i = 0; i < count; i += 4) {
+    const Mesh::Indices* of[4];
+    for (std::size_t t = 0; t < 4; ++t) of[t] = &indices[ids[std::min(i + t, count - 1)]];
+    for (std::size_t k = 0; k < 3; ++k) {
+      Float4 a = placeOf(places, (*of[0])[k]), b = placeOf(places, (*of[1])[k]), c = placeOf(places, (*of[2])[k]),
+             d = placeOf(places, (*of[3])[k]);
+      simd::transpose(a, b, c, d);
+      const Float4 coordinates[3] = {a, b, c};
+      for (std::size_t x = 0; x < 3; ++x) {
+        std::memcpy(rows + (3 * k + x) * stride + i, &coordinates[x], sizeof(Float4));
+      }
+    }
+  }
 }
 
 PieceBounds boundPiece(const CornerRows& corners, std::size_t begin, std::size_t count) {

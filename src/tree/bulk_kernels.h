@@ -45,15 +45,15 @@ struct CurveCells {
   int bits;  ///< 10 at most.
 };
 
-/// Keys of `count` triangles, 16 at least; `places` has four floats for each vertex.
+/// Keys of `count` triangles; `places` has four floats for each vertex, the last of them any number.
 void curveKeys(const Mesh::Indices* indices, std::size_t count, const float* places, const CurveCells& cells,
                SortKey* keys);
 
-/// Fills `ids` with the triangles in the order of `count` keys, 16 at least, and `boxes` with their boxes.
+/// Fills `ids` with the triangles in the order of `count` keys, and `boxes` with their boxes.
 void boxTriangles(const Mesh::Indices* indices, const float* places, const SortKey* keys, std::size_t count,
                   std::uint32_t* ids, TriangleBox* boxes);
 
-/// Fills row r of corners at rows + r * stride with the triangles `ids`; whole vectors of 16 may be written.
+/// Fills row r of corners at rows + r * stride with the triangles `ids`; whole vectors of 4 may be written.
 void gatherCorners(const Mesh::Indices* indices, const float* places, const std::uint32_t* ids, std::size_t count,
                    float* rows, std::size_t stride);
 
