@@ -1,4 +1,6 @@
 # An overlay port that builds the clone it lies in.
+# bocst takes the place of functions of FCL and calls the others by name, so FCL must be a shared library, too.
+vcpkg_check_linkage(ONLY_DYNAMIC_LIBRARY)
 get_filename_component(SOURCE_PATH "${CMAKE_CURRENT_LIST_DIR}/../../../.." ABSOLUTE)
 
 vcpkg_check_features(OUT_FEATURE_OPTIONS FEATURE_OPTIONS
