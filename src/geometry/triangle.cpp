@@ -35,7 +35,9 @@ Vector3d middleOfOverlap(const Corners& p, const Corners& q) {
   const Vector3d line = n.cross(m);
   Vector3d a, b, c, d;
   if (isDegenerate(p) || isDegenerate(q)) {
-    nearestPoints(p, q, a, b);
+    double largest = 0;
+    for (int k = 0; k < 3; ++k) largest = std::max({largest, p[k].cwiseAbs().maxCoeff(), q[k].cwiseAbs().maxCoeff()});
+    if (!edgesTouch(p, q, std::numeric_limits<double>::epsilon() * largest, a, b)) nearestPoints(p, q, a, b);
     return (a + b) / 2;
   }
   if (line.squaredNorm() > 1e-24 * n.squaredNorm() * m.squaredNorm() && cutByPlane(p, q[0], m, a, b) &&
@@ -318,6 +320,7 @@ ContactPoint trianglePenetrations(const Corners& p, const Corners& q) {
 PenetrationVerdicts trianglePenetrations(const TrianglePairs& pairs, double tolerance, ContactPoint* contacts) {
   PairPenetrations found;
   penetrationsOfPairs(pairs, tolerance, found);
+  if (contacts == nullptr) return {found.meet, found.apart};
   for (std::size_t i = 0; i < pairs.count; ++i) {
     ContactPoint& contact = contacts[i];
     contact.normal = Vector3d(found.normal[0][i], found.normal[1][i], found.normal[2][i]);
@@ -376,6 +379,21 @@ bool areApart(const Corners& p, const Corners& q, double distance) {
     for (const Vector3d& v : f) {
       if (parts(u.cross(v))) return true;
     }
+  }
+  return false;
+}
+
+bool edgesTouch(const Corners& p, const Corners& q, double distance, Vector3d& on_p, Vector3d& on_q) {
+  const double squared = distance * distance;
+  if (!(squared > 1e-280 && squared < 1e280)) return false;  // smaller squares vanish, larger ones overflow
+  const Face<double> face_p = faceOf(p), face_q = faceOf(q);
+  Closest<double> closest;
+  for (int i = 0; i < 9; ++i) {
+    considerEdges(face_p, i / 3, face_q, i % 3, closest);
+    if (!(closest.squared <= squared)) continue;
+    on_p = toVector(closest.p);
+    on_q = toVector(closest.q);
+    return true;
   }
   return false;
 }

@@ -29,8 +29,8 @@ struct PenetrationVerdicts {
   std::uint32_t meet, apart;
 };
 
-/// The same for many pairs at once, whether they touch or not; touches has room for pairs.count. `tolerance` is a
-/// length that corners may be off by without that meet or apart is wrong.
+/// The same for many pairs at once, whether they touch or not; `contacts` has room for pairs.count, or is null where
+/// nobody asks. `tolerance` is a length that corners may be off by without that meet or apart is wrong.
 PenetrationVerdicts trianglePenetrations(const TrianglePairs& pairs, double tolerance, ContactPoint* contacts);
 
 /// The point of a closed triangle, degenerate or not, that is nearest to x.
@@ -47,6 +47,10 @@ inline bool isDegenerate(const Corners& triangle) { return relativeWidth(triangl
 /// Are two closed triangles, degenerate or not, surely farther apart than `distance`? Looks for an axis among their
 /// normals and the cross products of their edges; a fiftieth of the time of nearestPoints() on slivers.
 bool areApart(const Corners& p, const Corners& q, double distance);
+
+/// Are there points of edges of both, degenerate or not, that are no farther apart than `distance`? Looks in double, so
+/// each point may be off its edge by 4 roundings of the largest coordinate. False says nothing.
+bool edgesTouch(const Corners& p, const Corners& q, double distance, Eigen::Vector3d& on_p, Eigen::Vector3d& on_q);
 
 /// The distance between two closed triangles, degenerate or not, 0 where an edge cuts the inside of the other, and a
 /// point of each that is as near to the other. It is off by a few roundings of the coordinates, also of triangles that

@@ -5,6 +5,7 @@
 #include <mutex>
 #include <numeric>
 
+#include "tree/box_tree.h"
 #include "tree/tree.h"
 
 namespace bocst::tree {
@@ -176,6 +177,10 @@ void Tree::pruneAlone(std::int64_t now, bool budget_only) {
       }
     }
     if (some) keepOnly(keep);
+  }
+  if (!budget_only && ttl > 0 && boxes_ != nullptr && now - boxes_used_.load(std::memory_order_relaxed) > ttl) {
+    dropBoxes();
+    countBytes();
   }
   applyBudget();
 }

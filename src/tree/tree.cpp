@@ -12,6 +12,7 @@
 #include <stdexcept>
 #include <string>
 
+#include "tree/box_tree.h"
 #include "tree/cell_bounds.h"
 
 namespace bocst::tree {
@@ -84,6 +85,7 @@ void Tree::reset(std::shared_ptr<const Mesh> mesh) {
   solid_ = options_.solid ? std::make_shared<const Solid>(mesh) : nullptr;
   component_points_known_ = nullptr;
   component_points_ = nullptr;
+  dropBoxes();
   surface_ = surfaceOf(std::move(mesh), options_);
   radius_ = -1;
   root_bounds_ = bounds::NodeBounds();
@@ -114,6 +116,27 @@ const std::vector<Eigen::Vector3d>& Tree::componentPoints() const {
     component_points_known_.store(component_points_.get(), std::memory_order_release);
   }
   return *component_points_;
+}
+
+const BoxTree& Tree::boxes(std::int64_t now) {
+  if (boxes_used_.load(std::memory_order_relaxed) < now) boxes_used_.store(now, std::memory_order_relaxed);
+  if (const BoxTree* known = boxes_known_.load(std::memory_order_acquire)) return *known;
+  const std::lock_guard<thread::ForkAwareMutex> lock(growth_);
+  if (boxes_ == nullptr) {
+    boxes_ = std::make_unique<const BoxTree>(surface_);
+    boxes_known_.store(boxes_.get(), std::memory_order_release);
+    countBytes();
+  }
+  return *boxes_;
+}
+
+bool Tree::affordsBoxes() const {
+  return options_.memory_budget == 0 || BoxTree::bytesOf(surface_.triangle_count) <= options_.memory_budget / 2;
+}
+
+void Tree::dropBoxes() {
+  boxes_known_.store(nullptr, std::memory_order_relaxed);
+  boxes_ = nullptr;
 }
 
 std::shared_ptr<const Mesh> Tree::mesh() const {
@@ -536,7 +559,8 @@ void Tree::countBytes() {
 }
 
 std::size_t Tree::treeBytes() const {
-  return blocks_.bytes() + records_.bytes() + last_use_.bytes() + lists_.bytes() + (grid_ ? grid_->bytes() : 0);
+  return blocks_.bytes() + records_.bytes() + last_use_.bytes() + lists_.bytes() + (grid_ ? grid_->bytes() : 0) +
+         (boxes_ ? boxes_->bytes() : 0);
 }
 
 }  // namespace bocst::tree

@@ -28,6 +28,7 @@
 
 namespace bocst::tree {
 
+class BoxTree;
 class BulkBuilder;
 
 /// The sphere-tree of one model: resident nodes, how they grow and how they go.
@@ -52,7 +53,8 @@ class Tree {
   bool isPruneDue(std::int64_t now) const { return now >= next_prune_.load(std::memory_order_relaxed); }
   /// Are there branches that are dropped some time, if no query uses them? Without a lock.
   bool hasDecay() const {
-    return root_.load(std::memory_order_relaxed).tag() == ChildRef::kBlock &&
+    return (root_.load(std::memory_order_relaxed).tag() == ChildRef::kBlock ||
+            boxes_known_.load(std::memory_order_relaxed) != nullptr) &&
            next_prune_.load(std::memory_order_relaxed) != kNeverDue;
   }
 
@@ -101,6 +103,11 @@ class Tree {
   const Solid* solid() const { return solid_.get(); }
   /// A point of each connected component of the surface, in the mesh's frame; found when first asked for.
   const std::vector<Eigen::Vector3d>& componentPoints() const;
+  /// Oriented boxes of all triangles, for exact answers of a long and thin surface; built when first asked for, and
+  /// dropped like a branch. @throws std::bad_alloc.
+  const BoxTree& boxes(std::int64_t now);
+  /// They would not take most of the memory budget.
+  bool affordsBoxes() const;
 
   /// Marks a block as used now, for ttl and budget.
   void markUsed(std::uint32_t block, std::int64_t now) const {
@@ -201,6 +208,7 @@ class Tree {
   void refit();
   void pruneAlone(std::int64_t now, bool budget_only);
   void applyBudget();
+  void dropBoxes();
   void keepOnly(const std::vector<std::uint8_t>& keep);
   void collectTriangles(ChildRef ref, const lattice::Cell& cell, std::vector<std::uint32_t>& ids) const;
   ChildRef regained(ChildRef block, const lattice::Cell& cell, TriangleLists& lists) const;
@@ -220,8 +228,11 @@ class Tree {
   mutable thread::ForkAwareMutex component_mutex_;  // guards component_points_ while they are found
   mutable std::unique_ptr<const std::vector<Eigen::Vector3d>> component_points_;
   mutable std::atomic<const std::vector<Eigen::Vector3d>*> component_points_known_{
-      nullptr};                             // component_points_, for readers
-  mutable std::atomic<double> radius_{-1};  // negative: not known yet
+      nullptr};                                       // component_points_, for readers
+  mutable std::atomic<double> radius_{-1};            // negative: not known yet
+  std::unique_ptr<const BoxTree> boxes_;              // made under growth_, dropped alone
+  std::atomic<const BoxTree*> boxes_known_{nullptr};  // boxes_, for readers
+  std::atomic<std::int64_t> boxes_used_{0};
   bounds::NodeBounds root_bounds_;
   SupportTable supports_;
   // Of a query of what is far apart, all that it reads.

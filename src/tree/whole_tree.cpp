@@ -12,6 +12,7 @@
 #include <thread>
 
 #include "thread/helper_thread.h"
+#include "tree/box_tree.h"
 #include "tree/bulk.h"
 #include "tree/cell_bounds.h"
 #include "tree/tree.h"
@@ -86,6 +87,7 @@ void Tree::leakPools() {
   (new decltype(lists_))->swap(lists_);
   (new decltype(resources_))->swap(resources_);
   (new decltype(refits_))->swap(refits_);
+  static_cast<void>(boxes_.release());
 }
 
 // The cell of a node; of a lane only the level, which counts from the cell that was built in bulk.

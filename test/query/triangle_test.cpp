@@ -41,6 +41,14 @@ void expectRight(const Corners& p, const Corners& q, double roundings) {
   ASSERT_LE(exactDistance(at_p, p), least);
   ASSERT_LE(exactDistance(at_q, q), least);
   ASSERT_NEAR(exactDistance(at_p, at_q), want, least);
+  for (const double d : {0.4 * want, want, want + least, 3 * least}) {
+    Vector3d edge_p, edge_q;
+    if (!edgesTouch(p, q, d, edge_p, edge_q)) continue;
+    const double rounding = 8 * 0x1p-53 * far;
+    ASSERT_LE(exactDistance({edge_p, edge_p, edge_p}, p), rounding);
+    ASSERT_LE(exactDistance({edge_q, edge_q, edge_q}, q), rounding);
+    ASSERT_LE(exactDistance({edge_p, edge_p, edge_p}, {edge_q, edge_q, edge_q}), d * (1 + 1e-15));
+  }
   for (int k = 0; k < 3; ++k) {
     const Corners x = {p[k], p[k], p[k]};
     const Vector3d near = closestPoint(p[k], q);
@@ -187,6 +195,34 @@ TEST(AreApart, FindsWhatIsApartByFacesOrEdges) {
   const Corners huge = {{1e200, 0, 0}, {1e200, 1e200, 0}, {1e200, 0, 1e200}},
                 far = {{-1e200, 0, 0}, {-1e200, 1e200, 0}, {-1e200, 0, 1e200}};
   EXPECT_FALSE(areApart(huge, far, 3e200));
+}
+
+TEST(EdgesTouch, FindsWhatSharesAPointOfEdges) {
+  std::mt19937_64 g(7);
+  std::uniform_real_distribution<double> u(-1, 1);
+  const auto point = [&] { return Vector3d(u(g), u(g), u(g)); };
+  int found = 0;
+  for (int round = 0; round < 3000; ++round) {
+    const double size = std::exp2(60 * u(g));
+    const Vector3d shared = size * point();
+    Corners p = {size * point(), size * point(), size * point()}, q = {size * point(), size * point(), size * point()};
+    if (round % 3 == 0) p[2] = p[0];
+    if (round % 2 == 0) {
+      p[0] = q[1] = shared;  // a corner
+    } else {
+      p[1] = shared + (shared - p[0]);  // the middles of two edges
+      q[2] = shared + (shared - q[1]);
+    }
+    Vector3d on_p, on_q;
+    found += edgesTouch(p, q, 16 * 0x1p-53 * largest(p, q), on_p, on_q);
+    ASSERT_FALSE(edgesTouch(p, q, 0, on_p, on_q)) << round;
+  }
+  EXPECT_GT(found, 2700) << "all but those of nearly parallel edges";
+  // So small that squares vanish.
+  const Corners p = {Vector3d(0, 0, 0), Vector3d(1e-200, 0, 0), Vector3d(0, 1e-200, 0)};
+  const Corners q = {Vector3d(0, 0, 1e-180), Vector3d(1e-200, 0, 1e-180), Vector3d(0, 1e-200, 1e-180)};
+  Vector3d on_p, on_q;
+  EXPECT_FALSE(edgesTouch(p, q, 1e-190, on_p, on_q));
 }
 
 TEST(IsDegenerate, WhateverTheOrderAndTheUnit) {

@@ -34,6 +34,7 @@
 #include "query/collide/tree_walk.h"
 #include "query/cull/far_apart.h"
 #include "query/leaf/pair_set.h"
+#include "query/sides/box_side.h"
 
 namespace bocst::fcl_adapter {
 namespace {
@@ -319,7 +320,8 @@ class Collector : public query::Visitor {
     }
     getCorners(keys, count);
     query::ContactPoint contacts[query::TrianglePairs::kCapacity];
-    const query::PenetrationVerdicts verdicts = query::trianglePenetrations(s_.pairs, 2 * rounding(), contacts);
+    const query::PenetrationVerdicts verdicts =
+        query::trianglePenetrations(s_.pairs, 2 * rounding(), q_.request.enable_contact ? contacts : nullptr);
     for (std::size_t i = 0; i < count; ++i) {
       const bool meet = isCertain(keys[i]) || (verdicts.meet >> i & 1);
       if (meet && margin_ == 0) {
@@ -367,6 +369,8 @@ class Collector : public query::Visitor {
     // Of slivers, its axes are rounding, and may part what touches.
     const double touching = sliver ? rounding() : margin_;
     Eigen::Vector3d on_p, on_q;
+    // Half of what counts as touching is left for what points on edges may be off by: the contact is as it was.
+    if (sliver && margin_ == 0 && query::edgesTouch(p, q, touching / 2, on_p, on_q)) return true;
     const double distance =
         query::nearestPoints(p, q, on_p, on_q, meet ? std::numeric_limits<double>::infinity() : touching);
     if (!meet && distance > touching) return false;
@@ -490,7 +494,7 @@ bool isOutOfSight(const CollideQuery<S>& q, const SimilarityTransform& b_in_a, d
 }
 
 // Is a surface so long and thin that the float walk's rounding, which is a part of its length, is as wide as it is? The
-// walk in double parts what that one cannot.
+// walk in double parts what that one cannot; of two such surfaces, along the axes of oriented boxes.
 bool isNeedle(const tree::Tree& tree) {
   constexpr float kThin = 0x1p-12f;
   return tree.outline().read([](const tree::Outline::Reader& box) {
@@ -518,6 +522,11 @@ void collideTrees(const CollideQuery<S>& q, const TreeSide& a, const TreeSide& b
   if (query::TreeWalk::fits(a, b, near) && !isNeedle(tree_a) && !isNeedle(tree_b)) {
     query::TreeWalk trees(a, b, near);
     if (!trees.isNeedless()) walk([&](auto& collector) { trees.run(collector); });
+  } else if (isNeedle(tree_a) && isNeedle(tree_b) && query::BoxSide::fits(a, b)) {
+    const query::BoxSide boxes_a(a), boxes_b(b);
+    walk([&](auto& collector) {
+      query::PairWalk<query::BoxSide, query::BoxSide>(boxes_a, boxes_b, near, collector).run();
+    });
   } else if (query::SphereWalk::fits(a, b)) {
     query::SphereWalk spheres(a, b, near);
     if (!spheres.isNeedless()) walk([&](auto& collector) { spheres.run(collector); });

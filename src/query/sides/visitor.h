@@ -36,6 +36,7 @@ struct Cut {
     const auto k = static_cast<std::size_t>(axis);
     return v.center[k] - static_cast<double>(v.half[k]);
   }
+  double leastOf(const OrientedVolume& v) const { return v.center[axis] - v.axes.row(axis).cwiseAbs().dot(v.half); }
   /// Half extents are rounded to float: by less than 2^-8 of a lattice unit, as is the middle.
   bool isBeyond(double least) const { return least > last + 0x1p-6; }
 };

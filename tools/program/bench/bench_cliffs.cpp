@@ -12,7 +12,6 @@ namespace {
 
 using Eigen::Vector3d;
 
-
 struct Triangles {
   std::vector<Vector3d> vertices;
   std::vector<fcl::Triangle> triangles;

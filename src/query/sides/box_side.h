@@ -1,0 +1,80 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#pragma once
+
+#include <cstddef>
+#include <cstdint>
+#include <vector>
+
+#include "query/sides/side.h"
+#include "tree/box_tree.h"
+
+namespace bocst::query {
+
+/// A model's oriented boxes as a side of a walk, in the frame of its TreeSide, which must outlive this: for exact
+/// answers of what is long and thin.
+class BoxSide {
+ public:
+  using Node = int;
+  static constexpr bool kBodies = false;
+  static constexpr bool kNodesContainSurface = true;
+
+  static bool fits(const TreeSide& a, const TreeSide& b) {
+    return !a.isConservative() && !b.isConservative() && a.tree().affordsBoxes() && b.tree().affordsBoxes();
+  }
+
+  explicit BoxSide(const TreeSide& side) : side_(side), nodes_(side.tree().boxes(side.now()).nodes()) {}
+
+  Node root() const { return 0; }
+  bool isConservative() const { return false; }
+  State state(Node n) const { return node(n).second == 0 ? State::kLeaf : State::kInner; }
+  bool growsFromGrid(Node) const { return true; }
+  void grow(Node, std::vector<tree::Tree::Growth>&) const {}
+  double size(Node n) const { return node(n).half.squaredNorm(); }
+
+  OrientedVolume volume(Node n) const {
+    OrientedVolume v;
+    v.center = node(n).center;
+    v.axes = node(n).axes;
+    v.half = node(n).half;
+    return v;
+  }
+  Sphere sphere(Node n) const { return {node(n).center, node(n).half.norm()}; }
+  // Only a side that answers with cells is asked for these.
+  Sphere cellSphere(Node n) const { return sphere(n); }
+  std::uint64_t cellId(Node n) const { return static_cast<std::uint64_t>(n); }
+
+  template <typename F>
+  void children(Node n, F&& f) const {
+    f(n + 1);
+    f(static_cast<Node>(node(n).second));
+  }
+  template <typename F>
+  void overlappingChildren(Node n, const OrientedVolume& other, const SimilarityTransform& to, F&& f) const {
+    children(n, [&](Node child) {
+      if (!boxesApart(volume(child), other, to)) f(child);
+    });
+  }
+  // A pair of children is not worth a look at each triangle.
+  template <typename Large, typename Other, typename F>
+  void childrenMeeting(Node n, const OrientedVolume& volume, const SimilarityTransform& to, Large&, const Other&,
+                       typename Other::Node, F&& f) const {
+    overlappingChildren(n, volume, to, f);
+  }
+
+  std::size_t triangleCount(Node) const { return 1; }
+  std::uint32_t triangle(Node n, std::size_t) const { return node(n).triangle; }
+  void prefetch(std::uint32_t t) const { side_.prefetch(t); }
+  void prefetchCorners(std::uint32_t t) const { side_.prefetchCorners(t); }
+  const Eigen::Vector3d& vertex(std::uint32_t t, int k) const { return side_.vertex(t, k); }
+  const Eigen::Vector3d& origin() const { return side_.origin(); }
+  double inverseUnit() const { return side_.inverseUnit(); }
+  Eigen::Vector3d corner(std::uint32_t t, int k) const { return side_.corner(t, k); }
+
+ private:
+  const tree::BoxTree::Node& node(Node n) const { return nodes_[static_cast<std::size_t>(n)]; }
+
+  const TreeSide& side_;
+  const std::vector<tree::BoxTree::Node>& nodes_;
+};
+
+}  // namespace bocst::query

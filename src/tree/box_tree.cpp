@@ -1,0 +1,118 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#include "tree/box_tree.h"
+
+#include <Eigen/Geometry>
+#include <algorithm>
+#include <cmath>
+#include <limits>
+
+namespace bocst::tree {
+namespace {
+
+using Eigen::Matrix3d;
+using Eigen::Vector3d;
+
+// Corners, axes and sums of their products are off by less, in lattice units: 2^16 units have an ulp of 2^-36.
+constexpr double kPad = 0x1p-30;
+
+// The direction in which a covariance is largest. It need not be exact: boxes may have any axes.
+Vector3d longestAxis(const Matrix3d& covariance) {
+  int largest = 0;
+  covariance.diagonal().maxCoeff(&largest);
+  Vector3d axis = covariance.col(largest);
+  if (!(axis.squaredNorm() > 1e-200)) return Vector3d::UnitX();
+  for (int i = 0; i < 6; ++i) axis = covariance * axis.normalized();
+  return axis.normalized();
+}
+
+// Along the longest edge of a triangle, and across it in the triangle's plane.
+Matrix3d axesOf(const Vector3d (&corner)[3]) {
+  const Vector3d edge[3] = {corner[1] - corner[0], corner[2] - corner[1], corner[0] - corner[2]};
+  const double squared[3] = {edge[0].squaredNorm(), edge[1].squaredNorm(), edge[2].squaredNorm()};
+  const auto longest = static_cast<std::size_t>(std::max_element(squared, squared + 3) - squared);
+  if (!(squared[longest] > 1e-200)) return Matrix3d::Identity();
+  Matrix3d axes;
+  axes.col(0) = edge[longest] / std::sqrt(squared[longest]);
+  Vector3d across = edge[(longest + 1) % 3];
+  for (int i = 0; i < 2; ++i) across -= axes.col(0).dot(across) * axes.col(0);  // once leaves a part along a long edge
+  const bool is_segment = !(across.squaredNorm() > 1e-24 * squared[longest]);
+  axes.col(1) = is_segment ? axes.col(0).unitOrthogonal() : across.normalized();
+  axes.col(2) = axes.col(0).cross(axes.col(1));
+  return axes;
+}
+
+// The axes of the corners' covariance. That of what lies across the longest axis is summed along two axes of its own:
+// next to the length it would be lost in rounding. `over` calls a function with each corner.
+template <typename F>
+Matrix3d principalAxes(double count, const F& over) {
+  Vector3d sum = Vector3d::Zero();
+  Matrix3d products = Matrix3d::Zero();
+  over([&](const Vector3d& p) {
+    sum += p;
+    products += p * p.transpose();
+  });
+  const Vector3d longest = longestAxis(products / count - sum * sum.transpose() / (count * count));
+  const Vector3d u = longest.unitOrthogonal(), v = longest.cross(u);
+  double su = 0, sv = 0, suu = 0, suv = 0, svv = 0;
+  over([&](const Vector3d& p) {
+    const double x = u.dot(p), y = v.dot(p);
+    su += x, sv += y, suu += x * x, suv += x * y, svv += y * y;
+  });
+  const double angle = std::atan2(2 * (suv - su * sv / count), suu - su * su / count - (svv - sv * sv / count)) / 2;
+  Matrix3d axes;
+  axes.col(0) = longest;
+  axes.col(1) = std::cos(angle) * u + std::sin(angle) * v;
+  axes.col(2) = longest.cross(axes.col(1));
+  return axes;
+}
+
+}  // namespace
+
+BoxTree::BoxTree(const oracle::Surface& surface) {
+  std::vector<Item> items(surface.triangle_count);
+  for (std::uint32_t t = 0; t < items.size(); ++t) {
+    for (int k = 0; k < 3; ++k) items[t].corner[k] = surface.corner(t, k);
+    items[t].middle = (items[t].corner[0] + items[t].corner[1] + items[t].corner[2]) / 3;
+    items[t].triangle = t;
+  }
+  nodes_.reserve(2 * items.size() - 1);
+  add(items.data(), items.data() + items.size());
+}
+
+void BoxTree::add(Item* begin, Item* end) {
+  const Vector3d origin = begin->corner[0];
+  const auto over_corners = [&](auto&& f) {
+    for (const Item* i = begin; i != end; ++i) {
+      for (const Vector3d& corner : i->corner) f(Vector3d(corner - origin));
+    }
+  };
+  const bool is_leaf = end - begin == 1;
+  const Matrix3d axes =
+      is_leaf ? axesOf(begin->corner) : principalAxes(3.0 * static_cast<double>(end - begin), over_corners);
+  Vector3d lo = Vector3d::Constant(std::numeric_limits<double>::infinity()), hi = -lo, first = lo, last = hi;
+  const Matrix3d to_axes = axes.transpose();
+  for (const Item* i = begin; i != end; ++i) {
+    for (const Vector3d& corner : i->corner) {
+      const Vector3d p = to_axes * (corner - origin);
+      lo = lo.cwiseMin(p);
+      hi = hi.cwiseMax(p);
+    }
+    const Vector3d middle = to_axes * (i->middle - origin);
+    first = first.cwiseMin(middle);
+    last = last.cwiseMax(middle);
+  }
+  const std::size_t index = nodes_.size();
+  nodes_.push_back({origin + axes * ((lo + hi) / 2), axes, ((hi - lo) / 2).array() + kPad, 0, begin->triangle});
+  if (is_leaf) return;
+  int widest = 0;
+  (last - first).maxCoeff(&widest);
+  const Vector3d along = axes.col(widest);
+  Item* const middle = begin + (end - begin) / 2;
+  std::nth_element(begin, middle, end,
+                   [&along](const Item& a, const Item& b) { return along.dot(a.middle) < along.dot(b.middle); });
+  add(begin, middle);
+  nodes_[index].second = static_cast<std::uint32_t>(nodes_.size());
+  add(middle, end);
+}
+
+}  // namespace bocst::tree
