@@ -130,16 +130,27 @@ T clampToUnit(const T& x) {
   return x < T(0) ? T(0) : x > T(1) ? T(1) : x;
 }
 
+// Corners, edges and their squares.
+template <typename T>
+struct Edges {
+  Vec<T> v[3], e[3];
+  T ee[3];
+
+  Edges(const Vec<T>& a, const Vec<T>& b, const Vec<T>& c) : v{a, b, c}, e{b - a, c - b, a - c} {
+    for (int i = 0; i < 3; ++i) ee[i] = dot(e[i], e[i]);
+  }
+};
+
 // A triangle with what is computed from it once. The normal is that of the two shorter edges: its direction is off by
 // 4 roundings over the sine of their angle, and that sine says what the three corners are.
 template <typename T>
-struct Face {
-  Vec<T> v[3], e[3], n;
-  T ee[3], nn;
+struct Face : Edges<T> {
+  using Edges<T>::v, Edges<T>::e, Edges<T>::ee;
+  Vec<T> n;
+  T nn;
   double sine2 = 0;  // of the angle between the two shorter edges, squared; 0 for a segment or a point
 
-  Face(const Vec<T>& a, const Vec<T>& b, const Vec<T>& c) : v{a, b, c}, e{b - a, c - b, a - c} {
-    for (int i = 0; i < 3; ++i) ee[i] = dot(e[i], e[i]);
+  Face(const Vec<T>& a, const Vec<T>& b, const Vec<T>& c) : Edges<T>(a, b, c) {
     const int longest = ee[1] > ee[0] ? (ee[2] > ee[1] ? 2 : 1) : (ee[2] > ee[0] ? 2 : 0);
     const int i = (longest + 1) % 3, j = (longest + 2) % 3;
     n = cross(e[i], e[j]);
@@ -205,7 +216,7 @@ struct Closest {
 };
 
 template <typename T>
-void considerEdges(const Face<T>& p, int i, const Face<T>& q, int j, Closest<T>& closest) {
+void considerEdges(const Edges<T>& p, int i, const Edges<T>& q, int j, Closest<T>& closest) {
   const T zero(0);
   const Vec<T>&a = p.v[i], &b = q.v[j], &e = p.e[i], &f = q.e[j];
   const T &ee = p.ee[i], &ff = q.ee[j];
@@ -265,7 +276,7 @@ Closest<T> closestOf(const Face<T>& p, const Face<T>& q) {
     }
   }
   for (int i = 0; i < 3; ++i) {
-    for (int j = 0; j < 3; ++j) considerEdges(p, i, q, j, closest);
+    for (int j = 0; j < 3; ++j) considerEdges<T>(p, i, q, j, closest);
   }
   return closest;
 }
@@ -386,10 +397,13 @@ bool areApart(const Corners& p, const Corners& q, double distance) {
 bool edgesTouch(const Corners& p, const Corners& q, double distance, Vector3d& on_p, Vector3d& on_q) {
   const double squared = distance * distance;
   if (!(squared > 1e-280 && squared < 1e280)) return false;  // smaller squares vanish, larger ones overflow
-  const Face<double> face_p = faceOf(p), face_q = faceOf(q);
+  const auto edges_of = [](const Corners& t) {
+    return Edges<double>(Vec<double>(t[0]), Vec<double>(t[1]), Vec<double>(t[2]));
+  };
+  const Edges<double> edges_p = edges_of(p), edges_q = edges_of(q);
   Closest<double> closest;
   for (int i = 0; i < 9; ++i) {
-    considerEdges(face_p, i / 3, face_q, i % 3, closest);
+    considerEdges(edges_p, i / 3, edges_q, i % 3, closest);
     if (!(closest.squared <= squared)) continue;
     on_p = toVector(closest.p);
     on_q = toVector(closest.q);

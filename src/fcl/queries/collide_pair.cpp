@@ -356,9 +356,18 @@ class Collector : public query::Visitor {
     // Each in its own frame: where it is placed, rounding may give it a width.
     Corners own;
     for (int k = 0; k < 3; ++k) own[k] = t2_.corner(b, k).template cast<double>();
-    const double width_p = query::relativeWidth(p), width_q = query::relativeWidth(own);
     const bool tiny = longest(p) * longest(own) < kSmallestProduct;
-    const bool sliver = !isCertain(key) && (tiny || isSliver(p, width_p) || isSliver(own, width_q));
+    const double width_q = query::relativeWidth(own);
+    const bool is_sliver_q = tiny || isSliver(own, width_q);
+    // Half of what counts as touching is left for what points on edges may be off by: the contact is as it was.
+    const auto touchesByEdges = [&] {
+      Eigen::Vector3d on_p, on_q;
+      return margin_ == 0 && query::edgesTouch(p, q, rounding() / 2, on_p, on_q);
+    };
+    if (is_sliver_q && touchesByEdges()) return true;
+    const double width_p = query::relativeWidth(p);
+    const bool is_sliver_p = isSliver(p, width_p), sliver = !isCertain(key) && (is_sliver_q || is_sliver_p);
+    if (!is_sliver_q && is_sliver_p && touchesByEdges()) return true;
     // FCL's axes do not separate segments and points from everything.
     const bool degenerate = sliver && (tiny || std::min(width_p, width_q) <= query::kDegenerate);
     const bool meet =
@@ -369,8 +378,6 @@ class Collector : public query::Visitor {
     // Of slivers, its axes are rounding, and may part what touches.
     const double touching = sliver ? rounding() : margin_;
     Eigen::Vector3d on_p, on_q;
-    // Half of what counts as touching is left for what points on edges may be off by: the contact is as it was.
-    if (sliver && margin_ == 0 && query::edgesTouch(p, q, touching / 2, on_p, on_q)) return true;
     const double distance =
         query::nearestPoints(p, q, on_p, on_q, meet ? std::numeric_limits<double>::infinity() : touching);
     if (!meet && distance > touching) return false;
