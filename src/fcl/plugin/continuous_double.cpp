@@ -35,3 +35,39 @@ template double fcl::continuousCollide<double>(const CollisionObject<double>*, c
                                                ContinuousCollisionResult<double>&);
 template double fcl::collide<double>(const ContinuousCollisionObject<double>*, const ContinuousCollisionObject<double>*,
                                      const ContinuousCollisionRequest<double>&, ContinuousCollisionResult<double>&);
+
+namespace {
+
+// The pairs of FCL's own table.
+bool fclAdvances(int row, int column) {
+  const auto is_shape = [](int type) { return bocst::fcl_adapter::isFclShape(type) && type != fcl::GEOM_ELLIPSOID; };
+  if (is_shape(row)) return is_shape(column) || bocst::fcl_adapter::isBvh(column);
+  return bocst::fcl_adapter::isBvh(row) && (is_shape(column) || row == column);
+}
+
+}  // namespace
+
+// As those of collisions: only code that names FCL's conservative advancement itself reads these tables.
+template <>
+fcl::detail::ConservativeAdvancementFunctionMatrix<
+    fcl::detail::GJKSolver_libccd<double>>::ConservativeAdvancementFunctionMatrix() {
+  bocst::fcl_adapter::fillTable(conservative_advancement_matrix,
+                                &bocst::fcl_adapter::libfcl::conservativeAdvancement<GJKSolver_libccd<double>>,
+                                fclAdvances);
+}
+template <>
+fcl::detail::ConservativeAdvancementFunctionMatrix<
+    fcl::detail::GJKSolver_indep<double>>::ConservativeAdvancementFunctionMatrix() {
+  bocst::fcl_adapter::fillTable(conservative_advancement_matrix,
+                                &bocst::fcl_adapter::libfcl::conservativeAdvancement<GJKSolver_indep<double>>,
+                                fclAdvances);
+}
+
+void bocst::fcl_adapter::registerContinuous() {
+  using Libccd = fcl::detail::GJKSolver_libccd<double>;
+  using Indep = fcl::detail::GJKSolver_indep<double>;
+  fillSlots(fcl::getConservativeAdvancementFunctionLookTable<Libccd>().conservative_advancement_matrix,
+            &advancementEntry<Libccd>);
+  fillSlots(fcl::getConservativeAdvancementFunctionLookTable<Indep>().conservative_advancement_matrix,
+            &advancementEntry<Indep>);
+}

@@ -15,6 +15,7 @@
 #include <memory>
 #include <stdexcept>
 #include <string>
+#include <type_traits>
 
 #include "fcl/adapters/models.h"
 
@@ -117,6 +118,7 @@ void checkDispatch() {
   static const bool registered = [] {
     registerCollide<S>();
     registerDistance<S>();
+    if (std::is_same<S, double>::value) registerContinuous();
     return true;
   }();
   if (!registered || !checkIsOn()) return;

@@ -22,6 +22,8 @@ template <typename Solver>
 struct CollisionFunctionMatrix;
 template <typename Solver>
 struct DistanceFunctionMatrix;
+template <typename Solver>
+struct ConservativeAdvancementFunctionMatrix;
 }  // namespace detail
 
 // FCL does not say so, but an executable that instantiates FCL's code itself must share these tables with us.
@@ -29,6 +31,9 @@ template <typename Solver>
 __attribute__((visibility("default"))) detail::CollisionFunctionMatrix<Solver>& getCollisionFunctionLookTable();
 template <typename Solver>
 __attribute__((visibility("default"))) detail::DistanceFunctionMatrix<Solver>& getDistanceFunctionLookTable();
+template <typename Solver>
+__attribute__((visibility("default"))) detail::ConservativeAdvancementFunctionMatrix<Solver>&
+getConservativeAdvancementFunctionLookTable();
 
 // Three of its four solvers do not look into any table. So both functions are ours, for double (float is in no libfcl);
 // they must be declared before FCL says that they are libfcl's.

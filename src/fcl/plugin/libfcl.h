@@ -21,6 +21,13 @@ std::size_t collide(const fcl::CollisionGeometry<double>* o1, const fcl::Transfo
                     const fcl::CollisionGeometry<double>* o2, const fcl::Transform3<double>& X_W2, const Solver* solver,
                     const fcl::CollisionRequest<double>& request, fcl::CollisionResult<double>& result);
 
+/// fcl::detail::continuousCollideConservativeAdvancement<Solver>, for both of FCL's solvers.
+template <typename Solver>
+double conservativeAdvancement(const fcl::CollisionGeometry<double>* o1, const fcl::MotionBase<double>* motion1,
+                               const fcl::CollisionGeometry<double>* o2, const fcl::MotionBase<double>* motion2,
+                               const Solver* solver, const fcl::ContinuousCollisionRequest<double>& request,
+                               fcl::ContinuousCollisionResult<double>& result);
+
 /// fcl::continuousCollide<double> with motions, and with begin and end poses.
 double continuousCollide(const fcl::CollisionGeometry<double>* o1, const fcl::MotionBase<double>* motion1,
                          const fcl::CollisionGeometry<double>* o2, const fcl::MotionBase<double>* motion2,

@@ -7,11 +7,9 @@
 
 #include <bocst/fcl.h>
 
-#include <algorithm>
 #include <iostream>
-#include <iterator>
 #include <limits>
-#include <type_traits>
+#include <typeinfo>
 
 #include "fcl/adapters/models.h"
 #include "fcl/plugin/libfcl.h"
@@ -33,7 +31,8 @@ class Sentinel final : public fcl::CollisionGeometry<S> {
 
 template <typename S>
 bool isSentinel(const fcl::CollisionGeometry<S>* geometry) {
-  return dynamic_cast<const Sentinel<S>*>(geometry) != nullptr;
+  // No dynamic_cast, which takes as long as FCL does for a far pair, and ends a program whose classes have no RTTI.
+  return &typeid(*geometry) == &typeid(Sentinel<S>);
 }
 
 /// FCL's own words for a slot that nobody fills: fcl::TriangleP has our node type too.
@@ -53,12 +52,8 @@ std::size_t collideEntry(const fcl::CollisionGeometry<S>* o1, const fcl::Transfo
   if (kind == PairKind::kNothing) return 0;
   if (kind == PairKind::kModel) return collidePair<S>(o1, X_W1, o2, X_W2, solver, request, result);
   if (isSentinel<S>(o1)) return Sentinel<S>::kReached;
-  if constexpr (std::is_same<S, double>::value) {
-    return libfcl::collide<Solver>(o1, X_W1, o2, X_W2, solver, request, result);
-  } else {
-    warnAsFcl<S>("collision", o1, o2);
-    return 0;
-  }
+  warnAsFcl<S>("collision", o1, o2);
+  return 0;
 }
 
 template <typename S, typename Solver>
@@ -73,10 +68,28 @@ S distanceEntry(const fcl::CollisionGeometry<S>* o1, const fcl::Transform3<S>& X
   return std::numeric_limits<S>::max();
 }
 
-/// All of one of FCL's tables.
-template <typename Entry>
-void fillTable(Entry (&matrix)[fcl::NODE_COUNT][fcl::NODE_COUNT], Entry entry) {
-  for (auto& row : matrix) std::fill(std::begin(row), std::end(row), entry);
+/// In double only, as libfcl has none in float.
+template <typename Solver>
+double advancementEntry(const fcl::CollisionGeometry<double>* o1, const fcl::MotionBase<double>* motion1,
+                        const fcl::CollisionGeometry<double>* o2, const fcl::MotionBase<double>* motion2, const Solver*,
+                        const fcl::ContinuousCollisionRequest<double>& request,
+                        fcl::ContinuousCollisionResult<double>& result) {
+  const PairKind kind = kindOf<double>(o1, o2);
+  if (kind == PairKind::kNothing && touchesNothing<double>(o1, o2, result)) return result.time_of_contact;
+  if (kind == PairKind::kModel) return continuousPair<double>(o1, motion1, o2, motion2, request, result);
+  warnAsFcl<double>("collision", o1, o2);
+  return -1;
+}
+
+constexpr bool isBvh(int node_type) { return node_type >= fcl::BV_AABB && node_type <= fcl::BV_KDOP24; }
+constexpr bool isFclShape(int node_type) { return node_type >= fcl::GEOM_BOX && node_type <= fcl::GEOM_HALFSPACE; }
+
+/// One of FCL's tables: `entry` where has(row, column); elsewhere FCL says that it does not support the pair.
+template <typename Entry, typename Has>
+void fillTable(Entry (&matrix)[fcl::NODE_COUNT][fcl::NODE_COUNT], Entry entry, Has&& has) {
+  for (int row = 0; row < fcl::NODE_COUNT; ++row) {
+    for (int column = 0; column < fcl::NODE_COUNT; ++column) matrix[row][column] = has(row, column) ? entry : nullptr;
+  }
 }
 
 /// The row and the column of Model's node type in one of FCL's tables.
@@ -110,12 +123,20 @@ void registerDistance() {
 extern template void registerDistance<float>();
 extern template void registerDistance<double>();
 
+/// In double.
+void registerContinuous();
+
 }  // namespace bocst::fcl_adapter
 
 namespace fcl::detail {
-// Tables in double lead to libfcl's queries (collide_double.cpp); for other scalars FCL's constructor is compiled.
+// These tables in double lead to libfcl's queries (collide_double.cpp, continuous_double.cpp); for others FCL's
+// constructor is compiled.
 template <>
 CollisionFunctionMatrix<GJKSolver_libccd<double>>::CollisionFunctionMatrix();
 template <>
 CollisionFunctionMatrix<GJKSolver_indep<double>>::CollisionFunctionMatrix();
+template <>
+ConservativeAdvancementFunctionMatrix<GJKSolver_libccd<double>>::ConservativeAdvancementFunctionMatrix();
+template <>
+ConservativeAdvancementFunctionMatrix<GJKSolver_indep<double>>::ConservativeAdvancementFunctionMatrix();
 }  // namespace fcl::detail
