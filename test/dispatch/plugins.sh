@@ -72,4 +72,17 @@ for mode in RTLD_LOCAL RTLD_GLOBAL; do
 done
 check python-alone answers "$python" -c "$call" RTLD_LOCAL "$work/planner.so"
 check python-preload answers env LD_PRELOAD="$libbocst" "$python" -c "$call" RTLD_LOCAL "$libfcl" "$work/planner.so"
+
+# A query while the plugin is still being loaded, from a thread that its initialiser waits for.
+"${launcher[@]}" "${compiler[@]}" -std=c++17 -O2 -fPIC "${flags[@]}" -c "$source/initializer.cpp" -o "$work/initializer.o"
+"${compiler[@]}" -shared -pthread "$work/initializer.o" -o "$work/initializer.so" "$libbocst" "$libfcl" \
+  "-Wl,-rpath,$(dirname "$libbocst")"
+check initializer answers timeout 60 "$work/bare" "$work/initializer.so"
+
+# Geometries without type information.
+"${launcher[@]}" "${compiler[@]}" -std=c++17 -O2 -fno-rtti "${flags[@]}" -c "$source/no_rtti.cpp" -o "$work/no_rtti.o"
+"${compiler[@]}" "$work/no_rtti.o" -o "$work/no_rtti" "$(keep "$libbocst")" "$(keep "$libfcl")" \
+  "-Wl,-rpath,$(dirname "$libbocst")"
+needs "$work/no_rtti" libbocst
+check no-rtti answers "$work/no_rtti"
 exit $failed

@@ -16,6 +16,7 @@
 #include <fcl/geometry/shape/box.h>
 #include <fcl/geometry/shape/sphere.h>
 #include <fcl/geometry/shape/triangle_p.h>
+#include <fcl/math/motion/translation_motion.h>
 #include <fcl/narrowphase/collision.h>
 #include <fcl/narrowphase/continuous_collision.h>
 #include <fcl/narrowphase/distance.h>
@@ -197,6 +198,19 @@ void run() {
       fcl::continuousCollide(&object1, moved(0), &object2, moved(5), request, result);
       expect(!result.is_collide, "continuousCollide of objects that recede is not bocst's");
     }
+  }
+  for (const fcl::GJKSolverType solver : {fcl::GST_LIBCCD, fcl::GST_INDEP}) {
+    const fcl::TranslationMotion<S> still(moved(0), moved(0)), approaching(moved(3), moved(-1)),
+        receding(moved(3), moved(5));
+    fcl::ContinuousCollisionRequest<S> request;
+    request.gjk_solver_type = solver;
+    fcl::ContinuousCollisionResult<S> result;
+    result.is_collide = false;
+    fcl::continuousCollideConservativeAdvancement<S>(a.get(), &still, b.get(), &approaching, request, result);
+    expect(result.is_collide, "continuousCollideConservativeAdvancement of models is not bocst's");
+    result = {};
+    fcl::continuousCollideConservativeAdvancement<S>(a.get(), &still, b.get(), &receding, request, result);
+    expect(!result.is_collide, "continuousCollideConservativeAdvancement of models that recede is not bocst's");
   }
   {
     fcl::CollisionObject<S> object1(box, moved(0)), object2(ball, moved(3)), object3(a, moved(0)),
