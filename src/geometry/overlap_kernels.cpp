@@ -485,7 +485,7 @@ HWY_INLINE PairBits testPairs(const Vec3 (&p)[3], const Vec3 (&q)[3], const Limi
 }
 
 std::size_t TouchingPairs(const TrianglePack& rows, std::uint32_t which, const TrianglePack& lanes,
-                          const PackRegion& region, float tolerance, float margin, PackPair* pairs) {
+                          const PackRegion& region, float tolerance, float margin, bool one_will_do, PackPair* pairs) {
   const D d;
   const hn::RebindToSigned<D> di;
   constexpr std::size_t kMost = hn::MaxLanes(D());
@@ -521,11 +521,18 @@ std::size_t TouchingPairs(const TrianglePack& rows, std::uint32_t which, const T
                   hn::TableLookupLanes(lane_corner[k].z, lane)};
         }
         const PairBits bits = testPairs(p, q, limits, hn::FirstN(d, count - at));
-        for (std::uint32_t k = bits.possible; k != 0; k &= k - 1) {
-          const auto in = static_cast<std::size_t>(__builtin_ctz(k));
+        const auto pairAt = [&](std::size_t in) HWY_ATTR {
           const auto met = static_cast<std::size_t>(which_pair[at + in]);
-          pairs[found++] = {picked.row[j + met / 8], static_cast<std::uint8_t>(i + met % 8),
-                            (bits.certain >> in & 1) != 0};
+          return PackPair{picked.row[j + met / 8], static_cast<std::uint8_t>(i + met % 8),
+                          (bits.certain >> in & 1) != 0};
+        };
+        const std::uint32_t certain = bits.possible & bits.certain;
+        if (one_will_do && certain != 0) {
+          pairs[0] = pairAt(static_cast<std::size_t>(__builtin_ctz(certain)));
+          return 1;
+        }
+        for (std::uint32_t k = bits.possible; k != 0; k &= k - 1) {
+          pairs[found++] = pairAt(static_cast<std::size_t>(__builtin_ctz(k)));
         }
       }
     }
@@ -574,8 +581,8 @@ void moveTriangles(const TrianglePack& pack, std::uint32_t which, const PackMoti
 }
 
 std::size_t touchingPairs(const TrianglePack& rows, std::uint32_t which, const TrianglePack& lanes,
-                          const PackRegion& region, float tolerance, float margin, PackPair* pairs) {
-  return HWY_DYNAMIC_DISPATCH(TouchingPairs)(rows, which, lanes, region, tolerance, margin, pairs);
+                          const PackRegion& region, float tolerance, float margin, bool one_will_do, PackPair* pairs) {
+  return HWY_DYNAMIC_DISPATCH(TouchingPairs)(rows, which, lanes, region, tolerance, margin, one_will_do, pairs);
 }
 
 }  // namespace bocst::query

@@ -105,7 +105,8 @@ struct PackPair {
 /// their boxes, their planes and where they cut the line of both planes; at most rows.count * lanes.count. Returns how
 /// many. What the rows have outside of the box of `region` is not looked at. `tolerance` is a distance that still
 /// counts as touching: what the caller's coordinates are off by. What is no farther apart than `margin` is certain to
-/// touch; two corners are looked at for that.
+/// touch; two corners are looked at for that. `one_will_do`: if a pair is found that is certain to touch, it alone is
+/// written.
 ///
 /// With M the larger size of the packs and u = 2^-24, corners are off by 6 u M along each axis.
 ///
@@ -120,6 +121,6 @@ struct PackPair {
 /// lengths. Where the former are more, all corners are on known sides of the other's plane; so are the ends of the
 /// intervals in which the two cut the line of both planes to each other, by the latter.
 std::size_t touchingPairs(const TrianglePack& rows, std::uint32_t which, const TrianglePack& lanes,
-                          const PackRegion& region, float tolerance, float margin, PackPair* pairs);
+                          const PackRegion& region, float tolerance, float margin, bool one_will_do, PackPair* pairs);
 
 }  // namespace bocst::query

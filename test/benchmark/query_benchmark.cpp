@@ -115,7 +115,7 @@ void pairsOfLeaves(benchmark::State& state) {
   const std::uint32_t all = ~0u >> (32 - count);
   std::size_t i = 0, pairs = 0;
   for (auto _ : state) {
-    pairs += touchingPairs(leaves[i % 32].pack, all, leaves[(i * 7 + 1) % 32].pack, region, 1e-6f, 0, found);
+    pairs += touchingPairs(leaves[i % 32].pack, all, leaves[(i * 7 + 1) % 32].pack, region, 1e-6f, 0, false, found);
     ++i;
   }
   state.counters["found"] = benchmark::Counter(static_cast<double>(pairs), benchmark::Counter::kAvgIterations);

@@ -4,6 +4,7 @@
 #include <fcl/narrowphase/detail/traversal/collision/intersect.h>
 #include <gtest/gtest.h>
 
+#include <algorithm>
 #include <map>
 #include <numeric>
 #include <set>
@@ -317,11 +318,24 @@ TEST_P(EveryTarget, NoPairIsLostThatFclFinds) {
       put(b, i, t);
     }
     PackPair found[TrianglePack::kCapacity * TrianglePack::kCapacity];
-    const std::size_t count = touchingPairs(a, ~0u >> (32 - a.count), b, everywhere(), 0, 0, found);
+    const std::size_t count = touchingPairs(a, ~0u >> (32 - a.count), b, everywhere(), 0, 0, false, found);
     std::map<std::pair<int, int>, bool> set;
     for (std::size_t k = 0; k < count; ++k) set[{found[k].row, found[k].lane}] = found[k].certain;
     ASSERT_EQ(set.size(), count);
     candidates += count;
+    // Where one pair will do, a certain one if there is any, else the same as before.
+    PackPair one[TrianglePack::kCapacity * TrianglePack::kCapacity];
+    const std::size_t fewer = touchingPairs(a, ~0u >> (32 - a.count), b, everywhere(), 0, 0, true, one);
+    if (std::any_of(set.begin(), set.end(), [](const auto& pair) { return pair.second; })) {
+      ASSERT_EQ(fewer, 1u) << "round " << round;
+      ASSERT_TRUE(one[0].certain) << "round " << round;
+    } else {
+      ASSERT_EQ(fewer, count) << "round " << round;
+    }
+    for (std::size_t k = 0; k < fewer; ++k) {
+      const auto at = set.find({one[k].row, one[k].lane});
+      ASSERT_TRUE(at != set.end() && at->second == one[k].certain) << "round " << round;
+    }
     for (std::size_t i = 0; i < a.count; ++i) {
       for (std::size_t j = 0; j < b.count; ++j) {
         ++pairs;
@@ -412,7 +426,7 @@ void certainMeansThatFclSaysSo() {
     moveTriangles(b, 1, motion, moved);
     const auto tolerance = static_cast<float>(magnitude * 32 * static_cast<double>(std::numeric_limits<S>::epsilon()));
     PackPair found[1];
-    const std::size_t count = touchingPairs(a, 1, moved, everywhere(), tolerance, 0, found);
+    const std::size_t count = touchingPairs(a, 1, moved, everywhere(), tolerance, 0, false, found);
     const bool meet = Exact::intersect_Triangle(p[0], p[1], p[2], q[0], q[1], q[2], R, T);
     const bool degenerate = isDegenerate(pd) || isDegenerate(qd);
     if (count == 1 && found[0].certain) {
@@ -473,8 +487,8 @@ TEST_P(EveryTarget, TrianglesWithoutAreaArePartedByEdges) {
     put(a, 0, p);
     put(b, 0, q);
     PackPair found[1];
-    ASSERT_EQ(touchingPairs(a, 1, b, everywhere(), 0, 0, found), 0u) << round;
-    ASSERT_EQ(touchingPairs(b, 1, a, everywhere(), 0, 0, found), 0u) << round;
+    ASSERT_EQ(touchingPairs(a, 1, b, everywhere(), 0, 0, false, found), 0u) << round;
+    ASSERT_EQ(touchingPairs(b, 1, a, everywhere(), 0, 0, false, found), 0u) << round;
   }
   EXPECT_GT(apart, 10000);
 }
@@ -507,7 +521,7 @@ TEST_P(EveryTarget, PairsWithinAMarginAreFound) {
     put(b, 0, q);
     PackPair found[1];
     const std::size_t count = touchingPairs(a, 1, b, everywhere(), static_cast<float>(margin * 1.001),
-                                            static_cast<float>(margin * 0.9999), found);
+                                            static_cast<float>(margin * 0.9999), false, found);
     if (distance <= margin) {
       ASSERT_EQ(count, 1u) << round;
     }

@@ -16,9 +16,35 @@ bool fclCollides(int row, int column) {
   return FCL_HAVE_OCTOMAP && row == fcl::GEOM_OCTREE && (of_shapes || of_octree || isBvh(column));
 }
 
+template <typename Solver>
+std::size_t collide(const fcl::CollisionGeometry<double>* o1, const fcl::Transform3<double>& X_W1,
+                    const fcl::CollisionGeometry<double>* o2, const fcl::Transform3<double>& X_W2, const Solver* solver,
+                    const fcl::CollisionRequest<double>& request, fcl::CollisionResult<double>& result) {
+  using namespace bocst::fcl_adapter;
+  static const Solver standard;  // FCL's for null, whatever the request asks for
+  const auto foreign = [&]() -> std::size_t {
+    if (isSentinel<double>(o1)) return Sentinel<double>::kReached;
+    return libfcl::collide<Solver>(o1, X_W1, o2, X_W2, solver, request, result);
+  };
+  return collideOr<double>(foreign, o1, X_W1, o2, X_W2, solver != nullptr ? solver : &standard, request, result);
+}
+
 }  // namespace
 
-// FCL's constructors would compile all of FCL's queries into this library.
+#define BOCST_OWN_COLLIDE(Solver)                                                                                    \
+  template <>                                                                                                        \
+  std::size_t fcl::collide<double, fcl::detail::Solver<double>>(                                                     \
+      const CollisionGeometry<double>* o1, const Transform3<double>& X_W1, const CollisionGeometry<double>* o2,      \
+      const Transform3<double>& X_W2, const detail::Solver<double>* solver, const CollisionRequest<double>& request, \
+      CollisionResult<double>& result) {                                                                             \
+    return ::collide(o1, X_W1, o2, X_W2, solver, request, result);                                                   \
+  }
+BOCST_OWN_COLLIDE(GJKSolver_libccd)
+BOCST_OWN_COLLIDE(GJKSolver_indep)
+#undef BOCST_OWN_COLLIDE
+
+// Read by code that compiled FCL's collide itself. FCL's constructors would compile all of FCL's queries into this
+// library.
 template <>
 fcl::detail::CollisionFunctionMatrix<fcl::detail::GJKSolver_libccd<double>>::CollisionFunctionMatrix() {
   bocst::fcl_adapter::fillTable(collision_matrix, &bocst::fcl_adapter::libfcl::collide<GJKSolver_libccd<double>>,

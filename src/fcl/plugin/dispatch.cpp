@@ -166,42 +166,28 @@ void refusePlaneAndConvex(const fcl::CollisionGeometry<S>* o1, const fcl::Collis
   }
 }
 
-/// The collision query where a Model may be among the two; where there is none, what `foreign` says.
-template <typename S, typename Foreign>
-std::size_t collideOr(const Foreign& foreign, const fcl::CollisionGeometry<S>* o1, const fcl::Transform3<S>& X_W1,
-                      const fcl::CollisionGeometry<S>* o2, const fcl::Transform3<S>& X_W2,
-                      const fcl_adapter::BroughtSolver<S>& solver, const fcl::CollisionRequest<S>& request,
-                      fcl::CollisionResult<S>& result) {
-  switch (fcl_adapter::kindOf<S>(o1, o2)) {
-    case fcl_adapter::PairKind::kForeign:
-      refusePlaneAndConvex<S>(o1, o2);
-      return foreign();
-    case fcl_adapter::PairKind::kNothing:
-      return result.numContacts();
-    case fcl_adapter::PairKind::kModel:
-      break;
-  }
-  if (request.num_max_contacts > 0) return fcl_adapter::collidePair<S>(o1, X_W1, o2, X_W2, solver, request, result);
-  std::cerr << "Warning: should stop early as num_max_contact is 0 !\n";
-  return 0;
-}
-
 }  // namespace
 
 template <typename S>
 std::size_t collide(const fcl::CollisionGeometry<S>* o1, const fcl::Transform3<S>& X_W1,
                     const fcl::CollisionGeometry<S>* o2, const fcl::Transform3<S>& X_W2,
                     const fcl::CollisionRequest<S>& request, fcl::CollisionResult<S>& result) {
-  const auto by_fcl = [&] { return fcl::collide<S>(o1, X_W1, o2, X_W2, request, result); };
-  return collideOr<S>(by_fcl, o1, X_W1, o2, X_W2, {}, request, result);
+  const auto by_fcl = [&] {
+    refusePlaneAndConvex<S>(o1, o2);
+    return fcl::collide<S>(o1, X_W1, o2, X_W2, request, result);
+  };
+  return fcl_adapter::collideOr<S>(by_fcl, o1, X_W1, o2, X_W2, {}, request, result);
 }
 
 template <typename S, typename Solver>
 std::size_t collide(const fcl::CollisionGeometry<S>* o1, const fcl::Transform3<S>& X_W1,
                     const fcl::CollisionGeometry<S>* o2, const fcl::Transform3<S>& X_W2, const Solver* solver,
                     const fcl::CollisionRequest<S>& request, fcl::CollisionResult<S>& result) {
-  const auto by_fcl = [&] { return fcl::collide<S, Solver>(o1, X_W1, o2, X_W2, solver, request, result); };
-  return collideOr<S>(by_fcl, o1, X_W1, o2, X_W2, solver, request, result);
+  const auto by_fcl = [&] {
+    refusePlaneAndConvex<S>(o1, o2);
+    return fcl::collide<S, Solver>(o1, X_W1, o2, X_W2, solver, request, result);
+  };
+  return fcl_adapter::collideOr<S>(by_fcl, o1, X_W1, o2, X_W2, solver, request, result);
 }
 
 namespace {

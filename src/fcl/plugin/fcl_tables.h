@@ -12,12 +12,18 @@
 #include <bocst/export.h>
 #include <fcl/geometry/collision_geometry.h>
 #include <fcl/math/motion/motion_base.h>
+#include <fcl/narrowphase/collision_request.h>
+#include <fcl/narrowphase/collision_result.h>
 #include <fcl/narrowphase/continuous_collision_request.h>
 #include <fcl/narrowphase/continuous_collision_result.h>
 
 namespace fcl {
 
 namespace detail {
+template <typename S>
+struct GJKSolver_libccd;
+template <typename S>
+struct GJKSolver_indep;
 template <typename Solver>
 struct CollisionFunctionMatrix;
 template <typename Solver>
@@ -34,6 +40,21 @@ __attribute__((visibility("default"))) detail::DistanceFunctionMatrix<Solver>& g
 template <typename Solver>
 __attribute__((visibility("default"))) detail::ConservativeAdvancementFunctionMatrix<Solver>&
 getConservativeAdvancementFunctionLookTable();
+
+// In double this is ours, without a table: most of a planner's queries are far misses, for which FCL's way to its table
+// takes as long as the answer. It must be declared before FCL's header is read.
+template <typename S, typename Solver>
+std::size_t collide(const CollisionGeometry<S>*, const Transform3<S>&, const CollisionGeometry<S>*,
+                    const Transform3<S>&, const Solver*, const CollisionRequest<S>&, CollisionResult<S>&);
+#define BOCST_OWN_COLLIDE(Solver)                                                                    \
+  template <>                                                                                        \
+  BOCST_EXPORT std::size_t collide<double, detail::Solver<double>>(                                  \
+      const CollisionGeometry<double>*, const Transform3<double>&, const CollisionGeometry<double>*, \
+      const Transform3<double>&, const detail::Solver<double>*, const CollisionRequest<double>&,     \
+      CollisionResult<double>&);
+BOCST_OWN_COLLIDE(GJKSolver_libccd)
+BOCST_OWN_COLLIDE(GJKSolver_indep)
+#undef BOCST_OWN_COLLIDE
 
 // Three of its four solvers do not look into any table. So both functions are ours, for double (float is in no libfcl);
 // they must be declared before FCL says that they are libfcl's.

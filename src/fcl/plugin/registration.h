@@ -42,18 +42,37 @@ void warnAsFcl(const char* query, const fcl::CollisionGeometry<S>* o1, const fcl
             << o2->getNodeType() << " is not supported\n";
 }
 
+/// The collision query where a Model may be among the two; where there is none, what foreign() says.
+template <typename S, typename Foreign>
+std::size_t collideOr(const Foreign& foreign, const fcl::CollisionGeometry<S>* o1, const fcl::Transform3<S>& X_W1,
+                      const fcl::CollisionGeometry<S>* o2, const fcl::Transform3<S>& X_W2,
+                      const BroughtSolver<S>& solver, const fcl::CollisionRequest<S>& request,
+                      fcl::CollisionResult<S>& result) {
+  switch (kindOf<S>(o1, o2)) {
+    case PairKind::kForeign:
+      return foreign();
+    case PairKind::kNothing:
+      return result.numContacts();
+    case PairKind::kModel:
+      break;
+  }
+  if (request.num_max_contacts > 0) return collidePair<S>(o1, X_W1, o2, X_W2, solver, request, result);
+  std::cerr << "Warning: should stop early as num_max_contact is 0 !\n";
+  return 0;
+}
+
 // What stands in FCL's tables.
 
 template <typename S, typename Solver>
 std::size_t collideEntry(const fcl::CollisionGeometry<S>* o1, const fcl::Transform3<S>& X_W1,
                          const fcl::CollisionGeometry<S>* o2, const fcl::Transform3<S>& X_W2, const Solver* solver,
                          const fcl::CollisionRequest<S>& request, fcl::CollisionResult<S>& result) {
-  const PairKind kind = kindOf<S>(o1, o2);
-  if (kind == PairKind::kNothing) return 0;
-  if (kind == PairKind::kModel) return collidePair<S>(o1, X_W1, o2, X_W2, solver, request, result);
-  if (isSentinel<S>(o1)) return Sentinel<S>::kReached;
-  warnAsFcl<S>("collision", o1, o2);
-  return 0;
+  const auto foreign = [&]() -> std::size_t {
+    if (isSentinel<S>(o1)) return Sentinel<S>::kReached;
+    warnAsFcl<S>("collision", o1, o2);
+    return 0;
+  };
+  return collideOr<S>(foreign, o1, X_W1, o2, X_W2, solver, request, result);
 }
 
 template <typename S, typename Solver>

@@ -47,7 +47,7 @@ class PairWalk {
     s.stack.clear();
     s.ordered.clear();
     s.deferred.clear();
-    s.leaves.start(b_in_a_, a_in_b_);
+    s.leaves.start(b_in_a_, a_in_b_, visitor_.endsAtFirst());
     s.large_a.clear();
     s.large_b.clear();
     const Pair root{a_.root(), b_.root()};

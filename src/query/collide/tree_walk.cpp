@@ -106,7 +106,7 @@ void TreeWalk::testLargeTriangles(PairSteps& steps, const StepEvent& event, Scra
 
 bool TreeWalk::testLeaves(const StepEvent& event, Scratch& s) {
   if (!s.leaves_started) {
-    s.leaves.start(b_in_a_, aInB());
+    s.leaves.start(b_in_a_, aInB(), visitor_->endsAtFirst());
     s.leaves_started = true;
   }
   const auto visit = [this](std::uint32_t t, std::uint32_t u, bool certain) {

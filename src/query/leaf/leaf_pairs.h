@@ -191,8 +191,8 @@ class LeafPacks {
 template <typename A, typename B>
 class LeafPairs {
  public:
-  /// To be called before the first test of a walk.
-  void start(const SimilarityTransform& b_in_a, const SimilarityTransform& a_in_b) {
+  /// To be called before the first test of a walk. `one_will_do`: the first pair that touches ends it.
+  void start(const SimilarityTransform& b_in_a, const SimilarityTransform& a_in_b, bool one_will_do) {
     leaves_a_.clear();
     leaves_b_.clear();
     for (int r = 0; r < 3; ++r) {
@@ -200,6 +200,7 @@ class LeafPairs {
     }
     b_in_a_ = &b_in_a;
     a_in_b_ = &a_in_b;
+    one_will_do_ = one_will_do;
   }
 
   /// Calls f(triangle of a, triangle of b, whether they surely meet) for the pairs that are not surely apart, until it
@@ -257,7 +258,7 @@ class LeafPairs {
       *id++ = b.id(static_cast<std::size_t>(__builtin_ctz(left)));
     const double error = static_cast<double>(a.error) + b_in_a_->scale * static_cast<double>(b.error);
     const auto [tolerance, margin] = limits(*b_in_a_, error);
-    const std::size_t found = touchingPairs(a.pack, rows, lanes_, region, tolerance, margin, found_);
+    const std::size_t found = touchingPairs(a.pack, rows, lanes_, region, tolerance, margin, one_will_do_, found_);
     for (std::size_t k = 0; k < found; ++k) {
       if (f(a.id(found_[k].row), ids[found_[k].lane], found_[k].certain)) return true;
     }
@@ -304,7 +305,7 @@ class LeafPairs {
     }
     const std::uint32_t all = rows_.count < 32 ? (1u << rows_.count) - 1 : ~0u;
     const auto [tolerance, margin] = limits(to, error);
-    const std::size_t found = touchingPairs(rows_, all, leaf.pack, region, tolerance, margin, found_);
+    const std::size_t found = touchingPairs(rows_, all, leaf.pack, region, tolerance, margin, one_will_do_, found_);
     for (std::size_t k = 0; k < found; ++k) {
       if (f(leaf.id(found_[k].lane), ids[found_[k].row], found_[k].certain)) return true;
     }
@@ -356,6 +357,7 @@ class LeafPairs {
   PackMotion to_a_;
   TrianglePack lanes_, rows_;
   const SimilarityTransform *b_in_a_ = nullptr, *a_in_b_ = nullptr;
+  bool one_will_do_ = false;
   PackPair found_[TrianglePack::kCapacity * TrianglePack::kCapacity];
 };
 
