@@ -70,6 +70,10 @@ for mode in RTLD_LOCAL RTLD_GLOBAL; do
   check "python-bocst-first-$mode" answers "$python" -c "$call" $mode "$libbocst" "$libfcl" "$work/planner.so"
   check "python-fcl-first-$mode" refuses "$python" -c "$call" $mode "$libfcl" "$work/planner.so"
 done
+# libfcl for all, but not libbocst: a plugin that brings a solver would reach libfcl's own function.
+mixed='import ctypes, sys; ctypes.CDLL(sys.argv[1], ctypes.RTLD_LOCAL); ctypes.CDLL(sys.argv[2], ctypes.RTLD_GLOBAL);
+sys.exit(ctypes.CDLL(sys.argv[3]).planner())'
+check python-fcl-global refuses "$python" -c "$mixed" "$libbocst" "$libfcl" "$work/planner.so"
 check python-alone answers "$python" -c "$call" RTLD_LOCAL "$work/planner.so"
 check python-preload answers env LD_PRELOAD="$libbocst" "$python" -c "$call" RTLD_LOCAL "$libfcl" "$work/planner.so"
 

@@ -49,6 +49,11 @@ class Function {
     return address != nullptr;
   }
 
+  bool isFoundFirst() {
+    const void* const found = dlsym(RTLD_DEFAULT, name_);
+    return found != nullptr && found == address_.load(std::memory_order_acquire);
+  }
+
   template <typename F>
   F* get() {
     if (address_.load(std::memory_order_acquire) == nullptr && !resolve()) {
@@ -112,6 +117,8 @@ Function poses_function(
 }();
 
 }  // namespace
+
+bool isFoundFirst() { return collide_function<Libccd>.isFoundFirst() || collide_function<Indep>.isFoundFirst(); }
 
 template <typename Solver>
 std::size_t collide(const Geometry* o1, const Pose& X_W1, const Geometry* o2, const Pose& X_W2, const Solver* solver,

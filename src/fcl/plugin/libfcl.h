@@ -13,7 +13,11 @@
 
 namespace bocst::fcl_adapter::libfcl {
 
-// Each throws std::runtime_error if this process has no libfcl that exports the function.
+/// Would code that is loaded now call libfcl's own fcl::collide<double, Solver>, which knows no Model? So it is where
+/// libfcl was loaded for all (RTLD_GLOBAL) and this library was not.
+bool isFoundFirst();
+
+// Each of these throws std::runtime_error if this process has no libfcl that exports the function.
 
 /// fcl::collide<double, Solver>, for both of FCL's solvers.
 template <typename Solver>
