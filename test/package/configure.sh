@@ -43,7 +43,7 @@ for missing in GTest Doxygen Boost; do
   grep -q "tests are not built: $missing missing" "$work/no-$missing.log" || fail "nothing says that $missing is missing"
 done
 # shellcheck disable=SC2046
-configure library -DBOCST_BUILD_IO=OFF -DBOCST_BUILD_TOOLS=OFF $(without assimp pugixml CLI11 nlohmann_json meshoptimizer urdfdom)
+configure library -DBOCST_BUILD_IO=OFF -DBOCST_BUILD_TOOLS=OFF $(without assimp pugixml CLI11 nlohmann_json meshoptimizer urdfdom console_bridge)
 expect library bocst mesh_test -- bocst_io bocst_program io_test reader_fuzz
 configure static -DBUILD_SHARED_LIBS=OFF -DBUILD_TESTING=OFF
 expect static bocst bocst_program -- mesh_test

@@ -31,6 +31,7 @@ NAMES = {
     "meshoptimizer": ("meshoptimizer", "meshoptimizer"),
     "cairo": ("cairo", "cairo"),
     "urdfdom": ("urdfdom", "urdfdom"),
+    "console_bridge": ("console-bridge", "console_bridge"),
 }
 
 # Stand-ins for vcpkg's functions: the port file runs with them and leaves what it would do in variables.
