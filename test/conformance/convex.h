@@ -51,6 +51,7 @@ inline Eigen::Vector3d nearestOf(std::array<Eigen::Vector3d, 4>& w, int& count) 
   int best_mask = 1;
   for (int mask = 1; mask < 1 << count; ++mask) {
     std::array<Eigen::Vector3d, 4> p;
+    p.fill(Eigen::Vector3d::Zero());
     int n = 0;
     for (int k = 0; k < count; ++k) {
       if (mask & 1 << k) p[static_cast<std::size_t>(n++)] = w[static_cast<std::size_t>(k)];
