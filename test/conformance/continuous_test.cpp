@@ -833,8 +833,8 @@ TEST(ContinuousDouble, MarginsAndSolidsWithShapes) {
   const fcl::Transform3d I = identity<double>();
   const auto at = [&](double x) { return test::pose<double>(I.linear(), {x, 0.3, 0.4}); };
   const auto r = request<double>(fcl::CCDM_LINEAR, 1e-6);
-  for (const auto& [partner, left] : {std::make_pair(static_cast<const fcl::CollisionGeometryd*>(&ball), 0.125),
-                                      std::make_pair(static_cast<const fcl::CollisionGeometryd*>(octree.get()), 0.0)}) {
+  for (const auto& [partner, left] : {std::pair(static_cast<const fcl::CollisionGeometryd*>(&ball), 0.125),
+                                      std::pair(static_cast<const fcl::CollisionGeometryd*>(octree.get()), 0.0)}) {
     for (const bool turned : {false, true}) {
       const auto ask = [&](const fcl::CollisionGeometryd* model, double from, double to) {
         const Ways<double> ways{model, I, I, partner, at(from), at(to)};

@@ -263,7 +263,7 @@ void ofAnySize(const std::vector<double>& sizes) {
     for (const double size_b : sizes) {
       for (int i = 0; i < 6; ++i) {
         Raw ra, rb;
-        for (auto [raw, size] : {std::make_pair(&ra, size_a), std::make_pair(&rb, size_b)}) {
+        for (auto [raw, size] : {std::pair(&ra, size_a), std::pair(&rb, size_b)}) {
           // One in three is a point, at its own origin or elsewhere.
           const bool point = g() % 3 == 0;
           const Vector3d middle = Vector3d(u(g), u(g), u(g)) * size * static_cast<double>(g() % 2);

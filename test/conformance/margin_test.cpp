@@ -412,7 +412,7 @@ TEST(MarginDouble, CostsAreOfWhatSharesRoom) {
   for (const double x : {1.4, 1.7}) {
     const auto Y = test::pose<double>(I.linear(), {x, 0.5, 0.5});
     std::vector<fcl::CostSourced> p, w;
-    for (const auto& [model, sources] : {std::make_pair(&plain, &p), std::make_pair(&wide, &w)}) {
+    for (const auto& [model, sources] : {std::pair(&plain, &p), std::pair(&wide, &w)}) {
       fcl::CollisionResultd result;
       fcl::collide(model, I, &box, Y, fcl::CollisionRequestd(1, false, 1000, true, false), result);
       result.getCostSources(*sources);
