@@ -21,12 +21,13 @@ std::size_t collide(const fcl::CollisionGeometry<double>* o1, const fcl::Transfo
                     const fcl::CollisionGeometry<double>* o2, const fcl::Transform3<double>& X_W2, const Solver* solver,
                     const fcl::CollisionRequest<double>& request, fcl::CollisionResult<double>& result) {
   using namespace bocst::fcl_adapter;
-  static const Solver standard;  // FCL's for null, whatever the request asks for
   const auto foreign = [&]() -> std::size_t {
     if (isSentinel<double>(o1)) return Sentinel<double>::kReached;
     return libfcl::collide<Solver>(o1, X_W1, o2, X_W2, solver, request, result);
   };
-  return collideOr<double>(foreign, o1, X_W1, o2, X_W2, solver != nullptr ? solver : &standard, request, result);
+  if (solver != nullptr) return collideOr<double>(foreign, o1, X_W1, o2, X_W2, solver, request, result);
+  const Solver standard;  // FCL's for null, whatever the request asks for
+  return collideOr<double>(foreign, o1, X_W1, o2, X_W2, &standard, request, result);
 }
 
 }  // namespace
