@@ -4,10 +4,11 @@
 // FCL's function tables, and FCL's code that reads them, as part of this library.
 //
 // libfcl hides its tables, but it calls its exported weak symbol fcl::collide<S, Solver> through the dynamic linker.
-// This library exports the same symbol, compiled over its own tables, in which bocst is registered. Where libbocst
-// precedes libfcl, everybody's collide ends there, libfcl's own included. FCL's distance<S, Solver> is not
-// exported by libfcl, so here the public distance and continuousCollide take libfcl's place. Pairs without a model go
-// back to libfcl's own functions (libfcl.h), but distances and all queries in float, which are compiled here.
+// This library exports the same symbol: in double a function of its own, in float FCL's over its own tables, in which
+// bocst is registered. Where libbocst precedes libfcl, everybody's collide ends there, libfcl's own included. FCL's
+// distance<S, Solver> is not exported by libfcl, so here the public distance and continuousCollide take libfcl's place.
+// Pairs without a model go back to libfcl's own functions (libfcl.h), but distances and all queries in float, which are
+// compiled here.
 
 #include <bocst/export.h>
 #include <fcl/geometry/collision_geometry.h>
