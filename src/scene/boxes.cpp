@@ -48,21 +48,19 @@ HWY_INLINE V ofFaces(V s0, V s1, V s2) {
 // Fills the gaps of the lanes in `mask` and returns those that are near.
 //
 // With u = 2^-24, C the largest coordinate and r the radius of each: centres are off by u C, so a way between them
-// along an axis by at most 12 u (Ca + Cb), radii by 16 u (ra + rb). An edge axis is used where its length is above 1/4,
-// so it is off by at most four times as much; a box's reach has 128 u (C + r) for that. Axes are those of a rotation
-// with entries of R^T R - 1 up to e = kFineError, see World::boxAt(). Their cross product, and sums of half sides along
-// it, are then off by up to 4.5 e d for a distance d of the centres and 6.4 e r for each box, four times as much after
-// the division. Beyond d = 4 (ra + rb) the faces' gap is more than d / 2, and kShare covers this; nearer, the reach
-// does.
+// along an axis by at most 12 u (Ca + Cb), radii by 16 u (ra + rb); a box's reach has 128 u (C + r) for that. Axes are
+// those of a rotation with entries of R^T R - 1 up to e = kFineError, see World::boxAt(). Their cross product, and sums
+// of half sides along it, are then off by up to 4.5 e d for a distance d of the centres and 6.4 e r for each box.
+// Beyond d = 4 (ra + rb) the faces' gap is more than d / 2, and kShare covers this; nearer, the reach does.
 constexpr float kShare = 0.995f;
 
-// The largest gap along a cross product of an axis of box a and one of boxes b. r[k][j] is the product of a's axis k
-// and b's axis j, `size` its amount, t the displacement along the axes of a.
+// The largest gap along a cross product of an axis of box a and one of boxes b, where there is one; it is a gap along
+// an axis of length 1 or less, so not more than the distance. r[k][j] is the product of a's axis k and b's axis j,
+// `size` its amount, t the displacement along the axes of a.
 HWY_INLINE V gapAlongEdges(const V (&r)[3][3], const V (&size)[3][3], const V (&t)[3], const V (&half_a)[3],
                            const V (&half_b)[3]) {
   const D d;
-  const V one = hn::Set(d, 1.0f), least = hn::Set(d, 0.0625f), none = hn::Set(d, -1e30f);
-  V most = none;
+  V most = hn::Zero(d);
   BOCST_UNROLL
   for (int k = 0; k < 3; ++k) {
     const int k1 = (k + 1) % 3, k2 = (k + 2) % 3;
@@ -72,9 +70,7 @@ HWY_INLINE V gapAlongEdges(const V (&r)[3][3], const V (&size)[3][3], const V (&
       const V along = hn::Abs(hn::NegMulAdd(t[k1], r[k2][j], hn::Mul(t[k2], r[k1][j])));
       const V of_a = hn::MulAdd(half_a[k1], size[k2][j], hn::Mul(half_a[k2], size[k1][j]));
       const V of_b = hn::MulAdd(half_b[j1], size[k][j2], hn::Mul(half_b[j2], size[k][j1]));
-      const V squared = hn::NegMulAdd(r[k][j], r[k][j], one);
-      const V apart = hn::Div(hn::Sub(along, hn::Add(of_a, of_b)), hn::Sqrt(hn::Max(squared, least)));
-      most = hn::Max(most, hn::IfThenElse(hn::Gt(squared, least), apart, none));
+      most = hn::Max(most, hn::Sub(along, hn::Add(of_a, of_b)));
     }
   }
   return most;
@@ -124,7 +120,9 @@ HWY_INLINE std::uint32_t nearLanes(const Box& a, const BoxGroup& b, std::uint32_
     V g = hn::Sub(hn::Mul(share, most), reach);
     std::uint32_t near = maskBits(hn::Le(g, more)) & lanes;
     if (near != 0) {
-      most = hn::Max(most, gapAlongEdges(r, size, t, half_a, half_b));
+      // How deep boxes overlap along edges says little: their axes may have almost no length.
+      const V along_edges = gapAlongEdges(r, size, t, half_a, half_b);
+      most = hn::IfThenElse(hn::Gt(along_edges, hn::Zero(d)), hn::Max(most, along_edges), most);
       g = hn::Sub(hn::Mul(share, most), reach);
       near = maskBits(hn::Le(g, more)) & lanes;
     }

@@ -2,7 +2,8 @@
 #include "scene/sweep.h"
 
 #include <algorithm>
-#include <cmath>
+
+#include "scene/pose_rows.h"
 
 namespace bocst::scene {
 namespace {
@@ -12,58 +13,54 @@ constexpr double kFarthest = 4;
 
 }  // namespace
 
-// From one pose to the next, a point at c + x of the box's centre c moves by (Y - X) c + (R_Y - R_X) x. For rotations
-// the norm of R_Y - R_X is 1/sqrt(2) of its Frobenius norm; where they are off by `orthogonality_error`, it is more by
-// less than 4 of it. Sums of roundings are far below the millionth that is added.
 template <typename S>
 void Sweep<S>::measure(const World<S>& world, const fcl::Transform3<S>* X_WM, std::size_t states) {
-  const std::size_t moving = world.moving.size();
-  path_.resize(moving * states);
+  const std::size_t moving = world.moving.size(), room = roomFor(moving);
+  path_.resize(room * states);
+  place_.resize(room);
+  const auto& c = world.moving_center;
+  measurePaths(X_WM->matrix().data(), states, moving,
+               PathRow{{c[0].data(), c[1].data(), c[2].data()}, world.moving_radius.data(), path_.data(), place_.data()});
+  // Of all states, as what is said of one holds for others.
   for (std::size_t i = 0; i < moving; ++i) {
-    const Bounds& b = world.moving[i].bounds;
-    const double radius = b.radius, c0 = b.center[0], c1 = b.center[1], c2 = b.center[2];
-    const auto placeOf = [&](std::size_t k) {
-      return static_cast<double>(X_WM[k * moving + i].translation().template lpNorm<1>());
-    };
-    const double orthogonality_error = check_.orthogonality_errors[i];
-    double sum = 0, place = placeOf(0);
-    double* path = path_.data() + i * states;
-    path[0] = 0;
-    for (std::size_t k = 1; k < states; ++k) {
-      const S *x = X_WM[(k - 1) * moving + i].matrix().data(), *y = X_WM[k * moving + i].matrix().data();
-      double displacement = 0, turn = 0;
-      for (int j = 0; j < 3; ++j) {
-        const double d0 = static_cast<double>(y[j]) - static_cast<double>(x[j]);
-        const double d1 = static_cast<double>(y[4 + j]) - static_cast<double>(x[4 + j]);
-        const double d2 = static_cast<double>(y[8 + j]) - static_cast<double>(x[8 + j]);
-        const double d =
-            d0 * c0 + d1 * c1 + d2 * c2 + (static_cast<double>(y[12 + j]) - static_cast<double>(x[12 + j]));
-        displacement += d * d;
-        turn += d0 * d0 + d1 * d1 + d2 * d2;
-      }
-      sum += (std::sqrt(displacement) + radius * (std::sqrt(turn / 2) + 8 * orthogonality_error)) * (1 + 1e-6);
-      path[k] = sum;
-      place = std::max(place, placeOf(k));
-    }
-    // Of all states, as what is said of one holds for others.
-    if (states > 1) check_.reach[i] = world.reachWithin(world.moving[i], place, orthogonality_error);
+    check_.reach[i] = world.reachWithin(world.moving[i], place_[i], check_.orthogonality_errors[i]);
   }
+  is_measured_ = true;
 }
 
 // False when objects move too far in this part for its middle to say much about the rest.
 template <typename S>
-bool Sweep<S>::setFar(const World<S>& world, std::size_t states, const Part& part, std::size_t middle) {
-  bool near = true;
-  for (std::size_t i = 0; i < world.moving.size(); ++i) {
-    const double* path = path_.data() + i * states;
-    const double far = std::max(path[middle] - path[part.begin], path[part.end - 1] - path[middle]);
-    // Differences of sums: after a long way even 0 is rounded.
-    check_.far[i] = far + 1e-15 * path[states - 1] * static_cast<double>(states);
+bool Sweep<S>::setFar(const World<S>& world, const fcl::Transform3<S>* X_WM, std::size_t states, const Part& part,
+                      std::size_t middle) {
+  const std::size_t moving = world.moving.size(), last = part.end - 1;
+  const auto isTooFar = [&](std::size_t i, double far) {
+    const Bounds& b = world.moving[i].bounds;
     // NaN: the motion is too long for a double.
-    if (!(check_.far[i] <= kFarthest * world.moving[i].bounds.radius) && world.moving[i].bounds.kind == Bounds::kBox)
-      near = false;
+    if (far <= kFarthest * b.radius || b.kind != Bounds::kBox) return false;
+    farthest_ = i;
+    return true;
+  };
+  // Of random states, the straight way of one object shows it: the one that did before is asked first.
+  for (std::size_t n = 0, i = farthest_ % moving; n < moving && !is_measured_; ++n, i = i + 1 < moving ? i + 1 : 0) {
+    const Eigen::Vector3d& c = world.moving[i].bounds.center;
+    const auto at = [&](std::size_t k) { return X_WM[k * moving + i].template cast<double>() * c; };
+    const Eigen::Vector3d between = at(middle);
+    if (isTooFar(i, std::max((at(part.begin) - between).norm(), (at(last) - between).norm()))) return false;
   }
-  return near;
+  if (!is_measured_) measure(world, X_WM, states);
+  const std::size_t room = roomFor(moving), most = std::max(middle - part.begin, last - middle);
+  for (std::size_t i = 0; i < moving; ++i) {
+    const double* path = path_.data() + i;
+    const double to_begin = path[middle * room] - path[part.begin * room],
+                 to_end = path[last * room] - path[middle * room];
+    // Differences of sums: after a long way even 0 is rounded.
+    const double rounding = 1e-15 * path[(states - 1) * room] * static_cast<double>(states);
+    // See measurePaths().
+    const double skew = 8.001 * check_.orthogonality_errors[i] * world.moving_radius[i] * static_cast<double>(most);
+    check_.far[i] = std::max(to_begin, to_end) + rounding + skew;
+    if (isTooFar(i, check_.far[i])) return false;
+  }
+  return true;
 }
 
 // What conservative answers to all states need grows in few batches, where an oracle is slow to answer.
@@ -98,7 +95,7 @@ std::size_t Sweep<S>::run(const World<S>& world, const fcl::Transform3<S>* X_WM,
   check_.start(world);
   check_.orthogonality_errors.assign(orthogonality_errors.begin(), orthogonality_errors.end());
   if (goal == Goal::kAll && states > 1 && world.grows_together) growForAll(world, X_WM, states);
-  measure(world, X_WM, states);
+  is_measured_ = false;
   std::size_t found = states;
   parts_.clear();
   entries_.clear();
@@ -116,7 +113,7 @@ std::size_t Sweep<S>::run(const World<S>& world, const fcl::Transform3<S>* X_WM,
     const fcl::Transform3<S>* X = X_WM + middle * moving;
     Part rest{0, 0, 0, 0, false};
     bool touches;
-    const bool whole = part.end - part.begin > 1 && setFar(world, states, part, middle);
+    const bool whole = part.end - part.begin > 1 && setFar(world, X_WM, states, part, middle);
     if (!whole) std::fill(check_.far.begin(), check_.far.end(), 0.0);
     found_.clear();
     std::vector<Entry>* entries = whole ? &found_ : nullptr;

@@ -37,11 +37,14 @@ class Sweep {
 
   void growForAll(const World<S>& world, const fcl::Transform3<S>* X_WM, std::size_t states);
   void measure(const World<S>& world, const fcl::Transform3<S>* X_WM, std::size_t states);
-  bool setFar(const World<S>& world, std::size_t states, const Part& part, std::size_t middle);
+  bool setFar(const World<S>& world, const fcl::Transform3<S>* X_WM, std::size_t states, const Part& part,
+              std::size_t middle);
 
   StateCheck<S> check_;
   std::vector<fcl_adapter::PosedPair<S>> pairs_;  // of growForAll()
-  std::vector<double> path_;  // [i * states + k]: how far points of moving object i have moved until state k, at most
+  std::vector<double> path_, place_;  // see PathRow
+  bool is_measured_ = false;
+  std::size_t farthest_ = 0;  // the moving object that last moved too far
   std::vector<Part> parts_;
   std::vector<Entry> entries_, found_;
 };

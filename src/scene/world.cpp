@@ -12,6 +12,7 @@
 
 #include "fcl/adapters/validate.h"
 #include "fcl/queries/grow_together.h"
+#include "scene/pose_rows.h"
 #include "simd/float4.h"
 
 namespace bocst::scene {
@@ -48,10 +49,10 @@ double orthogonalityErrorOf(const fcl::Transform3<S>& X) {
 }
 
 // No entry of R^T R - 1 is larger, for a pose that is surely rigid: its eigenvalues are 2 e + e^2, sum e^2 follows from
-// both sums (fcl_adapter::RigidSums), and 4e-15 is what they may have lost by rounding.
-inline double orthogonalityBound(double stretch, double shear) {
-  return 2.001 * std::sqrt((std::abs(shear) + stretch * stretch / 4 + 4e-15) / 2);
-}
+// both sums (fcl_adapter::RigidSums, rigidStates()), and 4e-15 is what they may have lost by rounding.
+constexpr double kErrorPerDeviation = 2.001;
+inline double errorOf(double deviation) { return kErrorPerDeviation * std::sqrt((deviation + 4e-15) / 2); }
+inline double deviationOf(double error) { return 2 * (error / kErrorPerDeviation) * (error / kErrorPerDeviation); }
 
 template <typename S>
 void refusePose(const char* query, const fcl::Transform3<S>* X_WM, std::size_t k, std::size_t moving,
@@ -65,22 +66,22 @@ void refusePose(const char* query, const fcl::Transform3<S>* X_WM, std::size_t k
 template <typename S>
 void checkPoses(const char* query, const fcl::Transform3<S>* X_WM, std::size_t states, std::size_t moving,
                 std::vector<double>& orthogonality_errors, const char* state) {
-  orthogonality_errors.assign(moving, 0);
-  if (states != 0 && moving != 0 && X_WM == nullptr) {
-    throw std::invalid_argument(std::string("bocst::Scene::") + query + ": the poses are null");
-  }
-  const std::size_t count = states * moving;
-  for (std::size_t k = 0, i = 0; k < count; k += 2) {
-    const fcl::Transform3<S>&X = X_WM[k], &Y = X_WM[std::min(k + 1, count - 1)];
-    const auto sums = fcl_adapter::rigidSumsOf(X, Y);
-    const auto rigid = fcl_adapter::isSurelyRigid(sums);
-    for (std::size_t lane = 0; lane < std::min<std::size_t>(2, count - k); ++lane, i = i + 1 < moving ? i + 1 : 0) {
-      const double error = rigid[lane] != 0 ? orthogonalityBound(sums.stretch[lane], sums.shear[lane])
-                                            : orthogonalityErrorOf<S>(lane == 0 ? X : Y);
-      if (!(error <= kMaxOrthogonalityError)) refusePose<S>(query, X_WM, k + lane, moving, state);
-      orthogonality_errors[i] = std::max(orthogonality_errors[i], error);
+  orthogonality_errors.assign(roomFor(moving), 0);
+  if (states == 0 || moving == 0) return;
+  if (X_WM == nullptr) throw std::invalid_argument(std::string("bocst::Scene::") + query + ": the poses are null");
+  static_assert(sizeof(fcl::Transform3<S>) == 16 * sizeof(S), "poses are rows of numbers");
+  double* const deviations = orthogonality_errors.data();
+  for (std::size_t k = 0;; ++k) {
+    k += rigidStates(X_WM[k * moving].matrix().data(), states - k, moving, deviations);
+    if (k == states) break;
+    for (std::size_t i = 0; i < moving; ++i) {
+      const double error = orthogonalityErrorOf<S>(X_WM[k * moving + i]);
+      if (!(error <= kMaxOrthogonalityError)) refusePose<S>(query, X_WM, k * moving + i, moving, state);
+      deviations[i] = std::max(deviations[i], deviationOf(error));
     }
+    if (k + 1 == states) break;
   }
+  for (std::size_t i = 0; i < moving; ++i) orthogonality_errors[i] = errorOf(deviations[i]);
 }
 
 template <typename S>
@@ -239,6 +240,13 @@ World<S>::World(std::vector<Object<S>> moving_objects, std::vector<Object<S>> fi
   const auto ignored = [&](Id a, Id b) { return ignored_pairs.count(std::minmax(a, b)) != 0; };
   const auto sizeOf = [](const Object<S>& o) { return o.bounds.kind == Bounds::kBox ? o.bounds.size : 0; };
   for (const Object<S>& o : moving) largest_ = std::max(largest_, sizeOf(o));
+  for (std::vector<double>* column : {&moving_center[0], &moving_center[1], &moving_center[2], &moving_radius}) {
+    column->assign(roomFor(moving.size()), 0);
+  }
+  for (std::size_t i = 0; i < moving.size(); ++i) {
+    for (int k = 0; k < 3; ++k) moving_center[k][i] = moving[i].bounds.center[k];
+    moving_radius[i] = moving[i].bounds.radius;
+  }
   Eigen::AlignedBox3d middles;
   for (const Object<S>& o : fixed_objects) {
     largest_ = std::max(largest_, sizeOf(o));

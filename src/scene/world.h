@@ -32,7 +32,7 @@ double orthogonalityErrorOf(const fcl::Transform3<S>& X);
 /// Poses with a larger one are refused: those of floats that were multiplied some thousand times are below.
 constexpr double kMaxOrthogonalityError = 1e-3;
 
-/// Writes the largest orthogonality error of the poses of each moving object to `orthogonality_errors`.
+/// Writes at least the largest orthogonality error of the poses of each moving object to `orthogonality_errors`.
 /// @throws std::invalid_argument that names the first pose that is not rigid; `state`: the name of the only one.
 template <typename S>
 void checkPoses(const char* query, const fcl::Transform3<S>* X_WM, std::size_t states, std::size_t moving,
@@ -69,7 +69,8 @@ class World {
   double reachWithin(const Object<S>& object, double place, double orthogonality_error) const;
 
   std::vector<Object<S>> moving;
-  std::vector<Object<S>> fixed;  ///< Eight a group.
+  std::vector<double> moving_center[3], moving_radius;  ///< Of their bounds; with room for PathRow.
+  std::vector<Object<S>> fixed;                         ///< Eight a group.
   std::vector<BoxNode> nodes;    ///< Over the groups; none without a fixed object that is somewhere.
   std::vector<BoxGroup> groups;
   /// [i * allGroups() + group]: lanes that make a pair with moving object i; of two moving objects in row of the first.

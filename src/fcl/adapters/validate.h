@@ -43,11 +43,14 @@ RigidSums<Number> rigidSumsOf(const Matrix& m) {
   return {squares - 3.0, squares - 2.0 * determinant - 1.0};
 }
 
+constexpr double kSurelyRigidStretch = 1e-5, kSurelyRigidShear = 1e-10;
+
 /// Is a pose rigid for sure? Seldom false where it is. With these bounds no |e| is above 8e-6, and the determinant is
 /// positive, so R is no reflection.
 template <typename Number>
 auto isSurelyRigid(const RigidSums<Number>& sums) {
-  return (sums.stretch <= 1e-5) & (sums.stretch >= -1e-5) & (sums.shear <= 1e-10);
+  return (sums.stretch <= kSurelyRigidStretch) & (sums.stretch >= -kSurelyRigidStretch) &
+         (sums.shear <= kSurelyRigidShear);
 }
 
 template <typename S>
