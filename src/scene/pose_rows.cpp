@@ -80,8 +80,8 @@ HWY_INLINE void rigidSums(const Poses& X, V& stretch, V& shear) {
   const D d;
   const Column &a = X.rotation[0], &b = X.rotation[1], &c = X.rotation[2];
   const Column nothing = sub(X.translation, X.translation);  // 0, or NaN
-  const V squares = hn::Add(hn::Add(hn::Add(dot(a, a), dot(b, b)), dot(c, c)),
-                            hn::Add(hn::Add(nothing.x, nothing.y), nothing.z));
+  const V squares =
+      hn::Add(hn::Add(hn::Add(dot(a, a), dot(b, b)), dot(c, c)), hn::Add(hn::Add(nothing.x, nothing.y), nothing.z));
   const Column across = {hn::Sub(hn::Mul(b.y, c.z), hn::Mul(b.z, c.y)), hn::Sub(hn::Mul(b.z, c.x), hn::Mul(b.x, c.z)),
                          hn::Sub(hn::Mul(b.x, c.y), hn::Mul(b.y, c.x))};
   stretch = hn::Sub(squares, hn::Set(d, 3.0));
@@ -121,9 +121,8 @@ HWY_INLINE void measurePathsOf(const S* poses, std::size_t states, std::size_t m
       if (k > 0) {
         const Column a = sub(X.rotation[0], before.rotation[0]), b = sub(X.rotation[1], before.rotation[1]),
                      c = sub(X.rotation[2], before.rotation[2]), t = sub(X.translation, before.translation);
-        const auto along = [&](V a_k, V b_k, V c_k, V t_k) HWY_ATTR {
-          return hn::MulAdd(a_k, c0, hn::MulAdd(b_k, c1, hn::MulAdd(c_k, c2, t_k)));
-        };
+        const auto along = [&](V a_k, V b_k, V c_k, V t_k)
+                               HWY_ATTR { return hn::MulAdd(a_k, c0, hn::MulAdd(b_k, c1, hn::MulAdd(c_k, c2, t_k))); };
         const Column displacement = {along(a.x, b.x, c.x, t.x), along(a.y, b.y, c.y, t.y), along(a.z, b.z, c.z, t.z)};
         const V turn = hn::Add(hn::Add(dot(a, a), dot(b, b)), dot(c, c));
         const V step = hn::MulAdd(radius, hn::Sqrt(hn::Mul(turn, half)), hn::Sqrt(dot(displacement, displacement)));

@@ -32,10 +32,30 @@ void StateCheck<S>::start(const World<S>& world) {
 }
 
 template <typename S>
+void StateCheck<S>::place(const fcl::Transform3<S>* X_WM, std::size_t i) {
+  boxes_[i] = world_->boxAt(world_->moving[i], X_WM[i], orthogonality_errors[i], reach[i]);
+  groups_[i / 8].set(i % 8, boxes_[i]);
+}
+
+template <typename S>
 void StateCheck<S>::place(const fcl::Transform3<S>* X_WM) {
-  for (std::size_t i = 0; i < boxes_.size(); ++i) {
-    boxes_[i] = world_->boxAt(world_->moving[i], X_WM[i], orthogonality_errors[i], reach[i]);
-    groups_[i / 8].set(i % 8, boxes_[i]);
+  for (std::size_t i = 0; i < boxes_.size(); ++i) place(X_WM, i);
+}
+
+// Those that the entries are about, and no others.
+template <typename S>
+void StateCheck<S>::place(const fcl::Transform3<S>* X_WM, const Entry* begin, const Entry* end) {
+  is_placed_.assign(boxes_.size(), 0);
+  const auto place_once = [&](std::size_t i) {
+    if (is_placed_[i] == 0) place(X_WM, i);
+    is_placed_[i] = 1;
+  };
+  for (const Entry* e = begin; e != end; ++e) {
+    place_once(e->moving);
+    if (world_->isFixed(e->group)) continue;
+    for (std::uint32_t left = e->mask; left != 0; left &= left - 1) {
+      place_once(world_->movingIndex(e->group, static_cast<std::size_t>(__builtin_ctz(left))));
+    }
   }
 }
 
@@ -90,7 +110,7 @@ bool StateCheck<S>::runAll(const fcl::Transform3<S>* X_WM, std::vector<Entry>* e
 template <typename S>
 bool StateCheck<S>::run(const fcl::Transform3<S>* X_WM, const Entry* begin, const Entry* end,
                         std::vector<Entry>* entries, PairAt* hit) {
-  place(X_WM);
+  place(X_WM, begin, end);
   spread();
   const auto size = static_cast<std::size_t>(end - begin);
   if (near_.size() < size) near_.resize(size);

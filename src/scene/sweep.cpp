@@ -19,8 +19,9 @@ void Sweep<S>::measure(const World<S>& world, const fcl::Transform3<S>* X_WM, st
   path_.resize(room * states);
   place_.resize(room);
   const auto& c = world.moving_center;
-  measurePaths(X_WM->matrix().data(), states, moving,
-               PathRow{{c[0].data(), c[1].data(), c[2].data()}, world.moving_radius.data(), path_.data(), place_.data()});
+  measurePaths(
+      X_WM->matrix().data(), states, moving,
+      PathRow{{c[0].data(), c[1].data(), c[2].data()}, world.moving_radius.data(), path_.data(), place_.data()});
   // Of all states, as what is said of one holds for others.
   for (std::size_t i = 0; i < moving; ++i) {
     check_.reach[i] = world.reachWithin(world.moving[i], place_[i], check_.orthogonality_errors[i]);

@@ -71,7 +71,7 @@ class World {
   std::vector<Object<S>> moving;
   std::vector<double> moving_center[3], moving_radius;  ///< Of their bounds; with room for PathRow.
   std::vector<Object<S>> fixed;                         ///< Eight a group.
-  std::vector<BoxNode> nodes;    ///< Over the groups; none without a fixed object that is somewhere.
+  std::vector<BoxNode> nodes;  ///< Over the groups; none without a fixed object that is somewhere.
   std::vector<BoxGroup> groups;
   /// [i * allGroups() + group]: lanes that make a pair with moving object i; of two moving objects in row of the first.
   std::vector<std::uint8_t> masks;
