@@ -18,8 +18,9 @@ using namespace query::HWY_NAMESPACE;
 
 // Which of eight boxes along the world's axes are no farther than `far` + far_b[] along any of them.
 template <typename Boxes>
-HWY_INLINE std::uint32_t overlapping(const Box& a, const Boxes& b, float far, const float* far_b) {
+HWY_INLINE std::uint32_t overlapping(const BoxLane& a, const Boxes& b, float far, const float* far_b) {
   const D d;
+  const BoxGroup& own = *a.group;
   std::uint32_t bits = 0;
   for (std::size_t i = 0; i < 8; i += hn::Lanes(d)) {
     V more = hn::Set(d, far);
@@ -27,8 +28,8 @@ HWY_INLINE std::uint32_t overlapping(const Box& a, const Boxes& b, float far, co
     M all = hn::MaskFromVec(hn::BitCast(d, hn::Set(hn::RebindToSigned<D>(), -1)));
     BOCST_UNROLL
     for (int k = 0; k < 3; ++k) {
-      const M below = hn::Le(hn::Load(d, b.lo[k] + i), hn::Add(hn::Set(d, a.hi[k]), more));
-      const M above = hn::Ge(hn::Add(hn::Load(d, b.hi[k] + i), more), hn::Set(d, a.lo[k]));
+      const M below = hn::Le(hn::Load(d, b.lo[k] + i), hn::Add(hn::Set(d, own.hi[k][a.lane]), more));
+      const M above = hn::Ge(hn::Add(hn::Load(d, b.hi[k] + i), more), hn::Set(d, own.lo[k][a.lane]));
       all = hn::And(all, hn::And(below, above));
     }
     bits |= maskBits(all) << i;
@@ -76,21 +77,23 @@ HWY_INLINE V gapAlongEdges(const V (&r)[3][3], const V (&size)[3][3], const V (&
   return most;
 }
 
-HWY_INLINE std::uint32_t nearLanes(const Box& a, const BoxGroup& b, std::uint32_t mask, float far, const float* far_b,
-                                   float* gap) {
+HWY_INLINE std::uint32_t nearLanes(const BoxLane& a, const BoxGroup& b, std::uint32_t mask, float far,
+                                   const float* far_b, float* gap) {
   const D d;
+  const BoxGroup& own = *a.group;
+  const std::size_t l = a.lane;
   std::uint32_t result = 0;
   for (std::size_t i = 0; i < 8; i += hn::Lanes(d)) {
     const std::uint32_t lanes = mask >> i & ((1u << hn::Lanes(d)) - 1);
     if (lanes == 0) continue;
-    const Vec3 displacement = sub(load(b.center, i), broadcast(a.center[0], a.center[1], a.center[2]));
+    const Vec3 displacement = sub(load(b.center, i), broadcast(own.center[0][l], own.center[1][l], own.center[2][l]));
     Vec3 axis_a[3], axis_b[3];
     V half_a[3], half_b[3], r[3][3], size[3][3], t[3], s[3], v[3];
     BOCST_UNROLL
     for (int k = 0; k < 3; ++k) {
-      axis_a[k] = broadcast(a.axis[k][0], a.axis[k][1], a.axis[k][2]);
+      axis_a[k] = broadcast(own.axis[k][0][l], own.axis[k][1][l], own.axis[k][2][l]);
       axis_b[k] = load(b.axis[k], i);
-      half_a[k] = hn::Set(d, a.half[k]);
+      half_a[k] = hn::Set(d, own.half[k][l]);
       half_b[k] = hn::Load(d, b.half[k] + i);
       t[k] = dot(displacement, axis_a[k]);
     }
@@ -113,7 +116,7 @@ HWY_INLINE std::uint32_t nearLanes(const Box& a, const BoxGroup& b, std::uint32_
       v[j] = hn::Sub(hn::Abs(dot(displacement, axis_b[j])), radius);
     }
     V most = hn::Max(ofFaces(s[0], s[1], s[2]), ofFaces(v[0], v[1], v[2]));
-    const V reach = hn::Add(hn::Set(d, a.reach), hn::Load(d, b.reach + i));
+    const V reach = hn::Add(hn::Set(d, own.reach[l]), hn::Load(d, b.reach + i));
     V more = hn::Set(d, far);
     if (far_b != nullptr) more = hn::Add(more, hn::LoadU(d, far_b + i));
     const V share = hn::Set(d, kShare);
@@ -132,13 +135,13 @@ HWY_INLINE std::uint32_t nearLanes(const Box& a, const BoxGroup& b, std::uint32_
   return result;
 }
 
-void NearInGroup(const Box& a, const BoxGroup& b, std::uint32_t mask, float far, const float* far_b, NearGroup& n) {
+void NearInGroup(const BoxLane& a, const BoxGroup& b, std::uint32_t mask, float far, const float* far_b, NearGroup& n) {
   n.mask = overlapping(a, b, far, far_b) & mask;
   if (n.mask != 0) n.mask = nearLanes(a, b, n.mask, far, far_b, n.gap);
 }
 
-std::size_t NearInTree(const Box& a, const BoxNode* nodes, const BoxGroup* groups, const std::uint8_t* masks, float far,
-                       std::int32_t* stack, NearGroup* near) {
+std::size_t NearInTree(const BoxLane& a, const BoxNode* nodes, const BoxGroup* groups, const std::uint8_t* masks,
+                       float far, std::int32_t* stack, NearGroup* near) {
   std::size_t count = 0, depth = 0;
   stack[depth++] = 0;
   while (depth != 0) {
@@ -189,12 +192,12 @@ void BoxGroup::set(std::size_t lane, const Box& box) {
   reach[lane] = box.reach;
 }
 
-void nearInGroup(const Box& a, const BoxGroup& b, std::uint32_t mask, float far, const float* far_b, NearGroup& n) {
+void nearInGroup(const BoxLane& a, const BoxGroup& b, std::uint32_t mask, float far, const float* far_b, NearGroup& n) {
   HWY_DYNAMIC_DISPATCH(NearInGroup)(a, b, mask, far, far_b, n);
 }
 
-std::size_t nearInTree(const Box& a, const BoxNode* nodes, const BoxGroup* groups, const std::uint8_t* masks, float far,
-                       std::int32_t* stack, NearGroup* near) {
+std::size_t nearInTree(const BoxLane& a, const BoxNode* nodes, const BoxGroup* groups, const std::uint8_t* masks,
+                       float far, std::int32_t* stack, NearGroup* near) {
   return HWY_DYNAMIC_DISPATCH(NearInTree)(a, nodes, groups, masks, far, stack, near);
 }
 

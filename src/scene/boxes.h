@@ -36,6 +36,12 @@ struct alignas(64) BoxNode {
   std::int32_t child[8];  ///< A node, or ~group.
 };
 
+/// One of a group.
+struct BoxLane {
+  const BoxGroup* group;
+  std::size_t lane;
+};
+
 /// What is near one box among a group.
 struct NearGroup {
   std::uint32_t box;    ///< The one; to be set by whoever asks.
@@ -45,11 +51,11 @@ struct NearGroup {
 };
 
 /// Which of the lanes in `mask` may be as near as `far` and the lane's own farB[] together; fills n.mask and n.gap.
-void nearInGroup(const Box& a, const BoxGroup& b, std::uint32_t mask, float far, const float* far_b, NearGroup& n);
+void nearInGroup(const BoxLane& a, const BoxGroup& b, std::uint32_t mask, float far, const float* far_b, NearGroup& n);
 
 /// The same with all groups below a hierarchy's root, node 0; masks[group] are the lanes asked for. Writes at most as
 /// many as there are groups to `near` and returns how many; `stack` has room for all nodes.
-std::size_t nearInTree(const Box& a, const BoxNode* nodes, const BoxGroup* groups, const std::uint8_t* masks, float far,
-                       std::int32_t* stack, NearGroup* near);
+std::size_t nearInTree(const BoxLane& a, const BoxNode* nodes, const BoxGroup* groups, const std::uint8_t* masks,
+                       float far, std::int32_t* stack, NearGroup* near);
 
 }  // namespace bocst::scene

@@ -4,6 +4,7 @@
 #include <algorithm>
 
 #include "fcl/adapters/validate.h"
+#include "scene/reach.h"
 
 #undef HWY_TARGET_INCLUDE
 #define HWY_TARGET_INCLUDE "scene/pose_rows.cpp"
@@ -106,35 +107,100 @@ HWY_INLINE std::size_t rigidStatesOf(const S* poses, std::size_t states, std::si
   return states;
 }
 
+// R x + t, from columns.
+HWY_INLINE Column transformed(const Column (&R)[3], const V (&x)[3], const Column& t) {
+  return {hn::MulAdd(R[0].x, x[0], hn::MulAdd(R[1].x, x[1], hn::MulAdd(R[2].x, x[2], t.x))),
+          hn::MulAdd(R[0].y, x[0], hn::MulAdd(R[1].y, x[1], hn::MulAdd(R[2].y, x[2], t.y))),
+          hn::MulAdd(R[0].z, x[0], hn::MulAdd(R[1].z, x[1], hn::MulAdd(R[2].z, x[2], t.z)))};
+}
+
+HWY_INLINE V load(const std::vector<double>& row, std::size_t i) { return hn::LoadU(D(), row.data() + i); }
+HWY_INLINE V sumOfSizes(const Column& c) { return hn::Add(hn::Add(hn::Abs(c.x), hn::Abs(c.y)), hn::Abs(c.z)); }
+
 template <typename S>
-HWY_INLINE void measurePathsOf(const S* poses, std::size_t states, std::size_t moving, const PathRow& row) {
+HWY_INLINE void measurePathsOf(const S* poses, std::size_t states, const BoundsRows& bounds, double* path,
+                               double* most_place) {
   const D d;
-  const std::size_t room = roomFor(moving);
+  const std::size_t moving = bounds.moving, room = roomFor(moving);
   const V half = hn::Set(d, 0.5), more = hn::Set(d, 1 + 1e-6);
   for (std::size_t i = 0; i < moving; i += kLanes) {
-    const V c0 = hn::LoadU(d, row.center[0] + i), c1 = hn::LoadU(d, row.center[1] + i),
-            c2 = hn::LoadU(d, row.center[2] + i), radius = hn::LoadU(d, row.radius + i);
+    const V center[3] = {load(bounds.center[0], i), load(bounds.center[1], i), load(bounds.center[2], i)};
+    const V radius = load(bounds.radius, i);
+    Poses before = posesAt(poses, i, moving);
     V sum = hn::Zero(d), place = hn::Zero(d);
-    Poses before;
     for (std::size_t k = 0; k < states; ++k) {
       const Poses X = posesAt(poses + 16 * k * moving, i, moving);
-      if (k > 0) {
-        const Column a = sub(X.rotation[0], before.rotation[0]), b = sub(X.rotation[1], before.rotation[1]),
-                     c = sub(X.rotation[2], before.rotation[2]), t = sub(X.translation, before.translation);
-        const auto along = [&](V a_k, V b_k, V c_k, V t_k)
-                               HWY_ATTR { return hn::MulAdd(a_k, c0, hn::MulAdd(b_k, c1, hn::MulAdd(c_k, c2, t_k))); };
-        const Column displacement = {along(a.x, b.x, c.x, t.x), along(a.y, b.y, c.y, t.y), along(a.z, b.z, c.z, t.z)};
-        const V turn = hn::Add(hn::Add(dot(a, a), dot(b, b)), dot(c, c));
-        const V step = hn::MulAdd(radius, hn::Sqrt(hn::Mul(turn, half)), hn::Sqrt(dot(displacement, displacement)));
-        sum = hn::MulAdd(step, more, sum);
-      }
-      const Column& t = X.translation;
-      place = hn::Max(place, hn::Add(hn::Add(hn::Abs(t.x), hn::Abs(t.y)), hn::Abs(t.z)));
-      hn::StoreU(sum, d, row.path + k * room + i);
+      const Column turn[3] = {sub(X.rotation[0], before.rotation[0]), sub(X.rotation[1], before.rotation[1]),
+                              sub(X.rotation[2], before.rotation[2])};
+      const Column displacement = transformed(turn, center, sub(X.translation, before.translation));
+      const V turned = hn::Add(hn::Add(dot(turn[0], turn[0]), dot(turn[1], turn[1])), dot(turn[2], turn[2]));
+      const V step = hn::MulAdd(radius, hn::Sqrt(hn::Mul(turned, half)), hn::Sqrt(dot(displacement, displacement)));
+      sum = hn::MulAdd(step, more, sum);
+      place = hn::Max(place, sumOfSizes(X.translation));
+      hn::StoreU(sum, d, path + k * room + i);
       before = X;
     }
-    hn::StoreU(place, d, row.place + i);
+    hn::StoreU(place, d, most_place + i);
   }
+}
+
+template <typename S>
+HWY_INLINE std::size_t placeBoxesOf(const S* state, const BoundsRows& bounds, const Placing& p, BoxGroup* groups,
+                                    std::uint32_t* others) {
+  const D d;
+  const hn::Rebind<float, D> df;
+  const V least_size = hn::Set(d, kUnboxedSize), fine = hn::Set(d, kFineError);
+  const ReachFactors factors = reachFactors<S>();
+  std::size_t count = 0;
+  for (std::size_t i = 0; i < bounds.moving; i += kLanes) {
+    BoxGroup& group = groups[i / 8];
+    const std::size_t lane = i % 8;
+    const auto store = [&](V v, float* row) HWY_ATTR { hn::StoreU(hn::DemoteTo(df, v), df, row + lane); };
+    const Poses X = posesAt(state, i, bounds.moving);
+    const Column origin = {hn::Set(d, p.origin[0]), hn::Set(d, p.origin[1]), hn::Set(d, p.origin[2])};
+    const V middle[3] = {load(bounds.center[0], i), load(bounds.center[1], i), load(bounds.center[2], i)};
+    const Column center = transformed(X.rotation, middle, sub(X.translation, origin));
+    const V error = hn::LoadU(d, p.orthogonality_errors + i), given = hn::LoadU(d, p.reach + i);
+    const V radius = load(bounds.radius, i), size = load(bounds.size, i), displacement = sumOfSizes(center);
+    V reach = hn::Add(load(bounds.reach, i), hn::Set(d, factors.least));
+    reach = hn::MulAdd(hn::Set(d, factors.per_place), hn::Add(sumOfSizes(X.translation), size), reach);
+    reach = hn::MulAdd(hn::Mul(hn::Set(d, factors.per_error), error), hn::Add(hn::Set(d, p.largest), size), reach);
+    reach = hn::MulAdd(hn::Set(d, factors.per_displacement), hn::Add(displacement, radius), reach);
+    reach = hn::IfThenElse(hn::Eq(given, hn::Zero(d)), reach, given);
+    // Comparisons with what is infinite or no number say no.
+    const auto is_box = hn::And(hn::Lt(hn::Add(hn::Add(displacement, size), reach), least_size), hn::Le(error, fine));
+    const Column nothing = {hn::Zero(d), hn::Zero(d), hn::Zero(d)};
+    Column extent = {reach, reach, reach};
+    BOCST_UNROLL
+    for (int k = 0; k < 3; ++k) {
+      const V along[3] = {load(bounds.axes[k][0], i), load(bounds.axes[k][1], i), load(bounds.axes[k][2], i)};
+      const Column axis = transformed(X.rotation, along, nothing);
+      const V half = load(bounds.half[k], i);
+      extent = {hn::MulAdd(hn::Abs(axis.x), half, extent.x), hn::MulAdd(hn::Abs(axis.y), half, extent.y),
+                hn::MulAdd(hn::Abs(axis.z), half, extent.z)};
+      store(axis.x, group.axis[k][0]);
+      store(axis.y, group.axis[k][1]);
+      store(axis.z, group.axis[k][2]);
+      store(half, group.half[k]);
+    }
+    store(center.x, group.center[0]);
+    store(center.y, group.center[1]);
+    store(center.z, group.center[2]);
+    store(reach, group.reach);
+    store(hn::Sub(center.x, extent.x), group.lo[0]);
+    store(hn::Sub(center.y, extent.y), group.lo[1]);
+    store(hn::Sub(center.z, extent.z), group.lo[2]);
+    store(hn::Add(center.x, extent.x), group.hi[0]);
+    store(hn::Add(center.y, extent.y), group.hi[1]);
+    store(hn::Add(center.z, extent.z), group.hi[2]);
+    if (HWY_LIKELY(hn::AllTrue(d, is_box))) continue;
+    HWY_ALIGN double boxed[kLanes];
+    hn::Store(hn::IfThenElseZero(is_box, hn::Set(d, 1.0)), d, boxed);
+    for (std::size_t l = 0; l < std::min(kLanes, bounds.moving - i); ++l) {
+      if (boxed[l] == 0) others[count++] = static_cast<std::uint32_t>(i + l);
+    }
+  }
+  return count;
 }
 
 std::size_t RigidStatesFloat(const float* poses, std::size_t states, std::size_t moving, double* deviations) {
@@ -143,11 +209,19 @@ std::size_t RigidStatesFloat(const float* poses, std::size_t states, std::size_t
 std::size_t RigidStatesDouble(const double* poses, std::size_t states, std::size_t moving, double* deviations) {
   return rigidStatesOf(poses, states, moving, deviations);
 }
-void MeasurePathsFloat(const float* poses, std::size_t states, std::size_t moving, const PathRow& row) {
-  measurePathsOf(poses, states, moving, row);
+void MeasurePathsFloat(const float* poses, std::size_t states, const BoundsRows& b, double* path, double* place) {
+  measurePathsOf(poses, states, b, path, place);
 }
-void MeasurePathsDouble(const double* poses, std::size_t states, std::size_t moving, const PathRow& row) {
-  measurePathsOf(poses, states, moving, row);
+void MeasurePathsDouble(const double* poses, std::size_t states, const BoundsRows& b, double* path, double* place) {
+  measurePathsOf(poses, states, b, path, place);
+}
+std::size_t PlaceBoxesFloat(const float* state, const BoundsRows& b, const Placing& p, BoxGroup* groups,
+                            std::uint32_t* others) {
+  return placeBoxesOf(state, b, p, groups, others);
+}
+std::size_t PlaceBoxesDouble(const double* state, const BoundsRows& b, const Placing& p, BoxGroup* groups,
+                             std::uint32_t* others) {
+  return placeBoxesOf(state, b, p, groups, others);
 }
 
 }  // namespace bocst::scene::HWY_NAMESPACE
@@ -160,23 +234,26 @@ HWY_EXPORT(RigidStatesFloat);
 HWY_EXPORT(RigidStatesDouble);
 HWY_EXPORT(MeasurePathsFloat);
 HWY_EXPORT(MeasurePathsDouble);
+HWY_EXPORT(PlaceBoxesFloat);
+HWY_EXPORT(PlaceBoxesDouble);
 
-template <>
-std::size_t rigidStates(const float* poses, std::size_t states, std::size_t moving, double* deviations) {
-  return HWY_DYNAMIC_DISPATCH(RigidStatesFloat)(poses, states, moving, deviations);
-}
-template <>
-std::size_t rigidStates(const double* poses, std::size_t states, std::size_t moving, double* deviations) {
-  return HWY_DYNAMIC_DISPATCH(RigidStatesDouble)(poses, states, moving, deviations);
-}
-template <>
-void measurePaths(const float* poses, std::size_t states, std::size_t moving, const PathRow& row) {
-  HWY_DYNAMIC_DISPATCH(MeasurePathsFloat)(poses, states, moving, row);
-}
-template <>
-void measurePaths(const double* poses, std::size_t states, std::size_t moving, const PathRow& row) {
-  HWY_DYNAMIC_DISPATCH(MeasurePathsDouble)(poses, states, moving, row);
-}
+#define BOCST_FOR(S, Name)                                                                                       \
+  template <>                                                                                                    \
+  std::size_t rigidStates(const S* poses, std::size_t states, std::size_t moving, double* deviations) {          \
+    return HWY_DYNAMIC_DISPATCH(RigidStates##Name)(poses, states, moving, deviations);                           \
+  }                                                                                                              \
+  template <>                                                                                                    \
+  void measurePaths(const S* poses, std::size_t states, const BoundsRows& bounds, double* path, double* place) { \
+    HWY_DYNAMIC_DISPATCH(MeasurePaths##Name)(poses, states, bounds, path, place);                                \
+  }                                                                                                              \
+  template <>                                                                                                    \
+  std::size_t placeBoxes(const S* state, const BoundsRows& bounds, const Placing& placing, BoxGroup* groups,     \
+                         std::uint32_t* others) {                                                                \
+    return HWY_DYNAMIC_DISPATCH(PlaceBoxes##Name)(state, bounds, placing, groups, others);                       \
+  }
+BOCST_FOR(float, Float)
+BOCST_FOR(double, Double)
+#undef BOCST_FOR
 
 }  // namespace bocst::scene
 #endif

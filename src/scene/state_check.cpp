@@ -21,42 +21,19 @@ template <typename S>
 void StateCheck<S>::start(const World<S>& world) {
   world_ = &world;
   if (serial_ != world.serial) has_last_ = false;
-  boxes_.resize(world.moving.size());
+  others_.resize(world.moving.size());
   // Each state fills all lanes with an object.
   if (serial_ != world.serial) groups_.assign(world.movingGroups(), BoxGroup());
   stack_.resize(world.nodes.size() + 1);
   far.assign(world.moving.size(), 0);
-  reach.assign(world.moving.size(), 0);
+  reach.assign(roomFor(world.moving.size()), 0);
   far_.assign(8 * world.movingGroups(), 0);
   serial_ = world.serial;
 }
 
 template <typename S>
-void StateCheck<S>::place(const fcl::Transform3<S>* X_WM, std::size_t i) {
-  boxes_[i] = world_->boxAt(world_->moving[i], X_WM[i], orthogonality_errors[i], reach[i]);
-  groups_[i / 8].set(i % 8, boxes_[i]);
-}
-
-template <typename S>
 void StateCheck<S>::place(const fcl::Transform3<S>* X_WM) {
-  for (std::size_t i = 0; i < boxes_.size(); ++i) place(X_WM, i);
-}
-
-// Those that the entries are about, and no others.
-template <typename S>
-void StateCheck<S>::place(const fcl::Transform3<S>* X_WM, const Entry* begin, const Entry* end) {
-  is_placed_.assign(boxes_.size(), 0);
-  const auto place_once = [&](std::size_t i) {
-    if (is_placed_[i] == 0) place(X_WM, i);
-    is_placed_[i] = 1;
-  };
-  for (const Entry* e = begin; e != end; ++e) {
-    place_once(e->moving);
-    if (world_->isFixed(e->group)) continue;
-    for (std::uint32_t left = e->mask; left != 0; left &= left - 1) {
-      place_once(world_->movingIndex(e->group, static_cast<std::size_t>(__builtin_ctz(left))));
-    }
-  }
+  world_->place(X_WM, orthogonality_errors.data(), reach.data(), groups_.data(), others_.data());
 }
 
 // Rounded up, as floats.
@@ -76,13 +53,13 @@ void StateCheck<S>::addNear(std::size_t i, float far_a, const float* far_of_movi
   const std::uint8_t* masks = world_->masks.data() + i * all;
   std::size_t count = near_count_;
   if (!world_->nodes.empty()) {
-    count += nearInTree(boxes_[i], world_->nodes.data(), world_->groups.data(), masks, far_a, stack_.data(),
+    count += nearInTree(boxOf(i), world_->nodes.data(), world_->groups.data(), masks, far_a, stack_.data(),
                         near_.data() + count);
   }
   for (std::size_t g = i / 8; g < groups_.size(); ++g) {
     if (masks[fixed + g] == 0) continue;
     NearGroup& n = near_[count];
-    nearInGroup(boxes_[i], groups_[g], masks[fixed + g], far_a,
+    nearInGroup(boxOf(i), groups_[g], masks[fixed + g], far_a,
                 far_of_moving == nullptr ? nullptr : far_of_moving + 8 * g, n);
     n.group = static_cast<std::uint32_t>(fixed + g);
     if (n.mask != 0) ++count;
@@ -93,7 +70,7 @@ void StateCheck<S>::addNear(std::size_t i, float far_a, const float* far_of_movi
 template <typename S>
 const std::vector<NearGroup>& StateCheck<S>::findNear(float most) {
   near_count_ = 0;
-  for (std::size_t i = 0; i < boxes_.size(); ++i) addNear(i, most, nullptr);
+  for (std::size_t i = 0; i < world_->moving.size(); ++i) addNear(i, most, nullptr);
   near_.resize(near_count_);
   return near_;
 }
@@ -103,14 +80,14 @@ bool StateCheck<S>::runAll(const fcl::Transform3<S>* X_WM, std::vector<Entry>* e
   place(X_WM);
   spread();
   near_count_ = 0;
-  for (std::size_t i = 0; i < boxes_.size(); ++i) addNear(i, far_[i], far_.data());
+  for (std::size_t i = 0; i < world_->moving.size(); ++i) addNear(i, far_[i], far_.data());
   return look(X_WM, near_count_, entries, hit);
 }
 
 template <typename S>
 bool StateCheck<S>::run(const fcl::Transform3<S>* X_WM, const Entry* begin, const Entry* end,
                         std::vector<Entry>* entries, PairAt* hit) {
-  place(X_WM, begin, end);
+  place(X_WM);
   spread();
   const auto size = static_cast<std::size_t>(end - begin);
   if (near_.size() < size) near_.resize(size);
@@ -118,10 +95,10 @@ bool StateCheck<S>::run(const fcl::Transform3<S>* X_WM, const Entry* begin, cons
   for (const Entry* e = begin; e != end; ++e) {
     NearGroup& n = near_[near_count_];
     if (world_->isFixed(e->group)) {
-      nearInGroup(boxes_[e->moving], world_->groups[e->group], e->mask, far_[e->moving], nullptr, n);
+      nearInGroup(boxOf(e->moving), world_->groups[e->group], e->mask, far_[e->moving], nullptr, n);
     } else {
       const std::size_t g = e->group - world_->fixedGroups();
-      nearInGroup(boxes_[e->moving], groups_[g], e->mask, far_[e->moving], far_.data() + 8 * g, n);
+      nearInGroup(boxOf(e->moving), groups_[g], e->mask, far_[e->moving], far_.data() + 8 * g, n);
     }
     if (n.mask == 0) continue;
     n.box = e->moving;

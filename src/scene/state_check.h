@@ -66,18 +66,16 @@ class StateCheck {
     std::size_t entry;
   };
 
-  void place(const fcl::Transform3<S>* X_WM, std::size_t i);
-  void place(const fcl::Transform3<S>* X_WM, const Entry* begin, const Entry* end);
+  BoxLane boxOf(std::size_t moving) const { return {&groups_[moving / 8], moving % 8}; }
   void addNear(std::size_t i, float far_a, const float* far_of_moving);
   bool look(const fcl::Transform3<S>* X_WM, std::size_t count, std::vector<Entry>* entries, PairAt* hit);
   void spread();
 
   const World<S>* world_ = nullptr;
   std::uint64_t serial_ = 0;
-  std::vector<Box> boxes_;
-  std::vector<BoxGroup> groups_;  // of moving objects
-  std::vector<std::uint8_t> is_placed_;
-  std::vector<float> far_;  // as far, rounded up, eight a group
+  std::vector<BoxGroup> groups_;       // of moving objects
+  std::vector<std::uint32_t> others_;  // of World::place()
+  std::vector<float> far_;             // as far, rounded up, eight a group
   std::vector<NearGroup> near_;
   std::size_t near_count_ = 0;
   std::vector<std::int32_t> stack_;

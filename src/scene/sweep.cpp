@@ -18,10 +18,7 @@ void Sweep<S>::measure(const World<S>& world, const fcl::Transform3<S>* X_WM, st
   const std::size_t moving = world.moving.size(), room = roomFor(moving);
   path_.resize(room * states);
   place_.resize(room);
-  const auto& c = world.moving_center;
-  measurePaths(
-      X_WM->matrix().data(), states, moving,
-      PathRow{{c[0].data(), c[1].data(), c[2].data()}, world.moving_radius.data(), path_.data(), place_.data()});
+  measurePaths(X_WM->matrix().data(), states, world.rows, path_.data(), place_.data());
   // Of all states, as what is said of one holds for others.
   for (std::size_t i = 0; i < moving; ++i) {
     check_.reach[i] = world.reachWithin(world.moving[i], place_[i], check_.orthogonality_errors[i]);
@@ -57,7 +54,7 @@ bool Sweep<S>::setFar(const World<S>& world, const fcl::Transform3<S>* X_WM, std
     // Differences of sums: after a long way even 0 is rounded.
     const double rounding = 1e-15 * path[(states - 1) * room] * static_cast<double>(states);
     // See measurePaths().
-    const double skew = 8.001 * check_.orthogonality_errors[i] * world.moving_radius[i] * static_cast<double>(most);
+    const double skew = 8.001 * check_.orthogonality_errors[i] * world.rows.radius[i] * static_cast<double>(most);
     check_.far[i] = std::max(to_begin, to_end) + rounding + skew;
     if (isTooFar(i, check_.far[i])) return false;
   }

@@ -42,7 +42,7 @@ class Sweep {
 
   StateCheck<S> check_;
   std::vector<fcl_adapter::PosedPair<S>> pairs_;  // of growForAll()
-  std::vector<double> path_, place_;              // see PathRow
+  std::vector<double> path_, place_;              // see measurePaths()
   bool is_measured_ = false;
   std::size_t farthest_ = 0;  // the moving object that last moved too far
   std::vector<Part> parts_;

@@ -12,7 +12,7 @@
 
 #include "fcl/adapters/validate.h"
 #include "fcl/queries/grow_together.h"
-#include "scene/pose_rows.h"
+#include "scene/reach.h"
 #include "simd/float4.h"
 
 namespace bocst::scene {
@@ -89,20 +89,11 @@ void checkPose(const char* query, const fcl::Transform3<S>& X) {
   if (!(orthogonalityErrorOf<S>(X) <= kMaxOrthogonalityError)) refuse<S>(query, "", X);
 }
 
-// Boxes of rotations that are off by more are boxes along the axes of the world, so that all axes are at right angles.
-constexpr double kFineError = 1e-5;
-
-/// Smaller numbers than this lose digits as floats.
-constexpr double kLeastReach = 1e-30;
-
-// What may be called a contact farther than the boxes are apart: FCL computes relative poses in S (64 roundings of
-// everything that is added up); where rotations are off by `orthogonality_error`, lengths along them are, of either
-// object, and walks tolerate four times that share of the frames' distance and of both sizes twice over; and the box is
-// in float, with axes that are off by as much (see nearLanes()).
 template <typename S>
 double reachOf(const Bounds& b, double largest, double place, double displacement, double orthogonality_error) {
-  return b.reach + 64 * static_cast<double>(std::numeric_limits<S>::epsilon()) * (place + b.size) +
-         128 * orthogonality_error * (largest + b.size) + 128 * 0x1p-24 * (displacement + b.radius) + kLeastReach;
+  const ReachFactors f = reachFactors<S>();
+  return b.reach + f.per_place * (place + b.size) + f.per_error * orthogonality_error * (largest + b.size) +
+         f.per_displacement * (displacement + b.radius) + f.least;
 }
 
 template <typename S>
@@ -139,8 +130,7 @@ Box World<S>::boxAt(const Object<S>& object, const fcl::Transform3<S>& X_WG, dou
   const double place = places[0] + places[1] + places[2];
   const double displacement = displacements[0] + displacements[1] + displacements[2];
   if (reach == 0) reach = reachOf<S>(b, largest_, place, displacement, orthogonality_error);
-  // Where half extents do not fit a float, nothing near does.
-  if (!(displacement + b.radius + reach < 1e12)) {
+  if (!(displacement + b.radius + reach < kUnboxedSize)) {
     Object<S> far;
     far.bounds.kind = Bounds::kEverywhere;
     return boxAt(far, X_WG, 0);
@@ -240,13 +230,7 @@ World<S>::World(std::vector<Object<S>> moving_objects, std::vector<Object<S>> fi
   const auto ignored = [&](Id a, Id b) { return ignored_pairs.count(std::minmax(a, b)) != 0; };
   const auto sizeOf = [](const Object<S>& o) { return o.bounds.kind == Bounds::kBox ? o.bounds.size : 0; };
   for (const Object<S>& o : moving) largest_ = std::max(largest_, sizeOf(o));
-  for (std::vector<double>* column : {&moving_center[0], &moving_center[1], &moving_center[2], &moving_radius}) {
-    column->assign(roomFor(moving.size()), 0);
-  }
-  for (std::size_t i = 0; i < moving.size(); ++i) {
-    for (int k = 0; k < 3; ++k) moving_center[k][i] = moving[i].bounds.center[k];
-    moving_radius[i] = moving[i].bounds.radius;
-  }
+  fillRows();
   Eigen::AlignedBox3d middles;
   for (const Object<S>& o : fixed_objects) {
     largest_ = std::max(largest_, sizeOf(o));
@@ -295,6 +279,36 @@ World<S>::World(std::vector<Object<S>> moving_objects, std::vector<Object<S>> fi
         masks[i * allGroups() + group] |= static_cast<std::uint8_t>(1u << lane);
       }
     }
+  }
+}
+
+template <typename S>
+void World<S>::fillRows() {
+  const auto fill = [this](std::vector<double>& row, auto&& of) {
+    row.assign(roomFor(moving.size()), 0);
+    for (std::size_t i = 0; i < moving.size(); ++i) row[i] = of(moving[i].bounds);
+  };
+  rows.moving = moving.size();
+  for (int k = 0; k < 3; ++k) {
+    fill(rows.center[k], [k](const Bounds& b) { return b.center[k]; });
+    fill(rows.half[k], [k](const Bounds& b) { return b.half[k]; });
+    for (int j = 0; j < 3; ++j) fill(rows.axes[k][j], [k, j](const Bounds& b) { return b.axes(j, k); });
+  }
+  fill(rows.reach, [](const Bounds& b) { return b.reach; });
+  fill(rows.radius, [](const Bounds& b) { return b.radius; });
+  fill(rows.size,
+       [](const Bounds& b) { return b.kind == Bounds::kBox ? b.size : std::numeric_limits<double>::infinity(); });
+}
+
+template <typename S>
+void World<S>::place(const fcl::Transform3<S>* X_WM, const double* orthogonality_errors, const double* reach,
+                     BoxGroup* boxes, std::uint32_t* others) const {
+  if (moving.empty()) return;
+  const Placing placing{orthogonality_errors, reach, {origin_[0], origin_[1], origin_[2]}, largest_};
+  const std::size_t count = placeBoxes(X_WM->matrix().data(), rows, placing, boxes, others);
+  for (std::size_t n = 0; n < count; ++n) {
+    const std::size_t i = others[n];
+    boxes[i / 8].set(i % 8, boxAt(moving[i], X_WM[i], orthogonality_errors[i], reach[i]));
   }
 }
 

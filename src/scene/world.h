@@ -11,7 +11,7 @@
 #include <vector>
 
 #include "scene/bounds.h"
-#include "scene/boxes.h"
+#include "scene/pose_rows.h"
 
 namespace bocst::scene {
 
@@ -59,19 +59,18 @@ class World {
   bool isFixed(std::size_t group) const { return group < fixedGroups(); }
   std::size_t movingIndex(std::size_t group, std::size_t lane) const { return 8 * (group - fixedGroups()) + lane; }
 
-  /// The box of an object at a pose of this orthogonality error, without an extent for what is nowhere. `reach`: the
-  /// box's, if it is known.
-  Box boxAt(const Object<S>& object, const fcl::Transform3<S>& X_WG, double orthogonality_error,
-            double reach = 0) const;
+  /// Places the boxes of all moving objects. `orthogonality_errors`, `reach`: see Placing. `others` has room for all.
+  void place(const fcl::Transform3<S>* X_WM, const double* orthogonality_errors, const double* reach, BoxGroup* boxes,
+             std::uint32_t* others) const;
 
   /// At least the reach of that box, while no coordinates of the pose's translation add up to more than `place`, and
   /// its orthogonality error is not larger.
   double reachWithin(const Object<S>& object, double place, double orthogonality_error) const;
 
   std::vector<Object<S>> moving;
-  std::vector<double> moving_center[3], moving_radius;  ///< Of their bounds; with room for PathRow.
-  std::vector<Object<S>> fixed;                         ///< Eight a group.
-  std::vector<BoxNode> nodes;  ///< Over the groups; none without a fixed object that is somewhere.
+  BoundsRows rows;               ///< Of the moving objects.
+  std::vector<Object<S>> fixed;  ///< Eight a group.
+  std::vector<BoxNode> nodes;    ///< Over the groups; none without a fixed object that is somewhere.
   std::vector<BoxGroup> groups;
   /// [i * allGroups() + group]: lanes that make a pair with moving object i; of two moving objects in row of the first.
   std::vector<std::uint8_t> masks;
@@ -81,6 +80,11 @@ class World {
   std::uint64_t serial;         ///< No other world has it.
 
  private:
+  // The box of an object at a pose of this orthogonality error, without an extent for what is nowhere. `reach`: the
+  // box's, if it is known.
+  Box boxAt(const Object<S>& object, const fcl::Transform3<S>& X_WG, double orthogonality_error,
+            double reach = 0) const;
+  void fillRows();
   std::int32_t build(std::vector<std::uint32_t>& order, std::vector<std::pair<std::size_t, std::size_t>> parts,
                      const std::vector<Box>& boxes, const std::vector<Object<S>>& objects);
 
