@@ -114,11 +114,11 @@ TEST_F(Program, CollidesTheModelsItComesWith) {
   EXPECT_EQ(report.at("contacts"), report.at("fcl").at("contacts"));
   EXPECT_EQ(report.at("agree"), true);
   EXPECT_GT(report.at("nodes"), 2);
-  for (const char* key : {"first_answer_us", "warm_query_us", "bytes"}) {
+  for (const char* key : {"first_answer_us", "warm_query_us", "settled_query_us", "bytes"}) {
     EXPECT_GT(report.at(key).at("bocst"), 0) << key;
     EXPECT_GT(report.at(key).at("fcl"), 0) << key;
   }
-  for (const char* key : {"first_answer", "warm_query", "memory"}) EXPECT_GT(report.at("ratio").at(key), 0) << key;
+  for (const char* key : {"first_answer", "warm_query", "settled_query", "memory"}) EXPECT_GT(report.at("ratio").at(key), 0) << key;
   const Result table = run("collide " + model("link") + " " + model("gripper"));
   EXPECT_EQ(table.code, 0);
   EXPECT_NE(table.out.find("They collide."), std::string::npos) << table.out;
