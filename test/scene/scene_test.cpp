@@ -271,6 +271,32 @@ TYPED_TEST(SceneTest, OctreesPlanesAndMapsWithoutCells) {
   EXPECT_LT(hits, states - states / 10);
 }
 
+// What has no bounds moves, among objects that are nowhere near its frame.
+TYPED_TEST(SceneTest, UnboundedObjectsMove) {
+  using S = TypeParam;
+  for (const bool is_plane : {false, true}) {
+    World<S> w;
+    std::mt19937_64 g(8);
+    w.fix(geometry<S>(0, g), test::pose<S>(Eigen::Matrix3d::Identity(), {40, -30, 20}));
+    w.move(geometry<S>(0, g));
+    if (is_plane) {
+      w.move(std::make_shared<fcl::Plane<S>>(fcl::Vector3<S>::UnitX(), S(0)));
+    } else {
+      w.move(std::make_shared<fcl::Halfspace<S>>(fcl::Vector3<S>::UnitX(), S(0)));
+    }
+    const std::size_t states = 60;
+    States<S> X;
+    for (std::size_t k = 0; k < states; ++k) {
+      X.push_back(test::pose<S>(Eigen::Matrix3d::Identity(), {200, 0, 100}));
+      X.push_back(test::pose<S>(Eigen::Matrix3d::Identity(), {static_cast<double>(k), 0, 0}));
+    }
+    std::size_t hits = 0;
+    checkVerdicts(w, X, states, hits);
+    EXPECT_GT(hits, 0u);
+    EXPECT_LT(hits, states);
+  }
+}
+
 // Contacts are found where they begin, and far from the origin of the world.
 TYPED_TEST(SceneTest, VerdictsOnTheBrinkOfContact) {
   using S = TypeParam;
@@ -714,6 +740,26 @@ std::string complaintOf(F&& f) {
     return e.what();
   }
   return "nothing thrown";
+}
+
+// Each pose of a row is looked at, also behind one whose rotation is off by what is allowed.
+TYPED_TEST(SceneTest, APoseThatIsNoneBehindOneThatIsSlightlyOff) {
+  using S = TypeParam;
+  std::mt19937_64 g(1);
+  Scene<S> scene;
+  scene.addFixed(geometry<S>(0, g), fcl::Transform3<S>::Identity());
+  for (int i = 0; i < 3; ++i) scene.addMoving(geometry<S>(0, g));
+  const std::size_t states = 5;
+  States<S> X(3 * states, test::pose<S>(Eigen::Matrix3d::Identity(), {50, 0, 0}));
+  X[1].linear() *= S(1.0003);
+  std::vector<std::uint8_t> hit(states);
+  EXPECT_NO_THROW(scene.collisions(X.data(), states, hit.data()));
+  for (const std::size_t bad : {3u, 4u, 8u, 14u}) {
+    States<S> Y = X;
+    Y[bad].translation().y() = std::numeric_limits<S>::quiet_NaN();
+    EXPECT_THROW(scene.collisions(Y.data(), states, hit.data()), std::invalid_argument) << bad;
+    EXPECT_THROW(scene.anyCollision(Y.data(), states), std::invalid_argument) << bad;
+  }
 }
 
 TYPED_TEST(SceneTest, MisuseThrows) {
