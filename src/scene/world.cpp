@@ -13,7 +13,6 @@
 #include "fcl/adapters/validate.h"
 #include "fcl/queries/grow_together.h"
 #include "scene/reach.h"
-#include "simd/float4.h"
 
 namespace bocst::scene {
 namespace {
@@ -121,41 +120,28 @@ Box World<S>::boxAt(const Object<S>& object, const fcl::Transform3<S>& X_WG, dou
     box.reach = 0;
     return box;
   }
-  const S* m = X_WG.matrix().data();  // columns of four
-  const simd::Double4 R[3] = {simd::loadDoubles(m), simd::loadDoubles(m + 4), simd::loadDoubles(m + 8)};
-  const simd::Double4 at = simd::loadDoubles(m + 12);
-  const simd::Double4 center = R[0] * b.center[0] + R[1] * b.center[1] + R[2] * b.center[2] + at -
-                               simd::Double4{simd::Double2{origin_[0], origin_[1]}, simd::Double2{origin_[2], 0}};
-  const simd::Double4 places = simd::abs(at), displacements = simd::abs(center);
-  const double place = places[0] + places[1] + places[2];
-  const double displacement = displacements[0] + displacements[1] + displacements[2];
-  if (reach == 0) reach = reachOf<S>(b, largest_, place, displacement, orthogonality_error);
+  const Eigen::Matrix3d R = X_WG.linear().template cast<double>();
+  const Eigen::Vector3d at = X_WG.translation().template cast<double>(), center = R * b.center + at - origin_;
+  const double displacement = center.lpNorm<1>();
+  if (reach == 0) reach = reachOf<S>(b, largest_, at.lpNorm<1>(), displacement, orthogonality_error);
   if (!(displacement + b.radius + reach < kUnboxedSize)) {
     Object<S> far;
     far.bounds.kind = Bounds::kEverywhere;
     return boxAt(far, X_WG, 0);
   }
+  const Eigen::Matrix3d own = R * b.axes;
+  const Eigen::Vector3d half = own.cwiseAbs() * b.half;  // along the world's axes
+  const bool fine = orthogonality_error <= kFineError;
+  const Eigen::Matrix3d axes = fine ? own : Eigen::Matrix3d::Identity();
+  const Eigen::Vector3d along = fine ? b.half : half;
   box.reach = static_cast<float>(reach);
-  simd::Double4 half = {};
-  const auto store = [](simd::Double4 from, float(&to)[3]) {
-    for (int j = 0; j < 3; ++j) to[j] = static_cast<float>(from[j]);
-  };
   for (int k = 0; k < 3; ++k) {
-    const simd::Double4 axis = R[0] * b.axes(0, k) + R[1] * b.axes(1, k) + R[2] * b.axes(2, k);
-    half = half + simd::abs(axis) * b.half[k];
-    store(axis, box.axis[k]);
-    box.half[k] = static_cast<float>(b.half[k]);
+    for (int j = 0; j < 3; ++j) box.axis[k][j] = static_cast<float>(axes(j, k));
+    box.half[k] = static_cast<float>(along[k]);
+    box.center[k] = static_cast<float>(center[k]);
+    box.lo[k] = static_cast<float>(center[k] - half[k] - reach);
+    box.hi[k] = static_cast<float>(center[k] + half[k] + reach);
   }
-  if (orthogonality_error > kFineError) {
-    for (int k = 0; k < 3; ++k) {
-      for (int j = 0; j < 3; ++j) box.axis[k][j] = j == k;
-    }
-    store(half, box.half);
-  }
-  half = half + simd::Double4{simd::Double2{reach, reach}, simd::Double2{reach, reach}};
-  store(center, box.center);
-  store(center - half, box.lo);
-  store(center + half, box.hi);
   return box;
 }
 

@@ -4,14 +4,13 @@
 #include <cstdint>
 #include <cstring>
 
-// Four floats or doubles, by the compiler's own vectors: for code that is too short to be compiled for each instruction
+// Four floats, by the compiler's own vectors: for code that is too short to be compiled for each instruction
 // set and called through a table.
 
 namespace bocst::simd {
 
 using Float4 = float __attribute__((vector_size(16)));
 using Int4 = std::int32_t __attribute__((vector_size(16)));
-using Double2 = double __attribute__((vector_size(16)));
 using Long2 = std::int64_t __attribute__((vector_size(16)));
 
 template <int I>
@@ -56,32 +55,6 @@ inline Float4 loadDifference(const double* p, const double* q) {
   std::memcpy(&v, p, sizeof v);
   std::memcpy(&w, q, sizeof w);
   return __builtin_convertvector(v - w, Float4);
-}
-
-/// Four doubles. (A vector of 32 bytes is not passed the same way by all compilers' settings.)
-struct Double4 {
-  Double2 low, high;
-
-  friend Double4 operator+(Double4 a, Double4 b) { return {a.low + b.low, a.high + b.high}; }
-  friend Double4 operator-(Double4 a, Double4 b) { return {a.low - b.low, a.high - b.high}; }
-  friend Double4 operator*(Double4 a, double b) { return {a.low * b, a.high * b}; }
-  double operator[](int i) const { return i < 2 ? low[i] : high[i - 2]; }
-};
-
-inline Double4 loadDoubles(const double* p) {
-  Double4 v;
-  std::memcpy(&v, p, sizeof v);
-  return v;
-}
-inline Double4 loadDoubles(const float* p) {
-  const double x = p[0], y = p[1], z = p[2], w = p[3];
-  return {Double2{x, y}, Double2{z, w}};
-}
-
-inline Double4 abs(Double4 v) {
-  constexpr Long2 kAllButSign = {0x7fffffffffffffff, 0x7fffffffffffffff};
-  return {reinterpret_cast<Double2>(reinterpret_cast<Long2>(v.low) & kAllButSign),
-          reinterpret_cast<Double2>(reinterpret_cast<Long2>(v.high) & kAllButSign)};
 }
 
 }  // namespace bocst::simd
