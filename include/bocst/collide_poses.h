@@ -22,7 +22,7 @@ namespace bocst {
 /// at which the bounding boxes are apart takes some nanoseconds.
 ///
 /// `threads`: number of threads that share the poses, including the calling thread; 0: one per hardware thread. Each
-/// call starts its threads, so more than one thread pays off only for some thousand poses.
+/// call starts its threads, so more than one thread pays off only for thousands of poses.
 ///
 /// Thread rule: as collide(); the models may be queried, pruned and deformed at the same time. Each pose sees a mesh
 /// either before or after a change.

@@ -112,8 +112,9 @@ class BOCST_EXPORT Model : public fcl::CollisionGeometry<S> {
   /// model is empty.
   std::shared_ptr<const Mesh> mesh() const;
 
-  /// Releases the mesh in host memory; the compute oracle has a copy on its device (3: "the model need not be in core
-  /// memory"). The memory is freed when no other owner is left. Later queries throw OracleError if the device is lost.
+  /// Releases the mesh in host memory; the compute oracle has a copy on its device (paper, 3: "the model need not be in
+  /// core memory"). The memory is freed when no other owner is left. Later queries throw OracleError if the device is
+  /// lost.
   /// @throws std::logic_error for exact answers and for solids, which need the triangles in host memory; OracleError if
   /// the oracle of this model has no copy.
   void releaseMesh();
@@ -130,8 +131,8 @@ class BOCST_EXPORT Model : public fcl::CollisionGeometry<S> {
   /// Calls f for every resident node, parents before children. f must not call back into this model.
   void visit(const std::function<void(const NodeView&)>& f) const;
 
-  /// Applies ttl and memory_budget at the time `now` (paper, 3.1): drops each deepest branch level whose last use is
-  /// longer ago than ttl. The ttl of its parent starts then. Queries also do this from time to time.
+  /// Applies ttl and memory_budget at the time `now` (paper, 3.1): drops each deepest branch level that was
+  /// last used more than ttl ago. The ttl of its parent starts then. Queries also do this from time to time.
   void prune(Clock::time_point now);
   void prune();  ///< With the current time.
 

@@ -77,7 +77,7 @@ class BOCST_EXPORT Scene {
   Scene& operator=(const Scene&) = delete;
 
   // Changes. All throw std::invalid_argument, and change nothing, for an Id of another scene or of a removed object,
-  // for a null geometry, for a geometry that fcl::collide does not accept, and for a pose that is not rigid.
+  // for a null geometry, an empty Model, a geometry that fcl::collide does not accept, and a pose that is not rigid.
 
   /// Adds an object that stays at X_WG. Computes a tight bound of its geometry, in time linear in its vertices.
   Id addFixed(std::shared_ptr<Geometry> geometry, const Transform& X_WG);
@@ -110,8 +110,8 @@ class BOCST_EXPORT Scene {
   /// True if the motion of all moving objects from one state to another is free of collisions at all times. Never steps
   /// over a contact. Geometries that pass closer than the resolution of fcl::continuousCollide (see bocst/fcl.h; for
   /// two of FCL's geometries 1e-5 of their sizes) count as touching. With CCDM_LINEAR, each object's origin moves on a
-  /// line, and the object turns about a fixed axis (slerp of the normalised quaternions, so a rotation that is off by
-  /// rounding is passed exact). Two of FCL's geometries that pass closer than the rounding of the motion's length also
+  /// line, and the object turns about a fixed axis (slerp of the normalised quaternions, which removes rounding
+  /// errors of a rotation). Two of FCL's geometries that pass closer than the rounding of the motion's length also
   /// count as touching.
   /// @throws std::invalid_argument as clearance().
   bool edgeIsFree(const Transform* X_WM_begin, const Transform* X_WM_end,
