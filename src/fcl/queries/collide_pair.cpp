@@ -653,7 +653,7 @@ void collideRow(const Model<S>& a, const Model<S>& b, const fcl::Transform3<S>* 
   const Models<S> models(&a, &b);
   const double margin = marginOf(&a, &b);
   // Of solids whose surfaces are apart, one may still be inside the other.
-  const bool may_be_inside = treeOf(a).solid() != nullptr || treeOf(b).solid() != nullptr;
+  const bool may_be_inside = treeOf(a).options().solid || treeOf(b).options().solid;
   const std::vector<Spheres>* spheres = nullptr;
   if (growsTogether(a, b)) {
     thread_local std::vector<PosedPair<S>> pairs;
