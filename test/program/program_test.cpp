@@ -118,7 +118,8 @@ TEST_F(Program, CollidesTheModelsItComesWith) {
     EXPECT_GT(report.at(key).at("bocst"), 0) << key;
     EXPECT_GT(report.at(key).at("fcl"), 0) << key;
   }
-  for (const char* key : {"first_answer", "warm_query", "settled_query", "memory"}) EXPECT_GT(report.at("ratio").at(key), 0) << key;
+  for (const char* key : {"first_answer", "warm_query", "settled_query", "memory"})
+    EXPECT_GT(report.at("ratio").at(key), 0) << key;
   const Result table = run("collide " + model("link") + " " + model("gripper"));
   EXPECT_EQ(table.code, 0);
   EXPECT_NE(table.out.find("They collide."), std::string::npos) << table.out;
