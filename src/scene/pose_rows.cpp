@@ -2,6 +2,7 @@
 #include "scene/pose_rows.h"
 
 #include <algorithm>
+#include <limits>
 
 #include "fcl/adapters/validate.h"
 #include "scene/reach.h"
@@ -236,6 +237,25 @@ HWY_EXPORT(MeasurePathsFloat);
 HWY_EXPORT(MeasurePathsDouble);
 HWY_EXPORT(PlaceBoxesFloat);
 HWY_EXPORT(PlaceBoxesDouble);
+
+BoundsRows rowsOf(const std::vector<Bounds>& bounds) {
+  BoundsRows rows;
+  rows.moving = bounds.size();
+  const auto fill = [&bounds](std::vector<double>& row, auto&& of) {
+    row.assign(roomFor(bounds.size()), 0);
+    std::transform(bounds.begin(), bounds.end(), row.begin(), of);
+  };
+  for (int k = 0; k < 3; ++k) {
+    fill(rows.center[k], [k](const Bounds& b) { return b.center[k]; });
+    fill(rows.half[k], [k](const Bounds& b) { return b.half[k]; });
+    for (int j = 0; j < 3; ++j) fill(rows.axes[k][j], [k, j](const Bounds& b) { return b.axes(j, k); });
+  }
+  fill(rows.reach, [](const Bounds& b) { return b.reach; });
+  fill(rows.radius, [](const Bounds& b) { return b.radius; });
+  fill(rows.size,
+       [](const Bounds& b) { return b.kind == Bounds::kBox ? b.size : std::numeric_limits<double>::infinity(); });
+  return rows;
+}
 
 #define BOCST_FOR(S, Name)                                                                                       \
   template <>                                                                                                    \

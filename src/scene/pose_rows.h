@@ -5,6 +5,7 @@
 #include <cstdint>
 #include <vector>
 
+#include "scene/bounds.h"
 #include "scene/boxes.h"
 
 // Rows of poses, several at a time: are they rigid, how far do they move objects, and where are the objects' boxes? A
@@ -23,6 +24,7 @@ struct BoundsRows {
   std::vector<double> center[3], axes[3][3], half[3];  ///< axes[k][j]: coordinate j of axis k.
   std::vector<double> reach, radius, size;
 };
+BoundsRows rowsOf(const std::vector<Bounds>& bounds);
 
 /// Goes through states until one has a pose that is not surely rigid (fcl_adapter::isSurelyRigid()), and returns how
 /// many were before it. Raises deviations[i] to |shear| + stretch^2 / 4 of moving object i's poses in these

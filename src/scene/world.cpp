@@ -216,7 +216,9 @@ World<S>::World(std::vector<Object<S>> moving_objects, std::vector<Object<S>> fi
   const auto ignored = [&](Id a, Id b) { return ignored_pairs.count(std::minmax(a, b)) != 0; };
   const auto sizeOf = [](const Object<S>& o) { return o.bounds.kind == Bounds::kBox ? o.bounds.size : 0; };
   for (const Object<S>& o : moving) largest_ = std::max(largest_, sizeOf(o));
-  fillRows();
+  std::vector<Bounds> bounds;
+  for (const Object<S>& o : moving) bounds.push_back(o.bounds);
+  rows = rowsOf(bounds);
   Eigen::AlignedBox3d middles;
   for (const Object<S>& o : fixed_objects) {
     largest_ = std::max(largest_, sizeOf(o));
@@ -266,24 +268,6 @@ World<S>::World(std::vector<Object<S>> moving_objects, std::vector<Object<S>> fi
       }
     }
   }
-}
-
-template <typename S>
-void World<S>::fillRows() {
-  const auto fill = [this](std::vector<double>& row, auto&& of) {
-    row.assign(roomFor(moving.size()), 0);
-    for (std::size_t i = 0; i < moving.size(); ++i) row[i] = of(moving[i].bounds);
-  };
-  rows.moving = moving.size();
-  for (int k = 0; k < 3; ++k) {
-    fill(rows.center[k], [k](const Bounds& b) { return b.center[k]; });
-    fill(rows.half[k], [k](const Bounds& b) { return b.half[k]; });
-    for (int j = 0; j < 3; ++j) fill(rows.axes[k][j], [k, j](const Bounds& b) { return b.axes(j, k); });
-  }
-  fill(rows.reach, [](const Bounds& b) { return b.reach; });
-  fill(rows.radius, [](const Bounds& b) { return b.radius; });
-  fill(rows.size,
-       [](const Bounds& b) { return b.kind == Bounds::kBox ? b.size : std::numeric_limits<double>::infinity(); });
 }
 
 template <typename S>

@@ -84,7 +84,6 @@ class World {
   // box's, if it is known.
   Box boxAt(const Object<S>& object, const fcl::Transform3<S>& X_WG, double orthogonality_error,
             double reach = 0) const;
-  void fillRows();
   std::int32_t build(std::vector<std::uint32_t>& order, std::vector<std::pair<std::size_t, std::size_t>> parts,
                      const std::vector<Box>& boxes, const std::vector<Object<S>>& objects);
 

@@ -54,24 +54,6 @@ struct PoseRows : test::EveryTarget {
     return all;
   }
 
-  static BoundsRows rowsOf(const std::vector<Bounds>& bounds) {
-    BoundsRows rows;
-    rows.moving = bounds.size();
-    const auto fill = [&](std::vector<double>& row, auto&& of) {
-      row.assign(roomFor(bounds.size()), 0);
-      for (std::size_t i = 0; i < bounds.size(); ++i) row[i] = of(bounds[i]);
-    };
-    for (int k = 0; k < 3; ++k) {
-      fill(rows.center[k], [k](const Bounds& b) { return b.center[k]; });
-      fill(rows.half[k], [k](const Bounds& b) { return b.half[k]; });
-      for (int j = 0; j < 3; ++j) fill(rows.axes[k][j], [k, j](const Bounds& b) { return b.axes(j, k); });
-    }
-    fill(rows.reach, [](const Bounds& b) { return b.reach; });
-    fill(rows.radius, [](const Bounds& b) { return b.radius; });
-    fill(rows.size, [](const Bounds& b) { return b.size; });
-    return rows;
-  }
-
   template <typename S>
   void findsTheFirstThatIsNotRigid() {
     for (std::size_t moving = 1; moving <= kMostMoving; ++moving) {
@@ -147,15 +129,13 @@ struct PoseRows : test::EveryTarget {
 
   template <typename S>
   void boxesHoldTheirObjects() {
-    const double nowhere = std::numeric_limits<double>::infinity();
     for (std::size_t moving = 1; moving <= kMostMoving; ++moving) {
       for (int turn = 0; turn < 8; ++turn) {
-        const std::vector<Bounds> bounds = someBounds(moving);
-        BoundsRows rows = rowsOf(bounds);
+        std::vector<Bounds> bounds = someBounds(moving);
         auto X = states<S>(1, moving);
         std::vector<double> errors(roomFor(moving), 1e-9), reach(roomFor(moving), 0);
         const std::size_t odd = static_cast<std::size_t>(turn) % moving;
-        if (turn == 1) rows.size[odd] = nowhere;
+        if (turn == 1) bounds[odd].kind = Bounds::kNowhere;
         if (turn == 2) X[odd].translation().x() = S(3e12);
         if (turn == 3) errors[odd] = 2 * kFineError;
         if (turn == 4) reach[odd] = 0.25;
@@ -163,9 +143,9 @@ struct PoseRows : test::EveryTarget {
         const Eigen::Vector3d origin = vector(3);
         std::vector<BoxGroup> groups((moving + 7) / 8 + 1);
         std::vector<std::uint32_t> others(moving);
-        const std::size_t count =
-            placeBoxes(X[0].matrix().data(), rows, {errors.data(), reach.data(), {origin[0], origin[1], origin[2]}, 2},
-                       groups.data(), others.data());
+        const std::size_t count = placeBoxes(X[0].matrix().data(), rowsOf(bounds),
+                                             {errors.data(), reach.data(), {origin[0], origin[1], origin[2]}, 2},
+                                             groups.data(), others.data());
         ASSERT_EQ(count, is_other ? 1u : 0u) << turn;
         if (is_other) {
           EXPECT_EQ(others[0], odd);
