@@ -5,9 +5,10 @@
 # {with <bocst/fcl.h>, without} x {-O0, -O2, -O3} x {static, shared libbocst} x {libbocst before libfcl, after}.
 # Each must answer rightly, or refuse with the remedy; the ones with libbocst before libfcl, and the static ones, must answer.
 #
-# And once for float, of which libfcl has no code, so that the order does not matter.
+# advancement.cpp, in which the compiler makes FCL's largest table, takes ten times as long as program.cpp: -O0 with the
+# header and -O2 without it. And float once, of which libfcl has no code, so that the order does not matter.
 #
-# matrix.sh SOURCE WORK STATIC_LIB SHARED_LIB LIBFCL CXX [FLAG...]
+# matrix.sh SOURCE_DIR WORK STATIC_LIB SHARED_LIB LIBFCL CXX [FLAG...]
 #   WORK: a directory for what is built here; FLAG: include directories, libraries of FCL, sanitizers.
 set -euo pipefail
 
@@ -28,10 +29,8 @@ mkdir -p "$work"
 shared_dir=$(dirname "$shared_lib")
 failed=0
 
-compile() { # object flags...
-  local object=$1
-  shift
-  "${launcher[@]}" "${compiler[@]}" -std=c++17 "${compile_flags[@]}" "$@" -c "$source" -o "$object"
+compile() { # source object flags...
+  "${launcher[@]}" "${compiler[@]}" -std=c++17 "${compile_flags[@]}" "${@:3}" -c "$source/$1.cpp" -o "$work/$2.o"
 }
 
 # Runs a program and compares what it does with what it must do: "answers", or "answers or refuses".
@@ -60,22 +59,34 @@ link_and_check() { # object kind order must
   local name=$kind-$object-$order
   if [[ $kind == static ]]; then bocst=$static_lib; fi
   if [[ $order == before ]]; then libs=("$bocst" "$libfcl"); else libs=("$libfcl" "$bocst"); fi
-  "${compiler[@]}" "${compile_flags[@]}" "$work/$object.o" -o "$work/$name" "${libs[@]}" "${link_flags[@]}" \
+  local advancement=()
+  case $object in
+    O0-*) advancement=("$work/advancement-O0-with.o") ;;
+    O*) advancement=("$work/advancement-O2-without.o") ;;
+  esac
+  "${compiler[@]}" "${compile_flags[@]}" "$work/$object.o" "${advancement[@]}" -o "$work/$name" "${libs[@]}" "${link_flags[@]}" \
     "-Wl,-rpath,$shared_dir"
   check "$name" "$must" "$work/$name"
 }
 
 objects=()
 for optimise in O0 O2 O3; do
-  objects+=("$optimise-with -$optimise -DWITH_HEADER" "$optimise-without -$optimise")
+  objects+=("$optimise-with" "$optimise-without")
 done
-objects+=("float-with -O0 -DWITH_FLOAT -DWITH_HEADER" "float-without -O0 -DWITH_FLOAT")
+objects+=(float-without)
+
+# The longest first.
+sources=("advancement advancement-O2-without -O2" "program float-without -O0 -DWITH_FLOAT"
+  "advancement advancement-O0-with -O0 -DWITH_HEADER")
+for optimise in O0 O2 O3; do
+  sources+=("program $optimise-with -$optimise -DWITH_HEADER" "program $optimise-without -$optimise")
+done
 
 # As many compilers at a time as there are processors; a failure ends the script.
 running=0
-for line in "${objects[@]}"; do
+for line in "${sources[@]}"; do
   read -r -a words <<< "$line"
-  compile "$work/${words[0]}.o" "${words[@]:1}" &
+  compile "${words[@]}" &
   running=$((running + 1))
   if ((running >= $(nproc))); then
     wait -n
@@ -87,8 +98,7 @@ while ((running > 0)); do
   running=$((running - 1))
 done
 
-for line in "${objects[@]}"; do
-  object=${line%% *}
+for object in "${objects[@]}"; do
   for kind in static shared; do
     for order in before after; do
       must=answers

@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: BSD-3-Clause
 //
 // A planner in small: it makes two models and asks FCL about them, with <bocst/fcl.h> (-DWITH_HEADER) or without.
+// continuousCollideConservativeAdvancement is called by advancement.cpp.
 // Exits with 0 when every answer was right, 1 when one was wrong, 3 with the complaint when bocst refused. As a plugin
 // it has planner() for main(). With CHECK_OFF in the environment it turns the check off from code.
 
@@ -16,7 +17,6 @@
 #include <fcl/geometry/shape/box.h>
 #include <fcl/geometry/shape/sphere.h>
 #include <fcl/geometry/shape/triangle_p.h>
-#include <fcl/math/motion/translation_motion.h>
 #include <fcl/narrowphase/collision.h>
 #include <fcl/narrowphase/continuous_collision.h>
 #include <fcl/narrowphase/distance.h>
@@ -27,6 +27,8 @@
 #include <memory>
 #include <stdexcept>
 #include <string>
+
+#include "advancement.h"
 
 #ifdef WITH_FLOAT
 using S = float;
@@ -200,17 +202,9 @@ void run() {
     }
   }
   for (const fcl::GJKSolverType solver : {fcl::GST_LIBCCD, fcl::GST_INDEP}) {
-    const fcl::TranslationMotion<S> still(moved(0), moved(0)), approaching(moved(3), moved(-1)),
-        receding(moved(3), moved(5));
-    fcl::ContinuousCollisionRequest<S> request;
-    request.gjk_solver_type = solver;
-    fcl::ContinuousCollisionResult<S> result;
-    result.is_collide = false;
-    fcl::continuousCollideConservativeAdvancement<S>(a.get(), &still, b.get(), &approaching, request, result);
-    expect(result.is_collide, "continuousCollideConservativeAdvancement of models is not bocst's");
-    result = {};
-    fcl::continuousCollideConservativeAdvancement<S>(a.get(), &still, b.get(), &receding, request, result);
-    expect(!result.is_collide, "continuousCollideConservativeAdvancement of models that recede is not bocst's");
+    expect(advances(*a, *b, 3, -1, solver), "continuousCollideConservativeAdvancement of models is not bocst's");
+    expect(!advances(*a, *b, 3, 5, solver),
+           "continuousCollideConservativeAdvancement of models that recede is not bocst's");
   }
   {
     fcl::CollisionObject<S> object1(box, moved(0)), object2(ball, moved(3)), object3(a, moved(0)),

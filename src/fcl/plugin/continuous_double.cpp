@@ -1,6 +1,24 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #include "fcl/plugin/registration.h"
 
+// Exported by libfcl, which reads its own hidden table there; a plugin that is compiled without optimisation calls it.
+#define BOCST_OWN_ADVANCEMENT(Solver)                                                                              \
+  namespace fcl::detail {                                                                                          \
+  template <>                                                                                                      \
+  BOCST_EXPORT double continuousCollideConservativeAdvancement<Solver<double>>(                                    \
+      const CollisionGeometry<double>* o1, const MotionBase<double>* motion1, const CollisionGeometry<double>* o2, \
+      const MotionBase<double>* motion2, const Solver<double>* solver,                                             \
+      const ContinuousCollisionRequest<double>& request, ContinuousCollisionResult<double>& result) {              \
+    if (bocst::isModel<double>(o1) || bocst::isModel<double>(o2)) {                                                \
+      return bocst::fcl_adapter::advancementEntry(o1, motion1, o2, motion2, solver, request, result);              \
+    }                                                                                                              \
+    return bocst::fcl_adapter::libfcl::conservativeAdvancement(o1, motion1, o2, motion2, solver, request, result); \
+  }                                                                                                                \
+  }
+BOCST_OWN_ADVANCEMENT(GJKSolver_libccd)
+BOCST_OWN_ADVANCEMENT(GJKSolver_indep)
+#undef BOCST_OWN_ADVANCEMENT
+
 // libfcl calls these, too, so they answer every pair.
 template <>
 double fcl::continuousCollide<double>(const CollisionGeometry<double>* o1, const MotionBase<double>* motion1,
