@@ -35,6 +35,14 @@ struct Raw {
   }
 };
 
+/// A rotation that turns the direction `from` to the direction `to`. Eigen's FromTwoVectors compiles for four seconds.
+inline Eigen::Matrix3d turnOnto(const Eigen::Vector3d& from, const Eigen::Vector3d& to) {
+  const Eigen::Vector3d axis = from.cross(to);
+  const double length = axis.norm(), angle = std::atan2(length, from.dot(to));
+  return Eigen::AngleAxisd(angle, length > 0 ? Eigen::Vector3d(axis / length) : from.unitOrthogonal())
+      .toRotationMatrix();
+}
+
 /// A bumpy torus of 2 * n * n triangles, about two units wide.
 inline Raw torus(std::size_t n, double bumps = 0.08) {
   Raw raw;

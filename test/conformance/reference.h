@@ -34,6 +34,18 @@ std::shared_ptr<fcl::BVHModel<BV>> bvh(const Raw& raw) {
   return model;
 }
 
+// Compiled once, in fcl_models.cpp.
+#define BOCST_FCL_MODEL(declaration, BV) \
+  declaration template std::shared_ptr<fcl::BVHModel<fcl::BV>> bvh<fcl::BV>(const Raw&);
+#define BOCST_FCL_MODELS(declaration, S)  \
+  BOCST_FCL_MODEL(declaration, OBBRSS<S>) \
+  BOCST_FCL_MODEL(declaration, OBB<S>)    \
+  BOCST_FCL_MODEL(declaration, RSS<S>)    \
+  BOCST_FCL_MODEL(declaration, kIOS<S>)   \
+  BOCST_FCL_MODEL(declaration, AABB<S>)
+BOCST_FCL_MODELS(extern, float)
+BOCST_FCL_MODELS(extern, double)
+
 template <typename S>
 bool touching(const fcl::CollisionGeometry<S>& a, const fcl::Transform3<S>& X_WA, const fcl::CollisionGeometry<S>& b,
               const fcl::Transform3<S>& X_WB) {

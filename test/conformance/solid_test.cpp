@@ -301,8 +301,7 @@ TEST(SolidModel, WhatReachesInWithItsFarthestPieceCollides) {
   const fcl::Transform3d I = fcl::Transform3d::Identity();
   for (const double depth : {-0.01, 0.01}) {
     // The way leads along x, into the face at 0.
-    const Eigen::Matrix3d R =
-        Eigen::Quaterniond::FromTwoVectors(direction, Eigen::Vector3d::UnitX()).toRotationMatrix();
+    const Eigen::Matrix3d R = test::turnOnto(direction, Eigen::Vector3d::UnitX());
     const auto X = test::pose<double>(R, Eigen::Vector3d(depth, 0.5, 0.5) - R * (9 * direction));
     for (const fcl::CollisionGeometryd* partner : {static_cast<const fcl::CollisionGeometryd*>(&model),
                                                    static_cast<const fcl::CollisionGeometryd*>(bvh.get())}) {

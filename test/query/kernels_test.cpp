@@ -138,8 +138,7 @@ TEST_P(EveryTarget, NoOctantIsLostThatSharesAPointInFramesOfTheRoots) {
       const double scale = v.norm() / w.norm();
       if (PairFrames::fits(scale)) {
         to.scale = scale;
-        to.rotation =
-            (Eigen::Quaterniond::FromTwoVectors(w, v) * Eigen::AngleAxisd(3 * u(g), w.normalized())).toRotationMatrix();
+        to.rotation = test::turnOnto(w, v) * Eigen::AngleAxisd(3 * u(g), w.normalized()).toRotationMatrix();
       }
     }
     if (round % 8 == 1) {

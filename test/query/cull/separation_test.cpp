@@ -229,7 +229,7 @@ TEST(Outline, HoldsTheSurfaceBeforeAndAfterTheWholeBuild) {
   }
   // A rod along a diagonal of its frame is far thinner than its box.
   test::Raw rod = test::box({0, 0, 0}, {1, 0.01, 0.01});
-  const Eigen::Matrix3d R = Eigen::Quaterniond::FromTwoVectors(Vector3d::UnitX(), Vector3d(1, 1, 1)).toRotationMatrix();
+  const Eigen::Matrix3d R = test::turnOnto(Vector3d::UnitX(), Vector3d(1, 1, 1));
   for (Vector3d& v : rod.vertices) v = R * v;
   const Side a(rod), b(rod);
   learnSupports(a, b);
