@@ -9,6 +9,7 @@
 
 #include "conformance/reference.h"
 #include "geometry/triangle.h"
+#include "sanitized.h"
 
 namespace bocst {
 namespace {
@@ -500,7 +501,7 @@ TEST(CollideConservative, NeverMissesAndTightensWithDepth) {
         std::mt19937_64 g(6);
         std::uniform_real_distribution<double> u(0, 1);
         int alarms = 0;
-        for (int i = 0; i < 120; ++i) {
+        for (int i = 0; i < test::repetitions(120); ++i) {
           const auto X = test::pose<double>(test::randomRotation(g), {1, 2, 3});
           const auto Y = test::pose<double>(test::randomRotation(g),
                                             X.translation() + test::randomDirection(g) * (0.8 + 1.6 * u(g)));

@@ -7,6 +7,7 @@
 
 #include "conformance/reference.h"
 #include "geometry/triangle.h"
+#include "sanitized.h"
 
 namespace bocst {
 namespace {
@@ -327,7 +328,7 @@ TEST(DistanceConservative, IsNeverMoreAndNearerWithDepth) {
   std::mt19937_64 g(6);
   const auto I = fcl::Transform3d(fcl::Transform3d::Identity());
   for (const Subdivision subdivision : {Subdivision::kOctree, Subdivision::kBono}) {
-    for (int i = 0; i < 5; ++i) {
+    for (int i = 0; i < test::repetitions(5); ++i) {
       const auto Y = test::pose<double>(test::randomRotation(g), test::randomDirection(g) * (2.2 + 0.5 * i));
       const double exact = ask<double>(exact_a, I, exact_b, Y).min_distance;
       double before = -1;

@@ -9,6 +9,7 @@
 
 #include "conformance/reference.h"
 #include "conformance/shapes.h"
+#include "sanitized.h"
 
 namespace bocst {
 namespace {
@@ -105,7 +106,7 @@ TEST(Threads, QueriesWhileEverythingIsExpanded) {
       }
     });
   }
-  for (int i = 0; i < 60; ++i) a.expandAll(7);
+  for (int i = 0; i < test::repetitions(60); ++i) a.expandAll(7);
   done = true;
   for (std::thread& t : threads) t.join();
   EXPECT_EQ(wrong, 0);

@@ -14,6 +14,7 @@
 
 #include "oracle/cpu/kernels.h"
 #include "oracle/gl/device_oracle.h"
+#include "sanitized.h"
 #include "surfaces.h"
 #include "tree/root_grid.h"
 
@@ -204,6 +205,7 @@ TEST_P(EveryOracle, NothingMissedAgainstIntegers) {
   // Corners on a grid of 2^-8 units, many of them on faces, edges and corners of cells.
   std::mt19937_64 g(9);
   constexpr int kFine = 8;
+  const auto triangles = static_cast<std::uint32_t>(test::repetitions(400));
   std::uint64_t touching = 0;
   for (int round = 0; round < 12; ++round) {
     const int level = 3 + round;  // of the octants
@@ -217,7 +219,7 @@ TEST_P(EveryOracle, NothingMissedAgainstIntegers) {
     }
     const std::int64_t middle = whole / 2;
     std::vector<IntVec> corners;
-    for (int t = 0; t < 400; ++t) {
+    for (std::uint32_t t = 0; t < triangles; ++t) {
       for (int k = 0; k < 3; ++k) {
         IntVec v;
         for (int c = 0; c < 3; ++c) {
@@ -234,10 +236,10 @@ TEST_P(EveryOracle, NothingMissedAgainstIntegers) {
     }
     const Surface surface = residentOn(*oracle_, surfaceOf(raw));
     ASSERT_EQ(surface.lattice.unit(), 1);
-    std::vector<std::uint32_t> ids(400);
-    for (std::uint32_t t = 0; t < 400; ++t) ids[t] = t + 2;
+    std::vector<std::uint32_t> ids(triangles);
+    for (std::uint32_t t = 0; t < triangles; ++t) ids[t] = t + 2;
     std::vector<ExpansionRequest> batch;
-    for (std::uint32_t t = 0; t < 400; ++t) {
+    for (std::uint32_t t = 0; t < triangles; ++t) {
       for (int o = 0; o < 8; ++o) {  // the eight cells of the level above about the middle
         const std::uint32_t at = 1u << (level - 3);
         ExpansionRequest e;
@@ -263,7 +265,7 @@ TEST_P(EveryOracle, NothingMissedAgainstIntegers) {
       }
     }
   }
-  EXPECT_GT(touching, 10000u);
+  EXPECT_GT(touching, 25 * triangles);
 }
 
 /// A multiple of 2^-20, so that sums about a place of a lattice are exact.

@@ -14,6 +14,7 @@
 #include "meshes.h"
 #include "oracle/reference.h"
 #include "query/sides/side.h"
+#include "sanitized.h"
 
 namespace bocst {
 namespace {
@@ -235,7 +236,7 @@ TEST(Tree, AnswersDoNotDependOnDecay) {
   Modeld a(test::torus(60).mesh(), options), b(test::torus(60).mesh(), options);
   std::mt19937_64 g(4);
   std::uniform_real_distribution<double> u(0, 1);
-  for (int i = 0; i < 200; ++i) {
+  for (int i = 0; i < test::repetitions(200); ++i) {
     const Eigen::Vector3d p = test::randomDirection(g) * 2.2 * u(g);
     clock.now += milliseconds(static_cast<int>(3000 * u(g)));
     if (i % 3 == 0) a.prune();
@@ -250,7 +251,7 @@ TEST(Tree, StaysWithinItsBudget) {
   Modeld a(mesh, options), b(mesh);
   std::mt19937_64 g(8);
   std::uniform_real_distribution<double> u(0, 1);
-  for (int i = 0; i < 100; ++i) {
+  for (int i = 0; i < test::repetitions(100); ++i) {
     const Eigen::Vector3d p = test::randomDirection(g) * 2.2 * u(g);
     EXPECT_EQ(touching(a, b, p), touching(Modeld(mesh), Modeld(mesh), p));
     EXPECT_LE(a.statistics().resident_bytes, options.memory_budget);
@@ -600,10 +601,10 @@ TEST(Tree, ConservativeTreesStopAtTheirDepth) {
 }
 
 TEST(Tree, DeepAndDenseMeshesStayBounded) {
-  // 2^20 triangles in one cell of the finest level, and one far away that makes the lattice coarse.
+  // A million triangles in one cell of the finest level, and one far away that makes the lattice coarse.
   test::Raw raw;
   raw.vertices = {{0, 0, 0}, {1e-9, 0, 0}, {0, 1e-9, 0}, {1, 1, 1}, {1, 1, 0.9}, {1, 0.9, 1}};
-  raw.triangles.assign(std::size_t{1} << 20, fcl::Triangle(0, 1, 2));
+  raw.triangles.assign(static_cast<std::size_t>(test::repetitions(1 << 20)), fcl::Triangle(0, 1, 2));
   raw.triangles.emplace_back(3, 4, 5);
   Modeld a(raw.mesh()), b(test::box({-0.5, -0.5, 0}, {0.5, 0.5, 0.5}).mesh());
   EXPECT_TRUE(touching(a, b, {0, 0, 0}));
