@@ -7,6 +7,7 @@
 
 #include <bocst/export.h>
 #include <fcl/narrowphase/collision.h>
+#include <fcl/narrowphase/continuous_collision.h>
 #include <fcl/narrowphase/distance.h>
 
 #define BOCST_FCL_COLLIDE_SOLVER(prefix, S, Solver)                                                  \
@@ -38,6 +39,10 @@
                                                   const fcl::DistanceRequest<S>&, fcl::DistanceResult<S>&);       \
   prefix template BOCST_EXPORT S fcl::distance<S>(const fcl::CollisionObject<S>*, const fcl::CollisionObject<S>*, \
                                                   const fcl::DistanceRequest<S>&, fcl::DistanceResult<S>&);
+#define BOCST_FCL_ADVANCEMENT(prefix, S)                                                             \
+  prefix template BOCST_EXPORT S fcl::continuousCollideConservativeAdvancement<S>(                   \
+      const fcl::CollisionGeometry<S>*, const fcl::MotionBase<S>*, const fcl::CollisionGeometry<S>*, \
+      const fcl::MotionBase<S>*, const fcl::ContinuousCollisionRequest<S>&, fcl::ContinuousCollisionResult<S>&);
 
 BOCST_FCL_COLLIDE_SOLVER(extern, float, GJKSolver_libccd)
 BOCST_FCL_COLLIDE_SOLVER(extern, float, GJKSolver_indep)
@@ -49,3 +54,4 @@ BOCST_FCL_DISTANCE_SOLVER(extern, float, GJKSolver_indep)
 BOCST_FCL_DISTANCE_SOLVER(extern, double, GJKSolver_libccd)
 BOCST_FCL_DISTANCE_SOLVER(extern, double, GJKSolver_indep)
 BOCST_FCL_DISTANCE(extern, float)
+BOCST_FCL_ADVANCEMENT(extern, double)

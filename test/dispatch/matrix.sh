@@ -5,8 +5,8 @@
 # {with <bocst/fcl.h>, without} x {-O0, -O2, -O3} x {static, shared libbocst} x {libbocst before libfcl, after}.
 # Each must answer rightly, or refuse with the remedy; the ones with libbocst before libfcl, and the static ones, must answer.
 #
-# advancement.cpp, in which the compiler makes FCL's largest table, takes ten times as long as program.cpp: -O0 with the
-# header and -O2 without it. And float once, of which libfcl has no code, so that the order does not matter.
+# advancement.cpp without the header, in which the compiler makes FCL's largest table, takes ten times as long as
+# program.cpp: -O2 (plugins.sh has -O0). And float once, of which libfcl has no code, so that the order does not matter.
 #
 # matrix.sh SOURCE_DIR WORK STATIC_LIB SHARED_LIB LIBFCL CXX [FLAG...]
 #   WORK: a directory for what is built here; FLAG: include directories, libraries of FCL, sanitizers.
@@ -61,7 +61,7 @@ link_and_check() { # object kind order must
   if [[ $order == before ]]; then libs=("$bocst" "$libfcl"); else libs=("$libfcl" "$bocst"); fi
   local advancement=()
   case $object in
-    O0-*) advancement=("$work/advancement-O0-with.o") ;;
+    O*-with) advancement=("$work/advancement-$object.o") ;;
     O*) advancement=("$work/advancement-O2-without.o") ;;
   esac
   "${compiler[@]}" "${compile_flags[@]}" "$work/$object.o" "${advancement[@]}" -o "$work/$name" "${libs[@]}" "${link_flags[@]}" \
@@ -76,10 +76,9 @@ done
 objects+=(float-without)
 
 # The longest first.
-sources=("advancement advancement-O2-without -O2" "program float-without -O0 -DWITH_FLOAT"
-  "advancement advancement-O0-with -O0 -DWITH_HEADER")
+sources=("advancement advancement-O2-without -O2" "program float-without -O0 -DWITH_FLOAT")
 for optimise in O0 O2 O3; do
-  sources+=("program $optimise-with -$optimise -DWITH_HEADER" "program $optimise-without -$optimise")
+  sources+=("advancement advancement-$optimise-with -$optimise -DWITH_HEADER" "program $optimise-with -$optimise -DWITH_HEADER" "program $optimise-without -$optimise")
 done
 
 # As many compilers at a time as there are processors; a failure ends the script.

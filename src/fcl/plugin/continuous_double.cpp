@@ -1,19 +1,44 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #include "fcl/plugin/registration.h"
 
-// Exported by libfcl, which reads its own hidden table there; a plugin that is compiled without optimisation calls it.
-#define BOCST_OWN_ADVANCEMENT(Solver)                                                                              \
-  namespace fcl::detail {                                                                                          \
-  template <>                                                                                                      \
-  BOCST_EXPORT double continuousCollideConservativeAdvancement<Solver<double>>(                                    \
-      const CollisionGeometry<double>* o1, const MotionBase<double>* motion1, const CollisionGeometry<double>* o2, \
-      const MotionBase<double>* motion2, const Solver<double>* solver,                                             \
-      const ContinuousCollisionRequest<double>& request, ContinuousCollisionResult<double>& result) {              \
-    if (bocst::isModel<double>(o1) || bocst::isModel<double>(o2)) {                                                \
-      return bocst::fcl_adapter::advancementEntry(o1, motion1, o2, motion2, solver, request, result);              \
-    }                                                                                                              \
-    return bocst::fcl_adapter::libfcl::conservativeAdvancement(o1, motion1, o2, motion2, solver, request, result); \
-  }                                                                                                                \
+namespace {
+
+using Geometry = fcl::CollisionGeometry<double>;
+using Motion = fcl::MotionBase<double>;
+using Request = fcl::ContinuousCollisionRequest<double>;
+using Result = fcl::ContinuousCollisionResult<double>;
+
+template <typename Solver>
+double advance(const Geometry* o1, const Motion* motion1, const Geometry* o2, const Motion* motion2,
+               const Solver* solver, const Request& request, Result& result) {
+  if (bocst::isModel<double>(o1) || bocst::isModel<double>(o2)) {
+    return bocst::fcl_adapter::advancementEntry(o1, motion1, o2, motion2, solver, request, result);
+  }
+  return bocst::fcl_adapter::libfcl::conservativeAdvancement(o1, motion1, o2, motion2, solver, request, result);
+}
+
+}  // namespace
+
+template <>
+double fcl::continuousCollideConservativeAdvancement<double>(const Geometry* o1, const Motion* motion1,
+                                                             const Geometry* o2, const Motion* motion2,
+                                                             const Request& request, Result& result) {
+  if (request.gjk_solver_type == GST_INDEP) {
+    const detail::GJKSolver_indep<double> solver;
+    return ::advance(o1, motion1, o2, motion2, &solver, request, result);
+  }
+  const detail::GJKSolver_libccd<double> solver;
+  return ::advance(o1, motion1, o2, motion2, &solver, request, result);
+}
+
+// libfcl exports these, too, and reads its own hidden table in them. Code that is compiled without optimisation and
+// without <bocst/fcl.h> calls them.
+#define BOCST_OWN_ADVANCEMENT(Solver)                                                                     \
+  template <>                                                                                             \
+  BOCST_EXPORT double fcl::detail::continuousCollideConservativeAdvancement<fcl::detail::Solver<double>>( \
+      const Geometry* o1, const Motion* motion1, const Geometry* o2, const Motion* motion2,               \
+      const fcl::detail::Solver<double>* solver, const Request& request, Result& result) {                \
+    return ::advance(o1, motion1, o2, motion2, solver, request, result);                                  \
   }
 BOCST_OWN_ADVANCEMENT(GJKSolver_libccd)
 BOCST_OWN_ADVANCEMENT(GJKSolver_indep)

@@ -57,6 +57,16 @@ BOCST_OWN_COLLIDE(GJKSolver_libccd)
 BOCST_OWN_COLLIDE(GJKSolver_indep)
 #undef BOCST_OWN_COLLIDE
 
+// As it would call what libfcl exports, which reads a table of its own.
+template <typename S>
+S continuousCollideConservativeAdvancement(const CollisionGeometry<S>*, const MotionBase<S>*,
+                                           const CollisionGeometry<S>*, const MotionBase<S>*,
+                                           const ContinuousCollisionRequest<S>&, ContinuousCollisionResult<S>&);
+template <>
+BOCST_EXPORT double continuousCollideConservativeAdvancement<double>(
+    const CollisionGeometry<double>*, const MotionBase<double>*, const CollisionGeometry<double>*,
+    const MotionBase<double>*, const ContinuousCollisionRequest<double>&, ContinuousCollisionResult<double>&);
+
 // Three of its four solvers do not look into any table. So both functions are ours, for double (float is in no libfcl);
 // they must be declared before FCL says that they are libfcl's.
 template <typename S>
