@@ -10,14 +10,16 @@
 #include <fcl/narrowphase/continuous_collision.h>
 #include <fcl/narrowphase/distance.h>
 
+#define BOCST_FCL_COLLIDE_OBJECTS(prefix, S, Solver)                                                 \
+  prefix template BOCST_EXPORT std::size_t fcl::collide<S, fcl::detail::Solver<S>>(                  \
+      const fcl::CollisionObject<S>*, const fcl::CollisionObject<S>*, const fcl::detail::Solver<S>*, \
+      const fcl::CollisionRequest<S>&, fcl::CollisionResult<S>&);
 #define BOCST_FCL_COLLIDE_SOLVER(prefix, S, Solver)                                                  \
   prefix template BOCST_EXPORT std::size_t fcl::collide<S, fcl::detail::Solver<S>>(                  \
       const fcl::CollisionGeometry<S>*, const fcl::Transform3<S>&, const fcl::CollisionGeometry<S>*, \
       const fcl::Transform3<S>&, const fcl::detail::Solver<S>*, const fcl::CollisionRequest<S>&,     \
       fcl::CollisionResult<S>&);                                                                     \
-  prefix template BOCST_EXPORT std::size_t fcl::collide<S, fcl::detail::Solver<S>>(                  \
-      const fcl::CollisionObject<S>*, const fcl::CollisionObject<S>*, const fcl::detail::Solver<S>*, \
-      const fcl::CollisionRequest<S>&, fcl::CollisionResult<S>&);
+  BOCST_FCL_COLLIDE_OBJECTS(prefix, S, Solver)
 #define BOCST_FCL_COLLIDE(prefix, S)                                                                 \
   prefix template BOCST_EXPORT std::size_t fcl::collide<S>(                                          \
       const fcl::CollisionGeometry<S>*, const fcl::Transform3<S>&, const fcl::CollisionGeometry<S>*, \

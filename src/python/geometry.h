@@ -65,7 +65,7 @@ FairSharedMutex& octreeMutex();
 /// The same where octrees may be read. Calls nothing of Python.
 class NoGilWithOctrees {
  private:
-  const NoGil released_;
+  const NoGil released_{};
   const std::shared_lock<FairSharedMutex> octrees_{octreeMutex()};
 };
 

@@ -88,12 +88,12 @@ std::vector<std::uint32_t> PackedTriangles::pack(const oracle::Surface& surface,
   const double inverse_step = std::ldexp(1.0, -exponent);
 
   const auto stepsOf = [&](const Eigen::Vector3d& place) {
-    std::uint64_t steps = 0;
+    std::uint64_t all = 0;
     for (int c = 2; c >= 0; --c) {
       const double exact = std::min(std::max((place[c] - origin[c]) * inverse_step, 0.0), kMost);
-      steps = steps << 16 | static_cast<std::uint16_t>(exact + 0.5);
+      all = all << 16 | static_cast<std::uint16_t>(exact + 0.5);
     }
-    return steps;
+    return all;
   };
   Numbers different;
   std::array<std::uint8_t, kMostPlaces> place_of;

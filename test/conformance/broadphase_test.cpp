@@ -169,8 +169,8 @@ TYPED_TEST_SUITE(Broadphase, Managers);
 
 template <typename Manager>
 struct ScalarOf;
-template <template <typename> class Manager, typename S>
-struct ScalarOf<Manager<S>> {
+template <template <typename...> class Manager, typename S, typename... Others>
+struct ScalarOf<Manager<S, Others...>> {
   using type = S;
 };
 

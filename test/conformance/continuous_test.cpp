@@ -627,7 +627,9 @@ TYPED_TEST(Continuous, NoShapeIsSteppedOverOnRandomWays) {
   const Raw raw = test::torus(16);
   const Model<S> a(raw.mesh());
   std::mt19937_64 g(21);
-  for (const auto& [name, shape] : test::shapes<S>()) {
+  for (const auto& entry : test::shapes<S>()) {
+    const std::string& name = entry.name;
+    const auto& shape = entry.shape;
     SCOPED_TRACE(name);
     int hits = 0;
     const int rounds = 24;
@@ -833,8 +835,10 @@ TEST(ContinuousDouble, MarginsAndSolidsWithShapes) {
   const fcl::Transform3d I = identity<double>();
   const auto at = [&](double x) { return test::pose<double>(I.linear(), {x, 0.3, 0.4}); };
   const auto r = request<double>(fcl::CCDM_LINEAR, 1e-6);
-  for (const auto& [partner, left] : {std::pair(static_cast<const fcl::CollisionGeometryd*>(&ball), 0.125),
-                                      std::pair(static_cast<const fcl::CollisionGeometryd*>(octree.get()), 0.0)}) {
+  for (const auto& entry : {std::pair(static_cast<const fcl::CollisionGeometryd*>(&ball), 0.125),
+                            std::pair(static_cast<const fcl::CollisionGeometryd*>(octree.get()), 0.0)}) {
+    const auto& partner = entry.first;
+    const double left = entry.second;
     for (const bool turned : {false, true}) {
       const auto ask = [&](const fcl::CollisionGeometryd* model, double from, double to) {
         const Ways<double> ways{model, I, I, partner, at(from), at(to)};

@@ -23,7 +23,6 @@ using test::NamedShape;
 using test::Raw;
 using test::Truth;
 
-constexpr double kFar = std::numeric_limits<double>::infinity();
 constexpr fcl::GJKSolverType kSolvers[] = {fcl::GST_LIBCCD, fcl::GST_INDEP};
 
 /// What FCL's solvers may be off by: their tolerance, and rounding.
@@ -88,7 +87,9 @@ TYPED_TEST(Shapes, VerdictsAndTrianglesEqualFclsWhereFclIsRight) {
   using S = TypeParam;
   const Raw raw = test::torus(14);
   const auto theirs = test::bvh<fcl::OBBRSS<S>>(raw);
-  for (const auto& [name, shape] : test::shapes<S>()) {
+  for (const auto& entry : test::shapes<S>()) {
+    const std::string& name = entry.name;
+    const auto& shape = entry.shape;
     SCOPED_TRACE(name);
     shape->computeLocalAABB();
     const Model<S> model(raw.mesh());
@@ -128,7 +129,9 @@ TYPED_TEST(Shapes, VerdictsAndTrianglesEqualFclsWhereFclIsRight) {
 TYPED_TEST(Shapes, ContactsPartWhatTouches) {
   using S = TypeParam;
   const Raw raw = test::torus(14);
-  for (const auto& [name, shape] : test::shapes<S>()) {
+  for (const auto& entry : test::shapes<S>()) {
+    const std::string& name = entry.name;
+    const auto& shape = entry.shape;
     SCOPED_TRACE(name);
     const Model<S> model(raw.mesh());
     const Truth<S> truth(raw, *shape);
@@ -228,7 +231,9 @@ TEST(ShapesDouble, CostsEqualFcls) {
   const Raw raw = test::torus(24);
   const auto theirs = test::bvh<fcl::OBBRSSd>(raw);
   const auto boxed = test::bvh<fcl::AABBd>(raw);  // whose box about the mesh is ours
-  for (const auto& [name, shape] : test::shapes<double>()) {
+  for (const auto& entry : test::shapes<double>()) {
+    const std::string& name = entry.name;
+    const auto& shape = entry.shape;
     if (name == "triangle") continue;
     SCOPED_TRACE(name);
     shape->computeLocalAABB();
@@ -295,7 +300,9 @@ TEST(ShapesDouble, CostsEqualFcls) {
 TYPED_TEST(Shapes, ConservativeAnswersMissNothing) {
   using S = TypeParam;
   const Raw raw = test::torus(14);
-  for (const auto& [name, shape] : test::shapes<S>()) {
+  for (const auto& entry : test::shapes<S>()) {
+    const std::string& name = entry.name;
+    const auto& shape = entry.shape;
     SCOPED_TRACE(name);
     const Truth<S> truth(raw, *shape);
     for (const Subdivision subdivision : {Subdivision::kOctree, Subdivision::kBono}) {
@@ -360,7 +367,9 @@ TYPED_TEST(Shapes, DistancesEqualThoseOfAllTriangles) {
   const Raw raw = test::torus(14);
   const auto theirs = test::bvh<fcl::OBBRSS<S>>(raw);
   const double off = std::is_same<S, double>::value ? 2e-9 : 2e-5;
-  for (const auto& [name, shape] : test::shapes<S>()) {
+  for (const auto& entry : test::shapes<S>()) {
+    const std::string& name = entry.name;
+    const auto& shape = entry.shape;
     SCOPED_TRACE(name);
     shape->computeLocalAABB();
     const Model<S> model(raw.mesh());
@@ -449,7 +458,9 @@ TYPED_TEST(Shapes, ConservativeDistancesAreNeverMore) {
   Options options;
   options.answer = Answer::kConservative;
   options.depth = 6;
-  for (const auto& [name, shape] : test::shapes<S>()) {
+  for (const auto& entry : test::shapes<S>()) {
+    const std::string& name = entry.name;
+    const auto& shape = entry.shape;
     SCOPED_TRACE(name);
     const Model<S> model(raw.mesh(), options);
     const Truth<S> truth(raw, *shape);
@@ -514,7 +525,9 @@ TEST(ShapesDouble, DegenerateMeshes) {
     const Modeld model(raw.mesh());
     std::mt19937_64 g(6);
     std::uniform_real_distribution<double> u(-1, 2);
-    for (const auto& [name, shape] : test::shapes<double>()) {
+    for (const auto& entry : test::shapes<double>()) {
+      const std::string& name = entry.name;
+      const auto& shape = entry.shape;
       SCOPED_TRACE(name);
       const Truth<double> truth(raw, *shape);
       int hits = 0;
@@ -645,7 +658,9 @@ TEST(ShapesDouble, WhatIsWhollyInsideASolidTouchesIt) {
   raw.scale(0.01);
   const Modeld model(raw.mesh());
   const auto I = test::pose<double>(Eigen::Matrix3d::Identity(), {0, 0, 0});
-  for (const auto& [name, shape] : test::shapes<double>()) {
+  for (const auto& entry : test::shapes<double>()) {
+    const std::string& name = entry.name;
+    const auto& shape = entry.shape;
     if (name == "plane" || name == "triangle" || name == "half-space") continue;
     SCOPED_TRACE(name);
     EXPECT_TRUE(test::touching<double>(model, I, *shape, I)) << "a shape is solid";

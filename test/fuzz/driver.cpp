@@ -52,7 +52,6 @@ Input read(const fs::path& file) {
 
 // What is being run, for the handler of signals.
 Input current;
-void (*volatile next_handler)(int) = SIG_DFL;
 char crash_file[512];
 
 extern "C" void onCrash(int signal) {

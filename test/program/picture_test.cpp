@@ -291,7 +291,7 @@ TEST(PictureDevice, IsTheOraclesOne) {
     EXPECT_NE(std::string(e.what()).find("no picture can be drawn: there is no device 99"), std::string::npos)
         << e.what();
   }
-  EXPECT_NO_THROW(Renderer(OracleKind::kCpu));
+  EXPECT_NO_THROW(Renderer{OracleKind::kCpu});
   ::setenv("BOCST_ORACLE", "0", 1);
   EXPECT_FALSE(Renderer(OracleKind::kAuto).device().empty());
   kept ? ::setenv("BOCST_ORACLE", kept->c_str(), 1) : ::unsetenv("BOCST_ORACLE");

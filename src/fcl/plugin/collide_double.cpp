@@ -57,8 +57,8 @@ fcl::detail::CollisionFunctionMatrix<fcl::detail::GJKSolver_indep<double>>::Coll
                                 fclCollides);
 }
 
-BOCST_FCL_COLLIDE_SOLVER(, double, GJKSolver_libccd)
-BOCST_FCL_COLLIDE_SOLVER(, double, GJKSolver_indep)
+BOCST_FCL_COLLIDE_OBJECTS(, double, GJKSolver_libccd)
+BOCST_FCL_COLLIDE_OBJECTS(, double, GJKSolver_indep)
 // Not fcl::collide<double>: libfcl's own is what checkDispatch() has to see.
 
 template void bocst::fcl_adapter::registerCollide<double>();

@@ -89,17 +89,17 @@ class Function {
 };
 
 template <typename Solver>
-Function collide_function(nullptr);
+Function collide_function{nullptr};
 template <>
-Function collide_function<Libccd>(BOCST_COLLIDE("16GJKSolver_libccd"));
+Function collide_function<Libccd>{BOCST_COLLIDE("16GJKSolver_libccd")};
 template <>
-Function collide_function<Indep>(BOCST_COLLIDE("15GJKSolver_indep"));
+Function collide_function<Indep>{BOCST_COLLIDE("15GJKSolver_indep")};
 template <typename Solver>
-Function advancement_function(nullptr);
+Function advancement_function{nullptr};
 template <>
-Function advancement_function<Libccd>(BOCST_ADVANCE("16GJKSolver_libccd"));
+Function advancement_function<Libccd>{BOCST_ADVANCE("16GJKSolver_libccd")};
 template <>
-Function advancement_function<Indep>(BOCST_ADVANCE("15GJKSolver_indep"));
+Function advancement_function<Indep>{BOCST_ADVANCE("15GJKSolver_indep")};
 Function motions_function(
     "_ZN3fcl17continuousCollideIdEET_PKNS_17CollisionGeometryIS1_EEPKNS_10MotionBaseIS1_EES5_S9_RKNS_26Continuous"
     "CollisionRequestIS1_EERNS_25ContinuousCollisionResultIS1_EE");

@@ -179,12 +179,12 @@ ArmWorld::Joints ArmWorld::randomJoints(Random& random) {
 }
 
 std::vector<ArmWorld::Joints> ArmWorld::edge(const Joints& from, const Joints& to) {
-  constexpr double kStep = 0.02, kLongest = 1;
+  constexpr double kJointStep = 0.02, kLongest = 1;
   double squared = 0;
   for (std::size_t i = 0; i < kJoints; ++i) squared += (to[i] - from[i]) * (to[i] - from[i]);
   const double length = std::sqrt(squared);
   std::vector<Joints> states;
-  for (double way = kStep; way <= std::min(length, kLongest); way += kStep) {
+  for (double way = kJointStep; way <= std::min(length, kLongest); way += kJointStep) {
     Joints q;
     for (std::size_t i = 0; i < kJoints; ++i) q[i] = from[i] + way / length * (to[i] - from[i]);
     states.push_back(q);
