@@ -57,6 +57,8 @@ fcl::detail::CollisionFunctionMatrix<fcl::detail::GJKSolver_indep<double>>::Coll
                                 fclCollides);
 }
 
+BOCST_FCL_TABLE(Collision, GJKSolver_libccd<double>)
+BOCST_FCL_TABLE(Collision, GJKSolver_indep<double>)
 BOCST_FCL_COLLIDE_OBJECTS(, double, GJKSolver_libccd)
 BOCST_FCL_COLLIDE_OBJECTS(, double, GJKSolver_indep)
 // Not fcl::collide<double>: libfcl's own is what checkDispatch() has to see.

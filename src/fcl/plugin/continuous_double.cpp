@@ -106,6 +106,9 @@ fcl::detail::ConservativeAdvancementFunctionMatrix<
                                 fclAdvances);
 }
 
+BOCST_FCL_TABLE(ConservativeAdvancement, GJKSolver_libccd<double>)
+BOCST_FCL_TABLE(ConservativeAdvancement, GJKSolver_indep<double>)
+
 void bocst::fcl_adapter::registerContinuous() {
   using Libccd = fcl::detail::GJKSolver_libccd<double>;
   using Indep = fcl::detail::GJKSolver_indep<double>;

@@ -94,3 +94,9 @@ BOCST_EXPORT double continuousCollide<double>(const CollisionGeometry<double>*, 
 #include <fcl/narrowphase/collision.h>
 #include <fcl/narrowphase/continuous_collision.h>
 #include <fcl/narrowphase/distance.h>
+
+// FCL's declarations of its solvers in double do not say that they are visible, so for Clang nothing made of them is,
+// if this does not say it.
+#define BOCST_FCL_TABLE(Query, Solver)                                           \
+  template BOCST_EXPORT fcl::detail::Query##FunctionMatrix<fcl::detail::Solver>& \
+      fcl::get##Query##FunctionLookTable<fcl::detail::Solver>();
