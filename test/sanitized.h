@@ -17,8 +17,8 @@ constexpr bool kThreadSanitized = true;
 constexpr bool kThreadSanitized = false;
 #endif
 
-/// How often a test asks: a fifth of `times` under sanitizers, which take ten times as long and look for other faults, and
-/// where the tests run once more with another oracle or driver, which draws in software.
+/// How often a test asks: a fifth of `times` under sanitizers, which take ten times as long and look for other faults,
+/// and where the tests run once more with another oracle or driver, which draws in software.
 inline int repetitions(int times) {
   const bool once_more = std::getenv("BOCST_ORACLE") != nullptr || std::getenv("GALLIUM_DRIVER") != nullptr;
   return kSanitized || once_more ? times / 5 : times;
