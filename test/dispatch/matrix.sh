@@ -1,12 +1,11 @@
 #!/bin/bash
 # SPDX-License-Identifier: BSD-3-Clause
 #
-# Does a query about a bocst::Model reach bocst, however the program was built? Builds program.cpp in every way and runs it:
+# Does a query about a bocst::Model reach bocst, however the program was built? Builds it in every way and runs it:
 # {with <bocst/fcl.h>, without} x {-O0, -O2, -O3} x {static, shared libbocst} x {libbocst before libfcl, after}.
 # Each must answer rightly, or refuse with the remedy; the ones with libbocst before libfcl, and the static ones, must answer.
 #
-# advancement.cpp without the header, in which the compiler makes FCL's largest table, takes ten times as long as
-# program.cpp: -O2 (plugins.sh has -O0). And float once, of which libfcl has no code, so that the order does not matter.
+# And once for float, of which libfcl has no code, so that the order does not matter.
 #
 # matrix.sh SOURCE_DIR WORK STATIC_LIB SHARED_LIB LIBFCL CXX [FLAG...]
 #   WORK: a directory for what is built here; FLAG: include directories, libraries of FCL, sanitizers.
@@ -60,10 +59,7 @@ link_and_check() { # object kind order must
   if [[ $kind == static ]]; then bocst=$static_lib; fi
   if [[ $order == before ]]; then libs=("$bocst" "$libfcl"); else libs=("$libfcl" "$bocst"); fi
   local advancement=()
-  case $object in
-    O*-with) advancement=("$work/advancement-$object.o") ;;
-    O*) advancement=("$work/advancement-O2-without.o") ;;
-  esac
+  if [[ $object != float* ]]; then advancement=("$work/advancement-$object.o"); fi
   "${compiler[@]}" "${compile_flags[@]}" "$work/$object.o" "${advancement[@]}" -o "$work/$name" "${libs[@]}" "${link_flags[@]}" \
     "-Wl,-rpath,$shared_dir"
   check "$name" "$must" "$work/$name"
@@ -75,10 +71,13 @@ for optimise in O0 O2 O3; do
 done
 objects+=(float-without)
 
-# The longest first.
-sources=("advancement advancement-O2-without -O2" "program float-without -O0 -DWITH_FLOAT")
+# The longest first: without the header, FCL's whole table of pairs is compiled with advancement.cpp.
+sources=()
+for optimise in O3 O2 O0; do sources+=("advancement advancement-$optimise-without -$optimise"); done
+sources+=("program float-without -O0 -DWITH_FLOAT")
 for optimise in O0 O2 O3; do
-  sources+=("advancement advancement-$optimise-with -$optimise -DWITH_HEADER" "program $optimise-with -$optimise -DWITH_HEADER" "program $optimise-without -$optimise")
+  sources+=("advancement advancement-$optimise-with -$optimise -DWITH_HEADER" "program $optimise-with -$optimise -DWITH_HEADER"
+    "program $optimise-without -$optimise")
 done
 
 # As many compilers at a time as there are processors; a failure ends the script.

@@ -26,7 +26,7 @@ print(bocst.__version__, "in", bocst.__file__)' "$1")
 
 # A copy, so that nothing is left in the source.
 mkdir "$work/source"
-cp -r "$source"/{CMakeLists.txt,LICENSE,README.md,pyproject.toml,setup.py,src} "$work/source"
+cp -r "$source"/{CMakeLists.txt,LICENSE,README.md,pyproject.toml,src} "$work/source"
 BOCST_BUILD=$build "$python" -m pip install --no-build-isolation --no-deps --no-index --no-cache-dir --quiet \
   --root-user-action=ignore --target "$work/pip" "$work/source" >"$work/log" 2>&1 || { cat "$work/log"; exit 1; }
 # What pip installed needs neither the build nor its libraries.

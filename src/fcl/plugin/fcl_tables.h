@@ -57,7 +57,7 @@ BOCST_OWN_COLLIDE(GJKSolver_libccd)
 BOCST_OWN_COLLIDE(GJKSolver_indep)
 #undef BOCST_OWN_COLLIDE
 
-// As it would call what libfcl exports, which reads a table of its own.
+// FCL's own would call a function that libfcl exports, too, and that reads libfcl's hidden table.
 template <typename S>
 S continuousCollideConservativeAdvancement(const CollisionGeometry<S>*, const MotionBase<S>*,
                                            const CollisionGeometry<S>*, const MotionBase<S>*,
@@ -95,8 +95,8 @@ BOCST_EXPORT double continuousCollide<double>(const CollisionGeometry<double>*, 
 #include <fcl/narrowphase/continuous_collision.h>
 #include <fcl/narrowphase/distance.h>
 
-// FCL's declarations of its solvers in double do not say that they are visible, so for Clang nothing made of them is,
-// if this does not say it.
+// FCL declares its solvers in double without a visibility. With -fvisibility=hidden, Clang then hides their tables,
+// too, unless an instance says otherwise.
 #define BOCST_FCL_TABLE(Query, Solver)                                           \
   template BOCST_EXPORT fcl::detail::Query##FunctionMatrix<fcl::detail::Solver>& \
       fcl::get##Query##FunctionLookTable<fcl::detail::Solver>();

@@ -1,15 +1,15 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""The extension module of pyproject.toml's package, built by CMake."""
+"""What pyproject.toml names as its build backend: setuptools, with the extension module built by CMake."""
 import os
 import pathlib
 import re
 import subprocess
 import sys
 
-from setuptools import Extension, setup
+from setuptools import Extension, build_meta, setup
 from setuptools.command.build_ext import build_ext
 
-SOURCE = pathlib.Path(__file__).resolve().parent
+SOURCE = pathlib.Path(__file__).resolve().parents[2]
 
 
 class CMakeBuild(build_ext):
@@ -28,9 +28,17 @@ class CMakeBuild(build_ext):
                         "-DCMAKE_INSTALL_COMPONENT=python", "-P", build / "src/python/cmake_install.cmake"], check=True)
 
 
-setup(
-    version=re.search(r"project\(bocst VERSION ([\d.]+)", (SOURCE / "CMakeLists.txt").read_text()).group(1),
-    ext_modules=[Extension("bocst._bocst", [])],
-    cmdclass={"build_ext": CMakeBuild},
-    options={"build": {"build_base": "build-pip", "build_temp": "build-pip"}},
-)
+class Backend(build_meta._BuildMetaBackend):  # pylint: disable=protected-access
+    """Calls setup() where setuptools would look for a setup.py at the top level."""
+
+    def run_setup(self, setup_script="setup.py"):
+        version = re.search(r"project\(bocst VERSION ([\d.]+)", (SOURCE / "CMakeLists.txt").read_text()).group(1)
+        setup(
+            version=version,
+            ext_modules=[Extension("bocst._bocst", [])],
+            cmdclass={"build_ext": CMakeBuild},
+            options={"build": {"build_base": "build-pip", "build_temp": "build-pip"}},
+        )
+
+
+backend = Backend()
