@@ -17,7 +17,7 @@ class Browser:
     def __init__(self, width=1200, height=800, webgl=True):
         program = shutil.which("chromium") or shutil.which("chromium-browser")
         if program is None:
-            raise RuntimeError("no chromium: tools/install-dependencies --test installs it")
+            raise RuntimeError("no chromium: tools/install-dependencies --all installs it")
         self.complaints = []
         self._profile = tempfile.mkdtemp(prefix="bocst_browser_")
         to_browser, self._out = os.pipe()

@@ -966,10 +966,10 @@ TEST_F(Program, WritesWholeFilesWhenInterrupted) {
     const std::string whole = read(file);
     std::set<bool> seen;
     // Through the whole run and, as no two take equally long, until it got to the end.
-    for (int i = 0; i < 40 || (i < 400 && seen.count(true) == 0); ++i) {
+    for (int i = 0; i < 24 || (i < 400 && seen.count(true) == 0); ++i) {
       fs::remove(file);
       char seconds[16];
-      std::snprintf(seconds, sizeof(seconds), "%.3f", 0.002 + took * i / 32);
+      std::snprintf(seconds, sizeof(seconds), "%.3f", 0.002 + took * i / 20);
       shell(std::string("timeout -s INT ") + seconds + " " + program() + inspect);
       std::set<std::string> left = files();
       seen.insert(left.erase("file") == 1);
