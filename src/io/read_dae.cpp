@@ -161,7 +161,8 @@ class DaeReader {
     }
   }
 
-  /// The geometry that a controller deforms, as it is before.
+  /// The geometry that a controller deforms, as it is before. A skin's bind_shape_matrix belongs to its bones, as in
+  /// assimp and what loads meshes by it.
   pugi::xml_node skinned(const pugi::xml_node& instance) const {
     pugi::xml_node node = target(instance, "url", {"controller"});
     for (int depth = 0; std::string_view(node.name()) == "controller"; ++depth) {

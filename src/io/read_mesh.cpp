@@ -3,9 +3,12 @@
 
 #include <stdexcept>
 
+#include "text.h"
+
 namespace bocst::io {
 
 Polygons readMesh(std::string_view bytes, Format format) {
+  if (format != Format::kStl) bytes = withoutByteOrderMark(bytes);  // a binary STL may begin with any bytes
   switch (format) {
     case Format::kObj:
       return readObj(bytes);

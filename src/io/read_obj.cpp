@@ -70,7 +70,7 @@ class ObjReader {
     }
   }
 
-  /// x y z, then nothing, or w, or a colour, or both.
+  /// x y z, then nothing, or w, or a colour of three or four numbers.
   void readVertex(std::string_view line) {
     double numbers[7];
     std::size_t n = 0;
@@ -82,7 +82,7 @@ class ObjReader {
     }
     Eigen::Vector3d p(numbers[0], numbers[1], numbers[2]);
     if (n == 5) failAt(bytes_, line.data(), what + ": 3, 4, 6 or 7 numbers expected");
-    const double w = n == 4 || n == 7 ? numbers[3] : 1;
+    const double w = n == 4 ? numbers[3] : 1;
     if (w == 0) failAt(bytes_, line.data(), what + ": lies at infinity (w is 0)");
     if (w != 1) p /= w;
     polygons_.vertices.push_back(p);

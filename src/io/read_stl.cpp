@@ -93,12 +93,13 @@ Polygons readText(std::string_view bytes) {
 }  // namespace
 
 Polygons readStl(std::string_view bytes) {
-  // Some binary files begin with "solid", too: their size tells.
+  // Some binary files begin with "solid", too: their size tells, as the same bytes of a text are a huge number.
   const std::size_t count = bytes.size() >= kHead ? number<std::uint32_t>(bytes.substr(kHead - 4), false) : 0;
   const std::size_t needed = kHead + kFacet * count;
   if (bytes.size() >= kHead && bytes.size() == needed) return readBinary(bytes, count);
-  std::string_view rest = bytes;
-  if (equal(takeWord(rest), "solid")) return readText(bytes);
+  const bool is_binary = bytes.size() >= kHead && bytes.size() > needed;
+  std::string_view rest = withoutByteOrderMark(bytes);
+  if (!is_binary && equal(takeWord(rest), "solid")) return readText(withoutByteOrderMark(bytes));
   if (bytes.size() < kHead) throw std::runtime_error("no STL file: neither 'solid' nor a binary header of 84 bytes");
   if (bytes.size() < needed) {
     throw std::runtime_error("truncated: " + std::to_string((bytes.size() - kHead) / kFacet) + " of " +

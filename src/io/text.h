@@ -8,6 +8,11 @@ namespace bocst::io {
 
 constexpr std::string_view kBlanks = " \t\r\n\v\f";
 
+/// Without what some editors put before a text in UTF-8.
+inline std::string_view withoutByteOrderMark(std::string_view text) {
+  return text.substr(text.substr(0, 3) == "\xEF\xBB\xBF" ? 3 : 0);
+}
+
 /// Cuts the next line off `text`, without its end.
 std::string_view takeLine(std::string_view& text);
 

@@ -438,6 +438,23 @@ TEST(ReadObj, RefusesWhatIsNoNumberAndNoIndex) {
   refuse("f 1 3 4", "surf 0 1 0 1 1 2 3", "line 9: free-form surfaces");
 }
 
+TEST(ReadObj, TakesWeightsAndColours) {
+  const auto second = [](const std::string& line) { return readObj(replaced(kObj, "v 1 0 0", line)).vertices.at(1); };
+  EXPECT_EQ(second("v 1 0 0 0.5"), Eigen::Vector3d(2, 0, 0));
+  EXPECT_EQ(second("v 1 0 0 0 0.5 0.5"), Eigen::Vector3d(1, 0, 0));
+  EXPECT_EQ(second("v 1 0 0 0 0.5 0.5 1"), Eigen::Vector3d(1, 0, 0));  // as some write r g b a
+  expectComplaint(Format::kObj, replaced(kObj, "v 1 0 0", "v 1 0 0 1 1"), "line 4: vertex 1: 3, 4, 6 or 7 numbers");
+}
+
+TEST(ReadMesh, SkipsAByteOrderMark) {
+  const std::string mark = "\xEF\xBB\xBF";
+  for (const auto& [format, text] : {std::pair{Format::kObj, kObj}, std::pair{Format::kOff, kOff},
+                                     std::pair{Format::kPly, kPly}, std::pair{Format::kStl, kStl}}) {
+    EXPECT_EQ(readMesh(mark + text, format).ends.size(), 2u);
+  }
+  EXPECT_EQ(readStl(mark + binaryStl().substr(3)).ends.size(), 1u);
+}
+
 TEST(ReadStl, RefusesRubbish) {
   expectComplaint(Format::kStl, kStl + "rubbish\n", "line 17: 'solid' expected, not 'rubbish'");
   expectComplaint(Format::kStl, binaryStl() + "x", "byte 134: there is more");
@@ -450,6 +467,10 @@ TEST(ReadStl, RefusesRubbish) {
   std::memcpy(nan.data() + 84 + 24, &bad, sizeof(bad));
   expectComplaint(Format::kStl, nan, "byte 108: vertex 1 of triangle 0 is not finite");
   EXPECT_EQ(readStl(kStl + replaced(kStl, "solid s", "SOLID")).ends.size(), 4u);
+  // Binary although it begins like a text: the number of triangles fits.
+  const std::string named = "solid" + binaryStl().substr(5);
+  EXPECT_EQ(readStl(named).ends.size(), 1u);
+  expectComplaint(Format::kStl, named + "\r\n", "byte 134: there is more");
   EXPECT_EQ(readStl(binaryStl()).vertices.size(), 3u);
 }
 

@@ -260,6 +260,16 @@ TEST_F(SceneFile, SaysWhereAUrdfIsWrong) {
   complains(two + joint("j", "screw", "a", "b"), {"line 4", "[j]"});
   complains(two + joint("j", "continuous", "a", "nobody"), {"nobody"});
   complains(two, {"root"});
+  // A robot is a tree: two parents, circles below the root and beside it, a joint from a link to itself.
+  const std::string three = two + link("c", kSphere), ab = joint("ab", "fixed", "a", "b");
+  complains(three + ab + joint("ac", "fixed", "a", "c") + joint("cb", "fixed", "c", "b"),
+            {"line 7: joint cb: link b is the child of joint ab, too", "a tree"});
+  complains(two + ab + joint("bb", "fixed", "b", "b"), {"joint bb: link b is the child of joint ab, too"});
+  complains(three + ab + joint("bc", "fixed", "b", "c") + joint("cb", "fixed", "c", "b"),
+            {"link b is the child of joint ab, too"});
+  complains(three + joint("bc", "fixed", "b", "c") + joint("cb", "fixed", "c", "b"),
+            {"link b: no joints connect it with the root link a"});
+  complains(two + joint("bb", "fixed", "b", "b"), {"link b: no joints connect it"});
   complains(two + joint("j", "continuous", "a", "b", "<axis xyz='0 0 0'/>"), {"line 4", "joint j", "axis"});
   complains(two + joint("j", "continuous", "a", "b", "<mimic joint='k'/>"), {"joint j mimics k, which is no joint"});
   complains(two + joint("j", "continuous", "a", "b", "<mimic joint='j'/>"), {"joint j mimics itself"});
@@ -295,21 +305,50 @@ TEST_F(SceneFile, FindsPackages) {
     fs::create_directories(folder_ / place);
   const std::string uri = "package://robots/meshes/a.stl";
   const auto at = [&](const std::string& place) { return (folder_ / place / "meshes/a.stl").string(); };
-  const Packages none;
   const std::string deep = (folder_ / "up/robots/urdf/deep").string();
-  EXPECT_EQ(none.resolve(uri, deep), at("up/robots"));
-  EXPECT_EQ(none.resolve(uri, (folder_ / "up").string()), at("up/robots"));
-  expectComplaint([&] { none.resolve(uri, (folder_ / "given").string()); },
+  EXPECT_EQ(Packages().resolve(uri, deep), at("up/robots"));
+  EXPECT_EQ(Packages().resolve(uri, (folder_ / "up").string()), at("up/robots"));
+  expectComplaint([&] { Packages().resolve(uri, (folder_ / "given").string()); },
                   {"package robots is not found", "--package robots="});
   setenv("AMENT_PREFIX_PATH", ("/nowhere:" + (folder_ / "prefix").string()).c_str(), 1);
-  EXPECT_EQ(none.resolve(uri, deep), at("prefix/share/robots"));
+  EXPECT_EQ(Packages().resolve(uri, deep), at("prefix/share/robots"));
   for (const char* path : {"ros", "ros/robots", "ros/robots/"}) {
     setenv("ROS_PACKAGE_PATH", ("/nowhere::" + (folder_ / path).string()).c_str(), 1);
-    EXPECT_EQ(none.resolve(uri, deep), at("ros/robots")) << path;
+    EXPECT_EQ(Packages().resolve(uri, deep), at("ros/robots")) << path;
   }
+  // Below the folders of ROS_PACKAGE_PATH, by the names in package.xml; a folder without one is only its own.
+  for (const char* place : {"ws/repo/husky/husky", "ws/repo/deep", "ws/repo/.git/deep", "ws/ignored/deep"}) {
+    fs::create_directories(folder_ / place);
+  }
+  fs::create_directory_symlink(folder_ / "ws", folder_ / "ws/repo/loop");
+  const auto package = [](const std::string& name) { return "<package><name> " + name + "\n</name></package>"; };
+  write("ws/repo/husky/husky/package.xml", package("husky"));
+  write("ws/repo/husky/husky/inner/package.xml", package("inner"));
+  write("ws/repo/deep/package.xml", package("another"));
+  write("ws/repo/old/manifest.xml", "<package/>");
+  write("ws/ignored/package.xml.disabled", "");
+  write("ws/ignored/CATKIN_IGNORE", "");
+  write("ws/ignored/deep/package.xml", package("off"));
+  setenv("ROS_PACKAGE_PATH", (folder_ / "ws").string().c_str(), 1);
+  const auto inPackage = [&](const std::string& name) { return Packages().resolve("package://" + name + "/a", "/"); };
+  const std::string repo = (folder_ / "ws/repo").string();
+  EXPECT_EQ(inPackage("husky"), repo + "/husky/husky/a");
+  EXPECT_EQ(inPackage("another"), repo + "/deep/a");
+  EXPECT_EQ(inPackage("old"), repo + "/old/a");
+  for (const char* name : {"deep", "inner", "off"}) EXPECT_THROW(inPackage(name), std::runtime_error) << name;
+  EXPECT_EQ(Packages().resolve("package://husky/a", repo + "/husky/husky/urdf"), repo + "/husky/husky/a");
+  unsetenv("ROS_PACKAGE_PATH");
+  EXPECT_EQ(Packages().resolve("package://husky/a", repo + "/old"), repo + "/husky/husky/a");
+
   const Packages given({"other=/x", "robots=" + (folder_ / "given").string()});
   EXPECT_EQ(given.resolve(uri, deep), at("given"));
+  EXPECT_EQ(given.resolve("package://other//m//a.stl", deep), "/x//m//a.stl");
   EXPECT_EQ(given.resolve("file:///a/b.stl", deep), "/a/b.stl");
+  EXPECT_EQ(given.resolve("file://localhost/a/b%20c%2d50%.stl", deep), "/a/b c-50%.stl");
+  EXPECT_EQ(given.resolve("file:///a%zz%4", deep), "/a%zz%4");
+  for (const char* wrong : {"file://a/b.stl", "file://b.stl"}) {
+    expectComplaint([&] { given.resolve(wrong, deep); }, {"an absolute path"});
+  }
   EXPECT_EQ(given.resolve("/a/b.stl", deep), "/a/b.stl");
   EXPECT_EQ(given.resolve("b.stl", "/c"), "/c/b.stl");
   EXPECT_THROW(given.resolve("package://robots", deep), std::runtime_error);
@@ -318,7 +357,7 @@ TEST_F(SceneFile, FindsPackages) {
   unsetenv("AMENT_PREFIX_PATH");
   const fs::path working = fs::current_path();
   fs::current_path(deep);
-  EXPECT_TRUE(fs::equivalent(fs::path(none.resolve(uri, "")).parent_path().parent_path(), folder_ / "up/robots"));
+  EXPECT_TRUE(fs::equivalent(fs::path(Packages().resolve(uri, "")).parent_path().parent_path(), folder_ / "up/robots"));
   fs::current_path(working);
   for (const char* wrong : {"robots", "=x", "robots="}) EXPECT_THROW(Packages({wrong}), std::invalid_argument) << wrong;
 }
@@ -363,6 +402,52 @@ TEST_F(SceneFile, AnSrdfDecidesWhichLinksAreChecked) {
   EXPECT_EQ(readScene(arguments).allowed, (Pairs{{1, 2}}));
   write("r.srdf", "<robot name='r'>\n\n<disable_collisions link1='c'/></robot>");
   expectComplaint([&] { readScene(arguments); }, {"r.srdf: line 3", "link2"});
+  write("r.srdf", "<robot name='r'>\n<xacro:arm/></robot>");
+  expectComplaint([&] { readScene(arguments); }, {"r.srdf: line 2", "run `xacro FILE > robot.srdf` first"});
+  arguments.srdf = arguments.file;
+  expectComplaint([&] { readScene(arguments); }, {"robot.urdf: line 2", "<link> belongs to a URDF"});
+  arguments.srdf = write("r.srdf", "<robot name='s'><disable_collisions link1=' a' link2='b\n'/></robot>");
+  const SceneSetup other = readScene(arguments);
+  EXPECT_EQ(other.allowed, (Pairs{{0, 1}}));
+  ASSERT_EQ(other.warnings.size(), 1u);
+  EXPECT_NE(other.warnings[0].find("the SRDF is of robot \"s\", the URDF of \"r\""), std::string::npos);
+}
+
+// As in MoveIt's AllowedCollisionMatrix, where a link's default entry is for all others, objects of the world included.
+TEST_F(SceneFile, DefaultsOfAnSrdfAreAboutObjectsToo) {
+  robot(link("a", kSphere) + link("b", kSphere) + joint("j1", "continuous", "a", "b"));
+  write("r.srdf",
+        "<robot name='r'><disable_default_collisions link='b'/><enable_collisions link1='b' link2='a'/></robot>");
+  const std::string objects = R"({"name": "floor", "box": [1, 1, 1]}, {"name": "tool", "sphere": 1, "attached": "a"})";
+  const auto allowed = [&](const std::string& more) {
+    return scene(R"({"robot": {"urdf": "robot.urdf", "srdf": "r.srdf"}, "objects": [)" + objects + "]" + more + "}")
+        .allowed;
+  };
+  using Pairs = std::set<std::pair<std::size_t, std::size_t>>;
+  EXPECT_EQ(allowed(""), (Pairs{{1, 2}, {1, 3}, {0, 3}}));
+}
+
+TEST_F(SceneFile, AllPathsMayBeInPackages) {
+  write("p/urdf/r.urdf", "<robot name='r'>" + link("a", kSphere) + "</robot>");
+  write("p/r.srdf", "<robot name='r'/>");
+  write("p/states.csv", "box.x,box.y,box.z\n1,2,3\n");
+  const SceneSetup setup = scene(R"({"robot": {"urdf": "package://p/urdf/r.urdf", "srdf": "package://p/r.srdf"},
+    "objects": [{"name": "box", "box": [1, 1, 1], "moving": true}], "states": "package://p/states.csv"})");
+  EXPECT_EQ(setup.robot->name(), "r");
+  EXPECT_EQ(setup.states.size(), 1u);
+  expectComplaint([&] { scene(R"({"robot": "package://q/r.urdf"})"); }, {"scene.json: robot: package q is not found"});
+}
+
+TEST_F(SceneFile, NamesOfGroupsAreNoNamesOfParts) {
+  for (const std::string name : {"robot", "*"}) {
+    expectComplaint([&] { scene("{\"objects\": [{\"name\": \"" + name + "\", \"sphere\": 1}]}"); },
+                    {"objects[0]: the name " + name + " is that of a group"});
+  }
+  robot(link("robot", kSphere) + link("b", kSphere) + joint("j", "continuous", "robot", "b"));
+  const std::string with = R"({"robot": "robot.urdf", "objects": [{"name": "floor", "box": [1, 1, 1]}])";
+  EXPECT_EQ(scene(with + R"(, "allowed": [["b", "floor"]]})").allowed.count({1, 2}), 1u);
+  expectComplaint([&] { scene(with + R"(, "allowed": [["robot", "floor"]]})"); },
+                  {"allowed[0][0]: it may be the link of this name or all links"});
 }
 
 StateNames twoJointsAndABox() {
@@ -412,6 +497,9 @@ TEST(States, SayWhatIsWrongAndWhere) {
   EXPECT_EQ(complaint("q1,elbow,weld\n1,2,3"), "path.csv: line 1: joint weld is fixed, so it must not be given");
   EXPECT_EQ(complaint("q1,elbow,q1\n1,2,3"), "path.csv: line 1: column q1 occurs twice");
   EXPECT_EQ(complaint("q1,elbow\n1,2\n\n3,x"), "path.csv: line 4: column elbow: \"x\" is no finite number");
+  EXPECT_EQ(complaint("q1,elbow\n1,+-2"), "path.csv: line 2: column elbow: \"+-2\" is no finite number");
+  EXPECT_EQ(complaint("q1,elbow\n+1,+"), "path.csv: line 2: column elbow: \"+\" is no finite number");
+  EXPECT_EQ(complaint("q1,elbow,\n1,2,"), "path.csv: line 1: a column has no name");
   EXPECT_EQ(complaint("q1,elbow\n1,nan"), "path.csv: line 2: column elbow: \"nan\" is no finite number");
   EXPECT_EQ(complaint("q1,elbow\n1,"), "path.csv: line 2: column elbow: \"\" is no finite number");
   EXPECT_EQ(complaint("q1,elbow\n1,2,3"), "path.csv: line 2: 2 numbers expected, 3 found");

@@ -2,8 +2,11 @@
 #include "robot/packages.h"
 
 #include <algorithm>
+#include <charconv>
 #include <cstdlib>
 #include <filesystem>
+#include <pugixml.hpp>
+#include <set>
 #include <sstream>
 #include <stdexcept>
 #include <system_error>
@@ -28,10 +31,70 @@ bool isFolder(const fs::path& path) {
   return fs::is_directory(path, error);
 }
 
-/// The folder itself, or the one of this name in it.
+bool isThere(const fs::path& path) {
+  std::error_code error;
+  return fs::exists(path, error);
+}
+
+/// The name of the package in this folder; empty: none. rosbuild's manifest.xml has no name.
+std::string packageIn(const fs::path& folder) {
+  pugi::xml_document manifest;
+  if (manifest.load_file((folder / "package.xml").c_str())) {
+    std::istringstream words(manifest.child("package").child_value("name"));
+    std::string name;
+    words >> name;
+    return name;
+  }
+  return isThere(folder / "manifest.xml") ? folder.filename().string() : "";
+}
+
+/// The package of this name in a folder or below, as rospack looks for it: not inside of other packages.
+fs::path crawl(const fs::path& folder, const std::string& name, std::set<fs::path>& seen) {
+  std::error_code error;
+  const fs::path place = fs::canonical(folder, error);  // links may lead round in a circle
+  if (error || !isFolder(place) || !seen.insert(place).second) return {};
+  const std::string package = packageIn(folder);
+  if (!package.empty()) return package == name ? folder : fs::path();
+  for (const char* mark : {"rospack_nosubdirs", "CATKIN_IGNORE", "AMENT_IGNORE", "COLCON_IGNORE"}) {
+    if (isThere(folder / mark)) return {};
+  }
+  std::set<fs::path> below;
+  for (fs::directory_iterator at(folder, error), end; !error && at != end; at.increment(error)) {
+    if (at->path().filename().string().front() != '.') below.insert(at->path());
+  }
+  for (const fs::path& path : below) {
+    const fs::path found = crawl(path, name, seen);
+    if (!found.empty()) return found;
+  }
+  return {};
+}
+fs::path crawl(const fs::path& folder, const std::string& name) {
+  std::set<fs::path> seen;
+  return crawl(folder.has_filename() ? folder : folder.parent_path(), name, seen);
+}
+
+/// The folder itself, or the one of this name in it, if it is not another package.
 fs::path namedFolder(const fs::path& folder, const std::string& name) {
-  if (isFolder(folder / name)) return folder / name;
-  return folder.filename() == name && isFolder(folder) ? folder : fs::path();
+  for (const fs::path& path : {folder / name, folder}) {
+    if (path.filename() == name && isFolder(path) && packageIn(path).empty()) return path;
+  }
+  return {};
+}
+
+/// A path of a URI, in which %20 is a blank.
+std::string decoded(const std::string& path) {
+  std::string result;
+  for (std::size_t i = 0; i < path.size(); ++i) {
+    unsigned char byte = 0;
+    const char* digits = path.data() + i + 1;
+    if (path[i] == '%' && i + 2 < path.size() && std::from_chars(digits, digits + 2, byte, 16).ptr == digits + 2) {
+      result += static_cast<char>(byte);
+      i += 2;
+    } else {
+      result += path[i];
+    }
+  }
+  return result;
 }
 
 bool startsWith(const std::string& text, const std::string& start) { return text.rfind(start, 0) == 0; }
@@ -51,7 +114,18 @@ Packages::Packages(const std::vector<std::string>& given) {
 std::string Packages::find(const std::string& name, const std::string& folder) const {
   const auto given = folders_.find(name);
   if (given != folders_.end()) return given->second;
-  for (const fs::path& path : foldersOf("ROS_PACKAGE_PATH")) {
+  std::string& found = found_[{name, folder}];
+  if (found.empty()) found = search(name, folder);
+  return found;
+}
+
+std::string Packages::search(const std::string& name, const std::string& folder) const {
+  const std::vector<fs::path> ros = foldersOf("ROS_PACKAGE_PATH");
+  for (const fs::path& path : ros) {
+    const fs::path found = crawl(path, name);
+    if (!found.empty()) return found.string();
+  }
+  for (const fs::path& path : ros) {
     const fs::path found = namedFolder(path.has_filename() ? path : path.parent_path(), name);
     if (!found.empty()) return found.string();
   }
@@ -60,7 +134,9 @@ std::string Packages::find(const std::string& name, const std::string& folder) c
   }
   std::error_code error;
   for (fs::path at = fs::absolute(folder.empty() ? "." : folder, error); !error; at = at.parent_path()) {
-    const fs::path found = namedFolder(at.has_filename() ? at : at.parent_path(), name);
+    if (packageIn(at) == name) return at.string();
+    fs::path found = crawl(at / name, name);
+    if (found.empty()) found = namedFolder(at.has_filename() ? at : at.parent_path(), name);
     if (!found.empty()) return found.string();
     if (at == at.parent_path()) break;
   }
@@ -74,9 +150,15 @@ std::string Packages::resolve(const std::string& uri, const std::string& folder)
     const std::size_t end = std::min(uri.find('/', scheme.size()), uri.size());
     const std::string name = uri.substr(scheme.size(), end - scheme.size());
     if (name.empty() || end + 1 >= uri.size()) throw std::runtime_error(scheme + "NAME/FILE expected");
-    return (fs::path(find(name, folder)) / uri.substr(end + 1)).string();
+    return find(name, folder) + uri.substr(end);  // also where there are several slashes
   }
-  if (startsWith(uri, "file://")) return uri.substr(7);
+  if (startsWith(uri, "file://")) {
+    const std::size_t path = uri.find('/', 7), host = path == std::string::npos ? 0 : path - 7;
+    if (path == std::string::npos || (host > 0 && uri.substr(7, host) != "localhost")) {
+      throw std::runtime_error("file:// and an absolute path expected, as in file:///opt/part.stl");
+    }
+    return decoded(uri.substr(path));
+  }
   if (uri.find("://") != std::string::npos) {
     throw std::runtime_error("unknown kind of URI: use package://, model://, file:// or a path");
   }

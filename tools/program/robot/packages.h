@@ -3,6 +3,7 @@
 
 #include <map>
 #include <string>
+#include <utility>
 #include <vector>
 
 namespace bocst::program {
@@ -16,15 +17,19 @@ class Packages {
   /// A package that the command line does not name.
   void add(const std::string& name, const std::string& folder) { folders_.emplace(name, folder); }
 
-  /// The file that a URI means in a file of this folder: package://name/path, file:///path, /path, path. Packages are
-  /// looked for among those given, in ROS_PACKAGE_PATH, AMENT_PREFIX_PATH, and from `folder` upwards.
+  /// The file that a URI means in a file of this folder: package://name/path, file:///path (%20 is a blank there), /path,
+  /// path. Packages are looked for among those given, in and below the folders of ROS_PACKAGE_PATH, in
+  /// AMENT_PREFIX_PATH, and from `folder` upwards. A package has the name that its package.xml says; a folder of this
+  /// name without a package.xml will do, too.
   /// @throws std::runtime_error that says where the package was looked for.
   std::string resolve(const std::string& uri, const std::string& folder) const;
 
  private:
   std::string find(const std::string& name, const std::string& folder) const;
+  std::string search(const std::string& name, const std::string& folder) const;
 
   std::map<std::string, std::string> folders_;
+  mutable std::map<std::pair<std::string, std::string>, std::string> found_;  // by name and folder
 };
 
 }  // namespace bocst::program

@@ -3,19 +3,37 @@
 
 #include <algorithm>
 #include <optional>
+#include <stdexcept>
 
 #include "robot/xml_file.h"
 
 namespace bocst::program {
 namespace {
 
+std::string withoutOuterBlanks(const std::string& text) {
+  constexpr const char* kBlanks = " \t\r\n";
+  const std::size_t begin = text.find_first_not_of(kBlanks);
+  return begin == std::string::npos ? "" : text.substr(begin, text.find_last_not_of(kBlanks) + 1 - begin);
+}
+
 class SrdfReader {
  public:
   SrdfReader(const XmlFile& xml, const Robot& robot) : xml_(xml), robot_(robot) {}
 
   Srdf read() {
+    xml_.refuseXacro("robot.srdf");
+    for (const char* name : {"link", "joint"}) {
+      const pugi::xml_node element = xml_.root().child(name);
+      if (element) throw std::runtime_error(xml_.place(element) + ": <" + name + "> belongs to a URDF, not to an SRDF");
+    }
+    const std::string robot = xml_.root().attribute("name").value();
+    if (robot != robot_.name()) {
+      srdf_.warnings.push_back(xml_.place(xml_.root()) + ": the SRDF is of robot \"" + robot + "\", the URDF of \"" +
+                               robot_.name() + "\"");
+    }
     for (const pugi::xml_node& element : xml_.root().children("disable_default_collisions")) {
       const std::optional<std::size_t> link = linkOf(element, "link");
+      if (link) srdf_.unchecked.push_back(*link);
       for (std::size_t other = 0; link && other < robot_.links().size(); ++other) {
         if (other != *link) srdf_.disabled.insert(std::minmax(*link, other));
       }
@@ -31,7 +49,7 @@ class SrdfReader {
 
  private:
   std::optional<std::size_t> linkOf(const pugi::xml_node& element, const char* attribute) {
-    const std::string name = xml_.attribute(element, attribute);
+    const std::string name = withoutOuterBlanks(xml_.attribute(element, attribute));
     const auto& links = robot_.links();
     const auto found = std::find_if(links.begin(), links.end(), [&](const Part& link) { return link.name == name; });
     if (found != links.end()) return static_cast<std::size_t>(found - links.begin());

@@ -8,6 +8,7 @@
 #include <algorithm>
 #include <cmath>
 #include <filesystem>
+#include <map>
 #include <sstream>
 #include <stdexcept>
 #include <utility>
@@ -40,12 +41,15 @@ class Listener final : public console_bridge::OutputHandler {
 class UrdfReader {
  public:
   UrdfReader(const std::string& file, const Packages& packages, MeshStore& meshes)
-      : xml_(file, "robot"), packages_(packages), meshes_(meshes) {}
+      : xml_(file, "robot"), packages_(packages), meshes_(meshes) {
+    xml_.refuseXacro("robot.urdf");
+  }
 
   Robot read() {
-    refuseXacro();
     const urdf::ModelInterfaceSharedPtr model = parse();
+    checkParents(*model);
     add(*model->root_link_);
+    checkAllConnected(*model);
     try {
       return Robot(model->name_, std::move(links_), std::move(joints_));
     } catch (const std::runtime_error& e) {
@@ -54,11 +58,24 @@ class UrdfReader {
   }
 
  private:
-  void refuseXacro() const {
-    for (const pugi::xml_node& element : xml_.root().children()) {
-      if (std::string(element.name()).rfind("xacro:", 0) != 0) continue;
-      throw std::runtime_error(xml_.place(element) + ": <" + element.name() +
-                               "> is a xacro element; run `xacro FILE > robot.urdf` first");
+  /// urdfdom only looks that one link is nobody's child.
+  void checkParents(const urdf::ModelInterface& model) const {
+    std::map<std::string, std::string> joint_of;
+    for (const auto& [name, joint] : model.joints_) {
+      const auto [other, is_first] = joint_of.emplace(joint->child_link_name, name);
+      if (!is_first) {
+        complain("joint", name,
+                 "link " + joint->child_link_name + " is the child of joint " + other->second +
+                     ", too; a robot is a tree of links");
+      }
+    }
+  }
+
+  void checkAllConnected(const urdf::ModelInterface& model) const {
+    for (const auto& [name, link] : model.links_) {
+      const auto is = [&name = name](const Part& part) { return part.name == name; };
+      if (std::any_of(links_.begin(), links_.end(), is)) continue;
+      complain("link", name, "no joints connect it with the root link " + model.root_link_->name);
     }
   }
 

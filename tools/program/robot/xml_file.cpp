@@ -17,6 +17,14 @@ XmlFile::XmlFile(std::string file, const std::string& root_name) : file_(std::mo
   }
 }
 
+void XmlFile::refuseXacro(const std::string& result) const {
+  for (const pugi::xml_node& element : root().children()) {
+    if (std::string(element.name()).rfind("xacro:", 0) != 0) continue;
+    throw std::runtime_error(place(element) + ": <" + element.name() + "> is a xacro element; run `xacro FILE > " +
+                             result + "` first");
+  }
+}
+
 std::string XmlFile::placeOf(std::ptrdiff_t offset) const {
   const std::size_t end = std::min(static_cast<std::size_t>(std::max<std::ptrdiff_t>(offset, 0)), text_.size());
   const auto lines = std::count(text_.begin(), text_.begin() + static_cast<std::ptrdiff_t>(end), '\n');

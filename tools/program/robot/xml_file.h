@@ -16,6 +16,9 @@ class XmlFile {
   const std::string& text() const { return text_; }
   pugi::xml_node root() const { return document_.document_element(); }
 
+  /// @throws std::runtime_error if a child of the root is an element of xacro. `result`: a name for what xacro writes.
+  void refuseXacro(const std::string& result) const;
+
   /// "FILE: line N", for complaints about this element.
   std::string place(const pugi::xml_node& element) const;
 

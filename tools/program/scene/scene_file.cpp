@@ -74,7 +74,11 @@ class Reader {
 
  private:
   std::string path(const JsonElement& element) const {
-    return (fs::path(arguments_.file).parent_path() / element.text()).string();
+    try {
+      return packages_.resolve(element.text(), fs::path(arguments_.file).parent_path().string());
+    } catch (const std::runtime_error& e) {
+      element.complain(e.what());
+    }
   }
 
   void readScene(const JsonElement& root) {
@@ -83,6 +87,9 @@ class Reader {
     if (!setup_.robot && !arguments_.srdf.empty()) root.complain("an SRDF is given, but no robot");
     if (root.has("objects")) {
       for (const JsonElement& object : root.at("objects").items()) readObject(object);
+    }
+    for (const std::size_t link : unchecked_) {
+      for (std::size_t part = setup_.linkCount(); part < setup_.partCount(); ++part) setup_.allowed.emplace(link, part);
     }
     nameParts(root);
     if (root.has("groups")) readGroups(root.at("groups"));
@@ -105,6 +112,7 @@ class Reader {
     if (!srdf.empty()) {
       Srdf read = readSrdf(srdf, *setup_.robot);
       setup_.allowed = std::move(read.disabled);
+      unchecked_ = std::move(read.unchecked);
       setup_.warnings = std::move(read.warnings);
     }
     using Adjacent = SceneArguments::Adjacent;
@@ -124,6 +132,9 @@ class Reader {
     SceneObject object;
     object.part.name = element.at("name").text();
     if (object.part.name.empty()) element.complain("the name is empty");
+    if (object.part.name == kAllLinks || object.part.name == kAllParts) {
+      element.complain("the name " + object.part.name + " is that of a group");
+    }
     object.moving = element.has("moving") && element.at("moving").boolean();
     if (element.has("pose")) object.X_WO = element.at("pose").pose();
     if (element.has("attached")) {
@@ -202,8 +213,9 @@ class Reader {
         scale = {numbers[0], numbers[1], numbers[2]};
       }
     }
+    const std::string at = path(file);
     try {
-      return meshes_.get(packages_.resolve(file.text(), fs::path(arguments_.file).parent_path().string()), scale);
+      return meshes_.get(at, scale);
     } catch (const std::exception& e) {
       file.complain(e.what());
     }
@@ -215,14 +227,17 @@ class Reader {
       if (!groups_.emplace(setup_.part(i).name, std::vector<std::size_t>{i}).second) {
         root.complain("two parts are called " + setup_.part(i).name);
       }
-      groups_["*"].push_back(i);
+      groups_[kAllParts].push_back(i);
     }
     std::vector<std::size_t> links(setup_.linkCount());
     for (std::size_t i = 0; i < links.size(); ++i) links[i] = i;
-    if (!links.empty()) groups_.emplace("robot", std::move(links));
+    if (!links.empty()) has_link_robot_ = !groups_.emplace(kAllLinks, std::move(links)).second;
   }
 
   const std::vector<std::size_t>& groupOf(const JsonElement& name) const {
+    if (name.text() == kAllLinks && has_link_robot_) {
+      name.complain("it may be the link of this name or all links: name the links one by one");
+    }
     const auto found = groups_.find(name.text());
     if (found != groups_.end()) return found->second;
     std::vector<std::string> known;
@@ -290,12 +305,15 @@ class Reader {
   }
 
   static const std::vector<std::string> kShapes;
+  static constexpr const char *kAllLinks = "robot", *kAllParts = "*";
 
   const SceneArguments& arguments_;
   Packages packages_;
   MeshStore meshes_;
   SceneSetup setup_;
   std::map<std::string, std::vector<std::size_t>> groups_;
+  std::vector<std::size_t> unchecked_;  ///< Links that the SRDF leaves out.
+  bool has_link_robot_ = false;
 };
 
 const std::vector<std::string> Reader::kShapes = {"mesh", "box", "sphere", "cylinder", "capsule"};

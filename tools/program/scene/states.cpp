@@ -39,7 +39,8 @@ std::vector<std::string> cellsOf(const std::string& line) {
 
 std::optional<double> numberOf(const std::string& cell) {
   double value = 0;
-  const char* begin = cell.data() + (!cell.empty() && cell.front() == '+');
+  const bool has_plus = cell.size() > 1 && cell[0] == '+' && cell[1] != '-';
+  const char* begin = cell.data() + has_plus;
   const auto [end, error] = std::from_chars(begin, cell.data() + cell.size(), value);
   const bool whole = error == std::errc() && end == cell.data() + cell.size() && std::isfinite(value);
   return whole ? std::optional<double>(value) : std::nullopt;
@@ -52,6 +53,7 @@ std::string list(const std::vector<std::string>& names) {
 }
 
 std::string refusal(const std::string& name, const StateNames& names) {
+  if (name.empty()) return "a column has no name";
   const auto joint = names.others.find(name);
   if (joint != names.others.end()) return "joint " + name + " " + joint->second + ", so it must not be given";
   std::vector<std::string> known = names.joints;
