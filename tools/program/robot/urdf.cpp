@@ -9,6 +9,7 @@
 #include <cmath>
 #include <filesystem>
 #include <map>
+#include <set>
 #include <sstream>
 #include <stdexcept>
 #include <utility>
@@ -46,10 +47,9 @@ class UrdfReader {
   }
 
   Robot read() {
+    checkTree();
     const urdf::ModelInterfaceSharedPtr model = parse();
-    checkParents(*model);
     add(*model->root_link_);
-    checkAllConnected(*model);
     try {
       return Robot(model->name_, std::move(links_), std::move(joints_));
     } catch (const std::runtime_error& e) {
@@ -58,24 +58,30 @@ class UrdfReader {
   }
 
  private:
-  /// urdfdom only looks that one link is nobody's child.
-  void checkParents(const urdf::ModelInterface& model) const {
-    std::map<std::string, std::string> joint_of;
-    for (const auto& [name, joint] : model.joints_) {
-      const auto [other, is_first] = joint_of.emplace(joint->child_link_name, name);
-      if (!is_first) {
-        complain("joint", name,
-                 "link " + joint->child_link_name + " is the child of joint " + other->second +
+  /// urdfdom only looks that one link is nobody's child, and never frees links in a circle.
+  void checkTree() const {
+    std::map<std::string, pugi::xml_node> joint_of;
+    for (const pugi::xml_node& joint : xml_.root().children("joint")) {
+      const std::string child = joint.child("child").attribute("link").value();
+      const auto [other, is_first] = joint_of.emplace(child, joint);
+      if (!is_first && !child.empty()) {
+        complain("joint", joint.attribute("name").value(),
+                 "link " + child + " is the child of joint " + other->second.attribute("name").value() +
                      ", too; a robot is a tree of links");
       }
     }
-  }
-
-  void checkAllConnected(const urdf::ModelInterface& model) const {
-    for (const auto& [name, link] : model.links_) {
-      const auto is = [&name = name](const Part& part) { return part.name == name; };
-      if (std::any_of(links_.begin(), links_.end(), is)) continue;
-      complain("link", name, "no joints connect it with the root link " + model.root_link_->name);
+    std::set<std::string> rooted;
+    for (const auto& [link, joint] : joint_of) {
+      std::set<std::string> path;
+      std::string at = link;
+      for (auto up = joint_of.find(at); up != joint_of.end() && rooted.count(at) == 0; up = joint_of.find(at)) {
+        if (!path.insert(at).second) {
+          complain("joint", joint.attribute("name").value(),
+                   "links are connected in a circle; a robot is a tree of links");
+        }
+        at = up->second.child("parent").attribute("link").value();
+      }
+      rooted.insert(path.begin(), path.end());
     }
   }
 
