@@ -15,7 +15,7 @@ namespace bocst::program {
 struct Srdf {
   std::set<std::pair<std::size_t, std::size_t>> disabled;  ///< Links of the robot, the smaller index first.
   std::vector<std::size_t> unchecked;                      ///< Links that are not checked with what is no link either.
-  std::vector<std::string> warnings;                       ///< Of another robot's name, and links that it does not have.
+  std::vector<std::string> warnings;  ///< Of another robot's name, and links that it does not have.
 };
 
 /// Reads <disable_collisions>, <disable_default_collisions> and <enable_collisions>; all else is skipped.
