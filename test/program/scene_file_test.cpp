@@ -270,6 +270,7 @@ TEST_F(SceneFile, SaysWhereAUrdfIsWrong) {
   complains(three + joint("bc", "fixed", "b", "c") + joint("cb", "fixed", "c", "b"),
             {"line 6: joint cb: links are connected in a circle"});
   complains(two + joint("bb", "fixed", "b", "b"), {"joint bb: links are connected in a circle"});
+  complains(two + "<joint name='j' type='fixed'/>", {"line 4", "[j]"});
   complains(two + joint("j", "continuous", "a", "b", "<axis xyz='0 0 0'/>"), {"line 4", "joint j", "axis"});
   complains(two + joint("j", "continuous", "a", "b", "<mimic joint='k'/>"), {"joint j mimics k, which is no joint"});
   complains(two + joint("j", "continuous", "a", "b", "<mimic joint='j'/>"), {"joint j mimics itself"});

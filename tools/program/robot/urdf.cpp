@@ -63,8 +63,9 @@ class UrdfReader {
     std::map<std::string, pugi::xml_node> joint_of;
     for (const pugi::xml_node& joint : xml_.root().children("joint")) {
       const std::string child = joint.child("child").attribute("link").value();
+      if (child.empty()) continue;  // urdfdom complains of that
       const auto [other, is_first] = joint_of.emplace(child, joint);
-      if (!is_first && !child.empty()) {
+      if (!is_first) {
         complain("joint", joint.attribute("name").value(),
                  "link " + child + " is the child of joint " + other->second.attribute("name").value() +
                      ", too; a robot is a tree of links");
