@@ -15,23 +15,12 @@ namespace {
 // Before anything is measured: one core of a desktop machine, and a GPU beside it (share/doc/oracles.md).
 constexpr CostModel kHost{1e-7, 1e-6, 4e-8}, kDevice{1e-4, 4e-7, 2e-9}, kUpload{1e-4, 0, 2e-8};
 
-// How far one batch corrects what is expected, and the most that it may be taken to be off by: a thread that has to
-// wait for its core says nothing of the device.
-constexpr double kRate = 0.3, kMostOff = 8;
-
 // The host's part is chosen to be ready somewhat before the device's: one that has to wait learns what the device
 // takes.
 constexpr double kHostEarlier = 0.8;
 
 // What it takes to part a batch and to put it together again, in seconds a cell.
 constexpr double kMoving = 1.5e-7;
-
-// A share of the host's time above which a gain is within what the models are off by.
-constexpr double kWorthwhile = 0.95;
-
-// Of the time of all batches, what asking a slower device again may take, and what it may make of one batch's time:
-// devices that were busy get better. A trial counts as kLeastPrice of the batch's time at least.
-constexpr double kTrying = 0.02, kSlowestTry = 4, kMostCredit = 0.02, kLeastPrice = 0.25;
 
 // A surface with hills, and triangles of many sizes.
 Surface hills() {
@@ -54,15 +43,6 @@ Surface hills() {
 }
 
 }  // namespace
-
-void CostModel::learn(double cells, double triangles, double seconds) {
-  const double expected = of(cells, triangles);
-  if (!(expected > 0)) return;
-  const double off = kRate * std::log(std::clamp(seconds / expected, 1 / kMostOff, kMostOff));
-  batch *= std::exp(off * batch / expected);
-  cell *= std::exp(off * cell * cells / expected);
-  triangle *= std::exp(off * triangle * triangles / expected);
-}
 
 double AutoOracle::steadySeconds() {
   return std::chrono::duration<double>(std::chrono::steady_clock::now().time_since_epoch()).count();
@@ -139,7 +119,7 @@ AutoOracle::Share AutoOracle::bestShare(const Work& batch, const std::vector<Can
                                         std::size_t least) const {
   Share share;
   const double alone = host_cost_.of(batch.cells, batch.triangles), moving = kMoving * batch.cells;
-  share.seconds = least == 0 ? kWorthwhile * alone : std::numeric_limits<double>::infinity();
+  share.seconds = least == 0 ? Trials::kWorthwhile * alone : std::numeric_limits<double>::infinity();
   double here = alone, there = device_cost_.batch;
   for (std::size_t n = 1; n <= candidates.size(); ++n) {
     const auto triangles = static_cast<double>(candidates[n - 1].triangles);
@@ -177,8 +157,8 @@ std::vector<AutoOracle::Candidate> AutoOracle::chooseShare(const std::vector<Exp
   Work work;
   for (const ExpansionRequest& e : batch) work.add(e);
   const double alone = host_cost_.of(work.cells, work.triangles);
-  credit_ = std::min(kMostCredit, credit_ + kTrying * alone);
-  if (device_cost_.batch > alone + std::min(credit_, (kSlowestTry - 1) * alone)) return {};
+  trials_.earn(alone);
+  if (!trials_.affords(device_cost_.batch, alone)) return {};
 
   if (meshes_.size() > 2 * live_meshes_ + 8) dropForgotten();
   std::vector<Candidate> candidates;
@@ -208,11 +188,7 @@ std::vector<AutoOracle::Candidate> AutoOracle::chooseShare(const std::vector<Exp
   Share share = bestShare(work, candidates, 0);
   if (share.count == 0 && !candidates.empty()) {
     const Share trial = bestShare(work, candidates, 1);
-    const double price = std::max(trial.seconds - alone, kLeastPrice * alone);
-    if (price < credit_ && trial.seconds < kSlowestTry * alone) {
-      credit_ -= price;
-      share = trial;
-    }
+    if (trials_.take(trial.seconds, alone)) share = trial;
   }
   candidates.resize(share.count);
   return candidates;

@@ -10,19 +10,10 @@
 #include <string>
 #include <vector>
 
+#include "oracle/cost_model.h"
 #include "oracle/oracle.h"
 
 namespace bocst::oracle {
-
-/// How long batches take somewhere, in seconds.
-struct CostModel {
-  double batch, cell, triangle;
-
-  double of(double cells, double triangles) const { return batch + cell * cells + triangle * triangles; }
-
-  /// A batch took so long there. Each term is corrected by its share of what was expected.
-  void learn(double cells, double triangles, double seconds);
-};
 
 /// Has each batch answered where that takes the least time (kAuto): by the host, by a device, or by both at once, each
 /// a part. What they take is measured at the start and with each batch that is answered. The nodes of a tree are the
@@ -43,6 +34,16 @@ class BOCST_EXPORT AutoOracle : public Oracle {
   /// The device starts with its part; the host's is answered here.
   void submit(std::vector<ExpansionRequest>& batch) override;
   void wait(std::vector<ExpansionRequest>& batch) override;
+
+  /// As the device has it.
+  bool walksPairs(std::size_t pairs) override { return device_->walksPairs(pairs); }
+  std::shared_ptr<const DeviceResource> uploadNodes(std::vector<std::uint32_t>& words) override {
+    return device_->uploadNodes(words);
+  }
+  void walkPairs(PairWalks& walks) override { device_->walkPairs(walks); }
+  void pairsTook(std::size_t pairs, double seconds, bool by_host) override {
+    device_->pairsTook(pairs, seconds, by_host);
+  }
 
   const std::shared_ptr<Oracle>& device() const { return device_; }
 
@@ -108,7 +109,7 @@ class BOCST_EXPORT AutoOracle : public Oracle {
   CostModel host_cost_, device_cost_, upload_cost_;
   std::map<const Mesh*, Known> meshes_;
   std::size_t live_meshes_ = 0;  // when forgotten ones were last dropped
-  double credit_ = 0;            // seconds that trying the device again may take
+  Trials trials_;
 };
 
 }  // namespace bocst::oracle

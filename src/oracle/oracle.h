@@ -13,6 +13,7 @@
 
 #include "bounds/node_bounds.h"
 #include "lattice/lattice.h"
+#include "oracle/pair_walk.h"
 #include "oracle/surface.h"
 
 namespace bocst::oracle {
@@ -86,6 +87,23 @@ class Oracle {
 
   /// Occlusion queries made so far, for all models.
   virtual std::uint64_t queries() const { return 0; }
+
+  // Conservative answers to many poses, walked where the oracle works.
+
+  /// Should it walk so many pairs, rather than the host?
+  virtual bool walksPairs(std::size_t) { return false; }
+
+  /// Brings a table of nodes (node_table) to where the oracle works; null where it cannot. Changes the words.
+  virtual std::shared_ptr<const DeviceResource> uploadNodes(std::vector<std::uint32_t>&) { return nullptr; }
+
+  /// Answers all pairs; of those that it cannot, kUndone.
+  virtual void walkPairs(PairWalks& walks) {
+    walks.found.assign(walks.pairs.size(), PairWalks::kUndone);
+    walks.deferred.clear();
+  }
+
+  /// So long took a walk over so many pairs, uploads included, by the oracle or by the host in its stead.
+  virtual void pairsTook(std::size_t /*pairs*/, double /*seconds*/, bool /*by_host*/) {}
 
   /// The ids of a list that this oracle keeps; false when it has lost them.
   virtual bool fetch(const DeviceResource&, ExpansionRequest::DeviceList, std::uint32_t*) { return false; }

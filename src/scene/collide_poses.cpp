@@ -2,15 +2,16 @@
 #include <bocst/collide_poses.h>
 
 #include <algorithm>
-#include <array>
 #include <sstream>
 #include <stdexcept>
 #include <string>
+#include <thread>
 #include <vector>
 
 #include "fcl/adapters/models.h"
 #include "fcl/adapters/validate.h"
 #include "fcl/queries/collide_row.h"
+#include "fcl/queries/grow_together.h"
 #include "fcl/queries/pose_boxes.h"
 #include "fcl/queries/query_scope.h"
 #include "scene/pool.h"
@@ -18,8 +19,9 @@
 namespace bocst {
 namespace {
 
-/// Poses that a thread takes at a time: enough that taking them costs nothing, few enough to be shared out.
-constexpr std::size_t kPosesAtOnce = 256;
+/// Poses that a thread takes at a time: enough that taking them costs nothing, few enough to be shared out. A device
+/// wants more of them.
+constexpr std::size_t kPosesAtOnce = 256, kPosesForDevice = 4096;
 
 enum class LastRow { kChecked, kIgnored };
 
@@ -61,8 +63,10 @@ template <typename S>
 void collideSome(const Model<S>& a, const Model<S>& b, const Poses<S>& X_AB, std::size_t begin, std::size_t end,
                  std::uint8_t* hit) {
   thread_local std::vector<fcl::Transform3<S>> near_poses;
-  std::array<std::uint32_t, kPosesAtOnce> near;
-  std::array<std::uint8_t, kPosesAtOnce> hits;
+  thread_local std::vector<std::uint32_t> near;
+  thread_local std::vector<std::uint8_t> hits;
+  near.resize(std::max(near.size(), end - begin));
+  hits.resize(near.size());
   std::fill(hit + begin, hit + end, std::uint8_t{0});
   std::size_t count;
   {
@@ -86,9 +90,13 @@ void collideAll(const Model<S>& a, const Model<S>& b, const Poses<S>& X_AB, std:
     std::fill(hit, hit + count, std::uint8_t{0});
     return;
   }
-  const std::size_t rows = (count + kPosesAtOnce - 1) / kPosesAtOnce;
+  const std::size_t workers = threads != 0 ? threads : std::max(1u, std::thread::hardware_concurrency());
+  const std::size_t at_once = fcl_adapter::growsTogether(a, b)
+                                  ? std::clamp((count + workers - 1) / workers, kPosesAtOnce, kPosesForDevice)
+                                  : kPosesAtOnce;
+  const std::size_t rows = (count + at_once - 1) / at_once;
   const auto work = [&](std::size_t row) {
-    collideSome(a, b, X_AB, row * kPosesAtOnce, std::min((row + 1) * kPosesAtOnce, count), hit);
+    collideSome(a, b, X_AB, row * at_once, std::min((row + 1) * at_once, count), hit);
     return true;
   };
   scene::Pool(threads, rows).share(rows, work);

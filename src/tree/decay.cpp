@@ -62,6 +62,7 @@ void Tree::dropUnusedResources() {
 // function, as a node is copied whole: its children, list, record and times belong to one move.
 void Tree::keepOnly(const std::vector<std::uint8_t>& keep) {
   ++generation_;
+  node_table_ = {};
   const ChildRef old_root = root_.load(std::memory_order_relaxed);
   std::array<std::size_t, lattice::kMaxLevel + 1> nodes_at{};
   nodes_at[1] = 1;

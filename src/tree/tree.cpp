@@ -452,6 +452,27 @@ void Tree::updateVertices(std::vector<Eigen::Vector3d> vertices) {
   reset(old.withVertices(std::move(vertices)));
 }
 
+// All of it anew whenever a block came: a few hundred kB, for a device that has just answered a batch.
+Tree::NodeTable Tree::nodeTable() {
+  namespace table = oracle::node_table;
+  const std::lock_guard<thread::ForkAwareMutex> lock(growth_);
+  const std::uint32_t count = blocks_.size();
+  if (node_table_.nodes != nullptr && node_table_.blocks == count) return node_table_;
+  const auto blockOf = [](ChildRef ref) { return ref.tag() == ChildRef::kBlock ? ref.index() : table::kNone; };
+  std::vector<std::uint32_t> words(std::size_t{count} * table::kWords);
+  for (std::uint32_t i = 0; i < count; ++i) {
+    const Block& block = blocks_[i];
+    std::uint32_t* const at = words.data() + std::size_t{i} * table::kWords;
+    at[table::kPlace] = block.at[0] | std::uint32_t{block.at[1]} << 16;
+    at[table::kShape] = block.at[2] | std::uint32_t{block.shape} << 16 | std::uint32_t{block.grey} << 24;
+    for (std::size_t o = 0; o < 8; ++o) at[table::kChildren + o] = blockOf(block.child[o].load());
+  }
+  node_table_.nodes = nullptr;  // its room first
+  node_table_ = {oracle_->uploadNodes(words), count, blockOf(root_.load())};
+  countBytes();
+  return node_table_;
+}
+
 // Inspection.
 
 void Tree::expandAll(int depth) {
@@ -551,6 +572,7 @@ void Tree::countBytes() {
   bytes_ = treeBytes();
   std::size_t device = surface_.device != nullptr ? surface_.device->bytes() : 0;
   const oracle::DeviceResource* last = nullptr;
+  if (node_table_.nodes != nullptr) device += node_table_.nodes->bytes();
   for (const auto& resource : resources_) {
     if (resource != nullptr && resource.get() != last) device += resource->bytes();
     last = resource.get();

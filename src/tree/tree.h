@@ -44,7 +44,7 @@ class Tree {
   ~Tree();
 
   const Options& options() const { return options_; }
-  const oracle::Oracle& oracle() const { return *oracle_; }
+  oracle::Oracle& oracle() const { return *oracle_; }
   thread::ShardedLock& queryLock() const { return query_lock_; }
 
   /// A box about the surface, or about the spheres of conservative answers; without a lock.
@@ -123,6 +123,13 @@ class Tree {
     const RootGrid* grid = grid_known_.load(std::memory_order_acquire);
     return grid != nullptr && !isLoose(node) && cell(node).level < grid->level();
   }
+
+  /// The resident nodes where the oracle works, for a walk there; `nodes` is null where it takes none.
+  struct NodeTable {
+    std::shared_ptr<const oracle::DeviceResource> nodes;
+    std::uint32_t blocks = 0, root = oracle::node_table::kNone;
+  };
+  NodeTable nodeTable();
 
   /// A node to grow, and whether a list of at most kMaxLeafTriangles is enough (exact answers).
   struct Growth {
@@ -257,6 +264,7 @@ class Tree {
   mutable Pool<std::atomic<std::int64_t>, 5> last_use_;
   TriangleLists lists_;
   std::vector<std::shared_ptr<const oracle::DeviceResource>> resources_;  // of the lists that the oracle keeps
+  NodeTable node_table_;                                                  // of a generation; under growth_
 
   // Tighter bounds of nodes than their parents' blocks hold; blocks that readers see are not written to, so these wait
   // for a moment alone.

@@ -86,6 +86,7 @@ void Tree::leakPools() {
   (new decltype(last_use_))->swap(last_use_);
   (new decltype(lists_))->swap(lists_);
   (new decltype(resources_))->swap(resources_);
+  (new decltype(node_table_.nodes))->swap(node_table_.nodes);
   (new decltype(refits_))->swap(refits_);
   static_cast<void>(boxes_.release());
 }

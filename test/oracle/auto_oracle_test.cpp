@@ -312,6 +312,41 @@ TEST(AutoOracle, MeshesComeAndGo) {
   }
 }
 
+// Many poses: pairs of trees are walked by whoever takes less time. A pair takes the host 4 us.
+struct Walks {
+  explicit Walks(bool is_hardware, double its_pair) : choice(is_hardware), pair(its_pair) {}
+  void run(int count) {
+    constexpr std::size_t kPairs = 1000;
+    for (int i = 0; i < count; ++i) {
+      const bool there = choice.takesDevice(kPairs);
+      const double took = kPairs * (there ? pair : 4e-6);
+      choice.learn(kPairs, took, !there);
+      seconds += took;
+      by_device += there;
+    }
+  }
+  PairsChoice choice;
+  double pair, seconds = 0;  // of the device, in seconds
+  int by_device = 0;
+};
+
+TEST(PairsChoice, TakesWhatIsFaster) {
+  Walks fast(true, 2e-7);
+  fast.run(200);
+  EXPECT_EQ(fast.by_device, 200);
+  // A device that turns out to be slow is tried now and then.
+  Walks slow(true, 1.2e-5);
+  slow.run(300);
+  EXPECT_LT(slow.seconds, 1.1 * 300 * 1000 * 4e-6);
+  slow.pair = 2e-7;
+  slow.by_device = 0;
+  slow.run(1000);
+  EXPECT_GT(slow.by_device, 500) << "it became fast";
+  Walks software(false, 4e-4);
+  software.run(1000);
+  EXPECT_EQ(software.by_device, 0);
+}
+
 TEST(AutoOracle, ThreadsShareTheDevice) {
   const Levels levels(surfaceOf(test::torus(40)), 6);
   const auto thread = std::make_shared<gl::Thread>(gl::ContextRequest());

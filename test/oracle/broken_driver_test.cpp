@@ -17,6 +17,7 @@
 #include "oracle/cpu/cpu_oracle.h"
 #include "oracle/gl/compute_oracle.h"
 #include "oracle/gl/devices.h"
+#include "oracle/gl/known_pairs.h"
 #include "oracle/gl/occlusion_oracle.h"
 #include "oracle/gl/self_test.h"
 #include "surfaces.h"
@@ -242,6 +243,45 @@ TEST_F(BrokenDriver, NoBrokenCallChangesAnAnswer) {
       noticed += is_noticed;
       EXPECT_TRUE(!is_noticed || !notices().empty()) << what;
       expectRight(ask(oracle, batch), what + ", afterwards");
+    }
+    EXPECT_TRUE(noticed > 0 || !way.must_be_noticed) << way.what;
+  }
+}
+
+// The same for walks over pairs of trees.
+TEST_F(BrokenDriver, NoBrokenCallChangesAWalk) {
+  const Surface a = surfaceOf(test::torus(16)), b = surfaceOf(test::torus(9));
+  const KnownPairs known(a, b);
+  const std::string undone = "pairs of trees were not walked", no_table = "it takes no table of nodes";
+  const struct {
+    const char* what;
+    Fault* fault;
+    bool must_be_noticed;  // some call of its kind
+  } ways[] = {{"the dispatch is dropped", &g_dispatch, true},
+              {"half of the dispatch is dropped", &g_half_dispatch, true},
+              {"a read returns what was there before", &g_copy, true},
+              {"a write is dropped", &g_write, true},
+              {"the answers are not cleared", &g_clear, false},
+              {"the device does not come back", &g_fence, true},
+              {"the driver resets the device", &g_reset, true},
+              {"the driver cannot map", &g_map, false},
+              {"there is no memory", &g_memory, false}};
+  for (const auto& way : ways) {
+    int noticed = 0;
+    for (int call = 0;; ++call) {
+      ComputeOracle oracle(newThread(4, way.fault == &g_fence ? kBrief : kPatient));
+      ASSERT_EQ(KnownPairs(b, a).ask(oracle), "");  // something else is in every buffer
+      way.fault->start(call);
+      const std::string wrong = known.ask(oracle);
+      const bool was_broken = way.fault->calls > call;
+      way.fault->start(kNever);
+      const std::string what = std::string(way.what) + ", call " + std::to_string(call);
+      EXPECT_TRUE(wrong.empty() || wrong == undone || wrong == no_table) << what << ": " << wrong;
+      noticed += !wrong.empty();
+      if (!was_broken) {
+        EXPECT_EQ(wrong, "") << what;
+        break;
+      }
     }
     EXPECT_TRUE(noticed > 0 || !way.must_be_noticed) << way.what;
   }

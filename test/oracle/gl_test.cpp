@@ -448,6 +448,7 @@ TEST(Shaders, AreValidForTheReferenceCompiler) {
   std::filesystem::create_directory(folder);
   std::vector<std::pair<std::string, std::string>> files;
   for (const auto& [name, source] : ComputeChain::sources()) files.emplace_back(name + ".comp", source);
+  files.emplace_back("pairs.comp", PairWalker::source());
   for (const auto form : {OcclusionOracle::Form::kConservative, OcclusionOracle::Form::kSampled}) {
     for (const Program::Stage& stage : OcclusionOracle::sources(form)) {
       const char* const ending = stage.type == GL_VERTEX_SHADER     ? ".vert"

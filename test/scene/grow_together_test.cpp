@@ -10,6 +10,7 @@
 #include <vector>
 
 #include "meshes.h"
+#include "oracle/gl/compute_oracle.h"
 
 namespace bocst {
 namespace {
@@ -40,14 +41,42 @@ Options optionsOf(OracleKind oracle, bool solid = false) {
   return options;
 }
 
-class GrowTogether : public testing::TestWithParam<OracleKind> {};
+// Each oracle, and `compute` once more with all walks on the device, which a software renderer would not be given.
+struct Param {
+  OracleKind oracle;
+  bool walks_there;
+};
+
+class GrowTogether : public testing::TestWithParam<Param> {
+ protected:
+  void SetUp() override {
+    setWalksAll(GetParam().walks_there);
+    walked_before_ = walked();
+  }
+  void TearDown() override {
+    setWalksAll(false);
+    EXPECT_EQ(walked() > walked_before_, GetParam().walks_there);
+  }
+
+ private:
+  void setWalksAll(bool all) {
+    if (GetParam().oracle != OracleKind::kCompute) return;
+    compute_ = std::dynamic_pointer_cast<oracle::gl::ComputeOracle>(oracle::makeOracle(OracleKind::kCompute));
+    ASSERT_NE(compute_, nullptr);
+    compute_->setWalksAll(all);
+  }
+  std::uint64_t walked() const { return compute_ != nullptr ? compute_->walked() : 0; }
+
+  std::shared_ptr<oracle::gl::ComputeOracle> compute_;
+  std::uint64_t walked_before_ = 0;
+};
 
 TEST_P(GrowTogether, PosesOfAPair) {
   const auto mesh_a = test::torus(30).mesh(), mesh_b = test::box({-0.1, 0.2, 0.3}, {0.4, 0.6, 0.4}).mesh();
   const Transforms X = randomPoses(400, 1.6);
   for (const bool solid : {false, true}) {
-    const Modeld a(mesh_a, optionsOf(GetParam(), solid)), b(mesh_b, optionsOf(GetParam(), solid));
-    const Modeld one_a(mesh_a, optionsOf(GetParam(), solid)), one_b(mesh_b, optionsOf(GetParam(), solid));
+    const Modeld a(mesh_a, optionsOf(GetParam().oracle, solid)), b(mesh_b, optionsOf(GetParam().oracle, solid));
+    const Modeld one_a(mesh_a, optionsOf(GetParam().oracle, solid)), one_b(mesh_b, optionsOf(GetParam().oracle, solid));
     const Modeld cpu_a(mesh_a, optionsOf(OracleKind::kCpu, solid)), cpu_b(mesh_b, optionsOf(OracleKind::kCpu, solid));
     std::vector<std::uint8_t> hits(X.size()), of_cpu(X.size()), one_by_one;
     collidePoses(a, b, X.data(), X.size(), hits.data());
@@ -72,7 +101,7 @@ TEST_P(GrowTogether, AnySizes) {
   huge.vertices = {{-1e30, -1e30, 0}, {1e30, -1e30, 0}, {0, 1e30, 0}};
   huge.triangles.emplace_back(0, 1, 2);
   const auto small = test::torus(12).mesh();
-  const Modeld a(huge.mesh(), optionsOf(GetParam())), b(small, optionsOf(GetParam()));
+  const Modeld a(huge.mesh(), optionsOf(GetParam().oracle)), b(small, optionsOf(GetParam().oracle));
   const Transforms X = randomPoses(40, 0.3);
   std::vector<std::uint8_t> hits(X.size()), of_cpu(X.size());
   collidePoses(a, b, X.data(), X.size(), hits.data());
@@ -111,12 +140,12 @@ TEST_P(GrowTogether, StatesOfAScene) {
   };
   const std::size_t states = X.size() / 3;
   std::vector<std::uint8_t> hits(states), of_cpu(states), one_by_one;
-  makeScene(GetParam(), models)->collisions(X.data(), states, hits.data());
+  makeScene(GetParam().oracle, models)->collisions(X.data(), states, hits.data());
   {
     std::vector<std::shared_ptr<Modeld>> cpu_models;
     makeScene(OracleKind::kCpu, cpu_models)->collisions(X.data(), states, of_cpu.data());
   }
-  const auto scene = makeScene(GetParam(), of_states);
+  const auto scene = makeScene(GetParam().oracle, of_states);
   for (std::size_t k = 0; k < states; ++k) one_by_one.push_back(scene->collides(X.data() + 3 * k));
   EXPECT_EQ(hits, of_cpu);
   EXPECT_EQ(hits, one_by_one);
@@ -124,8 +153,45 @@ TEST_P(GrowTogether, StatesOfAScene) {
   EXPECT_LT(batchesOf(models), batchesOf(of_states) / 2);
 }
 
-INSTANTIATE_TEST_SUITE_P(Oracles, GrowTogether, testing::Values(OracleKind::kCompute, OracleKind::kOcclusion),
-                         [](const auto& p) { return p.param == OracleKind::kCompute ? "compute" : "occlusion"; });
+// A model beside which nothing happens keeps what walks on the device came to.
+TEST(WalksOnTheDevice, KeepBranches) {
+  const auto compute = std::dynamic_pointer_cast<oracle::gl::ComputeOracle>(oracle::makeOracle(OracleKind::kCompute));
+  ASSERT_NE(compute, nullptr);
+  compute->setWalksAll(true);
+  auto now = std::make_shared<Clock::time_point>();
+  Options options = optionsOf(OracleKind::kCompute);
+  options.clock = [now] { return *now; };
+  options.ttl = std::chrono::seconds(2);
+  const auto mesh = test::torus(30).mesh();
+  Modeld a(mesh, options), b(mesh, options);
+  const Transforms X = randomPoses(60, 1.5);
+  std::vector<std::uint8_t> hits(X.size());
+  collidePoses(a, b, X.data(), X.size(), hits.data());
+  const std::size_t grown = a.statistics().resident_nodes, device = a.statistics().device_bytes;
+  const auto expansions = a.statistics().expansions;
+  EXPECT_GT(grown, 100u);
+  for (int i = 0; i < 5; ++i) {
+    *now += std::chrono::milliseconds(1500);
+    collidePoses(a, b, X.data(), X.size(), hits.data());
+  }
+  // Branches that only the first walks needed may go; none has to grow again.
+  EXPECT_EQ(a.statistics().expansions, expansions);
+  for (int i = 0; i < 8; ++i) {
+    *now += std::chrono::seconds(10);
+    a.prune(*now);
+  }
+  EXPECT_EQ(a.statistics().resident_nodes, 1u);
+  EXPECT_LT(a.statistics().device_bytes, device);  // the table went, too
+  compute->setWalksAll(false);
+}
+
+INSTANTIATE_TEST_SUITE_P(Oracles, GrowTogether,
+                         testing::Values(Param{OracleKind::kCompute, false}, Param{OracleKind::kCompute, true},
+                                         Param{OracleKind::kOcclusion, false}),
+                         [](const auto& p) {
+                           if (p.param.oracle == OracleKind::kOcclusion) return "occlusion";
+                           return p.param.walks_there ? "compute_walks" : "compute";
+                         });
 
 }  // namespace
 }  // namespace bocst

@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #include "fcl/queries/grow_together.h"
 
+#include <chrono>
 #include <utility>
 
 #include "fcl/adapters/models.h"
@@ -17,12 +18,19 @@ using Outcome = query::SphereWalk::Outcome;
 
 constexpr std::size_t kFirstBatch = query::DeferredPairs<query::TreeSide, query::TreeSide>::kFirstBatch;
 
+/// Walks whose nodes grow together, and that the host looks at in turn: more of them grow more than they need, as none
+/// knows what the others ask for.
+constexpr std::size_t kMostTogether = 256;
+
 struct Walk {
   const query::TreeSide *a, *b;
   query::SimilarityTransform b_in_a;
   std::size_t pair;
+  std::size_t batch;  // of pairs of nodes that grow next
 
   query::SphereWalk spheres() const { return {*a, *b, b_in_a}; }
+  oracle::Oracle& oracle() const { return a->tree().oracle(); }
+  bool hasOneOracle() const { return &oracle() == &b->tree().oracle(); }
 };
 
 /// What a thread keeps between calls, so that those that grow nothing allocate nothing.
@@ -32,6 +40,7 @@ struct Scratch {
   std::vector<Walk> walks;
   std::vector<tree::Tree::Growth> growths;
   std::vector<Spheres> found;
+  oracle::PairWalks device;
 };
 
 /// The session of one call about the trees in a scratch, as QueryScope: takes their query locks shared, in address
@@ -86,6 +95,133 @@ void growAll(std::vector<tree::Tree::Growth>& growths) {
   tree::Tree::grow(growths);
 }
 
+/// The walks of a scratch, over what is resident; what they need then grows, until all have their answer.
+class Walks {
+ public:
+  explicit Walks(Scratch& s) : s_(s) {}
+
+  void run() {
+    while (!s_.walks.empty()) {
+      s_.growths.clear();
+      if (!byDevice()) byHost();
+      growAll(s_.growths);
+    }
+  }
+
+ private:
+  using Found = oracle::PairWalks::Found;
+  static constexpr std::uint32_t kNone = ~std::uint32_t{0};
+
+  static double seconds() {
+    return std::chrono::duration<double>(std::chrono::steady_clock::now().time_since_epoch()).count();
+  }
+
+  /// Has the walk its answer? If not, adds what it needs.
+  bool look(Walk& walk) {
+    const Outcome outcome = walk.spheres().look(walk.batch, s_.growths);
+    walk.batch *= 2;
+    if (outcome == Outcome::kMeet) s_.found[walk.pair] = Spheres::kMeet;
+    return outcome != Outcome::kNeedsGrowth;
+  }
+
+  void byHost() {
+    const double begin = seconds();
+    const std::size_t count = std::min(kMostTogether, s_.walks.size());
+    oracle::Oracle& oracle = s_.walks.front().oracle();
+    const auto end = s_.walks.begin() + static_cast<std::ptrdiff_t>(count);
+    s_.walks.erase(std::remove_if(s_.walks.begin(), end, [this](Walk& walk) { return look(walk); }), end);
+    oracle.pairsTook(count, seconds() - begin, true);
+  }
+
+  /// Walks on a device what one oracle takes; false where none takes anything.
+  bool byDevice() {
+    oracle::Oracle& oracle = s_.walks.front().oracle();
+    const auto is_its = [&](const Walk& walk) { return walk.hasOneOracle() && &walk.oracle() == &oracle; };
+    if (!oracle.walksPairs(s_.walks.size()) || !is_its(s_.walks.front())) return false;
+    const double begin = seconds();
+    s_.device.trees.clear();
+    s_.device.pairs.clear();
+    trees_.assign(s_.sides.size(), kNone);
+    asked_.clear();
+    for (std::size_t i = 0; i < s_.walks.size(); ++i) {
+      oracle::PairWalks::Pair pair;
+      if (!is_its(s_.walks[i]) || !s_.walks[i].spheres().describe(pair)) continue;
+      pair.tree[0] = numberOf(*s_.walks[i].a);
+      pair.tree[1] = numberOf(*s_.walks[i].b);
+      if (s_.device.trees[pair.tree[0]].nodes == nullptr || s_.device.trees[pair.tree[1]].nodes == nullptr) continue;
+      s_.device.pairs.push_back(pair);
+      asked_.push_back(i);
+    }
+    if (asked_.empty()) return false;
+    oracle.walkPairs(s_.device);
+    oracle.pairsTook(asked_.size(), seconds() - begin, false);
+    for (std::size_t k = 0; k < s_.sides.size(); ++k) {
+      if (trees_[k] != kNone) query::SphereWalk::markUsed(s_.sides[k], s_.device.trees[trees_[k]]);
+    }
+    take();
+    return true;
+  }
+
+  /// The number of a side's tree among those of the device.
+  std::uint32_t numberOf(const query::TreeSide& side) {
+    std::uint32_t& number = trees_[static_cast<std::size_t>(&side - s_.sides.data())];
+    if (number == kNone) {
+      number = static_cast<std::uint32_t>(s_.device.trees.size());
+      s_.device.trees.push_back(query::SphereWalk::describe(side, side.tree().nodeTable()));
+    }
+    return number;
+  }
+
+  /// Takes what the device found. What it did not decide, and the first of what must grow, are the host's.
+  void take() {
+    std::stable_sort(s_.device.deferred.begin(), s_.device.deferred.end(),
+                     [](const auto& x, const auto& y) { return x.pair < y.pair; });
+    auto next = s_.device.deferred.begin();
+    std::size_t grown = 0;
+    done_.assign(s_.walks.size(), false);
+    for (std::size_t k = 0; k < asked_.size(); ++k) {
+      deferred_.clear();
+      for (; next != s_.device.deferred.end() && next->pair == k; ++next) deferred_.push_back(*next);
+      Walk& walk = s_.walks[asked_[k]];
+      const std::uint8_t found = s_.device.found[k];
+      if ((found & Found::kMeet) != 0) {
+        s_.found[walk.pair] = Spheres::kMeet;
+        done_[asked_[k]] = true;
+      } else if (found == 0) {
+        done_[asked_[k]] = true;
+      } else if (grown < kMostTogether) {
+        ++grown;
+        if ((found & (Found::kDoubt | Found::kUndone)) != 0 || deferred_.empty()) {
+          done_[asked_[k]] = look(walk);
+        } else {
+          walk.spheres().addGrowths(deferred_, walk.batch, s_.growths);
+          walk.batch *= 2;
+        }
+      }
+    }
+    // Those that no device takes.
+    for (std::size_t i = 0, k = 0; i < s_.walks.size() && grown < kMostTogether; ++i) {
+      if (k < asked_.size() && asked_[k] == i) {
+        ++k;
+      } else {
+        ++grown;
+        done_[i] = look(s_.walks[i]);
+      }
+    }
+    std::size_t left = 0;
+    for (std::size_t i = 0; i < s_.walks.size(); ++i) {
+      if (!done_[i]) s_.walks[left++] = s_.walks[i];
+    }
+    s_.walks.erase(s_.walks.begin() + static_cast<std::ptrdiff_t>(left), s_.walks.end());
+  }
+
+  Scratch& s_;
+  std::vector<std::uint32_t> trees_;  // of each side, its number among the device's
+  std::vector<std::size_t> asked_;    // the device's pairs, as numbers of walks
+  std::vector<oracle::PairWalks::Deferred> deferred_;
+  std::vector<bool> done_;
+};
+
 }  // namespace
 
 template <typename S>
@@ -114,7 +250,7 @@ const std::vector<Spheres>& growTogether(const std::vector<PosedPair<S>>& pairs)
     const OrderedPair<S> ordered{p.a, p.X_WA, p.b, p.X_WB, turned};
     const query::TreeSide *a = &scope.sideOf(treeOf(*p.a)), *b = &scope.sideOf(treeOf(*p.b));
     ordered.inCallersOrder(a, b);
-    Walk walk{a, b, relate<S>(ordered, *a, *b).b_in_a, k};
+    Walk walk{a, b, relate<S>(ordered, *a, *b).b_in_a, k, kFirstBatch};
     walk.b_in_a.tolerance += marginOf(p.a, p.b) / unitOf(*a);
     if (!(walk.b_in_a.tolerance < 1e15)) {
       s.found[k] = Spheres::kUnknown;  // beyond this a query looks at the distance first
@@ -122,16 +258,7 @@ const std::vector<Spheres>& growTogether(const std::vector<PosedPair<S>>& pairs)
       s.walks.push_back(walk);
     }
   }
-  for (std::size_t batch = kFirstBatch; !s.walks.empty(); batch *= 2) {
-    s.growths.clear();
-    const auto isDone = [&](const Walk& walk) {
-      const Outcome outcome = walk.spheres().look(batch, s.growths);
-      if (outcome == Outcome::kMeet) s.found[walk.pair] = Spheres::kMeet;
-      return outcome != Outcome::kNeedsGrowth;
-    };
-    s.walks.erase(std::remove_if(s.walks.begin(), s.walks.end(), isDone), s.walks.end());
-    growAll(s.growths);
-  }
+  Walks(s).run();
   return s.found;
 }
 

@@ -64,9 +64,7 @@ void Arena::grow(std::uint64_t words) {
     std::uint32_t sample[kSample];
     for (const std::uint64_t at : {std::uint64_t{0}, before / 2, before - kSample}) {
       buffer_->read(at * kWord, sizeof(sample), sample);
-      if (larger->holds(at * kWord, sizeof(sample), sample)) continue;
-      thread_->distrust("a copy did not arrive");
-      throw OracleError("the GPU context is lost");
+      thread_->require(larger->holds(at * kWord, sizeof(sample), sample), "a copy did not arrive");
     }
   }
   buffer_ = std::move(larger);

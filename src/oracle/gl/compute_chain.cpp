@@ -27,8 +27,6 @@ constexpr PassSource kSources[] = {{"masks", false},   {"decide", false}, {"plac
 // A dispatch of more would take long enough for a watchdog of a slow device.
 constexpr std::uint64_t kMostInvocations = std::uint64_t{1} << 22;
 
-std::uint32_t narrow(std::uint64_t n) { return static_cast<std::uint32_t>(n); }
-
 // So many cells that their states fit into one buffer.
 ComputeChain::Limits clamped(ComputeChain::Limits limits) {
   limits.cells = std::max<std::size_t>(1, std::min(limits.cells, limits.bytes / (kStateWords * kWord)));
@@ -185,28 +183,21 @@ const std::uint32_t* ComputeChain::read(std::size_t words, Thread& thread) {
   return static_cast<const std::uint32_t*>(staging_.take());
 }
 
-// A driver that leaves out work in silence would make surface vanish: it is not asked again.
-void ComputeChain::require(bool holds, const char* what, Thread& thread) {
-  if (holds) return;
-  thread.distrust(what);
-  throw OracleError("the GPU context is lost");
-}
-
 void ComputeChain::checkHeader(const std::uint32_t* answers, Thread& thread) const {
-  require(std::equal(groups_.begin(), groups_.end(), answers + kGroups), "work groups did not run", thread);
-  require((answers[kFailed] & kMasksFailed) == 0, "a pass did not see what the one before it wrote", thread);
-  require((answers[kFailed] & kListsFailed) == 0, "a list was not filled", thread);
+  thread.require(std::equal(groups_.begin(), groups_.end(), answers + kGroups), "work groups did not run");
+  thread.require((answers[kFailed] & kMasksFailed) == 0, "a pass did not see what the one before it wrote");
+  thread.require((answers[kFailed] & kListsFailed) == 0, "a list was not filled");
 }
 
 void ComputeChain::take(const std::vector<ExpansionRequest*>& requests, const std::uint32_t* answers,
                         Thread& thread) const {
   const std::uint32_t* const all_ids = answers + kHeader + requests.size() * kRow;
-  require(all_ids[answers[kIdWords]] == batch_, "what came back is not of this batch", thread);
+  thread.require(all_ids[answers[kIdWords]] == batch_, "what came back is not of this batch");
   for (std::size_t i = 0; i < requests.size(); ++i) {
     ExpansionRequest& e = *requests[i];
     const std::uint32_t* const row = answers + kHeader + i * kRow;
-    require(row[kRowCheck] == check(rows_[i]), "a cell was not answered", thread);
-    require(sums_[i] == 0 || row[kRowSum] == sums_[i], "it saw other triangles", thread);
+    thread.require(row[kRowCheck] == check(rows_[i]), "a cell was not answered");
+    thread.require(sums_[i] == 0 || row[kRowSum] == sums_[i], "it saw other triangles");
     CellAnswer answer;
     std::memcpy(static_cast<void*>(&answer), row, sizeof(answer));
     e.octants = answer.octants;
@@ -229,7 +220,7 @@ void ComputeChain::take(const std::vector<ExpansionRequest*>& requests, const st
       list += size;
     }
     e.list_begin[8] = here;
-    require(row[kRowIds] + here <= answers[kIdWords], "a list is longer than what came back", thread);
+    thread.require(row[kRowIds] + here <= answers[kIdWords], "a list is longer than what came back");
     e.lists.assign(ids, ids + here);
   }
 }
@@ -270,7 +261,7 @@ void ComputeChain::answer(const std::vector<ExpansionRequest*>& requests, Thread
     fill();
     answers = read(fixed + id_capacity_ + 1, thread);
     checkHeader(answers, thread);
-    require(answers[kListWords] == list_capacity_ && answers[kIdWords] == id_capacity_, "lists changed", thread);
+    thread.require(answers[kListWords] == list_capacity_ && answers[kIdWords] == id_capacity_, "lists changed");
   } else if (fixed + answers[kIdWords] + 1 > first_read) {
     answers = read(fixed + answers[kIdWords] + 1, thread);
     checkHeader(answers, thread);

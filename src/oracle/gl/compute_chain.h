@@ -64,7 +64,6 @@ class ComputeChain {
   void run(Pass pass, std::uint64_t invocations);
   void fill();
   const std::uint32_t* read(std::size_t words, Thread& thread);
-  static void require(bool holds, const char* what, Thread& thread);
   void checkHeader(const std::uint32_t* answers, Thread& thread) const;
   void take(const std::vector<ExpansionRequest*>& requests, const std::uint32_t* answers, Thread& thread) const;
   void findCost(std::chrono::duration<double> all);

@@ -19,17 +19,21 @@ ComputeChain::Limits complete(ComputeChain::Limits limits, Thread& thread) {
 }  // namespace
 
 ComputeOracle::ComputeOracle(const std::shared_ptr<Thread>& thread, ComputeChain::Limits limits)
-    : DeviceOracle(thread, true, complete(limits, *thread).bytes) {
+    : DeviceOracle(thread, true, complete(limits, *thread).bytes), choice_(thread->info().hardware) {
   limits = complete(limits, *thread_);
   thread_->run([&] {
     arena_ = std::make_shared<Arena>(thread_, limits.bytes);
     chain_ = std::make_unique<ComputeChain>(limits, *arena_);
+    walker_ = std::make_unique<PairWalker>(*arena_, limits.bytes);
   });
 }
 
 ComputeOracle::~ComputeOracle() {
   finish();
-  thread_->post([chain = chain_.release()] { delete chain; });
+  thread_->post([chain = chain_.release(), walker = walker_.release()] {
+    delete chain;
+    delete walker;
+  });
 }
 
 void ComputeOracle::answer(const std::vector<ExpansionRequest*>& requests, std::vector<Verdict>& verdicts) {
@@ -67,6 +71,30 @@ bool ComputeOracle::fetch(const DeviceResource&, ExpansionRequest::DeviceList li
   } catch (const OracleError& e) {
     reportFailure("a triangle list that only the device has", e);
     return false;
+  }
+}
+
+bool ComputeOracle::walksPairs(std::size_t pairs) {
+  return !thread_->isLost() && (walks_all_ || choice_.takesDevice(pairs));
+}
+
+std::shared_ptr<const DeviceResource> ComputeOracle::uploadNodes(std::vector<std::uint32_t>& words) {
+  std::shared_ptr<const DeviceResource> nodes;
+  try {
+    thread_->run([&] { nodes = walker_->upload(words); });
+  } catch (const std::exception& e) {
+    reportFailure("a table of nodes", e);
+  }
+  return nodes;
+}
+
+void ComputeOracle::walkPairs(PairWalks& walks) {
+  try {
+    thread_->run([&] { walker_->walk(walks, *thread_); });
+    walked_ += walks.pairs.size();
+  } catch (const std::exception& e) {
+    reportFailure("a walk over pairs", e);
+    Oracle::walkPairs(walks);
   }
 }
 

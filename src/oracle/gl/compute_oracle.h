@@ -1,14 +1,17 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #pragma once
 
+#include <atomic>
 #include <cstdint>
 #include <memory>
 #include <string>
 #include <vector>
 
+#include "oracle/cost_model.h"
 #include "oracle/gl/arena.h"
 #include "oracle/gl/compute_chain.h"
 #include "oracle/gl/device_oracle.h"
+#include "oracle/gl/pair_walker.h"
 
 namespace bocst::oracle::gl {
 
@@ -27,11 +30,25 @@ class ComputeOracle : public DeviceOracle {
 
   Cost lastCost() override;
 
+  bool walksPairs(std::size_t pairs) override;
+  std::shared_ptr<const DeviceResource> uploadNodes(std::vector<std::uint32_t>& words) override;
+  void walkPairs(PairWalks& walks) override;
+  void pairsTook(std::size_t pairs, double seconds, bool by_host) override { choice_.learn(pairs, seconds, by_host); }
+
+  /// For tests: walk all pairs, also where that takes longer than the host.
+  void setWalksAll(bool walks_all) { walks_all_ = walks_all; }
+  /// How many pairs were walked.
+  std::uint64_t walked() const { return walked_; }
+
  private:
   void answer(const std::vector<ExpansionRequest*>& requests, std::vector<Verdict>& verdicts) override;
 
   std::shared_ptr<Arena> arena_;
   std::unique_ptr<ComputeChain> chain_;
+  std::unique_ptr<PairWalker> walker_;
+  PairsChoice choice_;
+  std::atomic<bool> walks_all_{false};
+  std::atomic<std::uint64_t> walked_{0};
 };
 
 }  // namespace bocst::oracle::gl

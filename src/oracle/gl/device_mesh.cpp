@@ -28,10 +28,7 @@ DeviceMesh::DeviceMesh(Thread& thread, std::shared_ptr<Arena> arena, const Surfa
     words_ = arena_->take(words.size());
     const std::size_t at = words_->begin() * sizeof(words[0]), bytes = words.size() * sizeof(words[0]);
     arena_->buffer().write(at, bytes, words.data());
-    if (!arena_->buffer().holds(at, bytes, words.data())) {
-      thread.distrust("a mesh did not arrive");
-      throw OracleError("the GPU context is lost");
-    }
+    thread.require(arena_->buffer().holds(at, bytes, words.data()), "a mesh did not arrive");
   });
   vertices_ = words_->begin() + static_cast<std::uint32_t>(vertices);
   exact_ = words_->begin() + static_cast<std::uint32_t>(doubles);

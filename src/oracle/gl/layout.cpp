@@ -57,6 +57,43 @@ constexpr Constant kConstants[] = {
     BOCST_NAMED(kMostNormalNorm1),
     BOCST_NAMED(kMostSlabCenter),
     BOCST_NAMED(kMostSlabHalf),
+    BOCST_NAMED(kPairRotation),
+    BOCST_NAMED(kPairShift),
+    BOCST_NAMED(kPairUnit),
+    BOCST_NAMED(kPairMargin),
+    BOCST_NAMED(kPairTolerance),
+    BOCST_NAMED(kPairNotSmaller),
+    BOCST_NAMED(kPairTrees),
+    BOCST_NAMED(kTreeBegin),
+    BOCST_NAMED(kTreeStamp),
+    BOCST_NAMED(kTreeUsed),
+    BOCST_NAMED(kTreeBlocks),
+    BOCST_NAMED(kTreeRoot),
+    BOCST_NAMED(kTreeDeepest),
+    BOCST_NAMED(kTreeExtent),
+    BOCST_NAMED(kTreeWords),
+    BOCST_NAMED(kPairBatch),
+    BOCST_NAMED(kPairDeferred),
+    BOCST_NAMED(kPairRoom),
+    BOCST_NAMED(kPairWords),
+    BOCST_NAMED(kDeferredCount),
+    BOCST_NAMED(kPairHeader),
+    BOCST_NAMED(kPairAnswer),
+    BOCST_NAMED(kDeferredWords),
+    BOCST_NAMED(kMostSteps),
+    BOCST_NAMED(kWalkStack),
+    {"kMostLevel", lattice::kMaxLevel},
+    {"kNodePlace", node_table::kPlace},
+    {"kNodeShape", node_table::kShape},
+    {"kNodeChildren", node_table::kChildren},
+    {"kNodeStamp", node_table::kStamp},
+    {"kNodeWords", node_table::kWords},
+    {"kNoBlock", node_table::kNone},
+    {"kMeet", PairWalks::kMeet},
+    {"kDoubt", PairWalks::kDoubt},
+    {"kGrows", PairWalks::kGrows},
+    {"kUndone", PairWalks::kUndone},
+    {"kInvalid", PairWalks::kInvalid},
 };
 #undef BOCST_NAMED
 
@@ -68,6 +105,7 @@ std::string constants() {
   for (const Constant& c : kConstants) {
     text += std::string("const uint ") + c.name + " = " + std::to_string(c.value) + "u;\n";
   }
+  text += "const int kMiddle = " + std::to_string(lattice::kMiddle) + ";\n";
   return text;
 }
 

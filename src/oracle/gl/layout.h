@@ -7,10 +7,14 @@
 #include <string>
 
 #include "bounds/node_bounds.h"
+#include "lattice/lattice.h"
+#include "oracle/pair_walk.h"
 
 /// The tables that the compute shaders share with each other and with the host. The shaders get these numbers, and
 /// those of the codec of node bounds, under the same names.
 namespace bocst::oracle::gl::layout {
+
+inline std::uint32_t narrow(std::uint64_t n) { return static_cast<std::uint32_t>(n); }
 
 constexpr std::uint32_t kGroup = 128;        ///< Invocations of a work group.
 constexpr std::uint32_t kAll = 0xffffffffu;  ///< As a list: the triangles of the mesh, in order.
@@ -82,14 +86,38 @@ struct Cell {
   std::uint32_t batch;
 };
 static_assert(sizeof(Cell) == 48, "std430 pads to 16 bytes");
-/// What answers say of a cell that they belong to; common.glsl has the same.
+
+// A walk over pairs of trees (pairs.glsl). Of each pair it is asked, in words:
+constexpr std::uint32_t kPairRotation = 0, kPairShift = 9, kPairUnit = 12, kPairMargin = 13, kPairTolerance = 14,
+                        kPairNotSmaller = 15;            ///< As of PairWalks::Pair.
+constexpr std::uint32_t kPairTrees = 16;                 ///< 2 times kTreeWords:
+constexpr std::uint32_t kTreeBegin = 0, kTreeStamp = 1;  ///< where its table is, the stamp of its words,
+constexpr std::uint32_t kTreeUsed = 2;                   ///< where the bits of its blocks go,
+constexpr std::uint32_t kTreeBlocks = 3, kTreeRoot = 4, kTreeDeepest = 5, kTreeExtent = 6;  ///< as of PairWalks::Tree.
+constexpr std::uint32_t kTreeWords = 9;
+constexpr std::uint32_t kPairBatch = kPairTrees + 2 * kTreeWords;  ///< The number of the batch.
+constexpr std::uint32_t kPairDeferred = kPairBatch + 1;            ///< Where deferred pairs of nodes go,
+constexpr std::uint32_t kPairRoom = kPairDeferred + 1;             ///< and how many of them have room.
+constexpr std::uint32_t kPairWords = kPairRoom + 1;
+// The answer: a header, a row per pair (the batch's number above 8 bits of PairWalks::Found; its check), bits of
+// blocks, deferred pairs (the pair, two nodes, the batch's number).
+constexpr std::uint32_t kDeferredCount = 0, kPairHeader = 1, kPairAnswer = 2, kDeferredWords = 4;
+constexpr std::uint32_t kMostSteps = 1u << 12;  ///< Of a walk: longer ones are the host's, as a watchdog may look.
+constexpr std::uint32_t kWalkStack = 64 * 2 * lattice::kMaxLevel;
+
+/// What answers say of a question that they belong to; the shaders have the same.
 constexpr std::uint32_t kCheckFactor = 0x9e3779b1u;
-inline std::uint32_t check(const Cell& cell) {
-  std::uint32_t words[sizeof(Cell) / 4], sum = 0, factor = 1;
-  std::memcpy(words, &cell, sizeof(cell));
+template <std::size_t kCount>
+std::uint32_t check(const std::uint32_t (&words)[kCount]) {
+  std::uint32_t sum = 0, factor = 1;
   // From the last: products that need not wait for each other.
-  for (std::size_t i = sizeof(Cell) / 4; i-- > 0; factor *= kCheckFactor) sum += words[i] * factor;
+  for (std::size_t i = kCount; i-- > 0; factor *= kCheckFactor) sum += words[i] * factor;
   return sum;
+}
+inline std::uint32_t check(const Cell& cell) {
+  std::uint32_t words[sizeof(Cell) / 4];
+  std::memcpy(words, &cell, sizeof(cell));
+  return check(words);
 }
 
 /// All of these as constants of the shaders' language.

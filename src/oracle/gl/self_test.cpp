@@ -11,6 +11,7 @@
 
 #include "bounds/cell_frame.h"
 #include "oracle/cpu/cpu_oracle.h"
+#include "oracle/gl/known_pairs.h"
 #include "oracle/reference.h"
 
 namespace bocst::oracle::gl {
@@ -276,7 +277,7 @@ std::string selfTest(ComputeOracle& oracle) {
     const std::string wrong = askKept(oracle, {surface, lattice::Cell{}, allOf(*surface)});
     if (!wrong.empty()) return wrong;
   }
-  return "";
+  return KnownPairs(meshes->ball, meshes->star).ask(oracle);
 }
 
 std::string selfTest(OcclusionOracle& oracle) {

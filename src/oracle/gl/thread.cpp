@@ -116,6 +116,12 @@ void Thread::distrust(const std::string& why) {
   lose("it answered wrongly: " + why);
 }
 
+void Thread::require(bool holds, const char* what) {
+  if (holds) return;
+  distrust(what);
+  throw OracleError("the GPU context is lost");
+}
+
 void Thread::awaitDevice() {
   const auto begin = std::chrono::steady_clock::now();
   const GLsync fence = glFenceSync(GL_SYNC_GPU_COMMANDS_COMPLETE, 0);

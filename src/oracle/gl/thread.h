@@ -49,6 +49,9 @@ class Thread {
 
   /// The same for a device that answered wrongly, which nobody should ask again.
   void distrust(const std::string& why);
+  /// In a job: distrusts the device unless it `holds`; a driver that leaves out work in silence would make surface
+  /// vanish. @throws OracleError then.
+  void require(bool holds, const char* what);
   bool isDistrusted() const { return distrusted_.load(std::memory_order_relaxed); }
 
   /// In a job: looks whether the driver has lost the context. @throws OracleError if so.

@@ -322,6 +322,12 @@ SphereFrames::SphereFrames(const SimilarityTransform& one_in_zero) {
   tolerance = static_cast<float>(one_in_zero.tolerance);
 }
 
+int levelsApart(double scale) {
+  int levels;
+  const bool even = std::frexp(scale, &levels) == 0.5;
+  return even ? levels - 1 : levels;
+}
+
 SphereSteps::SphereSteps(const TreeSide& a, const TreeSide& b, const SimilarityTransform& b_in_a_,
                          SphereFrame* spheres_)
     : side{&a, &b}, b_in_a(b_in_a_), frames(b_in_a_), spheres(spheres_) {
@@ -330,9 +336,7 @@ SphereSteps::SphereSteps(const TreeSide& a, const TreeSide& b, const SimilarityT
     std::copy_n(tree.surface().lattice.extent().data(), 3, extent[s]);
     deepest[s] = static_cast<std::uint32_t>(tree.deepest());
   }
-  // As in PairSteps.
-  const bool even = std::frexp(b_in_a.scale, &not_smaller) == 0.5;
-  if (even) --not_smaller;
+  not_smaller = levelsApart(b_in_a.scale);
   std::fill_n(holds, kFrames, kNothing);
 }
 

@@ -40,6 +40,10 @@ struct SphereFrames {
   float tolerance = 0;
 };
 
+/// Of nodes that are so many levels apart, or more, the one of side 0 is not the smaller; `scale`: that of side 1's
+/// lattice unit.
+int levelsApart(double scale);
+
 /// Octants of one block that may meet one node of the other side, still to be walked. Words of one size, as in
 /// StepGroup.
 struct SphereGroup {
@@ -84,7 +88,7 @@ struct SphereSteps {
   const SphereFrames frames;
   std::uint32_t extent[2][3];  ///< Where the actual regions end.
   std::uint32_t deepest[2];    ///< The level of each side's leaves.
-  int not_smaller;             ///< As in PairSteps.
+  int not_smaller;             ///< See levelsApart().
   bool nearest_first = true;   ///< A hit ends the walk.
   const Cut* cut = nullptr;    ///< What is left out; octants then come in the order of their ids.
   bool isBeyondCut(tree::NodeRef a, tree::NodeRef b) const {

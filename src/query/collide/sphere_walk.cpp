@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #include "query/collide/sphere_walk.h"
 
+#include <algorithm>
 #include <cmath>
 #include <vector>
 
@@ -97,6 +98,49 @@ SphereWalk::Outcome SphereWalk::look(std::size_t batch, std::vector<tree::Tree::
         break;
       case SphereSteps::kLeaves:
         return Outcome::kMeet;
+    }
+  }
+}
+
+bool SphereWalk::describe(oracle::PairWalks::Pair& pair) const {
+  // Square roots of a device's float may be off by some ulp more.
+  constexpr float kWider = 1.5f;
+  const SphereFrames frames(b_in_a_);
+  if (!std::isfinite(frames.rounding_margin) || (a_.tree().isDeepest(1) && b_.tree().isDeepest(1))) return false;
+  const SphereFrames::Side& side = frames.side[1];
+  std::copy_n(&side.to_other[0][0], 9, &pair.rotation[0][0]);
+  std::copy_n(side.shift, 3, pair.shift);
+  pair.unit = side.unit;
+  pair.rounding_margin = kWider * frames.rounding_margin;
+  pair.tolerance = frames.tolerance;
+  pair.not_smaller = levelsApart(b_in_a_.scale);
+  return true;
+}
+
+oracle::PairWalks::Tree SphereWalk::describe(const TreeSide& side, const tree::Tree::NodeTable& table) {
+  oracle::PairWalks::Tree tree;
+  tree.nodes = table.nodes;
+  tree.blocks = table.blocks;
+  tree.root = table.root;
+  tree.deepest = static_cast<std::uint32_t>(side.tree().deepest());
+  std::copy_n(side.tree().surface().lattice.extent().data(), 3, tree.extent);
+  return tree;
+}
+
+void SphereWalk::addGrowths(const std::vector<oracle::PairWalks::Deferred>& deferred, std::size_t batch,
+                            std::vector<tree::Tree::Growth>& growths) const {
+  Scratch& s = scratchOfThread();
+  s.deferred.clear();
+  for (const oracle::PairWalks::Deferred& d : deferred) {
+    s.deferred.add({tree::NodeRef{d.node[0]}, tree::NodeRef{d.node[1]}});
+  }
+  if (!s.deferred.empty()) s.deferred.addGrowths(a_, b_, b_in_a_, batch, growths);
+}
+
+void SphereWalk::markUsed(const TreeSide& side, const oracle::PairWalks::Tree& tree) {
+  for (std::uint32_t word = 0; word < tree.used.size(); ++word) {
+    for (std::uint32_t bits = tree.used[word]; bits != 0; bits &= bits - 1) {
+      side.tree().markUsed(32 * word + static_cast<std::uint32_t>(__builtin_ctz(bits)), side.now());
     }
   }
 }

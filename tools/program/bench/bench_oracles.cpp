@@ -2,9 +2,11 @@
 #include "bench/bench_oracles.h"
 
 #include <bocst/bocst.h>
+#include <bocst/collide_poses.h>
 #include <bocst/io.h>
 
 #include <algorithm>
+#include <chrono>
 #include <cmath>
 #include <iostream>
 #include <memory>
@@ -225,6 +227,49 @@ class PlacementBench {
   std::vector<Level> levels_;
 };
 
+/// Conservative answers to many random poses of a mesh on itself, by collidePoses in one thread: microseconds a pose
+/// once both trees have all that the poses need.
+double timeOfPose(OracleKind kind, const std::shared_ptr<const Mesh>& mesh, int depth) {
+  constexpr std::size_t kPoses = 4096;
+  constexpr int kRounds = 8;
+  Options options;
+  options.oracle = kind;
+  options.answer = Answer::kConservative;
+  options.depth = depth;
+  options.ttl = std::chrono::hours(1);
+  const Modeld a(mesh, options), b(mesh, options);
+  const Eigen::AlignedBox3d box = mesh->bounds();
+  std::mt19937_64 g(5);
+  std::normal_distribution<double> normal;
+  std::uniform_real_distribution<double> uniform(-0.5, 0.5);
+  std::vector<fcl::Transform3d> poses(kPoses, fcl::Transform3d::Identity());
+  for (fcl::Transform3d& X : poses) {
+    Eigen::Vector4d q;
+    Eigen::Vector3d t;
+    for (int k = 0; k < 4; ++k) q[k] = normal(g);
+    for (int k = 0; k < 3; ++k) t[k] = uniform(g);
+    X.linear() = Eigen::Quaterniond(q.normalized()).toRotationMatrix();
+    X.translation() = box.center() - X.linear() * box.center() + box.diagonal().norm() * t;
+  }
+  std::vector<std::uint8_t> hits(kPoses);
+  std::vector<double> times;
+  for (int round = 0; round < kRounds; ++round) {
+    const Stopwatch watch;
+    collidePoses(a, b, poses.data(), kPoses, hits.data());
+    if (round > kRounds / 2) times.push_back(watch.microseconds() / kPoses);
+  }
+  return quantile(times, 0.5);
+}
+
+void measurePoses(const std::shared_ptr<const Mesh>& mesh, Table& table, Json& rows) {
+  for (const int depth : {5, 6, 7}) {
+    const double host = timeOfPose(OracleKind::kCpu, mesh, depth),
+                 device = timeOfPose(OracleKind::kCompute, mesh, depth);
+    rows.push_back({{"depth", depth}, {"cpu_us", host}, {"compute_us", device}});
+    table.row({std::to_string(depth), formatTime(host), formatTime(device), formatNumber(host / device, 3) + " x"});
+  }
+}
+
 }  // namespace
 
 int OracleBench::run(const Output& output) const {
@@ -285,8 +330,12 @@ int OracleBench::run(const Output& output) const {
   Table placement;
   placement.row({"conservative growth", "batches", "cpu", "compute", "auto", "better of both / auto"});
   report["placement"] = Json::array();
+  Table poses;
+  poses.row({"many poses, depth", "cpu, a pose", "compute", "cpu / compute"});
+  report["poses"] = Json::array();
   if (seen.count("compute") != 0) {
     PlacementBench(loadMesh(file), oracle::makeOracle(OracleKind::kCompute)).run(placement, report["placement"]);
+    measurePoses(loadMesh(file), poses, report["poses"]);
   }
   if (output.wantsJson()) {
     output.write(report);
@@ -295,6 +344,8 @@ int OracleBench::run(const Output& output) const {
     if (!report["placement"].empty()) {
       std::cout << '\n';
       placement.print();
+      std::cout << '\n';
+      poses.print();
     }
     for (const OracleInfo& info : oracles) std::cout << '\n' << info.name << ": " << info.device;
     std::cout << '\n';

@@ -1,0 +1,62 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#include "oracle/cost_model.h"
+
+#include <algorithm>
+#include <cmath>
+
+namespace bocst::oracle {
+namespace {
+
+// How far one batch corrects what is expected, and the most that it may be taken to be off by: a thread that has to
+// wait for its core says nothing of the device.
+constexpr double kRate = 0.3, kMostOff = 8;
+
+// Of the time of all batches, what asking a slower device again may take, and what it may make of one batch's time. A
+// trial counts as kLeastPrice of the batch's time at least.
+constexpr double kTrying = 0.02, kSlowestTry = 4, kMostCredit = 0.02, kLeastPrice = 0.25;
+
+// Before anything is measured; a cell is a pair here. The host: bunny00 at depth 7 on one core. A GPU: a guess. A
+// software renderer takes some hundred times as long as the host.
+constexpr CostModel kHostPairs{1e-7, 5e-6, 0}, kGpuPairs{3e-4, 1e-6, 0}, kSoftwarePairs{1e-3, 3e-4, 0};
+
+}  // namespace
+
+void CostModel::learn(double cells, double triangles, double seconds) {
+  const double expected = of(cells, triangles);
+  if (!(expected > 0)) return;
+  const double off = kRate * std::log(std::clamp(seconds / expected, 1 / kMostOff, kMostOff));
+  batch *= std::exp(off * batch / expected);
+  cell *= std::exp(off * cell * cells / expected);
+  triangle *= std::exp(off * triangle * triangles / expected);
+}
+
+void Trials::earn(double host) { credit_ = std::min(kMostCredit, credit_ + kTrying * host); }
+
+bool Trials::affords(double device, double host) const {
+  return device <= host + std::min(credit_, (kSlowestTry - 1) * host);
+}
+
+bool Trials::take(double device, double host) {
+  const double price = std::max(device - host, kLeastPrice * host);
+  if (price >= credit_ || device >= kSlowestTry * host) return false;
+  credit_ -= price;
+  return true;
+}
+
+PairsChoice::PairsChoice(bool is_hardware) : host_(kHostPairs), device_(is_hardware ? kGpuPairs : kSoftwarePairs) {}
+
+bool PairsChoice::takesDevice(std::size_t pairs) {
+  const std::unique_lock<std::mutex> lock(mutex_, std::try_to_lock);
+  if (!lock.owns_lock()) return false;
+  const auto count = static_cast<double>(pairs);
+  const double here = host_.of(count, 0), there = device_.of(count, 0);
+  trials_.earn(here);
+  return there < Trials::kWorthwhile * here || trials_.take(there, here);
+}
+
+void PairsChoice::learn(std::size_t pairs, double seconds, bool by_host) {
+  const std::unique_lock<std::mutex> lock(mutex_, std::try_to_lock);
+  if (lock.owns_lock()) (by_host ? host_ : device_).learn(static_cast<double>(pairs), 0, seconds);
+}
+
+}  // namespace bocst::oracle

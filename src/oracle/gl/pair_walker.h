@@ -1,0 +1,49 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#pragma once
+
+#include <cstddef>
+#include <cstdint>
+#include <memory>
+#include <string>
+#include <vector>
+
+#include "egl/handles.h"
+#include "oracle/gl/arena.h"
+#include "oracle/pair_walk.h"
+
+namespace bocst::oracle::gl {
+
+/// Walks pairs of sphere-trees at many poses (shaders/pairs.glsl): one dispatch and one read-back for all of them. In
+/// the thread of the context.
+class PairWalker {
+ public:
+  /// bytes: the most of one buffer. @throws OracleError when the shader does not compile.
+  PairWalker(Arena& arena, std::size_t bytes);
+
+  /// Brings a table of nodes to the device, after it has written its stamp into each block. @throws OracleError.
+  std::shared_ptr<const DeviceResource> upload(std::vector<std::uint32_t>& words);
+
+  /// Answers all. @throws OracleError; the context is lost then if the device left something out.
+  void walk(PairWalks& walks, Thread& thread);
+
+  /// What the driver gets.
+  static std::string source();
+
+ private:
+  struct Table;
+
+  void walkPart(PairWalks& walks, std::size_t first, std::size_t count, Thread& thread);
+  void describe(const PairWalks& walks, std::size_t first, std::size_t count);
+  void take(PairWalks& walks, std::size_t first, std::size_t count, const std::uint32_t* answers, Thread& thread) const;
+
+  Arena& arena_;
+  const std::size_t bytes_;
+  const Program program_;
+  Buffer pairs_, answers_;
+  Staging staging_;
+  std::uint32_t batch_ = 0, stamp_ = 0;
+  std::vector<std::uint32_t> rows_, used_;  // of the pairs; where each tree's bits go
+  std::uint32_t deferred_ = 0, room_ = 0;   // where deferred pairs of nodes go, and how many have room
+};
+
+}  // namespace bocst::oracle::gl

@@ -1,0 +1,158 @@
+// The walk over pairs of sphere-trees (query/collide/sphere_steps.h): a work group a pair of trees at a pose, eight
+// pairs of nodes at a time, a lane for each octant of the node that is expanded. It ends at the first leaves whose
+// spheres surely meet.
+//
+// The stack is sorted by depth, the sum of the two levels: what is taken are its deepest pairs, and what they put back
+// is deeper by one. So of each depth it has at most 64, and kWalkStack is room for all.
+
+layout(local_size_x = 64) in;
+
+layout(std430, binding = 0) readonly buffer Nodes { uint nodes[]; };  // tables of trees
+layout(std430, binding = 1) readonly buffer Pairs { uint pairs[]; };
+layout(std430, binding = 2) buffer Answers { uint answers[]; };
+
+shared uvec2 s_stack[kWalkStack];
+shared uint s_depth, s_found, s_goes_on[2];
+
+uint g_row;  // of the pair
+
+uint word(uint at) { return pairs[g_row + at]; }
+float number(uint at) { return uintBitsToFloat(word(at)); }
+uint ofTree(int t, uint at) { return word(kPairTrees + uint(t) * kTreeWords + at); }
+
+const uint kRoot = 0xffffffffu;  // as NodeRef
+
+struct Node {
+  uint level;
+  ivec3 at;  // of its cell
+};
+
+uint blockWord(int t, uint block, uint at) { return nodes[ofTree(t, kTreeBegin) + block * kNodeWords + at]; }
+
+Node nodeOf(int t, uint name) {
+  if (name == kRoot) return Node(1u, ivec3(0));
+  uint place = blockWord(t, name >> 3, kNodePlace), shape = blockWord(t, name >> 3, kNodeShape);
+  ivec3 octant = ivec3(name, name >> 1, name >> 2) & 1;
+  return Node((shape >> 16 & 0xffu) + 1u, 2 * ivec3(place & 0xffffu, place >> 16, shape & 0xffffu) + octant);
+}
+
+// About the middle of its own root, in units of tree 0; as TreeSide::sphere().
+void sphereOf(int t, Node node, out vec3 center, out float radius) {
+  int side = 1 << (kMostLevel - node.level);
+  ivec3 end = ivec3(ofTree(t, kTreeExtent), ofTree(t, kTreeExtent + 1u), ofTree(t, kTreeExtent + 2u)) - kMiddle;
+  ivec3 low = node.at * side - kMiddle, high = min(low + side, end);
+  float half_unit = t == 0 ? 0.5 : 0.5 * number(kPairUnit);
+  center = vec3(low + high) * half_unit;
+  if (all(greaterThanEqual(end, low + side))) {
+    radius = float(2 * side) * half_unit * 0.8660254;
+    return;
+  }
+  vec3 extent = vec3(high - low);
+  radius = sqrt(dot(extent, extent)) * half_unit * (node.level < ofTree(t, kTreeDeepest) ? 1.4142136 : 1.0);
+}
+
+vec3 placed(vec3 p) {
+  vec3 q;
+  for (uint j = 0u; j < 3u; ++j) {
+    uint row = kPairRotation + 3u * j;
+    q[j] = number(kPairShift + j) + number(row) * p.x + number(row + 1u) * p.y + number(row + 2u) * p.z;
+  }
+  return q;
+}
+
+void found(uint what) { atomicOr(s_found, what); }
+
+void defer(uint pair, uvec2 names) {
+  found(kGrows);
+  uint i = atomicAdd(answers[kDeferredCount], 1u);
+  if (i >= word(kPairRoom)) return;
+  uint at = word(kPairDeferred) + i * kDeferredWords;
+  answers[at] = pair;
+  answers[at + 1u] = names.x;
+  answers[at + 2u] = names.y;
+  answers[at + 3u] = word(kPairBatch);
+}
+
+void markUsed(int t, uint block) {
+  uint at = ofTree(t, kTreeUsed) + block / 32u, bit = 1u << (block & 31u);
+  if ((answers[at] & bit) == 0u) atomicOr(answers[at], bit);
+}
+
+// Is this octant of the next node of a pair to be walked on, and as what?
+bool step(uint pair, uvec2 names, uint octant, out uvec2 next) {
+  Node node[2] = Node[2](nodeOf(0, names.x), nodeOf(1, names.y));
+  bool leaf0 = node[0].level >= ofTree(0, kTreeDeepest), leaf1 = node[1].level >= ofTree(1, kTreeDeepest);
+  int deeper = int(node[1].level) - int(node[0].level);
+  int x = leaf1 || (!leaf0 && deeper >= int(word(kPairNotSmaller))) ? 0 : 1;
+  uint name = x == 0 ? names.x : names.y;
+  uint block = name == kRoot ? ofTree(x, kTreeRoot) : blockWord(x, name >> 3, kNodeChildren + (name & 7u));
+  if (block == kNoBlock) {
+    if (octant == 0u) defer(pair, names);
+    return false;
+  }
+  if (block >= ofTree(x, kTreeBlocks) || blockWord(x, block, kNodeStamp) != ofTree(x, kTreeStamp)) {
+    found(kInvalid);
+    return false;
+  }
+  if (octant == 0u) markUsed(x, block);
+  if ((blockWord(x, block, kNodeShape) >> (24u + octant) & 1u) == 0u) return false;
+  uint child = block << 3 | octant;
+  next = x == 0 ? uvec2(child, names.y) : uvec2(names.x, child);
+  node[x] = nodeOf(x, child);
+  vec3 center[2];
+  float radius[2];
+  sphereOf(0, node[0], center[0], radius[0]);
+  sphereOf(1, node[1], center[1], radius[1]);
+  vec3 way = placed(center[1]) - center[0];
+  float squared = dot(way, way), margin = number(kPairMargin);
+  float limit = radius[0] + radius[1] + number(kPairTolerance), most = limit + margin, least = max(limit - margin, 0.0);
+  if (squared > most * most) return false;
+  bool are_leaves = (x == 0 ? leaf1 : leaf0) && node[x].level >= ofTree(x, kTreeDeepest);
+  if (are_leaves) found(squared < least * least ? kMeet : kDoubt);
+  return !are_leaves;
+}
+
+uint before(uint lane) {
+  uint low = s_goes_on[0], high = s_goes_on[1];
+  if (lane < 32u) return uint(bitCount(low & ((1u << lane) - 1u)));
+  return uint(bitCount(low) + bitCount(high & ((1u << (lane - 32u)) - 1u)));
+}
+
+void synchronise() {
+  memoryBarrierShared();
+  barrier();
+}
+
+void main() {
+  uint pair = gl_WorkGroupID.x, lane = gl_LocalInvocationIndex;
+  g_row = pair * kPairWords;
+  if (lane == 0u) {
+    s_stack[0] = uvec2(kRoot);
+    s_depth = 1u;
+    s_found = 0u;
+  }
+  uint depth, steps = 0u;
+  for (;;) {
+    synchronise();
+    depth = s_depth;
+    bool is_done = depth == 0u || (s_found & (kMeet | kInvalid)) != 0u || steps == kMostSteps;
+    synchronise();
+    if (is_done) break;
+    ++steps;
+    if (lane < 2u) s_goes_on[lane] = 0u;
+    synchronise();
+    uint taken = min(depth, 8u), entry = lane / 8u;
+    uvec2 next;
+    bool goes_on = entry < taken && step(pair, s_stack[depth - taken + entry], lane & 7u, next);
+    if (goes_on) atomicOr(s_goes_on[lane / 32u], 1u << (lane & 31u));
+    synchronise();
+    if (goes_on) s_stack[depth - taken + before(lane)] = next;
+    if (lane == 0u) s_depth = depth - taken + uint(bitCount(s_goes_on[0]) + bitCount(s_goes_on[1]));
+  }
+  if (lane != 0u) return;
+  uint sum = 0u;
+  for (uint i = 0u; i < kPairWords; ++i) sum = sum * kCheckFactor + word(i);
+  uint row = kPairHeader + pair * kPairAnswer;
+  answers[row] = word(kPairBatch) << 8 | s_found | (depth != 0u && (s_found & kMeet) == 0u ? kUndone : 0u);
+  answers[row + 1u] = sum;
+}

@@ -1,0 +1,60 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#pragma once
+
+#include <cstddef>
+#include <cstdint>
+#include <memory>
+#include <vector>
+
+namespace bocst::oracle {
+
+class DeviceResource;
+
+/// The resident nodes of a sphere-tree as a device walks them: for each block kWords words.
+namespace node_table {
+constexpr std::uint32_t kPlace = 0;     ///< The expanded cell's x and, above 16 bits, y,
+constexpr std::uint32_t kShape = 1;     ///< z, above 16 bits its level, and above 24 the mask of its grey octants.
+constexpr std::uint32_t kChildren = 2;  ///< 8: the block of each octant, or kNone.
+constexpr std::uint32_t kStamp = 10;    ///< Of the upload: what did not arrive has another. The oracle's.
+constexpr std::uint32_t kWords = 11;
+constexpr std::uint32_t kNone = 0xffffffffu;
+}  // namespace node_table
+
+/// Pairs of sphere-trees at poses, for a walk over their resident nodes.
+struct PairWalks {
+  struct Tree {
+    std::shared_ptr<const DeviceResource> nodes;  ///< As Oracle::uploadNodes() gave.
+    std::uint32_t blocks = 0;                     ///< Of its table.
+    std::uint32_t root = node_table::kNone;       ///< The block of the root.
+    std::uint32_t deepest = 1;                    ///< The level of its leaves.
+    std::uint32_t extent[3] = {0, 0, 0};          ///< Where its actual regions end, in lattice units.
+    std::vector<std::uint32_t> used;              ///< Answered: of each block that was come to, a bit.
+  };
+  struct Pair {
+    std::uint32_t tree[2] = {0, 0};  ///< Of `trees`.
+    float rotation[3][3] = {};       ///< Row j of what turns coordinates about the middle of root 1 into those ...
+    float shift[3] = {0, 0, 0};      ///< ... about the middle of root 0, and what is added then.
+    float unit = 1;                  ///< A lattice unit of tree 1, in those of tree 0.
+    float rounding_margin = 0;       ///< As of query::SphereFrames; so much nearer or farther is in doubt.
+    float tolerance = 0;
+    std::int32_t not_smaller = 0;  ///< Of nodes so many levels apart, or more, that of tree 0 is expanded.
+  };
+  enum Found : std::uint8_t {
+    kMeet = 1,     ///< The spheres of leaves meet.
+    kDoubt = 2,    ///< Float does not tell of some.
+    kGrows = 4,    ///< A node is not resident.
+    kUndone = 8,   ///< The walk was too long, or the device did not do it.
+    kInvalid = 16  ///< The table is not what was uploaded. Never answered.
+  };
+  /// Two nodes that may meet, as NodeRef names them, one of which has to be expanded.
+  struct Deferred {
+    std::uint32_t pair, node[2];
+  };
+
+  std::vector<Tree> trees;
+  std::vector<Pair> pairs;
+  std::vector<std::uint8_t> found;  ///< Answered: bits of Found; 0: all spheres of leaves are apart.
+  std::vector<Deferred> deferred;   ///< Answered: of pairs that have kGrows. Some may be missing.
+};
+
+}  // namespace bocst::oracle
