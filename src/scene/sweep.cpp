@@ -61,10 +61,13 @@ bool Sweep<S>::setFar(const World<S>& world, const fcl::Transform3<S>* X_WM, std
   return true;
 }
 
-// What conservative answers to all states need grows in few batches, where an oracle is slow to answer.
+// What conservative answers to all states need grows in few batches, where an oracle is slow to answer; states in which
+// models meet are known then.
 template <typename S>
-void Sweep<S>::growForAll(const World<S>& world, const fcl::Transform3<S>* X_WM, std::size_t states) {
+void Sweep<S>::growForAll(const World<S>& world, const fcl::Transform3<S>* X_WM, std::size_t states,
+                          std::uint8_t* hit) {
   pairs_.clear();
+  state_of_pair_.clear();
   for (std::size_t k = 0; k < states; ++k) {
     const fcl::Transform3<S>* X = X_WM + k * world.moving.size();
     check_.place(X);
@@ -77,10 +80,15 @@ void Sweep<S>::growForAll(const World<S>& world, const fcl::Transform3<S>* X_WM,
         if (!a.model->isOccupied() || !b.model->isOccupied()) continue;
         if (!fcl_adapter::growsTogether(*a.model, *b.model)) continue;
         pairs_.push_back({a.model, X[n.box], b.model, check_.pose(X, n.group, lane)});
+        state_of_pair_.push_back(k);
       }
     }
   }
-  if (!pairs_.empty()) fcl_adapter::growTogether<S>(pairs_);
+  if (pairs_.empty()) return;
+  const std::vector<fcl_adapter::Spheres>& found = fcl_adapter::growTogether<S>(pairs_);
+  for (std::size_t i = 0; i < pairs_.size(); ++i) {
+    if (found[i] == fcl_adapter::Spheres::kMeet) hit[state_of_pair_[i]] = 1;
+  }
 }
 
 // In one function: the three goals differ in what comes next and when it ends, but share each state's check.
@@ -92,7 +100,7 @@ std::size_t Sweep<S>::run(const World<S>& world, const fcl::Transform3<S>* X_WM,
   if (states == 0 || moving == 0) return states;
   check_.start(world);
   check_.orthogonality_errors.assign(orthogonality_errors.begin(), orthogonality_errors.end());
-  if (goal == Goal::kAll && states > 1 && world.grows_together) growForAll(world, X_WM, states);
+  if (goal == Goal::kAll && states > 1 && world.grows_together) growForAll(world, X_WM, states, hit);
   is_measured_ = false;
   std::size_t found = states;
   parts_.clear();
@@ -110,24 +118,28 @@ std::size_t Sweep<S>::run(const World<S>& world, const fcl::Transform3<S>* X_WM,
     const std::size_t middle = part.begin + (part.end - part.begin) / 2;
     const fcl::Transform3<S>* X = X_WM + middle * moving;
     Part rest{0, 0, 0, 0, false};
-    bool touches;
-    const bool whole = part.end - part.begin > 1 && setFar(world, X_WM, states, part, middle);
-    if (!whole) std::fill(check_.far.begin(), check_.far.end(), 0.0);
-    found_.clear();
-    std::vector<Entry>* entries = whole ? &found_ : nullptr;
-    if (part.has_list) {
-      touches = check_.run(X, entries_.data() + part.first, entries_.data() + part.last, entries, nullptr);
-      if (!whole) rest = part;
+    bool touches = goal == Goal::kAll && hit[middle] != 0;  // known by growForAll()
+    if (touches) {
+      rest = part;
     } else {
-      touches = check_.runAll(X, entries, nullptr);
-    }
-    if (whole) {
-      rest.has_list = true;
-      rest.first = entries_.size();
-      for (const Entry& e : found_) {
-        if (e.mask != 0) entries_.push_back(e);
+      const bool whole = part.end - part.begin > 1 && setFar(world, X_WM, states, part, middle);
+      if (!whole) std::fill(check_.far.begin(), check_.far.end(), 0.0);
+      found_.clear();
+      std::vector<Entry>* entries = whole ? &found_ : nullptr;
+      if (part.has_list) {
+        touches = check_.run(X, entries_.data() + part.first, entries_.data() + part.last, entries, nullptr);
+        if (!whole) rest = part;
+      } else {
+        touches = check_.runAll(X, entries, nullptr);
       }
-      rest.last = entries_.size();
+      if (whole) {
+        rest.has_list = true;
+        rest.first = entries_.size();
+        for (const Entry& e : found_) {
+          if (e.mask != 0) entries_.push_back(e);
+        }
+        rest.last = entries_.size();
+      }
     }
     if (touches) {
       found = middle;

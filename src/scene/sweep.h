@@ -35,13 +35,14 @@ class Sweep {
     bool has_list;
   };
 
-  void growForAll(const World<S>& world, const fcl::Transform3<S>* X_WM, std::size_t states);
+  void growForAll(const World<S>& world, const fcl::Transform3<S>* X_WM, std::size_t states, std::uint8_t* hit);
   void measure(const World<S>& world, const fcl::Transform3<S>* X_WM, std::size_t states);
   bool setFar(const World<S>& world, const fcl::Transform3<S>* X_WM, std::size_t states, const Part& part,
               std::size_t middle);
 
   StateCheck<S> check_;
   std::vector<fcl_adapter::PosedPair<S>> pairs_;  // of growForAll()
+  std::vector<std::size_t> state_of_pair_;        // likewise
   std::vector<double> path_, place_;              // see measurePaths()
   bool is_measured_ = false;
   std::size_t farthest_ = 0;  // the moving object that last moved too far

@@ -121,16 +121,20 @@ TEST_P(GrowTogether, StatesOfAScene) {
   std::vector<std::shared_ptr<Modeld>> models, of_states;
   const auto makeScene = [&](OracleKind oracle, std::vector<std::shared_ptr<Modeld>>& made) {
     auto scene = std::make_unique<Scened>();
+    std::vector<Id> ids;
     for (int i = 0; i < 5; ++i) {
       made.push_back(std::make_shared<Modeld>(i % 2 == 0 ? mesh : bar, optionsOf(oracle)));
       if (i < 3) {
-        scene->addMoving(made.back());
+        ids.push_back(scene->addMoving(made.back()));
       } else {
         fcl::Transform3d X_WG = fcl::Transform3d::Identity();
         X_WG.translation()[0] = i - 2;
-        scene->addFixed(made.back(), X_WG);
+        ids.push_back(scene->addFixed(made.back(), X_WG));
       }
     }
+    // Of a pair that may touch, contacts are none of the state's.
+    scene->ignore(ids[0], ids[3]);
+    scene->ignore(ids[1], ids[2]);
     return scene;
   };
   const auto batchesOf = [](const std::vector<std::shared_ptr<Modeld>>& made) {

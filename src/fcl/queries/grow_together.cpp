@@ -158,6 +158,7 @@ class Walks {
     for (std::size_t k = 0; k < s_.sides.size(); ++k) {
       if (trees_[k] != kNone) query::SphereWalk::markUsed(s_.sides[k], s_.device.trees[trees_[k]]);
     }
+    s_.device.trees.clear();  // a scratch must not keep tables of models that go
     take();
     return true;
   }

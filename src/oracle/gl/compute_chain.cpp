@@ -206,19 +206,18 @@ void ComputeChain::take(const std::vector<ExpansionRequest*>& requests, const st
     const std::uint32_t* const ids = all_ids + row[kRowIds];
     std::uint32_t list = row[kRowList];
     std::size_t here = 0;  // ids of the lists that came back lie one after the other
-    e.kept_resource = nullptr;
+    bool keeps_some = false;
     for (std::size_t o = 0; o < 8; ++o) {
       const std::uint32_t size = row[kRowSizes + o];
       const bool is_here = size <= e.ids_up_to;
       e.list_begin[o] = here;
       e.device_lists[o] = is_here ? ExpansionRequest::DeviceList{} : ExpansionRequest::DeviceList{list, size};
-      if (is_here) {
-        here += size;
-      } else {
-        e.kept_resource = placed_;
-      }
+      here += is_here ? size : 0;
+      keeps_some = keeps_some || !is_here;
       list += size;
     }
+    // One count of its holders a cell: more would take half of the time.
+    e.kept_resource = keeps_some ? placed_ : nullptr;
     e.list_begin[8] = here;
     thread.require(row[kRowIds] + here <= answers[kIdWords], "a list is longer than what came back");
     e.lists.assign(ids, ids + here);
