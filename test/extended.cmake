@@ -25,6 +25,7 @@ if(BOCST_LAVAPIPE)
   bocst_test_on_driver(zink gl_test gl_test --gtest_filter=-Occlusion.SampledQueriesLoseSurface)
   bocst_test_on_driver(zink broken_driver_test broken_driver_test)
   bocst_test_on_driver(zink oracle_test oracle_test --gtest_filter=*/compute:*/occlusion)
+  bocst_test_on_driver(zink gpu_test gpu_test --gtest_filter=*GrowTogether*walks:WalksOnTheDevice*)
   if(BOCST_BUILD_TOOLS)
     bocst_test_on_driver(zink validate bocst_program validate ${PROJECT_SOURCE_DIR}/share/models/link.obj
       ${PROJECT_SOURCE_DIR}/share/models/gripper.obj --oracle compute --contacts --poses 100)

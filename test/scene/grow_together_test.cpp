@@ -5,6 +5,8 @@
 #include <bocst/scene.h>
 #include <gtest/gtest.h>
 
+#include <algorithm>
+#include <array>
 #include <memory>
 #include <random>
 #include <vector>
@@ -113,6 +115,34 @@ TEST_P(GrowTogether, AnySizes) {
   collidePoses(b, b, far.data(), far.size(), hits.data());
   collidePoses(cpu, cpu, far.data(), far.size(), of_cpu.data());
   EXPECT_EQ(hits, of_cpu);
+}
+
+// Depths, subdivisions, dimensions, margins and sizes that differ between the two.
+TEST_P(GrowTogether, AnyOptions) {
+  std::mt19937_64 g(17);
+  const auto oneOf = [&g](const auto&... values) { return std::array{values...}[g() % sizeof...(values)]; };
+  for (int i = 0; i < 24; ++i) {
+    const double size = oneOf(1e-3, 0.05, 0.5, 1.0, 20.0, 1e4);
+    Raw first = test::torus(18), second = test::torus(11);
+    for (Eigen::Vector3d& v : second.vertices) v = size * v + Eigen::Vector3d(0.1, 0, 0);
+    Options options[2];
+    for (Options& o : options) {
+      o = optionsOf(OracleKind::kCpu, oneOf(false, false, true));
+      o.depth = oneOf(1, 2, 3, 4, 5, 6);
+      o.subdivision = oneOf(Subdivision::kOctree, Subdivision::kBono);
+      o.dimension = oneOf(0.0, 0.0, 7.0, 150.0);
+      o.margin = oneOf(0.0, 0.0, 0.02);
+    }
+    const auto mesh_a = first.mesh(), mesh_b = second.mesh();
+    const Modeld cpu_a(mesh_a, options[0]), cpu_b(mesh_b, options[1]);
+    for (Options& o : options) o.oracle = GetParam().oracle;
+    const Modeld a(mesh_a, options[0]), b(mesh_b, options[1]);
+    const Transforms X = randomPoses(40, 1.4 * std::max(1.0, size));
+    std::vector<std::uint8_t> hits(X.size()), of_cpu(X.size());
+    collidePoses(a, b, X.data(), X.size(), hits.data());
+    collidePoses(cpu_a, cpu_b, X.data(), X.size(), of_cpu.data());
+    EXPECT_EQ(hits, of_cpu) << i;
+  }
 }
 
 TEST_P(GrowTogether, StatesOfAScene) {
