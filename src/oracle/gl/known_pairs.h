@@ -28,7 +28,7 @@ class KnownPairs {
   };
   enum class Known : std::uint8_t { kApart, kMeet, kClose };
 
-  static constexpr int kDepth = 5;
+  static constexpr int kDepth = 4;
 
   static Tree treeOf(const Surface& surface, int levels);
   void addPose(int number, std::uint32_t a, std::uint32_t b, double unit);
