@@ -216,7 +216,6 @@ void ComputeChain::take(const std::vector<ExpansionRequest*>& requests, const st
       keeps_some = keeps_some || !is_here;
       list += size;
     }
-    // One count of its holders a cell: more would take half of the time.
     e.kept_resource = keeps_some ? placed_ : nullptr;
     e.list_begin[8] = here;
     thread.require(row[kRowIds] + here <= answers[kIdWords], "a list is longer than what came back");

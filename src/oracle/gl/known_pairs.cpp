@@ -11,7 +11,7 @@
 namespace bocst::oracle::gl {
 namespace {
 
-constexpr int kPoses = 12;
+constexpr int kPoses = 5;
 
 }  // namespace
 
