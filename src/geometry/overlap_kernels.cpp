@@ -163,8 +163,28 @@ void PlaceTriangles(RawTriangles& raw, std::size_t count, const PackTransform& p
   pack.size = hn::GetLane(hn::MaxOfLanes(df, size));
 }
 
-std::uint32_t BoundTriangles(const RawTriangles& raw, std::uint32_t which, const PackTransform& place, double unit,
-                             double far, RawTriangles& placed, TriangleBounds& bounds) {
+// The normal of triangles with these edges, not of unit length; of those that are all but segments, a direction across
+// the segment, so that bounds along it and across both are close.
+template <typename VD>
+HWY_INLINE Vec3Of<VD> acrossTriangle(const Vec3Of<VD> (&e)[3]) {
+  const hn::DFromV<VD> dd;
+  const Vec3Of<VD> normal = cross(e[0], e[1]);
+  const VD square[3] = {dot(e[0], e[0]), dot(e[1], e[1]), dot(e[2], e[2])};
+  const VD longest = max3(square[0], square[1], square[2]);
+  const auto is_segment = hn::Le(dot(normal, normal), hn::Mul(hn::Set(dd, 1e-18), hn::Mul(longest, longest)));
+  if (hn::AllFalse(dd, is_segment)) return normal;
+  const auto first = hn::Eq(square[0], longest), second = hn::Eq(square[1], longest);
+  const Vec3Of<VD> along = choose(first, e[0], choose(second, e[1], e[2]));
+  const VD x = hn::Abs(along.x), y = hn::Abs(along.y), z = hn::Abs(along.z), none = hn::Zero(dd);
+  // Across the axis that it is the least along, too.
+  const Vec3Of<VD> by_x{none, along.z, hn::Neg(along.y)}, by_y{hn::Neg(along.z), none, along.x},
+      by_z{along.y, hn::Neg(along.x), none};
+  const Vec3Of<VD> across = choose(hn::And(hn::Le(x, y), hn::Le(x, z)), by_x, choose(hn::Le(y, z), by_y, by_z));
+  return choose(is_segment, across, normal);
+}
+
+void BoundTriangles(const RawTriangles& raw, std::uint32_t which, const PackTransform& place, double unit, double far,
+                    RawTriangles& placed, TriangleBounds& bounds) {
   const hn::CappedTag<double, 8> dd;
   const hn::Rebind<float, decltype(dd)> df;
   using VD = hn::Vec<decltype(dd)>;
@@ -172,10 +192,8 @@ std::uint32_t BoundTriangles(const RawTriangles& raw, std::uint32_t which, const
   const auto put = [&](VD x, float* to)
                        HWY_ATTR { hn::Store(hn::DemoteTo(df, hn::Min(hn::Max(x, least), most)), df, to); };
   const std::uint32_t lanes = (1u << hn::Lanes(dd)) - 1;
-  std::uint32_t done = 0;
   for (std::size_t i = 0; i < TriangleBounds::kCapacity; i += hn::Lanes(dd)) {
     if ((which >> i & lanes) == 0) continue;
-    done |= lanes << i;
     Vec3Of<VD> v[3];
     BOCST_UNROLL
     for (std::size_t k = 0; k < 3; ++k) {
@@ -211,7 +229,7 @@ std::uint32_t BoundTriangles(const RawTriangles& raw, std::uint32_t which, const
       return Vec3Of<VD>{hn::PromoteTo(dd, x), hn::PromoteTo(dd, y), hn::PromoteTo(dd, z)};
     };
     const Vec3Of<VD> e[3] = {sub(v[1], v[0]), sub(v[2], v[1]), sub(v[0], v[2])};
-    const Vec3Of<VD> across = cross(e[0], e[1]), n = direction(across, bounds.normal);
+    const Vec3Of<VD> across = acrossTriangle(e), n = direction(across, bounds.normal);
     const VD n0 = dot(n, v[0]), n1 = dot(n, v[1]), n2 = dot(n, v[2]);
     put(min3(n0, n1, n2), bounds.normal_low + i);
     put(max3(n0, n1, n2), bounds.normal_high + i);
@@ -221,7 +239,6 @@ std::uint32_t BoundTriangles(const RawTriangles& raw, std::uint32_t which, const
       put(max3(dot(out, v[0]), dot(out, v[1]), dot(out, v[2])), bounds.edge_high[k] + i);
     }
   }
-  return done;
 }
 
 std::uint32_t TrianglesWithin(const TrianglePack& pack, const PackRegion& region) {
@@ -357,7 +374,6 @@ struct Limits {
   V per_size, per_length;
   float moved;   // what two corners may be off by in sum, the tolerance included
   float margin;  // corners no farther apart touch for sure; 0 where there is no margin
-  bool wide;     // the tolerance is more than rounding of these corners
 
   V along(const Vec3& axis, V sizes) const {
     const V rounding = hn::MulAdd(per_size, sizes, hn::Set(D(), 1e-30f));  // products have lost bits below
@@ -372,7 +388,7 @@ HWY_INLINE Limits limitsOf(float size, float tolerance, float margin) {
   // The tolerance is a length. Where it is what FCL rounds, which is no axis of ours, it counts with the sizes.
   const float sure_margin = std::max(margin - rounding, 0.0f);
   return {hn::Set(D(), sure_margin > 0 ? rounding : rounding + tolerance), hn::Set(D(), tolerance),
-          25 * u * size + tolerance, sure_margin, tolerance > rounding};
+          25 * u * size + tolerance, sure_margin};
 }
 
 // A vector of triangles: their edges, normals, longest edges, and how far a determinant with the normal may be off.
@@ -402,10 +418,11 @@ struct PairBits {
 // Are p and q apart along a cross product of their edges? w: the corners of q from p[0] on. Any axis will do, whatever
 // it was computed from: with u = 2^-24, corners are off by 25 u of the size and the tolerance, what w and the two
 // products round is below 16 u times the sum of the axis's entries; the limits have 64 u of the size and the tolerance.
-HWY_INLINE M apartByEdges(const Plane& of_p, const Plane& of_q, const Vec3 (&w)[3], const Limits& limits) {
-  const V zero = hn::Zero(D());
+HWY_INLINE M apartByEdges(const Plane& of_p, const Plane& of_q, const Vec3 (&w)[3], const Limits& limits, M asked) {
+  const D d;
+  const V zero = hn::Zero(d);
   M apart = hn::MaskFromVec(zero);
-  for (int a = 0; a < 3; ++a) {
+  for (int a = 0; a < 3 && !hn::AllFalse(d, hn::AndNot(apart, asked)); ++a) {
     BOCST_UNROLL
     for (int b = 0; b < 3; ++b) {
       const Vec3 axis = cross(of_p.edge[a], of_q.edge[b]);
@@ -460,13 +477,13 @@ HWY_INLINE PairBits testPairs(const Vec3 (&p)[3], const Vec3 (&q)[3], const Limi
   clear = hn::And(clear, hn::Gt(min3(hn::Abs(m0), hn::Abs(m1), hn::Abs(m2)), offNormal(of_q.longest)));
   clear = hn::And(clear, hn::Gt(shorter, hn::Set(d, 64 * limits.moved)));
   // What has no plane, as triangles without area, is never clear.
-  M doubtful = limits.wide ? near : hn::AndNot(clear, near), close = hn::MaskFromVec(hn::Zero(d));
+  M doubtful = hn::AndNot(clear, near), close = hn::MaskFromVec(hn::Zero(d));
   if (limits.margin > 0) {
     close = hn::And(near, hn::Le(squareBetweenCorners(p, q), hn::Set(d, limits.margin * limits.margin)));
-    doubtful = hn::AndNot(close, doubtful);
+    doubtful = hn::AndNot(close, near);
   }
   if (!hn::AllFalse(d, doubtful)) {
-    near = hn::AndNot(hn::And(doubtful, apartByEdges(of_p, of_q, w, limits)), near);
+    near = hn::AndNot(hn::And(doubtful, apartByEdges(of_p, of_q, w, limits, doubtful)), near);
     if (hn::AllFalse(d, near)) return {0, 0};
   }
 
@@ -567,9 +584,9 @@ void placeTriangles(RawTriangles& raw, std::size_t count, const PackTransform& p
   HWY_DYNAMIC_DISPATCH(PlaceTriangles)(raw, count, place, pack);
 }
 
-std::uint32_t boundTriangles(const RawTriangles& raw, std::uint32_t which, const PackTransform& place, double unit,
-                             double far, RawTriangles& placed, TriangleBounds& bounds) {
-  return HWY_DYNAMIC_DISPATCH(BoundTriangles)(raw, which, place, unit, far, placed, bounds);
+void boundTriangles(const RawTriangles& raw, std::uint32_t which, const PackTransform& place, double unit, double far,
+                    RawTriangles& placed, TriangleBounds& bounds) {
+  HWY_DYNAMIC_DISPATCH(BoundTriangles)(raw, which, place, unit, far, placed, bounds);
 }
 
 std::uint32_t trianglesWithin(const TrianglePack& pack, const PackRegion& region) {

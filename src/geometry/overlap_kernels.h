@@ -69,10 +69,10 @@ struct TriangleBounds {
   float edge[3][3][kCapacity], edge_high[3][kCapacity];  ///< [edge]: out of the triangle; [axis].
 };
 
-/// Places at least those triangles in `which`, in double, and finds the bounds of what is placed, times `unit`, cut off
-/// at `far`. `raw` must have been placed in a pack. Returns which triangles are done; the places of others may be, too.
-std::uint32_t boundTriangles(const RawTriangles& raw, std::uint32_t which, const PackTransform& place, double unit,
-                             double far, RawTriangles& placed, TriangleBounds& bounds);
+/// Places those triangles in `which`, in double, and finds the bounds of what is placed, times `unit`, cut off at
+/// `far`. Others may be overwritten by what `raw` has in their places.
+void boundTriangles(const RawTriangles& raw, std::uint32_t which, const PackTransform& place, double unit, double far,
+                    RawTriangles& placed, TriangleBounds& bounds);
 
 /// Where triangles of a pack can meet those of another leaf: a box and a slab, all in the pack's frame and padded.
 struct PackRegion {

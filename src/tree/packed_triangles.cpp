@@ -11,7 +11,6 @@ namespace bocst::tree {
 
 namespace {
 
-constexpr double kMost = 65535;
 constexpr int kExponentBias = 127;  // that of a float, 23 bits up
 
 // Numbers at most kMostPlaces different keys in the order in which they come.

@@ -18,6 +18,7 @@ namespace bocst::tree {
 class PackedTriangles {
  public:
   static constexpr std::size_t kMostTriangles = kMaxLeafTriangles, kMostPlaces = 3 * kMostTriangles;
+  static constexpr double kMost = 65535;  ///< Steps along an axis.
 
   /// The words of at most kMostTriangles, at least one.
   static std::vector<std::uint32_t> pack(const oracle::Surface& surface, const std::vector<std::uint32_t>& ids);

@@ -27,9 +27,13 @@ bool TreeWalk::run(Visitor& visitor) {
   for (const TreeSide* side : {&a_, &b_}) side->tree().payRent(tree::Tree::kWalkRent);
   const bool ended = search(s);
   // A query that grew nodes packs no leaves. Others pack what is met again: see Tree::packLeaves().
-  if (s.leaves_started && !s.grew) {
-    a_.tree().packLeaves(s.leaves.looseOfA());
-    b_.tree().packLeaves(s.leaves.looseOfB());
+  if (!s.grew) {
+    if (s.leaves_started) {
+      a_.tree().packLeaves(s.leaves.looseOfA());
+      b_.tree().packLeaves(s.leaves.looseOfB());
+    }
+    a_.tree().packLeaves(s.large[0].loose());
+    b_.tree().packLeaves(s.large[1].loose());
   }
   return ended;
 }

@@ -5,14 +5,16 @@
 #include <cmath>
 
 #include "log/assert.h"
+#include "query/leaf/leaf_corners.h"
+#include "query/leaf/unpack.h"
 
 namespace bocst::query {
 namespace {
 
 // The region in which triangles of a pack can meet a node's volume v. The pack's frame has its origin at the middle of
-// the root of v's tree, in lattice units. With M = `extent`, region and trianglesWithin() are off by 15 u M, as for
-// LeafPairs.
-PackRegion regionOf(const Volume& v, const SimilarityTransform& other_in_side, double size) {
+// the root of v's tree, in lattice units; corners are off by `error`. With M = `extent`, region and trianglesWithin()
+// are off by 15 u M, as for LeafPairs, and moveTriangles() by 6 more.
+PackRegion regionOf(const Volume& v, const SimilarityTransform& other_in_side, double size, double error) {
   PackRegion region;
   double displacement[3], extent = size, offset = v.slab_offset;
   for (int k = 0; k < 3; ++k) {
@@ -22,7 +24,7 @@ PackRegion regionOf(const Volume& v, const SimilarityTransform& other_in_side, d
     region.normal[k] = v.normal[k];
   }
   const double rounding_margin =
-      (32 * 0x1p-24 + 4 * other_in_side.orthogonality_error) * extent + 1.02 * other_in_side.tolerance;
+      (32 * 0x1p-24 + 4 * other_in_side.orthogonality_error) * extent + 1.02 * (other_in_side.tolerance + error);
   for (int k = 0; k < 3; ++k) {
     region.low[k] = static_cast<float>(displacement[k] - v.half[k] - rounding_margin);
     region.high[k] = static_cast<float>(displacement[k] + v.half[k] + rounding_margin);
@@ -34,24 +36,60 @@ PackRegion regionOf(const Volume& v, const SimilarityTransform& other_in_side, d
 
 }  // namespace
 
+void LargeTriangles::start(const TreeSide& other, tree::NodeRef leaf, const SimilarityTransform& other_in_side) {
+  if (count_ == 0) {  // the first leaf of a walk
+    place_ = packTransform(other, other_in_side, Eigen::Vector3d::Constant(kMiddle), 1);
+    for (int r = 0; r < 3; ++r) {
+      for (int c = 0; c < 3; ++c) {
+        motion_.linear[r][c] = static_cast<float>(other_in_side.scale * other_in_side.rotation(r, c));
+      }
+    }
+  }
+  leaf_ = leaf;
+  known_ = 0;
+  tree::PackedTriangles packed;
+  if (!other.packed(leaf, packed, ids_)) {
+    const tree::TriangleList list = other.triangles(leaf);
+    ids_ = list.ids;
+    count_ = list.count;
+    BOCST_ASSERT(0 < count_ && count_ <= kCapacity);
+    loose_.push_back(leaf);
+    readCorners(other, ids_, all(), raw_);
+    read_ = all();
+    placeTriangles(raw_, count_, place_, pack_);
+    error_ = 0;
+    return;
+  }
+  count_ = packed.count;
+  read_ = 0;
+  const Eigen::Vector3d origin = other_in_side * Eigen::Vector3d(packed.origin[0], packed.origin[1], packed.origin[2]);
+  double size = 2 * other_in_side.scale * tree::PackedTriangles::kMost *
+                static_cast<double>(packed.step);  // as B of moveTriangles()
+  double offset = 0;
+  for (int k = 0; k < 3; ++k) {
+    motion_.offset[k] = static_cast<float>(origin[k] - kMiddle);
+    offset = std::max(offset, std::abs(origin[k] - kMiddle));
+  }
+  size += offset;
+  unpackTriangles(packed, motion_, pack_);
+  error_ = other_in_side.scale * static_cast<double>(packingError(packed)) + 1.7321 * 6 * 0x1p-24 * size;
+}
+
 std::uint32_t LargeTriangles::meeting(const TreeSide& side, tree::NodeRef node, const TreeSide& other,
                                       tree::NodeRef leaf, std::uint32_t which, const SimilarityTransform& other_in_side,
                                       double unit) {
-  if (count_ == 0 || !(leaf_ == leaf)) {
-    leaf_ = leaf;
-    known_ = 0;
-    raw_.take(other, leaf, 0);
-    count_ = raw_.count();
-    BOCST_ASSERT(0 < count_ && count_ <= kCapacity);
-    place_ = packTransform(other, other_in_side, Eigen::Vector3d::Constant(kMiddle), 1);
-    raw_.place(place_, pack_);
-  }
-  std::uint32_t met = which & (count_ < 8 * sizeof(which) ? (1u << count_) - 1 : ~0u);
+  if (count_ == 0 || !(leaf_ == leaf)) start(other, leaf, other_in_side);
+  std::uint32_t met = which & all();
   if (inRange(pack_)) {
-    met &= trianglesWithin(pack_, regionOf(side.volume(node), other_in_side, static_cast<double>(pack_.size)));
+    const auto size = static_cast<double>(pack_.size);
+    met &= trianglesWithin(pack_, regionOf(side.volume(node), other_in_side, size, error_));
   }
   const std::uint32_t wanted = met & ~known_;
-  if (wanted != 0) known_ |= boundTriangles(raw_.raw(), wanted, place_, unit, 2 * kMiddle * unit, placed_, bounds_);
+  if (wanted == 0) return met;
+  readCorners(other, ids_, wanted & ~read_, raw_);
+  read_ |= wanted;
+  boundTriangles(raw_, wanted, place_, unit, 2 * kMiddle * unit, placed_, bounds_);
+  known_ |= wanted;
   return met;
 }
 

@@ -3,14 +3,16 @@
 
 #include <cstddef>
 #include <cstdint>
+#include <vector>
 
-#include "query/leaf/leaf_corners.h"
+#include "geometry/overlap_kernels.h"
 #include "query/sides/side.h"
 
 namespace bocst::query {
 
 /// The triangles of a leaf of one side as smaller nodes of the other see them: with large triangles the leaf's volume
-/// says little. What misses a node misses its octants, so only the first of these is asked about all triangles.
+/// says little. What misses a node misses its octants, so only the first of these is asked about all triangles. Their
+/// packed corners are precise enough to say which of them miss a node; only the others are read from the mesh.
 class LargeTriangles {
  public:
   static constexpr std::size_t kCapacity = TrianglePack::kCapacity;
@@ -19,8 +21,11 @@ class LargeTriangles {
   void clear() {
     count_ = 0;
     known_ = 0;
-    raw_.clear();
+    loose_.clear();
   }
+
+  /// Leaves met in this walk whose corners the tree does not keep packed.
+  const std::vector<tree::NodeRef>& loose() const { return loose_; }
 
   /// Have these triangles of the leaf been placed?
   bool know(tree::NodeRef leaf, std::uint32_t which) const {
@@ -40,19 +45,27 @@ class LargeTriangles {
   Eigen::Vector3d corner(std::size_t i, std::size_t k) const {
     return {placed_.xyz[3 * k][i], placed_.xyz[3 * k + 1][i], placed_.xyz[3 * k + 2][i]};
   }
-  std::uint32_t id(std::size_t i) const { return raw_.id(i); }
+  std::uint32_t id(std::size_t i) const { return ids_[i]; }
 
   static constexpr double kMiddle = lattice::kMiddle;
 
  private:
-  LeafCorners<TreeSide> raw_;
+  void start(const TreeSide& other, tree::NodeRef leaf, const SimilarityTransform& other_in_side);
+  std::uint32_t all() const { return ~0u >> (kCapacity - count_); }
+
   TrianglePack pack_;  // about the middle of the smaller side's root
+  double error_ = 0;   // its corners may be so far from where they are, beside what placing rounds
   PackTransform place_;
+  PackMotion motion_;
   tree::NodeRef leaf_;
-  std::size_t count_ = 0;  // nothing is held when it is 0
-  std::uint32_t known_ = 0;
+  std::size_t count_ = 0;    // nothing is held when it is 0
+  std::uint32_t read_ = 0;   // triangles whose corners are in raw_
+  std::uint32_t known_ = 0;  // and those in placed_ and bounds_
+  tree::TriangleIds ids_;
+  RawTriangles raw_{};
   RawTriangles placed_;
   TriangleBounds bounds_;
+  std::vector<tree::NodeRef> loose_;
 };
 
 }  // namespace bocst::query

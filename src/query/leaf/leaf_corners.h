@@ -11,6 +11,23 @@
 
 namespace bocst::query {
 
+/// Reads the corners of those triangles of `ids` that `which` has bits of, as the mesh gives them. Triangles and
+/// vertices lie anywhere in memory: all are asked for before any is waited for.
+template <typename Side, typename Ids>
+void readCorners(const Side& side, const Ids& ids, std::uint32_t which, RawTriangles& raw) {
+  const auto next = [](std::uint32_t left) { return static_cast<std::size_t>(__builtin_ctz(left)); };
+  for (std::uint32_t left = which; left != 0; left &= left - 1) side.prefetch(ids[next(left)]);
+  for (std::uint32_t left = which; left != 0; left &= left - 1) side.prefetchCorners(ids[next(left)]);
+  for (std::uint32_t left = which; left != 0; left &= left - 1) {
+    const std::size_t i = next(left);
+    const std::uint32_t id = ids[i];
+    for (int k = 0; k < 3; ++k) {
+      const auto& v = side.vertex(id, k);
+      for (int c = 0; c < 3; ++c) raw.xyz[3 * k + c][i] = v[c];
+    }
+  }
+}
+
 /// The corners of a leaf as its mesh gives them, kept until another leaf is asked for: depth first, most pairs of
 /// leaves share one with the pair before.
 template <typename Side>
@@ -26,18 +43,8 @@ class LeafCorners {
     begin_ = begin;
     BOCST_ASSERT(begin < side.triangleCount(leaf));
     count_ = std::min(side.triangleCount(leaf) - begin, TrianglePack::kCapacity);
-    // Triangles and vertices lie anywhere in memory: ask for all of them before any is waited for.
-    for (std::size_t i = 0; i < count_; ++i) {
-      ids_[i] = side.triangle(leaf, begin + i);
-      side.prefetch(ids_[i]);
-    }
-    for (std::size_t i = 0; i < count_; ++i) side.prefetchCorners(ids_[i]);
-    for (std::size_t i = 0; i < count_; ++i) {
-      for (int k = 0; k < 3; ++k) {
-        const auto& v = side.vertex(ids_[i], k);
-        for (int c = 0; c < 3; ++c) raw_.xyz[3 * k + c][i] = v[c];
-      }
-    }
+    for (std::size_t i = 0; i < count_; ++i) ids_[i] = side.triangle(leaf, begin + i);
+    readCorners(side, ids_, ~0u >> (TrianglePack::kCapacity - count_), raw_);
     return true;
   }
 

@@ -158,11 +158,12 @@ class LeafPacks {
     if constexpr (std::is_same<Side, TreeSide>::value) {
       tree::PackedTriangles packed;
       if (side.packed(leaf.node, packed, leaf.listed)) {
-        unpackTriangles(packed, c, leaf.pack);
+        PackMotion motion{{{1, 0, 0}, {0, 1, 0}, {0, 0, 1}}, {}};
+        for (int k = 0; k < 3; ++k) motion.offset[k] = static_cast<float>(static_cast<double>(packed.origin[k]) - c[k]);
+        unpackTriangles(packed, motion, leaf.pack);
         leaf.all = packed.count;
-        // Half a step along each axis, and what unpacking rounds more than placing does; the middle lies in the box,
-        // but for a unit or a byte of the cell, and less than a hundredth of a step covers those.
-        leaf.error = 1.7321f * (0.504f * packed.step + 2 * 0x1p-24f * leaf.pack.size);
+        // The last is what unpacking rounds more than placing does.
+        leaf.error = packingError(packed) + 1.7321f * 2 * 0x1p-24f * leaf.pack.size;
         return;
       }
       loose_.push_back(leaf.node);

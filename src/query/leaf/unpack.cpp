@@ -12,23 +12,28 @@
 HWY_BEFORE_NAMESPACE();
 namespace bocst::query::HWY_NAMESPACE {
 
-void UnpackTriangles(const tree::PackedTriangles& packed, const double* center, TrianglePack& pack) {
+void UnpackTriangles(const tree::PackedTriangles& packed, const PackMotion& motion, TrianglePack& pack) {
   const D d;
   const hn::Rebind<std::uint8_t, D> db;
   const hn::Rebind<std::uint16_t, D> du;
   const hn::RebindToSigned<D> di;
   const std::size_t lanes = hn::Lanes(d);
   HWY_ALIGN float places[3][tree::PackedTriangles::kMostPlaces];
-  const V step = hn::Set(d, packed.step);
   V size = hn::Zero(d);
-  BOCST_UNROLL
-  for (std::size_t c = 0; c < 3; ++c) {
-    const V offset = hn::Set(d, static_cast<float>(static_cast<double>(packed.origin[c]) - center[c]));
-    const std::uint16_t* const row = packed.steps + c * packed.places;
-    for (std::size_t p = 0; p < packed.places; p += lanes) {
-      const V x = hn::MulAdd(hn::ConvertTo(d, hn::PromoteTo(di, hn::LoadU(du, row + p))), step, offset);
+  for (std::size_t p = 0; p < packed.places; p += lanes) {
+    const M filled = hn::FirstN(d, packed.places - p);
+    V steps[3];
+    BOCST_UNROLL
+    for (std::size_t k = 0; k < 3; ++k) {
+      steps[k] = hn::ConvertTo(d, hn::PromoteTo(di, hn::LoadU(du, packed.steps + k * packed.places + p)));
+    }
+    BOCST_UNROLL
+    for (std::size_t c = 0; c < 3; ++c) {
+      V x = hn::Set(d, motion.offset[c]);
+      BOCST_UNROLL
+      for (std::size_t k = 0; k < 3; ++k) x = hn::MulAdd(hn::Set(d, motion.linear[c][k] * packed.step), steps[k], x);
       hn::Store(x, d, places[c] + p);
-      size = hn::Max(size, hn::IfThenElseZero(hn::FirstN(d, packed.places - p), hn::Abs(x)));
+      size = hn::Max(size, hn::IfThenElseZero(filled, hn::Abs(x)));
     }
   }
   // Lanes beyond the last triangle get some place of these, too.
@@ -64,10 +69,10 @@ namespace bocst::query {
 
 HWY_EXPORT(UnpackTriangles);
 
-void unpackTriangles(const tree::PackedTriangles& packed, const double* center, TrianglePack& pack) {
+void unpackTriangles(const tree::PackedTriangles& packed, const PackMotion& motion, TrianglePack& pack) {
   BOCST_ASSERT(0 < packed.count && packed.count <= TrianglePack::kCapacity);
   BOCST_ASSERT(0 < packed.places && packed.places <= tree::PackedTriangles::kMostPlaces);
-  HWY_DYNAMIC_DISPATCH(UnpackTriangles)(packed, center, pack);
+  HWY_DYNAMIC_DISPATCH(UnpackTriangles)(packed, motion, pack);
 }
 
 }  // namespace bocst::query

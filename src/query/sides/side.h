@@ -139,8 +139,9 @@ class TreeSide {
   }
 
   /// Triangles of a leaf that is not a cell.
-  std::size_t triangleCount(Node node) const { return tree_.list(childRef(node)).count; }
-  std::uint32_t triangle(Node node, std::size_t i) const { return tree_.list(childRef(node)).ids[i]; }
+  tree::TriangleList triangles(Node node) const { return tree_.list(childRef(node)); }
+  std::size_t triangleCount(Node node) const { return triangles(node).count; }
+  std::uint32_t triangle(Node node, std::size_t i) const { return triangles(node).ids[i]; }
 
   /// The corners of a leaf's triangles where the tree keeps them packed, and their numbers; else false.
   bool packed(Node node, tree::PackedTriangles& triangles, tree::TriangleIds& ids) const {
