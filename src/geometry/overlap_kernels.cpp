@@ -4,6 +4,7 @@
 #include <algorithm>
 #include <cmath>
 #include <limits>
+#include <type_traits>
 
 #undef HWY_TARGET_INCLUDE
 #define HWY_TARGET_INCLUDE "geometry/overlap_kernels.cpp"
@@ -312,12 +313,13 @@ HWY_INLINE Fork forkOf(const Vec3 (&t)[3], V above0, V above1, V above2) {
 struct PickedRows {
   alignas(64) float xyz[9][TrianglePack::kCapacity];
   alignas(64) float low[3][TrianglePack::kCapacity], high[3][TrianglePack::kCapacity];
+  PackSlabs slabs;
   std::uint8_t row[TrianglePack::kCapacity];
   std::size_t count = 0;
 };
 
-HWY_INLINE void pickRows(const TrianglePack& rows, std::uint32_t which, const PackRegion& region, V extent,
-                         PickedRows& picked) {
+HWY_INLINE void pickRows(const TrianglePack& rows, const PackSlabs* slabs, std::uint32_t which,
+                         const PackRegion& region, V extent, PickedRows& picked) {
   const D d;
   for (std::size_t i = 0; i < rows.count; i += hn::Lanes(d)) {
     const std::uint32_t wanted = which >> i & ((1u << hn::Lanes(d)) - 1);
@@ -331,9 +333,16 @@ HWY_INLINE void pickRows(const TrianglePack& rows, std::uint32_t which, const Pa
     }
     const auto order = hn::SetTableIndices(d, from);
     // Whole vectors are written, but never beyond the place where they were read.
+    const auto pick = [&](const float* row, float* to) HWY_ATTR {
+      hn::StoreU(hn::TableLookupLanes(hn::Load(d, row + i), order), d, to + picked.count);
+    };
     BOCST_UNROLL
-    for (std::size_t k = 0; k < 9; ++k) {
-      hn::StoreU(hn::TableLookupLanes(hn::Load(d, rows.xyz[k] + i), order), d, picked.xyz[k] + picked.count);
+    for (std::size_t k = 0; k < 9; ++k) pick(rows.xyz[k], picked.xyz[k]);
+    if (slabs != nullptr) {
+      BOCST_UNROLL
+      for (std::size_t k = 0; k < 3; ++k) pick(slabs->normal[k], picked.slabs.normal[k]);
+      pick(slabs->middle, picked.slabs.middle);
+      pick(slabs->half, picked.slabs.half);
     }
     picked.count += count;
   }
@@ -371,7 +380,7 @@ HWY_INLINE std::uint64_t meetingBoxes(const Vec3& low, const Vec3& high, std::ui
 // What counts as apart. Along an axis that is a product of edges, a gap counts beyond per_size times the sizes of what
 // it was computed from and, with a margin, per_length times its length.
 struct Limits {
-  V per_size, per_length;
+  V per_size, per_length, across_slab;
   float moved;   // what two corners may be off by in sum, the tolerance included
   float margin;  // corners no farther apart touch for sure; 0 where there is no margin
 
@@ -383,12 +392,12 @@ struct Limits {
   }
 };
 
-HWY_INLINE Limits limitsOf(float size, float tolerance, float margin) {
+HWY_INLINE Limits limitsOf(float size, float lane_size, float tolerance, float margin) {
   const float u = 0x1p-24f, rounding = 64 * u * size;
   // The tolerance is a length. Where it is what FCL rounds, which is no axis of ours, it counts with the sizes.
   const float sure_margin = std::max(margin - rounding, 0.0f);
   return {hn::Set(D(), sure_margin > 0 ? rounding : rounding + tolerance), hn::Set(D(), tolerance),
-          25 * u * size + tolerance, sure_margin};
+          hn::Set(D(), 8 * u * lane_size + tolerance), 25 * u * size + tolerance, sure_margin};
 }
 
 // A vector of triangles: their edges, normals, longest edges, and how far a determinant with the normal may be off.
@@ -449,18 +458,36 @@ HWY_INLINE V squareBetweenCorners(const Vec3 (&p)[3], const Vec3 (&q)[3]) {
   return least;
 }
 
-HWY_INLINE PairBits testPairs(const Vec3 (&p)[3], const Vec3 (&q)[3], const Limits& limits, M pairs) {
+// A vector of PackSlabs.
+struct SlabLanes {
+  Vec3 normal;
+  V middle, half;
+};
+
+// slab: of p, or null.
+template <typename Slab>
+HWY_INLINE PairBits testPairs(const Vec3 (&p)[3], const Vec3 (&q)[3], const Slab* slab, const Limits& limits,
+                              bool one_will_do, M pairs) {
+  constexpr bool kSlab = std::is_same<Slab, SlabLanes>::value;
   const D d;
   const float u = 0x1p-24f;
   const V tiny = hn::Set(d, 1e-30f);  // products below have lost bits
   const Plane of_p = planeOf(p, limits), of_q = planeOf(q, limits);
   const Vec3 &n = of_p.normal, &m = of_q.normal;
   const Vec3 w[3] = {sub(q[0], p[0]), sub(q[1], p[0]), sub(q[2], p[0])};
-  const V n0 = dot(n, w[0]), n1 = dot(n, w[1]), n2 = dot(n, w[2]);
+  V n0, n1, n2, n_rounding_margin;
+  if constexpr (kSlab) {
+    n0 = hn::Sub(dot(slab->normal, q[0]), slab->middle), n1 = hn::Sub(dot(slab->normal, q[1]), slab->middle),
+    n2 = hn::Sub(dot(slab->normal, q[2]), slab->middle);
+    n_rounding_margin = hn::Add(slab->half, limits.across_slab);
+  } else {
+    n0 = dot(n, w[0]), n1 = dot(n, w[1]), n2 = dot(n, w[2]);
+    n_rounding_margin = of_p.rounding_margin;
+  }
   const V m0 = dot(m, sub(p[0], q[0])), m1 = dot(m, sub(p[1], q[0])), m2 = dot(m, sub(p[2], q[0]));
   const V by_n = reachAcross(n0, n1, n2), by_m = reachAcross(m0, m1, m2);
-  const M planes = hn::And(hn::Ge(by_n, hn::Neg(of_p.rounding_margin)), hn::Ge(by_m, hn::Neg(of_q.rounding_margin)));
-  M near = hn::And(pairs, planes);
+  const M planes = hn::And(hn::Ge(by_n, hn::Neg(n_rounding_margin)), hn::Ge(by_m, hn::Neg(of_q.rounding_margin)));
+  const M near = hn::And(pairs, planes);
   if (hn::AllFalse(d, near)) return {0, 0};
 
   // How far the determinants below may be off: those with a plane's normal, and those of an edge of each.
@@ -473,20 +500,15 @@ HWY_INLINE PairBits testPairs(const Vec3 (&p)[3], const Vec3 (&q)[3], const Limi
   const V longer = hn::Max(of_p.longest, of_q.longest), shorter = hn::Min(of_p.longest, of_q.longest);
   const V edges_off =
       hn::MulAdd(hn::Mul(longer, hn::MulAdd(rounds, shorter, moves)), hn::Add(hn::Add(span, span), shorter), tiny);
-  M clear = hn::Gt(min3(hn::Abs(n0), hn::Abs(n1), hn::Abs(n2)), offNormal(of_p.longest));
+  V n_off;
+  if constexpr (kSlab) {
+    n_off = n_rounding_margin;
+  } else {
+    n_off = offNormal(of_p.longest);
+  }
+  M clear = hn::Gt(min3(hn::Abs(n0), hn::Abs(n1), hn::Abs(n2)), n_off);
   clear = hn::And(clear, hn::Gt(min3(hn::Abs(m0), hn::Abs(m1), hn::Abs(m2)), offNormal(of_q.longest)));
   clear = hn::And(clear, hn::Gt(shorter, hn::Set(d, 64 * limits.moved)));
-  // What has no plane, as triangles without area, is never clear.
-  M doubtful = hn::AndNot(clear, near), close = hn::MaskFromVec(hn::Zero(d));
-  if (limits.margin > 0) {
-    close = hn::And(near, hn::Le(squareBetweenCorners(p, q), hn::Set(d, limits.margin * limits.margin)));
-    doubtful = hn::AndNot(close, near);
-  }
-  if (!hn::AllFalse(d, doubtful)) {
-    near = hn::AndNot(hn::And(doubtful, apartByEdges(of_p, of_q, w, limits, doubtful)), near);
-    if (hn::AllFalse(d, near)) return {0, 0};
-  }
-
   // Each cuts the other's plane with the edges from its corner that is alone on its side, in an interval of the line of
   // both planes. The determinant of two such edges says where an end of the one lies to an end of the other; the
   // intervals share no point when all ends of the one lie to one side of all of the other.
@@ -497,21 +519,38 @@ HWY_INLINE PairBits testPairs(const Vec3 (&p)[3], const Vec3 (&q)[3], const Limi
   const M beside = hn::Or(hn::Gt(low, edges_off), hn::Lt(high, hn::Neg(edges_off)));
   const M across = hn::And(hn::Lt(low, hn::Neg(edges_off)), hn::Gt(high, edges_off));
   const M cut = hn::Gt(hn::Min(by_n, by_m), hn::Zero(d));
-  const M possible = hn::AndNot(hn::And(clear, hn::Or(hn::Not(cut), beside)), near);
-  return {maskBits(hn::Or(possible, close)), maskBits(hn::Or(hn::And(clear, hn::And(cut, across)), close))};
+  M possible = hn::AndNot(hn::And(clear, hn::Or(hn::Not(cut), beside)), near);
+  M certain = hn::And(hn::And(near, clear), hn::And(cut, across));
+  if constexpr (kSlab) {
+    // FCL's test is to decide about slivers.
+    const V square = hn::Mul(of_p.longest, of_p.longest);
+    certain = hn::And(certain, hn::Gt(norm1(n), hn::Mul(hn::Set(d, 1e-3f), square)));
+  }
+  if (limits.margin > 0) {
+    const M close = hn::And(near, hn::Le(squareBetweenCorners(p, q), hn::Set(d, limits.margin * limits.margin)));
+    possible = hn::Or(possible, close);
+    certain = hn::Or(certain, close);
+  }
+  const M doubtful = hn::AndNot(certain, possible);
+  if (!hn::AllFalse(d, doubtful) && (!one_will_do || hn::AllFalse(d, certain))) {
+    possible = hn::AndNot(hn::And(doubtful, apartByEdges(of_p, of_q, w, limits, doubtful)), possible);
+  }
+  return {maskBits(possible), maskBits(certain)};
 }
 
-std::size_t TouchingPairs(const TrianglePack& rows, std::uint32_t which, const TrianglePack& lanes,
-                          const PackRegion& region, float tolerance, float margin, bool one_will_do, PackPair* pairs) {
+template <bool kSlabs>
+HWY_INLINE std::size_t touching(const TrianglePack& rows, std::uint32_t which, const TrianglePack& lanes,
+                                const PackRegion& region, float tolerance, float margin, bool one_will_do,
+                                PackPair* pairs, const PackSlabs* slabs) {
   const D d;
   const hn::RebindToSigned<D> di;
   constexpr std::size_t kMost = hn::MaxLanes(D());
   const float size = std::max(rows.size, lanes.size) * 1.0001f;
-  const Limits limits = limitsOf(size, tolerance, margin);
+  const Limits limits = limitsOf(size, lanes.size, tolerance, margin);
   const V extent = hn::Set(d, 64 * 0x1p-24f * size + tolerance);
   std::size_t found = 0;
   PickedRows picked;
-  pickRows(rows, which, region, extent, picked);
+  pickRows(rows, slabs, which, region, extent, picked);
   for (std::size_t i = 0; i < lanes.count; i += hn::Lanes(d)) {
     const std::uint32_t filled = lanes.count - i < hn::Lanes(d) ? (1u << (lanes.count - i)) - 1 : 0xff;
     const Vec3 lane_corner[3] = {corner(lanes, 0, i), corner(lanes, 1, i), corner(lanes, 2, i)};
@@ -537,7 +576,18 @@ std::size_t TouchingPairs(const TrianglePack& rows, std::uint32_t which, const T
           q[k] = {hn::TableLookupLanes(lane_corner[k].x, lane), hn::TableLookupLanes(lane_corner[k].y, lane),
                   hn::TableLookupLanes(lane_corner[k].z, lane)};
         }
-        const PairBits bits = testPairs(p, q, limits, hn::FirstN(d, count - at));
+        PairBits bits;
+        if constexpr (kSlabs) {
+          const auto slabRow = [&](const float* from)
+                                   HWY_ATTR { return hn::TableLookupLanes(hn::Load(d, from + j), row); };
+          const PackSlabs& of = picked.slabs;
+          const SlabLanes slab{{slabRow(of.normal[0]), slabRow(of.normal[1]), slabRow(of.normal[2])},
+                               slabRow(of.middle),
+                               slabRow(of.half)};
+          bits = testPairs(p, q, &slab, limits, one_will_do, hn::FirstN(d, count - at));
+        } else {
+          bits = testPairs(p, q, static_cast<const void*>(nullptr), limits, one_will_do, hn::FirstN(d, count - at));
+        }
         const auto pairAt = [&](std::size_t in) HWY_ATTR {
           const auto met = static_cast<std::size_t>(which_pair[at + in]);
           return PackPair{picked.row[j + met / 8], static_cast<std::uint8_t>(i + met % 8),
@@ -555,6 +605,13 @@ std::size_t TouchingPairs(const TrianglePack& rows, std::uint32_t which, const T
     }
   }
   return found;
+}
+
+std::size_t TouchingPairs(const TrianglePack& rows, std::uint32_t which, const TrianglePack& lanes,
+                          const PackRegion& region, float tolerance, float margin, bool one_will_do, PackPair* pairs,
+                          const PackSlabs* slabs) {
+  return slabs == nullptr ? touching<false>(rows, which, lanes, region, tolerance, margin, one_will_do, pairs, slabs)
+                          : touching<true>(rows, which, lanes, region, tolerance, margin, one_will_do, pairs, slabs);
 }
 
 }  // namespace bocst::query::HWY_NAMESPACE
@@ -598,8 +655,9 @@ void moveTriangles(const TrianglePack& pack, std::uint32_t which, const PackMoti
 }
 
 std::size_t touchingPairs(const TrianglePack& rows, std::uint32_t which, const TrianglePack& lanes,
-                          const PackRegion& region, float tolerance, float margin, bool one_will_do, PackPair* pairs) {
-  return HWY_DYNAMIC_DISPATCH(TouchingPairs)(rows, which, lanes, region, tolerance, margin, one_will_do, pairs);
+                          const PackRegion& region, float tolerance, float margin, bool one_will_do, PackPair* pairs,
+                          const PackSlabs* slabs) {
+  return HWY_DYNAMIC_DISPATCH(TouchingPairs)(rows, which, lanes, region, tolerance, margin, one_will_do, pairs, slabs);
 }
 
 }  // namespace bocst::query

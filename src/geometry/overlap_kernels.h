@@ -101,12 +101,19 @@ struct PackPair {
   bool certain;  ///< They surely meet.
 };
 
+/// What bounds each triangle of a pack along a direction of its own, in the pack's frame. Computed in double: in float,
+/// a plane through corners far away is known less well.
+struct PackSlabs {
+  alignas(64) float normal[3][TrianglePack::kCapacity];  ///< The sum of its entries' sizes is at most 1.
+  float middle[TrianglePack::kCapacity], half[TrianglePack::kCapacity];  ///< Along normal; half covers its rounding.
+};
+
 /// Writes the pairs (a triangle of rows, of those in `which`, and a triangle of lanes) that are not surely apart, by
 /// their boxes, their planes and where they cut the line of both planes; at most rows.count * lanes.count. Returns how
 /// many. What the rows have outside of the box of `region` is not looked at. `tolerance` is a distance that still
 /// counts as touching: what the caller's coordinates are off by. What is no farther apart than `margin` is certain to
 /// touch; two corners are looked at for that. `one_will_do`: if a pair is found that is certain to touch, it alone is
-/// written.
+/// written. `slabs`, if not null, are those of the rows, and take the place of their planes.
 ///
 /// With M the larger size of the packs and u = 2^-24, corners are off by 6 u M along each axis.
 ///
@@ -119,8 +126,10 @@ struct PackPair {
 /// corners. Determinants of two edges of one triangle and a way change by s (4 E W + E^2) to first order, those of an
 /// edge of each and a way by s (2 G W + E F), and both by less than a tenth more; rounding is 42 u times the three
 /// lengths. Where the former are more, all corners are on known sides of the other's plane; so are the ends of the
-/// intervals in which the two cut the line of both planes to each other, by the latter.
+/// intervals in which the two cut the line of both planes to each other, by the latter. Heights above the middle of a
+/// slab are off by 8 u m + tolerance, m the size of the lanes.
 std::size_t touchingPairs(const TrianglePack& rows, std::uint32_t which, const TrianglePack& lanes,
-                          const PackRegion& region, float tolerance, float margin, bool one_will_do, PackPair* pairs);
+                          const PackRegion& region, float tolerance, float margin, bool one_will_do, PackPair* pairs,
+                          const PackSlabs* slabs = nullptr);
 
 }  // namespace bocst::query

@@ -280,15 +280,26 @@ class LeafPairs {
       rows_.size = 0;
       for (std::uint32_t left = which; left != 0; left &= left - 1) {
         const auto t = static_cast<std::size_t>(__builtin_ctz(left));
+        const std::size_t row = rows_.count++;
+        const float(&normal)[3][LargeTriangles::kCapacity] = large.bounds().normal;
+        const Eigen::Vector3d n(normal[0][t], normal[1][t], normal[2][t]);
+        double lowest = 0, highest = 0;
         for (std::size_t k = 0; k < 3; ++k) {
           const Eigen::Vector3d v = large.corner(t, k) - (middle.array() - LargeTriangles::kMiddle).matrix();
+          const double height = n.dot(v);
+          lowest = k == 0 ? height : std::min(lowest, height);
+          highest = k == 0 ? height : std::max(highest, height);
           for (std::size_t x = 0; x < 3; ++x) {
             const auto at = static_cast<float>(v[static_cast<int>(x)]);
-            rows_.xyz[3 * k + x][rows_.count] = at;
+            rows_.xyz[3 * k + x][row] = at;
             rows_.size = std::max(rows_.size, std::abs(at));
           }
         }
-        ids[rows_.count++] = large.id(t);
+        const double height = (lowest + highest) / 2;
+        for (std::size_t k = 0; k < 3; ++k) slabs_.normal[k][row] = normal[k][t];
+        slabs_.middle[row] = static_cast<float>(height);
+        slabs_.half[row] = static_cast<float>((highest - lowest) / 2 + std::abs(height) * 2 * 0x1p-24) * (1 + 0x1p-22f);
+        ids[row] = large.id(t);
       }
       if (testRows(leaf, to, ids, f)) return true;
       if (begin + TrianglePack::kCapacity >= leaf.all) return false;
@@ -306,7 +317,8 @@ class LeafPairs {
     }
     const std::uint32_t all = rows_.count < 32 ? (1u << rows_.count) - 1 : ~0u;
     const auto [tolerance, margin] = limits(to, error);
-    const std::size_t found = touchingPairs(rows_, all, leaf.pack, region, tolerance, margin, one_will_do_, found_);
+    const std::size_t found =
+        touchingPairs(rows_, all, leaf.pack, region, tolerance, margin, one_will_do_, found_, &slabs_);
     for (std::size_t k = 0; k < found; ++k) {
       if (f(leaf.id(found_[k].lane), ids[found_[k].row], found_[k].certain)) return true;
     }
@@ -357,6 +369,7 @@ class LeafPairs {
   LeafPacks<B> leaves_b_;
   PackMotion to_a_;
   TrianglePack lanes_, rows_;
+  PackSlabs slabs_{};  // of rows_
   const SimilarityTransform *b_in_a_ = nullptr, *a_in_b_ = nullptr;
   bool one_will_do_ = false;
   PackPair found_[TrianglePack::kCapacity * TrianglePack::kCapacity];
