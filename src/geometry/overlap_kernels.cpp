@@ -294,6 +294,54 @@ void MoveTriangles(const TrianglePack& pack, std::uint32_t which, const PackMoti
   moved.size = (std::sqrt(3 * square) * pack.size + offset) * 1.0001f;
 }
 
+void TakeRows(const RawTriangles& placed, const TriangleBounds& bounds, std::uint32_t which, const double (&middle)[3],
+              TrianglePack& rows, PackSlabs& slabs) {
+  const hn::CappedTag<double, 8> dd;
+  const hn::Rebind<float, decltype(dd)> df;
+  using VD = hn::Vec<decltype(dd)>;
+  rows.count = 0;
+  auto size = hn::Zero(df);
+  for (std::size_t i = 0; i < TrianglePack::kCapacity; i += hn::Lanes(dd)) {
+    const std::uint32_t wanted = which >> i & ((1u << hn::Lanes(dd)) - 1);
+    if (wanted == 0) continue;
+    alignas(32) std::int32_t from[8];
+    std::fill_n(from, 8, __builtin_ctz(wanted));
+    std::size_t count = 0;
+    for (std::uint32_t left = wanted; left != 0; left &= left - 1) from[count++] = __builtin_ctz(left);
+    const auto order = hn::SetTableIndices(df, from);
+    // Whole vectors are written, but never beyond the place where they were read.
+    const auto put = [&](hn::Vec<decltype(df)> x, float* to)
+                         HWY_ATTR { hn::StoreU(hn::TableLookupLanes(x, order), df, to + rows.count); };
+    hn::Vec<decltype(df)> normal[3];
+    BOCST_UNROLL
+    for (std::size_t c = 0; c < 3; ++c) {
+      normal[c] = hn::Load(df, bounds.normal[c] + i);
+      put(normal[c], slabs.normal[c]);
+    }
+    VD height[3];
+    BOCST_UNROLL
+    for (std::size_t k = 0; k < 3; ++k) {
+      height[k] = hn::Zero(dd);
+      BOCST_UNROLL
+      for (std::size_t c = 0; c < 3; ++c) {
+        const VD x = hn::Sub(hn::Load(dd, placed.xyz[3 * k + c] + i), hn::Set(dd, middle[c]));
+        height[k] = hn::MulAdd(hn::PromoteTo(dd, normal[c]), x, height[k]);
+        const auto at = hn::TableLookupLanes(hn::DemoteTo(df, x), order);
+        size = hn::Max(size, hn::Abs(at));
+        hn::StoreU(at, df, rows.xyz[3 * k + c] + rows.count);
+      }
+    }
+    const VD low = min3(height[0], height[1], height[2]), high = max3(height[0], height[1], height[2]);
+    const VD at = hn::Mul(hn::Set(dd, 0.5), hn::Add(low, high)), half = hn::Mul(hn::Set(dd, 0.5), hn::Sub(high, low));
+    put(hn::DemoteTo(df, at), slabs.middle);
+    // The middle is rounded by u = 2^-24 of it, and so is what is written here.
+    const VD rounded = hn::MulAdd(hn::Set(dd, 2 * 0x1p-24), hn::Abs(at), half);
+    put(hn::DemoteTo(df, hn::Mul(hn::Set(dd, 1 + 0x1p-22), rounded)), slabs.half);
+    rows.count += count;
+  }
+  rows.size = hn::GetLane(hn::MaxOfLanes(df, size));
+}
+
 // The corner of a triangle that is alone on its side of a plane, and its edges; `above` as the corners are over it.
 struct Fork {
   Vec3 corner, edge[2];
@@ -359,24 +407,6 @@ HWY_INLINE void pickRows(const TrianglePack& rows, const PackSlabs* slabs, std::
   }
 }
 
-// Which of the lanes' boxes meet that of each picked row from j on: eight bits a row. One pair in three or four does.
-HWY_INLINE std::uint64_t meetingBoxes(const Vec3& low, const Vec3& high, std::uint32_t filled, const PickedRows& picked,
-                                      std::size_t j) {
-  const D d;
-  std::uint64_t meeting = 0;
-  const std::size_t end = std::min(hn::Lanes(d), picked.count - j);
-  for (std::size_t r = 0; r < end; ++r) {
-    M near =
-        hn::And(hn::Le(low.x, hn::Set(d, picked.high[0][j + r])), hn::Ge(high.x, hn::Set(d, picked.low[0][j + r])));
-    near = hn::And(near, hn::And(hn::Le(low.y, hn::Set(d, picked.high[1][j + r])),
-                                 hn::Ge(high.y, hn::Set(d, picked.low[1][j + r]))));
-    near = hn::And(near, hn::And(hn::Le(low.z, hn::Set(d, picked.high[2][j + r])),
-                                 hn::Ge(high.z, hn::Set(d, picked.low[2][j + r]))));
-    meeting |= std::uint64_t{maskBits(near) & filled} << 8 * r;
-  }
-  return meeting;
-}
-
 // What counts as apart. Along an axis that is a product of edges, a gap counts beyond per_size times the sizes of what
 // it was computed from and, with a margin, per_length times its length.
 struct Limits {
@@ -398,6 +428,36 @@ HWY_INLINE Limits limitsOf(float size, float lane_size, float tolerance, float m
   const float sure_margin = std::max(margin - rounding, 0.0f);
   return {hn::Set(D(), sure_margin > 0 ? rounding : rounding + tolerance), hn::Set(D(), tolerance),
           hn::Set(D(), 8 * u * lane_size + tolerance), 25 * u * size + tolerance, sure_margin};
+}
+
+// Which of the lanes' triangles meet the box of each picked row from j on, and its slab, if rows have these: eight bits
+// a row. One pair in three or four does.
+template <bool kSlabs>
+HWY_INLINE std::uint64_t meetingBoxes(const Vec3 (&lanes)[3], std::uint32_t filled, const PickedRows& picked,
+                                      std::size_t j, const Limits& limits) {
+  const D d;
+  const Vec3 low = min3(lanes), high = max3(lanes);
+  std::uint64_t meeting = 0;
+  const std::size_t end = std::min(hn::Lanes(d), picked.count - j);
+  for (std::size_t r = 0; r < end; ++r) {
+    M near =
+        hn::And(hn::Le(low.x, hn::Set(d, picked.high[0][j + r])), hn::Ge(high.x, hn::Set(d, picked.low[0][j + r])));
+    near = hn::And(near, hn::And(hn::Le(low.y, hn::Set(d, picked.high[1][j + r])),
+                                 hn::Ge(high.y, hn::Set(d, picked.low[1][j + r]))));
+    near = hn::And(near, hn::And(hn::Le(low.z, hn::Set(d, picked.high[2][j + r])),
+                                 hn::Ge(high.z, hn::Set(d, picked.low[2][j + r]))));
+    if constexpr (kSlabs) {
+      const PackSlabs& slabs = picked.slabs;
+      const Vec3 n = broadcast(slabs.normal[0][j + r], slabs.normal[1][j + r], slabs.normal[2][j + r]);
+      const V middle = hn::Set(d, slabs.middle[j + r]),
+              half = hn::Add(hn::Set(d, slabs.half[j + r]), limits.across_slab);
+      const V h[3] = {dot(n, lanes[0]), dot(n, lanes[1]), dot(n, lanes[2])};
+      near = hn::And(near, hn::And(hn::Le(hn::Sub(min3(h[0], h[1], h[2]), middle), half),
+                                   hn::Le(hn::Sub(middle, max3(h[0], h[1], h[2])), half)));
+    }
+    meeting |= std::uint64_t{maskBits(near) & filled} << 8 * r;
+  }
+  return meeting;
 }
 
 // A vector of triangles: their edges, normals, longest edges, and how far a determinant with the normal may be off.
@@ -522,9 +582,11 @@ HWY_INLINE PairBits testPairs(const Vec3 (&p)[3], const Vec3 (&q)[3], const Slab
   M possible = hn::AndNot(hn::And(clear, hn::Or(hn::Not(cut), beside)), near);
   M certain = hn::And(hn::And(near, clear), hn::And(cut, across));
   if constexpr (kSlab) {
-    // FCL's test is to decide about slivers.
-    const V square = hn::Mul(of_p.longest, of_p.longest);
-    certain = hn::And(certain, hn::Gt(norm1(n), hn::Mul(hn::Set(d, 1e-3f), square)));
+    // The heights stay what they are however the corners of q are moved by the tolerance; those of p move its plane.
+    const V least = hn::Sub(min3(hn::Abs(n0), hn::Abs(n1), hn::Abs(n2)), n_off), size = norm1(n);
+    const V moved = hn::Mul(hn::Mul(limits.per_length, of_p.longest), hn::Add(span4, of_p.longest));
+    certain = hn::And(certain, hn::Gt(hn::Mul(least, size), hn::Add(moved, moved)));
+    certain = hn::And(certain, hn::Gt(size, hn::Mul(hn::Set(d, 1e-3f), hn::Mul(of_p.longest, of_p.longest))));
   }
   if (limits.margin > 0) {
     const M close = hn::And(near, hn::Le(squareBetweenCorners(p, q), hn::Set(d, limits.margin * limits.margin)));
@@ -554,10 +616,9 @@ HWY_INLINE std::size_t touching(const TrianglePack& rows, std::uint32_t which, c
   for (std::size_t i = 0; i < lanes.count; i += hn::Lanes(d)) {
     const std::uint32_t filled = lanes.count - i < hn::Lanes(d) ? (1u << (lanes.count - i)) - 1 : 0xff;
     const Vec3 lane_corner[3] = {corner(lanes, 0, i), corner(lanes, 1, i), corner(lanes, 2, i)};
-    const Vec3 low = min3(lane_corner), high = max3(lane_corner);
     for (std::size_t j = 0; j < picked.count; j += hn::Lanes(d)) {
       // Pairs whose boxes meet are gathered before what costs more.
-      std::uint64_t meeting = meetingBoxes(low, high, filled, picked, j);
+      std::uint64_t meeting = meetingBoxes<kSlabs>(lane_corner, filled, picked, j, limits);
       if (meeting == 0) continue;
       alignas(64) std::int32_t which_pair[kMost * 8 + kMost];
       std::size_t count = 0;
@@ -626,6 +687,7 @@ HWY_EXPORT(PlaceTriangles);
 HWY_EXPORT(BoundTriangles);
 HWY_EXPORT(TrianglesWithin);
 HWY_EXPORT(MoveTriangles);
+HWY_EXPORT(TakeRows);
 HWY_EXPORT(TouchingPairs);
 
 std::uint8_t overlappingLanes(const bounds::LooseFrame& frame, const bounds::OctantBounds& lanes,
@@ -652,6 +714,11 @@ std::uint32_t trianglesWithin(const TrianglePack& pack, const PackRegion& region
 
 void moveTriangles(const TrianglePack& pack, std::uint32_t which, const PackMotion& motion, TrianglePack& moved) {
   HWY_DYNAMIC_DISPATCH(MoveTriangles)(pack, which, motion, moved);
+}
+
+void takeRows(const RawTriangles& placed, const TriangleBounds& bounds, std::uint32_t which, const double (&middle)[3],
+              TrianglePack& rows, PackSlabs& slabs) {
+  HWY_DYNAMIC_DISPATCH(TakeRows)(placed, bounds, which, middle, rows, slabs);
 }
 
 std::size_t touchingPairs(const TrianglePack& rows, std::uint32_t which, const TrianglePack& lanes,

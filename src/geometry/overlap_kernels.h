@@ -108,6 +108,11 @@ struct PackSlabs {
   float middle[TrianglePack::kCapacity], half[TrianglePack::kCapacity];  ///< Along normal; half covers its rounding.
 };
 
+/// Fills `rows` with the placed triangles in `which`, in that order, about `middle`, and `slabs` with theirs along the
+/// normals of `bounds`. Coordinates are rounded once.
+void takeRows(const RawTriangles& placed, const TriangleBounds& bounds, std::uint32_t which, const double (&middle)[3],
+              TrianglePack& rows, PackSlabs& slabs);
+
 /// Writes the pairs (a triangle of rows, of those in `which`, and a triangle of lanes) that are not surely apart, by
 /// their boxes, their planes and where they cut the line of both planes; at most rows.count * lanes.count. Returns how
 /// many. What the rows have outside of the box of `region` is not looked at. `tolerance` is a distance that still
@@ -126,8 +131,11 @@ struct PackSlabs {
 /// corners. Determinants of two edges of one triangle and a way change by s (4 E W + E^2) to first order, those of an
 /// edge of each and a way by s (2 G W + E F), and both by less than a tenth more; rounding is 42 u times the three
 /// lengths. Where the former are more, all corners are on known sides of the other's plane; so are the ends of the
-/// intervals in which the two cut the line of both planes to each other, by the latter. Heights above the middle of a
-/// slab are off by 8 u m + tolerance, m the size of the lanes.
+/// intervals in which the two cut the line of both planes to each other, by the latter.
+///
+/// With slabs, corners of lanes are on known sides where they are off the slab by 8 u m + tolerance, m the size of the
+/// lanes. A pair is certain to meet only where the former hold for the row, too, with the tolerance for s, and its
+/// normal is no less than 1e-3 E^2.
 std::size_t touchingPairs(const TrianglePack& rows, std::uint32_t which, const TrianglePack& lanes,
                           const PackRegion& region, float tolerance, float margin, bool one_will_do, PackPair* pairs,
                           const PackSlabs* slabs = nullptr);

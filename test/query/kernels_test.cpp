@@ -491,6 +491,117 @@ TEST_P(EveryTarget, TrianglesWithoutAreaArePartedByEdges) {
   EXPECT_GT(apart, 10000);
 }
 
+// Large triangles, which are placed in double, beside small ones, often in touch with them: what FCL finds is found,
+// and what is certain FCL finds.
+template <typename S>
+void noPairIsLostBesideLargeTriangles() {
+  using Exact = fcl::detail::Intersect<S>;
+  std::mt19937_64 g(39);
+  std::uniform_real_distribution<double> u(-1, 1);
+  const auto vector = [&] { return Eigen::Vector3d(u(g), u(g), u(g)); };
+  const auto rounded = [](const Eigen::Vector3d& v) -> Eigen::Vector3d {
+    return v.template cast<S>().template cast<double>();
+  };
+  const PackTransform identity = {{{1, 0, 0}, {0, 1, 0}, {0, 0, 1}}, {0, 0, 0}};
+  std::size_t pairs = 0, met = 0, certain = 0, found_free = 0, free = 0;
+  for (int round = 0; round < 1500; ++round) {
+    const double scale = std::pow(10.0, 3 * u(g)), large_size = std::pow(10.0, 3 * std::abs(u(g)));
+    TrianglePack small;
+    small.count = 1 + g() % TrianglePack::kCapacity;
+    const std::size_t large = 1 + g() % TrianglePack::kCapacity;
+    const Eigen::Vector3d middle = scale * large_size * vector();
+    std::vector<Corners> p(large), q(small.count);
+    for (std::size_t i = 0; i < small.count; ++i) {
+      const Eigen::Vector3d at = vector();
+      for (auto& v : q[i]) v = rounded(scale * (at + 0.3 * vector()));
+      degenerateAtTimes(g, q[i], 8);
+      put(small, i, q[i]);
+    }
+    RawTriangles raw{}, placed{};
+    for (std::size_t i = 0; i < large; ++i) {
+      for (auto& v : p[i]) v = scale * large_size * vector();
+      degenerateAtTimes(g, p[i], 6);
+      // Through a point of a small one, or close to it.
+      const Corners& other = q[g() % small.count];
+      const double a = std::abs(u(g)), b = (1 - a) * std::abs(u(g));
+      const Eigen::Vector3d on =
+          g() % 3 == 0 ? other[g() % 3]
+                       : Eigen::Vector3d(other[0] + a * (other[1] - other[0]) + b * (other[2] - other[0]));
+      const double c = std::abs(u(g)), e = (1 - c) * std::abs(u(g));
+      const Eigen::Vector3d through = p[i][0] + c * (p[i][1] - p[i][0]) + e * (p[i][2] - p[i][0]);
+      const Eigen::Vector3d off = g() % 2 == 0
+                                      ? Eigen::Vector3d::Zero()
+                                      : Eigen::Vector3d(scale * std::pow(10.0, -6 * std::abs(u(g))) * vector());
+      for (auto& v : p[i]) v = rounded(v + on - through + off);
+      for (std::size_t k = 0; k < 3; ++k) {
+        for (std::size_t x = 0; x < 3; ++x) {
+          raw.xyz[3 * k + x][i] = p[i][static_cast<int>(k)][static_cast<int>(x)] + middle[static_cast<int>(x)];
+        }
+      }
+    }
+    const std::uint32_t all = ~0u >> (32 - large), which = g() % 2 == 0 ? all : all & static_cast<std::uint32_t>(g());
+    TriangleBounds bounds;
+    boundTriangles(raw, all, identity, 1 / scale, 1e6, placed, bounds);
+    TrianglePack rows;
+    PackSlabs slabs;
+    takeRows(placed, bounds, which, {middle[0], middle[1], middle[2]}, rows, slabs);
+    std::vector<std::size_t> taken;
+    for (std::size_t i = 0; i < large; ++i) {
+      if (which >> i & 1) taken.push_back(i);
+    }
+    ASSERT_EQ(rows.count, taken.size());
+    if (taken.empty()) continue;
+    // What adding the middle rounds, and what FCL's test does.
+    const double magnitude = 4 * scale * large_size + 2 * scale;
+    const auto tolerance = static_cast<float>(magnitude * 32 * static_cast<double>(std::numeric_limits<S>::epsilon()));
+    PackPair found[TrianglePack::kCapacity * TrianglePack::kCapacity];
+    const std::size_t count =
+        touchingPairs(rows, ~0u >> (32 - rows.count), small, everywhere(), tolerance, 0, false, found, &slabs);
+    std::map<std::pair<std::size_t, std::size_t>, bool> set;
+    for (std::size_t k = 0; k < count; ++k) set[{found[k].row, found[k].lane}] = found[k].certain;
+    ASSERT_EQ(set.size(), count);
+    for (std::size_t r = 0; r < rows.count; ++r) {
+      for (std::size_t j = 0; j < small.count; ++j) {
+        const Corners &a = p[taken[r]], &b = q[j];
+        const auto at = set.find({r, j});
+        const bool is_found = at != set.end(), is_certain = is_found && at->second;
+        ++pairs;
+        certain += is_certain;
+        if (isDegenerate(a) || isDegenerate(b)) {
+          ASSERT_FALSE(is_certain) << "round " << round;
+          Eigen::Vector3d on_a, on_b;
+          const double distance = nearestPoints(a, b, on_a, on_b);
+          if (distance <= static_cast<double>(tolerance) / 2) {
+            ASSERT_TRUE(is_found) << "round " << round;
+          }
+          free += distance > 1e-3 * scale;
+          found_free += distance > 1e-3 * scale && is_found;
+          continue;
+        }
+        using Vector = fcl::Vector3<S>;
+        const auto s = [](const Eigen::Vector3d& v) -> Vector { return v.template cast<S>(); };
+        const bool meet = Exact::intersect_Triangle(s(a[0]), s(a[1]), s(a[2]), s(b[0]), s(b[1]), s(b[2]));
+        met += meet;
+        if (is_certain) {
+          ASSERT_TRUE(meet) << "round " << round;
+        }
+        if (meet) {
+          ASSERT_TRUE(is_found) << "round " << round;
+        }
+      }
+    }
+  }
+  EXPECT_GT(pairs, 100000u);
+  EXPECT_GT(met, 5000u);
+  EXPECT_GT(certain, met / 4);
+  EXPECT_LT(found_free, free / 20) << "a test that lets everything through proves nothing";
+}
+
+TEST_P(EveryTarget, NoPairIsLostBesideLargeTriangles) {
+  noPairIsLostBesideLargeTriangles<double>();
+  noPairIsLostBesideLargeTriangles<float>();
+}
+
 // With a margin, a pair is found where its distance is no longer, and certain only there.
 TEST_P(EveryTarget, PairsWithinAMarginAreFound) {
   std::mt19937_64 g(38);

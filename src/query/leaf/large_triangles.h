@@ -41,9 +41,9 @@ class LargeTriangles {
 
   /// In the coordinates of PairFrames.
   const TriangleBounds& bounds() const { return bounds_; }
-  /// In lattice units of the smaller side, about the middle of its root.
-  Eigen::Vector3d corner(std::size_t i, std::size_t k) const {
-    return {placed_.xyz[3 * k][i], placed_.xyz[3 * k + 1][i], placed_.xyz[3 * k + 2][i]};
+  /// Those in `which` about a point of the smaller side, in its lattice units.
+  void takeRows(std::uint32_t which, const double (&about)[3], TrianglePack& rows, PackSlabs& slabs) const {
+    query::takeRows(placed_, bounds_, which, {about[0] - kMiddle, about[1] - kMiddle, about[2] - kMiddle}, rows, slabs);
   }
   std::uint32_t id(std::size_t i) const { return ids_[i]; }
 

@@ -273,33 +273,11 @@ class LeafPairs {
                  std::uint32_t which, const SimilarityTransform& to, F&& f) {
     for (std::size_t begin = 0;; begin += TrianglePack::kCapacity) {
       const auto& leaf = leaves.get(side, node, begin);
-      std::uint32_t ids[TrianglePack::kCapacity];
       const double(&c)[3] = leaf.volume.center[0];
-      const Eigen::Vector3d middle(c[0], c[1], c[2]);
-      rows_.count = 0;
-      rows_.size = 0;
+      large.takeRows(which, c, rows_, slabs_);
+      std::uint32_t ids[TrianglePack::kCapacity], *id = ids;
       for (std::uint32_t left = which; left != 0; left &= left - 1) {
-        const auto t = static_cast<std::size_t>(__builtin_ctz(left));
-        const std::size_t row = rows_.count++;
-        const float(&normal)[3][LargeTriangles::kCapacity] = large.bounds().normal;
-        const Eigen::Vector3d n(normal[0][t], normal[1][t], normal[2][t]);
-        double lowest = 0, highest = 0;
-        for (std::size_t k = 0; k < 3; ++k) {
-          const Eigen::Vector3d v = large.corner(t, k) - (middle.array() - LargeTriangles::kMiddle).matrix();
-          const double height = n.dot(v);
-          lowest = k == 0 ? height : std::min(lowest, height);
-          highest = k == 0 ? height : std::max(highest, height);
-          for (std::size_t x = 0; x < 3; ++x) {
-            const auto at = static_cast<float>(v[static_cast<int>(x)]);
-            rows_.xyz[3 * k + x][row] = at;
-            rows_.size = std::max(rows_.size, std::abs(at));
-          }
-        }
-        const double height = (lowest + highest) / 2;
-        for (std::size_t k = 0; k < 3; ++k) slabs_.normal[k][row] = normal[k][t];
-        slabs_.middle[row] = static_cast<float>(height);
-        slabs_.half[row] = static_cast<float>((highest - lowest) / 2 + std::abs(height) * 2 * 0x1p-24) * (1 + 0x1p-22f);
-        ids[row] = large.id(t);
+        *id++ = large.id(static_cast<std::size_t>(__builtin_ctz(left)));
       }
       if (testRows(leaf, to, ids, f)) return true;
       if (begin + TrianglePack::kCapacity >= leaf.all) return false;
