@@ -334,9 +334,7 @@ void TakeRows(const RawTriangles& placed, const TriangleBounds& bounds, std::uin
     const VD low = min3(height[0], height[1], height[2]), high = max3(height[0], height[1], height[2]);
     const VD at = hn::Mul(hn::Set(dd, 0.5), hn::Add(low, high)), half = hn::Mul(hn::Set(dd, 0.5), hn::Sub(high, low));
     put(hn::DemoteTo(df, at), slabs.middle);
-    // The middle is rounded by u = 2^-24 of it, and so is what is written here.
-    const VD rounded = hn::MulAdd(hn::Set(dd, 2 * 0x1p-24), hn::Abs(at), half);
-    put(hn::DemoteTo(df, hn::Mul(hn::Set(dd, 1 + 0x1p-22), rounded)), slabs.half);
+    put(hn::DemoteTo(df, hn::Mul(hn::Set(dd, 1 + 0x1p-22), half)), slabs.half);
     rows.count += count;
   }
   rows.size = hn::GetLane(hn::MaxOfLanes(df, size));

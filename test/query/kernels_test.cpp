@@ -521,6 +521,7 @@ void noPairIsLostBesideLargeTriangles() {
     for (std::size_t i = 0; i < large; ++i) {
       for (auto& v : p[i]) v = scale * large_size * vector();
       degenerateAtTimes(g, p[i], 6);
+      if (g() % 3 == 0) p[i][2] = p[i][1] + std::pow(10.0, -6 * std::abs(u(g))) * (p[i][2] - p[i][1]);
       // Through a point of a small one, or close to it.
       const Corners& other = q[g() % small.count];
       const double a = std::abs(u(g)), b = (1 - a) * std::abs(u(g));
@@ -593,7 +594,7 @@ void noPairIsLostBesideLargeTriangles() {
   }
   EXPECT_GT(pairs, 100000u);
   EXPECT_GT(met, 5000u);
-  EXPECT_GT(certain, met / 4);
+  EXPECT_GT(certain, met / 6);
   EXPECT_LT(found_free, free / 20) << "a test that lets everything through proves nothing";
 }
 
