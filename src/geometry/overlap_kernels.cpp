@@ -312,11 +312,19 @@ void TakeRows(const RawTriangles& placed, const TriangleBounds& bounds, std::uin
     // Whole vectors are written, but never beyond the place where they were read.
     const auto put = [&](hn::Vec<decltype(df)> x, float* to)
                          HWY_ATTR { hn::StoreU(hn::TableLookupLanes(x, order), df, to + rows.count); };
-    hn::Vec<decltype(df)> normal[3];
+    // To unit length: a margin is a length.
+    VD normal[3], square = hn::Set(dd, 1e-100);
     BOCST_UNROLL
     for (std::size_t c = 0; c < 3; ++c) {
-      normal[c] = hn::Load(df, bounds.normal[c] + i);
-      put(normal[c], slabs.normal[c]);
+      normal[c] = hn::PromoteTo(dd, hn::Load(df, bounds.normal[c] + i));
+      square = hn::MulAdd(normal[c], normal[c], square);
+    }
+    const VD per_length = hn::Div(hn::Set(dd, 1.0), hn::Sqrt(square));
+    BOCST_UNROLL
+    for (std::size_t c = 0; c < 3; ++c) {
+      const auto n = hn::DemoteTo(df, hn::Mul(normal[c], per_length));
+      put(n, slabs.normal[c]);
+      normal[c] = hn::PromoteTo(dd, n);
     }
     VD height[3];
     BOCST_UNROLL
@@ -325,7 +333,7 @@ void TakeRows(const RawTriangles& placed, const TriangleBounds& bounds, std::uin
       BOCST_UNROLL
       for (std::size_t c = 0; c < 3; ++c) {
         const VD x = hn::Sub(hn::Load(dd, placed.xyz[3 * k + c] + i), hn::Set(dd, middle[c]));
-        height[k] = hn::MulAdd(hn::PromoteTo(dd, normal[c]), x, height[k]);
+        height[k] = hn::MulAdd(normal[c], x, height[k]);
         const auto at = hn::TableLookupLanes(hn::DemoteTo(df, x), order);
         size = hn::Max(size, hn::Abs(at));
         hn::StoreU(at, df, rows.xyz[3 * k + c] + rows.count);
@@ -408,9 +416,10 @@ HWY_INLINE void pickRows(const TrianglePack& rows, const PackSlabs* slabs, std::
 // What counts as apart. Along an axis that is a product of edges, a gap counts beyond per_size times the sizes of what
 // it was computed from and, with a margin, per_length times its length.
 struct Limits {
-  V per_size, per_length, across_slab;
-  float moved;   // what two corners may be off by in sum, the tolerance included
-  float margin;  // corners no farther apart touch for sure; 0 where there is no margin
+  V per_size, per_length, beside_slab;
+  V through_slab, tolerance;  // for what is certain to meet, where a margin is no tolerance
+  float moved;                // what two corners may be off by in sum, that tolerance included
+  float margin;               // corners no farther apart touch for sure; 0 where there is no margin
 
   V along(const Vec3& axis, V sizes) const {
     const V rounding = hn::MulAdd(per_size, sizes, hn::Set(D(), 1e-30f));  // products have lost bits below
@@ -424,8 +433,14 @@ HWY_INLINE Limits limitsOf(float size, float lane_size, float tolerance, float m
   const float u = 0x1p-24f, rounding = 64 * u * size;
   // The tolerance is a length. Where it is what FCL rounds, which is no axis of ours, it counts with the sizes.
   const float sure_margin = std::max(margin - rounding, 0.0f);
-  return {hn::Set(D(), sure_margin > 0 ? rounding : rounding + tolerance), hn::Set(D(), tolerance),
-          hn::Set(D(), 8 * u * lane_size + tolerance), 25 * u * size + tolerance, sure_margin};
+  const float rest = sure_margin > 0 ? tolerance - margin : tolerance;
+  return {hn::Set(D(), sure_margin > 0 ? rounding : rounding + tolerance),
+          hn::Set(D(), tolerance),
+          hn::Set(D(), 12 * u * lane_size + tolerance),
+          hn::Set(D(), 12 * u * lane_size + rest),
+          hn::Set(D(), rest),
+          25 * u * size + rest,
+          sure_margin};
 }
 
 // Which of the lanes' triangles meet the box of each picked row from j on, and its slab, if rows have these: eight bits
@@ -448,7 +463,7 @@ HWY_INLINE std::uint64_t meetingBoxes(const Vec3 (&lanes)[3], std::uint32_t fill
       const PackSlabs& slabs = picked.slabs;
       const Vec3 n = broadcast(slabs.normal[0][j + r], slabs.normal[1][j + r], slabs.normal[2][j + r]);
       const V middle = hn::Set(d, slabs.middle[j + r]),
-              half = hn::Add(hn::Set(d, slabs.half[j + r]), limits.across_slab);
+              half = hn::Add(hn::Set(d, slabs.half[j + r]), limits.beside_slab);
       const V h[3] = {dot(n, lanes[0]), dot(n, lanes[1]), dot(n, lanes[2])};
       near = hn::And(near, hn::And(hn::Le(hn::Sub(min3(h[0], h[1], h[2]), middle), half),
                                    hn::Le(hn::Sub(middle, max3(h[0], h[1], h[2])), half)));
@@ -537,7 +552,7 @@ HWY_INLINE PairBits testPairs(const Vec3 (&p)[3], const Vec3 (&q)[3], const Slab
   if constexpr (kSlab) {
     n0 = hn::Sub(dot(slab->normal, q[0]), slab->middle), n1 = hn::Sub(dot(slab->normal, q[1]), slab->middle),
     n2 = hn::Sub(dot(slab->normal, q[2]), slab->middle);
-    n_rounding_margin = hn::Add(slab->half, limits.across_slab);
+    n_rounding_margin = hn::Add(slab->half, limits.beside_slab);
   } else {
     n0 = dot(n, w[0]), n1 = dot(n, w[1]), n2 = dot(n, w[2]);
     n_rounding_margin = of_p.rounding_margin;
@@ -560,7 +575,7 @@ HWY_INLINE PairBits testPairs(const Vec3 (&p)[3], const Vec3 (&q)[3], const Slab
       hn::MulAdd(hn::Mul(longer, hn::MulAdd(rounds, shorter, moves)), hn::Add(hn::Add(span, span), shorter), tiny);
   V n_off;
   if constexpr (kSlab) {
-    n_off = n_rounding_margin;
+    n_off = hn::Add(slab->half, limits.through_slab);
   } else {
     n_off = offNormal(of_p.longest);
   }
@@ -577,19 +592,19 @@ HWY_INLINE PairBits testPairs(const Vec3 (&p)[3], const Vec3 (&q)[3], const Slab
   const M beside = hn::Or(hn::Gt(low, edges_off), hn::Lt(high, hn::Neg(edges_off)));
   const M across = hn::And(hn::Lt(low, hn::Neg(edges_off)), hn::Gt(high, edges_off));
   const M cut = hn::Gt(hn::Min(by_n, by_m), hn::Zero(d));
-  M possible = hn::AndNot(hn::And(clear, hn::Or(hn::Not(cut), beside)), near);
+  // With a margin, what shares no point may touch.
+  M possible = limits.margin > 0 ? near : hn::AndNot(hn::And(clear, hn::Or(hn::Not(cut), beside)), near);
   M certain = hn::And(hn::And(near, clear), hn::And(cut, across));
   if constexpr (kSlab) {
     // The heights stay what they are however the corners of q are moved by the tolerance; those of p move its plane.
     const V least = hn::Sub(min3(hn::Abs(n0), hn::Abs(n1), hn::Abs(n2)), n_off), size = norm1(n);
-    const V moved = hn::Mul(hn::Mul(limits.per_length, of_p.longest), hn::Add(span4, of_p.longest));
+    const V moved = hn::Mul(hn::Mul(limits.tolerance, of_p.longest), hn::Add(span4, of_p.longest));
     certain = hn::And(certain, hn::Gt(hn::Mul(least, size), hn::Add(moved, moved)));
     certain = hn::And(certain, hn::Gt(size, hn::Mul(hn::Set(d, 1e-3f), hn::Mul(of_p.longest, of_p.longest))));
   }
   if (limits.margin > 0) {
-    const M close = hn::And(near, hn::Le(squareBetweenCorners(p, q), hn::Set(d, limits.margin * limits.margin)));
-    possible = hn::Or(possible, close);
-    certain = hn::Or(certain, close);
+    certain =
+        hn::Or(certain, hn::And(near, hn::Le(squareBetweenCorners(p, q), hn::Set(d, limits.margin * limits.margin))));
   }
   const M doubtful = hn::AndNot(certain, possible);
   if (!hn::AllFalse(d, doubtful) && (!one_will_do || hn::AllFalse(d, certain))) {

@@ -104,7 +104,7 @@ struct PackPair {
 /// What bounds each triangle of a pack along a direction of its own, in the pack's frame. Computed in double: in float,
 /// a plane through corners far away is known less well.
 struct PackSlabs {
-  alignas(64) float normal[3][TrianglePack::kCapacity];  ///< The sum of its entries' sizes is at most 1.
+  alignas(64) float normal[3][TrianglePack::kCapacity];                  ///< Of unit length, but for rounding, or zero.
   float middle[TrianglePack::kCapacity], half[TrianglePack::kCapacity];  ///< Along normal; half covers its rounding.
 };
 
@@ -133,7 +133,7 @@ void takeRows(const RawTriangles& placed, const TriangleBounds& bounds, std::uin
 /// lengths. Where the former are more, all corners are on known sides of the other's plane; so are the ends of the
 /// intervals in which the two cut the line of both planes to each other, by the latter.
 ///
-/// With slabs, corners of lanes are on known sides where they are off the slab by 8 u m + tolerance, m the size of the
+/// With slabs, corners of lanes are on known sides where they are off the slab by 12 u m + tolerance, m the size of the
 /// lanes. A pair is certain to meet only where the former hold for the row, too, with the tolerance for s, and its
 /// normal is no less than 1e-3 E^2.
 std::size_t touchingPairs(const TrianglePack& rows, std::uint32_t which, const TrianglePack& lanes,
