@@ -47,13 +47,13 @@ struct ExpansionRequest {
   // Answered.
   std::uint8_t grey = 0;  ///< Bit o: the surface meets octant o (reference.h), which has an actual region.
   bounds::OctantBounds octants;
-  bounds::NodeBounds own;                   ///< Of the cell itself: what the octants taught about it.
-  std::vector<std::uint32_t> lists;         ///< Triangles of octant 0, of octant 1, ...
-  std::array<std::size_t, 9> list_begin{};  ///< Octant o has lists[list_begin[o]] to lists[list_begin[o + 1]].
+  bounds::NodeBounds own;                     ///< Of the cell itself: what the octants taught about it.
+  std::vector<std::uint32_t> lists;           ///< Triangles of octant 0, of octant 1, ...
+  std::array<std::uint32_t, 9> list_begin{};  ///< Octant o has lists[list_begin[o]] to lists[list_begin[o + 1]].
   std::shared_ptr<const DeviceResource> kept_resource;  ///< Holds the lists that the oracle keeps.
   std::array<DeviceList, 8> device_lists{};  ///< Where it has octant o's, if count is not 0; it is then not in `lists`.
 
-  std::size_t listSize(int o) const { return list_begin[o + 1] - list_begin[o] + device_lists[o].count; }
+  std::size_t listSize(int o) const { return std::size_t{list_begin[o + 1]} - list_begin[o] + device_lists[o].count; }
 };
 
 /// Answers expansion batches. Any number of threads may submit; each batch belongs to one thread until wait() returned.

@@ -204,20 +204,21 @@ void ComputeChain::take(const std::vector<ExpansionRequest*>& requests, const st
     e.own = answer.own;
     e.grey = answer.grey;
     const std::uint32_t* const ids = all_ids + row[kRowIds];
-    std::uint32_t list = row[kRowList];
+    // Without branches: octants differ in what they keep.
+    const auto up_to = static_cast<std::uint32_t>(std::min<std::size_t>(e.ids_up_to, 0xffffffff));
+    std::uint32_t list = row[kRowList], kept = 0;
     std::size_t here = 0;  // ids of the lists that came back lie one after the other
-    bool keeps_some = false;
     for (std::size_t o = 0; o < 8; ++o) {
       const std::uint32_t size = row[kRowSizes + o];
-      const bool is_here = size <= e.ids_up_to;
-      e.list_begin[o] = here;
-      e.device_lists[o] = is_here ? ExpansionRequest::DeviceList{} : ExpansionRequest::DeviceList{list, size};
-      here += is_here ? size : 0;
-      keeps_some = keeps_some || !is_here;
+      const std::uint32_t stays = size > up_to ? size : 0;
+      e.list_begin[o] = static_cast<std::uint32_t>(here);
+      e.device_lists[o] = {stays != 0 ? list : 0, stays};
+      here += size - stays;
+      kept |= stays;
       list += size;
     }
-    e.kept_resource = keeps_some ? placed_ : nullptr;
-    e.list_begin[8] = here;
+    e.kept_resource = kept != 0 ? placed_ : nullptr;
+    e.list_begin[8] = static_cast<std::uint32_t>(here);
     thread.require(row[kRowIds] + here <= answers[kIdWords], "a list is longer than what came back");
     e.lists.assign(ids, ids + here);
   }

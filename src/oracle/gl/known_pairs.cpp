@@ -94,6 +94,7 @@ void KnownPairs::addPose(int number, std::uint32_t a, std::uint32_t b, double un
   const double close = 4 * static_cast<double>(pair.rounding_margin);
   Known known = Known::kApart;
   for (const auto& other : trees_[b].leaves) {
+    if (known == Known::kMeet) break;
     double p[3];
     for (int j = 0; j < 3; ++j) {
       p[j] = static_cast<double>(pair.shift[j]);
@@ -103,8 +104,9 @@ void KnownPairs::addPose(int number, std::uint32_t a, std::uint32_t b, double un
       }
     }
     for (const auto& own : trees_[a].leaves) {
-      const double gap =
-          std::hypot(p[0] - own[0], p[1] - own[1], p[2] - own[2]) - own[3] - static_cast<double>(pair.unit) * other[3];
+      const double way[3] = {p[0] - own[0], p[1] - own[1], p[2] - own[2]};
+      const double distance = std::sqrt(way[0] * way[0] + way[1] * way[1] + way[2] * way[2]);  // hypot takes longer
+      const double gap = distance - own[3] - static_cast<double>(pair.unit) * other[3];
       if (gap < -close) known = Known::kMeet;
       if (gap < close && known == Known::kApart) known = Known::kClose;
     }

@@ -116,8 +116,7 @@ void Thread::distrust(const std::string& why) {
   lose("it answered wrongly: " + why);
 }
 
-void Thread::require(bool holds, const char* what) {
-  if (holds) return;
+void Thread::fail(const char* what) {
   distrust(what);
   throw OracleError("the GPU context is lost");
 }

@@ -51,7 +51,9 @@ class Thread {
   void distrust(const std::string& why);
   /// In a job: distrusts the device unless it `holds`; a driver that leaves out work in silence would make surface
   /// vanish. @throws OracleError then.
-  void require(bool holds, const char* what);
+  void require(bool holds, const char* what) {
+    if (!holds) fail(what);
+  }
   bool isDistrusted() const { return distrusted_.load(std::memory_order_relaxed); }
 
   /// In a job: looks whether the driver has lost the context. @throws OracleError if so.
@@ -62,6 +64,8 @@ class Thread {
   void awaitDevice();
 
  private:
+  [[noreturn]] void fail(const char* what);
+
   struct Job {
     std::function<void()> work;
     bool* done;  // null: nobody waits
