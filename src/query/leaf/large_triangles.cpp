@@ -39,11 +39,7 @@ PackRegion regionOf(const Volume& v, const SimilarityTransform& other_in_side, d
 void LargeTriangles::start(const TreeSide& other, tree::NodeRef leaf, const SimilarityTransform& other_in_side) {
   if (count_ == 0) {  // the first leaf of a walk
     place_ = packTransform(other, other_in_side, Eigen::Vector3d::Constant(kMiddle), 1);
-    for (int r = 0; r < 3; ++r) {
-      for (int c = 0; c < 3; ++c) {
-        motion_.linear[r][c] = static_cast<float>(other_in_side.scale * other_in_side.rotation(r, c));
-      }
-    }
+    motion_ = turnOf(other_in_side);
   }
   leaf_ = leaf;
   known_ = 0;

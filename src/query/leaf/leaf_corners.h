@@ -67,6 +67,15 @@ inline bool inRange(const TrianglePack& pack) { return pack.size > 1e-9f && pack
 /// And with this tolerance? A margin in the frame of a mesh without extent is beyond all floats.
 inline bool inRange(double tolerance) { return tolerance < 1e9; }
 
+/// Scale and rotation of `to` for corners in float; the offset is 0.
+inline PackMotion turnOf(const SimilarityTransform& to) {
+  PackMotion motion{};
+  for (int r = 0; r < 3; ++r) {
+    for (int c = 0; c < 3; ++c) motion.linear[r][c] = static_cast<float>(to.scale * to.rotation(r, c));
+  }
+  return motion;
+}
+
 /// Corners straight from the vertices into the frame that `place` leads to, about `center` there and `scale` times as
 /// large. Vertices of a side lie at (v - origin) * inverse_unit in its frame.
 template <typename Side>

@@ -196,9 +196,7 @@ class LeafPairs {
   void start(const SimilarityTransform& b_in_a, const SimilarityTransform& a_in_b, bool one_will_do) {
     leaves_a_.clear();
     leaves_b_.clear();
-    for (int r = 0; r < 3; ++r) {
-      for (int c = 0; c < 3; ++c) to_a_.linear[r][c] = static_cast<float>(b_in_a.scale * b_in_a.rotation(r, c));
-    }
+    to_a_ = turnOf(b_in_a);
     b_in_a_ = &b_in_a;
     a_in_b_ = &a_in_b;
     one_will_do_ = one_will_do;
