@@ -12,8 +12,8 @@ import sys
 import time
 
 import bocst
-import bocst.fcl as fcl
 import numpy as np
+from single_calls import bvh, loop
 
 POSES, SINGLE = 1000000, 4000
 LENGTHS = (0.25, 0.2, 0.28, 0.2, 0.24, 0.14, 0.1)  # of the links, in metres, as in tools/program/planner/arm_world.cpp
@@ -53,14 +53,6 @@ def scans(names, generator):
             yield bocst.Mesh((mesh.vertices - mesh.bounds.mean(axis=0)) * size, mesh.triangles), X
 
 
-def bvh(mesh):
-    model = fcl.BVHModelOBBRSS()
-    model.beginModel()
-    model.addSubModel(mesh.vertices, mesh.triangles)
-    model.endModel()
-    return model
-
-
 def least(work, clock):
     times = []
     for _ in range(3):
@@ -68,16 +60,6 @@ def least(work, clock):
         work()
         times.append(clock() - begin)
     return min(times) / POSES
-
-
-def loop(fixed, moving, X):
-    a, b = fcl.CollisionObject(fixed), fcl.CollisionObject(moving)
-    request = fcl.CollisionRequest()
-    hits = []
-    for x in X:
-        b.setTransform(fcl.Transform(x[:3, :3], x[:3, 3]))
-        hits.append(fcl.collide(a, b, request, fcl.CollisionResult()) > 0)
-    return np.array(hits)
 
 
 random = np.random.default_rng(5)

@@ -11,8 +11,8 @@ import sys
 import time
 
 import bocst
-import bocst.fcl as fcl
 import numpy as np
+from single_calls import bvh, loop
 
 
 def random_poses(count, spread, middle, generator):
@@ -33,24 +33,10 @@ def seconds(work, clock=time.process_time):
     return clock() - begin, result
 
 
-def loop(geometry, X):
-    """As python-fcl is used: an object is moved and asked about."""
-    fixed, moving = fcl.CollisionObject(geometry), fcl.CollisionObject(geometry)
-    request = fcl.CollisionRequest()
-    hits = []
-    for x in X:
-        moving.setTransform(fcl.Transform(x[:3, :3], x[:3, 3]))
-        hits.append(fcl.collide(fixed, moving, request, fcl.CollisionResult()) > 0)
-    return np.array(hits)
-
-
 mesh = bocst.load_mesh(sys.argv[1])
 count = int(sys.argv[2]) if len(sys.argv) > 2 else 1000000
 radius, middle = np.linalg.norm(mesh.bounds[1] - mesh.bounds[0]) / 2, mesh.bounds.mean(axis=0)
-bvh = fcl.BVHModelOBBRSS()
-bvh.beginModel()
-bvh.addSubModel(mesh.vertices, mesh.triangles)
-bvh.endModel()
+tree = bvh(mesh)
 single = max(count // 50, 1)
 futures = concurrent.futures.ThreadPoolExecutor(2)
 print(f"{mesh}, {count} poses a call, {single} single calls")
@@ -74,7 +60,7 @@ for spread in (1, 2, 4, 8, 30):
         assert all(np.array_equal(hits, expected) for _, hits in turns[-1])
         turns[-1] = [t for t, _ in turns[-1]]
     rows, cols, one, two, shared = (min(times) / count for times in zip(*turns))
-    (t_fcl, hits_fcl), (t_model, hits_model) = seconds(lambda: loop(bvh, X[:single])), seconds(lambda: loop(a, X[:single]))
+    (t_fcl, hits_fcl), (t_model, hits_model) = seconds(lambda: loop(tree, tree, X[:single])), seconds(lambda: loop(a, b, X[:single]))
     assert np.array_equal(hits_fcl, expected[:single]) and np.array_equal(hits_model, expected[:single])
     fcl_one, model_one = t_fcl / single, t_model / single
     print(f"{spread:5g} {expected.mean():6.4f} | {1e9 * rows:5.0f} {1e9 * cols:7.0f} | {1e9 * one:7.0f} {1e9 * two:6.0f} "

@@ -13,7 +13,7 @@ namespace {
 
 // The region in which triangles of a pack can meet a node's volume v. The pack's frame has its origin at the middle of
 // the root of v's tree, in lattice units; corners are off by `error`. With M = `extent`, region and trianglesWithin()
-// are off by 15 u M, as for LeafPairs, and moveTriangles() by 6 more.
+// are off by 15 u M, as for LeafPairs.
 PackRegion regionOf(const Volume& v, const SimilarityTransform& other_in_side, double size, double error) {
   PackRegion region;
   double displacement[3], extent = size, offset = v.slab_offset;
