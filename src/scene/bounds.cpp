@@ -157,6 +157,7 @@ Bounds boundsOf(fcl::CollisionGeometry<S>& geometry) {
   }
   b.radius = b.half.norm();
   b.size = b.radius + b.center.norm();
+  b.width = 2 * b.half.minCoeff();
   // Beyond this, single precision has no room for the squares.
   if (b.kind == Bounds::kBox && !(b.size < 1e12)) b.kind = Bounds::kEverywhere;
   return b;

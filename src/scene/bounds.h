@@ -21,7 +21,8 @@ struct Bounds {
   double reach = 0;  ///< It may touch what is so far from the box: margin, tolerance of FCL's solvers.
 
   double radius = 0;  ///< About the center; set by boundsOf(), as
-  double size = 0;    ///< that about the frame's origin.
+  double size = 0;    ///< that about the frame's origin, and
+  double width = 0;   ///< the least extent.
 };
 
 /// @throws std::invalid_argument for a geometry that fcl::collide does not take.

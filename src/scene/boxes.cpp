@@ -16,30 +16,63 @@ namespace bocst::scene::HWY_NAMESPACE {
 namespace hn = hwy::HWY_NAMESPACE;
 using namespace query::HWY_NAMESPACE;
 
-// Which of eight boxes along the world's axes are no farther than `far` + far_b[] along any of them.
-template <typename Boxes>
-HWY_INLINE std::uint32_t overlapping(const BoxLane& a, const Boxes& b, float far, const float* far_b) {
+/// A box in all lanes; `lo`, `hi` are farther out by `far`.
+struct Own {
+  Vec3 center, axis[3];
+  V half[3], reach, far, lo[3], hi[3];
+};
+
+HWY_INLINE Own ownOf(const BoxLane& a, float far) {
   const D d;
-  const BoxGroup& own = *a.group;
+  const BoxGroup& g = *a.group;
+  const std::size_t l = a.lane;
+  Own own;
+  own.center = broadcast(g.center[0][l], g.center[1][l], g.center[2][l]);
+  own.reach = hn::Set(d, g.reach[l]);
+  own.far = hn::Set(d, far);
+  BOCST_UNROLL
+  for (int k = 0; k < 3; ++k) {
+    own.axis[k] = broadcast(g.axis[k][0][l], g.axis[k][1][l], g.axis[k][2][l]);
+    own.half[k] = hn::Set(d, g.half[k][l]);
+    own.lo[k] = hn::Set(d, g.lo[k][l] - far);
+    own.hi[k] = hn::Set(d, g.hi[k][l] + far);
+  }
+  return own;
+}
+
+// How far the own box or those of a vector may be: `far` and their own, if they have one.
+HWY_INLINE V farOf(const Own& a, const float* far_b, std::size_t i) {
+  return far_b == nullptr ? a.far : hn::Add(a.far, hn::LoadU(D(), far_b + i));
+}
+
+// Which of eight boxes along the world's axes are no farther than the own `far` + far_b[] along any of them.
+template <typename Boxes>
+HWY_INLINE std::uint32_t overlapping(const Own& a, const Boxes& b, const float* far_b) {
+  const D d;
   std::uint32_t bits = 0;
   for (std::size_t i = 0; i < 8; i += hn::Lanes(d)) {
-    V more = hn::Set(d, far);
-    if (far_b != nullptr) more = hn::Add(more, hn::LoadU(d, far_b + i));
+    const V more = far_b == nullptr ? hn::Zero(d) : hn::LoadU(d, far_b + i);
     M all = hn::MaskFromVec(hn::BitCast(d, hn::Set(hn::RebindToSigned<D>(), -1)));
     BOCST_UNROLL
     for (int k = 0; k < 3; ++k) {
-      const M below = hn::Le(hn::Load(d, b.lo[k] + i), hn::Add(hn::Set(d, own.hi[k][a.lane]), more));
-      const M above = hn::Ge(hn::Add(hn::Load(d, b.hi[k] + i), more), hn::Set(d, own.lo[k][a.lane]));
-      all = hn::And(all, hn::And(below, above));
+      V lo = hn::Load(d, b.lo[k] + i), hi = hn::Load(d, b.hi[k] + i);
+      if (far_b != nullptr) {
+        lo = hn::Sub(lo, more);
+        hi = hn::Add(hi, more);
+      }
+      all = hn::And(all, hn::And(hn::Le(lo, a.hi[k]), hn::Ge(hi, a.lo[k])));
     }
     bits |= maskBits(all) << i;
   }
   return bits;
 }
 
-// What the faces of one box say: the distance of the other's box along the own axes, or how deep it is inside.
+// What the faces of one box say: the distance of the other's box along the own axes (of which the largest will do where
+// only touching counts), or how deep it is inside.
+template <bool kDistance>
 HWY_INLINE V ofFaces(V s0, V s1, V s2) {
   const D d;
+  if constexpr (!kDistance) return max3(s0, s1, s2);
   const V zero = hn::Zero(d);
   const V p0 = hn::Max(s0, zero), p1 = hn::Max(s1, zero), p2 = hn::Max(s2, zero);
   const V squared = hn::MulAdd(p0, p0, hn::MulAdd(p1, p1, hn::Mul(p2, p2)));
@@ -52,7 +85,7 @@ HWY_INLINE V ofFaces(V s0, V s1, V s2) {
 // along an axis by at most 12 u (Ca + Cb), radii by 16 u (ra + rb); a box's reach has 128 u (C + r) for that. Axes are
 // those of a rotation with entries of R^T R - 1 up to e = kFineError, see World::boxAt(). Their cross product, and sums
 // of half sides along it, are then off by up to 4.5 e d for a distance d of the centres and 6.4 e r for each box.
-// Beyond d = 4 (ra + rb) the faces' gap is more than d / 2, and kShare covers this; nearer, the reach does.
+// Beyond d = 4 (ra + rb) the faces' gap is more than d / 4, and kShare covers this; nearer, the reach does.
 constexpr float kShare = 0.995f;
 
 // The largest gap along a cross product of an axis of box a and one of boxes b, where there is one; it is a gap along
@@ -77,88 +110,101 @@ HWY_INLINE V gapAlongEdges(const V (&r)[3][3], const V (&size)[3][3], const V (&
   return most;
 }
 
-HWY_INLINE std::uint32_t nearLanes(const BoxLane& a, const BoxGroup& b, std::uint32_t mask, float far,
-                                   const float* far_b, float* gap) {
+template <bool kDistance>
+HWY_INLINE std::uint32_t nearLanes(const Own& a, const BoxGroup& b, std::uint32_t mask, const float* far_b,
+                                   float* gap) {
   const D d;
-  const BoxGroup& own = *a.group;
-  const std::size_t l = a.lane;
   std::uint32_t result = 0;
   for (std::size_t i = 0; i < 8; i += hn::Lanes(d)) {
     const std::uint32_t lanes = mask >> i & ((1u << hn::Lanes(d)) - 1);
     if (lanes == 0) continue;
-    const Vec3 displacement = sub(load(b.center, i), broadcast(own.center[0][l], own.center[1][l], own.center[2][l]));
-    Vec3 axis_a[3], axis_b[3];
-    V half_a[3], half_b[3], r[3][3], size[3][3], t[3], s[3], v[3];
+    const V reach = hn::Add(a.reach, hn::Load(d, b.reach + i)), far = farOf(a, far_b, i), share = hn::Set(d, kShare);
+    const Vec3 displacement = sub(load(b.center, i), a.center);
+    Vec3 axis_b[3];
+    V half_b[3], r[3][3], size[3][3], t[3], s[3], v[3];
     BOCST_UNROLL
-    for (int k = 0; k < 3; ++k) {
-      axis_a[k] = broadcast(own.axis[k][0][l], own.axis[k][1][l], own.axis[k][2][l]);
-      axis_b[k] = load(b.axis[k], i);
-      half_a[k] = hn::Set(d, own.half[k][l]);
-      half_b[k] = hn::Load(d, b.half[k] + i);
-      t[k] = dot(displacement, axis_a[k]);
+    for (int j = 0; j < 3; ++j) {
+      axis_b[j] = load(b.axis[j], i);
+      half_b[j] = hn::Load(d, b.half[j] + i);
     }
     BOCST_UNROLL
     for (int k = 0; k < 3; ++k) {
-      V radius = half_a[k];
+      t[k] = dot(displacement, a.axis[k]);
+      V radius = a.half[k];
       BOCST_UNROLL
       for (int j = 0; j < 3; ++j) {
-        r[k][j] = dot(axis_a[k], axis_b[j]);
+        r[k][j] = dot(a.axis[k], axis_b[j]);
         size[k][j] = hn::Abs(r[k][j]);
         radius = hn::MulAdd(half_b[j], size[k][j], radius);
       }
       s[k] = hn::Sub(hn::Abs(t[k]), radius);
     }
+    V most = ofFaces<kDistance>(s[0], s[1], s[2]), g;
+    const auto near = [&] {
+      g = hn::Sub(hn::Mul(share, most), reach);
+      return maskBits(hn::Le(g, far)) & lanes;
+    };
+    if (near() == 0) continue;
     BOCST_UNROLL
     for (int j = 0; j < 3; ++j) {
       V radius = half_b[j];
       BOCST_UNROLL
-      for (int k = 0; k < 3; ++k) radius = hn::MulAdd(half_a[k], size[k][j], radius);
+      for (int k = 0; k < 3; ++k) radius = hn::MulAdd(a.half[k], size[k][j], radius);
       v[j] = hn::Sub(hn::Abs(dot(displacement, axis_b[j])), radius);
     }
-    V most = hn::Max(ofFaces(s[0], s[1], s[2]), ofFaces(v[0], v[1], v[2]));
-    const V reach = hn::Add(hn::Set(d, own.reach[l]), hn::Load(d, b.reach + i));
-    V more = hn::Set(d, far);
-    if (far_b != nullptr) more = hn::Add(more, hn::LoadU(d, far_b + i));
-    const V share = hn::Set(d, kShare);
-    V g = hn::Sub(hn::Mul(share, most), reach);
-    std::uint32_t near = maskBits(hn::Le(g, more)) & lanes;
-    if (near != 0) {
-      // How deep boxes overlap along edges says little: their axes may have almost no length.
-      const V along_edges = gapAlongEdges(r, size, t, half_a, half_b);
-      most = hn::IfThenElse(hn::Gt(along_edges, hn::Zero(d)), hn::Max(most, along_edges), most);
-      g = hn::Sub(hn::Mul(share, most), reach);
-      near = maskBits(hn::Le(g, more)) & lanes;
-    }
+    most = hn::Max(most, ofFaces<kDistance>(v[0], v[1], v[2]));
+    if (near() == 0) continue;
+    // How deep boxes overlap along edges says little: their axes may have almost no length.
+    const V along_edges = gapAlongEdges(r, size, t, a.half, half_b);
+    most = hn::IfThenElse(hn::Gt(along_edges, hn::Zero(d)), hn::Max(most, along_edges), most);
+    result |= near() << i;
     hn::StoreU(g, d, gap + i);
-    result |= near << i;
   }
   return result;
 }
 
-void NearInGroup(const BoxLane& a, const BoxGroup& b, std::uint32_t mask, float far, const float* far_b, NearGroup& n) {
-  n.mask = overlapping(a, b, far, far_b) & mask;
-  if (n.mask != 0) n.mask = nearLanes(a, b, n.mask, far, far_b, n.gap);
+HWY_INLINE std::uint32_t nearLanes(const Own& a, const BoxGroup& b, std::uint32_t mask, bool by_distance,
+                                   const float* far_b, float* gap) {
+  return by_distance ? nearLanes<true>(a, b, mask, far_b, gap) : nearLanes<false>(a, b, mask, far_b, gap);
 }
 
-std::size_t NearInTree(const BoxLane& a, const BoxNode* nodes, const BoxGroup* groups, const std::uint8_t* masks,
-                       float far, std::int32_t* stack, NearGroup* near) {
+void NearInGroup(const BoxLane& a, const BoxGroup& b, std::uint32_t mask, float far, const float* far_b, NearGroup& n) {
+  const Own own = ownOf(a, far);
+  n.mask = overlapping(own, b, far_b) & mask;
+  if (n.mask != 0) n.mask = nearLanes(own, b, n.mask, far > 0 || far_b != nullptr, far_b, n.gap);
+}
+
+std::size_t NearBox(const SceneBoxes& boxes, std::size_t i, const std::uint8_t* masks, float far,
+                    const float* far_of_moving, std::int32_t* stack, NearGroup* near) {
+  const Own own = ownOf({&boxes.moving[i / 8], i % 8}, far);
   std::size_t count = 0, depth = 0;
-  stack[depth++] = 0;
+  const auto look = [&](const BoxGroup& group, std::uint32_t mask, std::size_t index, const float* far_b) {
+    mask &= overlapping(own, group, far_b);
+    if (mask == 0) return;
+    NearGroup& n = near[count];
+    n.mask = nearLanes(own, group, mask, far > 0 || far_b != nullptr, far_b, n.gap);
+    n.box = static_cast<std::uint32_t>(i);
+    n.group = static_cast<std::uint32_t>(index);
+    if (n.mask != 0) ++count;
+  };
+  if (boxes.nodes != nullptr) stack[depth++] = 0;
   while (depth != 0) {
-    const BoxNode& node = nodes[stack[--depth]];
-    for (std::uint32_t left = overlapping(a, node, far, nullptr); left != 0; left &= left - 1) {
+    const BoxNode& node = boxes.nodes[stack[--depth]];
+    for (std::uint32_t left = overlapping(own, node, nullptr); left != 0; left &= left - 1) {
       const std::int32_t child = node.child[__builtin_ctz(left)];
       if (child >= 0) {
         stack[depth++] = child;
-        continue;
+      } else {
+        const auto group = static_cast<std::size_t>(~child);
+        if (masks[group] != 0) look(boxes.fixed[group], masks[group], group, nullptr);
       }
-      const auto group = static_cast<std::uint32_t>(~child);
-      NearGroup& n = near[count];
-      n.group = group;
-      n.mask = masks[group] == 0 ? 0 : overlapping(a, groups[group], far, nullptr) & masks[group];
-      if (n.mask != 0) n.mask = nearLanes(a, groups[group], n.mask, far, nullptr, n.gap);
-      if (n.mask != 0) ++count;
     }
+  }
+  // Pairs of two moving ones are in the row of the first.
+  for (std::size_t g = i / 8; g < boxes.moving_count; ++g) {
+    const std::size_t index = boxes.fixed_count + g;
+    if (masks[index] == 0) continue;
+    look(boxes.moving[g], masks[index], index, far_of_moving == nullptr ? nullptr : far_of_moving + 8 * g);
   }
   return count;
 }
@@ -170,7 +216,7 @@ HWY_AFTER_NAMESPACE();
 namespace bocst::scene {
 
 HWY_EXPORT(NearInGroup);
-HWY_EXPORT(NearInTree);
+HWY_EXPORT(NearBox);
 
 BoxGroup::BoxGroup() : center(), axis(), half(), reach() {
   for (int k = 0; k < 3; ++k) {
@@ -196,9 +242,9 @@ void nearInGroup(const BoxLane& a, const BoxGroup& b, std::uint32_t mask, float 
   HWY_DYNAMIC_DISPATCH(NearInGroup)(a, b, mask, far, far_b, n);
 }
 
-std::size_t nearInTree(const BoxLane& a, const BoxNode* nodes, const BoxGroup* groups, const std::uint8_t* masks,
-                       float far, std::int32_t* stack, NearGroup* near) {
-  return HWY_DYNAMIC_DISPATCH(NearInTree)(a, nodes, groups, masks, far, stack, near);
+std::size_t nearBox(const SceneBoxes& boxes, std::size_t i, const std::uint8_t* masks, float far,
+                    const float* far_of_moving, std::int32_t* stack, NearGroup* near) {
+  return HWY_DYNAMIC_DISPATCH(NearBox)(boxes, i, masks, far, far_of_moving, stack, near);
 }
 
 }  // namespace bocst::scene

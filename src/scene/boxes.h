@@ -44,8 +44,8 @@ struct BoxLane {
 
 /// What is near one box among a group.
 struct NearGroup {
-  std::uint32_t box;    ///< The one; to be set by whoever asks.
-  std::uint32_t group;  ///< The others,
+  std::uint32_t box;    ///< The one; set by nearBox(), as is
+  std::uint32_t group;  ///< the others,
   std::uint32_t mask;   ///< and which of them are near.
   float gap[8];         ///< Not more than the distance less both reaches; negative where boxes overlap.
 };
@@ -53,9 +53,17 @@ struct NearGroup {
 /// Which of the lanes in `mask` may be as near as `far` and the lane's own farB[] together; fills n.mask and n.gap.
 void nearInGroup(const BoxLane& a, const BoxGroup& b, std::uint32_t mask, float far, const float* far_b, NearGroup& n);
 
-/// The same with all groups below a hierarchy's root, node 0; masks[group] are the lanes asked for. Writes at most as
-/// many as there are groups to `near` and returns how many; `stack` has room for all nodes.
-std::size_t nearInTree(const BoxLane& a, const BoxNode* nodes, const BoxGroup* groups, const std::uint8_t* masks,
-                       float far, std::int32_t* stack, NearGroup* near);
+/// The boxes of a scene: the fixed ones below a hierarchy's root, node 0 (null: there are none), and the moving ones.
+struct SceneBoxes {
+  const BoxNode* nodes;
+  const BoxGroup *fixed, *moving;
+  std::size_t fixed_count, moving_count;  ///< Groups.
+};
+
+/// The same for moving box i and all groups, fixed ones first; masks[group] are the lanes asked for. far_of_moving: of
+/// all moving objects; null: 0. Writes at most as many as there are groups to `near` and returns how many; `stack` has
+/// room for all nodes.
+std::size_t nearBox(const SceneBoxes& boxes, std::size_t i, const std::uint8_t* masks, float far,
+                    const float* far_of_moving, std::int32_t* stack, NearGroup* near);
 
 }  // namespace bocst::scene

@@ -43,9 +43,13 @@ class StateCheck {
   /// Of the poses of each moving object, at least; to be set before anything is asked.
   std::vector<double> orthogonality_errors;
 
+  /// Should lists be complete where a pair touches, too?
+  bool lists_after_hit = false;
+
   /// Places the objects, and finds pairs that may be near: among the entries [begin, end) of the list, or, without one,
   /// among all. Where `entries` is not null, pairs that may touch in one of the states are added to it.
-  /// True when a pair touches in this state itself, which `hit` then is; then more pairs may be added than needed.
+  /// True when a pair touches in this state itself, which `hit` then is; then more pairs may be added than needed, or
+  /// (without lists_after_hit) some are missing.
   bool run(const fcl::Transform3<S>* X_WM, const Entry* begin, const Entry* end, std::vector<Entry>* entries,
            PairAt* hit);
   bool runAll(const fcl::Transform3<S>* X_WM, std::vector<Entry>* entries, PairAt* hit);
@@ -62,26 +66,33 @@ class StateCheck {
  private:
   struct Candidate {
     float gap;
+    double depth;  // how far the boxes overlap, in widths of the thinner one
     PairAt pair;
     std::size_t entry;
   };
 
   BoxLane boxOf(std::size_t moving) const { return {&groups_[moving / 8], moving % 8}; }
   void addNear(std::size_t i, float far_a, const float* far_of_moving);
-  bool look(const fcl::Transform3<S>* X_WM, std::size_t count, std::vector<Entry>* entries, PairAt* hit);
-  void spread();
+  void beginState(const fcl::Transform3<S>* X_WM);
+  bool isDone(const std::vector<Entry>* entries) const { return touches_ && (entries == nullptr || !lists_after_hit); }
+  void lookAt(const fcl::Transform3<S>* X_WM, const NearGroup& n, std::vector<Entry>* entries);
+  bool lookAtRest(const fcl::Transform3<S>* X_WM, std::vector<Entry>* entries, PairAt* hit);
+  void ask(const fcl::Transform3<S>* X_WM, const Candidate& c, std::vector<Entry>* entries);
 
   const World<S>* world_ = nullptr;
   std::uint64_t serial_ = 0;
-  std::vector<BoxGroup> groups_;       // of moving objects
-  std::vector<std::uint32_t> others_;  // of World::place()
-  std::vector<float> far_;             // as far, rounded up, eight a group
+  std::vector<BoxGroup> groups_;          // of moving objects
+  std::vector<std::uint32_t> others_;     // of World::place()
+  std::vector<float> far_;                // as far, rounded up, eight a group
+  const float* far_of_moving_ = nullptr;  // it, or null where all are 0
+  std::vector<std::uint32_t> order_;      // of moving objects: those that touched last come first
   std::vector<NearGroup> near_;
   std::size_t near_count_ = 0;
   std::vector<std::int32_t> stack_;
   std::vector<Candidate> candidates_;
   PairAt last_{};  // that touched
   bool has_last_ = false;
+  bool touches_ = false;  // in this state
   fcl::CollisionResult<S> result_;
 };
 

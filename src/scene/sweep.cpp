@@ -99,6 +99,7 @@ std::size_t Sweep<S>::run(const World<S>& world, const fcl::Transform3<S>* X_WM,
   if (goal == Goal::kAll) std::fill(hit, hit + states, std::uint8_t{0});
   if (states == 0 || moving == 0) return states;
   check_.start(world);
+  check_.lists_after_hit = goal != Goal::kAny;
   check_.orthogonality_errors.assign(orthogonality_errors.begin(), orthogonality_errors.end());
   if (goal == Goal::kAll && states > 1 && world.grows_together) growForAll(world, X_WM, states, hit);
   is_measured_ = false;

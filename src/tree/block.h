@@ -128,7 +128,6 @@ struct NodeRef {
 /// What growth and decay know of a block beside; its number is the block's.
 struct BlockRecord {
   bounds::NodeBounds own;                 ///< Box and slab of the expanded node itself, as its octants showed it.
-  std::uint8_t came = 0;                  ///< Bit o: a query came to octant o, a leaf that is not packed yet.
   std::uint32_t own_list = Block::kNone;  ///< Where its list is; only where an oracle keeps its octants'.
   NodeRef parent;                         ///< Which node was expanded.
 };

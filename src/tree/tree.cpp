@@ -356,27 +356,22 @@ ChildRef Tree::addList(const std::uint32_t* ids, std::size_t count, bool leaf) {
 }
 
 void Tree::packLeaves(const std::vector<NodeRef>& leaves) {
-  if (leaves.empty() || !hasBudget()) return;
+  // Until the tree is built completely, its leaves are about to be replaced.
+  if (leaves.empty() || price_ != kNever || !hasBudget()) return;
   const std::unique_lock<thread::ForkAwareMutex> lock(growth_, std::try_to_lock);
   if (!lock.owns_lock() || lists_.isHalfFull()) return;
   std::size_t left = 16 + leaves.size() / 4;
+  bool has_packed = false;
   for (const NodeRef leaf : leaves) {
     const ChildRef list = childRef(leaf);
     if (!list.isList() || lists_.isPacked(list.index())) continue;
     const std::uint32_t count = lists_[list.index()].count;
     if (count == 0 || count > kMaxLeafTriangles) continue;
-    if (!leaf.isRoot()) {
-      // Half of the leaves are met but once in hundreds of queries: the second time is early enough.
-      std::uint8_t& came = records_[leaf.block()].came;
-      const bool again = (came >> leaf.octant() & 1) != 0;
-      came = static_cast<std::uint8_t>(came | 1 << leaf.octant());
-      if (!again) continue;
-    }
-    if (left == 0) continue;
     setChild(leaf, ChildRef(list.tag(), lists_.addPacked(surface_, list.index())));
-    --left;
+    has_packed = true;
+    if (--left == 0) break;
   }
-  countBytes();
+  if (has_packed) countBytes();
 }
 
 ChildRef Tree::addDeviceList(const std::shared_ptr<const oracle::DeviceResource>& resource,

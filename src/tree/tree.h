@@ -149,8 +149,8 @@ class Tree {
   /// Growth that no answer needs is welcome: it would not bring the tree near its memory budget.
   bool hasBudget() const { return options_.memory_budget == 0 || bytes_ < options_.memory_budget / 2; }
 
-  /// Packs the corners of leaves that are come to the second time, as many as a query hardly feels. Does nothing while
-  /// another thread grows the tree.
+  /// Packs the corners of leaves, as many as a query hardly feels. Does nothing before the tree is built completely, nor
+  /// while another thread grows it.
   void packLeaves(const std::vector<NodeRef>& leaves);
 
   // With the query lock free.

@@ -642,12 +642,32 @@ std::size_t collidePair(const fcl::CollisionGeometry<S>* o1, const fcl::Transfor
       models, solver);
 }
 
+namespace {
+
+// Yes or no for two occupied models.
+template <typename S>
+bool touchAt(const Models<S>& models, const fcl::Transform3<S>& X_W1, const fcl::Transform3<S>& X_W2, double margin) {
+  static const fcl::CollisionRequest<S> request;
+  thread_local fcl::CollisionResult<S> result;
+  result.clear();
+  const CollideQuery<S> q{
+      {models.first, X_W1, models.second, X_W2, turnsRound(models, X_W1, X_W2)}, request, result, margin};
+  const QueryScope scope(treeOf(*models.first), treeOf(*models.second));
+  collideTrees(q, q.swapped ? scope.b() : scope.a(), q.swapped ? scope.a() : scope.b());
+  return result.isCollision();
+}
+
+}  // namespace
+
+template <typename S>
+bool touch(const Model<S>& a, const fcl::Transform3<S>& X_WA, const Model<S>& b, const fcl::Transform3<S>& X_WB) {
+  return a.isOccupied() && b.isOccupied() && touchAt(Models<S>(&a, &b), X_WA, X_WB, marginOf(&a, &b));
+}
+
 template <typename S>
 void collideRow(const Model<S>& a, const Model<S>& b, const fcl::Transform3<S>* X_AB, std::size_t count,
                 std::uint8_t* hit) {
   static const fcl::Transform3<S> identity = fcl::Transform3<S>::Identity();
-  static const fcl::CollisionRequest<S> request;
-  thread_local fcl::CollisionResult<S> result;
   std::fill(hit, hit + count, std::uint8_t{0});
   if (!a.isOccupied() || !b.isOccupied()) return;
   const Models<S> models(&a, &b);
@@ -666,17 +686,13 @@ void collideRow(const Model<S>& a, const Model<S>& b, const fcl::Transform3<S>* 
     hit[k] = found == Spheres::kMeet;
     if (found == Spheres::kMeet || (found == Spheres::kApart && !may_be_inside)) continue;
     if (isSurelyRigid(X_AB[k]) && areFarApart(models, identity, X_AB[k], margin)) continue;
-    const CollideQuery<S> q{
-        {&a, identity, &b, X_AB[k], turnsRound(models, identity, X_AB[k])}, request, result, margin};
-    result.clear();
-    const QueryScope scope(treeOf(a), treeOf(b));
-    collideTrees(q, q.swapped ? scope.b() : scope.a(), q.swapped ? scope.a() : scope.b());
-    hit[k] = result.isCollision();
+    hit[k] = touchAt(models, identity, X_AB[k], margin);
   }
 }
 
 #define BOCST_INSTANTIATE(S)                                                                                           \
   template void collideRow(const Model<S>&, const Model<S>&, const fcl::Transform3<S>*, std::size_t, std::uint8_t*);   \
+  template bool touch(const Model<S>&, const fcl::Transform3<S>&, const Model<S>&, const fcl::Transform3<S>&);         \
   template std::size_t collidePair(const fcl::CollisionGeometry<S>*, const fcl::Transform3<S>&,                        \
                                    const fcl::CollisionGeometry<S>*, const fcl::Transform3<S>&,                        \
                                    const BroughtSolver<S>&, const fcl::CollisionRequest<S>&, fcl::CollisionResult<S>&, \

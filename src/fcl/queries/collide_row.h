@@ -14,4 +14,8 @@ template <typename S>
 void collideRow(const Model<S>& a, const Model<S>& b, const fcl::Transform3<S>* X_AB, std::size_t count,
                 std::uint8_t* hit);
 
+/// Does fcl::collide say with the default request that two models touch? Poses as above.
+template <typename S>
+bool touch(const Model<S>& a, const fcl::Transform3<S>& X_WA, const Model<S>& b, const fcl::Transform3<S>& X_WB);
+
 }  // namespace bocst::fcl_adapter

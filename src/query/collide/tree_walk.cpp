@@ -26,7 +26,7 @@ bool TreeWalk::run(Visitor& visitor) {
   // Each walk in a tree that is not whole brings the query nearer that builds it whole: see Tree::payRent().
   for (const TreeSide* side : {&a_, &b_}) side->tree().payRent(tree::Tree::kWalkRent);
   const bool ended = search(s);
-  // A query that grew nodes packs no leaves. Others pack what is met again: see Tree::packLeaves().
+  // A query that grew nodes packs no leaves: it took long enough.
   if (!s.grew) {
     if (s.leaves_started) {
       a_.tree().packLeaves(s.leaves.looseOfA());
