@@ -78,6 +78,14 @@ class Oracle {
   /// Does it need the mesh on the host, too?
   virtual bool needsHostMesh() const { return true; }
 
+  /// Keeps words where the oracle works; null where it cannot.
+  virtual std::shared_ptr<const DeviceResource> store(const std::vector<std::uint32_t>&) { return nullptr; }
+
+  /// Reads back what store() keeps. @throws OracleError when it is lost.
+  virtual void recall(const DeviceResource&, std::vector<std::uint32_t>&) {
+    throw OracleError("the oracle " + name() + " stores nothing");
+  }
+
   /// Where the time of the last batch went, in seconds, as the device measured it. read_back is what else passed until
   /// the answers were there. All 0 without a device, and for batches before the first call: timing takes time.
   struct Cost {

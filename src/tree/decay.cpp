@@ -183,6 +183,8 @@ void Tree::pruneAlone(std::int64_t now, bool budget_only) {
     dropBoxes();
     countBytes();
   }
+  const bool is_at_rest = root_.load(std::memory_order_relaxed).tag() != ChildRef::kBlock && boxes_ == nullptr;
+  if (!budget_only && ttl > 0 && is_at_rest && now - recall_time_ > ttl) forgetMesh();
   applyBudget();
 }
 

@@ -14,6 +14,7 @@
 
 #include "tree/box_tree.h"
 #include "tree/cell_bounds.h"
+#include "tree/stored_mesh.h"
 
 namespace bocst::tree {
 namespace {
@@ -167,17 +168,56 @@ double Tree::radius() const {
 }
 
 void Tree::releaseMesh() {
-  if (!conservative()) {
-    throw std::logic_error("bocst::Model::releaseMesh: exact answers test the triangles on the host");
-  }
   if (options_.solid) throw std::logic_error("bocst::Model::releaseMesh: a solid looks at its triangles on the host");
   const std::lock_guard<thread::ShardedLock> alone(query_lock_);
+  if (isReleased()) return;
   if (surface_.device == nullptr) surface_.device = oracle_->makeResident(surface_);
-  if (surface_.device == nullptr || oracle_->needsHostMesh()) {
-    throw OracleError("bocst::Model::releaseMesh: the oracle " + oracle_->name() + " needs the mesh on the host");
+  const bool needs_mesh = !conservative() || oracle_->needsHostMesh();
+  try {
+    if (surface_.device == nullptr) throw OracleError("the oracle " + oracle_->name() + " needs the mesh on the host");
+    if (needs_mesh) stored_ = std::make_unique<const StoredMesh>(*oracle_, *surface_.mesh);
+  } catch (const OracleError& e) {
+    throw OracleError(std::string("bocst::Model::releaseMesh: ") + e.what());
   }
   componentPoints();  // all that another solid asks of it
+  is_released_ = true;
   surface_.mesh = nullptr;
+  countBytes();
+}
+
+void Tree::recallMesh() {
+  const std::lock_guard<thread::ShardedLock> alone(query_lock_);
+  recallAlone();
+}
+
+void Tree::recallAlone() {
+  if (!lacksMesh()) return;
+  surface_.mesh = recall();
+}
+
+std::shared_ptr<const Mesh> Tree::recall() {
+  std::shared_ptr<const Mesh> mesh = stored_->recall();
+  recall_time_ = now();
+  recalled_bytes_ = mesh->bytes();
+  return mesh;
+}
+
+// What an oracle that works on the host is asked about. While the growth mutex is held.
+const oracle::Surface& Tree::grownSurface() {
+  if (surface_.mesh != nullptr || stored_ == nullptr) return surface_;
+  if (grown_surface_ == nullptr) {
+    const std::shared_ptr<const Mesh> mesh = recall();
+    grown_surface_.reset(new oracle::Surface{mesh, surface_.lattice, surface_.device});
+  }
+  return *grown_surface_;
+}
+
+// The mesh of a tree at rest goes from host memory again.
+void Tree::forgetMesh() {
+  if (recalled_bytes_ == 0) return;
+  surface_.mesh = nullptr;
+  grown_surface_ = nullptr;
+  recalled_bytes_ = 0;
 }
 
 // Growth.
@@ -219,7 +259,7 @@ void Tree::grow(std::vector<Growth>& batch, bool wait) {
       continue;
     }
     oracle::ExpansionRequest request;
-    request.surface = &tree.surface_;
+    request.surface = &tree.grownSurface();
     request.cell = cell;
     // Leaves are tested here; who answers conservatively has none.
     request.ids_up_to = tree.conservative()              ? 0
@@ -298,7 +338,7 @@ void Tree::askFor(std::uint32_t list, oracle::ExpansionRequest& request, std::ve
 }
 
 void Tree::growRoot() {
-  if (surface_.device == nullptr) surface_.device = oracle_->makeResident(surface_);
+  if (surface_.device == nullptr) surface_.device = oracle_->makeResident(grownSurface());
   if (grid_tried_ || !growsOnHost()) return;
   grid_tried_ = true;
   grid_ = RootGrid::make(surface_, deepest_);
@@ -438,7 +478,7 @@ void Tree::prune(Clock::time_point now) {
 
 void Tree::updateVertices(std::vector<Eigen::Vector3d> vertices) {
   const std::lock_guard<thread::ShardedLock> alone(query_lock_);
-  if (surface_.mesh == nullptr) throw std::logic_error("bocst::Model::updateVertices: the mesh was released");
+  if (isReleased()) throw std::logic_error("bocst::Model::updateVertices: the mesh was released");
   const Mesh& old = *surface_.mesh;
   if (vertices.size() != old.vertexCount()) {
     throw std::invalid_argument("bocst::Model::updateVertices: " + std::to_string(vertices.size()) +
@@ -477,6 +517,7 @@ void Tree::expandAll(int depth) {
   }
   // Queries never expand a leaf, and do not expect that somebody does.
   const std::lock_guard<thread::ShardedLock> alone(query_lock_);
+  recallAlone();
   keepOnly({});
   constexpr std::size_t kBatch = 1024;  // bounds the memory that answers take before they are published
   std::vector<NodeRef> level{NodeRef{}}, next;
@@ -514,7 +555,7 @@ void Tree::visit(const std::function<void(const NodeView&)>& f) const {
     NodeView view;
     view.id = id(e.node);
     view.parent = e.parent;
-    view.object = surface_.mesh.get();
+    view.object = isReleased() ? nullptr : surface_.mesh.get();
     view.n = surface_.lattice.rootExponent() - (e.level - 1);
     view.level = e.level;
     Eigen::Vector3d center, half;
@@ -558,7 +599,8 @@ Statistics Tree::statistics() const {
   s.oracle_cells = cells_;
   s.pruned_nodes = pruned_;
   s.built_triangles = built_;
-  s.mesh_bytes = (surface_.mesh != nullptr ? surface_.mesh->bytes() : 0) + (solid_ != nullptr ? solid_->bytes() : 0);
+  s.mesh_bytes = isReleased() ? recalled_bytes_.load() : surface_.mesh->bytes();
+  if (solid_ != nullptr) s.mesh_bytes += solid_->bytes();
   s.device_bytes = device_bytes_;
   return s;
 }
@@ -566,6 +608,7 @@ Statistics Tree::statistics() const {
 void Tree::countBytes() {
   bytes_ = treeBytes();
   std::size_t device = surface_.device != nullptr ? surface_.device->bytes() : 0;
+  if (stored_ != nullptr) device += stored_->bytes();
   const oracle::DeviceResource* last = nullptr;
   if (node_table_.nodes != nullptr) device += node_table_.nodes->bytes();
   for (const auto& resource : resources_) {

@@ -30,6 +30,7 @@ namespace bocst::tree {
 
 class BoxTree;
 class BulkBuilder;
+class StoredMesh;
 
 /// The sphere-tree of one model: resident nodes, how they grow and how they go.
 ///
@@ -54,13 +55,16 @@ class Tree {
   /// Are there branches that are dropped some time, if no query uses them? Without a lock.
   bool hasDecay() const {
     return (root_.load(std::memory_order_relaxed).tag() == ChildRef::kBlock ||
-            boxes_known_.load(std::memory_order_relaxed) != nullptr) &&
+            boxes_known_.load(std::memory_order_relaxed) != nullptr ||
+            recalled_bytes_.load(std::memory_order_relaxed) != 0) &&
            next_prune_.load(std::memory_order_relaxed) != kNeverDue;
   }
 
   // While the query lock is held, shared or alone.
 
   const oracle::Surface& surface() const { return surface_; }
+  /// Queries with exact answers need a mesh that was released: recallMesh() brings it back.
+  bool lacksMesh() const { return surface_.mesh == nullptr && !conservative(); }
   /// How far the spheres of conservative answers reach beyond the surface at most, in model units; 0 for exact answers.
   /// A sphere is about a cell of the collision depth that the surface meets, so no point of it is farther from the
   /// surface than the cell's diagonal. (Cells are decided to less than a lattice unit, which is added.)
@@ -149,8 +153,8 @@ class Tree {
   /// Growth that no answer needs is welcome: it would not bring the tree near its memory budget.
   bool hasBudget() const { return options_.memory_budget == 0 || bytes_ < options_.memory_budget / 2; }
 
-  /// Packs the corners of leaves, as many as a query hardly feels. Does nothing before the tree is built completely, nor
-  /// while another thread grows it.
+  /// Packs the corners of leaves, as many as a query hardly feels. Does nothing before the tree is built completely,
+  /// nor while another thread grows it.
   void packLeaves(const std::vector<NodeRef>& leaves);
 
   // With the query lock free.
@@ -161,8 +165,12 @@ class Tree {
   void prune(Clock::time_point now);
   void updateVertices(std::vector<Eigen::Vector3d> vertices);
   void releaseMesh();
-  std::shared_ptr<const Mesh> mesh() const;
-  Eigen::AlignedBox3d bounds() const;  ///< Of the mesh, in its frame.
+  bool isReleased() const { return is_released_; }
+  /// Reads a released mesh back from the device, if exact answers need it; it goes again when the tree is at rest.
+  /// @throws OracleError if the device lost it.
+  void recallMesh();
+  std::shared_ptr<const Mesh> mesh() const;  ///< In host memory, null if there is none.
+  Eigen::AlignedBox3d bounds() const;        ///< Of the mesh, in its frame.
   /// How far the surface extends from the middle of bounds(), at most: to the farthest vertex. Found when first asked
   /// for.
   double radius() const;
@@ -180,6 +188,10 @@ class Tree {
   };
 
   void reset(std::shared_ptr<const Mesh> mesh);
+  void recallAlone();
+  std::shared_ptr<const Mesh> recall();
+  const oracle::Surface& grownSurface();
+  void forgetMesh();
 
   void askFor(std::uint32_t list, oracle::ExpansionRequest& request, std::vector<std::uint32_t>& ids) const;
   // A device is not asked about fewer triangles: the host builds what is below them sooner than a batch comes back.
@@ -231,6 +243,12 @@ class Tree {
   thread::ForkAwareMutex growth_;  // guards what grow() appends to
 
   oracle::Surface surface_;
+  // Of a model whose mesh was released.
+  std::atomic<bool> is_released_{false};
+  std::unique_ptr<const StoredMesh> stored_;        // unless the oracle needs no mesh in host memory
+  std::unique_ptr<oracle::Surface> grown_surface_;  // surface_ with its mesh, for growth of conservative answers
+  std::atomic<std::size_t> recalled_bytes_{0};      // not 0 while the mesh is in host memory again
+  std::int64_t recall_time_ = 0;                    // in ns of the model's clock
   std::shared_ptr<const Solid> solid_;
   mutable thread::ForkAwareMutex component_mutex_;  // guards component_points_ while they are found
   mutable std::unique_ptr<const std::vector<Eigen::Vector3d>> component_points_;

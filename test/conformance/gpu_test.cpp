@@ -4,6 +4,9 @@
 #include <sys/wait.h>
 #include <unistd.h>
 
+#include <atomic>
+#include <thread>
+
 #include "conformance/reference.h"
 #include "fcl/adapters/models.h"
 #include "oracle/gl/device_oracle.h"
@@ -209,6 +212,130 @@ TEST_P(OnDevice, AChildAfterForkAnswers) {
   EXPECT_TRUE(WIFEXITED(status) && WEXITSTATUS(status) == 0) << status;
 }
 
+/// Two models whose mesh was released, and two with the same mesh on the CPU.
+struct Released {
+  Raw raw = test::torus(60);
+  std::chrono::steady_clock::time_point now = Clock::now();
+  Modeld a, b;
+  const Modeld c, d;
+
+  Released(OracleKind kind, Answer answer)
+      : a(raw.mesh(), options(kind, answer)),
+        b(raw.mesh(), options(kind, answer)),
+        c(raw.mesh(), with(OracleKind::kCpu, answer, 6)),
+        d(raw.mesh(), with(OracleKind::kCpu, answer, 6)) {
+    a.releaseMesh();
+    b.releaseMesh();
+  }
+
+  Options options(OracleKind kind, Answer answer) {
+    Options o = with(kind, answer, 6);
+    o.clock = [this] { return now; };
+    return o;
+  }
+
+  void rest() {
+    now += std::chrono::hours(1);
+    for (int level = 0; level < 20; ++level, now += std::chrono::seconds(3)) {
+      a.prune(now);
+      b.prune(now);
+    }
+  }
+};
+
+TEST_P(OnDevice, AReleasedMeshComesBackForQueriesAndGoesAtRest) {
+  for (const Answer answer : {Answer::kExact, Answer::kConservative}) {
+    Released r(GetParam(), answer);
+    const bool is_exact = answer == Answer::kExact, returns = is_exact || GetParam() == OracleKind::kOcclusion;
+    const auto bvh = test::bvh<fcl::OBBRSSd>(r.raw);
+    const fcl::Sphered ball(0.7);
+    int hits = 0;
+    for (int round = 0; round < 2; ++round) {
+      EXPECT_EQ(r.a.mesh(), nullptr);
+      EXPECT_EQ(r.a.statistics().mesh_bytes, 0u);
+      EXPECT_FALSE(
+          test::touching<double>(r.a, kIdentity, r.b, test::pose<double>(Eigen::Matrix3d::Identity(), {9, 0, 0})));
+      EXPECT_EQ(r.a.statistics().mesh_bytes, 0u) << "far pairs need no mesh";
+      for (const auto& X : poses(15, 2.4)) {
+        const bool expected = test::touching<double>(r.c, kIdentity, r.d, X);
+        hits += expected;
+        ASSERT_EQ(test::touching<double>(r.a, kIdentity, r.b, X), expected);
+        ASSERT_EQ(test::touching<double>(r.b, X, r.a, kIdentity), expected);
+        ASSERT_EQ(test::touching<double>(r.a, kIdentity, *bvh, X), test::touching<double>(r.c, kIdentity, *bvh, X));
+        ASSERT_EQ(test::touching<double>(ball, X, r.b, kIdentity), test::touching<double>(ball, X, r.d, kIdentity));
+        if (is_exact) {
+          ASSERT_EQ(test::pairs<double>(r.a, kIdentity, r.b, X), test::pairs<double>(r.c, kIdentity, r.d, X));
+        }
+        fcl::DistanceRequestd request;
+        request.enable_signed_distance = is_exact;
+        fcl::DistanceResultd ours, theirs;
+        ASSERT_EQ(fcl::distance(&r.a, kIdentity, &r.b, X, request, ours),
+                  fcl::distance(&r.c, kIdentity, &r.d, X, request, theirs));
+        const fcl::ContinuousCollisionRequestd moving;
+        fcl::ContinuousCollisionResultd when, expected_when;
+        auto end = X;
+        end.translation() *= -1;
+        ASSERT_NEAR(fcl::continuousCollide(&r.a, kIdentity, kIdentity, &r.b, X, end, moving, when),
+                    fcl::continuousCollide(&r.c, kIdentity, kIdentity, &r.d, X, end, moving, expected_when),
+                    2 * moving.toc_err);
+      }
+      EXPECT_EQ(r.a.statistics().mesh_bytes > 0, returns);
+      EXPECT_EQ(r.a.mesh(), nullptr) << "only queries see it";
+      r.a.visit([](const NodeView& node) { ASSERT_EQ(node.object, nullptr); });
+      r.rest();
+    }
+    EXPECT_GT(hits, 5);
+    EXPECT_THROW(r.a.updateVertices(r.raw.vertices), std::logic_error);
+    EXPECT_THROW(r.a.computeVolume(), std::logic_error);
+    EXPECT_NO_THROW(r.a.releaseMesh()) << "for the second time";
+    r.a.expandAll(4);
+    Modeld whole(r.raw.mesh(), with(OracleKind::kCpu, answer));
+    whole.expandAll(4);
+    EXPECT_EQ(r.a.statistics().nodes_per_level, whole.statistics().nodes_per_level);
+  }
+}
+
+TEST_P(OnDevice, AReleasedMeshThatIsLostIsAnError) {
+  for (const Answer answer : {Answer::kExact, Answer::kConservative}) {
+    Released r(GetParam(), answer);
+    const auto X = test::pose<double>(Eigen::Matrix3d::Identity(), {1.5, 0.2, 0});
+    EXPECT_TRUE(test::touching<double>(r.a, kIdentity, r.b, X));
+    r.rest();
+    deviceOf(r.a).thread().lose("a test says so");
+    for (int again = 0; again < 2; ++again) {
+      EXPECT_THROW(test::touching<double>(r.a, kIdentity, r.b, X), OracleError) << "never \"free\"";
+    }
+    EXPECT_FALSE(
+        test::touching<double>(r.a, kIdentity, r.b, test::pose<double>(Eigen::Matrix3d::Identity(), {9, 0, 0})));
+  }
+}
+
+TEST_P(OnDevice, ThreadsShareAReleasedMesh) {
+  for (const Answer answer : {Answer::kExact, Answer::kConservative}) {
+    Released r(GetParam(), answer);
+    const auto all = poses(12, 2.4);
+    std::vector<bool> expected;
+    for (const auto& X : all) expected.push_back(test::touching<double>(r.c, kIdentity, r.d, X));
+    std::atomic<int> wrong{0};
+    for (int round = 0; round < 3; ++round) {
+      std::vector<std::thread> threads;
+      for (int t = 0; t < 4; ++t) {
+        threads.emplace_back([&, t] {
+          for (std::size_t i = 0; i < all.size(); ++i) {
+            const std::size_t k = (i + static_cast<std::size_t>(3 * t)) % all.size();
+            wrong += test::touching<double>(r.a, kIdentity, r.b, all[k]) != expected[k];
+            (void)r.a.statistics();
+          }
+        });
+      }
+      for (std::thread& t : threads) t.join();
+      r.rest();
+      EXPECT_EQ(r.a.statistics().mesh_bytes, 0u);
+    }
+    EXPECT_EQ(wrong, 0);
+  }
+}
+
 std::string nameOf(const testing::TestParamInfo<OracleKind>& info) {
   return info.param == OracleKind::kCompute ? "compute" : "occlusion";
 }
@@ -257,15 +384,14 @@ TEST(Compute, TheMeshNeedNotBeInHostMemory) {
 
 TEST(Compute, WhatNeedsTheMeshKeepsIt) {
   const auto mesh = test::torus(20).mesh();
-  Modeld exact(mesh, with(OracleKind::kCompute)), cpu(mesh, with(OracleKind::kCpu, Answer::kConservative));
-  Modeld occlusion(mesh, with(OracleKind::kOcclusion, Answer::kConservative));
-  EXPECT_THROW(exact.releaseMesh(), std::logic_error);
-  EXPECT_THROW(cpu.releaseMesh(), OracleError);
-  EXPECT_THROW(occlusion.releaseMesh(), OracleError);
-  EXPECT_EQ(occlusion.mesh(), mesh);
-  Options solid = with(OracleKind::kCompute, Answer::kConservative);
-  solid.solid = true;
-  EXPECT_THROW(Modeld(mesh, solid).releaseMesh(), std::logic_error);
+  for (const Answer answer : {Answer::kExact, Answer::kConservative}) {
+    Modeld cpu(mesh, with(OracleKind::kCpu, answer));
+    EXPECT_THROW(cpu.releaseMesh(), OracleError);
+    EXPECT_EQ(cpu.mesh(), mesh);
+    Options solid = with(OracleKind::kCompute, answer);
+    solid.solid = true;
+    EXPECT_THROW(Modeld(mesh, solid).releaseMesh(), std::logic_error);
+  }
 }
 
 TEST(Compute, BytesOnTheDeviceComeAndGo) {

@@ -44,10 +44,11 @@ double marginOf(const Model<S>* model1, const Model<S>* model2) {
          (model2 != nullptr ? treeOf(*model2).options().margin : 0);
 }
 
-/// The mesh of a model as it is now, null for another geometry.
+/// The mesh of a model as host memory has it now, null for another geometry.
 template <typename S>
 std::shared_ptr<const Mesh> meshOf(const Model<S>* model) {
-  return model != nullptr ? model->mesh() : nullptr;
+  const tree::Tree* const tree = model != nullptr ? ModelTree::of(*model) : nullptr;
+  return tree != nullptr ? tree->mesh() : nullptr;
 }
 
 /// The pose of B in A's frame, computed in S as FCL does. Spelled out: Eigen's products of blocks are calls.

@@ -184,7 +184,7 @@ const Options& Model<S>::options() const {
 
 template <typename S>
 std::shared_ptr<const Mesh> Model<S>::mesh() const {
-  return tree_ != nullptr ? tree_->mesh() : nullptr;
+  return tree_ != nullptr && !tree_->isReleased() ? tree_->mesh() : nullptr;
 }
 
 template <typename S>

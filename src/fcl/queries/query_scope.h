@@ -25,12 +25,16 @@ inline void endQuery(const query::TreeSide& side) {
 /// removes nodes; when it ends, also by an exception, it gives the locks back and calls Tree::afterQuery() of both.
 class QueryScope {
  public:
-  explicit QueryScope(tree::Tree& a) : locks_(a, a), a_(a), b_(a_) { a.buildIfDue(); }
+  explicit QueryScope(tree::Tree& a) : locks_(a, a), a_(a), b_(a_) {
+    recallMeshes();
+    a.buildIfDue();
+  }
   QueryScope(tree::Tree& a, tree::Tree& b)
       : locks_(a, b),
         a_(a),
         // The system's clock need not be read twice.
         b_(b, a.options().clock || b.options().clock ? b.now() : a_.now()) {
+    recallMeshes();
     if (!a.buildIfDue()) b.buildIfDue();  // one a query, as each may take milliseconds
   }
   ~QueryScope() {
@@ -48,33 +52,51 @@ class QueryScope {
   /// The query locks of two trees, or of one that is given twice, taken shared in address order.
   class ReadLocks {
    public:
-    ReadLocks(tree::Tree& a, tree::Tree& b) : ReadLocks(std::less<tree::Tree*>()(&b, &a) ? b : a) {
-      // Should this throw, the first is given back: its constructor has ended.
-      tree::Tree* const last = first_ == &a ? &b : &a;
-      if (last == first_) return;
-      last->queryLock().lock_shared(shard_);
-      second_ = last;
+    ReadLocks(tree::Tree& a, tree::Tree& b)
+        : first_(std::less<tree::Tree*>()(&b, &a) ? &b : &a),
+          second_(&a == &b       ? nullptr
+                  : first_ == &a ? &b
+                                 : &a),
+          shard_(thread::ShardedLock::shard()) {
+      take();
     }
     ~ReadLocks() { release(); }
     ReadLocks(const ReadLocks&) = delete;
     ReadLocks& operator=(const ReadLocks&) = delete;
 
-    void release() {
-      for (tree::Tree** tree : {&second_, &first_}) {
-        if (*tree != nullptr) (*tree)->queryLock().unlock_shared(shard_);
-        *tree = nullptr;
+    void take() {
+      first_->queryLock().lock_shared(shard_);
+      held_ = 1;
+      if (second_ == nullptr) return;
+      try {
+        second_->queryLock().lock_shared(shard_);
+      } catch (...) {
+        release();
+        throw;
       }
+      held_ = 2;
+    }
+    void release() {
+      if (held_ == 2) second_->queryLock().unlock_shared(shard_);
+      if (held_ != 0) first_->queryLock().unlock_shared(shard_);
+      held_ = 0;
     }
 
    private:
-    explicit ReadLocks(tree::Tree& first) : first_(&first), shard_(thread::ShardedLock::shard()) {
-      first_->queryLock().lock_shared(shard_);
-    }
-
-    tree::Tree* first_;
-    tree::Tree* second_ = nullptr;
-    std::size_t shard_;
+    tree::Tree *const first_, *const second_;
+    const std::size_t shard_;
+    int held_ = 0;
   };
+
+  // Brings released meshes back that exact answers need; the locks are free meanwhile.
+  void recallMeshes() {
+    while (a_.tree().lacksMesh() || b_.tree().lacksMesh()) {
+      locks_.release();
+      a_.tree().recallMesh();
+      b_.tree().recallMesh();
+      locks_.take();
+    }
+  }
 
   ReadLocks locks_;
   query::TreeSide a_, b_;

@@ -53,4 +53,23 @@ std::shared_ptr<DeviceMesh> DeviceMeshes::makeResident(const Surface& surface) {
   return device;
 }
 
+std::shared_ptr<const DeviceResource> DeviceMeshes::store(const std::vector<std::uint32_t>& words) {
+  std::shared_ptr<Arena::Range> range;
+  thread_->run([&] {
+    range = arena_->take(words.size());
+    const std::size_t at = range->begin() * kWord, bytes = words.size() * kWord;
+    arena_->buffer().write(at, bytes, words.data());
+    thread_->require(arena_->buffer().holds(at, bytes, words.data()), "a mesh did not arrive");
+  });
+  return range;
+}
+
+void DeviceMeshes::recall(const DeviceResource& stored, std::vector<std::uint32_t>& words) {
+  const auto& range = static_cast<const Arena::Range&>(stored);
+  thread_->run([&] {
+    arena_->buffer().read(range.begin() * kWord, words.size() * kWord, words.data());
+    thread_->checkReset();
+  });
+}
+
 }  // namespace bocst::oracle::gl

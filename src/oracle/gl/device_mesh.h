@@ -56,6 +56,10 @@ class DeviceMeshes {
   /// @throws OracleError
   std::shared_ptr<DeviceMesh> makeResident(const Surface& surface);
 
+  /// Words that the device keeps as they are, and reads back. @throws OracleError
+  std::shared_ptr<const DeviceResource> store(const std::vector<std::uint32_t>& words);
+  void recall(const DeviceResource& stored, std::vector<std::uint32_t>& words);
+
  private:
   struct Entry {
     std::weak_ptr<const Mesh> mesh;

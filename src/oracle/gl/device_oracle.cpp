@@ -90,6 +90,23 @@ std::shared_ptr<const DeviceResource> DeviceOracle::makeResident(const Surface& 
   }
 }
 
+std::shared_ptr<const DeviceResource> DeviceOracle::store(const std::vector<std::uint32_t>& words) {
+  try {
+    return meshes_.store(words);
+  } catch (const OracleError& e) {
+    reportFailure("a mesh", e);
+    return nullptr;
+  }
+}
+
+void DeviceOracle::recall(const DeviceResource& stored, std::vector<std::uint32_t>& words) {
+  try {
+    meshes_.recall(stored, words);
+  } catch (const OracleError& e) {
+    throw OracleError(std::string("the GPU that had the only copy of a mesh lost it: ") + e.what());
+  }
+}
+
 void DeviceOracle::reportFailure(const char* what, const std::exception& why) noexcept {
   if (thread_->isLost() || reported_.exchange(true)) return;
   try {

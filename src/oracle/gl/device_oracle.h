@@ -24,6 +24,8 @@ class DeviceOracle : public Oracle {
   void submit(std::vector<ExpansionRequest>& batch) final;
   void wait(std::vector<ExpansionRequest>& batch) final;
   std::shared_ptr<const DeviceResource> makeResident(const Surface& surface) final;
+  std::shared_ptr<const DeviceResource> store(const std::vector<std::uint32_t>& words) final;
+  void recall(const DeviceResource& stored, std::vector<std::uint32_t>& words) final;
 
   Thread& thread() { return *thread_; }
 
