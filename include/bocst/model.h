@@ -112,11 +112,13 @@ class BOCST_EXPORT Model : public fcl::CollisionGeometry<S> {
   /// model is empty.
   std::shared_ptr<const Mesh> mesh() const;
 
-  /// Releases the mesh in host memory; the compute oracle has a copy on its device (paper, 3: "the model need not be in
-  /// core memory"). The memory is freed when no other owner is left. Later queries throw OracleError if the device is
-  /// lost.
-  /// @throws std::logic_error for exact answers and for solids, which need the triangles in host memory; OracleError if
-  /// the oracle of this model has no copy.
+  /// Releases the mesh in host memory (paper, 3: "the model need not be in core memory"); the oracle's device keeps a
+  /// copy. The memory is freed when no other owner is left. Conservative answers of the compute oracle need the mesh on
+  /// its device only. For exact answers, and for the occlusion oracles, a query that is not decided by boxes reads the
+  /// mesh back; prune() frees it again once the tree is a single sphere and ttl has passed. Such queries throw
+  /// OracleError if the device lost the mesh.
+  /// @throws std::logic_error for solids, which need the triangles in host memory; OracleError if the oracle of this
+  /// model has no device (OracleKind::kCpu, kAuto). The model is then unchanged.
   void releaseMesh();
 
   /// "cpu", "occlusion", "sampled", "compute", or "cpu and compute" (kAuto where there is a GPU).

@@ -21,8 +21,8 @@ struct Statistics {
                                       ///< times at which only the root is resident: at most 1.25 times the mesh's
                                       ///< triangles, plus those of one expansion.
   std::uint64_t pruned_nodes = 0;     ///< Nodes dropped by ttl, budget, prune() or updateVertices().
-  std::size_t mesh_bytes = 0;         ///< Heap bytes of the mesh (other models may share them; 0 after releaseMesh())
-                                      ///< and of the data for `solid`.
+  std::size_t mesh_bytes = 0;         ///< Heap bytes of the mesh (other models may share them; 0 after releaseMesh(),
+                                      ///< except while queries need it) and of the data for `solid`.
   std::size_t device_bytes = 0;  ///< Bytes on a GPU: the mesh (other models may share it) and triangle lists. What two
                                  ///< models expanded together counts for both. 0 with the CPU oracle.
 };

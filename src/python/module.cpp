@@ -339,7 +339,7 @@ resident children; is_cell (k,): False for a node that exact answers build below
           "Sets new positions, (n, 3), of all vertices. The tree is reset to its root; nothing is rebuilt.")
       .def(
           "release_mesh", [](const ModelGeometry& g) { g.model().releaseMesh(); }, py::call_guard<NoGil>(),
-          "Releases the mesh in host memory; only for conservative answers of the compute oracle.")
+          "Releases the mesh in host memory; a device keeps a copy. Exact answers read it back while they need it.")
       .def("__repr__", [](const ModelGeometry& g) {
         const std::shared_ptr<const Mesh> mesh = g.model().mesh();
         return "<bocst.Model" +

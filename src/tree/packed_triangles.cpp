@@ -6,6 +6,8 @@
 #include <array>
 #include <cmath>
 #include <cstring>
+#include <limits>
+#include <tuple>
 
 namespace bocst::tree {
 
@@ -57,63 +59,67 @@ PackedTriangles::PackedTriangles(const std::uint32_t* words, std::size_t count_)
   corners = reinterpret_cast<const std::uint8_t*>(steps + 3 * places);
 }
 
-std::size_t PackedTriangles::words(std::size_t count, std::size_t places) {
-  constexpr std::size_t kLanes = 8;
-  const std::size_t steps = 3 * places * sizeof(std::uint16_t), corners = 3 * count;
-  const std::size_t read = std::max(steps + (kLanes - 1) * sizeof(std::uint16_t), steps + corners + kLanes - 1);
-  return kHeader + (read + sizeof(std::uint32_t) - 1) / sizeof(std::uint32_t);
-}
-
-std::vector<std::uint32_t> PackedTriangles::pack(const oracle::Surface& surface,
-                                                 const std::vector<std::uint32_t>& ids) {
-  // Each vertex is placed once; vertices of soups share places, too.
+std::size_t PackedTriangles::pack(const oracle::Surface& surface, const std::uint32_t* ids, std::size_t triangles,
+                                  Words& words) {
+  static_assert(PackedTriangles::words(kMostTriangles, kMostPlaces) <= std::tuple_size<Words>::value,
+                "all packs have room");
   Numbers vertices;
   std::array<std::uint8_t, kMostPlaces> corners;
-  for (std::size_t k = 0; k < 3; ++k) {
-    for (std::size_t i = 0; i < ids.size(); ++i) {
-      corners[k * ids.size() + i] = vertices.number(surface.mesh->indices(ids[i])[k]);
-    }
+  for (std::size_t i = 0; i < triangles; ++i) {
+    const Mesh::Indices& indices = surface.mesh->indices(ids[i]);
+    for (std::size_t k = 0; k < 3; ++k) corners[k * triangles + i] = vertices.number(indices[k]);
   }
-  std::array<Eigen::Vector3d, kMostPlaces> places;
-  Eigen::AlignedBox3d box;
-  for (std::size_t i = 0; i < vertices.count(); ++i) {
-    places[i] = surface.lattice.toLattice(surface.mesh->vertex(vertices.key(i)));
-    box.extend(places[i]);
+  std::size_t count = vertices.count();
+  std::array<Eigen::Array3d, kMostPlaces> places;
+  Eigen::Array3d least = Eigen::Array3d::Constant(std::numeric_limits<double>::infinity()), most = -least;
+  for (std::size_t i = 0; i < count; ++i) {
+    places[i] = surface.lattice.toLattice(surface.mesh->vertex(vertices.key(i))).array();
+    least = least.min(places[i]);
+    most = most.max(places[i]);
   }
   // The surface lies in the lattice, but for rounding.
-  const Eigen::Vector3d origin = box.min().array().floor().max(0.0).min(kMost);
-  const double extent = (box.max() - origin).maxCoeff();
-  const int exponent = static_cast<int>(std::ceil(std::log2(std::max(extent, 0x1p-8) / kMost)));
+  const Eigen::Array3d origin = least.floor().max(0.0).min(kMost);
+  const double extent = (most - origin).maxCoeff();
+  // The least power of two with which kMost steps reach.
+  int exponent;
+  const double mantissa = std::frexp(std::max(extent, 0x1p-8) / kMost, &exponent);
+  if (mantissa == 0.5) --exponent;
   const double inverse_step = std::ldexp(1.0, -exponent);
 
-  const auto stepsOf = [&](const Eigen::Vector3d& place) {
-    std::uint64_t all = 0;
-    for (int c = 2; c >= 0; --c) {
-      const double exact = std::min(std::max((place[c] - origin[c]) * inverse_step, 0.0), kMost);
-      all = all << 16 | static_cast<std::uint16_t>(exact + 0.5);
+  std::array<std::array<std::uint16_t, 3>, kMostPlaces> steps;
+  for (std::size_t i = 0; i < count; ++i) {
+    const Eigen::Array3d exact = ((places[i] - origin) * inverse_step).max(0.0).min(kMost) + 0.5;
+    for (std::size_t c = 0; c < 3; ++c) {
+      steps[i][c] = static_cast<std::uint16_t>(exact[static_cast<Eigen::Index>(c)]);
     }
-    return all;
-  };
-  Numbers different;
-  std::array<std::uint8_t, kMostPlaces> place_of;
-  for (std::size_t i = 0; i < vertices.count(); ++i) place_of[i] = different.number(stepsOf(places[i]));
-  const std::size_t count = different.count();
+  }
+  // The vertices of a soup share places: a surface has about as many vertices as triangles.
+  if (count > triangles + triangles / 2) {
+    Numbers different;
+    std::array<std::uint8_t, kMostPlaces> place_of;
+    for (std::size_t i = 0; i < count; ++i) {
+      const std::array<std::uint16_t, 3> own = steps[i];
+      place_of[i] = different.number(own[0] | std::uint64_t{own[1]} << 16 | std::uint64_t{own[2]} << 32);
+      steps[place_of[i]] = own;  // never after those that are still to be read
+    }
+    count = different.count();
+    for (std::size_t i = 0; i < 3 * triangles; ++i) corners[i] = place_of[corners[i]];
+  }
 
-  std::vector<std::uint32_t> words(PackedTriangles::words(ids.size(), count));
   const auto at = [&origin](int k) { return static_cast<std::uint32_t>(origin[k]); };
   words[0] =
       static_cast<std::uint32_t>(count) | static_cast<std::uint32_t>(exponent + kExponentBias) << 8 | at(0) << 16;
   words[1] = at(1) | at(2) << 16;
+  const std::size_t size = PackedTriangles::words(triangles, count);
+  std::fill(words.begin() + kHeader, words.begin() + static_cast<std::ptrdiff_t>(size), 0);
   auto* to = reinterpret_cast<char*>(words.data() + kHeader);
-  for (int c = 0; c < 3; ++c) {
-    for (std::size_t i = 0; i < count; ++i) {
-      const auto step = static_cast<std::uint16_t>(different.key(i) >> 16 * c);
-      std::memcpy(to, &step, sizeof(step));
-      to += sizeof(step);
+  for (std::size_t c = 0; c < 3; ++c) {
+    for (std::size_t i = 0; i < count; ++i, to += sizeof(std::uint16_t)) {
+      std::memcpy(to, &steps[i][c], sizeof(std::uint16_t));
     }
   }
-  for (std::size_t i = 0; i < 3 * ids.size(); ++i) *to++ = static_cast<char>(place_of[corners[i]]);
-  return words;
+  std::memcpy(to, corners.data(), 3 * triangles);
+  return size;
 }
 
 }  // namespace bocst::tree

@@ -1,9 +1,10 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #pragma once
 
+#include <algorithm>
+#include <array>
 #include <cstddef>
 #include <cstdint>
-#include <vector>
 
 #include "lattice/limits.h"
 #include "oracle/oracle.h"
@@ -20,8 +21,9 @@ class PackedTriangles {
   static constexpr std::size_t kMostTriangles = kMaxLeafTriangles, kMostPlaces = 3 * kMostTriangles;
   static constexpr double kMost = 65535;  ///< Steps along an axis.
 
-  /// The words of at most kMostTriangles, at least one.
-  static std::vector<std::uint32_t> pack(const oracle::Surface& surface, const std::vector<std::uint32_t>& ids);
+  /// Packs at most kMostTriangles, at least one; returns how many words that takes.
+  using Words = std::array<std::uint32_t, 192>;
+  static std::size_t pack(const oracle::Surface& surface, const std::uint32_t* ids, std::size_t count, Words& words);
 
   PackedTriangles() = default;
   PackedTriangles(const std::uint32_t* words, std::size_t count);
@@ -40,7 +42,12 @@ class PackedTriangles {
  private:
   // The number of places, the exponent of step, the origin; steps, corners, and room for the last vectors.
   static constexpr std::size_t kHeader = 2;
-  static std::size_t words(std::size_t count, std::size_t places);
+  static constexpr std::size_t words(std::size_t count, std::size_t places) {
+    constexpr std::size_t kLanes = 8;
+    const std::size_t steps = 3 * places * sizeof(std::uint16_t), corners = 3 * count;
+    const std::size_t rest = std::max((kLanes - 1) * sizeof(std::uint16_t), corners + kLanes - 1);
+    return kHeader + (steps + rest + sizeof(std::uint32_t) - 1) / sizeof(std::uint32_t);
+  }
 };
 
 }  // namespace bocst::tree

@@ -2,6 +2,7 @@
 #include "tree/triangle_lists.h"
 
 #include <algorithm>
+#include <array>
 #include <stdexcept>
 
 #include "log/assert.h"
@@ -53,15 +54,17 @@ std::uint32_t TriangleLists::addDeviceList(std::size_t count, Place place) {
 }
 
 std::uint32_t TriangleLists::addPacked(const oracle::Surface& surface, std::uint32_t list) {
-  std::vector<std::uint32_t> ids;
-  (*this)[list].appendTo(ids);
-  BOCST_ASSERT(!ids.empty() && ids.size() <= PackedTriangles::kMostTriangles);
-  const std::vector<std::uint32_t> packed = PackedTriangles::pack(surface, ids);
-  const std::uint32_t index = words_.append(kPackedHeader + packed.size());
+  const TriangleList triangles = (*this)[list];
+  BOCST_ASSERT(triangles.count > 0 && triangles.count <= PackedTriangles::kMostTriangles);
+  std::array<std::uint32_t, PackedTriangles::kMostTriangles> ids;
+  for (std::size_t i = 0; i < triangles.count; ++i) ids[i] = triangles.ids[i];
+  PackedTriangles::Words packed;
+  const std::size_t size = PackedTriangles::pack(surface, ids.data(), triangles.count, packed);
+  const std::uint32_t index = words_.append(kPackedHeader + size);
   std::uint32_t* const words = &words_[index];
   words[0] = words_[list] | kPacked;
   words[1] = list + 1;
-  std::copy(packed.begin(), packed.end(), words + kPackedHeader);
+  std::copy_n(packed.begin(), size, words + kPackedHeader);
   return index;
 }
 

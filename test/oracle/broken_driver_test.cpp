@@ -21,6 +21,7 @@
 #include "oracle/gl/occlusion_oracle.h"
 #include "oracle/gl/self_test.h"
 #include "surfaces.h"
+#include "tree/stored_mesh.h"
 
 namespace bocst::oracle::gl {
 namespace {
@@ -39,12 +40,14 @@ struct Fault {
     return at == kEvery || at == call || (stays && at >= 0 && call > at);
   }
 };
-Fault g_dispatch, g_half_dispatch, g_copy, g_write, g_clear, g_fence, g_reset, g_memory, g_map, g_draw, g_uniform;
+Fault g_dispatch, g_half_dispatch, g_copy, g_write, g_read, g_clear, g_fence, g_reset, g_memory, g_map, g_draw,
+    g_uniform;
 
 // The driver's own functions, once libepoxy has found them.
 PFNGLDISPATCHCOMPUTEPROC g_real_dispatch;
 PFNGLCOPYBUFFERSUBDATAPROC g_real_copy;
 PFNGLBUFFERSUBDATAPROC g_real_write;
+PFNGLGETBUFFERSUBDATAPROC g_real_read;
 PFNGLCLEARBUFFERSUBDATAPROC g_real_clear;
 PFNGLCLIENTWAITSYNCPROC g_real_wait;
 PFNGLGETGRAPHICSRESETSTATUSPROC g_real_reset;
@@ -65,6 +68,9 @@ void copy(GLenum from, GLenum to, GLintptr a, GLintptr b, GLsizeiptr size) {
 }
 void write(GLenum target, GLintptr at, GLsizeiptr size, const void* data) {
   if (!g_write.now()) g_real_write(target, at, size, data);
+}
+void read(GLenum target, GLintptr at, GLsizeiptr size, void* to) {
+  if (!g_read.now()) g_real_read(target, at, size, to);
 }
 void clear(GLenum target, GLenum internal, GLintptr at, GLsizeiptr size, GLenum format, GLenum type, const void* data) {
   if (!g_clear.now()) g_real_clear(target, internal, at, size, format, type, data);
@@ -127,6 +133,7 @@ class BrokenDriver : public testing::Test {
     put(epoxy_glDispatchCompute, g_real_dispatch, &dispatch);
     put(epoxy_glCopyBufferSubData, g_real_copy, &copy);
     put(epoxy_glBufferSubData, g_real_write, &write);
+    put(epoxy_glGetBufferSubData, g_real_read, &read);
     put(epoxy_glClearBufferSubData, g_real_clear, &clear);
     put(epoxy_glClientWaitSync, g_real_wait, &wait);
     put(epoxy_glGetGraphicsResetStatus, g_real_reset, &reset);
@@ -143,8 +150,8 @@ class BrokenDriver : public testing::Test {
   void SetUp() override { notices().clear(); }
 
   void TearDown() override {
-    for (Fault* f : {&g_dispatch, &g_half_dispatch, &g_copy, &g_write, &g_clear, &g_fence, &g_reset, &g_memory, &g_map,
-                     &g_draw, &g_uniform}) {
+    for (Fault* f : {&g_dispatch, &g_half_dispatch, &g_copy, &g_write, &g_read, &g_clear, &g_fence, &g_reset, &g_memory,
+                     &g_map, &g_draw, &g_uniform}) {
       f->start(kNever);
     }
   }
@@ -300,6 +307,32 @@ TEST_F(BrokenDriver, MeshesThatDoNotArrive) {
     expectRight(ask(oracle, {rootOf(a), rootOf(b)}), "after");
     notices().clear();
   }
+}
+
+TEST_F(BrokenDriver, AStoredMeshComesBackAsItWasOrNotAtAll) {
+  const auto mesh = test::torus(80).mesh();
+  ComputeOracle compute(newThread());
+  OcclusionOracle occlusion(newThread(3), OcclusionOracle::Form::kConservative, 16);
+  for (DeviceOracle* oracle : std::vector<DeviceOracle*>{&compute, &occlusion}) {
+    const tree::StoredMesh stored(*oracle, *mesh);
+    EXPECT_EQ(stored.bytes(), mesh->bytes());
+    const auto back = stored.recall();
+    EXPECT_EQ(back->vertices(), mesh->vertices());
+    EXPECT_EQ(back->triangles(), mesh->triangles());
+    g_read.start(kEvery);
+    EXPECT_THROW(stored.recall(), OracleError);
+    g_read.start(kNever);
+    EXPECT_EQ(stored.recall()->vertices(), mesh->vertices());
+    g_write.start(kEvery);
+    EXPECT_THROW(tree::StoredMesh(*oracle, *test::torus(80, 0.3).mesh()), OracleError);
+    g_write.start(kNever);
+    g_reset.start(kEvery);
+    EXPECT_THROW(stored.recall(), OracleError);
+    g_reset.start(kNever);
+    EXPECT_TRUE(oracle->thread().isLost());
+  }
+  CpuOracle cpu;
+  EXPECT_THROW(tree::StoredMesh(cpu, *mesh), OracleError);
 }
 
 TEST_F(BrokenDriver, NoMemory) {

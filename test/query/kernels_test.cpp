@@ -767,9 +767,10 @@ TEST_P(EveryTarget, PackedCornersAreWhereTheMeshHasThem) {
     std::vector<std::uint32_t> ids(count);
     std::iota(ids.begin(), ids.end(), 1u);
     std::shuffle(ids.begin(), ids.end(), g);
-    const std::vector<std::uint32_t> words = tree::PackedTriangles::pack(surface, ids);
+    tree::PackedTriangles::Words words;
+    const std::size_t word_count = tree::PackedTriangles::pack(surface, ids.data(), count, words);
     const tree::PackedTriangles packed(words.data(), count);
-    ASSERT_EQ(packed.words(), words.size());
+    ASSERT_EQ(packed.words(), word_count);
     EXPECT_LE(packed.places, is_strip ? count + 2 : 3 * count);
     Eigen::AlignedBox3d box;
     for (const std::uint32_t t : ids) {
