@@ -222,31 +222,33 @@ void Tree::forgetMesh() {
 
 // Growth.
 
+void Tree::grow(std::vector<Growth>& nodes, bool wait) {
+  Batch batch(nodes, wait);
+  batch.finish();
+}
+
 // In one function, as what a node asks for depends on what the nodes before it have grown.
-void Tree::grow(std::vector<Growth>& batch, bool wait) {
+Tree::Batch::Batch(std::vector<Growth>& nodes, bool wait) {
   // Every growth locks its trees in address order.
-  std::vector<Tree*> trees;
-  for (const Growth& g : batch) {
-    if (trees.empty() || g.tree != trees.back()) trees.push_back(g.tree);
+  for (const Growth& g : nodes) {
+    if (trees_.empty() || g.tree != trees_.back()) trees_.push_back(g.tree);
   }
-  std::sort(trees.begin(), trees.end(), std::less<Tree*>());
-  trees.erase(std::unique(trees.begin(), trees.end()), trees.end());
-  std::vector<std::unique_lock<thread::ForkAwareMutex>> locks;
-  for (Tree* tree : trees) {
-    locks.emplace_back(tree->growth_, std::defer_lock);
+  std::sort(trees_.begin(), trees_.end(), std::less<Tree*>());
+  trees_.erase(std::unique(trees_.begin(), trees_.end()), trees_.end());
+  for (Tree* tree : trees_) {
+    locks_.emplace_back(tree->growth_, std::defer_lock);
     if (wait) {
-      locks.back().lock();
-    } else if (!locks.back().try_lock()) {
+      locks_.back().lock();
+    } else if (!locks_.back().try_lock()) {
+      locks_.clear();
+      trees_.clear();
       return;
     }
   }
 
-  std::vector<oracle::ExpansionRequest> requests;
-  std::vector<Growth> asked;
   thread_local std::vector<std::uint32_t> scratch;
-  std::vector<std::vector<std::uint32_t>> gathered;
-  gathered.reserve(batch.size());
-  for (const Growth& g : batch) {
+  gathered_.reserve(nodes.size());
+  for (const Growth& g : nodes) {
     Tree& tree = *g.tree;
     const ChildRef ref = tree.childRef(g.node);
     if (ref.tag() == ChildRef::kBlock) continue;
@@ -266,8 +268,8 @@ void Tree::grow(std::vector<Growth>& batch, bool wait) {
                         : tree.isDeepest(cell.level + 1) ? oracle::ExpansionRequest::kAll
                                                          : kHostTriangles;
     if (ref.isList()) {
-      gathered.emplace_back();
-      tree.askFor(ref.index(), request, gathered.back());
+      gathered_.emplace_back();
+      tree.askFor(ref.index(), request, gathered_.back());
     } else if (g.node.isRoot()) {
       request.count = tree.surface_.triangle_count;
       if (g.list_suffices && request.count <= kMaxLeafTriangles) {
@@ -277,49 +279,56 @@ void Tree::grow(std::vector<Growth>& batch, bool wait) {
         continue;
       }
     } else {
-      gathered.emplace_back();
-      gathered.back().reserve(4 * kMaxLeafTriangles);
-      tree.gatherNode(g.node, cell, gathered.back());
-      request.ids = gathered.back().data();
-      request.count = gathered.back().size();
+      gathered_.emplace_back();
+      gathered_.back().reserve(4 * kMaxLeafTriangles);
+      tree.gatherNode(g.node, cell, gathered_.back());
+      request.ids = gathered_.back().data();
+      request.count = gathered_.back().size();
     }
-    requests.push_back(std::move(request));
-    asked.push_back(g);
+    const auto is_its = [&tree](const Part& part) { return part.oracle == tree.oracle_.get(); };
+    auto part = std::find_if(parts_.begin(), parts_.end(), is_its);
+    if (part == parts_.end()) part = parts_.insert(parts_.end(), {tree.oracle_.get(), {}, {}});
+    part->nodes.push_back(g);
+    part->requests.push_back(std::move(request));
   }
-  ask(asked, requests);
-  for (Tree* tree : trees) {
-    const auto mine = [tree](const Growth& g) { return g.tree == tree; };
-    if (std::any_of(asked.begin(), asked.end(), mine)) ++tree->batches_;
-    tree->countBytes();
+  // From here on, oracles may write to the requests.
+  try {
+    for (; submitted_ < parts_.size(); ++submitted_) parts_[submitted_].oracle->submit(parts_[submitted_].requests);
+  } catch (...) {
+    abandon();
+    throw;
   }
 }
 
-// The questions of one oracle go out together.
-void Tree::ask(std::vector<Growth>& asked, std::vector<oracle::ExpansionRequest>& requests) {
-  const auto publish_all = [](std::vector<oracle::ExpansionRequest>& answers, const std::vector<Growth>& growths) {
-    oracle::Oracle& oracle = *growths.front().tree->oracle_;
-    oracle.submit(answers);
-    oracle.wait(answers);
-    for (std::size_t i = 0; i < answers.size(); ++i) {
-      growths[i].tree->publish(growths[i].node, answers[i]);
-      growths[i].tree->cells_ += 8;
+void Tree::Batch::finish() {
+  while (answered_ < submitted_) {
+    Part& part = parts_[answered_++];
+    part.oracle->wait(part.requests);
+    for (std::size_t i = 0; i < part.requests.size(); ++i) {
+      part.nodes[i].tree->publish(part.nodes[i].node, part.requests[i]);
+      part.nodes[i].tree->cells_ += 8;
     }
-  };
-  // Those of the first oracle, until none are left.
-  while (!asked.empty()) {
-    const oracle::Oracle* const first = asked.front().tree->oracle_.get();
-    const auto is_other = [first](const Growth& g) { return g.tree->oracle_.get() != first; };
-    if (std::none_of(asked.begin(), asked.end(), is_other)) return publish_all(requests, asked);
-    std::vector<oracle::ExpansionRequest> part, rest;
-    std::vector<Growth> growths, others;
-    for (std::size_t i = 0; i < asked.size(); ++i) {
-      const bool is_rest = is_other(asked[i]);
-      (is_rest ? rest : part).push_back(std::move(requests[i]));
-      (is_rest ? others : growths).push_back(asked[i]);
+  }
+  for (Tree* tree : trees_) {
+    const auto asks = [tree](const Part& part) {
+      return std::any_of(part.nodes.begin(), part.nodes.end(), [tree](const Growth& g) { return g.tree == tree; });
+    };
+    if (std::any_of(parts_.begin(), parts_.end(), asks)) ++tree->batches_;
+    tree->countBytes();
+  }
+  trees_.clear();
+  locks_.clear();
+}
+
+// Nobody wants the answers, but the oracles still write them.
+void Tree::Batch::abandon() noexcept {
+  while (answered_ < submitted_) {
+    Part& part = parts_[answered_++];
+    try {
+      part.oracle->wait(part.requests);
+    } catch (...) {
+      // The first error is on its way.
     }
-    publish_all(part, growths);
-    asked.swap(others);
-    requests.swap(rest);
   }
 }
 

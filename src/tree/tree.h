@@ -14,6 +14,7 @@
 #include <functional>
 #include <limits>
 #include <memory>
+#include <mutex>
 #include <vector>
 
 #include "mesh/solid.h"
@@ -145,7 +146,34 @@ class Tree {
   /// One expansion batch: makes each node's children resident (or, where enough, its list). Nodes that another thread
   /// has grown meanwhile are skipped. The query locks of all trees are held shared. Unless `wait`, it does nothing
   /// while another thread grows one of the trees.
-  static void grow(std::vector<Growth>& batch, bool wait = true);
+  static void grow(std::vector<Growth>& nodes, bool wait = true);
+
+  /// The same in two steps: oracles work on it until finish(), and meanwhile this thread may walk over what is
+  /// resident, but not grow more. It holds the trees' growth mutexes.
+  class Batch {
+   public:
+    explicit Batch(std::vector<Growth>& nodes, bool wait = true);
+    ~Batch() { abandon(); }
+    Batch(const Batch&) = delete;
+    Batch& operator=(const Batch&) = delete;
+
+    /// Waits for the answers and publishes them. @throws OracleError.
+    void finish();
+
+   private:
+    struct Part {
+      oracle::Oracle* oracle;
+      std::vector<Growth> nodes;
+      std::vector<oracle::ExpansionRequest> requests;
+    };
+    void abandon() noexcept;
+
+    std::vector<Tree*> trees_;
+    std::vector<std::unique_lock<thread::ForkAwareMutex>> locks_;
+    std::vector<std::vector<std::uint32_t>> gathered_;  // lists that requests point to
+    std::vector<Part> parts_;                           // one an oracle
+    std::size_t submitted_ = 0, answered_ = 0;          // parts
+  };
 
   /// A batch takes an oracle long, however small it is: walks that grow together ask it less often.
   bool growsSlowly() const { return oracle_->kind() != OracleKind::kCpu; }
@@ -200,7 +228,6 @@ class Tree {
   ChildRef addDeviceList(const std::shared_ptr<const oracle::DeviceResource>& resource,
                          oracle::ExpansionRequest::DeviceList list);
   ChildRef addOctantList(const oracle::ExpansionRequest& answer, int octant);
-  static void ask(std::vector<Growth>& asked, std::vector<oracle::ExpansionRequest>& requests);
   /// The host has all lists, so it can grow from the root grid and in bulk.
   bool growsOnHost() const { return oracle_->kind() == OracleKind::kCpu || oracle_->kind() == OracleKind::kAuto; }
   bool isBuildDue() const { return rent_.load(std::memory_order_relaxed) > price_.load(std::memory_order_relaxed); }

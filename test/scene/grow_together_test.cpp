@@ -9,6 +9,7 @@
 #include <array>
 #include <memory>
 #include <random>
+#include <thread>
 #include <vector>
 
 #include "meshes.h"
@@ -198,6 +199,28 @@ TEST_P(GrowTogether, StatesOfAScene) {
   EXPECT_EQ(hits, one_by_one);
   EXPECT_GT(batchesOf(of_states), 100u);
   EXPECT_LT(batchesOf(models), batchesOf(of_states) / 2);
+}
+
+// A device that is lost while batches are under way.
+TEST(GrowTogetherOnDevices, ThatAreLostMeanwhile) {
+  const auto mesh_a = test::torus(60).mesh(), mesh_b = test::torus(40, 0.3).mesh();
+  const Transforms X = randomPoses(1200, 1.3);
+  const Modeld cpu_a(mesh_a, optionsOf(OracleKind::kCpu)), cpu_b(mesh_b, optionsOf(OracleKind::kCpu));
+  std::vector<std::uint8_t> hits(X.size()), of_cpu(X.size());
+  collidePoses(cpu_a, cpu_b, X.data(), X.size(), of_cpu.data());
+  for (int i = 0; i < 12; ++i) {
+    const OracleKind kind = i % 2 == 0 ? OracleKind::kCompute : OracleKind::kOcclusion;
+    const auto device = std::dynamic_pointer_cast<oracle::gl::DeviceOracle>(oracle::makeOracle(kind));
+    ASSERT_NE(device, nullptr);
+    const Modeld a(mesh_a, optionsOf(kind)), b(mesh_b, optionsOf(kind));
+    std::thread loses([&] {
+      std::this_thread::sleep_for(std::chrono::milliseconds(4 * i));
+      device->thread().lose("a test says so");
+    });
+    collidePoses(a, b, X.data(), X.size(), hits.data());
+    loses.join();
+    EXPECT_EQ(hits, of_cpu) << i;
+  }
 }
 
 // A model beside which nothing happens keeps what walks on the device came to.

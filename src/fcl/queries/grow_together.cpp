@@ -1,7 +1,9 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #include "fcl/queries/grow_together.h"
 
+#include <algorithm>
 #include <chrono>
+#include <optional>
 #include <utility>
 
 #include "fcl/adapters/models.h"
@@ -87,12 +89,10 @@ bool isLess(const tree::Tree::Growth& x, const tree::Tree::Growth& y) {
   return x.tree != y.tree ? std::less<tree::Tree*>()(x.tree, y.tree) : x.node < y.node;
 }
 
-void growAll(std::vector<tree::Tree::Growth>& growths) {
-  if (growths.empty()) return;
+void removeDoubles(std::vector<tree::Tree::Growth>& growths) {
   std::sort(growths.begin(), growths.end(), isLess);
   const auto same = [](const auto& x, const auto& y) { return x.tree == y.tree && x.node == y.node; };
   growths.erase(std::unique(growths.begin(), growths.end(), same), growths.end());
-  tree::Tree::grow(growths);
 }
 
 /// The walks of a scratch, over what is resident; what they need then grows, until all have their answer.
@@ -100,11 +100,25 @@ class Walks {
  public:
   explicit Walks(Scratch& s) : s_(s) {}
 
+  // What some walks need grows while the host looks at others: the first `waiting_` are those that wait for the batch
+  // that is under way.
   void run() {
+    std::optional<tree::Tree::Batch> batch;
+    const auto finish = [&] {
+      if (batch) batch->finish();
+      batch.reset();
+      waiting_ = 0;
+    };
     while (!s_.walks.empty()) {
       s_.growths.clear();
-      if (!byDevice()) byHost();
-      growAll(s_.growths);
+      const bool device_walks = s_.walks.front().oracle().walksPairs(s_.walks.size());
+      if (device_walks || waiting_ == s_.walks.size()) finish();
+      const std::size_t next = device_walks && byDevice() ? s_.walks.size() : byHost();
+      finish();
+      removeDoubles(s_.growths);
+      if (s_.growths.empty()) continue;
+      batch.emplace(s_.growths);
+      waiting_ = next;
     }
   }
 
@@ -124,20 +138,27 @@ class Walks {
     return outcome != Outcome::kNeedsGrowth;
   }
 
-  void byHost() {
+  /// Looks at some walks that do not wait; those that need growth then come first. Returns how many these are.
+  std::size_t byHost() {
     const double begin = seconds();
-    const std::size_t count = std::min(kMostTogether, s_.walks.size());
     oracle::Oracle& oracle = s_.walks.front().oracle();
-    const auto end = s_.walks.begin() + static_cast<std::ptrdiff_t>(count);
-    s_.walks.erase(std::remove_if(s_.walks.begin(), end, [this](Walk& walk) { return look(walk); }), end);
+    const auto first = s_.walks.begin() + static_cast<std::ptrdiff_t>(waiting_);
+    const std::size_t count = std::min(kMostTogether, s_.walks.size() - waiting_);
+    const auto end = first + static_cast<std::ptrdiff_t>(count);
+    const auto need_growth = std::remove_if(first, end, [this](Walk& walk) { return look(walk); });
+    const auto left = static_cast<std::size_t>(need_growth - first);
+    s_.walks.erase(need_growth, end);
+    const auto looked = s_.walks.begin() + static_cast<std::ptrdiff_t>(waiting_);
+    std::rotate(s_.walks.begin(), looked, looked + static_cast<std::ptrdiff_t>(left));
     oracle.pairsTook(count, seconds() - begin, true);
+    return left;
   }
 
-  /// Walks on a device what one oracle takes; false where none takes anything.
+  /// Walks on a device what one oracle takes; false where it takes nothing.
   bool byDevice() {
     oracle::Oracle& oracle = s_.walks.front().oracle();
     const auto is_its = [&](const Walk& walk) { return walk.hasOneOracle() && &walk.oracle() == &oracle; };
-    if (!oracle.walksPairs(s_.walks.size()) || !is_its(s_.walks.front())) return false;
+    if (!is_its(s_.walks.front())) return false;
     const double begin = seconds();
     s_.device.trees.clear();
     s_.device.pairs.clear();
@@ -217,6 +238,7 @@ class Walks {
   }
 
   Scratch& s_;
+  std::size_t waiting_ = 0;
   std::vector<std::uint32_t> trees_;  // of each side, its number among the device's
   std::vector<std::size_t> asked_;    // the device's pairs, as numbers of walks
   std::vector<oracle::PairWalks::Deferred> deferred_;
