@@ -128,6 +128,7 @@ class BrokenDriver : public testing::Test {
     // One oracle makes libepoxy look up what is replaced then.
     ComputeOracle known(newThread());
     ASSERT_EQ(selfTest(known), "");
+    ASSERT_EQ(selfTestOfWalks(known), "");
     OcclusionOracle also(newThread(3), OcclusionOracle::Form::kConservative, 16);
     ASSERT_EQ(selfTest(also), "");
     put(epoxy_glDispatchCompute, g_real_dispatch, &dispatch);
@@ -376,6 +377,27 @@ TEST_F(BrokenDriver, FailsTheSelfTest) {
     fault->start(kEvery);
     EXPECT_NE(selfTest(oracle), "");
     fault->start(kNever);
+  }
+}
+
+TEST_F(BrokenDriver, WalksAreTestedBeforeTheFirst) {
+  {
+    ComputeOracle oracle(newThread());
+    oracle.setWalksAll(true);
+    EXPECT_TRUE(oracle.walksPairs(1000));
+    EXPECT_EQ(oracle.walked(), 20u) << "those of the test";
+    EXPECT_TRUE(oracle.walksPairs(1000));
+    EXPECT_EQ(oracle.walked(), 20u) << "it was tested once";
+  }
+  for (Fault* fault : {&g_dispatch, &g_copy, &g_write, &g_memory}) {
+    ComputeOracle oracle(newThread());
+    oracle.setWalksAll(true);
+    fault->start(kEvery);
+    EXPECT_FALSE(oracle.walksPairs(1000));
+    fault->start(kNever);
+    EXPECT_FALSE(oracle.walksPairs(1000)) << "it failed the test";
+    EXPECT_NE(notices(), "");
+    notices().clear();
   }
 }
 

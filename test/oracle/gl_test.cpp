@@ -437,6 +437,7 @@ TEST(Device, SoftwareIsKnownForWhatItIs) {
 TEST(Device, PassesItsSelfTest) {
   ComputeOracle compute(newThread());
   EXPECT_EQ(selfTest(compute), "");
+  EXPECT_EQ(selfTestOfWalks(compute), "");
   EXPECT_EQ(compute.leftToCpu(), 0u);
 }
 

@@ -4,6 +4,9 @@
 #include <algorithm>
 #include <utility>
 
+#include "log/log.h"
+#include "oracle/gl/self_test.h"
+
 namespace bocst::oracle::gl {
 namespace {
 
@@ -19,12 +22,13 @@ ComputeChain::Limits complete(ComputeChain::Limits limits, Thread& thread) {
 }  // namespace
 
 ComputeOracle::ComputeOracle(const std::shared_ptr<Thread>& thread, ComputeChain::Limits limits)
-    : DeviceOracle(thread, true, complete(limits, *thread).bytes), choice_(thread->info().hardware) {
+    : DeviceOracle(thread, true, complete(limits, *thread).bytes),
+      walker_bytes_(complete(limits, *thread).bytes),
+      choice_(thread->info().hardware) {
   limits = complete(limits, *thread_);
   thread_->run([&] {
     arena_ = std::make_shared<Arena>(thread_, limits.bytes);
     chain_ = std::make_unique<ComputeChain>(limits, *arena_);
-    walker_ = std::make_unique<PairWalker>(*arena_, limits.bytes);
   });
 }
 
@@ -75,13 +79,35 @@ bool ComputeOracle::fetch(const DeviceResource&, ExpansionRequest::DeviceList li
 }
 
 bool ComputeOracle::walksPairs(std::size_t pairs) {
-  return !thread_->isLost() && (walks_all_ || choice_.takesDevice(pairs));
+  return !thread_->isLost() && (walks_all_ || choice_.takesDevice(pairs)) && canWalk();
+}
+
+// Tested when a walk is first asked for, as most programs ask for none.
+bool ComputeOracle::canWalk() {
+  std::call_once(walks_tested_, [this] {
+    std::string wrong;
+    try {
+      wrong = selfTestOfWalks(*this);
+    } catch (const OracleError& e) {
+      wrong = e.what();
+    }
+    can_walk_ = wrong.empty();
+    if (!can_walk_ && !thread_->isLost()) {
+      log(LogLevel::kWarning, "oracle compute: walks over pairs of trees are left to the CPU (" + wrong + ")");
+    }
+  });
+  return can_walk_;
+}
+
+PairWalker& ComputeOracle::walker() {
+  if (walker_ == nullptr) walker_ = std::make_unique<PairWalker>(*arena_, walker_bytes_);
+  return *walker_;
 }
 
 std::shared_ptr<const DeviceResource> ComputeOracle::uploadNodes(std::vector<std::uint32_t>& words) {
   std::shared_ptr<const DeviceResource> nodes;
   try {
-    thread_->run([&] { nodes = walker_->upload(words); });
+    thread_->run([&] { nodes = walker().upload(words); });
   } catch (const std::exception& e) {
     reportFailure("a table of nodes", e);
   }
@@ -90,7 +116,7 @@ std::shared_ptr<const DeviceResource> ComputeOracle::uploadNodes(std::vector<std
 
 void ComputeOracle::walkPairs(PairWalks& walks) {
   try {
-    thread_->run([&] { walker_->walk(walks, *thread_); });
+    thread_->run([&] { walker().walk(walks, *thread_); });
     walked_ += walks.pairs.size();
   } catch (const std::exception& e) {
     reportFailure("a walk over pairs", e);

@@ -4,6 +4,7 @@
 #include <atomic>
 #include <cstdint>
 #include <memory>
+#include <mutex>
 #include <string>
 #include <vector>
 
@@ -41,11 +42,16 @@ class ComputeOracle : public DeviceOracle {
   std::uint64_t walked() const { return walked_; }
 
  private:
+  bool canWalk();
+  PairWalker& walker();
   void answer(const std::vector<ExpansionRequest*>& requests, std::vector<Verdict>& verdicts) override;
 
   std::shared_ptr<Arena> arena_;
   std::unique_ptr<ComputeChain> chain_;
-  std::unique_ptr<PairWalker> walker_;
+  const std::size_t walker_bytes_;
+  std::unique_ptr<PairWalker> walker_;  // made by the first walk, in the thread of the context
+  std::once_flag walks_tested_;
+  bool can_walk_ = false;
   PairsChoice choice_;
   std::atomic<bool> walks_all_{false};
   std::atomic<std::uint64_t> walked_{0};

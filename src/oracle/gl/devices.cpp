@@ -211,6 +211,10 @@ class Registry {
         const Tested tested = makeTested(kind, its_thread, PaperOptions{}.viewport);
         if (!tested.why_not.empty()) return tested.why_not;
         self_test = "passed in " + std::to_string(std::lround(tested.milliseconds)) + " ms";
+        if (const auto compute = std::dynamic_pointer_cast<ComputeOracle>(tested.oracle)) {
+          const std::string wrong = selfTestOfWalks(*compute);
+          self_test += wrong.empty() ? "; walks passed" : "; walks failed: " + wrong;
+        }
         return "";
       } catch (const OracleError& e) {
         return e.what();
