@@ -12,9 +12,9 @@
 #include <stdexcept>
 #include <string>
 
+#include "oracle/stored_mesh.h"
 #include "tree/box_tree.h"
 #include "tree/cell_bounds.h"
-#include "tree/stored_mesh.h"
 
 namespace bocst::tree {
 namespace {
@@ -175,7 +175,7 @@ void Tree::releaseMesh() {
   const bool needs_mesh = !conservative() || oracle_->needsHostMesh();
   try {
     if (surface_.device == nullptr) throw OracleError("the oracle " + oracle_->name() + " needs the mesh on the host");
-    if (needs_mesh) stored_ = std::make_unique<const StoredMesh>(*oracle_, *surface_.mesh);
+    if (needs_mesh) stored_ = std::make_unique<const oracle::StoredMesh>(*oracle_, *surface_.mesh);
   } catch (const OracleError& e) {
     throw OracleError(std::string("bocst::Model::releaseMesh: ") + e.what());
   }

@@ -27,11 +27,14 @@
 #include "tree/support_table.h"
 #include "tree/triangle_lists.h"
 
+namespace bocst::oracle {
+class StoredMesh;
+}
+
 namespace bocst::tree {
 
 class BoxTree;
 class BulkBuilder;
-class StoredMesh;
 
 /// The sphere-tree of one model: resident nodes, how they grow and how they go.
 ///
@@ -272,10 +275,10 @@ class Tree {
   oracle::Surface surface_;
   // Of a model whose mesh was released.
   std::atomic<bool> is_released_{false};
-  std::unique_ptr<const StoredMesh> stored_;        // unless the oracle needs no mesh in host memory
-  std::unique_ptr<oracle::Surface> grown_surface_;  // surface_ with its mesh, for growth of conservative answers
-  std::atomic<std::size_t> recalled_bytes_{0};      // not 0 while the mesh is in host memory again
-  std::int64_t recall_time_ = 0;                    // in ns of the model's clock
+  std::unique_ptr<const oracle::StoredMesh> stored_;  // unless the oracle needs no mesh in host memory
+  std::unique_ptr<oracle::Surface> grown_surface_;    // surface_ with its mesh, for growth of conservative answers
+  std::atomic<std::size_t> recalled_bytes_{0};        // not 0 while the mesh is in host memory again
+  std::int64_t recall_time_ = 0;                      // in ns of the model's clock
   std::shared_ptr<const Solid> solid_;
   mutable thread::ForkAwareMutex component_mutex_;  // guards component_points_ while they are found
   mutable std::unique_ptr<const std::vector<Eigen::Vector3d>> component_points_;

@@ -15,7 +15,7 @@
 #include "tree/box_tree.h"
 #include "tree/bulk.h"
 #include "tree/cell_bounds.h"
-#include "tree/stored_mesh.h"
+#include "oracle/stored_mesh.h"
 #include "tree/tree.h"
 
 namespace bocst::tree {

@@ -20,8 +20,8 @@
 #include "oracle/gl/known_pairs.h"
 #include "oracle/gl/occlusion_oracle.h"
 #include "oracle/gl/self_test.h"
+#include "oracle/stored_mesh.h"
 #include "surfaces.h"
-#include "tree/stored_mesh.h"
 
 namespace bocst::oracle::gl {
 namespace {
@@ -315,7 +315,7 @@ TEST_F(BrokenDriver, AStoredMeshComesBackAsItWasOrNotAtAll) {
   ComputeOracle compute(newThread());
   OcclusionOracle occlusion(newThread(3), OcclusionOracle::Form::kConservative, 16);
   for (DeviceOracle* oracle : std::vector<DeviceOracle*>{&compute, &occlusion}) {
-    const tree::StoredMesh stored(*oracle, *mesh);
+    const StoredMesh stored(*oracle, *mesh);
     EXPECT_EQ(stored.bytes(), mesh->bytes());
     const auto back = stored.recall();
     EXPECT_EQ(back->vertices(), mesh->vertices());
@@ -325,7 +325,7 @@ TEST_F(BrokenDriver, AStoredMeshComesBackAsItWasOrNotAtAll) {
     g_read.start(kNever);
     EXPECT_EQ(stored.recall()->vertices(), mesh->vertices());
     g_write.start(kEvery);
-    EXPECT_THROW(tree::StoredMesh(*oracle, *test::torus(80, 0.3).mesh()), OracleError);
+    EXPECT_THROW(StoredMesh(*oracle, *test::torus(80, 0.3).mesh()), OracleError);
     g_write.start(kNever);
     g_reset.start(kEvery);
     EXPECT_THROW(stored.recall(), OracleError);
@@ -333,7 +333,7 @@ TEST_F(BrokenDriver, AStoredMeshComesBackAsItWasOrNotAtAll) {
     EXPECT_TRUE(oracle->thread().isLost());
   }
   CpuOracle cpu;
-  EXPECT_THROW(tree::StoredMesh(cpu, *mesh), OracleError);
+  EXPECT_THROW(StoredMesh(cpu, *mesh), OracleError);
 }
 
 TEST_F(BrokenDriver, NoMemory) {

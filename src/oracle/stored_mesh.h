@@ -9,13 +9,13 @@
 
 #include "oracle/oracle.h"
 
-namespace bocst::tree {
+namespace bocst::oracle {
 
 /// A copy of a mesh in the memory of an oracle's device, for a model without a mesh in host memory.
 class StoredMesh {
  public:
   /// Uploads. @throws OracleError if the oracle cannot store it.
-  StoredMesh(oracle::Oracle& oracle, const Mesh& mesh);
+  StoredMesh(Oracle& oracle, const Mesh& mesh);
 
   /// Reads it back. @throws OracleError if the device lost it, or if other bytes came back.
   std::shared_ptr<const Mesh> recall() const;
@@ -23,10 +23,10 @@ class StoredMesh {
   std::size_t bytes() const { return stored_->bytes(); }
 
  private:
-  oracle::Oracle& oracle_;
+  Oracle& oracle_;
   std::size_t vertices_, triangles_;
   std::uint64_t check_;
-  std::shared_ptr<const oracle::DeviceResource> stored_;
+  std::shared_ptr<const DeviceResource> stored_;
 };
 
-}  // namespace bocst::tree
+}  // namespace bocst::oracle

@@ -1,11 +1,11 @@
 // SPDX-License-Identifier: BSD-3-Clause
-#include "tree/stored_mesh.h"
+#include "oracle/stored_mesh.h"
 
 #include <cstring>
 #include <utility>
 #include <vector>
 
-namespace bocst::tree {
+namespace bocst::oracle {
 namespace {
 
 constexpr std::size_t kVertexWords = sizeof(Eigen::Vector3d) / sizeof(std::uint32_t), kTriangleWords = 3;
@@ -19,7 +19,7 @@ std::uint64_t checkOf(const std::vector<std::uint32_t>& words) {
 
 }  // namespace
 
-StoredMesh::StoredMesh(oracle::Oracle& oracle, const Mesh& mesh)
+StoredMesh::StoredMesh(Oracle& oracle, const Mesh& mesh)
     : oracle_(oracle), vertices_(mesh.vertexCount()), triangles_(mesh.triangleCount()) {
   static_assert(sizeof(Mesh::Indices) == kTriangleWords * sizeof(std::uint32_t), "indices lie side by side");
   std::vector<std::uint32_t> words(kVertexWords * vertices_ + kTriangleWords * triangles_);
@@ -41,4 +41,4 @@ std::shared_ptr<const Mesh> StoredMesh::recall() const {
   return Mesh::fromIndices(std::move(vertices), std::move(triangles));
 }
 
-}  // namespace bocst::tree
+}  // namespace bocst::oracle
