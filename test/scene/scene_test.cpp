@@ -476,6 +476,65 @@ TYPED_TEST(SceneTest, ClearanceIsTheLeastDistance) {
   EXPECT_GT(apart, 5);
 }
 
+// Bodies that pass each other and others: what the middle of a row says must hold for all of its states.
+TYPED_TEST(SceneTest, RowsOfStatesOfBodiesThatPassEachOther) {
+  using S = TypeParam;
+  std::mt19937_64 g(31);
+  std::uniform_real_distribution<double> u(-1, 1);
+  const auto ring = std::make_shared<Model<S>>(test::torus(14).scale(0.15).mesh());
+  const auto bar = std::make_shared<Model<S>>(test::box({-0.05, -0.05, -0.3}, {0.05, 0.05, 0.3}).mesh());
+  const auto ball = std::make_shared<fcl::Sphere<S>>(S(0.1));
+  Raw corners;  // whose hull is much less than its box
+  corners.vertices = {{0.2, 0.2, 0.2}, {-0.2, -0.2, 0.2}, {-0.2, 0.2, -0.2}, {0.2, -0.2, -0.2}};
+  for (const std::size_t k : {0, 1, 2, 3}) corners.triangles.emplace_back(k, (k + 1) % 4, (k + 2) % 4);
+  const auto tetrahedron = std::make_shared<Model<S>>(corners.mesh());
+  const auto anyOf = [&]() -> Geometry<S> {
+    switch (g() % 6) {
+      case 0:
+        return ring;
+      case 1:
+        return bar;
+      case 2:
+        return ball;
+      default:
+        return tetrahedron;
+    }
+  };
+  constexpr std::size_t kStates = 101, kMoving = 3;
+  std::size_t touching = 0, rows_with_some = 0;
+  for (int round = 0; round < 300; ++round) {
+    World<S> w;
+    for (std::size_t i = 0; i < kMoving; ++i) w.move(anyOf());
+    const auto somewhere = [&] { return Eigen::Vector3d(u(g), u(g), u(g)); };
+    for (int k = 0; k < 8 * (round % 4); ++k) {
+      w.fix(anyOf(), test::pose<S>(test::randomRotation(g), 1.2 * somewhere()));
+    }
+    States<S> X(kStates * kMoving);
+    for (std::size_t i = 0; i < kMoving; ++i) {
+      // Some hardly move.
+      const double share = g() % 2 == 0 ? 1 : 0.01;
+      const Eigen::Vector3d from = somewhere(), way = share * (somewhere() - from), axis = test::randomDirection(g);
+      const Eigen::Matrix3d R = test::randomRotation(g);
+      for (std::size_t k = 0; k < kStates; ++k) {
+        const double t = static_cast<double>(k) / (kStates - 1);
+        const Eigen::Matrix3d turn = Eigen::AngleAxisd(share * t, axis).toRotationMatrix();
+        X[k * kMoving + i] = test::pose<S>(turn * R, from + t * way);
+      }
+    }
+    std::vector<std::uint8_t> expected, hits(kStates);
+    for (std::size_t k = 0; k < kStates; ++k) expected.push_back(!w.hits(&X[k * kMoving]).empty());
+    const auto first = std::find(expected.begin(), expected.end(), 1);
+    touching += static_cast<std::size_t>(std::count(expected.begin(), expected.end(), 1));
+    rows_with_some += first != expected.end();
+    w.scene.collisions(X.data(), kStates, hits.data());
+    EXPECT_EQ(hits, expected) << round;
+    EXPECT_EQ(w.scene.firstCollision(X.data(), kStates), static_cast<std::size_t>(first - expected.begin())) << round;
+    EXPECT_EQ(w.scene.anyCollision(X.data(), kStates), first != expected.end()) << round;
+  }
+  EXPECT_GT(rows_with_some, 100u);
+  EXPECT_LT(touching, 300 * kStates / 2) << "most states are free";
+}
+
 // No sample between touches where an edge is free; where it is not, something comes very close.
 TYPED_TEST(SceneTest, EdgesNeverStepOverAContact) {
   using S = TypeParam;
