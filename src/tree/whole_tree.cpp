@@ -11,11 +11,11 @@
 #include <stdexcept>
 #include <thread>
 
+#include "oracle/stored_mesh.h"
 #include "thread/helper_thread.h"
 #include "tree/box_tree.h"
 #include "tree/bulk.h"
 #include "tree/cell_bounds.h"
-#include "oracle/stored_mesh.h"
 #include "tree/tree.h"
 
 namespace bocst::tree {
