@@ -259,6 +259,9 @@ TEST_P(OnDevice, AReleasedMeshComesBackForQueriesAndGoesAtRest) {
       for (const auto& X : poses(15, 2.4)) {
         const bool expected = test::touching<double>(r.c, kIdentity, r.d, X);
         hits += expected;
+        // Beside models that have theirs, first, as one query brings back both.
+        ASSERT_EQ(test::touching<double>(r.a, kIdentity, r.d, X), expected);
+        ASSERT_EQ(test::touching<double>(r.c, kIdentity, r.b, X), expected);
         ASSERT_EQ(test::touching<double>(r.a, kIdentity, r.b, X), expected);
         ASSERT_EQ(test::touching<double>(r.b, X, r.a, kIdentity), expected);
         ASSERT_EQ(test::touching<double>(r.a, kIdentity, *bvh, X), test::touching<double>(r.c, kIdentity, *bvh, X));
