@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #pragma once
 
+#include <algorithm>
 #include <cstddef>
 #include <functional>
 #include <new>
@@ -53,10 +54,8 @@ class QueryScope {
   class ReadLocks {
    public:
     ReadLocks(tree::Tree& a, tree::Tree& b)
-        : first_(std::less<tree::Tree*>()(&b, &a) ? &b : &a),
-          second_(&a == &b       ? nullptr
-                  : first_ == &a ? &b
-                                 : &a),
+        : first_(std::min(&a, &b, std::less<tree::Tree*>())),
+          second_(&a != &b ? std::max(&a, &b, std::less<tree::Tree*>()) : nullptr),
           shard_(thread::ShardedLock::shard()) {
       take();
     }

@@ -48,6 +48,14 @@ std::shared_ptr<Arena::Range> Arena::take(std::uint64_t words) {
   }
 }
 
+std::shared_ptr<Arena::Range> Arena::upload(const std::vector<std::uint32_t>& words) {
+  std::shared_ptr<Range> range = take(words.size());
+  const std::size_t at = range->begin() * kWord, bytes = words.size() * kWord;
+  buffer_->write(at, bytes, words.data());
+  thread_->require(buffer_->holds(at, bytes, words.data()), "a mesh did not arrive");
+  return range;
+}
+
 void Arena::grow(std::uint64_t words) {
   const std::uint64_t before = buffer_->bytes() / kWord;
   if (before + words > most_words_) {

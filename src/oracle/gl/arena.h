@@ -6,6 +6,7 @@
 #include <map>
 #include <memory>
 #include <mutex>
+#include <vector>
 
 #include "egl/handles.h"
 #include "oracle/gl/thread.h"
@@ -43,6 +44,8 @@ class Arena : public std::enable_shared_from_this<Arena> {
 
   /// @throws OracleError when the arena would be too large for the device.
   std::shared_ptr<Range> take(std::uint64_t words);
+  /// Takes as many and writes them. @throws OracleError also when they do not arrive.
+  std::shared_ptr<Range> upload(const std::vector<std::uint32_t>& words);
 
   Buffer& buffer() { return *buffer_; }
 

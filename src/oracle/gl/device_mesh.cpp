@@ -24,12 +24,7 @@ DeviceMesh::DeviceMesh(Thread& thread, std::shared_ptr<Arena> arena, const Surfa
       if (exact) std::memcpy(&words[doubles + 6 * i + 2 * k], &x, sizeof(x));
     }
   }
-  thread.run([&] {
-    words_ = arena_->take(words.size());
-    const std::size_t at = words_->begin() * sizeof(words[0]), bytes = words.size() * sizeof(words[0]);
-    arena_->buffer().write(at, bytes, words.data());
-    thread.require(arena_->buffer().holds(at, bytes, words.data()), "a mesh did not arrive");
-  });
+  thread.run([&] { words_ = arena_->upload(words); });
   vertices_ = words_->begin() + static_cast<std::uint32_t>(vertices);
   exact_ = words_->begin() + static_cast<std::uint32_t>(doubles);
 }
@@ -55,12 +50,7 @@ std::shared_ptr<DeviceMesh> DeviceMeshes::makeResident(const Surface& surface) {
 
 std::shared_ptr<const DeviceResource> DeviceMeshes::store(const std::vector<std::uint32_t>& words) {
   std::shared_ptr<Arena::Range> range;
-  thread_->run([&] {
-    range = arena_->take(words.size());
-    const std::size_t at = range->begin() * kWord, bytes = words.size() * kWord;
-    arena_->buffer().write(at, bytes, words.data());
-    thread_->require(arena_->buffer().holds(at, bytes, words.data()), "a mesh did not arrive");
-  });
+  thread_->run([&] { range = arena_->upload(words); });
   return range;
 }
 
