@@ -11,9 +11,7 @@
 
 #include <cstdint>
 
-// At -O2 the compiler keeps short loops over arrays of vectors, and with them the arrays in memory.
-#undef BOCST_UNROLL
-#define BOCST_UNROLL _Pragma("GCC unroll 9")
+#include "simd/unroll.h"
 
 HWY_BEFORE_NAMESPACE();
 namespace bocst::query::HWY_NAMESPACE {

@@ -54,7 +54,7 @@ double marginOf(float size) { return 8 * 0x1p-24 * static_cast<double>(size); }
 
 void BulkBuilder::build(const oracle::Surface& surface, const std::uint32_t* ids, std::size_t count,
                         const Eigen::AlignedBox3d& region) {
-  base_ = region.min().array().floor();
+  base_ = region.center().array().floor();
   const Eigen::Vector3d lo = region.min() - base_, hi = region.max() - base_;
   least_ << (lo.array() - 0.01).cast<float>(), -kInfinity;
   most_ << (hi.array() + 0.01).cast<float>(), kInfinity;
@@ -436,6 +436,12 @@ void BulkBuilder::boundBlocks() {
                              static_cast<double>(most) - middle + off, b);
     }
   }
+}
+
+std::size_t BulkBuilder::pack(std::uint32_t begin, std::uint32_t count, PackedTriangles::Words& words) const {
+  if (size_ > kMostOnGrid) return 0;
+  const float base[3] = {static_cast<float>(base_[0]), static_cast<float>(base_[1]), static_cast<float>(base_[2])};
+  return PackedTriangles::pack(rows(), begin, count, base, words);
 }
 
 // Calls f with the pieces that supports are sought by.

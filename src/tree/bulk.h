@@ -13,6 +13,7 @@
 #include "tree/bulk_kernels.h"
 #include "tree/huge_pages.h"
 #include "tree/outline.h"
+#include "tree/packed_triangles.h"
 #include "tree/support_table.h"
 
 namespace bocst::tree {
@@ -54,6 +55,9 @@ class BulkBuilder {
   /// @throws std::length_error for less than kLeastToSort triangles, or more than kMostToSort vertices.
   void buildAll(const oracle::Surface& surface);
   static constexpr std::size_t kLeastToSort = 4096, kMostToSort = std::size_t{1} << 29;
+
+  /// Packs the corners of a leaf, triangles begin to begin + count - 1 of ids(); see PackedTriangles::pack().
+  std::size_t pack(std::uint32_t begin, std::uint32_t count, PackedTriangles::Words& words) const;
 
   /// Lowers all supports to those of the triangles that were built.
   void findSupports(SupportTable& supports) const;

@@ -2,10 +2,12 @@
 #include "tree/bulk_kernels.h"
 
 #include <algorithm>
+#include <cmath>
 #include <cstring>
 #include <limits>
 
 #include "simd/float4.h"
+#include "simd/unroll.h"
 
 #undef HWY_TARGET_INCLUDE
 #define HWY_TARGET_INCLUDE "tree/bulk_kernels.cpp"
@@ -85,6 +87,52 @@ void ExtremesAlong(const CornerRows& c, std::size_t begin, std::size_t count, co
   most = hn::GetLane(hn::MaxOfLanes(d, hi));
 }
 
+bool StepsOnGrid(const CornerRows& c, std::size_t begin, std::size_t count, const float (&base)[3], LeafGrid& grid,
+                 CornerSteps& steps) {
+  constexpr float kMost = 65535, kFewest = 512;
+  const D d;
+  V lo[3], hi[3];
+  BOCST_UNROLL
+  for (std::size_t x = 0; x < 3; ++x) lo[x] = hi[x] = hn::Set(d, c.row[x][begin]);
+  for (std::size_t i = 0; i < count; i += hn::Lanes(d)) {
+    const auto in = hn::FirstN(d, count - i);
+    BOCST_UNROLL
+    for (std::size_t k = 0; k < 9; ++k) {
+      const V p = hn::LoadU(d, c.row[k] + begin + i);
+      lo[k % 3] = hn::IfThenElse(in, hn::Min(lo[k % 3], p), lo[k % 3]);
+      hi[k % 3] = hn::IfThenElse(in, hn::Max(hi[k % 3], p), hi[k % 3]);
+    }
+  }
+  float from[3], extent = 0;
+  BOCST_UNROLL
+  for (std::size_t x = 0; x < 3; ++x) {
+    // The surface lies in the lattice, but for rounding.
+    grid.origin[x] = std::min(std::max(std::floor(hn::GetLane(hn::MinOfLanes(d, lo[x]))) + base[x], 0.0f), kMost);
+    from[x] = grid.origin[x] - base[x];
+    extent = std::max(extent, hn::GetLane(hn::MaxOfLanes(d, hi[x])) - from[x]);
+  }
+  if (!(extent >= kFewest * kLeastStep)) return false;
+  // The least power of two with which kMost steps reach.
+  std::uint32_t bits;
+  const float least = std::max(extent / kMost, kLeastStep);
+  std::memcpy(&bits, &least, sizeof(bits));
+  bits = (bits + 0x7fffff) & 0x7f800000;
+  std::memcpy(&grid.step, &bits, sizeof(bits));
+  const hn::RebindToSigned<D> di;
+  const hn::Rebind<std::uint16_t, D> du;
+  const V per = hn::Set(d, 1 / grid.step);
+  for (std::size_t i = 0; i < count; i += hn::Lanes(d)) {
+    BOCST_UNROLL
+    for (std::size_t k = 0; k < 9; ++k) {
+      const V first = hn::Set(d, from[k % 3]);
+      const V exact = hn::Mul(hn::Sub(hn::LoadU(d, c.row[k] + begin + i), first), per);
+      const V step = hn::Min(hn::Max(hn::Add(exact, hn::Set(d, 0.5f)), hn::Zero(d)), hn::Set(d, kMost));
+      hn::StoreU(hn::DemoteTo(du, hn::ConvertTo(di, step)), du, steps[k] + i);
+    }
+  }
+  return true;
+}
+
 // How far the boxes of pieces i, i + 1, ... reach.
 HWY_INLINE V reachOf(const BoundedPieces& pieces, std::size_t i, const float (&n)[3]) {
   const D d;
@@ -138,6 +186,7 @@ namespace bocst::tree {
 
 HWY_EXPORT(BoundPiece);
 HWY_EXPORT(ExtremesAlong);
+HWY_EXPORT(StepsOnGrid);
 HWY_EXPORT(FarthestAlong);
 
 // Reading corners one by one, each as one vector of four, takes less time than gathering coordinates in wider vectors.
@@ -212,6 +261,11 @@ PieceBounds boundPiece(const CornerRows& corners, std::size_t begin, std::size_t
 void extremesAlong(const CornerRows& corners, std::size_t begin, std::size_t count, const float (&n)[3], float& least,
                    float& most) {
   HWY_DYNAMIC_DISPATCH(ExtremesAlong)(corners, begin, count, n, least, most);
+}
+
+bool stepsOnGrid(const CornerRows& corners, std::size_t begin, std::size_t count, const float (&base)[3],
+                 LeafGrid& grid, CornerSteps& steps) {
+  return HWY_DYNAMIC_DISPATCH(StepsOnGrid)(corners, begin, count, base, grid, steps);
 }
 
 float farthestAlong(const CornerRows& corners, const BoundedPieces& pieces, const float (&n)[3]) {

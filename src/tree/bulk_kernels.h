@@ -7,6 +7,8 @@
 #include <cstddef>
 #include <cstdint>
 
+#include "lattice/limits.h"
+
 namespace bocst::tree {
 
 /// Coordinate c of corner k of triangles, one row for each (k, c) at [3 * k + c]; whole vectors of 16 may be read.
@@ -64,6 +66,23 @@ PieceBounds boundPiece(const CornerRows& corners, std::size_t begin, std::size_t
 /// The least and the most of n . p over the corners p of triangles begin to begin + count - 1.
 void extremesAlong(const CornerRows& corners, std::size_t begin, std::size_t count, const float (&n)[3], float& least,
                    float& most);
+
+/// A grid on which corners are counted in steps: whole lattice units from the mesh's, and a power of two.
+struct LeafGrid {
+  float origin[3];
+  float step;
+};
+
+/// Coordinate c of corner k of triangle i, in steps, at [3 * k + c][i]; whole vectors are written.
+using CornerSteps = std::uint16_t[9][kMaxLeafTriangles + 16];
+
+/// Puts the corners of triangles begin to begin + count - 1, at most kMaxLeafTriangles, on a grid of their own, with
+/// `base` the lattice point that they are counted from. False where they would have less than 9 bits on the finest one.
+bool stepsOnGrid(const CornerRows& corners, std::size_t begin, std::size_t count, const float (&base)[3],
+                 LeafGrid& grid, CornerSteps& steps);
+
+/// Corners of stepsOnGrid() are at most so large, so float rounds them by a quarter of the least step.
+constexpr float kMostOnGrid = 33000, kLeastStep = 0x1p-7f;
 
 /// The most of n . p over the corners p of all pieces. Pieces that cannot reach so far are spared.
 float farthestAlong(const CornerRows& corners, const BoundedPieces& pieces, const float (&n)[3]);

@@ -1,33 +1,31 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #include "tree/packed_triangles.h"
 
-#include <Eigen/Geometry>
 #include <algorithm>
 #include <array>
-#include <cmath>
 #include <cstring>
-#include <limits>
 #include <tuple>
 
 namespace bocst::tree {
 
 namespace {
 
-constexpr int kExponentBias = 127;  // that of a float, 23 bits up
-
 // Numbers at most kMostPlaces different keys in the order in which they come.
 class Numbers {
  public:
+  Numbers() { slots_.fill(kFree); }
+
   std::uint8_t number(std::uint64_t key) {
-    for (std::size_t at = key * 0x9e3779b97f4a7c15u >> 56;; at = (at + 1) % kSlots) {
-      const std::uint8_t found = slots_[at];
-      if (found == kFree) {
-        slots_[at] = static_cast<std::uint8_t>(count_);
-        keys_[count_] = key;
-        return static_cast<std::uint8_t>(count_++);
-      }
-      if (keys_[found] == key) return found;
+    // Where a slot is free, its number is that of the new key, which is there already: the only branch is hardly taken.
+    keys_[count_] = key;
+    std::size_t at = key * 0x9e3779b97f4a7c15u >> 56, number = std::min<std::size_t>(slots_[at], count_);
+    while (keys_[number] != key) {
+      at = (at + 1) % kSlots;
+      number = std::min<std::size_t>(slots_[at], count_);
     }
+    slots_[at] = static_cast<std::uint8_t>(number);
+    count_ += number == count_;
+    return static_cast<std::uint8_t>(number);
   }
   std::size_t count() const { return count_; }
   std::uint64_t key(std::size_t number) const { return keys_[number]; }
@@ -35,15 +33,9 @@ class Numbers {
  private:
   static constexpr std::size_t kSlots = 256;
   static constexpr std::uint8_t kFree = 0xff;
-  std::array<std::uint8_t, kSlots> slots_ = filled();
-  std::array<std::uint64_t, PackedTriangles::kMostPlaces> keys_;
+  std::array<std::uint8_t, kSlots> slots_;
+  std::array<std::uint64_t, PackedTriangles::kMostPlaces + 1> keys_;
   std::size_t count_ = 0;
-
-  static std::array<std::uint8_t, kSlots> filled() {
-    std::array<std::uint8_t, kSlots> slots;
-    slots.fill(kFree);
-    return slots;
-  }
 };
 
 }  // namespace
@@ -59,66 +51,37 @@ PackedTriangles::PackedTriangles(const std::uint32_t* words, std::size_t count_)
   corners = reinterpret_cast<const std::uint8_t*>(steps + 3 * places);
 }
 
-std::size_t PackedTriangles::pack(const oracle::Surface& surface, const std::uint32_t* ids, std::size_t triangles,
-                                  Words& words) {
+std::size_t PackedTriangles::pack(const CornerRows& rows, std::size_t begin, std::size_t triangles,
+                                  const float (&base)[3], Words& words) {
   static_assert(PackedTriangles::words(kMostTriangles, kMostPlaces) <= std::tuple_size<Words>::value,
                 "all packs have room");
-  Numbers vertices;
+  LeafGrid grid;
+  CornerSteps steps;
+  if (!stepsOnGrid(rows, begin, triangles, base, grid, steps)) return 0;
+  Numbers places;
   std::array<std::uint8_t, kMostPlaces> corners;
   for (std::size_t i = 0; i < triangles; ++i) {
-    const Mesh::Indices& indices = surface.mesh->indices(ids[i]);
-    for (std::size_t k = 0; k < 3; ++k) corners[k * triangles + i] = vertices.number(indices[k]);
-  }
-  std::size_t count = vertices.count();
-  std::array<Eigen::Array3d, kMostPlaces> places;
-  Eigen::Array3d least = Eigen::Array3d::Constant(std::numeric_limits<double>::infinity()), most = -least;
-  for (std::size_t i = 0; i < count; ++i) {
-    places[i] = surface.lattice.toLattice(surface.mesh->vertex(vertices.key(i))).array();
-    least = least.min(places[i]);
-    most = most.max(places[i]);
-  }
-  // The surface lies in the lattice, but for rounding.
-  const Eigen::Array3d origin = least.floor().max(0.0).min(kMost);
-  const double extent = (most - origin).maxCoeff();
-  // The least power of two with which kMost steps reach.
-  int exponent;
-  const double mantissa = std::frexp(std::max(extent, 0x1p-8) / kMost, &exponent);
-  if (mantissa == 0.5) --exponent;
-  const double inverse_step = std::ldexp(1.0, -exponent);
-
-  std::array<std::array<std::uint16_t, 3>, kMostPlaces> steps;
-  for (std::size_t i = 0; i < count; ++i) {
-    const Eigen::Array3d exact = ((places[i] - origin) * inverse_step).max(0.0).min(kMost) + 0.5;
-    for (std::size_t c = 0; c < 3; ++c) {
-      steps[i][c] = static_cast<std::uint16_t>(exact[static_cast<Eigen::Index>(c)]);
+    for (std::size_t k = 0; k < 3; ++k) {
+      const std::uint64_t x = steps[3 * k][i], y = steps[3 * k + 1][i], z = steps[3 * k + 2][i];
+      corners[k * triangles + i] = places.number(x | y << 16 | z << 32);
     }
   }
-  // The vertices of a soup share places: a surface has about as many vertices as triangles.
-  if (count > triangles + triangles / 2) {
-    Numbers different;
-    std::array<std::uint8_t, kMostPlaces> place_of;
-    for (std::size_t i = 0; i < count; ++i) {
-      const std::array<std::uint16_t, 3> own = steps[i];
-      place_of[i] = different.number(own[0] | std::uint64_t{own[1]} << 16 | std::uint64_t{own[2]} << 32);
-      steps[place_of[i]] = own;  // never after those that are still to be read
-    }
-    count = different.count();
-    for (std::size_t i = 0; i < 3 * triangles; ++i) corners[i] = place_of[corners[i]];
-  }
-
-  const auto at = [&origin](int k) { return static_cast<std::uint32_t>(origin[k]); };
-  words[0] =
-      static_cast<std::uint32_t>(count) | static_cast<std::uint32_t>(exponent + kExponentBias) << 8 | at(0) << 16;
+  std::uint32_t exponent;
+  std::memcpy(&exponent, &grid.step, sizeof(exponent));
+  const auto at = [&grid](std::size_t k) { return static_cast<std::uint32_t>(grid.origin[k]); };
+  const std::size_t count = places.count(), size = PackedTriangles::words(triangles, count);
+  words[0] = static_cast<std::uint32_t>(count) | exponent >> 23 << 8 | at(0) << 16;
   words[1] = at(1) | at(2) << 16;
-  const std::size_t size = PackedTriangles::words(triangles, count);
-  std::fill(words.begin() + kHeader, words.begin() + static_cast<std::ptrdiff_t>(size), 0);
-  auto* to = reinterpret_cast<char*>(words.data() + kHeader);
+  words[size - 2] = words[size - 1] = 0;
+  std::array<std::uint16_t, 3 * kMostPlaces> places_by_axis;
   for (std::size_t c = 0; c < 3; ++c) {
-    for (std::size_t i = 0; i < count; ++i, to += sizeof(std::uint16_t)) {
-      std::memcpy(to, &steps[i][c], sizeof(std::uint16_t));
+    for (std::size_t i = 0; i < count; ++i) {
+      places_by_axis[c * count + i] = static_cast<std::uint16_t>(places.key(i) >> (16 * c));
     }
   }
-  std::memcpy(to, corners.data(), 3 * triangles);
+  auto* const to = reinterpret_cast<char*>(words.data() + kHeader);
+  std::memcpy(to, places_by_axis.data(), 3 * count * sizeof(places_by_axis[0]));
+  std::memcpy(to + 3 * count * sizeof(places_by_axis[0]), corners.data(), 3 * triangles);
   return size;
 }
 

@@ -7,7 +7,7 @@
 #include <cstdint>
 
 #include "lattice/limits.h"
-#include "oracle/oracle.h"
+#include "tree/bulk_kernels.h"
 
 namespace bocst::tree {
 
@@ -15,15 +15,20 @@ namespace bocst::tree {
 /// query would else collect from places all over the mesh.
 ///
 /// A coordinate is origin + step * q in lattice units, origin a whole number and step a power of two, so all of it is
-/// exact in float but for q, which is off by half a step.
+/// exact in float but for q.
 class PackedTriangles {
  public:
   static constexpr std::size_t kMostTriangles = kMaxLeafTriangles, kMostPlaces = 3 * kMostTriangles;
   static constexpr double kMost = 65535;  ///< Steps along an axis.
+  /// How far a packed corner may be from where it is along an axis, in steps: half a step, a quarter of one by which
+  /// float corners are off before, and a hundredth of one in the sums.
+  static constexpr float kError = 0.76f;
 
-  /// Packs at most kMostTriangles, at least one; returns how many words that takes.
+  /// Packs triangles begin to begin + count - 1, at most kMostTriangles and at least one, of corners that count from
+  /// `base`; returns how many words that takes: none where their grid would be too coarse.
   using Words = std::array<std::uint32_t, 192>;
-  static std::size_t pack(const oracle::Surface& surface, const std::uint32_t* ids, std::size_t count, Words& words);
+  static std::size_t pack(const CornerRows& corners, std::size_t begin, std::size_t count, const float (&base)[3],
+                          Words& words);
 
   PackedTriangles() = default;
   PackedTriangles(const std::uint32_t* words, std::size_t count);

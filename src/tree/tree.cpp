@@ -404,25 +404,6 @@ ChildRef Tree::addList(const std::uint32_t* ids, std::size_t count, bool leaf) {
   return ChildRef(leaf || count <= kMaxLeafTriangles ? ChildRef::kShortList : ChildRef::kList, index);
 }
 
-void Tree::packLeaves(const std::vector<NodeRef>& leaves) {
-  // Until the tree is built completely, its leaves are about to be replaced.
-  if (leaves.empty() || price_ != kNever || !hasBudget()) return;
-  const std::unique_lock<thread::ForkAwareMutex> lock(growth_, std::try_to_lock);
-  if (!lock.owns_lock() || lists_.isHalfFull()) return;
-  std::size_t left = 16 + leaves.size() / 4;
-  bool has_packed = false;
-  for (const NodeRef leaf : leaves) {
-    const ChildRef list = childRef(leaf);
-    if (!list.isList() || lists_.isPacked(list.index())) continue;
-    const std::uint32_t count = lists_[list.index()].count;
-    if (count == 0 || count > kMaxLeafTriangles) continue;
-    setChild(leaf, ChildRef(list.tag(), lists_.addPacked(surface_, list.index())));
-    has_packed = true;
-    if (--left == 0) break;
-  }
-  if (has_packed) countBytes();
-}
-
 ChildRef Tree::addDeviceList(const std::shared_ptr<const oracle::DeviceResource>& resource,
                              oracle::ExpansionRequest::DeviceList list) {
   if (resources_.empty() || resources_.back() != resource) resources_.push_back(resource);

@@ -181,13 +181,6 @@ class Tree {
   /// A batch takes an oracle long, however small it is: walks that grow together ask it less often.
   bool growsSlowly() const { return oracle_->kind() != OracleKind::kCpu; }
 
-  /// Growth that no answer needs is welcome: it would not bring the tree near its memory budget.
-  bool hasBudget() const { return options_.memory_budget == 0 || bytes_ < options_.memory_budget / 2; }
-
-  /// Packs the corners of leaves, as many as a query hardly feels. Does nothing before the tree is built completely,
-  /// nor while another thread grows it.
-  void packLeaves(const std::vector<NodeRef>& leaves);
-
   // With the query lock free.
 
   Statistics statistics() const;
@@ -247,6 +240,8 @@ class Tree {
   static void startPlaces(const BulkBuilder& bulk, NodeRef node, int level, std::vector<BulkPlace>& places);
   void addBlocks(const BulkBuilder& bulk, std::vector<BulkPlace>& places, std::size_t begin, std::size_t end,
                  std::int64_t now);
+  bool packs(const std::vector<BulkPlace>& places) const;
+  ChildRef addLeaf(const BulkBuilder& bulk, std::uint32_t begin, std::uint32_t count, bool packed);
   void publishBulk(const BulkBuilder& bulk, const std::vector<BulkPlace>& places);
   void publishWhole(const BulkBuilder& bulk, const std::vector<BulkPlace>& places);
   lattice::Cell cellOrDepth(NodeRef node) const;

@@ -19,28 +19,41 @@ std::size_t TriangleLists::idWords(std::uint32_t flags) {
   return (flags & kNarrow) != 0 ? 1 + (count + 1) / 2 : count;
 }
 
-std::uint32_t TriangleLists::add(const std::uint32_t* ids, std::size_t count) {
+std::uint32_t TriangleLists::flagsOf(const std::uint32_t* ids, std::size_t count) {
   if (count > kCount) throw std::length_error("bocst: a node of more than 2^29 triangles");
-  auto flags = static_cast<std::uint32_t>(count);
-  std::uint32_t least = 0;
-  if (count > 1) {
-    const auto [lowest, highest] = std::minmax_element(ids, ids + count);
-    least = *lowest;
-    if (*highest - least <= 0xffff) flags |= kNarrow;
+  const auto length = static_cast<std::uint32_t>(count);
+  if (count < 2) return length;
+  const auto [least, most] = std::minmax_element(ids, ids + count);
+  return *most - *least <= 0xffff ? length | kNarrow : length;
+}
+
+void TriangleLists::writeIds(const std::uint32_t* ids, std::size_t count, bool narrow, std::uint32_t* to) {
+  if (!narrow) {
+    std::copy_n(ids, count, to);
+    return;
   }
-  const std::uint32_t index = words_.append(1 + idWords(flags));
-  std::uint32_t* const words = &words_[index];
-  words[0] = flags;
-  if ((flags & kNarrow) == 0) {
-    std::copy_n(ids, count, words + 1);
-    return index;
-  }
-  words[1] = least;
-  auto* const steps = reinterpret_cast<char*>(words + 2);
+  const std::uint32_t least = *std::min_element(ids, ids + count);
+  to[0] = least;
+  auto* const steps = reinterpret_cast<char*>(to + 1);
   for (std::size_t i = 0; i < count; ++i) {
     const auto step = static_cast<std::uint16_t>(ids[i] - least);
     std::memcpy(steps + i * sizeof(step), &step, sizeof(step));
   }
+}
+
+std::uint32_t TriangleLists::add(const std::uint32_t* ids, std::size_t count) {
+  const std::uint32_t flags = flagsOf(ids, count), index = words_.append(1 + idWords(flags));
+  words_[index] = flags;
+  writeIds(ids, count, (flags & kNarrow) != 0, &words_[index] + 1);
+  return index;
+}
+
+std::uint32_t TriangleLists::addPacked(const std::uint32_t* ids, std::size_t count,
+                                       const PackedTriangles::Words& packed, std::size_t size) {
+  const std::uint32_t flags = flagsOf(ids, count), index = words_.append(1 + size + idWords(flags));
+  std::uint32_t* const words = &words_[index];
+  words[0] = flags | kPacked;
+  writeIds(ids, count, (flags & kNarrow) != 0, std::copy_n(packed.begin(), size, words + 1));
   return index;
 }
 
@@ -53,34 +66,13 @@ std::uint32_t TriangleLists::addDeviceList(std::size_t count, Place place) {
   return index;
 }
 
-std::uint32_t TriangleLists::addPacked(const oracle::Surface& surface, std::uint32_t list) {
-  const TriangleList triangles = (*this)[list];
-  BOCST_ASSERT(triangles.count > 0 && triangles.count <= PackedTriangles::kMostTriangles);
-  std::array<std::uint32_t, PackedTriangles::kMostTriangles> ids;
-  for (std::size_t i = 0; i < triangles.count; ++i) ids[i] = triangles.ids[i];
-  PackedTriangles::Words packed;
-  const std::size_t size = PackedTriangles::pack(surface, ids.data(), triangles.count, packed);
-  const std::uint32_t index = words_.append(kPackedHeader + size);
-  std::uint32_t* const words = &words_[index];
-  words[0] = words_[list] | kPacked;
-  words[1] = list + 1;
-  std::copy_n(packed.begin(), size, words + kPackedHeader);
-  return index;
-}
-
 std::uint32_t TriangleLists::addCopy(const TriangleLists& from, std::uint32_t list) {
-  const auto copy = [this](const std::uint32_t* words, std::size_t count) {
-    const std::uint32_t index = words_.append(count);
-    std::copy_n(words, count, &words_[index]);
-    return index;
-  };
   const std::uint32_t* const words = &from.words_[list];
   const std::uint32_t flags = words[0];
-  if ((flags & kOnDevice) != 0) return copy(words, kDeviceListWords);
-  if ((flags & kPacked) == 0) return copy(words, 1 + idWords(flags));
-  const std::uint32_t ids = copy(&from.words_[words[1]], idWords(flags)),
-                      index = copy(words, kPackedHeader + packedAt(words).words());
-  words_[index + 1] = ids;
+  const std::size_t packed = (flags & kPacked) != 0 ? packedAt(words).words() : 0;
+  const std::size_t count = (flags & kOnDevice) != 0 ? kDeviceListWords : 1 + packed + idWords(flags);
+  const std::uint32_t index = words_.append(count);
+  std::copy_n(words, count, &words_[index]);
   return index;
 }
 

@@ -61,7 +61,7 @@ class TriangleLists {
     const std::uint32_t flags = words[0], count = flags & kCount;
     if ((flags & kOnDevice) != 0) return {{}, count};
     const bool narrow = (flags & kNarrow) != 0;
-    return {{(flags & kPacked) != 0 ? &words_[words[1]] : words + 1, narrow}, count};
+    return {{words + 1 + ((flags & kPacked) != 0 ? packedAt(words).words() : 0), narrow}, count};
   }
   /// False where nobody has packed it.
   bool packed(std::uint32_t list, PackedTriangles& triangles) const {
@@ -70,7 +70,6 @@ class TriangleLists {
     triangles = packedAt(words);
     return true;
   }
-  bool isPacked(std::uint32_t list) const { return (words_[list] & kPacked) != 0; }
   /// Does the oracle keep it?
   bool isOnDevice(std::uint32_t list) const { return (words_[list] & kOnDevice) != 0; }
   Place place(std::uint32_t list) const { return {words_[list + 1], words_[list + 2]}; }
@@ -81,11 +80,11 @@ class TriangleLists {
 
   std::uint32_t add(const std::uint32_t* ids, std::size_t count);
   std::uint32_t addDeviceList(std::size_t count, Place place);
-  /// A list of this, with its corners; whoever reads the old one goes on.
-  std::uint32_t addPacked(const oracle::Surface& surface, std::uint32_t list);
+  /// A list with its corners, which PackedTriangles::pack() put into so many words.
+  std::uint32_t addPacked(const std::uint32_t* ids, std::size_t count, const PackedTriangles::Words& packed,
+                          std::size_t size);
   std::uint32_t addCopy(const TriangleLists& from, std::uint32_t list);
 
-  bool isHalfFull() const { return words_.size() > Words::kMost / 2; }
   std::size_t bytes() const { return words_.bytes(); }
   void clear() { words_.clear(); }
   void swap(TriangleLists& other) { words_.swap(other.words_); }
@@ -93,14 +92,16 @@ class TriangleLists {
  private:
   using Words = Pool<std::uint32_t, 10>;
 
-  // A list is flags and a length, then the numbers: all as they are or, narrow, the least and 16-bit steps from it.
-  // Packed: flags and length, where the numbers are, PackedTriangles. Kept: flags and length, the place.
+  // A list is flags and a length, PackedTriangles if it is packed, then the numbers: all as they are or, narrow, the
+  // least and 16-bit steps from it. Kept: flags and length, the place.
   static constexpr std::uint32_t kOnDevice = 0x80000000u, kPacked = 0x40000000u, kNarrow = 0x20000000u,
                                  kCount = 0x1fffffffu;
-  static constexpr std::size_t kDeviceListWords = 3, kPackedHeader = 2;
+  static constexpr std::size_t kDeviceListWords = 3;
 
   static std::size_t idWords(std::uint32_t flags);
-  static PackedTriangles packedAt(const std::uint32_t* list) { return {list + kPackedHeader, list[0] & kCount}; }
+  static std::uint32_t flagsOf(const std::uint32_t* ids, std::size_t count);
+  static void writeIds(const std::uint32_t* ids, std::size_t count, bool narrow, std::uint32_t* to);
+  static PackedTriangles packedAt(const std::uint32_t* list) { return {list + 1, list[0] & kCount}; }
 
   Words words_;
 };

@@ -27,10 +27,12 @@ constexpr std::size_t kRent = 8;
 // Queries grow parts for longer while the helper thread builds; should it not come to it, a query still builds the
 // tree.
 constexpr std::size_t kRentAhead = 1;
+// A whole tree with the corners of its leaves takes so many bytes a triangle, at most.
+constexpr std::size_t kPackedBytes = 24;
 // What a thread keeps of a build's memory for the next one, in triangles.
 constexpr std::size_t kMostKept = 1 << 17;
 // Blocks that the helper thread adds while queries cannot grow the tree: some tens of microseconds.
-constexpr std::uint32_t kBlocksAtOnce = 64;
+constexpr std::uint32_t kBlocksAtOnce = 16;
 constexpr std::chrono::microseconds kPause(50);
 
 /// Box and slab of a cell's surface as bytes of the cell.
@@ -273,10 +275,25 @@ void Tree::startPlaces(const BulkBuilder& bulk, NodeRef node, int level, std::ve
   places[0].level = level;
 }
 
+// Are leaves of what was built kept with their corners? Not if they are about to be replaced, or would fill the memory
+// budget.
+bool Tree::packs(const std::vector<BulkPlace>& places) const {
+  const bool fit = options_.memory_budget == 0 || kPackedBytes * surface_.triangle_count <= options_.memory_budget / 2;
+  return fit && (places[0].node.isRoot() || price_ == kNever);
+}
+
+ChildRef Tree::addLeaf(const BulkBuilder& bulk, std::uint32_t begin, std::uint32_t count, bool packed) {
+  const std::uint32_t* const ids = bulk.ids().data() + begin;
+  PackedTriangles::Words words;
+  const std::size_t size = packed && count > 0 ? bulk.pack(begin, count, words) : 0;
+  return {ChildRef::kShortList, size > 0 ? lists_.addPacked(ids, count, words, size) : lists_.add(ids, count)};
+}
+
 // Adds blocks of what was built, from number `begin` on, after those before them. No reader sees them: all but the
 // first are put below their parents, and that one nowhere.
 void Tree::addBlocks(const BulkBuilder& bulk, std::vector<BulkPlace>& places, std::size_t begin, std::size_t end,
                      std::int64_t now) {
+  const bool packed = packs(places);
   for (std::size_t number = begin; number < end; ++number) {
     const BulkBuilder::Block& built = bulk.blocks()[number];
     BulkPlace& place = places[number];
@@ -288,7 +305,7 @@ void Tree::addBlocks(const BulkBuilder& bulk, std::vector<BulkPlace>& places, st
       const BulkBuilder::Lane& lane = built.lane[o];
       block.octants.set(o, built.bounds[o]);
       if (lane.block == BulkBuilder::kNone) {
-        block.child[o].store(addList(bulk.ids().data() + lane.begin, lane.count, false), std::memory_order_relaxed);
+        block.child[o].store(addLeaf(bulk, lane.begin, lane.count, packed), std::memory_order_relaxed);
       } else {
         places[lane.block].node = NodeRef::octant(place.index, static_cast<int>(o));
         places[lane.block].level = place.level + 1;
@@ -300,8 +317,9 @@ void Tree::addBlocks(const BulkBuilder& bulk, std::vector<BulkPlace>& places, st
 
 // All blocks were added: readers see them from now on.
 void Tree::publishBulk(const BulkBuilder& bulk, const std::vector<BulkPlace>& places) {
-  setChild(places[0].node, bulk.blocks().empty() ? addList(bulk.ids().data(), bulk.ids().size(), true)
-                                                 : ChildRef(ChildRef::kBlock, places[0].index));
+  setChild(places[0].node, bulk.blocks().empty()
+                               ? addLeaf(bulk, 0, static_cast<std::uint32_t>(bulk.ids().size()), packs(places))
+                               : ChildRef(ChildRef::kBlock, places[0].index));
 }
 
 // Of the whole tree; what was grown before is not counted any more.

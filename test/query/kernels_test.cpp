@@ -19,6 +19,8 @@
 #include "query/distance/distance_kernels.h"
 #include "query/leaf/large_triangles.h"
 #include "query/leaf/unpack.h"
+#include "tree/bulk.h"
+#include "tree/cell_bounds.h"
 #include "tree/packed_triangles.h"
 
 namespace bocst::query {
@@ -741,6 +743,7 @@ TEST_P(EveryTarget, MovedTrianglesAreWhereTheyBelong) {
 TEST_P(EveryTarget, PackedCornersAreWhereTheMeshHasThem) {
   std::mt19937_64 g(36);
   std::uniform_real_distribution<double> u(-1, 1);
+  int too_small = 0;
   for (int round = 0; round < 300; ++round) {
     // A few triangles of a mesh that may be far larger than they are, and may be points.
     test::Raw raw;
@@ -767,16 +770,25 @@ TEST_P(EveryTarget, PackedCornersAreWhereTheMeshHasThem) {
     std::vector<std::uint32_t> ids(count);
     std::iota(ids.begin(), ids.end(), 1u);
     std::shuffle(ids.begin(), ids.end(), g);
-    tree::PackedTriangles::Words words;
-    const std::size_t word_count = tree::PackedTriangles::pack(surface, ids.data(), count, words);
-    const tree::PackedTriangles packed(words.data(), count);
-    ASSERT_EQ(packed.words(), word_count);
-    EXPECT_LE(packed.places, is_strip ? count + 2 : 3 * count);
     Eigen::AlignedBox3d box;
     for (const std::uint32_t t : ids) {
       for (int k = 0; k < 3; ++k) box.extend(surface.corner(t, k));
     }
-    EXPECT_LE(static_cast<double>(packed.step), std::max((box.sizes().maxCoeff() + 1) / 32767, 0x1p-20));
+    tree::BulkBuilder bulk;
+    bulk.build(surface, ids.data(), count, tree::latticeBounds(surface));
+    ASSERT_EQ(bulk.ids(), ids);
+    tree::PackedTriangles::Words words;
+    const std::size_t word_count = bulk.pack(0, static_cast<std::uint32_t>(count), words);
+    if (word_count == 0) {
+      EXPECT_LT(box.sizes().maxCoeff(), 4.1) << "a leaf that is large enough is not packed";
+      ++too_small;
+      continue;
+    }
+    const tree::PackedTriangles packed(words.data(), count);
+    ASSERT_EQ(packed.words(), word_count);
+    EXPECT_LE(packed.places, is_strip ? count + 2 : 3 * count);
+    EXPECT_GT(box.sizes().maxCoeff(), 2.9);
+    EXPECT_LE(static_cast<double>(packed.step), std::max((box.sizes().maxCoeff() + 1) / 32767, 0x1p-7));
     const Eigen::Vector3d center = box.center();
     const double scale = std::pow(2.0, 10 * u(g));
     for (const Eigen::Matrix3d& linear :
@@ -793,8 +805,9 @@ TEST_P(EveryTarget, PackedCornersAreWhereTheMeshHasThem) {
       unpackTriangles(packed, motion, pack);
       ASSERT_EQ(pack.count, count);
       const double reach = std::sqrt(3.0) * scale * 65535 * static_cast<double>(packed.step) + offset.norm();
-      const double error = turns ? scale * static_cast<double>(packingError(packed)) + 6 * 0x1p-24 * reach
-                                 : static_cast<double>(packed.step) / 2 + 2 * 0x1p-24 * static_cast<double>(pack.size);
+      const double error =
+          turns ? scale * static_cast<double>(packingError(packed)) + 6 * 0x1p-24 * reach
+                : static_cast<double>(packed.step * tree::PackedTriangles::kError + 2 * 0x1p-24f * pack.size);
       for (std::size_t i = 0; i < count; ++i) {
         for (std::size_t k = 0; k < 3; ++k) {
           const Eigen::Vector3d x = linear * (surface.corner(ids[i], static_cast<int>(k)) - center);
@@ -811,6 +824,8 @@ TEST_P(EveryTarget, PackedCornersAreWhereTheMeshHasThem) {
       }
     }
   }
+  EXPECT_GT(too_small, 20);
+  EXPECT_LT(too_small, 150);
 }
 
 TEST_P(EveryTarget, GapsOfOctantsHoldTheDistancesOfTheirPoints) {

@@ -112,6 +112,53 @@ TEST(Tree, AQueryBuildsOneWholeTreeAtMost) {
   }
 }
 
+// Queries of a whole tree read no mesh but for pairs in doubt: its leaves have their corners with them, unless these
+// would take most of the memory budget, or a leaf is so small beside the mesh that its corners would be rounded badly.
+TEST(Tree, LeavesOfAWholeTreeArePacked) {
+  const auto share = [](const std::shared_ptr<const Mesh>& mesh, std::size_t budget) {
+    Options options;
+    options.oracle = OracleKind::kCpu;
+    options.memory_budget = budget;
+    tree::Tree tree(mesh, options);
+    tree.payRent(2 * mesh->triangleCount());
+    EXPECT_TRUE(tree.buildIfDue());
+    std::size_t packed = 0, all = 0;
+    std::vector<tree::NodeRef> stack{tree::NodeRef()};
+    while (!stack.empty()) {
+      const tree::ChildRef ref = tree.childRef(stack.back());
+      stack.pop_back();
+      if (ref.tag() == tree::ChildRef::kBlock) {
+        for (int o = 0; o < 8; ++o) {
+          if ((tree.block(ref.index()).grey >> o & 1) != 0) stack.push_back(tree::NodeRef::octant(ref.index(), o));
+        }
+        continue;
+      }
+      EXPECT_EQ(ref.tag(), tree::ChildRef::kShortList);
+      const std::size_t count = tree.list(ref).count;
+      tree::PackedTriangles corners;
+      all += count;
+      if (!tree.lists().packed(ref.index(), corners)) continue;
+      EXPECT_EQ(corners.count, count);
+      packed += count;
+    }
+    EXPECT_EQ(all, mesh->triangleCount());
+    return static_cast<double>(packed) / static_cast<double>(all);
+  };
+  for (const std::size_t n : {std::size_t{3}, std::size_t{20}, std::size_t{80}}) {  // a leaf, below a sort, sorted
+    const auto mesh = test::torus(n).mesh();
+    EXPECT_EQ(share(mesh, 0), 1) << n;
+    EXPECT_EQ(share(mesh, 100 * mesh->triangleCount()), 1) << n;
+    EXPECT_EQ(share(mesh, 20 * mesh->triangleCount()), 0) << n;
+  }
+  // A torus of a 100 000th of the mesh's size.
+  test::Raw raw = test::torus(40);
+  for (Eigen::Vector3d& v : raw.vertices) v *= 1e-5;
+  const std::size_t first = raw.vertices.size();
+  for (const double x : {-1.0, 0.0, 1.0}) raw.vertices.emplace_back(x, x * x, 1 - x);
+  raw.triangles.emplace_back(first, first + 1, first + 2);
+  EXPECT_LT(share(raw.mesh(), 0), 0.05);
+}
+
 // A sphere about the leaf of two large triangles meets far more cells than they do.
 TEST(Tree, MixedAnswersGrowAlongTheTrianglesOnly) {
   const std::vector<Eigen::Vector3d> corners{{-50, -50, 0}, {50, -50, 0}, {50, 50, 0}, {-50, 50, 0}};

@@ -8,6 +8,8 @@
 #include <vector>
 
 #include "meshes.h"
+#include "tree/bulk.h"
+#include "tree/cell_bounds.h"
 
 namespace bocst::tree {
 namespace {
@@ -65,7 +67,12 @@ TEST(TriangleLists, PackedAndKeptOnesGoAlongWithCopies) {
   for (std::uint32_t i = 0; i < 300; ++i) {
     Ids ids(1 + g() % PackedTriangles::kMostTriangles);
     for (auto& id : ids) id = static_cast<std::uint32_t>(g() % mesh->triangleCount());
-    const std::uint32_t plain = lists.add(ids.data(), ids.size()), packed = lists.addPacked(surface, plain),
+    BulkBuilder bulk;
+    bulk.build(surface, ids.data(), ids.size(), latticeBounds(surface));
+    PackedTriangles::Words words;
+    const std::size_t size = bulk.pack(0, static_cast<std::uint32_t>(ids.size()), words);
+    const std::uint32_t plain = lists.add(ids.data(), ids.size()),
+                        packed = lists.addPacked(ids.data(), ids.size(), words, size),
                         kept = lists.addDeviceList(1000 * i, {i, 7 * i}), copy = copies.addCopy(lists, packed),
                         kept_copy = copies.addCopy(lists, kept);
     PackedTriangles no, first, second;

@@ -3,14 +3,12 @@
 
 #include <algorithm>
 
+#include "simd/unroll.h"
+
 #undef HWY_TARGET_INCLUDE
 #define HWY_TARGET_INCLUDE "oracle/cpu/kernels.cpp"
 #include <hwy/foreach_target.h>
 #include <hwy/highway.h>
-
-// At -O2 the compiler keeps short loops over arrays of vectors, and with them the arrays in memory.
-#undef BOCST_UNROLL
-#define BOCST_UNROLL _Pragma("GCC unroll 8")
 
 HWY_BEFORE_NAMESPACE();
 namespace bocst::oracle::HWY_NAMESPACE {

@@ -11,7 +11,6 @@ struct TreeWalk::Scratch {
   bool leaves_started = false;
   LargeTriangles large[2];
   LargeTriangleLeaf<TreeSide> long_a, long_b;  // leaves of more triangles than those hold
-  bool grew = false;
 };
 
 bool TreeWalk::run(Visitor& visitor) {
@@ -22,20 +21,9 @@ bool TreeWalk::run(Visitor& visitor) {
   for (LargeTriangles& large : s.large) large.clear();
   s.long_a.clear();
   s.long_b.clear();
-  s.grew = false;
   // Each walk in a tree that is not whole brings the query nearer that builds it whole: see Tree::payRent().
   for (const TreeSide* side : {&a_, &b_}) side->tree().payRent(tree::Tree::kWalkRent);
-  const bool ended = search(s);
-  // A query that grew nodes packs no leaves: it took long enough.
-  if (!s.grew) {
-    if (s.leaves_started) {
-      a_.tree().packLeaves(s.leaves.looseOfA());
-      b_.tree().packLeaves(s.leaves.looseOfB());
-    }
-    a_.tree().packLeaves(s.large[0].loose());
-    b_.tree().packLeaves(s.large[1].loose());
-  }
-  return ended;
+  return search(s);
 }
 
 bool TreeWalk::search(Scratch& s) {
@@ -65,7 +53,6 @@ bool TreeWalk::search(Scratch& s) {
       s.deferred.dropIf([&](const auto& pair) { return cut->isBeyond(cut->leastOf(a_.volume(pair.a))); });
     }
     if (s.deferred.empty()) return false;
-    s.grew = true;
     s.deferred.grow(a_, b_, b_in_a_, may_end, push);
   }
 }

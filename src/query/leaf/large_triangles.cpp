@@ -49,7 +49,6 @@ void LargeTriangles::start(const TreeSide& other, tree::NodeRef leaf, const Simi
     ids_ = list.ids;
     count_ = list.count;
     BOCST_ASSERT(0 < count_ && count_ <= kCapacity);
-    loose_.push_back(leaf);
     readCorners(other, ids_, all(), raw_);
     read_ = all();
     placeTriangles(raw_, count_, place_, pack_);

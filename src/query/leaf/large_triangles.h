@@ -21,11 +21,7 @@ class LargeTriangles {
   void clear() {
     count_ = 0;
     known_ = 0;
-    loose_.clear();
   }
-
-  /// Leaves met in this walk whose corners the tree does not keep packed.
-  const std::vector<tree::NodeRef>& loose() const { return loose_; }
 
   /// Have these triangles of the leaf been placed?
   bool know(tree::NodeRef leaf, std::uint32_t which) const {
@@ -65,7 +61,6 @@ class LargeTriangles {
   RawTriangles raw_{};
   RawTriangles placed_;
   TriangleBounds bounds_;
-  std::vector<tree::NodeRef> loose_;
 };
 
 }  // namespace bocst::query

@@ -116,11 +116,7 @@ class LeafPacks {
   void clear() {
     ++walk_;
     used_ = 0;
-    loose_.clear();
   }
-
-  /// Leaves met in this walk whose corners the tree does not keep packed.
-  const std::vector<typename Side::Node>& loose() const { return loose_; }
 
   /// At most a pack of the leaf's triangles, from the one at `begin`; good until the next call.
   const Leaf& get(const Side& side, typename Side::Node node, std::size_t begin, const SimilarityTransform& to_other) {
@@ -166,7 +162,6 @@ class LeafPacks {
         leaf.error = packingError(packed) + 1.7321f * 2 * 0x1p-24f * leaf.pack.size;
         return;
       }
-      loose_.push_back(leaf.node);
     }
     corners_.clear();
     corners_.take(side, leaf.node, leaf.begin);
@@ -185,7 +180,6 @@ class LeafPacks {
   std::size_t used_ = 0;
   std::uint64_t walk_ = 1;
   LeafCorners<Side> corners_;
-  std::vector<typename Side::Node> loose_;
 };
 
 /// Leaves against leaves, triangle by triangle.
@@ -230,10 +224,6 @@ class LeafPairs {
   bool testLargeB(const A& a, typename A::Node node_a, const LargeTriangles& b, std::uint32_t which, F&& f) {
     return testLarge(leaves_a_, a, node_a, b, which, *b_in_a_, f);
   }
-
-  /// Leaves met in this walk that are worth to be packed.
-  const std::vector<typename A::Node>& looseOfA() const { return leaves_a_.loose(); }
-  const std::vector<typename B::Node>& looseOfB() const { return leaves_b_.loose(); }
 
  private:
   template <typename F>

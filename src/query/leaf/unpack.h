@@ -11,8 +11,10 @@ namespace bocst::query {
 /// motion does not turn, by packingError() and 2 u pack.size a coordinate. u = 2^-24.
 void unpackTriangles(const tree::PackedTriangles& packed, const PackMotion& motion, TrianglePack& pack);
 
-/// How far a packed corner may be from where it is, in lattice units: half a step along each axis. Less than a
-/// hundredth of a step covers that the middle of a leaf's box lies in the box but for a unit or a byte of the cell.
-inline float packingError(const tree::PackedTriangles& packed) { return 1.7321f * 0.504f * packed.step; }
+/// How far a packed corner may be from where it is, in lattice units. A hundredth of a step covers that the middle of a
+/// leaf's box lies in the box but for a unit or a byte of the cell.
+inline float packingError(const tree::PackedTriangles& packed) {
+  return 1.7321f * (tree::PackedTriangles::kError + 0.01f) * packed.step;
+}
 
 }  // namespace bocst::query
