@@ -275,11 +275,12 @@ void Tree::startPlaces(const BulkBuilder& bulk, NodeRef node, int level, std::ve
   places[0].level = level;
 }
 
-// Are leaves of what was built kept with their corners? Not if they are about to be replaced, or would fill the memory
-// budget.
+// Are leaves of what was built kept with their corners? Not if a build of the whole tree is about to replace them, or
+// if they would fill the memory budget.
 bool Tree::packs(const std::vector<BulkPlace>& places) const {
+  const bool is_part = !places[0].node.isRoot(), will_be_replaced = is_part && growsOnHost() && price_ != kNever;
   const bool fit = options_.memory_budget == 0 || kPackedBytes * surface_.triangle_count <= options_.memory_budget / 2;
-  return fit && (places[0].node.isRoot() || price_ == kNever);
+  return fit && !will_be_replaced;
 }
 
 ChildRef Tree::addLeaf(const BulkBuilder& bulk, std::uint32_t begin, std::uint32_t count, bool packed) {

@@ -15,6 +15,7 @@
 #include "oracle/reference.h"
 #include "query/sides/side.h"
 #include "sanitized.h"
+#include "tree/packed_share.h"
 
 namespace bocst {
 namespace {
@@ -122,27 +123,9 @@ TEST(Tree, LeavesOfAWholeTreeArePacked) {
     tree::Tree tree(mesh, options);
     tree.payRent(2 * mesh->triangleCount());
     EXPECT_TRUE(tree.buildIfDue());
-    std::size_t packed = 0, all = 0;
-    std::vector<tree::NodeRef> stack{tree::NodeRef()};
-    while (!stack.empty()) {
-      const tree::ChildRef ref = tree.childRef(stack.back());
-      stack.pop_back();
-      if (ref.tag() == tree::ChildRef::kBlock) {
-        for (int o = 0; o < 8; ++o) {
-          if ((tree.block(ref.index()).grey >> o & 1) != 0) stack.push_back(tree::NodeRef::octant(ref.index(), o));
-        }
-        continue;
-      }
-      EXPECT_EQ(ref.tag(), tree::ChildRef::kShortList);
-      const std::size_t count = tree.list(ref).count;
-      tree::PackedTriangles corners;
-      all += count;
-      if (!tree.lists().packed(ref.index(), corners)) continue;
-      EXPECT_EQ(corners.count, count);
-      packed += count;
-    }
-    EXPECT_EQ(all, mesh->triangleCount());
-    return static_cast<double>(packed) / static_cast<double>(all);
+    const test::PackedShare found = test::packedShareOf(tree);
+    EXPECT_EQ(found.all, mesh->triangleCount());
+    return static_cast<double>(found.packed) / static_cast<double>(found.all);
   };
   for (const std::size_t n : {std::size_t{3}, std::size_t{20}, std::size_t{80}}) {  // a leaf, below a sort, sorted
     const auto mesh = test::torus(n).mesh();
