@@ -12,6 +12,8 @@
 #include <type_traits>
 #include <utility>
 
+#include "simd/float4.h"
+
 namespace bocst::tree {
 namespace {
 
@@ -39,6 +41,13 @@ void store(const V4& from, float* to) {
   map = from;
 }
 V4 all(float x) { return V4::Constant(x); }
+// Not by Eigen's constructor of four numbers: it writes them to memory one by one, and then waits to read them as one.
+V4 rounded(const Eigen::Vector3d& p) {
+  const simd::Float4 v{static_cast<float>(p[0]), static_cast<float>(p[1]), static_cast<float>(p[2]), 0.0f};
+  V4 all;
+  std::memcpy(all.data(), &v, sizeof v);
+  return all;
+}
 
 float areaOf(const V4& lo, const V4& hi) {
   const V4 e = hi - lo;
@@ -58,7 +67,7 @@ void BulkBuilder::build(const oracle::Surface& surface, const std::uint32_t* ids
   const Eigen::Vector3d lo = region.min() - base_, hi = region.max() - base_;
   least_ << (lo.array() - 0.01).cast<float>(), -kInfinity;
   most_ << (hi.array() + 0.01).cast<float>(), kInfinity;
-  size_ = 0;
+  V4 reach = all(0);
   const Eigen::Vector3d origin = surface.lattice.origin();
   const double inverse_unit = surface.lattice.inverseUnit();
   const Mesh& mesh = *surface.mesh;
@@ -69,13 +78,12 @@ void BulkBuilder::build(const oracle::Surface& surface, const std::uint32_t* ids
     const Mesh::Indices& v = mesh.indices(ids[i]);
     V4 least = all(kInfinity), most = all(-kInfinity);
     for (std::size_t k = 0; k < 3; ++k) {
-      const Eigen::Vector3d p = (mesh.vertex(v[k]) - origin) * inverse_unit - base_;
-      const V4 at(static_cast<float>(p[0]), static_cast<float>(p[1]), static_cast<float>(p[2]), 0.0f);
+      const V4 at = rounded((mesh.vertex(v[k]) - origin) * inverse_unit - base_);
       store(at, &places_[kFloats * kept + 4 * k]);
       least = least.min(at);
       most = most.max(at);
     }
-    size_ = std::max(size_, least.abs().max(most.abs()).maxCoeff());
+    reach = reach.max(least.abs()).max(most.abs());
     least = least.max(least_);
     most = most.min(most_);
     if ((least > most).any()) continue;
@@ -87,6 +95,7 @@ void BulkBuilder::build(const oracle::Surface& surface, const std::uint32_t* ids
     const auto first = static_cast<std::uint32_t>(3 * i);
     own_corners_.push_back({first, first + 1, first + 2});
   }
+  size_ = reach.maxCoeff();
   count_ = kept;
   place_count_ = 3 * kept;
   cluster_count_ = 0;
@@ -108,8 +117,7 @@ void BulkBuilder::buildAll(const oracle::Surface& surface) {
   size_ = 1.001f * static_cast<float>(least.cwiseAbs().cwiseMax(most.cwiseAbs()).maxCoeff());
   makeRoom(count, vertices, count);
   for (std::size_t v = 0; v < vertices; ++v) {
-    const Eigen::Array3f p = place(mesh.vertex(v)).array().cast<float>();
-    store(V4(p[0], p[1], p[2], 0), &places_[4 * v]);
+    store(rounded(place(mesh.vertex(v))), &places_[4 * v]);
   }
 
   CurveCells cells;

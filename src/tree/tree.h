@@ -129,7 +129,7 @@ class Tree {
   /// The root grid knows the children of this frontier node.
   bool growsFromGrid(NodeRef node) const {
     const RootGrid* grid = grid_known_.load(std::memory_order_acquire);
-    return grid != nullptr && !isLoose(node) && cell(node).level < grid->level();
+    return grid != nullptr && !isLoose(node) && level(node) < grid->level();
   }
 
   /// The resident nodes where the oracle works, for a walk there; `nodes` is null where it takes none.
