@@ -9,6 +9,12 @@
 #include "tree/tree.h"
 
 namespace bocst::tree {
+namespace {
+
+/// Queries drop old branches when these have one block in so many.
+constexpr std::uint32_t kWorthwhileShare = 64;
+
+}  // namespace
 
 void Tree::collectTriangles(ChildRef ref, const lattice::Cell& cell, std::vector<std::uint32_t>& ids) const {
   if (ref.tag() == ChildRef::kBlock) {
@@ -33,8 +39,10 @@ ChildRef Tree::regained(ChildRef block, const lattice::Cell& cell, TriangleLists
   }
   std::vector<std::uint32_t> ids;
   collectTriangles(block, cell, ids);
-  std::sort(ids.begin(), ids.end());
-  ids.erase(std::unique(ids.begin(), ids.end()), ids.end());
+  if (!blocks_[block.index()].isLoose()) {  // lanes share no triangles, cells do
+    std::sort(ids.begin(), ids.end());
+    ids.erase(std::unique(ids.begin(), ids.end()), ids.end());
+  }
   return ChildRef(ids.size() <= kMaxLeafTriangles ? ChildRef::kShortList : ChildRef::kList,
                   lists.add(ids.data(), ids.size()));
 }
@@ -150,15 +158,17 @@ void Tree::keepOnly(const std::vector<std::uint8_t>& keep) {
   countBytes();
 }
 
-void Tree::pruneAlone(std::int64_t now, bool budget_only) {
+void Tree::pruneAlone(std::int64_t now, Pruning pruning) {
+  const bool budget_only = pruning == Pruning::kBudget;
   const std::int64_t ttl = std::chrono::duration_cast<std::chrono::nanoseconds>(options_.ttl).count();
   const auto is_old = [&](std::uint32_t block) { return now - last_use_[block].load(std::memory_order_relaxed) > ttl; };
-  const auto some_are_old = [&] {
-    std::uint32_t i = blocks_.size();
-    while (i > 0 && !is_old(i - 1)) --i;
-    return i > 0;
+  const auto are_enough_old = [&] {
+    // What stays is copied, so for few blocks a query of a large tree would pay much.
+    std::uint32_t least = pruning == Pruning::kWorthwhile ? std::max(1u, blocks_.size() / kWorthwhileShare) : 1;
+    for (std::uint32_t i = blocks_.size(); i > 0 && least > 0; --i) least -= is_old(i - 1);
+    return least == 0;
   };
-  if (!budget_only && ttl > 0 && root_.load(std::memory_order_relaxed).tag() == ChildRef::kBlock && some_are_old()) {
+  if (!budget_only && ttl > 0 && root_.load(std::memory_order_relaxed).tag() == ChildRef::kBlock && are_enough_old()) {
     // Children come after their parents in the pool, so one backward pass sees every child first.
     std::vector<std::uint8_t> keep(blocks_.size(), 1);
     bool some = false;
@@ -227,7 +237,7 @@ void Tree::afterQuery(std::int64_t now) {
   const std::unique_lock<thread::ShardedLock> alone(query_lock_, std::try_to_lock);
   if (!alone.owns_lock()) return;
   if (refits) refit();
-  if (over_budget || time_to) pruneAlone(now, !time_to);
+  if (over_budget || time_to) pruneAlone(now, time_to ? Pruning::kWorthwhile : Pruning::kBudget);
 }
 
 }  // namespace bocst::tree

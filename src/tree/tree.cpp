@@ -463,7 +463,7 @@ void Tree::gatherNode(NodeRef node, const lattice::Cell& cell, std::vector<std::
 
 void Tree::prune(Clock::time_point now) {
   const std::lock_guard<thread::ShardedLock> alone(query_lock_);
-  pruneAlone(nanoseconds(now), false);
+  pruneAlone(nanoseconds(now), Pruning::kAll);
 }
 
 void Tree::updateVertices(std::vector<Eigen::Vector3d> vertices) {

@@ -250,7 +250,12 @@ class Tree {
   ChildRef addList(const std::uint32_t* ids, std::size_t count, bool leaf);
   void setChild(NodeRef node, ChildRef ref);
   void refit();
-  void pruneAlone(std::int64_t now, bool budget_only);
+  enum class Pruning {
+    kBudget,      ///< What exceeds the memory budget only.
+    kWorthwhile,  ///< And branches unused for longer than ttl, if there are enough for the work that it is.
+    kAll,         ///< And all of these.
+  };
+  void pruneAlone(std::int64_t now, Pruning pruning);
   void applyBudget();
   void dropBoxes();
   void keepOnly(const std::vector<std::uint8_t>& keep);
