@@ -14,11 +14,6 @@ void TriangleList::appendTo(std::vector<std::uint32_t>& all) const {
   for (std::size_t i = 0; i < count; ++i) all.push_back(ids[i]);
 }
 
-std::size_t TriangleLists::idWords(std::uint32_t flags) {
-  const std::size_t count = flags & kCount;
-  return (flags & kNarrow) != 0 ? 1 + (count + 1) / 2 : count;
-}
-
 std::uint32_t TriangleLists::flagsOf(const std::uint32_t* ids, std::size_t count) {
   if (count > kCount) throw std::length_error("bocst: a node of more than 2^29 triangles");
   const auto length = static_cast<std::uint32_t>(count);
@@ -50,10 +45,11 @@ std::uint32_t TriangleLists::add(const std::uint32_t* ids, std::size_t count) {
 
 std::uint32_t TriangleLists::addPacked(const std::uint32_t* ids, std::size_t count,
                                        const PackedTriangles::Words& packed, std::size_t size) {
-  const std::uint32_t flags = flagsOf(ids, count), index = words_.append(1 + size + idWords(flags));
+  const std::uint32_t flags = flagsOf(ids, count), index = words_.append(1 + idWords(flags) + size);
   std::uint32_t* const words = &words_[index];
   words[0] = flags | kPacked;
-  writeIds(ids, count, (flags & kNarrow) != 0, std::copy_n(packed.begin(), size, words + 1));
+  writeIds(ids, count, (flags & kNarrow) != 0, words + 1);
+  std::copy_n(packed.begin(), size, words + 1 + idWords(flags));
   return index;
 }
 

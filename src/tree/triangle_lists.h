@@ -61,7 +61,7 @@ class TriangleLists {
     const std::uint32_t flags = words[0], count = flags & kCount;
     if ((flags & kOnDevice) != 0) return {{}, count};
     const bool narrow = (flags & kNarrow) != 0;
-    return {{words + 1 + ((flags & kPacked) != 0 ? packedAt(words).words() : 0), narrow}, count};
+    return {{words + 1, narrow}, count};
   }
   /// False where nobody has packed it.
   bool packed(std::uint32_t list, PackedTriangles& triangles) const {
@@ -92,16 +92,19 @@ class TriangleLists {
  private:
   using Words = Pool<std::uint32_t, 10>;
 
-  // A list is flags and a length, PackedTriangles if it is packed, then the numbers: all as they are or, narrow, the
-  // least and 16-bit steps from it. Kept: flags and length, the place.
+  // A list is flags and a length, then the numbers: all as they are or, narrow, the least and 16-bit steps from it;
+  // packed, then PackedTriangles. Kept: flags and length, the place.
   static constexpr std::uint32_t kOnDevice = 0x80000000u, kPacked = 0x40000000u, kNarrow = 0x20000000u,
                                  kCount = 0x1fffffffu;
   static constexpr std::size_t kDeviceListWords = 3;
 
-  static std::size_t idWords(std::uint32_t flags);
+  static std::size_t idWords(std::uint32_t flags) {
+    const std::size_t count = flags & kCount;
+    return (flags & kNarrow) != 0 ? 1 + (count + 1) / 2 : count;
+  }
   static std::uint32_t flagsOf(const std::uint32_t* ids, std::size_t count);
   static void writeIds(const std::uint32_t* ids, std::size_t count, bool narrow, std::uint32_t* to);
-  static PackedTriangles packedAt(const std::uint32_t* list) { return {list + 1, list[0] & kCount}; }
+  static PackedTriangles packedAt(const std::uint32_t* list) { return {list + 1 + idWords(list[0]), list[0] & kCount}; }
 
   Words words_;
 };
