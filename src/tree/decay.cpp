@@ -14,6 +14,10 @@ namespace {
 /// Queries drop old branches when these have one block in so many.
 constexpr std::uint32_t kWorthwhileShare = 64;
 
+/// While a model is used, queries keep lanes' blocks of more triangles: they take less than a byte a triangle, and
+/// without them a query that comes back builds all that was below.
+constexpr std::uint32_t kFewTriangles = 256;
+
 }  // namespace
 
 void Tree::collectTriangles(ChildRef ref, const lattice::Cell& cell, std::vector<std::uint32_t>& ids) const {
@@ -169,8 +173,10 @@ void Tree::pruneAlone(std::int64_t now, Pruning pruning) {
     return least == 0;
   };
   if (!budget_only && ttl > 0 && root_.load(std::memory_order_relaxed).tag() == ChildRef::kBlock && are_enough_old()) {
+    const bool is_used = pruning == Pruning::kWorthwhile && !is_old(root_.load(std::memory_order_relaxed).index());
     // Children come after their parents in the pool, so one backward pass sees every child first.
     std::vector<std::uint8_t> keep(blocks_.size(), 1);
+    std::vector<std::uint32_t> triangles(blocks_.size(), 0);
     bool some = false;
     for (std::uint32_t i = blocks_.size(); i-- > 0;) {
       const Block& block = blocks_[i];
@@ -178,11 +184,14 @@ void Tree::pruneAlone(std::int64_t now, Pruning pruning) {
       for (int o = 0; o < 8; ++o) {
         if ((block.grey >> o & 1) == 0) continue;
         const ChildRef child = block.child[o].load(std::memory_order_relaxed);
+        if (child.isList()) triangles[i] += list(child).count;
         if (child.tag() != ChildRef::kBlock) continue;
         deepest = false;
+        triangles[i] += triangles[child.index()];
         if (!keep[child.index()]) last_use_[i].store(now, std::memory_order_relaxed);  // its own time starts (3.1)
       }
-      if (deepest && is_old(i)) {
+      const bool is_cheap_to_keep = is_used && block.isLoose() && triangles[i] > kFewTriangles;
+      if (deepest && is_old(i) && !is_cheap_to_keep) {
         keep[i] = 0;
         some = true;
       }

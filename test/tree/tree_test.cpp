@@ -190,6 +190,47 @@ TEST(Tree, DecaysLevelByLevelToItsRoot) {
   }
 }
 
+// Blocks of many triangles are few: while queries use the tree, they stay, so that what comes back is built quickly.
+TEST(Tree, AWholeTreeInUseKeepsBlocksOfManyTriangles) {
+  FakeClock clock;
+  Options options;
+  options.clock = clock.function();
+  options.oracle = OracleKind::kCpu;
+  Modeld a(test::torus(100).mesh(), options);
+  const Modeld b(test::torus(10, 0.05).mesh(), options);
+  tree::Tree& tree = fcl_adapter::treeOf(a);
+  tree.payRent(2 * a.mesh()->triangleCount());
+  ASSERT_TRUE(touching(a, b, kHit));
+  const Statistics whole = a.statistics();
+  ASSERT_GE(whole.built_triangles, a.mesh()->triangleCount());
+  for (int i = 0; i < 40; ++i) {
+    clock.now += milliseconds(600);
+    ASSERT_TRUE(touching(a, b, kHit));
+  }
+  EXPECT_LT(a.statistics().resident_nodes, whole.resident_nodes / 2) << "the rest is dropped";
+  std::size_t most = 0;
+  std::vector<tree::NodeRef> stack{tree::NodeRef()};
+  while (!stack.empty()) {
+    const tree::ChildRef ref = tree.childRef(stack.back());
+    stack.pop_back();
+    if (ref.isList()) most = std::max<std::size_t>(most, tree.list(ref).count);
+    if (ref.tag() != tree::ChildRef::kBlock) continue;
+    for (int o = 0; o < 8; ++o) {
+      if ((tree.block(ref.index()).grey >> o & 1) != 0) stack.push_back(tree::NodeRef::octant(ref.index(), o));
+    }
+  }
+  EXPECT_LE(most, 256u);
+  EXPECT_GT(most, 64u);
+  const std::size_t kept = a.statistics().resident_nodes;
+  a.prune();
+  EXPECT_LT(a.statistics().resident_nodes, kept) << "prune() drops all that is old";
+  for (int i = 0; i < 30; ++i) {
+    clock.now += milliseconds(2001);
+    a.prune();
+  }
+  EXPECT_EQ(a.statistics().resident_nodes, 1u);
+}
+
 TEST(Tree, WhatIsUsedStays) {
   FakeClock clock;
   Options options;
