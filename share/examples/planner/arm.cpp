@@ -31,6 +31,7 @@
 #include <cmath>
 #include <cstdio>
 #include <functional>
+#include <map>
 #include <memory>
 #include <random>
 #include <stdexcept>
@@ -113,15 +114,36 @@ struct World {
 
 const double* jointsOf(const ob::State* state) { return state->as<ob::RealVectorStateSpace::StateType>()->values; }
 
+using GeometryPtr = std::shared_ptr<fcl::CollisionGeometryd>;
+
+/// One geometry for each mesh: what stands in several places shares it.
+class Geometries {
+ public:
+  using Make = std::function<GeometryPtr(const MeshPtr&)>;
+
+  explicit Geometries(Make make) : make_(std::move(make)) {}
+  const GeometryPtr& of(const MeshPtr& mesh) {
+    GeometryPtr& geometry = made_[mesh];
+    if (geometry == nullptr) geometry = make_(mesh);
+    return geometry;
+  }
+
+ private:
+  Make make_;
+  std::map<MeshPtr, GeometryPtr> made_;
+};
+
+GeometryPtr makeModel(const MeshPtr& mesh) { return std::make_shared<bocst::Modeld>(mesh); }
+
 /// FCL's managers with any geometries: one state at a time.
 class Managers {
  public:
-  using Make = std::function<std::shared_ptr<fcl::CollisionGeometryd>(const MeshPtr&)>;
-
-  Managers(const World& world, const Make& make) : poses_(world.links.size()) {
-    for (const MeshPtr& link : world.links) links_.push_back(std::make_unique<fcl::CollisionObjectd>(make(link)));
+  Managers(const World& world, Geometries geometries) : poses_(world.links.size()) {
+    for (const MeshPtr& link : world.links) {
+      links_.push_back(std::make_unique<fcl::CollisionObjectd>(geometries.of(link)));
+    }
     for (const Thing& thing : world.things) {
-      things_.push_back(std::make_unique<fcl::CollisionObjectd>(make(thing.mesh), thing.X_WT));
+      things_.push_back(std::make_unique<fcl::CollisionObjectd>(geometries.of(thing.mesh), thing.X_WT));
     }
     for (std::size_t i = 0; i < links_.size(); ++i) {
       links_[i]->setUserData(reinterpret_cast<void*>(i));
@@ -163,7 +185,7 @@ class Managers {
   Poses poses_;
 };
 
-std::shared_ptr<fcl::CollisionGeometryd> makeBvh(const MeshPtr& mesh) {
+GeometryPtr makeBvh(const MeshPtr& mesh) {
   std::vector<fcl::Triangle> triangles(mesh->triangleCount());
   for (std::size_t t = 0; t < triangles.size(); ++t) triangles[t] = mesh->triangle(t);
   auto bvh = std::make_shared<fcl::BVHModel<fcl::OBBRSSd>>();
@@ -273,8 +295,9 @@ Outcome solve(const World& world, Kind kind, int plans, unsigned seed) {
   if (kind == Kind::kScene) {
     bocst::Scened scene;
     std::vector<bocst::Id> ids;
-    for (const MeshPtr& link : world.links) ids.push_back(scene.addMoving(std::make_shared<bocst::Modeld>(link)));
-    for (const Thing& thing : world.things) scene.addFixed(std::make_shared<bocst::Modeld>(thing.mesh), thing.X_WT);
+    Geometries geometries(makeModel);
+    for (const MeshPtr& link : world.links) ids.push_back(scene.addMoving(geometries.of(link)));
+    for (const Thing& thing : world.things) scene.addFixed(geometries.of(thing.mesh), thing.X_WT);
     for (std::size_t i = 0; i < ids.size(); ++i) {
       for (std::size_t j = 0; j < i; ++j) {
         if (World::mayTouch(i, j)) scene.ignore(ids[i], ids[j]);
@@ -288,9 +311,7 @@ Outcome solve(const World& world, Kind kind, int plans, unsigned seed) {
     };
     plan(is_free, &scene, plans, seed, outcome);
   } else {
-    Managers managers(
-        world, kind == Kind::kBvh ? Managers::Make(makeBvh)
-                                  : [](const MeshPtr& mesh) { return std::make_shared<bocst::Modeld>(mesh); });
+    Managers managers(world, Geometries(kind == Kind::kBvh ? makeBvh : makeModel));
     outcome.set_up = secondsSince(start);
     plan([&](const double* joints) { return managers.isFree(joints); }, nullptr, plans, seed, outcome);
   }
