@@ -176,21 +176,20 @@ void Tree::pruneAlone(std::int64_t now, Pruning pruning) {
     const bool is_used = pruning == Pruning::kWorthwhile && !is_old(root_.load(std::memory_order_relaxed).index());
     // Children come after their parents in the pool, so one backward pass sees every child first.
     std::vector<std::uint8_t> keep(blocks_.size(), 1);
-    std::vector<std::uint32_t> triangles(blocks_.size(), 0);
     bool some = false;
     for (std::uint32_t i = blocks_.size(); i-- > 0;) {
       const Block& block = blocks_[i];
       bool deepest = true;
+      std::uint32_t triangles = 0;  // of a deepest one
       for (int o = 0; o < 8; ++o) {
         if ((block.grey >> o & 1) == 0) continue;
         const ChildRef child = block.child[o].load(std::memory_order_relaxed);
-        if (child.isList()) triangles[i] += list(child).count;
+        if (child.isList()) triangles += list(child).count;
         if (child.tag() != ChildRef::kBlock) continue;
         deepest = false;
-        triangles[i] += triangles[child.index()];
         if (!keep[child.index()]) last_use_[i].store(now, std::memory_order_relaxed);  // its own time starts (3.1)
       }
-      const bool is_cheap_to_keep = is_used && block.isLoose() && triangles[i] > kFewTriangles;
+      const bool is_cheap_to_keep = is_used && block.isLoose() && triangles > kFewTriangles;
       if (deepest && is_old(i) && !is_cheap_to_keep) {
         keep[i] = 0;
         some = true;

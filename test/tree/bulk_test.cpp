@@ -58,6 +58,10 @@ std::vector<std::shared_ptr<const Mesh>> hardMeshes() {
   add(41, [&](std::size_t i) -> Eigen::Vector3d {
     return i == 40 ? point(1) : Eigen::Vector3d(static_cast<double>(i) * 1e-45, 0, 0);
   });  // points so close that a scale to part them is infinite in float
+  add(120, [&](std::size_t i) -> Eigen::Vector3d {
+    const double place = std::exp2(-static_cast<double>(i) / 1.5);
+    return Eigen::Vector3d(place, 0, 0) + point(place / 50);
+  });  // ever smaller ones: what is dense is best left in one part
   add(33, [&](std::size_t) { return point(1); });
   add(32, [&](std::size_t) { return point(1); });
   add(1, [&](std::size_t) { return point(1); });
@@ -142,6 +146,9 @@ TEST(Bulk, LanesPartitionTheirBlock) {
           EXPECT_LE(child.lane[c].begin + child.lane[c].count, lane.begin + lane.count);
         }
         EXPECT_EQ(count, lane.count);
+        for (std::uint32_t c = 0; c < child.lanes; ++c) {
+          EXPECT_LT(2 * child.lane[c].count, count + 1) << "the tree is not as deep as kMostLooseDepth allows for";
+        }
       }
     }
   }
