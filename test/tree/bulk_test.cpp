@@ -135,8 +135,11 @@ TEST(Bulk, LanesPartitionTheirBlock) {
     BulkBuilder bulk;
     buildAll(bulk, surfaceOf(mesh));
     for (const BulkBuilder::Block& block : bulk.blocks()) {
+      std::uint32_t all = 0;
+      for (std::uint32_t o = 0; o < block.lanes; ++o) all += block.lane[o].count;
       for (std::uint32_t o = 0; o < block.lanes; ++o) {
         const BulkBuilder::Lane& lane = block.lane[o];
+        EXPECT_LE(2 * lane.count, all) << "else the tree may be deeper than kMostLooseDepth";
         if (lane.block == BulkBuilder::kNone) continue;
         const BulkBuilder::Block& child = bulk.blocks()[lane.block];
         std::uint32_t count = 0;
@@ -146,9 +149,6 @@ TEST(Bulk, LanesPartitionTheirBlock) {
           EXPECT_LE(child.lane[c].begin + child.lane[c].count, lane.begin + lane.count);
         }
         EXPECT_EQ(count, lane.count);
-        for (std::uint32_t c = 0; c < child.lanes; ++c) {
-          EXPECT_LT(2 * child.lane[c].count, count + 1) << "the tree is not as deep as kMostLooseDepth allows for";
-        }
       }
     }
   }
