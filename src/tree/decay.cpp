@@ -166,36 +166,36 @@ void Tree::pruneAlone(std::int64_t now, Pruning pruning) {
   const bool budget_only = pruning == Pruning::kBudget;
   const std::int64_t ttl = std::chrono::duration_cast<std::chrono::nanoseconds>(options_.ttl).count();
   const auto is_old = [&](std::uint32_t block) { return now - last_use_[block].load(std::memory_order_relaxed) > ttl; };
-  const auto are_enough_old = [&] {
-    // What stays is copied, so for few blocks a query of a large tree would pay much.
-    std::uint32_t least = pruning == Pruning::kWorthwhile ? std::max(1u, blocks_.size() / kWorthwhileShare) : 1;
-    for (std::uint32_t i = blocks_.size(); i > 0 && least > 0; --i) least -= is_old(i - 1);
-    return least == 0;
-  };
-  if (!budget_only && ttl > 0 && root_.load(std::memory_order_relaxed).tag() == ChildRef::kBlock && are_enough_old()) {
+  if (!budget_only && ttl > 0 && root_.load(std::memory_order_relaxed).tag() == ChildRef::kBlock) {
     const bool is_used = pruning == Pruning::kWorthwhile && !is_old(root_.load(std::memory_order_relaxed).index());
-    // Children come after their parents in the pool, so one backward pass sees every child first.
+    // What stays is copied, so for few blocks a query of a large tree would pay much.
+    const std::uint32_t least = pruning == Pruning::kWorthwhile ? std::max(1u, blocks_.size() / kWorthwhileShare) : 1;
+    std::uint32_t dropped = 0;
     std::vector<std::uint8_t> keep(blocks_.size(), 1);
-    bool some = false;
-    for (std::uint32_t i = blocks_.size(); i-- > 0;) {
+    for (std::uint32_t i = 0; i < blocks_.size(); ++i) {
+      if (!is_old(i)) continue;
       const Block& block = blocks_[i];
-      bool deepest = true;
-      std::uint32_t triangles = 0;  // of a deepest one
+      bool is_deepest = true;
+      std::uint32_t triangles = 0;
       for (int o = 0; o < 8; ++o) {
         if ((block.grey >> o & 1) == 0) continue;
         const ChildRef child = block.child[o].load(std::memory_order_relaxed);
         if (child.isList()) triangles += list(child).count;
-        if (child.tag() != ChildRef::kBlock) continue;
-        deepest = false;
-        if (!keep[child.index()]) last_use_[i].store(now, std::memory_order_relaxed);  // its own time starts (3.1)
+        is_deepest &= child.tag() != ChildRef::kBlock;
       }
       const bool is_cheap_to_keep = is_used && block.isLoose() && triangles > kFewTriangles;
-      if (deepest && is_old(i) && !is_cheap_to_keep) {
-        keep[i] = 0;
-        some = true;
-      }
+      if (!is_deepest || is_cheap_to_keep) continue;
+      keep[i] = 0;
+      ++dropped;
     }
-    if (some) keepOnly(keep);
+    if (dropped >= least) {
+      for (std::uint32_t i = 0; i < blocks_.size(); ++i) {
+        const NodeRef parent = records_[i].parent;
+        // The parent's own time starts (3.1).
+        if (!keep[i] && !parent.isRoot()) last_use_[parent.block()].store(now, std::memory_order_relaxed);
+      }
+      keepOnly(keep);
+    }
   }
   if (!budget_only && ttl > 0 && boxes_ != nullptr && now - boxes_used_.load(std::memory_order_relaxed) > ttl) {
     dropBoxes();

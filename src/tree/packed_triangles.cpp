@@ -72,7 +72,7 @@ std::size_t PackedTriangles::pack(const CornerRows& rows, std::size_t begin, std
   const std::size_t count = places.count(), size = PackedTriangles::words(triangles, count);
   words[0] = static_cast<std::uint32_t>(count) | exponent >> 23 << 8 | at(0) << 16;
   words[1] = at(1) | at(2) << 16;
-  words[size - 2] = words[size - 1] = 0;
+  std::fill_n(words.begin() + static_cast<std::ptrdiff_t>(size) - 3, 3, 0u);  // what no corner fills
   std::array<std::uint16_t, 3 * kMostPlaces> places_by_axis;
   for (std::size_t c = 0; c < 3; ++c) {
     for (std::size_t i = 0; i < count; ++i) {
