@@ -85,6 +85,7 @@ class TriangleLists {
                           std::size_t size);
   std::uint32_t addCopy(const TriangleLists& from, std::uint32_t list);
 
+  bool isHalfFull() const { return words_.size() > Words::kMost / 2; }
   std::size_t bytes() const { return words_.bytes(); }
   void clear() { words_.clear(); }
   void swap(TriangleLists& other) { words_.swap(other.words_); }

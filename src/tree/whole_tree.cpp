@@ -27,7 +27,7 @@ constexpr std::size_t kRent = 8;
 // Queries grow parts for longer while the helper thread builds; should it not come to it, a query still builds the
 // tree.
 constexpr std::size_t kRentAhead = 1;
-// A whole tree with the corners of its leaves takes so many bytes a triangle, at most.
+// A whole tree with the corners of its leaves takes about so many bytes a triangle; of a soup, the most.
 constexpr std::size_t kPackedBytes = 24;
 // What a thread keeps of a build's memory for the next one, in triangles.
 constexpr std::size_t kMostKept = 1 << 17;
@@ -286,7 +286,8 @@ bool Tree::packs(const std::vector<BulkPlace>& places) const {
 ChildRef Tree::addLeaf(const BulkBuilder& bulk, std::uint32_t begin, std::uint32_t count, bool packed) {
   const std::uint32_t* const ids = bulk.ids().data() + begin;
   PackedTriangles::Words words;
-  const std::size_t size = packed && count > 0 ? bulk.pack(begin, count, words) : 0;
+  // Lists without corners always have room.
+  const std::size_t size = packed && count > 0 && !lists_.isHalfFull() ? bulk.pack(begin, count, words) : 0;
   return {ChildRef::kShortList, size > 0 ? lists_.addPacked(ids, count, words, size) : lists_.add(ids, count)};
 }
 
