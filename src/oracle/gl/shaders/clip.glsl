@@ -20,8 +20,7 @@ void cut(inout Polygon p, int axis, float bound, float sign) {
     if (da <= 0.0 && q.count < 9) q.corners[q.count++] = a;
     if (((da < 0.0 && db > 0.0) || (da > 0.0 && db < 0.0)) && q.count < 9) {
       vec3 x = a + (da / (da - db)) * (b - a);
-      x[axis] = bound;
-      q.corners[q.count++] = x;
+      q.corners[q.count++] = mix(x, vec3(bound), equal(ivec3(0, 1, 2), ivec3(axis)));
     }
   }
   p = q;

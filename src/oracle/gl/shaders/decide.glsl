@@ -13,7 +13,7 @@ bool triangleMeetsCube(dvec3 corners[3], dvec3 center, double side) {
   }
   for (int k = 0; k < 3; ++k) e[k] = corners[(k + 1) % 3] - corners[k];
 
-  precise dvec3 n, size;
+  precise double n[3], size[3];
   for (int k = 0; k < 3; ++k) {
     int i = (k + 1) % 3, j = (k + 2) % 3;
     precise double a = e[0][i] * e[1][j], b = e[0][j] * e[1][i];

@@ -11,7 +11,8 @@ void main() {
   if (cell >= u_cell_count) return;
   for (uint i = 0u; i < kBoundsWords; ++i) row[i] = 0u;
   uint grey = states[state(cell, kGrey)];
-  uvec3 own_lo = uvec3(2u * kBoxSteps + 1u), own_hi = uvec3(0u);
+  uint own_lo[3] = uint[3](2u * kBoxSteps + 1u, 2u * kBoxSteps + 1u, 2u * kBoxSteps + 1u);
+  uint own_hi[3] = uint[3](0u, 0u, 0u);
   for (int o = 0; o < 8; ++o) {
     if ((grey >> o & 1u) == 0u) continue;
     for (int k = 0; k < 3; ++k) {

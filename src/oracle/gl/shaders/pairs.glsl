@@ -52,12 +52,10 @@ void sphereOf(int t, Node node, out vec3 center, out float radius) {
 }
 
 vec3 placed(vec3 p) {
-  vec3 q;
-  for (uint j = 0u; j < 3u; ++j) {
-    uint row = kPairRotation + 3u * j;
-    q[j] = number(kPairShift + j) + number(row) * p.x + number(row + 1u) * p.y + number(row + 2u) * p.z;
-  }
-  return q;
+  const uint r = kPairRotation, s = kPairShift;
+  return vec3(number(s), number(s + 1u), number(s + 2u)) + vec3(number(r), number(r + 3u), number(r + 6u)) * p.x +
+         vec3(number(r + 1u), number(r + 4u), number(r + 7u)) * p.y +
+         vec3(number(r + 2u), number(r + 5u), number(r + 8u)) * p.z;
 }
 
 void found(uint what) { atomicOr(s_found, what); }
