@@ -4,7 +4,6 @@
 #include <bocst/oracle.h>
 
 #include <algorithm>
-#include <cstring>
 
 namespace bocst::oracle::gl {
 namespace {
@@ -42,29 +41,13 @@ void Buffer::write(std::size_t offset, std::size_t bytes, const void* data) {
   glBufferSubData(kAnyTarget, static_cast<GLintptr>(offset), static_cast<GLsizeiptr>(bytes), data);
 }
 
-void Buffer::read(std::size_t offset, std::size_t bytes, void* data) const {
-  if (bytes == 0) return;
-  glBindBuffer(kAnyTarget, name());
-  glGetBufferSubData(kAnyTarget, static_cast<GLintptr>(offset), static_cast<GLsizeiptr>(bytes), data);
-}
-
-bool Buffer::holds(std::size_t offset, std::size_t bytes, const void* data) const {
-  char found[256];
-  const std::size_t some = std::min(bytes, sizeof(found));
-  for (const std::size_t at : {std::size_t{0}, (bytes - some) / 2, bytes - some}) {
-    read(offset + at, some, found);
-    if (std::memcmp(found, static_cast<const char*>(data) + at, some) != 0) return false;
-  }
-  return true;
-}
-
 void Buffer::clear(std::size_t bytes) {
   const GLuint zero = 0;
   glBindBuffer(kAnyTarget, name());
   glClearBufferSubData(kAnyTarget, GL_R32UI, 0, static_cast<GLsizeiptr>(bytes), GL_RED_INTEGER, GL_UNSIGNED_INT, &zero);
 }
 
-void Staging::copy(const Buffer& from, std::size_t bytes) {
+void Staging::copy(const Buffer& from, std::size_t begin, std::size_t bytes) {
   if (mapped_ != nullptr && !stays_mapped_) {
     glBindBuffer(kAnyTarget, name_);
     glUnmapBuffer(kAnyTarget);
@@ -92,7 +75,7 @@ void Staging::copy(const Buffer& from, std::size_t bytes) {
   copied_ = bytes;
   glBindBuffer(GL_COPY_READ_BUFFER, from.name());
   glBindBuffer(kAnyTarget, name_);
-  glCopyBufferSubData(GL_COPY_READ_BUFFER, kAnyTarget, 0, 0, static_cast<GLsizeiptr>(bytes));
+  glCopyBufferSubData(GL_COPY_READ_BUFFER, kAnyTarget, static_cast<GLintptr>(begin), 0, static_cast<GLsizeiptr>(bytes));
 }
 
 const void* Staging::take() {

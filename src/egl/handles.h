@@ -44,7 +44,8 @@ using VertexArray = Handle<detail::makeArray, detail::endArray>;
 using Framebuffer = Handle<detail::makeFramebuffer, detail::endFramebuffer>;
 using Renderbuffer = Handle<detail::makeRenderbuffer, detail::endRenderbuffer>;
 
-/// A buffer object that knows its size. @throws OracleError when the device has no memory for it.
+/// A buffer object that knows its size. The host reads it by Staging: after one glGetBufferSubData, a driver may keep all
+/// of a buffer in host memory (NVIDIA's does, and then moves it at each use). @throws OracleError when the device has no memory for it.
 class Buffer {
  public:
   Buffer() = default;
@@ -56,9 +57,6 @@ class Buffer {
   /// At least so many bytes; what was in it is lost where it had fewer.
   void reserve(std::size_t bytes);
   void write(std::size_t offset, std::size_t bytes, const void* data);
-  void read(std::size_t offset, std::size_t bytes, void* data) const;
-  /// Are the bytes there that were written? A few at both ends and in the middle are looked at.
-  bool holds(std::size_t offset, std::size_t bytes, const void* data) const;
   /// All bytes to zero from the start on.
   void clear(std::size_t bytes);
 
@@ -76,8 +74,8 @@ class Staging {
   Staging(const Staging&) = delete;
   Staging& operator=(const Staging&) = delete;
 
-  /// Starts to copy the first bytes of a buffer; what take() gave before is gone.
-  void copy(const Buffer& from, std::size_t bytes);
+  /// Starts to copy bytes of a buffer; what take() gave before is gone.
+  void copy(const Buffer& from, std::size_t begin, std::size_t bytes);
   /// What was copied, once the device has done all that it was told. @throws OracleError when it cannot be mapped.
   const void* take();
 

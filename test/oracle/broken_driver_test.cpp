@@ -40,8 +40,7 @@ struct Fault {
     return at == kEvery || at == call || (stays && at >= 0 && call > at);
   }
 };
-Fault g_dispatch, g_half_dispatch, g_copy, g_write, g_read, g_clear, g_fence, g_reset, g_memory, g_map, g_draw,
-    g_uniform;
+Fault g_dispatch, g_half_dispatch, g_copy, g_write, g_clear, g_fence, g_reset, g_memory, g_map, g_draw, g_uniform;
 
 // The driver's own functions, once libepoxy has found them.
 PFNGLDISPATCHCOMPUTEPROC g_real_dispatch;
@@ -50,7 +49,7 @@ PFNGLBUFFERSUBDATAPROC g_real_write;
 PFNGLGETBUFFERSUBDATAPROC g_real_read;
 PFNGLCLEARBUFFERSUBDATAPROC g_real_clear;
 PFNGLCLIENTWAITSYNCPROC g_real_wait;
-PFNGLGETGRAPHICSRESETSTATUSPROC g_real_reset;
+PFNGLGETGRAPHICSRESETSTATUSPROC g_real_reset, g_real_reset_khr;
 PFNGLBUFFERDATAPROC g_real_data;
 PFNGLBUFFERSTORAGEPROC g_real_storage;
 PFNGLMAPBUFFERRANGEPROC g_real_map;
@@ -70,7 +69,8 @@ void write(GLenum target, GLintptr at, GLsizeiptr size, const void* data) {
   if (!g_write.now()) g_real_write(target, at, size, data);
 }
 void read(GLenum target, GLintptr at, GLsizeiptr size, void* to) {
-  if (!g_read.now()) g_real_read(target, at, size, to);
+  ADD_FAILURE() << "after glGetBufferSubData a driver may keep the buffer in host memory";
+  g_real_read(target, at, size, to);
 }
 void clear(GLenum target, GLenum internal, GLintptr at, GLsizeiptr size, GLenum format, GLenum type, const void* data) {
   if (!g_clear.now()) g_real_clear(target, internal, at, size, format, type, data);
@@ -81,6 +81,8 @@ GLenum wait(GLsync sync, GLbitfield flags, GLuint64 time) {
   return GL_TIMEOUT_EXPIRED;
 }
 GLenum reset() { return g_reset.now() ? GL_GUILTY_CONTEXT_RESET : g_real_reset(); }
+// What a context of 4.3 or 4.4 has. Some drivers make one of just the version that is asked for.
+GLenum resetKhr() { return g_reset.now() ? GL_GUILTY_CONTEXT_RESET : g_real_reset_khr(); }
 void data(GLenum target, GLsizeiptr size, const void* from, GLenum usage) {
   if (g_memory.now()) {
     g_out_of_memory = true;
@@ -138,6 +140,7 @@ class BrokenDriver : public testing::Test {
     put(epoxy_glClearBufferSubData, g_real_clear, &clear);
     put(epoxy_glClientWaitSync, g_real_wait, &wait);
     put(epoxy_glGetGraphicsResetStatus, g_real_reset, &reset);
+    put(epoxy_glGetGraphicsResetStatusKHR, g_real_reset_khr, &resetKhr);
     put(epoxy_glBufferData, g_real_data, &data);
     put(epoxy_glBufferStorage, g_real_storage, &storage);
     put(epoxy_glMapBufferRange, g_real_map, &map);
@@ -151,8 +154,8 @@ class BrokenDriver : public testing::Test {
   void SetUp() override { notices().clear(); }
 
   void TearDown() override {
-    for (Fault* f : {&g_dispatch, &g_half_dispatch, &g_copy, &g_write, &g_read, &g_clear, &g_fence, &g_reset, &g_memory,
-                     &g_map, &g_draw, &g_uniform}) {
+    for (Fault* f : {&g_dispatch, &g_half_dispatch, &g_copy, &g_write, &g_clear, &g_fence, &g_reset, &g_memory, &g_map,
+                     &g_draw, &g_uniform}) {
       f->start(kNever);
     }
   }
@@ -320,9 +323,10 @@ TEST_F(BrokenDriver, AStoredMeshComesBackAsItWasOrNotAtAll) {
     const auto back = stored.recall();
     EXPECT_EQ(back->vertices(), mesh->vertices());
     EXPECT_EQ(back->triangles(), mesh->triangles());
-    g_read.start(kEvery);
+    const StoredMesh other(*oracle, *test::torus(9).mesh());  // what was read last is something else
+    g_copy.start(kEvery);
     EXPECT_THROW(stored.recall(), OracleError);
-    g_read.start(kNever);
+    g_copy.start(kNever);
     EXPECT_EQ(stored.recall()->vertices(), mesh->vertices());
     g_write.start(kEvery);
     EXPECT_THROW(StoredMesh(*oracle, *test::torus(80, 0.3).mesh()), OracleError);
@@ -480,6 +484,18 @@ TEST_F(BrokenDriver, SumsInAnotherOrder) {
     // On zink it was not seen to change an octant; why was not looked into.
     EXPECT_TRUE(wrong > 0 || oracle.thread().info().renderer.rfind("llvmpipe", 0) != 0);
   }
+  g_rewritten.clear();
+  epoxy_glShaderSource = g_real_source;
+}
+
+// As NVIDIA's driver 580 does with arrays of doubles that are `precise`.
+TEST_F(BrokenDriver, DoublesThatAreFloatsFailTheSelfTest) {
+  put(epoxy_glShaderSource, g_real_source, &source);
+  g_rewritten = {{"v[k] = corners[k] - center", "v[k] = dvec3(vec3(corners[k] - center))"}};
+  g_rewrites = 0;
+  ComputeOracle oracle(newThread());
+  EXPECT_EQ(g_rewrites, 1);
+  EXPECT_NE(selfTest(oracle), "");
   g_rewritten.clear();
   epoxy_glShaderSource = g_real_source;
 }

@@ -8,6 +8,7 @@
 #include <filesystem>
 #include <fstream>
 #include <random>
+#include <regex>
 #include <set>
 #include <thread>
 
@@ -439,6 +440,28 @@ TEST(Device, PassesItsSelfTest) {
   EXPECT_EQ(selfTest(compute), "");
   EXPECT_EQ(selfTestOfWalks(compute), "");
   EXPECT_EQ(compute.leftToCpu(), 0u);
+}
+
+// What NVIDIA's driver 580 gets wrong: it does not link a component of a vector that is written by a variable index,
+// and it computes arrays of doubles in float if they are `precise`.
+TEST(Shaders, AvoidWhatADriverGetsWrong) {
+  std::vector<std::pair<std::string, std::string>> all = ComputeChain::sources();
+  all.emplace_back("pairs", PairWalker::source());
+  std::size_t vectors = 0;
+  for (const auto& [name, source] : all) {
+    EXPECT_FALSE(std::regex_search(source, std::regex("precise d(ouble|vec)"))) << name;
+    const std::regex declared("\\b[diu]?vec[234] ([a-z_]+)((?:, [a-z_]+)*)( =|;)");
+    for (auto i = std::sregex_iterator(source.begin(), source.end(), declared); i != std::sregex_iterator(); ++i) {
+      std::string names = (*i)[1].str() + (*i)[2].str();
+      const std::regex separator("[a-z_]+");
+      for (auto n = std::sregex_iterator(names.begin(), names.end(), separator); n != std::sregex_iterator(); ++n) {
+        ++vectors;
+        const std::regex written("\\b" + n->str() + "\\[[^\\]]*[a-z][^\\]]*\\] [-+*/|&^]?= ");
+        EXPECT_FALSE(std::regex_search(source, written)) << name << ": " << n->str();
+      }
+    }
+  }
+  EXPECT_GT(vectors, 20u) << "the expressions find no declarations any more";
 }
 
 // Shaders as a compiler for Vulkan sees them: what one driver lets pass is an error for another.

@@ -2,6 +2,7 @@
 #include "oracle/gl/arena.h"
 
 #include <algorithm>
+#include <cstring>
 #include <iterator>
 #include <limits>
 #include <string>
@@ -10,7 +11,8 @@ namespace bocst::oracle::gl {
 namespace {
 
 constexpr std::uint64_t kFirstWords = 1 << 16;
-constexpr std::size_t kSample = 64;  // words
+constexpr std::size_t kSample = 64;           // words
+constexpr std::size_t kMostAtOnce = 1 << 20;  // words on their way to the host
 
 }  // namespace
 
@@ -25,10 +27,14 @@ void Arena::Range::trim(std::uint32_t words) {
 Arena::Arena(std::shared_ptr<Thread> thread, std::size_t most_bytes)
     : thread_(std::move(thread)),
       most_words_(std::min<std::uint64_t>(most_bytes / kWord, std::numeric_limits<std::int32_t>::max())),
-      buffer_(std::make_unique<Buffer>()) {}
+      buffer_(std::make_unique<Buffer>()),
+      staging_(std::make_unique<Staging>()) {}
 
 Arena::~Arena() {
-  thread_->post([b = buffer_.release()] { delete b; });
+  thread_->post([b = buffer_.release(), s = staging_.release()] {
+    delete b;
+    delete s;
+  });
 }
 
 std::shared_ptr<Arena::Range> Arena::take(std::uint64_t words) {
@@ -50,10 +56,27 @@ std::shared_ptr<Arena::Range> Arena::take(std::uint64_t words) {
 
 std::shared_ptr<Arena::Range> Arena::upload(const std::vector<std::uint32_t>& words) {
   std::shared_ptr<Range> range = take(words.size());
-  const std::size_t at = range->begin() * kWord, bytes = words.size() * kWord;
-  buffer_->write(at, bytes, words.data());
-  thread_->require(buffer_->holds(at, bytes, words.data()), "a mesh did not arrive");
+  buffer_->write(range->begin() * kWord, words.size() * kWord, words.data());
+  // Some words at both ends and in the middle show whether they arrived.
+  std::uint32_t sample[kSample];
+  const std::size_t some = std::min(words.size(), kSample);
+  for (const std::size_t at : {std::size_t{0}, (words.size() - some) / 2, words.size() - some}) {
+    read(*buffer_, range->begin() + at, some, sample);
+    thread_->require(std::equal(sample, sample + some, words.data() + at), "a mesh did not arrive");
+  }
   return range;
+}
+
+void Arena::read(std::uint32_t begin, std::size_t words, std::uint32_t* to) { read(*buffer_, begin, words, to); }
+
+void Arena::read(const Buffer& from, std::uint64_t begin, std::size_t words, std::uint32_t* to) {
+  for (std::size_t done = 0; done < words;) {
+    const std::size_t count = std::min(words - done, kMostAtOnce);
+    staging_->copy(from, (begin + done) * kWord, count * kWord);
+    thread_->awaitDevice();
+    std::memcpy(to + done, staging_->take(), count * kWord);
+    done += count;
+  }
 }
 
 void Arena::grow(std::uint64_t words) {
@@ -68,11 +91,11 @@ void Arena::grow(std::uint64_t words) {
     glBindBuffer(GL_COPY_READ_BUFFER, buffer_->name());
     glBindBuffer(GL_COPY_WRITE_BUFFER, larger->name());
     glCopyBufferSubData(GL_COPY_READ_BUFFER, GL_COPY_WRITE_BUFFER, 0, 0, static_cast<GLsizeiptr>(before * kWord));
-    // A few words show whether it was done.
-    std::uint32_t sample[kSample];
+    std::uint32_t here[kSample], there[kSample];
     for (const std::uint64_t at : {std::uint64_t{0}, before / 2, before - kSample}) {
-      buffer_->read(at * kWord, sizeof(sample), sample);
-      thread_->require(larger->holds(at * kWord, sizeof(sample), sample), "a copy did not arrive");
+      read(*buffer_, at, kSample, here);
+      read(*larger, at, kSample, there);
+      thread_->require(std::equal(here, here + kSample, there), "a copy did not arrive");
     }
   }
   buffer_ = std::move(larger);

@@ -46,16 +46,20 @@ class Arena : public std::enable_shared_from_this<Arena> {
   std::shared_ptr<Range> take(std::uint64_t words);
   /// Takes as many and writes them. @throws OracleError also when they do not arrive.
   std::shared_ptr<Range> upload(const std::vector<std::uint32_t>& words);
+  /// Words to the host. @throws OracleError when the context is lost.
+  void read(std::uint32_t begin, std::size_t words, std::uint32_t* to);
 
   Buffer& buffer() { return *buffer_; }
 
  private:
   void giveBack(std::uint32_t begin, std::uint32_t words);
+  void read(const Buffer& from, std::uint64_t begin, std::size_t words, std::uint32_t* to);
   void grow(std::uint64_t words);
 
   const std::shared_ptr<Thread> thread_;
   const std::uint64_t most_words_;
   std::unique_ptr<Buffer> buffer_;
+  std::unique_ptr<Staging> staging_;
   std::mutex mutex_;                             // of what follows
   std::map<std::uint32_t, std::uint32_t> free_;  // begin -> words
 };

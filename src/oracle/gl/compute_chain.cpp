@@ -178,7 +178,7 @@ void ComputeChain::fill() {
 }
 
 const std::uint32_t* ComputeChain::read(std::size_t words, Thread& thread) {
-  staging_.copy(answers_, words * kWord);
+  staging_.copy(answers_, 0, words * kWord);
   thread.awaitDevice();
   return static_cast<const std::uint32_t*>(staging_.take());
 }

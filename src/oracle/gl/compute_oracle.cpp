@@ -67,10 +67,7 @@ void ComputeOracle::answer(const std::vector<ExpansionRequest*>& requests, std::
 
 bool ComputeOracle::fetch(const DeviceResource&, ExpansionRequest::DeviceList list, std::uint32_t* ids) {
   try {
-    thread_->run([&] {
-      arena_->buffer().read(list.begin * sizeof(*ids), list.count * sizeof(*ids), ids);
-      thread_->checkReset();
-    });
+    thread_->run([&] { arena_->read(list.begin, list.count, ids); });
     return true;
   } catch (const OracleError& e) {
     reportFailure("a triangle list that only the device has", e);

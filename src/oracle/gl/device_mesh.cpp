@@ -56,10 +56,7 @@ std::shared_ptr<const DeviceResource> DeviceMeshes::store(const std::vector<std:
 
 void DeviceMeshes::recall(const DeviceResource& stored, std::vector<std::uint32_t>& words) {
   const auto& range = static_cast<const Arena::Range&>(stored);
-  thread_->run([&] {
-    arena_->buffer().read(range.begin() * kWord, words.size() * kWord, words.data());
-    thread_->checkReset();
-  });
+  thread_->run([&] { arena_->read(range.begin(), words.size(), words.data()); });
 }
 
 }  // namespace bocst::oracle::gl

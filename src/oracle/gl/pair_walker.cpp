@@ -111,7 +111,7 @@ void PairWalker::walkPart(PairWalks& walks, std::size_t first, std::size_t count
 
   // Most walks defer little; how much is known from the header.
   const auto read = [&](std::size_t deferred) {
-    staging_.copy(answers_, (deferred_ + deferred * kDeferredWords) * kWord);
+    staging_.copy(answers_, 0, (deferred_ + deferred * kDeferredWords) * kWord);
     thread.awaitDevice();
     return static_cast<const std::uint32_t*>(staging_.take());
   };

@@ -230,8 +230,55 @@ std::vector<Question> deepQuestions(const Surface& surface, int level) {
   return questions;
 }
 
+// Triangles that pass a face or an edge of an octant by less than float can tell, each with a cell that has the octant.
+// A device whose doubles are not quite doubles is wrong about half of them.
+struct Grazing {
+  std::shared_ptr<const Mesh> mesh;
+  std::vector<lattice::Cell> cells;  // of triangle kFirst + i
+  static constexpr std::uint32_t kFirst = 2;
+};
+
+Grazing grazing() {
+  constexpr int kCount = 48;
+  constexpr double kWhole = 2 * lattice::kMiddle;
+  std::uint32_t state = 1;
+  const auto random = [&state] {  // 0 to 1
+    state = 1664525 * state + 1013904223;
+    return static_cast<double>(state >> 8) / (1 << 24);
+  };
+  Grazing g;
+  // Two points make the lattice's unit that of the coordinates.
+  std::vector<Eigen::Vector3d> vertices{Eigen::Vector3d::Zero(), Eigen::Vector3d::Constant(kWhole)};
+  std::vector<Mesh::Indices> triangles{{0, 0, 0}, {1, 1, 1}};
+  for (int i = 0; i < kCount; ++i) {
+    lattice::Cell cell;
+    cell.level = 1 + i % 12;
+    for (std::uint32_t& at : cell.at) at = static_cast<std::uint32_t>(random() * (1 << (cell.level - 1)));
+    const double side = cell.side(), off = (i % 4 < 2 ? side : -side) * std::pow(10.0, -7 - 3 * random());
+    const Eigen::Vector3d middle = centerOf(cell);
+    Eigen::Vector3d p[3];
+    for (Eigen::Vector3d& v : p) v = middle + side * Eigen::Vector3d(random() - 0.5, random() - 0.5, random() - 0.5);
+    const int axis = i / 4 % 3;
+    if (i % 2 == 0) {
+      for (Eigen::Vector3d& v : p) v[axis] = middle[axis] + off;  // in a plane beside the middle one
+    } else {
+      // The middle of its first edge beside the middle line along the axis.
+      Eigen::Vector3d shift = middle - (p[0] + p[1]) / 2;
+      for (int k = 0; k < 3; ++k) shift[k] = k == axis ? 0 : shift[k] + off;
+      for (Eigen::Vector3d& v : p) v = (v + shift).cwiseMax(0.0).cwiseMin(kWhole);
+    }
+    const auto first = static_cast<std::uint32_t>(vertices.size());
+    vertices.insert(vertices.end(), std::begin(p), std::end(p));
+    triangles.push_back({first, first + 1, first + 2});
+    g.cells.push_back(cell);
+  }
+  g.mesh = Mesh::fromIndices(std::move(vertices), std::move(triangles));
+  return g;
+}
+
 struct Meshes {
-  Surface ball, star;
+  Surface ball, star, grazing;
+  std::vector<lattice::Cell> grazed;
 };
 
 Surface onHost(std::shared_ptr<const Mesh> mesh) {
@@ -239,15 +286,18 @@ Surface onHost(std::shared_ptr<const Mesh> mesh) {
   return {std::move(mesh), lattice};
 }
 
-// Both on the device. Empty where it has no room.
+// All on the device. Empty where it has no room.
 std::unique_ptr<Meshes> residentOn(DeviceOracle& oracle) {
   const auto surfaceOf = [&](std::shared_ptr<const Mesh> mesh) {
     Surface surface = onHost(std::move(mesh));
     surface.device = oracle.makeResident(surface);
     return surface;
   };
-  auto meshes = std::make_unique<Meshes>(Meshes{surfaceOf(ball()), surfaceOf(star())});
-  if (meshes->ball.device == nullptr || meshes->star.device == nullptr) return nullptr;
+  const Grazing g = grazing();
+  auto meshes = std::make_unique<Meshes>(Meshes{surfaceOf(ball()), surfaceOf(star()), surfaceOf(g.mesh), g.cells});
+  for (const Surface* surface : {&meshes->ball, &meshes->star, &meshes->grazing}) {
+    if (surface->device == nullptr) return nullptr;
+  }
   return meshes;
 }
 
@@ -261,6 +311,10 @@ std::vector<std::vector<Question>> batchesOf(const Meshes& meshes) {
       if (o % (q.surface == &meshes.star ? 3 : 2) != 0) continue;
       batches.back().push_back({q.surface, q.cell.octant(o), meeting(*q.surface, q.ids, q.cell.octant(o))});
     }
+  }
+  batches.emplace_back();
+  for (std::uint32_t i = 0; i < meshes.grazed.size(); ++i) {
+    batches.back().push_back({&meshes.grazing, meshes.grazed[i], {Grazing::kFirst + i}});
   }
   for (const auto& levels : {std::array{9, 14}, std::array{15, 16}}) {
     batches.emplace_back();

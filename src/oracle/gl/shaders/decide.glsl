@@ -1,33 +1,39 @@
 // Pass 2: octants that no triangle surely meets, but that some may: the reference test (oracle/reference.h), operation
-// by operation in double, so that grey is the same for all oracles.
+// by operation in double, so that grey is the same for all oracles. Without `precise`: with it, NVIDIA's driver 580
+// computes arrays of doubles in float. So products that are added come from product().
+
+uniform double u_zero;  // 0, as all uniforms at first; the compiler does not know
+
+// A product that is rounded by itself, whatever is done with it.
+double product(double a, double b) { return fma(a, b, u_zero); }
 
 const double kBoxRoundingMargin = 16.0lf * 65536.0lf / 9007199254740992.0lf;  // 16 * 2^16 * 2^-53
 const double kPlaneRoundingMargin = 32.0lf / 9007199254740992.0lf;
 
 bool triangleMeetsCube(dvec3 corners[3], dvec3 center, double side) {
-  precise double h = side + kBoxRoundingMargin;
-  precise dvec3 v[3], e[3];
+  double h = side + kBoxRoundingMargin;
+  dvec3 v[3], e[3];
   for (int k = 0; k < 3; ++k) v[k] = corners[k] - center;
   for (int k = 0; k < 3; ++k) {
     if (min(min(v[0][k], v[1][k]), v[2][k]) > h || max(max(v[0][k], v[1][k]), v[2][k]) < -h) return false;
   }
   for (int k = 0; k < 3; ++k) e[k] = corners[(k + 1) % 3] - corners[k];
 
-  precise double n[3], size[3];
+  double n[3], size[3];
   for (int k = 0; k < 3; ++k) {
     int i = (k + 1) % 3, j = (k + 2) % 3;
-    precise double a = e[0][i] * e[1][j], b = e[0][j] * e[1][i];
+    double a = product(e[0][i], e[1][j]), b = product(e[0][j], e[1][i]);
     n[k] = a - b;
     size[k] = abs(a) + abs(b);
   }
-  precise double width = (abs(n[0]) + abs(n[1])) + abs(n[2]);
-  precise double s0 = size[0] * (abs(v[0][0]) + h), s1 = size[1] * (abs(v[0][1]) + h),
-                 s2 = size[2] * (abs(v[0][2]) + h);
-  precise double products = (s0 + s1) + s2;
-  precise double reach_n = h * width, reach_p = kPlaneRoundingMargin * products;
-  precise double reach = reach_n + reach_p;
-  precise double d0 = n[0] * v[0][0], d1 = n[1] * v[0][1], d2 = n[2] * v[0][2];
-  precise double along = (d0 + d1) + d2;
+  double width = (abs(n[0]) + abs(n[1])) + abs(n[2]);
+  double s0 = product(size[0], abs(v[0][0]) + h), s1 = product(size[1], abs(v[0][1]) + h),
+         s2 = product(size[2], abs(v[0][2]) + h);
+  double products = (s0 + s1) + s2;
+  double reach_n = product(h, width), reach_p = product(kPlaneRoundingMargin, products);
+  double reach = reach_n + reach_p;
+  double d0 = product(n[0], v[0][0]), d1 = product(n[1], v[0][1]), d2 = product(n[2], v[0][2]);
+  double along = (d0 + d1) + d2;
   if (abs(along) > reach) return false;
 
   for (int i = 0; i < 3; ++i) {
@@ -35,10 +41,10 @@ bool triangleMeetsCube(dvec3 corners[3], dvec3 center, double side) {
     for (int k = 0; k < 3; ++k) {
       int p = (k + 1) % 3, q = (k + 2) % 3;
       double ep = e[i][p], eq = e[i][q];
-      precise double sa = ep * a[q], sb = eq * a[p], ta = ep * b[q], tb = eq * b[p];
-      precise double s = sa - sb, t = ta - tb;
-      precise double sum = abs(ep) + abs(eq);
-      precise double r = h * sum;
+      double sa = product(ep, a[q]), sb = product(eq, a[p]), ta = product(ep, b[q]), tb = product(eq, b[p]);
+      double s = sa - sb, t = ta - tb;
+      double sum = abs(ep) + abs(eq);
+      double r = h * sum;
       if (min(s, t) > r || max(s, t) < -r) return false;
     }
   }
