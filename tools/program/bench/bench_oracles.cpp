@@ -227,22 +227,13 @@ class PlacementBench {
   std::vector<Level> levels_;
 };
 
-/// Conservative answers to many random poses of a mesh on itself, by collidePoses in one thread: microseconds a pose
-/// once both trees have all that the poses need.
-double timeOfPose(OracleKind kind, const std::shared_ptr<const Mesh>& mesh, int depth) {
-  constexpr std::size_t kPoses = 4096;
-  constexpr int kRounds = 8;
-  Options options;
-  options.oracle = kind;
-  options.answer = Answer::kConservative;
-  options.depth = depth;
-  options.ttl = std::chrono::hours(1);
-  const Modeld a(mesh, options), b(mesh, options);
-  const Eigen::AlignedBox3d box = mesh->bounds();
+/// Random poses of a mesh on itself.
+std::vector<fcl::Transform3d> randomPoses(const Mesh& mesh, std::size_t count) {
+  const Eigen::AlignedBox3d box = mesh.bounds();
   std::mt19937_64 g(5);
   std::normal_distribution<double> normal;
   std::uniform_real_distribution<double> uniform(-0.5, 0.5);
-  std::vector<fcl::Transform3d> poses(kPoses, fcl::Transform3d::Identity());
+  std::vector<fcl::Transform3d> poses(count, fcl::Transform3d::Identity());
   for (fcl::Transform3d& X : poses) {
     Eigen::Vector4d q;
     Eigen::Vector3d t;
@@ -251,23 +242,59 @@ double timeOfPose(OracleKind kind, const std::shared_ptr<const Mesh>& mesh, int 
     X.linear() = Eigen::Quaterniond(q.normalized()).toRotationMatrix();
     X.translation() = box.center() - X.linear() * box.center() + box.diagonal().norm() * t;
   }
-  std::vector<std::uint8_t> hits(kPoses);
+  return poses;
+}
+
+/// Conservative answers to many poses by collidePoses in one thread: microseconds a pose.
+struct ManyPoses {
+  double first;  ///< Two new models.
+  double again;  ///< The same poses, once both trees have all that these need.
+  std::vector<std::uint8_t> hits;
+};
+
+ManyPoses timeOfPoses(OracleKind kind, const std::shared_ptr<const Mesh>& mesh,
+                      const std::vector<fcl::Transform3d>& poses, int depth) {
+  constexpr int kRounds = 8;
+  Options options;
+  options.oracle = kind;
+  options.answer = Answer::kConservative;
+  options.depth = depth;
+  options.ttl = std::chrono::hours(1);
+  const Modeld a(mesh, options), b(mesh, options);
+  ManyPoses result{0, 0, std::vector<std::uint8_t>(poses.size())};
   std::vector<double> times;
   for (int round = 0; round < kRounds; ++round) {
     const Stopwatch watch;
-    collidePoses(a, b, poses.data(), kPoses, hits.data());
-    if (round > kRounds / 2) times.push_back(watch.microseconds() / kPoses);
+    collidePoses(a, b, poses.data(), poses.size(), result.hits.data());
+    const double time = watch.microseconds() / static_cast<double>(poses.size());
+    if (round == 0) result.first = time;
+    if (round > kRounds / 2) times.push_back(time);
   }
-  return quantile(times, 0.5);
+  result.again = quantile(times, 0.5);
+  return result;
 }
 
-void measurePoses(const std::shared_ptr<const Mesh>& mesh, Table& table, Json& rows) {
-  for (const int depth : {5, 6, 7}) {
-    const double host = timeOfPose(OracleKind::kCpu, mesh, depth),
-                 device = timeOfPose(OracleKind::kCompute, mesh, depth);
-    rows.push_back({{"depth", depth}, {"cpu_us", host}, {"compute_us", device}});
-    table.row({std::to_string(depth), formatTime(host), formatTime(device), formatNumber(host / device, 3) + " x"});
+/// @return false when a verdict of the device differs from that of the host.
+bool measurePoses(const std::shared_ptr<const Mesh>& mesh, std::size_t count, Table& table, Json& rows) {
+  const std::vector<fcl::Transform3d> poses = randomPoses(*mesh, count);
+  bool are_equal = true;
+  for (const int depth : {5, 6, 7, 8}) {
+    const ManyPoses host = timeOfPoses(OracleKind::kCpu, mesh, poses, depth),
+                    device = timeOfPoses(OracleKind::kCompute, mesh, poses, depth);
+    const bool is_equal = host.hits == device.hits;
+    are_equal = are_equal && is_equal;
+    rows.push_back({{"depth", depth},
+                    {"poses", count},
+                    {"cpu_first_us", host.first},
+                    {"compute_first_us", device.first},
+                    {"cpu_us", host.again},
+                    {"compute_us", device.again},
+                    {"verdicts_equal", is_equal}});
+    table.row({std::to_string(depth), formatTime(host.first), formatTime(device.first), formatTime(host.again),
+               formatTime(device.again), formatNumber(host.again / device.again, 3) + " x",
+               is_equal ? "equal" : "DIFFER"});
   }
+  return are_equal;
 }
 
 }  // namespace
@@ -331,11 +358,13 @@ int OracleBench::run(const Output& output) const {
   placement.row({"conservative growth", "batches", "cpu", "compute", "auto", "better of both / auto"});
   report["placement"] = Json::array();
   Table poses;
-  poses.row({"many poses, depth", "cpu, a pose", "compute", "cpu / compute"});
+  poses.row({"many poses, depth", "first: cpu, a pose", "compute", "again: cpu, a pose", "compute", "cpu / compute",
+             "verdicts"});
   report["poses"] = Json::array();
+  bool are_equal = true;
   if (seen.count("compute") != 0) {
     PlacementBench(loadMesh(file), oracle::makeOracle(OracleKind::kCompute)).run(placement, report["placement"]);
-    measurePoses(loadMesh(file), poses, report["poses"]);
+    are_equal = measurePoses(loadMesh(file), pose_count, poses, report["poses"]);
   }
   if (output.wantsJson()) {
     output.write(report);
@@ -352,7 +381,7 @@ int OracleBench::run(const Output& output) const {
     for (const std::string& name : slow)
       std::cout << name << ": left out from the size at which it took more than " << limit_seconds << " s\n";
   }
-  return 0;
+  return are_equal ? 0 : 1;
 }
 
 }  // namespace bocst::program

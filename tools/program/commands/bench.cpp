@@ -68,6 +68,7 @@ struct Bench {
     OracleBench bench = oracles;
     bench.file = request.file_a;
     if (!sizes.empty()) bench.sizes = sizes;
+    bench.pose_count = request.poses;
     return bench.run(output);
   }
 
@@ -170,7 +171,7 @@ void addBench(CLI::App& program, Job& job) {
       ->delimiter(',')
       ->allow_extra_args(false)
       ->capture_default_str();
-  command->add_option("--poses", bench->request.poses, "number of random poses")
+  command->add_option("--poses", bench->request.poses, "number of random poses; with --oracles: of one call of collidePoses")
       ->check(positive())
       ->capture_default_str();
   command->add_option("--seed", bench->request.seed, "the same seed gives the same poses")->capture_default_str();
