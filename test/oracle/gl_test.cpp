@@ -435,6 +435,15 @@ TEST(Device, SoftwareIsKnownForWhatItIs) {
   EXPECT_TRUE(!says_so || !info.hardware) << info.renderer;
 }
 
+// As on a GPU.
+TEST(Compute, ALaneForEachOctant) {
+  ComputeChain::Limits limits;
+  limits.few_pairs = 4096;
+  ComputeOracle compute(newThread(), limits);
+  EXPECT_EQ(selfTest(compute), "");
+  EXPECT_EQ(compute.leftToCpu(), 0u);
+}
+
 TEST(Device, PassesItsSelfTest) {
   ComputeOracle compute(newThread());
   EXPECT_EQ(selfTest(compute), "");

@@ -53,8 +53,8 @@ ComputeChain::ComputeChain(Limits limits, Arena& arena) : limits_(clamped(limits
   for (const auto& [name, source] : sources()) {
     auto program = std::make_unique<Program>(std::vector<Program::Stage>{{GL_COMPUTE_SHADER, source}});
     const Program& p = *program;
-    steps_.push_back({std::move(program), p.uniform("u_pairs"), p.uniform("u_cell_count"), p.uniform("u_list_capacity"),
-                      p.uniform("u_id_capacity"), p.uniform("u_batch")});
+    steps_.push_back({std::move(program), p.uniform("u_items"), p.uniform("u_lanes"), p.uniform("u_cell_count"),
+                      p.uniform("u_list_capacity"), p.uniform("u_id_capacity"), p.uniform("u_batch")});
   }
 }
 
@@ -150,19 +150,21 @@ void ComputeChain::clearAnswers() {
   glMemoryBarrier(GL_SHADER_STORAGE_BARRIER_BIT | GL_BUFFER_UPDATE_BARRIER_BIT);
 }
 
-// Passes over pairs get them in parts; those over cells and octants, of which there are fewer, all at once.
-void ComputeChain::run(Pass pass, std::uint64_t invocations) {
+// So many lanes work on each pair or cell. Long passes are parted.
+void ComputeChain::run(Pass pass, std::uint64_t items, std::uint32_t lanes) {
   const Step& step = steps_[pass];
   step.program->use();
   glUniform1ui(step.cell_count, narrow(rows_.size()));
   glUniform2ui(step.list_capacity, placed_->begin(), narrow(list_capacity_));
   glUniform1ui(step.id_capacity, narrow(id_capacity_));
   glUniform1ui(step.batch, batch_);
-  for (std::uint64_t first = 0; first < invocations; first += kMostInvocations) {
-    const std::uint64_t end = std::min(invocations, first + kMostInvocations);
+  glUniform1ui(step.lanes, lanes);
+  const std::uint64_t most = kMostInvocations / lanes;
+  for (std::uint64_t first = 0; first < items; first += most) {
+    const std::uint64_t end = std::min(items, first + most);
     if (first > 0) glFlush();
-    glUniform2ui(step.pairs, narrow(first), narrow(end));
-    const std::uint32_t groups = narrow((end - first + kGroup - 1) / kGroup);
+    glUniform2ui(step.items, narrow(first), narrow(end));
+    const std::uint32_t groups = narrow(((end - first) * lanes + kGroup - 1) / kGroup);
     groups_[pass] += groups;
     glDispatchCompute(groups, 1, 1);
   }
@@ -170,11 +172,12 @@ void ComputeChain::run(Pass pass, std::uint64_t invocations) {
 }
 
 void ComputeChain::fill() {
+  const std::uint32_t lanes = pairs_ <= limits_.few_pairs.value_or(0) ? 8 : 1;
   run(kPlace, rows_.size());
-  run(kFill, pairs_);
-  run(kNormals, 8 * rows_.size());
-  run(kSlabs, pairs_);
-  run(kPack, rows_.size());
+  run(kFill, pairs_, lanes);
+  run(kNormals, rows_.size(), 64);
+  run(kSlabs, pairs_, lanes);
+  run(kPack, rows_.size(), 8);
 }
 
 const std::uint32_t* ComputeChain::read(std::size_t words, Thread& thread) {
@@ -246,10 +249,9 @@ void ComputeChain::answer(const std::vector<ExpansionRequest*>& requests, Thread
   fill();
   stamp(2);
 
-  // Most answers fit into the first read; what does not is known from the header.
+  // All that there is room for: a second read would take as long as some 100 000 words.
   const std::size_t fixed = kHeader + requests.size() * kRow;
-  const std::size_t first_read = fixed + std::min<std::uint64_t>(id_capacity_, 64 * requests.size()) + 1;
-  const std::uint32_t* answers = read(first_read, thread);
+  const std::uint32_t* answers = read(fixed + id_capacity_ + 1, thread);
   checkHeader(answers, thread);
   if (answers[kListWords] > list_capacity_ || answers[kIdWords] > id_capacity_) {
     list_capacity_ = answers[kListWords];
@@ -261,9 +263,6 @@ void ComputeChain::answer(const std::vector<ExpansionRequest*>& requests, Thread
     answers = read(fixed + id_capacity_ + 1, thread);
     checkHeader(answers, thread);
     thread.require(answers[kListWords] == list_capacity_ && answers[kIdWords] == id_capacity_, "lists changed");
-  } else if (fixed + answers[kIdWords] + 1 > first_read) {
-    answers = read(fixed + answers[kIdWords] + 1, thread);
-    checkHeader(answers, thread);
   }
   const GLenum error = glGetError();
   if (error != GL_NO_ERROR) throw OracleError("OpenGL error " + std::to_string(error));

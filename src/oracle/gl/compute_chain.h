@@ -5,6 +5,7 @@
 #include <chrono>
 #include <cstdint>
 #include <memory>
+#include <optional>
 #include <string>
 #include <utility>
 #include <vector>
@@ -24,6 +25,8 @@ class ComputeChain {
     std::uint64_t pairs = std::uint64_t{1} << 26;
     std::size_t cells = std::size_t{1} << 17;
     std::size_t bytes = 0;  ///< Of one buffer; 0: what the driver says.
+    /// In a batch of at most so many pairs, each octant of a pair has a lane of its own; empty: as suits the device.
+    std::optional<std::uint64_t> few_pairs;
   };
 
   /// @throws OracleError when a shader does not compile or the driver's limits are below what the chain needs.
@@ -54,14 +57,14 @@ class ComputeChain {
   /// A program and where its uniforms are; -1 for those that it does not have.
   struct Step {
     std::unique_ptr<Program> program;
-    GLint pairs, cell_count, list_capacity, id_capacity, batch;
+    GLint items, lanes, cell_count, list_capacity, id_capacity, batch;
   };
 
   void reserve(Buffer& buffer, std::size_t words) const;
   void describe(const std::vector<ExpansionRequest*>& requests);
   void upload();
   void clearAnswers();
-  void run(Pass pass, std::uint64_t invocations);
+  void run(Pass pass, std::uint64_t items, std::uint32_t lanes = 1);
   void fill();
   const std::uint32_t* read(std::size_t words, Thread& thread);
   void checkHeader(const std::uint32_t* answers, Thread& thread) const;

@@ -16,6 +16,8 @@ ComputeChain::Limits complete(ComputeChain::Limits limits, Thread& thread) {
     thread.run([&] { glGetInteger64v(GL_MAX_SHADER_STORAGE_BLOCK_SIZE, &bytes); });
     limits.bytes = static_cast<std::size_t>(bytes);
   }
+  // A GPU has more lanes than that; those of a software renderer are never idle.
+  if (!limits.few_pairs) limits.few_pairs = thread.info().hardware ? 4096 : 0;
   return limits;
 }
 

@@ -103,7 +103,7 @@ constexpr std::uint32_t kPairWords = kPairRoom + 1;
 // blocks, deferred pairs (the pair, two nodes, the batch's number).
 constexpr std::uint32_t kDeferredCount = 0, kPairHeader = 1, kPairAnswer = 2, kDeferredWords = 4;
 constexpr std::uint32_t kMostSteps = 1u << 12;  ///< Of a walk: longer ones are the host's, as a watchdog may look.
-constexpr std::uint32_t kWalkStack = 64 * 2 * lattice::kMaxLevel;
+constexpr std::uint32_t kWalkStack = 256;       ///< Pairs of nodes that a walk keeps; as above.
 
 /// What answers say of a question that they belong to; the shaders have the same.
 constexpr std::uint32_t kCheckFactor = 0x9e3779b1u;

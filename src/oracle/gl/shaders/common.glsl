@@ -29,7 +29,8 @@ layout(std430, binding = 3) buffer States { uint states[]; };
 layout(std430, binding = 4) buffer Masks { uint masks[]; };
 layout(std430, binding = 5) buffer Answers { uint answers[]; };
 
-uniform uvec2 u_pairs;      // first and end of the pairs of this dispatch
+uniform uvec2 u_items;      // first and end of the pairs, or cells, of this dispatch
+uniform uint u_lanes;       // invocations for each
 uniform uint u_cell_count;  // of the batch
 uniform uvec2 u_list_capacity;  // first word and number of words
 uniform uint u_id_capacity;
@@ -40,7 +41,10 @@ void countGroup() {
   if (gl_LocalInvocationIndex == 0u) atomicAdd(answers[kGroups + kPass], 1u);
 }
 
-uint invocation() { return gl_GlobalInvocationID.x; }
+uint item() { return u_items.x + gl_GlobalInvocationID.x / u_lanes; }
+uint laneOfItem() { return gl_GlobalInvocationID.x % u_lanes; }
+// The octants that are this lane's.
+uint octantsOfLane() { return u_lanes == 1u ? 0xffu : 1u << laneOfItem(); }
 
 uint cellOf(uint pair) {
   uint lo = 0u, hi = u_cell_count;  // cells[lo].first_pair <= pair < cells[hi].first_pair

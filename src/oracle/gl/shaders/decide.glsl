@@ -55,8 +55,8 @@ double doubleAt(uint at) { return packDouble2x32(uvec2(meshes[at], meshes[at + 1
 
 void main() {
   countGroup();
-  uint pair = u_pairs.x + invocation();
-  if (pair >= u_pairs.y) return;
+  uint pair = item();
+  if (pair >= u_items.y) return;
   uint maybe = maskOf(pair);
   if (maybe == 0u) return;
   uint cell = cellOf(pair);

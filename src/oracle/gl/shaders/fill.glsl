@@ -61,21 +61,21 @@ void addPart(bool together, uint cell, int o, vec3 v[3]) {
 void main() {
   countGroup();
   if (isOverflown()) return;
-  uint pair = u_pairs.x + invocation();
-  bool has_pair = pair < u_pairs.y;
+  uint pair = item();
+  bool has_pair = pair < u_items.y;
   uint lane = gl_LocalInvocationIndex;
   if (lane < 8u) s_counts[lane] = 0u;
   if (lane < 48u) {
     s_boxes[lane] = 0u;
     s_tensors[lane] = 0;
   }
-  uint cell = cellOf(min(pair, u_pairs.y - 1u));
+  uint cell = cellOf(min(pair, u_items.y - 1u));
   if (lane == 0u) s_cells[0] = cell;
   if (lane == GROUP - 1u) s_cells[1] = cell;
   barrier();
   bool together = s_cells[0] == s_cells[1];
 
-  uint mask = has_pair ? maskOf(pair) & states[state(cell, kGrey)] : 0u;
+  uint mask = has_pair ? maskOf(pair) & octantsOfLane() & states[state(cell, kGrey)] : 0u;
   uint triangle = has_pair ? triangleOf(cell, pair) : 0u;
   uint place[8];
   for (uint left = mask; left != 0u; left &= left - 1u) {

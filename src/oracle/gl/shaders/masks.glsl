@@ -65,12 +65,12 @@ void overlaps(vec3 v[3], out uint maybe, out uint surely) {
 
 void main() {
   countGroup();
-  uint pair = u_pairs.x + invocation();
-  bool has_pair = pair < u_pairs.y;
+  uint pair = item();
+  bool has_pair = pair < u_items.y;
   uint lane = gl_LocalInvocationIndex;
   if (lane < 8u) s_counts[lane] = 0u;
   if (lane == 0u) s_grey = s_ids = 0u;
-  uint cell = cellOf(min(pair, u_pairs.y - 1u));
+  uint cell = cellOf(min(pair, u_items.y - 1u));
   if (lane == 0u) s_cells[0] = cell;
   if (lane == GROUP - 1u) s_cells[1] = cell;
   barrier();

@@ -1,8 +1,8 @@
-// Pass 5, one invocation an octant: the normal of its slab, and the ids that the host wants, short lists in order.
+// Pass 5, eight lanes an octant: the ids that the host wants, short lists in order, and the normal of its slab.
 
 const uint kSorted = 32u;
 
-void copyIds(uint cell, int octant) {
+void copyIds(uint cell, int octant, uint lane) {
   uint row = kHeader + cell * kRow;
   uint from = answers[row + kRowList], to = kHeader + u_cell_count * kRow + answers[row + kRowIds];
   for (int o = 0; o < octant; ++o) {
@@ -11,28 +11,24 @@ void copyIds(uint cell, int octant) {
   }
   uint size = sizeOf(cell, octant);
   if (size > cells[cell].ids_up_to) return;
-  if (size > kSorted) {
-    for (uint i = 0u; i < size; ++i) answers[to + i] = lists[from + i];
-    return;
+  for (uint i = lane; i < size; i += 8u) {
+    uint id = lists[from + i], place = i;
+    if (size <= kSorted) {
+      place = 0u;
+      for (uint k = 0u; k < size; ++k) place += uint(lists[from + k] < id);
+    }
+    answers[to + place] = id;
   }
-  uint ids[kSorted];
-  for (uint i = 0u; i < size; ++i) {
-    uint id = lists[from + i];
-    int k = int(i);
-    for (; k > 0 && ids[k - 1] > id; --k) ids[k] = ids[k - 1];
-    ids[k] = id;
-  }
-  for (uint i = 0u; i < size; ++i) answers[to + i] = ids[i];
 }
 
 void main() {
   countGroup();
   if (isOverflown()) return;
-  uint index = invocation();
-  uint cell = index / 8u;
-  int o = int(index % 8u);
-  if (cell >= u_cell_count || (states[state(cell, kGrey)] >> o & 1u) == 0u) return;
-  copyIds(cell, o);
+  uint cell = item(), lane = laneOfItem();
+  int o = int(lane / 8u);
+  if (cell >= u_items.y || (states[state(cell, kGrey)] >> o & 1u) == 0u) return;
+  copyIds(cell, o, lane % 8u);
+  if (lane % 8u != 0u) return;
   if ((states[state(cell, kLoose)] >> o & 1u) != 0u || sizeOf(cell, o) > kSlabTriangles) return;
 
   float t[6];

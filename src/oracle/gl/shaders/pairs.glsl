@@ -3,7 +3,8 @@
 // spheres surely meet.
 //
 // The stack is sorted by depth, the sum of the two levels: what is taken are its deepest pairs, and what they put back
-// is deeper by one. So of each depth it has at most 64, and kWalkStack is room for all.
+// is deeper by one. It seldom holds more than 200 pairs, and a larger one would leave room for fewer groups at a time; a
+// walk that needs more room is left undone, for the host.
 
 layout(local_size_x = 64) in;
 
@@ -13,10 +14,9 @@ layout(std430, binding = 2) buffer Answers { uint answers[]; };
 
 shared uvec2 s_stack[kWalkStack];
 shared uint s_depth, s_found, s_goes_on[2];
+shared uint s_pair[kPairWords], s_check;
 
-uint g_row;  // of the pair
-
-uint word(uint at) { return pairs[g_row + at]; }
+uint word(uint at) { return s_pair[at]; }
 float number(uint at) { return uintBitsToFloat(word(at)); }
 uint ofTree(int t, uint at) { return word(kPairTrees + uint(t) * kTreeWords + at); }
 
@@ -121,9 +121,21 @@ void synchronise() {
   barrier();
 }
 
+// What is asked, and the check of it: each word times a power of kCheckFactor.
+void readPair(uint pair, uint lane) {
+  if (lane == 0u) s_check = 0u;
+  synchronise();
+  for (uint i = lane; i < kPairWords; i += 64u) {
+    uint factor = 1u;
+    for (uint k = i + 1u; k < kPairWords; ++k) factor *= kCheckFactor;
+    s_pair[i] = pairs[pair * kPairWords + i];
+    atomicAdd(s_check, s_pair[i] * factor);
+  }
+}
+
 void main() {
   uint pair = gl_WorkGroupID.x, lane = gl_LocalInvocationIndex;
-  g_row = pair * kPairWords;
+  readPair(pair, lane);
   if (lane == 0u) {
     s_stack[0] = uvec2(kRoot);
     s_depth = 1u;
@@ -144,13 +156,13 @@ void main() {
     bool goes_on = entry < taken && step(pair, s_stack[depth - taken + entry], lane & 7u, next);
     if (goes_on) atomicOr(s_goes_on[lane / 32u], 1u << (lane & 31u));
     synchronise();
+    uint after = depth - taken + uint(bitCount(s_goes_on[0]) + bitCount(s_goes_on[1]));
+    if (after > kWalkStack) break;
     if (goes_on) s_stack[depth - taken + before(lane)] = next;
-    if (lane == 0u) s_depth = depth - taken + uint(bitCount(s_goes_on[0]) + bitCount(s_goes_on[1]));
+    if (lane == 0u) s_depth = after;
   }
   if (lane != 0u) return;
-  uint sum = 0u;
-  for (uint i = 0u; i < kPairWords; ++i) sum = sum * kCheckFactor + word(i);
   uint row = kPairHeader + pair * kPairAnswer;
   answers[row] = word(kPairBatch) << 8 | s_found | (depth != 0u && (s_found & kMeet) == 0u ? kUndone : 0u);
-  answers[row + 1u] = sum;
+  answers[row + 1u] = s_check;
 }

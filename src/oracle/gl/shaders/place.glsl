@@ -2,7 +2,7 @@
 
 void main() {
   countGroup();
-  uint cell = invocation();
+  uint cell = item();
   if (cell >= u_cell_count) return;
   uint grey = states[state(cell, kGrey)];
   uint words = 0u, ids = 0u;

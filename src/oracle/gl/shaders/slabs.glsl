@@ -3,9 +3,9 @@
 void main() {
   countGroup();
   if (isOverflown()) return;
-  uint pair = u_pairs.x + invocation();
-  if (pair >= u_pairs.y) return;
-  uint mask = maskOf(pair);
+  uint pair = item();
+  if (pair >= u_items.y) return;
+  uint mask = maskOf(pair) & octantsOfLane();
   if (mask == 0u) return;
   uint cell = cellOf(pair);
   mask &= states[state(cell, kGrey)] & ~states[state(cell, kLoose)];
