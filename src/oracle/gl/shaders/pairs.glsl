@@ -8,23 +8,19 @@
 
 layout(local_size_x = 64) in;
 
-layout(std430, binding = 0) restrict readonly buffer Nodes { uint nodes[]; };  // tables of trees
-layout(std430, binding = 1) restrict readonly buffer Pairs { uint pairs[]; };
-layout(std430, binding = 2) restrict buffer Answers { uint answers[]; };
-
-const uint kMarked = 128u;
+layout(std430, binding = 0) readonly buffer Nodes { uint nodes[]; };  // tables of trees
+layout(std430, binding = 1) readonly buffer Pairs { uint pairs[]; };
+layout(std430, binding = 2) buffer Answers { uint answers[]; };
 
 shared uvec2 s_stack[kWalkStack];
 shared uint s_depth, s_found, s_goes_on[2];
 shared uint s_pair[kPairWords], s_check;
-shared uint s_marked[kMarked];  // blocks that this group has marked lately
 
 uint word(uint at) { return s_pair[at]; }
 float number(uint at) { return uintBitsToFloat(word(at)); }
 uint ofTree(int t, uint at) { return word(kPairTrees + uint(t) * kTreeWords + at); }
 
 const uint kRoot = 0xffffffffu;  // as NodeRef
-const uint kNoMark = 0xffffffffu;
 
 struct Node {
   uint level;
@@ -75,11 +71,7 @@ void defer(uint pair, uvec2 names) {
   answers[at + 3u] = word(kPairBatch);
 }
 
-// All groups mark the blocks near the roots: most of them should not have to look at the same word of memory.
 void markUsed(int t, uint block) {
-  uint mark = 2u * block + uint(t), place = mark % kMarked;
-  if (s_marked[place] == mark) return;
-  s_marked[place] = mark;
   uint at = ofTree(t, kTreeUsed) + block / 32u, bit = 1u << (block & 31u);
   if ((answers[at] & bit) == 0u) atomicOr(answers[at], bit);
 }
@@ -144,7 +136,6 @@ void readPair(uint pair, uint lane) {
 void main() {
   uint pair = gl_WorkGroupID.x, lane = gl_LocalInvocationIndex;
   readPair(pair, lane);
-  for (uint i = lane; i < kMarked; i += 64u) s_marked[i] = kNoMark;
   if (lane == 0u) {
     s_stack[0] = uvec2(kRoot);
     s_depth = 1u;
@@ -155,10 +146,11 @@ void main() {
     synchronise();
     depth = s_depth;
     bool is_done = depth == 0u || (s_found & (kMeet | kInvalid)) != 0u || steps == kMostSteps;
-    if (lane < 2u) s_goes_on[lane] = 0u;
     synchronise();
     if (is_done) break;
     ++steps;
+    if (lane < 2u) s_goes_on[lane] = 0u;
+    synchronise();
     uint taken = min(depth, 8u), entry = lane / 8u;
     uvec2 next;
     bool goes_on = entry < taken && step(pair, s_stack[depth - taken + entry], lane & 7u, next);
