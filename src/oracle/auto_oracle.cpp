@@ -98,9 +98,7 @@ void AutoOracle::measure() {
       for (const ExpansionRequest& e : timed(*host_, host_cost_)) {
         for (int o = 0; o < 8; ++o) {
           if ((e.grey >> o & 1) == 0) continue;
-          const auto first = e.lists.begin();
-          next_lists.emplace_back(first + static_cast<std::ptrdiff_t>(e.list_begin[static_cast<std::size_t>(o)]),
-                                  first + static_cast<std::ptrdiff_t>(e.list_begin[static_cast<std::size_t>(o) + 1]));
+          next_lists.emplace_back(e.listBegin(o), e.listEnd(o));
           next.push_back(root);
           next.back().cell = e.cell.octant(o);
           next.back().ids = next_lists.back().data();

@@ -50,8 +50,15 @@ struct ExpansionRequest {
   bounds::NodeBounds own;                     ///< Of the cell itself: what the octants taught about it.
   std::vector<std::uint32_t> lists;           ///< Triangles of octant 0, of octant 1, ...
   std::array<std::uint32_t, 9> list_begin{};  ///< Octant o has lists[list_begin[o]] to lists[list_begin[o + 1]].
-  std::shared_ptr<const DeviceResource> kept_resource;  ///< Holds the lists that the oracle keeps.
+  std::shared_ptr<const std::vector<std::uint32_t>> batch_lists;  ///< In place of `lists`: those of a whole batch.
+  std::shared_ptr<const DeviceResource> kept_resource;            ///< Holds the lists that the oracle keeps.
   std::array<DeviceList, 8> device_lists{};  ///< Where it has octant o's, if count is not 0; it is then not in `lists`.
+
+  /// The triangles of octant o that are here.
+  const std::uint32_t* listBegin(int o) const {
+    return (batch_lists != nullptr ? *batch_lists : lists).data() + list_begin[static_cast<std::size_t>(o)];
+  }
+  const std::uint32_t* listEnd(int o) const { return listBegin(o + 1); }
 
   std::size_t listSize(int o) const { return std::size_t{list_begin[o + 1]} - list_begin[o] + device_lists[o].count; }
 };

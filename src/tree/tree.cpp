@@ -413,7 +413,7 @@ ChildRef Tree::addDeviceList(const std::shared_ptr<const oracle::DeviceResource>
 
 ChildRef Tree::addOctantList(const oracle::ExpansionRequest& answer, int octant) {
   const std::size_t count = answer.listSize(octant),
-                    all = answer.lists.size() +
+                    all = answer.list_begin[8] - answer.list_begin[0] +
                           std::accumulate(answer.device_lists.begin(), answer.device_lists.end(), std::size_t{0},
                                           [](std::size_t sum, const oracle::ExpansionRequest::DeviceList&kept) {
                                             return sum + kept.count;
@@ -421,7 +421,7 @@ ChildRef Tree::addOctantList(const oracle::ExpansionRequest& answer, int octant)
   // Triangles so large that division only copies them: going on would take memory without end and cull nothing.
   const bool hopeless = all > 2 * answer.count && 4 * count > 3 * answer.count;
   const oracle::ExpansionRequest::DeviceList& kept = answer.device_lists[static_cast<std::size_t>(octant)];
-  if (kept.count == 0) return addList(answer.lists.data() + answer.list_begin[octant], count, hopeless);
+  if (kept.count == 0) return addList(answer.listBegin(octant), count, hopeless);
   if (hopeless && !conservative()) {
     // A leaf's triangles are needed here.
     std::vector<std::uint32_t> ids(count);

@@ -46,9 +46,7 @@ void expansionOfList(benchmark::State& state) {
     for (int o = 1; o < 8; ++o) {
       if (e.listSize(o) > e.listSize(fullest)) fullest = o;
     }
-    const auto begin = e.lists.begin();
-    ids.assign(begin + static_cast<std::ptrdiff_t>(e.list_begin[fullest]),
-               begin + static_cast<std::ptrdiff_t>(e.list_begin[fullest + 1]));
+    ids.assign(e.listBegin(fullest), e.listEnd(fullest));
     const lattice::Cell cell = e.cell.octant(fullest);
     e = ExpansionRequest();
     e.surface = &surface;

@@ -118,8 +118,7 @@ struct Levels {
       for (const ExpansionRequest& e : ask(cpu, level)) {
         for (std::size_t o = 0; o < 8; ++o) {
           if ((e.grey >> o & 1) == 0) continue;
-          lists.back().emplace_back(e.lists.begin() + static_cast<std::ptrdiff_t>(e.list_begin[o]),
-                                    e.lists.begin() + static_cast<std::ptrdiff_t>(e.list_begin[o + 1]));
+          lists.back().emplace_back(e.listBegin(static_cast<int>(o)), e.listEnd(static_cast<int>(o)));
           next.push_back(rootOf(surface));
           next.back().cell = e.cell.octant(static_cast<int>(o));
           next.back().ids = lists.back().back().data();
@@ -157,8 +156,7 @@ void expectSameAnswers(const std::vector<ExpansionRequest>& asked, const std::ve
     // An order is not promised.
     for (std::size_t o = 0; o < 8; ++o) {
       const auto sorted = [o](const ExpansionRequest& e) {
-        std::vector<std::uint32_t> ids(e.lists.begin() + static_cast<std::ptrdiff_t>(e.list_begin[o]),
-                                       e.lists.begin() + static_cast<std::ptrdiff_t>(e.list_begin[o + 1]));
+        std::vector<std::uint32_t> ids(e.listBegin(static_cast<int>(o)), e.listEnd(static_cast<int>(o)));
         std::sort(ids.begin(), ids.end());
         return ids;
       };

@@ -193,8 +193,7 @@ void expectRight(const std::vector<ExpansionRequest>& answers, const std::string
     for (int o = 0; o < 8; ++o) {
       const lattice::Cell octant = e.cell.octant(o);
       const bounds::NodeBounds b = e.octants.get(static_cast<std::size_t>(o));
-      const auto begin = e.lists.begin() + static_cast<std::ptrdiff_t>(e.list_begin[static_cast<std::size_t>(o)]),
-                 end = e.lists.begin() + static_cast<std::ptrdiff_t>(e.list_begin[static_cast<std::size_t>(o) + 1]);
+      const auto begin = e.listBegin(o), end = e.listEnd(o);
       for (std::size_t i = 0; i < e.count; ++i) {
         const std::uint32_t t = e.ids != nullptr ? e.ids[i] : static_cast<std::uint32_t>(i);
         if ((expected.grey >> o & 1) == 0 || !meets(*e.surface, t, octant)) continue;

@@ -78,8 +78,7 @@ void checkMesh(Oracle& oracle, const Surface& here, int levels, std::size_t most
         const Cell octant = e.cell.octant(o);
         const bool grey = e.grey >> o & 1;
         ASSERT_EQ(grey, referenceGrey(surface, octant)) << "level " << octant.level << " octant " << o;
-        const std::vector<std::uint32_t> list(e.lists.begin() + static_cast<std::ptrdiff_t>(e.list_begin[o]),
-                                              e.lists.begin() + static_cast<std::ptrdiff_t>(e.list_begin[o + 1]));
+        const std::vector<std::uint32_t> list(e.listBegin(static_cast<int>(o)), e.listEnd(static_cast<int>(o)));
         if (!grey) {
           ASSERT_TRUE(list.empty());
           continue;

@@ -142,6 +142,7 @@ class Expander {
     e_.list_begin[0] = 0;
     for (int o = 0; o < 8; ++o) e_.list_begin[o + 1] = e_.list_begin[o] + sizes[o];
     e_.lists.resize(e_.list_begin[8]);
+    e_.batch_lists = nullptr;
     std::array<std::size_t, 8> next;
     std::copy_n(e_.list_begin.begin(), 8, next.begin());
     for (std::size_t i = 0; i < e_.count; ++i) {

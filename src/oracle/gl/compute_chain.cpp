@@ -196,6 +196,8 @@ void ComputeChain::take(const std::vector<ExpansionRequest*>& requests, const st
                         Thread& thread) const {
   const std::uint32_t* const all_ids = answers + kHeader + requests.size() * kRow;
   thread.require(all_ids[answers[kIdWords]] == batch_, "what came back is not of this batch");
+  // One vector for all: as many of them as cells would take longer than the rest.
+  const auto lists = std::make_shared<const std::vector<std::uint32_t>>(all_ids, all_ids + answers[kIdWords]);
   for (std::size_t i = 0; i < requests.size(); ++i) {
     ExpansionRequest& e = *requests[i];
     const std::uint32_t* const row = answers + kHeader + i * kRow;
@@ -206,11 +208,10 @@ void ComputeChain::take(const std::vector<ExpansionRequest*>& requests, const st
     e.octants = answer.octants;
     e.own = answer.own;
     e.grey = answer.grey;
-    const std::uint32_t* const ids = all_ids + row[kRowIds];
     // Without branches: octants differ in what they keep.
     const auto up_to = static_cast<std::uint32_t>(std::min<std::size_t>(e.ids_up_to, 0xffffffff));
     std::uint32_t list = row[kRowList], kept = 0;
-    std::size_t here = 0;  // ids of the lists that came back lie one after the other
+    std::size_t here = row[kRowIds];  // the lists that came back lie one after the other
     for (std::size_t o = 0; o < 8; ++o) {
       const std::uint32_t size = row[kRowSizes + o];
       const std::uint32_t stays = size > up_to ? size : 0;
@@ -222,8 +223,8 @@ void ComputeChain::take(const std::vector<ExpansionRequest*>& requests, const st
     }
     e.kept_resource = kept != 0 ? placed_ : nullptr;
     e.list_begin[8] = static_cast<std::uint32_t>(here);
-    thread.require(row[kRowIds] + here <= answers[kIdWords], "a list is longer than what came back");
-    e.lists.assign(ids, ids + here);
+    thread.require(here <= answers[kIdWords], "a list is longer than what came back");
+    e.batch_lists = lists;
   }
 }
 

@@ -55,10 +55,8 @@ KnownPairs::Tree KnownPairs::treeOf(const Surface& surface, int levels) {
     }
     for (std::size_t o = 0; o < 8; ++o) {
       if ((request.grey >> o & 1) == 0) continue;
-      const auto first = request.lists.begin();
       entries.push_back({e.cell.octant(static_cast<int>(o)),
-                         {first + static_cast<std::ptrdiff_t>(request.list_begin[o]),
-                          first + static_cast<std::ptrdiff_t>(request.list_begin[o + 1])},
+                         {request.listBegin(static_cast<int>(o)), request.listEnd(static_cast<int>(o))},
                          at + node_table::kChildren + o});
     }
   }

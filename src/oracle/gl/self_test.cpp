@@ -144,9 +144,8 @@ std::string compare(const Question& question, const ExpansionRequest& e, const s
 
 std::vector<Ids> listsOf(const ExpansionRequest& e) {
   std::vector<Ids> lists;
-  for (std::size_t o = 0; o < 8; ++o) {
-    lists.emplace_back(e.lists.begin() + static_cast<std::ptrdiff_t>(e.list_begin[o]),
-                       e.lists.begin() + static_cast<std::ptrdiff_t>(e.list_begin[o + 1]));
+  for (int o = 0; o < 8; ++o) {
+    lists.emplace_back(e.listBegin(o), e.listEnd(o));
   }
   return lists;
 }

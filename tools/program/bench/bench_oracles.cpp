@@ -57,9 +57,7 @@ Level childrenOf(std::vector<ExpansionRequest>& answers) {
         child.resource = e.kept_resource;
         child.resource_begin = e.device_lists[o].begin;
       } else {
-        const auto list = e.lists.begin();
-        next.ids.back().assign(list + static_cast<std::ptrdiff_t>(e.list_begin[o]),
-                               list + static_cast<std::ptrdiff_t>(e.list_begin[o + 1]));
+        next.ids.back().assign(e.listBegin(static_cast<int>(o)), e.listEnd(static_cast<int>(o)));
       }
       next.requests.push_back(std::move(child));
     }
