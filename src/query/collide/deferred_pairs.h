@@ -22,11 +22,13 @@ class DeferredPairs {
   /// Pairs in the first batch of a walk that may end early; a few oracle answers cost less than one too many.
   static constexpr std::size_t kFirstBatch = 2;
 
-  void clear(std::size_t first_batch = kFirstBatch) {
+  void clear() {
     waiting_.clear();
-    batch_ = first_batch;
+    batch_ = kFirstBatch;
   }
   bool empty() const { return waiting_.empty(); }
+  /// Are there as many as the next batch takes?
+  bool fillsBatch() const { return waiting_.size() >= batch_; }
   void add(const Pair& pair) { waiting_.push_back({pair, kUnknown}); }
 
   /// Forgets the pairs of which f says that nobody asks for them any more.

@@ -160,7 +160,7 @@ HWY_INLINE std::uint32_t first(const SphereGroup& group, std::uint32_t octants) 
   return hn::GetLane(hn::MinOfLanes(du, least));
 }
 
-// Decodes a node of a pair that was pushed without frames into a frame, and returns its lane.
+// Decodes a node of a pair that has no frames into a frame, and returns its lane.
 HWY_NOINLINE std::uint32_t lookUp(SphereSteps& s, int side, tree::NodeRef node, std::uint32_t frame) {
   const tree::Tree& tree = s.side[side]->tree();
   const std::uint32_t root[3] = {0, 0, 0};
@@ -352,6 +352,10 @@ unsigned decideMeeting(const SphereSteps& s, int own, std::uint32_t index, unsig
 }
 
 SphereSteps::Event nextEvent(SphereSteps& steps) { return HWY_DYNAMIC_DISPATCH(NextEvent)(steps); }
+
+void leaveFrames(SphereSteps& s) {
+  for (std::size_t i = 0; i < s.depth; ++i) s.stack[i].frames = 0;
+}
 
 void pushPair(SphereSteps& s, tree::NodeRef node_a, tree::NodeRef node_b) {
   const tree::Tree &a = s.side[0]->tree(), &b = s.side[1]->tree();

@@ -59,7 +59,7 @@ struct SphereGroup {
   std::uint32_t block;    ///< As NodeRef names it, so the root is octant 7 of a block that there is not.
   std::uint32_t level;    ///< Of the octants.
   std::uint32_t frame;    ///< Where they are.
-  std::uint32_t frames;   ///< How many are in use: for the octants, and for what is above both nodes.
+  std::uint32_t frames;   ///< How many are in use: for the octants, and for what is above both nodes. 0: it has none.
   std::uint32_t octants;  ///< A bit each.
   /// Of each a number whose lowest three bits are the octant; the least comes first.
   std::uint32_t order[8];
@@ -110,7 +110,10 @@ struct SphereSteps {
 /// Goes on to the next event. Chosen at run time for the machine's instruction set.
 SphereSteps::Event nextEvent(SphereSteps& steps);
 
-/// Puts a pair of nodes on the stack.
+/// What is on the stack no longer needs its frames, so that pairs can be pushed on top of it.
+void leaveFrames(SphereSteps& steps);
+
+/// Puts a pair of nodes on the stack, which must be empty or have left its frames.
 void pushPair(SphereSteps& steps, tree::NodeRef node_a, tree::NodeRef node_b);
 
 }  // namespace bocst::query
