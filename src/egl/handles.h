@@ -44,8 +44,9 @@ using VertexArray = Handle<detail::makeArray, detail::endArray>;
 using Framebuffer = Handle<detail::makeFramebuffer, detail::endFramebuffer>;
 using Renderbuffer = Handle<detail::makeRenderbuffer, detail::endRenderbuffer>;
 
-/// A buffer object that knows its size. The host reads it by Staging: after one glGetBufferSubData, a driver may keep all
-/// of a buffer in host memory (NVIDIA's does, and then moves it at each use). @throws OracleError when the device has no memory for it.
+/// A buffer object that knows its size. @throws OracleError when the device has no memory for it.
+/// The host reads it by Staging: after one glGetBufferSubData, a driver may keep all of a buffer in host memory, as
+/// NVIDIA's does, which then moves it at each use.
 class Buffer {
  public:
   Buffer() = default;

@@ -144,9 +144,7 @@ std::string compare(const Question& question, const ExpansionRequest& e, const s
 
 std::vector<Ids> listsOf(const ExpansionRequest& e) {
   std::vector<Ids> lists;
-  for (int o = 0; o < 8; ++o) {
-    lists.emplace_back(e.listBegin(o), e.listEnd(o));
-  }
+  for (int o = 0; o < 8; ++o) lists.emplace_back(e.listBegin(o), e.listEnd(o));
   return lists;
 }
 

@@ -171,7 +171,9 @@ void addBench(CLI::App& program, Job& job) {
       ->delimiter(',')
       ->allow_extra_args(false)
       ->capture_default_str();
-  command->add_option("--poses", bench->request.poses, "number of random poses; with --oracles: of one call of collidePoses")
+  command
+      ->add_option("--poses", bench->request.poses,
+                   "number of random poses; with --oracles: of one call of collidePoses")
       ->check(positive())
       ->capture_default_str();
   command->add_option("--seed", bench->request.seed, "the same seed gives the same poses")->capture_default_str();
