@@ -81,14 +81,15 @@ bool SphereWalk::search(SphereSteps& steps, Scratch& s, Visitor& visitor) const 
         break;
       case SphereSteps::kDeferred:
         s.deferred.add({steps.pair[0], steps.pair[1]});
-        // Here and not at the end: a hit is rather below the nearest octants than anywhere in what is resident.
+        // Now and not at the end: a hit is more likely below the nearest octants than elsewhere in the resident nodes.
         if (visitor.endsAtFirst() && s.deferred.fillsBatch()) {
           leaveFrames(steps);
           grow();
         }
         break;
       case SphereSteps::kLeaves:
-        // What has grown comes in another place in a new walk, which must grow nothing when the query is asked again.
+        // A query that is asked again must grow nothing, and its walk visits in another order what has grown here: so
+        // it walks from the root until nothing grows.
         if (visitor.endsAtFirst() && has_grown) {
           start();
         } else if (visitLeaves(steps, visitor)) {
