@@ -41,7 +41,10 @@ bool Sweep<S>::setFar(const World<S>& world, const fcl::Transform3<S>* X_WM, std
   // Of random states, the straight way of one object shows it: the one that did before is asked first.
   for (std::size_t n = 0, i = farthest_ % moving; n < moving && !is_measured_; ++n, i = i + 1 < moving ? i + 1 : 0) {
     const Eigen::Vector3d& c = world.moving[i].bounds.center;
-    const auto at = [&](std::size_t k) { return X_WM[k * moving + i].template cast<double>() * c; };
+    const auto at = [&](std::size_t k) -> Eigen::Vector3d {
+      const fcl::Transform3<S>& X = X_WM[k * moving + i];
+      return X.linear().template cast<double>() * c + X.translation().template cast<double>();
+    };
     const Eigen::Vector3d between = at(middle);
     if (isTooFar(i, std::max((at(part.begin) - between).norm(), (at(last) - between).norm()))) return false;
   }
@@ -96,8 +99,6 @@ template <typename S>
 std::size_t Sweep<S>::run(const World<S>& world, const fcl::Transform3<S>* X_WM, std::size_t states, Goal goal,
                           std::uint8_t* hit, const std::vector<double>& orthogonality_errors) {
   const std::size_t moving = world.moving.size();
-  if (goal == Goal::kAll) std::fill(hit, hit + states, std::uint8_t{0});
-  if (states == 0 || moving == 0) return states;
   check_.start(world);
   check_.lists_after_hit = goal != Goal::kAny;
   check_.orthogonality_errors.assign(orthogonality_errors.begin(), orthogonality_errors.end());
@@ -123,15 +124,17 @@ std::size_t Sweep<S>::run(const World<S>& world, const fcl::Transform3<S>* X_WM,
     if (touches) {
       rest = part;
     } else {
-      const bool whole = part.end - part.begin > 1 && setFar(world, X_WM, states, part, middle);
+      // The middle of an edge is asked alone: half of the edges that are not free end there.
+      const bool alone = part.end - part.begin == 1 || (goal == Goal::kAny && front == 1);
+      const bool whole = !alone && setFar(world, X_WM, states, part, middle);
       if (!whole) std::fill(check_.far.begin(), check_.far.end(), 0.0);
       found_.clear();
       std::vector<Entry>* entries = whole ? &found_ : nullptr;
       if (part.has_list) {
-        touches = check_.run(X, entries_.data() + part.first, entries_.data() + part.last, entries, nullptr);
+        touches = check_.run(X, entries_.data() + part.first, entries_.data() + part.last, entries);
         if (!whole) rest = part;
       } else {
-        touches = check_.runAll(X, entries, nullptr);
+        touches = check_.runAll(X, entries);
       }
       if (whole) {
         rest.has_list = true;

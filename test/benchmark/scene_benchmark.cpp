@@ -249,91 +249,129 @@ struct Times {
   }
 };
 
+// FCL and bocst are asked in long turns, as a planner uses one of them: in short ones each finds its data evicted from
+// the caches by the other.
 void measure(Both& both, unsigned seed, bool with_distances) {
   std::mt19937_64 g(seed);
-  constexpr std::size_t kBlock = 200;
+  constexpr std::size_t kStates = 10000, kStatesInTurn = 2000;
   constexpr int kSettle = 15;
-  // Fresh: asked for the first time, so that trees grow. Again: the same states once more. Settled: when nothing grows.
-  Times fresh, again, settled;
-  std::size_t hits = 0, wrong = 0, states = 0;
-  for (std::size_t block = 0; block < 50; ++block) {
-    Poses X(kBlock * kJoints);
-    for (std::size_t k = 0; k < kBlock; ++k) forward(randomJoints(g), &X[k * kJoints]);
-    std::vector<std::uint8_t> expected(kBlock), hit(kBlock);
-    for (Times* t : {&fresh, &again, &settled}) {
-      for (int k = 0; t == &settled && k < kSettle; ++k) both.scene->collisions(X.data(), kBlock, hit.data());
+  // First: asked for the first time, so that trees grow. Again: the same states once more. Settled: when nothing grows.
+  // New: states that were never asked, of the settled trees.
+  Poses X(2 * kStates * kJoints);
+  for (std::size_t k = 0; k < 2 * kStates; ++k) forward(randomJoints(g), &X[k * kJoints]);
+  std::vector<std::uint8_t> expected(kStates), hit(kStates);
+  const auto timeStates = [&](const char* what, const fcl::Transform3d* X_WM) {
+    Times times;
+    for (std::size_t begin = 0; begin < kStates; begin += kStatesInTurn) {
+      const fcl::Transform3d* turn = X_WM + begin * kJoints;
       double start = now();
-      for (std::size_t k = 0; k < kBlock; ++k) expected[k] = both.fclCollides(&X[k * kJoints]);
-      t->fcl += now() - start;
+      for (std::size_t k = 0; k < kStatesInTurn; ++k) expected[begin + k] = both.fclCollides(turn + k * kJoints);
+      times.fcl += now() - start;
       start = now();
-      both.scene->collisions(X.data(), kBlock, hit.data());
-      t->bocst += now() - start;
-      for (std::size_t k = 0; k < kBlock; ++k) wrong += hit[k] != expected[k];
+      both.scene->collisions(turn, kStatesInTurn, &hit[begin]);
+      times.bocst += now() - start;
     }
-    hits += static_cast<std::size_t>(std::count(hit.begin(), hit.end(), 1));
-    states += kBlock;
-  }
-  fresh.print("random states", states, hits, wrong);
-  again.print("random states again", states, hits, wrong);
-  settled.print("random states, settled", states, hits, wrong);
+    std::size_t hits = 0, wrong = 0;
+    for (std::size_t k = 0; k < kStates; ++k) {
+      hits += hit[k];
+      wrong += hit[k] != expected[k];
+    }
+    times.print(what, kStates, hits, wrong);
+  };
+  timeStates("random states", X.data());
+  timeStates("random states again", X.data());
+  for (int k = 0; k < kSettle; ++k) both.scene->collisions(X.data(), kStates, hit.data());
+  timeStates("random states, settled", X.data());
+  timeStates("new random states", &X[kStates * kJoints]);
 
   // Edges as a planner extends its tree: from a free state, up to 1 rad, in steps of 0.02 rad.
-  Times any, any_again, any_settled, first;
-  std::size_t edges = 0;
-  states = hits = wrong = 0;
-  Poses one(kJoints);
-  while (edges < 400) {
-    const Joints from = randomJoints(g);
-    forward(from, one.data());
-    if (both.fclCollides(one.data())) continue;
-    Joints displacement = randomJoints(g) - from;
-    const double length = std::min(1.0, displacement.norm());
-    displacement.normalize();
-    const auto count = static_cast<std::size_t>(length / 0.02);
-    Poses X(count * kJoints);
-    for (std::size_t k = 0; k < count; ++k)
-      forward(from + 0.02 * static_cast<double>(k + 1) * displacement, &X[k * kJoints]);
-    bool expected = false;
-    for (Times* t : {&any, &any_again, &any_settled}) {
-      for (int k = 0; t == &any_settled && k < kSettle; ++k) both.scene->anyCollision(X.data(), count);
-      double start = now();
-      expected = fclAny(both, X.data(), count);
-      t->fcl += now() - start;
-      start = now();
-      wrong += both.scene->anyCollision(X.data(), count) != expected;
-      t->bocst += now() - start;
+  std::vector<std::vector<Joints>> edges;
+  std::size_t states = 0;
+  const auto addEdges = [&](std::size_t count) {
+    edges.clear();
+    states = 0;
+    Poses one(kJoints);
+    while (edges.size() < count) {
+      const Joints from = randomJoints(g);
+      forward(from, one.data());
+      if (both.fclCollides(one.data())) continue;
+      Joints displacement = randomJoints(g) - from;
+      const double length = std::min(1.0, displacement.norm());
+      displacement.normalize();
+      std::vector<Joints>& edge = edges.emplace_back();
+      for (std::size_t k = 0; k < static_cast<std::size_t>(length / 0.02); ++k)
+        edge.push_back(from + 0.02 * static_cast<double>(k + 1) * displacement);
+      states += edge.size();
     }
-    double start = now();
+  };
+  // Asks about all edges; returns the seconds that the answers took. The poses are computed just before each, untimed.
+  const auto askEdges = [&](const auto& ask, std::vector<std::size_t>& answers) {
+    double seconds = 0;
+    Poses poses;
+    for (const std::vector<Joints>& edge : edges) {
+      poses.resize(edge.size() * kJoints);
+      for (std::size_t k = 0; k < edge.size(); ++k) forward(edge[k], &poses[k * kJoints]);
+      const double start = now();
+      answers.push_back(ask(poses.data(), edge.size()));
+      seconds += now() - start;
+    }
+    return seconds;
+  };
+  // `fcl` and `bocst` answer one edge; an answer of 0 is a free edge.
+  const auto timeEdges = [&](const char* what, const auto& fcl, const auto& bocst) {
+    Times times;
+    std::vector<std::size_t> theirs, ours;
+    times.fcl = askEdges(fcl, theirs);
+    times.bocst = askEdges(bocst, ours);
+    std::size_t hits = 0, wrong = 0;
+    for (std::size_t k = 0; k < edges.size(); ++k) {
+      hits += theirs[k] != 0;
+      wrong += ours[k] != theirs[k];
+    }
+    times.print(what, edges.size(), hits, wrong);
+  };
+  const auto fclHits = [&](const fcl::Transform3d* X_WM, std::size_t count) -> std::size_t {
+    return fclAny(both, X_WM, count);
+  };
+  const auto bocstHits = [&](const fcl::Transform3d* X_WM, std::size_t count) -> std::size_t {
+    return both.scene->anyCollision(X_WM, count);
+  };
+  // States from the first that collides on.
+  const auto fclBlocked = [&](const fcl::Transform3d* X_WM, std::size_t count) {
     std::size_t at = 0;
-    while (at < count && !both.fclCollides(&X[at * kJoints])) ++at;
-    first.fcl += now() - start;
-    start = now();
-    wrong += both.scene->firstCollision(X.data(), count) != at;
-    first.bocst += now() - start;
-    hits += expected;
-    states += count;
-    ++edges;
-  }
-  std::printf("  %zu edges of %zu states:\n", edges, states / edges);
-  any.print("edge, any collision", edges, hits, wrong);
-  any_again.print("edge again, any collision", edges, hits, wrong);
-  any_settled.print("edge settled, any collision", edges, hits, wrong);
-  first.print("edge, first collision", edges, hits, wrong);
+    while (at < count && !both.fclCollides(X_WM + at * kJoints)) ++at;
+    return count - at;
+  };
+  const auto bocstBlocked = [&](const fcl::Transform3d* X_WM, std::size_t count) {
+    return count - both.scene->firstCollision(X_WM, count);
+  };
+  constexpr std::size_t kEdges = 400;
+  addEdges(kEdges);
+  std::printf("  %zu edges of %zu states:\n", kEdges, states / kEdges);
+  timeEdges("edge, any collision", fclHits, bocstHits);
+  timeEdges("edge again, any collision", fclHits, bocstHits);
+  std::vector<std::size_t> answers;
+  for (int k = 0; k < kSettle; ++k) askEdges(bocstHits, answers);
+  timeEdges("edge settled, any collision", fclHits, bocstHits);
+  addEdges(kEdges);
+  timeEdges("new edge, any collision", fclHits, bocstHits);
+  timeEdges("edge, first collision", fclBlocked, bocstBlocked);
 
   if (!with_distances) return;
   Times t;
-  hits = wrong = 0;
+  Poses one(kJoints);
+  std::size_t hits = 0, wrong = 0;
   const std::size_t asked = 150;
   for (std::size_t k = 0; k < asked; ++k) {
     forward(randomJoints(g), one.data());
     double start = now();
-    const double expected = both.fclClearance(one.data());
+    const double distance = both.fclClearance(one.data());
     t.fcl += now() - start;
     start = now();
     const double d = both.scene->clearance(one.data());
     t.bocst += now() - start;
-    wrong += std::abs(d - expected) > 1e-6;
-    hits += expected <= 0;
+    wrong += std::abs(d - distance) > 1e-6;
+    hits += distance <= 0;
   }
   t.print("clearance", asked, hits, wrong);
 }
