@@ -11,9 +11,8 @@ namespace bocst {
 /// is `fcl::distance(...) <= distance` up to rounding; 0 tests for contact. Solids and shapes include their inside.
 ///
 /// Pairs are those of bocst::collide (<bocst/fcl.h>); o1 and o2 may be in either order. The surface of a model with
-/// conservative answers is the set of its cells' spheres. Options::margin has no effect here. An empty model and a
-/// geometry that is not occupied (CollisionGeometry::threshold_occupied) are closer to nothing, as collide() finds them
-/// in contact with nothing.
+/// conservative answers is the set of its cells' spheres. Options::margin has no effect here. The answer is false if
+/// one of the two is an empty model or is not occupied (CollisionGeometry::isOccupied()).
 ///
 /// Thread rule: as collide(); any number of queries may run at the same time.
 /// @throws std::invalid_argument for a pose that is not rigid, or a distance that is negative, NaN or infinite;

@@ -16,7 +16,8 @@ enum class Subdivision {
 /// How a query tests for contact.
 enum class Answer {
   kExact,         ///< Triangle tests at the leaves: FCL's mesh-mesh answer.
-  kConservative,  ///< Sphere tests at Options::depth, as in the paper: no misses; overestimates by the sphere size.
+  kConservative,  ///< Sphere tests at Options::depth, as in the paper. No contact is missed; surfaces that are apart by
+                  ///< less than the diameters of two spheres, one of each model, may be reported as touching.
 };
 
 /// The backend that subdivides cells: it finds the octants that the surface meets.

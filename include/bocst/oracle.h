@@ -23,8 +23,9 @@ struct OracleInfo {
   std::string device;                  ///< Name of the device, for display.
   bool hardware = false;               ///< True if it runs on a GPU.
   std::string why_not;                 ///< Empty if it can be used; else the reason why not.
-  /// Result of the self-tests, which compare the device's answers with the CPU's before the device is used: "passed in
-  /// 20 ms", and for compute whether it walks, too. Empty if there was no test: for the CPU, for "sampled", and if
+  /// Result of the self-tests, which compare the device's answers with the CPU's before the device is used: for example
+  /// "passed in 20 ms; walks passed". The second part is for compute only: whether the device may also test many poses
+  /// of two trees (collidePoses(), Scene::collisions()). Empty if there was no test: for the CPU, for "sampled", and if
   /// why_not is not empty.
   std::string self_test = {};
 };

@@ -17,14 +17,16 @@ struct Statistics {
   std::uint64_t oracle_cells = 0;            ///< Cells that the oracle tested (eight octants per plain expansion).
   std::uint64_t expanded_octants = 0;        ///< Octants of expanded nodes that have an actual region; the paper makes
                                              ///< an occlusion query for each (5.4), from up to three sides.
-  std::uint64_t built_triangles = 0;  ///< Triangles that exact answers have sorted into the tree so far. Between two
-                                      ///< times at which only the root is resident: at most 1.25 times the mesh's
-                                      ///< triangles, plus those of one expansion.
+  std::uint64_t built_triangles = 0;  ///< Triangles that exact answers have sorted into the tree so far. From one time
+                                      ///< at which only the root is resident to the next: at most 1.25 times the
+                                      ///< mesh's triangles (2.25 times with Options::build_ahead), plus those of one
+                                      ///< expansion.
   std::uint64_t pruned_nodes = 0;     ///< Nodes dropped by ttl, budget, prune() or updateVertices().
   std::size_t mesh_bytes = 0;         ///< Heap bytes of the mesh (other models may share them; 0 after releaseMesh(),
                                       ///< except while queries need it) and of the data for `solid`.
-  std::size_t device_bytes = 0;  ///< Bytes on a GPU: the mesh (other models may share it) and triangle lists. What two
-                                 ///< models expanded together counts for both. 0 with the CPU oracle.
+  std::size_t device_bytes = 0;  ///< Bytes on a GPU: the mesh (other models may share it) and triangle lists. The lists
+                                 ///< of a batch that two models expanded together are counted for each of them. 0 with
+                                 ///< the CPU oracle.
 };
 
 }  // namespace bocst

@@ -218,7 +218,7 @@ AutoOracle::Pending AutoOracle::makePending(std::vector<ExpansionRequest>& batch
 }
 
 void AutoOracle::learn(CostModel& model, const Work& work, double seconds) {
-  const std::unique_lock<std::mutex> lock(books_, std::try_to_lock);
+  const std::unique_lock<std::mutex> lock(costs_mutex_, std::try_to_lock);
   if (lock.owns_lock()) model.learn(work.cells, work.triangles, seconds);
 }
 
@@ -239,7 +239,7 @@ std::list<AutoOracle::Pending>& AutoOracle::pendingOfThread() {
 void AutoOracle::submit(std::vector<ExpansionRequest>& batch) {
   std::list<Pending> made;
   {
-    const std::unique_lock<std::mutex> lock(books_, std::try_to_lock);
+    const std::unique_lock<std::mutex> lock(costs_mutex_, std::try_to_lock);
     if (lock.owns_lock()) {
       const std::vector<Candidate> share = chooseShare(batch);
       if (!share.empty()) made.push_back(makePending(batch, share));

@@ -21,7 +21,7 @@ namespace bocst::oracle {
 ///
 /// A mesh is uploaded when batches would have taken less time, by as much as the upload takes, had it been there.
 ///
-/// Threads: any number. A thread that finds another at the books below asks the host.
+/// Threads: any number. A thread that finds costs_mutex_ locked asks the host.
 class BOCST_EXPORT AutoOracle : public Oracle {
  public:
   using Seconds = std::function<double()>;  ///< A clock.
@@ -104,8 +104,8 @@ class BOCST_EXPORT AutoOracle : public Oracle {
 
   const std::shared_ptr<Oracle> host_, device_;
   const Seconds clock_;
-  // What follows is the books. Nobody waits for them: a child after fork() may find them locked for ever.
-  std::mutex books_;
+  // For what follows. Only try_lock is used: a child after fork() may find it locked for ever.
+  std::mutex costs_mutex_;
   CostModel host_cost_, device_cost_, upload_cost_;
   std::map<const Mesh*, Known> meshes_;
   std::size_t live_meshes_ = 0;  // when forgotten ones were last dropped

@@ -105,7 +105,7 @@ class Oracle {
 
   // Conservative answers to many poses, walked where the oracle works.
 
-  /// Should it walk so many pairs, rather than the host?
+  /// True if this oracle is expected to walk so many pairs faster than the host.
   virtual bool walksPairs(std::size_t) { return false; }
 
   /// Brings a table of nodes (node_table) to where the oracle works; null where it cannot. Changes the words.
@@ -117,7 +117,7 @@ class Oracle {
     walks.deferred.clear();
   }
 
-  /// So long took a walk over so many pairs, uploads included, by the oracle or by the host in its stead.
+  /// Tells how long a walk over `pairs` took, uploads included. `by_host`: the host walked, not the oracle.
   virtual void pairsTook(std::size_t /*pairs*/, double /*seconds*/, bool /*by_host*/) {}
 
   /// The ids of a list that this oracle keeps; false when it has lost them.

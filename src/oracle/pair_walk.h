@@ -12,8 +12,8 @@ class DeviceResource;
 
 /// The resident nodes of a sphere-tree as a device walks them: for each block kWords words.
 namespace node_table {
-constexpr std::uint32_t kPlace = 0;     ///< The expanded cell's x and, above 16 bits, y,
-constexpr std::uint32_t kShape = 1;     ///< z, above 16 bits its level, and above 24 the mask of its grey octants.
+constexpr std::uint32_t kPlace = 0;     ///< Bits 0 to 15: the expanded cell's x; 16 to 31: its y.
+constexpr std::uint32_t kShape = 1;     ///< Bits 0 to 15: its z; 16 to 23: its level; 24 to 31: its grey octants.
 constexpr std::uint32_t kChildren = 2;  ///< 8: the block of each octant, or kNone.
 constexpr std::uint32_t kStamp = 10;    ///< Of the upload: what did not arrive has another. The oracle's.
 constexpr std::uint32_t kWords = 11;
@@ -32,12 +32,12 @@ struct PairWalks {
   };
   struct Pair {
     std::uint32_t tree[2] = {0, 0};  ///< Of `trees`.
-    float rotation[3][3] = {};       ///< Row j of what turns coordinates about the middle of root 1 into those ...
-    float shift[3] = {0, 0, 0};      ///< ... about the middle of root 0, and what is added then.
+    float rotation[3][3] = {};       ///< Rows: p_0 = rotation * p_1 + shift, for points p_i in lattice units ...
+    float shift[3] = {0, 0, 0};      ///< ... of tree i from the middle of its root, those of tree 1 times `unit`.
     float unit = 1;                  ///< A lattice unit of tree 1, in those of tree 0.
     float rounding_margin = 0;       ///< As of query::SphereFrames; so much nearer or farther is in doubt.
     float tolerance = 0;
-    std::int32_t not_smaller = 0;  ///< Of nodes so many levels apart, or more, that of tree 0 is expanded.
+    std::int32_t not_smaller = 0;  ///< Tree 0's node is expanded if tree 1's is deeper by so many levels, or more.
   };
   enum Found : std::uint8_t {
     kMeet = 1,     ///< The spheres of leaves meet.

@@ -20,9 +20,10 @@ struct Bounds {
   Eigen::Vector3d half = Eigen::Vector3d::Zero();      ///< Along them.
   double reach = 0;  ///< It may touch what is so far from the box: margin, tolerance of FCL's solvers.
 
-  double radius = 0;  ///< About the center; set by boundsOf(), as
-  double size = 0;    ///< that about the frame's origin, and
-  double width = 0;   ///< the least extent.
+  // Set by boundsOf().
+  double radius = 0;  ///< Of the box, about its center.
+  double size = 0;    ///< Of the box, about the frame's origin.
+  double width = 0;   ///< The least of its three extents.
 };
 
 /// @throws std::invalid_argument for a geometry that fcl::collide does not take.

@@ -79,14 +79,7 @@ HWY_INLINE V ofFaces(V s0, V s1, V s2) {
   return hn::IfThenElse(hn::Gt(squared, zero), hn::Sqrt(squared), max3(s0, s1, s2));
 }
 
-// Fills the gaps of the lanes in `mask` and returns those that are near.
-//
-// With u = 2^-24, C the largest coordinate and r the radius of each: centres are off by u C, so a way between them
-// along an axis by at most 12 u (Ca + Cb), radii by 16 u (ra + rb); a box's reach has 128 u (C + r) for that. Axes are
-// those of a rotation with entries of R^T R - 1 up to e = kFineError, see World::boxAt(). Their cross product, and sums
-// of half sides along it, are then off by up to 4.5 e d for a distance d of the centres and 6.4 e r for each box.
-// Beyond d = 4 (ra + rb) the faces' gap is more than d / 4, and kShare covers this; nearer, the reach does.
-constexpr float kShare = 0.995f;
+constexpr float kShare = 0.995f;  // see nearLanes()
 
 // The largest gap along a cross product of an axis of box a and one of boxes b, where there is one; it is a gap along
 // an axis of length 1 or less, so not more than the distance. r[k][j] is the product of a's axis k and b's axis j,
@@ -110,6 +103,13 @@ HWY_INLINE V gapAlongEdges(const V (&r)[3][3], const V (&size)[3][3], const V (&
   return most;
 }
 
+// Fills the gaps of the lanes in `mask` and returns those that are near.
+//
+// With u = 2^-24, C the largest coordinate and r the radius of each: centres are off by u C, so their distance
+// along an axis by at most 12 u (Ca + Cb), radii by 16 u (ra + rb); a box's reach has 128 u (C + r) for that. Axes are
+// those of a rotation with entries of R^T R - 1 up to e = kFineError, see World::boxAt(). Their cross product, and sums
+// of half sides along it, are then off by up to 4.5 e d for a distance d of the centres and 6.4 e r for each box.
+// Beyond d = 4 (ra + rb) the faces' gap is more than d / 4, and kShare covers this; nearer, the reach does.
 template <bool kDistance>
 HWY_INLINE std::uint32_t nearLanes(const Own& a, const BoxGroup& b, std::uint32_t mask, const float* far_b,
                                    float* gap) {

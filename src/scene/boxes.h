@@ -44,13 +44,13 @@ struct BoxLane {
 
 /// What is near one box among a group.
 struct NearGroup {
-  std::uint32_t box;    ///< The one; set by nearBox(), as is
-  std::uint32_t group;  ///< the others,
-  std::uint32_t mask;   ///< and which of them are near.
+  std::uint32_t box;    ///< Index of the moving box; set by nearBox().
+  std::uint32_t group;  ///< Index of the group, fixed groups first; set by nearBox().
+  std::uint32_t mask;   ///< Lanes of the group that are near.
   float gap[8];         ///< Not more than the distance less both reaches; negative where boxes overlap.
 };
 
-/// Which of the lanes in `mask` may be as near as `far` and the lane's own farB[] together; fills n.mask and n.gap.
+/// Which of the lanes in `mask` may be as near as `far` and the lane's own far_b[] together; fills n.mask and n.gap.
 void nearInGroup(const BoxLane& a, const BoxGroup& b, std::uint32_t mask, float far, const float* far_b, NearGroup& n);
 
 /// The boxes of a scene: the fixed ones below a hierarchy's root, node 0 (null: there are none), and the moving ones.

@@ -14,6 +14,7 @@
 namespace bocst::scene {
 namespace {
 
+using fcl_adapter::poseAt;
 using query::Motion;
 
 /// Halvings of the way in search of what is near, before pairs are followed one by one.
@@ -21,15 +22,6 @@ constexpr int kHalvings = 4;
 
 /// What passes closer than this share of the sizes is taken to touch, between two of FCL's geometries.
 constexpr double kTouch = 1e-5;
-
-template <typename S>
-fcl::Transform3<S> poseAt(const Motion& motion, double time) {
-  const Eigen::Isometry3d X = motion.at(time);
-  fcl::Transform3<S> Y = fcl::Transform3<S>::Identity();
-  Y.linear() = X.linear().template cast<S>();
-  Y.translation() = X.translation().template cast<S>();
-  return Y;
-}
 
 /// fcl::distance of a pair, no less than 0; any larger value where it is not less than `below`.
 template <typename S>
@@ -98,8 +90,8 @@ class Edge {
     }
     std::vector<Entry> entries;
     const bool touches = list == nullptr
-                             ? check_.runAll(poses_.data(), &entries, nullptr)
-                             : check_.run(poses_.data(), list->data(), list->data() + list->size(), &entries, nullptr);
+                             ? check_.runAll(poses_.data(), &entries)
+                             : check_.run(poses_.data(), list->data(), list->data() + list->size(), &entries);
     if (touches) return true;
     entries.erase(std::remove_if(entries.begin(), entries.end(), [](const Entry& e) { return e.mask == 0; }),
                   entries.end());

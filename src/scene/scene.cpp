@@ -246,9 +246,8 @@ bool Scene<S>::collides(const Transform* X_WM, Pair* first) const {
   scene::StateCheck<S>& check = sweepOfThread<S>().check();
   scene::checkPoses<S>("collides", X_WM, 1, w->moving.size(), check.orthogonality_errors);
   check.start(*w);
-  scene::PairAt hit;
-  if (!check.runAll(X_WM, nullptr, &hit)) return false;
-  if (first != nullptr) *first = impl_->named(*w, hit);
+  if (!check.runAll(X_WM, nullptr)) return false;
+  if (first != nullptr) *first = impl_->named(*w, check.last());
   return true;
 }
 

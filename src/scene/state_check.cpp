@@ -86,7 +86,7 @@ const std::vector<NearGroup>& StateCheck<S>::findNear(float most) {
 }
 
 template <typename S>
-bool StateCheck<S>::runAll(const fcl::Transform3<S>* X_WM, std::vector<Entry>* entries, PairAt* hit) {
+bool StateCheck<S>::runAll(const fcl::Transform3<S>* X_WM, std::vector<Entry>* entries) {
   beginState(X_WM);
   for (std::size_t n = 0; n < order_.size() && !isDone(entries); ++n) {
     const std::uint32_t i = order_[n];
@@ -94,12 +94,12 @@ bool StateCheck<S>::runAll(const fcl::Transform3<S>* X_WM, std::vector<Entry>* e
     addNear(i, far_[i], far_of_moving_);
     for (std::size_t k = 0; k < near_count_; ++k) lookAt(X_WM, near_[k], entries);
   }
-  return lookAtRest(X_WM, entries, hit);
+  return lookAtRest(X_WM, entries);
 }
 
 template <typename S>
 bool StateCheck<S>::run(const fcl::Transform3<S>* X_WM, const Entry* begin, const Entry* end,
-                        std::vector<Entry>* entries, PairAt* hit) {
+                        std::vector<Entry>* entries) {
   beginState(X_WM);
   for (const Entry* e = begin; e != end && !isDone(entries); ++e) {
     NearGroup n;
@@ -115,7 +115,7 @@ bool StateCheck<S>::run(const fcl::Transform3<S>* X_WM, const Entry* begin, cons
     n.group = e->group;
     lookAt(X_WM, n, entries);
   }
-  return lookAtRest(X_WM, entries, hit);
+  return lookAtRest(X_WM, entries);
 }
 
 // Asks about pairs that probably touch: the one that touched last, and deep ones. The others are candidates.
@@ -140,13 +140,12 @@ void StateCheck<S>::lookAt(const fcl::Transform3<S>* X_WM, const NearGroup& n, s
 
 // Asks about the candidates, the deepest first.
 template <typename S>
-bool StateCheck<S>::lookAtRest(const fcl::Transform3<S>* X_WM, std::vector<Entry>* entries, PairAt* hit) {
+bool StateCheck<S>::lookAtRest(const fcl::Transform3<S>* X_WM, std::vector<Entry>* entries) {
   if (!touches_) {
     std::sort(candidates_.begin(), candidates_.end(),
               [](const Candidate& p, const Candidate& q) { return p.gap < q.gap; });
     for (auto c = candidates_.begin(); c != candidates_.end() && !touches_; ++c) ask(X_WM, *c, entries);
   }
-  if (touches_ && hit != nullptr) *hit = last_;
   return touches_;
 }
 

@@ -27,8 +27,8 @@ bool touch(const Object<S>& a, const fcl::Transform3<S>& X_WA, const Object<S>& 
 
 /// Looks at one state for itself and for all states near it. Kept by a thread between queries, for the memory it has.
 ///
-/// What is said of a state holds for others while no point of moving object i (of the box around it) is farther than
-/// far[i] from where it is in this one: objects whose boxes or hulls are farther apart than both may come nearer stay
+/// A result for a state also holds for every state in which no point of the box around moving object i is more than
+/// far[i] away from where it is in this state: objects whose boxes or hulls are farther apart than both can move stay
 /// apart.
 template <typename S>
 class StateCheck {
@@ -36,8 +36,8 @@ class StateCheck {
   /// To be called before other queries about a world.
   void start(const World<S>& world);
 
-  /// For each moving object; to be set by whoever asks for more than one state. As is `reach`, which is that of its box
-  /// in all of them, where it is not 0.
+  /// For each moving object, in scene units. far: see above; 0 if only one state matters. reach: that of its box, valid
+  /// in all these states; 0: it follows from the pose.
   std::vector<double> far, reach;
 
   /// Of the poses of each moving object, at least; to be set before anything is asked.
@@ -48,19 +48,22 @@ class StateCheck {
 
   /// Places the objects, and finds pairs that may be near: among the entries [begin, end) of the list, or, without one,
   /// among all. Where `entries` is not null, pairs that may touch in one of the states are added to it.
-  /// True when a pair touches in this state itself, which `hit` then is; then more pairs may be added than needed, or
-  /// (without lists_after_hit) some are missing.
-  bool run(const fcl::Transform3<S>* X_WM, const Entry* begin, const Entry* end, std::vector<Entry>* entries,
-           PairAt* hit);
-  bool runAll(const fcl::Transform3<S>* X_WM, std::vector<Entry>* entries, PairAt* hit);
+  /// True when a pair touches in this state itself; then more pairs may be added than needed, or (without
+  /// lists_after_hit) some are missing.
+  bool run(const fcl::Transform3<S>* X_WM, const Entry* begin, const Entry* end, std::vector<Entry>* entries);
+  bool runAll(const fcl::Transform3<S>* X_WM, std::vector<Entry>* entries);
+
+  /// The pair that touched last.
+  const PairAt& last() const { return last_; }
 
   /// Where an object is, in the state that was asked for.
   const fcl::Transform3<S>& pose(const fcl::Transform3<S>* X_WM, std::size_t group, std::size_t lane) const {
     return world_->isFixed(group) ? world_->object(group, lane).X_WG : X_WM[world_->movingIndex(group, lane)];
   }
 
-  /// Places the objects alone; all groups that are no farther from moving object i than `most` are then in near().
+  /// Places the objects alone.
   void place(const fcl::Transform3<S>* X_WM);
+  /// The groups that are no farther than `most` from each moving object, as they were last placed.
   const std::vector<NearGroup>& findNear(float most);
 
  private:
@@ -76,7 +79,7 @@ class StateCheck {
   void beginState(const fcl::Transform3<S>* X_WM);
   bool isDone(const std::vector<Entry>* entries) const { return touches_ && (entries == nullptr || !lists_after_hit); }
   void lookAt(const fcl::Transform3<S>* X_WM, const NearGroup& n, std::vector<Entry>* entries);
-  bool lookAtRest(const fcl::Transform3<S>* X_WM, std::vector<Entry>* entries, PairAt* hit);
+  bool lookAtRest(const fcl::Transform3<S>* X_WM, std::vector<Entry>* entries);
   void ask(const fcl::Transform3<S>* X_WM, const Candidate& c, std::vector<Entry>* entries);
 
   const World<S>* world_ = nullptr;

@@ -21,8 +21,8 @@ class Sweep {
     kAll,    ///< Each; written to hit[].
   };
 
-  /// `orthogonality_errors`: of the poses of each moving object, at least. Returns the index of the state that was
-  /// looked for; `states` if there is none.
+  /// There are states and moving objects; hit[] is 0 before. `orthogonality_errors`: of the poses of each moving
+  /// object, at least. Returns the index of the state that was looked for; `states` if there is none.
   std::size_t run(const World<S>& world, const fcl::Transform3<S>* X_WM, std::size_t states, Goal goal,
                   std::uint8_t* hit, const std::vector<double>& orthogonality_errors);
 

@@ -52,7 +52,6 @@ ChildRef Tree::regained(ChildRef block, const lattice::Cell& cell, TriangleLists
 }
 
 void Tree::dropUnusedResources() {
-  // Which shelves do the lists that stay lie on? Each is known by its first use.
   std::vector<std::uint8_t> used(resources_.size(), 0);
   const auto mark = [&](std::uint32_t list) {
     if (lists_.isOnDevice(list)) used[lists_.place(list).resource] = 1;

@@ -19,7 +19,7 @@ class Pool {
  public:
   static constexpr std::size_t kMost = std::size_t{1} << 30;  ///< a ChildRef has thirty bits.
   static constexpr std::size_t kChunk = std::size_t{1} << kChunkBits;
-  /// It grows by a chunk, or by the 16th part, but not by so many bytes that who appends would feel it.
+  /// It grows by a chunk, or by the 16th part, but not by so many bytes that one append() becomes slow.
   static constexpr std::size_t kShare = 16, kLargestShare = 1 << 16;
 
   T& operator[](std::uint32_t i) { return chunk(i)[i & (kChunk - 1)]; }

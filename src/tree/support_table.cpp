@@ -4,6 +4,8 @@
 #include <cmath>
 #include <limits>
 
+#include "lattice/lattice.h"
+
 namespace bocst::tree {
 namespace {
 
@@ -24,7 +26,7 @@ Eigen::Vector3d SupportTable::direction(int number) {
 }
 
 void SupportTable::start(const Eigen::AlignedBox3d& box) {
-  const Eigen::Vector3d center = box.center(), half = box.sizes() / 2;
+  const Eigen::Vector3d center = box.center() - Eigen::Vector3d::Constant(lattice::kMiddle), half = box.sizes() / 2;
   center_ = center.cast<float>();
   inner_radius_.store(static_cast<float>(half.minCoeff()), std::memory_order_relaxed);
   for (int n = 0; n < kCount; ++n) {

@@ -26,7 +26,7 @@ class SupportTable {
   static constexpr int number(int face, int i, int j) { return (face * kRow + i) * kRow + j; }
   static Eigen::Vector3d direction(int number);
 
-  /// All that is known is a box.
+  /// All that is known is a box, in the lattice's coordinates.
   void start(const Eigen::AlignedBox3d& box);
 
   /// The middle of that box.

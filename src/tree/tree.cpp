@@ -12,6 +12,7 @@
 #include <stdexcept>
 #include <string>
 
+#include "log/assert.h"
 #include "oracle/stored_mesh.h"
 #include "tree/box_tree.h"
 #include "tree/cell_bounds.h"
@@ -92,8 +93,7 @@ void Tree::reset(std::shared_ptr<const Mesh> mesh) {
   root_bounds_ = bounds::NodeBounds();
   const Eigen::AlignedBox3d box = latticeBounds(surface_);
   encodeBox(box, lattice::Cell{}, root_bounds_);
-  const Eigen::Vector3d middle = Eigen::Vector3d::Constant(lattice::kMiddle);
-  supports_.start({box.min() - middle, box.max() - middle});
+  supports_.start(box);
   supports_known_ = false;
   outline_.set(Outline::boxOf(surface_.bounds.center(), Eigen::Matrix3d::Identity(),
                               surface_.bounds.sizes() / 2 + Eigen::Vector3d::Constant(sphereReach())));
@@ -222,29 +222,17 @@ void Tree::forgetMesh() {
 
 // Growth.
 
-void Tree::grow(std::vector<Growth>& nodes, bool wait) {
-  Batch batch(nodes, wait);
-  batch.finish();
-}
+void Tree::grow(std::vector<Growth>& nodes) { Batch(nodes).finish(); }
 
 // In one function, as what a node asks for depends on what the nodes before it have grown.
-Tree::Batch::Batch(std::vector<Growth>& nodes, bool wait) {
+Tree::Batch::Batch(std::vector<Growth>& nodes) {
   // Every growth locks its trees in address order.
   for (const Growth& g : nodes) {
     if (trees_.empty() || g.tree != trees_.back()) trees_.push_back(g.tree);
   }
   std::sort(trees_.begin(), trees_.end(), std::less<Tree*>());
   trees_.erase(std::unique(trees_.begin(), trees_.end()), trees_.end());
-  for (Tree* tree : trees_) {
-    locks_.emplace_back(tree->growth_, std::defer_lock);
-    if (wait) {
-      locks_.back().lock();
-    } else if (!locks_.back().try_lock()) {
-      locks_.clear();
-      trees_.clear();
-      return;
-    }
-  }
+  for (Tree* tree : trees_) locks_.emplace_back(tree->growth_);
 
   thread_local std::vector<std::uint32_t> scratch;
   gathered_.reserve(nodes.size());
@@ -263,7 +251,7 @@ Tree::Batch::Batch(std::vector<Growth>& nodes, bool wait) {
     oracle::ExpansionRequest request;
     request.surface = &tree.grownSurface();
     request.cell = cell;
-    // Leaves are tested here; who answers conservatively has none.
+    // Leaves are tested here; trees of conservative answers have none.
     request.ids_up_to = tree.conservative()              ? 0
                         : tree.isDeepest(cell.level + 1) ? oracle::ExpansionRequest::kAll
                                                          : kHostTriangles;
@@ -281,7 +269,8 @@ Tree::Batch::Batch(std::vector<Growth>& nodes, bool wait) {
     } else {
       gathered_.emplace_back();
       gathered_.back().reserve(4 * kMaxLeafTriangles);
-      tree.gatherNode(g.node, cell, gathered_.back());
+      BOCST_ASSERT(tree.grid_ != nullptr);
+      tree.grid_->gather(tree.surface_, cell, gathered_.back());
       request.ids = gathered_.back().data();
       request.count = gathered_.back().size();
     }
@@ -379,8 +368,7 @@ void Tree::growFromGrid(NodeRef node) {
   }
   bounds::NodeBounds& bounds_of_all = records_[index].own;
   encodeBox(own, cell, bounds_of_all);
-  refits_.push_back({node, bounds_of_all});
-  refits_wait_.store(true, std::memory_order_relaxed);
+  addRefit(node, bounds_of_all);
   setChild(node, ChildRef(ChildRef::kBlock, index));
 }
 
@@ -436,10 +424,7 @@ void Tree::setChild(NodeRef node, ChildRef ref) {
 }
 
 void Tree::publish(NodeRef node, const oracle::ExpansionRequest& answer) {
-  if (answer.grey != 0) {
-    refits_.push_back({node, answer.own});
-    refits_wait_.store(true, std::memory_order_relaxed);
-  }
+  if (answer.grey != 0) addRefit(node, answer.own);
   const std::uint32_t index = addBlock(node, answer.cell.level, answer.grey, now());
   for (int o = 0; o < 8; ++o) octants_ += surface_.lattice.exists(answer.cell.octant(o));
   Block& block = blocks_[index];
@@ -454,11 +439,6 @@ void Tree::publish(NodeRef node, const oracle::ExpansionRequest& answer) {
     if (answer.grey >> o & 1) block.child[o].store(addOctantList(answer, o), std::memory_order_relaxed);
   }
   setChild(node, ChildRef(ChildRef::kBlock, index));
-}
-
-void Tree::gatherNode(NodeRef node, const lattice::Cell& cell, std::vector<std::uint32_t>& ids) const {
-  if (node.isRoot() || grid_ == nullptr) throw std::logic_error("bocst: an implicit list without a grid");
-  grid_->gather(surface_, cell, ids);
 }
 
 void Tree::prune(Clock::time_point now) {

@@ -36,7 +36,7 @@ namespace bocst::tree {
 class BoxTree;
 class BulkBuilder;
 
-/// The sphere-tree of one model: resident nodes, how they grow and how they go.
+/// The sphere-tree of one model: resident nodes, how they grow and how they are dropped.
 ///
 /// Threads: a query holds the query lock shared while it looks at nodes. Growth appends blocks and publishes each by
 /// one store of its child reference, so readers are never in its way; one growth a tree at a time. What removes nodes
@@ -81,9 +81,9 @@ class Tree {
   const Block& block(std::uint32_t index) const { return blocks_[index]; }
   /// Is it a lane of a loose block? Else it is a cell.
   bool isLoose(NodeRef node) const { return !node.isRoot() && blocks_[node.block()].isLoose(); }
-  /// That of a cell of about the node's size.
+  /// The root's is 1; that of a lane is the level of a cell of about its size.
   int level(NodeRef node) const { return node.isRoot() ? 1 : blocks_[node.block()].childLevel(); }
-  /// Of a node that is no lane.
+  /// For nodes that are no lanes.
   lattice::Cell cell(NodeRef node) const {
     return node.isRoot() ? lattice::Cell{} : blocks_[node.block()].cell().octant(node.octant());
   }
@@ -91,10 +91,10 @@ class Tree {
   const bounds::NodeBounds& rootBounds() const { return root_bounds_; }
   TriangleList list(ChildRef ref) const { return lists_[ref.index()]; }
   const TriangleLists& lists() const { return lists_; }
-  /// How far the surface reaches in any direction: that of its box, or exact once all was built at once.
+  /// How far the surface reaches in any direction: as far as its box, or exactly once the whole tree was built.
   const SupportTable& supports() const { return supports_; }
-  /// Work was done that a whole tree would have spared, in triangles grown by parts: it brings the time nearer at
-  /// which the tree is built at once. A walk between bounds that are still loose costs as much as kWalkRent of them.
+  /// Adds work that a whole tree would have saved, in triangles grown by parts. Once the sum exceeds the price of a
+  /// whole tree, the next query builds it. One walk in a tree that is not whole adds kWalkRent.
   static constexpr std::size_t kWalkRent = 64;
   void payRent(std::size_t triangles) const {
     if (price_.load(std::memory_order_relaxed) != kNever) rent_.fetch_add(triangles, std::memory_order_relaxed);
@@ -147,15 +147,14 @@ class Tree {
   };
 
   /// One expansion batch: makes each node's children resident (or, where enough, its list). Nodes that another thread
-  /// has grown meanwhile are skipped. The query locks of all trees are held shared. Unless `wait`, it does nothing
-  /// while another thread grows one of the trees.
-  static void grow(std::vector<Growth>& nodes, bool wait = true);
+  /// has grown meanwhile are skipped. The query locks of all trees are held shared.
+  static void grow(std::vector<Growth>& nodes);
 
   /// The same in two steps: oracles work on it until finish(), and meanwhile this thread may walk over what is
   /// resident, but not grow more. It holds the trees' growth mutexes.
   class Batch {
    public:
-    explicit Batch(std::vector<Growth>& nodes, bool wait = true);
+    explicit Batch(std::vector<Growth>& nodes);
     ~Batch() { abandon(); }
     Batch(const Batch&) = delete;
     Batch& operator=(const Batch&) = delete;
@@ -199,7 +198,8 @@ class Tree {
   /// for.
   double radius() const;
 
-  /// Takes up what the query taught about bounds, and prunes when it is time; puts it off when others are in the way.
+  /// To be called after a query has released its locks: applies tighter bounds that growth found, and prunes if it is
+  /// time. Does nothing while another query holds the lock.
   void afterQuery(std::int64_t now);
 
  private:
@@ -264,7 +264,6 @@ class Tree {
   void dropUnusedResources();
   std::size_t treeBytes() const;
   void countBytes();
-  void gatherNode(NodeRef node, const lattice::Cell& cell, std::vector<std::uint32_t>& ids) const;
 
   const Options options_;
   const std::shared_ptr<oracle::Oracle> oracle_;
@@ -320,6 +319,10 @@ class Tree {
     NodeRef node;
     bounds::NodeBounds bounds;
   };
+  void addRefit(NodeRef node, const bounds::NodeBounds& bounds) {
+    refits_.push_back({node, bounds});
+    refits_wait_.store(true, std::memory_order_relaxed);
+  }
   std::vector<Refit> refits_;
   std::atomic<bool> refits_wait_{false};
 

@@ -94,7 +94,7 @@ class TriangleLists {
   using Words = Pool<std::uint32_t, 10>;
 
   // A list is flags and a length, then the numbers: all as they are or, narrow, the least and 16-bit steps from it;
-  // packed, then PackedTriangles. Kept: flags and length, the place.
+  // packed, then PackedTriangles. On a device: flags and length, then the Place.
   static constexpr std::uint32_t kOnDevice = 0x80000000u, kPacked = 0x40000000u, kNarrow = 0x20000000u,
                                  kCount = 0x1fffffffu;
   static constexpr std::size_t kDeviceListWords = 3;

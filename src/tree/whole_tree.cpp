@@ -137,10 +137,7 @@ bool Tree::growInBulk(NodeRef node, std::vector<std::uint32_t>& ids) {
   thread_local BulkBuilder bulk;
   thread_local std::vector<BulkPlace> places;
   bulk.build(surface_, ids.data(), ids.size(), region);
-  if (!is_loose && !bulk.ids().empty()) {
-    refits_.push_back({node, encode(bulk.own(), cell(node))});
-    refits_wait_.store(true, std::memory_order_relaxed);
-  }
+  if (!is_loose && !bulk.ids().empty()) addRefit(node, encode(bulk.own(), cell(node)));
   startPlaces(bulk, node, cellOrDepth(node).level, places);
   addBlocks(bulk, places, 0, bulk.blocks().size(), now());
   publishBulk(bulk, places);
@@ -242,9 +239,7 @@ void Tree::buildAhead(AheadBuild& ahead) {
   BulkBuilder bulk;
   buildWhole(*surface, bulk);
   SupportTable supports;
-  const Eigen::AlignedBox3d box = latticeBounds(*surface);
-  const Eigen::Vector3d middle = Eigen::Vector3d::Constant(lattice::kMiddle);
-  supports.start({box.min() - middle, box.max() - middle});
+  supports.start(latticeBounds(*surface));
   bulk.findSupports(supports);
   const Outline::Box outline = bulk.findOutline(surface->lattice);
 
@@ -333,8 +328,7 @@ void Tree::publishWhole(const BulkBuilder& bulk, const std::vector<BulkPlace>& p
     nodes_at_[countedLevel(places[number].level + 1)] += bulk.blocks()[number].lanes;
   }
   publishBulk(bulk, places);
-  refits_.push_back({NodeRef(), encode(bulk.own(), lattice::Cell{})});
-  refits_wait_.store(true, std::memory_order_relaxed);
+  addRefit(NodeRef(), encode(bulk.own(), lattice::Cell{}));
 }
 
 }  // namespace bocst::tree

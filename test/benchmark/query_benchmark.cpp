@@ -33,7 +33,7 @@ CellOctants randomCell(std::mt19937_64& g) {
 }
 
 struct Cells {
-  Cells() : g(1), geometry(1, placement(g)) {
+  Cells() : g(1), geometry(placement(g)) {
     for (auto& side : cells) {
       for (CellOctants& c : side) c = randomCell(g);
     }

@@ -155,7 +155,7 @@ TEST_P(EveryTarget, NoOctantIsLostThatSharesAPointInFramesOfTheRoots) {
     }
     to.ready();
     ASSERT_TRUE(PairFrames::fits(to.scale));
-    const PairFrames frames(to.scale, to);
+    const PairFrames frames(to);
     ++shared;
     for (int own = 0; own < 2; ++own) {
       const unsigned mask = overlappingOctants(frames, own, cells[own], cells[1 - own], octants[1 - own]);
@@ -217,7 +217,7 @@ TEST_P(EveryTarget, NoTriangleIsLostThatMeetsAnOctant) {
     to.scale = std::pow(2.0, 10 * u(g));
     to.translation = Eigen::Vector3d(u(g), u(g), u(g)) * kMiddle;
     to.ready();
-    const PairFrames frames(to.scale, to);
+    const PairFrames frames(to);
     const auto unit = static_cast<double>(frames.side[own].unit);
     // Triangles through a point of an octant.
     const std::size_t count = 1 + g() % LargeTriangles::kCapacity;
@@ -856,7 +856,7 @@ TEST_P(EveryTarget, GapsOfOctantsHoldTheDistancesOfTheirPoints) {
     const Eigen::Vector3d displacement = test::randomDirection(g) * std::pow(10.0, 3 + 3 * u(g));
     to.translation = points[0] + displacement - to.scale * (to.rotation * points[1]);
     to.ready();
-    const PairFrames geometry(to.scale, to);
+    const PairFrames geometry(to);
     const double distance = (to * points[1] - points[0]).norm(), rounding = 1e-12 * geometry.rounding_margin * 0x1p24;
     FrameDirection expected;
     if (round % 3 != 0) {

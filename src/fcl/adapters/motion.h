@@ -57,7 +57,7 @@ query::AxisMotion read(const fcl::ScrewMotion<S>& m) {
           static_cast<double>(m.getAngularVelocity())};
 }
 
-/// FCL keeps the points to itself and its descendants. Never made; it lends its right to look.
+/// Gives access to the points, which are protected members. No object of it is made.
 template <typename S>
 struct SplineView : fcl::SplineMotion<S> {
   static query::SplineMotion read(const fcl::SplineMotion<S>& m) {
@@ -105,6 +105,16 @@ std::unique_ptr<query::Motion> motionOf(const char* argument, const fcl::MotionB
   }
   for (const double time : {0.0, 1.0}) refuseUnlessRigid("continuousCollide", argument, m->at(time));
   return m;
+}
+
+/// The pose at a time from 0 to 1.
+template <typename S>
+fcl::Transform3<S> poseAt(const query::Motion& motion, double time) {
+  const Eigen::Isometry3d X = motion.at(time);
+  fcl::Transform3<S> Y = fcl::Transform3<S>::Identity();
+  Y.linear() = X.linear().template cast<S>();
+  Y.translation() = X.translation().template cast<S>();
+  return Y;
 }
 
 /// From one pose to another. FCL 0.7 makes an InterpMotion with an unset reference point and a SplineMotion with unset

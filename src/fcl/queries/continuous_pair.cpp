@@ -30,15 +30,6 @@ struct ContinuousQuery : OrderedPair<S, Motion> {
   const fcl::ContinuousCollisionRequest<S>& request;
 };
 
-template <typename S>
-fcl::Transform3<S> poseAt(const Motion& motion, double time) {
-  const Eigen::Isometry3d X = motion.at(time);
-  fcl::Transform3<S> Y = fcl::Transform3<S>::Identity();
-  Y.linear() = X.linear().template cast<S>();
-  Y.translation() = X.translation().template cast<S>();
-  return Y;
-}
-
 SimilarityTransform inBody(const tree::Tree& tree) {
   SimilarityTransform p;
   p.scale = tree.surface().lattice.unit();

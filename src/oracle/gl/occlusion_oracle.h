@@ -19,9 +19,8 @@ class OcclusionQueries;
 /// the octants that pass are the CPU's work.
 ///
 /// - conservative: a geometry shader tests each triangle for the octant and emits one point; nothing is lost.
-/// - sampled: the paper's own form, three axis views of `viewport` pixels a side with an early end. It loses octants
-/// that
-///   the surface passes without covering a pixel's centre in any view: for comparison only.
+/// - sampled: the paper's own form, three axis views of `viewport` pixels a side with an early end. If the surface
+///   passes an octant without covering a pixel's centre in any view, the octant is lost: for comparison only.
 class OcclusionOracle : public DeviceOracle {
  public:
   enum class Form { kConservative, kSampled };

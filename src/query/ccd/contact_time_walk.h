@@ -63,12 +63,13 @@ class ContactTimeWalk : private BestFirst<ContactTimeWalk<A, B>, A, B> {
   // A pair that can be put off by this much is looked at again before its parts are.
   static constexpr double kWorthWaiting = 1.0 / 64;
 
-  // How far two leaves go between two looks at their primitives, in their sizes; but for so long at least.
+  // Two leaves' primitives are tested for the time in which the leaves move by this share of their sizes, but at least
+  // for kLeastWindow of the motion.
   static constexpr double kShareOfLeaves = 0.25, kLeastWindow = 1e-6;
 
   static constexpr double kFar = std::numeric_limits<double>::infinity();
 
-  // What bounds lose of the lengths that they are made of: 40 roundings at most.
+  // Relative error of bounds: 40 roundings at most.
   static constexpr double kRounding = 1e-14;
 
   // Unit directions are off by less.

@@ -31,8 +31,8 @@ struct SphereFrames {
 
   struct Side {
     float unit;            ///< A lattice unit, in those of side 0.
-    float shift[3];        ///< Coordinate j in the other frame is this ...
-    float to_other[3][3];  ///< ... and row j by the own coordinates.
+    float shift[3];        ///< Coordinates in the other frame are to_other * own coordinates + shift.
+    float to_other[3][3];  ///< Rows.
   };
   Side side[2] = {};
   /// Infinite where floats can't hold the pair: then each test is in doubt.
@@ -40,8 +40,8 @@ struct SphereFrames {
   float tolerance = 0;
 };
 
-/// Of nodes that are so many levels apart, or more, the one of side 0 is not the smaller; `scale`: that of side 1's
-/// lattice unit.
+/// The least d = level of side 1's node - level of side 0's at which side 0's node is not smaller. `scale`: lattice
+/// unit of side 1 in those of side 0.
 int levelsApart(double scale);
 
 /// Octants of one block that may meet one node of the other side, still to be walked. Words of one size, as in
@@ -56,7 +56,7 @@ struct SphereGroup {
   Node other;
   const tree::Block* at;  ///< The block, or null where there is none.
   std::uint32_t side;     ///< That of the block.
-  std::uint32_t block;    ///< As NodeRef names it, so the root is octant 7 of a block that there is not.
+  std::uint32_t block;    ///< Its index as in NodeRef::octant(); that of NodeRef::kRoot for the root, then octant 7.
   std::uint32_t level;    ///< Of the octants.
   std::uint32_t frame;    ///< Where they are.
   std::uint32_t frames;   ///< How many are in use: for the octants, and for what is above both nodes. 0: it has none.

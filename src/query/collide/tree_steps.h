@@ -90,7 +90,8 @@ struct PairSteps {
   const StepGroup* stack_end = nullptr;
   std::size_t depth = 0;
 
-  /// By how many levels a node of side 1 must at least be deeper, for one of side 0 to be not smaller, or larger.
+  /// With d = level of side 1's node - level of side 0's: side 0's node is not smaller if d >= not_smaller, and larger
+  /// if d >= larger.
   int not_smaller, larger;
 
   /// The other node of a pair is expanded for all octants of a group at once, so that their tests overlap in time. Set

@@ -12,8 +12,8 @@ bool PairFrames::isFine(const SimilarityTransform& one_in_zero) {
   return fits(one_in_zero.scale) && (one_in_zero.translation.norm() + q0 + q1) * 0x1p-9 <= std::min(q0, q1);
 }
 
-PairFrames::PairFrames(double scale_of_1, const SimilarityTransform& one_in_zero) {
-  const double q0 = lattice::kMiddle, q1 = q0 * scale_of_1;
+PairFrames::PairFrames(const SimilarityTransform& one_in_zero) {
+  const double q0 = lattice::kMiddle, q1 = q0 * one_in_zero.scale;
   const Eigen::Matrix3d& r = one_in_zero.rotation;
   // Where the middle of side 1's root is, from that of side 0's.
   const Eigen::Vector3d t = one_in_zero * Eigen::Vector3d::Constant(q0) - Eigen::Vector3d::Constant(q0);
@@ -27,7 +27,7 @@ PairFrames::PairFrames(double scale_of_1, const SimilarityTransform& one_in_zero
     side[1].shift[j] = static_cast<float>(t[j]);
   }
   side[0].unit = 1;
-  side[1].unit = static_cast<float>(scale_of_1);
+  side[1].unit = static_cast<float>(one_in_zero.scale);
   const double size = t.norm() + std::sqrt(3.0) * (q0 + q1),
                orthogonality_error = 4 * size * one_in_zero.orthogonality_error;
   rounding_margin = static_cast<float>((48 * 0x1p-24 * size + orthogonality_error + one_in_zero.tolerance) * 1.0001);

@@ -32,7 +32,7 @@ struct alignas(64) Frame {
 /// What sees octants in their own frame only, along axes whose entries' sizes sum up to 1, is off by less: see
 /// octantsMeeting().
 struct PairFrames {
-  PairFrames(double scale_of_1, const SimilarityTransform& one_in_zero);
+  explicit PairFrames(const SimilarityTransform& one_in_zero);
 
   /// Beyond these, one side's rounding is too coarse for the other's nodes.
   static bool fits(double scale) { return scale >= 0x1p-10 && scale <= 0x1p10; }
@@ -42,8 +42,8 @@ struct PairFrames {
 
   struct Side {
     float unit;            ///< A lattice unit, in those of side 0.
-    float shift[3];        ///< Coordinate j in the other frame is this ...
-    float to_other[3][3];  ///< ... and row j by the own coordinates.
+    float shift[3];        ///< Coordinates in the other frame are to_other * own coordinates + shift.
+    float to_other[3][3];  ///< Rows.
     float abs_to_other[3][3];
     float rounding_margin;  ///< Of tests in the octants' own frame: 128 u Q, and the same.
   };

@@ -107,7 +107,7 @@ HWY_INLINE V supportOf(const SupportTable& supports, const V (&u)[3]) {
   return hn::Mul(size, hn::Add(hn::Add(inner, middle), outer));
 }
 
-/// Where the pair's lattices lie to each other, in float; t is the way between the middles of the roots.
+/// The pose of b's lattice in a's, in float; t is the displacement between the middles of the roots.
 struct Between {
   float rotation[3][3];  // [j][k]: column j
   float t[3];
@@ -137,7 +137,7 @@ HWY_INLINE float values(const SupportTable& a, const SupportTable& b, const Betw
   return hn::GetLane(hn::MaxOfLanes(d, most));
 }
 
-// Good to some bits, which is enough for directions: what a look says of one holds for any.
+// Good to some bits, which is enough for directions: the test is valid for any.
 HWY_INLINE float roughInverse(float x) {
   const hn::CappedTag<float, 1> d;
   return hn::GetLane(hn::ApproximateReciprocal(hn::Set(d, x)));

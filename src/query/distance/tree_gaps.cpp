@@ -24,7 +24,7 @@ TreeGaps::Scratch& TreeGaps::scratch() {
 }
 
 TreeGaps::TreeGaps(const TreeSide& a, const TreeSide& b, const SimilarityTransform& b_in_a)
-    : side_{&a, &b}, b_in_a_(b_in_a), geometry_(b_in_a.scale, b_in_a) {
+    : side_{&a, &b}, b_in_a_(b_in_a), geometry_(b_in_a) {
   Scratch& s = scratch();
   for (int side = 0; side < 2; ++side) {
     std::fill(std::begin(s.blocks[side]), std::end(s.blocks[side]), Scratch::kNoBlock);

@@ -125,7 +125,7 @@ class LeafPacks {
     return leaf;
   }
 
-  /// The same for who asks nothing of it in the other side's frame.
+  /// The same without the leaf's volume in the other side's frame.
   const Leaf& get(const Side& side, typename Side::Node node, std::size_t begin) { return find(side, node, begin); }
 
  private:
@@ -296,7 +296,7 @@ class LeafPairs {
     return {static_cast<float>((to.tolerance + error) * 1.001), static_cast<float>((to.margin - error) * 0.999)};
   }
 
-  /// Nothing is known of them.
+  /// Calls f for all pairs: for coordinates beyond the range of floats.
   template <typename F>
   static bool allPairs(const typename LeafPacks<A>::Leaf& a, const typename LeafPacks<B>::Leaf& b, F&& f) {
     for (std::size_t i = 0; i < a.pack.count; ++i) {
@@ -307,8 +307,8 @@ class LeafPairs {
     return false;
   }
 
-  /// Where the triangles of a leaf can meet those of another, which `to` places in its frame. With M = `reach`, what is
-  /// computed here and by trianglesWithin() is off by 15 u M: corners 2, the normal 3, sums along it 10.
+  /// Where the triangles of a leaf can meet those of another, which `to` places in its frame. With M = `extent`, what
+  /// is computed here and by trianglesWithin() is off by 15 u M: corners 2, the normal 3, sums along it 10.
   static void fillRegion(const LeafVolume& own, const LeafVolume& other, const SimilarityTransform& to, double size,
                          float error, PackRegion& region) {
     double displacement[3], extent = size, offset = to.scale * other.slab[0];

@@ -10,9 +10,9 @@
 
 namespace bocst::query {
 
-/// PointSet of the bodies of side B, none of which meets the surface of side A, so that each connected component of
-/// what they fill has one: a body lies on one side of the surface as any of its points does, and a node of B that the
-/// surface does not meet at all has its bodies on one side.
+/// Yields points of side B's bodies, none of which may meet the surface of side A. Then each body is on one side of
+/// that surface, and one point for each connected component of the bodies tells on which. If the surface of A does not
+/// meet a node of B, all bodies below the node are on one side, and one point stands for them.
 template <typename A, typename B>
 class ComponentPoints {
  public:

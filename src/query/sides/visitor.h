@@ -22,14 +22,13 @@ struct CellLeaf {
   Sphere sphere;
 };
 
-/// What need not be visited, for a visitor that looks for the first of many pairs and lowers `last` and `last_cell` as
-/// it finds them: of side A with exact answers, nodes whose least coordinate along `axis` is larger than `last`, in the
-/// frame of A; where leaves are cells, nodes whose cells all have ids larger than `last_cell`, on side `cell_side` (0:
-/// A) where both sides have cells.
+/// Limits of a walk that wants only the first pairs in their order; the visitor lowers them as it finds pairs. With
+/// exact answers, nodes of side A are left out if their least coordinate along `axis` is larger than `last`. Where
+/// leaves are cells, nodes are left out if all their cells have ids larger than `last_cell`.
 struct Cut {
-  int axis = 0;
-  double last = std::numeric_limits<double>::infinity();
-  int cell_side = 0;
+  int axis = 0;                                           ///< Of the frame of A.
+  double last = std::numeric_limits<double>::infinity();  ///< Lattice units, in the frame of A.
+  int cell_side = 0;                                      ///< Whose ids count if both sides have cells; 0: A, 1: B.
   std::uint64_t last_cell = ~std::uint64_t{0};
 
   double leastOf(const Volume& v) const {

@@ -129,8 +129,10 @@ void addOracleBench(CLI::App& command, Bench& bench) {
   command.add_flag("--oracles", bench.of_oracles,
                    "measure instead each oracle of this machine on mesh A, subdivided to several sizes");
   command
-      .add_option("--limit", bench.oracles.limit_seconds,
-                  "with --oracles: seconds; an oracle that takes longer to grow a tree is left out at larger sizes")
+      .add_option(
+          "--limit", bench.oracles.limit_seconds,
+          "with --oracles: an oracle that takes longer than this (seconds) to grow a tree is left out at larger "
+          "sizes")
       ->check(positive())
       ->capture_default_str();
 }
@@ -179,7 +181,7 @@ void addBench(CLI::App& program, Job& job) {
   command->add_option("--seed", bench->request.seed, "the same seed gives the same poses")->capture_default_str();
   command
       ->add_option("--rounds", bench->request.rounds,
-                   "number of first answers, and of rounds over all poses and frames")
+                   "repetitions: number of first answers, and number of passes over all poses and frames")
       ->check(positive())
       ->capture_default_str();
   command->add_option("--frames", bench->request.frames, "number of frames of the path in the scenario moving")
