@@ -7,6 +7,7 @@
 #include <utility>
 #include <vector>
 
+#include "geometry/extent.h"
 #include "geometry/triangle.h"
 #include "log/assert.h"
 #include "query/collide/deferred_pairs.h"
@@ -73,12 +74,6 @@ class PairWalk {
     Pair pair;
     bool operator<(const PlacedPair& other) const { return place > other.place; }  // the front of a heap is the first
   };
-  struct LeafTriangle {
-    std::uint32_t id;
-    Corners corners;
-    Eigen::Vector3d lo, hi;
-  };
-
   struct Scratch {
     std::vector<Pair> stack;
     std::vector<PlacedPair> ordered;  // a heap; the walk's pairs where the visitor has a cut
@@ -86,7 +81,7 @@ class PairWalk {
     LeafPairs<A, B> leaves;
     LargeTriangleLeaf<A> large_a;
     LargeTriangleLeaf<B> large_b;
-    std::vector<LeafTriangle> leaf;  // beside bodies
+    std::vector<TriangleExtent> leaf;  // beside bodies
   };
   static Scratch& scratch() {
     thread_local Scratch s;
@@ -207,17 +202,16 @@ class PairWalk {
   }
 
   // Of the leaf that was asked last: many bodies ask about one after another.
-  const std::vector<LeafTriangle>& trianglesOf(typename A::Node leaf, Scratch& s) {
+  const std::vector<TriangleExtent>& trianglesOf(typename A::Node leaf, Scratch& s) {
     if (leaf_known_ && leaf_ == leaf) return s.leaf;
     leaf_known_ = true;
     leaf_ = leaf;
     s.leaf.resize(a_.triangleCount(leaf));
     for (std::size_t i = 0; i < s.leaf.size(); ++i) {
-      LeafTriangle& t = s.leaf[i];
+      TriangleExtent& t = s.leaf[i];
       t.id = a_.triangle(leaf, i);
       for (int k = 0; k < 3; ++k) t.corners[static_cast<std::size_t>(k)] = a_.corner(t.id, k);
-      t.lo = t.corners[0].cwiseMin(t.corners[1]).cwiseMin(t.corners[2]);
-      t.hi = t.corners[0].cwiseMax(t.corners[1]).cwiseMax(t.corners[2]);
+      t.ready();
     }
     return s.leaf;
   }
@@ -239,7 +233,7 @@ class PairWalk {
     }
 
     // Comparisons with what is infinite or none (of a plane's box) say no.
-    bool isApart(const LeafTriangle& t) const {
+    bool isApart(const TriangleExtent& t) const {
       for (int k = 0; k < 3; ++k) {
         if (t.hi[k] < lo_[k] || t.lo[k] > hi_[k]) return true;
       }
@@ -261,7 +255,7 @@ class PairWalk {
   bool leafTriangles(const Pair& pair, Scratch& s) {
     if constexpr (B::kBodies) {
       const BodyBox box(volumeOf(b_, seen_b_), b_in_a_);
-      for (const LeafTriangle& t : trianglesOf(pair.a, s)) {
+      for (const TriangleExtent& t : trianglesOf(pair.a, s)) {
         if (!box.isApart(t) && visitor_.triangle(t.id, pair.b)) return true;
       }
       return false;
@@ -302,28 +296,35 @@ class PairWalk {
     return false;
   }
 
-  // Beside a large triangle, the sphere about its leaf meets far more cells than the triangle does: without this test a
-  // conservative tree would grow all of them. `ball` is in the frame of A.
-  bool meetsLeafOfA(const Sphere& ball, typename A::Node leaf) const {
-    if (a_.isConservative()) return true;
-    for (std::size_t i = 0; i < a_.triangleCount(leaf); ++i) {
-      const std::uint32_t t = a_.triangle(leaf, i);
-      const Corners corners = {a_.corner(t, 0), a_.corner(t, 1), a_.corner(t, 2)};
-      if (spheresMeet(ball, {closestPoint(ball.center, corners), 0})) return true;
+  // Calls f(triangle, its point that is nearest to the ball's middle) for the triangles of a leaf that meet a ball,
+  // both in the frame that `place` leads to, until it returns true; says whether it did.
+  template <typename Side, typename F>
+  bool anyMeets(const Side& side, typename Side::Node leaf, const SimilarityTransform& place, const Sphere& ball,
+                F&& f) const {
+    for (std::size_t i = 0; i < side.triangleCount(leaf); ++i) {
+      const std::uint32_t t = side.triangle(leaf, i);
+      const Corners corners = {place * side.corner(t, 0), place * side.corner(t, 1), place * side.corner(t, 2)};
+      const Eigen::Vector3d point = closestPoint(ball.center, corners);
+      if (spheresMeet(ball, {point, 0}) && f(t, point)) return true;
     }
     return false;
   }
+
+  // Beside a large triangle, the sphere about its leaf meets far more cells than the triangle does: without this test a
+  // conservative tree would grow all of them. `ball` is in the frame of A.
+  bool meetsLeafOfA(const Sphere& ball, typename A::Node leaf) const { return meetsLeaf(a_, leaf, here_, ball); }
   bool meetsLeafOfB(const Sphere& ball, typename B::Node leaf) const {
-    if constexpr (!B::kBodies) {
-      if (b_.isConservative()) return true;
-      for (std::size_t i = 0; i < b_.triangleCount(leaf); ++i) {
-        const std::uint32_t t = b_.triangle(leaf, i);
-        const Corners corners = {b_in_a_ * b_.corner(t, 0), b_in_a_ * b_.corner(t, 1), b_in_a_ * b_.corner(t, 2)};
-        if (spheresMeet(ball, {closestPoint(ball.center, corners), 0})) return true;
-      }
-      return false;
+    if constexpr (B::kBodies) {
+      return true;
+    } else {
+      return meetsLeaf(b_, leaf, b_in_a_, ball);
     }
-    return true;
+  }
+  template <typename Side>
+  bool meetsLeaf(const Side& side, typename Side::Node leaf, const SimilarityTransform& place,
+                 const Sphere& ball) const {
+    const auto any = [](std::uint32_t, const Eigen::Vector3d&) { return true; };
+    return side.isConservative() || anyMeets(side, leaf, place, ball, any);
   }
 
   bool leafSpheres(const Pair& pair) {
@@ -338,22 +339,12 @@ class PairWalk {
   bool leafCells(const Pair& pair) {
     if (a_.isConservative()) {
       const CellLeaf a{a_.cellId(pair.a), a_.cellSphere(pair.a)};
-      for (std::size_t i = 0; i < b_.triangleCount(pair.b); ++i) {
-        const std::uint32_t t = b_.triangle(pair.b, i);
-        const Corners corners = {b_in_a_ * b_.corner(t, 0), b_in_a_ * b_.corner(t, 1), b_in_a_ * b_.corner(t, 2)};
-        const Eigen::Vector3d point = closestPoint(a.sphere.center, corners);
-        if (spheresMeet(a.sphere, {point, 0}) && visitor_.cellOfA(a, t, point)) return true;
-      }
-      return false;
+      return anyMeets(b_, pair.b, b_in_a_, a.sphere,
+                      [&](std::uint32_t t, const Eigen::Vector3d& point) { return visitor_.cellOfA(a, t, point); });
     }
     const CellLeaf b{b_.cellId(pair.b), inA(b_.cellSphere(pair.b))};
-    for (std::size_t i = 0; i < a_.triangleCount(pair.a); ++i) {
-      const std::uint32_t t = a_.triangle(pair.a, i);
-      const Corners corners = {a_.corner(t, 0), a_.corner(t, 1), a_.corner(t, 2)};
-      const Eigen::Vector3d point = closestPoint(b.sphere.center, corners);
-      if (spheresMeet(b.sphere, {point, 0}) && visitor_.cellOfB(t, b, point)) return true;
-    }
-    return false;
+    return anyMeets(a_, pair.a, here_, b.sphere,
+                    [&](std::uint32_t t, const Eigen::Vector3d& point) { return visitor_.cellOfB(t, b, point); });
   }
 
   template <typename Side>
@@ -388,7 +379,7 @@ class PairWalk {
   bool leaf_known_ = false;
   const A& a_;
   const B& b_;
-  const SimilarityTransform b_in_a_, a_in_b_;
+  const SimilarityTransform here_, b_in_a_, a_in_b_;
   V& visitor_;
   const bool spheres_;
   const Cut* const cut_;
