@@ -109,10 +109,11 @@ class BOCST_EXPORT Scene {
   S clearance(const Transform* X_WM, Pair* nearest = nullptr) const;
   /// True if the motion of all moving objects from one state to another is free of collisions at all times. Never steps
   /// over a contact. Geometries that pass closer than the resolution of fcl::continuousCollide (see bocst/fcl.h; for
-  /// two of FCL's geometries 1e-5 of their sizes) count as touching. With CCDM_LINEAR, each object's origin moves on a
-  /// line, and the object turns about a fixed axis (slerp of the normalised quaternions, which removes rounding
-  /// errors of a rotation). Two of FCL's geometries that pass closer than the rounding of the motion's length also
-  /// count as touching.
+  /// two of FCL's shapes and octrees 1e-5 of their sizes) count as touching. With CCDM_LINEAR, each object's origin
+  /// moves on a line, and the object turns about a fixed axis (slerp of the normalised quaternions, which removes
+  /// rounding errors of a rotation). Two of FCL's shapes and octrees that pass closer than the rounding of the motion's
+  /// length also count as touching. The first edge along which an fcl::BVHModel is near another of FCL's geometries
+  /// copies its mesh.
   /// @throws std::invalid_argument as clearance().
   bool edgeIsFree(const Transform* X_WM_begin, const Transform* X_WM_end,
                   fcl::CCDMotionType motion = fcl::CCDM_LINEAR) const;

@@ -42,6 +42,7 @@ io::Polygons readPolygons(const std::string& file) {
 }  // namespace
 
 std::shared_ptr<const Mesh> loadMesh(const std::string& file) {
+  if (file.find('\0') != std::string::npos) throw std::runtime_error("a file name that contains a null character");
   try {
     io::Polygons polygons = readPolygons(file);
     std::vector<Mesh::Indices> triangles = io::triangulate(polygons);

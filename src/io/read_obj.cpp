@@ -78,13 +78,16 @@ class ObjReader {
     for (std::string_view word = nextWord(line); !word.empty() || n < 3; word = nextWord(line)) {
       if (n == 7) failAt(bytes_, word.data(), what + ": too many numbers");
       std::string_view number = word;
-      numbers[n++] = takeFinite(bytes_, number, what);
+      numbers[n++] = takeCoordinate(bytes_, number, what);
     }
     Eigen::Vector3d p(numbers[0], numbers[1], numbers[2]);
     if (n == 5) failAt(bytes_, line.data(), what + ": 3, 4, 6 or 7 numbers expected");
     const double w = n == 4 ? numbers[3] : 1;
     if (w == 0) failAt(bytes_, line.data(), what + ": lies at infinity (w is 0)");
     if (w != 1) p /= w;
+    if (!(p.cwiseAbs().maxCoeff() <= kMostCoordinate)) {
+      failAt(bytes_, line.data(), what + ": a coordinate divided by w is larger than 1e75 in magnitude");
+    }
     polygons_.vertices.push_back(p);
   }
 

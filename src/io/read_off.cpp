@@ -70,10 +70,7 @@ Polygons readOff(std::string_view bytes) {
     if (!next_line()) truncated(v, vertex_count, "vertices");
     Eigen::Vector3d p;
     for (int i = 0; i < 3; ++i) {
-      const std::string_view word = takeWord(line);
-      if (!toNumber(word, p[i]) || !std::isfinite(p[i])) {
-        failAt(bytes, word.data(), "vertex " + std::to_string(v) + ": three finite numbers expected");
-      }
+      p[i] = takeCoordinate(bytes, line, "vertex " + std::to_string(v));
     }
     checkExtras(bytes, line, 9);
     polygons.vertices.push_back(p);

@@ -243,7 +243,7 @@ class PlyReader {
       }
       const double value = take(property.type, element, i);
       if (property.role == Role::kNone) continue;
-      if (!std::isfinite(value)) fail(last_, nameOf(element, i) + ": a coordinate that is not finite");
+      if (const char* fault = notACoordinate(value)) fail(last_, nameOf(element, i) + ": a coordinate " + fault);
       p[static_cast<int>(property.role) - static_cast<int>(Role::kX)] = value;
     }
     if (element.name == "vertex") polygons_.vertices.push_back(p);

@@ -78,7 +78,7 @@ Polygons readText(std::string_view bytes) {
         expect(takeWord(rest), {"vertex"});
         Eigen::Vector3d p;
         for (int i = 0; i < 3; ++i)
-          p[i] = takeFinite(bytes, rest, "vertex " + std::to_string(polygons.vertices.size()));
+          p[i] = takeCoordinate(bytes, rest, "vertex " + std::to_string(polygons.vertices.size()));
         c = pool.indexOf(p);
       }
       expect(takeWord(rest), {"endloop"});

@@ -60,11 +60,17 @@ void failAt(std::string_view file, const char* at, const std::string& what) {
   throw std::runtime_error("line " + std::to_string(line) + ": " + what);
 }
 
-double takeFinite(std::string_view file, std::string_view& text, const std::string& what) {
+const char* notACoordinate(double number) {
+  if (!std::isfinite(number)) return "is no finite number";
+  return std::abs(number) <= kMostCoordinate ? nullptr : "is larger than 1e75 in magnitude";
+}
+
+double takeCoordinate(std::string_view file, std::string_view& text, const std::string& what) {
   const std::string_view word = takeWord(text);
   double number = 0;
-  if (toNumber(word, number) && std::isfinite(number)) return number;
-  failAt(file, word.data(), what + ": " + (word.empty() ? "number missing" : inQuotes(word) + " is no finite number"));
+  const char* const fault = toNumber(word, number) ? notACoordinate(number) : "is no finite number";
+  if (fault == nullptr) return number;
+  failAt(file, word.data(), what + ": " + (word.empty() ? "number missing" : inQuotes(word) + " " + fault));
 }
 
 }  // namespace bocst::io

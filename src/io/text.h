@@ -34,8 +34,13 @@ std::string inQuotes(std::string_view word);
 /// @throws std::runtime_error "line N: what", where N is the line of `file` that `at` points into.
 [[noreturn]] void failAt(std::string_view file, const char* at, const std::string& what);
 
-/// Cuts a finite number off `text`.
-/// @throws std::runtime_error "line N: what: 'word' is no finite number".
-double takeFinite(std::string_view file, std::string_view& text, const std::string& what);
+/// Meshes have no larger coordinates.
+constexpr double kMostCoordinate = 1e75;
+/// Why a number is no coordinate of a mesh, for a message; null if it is one.
+const char* notACoordinate(double number);
+
+/// Cuts a coordinate off `text`.
+/// @throws std::runtime_error "line N: what: 'word' is no finite number", or "is larger than 1e75 in magnitude".
+double takeCoordinate(std::string_view file, std::string_view& text, const std::string& what);
 
 }  // namespace bocst::io

@@ -6,6 +6,7 @@
 #include <cstring>
 #include <iterator>
 #include <limits>
+#include <sstream>
 #include <stdexcept>
 #include <string>
 #include <type_traits>
@@ -28,7 +29,9 @@ constexpr double kMaxCoordinate = 1e75;
 }
 
 std::string coordinates(const Eigen::Vector3d& v) {
-  return "(" + std::to_string(v.x()) + ", " + std::to_string(v.y()) + ", " + std::to_string(v.z()) + ")";
+  std::ostringstream text;
+  text << "(" << v.x() << ", " << v.y() << ", " << v.z() << ")";
+  return text.str();
 }
 
 // FCL's accessor is a call into its library; its triangle is three indices and nothing else.
@@ -68,7 +71,8 @@ class NarrowIterator {
     return std::abs(v[0]) <= kMaxCoordinate && std::abs(v[1]) <= kMaxCoordinate && std::abs(v[2]) <= kMaxCoordinate;
   };
   const auto v = std::find_if_not(vertices.begin(), vertices.end(), good);
-  bad("vertex " + std::to_string(v - vertices.begin()) + " is " + coordinates(*v));
+  bad("vertex " + std::to_string(v - vertices.begin()) + " is " + coordinates(*v) +
+      "; coordinates must be finite and at most 1e75 in magnitude");
 }
 
 /// The box of points, and for each of its faces, lower ones first, one that lies there.

@@ -17,6 +17,11 @@ std::string shapeText(const py::array& a) { return py::str(a.attr("shape")); }
 
 /// The object as an array of numbers whose dtype has one of these kinds.
 py::array numbers(const char* name, const py::handle& object, const char* kinds, const char* expected) {
+  // An array of values that may be missing: NumPy would drop the mask.
+  if (py::hasattr(object, "mask")) {
+    throw py::type_error(std::string("bocst: ") + name +
+                         " is a masked array; pass its filled() or compressed() values");
+  }
   const py::array a = py::array::ensure(object);
   if (!a || std::strchr(kinds, a.dtype().kind()) == nullptr) {
     PyErr_Clear();
@@ -55,12 +60,14 @@ std::vector<std::array<std::uint32_t, 3>> indices(const char* name, const py::ha
   if (a.ndim() != 2 || a.shape(1) != 3) refuse(name, "has the shape " + shapeText(a) + "; (n, 3) is expected");
   const auto wide = py::array_t<std::int64_t, py::array::c_style | py::array::forcecast>::ensure(a);
   const std::int64_t* from = wide.data();
+  const bool is_unsigned = a.dtype().kind() == 'u';  // from 2^63 on they are negative in `wide`
   std::vector<std::array<std::uint32_t, 3>> result(static_cast<std::size_t>(a.shape(0)));
   for (std::size_t t = 0; t < result.size(); ++t) {
     for (std::size_t k = 0; k < 3; ++k) {
       const std::int64_t i = from[3 * t + k];
       if (i < 0 || i > 0xffffffff) {
-        refuse(name, "has the index " + std::to_string(i) + " in row " + std::to_string(t) + ", which no vertex has");
+        const std::string index = is_unsigned ? std::to_string(static_cast<std::uint64_t>(i)) : std::to_string(i);
+        refuse(name, "has the index " + index + " in row " + std::to_string(t) + ", which no vertex has");
       }
       result[t][k] = static_cast<std::uint32_t>(i);
     }

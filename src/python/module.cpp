@@ -407,11 +407,11 @@ std::size_t statesIn(const char* name, const Poses& poses, std::size_t moving, b
 
 /// Calls f(scene, poses, states) without the GIL.
 template <typename F>
-auto ask(const PyScene& s, const py::object& X_WM, bool many, const F& f) {
-  const Poses poses("X_WM", X_WM);
+auto ask(const PyScene& s, const py::object& X_WM, bool many, const F& f, const char* name = "X_WM") {
+  const Poses poses(name, X_WM);
   const NoGilWithOctrees free;
   const std::shared_lock<FairSharedMutex> lock(s.changing);
-  const std::size_t states = statesIn("X_WM", poses, s.scene.movingCount(), many);
+  const std::size_t states = statesIn(name, poses, s.scene.movingCount(), many);
   std::vector<fcl::Transform3d> copy;
   return f(s.scene, poses.transforms(copy), states);
 }
@@ -544,11 +544,12 @@ threads: number of threads that share the states of one call; 0: one per hardwar
           [](const PyScene& s, const py::object& begin, const py::object& end, const std::string& motion) {
             const auto type = valueOf("motion", motion, kMotions);
             const Poses last("X_WM_end", end);
-            return ask(s, begin, false, [&](const Scened& scene, Xs X, std::size_t) {
+            const auto is_free = [&](const Scened& scene, Xs X, std::size_t) {
               statesIn("X_WM_end", last, scene.movingCount(), false);
               std::vector<fcl::Transform3d> copy;
               return scene.edgeIsFree(X, last.transforms(copy), type);
-            });
+            };
+            return ask(s, begin, false, is_free, "X_WM_begin");
           },
           "X_WM_begin"_a, "X_WM_end"_a, "motion"_a = "linear",
           R"(True if the motion from one state to another, both (m, 4, 4), is free of collisions at all times.

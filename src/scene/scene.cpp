@@ -115,6 +115,7 @@ struct Scene<S>::Impl {
     o.model = fcl_adapter::asModel<S>(o.geometry.get());
     if (o.model != nullptr && o.model->empty()) throw std::invalid_argument("bocst::Scene: the model is empty");
     o.exact = o.model != nullptr && o.model->options().answer == Answer::kExact;
+    o.mesh_model = std::make_shared<scene::MeshModel<S>>();
     o.bounds = scene::boundsOf<S>(*o.geometry);
   }
 

@@ -537,6 +537,29 @@ TEST(IsCloserThan, IsThatOfDistancesAtAnySize) {
   }
 }
 
+// Half sides of cells below the least float.
+TEST(IsCloserThan, FindsCellsOfAnySize) {
+  const auto I = fcl::Transform3d(fcl::Transform3d::Identity());
+  for (const double s : {1.0, 1e-30, 1e-40, 1e-44, 1e-45, 1e-50, 1e-200}) {
+    test::Raw raw;
+    raw.vertices = {{0, 0, 0}, {s, 0, 0}, {0, s, 0}};
+    raw.triangles.emplace_back(0, 1, 2);
+    const Modeld model(raw.mesh());
+    auto map = std::make_shared<octomap::OcTree>(0.25 * s);
+    map->updateNode(map->keyToCoord(octomap::OcTreeKey(32768, 32768, 32768)), true);  // from 0 to 0.25 s
+    const fcl::OcTreed octree(map);
+    const auto apart = test::pose<double>(Eigen::Matrix3d::Identity(), {0, 0, 0.75 * s});
+    for (const double x : {1.0, 2.0}) {
+      EXPECT_TRUE(isCloserThan<double>(&octree, apart, &model, I, x * 0.76 * s)) << s;
+      EXPECT_TRUE(isCloserThan<double>(&model, I, &octree, I, x * s)) << s;
+    }
+    EXPECT_TRUE(isCloserThan<double>(&model, I, &octree, I, 0.0)) << s;
+    if (s > 1e-160) {  // squares vanish below
+      EXPECT_FALSE(isCloserThan<double>(&model, I, &octree, apart, 0.7 * s)) << s;
+    }
+  }
+}
+
 TEST(IsCloserThan, NothingIsNearAnEmptyModel) {
   const auto I = fcl::Transform3d(fcl::Transform3d::Identity());
   const Modeld empty, model(test::torus(9).mesh());

@@ -349,7 +349,8 @@ TEST(ReadPly, RefusesWhatIsNoIndexAndNoCount) {
   refuse("3 0 2 3", "4 0 2 3", "truncated");
   refuse("3 0 2 3", "3 0 2 3 4", "line 15: there is more");
   refuse("3 0 2 3", "3 0 2 4", "line 15: face 1: vertex index 4 out of range");
-  refuse("1 1 0", "1 nan 0", "line 12: vertex 2: a coordinate that is not finite");
+  refuse("1 1 0", "1 nan 0", "line 12: vertex 2: a coordinate is no finite number");
+  refuse("1 1 0", "1 1e300 0", "line 12: vertex 2: a coordinate is larger than 1e75 in magnitude");
   refuse("1 1 0", "1 1,5 0", "line 12: vertex 2: '1,5' is no number");
   refuse("property float y", "property float x", "line 5: PLY header: twice the property 'x'");
   refuse("property list uchar int vertex_indices",
@@ -393,7 +394,9 @@ TEST(ReadOff, RefusesWhatIsNoIndexAndNoEnd) {
   refuse("3 0 2 3\n", "3 0 2 3 1 2 3 4 5\n", "line 8: '5' not expected");
   refuse("1 1 0\n", "1 1 0 x\n", "line 5: 'x' not expected");
   refuse("1 1 0\n", "1 1,5 0\n", "line 5: vertex 2");
-  refuse("1 1 0\n", "1 inf 0\n", "line 5: vertex 2");
+  refuse("1 1 0\n", "1 inf 0\n", "line 5: vertex 2: 'inf' is no finite number");
+  refuse("1 1 0\n", "1 -1e76 0\n", "line 5: vertex 2: '-1e76' is larger than 1e75 in magnitude");
+  refuse("1 1 0\n", "1 1\n", "line 5: vertex 2: number missing");
   refuse("4 2 0\n", "4 2 0 7\n", "line 2: ");
   refuse("4 2 0\n", "4 2.5 0\n", "line 2: ");
   refuse("4 2 0\n", "4 1e300 0\n", "line 2: ");

@@ -142,6 +142,7 @@ TEST(Mesh, CoordinatesUpToTheLimitAreLegal) {
         EXPECT_EQ(messageOf(large), "");
         large.vertices[i].y() = sign * std::nextafter(1e75, 1e76);
         EXPECT_NE(messageOf(large).find("vertex " + std::to_string(i) + " "), std::string::npos) << messageOf(large);
+        EXPECT_NE(messageOf(large).find("at most 1e75"), std::string::npos) << messageOf(large);
       }
     }
   }

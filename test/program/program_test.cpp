@@ -705,6 +705,9 @@ TEST_F(SceneProgram, TakesTheOptionsOfAModel) {
   const std::string cubes = write("cubes.json", "{\"objects\": [{\"name\": \"a\", \"mesh\": \"" + cube() +
                                                     "\"}, {\"name\": \"b\", \"mesh\": \"" + cube() +
                                                     "\", \"moving\": true, \"pose\": [1.1, 0, 0]}]}");
+  for (const char* margin : {"nan", "-1", "inf", "x"}) {
+    expectComplaint("scene " + cubes + " --margin " + margin, kUsage, "--margin");
+  }
   EXPECT_EQ(json("scene " + cubes + " --margin 0.049").at("collisions"), 0);
   const Json margin = json("scene " + cubes + " --margin 0.051");
   EXPECT_EQ(margin.at("collisions"), 1);
@@ -869,7 +872,13 @@ TEST_F(Program, SuggestsWhatWasMeant) {
   expectComplaint("--versoin", kUsage, "--versoin");
   expectComplaint("collide " + cube() + " " + cube() + " --pos 1", kUsage, "Did you mean --pose?");
   expectComplaint("collide " + cube() + " " + cube() + " more", kUsage, "more: unexpected");
-  expectComplaint("validate " + cube() + " " + cube() + " --poses 0", kUsage, "0 is not a number above 0");
+  expectComplaint("validate " + cube() + " " + cube() + " --poses 0", kUsage, "0 is not a whole number from 1");
+  // What does not fit in 64 bits, or is negative, is not taken for another number.
+  for (const char* count : {"18446744073709551615", "18446744073709551616", "99999999999999999999", "-1", "1.5"}) {
+    expectComplaint("validate " + cube() + " " + cube() + " --poses " + count, kUsage, "--poses");
+    expectComplaint("validate " + cube() + " " + cube() + " --seed " + count, kUsage, "--seed");
+    expectComplaint("bench " + cube() + " --rounds " + count, kUsage, "--rounds");
+  }
   EXPECT_EQ(run("help").out, run("--help").out);
   EXPECT_EQ(run("help collide").out, run("collide --help").out);
   EXPECT_NE(run("help").out.find("glb"), std::string::npos) << "all formats are named";

@@ -283,6 +283,18 @@ TEST_F(SceneFile, SaysWhereAUrdfIsWrong) {
   complains(link("b", "<mesh filename='http://host/none.stl'/>"), {"line 2", "link b", "package://"});
   complains(link("b", "<mesh filename='tetra.off' scale='1 0 1'/>"), {"line 2", "link b", "scale"});
   complains(link("b", "<sphere radius='-1'/>"), {"line 2", "link b", "above 0"});
+  complains(link("b", "<sphere radius='1e76'/>"), {"line 2", "link b", "at most 1e75"});
+  complains(link("b", kSphere + "<!-- and --><box size='1 1 1'/>"), {"line 2", "link b", "one shape"});
+  complains("<link name='b'><collision><geometry>" + kSphere + "</geometry><geometry>" + kSphere +
+                "</geometry></collision></link>",
+            {"line 2", "link b", "one shape"});
+  // Parsers that go down the tree by recursion need a limit.
+  std::string chain = link("0", kSphere);
+  for (int i = 1; i <= 20000; ++i) {
+    const std::string name = std::to_string(i);
+    chain += link(name) + joint("j" + name, "fixed", std::to_string(i - 1), name);
+  }
+  complains(chain, {"more than 1000 joints are between link"});
   complains(link("b", "<capsule radius='1' length='1'/>"), {"line 2", "capsule", "[b]"});
   complains("<link name='b'><collision/></link>", {"line 2", "[b]"});
   complains("<link name='b'><collision><origin xyz='1 x 0'/><geometry>" + kSphere + "</geometry></collision></link>",
@@ -590,6 +602,7 @@ TEST_F(SceneFile, SaysWhereASceneIsWrong) {
   complains(objects(ball + R"(, {"name": "a"})"), "objects[1]: one of mesh, box");
   complains(objects(R"({"name": "a", "sphere": 1, "box": [1, 1, 1]})"), "objects[0]: one of mesh, box");
   complains(objects(R"({"name": "a", "sphere": 0})"), "objects[0].sphere: sizes must be above 0");
+  complains(objects(R"({"name": "a", "box": [1, 1e76, 1]})"), "objects[0].box: sizes must be above 0 and at most 1e75");
   complains(objects(R"({"name": "a", "box": [1, 2]})"), "objects[0].box: a list of 3 numbers expected");
   complains(objects(R"({"name": "a", "box": [1, 2, "3"]})"), "objects[0].box[2]: a number expected");
   complains(objects(R"({"name": "a", "mesh": "none.stl"})"), "objects[0].mesh: ");
@@ -615,6 +628,17 @@ TEST_F(SceneFile, SaysWhereASceneIsWrong) {
   complains(objects(R"({"name": "a", "sphere": 1, "moving": true})", R"(, "states": [{}])"), "states[0]: missing: a");
   expectComplaint([&] { scene(R"({"robot": {"urdf": "none.urdf"}})"); }, {"none.urdf", "No such file"});
   expectComplaint([&] { scene(objects(ball, R"(, "states": "none.csv")")); }, {"none.csv", "No such file"});
+}
+
+TEST_F(SceneFile, RefusesPositionsBeyondAllSizes) {
+  const auto place = [&](const std::string& moving, const std::string& fixed) {
+    const SceneSetup s = scene(R"({"objects": [{"name": "ball", "sphere": 1, "moving": true, "pose": [)" + moving +
+                               R"(, 0, 0]}, {"name": "post", "sphere": 1, "pose": [)" + fixed + ", 0, 0]}]}");
+    posesOf(s, Bodies(s));
+  };
+  place("1e75", "-1e75");
+  expectComplaint([&] { place("1e76", "0"); }, {"ball", "beyond 1e75"});
+  expectComplaint([&] { place("0", "-1e308"); }, {"post", "beyond 1e75"});
 }
 
 TEST_F(SceneFile, TakesAUrdfByItsContent) {

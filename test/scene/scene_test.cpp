@@ -580,6 +580,39 @@ TYPED_TEST(SceneTest, EdgesNeverStepOverAContact) {
   EXPECT_GT(blocked, 5);
 }
 
+// Beside an FCL mesh, steps by the distance would be as short as the gap.
+TYPED_TEST(SceneTest, EdgesAlongMeshesOfFcl) {
+  using S = TypeParam;
+  Raw disk;
+  const int sides = 500;
+  disk.vertices.emplace_back(0, 0, 0);
+  for (int i = 0; i < sides; ++i) {
+    disk.vertices.emplace_back(std::cos(2 * M_PI * i / sides), std::sin(2 * M_PI * i / sides), 0);
+    disk.triangles.emplace_back(0, 1 + i, 1 + (i + 1) % sides);
+  }
+  const auto bvh = test::bvh<fcl::OBBRSS<S>>(disk);
+  for (const double gap : {1e-2, 1e-4, -1e-4}) {
+    Scene<S> scene;
+    const Id fixed = scene.addFixed(bvh, fcl::Transform3<S>::Identity());
+    const Id moving = scene.addMoving(bvh);
+    const auto at = [&](double angle) {
+      return test::pose<S>(Eigen::AngleAxisd(angle, Eigen::Vector3d::UnitZ()).toRotationMatrix(), {2 + gap, 0, 0});
+    };
+    const auto begin = at(0.003), end = at(3);
+    EXPECT_EQ(scene.edgeIsFree(&begin, &end), gap > 0) << gap;
+    // Its vertices change: the scene is told.
+    bvh->beginReplaceModel();
+    for (const auto& v : disk.vertices) bvh->replaceVertex((v * (1 + 0.02 * (gap > 0))).template cast<S>());
+    bvh->endReplaceModel();
+    scene.update(fixed);
+    scene.update(moving);
+    EXPECT_FALSE(scene.edgeIsFree(&begin, &end)) << gap;
+    bvh->beginReplaceModel();
+    for (const auto& v : disk.vertices) bvh->replaceVertex(v.template cast<S>());
+    bvh->endReplaceModel();
+  }
+}
+
 // A thin wall that samples would step over.
 TYPED_TEST(SceneTest, EdgesThroughAThinWall) {
   using S = TypeParam;

@@ -11,6 +11,7 @@
 
 #include <cmath>
 #include <cstdint>
+#include <limits>
 #include <optional>
 #include <vector>
 
@@ -121,7 +122,8 @@ class OcTreeSide {
       query::Volume box{};
       for (int k = 0; k < 3; ++k) {
         box.center[k] = child.center[k];
-        box.half[k] = static_cast<float>(child.half);
+        // Rounded outwards: the half side may be below all floats but 0.
+        box.half[k] = std::nextafter(static_cast<float>(child.half), std::numeric_limits<float>::infinity());
       }
       if (!query::facesApart(box, other, to)) f(child);
     });

@@ -3,6 +3,8 @@
 
 #include <bocst/model.h>
 
+#include <memory>
+
 // What a Scene asks of one pair of models beside the queries of <bocst/fcl.h>.
 
 namespace bocst::fcl_adapter {
@@ -12,5 +14,9 @@ namespace bocst::fcl_adapter {
 template <typename S>
 bool hullsApart(const Model<S>& a, const fcl::Transform3<S>& X_WA, const Model<S>& b, const fcl::Transform3<S>& X_WB,
                 double gap);
+
+/// A model of the triangles of an fcl::BVHModel; null for other geometries.
+template <typename S>
+std::unique_ptr<const Model<S>> modelOfBvh(const fcl::CollisionGeometry<S>& geometry);
 
 }  // namespace bocst::fcl_adapter

@@ -7,6 +7,7 @@
 #include <algorithm>
 #include <cctype>
 #include <charconv>
+#include <cmath>
 #include <filesystem>
 
 namespace bocst::program {
@@ -124,6 +125,29 @@ CLI::Validator positive() {
     const auto [end, error] = std::from_chars(text.data(), text.data() + text.size(), value);
     const bool holds = error == std::errc() && end == text.data() + text.size() && value > 0;
     return holds ? std::string() : text + " is not a number above 0";
+  });
+  return validator;
+}
+
+CLI::Validator notNegative() {
+  CLI::Validator validator("NONNEGATIVE");
+  validator.operation([](std::string& text) {
+    double value = 0;
+    const auto [end, error] = std::from_chars(text.data(), text.data() + text.size(), value);
+    const bool holds = error == std::errc() && end == text.data() + text.size() && value >= 0 && std::isfinite(value);
+    return holds ? std::string() : text + " is not a finite number of at least 0";
+  });
+  return validator;
+}
+
+CLI::Validator wholeNumber(std::uint64_t least) {
+  CLI::Validator validator("WHOLE");
+  validator.operation([least](std::string& text) {
+    constexpr std::uint64_t kMost = 1000000000000000;
+    std::uint64_t value = 0;
+    const auto [end, error] = std::from_chars(text.data(), text.data() + text.size(), value);
+    const bool holds = error == std::errc() && end == text.data() + text.size() && value >= least && value <= kMost;
+    return holds ? std::string() : text + " is not a whole number from " + std::to_string(least) + " to 10^15";
   });
   return validator;
 }

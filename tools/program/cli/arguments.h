@@ -80,6 +80,12 @@ std::string meshFormats();
 /// A number above 0; CLI11's own complaint has 309 digits.
 CLI::Validator positive();
 
+/// A finite number that is not negative. (CLI::Range takes NaN.)
+CLI::Validator notNegative();
+
+/// A whole number from `least` to 10^15. CLI11 reads larger ones as 2^64 - 1, and negative ones as 2^64 less.
+CLI::Validator wholeNumber(std::uint64_t least = 1);
+
 /// A file that is written and has this ending (".png"), or none. "-", which is stdout, only where `stdout_too`.
 CLI::Validator outputFile(const std::string& ending, bool stdout_too = false);
 

@@ -143,8 +143,16 @@ std::string readFile(const std::string& file) {
   if (fs::is_directory(file, error)) throw std::runtime_error(file + ": is a directory");
   errno = 0;
   std::ifstream stream(file, std::ios::binary);
-  std::string text{std::istreambuf_iterator<char>(stream), std::istreambuf_iterator<char>()};
-  if (!stream) {
+  constexpr std::size_t kMost = std::size_t{1} << 32, kAtOnce = std::size_t{1} << 16;  // some devices have no end
+  std::string text;
+  while (stream && text.size() <= kMost) {
+    const std::size_t size = text.size();
+    text.resize(size + kAtOnce);
+    stream.read(text.data() + size, static_cast<std::streamsize>(kAtOnce));
+    text.resize(size + static_cast<std::size_t>(stream.gcount()));
+  }
+  if (text.size() > kMost) throw std::runtime_error(file + ": is larger than 4 GiB");
+  if (!stream.eof()) {
     throw std::runtime_error(file + ": cannot be read: " + std::generic_category().message(errno != 0 ? errno : EIO));
   }
   return text;

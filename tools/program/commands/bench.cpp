@@ -120,7 +120,7 @@ void addSizes(CLI::App& command, Bench& bench) {
       .add_option("--triangles", bench.sizes,
                   "approximate triangle counts for growth and --oracles; default: 10k, 100k, 1 M and 10 M; with "
                   "--oracles: 5k, 75k, 1 M and 10 M")
-      ->check(positive())
+      ->check(wholeNumber())
       ->delimiter(',')
       ->allow_extra_args(false);
 }
@@ -176,13 +176,15 @@ void addBench(CLI::App& program, Job& job) {
   command
       ->add_option("--poses", bench->request.poses,
                    "number of random poses; with --oracles: of one call of collidePoses")
-      ->check(positive())
+      ->check(wholeNumber())
       ->capture_default_str();
-  command->add_option("--seed", bench->request.seed, "the same seed gives the same poses")->capture_default_str();
+  command->add_option("--seed", bench->request.seed, "the same seed gives the same poses")
+      ->check(wholeNumber(0))
+      ->capture_default_str();
   command
       ->add_option("--rounds", bench->request.rounds,
                    "repetitions: number of first answers, and number of passes over all poses and frames")
-      ->check(positive())
+      ->check(wholeNumber())
       ->capture_default_str();
   command->add_option("--frames", bench->request.frames, "number of frames of the path in the scenario moving")
       ->check(CLI::Range(2, 10000000))

@@ -421,7 +421,7 @@ void addCollide(CLI::App& program, Job& job) {
   command->add_flag("--distance", collide->distances,
                     "with --poses: report also the distance and the nearest points of poses without contact");
   command->add_option("--max-contacts", collide->max_contacts, "maximum number of contacts; default: all")
-      ->check(positive());
+      ->check(wholeNumber());
   command
       ->add_option("--csv", collide->csv_file,
                    "write the contacts (with --poses: one line per pose) to this file; - is stdout")

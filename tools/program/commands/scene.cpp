@@ -2,7 +2,9 @@
 #include <CLI/CLI.hpp>
 #include <algorithm>
 #include <iostream>
+#include <limits>
 #include <memory>
+#include <set>
 #include <string>
 #include <utility>
 #include <vector>
@@ -60,9 +62,10 @@ class SceneReport {
   /// The pairs of parts that collide, each once.
   std::vector<Names> pairsOf(std::size_t state) const {
     std::vector<Names> names;
+    std::set<Names> known;
     for (const BodyPair& pair : answers_.pairs[state]) {
       const Names found = namesOf(pair);
-      if (std::find(names.begin(), names.end(), found) == names.end()) names.push_back(found);
+      if (known.insert(found).second) names.push_back(found);
     }
     return names;
   }
@@ -117,15 +120,19 @@ class SceneReport {
     return text;
   }
 
-  /// "hand - table; wrist - table".
-  std::string pairsText(std::size_t state) const {
+  /// "hand - table; wrist - table; 3 more".
+  std::string pairsText(std::size_t state, std::size_t most = std::numeric_limits<std::size_t>::max()) const {
+    const std::vector<Names> pairs = pairsOf(state);
     std::vector<std::string> texts;
-    for (const auto& [a, b] : pairsOf(state)) texts.push_back(a + " - " + b);
+    for (std::size_t i = 0; i < std::min(most, pairs.size()); ++i) {
+      texts.push_back(pairs[i].first + " - " + pairs[i].second);
+    }
+    if (texts.size() < pairs.size()) texts.push_back(std::to_string(pairs.size() - texts.size()) + " more");
     return joined(texts, "; ");
   }
 
   void printStates() const {
-    constexpr std::size_t kShown = 20;
+    constexpr std::size_t kShown = 20, kShownPairs = 10;
     const bool room = !answers_.clearance.empty();
     Table table(Table::Others::kLeft);
     std::vector<std::string> head = {"state", "collides", "pairs"};
@@ -137,7 +144,8 @@ class SceneReport {
       const std::vector<std::string> outside = outsideLimits(k);
       if (answers_.hit[k] == 0 && outside.empty() && !room) continue;
       if (++listed > kShown) continue;
-      std::vector<std::string> row = {setup_.states[k].place, answers_.hit[k] != 0 ? "yes" : "no", pairsText(k)};
+      std::vector<std::string> row = {setup_.states[k].place, answers_.hit[k] != 0 ? "yes" : "no",
+                                      pairsText(k, kShownPairs)};
       if (room) row.insert(row.begin() + 2, clearanceText(answers_.clearance[k]));
       row.push_back(joined(outside, "; "));
       table.row(row);
@@ -388,7 +396,7 @@ void addScene(CLI::App& program, Job& job) {
   command
       ->add_option("--margin", scene->margin,
                    "surfaces of meshes at a distance of at most this collide; between two meshes, twice this counts")
-      ->check(CLI::Range(0.0, 1e9))
+      ->check(notNegative())
       ->capture_default_str();
   command->add_flag("--no-fcl", scene->no_fcl, "do not compare with FCL");
   command->add_option("--csv", scene->csv_file, "write a line for each state to this file; - is stdout")

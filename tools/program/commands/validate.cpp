@@ -217,8 +217,10 @@ void addValidate(CLI::App& program, Job& job) {
       "overestimate most (with --histogram), else the first pose. Exit code 0 means that there was no mismatch.");
   command->add_option("a", validate->file_a, std::string("A: ") + kMeshFile)->required();
   command->add_option("b", validate->file_b, "B: mesh file")->required();
-  command->add_option("--poses", validate->poses, "number of poses")->check(positive())->capture_default_str();
-  command->add_option("--seed", validate->seed, "the same seed gives the same poses")->capture_default_str();
+  command->add_option("--poses", validate->poses, "number of poses")->check(wholeNumber())->capture_default_str();
+  command->add_option("--seed", validate->seed, "the same seed gives the same poses")
+      ->check(wholeNumber(0))
+      ->capture_default_str();
   command->add_flag("--contacts", validate->compare_contacts, "compare also the sets of triangle pairs");
   command->add_option("--reference", validate->references, "trees of FCL to compare with: obbrss, obb, rss (slow)")
       ->delimiter(',')

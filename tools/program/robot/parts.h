@@ -10,6 +10,9 @@
 
 namespace bocst::program {
 
+/// Larger sizes and coordinates of positions are refused, as those of meshes are: FCL's solvers compute with squares.
+constexpr double kMostLength = 1e75;
+
 /// A mesh or a body about the origin of its own frame.
 struct Shape {
   enum class Kind { kMesh, kBox, kSphere, kCylinder, kCapsule };

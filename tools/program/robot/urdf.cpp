@@ -39,6 +39,9 @@ class Listener final : public console_bridge::OutputHandler {
   std::string complaints_;
 };
 
+/// Joints between a link and the root; parsers go down the tree by recursion.
+constexpr std::size_t kMostDepth = 1000;
+
 class UrdfReader {
  public:
   UrdfReader(const std::string& file, const Packages& packages, MeshStore& meshes)
@@ -48,6 +51,7 @@ class UrdfReader {
 
   Robot read() {
     checkTree();
+    checkGeometries();
     const urdf::ModelInterfaceSharedPtr model = parse();
     add(*model->root_link_);
     try {
@@ -71,18 +75,41 @@ class UrdfReader {
                      ", too; a robot is a tree of links");
       }
     }
-    std::set<std::string> rooted;
+    std::map<std::string, std::size_t> depth_of;  // joints between a link and the root
     for (const auto& [link, joint] : joint_of) {
       std::set<std::string> path;
       std::string at = link;
-      for (auto up = joint_of.find(at); up != joint_of.end() && rooted.count(at) == 0; up = joint_of.find(at)) {
+      for (auto up = joint_of.find(at); up != joint_of.end() && depth_of.count(at) == 0; up = joint_of.find(at)) {
         if (!path.insert(at).second) {
           complain("joint", joint.attribute("name").value(),
                    "links are connected in a circle; a robot is a tree of links");
         }
         at = up->second.child("parent").attribute("link").value();
+        const auto above = depth_of.find(at);
+        if (path.size() + (above == depth_of.end() ? 0 : above->second) > kMostDepth) {
+          complain("joint", joint.attribute("name").value(),
+                   "more than " + std::to_string(kMostDepth) + " joints are between link " + link + " and the root");
+        }
       }
-      rooted.insert(path.begin(), path.end());
+      const auto above = depth_of.find(at);
+      depth_of[link] = path.size() + (above == depth_of.end() ? 0 : above->second);
+    }
+  }
+
+  /// urdfdom takes the first shape of a geometry and leaves out the others without a word.
+  void checkGeometries() const {
+    for (const pugi::xml_node& link : xml_.root().children("link")) {
+      for (const pugi::xml_node& collision : link.children("collision")) {
+        const auto shapes = collision.child("geometry").children();
+        const auto elements = std::count_if(shapes.begin(), shapes.end(), [](const pugi::xml_node& shape) {
+          return shape.type() == pugi::node_element;
+        });
+        if (elements > 1 ||
+            std::distance(collision.children("geometry").begin(), collision.children("geometry").end()) > 1) {
+          throw std::runtime_error(xml_.place(collision) + ": link " + link.attribute("name").value() +
+                                   ": a <collision> has one shape; write a <collision> for each");
+        }
+      }
     }
   }
 
@@ -189,8 +216,8 @@ class UrdfReader {
       default:
         complain("link", link, "a geometry of unknown type");
     }
-    if (!shape.size.allFinite() || !(shape.size.minCoeff() > 0)) {
-      complain("link", link, "the sizes of a geometry must be finite and above 0");
+    if (!(shape.size.minCoeff() > 0) || !(shape.size.maxCoeff() <= kMostLength)) {
+      complain("link", link, "the sizes of a geometry must be above 0 and at most 1e75");
     }
     return shape;
   }

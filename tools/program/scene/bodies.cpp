@@ -1,9 +1,19 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #include <algorithm>
+#include <stdexcept>
 
 #include "scene/scene_side.h"
 
 namespace bocst::program {
+namespace {
+
+void checkPosition(const SceneSetup& setup, std::size_t part, const State& state, const Eigen::Isometry3d& X_WB) {
+  if (X_WB.translation().cwiseAbs().maxCoeff() <= kMostLength) return;
+  throw std::runtime_error((state.place.empty() ? "" : state.place + ": ") + setup.part(part).name +
+                           ": a coordinate of its position is beyond 1e75");
+}
+
+}  // namespace
 
 Bodies::Bodies(const SceneSetup& setup) : parts(setup.partCount()), allowed(parts * parts, false) {
   const std::vector<Eigen::Isometry3d> X_WP = setup.partPoses(setup.states.front());
@@ -15,7 +25,9 @@ Bodies::Bodies(const SceneSetup& setup) : parts(setup.partCount()), allowed(part
         const auto found = std::find_if(shapes.begin(), shapes.end(), same);
         bodies.push_back({p, static_cast<std::size_t>(found - shapes.begin()), placed.X_PS});
         if (found == shapes.end()) shapes.push_back(placed.shape);
-        if (!moves) X_WB.push_back(X_WP[p] * placed.X_PS);
+        if (moves) continue;
+        X_WB.push_back(X_WP[p] * placed.X_PS);
+        checkPosition(setup, p, setup.states.front(), X_WB.back());
       }
     }
     if (moves) moving = bodies.size();
@@ -48,6 +60,7 @@ std::vector<Eigen::Isometry3d> posesOf(const SceneSetup& setup, const Bodies& bo
     const std::vector<Eigen::Isometry3d> X_WP = setup.partPoses(state);
     for (std::size_t i = 0; i < bodies.moving; ++i) {
       poses.push_back(X_WP[bodies.bodies[i].part] * bodies.bodies[i].X_PB);
+      checkPosition(setup, bodies.bodies[i].part, state, poses.back());
     }
   }
   return poses;

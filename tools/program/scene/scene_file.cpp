@@ -198,7 +198,9 @@ class Reader {
       const std::vector<double> sizes = value.numbers(2);  // radius, length
       shape.size = {sizes[0], sizes[1], sizes[1]};
     }
-    if (!(shape.size.minCoeff() > 0)) value.complain("sizes must be above 0");
+    if (!(shape.size.minCoeff() > 0) || !(shape.size.maxCoeff() <= kMostLength)) {
+      value.complain("sizes must be above 0 and at most 1e75");
+    }
     return shape;
   }
 
