@@ -524,8 +524,8 @@ HWY_INLINE V squareBetweenCorners(const Vec3 (&p)[3], const Vec3 (&q)[3]) {
   for (int i = 0; i < 3; ++i) {
     BOCST_UNROLL
     for (int j = 0; j < 3; ++j) {
-      const Vec3 way = sub(q[j], p[i]);
-      least = hn::Min(least, dot(way, way));
+      const Vec3 displacement = sub(q[j], p[i]);
+      least = hn::Min(least, dot(displacement, displacement));
     }
   }
   return least;

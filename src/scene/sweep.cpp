@@ -41,9 +41,10 @@ bool Sweep<S>::setFar(const World<S>& world, const fcl::Transform3<S>* X_WM, std
   // Of random states, the straight way of one object shows it: the one that did before is asked first.
   for (std::size_t n = 0, i = farthest_ % moving; n < moving && !is_measured_; ++n, i = i + 1 < moving ? i + 1 : 0) {
     const Eigen::Vector3d& c = world.moving[i].bounds.center;
+    // Column by column: Eigen's product of a transform is not inlined.
     const auto at = [&](std::size_t k) -> Eigen::Vector3d {
-      const fcl::Transform3<S>& X = X_WM[k * moving + i];
-      return X.linear().template cast<double>() * c + X.translation().template cast<double>();
+      const auto columns = X_WM[k * moving + i].matrix().template topRows<3>().template cast<double>();
+      return columns.col(0) * c[0] + columns.col(1) * c[1] + columns.col(2) * c[2] + columns.col(3);
     };
     const Eigen::Vector3d between = at(middle);
     if (isTooFar(i, std::max((at(part.begin) - between).norm(), (at(last) - between).norm()))) return false;

@@ -26,7 +26,7 @@ class alignas(64) Outline {
     };
     Axis axes[3] = {{{1, 0, 0}, 0}, {{0, 1, 0}, 0}, {{0, 0, 1}, 0}};
     float center[3] = {0, 0, 0};
-    float reach = 0;  ///< No point is farther from the frame's origin.
+    float radius = 0;  ///< No point is farther from the frame's origin.
   };
 
   /// The members of Box where they lie, four floats at once. A copy of them would be slow: what was just written in
@@ -35,7 +35,7 @@ class alignas(64) Outline {
    public:
     explicit Reader(const std::atomic<std::uint64_t>* words) : words_(words) {}
     simd::Float4 axis(std::size_t k) const { return at(2 * k); }  ///< The direction, and half the extent along it.
-    simd::Float4 center() const { return at(6); }                 ///< And the reach.
+    simd::Float4 center() const { return at(6); }                 ///< And the radius.
     float half(std::size_t k) const { return axis(k)[3]; }
 
    private:
@@ -56,7 +56,7 @@ class alignas(64) Outline {
       for (int c = 0; c < 3; ++c) box.axes[k].direction[c] = static_cast<float>(axes(c, k));
       box.axes[k].half = static_cast<float>(half[k]);
     }
-    box.reach = static_cast<float>(center.norm() + half.norm());
+    box.radius = static_cast<float>(center.norm() + half.norm());
     return box;
   }
 

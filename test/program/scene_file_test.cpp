@@ -288,13 +288,19 @@ TEST_F(SceneFile, SaysWhereAUrdfIsWrong) {
   complains("<link name='b'><collision><geometry>" + kSphere + "</geometry><geometry>" + kSphere +
                 "</geometry></collision></link>",
             {"line 2", "link b", "one shape"});
-  // Parsers that go down the tree by recursion need a limit.
-  std::string chain = link("0", kSphere);
-  for (int i = 1; i <= 20000; ++i) {
-    const std::string name = std::to_string(i);
-    chain += link(name) + joint("j" + name, "fixed", std::to_string(i - 1), name);
+  // Parsers that go down the tree by recursion need a limit. Links in the order of their names, and not.
+  for (const int first : {10000, 0}) {
+    const auto chain = [&](int joints) {
+      std::string text = link(std::to_string(first), kSphere);
+      for (int i = first + 1; i <= first + joints; ++i) {
+        const std::string name = std::to_string(i);
+        text += link(name) + joint("j" + name, "fixed", std::to_string(i - 1), name);
+      }
+      return text;
+    };
+    complains(chain(1001), {"more than 1000 joints are between link"});
+    EXPECT_EQ(read(robot(chain(1000))).links().size(), 1001u);
   }
-  complains(chain, {"more than 1000 joints are between link"});
   complains(link("b", "<capsule radius='1' length='1'/>"), {"line 2", "capsule", "[b]"});
   complains("<link name='b'><collision/></link>", {"line 2", "[b]"});
   complains("<link name='b'><collision><origin xyz='1 x 0'/><geometry>" + kSphere + "</geometry></collision></link>",

@@ -595,21 +595,26 @@ TYPED_TEST(SceneTest, EdgesAlongMeshesOfFcl) {
     Scene<S> scene;
     const Id fixed = scene.addFixed(bvh, fcl::Transform3<S>::Identity());
     const Id moving = scene.addMoving(bvh);
-    const auto at = [&](double angle) {
-      return test::pose<S>(Eigen::AngleAxisd(angle, Eigen::Vector3d::UnitZ()).toRotationMatrix(), {2 + gap, 0, 0});
+    const auto at = [&](double angle, double nearer = 0) {
+      return test::pose<S>(Eigen::AngleAxisd(angle, Eigen::Vector3d::UnitZ()).toRotationMatrix(),
+                           {2 + gap - nearer, 0, 0});
     };
     const auto begin = at(0.003), end = at(3);
     EXPECT_EQ(scene.edgeIsFree(&begin, &end), gap > 0) << gap;
-    // Its vertices change: the scene is told.
-    bvh->beginReplaceModel();
-    for (const auto& v : disk.vertices) bvh->replaceVertex((v * (1 + 0.02 * (gap > 0))).template cast<S>());
-    bvh->endReplaceModel();
-    scene.update(fixed);
-    scene.update(moving);
-    EXPECT_FALSE(scene.edgeIsFree(&begin, &end)) << gap;
-    bvh->beginReplaceModel();
-    for (const auto& v : disk.vertices) bvh->replaceVertex(v.template cast<S>());
-    bvh->endReplaceModel();
+    if (gap < 0) continue;
+    // Both become smaller and come nearer.
+    const auto replace = [&](double scale) {
+      bvh->beginReplaceModel();
+      for (const auto& v : disk.vertices) bvh->replaceVertex((v * scale).template cast<S>());
+      bvh->endReplaceModel();
+      scene.update(fixed);
+      scene.update(moving);
+    };
+    replace(0.98);
+    const auto nearer_begin = at(0.003, 0.01), nearer_end = at(3, 0.01);
+    EXPECT_TRUE(scene.edgeIsFree(&nearer_begin, &nearer_end)) << gap;
+    replace(1);
+    EXPECT_FALSE(scene.edgeIsFree(&nearer_begin, &nearer_end)) << gap;
   }
 }
 

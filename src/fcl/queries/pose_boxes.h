@@ -26,7 +26,7 @@ query::PoseBoxes boxesOf(const Model<S>& a, const Model<S>& b) {
   const double margin = 1.001 * (marginOf(&a, &b) + treeOf(a).sphereReach() + treeOf(b).sphereReach());
   query::PoseBoxes boxes;
   // However b is turned, it is no farther from its origin than this.
-  boxes.reach = to_a.norm() + 1.002 * (middle_b.norm() + to_b.norm());
+  boxes.radius_sum = to_a.norm() + 1.002 * (middle_b.norm() + to_b.norm());
   boxes.allowed_per_length = 1.001 * 2 * roundingOf<S>(1);
   boxes.allowed = margin + boxes.allowed_per_length * 2 * (magnitudeOf(box_a) + magnitudeOf(box_b));
   for (int i = 0; i < 3; ++i) {

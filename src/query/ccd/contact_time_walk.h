@@ -206,10 +206,10 @@ class ContactTimeWalk : private BestFirst<ContactTimeWalk<A, B>, A, B> {
     return convex;
   }
 
-  NodeExtent reachOfA(typename A::Node n) const { return NodeExtent(a_.volume(n), a_in_world_); }
-  NodeExtent reachOfB(typename B::Node n) const { return NodeExtent(b_.volume(n), b_in_world_); }
-  Sphere ballOfA(typename A::Node n) const { return stretched(query::placed(a_.sphere(n), a_in_world_)); }
-  auto ballOfB(typename B::Node n) const {
+  NodeExtent extentOfA(typename A::Node n) const { return NodeExtent(a_.volume(n), a_in_world_); }
+  NodeExtent extentOfB(typename B::Node n) const { return NodeExtent(b_.volume(n), b_in_world_); }
+  Sphere sphereOfA(typename A::Node n) const { return stretched(query::placed(a_.sphere(n), a_in_world_)); }
+  auto sphereOfB(typename B::Node n) const {
     if constexpr (B::kBodies) {
       return n;
     } else {

@@ -120,8 +120,8 @@ HWY_INLINE Met meeting(const SphereFrames& g, const SphereFrame& f, const Sphere
     V squared = hn::Zero(d);
     BOCST_UNROLL
     for (int k = 0; k < 3; ++k) {
-      const V way = hn::Sub(hn::Set(d, y.center[1][k][l]), hn::Load(d, f.center[0][k] + i));
-      squared = hn::MulAdd(way, way, squared);
+      const V displacement = hn::Sub(hn::Set(d, y.center[1][k][l]), hn::Load(d, f.center[0][k] + i));
+      squared = hn::MulAdd(displacement, displacement, squared);
     }
     const V radius = hn::Load(d, f.radius + i);
     const V most = hn::Add(radius, more), least = hn::Max(hn::Add(radius, less), hn::Zero(d));

@@ -13,7 +13,7 @@ namespace {
 
 // How far the sphere of a leaf may be from the surface that is in the leaf, of both sides together: each leaf's cell
 // meets the surface, so its sphere is within a diameter of that.
-double reachOfLeaves(const TreeSide& a, const TreeSide& b, double scale) {
+double radiiOfLeaves(const TreeSide& a, const TreeSide& b, double scale) {
   const auto diameter = [](const TreeSide& side) {
     return std::sqrt(3.0) * (1 << (lattice::kMaxLevel - side.tree().deepest()));
   };
@@ -30,7 +30,7 @@ struct SphereWalk::Scratch {
 
 bool SphereWalk::areBoxesApart() const {
   SimilarityTransform wide = b_in_a_;
-  wide.tolerance += reachOfLeaves(a_, b_, b_in_a_.scale);
+  wide.tolerance += radiiOfLeaves(a_, b_, b_in_a_.scale);
   return facesApart(a_.volume(a_.root()), b_.volume(b_.root()), wide);
 }
 

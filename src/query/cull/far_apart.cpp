@@ -14,7 +14,7 @@ using simd::lane;
 /// A box turned as in the world. Lane k of `half` is about axis k; lanes 3 are not used.
 struct TurnedBox {
   Float4 axes[3], center, half;
-  float reach;
+  float radius;
 };
 
 // The matrix of these columns times v.
@@ -41,10 +41,11 @@ Float4 afterNext(Float4 v) { return __builtin_shufflevector(v, v, 2, 0, 1, 3); }
 // Along the product of any axis i of a, a lane each, and axis J of b. Their products are at most 1 long, so a gap along
 // them is no shorter than it looks. `cosines` are of the angles between axis i and each of b.
 template <int J>
-simd::Int4 areApartByProducts(Float4 way, Float4 half_a, const Float4 (&cosines)[3], Float4 half_b, Float4 least) {
+simd::Int4 areApartByProducts(Float4 displacement, Float4 half_a, const Float4 (&cosines)[3], Float4 half_b,
+                              Float4 least) {
   constexpr int kNext = (J + 1) % 3, kAfter = (J + 2) % 3;
   const Float4 cosine = cosines[J], size = simd::abs(cosine);
-  const Float4 distance = simd::abs(afterNext(way) * next(cosine) - next(way) * afterNext(cosine));
+  const Float4 distance = simd::abs(afterNext(displacement) * next(cosine) - next(displacement) * afterNext(cosine));
   const Float4 extent_a = next(half_a) * afterNext(size) + afterNext(half_a) * next(size);
   const Float4 extent_b =
       lane<kNext>(half_b) * simd::abs(cosines[kAfter]) + lane<kAfter>(half_b) * simd::abs(cosines[kNext]);
@@ -54,18 +55,18 @@ simd::Int4 areApartByProducts(Float4 way, Float4 half_a, const Float4 (&cosines)
 // `translation` is that of b minus that of a.
 __attribute__((always_inline)) inline bool areFarApart(const TurnedBox& a, const TurnedBox& b, Float4 translation,
                                                        float margin) {
-  const Float4 way = translation + b.center - a.center;
+  const Float4 displacement = translation + b.center - a.center;
   const Float4 none = {0, 0, 0, 0};
   // Row c: coordinate c of each axis of a. So what is a sum over rows has a lane for each axis, and 0 in lane 3.
   Float4 rows_a[3] = {a.axes[0], a.axes[1], a.axes[2]}, rest = none;
   simd::transpose(rows_a[0], rows_a[1], rows_a[2], rest);
-  const Float4 along_a = product(rows_a, way);
+  const Float4 along_a = product(rows_a, displacement);
   const Float4 squares = along_a * along_a;
   const float squared = squares[0] + squares[1] + squares[2];
   // The square may vanish. Where it is infinite, so is the gap that is asked for.
   if (!(squared > 1e-30f)) return false;
   const float length = std::sqrt(squared);
-  const float gap = 1.001f * margin + 2e-4f * (length + 2 * (a.reach + b.reach));
+  const float gap = 1.001f * margin + 2e-4f * (length + 2 * (a.radius + b.radius));
   const Float4 least = {gap, gap, gap, gap};
 
   const Float4 cosines[3] = {product(rows_a, b.axes[0]), product(rows_a, b.axes[1]), product(rows_a, b.axes[2])};

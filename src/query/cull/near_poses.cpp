@@ -74,19 +74,19 @@ HWY_INLINE Md haveRotations(const LanesOfPoses& X) {
   return hn::And(rigid, hn::And(hn::Eq(norm1(X.last_row), hn::Zero(d)), hn::Eq(X.last, one)));
 }
 
-HWY_INLINE Md areApartByAxes(const PoseBoxes& boxes, const LanesOfPoses& X, Vec3d way, Vd allowed) {
+HWY_INLINE Md areApartByAxes(const PoseBoxes& boxes, const LanesOfPoses& X, Vec3d displacement, Vd allowed) {
   const Dd d;
   const Vec3d turned[3] = {abs(X.column[0]), abs(X.column[1]), abs(X.column[2])};
   Vec3d b = {allowed, allowed, allowed};
   for (std::size_t k = 0; k < 3; ++k) {
-    way = along(way, hn::Set(d, boxes.middle_b[k]), X.column[k]);
+    displacement = along(displacement, hn::Set(d, boxes.middle_b[k]), X.column[k]);
     b = along(b, hn::Set(d, boxes.half_b[k]), turned[k]);
   }
-  const Vec3d half_a = broadcast(boxes.half_a), gap = sub(sub(abs(way), half_a), b);
+  const Vec3d half_a = broadcast(boxes.half_a), gap = sub(sub(abs(displacement), half_a), b);
   Vd largest = max3(gap.x, gap.y, gap.z);
   for (std::size_t k = 0; k < 3; ++k) {
-    const Vd reach = hn::Add(dot(half_a, turned[k]), hn::Add(hn::Set(d, boxes.along_b[k]), allowed));
-    largest = hn::Max(largest, hn::Sub(hn::Abs(dot(way, X.column[k])), reach));
+    const Vd extent = hn::Add(dot(half_a, turned[k]), hn::Add(hn::Set(d, boxes.along_b[k]), allowed));
+    largest = hn::Max(largest, hn::Sub(hn::Abs(dot(displacement, X.column[k])), extent));
   }
   return hn::Gt(largest, hn::Zero(d));
 }
@@ -105,14 +105,14 @@ std::size_t find(const PoseBoxes& boxes, const S* X_AB, bool rows, std::size_t c
     }
     if (from == copy) std::copy(X_AB + 16 * first, X_AB + 16 * (first + poses), copy);
     const LanesOfPoses X = load(from, rows);
-    const Vec3d way = sub(X.translation, broadcast(boxes.middle_a));
+    const Vec3d displacement = sub(X.translation, broadcast(boxes.middle_a));
     // Of a translation that is not finite, this is not, so it parts nothing.
     const Vd allowed =
         hn::MulAdd(hn::Set(d, boxes.allowed_per_length), norm1(X.translation), hn::Set(d, boxes.allowed));
-    const Vd far = hn::Add(hn::Set(d, boxes.reach), allowed);
-    Md apart = hn::Gt(dot(way, way), hn::Mul(far, far));
+    const Vd far = hn::Add(hn::Set(d, boxes.radius_sum), allowed);
+    Md apart = hn::Gt(dot(displacement, displacement), hn::Mul(far, far));
     // Most of a planner's poses end here.
-    if (!hn::AllTrue(d, apart)) apart = hn::Or(apart, areApartByAxes(boxes, X, way, allowed));
+    if (!hn::AllTrue(d, apart)) apart = hn::Or(apart, areApartByAxes(boxes, X, displacement, allowed));
     std::uint8_t settled[8] = {};
     hn::StoreMaskBits(d, hn::And(apart, haveRotations(X)), settled);
     for (unsigned left = ~settled[0] & ((1u << poses) - 1); left != 0; left &= left - 1) {

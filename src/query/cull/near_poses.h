@@ -11,7 +11,7 @@ struct PoseBoxes {
   double middle_a[3], middle_b[3];
   double half_a[3], half_b[3];
   double along_b[3];          ///< How far b reaches along its own axes, which need not be quite orthogonal.
-  double reach;               ///< From the middle of a to its corners, and from b's origin to those of b, at most.
+  double radius_sum;          ///< From the middle of a to its corners, and from b's origin to those of b, at most.
   double allowed;             ///< A gap that is no larger parts nothing.
   double allowed_per_length;  ///< It grows so with the length of the translation.
 };

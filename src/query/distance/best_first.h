@@ -15,8 +15,8 @@ namespace bocst::query {
 /// then they grow in one batch, each twice as large as the one before.
 ///
 /// A query (Walk) derives from this and has, for this base: worthIt(bound); settled(); again(pair), true when it pushed
-/// the pair with a better bound instead; reachOfA(node) and reachOfB(node), or ballOfA(node) and ballOfB(node) when a
-/// side answers with cells; boundOf() of two of these; leaves(pair); scaleOfB(), the unit of B in that of A.
+/// the pair with a better bound instead; extentOfA(node) and extentOfB(node), or sphereOfA(node) and sphereOfB(node)
+/// when a side answers with cells; boundOf() of two of these; leaves(pair); scaleOfB(), the unit of B in that of A.
 template <typename Walk, typename A, typename B>
 class BestFirst {
  protected:
@@ -66,8 +66,8 @@ class BestFirst {
   }
 
   double boundOf(const Pair& pair) {
-    return spheres() ? walk().boundOf(walk().ballOfA(pair.a), walk().ballOfB(pair.b))
-                     : walk().boundOf(walk().reachOfA(pair.a), walk().reachOfB(pair.b));
+    return spheres() ? walk().boundOf(walk().sphereOfA(pair.a), walk().sphereOfB(pair.b))
+                     : walk().boundOf(walk().extentOfA(pair.a), walk().extentOfB(pair.b));
   }
 
   /// Pushes the pairs of one node's children and the other node. A query may have a faster way of its own.
@@ -144,21 +144,21 @@ class BestFirst {
 
   void expandA(const Pair& pair) {
     if (spheres()) {
-      const auto b = walk().ballOfB(pair.b);
-      a_.children(pair.a, [&](typename A::Node c) { push({walk().boundOf(walk().ballOfA(c), b), c, pair.b}); });
+      const auto b = walk().sphereOfB(pair.b);
+      a_.children(pair.a, [&](typename A::Node c) { push({walk().boundOf(walk().sphereOfA(c), b), c, pair.b}); });
     } else {
-      const auto b = walk().reachOfB(pair.b);
-      a_.children(pair.a, [&](typename A::Node c) { push({walk().boundOf(walk().reachOfA(c), b), c, pair.b}); });
+      const auto b = walk().extentOfB(pair.b);
+      a_.children(pair.a, [&](typename A::Node c) { push({walk().boundOf(walk().extentOfA(c), b), c, pair.b}); });
     }
   }
 
   void expandB(const Pair& pair) {
     if (spheres()) {
-      const auto a = walk().ballOfA(pair.a);
-      b_.children(pair.b, [&](typename B::Node c) { push({walk().boundOf(a, walk().ballOfB(c)), pair.a, c}); });
+      const auto a = walk().sphereOfA(pair.a);
+      b_.children(pair.b, [&](typename B::Node c) { push({walk().boundOf(a, walk().sphereOfB(c)), pair.a, c}); });
     } else {
-      const auto a = walk().reachOfA(pair.a);
-      b_.children(pair.b, [&](typename B::Node c) { push({walk().boundOf(a, walk().reachOfB(c)), pair.a, c}); });
+      const auto a = walk().extentOfA(pair.a);
+      b_.children(pair.b, [&](typename B::Node c) { push({walk().boundOf(a, walk().extentOfB(c)), pair.a, c}); });
     }
   }
 

@@ -91,19 +91,19 @@ class DistanceWalk : private BestFirst<DistanceWalk<A, B>, A, B> {
   }
   double scaleOfB() const { return b_in_a_.scale; }
 
-  NodeExtent reachOfA(typename A::Node n) const { return NodeExtent(a_.volume(n), SimilarityTransform()); }
-  NodeExtent reachOfB(typename B::Node n) const { return NodeExtent(b_.volume(n), b_in_a_); }
+  NodeExtent extentOfA(typename A::Node n) const { return NodeExtent(a_.volume(n), SimilarityTransform()); }
+  NodeExtent extentOfB(typename B::Node n) const { return NodeExtent(b_.volume(n), b_in_a_); }
 
   double boundOf(const NodeExtent& a, const NodeExtent& b) {
     // Where each node holds a piece of surface, something is no farther than this. From bodies, distances are measured
     // in their own frame.
     if (B::kNodesContainSurface) limit_ = std::min(limit_, farthest(a, b) * (B::kBodies ? kMostStretch : 1));
-    return distanceBound(a, b, way_, cutoff());
+    return distanceBound(a, b, direction_, cutoff());
   }
 
-  Sphere ballOfA(typename A::Node n) const { return a_.sphere(n); }
+  Sphere sphereOfA(typename A::Node n) const { return a_.sphere(n); }
   // Of bodies the ball would be a poor bound: they are asked themselves.
-  auto ballOfB(typename B::Node n) const {
+  auto sphereOfB(typename B::Node n) const {
     if constexpr (B::kBodies) {
       return n;
     } else {
@@ -178,9 +178,9 @@ class DistanceWalk : private BestFirst<DistanceWalk<A, B>, A, B> {
     best_ = n;
     limit_ = std::min(limit_, n.distance);
     if (!(n.distance > 0)) return;
-    way_ = (n.on_b - n.on_a) / n.distance;
+    direction_ = (n.on_b - n.on_a) / n.distance;
     if constexpr (kTrees) {
-      if (gaps_.has_value()) gaps_->expect(way_);
+      if (gaps_.has_value()) gaps_->expect(direction_);
     }
   }
 
@@ -251,8 +251,8 @@ class DistanceWalk : private BestFirst<DistanceWalk<A, B>, A, B> {
       }
     }
     triangles(s.a[first_a], s.b[first_b]);
-    for (TriangleExtent& t : s.a) t.along(way_);
-    for (TriangleExtent& t : s.b) t.along(way_);
+    for (TriangleExtent& t : s.a) t.along(direction_);
+    for (TriangleExtent& t : s.b) t.along(direction_);
     for (const TriangleExtent& t : s.a) {
       for (const TriangleExtent& u : s.b) {
         if (worthIt(u.lowest - t.highest) && !isBeyond(t, u, cutoff())) triangles(t, u);
@@ -334,8 +334,9 @@ class DistanceWalk : private BestFirst<DistanceWalk<A, B>, A, B> {
   std::optional<TreeGaps> gaps_;  // of two trees with exact answers
   DistanceGoal goal_;
   Nearest best_;
-  double limit_ = 0;                               // something at least this near exists, or nobody asks for more
-  Eigen::Vector3d way_ = Eigen::Vector3d::Zero();  // from side A to side B where they are nearest so far, unit length
+  double limit_ = 0;  // something at least this near exists, or nobody asks for more
+  Eigen::Vector3d direction_ =
+      Eigen::Vector3d::Zero();  // from side A to side B where they are nearest so far, unit length
 };
 
 }  // namespace bocst::query

@@ -22,7 +22,7 @@ using Eigen::Vector3d;
 
 PoseBoxes someBoxes() {
   PoseBoxes boxes = {{0.1, -0.2, 0.3}, {1, 0.5, -2}, {1, 0.2, 0.4}, {0.3, 2, 0.1}, {0.3, 2, 0.1}, 0, 0.25, 1e-9};
-  boxes.reach = Vector3d(boxes.half_a).norm() + Vector3d(boxes.middle_b).norm() + Vector3d(boxes.half_b).norm();
+  boxes.radius_sum = Vector3d(boxes.half_a).norm() + Vector3d(boxes.middle_b).norm() + Vector3d(boxes.half_b).norm();
   return boxes;
 }
 
@@ -30,7 +30,7 @@ PoseBoxes someBoxes() {
 double gapOf(const PoseBoxes& boxes, const Matrix4d& X) {
   const Matrix3d R = X.topLeftCorner<3, 3>();
   const Vector3d way = R * Vector3d(boxes.middle_b) + X.topRightCorner<3, 1>() - Vector3d(boxes.middle_a);
-  double gap = (X.topRightCorner<3, 1>() - Vector3d(boxes.middle_a)).norm() - boxes.reach - boxes.allowed;
+  double gap = (X.topRightCorner<3, 1>() - Vector3d(boxes.middle_a)).norm() - boxes.radius_sum - boxes.allowed;
   for (int k = 0; k < 6; ++k) {
     const Vector3d axis = k < 3 ? Vector3d(Matrix3d::Identity().col(k)) : Vector3d(R.col(k - 3));
     const double reach =

@@ -199,7 +199,7 @@ Outline::Box boxOf(const tree::Tree& tree) {
       box.center[c] = reader.center()[c];
     }
     for (std::size_t k = 0; k < 3; ++k) box.axes[k].half = reader.half(k);
-    box.reach = reader.center()[3];
+    box.radius = reader.center()[3];
     return true;
   }));
   return box;
@@ -215,12 +215,12 @@ TEST(Outline, HoldsTheSurfaceBeforeAndAfterTheWholeBuild) {
       for (const auto& t : raw.triangles) {
         for (std::size_t k = 0; k < 3; ++k) {
           const Vector3d v = raw.vertices[t[k]];
-          ASSERT_LE(v.norm(), static_cast<double>(box.reach) * (1 + 1e-6));
+          ASSERT_LE(v.norm(), static_cast<double>(box.radius) * (1 + 1e-6));
           for (std::size_t j = 0; j < 3; ++j) {
             const auto& [direction, half] = box.axes[j];
             const Vector3d axis(direction[0], direction[1], direction[2]);
             ASSERT_NEAR(axis.norm(), 1, 1e-6);
-            const double least = static_cast<double>(half) + 1e-6 * static_cast<double>(box.reach);
+            const double least = static_cast<double>(half) + 1e-6 * static_cast<double>(box.radius);
             ASSERT_LE(std::abs(axis.dot(v - center)), least) << is_whole;
           }
         }
@@ -280,7 +280,7 @@ TEST(Outline, BoxesThatMeetAreNotFarApart) {
     const Outline::Box a = randomBox(g, size, p), b = randomBox(g, size * std::exp2(8 * u(g)), q);
     // With 2e-6 an entry, one of R^T R - 1 is below 1e-5.
     const double error = round % 2 ? 2e-6 : 0, margin = round % 3 ? 0 : size * std::abs(u(g));
-    const double reaches = static_cast<double>(a.reach) + static_cast<double>(b.reach);
+    const double reaches = static_cast<double>(a.radius) + static_cast<double>(b.radius);
     const Eigen::Isometry3d X_WA = randomPose(g, size, error);
     Eigen::Isometry3d X_WB = randomPose(g, size, error);
     for (const bool apart : {false, true}) {

@@ -43,10 +43,10 @@ class Nearest : public BestFirst<Nearest, HandTree, HandTree> {
   bool worthIt(double bound) const { return bound < best; }
   bool settled() const { return best <= enough; }
   double scaleOfB() const { return 1; }
-  Box reachOfA(int n) const { return a_.box(n); }
-  Box reachOfB(int n) const { return b_.box(n); }
-  Box ballOfA(int n) const { return a_.box(n); }
-  Box ballOfB(int n) const { return b_.box(n); }
+  Box extentOfA(int n) const { return a_.box(n); }
+  Box extentOfB(int n) const { return b_.box(n); }
+  Box sphereOfA(int n) const { return a_.box(n); }
+  Box sphereOfB(int n) const { return b_.box(n); }
   double boundOf(const Box& a, const Box& b) const { return std::max(0.0, a.exteriorDistance(b) - put_off); }
   bool again(const Pair& pair) {
     const double better = a_.box(pair.a).exteriorDistance(b_.box(pair.b));
