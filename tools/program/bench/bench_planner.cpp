@@ -16,7 +16,8 @@ namespace {
 using Joints = ArmWorld::Joints;
 using States = std::vector<ArmWorld::Poses>;
 
-constexpr std::size_t kStatesInTurn = 25;   // states, or pairs, that one side is asked before the other is
+constexpr std::size_t kStatesInTurn = 500;  // states, or pairs, that one side is asked before the other is: a planner
+                                            // uses one, and in short turns each evicts the other's data from the caches
 constexpr std::size_t kMostPairs = 4000;    // that are timed one by one
 constexpr double kNearGap = 0.02;           // metres: nearer misses are near ones
 constexpr std::size_t kSettle = 4;          // times that states are asked before they are timed as settled
