@@ -121,15 +121,17 @@ struct Collide {
   }
 
  private:
+  struct Input {
+    std::shared_ptr<const Mesh> mesh_a, mesh_b;
+    MeshArrays a, b;
+    std::vector<std::string> warnings;
+  };
+
   /// What the ids of a contact are.
   std::string idName() const { return model.exact() ? "triangle" : "cell"; }
 
   std::string verdict(bool touching) const {
     return !touching ? "They do not collide." : model.exact() ? "They collide." : "They may touch.";
-  }
-
-  static void warn(const std::vector<std::string>& warnings) {
-    for (const std::string& warning : warnings) std::cerr << "bocst: " << warning << '\n';
   }
 
   Json nearestJson(const NearestPoints& nearest) const {
@@ -189,87 +191,34 @@ struct Collide {
     std::cout << '\n';
   }
 
-  void printHead(const MeshArrays& a, const Mesh& mesh_a, const MeshArrays& b, const Mesh& mesh_b) const {
+  void printHead(const Input& input) const {
     Table head(Table::Others::kLeft);
     const auto described = [](const std::string& file, const MeshArrays& mesh, const Mesh& shape) {
       const Eigen::Vector3d size = shape.bounds().sizes();
       return file + ", " + std::to_string(mesh.triangles.size()) + " triangles, " + formatNumber(size.x(), 4) + " x " +
              formatNumber(size.y(), 4) + " x " + formatNumber(size.z(), 4);
     };
-    head.row({"A", described(file_a, a, mesh_a)});
-    head.row({"B", described(file_b, b, mesh_b)});
+    head.row({"A", described(file_a, input.a, *input.mesh_a)});
+    head.row({"B", described(file_b, input.b, *input.mesh_b)});
     if (poses_file.empty()) head.row({"B in A", pose.text() + ", " + pose.rotationText()});
     head.row({"answer", model.answerText()});
     head.print();
   }
 
-  /// All poses of a file, asked of one pair of models; FCL is not asked.
-  int runList() const {
-    const std::vector<ListedPose> poses = parsePoses(readFile(poses_file), format(), poses_file);
-    for (const ListedPose& listed : poses)
-      warnOfNorm(listed.pose, poses_file + ": line " + std::to_string(listed.line));
-    const std::shared_ptr<const Mesh> mesh_a = loadMesh(file_a);
-    const std::shared_ptr<const Mesh> mesh_b = loadMesh(file_b);
-    const std::vector<std::string> warnings = warningsAbout(*mesh_a, *mesh_b);
-    warn(warnings);
-    const MeshArrays a(*mesh_a, model.scalarKind());
-    const MeshArrays b(*mesh_b, model.scalarKind());
-    const auto pair = makeBocstPair(model.scalarKind(), a, b, model.options());
+  Input load() const {
+    const std::shared_ptr<const Mesh> mesh_a = loadMesh(file_a), mesh_b = loadMesh(file_b);
+    Input input{mesh_a, mesh_b, MeshArrays(*mesh_a, model.scalarKind()), MeshArrays(*mesh_b, model.scalarKind()),
+                warningsAbout(*mesh_a, *mesh_b)};
+    for (const std::string& warning : input.warnings) std::cerr << "bocst: " << warning << '\n';
+    return input;
+  }
 
-    Json rows = Json::array();
-    std::string text = "line,x,y,z,qw,qx,qy,qz,collide";
-    if (distances) text += ",distance," + idName() + "_a," + idName() + "_b,ax,ay,az,bx,by,bz";
-    text += "\n";
-    Table table(Table::Others::kLeft);
-    table.row({"line", model.exact() ? "they collide" : "they may touch", distances ? "distance" : ""});
-    std::size_t touching = 0;
-    double microseconds = 0;
-    {
-      Progress progress("pose", poses.size());
-      for (const auto& [line, X] : poses) {
-        const Stopwatch watch;
-        const bool hit = pair->touch(X.transform());
-        std::optional<NearestPoints> nearest;
-        if (distances && !hit) nearest = pair->nearest(X.transform());
-        microseconds += watch.microseconds();
-        touching += hit;
-        Json row = {{"line", line}, {"pose", X.numbers}, {"collide", hit}};
-        text += std::to_string(line) + csv({X.numbers.begin(), X.numbers.end()}) + (hit ? ",1" : ",0");
-        if (distances) {
-          row["distance"] = nearest ? Json(nearest->distance) : Json();
-          row["nearest"] = nearest ? nearestJson(*nearest) : Json();
-          text += nearest ? csv({nearest->distance}) + "," + csvIds(nearest->triangles) +
-                                csv({nearest->on_a.x(), nearest->on_a.y(), nearest->on_a.z(), nearest->on_b.x(),
-                                     nearest->on_b.y(), nearest->on_b.z()})
-                          : std::string(9, ',');
-        }
-        text += '\n';
-        table.row({std::to_string(line), hit ? "yes" : "no", nearest ? formatNumber(nearest->distance, 6) : ""});
-        rows.push_back(std::move(row));
-        progress.step();
-      }
-    }
-    if (!csv_file.empty()) writeText(csv_file, text);
-    if (output.wantsJson()) {
-      output.write({{"a", file_a},
-                    {"b", file_b},
-                    {"extents", {{"a", extentsJson(*mesh_a)}, {"b", extentsJson(*mesh_b)}}},
-                    {"warnings", warnings},
-                    {"options", model.json()},
-                    {"oracle", pair->oracleName()},
-                    {"asked", poses.size()},
-                    {"collisions", touching},
-                    {"total_us", microseconds},
-                    {"poses", rows}});
-    } else if (csv_file.empty()) {
-      printHead(a, *mesh_a, b, *mesh_b);
-      std::cout << '\n';
-      table.print();
-      std::cout << '\n'
-                << touching << " of " << poses.size() << " poses " << (model.exact() ? "collide" : "may touch") << ", "
-                << formatTime(microseconds / static_cast<double>(poses.size())) << " a pose.\n";
-    }
-    return 0;
+  Json inputJson(const Input& input) const {
+    return {{"a", file_a},
+            {"b", file_b},
+            {"extents", {{"a", extentsJson(*input.mesh_a)}, {"b", extentsJson(*input.mesh_b)}}},
+            {"warnings", input.warnings},
+            {"options", model.json()}};
   }
 
   static void warnOfNorm(const Pose& pose, const std::string& where) {
@@ -279,115 +228,200 @@ struct Collide {
     }
   }
 
+  /// What is said of one pose of a list, and of all.
+  struct ListReport {
+    Json rows = Json::array();
+    std::string csv;
+    Table table{Table::Others::kLeft};
+    std::size_t touching = 0;
+    double microseconds = 0;
+  };
+
+  void addPose(const ListedPose& listed, const BocstPair& pair, ListReport& report) const {
+    const auto& [line, X] = listed;
+    const Stopwatch watch;
+    const bool hit = pair.touch(X.transform());
+    std::optional<NearestPoints> nearest;
+    if (distances && !hit) nearest = pair.nearest(X.transform());
+    report.microseconds += watch.microseconds();
+    report.touching += hit;
+    Json row = {{"line", line}, {"pose", X.numbers}, {"collide", hit}};
+    report.csv += std::to_string(line) + csv({X.numbers.begin(), X.numbers.end()}) + (hit ? ",1" : ",0");
+    if (distances) {
+      row["distance"] = nearest ? Json(nearest->distance) : Json();
+      row["nearest"] = nearest ? nearestJson(*nearest) : Json();
+      report.csv += nearest ? csv({nearest->distance}) + "," + csvIds(nearest->triangles) +
+                                  csv({nearest->on_a.x(), nearest->on_a.y(), nearest->on_a.z(), nearest->on_b.x(),
+                                       nearest->on_b.y(), nearest->on_b.z()})
+                            : std::string(9, ',');
+    }
+    report.csv += '\n';
+    report.table.row({std::to_string(line), hit ? "yes" : "no", nearest ? formatNumber(nearest->distance, 6) : ""});
+    report.rows.push_back(std::move(row));
+  }
+
+  /// All poses of a file, asked of one pair of models; FCL is not asked.
+  int runList() const {
+    const std::vector<ListedPose> poses = parsePoses(readFile(poses_file), format(), poses_file);
+    for (const ListedPose& listed : poses)
+      warnOfNorm(listed.pose, poses_file + ": line " + std::to_string(listed.line));
+    const Input input = load();
+    const auto pair = makeBocstPair(model.scalarKind(), input.a, input.b, model.options());
+
+    ListReport report;
+    report.csv = "line,x,y,z,qw,qx,qy,qz,collide";
+    if (distances) report.csv += ",distance," + idName() + "_a," + idName() + "_b,ax,ay,az,bx,by,bz";
+    report.csv += "\n";
+    report.table.row({"line", model.exact() ? "they collide" : "they may touch", distances ? "distance" : ""});
+    {
+      Progress progress("pose", poses.size());
+      for (const ListedPose& listed : poses) {
+        addPose(listed, *pair, report);
+        progress.step();
+      }
+    }
+    if (!csv_file.empty()) writeText(csv_file, report.csv);
+    if (output.wantsJson()) {
+      Json json = inputJson(input);
+      json.update({{"oracle", pair->oracleName()},
+                   {"asked", poses.size()},
+                   {"collisions", report.touching},
+                   {"total_us", report.microseconds},
+                   {"poses", report.rows}});
+      output.write(json);
+    } else if (csv_file.empty()) {
+      printHead(input);
+      std::cout << '\n';
+      report.table.print();
+      std::cout << '\n'
+                << report.touching << " of " << poses.size() << " poses " << (model.exact() ? "collide" : "may touch")
+                << ", " << formatTime(report.microseconds / static_cast<double>(poses.size())) << " a pose.\n";
+    }
+    return 0;
+  }
+
+  /// One pose, asked of both.
+  struct Compared {
+    Run ours, theirs;
+    std::size_t nodes = 0, nodes_in_the_end = 0;
+    std::size_t bytes = 0, bytes_in_the_end = 0, fcl_bytes = 0;
+    std::vector<TouchingPoint> points;
+    std::optional<NearestPoints> nearest;
+    std::string oracle;
+    bool agree = false;
+  };
+
+  Compared compare(const Input& input) const {
+    const Eigen::Isometry3d X_AB = pose.transform();
+    const Scalar scalar = model.scalarKind();
+    const Options options = model.options();
+    Compared c;
+    const auto bocst_pair =
+        measureFirst([&] { return makeBocstPair(scalar, input.a, input.b, options); }, X_AB, c.ours);
+    c.nodes = bocst_pair->nodes();
+    c.bytes = bocst_pair->bytes();
+    measureWarm(*bocst_pair, X_AB, c.ours);
+    const std::vector<QueryPair::Contact> our_contacts = bocst_pair->contacts(X_AB, max_contacts);
+    c.ours.contacts = our_contacts.size();
+    c.nodes_in_the_end = bocst_pair->nodes();
+    c.bytes_in_the_end = bocst_pair->bytes();
+    c.points = bocst_pair->touchingPoints(X_AB, max_contacts);
+    if (!c.ours.touching) c.nearest = bocst_pair->nearest(X_AB);
+    c.oracle = bocst_pair->oracleName();
+
+    const auto fcl_pair =
+        measureFirst([&] { return buildFclPair(FclTree::kObbRss, scalar, input.a, input.b); }, X_AB, c.theirs);
+    measureWarm(*fcl_pair, X_AB, c.theirs);
+    const std::vector<QueryPair::Contact> fcl_contacts = fcl_pair->contacts(X_AB, max_contacts);
+    c.theirs.contacts = fcl_contacts.size();
+    c.fcl_bytes = fclTreeBytes(scalar, input.a.triangles.size()) + fclTreeBytes(scalar, input.b.triangles.size());
+
+    // Conservative may say more. Exact must be equal; contacts too, unless a limit leaves the choice open. FCL's float
+    // trees may lose contacts to rounding, so with float it is enough that we have all that FCL has.
+    c.agree = c.ours.touching || !c.theirs.touching;
+    if (model.exact() && scalar == Scalar::kDouble) c.agree = c.ours.touching == c.theirs.touching;
+    if (model.exact() && max_contacts == QueryPair::kAll) {
+      c.agree &= scalar == Scalar::kDouble ? our_contacts == fcl_contacts
+                                           : std::includes(our_contacts.begin(), our_contacts.end(),
+                                                           fcl_contacts.begin(), fcl_contacts.end());
+    }
+    return c;
+  }
+
+  Json comparedJson(const Input& input, const Compared& c) const {
+    const auto both = [](auto bocst, auto fcl) { return Json{{"bocst", bocst}, {"fcl", fcl}}; };
+    Json report = inputJson(input);
+    report.update({{"pose", pose.numbers},
+                   {"rotation", pose.rotationText()},
+                   {"oracle", c.oracle},
+                   {"collide", c.ours.touching},
+                   {"contacts", c.ours.contacts},
+                   {"contact_points", contactsJson(c.points)},
+                   {"distance", c.nearest ? Json(c.nearest->distance) : Json()},
+                   {"nearest", c.nearest ? nearestJson(*c.nearest) : Json()},
+                   {"fcl", {{"collide", c.theirs.touching}, {"contacts", c.theirs.contacts}}},
+                   {"agree", c.agree},
+                   {"nodes", c.nodes},
+                   {"nodes_after_contacts", c.nodes_in_the_end},
+                   {"bytes", both(c.bytes, c.fcl_bytes)},
+                   {"bytes_after_contacts", c.bytes_in_the_end},
+                   {"first_answer_us", both(c.ours.first_us, c.theirs.first_us)},
+                   {"warm_query_us", both(c.ours.warm_us, c.theirs.warm_us)},
+                   {"settled_query_us", both(c.ours.settled_us, c.theirs.settled_us)},
+                   {"ratio",
+                    {{"first_answer", c.theirs.first_us / c.ours.first_us},
+                     {"warm_query", c.theirs.warm_us / c.ours.warm_us},
+                     {"settled_query", c.theirs.settled_us / c.ours.settled_us},
+                     {"memory", static_cast<double>(c.fcl_bytes) / static_cast<double>(c.bytes)}}}});
+    return report;
+  }
+
+  void printCompared(const Input& input, const Compared& c) const {
+    printHead(input);
+    std::cout << '\n' << verdict(c.ours.touching);
+    if (!model.exact() && c.ours.touching != c.theirs.touching) std::cout << " FCL's triangles do not.";
+    std::cout << "\n\n";
+    if (!c.points.empty()) printContacts(c.points);
+    if (c.nearest) printNearest(*c.nearest);
+    Table table;
+    table.row({"", "bocst", "FCL OBBRSS", "ratio"});
+    table.row({model.exact() ? "collide" : "may touch, collide", c.ours.touching ? "yes" : "no",
+               c.theirs.touching ? "yes" : "no"});
+    const auto limited = [this](std::size_t n) { return std::to_string(n) + (n == max_contacts ? " (limit)" : ""); };
+    table.row({"contacts", limited(c.ours.contacts), limited(c.theirs.contacts)});
+    const auto times = [&table](const char* what, double bocst, double fcl) {
+      table.row({what, formatTime(bocst), formatTime(fcl), formatRatio(fcl / bocst)});
+    };
+    times("first answer from arrays", c.ours.first_us, c.theirs.first_us);
+    times("the same query again", c.ours.warm_us, c.theirs.warm_us);
+    times("after 1000 queries", c.ours.settled_us, c.theirs.settled_us);
+    const std::size_t fcl_nodes = 2 * (input.a.triangles.size() + input.b.triangles.size()) - 2;
+    table.row({"tree nodes after first answer", std::to_string(c.nodes), std::to_string(fcl_nodes)});
+    const auto bytes = static_cast<double>(c.bytes), fcl_bytes = static_cast<double>(c.fcl_bytes);
+    table.row(
+        {"tree bytes after first answer", formatBytes(bytes), formatBytes(fcl_bytes), formatRatio(fcl_bytes / bytes)});
+    table.row({"tree nodes after all contacts", std::to_string(c.nodes_in_the_end), std::to_string(fcl_nodes)});
+    table.print();
+  }
+
   int runOne() const {
     warnOfNorm(pose, "--pose");
     std::optional<render::Renderer> renderer;
     if (image.wanted()) renderer.emplace(model.options().oracle);
-    const std::shared_ptr<const Mesh> mesh_a = loadMesh(file_a);
-    const std::shared_ptr<const Mesh> mesh_b = loadMesh(file_b);
-    const std::vector<std::string> warnings = warningsAbout(*mesh_a, *mesh_b);
-    warn(warnings);
-    const MeshArrays a(*mesh_a, model.scalarKind());
-    const MeshArrays b(*mesh_b, model.scalarKind());
-    const Eigen::Isometry3d X_AB = pose.transform();
-    const Options options = model.options();
-
-    Run ours;
-    const auto bocst_pair = measureFirst([&] { return makeBocstPair(model.scalarKind(), a, b, options); }, X_AB, ours);
-    const std::size_t nodes = bocst_pair->nodes();
-    const std::size_t bytes = bocst_pair->bytes();
-    measureWarm(*bocst_pair, X_AB, ours);
-    const std::vector<QueryPair::Contact> our_contacts = bocst_pair->contacts(X_AB, max_contacts);
-    ours.contacts = our_contacts.size();
-    const std::size_t nodes_in_the_end = bocst_pair->nodes();
-    const std::size_t bytes_in_the_end = bocst_pair->bytes();
-    const std::vector<TouchingPoint> points = bocst_pair->touchingPoints(X_AB, max_contacts);
-    std::optional<NearestPoints> nearest;
-    if (!ours.touching) nearest = bocst_pair->nearest(X_AB);
-
-    Run theirs;
-    const auto fcl_pair =
-        measureFirst([&] { return buildFclPair(FclTree::kObbRss, model.scalarKind(), a, b); }, X_AB, theirs);
-    measureWarm(*fcl_pair, X_AB, theirs);
-    const std::vector<QueryPair::Contact> fcl_contacts = fcl_pair->contacts(X_AB, max_contacts);
-    theirs.contacts = fcl_contacts.size();
-    const std::size_t fcl_bytes =
-        fclTreeBytes(model.scalarKind(), a.triangles.size()) + fclTreeBytes(model.scalarKind(), b.triangles.size());
-
-    // Conservative may say more. Exact must be equal; contacts too, unless a limit leaves the choice open. FCL's float
-    // trees may lose contacts to rounding, so with float it is enough that we have all that FCL has.
-    bool agree = ours.touching || !theirs.touching;
-    if (model.exact() && model.scalarKind() == Scalar::kDouble) agree = ours.touching == theirs.touching;
-    if (model.exact() && max_contacts == QueryPair::kAll) {
-      agree &= model.scalarKind() == Scalar::kDouble
-                   ? our_contacts == fcl_contacts
-                   : std::includes(our_contacts.begin(), our_contacts.end(), fcl_contacts.begin(), fcl_contacts.end());
-    }
+    const Input input = load();
+    const Compared compared = compare(input);
     if (!html_file.empty() || renderer) {
-      const GrownPair grown(file_a, *mesh_a, file_b, *mesh_b, model, pose, max_contacts);
+      const GrownPair grown(file_a, *input.mesh_a, file_b, *input.mesh_b, model, pose, max_contacts);
       if (!html_file.empty()) writeFile(html_file, pairPage(grown).html());
       if (renderer) writePng(image.file, pairPicture(*renderer, grown, image));
     }
-    if (!csv_file.empty()) writeText(csv_file, contactsCsv(points));
+    if (!csv_file.empty()) writeText(csv_file, contactsCsv(compared.points));
     if (output.wantsJson()) {
-      const auto compare = [](double bocst, double fcl) { return Json{{"bocst", bocst}, {"fcl", fcl}}; };
-      const auto count = [](std::size_t bocst, std::size_t fcl) { return Json{{"bocst", bocst}, {"fcl", fcl}}; };
-      Json report = {{"a", file_a},
-                     {"b", file_b},
-                     {"pose", pose.numbers},
-                     {"rotation", pose.rotationText()},
-                     {"extents", {{"a", extentsJson(*mesh_a)}, {"b", extentsJson(*mesh_b)}}},
-                     {"warnings", warnings},
-                     {"options", model.json()},
-                     {"oracle", bocst_pair->oracleName()},
-                     {"collide", ours.touching},
-                     {"contacts", ours.contacts},
-                     {"contact_points", contactsJson(points)},
-                     {"distance", nearest ? Json(nearest->distance) : Json()},
-                     {"nearest", nearest ? nearestJson(*nearest) : Json()},
-                     {"fcl", {{"collide", theirs.touching}, {"contacts", theirs.contacts}}},
-                     {"agree", agree},
-                     {"nodes", nodes},
-                     {"nodes_after_contacts", nodes_in_the_end},
-                     {"bytes", count(bytes, fcl_bytes)},
-                     {"bytes_after_contacts", bytes_in_the_end},
-                     {"first_answer_us", compare(ours.first_us, theirs.first_us)},
-                     {"warm_query_us", compare(ours.warm_us, theirs.warm_us)},
-                     {"settled_query_us", compare(ours.settled_us, theirs.settled_us)},
-                     {"ratio",
-                      {{"first_answer", theirs.first_us / ours.first_us},
-                       {"warm_query", theirs.warm_us / ours.warm_us},
-                       {"settled_query", theirs.settled_us / ours.settled_us},
-                       {"memory", static_cast<double>(fcl_bytes) / static_cast<double>(bytes)}}}};
-      output.write(report);
+      output.write(comparedJson(input, compared));
     } else if (csv_file != "-") {
-      printHead(a, *mesh_a, b, *mesh_b);
-      std::cout << '\n' << verdict(ours.touching);
-      if (!model.exact() && ours.touching != theirs.touching) std::cout << " FCL's triangles do not.";
-      std::cout << "\n\n";
-      if (!points.empty()) printContacts(points);
-      if (nearest) printNearest(*nearest);
-      Table table;
-      table.row({"", "bocst", "FCL OBBRSS", "ratio"});
-      table.row({model.exact() ? "collide" : "may touch, collide", ours.touching ? "yes" : "no",
-                 theirs.touching ? "yes" : "no"});
-      const auto limited = [this](std::size_t n) { return std::to_string(n) + (n == max_contacts ? " (limit)" : ""); };
-      table.row({"contacts", limited(ours.contacts), limited(theirs.contacts)});
-      table.row({"first answer from arrays", formatTime(ours.first_us), formatTime(theirs.first_us),
-                 formatRatio(theirs.first_us / ours.first_us)});
-      table.row({"the same query again", formatTime(ours.warm_us), formatTime(theirs.warm_us),
-                 formatRatio(theirs.warm_us / ours.warm_us)});
-      table.row({"after 1000 queries", formatTime(ours.settled_us), formatTime(theirs.settled_us),
-                 formatRatio(theirs.settled_us / ours.settled_us)});
-      const std::size_t fcl_nodes = 2 * (a.triangles.size() + b.triangles.size()) - 2;
-      table.row({"tree nodes after first answer", std::to_string(nodes), std::to_string(fcl_nodes)});
-      table.row({"tree bytes after first answer", formatBytes(static_cast<double>(bytes)),
-                 formatBytes(static_cast<double>(fcl_bytes)),
-                 formatRatio(static_cast<double>(fcl_bytes) / static_cast<double>(bytes))});
-      table.row({"tree nodes after all contacts", std::to_string(nodes_in_the_end), std::to_string(fcl_nodes)});
-      table.print();
+      printCompared(input, compared);
     }
-    if (!agree)
+    if (!compared.agree)
       throw std::runtime_error("the answers of bocst and FCL differ; please report both meshes and --pose " +
                                pose.text());
     return 0;
