@@ -295,6 +295,30 @@ bool measurePoses(const std::shared_ptr<const Mesh>& mesh, std::size_t count, Ta
   return are_equal;
 }
 
+void addRow(std::size_t triangles, const OracleInfo& info, const Figures& f, Json& rows, Table& table) {
+  const double cells_per_second = 1e6 * static_cast<double>(f.cells) / f.batch;
+  const double pairs_per_second = 1e6 * static_cast<double>(f.pairs) / f.batch;
+  rows.push_back(
+      {{"triangles", triangles},
+       {"oracle", info.name},
+       {"device", info.device},
+       {"hardware", info.hardware},
+       {"upload_us", f.hold},
+       {"first_answer_us", f.first_answer},
+       {"batch", {{"cells", f.cells}, {"pairs", f.pairs}, {"time_us", f.batch}}},
+       {"cells_per_second", cells_per_second},
+       {"pairs_per_second", pairs_per_second},
+       {"device_us",
+        {{"upload", 1e6 * f.cost.upload}, {"kernels", 1e6 * f.cost.kernels}, {"read_back", 1e6 * f.cost.read_back}}},
+       {"bytes", {{"host", f.host_bytes}, {"device", f.device_bytes}}}});
+  const bool device = f.hold > 0;
+  const auto part = [&](double seconds) { return f.cost.kernels > 0 ? formatTime(1e6 * seconds) : "-"; };
+  table.row({std::to_string(triangles), info.name, device ? formatTime(f.hold) : "-", formatTime(f.first_answer),
+             std::to_string(f.cells), std::to_string(f.pairs), formatTime(f.batch), formatNumber(cells_per_second),
+             formatNumber(pairs_per_second), part(f.cost.upload), part(f.cost.kernels), part(f.cost.read_back),
+             formatBytes(f.host_bytes), device ? formatBytes(f.device_bytes) : "-"});
+}
+
 }  // namespace
 
 int OracleBench::run(const Output& output) const {
@@ -327,29 +351,7 @@ int OracleBench::run(const Output& output) const {
         continue;
       }
       measureFirstAnswer(info.kind, mesh, f);
-      const double cells_per_second = 1e6 * static_cast<double>(f.cells) / f.batch;
-      const double pairs_per_second = 1e6 * static_cast<double>(f.pairs) / f.batch;
-      report["rows"].push_back({{"triangles", mesh->triangleCount()},
-                                {"oracle", info.name},
-                                {"device", info.device},
-                                {"hardware", info.hardware},
-                                {"upload_us", f.hold},
-                                {"first_answer_us", f.first_answer},
-                                {"batch", {{"cells", f.cells}, {"pairs", f.pairs}, {"time_us", f.batch}}},
-                                {"cells_per_second", cells_per_second},
-                                {"pairs_per_second", pairs_per_second},
-                                {"device_us",
-                                 {{"upload", 1e6 * f.cost.upload},
-                                  {"kernels", 1e6 * f.cost.kernels},
-                                  {"read_back", 1e6 * f.cost.read_back}}},
-                                {"bytes", {{"host", f.host_bytes}, {"device", f.device_bytes}}}});
-      const bool device = f.hold > 0;
-      const auto part = [&](double seconds) { return f.cost.kernels > 0 ? formatTime(1e6 * seconds) : "-"; };
-      table.row({std::to_string(mesh->triangleCount()), info.name, device ? formatTime(f.hold) : "-",
-                 formatTime(f.first_answer), std::to_string(f.cells), std::to_string(f.pairs), formatTime(f.batch),
-                 formatNumber(cells_per_second), formatNumber(pairs_per_second), part(f.cost.upload),
-                 part(f.cost.kernels), part(f.cost.read_back), formatBytes(f.host_bytes),
-                 device ? formatBytes(f.device_bytes) : "-"});
+      addRow(mesh->triangleCount(), info, f, report["rows"], table);
     }
   }
   Table placement;

@@ -146,25 +146,7 @@ struct Validate {
         if (by_depth[i]->touch(X_AB)) sum.overestimates[i].add(distance, number, pose);
       }
     };
-    std::optional<Pose> first;
-    {
-      const std::size_t rays = (poses + PoseSampler::kPosesOnRay - 1) / PoseSampler::kPosesOnRay;
-      Progress progress("ray", rays / shard.of);
-      for (std::size_t ray = 0; ray < rays; ++ray) {
-        if (!shard.has(ray)) continue;
-        std::size_t number = ray * PoseSampler::kPosesOnRay;
-        for (const Pose& pose : sampler.aroundContact(ray)) {
-          if (number == poses) break;
-          if (!first) first = pose;
-          try {
-            look(number++, pose);
-          } catch (const std::exception& e) {
-            throw std::runtime_error(std::string(e.what()) + " (pose " + pose.text() + ")");
-          }
-        }
-        progress.step();
-      }
-    }
+    const std::optional<Pose> first = forPoses(sampler, look);
 
     // First of all the result: pictures may fail.
     if (output.wantsJson()) {
@@ -182,6 +164,29 @@ struct Validate {
   }
 
  private:
+  /// Calls look(number, pose) for the poses of this shard. Returns the first of them.
+  template <typename F>
+  std::optional<Pose> forPoses(PoseSampler& sampler, const F& look) const {
+    std::optional<Pose> first;
+    const std::size_t rays = (poses + PoseSampler::kPosesOnRay - 1) / PoseSampler::kPosesOnRay;
+    Progress progress("ray", rays / shard.of);
+    for (std::size_t ray = 0; ray < rays; ++ray) {
+      if (!shard.has(ray)) continue;
+      std::size_t number = ray * PoseSampler::kPosesOnRay;
+      for (const Pose& pose : sampler.aroundContact(ray)) {
+        if (number == poses) break;
+        if (!first) first = pose;
+        try {
+          look(number++, pose);
+        } catch (const std::exception& e) {
+          throw std::runtime_error(std::string(e.what()) + " (pose " + pose.text() + ")");
+        }
+      }
+      progress.step();
+    }
+    return first;
+  }
+
   /// The first mismatch; else where conservative answers overestimate most; else the first pose.
   GrownPair worst(const Mesh& mesh_a, const Mesh& mesh_b, const Validation& sum, const Pose& first) const {
     Pose pose = first;
