@@ -7,8 +7,8 @@
 //   - FCL's managers with fcl::BVHModel<OBBRSS>, as planners do today,
 //   - FCL's managers with bocst::Model: only the geometries change,
 //   - bocst::Scene, which answers whole states and edges: StateValidityChecker and MotionValidator change.
-// Prints the time from the meshes in memory to the first plan, that of all plans, what of it was checking, and exits
-// with 1 when one of the three finds another plan.
+// Prints the set-up time; then, after the set-up, the time to the first plan, that of all plans and the share of it
+// that was checking. Exits with 1 when one of the three finds another plan.
 
 #include <bocst/bocst.h>
 #include <bocst/io.h>
@@ -224,7 +224,8 @@ class SceneMotionValidator final : public ob::MotionValidator {
   // The states behind `from`, with `to`.
   std::size_t place(const ob::State* from, const ob::State* to) const {
     const ob::StateSpace& space = *si_->getStateSpace();
-    const std::size_t states = space.validSegmentCount(from, to), links = scene_.movingCount();
+    // OMPL counts 0 segments where both states are the same.
+    const std::size_t states = std::max(1u, space.validSegmentCount(from, to)), links = scene_.movingCount();
     poses_.resize(states * links);
     ob::State* between = si_->allocState();
     for (std::size_t k = 1; k <= states; ++k) {

@@ -118,8 +118,8 @@ void addSizes(CLI::App& command, Bench& bench) {
       ->capture_default_str();
   command
       .add_option("--triangles", bench.sizes,
-                  "approximate triangle counts for growth and --oracles; default: 10k, 100k, 1 M and 10 M; with "
-                  "--oracles: 5k, 75k, 1 M and 10 M")
+                  "approximate triangle counts for growth and --oracles; default: 10000,100000,1000000,10000000; with "
+                  "--oracles: 5000,75000,1000000,10000000")
       ->check(wholeNumber())
       ->delimiter(',')
       ->allow_extra_args(false);
