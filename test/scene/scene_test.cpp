@@ -985,7 +985,6 @@ TYPED_TEST(SceneTest, RefusesPlanesBesideConvexes) {
   }
 }
 
-// What the tests run under ThreadSanitizer looks at: queries from several threads beside changes.
 /// Runs f in a child, which has a minute.
 template <typename F>
 void expectInChild(F&& f) {
@@ -1071,6 +1070,30 @@ TEST(SceneThreads, FewerThanAskedFor) {
   });
 }
 
+// The first edges beside one of FCL's meshes make a model of it.
+TEST(SceneThreads, EdgesAlongMeshesOfFcl) {
+  for (int turn = 0; turn < 8; ++turn) {
+    Scened scene;
+    const auto bvh = test::bvh<fcl::OBBRSSd>(test::torus(20, 0));
+    scene.addFixed(bvh, fcl::Transform3d::Identity());
+    scene.addMoving(bvh);
+    std::vector<std::thread> threads;
+    for (int t = 0; t < 3; ++t) {
+      threads.emplace_back([&scene, t] {
+        // About their common axis, one above the other: the tubes have the radius 0.35.
+        for (const double height : {0.705, 0.695}) {
+          const auto begin = test::pose<double>(Eigen::Matrix3d::Identity(), {0, 0, height});
+          const auto end =
+              test::pose<double>(Eigen::AngleAxisd(1 + t, Eigen::Vector3d::UnitZ()).toRotationMatrix(), {0, 0, height});
+          EXPECT_EQ(scene.edgeIsFree(&begin, &end), height > 0.7);
+        }
+      });
+    }
+    for (std::thread& thread : threads) thread.join();
+  }
+}
+
+// What the tests run under ThreadSanitizer looks at: queries from several threads beside changes.
 TEST(SceneThreads, ChangesBesideQueries) {
   std::mt19937_64 g(4);
   SceneOptions options;
