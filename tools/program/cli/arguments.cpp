@@ -165,7 +165,9 @@ CLI::Validator outputFile(const std::string& ending, bool stdout_too) {
 }
 
 void addJson(CLI::App& command, Output& output) {
-  command.add_option("--json", output.json_file, "write the report as JSON to this file, instead of the table; - is stdout")
+  command
+      .add_option("--json", output.json_file,
+                  "write the report as JSON to this file, instead of the table; - is stdout")
       ->type_name("FILE|-")
       ->check(outputFile(".json", true));
 }
