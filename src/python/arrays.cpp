@@ -18,7 +18,7 @@ std::string shapeText(const py::array& a) { return py::str(a.attr("shape")); }
 /// The object as an array of numbers whose dtype has one of these kinds.
 py::array numbers(const char* name, const py::handle& object, const char* kinds, const char* expected) {
   // An array of values that may be missing: NumPy would drop the mask.
-  if (py::hasattr(object, "mask")) {
+  if (py::hasattr(object, "mask") && py::isinstance(object, py::module_::import("numpy.ma").attr("MaskedArray"))) {
     throw py::type_error(std::string("bocst: ") + name +
                          " is a masked array; pass its filled() or compressed() values");
   }

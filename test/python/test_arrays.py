@@ -208,6 +208,14 @@ def test_masked_arrays_are_refused():
     with pytest.raises(TypeError, match="vertices is a masked array"):
         bocst.Mesh(masked, np.array([[0, 1, 2]]))
 
+    class Table:  # as of pandas, whose mask is a function
+        mask = None
+
+        def __array__(self, *args, **kwargs):
+            return V
+
+    assert np.array_equal(bocst.Mesh(Table(), T).vertices, V)
+
 
 def test_empty_states():
     scene = bocst.Scene()
