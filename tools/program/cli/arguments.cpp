@@ -19,6 +19,19 @@ std::string wrongDimension(const std::string& text) {
   return d == 0 || (d >= 1 && d <= 65536) ? "" : text + " is not 0 or 1 to 65536";
 }
 
+// The whole text is a number for which `holds` is true; `what` says which numbers these are.
+template <typename Number, typename F>
+CLI::Validator number(const char* name, const std::string& what, const F& holds) {
+  CLI::Validator validator(name);
+  validator.operation([what, holds](std::string& text) {
+    Number value = 0;
+    const auto [end, error] = std::from_chars(text.data(), text.data() + text.size(), value);
+    const bool is_one = error == std::errc() && end == text.data() + text.size() && holds(value);
+    return is_one ? std::string() : text + " is not " + what;
+  });
+  return validator;
+}
+
 }  // namespace
 
 void ModelArguments::addShape(CLI::App& command) {
@@ -119,37 +132,17 @@ std::string meshFormats() {
 }
 
 CLI::Validator positive() {
-  CLI::Validator validator("POSITIVE");
-  validator.operation([](std::string& text) {
-    double value = 0;
-    const auto [end, error] = std::from_chars(text.data(), text.data() + text.size(), value);
-    const bool holds = error == std::errc() && end == text.data() + text.size() && value > 0;
-    return holds ? std::string() : text + " is not a number above 0";
-  });
-  return validator;
+  return number<double>("POSITIVE", "a number above 0", [](double x) { return x > 0; });
 }
 
 CLI::Validator notNegative() {
-  CLI::Validator validator("NONNEGATIVE");
-  validator.operation([](std::string& text) {
-    double value = 0;
-    const auto [end, error] = std::from_chars(text.data(), text.data() + text.size(), value);
-    const bool holds = error == std::errc() && end == text.data() + text.size() && value >= 0 && std::isfinite(value);
-    return holds ? std::string() : text + " is not a finite number of at least 0";
-  });
-  return validator;
+  return number<double>("NONNEGATIVE", "a finite number of at least 0",
+                        [](double x) { return x >= 0 && std::isfinite(x); });
 }
 
 CLI::Validator wholeNumber(std::uint64_t least) {
-  CLI::Validator validator("WHOLE");
-  validator.operation([least](std::string& text) {
-    constexpr std::uint64_t kMost = 1000000000000000;
-    std::uint64_t value = 0;
-    const auto [end, error] = std::from_chars(text.data(), text.data() + text.size(), value);
-    const bool holds = error == std::errc() && end == text.data() + text.size() && value >= least && value <= kMost;
-    return holds ? std::string() : text + " is not a whole number from " + std::to_string(least) + " to 10^15";
-  });
-  return validator;
+  return number<std::uint64_t>("WHOLE", "a whole number from " + std::to_string(least) + " to 10^15",
+                               [least](std::uint64_t n) { return n >= least && n <= 1000000000000000; });
 }
 
 CLI::Validator outputFile(const std::string& ending, bool stdout_too) {
