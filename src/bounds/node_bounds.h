@@ -18,8 +18,7 @@ namespace bocst::bounds {
 // |---|---|
 // | lo, hi | the box: lo / 255 to hi / 255 of the frame's side, from its corner, along each axis |
 // | normal | the slab's, 127 times a unit vector, rounded; zero: no slab |
-// | slab_center, slab_half | abs(normal / 127 . (p - m) - slab_center * unit) <= slab_half * unit / 2 for its points p
-// |
+// | slab_center, slab_half | abs(normal / 127 . (p - m) - slab_center * unit) <= slab_half * unit / 2, points p |
 //
 // Of a cell of side s, m is the middle of the cell and the unit s / 127. Of a lane of a loose frame, m is the middle of
 // its box and the unit the longest side / 256. All is rounded outwards.

@@ -11,12 +11,17 @@ namespace {
 // Copies and clears need no binding of their own meaning.
 constexpr GLenum kAnyTarget = GL_COPY_WRITE_BUFFER;
 
+}  // namespace
+
 void forgetErrors() {
   while (glGetError() != GL_NO_ERROR) {
   }
 }
 
-}  // namespace
+void throwOnError() {
+  const GLenum error = glGetError();
+  if (error != GL_NO_ERROR) throw OracleError("OpenGL error " + std::to_string(error));
+}
 
 Buffer::Buffer(std::size_t bytes, const void* data) {
   reserve(bytes);

@@ -10,6 +10,13 @@
 
 namespace bocst::oracle::gl {
 
+// In the thread of the context.
+
+/// Drops what calls before have left.
+void forgetErrors();
+/// @throws OracleError if a call since forgetErrors() has failed.
+void throwOnError();
+
 /// Owns one OpenGL name. Made, used and ended in the thread of its context.
 template <void (*kMake)(GLuint*), void (*kEnd)(GLuint)>
 class Handle {

@@ -200,7 +200,7 @@ SupportShape::SupportShape(const Vector3d& center, const Vector3d& half_of_core,
 SeparationResult SupportShape::coreGap(const PointSet& points, double cutoff) const {
   constexpr int kMostSteps = 200, kPatience = 12;
   SeparationResult gap;
-  gap.atLeast = -std::numeric_limits<double>::infinity();
+  gap.at_least = -std::numeric_limits<double>::infinity();
   Simplex simplex;
   Vector3d v = box_.center - points.middle();
   if (!(v.squaredNorm() > 0)) v = Vector3d::UnitX();
@@ -212,19 +212,19 @@ SeparationResult SupportShape::coreGap(const PointSet& points, double cutoff) co
     size = std::max(size, p.lpNorm<1>() + q.lpNorm<1>());
     // All of the difference lies beyond this plane.
     const double beyond = v.dot(w) / v.norm() - kRounding * size;
-    if (beyond > gap.atLeast) {
-      gap.atLeast = beyond;
+    if (beyond > gap.at_least) {
+      gap.at_least = beyond;
       gap.normal = -v / v.norm();
       improved = step;
     }
-    if (gap.atLeast > cutoff) return gap;
+    if (gap.at_least > cutoff) return gap;
     const double tolerance = 1e-13 * gap.distance + 2 * kRounding * size;
-    if (step > 0 && (gap.distance - gap.atLeast <= tolerance || simplex.has(w))) return gap;
+    if (step > 0 && (gap.distance - gap.at_least <= tolerance || simplex.has(w))) return gap;
     simplex.add(p, q);
     const bool inside = !simplex.reduce();
     v = simplex.nearest();
     if (inside || v.norm() <= kRounding * size) {
-      gap.atLeast = gap.distance = 0;
+      gap.at_least = gap.distance = 0;
       gap.on_body = gap.on_points = simplex.onPoints();
       gap.around_count = simplex.size();
       for (int i = 0; i < simplex.size(); ++i) gap.around[i] = simplex.at(i);
@@ -255,11 +255,11 @@ double SupportShape::boxGap(const PointSet& points) const {
 SeparationResult SupportShape::gap(const PointSet& points, double cutoff) const {
   SeparationResult gap;
   // For most triangles of a leaf this is enough.
-  gap.atLeast = boxGap(points);
-  if (gap.atLeast > cutoff) return gap;
+  gap.at_least = boxGap(points);
+  if (gap.at_least > cutoff) return gap;
   for (int i = 0; i < points.count; ++i) {
     if (!contains(points.x[i])) continue;
-    gap.atLeast = gap.distance = 0;
+    gap.at_least = gap.distance = 0;
     gap.on_body = gap.on_points = points.x[i];
     gap.around[0].setZero();
     gap.around_count = 1;
@@ -267,7 +267,7 @@ SeparationResult SupportShape::gap(const PointSet& points, double cutoff) const 
   }
   gap = coreGap(points, cutoff + radius_);
   const double core = gap.distance;
-  gap.atLeast -= radius_;
+  gap.at_least -= radius_;
   if (gap.isTouching()) {
     gap.distance = 0;
     gap.on_body = gap.on_points;
@@ -283,9 +283,9 @@ ContactPoint SupportShape::penetration(const PointSet& points, const SeparationR
   ContactPoint contact;
   contact.point = gap.on_points;
   if (gap.around_count == 0) {
-    // The cores are apart, or all but: along this direction by atLeast.
+    // The cores are apart, or all but: along this direction by at_least.
     contact.normal = gap.normal;
-    contact.depth = std::max(-gap.atLeast, 0.0);
+    contact.depth = std::max(-gap.at_least, 0.0);
     contact.point += contact.normal * (contact.depth / 2);
     return contact;
   }
@@ -448,7 +448,7 @@ SeparationResult TriangleShape::gap(const PointSet& points, double cutoff) const
   if (gap.distance > 0) gap.normal = (gap.on_points - gap.on_body) / gap.distance;
   double size = 0;
   for (int k = 0; k < 3; ++k) size = std::max({size, corners_[k].lpNorm<1>(), other[k].lpNorm<1>()});
-  gap.atLeast = gap.distance - kRounding * size;
+  gap.at_least = gap.distance - kRounding * size;
   if (gap.isTouching()) gap.distance = 0;
   return gap;
 }
@@ -496,7 +496,7 @@ SeparationResult HalfspaceShape::gap(const PointSet& points, double) const {
   gap.on_points = lowest(points, normal_);
   gap.normal = normal_;
   const double above = normal_.dot(gap.on_points) - height_;
-  gap.atLeast = above - kRounding * (gap.on_points.lpNorm<1>() + std::abs(height_));
+  gap.at_least = above - kRounding * (gap.on_points.lpNorm<1>() + std::abs(height_));
   gap.distance = gap.isTouching() ? 0 : above;
   gap.on_body = gap.isTouching() ? gap.on_points : Vector3d(gap.on_points - normal_ * above);
   return gap;
@@ -522,7 +522,7 @@ SeparationResult PlaneShape::gap(const PointSet& points, double) const {
   gap.on_points = above > below ? low : high;
   gap.normal = above > below ? normal_ : Vector3d(-normal_);
   const double apart = std::max(above, below);
-  gap.atLeast = apart - kRounding * (gap.on_points.lpNorm<1>() + std::abs(height_));
+  gap.at_least = apart - kRounding * (gap.on_points.lpNorm<1>() + std::abs(height_));
   gap.distance = gap.isTouching() ? 0 : apart;
   if (gap.isTouching() && above + below < 0) {
     gap.on_body = gap.on_points = low + (high - low) * (above / (above + below));

@@ -40,19 +40,19 @@ struct PointSet {
 struct SeparationResult {
   /// The distance is surely no less, up to 4e-15 of the coordinates, which is taken off: where it is not positive, the
   /// two may touch.
-  double atLeast = 0;
-  /// Of the nearest points; 0 where the two touch, at a point of both. Not looked for when `atLeast` was found to be
+  double at_least = 0;
+  /// Of the nearest points; 0 where the two touch, at a point of both. Not looked for when `at_least` was found to be
   /// enough.
   double distance = std::numeric_limits<double>::infinity();
   Eigen::Vector3d on_body = Eigen::Vector3d::Zero(), on_points = Eigen::Vector3d::Zero();
-  /// The unit direction, from the body to the points, along which they are apart by `atLeast`. Where `atLeast` was more
-  /// than enough, it may be zero.
+  /// The unit direction, from the body to the points, along which they are apart by `at_least`. Where `at_least` was
+  /// more than enough, it may be zero.
   Eigen::Vector3d normal = Eigen::Vector3d::Zero();
   /// Where cores overlap: points of the difference (body minus points) in whose hull the origin is, for penetration().
   Eigen::Vector3d around[4];
   int around_count = 0;
 
-  bool isTouching() const { return !(atLeast > 0 && distance > 0); }
+  bool isTouching() const { return !(at_least > 0 && distance > 0); }
 };
 
 /// A few points in whose hull, blown up by a radius, a body lies: what bounds how fast any point of it moves.
@@ -73,7 +73,7 @@ class ConvexShape {
   const OrientedVolume& box() const { return box_; }
 
   /// The box bounds the body tightly: what meets the box nearly always meets the body, so the box alone culls.
-  virtual bool isBox() const { return false; }
+  virtual bool hasExactBox() const { return false; }
 
   /// The distance of the points. More than `cutoff` is not looked at closely.
   virtual SeparationResult gap(const PointSet& points, double cutoff) const = 0;
@@ -128,7 +128,7 @@ class BoxShape final : public SupportShape {
  public:
   explicit BoxShape(const Eigen::Vector3d& half);
 
-  bool isBox() const override { return true; }
+  bool hasExactBox() const override { return true; }
   using ConvexShape::penetration;
   ContactPoint penetration(const PointSet& points, const SeparationResult& gap) const override;
 
@@ -201,7 +201,7 @@ class HalfspaceShape final : public ConvexShape {
  public:
   HalfspaceShape(const Eigen::Vector3d& normal, double height, const Sphere& region);
 
-  bool isBox() const override { return true; }
+  bool hasExactBox() const override { return true; }
   SeparationResult gap(const PointSet& points, double cutoff) const override;
   using ConvexShape::penetration;
   ContactPoint penetration(const PointSet& points, const SeparationResult& gap) const override;
@@ -217,7 +217,7 @@ class PlaneShape final : public ConvexShape {
  public:
   PlaneShape(const Eigen::Vector3d& normal, double height, const Sphere& region);
 
-  bool isBox() const override { return true; }
+  bool hasExactBox() const override { return true; }
   SeparationResult gap(const PointSet& points, double cutoff) const override;
   using ConvexShape::penetration;
   ContactPoint penetration(const PointSet& points, const SeparationResult& gap) const override;

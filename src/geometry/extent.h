@@ -52,6 +52,29 @@ struct NodeExtent {
   }
 };
 
+/// Calls f(direction) with directions along which the gap between two nodes may be large, the most likely one first,
+/// until it returns true; did it? All are of unit length.
+template <typename F>
+bool anyDirectionApart(const NodeExtent& a, const NodeExtent& b, const F& f) {
+  const Eigen::Vector3d t = b.center - a.center;
+  const double apart = t.norm();
+  if (apart > 0 && f(Eigen::Vector3d(t / apart))) return true;
+  // On three axes at right angles, gaps add up as the sides of a box: the way between the nodes is the diagonal. Axes
+  // in float are not quite at right angles, which matters far away, so no bound follows from the gaps themselves.
+  const Eigen::Matrix3d s = (a.axes.transpose() * b.axes).cwiseAbs();
+  const Eigen::Vector3d in_a = a.axes.transpose() * t, in_b = b.axes.transpose() * t;
+  const Eigen::Vector3d gap_a = (in_a.cwiseAbs() - a.half - s * b.half).cwiseMax(0);
+  const Eigen::Vector3d gap_b = (in_b.cwiseAbs() - b.half - s.transpose() * a.half).cwiseMax(0);
+  const Eigen::Vector3d directions[] = {a.axes * gap_a.cwiseProduct(in_a.cwiseSign()),
+                                        b.axes * gap_b.cwiseProduct(in_b.cwiseSign()), a.axes * a.normal,
+                                        b.axes * b.normal};
+  for (const Eigen::Vector3d& direction : directions) {
+    const double length = direction.norm();
+    if (length > 0 && f(Eigen::Vector3d(direction / length))) return true;
+  }
+  return false;
+}
+
 /// No point of a is nearer to any of b than this, up to a part of 1e-12 of the sizes, which is taken off. `guess` is a
 /// direction in which the bound is likely to be good, or zero; a bound of `cutoff` or more is not made better.
 inline double distanceBound(const NodeExtent& a, const NodeExtent& b, const Eigen::Vector3d& guess, double cutoff) {
@@ -66,27 +89,7 @@ inline double distanceBound(const NodeExtent& a, const NodeExtent& b, const Eige
     best = std::max({best, d + lo_b - hi_a, lo_a - d - hi_b});
     return best - rounding_margin >= cutoff;
   };
-  if (guess.squaredNorm() > 0 && reachesCutoff(guess)) return best - rounding_margin;
-  if (apart > 0 && reachesCutoff(t / apart)) return best - rounding_margin;
-  // On three axes at right angles, gaps add up as the sides of a box. Axes in float are not quite at right angles,
-  // which matters far away, so the bound is that along the diagonal.
-  const Eigen::Matrix3d s = (a.axes.transpose() * b.axes).cwiseAbs();
-  const Eigen::Vector3d in_a = a.axes.transpose() * t, in_b = b.axes.transpose() * t;
-  const Eigen::Vector3d gap_a = (in_a.cwiseAbs() - a.half - s * b.half).cwiseMax(0);
-  const Eigen::Vector3d gap_b = (in_b.cwiseAbs() - b.half - s.transpose() * a.half).cwiseMax(0);
-  if (gap_a.squaredNorm() > best * best &&
-      reachesCutoff((a.axes * gap_a.cwiseProduct(in_a.cwiseSign())).normalized())) {
-    return best - rounding_margin;
-  }
-  if (gap_b.squaredNorm() > best * best &&
-      reachesCutoff((b.axes * gap_b.cwiseProduct(in_b.cwiseSign())).normalized())) {
-    return best - rounding_margin;
-  }
-  for (const NodeExtent* n : {&a, &b}) {
-    const Eigen::Vector3d normal = n->axes * n->normal;
-    const double length = normal.norm();
-    if (length > 0 && reachesCutoff(normal / length)) break;
-  }
+  if (!(guess.squaredNorm() > 0 && reachesCutoff(guess))) anyDirectionApart(a, b, reachesCutoff);
   return best - rounding_margin;
 }
 
@@ -115,6 +118,41 @@ struct TriangleExtent {
     lowest = std::min({x, y, z});
     highest = std::max({x, y, z});
   }
+};
+
+/// The box about a body, placed by `to`. What is apart from it along its axes or those of the frame need not be asked
+/// the body itself. Triangles are in a root cube; the margin is that of boxesApart().
+class BodyBox {
+ public:
+  BodyBox(const OrientedVolume& box, const SimilarityTransform& to)
+      : center_(to * box.center), axes_(to.rotation * box.axes), half_(to.scale * box.half) {
+    constexpr double kRoot = 3 * (1 << lattice::kBits);
+    const double margin =
+        (center_.lpNorm<1>() + kRoot + half_.lpNorm<1>()) * (64 * 0x1p-53 + 4 * to.orthogonality_error) + to.tolerance;
+    half_.array() += margin;
+    const Eigen::Vector3d extent = axes_.cwiseAbs() * half_;
+    lo_ = center_ - extent;
+    hi_ = center_ + extent;
+  }
+
+  // Comparisons with what is infinite or none (of a plane's box) say no.
+  bool isApart(const TriangleExtent& t) const {
+    for (int k = 0; k < 3; ++k) {
+      if (t.hi[k] < lo_[k] || t.lo[k] > hi_[k]) return true;
+    }
+    for (int k = 0; k < 3; ++k) {
+      const Eigen::Vector3d axis = axes_.col(k);
+      const double middle = axis.dot(center_), p = axis.dot(t.corners[0]) - middle, q = axis.dot(t.corners[1]) - middle,
+                   r = axis.dot(t.corners[2]) - middle;
+      if (std::min({p, q, r}) > half_[k] || std::max({p, q, r}) < -half_[k]) return true;
+    }
+    return false;
+  }
+
+ private:
+  Eigen::Vector3d center_;
+  Eigen::Matrix3d axes_;
+  Eigen::Vector3d half_, lo_, hi_;
 };
 
 /// Is the one at least this far from the other, by their boxes or along the line of their middles?

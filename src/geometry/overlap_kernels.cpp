@@ -118,7 +118,7 @@ HWY_INLINE std::uint8_t overlapping(const bounds::OctantBounds& octants, const f
     M apart = apartByFaces(boxes, b);
     apart = hn::Or(apart, apartAlongOctantNormal(slabs, b));
     apart = hn::Or(apart, apartAlongVolumeNormal(boxes, slabs, own, b));
-    result = static_cast<std::uint8_t>(result | maskBits(hn::Not(apart)) << i);
+    result = static_cast<std::uint8_t>(result | bitsOf(D(), hn::Not(apart)) << i);
   }
   return result;
 }
@@ -254,7 +254,7 @@ std::uint32_t TrianglesWithin(const TrianglePack& pack, const PackRegion& region
     in = hn::And(in, hn::And(hn::Le(lo.z, hn::Set(d, region.high[2])), hn::Ge(hi.z, hn::Set(d, region.low[2]))));
     in = hn::And(in, hn::And(hn::Le(min3(along[0], along[1], along[2]), hn::Set(d, region.slab_high)),
                              hn::Ge(max3(along[0], along[1], along[2]), hn::Set(d, region.slab_low))));
-    result |= maskBits(in) << i;
+    result |= bitsOf(D(), in) << i;
   }
   return pack.count < 32 ? result & ((1u << pack.count) - 1) : result;
 }
@@ -468,7 +468,7 @@ HWY_INLINE std::uint64_t meetingBoxes(const Vec3 (&lanes)[3], std::uint32_t fill
       near = hn::And(near, hn::And(hn::Le(hn::Sub(min3(h[0], h[1], h[2]), middle), half),
                                    hn::Le(hn::Sub(middle, max3(h[0], h[1], h[2])), half)));
     }
-    meeting |= std::uint64_t{maskBits(near) & filled} << 8 * r;
+    meeting |= std::uint64_t{bitsOf(D(), near) & filled} << 8 * r;
   }
   return meeting;
 }
@@ -610,7 +610,7 @@ HWY_INLINE PairBits testPairs(const Vec3 (&p)[3], const Vec3 (&q)[3], const Slab
   if (!hn::AllFalse(d, doubtful) && (!one_will_do || hn::AllFalse(d, certain))) {
     possible = hn::AndNot(hn::And(doubtful, apartByEdges(of_p, of_q, w, limits, doubtful)), possible);
   }
-  return {maskBits(possible), maskBits(certain)};
+  return {bitsOf(D(), possible), bitsOf(D(), certain)};
 }
 
 template <bool kSlabs>

@@ -16,12 +16,6 @@ using Vd = hn::Vec<Dd>;
 using Md = hn::Mask<Dd>;
 using Vec3d = Vec3Of<Vd>;
 
-HWY_INLINE std::uint32_t bitsOf(Md mask) {
-  std::uint8_t bits[8] = {};
-  hn::StoreMaskBits(Dd(), mask, bits);
-  return bits[0];
-}
-
 // A cross product of edges so short, squared and as a share of the edges' squares, is their rounding.
 constexpr double kShortest = 1e-20;
 
@@ -167,8 +161,8 @@ void PenetrationsOfPairs(const TrianglePairs& pairs, double tolerance, PairPenet
     const Vd longest = hn::Sqrt(
         hn::Max(max3(e.squared[0], e.squared[1], e.squared[2]), max3(f.squared[0], f.squared[1], f.squared[2])));
     const Vd cutoff = hn::MulAdd(hn::Set(d, 1e-4), longest, hn::Set(d, tolerance));
-    contacts.meet |= bitsOf(hn::Gt(depth, cutoff)) << i;
-    contacts.apart |= bitsOf(hn::Gt(hn::Neg(depth), cutoff)) << i;
+    contacts.meet |= bitsOf(Dd(), hn::Gt(depth, cutoff)) << i;
+    contacts.apart |= bitsOf(Dd(), hn::Gt(hn::Neg(depth), cutoff)) << i;
     hn::Store(least.normal.x, d, contacts.normal[0] + i);
     hn::Store(least.normal.y, d, contacts.normal[1] + i);
     hn::Store(least.normal.z, d, contacts.normal[2] + i);
@@ -178,7 +172,7 @@ void PenetrationsOfPairs(const TrianglePairs& pairs, double tolerance, PairPenet
     hn::Store(point.x, d, contacts.point[0] + i);
     hn::Store(point.y, d, contacts.point[1] + i);
     hn::Store(point.z, d, contacts.point[2] + i);
-    contacts.no_point |= bitsOf(hn::Not(middle.exists)) << i;
+    contacts.no_point |= bitsOf(Dd(), hn::Not(middle.exists)) << i;
   }
   if (pairs.count < 32) {
     const std::uint32_t all = (1u << pairs.count) - 1;

@@ -24,16 +24,10 @@ std::string extensionOf(const std::string& file) {
   return extension;
 }
 
-constexpr std::pair<const char*, io::Format> kFormats[] = {{"obj", io::Format::kObj},
-                                                           {"ply", io::Format::kPly},
-                                                           {"stl", io::Format::kStl},
-                                                           {"off", io::Format::kOff},
-                                                           {"dae", io::Format::kDae}};
-
 io::Polygons readPolygons(const std::string& file) {
   const std::string content = io::readFile(file);
   const std::string extension = extensionOf(file);
-  for (const auto& [name, format] : kFormats) {
+  for (const auto& [name, format] : io::kFormats) {
     if (extension == std::string(".") + name) return io::readMesh(content, format);
   }
   return io::readScene(file);
@@ -57,7 +51,7 @@ std::shared_ptr<const Mesh> loadMesh(const std::string& file) {
 
 std::vector<MeshFormat> meshFormats() {
   std::vector<MeshFormat> formats;
-  for (const auto& [name, format] : kFormats) formats.push_back({name, false});
+  for (const auto& [name, format] : io::kFormats) formats.push_back({name, false});
   for (std::string& ending : io::sceneEndings()) formats.push_back({std::move(ending), true});
   return formats;
 }

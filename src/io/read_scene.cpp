@@ -83,8 +83,8 @@ class CLocale {
 
 /// What a reader here refuses must not get in by another name.
 void leaveOut(Assimp::Importer& importer) {
-  for (const char* extension : {"obj", "ply", "stl", "off", "dae"}) {
-    while (const std::unique_ptr<Assimp::BaseImporter> reader{importer.GetImporter(extension)}) {
+  for (const auto& [name, format] : kFormats) {
+    while (const std::unique_ptr<Assimp::BaseImporter> reader{importer.GetImporter(name)}) {
       importer.UnregisterLoader(reader.get());  // it is ours from here on
     }
   }

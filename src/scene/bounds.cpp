@@ -13,6 +13,7 @@
 #include "fcl/adapters/models.h"
 #include "fcl/adapters/pair.h"
 #include "fcl/adapters/shapes.h"
+#include "scene/reach.h"
 
 namespace bocst::scene {
 namespace {
@@ -159,7 +160,7 @@ Bounds boundsOf(fcl::CollisionGeometry<S>& geometry) {
   b.size = b.radius + b.center.norm();
   b.width = 2 * b.half.minCoeff();
   // Beyond this, single precision has no room for the squares.
-  if (b.kind == Bounds::kBox && !(b.size < 1e12)) b.kind = Bounds::kEverywhere;
+  if (b.kind == Bounds::kBox && !(b.size < kUnboxedSize)) b.kind = Bounds::kEverywhere;
   return b;
 }
 

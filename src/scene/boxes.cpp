@@ -62,7 +62,7 @@ HWY_INLINE std::uint32_t overlapping(const Own& a, const Boxes& b, const float* 
       }
       all = hn::And(all, hn::And(hn::Le(lo, a.hi[k]), hn::Ge(hi, a.lo[k])));
     }
-    bits |= maskBits(all) << i;
+    bits |= bitsOf(D(), all) << i;
   }
   return bits;
 }
@@ -142,7 +142,7 @@ HWY_INLINE std::uint32_t nearLanes(const Own& a, const BoxGroup& b, std::uint32_
     V most = ofFaces<kDistance>(s[0], s[1], s[2]), g;
     const auto near = [&] {
       g = hn::Sub(hn::Mul(share, most), reach);
-      return maskBits(hn::Le(g, far)) & lanes;
+      return bitsOf(D(), hn::Le(g, far)) & lanes;
     };
     if (near() == 0) continue;
     BOCST_UNROLL

@@ -14,7 +14,7 @@
 #include "fcl/queries/grow_together.h"
 #include "fcl/queries/pose_boxes.h"
 #include "fcl/queries/query_scope.h"
-#include "scene/pool.h"
+#include "thread/thread_pool.h"
 
 namespace bocst {
 namespace {
@@ -99,7 +99,7 @@ void collideAll(const Model<S>& a, const Model<S>& b, const Poses<S>& X_AB, std:
     collideSome(a, b, X_AB, row * at_once, std::min((row + 1) * at_once, count), hit);
     return true;
   };
-  scene::Pool(threads, rows).share(rows, work);
+  thread::ThreadPool(threads, rows).share(rows, work);
 }
 
 }  // namespace

@@ -14,9 +14,9 @@
 
 #include "fcl/adapters/models.h"
 #include "scene/edge.h"
-#include "scene/pool.h"
 #include "scene/sweep.h"
 #include "thread/sharded_lock.h"
+#include "thread/thread_pool.h"
 
 namespace bocst {
 namespace {
@@ -176,7 +176,7 @@ struct Scene<S>::Impl {
   mutable thread::ShardedLock sharded_lock;  // of `world`; held no longer than it takes to copy it
   mutable WorldPtr world;                    // null after a change
   const std::uint32_t scene_number = nextScene();
-  mutable scene::Pool pool;
+  mutable thread::ThreadPool pool;
 };
 
 template <typename S>

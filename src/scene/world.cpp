@@ -75,7 +75,7 @@ void checkPoses(const char* query, const fcl::Transform3<S>* X_WM, std::size_t s
     if (k == states) break;
     for (std::size_t i = 0; i < moving; ++i) {
       const double error = orthogonalityErrorOf<S>(X_WM[k * moving + i]);
-      if (!(error <= kMaxOrthogonalityError)) refusePose<S>(query, X_WM, k * moving + i, moving, state);
+      if (!(error <= fcl_adapter::kMaxOrthogonalityError)) refusePose<S>(query, X_WM, k * moving + i, moving, state);
       deviations[i] = std::max(deviations[i], deviationOf(error));
     }
     if (k + 1 == states) break;
@@ -85,7 +85,7 @@ void checkPoses(const char* query, const fcl::Transform3<S>* X_WM, std::size_t s
 
 template <typename S>
 void checkPose(const char* query, const fcl::Transform3<S>& X) {
-  if (!(orthogonalityErrorOf<S>(X) <= kMaxOrthogonalityError)) refuse<S>(query, "", X);
+  if (!(orthogonalityErrorOf<S>(X) <= fcl_adapter::kMaxOrthogonalityError)) refuse<S>(query, "", X);
 }
 
 template <typename S>

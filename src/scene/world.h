@@ -51,9 +51,6 @@ struct Object {
 template <typename S>
 double orthogonalityErrorOf(const fcl::Transform3<S>& X);
 
-/// Poses with a larger one are refused: those of floats that were multiplied some thousand times are below.
-constexpr double kMaxOrthogonalityError = 1e-3;
-
 /// Writes at least the largest orthogonality error of the poses of each moving object to `orthogonality_errors`.
 /// @throws std::invalid_argument that names the first pose that is not rigid; `state`: the name of the only one.
 template <typename S>

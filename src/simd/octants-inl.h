@@ -37,10 +37,17 @@ HWY_INLINE V fromBytes(D d, const std::int8_t* p) {
   return hn::ConvertTo(d, hn::PromoteTo(di, hn::LoadU(ds, p)));
 }
 
-HWY_INLINE std::uint32_t maskBits(M mask) {
+// A mask of at most eight lanes as bits, and back; bits of lanes that a vector does not have are not looked at.
+template <typename Tag>
+HWY_INLINE unsigned bitsOf(Tag d, hn::Mask<Tag> mask) {
   std::uint8_t bits[8] = {};
-  hn::StoreMaskBits(D(), mask, bits);
+  hn::StoreMaskBits(d, mask, bits);
   return bits[0];
+}
+template <typename Tag>
+HWY_INLINE hn::Mask<Tag> maskOf(Tag d, unsigned bits) {
+  const std::uint8_t bytes[8] = {static_cast<std::uint8_t>(bits)};
+  return hn::LoadMaskBits(d, bytes);
 }
 
 }  // namespace bocst::query::HWY_NAMESPACE

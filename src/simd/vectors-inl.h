@@ -58,7 +58,7 @@ template <typename T>
 HWY_INLINE Vec3Of<T> scaled(Vec3Of<T> a, T by) {
   return {hn::Mul(a.x, by), hn::Mul(a.y, by), hn::Mul(a.z, by)};
 }
-/// a + by * way.
+/// a + by * direction.
 template <typename T>
 HWY_INLINE Vec3Of<T> along(Vec3Of<T> a, T by, Vec3Of<T> direction) {
   return {hn::MulAdd(by, direction.x, a.x), hn::MulAdd(by, direction.y, a.y), hn::MulAdd(by, direction.z, a.z)};

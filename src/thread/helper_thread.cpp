@@ -2,13 +2,14 @@
 #include "thread/helper_thread.h"
 
 #include <pthread.h>
-#include <signal.h>
 
 #include <condition_variable>
 #include <list>
 #include <mutex>
 #include <new>
 #include <thread>
+
+#include "thread/start.h"
 
 namespace bocst::thread {
 namespace {
@@ -18,7 +19,7 @@ class HelperThread {
   void add(std::function<void()> job) {
     {
       const std::lock_guard<std::mutex> lock(mutex_);
-      if (!thread_.joinable()) start();
+      if (!thread_.joinable()) thread_ = startWithoutSignals([this] { work(); });
       jobs_.push_back(std::move(job));
     }
     wake_.notify_one();
@@ -36,20 +37,6 @@ class HelperThread {
   }
 
  private:
-  // The thread takes no signals: they are for threads that the program made.
-  void start() {
-    sigset_t all, before;
-    sigfillset(&all);
-    pthread_sigmask(SIG_SETMASK, &all, &before);
-    try {
-      thread_ = std::thread([this] { work(); });
-    } catch (...) {
-      pthread_sigmask(SIG_SETMASK, &before, nullptr);
-      throw;
-    }
-    pthread_sigmask(SIG_SETMASK, &before, nullptr);
-  }
-
   void work() {
     for (;;) {
       std::function<void()> job;

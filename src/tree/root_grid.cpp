@@ -21,7 +21,7 @@ constexpr std::size_t kBlock = 256;           // triangles that are linked at on
 
 std::size_t inWholeGroups(std::size_t triangles) { return (triangles + 7) / 8 * 8; }
 
-/// ScratchMemory for what a grid is made from.
+/// Memory for the arrays from which one grid is made.
 class ScratchMemory {
  public:
   // Fresh memory costs as much as what is written to it, so a thread keeps some, one MB at most, for its next mesh.
@@ -66,7 +66,7 @@ class QuantisedMesh {
   QuantisedMesh(const oracle::Surface& surface, int bits, std::int16_t* room)
       : triangles_(surface.mesh->triangles().data()), bits_(bits), vertices_(room) {
     const Mesh& mesh = *surface.mesh;
-    // ScratchMemory for a step of margin on both sides.
+    // Leaves room for a step of margin on both sides.
     oracle::quantise(mesh.vertices().data()->data(), mesh.vertexCount(), surface.lattice.origin().data(),
                      surface.lattice.inverseUnit() / kMargin, (1 << oracle::kGridSpanBits) - 2, vertices_);
     vertices_[values(surface) - 1] = 0;

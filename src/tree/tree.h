@@ -146,15 +146,15 @@ class Tree {
     bool list_suffices;
   };
 
-  /// One expansion batch: makes each node's children resident (or, where enough, its list). Nodes that another thread
-  /// has grown meanwhile are skipped. The query locks of all trees are held shared.
-  static void grow(std::vector<Growth>& nodes);
+  /// One expansion batch: makes each node's children resident (or, where enough, its list). A node may occur more than
+  /// once; nodes that another thread has grown meanwhile are skipped. The query locks of all trees are held shared.
+  static void grow(const std::vector<Growth>& nodes);
 
   /// The same in two steps: oracles work on it until finish(), and meanwhile this thread may walk over what is
   /// resident, but not grow more. It holds the trees' growth mutexes.
   class Batch {
    public:
-    explicit Batch(std::vector<Growth>& nodes);
+    explicit Batch(const std::vector<Growth>& nodes);
     ~Batch() { abandon(); }
     Batch(const Batch&) = delete;
     Batch& operator=(const Batch&) = delete;
@@ -168,9 +168,10 @@ class Tree {
       std::vector<Growth> nodes;
       std::vector<oracle::ExpansionRequest> requests;
     };
+    void nameOnce(const std::vector<Growth>& nodes, std::vector<std::uint64_t>& names) const;
     void abandon() noexcept;
 
-    std::vector<Tree*> trees_;
+    std::vector<Tree*> trees_;  // by address, in which order their locks are taken
     std::vector<std::unique_lock<thread::ForkAwareMutex>> locks_;
     std::vector<std::vector<std::uint32_t>> gathered_;  // lists that requests point to
     std::vector<Part> parts_;                           // one an oracle

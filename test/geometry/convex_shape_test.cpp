@@ -114,7 +114,7 @@ class PointShape final : public SupportShape {
 
 void checkGap(const Known& k, const PointSet& p, double tolerance) {
   const SeparationResult gap = k.body->gap(p, kFar);
-  ASSERT_LE(gap.atLeast, gap.distance);
+  ASSERT_LE(gap.at_least, gap.distance);
   if (gap.isTouching()) {
     ASSERT_EQ(gap.distance, 0);
     // At a point of both.
@@ -123,7 +123,7 @@ void checkGap(const Known& k, const PointSet& p, double tolerance) {
     ASSERT_LE(PointShape(gap.on_points).gap(p, kFar).distance, tolerance);
     return;
   }
-  ASSERT_LE(gap.distance - gap.atLeast, tolerance);
+  ASSERT_LE(gap.distance - gap.at_least, tolerance);
   // The points are where they should be, and a plane between them has the two on its sides.
   const Vector3d n = (gap.on_points - gap.on_body).normalized();
   ASSERT_NEAR((gap.on_points - gap.on_body).norm(), gap.distance, tolerance);
@@ -136,8 +136,8 @@ void checkGap(const Known& k, const PointSet& p, double tolerance) {
   }
   // Asked whether they are within a part of the distance, it says no, with reason.
   const SeparationResult quick = k.body->gap(p, gap.distance / 2);
-  ASSERT_GT(quick.atLeast, gap.distance / 2);
-  ASSERT_LE(quick.atLeast, gap.distance + tolerance);
+  ASSERT_GT(quick.at_least, gap.distance / 2);
+  ASSERT_LE(quick.at_least, gap.distance + tolerance);
 }
 
 // Against exact arithmetic, far from the origin and near to each other, where rounding is all there is.
@@ -155,9 +155,9 @@ TEST(ConvexShape, TrianglesAreNoNearerThanTheySay) {
     }
     if (i % 2 == 0) q[0] = p[0] + gap;
     const SeparationResult found = TriangleShape(p).gap({q, 3}, kFar);
-    ASSERT_LE(found.atLeast, found.distance);
+    ASSERT_LE(found.at_least, found.distance);
     const long double distance = std::sqrt(exact::squaredDistance(p, q));
-    ASSERT_LE(static_cast<long double>(found.atLeast), distance * (1 + 1e-17L)) << i;
+    ASSERT_LE(static_cast<long double>(found.at_least), distance * (1 + 1e-17L)) << i;
     apart += distance > 0;
   }
   EXPECT_GT(apart, 2000);

@@ -75,11 +75,6 @@ class HandTree {
       if (!query::boxesApart(query::oriented(volume(child)), query::oriented(other), to)) f(child);
     });
   }
-  template <typename OtherVolume, typename Large, typename Other, typename F>
-  void childrenMeeting(Node n, OtherVolume& other, const query::SimilarityTransform& to, Large&, const Other&,
-                       typename Other::Node, F&& f) const {
-    overlappingChildren(n, other, to, f);
-  }
 
   std::size_t triangleCount(Node n) const { return at(n).end - at(n).begin; }
   std::uint32_t triangle(Node n, std::size_t i) const { return static_cast<std::uint32_t>(at(n).begin + i); }

@@ -120,13 +120,6 @@ class BvhSide {
     });
   }
 
-  // A pair of children is not worth a look at each triangle.
-  template <typename Large, typename Other, typename F>
-  void childrenMeeting(Node n, const query::Volume& volume, const query::SimilarityTransform& to, Large&, const Other&,
-                       typename Other::Node, F&& f) const {
-    overlappingChildren(n, volume, to, f);
-  }
-
   template <typename F>
   void children(Node n, F&& f) const {
     f(node(n).leftChild());

@@ -13,6 +13,7 @@
 #include <cstdint>
 #include <limits>
 #include <optional>
+#include <utility>
 #include <vector>
 
 #include "fcl/adapters/narrow_phase.h"
@@ -80,7 +81,7 @@ class OcTreeSide {
   }
   query::Sphere sphere(const Node& n) const { return {n.center, std::sqrt(3.0) * n.half}; }
 
-  bool isBox(const Node&) const { return true; }
+  bool hasExactBox(const Node&) const { return true; }
   query::SeparationResult gap(const Node& n, const query::PointSet& points, double cutoff) const {
     Eigen::Vector3d x[8];
     query::SeparationResult gap = bodyOf(n).gap(about(n, points, x), cutoff);
@@ -98,10 +99,6 @@ class OcTreeSide {
   }
   std::optional<Eigen::Vector3d> point(const Node& n) const { return n.center; }
   query::SweptHull hull(const Node& n) const { return query::sweptHullOf(volume(n)); }
-  bool meets(const Node& n, const query::Sphere& s, double tolerance) const {
-    const double extent = s.radius * (1 + 1e-12) + tolerance;
-    return !(gap(n, {&s.center, 1}, extent).atLeast > extent);
-  }
 
   template <typename F>
   void children(const Node& n, F&& f) const {
@@ -128,19 +125,11 @@ class OcTreeSide {
       if (!query::facesApart(box, other, to)) f(child);
     });
   }
-  // Eight cells are not worth a look at each triangle.
-  template <typename OtherVolume, typename Large, typename Other, typename F>
-  void childrenMeeting(const Node& n, const OtherVolume& other, const query::SimilarityTransform& to, Large&,
-                       const Other&, typename Other::Node, F&& f) const {
-    overlappingChildren(n, other, to, f);
-  }
 
-  // For ConvexCollector. Cells are made as FCL makes them, with its rounding.
+  // For ConvexCollector.
   bool fclOverlaps(const Node& n, const NarrowPhase<S>& narrow_phase, const fcl::Vector3<S> (&corners)[3],
                    const fcl::Transform3<S>& X_WM) const {
-    fcl::Box<S> cell;
-    fcl::Transform3<S> X_WC;
-    fcl::constructBox(n.box, X_WO_, cell, X_WC);
+    const auto [cell, X_WC] = cellOf(n);
     return narrow_phase.fclOverlaps(cell, X_WC, corners, X_WM);
   }
   bool occupied(const Node& n) const { return n.node != nullptr && octree_.isNodeOccupied(n.node); }
@@ -148,9 +137,7 @@ class OcTreeSide {
     return (n.node != nullptr ? static_cast<S>(n.node->getOccupancy()) : octree_.getOccupancyThres()) * density_;
   }
   fcl::AABB<S> worldBox(const Node& n) const {
-    fcl::Box<S> cell;
-    fcl::Transform3<S> X_WC;
-    fcl::constructBox(n.box, X_WO_, cell, X_WC);
+    const auto [cell, X_WC] = cellOf(n);
     fcl::AABB<S> box;
     fcl::computeBV(cell, X_WC, box);
     return box;
@@ -160,6 +147,13 @@ class OcTreeSide {
   bool sees(const octomap::OcTreeNode* node) const {
     if (node == nullptr) return costs_;
     return octree_.isNodeOccupied(node) || (costs_ && !octree_.isNodeFree(node));
+  }
+
+  // Made as FCL makes it, with its rounding.
+  std::pair<fcl::Box<S>, fcl::Transform3<S>> cellOf(const Node& n) const {
+    std::pair<fcl::Box<S>, fcl::Transform3<S>> cell;
+    fcl::constructBox(n.box, X_WO_, cell.first, cell.second);
+    return cell;
   }
 
   static query::BoxShape bodyOf(const Node& n) { return query::BoxShape(Eigen::Vector3d::Constant(n.half)); }

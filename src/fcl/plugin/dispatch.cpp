@@ -126,6 +126,7 @@ void checkDispatch() {
   static const std::string wrong = probe<S>();
   if (!wrong.empty()) throw std::runtime_error(wrong);
 }
+
 template <typename S>
 bool touchesNothing(const fcl::CollisionGeometry<S>* o1, const fcl::CollisionGeometry<S>* o2,
                     fcl::ContinuousCollisionResult<S>& result) {

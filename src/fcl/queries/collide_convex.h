@@ -166,8 +166,8 @@ class ConvexCollector final : public query::ConvexVisitor<typename Partner::Node
   bool touches(std::uint32_t t, const Eigen::Vector3d* corners, const Node& b, query::SeparationResult& gap) const {
     const double near = std::max(tolerance_, q_.margin);
     gap = partner_.gap(b, {corners, 3}, near);
-    if (gap.atLeast > near) return false;
-    if (gap.isTouching() || gap.atLeast <= q_.margin) return true;
+    if (gap.at_least > near) return false;
+    if (gap.isTouching() || gap.at_least <= q_.margin) return true;
     if (q_.is_distance) return false;
     const auto& i = surface_.mesh->indices(t);
     fcl::Vector3<S> c[3];

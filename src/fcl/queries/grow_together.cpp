@@ -85,16 +85,6 @@ class TreesScope {
   std::size_t locked_ = 0;
 };
 
-bool isLess(const tree::Tree::Growth& x, const tree::Tree::Growth& y) {
-  return x.tree != y.tree ? std::less<tree::Tree*>()(x.tree, y.tree) : x.node < y.node;
-}
-
-void removeDoubles(std::vector<tree::Tree::Growth>& growths) {
-  std::sort(growths.begin(), growths.end(), isLess);
-  const auto same = [](const auto& x, const auto& y) { return x.tree == y.tree && x.node == y.node; };
-  growths.erase(std::unique(growths.begin(), growths.end(), same), growths.end());
-}
-
 /// The walks of a scratch, over what is resident; what they need then grows, until all have their answer.
 class Walks {
  public:
@@ -115,7 +105,6 @@ class Walks {
       if (device_walks || waiting_ == s_.walks.size()) finish();
       const std::size_t next = device_walks && byDevice() ? s_.walks.size() : byHost();
       finish();
-      removeDoubles(s_.growths);
       if (s_.growths.empty()) continue;
       batch.emplace(s_.growths);
       waiting_ = next;

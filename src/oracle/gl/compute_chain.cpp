@@ -229,8 +229,7 @@ void ComputeChain::take(const std::vector<ExpansionRequest*>& requests, const st
 }
 
 void ComputeChain::answer(const std::vector<ExpansionRequest*>& requests, Thread& thread) {
-  while (glGetError() != GL_NO_ERROR) {
-  }
+  forgetErrors();
   const auto begin = std::chrono::steady_clock::now();
   const auto stamp = [this](std::size_t i) {
     if (is_timed_) glQueryCounter(times_[i], GL_TIMESTAMP);
@@ -265,8 +264,7 @@ void ComputeChain::answer(const std::vector<ExpansionRequest*>& requests, Thread
     checkHeader(answers, thread);
     thread.require(answers[kListWords] == list_capacity_ && answers[kIdWords] == id_capacity_, "lists changed");
   }
-  const GLenum error = glGetError();
-  if (error != GL_NO_ERROR) throw OracleError("OpenGL error " + std::to_string(error));
+  throwOnError();
   placed_->trim(answers[kListWords]);
   take(requests, answers, thread);
   if (is_timed) findCost(std::chrono::steady_clock::now() - begin);

@@ -53,8 +53,7 @@ class OcclusionQueries {
 
   /// candidates[i]: the octants of question i that are seen. @throws OracleError
   void ask(const std::vector<ExpansionRequest*>& requests, std::vector<std::uint8_t>& candidates, Thread& thread) {
-    while (glGetError() != GL_NO_ERROR) {
-    }
+    forgetErrors();
     glBindFramebuffer(GL_FRAMEBUFFER, framebuffer_.name());
     glViewport(0, 0, side_, side_);
     // 4.2: no culling, no writes; what is drawn is never looked at.
@@ -71,9 +70,8 @@ class OcclusionQueries {
     }
     glColorMask(GL_TRUE, GL_TRUE, GL_TRUE, GL_TRUE);
     glBindVertexArray(0);
-    const GLenum error = glGetError();
     thread.checkReset();
-    if (error != GL_NO_ERROR) throw OracleError("OpenGL error " + std::to_string(error));
+    throwOnError();
   }
 
  private:

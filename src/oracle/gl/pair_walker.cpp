@@ -93,8 +93,7 @@ void PairWalker::describe(const PairWalks& walks, std::size_t first, std::size_t
 }
 
 void PairWalker::walkPart(PairWalks& walks, std::size_t first, std::size_t count, Thread& thread) {
-  while (glGetError() != GL_NO_ERROR) {
-  }
+  forgetErrors();
   describe(walks, first, count);
   const std::size_t words = deferred_ + std::size_t{room_} * kDeferredWords;
   if (std::max(words, rows_.size()) * kWord > bytes_) throw OracleError("too many nodes for a buffer of the device");
@@ -119,8 +118,7 @@ void PairWalker::walkPart(PairWalks& walks, std::size_t first, std::size_t count
   const std::uint32_t* answers = read(come);
   const std::size_t deferred = std::min(answers[kDeferredCount], room_);
   if (deferred > come) answers = read(come = deferred);
-  const GLenum error = glGetError();
-  if (error != GL_NO_ERROR) throw OracleError("OpenGL error " + std::to_string(error));
+  throwOnError();
   thread.require(std::min(answers[kDeferredCount], room_) == deferred, "what came back changed");
   take(walks, first, count, answers, thread);
 }

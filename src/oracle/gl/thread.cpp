@@ -3,8 +3,6 @@
 
 #include <bocst/oracle.h>
 #include <epoxy/gl.h>
-#include <pthread.h>
-#include <signal.h>
 #include <unistd.h>
 
 #include <algorithm>
@@ -12,16 +10,12 @@
 #include <utility>
 
 #include "log/log.h"
+#include "thread/start.h"
 
 namespace bocst::oracle::gl {
 
 Thread::Thread(const ContextRequest& request) : process_(getpid()), wait_limit_(request.wait_limit) {
-  // Signals are the application's: its handlers must not run on our thread.
-  sigset_t all, before;
-  sigfillset(&all);
-  pthread_sigmask(SIG_SETMASK, &all, &before);
-  thread_ = std::make_unique<std::thread>([this, request] { loop(request); });
-  pthread_sigmask(SIG_SETMASK, &before, nullptr);
+  thread_ = std::make_unique<std::thread>(thread::startWithoutSignals([this, request] { loop(request); }));
   {
     std::unique_lock<std::mutex> lock(mutex_);
     done_.wait(lock, [this] { return started_; });

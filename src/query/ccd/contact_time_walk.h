@@ -147,20 +147,7 @@ class ContactTimeWalk : private BestFirst<ContactTimeWalk<A, B>, A, B> {
       if (gap > 0) best = std::max(best, timeToClose(gap, direction, a.center, radius_a, b.center, radius_b));
       return !worthIt(best);
     };
-    if (apart > 0 && consider(t / apart)) return best;
-    const Eigen::Matrix3d s = (a.axes.transpose() * b.axes).cwiseAbs();
-    const Eigen::Vector3d in_a = a.axes.transpose() * t, in_b = b.axes.transpose() * t;
-    const Eigen::Vector3d gap_a = (in_a.cwiseAbs() - a.half - s * b.half).cwiseMax(0);
-    const Eigen::Vector3d gap_b = (in_b.cwiseAbs() - b.half - s.transpose() * a.half).cwiseMax(0);
-    // Where boxes are apart on several of a box's axes, the way between them is a mixture of these.
-    const double length_a = gap_a.norm(), length_b = gap_b.norm();
-    if (length_a > 0 && consider(a.axes * (gap_a.cwiseProduct(in_a.cwiseSign()) / length_a))) return best;
-    if (length_b > 0 && consider(b.axes * (gap_b.cwiseProduct(in_b.cwiseSign()) / length_b))) return best;
-    for (const NodeExtent* n : {&a, &b}) {
-      const Eigen::Vector3d normal = n->axes * n->normal;
-      const double length = normal.norm();
-      if (length > 0 && consider(normal / length)) break;
-    }
+    anyDirectionApart(a, b, consider);
     return best;
   }
 
@@ -175,7 +162,7 @@ class ContactTimeWalk : private BestFirst<ContactTimeWalk<A, B>, A, B> {
   // What lies in a ball and a node of bodies, apart by a gap of the ball's middle or of other points in it.
   double boundOf(const SeparationResult& gap, double radius, const Sphere& ball, double radius_of_turn,
                  const Convex& b) const {
-    const double far = gap.atLeast * b_in_world_.scale;
+    const double far = gap.at_least * b_in_world_.scale;
     const double free = far * (1 - kRounding) - radius * (1 + kRounding) - clearance();
     if (!(free > 0)) return now_;
     const Eigen::Vector3d direction = -(b_in_world_.rotation * gap.normal);
@@ -221,7 +208,7 @@ class ContactTimeWalk : private BestFirst<ContactTimeWalk<A, B>, A, B> {
     at(pair.bound);
     double time = Base::boundOf(pair);
     if constexpr (B::kBodies) {
-      if (!spheres() && !b_.isBox(pair.b) && worthIt(time)) time = std::max(time, bodyBound(pair));
+      if (!spheres() && !b_.hasExactBox(pair.b) && worthIt(time)) time = std::max(time, bodyBound(pair));
     }
     if (time < now_ + kWorthWaiting) return !worthIt(time);
     push({time, pair.a, pair.b});
@@ -318,7 +305,7 @@ class ContactTimeWalk : private BestFirst<ContactTimeWalk<A, B>, A, B> {
     for (std::size_t k = 0; k < p.count; ++k) x[k] = world_in_b_ * p.corners[k];
     const SeparationResult gap = b_.gap(q.node, {x, static_cast<int>(p.count)}, kFar);
     direction = -(b_in_world_.rotation * gap.normal);
-    return gap.isTouching() ? 0 : std::max(0.0, gap.atLeast * b_in_world_.scale - p.radius);
+    return gap.isTouching() ? 0 : std::max(0.0, gap.at_least * b_in_world_.scale - p.radius);
   }
 
   // Velocities are affine in position, so a hull's extremes are at its corners; a ball goes with its middle.

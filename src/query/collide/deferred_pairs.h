@@ -47,7 +47,7 @@ class DeferredPairs {
     const auto end = choose(a, b, b_in_a, ends_at_first);
     growths_.clear();
     for (auto w = end; w != waiting_.end(); ++w) add(a, b, w->pair, growths_);
-    growAll();
+    tree::Tree::grow(growths_);
     for (auto w = end; w != waiting_.end(); ++w) f(w->pair);
     waiting_.erase(end, waiting_.end());
   }
@@ -93,11 +93,6 @@ class DeferredPairs {
   static void add(const A& a, const B& b, const Pair& pair, std::vector<tree::Tree::Growth>& growths) {
     if (a.state(pair.a) == State::kGrows) a.grow(pair.a, growths);
     if (b.state(pair.b) == State::kGrows) b.grow(pair.b, growths);
-  }
-
-  void growAll() {
-    uniqueGrowths(growths_);
-    if (!growths_.empty()) tree::Tree::grow(growths_);
   }
 
   template <typename Side>

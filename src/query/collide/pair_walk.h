@@ -138,7 +138,9 @@ class PairWalk {
 
   bool sphereMeets(const Sphere& a, typename B::Node b) const {
     if constexpr (B::kBodies) {
-      return b_.meets(b, placed(a, a_in_b_), a_in_b_.tolerance);
+      const Sphere s = placed(a, a_in_b_);
+      const double extent = s.radius * (1 + 1e-12) + a_in_b_.tolerance;
+      return !(b_.gap(b, {&s.center, 1}, extent).at_least > extent);
     } else {
       return spheresMeet(a, inA(b_.sphere(b)));
     }
@@ -146,11 +148,11 @@ class PairWalk {
 
   // May the box of a node meet the body itself, and not only the box about it?
   bool boxMeets(typename A::Node a, typename B::Node b) const {
-    if (b_.isBox(b)) return true;
+    if (b_.hasExactBox(b)) return true;
     Eigen::Vector3d corners[8];
     cornersOf(oriented(a_.volume(a)), a_in_b_, corners);
     const double tolerance = a_in_b_.tolerance + 4 * a_in_b_.orthogonality_error * a_in_b_.translation.norm();
-    return !(b_.gap(b, {corners, 8}, tolerance).atLeast > tolerance);
+    return !(b_.gap(b, {corners, 8}, tolerance).at_least > tolerance);
   }
 
   // The larger of two nodes is expanded, unless it is a leaf.
@@ -176,7 +178,7 @@ class PairWalk {
         const auto push = [&](typename A::Node c) { s.stack.push_back({c, pair.b}); };
         if constexpr (!B::kBodies) {
           if (sb == State::kLeaf && seen_a_.size < size_b) {
-            a_.childrenMeeting(pair.a, volumeOf(b_, seen_b_), b_in_a_, s.large_b, b_, pair.b, push);
+            childrenBesideLeaf(a_, pair.a, volumeOf(b_, seen_b_), b_in_a_, s.large_b, b_, pair.b, push);
             return false;
           }
         }
@@ -193,7 +195,7 @@ class PairWalk {
     } else {
       const auto push = [&](typename B::Node c) { s.stack.push_back({pair.a, c}); };
       if (sa == State::kLeaf && size_b < seen_a_.size) {
-        b_.childrenMeeting(pair.b, volumeOf(a_, seen_a_), a_in_b_, s.large_a, a_, pair.a, push);
+        childrenBesideLeaf(b_, pair.b, volumeOf(a_, seen_a_), a_in_b_, s.large_a, a_, pair.a, push);
       } else {
         b_.overlappingChildren(pair.b, volumeOf(a_, seen_a_), a_in_b_, push);
       }
@@ -201,7 +203,20 @@ class PairWalk {
     return false;
   }
 
-  // Of the leaf that was asked last: many bodies ask about one after another.
+  // Calls f for the children of an inner node that may meet a larger leaf of the other side. Only eight octants are
+  // worth a look at each triangle.
+  template <typename Side, typename Volume, typename Large, typename Other, typename F>
+  static void childrenBesideLeaf(const Side& side, typename Side::Node node, Volume& volume,
+                                 const SimilarityTransform& to, Large& large, const Other& other,
+                                 typename Other::Node leaf, F&& f) {
+    if constexpr (std::is_same<Side, TreeSide>::value) {
+      side.childrenMeeting(node, volume, to, large, other, leaf, f);
+    } else {
+      side.overlappingChildren(node, volume, to, f);
+    }
+  }
+
+  // The triangles of the leaf asked last, kept because many bodies ask about the same leaf.
   const std::vector<TriangleExtent>& trianglesOf(typename A::Node leaf, Scratch& s) {
     if (leaf_known_ && leaf_ == leaf) return s.leaf;
     leaf_known_ = true;
@@ -215,42 +230,6 @@ class PairWalk {
     }
     return s.leaf;
   }
-
-  // The box about a body, in the frame of A. What is apart along its axes or those of A need not be asked the body
-  // itself; the margin is that of boxesApart().
-  class BodyBox {
-   public:
-    BodyBox(const OrientedVolume& box, const SimilarityTransform& to)
-        : center_(to * box.center), axes_(to.rotation * box.axes), half_(to.scale * box.half) {
-      constexpr double kRoot = 3 * (1 << lattice::kBits);  // corners are in the root cube
-      const double margin = (center_.template lpNorm<1>() + kRoot + half_.template lpNorm<1>()) *
-                                (64 * 0x1p-53 + 4 * to.orthogonality_error) +
-                            to.tolerance;
-      half_.array() += margin;
-      const Eigen::Vector3d extent = axes_.cwiseAbs() * half_;
-      lo_ = center_ - extent;
-      hi_ = center_ + extent;
-    }
-
-    // Comparisons with what is infinite or none (of a plane's box) say no.
-    bool isApart(const TriangleExtent& t) const {
-      for (int k = 0; k < 3; ++k) {
-        if (t.hi[k] < lo_[k] || t.lo[k] > hi_[k]) return true;
-      }
-      for (int k = 0; k < 3; ++k) {
-        const Eigen::Vector3d axis = axes_.col(k);
-        const double middle = axis.dot(center_), p = axis.dot(t.corners[0]) - middle,
-                     q = axis.dot(t.corners[1]) - middle, r = axis.dot(t.corners[2]) - middle;
-        if (std::min({p, q, r}) > half_[k] || std::max({p, q, r}) < -half_[k]) return true;
-      }
-      return false;
-    }
-
-   private:
-    Eigen::Vector3d center_;
-    Eigen::Matrix3d axes_;
-    Eigen::Vector3d half_, lo_, hi_;
-  };
 
   bool leafTriangles(const Pair& pair, Scratch& s) {
     if constexpr (B::kBodies) {

@@ -130,7 +130,7 @@ HWY_INLINE Met meeting(const SphereFrames& g, const SphereFrame& f, const Sphere
     const auto depth =
         hn::Or(hn::And(hn::BitCast(du, squared), hn::Set(du, ~7u)), hn::Iota(du, static_cast<std::uint32_t>(i)));
     hn::StoreU(depth, du, order + i);
-    const unsigned bits_apart = maskBits(apart), bits_certain = maskBits(certain);
+    const unsigned bits_apart = bitsOf(D(), apart), bits_certain = bitsOf(D(), certain);
     met.maybe |= bits_apart << i;
     met.doubtful |= (bits_apart | bits_certain) << i;
   }
@@ -153,9 +153,8 @@ HWY_INLINE std::uint32_t first(const SphereGroup& group, std::uint32_t octants) 
   const hn::RebindToUnsigned<D> du;
   auto least = hn::Set(du, ~0u);
   for (std::size_t i = 0; i < 8; i += hn::Lanes(du)) {
-    const std::uint8_t wanted[8] = {static_cast<std::uint8_t>(octants >> i)};
     const auto order = hn::LoadU(du, group.order + i);
-    least = hn::Min(least, hn::IfThenElse(hn::LoadMaskBits(du, wanted), order, hn::Set(du, ~0u)));
+    least = hn::Min(least, hn::IfThenElse(maskOf(du, octants >> i), order, hn::Set(du, ~0u)));
   }
   return hn::GetLane(hn::MinOfLanes(du, least));
 }

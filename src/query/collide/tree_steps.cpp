@@ -135,9 +135,8 @@ HWY_INLINE std::uint32_t deepest(const StepGroup& group, std::uint32_t octants) 
   const hn::RebindToUnsigned<D> du;
   auto most = hn::Zero(du);
   for (std::size_t i = 0; i < 8; i += hn::Lanes(du)) {
-    const std::uint8_t wanted[8] = {static_cast<std::uint8_t>(octants >> i)};
     const auto depth = hn::LoadU(du, group.order + i);
-    most = hn::Max(most, hn::IfThenElseZero(hn::LoadMaskBits(du, wanted), depth));
+    most = hn::Max(most, hn::IfThenElseZero(maskOf(du, octants >> i), depth));
   }
   return hn::GetLane(hn::MaxOfLanes(du, most)) & 7;
 }
@@ -264,8 +263,7 @@ HWY_INLINE unsigned meeting(const PairFrames& g, int own, const Frame& f, unsign
   const hn::RebindToUnsigned<D> du;
   unsigned result = 0;
   for (std::size_t i = 0; i < 8; i += hn::Lanes(d)) {
-    const std::uint8_t wanted[8] = {static_cast<std::uint8_t>(mask >> i)};
-    const M in = hn::LoadMaskBits(d, wanted);
+    const M in = maskOf(d, mask >> i);
     OctantLanes octants;
     load(f, i, g.side[own].rounding_margin, octants);
     auto triangles = hn::Zero(du);
@@ -277,9 +275,7 @@ HWY_INLINE unsigned meeting(const PairFrames& g, int own, const Frame& f, unsign
       triangles = hn::Or(triangles, hn::IfThenElseZero(hn::RebindMask(du, meet), hn::Set(du, 1u << t)));
     }
     store(i, triangles);
-    std::uint8_t bits[8] = {};
-    hn::StoreMaskBits(du, hn::Ne(triangles, hn::Zero(du)), bits);
-    result |= static_cast<unsigned>(bits[0]) << i;
+    result |= bitsOf(du, hn::Ne(triangles, hn::Zero(du))) << i;
   }
   return result;
 }

@@ -188,16 +188,13 @@ HWY_INLINE unsigned overlapping(const PairFrames& g, const Frame& f, const Frame
     const FaceGaps gaps = faceGaps(f, i, y, l, rounding_margin);
     const V least = hn::Min(gaps.least, slabOverlap(f, i, y, l, gaps.displacement, slab_rounding_margin));
     const M apart = hn::Lt(least, hn::Zero(d));
-    const std::uint8_t wanted[8] = {static_cast<std::uint8_t>(octants >> i)};
-    const M left = hn::AndNot(apart, hn::LoadMaskBits(d, wanted));
+    const M left = hn::AndNot(apart, maskOf(d, octants >> i));
     if (order != nullptr) {
       const auto depth =
           hn::Or(hn::And(hn::BitCast(du, least), hn::Set(du, ~7u)), hn::Iota(du, static_cast<std::uint32_t>(i)));
       hn::StoreU(depth, du, order + i);
     }
-    std::uint8_t bits[8] = {};
-    hn::StoreMaskBits(d, left, bits);
-    result |= static_cast<unsigned>(bits[0]) << i;
+    result |= bitsOf(d, left) << i;
   }
   return result;
 }

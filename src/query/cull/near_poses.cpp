@@ -113,9 +113,8 @@ std::size_t find(const PoseBoxes& boxes, const S* X_AB, bool rows, std::size_t c
     Md apart = hn::Gt(dot(displacement, displacement), hn::Mul(far, far));
     // Most of a planner's poses end here.
     if (!hn::AllTrue(d, apart)) apart = hn::Or(apart, areApartByAxes(boxes, X, displacement, allowed));
-    std::uint8_t settled[8] = {};
-    hn::StoreMaskBits(d, hn::And(apart, haveRotations(X)), settled);
-    for (unsigned left = ~settled[0] & ((1u << poses) - 1); left != 0; left &= left - 1) {
+    const unsigned settled = bitsOf(d, hn::And(apart, haveRotations(X)));
+    for (unsigned left = ~settled & ((1u << poses) - 1); left != 0; left &= left - 1) {
       near[found++] = static_cast<std::uint32_t>(first) + static_cast<std::uint32_t>(__builtin_ctz(left));
     }
   }

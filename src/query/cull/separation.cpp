@@ -197,7 +197,7 @@ HWY_INLINE std::size_t largest(const float (&values)[8], float most) {
   const D d;
   unsigned bits = 1u << 8;
   for (std::size_t i = 0; i < 8; i += hn::Lanes(d)) {
-    bits |= maskBits(hn::Eq(hn::LoadU(d, values + i), hn::Set(d, most))) << i;
+    bits |= bitsOf(D(), hn::Eq(hn::LoadU(d, values + i), hn::Set(d, most))) << i;
   }
   return static_cast<std::size_t>(__builtin_ctz(bits));
 }

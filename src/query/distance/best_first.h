@@ -168,8 +168,7 @@ class BestFirst {
       if (a_.state(p.a) == State::kGrows) a_.grow(p.a, heap_.growths);
       if (b_.state(p.b) == State::kGrows) b_.grow(p.b, heap_.growths);
     }
-    uniqueGrowths(heap_.growths);
-    if (!heap_.growths.empty()) tree::Tree::grow(heap_.growths);
+    tree::Tree::grow(heap_.growths);
     for (const Pair& p : heap_.waiting) put(p);
     heap_.waiting.clear();
   }

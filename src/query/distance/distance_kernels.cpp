@@ -166,9 +166,7 @@ HWY_INLINE std::uint64_t nearRows(const RowBoxes& boxes, std::size_t count, cons
   for (std::size_t row = 0; row < count; row += hn::Lanes(d)) {
     const V square = squareOfGap(low, high, load(boxes.low, row), load(boxes.high, row));
     const M in = hn::And(hn::Lt(square, far_squared), hn::Lt(hn::Sub(lowest, hn::Load(d, boxes.extent + row)), far));
-    std::uint8_t bits[8] = {};
-    hn::StoreMaskBits(d, in, bits);
-    rows |= std::uint64_t{bits[0]} << row;
+    rows |= std::uint64_t{bitsOf(d, in)} << row;
   }
   return rows & ((std::uint64_t{1} << count) - 1);
 }
@@ -277,9 +275,8 @@ std::size_t NearPairs(const TrianglePack& rows, const TrianglePack& lanes, const
                              dot(line, q.corner[1]), dot(line, q.corner[2]));
       at_least = hn::Max(at_least, hn::Div(gap, hn::Max(hn::Sqrt(nearest.square), tiny)));
       near = hn::And(near, hn::Lt(at_least, far));
-      std::uint8_t bits[8] = {};
-      hn::StoreMaskBits(d, near, bits);
-      if (bits[0] == 0) continue;
+      const unsigned bits = bitsOf(d, near);
+      if (bits == 0) continue;
       // The edges are no farther apart than where they were found, so nothing farther is of interest any more.
       const V least_square = hn::MinOfLanes(d, hn::IfThenElse(near, nearest.square, huge));
       far = hn::Min(far, hn::MulAdd(hn::Sqrt(least_square), more, hn::Add(rounding_margin, rounding_margin)));
@@ -287,7 +284,7 @@ std::size_t NearPairs(const TrianglePack& rows, const TrianglePack& lanes, const
       alignas(64) float least[8];
       hn::Store(hn::Max(hn::Sub(hn::Mul(at_least, hn::Set(d, 1 - 16 * 0x1p-24f)), rounding_margin), zero), d, least);
       for (std::size_t k = 0; k < hn::Lanes(d); ++k) {
-        if (bits[0] >> k & 1) {
+        if (bits >> k & 1) {
           pairs[found++] = {least[k], static_cast<std::uint8_t>(row), static_cast<std::uint8_t>(i + k)};
         }
       }

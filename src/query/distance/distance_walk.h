@@ -78,10 +78,10 @@ class DistanceWalk : private BestFirst<DistanceWalk<A, B>, A, B> {
   // A body may be much smaller than its box: pairs that pass the box's bound are bounded once more, by the body itself.
   bool again(const Pair& pair) {
     if constexpr (B::kBodies) {
-      if (spheres() || b_.isBox(pair.b)) return false;
+      if (spheres() || b_.hasExactBox(pair.b)) return false;
       Eigen::Vector3d corners[8];
       cornersOf(oriented(a_.volume(pair.a)), a_in_b_, corners);
-      const double bound = b_.gap(pair.b, {corners, 8}, cutoff() * a_in_b_.scale).atLeast * b_in_a_.scale;
+      const double bound = b_.gap(pair.b, {corners, 8}, cutoff() * a_in_b_.scale).at_least * b_in_a_.scale;
       if (!(bound > pair.bound * (1 + 1e-9))) return false;
       this->push({bound, pair.a, pair.b});
       return true;
@@ -117,7 +117,7 @@ class DistanceWalk : private BestFirst<DistanceWalk<A, B>, A, B> {
   double boundOf(const Sphere& a, typename B::Node body) const {
     const Sphere ball = stretched(placed(a, a_in_b_));
     const double extent = ball.radius * (1 + 1e-12);
-    return (b_.gap(body, {&ball.center, 1}, cutoff() * a_in_b_.scale + extent).atLeast - extent) * b_in_a_.scale;
+    return (b_.gap(body, {&ball.center, 1}, cutoff() * a_in_b_.scale + extent).at_least - extent) * b_in_a_.scale;
   }
 
   // Two trees have their bounds in SIMD.

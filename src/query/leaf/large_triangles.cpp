@@ -23,8 +23,7 @@ PackRegion regionOf(const Volume& v, const SimilarityTransform& other_in_side, d
     offset += v.normal[k] * displacement[k];
     region.normal[k] = v.normal[k];
   }
-  const double rounding_margin =
-      (32 * 0x1p-24 + 4 * other_in_side.orthogonality_error) * extent + 1.02 * (other_in_side.tolerance + error);
+  const double rounding_margin = regionMargin(other_in_side, extent, error);
   for (int k = 0; k < 3; ++k) {
     region.low[k] = static_cast<float>(displacement[k] - v.half[k] - rounding_margin);
     region.high[k] = static_cast<float>(displacement[k] + v.half[k] + rounding_margin);

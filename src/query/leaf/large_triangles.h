@@ -10,6 +10,12 @@
 
 namespace bocst::query {
 
+/// By how much a PackRegion reaches beyond what it bounds, for a node of the other side that `to` places and corners
+/// that are off by `error`; no coordinate is larger than `extent`.
+inline double regionMargin(const SimilarityTransform& to, double extent, double error) {
+  return (32 * 0x1p-24 + 4 * to.orthogonality_error) * extent + 1.02 * (to.tolerance + error);
+}
+
 /// The triangles of a leaf of one side as smaller nodes of the other see them: with large triangles the leaf's volume
 /// says little. What misses a node misses its octants, so only the first of these is asked about all triangles. Their
 /// packed corners are precise enough to say which of them miss a node; only the others are read from the mesh.

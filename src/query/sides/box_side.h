@@ -54,12 +54,6 @@ class BoxSide {
       if (!boxesApart(volume(child), other, to)) f(child);
     });
   }
-  // A pair of children is not worth a look at each triangle.
-  template <typename Large, typename Other, typename F>
-  void childrenMeeting(Node n, const OrientedVolume& volume, const SimilarityTransform& to, Large&, const Other&,
-                       typename Other::Node, F&& f) const {
-    overlappingChildren(n, volume, to, f);
-  }
 
   std::size_t triangleCount(Node) const { return 1; }
   std::uint32_t triangle(Node n, std::size_t) const { return node(n).triangle; }

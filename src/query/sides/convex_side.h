@@ -32,7 +32,7 @@ class ConvexSide {
   OrientedVolume volume(Node) const { return body_.box(); }
   Sphere sphere(Node) const { return {body_.box().center, body_.box().half.norm()}; }
 
-  bool isBox(Node) const { return body_.isBox(); }
+  bool hasExactBox(Node) const { return body_.hasExactBox(); }
   SeparationResult gap(Node, const PointSet& points, double cutoff) const { return body_.gap(points, cutoff); }
   ContactPoint penetration(Node, const PointSet& points, const SeparationResult& gap) const {
     return body_.penetration(points, gap);
@@ -41,20 +41,11 @@ class ConvexSide {
   std::optional<Eigen::Vector3d> point(Node) const { return body_.point(); }
   SweptHull hull(Node) const { return body_.hull(); }
 
-  /// Does a sphere in this frame come within `tolerance` of the body?
-  bool meets(Node node, const Sphere& s, double tolerance) const {
-    const double extent = s.radius * (1 + 1e-12) + tolerance;
-    return !(gap(node, {&s.center, 1}, extent).atLeast > extent);
-  }
-
   // A leaf has no children.
   template <typename F>
   void children(Node, F&&) const {}
   template <typename OtherVolume, typename F>
   void overlappingChildren(Node, OtherVolume&, const SimilarityTransform&, F&&) const {}
-  template <typename OtherVolume, typename Large, typename Other, typename F>
-  void childrenMeeting(Node, OtherVolume&, const SimilarityTransform&, Large&, const Other&, typename Other::Node,
-                       F&&) const {}
 
  private:
   const ConvexShape& body_;

@@ -244,29 +244,4 @@ class TreeSide {
   mutable tree::ChildRef root_ref_;
 };
 
-/// Orders a batch, which is about one tree or two, so that each node is grown once.
-inline void uniqueGrowths(std::vector<tree::Tree::Growth>& batch) {
-  if (batch.size() < 2) return;
-  using Growth = tree::Tree::Growth;
-  tree::Tree* trees[2] = {batch[0].tree, batch[0].tree};
-  for (const Growth& g : batch) {
-    if (std::less<tree::Tree*>()(g.tree, trees[0])) trees[0] = g.tree;
-    if (std::less<tree::Tree*>()(trees[1], g.tree)) trees[1] = g.tree;
-  }
-  // Numbers, which sort several times as fast: tree, node, and what is wanted of it.
-  thread_local std::vector<std::uint64_t> keys;
-  keys.clear();
-  for (const Growth& g : batch) {
-    keys.push_back(std::uint64_t{g.tree != trees[0]} << 33 | std::uint64_t{g.node.bits} << 1 |
-                   std::uint64_t{g.list_suffices});
-  }
-  std::sort(keys.begin(), keys.end());
-  keys.erase(std::unique(keys.begin(), keys.end(), [](std::uint64_t a, std::uint64_t b) { return a >> 1 == b >> 1; }),
-             keys.end());
-  batch.clear();
-  for (const std::uint64_t key : keys) {
-    batch.push_back({trees[key >> 33], tree::NodeRef{static_cast<std::uint32_t>(key >> 1)}, (key & 1) != 0});
-  }
-}
-
 }  // namespace bocst::query

@@ -1,8 +1,7 @@
 // SPDX-License-Identifier: BSD-3-Clause
-// The only file that builds FCL's trees; its headers take long to compile. No bocst overload is in sight here, and
-// FCL's functions for float, which libfcl does not have, are those in libbocst: compiling them takes a minute.
+// No bocst overload is in sight here, and FCL's functions for float, which libfcl does not have, are those in libbocst:
+// compiling them takes a minute.
 #include <bocst/fcl_templates.h>
-#include <fcl/geometry/bvh/BVH_model.h>
 #include <fcl/math/bv/OBB.h>
 #include <fcl/math/bv/OBBRSS.h>
 #include <fcl/math/bv/RSS.h>
@@ -11,8 +10,7 @@
 #include <fcl/narrowphase/detail/traversal/collision/intersect.h>
 #include <fcl/narrowphase/distance.h>
 
-#include <stdexcept>
-
+#include "pairs/fcl_tree.h"
 #include "pairs/pair_of.h"
 #include "pairs/query_pair.h"
 
@@ -33,28 +31,6 @@ struct FclQueries {
     fcl::distance(o1, X_W1, o2, X_W2, request, result);
   }
 };
-
-void check(int code) {
-  if (code != fcl::BVH_OK) throw std::runtime_error("FCL does not accept the mesh, code " + std::to_string(code));
-}
-
-const std::vector<fcl::Vector3d>& verticesFor(const std::vector<Eigen::Vector3d>& vertices, double) { return vertices; }
-
-std::vector<fcl::Vector3f> verticesFor(const std::vector<Eigen::Vector3d>& vertices, float) {
-  std::vector<fcl::Vector3f> rounded;
-  rounded.reserve(vertices.size());
-  for (const Eigen::Vector3d& v : vertices) rounded.push_back(v.cast<float>());
-  return rounded;
-}
-
-template <typename BV>
-std::unique_ptr<fcl::BVHModel<BV>> build(const MeshArrays& mesh) {
-  auto model = std::make_unique<fcl::BVHModel<BV>>();
-  check(model->beginModel(static_cast<int>(mesh.triangles.size()), static_cast<int>(mesh.vertices.size())));
-  check(model->addSubModel(verticesFor(mesh.vertices, typename BV::S{}), mesh.triangles));
-  check(model->endModel());
-  return model;
-}
 
 template <typename BV>
 class BvhPair : public PairOf<typename BV::S, fcl::BVHModel<BV>, FclPair, FclQueries<typename BV::S>> {
@@ -81,26 +57,26 @@ class BvhPair : public PairOf<typename BV::S, fcl::BVHModel<BV>, FclPair, FclQue
                                                          second.vertices[q[1]], second.vertices[q[2]], R, T);
   }
 
-  void rebuildA(const MeshArrays& mesh) override { this->replaceA(build<BV>(mesh)); }
+  void rebuildA(const MeshArrays& mesh) override { this->replaceA(buildFclTree<BV>(mesh)); }
 
   void refitA(const std::vector<Eigen::Vector3d>& vertices, FclPair::Refit refit) override {
     fcl::BVHModel<BV>& model = this->a();
     const auto& positions = verticesFor(vertices, S{});
     if (refit == FclPair::Refit::kNewPositions) {
-      check(model.beginReplaceModel());
-      check(model.replaceSubModel(positions));
-      check(model.endReplaceModel(true, true));
+      checkFclCode(model.beginReplaceModel());
+      checkFclCode(model.replaceSubModel(positions));
+      checkFclCode(model.endReplaceModel(true, true));
     } else {
-      check(model.beginUpdateModel());
-      check(model.updateSubModel(positions));
-      check(model.endUpdateModel(true, true));
+      checkFclCode(model.beginUpdateModel());
+      checkFclCode(model.updateSubModel(positions));
+      checkFclCode(model.endUpdateModel(true, true));
     }
   }
 };
 
 template <typename BV>
 std::unique_ptr<FclPair> buildPair(const MeshArrays& a, const MeshArrays& b) {
-  return std::make_unique<BvhPair<BV>>(build<BV>(a), build<BV>(b));
+  return std::make_unique<BvhPair<BV>>(buildFclTree<BV>(a), buildFclTree<BV>(b));
 }
 
 template <typename S>

@@ -1,10 +1,10 @@
 // SPDX-License-Identifier: BSD-3-Clause
 // No bocst overload is in sight here, see pairs/fcl_pair.cpp.
 #include <bocst/fcl_templates.h>
-#include <fcl/geometry/bvh/BVH_model.h>
 #include <fcl/narrowphase/collision.h>
 #include <fcl/narrowphase/distance.h>
 
+#include "pairs/fcl_tree.h"
 #include "planner/managed_arm_of.h"
 
 namespace bocst::program {
@@ -22,11 +22,7 @@ struct FclArmQueries {
 };
 
 std::shared_ptr<fcl::CollisionGeometryd> build(const std::shared_ptr<const Mesh>& mesh) {
-  const MeshArrays arrays(*mesh, Scalar::kDouble);
-  auto model = std::make_shared<fcl::BVHModel<fcl::OBBRSSd>>();
-  model->beginModel(static_cast<int>(arrays.triangles.size()), static_cast<int>(arrays.vertices.size()));
-  model->addSubModel(arrays.vertices, arrays.triangles);
-  model->endModel();
+  std::shared_ptr<fcl::CollisionGeometryd> model = buildFclTree<fcl::OBBRSSd>(MeshArrays(*mesh, Scalar::kDouble));
   model->computeLocalAABB();
   return model;
 }

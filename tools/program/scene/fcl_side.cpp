@@ -2,16 +2,15 @@
 // FCL's trees and managers; no bocst overload is in sight here, see pairs/fcl_pair.cpp.
 #include <bocst/fcl_templates.h>
 #include <fcl/broadphase/broadphase_dynamic_AABB_tree.h>
-#include <fcl/geometry/bvh/BVH_model.h>
 #include <fcl/math/bv/OBBRSS.h>
 #include <fcl/narrowphase/collision.h>
 #include <fcl/narrowphase/collision_object.h>
 
 #include <algorithm>
 #include <limits>
-#include <stdexcept>
 
 #include "cli/report.h"
+#include "pairs/fcl_tree.h"
 #include "scene/scene_side.h"
 #include "scene/solids.h"
 
@@ -89,17 +88,7 @@ class Managers {
 template <typename S>
 std::shared_ptr<fcl::CollisionGeometry<S>> geometryOf(const Shape& shape) {
   if (shape.kind != Shape::Kind::kMesh) return solidOf<S>(shape);
-  auto model = std::make_shared<fcl::BVHModel<fcl::OBBRSS<S>>>();
-  std::vector<fcl::Vector3<S>> vertices;
-  vertices.reserve(shape.mesh->vertexCount());
-  for (const Eigen::Vector3d& v : shape.mesh->vertices()) vertices.push_back(v.cast<S>());
-  std::vector<fcl::Triangle> triangles;
-  triangles.reserve(shape.mesh->triangleCount());
-  for (std::size_t t = 0; t < shape.mesh->triangleCount(); ++t) triangles.push_back(shape.mesh->triangle(t));
-  const bool made = model->beginModel() == fcl::BVH_OK && model->addSubModel(vertices, triangles) == fcl::BVH_OK &&
-                    model->endModel() == fcl::BVH_OK;
-  if (!made) throw std::runtime_error("FCL does not accept a mesh");
-  return model;
+  return buildFclTree<fcl::OBBRSS<S>>(MeshArrays(*shape.mesh, Scalar::kDouble));
 }
 
 template <typename S>

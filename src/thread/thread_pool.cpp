@@ -1,21 +1,25 @@
 // SPDX-License-Identifier: BSD-3-Clause
-#include "scene/pool.h"
+#include "thread/thread_pool.h"
 
 #include <system_error>
 #include <utility>
 
-namespace bocst::scene {
+#include "thread/start.h"
 
-Pool::Pool(unsigned threads, std::size_t most) {
+namespace bocst::thread {
+
+ThreadPool::ThreadPool(unsigned threads, std::size_t most) {
   if (threads == 0) threads = std::max(1u, std::thread::hardware_concurrency());
+  const std::size_t all = std::min<std::size_t>(threads, most);
   try {
-    for (std::size_t i = 1; i < std::min<std::size_t>(threads, most); ++i) threads_.emplace_back([this] { wait(); });
+    threads_.reserve(all);  // a thread that has started must have its place
+    while (threads_.size() + 1 < all) threads_.push_back(startWithoutSignals([this] { wait(); }));
   } catch (const std::exception&) {
     // The system has no more, or no memory for them.
   }
 }
 
-Pool::~Pool() {
+ThreadPool::~ThreadPool() {
   if (isForked()) {
     // They stayed in the parent, so they can neither be joined nor be destroyed.
     new std::vector<std::thread>(std::move(threads_));
@@ -29,7 +33,7 @@ Pool::~Pool() {
   for (std::thread& t : threads_) t.join();
 }
 
-void Pool::run(const std::function<void()>& work) {
+void ThreadPool::run(const std::function<void()>& work) {
   if (isForked()) return work();
   const std::unique_lock<std::mutex> mine(busy_, std::try_to_lock);
   if (!mine.owns_lock() || threads_.empty()) return work();
@@ -45,7 +49,7 @@ void Pool::run(const std::function<void()>& work) {
   end_->wait(lock, [this] { return running_ == 0; });
 }
 
-void Pool::wait() {
+void ThreadPool::wait() {
   std::size_t round = 0;
   for (;;) {
     const std::function<void()>* work;
@@ -66,4 +70,4 @@ void Pool::wait() {
   }
 }
 
-}  // namespace bocst::scene
+}  // namespace bocst::thread

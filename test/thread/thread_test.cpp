@@ -1,15 +1,21 @@
 // SPDX-License-Identifier: BSD-3-Clause
-#include "thread/helper_thread.h"
-
 #include <gtest/gtest.h>
+#include <pthread.h>
 #include <signal.h>
 #include <sys/wait.h>
 #include <unistd.h>
 
+#include <atomic>
+#include <cstddef>
 #include <future>
 #include <memory>
+#include <system_error>
 #include <thread>
 #include <vector>
+
+#include "thread/helper_thread.h"
+#include "thread/start.h"
+#include "thread/thread_pool.h"
 
 namespace bocst::thread {
 namespace {
@@ -33,17 +39,41 @@ TEST(HelperThread, CallsJobsInOrderInOneOtherThread) {
   EXPECT_NE(threads[0], std::this_thread::get_id());
 }
 
-TEST(HelperThread, TakesNoSignals) {
-  std::promise<bool> blocked;
-  runInHelperThread([&] {
-    sigset_t mask;
-    pthread_sigmask(SIG_SETMASK, nullptr, &mask);
-    blocked.set_value(sigismember(&mask, SIGINT) == 1 && sigismember(&mask, SIGTERM) == 1);
-  });
-  EXPECT_TRUE(blocked.get_future().get());
+bool takesNoSignals() {
   sigset_t mask;
   pthread_sigmask(SIG_SETMASK, nullptr, &mask);
-  EXPECT_EQ(sigismember(&mask, SIGINT), 0) << "whoever asks keeps theirs";
+  return sigismember(&mask, SIGINT) == 1 && sigismember(&mask, SIGTERM) == 1;
+}
+
+TEST(HelperThread, TakesNoSignals) {
+  std::promise<bool> blocked;
+  runInHelperThread([&] { blocked.set_value(takesNoSignals()); });
+  EXPECT_TRUE(blocked.get_future().get());
+  EXPECT_FALSE(takesNoSignals()) << "the caller still does";
+}
+
+TEST(ThreadPool, ItsThreadsTakeNoSignals) {
+  ThreadPool pool(3);
+  ASSERT_EQ(pool.threads(), 3u);
+  const std::thread::id caller = std::this_thread::get_id();
+  std::atomic<int> blocked{0};
+  pool.run([&] { blocked += std::this_thread::get_id() != caller && takesNoSignals(); });
+  EXPECT_EQ(blocked, 2);
+  EXPECT_FALSE(takesNoSignals()) << "the caller still does";
+}
+
+TEST(StartWithoutSignals, LeavesTheCallersMaskWhenThereIsNoThread) {
+  pthread_attr_t before, huge;
+  ASSERT_EQ(pthread_getattr_default_np(&before), 0);
+  ASSERT_EQ(pthread_attr_init(&huge), 0);
+  ASSERT_EQ(pthread_attr_setstacksize(&huge, std::size_t{1} << 50), 0);
+  ASSERT_EQ(pthread_setattr_default_np(&huge), 0);
+  EXPECT_THROW(startWithoutSignals([] {}), std::system_error);
+  EXPECT_FALSE(takesNoSignals());
+  EXPECT_EQ(ThreadPool(3).threads(), 1u) << "the caller works alone";
+  ASSERT_EQ(pthread_setattr_default_np(&before), 0);
+  pthread_attr_destroy(&huge);
+  pthread_attr_destroy(&before);
 }
 
 // Also while the parent's thread is at work, and has more to do.

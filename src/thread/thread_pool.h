@@ -13,18 +13,18 @@
 
 #include "thread/fork.h"
 
-namespace bocst::scene {
+namespace bocst::thread {
 
 /// Threads that wait for work. One query at a time has them; another that comes meanwhile works alone, as does a child
 /// after fork().
-class Pool {
+class ThreadPool {
  public:
   /// `threads` work, the calling one included, or as many as there are to be had, but no more than `most`; 0: as many
   /// as the machine runs at once.
-  explicit Pool(unsigned threads, std::size_t most = 1024);
-  ~Pool();
-  Pool(const Pool&) = delete;
-  Pool& operator=(const Pool&) = delete;
+  explicit ThreadPool(unsigned threads, std::size_t most = 1024);
+  ~ThreadPool();
+  ThreadPool(const ThreadPool&) = delete;
+  ThreadPool& operator=(const ThreadPool&) = delete;
 
   /// Calls work() here, and beside it on the other threads if they are free; returns when all have returned.
   /// work() throws nothing.
@@ -62,16 +62,16 @@ class Pool {
 
  private:
   void wait();
-  bool isForked() const { return forks_ != thread::forks.load(); }
+  bool isForked() const { return forks_ != forks.load(); }
 
   std::mutex busy_;  // held by who has the threads
   std::mutex mutex_;
-  thread::NeverDestroyed<std::condition_variable> start_, end_;
+  NeverDestroyed<std::condition_variable> start_, end_;
   const std::function<void()>* work_ = nullptr;
   std::size_t round_ = 0, running_ = 0;
   bool stop_ = false;
   std::vector<std::thread> threads_;
-  const unsigned forks_ = thread::forks.load();
+  const unsigned forks_ = forks.load();
 };
 
-}  // namespace bocst::scene
+}  // namespace bocst::thread

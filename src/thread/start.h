@@ -1,0 +1,14 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#pragma once
+
+#include <functional>
+#include <thread>
+
+namespace bocst::thread {
+
+/// Starts a thread that takes no signals: handlers of the application run in threads that the application made.
+/// @throws std::system_error when there is no thread to be had, std::bad_alloc; the caller's signal mask is then as
+/// before, too.
+std::thread startWithoutSignals(std::function<void()> work);
+
+}  // namespace bocst::thread
