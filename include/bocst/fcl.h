@@ -34,9 +34,9 @@ namespace bocst {
 /// the number over all calls with this result. Adds nothing if request.isSatisfied(result) is already true.
 ///
 /// **Order.** The reported contacts and their order depend only on meshes, poses and request, not on the resident
-/// nodes, the clock, the oracle or the thread. Contacts are sorted by a coordinate of the model's triangle (o1's if
-/// both are models): the largest coordinate of its corners along the longest axis of its mesh's bounding box, in the
-/// mesh's frame; then by (b1, b2). Contacts of cells are sorted by the cell's Morton code (o1's if both answer with
+/// nodes, the clock, the oracle or the thread. Contacts are sorted by a key, then by (b1, b2). The key is the largest
+/// coordinate of the model's triangle (o1's if both are models) along the longest axis of its mesh's bounding box, in
+/// the mesh's frame. Contacts of cells are sorted by the cell's Morton code (o1's if both answer with
 /// cells). A request for fewer contacts gets the first of these, in less time. The default request (one contact,
 /// enable_contact false) is a yes-or-no query: its ids are those of any pair that touches.
 ///
@@ -57,7 +57,7 @@ namespace bocst {
 /// primitives as point sets, n is the normal (a unit vector from o1 to o2), and d >= 0 is the penetration_depth:
 ///     P1 and P2 + d n do not overlap: they touch at most.
 /// Between triangles, and between triangles and boxes, spheres, cells, planes and half-spaces, d is the minimum over
-/// all directions; with other shapes it is seldom larger than the minimum. pos is a point in or next to the overlap.
+/// all directions; with other shapes it may be larger than the minimum. pos is a point in or next to the overlap.
 /// All three values describe these two primitives, not the two bodies.
 ///
 /// **Margin** (Options::margin). m is the sum of the margins of both models; other geometries have no margin. A contact

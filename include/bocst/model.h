@@ -133,9 +133,10 @@ class BOCST_EXPORT Model : public fcl::CollisionGeometry<S> {
   /// Calls f for every resident node, parents before children. f must not call back into this model.
   void visit(const std::function<void(const NodeView&)>& f) const;
 
-  /// Applies ttl and memory_budget at the time `now` (paper, 3.1): drops each deepest branch level that was
-  /// last used more than ttl ago. The ttl of its parent starts then. Queries also do this from time to time, if it is
-  /// worth the work; of a completely built tree that is in use they keep the nodes of more than 256 triangles.
+  /// Applies ttl and memory_budget at the time `now` (paper, 3.1). Removes the deepest nodes that were last used more
+  /// than ttl ago; at that moment the ttl of their parents starts anew. So a branch goes level by level. Queries also
+  /// do this from time to time, if it is worth the work; of a completely built tree that is in use they keep the nodes
+  /// of more than 256 triangles.
   void prune(Clock::time_point now);
   void prune();  ///< With the current time.
 

@@ -38,8 +38,9 @@ struct NodeView {
 
   int level = 1;                        ///< 1 is the root.
   std::array<std::uint32_t, 3> cell{};  ///< Integer coordinates among the 2^(level-1) cells of an axis.
-  /// False for a node that exact answers build below a cell: center and radius are those of a box of some triangles,
-  /// level is counted from the cell above, n follows from level, and cell has no meaning.
+  /// False for a node that exact answers build below a cell. Then center and radius are those of a box about some
+  /// triangles; level is that of the cell above it plus its depth below that cell; n follows from level; cell is not
+  /// set.
   bool is_cell = true;
 };
 

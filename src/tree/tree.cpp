@@ -135,9 +135,17 @@ bool Tree::affordsBoxes() const {
   return options_.memory_budget == 0 || BoxTree::bytesOf(surface_.triangle_count) <= options_.memory_budget / 2;
 }
 
+std::size_t Tree::boxPrice() const {
+  constexpr std::size_t kPerTriangle = 4;  // a triangle's share of the build takes as long as so many pairs of leaves
+  if (knownBoxes() != nullptr) return 0;
+  const std::size_t price = kPerTriangle * surface_.triangle_count, paid = box_rent_.load(std::memory_order_relaxed);
+  return price - std::min(price, paid);
+}
+
 void Tree::dropBoxes() {
   boxes_known_.store(nullptr, std::memory_order_relaxed);
   boxes_ = nullptr;
+  box_rent_ = 0;
 }
 
 std::shared_ptr<const Mesh> Tree::mesh() const {

@@ -111,11 +111,17 @@ class Tree {
   const Solid* solid() const { return solid_.get(); }
   /// A point of each connected component of the surface, in the mesh's frame; found when first asked for.
   const std::vector<Eigen::Vector3d>& componentPoints() const;
-  /// Oriented boxes of all triangles, for exact answers of a long and thin surface; built when first asked for, and
-  /// dropped like a branch. @throws std::bad_alloc.
+  /// Oriented boxes of all triangles in double, for exact answers where the boxes of blocks separate too little: they
+  /// are as thin as the surface. Built when first asked for, and dropped like a branch. @throws std::bad_alloc.
   const BoxTree& boxes(std::int64_t now);
+  /// Null unless they are built.
+  const BoxTree* knownBoxes() const { return boxes_known_.load(std::memory_order_acquire); }
   /// They would not take most of the memory budget.
   bool affordsBoxes() const;
+  /// How many pairs of leaves long walks still test before boxes() pays; 0 if it is built.
+  std::size_t boxPrice() const;
+  /// Adds pairs of leaves that a long walk has tested.
+  void payBoxRent(std::size_t pairs) const { box_rent_.fetch_add(pairs, std::memory_order_relaxed); }
 
   /// Marks a block as used now, for ttl and budget.
   void markUsed(std::uint32_t block, std::int64_t now) const {
@@ -288,6 +294,7 @@ class Tree {
   std::unique_ptr<const BoxTree> boxes_;              // made under growth_, dropped alone
   std::atomic<const BoxTree*> boxes_known_{nullptr};  // boxes_, for readers
   std::atomic<std::int64_t> boxes_used_{0};
+  mutable std::atomic<std::size_t> box_rent_{0};  // see payBoxRent()
   bounds::NodeBounds root_bounds_;
   SupportTable supports_;
   // Of a query of what is far apart, all that it reads.

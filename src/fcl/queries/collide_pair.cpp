@@ -501,8 +501,7 @@ bool isOutOfSight(const CollideQuery<S>& q, const SimilarityTransform& b_in_a, d
 }
 
 // Is a surface so long and thin that the float walk's rounding, which is a part of its length, is as wide as it is? The
-// walk in double parts what that one cannot; of two such surfaces, along the axes of oriented boxes. Not with float:
-// FCL may see contacts of its slivers that such boxes part.
+// walk in double parts what that one cannot; of two such surfaces, along the axes of oriented boxes.
 bool isNeedle(const tree::Tree& tree) {
   constexpr float kThin = 0x1p-12f;
   return tree.outline().read([](const tree::Outline::Reader& box) {
@@ -527,14 +526,22 @@ void collideTrees(const CollideQuery<S>& q, const TreeSide& a, const TreeSide& b
     collector.finish();
   };
   const SimilarityTransform near = withMargin(b_in_a, a, q, a.isConservative() || b.isConservative());
+  // Not with float: FCL may see contacts of slivers that oriented boxes separate.
+  constexpr bool kUsesBoxes = std::is_same<S, double>::value;
+  const auto walkBoxes = [&](Collector<S>& collector) {
+    const query::BoxSide boxes_a(a), boxes_b(b);
+    query::PairWalk<query::BoxSide, query::BoxSide>(boxes_a, boxes_b, near, collector).run();
+  };
   if (query::TreeWalk::fits(a, b, near) && !isNeedle(tree_a) && !isNeedle(tree_b)) {
     query::TreeWalk trees(a, b, near);
-    if (!trees.isNeedless()) walk([&](auto& collector) { trees.run(collector); });
-  } else if (std::is_same<S, double>::value && isNeedle(tree_a) && isNeedle(tree_b) && query::BoxSide::fits(a, b)) {
-    const query::BoxSide boxes_a(a), boxes_b(b);
-    walk([&](auto& collector) {
-      query::PairWalk<query::BoxSide, query::BoxSide>(boxes_a, boxes_b, near, collector).run();
-    });
+    if (!trees.isNeedless() && !(kUsesBoxes && query::knownBoxesApart(a, b, near))) {
+      walk([&](auto& collector) {
+        trees.run(collector, kUsesBoxes);
+        if (trees.gaveUp()) walkBoxes(collector);
+      });
+    }
+  } else if (kUsesBoxes && isNeedle(tree_a) && isNeedle(tree_b) && query::BoxSide::fits(a, b)) {
+    walk(walkBoxes);
   } else if (query::SphereWalk::fits(a, b)) {
     query::SphereWalk spheres(a, b, near);
     if (!spheres.isNeedless()) walk([&](auto& collector) { spheres.run(collector); });

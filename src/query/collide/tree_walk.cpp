@@ -1,7 +1,19 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #include "query/collide/tree_walk.h"
 
+#include <algorithm>
+
+#include "query/sides/box_side.h"
+
 namespace bocst::query {
+namespace {
+
+// One walk in ten thousand of scans and robots' links tests more pairs of leaves without a hit.
+constexpr std::size_t kManyLeafPairs = 128;
+// The exact test of two triangles that float cannot tell apart takes as long as so many pairs of leaves.
+constexpr std::size_t kExactTest = 8;
+
+}  // namespace
 
 struct TreeWalk::Scratch {
   std::vector<StepGroup> stack;
@@ -13,8 +25,15 @@ struct TreeWalk::Scratch {
   LargeTriangleLeaf<TreeSide> long_a, long_b;  // leaves of more triangles than those hold
 };
 
-bool TreeWalk::run(Visitor& visitor) {
+// Oriented boxes are built when walks have paid for them, as whole trees are: then all walks together take at most some
+// times what the boxes would have.
+std::size_t TreeWalk::mostLeafPairs() const {
+  return std::max(kManyLeafPairs, a_.tree().boxPrice() + b_.tree().boxPrice());
+}
+
+bool TreeWalk::run(Visitor& visitor, bool may_give_up) {
   visitor_ = &visitor;
+  if (may_give_up && visitor.endsAtFirst() && BoxSide::fits(a_, b_)) most_leaf_pairs_ = mostLeafPairs();
   thread_local Scratch s;
   s.deferred.clear();
   s.leaves_started = false;
@@ -23,7 +42,11 @@ bool TreeWalk::run(Visitor& visitor) {
   s.long_b.clear();
   // Each walk in a tree that is not whole brings the query nearer that builds it whole: see Tree::payRent().
   for (const TreeSide* side : {&a_, &b_}) side->tree().payRent(tree::Tree::kWalkRent);
-  return search(s);
+  const bool ended = search(s);
+  if (leaf_pairs_ > kManyLeafPairs) {
+    for (const TreeSide* side : {&a_, &b_}) side->tree().payBoxRent(leaf_pairs_ - kManyLeafPairs);
+  }
+  return ended;
 }
 
 bool TreeWalk::search(Scratch& s) {
@@ -49,6 +72,7 @@ bool TreeWalk::search(Scratch& s) {
   push({a_.root(), b_.root()});
   for (;;) {
     if (stepAll(steps, s)) return true;
+    if (gave_up_) return false;
     if (cut != nullptr) {
       s.deferred.dropIf([&](const auto& pair) { return cut->isBeyond(cut->leastOf(a_.volume(pair.a))); });
     }
@@ -69,8 +93,12 @@ bool TreeWalk::stepAll(PairSteps& steps, Scratch& s) {
         break;
       case StepEvent::kLargeTriangles:
         testLargeTriangles(steps, event, s);
+        ++leaf_pairs_;
         break;
       case StepEvent::kLeaves:
+        gave_up_ = leaf_pairs_ > most_leaf_pairs_;
+        if (gave_up_) return false;
+        ++leaf_pairs_;
         if (testLeaves(event, s)) return true;
         if (steps.isCut()) steps.setCut(*visitor_->cut());
         break;
@@ -101,6 +129,7 @@ bool TreeWalk::testLeaves(const StepEvent& event, Scratch& s) {
     s.leaves_started = true;
   }
   const auto visit = [this](std::uint32_t t, std::uint32_t u, bool certain) {
+    if (!certain) leaf_pairs_ += kExactTest;
     return visitor_->triangles(t, u, certain);
   };
   const tree::NodeRef a = event.pair[0].node, b = event.pair[1].node;

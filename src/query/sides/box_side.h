@@ -11,7 +11,7 @@
 namespace bocst::query {
 
 /// A model's oriented boxes as a side of a walk, in the frame of its TreeSide, which must outlive this: for exact
-/// answers of what is long and thin.
+/// answers of what is long and thin, and where TreeWalk gives up.
 class BoxSide {
  public:
   using Node = int;
@@ -70,5 +70,12 @@ class BoxSide {
   const TreeSide& side_;
   const std::vector<tree::BoxTree::Node>& nodes_;
 };
+
+/// Do two models have oriented boxes, of which the roots' are apart?
+inline bool knownBoxesApart(const TreeSide& a, const TreeSide& b, const SimilarityTransform& b_in_a) {
+  if (a.tree().knownBoxes() == nullptr || b.tree().knownBoxes() == nullptr) return false;
+  const BoxSide boxes_a(a), boxes_b(b);
+  return boxesApart(boxes_a.volume(0), boxes_b.volume(0), b_in_a);
+}
 
 }  // namespace bocst::query

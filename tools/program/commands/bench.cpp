@@ -147,9 +147,10 @@ void addBench(CLI::App& program, Job& job) {
       "A ratio above 1 means that bocst is better. For times and memory it is FCL's value divided by bocst's. The "
       "meshes touch in about two of three poses.\n"
       "first: two new models and one query, from vertex and index arrays; FCL copies the arrays, bocst moves them "
-      "in. The streaming pass reads both meshes once: it adds up all vertices through the index arrays.\n"
+      "in. The streaming pass reads both meshes once, which is the least that any method must do: it adds up all "
+      "vertices through the index arrays.\n"
       "fresh: each pose is queried once, in turns of 50 poses with bocst and with FCL. FCL's trees are built before; "
-      "the totals include their build time. Use 20000 poses to see all windows.\n"
+      "the totals include their build time. 20000 poses fill four of the five windows.\n"
       "cliffs: difficult meshes that the program makes itself: rods, needles, equal triangles, fans and specks. The "
       "files do not matter.\n"
       "warm, contacts, distance: the poses are queried until the trees grow no more, and once more before each turn. "
@@ -162,10 +163,11 @@ void addBench(CLI::App& program, Job& job) {
       "one thread divided by the time with two threads.\n"
       "planner: an arm with seven joints and a hand, with links of 200 and of 20000 triangles, among shelves and "
       "three copies of each mesh, in FCL's DynamicAABBTreeCollisionManager. As many random states as poses are "
-      "checked, and as many states of edges. fresh: first query of a state; again: second query. Pairs are those "
+      "checked, and as many states of edges. fresh: first query of a state; again: second query of the same. Pairs are those "
       "that pass the broad phase; they are measured one by one after the trees have settled.\n"
       "growth: A against itself, without FCL. Ratios compare with the first size: growth of the triangle count "
-      "(first answer) or of its logarithm (warm query), divided by the growth of the time.");
+      "(first answer) or of its logarithm (warm query), divided by the growth of the time; above 1, the time grows "
+      "more slowly.");
   command->add_option("a", bench->request.file_a, std::string("A: ") + kMeshFile)->required();
   command->add_option("b", bench->request.file_b, "B: mesh file; default: A");
   command->add_option("--scenarios", bench->scenarios, "scenarios to measure")

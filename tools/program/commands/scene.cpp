@@ -374,10 +374,11 @@ void addScene(CLI::App& program, Job& job) {
       "States are the lines of a table (CSV). Its first line names the columns: each movable joint that does not\n"
       "mimic another, and for each moving object NAME.x, .y, .z with .qw, .qx, .qy, .qz or .roll, .pitch, .yaw.\n"
       "Without states, joints are at 0.\n"
-      "All links are checked with each other and with all objects, except for pairs that may touch.");
+      "All links and moving objects are checked with each other and with the fixed objects, except for pairs that\n"
+      "may touch.");
   command->add_option("file", scene->scene.file, "scene file (JSON) or robot (URDF)")->type_name("FILE")->required();
   command->add_option("--states", scene->scene.states, "states to check, one per line (CSV)")->type_name("FILE");
-  command->add_option("--srdf", scene->scene.srdf, "pairs of links that may touch (SRDF's disable_collisions)")
+  command->add_option("--srdf", scene->scene.srdf, "SRDF file; its disable_collisions are pairs of links that may touch")
       ->type_name("FILE");
   command
       ->add_option(
@@ -388,14 +389,15 @@ void addScene(CLI::App& program, Job& job) {
   command
       ->add_option(
           "--adjacent", scene->adjacent,
-          "pairs of links that a joint connects. srdf: as the SRDF says (without an SRDF: ignore); ignore; check")
+          "links that a joint connects: srdf = as the SRDF says (without one: ignore), ignore = they may touch, "
+          "check = they are checked")
       ->check(CLI::IsMember({"srdf", "ignore", "check"}))
       ->capture_default_str();
   command->add_flag("--clearance", scene->clearance,
                     "report also the least distance in each state and the pair that has it");
   command
       ->add_option("--margin", scene->margin,
-                   "surfaces of meshes at a distance of at most this collide; between two meshes, twice this counts")
+                   "margin of each mesh, in its unit: surfaces that are at most this far apart collide (two meshes: twice this)")
       ->check(notNegative())
       ->capture_default_str();
   command->add_flag("--no-fcl", scene->no_fcl, "do not compare with FCL");

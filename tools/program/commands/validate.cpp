@@ -211,8 +211,8 @@ void addValidate(CLI::App& program, Job& job) {
   auto validate = std::make_shared<Validate>();
   CLI::App* command = program.add_subcommand("validate", "compare answers with FCL's on many poses around contact");
   command->footer(
-      "Of eight poses, six are at 1e-9 to 1e-1 of the smaller mesh's radius from the pose of contact, on both\n"
-      "sides; two are at random distances.\n"
+      "Of each eight poses, six are 1e-9 to 1e-1 of the smaller mesh's radius before or after the first contact;\n"
+      "two are at random distances.\n"
       "Each pose is checked in both argument orders, by bocst and by FCL. A mismatch is a false negative; with\n"
       "exact answers also a false positive or a different set of contacts; with conservative answers also a verdict\n"
       "that depends on the argument order.\n"
