@@ -536,8 +536,11 @@ void collideTrees(const CollideQuery<S>& q, const TreeSide& a, const TreeSide& b
     query::TreeWalk trees(a, b, near);
     if (!trees.isNeedless() && !(kUsesBoxes && query::knownBoxesApart(a, b, near))) {
       walk([&](auto& collector) {
-        trees.run(collector, kUsesBoxes);
-        if (trees.gaveUp()) walkBoxes(collector);
+        if (kUsesBoxes && collector.endsAtFirst()) {
+          trees.runByTurns(collector);
+        } else {
+          trees.run(collector);
+        }
       });
     }
   } else if (kUsesBoxes && isNeedle(tree_a) && isNeedle(tree_b) && query::BoxSide::fits(a, b)) {

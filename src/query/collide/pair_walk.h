@@ -42,8 +42,8 @@ class PairWalk {
     if constexpr (!B::kBodies) BOCST_ASSERT(!a.isConservative() || !b.isConservative());
   }
 
-  /// True when the visitor ended it.
-  bool run() {
+  /// True when the visitor ended it. After `most_steps` pairs of nodes it gives up.
+  bool run(std::size_t most_steps = ~std::size_t{0}) {
     Scratch& s = scratch();
     s.stack.clear();
     s.ordered.clear();
@@ -58,6 +58,10 @@ class PairWalk {
       Pair pair;
       while (cut_ != nullptr ? popFirst(s, pair) : popLast(s, pair)) {
         if (spheres_ ? stepSpheres(pair, s) : stepBoxes(pair, s)) return true;
+        if (--most_steps == 0) {
+          gave_up_ = true;
+          return false;
+        }
       }
       if (cut_ != nullptr) s.deferred.dropIf([this](const Pair& p) { return isBeyond(placeOf(p)); });
       if (s.deferred.empty()) return false;
@@ -66,6 +70,9 @@ class PairWalk {
       seen_a_.valid = seen_b_.valid = leaf_known_ = false;
     }
   }
+
+  /// Did the walk end before it had seen all pairs?
+  bool gaveUp() const { return gave_up_; }
 
  private:
   using Pair = typename DeferredPairs<A, B>::Pair;
@@ -362,6 +369,7 @@ class PairWalk {
   V& visitor_;
   const bool spheres_;
   const Cut* const cut_;
+  bool gave_up_ = false;
 };
 
 }  // namespace bocst::query

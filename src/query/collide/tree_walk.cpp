@@ -3,6 +3,7 @@
 
 #include <algorithm>
 
+#include "query/collide/pair_walk.h"
 #include "query/sides/box_side.h"
 
 namespace bocst::query {
@@ -25,15 +26,31 @@ struct TreeWalk::Scratch {
   LargeTriangleLeaf<TreeSide> long_a, long_b;  // leaves of more triangles than those hold
 };
 
-// Oriented boxes are built when walks have paid for them, as whole trees are: then all walks together take at most some
-// times what the boxes would have.
-std::size_t TreeWalk::mostLeafPairs() const {
-  return std::max(kManyLeafPairs, a_.tree().boxPrice() + b_.tree().boxPrice());
+bool TreeWalk::runByTurns(Visitor& visitor) {
+  if (!BoxSide::fits(a_, b_)) return run(visitor);
+  // The boxes are built when walks have paid for them, as whole trees are. Each turn may take longer than the one
+  // before, so all take at most some times what the quicker of both ways takes. A step over boxes takes about as long
+  // as a pair of leaves.
+  constexpr std::size_t kLonger = 16;
+  const std::size_t price = a_.tree().boxPrice() + b_.tree().boxPrice();
+  for (std::size_t most = std::max(kManyLeafPairs, price);; most *= kLonger) {
+    const bool ended = run(visitor, most);
+    if (leaf_pairs_ > kManyLeafPairs) {
+      for (const TreeSide* side : {&a_, &b_}) side->tree().payBoxRent(leaf_pairs_ - kManyLeafPairs);
+    }
+    if (!gave_up_) return ended;
+    const BoxSide boxes_a(a_), boxes_b(b_);
+    PairWalk<BoxSide, BoxSide> boxes(boxes_a, boxes_b, b_in_a_, visitor);
+    if (boxes.run(most)) return true;
+    if (!boxes.gaveUp()) return false;
+  }
 }
 
-bool TreeWalk::run(Visitor& visitor, bool may_give_up) {
+bool TreeWalk::run(Visitor& visitor, std::size_t most_leaf_pairs) {
   visitor_ = &visitor;
-  if (may_give_up && visitor.endsAtFirst() && BoxSide::fits(a_, b_)) most_leaf_pairs_ = mostLeafPairs();
+  leaf_pairs_ = 0;
+  most_leaf_pairs_ = most_leaf_pairs;
+  gave_up_ = false;
   thread_local Scratch s;
   s.deferred.clear();
   s.leaves_started = false;
@@ -42,11 +59,7 @@ bool TreeWalk::run(Visitor& visitor, bool may_give_up) {
   s.long_b.clear();
   // Each walk in a tree that is not whole brings the query nearer that builds it whole: see Tree::payRent().
   for (const TreeSide* side : {&a_, &b_}) side->tree().payRent(tree::Tree::kWalkRent);
-  const bool ended = search(s);
-  if (leaf_pairs_ > kManyLeafPairs) {
-    for (const TreeSide* side : {&a_, &b_}) side->tree().payBoxRent(leaf_pairs_ - kManyLeafPairs);
-  }
-  return ended;
+  return search(s);
 }
 
 bool TreeWalk::search(Scratch& s) {

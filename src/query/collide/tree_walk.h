@@ -25,13 +25,13 @@ class TreeWalk {
   /// Are the two surely apart by their supports, so that no walk is needed? Costs little; to be asked before run().
   bool isNeedless() { return areSeparate(a_.tree().supports(), b_.tree().supports(), b_in_a_, is_shallow_); }
 
-  /// True when the visitor ended it. `may_give_up`: a walk that looks for one hit may end without having seen all, see
-  /// gaveUp().
-  bool run(Visitor& visitor, bool may_give_up = false);
+  /// True when the visitor ended it.
+  bool run(Visitor& visitor) { return run(visitor, ~std::size_t{0}); }
 
-  /// Did the walk end too early to tell? Volumes in float separate too little here, for example two flat faces with
-  /// little space between them; a walk over BoxSide takes less time.
-  bool gaveUp() const { return gave_up_; }
+  /// The same of a yes-or-no query, in turns with a walk over BoxSide where it gets long. Volumes in float separate
+  /// little between two flat faces with little space between them, where oriented boxes in double separate the faces as
+  /// a whole; in other places the float walk is quicker.
+  bool runByTurns(Visitor& visitor);
 
  private:
   struct Scratch;
@@ -41,7 +41,7 @@ class TreeWalk {
   void testLargeTriangles(PairSteps& steps, const StepEvent& event, Scratch& s);
   bool testLeaves(const StepEvent& event, Scratch& s);
   const SimilarityTransform& aInB();
-  std::size_t mostLeafPairs() const;
+  bool run(Visitor& visitor, std::size_t most_leaf_pairs);
 
   const TreeSide &a_, &b_;
   const SimilarityTransform& b_in_a_;
@@ -49,8 +49,8 @@ class TreeWalk {
   bool inverted_ = false;
   bool is_shallow_ = false;  // see areSeparate()
   Visitor* visitor_ = nullptr;
-  std::size_t leaf_pairs_ = 0, most_leaf_pairs_ = ~std::size_t{0};
-  bool gave_up_ = false;
+  std::size_t leaf_pairs_, most_leaf_pairs_;
+  bool gave_up_;  // after more than most_leaf_pairs_
 };
 
 }  // namespace bocst::query
