@@ -75,11 +75,15 @@ bool anyDirectionApart(const NodeExtent& a, const NodeExtent& b, const F& f) {
   return false;
 }
 
-/// No point of a is nearer to any of b than this, up to a part of 1e-12 of the sizes, which is taken off. `guess` is a
+/// What computing in double may be off by, as a share of the distance and of all half extents; twice over is enough for
+/// the boxes of a BoxTree, which are 2^-30 lattice units larger.
+constexpr double kExtentRounding = 1e-13;
+
+/// No point of a is nearer to any of b than this, up to kExtentRounding of the sizes, which is taken off. `guess` is a
 /// direction in which the bound is likely to be good, or zero; a bound of `cutoff` or more is not made better.
 inline double distanceBound(const NodeExtent& a, const NodeExtent& b, const Eigen::Vector3d& guess, double cutoff) {
   const Eigen::Vector3d t = b.center - a.center;
-  const double apart = t.norm(), rounding_margin = 1e-12 * (apart + a.half.sum() + b.half.sum());
+  const double apart = t.norm(), rounding_margin = kExtentRounding * (apart + a.half.sum() + b.half.sum());
   double best = 0;
   const auto reachesCutoff = [&](const Eigen::Vector3d& direction) {
     double lo_a, hi_a, lo_b, hi_b;

@@ -158,8 +158,15 @@ bool searchFar(const DistanceQuery<S>& q, const Distant& a, const query::ConvexS
 template <typename S, typename B>
 void search(const DistanceQuery<S>& q, const TreeSide& a, const B& b, const SimilarityTransform& b_in_a) {
   const lattice::Lattice& lattice = a.tree().surface().lattice;
-  query::DistanceWalk<TreeSide, B> walk(a, b, b_in_a);
-  report(q, walk.run(goalOf(q, lattice.unit())), lattice.origin(), lattice.unit());
+  const query::DistanceGoal goal = goalOf(q, lattice.unit());
+  const query::Nearest nearest = [&] {
+    if constexpr (std::is_same<B, TreeSide>::value) {
+      return query::findNearest(a, b, b_in_a, goal);
+    } else {
+      return query::DistanceWalk<TreeSide, B>(a, b, b_in_a).run(goal);
+    }
+  }();
+  report(q, nearest, lattice.origin(), lattice.unit());
 }
 
 /// What is inside a solid is not apart from it. There are no points where they touch: the points are those where the

@@ -15,6 +15,7 @@
 #include "geometry/triangle.h"
 #include "query/distance/best_first.h"
 #include "query/distance/tree_gaps.h"
+#include "query/sides/box_side.h"
 #include "query/sides/side.h"
 
 namespace bocst::query {
@@ -44,13 +45,25 @@ class DistanceWalk : private BestFirst<DistanceWalk<A, B>, A, B> {
     }
   }
 
-  Nearest run(const DistanceGoal& goal) {
+  /// `known`: an answer in hand. After `most_steps` it gives up.
+  Nearest run(const DistanceGoal& goal, const Nearest& known = {}, std::size_t most_steps = ~std::size_t{0}) {
     goal_ = goal;
     limit_ = goal.below;
+    steps_ = 0;
+    most_steps_ = most_steps;
+    if (!B::kBodies && !spheres()) {
+      const NodeExtent root_a = extentOfA(a_.root()), root_b = extentOfB(b_.root());
+      tie_ = 4 * kExtentRounding * ((root_b.center - root_a.center).norm() + root_a.half.sum() + root_b.half.sum());
+    }
+    found(known);
     if (gaps_.has_value()) descendGreedily();
     if (!settled()) this->search();
     return best_;
   }
+
+  /// Did the walk end before it was sure? Then run() has returned the nearest so far.
+  bool gaveUp() const { return steps_ > most_steps_; }
+  std::size_t steps() const { return steps_; }
 
  private:
   using Base = BestFirst<DistanceWalk<A, B>, A, B>;
@@ -69,12 +82,14 @@ class DistanceWalk : private BestFirst<DistanceWalk<A, B>, A, B> {
     return s;
   }
 
-  // What is at this distance or beyond does not improve the answer by more than the caller lets go.
+  // What is at this distance or beyond does not improve the answer by more than rounding, or than the caller lets go.
+  // Where many pairs are equally near (faces that are parallel, triangles about a tip), none but the first is computed.
   double cutoff() const {
-    return std::min(limit_, std::max(best_.distance - goal_.absolute, best_.distance / (1 + goal_.relative)));
+    const double needed = std::max(best_.distance - goal_.absolute, best_.distance / (1 + goal_.relative));
+    return std::min(limit_, needed - std::min(tie_, kTieShare * needed));
   }
   bool worthIt(double bound) const { return bound < cutoff(); }
-  bool settled() const { return !(limit_ > 0); }
+  bool settled() const { return !(limit_ > 0) || gaveUp(); }
   // A body may be much smaller than its box: pairs that pass the box's bound are bounded once more, by the body itself.
   bool again(const Pair& pair) {
     if constexpr (B::kBodies) {
@@ -185,6 +200,7 @@ class DistanceWalk : private BestFirst<DistanceWalk<A, B>, A, B> {
   }
 
   void leaves(const Pair& pair) {
+    ++steps_;
     if constexpr (B::kBodies) {
       leafBody(pair);
     } else {
@@ -279,6 +295,12 @@ class DistanceWalk : private BestFirst<DistanceWalk<A, B>, A, B> {
   }
 
   void triangles(std::uint32_t t, const Corners& in_a, std::uint32_t u, const Corners& of_b) {
+    ++steps_;
+    const auto along = [this](const Corners& c) {
+      return Eigen::Vector3d(direction_.dot(c[0]), direction_.dot(c[1]), direction_.dot(c[2]));
+    };
+    if (along(of_b).minCoeff() - along(in_a).maxCoeff() >= cutoff()) return;
+    steps_ += kExactTest;
     Nearest n;
     n.a = t;
     n.b = u;
@@ -329,14 +351,42 @@ class DistanceWalk : private BestFirst<DistanceWalk<A, B>, A, B> {
     found(n);
   }
 
+  static constexpr double kTieShare = 1e-3;     // of a distance: what is next to nothing is found as exactly as before
+  static constexpr std::size_t kExactTest = 2;  // steps in the time that the distance of two triangles takes
+
   const SimilarityTransform& b_in_a_;
   const SimilarityTransform a_in_b_;
   std::optional<TreeGaps> gaps_;  // of two trees with exact answers
   DistanceGoal goal_;
   Nearest best_;
   double limit_ = 0;  // something at least this near exists, or nobody asks for more
+  double tie_ = 0;    // what is nearer by no more is as near
+  std::size_t steps_ = 0, most_steps_ = 0;
   Eigen::Vector3d direction_ =
       Eigen::Vector3d::Zero();  // from side A to side B where they are nearest so far, unit length
 };
+
+/// The nearest triangles of two trees with exact answers. Float bounds tell little apart where many pairs are about as
+/// near, for example on two parallel faces, where oriented boxes in double tell all apart; in other places the walk
+/// with float bounds is quicker. So they take turns, as in TreeWalk::runByTurns().
+inline Nearest findNearest(const TreeSide& a, const TreeSide& b, const SimilarityTransform& b_in_a,
+                           const DistanceGoal& goal) {
+  constexpr std::size_t kFew = 128, kMany = 1024, kLonger = 16;
+  DistanceWalk<TreeSide, TreeSide> trees(a, b, b_in_a);
+  if (!BoxSide::fits(a, b)) return trees.run(goal);
+  const std::size_t price = a.tree().boxPrice() + b.tree().boxPrice();
+  Nearest nearest;
+  for (std::size_t most = price == 0 ? kFew : std::max(kMany, price);; most *= kLonger) {
+    nearest = trees.run(goal, nearest, most);
+    if (trees.steps() > kMany) {
+      for (const TreeSide* side : {&a, &b}) side->tree().payBoxRent(trees.steps() - kMany);
+    }
+    if (!trees.gaveUp()) return nearest;
+    const BoxSide boxes_a(a), boxes_b(b);
+    DistanceWalk<BoxSide, BoxSide> boxes(boxes_a, boxes_b, b_in_a);
+    nearest = boxes.run(goal, nearest, most);
+    if (!boxes.gaveUp()) return nearest;
+  }
+}
 
 }  // namespace bocst::query
