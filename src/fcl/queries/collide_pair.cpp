@@ -481,12 +481,13 @@ class Collector : public query::Visitor {
 };
 
 /// What is within the margin touches: the walk's tolerance, in units of side A, is so much more. Positions may be off
-/// by the tolerance before.
+/// by the tolerance before. `culling_margin`: the margin, or what CollideQuery::cullingMargin() has for slabs.
 template <typename S>
-SimilarityTransform withMargin(SimilarityTransform b_in_a, const TreeSide& a, const CollideQuery<S>& q, bool spheres) {
+SimilarityTransform withMargin(SimilarityTransform b_in_a, const TreeSide& a, const CollideQuery<S>& q,
+                               double culling_margin) {
   const double per_unit = 1 / a.tree().surface().lattice.unit();
   b_in_a.margin = std::max(q.margin * per_unit - b_in_a.tolerance, 0.0);
-  b_in_a.tolerance += q.cullingMargin(spheres) * per_unit;
+  b_in_a.tolerance += culling_margin * per_unit;
   return b_in_a;
 }
 
@@ -525,7 +526,8 @@ void collideTrees(const CollideQuery<S>& q, const TreeSide& a, const TreeSide& b
     with_collector(collector);
     collector.finish();
   };
-  const SimilarityTransform near = withMargin(b_in_a, a, q, a.isConservative() || b.isConservative());
+  // TreeWalk widens slabs by itself; oriented boxes and spheres need no more than the margin.
+  const SimilarityTransform near = withMargin(b_in_a, a, q, q.margin);
   // Not with float: FCL may see contacts of slivers that oriented boxes separate.
   constexpr bool kUsesBoxes = std::is_same<S, double>::value;
   const auto walkBoxes = [&](Collector<S>& collector) {
@@ -549,7 +551,9 @@ void collideTrees(const CollideQuery<S>& q, const TreeSide& a, const TreeSide& b
     query::SphereWalk spheres(a, b, near);
     if (!spheres.isNeedless()) walk([&](auto& collector) { spheres.run(collector); });
   } else {
-    walk([&](auto& collector) { query::PairWalk<TreeSide, TreeSide>(a, b, near, collector).run(); });
+    const bool spheres = a.isConservative() || b.isConservative();
+    const SimilarityTransform wide = withMargin(b_in_a, a, q, q.cullingMargin(spheres));
+    walk([&](auto& collector) { query::PairWalk<TreeSide, TreeSide>(a, b, wide, collector).run(); });
   }
   if (q.mayBeInside(before) && (contains<S>(tree_a, q.X_WA(), tree_b, q.X_WB(), magnitude) ||
                                 contains<S>(tree_b, q.X_WB(), tree_a, q.X_WA(), magnitude))) {
@@ -568,7 +572,8 @@ void collideBvh(const CollideQuery<S>& q, tree::Tree& tree, const BvhSide& b) {
   const Triangles<S> of_model(tree), of_partner(b);
   Collector<S> collector(q, tree, q.swapped ? of_partner : of_model, q.swapped ? of_model : of_partner, magnitude);
   collector.setFrame(surface.lattice.origin(), surface.lattice.unit());
-  query::PairWalk<TreeSide, BvhSide>(a, b, withMargin(b_in_a, a, q, a.isConservative()), collector).run();
+  query::PairWalk<TreeSide, BvhSide>(a, b, withMargin(b_in_a, a, q, q.cullingMargin(a.isConservative())), collector)
+      .run();
   collector.finish();
   if (q.mayBeInside(before) && contains<S>(tree, q.X_WA(), b, q.X_WB(), magnitude)) addInside(q, a, b, b_in_a);
 }
