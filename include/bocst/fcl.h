@@ -31,7 +31,8 @@ namespace bocst {
 
 /// Checks whether two geometries collide at the poses X_W1 and X_W2 (world from geometry). Same interface as
 /// fcl::collide: adds contacts to the result until it has request.num_max_contacts, and returns result.numContacts(),
-/// the number over all calls with this result. Adds nothing if request.isSatisfied(result) is already true.
+/// the number over all calls with this result (0 if num_max_contacts is 0). Adds nothing if
+/// request.isSatisfied(result) is already true.
 ///
 /// **Order.** The reported contacts and their order depend only on meshes, poses and request, not on the resident
 /// nodes, the clock, the oracle or the thread. Contacts are sorted by a key, then by (b1, b2). The key is the largest
@@ -111,10 +112,10 @@ BOCST_EXPORT std::size_t collide(const fcl::CollisionGeometry<S>* o1, const fcl:
 ///   nearest points at its pos, as in FCL for meshes. This describes two primitives, not two bodies. For a geometry
 ///   inside a solid it is minus the distance between the surfaces (the depth of collide()'s contact without margin).
 /// The error of the answer is below 1e-11 of the geometries' sizes (1e-8 with ellipsoids, cones and cylinders), plus
-/// rounding to S. The answer does not depend on the solver or on the resident nodes.
-/// @throws std::invalid_argument as collide(), if result.min_distance is NaN before the call, and for a Plane or
-/// Halfspace if neither geometry is a Model.
-/// Thread rule: as collide().
+/// rounding to S. The answer does not depend on the solver, and on the resident nodes only within that error.
+/// @throws std::invalid_argument as collide(), if result.min_distance is NaN before the call, and if neither geometry
+/// is a Model, for a Plane, a Halfspace, an Ellipsoid with a radius of 0 and an OcTree without cells. Thread rule: as
+/// collide().
 template <typename S>
 BOCST_EXPORT S distance(const fcl::CollisionGeometry<S>* o1, const fcl::Transform3<S>& X_W1,
                         const fcl::CollisionGeometry<S>* o2, const fcl::Transform3<S>& X_W2,

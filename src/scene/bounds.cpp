@@ -9,6 +9,7 @@
 #include <Eigen/Eigenvalues>
 #include <cmath>
 #include <limits>
+#include <shared_mutex>
 
 #include "fcl/adapters/models.h"
 #include "fcl/adapters/pair.h"
@@ -72,7 +73,9 @@ Bounds aligned(const fcl::AABB<S>& box) {
 template <typename S>
 Bounds boundsOfModel(const Model<S>& model) {
   const tree::Tree& tree = fcl_adapter::treeOf(model);
-  const std::shared_ptr<const Mesh> mesh = model.mesh();
+  // Other threads may change the vertices meanwhile.
+  const std::shared_lock<thread::ShardedLock> lock(tree.queryLock());
+  const std::shared_ptr<const Mesh>& mesh = tree.surface().mesh;
   Bounds b;
   if (mesh != nullptr) {
     const Eigen::AlignedBox3d box = mesh->bounds();
@@ -83,7 +86,7 @@ Bounds boundsOfModel(const Model<S>& model) {
       }
     });
   } else {
-    const Eigen::AlignedBox3d box = tree.bounds();
+    const Eigen::AlignedBox3d& box = tree.surface().bounds;
     b.center = box.center();
     b.half = box.sizes() / 2;
   }
@@ -148,6 +151,7 @@ Bounds boundsOf(fcl::CollisionGeometry<S>& geometry) {
     b.reach = kSolverReach * (1 + b.half.norm());
 #endif
   } else {
+    fcl_adapter::bvhSideOf<S>("Scene", &geometry);  // throws unless it is a finished mesh
     fcl_adapter::withBvh<S>("Scene", &geometry, [&](const auto& bvh) {
       b = fit([&](auto&& f) {
         for (int t = 0; t < bvh.num_tris; ++t) {

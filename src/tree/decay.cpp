@@ -163,9 +163,8 @@ void Tree::keepOnly(const std::vector<std::uint8_t>& keep) {
 
 void Tree::pruneAlone(std::int64_t now, Pruning pruning) {
   const bool budget_only = pruning == Pruning::kBudget;
-  const std::int64_t ttl = std::chrono::duration_cast<std::chrono::nanoseconds>(options_.ttl).count();
-  const auto is_old = [&](std::uint32_t block) { return now - last_use_[block].load(std::memory_order_relaxed) > ttl; };
-  if (!budget_only && ttl > 0 && root_.load(std::memory_order_relaxed).tag() == ChildRef::kBlock) {
+  const auto is_old = [&](std::uint32_t block) { return isOld(last_use_[block].load(std::memory_order_relaxed), now); };
+  if (!budget_only && ttl_ > 0 && root_.load(std::memory_order_relaxed).tag() == ChildRef::kBlock) {
     const bool is_used = pruning == Pruning::kWorthwhile && !is_old(root_.load(std::memory_order_relaxed).index());
     // What stays is copied, so for few blocks a query of a large tree would pay much.
     const std::uint32_t least = pruning == Pruning::kWorthwhile ? std::max(1u, blocks_.size() / kWorthwhileShare) : 1;
@@ -196,12 +195,12 @@ void Tree::pruneAlone(std::int64_t now, Pruning pruning) {
       keepOnly(keep);
     }
   }
-  if (!budget_only && ttl > 0 && boxes_ != nullptr && now - boxes_used_.load(std::memory_order_relaxed) > ttl) {
+  if (!budget_only && boxes_ != nullptr && isOld(boxes_used_.load(std::memory_order_relaxed), now)) {
     dropBoxes();
     countBytes();
   }
   const bool is_at_rest = root_.load(std::memory_order_relaxed).tag() != ChildRef::kBlock && boxes_ == nullptr;
-  if (!budget_only && ttl > 0 && is_at_rest && now - recall_time_ > ttl) forgetMesh();
+  if (!budget_only && is_at_rest && isOld(recall_time_, now)) forgetMesh();
   applyBudget();
 }
 
@@ -237,8 +236,8 @@ void Tree::afterQuery(std::int64_t now) {
   bool time_to = isPruneDue(now);
   if (time_to) {
     // A quarter of ttl between looks keeps the cost away from queries; whoever moves the time does the work.
-    const std::int64_t step = std::chrono::duration_cast<std::chrono::nanoseconds>(options_.ttl).count() / 4 + 1;
-    time_to = next_prune_.compare_exchange_strong(due, now + step, std::memory_order_relaxed);
+    const std::int64_t step = ttl_ / 4 + 1, next = now > kNeverDue - step ? kNeverDue : now + step;
+    time_to = next_prune_.compare_exchange_strong(due, next, std::memory_order_relaxed);
   }
   if (!refits && !over_budget && !time_to) return;
   const std::unique_lock<thread::ShardedLock> alone(query_lock_, std::try_to_lock);

@@ -76,6 +76,10 @@ class Pool {
 
   void grow(std::size_t chunks) {
     const std::size_t used = capacity_ >> kChunkBits;
+    // Room first: what is made then must not be lost for want of it.
+    chunks_.reserve(chunks_.size() + 1);
+    directories_.reserve(directories_.size() + 1);
+    directory_sizes_.reserve(directory_sizes_.size() + 1);
     if (directory_sizes_.empty() || used + chunks > directory_sizes_.back()) {
       // The old directory stays: a reader may be looking at it.
       const std::size_t size = std::max<std::size_t>(8, 2 * (used + chunks));

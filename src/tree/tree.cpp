@@ -58,6 +58,12 @@ oracle::Surface surfaceOf(std::shared_ptr<const Mesh> mesh, const Options& o) {
   return {std::move(mesh), lattice};
 }
 
+// Of more than 292 years, the longest that there is.
+std::int64_t nanoseconds(std::chrono::milliseconds ttl) {
+  constexpr auto kMost = std::chrono::duration_cast<std::chrono::milliseconds>(std::chrono::nanoseconds::max());
+  return std::chrono::nanoseconds(std::min(ttl, kMost)).count();
+}
+
 std::int64_t nanoseconds(Clock::time_point t) {
   return std::chrono::duration_cast<std::chrono::nanoseconds>(t.time_since_epoch()).count();
 }
@@ -76,6 +82,7 @@ std::int64_t coarseNow() {
 
 Tree::Tree(std::shared_ptr<const Mesh> mesh, const Options& options)
     : options_(checked(options)),
+      ttl_(nanoseconds(options.ttl)),
       oracle_(oracle::makeOracle(options.oracle, options.answer, options.paper.viewport)),
       deepest_(deepestLevel(options)),
       surface_(surfaceOf(mesh, options)),

@@ -257,6 +257,11 @@ class Tree {
   ChildRef addList(const std::uint32_t* ids, std::size_t count, bool leaf);
   void setChild(NodeRef node, ChildRef ref);
   void refit();
+  /// Was the time `then` more than ttl before `now`? Both may be any times.
+  bool isOld(std::int64_t then, std::int64_t now) const {
+    std::int64_t age;
+    return ttl_ > 0 && now > then && (__builtin_sub_overflow(now, then, &age) || age > ttl_);
+  }
   enum class Pruning {
     kBudget,      ///< What exceeds the memory budget only.
     kWorthwhile,  ///< And branches unused for longer than ttl, if there are enough for the work that it is.
@@ -273,6 +278,7 @@ class Tree {
   void countBytes();
 
   const Options options_;
+  const std::int64_t ttl_;  // in ns; 0: nothing is ever old
   const std::shared_ptr<oracle::Oracle> oracle_;
   const int deepest_;
   mutable thread::ShardedLock query_lock_;

@@ -932,7 +932,7 @@ TEST(CollideDegenerate, AnswersAreRight) {
   EXPECT_EQ(test::pairs<double>(many, I, one, test::pose<double>(test::randomRotation(g), {0.2, 0.2, 0})).size(),
             5000u);
   EXPECT_FALSE(test::touching<double>(many, I, one, test::pose<double>(Eigen::Matrix3d::Identity(), {0, 0, 1e-9})));
-  EXPECT_LE(many.statistics().resident_bytes, 200u * same.triangles.size());
+  EXPECT_LE(many.statistics().resident_bytes, 300u * same.triangles.size()) << "oriented boxes included";
 }
 
 TEST(CollideDegenerate, CoplanarAndTouchingFacesAreReported) {

@@ -273,8 +273,8 @@ TEST_P(OnDevice, AReleasedMeshComesBackForQueriesAndGoesAtRest) {
         fcl::DistanceRequestd request;
         request.enable_signed_distance = is_exact;
         fcl::DistanceResultd ours, theirs;
-        ASSERT_EQ(fcl::distance(&r.a, kIdentity, &r.b, X, request, ours),
-                  fcl::distance(&r.c, kIdentity, &r.d, X, request, theirs));
+        ASSERT_NEAR(fcl::distance(&r.a, kIdentity, &r.b, X, request, ours),
+                    fcl::distance(&r.c, kIdentity, &r.d, X, request, theirs), 1e-12);
         const fcl::ContinuousCollisionRequestd moving;
         fcl::ContinuousCollisionResultd when, expected_when;
         auto end = X;

@@ -50,6 +50,10 @@ def test_geometries_and_their_members():
     with pytest.raises(ValueError):
         sphere.radius = -1
     assert sphere.radius == 2.5
+    for lacking in (fcl.OcTree(0.1), fcl.Ellipsoid(0, 0, 0)):  # FCL ends the process
+        for pair in ((fcl.Box(1, 1, 1), lacking), (lacking, fcl.Sphere(1)), (lacking, lacking)):
+            with pytest.raises(ValueError, match="FCL knows no distance"):
+                fcl.distance(*map(fcl.CollisionObject, pair))
     assert fcl.Sphere(1).getNodeType() == fcl.NODE_TYPE.GEOM_SPHERE
     cube = fcl.Convex(box()[0], 12, np.column_stack([np.full(12, 3), box()[1]]).ravel())
     assert cube.num_faces == 12

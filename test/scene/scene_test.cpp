@@ -881,6 +881,10 @@ TYPED_TEST(SceneTest, MisuseThrows) {
   EXPECT_THROW(scene.ignore(fixed, fixed), std::invalid_argument);
   EXPECT_THROW(scene.addFixed(nullptr, good), std::invalid_argument);
   EXPECT_THROW(scene.addMoving(nullptr), std::invalid_argument);
+  const auto unfinished = std::make_shared<fcl::BVHModel<fcl::OBBRSS<S>>>();
+  unfinished->beginModel();
+  unfinished->addTriangle(fcl::Vector3<S>(0, 0, 0), fcl::Vector3<S>(1, 0, 0), fcl::Vector3<S>(0, 1, 0));
+  EXPECT_THROW(scene.addMoving(unfinished), std::invalid_argument);
   EXPECT_THROW(scene.collides(nullptr), std::invalid_argument);
   EXPECT_THROW(scene.collisions(nullptr, 1, nullptr), std::invalid_argument);
 
@@ -1091,6 +1095,31 @@ TEST(SceneThreads, EdgesAlongMeshesOfFcl) {
     }
     for (std::thread& thread : threads) thread.join();
   }
+}
+
+TEST(SceneThreads, ChangesBesideNewVertices) {
+  Options options;
+  options.answer = Answer::kConservative;
+  const test::Raw raw = test::torus(10);
+  const auto model = std::make_shared<Modeld>(raw.mesh(), options);
+  Scened scene;
+  const Id id = scene.addFixed(model, fcl::Transform3d::Identity());
+  std::atomic<bool> stop{false};
+  std::thread changes([&] {
+    for (int i = 0; !stop; ++i) {
+      std::vector<Eigen::Vector3d> vertices = raw.vertices;
+      for (Eigen::Vector3d& v : vertices) v *= 1 + i % 3;
+      model->updateVertices(vertices);
+    }
+  });
+  for (int i = 0; i < test::repetitions(200); ++i) scene.update(id);
+  stop = true;
+  changes.join();
+  model->updateVertices(raw.vertices);
+  scene.update(id);
+  scene.addMoving(std::make_shared<fcl::Sphered>(0.1));
+  const auto X = test::pose<double>(Eigen::Matrix3d::Identity(), {0.7, 0, 0.4});
+  EXPECT_TRUE(scene.collides(&X));
 }
 
 // What the tests run under ThreadSanitizer looks at: queries from several threads beside changes.

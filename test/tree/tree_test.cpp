@@ -300,6 +300,28 @@ TEST(Tree, TtlZeroKeepsEverything) {
   EXPECT_EQ(a.statistics().resident_nodes, grown);
 }
 
+// Differences of these times do not fit 64 bits.
+TEST(Tree, TimesAtTheEndsOfTheClock) {
+  for (const milliseconds ttl : {milliseconds(1000), milliseconds::max(), milliseconds(18446744073710)}) {
+    FakeClock clock;
+    Options options;
+    options.clock = clock.function();
+    options.ttl = ttl;
+    Modeld a(test::torus(50).mesh(), options), b(test::torus(50).mesh(), options);
+    for (int i = 0; i < 30; ++i) EXPECT_TRUE(touching(a, b, kHit));
+    const std::size_t grown = a.statistics().resident_nodes;
+    a.prune(Clock::time_point::min());
+    a.prune(clock.now + milliseconds(500));
+    EXPECT_EQ(a.statistics().resident_nodes, grown) << "nothing is older than " << ttl.count() << " ms";
+    clock.now = Clock::time_point::max();
+    for (int i = 0; i < 3; ++i) EXPECT_TRUE(touching(a, b, kHit));
+    clock.now = Clock::time_point::min();
+    for (int i = 0; i < 3; ++i) EXPECT_TRUE(touching(a, b, kHit));
+    a.prune(Clock::time_point::max());
+    if (ttl == milliseconds(1000)) EXPECT_LT(a.statistics().resident_nodes, grown);
+  }
+}
+
 TEST(Tree, AnswersDoNotDependOnDecay) {
   FakeClock clock;
   Options options;

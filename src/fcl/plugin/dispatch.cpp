@@ -8,6 +8,8 @@
 #include <bocst/dispatch_check.h>
 #include <bocst/unchecked_dispatch.h>
 #include <dlfcn.h>
+#include <fcl/geometry/octree/octree.h>
+#include <fcl/geometry/shape/ellipsoid.h>
 
 #include <atomic>
 #include <cstdlib>
@@ -194,13 +196,33 @@ std::size_t collide(const fcl::CollisionGeometry<S>* o1, const fcl::Transform3<S
 
 namespace {
 
-// FCL would call a support function that these do not have.
+/// Why FCL has no distance to a geometry; null if it has one.
 template <typename S>
-void refuseUnbounded(const fcl::CollisionGeometry<S>* o1, const fcl::CollisionGeometry<S>* o2) {
+const char* noDistanceTo(const fcl::CollisionGeometry<S>& o) {
+  switch (o.getNodeType()) {
+    case fcl::GEOM_PLANE:
+    case fcl::GEOM_HALFSPACE:  // It would call a support function that these do not have.
+      return "a Plane or Halfspace needs a bocst::Model beside it";
+    case fcl::GEOM_ELLIPSOID:  // libccd ends the process.
+      return static_cast<const fcl::Ellipsoid<S>&>(o).radii.minCoeff() > 0
+                 ? nullptr
+                 : "an Ellipsoid with a radius of 0 needs a bocst::Model beside it";
+#if FCL_HAVE_OCTOMAP
+    case fcl::GEOM_OCTREE:  // It would read a root that is not there.
+      return static_cast<const fcl::OcTree<S>&>(o).getRoot() != nullptr ? nullptr : "the OcTree has no cells";
+#endif
+    default:
+      return nullptr;
+  }
+}
+
+template <typename S>
+void refuseWithoutDistance(const fcl::CollisionGeometry<S>* o1, const fcl::CollisionGeometry<S>* o2) {
   for (const fcl::CollisionGeometry<S>* o : {o1, o2}) {
-    if (o->getNodeType() != fcl::GEOM_PLANE && o->getNodeType() != fcl::GEOM_HALFSPACE) continue;
-    throw std::invalid_argument("bocst::distance: FCL knows no distance of " + fcl_adapter::typeName<S>(o1) + " and " +
-                                fcl_adapter::typeName<S>(o2) + "; a Plane or Halfspace needs a bocst::Model beside it");
+    if (const char* const why = noDistanceTo(*o)) {
+      throw std::invalid_argument("bocst::distance: FCL knows no distance of " + fcl_adapter::typeName<S>(o1) +
+                                  " and " + fcl_adapter::typeName<S>(o2) + "; " + why);
+    }
   }
 }
 
@@ -217,7 +239,7 @@ S distance(const fcl::CollisionGeometry<S>* o1, const fcl::Transform3<S>& X_W1, 
     case fcl_adapter::PairKind::kForeign:
       break;
   }
-  refuseUnbounded<S>(o1, o2);
+  refuseWithoutDistance<S>(o1, o2);
   return fcl::distance<S>(o1, X_W1, o2, X_W2, request, result);
 }
 
@@ -226,7 +248,7 @@ S distance(const fcl::CollisionGeometry<S>* o1, const fcl::Transform3<S>& X_W1, 
            const fcl::Transform3<S>& X_W2, const Solver* solver, const fcl::DistanceRequest<S>& request,
            fcl::DistanceResult<S>& result) {
   if (isModel<S>(o1) || isModel<S>(o2)) return bocst::distance<S>(o1, X_W1, o2, X_W2, request, result);
-  refuseUnbounded<S>(o1, o2);
+  refuseWithoutDistance<S>(o1, o2);
   return fcl::distance<Solver>(o1, X_W1, o2, X_W2, solver, request, result);
 }
 

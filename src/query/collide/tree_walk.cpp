@@ -10,7 +10,7 @@ namespace bocst::query {
 namespace {
 
 // One walk in ten thousand of scans and robots' links tests more pairs of leaves without a hit.
-constexpr std::size_t kManyLeafPairs = 128;
+constexpr std::size_t kManyLeafPairs = 256;
 // The exact test of two triangles that float cannot tell apart takes as long as so many pairs of leaves.
 constexpr std::size_t kExactTest = 8;
 
@@ -31,7 +31,7 @@ bool TreeWalk::runByTurns(Visitor& visitor) {
   // The boxes are built when walks have paid for them, as whole trees are. Each turn may take longer than the one
   // before, so all take at most some times what the quicker of both ways takes. A step over boxes takes about as long
   // as a pair of leaves.
-  constexpr std::size_t kLonger = 16;
+  constexpr std::size_t kLonger = 16, kSteps = 4;
   const std::size_t price = a_.tree().boxPrice() + b_.tree().boxPrice();
   for (std::size_t most = std::max(kManyLeafPairs, price);; most *= kLonger) {
     const bool ended = run(visitor, most);
@@ -41,7 +41,7 @@ bool TreeWalk::runByTurns(Visitor& visitor) {
     if (!gave_up_) return ended;
     const BoxSide boxes_a(a_), boxes_b(b_);
     PairWalk<BoxSide, BoxSide> boxes(boxes_a, boxes_b, b_in_a_, visitor);
-    if (boxes.run(most)) return true;
+    if (boxes.run(kSteps * most)) return true;
     if (!boxes.gaveUp()) return false;
   }
 }
@@ -109,10 +109,7 @@ bool TreeWalk::stepAll(PairSteps& steps, Scratch& s) {
         ++leaf_pairs_;
         break;
       case StepEvent::kLeaves:
-        gave_up_ = leaf_pairs_ > most_leaf_pairs_;
-        if (gave_up_) return false;
-        ++leaf_pairs_;
-        if (testLeaves(event, s)) return true;
+        if (testLeaves(event, s)) return !gave_up_;
         if (steps.isCut()) steps.setCut(*visitor_->cut());
         break;
     }
@@ -136,14 +133,18 @@ void TreeWalk::testLargeTriangles(PairSteps& steps, const StepEvent& event, Scra
   }
 }
 
+// True when the visitor ended the walk, or it gave up.
 bool TreeWalk::testLeaves(const StepEvent& event, Scratch& s) {
+  gave_up_ = ++leaf_pairs_ > most_leaf_pairs_;
+  if (gave_up_) return true;
   if (!s.leaves_started) {
     s.leaves.start(b_in_a_, aInB(), visitor_->endsAtFirst());
     s.leaves_started = true;
   }
   const auto visit = [this](std::uint32_t t, std::uint32_t u, bool certain) {
     if (!certain) leaf_pairs_ += kExactTest;
-    return visitor_->triangles(t, u, certain);
+    gave_up_ = leaf_pairs_ > most_leaf_pairs_;
+    return gave_up_ || visitor_->triangles(t, u, certain);
   };
   const tree::NodeRef a = event.pair[0].node, b = event.pair[1].node;
   const std::uint32_t triangles = event.asked.triangles;

@@ -1,0 +1,218 @@
+// SPDX-License-Identifier: BSD-3-Clause
+// Pairs of which many parts are about as near as the nearest: flat faces with little space between them, cones tip to
+// tip. Answers are right whatever was asked before, and the work is bounded.
+#include <bocst/is_closer_than.h>
+#include <gtest/gtest.h>
+
+#include <cmath>
+#include <memory>
+#include <random>
+#include <set>
+#include <vector>
+
+#include "conformance/reference.h"
+#include "query/collide/tree_walk.h"
+#include "query/distance/distance_walk.h"
+
+namespace bocst {
+namespace {
+
+using Eigen::Vector3d;
+using test::Raw;
+
+// A square of side 1 about the origin, of 2 n^2 triangles.
+Raw plate(std::size_t n) {
+  Raw raw;
+  const auto at = [n](std::size_t i) { return static_cast<double>(i) / static_cast<double>(n) - 0.5; };
+  for (std::size_t i = 0; i <= n; ++i) {
+    for (std::size_t j = 0; j <= n; ++j) raw.vertices.emplace_back(at(i), at(j), 0);
+  }
+  for (std::size_t i = 0; i < n; ++i) {
+    for (std::size_t j = 0; j < n; ++j) {
+      const std::size_t a = i * (n + 1) + j, b = a + 1, c = a + n + 1, d = c + 1;
+      raw.triangles.emplace_back(a, c, b);
+      raw.triangles.emplace_back(b, c, d);
+    }
+  }
+  return raw;
+}
+
+// A plate with walls about it: a tray, whose floor is no side of its convex hull.
+Raw tray(std::size_t n) {
+  Raw raw = plate(n), wall = plate(n);
+  for (Vector3d& v : wall.vertices) v = Vector3d(0.5, v.y(), v.x() / 2 + 0.25);
+  raw.add(wall);
+  for (Vector3d& v : wall.vertices) v.x() = -0.5;
+  raw.add(wall);
+  return raw;
+}
+
+// With its tip at the origin, up to z = 1.
+Raw cone(std::size_t sectors) {
+  Raw raw;
+  raw.vertices.emplace_back(0, 0, 0);
+  for (std::size_t i = 0; i < sectors; ++i) {
+    const double angle = 2 * std::acos(-1.0) * static_cast<double>(i) / static_cast<double>(sectors);
+    raw.vertices.emplace_back(0.3 * std::cos(angle), 0.3 * std::sin(angle), 1);
+    raw.triangles.emplace_back(0, 1 + i, 1 + (i + 1) % sectors);
+  }
+  return raw;
+}
+
+template <typename S>
+fcl::Transform3<S> above(double gap, double turn = 0) {
+  fcl::Transform3<S> X = fcl::Transform3<S>::Identity();
+  X.linear() = Eigen::AngleAxisd(turn, Vector3d::UnitZ()).toRotationMatrix().cast<S>();
+  X.translation() = Vector3d(0.0123, 0.0071, gap).cast<S>();
+  return X;
+}
+
+template <typename S>
+class FlatFaces : public testing::Test {};
+using Scalars = testing::Types<float, double>;
+TYPED_TEST_SUITE(FlatFaces, Scalars);
+
+// One pose after the other, so that the later ones find oriented boxes built.
+TYPED_TEST(FlatFaces, AnswersAreRightAtAnyGap) {
+  using S = TypeParam;
+  const fcl::Transform3<S> I = fcl::Transform3<S>::Identity();
+  const double finest = std::is_same<S, double>::value ? 1e-12 : 1e-5;
+  const Model<S> below(plate(24).mesh()), inside(tray(24).mesh());
+  const Model<S> upper(plate(20).scale(0.9).mesh());
+  for (const Model<S>* lower : {&below, &inside}) {
+    for (int round = 0; round < 2; ++round) {
+      for (const double gap : {0.0, 1e-12, 1e-9, 1e-7, 1e-6, 4e-6, 2e-5, 1e-4, 1e-3, 1e-2, 0.1}) {
+        if (gap > 0 && gap < finest) continue;
+        if (lower == &inside && gap > 0.03) continue;  // the walls are as near
+        for (const double turn : {0.0, 0.3}) {
+          if (lower == &inside && turn != 0) continue;  // it would meet the walls
+          const fcl::Transform3<S> X = above<S>(gap, turn);
+          SCOPED_TRACE(testing::Message() << "gap " << gap << ", turned by " << turn << ", round " << round);
+          ASSERT_EQ(test::touching<S>(*lower, I, upper, X), gap == 0);
+          ASSERT_EQ(test::touching<S>(upper, X, *lower, I), gap == 0);
+          fcl::DistanceResult<S> result, turned;
+          fcl::distance(lower, I, &upper, X, fcl::DistanceRequest<S>(), result);
+          fcl::distance(&upper, X, lower, I, fcl::DistanceRequest<S>(), turned);
+          const double rounding = std::is_same<S, double>::value ? 2e-12 : 1e-6;
+          ASSERT_NEAR(result.min_distance, gap, rounding);
+          ASSERT_NEAR(turned.min_distance, gap, rounding);
+          if (gap < 100 * finest) continue;
+          for (const double share : {0.5, 0.98, 0.9999, 1.0001, 1.02}) {
+            const S limit = static_cast<S>(share * gap);
+            ASSERT_EQ(isCloserThan<S>(lower, I, &upper, X, limit), share > 1) << share;
+            ASSERT_EQ(isCloserThan<S>(&upper, X, lower, I, limit), share > 1) << share;
+          }
+        }
+      }
+    }
+  }
+}
+
+struct Side {
+  explicit Side(const Raw& raw) : tree(raw.mesh(), options()) {}
+  static Options options() {
+    Options o;
+    o.ttl = std::chrono::milliseconds(0);
+    return o;
+  }
+  tree::Tree tree;
+};
+
+query::SimilarityTransform relative(const Side& a, const Side& b, const fcl::Transform3d& X_AB) {
+  const lattice::Lattice &la = a.tree.surface().lattice, &lb = b.tree.surface().lattice;
+  query::SimilarityTransform p;
+  p.rotation = X_AB.linear();
+  p.scale = lb.unit() / la.unit();
+  p.translation = (X_AB * lb.origin() - la.origin()) / la.unit();
+  p.tolerance = 1e-13 * lattice::kMiddle;
+  p.ready();
+  return p;
+}
+
+// Says no to all pairs, as the exact test would, and counts them.
+class Counter final : public query::Visitor {
+ public:
+  bool endsAtFirst() const override { return true; }
+  bool triangles(std::uint32_t, std::uint32_t, bool certain) override {
+    EXPECT_FALSE(certain);
+    ++count;
+    return false;
+  }
+  bool cells(const query::CellLeaf&, const query::CellLeaf&) override { return false; }
+  bool cellOfA(const query::CellLeaf&, std::uint32_t, const Vector3d&) override { return false; }
+  bool cellOfB(std::uint32_t, const query::CellLeaf&, const Vector3d&) override { return false; }
+
+  std::size_t count = 0;
+};
+
+TEST(FlatWork, OfAYesOrNoQueryIsBounded) {
+  Side a(tray(40)), b(plate(40).scale(0.9));
+  const query::TreeSide side_a(a.tree), side_b(b.tree);
+  const query::SimilarityTransform to = relative(a, b, above<double>(1e-7));
+  const std::size_t triangles = a.tree.surface().triangle_count + b.tree.surface().triangle_count;
+  const auto ask = [&](bool by_turns) {
+    Counter counter;
+    query::TreeWalk walk(side_a, side_b, to);
+    const bool ended = by_turns ? walk.runByTurns(counter) : walk.run(counter);
+    EXPECT_FALSE(ended);
+    return counter.count;
+  };
+  ASSERT_GT(ask(false), 2000u) << "float leaves most of the faces' pairs in doubt";
+  std::size_t sum = 0;
+  for (int i = 0; i < 30; ++i) sum += ask(true);
+  EXPECT_LT(sum, 2 * triangles) << "until oriented boxes are built, exact tests cost less than these";
+  EXPECT_NE(a.tree.knownBoxes(), nullptr);
+  EXPECT_NE(b.tree.knownBoxes(), nullptr);
+  EXPECT_LT(ask(true), 100u) << "from then on";
+}
+
+// `steps` counts pairs of leaves and of triangles, each exact distance as two more.
+TEST(FlatWork, OfADistanceIsBounded) {
+  const Raw first[] = {plate(40), plate(40), cone(64), cone(64)};
+  const Raw second[] = {plate(40), plate(40).scale(0.9), cone(64), plate(40)};
+  for (std::size_t i = 0; i < 4; ++i) {
+    Side a(first[i]), b(second[i]);
+    const query::TreeSide side_a(a.tree), side_b(b.tree);
+    const bool tips = i == 2;
+    fcl::Transform3d X = above<double>(i < 2 ? 0.1 : -0.1, 0.3);
+    if (tips) X.linear() = Eigen::AngleAxisd(std::acos(-1.0), Vector3d::UnitX()).toRotationMatrix() * X.linear();
+    const query::SimilarityTransform to = relative(a, b, X);
+    const double expected = (tips ? X.translation().norm() : 0.1) / a.tree.surface().lattice.unit();
+    query::DistanceWalk<query::TreeSide, query::TreeSide>(side_a, side_b, to).run({});  // grows
+    query::DistanceWalk<query::TreeSide, query::TreeSide> trees(side_a, side_b, to);
+    EXPECT_NEAR(trees.run({}).distance, expected, 1e-11 * expected + 1e-6) << i;
+    const query::BoxSide boxes_a(side_a), boxes_b(side_b);
+    query::DistanceWalk<query::BoxSide, query::BoxSide> boxes(boxes_a, boxes_b, to);
+    EXPECT_NEAR(boxes.run({}).distance, expected, 1e-11 * expected + 1e-6) << i;
+    EXPECT_LT(boxes.steps(), tips ? 2u * 64 * 64 : 400u) << i;
+    const std::size_t triangles = a.tree.surface().triangle_count + b.tree.surface().triangle_count;
+    EXPECT_LT(trees.steps(), tips ? 2u * 64 * 64 : 5 * triangles) << i;
+    // An answer in hand is not lost where a walk gives up at once.
+    query::DistanceWalk<query::TreeSide, query::TreeSide> short_one(side_a, side_b, to);
+    query::Nearest known;
+    known.distance = 2 * expected;
+    EXPECT_LE(short_one.run({}, known, 0).distance, known.distance);
+    EXPECT_TRUE(short_one.gaveUp());
+    EXPECT_NEAR(query::findNearest(side_a, side_b, to, {}).distance, expected, 1e-11 * expected + 1e-6) << i;
+  }
+}
+
+// What is nearly as near as a touching pair is not taken for it.
+TEST(FlatWork, DistancesNextToNothingAreFound) {
+  std::mt19937_64 g(3);
+  std::uniform_real_distribution<double> u(-1, 1);
+  const Modeld a(plate(12).mesh()), b(cone(12).mesh());
+  const fcl::Transform3d I = fcl::Transform3d::Identity();
+  for (const double gap : {1e-13, 1e-11, 1e-9, 1e-6}) {
+    for (int i = 0; i < 20; ++i) {
+      fcl::Transform3d X = above<double>(gap);
+      X.linear() = Eigen::AngleAxisd(0.2 * u(g), Vector3d(u(g), u(g), 0).normalized()).toRotationMatrix();
+      fcl::DistanceResultd result;
+      fcl::distance(&a, I, &b, X, fcl::DistanceRequestd(), result);
+      ASSERT_NEAR(result.min_distance, gap, 1e-12 + 2e-3 * gap);
+    }
+  }
+}
+
+}  // namespace
+}  // namespace bocst
