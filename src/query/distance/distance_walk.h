@@ -371,7 +371,7 @@ class DistanceWalk : private BestFirst<DistanceWalk<A, B>, A, B> {
 /// with float bounds is quicker. So they take turns, as in TreeWalk::runByTurns().
 inline Nearest findNearest(const TreeSide& a, const TreeSide& b, const SimilarityTransform& b_in_a,
                            const DistanceGoal& goal) {
-  constexpr std::size_t kFew = 128, kMany = 1024, kLonger = 16;
+  constexpr std::size_t kFew = 64, kMany = 1024, kLonger = 16, kSteps = 8;
   DistanceWalk<TreeSide, TreeSide> trees(a, b, b_in_a);
   if (!BoxSide::fits(a, b)) return trees.run(goal);
   const std::size_t price = a.tree().boxPrice() + b.tree().boxPrice();
@@ -384,7 +384,7 @@ inline Nearest findNearest(const TreeSide& a, const TreeSide& b, const Similarit
     if (!trees.gaveUp()) return nearest;
     const BoxSide boxes_a(a), boxes_b(b);
     DistanceWalk<BoxSide, BoxSide> boxes(boxes_a, boxes_b, b_in_a);
-    nearest = boxes.run(goal, nearest, most);
+    nearest = boxes.run(goal, nearest, kSteps * most);
     if (!boxes.gaveUp()) return nearest;
   }
 }

@@ -131,9 +131,77 @@ std::vector<Cliff> cliffs() {
   return all;
 }
 
+/// A tessellated square of side 1.
+Triangles plate(std::size_t rows) {
+  return sheet(rows, rows, [](double u, double v) { return Vector3d(u - 0.5, v - 0.5, 0); });
+}
+
+/// With its tip at the origin; height 1, along z upwards or downwards.
+Triangles cone(std::size_t sectors, double height) {
+  Triangles t;
+  t.vertices.emplace_back(0, 0, 0);
+  for (std::size_t i = 0; i < sectors; ++i) {
+    const double angle = 2 * kPi * static_cast<double>(i) / static_cast<double>(sectors);
+    t.vertices.emplace_back(0.3 * std::cos(angle), 0.3 * std::sin(angle), height);
+    t.triangles.emplace_back(0, 1 + i, 1 + (i + 1) % sectors);
+  }
+  return t;
+}
+
+/// Pairs of which many triangles are about as near as the nearest, asked kTieQueries times.
+struct Tie {
+  std::string key, name;
+  Triangles a, b;
+  double gap, turn;  ///< Along z, and about it.
+};
+constexpr std::size_t kTieQueries = 20;
+
+std::vector<Tie> ties() {
+  std::vector<Tie> all;
+  for (const double gap : {1e-6, 1e-5, 1e-3, 0.1}) {
+    const std::string name = "plates of 7200 triangles, gap " + formatPlain(gap);
+    all.push_back({"plates_" + formatPlain(gap), name, plate(60), plate(60), gap, 0.3});
+  }
+  all.push_back({"tips", "cones of 128 triangles, tip to tip", cone(128, -1), cone(128, 1), 0.01, 0.1});
+  return all;
+}
+
+void benchTie(const Tie& tie, BenchReport& report) {
+  const std::shared_ptr<const Mesh> a = tie.a.mesh(), b = tie.b.mesh();
+  Eigen::Isometry3d X_AB = Eigen::Isometry3d::Identity();
+  X_AB.rotate(Eigen::AngleAxisd(tie.turn, Vector3d::UnitZ())).pretranslate(Vector3d(0.01, 0.02, tie.gap));
+  const MeshArrays arrays_a(*a, Scalar::kDouble), arrays_b(*b, Scalar::kDouble);
+  for (const bool distance : {false, true}) {
+    const auto ask = [&](const QueryPair& pair) { return distance ? pair.distance(X_AB) : double(pair.touch(X_AB)); };
+    // The time of all queries and of the set-up before them, and that of one more.
+    const auto measure = [&](auto&& make, double& all, double& again) {
+      const Stopwatch watch;
+      const auto pair = make();
+      for (std::size_t i = 0; i < kTieQueries; ++i) ask(*pair);
+      all = watch.microseconds();
+      const Stopwatch later;
+      const double answer = ask(*pair);
+      again = later.microseconds();
+      return answer;
+    };
+    double ours, ours_again, theirs, theirs_again;
+    const double expected = measure([&] { return buildFclPair(FclTree::kObbRss, Scalar::kDouble, arrays_a, arrays_b); },
+                                    theirs, theirs_again);
+    const double answer =
+        measure([&] { return makeBocstPair(HandedOver(*a), HandedOver(*b), Options{}); }, ours, ours_again);
+    report.mustBeEqual(std::abs(answer - expected) < 1e-9, "answers of " + tie.name);
+    const std::string key = tie.key + (distance ? "_distance" : "_touch");
+    const std::string name = tie.name + (distance ? ", distance: " : ", yes or no: ");
+    report.compare(key, name + "build and " + std::to_string(kTieQueries) + " queries", BenchRow::Unit::kMicroseconds,
+                   ours, theirs);
+    report.compare(key + "_again", name + "asked again", BenchRow::Unit::kMicroseconds, ours_again, theirs_again);
+  }
+}
+
 }  // namespace
 
 void benchCliffs(BenchSetting& setting, BenchReport& report) {
+  for (const Tie& tie : ties()) benchTie(tie, report);
   const std::vector<Cliff> all = cliffs();
   Progress progress("cliffs: pair", all.size());
   for (const Cliff& cliff : all) {
