@@ -40,7 +40,7 @@ class BOCST_EXPORT AutoOracle : public Oracle {
   std::shared_ptr<const DeviceResource> uploadNodes(std::vector<std::uint32_t>& words) override {
     return device_->uploadNodes(words);
   }
-  void walkPairs(PairWalks& walks) override { device_->walkPairs(walks); }
+  void walkPairs(DeviceWalks& walks) override { device_->walkPairs(walks); }
   void pairsTook(std::size_t pairs, double seconds, bool by_host) override {
     device_->pairsTook(pairs, seconds, by_host);
   }

@@ -13,7 +13,7 @@
 
 #include "bounds/node_bounds.h"
 #include "lattice/lattice.h"
-#include "oracle/pair_walk.h"
+#include "oracle/device_walks.h"
 #include "oracle/surface.h"
 
 namespace bocst::oracle {
@@ -112,8 +112,8 @@ class Oracle {
   virtual std::shared_ptr<const DeviceResource> uploadNodes(std::vector<std::uint32_t>&) { return nullptr; }
 
   /// Answers all pairs; of those that it cannot, kUndone.
-  virtual void walkPairs(PairWalks& walks) {
-    walks.found.assign(walks.pairs.size(), PairWalks::kUndone);
+  virtual void walkPairs(DeviceWalks& walks) {
+    walks.found.assign(walks.pairs.size(), DeviceWalks::kUndone);
     walks.deferred.clear();
   }
 

@@ -42,7 +42,7 @@ struct Scratch {
   std::vector<Walk> walks;
   std::vector<tree::Tree::Growth> growths;
   std::vector<Spheres> found;
-  oracle::PairWalks device;
+  oracle::DeviceWalks device;
 };
 
 /// The session of one call about the trees in a scratch, as QueryScope: takes their query locks shared, in address
@@ -112,7 +112,7 @@ class Walks {
   }
 
  private:
-  using Found = oracle::PairWalks::Found;
+  using Found = oracle::DeviceWalks::Found;
   static constexpr std::uint32_t kNone = ~std::uint32_t{0};
 
   static double seconds() {
@@ -154,7 +154,7 @@ class Walks {
     trees_.assign(s_.sides.size(), kNone);
     asked_.clear();
     for (std::size_t i = 0; i < s_.walks.size(); ++i) {
-      oracle::PairWalks::Pair pair;
+      oracle::DeviceWalks::Pair pair;
       if (!is_its(s_.walks[i]) || !s_.walks[i].spheres().describe(pair)) continue;
       pair.tree[0] = numberOf(*s_.walks[i].a);
       pair.tree[1] = numberOf(*s_.walks[i].b);
@@ -230,7 +230,7 @@ class Walks {
   std::size_t waiting_ = 0;
   std::vector<std::uint32_t> trees_;  // of each side, its number among the device's
   std::vector<std::size_t> asked_;    // the device's pairs, as numbers of walks
-  std::vector<oracle::PairWalks::Deferred> deferred_;
+  std::vector<oracle::DeviceWalks::Deferred> deferred_;
   std::vector<bool> done_;
 };
 

@@ -113,7 +113,7 @@ std::shared_ptr<const DeviceResource> ComputeOracle::uploadNodes(std::vector<std
   return nodes;
 }
 
-void ComputeOracle::walkPairs(PairWalks& walks) {
+void ComputeOracle::walkPairs(DeviceWalks& walks) {
   try {
     thread_->run([&] { walker().walk(walks, *thread_); });
     walked_ += walks.pairs.size();

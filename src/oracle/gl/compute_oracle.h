@@ -33,7 +33,7 @@ class ComputeOracle : public DeviceOracle {
 
   bool walksPairs(std::size_t pairs) override;
   std::shared_ptr<const DeviceResource> uploadNodes(std::vector<std::uint32_t>& words) override;
-  void walkPairs(PairWalks& walks) override;
+  void walkPairs(DeviceWalks& walks) override;
   void pairsTook(std::size_t pairs, double seconds, bool by_host) override { choice_.learn(pairs, seconds, by_host); }
 
   /// For tests: walk all pairs, also where that takes longer than the host.

@@ -79,7 +79,7 @@ void KnownPairs::addPose(int number, std::uint32_t a, std::uint32_t b, double un
   const double angle = 0.4 + 0.7 * number, far = (0.2 + 0.9 * number / kPoses) * 2 * lattice::kMiddle;
   const Eigen::Vector3d axis(std::sin(number), std::cos(2 * number), 0.3);
   const Eigen::Matrix3f rotation = Eigen::AngleAxisd(angle, axis.normalized()).toRotationMatrix().cast<float>();
-  PairWalks::Pair pair;
+  DeviceWalks::Pair pair;
   pair.tree[0] = a;
   pair.tree[1] = b;
   pair.unit = static_cast<float>(unit);
@@ -114,7 +114,7 @@ void KnownPairs::addPose(int number, std::uint32_t a, std::uint32_t b, double un
 }
 
 std::string KnownPairs::ask(ComputeOracle& oracle) const {
-  PairWalks walks;
+  DeviceWalks walks;
   walks.pairs = pairs_;
   for (const Tree& t : trees_) {
     std::vector<std::uint32_t> words = t.words;
@@ -126,14 +126,14 @@ std::string KnownPairs::ask(ComputeOracle& oracle) const {
   bool some_grow = false;
   for (std::size_t i = 0; i < walks.pairs.size(); ++i) {
     const unsigned found = walks.found[i];
-    if (found == PairWalks::kUndone) return "pairs of trees were not walked";
+    if (found == DeviceWalks::kUndone) return "pairs of trees were not walked";
     if (found == 0 && known_[i] == Known::kMeet) return "a contact between trees is lost";
-    if ((found & PairWalks::kMeet) != 0 && known_[i] == Known::kApart) return "trees that are apart meet";
+    if ((found & DeviceWalks::kMeet) != 0 && known_[i] == Known::kApart) return "trees that are apart meet";
     // Of whole trees the device tells all but close ones.
     const bool is_whole = walks.pairs[i].tree[0] % 2 == 0 && walks.pairs[i].tree[1] % 2 == 0;
-    const bool is_told = known_[i] == Known::kMeet ? (found & PairWalks::kMeet) != 0 : found == 0;
+    const bool is_told = known_[i] == Known::kMeet ? (found & DeviceWalks::kMeet) != 0 : found == 0;
     if (is_whole && known_[i] != Known::kClose && !is_told) return "a walk over whole trees did not end";
-    some_grow = some_grow || (found & PairWalks::kGrows) != 0;
+    some_grow = some_grow || (found & DeviceWalks::kGrows) != 0;
   }
   if (some_grow == walks.deferred.empty()) return "nodes that must grow are not told";
   return "";

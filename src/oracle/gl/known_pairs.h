@@ -23,7 +23,7 @@ class KnownPairs {
  private:
   struct Tree {
     std::vector<std::uint32_t> words;
-    PairWalks::Tree tree;
+    DeviceWalks::Tree tree;
     std::vector<std::array<double, 4>> leaves;  // spheres about the middle of the root
   };
   enum class Known : std::uint8_t { kApart, kMeet, kClose };
@@ -34,7 +34,7 @@ class KnownPairs {
   void addPose(int number, std::uint32_t a, std::uint32_t b, double unit);
 
   std::vector<Tree> trees_;
-  std::vector<PairWalks::Pair> pairs_;
+  std::vector<DeviceWalks::Pair> pairs_;
   std::vector<Known> known_;
 };
 

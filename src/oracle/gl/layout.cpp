@@ -89,11 +89,11 @@ constexpr Constant kConstants[] = {
     {"kNodeStamp", node_table::kStamp},
     {"kNodeWords", node_table::kWords},
     {"kNoBlock", node_table::kNone},
-    {"kMeet", PairWalks::kMeet},
-    {"kDoubt", PairWalks::kDoubt},
-    {"kGrows", PairWalks::kGrows},
-    {"kUndone", PairWalks::kUndone},
-    {"kInvalid", PairWalks::kInvalid},
+    {"kMeet", DeviceWalks::kMeet},
+    {"kDoubt", DeviceWalks::kDoubt},
+    {"kGrows", DeviceWalks::kGrows},
+    {"kUndone", DeviceWalks::kUndone},
+    {"kInvalid", DeviceWalks::kInvalid},
 };
 #undef BOCST_NAMED
 

@@ -8,7 +8,7 @@
 
 #include "bounds/node_bounds.h"
 #include "lattice/lattice.h"
-#include "oracle/pair_walk.h"
+#include "oracle/device_walks.h"
 
 /// The tables that the compute shaders share with each other and with the host. The shaders get these numbers, and
 /// those of the codec of node bounds, under the same names.
@@ -89,17 +89,18 @@ static_assert(sizeof(Cell) == 48, "std430 pads to 16 bytes");
 
 // A walk over pairs of trees (pairs.glsl). Of each pair it is asked, in words:
 constexpr std::uint32_t kPairRotation = 0, kPairShift = 9, kPairUnit = 12, kPairMargin = 13, kPairTolerance = 14,
-                        kPairNotSmaller = 15;            ///< As of PairWalks::Pair.
+                        kPairNotSmaller = 15;            ///< As of DeviceWalks::Pair.
 constexpr std::uint32_t kPairTrees = 16;                 ///< 2 times kTreeWords:
 constexpr std::uint32_t kTreeBegin = 0, kTreeStamp = 1;  ///< where its table is, the stamp of its words,
 constexpr std::uint32_t kTreeUsed = 2;                   ///< where the bits of its blocks go,
-constexpr std::uint32_t kTreeBlocks = 3, kTreeRoot = 4, kTreeDeepest = 5, kTreeExtent = 6;  ///< as of PairWalks::Tree.
+constexpr std::uint32_t kTreeBlocks = 3, kTreeRoot = 4, kTreeDeepest = 5,
+                        kTreeExtent = 6;  ///< as of DeviceWalks::Tree.
 constexpr std::uint32_t kTreeWords = 9;
 constexpr std::uint32_t kPairBatch = kPairTrees + 2 * kTreeWords;  ///< The number of the batch.
 constexpr std::uint32_t kPairDeferred = kPairBatch + 1;            ///< Where deferred pairs of nodes go,
 constexpr std::uint32_t kPairRoom = kPairDeferred + 1;             ///< and how many of them have room.
 constexpr std::uint32_t kPairWords = kPairRoom + 1;
-// The answer: a header, a row per pair (the batch's number above 8 bits of PairWalks::Found; its check), bits of
+// The answer: a header, a row per pair (the batch's number above 8 bits of DeviceWalks::Found; its check), bits of
 // blocks, deferred pairs (the pair, two nodes, the batch's number).
 constexpr std::uint32_t kDeferredCount = 0, kPairHeader = 1, kPairAnswer = 2, kDeferredWords = 4;
 constexpr std::uint32_t kMostSteps = 1u << 12;  ///< Of a walk: longer ones are the host's, as a watchdog may look.

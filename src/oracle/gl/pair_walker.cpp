@@ -45,20 +45,20 @@ std::shared_ptr<const DeviceResource> PairWalker::upload(std::vector<std::uint32
   return table;
 }
 
-void PairWalker::walk(PairWalks& walks, Thread& thread) {
-  walks.found.assign(walks.pairs.size(), PairWalks::kUndone);
+void PairWalker::walk(DeviceWalks& walks, Thread& thread) {
+  walks.found.assign(walks.pairs.size(), DeviceWalks::kUndone);
   walks.deferred.clear();
-  for (PairWalks::Tree& tree : walks.trees) tree.used.assign((tree.blocks + 31) / 32, 0);
+  for (DeviceWalks::Tree& tree : walks.trees) tree.used.assign((tree.blocks + 31) / 32, 0);
   for (std::size_t first = 0; first < walks.pairs.size(); first += kMostPairs) {
     walkPart(walks, first, std::min(kMostPairs, walks.pairs.size() - first), thread);
   }
 }
 
-void PairWalker::describe(const PairWalks& walks, std::size_t first, std::size_t count) {
+void PairWalker::describe(const DeviceWalks& walks, std::size_t first, std::size_t count) {
   batch_ = batch_ % (kMostBatches - 1) + 1;  // never that of fresh memory
   std::size_t words = kPairHeader + count * kPairAnswer;
   used_.clear();
-  for (const PairWalks::Tree& tree : walks.trees) {
+  for (const DeviceWalks::Tree& tree : walks.trees) {
     used_.push_back(narrow(words));
     words += tree.used.size();
   }
@@ -66,7 +66,7 @@ void PairWalker::describe(const PairWalks& walks, std::size_t first, std::size_t
   room_ = narrow(std::max(kLeastDeferred, kDeferredPerPair * count));
   rows_.resize(count * kPairWords);
   for (std::size_t i = 0; i < count; ++i) {
-    const PairWalks::Pair& pair = walks.pairs[first + i];
+    const DeviceWalks::Pair& pair = walks.pairs[first + i];
     std::uint32_t* const row = rows_.data() + i * kPairWords;
     std::memcpy(row + kPairRotation, pair.rotation, sizeof(pair.rotation));
     std::memcpy(row + kPairShift, pair.shift, sizeof(pair.shift));
@@ -75,7 +75,7 @@ void PairWalker::describe(const PairWalks& walks, std::size_t first, std::size_t
     row[kPairTolerance] = bitsOf(pair.tolerance);
     row[kPairNotSmaller] = static_cast<std::uint32_t>(pair.not_smaller);
     for (std::size_t t = 0; t < 2; ++t) {
-      const PairWalks::Tree& tree = walks.trees[pair.tree[t]];
+      const DeviceWalks::Tree& tree = walks.trees[pair.tree[t]];
       const Table& table = static_cast<const Table&>(*tree.nodes);
       std::uint32_t* const at = row + kPairTrees + t * kTreeWords;
       at[kTreeBegin] = table.range->begin();
@@ -92,7 +92,7 @@ void PairWalker::describe(const PairWalks& walks, std::size_t first, std::size_t
   }
 }
 
-void PairWalker::walkPart(PairWalks& walks, std::size_t first, std::size_t count, Thread& thread) {
+void PairWalker::walkPart(DeviceWalks& walks, std::size_t first, std::size_t count, Thread& thread) {
   forgetErrors();
   describe(walks, first, count);
   const std::size_t words = deferred_ + std::size_t{room_} * kDeferredWords;
@@ -123,24 +123,24 @@ void PairWalker::walkPart(PairWalks& walks, std::size_t first, std::size_t count
   take(walks, first, count, answers, thread);
 }
 
-void PairWalker::take(PairWalks& walks, std::size_t first, std::size_t count, const std::uint32_t* answers,
+void PairWalker::take(DeviceWalks& walks, std::size_t first, std::size_t count, const std::uint32_t* answers,
                       Thread& thread) const {
   for (std::size_t i = 0; i < count; ++i) {
     const std::uint32_t* const row = answers + kPairHeader + i * kPairAnswer;
     std::uint32_t asked[kPairWords];
     std::copy_n(rows_.data() + i * kPairWords, kPairWords, asked);
     thread.require(row[0] >> 8 == batch_ && row[1] == check(asked), "a pair of trees was not walked");
-    thread.require((row[0] & PairWalks::kInvalid) == 0, "a table of nodes did not arrive");
+    thread.require((row[0] & DeviceWalks::kInvalid) == 0, "a table of nodes did not arrive");
     walks.found[first + i] = static_cast<std::uint8_t>(row[0] & 0xff);
   }
-  const auto exists = [](const PairWalks::Tree& tree, std::uint32_t node) {
+  const auto exists = [](const DeviceWalks::Tree& tree, std::uint32_t node) {
     return node == kRootName || node >> 3 < tree.blocks;
   };
   const std::size_t deferred = std::min(answers[kDeferredCount], room_);
   for (std::size_t i = 0; i < deferred; ++i) {
     const std::uint32_t* const entry = answers + deferred_ + i * kDeferredWords;
     thread.require(entry[3] == batch_ && entry[0] < count, "what was deferred is not of this batch");
-    const PairWalks::Pair& pair = walks.pairs[first + entry[0]];
+    const DeviceWalks::Pair& pair = walks.pairs[first + entry[0]];
     thread.require(exists(walks.trees[pair.tree[0]], entry[1]) && exists(walks.trees[pair.tree[1]], entry[2]),
                    "what was deferred is no node");
     walks.deferred.push_back({narrow(first + entry[0]), {entry[1], entry[2]}});

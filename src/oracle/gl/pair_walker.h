@@ -8,8 +8,8 @@
 #include <vector>
 
 #include "egl/handles.h"
+#include "oracle/device_walks.h"
 #include "oracle/gl/arena.h"
-#include "oracle/pair_walk.h"
 
 namespace bocst::oracle::gl {
 
@@ -24,7 +24,7 @@ class PairWalker {
   std::shared_ptr<const DeviceResource> upload(std::vector<std::uint32_t>& words);
 
   /// Answers all. @throws OracleError; the context is lost then if the device left something out.
-  void walk(PairWalks& walks, Thread& thread);
+  void walk(DeviceWalks& walks, Thread& thread);
 
   /// What the driver gets.
   static std::string source();
@@ -32,9 +32,10 @@ class PairWalker {
  private:
   struct Table;
 
-  void walkPart(PairWalks& walks, std::size_t first, std::size_t count, Thread& thread);
-  void describe(const PairWalks& walks, std::size_t first, std::size_t count);
-  void take(PairWalks& walks, std::size_t first, std::size_t count, const std::uint32_t* answers, Thread& thread) const;
+  void walkPart(DeviceWalks& walks, std::size_t first, std::size_t count, Thread& thread);
+  void describe(const DeviceWalks& walks, std::size_t first, std::size_t count);
+  void take(DeviceWalks& walks, std::size_t first, std::size_t count, const std::uint32_t* answers,
+            Thread& thread) const;
 
   Arena& arena_;
   const std::size_t bytes_;

@@ -119,7 +119,7 @@ SphereWalk::Outcome SphereWalk::look(std::size_t batch, std::vector<tree::Tree::
   }
 }
 
-bool SphereWalk::describe(oracle::PairWalks::Pair& pair) const {
+bool SphereWalk::describe(oracle::DeviceWalks::Pair& pair) const {
   // Square roots of a device's float may be off by some ulp more.
   constexpr float kWider = 1.5f;
   const SphereFrames frames(b_in_a_);
@@ -134,8 +134,8 @@ bool SphereWalk::describe(oracle::PairWalks::Pair& pair) const {
   return true;
 }
 
-oracle::PairWalks::Tree SphereWalk::describe(const TreeSide& side, const tree::Tree::NodeTable& table) {
-  oracle::PairWalks::Tree tree;
+oracle::DeviceWalks::Tree SphereWalk::describe(const TreeSide& side, const tree::Tree::NodeTable& table) {
+  oracle::DeviceWalks::Tree tree;
   tree.nodes = table.nodes;
   tree.blocks = table.blocks;
   tree.root = table.root;
@@ -144,17 +144,17 @@ oracle::PairWalks::Tree SphereWalk::describe(const TreeSide& side, const tree::T
   return tree;
 }
 
-void SphereWalk::addGrowths(const std::vector<oracle::PairWalks::Deferred>& deferred, std::size_t batch,
+void SphereWalk::addGrowths(const std::vector<oracle::DeviceWalks::Deferred>& deferred, std::size_t batch,
                             std::vector<tree::Tree::Growth>& growths) const {
   Scratch& s = scratchOfThread();
   s.deferred.clear();
-  for (const oracle::PairWalks::Deferred& d : deferred) {
+  for (const oracle::DeviceWalks::Deferred& d : deferred) {
     s.deferred.add({tree::NodeRef{d.node[0]}, tree::NodeRef{d.node[1]}});
   }
   if (!s.deferred.empty()) s.deferred.addGrowths(a_, b_, b_in_a_, batch, growths);
 }
 
-void SphereWalk::markUsed(const TreeSide& side, const oracle::PairWalks::Tree& tree) {
+void SphereWalk::markUsed(const TreeSide& side, const oracle::DeviceWalks::Tree& tree) {
   for (std::uint32_t word = 0; word < tree.used.size(); ++word) {
     for (std::uint32_t bits = tree.used[word]; bits != 0; bits &= bits - 1) {
       side.tree().markUsed(32 * word + static_cast<std::uint32_t>(__builtin_ctz(bits)), side.now());

@@ -36,14 +36,14 @@ class SphereWalk {
 
   /// The same by a device: what it is asked about this pair. False where float cannot hold the pair, or the roots are
   /// leaves, which is the host's.
-  bool describe(oracle::PairWalks::Pair& pair) const;
+  bool describe(oracle::DeviceWalks::Pair& pair) const;
   /// What it is asked about the tree of a side, from a table of its nodes.
-  static oracle::PairWalks::Tree describe(const TreeSide& side, const tree::Tree::NodeTable& table);
+  static oracle::DeviceWalks::Tree describe(const TreeSide& side, const tree::Tree::NodeTable& table);
   /// As look() does, of pairs of nodes that the device did not find resident.
-  void addGrowths(const std::vector<oracle::PairWalks::Deferred>& deferred, std::size_t batch,
+  void addGrowths(const std::vector<oracle::DeviceWalks::Deferred>& deferred, std::size_t batch,
                   std::vector<tree::Tree::Growth>& growths) const;
   /// Marks the blocks that the device came to.
-  static void markUsed(const TreeSide& side, const oracle::PairWalks::Tree& tree);
+  static void markUsed(const TreeSide& side, const oracle::DeviceWalks::Tree& tree);
 
  private:
   struct Scratch;

@@ -17,6 +17,7 @@
 #include "query/distance/tree_gaps.h"
 #include "query/sides/box_side.h"
 #include "query/sides/side.h"
+#include "query/sides/visitor.h"
 
 namespace bocst::query {
 
@@ -314,31 +315,27 @@ class DistanceWalk : private BestFirst<DistanceWalk<A, B>, A, B> {
       spheresFound({a_.cellId(pair.a), a_.cellSphere(pair.a)},
                    {b_.cellId(pair.b), placed(b_.cellSphere(pair.b), b_in_a_)});
     } else if (a_.isConservative()) {
-      const Ball ball{a_.cellId(pair.a), a_.cellSphere(pair.a)};
+      const CellLeaf ball{a_.cellId(pair.a), a_.cellSphere(pair.a)};
       for (std::size_t i = 0; i < b_.triangleCount(pair.b); ++i) {
         spheresFound(ball, pointOf(b_, b_.triangle(pair.b, i), b_in_a_, ball.sphere.center));
       }
     } else {
-      const Ball ball{b_.cellId(pair.b), placed(b_.cellSphere(pair.b), b_in_a_)};
+      const CellLeaf ball{b_.cellId(pair.b), placed(b_.cellSphere(pair.b), b_in_a_)};
       for (std::size_t i = 0; i < a_.triangleCount(pair.a); ++i) {
         spheresFound(pointOf(a_, a_.triangle(pair.a, i), here, ball.sphere.center), ball);
       }
     }
   }
 
-  struct Ball {
-    std::uint64_t id;
-    Sphere sphere;
-  };
-
   // A triangle is a sphere without radius, at its point nearest to the other.
   template <typename Side>
-  static Ball pointOf(const Side& side, std::uint32_t t, const SimilarityTransform& place, const Eigen::Vector3d& to) {
+  static CellLeaf pointOf(const Side& side, std::uint32_t t, const SimilarityTransform& place,
+                          const Eigen::Vector3d& to) {
     const Corners corners = {place * side.corner(t, 0), place * side.corner(t, 1), place * side.corner(t, 2)};
     return {t, {closestPoint(to, corners), 0}};
   }
 
-  void spheresFound(const Ball& a, const Ball& b) {
+  void spheresFound(const CellLeaf& a, const CellLeaf& b) {
     Nearest n;
     n.a = a.id;
     n.b = b.id;

@@ -21,7 +21,7 @@ constexpr std::uint32_t kNone = 0xffffffffu;
 }  // namespace node_table
 
 /// Pairs of sphere-trees at poses, for a walk over their resident nodes.
-struct PairWalks {
+struct DeviceWalks {
   struct Tree {
     std::shared_ptr<const DeviceResource> nodes;  ///< As Oracle::uploadNodes() gave.
     std::uint32_t blocks = 0;                     ///< Of its table.
