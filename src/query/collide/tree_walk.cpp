@@ -85,7 +85,6 @@ bool TreeWalk::search(Scratch& s) {
   push({a_.root(), b_.root()});
   for (;;) {
     if (stepAll(steps, s)) return true;
-    if (gave_up_) return false;
     if (cut != nullptr) {
       s.deferred.dropIf([&](const auto& pair) { return cut->isBeyond(cut->leastOf(a_.volume(pair.a))); });
     }
@@ -109,7 +108,7 @@ bool TreeWalk::stepAll(PairSteps& steps, Scratch& s) {
         ++leaf_pairs_;
         break;
       case StepEvent::kLeaves:
-        if (testLeaves(event, s)) return !gave_up_;
+        if (testLeaves(event, s)) return true;
         if (steps.isCut()) steps.setCut(*visitor_->cut());
         break;
     }

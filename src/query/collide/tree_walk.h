@@ -41,7 +41,7 @@ class TreeWalk {
   void testLargeTriangles(PairSteps& steps, const StepEvent& event, Scratch& s);
   bool testLeaves(const StepEvent& event, Scratch& s);
   const SimilarityTransform& aInB();
-  bool run(Visitor& visitor, std::size_t most_leaf_pairs);
+  bool run(Visitor& visitor, std::size_t most_leaf_pairs);  // true also when it gave up
 
   const TreeSide &a_, &b_;
   const SimilarityTransform& b_in_a_;
