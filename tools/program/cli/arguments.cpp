@@ -57,9 +57,10 @@ void ModelArguments::addDepth(CLI::App& command) {
 
 void ModelArguments::addOracle(CLI::App& command) {
   command
-      .add_option("--oracle", oracle,
-                  "backend that finds the octants of a cell that the surface meets; see `bocst oracles`; sampled is the "
-                  "paper's, which can miss contacts")
+      .add_option(
+          "--oracle", oracle,
+          "backend that finds the octants of a cell that the surface meets; see `bocst oracles`; sampled is the "
+          "paper's, which can miss contacts")
       ->check(CLI::IsMember({"auto", "cpu", "occlusion", "compute", "sampled"}))
       ->capture_default_str();
   command.add_option("--viewport", viewport, "width and height in pixels of the views that --oracle sampled draws")

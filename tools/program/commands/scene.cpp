@@ -378,7 +378,8 @@ void addScene(CLI::App& program, Job& job) {
       "may touch.");
   command->add_option("file", scene->scene.file, "scene file (JSON) or robot (URDF)")->type_name("FILE")->required();
   command->add_option("--states", scene->scene.states, "states to check, one per line (CSV)")->type_name("FILE");
-  command->add_option("--srdf", scene->scene.srdf, "SRDF file; its disable_collisions are pairs of links that may touch")
+  command
+      ->add_option("--srdf", scene->scene.srdf, "SRDF file; its disable_collisions are pairs of links that may touch")
       ->type_name("FILE");
   command
       ->add_option(
@@ -396,8 +397,9 @@ void addScene(CLI::App& program, Job& job) {
   command->add_flag("--clearance", scene->clearance,
                     "report also the least distance in each state and the pair that has it");
   command
-      ->add_option("--margin", scene->margin,
-                   "margin of each mesh, in its unit: surfaces that are at most this far apart collide (two meshes: twice this)")
+      ->add_option(
+          "--margin", scene->margin,
+          "margin of each mesh, in its unit: surfaces that are at most this far apart collide (two meshes: twice this)")
       ->check(notNegative())
       ->capture_default_str();
   command->add_flag("--no-fcl", scene->no_fcl, "do not compare with FCL");
