@@ -164,8 +164,7 @@ void addBench(CLI::App& program, Job& job) {
       "planner: an arm with seven joints and a hand, with links of 200 and of 20000 triangles, among shelves and "
       "three copies of each mesh, in FCL's DynamicAABBTreeCollisionManager. As many random states as poses are "
       "checked, and as many states of edges. fresh: first query of a state; again: second query of the same. Pairs are "
-      "those "
-      "that pass the broad phase; they are measured one by one after the trees have settled.\n"
+      "those that pass the broad phase; they are measured one by one after the trees have settled.\n"
       "growth: A against itself, without FCL. Ratios compare with the first size: growth of the triangle count "
       "(first answer) or of its logarithm (warm query), divided by the growth of the time; above 1, the time grows "
       "more slowly.");
