@@ -31,13 +31,13 @@ class BestFirst {
     std::vector<tree::Tree::Growth> growths;
   };
 
-  BestFirst(const A& a, const B& b, Heap& heap) : a_(a), b_(b), heap_(heap) {
-    heap_.heap.clear();
-    heap_.waiting.clear();
-  }
+  BestFirst(const A& a, const B& b, Heap& heap) : a_(a), b_(b), heap_(heap) {}
 
   /// Looks at pairs, from that of the roots on, until nothing can be better than what was found.
   void search() {
+    heap_.heap.clear();
+    heap_.waiting.clear();
+    has_next_ = false;
     const Pair root{0, a_.root(), b_.root()};
     push({boundOf(root), root.a, root.b});
     std::size_t batch = kFirstBatch;
