@@ -126,6 +126,7 @@ class Edge {
     }
     fcl::ContinuousCollisionRequest<S> request;
     request.ccd_motion_type = type_;
+    request.toc_err = 2;  // any contact will do
     fcl::ContinuousCollisionResult<S> result;
     bocst::continuousCollide<S>(geometry_a, begin_[p.moving], end_[p.moving], geometry_b,
                                 check_.pose(begin_, p.group, p.lane), check_.pose(end_, p.group, p.lane), request,

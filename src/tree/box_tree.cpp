@@ -25,20 +25,32 @@ Vector3d longestAxis(const Matrix3d& covariance) {
   return axis.normalized();
 }
 
-// Along the longest edge of a triangle, and across it in the triangle's plane.
+// Along an edge of a triangle, and across it in the triangle's plane. The boxes along either of the two longest edges
+// have the same area, so the one of the shorter outline is taken: that of a right angle has its sides, as the surface
+// that the triangle is cut from may have. (Where no edge has a length, any axes will do.)
 Matrix3d axesOf(const Vector3d (&corner)[3]) {
-  const Vector3d edge[3] = {corner[1] - corner[0], corner[2] - corner[1], corner[0] - corner[2]};
-  const double squared[3] = {edge[0].squaredNorm(), edge[1].squaredNorm(), edge[2].squaredNorm()};
-  const auto longest = static_cast<std::size_t>(std::max_element(squared, squared + 3) - squared);
-  if (!(squared[longest] > 1e-200)) return Matrix3d::Identity();
-  Matrix3d axes;
-  axes.col(0) = edge[longest] / std::sqrt(squared[longest]);
-  Vector3d across = edge[(longest + 1) % 3];
-  for (int i = 0; i < 2; ++i) across -= axes.col(0).dot(across) * axes.col(0);  // once leaves a part along a long edge
-  const bool is_segment = !(across.squaredNorm() > 1e-24 * squared[longest]);
-  axes.col(1) = is_segment ? axes.col(0).unitOrthogonal() : across.normalized();
-  axes.col(2) = axes.col(0).cross(axes.col(1));
-  return axes;
+  Vector3d edge[3] = {corner[1] - corner[0], corner[2] - corner[1], corner[0] - corner[2]};
+  std::sort(edge, edge + 3, [](const Vector3d& p, const Vector3d& q) { return p.squaredNorm() > q.squaredNorm(); });
+  if (!(edge[0].squaredNorm() > 1e-200)) return Matrix3d::Identity();
+  Matrix3d best;
+  double least = std::numeric_limits<double>::infinity();
+  for (int base = 0; base < 2; ++base) {
+    Matrix3d axes;
+    axes.col(0) = edge[base].normalized();
+    Vector3d across = edge[1 - base];
+    for (int i = 0; i < 2; ++i)
+      across -= axes.col(0).dot(across) * axes.col(0);  // once leaves a part along a long edge
+    const bool is_segment = !(across.squaredNorm() > 1e-24 * edge[0].squaredNorm());
+    axes.col(1) = is_segment ? axes.col(0).unitOrthogonal() : across.normalized();
+    axes.col(2) = axes.col(0).cross(axes.col(1));
+    double outline = 0;
+    for (int k = 0; k < 2; ++k) {
+      const double at[2] = {axes.col(k).dot(edge[0]), -axes.col(k).dot(edge[1])};
+      outline += std::max({at[0], at[1], 0.0}) - std::min({at[0], at[1], 0.0});
+    }
+    if (outline < least) least = outline, best = axes;
+  }
+  return best;
 }
 
 // The axes of the corners' covariance. That of what lies across the longest axis is summed along two axes of its own:
@@ -68,6 +80,31 @@ Matrix3d principalAxes(double count, const F& over) {
 
 }  // namespace
 
+// Axes, and how far triangles reach along them.
+struct BoxTree::Frame {
+  explicit Frame(const Matrix3d& axes_) : axes(axes_) {}
+
+  void add(const Item& item, const Vector3d& origin) {
+    const Matrix3d to_axes = axes.transpose();
+    for (const Vector3d& corner : item.corner) {
+      const Vector3d p = to_axes * (corner - origin);
+      lo = lo.cwiseMin(p);
+      hi = hi.cwiseMax(p);
+    }
+    const Vector3d middle = to_axes * (item.middle - origin);
+    first = first.cwiseMin(middle);
+    last = last.cwiseMax(middle);
+  }
+  double area() const {
+    const Vector3d size = hi - lo;
+    return size.x() * size.y() + size.y() * size.z() + size.z() * size.x();
+  }
+
+  Matrix3d axes;
+  Vector3d lo = Vector3d::Constant(std::numeric_limits<double>::infinity()), hi = -lo;
+  Vector3d first = lo, last = hi;  // of the triangles' middles
+};
+
 BoxTree::BoxTree(const oracle::Surface& surface) {
   std::vector<Item> items(surface.triangle_count);
   for (std::uint32_t t = 0; t < items.size(); ++t) {
@@ -87,26 +124,21 @@ void BoxTree::add(Item* begin, Item* end) {
     }
   };
   const bool is_leaf = end - begin == 1;
-  const Matrix3d axes =
-      is_leaf ? axesOf(begin->corner) : principalAxes(3.0 * static_cast<double>(end - begin), over_corners);
-  Vector3d lo = Vector3d::Constant(std::numeric_limits<double>::infinity()), hi = -lo, first = lo, last = hi;
-  const Matrix3d to_axes = axes.transpose();
+  Frame frame(is_leaf ? axesOf(begin->corner) : principalAxes(3.0 * static_cast<double>(end - begin), over_corners));
+  Frame straight(Matrix3d::Identity());
   for (const Item* i = begin; i != end; ++i) {
-    for (const Vector3d& corner : i->corner) {
-      const Vector3d p = to_axes * (corner - origin);
-      lo = lo.cwiseMin(p);
-      hi = hi.cwiseMax(p);
-    }
-    const Vector3d middle = to_axes * (i->middle - origin);
-    first = first.cwiseMin(middle);
-    last = last.cwiseMax(middle);
+    frame.add(*i, origin);
+    straight.add(*i, origin);
   }
+  // Many parts are made along their own axes; those of a square's or a cube's covariance may be any.
+  if (straight.area() < frame.area()) frame = straight;
   const std::size_t index = nodes_.size();
-  nodes_.push_back({origin + axes * ((lo + hi) / 2), axes, ((hi - lo) / 2).array() + kPad, 0, begin->triangle});
+  nodes_.push_back({origin + frame.axes * ((frame.lo + frame.hi) / 2), frame.axes,
+                    ((frame.hi - frame.lo) / 2).array() + kPad, 0, begin->triangle});
   if (is_leaf) return;
   int widest = 0;
-  (last - first).maxCoeff(&widest);
-  const Vector3d along = axes.col(widest);
+  (frame.last - frame.first).maxCoeff(&widest);
+  const Vector3d along = frame.axes.col(widest);
   Item* const middle = begin + (end - begin) / 2;
   std::nth_element(begin, middle, end,
                    [&along](const Item& a, const Item& b) { return along.dot(a.middle) < along.dot(b.middle); });

@@ -36,6 +36,8 @@ class BoxTree {
     std::uint32_t triangle;
   };
 
+  struct Frame;
+
   void add(Item* begin, Item* end);
 
   std::vector<Node> nodes_;

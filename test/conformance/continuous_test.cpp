@@ -238,7 +238,7 @@ void checkBySampling(const Ways<S>& ways, const fcl::CollisionGeometry<S>& a, co
     const double d = distanceAt<S>(a, poseAt<S>(*m1, t), b, poseAt<S>(*m2, t));
     nearest = std::min(nearest, d);
   };
-  for (int i = 0; i <= 8; ++i) look(std::min(toc + toc_err * i / 8, 1.0));
+  for (int i = 0; i <= 100; ++i) look(std::min(toc + toc_err * i / 100, 1.0));
   EXPECT_LT(nearest, (std::is_same<S, double>::value ? 1e-7 : 1e-3) + kFclTolerance) << toc;
   const auto X = m1->at(toc).matrix();
   EXPECT_LT((result.contact_tf1.matrix().template cast<double>() - X).cwiseAbs().maxCoeff(), 1e-5);

@@ -123,5 +123,16 @@ TEST(BoxTree, IsAsThinAsASliver) {
   }
 }
 
+// A cube's covariance has no axes of its own, and the halves of a right angle's box along its longest side stick out of
+// the surface that it is cut from.
+TEST(BoxTree, PartsMadeAlongTheirAxesHaveBoxesAlongThese) {
+  const Check check(surfaceOf(test::box({0, 0, 0}, {1, 1, 1})));
+  for (const BoxTree::Node& node : check.tree().nodes()) {
+    const bool is_root = &node == check.tree().nodes().data();
+    if (!is_root && node.second != 0) continue;
+    for (int k = 0; k < 3; ++k) EXPECT_NEAR(node.axes.col(k).cwiseAbs().maxCoeff(), 1, 1e-12);
+  }
+}
+
 }  // namespace
 }  // namespace bocst::tree

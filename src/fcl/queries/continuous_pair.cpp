@@ -131,7 +131,9 @@ std::optional<double> timeOfContact(const ContinuousQuery<S>& q, const Mesh* mes
   if (model_b != nullptr) {
     const QueryScope scope(tree, treeOf(*model_b));
     if (tree.surface().mesh.get() != mesh_a || treeOf(*model_b).surface().mesh.get() != mesh_b) return {};
-    return walk(scope.a(), scope.b(), inBody(scope.b().tree()));
+    const TreeSide &a = scope.a(), &b = scope.b();
+    return query::findContactTime(a, inBody(a.tree()), q.X_WA(), b, inBody(b.tree()), q.X_WB(),
+                                  goalOf(q, magnitudeOf(a), magnitudeOf(b), margin));
   }
   const QueryScope scope(tree);
   if (tree.surface().mesh.get() != mesh_a) return {};

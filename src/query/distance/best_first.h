@@ -14,7 +14,8 @@ namespace bocst::query {
 /// need a node that is not expanded wait, the nearest first, while what is resident may still make them superfluous;
 /// then they grow in one batch, each twice as large as the one before.
 ///
-/// A query (Walk) derives from this and has, for this base: worthIt(bound); settled(); again(pair), true when it pushed
+/// A query (Walk) derives from this and has, for this base: worthIt(bound); settled(); tie(), by how much bounds may
+/// differ without a difference to the answer: of such pairs, the last is taken first; again(pair), true when it pushed
 /// the pair with a better bound instead; extentOfA(node) and extentOfB(node), or sphereOfA(node) and sphereOfB(node)
 /// when a side answers with cells; boundOf() of two of these; leaves(pair); scaleOfB(), the unit of B in that of A.
 template <typename Walk, typename A, typename B>
@@ -113,7 +114,8 @@ class BestFirst {
 
   // Makes the pair of the least bound the next; false when it is not worth it, or there is none.
   bool next() {
-    if (!heap_.heap.empty() && (!has_next_ || heap_.heap.front().bound < next_.bound)) {
+    if (!heap_.heap.empty() &&
+        (!has_next_ || heap_.heap.front().bound < next_.bound - walk().tie() || !walk().worthIt(next_.bound))) {
       std::pop_heap(heap_.heap.begin(), heap_.heap.end(), Later());
       Pair least = heap_.heap.back();
       heap_.heap.pop_back();

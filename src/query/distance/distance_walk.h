@@ -90,6 +90,7 @@ class DistanceWalk : private BestFirst<DistanceWalk<A, B>, A, B> {
     return std::min(limit_, needed - std::min(tie_, kTieShare * needed));
   }
   bool worthIt(double bound) const { return bound < cutoff(); }
+  double tie() const { return tie_; }
   bool settled() const { return !(limit_ > 0) || gaveUp(); }
   // A body may be much smaller than its box: pairs that pass the box's bound are bounded once more, by the body itself.
   bool again(const Pair& pair) {

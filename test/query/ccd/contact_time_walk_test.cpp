@@ -123,6 +123,28 @@ TEST(ContactTimes, CloudsAgreeWithManyDistances) {
   EXPECT_GT(misses, 4);
 }
 
+// All triangles of two rows meet at the same time: one pair is followed to its contact, not all.
+TEST(ContactTimes, FlatLandingsTakeFewSteps) {
+  HandTree a(test::row(64)), b(test::row(64, 1));
+  SimilarityTransform same;
+  same.ready();
+  const AxisMotion up = moving({0, 0, 8}), none = still();
+  ContactTimeWalk<HandTree, HandTree> walk(a, same, up, b, same, none);
+  ContactGoal goal;
+  goal.rounding = kRounding;
+  goal.time_error = kTimeError;
+  expectTime(walk.run(goal), 0.125, 8);
+  EXPECT_FALSE(walk.gaveUp());
+  EXPECT_LT(walk.steps(), 64u);
+  // A walk that gives up keeps what it was told, or found.
+  EXPECT_EQ(walk.run(goal, 0.5, 2), 0.5);
+  EXPECT_TRUE(walk.gaveUp());
+  expectTime(walk.run(goal, 0.5), 0.125, 8);
+  // A contact that is known ends the walk where nothing is earlier.
+  expectTime(walk.run(goal, 0.125), 0.125, 8);
+  EXPECT_LE(walk.steps(), 1u);
+}
+
 TEST(ContactTimes, OnlyWhatMayTouchFirstGrows) {
   HandTree a(test::row(64)), b(test::row(1, 4));
   a.sleepFrom(0);

@@ -41,6 +41,7 @@ class Nearest : public BestFirst<Nearest, HandTree, HandTree> {
     return h;
   }
   bool worthIt(double bound) const { return bound < best; }
+  double tie() const { return 0; }
   bool settled() const { return best <= enough; }
   double scaleOfB() const { return 1; }
   Box extentOfA(int n) const { return a_.box(n); }
