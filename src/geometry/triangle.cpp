@@ -345,6 +345,54 @@ PenetrationVerdicts trianglePenetrations(const TrianglePairs& pairs, double tole
   return {found.meet, found.apart};
 }
 
+namespace {
+
+// The two points in which the edges of triangle t cross the plane of another, if they clearly do.
+bool cutByPlane(const Corners& t, const Corners& other, const Vector3d& normal, double tolerance, Vector3d (&ends)[2]) {
+  const Vector3d way[3] = {t[0] - other[0], t[1] - other[0], t[2] - other[0]};
+  const double height[3] = {normal.dot(way[0]), normal.dot(way[1]), normal.dot(way[2])};
+  const double largest = std::max(t[0].lpNorm<1>(), other[0].lpNorm<1>());
+  const double size = (other[1] - other[0]).lpNorm<1>() + (other[2] - other[0]).lpNorm<1>();
+  const double reach = way[0].lpNorm<1>() + (t[1] - t[0]).lpNorm<1>() + (t[2] - t[0]).lpNorm<1>();
+  // Corners are off by a rounding of the largest coordinate, the normal's entries by that times the other's size.
+  const double doubt = 16 * std::numeric_limits<double>::epsilon() * size * (largest + size) * (reach + size);
+  int above = 0;
+  for (const double h : height) {
+    if (!(std::abs(h) > doubt)) return false;
+    above += h > 0;
+  }
+  if (above == 0 || above == 3) return false;
+  int lone = 0;
+  while ((height[lone] > 0) != (above == 1)) ++lone;
+  for (int e = 0; e < 2; ++e) {
+    const int k = (lone + 1 + e) % 3;
+    const double drop = height[lone] - height[k];
+    const Vector3d edge = t[k] - t[lone];
+    if (2 * doubt * edge.norm() > tolerance * std::abs(drop)) return false;
+    ends[e] = t[lone] + height[lone] / drop * edge;
+  }
+  return true;
+}
+
+}  // namespace
+
+std::optional<double> farEndOfCut(const Corners& p, const Corners& q, const Vector3d& direction, double tolerance) {
+  const Vector3d normal_p = (p[1] - p[0]).cross(p[2] - p[0]), normal_q = (q[1] - q[0]).cross(q[2] - q[0]);
+  const Vector3d line = normal_p.cross(normal_q);
+  // The order of points along the line is that of their coordinates along its direction, which must be known.
+  constexpr double kLeastSine = 1e-6;
+  if (!(line.squaredNorm() > kLeastSine * kLeastSine * normal_p.squaredNorm() * normal_q.squaredNorm())) return {};
+  Vector3d of_p[2], of_q[2];
+  if (!cutByPlane(p, q, normal_q, tolerance, of_p) || !cutByPlane(q, p, normal_p, tolerance, of_q)) return {};
+  for (Vector3d(*ends)[2] : {&of_p, &of_q}) {
+    if (line.dot((*ends)[0]) > line.dot((*ends)[1])) std::swap((*ends)[0], (*ends)[1]);
+  }
+  const Vector3d& from = line.dot(of_p[0]) > line.dot(of_q[0]) ? of_p[0] : of_q[0];
+  const Vector3d& to = line.dot(of_p[1]) < line.dot(of_q[1]) ? of_p[1] : of_q[1];
+  if (line.dot(from) > line.dot(to)) return {};
+  return std::max(direction.dot(from), direction.dot(to));
+}
+
 Vector3d closestPoint(const Vector3d& x, const Corners& t) {
   const Face<double> face = faceOf(t);
   if (hasFace(face) && (x - t[0]).squaredNorm() < kFarthest) return toVector(closestTo(Vec<double>(x), face));

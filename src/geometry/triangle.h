@@ -4,6 +4,7 @@
 #include <Eigen/Core>
 #include <cstdint>
 #include <limits>
+#include <optional>
 
 #include "geometry/penetration_kernels.h"
 
@@ -32,6 +33,11 @@ struct PenetrationVerdicts {
 /// The same for many pairs at once, whether they touch or not; `contacts` has room for pairs.count, or is null where
 /// nobody asks. `tolerance` is a length that corners may be off by without that meet or apart is wrong.
 PenetrationVerdicts trianglePenetrations(const TrianglePairs& pairs, double tolerance, ContactPoint* contacts);
+
+/// Of the segment in which two triangles cut each other, the largest coordinate along a direction, known to `tolerance`
+/// (both may have any length). Nothing where they do not, or where rounding leaves that in doubt.
+std::optional<double> farEndOfCut(const Corners& p, const Corners& q, const Eigen::Vector3d& direction,
+                                  double tolerance);
 
 /// The point of a closed triangle, degenerate or not, that is nearest to x.
 Eigen::Vector3d closestPoint(const Eigen::Vector3d& x, const Corners& triangle);

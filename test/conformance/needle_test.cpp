@@ -2,6 +2,7 @@
 // Pairs of long and thin meshes, whose triangles are as long as they are: the contacts are FCL's, whatever is resident.
 #include <gtest/gtest.h>
 
+#include <algorithm>
 #include <atomic>
 #include <chrono>
 #include <cmath>
@@ -95,8 +96,8 @@ TEST(Needles, ContactsAreFcls) {
   EXPECT_GT(misses, 40u);
 }
 
-// A few contacts are the first of all, with and without boxes.
-TEST(Needles, FewContactsAreTheFirst) {
+// Few contacts are some of all, the same with and without boxes.
+TEST(Needles, FewContactsAreSomeOfAll) {
   Random g(2);
   const Raw raw = rod(5e-6, 20);
   Options small;
@@ -113,14 +114,17 @@ TEST(Needles, FewContactsAreTheFirst) {
   for (const fcl::Transform3d& X : poses(g, 5e-6)) {
     const auto all = ask(a, b, X, 100000);
     for (const std::size_t most : {1, 3, 100000}) {
-      for (const auto& some : {ask(a, b, X, most), ask(small_a, small_b, X, most)}) {
-        ASSERT_EQ(some.size(), std::min(most, all.size()));
-        for (std::size_t i = 0; i < some.size(); ++i) {
-          EXPECT_EQ(some[i].b1, all[i].b1);
-          EXPECT_EQ(some[i].b2, all[i].b2);
-          EXPECT_EQ(some[i].penetration_depth, all[i].penetration_depth);
-          EXPECT_EQ(some[i].pos, all[i].pos);
-        }
+      const auto some = ask(a, b, X, most), same = ask(small_a, small_b, X, most);
+      ASSERT_EQ(some.size(), std::min(most, all.size()));
+      ASSERT_EQ(same.size(), some.size());
+      auto next = all.begin();
+      for (std::size_t i = 0; i < some.size(); ++i) {
+        EXPECT_EQ(some[i].b1, same[i].b1);
+        EXPECT_EQ(some[i].b2, same[i].b2);
+        next = std::find_if(next, all.end(), [&](const auto& c) { return c.b1 == some[i].b1 && c.b2 == some[i].b2; });
+        ASSERT_NE(next, all.end());
+        EXPECT_EQ(some[i].penetration_depth, next->penetration_depth);
+        EXPECT_EQ(some[i].pos, next->pos);
       }
     }
   }

@@ -6,7 +6,9 @@
 
 #include <algorithm>
 #include <cmath>
+#include <limits>
 #include <random>
+#include <utility>
 
 #include "exact.h"
 #include "meshes.h"
@@ -223,6 +225,54 @@ TEST(EdgesTouch, FindsWhatSharesAPointOfEdges) {
   const Corners q = {Vector3d(0, 0, 1e-180), Vector3d(1e-200, 0, 1e-180), Vector3d(0, 1e-200, 1e-180)};
   Vector3d on_p, on_q;
   EXPECT_FALSE(edgesTouch(p, q, 1e-190, on_p, on_q));
+}
+
+// The points in which edges of one cut the other end the segment that both share.
+TEST(FarEndOfCut, IsTheFarthestPointOfBoth) {
+  std::mt19937_64 g(11);
+  std::uniform_real_distribution<double> u(-1, 1);
+  std::uniform_int_distribution<int> step(-3, 3);
+  int found = 0, doubtful = 0;
+  for (int round = 0; round < 20000; ++round) {
+    // On a grid corners and edges meet; thin ones and those in nearly one plane are cut where rounding decides.
+    const bool on_grid = round % 4 == 0;
+    const double thin = round % 4 == 1 ? std::exp2(20 * u(g) - 20) : 1, far = round % 8 == 2 ? 1e6 : 0;
+    Corners p, q;
+    for (Corners* t : {&p, &q}) {
+      for (Vector3d& x : *t) {
+        x = on_grid ? Vector3d(step(g), step(g), step(g)) : Vector3d(u(g), u(g), thin * u(g));
+        x += Vector3d::Constant(far);
+      }
+    }
+    const Vector3d direction = round % 3 == 0 ? Vector3d(0, 0, 2) : Vector3d(u(g), u(g), u(g));
+    const double tolerance = 1e-6;
+    const auto end = farEndOfCut(p, q, direction, tolerance), same = farEndOfCut(q, p, direction, tolerance);
+    ASSERT_EQ(end.has_value(), same.has_value());
+    double expected = -std::numeric_limits<double>::infinity();
+    for (const auto& [t, other] : {std::make_pair(&p, &q), std::make_pair(&q, &p)}) {
+      for (int k = 0; k < 3; ++k) {
+        const Vector3d begin = (*t)[k], way = (*t)[(k + 1) % 3] - begin;
+        Eigen::Matrix<long double, 3, 3> m;
+        m << ((*other)[1] - (*other)[0]).cast<long double>(), ((*other)[2] - (*other)[0]).cast<long double>(),
+            -way.cast<long double>();
+        const Eigen::FullPivLU<Eigen::Matrix<long double, 3, 3>> lu(m);
+        if (!lu.isInvertible()) continue;
+        const Eigen::Matrix<long double, 3, 1> x = lu.solve((begin - (*other)[0]).cast<long double>());
+        if (!(x.minCoeff() >= -1e-9L && x[0] + x[1] <= 1 + 1e-9L && x[2] <= 1 + 1e-9L)) continue;
+        expected = std::max(expected, direction.dot(begin) + static_cast<double>(x[2]) * direction.dot(way));
+      }
+    }
+    if (!end.has_value()) {
+      doubtful += std::isfinite(expected) && !on_grid && thin == 1 && far == 0;
+      continue;
+    }
+    ++found;
+    ASSERT_NEAR(*end, expected, direction.norm() * 2 * tolerance) << round;
+    ASSERT_NEAR(*same, *end, direction.norm() * 2 * tolerance);
+    ASSERT_LT(exactDistance(p, q), tolerance);
+  }
+  EXPECT_GT(found, 3000);
+  EXPECT_LT(doubtful, found / 100);
 }
 
 TEST(IsDegenerate, WhateverTheOrderAndTheUnit) {

@@ -103,14 +103,16 @@ class ConvexCollector final : public query::ConvexVisitor<typename Partner::Node
     return false;
   }
 
-  /// To be called at the end of the walk: as in the Collector of meshes, contacts are in ContactOrder and not in that
-  /// in which the walk found them. `cells`: those are what it found.
+  /// To be called at the end of the walk: as in the Collector of meshes, contacts are sorted by their ids, and few are
+  /// chosen by ContactOrder. `cells`: those are what it found.
   void finish(bool cells) {
     if (is_cut_) s_.found = s_.first.sort();
     s_.order.resize(s_.found.size());
     std::iota(s_.order.begin(), s_.order.end(), 0u);
-    std::sort(s_.order.begin(), s_.order.end(),
-              [this](std::uint32_t i, std::uint32_t j) { return s_.found[i] < s_.found[j]; });
+    std::sort(s_.order.begin(), s_.order.end(), [this](std::uint32_t i, std::uint32_t j) {
+      const Found &f = s_.found[i], &g = s_.found[j];
+      return std::tie(f.b1, f.b2) < std::tie(g.b1, g.b2);
+    });
     for (const std::uint32_t i : s_.order) {
       const Found& f = s_.found[i];
       if (cells ? addCell(f.leaf, f.body) : addTriangle(static_cast<std::uint32_t>(f.leaf.id), f.body)) return;
@@ -153,7 +155,7 @@ class ConvexCollector final : public query::ConvexVisitor<typename Partner::Node
     const auto t = static_cast<std::uint32_t>(found.leaf.id);
     if (!partner_.occupied(found.body) || !touches(t, cornersOf(t).data(), found.body, gap)) return;
     s_.first.add(found);
-    if (s_.first.isFull()) order_.setCut(s_.first.last().place, cut_);
+    if (s_.first.isFull()) order_.setCut(s_.first.last().place, 0, cut_);
   }
 
   std::array<Eigen::Vector3d, 3> cornersOf(std::uint32_t t) const {

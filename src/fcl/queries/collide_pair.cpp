@@ -76,7 +76,7 @@ class Triangles {
 
 /// A contact before it is one of FCL's: ids in the caller's order, and how the two touch, in the world.
 struct Met {
-  double place;  // see ContactOrder
+  double place;  // of cells, see ContactOrder; of triangles 0
   std::uint64_t b1, b2;
   query::ContactPoint contact;
 
@@ -94,9 +94,9 @@ struct PlacedPair {
 /// Turns the pairs of a walk into contacts and cost sources; triangles are those of the caller's first and second
 /// geometry.
 ///
-/// A walk finds pairs in an order that depends on what is resident. So unless any pair will do, contacts are put in
-/// ContactOrder: few of them by cutting the walk at the place of the last that is asked for, many by gathering pairs
-/// and sorting them until there are enough.
+/// A walk finds pairs in an order that depends on what is resident. So unless any pair will do, contacts are sorted by
+/// their ids. If there may be more than are asked for, few are chosen by ContactOrder, which lets the walk be cut at
+/// the place of the last of them; many are the first by their ids of all that are gathered.
 template <typename S>
 class Collector : public query::Visitor {
  public:
@@ -126,10 +126,12 @@ class Collector : public query::Visitor {
     }
   }
 
-  /// Where cells lie in the world: from the lattice frame of side A.
-  void setFrame(const Eigen::Vector3d& origin, double unit) {
-    origin_ = origin;
-    unit_ = unit;
+  /// Where side A's cells lie in the world, and by how many of its lattice units positions may be off: the margin
+  /// included.
+  void setFrame(const lattice::Lattice& lattice, double tolerance) {
+    origin_ = lattice.origin();
+    unit_ = lattice.unit();
+    position_tolerance_ = tolerance;
   }
 
   bool endsAtFirst() const override { return ends_at_first_; }
@@ -141,9 +143,9 @@ class Collector : public query::Visitor {
     const std::uint64_t key = keyOf(a, b, certain);
     if (ends_at_first_) return endsWith(key);
     if (is_cut_) {
-      addFirst({order_.placeOf(of_model), key});
+      addFirst(of_model, key);
     } else if (s_.seen.insert(a, b)) {
-      s_.found.push_back({0, key});
+      s_.found.push_back(key);
       if (s_.found.size() >= most_) lookAtFound();
     }
     return false;
@@ -167,11 +169,12 @@ class Collector : public query::Visitor {
   void finish() {
     if (ends_at_first_) return;
     if (is_cut_) {
-      s_.found = s_.first.sort();
+      for (const PlacedPair& pair : s_.first.sort()) s_.found.push_back(pair.key);
       s_.met = s_.first_cells.sort();
     }
     lookAtFound();
-    keepFirst();
+    std::sort(s_.met.begin(), s_.met.end(),
+              [](const Met& x, const Met& y) { return std::tie(x.b1, x.b2) < std::tie(y.b1, y.b2); });
     emit();
   }
 
@@ -196,10 +199,10 @@ class Collector : public query::Visitor {
     query::PairSet<std::uint32_t> seen;
     query::PairSet<std::uint64_t> seen_cells;
     query::TrianglePairs pairs;
-    FirstPairs first;               // that touch, where the walk is cut
-    FirstItems<Met> first_cells;    // the same where cells are in the pairs
-    std::vector<PlacedPair> found;  // pairs of triangles that were not tested yet
-    std::vector<Met> met;           // the first that touch, of those that were
+    FirstPairs first;                  // that touch, where the walk is cut
+    FirstItems<Met> first_cells;       // the same where cells are in the pairs
+    std::vector<std::uint64_t> found;  // keys of pairs of triangles that were not tested yet
+    std::vector<Met> met;              // the first that touch, of those that were
   };
   static Scratch& scratch() {
     thread_local Scratch scratch;
@@ -232,6 +235,7 @@ class Collector : public query::Visitor {
                            p_12_);
     place_.linear() = R_12_.template cast<double>();
     place_.translation() = p_12_.template cast<double>();
+    if (q_.swapped) to_model_ = place_.inverse(Eigen::Affine);
     placed_ = true;
   }
 
@@ -245,16 +249,21 @@ class Collector : public query::Visitor {
   }
 
   // Only the first so many that touch are wanted: is this one of them?
-  void addFirst(const PlacedPair& pair) {
-    if (!s_.first.wants(pair) || !s_.seen.insert(first(pair.key), second(pair.key))) return;
-    if (!isCertain(pair.key)) {
-      s_.met.clear();
-      decidePairs(&pair, 1);
-      if (s_.met.empty()) return;
-      s_.met.clear();
-    }
+  void addFirst(std::uint32_t of_model, std::uint64_t key) {
+    if (!s_.seen.insert(first(key), second(key))) return;
+    getCorners(&key, 1);
+    const PlacedPair pair{placeOf(of_model, 0), key};
+    if (!s_.first.wants(pair) || !decide(key, 0, nullptr)) return;
     s_.first.add(pair);
-    if (s_.first.isFull()) order_.setCut(s_.first.last().place, cut_);
+    if (s_.first.isFull()) order_.setCut(s_.first.last().place, position_tolerance_, cut_);
+  }
+
+  // Of pair i of s_.pairs.
+  double placeOf(std::uint32_t of_model, std::size_t i) const {
+    if (margin_ > 0) return order_.placeOf(of_model);
+    Corners p, q;
+    s_.pairs.get(i, p, q);
+    return order_.placeOf(of_model, p, q, to_model_);
   }
 
   // True when nothing more is asked for.
@@ -269,37 +278,24 @@ class Collector : public query::Visitor {
   // Moves the first of what was found and touches to `met`, and forgets the rest of it.
   void lookAtFound() {
     constexpr std::size_t kBatch = query::TrianglePairs::kCapacity;
-    std::vector<PlacedPair>& found = s_.found;
-    if (!is_cut_) sortFound();
+    std::vector<std::uint64_t>& found = s_.found;
+    std::sort(found.begin(), found.end());
     const std::size_t before = s_.met.size();
     for (std::size_t i = 0; i < found.size(); i += kBatch) {
-      const std::size_t count = std::min(kBatch, found.size() - i);
       for (std::size_t k = i + kBatch; k < std::min(i + 2 * kBatch, found.size()); ++k) {
-        t1_.prefetchCorners(first(found[k].key));
-        t2_.prefetchCorners(second(found[k].key));
+        t1_.prefetchCorners(first(found[k]));
+        t2_.prefetchCorners(second(found[k]));
       }
       for (std::size_t k = i + 2 * kBatch; k < std::min(i + 3 * kBatch, found.size()); ++k) {
-        t1_.prefetch(first(found[k].key));
-        t2_.prefetch(second(found[k].key));
+        t1_.prefetch(first(found[k]));
+        t2_.prefetch(second(found[k]));
       }
-      decidePairs(&found[i], count);
+      decidePairs(&found[i], std::min(kBatch, found.size() - i));
       if (q_.request.enable_cost || s_.met.size() - before < left_) continue;
       break;  // What comes later comes behind what there is.
     }
     found.clear();
     keepFirst();
-  }
-
-  void sortFound() {
-    std::vector<PlacedPair>& found = s_.found;
-    constexpr std::size_t kAhead = 16;
-    const auto of_model = [this](const PlacedPair& pair) { return q_.swapped ? second(pair.key) : first(pair.key); };
-    for (std::size_t i = 0; i < found.size(); ++i) {
-      if (i + 2 * kAhead < found.size()) order_.prefetch(of_model(found[i + 2 * kAhead]));
-      if (i + kAhead < found.size()) order_.prefetchCorners(of_model(found[i + kAhead]));
-      found[i].place = order_.placeOf(of_model(found[i]));
-    }
-    std::sort(found.begin(), found.end());
   }
 
   // Of what touches, only as much as is asked for.
@@ -309,12 +305,10 @@ class Collector : public query::Visitor {
     if (met.size() > left_) met.resize(left_);
   }
 
-  void decidePairs(const PlacedPair* pairs, std::size_t count) {
-    std::uint64_t keys[query::TrianglePairs::kCapacity];
-    for (std::size_t i = 0; i < count; ++i) keys[i] = pairs[i].key;
+  void decidePairs(const std::uint64_t* keys, std::size_t count) {
     if (!needsCorners() && std::all_of(keys, keys + count, isCertain)) {
       for (std::size_t i = 0; i < count; ++i) {
-        s_.met.push_back({pairs[i].place, first(keys[i]), second(keys[i]), {}});
+        s_.met.push_back({0, first(keys[i]), second(keys[i]), {}});
       }
       return;
     }
@@ -325,9 +319,9 @@ class Collector : public query::Visitor {
     for (std::size_t i = 0; i < count; ++i) {
       const bool meet = isCertain(keys[i]) || (verdicts.meet >> i & 1);
       if (meet && margin_ == 0) {
-        addMet(pairs[i], contacts[i]);
+        addMet(keys[i], contacts[i]);
       } else if (margin_ > 0 || !kTrustsApart || !(verdicts.apart >> i & 1)) {
-        if (decide(keys[i], i, &contacts[i])) addMet(pairs[i], contacts[i]);
+        if (decide(keys[i], i, &contacts[i])) addMet(keys[i], contacts[i]);
       }
     }
   }
@@ -339,7 +333,8 @@ class Collector : public query::Visitor {
       Corners p, q;
       for (int k = 0; k < 3; ++k) {
         p[k] = t1_.corner(first(keys[i]), k).template cast<double>();
-        q[k] = place_ * t2_.corner(second(keys[i]), k).template cast<double>().eval();
+        const Eigen::Vector3d own = t2_.corner(second(keys[i]), k).template cast<double>();
+        q[k] = place_.linear() * own + place_.translation();
       }
       s_.pairs.put(i, p, q);
     }
@@ -405,10 +400,10 @@ class Collector : public query::Visitor {
     }
   }
 
-  void addMet(const PlacedPair& pair, const query::ContactPoint& contact) {
-    const std::uint32_t a = first(pair.key), b = second(pair.key);
+  void addMet(std::uint64_t key, const query::ContactPoint& contact) {
+    const std::uint32_t a = first(key), b = second(key);
     if (q_.request.enable_cost) addCost(a, b);
-    Met met{pair.place, a, b, {}};
+    Met met{0, a, b, {}};
     if (q_.request.enable_contact) {
       const fcl::Transform3<double> X_W1 = q_.X_W1.template cast<double>();
       met.contact = {X_W1.linear() * contact.normal, X_W1 * contact.point, contact.depth};
@@ -472,12 +467,13 @@ class Collector : public query::Visitor {
   const bool is_cut_;
   Scratch& s_;
   query::Cut cut_;
-  fcl::Transform3<double> place_ = fcl::Transform3<double>::Identity();  // the same in double
+  fcl::Transform3<double> place_ = fcl::Transform3<double>::Identity();     // the same in double
+  fcl::Transform3<double> to_model_ = fcl::Transform3<double>::Identity();  // from the frame of the first geometry
   fcl::Matrix3<S> R_12_;
   fcl::Vector3<S> p_12_;
   bool placed_ = false;  // R_12_ and p_12_ are set
   Eigen::Vector3d origin_ = Eigen::Vector3d::Zero();
-  double unit_ = 1;
+  double unit_ = 1, position_tolerance_ = 0;
 };
 
 /// What is within the margin touches: the walk's tolerance, in units of side A, is so much more. Positions may be off
@@ -518,11 +514,10 @@ void collideTrees(const CollideQuery<S>& q, const TreeSide& a, const TreeSide& b
   tree::Tree &tree_a = a.tree(), &tree_b = b.tree();
   const auto [b_in_a, magnitude] = relate<S>(q, a, b);
   if (isOutOfSight(q, b_in_a, magnitudeOf(tree_a.surface().bounds), magnitudeOf(tree_b.surface().bounds))) return;
-  const auto walk = [&, magnitude = magnitude](auto&& with_collector) {
-    const lattice::Lattice& lattice = tree_a.surface().lattice;
+  const auto walk = [&, &b_in_a = b_in_a, magnitude = magnitude](auto&& with_collector) {
     const Triangles<S> t1(q.swapped ? tree_b : tree_a), t2(q.swapped ? tree_a : tree_b);
     Collector<S> collector(q, tree_a, t1, t2, magnitude);
-    collector.setFrame(lattice.origin(), lattice.unit());
+    collector.setFrame(tree_a.surface().lattice, b_in_a.tolerance + q.margin / tree_a.surface().lattice.unit());
     with_collector(collector);
     collector.finish();
   };
@@ -571,7 +566,7 @@ void collideBvh(const CollideQuery<S>& q, tree::Tree& tree, const BvhSide& b) {
   if (isOutOfSight(q, b_in_a, magnitudeOf(surface.bounds), b.magnitude())) return;
   const Triangles<S> of_model(tree), of_partner(b);
   Collector<S> collector(q, tree, q.swapped ? of_partner : of_model, q.swapped ? of_model : of_partner, magnitude);
-  collector.setFrame(surface.lattice.origin(), surface.lattice.unit());
+  collector.setFrame(surface.lattice, b_in_a.tolerance + q.margin / surface.lattice.unit());
   query::PairWalk<TreeSide, BvhSide>(a, b, withMargin(b_in_a, a, q, q.cullingMargin(a.isConservative())), collector)
       .run();
   collector.finish();

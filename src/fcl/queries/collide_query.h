@@ -39,7 +39,7 @@ struct CollideQuery : OrderedPair<S> {
   }
 
   /// Yes or no: any pair that touches will do, so which one it is may depend on what is resident. All other questions
-  /// get the first contacts in ContactOrder.
+  /// get the same contacts always.
   bool endsAtFirst() const {
     return request.num_max_contacts == 1 && !request.enable_contact && !request.enable_cost && occupied();
   }

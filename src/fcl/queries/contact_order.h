@@ -1,21 +1,26 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #pragma once
 
+#include <fcl/common/types.h>
+
 #include <algorithm>
 #include <cstddef>
 #include <cstdint>
 #include <limits>
 #include <vector>
 
+#include "geometry/triangle.h"
 #include "query/sides/visitor.h"
 #include "tree/tree.h"
 
 namespace bocst::fcl_adapter {
 
-/// The order of contacts: by place, then by the ids. The place of a triangle of a model is the largest coordinate of
-/// its corners along the longest axis of its mesh's bounding box, in the mesh's frame and length unit; that of a cell
-/// is its Morton code, which has at most 48 bits. So the order is a property of mesh, pose and request, and a walk that
-/// wants the first few can leave out what lies beyond.
+/// Which of many contacts a request for few gets: the first by place, then by the ids. The place of two triangles is
+/// the largest coordinate of the segment in which they cut each other, along the longest axis of the bounding box of
+/// the model's mesh, in the mesh's frame and length unit; where they do not clearly cut each other, and beside bodies,
+/// that of the corners of the model's triangle. The place of a cell is its Morton code, which has at most 48 bits. So
+/// the order is a property of mesh, pose and request, and a walk that wants the first few can leave out what lies
+/// beyond: where two triangles touch, no coordinate is larger than their place.
 class ContactOrder {
  public:
   explicit ContactOrder(const tree::Tree& model) : surface_(model.surface()) {
@@ -28,10 +33,12 @@ class ContactOrder {
         {surface_.mesh->vertex(i[0])[axis_], surface_.mesh->vertex(i[1])[axis_], surface_.mesh->vertex(i[2])[axis_]});
   }
 
-  /// Triangle t is about to be asked for, and now its corners.
-  void prefetch(std::uint32_t t) const { __builtin_prefetch(&surface_.mesh->indices(t)); }
-  void prefetchCorners(std::uint32_t t) const {
-    for (const std::uint32_t v : surface_.mesh->indices(t)) __builtin_prefetch(&surface_.mesh->vertex(v)[axis_]);
+  /// The same of triangle t and one of another mesh, corners in any frame, from which `to_model` leads to the model's.
+  double placeOf(std::uint32_t t, const query::Corners& p, const query::Corners& q,
+                 const fcl::Transform3<double>& to_model) const {
+    const Eigen::Vector3d direction = to_model.linear().row(axis_);
+    const auto place = query::farEndOfCut(p, q, direction, kTolerance * surface_.lattice.unit());
+    return place ? *place + to_model.translation()[axis_] : placeOf(t);
   }
 
   /// The cut of a walk in the model's lattice frame that has found nothing yet: it leaves nothing out.
@@ -41,12 +48,15 @@ class ContactOrder {
     return cut;
   }
   /// Nodes whose triangles all lie at places after this one may be left out of the walk.
-  void setCut(double place, query::Cut& cut) const {
+  /// Positions may be off by `tolerance` lattice units.
+  void setCut(double place, double tolerance, query::Cut& cut) const {
     const lattice::Lattice& lattice = surface_.lattice;
-    cut.last = (place - lattice.origin()[axis_]) / lattice.unit();
+    cut.last = (place - lattice.origin()[axis_]) / lattice.unit() + tolerance;
   }
 
  private:
+  static constexpr double kTolerance = 0x1p-8;  // lattice units: less than Cut::isBeyond() adds
+
   const oracle::Surface& surface_;
   int axis_ = 0;
 };
@@ -55,7 +65,7 @@ class ContactOrder {
 template <typename Item>
 class FirstItems {
  public:
-  /// More than these are rather gathered and sorted.
+  /// Requests for more gather all contacts, and get the first by the ids.
   static constexpr std::size_t kMost = 1024;
 
   void start(std::size_t count) {

@@ -48,7 +48,7 @@ class PairWalk {
     s.stack.clear();
     s.ordered.clear();
     s.deferred.clear();
-    s.leaves.start(b_in_a_, a_in_b_, visitor_.endsAtFirst());
+    s.leaves.start(b_in_a_, a_in_b_, visitor_.endsAtFirst(), cut_);
     s.large_a.clear();
     s.large_b.clear();
     const Pair root{a_.root(), b_.root()};
@@ -120,7 +120,10 @@ class PairWalk {
 
   // The least that Cut knows of a pair: along its axis, or the least id of its cells.
   double placeOf(const Pair& pair) const {
-    if (!spheres_) return cut_->leastOf(a_.volume(pair.a));
+    if (!spheres_) {
+      const double least = cut_->leastOf(a_.volume(pair.a));
+      return B::kBodies ? least : std::max(least, cut_->leastOf(b_.volume(pair.b), b_in_a_));
+    }
     if constexpr (std::is_same<A, TreeSide>::value) {
       if (a_.isConservative()) return static_cast<double>(a_.firstCellId(pair.a));
     }

@@ -347,24 +347,21 @@ HWY_INLINE bool pushOthers(PairSteps& s, const BlockView& own, const StepNode& o
   return !waits;
 }
 
-// The least coordinate of a node of side 0 along the axis of the cut, in the frame of side 0.
-HWY_INLINE float leastAlongCut(const PairSteps& s, const Frame& f, std::uint32_t o) {
-  return f.center[0][s.cut_axis][o] - f.half[0][s.cut_axis][o];
+// Does a node of a side lie behind the cut? All in the frame of side 0, as side 1's octants see it, too.
+HWY_INLINE bool isBeyondCut(const PairSteps& s, int side, const StepNode& node) {
+  if (node.lane == StepNode::kNoLane) return false;
+  const Frame& f = s.frames[node.lane / 8];
+  const std::uint32_t o = node.lane % 8;
+  return f.center[side][s.cut_axis][o] - f.half[side][s.cut_axis][o] > s.cut;
 }
 
-HWY_INLINE bool isBeyondCut(const PairSteps& s, const Popped& p) {
-  const std::uint32_t lane = p.side == 0 ? p.own.lane : p.other.lane;
-  if (!s.isCut() || lane == StepNode::kNoLane) return false;
-  return leastAlongCut(s, s.frames[lane / 8], lane % 8) > s.cut;
-}
-
-// Orders octants by their least coordinates along the axis of the cut: that with the smallest is taken first.
-HWY_INLINE void orderAlongCut(const PairSteps& s, const Frame& f, std::uint32_t (&order)[8]) {
+// Orders a side's octants by their least coordinates along the axis of the cut: that with the smallest is taken first.
+HWY_INLINE void orderAlongCut(const PairSteps& s, int side, const Frame& f, std::uint32_t (&order)[8]) {
   const D d;
   const hn::RebindToUnsigned<D> du;
   const V beyond = hn::Set(d, 4.0f * lattice::kMiddle);  // keeps the numbers positive: their bits are in their order
   for (std::size_t i = 0; i < 8; i += hn::Lanes(d)) {
-    const V least = hn::Sub(hn::Load(d, f.center[0][s.cut_axis] + i), hn::Load(d, f.half[0][s.cut_axis] + i));
+    const V least = hn::Sub(hn::Load(d, f.center[side][s.cut_axis] + i), hn::Load(d, f.half[side][s.cut_axis] + i));
     const auto octant = hn::Iota(du, static_cast<std::uint32_t>(i));
     hn::StoreU(hn::Or(hn::AndNot(hn::Set(du, 7), hn::BitCast(du, hn::Sub(beyond, least))), octant), du, order + i);
   }
@@ -398,7 +395,7 @@ void NextEvent(PairSteps& s, StepEvent& event) {
   while (known || s.depth != 0) {
     if (!known) p = pop(s);
     known = false;
-    if (isBeyondCut(s, p)) continue;
+    if (s.isCut() && (isBeyondCut(s, p.side, p.own) || isBeyondCut(s, 1 - p.side, p.other))) continue;
     const bool own_leaf = isLeaf(p.own), other_leaf = isLeaf(p.other);
     if (own_leaf && other_leaf) {
       if (!s.sees_all) {
@@ -420,7 +417,7 @@ void NextEvent(PairSteps& s, StepEvent& event) {
     const unsigned mask =
         overlapping(s.geometry, s.frames[block.frame], s.frames[other.lane / 8], other.lane % 8, block.at->grey, order);
     if (mask == 0) continue;
-    if (s.isCut() && x == 0) orderAlongCut(s, s.frames[block.frame], order);
+    if (s.isCut()) orderAlongCut(s, x, s.frames[block.frame], order);
     if (choice.has_larger_leaf) {
       if (p.asked.side == AskedLeaf::kNone || !s.leaf[y]->know(other.node, p.asked.triangles)) {
         fill(event, StepEvent::kLargeTriangles, p);

@@ -101,8 +101,8 @@ struct PairSteps {
   /// No hit ends the walk: what is on the stack will be walked, so it is fetched ahead.
   bool sees_all = false;
 
-  /// Nodes of side 0 whose least coordinate along this axis, in their own frame, is larger than `cut` are left out;
-  /// octants of side 0 come in the order of these coordinates. Axis 3: nothing is left out.
+  /// Nodes whose least coordinate along this axis, in the frame of side 0, is larger than `cut` are left out; octants
+  /// come in the order of these coordinates. Axis 3: nothing is left out.
   std::uint32_t cut_axis = 3;
   float cut = 0;
   bool isCut() const { return cut_axis < 3; }

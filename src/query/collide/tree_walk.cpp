@@ -137,7 +137,7 @@ bool TreeWalk::testLeaves(const StepEvent& event, Scratch& s) {
   gave_up_ = ++leaf_pairs_ > most_leaf_pairs_;
   if (gave_up_) return true;
   if (!s.leaves_started) {
-    s.leaves.start(b_in_a_, aInB(), visitor_->endsAtFirst());
+    s.leaves.start(b_in_a_, aInB(), visitor_->endsAtFirst(), visitor_->cut());
     s.leaves_started = true;
   }
   const auto visit = [this](std::uint32_t t, std::uint32_t u, bool certain) {

@@ -14,6 +14,7 @@
 #include "query/leaf/leaf_corners.h"
 #include "query/leaf/unpack.h"
 #include "query/sides/side.h"
+#include "query/sides/visitor.h"
 
 namespace bocst::query {
 
@@ -70,6 +71,14 @@ struct LeafVolume {
       center[0][k] = v.center[k];
       half[0][k] = own[k];
     }
+  }
+
+  /// Leaves out what has a larger coordinate along an axis of its own frame. To be placed again.
+  void cutOff(int axis, double most) {
+    const double beyond = std::clamp(center[0][axis] + half[0][axis] - most, 0.0, 2 * half[0][axis]);
+    center[0][axis] -= beyond / 2;
+    half[0][axis] -= beyond / 2;
+    slab[0] += normal[0][axis] * beyond / 2;
   }
 
   void place(const SimilarityTransform& to_other) {
@@ -186,14 +195,16 @@ class LeafPacks {
 template <typename A, typename B>
 class LeafPairs {
  public:
-  /// To be called before the first test of a walk. `one_will_do`: the first pair that touches ends it.
-  void start(const SimilarityTransform& b_in_a, const SimilarityTransform& a_in_b, bool one_will_do) {
+  /// To be called before the first test of a walk. `one_will_do`: the first pair that touches ends it. What lies beyond
+  /// `cut`, which may be null, is left out of the tests of leaves.
+  void start(const SimilarityTransform& b_in_a, const SimilarityTransform& a_in_b, bool one_will_do, const Cut* cut) {
     leaves_a_.clear();
     leaves_b_.clear();
     to_a_ = turnOf(b_in_a);
     b_in_a_ = &b_in_a;
     a_in_b_ = &a_in_b;
     one_will_do_ = one_will_do;
+    cut_ = cut;
   }
 
   /// Calls f(triangle of a, triangle of b, whether they surely meet) for the pairs that are not surely apart, until it
@@ -233,10 +244,17 @@ class LeafPairs {
     b.prefetchIds();
     // What touches within both leaves does so within both boxes and both slabs.
     PackRegion region;
-    fillRegion(b.volume, a.volume, *a_in_b_, b.pack.size, b.error, region);
+    if (cut_ == nullptr) {
+      fillRegion(b.volume, a.volume, *a_in_b_, b.pack.size, b.error, region);
+    } else {
+      LeafVolume before_cut = a.volume;
+      before_cut.cutOff(cut_->axis, cut_->most());
+      before_cut.place(*a_in_b_);
+      fillRegion(b.volume, before_cut, *a_in_b_, b.pack.size, b.error, region);
+    }
     const std::uint32_t lanes = trianglesWithin(b.pack, region);
     if (lanes == 0) return false;
-    fillRegion(a.volume, b.volume, *b_in_a_, a.pack.size, a.error, region);
+    fillRegion(a.volume, b.volume, *b_in_a_, a.pack.size, a.error, region, cut_);
     const std::uint32_t rows = trianglesWithin(a.pack, region);
     if (rows == 0) return false;
     for (int k = 0; k < 3; ++k) to_a_.offset[k] = static_cast<float>(b.volume.center[1][k] - a.volume.center[0][k]);
@@ -310,7 +328,7 @@ class LeafPairs {
   /// Where the triangles of a leaf can meet those of another, which `to` places in its frame. With M = `extent`, what
   /// is computed here and by trianglesWithin() is off by 15 u M: corners 2, the normal 3, sums along it 10.
   static void fillRegion(const LeafVolume& own, const LeafVolume& other, const SimilarityTransform& to, double size,
-                         float error, PackRegion& region) {
+                         float error, PackRegion& region, const Cut* cut = nullptr) {
     double displacement[3], extent = size, offset = to.scale * other.slab[0];
     for (int k = 0; k < 3; ++k) {
       displacement[k] = other.center[1][k] - own.center[0][k];
@@ -325,6 +343,10 @@ class LeafPairs {
       region.high[k] =
           static_cast<float>(std::min(own.half[0][k], displacement[k] + other.half[1][k]) + rounding_margin);
     }
+    if (cut != nullptr) {
+      const int k = cut->axis;
+      region.high[k] = std::min(region.high[k], static_cast<float>(cut->most() - own.center[0][k] + rounding_margin));
+    }
     const double half = to.scale * other.slab[1] + rounding_margin;
     region.slab_low = static_cast<float>(offset - half);
     region.slab_high = static_cast<float>(offset + half);
@@ -337,6 +359,7 @@ class LeafPairs {
   PackSlabs slabs_{};  // of rows_
   const SimilarityTransform *b_in_a_ = nullptr, *a_in_b_ = nullptr;
   bool one_will_do_ = false;
+  const Cut* cut_ = nullptr;
   PackPair found_[TrianglePack::kCapacity * TrianglePack::kCapacity];
 };
 

@@ -23,8 +23,9 @@ struct CellLeaf {
 };
 
 /// Limits of a walk that wants only the first pairs in their order; the visitor lowers them as it finds pairs. With
-/// exact answers, nodes of side A are left out if their least coordinate along `axis` is larger than `last`. Where
-/// leaves are cells, nodes are left out if all their cells have ids larger than `last_cell`.
+/// exact answers, nodes are left out if their least coordinate along `axis` is larger than `last`: those of side A, and
+/// of side B where it has triangles. Where leaves are cells, nodes are left out if all their cells have ids larger than
+/// `last_cell`.
 struct Cut {
   int axis = 0;                                           ///< Of the frame of A.
   double last = std::numeric_limits<double>::infinity();  ///< Lattice units, in the frame of A.
@@ -36,8 +37,15 @@ struct Cut {
     return v.center[k] - static_cast<double>(v.half[k]);
   }
   double leastOf(const OrientedVolume& v) const { return v.center[axis] - v.axes.row(axis).cwiseAbs().dot(v.half); }
+  /// The same of a node of side B, in the frame of A.
+  double leastOf(const Volume& v, const SimilarityTransform& to_a) const { return leastOf(oriented(v), to_a); }
+  double leastOf(const OrientedVolume& v, const SimilarityTransform& to_a) const {
+    const Eigen::RowVector3d row = to_a.scale * to_a.rotation.row(axis);
+    return row.dot(v.center) + to_a.translation[axis] - (row * v.axes).cwiseAbs().dot(v.half);
+  }
   /// Half extents are rounded to float: by less than 2^-8 of a lattice unit, as is the middle.
-  bool isBeyond(double least) const { return least > last + 0x1p-6; }
+  double most() const { return last + 0x1p-6; }
+  bool isBeyond(double least) const { return least > most(); }
 };
 
 /// What a query does with the pairs that a walk finds. Each function returns true to end the walk. A pair may come more
