@@ -12,7 +12,7 @@
 namespace bocst::test {
 
 /// The distance of each triangle of a mesh from a shape, triangle by triangle, and how far it must go along a direction
-/// to be off the shape. body_test proves these gaps.
+/// to be off the shape. convex_shape_test proves these gaps.
 template <typename S>
 class Truth {
  public:

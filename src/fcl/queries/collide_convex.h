@@ -15,7 +15,7 @@
 #include "fcl/adapters/narrow_phase.h"
 #include "fcl/queries/collide_query.h"
 #include "fcl/queries/contact_order.h"
-#include "fcl/queries/convex_pair.h"
+#include "fcl/queries/convex_frame.h"
 #include "fcl/queries/inside.h"
 #include "fcl/queries/inside_contact.h"
 #include "fcl/queries/query_scope.h"
@@ -103,7 +103,7 @@ class ConvexCollector final : public query::ConvexVisitor<typename Partner::Node
     return false;
   }
 
-  /// To be called at the end of the walk: as in the Collector of meshes, contacts are sorted by their ids, and few are
+  /// To be called at the end of the walk: as in MeshCollector, contacts are sorted by their ids, and few are
   /// chosen by ContactOrder. `cells`: those are what it found.
   void finish(bool cells) {
     if (is_cut_) s_.found = s_.first.sort();

@@ -1,7 +1,6 @@
 // SPDX-License-Identifier: BSD-3-Clause
-#include "fcl/queries/collide_octree.h"
-
 #include "fcl/adapters/octree_side.h"
+#include "fcl/queries/collide_bodies.h"
 
 #if FCL_HAVE_OCTOMAP
 

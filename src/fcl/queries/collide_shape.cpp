@@ -1,8 +1,7 @@
 // SPDX-License-Identifier: BSD-3-Clause
-#include "fcl/queries/collide_shape.h"
-
 #include <fcl/geometry/shape/utility.h>
 
+#include "fcl/queries/collide_bodies.h"
 #include "fcl/queries/collide_convex.h"
 
 namespace bocst::fcl_adapter {

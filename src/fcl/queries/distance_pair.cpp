@@ -14,7 +14,7 @@
 #include "fcl/adapters/pair.h"
 #include "fcl/adapters/validate.h"
 #include "fcl/queries/collide_pair.h"
-#include "fcl/queries/convex_pair.h"
+#include "fcl/queries/convex_frame.h"
 #include "fcl/queries/inside.h"
 #include "fcl/queries/query_scope.h"
 #include "query/distance/distance_walk.h"

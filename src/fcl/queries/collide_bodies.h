@@ -7,7 +7,11 @@
 
 namespace bocst::fcl_adapter {
 
-/// collidePair() for a model, side A, and an fcl::OcTree. There is none where FCL was built without octomap.
+/// collidePair() for a model, side A, and a shape (see isShape()).
+template <typename S>
+void collideShape(const CollideQuery<S>& q, tree::Tree& tree, const BroughtSolver<S>& solver);
+
+/// The same for an fcl::OcTree. There is none where FCL was built without octomap.
 template <typename S>
 void collideOcTree(const CollideQuery<S>& q, tree::Tree& tree, const BroughtSolver<S>& solver);
 
