@@ -101,9 +101,13 @@ HWY_INLINE LeastOverlap leastOverlap(const BothTriangles& t, const Edges& e, con
   // Between triangles with an area and no common plane, the difference of the two has no other faces; in a common
   // plane the overlap along its normal is 0.
   if (hn::AllTrue(d, areas)) return least;
+  // What a pair gets must not depend on its neighbours: to others these axes are all rounding.
+  const auto shortest = [&](Vd edge, Vd normal) HWY_ATTR {
+    return hn::IfThenElse(areas, hn::Inf(d), hn::Mul(tiny, hn::Mul(edge, normal)));
+  };
   for (int a = 0; a < 3; ++a) {
-    consider(t, cross(e.edge[a], e.normal), hn::Mul(tiny, hn::Mul(e.squared[a], e.normal_squared)), least);
-    consider(t, cross(f.edge[a], f.normal), hn::Mul(tiny, hn::Mul(f.squared[a], f.normal_squared)), least);
+    consider(t, cross(e.edge[a], e.normal), shortest(e.squared[a], e.normal_squared), least);
+    consider(t, cross(f.edge[a], f.normal), shortest(f.squared[a], f.normal_squared), least);
   }
   return least;
 }

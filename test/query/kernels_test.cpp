@@ -1039,6 +1039,37 @@ TEST_P(EveryTarget, MovingByDepthParts) {
   EXPECT_GT(slivers, 5);
 }
 
+// Edges at right angles have equal overlaps along several axes; beside triangles without area, more axes are tried.
+TEST_P(EveryTarget, PenetrationsDoNotDependOnNeighbours) {
+  std::mt19937_64 g(7);
+  std::uniform_int_distribution<int> step(-2, 2);
+  int areas = 0;
+  for (int round = 0; round < 2000; ++round) {
+    const Eigen::Matrix3d R = test::randomRotation(g);
+    const auto corner = [&] { return Eigen::Vector3d(R * Eigen::Vector3d(step(g), step(g), step(g))); };
+    const Corners p = {corner(), corner(), corner()}, q = {corner(), corner(), corner()};
+    const Corners flat = {p[0], p[1], p[1]};
+    ContactPoint touches[2][TrianglePairs::kCapacity];
+    PenetrationVerdicts verdicts[2];
+    const std::size_t at = g() % TrianglePairs::kCapacity;
+    for (const bool with_flat : {false, true}) {
+      TrianglePairs pairs;
+      pairs.count = TrianglePairs::kCapacity;
+      for (std::size_t i = 0; i < pairs.count; ++i) pairs.put(i, with_flat && i != at ? flat : p, q);
+      verdicts[with_flat] = trianglePenetrations(pairs, 1e-12, touches[with_flat]);
+    }
+    areas += !isDegenerate(p) && !isDegenerate(q);
+    ASSERT_EQ(touches[0][at].depth, touches[1][at].depth);
+    ASSERT_EQ(touches[0][at].normal, touches[1][at].normal);
+    if ((verdicts[0].apart >> at & 1) == 0) {
+      ASSERT_EQ(touches[0][at].point, touches[1][at].point);
+    }
+    ASSERT_EQ(verdicts[0].meet >> at & 1, verdicts[1].meet >> at & 1);
+    ASSERT_EQ(verdicts[0].apart >> at & 1, verdicts[1].apart >> at & 1);
+  }
+  EXPECT_GT(areas, 1000);
+}
+
 INSTANTIATE_TEST_SUITE_P(Targets, EveryTarget, testing::ValuesIn(test::EveryTarget::targets()),
                          test::EveryTarget::name);
 
