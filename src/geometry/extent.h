@@ -53,10 +53,9 @@ struct NodeExtent {
 };
 
 /// Calls f(direction) with directions along which the gap between two nodes may be large, the most likely one first,
-/// until it returns true; did it? All are of unit length. `each_axis`: with the axes of the boxes too, along which the
-/// gap is smaller, but nodes that slide past each other do not come nearer.
+/// until it returns true; did it? All are of unit length.
 template <typename F>
-bool anyDirectionApart(const NodeExtent& a, const NodeExtent& b, const F& f, bool each_axis = false) {
+bool anyDirectionApart(const NodeExtent& a, const NodeExtent& b, const F& f) {
   const Eigen::Vector3d t = b.center - a.center;
   const double apart = t.norm();
   if (apart > 0 && f(Eigen::Vector3d(t / apart))) return true;
@@ -66,24 +65,14 @@ bool anyDirectionApart(const NodeExtent& a, const NodeExtent& b, const F& f, boo
   const Eigen::Vector3d in_a = a.axes.transpose() * t, in_b = b.axes.transpose() * t;
   const Eigen::Vector3d gap_a = (in_a.cwiseAbs() - a.half - s * b.half).cwiseMax(0);
   const Eigen::Vector3d gap_b = (in_b.cwiseAbs() - b.half - s.transpose() * a.half).cwiseMax(0);
-  const auto isApart = [&f](const Eigen::Vector3d& direction) {
+  const Eigen::Vector3d directions[] = {a.axes * gap_a.cwiseProduct(in_a.cwiseSign()),
+                                        b.axes * gap_b.cwiseProduct(in_b.cwiseSign()), a.axes * a.normal,
+                                        b.axes * b.normal};
+  for (const Eigen::Vector3d& direction : directions) {
     const double length = direction.norm();
-    return length > 0 && f(Eigen::Vector3d(direction / length));
-  };
-  if (isApart(a.axes * gap_a.cwiseProduct(in_a.cwiseSign())) ||
-      isApart(b.axes * gap_b.cwiseProduct(in_b.cwiseSign())) || isApart(a.axes * a.normal) ||
-      isApart(b.axes * b.normal)) {
-    return true;
+    if (length > 0 && f(Eigen::Vector3d(direction / length))) return true;
   }
-  if (!each_axis) return false;
-  const auto anyAxisApart = [&isApart](const Eigen::Matrix3d& axes, const Eigen::Vector3d& gap) {
-    if ((gap.array() > 0).count() < 2) return false;  // the one direction has been asked
-    for (int k = 0; k < 3; ++k) {
-      if (gap[k] > 0 && isApart(axes.col(k))) return true;
-    }
-    return false;
-  };
-  return anyAxisApart(a.axes, gap_a) || anyAxisApart(b.axes, gap_b);
+  return false;
 }
 
 /// What computing in double may be off by, as a share of the distance and of all half extents; twice over is enough for

@@ -123,17 +123,14 @@ std::optional<double> timeOfContact(const ContinuousQuery<S>& q, const Mesh* mes
   const Model<S>*model_a = asModel<S>(q.a()), *model_b = asModel<S>(q.b());
   const double margin = marginOf(model_a, model_b);
   const auto walk = [&](const TreeSide& a, const auto& b, const SimilarityTransform& b_in_body) {
-    query::ContactTimeWalk<TreeSide, std::decay_t<decltype(b)>> times(a, inBody(a.tree()), q.X_WA(), b, b_in_body,
-                                                                      q.X_WB());
-    return times.run(goalOf(q, magnitudeOf(a), magnitudeOf(b), margin));
+    return query::findContactTime(a, inBody(a.tree()), q.X_WA(), b, b_in_body, q.X_WB(),
+                                  goalOf(q, magnitudeOf(a), magnitudeOf(b), margin));
   };
   tree::Tree& tree = treeOf(*model_a);
   if (model_b != nullptr) {
     const QueryScope scope(tree, treeOf(*model_b));
     if (tree.surface().mesh.get() != mesh_a || treeOf(*model_b).surface().mesh.get() != mesh_b) return {};
-    const TreeSide &a = scope.a(), &b = scope.b();
-    return query::findContactTime(a, inBody(a.tree()), q.X_WA(), b, inBody(b.tree()), q.X_WB(),
-                                  goalOf(q, magnitudeOf(a), magnitudeOf(b), margin));
+    return walk(scope.a(), scope.b(), inBody(scope.b().tree()));
   }
   const QueryScope scope(tree);
   if (tree.surface().mesh.get() != mesh_a) return {};

@@ -165,7 +165,7 @@ class ContactTimeWalk : private BestFirst<ContactTimeWalk<A, B>, A, B> {
       if (gap > 0) best = std::max(best, timeToClose(gap, direction, a.center, radius_a, b.center, radius_b));
       return !worthIt(best);
     };
-    anyDirectionApart(a, b, consider, true);
+    anyDirectionApart(a, b, consider);
     return best;
   }
 
@@ -266,9 +266,8 @@ class ContactTimeWalk : private BestFirst<ContactTimeWalk<A, B>, A, B> {
         motion_a_.fastest(a.center, a.radius, pair.bound) + motion_b_.fastest(b.center, b.radius, pair.bound);
     const double gap = std::max(0.0, (a.center - b.center).norm() - a.radius - b.radius);
     const bool is_single = s.a.size() * s.b.size() == 1;
-    const double window = is_single || !(speed > 0)
-                              ? 2
-                              : std::max(kLeastWindow, (gap + kShareOfLeaves * (a.radius + b.radius)) / speed);
+    const double window =
+        is_single || !(speed > 0) ? 2 : std::max(kLeastWindow, (gap + kShareOfLeaves * (a.radius + b.radius)) / speed);
     const double until = pair.bound + window;
     const double near =
         (window * speed + contactDistance()) * (1 + 1e-12) + 1e-15 * (a.center.norm() + b.center.norm());
@@ -386,22 +385,36 @@ class ContactTimeWalk : private BestFirst<ContactTimeWalk<A, B>, A, B> {
   SimilarityTransform a_in_world_, b_in_world_, world_in_b_;  // at the time now_; the last for bodies only
 };
 
-/// When the triangles of two trees with exact answers first touch. Oriented boxes take a fifth of the steps: parts that
-/// slide past each other or land flat are apart along an axis of theirs. They are built when walks have paid for them.
-inline double findContactTime(const TreeSide& a, const SimilarityTransform& a_in_body, const Motion& motion_a,
-                              const TreeSide& b, const SimilarityTransform& b_in_body, const Motion& motion_b,
-                              const ContactGoal& goal) {
+/// When the triangles of a tree and another side first touch. Of exact answers, oriented boxes take a fifth of the
+/// steps: parts that slide past each other or land flat are apart along an axis of theirs. They are built when walks
+/// have paid for them.
+template <typename B>
+double findContactTime(const TreeSide& a, const SimilarityTransform& a_in_body, const Motion& motion_a, const B& b,
+                       const SimilarityTransform& b_in_body, const Motion& motion_b, const ContactGoal& goal) {
   constexpr std::size_t kFew = 32, kMany = 2048;
-  ContactTimeWalk<TreeSide, TreeSide> trees(a, a_in_body, motion_a, b, b_in_body, motion_b);
-  if (!BoxSide::fits(a, b)) return trees.run(goal);
-  const std::size_t price = a.tree().boxPrice() + b.tree().boxPrice();
-  const double time = trees.run(goal, std::numeric_limits<double>::infinity(), price == 0 ? kFew : kMany + price);
-  if (trees.steps() > kMany) {
-    for (const TreeSide* side : {&a, &b}) side->tree().payBoxRent(trees.steps() - kMany);
+  constexpr bool kTwoTrees = std::is_same<B, TreeSide>::value;
+  ContactTimeWalk<TreeSide, B> trees(a, a_in_body, motion_a, b, b_in_body, motion_b);
+  const auto fits = [](const TreeSide& side) { return !side.isConservative() && side.tree().affordsBoxes(); };
+  std::size_t price = a.tree().boxPrice();
+  bool has_boxes = fits(a);
+  if constexpr (kTwoTrees) {
+    price += b.tree().boxPrice();
+    has_boxes = has_boxes && fits(b);
   }
+  if (!has_boxes) return trees.run(goal);
+  const double time = trees.run(goal, std::numeric_limits<double>::infinity(), price == 0 ? kFew : kMany + price);
+  const std::size_t rent = trees.steps() - std::min(trees.steps(), kMany);
+  a.tree().payBoxRent(rent);
+  if constexpr (kTwoTrees) b.tree().payBoxRent(rent);
   if (!trees.gaveUp()) return time;
-  const BoxSide boxes_a(a), boxes_b(b);
-  return ContactTimeWalk<BoxSide, BoxSide>(boxes_a, a_in_body, motion_a, boxes_b, b_in_body, motion_b).run(goal, time);
+  const BoxSide boxes_a(a);
+  if constexpr (kTwoTrees) {
+    const BoxSide boxes_b(b);
+    return ContactTimeWalk<BoxSide, BoxSide>(boxes_a, a_in_body, motion_a, boxes_b, b_in_body, motion_b)
+        .run(goal, time);
+  } else {
+    return ContactTimeWalk<BoxSide, B>(boxes_a, a_in_body, motion_a, b, b_in_body, motion_b).run(goal, time);
+  }
 }
 
 }  // namespace bocst::query
