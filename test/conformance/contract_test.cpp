@@ -336,15 +336,18 @@ TYPED_TEST(Contacts, AreThoseOfThinLayers) {
     layers.triangles.emplace_back(n, n + 1, n + 2);
   }
   const test::Raw rod = test::box({0.5, -0.5, -0.5}, {2.5, 0.5, 0.5});
-  const auto a = std::make_shared<Model<S>>(layers.mesh());
+  const auto a = std::make_shared<Model<S>>(layers.mesh()), c = std::make_shared<Model<S>>(rod.mesh());
   const auto X = fcl::Transform3<S>::Identity();
   const auto Y = test::pose<S>(Eigen::AngleAxisd(0.02, Eigen::Vector3d::UnitZ()).toRotationMatrix(), {0, 0, 0});
-  const std::vector<std::shared_ptr<fcl::CollisionGeometry<S>>> partners = {
-      std::make_shared<Model<S>>(rod.mesh()), test::bvh<fcl::OBBRSS<S>>(rod),
-      std::make_shared<fcl::Box<S>>(S(4), S(1), S(1))};
-  for (const auto& b : partners) {
+  using G = typename TestFixture::Geometry;
+  const std::vector<std::pair<G, G>> rows = {{a, c},
+                                             {a, test::bvh<fcl::OBBRSS<S>>(rod)},
+                                             {a, std::make_shared<fcl::Box<S>>(S(4), S(1), S(1))},
+                                             {c, a},
+                                             {c, test::bvh<fcl::OBBRSS<S>>(layers)}};
+  for (const auto& [first, second] : rows) {
     for (const bool swapped : {false, true}) {
-      const Question<S> q = swapped ? Question<S>{b, a, Y, X} : Question<S>{a, b, X, Y};
+      const Question<S> q = swapped ? Question<S>{second, first, Y, X} : Question<S>{first, second, X, Y};
       const auto all = q.ask(fcl::CollisionRequest<S>(100000, true));
       ASSERT_GT(all.size(), 1500u);
       for (std::size_t most = 2; most < 1000; most += 37) {
