@@ -336,15 +336,26 @@ TYPED_TEST(Contacts, AreThoseOfThinLayers) {
     layers.triangles.emplace_back(n, n + 1, n + 2);
   }
   const test::Raw rod = test::box({0.5, -0.5, -0.5}, {2.5, 0.5, 0.5});
+  // As small as the distance of some layers along the axis, and as large across it: no node has far larger triangles.
+  test::Raw chips;
+  for (int i = 0; i < 3000; ++i) {
+    const double x = u(g), y = g() % 2 ? 0.5 : -0.5, z = 0.5 * (u(g) - 1.5);
+    const std::size_t n = chips.vertices.size();
+    chips.vertices.insert(chips.vertices.end(), {{x, y - 0.4, z}, {x + 0.01, y + 0.4, z}, {x, y, z + 0.1}});
+    chips.triangles.emplace_back(n, n + 1, n + 2);
+  }
   const auto a = std::make_shared<Model<S>>(layers.mesh()), c = std::make_shared<Model<S>>(rod.mesh());
   const auto X = fcl::Transform3<S>::Identity();
   const auto Y = test::pose<S>(Eigen::AngleAxisd(0.02, Eigen::Vector3d::UnitZ()).toRotationMatrix(), {0, 0, 0});
   using G = typename TestFixture::Geometry;
+  const auto d = std::make_shared<Model<S>>(chips.mesh());
   const std::vector<std::pair<G, G>> rows = {{a, c},
                                              {a, test::bvh<fcl::OBBRSS<S>>(rod)},
                                              {a, std::make_shared<fcl::Box<S>>(S(4), S(1), S(1))},
                                              {c, a},
-                                             {c, test::bvh<fcl::OBBRSS<S>>(layers)}};
+                                             {c, test::bvh<fcl::OBBRSS<S>>(layers)},
+                                             {d, a},
+                                             {d, test::bvh<fcl::OBBRSS<S>>(layers)}};
   for (const auto& [first, second] : rows) {
     for (const bool swapped : {false, true}) {
       const Question<S> q = swapped ? Question<S>{second, first, Y, X} : Question<S>{first, second, X, Y};
