@@ -231,17 +231,17 @@ class MeshCollector : public query::Visitor {
   void addFirst(std::uint32_t of_model, std::uint64_t key) {
     if (!s_.seen.insert(first(key), second(key))) return;
     getCorners(&key, 1);
-    const PlacedPair pair{placeOf(of_model, 0), key};
+    const PlacedPair pair{placeOf(of_model), key};
     if (!s_.first.wants(pair) || !decide(key, 0, nullptr)) return;
     s_.first.add(pair);
     if (s_.first.isFull()) order_.setCut(s_.first.last().place, position_tolerance_, cut_);
   }
 
-  // Of pair i of s_.pairs.
-  double placeOf(std::uint32_t of_model, std::size_t i) const {
+  // Of the pair whose corners were got last.
+  double placeOf(std::uint32_t of_model) const {
     if (margin_ > 0) return order_.placeOf(of_model);
     query::Corners p, q;
-    s_.pairs.get(i, p, q);
+    s_.pairs.get(0, p, q);
     return order_.placeOf(of_model, p, q, to_model_);
   }
 
