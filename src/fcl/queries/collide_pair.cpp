@@ -97,7 +97,7 @@ void collideTrees(const CollideQuery<S>& q, const TreeSide& a, const TreeSide& b
         }
       });
     }
-  } else if (kUsesBoxes && isNeedle(tree_a) && isNeedle(tree_b) && query::BoxSide::fits(a, b)) {
+  } else if (kUsesBoxes && isNeedle(tree_a) && isNeedle(tree_b) && query::BoxSide::fits(a) && query::BoxSide::fits(b)) {
     walk(walkBoxes);
   } else if (query::SphereWalk::fits(a, b)) {
     query::SphereWalk spheres(a, b, near);

@@ -47,8 +47,8 @@ class ContactOrder {
     cut.axis = axis_;
     return cut;
   }
-  /// Nodes whose triangles all lie at places after this one may be left out of the walk.
-  /// Positions may be off by `tolerance` lattice units.
+  /// What lies beyond this place along the axis may be left out of the walk. Positions may be off by `tolerance`
+  /// lattice units.
   void setCut(double place, double tolerance, query::Cut& cut) const {
     const lattice::Lattice& lattice = surface_.lattice;
     cut.last = (place - lattice.origin()[axis_]) / lattice.unit() + tolerance;

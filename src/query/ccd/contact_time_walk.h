@@ -394,14 +394,13 @@ double findContactTime(const TreeSide& a, const SimilarityTransform& a_in_body, 
   constexpr std::size_t kFew = 32, kMany = 2048;
   constexpr bool kTwoTrees = std::is_same<B, TreeSide>::value;
   ContactTimeWalk<TreeSide, B> trees(a, a_in_body, motion_a, b, b_in_body, motion_b);
-  const auto fits = [](const TreeSide& side) { return !side.isConservative() && side.tree().affordsBoxes(); };
   std::size_t price = a.tree().boxPrice();
-  bool has_boxes = fits(a);
+  bool fits = BoxSide::fits(a);
   if constexpr (kTwoTrees) {
     price += b.tree().boxPrice();
-    has_boxes = has_boxes && fits(b);
+    fits = fits && BoxSide::fits(b);
   }
-  if (!has_boxes) return trees.run(goal);
+  if (!fits) return trees.run(goal);
   const double time = trees.run(goal, std::numeric_limits<double>::infinity(), price == 0 ? kFew : kMany + price);
   const std::size_t rent = trees.steps() - std::min(trees.steps(), kMany);
   a.tree().payBoxRent(rent);

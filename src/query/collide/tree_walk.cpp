@@ -27,7 +27,7 @@ struct TreeWalk::Scratch {
 };
 
 bool TreeWalk::runByTurns(Visitor& visitor) {
-  if (!BoxSide::fits(a_, b_)) return run(visitor);
+  if (!BoxSide::fits(a_) || !BoxSide::fits(b_)) return run(visitor);
   // The boxes are built when walks have paid for them, as whole trees are. Each turn may take longer than the one
   // before, so all take at most some times what the quicker of both ways takes. A step over boxes takes about as long
   // as a pair of leaves.

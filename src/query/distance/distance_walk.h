@@ -371,7 +371,7 @@ inline Nearest findNearest(const TreeSide& a, const TreeSide& b, const Similarit
                            const DistanceGoal& goal) {
   constexpr std::size_t kFew = 64, kMany = 1024, kLonger = 16, kSteps = 8;
   DistanceWalk<TreeSide, TreeSide> trees(a, b, b_in_a);
-  if (!BoxSide::fits(a, b)) return trees.run(goal);
+  if (!BoxSide::fits(a) || !BoxSide::fits(b)) return trees.run(goal);
   const std::size_t price = a.tree().boxPrice() + b.tree().boxPrice();
   Nearest nearest;
   for (std::size_t most = price == 0 ? kFew : std::max(kMany, price);; most *= kLonger) {

@@ -18,9 +18,7 @@ class BoxSide {
   static constexpr bool kBodies = false;
   static constexpr bool kNodesContainSurface = true;
 
-  static bool fits(const TreeSide& a, const TreeSide& b) {
-    return !a.isConservative() && !b.isConservative() && a.tree().affordsBoxes() && b.tree().affordsBoxes();
-  }
+  static bool fits(const TreeSide& side) { return !side.isConservative() && side.tree().affordsBoxes(); }
 
   explicit BoxSide(const TreeSide& side) : side_(side), nodes_(side.tree().boxes(side.now()).nodes()) {}
 
