@@ -278,6 +278,21 @@ inline std::map<std::intptr_t, const Solid*> byId(const Solids& solids) {
   return all;
 }
 
+/// Are the contacts of (partner, model) those of (model, partner), seen from the other side?
+template <typename S>
+void checkMirrored(const fcl::CollisionResult<S>& direct, const fcl::CollisionResult<S>& turned) {
+  std::map<std::pair<std::intptr_t, std::intptr_t>, fcl::Contact<S>> others;
+  for (std::size_t k = 0; k < turned.numContacts(); ++k)
+    others[idsOf(turned.getContact(k), true)] = turned.getContact(k);
+  for (std::size_t k = 0; k < direct.numContacts(); ++k) {
+    const auto& c = direct.getContact(k);
+    const auto& other = others.at(idsOf(c, false));
+    ASSERT_EQ(c.normal, -other.normal);
+    ASSERT_EQ(c.pos, other.pos);
+    ASSERT_EQ(c.penetration_depth, other.penetration_depth);
+  }
+}
+
 /// collide() with exact answers.
 template <typename S>
 void checkCollide(const Partner<S>& row) {
@@ -296,8 +311,10 @@ void checkCollide(const Partner<S>& row) {
     const Eigen::Isometry3d X = s.modelInPartner();
     for (const auto solver : {fcl::GST_LIBCCD, fcl::GST_INDEP}) {
       Pairs found[2];
+      fcl::CollisionResult<S> all[2];
       for (const bool turned : {false, true}) {
-        const auto result = pairing.collide(s, turned, solver, kAll, true);
+        auto& result = all[turned];
+        result = pairing.collide(s, turned, solver, kAll, true);
         for (std::size_t k = 0; k < result.numContacts(); ++k) {
           found[turned].insert(idsOf(result.getContact(k), turned));
           ASSERT_NO_FATAL_FAILURE(
@@ -314,6 +331,7 @@ void checkCollide(const Partner<S>& row) {
       // In S, FCL's triangle test may tell the orders apart where it cannot tell more.
       if (!row.is_mesh) {
         ASSERT_EQ(found[0], found[1]) << "the order matters";
+        ASSERT_NO_FATAL_FAILURE(checkMirrored(all[0], all[1]));
       }
       (found[0].empty() ? misses : hits)++;
 
@@ -449,6 +467,10 @@ void checkDistance(const Partner<S>& row) {
     ASSERT_LE(with_sign, expected.high + 2 * off);
     if (expected.low > toleranceOf<S>(s.away)) {
       ASSERT_GE(with_sign, expected.low - 2 * off);
+    } else if (with_sign <= 0) {
+      const auto contact = pairing.collide(s, i % 2, fcl::GST_LIBCCD, 1, true);
+      ASSERT_EQ(contact.numContacts(), 1u);
+      ASSERT_EQ(with_sign, -static_cast<double>(contact.getContact(0).penetration_depth));
     }
   }
   EXPECT_GT(apart, count / 5) << "of " << count;

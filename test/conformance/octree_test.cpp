@@ -14,7 +14,6 @@ namespace {
 using Eigen::Vector3d;
 using test::cloud;
 using test::gap;
-using test::Pairs;
 using test::Raw;
 
 template <typename S>
@@ -31,59 +30,6 @@ fcl::CollisionResult<S> ask(const fcl::CollisionGeometry<S>& a, const fcl::Trans
   fcl::CollisionResult<S> result;
   fcl::collide(&a, X, &b, Y, request, result);
   return result;
-}
-
-/// Pairs of cell and triangle; FCL keeps the lower half of the names of cells only.
-template <typename S>
-Pairs pairsOf(const fcl::CollisionResult<S>& result, bool octree_first) {
-  Pairs pairs;
-  for (std::size_t i = 0; i < result.numContacts(); ++i) {
-    const auto& c = result.getContact(i);
-    const std::intptr_t cell = octree_first ? c.b1 : c.b2;
-    pairs.insert({static_cast<int>(cell), octree_first ? c.b2 : c.b1});
-  }
-  EXPECT_EQ(pairs.size(), result.numContacts());
-  return pairs;
-}
-
-TYPED_TEST(OcTrees, VerdictsAndPairsEqualFclsWhereFclIsRight) {
-  using S = TypeParam;
-  const Raw raw = test::torus(12);
-  const auto theirs = test::bvh<fcl::OBBRSS<S>>(raw);
-  const auto octree = cloud<S>(1, 300);
-  const auto boxes = octree->toBoxes();
-  ASSERT_GT(boxes.size(), 20u);
-  const Model<S> model(raw.mesh());
-  const double tolerance = std::is_same<S, double>::value ? 2e-6 : 2e-5;
-  std::mt19937_64 g(2);
-  std::uniform_real_distribution<double> u(0, 1);
-  int hits = 0;
-  for (int i = 0; i < 40; ++i) {
-    const auto X = test::pose<S>(test::randomRotation(g), test::randomDirection(g));
-    const auto Y = test::pose<S>(test::randomRotation(g),
-                                 X.translation().template cast<double>() + test::randomDirection(g) * 2.2 * u(g));
-    std::size_t touching = 0, near = 0;
-    for (std::size_t t = 0; t < raw.triangles.size(); ++t) {
-      for (const auto& box : boxes) {
-        const double d = gap<S>(raw, t, X, box, Y);
-        touching += d == 0;
-        near += d <= tolerance;
-      }
-    }
-    for (const auto solver : {fcl::GST_LIBCCD, fcl::GST_INDEP}) {
-      const auto ours = ask<S>(model, X, *octree, Y, solver);
-      const Pairs pairs = pairsOf(ours, false);
-      ASSERT_EQ(pairs, pairsOf(ask<S>(*octree, Y, model, X, solver), true));
-      ASSERT_GE(pairs.size(), touching);
-      ASSERT_LE(pairs.size(), near);
-      for (const auto& pair : pairsOf(ask<S>(*octree, Y, *theirs, X, solver), true)) ASSERT_TRUE(pairs.count(pair));
-      const bool once = ask<S>(model, X, *octree, Y, solver, false, 1).isCollision();
-      ASSERT_EQ(once, !pairs.empty());
-      hits += once;
-    }
-  }
-  EXPECT_GT(hits, 10);
-  EXPECT_LT(hits, 80);
 }
 
 TYPED_TEST(OcTrees, ContactsNameTheirCells) {
@@ -226,83 +172,6 @@ TEST(OcTreesDouble, ApproximateCostsAreFclsAndThoseOfAllCells) {
       EXPECT_NEAR(total, unseen + expected, 1e-6 * total);
       ASSERT_GT(cells, 5u);
     }
-  }
-}
-
-TYPED_TEST(OcTrees, DistancesEqualThoseOfAllBoxes) {
-  using S = TypeParam;
-  const Raw raw = test::torus(12);
-  const auto theirs = test::bvh<fcl::OBBRSS<S>>(raw);
-  const auto octree = cloud<S>(7, 60);
-  const auto boxes = octree->toBoxes();
-  const Model<S> model(raw.mesh());
-  const double off = std::is_same<S, double>::value ? 1e-10 : 2e-5;
-  std::mt19937_64 g(8);
-  std::uniform_real_distribution<double> u(0, 1);
-  int apart = 0;
-  for (int i = 0; i < 30; ++i) {
-    const auto X = test::pose<S>(test::randomRotation(g), test::randomDirection(g));
-    const auto Y = test::pose<S>(test::randomRotation(g),
-                                 X.translation().template cast<double>() + test::randomDirection(g) * (1.5 + 2 * u(g)));
-    double expected = std::numeric_limits<double>::infinity();
-    for (std::size_t t = 0; t < raw.triangles.size(); ++t) {
-      for (const auto& box : boxes) expected = std::min(expected, gap<S>(raw, t, X, box, Y));
-    }
-    apart += expected > 0;
-    for (const bool turn : {false, true}) {
-      fcl::DistanceRequest<S> request(true);
-      fcl::DistanceResult<S> d;
-      const S returned = turn ? fcl::distance(octree.get(), Y, &model, X, request, d)
-                              : fcl::distance(&model, X, octree.get(), Y, request, d);
-      ASSERT_EQ(returned, d.min_distance);
-      ASSERT_NEAR(d.min_distance, expected, off) << i;
-      ASSERT_EQ(d.o1, turn ? static_cast<const fcl::CollisionGeometry<S>*>(octree.get()) : &model);
-      ASSERT_NEAR((d.nearest_points[0] - d.nearest_points[1]).norm(), expected, off);
-      const Vector3d in_octree =
-          Y.template cast<double>().inverse() * d.nearest_points[turn ? 0 : 1].template cast<double>();
-      bool on_a_box = false;
-      for (const auto& b : boxes) {
-        on_a_box |= ((in_octree - Vector3d(b[0], b[1], b[2])).cwiseAbs().array() <= b[3] / 2.0 + 10 * off).all();
-      }
-      ASSERT_TRUE(on_a_box);
-    }
-    if (expected > 0.01) {
-      fcl::DistanceRequest<S> request;
-      fcl::DistanceResult<S> reference;
-      ASSERT_NEAR(fcl::distance(octree.get(), Y, theirs.get(), X, request, reference), expected, 1e-3);
-    }
-  }
-  EXPECT_GT(apart, 10);
-}
-
-TYPED_TEST(OcTrees, ConservativeAnswersMissNothing) {
-  using S = TypeParam;
-  const Raw raw = test::torus(12);
-  const auto octree = cloud<S>(9, 100);
-  Options options;
-  options.answer = Answer::kConservative;
-  options.depth = 6;
-  const Model<S> exact(raw.mesh()), spheres(raw.mesh(), options);
-  std::mt19937_64 g(10);
-  std::uniform_real_distribution<double> u(0, 1);
-  const auto far = [&](const Model<S>& model, const auto& X, const auto& Y) {
-    fcl::DistanceRequest<S> request;
-    fcl::DistanceResult<S> result;
-    return fcl::distance(&model, X, octree.get(), Y, request, result);
-  };
-  for (int i = 0; i < 30; ++i) {
-    const auto X = test::pose<S>(test::randomRotation(g), test::randomDirection(g));
-    const auto Y = test::pose<S>(test::randomRotation(g),
-                                 X.translation().template cast<double>() + test::randomDirection(g) * 2.2 * u(g));
-    const S d = far(exact, X, Y), e = far(spheres, X, Y);
-    ASSERT_LE(e, d + S(1e-5));
-    ASSERT_GE(e, d - S(0.13));
-    const bool hit = test::touching<S>(spheres, X, *octree, Y);
-    ASSERT_EQ(hit, test::touching<S>(*octree, Y, spheres, X));
-    if (test::touching<S>(exact, X, *octree, Y)) {
-      ASSERT_TRUE(hit);
-    }
-    ASSERT_TRUE(!hit || d < S(0.13));
   }
 }
 

@@ -19,32 +19,16 @@ namespace bocst {
 namespace {
 
 using Eigen::Vector3d;
-using test::NamedShape;
 using test::Raw;
 using test::Truth;
 
 constexpr fcl::GJKSolverType kSolvers[] = {fcl::GST_LIBCCD, fcl::GST_INDEP};
-
-/// What FCL's solvers may be off by: their tolerance, and rounding.
-template <typename S>
-double tolerance() {
-  return std::is_same<S, double>::value ? 2e-6 : 2e-5;
-}
 
 template <typename S>
 fcl::CollisionRequest<S> all(fcl::GJKSolverType solver, bool contacts = false) {
   fcl::CollisionRequest<S> request(1000000, contacts);
   request.gjk_solver_type = solver;
   return request;
-}
-
-/// The point of a triangle of a mesh that is nearest to p.
-template <typename S>
-Vector3d onTriangle(const Raw& raw, std::size_t t, const fcl::Transform3<S>& X, const Vector3d& p) {
-  const fcl::Transform3<double> Xd = X.template cast<double>();
-  const auto& i = raw.triangles[t];
-  const query::Corners c = {Xd * raw.vertices[i[0]], Xd * raw.vertices[i[1]], Xd * raw.vertices[i[2]]};
-  return query::closestPoint(p, c);
 }
 
 /// Poses around contact and anywhere.
@@ -70,107 +54,6 @@ template <typename S>
 class Shapes : public testing::Test {};
 using Scalars = testing::Types<float, double>;
 TYPED_TEST_SUITE(Shapes, Scalars);
-
-template <typename S>
-std::set<std::intptr_t> triangles(const fcl::CollisionResult<S>& result, bool first) {
-  std::set<std::intptr_t> ids;
-  for (std::size_t i = 0; i < result.numContacts(); ++i) {
-    const auto& c = result.getContact(i);
-    ids.insert(first ? c.b1 : c.b2);
-    EXPECT_EQ(first ? c.b2 : c.b1, +fcl::Contact<S>::NONE);
-  }
-  EXPECT_EQ(ids.size(), result.numContacts()) << "no pair twice";
-  return ids;
-}
-
-TYPED_TEST(Shapes, VerdictsAndTrianglesEqualFclsWhereFclIsRight) {
-  using S = TypeParam;
-  const Raw raw = test::torus(14);
-  const auto theirs = test::bvh<fcl::OBBRSS<S>>(raw);
-  for (const auto& entry : test::shapes<S>()) {
-    const std::string& name = entry.name;
-    const auto& shape = entry.shape;
-    SCOPED_TRACE(name);
-    shape->computeLocalAABB();
-    const Model<S> model(raw.mesh());
-    const Truth<S> truth(raw, *shape);
-    int hits = 0;
-    const int count = 60;
-    forPoses<S>(count, 1, truth, [&](int i, const auto& X, const auto& Y) {
-      for (const auto solver : kSolvers) {
-        fcl::CollisionResult<S> ours, turned, once, reference;
-        fcl::collide(&model, X, shape.get(), Y, all<S>(solver), ours);
-        fcl::collide(shape.get(), Y, &model, X, all<S>(solver), turned);
-        fcl::CollisionRequest<S> boolean;
-        boolean.gjk_solver_type = solver;
-        fcl::collide(&model, X, shape.get(), Y, boolean, once);
-        const auto set = triangles(ours, true);
-        ASSERT_EQ(set, triangles(turned, false)) << i;
-        ASSERT_EQ(once.numContacts(), set.empty() ? 0u : 1u) << i;
-        if (name != "triangle") {  // FCL has no such pair
-          fcl::collide(theirs.get(), X, shape.get(), Y, all<S>(solver), reference);
-          for (const std::intptr_t t : triangles(reference, true)) ASSERT_TRUE(set.count(t)) << i << ' ' << t;
-        }
-        // What FCL misses touches, and what we have beyond that is within FCL's tolerance.
-        for (std::size_t t = 0; t < raw.triangles.size(); ++t) {
-          const double gap = truth.gap(t, X, Y).distance;
-          if (gap == 0 || gap > tolerance<S>()) {
-            ASSERT_EQ(set.count(static_cast<std::intptr_t>(t)), gap == 0) << gap;
-          }
-        }
-        hits += !set.empty();
-      }
-    });
-    EXPECT_GT(hits, count / 2);
-    EXPECT_LT(hits, 2 * count);
-  }
-}
-
-TYPED_TEST(Shapes, ContactsPartWhatTouches) {
-  using S = TypeParam;
-  const Raw raw = test::torus(14);
-  for (const auto& entry : test::shapes<S>()) {
-    const std::string& name = entry.name;
-    const auto& shape = entry.shape;
-    SCOPED_TRACE(name);
-    const Model<S> model(raw.mesh());
-    const Truth<S> truth(raw, *shape);
-    std::size_t contacts = 0;
-    forPoses<S>(40, 2, truth, [&](int i, const auto& X, const auto& Y) {
-      for (const auto solver : kSolvers) {
-        fcl::CollisionResult<S> ours, turned;
-        fcl::collide(&model, X, shape.get(), Y, all<S>(solver, true), ours);
-        fcl::collide(shape.get(), Y, &model, X, all<S>(solver, true), turned);
-        ASSERT_EQ(ours.numContacts(), turned.numContacts());
-        std::map<std::intptr_t, fcl::Contact<S>> other;
-        for (std::size_t k = 0; k < turned.numContacts(); ++k) other[turned.getContact(k).b2] = turned.getContact(k);
-        for (std::size_t k = 0; k < ours.numContacts(); ++k) {
-          const auto& c = ours.getContact(k);
-          const auto& d = other[c.b1];
-          ASSERT_EQ(c.o1, &model);
-          ASSERT_EQ(c.o2, shape.get());
-          ASSERT_EQ(d.o1, shape.get());
-          ASSERT_EQ(d.o2, &model);
-          ASSERT_EQ(c.normal, -d.normal);
-          ASSERT_EQ(c.pos, d.pos);
-          ASSERT_EQ(c.penetration_depth, d.penetration_depth);
-          ASSERT_NEAR(c.normal.norm(), 1, 1e-5);
-          ASSERT_GE(c.penetration_depth, 0);
-          const auto t = static_cast<std::size_t>(c.b1);
-          const Vector3d n = c.normal.template cast<double>();
-          const double depth = static_cast<double>(c.penetration_depth), off = 20 * tolerance<S>();
-          // Moved back from the shape by the depth, and a little for what the solver's tolerance is, it is off.
-          ASSERT_GT(truth.gap(t, X, Y, -n * (depth * 1.001 + off)).distance, 0)
-              << i << " solver " << solver << " depth " << depth;
-          const Vector3d pos = c.pos.template cast<double>();
-          ASSERT_LE((onTriangle(raw, t, X, pos) - pos).norm(), depth + off) << "it is where they overlap";
-          ++contacts;
-        }
-      }
-    });
-    EXPECT_GT(contacts, 200u);
-  }
-}
 
 TYPED_TEST(Shapes, RequestsAreHonoured) {
   using S = TypeParam;
@@ -362,68 +245,6 @@ fcl::DistanceResult<S> askDistance(const fcl::CollisionGeometry<S>& a, const fcl
   return result;
 }
 
-TYPED_TEST(Shapes, DistancesEqualThoseOfAllTriangles) {
-  using S = TypeParam;
-  const Raw raw = test::torus(14);
-  const auto theirs = test::bvh<fcl::OBBRSS<S>>(raw);
-  const double off = std::is_same<S, double>::value ? 2e-9 : 2e-5;
-  for (const auto& entry : test::shapes<S>()) {
-    const std::string& name = entry.name;
-    const auto& shape = entry.shape;
-    SCOPED_TRACE(name);
-    shape->computeLocalAABB();
-    const Model<S> model(raw.mesh());
-    const Truth<S> truth(raw, *shape);
-    int apart = 0;
-    const int count = 50;
-    forPoses<S>(count, 8, truth, [&](int i, const auto& X, const auto& Y) {
-      const double expected = truth.distance(X, Y);
-      for (const bool turn : {false, true}) {
-        const auto solver = kSolvers[i % 2];
-        const auto d = turn ? askDistance<S>(*shape, Y, model, X, solver) : askDistance<S>(model, X, *shape, Y, solver);
-        ASSERT_NEAR(d.min_distance, expected, off) << i;
-        ASSERT_EQ(d.o1, turn ? static_cast<const fcl::CollisionGeometry<S>*>(shape.get()) : &model);
-        ASSERT_EQ(d.o2, turn ? &model : static_cast<const fcl::CollisionGeometry<S>*>(shape.get()));
-        ASSERT_EQ(turn ? d.b1 : d.b2, +fcl::DistanceResult<S>::NONE);
-        const auto t = static_cast<std::size_t>(turn ? d.b2 : d.b1);
-        const Vector3d p = d.nearest_points[turn ? 1 : 0].template cast<double>();
-        const Vector3d q = d.nearest_points[turn ? 0 : 1].template cast<double>();
-        ASSERT_NEAR((p - q).norm(), expected, off) << i;
-        ASSERT_LT((onTriangle(raw, t, X, p) - p).norm(), 10 * off) << "on the triangle";
-        Raw point;
-        point.vertices.assign(3, q);
-        point.triangles.emplace_back(0, 1, 2);
-        const auto I = test::pose<S>(Eigen::Matrix3d::Identity(), {0, 0, 0});
-        ASSERT_LT(Truth<S>(point, *shape).distance(I, Y), 10 * off) << "on the shape";
-        if (expected <= 0.01) continue;
-        // Moved towards each other by nearly as much, they are nearly there.
-        auto Z = Y;
-        Z.translation() += ((p - q) * (1 - 1e-3)).template cast<S>();
-        ASSERT_NEAR(askDistance<S>(model, X, *shape, Z).min_distance, 1e-3 * expected, 10 * off + 1e-5 * expected);
-        ASSERT_FALSE(test::touching<S>(model, X, *shape, Z));
-      }
-      // FCL knows no distance of planes, half-spaces and triangles.
-      if (expected > 0.01 && name != "plane" && name != "half-space" && name != "triangle") {
-        ASSERT_NEAR(askDistance<S>(*theirs, X, *shape, Y).min_distance, expected, 1e-3);
-      }
-      apart += expected > 0;
-      // With signs, touching is at minus the depth of a contact.
-      const auto d = askDistance<S>(model, X, *shape, Y, fcl::GST_LIBCCD, true);
-      if (expected > 0) {
-        ASSERT_NEAR(d.min_distance, expected, off);
-      } else {
-        ASSERT_LE(d.min_distance, 0);
-        fcl::CollisionRequest<S> request(1, true);
-        fcl::CollisionResult<S> result;
-        fcl::collide(&model, X, shape.get(), Y, request, result);
-        ASSERT_EQ(d.min_distance, -result.getContact(0).penetration_depth);
-      }
-    });
-    EXPECT_GT(apart, count / 8);
-    EXPECT_LT(apart, count);
-  }
-}
-
 TYPED_TEST(Shapes, MinimaRunAndErrorsAreTaken) {
   using S = TypeParam;
   const Raw raw = test::torus(30);
@@ -449,31 +270,6 @@ TYPED_TEST(Shapes, MinimaRunAndErrorsAreTaken) {
     EXPECT_LE(fcl::distance(&fresh, I, &cylinder, Y, looser, absolute), (exact + error) * S(1.0001));
     EXPECT_GE(relative.min_distance, exact * S(0.9999));
     EXPECT_GE(absolute.min_distance, exact * S(0.9999));
-  }
-}
-
-TYPED_TEST(Shapes, ConservativeDistancesAreNeverMore) {
-  using S = TypeParam;
-  const Raw raw = test::torus(14);
-  Options options;
-  options.answer = Answer::kConservative;
-  options.depth = 6;
-  for (const auto& entry : test::shapes<S>()) {
-    const std::string& name = entry.name;
-    const auto& shape = entry.shape;
-    SCOPED_TRACE(name);
-    const Model<S> model(raw.mesh(), options);
-    const Truth<S> truth(raw, *shape);
-    forPoses<S>(20, 9, truth, [&](int i, const auto& X, const auto& Y) {
-      const double expected = truth.distance(X, Y);
-      const double d = static_cast<double>(askDistance<S>(model, X, *shape, Y).min_distance);
-      ASSERT_LE(d, expected + 1e-5) << i;
-      ASSERT_GE(d, expected - 0.13) << i;
-      ASSERT_NEAR(d, askDistance<S>(*shape, Y, model, X).min_distance, 1e-5);
-      if (d > 1e-4) {
-        ASSERT_FALSE(test::touching<S>(model, X, *shape, Y));
-      }
-    });
   }
 }
 
@@ -540,7 +336,7 @@ TEST(ShapesDouble, DegenerateMeshes) {
         const double distance = truth.distance(I, Y);
         const bool touch = test::touching<double>(model, I, *shape, Y);
         hits += touch;
-        if (distance == 0 || distance > tolerance<double>()) {
+        if (distance == 0 || distance > 2e-6) {
           ASSERT_EQ(touch, distance == 0) << i << ' ' << distance;
         }
       }
