@@ -50,13 +50,15 @@ struct SceneOptions {
 /// The collision queries of a planner for a robot among obstacles: one call checks whole states or an edge.
 ///
 /// An object is a geometry that is fixed in the world or moves. Geometries are bocst::Model and all types that
-/// fcl::collide accepts: FCL's shapes, BVHModel and OcTree. A scene checks each pair of a moving object and any other
-/// object, not pairs of two fixed objects. A state is the list of the poses of all moving objects, world from geometry,
-/// in the order in which they were added: the pose of moving object i in state k is X_WM[k * movingCount() + i].
+/// fcl::collide accepts: FCL's shapes, BVHModel and OcTree. Of a BVHModel, the scene makes a Model with default
+/// options, which objects with the same geometry share, and checks that one, because two models are checked several
+/// times as fast. A scene checks each pair of a moving object and any other object, not pairs of two fixed objects. A
+/// state is the list of the poses of all moving objects, world from geometry, in the order in which they were added:
+/// the pose of moving object i in state k is X_WM[k * movingCount() + i].
 ///
 /// Verdicts: a state collides if fcl::collide(a, b) with the default request reports a collision for one of its pairs
-/// that is not ignored (Pair has the order of the arguments). Verdicts do not depend on earlier queries, on threads or
-/// on the resident nodes. Each query checks that all its poses are rigid.
+/// that is not ignored (Pair has the order of the arguments; a Model stands for a BVHModel). Verdicts do not depend on
+/// earlier queries, on threads or on the resident nodes. Each query checks that all its poses are rigid.
 ///
 /// Threads: any number of threads may query one scene, also while another thread changes it: each query sees the scene
 /// before or after a change, never a mixture. Changes wait for each other. The first query after a change updates the
@@ -79,7 +81,8 @@ class BOCST_EXPORT Scene {
   // Changes. All throw std::invalid_argument, and change nothing, for an Id of another scene or of a removed object,
   // for a null geometry, an empty Model, a geometry that fcl::collide does not accept, and a pose that is not rigid.
 
-  /// Adds an object that stays at X_WG. Computes a tight bound of its geometry, in time linear in its vertices.
+  /// Adds an object that stays at X_WG. Computes a tight bound of its geometry, in time linear in its vertices; objects
+  /// with the same geometry share the bound.
   Id addFixed(std::shared_ptr<Geometry> geometry, const Transform& X_WG);
   /// Adds an object whose pose is part of each state.
   Id addMoving(std::shared_ptr<Geometry> geometry);
@@ -89,7 +92,8 @@ class BOCST_EXPORT Scene {
   void setPose(Id fixed, const Transform& X_WG);
   /// Allows the two to touch (allowed collision, SRDF's disabled pairs); `ignored` = false undoes this.
   void ignore(Id a, Id b, bool ignored = true);
-  /// Call this after the shape of a geometry has changed: Model::updateVertices(), a changed map of an OcTree.
+  /// Call this after the geometry of an object has changed: Model::updateVertices(), a changed map of an OcTree, new
+  /// vertices, thresholds or cost density of a BVHModel. Updates all objects with the same geometry.
   void update(Id object);
 
   // Queries. X_WM may be null if there are no moving objects or no states.
@@ -105,15 +109,14 @@ class BOCST_EXPORT Scene {
   void collisions(const Transform* X_WM, std::size_t states, std::uint8_t* hit) const;
   /// The minimum fcl::distance of all pairs; 0 if a pair touches; std::numeric_limits<S>::max() without pairs.
   /// `nearest` is set to a pair at this distance; to invalid Ids without pairs. Options::margin has no effect.
-  /// @throws std::invalid_argument for a pair of FCL's geometries whose distance FCL cannot compute.
+  /// @throws std::invalid_argument for two of FCL's shapes and octrees whose distance FCL cannot compute.
   S clearance(const Transform* X_WM, Pair* nearest = nullptr) const;
   /// True if the motion of all moving objects from one state to another is free of collisions at all times. Never steps
   /// over a contact. Geometries that pass closer than the resolution of fcl::continuousCollide (see bocst/fcl.h; for
   /// two of FCL's shapes and octrees 1e-5 of their sizes) count as touching. With CCDM_LINEAR, each object's origin
   /// moves on a line, and the object turns about a fixed axis (slerp of the normalised quaternions, which removes
   /// rounding errors of a rotation). Two of FCL's shapes and octrees that pass closer than the rounding of the motion's
-  /// length also count as touching. The first edge along which an fcl::BVHModel is near another of FCL's geometries
-  /// copies its mesh.
+  /// length also count as touching.
   /// @throws std::invalid_argument as clearance().
   bool edgeIsFree(const Transform* X_WM_begin, const Transform* X_WM_end,
                   fcl::CCDMotionType motion = fcl::CCDM_LINEAR) const;

@@ -12,8 +12,6 @@
 #include <shared_mutex>
 
 #include "fcl/adapters/models.h"
-#include "fcl/adapters/pair.h"
-#include "fcl/adapters/shapes.h"
 #include "scene/reach.h"
 
 namespace bocst::scene {
@@ -142,23 +140,14 @@ Bounds boundsOf(fcl::CollisionGeometry<S>& geometry) {
   Bounds b;
   if (const Model<S>* model = fcl_adapter::asModel<S>(&geometry)) {
     b = boundsOfModel(*model);
-  } else if (fcl_adapter::isShape<S>(&geometry)) {
-    b = boundsOfShape(geometry);
-    b.reach = kSolverReach * (1 + b.half.norm());
-#if FCL_HAVE_OCTOMAP
-  } else if (geometry.getNodeType() == fcl::GEOM_OCTREE) {
-    b = boundsOfOcTree(static_cast<const fcl::OcTree<S>&>(geometry));
-    b.reach = kSolverReach * (1 + b.half.norm());
-#endif
   } else {
-    fcl_adapter::bvhSideOf<S>("Scene", &geometry);  // throws unless it is a finished mesh
-    fcl_adapter::withBvh<S>("Scene", &geometry, [&](const auto& bvh) {
-      b = fit([&](auto&& f) {
-        for (int t = 0; t < bvh.num_tris; ++t) {
-          for (std::size_t k = 0; k < 3; ++k) f(bvh.vertices[bvh.tri_indices[t][k]].template cast<double>().eval());
-        }
-      });
-    });
+#if FCL_HAVE_OCTOMAP
+    const bool is_octree = geometry.getNodeType() == fcl::GEOM_OCTREE;
+    b = is_octree ? boundsOfOcTree(static_cast<const fcl::OcTree<S>&>(geometry)) : boundsOfShape(geometry);
+#else
+    b = boundsOfShape(geometry);
+#endif
+    b.reach = kSolverReach * (1 + b.half.norm());
   }
   b.radius = b.half.norm();
   b.size = b.radius + b.center.norm();

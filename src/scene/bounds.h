@@ -26,7 +26,7 @@ struct Bounds {
   double width = 0;   ///< The least of its three extents.
 };
 
-/// @throws std::invalid_argument for a geometry that fcl::collide does not take.
+/// Of a Model, a shape or an OcTree.
 template <typename S>
 Bounds boundsOf(fcl::CollisionGeometry<S>& geometry);
 

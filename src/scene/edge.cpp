@@ -109,14 +109,7 @@ class Edge {
 
   bool touchesOnWay(const PairAt& p) {
     const Object<S>&a = world_.moving[p.moving], &b = world_.object(p.group, p.lane);
-    const fcl::CollisionGeometry<S>*geometry_a = a.geometry.get(), *geometry_b = b.geometry.get();
-    // A model takes the place of one of FCL's meshes: along a mesh, steps by distances become as short as these.
-    if (a.model == nullptr && b.model == nullptr) {
-      const Model<S>*model_a = a.mesh_model->of(*geometry_a), *model_b = b.mesh_model->of(*geometry_b);
-      if (model_a != nullptr) geometry_a = model_a;
-      if (model_b != nullptr) geometry_b = model_b;
-    }
-    switch (fcl_adapter::kindOf<S>(geometry_a, geometry_b)) {
+    switch (fcl_adapter::kindOf<S>(a.geometry.get(), b.geometry.get())) {
       case fcl_adapter::PairKind::kForeign:
         return advance(p, a, b);
       case fcl_adapter::PairKind::kNothing:
@@ -128,13 +121,13 @@ class Edge {
     request.ccd_motion_type = type_;
     request.toc_err = 2;  // any contact will do
     fcl::ContinuousCollisionResult<S> result;
-    bocst::continuousCollide<S>(geometry_a, begin_[p.moving], end_[p.moving], geometry_b,
+    bocst::continuousCollide<S>(a.geometry.get(), begin_[p.moving], end_[p.moving], b.geometry.get(),
                                 check_.pose(begin_, p.group, p.lane), check_.pose(end_, p.group, p.lane), request,
                                 result);
     return result.is_collide;
   }
 
-  // Conservative advancement: FCL's own steps over contacts of meshes.
+  // Conservative advancement, of two of FCL's shapes and octrees: FCL's own may step over contacts.
   bool advance(const PairAt& p, const Object<S>& a, const Object<S>& b) {
     const bool fixed = world_.isFixed(p.group);
     const std::size_t j = fixed ? 0 : world_.movingIndex(p.group, p.lane);

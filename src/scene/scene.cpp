@@ -10,9 +10,12 @@
 #include <shared_mutex>
 #include <stdexcept>
 #include <string>
+#include <utility>
 #include <vector>
 
 #include "fcl/adapters/models.h"
+#include "fcl/adapters/shapes.h"
+#include "fcl/queries/scene_pair.h"
 #include "scene/edge.h"
 #include "scene/sweep.h"
 #include "thread/sharded_lock.h"
@@ -89,6 +92,7 @@ struct Scene<S>::Impl {
   }
 
   struct Record {
+    std::shared_ptr<Geometry> given;  // by the caller
     Object<S> object;
     bool moves;
   };
@@ -97,26 +101,39 @@ struct Scene<S>::Impl {
     const std::string name = std::string("bocst::Scene::") + query;
     if (geometry == nullptr) throw std::invalid_argument(name + ": the geometry is null");
     if (X_WG != nullptr) scene::checkPose<S>(query, *X_WG);
-    Record record;
-    record.moves = X_WG == nullptr;
-    Object<S>& o = record.object;
-    o.geometry = std::move(geometry);
+    Object<S> o = objectOf(geometry);
     if (X_WG != nullptr) o.X_WG = *X_WG;
-    describe(o);
     const std::lock_guard<thread::ForkAwareMutex> lock(mutex);
     const std::uint32_t number = next_number++;
     o.id = Id(scene_number, number);
-    objects.emplace(number, std::move(record));
+    with_geometry[geometry.get()] = number;
+    objects.emplace(number, Record{std::move(geometry), std::move(o), X_WG == nullptr});
     publish(nullptr);
     return Id(scene_number, number);
   }
 
-  static void describe(Object<S>& o) {
+  // With what is known of the geometry, but without Id and pose.
+  Object<S> objectOf(const std::shared_ptr<Geometry>& geometry) const {
+    {
+      const std::lock_guard<thread::ForkAwareMutex> lock(mutex);
+      const auto other = with_geometry.find(geometry.get());
+      if (other != with_geometry.end()) return objects.at(other->second).object;
+    }
+    return describe(geometry);
+  }
+
+  static Object<S> describe(const std::shared_ptr<Geometry>& geometry) {
+    Object<S> o;
+    const Geometry* g = geometry.get();
+    const bool is_mesh =
+        fcl_adapter::asModel<S>(g) == nullptr && !fcl_adapter::isShape<S>(g) && g->getNodeType() != fcl::GEOM_OCTREE;
+    // Models meet each other several times as fast as an fcl::BVHModel.
+    o.geometry = is_mesh ? fcl_adapter::modelOfBvh<S>(*g) : geometry;
     o.model = fcl_adapter::asModel<S>(o.geometry.get());
     if (o.model != nullptr && o.model->empty()) throw std::invalid_argument("bocst::Scene: the model is empty");
     o.exact = o.model != nullptr && o.model->options().answer == Answer::kExact;
-    o.mesh_model = std::make_shared<scene::MeshModel<S>>();
     o.bounds = scene::boundsOf<S>(*o.geometry);
+    return o;
   }
 
   // To be called with the mutex held.
@@ -171,10 +188,11 @@ struct Scene<S>::Impl {
 
   mutable thread::ForkAwareMutex mutex;  // of changes
   std::uint32_t next_number = 0;
-  std::map<std::uint32_t, Record> objects;   // in the order of adding
-  std::set<std::pair<Id, Id>> ignored;       // the smaller Id first
-  mutable thread::ShardedLock sharded_lock;  // of `world`; held no longer than it takes to copy it
-  mutable WorldPtr world;                    // null after a change
+  std::map<std::uint32_t, Record> objects;                 // in the order of adding
+  std::map<const Geometry*, std::uint32_t> with_geometry;  // an object that was given it
+  std::set<std::pair<Id, Id>> ignored;                     // the smaller Id first
+  mutable thread::ShardedLock sharded_lock;                // of `world`; held no longer than it takes to copy it
+  mutable WorldPtr world;                                  // null after a change
   const std::uint32_t scene_number = nextScene();
   mutable thread::ThreadPool pool;
 };
@@ -198,7 +216,8 @@ Id Scene<S>::addMoving(std::shared_ptr<Geometry> geometry) {
 template <typename S>
 void Scene<S>::remove(Id object) {
   const std::lock_guard<thread::ForkAwareMutex> lock(impl_->mutex);
-  impl_->find("remove", object);
+  const auto other = impl_->with_geometry.find(impl_->find("remove", object).given.get());
+  if (other != impl_->with_geometry.end() && other->second == object.number_) impl_->with_geometry.erase(other);
   impl_->objects.erase(object.number_);
   auto& ignored = impl_->ignored;
   for (auto i = ignored.begin(); i != ignored.end();) {
@@ -236,8 +255,14 @@ void Scene<S>::ignore(Id a, Id b, bool ignored) {
 template <typename S>
 void Scene<S>::update(Id object) {
   const std::lock_guard<thread::ForkAwareMutex> lock(impl_->mutex);
-  typename Impl::Record& record = impl_->find("update", object);
-  Impl::describe(record.object);
+  const std::shared_ptr<Geometry> geometry = impl_->find("update", object).given;
+  const Object<S> updated = Impl::describe(geometry);
+  for (auto& [number, record] : impl_->objects) {
+    if (record.given != geometry) continue;
+    const Object<S> before = std::exchange(record.object, updated);
+    record.object.id = before.id;
+    record.object.X_WG = before.X_WG;
+  }
   impl_->publish(nullptr);
 }
 

@@ -6,42 +6,20 @@
 
 #include <cstdint>
 #include <memory>
-#include <mutex>
 #include <set>
 #include <utility>
 #include <vector>
 
-#include "fcl/queries/scene_pair.h"
 #include "scene/bounds.h"
 #include "scene/pose_rows.h"
-#include "thread/fork.h"
 
 namespace bocst::scene {
 
-/// A model of an fcl::BVHModel's triangles, made when an edge first needs it.
-template <typename S>
-class MeshModel {
- public:
-  /// Null for a geometry that is no fcl::BVHModel.
-  const Model<S>* of(const fcl::CollisionGeometry<S>& geometry) {
-    const std::lock_guard<thread::ForkAwareMutex> lock(mutex_);
-    if (!is_known_) model_ = fcl_adapter::modelOfBvh<S>(geometry);
-    is_known_ = true;
-    return model_.get();
-  }
-
- private:
-  thread::ForkAwareMutex mutex_;
-  bool is_known_ = false;
-  std::unique_ptr<const Model<S>> model_;
-};
-
 template <typename S>
 struct Object {
-  std::shared_ptr<fcl::CollisionGeometry<S>> geometry;  ///< Null: a lane without an object.
+  std::shared_ptr<fcl::CollisionGeometry<S>> geometry;  ///< Of a BVHModel the model; null: a lane without an object.
   const Model<S>* model = nullptr;                      ///< It, if it is one.
   bool exact = false;                                   ///< A model with exact answers.
-  std::shared_ptr<MeshModel<S>> mesh_model;             ///< Of its geometry.
   Bounds bounds;
   Id id;
   fcl::Transform3<S> X_WG = fcl::Transform3<S>::Identity();  ///< Where it is, if it is fixed.

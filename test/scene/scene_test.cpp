@@ -401,19 +401,73 @@ TYPED_TEST(SceneTest, Changes) {
   EXPECT_GT(hits, 20u);
 }
 
+// Objects that share a geometry share what the scene knows of it, also when one of them is gone.
 TYPED_TEST(SceneTest, DeformedMesh) {
   using S = TypeParam;
-  World<S> w;
-  Raw raw = test::torus(10);
-  auto model = std::make_shared<Model<S>>(raw.mesh());
-  const Id id = w.fix(model, fcl::Transform3<S>::Identity());
-  w.move(std::make_shared<fcl::Sphere<S>>(S(0.2)));
-  const auto at = test::pose<S>(Eigen::Matrix3d::Identity(), {5, 0, 0});
-  EXPECT_FALSE(w.scene.collides(&at));
-  raw.move({4, 0, 0});
-  model->updateVertices(raw.vertices);
-  w.scene.update(id);
-  EXPECT_TRUE(w.scene.collides(&at));
+  const Raw raw = test::torus(10);
+  for (const bool is_model : {true, false}) {
+    const auto model = std::make_shared<Model<S>>(raw.mesh());
+    const auto bvh = test::bvh<fcl::OBBRSS<S>>(raw);
+    const std::shared_ptr<fcl::CollisionGeometry<S>> mesh = is_model ? Geometry<S>(model) : Geometry<S>(bvh);
+    const auto deform = [&](const Eigen::Vector3d& displacement) {
+      std::vector<Eigen::Vector3d> vertices;
+      for (const auto& v : raw.vertices) vertices.push_back(v + displacement);
+      if (is_model) {
+        model->updateVertices(vertices);
+      } else {
+        bvh->beginReplaceModel();
+        for (const auto& v : vertices) bvh->replaceVertex(v.cast<S>());
+        bvh->endReplaceModel();
+      }
+    };
+    const auto at = [](double x) { return test::pose<S>(Eigen::Matrix3d::Identity(), {x, 0, 0}); };
+    Scene<S> scene;
+    const Id zero = scene.addFixed(mesh, at(0)), ten = scene.addFixed(mesh, at(10));
+    scene.addMoving(std::make_shared<fcl::Sphere<S>>(S(0.2)));
+    const auto collides = [&](double x) {
+      const auto X = at(x);
+      return scene.collides(&X);
+    };
+    EXPECT_TRUE(collides(1) && collides(11));
+    EXPECT_FALSE(collides(5) || collides(15));
+    deform({4, 0, 0});
+    scene.update(zero);
+    EXPECT_TRUE(collides(5) && collides(15)) << "of the other, too";
+    EXPECT_FALSE(collides(1) || collides(11));
+    scene.remove(ten);
+    const Id twenty = scene.addFixed(mesh, at(20));
+    EXPECT_TRUE(collides(5) && collides(25));
+    EXPECT_FALSE(collides(15));
+    deform({0, 0, 0});
+    scene.update(twenty);
+    EXPECT_TRUE(collides(1) && collides(21));
+    scene.remove(twenty);
+    scene.remove(zero);
+    EXPECT_FALSE(collides(1) || collides(21));
+    deform({4, 0, 0});
+    scene.addFixed(mesh, at(0));
+    EXPECT_TRUE(collides(5)) << "nothing is known of a geometry that left";
+  }
+}
+
+// A model stands for one of FCL's meshes: faces that rest on one another touch, and its occupancy counts.
+TYPED_TEST(SceneTest, MeshesOfFclAreChecked) {
+  using S = TypeParam;
+  const auto cube = test::bvh<fcl::OBB<S>>(test::box({-1, -1, -1}, {1, 1, 1}));
+  const auto other = test::bvh<fcl::KDOP<S, 24>>(test::box({-1, -1, -1}, {1, 1, 1}));
+  Scene<S> scene;
+  const Id fixed = scene.addFixed(cube, fcl::Transform3<S>::Identity());
+  scene.addMoving(other);
+  const auto at = [](double x) { return test::pose<S>(Eigen::Matrix3d::Identity(), {x, 0, 0}); };
+  const auto resting = at(2), apart = at(2.25);
+  EXPECT_TRUE(scene.collides(&resting));
+  EXPECT_FALSE(scene.collides(&apart));
+  EXPECT_EQ(scene.clearance(&apart), S(0.25));
+  EXPECT_TRUE(scene.edgeIsFree(&apart, &apart));
+  cube->cost_density = 0;
+  scene.update(fixed);
+  EXPECT_FALSE(scene.collides(&resting));
+  EXPECT_TRUE(scene.edgeIsFree(&resting, &apart));
 }
 
 TYPED_TEST(SceneTest, ScenesWithoutPairs) {
@@ -607,8 +661,7 @@ TYPED_TEST(SceneTest, EdgesAlongMeshesOfFcl) {
       bvh->beginReplaceModel();
       for (const auto& v : disk.vertices) bvh->replaceVertex((v * scale).template cast<S>());
       bvh->endReplaceModel();
-      scene.update(fixed);
-      scene.update(moving);
+      scene.update(scale < 1 ? fixed : moving);  // of the other, too
     };
     replace(0.98);
     const auto nearer_begin = at(0.003, 0.01), nearer_end = at(3, 0.01);
@@ -1074,7 +1127,7 @@ TEST(SceneThreads, FewerThanAskedFor) {
   });
 }
 
-// The first edges beside one of FCL's meshes make a model of it.
+// The model that the scene made of one of FCL's meshes grows.
 TEST(SceneThreads, EdgesAlongMeshesOfFcl) {
   for (int turn = 0; turn < 8; ++turn) {
     Scened scene;

@@ -22,21 +22,17 @@ bool hullsApart(const Model<S>& a, const fcl::Transform3<S>& X_WA, const Model<S
 }
 
 template <typename S>
-std::unique_ptr<const Model<S>> modelOfBvh(const fcl::CollisionGeometry<S>& geometry) {
-  if (geometry.getObjectType() != fcl::OT_BVH) return nullptr;
-  const BvhSide bvh = bvhSideOf<S>("Scene", &geometry);
-  std::vector<Eigen::Vector3d> vertices;
-  std::vector<fcl::Triangle> triangles;
-  for (std::size_t v = 0; v < bvh.meshVertices(); ++v) vertices.push_back(bvh.vertex(v));
-  for (std::size_t t = 0; t < bvh.meshTriangles(); ++t) triangles.push_back(bvh.indices(t));
-  auto model = std::make_unique<Model<S>>(std::make_shared<const Mesh>(std::move(vertices), triangles));
+std::unique_ptr<Model<S>> modelOfBvh(const fcl::CollisionGeometry<S>& geometry) {
+  bvhSideOf<S>("Scene", &geometry);  // throws unless it is a finished mesh
+  std::unique_ptr<Model<S>> model;
+  withBvh<S>("Scene", &geometry, [&](const auto& bvh) { model = std::make_unique<Model<S>>(bvh); });
   model->threshold_occupied = geometry.threshold_occupied;
   model->cost_density = geometry.cost_density;
   return model;
 }
 
-template std::unique_ptr<const Model<float>> modelOfBvh<float>(const fcl::CollisionGeometry<float>&);
-template std::unique_ptr<const Model<double>> modelOfBvh<double>(const fcl::CollisionGeometry<double>&);
+template std::unique_ptr<Model<float>> modelOfBvh<float>(const fcl::CollisionGeometry<float>&);
+template std::unique_ptr<Model<double>> modelOfBvh<double>(const fcl::CollisionGeometry<double>&);
 template bool hullsApart<float>(const Model<float>&, const fcl::Transform3<float>&, const Model<float>&,
                                 const fcl::Transform3<float>&, double);
 template bool hullsApart<double>(const Model<double>&, const fcl::Transform3<double>&, const Model<double>&,

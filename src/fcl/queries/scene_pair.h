@@ -15,8 +15,9 @@ template <typename S>
 bool hullsApart(const Model<S>& a, const fcl::Transform3<S>& X_WA, const Model<S>& b, const fcl::Transform3<S>& X_WB,
                 double gap);
 
-/// A model of the triangles of an fcl::BVHModel; null for other geometries.
+/// A model of the triangles of an fcl::BVHModel. @throws std::invalid_argument for other geometries, and for a mesh
+/// that is not finished or that Mesh refuses.
 template <typename S>
-std::unique_ptr<const Model<S>> modelOfBvh(const fcl::CollisionGeometry<S>& geometry);
+std::unique_ptr<Model<S>> modelOfBvh(const fcl::CollisionGeometry<S>& geometry);
 
 }  // namespace bocst::fcl_adapter
