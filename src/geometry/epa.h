@@ -111,7 +111,8 @@ class Epa {
     return true;
   }
 
-  // Takes away what the new point sees and closes the hole with faces to it. False when it is no news, or too much.
+  // Takes away what the new point sees and closes the hole with faces to it. False if the point
+  // adds nothing, or if there is no room for more faces.
   bool expand(const Eigen::Vector3d& w) {
     const int point = static_cast<int>(count_);
     points_[count_++] = w;

@@ -10,8 +10,8 @@ namespace bocst::query {
 /// How fast a part of a body comes nearer along a direction, from some time until 1. Negative: it recedes.
 struct ClosingSpeed {
   double ever;    ///< No point of it is ever faster.
-  double now;     ///< Nor, at that time, faster than this,
-  double change;  ///< which grows by at most so much per time.
+  double now;     ///< Upper bound of the speed at that time.
+  double change;  ///< How much `now` may grow per unit of time.
 
   ClosingSpeed operator+(const ClosingSpeed& o) const { return {ever + o.ever, now + o.now, change + o.change}; }
   /// What holds for two parts.

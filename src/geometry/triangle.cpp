@@ -348,7 +348,8 @@ PenetrationVerdicts trianglePenetrations(const TrianglePairs& pairs, double tole
 namespace {
 
 // The two points in which the edges of triangle t cross the plane of another, if they clearly do.
-bool cutByPlane(const Corners& t, const Corners& other, const Vector3d& normal, double tolerance, Vector3d (&ends)[2]) {
+bool clearlyCutByPlane(const Corners& t, const Corners& other, const Vector3d& normal, double tolerance,
+                       Vector3d (&ends)[2]) {
   const Vector3d way[3] = {t[0] - other[0], t[1] - other[0], t[2] - other[0]};
   const double height[3] = {normal.dot(way[0]), normal.dot(way[1]), normal.dot(way[2])};
   const double largest = std::max(t[0].lpNorm<1>(), other[0].lpNorm<1>());
@@ -383,7 +384,8 @@ std::optional<double> farEndOfCut(const Corners& p, const Corners& q, const Vect
   constexpr double kLeastSine = 1e-6;
   if (!(line.squaredNorm() > kLeastSine * kLeastSine * normal_p.squaredNorm() * normal_q.squaredNorm())) return {};
   Vector3d of_p[2], of_q[2];
-  if (!cutByPlane(p, q, normal_q, tolerance, of_p) || !cutByPlane(q, p, normal_p, tolerance, of_q)) return {};
+  if (!clearlyCutByPlane(p, q, normal_q, tolerance, of_p) || !clearlyCutByPlane(q, p, normal_p, tolerance, of_q))
+    return {};
   for (Vector3d(*ends)[2] : {&of_p, &of_q}) {
     if (line.dot((*ends)[0]) > line.dot((*ends)[1])) std::swap((*ends)[0], (*ends)[1]);
   }

@@ -33,7 +33,7 @@ struct SimilarityTransform {
   double scale = 1;
   Eigen::Vector3d translation = Eigen::Vector3d::Zero();
   double tolerance = 0;  ///< A length in the target frame: what positions may be off by; touching within it counts.
-  double margin = 0;  ///< A length in the target frame: what is no farther apart touches for sure. Part of tolerance.
+  double margin = 0;     ///< The same: surfaces at most this far apart certainly touch. Included in `tolerance`.
   double orthogonality_error = 0;  ///< Largest entry of rotation^T rotation - 1: what the axes tests must allow for.
   float axes[3][3] = {};           ///< axes[j]: column j of rotation; set by ready().
   float rounding_margin = 0;       ///< Per unit of size, see overlappingOctants(); set by ready().

@@ -2,15 +2,13 @@
 #pragma once
 
 #include <cstddef>
-#include <cstdint>
 
 namespace bocst {
 
-/// Exact answers test the triangles of a node with at most so many rather than expanding it. Kernels hold one leaf in a
-/// pack and have a bit for each of its triangles, so their masks' type is LeafMask.
+/// Exact answers test the triangles of a node that has at most this many instead of expanding it. Kernels hold one leaf
+/// in a pack.
 constexpr std::size_t kMaxLeafTriangles = 32;
-using LeafMask = std::uint32_t;
-static_assert(8 * sizeof(LeafMask) >= kMaxLeafTriangles, "a bit for each triangle of a leaf");
+static_assert(kMaxLeafTriangles <= 32, "a mask has a bit of a std::uint32_t for each triangle of a leaf");
 static_assert(kMaxLeafTriangles % 16 == 0, "kernels fill whole vectors of floats of any instruction set");
 
 }  // namespace bocst

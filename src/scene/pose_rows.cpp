@@ -12,7 +12,7 @@
 #include <hwy/foreach_target.h>
 #include <hwy/highway.h>
 
-#include "simd/octants-inl.h"
+#include "simd/vectors-inl.h"
 
 HWY_BEFORE_NAMESPACE();
 namespace bocst::scene::HWY_NAMESPACE {
@@ -32,10 +32,8 @@ HWY_INLINE hn::Vec<Tag> loadAs(Tag d, const float* p) {
   return hn::PromoteTo(d, hn::LoadU(hn::Rebind<float, Tag>(), p));
 }
 
-// One column of as many poses as a vector has lanes: x, y and z of each.
-struct Column {
-  V x, y, z;
-};
+// One column of as many poses as a vector has lanes.
+using Column = query::HWY_NAMESPACE::Vec3Of<V>;
 
 template <typename Tag, typename S>
 HWY_INLINE Column column(Tag d, const S* const* poses, std::size_t c) {
@@ -70,13 +68,6 @@ HWY_INLINE Poses posesAt(const S* state, std::size_t i, std::size_t moving) {
   return {{column(D(), at, 0), column(D(), at, 1), column(D(), at, 2)}, column(D(), at, 3)};
 }
 
-HWY_INLINE V dot(const Column& a, const Column& b) {
-  return hn::MulAdd(a.x, b.x, hn::MulAdd(a.y, b.y, hn::Mul(a.z, b.z)));
-}
-HWY_INLINE Column sub(const Column& a, const Column& b) {
-  return {hn::Sub(a.x, b.x), hn::Sub(a.y, b.y), hn::Sub(a.z, b.z)};
-}
-
 // The sums of fcl_adapter::rigidSumsOf().
 HWY_INLINE void rigidSums(const Poses& X, V& stretch, V& shear) {
   const D d;
@@ -84,10 +75,8 @@ HWY_INLINE void rigidSums(const Poses& X, V& stretch, V& shear) {
   const Column nothing = sub(X.translation, X.translation);  // 0, or NaN
   const V squares =
       hn::Add(hn::Add(hn::Add(dot(a, a), dot(b, b)), dot(c, c)), hn::Add(hn::Add(nothing.x, nothing.y), nothing.z));
-  const Column across = {hn::Sub(hn::Mul(b.y, c.z), hn::Mul(b.z, c.y)), hn::Sub(hn::Mul(b.z, c.x), hn::Mul(b.x, c.z)),
-                         hn::Sub(hn::Mul(b.x, c.y), hn::Mul(b.y, c.x))};
   stretch = hn::Sub(squares, hn::Set(d, 3.0));
-  shear = hn::Sub(hn::NegMulAdd(hn::Set(d, 2.0), dot(a, across), squares), hn::Set(d, 1.0));
+  shear = hn::Sub(hn::NegMulAdd(hn::Set(d, 2.0), dot(a, cross(b, c)), squares), hn::Set(d, 1.0));
 }
 
 template <typename S>
@@ -116,7 +105,6 @@ HWY_INLINE Column transformed(const Column (&R)[3], const V (&x)[3], const Colum
 }
 
 HWY_INLINE V load(const std::vector<double>& row, std::size_t i) { return hn::LoadU(D(), row.data() + i); }
-HWY_INLINE V sumOfSizes(const Column& c) { return hn::Add(hn::Add(hn::Abs(c.x), hn::Abs(c.y)), hn::Abs(c.z)); }
 
 template <typename S>
 HWY_INLINE void measurePathsOf(const S* poses, std::size_t states, const BoundsRows& bounds, double* path,
@@ -137,7 +125,7 @@ HWY_INLINE void measurePathsOf(const S* poses, std::size_t states, const BoundsR
       const V turned = hn::Add(hn::Add(dot(turn[0], turn[0]), dot(turn[1], turn[1])), dot(turn[2], turn[2]));
       const V step = hn::MulAdd(radius, hn::Sqrt(hn::Mul(turned, half)), hn::Sqrt(dot(displacement, displacement)));
       sum = hn::MulAdd(step, more, sum);
-      place = hn::Max(place, sumOfSizes(X.translation));
+      place = hn::Max(place, norm1(X.translation));
       hn::StoreU(sum, d, path + k * room + i);
       before = X;
     }
@@ -162,9 +150,9 @@ HWY_INLINE std::size_t placeBoxesOf(const S* state, const BoundsRows& bounds, co
     const V middle[3] = {load(bounds.center[0], i), load(bounds.center[1], i), load(bounds.center[2], i)};
     const Column center = transformed(X.rotation, middle, sub(X.translation, origin));
     const V error = hn::LoadU(d, p.orthogonality_errors + i), given = hn::LoadU(d, p.reach + i);
-    const V radius = load(bounds.radius, i), size = load(bounds.size, i), displacement = sumOfSizes(center);
+    const V radius = load(bounds.radius, i), size = load(bounds.size, i), displacement = norm1(center);
     V reach = hn::Add(load(bounds.reach, i), hn::Set(d, factors.least));
-    reach = hn::MulAdd(hn::Set(d, factors.per_place), hn::Add(sumOfSizes(X.translation), size), reach);
+    reach = hn::MulAdd(hn::Set(d, factors.per_place), hn::Add(norm1(X.translation), size), reach);
     reach = hn::MulAdd(hn::Mul(hn::Set(d, factors.per_error), error), hn::Add(hn::Set(d, p.largest), size), reach);
     reach = hn::MulAdd(hn::Set(d, factors.per_displacement), hn::Add(displacement, radius), reach);
     reach = hn::IfThenElse(hn::Eq(given, hn::Zero(d)), reach, given);

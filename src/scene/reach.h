@@ -10,7 +10,8 @@ namespace bocst::scene {
 /// Boxes of rotations that are off by more are boxes along the axes of the world, so that all axes are at right angles.
 constexpr double kFineError = 1e-5;
 
-/// Where half extents do not fit a float, nothing near does: what is so large, or so far away, is everywhere.
+/// An object that is larger or farther away gets no box and counts as overlapping everything, because its half extents
+/// do not fit a float.
 constexpr double kUnboxedSize = 1e12;
 
 /// What may be called a contact farther than the boxes are apart: FCL computes relative poses in S (64 roundings of

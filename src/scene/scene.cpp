@@ -85,10 +85,8 @@ struct Scene<S>::Impl {
 
   // To be called with the mutex held.
   void publish(WorldPtr next) const {
-    {
-      const std::lock_guard<thread::ShardedLock> alone(sharded_lock);
-      std::swap(world, next);
-    }
+    const std::lock_guard<thread::ShardedLock> alone(sharded_lock);
+    std::swap(world, next);  // the old world goes with `next`, after the lock
   }
 
   struct Record {
@@ -153,7 +151,7 @@ struct Scene<S>::Impl {
     const WorldPtr w = current();
     const std::size_t moving = w->moving.size();
     thread_local std::vector<double> errors_of_thread;
-    std::vector<double>& orthogonality_errors = errors_of_thread;
+    std::vector<double>& orthogonality_errors = errors_of_thread;  // the pool's threads have others
     scene::checkPoses<S>(query, X_WM, states, moving, orthogonality_errors);
     if (goal == Goal::kAll) std::fill(hit, hit + states, std::uint8_t{0});
     if (states == 0 || moving == 0) return states;
@@ -161,7 +159,7 @@ struct Scene<S>::Impl {
     const std::size_t length = all_at_once ? states : kStatesAtOnce, rows = (states + length - 1) / length;
     if (rows == 1) return sweepOfThread<S>().run(*w, X_WM, states, goal, hit, orthogonality_errors);
     const std::vector<std::size_t> order = goal == Goal::kAny ? bisected(rows) : std::vector<std::size_t>();
-    // Of rows, in their order, the first that has what is looked for; rows after it need not be looked at.
+    // The first row, in the order of the search, that has a hit; later rows are skipped.
     std::atomic<std::size_t> least{rows};
     std::mutex finding;
     std::size_t found = states;
@@ -243,7 +241,7 @@ void Scene<S>::ignore(Id a, Id b, bool ignored) {
   const std::lock_guard<thread::ForkAwareMutex> lock(impl_->mutex);
   impl_->find("ignore", a);
   impl_->find("ignore", b);
-  if (a == b) throw std::invalid_argument("bocst::Scene::ignore: an object makes no pair with itself");
+  if (a == b) throw std::invalid_argument("bocst::Scene::ignore: both Ids name the same object");
   if (ignored) {
     impl_->ignored.insert(std::minmax(a, b));
   } else {

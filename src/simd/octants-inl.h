@@ -1,10 +1,10 @@
 // SPDX-License-Identifier: BSD-3-Clause
 // What the tests of eight octants share, once for each instruction set; see Highway's -inl.h headers.
-#if defined(BOCST_QUERY_OCTANTS_INL_H) == defined(HWY_TARGET_TOGGLE)
-#ifdef BOCST_QUERY_OCTANTS_INL_H
-#undef BOCST_QUERY_OCTANTS_INL_H
+#if defined(BOCST_SIMD_OCTANTS_INL_H) == defined(HWY_TARGET_TOGGLE)
+#ifdef BOCST_SIMD_OCTANTS_INL_H
+#undef BOCST_SIMD_OCTANTS_INL_H
 #else
-#define BOCST_QUERY_OCTANTS_INL_H
+#define BOCST_SIMD_OCTANTS_INL_H
 #endif
 
 #include <hwy/highway.h>

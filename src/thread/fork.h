@@ -18,8 +18,8 @@ std::mutex& forkMutex();
 
 [[noreturn]] void throwForked();
 
-/// What is not destroyed: a condition variable that a thread which stayed in the parent waits for waits, in turn, for
-/// that thread when it is destroyed.
+/// A value whose destructor never runs. In a forked child, the destructor of a condition variable would wait for
+/// threads that exist only in the parent.
 template <typename T>
 class NeverDestroyed {
  public:

@@ -35,7 +35,7 @@ void Tree::collectTriangles(ChildRef ref, const lattice::Cell& cell, std::vector
 
 // The list of a node whose block goes.
 ChildRef Tree::regained(ChildRef block, const lattice::Cell& cell, TriangleLists& lists) const {
-  if (grid_ != nullptr && cell.level <= grid_->level()) return ChildRef();
+  if (grid_ && cell.level <= grid_->level()) return ChildRef();
   const std::uint32_t own = records_[block.index()].own_list;
   if (own != Block::kNone) {
     const bool is_short = !lists_.isOnDevice(own) && lists_[own].count <= kMaxLeafTriangles;
@@ -69,96 +69,99 @@ void Tree::dropUnusedResources() {
   }
 }
 
+// The tree is one sphere again.
+void Tree::dropTree() {
+  grid_.reset();
+  grid_tried_ = false;
+  startRent();
+  root_.store(ChildRef(), std::memory_order_relaxed);
+  blocks_.clear();
+  records_.clear();
+  last_use_.clear();
+  lists_.clear();
+  resources_.clear();
+  NodeCounts nodes_at{};
+  nodes_at[1] = 1;
+  startGeneration(nodes_at);
+}
+
+// What names nodes of the old pools goes.
+void Tree::startGeneration(const NodeCounts& nodes_at) {
+  ++generation_;
+  node_table_ = {};
+  refits_.clear();
+  refits_wait_.store(false, std::memory_order_relaxed);
+  const std::size_t before = std::accumulate(nodes_at_.begin(), nodes_at_.end(), std::size_t{0});
+  const std::size_t after = std::accumulate(nodes_at.begin(), nodes_at.end(), std::size_t{0});
+  std::copy(nodes_at.begin(), nodes_at.end(), nodes_at_.begin());
+  if (before > after) pruned_ += before - after;
+  countBytes();
+}
+
 // Copies what stays into fresh pools: what goes leaves no holes, and nothing of it is looked at again. In one
 // function, as a node is copied whole: its children, list, record and times belong to one move.
 void Tree::keepOnly(const std::vector<std::uint8_t>& keep) {
-  ++generation_;
-  node_table_ = {};
   const ChildRef old_root = root_.load(std::memory_order_relaxed);
-  std::array<std::size_t, lattice::kMaxLevel + 1> nodes_at{};
-  nodes_at[1] = 1;
-
-  if (old_root.tag() == ChildRef::kBlock && blocks_[old_root.index()].isLoose()) {
-    grid_known_.store(nullptr, std::memory_order_relaxed);  // its cells are not those of the tree any more
-    grid_.reset();
-  }
+  if (old_root.tag() != ChildRef::kBlock || !keep[old_root.index()]) return dropTree();
+  if (blocks_[old_root.index()].isLoose()) grid_.reset();  // its cells are not those of the tree any more
   struct Move {
     ChildRef from;
     NodeRef to;
     lattice::Cell cell;
   };
   std::vector<Move> moves{{old_root, NodeRef{}, lattice::Cell{}}};
-  const bool root_stays =
-      old_root.tag() == ChildRef::kBlock && old_root.index() < keep.size() && keep[old_root.index()];
-  if (!root_stays) {
-    grid_known_.store(nullptr, std::memory_order_relaxed);
-    grid_.reset();
-    grid_tried_ = false;
-    startRent();
-    root_.store(ChildRef(), std::memory_order_relaxed);
-    blocks_.clear();
-    records_.clear();
-    last_use_.clear();
-    lists_.clear();
-    resources_.clear();
-  } else {
-    Pool<Block, 5> blocks;
-    Pool<BlockRecord, 5> records;
-    Pool<std::atomic<std::int64_t>, 5> last_use;
-    TriangleLists lists;
-    ChildRef root;
-    while (!moves.empty()) {
-      const Move move = moves.back();
-      moves.pop_back();
-      ChildRef ref = move.from;
-      if (ref.tag() == ChildRef::kBlock && !keep[ref.index()]) {
-        ref = regained(move.from, move.cell, lists);
-      } else if (ref.isList()) {
-        ref = ChildRef(ref.tag(), lists.addCopy(lists_, ref.index()));
-      } else if (ref.tag() == ChildRef::kBlock) {
-        const Block& from = blocks_[ref.index()];
-        const std::uint32_t own_list = records_[ref.index()].own_list, index = blocks.append(1);
-        records.append(1);
-        last_use.append(1);
-        Block& to = blocks[index];
-        to.octants = from.octants;
-        to.grey = from.grey;
-        to.shape = from.shape;
-        std::copy_n(from.at, 3, to.at);
-        records[index].own = records_[ref.index()].own;
-        if (own_list != Block::kNone) records[index].own_list = lists.addCopy(lists_, own_list);
-        records[index].parent = move.to;
-        last_use[index].store(last_use_[ref.index()].load(std::memory_order_relaxed), std::memory_order_relaxed);
-        nodes_at[countedLevel(move.cell.level + 1)] += __builtin_popcount(from.grey);
-        for (int o = 0; o < 8; ++o) {
-          if (from.grey >> o & 1) {
-            moves.push_back(
-                {from.child[o].load(std::memory_order_relaxed), NodeRef::octant(index, o), move.cell.octant(o)});
-          }
+  Pool<Block, 5> blocks;
+  Pool<BlockRecord, 5> records;
+  Pool<std::atomic<std::int64_t>, 5> last_use;
+  TriangleLists lists;
+  ChildRef root;
+  NodeCounts nodes_at{};
+  nodes_at[1] = 1;
+  while (!moves.empty()) {
+    const Move move = moves.back();
+    moves.pop_back();
+    ChildRef ref = move.from;
+    if (ref.tag() == ChildRef::kBlock && !keep[ref.index()]) {
+      ref = regained(move.from, move.cell, lists);
+    } else if (ref.isList()) {
+      ref = ChildRef(ref.tag(), lists.addCopy(lists_, ref.index()));
+    } else if (ref.tag() == ChildRef::kBlock) {
+      const Block& from = blocks_[ref.index()];
+      const std::uint32_t own_list = records_[ref.index()].own_list, index = blocks.append(1);
+      records.append(1);
+      last_use.append(1);
+      Block& to = blocks[index];
+      to.octants = from.octants;
+      to.grey = from.grey;
+      to.shape = from.shape;
+      std::copy_n(from.at, 3, to.at);
+      records[index].own = records_[ref.index()].own;
+      if (own_list != Block::kNone) records[index].own_list = lists.addCopy(lists_, own_list);
+      records[index].parent = move.to;
+      last_use[index].store(last_use_[ref.index()].load(std::memory_order_relaxed), std::memory_order_relaxed);
+      nodes_at[countedLevel(move.cell.level + 1)] += __builtin_popcount(from.grey);
+      for (int o = 0; o < 8; ++o) {
+        if (from.grey >> o & 1) {
+          moves.push_back(
+              {from.child[o].load(std::memory_order_relaxed), NodeRef::octant(index, o), move.cell.octant(o)});
         }
-        ref = ChildRef(ChildRef::kBlock, index);
       }
-      if (move.to.isRoot()) {
-        root = ref;
-      } else {
-        blocks[move.to.block()].child[move.to.octant()].store(ref, std::memory_order_relaxed);
-      }
+      ref = ChildRef(ChildRef::kBlock, index);
     }
-    // There was memory for all of it.
-    root_.store(root, std::memory_order_relaxed);
-    blocks_.swap(blocks);
-    records_.swap(records);
-    last_use_.swap(last_use);
-    lists_.swap(lists);
+    if (move.to.isRoot()) {
+      root = ref;
+    } else {
+      blocks[move.to.block()].child[move.to.octant()].store(ref, std::memory_order_relaxed);
+    }
   }
-  refits_.clear();  // they name nodes of the old pools
-  refits_wait_.store(false, std::memory_order_relaxed);
-  const std::size_t before = std::accumulate(nodes_at_.begin(), nodes_at_.end(), std::size_t{0});
-  const std::size_t after = std::accumulate(nodes_at.begin(), nodes_at.end(), std::size_t{0});
-  std::copy(nodes_at.begin(), nodes_at.end(), nodes_at_.begin());
-  if (before > after) pruned_ += before - after;
-  if (root_stays) dropUnusedResources();
-  countBytes();
+  // There was memory for all of it.
+  root_.store(root, std::memory_order_relaxed);
+  blocks_.swap(blocks);
+  records_.swap(records);
+  last_use_.swap(last_use);
+  lists_.swap(lists);
+  dropUnusedResources();
+  startGeneration(nodes_at);
 }
 
 void Tree::pruneAlone(std::int64_t now, Pruning pruning) {
@@ -195,11 +198,11 @@ void Tree::pruneAlone(std::int64_t now, Pruning pruning) {
       keepOnly(keep);
     }
   }
-  if (!budget_only && boxes_ != nullptr && isOld(boxes_used_.load(std::memory_order_relaxed), now)) {
+  if (!budget_only && boxes_ && isOld(boxes_used_.load(std::memory_order_relaxed), now)) {
     dropBoxes();
     countBytes();
   }
-  const bool is_at_rest = root_.load(std::memory_order_relaxed).tag() != ChildRef::kBlock && boxes_ == nullptr;
+  const bool is_at_rest = root_.load(std::memory_order_relaxed).tag() != ChildRef::kBlock && !boxes_;
   if (!budget_only && is_at_rest && isOld(recall_time_, now)) forgetMesh();
   applyBudget();
 }

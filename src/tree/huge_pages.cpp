@@ -19,7 +19,7 @@ void adviseHugePages([[maybe_unused]] void* begin, [[maybe_unused]] std::size_t 
 #ifdef MADV_HUGEPAGE
   const auto address = reinterpret_cast<std::uintptr_t>(begin);
   const std::uintptr_t first = roundedUp(address), end = (address + bytes) / kHugePage * kHugePage;
-  // But a wish: where it is not granted, small pages will do.
+  // Only a hint: if the kernel refuses it, small pages are used.
   if (first < end) madvise(reinterpret_cast<void*>(first), end - first, MADV_HUGEPAGE);
 #endif
 }

@@ -22,8 +22,8 @@ class SupportTable {
   static constexpr int kRow = kCells + 1;
   static constexpr int kCount = 6 * kRow * kRow;
 
-  /// Point (i, j) of face 2 * k + (1 if negative): entry k is 1 or -1, those after it run from -1 to 1 with i and j.
-  static constexpr int number(int face, int i, int j) { return (face * kRow + i) * kRow + j; }
+  /// Of number (face * kRow + i) * kRow + j, point (i, j) of face 2 * k + (1 if negative): entry k is 1 or -1, those
+  /// after it run from -1 to 1 with i and j.
   static Eigen::Vector3d direction(int number);
 
   /// All that is known is a box, in the lattice's coordinates.

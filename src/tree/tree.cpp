@@ -92,8 +92,7 @@ Tree::Tree(std::shared_ptr<const Mesh> mesh, const Options& options)
 
 void Tree::reset(std::shared_ptr<const Mesh> mesh) {
   solid_ = options_.solid ? std::make_shared<const Solid>(mesh) : nullptr;
-  component_points_known_ = nullptr;
-  component_points_ = nullptr;
+  component_points_.reset();
   dropBoxes();
   surface_ = surfaceOf(std::move(mesh), options_);
   radius_ = -1;
@@ -104,7 +103,7 @@ void Tree::reset(std::shared_ptr<const Mesh> mesh) {
   supports_known_ = false;
   outline_.set(Outline::boxOf(surface_.bounds.center(), Eigen::Matrix3d::Identity(),
                               surface_.bounds.sizes() / 2 + Eigen::Vector3d::Constant(sphereReach())));
-  keepOnly({});
+  dropTree();
 }
 
 double Tree::sphereReach() const {
@@ -116,26 +115,24 @@ double Tree::sphereReach() const {
 std::int64_t Tree::now() const { return options_.clock ? nanoseconds(options_.clock()) : coarseNow(); }
 
 const std::vector<Eigen::Vector3d>& Tree::componentPoints() const {
-  if (const auto* known = component_points_known_.load(std::memory_order_acquire)) return *known;
+  if (const auto* known = component_points_.seen()) return *known;
   const std::lock_guard<thread::ForkAwareMutex> lock(component_mutex_);
-  if (component_points_ == nullptr) {
-    component_points_ = std::make_unique<const std::vector<Eigen::Vector3d>>(
-        pointOfEachComponent(surface_.mesh->vertices(), surface_.mesh->triangles()));
-    component_points_known_.store(component_points_.get(), std::memory_order_release);
+  if (!component_points_) {
+    component_points_.set(std::make_unique<const std::vector<Eigen::Vector3d>>(
+        pointOfEachComponent(surface_.mesh->vertices(), surface_.mesh->triangles())));
   }
-  return *component_points_;
+  return *component_points_.seen();
 }
 
 const BoxTree& Tree::boxes(std::int64_t now) {
   if (boxes_used_.load(std::memory_order_relaxed) < now) boxes_used_.store(now, std::memory_order_relaxed);
-  if (const BoxTree* known = boxes_known_.load(std::memory_order_acquire)) return *known;
+  if (const BoxTree* known = boxes_.seen()) return *known;
   const std::lock_guard<thread::ForkAwareMutex> lock(growth_);
-  if (boxes_ == nullptr) {
-    boxes_ = std::make_unique<const BoxTree>(surface_);
-    boxes_known_.store(boxes_.get(), std::memory_order_release);
+  if (!boxes_) {
+    boxes_.set(std::make_unique<const BoxTree>(surface_));
     countBytes();
   }
-  return *boxes_;
+  return *boxes_.seen();
 }
 
 bool Tree::affordsBoxes() const {
@@ -150,8 +147,7 @@ std::size_t Tree::boxPrice() const {
 }
 
 void Tree::dropBoxes() {
-  boxes_known_.store(nullptr, std::memory_order_relaxed);
-  boxes_ = nullptr;
+  boxes_.reset();
   box_rent_ = 0;
 }
 
@@ -282,7 +278,7 @@ Tree::Batch::Batch(const std::vector<Growth>& nodes) {
     if (g.node.isRoot()) tree.growRoot();
     if (g.list_suffices && tree.growInBulk(g.node, scratch)) continue;
     const lattice::Cell cell = tree.cell(g.node);
-    if (tree.grid_ != nullptr && cell.level < tree.grid_->level()) {
+    if (tree.grid_ && cell.level < tree.grid_->level()) {
       tree.growFromGrid(g.node);
       continue;
     }
@@ -307,7 +303,7 @@ Tree::Batch::Batch(const std::vector<Growth>& nodes) {
     } else {
       gathered_.emplace_back();
       gathered_.back().reserve(4 * kMaxLeafTriangles);
-      BOCST_ASSERT(tree.grid_ != nullptr);
+      BOCST_ASSERT(tree.grid_);
       tree.grid_->gather(tree.surface_, cell, gathered_.back());
       request.ids = gathered_.back().data();
       request.count = gathered_.back().size();
@@ -377,9 +373,8 @@ void Tree::growRoot() {
   if (surface_.device == nullptr) surface_.device = oracle_->makeResident(grownSurface());
   if (grid_tried_ || !growsOnHost()) return;
   grid_tried_ = true;
-  grid_ = RootGrid::make(surface_, deepest_);
-  if (grid_ == nullptr) return;
-  grid_known_.store(grid_.get(), std::memory_order_release);
+  grid_.set(RootGrid::make(surface_, deepest_));
+  if (!grid_) return;
   ++batches_;
   for (int level = 2; level <= grid_->level(); ++level) cells_ += std::uint64_t{1} << 3 * (level - 1);
 }
@@ -526,7 +521,7 @@ void Tree::expandAll(int depth) {
   // Queries never expand a leaf, and do not expect that somebody does.
   const std::lock_guard<thread::ShardedLock> alone(query_lock_);
   recallAlone();
-  keepOnly({});
+  dropTree();
   constexpr std::size_t kBatch = 1024;  // bounds the memory that answers take before they are published
   std::vector<NodeRef> level{NodeRef{}}, next;
   for (int l = 1; l < depth; ++l) {

@@ -19,11 +19,12 @@
 
 #include "mesh/solid.h"
 #include "oracle/oracle.h"
+#include "thread/published.h"
 #include "thread/sharded_lock.h"
 #include "tree/block.h"
+#include "tree/grid/root_grid.h"
 #include "tree/outline.h"
 #include "tree/pool.h"
-#include "tree/root_grid.h"
 #include "tree/support_table.h"
 #include "tree/triangle_lists.h"
 
@@ -58,8 +59,7 @@ class Tree {
   bool isPruneDue(std::int64_t now) const { return now >= next_prune_.load(std::memory_order_relaxed); }
   /// Are there branches that are dropped some time, if no query uses them? Without a lock.
   bool hasDecay() const {
-    return (root_.load(std::memory_order_relaxed).tag() == ChildRef::kBlock ||
-            boxes_known_.load(std::memory_order_relaxed) != nullptr ||
+    return (root_.load(std::memory_order_relaxed).tag() == ChildRef::kBlock || boxes_.seen() != nullptr ||
             recalled_bytes_.load(std::memory_order_relaxed) != 0) &&
            next_prune_.load(std::memory_order_relaxed) != kNeverDue;
   }
@@ -115,7 +115,7 @@ class Tree {
   /// are as thin as the surface. Built when first asked for, and dropped like a branch. @throws std::bad_alloc.
   const BoxTree& boxes(std::int64_t now);
   /// Null unless they are built.
-  const BoxTree* knownBoxes() const { return boxes_known_.load(std::memory_order_acquire); }
+  const BoxTree* knownBoxes() const { return boxes_.seen(); }
   /// They would not take most of the memory budget.
   bool affordsBoxes() const;
   /// How many pairs of leaves long walks still test before boxes() pays; 0 if it is built.
@@ -134,7 +134,7 @@ class Tree {
 
   /// The root grid knows the children of this frontier node.
   bool growsFromGrid(NodeRef node) const {
-    const RootGrid* grid = grid_known_.load(std::memory_order_acquire);
+    const RootGrid* grid = grid_.seen();
     return grid != nullptr && !isLoose(node) && level(node) < grid->level();
   }
 
@@ -270,7 +270,10 @@ class Tree {
   void pruneAlone(std::int64_t now, Pruning pruning);
   void applyBudget();
   void dropBoxes();
+  using NodeCounts = std::array<std::size_t, lattice::kMaxLevel + 1>;
   void keepOnly(const std::vector<std::uint8_t>& keep);
+  void dropTree();
+  void startGeneration(const NodeCounts& nodes_at);
   void collectTriangles(ChildRef ref, const lattice::Cell& cell, std::vector<std::uint32_t>& ids) const;
   ChildRef regained(ChildRef block, const lattice::Cell& cell, TriangleLists& lists) const;
   void dropUnusedResources();
@@ -293,12 +296,9 @@ class Tree {
   std::int64_t recall_time_ = 0;                      // in ns of the model's clock
   std::shared_ptr<const Solid> solid_;
   mutable thread::ForkAwareMutex component_mutex_;  // guards component_points_ while they are found
-  mutable std::unique_ptr<const std::vector<Eigen::Vector3d>> component_points_;
-  mutable std::atomic<const std::vector<Eigen::Vector3d>*> component_points_known_{
-      nullptr};                                       // component_points_, for readers
-  mutable std::atomic<double> radius_{-1};            // negative: not known yet
-  std::unique_ptr<const BoxTree> boxes_;              // made under growth_, dropped alone
-  std::atomic<const BoxTree*> boxes_known_{nullptr};  // boxes_, for readers
+  mutable thread::Published<const std::vector<Eigen::Vector3d>> component_points_;
+  mutable std::atomic<double> radius_{-1};  // negative: not known yet
+  thread::Published<const BoxTree> boxes_;  // made under growth_, dropped alone
   std::atomic<std::int64_t> boxes_used_{0};
   mutable std::atomic<std::size_t> box_rent_{0};  // see payBoxRent()
   bounds::NodeBounds root_bounds_;
@@ -309,8 +309,7 @@ class Tree {
   static constexpr std::int64_t kNeverDue = std::numeric_limits<std::int64_t>::max();
   std::atomic<std::int64_t> next_prune_;  // in ns of the model's clock
   bool supports_known_ = false;
-  std::unique_ptr<RootGrid> grid_;
-  std::atomic<const RootGrid*> grid_known_{nullptr};  // grid_, for readers
+  thread::Published<RootGrid> grid_;
   bool grid_tried_ = false;
   static constexpr std::size_t kNever = ~std::size_t{0};
   mutable std::atomic<std::size_t> rent_{0};  // see payRent()

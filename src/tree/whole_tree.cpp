@@ -91,7 +91,7 @@ void Tree::leakPools() {
   (new decltype(resources_))->swap(resources_);
   (new decltype(node_table_.nodes))->swap(node_table_.nodes);
   (new decltype(refits_))->swap(refits_);
-  static_cast<void>(boxes_.release());
+  boxes_.leak();
 }
 
 // The cell of a node; of a lane only the level, which counts from the cell that was built in bulk.
@@ -116,7 +116,7 @@ bool Tree::growInBulk(NodeRef node, std::vector<std::uint32_t>& ids) {
     list.appendTo(ids);
   } else if (!growsOnHost()) {
     return false;
-  } else if (grid_ != nullptr) {
+  } else if (grid_) {
     if (cell(node).level < grid_->level()) return false;
     grid_->gather(surface_, cell(node), ids);
   } else {

@@ -18,7 +18,7 @@ struct HandTriangle {
 
 /// A small tree made by hand, as a side of a walk: a binary tree of boxes over rows of triangles. Nodes may be asleep:
 /// these have to be grown before their children are there, which is counted.
-class HandTree {
+class HandTree : public query::CompleteSide {
  public:
   using Node = int;
   static constexpr bool kBodies = false;
@@ -41,12 +41,10 @@ class HandTree {
   const query::Corners& corners(std::uint32_t t) const { return triangles_[t].corners; }
 
   Node root() const { return 0; }
-  bool isConservative() const { return false; }
   query::State state(Node n) const {
     if (at(n).children.empty()) return query::State::kLeaf;
     return at(n).asleep ? query::State::kGrows : query::State::kInner;
   }
-  bool growsFromGrid(Node) const { return false; }
   void grow(Node n, std::vector<tree::Tree::Growth>&) const {
     if (!at(n).asleep) return;  // two pairs may ask for the same node
     at(n).asleep = false;
@@ -62,8 +60,6 @@ class HandTree {
     return v;
   }
   query::Sphere sphere(Node n) const { return {at(n).box.center(), at(n).box.diagonal().norm() / 2}; }
-  query::Sphere cellSphere(Node n) const { return sphere(n); }
-  std::uint64_t cellId(Node n) const { return static_cast<std::uint64_t>(n); }
 
   template <typename F>
   void children(Node n, F&& f) const {

@@ -65,7 +65,7 @@ query::OrientedVolume volumeOf(const fcl::KDOP<S, N>& bv) {
 
 /// A prebuilt FCL mesh as a side of a walk. Its frame is the model's. One class for all of FCL's volumes and scalars,
 /// so that walks are compiled once. Lives no longer than the mesh.
-class BvhSide {
+class BvhSide : public query::CompleteSide {
  public:
   using Node = int;
   static constexpr bool kBodies = false;
@@ -90,10 +90,7 @@ class BvhSide {
   double magnitude() const { return magnitude_; }
 
   Node root() const { return 0; }
-  bool isConservative() const { return false; }
   query::State state(Node n) const { return node(n).isLeaf() ? query::State::kLeaf : query::State::kInner; }
-  bool growsFromGrid(Node) const { return true; }
-  void grow(Node, std::vector<tree::Tree::Growth>&) const {}
 
   double size(Node n) const { return volume(n).half.squaredNorm(); }
 
@@ -108,10 +105,6 @@ class BvhSide {
     const query::OrientedVolume v = volume(n);
     return {v.center, v.half.norm()};
   }
-
-  // Only a side that answers with cells is asked for these.
-  query::Sphere cellSphere(Node n) const { return sphere(n); }
-  std::uint64_t cellId(Node n) const { return static_cast<std::uint64_t>(n); }
 
   template <typename F>
   void overlappingChildren(Node n, const query::Volume& other, const query::SimilarityTransform& to, F&& f) const {

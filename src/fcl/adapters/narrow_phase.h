@@ -16,7 +16,7 @@ struct GJKSolver_indep;
 
 namespace bocst::fcl_adapter {
 
-/// A solver that the caller brought; null and none mean one as his request asks for.
+/// A solver that the caller brought. Without one, or with a null one, the solver type of the request is used.
 template <typename S>
 using BroughtSolver =
     std::variant<std::monostate, const fcl::detail::GJKSolver_libccd<S>*, const fcl::detail::GJKSolver_indep<S>*>;

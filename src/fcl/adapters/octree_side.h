@@ -24,7 +24,7 @@ namespace bocst::fcl_adapter {
 
 /// FCL's OcTree as a side of a walk: its leaves are boxes, in its own frame.
 template <typename S>
-class OcTreeSide {
+class OcTreeSide : public query::CompleteSide {
  public:
   /// A cube of the octree; without an octomap node it is one that nobody has seen.
   struct Node {
@@ -54,12 +54,9 @@ class OcTreeSide {
   bool empty() const { return !sees(root_node_); }
 
   const Node& root() const { return root_; }
-  bool isConservative() const { return false; }
   query::State state(const Node& n) const {
     return n.node != nullptr && octree_.nodeHasChildren(n.node) ? query::State::kInner : query::State::kLeaf;
   }
-  bool growsFromGrid(const Node&) const { return true; }
-  void grow(const Node&, std::vector<tree::Tree::Growth>&) const {}
 
   /// As FCL names cells, see fcl::OcTree::getNodeByQueryCellId(); of cells that octomap does not have, by their places,
   /// with a prefix that no difference of addresses has.

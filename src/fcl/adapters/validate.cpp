@@ -47,7 +47,7 @@ void refuseUnlessRigid(const char* query, const char* argument, const Eigen::Iso
     refuse(query, argument, "has the rotation " + text(R) + ", " + what);
   };
   if (!R.allFinite()) refuseRotation("which is not finite");
-  const double error = (R.transpose() * R - Eigen::Matrix3d::Identity()).cwiseAbs().maxCoeff();
+  const double error = orthogonalityError(R);
   if (!(error <= kMaxOrthogonalityError)) {
     refuseRotation("whose product with its transpose is off the identity by " + text(error) + "; at most " +
                    text(kMaxOrthogonalityError) + " is allowed");

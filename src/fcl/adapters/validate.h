@@ -73,6 +73,11 @@ bool areSurelyRigid(const fcl::Transform3<S>& X, const fcl::Transform3<S>& Y) {
   return (rigid[0] & rigid[1]) != 0;
 }
 
+/// The largest entry of R^T R - 1.
+inline double orthogonalityError(const Eigen::Matrix3d& R) {
+  return (R.transpose() * R - Eigen::Matrix3d::Identity()).cwiseAbs().maxCoeff();
+}
+
 /// @throws std::invalid_argument unless the translation is finite and the rotation is one, see kMaxOrthogonalityError.
 void refuseUnlessRigid(const char* query, const char* argument, const Eigen::Isometry3d& X);
 

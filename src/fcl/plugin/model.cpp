@@ -25,10 +25,6 @@ S roundDown(double x) {
   return -roundUp<S>(-x);
 }
 
-}  // namespace
-
-namespace {
-
 /// The box of the surface and its margin, which broadphase managers must not leave out, and a sphere about its middle
 /// that holds the surface however it is turned: no larger than `radius` and the box's.
 template <typename S>
@@ -45,6 +41,12 @@ void setBounds(fcl::CollisionGeometry<S>& geometry, Eigen::AlignedBox3d b, doubl
   const double to_corner = (b.max() - center).cwiseMax(center - b.min()).norm();
   const double to_vertex = (center - middle).norm() + radius + margin;
   geometry.aabb_radius = roundUp<S>(std::min(to_corner, to_vertex) * (1 + 1e-15));
+}
+
+/// The same by the box alone: who asks geometries and poses needs no radius, so vertices are not looked through yet.
+template <typename S>
+void setBoundsByBox(fcl::CollisionGeometry<S>& geometry, const tree::Tree& tree) {
+  setBounds(geometry, tree.bounds(), tree.options().margin, HUGE_VAL);
 }
 
 }  // namespace
@@ -66,8 +68,7 @@ template <typename S>
 Model<S>::Model(std::shared_ptr<const Mesh> mesh, const Options& options)
     : options_(options), tree_(std::make_unique<tree::Tree>(std::move(mesh), options)) {
   fcl_adapter::checkDispatch<S>();
-  // Who asks geometries and poses needs no radius, so vertices are not looked through yet.
-  setBounds(*this, tree_->bounds(), tree_->options().margin, HUGE_VAL);
+  setBoundsByBox(*this, *tree_);
 }
 
 template <typename S>
@@ -80,7 +81,7 @@ template <typename S>
 void Model<S>::setMesh(std::shared_ptr<const Mesh> mesh) {
   tree_ = std::make_unique<tree::Tree>(std::move(mesh), options_);
   staged_.reset();
-  setBounds(*this, tree_->bounds(), tree_->options().margin, HUGE_VAL);
+  setBoundsByBox(*this, *tree_);
 }
 
 template <typename S>
@@ -225,7 +226,7 @@ void Model<S>::prune() {
 template <typename S>
 void Model<S>::updateVertices(std::vector<Eigen::Vector3d> vertices) {
   fcl_adapter::treeOf(*this).updateVertices(std::move(vertices));
-  setBounds(*this, tree_->bounds(), tree_->options().margin, HUGE_VAL);
+  setBoundsByBox(*this, *tree_);
 }
 
 template <typename S>

@@ -44,8 +44,8 @@ SimilarityTransform withMargin(SimilarityTransform b_in_a, const TreeSide& a, co
   return b_in_a;
 }
 
-/// Are two meshes, and the spheres of their cells, apart because one of them is farther away than floats can say? Most
-/// queries compare one number. What is beyond would overflow in a walk, or be lost in its tolerance.
+/// Are two meshes, and the spheres of their cells, apart because their distance exceeds the range of a walk's floats? A
+/// walk would overflow, or lose the distance in its tolerance. Most queries compare one number.
 template <typename S>
 bool isOutOfSight(const CollideQuery<S>& q, const SimilarityTransform& b_in_a, double size_a, double size_b) {
   if (b_in_a.tolerance < 1e15) return false;

@@ -6,9 +6,9 @@
 #include <limits>
 #include <optional>
 
+#include "fcl/adapters/bodies.h"
 #include "fcl/adapters/models.h"
 #include "fcl/adapters/motion.h"
-#include "fcl/adapters/octree_side.h"
 #include "fcl/adapters/pair.h"
 #include "fcl/adapters/validate.h"
 #include "fcl/queries/collide_pair.h"
@@ -35,15 +35,6 @@ SimilarityTransform inBody(const tree::Tree& tree) {
   p.scale = tree.surface().lattice.unit();
   p.translation = tree.surface().lattice.origin();
   return p;
-}
-
-/// A shape or an octree?
-template <typename S>
-bool isBodies(const fcl::CollisionGeometry<S>* geometry) {
-#if FCL_HAVE_OCTOMAP
-  if (geometry->getNodeType() == fcl::GEOM_OCTREE) return true;
-#endif
-  return isShape(geometry);
 }
 
 /// What is to be taken for a contact. The bodies are at most so far from their origins; `largest` coordinate of all.
@@ -102,17 +93,7 @@ double walkConvex(const ContinuousQuery<S>& q, const TreeSide& a, double margin)
     goal.rounding = std::max(goal.rounding, 2 * toleranceOfCollide(q, model_size, region.radius));
     time = walk.run(goal);
   };
-  if (isShape(q.b())) {
-    withConvexShape(static_cast<const fcl::ShapeBase<S>&>(*q.b()), region,
-                    [&](const query::ConvexShape& body) { run(query::ConvexSide(body)); });
-  }
-#if FCL_HAVE_OCTOMAP
-  if (q.b()->getNodeType() == fcl::GEOM_OCTREE) {
-    const fcl::Transform3<S> X_WO = poseAt<S>(q.X_WB(), 0);
-    const OcTreeSide<S> side(static_cast<const fcl::OcTree<S>&>(*q.b()), X_WO, 1, false);
-    if (!side.empty()) run(side);
-  }
-#endif
+  withBodies(*q.b(), poseAt<S>(q.X_WB(), 0), region, run);
   return time;
 }
 

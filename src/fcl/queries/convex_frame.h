@@ -7,6 +7,7 @@
 
 #include "fcl/adapters/convex_shapes.h"
 #include "fcl/adapters/pair.h"
+#include "fcl/adapters/validate.h"
 #include "query/sides/convex_side.h"
 #include "query/sides/side.h"
 
@@ -68,10 +69,6 @@ class ConvexFrame {
   }
 
  private:
-  static double orthogonalityError(const Eigen::Matrix3d& R) {
-    return (R.transpose() * R - Eigen::Matrix3d::Identity()).cwiseAbs().maxCoeff();
-  }
-
   Eigen::Matrix3d R_BM_, R_MB_;
   Eigen::Vector3d p_BM_;
   query::Sphere region_;

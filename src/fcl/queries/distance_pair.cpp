@@ -9,8 +9,8 @@
 #include <limits>
 #include <type_traits>
 
+#include "fcl/adapters/bodies.h"
 #include "fcl/adapters/models.h"
-#include "fcl/adapters/octree_side.h"
 #include "fcl/adapters/pair.h"
 #include "fcl/adapters/validate.h"
 #include "fcl/queries/collide_pair.h"
@@ -183,15 +183,15 @@ void searchSolid(const DistanceQuery<S>& q, Search&& search, IsInside&& is_insid
   q.result.min_distance = 0;
 }
 
-/// The same between a tree and solid bodies: with_partner(frame, f) makes the side of the bodies and calls f with it.
-template <typename S, typename F>
-void searchConvex(const DistanceQuery<S>& q, tree::Tree& tree, F&& with_partner) {
+/// The same between a tree and solid bodies.
+template <typename S>
+void searchBodies(const DistanceQuery<S>& q, tree::Tree& tree) {
   const QueryScope scope(tree);
   const TreeSide& a = scope.a();
   const oracle::Surface& surface = tree.surface();
   const ConvexFrame<S> frame(q.X_WA(), q.X_WB(), surface);
   const SimilarityTransform b_in_a = frame.toLattice(surface.lattice, 0);
-  with_partner(frame, [&](const auto& b) {
+  withBodies(*q.b(), q.X_WB(), frame.region(), [&](const auto& b) {
     if constexpr (std::is_same<std::decay_t<decltype(b)>, query::ConvexSide>::value) {
       if (searchFar(q, Distant(isometryOf<S>(q.X_WA()), tree), b)) return;
     }
@@ -200,43 +200,36 @@ void searchConvex(const DistanceQuery<S>& q, tree::Tree& tree, F&& with_partner)
   });
 }
 
-template <typename S>
-void searchModels(const DistanceQuery<S>& q, tree::Tree& tree_a, tree::Tree& tree_b) {
-  const QueryScope scope(tree_a, tree_b);
-  const RelativeSides sides = relate<S>(q, scope.a(), scope.b());
-  if (searchFar(q, Distant(isometryOf<S>(q.X_WA()), tree_a), Distant(isometryOf<S>(q.X_WB()), tree_b))) return;
+/// The same between meshes, of which `mesh_b` is side B's tree or fcl::BVHModel.
+template <typename S, typename B, typename MeshB>
+void searchMeshes(const DistanceQuery<S>& q, const TreeSide& a, const B& b, MeshB& mesh_b) {
+  tree::Tree& tree_a = a.tree();
+  const RelativeSides sides = relate<S>(q, a, b);
+  if (searchFar(q, Distant(isometryOf<S>(q.X_WA()), tree_a), Distant(isometryOf<S>(q.X_WB()), mesh_b))) return;
   searchSolid(
-      q, [&] { search(q, scope.a(), scope.b(), sides.b_in_a); },
+      q, [&] { search(q, a, b, sides.b_in_a); },
       [&] {
-        return contains<S>(tree_a, q.X_WA(), tree_b, q.X_WB(), sides.magnitude) ||
-               contains<S>(tree_b, q.X_WB(), tree_a, q.X_WA(), sides.magnitude);
+        if (contains<S>(tree_a, q.X_WA(), mesh_b, q.X_WB(), sides.magnitude)) return true;
+        if constexpr (std::is_same<B, TreeSide>::value) {
+          return contains<S>(mesh_b, q.X_WB(), tree_a, q.X_WA(), sides.magnitude);
+        }
+        return false;
       });
 }
 
-/// Between a tree and whatever is no model.
 /// @throws std::invalid_argument for a partner that is not supported.
 template <typename S>
-void searchPartner(const DistanceQuery<S>& q, tree::Tree& tree) {
-  if (isShape(q.b())) {
-    const auto& shape = static_cast<const fcl::ShapeBase<S>&>(*q.b());
-    searchConvex(q, tree, [&](const ConvexFrame<S>& frame, auto&& f) {
-      withConvexShape(shape, frame.region(), [&](const query::ConvexShape& body) { f(query::ConvexSide(body)); });
-    });
-#if FCL_HAVE_OCTOMAP
-  } else if (q.b()->getNodeType() == fcl::GEOM_OCTREE) {
-    searchConvex(q, tree, [&](const ConvexFrame<S>&, auto&& f) {
-      const OcTreeSide<S> side(static_cast<const fcl::OcTree<S>&>(*q.b()), q.X_WB(), 1, false);
-      if (!side.empty()) f(side);
-    });
-#endif
+void searchPair(const DistanceQuery<S>& q) {
+  tree::Tree& tree = treeOf(*asModel<S>(q.a()));
+  if (const Model<S>* other = asModel<S>(q.b())) {
+    const QueryScope scope(tree, treeOf(*other));
+    searchMeshes(q, scope.a(), scope.b(), treeOf(*other));
+  } else if (isBodies<S>(q.b())) {
+    searchBodies(q, tree);
   } else {
     const BvhSide b = bvhSideOf<S>("distance", q.b());
     const QueryScope scope(tree);
-    const RelativeSides sides = relate<S>(q, scope.a(), b);
-    if (searchFar(q, Distant(isometryOf<S>(q.X_WA()), tree), Distant(isometryOf<S>(q.X_WB()), b))) return;
-    searchSolid(
-        q, [&] { search(q, scope.a(), b, sides.b_in_a); },
-        [&] { return contains<S>(tree, q.X_WA(), b, q.X_WB(), sides.magnitude); });
+    searchMeshes(q, scope.a(), b, b);
   }
 }
 
@@ -275,11 +268,7 @@ S distancePair(const fcl::CollisionGeometry<S>* o1, const fcl::Transform3<S>& X_
   for (;;) {
     // Held, so that another mesh does not get the address of one of these.
     const auto mesh1 = is_signed ? meshOf(model1) : nullptr, mesh2 = is_signed ? meshOf(model2) : nullptr;
-    if (model1 != nullptr && model2 != nullptr) {
-      searchModels(q, treeOf(*model1), treeOf(*model2));
-    } else {
-      searchPartner(q, treeOf(model1 != nullptr ? *model1 : *model2));
-    }
+    searchPair(q);
     if (!is_signed || result.min_distance > 0) return result.min_distance;
     sign(q);
     // The depth must be that of the surfaces that touch.

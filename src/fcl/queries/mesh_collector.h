@@ -63,11 +63,11 @@ struct Met {
 };
 
 /// A pair of triangles and its place in the order of contacts.
-struct PlacedPair {
+struct RankedPair {
   double place;
   std::uint64_t key;
 
-  bool operator<(const PlacedPair& other) const { return place != other.place ? place < other.place : key < other.key; }
+  bool operator<(const RankedPair& other) const { return place != other.place ? place < other.place : key < other.key; }
 };
 
 /// Turns the pairs of a walk into contacts and cost sources; triangles are those of the caller's first and second
@@ -148,7 +148,7 @@ class MeshCollector : public query::Visitor {
   void finish() {
     if (ends_at_first_) return;
     if (is_cut_) {
-      for (const PlacedPair& pair : s_.first.sort()) s_.found.push_back(pair.key);
+      for (const RankedPair& pair : s_.first.sort()) s_.found.push_back(pair.key);
       s_.met = s_.first_cells.sort();
     }
     lookAtFound();
@@ -172,7 +172,7 @@ class MeshCollector : public query::Visitor {
   static std::uint32_t second(std::uint64_t key) { return static_cast<std::uint32_t>(key >> 1); }
   static bool isCertain(std::uint64_t key) { return (key & 1) == 0; }
 
-  using FirstPairs = FirstItems<PlacedPair>;
+  using FirstPairs = FirstItems<RankedPair>;
   // Kept by the thread between queries.
   struct Scratch {
     query::PairSet<std::uint32_t> seen;
@@ -231,7 +231,7 @@ class MeshCollector : public query::Visitor {
   void addFirst(std::uint32_t of_model, std::uint64_t key) {
     if (!s_.seen.insert(first(key), second(key))) return;
     getCorners(&key, 1);
-    const PlacedPair pair{placeOf(of_model), key};
+    const RankedPair pair{placeOf(of_model), key};
     if (!s_.first.wants(pair) || !decide(key, 0, nullptr)) return;
     s_.first.add(pair);
     if (s_.first.isFull()) order_.setCut(s_.first.last().place, position_tolerance_, cut_);

@@ -23,11 +23,14 @@ ComputeChain::Limits complete(ComputeChain::Limits limits, Thread& thread) {
 
 }  // namespace
 
-ComputeOracle::ComputeOracle(const std::shared_ptr<Thread>& thread, ComputeChain::Limits limits)
-    : DeviceOracle(thread, true, complete(limits, *thread).bytes),
-      walker_bytes_(complete(limits, *thread).bytes),
+ComputeOracle::ComputeOracle(const std::shared_ptr<Thread>& thread, const ComputeChain::Limits& limits)
+    : ComputeOracle(Completed{complete(limits, *thread)}, thread) {}
+
+ComputeOracle::ComputeOracle(const Completed& completed, const std::shared_ptr<Thread>& thread)
+    : DeviceOracle(thread, true, completed.limits.bytes),
+      walker_bytes_(completed.limits.bytes),
       choice_(thread->info().hardware) {
-  limits = complete(limits, *thread_);
+  const ComputeChain::Limits& limits = completed.limits;
   thread_->run([&] {
     arena_ = std::make_shared<Arena>(thread_, limits.bytes);
     chain_ = std::make_unique<ComputeChain>(limits, *arena_);

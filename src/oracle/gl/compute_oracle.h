@@ -21,7 +21,7 @@ namespace bocst::oracle::gl {
 class ComputeOracle : public DeviceOracle {
  public:
   /// @throws OracleError when a shader does not compile or the driver allows less than the chain needs.
-  explicit ComputeOracle(const std::shared_ptr<Thread>& thread, ComputeChain::Limits limits = {});
+  explicit ComputeOracle(const std::shared_ptr<Thread>& thread, const ComputeChain::Limits& limits = {});
   ~ComputeOracle() override;
 
   OracleKind kind() const override { return OracleKind::kCompute; }
@@ -42,6 +42,12 @@ class ComputeOracle : public DeviceOracle {
   std::uint64_t walked() const { return walked_; }
 
  private:
+  // With a value for everything that the caller left open.
+  struct Completed {
+    ComputeChain::Limits limits;
+  };
+  ComputeOracle(const Completed& completed, const std::shared_ptr<Thread>& thread);
+
   bool canWalk();
   PairWalker& walker();
   void answer(const std::vector<ExpansionRequest*>& requests, std::vector<Verdict>& verdicts) override;

@@ -8,7 +8,7 @@
 namespace bocst::oracle::gl {
 
 DeviceMesh::DeviceMesh(Thread& thread, std::shared_ptr<Arena> arena, const Surface& surface, bool exact)
-    : arena_(std::move(arena)), triangle_count_(surface.mesh->triangleCount()) {
+    : arena_(std::move(arena)) {
   const std::vector<Mesh::Indices>& triangles = surface.mesh->triangles();
   const std::vector<Eigen::Vector3d>& from = surface.mesh->vertices();
   const std::size_t vertices = 3 * triangles.size(), doubles = vertices + 6 * from.size();

@@ -24,7 +24,6 @@ class DeviceMesh : public DeviceResource {
   DeviceMesh(Thread& thread, std::shared_ptr<Arena> arena, const Surface& surface, bool exact);
 
   std::size_t bytes() const override { return words_->bytes(); }
-  std::size_t triangleCount() const { return triangle_count_; }
 
   /// In the thread of the context. The name changes when the arena grows.
   const Buffer& buffer() const { return arena_->buffer(); }
@@ -37,7 +36,6 @@ class DeviceMesh : public DeviceResource {
  private:
   std::shared_ptr<Arena> arena_;
   std::shared_ptr<const Arena::Range> words_;
-  std::size_t triangle_count_ = 0;
   std::uint32_t vertices_ = 0, exact_ = 0;
 };
 

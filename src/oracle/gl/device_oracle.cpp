@@ -31,7 +31,7 @@ void DeviceOracle::flush() {
   } catch (const std::exception& e) {
     reportFailure("a batch", e);  // no memory
   }
-  // Whatever went wrong, who waits is told; what has no verdict is the CPU's.
+  // Whatever went wrong: wake all threads that wait. Requests without a verdict go to the CPU.
   const std::lock_guard<std::mutex> lock(mutex_);
   for (Ticket& t : tickets_) t.done = t.done || t.taken;
   answered_.notify_all();

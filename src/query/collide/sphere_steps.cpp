@@ -7,7 +7,6 @@
 #include <hwy/highway.h>
 
 #include <algorithm>
-#include <cmath>
 
 #include "log/assert.h"
 #include "simd/octants-inl.h"
@@ -23,10 +22,21 @@ namespace {
 
 constexpr float kHalfDiagonal = 0.8660254f;   // of a cube of side 1
 constexpr float kClippedFactor = 1.4142136f;  // see TreeSide::sphere()
-constexpr std::uint64_t kNothing = ~std::uint64_t{0};
 
-inline std::uint64_t nameOf(int side, std::uint32_t block) {
-  return std::uint64_t{block} << 1 | static_cast<std::uint64_t>(side);
+// A block of a side whose octants are in a frame.
+inline BlockView viewOf(const SphereSteps& s, int side, std::uint32_t index, std::uint32_t frame) {
+  const tree::Block& block = s.side[side]->tree().block(index);
+  return {&block, index, block.shape + 1u, frame, static_cast<std::uint32_t>(side)};
+}
+
+// Octant o of a block in a frame.
+inline StepNode octantOf(const BlockView& b, std::uint32_t o) {
+  StepNode n;
+  n.node = tree::NodeRef::octant(b.index, static_cast<int>(o));
+  n.ref = b.at->child[o].load(std::memory_order_acquire);
+  n.level = b.level;
+  n.lane = 8 * b.frame + o;
+  return n;
 }
 
 }  // namespace
@@ -97,12 +107,20 @@ HWY_INLINE void decodeSpheres(const SphereSteps& s, int side, int level, const P
   }
 }
 
-// Decodes the octants of a block into a frame, unless it holds them: the last pair may have had the same block.
-HWY_INLINE void decodeBlock(SphereSteps& s, int side, std::uint32_t index, const tree::Block& block,
-                            std::uint32_t frame) {
-  if (s.holds[frame] == nameOf(side, index)) return;
-  s.holds[frame] = nameOf(side, index);
-  decodeSpheres(s, side, block.shape, block.at, s.spheres[frame]);
+// Decodes the octants of a block into its frame, unless it holds them: the last pair may have had the same block.
+HWY_INLINE void decodeBlock(SphereSteps& s, const BlockView& block) {
+  const std::uint64_t name = frameName(block.side, block.index);
+  if (s.holds[block.frame] == name) return;
+  s.holds[block.frame] = name;
+  decodeSpheres(s, static_cast<int>(block.side), block.at->shape, block.at->at, s.spheres[block.frame]);
+}
+
+// Decodes the block of an expanded node of a side into a frame.
+HWY_INLINE BlockView open(SphereSteps& s, int side, const StepNode& node, std::uint32_t frame) {
+  const BlockView block = viewOf(s, side, node.ref.index(), frame);
+  s.side[side]->tree().markUsed(block.index, s.side[0]->now());
+  decodeBlock(s, block);
+  return block;
 }
 
 // Octants of frame f: which may meet lane l of frame y, of the other side, and of which float does not tell.
@@ -139,13 +157,13 @@ HWY_INLINE Met meeting(const SphereFrames& g, const SphereFrame& f, const Sphere
   return met;
 }
 
-// The octants of a block in a frame whose spheres meet that of lane `lane` of the other side, and their order.
-HWY_INLINE unsigned meetingOctants(SphereSteps& s, int x, std::uint32_t index, const tree::Block& block,
-                                   std::uint32_t frame, tree::NodeRef other, std::uint32_t lane, std::uint32_t* order) {
-  const Met met = meeting(s.frames, s.spheres[frame], s.spheres[lane / 8], lane % 8, order);
-  const unsigned mask = met.maybe & block.grey, doubtful = met.doubtful & block.grey;
+// The octants of a block in a frame whose spheres meet that of the other side's node, and their order.
+HWY_INLINE unsigned meetingOctants(SphereSteps& s, const BlockView& block, const StepNode& other,
+                                   std::uint32_t* order) {
+  const Met met = meeting(s.frames, s.spheres[block.frame], s.spheres[other.lane / 8], other.lane % 8, order);
+  const unsigned mask = met.maybe & block.at->grey, doubtful = met.doubtful & block.at->grey;
   if (doubtful == 0) return mask;
-  return (mask & ~doubtful) | decideMeeting(s, x, index, doubtful, other);
+  return (mask & ~doubtful) | decideMeeting(s, static_cast<int>(block.side), block.index, doubtful, other.node);
 }
 
 // The first in the order of a group.
@@ -161,14 +179,12 @@ HWY_INLINE std::uint32_t first(const SphereGroup& group, std::uint32_t octants) 
 
 // Decodes a node of a pair that has no frames into a frame, and returns its lane.
 HWY_NOINLINE std::uint32_t lookUp(SphereSteps& s, int side, tree::NodeRef node, std::uint32_t frame) {
-  const tree::Tree& tree = s.side[side]->tree();
   const std::uint32_t root[3] = {0, 0, 0};
   if (!node.isRoot()) {
-    const tree::Block& block = tree.block(node.block());
-    decodeBlock(s, side, node.block(), block, frame);
+    decodeBlock(s, viewOf(s, side, node.block(), frame));
     return 8 * frame + static_cast<std::uint32_t>(node.octant());
   }
-  s.holds[frame] = kNothing;
+  s.holds[frame] = kEmptyFrame;
   // The root as the first octant of a cell that is twice as large, whose other octants nobody asks for.
   decodeSpheres(s, side, 0, root, s.spheres[frame]);
   return 8 * frame;
@@ -178,48 +194,31 @@ HWY_INLINE bool isLeaf(const SphereSteps& s, int side, std::uint32_t level) { re
 
 // Of two nodes that are no leaves, is that of side x, at `level`, to be expanded before the other?
 HWY_INLINE bool isLarger(const SphereSteps& s, int x, std::uint32_t level, std::uint32_t other_level) {
-  const int deeper = static_cast<int>(other_level) - static_cast<int>(level);
-  return x == 0 ? deeper >= s.not_smaller : -deeper < s.not_smaller;
+  return s.level_rule.isFirst(x, static_cast<int>(other_level) - static_cast<int>(level));
 }
 
-HWY_INLINE void push(SphereSteps& s, int side, const tree::Block& block, std::uint32_t index, std::uint32_t frame,
-                     std::uint32_t frames, const SphereGroup::Node& other, unsigned octants) {
+HWY_INLINE void push(SphereSteps& s, const BlockView& own, std::uint32_t frames, const StepNode& other,
+                     unsigned octants) {
   BOCST_ASSERT(frames <= SphereSteps::kFrames && s.stack + s.depth < s.stack_end);
   SphereGroup& top = s.stack[s.depth++];
-  top.other = other;
-  top.at = &block;
-  top.side = static_cast<std::uint32_t>(side);
-  top.block = index;
-  top.level = block.shape + 1u;
-  top.frame = frame;
+  copyWords(other, top.other);
+  copyWords(own, top.own);
   top.frames = frames;
   top.octants = octants;
 }
 
-// Expands the other node of a pair for all octants in `mask` of block `index`, in frame `frame`, so that their tests
-// overlap in time. False where it is not the next to be expanded.
-HWY_INLINE bool expandOther(SphereSteps& s, int x, const tree::Block& own, std::uint32_t index, std::uint32_t frame,
-                            const SphereGroup::Node& other, unsigned mask) {
-  const int y = 1 - x;
-  const std::uint32_t level = own.shape + 1u;
+// Expands the other node of a pair for all octants in `mask` of a block, so that their tests overlap in time. False
+// where it is not the next to be expanded.
+HWY_INLINE bool expandOther(SphereSteps& s, const BlockView& own, const StepNode& other, unsigned mask) {
+  const int x = static_cast<int>(own.side), y = 1 - x;
   if (isLeaf(s, y, other.level) || other.ref.tag() != tree::ChildRef::kBlock) return false;
-  if (!isLeaf(s, x, level) && !isLarger(s, y, other.level, level)) return false;
-  const std::uint32_t other_index = other.ref.index(), other_frame = frame + 1;
-  const tree::Tree& tree = s.side[y]->tree();
-  const tree::Block& block = tree.block(other_index);
-  tree.markUsed(other_index, s.side[0]->now());
-  decodeBlock(s, y, other_index, block, other_frame);
+  if (!isLeaf(s, x, own.level) && !isLarger(s, y, other.level, own.level)) return false;
+  const BlockView block = open(s, y, other, own.frame + 1);
   const std::size_t start = s.depth;
   for (; mask != 0; mask &= mask - 1) {
-    const auto o = static_cast<std::uint32_t>(__builtin_ctz(mask));
-    SphereGroup::Node n;
-    n.node = tree::NodeRef::octant(index, static_cast<int>(o));
-    n.level = level;
-    n.lane = 8 * frame + o;
-    const unsigned left = meetingOctants(s, y, other_index, block, other_frame, n.node, n.lane, s.stack[s.depth].order);
-    if (left == 0) continue;
-    n.ref = own.child[o].load(std::memory_order_acquire);
-    push(s, y, block, other_index, other_frame, other_frame + 1, n, left);
+    const StepNode n = octantOf(own, static_cast<std::uint32_t>(__builtin_ctz(mask)));
+    const unsigned left = meetingOctants(s, block, n, s.stack[s.depth].order);
+    if (left != 0) push(s, block, block.frame + 1, n, left);
   }
   // The group with the nearest octant goes on top.
   if (s.depth - start < 2 || !s.nearest_first) return true;
@@ -236,12 +235,12 @@ HWY_INLINE bool expandOther(SphereSteps& s, int x, const tree::Block& own, std::
 SphereSteps::Event NextEvent(SphereSteps& s) {
   while (s.depth != 0) {
     SphereGroup& top = s.stack[s.depth - 1];
-    const int side = static_cast<int>(top.side);
-    SphereGroup::Node other = top.other;
-    const bool own_leaf = isLeaf(s, side, top.level), other_leaf = isLeaf(s, 1 - side, other.level);
+    const int side = static_cast<int>(top.own.side);
+    StepNode other = top.other;
+    const bool own_leaf = isLeaf(s, side, top.own.level), other_leaf = isLeaf(s, 1 - side, other.level);
     if (own_leaf && other_leaf) {
       --s.depth;
-      s.pair[side] = tree::NodeRef::octant(top.block, 0);
+      s.pair[side] = tree::NodeRef::octant(top.own.index, 0);
       s.pair[1 - side] = other.node;
       s.expanded = side;
       s.mask = top.octants;
@@ -252,44 +251,36 @@ SphereSteps::Event NextEvent(SphereSteps& s) {
                                 : static_cast<std::uint32_t>(__builtin_ctz(top.octants));
     top.octants &= ~(1u << o);
     if (top.octants == 0) --s.depth;
-    SphereGroup::Node own;
-    own.node = tree::NodeRef::octant(top.block, static_cast<int>(o));
+    StepNode own;
+    own.node = tree::NodeRef::octant(top.own.index, static_cast<int>(o));
     if (s.cut != nullptr && s.isBeyondCut(side == 0 ? own.node : other.node, side == 0 ? other.node : own.node)) {
       continue;
     }
-    own.level = top.level;
-    own.ref =
-        top.at != nullptr ? top.at->child[o].load(std::memory_order_acquire) : s.side[side]->tree().childRef(own.node);
+    own.level = top.own.level;
+    own.ref = top.own.at != nullptr ? top.own.at->child[o].load(std::memory_order_acquire)
+                                    : s.side[side]->tree().childRef(own.node);
     std::uint32_t frames = top.frames;
     if (frames == 0) {
       own.lane = lookUp(s, side, own.node, frames++);
       other.lane = lookUp(s, 1 - side, other.node, frames++);
     } else {
-      own.lane = 8 * top.frame + o;
+      own.lane = 8 * top.own.frame + o;
     }
     // The larger of two nodes is expanded, unless it is a leaf.
     const bool expands_own = other_leaf || (!own_leaf && isLarger(s, side, own.level, other.level));
     const int x = expands_own ? side : 1 - side;
-    const SphereGroup::Node& gone = expands_own ? own : other;
-    const SphereGroup::Node& still = expands_own ? other : own;
+    const StepNode &gone = expands_own ? own : other, &still = expands_own ? other : own;
     if (gone.ref.tag() != tree::ChildRef::kBlock) {
       s.pair[side] = own.node;
       s.pair[1 - side] = other.node;
       return SphereSteps::kDeferred;
     }
-    const std::uint32_t index = gone.ref.index(), frame = frames++;
-    const tree::Tree& tree = s.side[x]->tree();
-    const tree::Block& block = tree.block(index);
-    tree.markUsed(index, s.side[0]->now());
-    const std::uint32_t level = block.shape + 1u;
-    const bool leaves = isLeaf(s, x, level) && isLeaf(s, 1 - x, still.level);
-    decodeBlock(s, x, index, block, frame);
-    const unsigned mask = meetingOctants(s, x, index, block, frame, still.node, still.lane, s.stack[s.depth].order);
+    const BlockView block = open(s, x, gone, frames++);
+    const unsigned mask = meetingOctants(s, block, still, s.stack[s.depth].order);
     if (mask == 0) continue;
+    const bool leaves = isLeaf(s, x, block.level) && isLeaf(s, 1 - x, still.level);
     // Not expandOther() with a cut: it puts octants on the stack in the opposite order.
-    if (leaves || s.cut != nullptr || !expandOther(s, x, block, index, frame, still, mask)) {
-      push(s, x, block, index, frame, frames, still, mask);
-    }
+    if (leaves || s.cut != nullptr || !expandOther(s, block, still, mask)) push(s, block, frames, still, mask);
   }
   return SphereSteps::kDone;
 }
@@ -321,22 +312,15 @@ SphereFrames::SphereFrames(const SimilarityTransform& one_in_zero) {
   tolerance = static_cast<float>(one_in_zero.tolerance);
 }
 
-int levelsApart(double scale) {
-  int levels;
-  const bool even = std::frexp(scale, &levels) == 0.5;
-  return even ? levels - 1 : levels;
-}
-
 SphereSteps::SphereSteps(const TreeSide& a, const TreeSide& b, const SimilarityTransform& b_in_a_,
                          SphereFrame* spheres_)
-    : side{&a, &b}, b_in_a(b_in_a_), frames(b_in_a_), spheres(spheres_) {
+    : side{&a, &b}, b_in_a(b_in_a_), frames(b_in_a_), level_rule(LevelRule::of(b_in_a_.scale)), spheres(spheres_) {
   for (int s = 0; s < 2; ++s) {
     const tree::Tree& tree = side[s]->tree();
     std::copy_n(tree.surface().lattice.extent().data(), 3, extent[s]);
     deepest[s] = static_cast<std::uint32_t>(tree.deepest());
   }
-  not_smaller = levelsApart(b_in_a.scale);
-  std::fill_n(holds, kFrames, kNothing);
+  std::fill_n(holds, kFrames, kEmptyFrame);
 }
 
 unsigned decideMeeting(const SphereSteps& s, int own, std::uint32_t index, unsigned mask, tree::NodeRef other) {
@@ -362,10 +346,8 @@ void pushPair(SphereSteps& s, tree::NodeRef node_a, tree::NodeRef node_b) {
   top.other.node = node_b;
   top.other.ref = b.childRef(node_b);
   top.other.level = static_cast<std::uint32_t>(b.level(node_b));
-  top.side = 0;
-  top.at = node_a.isRoot() ? nullptr : &a.block(node_a.block());
-  top.block = node_a.block();
-  top.level = static_cast<std::uint32_t>(a.level(node_a));
+  const tree::Block* const block = node_a.isRoot() ? nullptr : &a.block(node_a.block());
+  top.own = {block, node_a.block(), static_cast<std::uint32_t>(a.level(node_a)), BlockView::kNoFrame, 0};
   top.octants = 1u << node_a.octant();
   top.frames = 0;
 }

@@ -5,6 +5,7 @@
 #include <cstdint>
 #include <limits>
 
+#include "query/collide/step_state.h"
 #include "query/sides/side.h"
 #include "query/sides/visitor.h"
 
@@ -40,25 +41,11 @@ struct SphereFrames {
   float tolerance = 0;
 };
 
-/// The least d = level of side 1's node - level of side 0's at which side 0's node is not smaller. `scale`: lattice
-/// unit of side 1 in those of side 0.
-int levelsApart(double scale);
-
-/// Octants of one block that may meet one node of the other side, still to be walked. Words of one size, as in
-/// StepGroup.
+/// Octants of one block that may meet one node of the other side, still to be walked. Words of one size, see
+/// copyWords().
 struct SphereGroup {
-  struct Node {
-    tree::NodeRef node;
-    tree::ChildRef ref;  ///< Not read of a leaf.
-    std::uint32_t level;
-    std::uint32_t lane;  ///< 8 * frame + octant.
-  };
-  Node other;
-  const tree::Block* at;  ///< The block, or null where there is none.
-  std::uint32_t side;     ///< That of the block.
-  std::uint32_t block;    ///< Its index as in NodeRef::octant(); that of NodeRef::kRoot for the root, then octant 7.
-  std::uint32_t level;    ///< Of the octants.
-  std::uint32_t frame;    ///< Where they are.
+  StepNode other;         ///< Its child is not read if it is a leaf.
+  BlockView own;          ///< Of the root: index of NodeRef::kRoot, octant 7.
   std::uint32_t frames;   ///< How many are in use: for the octants, and for what is above both nodes. 0: it has none.
   std::uint32_t octants;  ///< A bit each.
   /// Of each a number whose lowest three bits are the octant; the least comes first.
@@ -88,15 +75,15 @@ struct SphereSteps {
   const SphereFrames frames;
   std::uint32_t extent[2][3];  ///< Where the actual regions end.
   std::uint32_t deepest[2];    ///< The level of each side's leaves.
-  int not_smaller;             ///< See levelsApart().
-  bool nearest_first = true;   ///< A hit ends the walk.
-  const Cut* cut = nullptr;    ///< What is left out; octants then come in the order of their ids.
+  const LevelRule level_rule;
+  bool nearest_first = true;  ///< A hit ends the walk.
+  const Cut* cut = nullptr;   ///< What is left out; octants then come in the order of their ids.
   bool isBeyondCut(tree::NodeRef a, tree::NodeRef b) const {
     return side[cut->cell_side]->firstCellId(cut->cell_side == 0 ? a : b) > cut->last_cell;
   }
 
   SphereFrame* const spheres;
-  std::uint64_t holds[kFrames];  ///< Which block of which side is in a frame.
+  std::uint64_t holds[kFrames];  ///< frameName() of what is in a frame.
 
   SphereGroup* stack = nullptr;  ///< With room for kStackRoom more, below `stack_end`.
   const SphereGroup* stack_end = nullptr;

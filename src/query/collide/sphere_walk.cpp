@@ -39,15 +39,6 @@ SphereWalk::Scratch& SphereWalk::scratchOfThread() {
   return s;
 }
 
-void SphereWalk::push(SphereSteps& steps, Scratch& s, tree::NodeRef node_a, tree::NodeRef node_b) {
-  if (s.stack.size() < steps.depth + 1 + SphereSteps::kStackRoom) {
-    s.stack.resize(2 * (steps.depth + SphereSteps::kStackRoom));
-  }
-  steps.stack = s.stack.data();
-  steps.stack_end = steps.stack + s.stack.size();
-  pushPair(steps, node_a, node_b);
-}
-
 bool SphereWalk::run(Visitor& visitor) {
   Scratch& s = scratchOfThread();
   SphereSteps steps(a_, b_, b_in_a_, s.spheres);
@@ -61,13 +52,13 @@ bool SphereWalk::search(SphereSteps& steps, Scratch& s, Visitor& visitor) const 
   const auto start = [&] {
     s.deferred.clear();
     steps.depth = 0;
-    push(steps, s, a_.root(), b_.root());
+    pushWithRoom(steps, s.stack, a_.root(), b_.root());
     has_grown = false;
   };
   const auto grow = [&] {
     has_grown = true;
     s.deferred.grow(a_, b_, b_in_a_, visitor.endsAtFirst() || steps.cut != nullptr,
-                    [&](const auto& pair) { push(steps, s, pair.a, pair.b); });
+                    [&](const auto& pair) { pushWithRoom(steps, s.stack, pair.a, pair.b); });
   };
   start();
   for (;;) {
@@ -103,7 +94,7 @@ SphereWalk::Outcome SphereWalk::look(std::size_t batch, std::vector<tree::Tree::
   Scratch& s = scratchOfThread();
   SphereSteps steps(a_, b_, b_in_a_, s.spheres);
   s.deferred.clear();
-  push(steps, s, a_.root(), b_.root());
+  pushWithRoom(steps, s.stack, a_.root(), b_.root());
   for (;;) {
     switch (nextEvent(steps)) {
       case SphereSteps::kDone:
@@ -130,7 +121,7 @@ bool SphereWalk::describe(oracle::DeviceWalks::Pair& pair) const {
   pair.unit = side.unit;
   pair.rounding_margin = kWider * frames.rounding_margin;
   pair.tolerance = frames.tolerance;
-  pair.not_smaller = levelsApart(b_in_a_.scale);
+  pair.not_smaller = LevelRule::of(b_in_a_.scale).not_smaller;
   return true;
 }
 

@@ -49,7 +49,6 @@ class SphereWalk {
   struct Scratch;
 
   static Scratch& scratchOfThread();
-  static void push(SphereSteps& steps, Scratch& s, tree::NodeRef node_a, tree::NodeRef node_b);
   bool search(SphereSteps& steps, Scratch& s, Visitor& visitor) const;
   bool visitLeaves(const SphereSteps& steps, Visitor& visitor) const;
 

@@ -40,15 +40,8 @@ inline void push(PairSteps& s, const BlockView& own, const StepNode& other, unsi
                  std::uint32_t asked = AskedLeaf::kNone) {
   BOCST_ASSERT(s.stack + s.depth < s.stack_end);
   StepGroup& top = s.stack[s.depth++];
-  top.own.at = own.at;
-  top.own.index = own.index;
-  top.own.level = own.level;
-  top.own.frame = own.frame;
-  top.own.side = own.side;
-  top.other.node = other.node;
-  top.other.ref = other.ref;
-  top.other.level = other.level;
-  top.other.lane = other.lane;
+  copyWords(own, top.own);
+  copyWords(other, top.other);
   top.octants = octants;
   top.late = 0;
   top.asked = asked;
@@ -90,7 +83,7 @@ namespace bocst::query::HWY_NAMESPACE {
 // Decodes the octants of a block into a frame. False where the frame holds them already: pairs that differ in the other
 // node only come one after the other.
 HWY_INLINE bool decodeBlock(PairSteps& s, int own, std::uint32_t index, const tree::Block& block, std::uint32_t frame) {
-  const std::uint64_t name = PairSteps::name(own, index);
+  const std::uint64_t name = frameName(static_cast<std::uint32_t>(own), index);
   if (s.holds[frame] == name) return false;
   s.holds[frame] = name;
   decodeBlock(s.geometry, own, block, s.frames[frame]);
@@ -102,7 +95,7 @@ HWY_INLINE void lookUp(PairSteps& s, StepNode& n, int side, std::uint32_t& frame
   const tree::Tree& tree = *s.tree[side];
   if (n.node.isRoot()) {
     decodeRoot(s.geometry, side, tree.rootBounds(), s.frames[frames]);
-    s.holds[frames] = PairSteps::kNothing;
+    s.holds[frames] = kEmptyFrame;
     n.lane = 8 * frames;
   } else {
     const std::uint32_t index = n.node.block();
@@ -311,7 +304,7 @@ HWY_INLINE bool expandOther(PairSteps& s, const BlockView& own, const StepNode& 
   const int x = static_cast<int>(own.side), y = 1 - x;
   if (other.ref.tag() != tree::ChildRef::kBlock) return false;
   const int deeper = static_cast<int>(other.level) - static_cast<int>(own.level);
-  if (x == 0 ? deeper >= s.not_smaller : -deeper < s.not_smaller) return false;
+  if (s.level_rule.isFirst(x, deeper)) return false;
   bool is_new;
   const BlockView block = open(s, y, other, own.frame + 1, is_new);
   if (fetch_own) fetchAll(s, own, mask);
@@ -378,8 +371,9 @@ HWY_INLINE Choice choose(const PairSteps& s, const Popped& p, bool own_leaf, boo
   const bool leaf0 = p.side == 0 ? own_leaf : other_leaf, leaf1 = p.side == 0 ? other_leaf : own_leaf;
   const int below = static_cast<int>(p.own.level) - static_cast<int>(p.other.level);
   const int deeper = p.side == 0 ? -below : below;  // side 1's node than side 0's
-  if (leaf1 || (!leaf0 && deeper >= s.not_smaller)) return {0, leaf1 && deeper < s.not_smaller};
-  return {1, leaf0 && deeper >= s.larger};
+  const bool is_smaller = !s.level_rule.isFirst(0, deeper);
+  if (leaf1 || (!leaf0 && !is_smaller)) return {0, leaf1 && is_smaller};
+  return {1, leaf0 && deeper >= s.level_rule.larger};
 }
 
 HWY_INLINE void fill(StepEvent& e, StepEvent::Kind kind, const Popped& p) {

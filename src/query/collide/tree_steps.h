@@ -1,37 +1,15 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #pragma once
 
-#include <cmath>
 #include <cstddef>
 #include <cstdint>
 
+#include "query/collide/step_state.h"
 #include "query/cull/frames.h"
 #include "query/leaf/large_triangles.h"
 #include "query/sides/visitor.h"
-#include "tree/tree.h"
 
 namespace bocst::query {
-
-/// A node as the walk knows it.
-struct StepNode {
-  static constexpr std::uint32_t kNoLane = 0xffffffff;
-
-  tree::NodeRef node;
-  tree::ChildRef ref;
-  std::uint32_t level = 1;
-  std::uint32_t lane = kNoLane;  ///< 8 * frame + octant: where its volume is decoded; or kNoLane.
-};
-
-/// A block whose octants (or lanes) take part in a walk.
-struct BlockView {
-  static constexpr std::uint32_t kNoFrame = 0xffffffff;
-
-  const tree::Block* at;  ///< Null: the root, which no block has.
-  std::uint32_t index;    ///< As NodeRef names it.
-  std::uint32_t level;    ///< Of the octants.
-  std::uint32_t frame;    ///< Has the octants, or kNoFrame; frames of lower number are in use, too.
-  std::uint32_t side;     ///< Whose tree has the block.
-};
 
 /// A leaf of large triangles that was asked which of them may meet a node of the other side.
 struct AskedLeaf {
@@ -41,8 +19,8 @@ struct AskedLeaf {
   std::uint32_t triangles = 0;  ///< Those that may meet, a bit each.
 };
 
-/// Octants of one block against one node of the other side, still to be walked. Words of one size, written and read one
-/// by one: a processor is slow to read a wide word that was just written in parts.
+/// Octants of one block against one node of the other side, still to be walked. Words of one size, see
+/// copyWords().
 struct StepGroup {
   StepNode other;
   BlockView own;
@@ -90,9 +68,7 @@ struct PairSteps {
   const StepGroup* stack_end = nullptr;
   std::size_t depth = 0;
 
-  /// With d = level of side 1's node - level of side 0's: side 0's node is not smaller if d >= not_smaller, and larger
-  /// if d >= larger.
-  int not_smaller, larger;
+  const LevelRule level_rule;
 
   /// The other node of a pair is expanded for all octants of a group at once, so that their tests overlap in time. Set
   /// where a hit is not expected or does not end the walk; else the first hit makes most of these tests unnecessary.
@@ -113,20 +89,17 @@ struct PairSteps {
 
   const LargeTriangles* leaf[2] = {nullptr, nullptr};  ///< Of each side, those of the larger leaf placed last.
 
-  std::uint64_t holds[kFrames];  ///< Which block of which side is in a frame.
-  static constexpr std::uint64_t kNothing = ~std::uint64_t{0};
-  static constexpr std::uint64_t name(int side, std::uint32_t block) {
-    return std::uint64_t{block} << 1 | static_cast<std::uint64_t>(side);
-  }
+  std::uint64_t holds[kFrames];  ///< frameName() of what is in a frame.
 
   PairSteps(const tree::Tree* a, const tree::Tree* b, std::int64_t now_, const PairFrames& geometry_, Frame* frames_)
-      : tree{a, b}, now(now_), geometry(geometry_), frames(frames_), stack(nullptr) {
-    // The least d for which 2^d is at least the ratio of the units, or more than that; exact.
-    int exponent = 0;
-    const bool even = std::frexp(geometry.side[1].unit / geometry.side[0].unit, &exponent) == 0.5f;
-    not_smaller = even ? exponent - 1 : exponent;
-    larger = exponent;
-    for (std::uint64_t& h : holds) h = kNothing;
+      : tree{a, b},
+        now(now_),
+        geometry(geometry_),
+        frames(frames_),
+        stack(nullptr),
+        // Units are floats, and so is their quotient.
+        level_rule(LevelRule::of(static_cast<double>(geometry.side[1].unit / geometry.side[0].unit))) {
+    for (std::uint64_t& h : holds) h = kEmptyFrame;
   }
 };
 

@@ -75,12 +75,7 @@ bool TreeWalk::search(Scratch& s) {
   steps.all_at_once = cut == nullptr && (is_shallow_ || steps.sees_all);
   if (cut != nullptr) steps.setCut(*cut);
   const auto push = [&](const DeferredPairs<TreeSide, TreeSide>::Pair& pair) {
-    if (s.stack.size() < steps.depth + 1 + PairSteps::kStackRoom) {
-      s.stack.resize(2 * (steps.depth + PairSteps::kStackRoom));
-    }
-    steps.stack = s.stack.data();
-    steps.stack_end = steps.stack + s.stack.size();
-    pushPair(steps, pair.a, pair.b);
+    pushWithRoom(steps, s.stack, pair.a, pair.b);
   };
   push({a_.root(), b_.root()});
   for (;;) {

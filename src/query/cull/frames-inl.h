@@ -1,10 +1,10 @@
 // SPDX-License-Identifier: BSD-3-Clause
 // Fills frames and compares them, once for each instruction set; see Highway's -inl.h headers.
-#if defined(BOCST_QUERY_FRAMES_INL_H) == defined(HWY_TARGET_TOGGLE)
-#ifdef BOCST_QUERY_FRAMES_INL_H
-#undef BOCST_QUERY_FRAMES_INL_H
+#if defined(BOCST_CULL_FRAMES_INL_H) == defined(HWY_TARGET_TOGGLE)
+#ifdef BOCST_CULL_FRAMES_INL_H
+#undef BOCST_CULL_FRAMES_INL_H
 #else
-#define BOCST_QUERY_FRAMES_INL_H
+#define BOCST_CULL_FRAMES_INL_H
 #endif
 
 #include "bounds/decode-inl.h"

@@ -8,7 +8,7 @@ namespace bocst::query {
 
 bool PairFrames::isFine(const SimilarityTransform& one_in_zero) {
   const double q0 = lattice::kMiddle, q1 = q0 * one_in_zero.scale;
-  // Not true of what is not a number.
+  // False for NaN.
   return fits(one_in_zero.scale) && (one_in_zero.translation.norm() + q0 + q1) * 0x1p-9 <= std::min(q0, q1);
 }
 

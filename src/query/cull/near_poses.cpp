@@ -121,6 +121,7 @@ std::size_t find(const PoseBoxes& boxes, const S* X_AB, bool rows, std::size_t c
   return found;
 }
 
+// Called twice with a constant, so that the loop does not test `rows`.
 std::size_t FindNearPosesDouble(const PoseBoxes& boxes, const double* X_AB, bool rows, std::size_t count,
                                 std::uint32_t* near) {
   return rows ? find(boxes, X_AB, true, count, near) : find(boxes, X_AB, false, count, near);

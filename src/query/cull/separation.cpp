@@ -227,7 +227,7 @@ bool AreSeparate(const SupportTable& a, const SupportTable& b, const SimilarityT
   const float rounding_margin = 1.25f * (64 * 0x1p-24f * (distance + 2 * size) + g.tolerance);
   float n[3];
   const float length = displacementBetweenMiddles(a, b, g, n);
-  // Not true of what is not a number.
+  // False for NaN.
   if (!(length > 1e-6f * size && length < 0x1p50f && g.orthogonality_error < 1e-3f)) return false;
   // No direction can do better than this; most hits are so deep.
   if (length - a.innerRadius() - g.scale * b.innerRadius() < -kHopeless * smaller) return false;

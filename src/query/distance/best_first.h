@@ -100,7 +100,7 @@ class BestFirst {
     bool operator()(const Pair& x, const Pair& y) const { return x.bound > y.bound; }
   };
 
-  // The least of what was put lately stays out of the heap: mostly it is the next.
+  // The pair of the least bound since the last call of next() stays out of the heap: usually it is taken next.
   void put(Pair pair) {
     if (!has_next_) {
       next_ = pair;

@@ -12,7 +12,7 @@ namespace bocst::query {
 
 /// A model's oriented boxes as a side of a walk, in the frame of its TreeSide, which must outlive this: for exact
 /// answers of what is long and thin, and where TreeWalk gives up.
-class BoxSide {
+class BoxSide : public CompleteSide {
  public:
   using Node = int;
   static constexpr bool kBodies = false;
@@ -23,10 +23,7 @@ class BoxSide {
   explicit BoxSide(const TreeSide& side) : side_(side), nodes_(side.tree().boxes(side.now()).nodes()) {}
 
   Node root() const { return 0; }
-  bool isConservative() const { return false; }
   State state(Node n) const { return node(n).second == 0 ? State::kLeaf : State::kInner; }
-  bool growsFromGrid(Node) const { return true; }
-  void grow(Node, std::vector<tree::Tree::Growth>&) const {}
   double size(Node n) const { return node(n).half.squaredNorm(); }
 
   OrientedVolume volume(Node n) const {
@@ -37,9 +34,6 @@ class BoxSide {
     return v;
   }
   Sphere sphere(Node n) const { return {node(n).center, node(n).half.norm()}; }
-  // Only a side that answers with cells is asked for these.
-  Sphere cellSphere(Node n) const { return sphere(n); }
-  std::uint64_t cellId(Node n) const { return static_cast<std::uint64_t>(n); }
 
   template <typename F>
   void children(Node n, F&& f) const {

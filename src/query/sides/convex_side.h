@@ -3,7 +3,6 @@
 
 #include <cstdint>
 #include <optional>
-#include <vector>
 
 #include "geometry/convex_shape.h"
 #include "query/sides/side.h"
@@ -11,7 +10,7 @@
 namespace bocst::query {
 
 /// One solid body as a side of a walk: a single leaf, in the frame of the body.
-class ConvexSide {
+class ConvexSide : public CompleteSide {
  public:
   using Node = int;
   static constexpr bool kBodies = true;
@@ -20,10 +19,7 @@ class ConvexSide {
   explicit ConvexSide(const ConvexShape& body) : body_(body) {}
 
   Node root() const { return 0; }
-  bool isConservative() const { return false; }
   State state(Node) const { return State::kLeaf; }
-  bool growsFromGrid(Node) const { return true; }
-  void grow(Node, std::vector<tree::Tree::Growth>&) const {}
 
   /// FCL's name for what has no parts.
   std::uint64_t id(Node) const { return ~std::uint64_t{0}; }

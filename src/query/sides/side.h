@@ -18,6 +18,26 @@ enum class State {
   kGrows,  ///< Needs the oracle first.
 };
 
+/// What sides have in common of which nothing grows, and which answer with their surface.
+struct CompleteSide {
+  bool isConservative() const { return false; }
+  template <typename Node>
+  bool growsFromGrid(const Node&) const {
+    return false;
+  }
+  template <typename Node>
+  void grow(const Node&, std::vector<tree::Tree::Growth>&) const {}
+  // Only a side that answers with cells is asked for these.
+  template <typename Node>
+  Sphere cellSphere(const Node&) const {
+    return {};
+  }
+  template <typename Node>
+  std::uint64_t cellId(const Node&) const {
+    return 0;
+  }
+};
+
 /// One side of a pair: a model's tree. A partner of another kind is another class with these members (BvhSide).
 /// The query lock of the tree is held shared for the life of this object.
 class TreeSide {

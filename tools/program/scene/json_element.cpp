@@ -58,12 +58,6 @@ std::vector<double> JsonElement::numbers(std::size_t count) const {
   complain("a list of " + std::to_string(count) + " numbers expected");
 }
 
-std::vector<std::string> JsonElement::texts() const {
-  std::vector<std::string> list;
-  for (const JsonElement& item : items()) list.push_back(item.text());
-  return list;
-}
-
 Eigen::Isometry3d JsonElement::pose() const {
   std::array<double, 7> numbers{0, 0, 0, 1, 0, 0, 0};
   RotationFormat format = RotationFormat::kWxyz;

@@ -22,7 +22,6 @@ class JsonElement {
   bool isText() const { return json_.is_string(); }
   bool isNumber() const { return json_.is_number(); }
   bool isList() const { return json_.is_array(); }
-  bool isObject() const { return json_.is_object(); }
 
   // All throw std::runtime_error where the value is of another kind.
 
@@ -32,7 +31,6 @@ class JsonElement {
   std::vector<JsonElement> items() const;                            ///< Of a list.
   std::vector<std::pair<std::string, JsonElement>> members() const;  ///< Of an object.
   std::vector<double> numbers(std::size_t count) const;              ///< A list of so many.
-  std::vector<std::string> texts() const;
   /// [x, y, z], [x, y, z, qw, qx, qy, qz], or {"xyz": [...], "rpy" or "wxyz" or "xyzw": [...]}.
   Eigen::Isometry3d pose() const;
 

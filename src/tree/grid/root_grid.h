@@ -7,8 +7,8 @@
 #include <memory>
 #include <vector>
 
-#include "oracle/cpu/kernels.h"
 #include "oracle/oracle.h"
+#include "tree/grid/root_grid_kernels.h"
 
 namespace bocst::tree {
 
@@ -48,7 +48,7 @@ class RootGrid {
 
   explicit RootGrid(int bits) : bits_(bits) {}
   bool build(const oracle::Surface& surface);
-  void link(std::uint32_t begin, std::uint32_t end, const oracle::GridSpan* spans, std::uint32_t* heads);
+  void link(std::uint32_t begin, std::uint32_t end, const GridSpan* spans, std::uint32_t* heads);
   void keepLists(const std::uint32_t* heads, std::uint8_t* bits);
   void markCells();
   void dropMissingCells(const oracle::Surface& surface);

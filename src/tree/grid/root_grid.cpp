@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: BSD-3-Clause
-#include "tree/root_grid.h"
+#include "tree/grid/root_grid.h"
 
 #include <algorithm>
 #include <cmath>
@@ -67,20 +67,20 @@ class QuantisedMesh {
       : triangles_(surface.mesh->triangles().data()), bits_(bits), vertices_(room) {
     const Mesh& mesh = *surface.mesh;
     // Leaves room for a step of margin on both sides.
-    oracle::quantise(mesh.vertices().data()->data(), mesh.vertexCount(), surface.lattice.origin().data(),
-                     surface.lattice.inverseUnit() / kMargin, (1 << oracle::kGridSpanBits) - 2, vertices_);
+    quantise(mesh.vertices().data()->data(), mesh.vertexCount(), surface.lattice.origin().data(),
+             surface.lattice.inverseUnit() / kMargin, (1 << kGridSpanBits) - 2, vertices_);
     vertices_[values(surface) - 1] = 0;
   }
 
   /// Of `count` triangles from t on. One step of margin covers the rounding of toLattice and closed cells that only
   /// touch.
-  void spans(std::size_t t, std::size_t count, oracle::GridSpan* out) const {
-    oracle::gridSpans(vertices_, triangles_[t].data(), count, bits_, out);
+  void spans(std::size_t t, std::size_t count, GridSpan* out) const {
+    gridSpans(vertices_, triangles_[t].data(), count, bits_, out);
   }
 
   /// The first and the last cell of a triangle's box along each axis.
   void box(std::size_t t, std::uint32_t first[3], std::uint32_t last[3]) const {
-    const int shift = oracle::kGridSpanBits - bits_;
+    const int shift = kGridSpanBits - bits_;
     for (std::size_t k = 0; k < 3; ++k) {
       const auto at = [&](std::size_t corner) { return vertices_[3 * std::size_t{triangles_[t][corner]} + k]; };
       const std::int16_t a = at(0), b = at(1), c = at(2);
@@ -119,7 +119,7 @@ bool RootGrid::build(const oracle::Surface& surface) {
   back_.reset(new std::uint16_t[inWholeGroups(count)]);
   adviseHugePages(back_.get(), count * sizeof(back_[0]));
   triangle_count_ = count;
-  oracle::GridSpan spans[kBlock];
+  GridSpan spans[kBlock];
   for (std::size_t begin = 0; begin < count; begin += kBlock) {
     const std::size_t size = std::min(kBlock, count - begin);
     mesh.spans(begin, size, spans);
@@ -144,8 +144,8 @@ bool RootGrid::build(const oracle::Surface& surface) {
   return true;
 }
 
-void RootGrid::link(std::uint32_t begin, std::uint32_t end, const oracle::GridSpan* spans, std::uint32_t* heads) {
-  const std::uint32_t first_large = oracle::kGridSpanLarge << 3 * bits_;
+void RootGrid::link(std::uint32_t begin, std::uint32_t end, const GridSpan* spans, std::uint32_t* heads) {
+  const std::uint32_t first_large = kGridSpanLarge << 3 * bits_;
   std::uint32_t next[kBlock] = {};
 #pragma GCC unroll 4
   for (std::uint32_t t = begin; t < end; ++t) {
@@ -158,7 +158,7 @@ void RootGrid::link(std::uint32_t begin, std::uint32_t end, const oracle::GridSp
     next[t - begin] = heads[list];
     heads[list] = t;
   }
-  if (!oracle::stepsBack(next, begin, end - begin, &back_[begin])) return;
+  if (!stepsBack(next, begin, end - begin, &back_[begin])) return;
   for (std::uint32_t t = begin; t < end; ++t) {
     if (next[t - begin] != kNone && t - next[t - begin] >= kFar) far_.push_back({t, next[t - begin]});
   }
@@ -172,7 +172,7 @@ std::uint32_t RootGrid::farNext(std::uint32_t triangle) const {
 void RootGrid::keepLists(const std::uint32_t* heads, std::uint8_t* bits) {
   const std::size_t side = std::size_t{1} << bits_, bytes = side / 8;
   rows_.resize(8 * side * side);
-  oracle::bitsOfOthers(heads, rows_.size() * side, kNone, bits);
+  bitsOfOthers(heads, rows_.size() * side, kNone, bits);
   std::uint32_t count = 0;
   for (Row& row : rows_) {
     row = {0, count};
