@@ -62,7 +62,7 @@ class Buffer {
   GLuint name() const { return handle_.name(); }
   std::size_t bytes() const { return bytes_; }
 
-  /// At least so many bytes; what was in it is lost where it had fewer.
+  /// Makes it at least this large, in bytes; its contents are lost if it had fewer.
   void reserve(std::size_t bytes);
   void write(std::size_t offset, std::size_t bytes, const void* data);
   /// All bytes to zero from the start on.

@@ -341,6 +341,41 @@ class DaeReader {
     return result;
   }
 
+  // The vertex indices of a <p>: of each `stride` numbers, that at `offset`.
+  std::vector<std::uint32_t> corners(const pugi::xml_node& p, std::size_t stride, std::size_t offset,
+                                     std::size_t vertices) const {
+    const std::vector<long long> all = numbers<long long>(p);
+    if (all.size() % stride != 0) {
+      fail(p, std::to_string(all.size()) + " indices are no multiple of " + std::to_string(stride) + " a corner");
+    }
+    std::vector<std::uint32_t> result;
+    result.reserve(all.size() / stride);
+    for (std::size_t i = offset; i < all.size(); i += stride) {
+      if (all[i] < 0 || static_cast<std::size_t>(all[i]) >= vertices) {
+        fail(p, "vertex index " + std::to_string(all[i]) + " out of range, there are " + std::to_string(vertices) +
+                    " vertices");
+      }
+      result.push_back(static_cast<std::uint32_t>(all[i]));
+    }
+    return result;
+  }
+
+  // Adds the polygons of a <triangles> or <polylist>, whose corners are in one list. Returns how many there are.
+  std::size_t addCounted(const pugi::xml_node& primitive, const std::vector<std::uint32_t>& all,
+                         Polygons& polygons) const {
+    const bool is_polylist = std::string_view(primitive.name()) == "polylist";
+    std::vector<long long> sizes(is_polylist ? 0 : all.size() / 3, 3);
+    if (is_polylist) sizes = numbers<long long>(primitive.child("vcount"));
+    std::size_t end = 0;
+    for (const long long size : sizes) {
+      if (size < 0 || static_cast<std::size_t>(size) > all.size() - end) fail(primitive, "more corners than indices");
+      for (long long k = 0; k < size; ++k) polygons.corners.push_back(all[end++]);
+      polygons.ends.push_back(polygons.corners.size());
+    }
+    if (end != all.size()) fail(primitive, "more indices than corners");
+    return sizes.size();
+  }
+
   void readPrimitive(const pugi::xml_node& primitive, const pugi::xml_node& vertices, Polygons& polygons) const {
     const pugi::xml_node vertex = primitive.find_child_by_attribute("input", "semantic", "VERTEX");
     const std::size_t promised = count(primitive, "count", 0);
@@ -356,43 +391,18 @@ class DaeReader {
       stride = std::max(stride, count(input, "offset", 0) + 1);
     }
     const std::size_t offset = count(vertex, "offset", 0);
-
-    // The vertex indices of a <p>.
-    const auto corners = [&](const pugi::xml_node& p) {
-      const std::vector<long long> all = numbers<long long>(p);
-      if (all.size() % stride != 0) {
-        fail(p, std::to_string(all.size()) + " indices are no multiple of " + std::to_string(stride) + " a corner");
-      }
-      std::vector<std::uint32_t> result;
-      result.reserve(all.size() / stride);
-      for (std::size_t i = offset; i < all.size(); i += stride) {
-        if (all[i] < 0 || static_cast<std::size_t>(all[i]) >= polygons.vertices.size()) {
-          fail(p, "vertex index " + std::to_string(all[i]) + " out of range, there are " +
-                      std::to_string(polygons.vertices.size()) + " vertices");
-        }
-        result.push_back(static_cast<std::uint32_t>(all[i]));
-      }
-      return result;
+    const auto cornersOf = [&](const pugi::xml_node& p) {
+      return corners(p, stride, offset, polygons.vertices.size());
     };
 
     if (primitive.child("ph")) fail(primitive.child("ph"), "polygons with holes are not supported");
     const std::string_view name = primitive.name();
     std::size_t found = 0;
     if (name == "triangles" || name == "polylist") {
-      const std::vector<std::uint32_t> all = corners(primitive.child("p"));
-      std::vector<long long> sizes(name == "triangles" ? all.size() / 3 : 0, 3);
-      if (name == "polylist") sizes = numbers<long long>(primitive.child("vcount"));
-      std::size_t end = 0;
-      for (const long long size : sizes) {
-        if (size < 0 || static_cast<std::size_t>(size) > all.size() - end) fail(primitive, "more corners than indices");
-        for (long long k = 0; k < size; ++k) polygons.corners.push_back(all[end++]);
-        polygons.ends.push_back(polygons.corners.size());
-      }
-      if (end != all.size()) fail(primitive, "more indices than corners");
-      found = sizes.size();
+      found = addCounted(primitive, cornersOf(primitive.child("p")), polygons);
     } else {
       for (const pugi::xml_node& p : primitive.children("p")) {
-        const std::vector<std::uint32_t> c = corners(p);
+        const std::vector<std::uint32_t> c = cornersOf(p);
         if (name == "tristrips") polygons.addStrip(c.data(), c.size());
         if (name == "trifans") {
           for (std::size_t i = 2; i < c.size(); ++i) polygons.addTriangle(c[0], c[i - 1], c[i]);

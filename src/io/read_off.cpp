@@ -6,6 +6,7 @@
 #include <stdexcept>
 #include <string>
 #include <string_view>
+#include <utility>
 
 #include "read_mesh.h"
 #include "text.h"
@@ -23,78 +24,95 @@ void checkExtras(std::string_view file, std::string_view line, int most) {
   }
 }
 
-}  // namespace
+class OffReader {
+ public:
+  explicit OffReader(std::string_view bytes) : bytes_(bytes), text_(bytes) {}
 
-Polygons readOff(std::string_view bytes) {
-  std::string_view text = bytes;
-  std::string_view line;
-  // The next line that says something: comments and blank lines do not count.
-  const auto next_line = [&text, &line] {
-    while (!text.empty()) {
-      line = takeLine(text);
-      line = line.substr(0, line.find('#'));
-      if (!isBlank(line)) return true;
+  Polygons read() {
+    readHeader();
+    // Each vertex and each face takes a line: never reserve more than the file can hold.
+    const auto bytes_left = static_cast<long long>(text_.size());
+    polygons_.vertices.reserve(static_cast<std::size_t>(std::min(vertex_count_, bytes_left)));
+    for (long long v = 0; v < vertex_count_; ++v) readVertex(v);
+    polygons_.ends.reserve(static_cast<std::size_t>(std::min(face_count_, bytes_left)));
+    for (long long f = 0; f < face_count_; ++f) readFace(f);
+    if (nextLine()) fail("there is more after the last face");
+    return std::move(polygons_);
+  }
+
+ private:
+  // Goes on to the next line that says something: comments and blank lines do not count.
+  bool nextLine() {
+    while (!text_.empty()) {
+      line_ = takeLine(text_);
+      line_ = line_.substr(0, line_.find('#'));
+      if (!isBlank(line_)) return true;
     }
     return false;
-  };
-  const auto fail = [&](const std::string& what) { failAt(bytes, line.data(), what); };
-
-  if (!next_line()) throw std::runtime_error("no OFF file: nothing but blank lines");
-  // The keyword is [ST][C][N][4][n]OFF and may be missing.
-  std::string_view rest = line;
-  const std::string_view keyword = takeWord(rest);
-  if (keyword.size() >= 3 && keyword.substr(keyword.size() - 3) == "OFF") {
-    if (keyword.find_first_not_of("STCNOF") != std::string_view::npos) fail("only three-dimensional OFF is supported");
-    line = rest;
-    if (takeWord(rest) == "BINARY") fail("binary OFF is not supported");
-    if (isBlank(line) && !next_line()) fail("truncated: no numbers of vertices and faces");
   }
-  long long vertex_count = 0;
-  long long face_count = 0;
-  long long edge_count = 0;  // not used, often 0
-  if (!takeNumber(line, vertex_count) || !takeNumber(line, face_count) || vertex_count < 0 || face_count < 0) {
-    fail("no OFF file: numbers of vertices and faces expected");
-  }
-  if (!isBlank(line) && (!takeNumber(line, edge_count) || !isBlank(line))) {
-    fail("numbers of vertices, faces and edges expected, and nothing else");
-  }
-
-  // Each vertex and each face takes a line: never reserve more than the file can hold.
-  const auto bytes_left = static_cast<long long>(text.size());
-  const auto truncated = [](long long found, long long promised, const char* what) {
+  void nextLine(long long found, long long promised, const char* what) {
+    if (nextLine()) return;
     throw std::runtime_error("truncated: " + std::to_string(found) + " of " + std::to_string(promised) + " " + what);
-  };
-  Polygons polygons;
-  polygons.vertices.reserve(static_cast<std::size_t>(std::min(vertex_count, bytes_left)));
-  for (long long v = 0; v < vertex_count; ++v) {
-    if (!next_line()) truncated(v, vertex_count, "vertices");
-    Eigen::Vector3d p;
-    for (int i = 0; i < 3; ++i) {
-      p[i] = takeCoordinate(bytes, line, "vertex " + std::to_string(v));
-    }
-    checkExtras(bytes, line, 9);
-    polygons.vertices.push_back(p);
   }
-  polygons.ends.reserve(static_cast<std::size_t>(std::min(face_count, bytes_left)));
-  for (long long f = 0; f < face_count; ++f) {
-    if (!next_line()) truncated(f, face_count, "faces");
+
+  [[noreturn]] void fail(const std::string& what) const { failAt(bytes_, line_.data(), what); }
+
+  void readHeader() {
+    if (!nextLine()) throw std::runtime_error("no OFF file: nothing but blank lines");
+    // The keyword is [ST][C][N][4][n]OFF and may be missing.
+    std::string_view rest = line_;
+    const std::string_view keyword = takeWord(rest);
+    if (keyword.size() >= 3 && keyword.substr(keyword.size() - 3) == "OFF") {
+      if (keyword.find_first_not_of("STCNOF") != std::string_view::npos) {
+        fail("only three-dimensional OFF is supported");
+      }
+      line_ = rest;
+      if (takeWord(rest) == "BINARY") fail("binary OFF is not supported");
+      if (isBlank(line_) && !nextLine()) fail("truncated: no numbers of vertices and faces");
+    }
+    if (!takeNumber(line_, vertex_count_) || !takeNumber(line_, face_count_) || vertex_count_ < 0 || face_count_ < 0) {
+      fail("no OFF file: numbers of vertices and faces expected");
+    }
+    long long edge_count = 0;  // not used, often 0
+    if (!isBlank(line_) && (!takeNumber(line_, edge_count) || !isBlank(line_))) {
+      fail("numbers of vertices, faces and edges expected, and nothing else");
+    }
+  }
+
+  void readVertex(long long v) {
+    nextLine(v, vertex_count_, "vertices");
+    Eigen::Vector3d p;
+    for (int i = 0; i < 3; ++i) p[i] = takeCoordinate(bytes_, line_, "vertex " + std::to_string(v));
+    checkExtras(bytes_, line_, 9);
+    polygons_.vertices.push_back(p);
+  }
+
+  void readFace(long long f) {
+    nextLine(f, face_count_, "faces");
     const auto face = [f] { return "face " + std::to_string(f) + ": "; };
     long long n = 0;
-    if (!takeNumber(line, n) || n < 0) fail(face() + "number of corners expected");
+    if (!takeNumber(line_, n) || n < 0) fail(face() + "number of corners expected");
     for (long long i = 0; i < n; ++i) {
       long long index = 0;
-      if (!takeNumber(line, index)) fail(face() + std::to_string(n) + " vertex indices expected");
-      if (index < 0 || index >= vertex_count) {
+      if (!takeNumber(line_, index)) fail(face() + std::to_string(n) + " vertex indices expected");
+      if (index < 0 || index >= vertex_count_) {
         fail(face() + "vertex index " + std::to_string(index) + " out of range, there are " +
-             std::to_string(vertex_count) + " vertices");
+             std::to_string(vertex_count_) + " vertices");
       }
-      polygons.corners.push_back(static_cast<std::uint32_t>(index));
+      polygons_.corners.push_back(static_cast<std::uint32_t>(index));
     }
-    checkExtras(bytes, line, 4);
-    polygons.ends.push_back(polygons.corners.size());
+    checkExtras(bytes_, line_, 4);
+    polygons_.ends.push_back(polygons_.corners.size());
   }
-  if (next_line()) fail("there is more after the last face");
-  return polygons;
-}
+
+  const std::string_view bytes_;
+  std::string_view text_, line_;  // what is not read yet; of the current line, too
+  long long vertex_count_ = 0, face_count_ = 0;
+  Polygons polygons_;
+};
+
+}  // namespace
+
+Polygons readOff(std::string_view bytes) { return OffReader(bytes).read(); }
 
 }  // namespace bocst::io

@@ -111,7 +111,7 @@ void AutoOracle::measure() {
   }
 }
 
-// What the device should answer while the host answers the rest, at least so many. In the order of the candidates,
+// What the device should answer while the host answers the rest, at least `least`. In the order of the candidates,
 // which come by how much sooner the device is done with them.
 AutoOracle::Share AutoOracle::bestShare(const Work& batch, const std::vector<Candidate>& candidates,
                                         std::size_t least) const {

@@ -81,7 +81,7 @@ class BOCST_EXPORT AutoOracle : public Oracle {
     std::size_t triangles, place;
     Known* mesh;
   };
-  /// The device's part, the first so many candidates, and what the whole batch takes then.
+  /// How many of the candidates, from the first on, are the device's part, and the time of the whole batch then.
   struct Share {
     std::size_t count = 0;
     double seconds = 0;

@@ -22,9 +22,9 @@ class Trials {
   /// A share of the host's time above which a gain is within what the models are off by.
   static constexpr double kWorthwhile = 0.95;
 
-  /// Work came that takes the host so many seconds.
+  /// Work came that takes the host `host` seconds.
   void earn(double host);
-  /// May work be tried that takes so long there? Without paying.
+  /// May work be tried that takes so long on the device and on the host? Without paying.
   bool affords(double device, double host) const;
   /// Pays for a trial, or says no.
   bool take(double device, double host);

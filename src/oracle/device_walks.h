@@ -37,7 +37,7 @@ struct DeviceWalks {
     float unit = 1;                  ///< A lattice unit of tree 1, in those of tree 0.
     float rounding_margin = 0;       ///< As of query::SphereFrames; so much nearer or farther is in doubt.
     float tolerance = 0;
-    std::int32_t not_smaller = 0;  ///< Tree 0's node is expanded if tree 1's is deeper by so many levels, or more.
+    std::int32_t not_smaller = 0;  ///< Tree 0's node is expanded if tree 1's is deeper by at least this many levels.
   };
   enum Found : std::uint8_t {
     kMeet = 1,     ///< The spheres of leaves meet.

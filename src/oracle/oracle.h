@@ -105,7 +105,7 @@ class Oracle {
 
   // Conservative answers to many poses, walked where the oracle works.
 
-  /// True if this oracle is expected to walk so many pairs faster than the host.
+  /// True if this oracle is expected to walk this many pairs faster than the host.
   virtual bool walksPairs(std::size_t) { return false; }
 
   /// Brings a table of nodes (node_table) to where the oracle works; null where it cannot. Changes the words.

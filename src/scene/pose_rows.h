@@ -14,7 +14,7 @@
 
 namespace bocst::scene {
 
-/// So many poses are read together at most; arrays of one number a moving object have room for whole such groups.
+/// At most this many poses are read together; arrays of one number a moving object have room for whole such groups.
 constexpr std::size_t kPosesAtOnce = 4;
 constexpr std::size_t roomFor(std::size_t moving) { return (moving + kPosesAtOnce - 1) / kPosesAtOnce * kPosesAtOnce; }
 

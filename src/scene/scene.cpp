@@ -29,7 +29,7 @@ using scene::World;
 
 /// States that one thread looks at in a row: enough of them to be alike, few enough to be shared out.
 constexpr std::size_t kStatesAtOnce = 128;
-/// An edge seldom has more; up to so many, middles come first among all.
+/// An edge seldom has more states. Up to this many, the middles of all parts come first; more are shared out in rows.
 constexpr std::size_t kEdge = 512;
 
 std::uint32_t nextScene() {

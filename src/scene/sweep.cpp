@@ -8,7 +8,7 @@
 namespace bocst::scene {
 namespace {
 
-/// Parts in which objects move farther than so many of their radii are not worth a look as a whole.
+/// Parts in which an object moves farther than this many of its radii are not checked as a whole.
 constexpr double kFarthest = 4;
 
 }  // namespace

@@ -24,7 +24,7 @@ constexpr std::uint32_t kSmallPiece = 12;            // is not divided further w
 constexpr std::uint32_t kMostInCluster = 16;         // neighbours along the curve that stay together in large pieces
 constexpr std::uint32_t kMostOneByOne = 64;          // smaller pieces are divided triangle by triangle
 constexpr std::size_t kMostInSlab = 4096;            // above, the surface is no slab and the pass over it is long
-constexpr std::size_t kMostOnCoarseCurve = 1 << 18;  // a curve of 2^7 cells along each axis parts so many
+constexpr std::size_t kMostOnCoarseCurve = 1 << 18;  // a curve of 2^7 cells along each axis parts this many
 constexpr std::uint32_t kMostInEnd = 512;            // the finest pieces that supports are sought by
 constexpr int kBins = 8;
 constexpr float kInfinity = std::numeric_limits<float>::infinity();
@@ -166,13 +166,13 @@ void BulkBuilder::makeRoom(std::size_t triangles, std::size_t places, std::size_
   if (bytes <= room_) return;
   room_ = 0;  // should there be no memory
   memory_ = nullptr;
-  huge_pages_ = HugePages();
+  huge_pages_ = memory::HugePages();
   few_pages_.reset();
   if (bytes <= kMostOnSmallPages) {
     few_pages_.reset(new std::byte[bytes]);
     memory_ = few_pages_.get();
   } else {
-    huge_pages_ = HugePages(bytes);
+    huge_pages_ = memory::HugePages(bytes);
     memory_ = static_cast<std::byte*>(huge_pages_.begin());
   }
   room_ = bytes;
@@ -488,7 +488,7 @@ Eigen::Matrix3d BulkBuilder::principalAxes() const {
   Eigen::Vector3d sum = Eigen::Vector3d::Zero();
   Eigen::Matrix3d products = Eigen::Matrix3d::Zero();
   constexpr std::size_t kFew = 256;         // sums of more would be lost in float
-  constexpr std::size_t kEnough = 1 << 12;  // the axes of so many are as good as those of all
+  constexpr std::size_t kEnough = 1 << 12;  // the axes of this many are as good as those of all
   const std::size_t step = 1 + place_count_ / kEnough;
   for (std::size_t begin = 0; begin < place_count_; begin += kFew * step) {
     V4 first = all(0), square = all(0), turned = all(0);

@@ -8,10 +8,10 @@
 #include <vector>
 
 #include "bounds/loose_frame.h"
+#include "memory/huge_pages.h"
 #include "oracle/surface.h"
 #include "tree/block.h"
 #include "tree/bulk_kernels.h"
-#include "tree/huge_pages.h"
 #include "tree/outline.h"
 #include "tree/packed_triangles.h"
 #include "tree/support_table.h"
@@ -33,7 +33,7 @@ class BulkBuilder {
 
   struct Block {
     bounds::LooseFrame frame;
-    std::uint32_t lanes = 0;  ///< The first so many are in use.
+    std::uint32_t lanes = 0;  ///< How many are in use; these come first.
     Lane lane[8];
     bounds::NodeBounds bounds[8];
   };
@@ -118,7 +118,7 @@ class BulkBuilder {
 
   // Where what is below lies, for `count_` triangles.
   std::unique_ptr<std::byte[]> few_pages_;
-  HugePages huge_pages_;
+  memory::HugePages huge_pages_;
   std::byte* memory_ = nullptr;
   std::size_t room_ = 0, count_ = 0, place_count_ = 0;
   std::uint32_t cluster_count_ = 0;

@@ -11,7 +11,7 @@
 namespace bocst::tree {
 namespace {
 
-/// Queries drop old branches when these have one block in so many.
+/// Queries drop old branches when these have at least one block in this many.
 constexpr std::uint32_t kWorthwhileShare = 64;
 
 /// While a model is used, queries keep lanes' blocks of more triangles: they take less than a byte a triangle, and
@@ -110,9 +110,9 @@ void Tree::keepOnly(const std::vector<std::uint8_t>& keep) {
     lattice::Cell cell;
   };
   std::vector<Move> moves{{old_root, NodeRef{}, lattice::Cell{}}};
-  Pool<Block, 5> blocks;
-  Pool<BlockRecord, 5> records;
-  Pool<std::atomic<std::int64_t>, 5> last_use;
+  memory::Pool<Block, 5> blocks;
+  memory::Pool<BlockRecord, 5> records;
+  memory::Pool<std::atomic<std::int64_t>, 5> last_use;
   TriangleLists lists;
   ChildRef root;
   NodeCounts nodes_at{};

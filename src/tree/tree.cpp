@@ -140,7 +140,7 @@ bool Tree::affordsBoxes() const {
 }
 
 std::size_t Tree::boxPrice() const {
-  constexpr std::size_t kPerTriangle = 4;  // a triangle's share of the build takes as long as so many pairs of leaves
+  constexpr std::size_t kPerTriangle = 4;  // a triangle's share of the build takes as long as this many pairs of leaves
   if (knownBoxes() != nullptr) return 0;
   const std::size_t price = kPerTriangle * surface_.triangle_count, paid = box_rent_.load(std::memory_order_relaxed);
   return price - std::min(price, paid);

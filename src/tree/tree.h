@@ -17,14 +17,14 @@
 #include <mutex>
 #include <vector>
 
+#include "memory/pool.h"
 #include "mesh/solid.h"
 #include "oracle/oracle.h"
 #include "thread/published.h"
 #include "thread/sharded_lock.h"
 #include "tree/block.h"
-#include "tree/grid/root_grid.h"
 #include "tree/outline.h"
-#include "tree/pool.h"
+#include "tree/root_grid.h"
 #include "tree/support_table.h"
 #include "tree/triangle_lists.h"
 
@@ -319,9 +319,9 @@ class Tree {
   std::uint64_t generation_ = 0;  // of the pools: indices of blocks are of one generation
   // Of each block: what walks read, what growth and decay know, and when a query last went through it, in ns of the
   // model's clock. Apart, so that walks have few lines to read.
-  Pool<Block, 5> blocks_;
-  Pool<BlockRecord, 5> records_;
-  mutable Pool<std::atomic<std::int64_t>, 5> last_use_;
+  memory::Pool<Block, 5> blocks_;
+  memory::Pool<BlockRecord, 5> records_;
+  mutable memory::Pool<std::atomic<std::int64_t>, 5> last_use_;
   TriangleLists lists_;
   std::vector<std::shared_ptr<const oracle::DeviceResource>> resources_;  // of the lists that the oracle keeps
   NodeTable node_table_;                                                  // of a generation; under growth_

@@ -6,8 +6,8 @@
 #include <cstring>
 #include <vector>
 
+#include "memory/pool.h"
 #include "tree/packed_triangles.h"
-#include "tree/pool.h"
 
 namespace bocst::tree {
 
@@ -80,7 +80,7 @@ class TriangleLists {
 
   std::uint32_t add(const std::uint32_t* ids, std::size_t count);
   std::uint32_t addDeviceList(std::size_t count, Place place);
-  /// A list with its corners, which PackedTriangles::pack() put into so many words.
+  /// A list with its corners, as PackedTriangles::pack() put them into `words`.
   std::uint32_t addPacked(const std::uint32_t* ids, std::size_t count, const PackedTriangles::Words& packed,
                           std::size_t size);
   std::uint32_t addCopy(const TriangleLists& from, std::uint32_t list);
@@ -91,7 +91,7 @@ class TriangleLists {
   void swap(TriangleLists& other) { words_.swap(other.words_); }
 
  private:
-  using Words = Pool<std::uint32_t, 10>;
+  using Words = memory::Pool<std::uint32_t, 10>;
 
   // A list is flags and a length, then the numbers: all as they are or, narrow, the least and 16-bit steps from it;
   // packed, then PackedTriangles. On a device: flags and length, then the Place.

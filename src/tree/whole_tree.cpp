@@ -27,7 +27,7 @@ constexpr std::size_t kRent = 8;
 // Queries grow parts for longer while the helper thread builds; should it not come to it, a query still builds the
 // tree.
 constexpr std::size_t kRentAhead = 1;
-// A whole tree with the corners of its leaves takes about so many bytes a triangle; of a soup, the most.
+// A whole tree with the corners of its leaves takes about this many bytes a triangle, of a soup at most.
 constexpr std::size_t kPackedBytes = 24;
 // What a thread keeps of a build's memory for the next one, in triangles.
 constexpr std::size_t kMostKept = 1 << 17;

@@ -6,7 +6,7 @@
 #include "oracle/cpu/cpu_oracle.h"
 #include "oracle/cpu/kernels.h"
 #include "oracle/surfaces.h"
-#include "tree/grid/root_grid.h"
+#include "tree/root_grid.h"
 
 namespace bocst::oracle {
 namespace {

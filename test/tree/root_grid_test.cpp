@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: BSD-3-Clause
 // The grid of the first levels: its kernels one value at a time on every instruction set, its cells against the padded
 // double reference, its lists against all triangles.
-#include "tree/grid/root_grid.h"
+#include "tree/root_grid.h"
 
 #include <gtest/gtest.h>
 

@@ -149,7 +149,7 @@ class ConvexCollector final : public query::ConvexVisitor<typename Partner::Node
     return {place, b1, b2, a, b};
   }
 
-  // Only the first so many contacts are wanted: is this one of them?
+  // Only the first contacts, a given number of them, are wanted: is this one of them?
   void addFirst(const Found& found) {
     query::SeparationResult gap;
     const auto t = static_cast<std::uint32_t>(found.leaf.id);

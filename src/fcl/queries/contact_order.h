@@ -61,7 +61,7 @@ class ContactOrder {
   int axis_ = 0;
 };
 
-/// The first so many of what a walk finds, in an order of contacts.
+/// The first items that a walk finds, a given number of them, in an order of contacts.
 template <typename Item>
 class FirstItems {
  public:

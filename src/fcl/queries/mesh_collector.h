@@ -161,7 +161,7 @@ class MeshCollector : public query::Visitor {
   static constexpr double kEpsilon = static_cast<double>(std::numeric_limits<S>::epsilon());
   // In float, FCL's axes between slivers' all but parallel edges are rubbish, and it may say that they meet.
   static constexpr bool kTrustsApart = std::is_same<S, double>::value;
-  // So many pairs are gathered before the ones too many are dropped.
+  // When this many pairs are gathered, those beyond the number wanted are dropped.
   static constexpr std::size_t kMost = std::size_t{1} << 16, kUnlimited = std::size_t{1} << 40;
 
   // Orders pairs by their ids; triangle ids of the first geometry have at most 31 bits.
@@ -227,7 +227,7 @@ class MeshCollector : public query::Visitor {
     return q_.addContact(first(key), second(key), nullptr);
   }
 
-  // Only the first so many that touch are wanted: is this one of them?
+  // Only the first pairs that touch, a given number of them, are wanted: is this one of them?
   void addFirst(std::uint32_t of_model, std::uint64_t key) {
     if (!s_.seen.insert(first(key), second(key))) return;
     getCorners(&key, 1);

@@ -27,7 +27,7 @@ constexpr PassSource kSources[] = {{"masks", false},   {"decide", false}, {"plac
 // A dispatch of more would take long enough for a watchdog of a slow device.
 constexpr std::uint64_t kMostInvocations = std::uint64_t{1} << 22;
 
-// So many cells that their states fit into one buffer.
+// At most as many cells as have room for their states in one buffer.
 ComputeChain::Limits clamped(ComputeChain::Limits limits) {
   limits.cells = std::max<std::size_t>(1, std::min(limits.cells, limits.bytes / (kStateWords * kWord)));
   return limits;
@@ -150,7 +150,7 @@ void ComputeChain::clearAnswers() {
   glMemoryBarrier(GL_SHADER_STORAGE_BARRIER_BIT | GL_BUFFER_UPDATE_BARRIER_BIT);
 }
 
-// So many lanes work on each pair or cell. Long passes are parted.
+// The number of lanes that work on each pair or cell. Long passes are parted.
 void ComputeChain::run(Pass pass, std::uint64_t items, std::uint32_t lanes) {
   const Step& step = steps_[pass];
   step.program->use();

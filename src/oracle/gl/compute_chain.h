@@ -25,7 +25,7 @@ class ComputeChain {
     std::uint64_t pairs = std::uint64_t{1} << 26;
     std::size_t cells = std::size_t{1} << 17;
     std::size_t bytes = 0;  ///< Of one buffer; 0: what the driver says.
-    /// In a batch of at most so many pairs, each octant of a pair has a lane of its own; empty: as suits the device.
+    /// In a batch of at most this many pairs, each octant of a pair has a lane of its own; empty: as suits the device.
     std::optional<std::uint64_t> few_pairs;
   };
 

@@ -48,7 +48,7 @@ inline const DeviceMesh* meshOf(const ExpansionRequest& e) {
 /// Thread-safe.
 class DeviceMeshes {
  public:
-  /// They take at most so many bytes together. @throws OracleError when the context is lost.
+  /// They take at most `most_bytes` together. @throws OracleError when the context is lost.
   DeviceMeshes(std::shared_ptr<Thread> thread, bool exact, std::size_t most_bytes);
 
   /// @throws OracleError

@@ -40,7 +40,7 @@ class DeviceOracle : public Oracle {
   };
 
   /// exact: device meshes have their vertices in double, too.
-  /// Meshes take at most so many bytes of the device together.
+  /// Meshes take at most mesh_bytes of the device together.
   DeviceOracle(std::shared_ptr<Thread> thread, bool exact, std::size_t mesh_bytes)
       : thread_(std::move(thread)), meshes_(thread_, exact, mesh_bytes) {}
 

@@ -14,7 +14,7 @@ using namespace layout;
 
 constexpr std::uint32_t kRootName = 0xffffffffu;  // as NodeRef
 
-// A dispatch may have so many groups on any device; and a part's deferred pairs take a few MB.
+// Any device allows a dispatch of this many groups, and a part's deferred pairs take a few MB.
 constexpr std::size_t kMostPairs = 1 << 14, kDeferredPerPair = 16, kLeastDeferred = 4096;
 
 std::uint32_t bitsOf(float x) {

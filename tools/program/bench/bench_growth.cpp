@@ -12,7 +12,7 @@
 namespace bocst::program {
 namespace {
 
-/// About so many triangles: decimated, where it has fewer to what subdivisions will bring there.
+/// A mesh of about this many triangles: decimated; if it has fewer, to a number that subdivisions bring there.
 std::shared_ptr<const Mesh> resized(const std::shared_ptr<const Mesh>& mesh, std::size_t triangles) {
   std::size_t times = 0;
   while (mesh->triangleCount() < triangles >> 2 * times) ++times;

@@ -59,7 +59,7 @@ class Questions {
     });
   }
 
-  /// So many passes take a while long enough to be timed.
+  /// The number of passes that take long enough to be timed.
   std::size_t passesFor(const QueryPair& pair) {
     constexpr double kMicroseconds = 2e4;
     return static_cast<std::size_t>(std::ceil(kMicroseconds / once(pair, 1)));

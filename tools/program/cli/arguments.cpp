@@ -10,6 +10,8 @@
 #include <cmath>
 #include <filesystem>
 
+#include "cli/words.h"
+
 namespace bocst::program {
 namespace {
 
@@ -151,8 +153,7 @@ CLI::Validator outputFile(const std::string& ending, bool stdout_too) {
   CLI::Validator validator("");
   validator.operation([ending, stdout_too](std::string& file) {
     if (file == "-" && !stdout_too) return std::string("stdout (-) is not supported here; use the file /dev/stdout");
-    std::string found = std::filesystem::path(file).extension().string();
-    std::transform(found.begin(), found.end(), found.begin(), [](unsigned char c) { return std::tolower(c); });
+    const std::string found = endingOf(file);
     const bool fits = found.empty() || found == ending;
     return fits ? std::string() : file + ": this option writes a " + ending + " file, not a " + found + " file";
   });

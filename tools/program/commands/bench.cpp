@@ -137,37 +137,40 @@ void addOracleBench(CLI::App& command, Bench& bench) {
       ->capture_default_str();
 }
 
+// What a reader must know of each scenario.
+const char* const kOfScenarios =
+    "A ratio above 1 means that bocst is better. For times and memory it is FCL's value divided by bocst's. The "
+    "meshes touch in about two of three poses.\n"
+    "first: two new models and one query, from vertex and index arrays; FCL copies the arrays, bocst moves them "
+    "in. The streaming pass reads both meshes once, which is the least that any method must do: it adds up all "
+    "vertices through the index arrays.\n"
+    "fresh: each pose is queried once, in turns of 50 poses with bocst and with FCL. FCL's trees are built before; "
+    "the totals include their build time. 20000 poses fill four of the five windows.\n"
+    "cliffs: difficult meshes that the program makes itself: flat plates close to each other, cones tip to tip, "
+    "rods, needles, equal triangles, fans and specks. The files do not matter.\n"
+    "warm, contacts, distance: the poses are queried until the trees grow no more, and once more before each turn. "
+    "In contacts and distance the models' clock stands still, because FCL's turn can take longer than ttl.\n"
+    "memory: heap is the memory of both models as the allocator reports it, including mesh copies.\n"
+    "moving: one mesh slides over the other, with 60 frames per second on the models' clock. The time of a frame "
+    "is the minimum of all rounds.\n"
+    "deforming: all vertices of A move, then 10 queries follow.\n"
+    "threads: two threads query one pair of models; the best of all rounds counts. The last ratio is the time with "
+    "one thread divided by the time with two threads.\n"
+    "planner: an arm with seven joints and a hand, with links of 200 and of 20000 triangles, among shelves and "
+    "three copies of each mesh, in FCL's DynamicAABBTreeCollisionManager. As many random states as poses are "
+    "checked, and as many states of edges. fresh: first query of a state; again: second query of the same. Pairs are "
+    "those that pass the broad phase; they are measured one by one after the trees have settled.\n"
+    "growth: A against itself, without FCL. Ratios compare with the first size: growth of the triangle count "
+    "(first answer) or of its logarithm (warm query), divided by the growth of the time; above 1, the time grows "
+    "more slowly.";
+
 }  // namespace
 
 void addBench(CLI::App& program, Job& job) {
   auto bench = std::make_shared<Bench>();
   CLI::App* command =
       program.add_subcommand("bench", "measure time and memory, compared with FCL's BVHModel<OBBRSS> in one run");
-  command->footer(
-      "A ratio above 1 means that bocst is better. For times and memory it is FCL's value divided by bocst's. The "
-      "meshes touch in about two of three poses.\n"
-      "first: two new models and one query, from vertex and index arrays; FCL copies the arrays, bocst moves them "
-      "in. The streaming pass reads both meshes once, which is the least that any method must do: it adds up all "
-      "vertices through the index arrays.\n"
-      "fresh: each pose is queried once, in turns of 50 poses with bocst and with FCL. FCL's trees are built before; "
-      "the totals include their build time. 20000 poses fill four of the five windows.\n"
-      "cliffs: difficult meshes that the program makes itself: flat plates close to each other, cones tip to tip, "
-      "rods, needles, equal triangles, fans and specks. The files do not matter.\n"
-      "warm, contacts, distance: the poses are queried until the trees grow no more, and once more before each turn. "
-      "In contacts and distance the models' clock stands still, because FCL's turn can take longer than ttl.\n"
-      "memory: heap is the memory of both models as the allocator reports it, including mesh copies.\n"
-      "moving: one mesh slides over the other, with 60 frames per second on the models' clock. The time of a frame "
-      "is the minimum of all rounds.\n"
-      "deforming: all vertices of A move, then 10 queries follow.\n"
-      "threads: two threads query one pair of models; the best of all rounds counts. The last ratio is the time with "
-      "one thread divided by the time with two threads.\n"
-      "planner: an arm with seven joints and a hand, with links of 200 and of 20000 triangles, among shelves and "
-      "three copies of each mesh, in FCL's DynamicAABBTreeCollisionManager. As many random states as poses are "
-      "checked, and as many states of edges. fresh: first query of a state; again: second query of the same. Pairs are "
-      "those that pass the broad phase; they are measured one by one after the trees have settled.\n"
-      "growth: A against itself, without FCL. Ratios compare with the first size: growth of the triangle count "
-      "(first answer) or of its logarithm (warm query), divided by the growth of the time; above 1, the time grows "
-      "more slowly.");
+  command->footer(kOfScenarios);
   command->add_option("a", bench->request.file_a, std::string("A: ") + kMeshFile)->required();
   command->add_option("b", bench->request.file_b, "B: mesh file; default: A");
   command->add_option("--scenarios", bench->scenarios, "scenarios to measure")

@@ -13,6 +13,7 @@
 
 #include "cli/arguments.h"
 #include "cli/file.h"
+#include "cli/words.h"
 
 namespace bocst::program {
 namespace {
@@ -73,9 +74,8 @@ bool takesFile(const CLI::Option& option) {
 /// A value as the man page names it: the choices, a number, or what the option itself says.
 std::string valueOf(const CLI::Option& option) {
   if (option.get_items_expected_max() == 0) return "";
-  std::string all;
-  for (const std::string& choice : choicesOf(option)) all += (all.empty() ? "" : "|") + choice;
-  if (!all.empty()) return all;
+  const std::string choices = joined(choicesOf(option), "|");
+  if (!choices.empty()) return choices;
   const std::string type = option.get_type_name();
   const std::string basic = type.substr(0, type.find(':'));
   if (basic == "INT" || basic == "UINT") return "N";
@@ -168,16 +168,10 @@ std::string manPage(const CLI::App& program) {
   return text;
 }
 
-std::string words(const std::vector<std::string>& list) {
-  std::string text;
-  for (const std::string& word : list) text += (text.empty() ? "" : " ") + word;
-  return text;
-}
+std::string words(const std::vector<std::string>& list) { return joined(list, " "); }
 
 std::string meshEndings() {
-  std::string text;
-  for (const MeshFormat& format : bocst::meshFormats()) text += (text.empty() ? "" : " ") + format.ending;
-  return text;
+  return joined(bocst::meshFormats(), " ", [](const MeshFormat& format) { return format.ending; });
 }
 
 std::string completion(const CLI::App& program) {

@@ -13,6 +13,7 @@
 #include "cli/arguments.h"
 #include "cli/file.h"
 #include "cli/suggest.h"
+#include "cli/words.h"
 
 namespace bocst::program {
 namespace {
@@ -32,11 +33,7 @@ std::vector<std::string> commandNames(const CLI::App& program) {
   return names;
 }
 
-std::string commandList(const CLI::App& program) {
-  std::string list;
-  for (const std::string& name : commandNames(program)) list += (list.empty() ? "" : ", ") + name;
-  return list;
-}
+std::string commandList(const CLI::App& program) { return joined(commandNames(program), ", "); }
 
 /// The complaint about a word that is no command, no option or too much.
 std::string unexpected(const CLI::App& program) {

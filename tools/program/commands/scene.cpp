@@ -11,6 +11,7 @@
 
 #include "cli/arguments.h"
 #include "cli/file.h"
+#include "cli/words.h"
 #include "robot/packages.h"
 #include "scene/ask_scene.h"
 #include "scene/scene_file.h"
@@ -20,17 +21,6 @@ namespace bocst::program {
 namespace {
 
 using Names = std::pair<std::string, std::string>;
-
-std::string joined(const std::vector<std::string>& list, const std::string& between) {
-  std::string text;
-  for (const std::string& item : list) text += (text.empty() ? "" : between) + item;
-  return text;
-}
-
-/// "1 link", "2 links".
-std::string counted(std::size_t count, const std::string& what) {
-  return std::to_string(count) + " " + what + (count == 1 ? "" : "s");
-}
 
 /// A cell of CSV that may hold anything.
 std::string csvCell(const std::string& text) {

@@ -25,7 +25,7 @@ struct SphereFit {
 /// Spheres that hold the whole surface: it is cut by planes, always the part that protrudes most, and each part has a
 /// sphere about what is left of its triangles.
 ///
-/// @param count at most so many spheres, 0: as many as the tolerance needs.
+/// @param count the most spheres; 0: as many as the tolerance needs.
 /// @param tolerance no cut of parts that protrude no more than this.
 /// @throws std::runtime_error when more than kMostSpheres would be needed.
 SphereFit fitSpheres(const Mesh& mesh, std::size_t count, double tolerance);

@@ -7,6 +7,7 @@
 #include <stdexcept>
 
 #include "cli/report.h"
+#include "cli/words.h"
 
 namespace bocst::program {
 namespace {
@@ -14,8 +15,7 @@ namespace {
 enum class Format { kJson, kPly, kYaml };
 
 Format formatOf(const std::string& file) {
-  std::string ending = std::filesystem::path(file).extension().string();
-  std::transform(ending.begin(), ending.end(), ending.begin(), [](unsigned char c) { return std::tolower(c); });
+  const std::string ending = endingOf(file);
   if (ending == ".json") return Format::kJson;
   if (ending == ".ply") return Format::kPly;
   if (ending == ".yaml" || ending == ".yml") return Format::kYaml;

@@ -9,6 +9,8 @@
 #include <sstream>
 #include <utility>
 
+#include "cli/words.h"
+
 namespace bocst::program {
 namespace {
 
@@ -414,8 +416,7 @@ void writeRun(Text& text, const AnimationStudy& study, const OfOracle& shown, in
 
 void writeAnimation(Text& text, const AnimationStudy& study) {
   text.heading(2, "The animation (5.4)");
-  std::string obstacles;
-  for (const StudyMesh& mesh : study.obstacles) obstacles += (obstacles.empty() ? "" : ", ") + fileName(mesh);
+  const std::string obstacles = joined(study.obstacles, ", ", [](const StudyMesh& mesh) { return fileName(mesh); });
   text.paragraph(
       "The paper moves an object of 5000 triangles over three objects on a path that it does not describe. Our "
       "animation moves " +
@@ -453,10 +454,8 @@ void writeAnimation(Text& text, const AnimationStudy& study) {
   text.table(rows, 2);
 }
 
-std::string joined(const std::set<double>& values) {
-  std::string text;
-  for (const double value : values) text += (text.empty() ? "" : ", ") + formatPlain(value);
-  return text;
+std::string listOf(const std::set<double>& values) {
+  return joined(values, ", ", [](double value) { return formatPlain(value); });
 }
 
 /// The paper's parameters, and those that all runs of the study were made with.
@@ -472,10 +471,10 @@ void writeParameters(Text& text, const AnimationStudy& study) {
       dimensions.insert(run.dimension);
     }
     const std::size_t column = subdivision == Subdivision::kOctree ? 2 : 4;
-    rows[1][column] = joined(depths);
+    rows[1][column] = listOf(depths);
     rows[2][column] = formatPlain(static_cast<double>(Animation::kMaxTime.count()) / 1000);
     rows[3][column] = std::to_string(study.frames);
-    rows[4][column] = joined(dimensions);
+    rows[4][column] = listOf(dimensions);
   }
   text.table(rows, 1);
 }

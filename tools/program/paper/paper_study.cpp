@@ -6,6 +6,8 @@
 #include <algorithm>
 #include <stdexcept>
 
+#include "mesh/node_levels.h"
+
 namespace bocst::program {
 namespace {
 
@@ -26,15 +28,6 @@ std::vector<NodeView> wholeTree(const std::shared_ptr<const Mesh>& mesh, double 
   std::vector<NodeView> nodes;
   model.visit([&nodes](const NodeView& node) { nodes.push_back(node); });
   return nodes;
-}
-
-std::vector<std::size_t> countsOf(const std::vector<NodeView>& nodes) {
-  std::vector<std::size_t> counts;
-  for (const NodeView& node : nodes) {
-    counts.resize(std::max(counts.size(), static_cast<std::size_t>(node.level)));
-    ++counts[static_cast<std::size_t>(node.level) - 1];
-  }
-  return counts;
 }
 
 Json jsonOf(const Animation::Part& part) {
@@ -73,7 +66,7 @@ TreeStudy studyTrees(const PaperMesh& paper, const StudyMesh& mesh, bool sampled
     const int depth = tree.paper != nullptr ? kTableDepth : kFigureDepth;
     tree.levels = errorByLevel(*mesh.mesh, wholeTree(mesh.mesh, tree.dimension, depth, OracleKind::kCpu));
     if (sampled && tree.paper != nullptr) {
-      tree.sampled = countsOf(wholeTree(mesh.mesh, tree.dimension, depth, OracleKind::kSampled));
+      tree.sampled = nodesPerLevel(wholeTree(mesh.mesh, tree.dimension, depth, OracleKind::kSampled));
     }
     progress.step();
   }

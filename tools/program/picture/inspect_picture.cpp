@@ -5,6 +5,7 @@
 #include <filesystem>
 
 #include "cli/report.h"
+#include "cli/words.h"
 #include "mesh/spheres.h"
 #include "picture/marks.h"
 #include "picture/picture_scene.h"

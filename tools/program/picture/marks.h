@@ -18,7 +18,7 @@ constexpr render::Color kFaultColor = {0.85f, 0.0f, 0.1f};
 /// How long the arrow of a normal is, of the view's radius.
 constexpr double kNormalLength = 0.22;
 
-/// Contacts as dots over a square view of so many pixels; with normals, arrows along them from as many as have room,
+/// Contacts as dots over a square view of `side` pixels; with normals, arrows along them from as many as have room,
 /// which all start at a contact. Nothing hides them.
 void markContacts(cairo_t* pen, const std::vector<TouchingPoint>& contacts, const render::View& view, int side,
                   bool normals);

@@ -7,6 +7,7 @@
 #include <cstring>
 #include <utility>
 
+#include "mesh/node_levels.h"
 #include "picture/display_mesh.h"
 #include "picture/page_text.h"
 
@@ -80,11 +81,7 @@ void Page::object(const std::string& name, const Mesh& mesh, const Eigen::Isomet
 
 void Page::tree(const Mesh& mesh, const std::vector<NodeView>& nodes, Subdivision subdivision, double dimension,
                 const std::vector<LevelError>& errors) {
-  std::vector<std::size_t> counts;
-  for (const NodeView& node : nodes) {
-    counts.resize(std::max(counts.size(), static_cast<std::size_t>(node.level)));
-    ++counts[static_cast<std::size_t>(node.level) - 1];
-  }
+  const std::vector<std::size_t> counts = nodesPerLevel(nodes);
   const int levels = levelsToShow(counts);
   // Centre, half extents and radius of each node, in the cube that positions are in: [-1/2, 1/2] on each axis.
   std::vector<float> numbers;

@@ -10,6 +10,7 @@
 #include <vector>
 
 #include "cli/report.h"
+#include "cli/words.h"
 #include "picture/marks.h"
 #include "picture/picture_scene.h"
 

@@ -25,10 +25,6 @@ render::Volumes volumesOf(const std::vector<NodeView>& nodes, const Mesh& mesh, 
   return volumes;
 }
 
-std::string counted(std::size_t count, const std::string& what) {
-  return std::to_string(count) + " " + what + (count == 1 ? "" : "s");
-}
-
 std::string nameOf(Subdivision subdivision) { return subdivision == Subdivision::kOctree ? "O-BOCST" : "B-BOCST"; }
 
 }  // namespace bocst::program

@@ -30,9 +30,6 @@ constexpr std::array<render::Color, 2> kVolumeColors = {{{0.20f, 0.50f, 0.86f}, 
 render::Volumes volumesOf(const std::vector<NodeView>& nodes, const Mesh& mesh, const Options& options,
                           render::Volumes::Shape shape);
 
-/// "1 node", "2 nodes".
-std::string counted(std::size_t count, const std::string& what);
-
 /// As the paper calls it.
 std::string nameOf(Subdivision subdivision);
 

@@ -29,7 +29,7 @@ class ArmWorld {
     Eigen::Isometry3d X_WT = Eigen::Isometry3d::Identity();  ///< World from mesh, of a thing that does not move.
   };
 
-  /// Links of about so many triangles each; of each scan there are three on the shelves, 0.2 to 0.4 m long.
+  /// Links of about `triangles_a_link` triangles each; of each scan there are three on the shelves, 0.2 to 0.4 m long.
   ArmWorld(std::size_t triangles_a_link, const std::vector<std::shared_ptr<const Mesh>>& scans, std::uint64_t seed);
 
   const std::vector<Thing>& links() const { return links_; }

@@ -49,7 +49,7 @@ std::unique_ptr<ManagedArm> manageFclArm(const ArmWorld& world);
 /// With bocst's models.
 class BocstManagedArm : public ManagedArm {
  public:
-  /// As after so many seconds without a query.
+  /// As after `seconds` without a query.
   virtual void rest(double seconds) = 0;
 
   /// Changes whenever a tree grows: what each has built so far, and its size.

@@ -30,7 +30,7 @@ class JsonElement {
   bool boolean() const;
   std::vector<JsonElement> items() const;                            ///< Of a list.
   std::vector<std::pair<std::string, JsonElement>> members() const;  ///< Of an object.
-  std::vector<double> numbers(std::size_t count) const;              ///< A list of so many.
+  std::vector<double> numbers(std::size_t count) const;              ///< A list of `count`.
   /// [x, y, z], [x, y, z, qw, qx, qy, qz], or {"xyz": [...], "rpy" or "wxyz" or "xyzw": [...]}.
   Eigen::Isometry3d pose() const;
 

@@ -11,6 +11,7 @@
 
 #include "cli/file.h"
 #include "cli/suggest.h"
+#include "cli/words.h"
 #include "robot/mesh_store.h"
 #include "robot/packages.h"
 #include "robot/srdf.h"
@@ -24,8 +25,7 @@ namespace fs = std::filesystem;
 
 /// By its ending, or by its first character.
 bool isUrdf(const std::string& file) {
-  std::string ending = fs::path(file).extension().string();
-  std::transform(ending.begin(), ending.end(), ending.begin(), [](unsigned char c) { return std::tolower(c); });
+  const std::string ending = endingOf(file);
   if (ending == ".json") return false;
   if (ending == ".urdf" || ending == ".xml" || ending == ".xacro") return true;
   const std::string text = readFile(file);

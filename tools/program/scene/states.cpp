@@ -10,6 +10,7 @@
 #include <system_error>
 
 #include "cli/suggest.h"
+#include "cli/words.h"
 #include "pairs/poses.h"
 
 namespace bocst::program {
@@ -46,12 +47,6 @@ std::optional<double> numberOf(const std::string& cell) {
   return whole ? std::optional<double>(value) : std::nullopt;
 }
 
-std::string list(const std::vector<std::string>& names) {
-  std::string text;
-  for (const std::string& name : names) text += (text.empty() ? "" : ", ") + name;
-  return text;
-}
-
 std::string refusal(const std::string& name, const StateNames& names) {
   if (name.empty()) return "a column has no name";
   const auto joint = names.others.find(name);
@@ -83,7 +78,7 @@ class Columns {
       const auto is = [j](const Column& c) { return !c.object && c.index == j; };
       if (std::none_of(columns_.begin(), columns_.end(), is)) missing.push_back(names.joints[j]);
     }
-    if (!missing.empty()) throw std::invalid_argument("columns are missing: " + list(missing));
+    if (!missing.empty()) throw std::invalid_argument("columns are missing: " + joined(missing, ", "));
     for (std::size_t i = 0; i < given_.size(); ++i) checkObject(i);
   }
 
@@ -224,7 +219,7 @@ State stateOfJson(const JsonElement& element, const StateNames& names) {
     if (!objects[i]) missing.push_back(names.objects[i]);
     state.objects.push_back(objects[i].value_or(Eigen::Isometry3d::Identity()));
   }
-  if (!missing.empty()) element.complain("missing: " + list(missing));
+  if (!missing.empty()) element.complain("missing: " + joined(missing, ", "));
   return state;
 }
 

@@ -8,7 +8,7 @@
 #include <vector>
 
 #include "oracle/oracle.h"
-#include "tree/grid/root_grid_kernels.h"
+#include "tree/root_grid_kernels.h"
 
 namespace bocst::tree {
 
@@ -70,7 +70,7 @@ class RootGrid {
   };
   std::vector<Row> rows_;  // [axes][z][y]
   std::vector<std::uint32_t> head_;
-  // [triangle]: so many triangles back is the next of its list; 0 for the last, kFar for what far_ has.
+  // [triangle]: how many triangles back the next of its list is; 0 for the last, kFar for what far_ has.
   static constexpr std::uint32_t kFar = 0xffff;
   std::unique_ptr<std::uint16_t[]> back_;
   struct Far {

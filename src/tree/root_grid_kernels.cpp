@@ -1,12 +1,12 @@
 // SPDX-License-Identifier: BSD-3-Clause
-#include "tree/grid/root_grid_kernels.h"
+#include "tree/root_grid_kernels.h"
 
 #include <algorithm>
 
 #include "simd/unroll.h"
 
 #undef HWY_TARGET_INCLUDE
-#define HWY_TARGET_INCLUDE "tree/grid/root_grid_kernels.cpp"
+#define HWY_TARGET_INCLUDE "tree/root_grid_kernels.cpp"
 #include <hwy/foreach_target.h>
 #include <hwy/highway.h>
 

@@ -9,7 +9,7 @@
 #include <stdexcept>
 #include <vector>
 
-namespace bocst::tree {
+namespace bocst::memory {
 
 /// An append-only array whose elements never move, so readers need no lock while one writer appends.
 /// Threads: operator[] for indices that were published to the caller by a release/acquire pair, from any thread;
@@ -19,7 +19,7 @@ class Pool {
  public:
   static constexpr std::size_t kMost = std::size_t{1} << 30;  ///< a ChildRef has thirty bits.
   static constexpr std::size_t kChunk = std::size_t{1} << kChunkBits;
-  /// It grows by a chunk, or by the 16th part, but not by so many bytes that one append() becomes slow.
+  /// It grows by a chunk, or by the 16th part, but by few enough bytes to keep one append() fast.
   static constexpr std::size_t kShare = 16, kLargestShare = 1 << 16;
 
   T& operator[](std::uint32_t i) { return chunk(i)[i & (kChunk - 1)]; }
@@ -102,4 +102,4 @@ class Pool {
   std::vector<std::unique_ptr<T[]>> chunks_;
 };
 
-}  // namespace bocst::tree
+}  // namespace bocst::memory

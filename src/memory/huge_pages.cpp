@@ -1,12 +1,12 @@
 // SPDX-License-Identifier: BSD-3-Clause
-#include "tree/huge_pages.h"
+#include "memory/huge_pages.h"
 
 #include <sys/mman.h>
 
 #include <cstdint>
 #include <new>
 
-namespace bocst::tree {
+namespace bocst::memory {
 namespace {
 
 constexpr std::size_t kHugePage = std::size_t{1} << 21;
@@ -30,4 +30,4 @@ HugePages::HugePages(std::size_t bytes) : memory_(::operator new(roundedUp(bytes
 
 void HugePages::Delete::operator()(void* memory) const { ::operator delete(memory, std::align_val_t(kHugePage)); }
 
-}  // namespace bocst::tree
+}  // namespace bocst::memory

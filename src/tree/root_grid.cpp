@@ -1,21 +1,21 @@
 // SPDX-License-Identifier: BSD-3-Clause
-#include "tree/grid/root_grid.h"
+#include "tree/root_grid.h"
 
 #include <algorithm>
 #include <cmath>
 #include <cstring>
 
+#include "memory/huge_pages.h"
 #include "oracle/cpu/clip.h"
 #include "oracle/cpu/kernels.h"
 #include "oracle/reference.h"
-#include "tree/huge_pages.h"
 
 namespace bocst::tree {
 namespace {
 
 constexpr std::uint32_t kNone = 0x7f7f7f7fu;  // more triangles than a grid is made for; of equal bytes, so quickly set
 constexpr std::size_t kSmallest = 4096;       // triangles: below, plain expansions are as fast
-constexpr std::size_t kLargeShare = 256;      // at most one triangle in so many may span more than two cells
+constexpr std::size_t kLargeShare = 256;      // at most one triangle in this many may span more than two cells
 constexpr double kMargin = 2;                 // lattice units: one step
 constexpr std::size_t kBlock = 256;           // triangles that are linked at once
 
@@ -27,7 +27,7 @@ class ScratchMemory {
   // Fresh memory costs as much as what is written to it, so a thread keeps some, one MB at most, for its next mesh.
   explicit ScratchMemory(std::size_t bytes) {
     if (bytes > kMostKept) {
-      own_ = HugePages(bytes);
+      own_ = memory::HugePages(bytes);
       begin_ = static_cast<std::byte*>(own_.begin());
       return;
     }
@@ -54,7 +54,7 @@ class ScratchMemory {
  private:
   static constexpr std::size_t kMostKept = 1 << 20;
 
-  HugePages own_;
+  memory::HugePages own_;
   std::byte* begin_;
 };
 
@@ -117,7 +117,7 @@ bool RootGrid::build(const oracle::Surface& surface) {
   std::memset(heads, kNone & 0xff, lists * sizeof(*heads));
   const QuantisedMesh mesh(surface, bits_, room.take<std::int16_t>(QuantisedMesh::values(surface)));
   back_.reset(new std::uint16_t[inWholeGroups(count)]);
-  adviseHugePages(back_.get(), count * sizeof(back_[0]));
+  memory::adviseHugePages(back_.get(), count * sizeof(back_[0]));
   triangle_count_ = count;
   GridSpan spans[kBlock];
   for (std::size_t begin = 0; begin < count; begin += kBlock) {

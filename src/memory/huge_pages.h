@@ -4,7 +4,7 @@
 #include <cstddef>
 #include <memory>
 
-namespace bocst::tree {
+namespace bocst::memory {
 
 /// Asks the system for huge pages where a piece of fresh memory, about to be written to, spans whole ones. It takes a
 /// fifth of the time to be given these, and half of it to read a large mesh's vertices out of order.
@@ -24,4 +24,4 @@ class HugePages {
   std::unique_ptr<void, Delete> memory_;
 };
 
-}  // namespace bocst::tree
+}  // namespace bocst::memory
