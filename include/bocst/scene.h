@@ -61,11 +61,13 @@ struct SceneOptions {
 /// earlier queries, on threads or on the resident nodes. Each query checks that all its poses are rigid.
 ///
 /// Threads: any number of threads may query one scene, also while another thread changes it: each query sees the scene
-/// before or after a change, never a mixture. Changes wait for each other. The first query after a change updates the
-/// scene's internal data, and other queries wait for that; apart from this, no query waits for another. If no model has
-/// to grow, collides() and calls with up to 128 states allocate no memory after the thread's first similar queries,
-/// except in FCL's own code for a pair without a Model. A child of fork() works alone; calls throw std::runtime_error
-/// if another thread of the parent was at work in the scene or in one of its models at the fork.
+/// before or after a change, never a mixture. Changes wait for each other. A change of a fixed object takes
+/// microseconds; while queries are under way, it copies what they share. The first query, and the first one after
+/// moving objects came or went or after many changes, updates the scene's internal data, and other queries wait for
+/// that; apart from changes, no query waits for another. If no model has to grow, collides() and calls with up to 128
+/// states allocate no memory after the thread's first similar queries, except in FCL's own code for a pair without a
+/// Model. A child of fork() works alone; calls throw std::runtime_error if another thread of the parent was at work in
+/// the scene or in one of its models at the fork.
 template <typename S>
 class BOCST_EXPORT Scene {
  public:

@@ -219,11 +219,13 @@ HWY_EXPORT(NearInGroup);
 HWY_EXPORT(NearBox);
 
 BoxGroup::BoxGroup() : center(), axis(), half(), reach() {
+  for (std::size_t i = 0; i < 8; ++i) clear(i);
+}
+
+void BoxGroup::clear(std::size_t lane) {
   for (int k = 0; k < 3; ++k) {
-    for (std::size_t i = 0; i < 8; ++i) {
-      lo[k][i] = std::numeric_limits<float>::infinity();
-      hi[k][i] = -std::numeric_limits<float>::infinity();
-    }
+    lo[k][lane] = std::numeric_limits<float>::infinity();
+    hi[k][lane] = -std::numeric_limits<float>::infinity();
   }
 }
 

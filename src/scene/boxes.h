@@ -28,6 +28,7 @@ struct alignas(64) BoxGroup {
 
   BoxGroup();  ///< All lanes are empty.
   void set(std::size_t lane, const Box& box);
+  void clear(std::size_t lane);
 };
 
 /// Of the hierarchy: boxes along the axes of the world around eight nodes or groups.

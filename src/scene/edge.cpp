@@ -4,12 +4,14 @@
 #include <bocst/fcl.h>
 
 #include <algorithm>
+#include <cmath>
 #include <limits>
 #include <stdexcept>
 #include <tuple>
 
 #include "fcl/adapters/models.h"
 #include "fcl/adapters/motion.h"
+#include "scene/reach.h"
 
 namespace bocst::scene {
 namespace {
@@ -184,24 +186,38 @@ S clearance(const World<S>& world, StateCheck<S>& check, const fcl::Transform3<S
     PairAt pair;
   };
   thread_local std::vector<Candidate> candidates;
-  candidates.clear();
-  for (const NearGroup& n : check.findNear(std::numeric_limits<float>::max())) {
-    for (std::uint32_t left = n.mask; left != 0; left &= left - 1) {
-      const auto lane = static_cast<std::uint32_t>(__builtin_ctz(left));
-      candidates.push_back({n.gap[lane], {n.box, n.group, lane}});
-    }
-  }
-  std::sort(candidates.begin(), candidates.end(), [](const Candidate& p, const Candidate& q) { return p.gap < q.gap; });
   S least = std::numeric_limits<S>::max();
-  for (const Candidate& c : candidates) {
-    if (static_cast<double>(c.gap) >= static_cast<double>(least)) break;
-    const Object<S>&a = world.moving[c.pair.moving], &b = world.object(c.pair.group, c.pair.lane);
-    const S d = distanceBelow<S>(a, X_WM[c.pair.moving], b, check.pose(X_WM, c.pair.group, c.pair.lane), least);
-    if (!(d < least)) continue;
-    least = d;
-    nearest = c.pair;
-    if (!(least > 0)) break;
+  // Pairs of boxes are listed in rounds, each with a longer reach, so most are never listed.
+  constexpr float kInfinity = std::numeric_limits<float>::infinity(), kMost = std::numeric_limits<float>::max();
+  constexpr float kLonger = 4;
+  float before = -kInfinity;
+  for (float reach = std::max(static_cast<float>(check.clearance_guess), std::numeric_limits<float>::min());;
+       reach = std::min(kLonger * reach, std::nextafter(static_cast<float>(least), kInfinity))) {
+    const bool is_last = !(reach < kUnboxedSize);
+    if (is_last) reach = kMost;
+    candidates.clear();
+    for (const NearGroup& n : check.findNear(reach)) {
+      for (std::uint32_t left = n.mask; left != 0; left &= left - 1) {
+        const auto lane = static_cast<std::uint32_t>(__builtin_ctz(left));
+        if (!(n.gap[lane] <= before)) candidates.push_back({n.gap[lane], {n.box, n.group, lane}});
+      }
+    }
+    std::sort(candidates.begin(), candidates.end(),
+              [](const Candidate& p, const Candidate& q) { return p.gap < q.gap; });
+    for (const Candidate& c : candidates) {
+      if (static_cast<double>(c.gap) >= static_cast<double>(least)) break;
+      const Object<S>&a = world.moving[c.pair.moving], &b = world.object(c.pair.group, c.pair.lane);
+      const S d = distanceBelow<S>(a, X_WM[c.pair.moving], b, check.pose(X_WM, c.pair.group, c.pair.lane), least);
+      if (!(d < least)) continue;
+      least = d;
+      nearest = c.pair;
+      if (!(least > 0)) return least;
+    }
+    if (is_last || static_cast<double>(least) <= static_cast<double>(reach)) break;
+    before = reach;
   }
+  const auto found = static_cast<double>(least);
+  if (found < kUnboxedSize) check.clearance_guess = std::max(found, check.clearance_guess / kLonger);
   return least;
 }
 

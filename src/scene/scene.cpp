@@ -6,7 +6,7 @@
 #include <limits>
 #include <map>
 #include <mutex>
-#include <set>
+#include <new>
 #include <shared_mutex>
 #include <stdexcept>
 #include <string>
@@ -68,25 +68,61 @@ struct Scene<S>::Impl {
 
   explicit Impl(const SceneOptions& o) : pool(o.threads) {}
 
-  // The world for a query. Made when it is asked for, so that many changes in a row cost little.
+  // The world for a query. Made when it is asked for, so that many additions in a row cost little.
   WorldPtr current() const {
     {
       const std::shared_lock<thread::ShardedLock> lock(sharded_lock);
-      if (world != nullptr) return world;
+      if (world != nullptr && !is_moving_stale) return world;
     }
     const std::lock_guard<thread::ForkAwareMutex> lock(mutex);
+    if (is_moving_stale) {
+      change([&](World<S>& w) {
+        is_moving_stale = false;
+        return w.setMoving(movingObjects(), ignored);
+      });
+    }
     if (world == nullptr) {
-      std::vector<Object<S>> moving, fixed;
-      for (const auto& [number, record] : objects) (record.moves ? moving : fixed).push_back(record.object);
-      publish(std::make_shared<const World<S>>(std::move(moving), std::move(fixed), ignored));
+      std::vector<Object<S>> fixed;
+      for (const auto& [number, record] : objects) {
+        if (!record.moves) fixed.push_back(record.object);
+      }
+      const auto made = std::make_shared<World<S>>(movingObjects(), fixed, ignored);
+      const std::lock_guard<thread::ShardedLock> alone(sharded_lock);
+      world = made;
+      is_moving_stale = false;
     }
     return world;
   }
 
-  // To be called with the mutex held.
-  void publish(WorldPtr next) const {
+  std::vector<Object<S>> movingObjects() const {
+    std::vector<Object<S>> all;
+    for (const std::uint32_t number : moving_numbers) all.push_back(objects.at(number).object);
+    return all;
+  }
+
+  // Changes the world that queries see by apply(World&), unless there is none; drops it where that returns false, or
+  // where changes have worn it. To be called with the mutex held, after the objects were changed.
+  template <typename Apply>
+  void change(Apply&& apply) const {
     const std::lock_guard<thread::ShardedLock> alone(sharded_lock);
-    std::swap(world, next);  // the old world goes with `next`, after the lock
+    if (world == nullptr) return;
+    try {
+      if (world.use_count() > 1) {
+        world = std::make_shared<World<S>>(*world);  // queries under way keep the old one
+      } else {
+        const auto counted = world;  // when it counts down, it sees what queries did before they counted down
+      }
+      if (apply(*world) && !world->isWorn()) return;
+    } catch (const std::bad_alloc&) {
+      // The next query makes another one, or has no memory either.
+    }
+    world = nullptr;
+  }
+
+  // Moving objects came or went, or changed: the next query takes over all of them.
+  void changeMoving() {
+    const std::lock_guard<thread::ShardedLock> alone(sharded_lock);
+    is_moving_stale = true;
   }
 
   struct Record {
@@ -105,8 +141,14 @@ struct Scene<S>::Impl {
     const std::uint32_t number = next_number++;
     o.id = Id(scene_number, number);
     with_geometry[geometry.get()] = number;
-    objects.emplace(number, Record{std::move(geometry), std::move(o), X_WG == nullptr});
-    publish(nullptr);
+    const Record& record =
+        objects.emplace(number, Record{std::move(geometry), std::move(o), X_WG == nullptr}).first->second;
+    if (record.moves) {
+      moving_numbers.push_back(number);
+      changeMoving();
+    } else {
+      change([&](World<S>& w) { return w.putFixed(record.object, ignored); });
+    }
     return Id(scene_number, number);
   }
 
@@ -187,10 +229,13 @@ struct Scene<S>::Impl {
   mutable thread::ForkAwareMutex mutex;  // of changes
   std::uint32_t next_number = 0;
   std::map<std::uint32_t, Record> objects;                 // in the order of adding
+  std::vector<std::uint32_t> moving_numbers;               // numbers of objects, in the order of adding
   std::map<const Geometry*, std::uint32_t> with_geometry;  // an object that was given it
-  std::set<std::pair<Id, Id>> ignored;                     // the smaller Id first
-  mutable thread::ShardedLock sharded_lock;                // of `world`; held no longer than it takes to copy it
-  mutable WorldPtr world;                                  // null after a change
+  scene::IgnoredPairs ignored;
+  mutable thread::ShardedLock
+      sharded_lock;                         // of `world`; held no longer than it takes to copy the pointer, or a change
+  mutable bool is_moving_stale = false;     // `world` has other moving objects; written to under both locks
+  mutable std::shared_ptr<World<S>> world;  // null before the first query, and after some changes
   const std::uint32_t scene_number = nextScene();
   mutable thread::ThreadPool pool;
 };
@@ -216,12 +261,19 @@ void Scene<S>::remove(Id object) {
   const std::lock_guard<thread::ForkAwareMutex> lock(impl_->mutex);
   const auto other = impl_->with_geometry.find(impl_->find("remove", object).given.get());
   if (other != impl_->with_geometry.end() && other->second == object.number_) impl_->with_geometry.erase(other);
+  const bool moves = impl_->objects.at(object.number_).moves;
   impl_->objects.erase(object.number_);
-  auto& ignored = impl_->ignored;
-  for (auto i = ignored.begin(); i != ignored.end();) {
-    i = i->first == object || i->second == object ? ignored.erase(i) : std::next(i);
+  impl_->ignored.remove(object);
+  if (moves) {
+    auto& moving = impl_->moving_numbers;
+    moving.erase(std::find(moving.begin(), moving.end(), object.number_));
+    impl_->changeMoving();
+  } else {
+    impl_->change([&](World<S>& w) {
+      w.removeFixed(object);
+      return true;
+    });
   }
-  impl_->publish(nullptr);
 }
 
 template <typename S>
@@ -233,7 +285,7 @@ void Scene<S>::setPose(Id fixed, const Transform& X_WG) {
     throw std::invalid_argument("bocst::Scene::setPose: the object moves; its pose comes with each state");
   }
   record.object.X_WG = X_WG;
-  impl_->publish(nullptr);
+  impl_->change([&](World<S>& w) { return w.putFixed(record.object, impl_->ignored); });
 }
 
 template <typename S>
@@ -242,12 +294,11 @@ void Scene<S>::ignore(Id a, Id b, bool ignored) {
   impl_->find("ignore", a);
   impl_->find("ignore", b);
   if (a == b) throw std::invalid_argument("bocst::Scene::ignore: both Ids name the same object");
-  if (ignored) {
-    impl_->ignored.insert(std::minmax(a, b));
-  } else {
-    impl_->ignored.erase(std::minmax(a, b));
-  }
-  impl_->publish(nullptr);
+  impl_->ignored.set(a, b, ignored);
+  impl_->change([&](World<S>& w) {
+    w.setIgnored(a, b, ignored);
+    return true;
+  });
 }
 
 template <typename S>
@@ -255,13 +306,17 @@ void Scene<S>::update(Id object) {
   const std::lock_guard<thread::ForkAwareMutex> lock(impl_->mutex);
   const std::shared_ptr<Geometry> geometry = impl_->find("update", object).given;
   const Object<S> updated = Impl::describe(geometry);
+  bool any_moves = false;
   for (auto& [number, record] : impl_->objects) {
     if (record.given != geometry) continue;
     const Object<S> before = std::exchange(record.object, updated);
     record.object.id = before.id;
     record.object.X_WG = before.X_WG;
+    any_moves |= record.moves;
+    if (record.moves) continue;
+    impl_->change([&, &object = record.object](World<S>& w) { return w.putFixed(object, impl_->ignored); });
   }
-  impl_->publish(nullptr);
+  if (any_moves) impl_->changeMoving();
 }
 
 template <typename S>
@@ -315,19 +370,27 @@ bool Scene<S>::edgeIsFree(const Transform* X_WM_begin, const Transform* X_WM_end
 
 template <typename S>
 std::size_t Scene<S>::movingCount() const {
-  return impl_->current()->moving.size();
+  const std::lock_guard<thread::ForkAwareMutex> lock(impl_->mutex);
+  return impl_->moving_numbers.size();
 }
 
 template <typename S>
 std::size_t Scene<S>::fixedCount() const {
   const std::lock_guard<thread::ForkAwareMutex> lock(impl_->mutex);
-  return static_cast<std::size_t>(std::count_if(impl_->objects.begin(), impl_->objects.end(),
-                                                [](const auto& entry) { return !entry.second.moves; }));
+  return impl_->objects.size() - impl_->moving_numbers.size();
 }
 
 template <typename S>
 std::size_t Scene<S>::pairCount() const {
-  return impl_->current()->pair_count;
+  const std::lock_guard<thread::ForkAwareMutex> lock(impl_->mutex);
+  const std::size_t moving = impl_->moving_numbers.size(), fixed = impl_->objects.size() - moving;
+  std::size_t ignored_twice = 0;  // two moving objects see each other
+  for (const std::uint32_t number : impl_->moving_numbers) {
+    for (const Id other : impl_->ignored.of(Id(impl_->scene_number, number))) {
+      ignored_twice += impl_->objects.at(other.number_).moves ? 1 : 2;
+    }
+  }
+  return moving * fixed + moving * (moving - 1) / 2 - ignored_twice / 2;
 }
 
 template <typename S>
@@ -336,12 +399,8 @@ std::size_t Scene<S>::movingIndex(Id moving) const {
   if (!impl_->find("movingIndex", moving).moves) {
     throw std::invalid_argument("bocst::Scene::movingIndex: the object is fixed");
   }
-  std::size_t index = 0;
-  for (const auto& [number, record] : impl_->objects) {
-    if (number == moving.number_) break;
-    index += record.moves;
-  }
-  return index;
+  const auto& all = impl_->moving_numbers;
+  return static_cast<std::size_t>(std::find(all.begin(), all.end(), moving.number_) - all.begin());
 }
 
 template class Scene<float>;

@@ -4,6 +4,7 @@
 #include <bocst/fcl.h>
 
 #include <algorithm>
+#include <limits>
 #include <numeric>
 
 #include "fcl/queries/collide_row.h"
@@ -33,6 +34,10 @@ void StateCheck<S>::start(const World<S>& world) {
   lists_after_hit = false;
   if (serial_ != world.serial) {
     has_last_ = false;
+    clearance_guess = std::numeric_limits<float>::min();
+    for (const Object<S>& o : world.moving) {
+      if (o.bounds.kind == Bounds::kBox) clearance_guess = std::max(clearance_guess, o.bounds.radius / 4);
+    }
     order_.resize(world.moving.size());
     std::iota(order_.begin(), order_.end(), 0u);
   }

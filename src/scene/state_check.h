@@ -43,6 +43,9 @@ class StateCheck {
   /// Of the poses of each moving object, at least; to be set before anything is asked.
   std::vector<double> orthogonality_errors;
 
+  /// A length that clearances of this world may have; more than 0.
+  double clearance_guess = 0;
+
   /// Should lists be complete where a pair touches, too?
   bool lists_after_hit = false;
 

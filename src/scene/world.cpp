@@ -209,16 +209,35 @@ std::int32_t World<S>::build(std::vector<std::uint32_t>& order, std::vector<std:
   return index;
 }
 
+namespace {
+
 template <typename S>
-World<S>::World(std::vector<Object<S>> moving_objects, std::vector<Object<S>> fixed_objects,
-                const std::set<std::pair<Id, Id>>& ignored_pairs)
-    : moving(std::move(moving_objects)), serial(nextSerial()) {
-  const auto ignored = [&](Id a, Id b) { return ignored_pairs.count(std::minmax(a, b)) != 0; };
-  const auto sizeOf = [](const Object<S>& o) { return o.bounds.kind == Bounds::kBox ? o.bounds.size : 0; };
-  for (const Object<S>& o : moving) largest_ = std::max(largest_, sizeOf(o));
-  std::vector<Bounds> bounds;
-  for (const Object<S>& o : moving) bounds.push_back(o.bounds);
-  rows = rowsOf(bounds);
+double sizeOf(const Object<S>& o) {
+  return o.bounds.kind == Bounds::kBox ? o.bounds.size : 0;
+}
+
+template <typename S>
+bool growsSlowly(const Object<S>& o) {
+  return o.model != nullptr && fcl_adapter::growsTogether(*o.model, *o.model);
+}
+
+constexpr std::size_t kFewPlaces = 8;  // free ones that are compared for a new object
+
+// The box along the world's axes around all lanes of a node or group.
+template <typename Boxes>
+void unite(const Boxes& boxes, float (&lo)[3], float (&hi)[3]) {
+  for (int k = 0; k < 3; ++k) {
+    lo[k] = *std::min_element(boxes.lo[k], boxes.lo[k] + 8);
+    hi[k] = *std::max_element(boxes.hi[k], boxes.hi[k] + 8);
+  }
+}
+
+}  // namespace
+
+template <typename S>
+World<S>::World(std::vector<Object<S>> moving_objects, const std::vector<Object<S>>& fixed_objects,
+                const IgnoredPairs& ignored) {
+  for (const Object<S>& o : moving_objects) largest_ = std::max(largest_, sizeOf(o));
   Eigen::AlignedBox3d middles;
   for (const Object<S>& o : fixed_objects) {
     largest_ = std::max(largest_, sizeOf(o));
@@ -238,6 +257,7 @@ World<S>::World(std::vector<Object<S>> moving_objects, std::vector<Object<S>> fi
   for (const Object<S>& o : fixed_objects) {
     const double orthogonality_error = orthogonalityErrorOf<S>(o.X_WG);
     fixed_error = std::max(fixed_error, orthogonality_error);
+    grows_together |= growsSlowly(o);
     boxes.push_back(boxAt(o, o.X_WG, orthogonality_error));
   }
   const auto unbounded =
@@ -247,27 +267,238 @@ World<S>::World(std::vector<Object<S>> moving_objects, std::vector<Object<S>> fi
   if (unbounded > 0) parts.emplace_back(0, unbounded);
   if (order.size() > unbounded) parts.emplace_back(unbounded, order.size());
   if (!parts.empty()) build(order, parts, boxes, fixed_objects);
+  link();
+  setMoving(std::move(moving_objects), ignored);
+}
 
-  const auto growsSlowly = [](const Object<S>& o) {
-    return o.model != nullptr && fcl_adapter::growsTogether(*o.model, *o.model);
-  };
-  grows_together = std::any_of(moving.begin(), moving.end(), growsSlowly) ||
-                   std::any_of(fixed_objects.begin(), fixed_objects.end(), growsSlowly);
-
-  masks.assign(moving.size() * allGroups(), 0);
-  for (std::size_t i = 0; i < moving.size(); ++i) {
-    for (const Object<S>& o : fixed_objects) pair_count += !ignored(moving[i].id, o.id);
-    for (std::size_t j = i + 1; j < moving.size(); ++j) pair_count += !ignored(moving[i].id, moving[j].id);
-    if (moving[i].bounds.kind == Bounds::kNowhere) continue;
-    for (std::size_t group = 0; group < allGroups(); ++group) {
-      for (std::size_t lane = 0; lane < 8; ++lane) {
-        if (!isFixed(group) && (movingIndex(group, lane) <= i || movingIndex(group, lane) >= moving.size())) continue;
-        const Object<S>& o = object(group, lane);
-        if (o.geometry == nullptr || o.bounds.kind == Bounds::kNowhere || ignored(moving[i].id, o.id)) continue;
-        masks[i * allGroups() + group] |= static_cast<std::uint8_t>(1u << lane);
-      }
+// Notes where everything is, and what is free.
+template <typename S>
+void World<S>::link() {
+  slot_of_node_.resize(nodes.size());
+  slot_of_group_.resize(groups.size());
+  // Slots near the root are used first.
+  for (std::size_t n = nodes.size(); n-- > 0;) {
+    for (std::size_t lane = 0; lane < 8; ++lane) {
+      const std::int32_t child = nodes[n].child[lane];
+      if (child > 0) slot_of_node_[static_cast<std::size_t>(child)] = {n, lane};
+      if (child < 0) slot_of_group_[static_cast<std::size_t>(~child)] = {n, lane};
+      if (child == 0) free_slots_.push_back({n, lane});
     }
   }
+  occupied_.assign(groups.size(), 0);
+  for (std::size_t place = 0; place < fixed.size(); ++place) {
+    if (fixed[place].geometry == nullptr) {
+      free_places_.push_back(place);
+    } else {
+      place_of_[fixed[place].id] = place;
+      occupied_[place / 8] |= static_cast<std::uint8_t>(1u << place % 8);
+    }
+  }
+}
+
+// Widens or narrows the boxes above a group.
+template <typename S>
+void World<S>::refit(std::size_t group) {
+  float lo[3], hi[3];
+  unite(groups[group], lo, hi);
+  for (Slot slot = slot_of_group_[group];; slot = slot_of_node_[slot.node]) {
+    BoxNode& node = nodes[slot.node];
+    for (int k = 0; k < 3; ++k) {
+      node.lo[k][slot.lane] = lo[k];
+      node.hi[k][slot.lane] = hi[k];
+    }
+    if (slot.node == 0) return;
+    unite(node, lo, hi);
+  }
+}
+
+// A lane for one more object: of some that are free the one whose group grows the least.
+template <typename S>
+std::size_t World<S>::freePlace(const Box& box) {
+  if (free_places_.empty()) addGroup();
+  const auto growth = [&](std::size_t place) {
+    float lo[3], hi[3], sum = 0;
+    unite(groups[place / 8], lo, hi);
+    for (int k = 0; k < 3; ++k) {
+      const float before = std::max(hi[k] - lo[k], 0.0f);
+      sum += std::max(hi[k], box.hi[k]) - std::min(lo[k], box.lo[k]) - before;
+    }
+    return sum;
+  };
+  const auto first = free_places_.size() > kFewPlaces ? free_places_.end() - kFewPlaces : free_places_.begin();
+  const auto best =
+      std::min_element(first, free_places_.end(), [&](std::size_t p, std::size_t q) { return growth(p) < growth(q); });
+  std::swap(*best, free_places_.back());
+  const std::size_t place = free_places_.back();
+  free_places_.pop_back();
+  return place;
+}
+
+template <typename S>
+void World<S>::addGroup() {
+  const auto addNode = [this](const BoxNode& node) {
+    nodes.push_back(node);
+    slot_of_node_.push_back({0, 0});
+    return nodes.size() - 1;
+  };
+  if (free_slots_.empty()) {
+    BoxNode empty;
+    for (std::size_t lane = 0; lane < 8; ++lane) {
+      empty.child[lane] = 0;
+      for (int k = 0; k < 3; ++k) {
+        empty.lo[k][lane] = std::numeric_limits<float>::infinity();
+        empty.hi[k][lane] = -std::numeric_limits<float>::infinity();
+      }
+    }
+    std::size_t first_free = 0;
+    if (nodes.empty()) {
+      addNode(empty);
+    } else {
+      // The root moves down, below a new one in its place.
+      const BoxNode root = nodes[0];
+      const std::size_t below = addNode(root);
+      for (std::size_t lane = 0; lane < 8; ++lane) {
+        const std::int32_t child = root.child[lane];
+        if (child > 0) slot_of_node_[static_cast<std::size_t>(child)].node = below;
+        if (child < 0) slot_of_group_[static_cast<std::size_t>(~child)].node = below;
+      }
+      float lo[3], hi[3];
+      unite(root, lo, hi);
+      empty.child[0] = static_cast<std::int32_t>(below);
+      for (int k = 0; k < 3; ++k) {
+        empty.lo[k][0] = lo[k];
+        empty.hi[k][0] = hi[k];
+      }
+      nodes[0] = empty;
+      first_free = 1;
+    }
+    for (std::size_t lane = first_free; lane < 8; ++lane) free_slots_.push_back({0, lane});
+  }
+  const Slot slot = free_slots_.back();
+  free_slots_.pop_back();
+  // The masks of moving groups come after those of fixed ones.
+  const std::size_t before = allGroups(), fixed_before = fixedGroups();
+  std::vector<std::uint8_t> more(moving.size() * (before + 1), 0);
+  for (std::size_t i = 0; i < moving.size(); ++i) {
+    const std::uint8_t* from = masks.data() + i * before;
+    std::uint8_t* to = more.data() + i * (before + 1);
+    std::copy(from, from + fixed_before, to);
+    std::copy(from + fixed_before, from + before, to + fixed_before + 1);
+  }
+  masks = std::move(more);
+  nodes[slot.node].child[slot.lane] = ~static_cast<std::int32_t>(groups.size());
+  slot_of_group_.push_back(slot);
+  for (std::size_t lane = 8; lane-- > 0;) free_places_.push_back(8 * groups.size() + lane);
+  groups.emplace_back();
+  occupied_.push_back(0);
+  fixed.resize(8 * groups.size());
+}
+
+template <typename S>
+bool World<S>::putFixed(const Object<S>& object, const IgnoredPairs& ignored) {
+  if (sizeOf(object) > largest_) return false;  // the reach of all boxes depends on it
+  ++changes_;
+  const auto known = place_of_.find(object.id);
+  if (object.bounds.kind == Bounds::kNowhere) {
+    removeFixed(object.id);
+    return true;
+  }
+  const double orthogonality_error = orthogonalityErrorOf<S>(object.X_WG);
+  const Box box = boxAt(object, object.X_WG, orthogonality_error);
+  const std::size_t place = known != place_of_.end() ? known->second : freePlace(box);
+  place_of_[object.id] = place;
+  fixed[place] = object;
+  occupied_[place / 8] |= static_cast<std::uint8_t>(1u << place % 8);
+  fixed_error = std::max(fixed_error, orthogonality_error);
+  grows_together |= growsSlowly(object);
+  groups[place / 8].set(place % 8, box);
+  refit(place / 8);
+  for (std::size_t i = 0; i < moving.size(); ++i) {
+    setMask(i, place / 8, place % 8, !ignored.contains(moving[i].id, object.id));
+  }
+  return true;
+}
+
+template <typename S>
+void World<S>::removeFixed(Id object) {
+  const auto known = place_of_.find(object);
+  if (known == place_of_.end()) return;
+  ++changes_;
+  const std::size_t place = known->second;
+  free_places_.push_back(place);
+  place_of_.erase(known);
+  fixed[place] = Object<S>();
+  occupied_[place / 8] &= static_cast<std::uint8_t>(~(1u << place % 8));
+  groups[place / 8].clear(place % 8);
+  refit(place / 8);
+  for (std::size_t i = 0; i < moving.size(); ++i) setMask(i, place / 8, place % 8, false);
+}
+
+template <typename S>
+bool World<S>::setMoving(std::vector<Object<S>> objects, const IgnoredPairs& ignored) {
+  for (const Object<S>& o : objects) {
+    if (sizeOf(o) > largest_) return false;
+    grows_together |= growsSlowly(o);
+  }
+  moving = std::move(objects);
+  serial = nextSerial();
+  std::vector<Bounds> bounds;
+  moving_of_.clear();
+  for (std::size_t i = 0; i < moving.size(); ++i) {
+    bounds.push_back(moving[i].bounds);
+    moving_of_[moving[i].id] = i;
+  }
+  rows = rowsOf(bounds);
+  fillMasks(ignored);
+  return true;
+}
+
+template <typename S>
+void World<S>::fillMasks(const IgnoredPairs& ignored) {
+  std::vector<std::uint8_t> all = occupied_;
+  all.resize(allGroups(), 0);
+  for (std::size_t i = 0; i < moving.size(); ++i) {
+    if (moving[i].bounds.kind == Bounds::kNowhere) continue;
+    all[fixedGroups() + i / 8] |= static_cast<std::uint8_t>(1u << i % 8);
+  }
+  masks.assign(moving.size() * allGroups(), 0);
+  for (std::size_t i = 0; i < moving.size(); ++i) {
+    // Of moving objects, those that come later.
+    std::uint8_t& own = all[fixedGroups() + i / 8];
+    own &= static_cast<std::uint8_t>(~(1u << i % 8));
+    if (moving[i].bounds.kind == Bounds::kNowhere) continue;
+    std::copy(all.begin(), all.begin() + static_cast<std::ptrdiff_t>(fixedGroups()), &masks[i * allGroups()]);
+    std::copy(all.begin() + static_cast<std::ptrdiff_t>(fixedGroups() + i / 8), all.end(),
+              &masks[i * allGroups() + fixedGroups() + i / 8]);
+  }
+  for (const Object<S>& o : moving) {
+    for (const Id other : ignored.of(o.id)) setIgnored(o.id, other, true);
+  }
+}
+
+// Makes a lane a pair with a moving object, or not.
+template <typename S>
+void World<S>::setMask(std::size_t moving_index, std::size_t group, std::size_t lane, bool is_pair) {
+  std::uint8_t& mask = masks[moving_index * allGroups() + group];
+  const auto bit = static_cast<std::uint8_t>(1u << lane);
+  const bool is_somewhere = moving[moving_index].bounds.kind != Bounds::kNowhere;
+  mask = static_cast<std::uint8_t>(is_pair && is_somewhere ? mask | bit : mask & ~bit);
+}
+
+template <typename S>
+void World<S>::setIgnored(Id a, Id b, bool ignored) {
+  const auto moving_a = moving_of_.find(a), moving_b = moving_of_.find(b);
+  if (moving_a != moving_of_.end() && moving_b != moving_of_.end()) {
+    const std::size_t first = std::min(moving_a->second, moving_b->second),
+                      second = std::max(moving_a->second, moving_b->second);
+    const bool is_somewhere = moving[second].bounds.kind != Bounds::kNowhere;
+    setMask(first, fixedGroups() + second / 8, second % 8, !ignored && is_somewhere);
+    return;
+  }
+  const auto moves = moving_a != moving_of_.end() ? moving_a : moving_b;
+  const auto place = place_of_.find(moves == moving_a ? b : a);
+  if (moves == moving_of_.end() || place == place_of_.end()) return;  // of two fixed objects, or of one that is nowhere
+  setMask(moves->second, place->second / 8, place->second % 8, !ignored);
 }
 
 template <typename S>

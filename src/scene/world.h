@@ -6,11 +6,12 @@
 
 #include <cstdint>
 #include <memory>
-#include <set>
+#include <unordered_map>
 #include <utility>
 #include <vector>
 
 #include "scene/bounds.h"
+#include "scene/ignored_pairs.h"
 #include "scene/pose_rows.h"
 
 namespace bocst::scene {
@@ -37,13 +38,24 @@ void checkPoses(const char* query, const fcl::Transform3<S>* X_WM, std::size_t s
 template <typename S>
 void checkPose(const char* query, const fcl::Transform3<S>& X);
 
-/// A scene as a query sees it: never changed once it is made.
+/// A scene as a query sees it. A change takes the time of the moving objects and of a path in the hierarchy of fixed
+/// ones, but wears the hierarchy: it is to be made anew once isWorn().
+///
+/// Threads: any number of queries, or one change alone.
 template <typename S>
 class World {
  public:
-  /// Pairs that are `ignored`, the smaller Id first.
-  World(std::vector<Object<S>> moving_objects, std::vector<Object<S>> fixed_objects,
-        const std::set<std::pair<Id, Id>>& ignored);
+  World(std::vector<Object<S>> moving_objects, const std::vector<Object<S>>& fixed_objects,
+        const IgnoredPairs& ignored);
+
+  // Changes. They return false, and leave what no query may see, where a new world is to be made instead.
+
+  /// Adds a fixed object, or replaces the one of this Id.
+  bool putFixed(const Object<S>& object, const IgnoredPairs& ignored);
+  void removeFixed(Id object);
+  bool setMoving(std::vector<Object<S>> objects, const IgnoredPairs& ignored);
+  void setIgnored(Id a, Id b, bool ignored);
+  bool isWorn() const { return changes_ > fixed.size() / 4 + 16; }
 
   std::size_t fixedGroups() const { return groups.size(); }
   std::size_t movingGroups() const { return (moving.size() + 7) / 8; }
@@ -71,10 +83,9 @@ class World {
   std::vector<BoxGroup> groups;
   /// [i * allGroups() + group]: lanes that make a pair with moving object i; of two moving objects in row of the first.
   std::vector<std::uint8_t> masks;
-  std::size_t pair_count = 0;
   bool grows_together = false;  ///< A model is worth fcl_adapter::growTogether().
   double fixed_error = 0;       ///< The largest orthogonality error of fixed objects.
-  std::uint64_t serial;         ///< No other world has it.
+  std::uint64_t serial = 0;     ///< No world with other moving objects has it.
 
  private:
   // The box of an object at a pose of this orthogonality error, without an extent for what is nowhere. `reach`: the
@@ -83,6 +94,24 @@ class World {
             double reach = 0) const;
   std::int32_t build(std::vector<std::uint32_t>& order, std::vector<std::pair<std::size_t, std::size_t>> parts,
                      const std::vector<Box>& boxes, const std::vector<Object<S>>& objects);
+  void link();
+  void refit(std::size_t group);
+  std::size_t freePlace(const Box& box);
+  void addGroup();
+  void fillMasks(const IgnoredPairs& ignored);
+  void setMask(std::size_t moving_index, std::size_t group, std::size_t lane, bool is_pair);
+
+  // Where a child is in the hierarchy.
+  struct Slot {
+    std::size_t node, lane;
+  };
+  std::vector<Slot> slot_of_node_, slot_of_group_;  // of the root: not used
+  std::vector<Slot> free_slots_;
+  std::vector<std::uint8_t> occupied_;             // of each fixed group, a bit for each lane with an object
+  std::vector<std::size_t> free_places_;           // 8 * group + lane
+  std::unordered_map<Id, std::size_t> place_of_;   // of fixed objects that are somewhere
+  std::unordered_map<Id, std::size_t> moving_of_;  // index of moving objects
+  std::size_t changes_ = 0;                        // since the hierarchy was made
 
   Eigen::Vector3d origin_ = Eigen::Vector3d::Zero();  // coordinates of boxes count from here
   double largest_ = 0;                                // radius about the origin of its own frame

@@ -401,6 +401,77 @@ TYPED_TEST(SceneTest, Changes) {
   EXPECT_GT(hits, 20u);
 }
 
+// Changes between queries: of few and of many objects, so that places are used again, the hierarchy grows at its root
+// and is made anew, and moving objects come and go.
+TYPED_TEST(SceneTest, ManyChangesBetweenQueries) {
+  using S = TypeParam;
+  for (const auto& [seed, start] : {std::pair(1u, 0), std::pair(2u, 30), std::pair(3u, 200)}) {
+    SCOPED_TRACE(start);
+    World<S> w;
+    std::mt19937_64 g(seed);
+    const double spread = start > 100 ? 6 : 3;
+    populate(w, 3, static_cast<std::size_t>(start), spread, seed);
+    std::size_t hits = 0, states = 0;
+    std::set<Id> nowhere;  // FCL has no distance of these
+    const auto any = [&g](auto& list) -> auto& { return list[g() % list.size()]; };
+    const auto forget = [&w](auto& list, std::size_t at) {
+      const Id id = list[at].id;
+      w.scene.remove(id);
+      list.erase(list.begin() + static_cast<std::ptrdiff_t>(at));
+      for (auto i = w.ignored.begin(); i != w.ignored.end();) {
+        i = i->first == id || i->second == id ? w.ignored.erase(i) : std::next(i);
+      }
+    };
+    for (int round = 0; round < 60; ++round) {
+      for (std::size_t changes = g() % 8; changes > 0; --changes) {
+        const std::size_t what = g() % 16;
+        if (what < 6 || w.fixed.empty() || w.moving.empty()) {
+          const bool is_empty = what == 5 && g() % 2 == 0;
+          const Geometry<S> octree = test::cloud<S>(seed, is_empty ? 0 : 30);
+          const Id id = w.fix(what == 5 ? octree : geometry<S>(g(), g), randomPose<S>(g, spread));
+          if (is_empty) nowhere.insert(id);
+        } else if (what < 9) {
+          auto& object = any(w.fixed);
+          object.X_WG = randomPose<S>(g, g() % 5 == 0 ? 40 * spread : spread);
+          w.scene.setPose(object.id, object.X_WG);
+        } else if (what < 12) {
+          forget(w.fixed, g() % w.fixed.size());
+        } else if (what == 12) {
+          w.move(geometry<S>(g(), g));
+        } else if (what == 13 && w.moving.size() > 1) {
+          forget(w.moving, g() % w.moving.size());
+        } else if (what == 14) {
+          w.scene.update(any(w.fixed).id);
+        } else {
+          const Id a = any(w.moving).id, b = g() % 3 == 0 ? any(w.moving).id : any(w.fixed).id;
+          if (a == b) continue;
+          w.ignore(a, b);
+          if (g() % 3 != 0) continue;
+          w.scene.ignore(b, a, false);
+          w.ignored.erase({a, b});
+          w.ignored.erase({b, a});
+        }
+      }
+      std::size_t pairs = 0;
+      w.pairs(States<S>(w.moving.size()).data(), [&pairs](const auto&...) { ++pairs; });
+      ASSERT_EQ(w.scene.pairCount(), pairs);
+      ASSERT_EQ(w.scene.fixedCount(), w.fixed.size());
+      for (std::size_t i = 0; i < w.moving.size(); ++i) ASSERT_EQ(w.scene.movingIndex(w.moving[i].id), i);
+      const States<S> X = walk<S>(3, w.moving.size(), spread, 0.05, static_cast<unsigned>(round));
+      ASSERT_NO_FATAL_FAILURE(checkVerdicts(w, X, 3, hits));
+      states += 3;
+      const auto isNowhere = [&](const auto& object) { return nowhere.count(object.id) != 0; };
+      if (round % 4 != 0 || std::any_of(w.fixed.begin(), w.fixed.end(), isNowhere)) continue;
+      Pair nearest;
+      const S clearance = w.scene.clearance(X.data(), &nearest);
+      const double rounding = std::is_same<S, double>::value ? 2e-6 : 2e-5;
+      ASSERT_NEAR(clearance, w.clearance(X.data()), rounding);
+    }
+    EXPECT_GT(hits, states / 10);
+    EXPECT_LT(hits, states);
+  }
+}
+
 // Objects that share a geometry share what the scene knows of it, also when one of them is gone.
 TYPED_TEST(SceneTest, DeformedMesh) {
   using S = TypeParam;
