@@ -84,14 +84,15 @@ Matrix3d principalAxes(double count, const F& over) {
 struct BoxTree::Frame {
   explicit Frame(const Matrix3d& axes_) : axes(axes_) {}
 
-  void add(const Item& item, const Vector3d& origin) {
-    const Matrix3d to_axes = axes.transpose();
+  // `along` gives the coordinates along the axes of a point of the mesh.
+  template <typename F>
+  void add(const Item& item, const F& along) {
     for (const Vector3d& corner : item.corner) {
-      const Vector3d p = to_axes * (corner - origin);
+      const Vector3d p = along(corner);
       lo = lo.cwiseMin(p);
       hi = hi.cwiseMax(p);
     }
-    const Vector3d middle = to_axes * (item.middle - origin);
+    const Vector3d middle = along(item.middle);
     first = first.cwiseMin(middle);
     last = last.cwiseMax(middle);
   }
@@ -118,17 +119,21 @@ BoxTree::BoxTree(const oracle::Surface& surface) {
 
 void BoxTree::add(Item* begin, Item* end) {
   const Vector3d origin = begin->corner[0];
+  constexpr std::ptrdiff_t kEnough = 256;  // the axes of this many triangles are nearly as good as those of all
+  const std::ptrdiff_t step = (end - begin + kEnough - 1) / kEnough;
   const auto over_corners = [&](auto&& f) {
-    for (const Item* i = begin; i != end; ++i) {
+    for (const Item* i = begin; i < end; i += step) {
       for (const Vector3d& corner : i->corner) f(Vector3d(corner - origin));
     }
   };
   const bool is_leaf = end - begin == 1;
-  Frame frame(is_leaf ? axesOf(begin->corner) : principalAxes(3.0 * static_cast<double>(end - begin), over_corners));
+  const auto count = static_cast<double>(3 * ((end - begin + step - 1) / step));
+  Frame frame(is_leaf ? axesOf(begin->corner) : principalAxes(count, over_corners));
   Frame straight(Matrix3d::Identity());
+  const Matrix3d to_axes = frame.axes.transpose();
   for (const Item* i = begin; i != end; ++i) {
-    frame.add(*i, origin);
-    straight.add(*i, origin);
+    frame.add(*i, [&](const Vector3d& p) -> Vector3d { return to_axes * (p - origin); });
+    straight.add(*i, [&](const Vector3d& p) -> Vector3d { return p - origin; });
   }
   // Many parts are made along their own axes; those of a square's or a cube's covariance may be any.
   if (straight.area() < frame.area()) frame = straight;

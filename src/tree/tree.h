@@ -123,6 +123,15 @@ class Tree {
   /// Adds pairs of leaves that a long walk has tested.
   void payBoxRent(std::size_t pairs) const { box_rent_.fetch_add(pairs, std::memory_order_relaxed); }
 
+  /// How the last long search of a kind ended: over oriented boxes or not, and after how many steps. A guess for the
+  /// next one.
+  enum class Search { kYesOrNo, kDistance };
+  struct LongSearch {
+    std::uint32_t over_boxes = 0, steps = 0;
+  };
+  LongSearch longSearch(Search kind) const { return long_searches_[static_cast<std::size_t>(kind)]; }
+  void setLongSearch(Search kind, LongSearch last) const { long_searches_[static_cast<std::size_t>(kind)] = last; }
+
   /// Marks a block as used now, for ttl and budget.
   void markUsed(std::uint32_t block, std::int64_t now) const {
     std::atomic<std::int64_t>& last_use = last_use_[block];
@@ -301,6 +310,7 @@ class Tree {
   thread::Published<const BoxTree> boxes_;  // made under growth_, dropped alone
   std::atomic<std::int64_t> boxes_used_{0};
   mutable std::atomic<std::size_t> box_rent_{0};  // see payBoxRent()
+  mutable std::atomic<LongSearch> long_searches_[2] = {};
   bounds::NodeBounds root_bounds_;
   SupportTable supports_;
   // Of a query of what is far apart, all that it reads.

@@ -12,6 +12,7 @@
 #include "geometry/extent.h"
 #include "geometry/motion.h"
 #include "geometry/triangle.h"
+#include "query/ccd/hull_advance.h"
 #include "query/distance/best_first.h"
 #include "query/sides/box_side.h"
 #include "query/sides/side.h"
@@ -45,13 +46,15 @@ class ContactTimeWalk : private BestFirst<ContactTimeWalk<A, B>, A, B> {
 
   /// The time of the first contact, at most goal.time_error too early and never too late; infinite without contact.
   /// `known`: a time at which there is contact. After `most_steps` it gives up, and returns the first that it found.
-  double run(const ContactGoal& goal, double known = kNever, std::size_t most_steps = ~std::size_t{0}) {
+  /// `begin`: there is no contact before.
+  double run(const ContactGoal& goal, double known = kNever, std::size_t most_steps = ~std::size_t{0},
+             double begin = 0) {
     goal_ = goal;
     first_ = known;
     first_skipped_ = kNever;
     steps_ = 0;
     most_steps_ = most_steps;
-    at(0);
+    at(begin);
     this->search();
     return gaveUp() ? first_ : std::min(first_, first_skipped_);
   }
@@ -391,7 +394,7 @@ class ContactTimeWalk : private BestFirst<ContactTimeWalk<A, B>, A, B> {
 template <typename B>
 double findContactTime(const TreeSide& a, const SimilarityTransform& a_in_body, const Motion& motion_a, const B& b,
                        const SimilarityTransform& b_in_body, const Motion& motion_b, const ContactGoal& goal) {
-  constexpr std::size_t kFew = 32, kMany = 2048;
+  constexpr std::size_t kFew = 32, kMany = 2048, kAll = ~std::size_t{0};
   constexpr bool kTwoTrees = std::is_same<B, TreeSide>::value;
   ContactTimeWalk<TreeSide, B> trees(a, a_in_body, motion_a, b, b_in_body, motion_b);
   std::size_t price = a.tree().boxPrice();
@@ -401,19 +404,47 @@ double findContactTime(const TreeSide& a, const SimilarityTransform& a_in_body, 
     fits = fits && BoxSide::fits(b);
   }
   if (!fits) return trees.run(goal);
-  const double time = trees.run(goal, std::numeric_limits<double>::infinity(), price == 0 ? kFew : kMany + price);
-  const std::size_t rent = trees.steps() - std::min(trees.steps(), kMany);
-  a.tree().payBoxRent(rent);
-  if constexpr (kTwoTrees) b.tree().payBoxRent(rent);
-  if (!trees.gaveUp()) return time;
-  const BoxSide boxes_a(a);
+  double time = std::numeric_limits<double>::infinity(), begin = 0;
+  bool gave_up = true;
+  const auto walkTrees = [&](std::size_t most) {
+    time = trees.run(goal, time, most, begin);
+    gave_up = trees.gaveUp();
+    const std::size_t rent = trees.steps() - std::min(trees.steps(), kMany);
+    a.tree().payBoxRent(rent);
+    if constexpr (kTwoTrees) b.tree().payBoxRent(rent);
+  };
+  const auto walkBoxes = [&](std::size_t most) {
+    const BoxSide boxes_a(a);
+    const auto walk = [&](auto&& boxes) {
+      time = boxes.run(goal, time, most, begin);
+      gave_up = boxes.gaveUp();
+    };
+    if constexpr (kTwoTrees) {
+      const BoxSide boxes_b(b);
+      walk(ContactTimeWalk<BoxSide, BoxSide>(boxes_a, a_in_body, motion_a, boxes_b, b_in_body, motion_b));
+    } else {
+      walk(ContactTimeWalk<BoxSide, B>(boxes_a, a_in_body, motion_a, b, b_in_body, motion_b));
+    }
+  };
   if constexpr (kTwoTrees) {
-    const BoxSide boxes_b(b);
-    return ContactTimeWalk<BoxSide, BoxSide>(boxes_a, a_in_body, motion_a, boxes_b, b_in_body, motion_b)
-        .run(goal, time);
-  } else {
-    return ContactTimeWalk<BoxSide, B>(boxes_a, a_in_body, motion_a, b, b_in_body, motion_b).run(goal, time);
+    // Bodies that pass each other usually do so with their hulls apart. To ask this many vertices takes about as long
+    // as a step of a walk.
+    constexpr std::size_t kVerticesPerStep = 16, kMostVertices = 8192;
+    const std::shared_ptr<const Mesh>&mesh_a = a.tree().surface().mesh, &mesh_b = b.tree().surface().mesh;
+    const bool are_here = mesh_a != nullptr && mesh_b != nullptr;
+    const std::size_t vertices = are_here ? mesh_a->vertexCount() + mesh_b->vertexCount() : 0;
+    if (are_here && vertices <= kMostVertices) {
+      const std::size_t steps = std::max(kFew, vertices / kVerticesPerStep);
+      walkTrees(price == 0 ? kFew : steps);
+      if (gave_up && price == 0) walkBoxes(steps);
+      if (!gave_up) return time;
+      begin = hullsApartUntil(*mesh_a, motion_a, *mesh_b, motion_b, goal.margin + goal.rounding);
+      if (begin > 1) return time;
+    }
   }
+  if (gave_up) walkTrees(price == 0 ? kFew : kMany + price);
+  if (gave_up) walkBoxes(kAll);
+  return time;
 }
 
 }  // namespace bocst::query

@@ -58,10 +58,9 @@ class PairWalk {
       Pair pair;
       while (cut_ != nullptr ? popFirst(s, pair) : popLast(s, pair)) {
         if (spheres_ ? stepSpheres(pair, s) : stepBoxes(pair, s)) return true;
-        if (--most_steps == 0) {
-          gave_up_ = true;
-          return false;
-        }
+        if (++steps_ < most_steps) continue;
+        gave_up_ = true;
+        return false;
       }
       if (cut_ != nullptr) s.deferred.dropIf([this](const Pair& p) { return isBeyond(placeOf(p)); });
       if (s.deferred.empty()) return false;
@@ -73,6 +72,8 @@ class PairWalk {
 
   /// Did the walk end before it had seen all pairs?
   bool gaveUp() const { return gave_up_; }
+  /// Pairs of nodes that it looked at.
+  std::size_t steps() const { return steps_; }
 
  private:
   using Pair = typename DeferredPairs<A, B>::Pair;
@@ -373,6 +374,7 @@ class PairWalk {
   const bool spheres_;
   const Cut* const cut_;
   bool gave_up_ = false;
+  std::size_t steps_ = 0;
 };
 
 }  // namespace bocst::query

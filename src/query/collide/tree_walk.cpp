@@ -4,15 +4,18 @@
 #include <algorithm>
 
 #include "query/collide/pair_walk.h"
-#include "query/sides/box_side.h"
+#include "query/sides/turns.h"
 
 namespace bocst::query {
 namespace {
 
-// One walk in ten thousand of scans and robots' links tests more pairs of leaves without a hit.
-constexpr std::size_t kManyLeafPairs = 256;
+// One walk in ten thousand of scans and robots' links tests more than 256 pairs of leaves without a hit.
+constexpr Turns::Limits kLimits = {64, 256, 1024, 1};
 // The exact test of two triangles that float cannot tell apart takes as long as this many pairs of leaves.
 constexpr std::size_t kExactTest = 8;
+// Boxes and slabs of leaves leave few triangles to be tested, but of slivers all: so many pairs of triangles then take
+// as long as a pair of leaves.
+constexpr std::size_t kTrianglePairs = 32;
 
 }  // namespace
 
@@ -28,21 +31,16 @@ struct TreeWalk::Scratch {
 
 bool TreeWalk::runByTurns(Visitor& visitor) {
   if (!BoxSide::fits(a_) || !BoxSide::fits(b_)) return run(visitor);
-  // The boxes are built when walks have paid for them, as whole trees are. Each turn may take longer than the one
-  // before, so all take at most some times what the quicker of both ways takes. A step over boxes takes about as long
-  // as a pair of leaves.
-  constexpr std::size_t kLonger = 16, kSteps = 4;
-  const std::size_t price = a_.tree().boxPrice() + b_.tree().boxPrice();
-  for (std::size_t most = std::max(kManyLeafPairs, price);; most *= kLonger) {
-    const bool ended = run(visitor, most);
-    if (leaf_pairs_ > kManyLeafPairs) {
-      for (const TreeSide* side : {&a_, &b_}) side->tree().payBoxRent(leaf_pairs_ - kManyLeafPairs);
-    }
+  for (Turns turns(a_, b_, tree::Tree::Search::kYesOrNo, kLimits);; turns.next()) {
+    const bool ended = run(visitor, turns.most());
+    turns.tookOverBlocks(leaf_pairs_, gave_up_);
     if (!gave_up_) return ended;
     const BoxSide boxes_a(a_), boxes_b(b_);
     PairWalk<BoxSide, BoxSide> boxes(boxes_a, boxes_b, b_in_a_, visitor);
-    if (boxes.run(kSteps * most)) return true;
-    if (!boxes.gaveUp()) return false;
+    const bool met = boxes.run(turns.mostOverBoxes());
+    if (boxes.gaveUp()) continue;
+    turns.endedOverBoxes(boxes.steps());
+    return met;
   }
 }
 
@@ -142,9 +140,12 @@ bool TreeWalk::testLeaves(const StepEvent& event, Scratch& s) {
   };
   const tree::NodeRef a = event.pair[0].node, b = event.pair[1].node;
   const std::uint32_t triangles = event.asked.triangles;
-  if (event.asked.side == AskedLeaf::kNone) return s.leaves.test(a_, a, b_, b, visit);
-  return event.asked.side == 0 ? s.leaves.testLargeA(s.large[0], triangles, b_, b, visit)
-                               : s.leaves.testLargeB(a_, a, s.large[1], triangles, visit);
+  const std::size_t before = s.leaves.tested();
+  const bool ended = event.asked.side == AskedLeaf::kNone ? s.leaves.test(a_, a, b_, b, visit)
+                     : event.asked.side == 0              ? s.leaves.testLargeA(s.large[0], triangles, b_, b, visit)
+                                                          : s.leaves.testLargeB(a_, a, s.large[1], triangles, visit);
+  leaf_pairs_ += (s.leaves.tested() - before) / kTrianglePairs;
+  return ended;
 }
 
 const SimilarityTransform& TreeWalk::aInB() {

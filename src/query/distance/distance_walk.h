@@ -15,8 +15,8 @@
 #include "geometry/triangle.h"
 #include "query/distance/best_first.h"
 #include "query/distance/tree_gaps.h"
-#include "query/sides/box_side.h"
 #include "query/sides/side.h"
+#include "query/sides/turns.h"
 #include "query/sides/visitor.h"
 
 namespace bocst::query {
@@ -364,26 +364,22 @@ class DistanceWalk : private BestFirst<DistanceWalk<A, B>, A, B> {
       Eigen::Vector3d::Zero();  // from side A to side B where they are nearest so far, unit length
 };
 
-/// The nearest triangles of two trees with exact answers. Float bounds tell little apart where many pairs are about as
-/// near, for example on two parallel faces, where oriented boxes in double tell all apart; in other places the walk
-/// with float bounds is quicker. So they take turns, as in TreeWalk::runByTurns().
+/// The nearest triangles of two trees with exact answers.
 inline Nearest findNearest(const TreeSide& a, const TreeSide& b, const SimilarityTransform& b_in_a,
                            const DistanceGoal& goal) {
-  constexpr std::size_t kFew = 64, kMany = 1024, kLonger = 16, kSteps = 8;
   DistanceWalk<TreeSide, TreeSide> trees(a, b, b_in_a);
   if (!BoxSide::fits(a) || !BoxSide::fits(b)) return trees.run(goal);
-  const std::size_t price = a.tree().boxPrice() + b.tree().boxPrice();
   Nearest nearest;
-  for (std::size_t most = price == 0 ? kFew : std::max(kMany, price);; most *= kLonger) {
-    nearest = trees.run(goal, nearest, most);
-    if (trees.steps() > kMany) {
-      for (const TreeSide* side : {&a, &b}) side->tree().payBoxRent(trees.steps() - kMany);
-    }
+  for (Turns turns(a, b, tree::Tree::Search::kDistance, {64, 1024, 1024, 4});; turns.next()) {
+    nearest = trees.run(goal, nearest, turns.most());
+    turns.tookOverBlocks(trees.steps(), trees.gaveUp());
     if (!trees.gaveUp()) return nearest;
     const BoxSide boxes_a(a), boxes_b(b);
     DistanceWalk<BoxSide, BoxSide> boxes(boxes_a, boxes_b, b_in_a);
-    nearest = boxes.run(goal, nearest, kSteps * most);
-    if (!boxes.gaveUp()) return nearest;
+    nearest = boxes.run(goal, nearest, turns.mostOverBoxes());
+    if (boxes.gaveUp()) continue;
+    turns.endedOverBoxes(boxes.steps());
+    return nearest;
   }
 }
 

@@ -200,12 +200,16 @@ class LeafPairs {
   void start(const SimilarityTransform& b_in_a, const SimilarityTransform& a_in_b, bool one_will_do, const Cut* cut) {
     leaves_a_.clear();
     leaves_b_.clear();
+    tested_ = 0;
     to_a_ = turnOf(b_in_a);
     b_in_a_ = &b_in_a;
     a_in_b_ = &a_in_b;
     one_will_do_ = one_will_do;
     cut_ = cut;
   }
+
+  /// Pairs of triangles that were tested since start().
+  std::size_t tested() const { return tested_; }
 
   /// Calls f(triangle of a, triangle of b, whether they surely meet) for the pairs that are not surely apart, until it
   /// returns true. A pair may be left to other leaves where it touches, too.
@@ -265,6 +269,7 @@ class LeafPairs {
       *id++ = b.id(static_cast<std::size_t>(__builtin_ctz(left)));
     const double error = static_cast<double>(a.error) + b_in_a_->scale * static_cast<double>(b.error);
     const auto [tolerance, margin] = limits(*b_in_a_, error);
+    tested_ += static_cast<std::size_t>(__builtin_popcount(rows)) * lanes_.count;
     const std::size_t found = touchingPairs(a.pack, rows, lanes_, region, tolerance, margin, one_will_do_, found_);
     for (std::size_t k = 0; k < found; ++k) {
       if (f(a.id(found_[k].row), ids[found_[k].lane], found_[k].certain)) return true;
@@ -301,6 +306,7 @@ class LeafPairs {
     }
     const std::uint32_t all = rows_.count < 32 ? (1u << rows_.count) - 1 : ~0u;
     const auto [tolerance, margin] = limits(to, error);
+    tested_ += rows_.count * leaf.pack.count;
     const std::size_t found =
         touchingPairs(rows_, all, leaf.pack, region, tolerance, margin, one_will_do_, found_, &slabs_);
     for (std::size_t k = 0; k < found; ++k) {
@@ -359,6 +365,7 @@ class LeafPairs {
   PackSlabs slabs_{};  // of rows_
   const SimilarityTransform *b_in_a_ = nullptr, *a_in_b_ = nullptr;
   bool one_will_do_ = false;
+  std::size_t tested_ = 0;
   const Cut* cut_ = nullptr;
   PackPair found_[TrianglePack::kCapacity * TrianglePack::kCapacity];
 };

@@ -1,0 +1,88 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#pragma once
+
+#include <bocst/mesh.h>
+
+#include <limits>
+#include <vector>
+
+#include "geometry/convex_shape.h"
+#include "geometry/motion.h"
+
+namespace bocst::query {
+
+/// The convex hull of points, which must outlive it.
+class HullShape final : public SupportShape {
+ public:
+  explicit HullShape(const std::vector<Eigen::Vector3d>& points) : HullShape(points, boxOf(points)) {}
+
+ protected:
+  Eigen::Vector3d support(const Eigen::Vector3d& d) const override {
+    const Eigen::Vector3d* best = &points_.front();
+    double most = -std::numeric_limits<double>::infinity();
+    for (const Eigen::Vector3d& p : points_) {
+      const double along = d.dot(p);
+      if (along > most) most = along, best = &p;
+    }
+    return *best;
+  }
+
+ private:
+  HullShape(const std::vector<Eigen::Vector3d>& points, const Eigen::AlignedBox3d& box)
+      : SupportShape(box.center(), box.sizes() / 2, 0), points_(points) {}
+
+  static Eigen::AlignedBox3d boxOf(const std::vector<Eigen::Vector3d>& points) {
+    Eigen::AlignedBox3d box;
+    for (const Eigen::Vector3d& p : points) box.extend(p);
+    return box;
+  }
+
+  const std::vector<Eigen::Vector3d>& points_;
+};
+
+/// Of the hull of points of a moving body, along a unit direction: velocities are affine in position, so the extremes
+/// are at the points.
+inline ClosingSpeed fastestOf(const std::vector<Eigen::Vector3d>& points, const Motion& motion,
+                              const Eigen::Vector3d& direction, double time) {
+  constexpr double kBlur = 1e-15;
+  ClosingSpeed most = motion.closingSpeed(direction, kBlur, points[0], 0, time);
+  for (const Eigen::Vector3d& p : points) {
+    most = ClosingSpeed::most(most, motion.closingSpeed(direction, kBlur, p, 0, time));
+  }
+  return most;
+}
+
+/// A time before which two moving meshes are surely farther apart than `clearance`, because their convex hulls are;
+/// more than 1: they are so all the time. Some steps of conservative advancement, as in ContactTimeWalk; each looks at
+/// all vertices some twenty times. All in world coordinates.
+inline double hullsApartUntil(const Mesh& a, const Motion& motion_a, const Mesh& b, const Motion& motion_b,
+                              double clearance) {
+  constexpr int kMostSteps = 24, kFirstSteps = 6;
+  constexpr double kLeastStep = 1.0 / 96;  // on average, after the first
+  constexpr double kRounding = 1e-14;
+  const auto place = [](const Mesh& mesh, const Eigen::Isometry3d& X, std::vector<Eigen::Vector3d>& points) {
+    points.clear();
+    for (const Eigen::Vector3d& v : mesh.vertices()) points.push_back(X * v);
+  };
+  const double size = a.bounds().diagonal().norm() + b.bounds().diagonal().norm();
+  std::vector<Eigen::Vector3d> points_a, points_b;
+  double time = 0;
+  for (int step = 0; step < kMostSteps && time <= 1; ++step) {
+    if (step >= kFirstSteps && time < step * kLeastStep) break;
+    const Eigen::Isometry3d X_WA = motion_a.at(time), X_WB = motion_b.at(time);
+    place(a, X_WA, points_a);
+    place(b, X_WB, points_b);
+    const SeparationResult gap = HullShape(points_b).gap({points_a.data(), static_cast<int>(points_a.size())},
+                                                         std::numeric_limits<double>::infinity());
+    const double farthest = (X_WA * a.bounds().center()).norm() + (X_WB * b.bounds().center()).norm();
+    const double free = gap.at_least - kRounding * (farthest + 2 * size) - clearance;
+    if (!(free > 0)) break;
+    // gap.normal leads from B to A.
+    const ClosingSpeed speed =
+        fastestOf(points_a, motion_a, -gap.normal, time) + fastestOf(points_b, motion_b, gap.normal, time);
+    time += speed.timeFor(free) * (1 - 1e-12);
+  }
+  return time;
+}
+
+}  // namespace bocst::query

@@ -1,0 +1,78 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#pragma once
+
+#include <algorithm>
+#include <cstddef>
+#include <cstdint>
+
+#include "query/sides/box_side.h"
+
+namespace bocst::query {
+
+/// How long a walk over the blocks of two models and one over their oriented boxes (BoxSide) take turns, until one
+/// ends. The first is usually quicker; but between two flat faces with little space between them, or of slivers, its
+/// volumes separate little. Each turn may take longer than the one before, so all take at most some times what the
+/// quicker way takes. What ended the last long search of both trees gets as many steps at once.
+///
+/// The boxes are built when walks have paid for them, as whole trees are.
+class Turns {
+ public:
+  struct Limits {
+    std::size_t few;         ///< Steps over blocks in the first turn, once the boxes are built ...
+    std::size_t many;        ///< ... and before. Longer walks over blocks pay for the boxes.
+    std::size_t over_boxes;  ///< The least number of steps over boxes.
+    std::size_t slower;      ///< A step over boxes takes as long as this many over blocks.
+  };
+
+  Turns(const TreeSide& a, const TreeSide& b, tree::Tree::Search kind, const Limits& limits)
+      : trees_{&a.tree(), &b.tree()}, kind_(kind), limits_(limits) {
+    const std::size_t price = trees_[0]->boxPrice() + trees_[1]->boxPrice();
+    const tree::Tree::LongSearch last[2] = {trees_[0]->longSearch(kind), trees_[1]->longSearch(kind)};
+    most_ = price == 0 ? limits.few : std::max(limits.many, price);
+    if (last[0].over_boxes != last[1].over_boxes) return;
+    const std::size_t steps = 2 * std::size_t{std::min(last[0].steps, last[1].steps)};
+    if (last[0].over_boxes != 0) {
+      most_over_boxes_ = steps;
+    } else if (price == 0 && steps > 0) {
+      most_ = std::max(most_, steps);
+      follows_last_ = true;
+    }
+  }
+
+  /// Of this turn.
+  std::size_t most() const { return most_; }
+  std::size_t mostOverBoxes() const { return std::max({limits_.over_boxes, most_ / limits_.slower, most_over_boxes_}); }
+
+  /// The walk over blocks took so many steps, and gave up or not.
+  void tookOverBlocks(std::size_t steps, bool gave_up) const {
+    if (steps > limits_.many) {
+      for (const tree::Tree* tree : trees_) tree->payBoxRent(steps - limits_.many);
+    }
+    // In a first turn, boxes were not tried.
+    if (!gave_up && (!is_first_ || follows_last_)) remember(0, steps);
+  }
+  /// The walk over boxes ended.
+  void endedOverBoxes(std::size_t steps) const { remember(1, steps); }
+
+  void next() {
+    constexpr std::size_t kLonger = 16;
+    most_ *= kLonger;
+    is_first_ = false;
+  }
+
+ private:
+  void remember(std::uint32_t over_boxes, std::size_t steps) const {
+    constexpr std::size_t kMost = std::size_t{1} << 30;
+    for (const tree::Tree* tree : trees_) {
+      tree->setLongSearch(kind_, {over_boxes, static_cast<std::uint32_t>(std::min(steps, kMost))});
+    }
+  }
+
+  const tree::Tree* trees_[2];
+  const tree::Tree::Search kind_;
+  const Limits limits_;
+  std::size_t most_ = 0, most_over_boxes_ = 0;
+  bool is_first_ = true, follows_last_ = false;
+};
+
+}  // namespace bocst::query
