@@ -1,0 +1,95 @@
+// SPDX-License-Identifier: BSD-3-Clause
+// How many steps two walks get in turns, and what the next query of the same models remembers of the last.
+#include "query/sides/turns.h"
+
+#include <gtest/gtest.h>
+
+#include <algorithm>
+#include <chrono>
+
+#include "meshes.h"
+
+namespace bocst::query {
+namespace {
+
+using Search = tree::Tree::Search;
+
+constexpr Turns::Limits kLimits = {64, 1024, 2048, 4};
+
+struct Pair {
+  Pair() : a(test::torus(20).mesh(), options()), b(test::torus(16).mesh(), options()), side_a(a), side_b(b) {}
+  static Options options() {
+    Options o;
+    o.ttl = std::chrono::milliseconds(0);
+    return o;
+  }
+  void buildBoxes() {
+    a.boxes(0);
+    b.boxes(0);
+  }
+  Turns turns(Search kind = Search::kDistance) const { return {side_a, side_b, kind, kLimits}; }
+
+  tree::Tree a, b;
+  TreeSide side_a, side_b;
+};
+
+TEST(Turns, WalksPayForBoxes) {
+  const Pair pair;
+  const std::size_t price = pair.a.boxPrice() + pair.b.boxPrice();
+  EXPECT_EQ(pair.turns().most(), std::max(kLimits.many, price));
+  pair.turns().tookOverBlocks(kLimits.many, true);
+  EXPECT_EQ(pair.a.boxPrice() + pair.b.boxPrice(), price) << "a short walk pays nothing";
+  pair.turns().tookOverBlocks(kLimits.many + 100, true);
+  EXPECT_EQ(pair.a.boxPrice() + pair.b.boxPrice(), price - 200) << "a long one pays for both";
+}
+
+TEST(Turns, EachIsSixteenTimesAsLong) {
+  Pair pair;
+  pair.buildBoxes();
+  Turns turns = pair.turns();
+  EXPECT_EQ(turns.most(), 64u);
+  EXPECT_EQ(turns.mostOverBoxes(), 2048u);
+  turns.next();
+  EXPECT_EQ(turns.most(), 1024u);
+  EXPECT_EQ(turns.mostOverBoxes(), 2048u);
+  turns.next();
+  EXPECT_EQ(turns.most(), 16384u);
+  EXPECT_EQ(turns.mostOverBoxes(), 4096u);
+}
+
+TEST(Turns, WhatEndedTheLastLongSearchGetsMore) {
+  Pair pair;
+  pair.buildBoxes();
+  pair.turns().endedOverBoxes(5000);
+  EXPECT_EQ(pair.turns().most(), 64u);
+  EXPECT_EQ(pair.turns().mostOverBoxes(), 10000u);
+  EXPECT_EQ(pair.turns(Search::kYesOrNo).mostOverBoxes(), 2048u) << "of another kind";
+
+  pair.turns().tookOverBlocks(50, false);
+  EXPECT_EQ(pair.turns().mostOverBoxes(), 10000u) << "a short search says nothing";
+
+  Turns second = pair.turns();
+  second.next();
+  second.tookOverBlocks(900, true);
+  EXPECT_EQ(pair.turns().most(), 64u) << "that one gave up";
+  second.tookOverBlocks(7000, false);
+  EXPECT_EQ(pair.turns().most(), 14000u);
+  EXPECT_EQ(pair.turns().mostOverBoxes(), 3500u);
+  pair.turns().tookOverBlocks(300, false);
+  EXPECT_EQ(pair.turns().most(), 600u) << "no longer than the last of these";
+
+  pair.a.setLongSearch(Search::kDistance, {1, 9000});
+  EXPECT_EQ(pair.turns().most(), 64u) << "the two do not agree";
+  EXPECT_EQ(pair.turns().mostOverBoxes(), 2048u);
+  pair.b.setLongSearch(Search::kDistance, {1, 4000});
+  EXPECT_EQ(pair.turns().mostOverBoxes(), 8000u) << "the lesser of both";
+}
+
+TEST(Turns, BlocksGetNoMoreBeforeBoxesAreThere) {
+  const Pair pair;
+  for (const tree::Tree* tree : {&pair.a, &pair.b}) tree->setLongSearch(Search::kDistance, {0, 1u << 29});
+  EXPECT_EQ(pair.turns().most(), std::max(kLimits.many, pair.a.boxPrice() + pair.b.boxPrice()));
+}
+
+}  // namespace
+}  // namespace bocst::query
