@@ -111,7 +111,8 @@ class BOCST_EXPORT Scene {
   void collisions(const Transform* X_WM, std::size_t states, std::uint8_t* hit) const;
   /// The minimum fcl::distance of all pairs; 0 if a pair touches; std::numeric_limits<S>::max() without pairs.
   /// `nearest` is set to a pair at this distance; to invalid Ids without pairs. Options::margin has no effect.
-  /// @throws std::invalid_argument for two of FCL's shapes and octrees whose distance FCL cannot compute.
+  /// @throws std::invalid_argument for two of FCL's shapes and octrees whose distance FCL cannot compute, unless
+  /// another pair is found to be nearer before.
   S clearance(const Transform* X_WM, Pair* nearest = nullptr) const;
   /// True if the motion of all moving objects from one state to another is free of collisions at all times. Never steps
   /// over a contact. Geometries that pass closer than the resolution of fcl::continuousCollide (see bocst/fcl.h; for

@@ -5,6 +5,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <cstdint>
 #include <limits>
 #include <stdexcept>
 #include <tuple>
@@ -186,11 +187,16 @@ S clearance(const World<S>& world, StateCheck<S>& check, const fcl::Transform3<S
     PairAt pair;
   };
   thread_local std::vector<Candidate> candidates;
+  thread_local std::vector<std::uint64_t> asked;  // in earlier rounds, sorted
+  asked.clear();
+  const auto nameOf = [](const PairAt& p) {
+    return std::uint64_t{p.moving} << 32 | std::uint64_t{8 * p.group + p.lane};
+  };
   S least = std::numeric_limits<S>::max();
-  // Pairs of boxes are listed in rounds, each with a longer reach, so most are never listed.
+  // Pairs of boxes are listed in rounds, each with a longer reach, so most are never listed. Once something was found,
+  // the next round, as long as that, is the last.
   constexpr float kInfinity = std::numeric_limits<float>::infinity(), kMost = std::numeric_limits<float>::max();
   constexpr float kLonger = 4;
-  float before = -kInfinity;
   for (float reach = std::max(static_cast<float>(check.clearance_guess), std::numeric_limits<float>::min());;
        reach = std::min(kLonger * reach, std::nextafter(static_cast<float>(least), kInfinity))) {
     const bool is_last = !(reach < kUnboxedSize);
@@ -198,14 +204,16 @@ S clearance(const World<S>& world, StateCheck<S>& check, const fcl::Transform3<S
     candidates.clear();
     for (const NearGroup& n : check.findNear(reach)) {
       for (std::uint32_t left = n.mask; left != 0; left &= left - 1) {
-        const auto lane = static_cast<std::uint32_t>(__builtin_ctz(left));
-        if (!(n.gap[lane] <= before)) candidates.push_back({n.gap[lane], {n.box, n.group, lane}});
+        const PairAt pair{n.box, n.group, static_cast<std::uint32_t>(__builtin_ctz(left))};
+        if (std::binary_search(asked.begin(), asked.end(), nameOf(pair))) continue;
+        candidates.push_back({n.gap[pair.lane], pair});
       }
     }
     std::sort(candidates.begin(), candidates.end(),
               [](const Candidate& p, const Candidate& q) { return p.gap < q.gap; });
     for (const Candidate& c : candidates) {
       if (static_cast<double>(c.gap) >= static_cast<double>(least)) break;
+      asked.push_back(nameOf(c.pair));
       const Object<S>&a = world.moving[c.pair.moving], &b = world.object(c.pair.group, c.pair.lane);
       const S d = distanceBelow<S>(a, X_WM[c.pair.moving], b, check.pose(X_WM, c.pair.group, c.pair.lane), least);
       if (!(d < least)) continue;
@@ -214,7 +222,7 @@ S clearance(const World<S>& world, StateCheck<S>& check, const fcl::Transform3<S
       if (!(least > 0)) return least;
     }
     if (is_last || static_cast<double>(least) <= static_cast<double>(reach)) break;
-    before = reach;
+    std::sort(asked.begin(), asked.end());
   }
   const auto found = static_cast<double>(least);
   if (found < kUnboxedSize) check.clearance_guess = std::max(found, check.clearance_guess / kLonger);

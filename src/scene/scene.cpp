@@ -136,8 +136,10 @@ struct Scene<S>::Impl {
     if (geometry == nullptr) throw std::invalid_argument(name + ": the geometry is null");
     if (X_WG != nullptr) scene::checkPose<S>(query, *X_WG);
     Object<S> o = objectOf(geometry);
-    if (X_WG != nullptr) o.X_WG = *X_WG;
     const std::lock_guard<thread::ForkAwareMutex> lock(mutex);
+    const auto other = with_geometry.find(geometry.get());
+    if (other != with_geometry.end()) o = objects.at(other->second).object;  // update() may have come in between
+    if (X_WG != nullptr) o.X_WG = *X_WG;
     const std::uint32_t number = next_number++;
     o.id = Id(scene_number, number);
     with_geometry[geometry.get()] = number;

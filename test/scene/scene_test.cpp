@@ -602,6 +602,40 @@ TYPED_TEST(SceneTest, ClearanceIsTheLeastDistance) {
 }
 
 // Bodies that pass each other and others: what the middle of a row says must hold for all of its states.
+// Pairs are listed in rounds of growing reach: none may fall between two rounds, whatever was asked before.
+TYPED_TEST(SceneTest, ClearanceOfAnyLength) {
+  using S = TypeParam;
+  const auto cube = std::make_shared<Model<S>>(test::box({-0.5, -0.5, -0.5}, {0.5, 0.5, 0.5}).mesh());
+  const auto at = [](double x) { return test::pose<S>(Eigen::Matrix3d::Identity(), {x, 0, 0}); };
+  const double rounding = std::is_same<S, double>::value ? 1e-12 : 1e-5;
+  const auto origin = at(0);
+  for (int i = 1; i < 5000; ++i) {
+    const double gap = 0.001 * i;
+    Scene<S> scene;
+    scene.addFixed(cube, at(1 + gap));
+    scene.addMoving(cube);
+    ASSERT_NEAR(scene.clearance(&origin), gap, rounding);
+  }
+  Scene<S> scene;
+  std::mt19937_64 g(7);
+  std::uniform_real_distribution<double> u(-6, 6);
+  World<S> turned;
+  for (int i = 0; i < 40; ++i) turned.fix(cube, randomPose<S>(g, 12));
+  turned.move(cube);
+  for (int i = 0; i < 400; ++i) {
+    const auto X = randomPose<S>(g, 12);
+    ASSERT_NEAR(turned.scene.clearance(&X), turned.clearance(&X), 10 * rounding);
+  }
+  const Id far = scene.addFixed(cube, at(1e6)), near = scene.addFixed(cube, at(2));
+  scene.addMoving(cube);
+  for (int i = 0; i < 300; ++i) {
+    const double gap = std::abs(u(g)) * std::pow(10.0, u(g) - 2);
+    scene.setPose(near, at(1 + gap));
+    scene.setPose(far, at(i % 2 == 0 ? 1e6 : 1 + 2 * gap));
+    ASSERT_NEAR(scene.clearance(&origin), gap, rounding * (1 + 1e3 * gap)) << gap;
+  }
+}
+
 TYPED_TEST(SceneTest, RowsOfStatesOfBodiesThatPassEachOther) {
   using S = TypeParam;
   std::mt19937_64 g(31);

@@ -62,7 +62,10 @@ inline double hullsApartUntil(const Mesh& a, const Motion& motion_a, const Mesh&
   constexpr double kRounding = 1e-14;
   const auto place = [](const Mesh& mesh, const Eigen::Isometry3d& X, std::vector<Eigen::Vector3d>& points) {
     points.clear();
-    for (const Eigen::Vector3d& v : mesh.vertices()) points.push_back(X * v);
+    const Eigen::AlignedBox3d box = mesh.bounds();  // vertices of no triangle may lie anywhere
+    for (const Eigen::Vector3d& v : mesh.vertices()) {
+      if (box.contains(v)) points.push_back(X * v);
+    }
   };
   const double size = a.bounds().diagonal().norm() + b.bounds().diagonal().norm();
   std::vector<Eigen::Vector3d> points_a, points_b;
