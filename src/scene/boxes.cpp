@@ -218,15 +218,26 @@ namespace bocst::scene {
 HWY_EXPORT(NearInGroup);
 HWY_EXPORT(NearBox);
 
+namespace {
+
+template <typename Boxes>
+void makeEmpty(Boxes& boxes, std::size_t lane) {
+  for (int k = 0; k < 3; ++k) {
+    boxes.lo[k][lane] = std::numeric_limits<float>::infinity();
+    boxes.hi[k][lane] = -std::numeric_limits<float>::infinity();
+  }
+}
+
+}  // namespace
+
 BoxGroup::BoxGroup() : center(), axis(), half(), reach() {
   for (std::size_t i = 0; i < 8; ++i) clear(i);
 }
 
-void BoxGroup::clear(std::size_t lane) {
-  for (int k = 0; k < 3; ++k) {
-    lo[k][lane] = std::numeric_limits<float>::infinity();
-    hi[k][lane] = -std::numeric_limits<float>::infinity();
-  }
+void BoxGroup::clear(std::size_t lane) { makeEmpty(*this, lane); }
+
+BoxNode::BoxNode() : child() {
+  for (std::size_t i = 0; i < 8; ++i) makeEmpty(*this, i);
 }
 
 void BoxGroup::set(std::size_t lane, const Box& box) {

@@ -34,7 +34,9 @@ struct alignas(64) BoxGroup {
 /// Of the hierarchy: boxes along the axes of the world around eight nodes or groups.
 struct alignas(64) BoxNode {
   float lo[3][8], hi[3][8];
-  std::int32_t child[8];  ///< A node, or ~group.
+  std::int32_t child[8];  ///< A node, or ~group; 0: none.
+
+  BoxNode();  ///< All lanes are empty.
 };
 
 /// One of a group.

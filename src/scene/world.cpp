@@ -178,13 +178,7 @@ std::int32_t World<S>::build(std::vector<std::uint32_t>& order, std::vector<std:
   const auto index = static_cast<std::int32_t>(nodes.size());
   nodes.emplace_back();
   BoxNode node;
-  for (std::size_t lane = 0; lane < 8; ++lane) {
-    node.child[lane] = 0;
-    for (int k = 0; k < 3; ++k) {
-      node.lo[k][lane] = std::numeric_limits<float>::infinity();
-      node.hi[k][lane] = -std::numeric_limits<float>::infinity();
-    }
-    if (lane >= parts.size()) continue;
+  for (std::size_t lane = 0; lane < parts.size(); ++lane) {
     const auto [begin, end] = parts[lane];
     for (std::size_t i = begin; i < end; ++i) {
       for (int k = 0; k < 3; ++k) {
@@ -342,17 +336,9 @@ void World<S>::addGroup() {
     return nodes.size() - 1;
   };
   if (free_slots_.empty()) {
-    BoxNode empty;
-    for (std::size_t lane = 0; lane < 8; ++lane) {
-      empty.child[lane] = 0;
-      for (int k = 0; k < 3; ++k) {
-        empty.lo[k][lane] = std::numeric_limits<float>::infinity();
-        empty.hi[k][lane] = -std::numeric_limits<float>::infinity();
-      }
-    }
     std::size_t first_free = 0;
     if (nodes.empty()) {
-      addNode(empty);
+      addNode(BoxNode());
     } else {
       // The root moves down, below a new one in its place.
       const BoxNode root = nodes[0];
@@ -364,12 +350,13 @@ void World<S>::addGroup() {
       }
       float lo[3], hi[3];
       unite(root, lo, hi);
-      empty.child[0] = static_cast<std::int32_t>(below);
+      BoxNode above;
+      above.child[0] = static_cast<std::int32_t>(below);
       for (int k = 0; k < 3; ++k) {
-        empty.lo[k][0] = lo[k];
-        empty.hi[k][0] = hi[k];
+        above.lo[k][0] = lo[k];
+        above.hi[k][0] = hi[k];
       }
-      nodes[0] = empty;
+      nodes[0] = above;
       first_free = 1;
     }
     for (std::size_t lane = first_free; lane < 8; ++lane) free_slots_.push_back({0, lane});
