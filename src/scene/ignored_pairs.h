@@ -3,7 +3,7 @@
 
 #include <bocst/scene.h>
 
-#include <cstddef>
+#include <new>
 #include <unordered_map>
 #include <unordered_set>
 
@@ -16,18 +16,24 @@ class IgnoredPairs {
 
   void set(Id a, Id b, bool ignored) {
     if (ignored) {
-      partners_[a].insert(b);
-      partners_[b].insert(a);
-    } else {
-      erase(a, b);
-      erase(b, a);
+      try {
+        partners_[a].insert(b);
+        partners_[b].insert(a);
+        return;
+      } catch (const std::bad_alloc&) {
+        erase(a, b);
+        erase(b, a);
+        throw;
+      }
     }
+    erase(a, b);
+    erase(b, a);
   }
 
   /// Forgets all pairs of an object.
   void remove(Id object) {
-    const Partners partners = of(object);
-    for (const Id other : partners) set(object, other, false);
+    for (const Id other : of(object)) erase(other, object);
+    partners_.erase(object);
   }
 
   /// What may touch an object.

@@ -139,14 +139,21 @@ struct Scene<S>::Impl {
     const std::lock_guard<thread::ForkAwareMutex> lock(mutex);
     const auto other = with_geometry.find(geometry.get());
     if (other != with_geometry.end()) o = objects.at(other->second).object;  // update() may have come in between
+    refuseEmpty(o);
     if (X_WG != nullptr) o.X_WG = *X_WG;
     const std::uint32_t number = next_number++;
     o.id = Id(scene_number, number);
-    with_geometry[geometry.get()] = number;
-    const Record& record =
-        objects.emplace(number, Record{std::move(geometry), std::move(o), X_WG == nullptr}).first->second;
+    const auto entry = objects.emplace(number, Record{geometry, std::move(o), X_WG == nullptr}).first;
+    const Record& record = entry->second;
+    try {
+      with_geometry[geometry.get()] = number;
+      if (record.moves) moving_numbers.push_back(number);
+    } catch (const std::bad_alloc&) {
+      with_geometry.erase(geometry.get());
+      objects.erase(entry);
+      throw;
+    }
     if (record.moves) {
-      moving_numbers.push_back(number);
       changeMoving();
     } else {
       change([&](World<S>& w) { return w.putFixed(record.object, ignored); });
@@ -164,6 +171,10 @@ struct Scene<S>::Impl {
     return describe(geometry);
   }
 
+  static void refuseEmpty(const Object<S>& o) {
+    if (o.model != nullptr && o.model->empty()) throw std::invalid_argument("bocst::Scene: the model is empty");
+  }
+
   static Object<S> describe(const std::shared_ptr<Geometry>& geometry) {
     Object<S> o;
     const Geometry* g = geometry.get();
@@ -172,7 +183,7 @@ struct Scene<S>::Impl {
     // Models meet each other several times as fast as an fcl::BVHModel.
     o.geometry = is_mesh ? fcl_adapter::modelOfBvh<S>(*g) : geometry;
     o.model = fcl_adapter::asModel<S>(o.geometry.get());
-    if (o.model != nullptr && o.model->empty()) throw std::invalid_argument("bocst::Scene: the model is empty");
+    refuseEmpty(o);
     o.exact = o.model != nullptr && o.model->options().answer == Answer::kExact;
     o.bounds = scene::boundsOf<S>(*o.geometry);
     return o;

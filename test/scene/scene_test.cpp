@@ -513,6 +513,13 @@ TYPED_TEST(SceneTest, DeformedMesh) {
     scene.update(twenty);
     EXPECT_TRUE(collides(1) && collides(21));
     scene.remove(twenty);
+    if (is_model) {
+      model->beginModel();
+      EXPECT_THROW(scene.addFixed(mesh, at(0)), std::logic_error);
+      model->addTriangle(fcl::Vector3<S>(0, 0, 0), fcl::Vector3<S>(1, 0, 0), fcl::Vector3<S>(0, 1, 0));
+      model->endModel();
+      model->setMesh(raw.mesh());
+    }
     scene.remove(zero);
     EXPECT_FALSE(collides(1) || collides(21));
     deform({4, 0, 0});
