@@ -29,6 +29,8 @@ struct DeviceWalks {
     std::uint32_t deepest = 1;                    ///< The level of its leaves.
     std::uint32_t extent[3] = {0, 0, 0};          ///< Where its actual regions end, in lattice units.
     std::vector<std::uint32_t> used;              ///< Answered: of each block that was come to, a bit.
+    std::vector<std::uint32_t> wanted;  ///< Answered: bit 8 b + o: octant o of block b has to be expanded; of one block
+                                        ///< more, bit 0: the root has to be.
   };
   struct Pair {
     std::uint32_t tree[2] = {0, 0};  ///< Of `trees`.
@@ -42,19 +44,13 @@ struct DeviceWalks {
   enum Found : std::uint8_t {
     kMeet = 1,     ///< The spheres of leaves meet.
     kDoubt = 2,    ///< Float does not tell of some.
-    kGrows = 4,    ///< A node is not resident.
+    kGrows = 4,    ///< A node is not resident; `wanted` has what must be, unless the walk has kMeet.
     kUndone = 8,   ///< The walk was too long, or the device did not do it.
     kInvalid = 16  ///< The table is not what was uploaded. Never answered.
   };
-  /// Two nodes that may meet, as NodeRef names them, one of which has to be expanded.
-  struct Deferred {
-    std::uint32_t pair, node[2];
-  };
-
   std::vector<Tree> trees;
   std::vector<Pair> pairs;
   std::vector<std::uint8_t> found;  ///< Answered: bits of Found; 0: all spheres of leaves are apart.
-  std::vector<Deferred> deferred;   ///< Answered: of pairs that have kGrows. Some may be missing.
 };
 
 }  // namespace bocst::oracle

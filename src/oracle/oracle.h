@@ -114,7 +114,10 @@ class Oracle {
   /// Answers all pairs; of those that it cannot, kUndone.
   virtual void walkPairs(DeviceWalks& walks) {
     walks.found.assign(walks.pairs.size(), DeviceWalks::kUndone);
-    walks.deferred.clear();
+    for (DeviceWalks::Tree& tree : walks.trees) {
+      tree.used.clear();
+      tree.wanted.clear();
+    }
   }
 
   /// Tells how long a walk over `pairs` took, uploads included. `by_host`: the host walked, not the oracle.

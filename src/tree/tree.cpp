@@ -310,7 +310,11 @@ Tree::Batch::Batch(const std::vector<Growth>& nodes) {
     }
     const auto is_its = [&tree](const Part& part) { return part.oracle == tree.oracle_.get(); };
     auto part = std::find_if(parts_.begin(), parts_.end(), is_its);
-    if (part == parts_.end()) part = parts_.insert(parts_.end(), {tree.oracle_.get(), {}, {}});
+    if (part == parts_.end()) {
+      part = parts_.insert(parts_.end(), {tree.oracle_.get(), {}, {}});
+      part->nodes.reserve(names.size());
+      part->requests.reserve(names.size());
+    }
     part->nodes.push_back(g);
     part->requests.push_back(std::move(request));
   }

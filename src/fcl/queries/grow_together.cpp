@@ -166,7 +166,9 @@ class Walks {
     oracle.walkPairs(s_.device);
     oracle.pairsTook(asked_.size(), seconds() - begin, false);
     for (std::size_t k = 0; k < s_.sides.size(); ++k) {
-      if (trees_[k] != kNone) query::SphereWalk::markUsed(s_.sides[k], s_.device.trees[trees_[k]]);
+      if (trees_[k] == kNone) continue;
+      query::SphereWalk::markUsed(s_.sides[k], s_.device.trees[trees_[k]]);
+      query::SphereWalk::addWanted(s_.sides[k], s_.device.trees[trees_[k]], s_.growths);
     }
     s_.device.trees.clear();  // a scratch must not keep tables of models that go
     take();
@@ -183,45 +185,24 @@ class Walks {
     return number;
   }
 
-  /// Takes what the device found. What it did not decide, and the first of what must grow, are the host's.
+  /// Takes what the device found. What it did not decide is the host's, and so is all where it names no node to grow.
   void take() {
-    std::stable_sort(s_.device.deferred.begin(), s_.device.deferred.end(),
-                     [](const auto& x, const auto& y) { return x.pair < y.pair; });
-    auto next = s_.device.deferred.begin();
-    std::size_t grown = 0;
-    done_.assign(s_.walks.size(), false);
-    for (std::size_t k = 0; k < asked_.size(); ++k) {
-      deferred_.clear();
-      for (; next != s_.device.deferred.end() && next->pair == k; ++next) deferred_.push_back(*next);
-      Walk& walk = s_.walks[asked_[k]];
-      const std::uint8_t found = s_.device.found[k];
-      if ((found & Found::kMeet) != 0) {
-        s_.found[walk.pair] = Spheres::kMeet;
-        done_[asked_[k]] = true;
-      } else if (found == 0) {
-        done_[asked_[k]] = true;
-      } else if (grown < kMostTogether) {
-        ++grown;
-        if ((found & (Found::kDoubt | Found::kUndone)) != 0 || deferred_.empty()) {
-          done_[asked_[k]] = look(walk);
-        } else {
-          walk.spheres().addGrowths(deferred_, walk.batch, s_.growths);
-          walk.batch *= 2;
-        }
-      }
-    }
-    // Those that no device takes.
-    for (std::size_t i = 0, k = 0; i < s_.walks.size() && grown < kMostTogether; ++i) {
-      if (k < asked_.size() && asked_[k] == i) {
-        ++k;
-      } else {
-        ++grown;
-        done_[i] = look(s_.walks[i]);
-      }
-    }
-    std::size_t left = 0;
+    const bool grows = !s_.growths.empty();
+    found_.assign(s_.walks.size(), Found::kUndone);
+    for (std::size_t k = 0; k < asked_.size(); ++k) found_[asked_[k]] = s_.device.found[k];
+    std::size_t looked = 0, left = 0;
     for (std::size_t i = 0; i < s_.walks.size(); ++i) {
-      if (!done_[i]) s_.walks[left++] = s_.walks[i];
+      Walk walk = s_.walks[i];
+      const unsigned found = found_[i];
+      if ((found & Found::kMeet) != 0) s_.found[walk.pair] = Spheres::kMeet;
+      if (found == 0 || (found & Found::kMeet) != 0) continue;
+      if (grows && (found & Found::kGrows) != 0) {
+        walk.batch *= 2;
+      } else if (looked < kMostTogether) {
+        ++looked;
+        if (look(walk)) continue;
+      }
+      s_.walks[left++] = walk;
     }
     s_.walks.erase(s_.walks.begin() + static_cast<std::ptrdiff_t>(left), s_.walks.end());
   }
@@ -230,8 +211,7 @@ class Walks {
   std::size_t waiting_ = 0;
   std::vector<std::uint32_t> trees_;  // of each side, its number among the device's
   std::vector<std::size_t> asked_;    // the device's pairs, as numbers of walks
-  std::vector<oracle::DeviceWalks::Deferred> deferred_;
-  std::vector<bool> done_;
+  std::vector<std::uint8_t> found_;   // of each walk
 };
 
 }  // namespace

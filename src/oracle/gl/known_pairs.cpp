@@ -135,7 +135,10 @@ std::string KnownPairs::ask(ComputeOracle& oracle) const {
     if (is_whole && known_[i] != Known::kClose && !is_told) return "a walk over whole trees did not end";
     some_grow = some_grow || (found & DeviceWalks::kGrows) != 0;
   }
-  if (some_grow == walks.deferred.empty()) return "nodes that must grow are not told";
+  const bool some_wanted = std::any_of(walks.trees.begin(), walks.trees.end(), [](const DeviceWalks::Tree& tree) {
+    return std::any_of(tree.wanted.begin(), tree.wanted.end(), [](std::uint32_t bits) { return bits != 0; });
+  });
+  if (some_grow != some_wanted) return "nodes that must grow are not told";
   return "";
 }
 

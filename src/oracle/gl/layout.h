@@ -93,16 +93,16 @@ constexpr std::uint32_t kPairRotation = 0, kPairShift = 9, kPairUnit = 12, kPair
 constexpr std::uint32_t kPairTrees = 16;                 ///< 2 times kTreeWords:
 constexpr std::uint32_t kTreeBegin = 0, kTreeStamp = 1;  ///< where its table is, the stamp of its words,
 constexpr std::uint32_t kTreeUsed = 2;                   ///< where the bits of its blocks go,
-constexpr std::uint32_t kTreeBlocks = 3, kTreeRoot = 4, kTreeDeepest = 5,
-                        kTreeExtent = 6;  ///< as of DeviceWalks::Tree.
-constexpr std::uint32_t kTreeWords = 9;
+constexpr std::uint32_t kTreeWanted = 3;                 ///< and those of its octants that must grow,
+constexpr std::uint32_t kTreeBlocks = 4, kTreeRoot = 5, kTreeDeepest = 6,
+                        kTreeExtent = 7;  ///< as of DeviceWalks::Tree.
+constexpr std::uint32_t kTreeWords = 10;
 constexpr std::uint32_t kPairBatch = kPairTrees + 2 * kTreeWords;  ///< The number of the batch.
-constexpr std::uint32_t kPairDeferred = kPairBatch + 1;            ///< Where deferred pairs of nodes go,
-constexpr std::uint32_t kPairRoom = kPairDeferred + 1;             ///< and how many of them have room.
-constexpr std::uint32_t kPairWords = kPairRoom + 1;
-// The answer: a header, a row per pair (the batch's number above 8 bits of DeviceWalks::Found; its check), bits of
-// blocks, deferred pairs (the pair, two nodes, the batch's number).
-constexpr std::uint32_t kDeferredCount = 0, kPairHeader = 1, kPairAnswer = 2, kDeferredWords = 4;
+constexpr std::uint32_t kPairWords = kPairBatch + 1;
+// The answer: a row per pair (the batch's number above 8 bits of DeviceWalks::Found; its check), then each tree's bits.
+constexpr std::uint32_t kPairAnswer = 2;
+constexpr std::uint32_t kDeferredRoom = 64;     ///< Pairs of nodes of a walk that wait for nodes; then it ends.
+constexpr std::uint32_t kMostWanted = 16;       ///< So many of them, those that overlap most, get their nodes next.
 constexpr std::uint32_t kMostSteps = 1u << 12;  ///< Of a walk: longer ones are the host's, as a watchdog may look.
 constexpr std::uint32_t kWalkStack = 256;       ///< Pairs of nodes that a walk keeps; as above.
 

@@ -12,10 +12,8 @@ namespace {
 
 using namespace layout;
 
-constexpr std::uint32_t kRootName = 0xffffffffu;  // as NodeRef
-
-// Any device allows a dispatch of this many groups, and a part's deferred pairs take a few MB.
-constexpr std::size_t kMostPairs = 1 << 14, kDeferredPerPair = 16, kLeastDeferred = 4096;
+// Any device allows a dispatch of this many groups.
+constexpr std::size_t kMostPairs = 1 << 14;
 
 std::uint32_t bitsOf(float x) {
   std::uint32_t bits;
@@ -47,8 +45,10 @@ std::shared_ptr<const DeviceResource> PairWalker::upload(std::vector<std::uint32
 
 void PairWalker::walk(DeviceWalks& walks, Thread& thread) {
   walks.found.assign(walks.pairs.size(), DeviceWalks::kUndone);
-  walks.deferred.clear();
-  for (DeviceWalks::Tree& tree : walks.trees) tree.used.assign((tree.blocks + 31) / 32, 0);
+  for (DeviceWalks::Tree& tree : walks.trees) {
+    tree.used.assign((tree.blocks + 31) / 32, 0);
+    tree.wanted.assign(tree.blocks / 4 + 1, 0);
+  }
   for (std::size_t first = 0; first < walks.pairs.size(); first += kMostPairs) {
     walkPart(walks, first, std::min(kMostPairs, walks.pairs.size() - first), thread);
   }
@@ -56,14 +56,14 @@ void PairWalker::walk(DeviceWalks& walks, Thread& thread) {
 
 void PairWalker::describe(const DeviceWalks& walks, std::size_t first, std::size_t count) {
   batch_ = batch_ % (kMostBatches - 1) + 1;  // never that of fresh memory
-  std::size_t words = kPairHeader + count * kPairAnswer;
+  answer_words_ = count * kPairAnswer;
   used_.clear();
+  wanted_.clear();
   for (const DeviceWalks::Tree& tree : walks.trees) {
-    used_.push_back(narrow(words));
-    words += tree.used.size();
+    used_.push_back(narrow(answer_words_));
+    wanted_.push_back(narrow(answer_words_ + tree.used.size()));
+    answer_words_ += tree.used.size() + tree.wanted.size();
   }
-  deferred_ = narrow(words);
-  room_ = narrow(std::max(kLeastDeferred, kDeferredPerPair * count));
   rows_.resize(count * kPairWords);
   for (std::size_t i = 0; i < count; ++i) {
     const DeviceWalks::Pair& pair = walks.pairs[first + i];
@@ -81,73 +81,54 @@ void PairWalker::describe(const DeviceWalks& walks, std::size_t first, std::size
       at[kTreeBegin] = table.range->begin();
       at[kTreeStamp] = table.stamp;
       at[kTreeUsed] = used_[pair.tree[t]];
+      at[kTreeWanted] = wanted_[pair.tree[t]];
       at[kTreeBlocks] = tree.blocks;
       at[kTreeRoot] = tree.root;
       at[kTreeDeepest] = tree.deepest;
       std::copy_n(tree.extent, 3, at + kTreeExtent);
     }
     row[kPairBatch] = batch_;
-    row[kPairDeferred] = deferred_;
-    row[kPairRoom] = room_;
   }
 }
 
 void PairWalker::walkPart(DeviceWalks& walks, std::size_t first, std::size_t count, Thread& thread) {
   forgetErrors();
   describe(walks, first, count);
-  const std::size_t words = deferred_ + std::size_t{room_} * kDeferredWords;
-  if (std::max(words, rows_.size()) * kWord > bytes_) throw OracleError("too many nodes for a buffer of the device");
+  const std::size_t bytes = answer_words_ * kWord;
+  if (std::max(bytes, rows_.size() * kWord) > bytes_) throw OracleError("too many nodes for a buffer of the device");
   pairs_.reserve(rows_.size() * kWord);
   pairs_.write(0, rows_.size() * kWord, rows_.data());
-  answers_.reserve(words * kWord);
-  answers_.clear(deferred_ * kWord);
+  answers_.reserve(bytes);
+  answers_.clear(bytes);
   const GLuint bound[] = {arena_.buffer().name(), pairs_.name(), answers_.name()};
   for (GLuint i = 0; i < 3; ++i) glBindBufferBase(GL_SHADER_STORAGE_BUFFER, i, bound[i]);
   glMemoryBarrier(GL_SHADER_STORAGE_BARRIER_BIT | GL_BUFFER_UPDATE_BARRIER_BIT);
   program_.use();
   glDispatchCompute(narrow(count), 1, 1);
   glMemoryBarrier(GL_SHADER_STORAGE_BARRIER_BIT | GL_BUFFER_UPDATE_BARRIER_BIT);
-
-  // Most walks defer little; how much is known from the header.
-  const auto read = [&](std::size_t deferred) {
-    staging_.copy(answers_, 0, (deferred_ + deferred * kDeferredWords) * kWord);
-    thread.awaitDevice();
-    return static_cast<const std::uint32_t*>(staging_.take());
-  };
-  std::size_t come = std::min<std::size_t>(room_, count);
-  const std::uint32_t* answers = read(come);
-  const std::size_t deferred = std::min(answers[kDeferredCount], room_);
-  if (deferred > come) answers = read(come = deferred);
+  staging_.copy(answers_, 0, bytes);
+  thread.awaitDevice();
+  const auto* const answers = static_cast<const std::uint32_t*>(staging_.take());
   throwOnError();
-  thread.require(std::min(answers[kDeferredCount], room_) == deferred, "what came back changed");
   take(walks, first, count, answers, thread);
 }
 
 void PairWalker::take(DeviceWalks& walks, std::size_t first, std::size_t count, const std::uint32_t* answers,
                       Thread& thread) const {
   for (std::size_t i = 0; i < count; ++i) {
-    const std::uint32_t* const row = answers + kPairHeader + i * kPairAnswer;
+    const std::uint32_t* const row = answers + i * kPairAnswer;
     std::uint32_t asked[kPairWords];
     std::copy_n(rows_.data() + i * kPairWords, kPairWords, asked);
     thread.require(row[0] >> 8 == batch_ && row[1] == check(asked), "a pair of trees was not walked");
     thread.require((row[0] & DeviceWalks::kInvalid) == 0, "a table of nodes did not arrive");
     walks.found[first + i] = static_cast<std::uint8_t>(row[0] & 0xff);
   }
-  const auto exists = [](const DeviceWalks::Tree& tree, std::uint32_t node) {
-    return node == kRootName || node >> 3 < tree.blocks;
+  const auto add = [answers](std::vector<std::uint32_t>& bits, std::uint32_t begin) {
+    for (std::size_t i = 0; i < bits.size(); ++i) bits[i] |= answers[begin + i];
   };
-  const std::size_t deferred = std::min(answers[kDeferredCount], room_);
-  for (std::size_t i = 0; i < deferred; ++i) {
-    const std::uint32_t* const entry = answers + deferred_ + i * kDeferredWords;
-    thread.require(entry[3] == batch_ && entry[0] < count, "what was deferred is not of this batch");
-    const DeviceWalks::Pair& pair = walks.pairs[first + entry[0]];
-    thread.require(exists(walks.trees[pair.tree[0]], entry[1]) && exists(walks.trees[pair.tree[1]], entry[2]),
-                   "what was deferred is no node");
-    walks.deferred.push_back({narrow(first + entry[0]), {entry[1], entry[2]}});
-  }
   for (std::size_t t = 0; t < walks.trees.size(); ++t) {
-    std::vector<std::uint32_t>& used = walks.trees[t].used;
-    for (std::size_t i = 0; i < used.size(); ++i) used[i] |= answers[used_[t] + i];
+    add(walks.trees[t].used, used_[t]);
+    add(walks.trees[t].wanted, wanted_[t]);
   }
 }
 

@@ -43,8 +43,8 @@ class PairWalker {
   Buffer pairs_, answers_;
   Staging staging_;
   std::uint32_t batch_ = 0, stamp_ = 0;
-  std::vector<std::uint32_t> rows_, used_;  // of the pairs; where each tree's bits go
-  std::uint32_t deferred_ = 0, room_ = 0;   // where deferred pairs of nodes go, and how many have room
+  std::vector<std::uint32_t> rows_, used_, wanted_;  // of the pairs; where each tree's bits go
+  std::size_t answer_words_ = 0;
 };
 
 }  // namespace bocst::oracle::gl

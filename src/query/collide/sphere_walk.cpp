@@ -20,6 +20,15 @@ double radiiOfLeaves(const TreeSide& a, const TreeSide& b, double scale) {
   return (diameter(a) + diameter(b) * scale) * (1 + 1e-9);
 }
 
+template <typename F>
+void forEachBit(const std::vector<std::uint32_t>& words, F&& f) {
+  for (std::uint32_t i = 0; i < words.size(); ++i) {
+    for (std::uint32_t bits = words[i]; bits != 0; bits &= bits - 1) {
+      f(32 * i + static_cast<std::uint32_t>(__builtin_ctz(bits)));
+    }
+  }
+}
+
 }  // namespace
 
 struct SphereWalk::Scratch {
@@ -135,22 +144,20 @@ oracle::DeviceWalks::Tree SphereWalk::describe(const TreeSide& side, const tree:
   return tree;
 }
 
-void SphereWalk::addGrowths(const std::vector<oracle::DeviceWalks::Deferred>& deferred, std::size_t batch,
-                            std::vector<tree::Tree::Growth>& growths) const {
-  Scratch& s = scratchOfThread();
-  s.deferred.clear();
-  for (const oracle::DeviceWalks::Deferred& d : deferred) {
-    s.deferred.add({tree::NodeRef{d.node[0]}, tree::NodeRef{d.node[1]}});
-  }
-  if (!s.deferred.empty()) s.deferred.addGrowths(a_, b_, b_in_a_, batch, growths);
+void SphereWalk::markUsed(const TreeSide& side, const oracle::DeviceWalks::Tree& tree) {
+  forEachBit(tree.used, [&](std::uint32_t block) { side.tree().markUsed(block, side.now()); });
 }
 
-void SphereWalk::markUsed(const TreeSide& side, const oracle::DeviceWalks::Tree& tree) {
-  for (std::uint32_t word = 0; word < tree.used.size(); ++word) {
-    for (std::uint32_t bits = tree.used[word]; bits != 0; bits &= bits - 1) {
-      side.tree().markUsed(32 * word + static_cast<std::uint32_t>(__builtin_ctz(bits)), side.now());
-    }
-  }
+void SphereWalk::addWanted(const TreeSide& side, const oracle::DeviceWalks::Tree& tree,
+                           std::vector<tree::Tree::Growth>& growths) {
+  forEachBit(tree.wanted, [&](std::uint32_t bit) {
+    const std::uint32_t block = bit / 8;
+    const auto octant = static_cast<int>(bit % 8);
+    // A device that errs must not make nodes of what is empty.
+    const bool exists = block < tree.blocks ? (side.tree().block(block).grey >> octant & 1) != 0 : octant == 0;
+    const tree::NodeRef node = block < tree.blocks ? tree::NodeRef::octant(block, octant) : side.root();
+    if (exists && side.state(node) == State::kGrows) side.grow(node, growths);
+  });
 }
 
 bool SphereWalk::visitLeaves(const SphereSteps& steps, Visitor& visitor) const {

@@ -39,11 +39,11 @@ class SphereWalk {
   bool describe(oracle::DeviceWalks::Pair& pair) const;
   /// What it is asked about the tree of a side, from a table of its nodes.
   static oracle::DeviceWalks::Tree describe(const TreeSide& side, const tree::Tree::NodeTable& table);
-  /// As look() does, of pairs of nodes that the device did not find resident.
-  void addGrowths(const std::vector<oracle::DeviceWalks::Deferred>& deferred, std::size_t batch,
-                  std::vector<tree::Tree::Growth>& growths) const;
   /// Marks the blocks that the device came to.
   static void markUsed(const TreeSide& side, const oracle::DeviceWalks::Tree& tree);
+  /// Adds what the device did not find resident.
+  static void addWanted(const TreeSide& side, const oracle::DeviceWalks::Tree& tree,
+                        std::vector<tree::Tree::Growth>& growths);
 
  private:
   struct Scratch;

@@ -5,6 +5,9 @@
 // The stack is sorted by depth, the sum of the two levels: what is taken are its deepest pairs, and what they put back
 // is deeper by one. It seldom holds more than 200 pairs, and a larger one would leave room for fewer groups at a time; a
 // walk that needs more room is left undone, for the host.
+//
+// A walk that has come to many nodes that are not resident ends, too: it will be walked again when those among them that
+// overlap most are there, and the resident nodes tell little before.
 
 layout(local_size_x = 64) in;
 
@@ -14,6 +17,9 @@ layout(std430, binding = 2) buffer Answers { uint answers[]; };
 
 shared uvec2 s_stack[kWalkStack];
 shared uint s_depth, s_found, s_goes_on[2];
+shared uvec2 s_deferred[kDeferredRoom];
+shared float s_gap[kDeferredRoom];
+shared uint s_deferred_count;
 shared uint s_pair[kPairWords], s_check;
 
 uint word(uint at) { return s_pair[at]; }
@@ -60,15 +66,20 @@ vec3 placed(vec3 p) {
 
 void found(uint what) { atomicOr(s_found, what); }
 
-void defer(uint pair, uvec2 names) {
+// How far the spheres of two nodes are apart; less than 0 where they overlap.
+float gapOf(Node node[2]) {
+  vec3 center[2];
+  float radius[2];
+  sphereOf(0, node[0], center[0], radius[0]);
+  sphereOf(1, node[1], center[1], radius[1]);
+  return distance(placed(center[1]), center[0]) - radius[0] - radius[1];
+}
+
+void defer(uvec2 names, Node node[2]) {
   found(kGrows);
-  uint i = atomicAdd(answers[kDeferredCount], 1u);
-  if (i >= word(kPairRoom)) return;
-  uint at = word(kPairDeferred) + i * kDeferredWords;
-  answers[at] = pair;
-  answers[at + 1u] = names.x;
-  answers[at + 2u] = names.y;
-  answers[at + 3u] = word(kPairBatch);
+  uint i = atomicAdd(s_deferred_count, 1u);
+  s_deferred[i] = names;
+  s_gap[i] = gapOf(node);
 }
 
 void markUsed(int t, uint block) {
@@ -76,16 +87,20 @@ void markUsed(int t, uint block) {
   if ((answers[at] & bit) == 0u) atomicOr(answers[at], bit);
 }
 
+uint blockOf(int t, uint name) {
+  return name == kRoot ? ofTree(t, kTreeRoot) : blockWord(t, name >> 3, kNodeChildren + (name & 7u));
+}
+
 // Is this octant of the next node of a pair to be walked on, and as what?
-bool step(uint pair, uvec2 names, uint octant, out uvec2 next) {
+bool step(uvec2 names, uint octant, out uvec2 next) {
   Node node[2] = Node[2](nodeOf(0, names.x), nodeOf(1, names.y));
   bool leaf0 = node[0].level >= ofTree(0, kTreeDeepest), leaf1 = node[1].level >= ofTree(1, kTreeDeepest);
   int deeper = int(node[1].level) - int(node[0].level);
   int x = leaf1 || (!leaf0 && deeper >= int(word(kPairNotSmaller))) ? 0 : 1;
   uint name = x == 0 ? names.x : names.y;
-  uint block = name == kRoot ? ofTree(x, kTreeRoot) : blockWord(x, name >> 3, kNodeChildren + (name & 7u));
+  uint block = blockOf(x, name);
   if (block == kNoBlock) {
-    if (octant == 0u) defer(pair, names);
+    if (octant == 0u) defer(names, node);
     return false;
   }
   if (block >= ofTree(x, kTreeBlocks) || blockWord(x, block, kNodeStamp) != ofTree(x, kTreeStamp)) {
@@ -121,6 +136,27 @@ void synchronise() {
   barrier();
 }
 
+// Puts the deferred pairs that overlap most first.
+void sortDeferred(uint lane) {
+  uint count = s_deferred_count, rank = 0u;
+  uvec2 names = s_deferred[lane];
+  float gap = s_gap[lane];
+  for (uint i = 0u; i < count; ++i) {
+    if (s_gap[i] < gap || (s_gap[i] == gap && i < lane)) ++rank;
+  }
+  synchronise();
+  if (lane < count) s_deferred[rank] = names;
+  synchronise();
+}
+
+void wantNode(int t, uint name) {
+  bool is_root = name == kRoot;
+  if (blockOf(t, name) != kNoBlock || nodeOf(t, name).level >= ofTree(t, kTreeDeepest)) return;
+  uint block = is_root ? ofTree(t, kTreeBlocks) : name >> 3, octant = is_root ? 0u : name & 7u;
+  uint at = ofTree(t, kTreeWanted) + block / 4u, bit = 1u << ((block & 3u) * 8u + octant);
+  if ((answers[at] & bit) == 0u) atomicOr(answers[at], bit);
+}
+
 // What is asked, and the check of it: each word times a power of kCheckFactor.
 void readPair(uint pair, uint lane) {
   if (lane == 0u) s_check = 0u;
@@ -140,6 +176,7 @@ void main() {
     s_stack[0] = uvec2(kRoot);
     s_depth = 1u;
     s_found = 0u;
+    s_deferred_count = 0u;
   }
   uint depth, steps = 0u;
   for (;;) {
@@ -153,16 +190,24 @@ void main() {
     synchronise();
     uint taken = min(depth, 8u), entry = lane / 8u;
     uvec2 next;
-    bool goes_on = entry < taken && step(pair, s_stack[depth - taken + entry], lane & 7u, next);
+    bool goes_on = entry < taken && step(s_stack[depth - taken + entry], lane & 7u, next);
     if (goes_on) atomicOr(s_goes_on[lane / 32u], 1u << (lane & 31u));
     synchronise();
     uint after = depth - taken + uint(bitCount(s_goes_on[0]) + bitCount(s_goes_on[1]));
     if (after > kWalkStack) break;
     if (goes_on) s_stack[depth - taken + before(lane)] = next;
     if (lane == 0u) s_depth = after;
+    if (s_deferred_count > kDeferredRoom - 8u) break;  // a step may add eight
+  }
+  if ((s_found & (kGrows | kMeet)) == kGrows) {
+    sortDeferred(lane);
+    if (lane < min(s_deferred_count, kMostWanted)) {
+      wantNode(0, s_deferred[lane].x);
+      wantNode(1, s_deferred[lane].y);
+    }
   }
   if (lane != 0u) return;
-  uint row = kPairHeader + pair * kPairAnswer;
+  uint row = pair * kPairAnswer;
   answers[row] = word(kPairBatch) << 8 | s_found | (depth != 0u && (s_found & kMeet) == 0u ? kUndone : 0u);
   answers[row + 1u] = s_check;
 }
