@@ -8,6 +8,7 @@
 #include <cstdint>
 #include <limits>
 #include <memory>
+#include <numeric>
 #include <string>
 #include <vector>
 
@@ -29,7 +30,7 @@ class DeviceResource {
 struct ExpansionRequest {
   static constexpr std::size_t kAll = std::numeric_limits<std::size_t>::max();
 
-  /// A list that the oracle keeps for itself.
+  /// A list that the oracle keeps for itself, in `kept_resource`.
   struct DeviceList {
     std::uint32_t begin = 0, count = 0;
   };
@@ -46,21 +47,32 @@ struct ExpansionRequest {
 
   // Answered.
   std::uint8_t grey = 0;  ///< Bit o: the surface meets octant o (reference.h), which has an actual region.
+  std::uint8_t kept = 0;  ///< Bit o: the oracle keeps octant o's list.
   bounds::OctantBounds octants;
-  bounds::NodeBounds own;                     ///< Of the cell itself: what the octants taught about it.
-  std::vector<std::uint32_t> lists;           ///< Triangles of octant 0, of octant 1, ...
-  std::array<std::uint32_t, 9> list_begin{};  ///< Octant o has lists[list_begin[o]] to lists[list_begin[o + 1]].
+  bounds::NodeBounds own;                ///< Of the cell itself: what the octants taught about it.
+  std::array<std::uint32_t, 8> sizes{};  ///< Of each octant, how many triangles meet it.
+  std::uint32_t first_here = 0;  ///< Where the lists that are not kept begin, that of octant 0, of octant 1, ...
+  std::uint32_t first_kept = 0;  ///< Where octant 0's list would be with the oracle, which has room for all eight.
+  std::vector<std::uint32_t> lists;
   std::shared_ptr<const std::vector<std::uint32_t>> batch_lists;  ///< In place of `lists`: those of a whole batch.
-  std::shared_ptr<const DeviceResource> kept_resource;            ///< Holds the lists that the oracle keeps.
-  std::array<DeviceList, 8> device_lists{};  ///< Where it has octant o's, if count is not 0; it is then not in `lists`.
+  std::shared_ptr<const DeviceResource> kept_resource;            ///< Null where nothing is kept.
 
-  /// The triangles of octant o that are here.
+  std::size_t listSize(int o) const { return sizes[static_cast<std::size_t>(o)]; }
+  bool isKept(int o) const { return (kept >> o & 1) != 0; }
+
+  /// The triangles of octant o, none if its list is kept.
   const std::uint32_t* listBegin(int o) const {
-    return (batch_lists != nullptr ? *batch_lists : lists).data() + list_begin[static_cast<std::size_t>(o)];
+    std::size_t begin = first_here;
+    for (int p = 0; p < o; ++p) begin += isKept(p) ? 0 : listSize(p);
+    return (batch_lists != nullptr ? *batch_lists : lists).data() + begin;
   }
   const std::uint32_t* listEnd(int o) const { return listBegin(o + 1); }
 
-  std::size_t listSize(int o) const { return std::size_t{list_begin[o + 1]} - list_begin[o] + device_lists[o].count; }
+  /// Where octant o's list is kept; of none if it is not.
+  DeviceList keptList(int o) const {
+    if (!isKept(o)) return {};
+    return {std::accumulate(sizes.begin(), sizes.begin() + o, first_kept), sizes[static_cast<std::size_t>(o)]};
+  }
 };
 
 /// Answers expansion batches. Any number of threads may submit; each batch belongs to one thread until wait() returned.

@@ -438,14 +438,10 @@ ChildRef Tree::addDeviceList(const std::shared_ptr<const oracle::DeviceResource>
 
 ChildRef Tree::addOctantList(const oracle::ExpansionRequest& answer, int octant) {
   const std::size_t count = answer.listSize(octant),
-                    all = answer.list_begin[8] - answer.list_begin[0] +
-                          std::accumulate(answer.device_lists.begin(), answer.device_lists.end(), std::size_t{0},
-                                          [](std::size_t sum, const oracle::ExpansionRequest::DeviceList&kept) {
-                                            return sum + kept.count;
-                                          });
+                    all = std::accumulate(answer.sizes.begin(), answer.sizes.end(), std::size_t{0});
   // Triangles so large that division only copies them: going on would take memory without end and cull nothing.
   const bool hopeless = all > 2 * answer.count && 4 * count > 3 * answer.count;
-  const oracle::ExpansionRequest::DeviceList& kept = answer.device_lists[static_cast<std::size_t>(octant)];
+  const oracle::ExpansionRequest::DeviceList kept = answer.keptList(octant);
   if (kept.count == 0) return addList(answer.listBegin(octant), count, hopeless);
   if (hopeless && !conservative()) {
     // A leaf's triangles are needed here.
@@ -494,23 +490,24 @@ void Tree::updateVertices(std::vector<Eigen::Vector3d> vertices) {
   reset(old.withVertices(std::move(vertices)));
 }
 
-// All of it anew whenever a block came: a few hundred kB, for a device that has just answered a batch.
 Tree::NodeTable Tree::nodeTable() {
   namespace table = oracle::node_table;
   const std::lock_guard<thread::ForkAwareMutex> lock(growth_);
-  const std::uint32_t count = blocks_.size();
-  if (node_table_.nodes != nullptr && node_table_.blocks == count) return node_table_;
+  const std::uint32_t known = node_table_.blocks, count = blocks_.size();
+  if (node_table_.nodes != nullptr && known == count) return node_table_;
   const auto blockOf = [](ChildRef ref) { return ref.tag() == ChildRef::kBlock ? ref.index() : table::kNone; };
-  std::vector<std::uint32_t> words(std::size_t{count} * table::kWords);
-  for (std::uint32_t i = 0; i < count; ++i) {
+  node_words_.resize(std::size_t{count} * table::kWords);
+  const auto row = [this](std::uint32_t block) { return node_words_.data() + std::size_t{block} * table::kWords; };
+  for (std::uint32_t i = known; i < count; ++i) {
     const Block& block = blocks_[i];
-    std::uint32_t* const at = words.data() + std::size_t{i} * table::kWords;
-    at[table::kPlace] = block.at[0] | std::uint32_t{block.at[1]} << 16;
-    at[table::kShape] = block.at[2] | std::uint32_t{block.shape} << 16 | std::uint32_t{block.grey} << 24;
-    for (std::size_t o = 0; o < 8; ++o) at[table::kChildren + o] = blockOf(block.child[o].load());
+    row(i)[table::kPlace] = block.at[0] | std::uint32_t{block.at[1]} << 16;
+    row(i)[table::kShape] = block.at[2] | std::uint32_t{block.shape} << 16 | std::uint32_t{block.grey} << 24;
+    for (std::size_t o = 0; o < 8; ++o) row(i)[table::kChildren + o] = blockOf(block.child[o].load());
+    const NodeRef node = records_[i].parent;
+    if (!node.isRoot()) row(node.block())[table::kChildren + node.octant()] = blockOf(childRef(node));
   }
   node_table_.nodes = nullptr;  // its room first
-  node_table_ = {oracle_->uploadNodes(words), count, blockOf(root_.load())};
+  node_table_ = {oracle_->uploadNodes(node_words_), count, blockOf(root_.load())};
   countBytes();
   return node_table_;
 }
@@ -627,7 +624,7 @@ void Tree::countBytes() {
 
 std::size_t Tree::treeBytes() const {
   return blocks_.bytes() + records_.bytes() + last_use_.bytes() + lists_.bytes() + (grid_ ? grid_->bytes() : 0) +
-         (boxes_ ? boxes_->bytes() : 0);
+         node_words_.capacity() * sizeof(node_words_[0]) + (boxes_ ? boxes_->bytes() : 0);
 }
 
 }  // namespace bocst::tree

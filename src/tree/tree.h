@@ -335,6 +335,7 @@ class Tree {
   TriangleLists lists_;
   std::vector<std::shared_ptr<const oracle::DeviceResource>> resources_;  // of the lists that the oracle keeps
   NodeTable node_table_;                                                  // of a generation; under growth_
+  std::vector<std::uint32_t> node_words_;                                 // what it was made from
 
   // Tighter bounds of nodes than their parents' blocks hold; blocks that readers see are not written to, so these wait
   // for a moment alone.

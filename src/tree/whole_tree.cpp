@@ -90,6 +90,7 @@ void Tree::leakPools() {
   (new decltype(lists_))->swap(lists_);
   (new decltype(resources_))->swap(resources_);
   (new decltype(node_table_.nodes))->swap(node_table_.nodes);
+  (new decltype(node_words_))->swap(node_words_);
   (new decltype(refits_))->swap(refits_);
   boxes_.leak();
 }

@@ -52,8 +52,8 @@ std::vector<ExpansionRequest> grownFromKeptLists(Oracle& oracle, const Surface& 
         child.surface = &surface;
         child.cell = e.cell.octant(o);
         child.resource = e.kept_resource;
-        child.resource_begin = e.device_lists[static_cast<std::size_t>(o)].begin;
-        child.count = e.device_lists[static_cast<std::size_t>(o)].count;
+        child.resource_begin = e.keptList(o).begin;
+        child.count = e.keptList(o).count;
         child.ids_up_to = 0;
         EXPECT_GT(child.count, 0u);
         level.push_back(child);
@@ -99,10 +99,10 @@ TEST(Compute, FetchesWhatItKeeps) {
   kept.ids_up_to = 0;
   kept = ask(oracle, {kept})[0];
   here = ask(oracle, {here})[0];
-  for (std::size_t o = 0; o < 8; ++o) {
-    std::vector<std::uint32_t> ids(kept.device_lists[o].count);
-    ASSERT_TRUE(oracle.fetch(*kept.kept_resource, kept.device_lists[o], ids.data()));
-    std::vector<std::uint32_t> expected(here.listBegin(static_cast<int>(o)), here.listEnd(static_cast<int>(o)));
+  for (int o = 0; o < 8; ++o) {
+    std::vector<std::uint32_t> ids(kept.keptList(o).count);
+    ASSERT_TRUE(oracle.fetch(*kept.kept_resource, kept.keptList(o), ids.data()));
+    std::vector<std::uint32_t> expected(here.listBegin(o), here.listEnd(o));
     std::sort(ids.begin(), ids.end());
     std::sort(expected.begin(), expected.end());
     EXPECT_EQ(ids, expected);
@@ -117,7 +117,7 @@ TEST(Compute, ListsGoWhenNobodyHoldsThem) {
     ExpansionRequest root = rootOf(surface);
     root.ids_up_to = 0;
     root = ask(oracle, {root})[0];
-    const std::uint32_t begin = root.device_lists[0].begin;
+    const std::uint32_t begin = root.keptList(0).begin;
     if (i == 0) end = begin;
     EXPECT_EQ(begin, end) << "round " << i << ": the room of the last round was free again";
   }
@@ -318,7 +318,7 @@ TEST(Device, ALostContextLeavesEverythingToTheCpu) {
       child.count = root.listSize(o);
       if (root.kept_resource != nullptr) {
         child.resource = root.kept_resource;
-        child.resource_begin = root.device_lists[static_cast<std::size_t>(o)].begin;
+        child.resource_begin = root.keptList(o).begin;
       } else {
         child.ids = root.listBegin(o);
       }

@@ -2,6 +2,7 @@
 #include "oracle/cpu/cpu_oracle.h"
 
 #include <algorithm>
+#include <numeric>
 
 #include "oracle/cpu/clip.h"
 #include "oracle/cpu/kernels.h"
@@ -31,7 +32,7 @@ class Expander {
     }
     exists_ &= candidates;
     e.kept_resource = nullptr;
-    e.device_lists = {};
+    e.kept = 0;
   }
 
   void run() {
@@ -129,7 +130,7 @@ class Expander {
   }
 
   void makeLists() {
-    std::array<std::size_t, 8> sizes{};
+    e_.sizes = {};
     constexpr std::size_t kMostInByte = 255;
     for (std::size_t begin = 0; begin < e_.count; begin += kMostInByte) {
       std::uint64_t sums = 0;  // a byte for each octant
@@ -137,14 +138,13 @@ class Expander {
         s_.masks[i] &= proven_;
         sums += bytesOfBits(s_.masks[i]);
       }
-      for (int o = 0; o < 8; ++o) sizes[o] += sums >> 8 * o & 0xff;
+      for (int o = 0; o < 8; ++o) e_.sizes[o] += sums >> 8 * o & 0xff;
     }
-    e_.list_begin[0] = 0;
-    for (int o = 0; o < 8; ++o) e_.list_begin[o + 1] = e_.list_begin[o] + sizes[o];
-    e_.lists.resize(e_.list_begin[8]);
-    e_.batch_lists = nullptr;
     std::array<std::size_t, 8> next;
-    std::copy_n(e_.list_begin.begin(), 8, next.begin());
+    std::exclusive_scan(e_.sizes.begin(), e_.sizes.end(), next.begin(), std::size_t{0});
+    e_.lists.resize(next[7] + e_.sizes[7]);
+    e_.first_here = 0;
+    e_.batch_lists = nullptr;
     for (std::size_t i = 0; i < e_.count; ++i) {
       for (int bits = s_.masks[i]; bits != 0; bits &= bits - 1) e_.lists[next[__builtin_ctz(bits)]++] = id(i);
     }

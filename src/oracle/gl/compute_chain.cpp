@@ -27,6 +27,9 @@ constexpr PassSource kSources[] = {{"masks", false},   {"decide", false}, {"plac
 // A dispatch of more would take long enough for a watchdog of a slow device.
 constexpr std::uint64_t kMostInvocations = std::uint64_t{1} << 22;
 
+// So that cells in another order have another sum.
+std::uint32_t placed(std::uint32_t check, std::size_t i) { return check * (2 * narrow(i) + 1); }
+
 // At most as many cells as have room for their states in one buffer.
 ComputeChain::Limits clamped(ComputeChain::Limits limits) {
   limits.cells = std::max<std::size_t>(1, std::min(limits.cells, limits.bytes / (kStateWords * kWord)));
@@ -130,6 +133,8 @@ void ComputeChain::upload() {
   for (std::size_t i = 0; i < rows_.size() && uploaded_ != nullptr; ++i) {
     if (is_uploaded_[i]) rows_[i].list += uploaded_->begin();
   }
+  checks_ = 0;
+  for (std::size_t i = 0; i < rows_.size(); ++i) checks_ += placed(check(rows_[i]), i);
   placed_ = arena_.take(list_capacity_);
   reserve(cells_, rows_.size() * sizeof(Cell) / kWord);
   cells_.write(0, rows_.size() * sizeof(Cell), rows_.data());
@@ -196,36 +201,38 @@ void ComputeChain::take(const std::vector<ExpansionRequest*>& requests, const st
                         Thread& thread) const {
   const std::uint32_t* const all_ids = answers + kHeader + requests.size() * kRow;
   thread.require(all_ids[answers[kIdWords]] == batch_, "what came back is not of this batch");
+  std::uint32_t checks = 0;
   // One vector for all: as many of them as cells would take longer than the rest.
   const auto lists = std::make_shared<const std::vector<std::uint32_t>>(all_ids, all_ids + answers[kIdWords]);
   for (std::size_t i = 0; i < requests.size(); ++i) {
     ExpansionRequest& e = *requests[i];
     const std::uint32_t* const row = answers + kHeader + i * kRow;
-    thread.require(row[kRowCheck] == check(rows_[i]), "a cell was not answered");
+    checks += placed(row[kRowCheck], i);
     thread.require(sums_[i] == 0 || row[kRowSum] == sums_[i], "it saw other triangles");
     CellAnswer answer;
     std::memcpy(static_cast<void*>(&answer), row, sizeof(answer));
     e.octants = answer.octants;
     e.own = answer.own;
     e.grey = answer.grey;
+    std::copy_n(row + kRowSizes, 8, e.sizes.begin());
+    e.first_kept = row[kRowList];
+    e.first_here = row[kRowIds];
+    e.kept = 0;
+    std::size_t here = 0;
     // Without branches: octants differ in what they keep.
-    const auto up_to = static_cast<std::uint32_t>(std::min<std::size_t>(e.ids_up_to, 0xffffffff));
-    std::uint32_t list = row[kRowList], kept = 0;
-    std::size_t here = row[kRowIds];  // the lists that came back lie one after the other
-    for (std::size_t o = 0; o < 8; ++o) {
-      const std::uint32_t size = row[kRowSizes + o];
-      const std::uint32_t stays = size > up_to ? size : 0;
-      e.list_begin[o] = static_cast<std::uint32_t>(here);
-      e.device_lists[o] = {stays != 0 ? list : 0, stays};
-      here += size - stays;
-      kept |= stays;
-      list += size;
+    for (unsigned o = 0; o < 8; ++o) {
+      const bool stays = e.sizes[o] > e.ids_up_to;
+      e.kept = static_cast<std::uint8_t>(e.kept | unsigned{stays} << o);
+      here += stays ? 0 : e.sizes[o];
     }
-    e.kept_resource = kept != 0 ? placed_ : nullptr;
-    e.list_begin[8] = static_cast<std::uint32_t>(here);
-    thread.require(here <= answers[kIdWords], "a list is longer than what came back");
-    e.batch_lists = lists;
+    thread.require(e.first_here + here <= answers[kIdWords], "a list is longer than what came back");
+    // Only what is needed is held, as it takes time to count who holds it.
+    e.kept_resource = nullptr;
+    e.batch_lists = nullptr;
+    if (e.kept != 0) e.kept_resource = placed_;
+    if (here != 0) e.batch_lists = lists;
   }
+  thread.require(checks == checks_, "a cell was not answered");
 }
 
 void ComputeChain::answer(const std::vector<ExpansionRequest*>& requests, Thread& thread) {

@@ -82,6 +82,7 @@ class ComputeChain {
   std::vector<std::uint32_t> ids_;   // of lists that are uploaded
   std::vector<std::uint32_t> sums_;  // of each cell's ids, as layout::kIds; 0 where the host does not know them
   std::vector<bool> is_uploaded_;    // each cell's list
+  std::uint32_t checks_ = 0;         // of all cells together
   std::shared_ptr<Arena::Range> uploaded_, placed_;
   std::uint64_t pairs_ = 0, list_capacity_ = 0, id_capacity_ = 0;
   std::array<std::uint32_t, kPasses> groups_{};  // that are to run, since answers_ was cleared

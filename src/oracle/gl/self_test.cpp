@@ -178,7 +178,7 @@ std::string askKept(ComputeOracle& oracle, std::vector<Question> questions) {
     for (std::size_t i = 0; i < batch.size(); ++i) {
       std::vector<Ids> lists(8);
       for (std::size_t o = 0; o < 8; ++o) {
-        const ExpansionRequest::DeviceList& kept = batch[i].device_lists[o];
+        const ExpansionRequest::DeviceList kept = batch[i].keptList(static_cast<int>(o));
         lists[o].resize(kept.count);
         if (kept.count == 0) continue;
         if (!oracle.fetch(*batch[i].kept_resource, kept, lists[o].data())) return "a list was lost";

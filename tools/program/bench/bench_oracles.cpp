@@ -45,19 +45,19 @@ struct Level {
 Level childrenOf(std::vector<ExpansionRequest>& answers) {
   Level next;
   for (const ExpansionRequest& e : answers) {
-    for (std::size_t o = 0; o < 8; ++o) {
+    for (int o = 0; o < 8; ++o) {
       if ((e.grey >> o & 1) == 0) continue;
       ExpansionRequest child;
       child.surface = e.surface;
-      child.cell = e.cell.octant(static_cast<int>(o));
+      child.cell = e.cell.octant(o);
       child.ids_up_to = kLeaf;
-      child.count = e.listSize(static_cast<int>(o));
+      child.count = e.listSize(o);
       next.ids.emplace_back();
-      if (e.device_lists[o].count > 0) {
+      if (e.isKept(o)) {
         child.resource = e.kept_resource;
-        child.resource_begin = e.device_lists[o].begin;
+        child.resource_begin = e.keptList(o).begin;
       } else {
-        next.ids.back().assign(e.listBegin(static_cast<int>(o)), e.listEnd(static_cast<int>(o)));
+        next.ids.back().assign(e.listBegin(o), e.listEnd(o));
       }
       next.requests.push_back(std::move(child));
     }
