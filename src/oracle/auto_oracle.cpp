@@ -133,6 +133,14 @@ AutoOracle::Share AutoOracle::bestShare(const Work& batch, const std::vector<Can
   return share;
 }
 
+// Is the device faster than the host, and faster alone than both together can be? In a second, the host answers cells
+// that the device would have answered in at most `relief` seconds.
+bool AutoOracle::isAllForDevice(const Work& batch, double alone) const {
+  const double there = device_cost_.of(batch.cells, batch.triangles);
+  const double relief = std::max(device_cost_.cell / host_cost_.cell, device_cost_.triangle / host_cost_.triangle);
+  return there < Trials::kWorthwhile * alone && there <= there / (1 + relief) + kMoving * batch.cells;
+}
+
 AutoOracle::Known& AutoOracle::known(const Surface& surface) {
   Known& its = meshes_[surface.mesh.get()];
   if (its.mesh.lock() != surface.mesh) its = {surface.mesh, nullptr};  // a new mesh where another was
@@ -168,6 +176,9 @@ std::vector<AutoOracle::Candidate> AutoOracle::chooseShare(const std::vector<Exp
     Known* const its = is_next ? candidates.back().mesh : &known(*e.surface);
     if (!its->refused) candidates.push_back({e.count, i, its});
   }
+  const bool all_resident =
+      std::all_of(candidates.begin(), candidates.end(), [](const Candidate& c) { return c.mesh->device != nullptr; });
+  if (candidates.size() == batch.size() && all_resident && isAllForDevice(work, alone)) return candidates;
   const bool large_first =
       host_cost_.triangle * device_cost_.cell > host_cost_.cell * device_cost_.triangle;  // grows with the triangles
   std::sort(candidates.begin(), candidates.end(), [large_first](const Candidate& a, const Candidate& b) {
