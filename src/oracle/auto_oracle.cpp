@@ -133,12 +133,13 @@ AutoOracle::Share AutoOracle::bestShare(const Work& batch, const std::vector<Can
   return share;
 }
 
-// Is the device faster than the host, and faster alone than both together can be? In a second, the host answers cells
-// that the device would have answered in at most `relief` seconds.
-bool AutoOracle::isAllForDevice(const Work& batch, double alone) const {
-  const double there = device_cost_.of(batch.cells, batch.triangles);
+// Is the device faster than the host, and faster alone than both together can be? In a second, the host answers what
+// takes the device at most `relief` seconds, so both together take at least 1 / (1 + relief) of the device's time.
+bool AutoOracle::isAllForDevice(const Work& batch) const {
+  const double here = host_cost_.of(batch.cells, batch.triangles),
+               there = device_cost_.of(batch.cells, batch.triangles);
   const double relief = std::max(device_cost_.cell / host_cost_.cell, device_cost_.triangle / host_cost_.triangle);
-  return there < Trials::kWorthwhile * alone && there <= there / (1 + relief) + kMoving * batch.cells;
+  return there < Trials::kWorthwhile * here && there <= there / (1 + relief) + kMoving * batch.cells;
 }
 
 AutoOracle::Known& AutoOracle::known(const Surface& surface) {
@@ -176,9 +177,11 @@ std::vector<AutoOracle::Candidate> AutoOracle::chooseShare(const std::vector<Exp
     Known* const its = is_next ? candidates.back().mesh : &known(*e.surface);
     if (!its->refused) candidates.push_back({e.count, i, its});
   }
-  const bool all_resident =
-      std::all_of(candidates.begin(), candidates.end(), [](const Candidate& c) { return c.mesh->device != nullptr; });
-  if (candidates.size() == batch.size() && all_resident && isAllForDevice(work, alone)) return candidates;
+  const auto is_away = [](const Candidate& c) { return c.mesh->device == nullptr; };
+  if (candidates.size() == batch.size() && isAllForDevice(work) &&
+      std::none_of(candidates.begin(), candidates.end(), is_away)) {
+    return candidates;
+  }
   const bool large_first =
       host_cost_.triangle * device_cost_.cell > host_cost_.cell * device_cost_.triangle;  // grows with the triangles
   std::sort(candidates.begin(), candidates.end(), [large_first](const Candidate& a, const Candidate& b) {
@@ -192,7 +195,6 @@ std::vector<AutoOracle::Candidate> AutoOracle::chooseShare(const std::vector<Exp
     const Surface& surface = *batch[candidates[n].place].surface;
     if (its.saved > upload_cost_.of(0, static_cast<double>(surface.triangle_count))) upload(surface, its);
   }
-  const auto is_away = [](const Candidate& c) { return c.mesh->device == nullptr; };
   candidates.erase(std::remove_if(candidates.begin(), candidates.end(), is_away), candidates.end());
   Share share = bestShare(work, candidates, 0);
   if (share.count == 0 && !candidates.empty()) {

@@ -90,7 +90,7 @@ class BOCST_EXPORT AutoOracle : public Oracle {
 
   void measure();
   Share bestShare(const Work& batch, const std::vector<Candidate>& candidates, std::size_t least) const;
-  bool isAllForDevice(const Work& batch, double alone) const;
+  bool isAllForDevice(const Work& batch) const;
   std::vector<Candidate> chooseShare(const std::vector<ExpansionRequest>& batch);
   Known& known(const Surface& surface);
   void upload(const Surface& surface, Known& its);

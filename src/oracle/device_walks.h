@@ -28,9 +28,9 @@ struct DeviceWalks {
     std::uint32_t root = node_table::kNone;       ///< The block of the root.
     std::uint32_t deepest = 1;                    ///< The level of its leaves.
     std::uint32_t extent[3] = {0, 0, 0};          ///< Where its actual regions end, in lattice units.
-    std::vector<std::uint32_t> used;              ///< Answered: of each block that was come to, a bit.
-    std::vector<std::uint32_t> wanted;  ///< Answered: bit 8 b + o: octant o of block b has to be expanded; of one block
-                                        ///< more, bit 0: the root has to be.
+    std::vector<std::uint32_t> used;              ///< Answered: of each block that a walk visited, a bit.
+    std::vector<std::uint32_t> wanted;  ///< Answered: bit 8 b + o: octant o of block b has to be expanded; bit 8 *
+                                        ///< blocks: the root has to be.
   };
   struct Pair {
     std::uint32_t tree[2] = {0, 0};  ///< Of `trees`.

@@ -113,7 +113,8 @@ BoxTree::BoxTree(const oracle::Surface& surface) {
     items[t].middle = (items[t].corner[0] + items[t].corner[1] + items[t].corner[2]) / 3;
     items[t].triangle = t;
   }
-  nodes_.reserve(2 * items.size() - 1);
+  nodes_.reserve(mostNodes(items.size()));
+  triangles_.reserve(items.size());
   add(items.data(), items.data() + items.size());
 }
 
@@ -126,9 +127,10 @@ void BoxTree::add(Item* begin, Item* end) {
       for (const Vector3d& corner : i->corner) f(Vector3d(corner - origin));
     }
   };
-  const bool is_leaf = end - begin == 1;
+  const auto size = static_cast<std::size_t>(end - begin);
+  const bool is_leaf = size <= kMostInLeaf;
   const auto count = static_cast<double>(3 * ((end - begin + step - 1) / step));
-  Frame frame(is_leaf ? axesOf(begin->corner) : principalAxes(count, over_corners));
+  Frame frame(size == 1 ? axesOf(begin->corner) : principalAxes(count, over_corners));
   Frame straight(Matrix3d::Identity());
   const Matrix3d to_axes = frame.axes.transpose();
   for (const Item* i = begin; i != end; ++i) {
@@ -139,8 +141,12 @@ void BoxTree::add(Item* begin, Item* end) {
   if (straight.area() < frame.area()) frame = straight;
   const std::size_t index = nodes_.size();
   nodes_.push_back({origin + frame.axes * ((frame.lo + frame.hi) / 2), frame.axes,
-                    ((frame.hi - frame.lo) / 2).array() + kPad, 0, begin->triangle});
-  if (is_leaf) return;
+                    ((frame.hi - frame.lo) / 2).array() + kPad, 0, static_cast<std::uint32_t>(triangles_.size()),
+                    is_leaf ? static_cast<std::uint32_t>(size) : 0});
+  if (is_leaf) {
+    for (const Item* i = begin; i != end; ++i) triangles_.push_back(i->triangle);
+    return;
+  }
   int widest = 0;
   (frame.last - frame.first).maxCoeff(&widest);
   const Vector3d along = frame.axes.col(widest);

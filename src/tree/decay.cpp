@@ -88,8 +88,7 @@ void Tree::dropTree() {
 // What names nodes of the old pools goes.
 void Tree::startGeneration(const NodeCounts& nodes_at) {
   ++generation_;
-  node_table_ = {};
-  std::vector<std::uint32_t>().swap(node_words_);
+  dropNodeTable();
   refits_.clear();
   refits_wait_.store(false, std::memory_order_relaxed);
   const std::size_t before = std::accumulate(nodes_at_.begin(), nodes_at_.end(), std::size_t{0});

@@ -497,19 +497,26 @@ Tree::NodeTable Tree::nodeTable() {
   if (node_table_.nodes != nullptr && known == count) return node_table_;
   const auto blockOf = [](ChildRef ref) { return ref.tag() == ChildRef::kBlock ? ref.index() : table::kNone; };
   node_words_.resize(std::size_t{count} * table::kWords);
-  const auto row = [this](std::uint32_t block) { return node_words_.data() + std::size_t{block} * table::kWords; };
   for (std::uint32_t i = known; i < count; ++i) {
     const Block& block = blocks_[i];
-    row(i)[table::kPlace] = block.at[0] | std::uint32_t{block.at[1]} << 16;
-    row(i)[table::kShape] = block.at[2] | std::uint32_t{block.shape} << 16 | std::uint32_t{block.grey} << 24;
-    for (std::size_t o = 0; o < 8; ++o) row(i)[table::kChildren + o] = blockOf(block.child[o].load());
-    const NodeRef node = records_[i].parent;
-    if (!node.isRoot()) row(node.block())[table::kChildren + node.octant()] = blockOf(childRef(node));
+    std::uint32_t* const row = node_words_.data() + std::size_t{i} * table::kWords;
+    row[table::kPlace] = block.at[0] | std::uint32_t{block.at[1]} << 16;
+    row[table::kShape] = block.at[2] | std::uint32_t{block.shape} << 16 | std::uint32_t{block.grey} << 24;
+    std::fill_n(row + table::kChildren, 8, table::kNone);
+    const NodeRef node = records_[i].parent;  // its block is an earlier one
+    if (node.isRoot()) continue;
+    node_words_[std::size_t{node.block()} * table::kWords + table::kChildren + node.octant()] = blockOf(childRef(node));
   }
-  node_table_.nodes = nullptr;  // its room first
+  node_table_.nodes = nullptr;  // frees the room of the last table before the next one takes its own
   node_table_ = {oracle_->uploadNodes(node_words_), count, blockOf(root_.load())};
+  if (node_table_.nodes == nullptr) dropNodeTable();
   countBytes();
   return node_table_;
+}
+
+void Tree::dropNodeTable() {
+  node_table_ = {};
+  std::vector<std::uint32_t>().swap(node_words_);
 }
 
 // Inspection.

@@ -248,6 +248,7 @@ class Tree {
   bool buildsAhead() const;
   void askForAheadBuild();
   void leakPools();
+  void dropNodeTable();
   static void buildAhead(AheadBuild& ahead);
   void growRoot();
   void growFromGrid(NodeRef node);

@@ -310,7 +310,7 @@ TEST(FlatWork, OfManyTimesOfContactPaysForBoxes) {
   request.ccd_solver_type = fcl::CCDC_CONSERVATIVE_ADVANCEMENT;
   const std::size_t before = a.statistics().resident_bytes;
   int queries = 0;
-  for (; queries < 1000 && a.statistics().resident_bytes < before + 256 * 2 * 24 * 24; ++queries) {
+  for (; queries < 1000 && a.statistics().resident_bytes < before + 100 * 2 * 24 * 24; ++queries) {
     fcl::Transform3d end = begin;
     end.translation().x() += 0.1;
     fcl::ContinuousCollisionResultd result;

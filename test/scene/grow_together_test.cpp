@@ -223,11 +223,66 @@ TEST(GrowTogetherOnDevices, ThatAreLostMeanwhile) {
   }
 }
 
+// All walks are the device's.
+class WalksOnTheDevice : public testing::Test {
+ protected:
+  void SetUp() override {
+    compute = std::dynamic_pointer_cast<oracle::gl::ComputeOracle>(oracle::makeOracle(OracleKind::kCompute));
+    ASSERT_NE(compute, nullptr);
+    compute->setWalksAll(true);
+  }
+  void TearDown() override { compute->setWalksAll(false); }
+
+  std::shared_ptr<oracle::gl::ComputeOracle> compute;
+};
+
+// Its table of nodes has all that grew: else the host would look at some, and the device again at the others.
+TEST_F(WalksOnTheDevice, WalkSettledPosesOnce) {
+  const auto mesh = test::torus(30).mesh();
+  const Modeld a(mesh, optionsOf(OracleKind::kCompute)), b(mesh, optionsOf(OracleKind::kCompute));
+  const Transforms X = randomPoses(1500, 1.5);
+  std::vector<std::uint8_t> hits(X.size());
+  collidePoses(a, b, X.data(), X.size(), hits.data());
+  const std::uint64_t first = compute->walked();
+  collidePoses(a, b, X.data(), X.size(), hits.data());
+  EXPECT_LE(compute->walked() - first, X.size());
+}
+
+TEST_F(WalksOnTheDevice, GrowAboutWhatSingleQueriesNeed) {
+  const auto mesh = test::torus(30).mesh();
+  const Modeld a(mesh, optionsOf(OracleKind::kCompute)), b(mesh, optionsOf(OracleKind::kCompute));
+  const Modeld cpu_a(mesh, optionsOf(OracleKind::kCpu)), cpu_b(mesh, optionsOf(OracleKind::kCpu));
+  const Transforms X = randomPoses(400, 1.5);
+  std::vector<std::uint8_t> hits(X.size());
+  collidePoses(a, b, X.data(), X.size(), hits.data());
+  collidePoses(cpu_a, cpu_b, X.data(), X.size(), hits.data());
+  EXPECT_LT(a.statistics().resident_nodes, 1.5 * static_cast<double>(cpu_a.statistics().resident_nodes));
+}
+
+// Near misses of faces need thousands of nodes, more than a walk gets in all its rounds on the device.
+TEST_F(WalksOnTheDevice, EndWhereMuchMustGrow) {
+  const auto mesh = test::box({-1, -1, -0.01}, {1, 1, 0}).mesh();
+  Options options = optionsOf(OracleKind::kCompute);
+  options.depth = 7;
+  const Modeld a(mesh, options), b(mesh, options);
+  options.oracle = OracleKind::kCpu;
+  const Modeld cpu_a(mesh, options), cpu_b(mesh, options);
+  Transforms X = randomPoses(12, 0.002);
+  for (std::size_t i = 0; i < X.size(); ++i) {
+    X[i].linear().setIdentity();
+    X[i].translation()[2] += 0.02 + 0.012 * static_cast<double>(i);
+  }
+  std::vector<std::uint8_t> hits(X.size()), of_cpu(X.size());
+  collidePoses(a, b, X.data(), X.size(), hits.data());
+  collidePoses(cpu_a, cpu_b, X.data(), X.size(), of_cpu.data());
+  EXPECT_EQ(hits, of_cpu);
+  const auto met = std::count(of_cpu.begin(), of_cpu.end(), 1);
+  EXPECT_GT(met, 0);
+  EXPECT_LT(met, static_cast<std::ptrdiff_t>(X.size()));
+}
+
 // A model beside which nothing happens keeps what walks on the device came to.
-TEST(WalksOnTheDevice, KeepBranches) {
-  const auto compute = std::dynamic_pointer_cast<oracle::gl::ComputeOracle>(oracle::makeOracle(OracleKind::kCompute));
-  ASSERT_NE(compute, nullptr);
-  compute->setWalksAll(true);
+TEST_F(WalksOnTheDevice, KeepBranches) {
   auto now = std::make_shared<Clock::time_point>();
   Options options = optionsOf(OracleKind::kCompute);
   options.clock = [now] { return *now; };
@@ -252,7 +307,6 @@ TEST(WalksOnTheDevice, KeepBranches) {
   }
   EXPECT_EQ(a.statistics().resident_nodes, 1u);
   EXPECT_LT(a.statistics().device_bytes, device);  // the table went, too
-  compute->setWalksAll(false);
 }
 
 INSTANTIATE_TEST_SUITE_P(Oracles, GrowTogether,

@@ -32,7 +32,10 @@ class Check {
     leaves_.assign(surface_.triangle_count, 0);
     const std::size_t end = visit(0, 0);
     EXPECT_EQ(end, tree_.nodes().size());
-    EXPECT_EQ(tree_.bytes(), tree_.nodes().size() * sizeof(BoxTree::Node));
+    const std::size_t bytes =
+        tree_.nodes().size() * sizeof(BoxTree::Node) + tree_.triangles().size() * sizeof(std::uint32_t);
+    EXPECT_LE(bytes, tree_.bytes());
+    EXPECT_GE(bytes, tree_.bytes() / 2);
     EXPECT_EQ(tree_.bytes(), BoxTree::bytesOf(surface_.triangle_count));
     for (const int leaves : leaves_) EXPECT_EQ(leaves, 1);
     EXPECT_LE(depth_, 2 + static_cast<int>(std::ceil(std::log2(static_cast<double>(surface_.triangle_count)))));
@@ -49,20 +52,27 @@ class Check {
     path_.push_back(&node);
     std::size_t end = index + 1;
     if (node.second == 0) {
-      ++leaves_[node.triangle];
-      for (int k = 0; k < 3; ++k) {
-        const Vector3d corner = surface_.corner(node.triangle, k);
-        for (const BoxTree::Node* box : path_) {
-          const Vector3d at = box->axes.transpose() * (corner - box->center);
-          EXPECT_TRUE((at.cwiseAbs().array() <= box->half.array()).all()) << at.transpose() << " " << box->half;
-        }
-      }
+      EXPECT_GE(node.count, 1u);
+      EXPECT_LE(node.count, BoxTree::kMostInLeaf);
+      for (std::uint32_t i = 0; i < node.count; ++i) checkTriangle(tree_.triangles().at(node.begin + i));
     } else {
+      EXPECT_EQ(node.count, 0u);
       EXPECT_EQ(visit(index + 1, depth + 1), node.second);
       end = visit(node.second, depth + 1);
     }
     path_.pop_back();
     return end;
+  }
+
+  void checkTriangle(std::uint32_t triangle) {
+    ++leaves_[triangle];
+    for (int k = 0; k < 3; ++k) {
+      const Vector3d corner = surface_.corner(triangle, k);
+      for (const BoxTree::Node* box : path_) {
+        const Vector3d at = box->axes.transpose() * (corner - box->center);
+        EXPECT_TRUE((at.cwiseAbs().array() <= box->half.array()).all()) << at.transpose() << " " << box->half;
+      }
+    }
   }
 
   const oracle::Surface surface_;
@@ -118,7 +128,7 @@ TEST(BoxTree, IsAsThinAsASliver) {
     EXPECT_LT(root[2], 1e-12);
     for (const BoxTree::Node& node : tree.nodes()) {
       if (node.second != 0) continue;
-      EXPECT_LT(unit * node.half[1], 0.51 * width + 1e-12);
+      EXPECT_LT(unit * node.half[1], 0.51 * node.count * width + 1e-12);
     }
   }
 }

@@ -24,11 +24,18 @@ constexpr std::size_t kFirstBatch = query::DeferredPairs<query::TreeSide, query:
 /// knows what the others ask for.
 constexpr std::size_t kMostTogether = 256;
 
+/// Pairs of nodes that grow at once for one walk.
+constexpr std::size_t kMostBatch = std::size_t{1} << 20;
+
+/// A device grows few nodes for a walk at a time. After so many rounds the host grows twice as many each time.
+constexpr int kMostDeviceRounds = 16;
+
 struct Walk {
   const query::TreeSide *a, *b;
   query::SimilarityTransform b_in_a;
   std::size_t pair;
-  std::size_t batch;  // of pairs of nodes that grow next
+  std::size_t batch;  // of pairs of nodes that grow next, if the host looks
+  int device_rounds = 0;
 
   query::SphereWalk spheres() const { return {*a, *b, b_in_a}; }
   oracle::Oracle& oracle() const { return a->tree().oracle(); }
@@ -101,7 +108,7 @@ class Walks {
     };
     while (!s_.walks.empty()) {
       s_.growths.clear();
-      const bool device_walks = s_.walks.front().oracle().walksPairs(s_.walks.size());
+      const bool device_walks = !is_refused_ && s_.walks.front().oracle().walksPairs(s_.walks.size());
       if (device_walks || waiting_ == s_.walks.size()) finish();
       const std::size_t next = device_walks && byDevice() ? s_.walks.size() : byHost();
       finish();
@@ -122,7 +129,7 @@ class Walks {
   /// Has the walk its answer? If not, adds what it needs.
   bool look(Walk& walk) {
     const Outcome outcome = walk.spheres().look(walk.batch, s_.growths);
-    walk.batch *= 2;
+    walk.batch = std::min(2 * walk.batch, kMostBatch);
     if (outcome == Outcome::kMeet) s_.found[walk.pair] = Spheres::kMeet;
     return outcome != Outcome::kNeedsGrowth;
   }
@@ -145,6 +152,11 @@ class Walks {
 
   /// Walks on a device what one oracle takes; false where it takes nothing.
   bool byDevice() {
+    // A scratch must not keep tables of models that go.
+    struct Clear {
+      oracle::DeviceWalks& device;
+      ~Clear() { device.trees.clear(); }
+    } clear{s_.device};
     oracle::Oracle& oracle = s_.walks.front().oracle();
     const auto is_its = [&](const Walk& walk) { return walk.hasOneOracle() && &walk.oracle() == &oracle; };
     if (!is_its(s_.walks.front())) return false;
@@ -162,17 +174,25 @@ class Walks {
       s_.device.pairs.push_back(pair);
       asked_.push_back(i);
     }
-    if (asked_.empty()) return false;
+    if (asked_.empty()) return refuse();
     oracle.walkPairs(s_.device);
-    oracle.pairsTook(asked_.size(), seconds() - begin, false);
+    const auto undone = std::count(s_.device.found.begin(), s_.device.found.end(), std::uint8_t{Found::kUndone});
+    const std::size_t walked = asked_.size() - static_cast<std::size_t>(undone);
+    if (walked == 0) return refuse();
+    oracle.pairsTook(walked, seconds() - begin, false);
     for (std::size_t k = 0; k < s_.sides.size(); ++k) {
       if (trees_[k] == kNone) continue;
       query::SphereWalk::markUsed(s_.sides[k], s_.device.trees[trees_[k]]);
       query::SphereWalk::addWanted(s_.sides[k], s_.device.trees[trees_[k]], s_.growths);
     }
-    s_.device.trees.clear();  // a scratch must not keep tables of models that go
     take();
     return true;
+  }
+
+  /// The device is not asked again in this call.
+  bool refuse() {
+    is_refused_ = true;
+    return false;
   }
 
   /// The number of a side's tree among those of the device.
@@ -185,7 +205,8 @@ class Walks {
     return number;
   }
 
-  /// Takes what the device found. What it did not decide is the host's, and so is all where it names no node to grow.
+  /// Takes what the device found. The host looks at what the device did not decide, at walks that have waited for nodes
+  /// often, and, if the device names no node, at all that wait.
   void take() {
     const bool grows = !s_.growths.empty();
     found_.assign(s_.walks.size(), Found::kUndone);
@@ -196,8 +217,8 @@ class Walks {
       const unsigned found = found_[i];
       if ((found & Found::kMeet) != 0) s_.found[walk.pair] = Spheres::kMeet;
       if (found == 0 || (found & Found::kMeet) != 0) continue;
-      if (grows && (found & Found::kGrows) != 0) {
-        walk.batch *= 2;
+      if (grows && (found & Found::kGrows) != 0 && walk.device_rounds < kMostDeviceRounds) {
+        ++walk.device_rounds;
       } else if (looked < kMostTogether) {
         ++looked;
         if (look(walk)) continue;
@@ -209,6 +230,7 @@ class Walks {
 
   Scratch& s_;
   std::size_t waiting_ = 0;
+  bool is_refused_ = false;           // by a device that has no room, or is lost
   std::vector<std::uint32_t> trees_;  // of each side, its number among the device's
   std::vector<std::size_t> asked_;    // the device's pairs, as numbers of walks
   std::vector<std::uint8_t> found_;   // of each walk

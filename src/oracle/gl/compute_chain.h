@@ -79,10 +79,10 @@ class ComputeChain {
   GLuint meshes_ = 0;  // the buffer that has all meshes
   std::uint32_t batch_ = 0;
   std::vector<layout::Cell> rows_;
-  std::vector<std::uint32_t> ids_;   // of lists that are uploaded
-  std::vector<std::uint32_t> sums_;  // of each cell's ids, as layout::kIds; 0 where the host does not know them
-  std::vector<bool> is_uploaded_;    // each cell's list
-  std::uint32_t checks_ = 0;         // of all cells together
+  std::vector<std::uint32_t> ids_;     // of lists that are uploaded
+  std::vector<std::uint32_t> sums_;    // of each cell's ids, as layout::kIds; 0 where the host does not know them
+  std::vector<bool> is_uploaded_;      // each cell's list
+  std::vector<std::uint32_t> checks_;  // of each cell, in 4 bytes: its row is no longer in the cache
   std::shared_ptr<Arena::Range> uploaded_, placed_;
   std::uint64_t pairs_ = 0, list_capacity_ = 0, id_capacity_ = 0;
   std::array<std::uint32_t, kPasses> groups_{};  // that are to run, since answers_ was cleared

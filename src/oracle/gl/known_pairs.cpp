@@ -113,6 +113,14 @@ void KnownPairs::addPose(int number, std::uint32_t a, std::uint32_t b, double un
   known_.push_back(known);
 }
 
+bool KnownPairs::isFrontier(const Tree& t, std::uint32_t block, std::uint32_t octant) {
+  if (block >= t.tree.blocks) return false;  // the root is resident
+  const std::uint32_t* const row = t.words.data() + std::size_t{block} * node_table::kWords;
+  const std::uint32_t level = (row[node_table::kShape] >> 16 & 0xff) + 1;
+  return (row[node_table::kShape] >> (24 + octant) & 1) != 0 && level < t.tree.deepest &&
+         row[node_table::kChildren + octant] == node_table::kNone;
+}
+
 std::string KnownPairs::ask(ComputeOracle& oracle) const {
   DeviceWalks walks;
   walks.pairs = pairs_;
@@ -133,11 +141,16 @@ std::string KnownPairs::ask(ComputeOracle& oracle) const {
     const bool is_whole = walks.pairs[i].tree[0] % 2 == 0 && walks.pairs[i].tree[1] % 2 == 0;
     const bool is_told = known_[i] == Known::kMeet ? (found & DeviceWalks::kMeet) != 0 : found == 0;
     if (is_whole && known_[i] != Known::kClose && !is_told) return "a walk over whole trees did not end";
-    some_grow = some_grow || (found & DeviceWalks::kGrows) != 0;
+    some_grow = some_grow || (found & (DeviceWalks::kGrows | DeviceWalks::kMeet)) == DeviceWalks::kGrows;
   }
-  const bool some_wanted = std::any_of(walks.trees.begin(), walks.trees.end(), [](const DeviceWalks::Tree& tree) {
-    return std::any_of(tree.wanted.begin(), tree.wanted.end(), [](std::uint32_t bits) { return bits != 0; });
-  });
+  bool some_wanted = false;
+  for (std::size_t t = 0; t < trees_.size(); ++t) {
+    for (std::uint32_t bit = 0; bit < 32 * walks.trees[t].wanted.size(); ++bit) {
+      if ((walks.trees[t].wanted[bit / 32] >> bit % 32 & 1) == 0) continue;
+      some_wanted = true;
+      if (!isFrontier(trees_[t], bit / 8, bit % 8)) return "nodes are asked for that are there, or cannot be";
+    }
+  }
   if (some_grow != some_wanted) return "nodes that must grow are not told";
   return "";
 }

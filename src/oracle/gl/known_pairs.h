@@ -31,6 +31,7 @@ class KnownPairs {
   static constexpr int kDepth = 4;
 
   static Tree treeOf(const Surface& surface, int levels);
+  static bool isFrontier(const Tree& t, std::uint32_t block, std::uint32_t octant);
   void addPose(int number, std::uint32_t a, std::uint32_t b, double unit);
 
   std::vector<Tree> trees_;

@@ -76,6 +76,8 @@ constexpr Constant kConstants[] = {
     BOCST_NAMED(kPairBatch),
     BOCST_NAMED(kPairWords),
     BOCST_NAMED(kPairAnswer),
+    BOCST_NAMED(kWalkGroup),
+    BOCST_NAMED(kWalkPairs),
     BOCST_NAMED(kDeferredRoom),
     BOCST_NAMED(kMostWanted),
     BOCST_NAMED(kMostSteps),
@@ -99,7 +101,8 @@ constexpr Constant kConstants[] = {
 
 std::string constants() {
   // A layout qualifier takes a literal, so a macro.
-  std::string text = "#define GROUP " + std::to_string(kGroup) + "\n";
+  std::string text =
+      "#define GROUP " + std::to_string(kGroup) + "\n#define WALK_GROUP " + std::to_string(kWalkGroup) + "\n";
   for (const Constant& c : kConstants) {
     text += std::string("const uint ") + c.name + " = " + std::to_string(c.value) + "u;\n";
   }

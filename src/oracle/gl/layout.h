@@ -101,8 +101,13 @@ constexpr std::uint32_t kPairBatch = kPairTrees + 2 * kTreeWords;  ///< The numb
 constexpr std::uint32_t kPairWords = kPairBatch + 1;
 // The answer: a row per pair (the batch's number above 8 bits of DeviceWalks::Found; its check), then each tree's bits.
 constexpr std::uint32_t kPairAnswer = 2;
-constexpr std::uint32_t kDeferredRoom = 64;     ///< Pairs of nodes of a walk that wait for nodes; then it ends.
-constexpr std::uint32_t kMostWanted = 16;       ///< So many of them, those that overlap most, get their nodes next.
+constexpr std::uint32_t kWalkGroup = 64;              ///< Invocations of a walk.
+constexpr std::uint32_t kWalkPairs = kWalkGroup / 8;  ///< Pairs of nodes that it takes in a step.
+constexpr std::uint32_t kDeferredRoom = 64;  ///< For pairs of nodes of a walk that wait for nodes. A walk ends before a
+                                             ///< step could need more.
+constexpr std::uint32_t kMostWanted = 16;    ///< So many of them, those that overlap most, get their nodes next.
+static_assert(kDeferredRoom <= kWalkGroup && kMostWanted <= kDeferredRoom,
+              "each has an invocation when they are sorted");
 constexpr std::uint32_t kMostSteps = 1u << 12;  ///< Of a walk: longer ones are the host's, as a watchdog may look.
 constexpr std::uint32_t kWalkStack = 256;       ///< Pairs of nodes that a walk keeps; as above.
 

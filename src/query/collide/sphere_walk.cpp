@@ -153,10 +153,11 @@ void SphereWalk::addWanted(const TreeSide& side, const oracle::DeviceWalks::Tree
   forEachBit(tree.wanted, [&](std::uint32_t bit) {
     const std::uint32_t block = bit / 8;
     const auto octant = static_cast<int>(bit % 8);
+    const bool is_root = bit == 8 * tree.blocks;
     // A device that errs must not make nodes of what is empty.
-    const bool exists = block < tree.blocks ? (side.tree().block(block).grey >> octant & 1) != 0 : octant == 0;
-    const tree::NodeRef node = block < tree.blocks ? tree::NodeRef::octant(block, octant) : side.root();
-    if (exists && side.state(node) == State::kGrows) side.grow(node, growths);
+    if (!is_root && (block >= tree.blocks || (side.tree().block(block).grey >> octant & 1) == 0)) return;
+    const tree::NodeRef node = is_root ? side.root() : tree::NodeRef::octant(block, octant);
+    if (side.state(node) == State::kGrows) side.grow(node, growths);
   });
 }
 

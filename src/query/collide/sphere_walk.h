@@ -9,8 +9,8 @@
 namespace bocst::query {
 
 /// The walk for two trees with conservative answers: finds the pairs of leaves whose spheres meet, see spheresMeet().
-/// Spheres follow from the lattices and the pose alone, so the verdict and what a walk grows are the same with every
-/// oracle.
+/// Spheres follow from the lattices and the pose alone, so the verdict is the same with every oracle, and so is what
+/// run() and look() grow.
 class SphereWalk {
  public:
   static bool fits(const TreeSide& a, const TreeSide& b) { return a.isConservative() && b.isConservative(); }
@@ -41,7 +41,7 @@ class SphereWalk {
   static oracle::DeviceWalks::Tree describe(const TreeSide& side, const tree::Tree::NodeTable& table);
   /// Marks the blocks that the device came to.
   static void markUsed(const TreeSide& side, const oracle::DeviceWalks::Tree& tree);
-  /// Adds what the device did not find resident.
+  /// Adds the nodes that the device asks for and that are not resident.
   static void addWanted(const TreeSide& side, const oracle::DeviceWalks::Tree& tree,
                         std::vector<tree::Tree::Growth>& growths);
 

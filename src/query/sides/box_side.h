@@ -20,7 +20,7 @@ class BoxSide : public CompleteSide {
 
   static bool fits(const TreeSide& side) { return !side.isConservative() && side.tree().affordsBoxes(); }
 
-  explicit BoxSide(const TreeSide& side) : side_(side), nodes_(side.tree().boxes(side.now()).nodes()) {}
+  explicit BoxSide(const TreeSide& side) : side_(side), boxes_(side.tree().boxes(side.now())) {}
 
   Node root() const { return 0; }
   State state(Node n) const { return node(n).second == 0 ? State::kLeaf : State::kInner; }
@@ -47,8 +47,8 @@ class BoxSide : public CompleteSide {
     });
   }
 
-  std::size_t triangleCount(Node) const { return 1; }
-  std::uint32_t triangle(Node n, std::size_t) const { return node(n).triangle; }
+  std::size_t triangleCount(Node n) const { return node(n).count; }
+  std::uint32_t triangle(Node n, std::size_t i) const { return boxes_.triangles()[node(n).begin + i]; }
   void prefetch(std::uint32_t t) const { side_.prefetch(t); }
   void prefetchCorners(std::uint32_t t) const { side_.prefetchCorners(t); }
   const Eigen::Vector3d& vertex(std::uint32_t t, int k) const { return side_.vertex(t, k); }
@@ -57,10 +57,10 @@ class BoxSide : public CompleteSide {
   Eigen::Vector3d corner(std::uint32_t t, int k) const { return side_.corner(t, k); }
 
  private:
-  const tree::BoxTree::Node& node(Node n) const { return nodes_[static_cast<std::size_t>(n)]; }
+  const tree::BoxTree::Node& node(Node n) const { return boxes_.nodes()[static_cast<std::size_t>(n)]; }
 
   const TreeSide& side_;
-  const std::vector<tree::BoxTree::Node>& nodes_;
+  const tree::BoxTree& boxes_;
 };
 
 /// Do two models have oriented boxes, of which the roots' are apart?

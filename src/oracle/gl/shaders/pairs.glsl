@@ -9,7 +9,7 @@
 // A walk that has come to many nodes that are not resident ends, too: it will be walked again when those among them that
 // overlap most are there, and the resident nodes tell little before.
 
-layout(local_size_x = 64) in;
+layout(local_size_x = WALK_GROUP) in;
 
 layout(std430, binding = 0) readonly buffer Nodes { uint nodes[]; };  // tables of trees
 layout(std430, binding = 1) readonly buffer Pairs { uint pairs[]; };
@@ -66,13 +66,20 @@ vec3 placed(vec3 p) {
 
 void found(uint what) { atomicOr(s_found, what); }
 
-// How far the spheres of two nodes are apart; less than 0 where they overlap.
-float gapOf(Node node[2]) {
+// The way from one node's sphere to the other's, in units of tree 0, and their radii.
+void spheresOf(Node node[2], out vec3 way, out float radius[2]) {
   vec3 center[2];
-  float radius[2];
   sphereOf(0, node[0], center[0], radius[0]);
   sphereOf(1, node[1], center[1], radius[1]);
-  return distance(placed(center[1]), center[0]) - radius[0] - radius[1];
+  way = placed(center[1]) - center[0];
+}
+
+// What overlaps most has the least, as in DeferredPairs.
+float gapOf(Node node[2]) {
+  vec3 way;
+  float radius[2];
+  spheresOf(node, way, radius);
+  return dot(way, way) / (radius[0] * radius[0] + radius[1] * radius[1]);
 }
 
 void defer(uvec2 names, Node node[2]) {
@@ -112,11 +119,9 @@ bool step(uvec2 names, uint octant, out uvec2 next) {
   uint child = block << 3 | octant;
   next = x == 0 ? uvec2(child, names.y) : uvec2(names.x, child);
   node[x] = nodeOf(x, child);
-  vec3 center[2];
+  vec3 way;
   float radius[2];
-  sphereOf(0, node[0], center[0], radius[0]);
-  sphereOf(1, node[1], center[1], radius[1]);
-  vec3 way = placed(center[1]) - center[0];
+  spheresOf(node, way, radius);
   float squared = dot(way, way), margin = number(kPairMargin);
   float limit = radius[0] + radius[1] + number(kPairTolerance), most = limit + margin, least = max(limit - margin, 0.0);
   if (squared > most * most) return false;
@@ -136,13 +141,17 @@ void synchronise() {
   barrier();
 }
 
-// Puts the deferred pairs that overlap most first.
+bool isBefore(uvec2 names, uvec2 others) {
+  return names.x < others.x || (names.x == others.x && names.y < others.y);
+}
+
+// Puts the deferred pairs that overlap most first; of equal ones, which come in any order, those of lesser names.
 void sortDeferred(uint lane) {
   uint count = s_deferred_count, rank = 0u;
   uvec2 names = s_deferred[lane];
   float gap = s_gap[lane];
   for (uint i = 0u; i < count; ++i) {
-    if (s_gap[i] < gap || (s_gap[i] == gap && i < lane)) ++rank;
+    if (s_gap[i] < gap || (s_gap[i] == gap && isBefore(s_deferred[i], names))) ++rank;
   }
   synchronise();
   if (lane < count) s_deferred[rank] = names;
@@ -161,7 +170,7 @@ void wantNode(int t, uint name) {
 void readPair(uint pair, uint lane) {
   if (lane == 0u) s_check = 0u;
   synchronise();
-  for (uint i = lane; i < kPairWords; i += 64u) {
+  for (uint i = lane; i < kPairWords; i += kWalkGroup) {
     uint factor = 1u;
     for (uint k = i + 1u; k < kPairWords; ++k) factor *= kCheckFactor;
     s_pair[i] = pairs[pair * kPairWords + i];
@@ -188,7 +197,7 @@ void main() {
     ++steps;
     if (lane < 2u) s_goes_on[lane] = 0u;
     synchronise();
-    uint taken = min(depth, 8u), entry = lane / 8u;
+    uint taken = min(depth, kWalkPairs), entry = lane / 8u;
     uvec2 next;
     bool goes_on = entry < taken && step(s_stack[depth - taken + entry], lane & 7u, next);
     if (goes_on) atomicOr(s_goes_on[lane / 32u], 1u << (lane & 31u));
@@ -197,7 +206,7 @@ void main() {
     if (after > kWalkStack) break;
     if (goes_on) s_stack[depth - taken + before(lane)] = next;
     if (lane == 0u) s_depth = after;
-    if (s_deferred_count > kDeferredRoom - 8u) break;  // a step may add eight
+    if (s_deferred_count > kDeferredRoom - kWalkPairs) break;
   }
   if ((s_found & (kGrows | kMeet)) == kGrows) {
     sortDeferred(lane);
