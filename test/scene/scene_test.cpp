@@ -472,6 +472,72 @@ TYPED_TEST(SceneTest, ManyChangesBetweenQueries) {
   }
 }
 
+template <typename S>
+fcl::Transform3<S> placeAt(S x, S y, S z) {
+  fcl::Transform3<S> X = fcl::Transform3<S>::Identity();
+  X.translation() << x, y, z;
+  return X;
+}
+
+// One pair decides, so a change that is lost shows.
+TYPED_TEST(SceneTest, IgnoredPairsStayIgnoredThroughChanges) {
+  using S = TypeParam;
+  const auto ball = std::make_shared<fcl::Sphere<S>>(S(1));
+  Scene<S> scene;
+  const Id a = scene.addMoving(ball), b = scene.addMoving(ball), f = scene.addFixed(ball, placeAt<S>(5, 0, 0));
+  for (int i = 0; i < 40; ++i) scene.addFixed(ball, placeAt<S>(S(100 + 3 * i), 0, 0));
+  const States<S> beside_f = {placeAt<S>(S(5.5), 0, 0), placeAt<S>(0, 20, 0)};
+  const States<S> together = {placeAt<S>(0, 0, 20), placeAt<S>(0, S(0.5), 20)};
+  EXPECT_TRUE(scene.collides(beside_f.data()));
+  scene.ignore(a, f);
+  EXPECT_FALSE(scene.collides(beside_f.data()));
+  scene.setPose(f, placeAt<S>(5, S(0.1), 0));
+  EXPECT_FALSE(scene.collides(beside_f.data()));
+  scene.ignore(f, a, false);
+  EXPECT_TRUE(scene.collides(beside_f.data()));
+  EXPECT_TRUE(scene.collides(together.data()));
+  scene.ignore(b, a);
+  EXPECT_FALSE(scene.collides(together.data()));
+  scene.ignore(a, b, false);
+  EXPECT_TRUE(scene.collides(together.data()));
+}
+
+// So many objects come that the root of the hierarchy moves down; then some leave its bounds.
+TYPED_TEST(SceneTest, ObjectsAreFoundWhereTheyMove) {
+  using S = TypeParam;
+  const auto ball = std::make_shared<fcl::Sphere<S>>(S(1));
+  Scene<S> scene;
+  scene.addMoving(ball);
+  std::mt19937_64 g(5);
+  std::uniform_real_distribution<S> u(-500, 500);
+  std::vector<Id> fixed;
+  const auto touchesAt = [&scene](const fcl::Transform3<S>& X) { return scene.collides(&X); };
+  for (int i = 0; i < 580; ++i) {
+    fixed.push_back(scene.addFixed(ball, placeAt<S>(u(g), u(g), u(g))));
+    if (i >= 512) touchesAt(placeAt<S>(0, 0, 700));  // from here on, each is added to what was made
+  }
+  for (int i = 0; i < 50; ++i) {
+    const fcl::Transform3<S> X = placeAt<S>(600, S(10 * i), S(3 * i));
+    EXPECT_FALSE(touchesAt(X));
+    scene.setPose(fixed[static_cast<std::size_t>(11 * i)], X);
+    EXPECT_TRUE(touchesAt(X)) << i;
+  }
+}
+
+// What has no bounds is placed apart from the others.
+TYPED_TEST(SceneTest, HalfSpacesMove) {
+  using S = TypeParam;
+  Scene<S> scene;
+  scene.addMoving(std::make_shared<fcl::Halfspace<S>>(fcl::Vector3<S>::UnitZ(), S(0)));
+  scene.addMoving(std::make_shared<Model<S>>(test::torus(8).mesh()));
+  scene.addFixed(std::make_shared<Model<S>>(test::torus(10).mesh()), placeAt<S>(50, 0, 10));
+  const States<S> below = {placeAt<S>(0, 0, 0), placeAt<S>(0, 0, 90)}, above = {placeAt<S>(0, 0, 20), below[1]},
+                  both = {placeAt<S>(0, 0, 0), placeAt<S>(-40, 0, -5)};
+  EXPECT_FALSE(scene.collides(below.data()));
+  EXPECT_TRUE(scene.collides(above.data()));
+  EXPECT_TRUE(scene.collides(both.data()));
+}
+
 // Objects that share a geometry share what the scene knows of it, also when one of them is gone.
 TYPED_TEST(SceneTest, DeformedMesh) {
   using S = TypeParam;
