@@ -21,8 +21,9 @@ namespace bocst {
 /// solids, conservative answers and occupancy. They do not depend on `threads` or on which nodes are resident. A pose
 /// at which the bounding boxes are apart takes some nanoseconds.
 ///
-/// `threads`: number of threads that share the poses, including the calling thread; 0: one per hardware thread. Each
-/// call starts its threads, so more than one thread pays off only for thousands of poses.
+/// `threads`: number of threads that share the poses, including the calling thread. 0: one per hardware thread, but
+/// only one for every 4096 poses, because each call starts its threads. A program whose own threads call this at the
+/// same time passes 1.
 ///
 /// Thread rule: as collide(); the models may be queried, pruned and deformed at the same time. Each pose sees a mesh
 /// either before or after a change.
@@ -30,7 +31,7 @@ namespace bocst {
 /// The contents of hit[] are then unspecified.
 template <typename S>
 BOCST_EXPORT void collidePoses(const Model<S>& a, const Model<S>& b, const fcl::Transform3<S>* X_AB, std::size_t count,
-                               std::uint8_t* hit, unsigned threads = 1);
+                               std::uint8_t* hit, unsigned threads = 0);
 
 /// The order of the 16 numbers of a 4x4 matrix in memory: column by column, as in Eigen (kColumns), or row by row, as
 /// in C and NumPy arrays (kRows).
@@ -41,7 +42,7 @@ enum class MatrixOrder { kColumns, kRows };
 /// @throws std::invalid_argument as above, and for a matrix whose last row is not 0 0 0 1.
 template <typename S>
 BOCST_EXPORT void collidePoses(const Model<S>& a, const Model<S>& b, const S* X_AB, MatrixOrder order,
-                               std::size_t count, std::uint8_t* hit, unsigned threads = 1);
+                               std::size_t count, std::uint8_t* hit, unsigned threads = 0);
 
 extern template void collidePoses(const Model<float>&, const Model<float>&, const fcl::Transform3<float>*, std::size_t,
                                   std::uint8_t*, unsigned);

@@ -25,7 +25,7 @@ enum class OracleKind {
   kAuto,       ///< BOCST_ORACLE if it is set; else the CPU, and for conservative answers also a GPU.
   kCpu,        ///< SIMD on the calling thread.
   kOcclusion,  ///< OpenGL 3.3: occlusion queries with an exact test in the geometry shader.
-  kCompute,    ///< OpenGL 4.3: compute shaders; triangle lists stay on the device.
+  kCompute,    ///< OpenGL 4.3: compute shaders; long triangle lists stay on the device.
   kSampled,    ///< The paper's occlusion queries as published (4.2). They can miss parts of the surface and so
                ///< give a false "free": for comparison only.
 };

@@ -26,11 +26,17 @@ class DeviceResource {
   virtual std::size_t bytes() const = 0;
 };
 
+/// What the answers of a batch hold together: a shared pointer for each of them would take as long as the rest.
+struct BatchLists {
+  std::vector<std::uint32_t> ids;              ///< Lists that are not kept.
+  std::shared_ptr<const DeviceResource> kept;  ///< Lists that are.
+};
+
 /// One node to expand: the question and the answer.
 struct ExpansionRequest {
   static constexpr std::size_t kAll = std::numeric_limits<std::size_t>::max();
 
-  /// A list that the oracle keeps for itself, in `kept_resource`.
+  /// A list that the oracle keeps for itself, in keptLists().
   struct DeviceList {
     std::uint32_t begin = 0, count = 0;
   };
@@ -53,9 +59,8 @@ struct ExpansionRequest {
   std::array<std::uint32_t, 8> sizes{};  ///< Of each octant, how many triangles meet it.
   std::uint32_t first_here = 0;  ///< Where the lists that are not kept begin, that of octant 0, of octant 1, ...
   std::uint32_t first_kept = 0;  ///< Where octant 0's list would be with the oracle, which has room for all eight.
-  std::vector<std::uint32_t> lists;
-  std::shared_ptr<const std::vector<std::uint32_t>> batch_lists;  ///< In place of `lists`: those of a whole batch.
-  std::shared_ptr<const DeviceResource> kept_resource;            ///< Null where nothing is kept.
+  std::shared_ptr<const BatchLists> batch;  ///< Null where the answer has none of its lists.
+  std::vector<std::uint32_t> lists;         ///< In place of those of the batch.
 
   std::size_t listSize(int o) const { return sizes[static_cast<std::size_t>(o)]; }
   bool isKept(int o) const { return (kept >> o & 1) != 0; }
@@ -64,9 +69,12 @@ struct ExpansionRequest {
   const std::uint32_t* listBegin(int o) const {
     std::size_t begin = first_here;
     for (int p = 0; p < o; ++p) begin += isKept(p) ? 0 : listSize(p);
-    return (batch_lists != nullptr ? *batch_lists : lists).data() + begin;
+    return (batch != nullptr ? batch->ids : lists).data() + begin;
   }
   const std::uint32_t* listEnd(int o) const { return listBegin(o + 1); }
+
+  /// What has the lists that are kept; null where none is.
+  std::shared_ptr<const DeviceResource> keptLists() const { return kept != 0 ? batch->kept : nullptr; }
 
   /// Where octant o's list is kept; of none if it is not.
   DeviceList keptList(int o) const {

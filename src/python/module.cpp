@@ -423,13 +423,14 @@ std::optional<std::pair<Id, Id>> idsOf(const Pair& pair) {
 }
 
 void bindScene(py::module_& m) {
-  m.def("collide_poses", &posesOf, "a"_a, "b"_a, "X_AB"_a, py::kw_only(), "threads"_a = 1,
+  m.def("collide_poses", &posesOf, "a"_a, "b"_a, "X_AB"_a, py::kw_only(), "threads"_a = 0,
         R"(Checks one pair of models for collision at many poses. Returns a bool array (n,), as fcl.collide answers.
 
 a, b: Model.
 X_AB: (n, 4, 4) poses of b in the frame of a, in the length unit of the meshes. float64 arrays in C order are not copied,
 nor are those with matrices in column-major order (np.swapaxes(X, 1, 2) of an array in C order).
-threads: number of threads that share the poses; 0: one per hardware thread.)");
+threads: number of threads that share the poses; 0: one per hardware thread, but only one for every 4096 poses.
+Pass 1 if your own threads or processes call this at the same time.)");
 
   py::class_<Id>(m, "Id", "Identifies an object of one Scene.")
       .def("__bool__", &Id::isValid)

@@ -22,6 +22,8 @@ namespace {
 /// Poses that a thread takes at a time: enough that taking them costs nothing, few enough to be shared out. A device
 /// wants more of them.
 constexpr std::size_t kPosesAtOnce = 256, kPosesForDevice = 4096;
+/// A thread starts in the time that so many poses take whose bounding boxes are apart.
+constexpr std::size_t kPosesForThread = 4096;
 
 enum class LastRow { kChecked, kIgnored };
 
@@ -90,9 +92,12 @@ void collideAll(const Model<S>& a, const Model<S>& b, const Poses<S>& X_AB, std:
     std::fill(hit, hit + count, std::uint8_t{0});
     return;
   }
-  const std::size_t workers = threads != 0 ? threads : std::max(1u, std::thread::hardware_concurrency());
+  if (threads == 0) {
+    const std::size_t most = std::max(1u, std::thread::hardware_concurrency());
+    threads = static_cast<unsigned>(std::clamp<std::size_t>(count / kPosesForThread, 1, most));
+  }
   const std::size_t at_once = fcl_adapter::growsTogether(a, b)
-                                  ? std::clamp((count + workers - 1) / workers, kPosesAtOnce, kPosesForDevice)
+                                  ? std::clamp((count + threads - 1) / threads, kPosesAtOnce, kPosesForDevice)
                                   : kPosesAtOnce;
   const std::size_t rows = (count + at_once - 1) / at_once;
   const auto work = [&](std::size_t row) {

@@ -446,9 +446,9 @@ ChildRef Tree::addOctantList(const oracle::ExpansionRequest& answer, int octant)
   if (hopeless && !conservative()) {
     // A leaf's triangles are needed here.
     std::vector<std::uint32_t> ids(count);
-    if (oracle_->fetch(*answer.kept_resource, kept, ids.data())) return addList(ids.data(), count, true);
+    if (oracle_->fetch(*answer.batch->kept, kept, ids.data())) return addList(ids.data(), count, true);
   }
-  return addDeviceList(answer.kept_resource, kept);
+  return addDeviceList(answer.batch->kept, kept);
 }
 
 void Tree::setChild(NodeRef node, ChildRef ref) {
@@ -464,7 +464,7 @@ void Tree::publish(NodeRef node, const oracle::ExpansionRequest& answer) {
   block.setCell(answer.cell);
   block.octants = answer.octants;
   records_[index].own = answer.own;
-  if (answer.kept_resource != nullptr) {
+  if (answer.kept != 0) {
     const ChildRef own = childRef(node);
     if (own.isList()) records_[index].own_list = own.index();
   }

@@ -51,7 +51,7 @@ std::vector<ExpansionRequest> grownFromKeptLists(Oracle& oracle, const Surface& 
         ExpansionRequest child;
         child.surface = &surface;
         child.cell = e.cell.octant(o);
-        child.resource = e.kept_resource;
+        child.resource = e.keptLists();
         child.resource_begin = e.keptList(o).begin;
         child.count = e.keptList(o).count;
         child.ids_up_to = 0;
@@ -101,7 +101,7 @@ TEST(Compute, FetchesWhatItKeeps) {
   here = ask(oracle, {here})[0];
   for (int o = 0; o < 8; ++o) {
     std::vector<std::uint32_t> ids(kept.keptList(o).count);
-    ASSERT_TRUE(oracle.fetch(*kept.kept_resource, kept.keptList(o), ids.data()));
+    ASSERT_TRUE(oracle.fetch(*kept.keptLists(), kept.keptList(o), ids.data()));
     std::vector<std::uint32_t> expected(here.listBegin(o), here.listEnd(o));
     std::sort(ids.begin(), ids.end());
     std::sort(expected.begin(), expected.end());
@@ -316,8 +316,8 @@ TEST(Device, ALostContextLeavesEverythingToTheCpu) {
       child.surface = &surface;
       child.cell = root.cell.octant(o);
       child.count = root.listSize(o);
-      if (root.kept_resource != nullptr) {
-        child.resource = root.kept_resource;
+      if (root.kept != 0) {
+        child.resource = root.keptLists();
         child.resource_begin = root.keptList(o).begin;
       } else {
         child.ids = root.listBegin(o);
@@ -385,7 +385,7 @@ TEST(Device, RoundsLeakNothing) {
     root.ids_up_to = 0;
     root = ask(compute, {root})[0];
     EXPECT_NE(root.grey, 0);
-    return root.kept_resource;  // outlives its oracle
+    return root.keptLists();  // outlives its oracle
   };
   std::shared_ptr<const DeviceResource> last;
   for (int i = 0; i < 10; ++i) last = round();

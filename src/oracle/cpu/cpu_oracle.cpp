@@ -31,7 +31,7 @@ class Expander {
       s.octants[o].clear();
     }
     exists_ &= candidates;
-    e.kept_resource = nullptr;
+    e.batch = nullptr;
     e.kept = 0;
   }
 
@@ -144,7 +144,6 @@ class Expander {
     std::exclusive_scan(e_.sizes.begin(), e_.sizes.end(), next.begin(), std::size_t{0});
     e_.lists.resize(next[7] + e_.sizes[7]);
     e_.first_here = 0;
-    e_.batch_lists = nullptr;
     for (std::size_t i = 0; i < e_.count; ++i) {
       for (int bits = s_.masks[i]; bits != 0; bits &= bits - 1) e_.lists[next[__builtin_ctz(bits)]++] = id(i);
     }

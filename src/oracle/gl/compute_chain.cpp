@@ -199,8 +199,7 @@ void ComputeChain::take(const std::vector<ExpansionRequest*>& requests, const st
   const std::uint32_t* const all_ids = answers + kHeader + requests.size() * kRow;
   thread.require(all_ids[answers[kIdWords]] == batch_, "what came back is not of this batch");
   std::uint32_t wrong = 0;
-  // One vector for all: as many of them as cells would take longer than the rest.
-  const auto lists = std::make_shared<const std::vector<std::uint32_t>>(all_ids, all_ids + answers[kIdWords]);
+  const auto lists = std::make_shared<const BatchLists>(BatchLists{{all_ids, all_ids + answers[kIdWords]}, placed_});
   for (std::size_t i = 0; i < requests.size(); ++i) {
     ExpansionRequest& e = *requests[i];
     const std::uint32_t* const row = answers + kHeader + i * kRow;
@@ -222,12 +221,9 @@ void ComputeChain::take(const std::vector<ExpansionRequest*>& requests, const st
       here += stays ? 0 : e.sizes[o];
     }
     thread.require(row[kRowIds] + here <= answers[kIdWords], "a list is longer than what came back");
-    // To copy a shared pointer that nobody needs would take as long as the rest.
     e.first_here = here != 0 ? row[kRowIds] : 0;
-    e.kept_resource = nullptr;
-    e.batch_lists = nullptr;
-    if (e.kept != 0) e.kept_resource = placed_;
-    if (here != 0) e.batch_lists = lists;
+    e.batch = nullptr;
+    if (e.kept != 0 || here != 0) e.batch = lists;
   }
   thread.require(wrong == 0, "a cell was not answered");
 }

@@ -181,13 +181,13 @@ std::string askKept(ComputeOracle& oracle, std::vector<Question> questions) {
         const ExpansionRequest::DeviceList kept = batch[i].keptList(static_cast<int>(o));
         lists[o].resize(kept.count);
         if (kept.count == 0) continue;
-        if (!oracle.fetch(*batch[i].kept_resource, kept, lists[o].data())) return "a list was lost";
+        if (!oracle.fetch(*batch[i].keptLists(), kept, lists[o].data())) return "a list was lost";
         if (o % 3 != 0) continue;
         next.push_back({questions[i].surface, questions[i].cell.octant(static_cast<int>(o)), lists[o]});
         ExpansionRequest child;
         child.surface = next.back().surface;
         child.cell = next.back().cell;
-        child.resource = batch[i].kept_resource;
+        child.resource = batch[i].keptLists();
         child.resource_begin = kept.begin;
         child.count = kept.count;
         children.push_back(child);

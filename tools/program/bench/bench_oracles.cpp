@@ -54,7 +54,7 @@ Level childrenOf(std::vector<ExpansionRequest>& answers) {
       child.count = e.listSize(o);
       next.ids.emplace_back();
       if (e.isKept(o)) {
-        child.resource = e.kept_resource;
+        child.resource = e.keptLists();
         child.resource_begin = e.keptList(o).begin;
       } else {
         next.ids.back().assign(e.listBegin(o), e.listEnd(o));
@@ -263,7 +263,7 @@ ManyPoses timeOfPoses(OracleKind kind, const std::shared_ptr<const Mesh>& mesh,
   std::vector<double> times;
   for (int round = 0; round < kRounds; ++round) {
     const Stopwatch watch;
-    collidePoses(a, b, poses.data(), poses.size(), result.hits.data());
+    collidePoses(a, b, poses.data(), poses.size(), result.hits.data(), 1);
     const double time = watch.microseconds() / static_cast<double>(poses.size());
     if (round == 0) result.first = time;
     if (round > kRounds / 2) times.push_back(time);
