@@ -21,9 +21,9 @@ namespace bocst {
 /// solids, conservative answers and occupancy. They do not depend on `threads` or on which nodes are resident. A pose
 /// at which the bounding boxes are apart takes some nanoseconds.
 ///
-/// `threads`: number of threads that share the poses, including the calling thread. 0: one per hardware thread, but
-/// only one for every 4096 poses, because each call starts its threads. A program whose own threads call this at the
-/// same time passes 1.
+/// `threads`: number of threads that share the poses, including the calling thread. 0: one for every
+/// 4096 poses, at most one per hardware thread; fewer poses do not pay for threads, which each call starts. Pass 1 if
+/// your own threads call this at the same time.
 ///
 /// Thread rule: as collide(); the models may be queried, pruned and deformed at the same time. Each pose sees a mesh
 /// either before or after a change.

@@ -9,14 +9,16 @@
 #include <limits>
 #include <utility>
 
+#include "log/assert.h"
+
 namespace bocst::oracle {
 namespace {
 
 // Before anything is measured: one core of a desktop machine, and a GPU beside it (share/doc/oracles.md).
 constexpr CostModel kHost{1e-7, 1e-6, 4e-8}, kDevice{1e-4, 4e-7, 2e-9}, kUpload{1e-4, 0, 2e-8};
 
-// The host's part is chosen to be ready somewhat before the device's: one that has to wait learns what the device
-// takes.
+// The host's part should end before the device's: only if the host has to wait does the elapsed time measure the
+// device.
 constexpr double kHostEarlier = 0.8;
 
 // What it takes to part a batch and to put it together again, in seconds a cell.
@@ -143,9 +145,14 @@ bool AutoOracle::isAllForDevice(const Work& batch) const {
 }
 
 AutoOracle::Known& AutoOracle::known(const Surface& surface) {
-  Known& its = meshes_[surface.mesh.get()];
-  if (its.mesh.lock() != surface.mesh) its = {surface.mesh, nullptr};  // a new mesh where another was
-  return its;
+  const auto [begin, end] = meshes_.equal_range(surface.mesh.get());
+  for (auto i = begin; i != end; ++i) {
+    Known& its = i->second;
+    if (!(its.lattice == surface.lattice)) continue;
+    if (its.mesh.lock() != surface.mesh) its = {surface.mesh, surface.lattice};  // a new mesh where another was
+    return its;
+  }
+  return meshes_.insert({surface.mesh.get(), {surface.mesh, surface.lattice}})->second;
 }
 
 void AutoOracle::dropForgotten() {
@@ -172,7 +179,7 @@ std::vector<AutoOracle::Candidate> AutoOracle::chooseShare(const std::vector<Exp
   candidates.reserve(batch.size());
   for (std::size_t i = 0; i < batch.size(); ++i) {
     const ExpansionRequest& e = batch[i];
-    if (e.surface->mesh == nullptr) continue;
+    BOCST_ASSERT(e.surface->mesh != nullptr);  // this oracle makes nothing resident, so no mesh is released
     const bool is_next = !candidates.empty() && batch[candidates.back().place].surface == e.surface;
     Known* const its = is_next ? candidates.back().mesh : &known(*e.surface);
     if (!its->refused) candidates.push_back({e.count, i, its});
@@ -213,7 +220,9 @@ AutoOracle::Pending AutoOracle::makePending(std::vector<ExpansionRequest>& batch
   const bool is_part = share.size() < batch.size();
   for (const Candidate& candidate : share) {
     ExpansionRequest& e = batch[candidate.place];
-    const auto has_same = [&](const auto& other) { return other->mesh == e.surface->mesh; };
+    const auto has_same = [&](const auto& other) {
+      return other->mesh == e.surface->mesh && other->lattice == e.surface->lattice;
+    };
     auto found = std::find_if(pending.surfaces.begin(), pending.surfaces.end(), has_same);
     if (found == pending.surfaces.end()) {
       pending.surfaces.push_back(std::make_unique<Surface>(*e.surface));
@@ -265,14 +274,16 @@ void AutoOracle::submit(std::vector<ExpansionRequest>& batch) {
   // From here on the device may write to it, so it stays where it is.
   std::list<Pending>& all = pendingOfThread();
   all.splice(all.begin(), made);
-  Pending& mine = all.front();
+  const auto place = all.begin();
+  Pending& mine = *place;
   mine.begin = clock_();
   try {
     device_->submit(asked(mine, batch));
     if (mine.places.size() < batch.size()) answerRest(batch, mine);
   } catch (...) {
+    std::list<Pending> ended;  // also if wait() throws
+    ended.splice(ended.begin(), all, place);
     device_->wait(asked(mine, batch));
-    all.pop_front();
     throw;
   }
   mine.host_end = clock_();
@@ -298,12 +309,9 @@ void AutoOracle::wait(std::vector<ExpansionRequest>& batch) {
   const auto mine =
       std::find_if(all.begin(), all.end(), [&](const Pending& p) { return p.oracle == this && p.batch == &batch; });
   if (mine == all.end()) return;
-  try {
-    device_->wait(asked(*mine, batch));
-  } catch (...) {
-    all.erase(mine);
-    throw;
-  }
+  std::list<Pending> ended;  // also if wait() throws
+  ended.splice(ended.begin(), all, mine);
+  device_->wait(asked(*mine, batch));
   const double now = clock_(), took = now - mine->begin;
   // Where the host was the slower, the device took less than this.
   if (now - mine->host_end > 0.05 * took || took < mine->expected) learn(device_cost_, mine->work, took);
@@ -314,7 +322,6 @@ void AutoOracle::wait(std::vector<ExpansionRequest>& batch) {
     e.surface = place.surface;
     e.ids_up_to = place.ids_up_to;
   }
-  all.erase(mine);
 }
 
 }  // namespace bocst::oracle

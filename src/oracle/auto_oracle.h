@@ -19,7 +19,7 @@ namespace bocst::oracle {
 /// a part. What they take is measured at the start and with each batch that is answered. The nodes of a tree are the
 /// same wherever they were made; all lists come back to the host, so whoever made a node, either can go on below it.
 ///
-/// A mesh is uploaded when batches would have taken less time, by as much as the upload takes, had it been there.
+/// A mesh is uploaded once the time that its batches would have saved on the device exceeds the upload's time.
 ///
 /// Threads: any number. A thread that finds costs_mutex_ locked asks the host.
 class BOCST_EXPORT AutoOracle : public Oracle {
@@ -54,12 +54,13 @@ class BOCST_EXPORT AutoOracle : public Oracle {
     double cells = 0, triangles = 0;
     void add(const ExpansionRequest& e);
   };
-  /// A mesh, and what the device has of it.
+  /// A mesh on a lattice, and what the device has of it.
   struct Known {
     std::weak_ptr<const Mesh> mesh;
-    std::shared_ptr<const DeviceResource> device;  // null: nothing yet
-    double saved = 0;                              // seconds that the device would have saved
-    bool refused = false;                          // the device cannot take it
+    lattice::Lattice lattice;
+    std::shared_ptr<const DeviceResource> device = nullptr;  // null: nothing yet
+    double saved = 0;                                        // seconds that the device would have saved
+    bool refused = false;                                    // the device cannot take it
   };
   /// A batch of which the device has a part.
   struct Pending {
@@ -70,8 +71,9 @@ class BOCST_EXPORT AutoOracle : public Oracle {
       const Surface* surface;
       std::size_t ids_up_to;
     };
-    std::vector<ExpansionRequest> part;  // what the device has of it, unless that is all: taken until it is answered
-    std::vector<Place> places;           // and whence
+    std::vector<ExpansionRequest> part;  // the device's requests, moved out of the batch until wait(); empty if the
+                                         // device has the whole batch
+    std::vector<Place> places;           // where each was in the batch
     std::vector<std::unique_ptr<Surface>> surfaces;
     Work work;
     double expected = 0, begin = 0, host_end = 0;
@@ -108,7 +110,7 @@ class BOCST_EXPORT AutoOracle : public Oracle {
   // For what follows. Only try_lock is used: a child after fork() may find it locked for ever.
   std::mutex costs_mutex_;
   CostModel host_cost_, device_cost_, upload_cost_;
-  std::map<const Mesh*, Known> meshes_;
+  std::multimap<const Mesh*, Known> meshes_;
   std::size_t live_meshes_ = 0;  // when forgotten ones were last dropped
   Trials trials_;
 };

@@ -7,13 +7,13 @@
 namespace bocst::oracle {
 namespace {
 
-// How far one batch corrects what is expected, and the most that it may be taken to be off by: a thread that has to
-// wait for its core says nothing of the device.
-constexpr double kRate = 0.3, kMostOff = 8;
+constexpr double kRate = 0.3;   // the share of an error, as a logarithm, that one batch corrects
+constexpr double kMostOff = 8;  // a batch counts as off by at most this factor: its thread may have waited for its core
 
-// Of the time of all batches, what asking a slower device again may take, and what it may make of one batch's time. A
-// trial counts as kLeastPrice of the batch's time at least.
-constexpr double kTrying = 0.02, kSlowestTry = 4, kMostCredit = 0.02, kLeastPrice = 0.25;
+constexpr double kTrying = 0.02;      // the share of the host's time that trials of a slower device may take
+constexpr double kMostCredit = 0.02;  // seconds of it that may be saved up
+constexpr double kSlowestTry = 4;     // a trial may take at most this multiple of the host's time
+constexpr double kLeastPrice = 0.25;  // and counts as at least this share of it
 
 // Before anything is measured; a cell is a pair here. The host: bunny00 at depth 7 on one core. A GPU: a guess. A
 // software renderer takes some hundred times as long as the host.

@@ -19,7 +19,7 @@ struct CostModel {
 /// When a device that is expected to be slower than the host is tried again: devices that were busy get better.
 class Trials {
  public:
-  /// A share of the host's time above which a gain is within what the models are off by.
+  /// The device must take less than this share of the host's time: a smaller gain is within the models' error.
   static constexpr double kWorthwhile = 0.95;
 
   /// Work came that takes the host `host` seconds.

@@ -15,7 +15,7 @@ namespace node_table {
 constexpr std::uint32_t kPlace = 0;     ///< Bits 0 to 15: the expanded cell's x; 16 to 31: its y.
 constexpr std::uint32_t kShape = 1;     ///< Bits 0 to 15: its z; 16 to 23: its level; 24 to 31: its grey octants.
 constexpr std::uint32_t kChildren = 2;  ///< 8: the block of each octant, or kNone.
-constexpr std::uint32_t kStamp = 10;    ///< Of the upload: what did not arrive has another. The oracle's.
+constexpr std::uint32_t kStamp = 10;    ///< Number of the upload, by the oracle; a block with another did not arrive.
 constexpr std::uint32_t kWords = 11;
 constexpr std::uint32_t kNone = 0xffffffffu;
 }  // namespace node_table
@@ -37,13 +37,13 @@ struct DeviceWalks {
     float rotation[3][3] = {};       ///< Rows: p_0 = rotation * p_1 + shift, for points p_i in lattice units ...
     float shift[3] = {0, 0, 0};      ///< ... of tree i from the middle of its root, those of tree 1 times `unit`.
     float unit = 1;                  ///< A lattice unit of tree 1, in those of tree 0.
-    float rounding_margin = 0;       ///< As of query::SphereFrames; so much nearer or farther is in doubt.
+    float rounding_margin = 0;       ///< Distances within this of the sum of the radii are kDoubt (SphereFrames).
     float tolerance = 0;
     std::int32_t not_smaller = 0;  ///< Tree 0's node is expanded if tree 1's is deeper by at least this many levels.
   };
   enum Found : std::uint8_t {
     kMeet = 1,     ///< The spheres of leaves meet.
-    kDoubt = 2,    ///< Float does not tell of some.
+    kDoubt = 2,    ///< Some leaves are too close to call in float.
     kGrows = 4,    ///< A node is not resident; `wanted` has what must be, unless the walk has kMeet.
     kUndone = 8,   ///< The walk was too long, or the device did not do it.
     kInvalid = 16  ///< The table is not what was uploaded. Never answered.

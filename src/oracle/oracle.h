@@ -26,17 +26,17 @@ class DeviceResource {
   virtual std::size_t bytes() const = 0;
 };
 
-/// What the answers of a batch hold together: a shared pointer for each of them would take as long as the rest.
+/// The lists of a batch. All its answers share one pointer to them: one for each list would take as long as the rest.
 struct BatchLists {
-  std::vector<std::uint32_t> ids;              ///< Lists that are not kept.
-  std::shared_ptr<const DeviceResource> kept;  ///< Lists that are.
+  std::vector<std::uint32_t> ids;                   ///< Of lists on the host, one after the other.
+  std::shared_ptr<const DeviceResource> on_device;  ///< Has the lists that the oracle keeps.
 };
 
 /// One node to expand: the question and the answer.
 struct ExpansionRequest {
   static constexpr std::size_t kAll = std::numeric_limits<std::size_t>::max();
 
-  /// A list that the oracle keeps for itself, in keptLists().
+  /// A list that the oracle keeps for itself, in deviceLists().
   struct DeviceList {
     std::uint32_t begin = 0, count = 0;
   };
@@ -52,34 +52,34 @@ struct ExpansionRequest {
   std::size_t ids_up_to = kAll;  ///< Longer lists may stay with the oracle.
 
   // Answered.
-  std::uint8_t grey = 0;  ///< Bit o: the surface meets octant o (reference.h), which has an actual region.
-  std::uint8_t kept = 0;  ///< Bit o: the oracle keeps octant o's list.
+  std::uint8_t grey = 0;       ///< Bit o: the surface meets octant o (reference.h), which has an actual region.
+  std::uint8_t on_device = 0;  ///< Bit o: the oracle keeps octant o's list.
   bounds::OctantBounds octants;
   bounds::NodeBounds own;                ///< Of the cell itself: what the octants taught about it.
   std::array<std::uint32_t, 8> sizes{};  ///< Of each octant, how many triangles meet it.
-  std::uint32_t first_here = 0;  ///< Where the lists that are not kept begin, that of octant 0, of octant 1, ...
-  std::uint32_t first_kept = 0;  ///< Where octant 0's list would be with the oracle, which has room for all eight.
+  std::uint32_t first_on_host = 0;       ///< Where the lists on the host begin in batch->ids, or in `lists`, by octant.
+  std::uint32_t first_on_device = 0;     ///< Where octant 0's list would be with the oracle, which has room for all.
   std::shared_ptr<const BatchLists> batch;  ///< Null where the answer has none of its lists.
   std::vector<std::uint32_t> lists;         ///< In place of those of the batch.
 
   std::size_t listSize(int o) const { return sizes[static_cast<std::size_t>(o)]; }
-  bool isKept(int o) const { return (kept >> o & 1) != 0; }
+  bool isOnDevice(int o) const { return (on_device >> o & 1) != 0; }
 
-  /// The triangles of octant o, none if its list is kept.
+  /// The triangles of octant o; none if the oracle keeps its list.
   const std::uint32_t* listBegin(int o) const {
-    std::size_t begin = first_here;
-    for (int p = 0; p < o; ++p) begin += isKept(p) ? 0 : listSize(p);
+    std::size_t begin = first_on_host;
+    for (int p = 0; p < o; ++p) begin += isOnDevice(p) ? 0 : listSize(p);
     return (batch != nullptr ? batch->ids : lists).data() + begin;
   }
   const std::uint32_t* listEnd(int o) const { return listBegin(o + 1); }
 
-  /// What has the lists that are kept; null where none is.
-  std::shared_ptr<const DeviceResource> keptLists() const { return kept != 0 ? batch->kept : nullptr; }
+  /// What has the lists that the oracle keeps; null where there are none.
+  std::shared_ptr<const DeviceResource> deviceLists() const { return on_device != 0 ? batch->on_device : nullptr; }
 
-  /// Where octant o's list is kept; of none if it is not.
-  DeviceList keptList(int o) const {
-    if (!isKept(o)) return {};
-    return {std::accumulate(sizes.begin(), sizes.begin() + o, first_kept), sizes[static_cast<std::size_t>(o)]};
+  /// Where the oracle keeps octant o's list; empty if it does not.
+  DeviceList deviceList(int o) const {
+    if (!isOnDevice(o)) return {};
+    return {std::accumulate(sizes.begin(), sizes.begin() + o, first_on_device), sizes[static_cast<std::size_t>(o)]};
   }
 };
 

@@ -11,7 +11,7 @@ namespace bocst::oracle {
 
 class DeviceResource;
 
-/// What an oracle is asked about: a mesh, seen on its lattice.
+/// What an oracle is asked about: a mesh, seen on its lattice. A Surface is made with a mesh, whose size it keeps.
 struct Surface {
   std::shared_ptr<const Mesh> mesh;  ///< Null when only the device has it.
   lattice::Lattice lattice;

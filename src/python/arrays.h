@@ -21,7 +21,7 @@ namespace py = pybind11;
 /// Doubles in C order, aligned, of any real or integer dtype and any layout; the array itself where it is that already.
 py::array_t<double, py::array::c_style> doubles(const char* name, const py::handle& object);
 
-/// An (n, 3) array as vectors; `bytes` of the copy that Eigen wants, and no other.
+/// An (n, 3) array of any dtype and layout as vectors, copied once.
 std::vector<Eigen::Vector3d> vectors(const char* name, const py::handle& object);
 
 /// (3,) and (3, 3), finite.

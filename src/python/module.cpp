@@ -429,7 +429,7 @@ void bindScene(py::module_& m) {
 a, b: Model.
 X_AB: (n, 4, 4) poses of b in the frame of a, in the length unit of the meshes. float64 arrays in C order are not copied,
 nor are those with matrices in column-major order (np.swapaxes(X, 1, 2) of an array in C order).
-threads: number of threads that share the poses; 0: one per hardware thread, but only one for every 4096 poses.
+threads: number of threads that share the poses; 0: one for every 4096 poses, at most one per hardware thread.
 Pass 1 if your own threads or processes call this at the same time.)");
 
   py::class_<Id>(m, "Id", "Identifies an object of one Scene.")

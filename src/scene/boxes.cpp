@@ -67,10 +67,10 @@ HWY_INLINE std::uint32_t overlapping(const Own& a, const Boxes& b, const float* 
   return bits;
 }
 
-// What the faces of one box say: the distance of the other's box along the own axes (of which the largest will do where
-// only touching counts), or how deep it is inside.
+// The gap of two boxes along the normals of one box's faces: their distance if kDistance, else the largest gap of the
+// three; negative: the depth.
 template <bool kDistance>
-HWY_INLINE V ofFaces(V s0, V s1, V s2) {
+HWY_INLINE V gapAlongFaces(V s0, V s1, V s2) {
   const D d;
   if constexpr (!kDistance) return max3(s0, s1, s2);
   const V zero = hn::Zero(d);
@@ -139,7 +139,7 @@ HWY_INLINE std::uint32_t nearLanes(const Own& a, const BoxGroup& b, std::uint32_
       }
       s[k] = hn::Sub(hn::Abs(t[k]), radius);
     }
-    V most = ofFaces<kDistance>(s[0], s[1], s[2]), g;
+    V most = gapAlongFaces<kDistance>(s[0], s[1], s[2]), g;
     const auto near = [&] {
       g = hn::Sub(hn::Mul(share, most), reach);
       return bitsOf(D(), hn::Le(g, far)) & lanes;
@@ -152,7 +152,7 @@ HWY_INLINE std::uint32_t nearLanes(const Own& a, const BoxGroup& b, std::uint32_
       for (int k = 0; k < 3; ++k) radius = hn::MulAdd(a.half[k], size[k][j], radius);
       v[j] = hn::Sub(hn::Abs(dot(displacement, axis_b[j])), radius);
     }
-    most = hn::Max(most, ofFaces<kDistance>(v[0], v[1], v[2]));
+    most = hn::Max(most, gapAlongFaces<kDistance>(v[0], v[1], v[2]));
     if (near() == 0) continue;
     // How deep boxes overlap along edges says little: their axes may have almost no length.
     const V along_edges = gapAlongEdges(r, size, t, a.half, half_b);
@@ -178,7 +178,7 @@ std::size_t NearBox(const SceneBoxes& boxes, std::size_t i, const std::uint8_t* 
                     const float* far_of_moving, std::int32_t* stack, NearGroup* near) {
   const Own own = ownOf({&boxes.moving[i / 8], i % 8}, far);
   std::size_t count = 0, depth = 0;
-  const auto look = [&](const BoxGroup& group, std::uint32_t mask, std::size_t index, const float* far_b) {
+  const auto addNearGroup = [&](const BoxGroup& group, std::uint32_t mask, std::size_t index, const float* far_b) {
     mask &= overlapping(own, group, far_b);
     if (mask == 0) return;
     NearGroup& n = near[count];
@@ -196,7 +196,7 @@ std::size_t NearBox(const SceneBoxes& boxes, std::size_t i, const std::uint8_t* 
         stack[depth++] = child;
       } else {
         const auto group = static_cast<std::size_t>(~child);
-        if (masks[group] != 0) look(boxes.fixed[group], masks[group], group, nullptr);
+        if (masks[group] != 0) addNearGroup(boxes.fixed[group], masks[group], group, nullptr);
       }
     }
   }
@@ -204,7 +204,7 @@ std::size_t NearBox(const SceneBoxes& boxes, std::size_t i, const std::uint8_t* 
   for (std::size_t g = i / 8; g < boxes.moving_count; ++g) {
     const std::size_t index = boxes.fixed_count + g;
     if (masks[index] == 0) continue;
-    look(boxes.moving[g], masks[index], index, far_of_moving == nullptr ? nullptr : far_of_moving + 8 * g);
+    addNearGroup(boxes.moving[g], masks[index], index, far_of_moving == nullptr ? nullptr : far_of_moving + 8 * g);
   }
   return count;
 }

@@ -198,7 +198,8 @@ S clearance(const World<S>& world, StateCheck<S>& check, const fcl::Transform3<S
   constexpr float kInfinity = std::numeric_limits<float>::infinity(), kMost = std::numeric_limits<float>::max();
   constexpr float kLonger = 4;
   for (float reach = std::max(static_cast<float>(check.clearance_guess), std::numeric_limits<float>::min());;
-       reach = std::min(kLonger * reach, std::nextafter(static_cast<float>(least), kInfinity))) {
+       reach =
+           std::min(kLonger * reach, std::nextafter(static_cast<float>(std::min<double>(least, kMost)), kInfinity))) {
     const bool is_last = !(reach < kUnboxedSize);
     if (is_last) reach = kMost;
     candidates.clear();

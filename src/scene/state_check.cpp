@@ -97,9 +97,9 @@ bool StateCheck<S>::runAll(const fcl::Transform3<S>* X_WM, std::vector<Entry>* e
     const std::uint32_t i = order_[n];
     near_count_ = 0;
     addNear(i, far_[i], far_of_moving_);
-    for (std::size_t k = 0; k < near_count_; ++k) lookAt(X_WM, near_[k], entries);
+    for (std::size_t k = 0; k < near_count_; ++k) addCandidates(X_WM, near_[k], entries);
   }
-  return lookAtRest(X_WM, entries);
+  return checkCandidates(X_WM, entries);
 }
 
 template <typename S>
@@ -118,14 +118,14 @@ bool StateCheck<S>::run(const fcl::Transform3<S>* X_WM, const Entry* begin, cons
     if (n.mask == 0) continue;
     n.box = e->moving;
     n.group = e->group;
-    lookAt(X_WM, n, entries);
+    addCandidates(X_WM, n, entries);
   }
-  return lookAtRest(X_WM, entries);
+  return checkCandidates(X_WM, entries);
 }
 
 // Asks about pairs that probably touch: the one that touched last, and deep ones. The others are candidates.
 template <typename S>
-void StateCheck<S>::lookAt(const fcl::Transform3<S>* X_WM, const NearGroup& n, std::vector<Entry>* entries) {
+void StateCheck<S>::addCandidates(const fcl::Transform3<S>* X_WM, const NearGroup& n, std::vector<Entry>* entries) {
   if (entries != nullptr) entries->push_back({n.box, n.group, n.mask});
   for (std::uint32_t left = n.mask; left != 0 && !touches_; left &= left - 1) {
     const auto lane = static_cast<std::uint32_t>(__builtin_ctz(left));
@@ -145,7 +145,7 @@ void StateCheck<S>::lookAt(const fcl::Transform3<S>* X_WM, const NearGroup& n, s
 
 // Asks about the candidates, the deepest first.
 template <typename S>
-bool StateCheck<S>::lookAtRest(const fcl::Transform3<S>* X_WM, std::vector<Entry>* entries) {
+bool StateCheck<S>::checkCandidates(const fcl::Transform3<S>* X_WM, std::vector<Entry>* entries) {
   if (!touches_) {
     std::sort(candidates_.begin(), candidates_.end(),
               [](const Candidate& p, const Candidate& q) { return p.gap < q.gap; });

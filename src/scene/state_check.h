@@ -25,7 +25,7 @@ template <typename S>
 bool touch(const Object<S>& a, const fcl::Transform3<S>& X_WA, const Object<S>& b, const fcl::Transform3<S>& X_WB,
            fcl::CollisionResult<S>& scratch);
 
-/// Looks at one state for itself and for all states near it. Kept by a thread between queries, for the memory it has.
+/// Checks one state and lists the pairs that may touch in states near it. Each thread keeps one, to reuse its memory.
 ///
 /// A result for a state also holds for every state in which no point of the box around moving object i is more than
 /// far[i] away from where it is in this state: objects whose boxes or hulls are farther apart than both can move stay
@@ -81,8 +81,8 @@ class StateCheck {
   void addNear(std::size_t i, float far_a, const float* far_of_moving);
   void beginState(const fcl::Transform3<S>* X_WM);
   bool isDone(const std::vector<Entry>* entries) const { return touches_ && (entries == nullptr || !lists_after_hit); }
-  void lookAt(const fcl::Transform3<S>* X_WM, const NearGroup& n, std::vector<Entry>* entries);
-  bool lookAtRest(const fcl::Transform3<S>* X_WM, std::vector<Entry>* entries);
+  void addCandidates(const fcl::Transform3<S>* X_WM, const NearGroup& n, std::vector<Entry>* entries);
+  bool checkCandidates(const fcl::Transform3<S>* X_WM, std::vector<Entry>* entries);
   void ask(const fcl::Transform3<S>* X_WM, const Candidate& c, std::vector<Entry>* entries);
 
   const World<S>* world_ = nullptr;

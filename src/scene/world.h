@@ -16,14 +16,16 @@
 
 namespace bocst::scene {
 
+/// An object of a scene: a geometry, its bounds, and its pose if it is fixed.
 template <typename S>
 struct Object {
-  std::shared_ptr<fcl::CollisionGeometry<S>> geometry;  ///< Of a BVHModel the model; null: a lane without an object.
-  const Model<S>* model = nullptr;                      ///< It, if it is one.
-  bool exact = false;                                   ///< A model with exact answers.
+  std::shared_ptr<fcl::CollisionGeometry<S>>
+      geometry;                     ///< For a BVHModel, the Model made from it; null: an empty lane.
+  const Model<S>* model = nullptr;  ///< `geometry` as a Model, or null.
+  bool exact = false;               ///< A model with exact answers.
   Bounds bounds;
   Id id;
-  fcl::Transform3<S> X_WG = fcl::Transform3<S>::Identity();  ///< Where it is, if it is fixed.
+  fcl::Transform3<S> X_WG = fcl::Transform3<S>::Identity();  ///< Of a fixed object, in the world.
 };
 
 /// The largest entry of R^T R - 1 of a pose that is rigid up to rounding; infinite where it is not finite, or reflects.

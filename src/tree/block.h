@@ -125,7 +125,7 @@ struct NodeRef {
   bool operator<(NodeRef other) const { return bits < other.bits; }
 };
 
-/// What growth and decay know of a block beside; its number is the block's.
+/// What only growth and decay read of a block; the record has the block's number.
 struct BlockRecord {
   bounds::NodeBounds own;                 ///< Box and slab of the expanded node itself, as its octants showed it.
   std::uint32_t own_list = Block::kNone;  ///< Where its list is; only where an oracle keeps its octants'.

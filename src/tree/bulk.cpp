@@ -25,7 +25,7 @@ constexpr std::uint32_t kMostInCluster = 16;         // neighbours along the cur
 constexpr std::uint32_t kMostOneByOne = 64;          // smaller pieces are divided triangle by triangle
 constexpr std::size_t kMostInSlab = 4096;            // above, the surface is no slab and the pass over it is long
 constexpr std::size_t kMostOnCoarseCurve = 1 << 18;  // a curve of 2^7 cells along each axis parts this many
-constexpr std::uint32_t kMostInEnd = 512;            // the finest pieces that supports are sought by
+constexpr std::uint32_t kMostInSupportPiece = 512;   // the finest pieces that supports are sought by
 constexpr int kBins = 8;
 constexpr float kInfinity = std::numeric_limits<float>::infinity();
 constexpr std::size_t kRowPad = 16;     // kernels read whole vectors
@@ -425,8 +425,8 @@ void BulkBuilder::boundBlocks() {
     std::uint32_t count = 0;
     for (std::uint32_t o = 0; o < block.lanes; ++o) count += block.lane[o].count;
     for (std::uint32_t o = 0; o < block.lanes; ++o) {
-      if (count > kMostInEnd && block.lane[o].count <= kMostInEnd) {
-        ends_.push_back({block.lane[o].begin, block.lane[o].count, lanes[o]});
+      if (count > kMostInSupportPiece && block.lane[o].count <= kMostInSupportPiece) {
+        support_pieces_.push_back({block.lane[o].begin, block.lane[o].count, lanes[o]});
       }
       bounds::NodeBounds& b = block.bounds[o];
       corner(lanes[o].lo, -margin, lo);
@@ -454,13 +454,13 @@ std::size_t BulkBuilder::pack(std::uint32_t begin, std::uint32_t count, PackedTr
 
 // Calls f with the pieces that supports are sought by.
 template <typename F>
-void BulkBuilder::withEnds(F&& f) const {
-  const std::size_t stride = ends_.size() + kRowPad;
+void BulkBuilder::withSupportPieces(F&& f) const {
+  const std::size_t stride = support_pieces_.size() + kRowPad;
   std::vector<float> center(3 * stride, 0), half(3 * stride, -kInfinity);
   std::vector<std::array<std::uint32_t, 2>> pieces;
-  for (std::size_t i = 0; i < ends_.size(); ++i) {
-    const PieceBounds& b = ends_[i].bounds;
-    pieces.push_back({ends_[i].begin, ends_[i].count});
+  for (std::size_t i = 0; i < support_pieces_.size(); ++i) {
+    const PieceBounds& b = support_pieces_[i].bounds;
+    pieces.push_back({support_pieces_[i].begin, support_pieces_[i].count});
     for (std::size_t c = 0; c < 3; ++c) {
       center[c * stride + i] = (b.lo[c] + b.hi[c]) / 2;
       half[c * stride + i] = (b.hi[c] - b.lo[c]) / 2;
@@ -473,12 +473,12 @@ void BulkBuilder::findSupports(SupportTable& supports) const {
   const CornerRows rows = this->rows();
   const double margin = 3 * marginOf(size_);
   const Eigen::Vector3d base = base_.array() - lattice::kMiddle;
-  withEnds([&](const BoundedPieces& ends) {
+  withSupportPieces([&](const BoundedPieces& pieces) {
     for (int number = 0; number < SupportTable::kCount; ++number) {
       const Eigen::Vector3d direction = SupportTable::direction(number);
       const float n[3] = {static_cast<float>(direction[0]), static_cast<float>(direction[1]),
                           static_cast<float>(direction[2])};
-      const auto most = static_cast<double>(farthestAlong(rows, ends, n));
+      const auto most = static_cast<double>(farthestAlong(rows, pieces, n));
       supports.lower(number, most + direction.dot(base) + margin);
     }
   });
@@ -514,7 +514,7 @@ Outline::Box BulkBuilder::findOutline(const lattice::Lattice& lattice) const {
   const CornerRows rows = this->rows();
   Outline::Box best;
   double best_area = std::numeric_limits<double>::infinity();
-  withEnds([&](const BoundedPieces& ends) {
+  withSupportPieces([&](const BoundedPieces& pieces) {
     for (const Eigen::Matrix3d& axes : {Eigen::Matrix3d(Eigen::Matrix3d::Identity()), principalAxes()}) {
       if (!axes.allFinite()) continue;
       Eigen::Vector3d center = base_, half;
@@ -523,7 +523,7 @@ Outline::Box BulkBuilder::findOutline(const lattice::Lattice& lattice) const {
         for (const int sign : {-1, 1}) {
           float n[3];
           for (int c = 0; c < 3; ++c) n[c] = static_cast<float>(sign * axes(c, k));
-          ends_at[sign > 0] = sign * (static_cast<double>(farthestAlong(rows, ends, n)) + 3 * marginOf(size_));
+          ends_at[sign > 0] = sign * (static_cast<double>(farthestAlong(rows, pieces, n)) + 3 * marginOf(size_));
         }
         center += axes.col(k) * (ends_at[0] + ends_at[1]) / 2;
         half[k] = (ends_at[1] - ends_at[0]) / 2;
@@ -539,13 +539,13 @@ Outline::Box BulkBuilder::findOutline(const lattice::Lattice& lattice) const {
 
 void BulkBuilder::finish(const Mesh::Indices* indices, const std::uint32_t* numbers) {
   own_ = Own();
-  ends_.clear();
+  support_pieces_.clear();
   if (ids_.empty()) return;
   gatherCorners(indices, places_, numbers, count_, rows_, count_ + kRowPad);
   boundBlocks();
   const auto count = static_cast<std::uint32_t>(ids_.size());
   const PieceBounds bounds = blocks_.empty() ? boundsOf(0, count) : block_bounds_[0];
-  if (ends_.empty()) ends_.push_back({0, count, bounds});
+  if (support_pieces_.empty()) support_pieces_.push_back({0, count, bounds});
   const double margin = marginOf(size_);
   for (int k = 0; k < 3; ++k) {
     own_.box.min()[k] = static_cast<double>(bounds.lo[k]) + base_[k] - margin;

@@ -93,7 +93,7 @@ class BulkBuilder {
   struct Half {
     std::uint32_t items, triangles;  ///< Of the first part.
   };
-  struct End {
+  struct SupportPiece {
     std::uint32_t begin, count;  ///< Of ids().
     PieceBounds bounds;
   };
@@ -111,7 +111,7 @@ class BulkBuilder {
   void finish(const Mesh::Indices* indices, const std::uint32_t* numbers);
   CornerRows rows() const;
   template <typename F>
-  void withEnds(F&& f) const;
+  void withSupportPieces(F&& f) const;
   Eigen::Matrix3d principalAxes() const;
   PieceBounds boundsOf(std::uint32_t begin, std::uint32_t count) const;
   void boundBlocks();
@@ -135,7 +135,7 @@ class BulkBuilder {
 
   std::vector<std::uint32_t> ids_;
   std::vector<PieceBounds> block_bounds_;
-  std::vector<End> ends_;  // pieces that supports are sought by
+  std::vector<SupportPiece> support_pieces_;  // pieces that supports are sought by
   std::vector<Block> blocks_;
   Own own_;
   Eigen::Vector3d base_;         // of the float coordinates, whole lattice units

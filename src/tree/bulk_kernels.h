@@ -16,14 +16,14 @@ struct CornerRows {
   const float* row[9];
 };
 
-/// The last entries are any.
+/// The last entries are not used.
 struct TriangleBox {
   float lo[4], hi[4];
 };
 
 /// Box of the corners of some triangles, and twice the sum of their areas as vectors along their normals.
 struct PieceBounds {
-  float lo[4], hi[4];  ///< The last entries are any.
+  float lo[4], hi[4];  ///< The last entries are not used.
   float normal[3];
 };
 

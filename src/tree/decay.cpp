@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: BSD-3-Clause
-// How branches go: by age and by budget, and where their triangles are then.
+// Drops branches by age and by budget, and gives their triangles back to their nodes.
 #include <algorithm>
 #include <array>
 #include <mutex>
@@ -65,7 +65,10 @@ void Tree::dropUnusedResources() {
     }
   }
   for (std::size_t i = 0; i < resources_.size(); ++i) {
-    if (!used[i]) resources_[i] = nullptr;
+    if (used[i] || resources_[i] == nullptr) continue;
+    resource_bytes_ -= resources_[i]->bytes();
+    resources_[i] = nullptr;
+    free_resources_.push_back(static_cast<std::uint32_t>(i));
   }
 }
 
@@ -80,6 +83,8 @@ void Tree::dropTree() {
   last_use_.clear();
   lists_.clear();
   resources_.clear();
+  free_resources_.clear();
+  resource_bytes_ = 0;
   NodeCounts nodes_at{};
   nodes_at[1] = 1;
   startGeneration(nodes_at);

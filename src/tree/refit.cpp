@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: BSD-3-Clause
-// How bounds that queries taught reach the root.
+// Applies tighter bounds that growth found, up to the root.
 #include "bounds/merge.h"
 #include "tree/tree.h"
 

@@ -6,8 +6,6 @@
 #include <cstring>
 
 #include "memory/huge_pages.h"
-#include "oracle/cpu/clip.h"
-#include "oracle/cpu/kernels.h"
 #include "oracle/reference.h"
 
 namespace bocst::tree {

@@ -429,11 +429,21 @@ ChildRef Tree::addList(const std::uint32_t* ids, std::size_t count, bool leaf) {
   return ChildRef(leaf || count <= kMaxLeafTriangles ? ChildRef::kShortList : ChildRef::kList, index);
 }
 
+void Tree::addResource(const std::shared_ptr<const oracle::DeviceResource>& resource) {
+  if (free_resources_.empty()) {
+    resources_.push_back(nullptr);
+    free_resources_.push_back(static_cast<std::uint32_t>(resources_.size() - 1));
+  }
+  newest_resource_ = free_resources_.back();
+  free_resources_.pop_back();
+  resources_[newest_resource_] = resource;
+  resource_bytes_ += resource->bytes();
+}
+
 ChildRef Tree::addDeviceList(const std::shared_ptr<const oracle::DeviceResource>& resource,
                              oracle::ExpansionRequest::DeviceList list) {
-  if (resources_.empty() || resources_.back() != resource) resources_.push_back(resource);
-  const auto number = static_cast<std::uint32_t>(resources_.size() - 1);
-  return ChildRef(ChildRef::kList, lists_.addDeviceList(list.count, {number, list.begin}));
+  if (newest_resource_ >= resources_.size() || resources_[newest_resource_] != resource) addResource(resource);
+  return ChildRef(ChildRef::kList, lists_.addDeviceList(list.count, {newest_resource_, list.begin}));
 }
 
 ChildRef Tree::addOctantList(const oracle::ExpansionRequest& answer, int octant) {
@@ -441,14 +451,14 @@ ChildRef Tree::addOctantList(const oracle::ExpansionRequest& answer, int octant)
                     all = std::accumulate(answer.sizes.begin(), answer.sizes.end(), std::size_t{0});
   // Triangles so large that division only copies them: going on would take memory without end and cull nothing.
   const bool hopeless = all > 2 * answer.count && 4 * count > 3 * answer.count;
-  const oracle::ExpansionRequest::DeviceList kept = answer.keptList(octant);
+  const oracle::ExpansionRequest::DeviceList kept = answer.deviceList(octant);
   if (kept.count == 0) return addList(answer.listBegin(octant), count, hopeless);
   if (hopeless && !conservative()) {
     // A leaf's triangles are needed here.
     std::vector<std::uint32_t> ids(count);
-    if (oracle_->fetch(*answer.batch->kept, kept, ids.data())) return addList(ids.data(), count, true);
+    if (oracle_->fetch(*answer.batch->on_device, kept, ids.data())) return addList(ids.data(), count, true);
   }
-  return addDeviceList(answer.batch->kept, kept);
+  return addDeviceList(answer.batch->on_device, kept);
 }
 
 void Tree::setChild(NodeRef node, ChildRef ref) {
@@ -464,7 +474,7 @@ void Tree::publish(NodeRef node, const oracle::ExpansionRequest& answer) {
   block.setCell(answer.cell);
   block.octants = answer.octants;
   records_[index].own = answer.own;
-  if (answer.kept != 0) {
+  if (answer.on_device != 0) {
     const ChildRef own = childRef(node);
     if (own.isList()) records_[index].own_list = own.index();
   }
@@ -620,13 +630,8 @@ void Tree::countBytes() {
   bytes_ = treeBytes();
   std::size_t device = surface_.device != nullptr ? surface_.device->bytes() : 0;
   if (stored_ != nullptr) device += stored_->bytes();
-  const oracle::DeviceResource* last = nullptr;
   if (node_table_.nodes != nullptr) device += node_table_.nodes->bytes();
-  for (const auto& resource : resources_) {
-    if (resource != nullptr && resource.get() != last) device += resource->bytes();
-    last = resource.get();
-  }
-  device_bytes_ = device;
+  device_bytes_ = device + resource_bytes_;
 }
 
 std::size_t Tree::treeBytes() const {

@@ -237,6 +237,7 @@ class Tree {
   // A device is not asked about fewer triangles: the host builds what is below them sooner than a batch comes back.
   static constexpr std::size_t kHostTriangles = 512;
   static std::size_t countedLevel(int level) { return static_cast<std::size_t>(std::min(level, lattice::kMaxLevel)); }
+  void addResource(const std::shared_ptr<const oracle::DeviceResource>& resource);
   ChildRef addDeviceList(const std::shared_ptr<const oracle::DeviceResource>& resource,
                          oracle::ExpansionRequest::DeviceList list);
   ChildRef addOctantList(const oracle::ExpansionRequest& answer, int octant);
@@ -314,7 +315,7 @@ class Tree {
   mutable std::atomic<LongSearch> long_searches_[2] = {};
   bounds::NodeBounds root_bounds_;
   SupportTable supports_;
-  // Of a query of what is far apart, all that it reads.
+  // A query of two models that are far apart reads only the members up to next_prune_.
   Outline outline_;
   std::atomic<ChildRef> root_{ChildRef()};
   static constexpr std::int64_t kNeverDue = std::numeric_limits<std::int64_t>::max();
@@ -325,7 +326,7 @@ class Tree {
   static constexpr std::size_t kNever = ~std::size_t{0};
   mutable std::atomic<std::size_t> rent_{0};  // see payRent()
   std::atomic<std::size_t> price_{kNever};    // the whole tree is built when rent_ is more; kNever once it is
-  bool is_ahead_build_due_ = false;           // then by the helper thread, which is to be asked; under growth_
+  bool is_ahead_build_due_ = false;           // the helper thread must still be asked to build it; under growth_
   std::shared_ptr<AheadBuild> ahead_build_;
   std::uint64_t generation_ = 0;  // of the pools: indices of blocks are of one generation
   // Of each block: what walks read, what growth and decay know, and when a query last went through it, in ns of the
@@ -335,8 +336,11 @@ class Tree {
   mutable memory::Pool<std::atomic<std::int64_t>, 5> last_use_;
   TriangleLists lists_;
   std::vector<std::shared_ptr<const oracle::DeviceResource>> resources_;  // of the lists that the oracle keeps
-  NodeTable node_table_;                                                  // of a generation; under growth_
-  std::vector<std::uint32_t> node_words_;                                 // what it was made from
+  std::vector<std::uint32_t> free_resources_;                             // entries that no list names
+  std::uint32_t newest_resource_ = 0;
+  std::size_t resource_bytes_ = 0;         // of all resources_
+  NodeTable node_table_;                   // of a generation; under growth_
+  std::vector<std::uint32_t> node_words_;  // what it was made from
 
   // Tighter bounds of nodes than their parents' blocks hold; blocks that readers see are not written to, so these wait
   // for a moment alone.

@@ -220,7 +220,7 @@ void Tree::askForAheadBuild() {
 void Tree::buildAhead(AheadBuild& ahead) {
   std::unique_ptr<oracle::Surface> surface;
   std::uint64_t generation = 0;
-  // Calls f(tree) unless the tree is gone, or is another by now, or was built by a query; did it?
+  // Calls f(tree) unless the tree is gone, or is another by now, or was built by a query. Returns whether it did.
   const auto withTree = [&](auto&& f) {
     const std::lock_guard<thread::ForkAwareMutex> exists(ahead.mutex);
     if (ahead.tree == nullptr) return false;

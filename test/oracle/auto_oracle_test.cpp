@@ -43,12 +43,14 @@ class SimulatedHost : public CpuOracle {
  public:
   explicit SimulatedHost(Time& time) : time_(time) {}
   void submit(std::vector<ExpansionRequest>& batch) override {
+    if (throws) throw std::bad_alloc();
     if (answers) CpuOracle::submit(batch);
     time_.now += Rates().of(batch);
     cells += batch.size();
   }
   std::size_t cells = 0;
   bool answers = true;  // or only their time passes
+  bool throws = false;
 
  private:
   Time& time_;
@@ -57,9 +59,11 @@ class SimulatedHost : public CpuOracle {
 class SimulatedDevice : public CpuOracle {
  public:
   struct Resource : DeviceResource {
-    explicit Resource(int& all) : count(all) { ++count; }
+    Resource(const Surface& on, int& all) : mesh(on.mesh.get()), lattice(on.lattice), count(all) { ++count; }
     ~Resource() override { --count; }
     std::size_t bytes() const override { return 1; }
+    const Mesh* mesh;
+    lattice::Lattice lattice;
     int& count;
   };
 
@@ -70,12 +74,15 @@ class SimulatedDevice : public CpuOracle {
   std::shared_ptr<const DeviceResource> makeResident(const Surface& surface) override {
     time_.now += latency + 1e-8 * static_cast<double>(surface.triangle_count);
     ++uploads;
-    return has_room ? std::make_shared<Resource>(resources) : nullptr;
+    return has_room ? std::make_shared<Resource>(surface, resources) : nullptr;
   }
   void submit(std::vector<ExpansionRequest>& batch) override {
     if (is_lost) return;
     for (const ExpansionRequest& e : batch) {
-      EXPECT_NE(e.surface->device, nullptr) << "a mesh that the device does not have";
+      const auto* const its = static_cast<const Resource*>(e.surface->device.get());
+      ASSERT_NE(its, nullptr) << "a mesh that the device does not have";
+      EXPECT_EQ(its->mesh, e.surface->mesh.get());
+      EXPECT_TRUE(its->lattice == e.surface->lattice);
       EXPECT_EQ(e.ids_up_to, ExpansionRequest::kAll);
     }
     if (answers) CpuOracle::submit(batch);
@@ -85,6 +92,7 @@ class SimulatedDevice : public CpuOracle {
   }
   // As oracles on a device do it: what a lost one leaves is the CPU's.
   void wait(std::vector<ExpansionRequest>& batch) override {
+    if (throws) throw std::bad_alloc();
     if (is_lost) {
       if (!loss_is_known_) time_.now += 10;
       loss_is_known_ = true;
@@ -97,7 +105,7 @@ class SimulatedDevice : public CpuOracle {
   }
 
   double latency, faster;
-  bool has_room = true, is_lost = false, answers = true;
+  bool has_room = true, is_lost = false, answers = true, throws = false;
   std::size_t cells = 0, batches = 0, uploads = 0;
   int resources = 0;  // that somebody holds
 
@@ -151,7 +159,7 @@ void expectSameAnswers(const std::vector<ExpansionRequest>& asked, const std::ve
   for (std::size_t i = 0; i < asked.size(); ++i) {
     EXPECT_EQ(answers[i].grey, expected[i].grey);
     EXPECT_EQ(answers[i].surface, asked[i].surface);
-    EXPECT_EQ(answers[i].kept, 0) << "the host has all lists";
+    EXPECT_EQ(answers[i].on_device, 0) << "the host has all lists";
     // An order is not promised.
     for (std::size_t o = 0; o < 8; ++o) {
       const auto sorted = [o](const ExpansionRequest& e) {
@@ -196,7 +204,7 @@ TEST(AutoOracle, IsAsGoodAsTheBetterOnAnyDevice) {
   const Levels levels(surfaceOf(test::torus(64)), 7);
   Levels there(levels.surface, 7);
   int resources = 0;
-  there.surface.device = std::make_shared<SimulatedDevice::Resource>(resources);
+  there.surface.device = std::make_shared<SimulatedDevice::Resource>(there.surface, resources);
   for (auto& level : there.all) {
     for (ExpansionRequest& e : level) e.ids_up_to = ExpansionRequest::kAll;
   }
@@ -243,6 +251,44 @@ TEST(AutoOracle, AnswersAreTheSameWhoeverGivesThem) {
     EXPECT_GT(device->cells, 0u);
     EXPECT_EQ(device->uploads, 3u + 2u) << "each mesh once";
   }
+}
+
+// Two models may share a mesh and divide it in different ways. What the device has is in the units of one lattice.
+TEST(AutoOracle, AMeshOnTwoLatticesIsUploadedForEach) {
+  const Surface surface = surfaceOf(test::torus(40));
+  const Levels a(surface, 6), b({surface.mesh, lattice::Lattice(surface.mesh->bounds(), Subdivision::kOctree, 0)}, 6);
+  ASSERT_FALSE(a.surface.lattice == b.surface.lattice);
+  Simulation simulated(0, 3);
+  auto& [time, host, device] = simulated;
+  AutoOracle both(host, device, time.clock());
+  device->cells = device->uploads = 0;
+  std::mt19937_64 g(5);
+  for (int i = 0; i < 50; ++i) {
+    std::vector<ExpansionRequest> batch = some(a, 1 + g() % 5, 1 + g() % 200, g);
+    for (const ExpansionRequest& e : some(b, 1 + g() % 5, 1 + g() % 200, g)) batch.push_back(e);
+    std::shuffle(batch.begin(), batch.end(), g);
+    expectSameAnswers(batch, ask(both, batch));
+  }
+  EXPECT_GT(device->cells, 0u);
+  EXPECT_EQ(device->uploads, 2u);
+}
+
+// Neither the host nor the device has memory. The next batch at the same address is another one.
+TEST(AutoOracle, AnExceptionLeavesNoBatchBehind) {
+  const Levels levels(surfaceOf(test::torus(64)), 7);
+  Simulation simulated(20e-6, 2);
+  auto& [time, host, device] = simulated;
+  AutoOracle both(host, device, time.clock());
+  for (int k = 0; k < 5; ++k) ask(both, levels.all[5]);
+  std::vector<ExpansionRequest> batch = levels.all[5];
+  host->throws = device->throws = true;
+  EXPECT_THROW(both.submit(batch), std::bad_alloc);
+  host->throws = device->throws = false;
+  const std::vector<ExpansionRequest> one(levels.all[5].begin(), levels.all[5].begin() + 1);
+  batch.assign(one.begin(), one.end());
+  both.submit(batch);
+  both.wait(batch);
+  expectSameAnswers(one, batch);
 }
 
 TEST(AutoOracle, ADeviceThatSlowsDownIsLeftAndFoundAgain) {

@@ -51,9 +51,9 @@ std::vector<ExpansionRequest> grownFromKeptLists(Oracle& oracle, const Surface& 
         ExpansionRequest child;
         child.surface = &surface;
         child.cell = e.cell.octant(o);
-        child.resource = e.keptLists();
-        child.resource_begin = e.keptList(o).begin;
-        child.count = e.keptList(o).count;
+        child.resource = e.deviceLists();
+        child.resource_begin = e.deviceList(o).begin;
+        child.count = e.deviceList(o).count;
         child.ids_up_to = 0;
         EXPECT_GT(child.count, 0u);
         level.push_back(child);
@@ -100,8 +100,8 @@ TEST(Compute, FetchesWhatItKeeps) {
   kept = ask(oracle, {kept})[0];
   here = ask(oracle, {here})[0];
   for (int o = 0; o < 8; ++o) {
-    std::vector<std::uint32_t> ids(kept.keptList(o).count);
-    ASSERT_TRUE(oracle.fetch(*kept.keptLists(), kept.keptList(o), ids.data()));
+    std::vector<std::uint32_t> ids(kept.deviceList(o).count);
+    ASSERT_TRUE(oracle.fetch(*kept.deviceLists(), kept.deviceList(o), ids.data()));
     std::vector<std::uint32_t> expected(here.listBegin(o), here.listEnd(o));
     std::sort(ids.begin(), ids.end());
     std::sort(expected.begin(), expected.end());
@@ -117,7 +117,7 @@ TEST(Compute, ListsGoWhenNobodyHoldsThem) {
     ExpansionRequest root = rootOf(surface);
     root.ids_up_to = 0;
     root = ask(oracle, {root})[0];
-    const std::uint32_t begin = root.keptList(0).begin;
+    const std::uint32_t begin = root.deviceList(0).begin;
     if (i == 0) end = begin;
     EXPECT_EQ(begin, end) << "round " << i << ": the room of the last round was free again";
   }
@@ -316,9 +316,9 @@ TEST(Device, ALostContextLeavesEverythingToTheCpu) {
       child.surface = &surface;
       child.cell = root.cell.octant(o);
       child.count = root.listSize(o);
-      if (root.kept != 0) {
-        child.resource = root.keptLists();
-        child.resource_begin = root.keptList(o).begin;
+      if (root.on_device != 0) {
+        child.resource = root.deviceLists();
+        child.resource_begin = root.deviceList(o).begin;
       } else {
         child.ids = root.listBegin(o);
       }
@@ -367,6 +367,22 @@ TEST(Device, AChildAfterForkAnswersOnTheCpu) {
   EXPECT_EQ(ask(oracle, {rootOf(surface)})[0].grey, expected) << "the parent goes on";
 }
 
+// The thread of the context waits for work in the parent for ever.
+TEST(Device, AChildAfterForkMayDestroyAnOracle) {
+  auto oracle = std::make_unique<ComputeOracle>(newThread());
+  const Surface surface = surfaceOf(test::torus(8));
+  ask(*oracle, {rootOf(surface)});
+  const pid_t child = fork();
+  if (child == 0) {
+    alarm(60);
+    oracle = nullptr;
+    _exit(0);
+  }
+  int status = 0;
+  ASSERT_EQ(waitpid(child, &status, 0), child);
+  EXPECT_TRUE(WIFEXITED(status) && WEXITSTATUS(status) == 0) << "status " << status;
+}
+
 std::size_t residentBytes() {
   std::ifstream statm("/proc/self/statm");
   std::size_t size = 0, resident = 0;
@@ -385,7 +401,7 @@ TEST(Device, RoundsLeakNothing) {
     root.ids_up_to = 0;
     root = ask(compute, {root})[0];
     EXPECT_NE(root.grey, 0);
-    return root.keptLists();  // outlives its oracle
+    return root.deviceLists();  // outlives its oracle
   };
   std::shared_ptr<const DeviceResource> last;
   for (int i = 0; i < 10; ++i) last = round();

@@ -191,7 +191,7 @@ class ConvexCollector final : public query::ConvexVisitor<typename Partner::Node
       addCost(fcl::AABB<S>(p, r, s), b);
     }
     if (!q_.request.enable_contact) return add(t, b, nullptr);
-    // With a margin the way must be known, and of what is nearly in touch it is not.
+    // With a margin the direction is needed, and nearest points closer than the rounding give none.
     query::ContactPoint contact;
     if (gap.isTouching() || (q_.margin > 0 && gap.distance <= frame_.rounding())) {
       contact = partner_.penetration(b, points, gap);
@@ -218,11 +218,11 @@ class ConvexCollector final : public query::ConvexVisitor<typename Partner::Node
     return add(a.id, b, &contact);
   }
 
-  /// Of points that are just off the body: the way between the nearest ones, of no depth.
+  /// The contact of points just outside the body: along the line between the nearest points, of depth 0.
   query::ContactPoint bridge(const query::SeparationResult& gap, const query::PointSet& points, const Node& b) const {
     const Eigen::Vector3d displacement = gap.on_points - gap.on_body;
     query::ContactPoint contact;
-    // The shortest ways are rounding, and lead anywhere.
+    // Displacements this short are rounding: the penetration has the normal.
     const double size = gap.on_points.norm() + gap.on_body.norm();
     contact.normal =
         displacement.norm() > 1e-12 * size ? displacement.normalized() : partner_.penetration(b, points, gap).normal;

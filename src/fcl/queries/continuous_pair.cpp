@@ -37,7 +37,7 @@ SimilarityTransform inBody(const tree::Tree& tree) {
   return p;
 }
 
-/// What is to be taken for a contact. The bodies are at most so far from their origins; `largest` coordinate of all.
+/// What counts as a contact. size1, size2: the largest distance of each body's points from its origin.
 template <typename S>
 ContactGoal goalOf(const ContinuousQuery<S>& q, double size1, double size2, double margin) {
   double largest = size1 + size2;
@@ -55,8 +55,8 @@ ContactGoal goalOf(const ContinuousQuery<S>& q, double size1, double size2, doub
   return goal;
 }
 
-/// A ball about the origin of the partner that holds the model on all of its way, in the partner's frame. What is kept
-/// by all motions is the distance of a partner's point from its origin, so nothing beyond matters.
+/// A ball about the partner's origin, in its frame, that contains the model during the whole motion. Motions keep the
+/// distance of the partner's points from that origin, so points of the partner outside the ball touch nothing.
 query::Sphere regionOf(const Motion& of_model, const Eigen::AlignedBox3d& bounds, const Motion& of_partner) {
   const Eigen::Vector3d center = of_model.at(0) * bounds.center(), origin = of_partner.at(0).translation();
   // Spheres of cells stick out of the bounds.

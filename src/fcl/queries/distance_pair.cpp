@@ -118,8 +118,8 @@ struct Distant {
   }
 };
 
-/// What is 2^27 times as far away as both are large: the tips along the way between the middles are the nearest, but
-/// for a part 2^-54 of the distance. False where that is not so.
+/// For meshes more than 2^27 times their size apart: the farthest vertices along the line of the centres are the
+/// nearest points, up to 2^-54 of the distance. Returns false if they are nearer.
 template <typename S>
 bool searchFar(const DistanceQuery<S>& q, const Distant& a, const Distant& b) {
   const Eigen::Vector3d half_way = Distant::halfWay(a.X_WM, a.center, b.X_WM, b.center);

@@ -127,8 +127,8 @@ class Walks {
   }
 
   /// Has the walk its answer? If not, adds what it needs.
-  bool look(Walk& walk) {
-    const Outcome outcome = walk.spheres().look(walk.batch, s_.growths);
+  bool walkResident(Walk& walk) {
+    const Outcome outcome = walk.spheres().walkResident(walk.batch, s_.growths);
     walk.batch = std::min(2 * walk.batch, kMostBatch);
     if (outcome == Outcome::kMeet) s_.found[walk.pair] = Spheres::kMeet;
     return outcome != Outcome::kNeedsGrowth;
@@ -141,7 +141,7 @@ class Walks {
     const auto first = s_.walks.begin() + static_cast<std::ptrdiff_t>(waiting_);
     const std::size_t count = std::min(kMostTogether, s_.walks.size() - waiting_);
     const auto end = first + static_cast<std::ptrdiff_t>(count);
-    const auto need_growth = std::remove_if(first, end, [this](Walk& walk) { return look(walk); });
+    const auto need_growth = std::remove_if(first, end, [this](Walk& walk) { return walkResident(walk); });
     const auto left = static_cast<std::size_t>(need_growth - first);
     s_.walks.erase(need_growth, end);
     const auto looked = s_.walks.begin() + static_cast<std::ptrdiff_t>(waiting_);
@@ -221,7 +221,7 @@ class Walks {
         ++walk.device_rounds;
       } else if (looked < kMostTogether) {
         ++looked;
-        if (look(walk)) continue;
+        if (walkResident(walk)) continue;
       }
       s_.walks[left++] = walk;
     }

@@ -125,7 +125,7 @@ class MeshCollector : public query::Visitor {
       addFirst(of_model, key);
     } else if (s_.seen.insert(a, b)) {
       s_.found.push_back(key);
-      if (s_.found.size() >= most_) lookAtFound();
+      if (s_.found.size() >= most_) decideFound();
     }
     return false;
   }
@@ -151,7 +151,7 @@ class MeshCollector : public query::Visitor {
       for (const RankedPair& pair : s_.first.sort()) s_.found.push_back(pair.key);
       s_.met = s_.first_cells.sort();
     }
-    lookAtFound();
+    decideFound();
     std::sort(s_.met.begin(), s_.met.end(),
               [](const Met& x, const Met& y) { return std::tie(x.b1, x.b2) < std::tie(y.b1, y.b2); });
     emit();
@@ -255,7 +255,7 @@ class MeshCollector : public query::Visitor {
   }
 
   // Moves the first of what was found and touches to `met`, and forgets the rest of it.
-  void lookAtFound() {
+  void decideFound() {
     constexpr std::size_t kBatch = query::TrianglePairs::kCapacity;
     std::vector<std::uint64_t>& found = s_.found;
     std::sort(found.begin(), found.end());
@@ -319,8 +319,8 @@ class MeshCollector : public query::Visitor {
     }
   }
 
-  // FCL's test, and what it leaves open: does the pair touch, whose corners are pair i of s_.pairs? Betters `contact`,
-  // which is how the two are parted, or null where nobody asks.
+  // Does the pair touch whose corners are pair i of s_.pairs: by FCL's test, and by ours where that leaves it open?
+  // Improves *contact, the pair's penetration; null: not wanted.
   bool decide(std::uint64_t key, std::size_t i, query::ContactPoint* contact) {
     const std::uint32_t a = first(key), b = second(key);
     if (isCertain(key) && margin_ == 0) return true;

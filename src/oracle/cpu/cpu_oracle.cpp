@@ -32,7 +32,7 @@ class Expander {
     }
     exists_ &= candidates;
     e.batch = nullptr;
-    e.kept = 0;
+    e.on_device = 0;
   }
 
   void run() {
@@ -143,7 +143,7 @@ class Expander {
     std::array<std::size_t, 8> next;
     std::exclusive_scan(e_.sizes.begin(), e_.sizes.end(), next.begin(), std::size_t{0});
     e_.lists.resize(next[7] + e_.sizes[7]);
-    e_.first_here = 0;
+    e_.first_on_host = 0;
     for (std::size_t i = 0; i < e_.count; ++i) {
       for (int bits = s_.masks[i]; bits != 0; bits &= bits - 1) e_.lists[next[__builtin_ctz(bits)]++] = id(i);
     }

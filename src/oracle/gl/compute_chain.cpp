@@ -211,19 +211,19 @@ void ComputeChain::take(const std::vector<ExpansionRequest*>& requests, const st
     e.own = answer.own;
     e.grey = answer.grey;
     std::copy_n(row + kRowSizes, 8, e.sizes.begin());
-    e.first_kept = row[kRowList];
-    e.kept = 0;
+    e.first_on_device = row[kRowList];
+    e.on_device = 0;
     std::size_t here = 0;
     // Without branches: octants differ in what they keep.
     for (unsigned o = 0; o < 8; ++o) {
       const bool stays = e.sizes[o] > e.ids_up_to;
-      e.kept = static_cast<std::uint8_t>(e.kept | unsigned{stays} << o);
+      e.on_device = static_cast<std::uint8_t>(e.on_device | unsigned{stays} << o);
       here += stays ? 0 : e.sizes[o];
     }
     thread.require(row[kRowIds] + here <= answers[kIdWords], "a list is longer than what came back");
-    e.first_here = here != 0 ? row[kRowIds] : 0;
+    e.first_on_host = here != 0 ? row[kRowIds] : 0;
     e.batch = nullptr;
-    if (e.kept != 0 || here != 0) e.batch = lists;
+    if (e.on_device != 0 || here != 0) e.batch = lists;
   }
   thread.require(wrong == 0, "a cell was not answered");
 }
@@ -235,7 +235,7 @@ void ComputeChain::answer(const std::vector<ExpansionRequest*>& requests, Thread
     if (is_timed_) glQueryCounter(times_[i], GL_TIMESTAMP);
   };
   const bool is_timed = is_timed_;
-  // Whatever happens: a range holds its arena, and that the thread, which must not end in itself.
+  // Released on every path: a range keeps the arena and the Thread alive, and a Thread must not end in its own thread.
   struct Release {
     ComputeChain& chain;
     ~Release() { chain.placed_ = chain.uploaded_ = nullptr; }

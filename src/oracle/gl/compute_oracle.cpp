@@ -74,7 +74,7 @@ bool ComputeOracle::fetch(const DeviceResource&, ExpansionRequest::DeviceList li
   try {
     thread_->run([&] { arena_->read(list.begin, list.count, ids); });
     return true;
-  } catch (const OracleError& e) {
+  } catch (const std::exception& e) {
     reportFailure("a triangle list that only the device has", e);
     return false;
   }

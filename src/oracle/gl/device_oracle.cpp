@@ -34,7 +34,7 @@ void DeviceOracle::flush() {
   // Whatever went wrong: wake all threads that wait. Requests without a verdict go to the CPU.
   const std::lock_guard<std::mutex> lock(mutex_);
   for (Ticket& t : tickets_) t.done = t.done || t.taken;
-  answered_.notify_all();
+  answered_->notify_all();
 }
 
 void DeviceOracle::answerAll(std::vector<Ticket*>& taken) {
@@ -68,7 +68,7 @@ void DeviceOracle::wait(std::vector<ExpansionRequest>& batch) {
     const auto ticket =
         std::find_if(tickets_.begin(), tickets_.end(), [&](const Ticket& t) { return t.batch == &batch; });
     if (ticket != tickets_.end()) {
-      answered_.wait(lock, [&] { return ticket->done; });
+      answered_->wait(lock, [&] { return ticket->done; });
       verdicts = std::move(ticket->verdicts);
       tickets_.erase(ticket);
     }
@@ -84,7 +84,7 @@ void DeviceOracle::wait(std::vector<ExpansionRequest>& batch) {
 std::shared_ptr<const DeviceResource> DeviceOracle::makeResident(const Surface& surface) {
   try {
     return meshes_.makeResident(surface);
-  } catch (const OracleError& e) {
+  } catch (const std::exception& e) {
     reportFailure("a mesh", e);
     return nullptr;
   }
@@ -93,7 +93,7 @@ std::shared_ptr<const DeviceResource> DeviceOracle::makeResident(const Surface& 
 std::shared_ptr<const DeviceResource> DeviceOracle::store(const std::vector<std::uint32_t>& words) {
   try {
     return meshes_.store(words);
-  } catch (const OracleError& e) {
+  } catch (const std::exception& e) {
     reportFailure("a mesh", e);
     return nullptr;
   }

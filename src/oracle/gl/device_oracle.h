@@ -13,6 +13,7 @@
 #include "oracle/gl/device_mesh.h"
 #include "oracle/gl/thread.h"
 #include "oracle/oracle.h"
+#include "thread/fork.h"
 
 namespace bocst::oracle::gl {
 
@@ -70,7 +71,7 @@ class DeviceOracle : public Oracle {
   std::atomic<std::uint64_t> left_to_cpu_{0};
   std::atomic<bool> reported_{false};
   std::mutex mutex_;  // of what follows
-  std::condition_variable answered_;
+  thread::NeverDestroyed<std::condition_variable> answered_;
   std::list<Ticket> tickets_;
   bool flush_is_due_ = false;
 };

@@ -15,7 +15,7 @@ using namespace bounds;
 constexpr Constant kConstants[] = {
     BOCST_NAMED(kAll),
     BOCST_NAMED(kGrey),
-    BOCST_NAMED(kLoose),
+    BOCST_NAMED(kBoxOnly),
     BOCST_NAMED(kCounts),
     BOCST_NAMED(kNext),
     BOCST_NAMED(kIds),

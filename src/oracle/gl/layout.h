@@ -21,7 +21,7 @@ constexpr std::uint32_t kAll = 0xffffffffu;  ///< As a list: the triangles of th
 
 // Per cell, in words. Maxima of values that are never negative start at 0, so a cleared table is an empty one.
 constexpr std::uint32_t kGrey = 0;              ///< Octants that a triangle surely meets.
-constexpr std::uint32_t kLoose = 1;             ///< Octants with a part that only its box bounds: no slab.
+constexpr std::uint32_t kBoxOnly = 1;           ///< Octants with a part that only its box bounds: no slab.
 constexpr std::uint32_t kCounts = 2;            ///< 8: lengths of the octants' lists.
 constexpr std::uint32_t kNext = kCounts + 8;    ///< 8: where the next triangle of each list goes.
 constexpr std::uint32_t kIds = kNext + 8;       ///< Sum of the numbers of its triangles, each plus one.

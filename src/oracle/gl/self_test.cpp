@@ -178,16 +178,16 @@ std::string askKept(ComputeOracle& oracle, std::vector<Question> questions) {
     for (std::size_t i = 0; i < batch.size(); ++i) {
       std::vector<Ids> lists(8);
       for (std::size_t o = 0; o < 8; ++o) {
-        const ExpansionRequest::DeviceList kept = batch[i].keptList(static_cast<int>(o));
+        const ExpansionRequest::DeviceList kept = batch[i].deviceList(static_cast<int>(o));
         lists[o].resize(kept.count);
         if (kept.count == 0) continue;
-        if (!oracle.fetch(*batch[i].keptLists(), kept, lists[o].data())) return "a list was lost";
+        if (!oracle.fetch(*batch[i].deviceLists(), kept, lists[o].data())) return "a list was lost";
         if (o % 3 != 0) continue;
         next.push_back({questions[i].surface, questions[i].cell.octant(static_cast<int>(o)), lists[o]});
         ExpansionRequest child;
         child.surface = next.back().surface;
         child.cell = next.back().cell;
-        child.resource = batch[i].keptLists();
+        child.resource = batch[i].deviceLists();
         child.resource_begin = kept.begin;
         child.count = kept.count;
         children.push_back(child);

@@ -18,7 +18,7 @@ Thread::Thread(const ContextRequest& request) : process_(getpid()), wait_limit_(
   thread_ = std::make_unique<std::thread>(thread::startWithoutSignals([this, request] { loop(request); }));
   {
     std::unique_lock<std::mutex> lock(mutex_);
-    done_.wait(lock, [this] { return started_; });
+    done_->wait(lock, [this] { return started_; });
   }
   if (failure_) {
     thread_->join();
@@ -35,7 +35,7 @@ Thread::~Thread() {
     const std::lock_guard<std::mutex> lock(mutex_);
     stop_ = true;
   }
-  work_.notify_one();
+  work_->notify_one();
   thread_->join();
 }
 
@@ -53,10 +53,10 @@ void Thread::loop(const ContextRequest& request) {
     failure_ = std::current_exception();
   }
   started_ = true;
-  done_.notify_all();
+  done_->notify_all();
   if (failure_) return;
   for (;;) {
-    work_.wait(lock, [this] { return stop_ || !jobs_.empty(); });
+    work_->wait(lock, [this] { return stop_ || !jobs_.empty(); });
     if (jobs_.empty()) return;
     Job job = std::move(jobs_.front());
     jobs_.pop_front();
@@ -73,7 +73,7 @@ void Thread::loop(const ContextRequest& request) {
     if (job.done != nullptr) {
       *job.error = error;
       *job.done = true;
-      done_.notify_all();
+      done_->notify_all();
     }
   }
 }
@@ -84,8 +84,8 @@ void Thread::run(const std::function<void()>& job) {
   std::exception_ptr error;
   std::unique_lock<std::mutex> lock(mutex_);
   jobs_.push_back({job, &done, &error});
-  work_.notify_one();
-  done_.wait(lock, [&done] { return done; });
+  work_->notify_one();
+  done_->wait(lock, [&done] { return done; });
   if (error) std::rethrow_exception(error);
 }
 
@@ -93,7 +93,7 @@ void Thread::post(std::function<void()> job) {
   if (isForked()) return;
   const std::lock_guard<std::mutex> lock(mutex_);
   jobs_.push_back({std::move(job), nullptr, nullptr});
-  work_.notify_one();
+  work_->notify_one();
 }
 
 bool Thread::isForked() const { return getpid() != process_; }

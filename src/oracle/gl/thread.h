@@ -14,6 +14,7 @@
 #include <thread>
 
 #include "egl/context.h"
+#include "thread/fork.h"
 
 namespace bocst::oracle::gl {
 
@@ -79,7 +80,7 @@ class Thread {
   std::chrono::milliseconds wait_limit_;
   std::atomic<bool> lost_{false}, distrusted_{false};
   std::mutex mutex_;
-  std::condition_variable work_, done_;
+  thread::NeverDestroyed<std::condition_variable> work_, done_;
   std::deque<Job> jobs_;
   bool stop_ = false, started_ = false;
   std::exception_ptr failure_;

@@ -99,7 +99,7 @@ bool SphereWalk::search(SphereSteps& steps, Scratch& s, Visitor& visitor) const 
   }
 }
 
-SphereWalk::Outcome SphereWalk::look(std::size_t batch, std::vector<tree::Tree::Growth>& growths) const {
+SphereWalk::Outcome SphereWalk::walkResident(std::size_t batch, std::vector<tree::Tree::Growth>& growths) const {
   Scratch& s = scratchOfThread();
   SphereSteps steps(a_, b_, b_in_a_, s.spheres);
   s.deferred.clear();

@@ -10,7 +10,7 @@ namespace bocst::query {
 
 /// The walk for two trees with conservative answers: finds the pairs of leaves whose spheres meet, see spheresMeet().
 /// Spheres follow from the lattices and the pose alone, so the verdict is the same with every oracle, and so is what
-/// run() and look() grow.
+/// run() and walkResident() grow.
 class SphereWalk {
  public:
   static bool fits(const TreeSide& a, const TreeSide& b) { return a.isConservative() && b.isConservative(); }
@@ -32,7 +32,7 @@ class SphereWalk {
   enum class Outcome { kApart, kMeet, kNeedsGrowth };
   /// Do the spheres of any leaves meet, as far as resident nodes say? Unless it is needless. Where more must grow, adds
   /// that to `growths`: of at most `batch` pairs, the deepest overlaps first.
-  Outcome look(std::size_t batch, std::vector<tree::Tree::Growth>& growths) const;
+  Outcome walkResident(std::size_t batch, std::vector<tree::Tree::Growth>& growths) const;
 
   /// The same by a device: what it is asked about this pair. False where float cannot hold the pair, or the roots are
   /// leaves, which is the host's.

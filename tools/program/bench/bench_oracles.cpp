@@ -53,9 +53,9 @@ Level childrenOf(std::vector<ExpansionRequest>& answers) {
       child.ids_up_to = kLeaf;
       child.count = e.listSize(o);
       next.ids.emplace_back();
-      if (e.isKept(o)) {
-        child.resource = e.keptLists();
-        child.resource_begin = e.keptList(o).begin;
+      if (e.isOnDevice(o)) {
+        child.resource = e.deviceLists();
+        child.resource_begin = e.deviceList(o).begin;
       } else {
         next.ids.back().assign(e.listBegin(o), e.listEnd(o));
       }

@@ -32,7 +32,7 @@ void addPart(bool together, uint cell, int o, vec3 v[3]) {
     // The test's rounding margin is wider than the clipper's: what only the test sees is bounded by the triangle's box.
     lo = clamp(min(min(v[0], v[1]), v[2]), center - 0.5, center + 0.5);
     hi = clamp(max(max(v[0], v[1]), v[2]), center - 0.5, center + 0.5);
-    atomicOr(states[state(cell, kLoose)], 1u << o);
+    atomicOr(states[state(cell, kBoxOnly)], 1u << o);
   }
   const float kSteps = float(kBoxSteps);
   // 1e-3 of a byte covers the rounding of the product.

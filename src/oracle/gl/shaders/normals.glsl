@@ -29,7 +29,7 @@ void main() {
   if (cell >= u_items.y || (states[state(cell, kGrey)] >> o & 1u) == 0u) return;
   copyIds(cell, o, lane % 8u);
   if (lane % 8u != 0u) return;
-  if ((states[state(cell, kLoose)] >> o & 1u) != 0u || sizeOf(cell, o) > kSlabTriangles) return;
+  if ((states[state(cell, kBoxOnly)] >> o & 1u) != 0u || sizeOf(cell, o) > kSlabTriangles) return;
 
   float t[6];
   for (uint k = 0u; k < 6u; ++k) t[k] = float(int(states[octantState(cell, o, kTensor + k)]));

@@ -21,7 +21,7 @@ void putOctant(uint cell, int o) {
   }
   uint normal = states[octantState(cell, o, kNormal)];
   uint slab_half = kMostSlabHalf;
-  if ((states[state(cell, kLoose)] >> o & 1u) == 0u && normal != 0u) {
+  if ((states[state(cell, kBoxOnly)] >> o & 1u) == 0u && normal != 0u) {
     const float shift = float(kSlabShift), scale = float(kSlabScale);
     float below = shift - float(states[octantState(cell, o, kSlab)]) / scale;
     float above = float(states[octantState(cell, o, kSlab + 1u)]) / scale - shift;

@@ -8,7 +8,7 @@ void main() {
   uint mask = maskOf(pair) & octantsOfLane();
   if (mask == 0u) return;
   uint cell = cellOf(pair);
-  mask &= states[state(cell, kGrey)] & ~states[state(cell, kLoose)];
+  mask &= states[state(cell, kGrey)] & ~states[state(cell, kBoxOnly)];
   if (mask == 0u) return;
   vec3 v[3];
   cornersOf(cell, triangleOf(cell, pair), v);
