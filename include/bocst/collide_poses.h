@@ -27,8 +27,8 @@ namespace bocst {
 ///
 /// Thread rule: as collide(); the models may be queried, pruned and deformed at the same time. Each pose sees a mesh
 /// either before or after a change.
-/// @throws std::invalid_argument for a null array, and for a pose that is not rigid (the message names the first one).
-/// The contents of hit[] are then unspecified.
+/// @throws std::invalid_argument for a null array, and for a pose that is not rigid (the message names the first one),
+/// unless a model is empty. The contents of hit[] are then unspecified.
 template <typename S>
 BOCST_EXPORT void collidePoses(const Model<S>& a, const Model<S>& b, const fcl::Transform3<S>* X_AB, std::size_t count,
                                std::uint8_t* hit, unsigned threads = 0);

@@ -109,8 +109,9 @@ class BOCST_EXPORT Scene {
   bool anyCollision(const Transform* X_WM, std::size_t states, std::size_t* where = nullptr) const;
   /// Sets hit[k] to 1 if state k collides, otherwise to 0.
   void collisions(const Transform* X_WM, std::size_t states, std::uint8_t* hit) const;
-  /// The minimum fcl::distance of all pairs; 0 if a pair touches; std::numeric_limits<S>::max() without pairs.
-  /// `nearest` is set to a pair at this distance; to invalid Ids without pairs. Options::margin has no effect.
+  /// The minimum fcl::distance of all pairs; if a pair touches, 0 up to the rounding of fcl::distance;
+  /// std::numeric_limits<S>::max() without pairs. `nearest` is set to a pair at this distance; to invalid Ids without
+  /// pairs. Options::margin has no effect.
   /// @throws std::invalid_argument for two of FCL's shapes and octrees whose distance FCL cannot compute, unless
   /// another pair is found to be nearer before.
   S clearance(const Transform* X_WM, Pair* nearest = nullptr) const;

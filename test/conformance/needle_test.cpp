@@ -212,5 +212,51 @@ TEST(Needles, ThreadsBuildOnce) {
   }
 }
 
+// A mesh so much larger than its details that these share a unit of its lattice: a part on the ground, or beside one
+// triangle far away.
+TEST(FineDetails, OfALargeMeshAreFoundByOrientedBoxes) {
+  const Raw part = test::torus(16);
+  for (const double far : {1e4, 1e6}) {
+    for (const bool is_ground : {true, false}) {
+      SCOPED_TRACE(testing::Message() << far << (is_ground ? " ground" : " outlier"));
+      Raw raw = part;
+      const std::size_t n = raw.vertices.size();
+      if (is_ground) {
+        for (const double x : {-far, far}) {
+          for (const double y : {-far, far}) raw.vertices.emplace_back(x, y, -0.25);
+        }
+        raw.triangles.emplace_back(n, n + 1, n + 2);
+        raw.triangles.emplace_back(n + 1, n + 3, n + 2);
+      } else {
+        for (const double x : {0.0, 1.0, 2.0}) raw.vertices.emplace_back(far, x, x * x);
+        raw.triangles.emplace_back(n, n + 1, n + 2);
+      }
+      const auto bvh = test::bvh<fcl::OBBRSSd>(raw), bvh_of_part = test::bvh<fcl::OBBRSSd>(part);
+      const Modeld a(raw.mesh()), b(part.mesh());
+      Random g(4);
+      std::size_t hits = 0, misses = 0;
+      for (int i = 0; i < 60; ++i) {
+        const fcl::Transform3d I = fcl::Transform3d::Identity(),
+                               X = test::pose<double>(rotation(g), {uniform(g, -2, 2), uniform(g, -2, 2), 1});
+        const Pairs expected = test::pairs<double>(*bvh, I, *bvh_of_part, X);
+        ASSERT_EQ(test::touching<double>(a, I, b, X), !expected.empty());
+        ASSERT_EQ(test::touching<double>(b, X, a, I), !expected.empty());
+        ASSERT_EQ(test::pairs<double>(a, I, b, X), expected);
+        fcl::DistanceResultd nearest;
+        fcl::distance(bvh.get(), I, bvh_of_part.get(), X, fcl::DistanceRequestd(), nearest);
+        const double distance = expected.empty() ? nearest.min_distance : 0;
+        for (const double share : {0.9, 1.1}) {
+          if (distance < 1e-3) continue;
+          ASSERT_EQ(isCloserThan<double>(&a, I, &b, X, share * distance), share > 1);
+        }
+        ++(expected.empty() ? misses : hits);
+      }
+      EXPECT_GT(hits, 5u);
+      EXPECT_GT(misses, 5u);
+      EXPECT_GT(a.statistics().resident_bytes, 100 * raw.triangles.size()) << "the boxes";
+    }
+  }
+}
+
 }  // namespace
 }  // namespace bocst

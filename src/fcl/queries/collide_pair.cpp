@@ -105,7 +105,25 @@ void collideTrees(const CollideQuery<S>& q, const TreeSide& a, const TreeSide& b
   } else {
     const bool spheres = a.isConservative() || b.isConservative();
     const SimilarityTransform wide = withMargin(b_in_a, a, q, q.cullingMargin(spheres));
-    walk([&](auto& collector) { query::PairWalk<TreeSide, TreeSide>(a, b, wide, collector).run(); });
+    walk([&](auto& collector) {
+      const auto walk_blocks = [&](std::size_t most) {
+        query::PairWalk<TreeSide, TreeSide> blocks(a, b, wide, collector);
+        const bool met = blocks.run(most);
+        return query::WalkEnd{met, blocks.steps(), blocks.gaveUp()};
+      };
+      // Of a mesh that is much larger than its details, these share a unit of the lattice, and blocks part nothing.
+      constexpr query::Turns::Limits kLimits = {64, 1024, 1024, 1};
+      if (spheres || !kUsesBoxes || !query::BoxSide::fits(a) || !query::BoxSide::fits(b)) {
+        walk_blocks(~std::size_t{0});
+      } else if (collector.endsAtFirst()) {
+        query::walkByTurns(a, b, near, collector, kLimits, walk_blocks);
+      } else if (tree_a.knownBoxes() != nullptr && tree_b.knownBoxes() != nullptr) {
+        walkBoxes(collector);
+      } else {
+        const query::Turns turns(a, b, tree::Tree::Search::kYesOrNo, kLimits);
+        turns.tookOverBlocks(walk_blocks(~std::size_t{0}).steps, false);
+      }
+    });
   }
   if (q.mayBeInside(before) && (contains<S>(tree_a, q.X_WA(), tree_b, q.X_WB(), magnitude) ||
                                 contains<S>(tree_b, q.X_WB(), tree_a, q.X_WA(), magnitude))) {

@@ -12,6 +12,7 @@
 #include "log/assert.h"
 #include "query/collide/deferred_pairs.h"
 #include "query/leaf/leaf_pairs.h"
+#include "query/sides/turns.h"
 #include "query/sides/visitor.h"
 
 namespace bocst::query {
@@ -44,6 +45,7 @@ class PairWalk {
 
   /// True when the visitor ended it. After `most_steps` pairs of nodes it gives up.
   bool run(std::size_t most_steps = ~std::size_t{0}) {
+    most_steps_ = most_steps;
     Scratch& s = scratch();
     s.stack.clear();
     s.ordered.clear();
@@ -57,7 +59,7 @@ class PairWalk {
     for (;;) {
       Pair pair;
       while (cut_ != nullptr ? popFirst(s, pair) : popLast(s, pair)) {
-        if (spheres_ ? stepSpheres(pair, s) : stepBoxes(pair, s)) return true;
+        if (spheres_ ? stepSpheres(pair, s) : stepBoxes(pair, s)) return !gave_up_;
         if (++steps_ < most_steps) continue;
         gave_up_ = true;
         return false;
@@ -166,6 +168,9 @@ class PairWalk {
     return !(b_.gap(b, {corners, 8}, tolerance).at_least > tolerance);
   }
 
+  // Beside a pair of nodes: as many pairs of triangles take as long, and the exact test of one that many.
+  static constexpr std::size_t kTrianglePairs = 32, kExactTest = 8;
+
   // The larger of two nodes is expanded, unless it is a leaf.
   static bool expandsA(State sa, State sb, double size_a, double size_b) {
     return sb == State::kLeaf || (sa != State::kLeaf && size_a >= size_b);
@@ -250,9 +255,15 @@ class PairWalk {
       }
       return false;
     } else {
-      return s.leaves.test(a_, pair.a, b_, pair.b, [this](std::uint32_t t, std::uint32_t u, bool certain) {
-        return visitor_.triangles(t, u, certain);
-      });
+      const std::size_t before = s.leaves.tested();
+      const auto visit = [this](std::uint32_t t, std::uint32_t u, bool certain) {
+        if (!certain) steps_ += kExactTest;
+        gave_up_ = steps_ > most_steps_;
+        return gave_up_ || visitor_.triangles(t, u, certain);
+      };
+      const bool ended = s.leaves.test(a_, pair.a, b_, pair.b, visit);
+      steps_ += (s.leaves.tested() - before) / kTrianglePairs;
+      return ended;
     }
   }
 
@@ -374,7 +385,32 @@ class PairWalk {
   const bool spheres_;
   const Cut* const cut_;
   bool gave_up_ = false;
-  std::size_t steps_ = 0;
+  std::size_t steps_ = 0, most_steps_ = 0;
 };
+
+/// How a walk ended.
+struct WalkEnd {
+  bool met;  ///< The visitor ended it.
+  std::size_t steps;
+  bool gave_up;
+};
+
+/// A walk over the blocks of two models and one over their oriented boxes in turns, until one ends; for a visitor that
+/// ends at the first hit. walk_blocks(most_steps) returns a WalkEnd.
+template <typename WalkBlocks>
+bool walkByTurns(const TreeSide& a, const TreeSide& b, const SimilarityTransform& b_in_a, Visitor& visitor,
+                 const Turns::Limits& limits, WalkBlocks&& walk_blocks) {
+  for (Turns turns(a, b, tree::Tree::Search::kYesOrNo, limits);; turns.next()) {
+    const WalkEnd blocks = walk_blocks(turns.most());
+    turns.tookOverBlocks(blocks.steps, blocks.gave_up);
+    if (!blocks.gave_up) return blocks.met;
+    const BoxSide boxes_a(a), boxes_b(b);
+    PairWalk<BoxSide, BoxSide> boxes(boxes_a, boxes_b, b_in_a, visitor);
+    const bool met = boxes.run(turns.mostOverBoxes());
+    if (boxes.gaveUp()) continue;
+    turns.endedOverBoxes(boxes.steps());
+    return met;
+  }
+}
 
 }  // namespace bocst::query

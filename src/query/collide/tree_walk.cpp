@@ -4,7 +4,6 @@
 #include <algorithm>
 
 #include "query/collide/pair_walk.h"
-#include "query/sides/turns.h"
 
 namespace bocst::query {
 namespace {
@@ -31,17 +30,10 @@ struct TreeWalk::Scratch {
 
 bool TreeWalk::runByTurns(Visitor& visitor) {
   if (!BoxSide::fits(a_) || !BoxSide::fits(b_)) return run(visitor);
-  for (Turns turns(a_, b_, tree::Tree::Search::kYesOrNo, kLimits);; turns.next()) {
-    const bool ended = run(visitor, turns.most());
-    turns.tookOverBlocks(leaf_pairs_, gave_up_);
-    if (!gave_up_) return ended;
-    const BoxSide boxes_a(a_), boxes_b(b_);
-    PairWalk<BoxSide, BoxSide> boxes(boxes_a, boxes_b, b_in_a_, visitor);
-    const bool met = boxes.run(turns.mostOverBoxes());
-    if (boxes.gaveUp()) continue;
-    turns.endedOverBoxes(boxes.steps());
-    return met;
-  }
+  return walkByTurns(a_, b_, b_in_a_, visitor, kLimits, [&](std::size_t most) {
+    const bool ended = run(visitor, most);
+    return WalkEnd{ended, leaf_pairs_, gave_up_};
+  });
 }
 
 bool TreeWalk::run(Visitor& visitor, std::size_t most_leaf_pairs) {
