@@ -172,6 +172,17 @@ void expectSameAnswers(const std::vector<ExpansionRequest>& asked, const std::ve
   }
 }
 
+// In batches that mix nodes of two surfaces.
+void expectSameAnswersOfBoth(Oracle& oracle, const Levels& a, const Levels& b) {
+  std::mt19937_64 g(5);
+  for (int i = 0; i < 100; ++i) {
+    std::vector<ExpansionRequest> batch = some(a, 1 + g() % 5, 1 + g() % 400, g);
+    for (const ExpansionRequest& e : some(b, g() % 6, g() % 100, g)) batch.push_back(e);
+    std::shuffle(batch.begin(), batch.end(), g);
+    expectSameAnswers(batch, ask(oracle, batch));
+  }
+}
+
 enum class Job { kPath, kLarge, kMixed };
 
 // A host and a device on one clock.
@@ -240,13 +251,7 @@ TEST(AutoOracle, AnswersAreTheSameWhoeverGivesThem) {
     auto& [time, host, device] = simulated;
     AutoOracle both(host, device, time.clock());
     host->cells = device->cells = 0;
-    std::mt19937_64 g(5);
-    for (int i = 0; i < 100; ++i) {
-      std::vector<ExpansionRequest> batch = some(a, 1 + g() % 5, 1 + g() % 400, g);
-      for (const ExpansionRequest& e : some(b, g() % 6, g() % 100, g)) batch.push_back(e);
-      std::shuffle(batch.begin(), batch.end(), g);
-      expectSameAnswers(batch, ask(both, batch));
-    }
+    expectSameAnswersOfBoth(both, a, b);
     EXPECT_GT(host->cells, 0u);
     EXPECT_GT(device->cells, 0u);
     EXPECT_EQ(device->uploads, 3u + 2u) << "each mesh once";
@@ -262,13 +267,7 @@ TEST(AutoOracle, AMeshOnTwoLatticesIsUploadedForEach) {
   auto& [time, host, device] = simulated;
   AutoOracle both(host, device, time.clock());
   device->cells = device->uploads = 0;
-  std::mt19937_64 g(5);
-  for (int i = 0; i < 50; ++i) {
-    std::vector<ExpansionRequest> batch = some(a, 1 + g() % 5, 1 + g() % 200, g);
-    for (const ExpansionRequest& e : some(b, 1 + g() % 5, 1 + g() % 200, g)) batch.push_back(e);
-    std::shuffle(batch.begin(), batch.end(), g);
-    expectSameAnswers(batch, ask(both, batch));
-  }
+  expectSameAnswersOfBoth(both, a, b);
   EXPECT_GT(device->cells, 0u);
   EXPECT_EQ(device->uploads, 2u);
 }
