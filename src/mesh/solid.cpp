@@ -3,40 +3,16 @@
 
 #include <algorithm>
 #include <cmath>
-#include <cstring>
 #include <numeric>
 #include <stdexcept>
 #include <string>
+
+#include "mesh/weld.h"
 
 namespace bocst {
 namespace {
 
 using Eigen::Vector3d;
-
-/// For each vertex the first one at its place.
-std::vector<std::uint32_t> weld(const std::vector<Vector3d>& vertices) {
-  constexpr std::uint32_t kEmpty = 0xffffffffu;
-  std::size_t size = 16;
-  while (size < 2 * vertices.size()) size *= 2;
-  std::vector<std::uint32_t> slots(size, kEmpty), first(vertices.size());
-  for (std::uint32_t i = 0; i < vertices.size(); ++i) {
-    std::uint64_t hash = 0;
-    for (int k = 0; k < 3; ++k) {
-      const double x = vertices[i][k] + 0.0;  // -0.0 is 0.0
-      std::uint64_t bits;
-      std::memcpy(&bits, &x, sizeof bits);
-      hash = (hash ^ bits) * 0x9e3779b97f4a7c15ull;
-      hash ^= hash >> 29;
-    }
-    std::size_t at = hash & (size - 1);
-    while (slots[at] != kEmpty && vertices[slots[at]] != vertices[i]) at = (at + 1) & (size - 1);
-    if (slots[at] == kEmpty) slots[at] = i;
-    first[i] = slots[at];
-  }
-  return first;
-}
-
-bool isTriangle(std::uint32_t a, std::uint32_t b, std::uint32_t c) { return a != b && b != c && c != a; }
 
 std::string placeOf(const Vector3d& v) {
   return "(" + std::to_string(v.x()) + ", " + std::to_string(v.y()) + ", " + std::to_string(v.z()) + ")";
@@ -78,21 +54,11 @@ void checkWatertight(const Mesh& mesh) {
 
 std::vector<Vector3d> pointOfEachComponent(const std::vector<Vector3d>& vertices,
                                            const std::vector<Mesh::Indices>& triangles) {
-  std::vector<std::uint32_t> parent = weld(vertices);
-  const auto root = [&parent](std::uint32_t i) {
-    while (parent[i] != i) i = parent[i] = parent[parent[i]];
-    return i;
-  };
-  for (const Mesh::Indices& t : triangles) {
-    for (int k = 1; k < 3; ++k) {
-      const std::uint32_t a = root(t[0]), b = root(t[static_cast<std::size_t>(k)]);
-      parent[std::max(a, b)] = std::min(a, b);
-    }
-  }
+  const std::vector<std::uint32_t> component = componentOfEachVertex(weld(vertices), triangles);
   std::vector<std::uint8_t> seen(vertices.size(), 0);
   std::vector<Vector3d> points;
   for (const Mesh::Indices& t : triangles) {
-    const std::uint32_t r = root(t[0]);
+    const std::uint32_t r = component[t[0]];
     if (!seen[r]) points.push_back(vertices[t[0]]);
     seen[r] = 1;
   }

@@ -207,7 +207,11 @@ void Tree::pruneAlone(std::int64_t now, Pruning pruning) {
     dropBoxes();
     countBytes();
   }
-  const bool is_at_rest = root_.load(std::memory_order_relaxed).tag() != ChildRef::kBlock && !boxes_;
+  if (!budget_only && interior_ && isOld(interior_used_.load(std::memory_order_relaxed), now)) {
+    dropInterior();
+    countBytes();
+  }
+  const bool is_at_rest = root_.load(std::memory_order_relaxed).tag() != ChildRef::kBlock && !boxes_ && !interior_;
   if (!budget_only && is_at_rest && isOld(recall_time_, now)) forgetMesh();
   applyBudget();
 }

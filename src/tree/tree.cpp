@@ -94,6 +94,7 @@ void Tree::reset(std::shared_ptr<const Mesh> mesh) {
   solid_ = options_.solid ? std::make_shared<const Solid>(mesh) : nullptr;
   component_points_.reset();
   dropBoxes();
+  dropInterior();
   surface_ = surfaceOf(std::move(mesh), options_);
   radius_ = -1;
   root_bounds_ = bounds::NodeBounds();
@@ -125,7 +126,7 @@ const std::vector<Eigen::Vector3d>& Tree::componentPoints() const {
 }
 
 const BoxTree& Tree::boxes(std::int64_t now) {
-  if (boxes_used_.load(std::memory_order_relaxed) < now) boxes_used_.store(now, std::memory_order_relaxed);
+  markUsed(boxes_used_, now);
   if (const BoxTree* known = boxes_.seen()) return *known;
   const std::lock_guard<thread::ForkAwareMutex> lock(growth_);
   if (!boxes_) {
@@ -149,6 +150,27 @@ std::size_t Tree::boxPrice() const {
 void Tree::dropBoxes() {
   boxes_.reset();
   box_rent_ = 0;
+}
+
+void Tree::payInterior(std::int64_t now) {
+  // A walk that finds contact takes as long as the share of so many triangles.
+  constexpr std::size_t kTrianglesPerWalk = 40, kLeastWalks = 16;
+  const std::size_t budget = options_.memory_budget;
+  if (interior_.seen() != nullptr || surface_.mesh == nullptr || (budget != 0 && Interior::kMostBytes > budget / 2)) {
+    return;
+  }
+  const std::size_t price = kLeastWalks + surface_.triangle_count / kTrianglesPerWalk;
+  if (interior_rent_.fetch_add(1, std::memory_order_relaxed) + 1 < price) return;
+  const std::unique_lock<thread::ForkAwareMutex> lock(growth_, std::try_to_lock);
+  if (!lock.owns_lock() || interior_) return;
+  markUsed(interior_used_, now);
+  interior_.set(std::make_unique<const Interior>(*surface_.mesh, surface_.lattice));
+  countBytes();
+}
+
+void Tree::dropInterior() {
+  interior_.reset();
+  interior_rent_ = 0;
 }
 
 std::shared_ptr<const Mesh> Tree::mesh() const {
@@ -636,7 +658,8 @@ void Tree::countBytes() {
 
 std::size_t Tree::treeBytes() const {
   return blocks_.bytes() + records_.bytes() + last_use_.bytes() + lists_.bytes() + (grid_ ? grid_->bytes() : 0) +
-         node_words_.capacity() * sizeof(node_words_[0]) + (boxes_ ? boxes_->bytes() : 0);
+         node_words_.capacity() * sizeof(node_words_[0]) + (boxes_ ? boxes_->bytes() : 0) +
+         (interior_ ? interior_->bytes() : 0);
 }
 
 }  // namespace bocst::tree

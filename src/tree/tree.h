@@ -18,6 +18,7 @@
 #include <vector>
 
 #include "memory/pool.h"
+#include "mesh/interior.h"
 #include "mesh/solid.h"
 #include "oracle/oracle.h"
 #include "thread/published.h"
@@ -60,7 +61,7 @@ class Tree {
   /// Are there branches that are dropped some time, if no query uses them? Without a lock.
   bool hasDecay() const {
     return (root_.load(std::memory_order_relaxed).tag() == ChildRef::kBlock || boxes_.seen() != nullptr ||
-            recalled_bytes_.load(std::memory_order_relaxed) != 0) &&
+            interior_.seen() != nullptr || recalled_bytes_.load(std::memory_order_relaxed) != 0) &&
            next_prune_.load(std::memory_order_relaxed) != kNeverDue;
   }
 
@@ -123,6 +124,17 @@ class Tree {
   /// Adds pairs of leaves that a long walk has tested.
   void payBoxRent(std::size_t pairs) const { box_rent_.fetch_add(pairs, std::memory_order_relaxed); }
 
+  /// The surface's Interior, which proves contact quickly; null until payInterior() has built it. Dropped like a
+  /// branch.
+  const Interior* interior(std::int64_t now) const {
+    const Interior* known = interior_.seen();
+    if (known != nullptr) markUsed(interior_used_, now);
+    return known;
+  }
+  /// A walk has found that the surface touches another one. Builds interior() once such walks have taken as long as
+  /// that does. @throws std::bad_alloc.
+  void payInterior(std::int64_t now);
+
   /// How the last long search of a kind ended: over oriented boxes or not, and after how many steps. A guess for the
   /// next one.
   enum class Search { kYesOrNo, kDistance };
@@ -133,10 +145,7 @@ class Tree {
   void setLongSearch(Search kind, LongSearch last) const { long_searches_[static_cast<std::size_t>(kind)] = last; }
 
   /// Marks a block as used now, for ttl and budget.
-  void markUsed(std::uint32_t block, std::int64_t now) const {
-    std::atomic<std::int64_t>& last_use = last_use_[block];
-    if (last_use.load(std::memory_order_relaxed) < now) last_use.store(now, std::memory_order_relaxed);
-  }
+  void markUsed(std::uint32_t block, std::int64_t now) const { markUsed(last_use_[block], now); }
   /// A block is about to be marked.
   void prefetchLastUse(std::uint32_t block) const { __builtin_prefetch(&last_use_[block]); }
   std::int64_t now() const;
@@ -220,6 +229,9 @@ class Tree {
 
  private:
   struct AheadBuild;
+  static void markUsed(std::atomic<std::int64_t>& last_use, std::int64_t now) {
+    if (last_use.load(std::memory_order_relaxed) < now) last_use.store(now, std::memory_order_relaxed);
+  }
   /// Where a block of a build goes: below a node, whose level as counted this is; and its index, once it is added.
   struct BulkPlace {
     NodeRef node;
@@ -281,6 +293,7 @@ class Tree {
   void pruneAlone(std::int64_t now, Pruning pruning);
   void applyBudget();
   void dropBoxes();
+  void dropInterior();
   using NodeCounts = std::array<std::size_t, lattice::kMaxLevel + 1>;
   void keepOnly(const std::vector<std::uint8_t>& keep);
   void dropTree();
@@ -312,6 +325,9 @@ class Tree {
   thread::Published<const BoxTree> boxes_;  // made under growth_, dropped alone
   std::atomic<std::int64_t> boxes_used_{0};
   mutable std::atomic<std::size_t> box_rent_{0};  // see payBoxRent()
+  thread::Published<const Interior> interior_;    // made under growth_, dropped alone
+  mutable std::atomic<std::int64_t> interior_used_{0};
+  std::atomic<std::size_t> interior_rent_{0};  // walks, see payInterior()
   mutable std::atomic<LongSearch> long_searches_[2] = {};
   bounds::NodeBounds root_bounds_;
   SupportTable supports_;

@@ -93,6 +93,7 @@ void Tree::leakPools() {
   (new decltype(node_words_))->swap(node_words_);
   (new decltype(refits_))->swap(refits_);
   boxes_.leak();
+  interior_.leak();
 }
 
 // The cell of a node; of a lane only the level, which counts from the cell that was built in bulk.

@@ -13,7 +13,9 @@
 #include <thread>
 #include <vector>
 
+#include "fcl/adapters/models.h"
 #include "meshes.h"
+#include "tree/tree.h"
 
 namespace bocst {
 namespace {
@@ -98,6 +100,77 @@ TYPED_TEST(CollidePoses, HasTheVerdictsOfCollide) {
     for (const unsigned threads : {1u, 2u, 3u, 0u}) EXPECT_EQ(atOnce(a, b, X, threads), expected) << threads;
     EXPECT_EQ(atOnce(a, a, X), oneByOne(a, a, X));
   }
+}
+
+// Once enough poses touched, most are known to by probes. A walk, which collide() always makes, agrees.
+TYPED_TEST(CollidePoses, HasThemOnceInteriorsAreKnown) {
+  using S = TypeParam;
+  Raw shell = test::box({-1, -1, -1}, {1, 1, 1});
+  shell.add(test::box({-0.6, -0.6, -0.6}, {0.6, 0.6, 0.6}));
+  const Raw raws[] = {test::torus(30), test::torus(12).scale(0.4), shell,
+                      test::box({-0.1, -0.2, -0.3}, {0.1, 0.2, 0.3})};
+  for (const Options& options :
+       {Options(), optionsOf(Answer::kConservative, 0, false), optionsOf(Answer::kExact, 0.1, false)}) {
+    for (const Raw& raw_a : raws) {
+      for (const Raw& raw_b : raws) {
+        const Model<S> a(raw_a.mesh(), options), b(raw_b.mesh(), options);
+        const Poses<S> before = randomPoses<S>(400, 0.8, 2), X = randomPoses<S>(800, 1.6, 3);
+        atOnce(a, b, before);
+        ASSERT_NE(fcl_adapter::treeOf(a).interior(0), nullptr);
+        ASSERT_NE(fcl_adapter::treeOf(b).interior(0), nullptr);
+        const auto expected = oneByOne(a, b, X);
+        EXPECT_GT(count(expected), 10u);
+        EXPECT_EQ(atOnce(a, b, X), expected);
+        const auto turned = oneByOne(b, a, X);
+        EXPECT_EQ(atOnce(b, a, X), turned);
+      }
+    }
+  }
+}
+
+// What proves contact quickly is dropped like a branch, and counted.
+TEST(CollidePosesInteriors, Decay) {
+  Clock::time_point now{};
+  Options options;
+  options.clock = [&now] { return now; };
+  options.ttl = std::chrono::milliseconds(1000);
+  const auto mesh = test::torus(20).mesh();
+  Model<double> a(mesh, options);
+  const Model<double> b(mesh, options);
+  const Poses<double> X = randomPoses<double>(400, 0.8, 2);
+  atOnce(a, b, X);
+  const tree::Tree& tree = fcl_adapter::treeOf(a);
+  ASSERT_NE(tree.interior(0), nullptr);
+  for (int n = 0; n < 20; ++n) a.prune(now += std::chrono::milliseconds(1500));
+  EXPECT_EQ(tree.interior(0), nullptr);
+  EXPECT_EQ(a.statistics().resident_bytes, Model<double>(mesh, options).statistics().resident_bytes);
+  atOnce(a, b, X);
+  EXPECT_NE(tree.interior(0), nullptr);
+}
+
+// A mesh that moves has another one.
+TEST(CollidePosesInteriors, AreOfTheVerticesAsTheyAre) {
+  const Raw raw = test::torus(20);
+  Model<double> a(raw.mesh());
+  const Model<double> b(raw.mesh());
+  const Poses<double> X = randomPoses<double>(400, 0.8, 2);
+  atOnce(a, b, X);
+  ASSERT_NE(fcl_adapter::treeOf(a).interior(0), nullptr);
+  Raw moved = raw;
+  moved.scale(0.3).move({0.7, 0, 0});
+  a.updateVertices(moved.vertices);
+  EXPECT_EQ(fcl_adapter::treeOf(a).interior(0), nullptr);
+  for (int n = 0; n < 2; ++n) EXPECT_EQ(atOnce(a, b, X), oneByOne(a, b, X));
+}
+
+TEST(CollidePosesInteriors, DoNotExceedTheBudget) {
+  Options options;
+  options.memory_budget = 15000;
+  const auto mesh = test::torus(20).mesh();
+  const Model<double> a(mesh, options), b(mesh);
+  atOnce(a, b, randomPoses<double>(400, 0.8, 2));
+  EXPECT_EQ(fcl_adapter::treeOf(a).interior(0), nullptr);
+  EXPECT_NE(fcl_adapter::treeOf(b).interior(0), nullptr);
 }
 
 // Where boxes just touch, and where they just do not: rounding must not part what meets.

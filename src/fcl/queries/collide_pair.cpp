@@ -5,6 +5,7 @@
 #include <fcl/geometry/bvh/BVH_model.h>
 
 #include <algorithm>
+#include <new>
 #include <optional>
 #include <stdexcept>
 #include <type_traits>
@@ -24,6 +25,7 @@
 #include "query/collide/pair_walk.h"
 #include "query/collide/sphere_walk.h"
 #include "query/collide/tree_walk.h"
+#include "query/cull/crossing.h"
 #include "query/cull/far_apart.h"
 #include "query/sides/box_side.h"
 
@@ -66,10 +68,10 @@ bool isNeedle(const tree::Tree& tree) {
 }
 
 template <typename S>
-void collideTrees(const CollideQuery<S>& q, const TreeSide& a, const TreeSide& b) {
+void collideTrees(const CollideQuery<S>& q, const TreeSide& a, const TreeSide& b, const RelativeSides& sides) {
   const std::size_t before = q.result.numContacts();
   tree::Tree &tree_a = a.tree(), &tree_b = b.tree();
-  const auto [b_in_a, magnitude] = relate<S>(q, a, b);
+  const auto& [b_in_a, magnitude] = sides;
   if (isOutOfSight(q, b_in_a, magnitudeOf(tree_a.surface().bounds), magnitudeOf(tree_b.surface().bounds))) return;
   const auto walk = [&, &b_in_a = b_in_a, magnitude = magnitude](auto&& with_collector) {
     const Triangles<S> t1(q.swapped ? tree_b : tree_a), t2(q.swapped ? tree_a : tree_b);
@@ -192,7 +194,7 @@ std::size_t answer(const CollideQuery<S>& q, const Models<S>& models, const Brou
   q.inCallersOrder(a, b);
   if (b != nullptr) {
     const QueryScope scope(treeOf(*a), treeOf(*b));
-    collideTrees(q, scope.a(), scope.b());
+    collideTrees(q, scope.a(), scope.b(), relate<S>(q, scope.a(), scope.b()));
   } else if (isShape(q.b())) {
     collideShape(q, treeOf(*a), solver);
 #if FCL_HAVE_OCTOMAP
@@ -238,8 +240,21 @@ bool touchAt(const Models<S>& models, const fcl::Transform3<S>& X_W1, const fcl:
   const CollideQuery<S> q{
       {models.first, X_W1, models.second, X_W2, turnsRound(models, X_W1, X_W2)}, request, result, margin};
   const QueryScope scope(treeOf(*models.first), treeOf(*models.second));
-  collideTrees(q, q.swapped ? scope.b() : scope.a(), q.swapped ? scope.a() : scope.b());
-  return result.isCollision();
+  const TreeSide &a = q.swapped ? scope.b() : scope.a(), &b = q.swapped ? scope.a() : scope.b();
+  const Interior *interior_a = a.tree().interior(a.now()), *interior_b = b.tree().interior(b.now());
+  const RelativeSides sides = relate<S>(q, a, b);
+  if (interior_a != nullptr && interior_b != nullptr && query::surelyCross(*interior_a, *interior_b, sides.b_in_a)) {
+    return true;
+  }
+  collideTrees(q, a, b, sides);
+  if (!result.isCollision()) return false;
+  try {
+    a.tree().payInterior(a.now());
+    b.tree().payInterior(b.now());
+  } catch (const std::bad_alloc&) {
+    // The answer stands.
+  }
+  return true;
 }
 
 }  // namespace

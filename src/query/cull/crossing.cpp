@@ -1,0 +1,97 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#include "query/cull/crossing.h"
+
+#undef HWY_TARGET_INCLUDE
+#define HWY_TARGET_INCLUDE "query/cull/crossing.cpp"
+#include <hwy/foreach_target.h>
+#include <hwy/highway.h>
+
+#include "query/cull/probe_grid.h"
+#include "simd/vectors-inl.h"
+
+HWY_BEFORE_NAMESPACE();
+namespace bocst::query::HWY_NAMESPACE {
+
+// Is a probe in a marked cell, or, where that counts, beyond the grid?
+HWY_INLINE bool anyIn(const ProbeGrid& grid, const std::uint32_t* marked, bool beyond_counts) {
+  const D d;
+  using Di = hn::RebindToSigned<D>;
+  const Di di;
+  const V side = hn::Set(d, static_cast<float>(1 << grid.bits));
+  const auto bits = hn::Set(di, grid.bits);
+  auto found = hn::Zero(di);
+  for (std::size_t i = 0; i < Interior::kProbes; i += hn::Lanes(d)) {
+    const Vec3 p = load(*grid.probes, i);
+    hn::Vec<Di> cell[3];
+    M in_grid = hn::Eq(p.x, p.x);
+    for (std::size_t k = 0; k < 3; ++k) {
+      const V at = hn::MulAdd(hn::Set(d, grid.to_cells[k][0]), p.x,
+                              hn::MulAdd(hn::Set(d, grid.to_cells[k][1]), p.y,
+                                         hn::MulAdd(hn::Set(d, grid.to_cells[k][2]), p.z, hn::Set(d, grid.shift[k]))));
+      in_grid = hn::And(in_grid, hn::And(hn::Ge(at, hn::Zero(d)), hn::Lt(at, side)));
+      cell[k] = hn::ConvertTo(di, at);
+    }
+    if (beyond_counts && !hn::AllTrue(d, in_grid)) return true;
+    if (hn::AllFalse(d, in_grid)) continue;
+    const auto is_in_grid = hn::RebindMask(di, in_grid);
+    const auto row = hn::IfThenElseZero(is_in_grid, hn::Or(hn::Shl(cell[2], bits), cell[1]));
+    const auto bit = hn::IfThenElseZero(is_in_grid, hn::Shl(hn::Set(di, 1), cell[0]));
+    found = hn::Or(found, hn::And(hn::GatherIndex(di, reinterpret_cast<const std::int32_t*>(marked), row), bit));
+  }
+  return !hn::AllTrue(di, hn::Eq(found, hn::Zero(di)));
+}
+
+bool EntersAndLeaves(const ProbeGrid& grid) {
+  return anyIn(grid, grid.inside, false) && anyIn(grid, grid.outside, true);
+}
+
+}  // namespace bocst::query::HWY_NAMESPACE
+HWY_AFTER_NAMESPACE();
+
+#if HWY_ONCE
+namespace bocst::query {
+
+HWY_EXPORT(EntersAndLeaves);
+
+namespace {
+
+/// Do probes prove that a surface crosses that of `grid`, in whose lattice units they are at scale * R * probe + t?
+bool proves(const Interior& grid, const float (&probes)[3][Interior::kProbes], const Eigen::Matrix3d& R, double scale,
+            const Eigen::Vector3d& t, double off) {
+  if (grid.bits == 0) return false;
+  ProbeGrid g;
+  g.probes = &probes;
+  g.inside = grid.inside.data();
+  g.outside = grid.outside.data();
+  g.bits = grid.bits;
+  // Probes are no farther than this from the middle of their root cube. In float, a probe, an entry, a product and
+  // three sums are rounded: 6 u, of the shift 4.
+  constexpr double kReach = 0.87 * (1 << lattice::kBits), kRounding = 16 * 0x1p-24;
+  for (int k = 0; k < 3; ++k) {
+    const double per_unit = grid.cells_per_unit[k], shift = (t[k] - grid.low[k]) * per_unit;
+    if (!((off + kRounding * scale * kReach) * per_unit + kRounding * std::abs(shift) < Interior::kAllowed))
+      return false;
+    for (int j = 0; j < 3; ++j) g.to_cells[k][j] = static_cast<float>(scale * R(k, j) * per_unit);
+    g.shift[k] = static_cast<float>(shift);
+  }
+  return HWY_DYNAMIC_DISPATCH(EntersAndLeaves)(g);
+}
+
+}  // namespace
+
+bool surelyCross(const Interior& a, const Interior& b, const SimilarityTransform& b_in_a) {
+  if (a.bits == 0 && b.bits == 0) return false;
+  // Probes are counted from the middles of the root cubes.
+  const Eigen::Vector3d middle = Eigen::Vector3d::Constant(lattice::kMiddle);
+  const Eigen::Vector3d b_at = b_in_a * middle;
+  if (proves(a, b.probes, b_in_a.rotation, b_in_a.scale, b_at, b_in_a.tolerance)) return true;
+  // The transposed rotation is its inverse but for its error, over the way between the middles and beyond.
+  const double per_unit = 1 / b_in_a.scale;
+  const Eigen::Vector3d way = middle - b_at;
+  const double off = b_in_a.tolerance + 4 * b_in_a.orthogonality_error * (way.norm() + (1 << lattice::kBits));
+  const Eigen::Matrix3d back = b_in_a.rotation.transpose();
+  return proves(b, a.probes, back, per_unit, middle + per_unit * (back * way), off * per_unit);
+}
+
+}  // namespace bocst::query
+#endif
