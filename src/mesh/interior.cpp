@@ -55,9 +55,11 @@ struct alignas(8) Ranges {
   }
 };
 
-/// A grid of cubes of side 1 from the origin on, `side` along each axis, one bit each.
+/// A grid of cubes of side 1 from the origin on, `side` along each axis.
 class GridRows {
  public:
+  using Row = std::uint64_t;  // of cells along x, a bit each
+
   explicit GridRows(int bits) : bits_(bits), side_(1 << bits), near_(std::size_t{1} << 2 * bits), odd_(near_.size()) {}
 
   using Corners = std::array<Vector3d, 3>;
@@ -85,7 +87,7 @@ class GridRows {
     const int lines_end = side_ - r.lines_from_end;
     const bool is_small = (x1 - x0 <= 1) & (y1 - y0 <= 1) & (z1 - z0 <= 1);
     if (is_small) {
-      const std::uint32_t cells = cellsFrom(x0, x1);
+      const Row cells = cellsFrom(x0, x1);
       near_[row(y0, z0)] |= cells;
       near_[row(y1, z0)] |= cells;
       near_[row(y0, z1)] |= cells;
@@ -103,19 +105,19 @@ class GridRows {
     return true;
   }
 
-  std::uint32_t inside(std::size_t row) const { return odd_[row] & ~near_[row] & all(); }
-  std::uint32_t outside(std::size_t row) const { return ~odd_[row] & ~near_[row] & all(); }
+  Row inside(std::size_t row) const { return odd_[row] & ~near_[row] & all(); }
+  Row outside(std::size_t row) const { return ~odd_[row] & ~near_[row] & all(); }
   std::size_t rows() const { return near_.size(); }
 
  private:
   // Beyond what positions may be off by when the grid is asked: rounding here.
   static constexpr double kNear = Interior::kAllowed + 1e-3;
 
-  std::uint32_t all() const { return ~std::uint32_t{0} >> (32 - side_); }
+  Row all() const { return ~Row{0} >> (64 - side_); }
   std::size_t row(int y, int z) const { return static_cast<std::size_t>(z << bits_ | y); }
   // A vertex that no triangle uses may be anywhere.
   int cell(double x) const { return static_cast<int>(std::min(std::max(x, 0.0), side_ - 1.0)); }
-  static std::uint32_t cellsFrom(int x0, int x1) { return (~std::uint32_t{0} >> (31 - (x1 - x0))) << x0; }
+  static Row cellsFrom(int x0, int x1) { return (~Row{0} >> (63 - (x1 - x0))) << x0; }
 
   // Cells whose middle, as seen along x and along the triangle's normal, is no farther from the triangle than they
   // reach.
@@ -173,14 +175,20 @@ class GridRows {
         if ((crossing[0].y() > at_z) == (crossing[1].y() > at_z)) continue;
         const double s = (at_z - crossing[0].y()) / (crossing[1].y() - crossing[0].y());
         const int x = cell(crossing[0].x() + s * (crossing[1].x() - crossing[0].x()));
-        odd_[row(y, z)] ^= ~std::uint32_t{1} << x;
+        odd_[row(y, z)] ^= ~Row{1} << x;
       }
     }
   }
 
   const int bits_, side_;
-  std::vector<std::uint32_t> near_, odd_;
+  std::vector<Row> near_, odd_;
 };
+
+/// Of a grid for so many triangles: it takes little memory beside their tree.
+int bitsOf(std::size_t triangles) {
+  constexpr std::size_t kFew = 512, kMany = 8192;
+  return triangles <= kFew ? 4 : triangles < kMany ? 5 : 6;
+}
 
 }  // namespace
 
@@ -250,8 +258,7 @@ void Interior::spreadProbes(const Mesh& mesh, const lattice::Lattice& lattice,
 }
 
 void Interior::fillGrid(const Mesh& mesh, const lattice::Lattice& lattice) {
-  constexpr std::size_t kFewTriangles = 512;
-  const int bits_here = mesh.triangleCount() <= kFewTriangles ? 4 : 5;
+  const int bits_here = bitsOf(mesh.triangleCount());
   const int side = 1 << bits_here;
   // The bounds end a quarter of a cell before the grid does.
   constexpr double kRim = 0.25;
@@ -271,12 +278,18 @@ void Interior::fillGrid(const Mesh& mesh, const lattice::Lattice& lattice) {
     const auto corners = [&]() -> GridRows::Corners { return {toCells(t[0]), toCells(t[1]), toCells(t[2])}; };
     if (!rows.add(least(ranges[t[0]], ranges[t[1]], ranges[t[2]]), corners, rows_left)) return;
   }
-  std::uint32_t any = 0;
+  GridRows::Row any = 0;
   for (std::size_t i = 0; i < rows.rows(); ++i) any |= rows.inside(i);
   if (any == 0) return;
+  inside.assign(rows.rows() * static_cast<std::size_t>(side) / 32, 0);
+  outside = inside;
   for (std::size_t i = 0; i < rows.rows(); ++i) {
-    inside.push_back(rows.inside(i));
-    outside.push_back(rows.outside(i));
+    const std::size_t first = i << bits_here;
+    for (int x = 0; x < side; x += 32) {
+      const std::size_t cell = first + static_cast<std::size_t>(x);
+      inside[cell / 32] |= static_cast<std::uint32_t>(rows.inside(i) >> x) << cell % 32;
+      outside[cell / 32] |= static_cast<std::uint32_t>(rows.outside(i) >> x) << cell % 32;
+    }
   }
   bits = bits_here;
   for (int k = 0; k < 3; ++k) {
@@ -287,6 +300,10 @@ void Interior::fillGrid(const Mesh& mesh, const lattice::Lattice& lattice) {
 
 std::size_t Interior::bytes() const {
   return (inside.capacity() + outside.capacity()) * sizeof(std::uint32_t) + sizeof(*this);
+}
+
+std::size_t Interior::mostBytesOf(std::size_t triangles) {
+  return sizeof(Interior) + 2 * (std::size_t{1} << 3 * bitsOf(triangles)) / 8;
 }
 
 }  // namespace bocst

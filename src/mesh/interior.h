@@ -18,7 +18,7 @@ namespace bocst {
 ///
 /// Closed: each edge belongs to an even number of triangles (vertices at the same place are one). A point is inside if
 /// a ray from it crosses an odd number of triangles. Edges are counted by the exclusive or of 64-bit hash values, so an
-/// open mesh passes for a closed one with a probability of 2^-64. Immutable; 9 kB.
+/// open mesh passes for a closed one with a probability of 2^-64. Immutable; 1.5, 9 or 66 kB.
 class Interior {
  public:
   static constexpr std::size_t kProbes = 32;
@@ -36,11 +36,12 @@ class Interior {
   double low[3] = {}, cells_per_unit[3] = {};
   /// Positions off by this many cells at most are inside or outside where the grid says so.
   static constexpr double kAllowed = 1.0 / 16;
-  /// Bit x of word z << bits | y: the cell (x, y, z) is wholly inside or wholly outside. Neither: the surface is near.
+  /// Bits of the cells that are wholly inside, and wholly outside; of other cells the surface is near. The cell
+  /// (x, y, z) has the number (z << bits | y) << bits | x, its bit is number % 32 of the word number / 32.
   std::vector<std::uint32_t> inside, outside;
 
   std::size_t bytes() const;
-  static constexpr std::size_t kMostBytes = 10000;
+  static std::size_t mostBytesOf(std::size_t triangles);
 
  private:
   void spreadProbes(const Mesh& mesh, const lattice::Lattice& lattice, const std::vector<std::uint32_t>& welded);

@@ -154,11 +154,10 @@ void Tree::dropBoxes() {
 
 void Tree::payInterior(std::int64_t now) {
   // A walk that finds contact takes as long as the share of so many triangles.
-  constexpr std::size_t kTrianglesPerWalk = 40, kLeastWalks = 16;
+  constexpr std::size_t kTrianglesPerWalk = 32, kLeastWalks = 16;
   const std::size_t budget = options_.memory_budget;
-  if (interior_.seen() != nullptr || surface_.mesh == nullptr || (budget != 0 && Interior::kMostBytes > budget / 2)) {
-    return;
-  }
+  if (interior_.seen() != nullptr || surface_.mesh == nullptr) return;
+  if (budget != 0 && Interior::mostBytesOf(surface_.triangle_count) > budget / 2) return;
   const std::size_t price = kLeastWalks + surface_.triangle_count / kTrianglesPerWalk;
   if (interior_rent_.fetch_add(1, std::memory_order_relaxed) + 1 < price) return;
   const std::unique_lock<thread::ForkAwareMutex> lock(growth_, std::try_to_lock);

@@ -165,7 +165,7 @@ TEST(CollidePosesInteriors, AreOfTheVerticesAsTheyAre) {
 
 TEST(CollidePosesInteriors, DoNotExceedTheBudget) {
   Options options;
-  options.memory_budget = 15000;
+  options.memory_budget = 2 * Interior::mostBytesOf(test::torus(20).triangles.size()) - 2;
   const auto mesh = test::torus(20).mesh();
   const Model<double> a(mesh, options), b(mesh);
   atOnce(a, b, randomPoses<double>(400, 0.8, 2));

@@ -22,21 +22,21 @@ HWY_INLINE bool anyIn(const ProbeGrid& grid, const std::uint32_t* marked, bool b
   auto found = hn::Zero(di);
   for (std::size_t i = 0; i < Interior::kProbes; i += hn::Lanes(d)) {
     const Vec3 p = load(*grid.probes, i);
-    hn::Vec<Di> cell[3];
+    V at[3];
     M in_grid = hn::Eq(p.x, p.x);
     for (std::size_t k = 0; k < 3; ++k) {
-      const V at = hn::MulAdd(hn::Set(d, grid.to_cells[k][0]), p.x,
-                              hn::MulAdd(hn::Set(d, grid.to_cells[k][1]), p.y,
-                                         hn::MulAdd(hn::Set(d, grid.to_cells[k][2]), p.z, hn::Set(d, grid.shift[k]))));
-      in_grid = hn::And(in_grid, hn::And(hn::Ge(at, hn::Zero(d)), hn::Lt(at, side)));
-      cell[k] = hn::ConvertTo(di, at);
+      const V y = hn::MulAdd(hn::Set(d, grid.to_cells[k][1]), p.y, hn::Set(d, grid.shift[k]));
+      at[k] = hn::MulAdd(hn::Set(d, grid.to_cells[k][0]), p.x, hn::MulAdd(hn::Set(d, grid.to_cells[k][2]), p.z, y));
+      in_grid = hn::And(in_grid, hn::And(hn::Ge(at[k], hn::Zero(d)), hn::Lt(at[k], side)));
     }
     if (beyond_counts && !hn::AllTrue(d, in_grid)) return true;
     if (hn::AllFalse(d, in_grid)) continue;
-    const auto is_in_grid = hn::RebindMask(di, in_grid);
-    const auto row = hn::IfThenElseZero(is_in_grid, hn::Or(hn::Shl(cell[2], bits), cell[1]));
-    const auto bit = hn::IfThenElseZero(is_in_grid, hn::Shl(hn::Set(di, 1), cell[0]));
-    found = hn::Or(found, hn::And(hn::GatherIndex(di, reinterpret_cast<const std::int32_t*>(marked), row), bit));
+    const auto cell = [&](std::size_t k) { return hn::ConvertTo(di, hn::IfThenElseZero(in_grid, at[k])); };
+    const auto number = hn::Or(hn::Shl(hn::Or(hn::Shl(cell(2), bits), cell(1)), bits), cell(0));
+    const auto bit =
+        hn::IfThenElseZero(hn::RebindMask(di, in_grid), hn::Shl(hn::Set(di, 1), hn::And(number, hn::Set(di, 31))));
+    const auto word = hn::ShiftRight<5>(number);
+    found = hn::Or(found, hn::And(hn::GatherIndex(di, reinterpret_cast<const std::int32_t*>(marked), word), bit));
   }
   return !hn::AllTrue(di, hn::Eq(found, hn::Zero(di)));
 }
