@@ -147,11 +147,14 @@ class GridRows {
             edges[2].normal.dot(middle) < edges[2].least) {
           continue;
         }
+        const double rest = offset - n.y() * middle.x() - n.z() * middle.y();
         int first = x0, last = x1;
         if (!is_parallel) {
-          const double x = (offset - n.y() * middle.x() - n.z() * middle.y()) * per_x;
+          const double x = rest * per_x;
           first = std::max(first, cell(x - reach_x + 0.5));  // the middle of cell i is at i + 1/2
           last = std::min(last, cell(x + reach_x - 0.5));
+        } else if (std::abs(rest) > 1.001 * reach) {
+          continue;
         }
         if (first <= last) near_[row(y, z)] |= cellsFrom(first, last);
       }

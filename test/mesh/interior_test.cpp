@@ -7,6 +7,7 @@
 #include <cmath>
 #include <random>
 #include <set>
+#include <utility>
 #include <vector>
 
 #include "mesh/solid.h"
@@ -93,6 +94,14 @@ Raw withSlivers(const Raw& raw) {
   return result;
 }
 
+/// The faces of its cavity are 0.03 cells from ends of cells: what is off by kAllowed may be beyond them.
+Raw cavityBesideCells() {
+  const double cell = 1 / 15.5;
+  const Vector3d from = Vector3d::Constant((5 - 0.25 + 0.03) * cell),
+                 to = Vector3d::Constant((11 - 0.25 - 0.03) * cell);
+  return test::box({0, 0, 0}, {1, 1, 1}).add(insideOut(test::box(from, to)));
+}
+
 std::vector<Case> closedMeshes() {
   return {{"box", test::box({-1, -2, -0.5}, {1, 2, 0.5})},
           {"turned box", turned(test::box({-1, -2, -0.5}, {1, 2, 0.5}), 1)},
@@ -103,6 +112,7 @@ std::vector<Case> closedMeshes() {
           {"torus without common vertices", unwelded(turned(test::torus(20), 3))},
           {"torus with degenerate triangles", withDegenerates(test::torus(20))},
           {"shell", turned(shell(), 4)},
+          {"cavity beside the ends of cells", cavityBesideCells()},
           {"long", test::box({-10, -0.1, -0.2}, {10, 0.1, 0.2})},
           {"two apart", turned(test::torus(12).add(test::box({3, 0, 0}, {4, 1, 1})), 6)},
           {"pipe", turned(pipe(300), 9)},
@@ -138,6 +148,13 @@ TEST(Interior, CellsAreWhollyInsideOrOutside) {
     ASSERT_NE(grid.bits, 0);
     const Solid solid(mesh);
     const int side = 1 << grid.bits;
+    // What is beyond the grid is outside.
+    for (int k = 0; k < 3; ++k) {
+      const double from = (lattice.toLattice(mesh->bounds().min())[k] - grid.low[k]) * grid.cells_per_unit[k],
+                   to = (lattice.toLattice(mesh->bounds().max())[k] - grid.low[k]) * grid.cells_per_unit[k];
+      EXPECT_GT(from, Interior::kAllowed);
+      EXPECT_LT(to, side - Interior::kAllowed);
+    }
     std::size_t inside = 0, outside = 0;
     for (int z = 0; z < side; ++z) {
       for (int y = 0; y < side; ++y) {
@@ -147,7 +164,7 @@ TEST(Interior, CellsAreWhollyInsideOrOutside) {
           ASSERT_FALSE(is_inside && is_outside);
           if (!is_inside && !is_outside) continue;
           (is_inside ? inside : outside) += 1;
-          for (int n = 0; n < 4; ++n) {
+          for (int n = 0; n < 6; ++n) {
             const Vector3d at = n == 0 ? Vector3d(0.5, 0.5, 0.5) : Vector3d(u(g), u(g), u(g));
             ASSERT_EQ(solid.mayContain(pointIn(grid, lattice, cell, at), 0), is_inside)
                 << "cell " << cell.transpose() << " at " << at.transpose();
@@ -177,13 +194,35 @@ TEST(Interior, MostOfABoxIsInside) {
   EXPECT_LT(share, expected);
 }
 
+// Faces along x as well as others.
+TEST(Interior, MostOfAPyramidIsInside) {
+  Raw pyramid;
+  pyramid.vertices = {{0, 0, 0}, {1, 1, 0}, {0, 1, 0}, {1, 0, 0}, {0.5, 0.5, 1}};
+  for (const auto& [a, b, c] :
+       {std::array<std::size_t, 3>{0, 2, 4}, {2, 1, 4}, {1, 3, 4}, {3, 0, 4}, {0, 3, 2}, {3, 1, 2}})
+    pyramid.triangles.emplace_back(a, b, c);
+  const auto mesh = pyramid.mesh();
+  const Interior grid(*mesh, latticeOf(*mesh));
+  std::size_t inside = 0;
+  for (const std::uint32_t cells : grid.inside) inside += static_cast<std::size_t>(__builtin_popcount(cells));
+  EXPECT_GT(inside, 4096u / 3 / 2);
+  EXPECT_LT(inside, 4096u / 3);
+}
+
 TEST(Interior, OfASurfaceThatIsNotClosedThereIsNoGrid) {
   Raw open = test::torus(12);
   open.triangles.pop_back();
   Raw fin = test::box({0, 0, 0}, {1, 1, 1});
   fin.vertices.push_back({2, 2, 2});
   fin.triangles.emplace_back(0, 1, fin.vertices.size() - 1);
-  for (const Raw& raw : {open, fin, test::soup(40, 1)}) {
+  // Each vertex is the lesser one of an even number of the edges that have one triangle.
+  Raw pyramid;
+  pyramid.vertices = {{0, 0, 0}, {1, 1, 0}, {0, 1, 0}, {1, 0, 0}, {0.5, 0.5, 1}};
+  for (const std::size_t corner : {0, 1}) {
+    pyramid.triangles.emplace_back(corner, corner == 0 ? 2 : 3, 4);
+    pyramid.triangles.emplace_back(corner == 0 ? 2 : 3, 1 - corner, 4);
+  }
+  for (const Raw& raw : {open, fin, pyramid, test::soup(40, 1)}) {
     const auto mesh = raw.mesh();
     EXPECT_EQ(Interior(*mesh, latticeOf(*mesh)).bits, 0);
   }
@@ -209,6 +248,13 @@ TEST(Interior, OfManyLongTrianglesThereIsNoGrid) {
 TEST(Interior, OfAFlatSurfaceThereIsNoGrid) {
   const auto mesh = test::box({0, 0, 0}, {1, 1, 1e-9}).mesh();
   EXPECT_EQ(Interior(*mesh, latticeOf(*mesh)).bits, 0);
+}
+
+TEST(Interior, LargeMeshesHaveFinerGrids) {
+  for (const auto& [n, bits] : {std::pair<std::size_t, int>{12, 4}, {40, 5}, {64, 6}}) {
+    const auto mesh = test::torus(n).mesh();
+    EXPECT_EQ(Interior(*mesh, latticeOf(*mesh)).bits, bits) << mesh->triangleCount();
+  }
 }
 
 // Each triangle twice: nothing is inside, as each line crosses the surface twice where it crosses it.
@@ -244,6 +290,15 @@ TEST(Interior, ASurfaceWithoutAreaHasOneProbe) {
   for (std::size_t i = 0; i < Interior::kProbes; ++i) {
     for (int k = 0; k < 3; ++k) EXPECT_EQ(interior.probes[k][i], interior.probes[k][0]);
   }
+}
+
+TEST(Weld, AThirdCornerJoinsTheComponentOfTheOthers) {
+  Raw strip;
+  strip.vertices = {{0, 0, 0}, {1, 0, 0}, {0, 1, 0}, {0, -1, 0}};
+  strip.triangles.emplace_back(0, 1, 2);
+  strip.triangles.emplace_back(0, 1, 3);
+  const auto mesh = strip.mesh();
+  EXPECT_EQ(componentOfEachVertex(weld(mesh->vertices()), mesh->triangles()), std::vector<std::uint32_t>(4, 0));
 }
 
 TEST(Weld, ComponentsAreJoinedAtCommonPlaces) {
