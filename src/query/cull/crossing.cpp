@@ -6,6 +6,8 @@
 #include <hwy/foreach_target.h>
 #include <hwy/highway.h>
 
+#include <cmath>
+
 #include "query/cull/probe_grid.h"
 #include "simd/vectors-inl.h"
 
@@ -55,9 +57,10 @@ HWY_EXPORT(EntersAndLeaves);
 
 namespace {
 
-/// Do probes prove that a surface crosses that of `grid`, in whose lattice units they are at scale * R * probe + t?
-bool proves(const Interior& grid, const float (&probes)[3][Interior::kProbes], const Eigen::Matrix3d& R, double scale,
-            const Eigen::Vector3d& t, double off) {
+/// Do probes prove that a surface crosses that of `grid`, in whose lattice units they are at M * probe + t? They may be
+/// off by `off` units; the rows of M are `scale` long.
+bool proves(const Interior& grid, const float (&probes)[3][Interior::kProbes], const double (&M)[3][3],
+            const double (&t)[3], double scale, double off) {
   if (grid.bits == 0) return false;
   ProbeGrid g;
   g.probes = &probes;
@@ -69,9 +72,9 @@ bool proves(const Interior& grid, const float (&probes)[3][Interior::kProbes], c
   constexpr double kReach = 0.87 * (1 << lattice::kBits), kRounding = 16 * 0x1p-24;
   for (int k = 0; k < 3; ++k) {
     const double per_unit = grid.cells_per_unit[k], shift = (t[k] - grid.low[k]) * per_unit;
-    if (!((off + kRounding * scale * kReach) * per_unit + kRounding * std::abs(shift) < Interior::kAllowed))
-      return false;
-    for (int j = 0; j < 3; ++j) g.to_cells[k][j] = static_cast<float>(scale * R(k, j) * per_unit);
+    const double off_in_cells = (off + kRounding * scale * kReach) * per_unit + kRounding * std::abs(shift);
+    if (!(off_in_cells < Interior::kAllowed)) return false;
+    for (int j = 0; j < 3; ++j) g.to_cells[k][j] = static_cast<float>(M[k][j] * per_unit);
     g.shift[k] = static_cast<float>(shift);
   }
   return HWY_DYNAMIC_DISPATCH(EntersAndLeaves)(g);
@@ -79,18 +82,30 @@ bool proves(const Interior& grid, const float (&probes)[3][Interior::kProbes], c
 
 }  // namespace
 
+// Spelled out: Eigen's products are calls here.
 bool surelyCross(const Interior& a, const Interior& b, const SimilarityTransform& b_in_a) {
   if (a.bits == 0 && b.bits == 0) return false;
   // Probes are counted from the middles of the root cubes.
-  const Eigen::Vector3d middle = Eigen::Vector3d::Constant(lattice::kMiddle);
-  const Eigen::Vector3d b_at = b_in_a * middle;
-  if (proves(a, b.probes, b_in_a.rotation, b_in_a.scale, b_at, b_in_a.tolerance)) return true;
+  constexpr double kMiddle = lattice::kMiddle;
+  const double scale = b_in_a.scale, per_scale = 1 / scale;
+  double to_a[3][3], to_b[3][3], b_at[3], a_at[3], way = 0;
+  for (int k = 0; k < 3; ++k) {
+    b_at[k] = b_in_a.translation[k];
+    for (int j = 0; j < 3; ++j) {
+      to_a[k][j] = scale * b_in_a.rotation(k, j);
+      to_b[k][j] = per_scale * b_in_a.rotation(j, k);
+      b_at[k] += to_a[k][j] * kMiddle;
+    }
+    way += std::abs(kMiddle - b_at[k]);
+  }
+  if (proves(a, b.probes, to_a, b_at, scale, b_in_a.tolerance)) return true;
   // The transposed rotation is its inverse but for its error, over the way between the middles and beyond.
-  const double per_unit = 1 / b_in_a.scale;
-  const Eigen::Vector3d way = middle - b_at;
-  const double off = b_in_a.tolerance + 4 * b_in_a.orthogonality_error * (way.norm() + (1 << lattice::kBits));
-  const Eigen::Matrix3d back = b_in_a.rotation.transpose();
-  return proves(b, a.probes, back, per_unit, middle + per_unit * (back * way), off * per_unit);
+  for (int k = 0; k < 3; ++k) {
+    a_at[k] = kMiddle;
+    for (int j = 0; j < 3; ++j) a_at[k] += to_b[k][j] * (kMiddle - b_at[j]);
+  }
+  const double off = b_in_a.tolerance + 4 * b_in_a.orthogonality_error * (way + (1 << lattice::kBits));
+  return proves(b, a.probes, to_b, a_at, per_scale, off * per_scale);
 }
 
 }  // namespace bocst::query
