@@ -16,20 +16,21 @@ using Eigen::Vector2d;
 using Eigen::Vector3d;
 using Eigen::Vector3f;
 
-/// Of two vertices. The product of 128 bits, folded, mixes as well as hash functions need.
-std::uint64_t hashOf(std::uint64_t a, std::uint64_t b) {
-  __extension__ using Product = unsigned __int128;
-  const Product p = Product{a ^ 0x9e3779b97f4a7c15ull} * (b ^ 0xd1b54a32d192ed03ull);
-  return static_cast<std::uint64_t>(p) ^ static_cast<std::uint64_t>(p >> 64);
-}
-
+// The sum of hash values of all triangles' edges is that of edges with an odd number of triangles. The hash depends on
+// all triangles, so nobody finds an open mesh whose sum is 0 by choosing among edges of known values.
 bool isClosed(const std::vector<Mesh::Indices>& triangles, const std::vector<std::uint32_t>& welded) {
+  std::uint64_t key = triangles.size();
+  for (const Mesh::Indices& t : triangles) {
+    key = mixed(key ^ (std::uint64_t{welded[t[0]]} << 32 | welded[t[1]]), 0x9e3779b97f4a7c15ull ^ welded[t[2]]);
+  }
+  const std::uint64_t key_a = mixed(key ^ 0xa0761d6478bd642full, 0xe7037ed1a0b428dbull),
+                      key_b = mixed(key ^ 0x8ebc6af09c88c6e3ull, 0x589965cc75374cc3ull);
   std::uint64_t odd = 0;
   for (const Mesh::Indices& t : triangles) {
     const std::uint64_t v[3] = {welded[t[0]], welded[t[1]], welded[t[2]]};
     for (int k = 0; k < 3; ++k) {
       const std::uint64_t a = v[k], b = v[(k + 1) % 3];
-      if (a != b) odd ^= hashOf(std::min(a, b), std::max(a, b));
+      if (a != b) odd ^= mixed(std::min(a, b) ^ key_a, std::max(a, b) ^ key_b);
     }
   }
   return odd == 0;
@@ -271,7 +272,7 @@ void Interior::fillGrid(const Mesh& mesh, const lattice::Lattice& lattice) {
   const Vector3d start = from - kRim * cells_per.cwiseInverse();
   GridRows rows(bits_here);
   // Of large triangles that are not along the axes, boxes are much larger.
-  std::size_t rows_left = 64 * mesh.triangleCount() + 65536;
+  std::size_t rows_left = 16 * mesh.triangleCount() + 16384;
   const auto toCells = [&](std::uint32_t i) -> Vector3d {
     return (lattice.toLattice(mesh.vertex(i)) - start).cwiseProduct(cells_per);
   };

@@ -18,8 +18,7 @@ std::vector<std::uint32_t> weld(const std::vector<Eigen::Vector3d>& vertices) {
       const double x = vertices[i][k] + 0.0;  // -0.0 is 0.0
       std::uint64_t bits;
       std::memcpy(&bits, &x, sizeof bits);
-      hash = (hash ^ bits) * 0x9e3779b97f4a7c15ull;
-      hash ^= hash >> 29;
+      hash = mixed(hash ^ bits, 0x9e3779b97f4a7c15ull);
     }
     std::size_t at = hash & (size - 1);
     while (slots[at] != kEmpty && vertices[slots[at]] != vertices[i]) at = (at + 1) & (size - 1);

@@ -9,6 +9,13 @@
 
 namespace bocst {
 
+/// A hash value of two numbers: their product of 128 bits, folded.
+inline std::uint64_t mixed(std::uint64_t a, std::uint64_t b) {
+  __extension__ using Product = unsigned __int128;
+  const Product p = Product{a} * b;
+  return static_cast<std::uint64_t>(p) ^ static_cast<std::uint64_t>(p >> 64);
+}
+
 /// For each vertex the first one at the same place.
 std::vector<std::uint32_t> weld(const std::vector<Eigen::Vector3d>& vertices);
 

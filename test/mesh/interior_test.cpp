@@ -115,7 +115,7 @@ std::vector<Case> closedMeshes() {
           {"cavity beside the ends of cells", cavityBesideCells()},
           {"long", test::box({-10, -0.1, -0.2}, {10, 0.1, 0.2})},
           {"two apart", turned(test::torus(12).add(test::box({3, 0, 0}, {4, 1, 1})), 6)},
-          {"pipe", turned(pipe(300), 9)},
+          {"pipe", turned(pipe(50), 9)},
           {"box with slivers", withSlivers(turned(test::box({0, 0, 0}, {1, 1, 2}), 10))},
           {"small", turned(test::torus(20), 7).scale(1e-20)}};
 }

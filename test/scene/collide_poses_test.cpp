@@ -227,6 +227,30 @@ TYPED_TEST(CollidePoses, HasThemForPosesThatAreNotQuiteRigid) {
   EXPECT_LT(count(expected), 5000u);
 }
 
+// Conservative answers allow for what a rotation that is not quite one moves: the more, the farther from the origins.
+TYPED_TEST(CollidePoses, HasThemForConservativeAnswersOfSuchPosesFarFromTheOrigins) {
+  using S = TypeParam;
+  const Vector3d middle_a(800, -500, 300), middle_b(-400, 900, 700);
+  const auto mesh_a = test::box({-1, -0.01, -1}, {1, 0.01, 1}).move(middle_a).mesh(),
+             mesh_b = test::torus(12).scale(0.1).move(middle_b).mesh();
+  for (const bool first : {true, false}) {
+    const Options conservative = optionsOf(Answer::kConservative, 0, false);
+    const Model<S> a(mesh_a, first ? conservative : Options()), b(mesh_b, first ? Options() : conservative);
+    std::mt19937_64 g(8);
+    std::uniform_real_distribution<double> u(-1, 1);
+    Poses<S> X = randomPoses<S>(4000, 0, 9);
+    for (fcl::Transform3<S>& x : X) {
+      for (int i = 0; i < 9; ++i) x.linear()(i % 3, i / 3) += static_cast<S>(2e-5 * u(g));
+      const Eigen::Matrix3d R = x.linear().template cast<double>();
+      x.translation() = (middle_a + Vector3d(u(g), 1.5 + 1.4 * u(g), u(g)) - R * middle_b).template cast<S>();
+    }
+    const auto expected = oneByOne(a, b, X);
+    EXPECT_EQ(atOnce(a, b, X), expected);
+    EXPECT_GT(count(expected), 100u);
+    EXPECT_LT(count(expected), 3900u);
+  }
+}
+
 TEST(CollidePosesModels, NothingTouchesAnEmptyOne) {
   const Modeld empty, model(test::torus(9).mesh());
   const std::vector<fcl::Transform3d> X(100, fcl::Transform3d::Identity());

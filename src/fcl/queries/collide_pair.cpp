@@ -67,12 +67,21 @@ bool isNeedle(const tree::Tree& tree) {
   });
 }
 
+/// What a query wants: contacts, or only whether there is one.
+enum class Wanted { kContacts, kVerdict };
+
+/// Adds contacts to the result. True where only a verdict is wanted and probes prove contact; then there may be none.
 template <typename S>
-void collideTrees(const CollideQuery<S>& q, const TreeSide& a, const TreeSide& b, const RelativeSides& sides) {
+bool collideTrees(const CollideQuery<S>& q, const TreeSide& a, const TreeSide& b, Wanted wanted) {
   const std::size_t before = q.result.numContacts();
   tree::Tree &tree_a = a.tree(), &tree_b = b.tree();
-  const auto& [b_in_a, magnitude] = sides;
-  if (isOutOfSight(q, b_in_a, magnitudeOf(tree_a.surface().bounds), magnitudeOf(tree_b.surface().bounds))) return;
+  const auto [b_in_a, magnitude] = relate<S>(q, a, b);
+  if (isOutOfSight(q, b_in_a, magnitudeOf(tree_a.surface().bounds), magnitudeOf(tree_b.surface().bounds))) return false;
+  const auto isProved = [&, &b_in_a = b_in_a] {
+    if (wanted != Wanted::kVerdict) return false;
+    const Interior *of_a = tree_a.interior(a.now()), *of_b = tree_b.interior(b.now());
+    return of_a != nullptr && of_b != nullptr && query::surelyCross(*of_a, *of_b, b_in_a);
+  };
   const auto walk = [&, &b_in_a = b_in_a, magnitude = magnitude](auto&& with_collector) {
     const Triangles<S> t1(q.swapped ? tree_b : tree_a), t2(q.swapped ? tree_a : tree_b);
     MeshCollector<S> collector(q, tree_a, t1, t2, magnitude);
@@ -91,6 +100,7 @@ void collideTrees(const CollideQuery<S>& q, const TreeSide& a, const TreeSide& b
   if (query::TreeWalk::fits(a, b, near) && !isNeedle(tree_a) && !isNeedle(tree_b)) {
     query::TreeWalk trees(a, b, near);
     if (!trees.isNeedless() && !(kUsesBoxes && query::knownBoxesApart(a, b, near))) {
+      if (isProved()) return true;
       walk([&](auto& collector) {
         if (kUsesBoxes && collector.endsAtFirst()) {
           trees.runByTurns(collector);
@@ -103,7 +113,10 @@ void collideTrees(const CollideQuery<S>& q, const TreeSide& a, const TreeSide& b
     walk(walkBoxes);
   } else if (query::SphereWalk::fits(a, b)) {
     query::SphereWalk spheres(a, b, near);
-    if (!spheres.isNeedless()) walk([&](auto& collector) { spheres.run(collector); });
+    if (!spheres.isNeedless()) {
+      if (isProved()) return true;
+      walk([&](auto& collector) { spheres.run(collector); });
+    }
   } else {
     const bool spheres = a.isConservative() || b.isConservative();
     const SimilarityTransform wide = withMargin(b_in_a, a, q, q.cullingMargin(spheres));
@@ -131,6 +144,7 @@ void collideTrees(const CollideQuery<S>& q, const TreeSide& a, const TreeSide& b
                                 contains<S>(tree_b, q.X_WB(), tree_a, q.X_WA(), magnitude))) {
     addInside(q, a, b, b_in_a);
   }
+  return false;
 }
 
 template <typename S>
@@ -194,7 +208,7 @@ std::size_t answer(const CollideQuery<S>& q, const Models<S>& models, const Brou
   q.inCallersOrder(a, b);
   if (b != nullptr) {
     const QueryScope scope(treeOf(*a), treeOf(*b));
-    collideTrees(q, scope.a(), scope.b(), relate<S>(q, scope.a(), scope.b()));
+    collideTrees(q, scope.a(), scope.b(), Wanted::kContacts);
   } else if (isShape(q.b())) {
     collideShape(q, treeOf(*a), solver);
 #if FCL_HAVE_OCTOMAP
@@ -241,12 +255,7 @@ bool touchAt(const Models<S>& models, const fcl::Transform3<S>& X_W1, const fcl:
       {models.first, X_W1, models.second, X_W2, turnsRound(models, X_W1, X_W2)}, request, result, margin};
   const QueryScope scope(treeOf(*models.first), treeOf(*models.second));
   const TreeSide &a = q.swapped ? scope.b() : scope.a(), &b = q.swapped ? scope.a() : scope.b();
-  const Interior *interior_a = a.tree().interior(a.now()), *interior_b = b.tree().interior(b.now());
-  const RelativeSides sides = relate<S>(q, a, b);
-  if (interior_a != nullptr && interior_b != nullptr && query::surelyCross(*interior_a, *interior_b, sides.b_in_a)) {
-    return true;
-  }
-  collideTrees(q, a, b, sides);
+  if (collideTrees(q, a, b, Wanted::kVerdict)) return true;
   if (!result.isCollision()) return false;
   try {
     a.tree().payInterior(a.now());
