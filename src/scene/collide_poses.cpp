@@ -19,9 +19,9 @@
 namespace bocst {
 namespace {
 
-/// Poses that a thread takes at a time: enough that taking them costs nothing, few enough to be shared out. A device
-/// wants more of them.
-constexpr std::size_t kPosesAtOnce = 256, kPosesForDevice = 4096;
+/// Poses that a thread takes at a time: enough that reading and walking seldom take turns, few enough to be shared out.
+/// Devices want many.
+constexpr std::size_t kLeastAtOnce = 256, kMostAtOnce = 4096;
 /// A thread starts in the time that so many poses take whose bounding boxes are apart.
 constexpr std::size_t kPosesForThread = 4096;
 
@@ -96,9 +96,8 @@ void collideAll(const Model<S>& a, const Model<S>& b, const Poses<S>& X_AB, std:
     const std::size_t most = std::max(1u, std::thread::hardware_concurrency());
     threads = static_cast<unsigned>(std::clamp<std::size_t>(count / kPosesForThread, 1, most));
   }
-  const std::size_t at_once = fcl_adapter::growsTogether(a, b)
-                                  ? std::clamp((count + threads - 1) / threads, kPosesAtOnce, kPosesForDevice)
-                                  : kPosesAtOnce;
+  const std::size_t shares = fcl_adapter::growsTogether(a, b) ? std::size_t{threads} : std::size_t{8} * threads;
+  const std::size_t at_once = std::clamp((count + shares - 1) / shares, kLeastAtOnce, kMostAtOnce);
   const std::size_t rows = (count + at_once - 1) / at_once;
   const auto work = [&](std::size_t row) {
     collideSome(a, b, X_AB, row * at_once, std::min((row + 1) * at_once, count), hit);
