@@ -153,8 +153,8 @@ void Tree::dropBoxes() {
 }
 
 void Tree::payInterior(std::int64_t now) {
-  // A walk that finds contact takes as long as the share of so many triangles.
-  constexpr std::size_t kTrianglesPerWalk = 32, kLeastWalks = 16;
+  // Probes spare about half of the walks that find contact; one takes as long as the share of 32 triangles.
+  constexpr std::size_t kTrianglesPerWalk = 16, kLeastWalks = 24;
   const std::size_t budget = options_.memory_budget;
   if (interior_.seen() != nullptr || surface_.mesh == nullptr) return;
   if (budget != 0 && Interior::mostBytesOf(surface_.triangle_count) > budget / 2) return;

@@ -114,7 +114,7 @@ TYPED_TEST(CollidePoses, HasThemOnceInteriorsAreKnown) {
     for (const Raw& raw_a : raws) {
       for (const Raw& raw_b : raws) {
         const Model<S> a(raw_a.mesh(), options), b(raw_b.mesh(), options);
-        const Poses<S> before = randomPoses<S>(400, 0.8, 2), X = randomPoses<S>(800, 1.6, 3);
+        const Poses<S> before = randomPoses<S>(1500, 0.8, 2), X = randomPoses<S>(800, 1.6, 3);
         atOnce(a, b, before);
         ASSERT_NE(fcl_adapter::treeOf(a).interior(0), nullptr);
         ASSERT_NE(fcl_adapter::treeOf(b).interior(0), nullptr);
@@ -137,7 +137,7 @@ TEST(CollidePosesInteriors, Decay) {
   const auto mesh = test::torus(20).mesh();
   Model<double> a(mesh, options);
   const Model<double> b(mesh, options);
-  const Poses<double> X = randomPoses<double>(400, 0.8, 2);
+  const Poses<double> X = randomPoses<double>(800, 0.8, 2);
   atOnce(a, b, X);
   const tree::Tree& tree = fcl_adapter::treeOf(a);
   ASSERT_NE(tree.interior(0), nullptr);
@@ -153,7 +153,7 @@ TEST(CollidePosesInteriors, AreOfTheVerticesAsTheyAre) {
   const Raw raw = test::torus(20);
   Model<double> a(raw.mesh());
   const Model<double> b(raw.mesh());
-  const Poses<double> X = randomPoses<double>(400, 0.8, 2);
+  const Poses<double> X = randomPoses<double>(800, 0.8, 2);
   atOnce(a, b, X);
   ASSERT_NE(fcl_adapter::treeOf(a).interior(0), nullptr);
   Raw moved = raw;
@@ -168,7 +168,7 @@ TEST(CollidePosesInteriors, DoNotExceedTheBudget) {
   options.memory_budget = 2 * Interior::mostBytesOf(test::torus(20).triangles.size()) - 2;
   const auto mesh = test::torus(20).mesh();
   const Model<double> a(mesh, options), b(mesh);
-  atOnce(a, b, randomPoses<double>(400, 0.8, 2));
+  atOnce(a, b, randomPoses<double>(800, 0.8, 2));
   EXPECT_EQ(fcl_adapter::treeOf(a).interior(0), nullptr);
   EXPECT_NE(fcl_adapter::treeOf(b).interior(0), nullptr);
 }
