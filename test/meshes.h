@@ -35,6 +35,22 @@ struct Raw {
   }
 };
 
+/// Every triangle with vertices of its own, as STL files have them.
+inline Raw unwelded(const Raw& raw) {
+  Raw out;
+  for (const auto& t : raw.triangles) {
+    const std::size_t n = out.vertices.size();
+    for (std::size_t k = 0; k < 3; ++k) out.vertices.push_back(raw.vertices[t[k]]);
+    out.triangles.emplace_back(n, n + 1, n + 2);
+  }
+  return out;
+}
+
+inline Raw turnedOver(Raw raw) {
+  for (auto& t : raw.triangles) t = fcl::Triangle(t[0], t[2], t[1]);
+  return raw;
+}
+
 /// A rotation that turns the direction `from` to the direction `to`. Eigen's FromTwoVectors compiles for four seconds.
 inline Eigen::Matrix3d turnOnto(const Eigen::Vector3d& from, const Eigen::Vector3d& to) {
   const Eigen::Vector3d axis = from.cross(to);

@@ -15,28 +15,14 @@ namespace bocst {
 namespace {
 
 using test::Raw;
+using test::turnedOver;
+using test::unwelded;
 
 Options solid(Answer answer = Answer::kExact) {
   Options o;
   o.solid = true;
   o.answer = answer;
   return o;
-}
-
-Raw turnedOver(Raw raw) {
-  for (auto& t : raw.triangles) t = fcl::Triangle(t[0], t[2], t[1]);
-  return raw;
-}
-
-/// Every triangle with vertices of its own, as STL files have them.
-Raw unwelded(const Raw& raw) {
-  Raw out;
-  for (const auto& t : raw.triangles) {
-    const std::size_t n = out.vertices.size();
-    for (std::size_t k = 0; k < 3; ++k) out.vertices.push_back(raw.vertices[t[k]]);
-    out.triangles.emplace_back(n, n + 1, n + 2);
-  }
-  return out;
 }
 
 /// How often the surface winds about a point, by the solid angles of its triangles.

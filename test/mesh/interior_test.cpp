@@ -19,6 +19,8 @@ namespace {
 
 using Eigen::Vector3d;
 using test::Raw;
+using test::turnedOver;
+using test::unwelded;
 
 struct Case {
   const char* name;
@@ -33,25 +35,9 @@ Raw turned(const Raw& raw, unsigned seed) {
   return result;
 }
 
-/// Each triangle with corners of its own, as STL files have it.
-Raw unwelded(const Raw& raw) {
-  Raw apart;
-  for (const auto& t : raw.triangles) {
-    const std::size_t n = apart.vertices.size();
-    for (std::size_t k = 0; k < 3; ++k) apart.vertices.push_back(raw.vertices[t[k]]);
-    apart.triangles.emplace_back(n, n + 1, n + 2);
-  }
-  return apart;
-}
-
-Raw insideOut(Raw raw) {
-  for (auto& t : raw.triangles) t = fcl::Triangle(t[0], t[2], t[1]);
-  return raw;
-}
-
 /// Solid between the two.
 Raw shell() {
-  return test::box({-1, -1, -1}, {1, 1, 1}).add(insideOut(test::box({-0.7, -0.7, -0.7}, {0.7, 0.7, 0.7})));
+  return test::box({-1, -1, -1}, {1, 1, 1}).add(turnedOver(test::box({-0.7, -0.7, -0.7}, {0.7, 0.7, 0.7})));
 }
 
 /// Of triangles as long as it is.
@@ -99,7 +85,7 @@ Raw cavityBesideCells() {
   const double cell = 1 / 15.5;
   const Vector3d from = Vector3d::Constant((5 - 0.25 + 0.03) * cell),
                  to = Vector3d::Constant((11 - 0.25 - 0.03) * cell);
-  return test::box({0, 0, 0}, {1, 1, 1}).add(insideOut(test::box(from, to)));
+  return test::box({0, 0, 0}, {1, 1, 1}).add(turnedOver(test::box(from, to)));
 }
 
 std::vector<Case> closedMeshes() {
@@ -259,7 +245,7 @@ TEST(Interior, LargeMeshesHaveFinerGrids) {
 
 // Each triangle twice: nothing is inside, as each line crosses the surface twice where it crosses it.
 TEST(Interior, TwoSheetsAtOnePlaceEncloseNothing) {
-  const auto mesh = test::torus(12).add(insideOut(test::torus(12))).mesh();
+  const auto mesh = test::torus(12).add(turnedOver(test::torus(12))).mesh();
   EXPECT_EQ(Interior(*mesh, latticeOf(*mesh)).bits, 0);
 }
 
