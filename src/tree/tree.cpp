@@ -7,6 +7,7 @@
 #include <cmath>
 #include <limits>
 #include <mutex>
+#include <new>
 #include <numeric>
 #include <shared_mutex>
 #include <stdexcept>
@@ -162,8 +163,13 @@ void Tree::payInterior(std::int64_t now) {
   if (interior_rent_.fetch_add(1, std::memory_order_relaxed) + 1 < price) return;
   const std::unique_lock<thread::ForkAwareMutex> lock(growth_, std::try_to_lock);
   if (!lock.owns_lock() || interior_) return;
+  try {
+    interior_.set(std::make_unique<const Interior>(*surface_.mesh, surface_.lattice));
+  } catch (const std::bad_alloc&) {
+    interior_rent_ = 0;  // walks go on without it; tried again when they have paid again
+    return;
+  }
   markUsed(interior_used_, now);
-  interior_.set(std::make_unique<const Interior>(*surface_.mesh, surface_.lattice));
   countBytes();
 }
 

@@ -131,8 +131,8 @@ class Tree {
     if (known != nullptr) markUsed(interior_used_, now);
     return known;
   }
-  /// A walk has found that the surface touches another one. Builds interior() once such walks have taken as long as
-  /// that does. @throws std::bad_alloc.
+  /// A walk has found that the surface touches another one. Builds interior() once such walks have taken about twice as
+  /// long as that does, if there is memory.
   void payInterior(std::int64_t now);
 
   /// How the last long search of a kind ended: over oriented boxes or not, and after how many steps. A guess for the

@@ -5,7 +5,6 @@
 #include <fcl/geometry/bvh/BVH_model.h>
 
 #include <algorithm>
-#include <new>
 #include <optional>
 #include <stdexcept>
 #include <type_traits>
@@ -257,12 +256,8 @@ bool touchAt(const Models<S>& models, const fcl::Transform3<S>& X_W1, const fcl:
   const TreeSide &a = q.swapped ? scope.b() : scope.a(), &b = q.swapped ? scope.a() : scope.b();
   if (collideTrees(q, a, b, Wanted::kVerdict)) return true;
   if (!result.isCollision()) return false;
-  try {
-    a.tree().payInterior(a.now());
-    b.tree().payInterior(b.now());
-  } catch (const std::bad_alloc&) {
-    // The answer stands.
-  }
+  a.tree().payInterior(a.now());
+  b.tree().payInterior(b.now());
   return true;
 }
 
