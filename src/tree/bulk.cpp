@@ -134,9 +134,10 @@ void BulkBuilder::buildAll(const oracle::Surface& surface) {
   finish(mesh.triangles().data(), ids_.data());
 }
 
-// Fresh memory costs more than what is done with it here, so all of it comes at once, in huge pages.
+// Fresh memory costs more than what is done with it here, so all of it comes at once, in huge pages if it is much. In a
+// virtual machine that returns free memory to its host, a new huge page may cost 5 ms, ten times what small pages cost.
 void BulkBuilder::makeRoom(std::size_t triangles, std::size_t places, std::size_t clusters) {
-  constexpr std::size_t kLine = 64, kMostOnSmallPages = 1 << 18;
+  constexpr std::size_t kLine = 64, kMostOnSmallPages = 1 << 24;
   std::size_t bytes = 0;
   const auto take = [&bytes, this](auto*& values, std::size_t count) {
     if (memory_ != nullptr) values = reinterpret_cast<std::remove_reference_t<decltype(values)>>(memory_ + bytes);
