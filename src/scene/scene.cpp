@@ -7,6 +7,7 @@
 #include <map>
 #include <mutex>
 #include <new>
+#include <set>
 #include <shared_mutex>
 #include <stdexcept>
 #include <string>
@@ -138,7 +139,8 @@ struct Scene<S>::Impl {
     Object<S> o = objectOf(geometry);
     const std::lock_guard<thread::ForkAwareMutex> lock(mutex);
     const auto other = with_geometry.find(geometry.get());
-    if (other != with_geometry.end()) o = objects.at(other->second).object;  // update() may have come in between
+    if (other != with_geometry.end())
+      o = objects.at(*other->second.begin()).object;  // update() may have come in between
     refuseEmpty(o);
     if (X_WG != nullptr) o.X_WG = *X_WG;
     const std::uint32_t number = next_number++;
@@ -146,10 +148,10 @@ struct Scene<S>::Impl {
     const auto entry = objects.emplace(number, Record{geometry, std::move(o), X_WG == nullptr}).first;
     const Record& record = entry->second;
     try {
-      with_geometry[geometry.get()] = number;
+      with_geometry[geometry.get()].insert(number);
       if (record.moves) moving_numbers.push_back(number);
     } catch (const std::bad_alloc&) {
-      with_geometry.erase(geometry.get());
+      forgetGeometry(geometry.get(), number);
       objects.erase(entry);
       throw;
     }
@@ -166,9 +168,16 @@ struct Scene<S>::Impl {
     {
       const std::lock_guard<thread::ForkAwareMutex> lock(mutex);
       const auto other = with_geometry.find(geometry.get());
-      if (other != with_geometry.end()) return objects.at(other->second).object;
+      if (other != with_geometry.end()) return objects.at(*other->second.begin()).object;
     }
     return describe(geometry);
+  }
+
+  void forgetGeometry(const Geometry* geometry, std::uint32_t number) {
+    const auto others = with_geometry.find(geometry);
+    if (others == with_geometry.end()) return;
+    others->second.erase(number);
+    if (others->second.empty()) with_geometry.erase(others);
   }
 
   static void refuseEmpty(const Object<S>& o) {
@@ -241,9 +250,9 @@ struct Scene<S>::Impl {
 
   mutable thread::ForkAwareMutex mutex;  // of changes
   std::uint32_t next_number = 0;
-  std::map<std::uint32_t, Record> objects;                 // in the order of adding
-  std::vector<std::uint32_t> moving_numbers;               // numbers of objects, in the order of adding
-  std::map<const Geometry*, std::uint32_t> with_geometry;  // an object that was given it
+  std::map<std::uint32_t, Record> objects;                           // in the order of adding
+  std::vector<std::uint32_t> moving_numbers;                         // numbers of objects, in the order of adding
+  std::map<const Geometry*, std::set<std::uint32_t>> with_geometry;  // the objects that were given it
   scene::IgnoredPairs ignored;
   mutable thread::ShardedLock
       sharded_lock;                         // of `world`; held no longer than it takes to copy the pointer, or a change
@@ -272,8 +281,7 @@ Id Scene<S>::addMoving(std::shared_ptr<Geometry> geometry) {
 template <typename S>
 void Scene<S>::remove(Id object) {
   const std::lock_guard<thread::ForkAwareMutex> lock(impl_->mutex);
-  const auto other = impl_->with_geometry.find(impl_->find("remove", object).given.get());
-  if (other != impl_->with_geometry.end() && other->second == object.number_) impl_->with_geometry.erase(other);
+  impl_->forgetGeometry(impl_->find("remove", object).given.get(), object.number_);
   const bool moves = impl_->objects.at(object.number_).moves;
   impl_->objects.erase(object.number_);
   impl_->ignored.remove(object);

@@ -327,6 +327,37 @@ TYPED_TEST(Validate, RefusesOptionsThatDoNotExist) {
   refuse("ttl", [](Options& o) { o.ttl = std::chrono::milliseconds(-1); });
 }
 
+TYPED_TEST(Validate, RefusesNullGeometries) {
+  using S = TypeParam;
+  const Model<S> box(test::box({0, 0, 0}, {1, 1, 1}).mesh());
+  const fcl::Transform3<S> I = fcl::Transform3<S>::Identity();
+  const std::vector<std::string> words = {"null"};
+  using Pointer = const fcl::CollisionGeometry<S>*;
+  for (const auto& [o1, o2] : {std::pair<Pointer, Pointer>{&box, nullptr}, {nullptr, &box}}) {
+    expectRefusal([&, o1 = o1, o2 = o2] { this->collide(o1, I, o2, I); }, words);
+    expectRefusal([&, o1 = o1, o2 = o2] { this->distance(o1, I, o2, I); }, words);
+    expectRefusal([&, o1 = o1, o2 = o2] { isCloserThan<S>(o1, I, o2, I, S(1)); }, words);
+    expectRefusal(
+        [&, o1 = o1, o2 = o2] {
+          fcl::ContinuousCollisionResult<S> result;
+          bocst::continuousCollide<S>(o1, I, I, o2, I, I, fcl::ContinuousCollisionRequest<S>(), result);
+        },
+        words);
+  }
+}
+
+TYPED_TEST(Validate, IsCloserThanNeedsAModel) {
+  using S = TypeParam;
+  const fcl::Sphere<S> ball(S(1));
+  const fcl::Transform3<S> I = fcl::Transform3<S>::Identity();
+  try {
+    isCloserThan<S>(&ball, I, &ball, I, S(1));
+    ADD_FAILURE();
+  } catch (const std::logic_error& e) {
+    EXPECT_NE(std::string(e.what()).find("isCloserThan"), std::string::npos) << e.what();
+  }
+}
+
 TYPED_TEST(Validate, LeavesPairsWithoutModelsToFcl) {
   using S = TypeParam;
   const fcl::Sphere<S> ball(S(1));

@@ -594,6 +594,26 @@ TYPED_TEST(SceneTest, DeformedMesh) {
   }
 }
 
+// What an object knows of its geometry does not go with another object that was added later.
+TYPED_TEST(SceneTest, ObjectsShareTheModelOfAMeshAfterOneOfThemLeft) {
+  using S = TypeParam;
+  const auto mesh = test::bvh<fcl::OBBRSS<S>>(test::box({-1, -1, -1}, {1, 1, 1}));
+  const auto at = [](double x) { return test::pose<S>(Eigen::Matrix3d::Identity(), {x, 0, 0}); };
+  Scene<S> scene;
+  scene.addFixed(mesh, at(0));
+  const Id later = scene.addFixed(mesh, at(10));
+  scene.addMoving(std::make_shared<fcl::Sphere<S>>(S(0.2)));
+  scene.remove(later);
+  ASSERT_EQ(mesh->beginReplaceModel(), fcl::BVH_OK);
+  for (const auto& v : test::box({3, -1, -1}, {5, 1, 1}).vertices) mesh->replaceVertex(v.cast<S>());
+  ASSERT_EQ(mesh->endReplaceModel(), fcl::BVH_OK);
+  scene.addFixed(mesh, at(20));
+  for (const double x : {1.0, 21.0}) {
+    const auto X = at(x);
+    EXPECT_TRUE(scene.collides(&X)) << "the mesh changed, but update() was not called: " << x;
+  }
+}
+
 // A model stands for one of FCL's meshes: faces that rest on one another touch, and its occupancy counts.
 TYPED_TEST(SceneTest, MeshesOfFclAreChecked) {
   using S = TypeParam;

@@ -46,11 +46,14 @@ enum class PairKind {
   kModel,
 };
 
-/// @throws std::logic_error for a Model that is being built.
+/// @throws std::logic_error for a Model that is being built, std::invalid_argument for null.
 template <typename S>
 PairKind kindOf(const fcl::CollisionGeometry<S>* o1, const fcl::CollisionGeometry<S>* o2) {
   const Model<S>*model1 = asModel<S>(o1), *model2 = asModel<S>(o2);
-  if (model1 == nullptr && model2 == nullptr) return PairKind::kForeign;
+  if (model1 == nullptr || model2 == nullptr) {
+    if (o1 == nullptr || o2 == nullptr) throw std::invalid_argument("bocst: a geometry is a null pointer");
+    if (model1 == model2) return PairKind::kForeign;
+  }
   const auto is_empty = [](const Model<S>* model) {
     return model != nullptr && ModelTree::of(*model) == nullptr && model->empty();
   };

@@ -2,6 +2,8 @@
 #include <bocst/is_closer_than.h>
 #include <fcl/narrowphase/collision_result.h>
 
+#include <stdexcept>
+
 #include "fcl/adapters/models.h"
 #include "fcl/adapters/validate.h"
 #include "fcl/queries/collide_pair.h"
@@ -30,7 +32,7 @@ bool isCloserThan(const fcl::CollisionGeometry<S>* o1, const fcl::Transform3<S>&
       }
       break;
     case fcl_adapter::PairKind::kForeign:
-      break;
+      throw std::logic_error("bocst::isCloserThan: neither geometry is a bocst::Model");
   }
   fcl::CollisionResult<S> result;
   return fcl_adapter::collidePair<S>(o1, X_W1, o2, X_W2, {}, fcl::CollisionRequest<S>(), result,
