@@ -1,6 +1,8 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #include "log/log.h"
 
+#include <pthread.h>
+
 #include <cstdio>
 #include <memory>
 #include <mutex>
@@ -16,10 +18,16 @@ struct Registered {
   std::shared_ptr<const Logger> logger;
 };
 
-// Never destroyed: threads of devices may report while the process ends.
+// Never destroyed: threads of devices may report while the process ends. Held during a fork(): the child has no other
+// thread that could give it back.
 Registered& registered() {
-  static Registered& r = *new Registered;
-  return r;
+  static Registered* const r = [] {
+    static auto* const made = new Registered;
+    const auto unlock = [] { made->mutex.unlock(); };
+    pthread_atfork([] { made->mutex.lock(); }, unlock, unlock);
+    return made;
+  }();
+  return *r;
 }
 
 }  // namespace

@@ -6,12 +6,15 @@
 #include <fcl/geometry/octree/octree.h>
 #endif
 
+#include <fcl/geometry/shape/utility.h>
+
 #include <Eigen/Eigenvalues>
 #include <cmath>
 #include <limits>
 #include <shared_mutex>
 
 #include "fcl/adapters/models.h"
+#include "fcl/adapters/shapes.h"
 #include "scene/reach.h"
 
 namespace bocst::scene {
@@ -121,31 +124,35 @@ Bounds boundsOfOcTree(const fcl::OcTree<S>& tree) {
 #endif
 
 template <typename S>
-Bounds boundsOfShape(fcl::CollisionGeometry<S>& shape) {
+Bounds boundsOfShape(const fcl::ShapeBase<S>& shape) {
   Bounds b;
   const fcl::NODE_TYPE type = shape.getNodeType();
   if (type == fcl::GEOM_PLANE || type == fcl::GEOM_HALFSPACE) {
     b.kind = Bounds::kEverywhere;
     return b;
   }
-  shape.computeLocalAABB();
-  b = aligned(shape.aabb_local);
-  return b;
+  // Not computeLocalAABB(): other threads may read the shape's box.
+  return aligned(fcl_adapter::withShape(shape, [](const auto& s) {
+    fcl::AABB<S> box;
+    fcl::computeBV(s, fcl::Transform3<S>(fcl::Transform3<S>::Identity()), box);
+    return box;
+  }));
 }
 
 }  // namespace
 
 template <typename S>
-Bounds boundsOf(fcl::CollisionGeometry<S>& geometry) {
+Bounds boundsOf(const fcl::CollisionGeometry<S>& geometry) {
   Bounds b;
   if (const Model<S>* model = fcl_adapter::asModel<S>(&geometry)) {
     b = boundsOfModel(*model);
   } else {
 #if FCL_HAVE_OCTOMAP
     const bool is_octree = geometry.getNodeType() == fcl::GEOM_OCTREE;
-    b = is_octree ? boundsOfOcTree(static_cast<const fcl::OcTree<S>&>(geometry)) : boundsOfShape(geometry);
+    b = is_octree ? boundsOfOcTree(static_cast<const fcl::OcTree<S>&>(geometry))
+                  : boundsOfShape(static_cast<const fcl::ShapeBase<S>&>(geometry));
 #else
-    b = boundsOfShape(geometry);
+    b = boundsOfShape(static_cast<const fcl::ShapeBase<S>&>(geometry));
 #endif
     b.reach = kSolverReach * (1 + b.half.norm());
   }
@@ -157,7 +164,7 @@ Bounds boundsOf(fcl::CollisionGeometry<S>& geometry) {
   return b;
 }
 
-template Bounds boundsOf<float>(fcl::CollisionGeometry<float>&);
-template Bounds boundsOf<double>(fcl::CollisionGeometry<double>&);
+template Bounds boundsOf<float>(const fcl::CollisionGeometry<float>&);
+template Bounds boundsOf<double>(const fcl::CollisionGeometry<double>&);
 
 }  // namespace bocst::scene

@@ -28,6 +28,6 @@ struct Bounds {
 
 /// Of a Model, a shape or an OcTree.
 template <typename S>
-Bounds boundsOf(fcl::CollisionGeometry<S>& geometry);
+Bounds boundsOf(const fcl::CollisionGeometry<S>& geometry);
 
 }  // namespace bocst::scene

@@ -12,6 +12,7 @@
 
 #include "fcl/adapters/models.h"
 #include "fcl/adapters/motion.h"
+#include "fcl/adapters/validate.h"
 #include "scene/reach.h"
 
 namespace bocst::scene {
@@ -61,7 +62,7 @@ class Edge {
       orthogonality_error = 1e-12;
       for (const fcl::Transform3<S>& X : {begin[i], end[i]}) {
         place = std::max(place, static_cast<double>(X.translation().template lpNorm<1>()));
-        orthogonality_error = std::max(orthogonality_error, orthogonalityErrorOf<S>(X));
+        orthogonality_error = std::max(orthogonality_error, fcl_adapter::orthogonalityErrorOf<S>(X));
       }
       const Eigen::Vector3d origin = motions_[i]->at(0).translation();
       place += 2 * motions_[i]->fastest(origin, 0, 0);

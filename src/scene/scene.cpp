@@ -16,6 +16,7 @@
 
 #include "fcl/adapters/models.h"
 #include "fcl/adapters/shapes.h"
+#include "fcl/adapters/validate.h"
 #include "fcl/queries/scene_pair.h"
 #include "scene/edge.h"
 #include "scene/sweep.h"
@@ -135,7 +136,7 @@ struct Scene<S>::Impl {
   Id add(const char* query, std::shared_ptr<Geometry> geometry, const Transform* X_WG) {
     const std::string name = std::string("bocst::Scene::") + query;
     if (geometry == nullptr) throw std::invalid_argument(name + ": the geometry is null");
-    if (X_WG != nullptr) scene::checkPose<S>(query, *X_WG);
+    if (X_WG != nullptr) fcl_adapter::checkPose<S>(("Scene::" + std::string(query)).c_str(), "X_WG", *X_WG);
     Object<S> o = objectOf(geometry);
     const std::lock_guard<thread::ForkAwareMutex> lock(mutex);
     const auto other = with_geometry.find(geometry.get());
@@ -299,7 +300,7 @@ void Scene<S>::remove(Id object) {
 
 template <typename S>
 void Scene<S>::setPose(Id fixed, const Transform& X_WG) {
-  scene::checkPose<S>("setPose", X_WG);
+  fcl_adapter::checkPose<S>("Scene::setPose", "X_WG", X_WG);
   const std::lock_guard<thread::ForkAwareMutex> lock(impl_->mutex);
   typename Impl::Record& record = impl_->find("setPose", fixed);
   if (record.moves) {

@@ -6,7 +6,6 @@
 #include <cmath>
 #include <limits>
 #include <numeric>
-#include <sstream>
 #include <stdexcept>
 #include <string>
 
@@ -17,35 +16,12 @@
 namespace bocst::scene {
 namespace {
 
-template <typename S>
-[[noreturn]] void refuse(const char* query, const std::string& which, const fcl::Transform3<S>& X) {
-  std::ostringstream text;
-  text << "bocst::Scene::" << query << ": the pose" << which << " is not rigid:\n" << X.matrix();
-  throw std::invalid_argument(text.str());
-}
-
 std::uint64_t nextSerial() {
   static std::atomic<std::uint64_t> last{0};
   return ++last;
 }
 
 }  // namespace
-
-template <typename S>
-double orthogonalityErrorOf(const fcl::Transform3<S>& X) {
-  const S* m = X.matrix().data();  // columns of four
-  const double a0 = m[0], a1 = m[1], a2 = m[2], b0 = m[4], b1 = m[5], b2 = m[6], c0 = m[8], c1 = m[9], c2 = m[10];
-  const double aa = a0 * a0 + a1 * a1 + a2 * a2, bb = b0 * b0 + b1 * b1 + b2 * b2, cc = c0 * c0 + c1 * c1 + c2 * c2;
-  const double ab = a0 * b0 + a1 * b1 + a2 * b2, bc = b0 * c0 + b1 * c1 + b2 * c2, ca = c0 * a0 + c1 * a1 + c2 * a2;
-  const double determinant = a0 * (b1 * c2 - b2 * c1) + a1 * (b2 * c0 - b0 * c2) + a2 * (b0 * c1 - b1 * c0);
-  // x - x is 0, and NaN for what is not finite.
-  const double nothing = (m[12] - m[12]) + (m[13] - m[13]) + (m[14] - m[14]);
-  const double off = std::max(std::max(std::max(std::abs(aa - 1), std::abs(bb - 1)), std::abs(cc - 1)),
-                              std::max(std::max(std::abs(ab), std::abs(bc)), std::abs(ca)));
-  // std::max may lose a NaN; a sum does not.
-  const bool finite = aa + bb + cc + nothing < std::numeric_limits<double>::infinity();
-  return finite && determinant > 0 ? off : std::numeric_limits<double>::infinity();
-}
 
 // No entry of R^T R - 1 is larger, for a pose that is surely rigid: its eigenvalues are 2 e + e^2, sum e^2 follows from
 // both sums (fcl_adapter::RigidSums, rigidStates()), and 4e-15 is what they may have lost by rounding.
@@ -54,38 +30,30 @@ inline double errorOf(double deviation) { return kErrorPerDeviation * std::sqrt(
 inline double deviationOf(double error) { return 2 * (error / kErrorPerDeviation) * (error / kErrorPerDeviation); }
 
 template <typename S>
-void refusePose(const char* query, const fcl::Transform3<S>* X_WM, std::size_t k, std::size_t moving,
-                const char* state) {
-  refuse<S>(query,
-            " of moving object " + std::to_string(k % moving) + " in " +
-                (state != nullptr ? state : "state " + std::to_string(k / moving)),
-            X_WM[k]);
-}
-
-template <typename S>
 void checkPoses(const char* query, const fcl::Transform3<S>* X_WM, std::size_t states, std::size_t moving,
                 std::vector<double>& orthogonality_errors, const char* state) {
   orthogonality_errors.assign(roomFor(moving), 0);
   if (states == 0 || moving == 0) return;
-  if (X_WM == nullptr) throw std::invalid_argument(std::string("bocst::Scene::") + query + ": the poses are null");
+  // Strings are made for what is refused, or nearly: queries allocate no memory.
+  const auto name = [query] { return std::string("Scene::") + query; };
+  if (X_WM == nullptr) throw std::invalid_argument("bocst::" + name() + ": the poses are null");
   static_assert(sizeof(fcl::Transform3<S>) == 16 * sizeof(S), "poses are rows of numbers");
   double* const deviations = orthogonality_errors.data();
   for (std::size_t k = 0;; ++k) {
     k += rigidStates(X_WM[k * moving].matrix().data(), states - k, moving, deviations);
     if (k == states) break;
     for (std::size_t i = 0; i < moving; ++i) {
-      const double error = orthogonalityErrorOf<S>(X_WM[k * moving + i]);
-      if (!(error <= fcl_adapter::kMaxOrthogonalityError)) refusePose<S>(query, X_WM, k * moving + i, moving, state);
-      deviations[i] = std::max(deviations[i], deviationOf(error));
+      const fcl::Transform3<S>& X = X_WM[k * moving + i];
+      if (!fcl_adapter::isSurelyRigid(X)) {
+        const std::string where = state != nullptr ? state : "state " + std::to_string(k),
+                          which = "the pose of moving object " + std::to_string(i) + " in " + where;
+        fcl_adapter::checkPose(name().c_str(), which.c_str(), X);
+      }
+      deviations[i] = std::max(deviations[i], deviationOf(fcl_adapter::orthogonalityErrorOf<S>(X)));
     }
     if (k + 1 == states) break;
   }
   for (std::size_t i = 0; i < moving; ++i) orthogonality_errors[i] = errorOf(deviations[i]);
-}
-
-template <typename S>
-void checkPose(const char* query, const fcl::Transform3<S>& X) {
-  if (!(orthogonalityErrorOf<S>(X) <= fcl_adapter::kMaxOrthogonalityError)) refuse<S>(query, "", X);
 }
 
 template <typename S>
@@ -249,7 +217,7 @@ World<S>::World(std::vector<Object<S>> moving_objects, const std::vector<Object<
     }
   }
   for (const Object<S>& o : fixed_objects) {
-    const double orthogonality_error = orthogonalityErrorOf<S>(o.X_WG);
+    const double orthogonality_error = fcl_adapter::orthogonalityErrorOf<S>(o.X_WG);
     fixed_error = std::max(fixed_error, orthogonality_error);
     grows_together |= growsSlowly(o);
     boxes.push_back(boxAt(o, o.X_WG, orthogonality_error));
@@ -390,7 +358,7 @@ bool World<S>::putFixed(const Object<S>& object, const IgnoredPairs& ignored) {
     removeFixed(object.id);
     return true;
   }
-  const double orthogonality_error = orthogonalityErrorOf<S>(object.X_WG);
+  const double orthogonality_error = fcl_adapter::orthogonalityErrorOf<S>(object.X_WG);
   const Box box = boxAt(object, object.X_WG, orthogonality_error);
   const std::size_t place = known != place_of_.end() ? known->second : freePlace(box);
   place_of_[object.id] = place;
@@ -502,10 +470,8 @@ void World<S>::place(const fcl::Transform3<S>* X_WM, const double* orthogonality
 
 #define BOCST_INSTANTIATE(S)                                                                                          \
   template class World<S>;                                                                                            \
-  template double orthogonalityErrorOf<S>(const fcl::Transform3<S>&);                                                 \
   template void checkPoses<S>(const char*, const fcl::Transform3<S>*, std::size_t, std::size_t, std::vector<double>&, \
-                              const char*);                                                                           \
-  template void checkPose<S>(const char*, const fcl::Transform3<S>&);
+                              const char*);
 BOCST_INSTANTIATE(float)
 BOCST_INSTANTIATE(double)
 #undef BOCST_INSTANTIATE

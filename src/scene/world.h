@@ -28,17 +28,11 @@ struct Object {
   fcl::Transform3<S> X_WG = fcl::Transform3<S>::Identity();  ///< Of a fixed object, in the world.
 };
 
-/// The largest entry of R^T R - 1 of a pose that is rigid up to rounding; infinite where it is not finite, or reflects.
-template <typename S>
-double orthogonalityErrorOf(const fcl::Transform3<S>& X);
-
 /// Writes at least the largest orthogonality error of the poses of each moving object to `orthogonality_errors`.
 /// @throws std::invalid_argument that names the first pose that is not rigid; `state`: the name of the only one.
 template <typename S>
 void checkPoses(const char* query, const fcl::Transform3<S>* X_WM, std::size_t states, std::size_t moving,
                 std::vector<double>& orthogonality_errors, const char* state = nullptr);
-template <typename S>
-void checkPose(const char* query, const fcl::Transform3<S>& X);
 
 /// A scene as a query sees it. A change takes the time of the moving objects and of a path in the hierarchy of fixed
 /// ones, but wears the hierarchy: it is to be made anew once isWorn().

@@ -113,7 +113,7 @@ static_assert(std::atomic<ChildRef>::is_always_lock_free);
 
 /// A resident node: the root, or an octant of a block.
 struct NodeRef {
-  static constexpr std::uint32_t kRoot = 0xffffffffu;
+  static constexpr std::uint32_t kRoot = 0xffffffffu, kMostBlocks = kRoot >> 3;
 
   std::uint32_t bits = kRoot;
 

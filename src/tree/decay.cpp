@@ -165,8 +165,9 @@ void Tree::keepOnly(const std::vector<std::uint8_t>& keep) {
   records_.swap(records);
   last_use_.swap(last_use);
   lists_.swap(lists);
-  dropUnusedResources();
   startGeneration(nodes_at);
+  dropUnusedResources();
+  countBytes();
 }
 
 void Tree::pruneAlone(std::int64_t now, Pruning pruning) {

@@ -137,6 +137,16 @@ const BoxTree& Tree::boxes(std::int64_t now) {
   return *boxes_.seen();
 }
 
+bool Tree::buildBoxes(std::int64_t now) {
+  try {
+    boxes(now);
+    return true;
+  } catch (const std::bad_alloc&) {
+    box_rent_.store(0, std::memory_order_relaxed);
+    return false;
+  }
+}
+
 bool Tree::affordsBoxes() const {
   return options_.memory_budget == 0 || BoxTree::bytesOf(surface_.triangle_count) <= options_.memory_budget / 2;
 }
@@ -440,6 +450,7 @@ void Tree::growFromGrid(NodeRef node) {
 std::uint32_t Tree::addBlock(NodeRef node, int level, std::uint8_t grey, std::int64_t now) {
   // Without memory for one of the three, the next block takes the places of those that there were.
   const std::uint32_t index = blocks_.size();
+  if (index >= NodeRef::kMostBlocks) throw std::length_error("bocst: a tree of more than 2^29 blocks");
   if (records_.size() == index) records_.append(1);
   if (last_use_.size() == index) last_use_.append(1);
   blocks_.append(1);

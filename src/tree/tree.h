@@ -115,6 +115,8 @@ class Tree {
   /// Oriented boxes of all triangles in double, for exact answers where the boxes of blocks separate too little: they
   /// are as thin as the surface. Built when first asked for, and dropped like a branch. @throws std::bad_alloc.
   const BoxTree& boxes(std::int64_t now);
+  /// The same; false where there is no memory for them, and walks must pay for them again.
+  bool buildBoxes(std::int64_t now);
   /// Null unless they are built.
   const BoxTree* knownBoxes() const { return boxes_.seen(); }
   /// They would not take most of the memory budget.
@@ -233,6 +235,7 @@ class Tree {
     if (last_use.load(std::memory_order_relaxed) < now) last_use.store(now, std::memory_order_relaxed);
   }
   /// Where a block of a build goes: below a node, whose level as counted this is; and its index, once it is added.
+  class BuildMemory;
   struct BulkPlace {
     NodeRef node;
     int level = 0;

@@ -60,6 +60,32 @@ void buildWhole(const oracle::Surface& surface, BulkBuilder& bulk) {
 
 }  // namespace
 
+/// What a build needs, and a thread keeps for its next build unless this one was of many triangles.
+class Tree::BuildMemory {
+ public:
+  explicit BuildMemory(std::size_t triangles) : triangles_(triangles) {}
+  ~BuildMemory() {
+    if (triangles_ > kMostKept) ofThread() = Parts();
+  }
+  BuildMemory(const BuildMemory&) = delete;
+  BuildMemory& operator=(const BuildMemory&) = delete;
+
+  BulkBuilder& bulk() const { return ofThread().bulk; }
+  std::vector<BulkPlace>& places() const { return ofThread().places; }
+
+ private:
+  struct Parts {
+    BulkBuilder bulk;
+    std::vector<BulkPlace> places;
+  };
+  static Parts& ofThread() {
+    thread_local Parts parts;
+    return parts;
+  }
+
+  const std::size_t triangles_;
+};
+
 /// A build by the helper thread: it and the tree share this, as either may end first.
 struct Tree::AheadBuild {
   thread::ForkAwareMutex mutex;  // of what follows
@@ -136,8 +162,9 @@ bool Tree::growInBulk(NodeRef node, std::vector<std::uint32_t>& ids) {
     const Eigen::Vector3d corner(cell.corner()[0], cell.corner()[1], cell.corner()[2]);
     region = Eigen::AlignedBox3d(corner, corner.array() + cell.side());
   }
-  thread_local BulkBuilder bulk;
-  thread_local std::vector<BulkPlace> places;
+  const BuildMemory memory(ids.size());
+  BulkBuilder& bulk = memory.bulk();
+  std::vector<BulkPlace>& places = memory.places();
   bulk.build(surface_, ids.data(), ids.size(), region);
   if (!is_loose && !bulk.ids().empty()) addRefit(node, encode(bulk.own(), cell(node)));
   startPlaces(bulk, node, cellOrDepth(node).level, places);
@@ -153,7 +180,9 @@ bool Tree::buildsAhead() const {
 void Tree::startRent() {
   rent_ = 0;
   is_ahead_build_due_ = buildsAhead();
-  const bool is_built = !conservative() && 3 * surface_.triangle_count <= BulkBuilder::kMostToSort;
+  // Beside a device, a build finds the supports alone.
+  const bool gains = !conservative() && (growsOnHost() || !supports_known_);
+  const bool is_built = gains && 3 * surface_.triangle_count <= BulkBuilder::kMostToSort;
   price_ = !is_built ? kNever : is_ahead_build_due_ ? 0 : surface_.triangle_count / kRent;
 }
 
@@ -178,8 +207,9 @@ bool Tree::buildNow() {
 
 // All of the tree that exact answers need. Queries under way go on in the old blocks.
 void Tree::growWhole() {
-  thread_local BulkBuilder bulk;
-  thread_local std::vector<BulkPlace> places;
+  const BuildMemory memory(surface_.triangle_count);
+  BulkBuilder& bulk = memory.bulk();
+  std::vector<BulkPlace>& places = memory.places();
   buildWhole(surface_, bulk);
   price_ = kNever;
   if (!supports_known_) {
@@ -192,10 +222,6 @@ void Tree::growWhole() {
   startPlaces(bulk, NodeRef(), 1, places);
   addBlocks(bulk, places, 0, bulk.blocks().size(), now());
   publishWhole(bulk, places);
-  if (surface_.triangle_count > kMostKept) {
-    bulk = BulkBuilder();
-    places = {};
-  }
 }
 
 void Tree::askForAheadBuild() {

@@ -2,6 +2,8 @@
 #include "log/log.h"
 
 #include <gtest/gtest.h>
+#include <sys/wait.h>
+#include <unistd.h>
 
 #include <atomic>
 #include <memory>
@@ -44,6 +46,35 @@ TEST_F(Log, WhatALoggerThrowsIsIgnored) {
   log(LogLevel::kInfo, "one");
   log(LogLevel::kInfo, "two");
   EXPECT_EQ(calls, 2);
+}
+
+// Another thread of the parent may hold the lock at the fork.
+TEST_F(Log, WorksInAChildOfAProcessThatReports) {
+  setLogger([](LogLevel, const std::string&) {});
+  const std::string message = "again";
+  std::atomic<bool> stop{false};
+  std::vector<std::thread> threads;
+  for (int t = 0; t < 3; ++t) {
+    threads.emplace_back([&] {
+      while (!stop) log(LogLevel::kInfo, message);
+    });
+  }
+  int failed = 0;
+  for (int i = 0; i < 300; ++i) {
+    const pid_t child = fork();
+    if (child == 0) {
+      alarm(20);
+      log(LogLevel::kInfo, message);
+      _exit(0);
+    }
+    int status = 0;
+    ASSERT_EQ(waitpid(child, &status, 0), child);
+    failed += status != 0;
+    if (failed > 0) break;
+  }
+  stop = true;
+  for (std::thread& t : threads) t.join();
+  EXPECT_EQ(failed, 0);
 }
 
 TEST_F(Log, MayBeReplacedWhileOthersReport) {

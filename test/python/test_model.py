@@ -193,7 +193,7 @@ def test_scene_changes():
         scene.remove(moving[0])
     with pytest.raises(ValueError, match="another scene"):
         bocst.Scene().remove(fixed[0])
-    with pytest.raises(ValueError, match="not rigid"):
+    with pytest.raises(ValueError, match="Scene::setPose: X_WG has the rotation"):
         scene.set_pose(fixed[0], np.diag([2.0, 1, 1, 1]))
 
 

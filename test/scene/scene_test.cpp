@@ -1206,6 +1206,8 @@ TYPED_TEST(SceneTest, WarmQueriesAllocateNothing) {
   World<S> w;
   std::mt19937_64 g(9);
   for (std::size_t i = 0; i < 30; ++i) w.fix(geometry<S>(i % 3, g), randomPose<S>(g, 2));
+  // For other shapes, FCL's tests of triangles allocate.
+  for (int i = 0; i < 8; ++i) w.fix(std::make_shared<fcl::Sphere<S>>(S(0.4)), randomPose<S>(g, 2));
   for (std::size_t i = 0; i < 3; ++i) w.move(geometry<S>(i, g));
   const States<S> X = walk<S>(120, 3, 2, 0.03, 31);
   std::uint8_t hit[120];
@@ -1219,6 +1221,25 @@ TYPED_TEST(SceneTest, WarmQueriesAllocateNothing) {
   const std::size_t before = allocations;
   ask();
   EXPECT_EQ(allocations, before);
+}
+
+// Others may read the box of a shape that they share with the scene, and may have enlarged it.
+TYPED_TEST(SceneTest, LeavesTheBoxesOfShapesAlone) {
+  using S = TypeParam;
+  const auto ball = std::make_shared<fcl::Sphere<S>>(S(1));
+  ball->aabb_local.max_[0] = S(5);
+  ball->aabb_radius = S(6);
+  const auto box = ball->aabb_local;
+  Scene<S> scene;
+  const Id fixed = scene.addFixed(ball, fcl::Transform3<S>::Identity());
+  scene.addMoving(ball);
+  scene.update(fixed);
+  EXPECT_TRUE(ball->aabb_local.min_ == box.min_ && ball->aabb_local.max_ == box.max_);
+  EXPECT_EQ(ball->aabb_radius, S(6));
+  const auto near = test::pose<S>(Eigen::Matrix3d::Identity(), {1.9, 0, 0}),
+             apart = test::pose<S>(Eigen::Matrix3d::Identity(), {2.1, 0, 0});
+  EXPECT_TRUE(scene.collides(&near));
+  EXPECT_FALSE(scene.collides(&apart));
 }
 
 // FCL would call a support function that a plane does not have.

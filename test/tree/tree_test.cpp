@@ -231,6 +231,36 @@ TEST(Tree, AWholeTreeInUseKeepsBlocksOfManyTriangles) {
   EXPECT_EQ(a.statistics().resident_nodes, 1u);
 }
 
+// A block is used at the time of its own model's clock, whichever model is asked first.
+TEST(Tree, ModelsWithClocksOfTheirOwnKeepWhatIsUsed) {
+  for (const Answer answer : {Answer::kExact, Answer::kConservative}) {
+    FakeClock clocks[2];
+    Options options[2];
+    for (int i = 0; i < 2; ++i) {
+      options[i].answer = answer;
+      options[i].clock = clocks[i].function();
+    }
+    Modeld a(test::torus(60).mesh(), options[0]), b(test::torus(60).mesh(), options[1]);
+    const auto ask = [&](bool turned) { EXPECT_TRUE(turned ? touching(b, a, -kHit) : touching(a, b, kHit)); };
+    for (const bool turned : {false, true}) {
+      for (int i = 0; i < 10; ++i) ask(turned);
+      // One clock stands still.
+      for (int k = 0; k < 2; ++k) {
+        for (int i = 0; i < 20; ++i) {
+          clocks[k].now += milliseconds(900);
+          ask(turned);
+        }
+        const std::uint64_t grown = a.statistics().expansions + b.statistics().expansions;
+        for (int i = 0; i < 20; ++i) {
+          clocks[k].now += milliseconds(900);
+          ask(turned);
+        }
+        EXPECT_EQ(a.statistics().expansions + b.statistics().expansions, grown) << "what was dropped grew again";
+      }
+    }
+  }
+}
+
 TEST(Tree, WhatIsUsedStays) {
   FakeClock clock;
   Options options;

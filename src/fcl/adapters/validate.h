@@ -73,9 +73,13 @@ bool areSurelyRigid(const fcl::Transform3<S>& X, const fcl::Transform3<S>& Y) {
   return (rigid[0] & rigid[1]) != 0;
 }
 
-/// The largest entry of R^T R - 1.
+/// The largest entry of R^T R - I, where I is the identity.
 inline double orthogonalityError(const Eigen::Matrix3d& R) {
   return (R.transpose() * R - Eigen::Matrix3d::Identity()).cwiseAbs().maxCoeff();
+}
+template <typename S>
+double orthogonalityErrorOf(const fcl::Transform3<S>& X) {
+  return orthogonalityError(X.linear().template cast<double>());
 }
 
 /// @throws std::invalid_argument unless the translation is finite and the rotation is one, see kMaxOrthogonalityError.

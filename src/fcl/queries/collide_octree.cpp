@@ -1,4 +1,6 @@
 // SPDX-License-Identifier: BSD-3-Clause
+#include <functional>
+
 #include "fcl/adapters/octree_side.h"
 #include "fcl/queries/collide_bodies.h"
 
@@ -11,12 +13,13 @@ namespace bocst::fcl_adapter {
 template <typename S>
 void collideOcTree(const CollideQuery<S>& q, tree::Tree& tree, const BroughtSolver<S>& brought) {
   const auto& octree = static_cast<const fcl::OcTree<S>&>(*q.b());
-  withNarrowPhase<S>(brought, q.request, [&](const NarrowPhase<S>& narrow_phase) {
+  const auto collide_with = [&](const NarrowPhase<S>& narrow_phase) {
     collideConvex(q, tree, narrow_phase, [&](const ConvexFrame<S>&, bool costs, auto&& f) {
       const OcTreeSide<S> side(octree, q.X_WB(), q.a()->cost_density, costs);
       if (!side.empty()) f(side);
     });
-  });
+  };
+  withNarrowPhase<S>(brought, q.request, std::ref(collide_with));
 }
 
 template void collideOcTree<float>(const CollideQuery<float>&, tree::Tree&, const BroughtSolver<float>&);

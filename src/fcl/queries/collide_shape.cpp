@@ -1,6 +1,8 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #include <fcl/geometry/shape/utility.h>
 
+#include <functional>
+
 #include "fcl/queries/collide_bodies.h"
 #include "fcl/queries/collide_convex.h"
 
@@ -39,13 +41,14 @@ class ShapeSide : public query::ConvexSide {
 template <typename S>
 void collideShape(const CollideQuery<S>& q, tree::Tree& tree, const BroughtSolver<S>& brought) {
   const auto& shape = static_cast<const fcl::ShapeBase<S>&>(*q.b());
-  withNarrowPhase<S>(brought, q.request, [&](const NarrowPhase<S>& narrow_phase) {
+  const auto collide_with = [&](const NarrowPhase<S>& narrow_phase) {
     collideConvex(q, tree, narrow_phase, [&](const ConvexFrame<S>& frame, bool, auto&& f) {
       withConvexShape(shape, frame.region(), [&](const query::ConvexShape& body) {
         f(ShapeSide<S>(body, shape, q.X_WB(), q.o1->cost_density * q.o2->cost_density));
       });
     });
-  });
+  };
+  withNarrowPhase<S>(brought, q.request, std::ref(collide_with));
 }
 
 template void collideShape<float>(const CollideQuery<float>&, tree::Tree&, const BroughtSolver<float>&);

@@ -3,8 +3,8 @@
 
 #include <algorithm>
 #include <cstddef>
+#include <exception>
 #include <functional>
-#include <new>
 
 #include "fcl/adapters/pair.h"
 #include "fcl/queries/ordered_pair.h"
@@ -13,12 +13,12 @@
 
 namespace bocst::fcl_adapter {
 
-/// Has a tree do what waits for the end of a query. Without memory for it, that waits for a later query; the answer
-/// stands.
+/// Has a tree do what waits for the end of a query. Without memory or room for it, that waits for a later query; the
+/// answer stands.
 inline void endQuery(const query::TreeSide& side) {
   try {
     side.tree().afterQuery(side.now());
-  } catch (const std::bad_alloc&) {
+  } catch (const std::exception&) {
   }
 }
 

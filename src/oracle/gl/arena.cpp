@@ -5,6 +5,7 @@
 #include <cstring>
 #include <iterator>
 #include <limits>
+#include <new>
 #include <string>
 
 namespace bocst::oracle::gl {
@@ -16,7 +17,13 @@ constexpr std::size_t kMostAtOnce = 1 << 20;  // words on their way to the host
 
 }  // namespace
 
-Arena::Range::~Range() { arena_->giveBack(begin_, words_); }
+Arena::Range::~Range() {
+  try {
+    arena_->giveBack(begin_, words_);
+  } catch (const std::bad_alloc&) {
+    // These words are lost to the arena.
+  }
+}
 
 void Arena::Range::trim(std::uint32_t words) {
   if (words >= words_) return;

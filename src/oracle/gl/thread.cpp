@@ -7,6 +7,8 @@
 
 #include <algorithm>
 #include <exception>
+#include <string>
+#include <system_error>
 #include <utility>
 
 #include "log/log.h"
@@ -15,7 +17,11 @@
 namespace bocst::oracle::gl {
 
 Thread::Thread(const ContextRequest& request) : process_(getpid()), wait_limit_(request.wait_limit) {
-  thread_ = std::make_unique<std::thread>(thread::startWithoutSignals([this, request] { loop(request); }));
+  try {
+    thread_ = std::make_unique<std::thread>(thread::startWithoutSignals([this, request] { loop(request); }));
+  } catch (const std::system_error& e) {
+    throw OracleError(std::string("bocst: no thread for OpenGL: ") + e.what());
+  }
   {
     std::unique_lock<std::mutex> lock(mutex_);
     done_->wait(lock, [this] { return started_; });

@@ -443,7 +443,10 @@ double findContactTime(const TreeSide& a, const SimilarityTransform& a_in_body, 
     }
   }
   if (gave_up) walkTrees(price == 0 ? kFew : kMany + price);
-  if (gave_up) walkBoxes(kAll);
+  bool has_boxes = gave_up && BoxSide::build(a);
+  if constexpr (kTwoTrees) has_boxes = has_boxes && BoxSide::build(b);
+  if (has_boxes) walkBoxes(kAll);
+  if (gave_up) walkTrees(kAll);
   return time;
 }
 

@@ -404,6 +404,7 @@ bool walkByTurns(const TreeSide& a, const TreeSide& b, const SimilarityTransform
     const WalkEnd blocks = walk_blocks(turns.most());
     turns.tookOverBlocks(blocks.steps, blocks.gave_up);
     if (!blocks.gave_up) return blocks.met;
+    if (!BoxSide::build(a) || !BoxSide::build(b)) return walk_blocks(~std::size_t{0}).met;
     const BoxSide boxes_a(a), boxes_b(b);
     PairWalk<BoxSide, BoxSide> boxes(boxes_a, boxes_b, b_in_a, visitor);
     const bool met = boxes.run(turns.mostOverBoxes());

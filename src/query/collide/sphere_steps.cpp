@@ -118,7 +118,7 @@ HWY_INLINE void decodeBlock(SphereSteps& s, const BlockView& block) {
 // Decodes the block of an expanded node of a side into a frame.
 HWY_INLINE BlockView open(SphereSteps& s, int side, const StepNode& node, std::uint32_t frame) {
   const BlockView block = viewOf(s, side, node.ref.index(), frame);
-  s.side[side]->tree().markUsed(block.index, s.side[0]->now());
+  s.side[side]->tree().markUsed(block.index, s.side[side]->now());
   decodeBlock(s, block);
   return block;
 }

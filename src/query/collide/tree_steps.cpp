@@ -109,7 +109,7 @@ HWY_INLINE void lookUp(PairSteps& s, StepNode& n, int side, std::uint32_t& frame
 HWY_INLINE BlockView open(PairSteps& s, int x, const StepNode& node, std::uint32_t frame, bool& is_new) {
   BOCST_ASSERT(frame < PairSteps::kFrames);
   const BlockView block = viewOf(s, x, node.ref.index(), frame);
-  s.tree[x]->markUsed(block.index, s.now);
+  s.tree[x]->markUsed(block.index, s.now[x]);
   is_new = decodeBlock(s, x, block.index, *block.at, frame);
   return block;
 }

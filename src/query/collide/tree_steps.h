@@ -61,7 +61,7 @@ struct PairSteps {
   static constexpr std::size_t kStackRoom = 8 * kMostDepth + 1;
 
   const tree::Tree* tree[2];
-  std::int64_t now;
+  std::int64_t now[2];  ///< By the clock of each side.
   PairFrames geometry;
   Frame* frames;     ///< kFrames of them.
   StepGroup* stack;  ///< With room for kStackRoom more, below `stack_end`.
@@ -91,9 +91,10 @@ struct PairSteps {
 
   std::uint64_t holds[kFrames];  ///< frameName() of what is in a frame.
 
-  PairSteps(const tree::Tree* a, const tree::Tree* b, std::int64_t now_, const PairFrames& geometry_, Frame* frames_)
+  PairSteps(const tree::Tree* a, std::int64_t now_a, const tree::Tree* b, std::int64_t now_b,
+            const PairFrames& geometry_, Frame* frames_)
       : tree{a, b},
-        now(now_),
+        now{now_a, now_b},
         geometry(geometry_),
         frames(frames_),
         stack(nullptr),

@@ -374,6 +374,7 @@ inline Nearest findNearest(const TreeSide& a, const TreeSide& b, const Similarit
     nearest = trees.run(goal, nearest, turns.most());
     turns.tookOverBlocks(trees.steps(), trees.gaveUp());
     if (!trees.gaveUp()) return nearest;
+    if (!BoxSide::build(a) || !BoxSide::build(b)) return trees.run(goal, nearest);
     const BoxSide boxes_a(a), boxes_b(b);
     DistanceWalk<BoxSide, BoxSide> boxes(boxes_a, boxes_b, b_in_a);
     nearest = boxes.run(goal, nearest, turns.mostOverBoxes());

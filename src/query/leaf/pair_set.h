@@ -59,12 +59,13 @@ class PairSet {
   }
 
   void grow() {
+    const std::size_t more = std::max(2 * used_, kLeast);
+    slots_.resize(std::max(more, slots_.size()));
     held_.clear();
     std::copy_if(slots_.begin(), slots_.begin() + static_cast<std::ptrdiff_t>(used_), std::back_inserter(held_),
                  [](const Slot& s) { return s.b != kNone; });
     clear();
-    used_ = std::max(2 * used_, kLeast);
-    slots_.resize(std::max(used_, slots_.size()));
+    used_ = more;
     for (const Slot& s : held_) place(s);
   }
 

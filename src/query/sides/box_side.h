@@ -20,6 +20,9 @@ class BoxSide : public CompleteSide {
 
   static bool fits(const TreeSide& side) { return !side.isConservative() && side.tree().affordsBoxes(); }
 
+  /// Has a model its boxes, or is there memory to build them? Else walks over blocks go on.
+  static bool build(const TreeSide& side) { return side.tree().buildBoxes(side.now()); }
+
   explicit BoxSide(const TreeSide& side) : side_(side), boxes_(side.tree().boxes(side.now())) {}
 
   Node root() const { return 0; }

@@ -23,7 +23,7 @@ class Walk {
   Walk(const tree::Tree& a, const tree::Tree& b, const SimilarityTransform& b_in_a, bool all_at_once)
       : frames_(PairSteps::kFrames),
         stack_(PairSteps::kStackRoom + 1),
-        steps_(&a, &b, a.now(), PairFrames(b_in_a), frames_.data()) {
+        steps_(&a, a.now(), &b, b.now(), PairFrames(b_in_a), frames_.data()) {
     steps_.stack = stack_.data();
     steps_.stack_end = stack_.data() + stack_.size();
     steps_.all_at_once = all_at_once;
