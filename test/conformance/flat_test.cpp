@@ -20,24 +20,8 @@ namespace bocst {
 namespace {
 
 using Eigen::Vector3d;
+using test::plate;
 using test::Raw;
-
-// A square of side 1 about the origin, of 2 n^2 triangles.
-Raw plate(std::size_t n) {
-  Raw raw;
-  const auto at = [n](std::size_t i) { return static_cast<double>(i) / static_cast<double>(n) - 0.5; };
-  for (std::size_t i = 0; i <= n; ++i) {
-    for (std::size_t j = 0; j <= n; ++j) raw.vertices.emplace_back(at(i), at(j), 0);
-  }
-  for (std::size_t i = 0; i < n; ++i) {
-    for (std::size_t j = 0; j < n; ++j) {
-      const std::size_t a = i * (n + 1) + j, b = a + 1, c = a + n + 1, d = c + 1;
-      raw.triangles.emplace_back(a, c, b);
-      raw.triangles.emplace_back(b, c, d);
-    }
-  }
-  return raw;
-}
 
 // A plate with walls about it: a tray, whose floor is no side of its convex hull.
 Raw tray(std::size_t n) {

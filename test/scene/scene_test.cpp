@@ -23,14 +23,17 @@
 
 #include "conformance/octrees.h"
 #include "conformance/reference.h"
+#include "fcl/adapters/models.h"
 #include "sanitized.h"
+#include "tree/tree.h"
 
 namespace {
 
-thread_local std::size_t allocations = 0;
+thread_local std::size_t allocations = 0, most_bytes = ~std::size_t{0};
 
 void* allocate(std::size_t size, std::size_t alignment) {
   ++allocations;
+  if (size > most_bytes) throw std::bad_alloc();
   void* p = std::aligned_alloc(alignment, (size + alignment) / alignment * alignment);
   if (p == nullptr) throw std::bad_alloc();
   return p;
@@ -1221,6 +1224,29 @@ TYPED_TEST(SceneTest, WarmQueriesAllocateNothing) {
   const std::size_t before = allocations;
   ask();
   EXPECT_EQ(allocations, before);
+}
+
+// Two flat faces with little space between them are searched over oriented boxes, if there is memory for these.
+TEST(Scene, ClearancesDoNotNeedMemoryForOrientedBoxes) {
+  const auto mesh = test::plate(64).mesh();
+  const auto clearance = [&](std::size_t most) {
+    const auto fixed = std::make_shared<Modeld>(mesh), moving = std::make_shared<Modeld>(mesh);
+    Scened scene;
+    scene.addFixed(fixed, fcl::Transform3d::Identity());
+    scene.addMoving(moving);
+    const auto X = test::pose<double>(Eigen::Matrix3d::Identity(), {0.1, 0.2, 1e-3});
+    scene.collides(&X);
+    most_bytes = most;
+    double d = 0;
+    for (int k = 0; k < 10; ++k) d = scene.clearance(&X);
+    most_bytes = ~std::size_t{0};
+    const bool has_boxes = fcl_adapter::treeOf(*fixed).knownBoxes() != nullptr;
+    EXPECT_EQ(has_boxes, most == ~std::size_t{0});
+    return d;
+  };
+  const double with = clearance(~std::size_t{0}), without = clearance(1 << 17);
+  EXPECT_NEAR(with, 1e-3, 1e-9);
+  EXPECT_NEAR(without, with, 1e-12);
 }
 
 // Others may read the box of a shape that they share with the scene, and may have enlarged it.
