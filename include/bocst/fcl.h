@@ -36,12 +36,14 @@ namespace bocst {
 ///
 /// **Order.** The reported contacts and their order depend only on meshes, poses and request, not on the resident
 /// nodes, the clock, the oracle or the thread. Contacts are sorted by (b1, b2). If there are more than a request asks
-/// for, a request for at most 1024 without costs gets those of the least place, in less time; others get those of the
-/// least ids. The place of two triangles is the largest coordinate of the segment in which they intersect, along the
-/// longest axis of the bounding box of the model's mesh (o1's if both are models), in the mesh's frame; where they do
-/// not clearly intersect, with a margin, and beside shapes and octrees, that of the corners of the model's triangle; of
-/// a cell, its Morton code. The default request (one contact, enable_contact false) is a yes-or-no query: its ids are
-/// those of any pair that touches.
+/// for, a request with costs, or for more than 1024, gets those with the smallest (b1, b2). Other requests get, in less
+/// time, those with the smallest position along the mesh: the largest coordinate, along the longest axis of the
+/// bounding box of the model's mesh (o1's if both are models), in the mesh's frame, of
+/// - the segment in which the two triangles intersect;
+/// - the corners of the model's triangle, if the triangles do not clearly intersect, with a margin, and with shapes and
+///   octrees.
+/// With conservative answers it is the Morton code of the cell. The default request (one contact, enable_contact false)
+/// is a yes-or-no query: its ids are those of any pair that touches.
 ///
 /// **Pairs.** One geometry is a Model; the other is a Model, an fcl::BVHModel<BV> of any BV, one of FCL's shapes (Box,
 /// Sphere, Ellipsoid, Capsule, Cone, Cylinder, Convex, Plane, Halfspace, TriangleP) or an OcTree. Contacts keep the

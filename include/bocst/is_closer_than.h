@@ -16,8 +16,8 @@ namespace bocst {
 /// one of the two is an empty model or is not occupied (CollisionGeometry::isOccupied()).
 ///
 /// Thread rule: as collide(); any number of queries may run at the same time.
-/// @throws std::invalid_argument for a null pointer, a pose that is not rigid, or a distance that is negative, NaN or
-/// infinite; std::logic_error if neither geometry is a Model.
+/// @throws std::invalid_argument for a null pointer, a partner that is not supported, a pose that is not rigid, or a
+/// distance that is negative, NaN or infinite; std::logic_error if neither geometry is a Model.
 template <typename S>
 BOCST_EXPORT bool isCloserThan(const fcl::CollisionGeometry<S>* o1, const fcl::Transform3<S>& X_W1,
                                const fcl::CollisionGeometry<S>* o2, const fcl::Transform3<S>& X_W2, S distance);

@@ -34,6 +34,8 @@ struct ModelTree;
 ///
 /// Threads: any number of threads may query one model, read its statistics, visit() and prune() it at the same time.
 /// updateVertices() may run at the same time, too; a query sees the mesh before or after the update, never a mixture.
+/// expandAll() and releaseMesh() may be called at the same time, and wait for running queries. No query may run during
+/// setMesh(), or between beginModel() and endModel().
 /// The public members of CollisionGeometry (cost_density, aabb_local, ...) are not protected, as in FCL.
 ///
 /// After fork() a child process may use models that it makes itself, and models of the parent that no other thread was
@@ -127,7 +129,9 @@ class BOCST_EXPORT Model : public fcl::CollisionGeometry<S> {
   Statistics statistics() const;  ///< A snapshot.
 
   /// Expands the complete tree down to level `depth` (1 to 17; the root is level 1, as in the paper's tables). Deeper
-  /// branches, grown by queries, are dropped first. For inspection; queries never need it.
+  /// branches, grown by queries, are dropped first. For inspection; queries never need it, and with exact answers they
+  /// may replace these nodes by their own.
+  /// @throws std::invalid_argument for another depth; std::logic_error for an empty model.
   void expandAll(int depth);
 
   /// Calls f for every resident node, parents before children. f must not call back into this model.
@@ -154,8 +158,10 @@ class BOCST_EXPORT Model : public fcl::CollisionGeometry<S> {
   fcl::Matrix3<S> computeMomentofInertia() const override;  ///< See computeVolume().
 
   // FCL's interface of a geometry.
-  void computeLocalAABB() override;                 ///< Box: the mesh's bounds. Sphere: about their centre,
-                                                    ///< around all vertices (searched only once).
+  /// Sets aabb_local to the mesh's bounds, enlarged by Options::margin, and the sphere about its centre around all
+  /// vertices (searched only once). The spheres of conservative answers reach beyond this box, so a broadphase manager
+  /// leaves out pairs that touch by these alone.
+  void computeLocalAABB() override;
   fcl::OBJECT_TYPE getObjectType() const override;  ///< OT_UNKNOWN: FCL never swaps the arguments.
   fcl::NODE_TYPE getNodeType() const override;      ///< GEOM_TRIANGLE: an empty row of FCL's tables.
 

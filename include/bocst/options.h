@@ -57,7 +57,8 @@ struct Options {
 
   OracleKind oracle = OracleKind::kAuto;  ///< Backend that subdivides cells.
 
-  /// The paper's Max. time (3.1): a deepest level that is unused for longer is dropped; 0: never.
+  /// The paper's Max. time (3.1): a deepest level that is unused for longer is dropped by later queries of this model
+  /// or by Model::prune(), not by a thread; 0: never.
   std::chrono::milliseconds ttl{2000};
 
   /// Limit of the resident tree in bytes; the least recently used branches are dropped first; 0: no limit. A running
@@ -86,7 +87,8 @@ struct Options {
   PaperOptions paper;  ///< For experiments.
 
   /// Source of the time for ttl; empty: Clock, with the resolution of the system's tick (some milliseconds). Tests can
-  /// set their own clock here.
+  /// set their own clock here. Queries call it from several threads at once, so it must be thread-safe, and must not
+  /// call the model.
   std::function<Clock::time_point()> clock;
 };
 

@@ -40,7 +40,7 @@ struct Pair {
   Id b;  ///< The other object.
 };
 
-/// Options of a scene. Answers do not depend on them.
+/// Options of a scene.
 struct SceneOptions {
   /// Number of threads that share the states of one call with many states, including the calling thread; 0: one per
   /// hardware thread. Answers do not depend on it.
@@ -65,9 +65,9 @@ struct SceneOptions {
 /// microseconds; while queries are under way, it copies what they share. The first query, and the first one after
 /// moving objects came or went or after many changes, updates the scene's internal data, and other queries wait for
 /// that; apart from changes, no query waits for another. If no model has to grow, collides() and calls with up to 128
-/// states allocate no memory after the thread's first similar queries, except in FCL's own code for a pair without a
-/// Model. A child of fork() works alone; calls throw std::runtime_error if another thread of the parent was at work in
-/// the scene or in one of its models at the fork.
+/// states allocate no memory after the thread's first similar queries, except in FCL's own code (pairs without a Model,
+/// and a triangle near a shape or a cell). A child of fork() works alone; calls throw std::runtime_error if another
+/// thread of the parent was at work in the scene or in one of its models at the fork.
 template <typename S>
 class BOCST_EXPORT Scene {
  public:
@@ -81,7 +81,9 @@ class BOCST_EXPORT Scene {
   Scene& operator=(const Scene&) = delete;
 
   // Changes. All throw std::invalid_argument, and change nothing, for an Id of another scene or of a removed object,
-  // for a null geometry, an empty Model, a geometry that fcl::collide does not accept, and a pose that is not rigid.
+  // for a null geometry, an empty Model, a geometry that fcl::collide does not accept, a pose that is not rigid,
+  // ignore(a, a), setPose() of a moving object and movingIndex() of a fixed one; std::logic_error for a Model between
+  // beginModel() and endModel().
 
   /// Adds an object that stays at X_WG. Computes a tight bound of its geometry, in time linear in its vertices; objects
   /// with the same geometry share the bound.
@@ -98,10 +100,11 @@ class BOCST_EXPORT Scene {
   /// vertices, thresholds or cost density of a BVHModel. Updates all objects with the same geometry.
   void update(Id object);
 
-  // Queries. X_WM may be null if there are no moving objects or no states.
+  // Queries. X_WM may be null if there are no moving objects or no states. All throw std::invalid_argument, which names
+  // the moving object and the state, for a pose that is not rigid, and for another null pointer to poses or hits.
 
-  /// True if this state collides. `first` is then set to a pair that collides; to any one if several do.
-  bool collides(const Transform* X_WM, Pair* first = nullptr) const;
+  /// True if this state collides. `pair` is then set to one of the pairs that collide.
+  bool collides(const Transform* X_WM, Pair* pair = nullptr) const;
   /// The smallest index of a state that collides; `states` if none does.
   std::size_t firstCollision(const Transform* X_WM, std::size_t states) const;
   /// True if any state collides. Checks the middle of each part before its halves, to find a collision on an edge

@@ -13,7 +13,7 @@
 
 namespace bocst::query {
 
-/// A pose relative to another may stretch a length by this factor: entries of R^T R - 1 of at most 1e-3 change the
+/// A pose relative to another may stretch a length by this factor: entries of R^T R - I of at most 1e-3 change the
 /// square of a length by at most 3e-3, and either rotation may be so far off. 1.003 / 0.997 is less than its square.
 constexpr double kMostStretch = 1.0031;
 

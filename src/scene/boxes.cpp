@@ -107,7 +107,7 @@ HWY_INLINE V gapAlongEdges(const V (&r)[3][3], const V (&size)[3][3], const V (&
 //
 // With u = 2^-24, C the largest coordinate and r the radius of each: centres are off by u C, so their distance
 // along an axis by at most 12 u (Ca + Cb), radii by 16 u (ra + rb); a box's reach has 128 u (C + r) for that. Axes are
-// those of a rotation with entries of R^T R - 1 up to e = kFineError, see World::boxAt(). Their cross product, and sums
+// those of a rotation with entries of R^T R - I up to e = kFineError, see World::boxAt(). Their cross product, and sums
 // of half sides along it, are then off by up to 4.5 e d for a distance d of the centres and 6.4 e r for each box.
 // Beyond d = 4 (ra + rb) the faces' gap is more than d / 4, and kShare covers this; nearer, the reach does.
 template <bool kDistance>

@@ -342,13 +342,13 @@ void Scene<S>::update(Id object) {
 }
 
 template <typename S>
-bool Scene<S>::collides(const Transform* X_WM, Pair* first) const {
+bool Scene<S>::collides(const Transform* X_WM, Pair* pair) const {
   const auto w = impl_->current();
   scene::StateCheck<S>& check = sweepOfThread<S>().check();
   scene::checkPoses<S>("collides", X_WM, 1, w->moving.size(), check.orthogonality_errors);
   check.start(*w);
   if (!check.runAll(X_WM, nullptr)) return false;
-  if (first != nullptr) *first = impl_->named(*w, check.last());
+  if (pair != nullptr) *pair = impl_->named(*w, check.last());
   return true;
 }
 

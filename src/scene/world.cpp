@@ -23,7 +23,7 @@ std::uint64_t nextSerial() {
 
 }  // namespace
 
-// No entry of R^T R - 1 is larger, for a pose that is surely rigid: its eigenvalues are 2 e + e^2, sum e^2 follows from
+// No entry of R^T R - I is larger, for a pose that is surely rigid: its eigenvalues are 2 e + e^2, sum e^2 follows from
 // both sums (fcl_adapter::RigidSums, rigidStates()), and 4e-15 is what they may have lost by rounding.
 constexpr double kErrorPerDeviation = 2.001;
 inline double errorOf(double deviation) { return kErrorPerDeviation * std::sqrt((deviation + 4e-15) / 2); }

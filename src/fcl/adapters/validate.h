@@ -16,11 +16,11 @@
 
 namespace bocst::fcl_adapter {
 
-/// A rotation R is refused where an entry of R^T R - 1 is larger. Rotations of floats that were multiplied some
+/// A rotation R is refused where an entry of R^T R - I is larger. Rotations of floats that were multiplied some
 /// thousand times stay below; what a walk allows for grows with it (SimilarityTransform::orthogonality_error).
 constexpr double kMaxOrthogonalityError = 1e-3;
 
-/// No entry of R^T R - 1 is larger where isSurelyRigid() says so.
+/// No entry of R^T R - I is larger where isSurelyRigid() says so.
 constexpr double kSurelyRigidError = 2e-5;
 
 /// What tells rotations from other matrices. With singular values 1 + e, and products of three e left out,

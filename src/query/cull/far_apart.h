@@ -10,7 +10,7 @@ namespace bocst::query {
 /// numbers, column after column; the last row is not read. All in float, whose range ends where sizes are not within
 /// 1e-15 to 1e15: these are never far apart.
 ///
-/// The poses must be rigid but for 2e-5, the largest entry of R^T R - 1. A gap counts beyond 2e-4 of all sizes, see
+/// The poses must be rigid but for 2e-5, the largest entry of R^T R - I. A gap counts beyond 2e-4 of all sizes, see
 /// share/doc/guarantees.md.
 template <typename S>
 bool areFarApart(const tree::Outline& a, const S* X_WA, const tree::Outline& b, const S* X_WB, double margin);
