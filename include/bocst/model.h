@@ -128,6 +128,13 @@ class BOCST_EXPORT Model : public fcl::CollisionGeometry<S> {
 
   Statistics statistics() const;  ///< A snapshot.
 
+  /// Builds the whole tree of exact answers now, in 60 to 150 ns per triangle, so that the next queries do not have to.
+  /// For a program whose queries have a time limit; set Options::ttl to 0 if it makes pauses, or branches are dropped.
+  /// Conservative answers gain nothing by it, nor do models with an oracle on a device. Queries may run at the same
+  /// time; those that have to grow the tree wait.
+  /// @throws std::logic_error for an empty model; std::bad_alloc, which leaves the tree as valid as it was.
+  void buildTree();
+
   /// Expands the complete tree down to level `depth` (1 to 17; the root is level 1, as in the paper's tables). Deeper
   /// branches, grown by queries, are dropped first. For inspection; queries never need it, and with exact answers they
   /// may replace these nodes by their own.

@@ -316,6 +316,9 @@ Model(mesh, options), or options as keyword arguments: Model(mesh, margin=0.01).
           "statistics", [](const ModelGeometry& g) { return g.model().statistics(); }, py::call_guard<NoGil>(),
           "A snapshot; see Statistics.")
       .def(
+          "build_tree", [](const ModelGeometry& g) { g.model().buildTree(); }, py::call_guard<NoGil>(),
+          "Builds the whole tree of exact answers now, so that the next queries do not have to.")
+      .def(
           "expand_all", [](const ModelGeometry& g, int depth) { g.model().expandAll(depth); }, "depth"_a,
           py::call_guard<NoGil>(), "Expands the whole tree down to this level (1 to 17). For inspection.")
       .def(

@@ -103,6 +103,8 @@ class Tree {
   /// Builds the whole tree when queries have paid as much as that costs, unless another thread grows it; did it? Of a
   /// model that is built ahead, the first query that has paid anything has the helper thread do it.
   bool buildIfDue() { return isBuildDue() && buildNow(); }
+  /// Builds the whole tree of exact answers, if the host can, whatever queries have paid.
+  void build();
   /// No more expansions below this node: a single lattice unit, or the collision depth of conservative answers.
   bool isDeepest(int level) const { return level >= deepest_; }
   int deepest() const { return deepest_; }
@@ -260,6 +262,7 @@ class Tree {
   bool growsOnHost() const { return oracle_->kind() == OracleKind::kCpu || oracle_->kind() == OracleKind::kAuto; }
   bool isBuildDue() const { return rent_.load(std::memory_order_relaxed) > price_.load(std::memory_order_relaxed); }
   bool buildNow();
+  bool fitsBuild() const;
   void startRent();
   bool buildsAhead() const;
   void askForAheadBuild();

@@ -88,9 +88,9 @@ class Tree::BuildMemory {
 
 /// A build by the helper thread: it and the tree share this, as either may end first.
 struct Tree::AheadBuild {
-  thread::ForkAwareMutex mutex;  // of what follows
+  thread::ForkAwareMutex mutex;  // of `tree`
   Tree* tree;                    // null when the tree is gone
-  std::int64_t asked;            // by Options::clock, which the helper thread does not call
+  std::int64_t asked;            // by Options::clock, which the helper thread does not call; under the tree's growth_
 };
 
 Tree::~Tree() {
@@ -177,12 +177,14 @@ bool Tree::buildsAhead() const {
   return options_.build_ahead && !conservative() && options_.memory_budget == 0 && growsOnHost();
 }
 
+bool Tree::fitsBuild() const { return 3 * surface_.triangle_count <= BulkBuilder::kMostToSort; }
+
 void Tree::startRent() {
   rent_ = 0;
   is_ahead_build_due_ = buildsAhead();
   // Beside a device, a build finds the supports alone.
   const bool gains = !conservative() && (growsOnHost() || !supports_known_);
-  const bool is_built = gains && 3 * surface_.triangle_count <= BulkBuilder::kMostToSort;
+  const bool is_built = gains && fitsBuild();
   price_ = !is_built ? kNever : is_ahead_build_due_ ? 0 : surface_.triangle_count / kRent;
 }
 
@@ -203,6 +205,14 @@ bool Tree::buildNow() {
   }
   countBytes();
   return true;
+}
+
+void Tree::build() {
+  if (conservative() || !growsOnHost() || !fitsBuild()) return;
+  const std::lock_guard<thread::ForkAwareMutex> lock(growth_);
+  is_ahead_build_due_ = false;
+  growWhole();
+  countBytes();
 }
 
 // All of the tree that exact answers need. Queries under way go on in the old blocks.

@@ -82,6 +82,8 @@ def test_deforming():
     with pytest.raises(ValueError):
         a.update_vertices(np.full((8, 3), np.nan))
     assert bocst.collide_poses(a, b, X)[0]
+    a.build_tree()
+    assert a.statistics().built_triangles >= len(a.mesh.triangles)
     a.prune()
     with pytest.raises(RuntimeError):
         a.release_mesh()

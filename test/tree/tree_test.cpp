@@ -231,6 +231,33 @@ TEST(Tree, AWholeTreeInUseKeepsBlocksOfManyTriangles) {
   EXPECT_EQ(a.statistics().resident_nodes, 1u);
 }
 
+// After it, no pose makes the tree grow.
+TEST(Tree, BuildTreeLeavesNothingToGrow) {
+  for (const std::size_t n : {3, 20, 100}) {
+    const auto mesh = test::torus(n).mesh();
+    Modeld a(mesh), b(mesh), lazy(mesh);
+    a.buildTree();
+    b.buildTree();
+    EXPECT_GE(a.statistics().built_triangles, mesh->triangleCount());
+    const std::uint64_t expansions = a.statistics().expansions;
+    std::mt19937_64 g(n);
+    std::uniform_real_distribution<double> u(-1.5, 1.5);
+    for (int i = 0; i < 200; ++i) {
+      const Eigen::Vector3d p(u(g), u(g), u(g));
+      EXPECT_EQ(touching(a, b, p), touching(lazy, b, p));
+    }
+    EXPECT_EQ(a.statistics().expansions, expansions);
+    a.buildTree();
+    EXPECT_TRUE(touching(a, b, kHit)) << "built once more";
+  }
+  EXPECT_THROW(Modeld().buildTree(), std::logic_error);
+  Options options;
+  options.answer = Answer::kConservative;
+  Modeld conservative(test::torus(20).mesh(), options);
+  conservative.buildTree();
+  EXPECT_EQ(conservative.statistics().resident_nodes, 1u);
+}
+
 // A block is used at the time of its own model's clock, whichever model is asked first.
 TEST(Tree, ModelsWithClocksOfTheirOwnKeepWhatIsUsed) {
   for (const Answer answer : {Answer::kExact, Answer::kConservative}) {

@@ -9,6 +9,7 @@
 
 #include "fcl/adapters/models.h"
 #include "fcl/plugin/dispatch.h"
+#include "fcl/queries/query_scope.h"
 #include "tree/tree.h"
 
 namespace bocst {
@@ -201,6 +202,12 @@ std::string Model<S>::oracleName() const {
 template <typename S>
 Statistics Model<S>::statistics() const {
   return tree_ != nullptr ? tree_->statistics() : Statistics{};
+}
+
+template <typename S>
+void Model<S>::buildTree() {
+  const fcl_adapter::QueryScope scope(fcl_adapter::treeOf(*this));
+  scope.a().tree().build();
 }
 
 template <typename S>

@@ -50,7 +50,6 @@ class LeafCorners {
 
   std::size_t count() const { return count_; }
   std::uint32_t id(std::size_t i) const { return ids_[i]; }
-  const RawTriangles& raw() const { return raw_; }
   void place(const PackTransform& to, TrianglePack& pack) { placeTriangles(raw_, count_, to, pack); }
 
  private:
