@@ -50,10 +50,7 @@ class Simplex {
         best = triangle(0, 1, 2);
         break;
       default:
-        if (tetrahedron(best)) {
-          weighOrigin();
-          return false;
-        }
+        if (tetrahedron(best)) return false;
     }
     Simplex kept;
     for (int i = 0; i < best.n; ++i) {
@@ -113,17 +110,6 @@ class Simplex {
     return f;
   }
 
-  // The weights of the origin inside a tetrahedron: its volumes with the faces.
-  void weighOrigin() {
-    const auto volume = [this](int a, int b, int c) { return w_[a].dot(w_[b].cross(w_[c])); };
-    weight_[0] = volume(1, 2, 3);
-    weight_[1] = -volume(0, 2, 3);
-    weight_[2] = volume(0, 1, 3);
-    weight_[3] = -volume(0, 1, 2);
-    const double total = weight_[0] + weight_[1] + weight_[2] + weight_[3];
-    for (double& weight : weight_) weight /= total;
-  }
-
   static const Face& nearer(const Face& f, const Face& g) {
     return g.nearest.squaredNorm() < f.nearest.squaredNorm() ? g : f;
   }
@@ -159,23 +145,37 @@ class Simplex {
     return nearer(segment(a, b), nearer(segment(b, c), segment(c, a)));
   }
 
-  // True when the origin is inside, else the nearest face.
-  bool tetrahedron(Face& best) const {
+  // True when the origin is inside, with its weights; else the nearest face.
+  bool tetrahedron(Face& best) {
     static constexpr int kFaces[4][4] = {{0, 1, 2, 3}, {0, 3, 1, 2}, {0, 2, 3, 1}, {1, 3, 2, 0}};
-    double size = 0;
+    constexpr double kClear = 1e3;  // volumes of so many times their rounding make good weights
+    double size = 0, volume[4], sum = 0;
     for (const Vector3d& w : w_) size = std::max(size, w.lpNorm<1>());
-    bool inside = true;
-    for (const auto& f : kFaces) {
+    bool is_within[4], is_inside = true, is_clear = true;
+    for (int i = 0; i < 4; ++i) {
+      const auto& f = kFaces[i];
       const Vector3d e = w_[f[1]] - w_[f[0]], d = w_[f[2]] - w_[f[0]], n = e.cross(d);
       const double origin = -n.dot(w_[f[0]]), other = n.dot(w_[f[3]] - w_[f[0]]);
       // On the same side as the fourth corner, and both surely off the plane?
       const double least = kRounding * size * e.norm() * d.norm();
-      const bool within = (origin > least && other > least) || (origin < -least && other < -least);
-      if (within) continue;
-      inside = false;
-      best = nearer(best, triangle(f[0], f[1], f[2]));
+      is_within[i] = (origin > least && other > least) || (origin < -least && other < -least);
+      is_inside = is_inside && is_within[i];
+      volume[f[3]] = std::abs(origin);
+      sum += volume[f[3]];
+      is_clear = is_clear && volume[f[3]] > kClear * least;
     }
-    return inside;
+    if (is_inside && is_clear) {
+      for (int i = 0; i < 4; ++i) weight_[i] = volume[i] / sum;
+      return true;
+    }
+    for (int i = 0; i < 4; ++i) {
+      if (is_inside || !is_within[i]) best = nearer(best, triangle(kFaces[i][0], kFaces[i][1], kFaces[i][2]));
+    }
+    if (!is_inside) return false;
+    // The nearest face is as near as rounding.
+    std::fill(weight_, weight_ + 4, 0.0);
+    for (int i = 0; i < best.n; ++i) weight_[best.index[i]] = best.weight[i];
+    return true;
   }
 
   Vector3d w_[4], body_[4], points_[4], nearest_;
@@ -464,7 +464,10 @@ ContactPoint TriangleShape::penetration(const PointSet& points, const Separation
   if (points.count > 3) return SupportShape::penetration(points, gap);
   Corners other;
   asTriangle(points, other);
-  return trianglePenetrations(corners_, other);
+  ContactPoint contact = trianglePenetrations(corners_, other);
+  // Triangles that are apart by no more than a query's rounding.
+  if (!contact.point.allFinite()) contact.point = (gap.on_body + gap.on_points) / 2;
+  return contact;
 }
 
 namespace {

@@ -501,6 +501,101 @@ TEST(ShapesDouble, NormalsOfWhatIsJustOffAreUnitVectors) {
   EXPECT_GT(contacts, 500);
 }
 
+// Where the two just touch, the difference of a triangle and a body is as flat as rounding about the origin.
+TEST(ShapesDouble, WhatJustTouchesTouchesAtBoth) {
+  Raw raw;
+  raw.vertices = {{-1, 0.5, -0.25}, {-1, 0.5, 0.25}, {1, 0.5, 0.25}};
+  raw.triangles.emplace_back(0, 1, 2);
+  const std::shared_ptr<fcl::ShapeBased> shapes[] = {std::make_shared<fcl::Cylinderd>(0.2, 0.3),
+                                                     std::make_shared<fcl::Coned>(0.2, 0.3),
+                                                     std::make_shared<fcl::Ellipsoidd>(0.2, 0.3, 0.1)};
+  constexpr double kRadius = 0.4;  // none is larger
+  std::uniform_real_distribution<double> u(-1, 1);
+  for (const double margin : {0.0, 0.25}) {
+    Options options;
+    options.margin = margin;
+    const Modeld model(raw.mesh(), options);
+    int contacts = 0;
+    for (const auto& shape : shapes) {
+      std::mt19937_64 g(7);
+      for (int i = 0; i < test::repetitions(1500); ++i) {
+        const auto X = test::pose<double>(test::randomRotation(g), {0, 0, 0});
+        auto Y = test::pose<double>(test::randomRotation(g), X * Vector3d(u(g), 0.5 + 0.5 * u(g), 0.25 * u(g)));
+        fcl::DistanceRequestd request;
+        request.enable_nearest_points = true;
+        fcl::DistanceResultd d;
+        for (int step = 0; step < 4; ++step) {
+          d = fcl::DistanceResultd();
+          fcl::distance(&model, X, shape.get(), Y, request, d);
+          if (d.min_distance <= 0) break;
+          Y.translation() += d.nearest_points[0] - d.nearest_points[1];
+        }
+        for (const Vector3d& p : d.nearest_points) ASSERT_LT((p - Y.translation()).norm(), kRadius + 1e-6) << i;
+        fcl::CollisionResultd result;
+        fcl::collide(&model, X, shape.get(), Y, fcl::CollisionRequestd(1, true), result);
+        if (!result.isCollision()) continue;
+        ++contacts;
+        ASSERT_LT((result.getContact(0).pos - Y.translation()).norm(), kRadius + margin + 1e-6) << i;
+      }
+    }
+    EXPECT_GT(contacts, 3 * test::repetitions(1500) / 2);
+  }
+}
+
+// A bound that rounding has made negative must not be taken for a better one for ever.
+TYPED_TEST(Shapes, DistancesOfWhatTouchesALargeOrAtAPointEnd) {
+  using S = TypeParam;
+  const auto mesh = test::box({-1, -0.5, -0.25}, {1, 0.5, 0.25}).mesh();
+  const Model<S> box(mesh);
+  const auto distance = [](const Model<S>& model, const fcl::Sphere<S>& ball, const Vector3d& at) {
+    fcl::DistanceResult<S> result;
+    return fcl::distance<S>(&model, fcl::Transform3<S>::Identity(), &ball,
+                            test::pose<S>(Eigen::Matrix3d::Identity(), at), fcl::DistanceRequest<S>(), result);
+  };
+  for (const double radius : {1e6, 1e7, 1e8}) {
+    const fcl::Sphere<S> ball{static_cast<S>(radius)};
+    std::mt19937_64 g(3);
+    for (int i = 0; i < 40; ++i) {
+      const Vector3d n = test::randomDirection(g);
+      // Inside, about, and outside of contact.
+      for (const double off : {-1.0, -0.5, -0.1, 0.1}) {
+        const double d = static_cast<double>(distance(box, ball, (radius + off) * n));
+        EXPECT_LE(d, 0.2 + 4 * radius * static_cast<double>(std::numeric_limits<S>::epsilon()));
+      }
+    }
+  }
+  Raw point;
+  point.vertices = {{1, -1, 0.25}};
+  point.triangles.emplace_back(0, 0, 0);
+  EXPECT_EQ(distance(Model<S>(point.mesh()), fcl::Sphere<S>(S(1.25)), {2, -1, 1}), S(0));
+}
+
+// Float triangles that the rounding of their poses separates are within a margin.
+TEST(ShapesFloat, PositionsOfContactsWithinAMarginAreFinite) {
+  std::mt19937_64 g(5);
+  std::uniform_real_distribution<double> u(-1, 1);
+  const auto point = [&] { return Vector3d(u(g), u(g), u(g)); };
+  int contacts = 0;
+  for (int i = 0; i < test::repetitions(3000); ++i) {
+    Raw raw;
+    raw.vertices = {point(), point(), point()};
+    raw.triangles.emplace_back(0, 1, 2);
+    Options options;
+    options.margin = 0.05;
+    const Modelf model(raw.mesh(), options);
+    // The first corner touches the other triangle.
+    const Vector3d a = point(), b = point(), c = (raw.vertices[0] - 0.3 * a - 0.3 * b) / 0.4;
+    const fcl::TriangleP<float> triangle(a.cast<float>(), b.cast<float>(), c.cast<float>());
+    const auto X = test::pose<float>(test::randomRotation(g), 1e4 * point());
+    fcl::CollisionResultf result;
+    fcl::collide<float>(&model, X, &triangle, X, fcl::CollisionRequestf(1, true), result);
+    if (!result.isCollision()) continue;
+    ++contacts;
+    ASSERT_TRUE(result.getContact(0).pos.allFinite()) << i;
+  }
+  EXPECT_GT(contacts, test::repetitions(3000) / 2);
+}
+
 TEST(ShapesDouble, ManagersAndObjects) {
   const auto model = std::make_shared<Modeld>(test::torus(20).mesh());
   fcl::CollisionObjectd arm(model);

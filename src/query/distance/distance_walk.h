@@ -99,7 +99,8 @@ class DistanceWalk : private BestFirst<DistanceWalk<A, B>, A, B> {
       Eigen::Vector3d corners[8];
       cornersOf(oriented(a_.volume(pair.a)), a_in_b_, corners);
       const double bound = b_.gap(pair.b, {corners, 8}, cutoff() * a_in_b_.scale).at_least * b_in_a_.scale;
-      if (!(bound > pair.bound * (1 + 1e-9))) return false;
+      // Rounding margins make bounds negative.
+      if (!(bound > pair.bound + 1e-9 * std::abs(pair.bound))) return false;
       this->push({bound, pair.a, pair.b});
       return true;
     } else {
