@@ -570,25 +570,26 @@ TYPED_TEST(Shapes, DistancesOfWhatTouchesALargeOrAtAPointEnd) {
   EXPECT_EQ(distance(Model<S>(point.mesh()), fcl::Sphere<S>(S(1.25)), {2, -1, 1}), S(0));
 }
 
-// Float triangles that the rounding of their poses separates are within a margin.
+// Far from the origin, triangles in float that are apart by less than the rounding of their poses.
 TEST(ShapesFloat, PositionsOfContactsWithinAMarginAreFinite) {
+  Raw raw;
+  raw.vertices = {{-1, 0.5, -0.25}, {-1, 0.5, 0.25}, {1, 0.5, 0.25}};
+  raw.triangles.emplace_back(0, 1, 2);
+  Options options;
+  options.margin = 0.25;
+  const Modelf model(raw.mesh(), options);
+  const fcl::TriangleP<float> triangle(fcl::Vector3f(-0.3f, -0.2f, 0), fcl::Vector3f(0.1f, 0.2f, -0.3f),
+                                       fcl::Vector3f(0.2f, -0.1f, 0.2f));
   std::mt19937_64 g(5);
   std::uniform_real_distribution<double> u(-1, 1);
-  const auto point = [&] { return Vector3d(u(g), u(g), u(g)); };
   int contacts = 0;
   for (int i = 0; i < test::repetitions(3000); ++i) {
-    Raw raw;
-    raw.vertices = {point(), point(), point()};
-    raw.triangles.emplace_back(0, 1, 2);
-    Options options;
-    options.margin = 0.05;
-    const Modelf model(raw.mesh(), options);
-    // The first corner touches the other triangle.
-    const Vector3d a = point(), b = point(), c = (raw.vertices[0] - 0.3 * a - 0.3 * b) / 0.4;
-    const fcl::TriangleP<float> triangle(a.cast<float>(), b.cast<float>(), c.cast<float>());
-    const auto X = test::pose<float>(test::randomRotation(g), 1e4 * point());
+    const auto X = test::pose<float>(test::randomRotation(g), {1e5, 7e4, 3e4});
+    const Vector3d near(u(g), 0.5 + 0.5 * u(g), 0.25 * u(g));
+    auto Y = test::pose<float>(test::randomRotation(g), {0, 0, 0});
+    Y.translation() = X.translation() + X.linear() * near.cast<float>();
     fcl::CollisionResultf result;
-    fcl::collide<float>(&model, X, &triangle, X, fcl::CollisionRequestf(1, true), result);
+    fcl::collide<float>(&model, X, &triangle, Y, fcl::CollisionRequestf(1, true), result);
     if (!result.isCollision()) continue;
     ++contacts;
     ASSERT_TRUE(result.getContact(0).pos.allFinite()) << i;
