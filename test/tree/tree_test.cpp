@@ -235,7 +235,9 @@ TEST(Tree, AWholeTreeInUseKeepsBlocksOfManyTriangles) {
 TEST(Tree, BuildTreeLeavesNothingToGrow) {
   for (const std::size_t n : {3, 20, 100}) {
     const auto mesh = test::torus(n).mesh();
-    Modeld a(mesh), b(mesh), lazy(mesh);
+    Options on_host;
+    on_host.oracle = OracleKind::kCpu;
+    Modeld a(mesh, on_host), b(mesh, on_host), lazy(mesh);
     a.buildTree();
     b.buildTree();
     EXPECT_GE(a.statistics().built_triangles, mesh->triangleCount());
