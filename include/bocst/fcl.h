@@ -145,10 +145,6 @@ BOCST_EXPORT S continuousPair(const fcl::CollisionGeometry<S>* o1, const fcl::Tr
                               const fcl::Transform3<S>& X_W2_begin, const fcl::Transform3<S>& X_W2_end,
                               const fcl::ContinuousCollisionRequest<S>& request,
                               fcl::ContinuousCollisionResult<S>& result);
-/// True if one of the two is an empty Model. Then they never touch, and the result is set to no collision.
-template <typename S>
-BOCST_EXPORT bool touchesNothing(const fcl::CollisionGeometry<S>* o1, const fcl::CollisionGeometry<S>* o2,
-                                 fcl::ContinuousCollisionResult<S>& result);
 }  // namespace fcl_adapter
 
 /// Computes the first time in [0, 1] at which two moving geometries touch. Same interface as fcl::continuousCollide,
@@ -176,7 +172,6 @@ S continuousCollide(const fcl::CollisionGeometry<S>* o1, const fcl::MotionBase<S
                     const fcl::CollisionGeometry<S>* o2, const fcl::MotionBase<S>* motion2,
                     const fcl::ContinuousCollisionRequest<S>& request, fcl::ContinuousCollisionResult<S>& result) {
   if (isModel<S>(o1) || isModel<S>(o2)) {
-    if (fcl_adapter::touchesNothing<S>(o1, o2, result)) return result.time_of_contact;
     return fcl_adapter::continuousPair<S>(o1, motion1, o2, motion2, request, result);
   }
   return fcl::continuousCollide<S>(o1, motion1, o2, motion2, request, result);
@@ -187,7 +182,6 @@ S continuousCollide(const fcl::CollisionGeometry<S>* o1, const fcl::Transform3<S
                     const fcl::Transform3<S>& X_W2_begin, const fcl::Transform3<S>& X_W2_end,
                     const fcl::ContinuousCollisionRequest<S>& request, fcl::ContinuousCollisionResult<S>& result) {
   if (isModel<S>(o1) || isModel<S>(o2)) {
-    if (fcl_adapter::touchesNothing<S>(o1, o2, result)) return result.time_of_contact;
     return fcl_adapter::continuousPair<S>(o1, X_W1_begin, X_W1_end, o2, X_W2_begin, X_W2_end, request, result);
   }
   if constexpr (std::is_same<S, double>::value) {

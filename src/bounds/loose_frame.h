@@ -12,7 +12,7 @@ namespace bocst::bounds {
 
 /// The frame of the bounds of a bulk-built block's lanes, in lattice units; it follows no cell of the lattice.
 ///
-/// Sides are powers of two, so a thin axis may be finer than the longest by one of four factors. 63 bits in all.
+/// Sides are powers of two, so a thin axis may be finer than the longest by one of four factors. 55 bits in all.
 struct LooseFrame {
   static constexpr int kShifts[4] = {0, 3, 6, 10};
   static constexpr int kLeastExponent = 2, kMostExponent = 17;

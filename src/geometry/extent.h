@@ -5,6 +5,7 @@
 #include <algorithm>
 #include <cmath>
 #include <cstdint>
+#include <limits>
 
 #include "geometry/triangle.h"
 #include "geometry/volume.h"
@@ -95,6 +96,22 @@ inline double distanceBound(const NodeExtent& a, const NodeExtent& b, const Eige
   };
   if (!(guess.squaredNorm() > 0 && reachesCutoff(guess))) anyDirectionApart(a, b, reachesCutoff);
   return best - rounding_margin;
+}
+
+/// The same of a triangle and a node, along the line from the triangle's point nearest to the node's centre.
+inline double distanceBound(const Corners& triangle, const NodeExtent& node) {
+  const Eigen::Vector3d line = node.center - closestPoint(node.center, triangle);
+  const double length = line.norm();
+  if (!(length > 0)) return 0;
+  const Eigen::Vector3d direction = line / length;
+  double lo, hi, gap = std::numeric_limits<double>::infinity(), size = node.half.sum();
+  node.along(direction, lo, hi);
+  for (const Eigen::Vector3d& corner : triangle) {
+    const Eigen::Vector3d way = node.center - corner;
+    gap = std::min(gap, direction.dot(way));
+    size = std::max(size, way.norm());
+  }
+  return gap + lo - 2 * kExtentRounding * size;
 }
 
 /// Some point of a is no farther from one of b than this.

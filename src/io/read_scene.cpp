@@ -22,6 +22,7 @@
 #include <vector>
 
 #include "file.h"
+#include "read_mesh.h"
 #include "vertex_pool.h"
 
 namespace bocst::io {

@@ -51,6 +51,7 @@ bool equal(std::string_view word, std::string_view lower_case) {
 Polygons readText(std::string_view bytes) {
   Polygons polygons;
   VertexPool pool(polygons.vertices);
+  std::size_t vertices = 0;
   std::string_view rest = bytes;
   const auto expect = [&](std::string_view word, std::initializer_list<std::string_view> keywords) {
     for (const std::string_view keyword : keywords) {
@@ -77,8 +78,8 @@ Polygons readText(std::string_view bytes) {
       for (std::uint32_t& c : corner) {
         expect(takeWord(rest), {"vertex"});
         Eigen::Vector3d p;
-        for (int i = 0; i < 3; ++i)
-          p[i] = takeCoordinate(bytes, rest, "vertex " + std::to_string(polygons.vertices.size()));
+        for (int i = 0; i < 3; ++i) p[i] = takeCoordinate(bytes, rest, "vertex " + std::to_string(vertices));
+        ++vertices;
         c = pool.indexOf(p);
       }
       expect(takeWord(rest), {"endloop"});

@@ -16,8 +16,8 @@ using Eigen::Vector2d;
 using Eigen::Vector3d;
 using Eigen::Vector3f;
 
-// The sum of hash values of all triangles' edges is that of edges with an odd number of triangles. The hash depends on
-// all triangles, so nobody finds an open mesh whose sum is 0 by choosing among edges of known values.
+// The exclusive or of the hash values of all triangles' edges is that of the edges with an odd number of triangles. The
+// hash depends on all triangles, so nobody finds an open mesh where it is 0 by choosing among edges of known values.
 bool isClosed(const std::vector<Mesh::Indices>& triangles, const std::vector<std::uint32_t>& welded) {
   std::uint64_t key = triangles.size();
   for (const Mesh::Indices& t : triangles) {

@@ -16,6 +16,8 @@
 #include "fcl/adapters/models.h"
 #include "fcl/adapters/shapes.h"
 #include "scene/reach.h"
+#include "thread/sharded_lock.h"
+#include "tree/tree.h"
 
 namespace bocst::scene {
 namespace {

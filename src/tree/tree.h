@@ -233,11 +233,11 @@ class Tree {
 
  private:
   struct AheadBuild;
+  class BuildMemory;
   static void markUsed(std::atomic<std::int64_t>& last_use, std::int64_t now) {
     if (last_use.load(std::memory_order_relaxed) < now) last_use.store(now, std::memory_order_relaxed);
   }
   /// Where a block of a build goes: below a node, whose level as counted this is; and its index, once it is added.
-  class BuildMemory;
   struct BulkPlace {
     NodeRef node;
     int level = 0;

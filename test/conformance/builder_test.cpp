@@ -169,8 +169,12 @@ TEST(Builder, AnEmptyModelTouchesNothing) {
       EXPECT_EQ(fcl::distance(o1, I, o2, I, fcl::DistanceRequestd(true), distance), std::numeric_limits<double>::max());
       fcl::ContinuousCollisionResultd moved;
       moved.is_collide = true;
-      EXPECT_EQ(fcl::continuousCollide(o1, I, I, o2, I, I, fcl::ContinuousCollisionRequestd(), moved), 1);
+      fcl::Transform3d end = I;
+      end.translation() << 0, 1, 2;
+      EXPECT_EQ(fcl::continuousCollide(o1, I, end, o2, I, I, fcl::ContinuousCollisionRequestd(), moved), 1);
       EXPECT_FALSE(moved.is_collide);
+      EXPECT_TRUE(moved.contact_tf1.isApprox(end));
+      EXPECT_TRUE(moved.contact_tf2.isApprox(I));
     }
   }
   // In a manager, too.

@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: BSD-3-Clause
 // Distances against FCL's own mesh query, against brute force over triangles, and against what they must mean.
+#include <bocst/is_closer_than.h>
 #include <fcl/narrowphase/detail/primitive_shape_algorithm/triangle_distance.h>
 #include <gtest/gtest.h>
 
@@ -98,6 +99,73 @@ TEST(DistanceDouble, OfWhatIsFarApart) {
       EXPECT_NEAR(ask<double>(b, Y, a, X).min_distance, expected, 1e-12 * far);
     }
   }
+}
+
+// The spheres' radii count until they are no more than a rounding of the distance, and ids name cells at any distance.
+TEST(DistanceConservative, OfWhatIsFarApart) {
+  Options options;
+  options.answer = Answer::kConservative;
+  options.depth = 4;
+  const Raw tetrahedron{{{0, 0, 0}, {1, 0, 0}, {0, 1, 0}, {0, 0, 1}}, {{0, 1, 2}, {0, 1, 3}, {0, 2, 3}, {1, 2, 3}}};
+  const Modeld a(tetrahedron.mesh(), options), b(tetrahedron.mesh(), options);
+  const auto I = fcl::Transform3d(fcl::Transform3d::Identity());
+  const auto near = ask<double>(a, I, b, test::pose<double>(Eigen::Matrix3d::Identity(), {10, 0, 0}));
+  const double radii = 9 - near.min_distance;
+  EXPECT_GT(radii, 0.01);
+  for (const double far : {1e4, 1e7, 1e8, 4e8, 1e12, 1e40}) {
+    SCOPED_TRACE(far);
+    const auto Y = test::pose<double>(Eigen::Matrix3d::Identity(), {far, 0, 0});
+    const auto d = ask<double>(a, I, b, Y);
+    EXPECT_NEAR(d.min_distance, far - 1 - radii, 1e-13 * far);
+    EXPECT_GE(d.b1, 0);
+    EXPECT_LT(d.b1, 512);
+    if (far < 1e12) {
+      const fcl::Sphered ball(0.5);
+      EXPECT_LT(ask<double>(a, I, ball, Y).min_distance, far - 1.5 - radii / 4);
+    }
+  }
+}
+
+// A dense mesh beside triangles that are larger than it: boxes of leaves tell nothing about it. Brute force knows none.
+TYPED_TEST(Distance, BesideMuchLargerTriangles) {
+  using S = TypeParam;
+  Raw large = test::torus(6, 0.3);
+  large.scale(100);
+  const Raw small = test::torus(12, 0.2);
+  const Model<S> a(large.mesh()), b(small.mesh());
+  const auto bvh = test::bvh<fcl::OBBRSS<S>>(large);
+  const double rounding = std::is_same<S, double>::value ? 1e-11 : 2e-3;
+  std::mt19937_64 g(19);
+  std::uniform_real_distribution<double> u(0, 1);
+  int apart = 0;
+  for (int i = 0; i < 12; ++i) {
+    const auto X = test::pose<S>(test::randomRotation(g), test::randomDirection(g) * 50);
+    const auto Y = test::pose<S>(test::randomRotation(g), test::randomDirection(g) * (10 + 200 * u(g)));
+    double expected = std::numeric_limits<double>::infinity();
+    const auto corners = [](const Raw& raw, std::size_t t, const fcl::Transform3<S>& to, query::Corners& out) {
+      for (std::size_t k = 0; k < 3; ++k) out[k] = to.template cast<double>() * raw.vertices[raw.triangles[t][k]];
+    };
+    for (std::size_t t = 0; t < large.triangles.size(); ++t) {
+      query::Corners of_large, of_small;
+      corners(large, t, X, of_large);
+      for (std::size_t v = 0; v < small.triangles.size(); ++v) {
+        corners(small, v, Y, of_small);
+        Eigen::Vector3d p, q;
+        expected = std::min(expected, query::nearestPoints(of_large, of_small, p, q));
+      }
+    }
+    if (expected < 1) continue;
+    ++apart;
+    EXPECT_NEAR(ask<S>(a, X, b, Y).min_distance, expected, rounding) << i;
+    EXPECT_NEAR(ask<S>(b, Y, a, X).min_distance, expected, rounding) << i;
+    EXPECT_NEAR(ask<S>(*bvh, X, b, Y).min_distance, expected, rounding) << i;
+    for (const double share : {0.5, 0.999, 1.001, 2.0}) {
+      const bool closer = share > 1;
+      EXPECT_EQ(isCloserThan<S>(&a, X, &b, Y, static_cast<S>(share * expected)), closer) << i << ": " << share;
+      EXPECT_EQ(isCloserThan<S>(&b, Y, &a, X, static_cast<S>(share * expected)), closer) << i << ": " << share;
+    }
+  }
+  EXPECT_GT(apart, 5);
 }
 
 TEST(DistanceDouble, SignedOfWhatIsInsideASolid) {

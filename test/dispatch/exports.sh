@@ -5,7 +5,7 @@
 set -euo pipefail
 
 names=$(nm -DC --defined-only "$1" | cut -d' ' -f3-)
-own='^(typeinfo (name )?for |vtable for )?bocst::|^[a-z:<> ]*bocst::(collide|distance|isModel|fcl_adapter::continuousPair|fcl_adapter::touchesNothing)<|^(float|double|unsigned long|bool|void) bocst::'
+own='^(typeinfo (name )?for |vtable for )?bocst::|^[a-z:<> ]*bocst::(collide|distance|isModel|fcl_adapter::continuousPair)<|^(float|double|unsigned long|bool|void) bocst::'
 fcl='^(unsigned long|float|double|fcl::detail::GJKSolver_[a-z]*<[a-z]*>::S) fcl::(collide|distance|continuousCollide|(detail::)?continuousCollideConservativeAdvancement)<'
 tables='^(guard variable for )?fcl::get(Collision|Distance|ConservativeAdvancement)FunctionLookTable<.*::table$|^fcl::detail::[A-Za-z]*FunctionMatrix<.*>& fcl::get(Collision|Distance|ConservativeAdvancement)FunctionLookTable<.*>\(\)$'
 types='^(typeinfo for|typeinfo name for|vtable for) fcl::(CollisionGeometry|ShapeBase|TriangleP|[A-Za-z]*Motion|MotionBase)<'

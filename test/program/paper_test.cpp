@@ -190,7 +190,7 @@ TEST(Decimation, TakesWhatIsHardToReduce) {
   const auto far = program::decimated(exploded.move({1e6, -1e6, 0}).mesh(), 500);
   EXPECT_LE(far->triangleCount(), 500u);
   EXPECT_TRUE(program::healthOf(*far).watertight());
-  // PointSet and needles: whatever is left is a mesh.
+  // Points and needles: whatever is left is a mesh.
   test::Raw needles;
   for (int i = 0; i < 50; ++i) {
     needles.vertices.push_back({i * 1.0, 0, 0});

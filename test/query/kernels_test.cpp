@@ -304,7 +304,7 @@ TEST_P(EveryTarget, NoPairIsLostThatFclFinds) {
     }
     for (std::size_t i = 0; i < b.count; ++i) {
       make(tb[i]);
-      // ContactPoint a triangle of the other side exactly: by a corner, or moved onto its plane.
+      // Touches a triangle of the other side exactly: by a corner, or moved onto its plane.
       if (g() % 2) {
         const auto& other = ta[g() % a.count];
         const double s = std::abs(u(g)), t = (1 - s) * std::abs(u(g));

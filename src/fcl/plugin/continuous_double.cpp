@@ -51,7 +51,6 @@ double fcl::continuousCollide<double>(const CollisionGeometry<double>* o1, const
                                       const ContinuousCollisionRequest<double>& request,
                                       ContinuousCollisionResult<double>& result) {
   if (bocst::isModel<double>(o1) || bocst::isModel<double>(o2)) {
-    if (bocst::fcl_adapter::touchesNothing<double>(o1, o2, result)) return result.time_of_contact;
     return bocst::fcl_adapter::continuousPair<double>(o1, motion1, o2, motion2, request, result);
   }
   return bocst::fcl_adapter::libfcl::continuousCollide(o1, motion1, o2, motion2, request, result);
@@ -64,7 +63,6 @@ double fcl::continuousCollide<double>(const CollisionGeometry<double>* o1, const
                                       const ContinuousCollisionRequest<double>& request,
                                       ContinuousCollisionResult<double>& result) {
   if (bocst::isModel<double>(o1) || bocst::isModel<double>(o2)) {
-    if (bocst::fcl_adapter::touchesNothing<double>(o1, o2, result)) return result.time_of_contact;
     return bocst::fcl_adapter::continuousPair<double>(o1, X_W1_begin, X_W1_end, o2, X_W2_begin, X_W2_end, request,
                                                       result);
   }

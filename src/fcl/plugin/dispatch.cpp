@@ -129,19 +129,6 @@ void checkDispatch() {
   if (!wrong.empty()) throw std::runtime_error(wrong);
 }
 
-template <typename S>
-bool touchesNothing(const fcl::CollisionGeometry<S>* o1, const fcl::CollisionGeometry<S>* o2,
-                    fcl::ContinuousCollisionResult<S>& result) {
-  if (kindOf<S>(o1, o2) != PairKind::kNothing) return false;
-  result.is_collide = false;
-  result.time_of_contact = 1;
-  return true;
-}
-template bool touchesNothing(const fcl::CollisionGeometry<float>*, const fcl::CollisionGeometry<float>*,
-                             fcl::ContinuousCollisionResult<float>&);
-template bool touchesNothing(const fcl::CollisionGeometry<double>*, const fcl::CollisionGeometry<double>*,
-                             fcl::ContinuousCollisionResult<double>&);
-
 template void checkDispatch<float>();
 template void checkDispatch<double>();
 

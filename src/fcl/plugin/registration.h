@@ -93,9 +93,9 @@ double advancementEntry(const fcl::CollisionGeometry<double>* o1, const fcl::Mot
                         const fcl::CollisionGeometry<double>* o2, const fcl::MotionBase<double>* motion2, const Solver*,
                         const fcl::ContinuousCollisionRequest<double>& request,
                         fcl::ContinuousCollisionResult<double>& result) {
-  const PairKind kind = kindOf<double>(o1, o2);
-  if (kind == PairKind::kNothing && touchesNothing<double>(o1, o2, result)) return result.time_of_contact;
-  if (kind == PairKind::kModel) return continuousPair<double>(o1, motion1, o2, motion2, request, result);
+  if (kindOf<double>(o1, o2) != PairKind::kForeign) {
+    return continuousPair<double>(o1, motion1, o2, motion2, request, result);
+  }
   warnAsFcl<double>("collision", o1, o2);
   return -1;
 }

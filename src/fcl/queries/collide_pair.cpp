@@ -5,6 +5,8 @@
 #include <fcl/geometry/bvh/BVH_model.h>
 
 #include <algorithm>
+#include <cmath>
+#include <cstdint>
 #include <optional>
 #include <stdexcept>
 #include <type_traits>
@@ -26,6 +28,7 @@
 #include "query/collide/tree_walk.h"
 #include "query/cull/crossing.h"
 #include "query/cull/far_apart.h"
+#include "query/distance/distance_walk.h"
 #include "query/sides/box_side.h"
 
 namespace bocst::fcl_adapter {
@@ -66,6 +69,26 @@ bool isNeedle(const tree::Tree& tree) {
   });
 }
 
+/// A yes-or-no walk of a query with a margin. Beside a margin that is much larger than nodes and triangles, these
+/// separate nothing: so if the walk over blocks gets long, the search for the distance is asked whether anything is
+/// near enough to be tested. walk_blocks(most_steps) returns a query::WalkEnd.
+template <typename S, typename WalkBlocks>
+void walkWithinMargin(const TreeSide& a, const TreeSide& b, const SimilarityTransform& near,
+                      MeshCollector<S>& collector, WalkBlocks&& walk_blocks) {
+  constexpr std::size_t kMostSteps = 256;
+  constexpr double kAnyWillDo = 1e300;
+  if (!walk_blocks(kMostSteps).gave_up) return;
+  // What the search computes is off by less than this; so are the lengths of the tolerance.
+  constexpr double kRounding = 1e-12;
+  const double below = near.tolerance * (1 + kRounding) + kRounding * 2 * lattice::kMiddle * (1 + near.scale);
+  const query::Nearest nearest = query::findNearest(a, b, near, {below, kAnyWillDo, kAnyWillDo});
+  if (!std::isfinite(nearest.distance)) return;
+  // Else the distance and the margin are the same up to rounding.
+  const bool meets =
+      collector.triangles(static_cast<std::uint32_t>(nearest.a), static_cast<std::uint32_t>(nearest.b), false);
+  if (!meets) walk_blocks(~std::size_t{0});
+}
+
 /// What a query wants: contacts, or only whether there is one.
 enum class Wanted { kContacts, kVerdict };
 
@@ -101,7 +124,9 @@ bool collideTrees(const CollideQuery<S>& q, const TreeSide& a, const TreeSide& b
     if (!trees.isNeedless() && !(kUsesBoxes && query::knownBoxesApart(a, b, near))) {
       if (isProved()) return true;
       walk([&](auto& collector) {
-        if (kUsesBoxes && collector.endsAtFirst()) {
+        if (near.margin > 0 && collector.endsAtFirst()) {
+          walkWithinMargin(a, b, near, collector, [&](std::size_t most) { return trees.run(collector, most); });
+        } else if (kUsesBoxes && collector.endsAtFirst()) {
           trees.runByTurns(collector);
         } else {
           trees.run(collector);
@@ -127,7 +152,9 @@ bool collideTrees(const CollideQuery<S>& q, const TreeSide& a, const TreeSide& b
       };
       // Of a mesh that is much larger than its details, these share a unit of the lattice, and blocks part nothing.
       constexpr query::Turns::Limits kLimits = {64, 1024, 1024, 1};
-      if (spheres || !kUsesBoxes || !query::BoxSide::fits(a) || !query::BoxSide::fits(b)) {
+      if (!spheres && near.margin > 0 && collector.endsAtFirst()) {
+        walkWithinMargin(a, b, near, collector, walk_blocks);
+      } else if (spheres || !kUsesBoxes || !query::BoxSide::fits(a) || !query::BoxSide::fits(b)) {
         walk_blocks(~std::size_t{0});
       } else if (collector.endsAtFirst()) {
         query::walkByTurns(a, b, near, collector, kLimits, walk_blocks);

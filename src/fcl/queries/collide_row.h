@@ -9,7 +9,7 @@
 namespace bocst::fcl_adapter {
 
 /// hit[k] is 1 where fcl::collide says with the default request that b touches a at the pose X_AB[k], else 0. Poses are
-/// rigid, and near: none is looked at by boxes first.
+/// rigid; those that PoseBoxes separate were left out.
 template <typename S>
 void collideRow(const Model<S>& a, const Model<S>& b, const fcl::Transform3<S>* X_AB, std::size_t count,
                 std::uint8_t* hit);

@@ -147,7 +147,9 @@ double firstContact(const ContinuousQuery<S>& q) {
 
 template <typename S>
 S answer(const ContinuousQuery<S>& q, fcl::ContinuousCollisionResult<S>& result) {
-  const double time = firstContact(q);
+  // An empty model touches nothing.
+  const bool is_empty = kindOf<S>(q.o1, q.o2) == PairKind::kNothing;
+  const double time = is_empty ? std::numeric_limits<double>::infinity() : firstContact(q);
   result.is_collide = time <= 1;
   // Rounded, if at all, to what is earlier.
   result.time_of_contact = result.is_collide ? static_cast<S>(time) : S(1);

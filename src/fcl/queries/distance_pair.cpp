@@ -5,6 +5,7 @@
 #include <fcl/narrowphase/collision_request.h>
 #include <fcl/narrowphase/collision_result.h>
 
+#include <algorithm>
 #include <functional>
 #include <limits>
 #include <type_traits>
@@ -73,8 +74,11 @@ struct Distant {
   Eigen::Isometry3d X_WM;
   Eigen::Vector3d center;  ///< Of the ball, in the mesh's frame.
   double radius;
-  std::size_t triangles;
+  std::size_t triangles;  ///< 0 where the host has no mesh.
   std::function<Eigen::Vector3d(std::uint32_t, int)> corner;
+  /// From this many times its size on, the mesh is what searchFar() takes it for. Spheres of conservative answers are
+  /// told apart by the walk, until squares of lengths overflow.
+  double far = 0x1p26;
 
   Distant(const Eigen::Isometry3d& X, const tree::Tree& tree)
       : X_WM(X),
@@ -83,7 +87,8 @@ struct Distant {
         triangles(tree.surface().mesh == nullptr ? 0 : tree.surface().triangle_count),
         corner([mesh = tree.surface().mesh.get()](std::uint32_t t, int k) {
           return mesh->vertex(mesh->indices(t)[static_cast<std::size_t>(k)]);
-        }) {}
+        }),
+        far(tree.conservative() ? 0x1p400 : 0x1p26) {}
   Distant(const Eigen::Isometry3d& X, const BvhSide& side)
       : X_WM(X),
         triangles(side.meshTriangles()),
@@ -123,7 +128,8 @@ struct Distant {
 template <typename S>
 bool searchFar(const DistanceQuery<S>& q, const Distant& a, const Distant& b) {
   const Eigen::Vector3d half_way = Distant::halfWay(a.X_WM, a.center, b.X_WM, b.center);
-  if (!(half_way.cwiseAbs().maxCoeff() > 0x1p26 * (a.radius + b.radius)) || a.triangles == 0 || b.triangles == 0) {
+  if (!(half_way.cwiseAbs().maxCoeff() > std::max(a.far, b.far) * (a.radius + b.radius)) || a.triangles == 0 ||
+      b.triangles == 0) {
     return false;
   }
   const Eigen::Vector3d direction = half_way.stableNormalized();
@@ -143,7 +149,8 @@ bool searchFar(const DistanceQuery<S>& q, const Distant& a, const query::ConvexS
   const query::Sphere ball = b.sphere(b.root());
   const Eigen::Isometry3d X = isometryOf<S>(q.X_WB());
   const Eigen::Vector3d half_way = Distant::halfWay(a.X_WM, a.center, X, ball.center);
-  if (!(half_way.cwiseAbs().maxCoeff() > 0x1p53 * (a.radius + ball.radius)) || a.triangles == 0) return false;
+  if (!(half_way.cwiseAbs().maxCoeff() > std::max(0x1p53, a.far) * (a.radius + ball.radius)) || a.triangles == 0)
+    return false;
   query::Nearest n;
   Eigen::Vector3d tip;
   n.a = a.farthest(half_way.stableNormalized(), tip);

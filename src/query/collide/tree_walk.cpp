@@ -3,8 +3,6 @@
 
 #include <algorithm>
 
-#include "query/collide/pair_walk.h"
-
 namespace bocst::query {
 namespace {
 
@@ -30,13 +28,10 @@ struct TreeWalk::Scratch {
 
 bool TreeWalk::runByTurns(Visitor& visitor) {
   if (!BoxSide::fits(a_) || !BoxSide::fits(b_)) return run(visitor);
-  return walkByTurns(a_, b_, b_in_a_, visitor, kLimits, [&](std::size_t most) {
-    const bool ended = run(visitor, most);
-    return WalkEnd{ended, leaf_pairs_, gave_up_};
-  });
+  return walkByTurns(a_, b_, b_in_a_, visitor, kLimits, [&](std::size_t most) { return run(visitor, most); });
 }
 
-bool TreeWalk::run(Visitor& visitor, std::size_t most_leaf_pairs) {
+WalkEnd TreeWalk::run(Visitor& visitor, std::size_t most_leaf_pairs) {
   visitor_ = &visitor;
   leaf_pairs_ = 0;
   most_leaf_pairs_ = most_leaf_pairs;
@@ -49,7 +44,8 @@ bool TreeWalk::run(Visitor& visitor, std::size_t most_leaf_pairs) {
   s.long_b.clear();
   // Each walk in a tree that is not whole brings the query nearer that builds it whole: see Tree::payRent().
   for (const TreeSide* side : {&a_, &b_}) side->tree().payRent(tree::Tree::kWalkRent);
-  return search(s);
+  const bool ended = search(s);
+  return {ended && !gave_up_, leaf_pairs_, gave_up_};
 }
 
 bool TreeWalk::search(Scratch& s) {

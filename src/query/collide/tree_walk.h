@@ -4,6 +4,7 @@
 #include <vector>
 
 #include "query/collide/deferred_pairs.h"
+#include "query/collide/pair_walk.h"
 #include "query/collide/tree_steps.h"
 #include "query/cull/separation.h"
 #include "query/leaf/leaf_pairs.h"
@@ -26,7 +27,10 @@ class TreeWalk {
   bool isNeedless() { return areSeparate(a_.tree().supports(), b_.tree().supports(), b_in_a_, is_shallow_); }
 
   /// True when the visitor ended it.
-  bool run(Visitor& visitor) { return run(visitor, ~std::size_t{0}); }
+  bool run(Visitor& visitor) { return run(visitor, ~std::size_t{0}).met; }
+
+  /// The same, but gives up after more than so many pairs of leaves.
+  WalkEnd run(Visitor& visitor, std::size_t most_leaf_pairs);
 
   /// The same of a yes-or-no query, in turns with a walk over BoxSide where it gets long. Volumes in float separate
   /// little between two flat faces with little space between them, where oriented boxes in double separate the faces as
@@ -41,7 +45,6 @@ class TreeWalk {
   void testLargeTriangles(PairSteps& steps, const StepEvent& event, Scratch& s);
   bool testLeaves(const StepEvent& event, Scratch& s);
   const SimilarityTransform& aInB();
-  bool run(Visitor& visitor, std::size_t most_leaf_pairs);  // true also when it gave up
 
   const TreeSide &a_, &b_;
   const SimilarityTransform& b_in_a_;

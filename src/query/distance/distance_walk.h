@@ -55,6 +55,9 @@ class DistanceWalk : private BestFirst<DistanceWalk<A, B>, A, B> {
     if (!B::kBodies && !spheres()) {
       const NodeExtent root_a = extentOfA(a_.root()), root_b = extentOfB(b_.root());
       tie_ = 4 * kExtentRounding * ((root_b.center - root_a.center).norm() + root_a.half.sum() + root_b.half.sum());
+    } else if constexpr (!B::kBodies) {
+      const Sphere root_a = sphereOfA(a_.root()), root_b = sphereOfB(b_.root());
+      tie_ = 4 * kSphereRounding * ((root_b.center - root_a.center).norm() + root_a.radius + root_b.radius);
     }
     found(known);
     if (gaps_.has_value()) descendGreedily();
@@ -92,21 +95,44 @@ class DistanceWalk : private BestFirst<DistanceWalk<A, B>, A, B> {
   bool worthIt(double bound) const { return bound < cutoff(); }
   double tie() const { return tie_; }
   bool settled() const { return !(limit_ > 0) || gaveUp(); }
-  // A body may be much smaller than its box: pairs that pass the box's bound are bounded once more, by the body itself.
+  // Pairs that pass the bound of their boxes are bounded once more where that bound is poor: of a body, which may be
+  // much smaller than its box, and of a leaf beside a much smaller node, which may be nearer to the leaf's box than to
+  // its triangles.
   bool again(const Pair& pair) {
+    if (spheres()) return false;
+    double bound = 0;
     if constexpr (B::kBodies) {
-      if (spheres() || b_.hasExactBox(pair.b)) return false;
+      if (b_.hasExactBox(pair.b)) return false;
       Eigen::Vector3d corners[8];
       cornersOf(oriented(a_.volume(pair.a)), a_in_b_, corners);
-      const double bound = b_.gap(pair.b, {corners, 8}, cutoff() * a_in_b_.scale).at_least * b_in_a_.scale;
-      // Rounding margins make bounds negative.
-      if (!(bound > pair.bound + 1e-9 * std::abs(pair.bound))) return false;
-      this->push({bound, pair.a, pair.b});
-      return true;
+      bound = b_.gap(pair.b, {corners, 8}, cutoff() * a_in_b_.scale).at_least * b_in_a_.scale;
     } else {
-      return false;
+      const bool leaf_a = a_.state(pair.a) == State::kLeaf, leaf_b = b_.state(pair.b) == State::kLeaf;
+      if (leaf_a == leaf_b) return false;
+      const double size_a = a_.size(pair.a), size_b = b_.size(pair.b) * b_in_a_.scale * b_in_a_.scale;
+      if ((leaf_a ? size_a : size_b) < kMuchLarger * (leaf_a ? size_b : size_a)) return false;
+      bound = leaf_a ? boundOfLeaf(a_, pair.a, SimilarityTransform(), extentOfB(pair.b))
+                     : boundOfLeaf(b_, pair.b, b_in_a_, extentOfA(pair.a));
     }
+    // Rounding margins make bounds negative.
+    if (!(bound > pair.bound + 1e-9 * std::abs(pair.bound))) return false;
+    this->push({bound, pair.a, pair.b});
+    return true;
   }
+
+  // No triangle of a leaf, placed in the frame of A, is nearer to the other side's node than this.
+  template <typename Side>
+  double boundOfLeaf(const Side& side, typename Side::Node leaf, const SimilarityTransform& place,
+                     const NodeExtent& other) const {
+    double bound = std::numeric_limits<double>::infinity();
+    for (std::size_t i = 0; i < side.triangleCount(leaf); ++i) {
+      const std::uint32_t t = side.triangle(leaf, i);
+      const Corners c = {place * side.corner(t, 0), place * side.corner(t, 1), place * side.corner(t, 2)};
+      bound = std::min(bound, distanceBound(c, other));
+    }
+    return bound;
+  }
+
   double scaleOfB() const { return b_in_a_.scale; }
 
   NodeExtent extentOfA(typename A::Node n) const { return NodeExtent(a_.volume(n), SimilarityTransform()); }
@@ -130,7 +156,7 @@ class DistanceWalk : private BestFirst<DistanceWalk<A, B>, A, B> {
   }
 
   static double boundOf(const Sphere& a, const Sphere& b) {
-    return (a.center - b.center).norm() * (1 - 1e-12) - (a.radius + b.radius) * (1 + 1e-12);
+    return (a.center - b.center).norm() * (1 - kSphereRounding) - (a.radius + b.radius) * (1 + kSphereRounding);
   }
   double boundOf(const Sphere& a, typename B::Node body) const {
     const Sphere ball = stretched(placed(a, a_in_b_));
@@ -350,7 +376,9 @@ class DistanceWalk : private BestFirst<DistanceWalk<A, B>, A, B> {
     found(n);
   }
 
+  static constexpr double kSphereRounding = 1e-14;  // of the distance of two spheres
   static constexpr double kTieShare = 1e-3;     // of a distance: what is next to nothing is found as exactly as before
+  static constexpr double kMuchLarger = 4 * 4;  // of two sizes squared: there the better bound of a leaf pays
   static constexpr std::size_t kExactTest = 2;  // steps in the time that the distance of two triangles takes
 
   const SimilarityTransform& b_in_a_;
