@@ -75,7 +75,9 @@ std::string nameOf(Enum value, const Name<Enum> (&names)[N]) {
 
 std::chrono::milliseconds milliseconds(double seconds) {
   if (!(std::abs(seconds) < 1e12)) throw py::value_error("bocst: ttl is " + std::to_string(seconds) + " seconds");
-  return std::chrono::milliseconds(std::llround(seconds * 1e3));
+  const std::chrono::milliseconds rounded(std::llround(seconds * 1e3));
+  // 0 means never.
+  return seconds > 0 ? std::max(rounded, std::chrono::milliseconds(1)) : rounded;
 }
 
 Options makeOptions(const std::string& subdivision, const std::string& answer, int depth, double dimension,
@@ -484,7 +486,8 @@ threads: number of threads that share the states of one call; 0: one per hardwar
           "ignored"_a = true, py::call_guard<NoGilWithOctrees>(), "Allows the two to touch; ignored=False undoes this.")
       .def(
           "update", [](PyScene& s, Id id) { s.scene.update(id); }, "object"_a, py::call_guard<NoGilWithOctrees>(),
-          "Call this after the shape of a geometry has changed.")
+          "Call this after the shape of a geometry has changed. A BVHModel that was built again is another geometry: "
+          "remove the object and add it again.")
       .def(
           "collides",
           [](const PyScene& s, const py::object& X_WM) {

@@ -57,6 +57,9 @@ class Edge {
       motions_.push_back(fcl_adapter::motionOf<S>(begin[i], end[i], motion));
       const Eigen::Vector3d center = motions_[i]->at(0) * o.bounds.center;
       speeds_.push_back(motions_[i]->fastest(center, o.bounds.radius, 0) * (1 + 1e-6));
+      const bool is_straight = motion == fcl::CCDM_LINEAR || motion == fcl::CCDM_TRANS;
+      velocities_.push_back(is_straight ? motions_[i]->at(1).translation() - motions_[i]->at(0).translation()
+                                        : Eigen::Vector3d(0, 0, 0));
       double place = 0;
       double& orthogonality_error = check.orthogonality_errors[i];
       orthogonality_error = 1e-12;
@@ -131,11 +134,20 @@ class Edge {
     return result.is_collide;
   }
 
+  // No distance between points of two moving objects changes faster. Origins move on lines, or their velocities are not
+  // known and 0: then the speeds count in full. What is left of a speed is that of the turn about the origin.
+  double relativeSpeed(std::size_t i, std::size_t j) const {
+    const double straight_i = velocities_[i].norm(), straight_j = velocities_[j].norm();
+    const double rounding = 1e-14 * (straight_i + straight_j);
+    return std::max(speeds_[i] - straight_i, 0.0) + std::max(speeds_[j] - straight_j, 0.0) +
+           (velocities_[i] - velocities_[j]).norm() + rounding;
+  }
+
   // Conservative advancement, of two of FCL's shapes and octrees: FCL's own may step over contacts.
   bool advance(const PairAt& p, const Object<S>& a, const Object<S>& b) {
     const bool fixed = world_.isFixed(p.group);
     const std::size_t j = fixed ? 0 : world_.movingIndex(p.group, p.lane);
-    const double speed = speeds_[p.moving] + (fixed ? 0 : speeds_[j]);
+    const double speed = fixed ? speeds_[p.moving] : relativeSpeed(p.moving, j);
     double size = 0;
     for (const Object<S>* o : {&a, &b}) {
       if (o->bounds.kind == Bounds::kBox) size += o->bounds.radius;
@@ -165,7 +177,8 @@ class Edge {
   const fcl::CCDMotionType type_;
   std::vector<std::unique_ptr<Motion>> motions_;
   std::vector<double> speeds_;
-  std::vector<double> places_;  // none on the way has coordinates that add up to more
+  std::vector<Eigen::Vector3d> velocities_;  // of origins that move on lines
+  std::vector<double> places_;               // none on the way has coordinates that add up to more
   std::vector<fcl::Transform3<S>> poses_;
   std::vector<PairAt> left_;
   fcl::CollisionResult<S> result_;

@@ -250,6 +250,18 @@ TEST_F(Program, AsksForEachPoseOfAFile) {
   expectComplaint("collide " + cube() + " " + cube() + " --poses " + write("none.csv", "# none\n"), kFailed,
                   "no poses");
   expectComplaint(command + " --pose 0,0,0,1,0,0,0", kUsage, "--pose");
+  expectComplaint(command + " --csv - --json -", kUsage, "--csv");
+  // Names of columns count: in another order the numbers are other poses.
+  const auto complain = [this](const std::string& text, const std::string& about) {
+    expectComplaint("collide " + cube() + " " + cube() + " --poses " + write("names.csv", text), kFailed, about);
+  };
+  const std::string numbers = "\n0.9,0,0,0,0,0,1\n";
+  complain("x,y,z,qx,qy,qz,qw" + numbers, "line 1: the columns are x,y,z,qx,qy,qz,qw; add --xyzw");
+  complain("z,y,x,qw,qx,qy,qz" + numbers, "line 1: the columns must be named x,y,z,qw,qx,qy,qz");
+  complain("NaN,0,0,1,0,0,0" + numbers, "line 1: a pose must have finite numbers");
+  complain("Inf,0,0,1,0,0,0" + numbers, "line 1: a pose must have finite numbers");
+  const std::string ros = write("ros.csv", "\"X\", Y, Z, qx, qy, qz, qw" + numbers);
+  EXPECT_EQ(json("collide " + cube() + " " + cube() + " --xyzw --poses " + ros).at("collisions"), 1);
   expectComplaint(command + " --html p.html", kUsage, "--poses");
 }
 

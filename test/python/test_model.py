@@ -64,6 +64,7 @@ def test_options_come_back():
                             memory_budget=1 << 20, margin=0.25, solid=False, build_ahead=True)
     model = bocst.Model(bocst.Mesh(*box()), options)
     assert model.options == options and options != bocst.Options()
+    assert bocst.Options(ttl=1e-9).ttl == 0.001, "0 would be never"
     assert model.options.ttl == 0.5 and model.options.margin == 0.25 and model.options.oracle == "cpu"
     assert "depth=4" in repr(options)
     with pytest.raises(AttributeError):

@@ -1287,6 +1287,52 @@ TYPED_TEST(SceneTest, RefusesPlanesBesideConvexes) {
   }
 }
 
+// FCL's tables have nothing for a TriangleP: it would say "free" at every pose.
+TYPED_TEST(SceneTest, RefusesTrianglesBesideShapes) {
+  using S = TypeParam;
+  using V = fcl::Vector3<S>;
+  const auto triangle = std::make_shared<fcl::TriangleP<S>>(V(0, 0, 0), V(S(0.1), 0, 0), V(0, S(0.1), 0));
+  const std::vector<Geometry<S>> partners = {std::make_shared<fcl::Box<S>>(2, 2, 2),
+                                             std::make_shared<fcl::Sphere<S>>(1),
+                                             std::make_shared<fcl::Halfspace<S>>(V::UnitZ(), S(1)),
+                                             std::make_shared<fcl::TriangleP<S>>(V(0, 0, -1), V(0, 1, 1), V(1, 0, 1))};
+  const States<S> X(1, fcl::Transform3<S>::Identity());
+  for (const Geometry<S>& partner : partners) {
+    for (const bool turned : {false, true}) {
+      Scene<S> scene;
+      scene.addFixed(turned ? Geometry<S>(triangle) : partner, X[0]);
+      scene.addMoving(turned ? partner : Geometry<S>(triangle));
+      EXPECT_NE(complaintOf([&] { scene.collides(X.data()); }).find("TriangleP a bocst::Model"), std::string::npos);
+      fcl::CollisionResult<S> result;
+      EXPECT_THROW(bocst::collide<S>(triangle.get(), X[0], partner.get(), X[0], fcl::CollisionRequest<S>(), result),
+                   std::invalid_argument);
+    }
+  }
+}
+
+// Two shapes that are carried together never meet, and one that comes up with the other does. The number of queries on
+// the way is that of the gap over the relative way: without that, this test takes hours.
+TYPED_TEST(SceneTest, EdgesOfShapesThatMoveTogether) {
+  using S = TypeParam;
+  Scene<S> scene;
+  const auto box = std::make_shared<fcl::Box<S>>(S(0.4), S(0.4), S(0.4));
+  scene.addMoving(box);
+  scene.addMoving(box);
+  States<S> begin(2, fcl::Transform3<S>::Identity()), end = begin;
+  const S gap = S(1e-3), way = std::is_same<S, double>::value ? S(1e6) : S(1);
+  begin[1].translation().x() = S(0.4) + gap;
+  for (const S closer : {S(0), gap / 2, gap * 2, S(0.5)}) {
+    end[0].translation() = fcl::Vector3<S>(0, way, way / 2);
+    end[1].translation() = begin[1].translation() + end[0].translation() - fcl::Vector3<S>(closer, 0, 0);
+    EXPECT_EQ(scene.edgeIsFree(begin.data(), end.data()), closer < gap) << closer;
+    EXPECT_EQ(scene.edgeIsFree(end.data(), begin.data()), closer < gap) << closer;
+  }
+  // One that turns about its own middle reaches the other with a corner.
+  end[1].translation() = begin[1].translation() + end[0].translation();
+  end[0].linear() = Eigen::AngleAxis<S>(S(0.5), fcl::Vector3<S>::UnitZ()).toRotationMatrix();
+  EXPECT_FALSE(scene.edgeIsFree(begin.data(), end.data()));
+}
+
 /// Runs f in a child, which has a minute.
 template <typename F>
 void expectInChild(F&& f) {

@@ -127,7 +127,11 @@ Validation Validation::fromJson(const Json& json) {
       if (result.shard.index < 1 || result.shard.index > result.shard.of)
         throw std::runtime_error("a shard out of range");
     }
-    for (std::size_t i = 0; i < kKeys; ++i) result.count[i] = take(kRows[i].key).get<std::size_t>();
+    for (std::size_t i = 0; i < kKeys; ++i) {
+      const Json count = take(kRows[i].key);
+      if (!count.is_number_unsigned()) throw std::runtime_error(std::string(kRows[i].key) + " is no count");
+      result.count[i] = count.get<std::size_t>();
+    }
     for (const Json& failure : take("failures")) {
       result.failures.push_back({failure.at("at"), {failure.at("pose")}, failure.at("what")});
     }

@@ -27,6 +27,30 @@ std::string shortest(double number) {
   return {buffer, r.ptr};
 }
 
+bool startsWithName(const std::string& list) {
+  std::string word = list.substr(0, 3);
+  for (char& c : word) c = static_cast<char>(std::tolower(static_cast<unsigned char>(c)));
+  return (std::isalpha(static_cast<unsigned char>(list.front())) != 0 || list[0] == '"') && word != "nan" &&
+         word != "inf";
+}
+
+// Columns in another order would be other poses.
+void checkNames(const std::string& list, RotationFormat format) {
+  std::string names;
+  for (const char c : list) {
+    if (c != '"') names += static_cast<char>(std::tolower(static_cast<unsigned char>(c)));
+  }
+  if (names == spelling(format)) return;
+  for (const RotationFormat other : {RotationFormat::kWxyz, RotationFormat::kXyzw, RotationFormat::kRpy}) {
+    if (names != spelling(other)) continue;
+    throw std::invalid_argument("the columns are " + names +
+                                (other == RotationFormat::kXyzw  ? "; add --xyzw"
+                                 : other == RotationFormat::kRpy ? "; add --rpy"
+                                                                 : "; leave out --xyzw and --rpy"));
+  }
+  throw std::invalid_argument("the columns must be named " + spelling(format));
+}
+
 }  // namespace
 
 std::string spelling(RotationFormat format) {
@@ -91,11 +115,11 @@ std::vector<ListedPose> parsePoses(const std::string& text, RotationFormat forma
       gap = blank;
     }
     if (list.empty()) continue;
-    const bool names = poses.empty() &&
-                       (std::isalpha(static_cast<unsigned char>(list.front())) != 0 || list[0] == '"') &&
-                       list.rfind("nan", 0) != 0 && list.rfind("inf", 0) != 0;
-    if (names && number == 1) continue;
     try {
+      if (number == 1 && startsWithName(list)) {
+        checkNames(list, format);
+        continue;
+      }
       poses.push_back({number, Pose::parse(list, format)});
     } catch (const std::invalid_argument& e) {
       throw std::runtime_error(name + ": line " + std::to_string(number) + ": " + e.what());

@@ -54,7 +54,7 @@ struct ListedPose {
 };
 
 /// The poses of a text, one a line, the numbers with commas, semicolons or blanks between. Empty lines, what follows #,
-/// and a first line of names are skipped.
+/// and a first line with the names of the columns, as spelling() has them, are skipped.
 /// @param name of the file, for messages. @throws std::runtime_error that names the line that is no pose.
 std::vector<ListedPose> parsePoses(const std::string& text, RotationFormat format, const std::string& name);
 
