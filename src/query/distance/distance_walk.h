@@ -110,7 +110,9 @@ class DistanceWalk : private BestFirst<DistanceWalk<A, B>, A, B> {
       const bool leaf_a = a_.state(pair.a) == State::kLeaf, leaf_b = b_.state(pair.b) == State::kLeaf;
       if (leaf_a == leaf_b) return false;
       const double size_a = a_.size(pair.a), size_b = b_.size(pair.b) * b_in_a_.scale * b_in_a_.scale;
-      if ((leaf_a ? size_a : size_b) < kMuchLarger * (leaf_a ? size_b : size_a)) return false;
+      const double large = leaf_a ? size_a : size_b, small = leaf_a ? size_b : size_a;
+      // A node that is hardly larger than a tie would be left out for the first of its triangles.
+      if (large < kMuchLarger * small || small < kManyTies * tie_ * tie_) return false;
       bound = leaf_a ? boundOfLeaf(a_, pair.a, SimilarityTransform(), extentOfB(pair.b))
                      : boundOfLeaf(b_, pair.b, b_in_a_, extentOfA(pair.a));
     }
@@ -379,6 +381,7 @@ class DistanceWalk : private BestFirst<DistanceWalk<A, B>, A, B> {
   static constexpr double kSphereRounding = 1e-14;  // of the distance of two spheres
   static constexpr double kTieShare = 1e-3;     // of a distance: what is next to nothing is found as exactly as before
   static constexpr double kMuchLarger = 4 * 4;  // of two sizes squared: there the better bound of a leaf pays
+  static constexpr double kManyTies = 1e4 * 1e4;
   static constexpr std::size_t kExactTest = 2;  // steps in the time that the distance of two triangles takes
 
   const SimilarityTransform& b_in_a_;
