@@ -70,14 +70,22 @@ bool isNeedle(const tree::Tree& tree) {
 }
 
 /// A yes-or-no walk of a query with a margin. Beside a margin that is much larger than nodes and triangles, these
-/// separate nothing: so if the walk over blocks gets long, the search for the distance is asked whether anything is
-/// near enough to be tested. walk_blocks(most_steps) returns a query::WalkEnd.
+/// separate nothing: so if the walks over blocks and oriented boxes get as long as a search for the distance usually
+/// takes, that is asked whether anything is near enough to be tested. `boxes`: oriented boxes may be used if they are
+/// known. walk_blocks(most_steps) returns a query::WalkEnd.
 template <typename S, typename WalkBlocks>
 void walkWithinMargin(const TreeSide& a, const TreeSide& b, const SimilarityTransform& near,
-                      MeshCollector<S>& collector, WalkBlocks&& walk_blocks) {
-  constexpr std::size_t kMostSteps = 256;
+                      MeshCollector<S>& collector, bool boxes, WalkBlocks&& walk_blocks) {
+  constexpr std::size_t kFewSteps = 64, kMostSteps = 4096;
   constexpr double kAnyWillDo = 1e300;
-  if (!walk_blocks(kMostSteps).gave_up) return;
+  boxes = boxes && a.tree().knownBoxes() != nullptr && b.tree().knownBoxes() != nullptr;
+  if (!walk_blocks(boxes ? kFewSteps : kMostSteps).gave_up) return;
+  if (boxes) {
+    const query::BoxSide boxes_a(a), boxes_b(b);
+    query::PairWalk<query::BoxSide, query::BoxSide> walk(boxes_a, boxes_b, near, collector);
+    walk.run(kMostSteps);
+    if (!walk.gaveUp()) return;
+  }
   // What the search computes is off by less than this; so are the lengths of the tolerance.
   constexpr double kRounding = 1e-12;
   const double below = near.tolerance * (1 + kRounding) + kRounding * 2 * lattice::kMiddle * (1 + near.scale);
@@ -125,7 +133,8 @@ bool collideTrees(const CollideQuery<S>& q, const TreeSide& a, const TreeSide& b
       if (isProved()) return true;
       walk([&](auto& collector) {
         if (near.margin > 0 && collector.endsAtFirst()) {
-          walkWithinMargin(a, b, near, collector, [&](std::size_t most) { return trees.run(collector, most); });
+          walkWithinMargin(a, b, near, collector, kUsesBoxes,
+                           [&](std::size_t most) { return trees.run(collector, most); });
         } else if (kUsesBoxes && collector.endsAtFirst()) {
           trees.runByTurns(collector);
         } else {
@@ -153,7 +162,7 @@ bool collideTrees(const CollideQuery<S>& q, const TreeSide& a, const TreeSide& b
       // Of a mesh that is much larger than its details, these share a unit of the lattice, and blocks part nothing.
       constexpr query::Turns::Limits kLimits = {64, 1024, 1024, 1};
       if (!spheres && near.margin > 0 && collector.endsAtFirst()) {
-        walkWithinMargin(a, b, near, collector, walk_blocks);
+        walkWithinMargin(a, b, near, collector, kUsesBoxes, walk_blocks);
       } else if (spheres || !kUsesBoxes || !query::BoxSide::fits(a) || !query::BoxSide::fits(b)) {
         walk_blocks(~std::size_t{0});
       } else if (collector.endsAtFirst()) {
