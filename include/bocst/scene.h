@@ -101,7 +101,9 @@ class BOCST_EXPORT Scene {
   void update(Id object);
 
   // Queries. X_WM may be null if there are no moving objects or no states. All throw std::invalid_argument, which names
-  // the moving object and the state, for a pose that is not rigid, and for another null pointer to poses or hits.
+  // the moving object and the state, for a pose that is not rigid, for another null pointer to poses or hits, and for
+  // two geometries near each other of which FCL knows no collision: a Plane and a Convex, or a TriangleP and any
+  // geometry that is not a Model.
 
   /// True if this state collides. `pair` is then set to one of the pairs that collide.
   bool collides(const Transform* X_WM, Pair* pair = nullptr) const;
