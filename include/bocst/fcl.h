@@ -85,7 +85,7 @@ namespace bocst {
 /// triangle and a shape or cell whose distance is below the solver's tolerance.
 /// @throws std::invalid_argument for a geometry that is null or not supported (FCL would return 0, "free"), a pose that
 /// is not rigid, an invalid tolerance or an unknown solver type. The message names the argument and its value. If neither
-/// is a Model: for a Plane and a Convex, and for a TriangleP, of which FCL knows no collisions. See
+/// is a Model, the answer is FCL's own (which is 0 for a TriangleP); a Plane and a Convex are refused. See
 /// share/doc/guarantees.md.
 /// Thread rule: any number of threads may query the same models, each with its own request and result.
 template <typename S>

@@ -1303,9 +1303,6 @@ TYPED_TEST(SceneTest, RefusesTrianglesBesideShapes) {
       scene.addFixed(turned ? Geometry<S>(triangle) : partner, X[0]);
       scene.addMoving(turned ? partner : Geometry<S>(triangle));
       EXPECT_NE(complaintOf([&] { scene.collides(X.data()); }).find("TriangleP a bocst::Model"), std::string::npos);
-      fcl::CollisionResult<S> result;
-      EXPECT_THROW(bocst::collide<S>(triangle.get(), X[0], partner.get(), X[0], fcl::CollisionRequest<S>(), result),
-                   std::invalid_argument);
     }
   }
 }

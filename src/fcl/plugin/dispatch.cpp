@@ -146,21 +146,15 @@ bool isModel(const fcl::CollisionGeometry<S>* geometry) {
 
 namespace {
 
-/// Refuses what FCL would answer "free" to whatever the poses, or would end the process for: its tables have nothing
-/// for a TriangleP; for a plane and a Convex they have a test that calls a support function that planes lack.
+/// FCL's table has a general test for this pair, which calls a support function that a plane does not have.
 template <typename S>
-void refuseWithoutCollision(const fcl::CollisionGeometry<S>* o1, const fcl::CollisionGeometry<S>* o2) {
+void refusePlaneAndConvex(const fcl::CollisionGeometry<S>* o1, const fcl::CollisionGeometry<S>* o2) {
   const fcl::NODE_TYPE type1 = o1->getNodeType(), type2 = o2->getNodeType();
-  const char* remedy = nullptr;
-  const bool has_triangle = type1 == fcl::GEOM_TRIANGLE || type2 == fcl::GEOM_TRIANGLE;
-  if (has_triangle && !fcl_adapter::isSentinel<S>(o1)) remedy = "make the TriangleP a bocst::Model";
   if ((type1 == fcl::GEOM_PLANE && type2 == fcl::GEOM_CONVEX) ||
       (type1 == fcl::GEOM_CONVEX && type2 == fcl::GEOM_PLANE)) {
-    remedy = "make the Convex a bocst::Model";
+    throw std::invalid_argument("bocst::collide: FCL knows no collision of " + fcl_adapter::typeName<S>(o1) + " and " +
+                                fcl_adapter::typeName<S>(o2) + "; make the Convex a bocst::Model");
   }
-  if (remedy == nullptr) return;
-  throw std::invalid_argument("bocst::collide: FCL knows no collision of " + fcl_adapter::typeName<S>(o1) + " and " +
-                              fcl_adapter::typeName<S>(o2) + "; " + remedy);
 }
 
 }  // namespace
@@ -170,7 +164,7 @@ std::size_t collide(const fcl::CollisionGeometry<S>* o1, const fcl::Transform3<S
                     const fcl::CollisionGeometry<S>* o2, const fcl::Transform3<S>& X_W2,
                     const fcl::CollisionRequest<S>& request, fcl::CollisionResult<S>& result) {
   const auto by_fcl = [&] {
-    refuseWithoutCollision<S>(o1, o2);
+    refusePlaneAndConvex<S>(o1, o2);
     return fcl::collide<S>(o1, X_W1, o2, X_W2, request, result);
   };
   return fcl_adapter::collideOr<S>(by_fcl, o1, X_W1, o2, X_W2, {}, request, result);
@@ -181,7 +175,7 @@ std::size_t collide(const fcl::CollisionGeometry<S>* o1, const fcl::Transform3<S
                     const fcl::CollisionGeometry<S>* o2, const fcl::Transform3<S>& X_W2, const Solver* solver,
                     const fcl::CollisionRequest<S>& request, fcl::CollisionResult<S>& result) {
   const auto by_fcl = [&] {
-    refuseWithoutCollision<S>(o1, o2);
+    refusePlaneAndConvex<S>(o1, o2);
     return fcl::collide<S, Solver>(o1, X_W1, o2, X_W2, solver, request, result);
   };
   return fcl_adapter::collideOr<S>(by_fcl, o1, X_W1, o2, X_W2, solver, request, result);
