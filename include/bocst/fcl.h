@@ -84,8 +84,8 @@ namespace bocst {
 /// The verdict does not depend on the argument order, on the resident nodes, or on the GJK solver, except for a
 /// triangle and a shape or cell whose distance is below the solver's tolerance.
 /// @throws std::invalid_argument for a geometry that is null or not supported (FCL would return 0, "free"), a pose that
-/// is not rigid, an invalid tolerance or an unknown solver type. The message names the argument and its value. If neither
-/// is a Model, the answer is FCL's own (which is 0 for a TriangleP); a Plane and a Convex are refused. See
+/// is not rigid, an invalid tolerance or an unknown solver type. The message names the argument and its value. If
+/// neither is a Model, the answer is FCL's own (which is 0 for a TriangleP); a Plane and a Convex are refused. See
 /// share/doc/guarantees.md.
 /// Thread rule: any number of threads may query the same models, each with its own request and result.
 template <typename S>
