@@ -30,8 +30,8 @@ class ThreadPool {
   /// work() throws nothing.
   void run(const std::function<void()>& work);
 
-  /// Shares rows out: work(row) is called for each, in this order, by any thread, until it throws; a
-  /// thread whose work says false takes no more rows. Of several exceptions the one of the least row is thrown.
+  /// Shares rows out: work(row) is called for each, in this order, by any thread, until it throws; a thread
+  /// whose work says false takes no more rows. Of several exceptions the one of the least row is thrown.
   template <typename Work>
   void share(std::size_t rows, const Work& work) {
     std::atomic<std::size_t> next{0};

@@ -40,6 +40,21 @@ Eigen::Vector3d onTriangle(const Raw& raw, std::intptr_t t, const fcl::Transform
 }
 
 template <typename S>
+double bruteForce(const Raw& a, const fcl::Transform3<S>& X, const Raw& b, const fcl::Transform3<S>& Y) {
+  const fcl::Transform3<double> Xd = X.template cast<double>(), Yd = Y.template cast<double>();
+  double least = std::numeric_limits<double>::infinity();
+  for (const auto& s : a.triangles) {
+    const query::Corners p = {Xd * a.vertices[s[0]], Xd * a.vertices[s[1]], Xd * a.vertices[s[2]]};
+    for (const auto& t : b.triangles) {
+      const query::Corners q = {Yd * b.vertices[t[0]], Yd * b.vertices[t[1]], Yd * b.vertices[t[2]]};
+      Eigen::Vector3d on_p, on_q;
+      least = std::min(least, query::nearestPoints(p, q, on_p, on_q));
+    }
+  }
+  return least;
+}
+
+template <typename S>
 void checkAgainstFcl(int poses, double scale) {
   Raw ra = test::torus(40), rb = test::torus(23, 0.3);
   ra.scale(scale);
@@ -141,19 +156,7 @@ TYPED_TEST(Distance, BesideMuchLargerTriangles) {
   for (int i = 0; i < 12; ++i) {
     const auto X = test::pose<S>(test::randomRotation(g), test::randomDirection(g) * 50);
     const auto Y = test::pose<S>(test::randomRotation(g), test::randomDirection(g) * (10 + 200 * u(g)));
-    double expected = std::numeric_limits<double>::infinity();
-    const auto corners = [](const Raw& raw, std::size_t t, const fcl::Transform3<S>& to, query::Corners& out) {
-      for (std::size_t k = 0; k < 3; ++k) out[k] = to.template cast<double>() * raw.vertices[raw.triangles[t][k]];
-    };
-    for (std::size_t t = 0; t < large.triangles.size(); ++t) {
-      query::Corners of_large, of_small;
-      corners(large, t, X, of_large);
-      for (std::size_t v = 0; v < small.triangles.size(); ++v) {
-        corners(small, v, Y, of_small);
-        Eigen::Vector3d p, q;
-        expected = std::min(expected, query::nearestPoints(of_large, of_small, p, q));
-      }
-    }
+    const double expected = bruteForce<S>(large, X, small, Y);
     if (expected < 1) continue;
     ++apart;
     EXPECT_NEAR(ask<S>(a, X, b, Y).min_distance, expected, rounding) << i;
@@ -210,15 +213,7 @@ TEST(DistanceDouble, DegenerateMeshesAgainstBruteForce) {
       const Modeld a(ra.mesh()), b(rb.mesh());
       for (int i = 0; i < 6; ++i) {
         const auto Y = test::pose<double>(test::randomRotation(g), test::randomDirection(g) * i * 0.8);
-        double expected = std::numeric_limits<double>::infinity();
-        for (const auto& s : ra.triangles) {
-          const query::Corners p = {ra.vertices[s[0]], ra.vertices[s[1]], ra.vertices[s[2]]};
-          for (const auto& t : rb.triangles) {
-            const query::Corners q = {Y * rb.vertices[t[0]], Y * rb.vertices[t[1]], Y * rb.vertices[t[2]]};
-            Eigen::Vector3d on_p, on_q;
-            expected = std::min(expected, query::nearestPoints(p, q, on_p, on_q));
-          }
-        }
+        const double expected = bruteForce<double>(ra, I, rb, Y);
         ASSERT_NEAR(ask<double>(a, I, b, Y).min_distance, expected, 1e-12);
         ASSERT_NEAR(ask<double>(b, Y, a, I).min_distance, expected, 1e-12);
       }

@@ -69,16 +69,19 @@ bool isNeedle(const tree::Tree& tree) {
   });
 }
 
+/// Not with float: FCL may see contacts of slivers that oriented boxes separate.
+template <typename S>
+constexpr bool kUsesBoxes = std::is_same<S, double>::value;
+
 /// A yes-or-no walk of a query with a margin. Beside a margin that is much larger than nodes and triangles, these
 /// separate nothing: so if the walks over blocks and oriented boxes get as long as a search for the distance usually
-/// takes, that is asked whether anything is near enough to be tested. `boxes`: oriented boxes may be used if they are
-/// known. walk_blocks(most_steps) returns a query::WalkEnd.
+/// takes, that is asked whether anything is near enough to be tested. walk_blocks(most_steps) returns a query::WalkEnd.
 template <typename S, typename WalkBlocks>
 void walkWithinMargin(const TreeSide& a, const TreeSide& b, const SimilarityTransform& near,
-                      MeshCollector<S>& collector, bool boxes, WalkBlocks&& walk_blocks) {
+                      MeshCollector<S>& collector, WalkBlocks&& walk_blocks) {
   constexpr std::size_t kFewSteps = 64, kMostSteps = 4096;
   constexpr double kAnyWillDo = 1e300;
-  boxes = boxes && a.tree().knownBoxes() != nullptr && b.tree().knownBoxes() != nullptr;
+  const bool boxes = kUsesBoxes<S> && a.tree().knownBoxes() != nullptr && b.tree().knownBoxes() != nullptr;
   if (!walk_blocks(boxes ? kFewSteps : kMostSteps).gave_up) return;
   if (boxes) {
     const query::BoxSide boxes_a(a), boxes_b(b);
@@ -121,28 +124,26 @@ bool collideTrees(const CollideQuery<S>& q, const TreeSide& a, const TreeSide& b
   };
   // TreeWalk widens slabs by itself; oriented boxes and spheres need no more than the margin.
   const SimilarityTransform near = withMargin(b_in_a, a, q, q.margin);
-  // Not with float: FCL may see contacts of slivers that oriented boxes separate.
-  constexpr bool kUsesBoxes = std::is_same<S, double>::value;
   const auto walkBoxes = [&](MeshCollector<S>& collector) {
     const query::BoxSide boxes_a(a), boxes_b(b);
     query::PairWalk<query::BoxSide, query::BoxSide>(boxes_a, boxes_b, near, collector).run();
   };
   if (query::TreeWalk::fits(a, b, near) && !isNeedle(tree_a) && !isNeedle(tree_b)) {
     query::TreeWalk trees(a, b, near);
-    if (!trees.isNeedless() && !(kUsesBoxes && query::knownBoxesApart(a, b, near))) {
+    if (!trees.isNeedless() && !(kUsesBoxes<S> && query::knownBoxesApart(a, b, near))) {
       if (isProved()) return true;
       walk([&](auto& collector) {
         if (near.margin > 0 && collector.endsAtFirst()) {
-          walkWithinMargin(a, b, near, collector, kUsesBoxes,
-                           [&](std::size_t most) { return trees.run(collector, most); });
-        } else if (kUsesBoxes && collector.endsAtFirst()) {
+          walkWithinMargin(a, b, near, collector, [&](std::size_t most) { return trees.run(collector, most); });
+        } else if (kUsesBoxes<S> && collector.endsAtFirst()) {
           trees.runByTurns(collector);
         } else {
           trees.run(collector);
         }
       });
     }
-  } else if (kUsesBoxes && isNeedle(tree_a) && isNeedle(tree_b) && query::BoxSide::fits(a) && query::BoxSide::fits(b)) {
+  } else if (kUsesBoxes<S> && isNeedle(tree_a) && isNeedle(tree_b) && query::BoxSide::fits(a) &&
+             query::BoxSide::fits(b)) {
     walk(walkBoxes);
   } else if (query::SphereWalk::fits(a, b)) {
     query::SphereWalk spheres(a, b, near);
@@ -162,8 +163,8 @@ bool collideTrees(const CollideQuery<S>& q, const TreeSide& a, const TreeSide& b
       // Of a mesh that is much larger than its details, these share a unit of the lattice, and blocks part nothing.
       constexpr query::Turns::Limits kLimits = {64, 1024, 1024, 1};
       if (!spheres && near.margin > 0 && collector.endsAtFirst()) {
-        walkWithinMargin(a, b, near, collector, kUsesBoxes, walk_blocks);
-      } else if (spheres || !kUsesBoxes || !query::BoxSide::fits(a) || !query::BoxSide::fits(b)) {
+        walkWithinMargin(a, b, near, collector, walk_blocks);
+      } else if (spheres || !kUsesBoxes<S> || !query::BoxSide::fits(a) || !query::BoxSide::fits(b)) {
         walk_blocks(~std::size_t{0});
       } else if (collector.endsAtFirst()) {
         query::walkByTurns(a, b, near, collector, kLimits, walk_blocks);

@@ -381,8 +381,8 @@ class DistanceWalk : private BestFirst<DistanceWalk<A, B>, A, B> {
   static constexpr double kSphereRounding = 1e-14;  // of the distance of two spheres
   static constexpr double kTieShare = 1e-3;     // of a distance: what is next to nothing is found as exactly as before
   static constexpr double kMuchLarger = 4 * 4;  // of two sizes squared: there the better bound of a leaf pays
-  static constexpr double kManyTies = 1e4 * 1e4;
-  static constexpr std::size_t kExactTest = 2;  // steps in the time that the distance of two triangles takes
+  static constexpr double kManyTies = 1e4 * 1e4;  // of a size squared over a tie squared
+  static constexpr std::size_t kExactTest = 2;    // steps in the time that the distance of two triangles takes
 
   const SimilarityTransform& b_in_a_;
   const SimilarityTransform a_in_b_;

@@ -168,6 +168,11 @@ void addJson(CLI::App& command, Output& output) {
       ->check(outputFile(".json", true));
 }
 
+void checkStdout(const std::string& csv_file, const Output& output) {
+  if (csv_file != "-" || output.json_file != "-") return;
+  throw CLI::ValidationError("--csv", "--json already writes to stdout; give a file");
+}
+
 void addHtml(CLI::App& command, std::string& file) {
   command
       .add_option("--html", file,

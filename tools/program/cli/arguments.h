@@ -89,7 +89,9 @@ CLI::Validator wholeNumber(std::uint64_t least = 1);
 /// A file that is written and has this ending (".png"), or none. "-", which is stdout, only where `stdout_too`.
 CLI::Validator outputFile(const std::string& ending, bool stdout_too = false);
 
-void addJson(CLI::App& command, Output& output);     ///< --json
+void addJson(CLI::App& command, Output& output);  ///< --json
+/// @throws CLI::ValidationError if CSV and JSON both go to stdout.
+void checkStdout(const std::string& csv_file, const Output& output);
 void addHtml(CLI::App& command, std::string& file);  ///< --html
 
 }  // namespace bocst::program

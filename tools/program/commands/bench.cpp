@@ -201,9 +201,7 @@ void addBench(CLI::App& program, Job& job) {
   addJson(*command, bench->output);
   command->add_option("--csv", bench->csv_file, "write the rows as CSV to this file; - is stdout")->type_name("FILE|-");
   command->callback([bench, &job] {
-    if (bench->csv_file == "-" && bench->output.json_file == "-") {
-      throw CLI::ValidationError("--csv", "--json already writes to stdout; give a file");
-    }
+    checkStdout(bench->csv_file, bench->output);
     if (bench->of_oracles && !bench->csv_file.empty()) {
       throw CLI::ValidationError("--csv", "not available with --oracles; use --json");
     }

@@ -443,9 +443,9 @@ void addCollide(CLI::App& program, Job& job) {
   CLI::Option* pose = command->add_option("--pose", collide->pose_text, "pose of B in A's frame; default: identity")
                           ->type_name("x,y,z,qw,qx,qy,qz");
   command
-      ->add_option("--poses", collide->poses_file,
-                   "check each pose of a file, one per line (CSV, or separated by blanks; the first line may name "
-                   "the columns)")
+      ->add_option(
+          "--poses", collide->poses_file,
+          "check each pose of a file, one per line (CSV, or separated by blanks; the first line may name the columns)")
       ->type_name("FILE")
       ->excludes(pose);
   CLI::Option* rpy = command->add_flag(
@@ -476,9 +476,7 @@ void addCollide(CLI::App& program, Job& job) {
     if (!collide->poses_file.empty() && shown) {
       throw CLI::ValidationError("--poses", "cannot be combined with --html, --image or --max-contacts; use --pose");
     }
-    if (collide->csv_file == "-" && collide->output.json_file == "-") {
-      throw CLI::ValidationError("--csv", "--json already writes to stdout; give a file");
-    }
+    checkStdout(collide->csv_file, collide->output);
     if (collide->poses_file.empty() && collide->distances) {
       throw CLI::ValidationError("--distance", "needs --poses; for a single pose the distance is always reported");
     }

@@ -405,9 +405,7 @@ void addScene(CLI::App& program, Job& job) {
     } catch (const std::invalid_argument& e) {
       throw CLI::ValidationError("--package", e.what());
     }
-    if (scene->csv_file == "-" && scene->output.json_file == "-") {
-      throw CLI::ValidationError("--csv", "--json already writes to stdout; give a file");
-    }
+    checkStdout(scene->csv_file, scene->output);
     using Adjacent = SceneArguments::Adjacent;
     scene->scene.adjacent = scene->adjacent == "ignore"  ? Adjacent::kIgnore
                             : scene->adjacent == "check" ? Adjacent::kCheck
