@@ -76,6 +76,7 @@ constexpr bool kUsesBoxes = std::is_same<S, double>::value;
 /// A yes-or-no walk of a query with a margin. Beside a margin that is much larger than nodes and triangles, these
 /// separate nothing: so if the walks over blocks and oriented boxes get as long as a search for the distance usually
 /// takes, that is asked whether anything is near enough to be tested. walk_blocks(most_steps) returns a query::WalkEnd.
+/// near.margin > 0: the margin exceeds rounding, so the distance of two triangles alone decides whether they touch.
 template <typename S, typename WalkBlocks>
 void walkWithinMargin(const TreeSide& a, const TreeSide& b, const SimilarityTransform& near,
                       MeshCollector<S>& collector, WalkBlocks&& walk_blocks) {
