@@ -408,6 +408,37 @@ TEST(DistanceConservative, IsNeverMoreAndNearerWithDepth) {
   }
 }
 
+TEST(DistanceConservative, IsThatOfTheNearestSpheres) {
+  std::mt19937_64 g(21);
+  const auto I = fcl::Transform3d(fcl::Transform3d::Identity());
+  for (const int depth : {4, 6}) {
+    Options options;
+    options.answer = Answer::kConservative;
+    options.depth = depth;
+    const Modeld a(test::torus(20).mesh(), options), b(test::torus(17, 0.2).mesh(), options);
+    const auto leavesOf = [depth](const Modeld& model) {
+      Modeld whole(model.mesh(), model.options());
+      whole.expandAll(depth);
+      std::vector<NodeView> leaves;
+      whole.visit([&](const NodeView& node) {
+        if (node.level == depth) leaves.push_back(node);
+      });
+      return leaves;
+    };
+    const auto of_a = leavesOf(a), of_b = leavesOf(b);
+    for (int i = 0; i < 6; ++i) {
+      const auto Y = test::pose<double>(test::randomRotation(g), test::randomDirection(g) * (2.6 + i));
+      double expected = std::numeric_limits<double>::infinity();
+      for (const NodeView& v : of_b) {
+        const Eigen::Vector3d center = Y * v.center;
+        for (const NodeView& u : of_a) expected = std::min(expected, (center - u.center).norm() - u.radius - v.radius);
+      }
+      EXPECT_NEAR(ask<double>(a, I, b, Y).min_distance, std::max(expected, 0.0), 1e-11) << depth << ", " << i;
+      EXPECT_NEAR(ask<double>(b, Y, a, I).min_distance, std::max(expected, 0.0), 1e-11) << depth << ", " << i;
+    }
+  }
+}
+
 TEST(DistanceGrowth, OnlyWhatTheBoundNeedsAndNothingTwice) {
   const Raw raw = test::torus(100);
   Modeld a(raw.mesh()), b(raw.mesh());

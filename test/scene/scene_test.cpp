@@ -1324,10 +1324,40 @@ TYPED_TEST(SceneTest, EdgesOfShapesThatMoveTogether) {
     EXPECT_EQ(scene.edgeIsFree(begin.data(), end.data()), closer < gap) << closer;
     EXPECT_EQ(scene.edgeIsFree(end.data(), begin.data()), closer < gap) << closer;
   }
-  // One that turns about its own middle reaches the other with a corner.
-  end[1].translation() = begin[1].translation() + end[0].translation();
-  end[0].linear() = Eigen::AngleAxis<S>(S(0.5), fcl::Vector3<S>::UnitZ()).toRotationMatrix();
-  EXPECT_FALSE(scene.edgeIsFree(begin.data(), end.data()));
+}
+
+// The two touch for a hundredth of the way, between the states that halving it looks at.
+TYPED_TEST(SceneTest, EdgesOfShapesThatPassOneAnother) {
+  using S = TypeParam;
+  using V = fcl::Vector3<S>;
+  const auto small = std::make_shared<fcl::Box<S>>(S(0.01), S(0.01), S(0.01));
+  const auto rod = std::make_shared<fcl::Box<S>>(S(1), S(0.01), S(0.01));
+  const S time = S(11.5 / 32), angle = S(2.8);
+  for (const bool meet : {false, true}) {
+    const S aside = meet ? S(0) : S(0.02);
+    for (const bool turned : {false, true}) {
+      SCOPED_TRACE(testing::Message() << meet << turned);
+      const std::size_t i = turned, j = 1 - i;
+      States<S> begin(2, fcl::Transform3<S>::Identity()), end = begin;
+      Scene<S> boxes;
+      boxes.addMoving(small);
+      boxes.addMoving(small);
+      begin[j].translation() = V(-2 * time, aside, 0);
+      end[i].translation() = V(0, 0, 3);
+      end[j].translation() = V(2 - 2 * time, aside, 3);
+      EXPECT_EQ(boxes.edgeIsFree(begin.data(), end.data()), !meet);
+
+      // A rod that turns about its middle, and what it sweeps: carried along.
+      Scene<S> sweep;
+      sweep.addMoving(turned ? small : rod);
+      sweep.addMoving(turned ? rod : small);
+      const V along = Eigen::AngleAxis<S>(time * angle, V::UnitZ()) * V::UnitX();
+      begin[j].translation() = along * S(0.4) + V(0, 0, aside);
+      end[j].translation() = begin[j].translation() + V(0, 0, 3);
+      end[i].linear() = Eigen::AngleAxis<S>(angle, V::UnitZ()).toRotationMatrix();
+      EXPECT_EQ(sweep.edgeIsFree(begin.data(), end.data()), !meet);
+    }
+  }
 }
 
 /// Runs f in a child, which has a minute.
