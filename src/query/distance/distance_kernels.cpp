@@ -20,6 +20,61 @@ void FillRootFrame(const PairFrames& geometry, int own, const bounds::NodeBounds
   decodeRoot(geometry, own, root, frame);
 }
 
+// Of octants of sides `length`, the first with its corner at `corner`: lattice units, from the corner of the root.
+HWY_INLINE void decodeCenters(const PairFrames::Side& g, const bounds::OctantBounds& octants,
+                              const std::int32_t (&corner)[3], std::int32_t length, const LeafCells& leaves, Frame& f) {
+  const D d;
+  // What bytes and the oracle round is a small part of a cell.
+  constexpr float kPartOfCell = 1.0f / 16;
+  const float cells = static_cast<float>(length / leaves.side);
+  const V cells_per_step = hn::Set(d, cells * (1.0f / bounds::kBoxSteps)), part = hn::Set(d, kPartOfCell),
+          last = hn::Set(d, cells - 1), side = hn::Set(d, static_cast<float>(leaves.side)),
+          half_unit = hn::Set(d, 0.5f * g.unit), half_cell = hn::Mul(side, half_unit);
+  for (std::size_t i = 0; i < 8; i += hn::Lanes(d)) {
+    V c[3], h[3], n[3], offset, slab_half;
+    const auto octant_side = static_cast<float>(length);
+    codec::decodeSlab(octants, i, codec::cellSlabUnit(octant_side * g.unit), offset, slab_half);
+    BOCST_UNROLL
+    for (int k = 0; k < 3; ++k) {
+      const V end = hn::Set(d, static_cast<float>(leaves.extent[static_cast<std::size_t>(k)] - lattice::kMiddle));
+      const V from = hn::MulAdd(hn::Load(d, kOctantCorner[k] + i), hn::Set(d, octant_side),
+                                hn::Set(d, static_cast<float>(corner[k] - lattice::kMiddle)));
+      const V lo = hn::Mul(fromBytes(d, octants.lo[k] + i), cells_per_step),
+              hi = hn::Mul(fromBytes(d, octants.hi[k] + i), cells_per_step);
+      const V first_cell = hn::Min(hn::Max(hn::Floor(hn::Sub(lo, part)), hn::Zero(d)), last);
+      const V last_cell = hn::Max(hn::Min(hn::Sub(hn::Ceil(hn::Add(hi, part)), hn::Set(d, 1.0f)), last), first_cell);
+      // Whole numbers: twice the middle of a cell's part inside the regions.
+      const auto twiceMiddle = [&](V cell) HWY_ATTR {
+        const V low = hn::MulAdd(cell, side, from);
+        return hn::Add(low, hn::Min(hn::Add(low, side), end));
+      };
+      const V least = twiceMiddle(first_cell), most = twiceMiddle(last_cell);
+      c[k] = hn::Mul(hn::Mul(hn::Add(least, most), hn::Set(d, 0.5f)), half_unit);
+      h[k] = hn::Mul(hn::Mul(hn::Sub(most, least), hn::Set(d, 0.5f)), half_unit);
+      n[k] = codec::decodeNormal(octants, k, i);
+      // The slab is given from the octant's middle and wanted from its box's.
+      const V middle = hn::Mul(hn::MulAdd(from, hn::Set(d, 2.0f), hn::Set(d, octant_side)), half_unit);
+      offset = hn::NegMulAdd(n[k], hn::Sub(c[k], middle), offset);
+      slab_half = hn::MulAdd(hn::Abs(n[k]), half_cell, slab_half);
+    }
+    storeLanes(g, c, h, n, offset, slab_half, i, f);
+  }
+}
+
+void FillCenters(const PairFrames& geometry, int own, const tree::Block& block, const LeafCells& leaves, Frame& frame) {
+  const std::int32_t length = 1 << (lattice::kMaxLevel - 1 - block.shape);
+  const std::int32_t corner[3] = {2 * block.at[0] * length, 2 * block.at[1] * length, 2 * block.at[2] * length};
+  decodeCenters(geometry.side[own], block.octants, corner, length, leaves, frame);
+}
+
+void FillRootCenters(const PairFrames& geometry, int own, const bounds::NodeBounds& bounds, const LeafCells& leaves,
+                     Frame& frame) {
+  bounds::OctantBounds root;
+  root.fill(bounds);
+  const std::int32_t corner[3] = {0, 0, 0};
+  decodeCenters(geometry.side[own], root, corner, 2 * lattice::kMiddle, leaves, frame);
+}
+
 struct Interval {
   V lo, hi;
 };
@@ -301,6 +356,8 @@ namespace bocst::query {
 
 HWY_EXPORT(FillFrame);
 HWY_EXPORT(FillRootFrame);
+HWY_EXPORT(FillCenters);
+HWY_EXPORT(FillRootCenters);
 HWY_EXPORT(OctantGapsOf);
 HWY_EXPORT(NearPairs);
 
@@ -310,6 +367,15 @@ void fillFrame(const PairFrames& geometry, int own, const tree::Block& block, Fr
 
 void fillFrame(const PairFrames& geometry, int own, const bounds::NodeBounds& root, Frame& frame) {
   HWY_DYNAMIC_DISPATCH(FillRootFrame)(geometry, own, root, frame);
+}
+
+void fillCenters(const PairFrames& geometry, int own, const tree::Block& block, const LeafCells& leaves, Frame& frame) {
+  HWY_DYNAMIC_DISPATCH(FillCenters)(geometry, own, block, leaves, frame);
+}
+
+void fillCenters(const PairFrames& geometry, int own, const bounds::NodeBounds& root, const LeafCells& leaves,
+                 Frame& frame) {
+  HWY_DYNAMIC_DISPATCH(FillRootCenters)(geometry, own, root, leaves, frame);
 }
 
 void octantGaps(const PairFrames& geometry, int own, const Frame& f, const Frame& y, std::size_t lane,

@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #pragma once
 
+#include <array>
 #include <cstddef>
 #include <cstdint>
 
@@ -16,6 +17,19 @@ namespace bocst::query {
 void fillFrame(const PairFrames& geometry, int own, const tree::Block& block, Frame& frame);
 /// Fills lane 0 of the frame with the root of side `own`.
 void fillFrame(const PairFrames& geometry, int own, const bounds::NodeBounds& root, Frame& frame);
+
+/// The leaves of a side with conservative answers: where the spheres of nodes below which they are may have centres.
+struct LeafCells {
+  std::int32_t side;                   ///< Lattice units.
+  std::array<std::int32_t, 3> extent;  ///< Where the actual regions end, see Lattice.
+};
+
+/// The same frames of such a side, but the boxes and slabs bound the centres of the leaves' spheres instead of the
+/// surface. The cell of each leaf meets the surface in the node's box and slab, so these say which cells are leaves:
+/// boxes of whole cells, without rounding; and slabs that are thicker by half a cell on either side.
+void fillCenters(const PairFrames& geometry, int own, const tree::Block& block, const LeafCells& leaves, Frame& frame);
+void fillCenters(const PairFrames& geometry, int own, const bounds::NodeBounds& root, const LeafCells& leaves,
+                 Frame& frame);
 
 /// A direction in the frames of both sides, of unit length or zero.
 struct FrameDirection {

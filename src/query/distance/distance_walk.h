@@ -42,7 +42,7 @@ class DistanceWalk : private BestFirst<DistanceWalk<A, B>, A, B> {
   DistanceWalk(const A& a, const B& b, const SimilarityTransform& b_in_a)
       : Base(a, b, scratch()), b_in_a_(b_in_a), a_in_b_(b_in_a.inverse()) {
     if constexpr (kTrees) {
-      if (!spheres() && PairFrames::isFine(b_in_a)) gaps_.emplace(a, b, b_in_a);
+      if (PairFrames::isFine(b_in_a)) gaps_.emplace(a, b, b_in_a);
     }
   }
 
@@ -185,7 +185,13 @@ class DistanceWalk : private BestFirst<DistanceWalk<A, B>, A, B> {
         const OctantGaps gaps = gapsOf(pair, expands_a);
         children(pair, expands_a, [&](int o, tree::NodeRef a, tree::NodeRef b) {
           limit_ = std::min(limit_, double{gaps.at_most[o]});
-          this->push({gaps.at_least[o], a, b});
+          const Pair child{gaps.at_least[o], a, b};
+          // The distance of two spheres costs less than a place on the heap.
+          if (spheres() && a_.state(a) == State::kLeaf && b_.state(b) == State::kLeaf) {
+            if (worthIt(child.bound)) leaves(child);
+          } else {
+            this->push(child);
+          }
         });
         return;
       }
@@ -386,7 +392,7 @@ class DistanceWalk : private BestFirst<DistanceWalk<A, B>, A, B> {
 
   const SimilarityTransform& b_in_a_;
   const SimilarityTransform a_in_b_;
-  std::optional<TreeGaps> gaps_;  // of two trees with exact answers
+  std::optional<TreeGaps> gaps_;  // of two trees
   DistanceGoal goal_;
   Nearest best_;
   double limit_ = 0;  // something at least this near exists, or nobody asks for more

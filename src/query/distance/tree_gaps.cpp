@@ -2,6 +2,11 @@
 #include "query/distance/tree_gaps.h"
 
 namespace bocst::query {
+namespace {
+
+constexpr double kHalfDiagonal = 0.8660254037844387;  // of a cube of side 1
+
+}  // namespace
 
 /// Frames and corners of one thread. Pairs come best first, so what was used lately is often used again.
 struct TreeGaps::Scratch {
@@ -28,7 +33,15 @@ TreeGaps::TreeGaps(const TreeSide& a, const TreeSide& b, const SimilarityTransfo
   Scratch& s = scratch();
   for (int side = 0; side < 2; ++side) {
     std::fill(std::begin(s.blocks[side]), std::end(s.blocks[side]), Scratch::kNoBlock);
-    fillFrame(geometry_, side, side_[side]->tree().rootBounds(), s.roots[side]);
+    const bounds::NodeBounds& root = side_[side]->tree().rootBounds();
+    if (side_[side]->isConservative()) {
+      const LeafCells leaves = leavesOf(side);
+      const double radius = kHalfDiagonal * leaves.side * (side == 0 ? 1 : b_in_a.scale);
+      radii_ += static_cast<float>(radius * (1 + 0x1p-20));
+      fillCenters(geometry_, side, root, leaves, s.roots[side]);
+    } else {
+      fillFrame(geometry_, side, root, s.roots[side]);
+    }
     for (LeafCorners<TreeSide>& leaf : s.corners[side]) leaf.clear();
   }
 }
@@ -41,12 +54,24 @@ void TreeGaps::expect(const Eigen::Vector3d& direction) {
   }
 }
 
+LeafCells TreeGaps::leavesOf(int side) const {
+  const tree::Tree& tree = side_[side]->tree();
+  LeafCells leaves{1 << (lattice::kMaxLevel - tree.deepest()), {}};
+  std::copy_n(tree.surface().lattice.extent().data(), 3, leaves.extent.data());
+  return leaves;
+}
+
 const Frame& TreeGaps::frame(int side, std::uint32_t block) {
   Scratch& s = scratch();
   const std::size_t at = block % Scratch::kFrames;
   if (s.blocks[side][at] != block) {
     s.blocks[side][at] = block;
-    fillFrame(geometry_, side, side_[side]->tree().block(block), s.frames[side][at]);
+    const tree::Block& octants = side_[side]->tree().block(block);
+    if (side_[side]->isConservative()) {
+      fillCenters(geometry_, side, octants, leavesOf(side), s.frames[side][at]);
+    } else {
+      fillFrame(geometry_, side, octants, s.frames[side][at]);
+    }
   }
   return s.frames[side][at];
 }
@@ -66,6 +91,9 @@ OctantGaps TreeGaps::ofOctants(int own, tree::NodeRef x, tree::NodeRef y) {
   const Frame& other = frameOf(1 - own, y, lane);
   OctantGaps gaps;
   octantGaps(geometry_, own, f, other, lane, direction_, gaps);
+  if (radii_ > 0) {
+    for (float& gap : gaps.at_least) gap = std::max(gap * (1 - 0x1p-22f) - radii_, 0.0f);
+  }
   return gaps;
 }
 

@@ -13,7 +13,8 @@
 
 namespace bocst::query {
 
-/// Bounds for the distances of two trees' nodes and triangles, exact answers. Lengths are those of side A's lattice.
+/// Bounds for the distances of two trees' nodes: of the surfaces, or, where a side answers conservatively, of the
+/// spheres of its leaves. Lengths are those of side A's lattice.
 class TreeGaps {
  public:
   TreeGaps(const TreeSide& a, const TreeSide& b, const SimilarityTransform& b_in_a);
@@ -29,14 +30,15 @@ class TreeGaps {
     double at_least;
     std::uint32_t a, b;
   };
-  /// The pairs of triangles of two leaves that may be nearer than `cutoff`, the nearest bound first. Valid until the
-  /// next call.
+  /// Of exact answers, the pairs of triangles of two leaves that may be nearer than `cutoff`, the nearest bound first.
+  /// Valid until the next call.
   const std::vector<Candidate>& ofTriangles(tree::NodeRef leaf_a, tree::NodeRef leaf_b, double cutoff);
 
  private:
   struct Scratch;
   static Scratch& scratch();
 
+  LeafCells leavesOf(int side) const;
   const Frame& frame(int side, std::uint32_t block);
   const Frame& frameOf(int side, tree::NodeRef node, std::size_t& lane);
 
@@ -44,6 +46,7 @@ class TreeGaps {
   const SimilarityTransform& b_in_a_;
   const PairFrames geometry_;
   FrameDirection direction_;
+  float radii_ = 0;  // no spheres of leaves of both sides together have larger ones
 };
 
 }  // namespace bocst::query
