@@ -24,8 +24,6 @@ void FillRootFrame(const PairFrames& geometry, int own, const bounds::NodeBounds
 HWY_INLINE void decodeCenters(const PairFrames::Side& g, const bounds::OctantBounds& octants,
                               const std::int32_t (&corner)[3], std::int32_t length, const LeafCells& leaves, Frame& f) {
   const D d;
-  // What bytes and the oracle round is a small part of a cell.
-  constexpr float kPartOfCell = 1.0f / 16;
   const float cells = static_cast<float>(length / leaves.side);
   const V cells_per_step = hn::Set(d, cells * (1.0f / bounds::kBoxSteps)), part = hn::Set(d, kPartOfCell),
           last = hn::Set(d, cells - 1), side = hn::Set(d, static_cast<float>(leaves.side)),

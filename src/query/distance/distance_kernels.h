@@ -23,6 +23,8 @@ struct LeafCells {
   std::int32_t side;                   ///< Lattice units.
   std::array<std::int32_t, 3> extent;  ///< Where the actual regions end, see Lattice.
 };
+/// What bytes and an oracle round is a smaller part of a leaf's cell.
+constexpr float kPartOfCell = 1.0f / 16;
 
 /// The same frames of such a side, but the boxes and slabs bound the centres of the leaves' spheres instead of the
 /// surface. The cell of each leaf meets the surface in the node's box and slab, so these say which cells are leaves:

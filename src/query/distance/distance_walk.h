@@ -52,12 +52,9 @@ class DistanceWalk : private BestFirst<DistanceWalk<A, B>, A, B> {
     limit_ = goal.below;
     steps_ = 0;
     most_steps_ = most_steps;
-    if (!B::kBodies && !spheres()) {
+    if constexpr (!B::kBodies) {
       const NodeExtent root_a = extentOfA(a_.root()), root_b = extentOfB(b_.root());
       tie_ = 4 * kExtentRounding * ((root_b.center - root_a.center).norm() + root_a.half.sum() + root_b.half.sum());
-    } else if constexpr (!B::kBodies) {
-      const Sphere root_a = sphereOfA(a_.root()), root_b = sphereOfB(b_.root());
-      tie_ = 4 * kSphereRounding * ((root_b.center - root_a.center).norm() + root_a.radius + root_b.radius);
     }
     found(known);
     if (gaps_.has_value()) descendGreedily();
@@ -96,12 +93,14 @@ class DistanceWalk : private BestFirst<DistanceWalk<A, B>, A, B> {
   double tie() const { return tie_; }
   bool settled() const { return !(limit_ > 0) || gaveUp(); }
   // Pairs that pass the bound of their boxes are bounded once more where that bound is poor: of a body, which may be
-  // much smaller than its box, and of a leaf beside a much smaller node, which may be nearer to the leaf's box than to
-  // its triangles.
+  // much smaller than its box; of a leaf beside a much smaller node, which may be nearer to the leaf's box than to its
+  // triangles; and of spheres, where many pairs may be equally near, and float is too coarse to tell.
   bool again(const Pair& pair) {
-    if (spheres()) return false;
     double bound = 0;
-    if constexpr (B::kBodies) {
+    if (spheres()) {
+      if (!gaps_.has_value() || pair.bound + gaps_->doubt() < cutoff()) return false;
+      bound = boundOfSpheres(pair);
+    } else if constexpr (B::kBodies) {
       if (b_.hasExactBox(pair.b)) return false;
       Eigen::Vector3d corners[8];
       cornersOf(oriented(a_.volume(pair.a)), a_in_b_, corners);
@@ -120,6 +119,11 @@ class DistanceWalk : private BestFirst<DistanceWalk<A, B>, A, B> {
     if (!(bound > pair.bound + 1e-9 * std::abs(pair.bound))) return false;
     this->push({bound, pair.a, pair.b});
     return true;
+  }
+
+  double boundOfSpheres(const Pair& pair) const {
+    if constexpr (kTrees) return gaps_->ofSpheres(pair.a, pair.b, direction_, cutoff());
+    return 0;
   }
 
   // No triangle of a leaf, placed in the frame of A, is nearer to the other side's node than this.

@@ -1,6 +1,9 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #include "query/distance/tree_gaps.h"
 
+#include <algorithm>
+#include <cmath>
+
 namespace bocst::query {
 namespace {
 
@@ -38,12 +41,16 @@ TreeGaps::TreeGaps(const TreeSide& a, const TreeSide& b, const SimilarityTransfo
       const LeafCells leaves = leavesOf(side);
       const double radius = kHalfDiagonal * leaves.side * (side == 0 ? 1 : b_in_a.scale);
       radii_ += static_cast<float>(radius * (1 + 0x1p-20));
+      const bool is_clipped = std::any_of(leaves.extent.begin(), leaves.extent.end(),
+                                          [&](std::int32_t end) { return end % leaves.side != 0; });
+      if (is_clipped) doubt_ += radius;
       fillCenters(geometry_, side, root, leaves, s.roots[side]);
     } else {
       fillFrame(geometry_, side, root, s.roots[side]);
     }
     for (LeafCorners<TreeSide>& leaf : s.corners[side]) leaf.clear();
   }
+  doubt_ += 4 * static_cast<double>(geometry_.slab_rounding_margin);
 }
 
 void TreeGaps::expect(const Eigen::Vector3d& direction) {
@@ -95,6 +102,38 @@ OctantGaps TreeGaps::ofOctants(int own, tree::NodeRef x, tree::NodeRef y) {
     for (float& gap : gaps.at_least) gap = std::max(gap * (1 - 0x1p-22f) - radii_, 0.0f);
   }
   return gaps;
+}
+
+// As fillCenters() has it. Adds the radius that no leaf's sphere exceeds.
+NodeExtent TreeGaps::extentOf(int side, tree::NodeRef node, double& radii) const {
+  const SimilarityTransform here, &to = side == 0 ? here : b_in_a_;
+  const Volume v = side_[side]->volume(node);
+  if (!side_[side]->isConservative()) return {v, to};
+  const LeafCells leaves = leavesOf(side);
+  const lattice::Cell cell = side_[side]->tree().cell(node);
+  const double leaf = leaves.side, cells = cell.side() / leaf;
+  OrientedVolume centers;
+  Eigen::Vector3d largest;
+  for (int k = 0; k < 3; ++k) {
+    const auto i = static_cast<std::size_t>(k);
+    const double corner = cell.corner()[i], half = double(v.half[i]), end = leaves.extent[i];
+    const double lo = (v.center[i] - half - corner) / leaf, hi = (v.center[i] + half - corner) / leaf;
+    const double first = std::clamp(std::floor(lo - kPartOfCell), 0.0, cells - 1),
+                 last = std::clamp(std::ceil(hi + kPartOfCell) - 1, first, cells - 1);
+    const double low = corner + first * leaf, high = corner + last * leaf;
+    const double least = (low + std::min(low + leaf, end)) / 2, most = (high + std::min(high + leaf, end)) / 2;
+    centers.center[k] = (least + most) / 2;
+    centers.half[k] = (most - least) / 2;
+    largest[k] = least - low;
+  }
+  radii += largest.norm() * to.scale;
+  return {centers, to};
+}
+
+double TreeGaps::ofSpheres(tree::NodeRef a, tree::NodeRef b, const Eigen::Vector3d& direction, double cutoff) const {
+  double radii = 0;
+  const NodeExtent extent_a = extentOf(0, a, radii), extent_b = extentOf(1, b, radii);
+  return distanceBound(extent_a, extent_b, direction, cutoff + radii) - radii;
 }
 
 const std::vector<TreeGaps::Candidate>& TreeGaps::ofTriangles(tree::NodeRef leaf_a, tree::NodeRef leaf_b,

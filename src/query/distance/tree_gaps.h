@@ -6,6 +6,7 @@
 #include <cstdint>
 #include <vector>
 
+#include "geometry/extent.h"
 #include "geometry/triangle.h"
 #include "query/distance/distance_kernels.h"
 #include "query/leaf/leaf_pairs.h"
@@ -25,6 +26,12 @@ class TreeGaps {
   /// The gaps between the octants of an inner node x of side `own` and a node y of the other side.
   OctantGaps ofOctants(int own, tree::NodeRef x, tree::NodeRef y);
 
+  /// The same of two nodes in double, where a side answers conservatively: up to kExtentRounding of the sizes, which is
+  /// taken off. `direction` and `cutoff`: see distanceBound().
+  double ofSpheres(tree::NodeRef a, tree::NodeRef b, const Eigen::Vector3d& direction, double cutoff) const;
+  /// Then it may be larger than that of ofOctants() by this much because of rounding and of smaller spheres alone.
+  double doubt() const { return doubt_; }
+
   /// Triangles of two leaves, and no more than their distance.
   struct Candidate {
     double at_least;
@@ -39,6 +46,7 @@ class TreeGaps {
   static Scratch& scratch();
 
   LeafCells leavesOf(int side) const;
+  NodeExtent extentOf(int side, tree::NodeRef node, double& radii) const;
   const Frame& frame(int side, std::uint32_t block);
   const Frame& frameOf(int side, tree::NodeRef node, std::size_t& lane);
 
@@ -46,6 +54,7 @@ class TreeGaps {
   const SimilarityTransform& b_in_a_;
   const PairFrames geometry_;
   FrameDirection direction_;
+  double doubt_ = 0;
   float radii_ = 0;  // no spheres of leaves of both sides together have larger ones
 };
 
