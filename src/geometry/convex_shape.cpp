@@ -197,6 +197,14 @@ SupportShape::SupportShape(const Vector3d& center, const Vector3d& half_of_core,
   box_.half = half_of_core + Vector3d::Constant(radius);
 }
 
+DifferenceShape::DifferenceShape(const SupportShape& a, const SupportShape& b, const Eigen::Isometry3d& X_AB)
+    : SupportShape(a.box().center - X_AB * b.box().center,
+                   a.box().half + X_AB.linear().cwiseAbs() * b.box().half - Vector3d::Constant(a.radius()),
+                   a.radius() + b.radius()),
+      a_(a),
+      b_(b),
+      X_AB_(X_AB) {}
+
 SeparationResult SupportShape::coreGap(const PointSet& points, double cutoff) const {
   constexpr int kMostSteps = 200, kPatience = 12;
   SeparationResult gap;

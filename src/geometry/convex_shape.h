@@ -2,6 +2,7 @@
 #pragma once
 
 #include <Eigen/Core>
+#include <Eigen/Geometry>
 #include <cstddef>
 #include <limits>
 #include <optional>
@@ -105,11 +106,12 @@ class SupportShape : public ConvexShape {
   ContactPoint penetration(const PointSet& points, const SeparationResult& gap) const override;
   std::optional<Eigen::Vector3d> point() const override { return support(Eigen::Vector3d::UnitX()); }
 
- protected:
-  SupportShape(const Eigen::Vector3d& center, const Eigen::Vector3d& half_of_core, double radius);
-
   /// The point of the core that is farthest along d, which has any length but zero.
   virtual Eigen::Vector3d support(const Eigen::Vector3d& d) const = 0;
+  double radius() const { return radius_; }
+
+ protected:
+  SupportShape(const Eigen::Vector3d& center, const Eigen::Vector3d& half_of_core, double radius);
 
   /// Is the point surely in the core? False where that is not known at a glance.
   virtual bool contains(const Eigen::Vector3d&) const { return false; }
@@ -121,6 +123,21 @@ class SupportShape : public ConvexShape {
   SeparationResult coreGap(const PointSet& points, double cutoff) const;
   ContactPoint along(const Eigen::Vector3d& normal, const PointSet& points) const;
   ContactPoint shorten(ContactPoint contact, const PointSet& points) const;
+};
+
+/// All differences of a point of body a and one of body b, in the frame of a: the bodies are as far apart as it is from
+/// the origin. Both bodies must outlive it.
+class DifferenceShape final : public SupportShape {
+ public:
+  DifferenceShape(const SupportShape& a, const SupportShape& b, const Eigen::Isometry3d& X_AB);
+
+  Eigen::Vector3d support(const Eigen::Vector3d& d) const override {
+    return a_.support(d) - X_AB_ * b_.support(-(X_AB_.linear().transpose() * d));
+  }
+
+ private:
+  const SupportShape &a_, &b_;
+  const Eigen::Isometry3d X_AB_;
 };
 
 /// From half sizes, at the origin.

@@ -687,6 +687,12 @@ void refuseWhatFclLacks(const fcl::CollisionGeometryd& g1, const fcl::CollisionG
   const auto is_unbounded = [](const fcl::CollisionGeometryd& g) {
     return g.getNodeType() == fcl::GEOM_PLANE || g.getNodeType() == fcl::GEOM_HALFSPACE;
   };
+  const fcl::NODE_TYPE type1 = g1.getNodeType(), type2 = g2.getNodeType();
+  if ((type1 == fcl::GEOM_PLANE && type2 == fcl::GEOM_CONVEX) ||
+      (type1 == fcl::GEOM_CONVEX && type2 == fcl::GEOM_PLANE)) {
+    throw py::value_error(
+        "bocst: FCL has no continuous collision of a Plane and a Convex; make the Convex a bocst.Model");
+  }
   const bool advances = request.ccd_solver_type == fcl::CCDC_CONSERVATIVE_ADVANCEMENT;
   if (request.ccd_motion_type != fcl::CCDM_SPLINE &&
       !(advances && (is_unbounded(g1) || is_unbounded(g2) ||

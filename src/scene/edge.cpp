@@ -7,12 +7,14 @@
 #include <cmath>
 #include <cstdint>
 #include <limits>
+#include <optional>
 #include <stdexcept>
 #include <tuple>
 
 #include "fcl/adapters/models.h"
 #include "fcl/adapters/motion.h"
 #include "fcl/adapters/validate.h"
+#include "fcl/queries/scene_pair.h"
 #include "scene/reach.h"
 
 namespace bocst::scene {
@@ -30,8 +32,9 @@ constexpr double kTouch = 1e-5;
 /// fcl::distance of a pair, no less than 0; any larger value where it is not less than `below`.
 template <typename S>
 S distanceBelow(const Object<S>& a, const fcl::Transform3<S>& X_WA, const Object<S>& b, const fcl::Transform3<S>& X_WB,
-                S below) {
-  static const fcl::DistanceRequest<S> request;
+                S below, fcl::GJKSolverType solver = fcl::GST_LIBCCD) {
+  fcl::DistanceRequest<S> request;
+  request.gjk_solver_type = solver;
   fcl::DistanceResult<S> result;
   const bool has_model = a.model != nullptr || b.model != nullptr;
   if (has_model) result.min_distance = below;
@@ -42,6 +45,18 @@ S distanceBelow(const Object<S>& a, const fcl::Transform3<S>& X_WA, const Object
                                 fcl_adapter::typeName<S>(b.geometry.get()));
   }
   return std::max(d, S(0));
+}
+
+/// No more than the distance of two of FCL's geometries. Its solvers may say more, each for other poses; shapes are
+/// measured here, and of octrees the lesser of both solvers' answers is taken.
+template <typename S>
+double leastDistance(const Object<S>& a, const fcl::Transform3<S>& X_WA, const Object<S>& b,
+                     const fcl::Transform3<S>& X_WB) {
+  const std::optional<double> known = fcl_adapter::distanceOfShapes<S>(*a.geometry, X_WA, *b.geometry, X_WB);
+  if (known.has_value()) return *known;
+  constexpr S kAny = std::numeric_limits<S>::max();
+  return static_cast<double>(std::min(distanceBelow<S>(a, X_WA, b, X_WB, kAny, fcl::GST_LIBCCD),
+                                      distanceBelow<S>(a, X_WA, b, X_WB, kAny, fcl::GST_INDEP)));
 }
 
 /// One way of all moving objects.
@@ -162,7 +177,7 @@ class Edge {
       const fcl::Transform3<S> X_WB = fixed ? b.X_WG : poseAt<S>(*motions_[j], time);
       if (touch(a, X_WA, b, X_WB, result_)) return true;
       if (!a.geometry->isOccupied() || !b.geometry->isOccupied()) return false;
-      const double gap = static_cast<double>(distanceBelow<S>(a, X_WA, b, X_WB, std::numeric_limits<S>::max()));
+      const double gap = leastDistance<S>(a, X_WA, b, X_WB);
       if (gap <= near) return true;
       if (time >= 1 || gap >= speed * (1 - time) + near) return false;
       const double next = std::min(1.0, time + (gap - near / 2) / speed);

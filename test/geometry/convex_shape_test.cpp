@@ -163,6 +163,44 @@ TEST(ConvexShape, TrianglesAreNoNearerThanTheySay) {
   EXPECT_GT(apart, 2000);
 }
 
+// A plane between two bodies proves how far they are apart at least; a ball beside anything is as far as its centre is,
+// less its radius.
+TEST(ConvexShape, TwoBodiesAreNoNearerThanTheirDifferenceSays) {
+  std::mt19937_64 g(31);
+  std::uniform_real_distribution<double> u(-1, 1);
+  const Vector3d origin = Vector3d::Zero();
+  int pairs = 0, apart = 0;
+  for (const Known& k : bodies()) {
+    for (const Known& l : bodies()) {
+      const auto *a = dynamic_cast<const SupportShape*>(k.body.get()),
+                 *b = dynamic_cast<const SupportShape*>(l.body.get());
+      if (a == nullptr || b == nullptr) continue;
+      SCOPED_TRACE(std::string(k.name) + ", " + l.name);
+      ++pairs;
+      const bool is_ball = std::string(l.name) == "ball";
+      for (int i = 0; i < test::repetitions(60); ++i) {
+        Eigen::Isometry3d X_AB = Eigen::Isometry3d::Identity();
+        if (i % 4 != 0) X_AB.linear() = test::randomRotation(g);
+        X_AB.translation() = i % 4 == 1 ? Vector3d(0, 0, 6 * u(g)) : Vector3d(4 * u(g), 4 * u(g), 4 * u(g));
+        const SeparationResult gap = DifferenceShape(*a, *b, X_AB).gap({&origin, 1}, kFar);
+        if (is_ball) {
+          const Vector3d center = X_AB.translation();
+          const double expected = a->gap({&center, 1}, kFar).distance - 0.6;
+          ASSERT_NEAR(std::max(gap.at_least, 0.0), std::max(expected, 0.0), 1e-5);
+        }
+        if (gap.isTouching()) continue;
+        ++apart;
+        ASSERT_LE(gap.distance - gap.at_least, 1e-5 * (1 + gap.distance));
+        const Vector3d n = gap.normal;
+        const double between = n.dot(X_AB.translation()) - l.height(-(X_AB.linear().transpose() * n)) - k.height(n);
+        ASSERT_GE(between, gap.at_least - 1e-12);
+      }
+    }
+  }
+  EXPECT_GE(pairs, 25);
+  EXPECT_GT(apart, 10 * pairs);
+}
+
 TEST(ConvexShape, GapsOfTrianglesAreProvedBothWays) {
   const int count = test::repetitions(1500);
   std::mt19937_64 g(1);

@@ -718,6 +718,9 @@ def test_what_fcl_would_end_the_process_with():
     convex = fcl.Convex(v, len(f), np.concatenate([[3, *t] for t in f]))
     with pytest.raises(ValueError, match='Convex'):
         fcl.collide(at(convex), at(fcl.Plane(up, 0)))
+    with pytest.raises(ValueError, match='Convex'):
+        fcl.continuousCollide(at(fcl.Plane(up, 0)), fcl.Transform(), at(convex), fcl.Transform(),
+                              fcl.ContinuousCollisionRequest())
 
 
 def test_points_that_were_not_asked_for():

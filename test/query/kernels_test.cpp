@@ -883,6 +883,60 @@ TEST_P(EveryTarget, GapsOfOctantsHoldTheDistancesOfTheirPoints) {
   EXPECT_GT(close, compared / 10) << "bounds of nothing prove nothing";
 }
 
+// The centre of the sphere about each leaf that meets the surface, wherever the actual regions end.
+TEST_P(EveryTarget, FramesOfCentersHoldThoseOfAllLeaves) {
+  std::mt19937_64 g(23);
+  int compared = 0, tight = 0;
+  for (int round = 0; round < 20000; ++round) {
+    lattice::Cell cell;
+    cell.level = 1 + static_cast<int>(g() % 14);
+    for (auto& x : cell.at) x = static_cast<std::uint32_t>(g() % (1u << (cell.level - 1)));
+    tree::Block block;
+    block.setCell(cell);
+    for (int o = 0; o < 8; ++o) block.octants.set(o, randomBounds(g));
+    const int o = static_cast<int>(g() % 8);
+    const lattice::Cell octant = cell.octant(o);
+    const Eigen::Vector3d corner(octant.corner()[0], octant.corner()[1], octant.corner()[2]);
+    LeafCells leaves{};
+    leaves.side = static_cast<std::int32_t>(octant.side() >> g() % (lattice::kMaxLevel - octant.level + 1));
+    for (std::size_t k = 0; k < 3; ++k) {
+      leaves.extent[k] =
+          g() % 2 ? 1 << lattice::kBits : static_cast<std::int32_t>(octant.corner()[k] + 1 + g() % octant.side());
+    }
+    Eigen::Vector3d surface, center;
+    if (!randomPoint(g, block.octants.get(o), corner, octant.side(), surface)) continue;
+    bool exists = true;
+    for (int k = 0; k < 3; ++k) {
+      const double side = leaves.side, end = leaves.extent[static_cast<std::size_t>(k)];
+      // At the end of a cell, either may be the leaf.
+      double at = std::floor((surface[k] - corner[k]) / side);
+      if (at * side == surface[k] - corner[k] && at > 0 && g() % 2) --at;
+      const double low = corner[k] + side * std::min(at, octant.side() / side - 1);
+      exists = exists && low < end && surface[k] <= end;
+      center[k] = (low + std::min(low + side, end)) / 2 - lattice::kMiddle;
+    }
+    if (!exists) continue;
+    SimilarityTransform to;
+    to.ready();
+    Frame f;
+    fillCenters(PairFrames(to), 0, block, leaves, f);
+    double along = -static_cast<double>(f.slab_center[o]);
+    bool is_tight = true;
+    for (int k = 0; k < 3; ++k) {
+      const double displacement = center[k] - double{f.center[0][k][o]}, half = double{f.half[0][k][o]};
+      ASSERT_LE(std::abs(displacement), half) << round;
+      const double box = (block.octants.hi[k][o] - block.octants.lo[k][o]) / 255.0 * octant.side();
+      is_tight = is_tight && 2 * half <= box + 1.2 * leaves.side;
+      along += double{f.normal[0][k][o]} * displacement;
+    }
+    ASSERT_LE(std::abs(along), double{f.slab_half[o]} + 1e-2) << round;
+    ++compared;
+    tight += is_tight;
+  }
+  EXPECT_GT(compared, 4000);
+  EXPECT_EQ(tight, compared);
+}
+
 TEST_P(EveryTarget, NoPairIsLostThatIsNearest) {
   std::mt19937_64 g(22);
   std::uniform_real_distribution<double> u(-1, 1);

@@ -872,6 +872,40 @@ TYPED_TEST(SceneTest, EdgesAlongMeshesOfFcl) {
   }
 }
 
+// Where libccd says that two shapes are farther apart than they are: boxes with parallel faces (6.083 for 6), and a box
+// above a tetrahedron (1.9685 for 1.8200).
+TYPED_TEST(SceneTest, EdgesOfShapesThatFclMeasuresTooFarApart) {
+  using S = TypeParam;
+  const auto I = fcl::Transform3<S>(fcl::Transform3<S>::Identity());
+  const auto at = [](double z) { return test::pose<S>(Eigen::Matrix3d::Identity(), {0, 0, z}); };
+  Scene<S> boxes;
+  const auto cube = std::make_shared<fcl::Box<S>>(S(1), S(1), S(1));
+  boxes.addFixed(cube, I);
+  boxes.addMoving(cube);
+  const auto far = at(7), touching = at(0.95), near = at(1.05);
+  EXPECT_FALSE(boxes.edgeIsFree(&far, &touching));
+  EXPECT_FALSE(boxes.edgeIsFree(&far, &touching, fcl::CCDM_TRANS));
+  EXPECT_TRUE(boxes.edgeIsFree(&far, &near));
+
+  using V = fcl::Vector3<S>;
+  const auto corners =
+      std::make_shared<const std::vector<V>>(std::vector<V>{V::Zero(), V::UnitX(), V::UnitY(), V::UnitZ()});
+  const auto faces =
+      std::make_shared<const std::vector<int>>(std::vector<int>{3, 0, 2, 1, 3, 0, 1, 3, 3, 1, 2, 3, 3, 2, 0, 3});
+  Scene<S> scene;
+  scene.addFixed(std::make_shared<fcl::Box<S>>(S(0.5), S(0.5), S(2)),
+                 test::pose<S>(Eigen::Matrix3d::Identity(), {1, 1, 2}));
+  scene.addMoving(std::make_shared<fcl::Convex<S>>(corners, 4, faces));
+  Eigen::Matrix3d R;
+  R << 0, -1, 0, -1, 0, 0, 0, 0, -1;
+  const auto begin = test::pose<S>(R, {0.5, -1, 0.5}),
+             end = test::pose<S>(R, {1.1601118569381956, 0.7683657226852851, 1.0201701376286056});
+  EXPECT_TRUE(scene.collides(&end));
+  for (const auto motion : {fcl::CCDM_TRANS, fcl::CCDM_LINEAR, fcl::CCDM_SCREW}) {
+    EXPECT_FALSE(scene.edgeIsFree(&begin, &end, motion)) << motion;
+  }
+}
+
 // A thin wall that samples would step over.
 TYPED_TEST(SceneTest, EdgesThroughAThinWall) {
   using S = TypeParam;

@@ -1,6 +1,10 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #include "fcl/queries/scene_pair.h"
 
+#include <algorithm>
+#include <limits>
+
+#include "fcl/adapters/convex_shapes.h"
 #include "fcl/adapters/pair.h"
 #include "fcl/queries/query_scope.h"
 #include "query/collide/sphere_walk.h"
@@ -22,6 +26,31 @@ bool hullsApart(const Model<S>& a, const fcl::Transform3<S>& X_WA, const Model<S
 }
 
 template <typename S>
+std::optional<double> distanceOfShapes(const fcl::CollisionGeometry<S>& a, const fcl::Transform3<S>& X_WA,
+                                       const fcl::CollisionGeometry<S>& b, const fcl::Transform3<S>& X_WB) {
+  if (!isShape<S>(&a) || !isShape<S>(&b)) return std::nullopt;
+  const auto withCore = [](const fcl::CollisionGeometry<S>& g, auto&& f) {
+    withConvexShape(static_cast<const fcl::ShapeBase<S>&>(g), query::Sphere(), [&](const query::ConvexShape& shape) {
+      if (const auto* core = dynamic_cast<const query::SupportShape*>(&shape)) f(*core);
+    });
+  };
+  // Not inverse(): the difference first, as both may be far from the origin.
+  const Eigen::Isometry3d X = isometryOf<S>(X_WA), Y = isometryOf<S>(X_WB);
+  Eigen::Isometry3d X_AB = Eigen::Isometry3d::Identity();
+  X_AB.linear() = X.linear().transpose() * Y.linear();
+  X_AB.translation() = X.linear().transpose() * (Y.translation() - X.translation());
+  const Eigen::Vector3d origin = Eigen::Vector3d::Zero();
+  std::optional<double> distance;
+  withCore(a, [&](const query::SupportShape& core_a) {
+    withCore(b, [&](const query::SupportShape& core_b) {
+      const query::DifferenceShape difference(core_a, core_b, X_AB);
+      distance = std::max(difference.gap({&origin, 1}, std::numeric_limits<double>::infinity()).at_least, 0.0);
+    });
+  });
+  return distance;
+}
+
+template <typename S>
 std::unique_ptr<Model<S>> modelOfBvh(const fcl::CollisionGeometry<S>& geometry) {
   bvhSideOf<S>("Scene", &geometry);  // throws unless it is a finished mesh
   std::unique_ptr<Model<S>> model;
@@ -31,6 +60,14 @@ std::unique_ptr<Model<S>> modelOfBvh(const fcl::CollisionGeometry<S>& geometry) 
   return model;
 }
 
+template std::optional<double> distanceOfShapes<float>(const fcl::CollisionGeometry<float>&,
+                                                       const fcl::Transform3<float>&,
+                                                       const fcl::CollisionGeometry<float>&,
+                                                       const fcl::Transform3<float>&);
+template std::optional<double> distanceOfShapes<double>(const fcl::CollisionGeometry<double>&,
+                                                        const fcl::Transform3<double>&,
+                                                        const fcl::CollisionGeometry<double>&,
+                                                        const fcl::Transform3<double>&);
 template std::unique_ptr<Model<float>> modelOfBvh<float>(const fcl::CollisionGeometry<float>&);
 template std::unique_ptr<Model<double>> modelOfBvh<double>(const fcl::CollisionGeometry<double>&);
 template bool hullsApart<float>(const Model<float>&, const fcl::Transform3<float>&, const Model<float>&,

@@ -4,6 +4,7 @@
 #include <bocst/model.h>
 
 #include <memory>
+#include <optional>
 
 // What a Scene asks of one pair of models beside the queries of <bocst/fcl.h>.
 
@@ -14,6 +15,12 @@ namespace bocst::fcl_adapter {
 template <typename S>
 bool hullsApart(const Model<S>& a, const fcl::Transform3<S>& X_WA, const Model<S>& b, const fcl::Transform3<S>& X_WB,
                 double gap);
+
+/// No more than the distance of two of FCL's bounded shapes, and less than it by rounding alone; 0 where they may
+/// touch. Null for other geometries. fcl::distance may be too large: by a tenth for boxes whose faces are parallel.
+template <typename S>
+std::optional<double> distanceOfShapes(const fcl::CollisionGeometry<S>& a, const fcl::Transform3<S>& X_WA,
+                                       const fcl::CollisionGeometry<S>& b, const fcl::Transform3<S>& X_WB);
 
 /// A model of the triangles of an fcl::BVHModel. @throws std::invalid_argument for other geometries, and for a mesh
 /// that is not finished or that Mesh refuses.
