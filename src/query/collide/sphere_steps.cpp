@@ -258,7 +258,7 @@ SphereSteps::Event NextEvent(SphereSteps& s) {
     }
     own.level = top.own.level;
     own.ref = top.own.at != nullptr ? top.own.at->child[o].load(std::memory_order_acquire)
-                                    : s.side[side]->tree().childRef(own.node);
+                                    : s.side[side]->childRef(own.node);
     std::uint32_t frames = top.frames;
     if (frames == 0) {
       own.lane = lookUp(s, side, own.node, frames++);
@@ -344,7 +344,7 @@ void pushPair(SphereSteps& s, tree::NodeRef node_a, tree::NodeRef node_b) {
   const tree::Tree &a = s.side[0]->tree(), &b = s.side[1]->tree();
   SphereGroup& top = s.stack[s.depth++];
   top.other.node = node_b;
-  top.other.ref = b.childRef(node_b);
+  top.other.ref = s.side[1]->childRef(node_b);
   top.other.level = static_cast<std::uint32_t>(b.level(node_b));
   const tree::Block* const block = node_a.isRoot() ? nullptr : &a.block(node_a.block());
   top.own = {block, node_a.block(), static_cast<std::uint32_t>(a.level(node_a)), BlockView::kNoFrame, 0};

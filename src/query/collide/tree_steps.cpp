@@ -155,7 +155,7 @@ HWY_INLINE Popped pop(PairSteps& s) {
     p.side = static_cast<int>(top.own.side);
     p.own.node = tree::NodeRef::octant(top.own.index, static_cast<int>(o));
     p.own.ref = top.own.at != nullptr ? top.own.at->child[o].load(std::memory_order_acquire)
-                                      : s.tree[p.side]->childRef(p.own.node);
+                                      : s.side[p.side]->childRef(p.own.node);
     if (p.own.ref.tag() == tree::ChildRef::kImplicit && rest != 0 && soon != 0) {
       top.late |= 1u << o;
       continue;
@@ -465,7 +465,7 @@ void pushOctants(PairSteps& s, const StepEvent& event, unsigned mask) {
 void pushPair(PairSteps& s, tree::NodeRef node_a, tree::NodeRef node_b) {
   StepNode other;
   other.node = node_b;
-  other.ref = s.tree[1]->childRef(node_b);
+  other.ref = s.side[1]->childRef(node_b);
   other.level = static_cast<std::uint32_t>(s.tree[1]->level(node_b));
   const auto o = static_cast<std::uint32_t>(node_a.octant());
   std::fill_n(s.stack[s.depth].order, 8, o);

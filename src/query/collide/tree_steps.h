@@ -60,6 +60,7 @@ struct PairSteps {
   /// Groups that a walk below one pair can add: one for each block of either side, eight where two blocks go at once.
   static constexpr std::size_t kStackRoom = 8 * kMostDepth + 1;
 
+  const TreeSide* side[2];  ///< They see the same root all the time, while a helper thread may publish another.
   const tree::Tree* tree[2];
   std::int64_t now[2];  ///< By the clock of each side.
   PairFrames geometry;
@@ -91,10 +92,10 @@ struct PairSteps {
 
   std::uint64_t holds[kFrames];  ///< frameName() of what is in a frame.
 
-  PairSteps(const tree::Tree* a, std::int64_t now_a, const tree::Tree* b, std::int64_t now_b,
-            const PairFrames& geometry_, Frame* frames_)
-      : tree{a, b},
-        now{now_a, now_b},
+  PairSteps(const TreeSide& a, const TreeSide& b, const PairFrames& geometry_, Frame* frames_)
+      : side{&a, &b},
+        tree{&a.tree(), &b.tree()},
+        now{a.now(), b.now()},
         geometry(geometry_),
         frames(frames_),
         stack(nullptr),

@@ -53,7 +53,7 @@ bool TreeWalk::search(Scratch& s) {
   const bool new_root = a_.state(a_.root()) == State::kGrows || b_.state(b_.root()) == State::kGrows;
   if (new_root && facesApart(a_.volume(a_.root()), b_.volume(b_.root()), b_in_a_)) return false;
 
-  PairSteps steps(&a_.tree(), a_.now(), &b_.tree(), b_.now(), PairFrames(b_in_a_), s.frames);
+  PairSteps steps(a_, b_, PairFrames(b_in_a_), s.frames);
   for (int side = 0; side < 2; ++side) steps.leaf[side] = &s.large[side];
   const Cut* const cut = visitor_->cut();
   const bool may_end = visitor_->endsAtFirst() || cut != nullptr;

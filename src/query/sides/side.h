@@ -54,6 +54,16 @@ class TreeSide {
   /// Leaves are cells of the collision depth, not triangles.
   bool isConservative() const { return tree_.conservative(); }
 
+  /// Where the children or triangles of a node are. While a query runs, another thread may put a whole tree below the
+  /// root: all that this query reads of the root is of the block or leaf that it saw first.
+  tree::ChildRef childRef(Node node) const {
+    if (!node.isRoot()) return tree_.childRef(node);
+    if (root_ref_.tag() != tree::ChildRef::kBlock && root_ref_.tag() != tree::ChildRef::kShortList) {
+      root_ref_ = tree_.childRef(node);
+    }
+    return root_ref_;
+  }
+
   State state(Node node) const {
     const tree::ChildRef ref = childRef(node);
     if (ref.tag() == tree::ChildRef::kBlock && !(isConservative() && tree_.isDeepest(level(node))))
@@ -248,16 +258,6 @@ class TreeSide {
   }
 
   int level(Node node) const { return tree_.level(node); }
-
-  // While a query runs, another thread may put a whole tree below the root. All that this query reads of the root is of
-  // the block or leaf that it saw first.
-  tree::ChildRef childRef(Node node) const {
-    if (!node.isRoot()) return tree_.childRef(node);
-    if (root_ref_.tag() != tree::ChildRef::kBlock && root_ref_.tag() != tree::ChildRef::kShortList) {
-      root_ref_ = tree_.childRef(node);
-    }
-    return root_ref_;
-  }
 
   tree::Tree& tree_;
   const std::int64_t now_;

@@ -20,10 +20,12 @@ class Steps : public test::EveryTarget {};
 // A walk over two trees, without the tests at its bottom.
 class Walk {
  public:
-  Walk(const tree::Tree& a, const tree::Tree& b, const SimilarityTransform& b_in_a, bool all_at_once)
-      : frames_(PairSteps::kFrames),
+  Walk(tree::Tree& a, tree::Tree& b, const SimilarityTransform& b_in_a, bool all_at_once)
+      : side_a_(a),
+        side_b_(b),
+        frames_(PairSteps::kFrames),
         stack_(PairSteps::kStackRoom + 1),
-        steps_(&a, a.now(), &b, b.now(), PairFrames(b_in_a), frames_.data()) {
+        steps_(side_a_, side_b_, PairFrames(b_in_a), frames_.data()) {
     steps_.stack = stack_.data();
     steps_.stack_end = stack_.data() + stack_.size();
     steps_.all_at_once = all_at_once;
@@ -41,6 +43,7 @@ class Walk {
   tree::NodeRef node(int side) const { return event_.pair[side].node; }
 
  private:
+  const TreeSide side_a_, side_b_;
   std::vector<Frame> frames_;
   std::vector<StepGroup> stack_;
   PairSteps steps_;

@@ -188,7 +188,8 @@ TEST(PairWalk, ACutLeavesOutWhatLiesBeyondAndComesFromBelow) {
   }
 }
 
-// Two trees: their walk against brute force over the triangles, and against the walk of anything else.
+// Two trees: their walk against brute force over the triangles, and against the walk of anything else. Also while
+// another thread builds.
 TEST(TreeWalk, FindsAllThatTouches) {
   std::mt19937_64 g(2);
   std::size_t touching = 0, visited = 0, certain = 0;
@@ -205,6 +206,17 @@ TEST(TreeWalk, FindsAllThatTouches) {
     }
     tree::Tree a(mesh[0], Options()), b(mesh[1], Options());
     const TreeSide side_a(a), side_b(b);
+    if (i % 3 != 0) {
+      // A helper thread puts the whole tree, often a single leaf, in the place of blocks that the query has seen.
+      a.expandAll(3);
+      ASSERT_EQ(side_a.state(side_a.root()), State::kInner);
+      a.build();
+      if (i % 3 == 2) {
+        b.expandAll(2);
+        ASSERT_EQ(side_b.state(side_b.root()), State::kInner);
+        b.build();
+      }
+    }
     const double unit_a = a.surface().lattice.unit(), unit_b = b.surface().lattice.unit();
     SimilarityTransform b_in_a;
     b_in_a.rotation = test::randomRotation(g);
