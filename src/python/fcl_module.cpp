@@ -189,7 +189,10 @@ void bindHalf(py::module_& m, const char* name, const char* text) {
 /// FCL goes through the faces without looking where they end.
 std::shared_ptr<const std::vector<int>> facesOf(const py::object& faces, int count, std::size_t vertices) {
   std::vector<int> f;
-  for (const auto& face : arrayOfAny("faces", faces).attr("ravel")().attr("tolist")()) f.push_back(face.cast<int>());
+  for (const auto& face : arrayOfAny("faces", faces).attr("ravel")().attr("tolist")()) {
+    if (!py::isinstance<py::int_>(face)) throw py::type_error("bocst: faces: an array of whole numbers is expected");
+    f.push_back(face.cast<int>());
+  }
   std::size_t at = 0;
   for (int k = 0; k < count; ++k) {
     const int corners = at < f.size() ? f[at] : 0;
@@ -950,6 +953,7 @@ class Manager {
       if (!py::isinstance<Object>(o))
         throw py::type_error("bocst: " + py::repr(o).cast<std::string>() + " is not a CollisionObject");
       held.push_back(py::reinterpret_borrow<py::object>(o));
+      if (objects_.contains(held.back())) throw py::value_error("bocst: an object is registered already");
     }
     for (const py::object& o : held) add(o.cast<Object&>());
   }

@@ -131,7 +131,8 @@ build_ahead: a thread that all models share builds the tree while the first quer
            "dimension"_a = 0.0, "oracle"_a = "auto", "ttl"_a = 2.0, "memory_budget"_a = 0, "margin"_a = 0.0,
            "solid"_a = false, "build_ahead"_a = false)
       .def("__repr__", [](const Options& o) { return repr("Options", asDict(o)); })
-      .def("__eq__", [](const Options& a, const Options& b) { return asDict(a).equal(asDict(b)); });
+      .def(
+          "__eq__", [](const Options& a, const Options& b) { return asDict(a).equal(asDict(b)); }, py::is_operator());
   for (const auto item : asDict(Options())) {
     const std::string key = py::str(item.first);
     options.def_property_readonly(key.c_str(),

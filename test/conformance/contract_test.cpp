@@ -323,6 +323,32 @@ TYPED_TEST(Contacts, AreThoseOfVeryMany) {
   }
 }
 
+// With costs, exact or approximate, or for more than 1024: those of the least ids, whichever side has cells.
+TYPED_TEST(Contacts, AreThoseOfTheLeastIds) {
+  using S = TypeParam;
+  const test::Raw raw = test::torus(40);
+  Options options;
+  options.answer = Answer::kConservative;
+  options.depth = 5;
+  const auto exact = std::make_shared<Model<S>>(raw.mesh()), cells = std::make_shared<Model<S>>(raw.mesh(), options);
+  const auto I = fcl::Transform3<S>(fcl::Transform3<S>::Identity());
+  const auto Y = test::pose<S>(Eigen::Matrix3d::Identity(), {-0.5, 0.2, 0.1});
+  const std::shared_ptr<fcl::CollisionGeometry<S>> ball = std::make_shared<fcl::Sphere<S>>(S(1.2));
+  for (const auto& [a, b] : {std::pair(exact, cells), std::pair(cells, exact), std::pair(cells, cells)}) {
+    const Question<S> q{a, b, I, Y};
+    const auto all = q.ask(fcl::CollisionRequest<S>(10000000, false));
+    ASSERT_GT(all.size(), 2000u);
+    this->expectSomeOf(all, q, q.ask(fcl::CollisionRequest<S>(10, false, 5, true, false)), 10, false);
+    this->expectSomeOf(all, q, q.ask(fcl::CollisionRequest<S>(1500, false)), 1500, false);
+  }
+  for (const bool is_approximate : {false, true}) {
+    const Question<S> q{exact, ball, I, Y};
+    const auto all = q.ask(fcl::CollisionRequest<S>(10000000, false));
+    ASSERT_GT(all.size(), 20u);
+    this->expectSomeOf(all, q, q.ask(fcl::CollisionRequest<S>(10, false, 5, true, is_approximate)), 10, false);
+  }
+}
+
 // Thin layers across the longest axis, in four columns, many in each leaf: where a walk is cut shows in each.
 TYPED_TEST(Contacts, AreThoseOfThinLayers) {
   using S = TypeParam;

@@ -452,6 +452,7 @@ TEST_F(Program, DividesAValidation) {
   }
   expectComplaint("merge " + cube(), kFailed, "cube.off: not JSON");
   expectComplaint("merge " + write("list.json", "[1, 2]"), kFailed, "list.json: not a report");
+  expectComplaint("merge " + write("empty.json", "{}"), kFailed, "empty.json: not a report of `bocst validate`");
   expectComplaint(whole + " --shard 4/3", kUsage, "--shard");
   expectComplaint(whole + " --histogram", kUsage, "--histogram");
 }
@@ -905,6 +906,8 @@ TEST_F(Program, RefusesOutputsOfAnotherKind) {
   expectComplaint(inspect + "--html x.png", kUsage, "--html");
   expectComplaint(inspect + "--json x.csv", kUsage, "--json");
   expectComplaint("collide " + cube() + " " + cube() + " --csv x.json", kUsage, "--csv");
+  expectComplaint("bench " + cube() + " " + cube() + " --csv x.json", kUsage, "--csv");
+  expectComplaint("collide " + cube() + " " + cube() + " --pose ''", kUsage, "--pose");
 }
 
 TEST_F(Program, ExplainsWhatFails) {

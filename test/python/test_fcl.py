@@ -723,6 +723,30 @@ def test_what_fcl_would_end_the_process_with():
                               fcl.ContinuousCollisionRequest())
 
 
+def test_faces_that_are_no_numbers():
+    v, f = box()
+    faces = np.concatenate([[3, *t] for t in f])
+    for bad in (faces.astype(float), None, 'faces', ['a', 'b']):
+        with pytest.raises(TypeError, match='faces'):
+            fcl.Convex(v, len(f), bad)
+
+
+def test_all_objects_are_registered_or_none():
+    first, second = at(fcl.Sphere(1)), at(fcl.Sphere(1), 3, 0, 0)
+    manager = fcl.DynamicAABBTreeCollisionManager()
+    manager.registerObject(second)
+    with pytest.raises(ValueError, match='registered'):
+        manager.registerObjects([first, second])
+    assert manager.size() == 1
+
+
+def test_options_beside_something_else():
+    import bocst
+    assert bocst.Options() == bocst.Options()
+    assert bocst.Options() != bocst.Options(depth=7)
+    assert bocst.Options() != 3
+
+
 def test_points_that_were_not_asked_for():
     result = fcl.DistanceResult()
     fcl.distance(at(fcl.Sphere(1)), at(fcl.Sphere(1), 3, 0, 0), fcl.DistanceRequest(), result)

@@ -38,8 +38,9 @@ class ConvexCollector final : public query::ConvexVisitor<typename Partner::Node
  public:
   using Node = typename Partner::Node;
 
+  /// `costs`: of each contact. `by_ids`: those with the smallest ids are wanted, however few.
   ConvexCollector(const CollideQuery<S>& q, const Partner& partner, const ConvexFrame<S>& frame,
-                  const tree::Tree& model, const NarrowPhase<S>& narrow_phase, bool costs)
+                  const tree::Tree& model, const NarrowPhase<S>& narrow_phase, bool costs, bool by_ids)
       : q_(q),
         order_(model),
         partner_(partner),
@@ -51,7 +52,7 @@ class ConvexCollector final : public query::ConvexVisitor<typename Partner::Node
         tolerance_(frame.rounding() + (q.is_distance ? 0 : narrow_phase.tolerance())),
         costs_(costs),
         ends_at_first_(q.endsAtFirst()),
-        is_cut_(!ends_at_first_ && !costs && q.contactsLeft() > 0 && q.contactsLeft() <= FirstFound::kMost),
+        is_cut_(!ends_at_first_ && !by_ids && q.contactsLeft() > 0 && q.contactsLeft() <= FirstFound::kMost),
         s_(scratch()),
         cut_(order_.startCut()) {
     s_.seen.clear();
@@ -305,7 +306,8 @@ void collideConvex(const CollideQuery<S>& q, tree::Tree& tree, const NarrowPhase
   const auto with_collector = [&](bool costs, auto&& f) {
     with_partner(frame, costs, [&](const auto& partner) {
       using Partner = std::remove_cv_t<std::remove_reference_t<decltype(partner)>>;
-      ConvexCollector<S, Partner> collector(first, partner, frame, tree, narrow_phase, request.enable_cost);
+      ConvexCollector<S, Partner> collector(first, partner, frame, tree, narrow_phase, request.enable_cost,
+                                            q.request.enable_cost);
       f(partner, collector);
     });
   };

@@ -55,7 +55,7 @@ class Triangles {
 
 /// A contact before it is one of FCL's: ids in the caller's order, and how the two touch, in the world.
 struct Met {
-  double place;  // of cells, see ContactOrder; of triangles 0
+  double place;  // of cells where few are chosen, see ContactOrder; else 0
   std::uint64_t b1, b2;
   query::ContactPoint contact;
 
@@ -393,7 +393,7 @@ class MeshCollector : public query::Visitor {
 
   bool addSpheres(std::uint64_t cell, std::uint64_t id1, query::Sphere a, std::uint64_t id2, query::Sphere b) {
     q_.inCallersOrder(id1, id2);
-    Met met{static_cast<double>(cell), id1, id2, {}};
+    Met met{is_cut_ ? static_cast<double>(cell) : 0, id1, id2, {}};
     if (is_cut_ && !s_.first_cells.wants(met)) return false;
     q_.inCallersOrder(a, b);
     const fcl::Transform3<double> X_WA = q_.X_WA().template cast<double>();

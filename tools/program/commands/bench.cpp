@@ -199,7 +199,9 @@ void addBench(CLI::App& program, Job& job) {
   addSizes(*command, *bench);
   addOracleBench(*command, *bench);
   addJson(*command, bench->output);
-  command->add_option("--csv", bench->csv_file, "write the rows as CSV to this file; - is stdout")->type_name("FILE|-");
+  command->add_option("--csv", bench->csv_file, "write the rows as CSV to this file; - is stdout")
+      ->type_name("FILE|-")
+      ->check(outputFile(".csv", true));
   command->callback([bench, &job] {
     checkStdout(bench->csv_file, bench->output);
     if (bench->of_oracles && !bench->csv_file.empty()) {

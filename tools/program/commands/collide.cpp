@@ -465,9 +465,9 @@ void addCollide(CLI::App& program, Job& job) {
   addHtml(*command, collide->html_file);
   collide->image.add(*command);
   addJson(*command, collide->output);
-  command->callback([collide, &job] {
+  command->callback([collide, pose, &job] {
     try {
-      if (!collide->pose_text.empty()) collide->pose = Pose::parse(collide->pose_text, collide->format());
+      if (pose->count() != 0) collide->pose = Pose::parse(collide->pose_text, collide->format());
     } catch (const std::invalid_argument& e) {
       throw CLI::ValidationError("--pose", e.what());
     }

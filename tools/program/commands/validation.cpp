@@ -143,8 +143,8 @@ Validation Validation::fromJson(const Json& json) {
     }
     result.settings = rest;
     result.settings.at("seed");
-  } catch (const Json::exception& e) {
-    throw std::runtime_error(std::string("not a report of `bocst validate`: ") + e.what());
+  } catch (const Json::exception&) {
+    throw std::runtime_error("not a report of `bocst validate`");
   }
   return result;
 }
