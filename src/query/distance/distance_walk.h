@@ -54,7 +54,8 @@ class DistanceWalk : private BestFirst<DistanceWalk<A, B>, A, B> {
     most_steps_ = most_steps;
     if constexpr (!B::kBodies) {
       const NodeExtent root_a = extentOfA(a_.root()), root_b = extentOfB(b_.root());
-      tie_ = 4 * kExtentRounding * ((root_b.center - root_a.center).norm() + root_a.half.sum() + root_b.half.sum());
+      const double rounding = spheres() && !gaps_.has_value() ? kSphereRounding : kExtentRounding;
+      tie_ = 4 * rounding * ((root_b.center - root_a.center).norm() + root_a.half.sum() + root_b.half.sum());
     }
     found(known);
     if (gaps_.has_value()) descendGreedily();
