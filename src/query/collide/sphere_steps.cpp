@@ -257,8 +257,8 @@ SphereSteps::Event NextEvent(SphereSteps& s) {
       continue;
     }
     own.level = top.own.level;
-    own.ref = top.own.at != nullptr ? top.own.at->child[o].load(std::memory_order_acquire)
-                                    : s.side[side]->childRef(own.node);
+    own.ref =
+        top.own.at != nullptr ? top.own.at->child[o].load(std::memory_order_acquire) : s.side[side]->childRef(own.node);
     std::uint32_t frames = top.frames;
     if (frames == 0) {
       own.lane = lookUp(s, side, own.node, frames++);
