@@ -18,7 +18,7 @@ void fillFrame(const PairFrames& geometry, int own, const tree::Block& block, Fr
 /// Fills lane 0 of the frame with the root of side `own`.
 void fillFrame(const PairFrames& geometry, int own, const bounds::NodeBounds& root, Frame& frame);
 
-/// The leaves of a side with conservative answers: where the spheres of nodes below which they are may have centres.
+/// The leaves of a side with conservative answers: cells of this side, cut off where the actual regions end.
 struct LeafCells {
   std::int32_t side;                   ///< Lattice units.
   std::array<std::int32_t, 3> extent;  ///< Where the actual regions end, see Lattice.
