@@ -6,7 +6,6 @@
 #include <bocst/mesh.h>
 
 #include <cmath>
-#include <cstdint>
 #include <memory>
 #include <random>
 #include <vector>
@@ -27,6 +26,12 @@ struct Raw {
     for (auto& v : vertices) v += d;
     return *this;
   }
+  Raw& addTriangle(const Eigen::Vector3d& a, const Eigen::Vector3d& b, const Eigen::Vector3d& c) {
+    const std::size_t n = vertices.size();
+    vertices.insert(vertices.end(), {a, b, c});
+    triangles.emplace_back(n, n + 1, n + 2);
+    return *this;
+  }
   Raw& add(const Raw& other) {
     const std::size_t first = vertices.size();
     vertices.insert(vertices.end(), other.vertices.begin(), other.vertices.end());
@@ -38,11 +43,7 @@ struct Raw {
 /// Every triangle with vertices of its own, as STL files have them.
 inline Raw unwelded(const Raw& raw) {
   Raw out;
-  for (const auto& t : raw.triangles) {
-    const std::size_t n = out.vertices.size();
-    for (std::size_t k = 0; k < 3; ++k) out.vertices.push_back(raw.vertices[t[k]]);
-    out.triangles.emplace_back(n, n + 1, n + 2);
-  }
+  for (const auto& t : raw.triangles) out.addTriangle(raw.vertices[t[0]], raw.vertices[t[1]], raw.vertices[t[2]]);
   return out;
 }
 
@@ -116,18 +117,13 @@ inline Raw adversarial() {
   Raw raw = box({0, 0, 0}, {1, 1, 1});
   raw.add(box({0.25, 0.5, 0.125}, {0.75, 0.5, 0.875}));  // flat: faces on cell faces, some without area
   raw.add(box({0.5, 0.25, 0.5}, {0.5, 0.5, 0.5}));       // a segment, twelve times
-  const auto triangle = [&](const Eigen::Vector3d& a, const Eigen::Vector3d& b, const Eigen::Vector3d& c) {
-    const std::size_t n = raw.vertices.size();
-    raw.vertices.insert(raw.vertices.end(), {a, b, c});
-    raw.triangles.emplace_back(n, n + 1, n + 2);
-  };
-  triangle({0.1, 0.1, 0.1}, {0.9, 0.9, 0.9}, {0.9, 0.9, 0.9 + 1e-12});  // sliver
-  triangle({0.2, 0.8, 0.3}, {0.2, 0.8, 0.3}, {0.2, 0.8, 0.3});          // point
-  triangle({0.3, 0.3, 0.7}, {0.3 + 1e-7, 0.3, 0.7}, {0.3, 0.3 + 1e-7, 0.7});
-  triangle({0.5, 0.5, 0.5}, {0.5 + 1e-7, 0.5, 0.5}, {0.5, 0.5 + 1e-7, 0.5 + 1e-7});  // at the root's centre
-  triangle({0, 0, 0}, {1, 0, 1}, {0, 1, 1});
-  triangle({0, 0, 0}, {1, 0, 1}, {0, 1, 1});  // twice
-  triangle({0.25, 0.25, 0}, {0.25, 0.25, 1}, {0.25, 0.75, 0.5});
+  raw.addTriangle({0.1, 0.1, 0.1}, {0.9, 0.9, 0.9}, {0.9, 0.9, 0.9 + 1e-12});  // sliver
+  raw.addTriangle({0.2, 0.8, 0.3}, {0.2, 0.8, 0.3}, {0.2, 0.8, 0.3});          // point
+  raw.addTriangle({0.3, 0.3, 0.7}, {0.3 + 1e-7, 0.3, 0.7}, {0.3, 0.3 + 1e-7, 0.7});
+  raw.addTriangle({0.5, 0.5, 0.5}, {0.5 + 1e-7, 0.5, 0.5}, {0.5, 0.5 + 1e-7, 0.5 + 1e-7});  // at the root's centre
+  raw.addTriangle({0, 0, 0}, {1, 0, 1}, {0, 1, 1});
+  raw.addTriangle({0, 0, 0}, {1, 0, 1}, {0, 1, 1});  // twice
+  raw.addTriangle({0.25, 0.25, 0}, {0.25, 0.25, 1}, {0.25, 0.75, 0.5});
   return raw;
 }
 
@@ -144,6 +140,14 @@ inline Raw soup(std::size_t count, unsigned seed) {
     raw.triangles.emplace_back(3 * t, 3 * t + 1, 3 * t + 2);
   }
   return raw;
+}
+
+template <typename S>
+Eigen::Transform<S, 3, Eigen::Isometry> pose(const Eigen::Matrix3d& R, const Eigen::Vector3d& p) {
+  Eigen::Transform<S, 3, Eigen::Isometry> X = Eigen::Transform<S, 3, Eigen::Isometry>::Identity();
+  X.linear() = R.cast<S>();
+  X.translation() = p.cast<S>();
+  return X;
 }
 
 inline Eigen::Matrix3d randomRotation(std::mt19937_64& g) {

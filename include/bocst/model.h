@@ -120,7 +120,8 @@ class BOCST_EXPORT Model : public fcl::CollisionGeometry<S> {
   /// mesh back; prune() frees it again once the tree is a single sphere and ttl has passed. Such queries throw
   /// OracleError if the device lost the mesh.
   /// @throws std::logic_error for solids, which need the triangles in host memory; OracleError if the oracle of this
-  /// model has no device (OracleKind::kCpu, kAuto). The model is then unchanged.
+  /// model has no device (OracleKind::kCpu; kAuto, unless BOCST_ORACLE names an oracle on a device). The model is then
+  /// unchanged.
   void releaseMesh();
 
   /// "cpu", "occlusion", "sampled", "compute", or "cpu and compute" (kAuto where there is a GPU).
@@ -128,10 +129,11 @@ class BOCST_EXPORT Model : public fcl::CollisionGeometry<S> {
 
   Statistics statistics() const;  ///< A snapshot.
 
-  /// Builds the whole tree of exact answers now, in 60 to 150 ns per triangle, so that the next queries do not have to.
-  /// For a program whose queries have a time limit; set Options::ttl to 0 if it makes pauses, or branches are dropped.
-  /// Conservative answers gain nothing by it, nor do models with an oracle on a device. Queries may run at the same
-  /// time; those that have to grow the tree wait.
+  /// Builds the whole tree of exact answers now, in 60 to 150 ns per triangle (the first build of a process up to 300),
+  /// so that the next queries do not have to. For a program whose queries have a time limit. If it pauses for longer
+  /// than Options::ttl, set that to 0; otherwise branches are dropped and grow again. Conservative answers gain nothing
+  /// by it, nor do models with an oracle on a device. Queries may run at the same time; those that have to grow the
+  /// tree wait.
   /// @throws std::logic_error for an empty model; std::bad_alloc, which leaves the tree as valid as it was.
   void buildTree();
 

@@ -51,14 +51,15 @@ struct Options {
   /// Collision depth: the level of the spheres that kConservative tests; the root is level 1. From 1 to 17.
   int depth = 6;
 
-  /// The paper's d_t: the largest extent of the mesh in lattice units, from 1 to 65536; 0: 65536, the finest lattice.
+  /// The paper's d_t: the largest extent of the mesh in units of the lattice, which divides each axis of the root cube
+  /// into 65536 at most: from 1 to 65536; 0: 65536, the finest lattice.
   /// Only kBono's cells depend on it (4.4): the side of its root cube is the smallest power of two that is >= d_t.
   double dimension = 0;
 
   OracleKind oracle = OracleKind::kAuto;  ///< Backend that subdivides cells.
 
-  /// The paper's Max. time (3.1): a deepest level that is unused for longer is dropped by later queries of this model
-  /// or by Model::prune(), not by a thread; 0: never.
+  /// After this time without use, the deepest level of a branch is dropped; then the time of the level above starts.
+  /// Later queries of this model or Model::prune() do this, no thread. 0: never. The paper's Max. time (3.1).
   std::chrono::milliseconds ttl{2000};
 
   /// Limit of the resident tree in bytes; the least recently used branches are dropped first; 0: no limit. A running

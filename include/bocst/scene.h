@@ -64,9 +64,9 @@ struct SceneOptions {
 /// before or after a change, never a mixture. Changes wait for each other. A change of a fixed object takes
 /// microseconds; while queries are under way, it copies what they share. The first query, and the first one after
 /// moving objects came or went or after many changes, updates the scene's internal data, and other queries wait for
-/// that; apart from changes, no query waits for another. If no model has to grow, collides() and calls with up to 128
-/// states allocate no memory after the thread's first similar queries, except in FCL's own code (pairs without a Model,
-/// and a triangle near a shape or a cell). A child of fork() works alone; calls throw std::runtime_error if another
+/// that; apart from changes, no query waits for another. When no tree has to grow, collides() and calls with up to 128
+/// states allocate no memory (after the first such calls of a thread), except inside FCL: for pairs without a Model,
+/// and for a triangle near a shape or a cell. A child of fork() works alone; calls throw std::runtime_error if another
 /// thread of the parent was at work in the scene or in one of its models at the fork.
 template <typename S>
 class BOCST_EXPORT Scene {

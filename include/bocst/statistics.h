@@ -7,8 +7,8 @@
 
 namespace bocst {
 
-/// A snapshot of a model's memory and of its work so far. Counters never decrease until the model gets another mesh
-/// (setMesh, beginModel), where they start at 0; they are exact if no query runs.
+/// A snapshot of a model's memory and of its work so far. Counters never decrease, but start again at 0 when the
+/// model gets another mesh (setMesh, beginModel); they are exact if no query runs.
 struct Statistics {
   std::size_t resident_nodes = 0;  ///< Nodes in memory: cells and groups of triangles; 1 if only the root is left.
   std::size_t resident_bytes = 0;  ///< Heap bytes of the tree: nodes, triangle lists, bookkeeping; not the mesh.

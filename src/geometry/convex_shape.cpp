@@ -421,18 +421,7 @@ Vector3d RoundShape::support(const Vector3d& d) const {
   return Vector3d(d[0] * radius, d[1] * radius, up ? half_length_ : -half_length_);
 }
 
-namespace {
-
-Eigen::AlignedBox3d boxOf(const Corners& corners) {
-  Eigen::AlignedBox3d box;
-  for (const Vector3d& corner : corners) box.extend(corner);
-  return box;
-}
-
-}  // namespace
-
-TriangleShape::TriangleShape(const Corners& corners)
-    : SupportShape(boxOf(corners).center(), boxOf(corners).sizes() / 2, 0) {
+TriangleShape::TriangleShape(const Corners& corners) : SupportShape(boxOf(corners), 0) {
   for (int k = 0; k < 3; ++k) corners_[k] = corners[k];
 }
 

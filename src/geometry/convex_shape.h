@@ -37,6 +37,14 @@ struct PointSet {
   }
 };
 
+/// Of points in float or double.
+template <typename Points>
+Eigen::AlignedBox3d boxOf(const Points& points) {
+  Eigen::AlignedBox3d box;
+  for (const auto& p : points) box.extend(p.template cast<double>());
+  return box;
+}
+
 /// How far points are from a body.
 struct SeparationResult {
   /// The distance is surely no less, up to 4e-15 of the coordinates, which is taken off: where it is not positive, the
@@ -90,9 +98,6 @@ class ConvexShape {
   /// Of boxes, balls, planes, half-spaces and triangles the shortest way; of other bodies one that is seldom longer by
   /// more than a tenth. `gap` is what gap() says of these points.
   virtual ContactPoint penetration(const PointSet& points, const SeparationResult& gap) const = 0;
-  ContactPoint penetration(const PointSet& points) const {
-    return penetration(points, gap(points, std::numeric_limits<double>::infinity()));
-  }
 
  protected:
   OrientedVolume box_;
@@ -102,7 +107,6 @@ class ConvexShape {
 class SupportShape : public ConvexShape {
  public:
   SeparationResult gap(const PointSet& points, double cutoff) const override;
-  using ConvexShape::penetration;
   ContactPoint penetration(const PointSet& points, const SeparationResult& gap) const override;
   std::optional<Eigen::Vector3d> point() const override { return support(Eigen::Vector3d::UnitX()); }
 
@@ -112,6 +116,8 @@ class SupportShape : public ConvexShape {
 
  protected:
   SupportShape(const Eigen::Vector3d& center, const Eigen::Vector3d& half_of_core, double radius);
+  SupportShape(const Eigen::AlignedBox3d& core, double radius)
+      : SupportShape(core.center(), core.sizes() / 2, radius) {}
 
   /// Is the point surely in the core? False where that is not known at a glance.
   virtual bool contains(const Eigen::Vector3d&) const { return false; }
@@ -146,7 +152,6 @@ class BoxShape final : public SupportShape {
   explicit BoxShape(const Eigen::Vector3d& half);
 
   bool hasExactBox() const override { return true; }
-  using ConvexShape::penetration;
   ContactPoint penetration(const PointSet& points, const SeparationResult& gap) const override;
 
  protected:
@@ -202,7 +207,6 @@ class TriangleShape final : public SupportShape {
   explicit TriangleShape(const Corners& corners);
 
   SeparationResult gap(const PointSet& points, double cutoff) const override;
-  using ConvexShape::penetration;
   ContactPoint penetration(const PointSet& points, const SeparationResult& gap) const override;
   SweptHull hull() const override;
 
@@ -220,7 +224,6 @@ class HalfspaceShape final : public ConvexShape {
 
   bool hasExactBox() const override { return true; }
   SeparationResult gap(const PointSet& points, double cutoff) const override;
-  using ConvexShape::penetration;
   ContactPoint penetration(const PointSet& points, const SeparationResult& gap) const override;
   std::optional<Eigen::Vector3d> point() const override { return std::nullopt; }
 
@@ -236,7 +239,6 @@ class PlaneShape final : public ConvexShape {
 
   bool hasExactBox() const override { return true; }
   SeparationResult gap(const PointSet& points, double cutoff) const override;
-  using ConvexShape::penetration;
   ContactPoint penetration(const PointSet& points, const SeparationResult& gap) const override;
   std::optional<Eigen::Vector3d> point() const override { return std::nullopt; }
 

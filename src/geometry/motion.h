@@ -39,6 +39,16 @@ class Motion {
   virtual double fastest(const Eigen::Vector3d& center, double radius, double time) const = 0;
 };
 
+/// Of the hull of some points (W): velocities are affine in position, so a hull's extremes are at its corners.
+inline ClosingSpeed closingSpeedOf(const Motion& motion, const Eigen::Vector3d* points, std::size_t count,
+                                   const Eigen::Vector3d& direction, double blur, double time) {
+  ClosingSpeed most = motion.closingSpeed(direction, blur, points[0], 0, time);
+  for (std::size_t i = 1; i < count; ++i) {
+    most = ClosingSpeed::most(most, motion.closingSpeed(direction, blur, points[i], 0, time));
+  }
+  return most;
+}
+
 /// A constant turn about an axis that moves with a constant velocity: FCL's translation, interpolation and screw.
 class AxisMotion final : public Motion {
  public:

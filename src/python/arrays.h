@@ -8,7 +8,6 @@
 
 #include <cstddef>
 #include <cstdint>
-#include <string>
 #include <vector>
 
 // NumPy arrays as C++ wants them. What does not fit is refused with the argument's name: TypeError for what holds no

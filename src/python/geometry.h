@@ -10,7 +10,6 @@
 #include <memory>
 #include <mutex>
 #include <shared_mutex>
-#include <stdexcept>
 #include <thread>
 
 namespace bocst::python {

@@ -9,7 +9,6 @@
 #include <fcl/geometry/shape/utility.h>
 
 #include <Eigen/Eigenvalues>
-#include <cmath>
 #include <limits>
 #include <shared_mutex>
 

@@ -88,7 +88,7 @@ void collideAll(const Model<S>& a, const Model<S>& b, const Poses<S>& X_AB, std:
   if (count == 0) return;
   if (X_AB.numbers(0) == nullptr) throw std::invalid_argument("bocst::collidePoses: X_AB is null");
   if (hit == nullptr) throw std::invalid_argument("bocst::collidePoses: hit is null");
-  if (fcl_adapter::kindOf<S>(&a, &b) == fcl_adapter::PairKind::kNothing) {
+  if (fcl_adapter::kindOf<S>("collidePoses", &a, &b) == fcl_adapter::PairKind::kNothing) {
     std::fill(hit, hit + count, std::uint8_t{0});
     return;
   }

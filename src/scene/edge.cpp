@@ -131,7 +131,7 @@ class Edge {
 
   bool touchesOnWay(const PairAt& p) {
     const Object<S>&a = world_.moving[p.moving], &b = world_.object(p.group, p.lane);
-    switch (fcl_adapter::kindOf<S>(a.geometry.get(), b.geometry.get())) {
+    switch (fcl_adapter::kindOf<S>("edgeIsFree", a.geometry.get(), b.geometry.get())) {
       case fcl_adapter::PairKind::kForeign:
         return advance(p, a, b);
       case fcl_adapter::PairKind::kNothing:

@@ -1,7 +1,6 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #include "thread/thread_pool.h"
 
-#include <system_error>
 #include <utility>
 
 #include "thread/start.h"

@@ -1,7 +1,6 @@
 // SPDX-License-Identifier: BSD-3-Clause
 // Drops branches by age and by budget, and gives their triangles back to their nodes.
 #include <algorithm>
-#include <array>
 #include <mutex>
 #include <numeric>
 

@@ -4,7 +4,6 @@
 #include <algorithm>
 #include <array>
 #include <cstring>
-#include <tuple>
 
 namespace bocst::tree {
 

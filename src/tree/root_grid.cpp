@@ -2,7 +2,6 @@
 #include "tree/root_grid.h"
 
 #include <algorithm>
-#include <cmath>
 #include <cstring>
 
 #include "memory/huge_pages.h"

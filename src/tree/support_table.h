@@ -5,7 +5,6 @@
 #include <Eigen/Geometry>
 #include <array>
 #include <atomic>
-#include <cstdint>
 
 namespace bocst::tree {
 

@@ -2,7 +2,6 @@
 #include "tree/triangle_lists.h"
 
 #include <algorithm>
-#include <array>
 #include <stdexcept>
 
 #include "log/assert.h"

@@ -21,8 +21,7 @@ using test::Raw;
 
 template <typename S>
 class Collide : public testing::Test {};
-using Scalars = testing::Types<float, double>;
-TYPED_TEST_SUITE(Collide, Scalars);
+TYPED_TEST_SUITE(Collide, test::Scalars);
 
 TYPED_TEST(Collide, EqualsObbrssOnRandomPoses) {
   using S = TypeParam;
@@ -372,8 +371,7 @@ TEST(CollideDouble, OneTriangleOfAnySizeThroughAMesh) {
   const auto I = fcl::Transform3<double>(fcl::Transform3<double>::Identity());
   for (const double size : {1.0, 1e3, 1e6, 1e8, 1e9, 1e10, 1e12, 1e15}) {
     Raw huge;
-    huge.vertices = {{-size, -size, -0.3 * size}, {size, -size, 0.3 * size}, {0, size, 0}};
-    huge.triangles.emplace_back(0, 1, 2);
+    huge.addTriangle({-size, -size, -0.3 * size}, {size, -size, 0.3 * size}, {0, size, 0});
     const auto fb = test::bvh<fcl::OBBRSS<double>>(huge);
     const Pairs want = test::pairs<double>(*fa, I, *fb, I), turned = test::pairs<double>(*fb, I, *fa, I);
     ASSERT_GT(want.size(), 10u);
@@ -887,14 +885,12 @@ bool bruteForce(const Raw& a, const Raw& b, const fcl::Transform3d& X_AB, bool& 
 
 TEST(CollideDegenerate, AnswersAreRight) {
   Raw single;
-  single.vertices = {{0, 0, 0}, {1, 0, 0}, {0, 1, 0}};
-  single.triangles.emplace_back(0, 1, 2);
+  single.addTriangle({0, 0, 0}, {1, 0, 0}, {0, 1, 0});
   Raw point;
   point.vertices.assign(3, Eigen::Vector3d(0.2, 0.3, 0.4));
   point.triangles.emplace_back(0, 1, 2);
   Raw segment;
-  segment.vertices = {{0, 0, 0}, {0, 0, 1}, {0, 0, 0.5}};
-  segment.triangles.emplace_back(0, 1, 2);
+  segment.addTriangle({0, 0, 0}, {0, 0, 1}, {0, 0, 0.5});
   Raw same;
   same.vertices = single.vertices;
   same.triangles.assign(5000, single.triangles[0]);

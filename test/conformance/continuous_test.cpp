@@ -207,13 +207,6 @@ struct Ways {
   Ways swapped() const { return {o2, begin2, end2, o1, begin1, end1}; }
 };
 
-template <typename S>
-double distanceAt(const fcl::CollisionGeometry<S>& a, const fcl::Transform3<S>& X, const fcl::CollisionGeometry<S>& b,
-                  const fcl::Transform3<S>& Y) {
-  fcl::DistanceResult<S> result;
-  return static_cast<double>(fcl::distance(&a, X, &b, Y, fcl::DistanceRequest<S>(), result));
-}
-
 /// Checks an answer by many poses on the way, each asked of `a` and `b`, which look like the geometries of `ways`.
 template <typename S>
 void checkBySampling(const Ways<S>& ways, const fcl::CollisionGeometry<S>& a, const fcl::CollisionGeometry<S>& b,
@@ -235,7 +228,7 @@ void checkBySampling(const Ways<S>& ways, const fcl::CollisionGeometry<S>& a, co
   // Somewhere in what the answer leaves open, they touch.
   double nearest = std::numeric_limits<double>::infinity();
   const auto look = [&](double t) {
-    const double d = distanceAt<S>(a, poseAt<S>(*m1, t), b, poseAt<S>(*m2, t));
+    const auto d = static_cast<double>(test::distance<S>(a, poseAt<S>(*m1, t), b, poseAt<S>(*m2, t)));
     nearest = std::min(nearest, d);
   };
   for (int i = 0; i <= 100; ++i) look(std::min(toc + toc_err * i / 100, 1.0));
@@ -246,8 +239,7 @@ void checkBySampling(const Ways<S>& ways, const fcl::CollisionGeometry<S>& a, co
 
 template <typename S>
 class Continuous : public testing::Test {};
-using Scalars = testing::Types<float, double>;
-TYPED_TEST_SUITE(Continuous, Scalars);
+TYPED_TEST_SUITE(Continuous, test::Scalars);
 
 template <typename S>
 Ways<S> randomWays(std::mt19937_64& g, const fcl::CollisionGeometry<S>& a, const fcl::CollisionGeometry<S>& b,
@@ -418,7 +410,7 @@ TEST(ContinuousDouble, SplinesFromRandomPoints) {
       ASSERT_FALSE(test::touching<double>(a, identity<double>(), b, currentPose(m)));
     }
     if (!result.is_collide) continue;
-    EXPECT_LT(distanceAt<double>(a, result.contact_tf1, b, result.contact_tf2), 1e-2);
+    EXPECT_LT(test::distance<double>(a, result.contact_tf1, b, result.contact_tf2), 1e-2);
     hits += result.time_of_contact > 0;
   }
   EXPECT_GT(hits, 2);
@@ -541,8 +533,7 @@ TEST(ContinuousDouble, ShearedRotationsStepOverNothing) {
       sheared.linear()(0, 2) = shear;
       for (const double x : {-0.99, 0.0, 0.99}) {
         Raw speck;
-        speck.vertices = {{x, 0, 0}, {x + 1e-5, 0, 0}, {x, 1e-5, 0}};
-        speck.triangles.emplace_back(0, 1, 2);
+        speck.addTriangle({x, 0, 0}, {x + 1e-5, 0, 0}, {x, 1e-5, 0});
         const Modeld small(speck.mesh());
         const auto at = [](double z) { return test::pose<double>(Eigen::Matrix3d::Identity(), {0, 0, z}); };
         for (const double end : {0.0074, -0.5}) {

@@ -20,7 +20,6 @@
 #include <optional>
 #include <random>
 #include <thread>
-#include <tuple>
 
 #include "meshes.h"
 #include "reference.h"
@@ -307,9 +306,7 @@ TYPED_TEST(Contacts, AreThoseOfVeryMany) {
   test::Raw fan;
   for (int i = 0; i < 400; ++i) {
     const double z = i * 1e-4;
-    const std::size_t n = fan.vertices.size();
-    fan.vertices.insert(fan.vertices.end(), {{-1, -1, z}, {1, -1, -z}, {0, 1, 0.01}});
-    fan.triangles.emplace_back(n, n + 1, n + 2);
+    fan.addTriangle({-1, -1, z}, {1, -1, -z}, {0, 1, 0.01});
   }
   std::mt19937 g(9);
   std::shuffle(fan.triangles.begin(), fan.triangles.end(), g);
@@ -357,18 +354,14 @@ TYPED_TEST(Contacts, AreThoseOfThinLayers) {
   std::uniform_real_distribution<double> u(0, 3);
   for (int i = 0; i < 3000; ++i) {
     const double x = u(g), y = g() % 2 ? 0.5 : -0.5, z = g() % 2 ? 0.5 : -0.5;
-    const std::size_t n = layers.vertices.size();
-    layers.vertices.insert(layers.vertices.end(), {{x, y - 0.4, z - 0.4}, {x, y + 0.4, z - 0.4}, {x, y, z + 0.4}});
-    layers.triangles.emplace_back(n, n + 1, n + 2);
+    layers.addTriangle({x, y - 0.4, z - 0.4}, {x, y + 0.4, z - 0.4}, {x, y, z + 0.4});
   }
   const test::Raw rod = test::box({0.5, -0.5, -0.5}, {2.5, 0.5, 0.5});
   // As small as the distance of some layers along the axis, and as large across it: no node has far larger triangles.
   test::Raw chips;
   for (int i = 0; i < 3000; ++i) {
     const double x = u(g), y = g() % 2 ? 0.5 : -0.5, z = 0.5 * (u(g) - 1.5);
-    const std::size_t n = chips.vertices.size();
-    chips.vertices.insert(chips.vertices.end(), {{x, y - 0.4, z}, {x + 0.01, y + 0.4, z}, {x, y, z + 0.1}});
-    chips.triangles.emplace_back(n, n + 1, n + 2);
+    chips.addTriangle({x, y - 0.4, z}, {x + 0.01, y + 0.4, z}, {x, y, z + 0.1});
   }
   const auto a = std::make_shared<Model<S>>(layers.mesh()), c = std::make_shared<Model<S>>(rod.mesh());
   const auto X = fcl::Transform3<S>::Identity();

@@ -12,10 +12,7 @@ namespace {
 using Eigen::Vector3d;
 
 Eigen::Isometry3d at(const Vector3d& p, const Eigen::Matrix3d& R = Eigen::Matrix3d::Identity()) {
-  Eigen::Isometry3d X = Eigen::Isometry3d::Identity();
-  X.linear() = R;
-  X.translation() = p;
-  return X;
+  return test::pose<double>(R, p);
 }
 
 Solid ball(double radius) {

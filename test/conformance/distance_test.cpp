@@ -28,8 +28,7 @@ fcl::DistanceResult<S> ask(const fcl::CollisionGeometry<S>& a, const fcl::Transf
 
 template <typename S>
 class Distance : public testing::Test {};
-using Scalars = testing::Types<float, double>;
-TYPED_TEST_SUITE(Distance, Scalars);
+TYPED_TEST_SUITE(Distance, test::Scalars);
 
 template <typename S>
 Eigen::Vector3d onTriangle(const Raw& raw, std::intptr_t t, const fcl::Transform3<S>& X, const fcl::Vector3<S>& p) {

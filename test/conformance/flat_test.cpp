@@ -6,10 +6,7 @@
 
 #include <cmath>
 #include <limits>
-#include <memory>
 #include <random>
-#include <set>
-#include <vector>
 
 #include "conformance/reference.h"
 #include "query/ccd/contact_time_walk.h"
@@ -47,16 +44,12 @@ Raw cone(std::size_t sectors) {
 
 template <typename S>
 fcl::Transform3<S> above(double gap, double turn = 0) {
-  fcl::Transform3<S> X = fcl::Transform3<S>::Identity();
-  X.linear() = Eigen::AngleAxisd(turn, Vector3d::UnitZ()).toRotationMatrix().cast<S>();
-  X.translation() = Vector3d(0.0123, 0.0071, gap).cast<S>();
-  return X;
+  return test::pose<S>(Eigen::AngleAxisd(turn, Vector3d::UnitZ()).toRotationMatrix(), Vector3d(0.0123, 0.0071, gap));
 }
 
 template <typename S>
 class FlatFaces : public testing::Test {};
-using Scalars = testing::Types<float, double>;
-TYPED_TEST_SUITE(FlatFaces, Scalars);
+TYPED_TEST_SUITE(FlatFaces, test::Scalars);
 
 // One pose after the other, so that the later ones find oriented boxes built.
 TYPED_TEST(FlatFaces, AnswersAreRightAtAnyGap) {
@@ -76,12 +69,9 @@ TYPED_TEST(FlatFaces, AnswersAreRightAtAnyGap) {
           SCOPED_TRACE(testing::Message() << "gap " << gap << ", turned by " << turn << ", round " << round);
           ASSERT_EQ(test::touching<S>(*lower, I, upper, X), gap == 0);
           ASSERT_EQ(test::touching<S>(upper, X, *lower, I), gap == 0);
-          fcl::DistanceResult<S> result, turned;
-          fcl::distance(lower, I, &upper, X, fcl::DistanceRequest<S>(), result);
-          fcl::distance(&upper, X, lower, I, fcl::DistanceRequest<S>(), turned);
           const double rounding = std::is_same<S, double>::value ? 2e-12 : 1e-6;
-          ASSERT_NEAR(result.min_distance, gap, rounding);
-          ASSERT_NEAR(turned.min_distance, gap, rounding);
+          ASSERT_NEAR(test::distance<S>(*lower, I, upper, X), gap, rounding);
+          ASSERT_NEAR(test::distance<S>(upper, X, *lower, I), gap, rounding);
           if (gap < 100 * finest) continue;
           for (const double share : {0.5, 0.98, 0.9999, 1.0001, 1.02}) {
             const S limit = static_cast<S>(share * gap);
@@ -314,9 +304,7 @@ TEST(FlatWork, DistancesNextToNothingAreFound) {
     for (int i = 0; i < 20; ++i) {
       fcl::Transform3d X = above<double>(gap);
       X.linear() = Eigen::AngleAxisd(0.2 * u(g), Vector3d(u(g), u(g), 0).normalized()).toRotationMatrix();
-      fcl::DistanceResultd result;
-      fcl::distance(&a, I, &b, X, fcl::DistanceRequestd(), result);
-      ASSERT_NEAR(result.min_distance, gap, 1e-12 + 2e-3 * gap);
+      ASSERT_NEAR(test::distance<double>(a, I, b, X), gap, 1e-12 + 2e-3 * gap);
     }
   }
 }

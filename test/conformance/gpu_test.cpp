@@ -94,8 +94,7 @@ TEST_P(OnDevice, SmallAndDenseMeshesAnswerAsOnTheCpu) {
     cluster.vertices.insert(cluster.vertices.end(), {{0.4 - 1e-8, y, 0}, {0.4 + 1e-8, y, 0}, {0.4, y, 1e-8}});
     cluster.triangles.emplace_back(3 * i, 3 * i + 1, 3 * i + 2);
   }
-  cluster.vertices.insert(cluster.vertices.end(), {{3, 3, 3}, {3, 4, 3}, {4, 3, 3}});
-  cluster.triangles.emplace_back(cluster.vertices.size() - 3, cluster.vertices.size() - 2, cluster.vertices.size() - 1);
+  cluster.addTriangle({3, 3, 3}, {3, 4, 3}, {4, 3, 3});
   const Modeld a(cluster.mesh(), with(GetParam())), b(few.mesh(), with(GetParam()));
   const Modeld c(cluster.mesh(), with(OracleKind::kCpu)), d(few.mesh(), with(OracleKind::kCpu));
   const test::Pairs expected = test::pairs<double>(c, kIdentity, d, kIdentity);

@@ -26,16 +26,8 @@ Options with(double margin, Answer answer = Answer::kExact, Subdivision subdivis
 }
 
 template <typename S>
-S distanceOf(const fcl::CollisionGeometry<S>& a, const fcl::Transform3<S>& X, const fcl::CollisionGeometry<S>& b,
-             const fcl::Transform3<S>& Y) {
-  fcl::DistanceResult<S> result;
-  return fcl::distance(&a, X, &b, Y, fcl::DistanceRequest<S>(), result);
-}
-
-template <typename S>
 class Margin : public testing::Test {};
-using Scalars = testing::Types<float, double>;
-TYPED_TEST_SUITE(Margin, Scalars);
+TYPED_TEST_SUITE(Margin, test::Scalars);
 
 // Just more and just less than the distance, however it is shared between the two.
 TYPED_TEST(Margin, IsTheDistanceUpToWhichTheyCollide) {
@@ -50,7 +42,7 @@ TYPED_TEST(Margin, IsTheDistanceUpToWhichTheyCollide) {
   for (int i = 0; i < 24; ++i) {
     const auto X = test::pose<S>(test::randomRotation(g), test::randomDirection(g));
     const auto Y = test::pose<S>(test::randomRotation(g), test::randomDirection(g) * 4 * u(g));
-    const double d = static_cast<double>(distanceOf<S>(plain_a, X, plain_b, Y));
+    const double d = static_cast<double>(test::distance<S>(plain_a, X, plain_b, Y));
     if (d < 1e-3) continue;
     ++apart;
     const double share = i % 3 == 0 ? 0 : u(g);
@@ -66,7 +58,7 @@ TYPED_TEST(Margin, IsTheDistanceUpToWhichTheyCollide) {
       ASSERT_EQ(isCloserThan<S>(&a, X, &plain_b, Y, least), hit) << "which knows no margin of the models";
       ASSERT_EQ(isCloserThan<S>(&plain_b, Y, &plain_a, X, least), hit);
       ASSERT_EQ(isCloserThan<S>(bvh.get(), Y, &plain_a, X, least), hit);
-      ASSERT_EQ(distanceOf<S>(a, X, b, Y), distanceOf<S>(plain_a, X, plain_b, Y)) << "distances know no margin";
+      ASSERT_EQ(test::distance<S>(a, X, b, Y), test::distance<S>(plain_a, X, plain_b, Y)) << "distances know no margin";
     }
   }
   EXPECT_GT(apart, 8);
@@ -210,7 +202,7 @@ TEST(MarginConservative, NeverFreeWithinIt) {
   for (const Subdivision subdivision : {Subdivision::kOctree, Subdivision::kBono}) {
     for (int i = 0; i < 12; ++i) {
       const auto Y = test::pose<double>(test::randomRotation(g), test::randomDirection(g) * (1.8 + 2 * u(g)));
-      const double d = distanceOf<double>(exact_a, I, exact_b, Y);
+      const double d = test::distance<double>(exact_a, I, exact_b, Y);
       for (const double margin : {d * (1 + 1e-9), d * 2 + 1e-3, d / 4}) {
         auto options = with(margin, Answer::kConservative, subdivision);
         options.depth = 5;
@@ -221,11 +213,11 @@ TEST(MarginConservative, NeverFreeWithinIt) {
         EXPECT_TRUE(hit || margin < d);
         EXPECT_EQ(test::touching<double>(b, Y, a, I), hit);
         // As the distance of the spheres says, which is a query of its own.
-        EXPECT_EQ(hit, distanceOf<double>(same, I, b, Y) <= margin);
+        EXPECT_EQ(hit, test::distance<double>(same, I, b, Y) <= margin);
         for (const fcl::CollisionGeometryd* partner : {static_cast<const fcl::CollisionGeometryd*>(&exact_b),
                                                        static_cast<const fcl::CollisionGeometryd*>(bvh.get())}) {
-          EXPECT_EQ(test::touching<double>(a, I, *partner, Y), distanceOf<double>(same, I, *partner, Y) <= margin);
-          EXPECT_EQ(test::touching<double>(*partner, Y, a, I), distanceOf<double>(same, I, *partner, Y) <= margin);
+          EXPECT_EQ(test::touching<double>(a, I, *partner, Y), test::distance<double>(same, I, *partner, Y) <= margin);
+          EXPECT_EQ(test::touching<double>(*partner, Y, a, I), test::distance<double>(same, I, *partner, Y) <= margin);
         }
         free_ones += !hit;
       }
@@ -262,7 +254,8 @@ TYPED_TEST(Margin, ShapesWithinItCollide) {
           ASSERT_EQ(fcl::collide(&wide, X, shape.get(), Y, request, one) > 0, hit) << margin << ' ' << d;
           ASSERT_EQ(fcl::collide(shape.get(), Y, &wide, X, request, other) > 0, hit) << margin << ' ' << d;
         }
-        ASSERT_EQ(distanceOf<S>(wide, X, *shape, Y), distanceOf<S>(plain, X, *shape, Y)) << "distances know no margin";
+        ASSERT_EQ(test::distance<S>(wide, X, *shape, Y), test::distance<S>(plain, X, *shape, Y))
+            << "distances know no margin";
       }
       apart += d > 0;
     }
@@ -382,11 +375,11 @@ TEST(MarginConservative, ShapesAndCellsAreNeverFreeWithinIt) {
       for (int i = 0; i < 6; ++i) {
         const auto X = test::pose<double>(test::randomRotation(g), test::randomDirection(g));
         const auto Y = test::pose<double>(test::randomRotation(g), test::randomDirection(g) * 4 * u(g));
-        const double d = distanceOf<double>(exact, X, *partner, Y);
+        const double d = test::distance<double>(exact, X, *partner, Y);
         auto options = with(0, Answer::kConservative, subdivision);
         options.depth = 5;
         const Modeld none(raw.mesh(), options);
-        const double e = distanceOf<double>(none, X, *partner, Y);
+        const double e = test::distance<double>(none, X, *partner, Y);
         for (const double margin : {d * (1 + 1e-6) + 1e-6, e * (1 + 1e-4) + 1e-4, e * (1 - 1e-4) - 1e-4}) {
           if (margin < 0) continue;
           options.margin = margin;
@@ -446,8 +439,7 @@ TYPED_TEST(Margin, AlongEdgesWithTinyComponents) {
   a.vertices = {{-1, -1, 0}, {1, 0, 0}, {0, 1, 0}};
   a.vertices[1].y() = -1;
   a.triangles.emplace_back(0, 1, 2);
-  b.vertices = {{-1, 0, 0.1}, {1, 1e-33, 0.1}, {0, 0, 0.5}};
-  b.triangles.emplace_back(0, 1, 2);
+  b.addTriangle({-1, 0, 0.1}, {1, 1e-33, 0.1}, {0, 0, 0.5});
   const auto I = fcl::Transform3<S>(fcl::Transform3<S>::Identity());
   const Model<S> narrow(a.mesh(), with(0.09)), wide(a.mesh(), with(0.2)), model(b.mesh());
   const auto bvh = test::bvh<fcl::AABB<S>>(b);
@@ -456,7 +448,7 @@ TYPED_TEST(Margin, AlongEdgesWithTinyComponents) {
     EXPECT_TRUE(test::touching<S>(wide, I, *partner, I));
     EXPECT_TRUE(test::touching<S>(*partner, I, wide, I));
     EXPECT_FALSE(test::touching<S>(narrow, I, *partner, I));
-    EXPECT_NEAR(static_cast<double>(distanceOf<S>(wide, I, *partner, I)), 0.1, 1e-6);
+    EXPECT_NEAR(static_cast<double>(test::distance<S>(wide, I, *partner, I)), 0.1, 1e-6);
   }
 }
 
@@ -542,8 +534,7 @@ TEST(IsCloserThan, FindsCellsOfAnySize) {
   const auto I = fcl::Transform3d(fcl::Transform3d::Identity());
   for (const double s : {1.0, 1e-30, 1e-40, 1e-44, 1e-45, 1e-50, 1e-200}) {
     test::Raw raw;
-    raw.vertices = {{0, 0, 0}, {s, 0, 0}, {0, s, 0}};
-    raw.triangles.emplace_back(0, 1, 2);
+    raw.addTriangle({0, 0, 0}, {s, 0, 0}, {0, s, 0});
     const Modeld model(raw.mesh());
     auto map = std::make_shared<octomap::OcTree>(0.25 * s);
     map->updateNode(map->keyToCoord(octomap::OcTreeKey(32768, 32768, 32768)), true);  // from 0 to 0.25 s

@@ -535,8 +535,7 @@ void checkConservative(const Partner<S>& row) {
 template <typename S>
 void checkOneTriangle(const Partner<S>& row) {
   Raw raw;
-  raw.vertices = {{-0.5, -0.25, 0.125}, {0.75, -0.125, -0.25}, {0, 0.625, 0.25}};
-  raw.triangles.emplace_back(0, 1, 2);
+  raw.addTriangle({-0.5, -0.25, 0.125}, {0.75, -0.125, -0.25}, {0, 0.625, 0.25});
   const Solids solids = solidsOf(raw);
   const Model<S> model(raw.mesh());
   const Pairing<S> pairing{model, *row.geometry};

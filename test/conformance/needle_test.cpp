@@ -140,10 +140,9 @@ TEST(Needles, MarginsAndFloat) {
   const Modelf fa(raw.mesh()), fb(raw.mesh());
   const fcl::Transform3d I = fcl::Transform3d::Identity();
   for (const fcl::Transform3d& X : poses(g, radius)) {
-    fcl::DistanceResultd distance;
-    fcl::distance(&a, I, &b, X, fcl::DistanceRequestd(), distance);
-    EXPECT_EQ(test::touching<double>(a, I, b, X), distance.min_distance <= wide.margin) << distance.min_distance;
-    EXPECT_EQ(test::touching<double>(b, X, a, I), distance.min_distance <= wide.margin);
+    const double distance = test::distance<double>(a, I, b, X);
+    EXPECT_EQ(test::touching<double>(a, I, b, X), distance <= wide.margin) << distance;
+    EXPECT_EQ(test::touching<double>(b, X, a, I), distance <= wide.margin);
     const fcl::Transform3f Xf = test::pose<float>(X.linear(), X.translation()), If = fcl::Transform3f::Identity();
     const Pairs pairs = test::pairs<float>(fa, If, fb, Xf);
     Pairs swapped;
@@ -151,9 +150,9 @@ TEST(Needles, MarginsAndFloat) {
     EXPECT_EQ(pairs.empty(), !test::touching<float>(fa, If, fb, Xf));
     EXPECT_EQ(pairs.empty(), swapped.empty());
     // Beyond what float coordinates of length 1 are off by.
-    if (distance.min_distance > 1e-4) {
+    if (distance > 1e-4) {
       EXPECT_TRUE(pairs.empty());
-    } else if (distance.min_distance == 0) {
+    } else if (distance == 0) {
       EXPECT_FALSE(pairs.empty());
     }
   }

@@ -18,8 +18,7 @@ using test::Raw;
 
 template <typename S>
 class OcTrees : public testing::Test {};
-using Scalars = testing::Types<float, double>;
-TYPED_TEST_SUITE(OcTrees, Scalars);
+TYPED_TEST_SUITE(OcTrees, test::Scalars);
 
 template <typename S>
 fcl::CollisionResult<S> ask(const fcl::CollisionGeometry<S>& a, const fcl::Transform3<S>& X,

@@ -3,6 +3,7 @@
 
 #include <bocst/bocst.h>
 #include <fcl/geometry/bvh/BVH_model.h>
+#include <gtest/gtest.h>
 
 #include <set>
 #include <utility>
@@ -19,6 +20,8 @@ constexpr double kAtContact = 1e-12;
 #else
 constexpr double kAtContact = 0;
 #endif
+
+using Scalars = testing::Types<float, double>;
 
 using Pairs = std::set<std::pair<std::intptr_t, std::intptr_t>>;
 
@@ -55,6 +58,14 @@ bool touching(const fcl::CollisionGeometry<S>& a, const fcl::Transform3<S>& X_WA
 }
 
 template <typename S>
+S distance(const fcl::CollisionGeometry<S>& a, const fcl::Transform3<S>& X_WA, const fcl::CollisionGeometry<S>& b,
+           const fcl::Transform3<S>& X_WB) {
+  fcl::DistanceRequest<S> request;
+  fcl::DistanceResult<S> result;
+  return fcl::distance(&a, X_WA, &b, X_WB, request, result);
+}
+
+template <typename S>
 Pairs pairs(const fcl::CollisionGeometry<S>& a, const fcl::Transform3<S>& X_WA, const fcl::CollisionGeometry<S>& b,
             const fcl::Transform3<S>& X_WB) {
   fcl::CollisionRequest<S> request(1000000000);
@@ -66,14 +77,6 @@ Pairs pairs(const fcl::CollisionGeometry<S>& a, const fcl::Transform3<S>& X_WA, 
     set.insert({c.b1, c.b2});
   }
   return set;
-}
-
-template <typename S>
-fcl::Transform3<S> pose(const Eigen::Matrix3d& R, const Eigen::Vector3d& p) {
-  fcl::Transform3<S> X = fcl::Transform3<S>::Identity();
-  X.linear() = R.cast<S>();
-  X.translation() = p.cast<S>();
-  return X;
 }
 
 /// Along a direction, how far b must go so that the two just part: by bisection of `test(distance)`.

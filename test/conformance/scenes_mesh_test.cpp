@@ -190,8 +190,7 @@ test::Solid shrunk(test::Solid s, double by) {
 
 template <typename S>
 class ShapesAsMeshes : public testing::Test {};
-using Scalars = testing::Types<float, double>;
-TYPED_TEST_SUITE(ShapesAsMeshes, Scalars);
+TYPED_TEST_SUITE(ShapesAsMeshes, test::Scalars);
 
 TYPED_TEST(ShapesAsMeshes, AgreeWithTheShapes) {
   using S = TypeParam;
@@ -274,8 +273,7 @@ TYPED_TEST(ShapesAsMeshes, OneInTheOther) {
     const Model<S> inner(small.mesh());
     EXPECT_FALSE(test::touching<S>(*a.model, I, inner, I));
     EXPECT_TRUE(test::touching<S>(inner, I, *a.shape, I)) << "it is in the solid shape";
-    fcl::DistanceResult<S> distance;
-    EXPECT_GT(fcl::distance(&inner, I, a.model.get(), I, fcl::DistanceRequest<S>(), distance), S(0.1));
+    EXPECT_GT(test::distance<S>(inner, I, *a.model, I), S(0.1));
   }
 }
 

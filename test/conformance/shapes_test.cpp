@@ -52,8 +52,7 @@ void forPoses(int count, unsigned seed, const Truth<S>& truth, F&& f) {
 
 template <typename S>
 class Shapes : public testing::Test {};
-using Scalars = testing::Types<float, double>;
-TYPED_TEST_SUITE(Shapes, Scalars);
+TYPED_TEST_SUITE(Shapes, test::Scalars);
 
 TYPED_TEST(Shapes, RequestsAreHonoured) {
   using S = TypeParam;
@@ -383,8 +382,7 @@ TEST(ShapesDouble, ShapesWithoutExtent) {
 TEST(ShapesDouble, RotationsThatAreNotQuiteOrthogonal) {
   const fcl::Transform3d I = fcl::Transform3d::Identity();
   Raw far;
-  far.vertices = {{1000, 0, 0}, {1001, 0, 0}, {1000, 1, 0}};
-  far.triangles.emplace_back(0, 1, 2);
+  far.addTriangle({1000, 0, 0}, {1001, 0, 0}, {1000, 1, 0});
   const Modeld model(far.mesh());
   const fcl::Sphered small(0.01), unit(1);
   fcl::Transform3d X_WM = I, X_WB = test::pose<double>(I.linear(), {1000.8, 0.2, 0});
@@ -470,8 +468,7 @@ TEST(ShapesDouble, WhatIsWhollyInsideASolidTouchesIt) {
 // Gaps down to what rounding leaves of them: FCL's solver calls them contacts.
 TEST(ShapesDouble, NormalsOfWhatIsJustOffAreUnitVectors) {
   Raw raw;
-  raw.vertices = {{-3, -2, 0}, {4, -1, 0}, {0, 5, 0}};
-  raw.triangles.emplace_back(0, 1, 2);
+  raw.addTriangle({-3, -2, 0}, {4, -1, 0}, {0, 5, 0});
   const Modeld model(raw.mesh());
   const double lean = 0.3;
   const std::vector<std::pair<std::shared_ptr<fcl::ShapeBased>, double>> shapes = {
@@ -504,8 +501,7 @@ TEST(ShapesDouble, NormalsOfWhatIsJustOffAreUnitVectors) {
 // Where the two just touch, the difference of a triangle and a body is as flat as rounding about the origin.
 TEST(ShapesDouble, WhatJustTouchesTouchesAtBoth) {
   Raw raw;
-  raw.vertices = {{-1, 0.5, -0.25}, {-1, 0.5, 0.25}, {1, 0.5, 0.25}};
-  raw.triangles.emplace_back(0, 1, 2);
+  raw.addTriangle({-1, 0.5, -0.25}, {-1, 0.5, 0.25}, {1, 0.5, 0.25});
   const std::shared_ptr<fcl::ShapeBased> shapes[] = {std::make_shared<fcl::Cylinderd>(0.2, 0.3),
                                                      std::make_shared<fcl::Coned>(0.2, 0.3),
                                                      std::make_shared<fcl::Ellipsoidd>(0.2, 0.3, 0.1)};
@@ -573,8 +569,7 @@ TYPED_TEST(Shapes, DistancesOfWhatTouchesALargeOrAtAPointEnd) {
 // Far from the origin, triangles in float that are apart by less than the rounding of their poses.
 TEST(ShapesFloat, PositionsOfContactsWithinAMarginAreFinite) {
   Raw raw;
-  raw.vertices = {{-1, 0.5, -0.25}, {-1, 0.5, 0.25}, {1, 0.5, 0.25}};
-  raw.triangles.emplace_back(0, 1, 2);
+  raw.addTriangle({-1, 0.5, -0.25}, {-1, 0.5, 0.25}, {1, 0.5, 0.25});
   Options options;
   options.margin = 0.25;
   const Modelf model(raw.mesh(), options);

@@ -219,8 +219,7 @@ TEST(SolidModel, OnlyOfWatertightMeshes) {
 
 template <typename S>
 class SolidQueries : public testing::Test {};
-using Scalars = testing::Types<float, double>;
-TYPED_TEST_SUITE(SolidQueries, Scalars);
+TYPED_TEST_SUITE(SolidQueries, test::Scalars);
 
 TYPED_TEST(SolidQueries, WhatIsInsideCollidesEitherWayRound) {
   using S = TypeParam;
@@ -262,9 +261,7 @@ TYPED_TEST(SolidQueries, WhatIsInsideCollidesEitherWayRound) {
         // The other way round, the small one is no shell around the large one.
         ASSERT_EQ(test::touching<S>(shell, X, both, Y), touch) << i;
         ASSERT_EQ(test::pairs<S>(a, X, b, Y).size(), touch ? test::pairs<S>(*fa, X, *fb, Y).size() : inside) << i;
-        fcl::DistanceResult<S> result;
-        fcl::distance(&a, X, &b, Y, fcl::DistanceRequest<S>(), result);
-        ASSERT_EQ(result.min_distance > 0, !hit) << i;
+        ASSERT_EQ(test::distance<S>(a, X, b, Y) > 0, !hit) << i;
       }
     }
     EXPECT_GT(held, 20);
@@ -474,9 +471,7 @@ TYPED_TEST(SolidQueries, OccupiedCellsInsideCollide) {
     const bool hit = d == 0 || inside;
     ASSERT_EQ(test::touching<S>(a, I, octree, Y), hit) << i;
     ASSERT_EQ(test::touching<S>(octree, Y, a, I), hit) << i;
-    fcl::DistanceResult<S> result;
-    fcl::distance(&octree, Y, &a, I, fcl::DistanceRequest<S>(), result);
-    ASSERT_EQ(result.min_distance > 0, !hit) << i;
+    ASSERT_EQ(test::distance<S>(octree, Y, a, I) > 0, !hit) << i;
     held += inside && d > 0;
     is_free += !hit;
     if (!inside || d == 0) continue;
@@ -631,8 +626,7 @@ TEST(Solid, RotationsThatAreOffPutNothingInside) {
   for (const double y : {7.0, 22.0, 24.0, 26.0, 40.0}) {
     const auto Y = test::pose<double>(Eigen::Matrix3d::Identity(), {0, y, 0});
     EXPECT_FALSE(test::touching<double>(model, X, ball, Y)) << y;
-    fcl::DistanceResultd result;
-    EXPECT_NEAR(fcl::distance(&model, X, &ball, Y, fcl::DistanceRequestd(), result), y - 2, 0.02) << y;
+    EXPECT_NEAR(test::distance<double>(model, X, ball, Y), y - 2, 0.02) << y;
   }
 }
 

@@ -152,8 +152,7 @@ struct Answers {
     const fcl::Transform3d I = fcl::Transform3d::Identity();
     all.touches = test::touching<double>(a, I, b, Y);
     all.contacts = test::pairs<double>(a, I, b, Y).size();
-    fcl::DistanceResultd d;
-    all.distance = fcl::distance(&a, I, &b, Y, fcl::DistanceRequestd(), d);
+    all.distance = test::distance<double>(a, I, b, Y);
     fcl::Transform3d start = Y;
     start.translation() += Eigen::Vector3d(4, 1, 0);
     fcl::ContinuousCollisionRequestd request;

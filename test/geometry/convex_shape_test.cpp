@@ -31,6 +31,10 @@ struct Known {
   bool shortest;                                  // penetration() is the shortest way
 };
 
+ContactPoint penetration(const ConvexShape& body, const PointSet& points) {
+  return body.penetration(points, body.gap(points, std::numeric_limits<double>::infinity()));
+}
+
 std::vector<Known> bodies() {
   const Vector3d h(0.7, 0.4, 1.1), r(0.5, 1.2, 0.8);
   const double radius = 0.6, half = 0.9, top = 0.2;
@@ -313,7 +317,7 @@ TEST(ConvexShape, PartingPartsAndIsLeastWhereItSaysSo) {
       Vector3d t[3];
       for (Vector3d& x : t) x = at + size * Vector3d(u(g), u(g), u(g));
       if (!k.body->gap({t, 3}, kFar).isTouching()) continue;
-      const ContactPoint touch = k.body->penetration({t, 3});
+      const ContactPoint touch = penetration(*k.body, {t, 3});
       ASSERT_NEAR(touch.normal.norm(), 1, 1e-12);
       ASSERT_GE(touch.depth, 0);
       const auto moved = [&](const Vector3d& by) {
@@ -358,7 +362,7 @@ TEST(ConvexShape, WhatOverlapsByLittlePartsByLittle) {
         for (int s = 0; s < 50; ++s) (touchesAt((lo + hi) / 2) ? lo : hi) = (lo + hi) / 2;
         if (!touchesAt(lo - overlap)) continue;
         // Back along the way is one way to part them.
-        longer += k.body->penetration({m, 3}).depth > 1.5 * overlap;
+        longer += penetration(*k.body, {m, 3}).depth > 1.5 * overlap;
         ++parted;
       }
       EXPECT_GT(parted, 50);
@@ -416,7 +420,7 @@ TEST(ConvexShape, PartingPartsWhatIsFlatAndSymmetric) {
     for (std::size_t i = 0; i < triangles.size(); ++i) {
       const Vector3d* t = triangles[i].data();
       if (!all[b]->gap({t, 3}, kFar).isTouching()) continue;
-      const ContactPoint touch = all[b]->penetration({t, 3});
+      const ContactPoint touch = penetration(*all[b], {t, 3});
       ASSERT_NEAR(touch.normal.norm(), 1, 1e-9) << b << ' ' << i;
       ASSERT_GE(touch.depth, 0);
       ASSERT_LT(touch.depth, 3);
@@ -436,8 +440,8 @@ TEST(ConvexShape, TrianglesPartAsTriangles) {
   const Vector3d across[3] = {{0.5, 0.5, -0.25}, {0.5, 0.5, 1}, {1, 0.5, 1}},
                  off[3] = {{0, 0, 1}, {1, 0, 1}, {0, 1, 1}};
   EXPECT_TRUE(body.gap({across, 3}, kFar).isTouching());
-  EXPECT_NEAR(body.penetration({across, 3}).depth, 0.25, 1e-12);
-  EXPECT_NEAR(body.penetration({across, 3}).normal.z(), 1, 1e-12);
+  EXPECT_NEAR(penetration(body, {across, 3}).depth, 0.25, 1e-12);
+  EXPECT_NEAR(penetration(body, {across, 3}).normal.z(), 1, 1e-12);
   EXPECT_NEAR(body.gap({off, 3}, kFar).distance, 1, 1e-12);
   // More points than three.
   Vector3d corners[8];

@@ -269,8 +269,7 @@ TEST(Interior, ProbesAreSpreadOverTheLargestComponent) {
 
 TEST(Interior, ASurfaceWithoutAreaHasOneProbe) {
   Raw line;
-  line.vertices = {{0, 0, 0}, {1, 2, 3}, {2, 4, 6}};
-  line.triangles.emplace_back(0, 1, 2);
+  line.addTriangle({0, 0, 0}, {1, 2, 3}, {2, 4, 6});
   const auto mesh = line.mesh();
   const Interior interior(*mesh, latticeOf(*mesh));
   for (std::size_t i = 0; i < Interior::kProbes; ++i) {

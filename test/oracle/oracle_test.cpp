@@ -347,8 +347,7 @@ TEST_P(EveryOracle, LongSliversThroughDeepCells) {
       places.push_back(placeIn(octants.back(), g));
       Eigen::Vector3d corners[3];
       sliverThrough(places.back(), t % 2 == 0 ? 16000 : std::min(16000u, 6 * octants.back().side()), g, corners);
-      raw.vertices.insert(raw.vertices.end(), corners, corners + 3);
-      raw.triangles.emplace_back(raw.vertices.size() - 3, raw.vertices.size() - 2, raw.vertices.size() - 1);
+      raw.addTriangle(corners[0], corners[1], corners[2]);
     }
     const Surface surface = residentOn(*oracle_, surfaceOf(raw));
     ASSERT_EQ(surface.lattice.unit(), 1);
@@ -390,8 +389,7 @@ struct SingleTriangles {
       add(Eigen::Vector3d(x, x, x), Eigen::Vector3d(x, x, x), Eigen::Vector3d(x, x, x));
   }
   std::uint32_t add(const Eigen::Vector3d& a, const Eigen::Vector3d& b, const Eigen::Vector3d& c) {
-    raw.vertices.insert(raw.vertices.end(), {a, b, c});
-    raw.triangles.emplace_back(raw.vertices.size() - 3, raw.vertices.size() - 2, raw.vertices.size() - 1);
+    raw.addTriangle(a, b, c);
     return static_cast<std::uint32_t>(raw.triangles.size() - 1);
   }
   test::Raw raw;

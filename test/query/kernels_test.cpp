@@ -7,7 +7,6 @@
 #include <algorithm>
 #include <map>
 #include <numeric>
-#include <set>
 
 #include "every_target.h"
 #include "geometry/overlap_kernels.h"
@@ -750,12 +749,8 @@ TEST_P(EveryTarget, PackedCornersAreWhereTheMeshHasThem) {
     const double size = std::pow(10.0, 3 * u(g)), part = round % 10 == 0 ? 0 : std::pow(10.0, 2 * u(g) - 2);
     const std::size_t count = 1 + g() % TrianglePack::kCapacity;
     const Eigen::Vector3d at = size * 0.5 * Eigen::Vector3d(u(g), u(g), u(g));
-    const auto add = [&raw](const Eigen::Vector3d& p, const Eigen::Vector3d& q, const Eigen::Vector3d& r) {
-      const std::size_t first = raw.vertices.size();
-      for (const Eigen::Vector3d& v : {p, q, r}) raw.vertices.push_back(v);
-      raw.triangles.emplace_back(first, first + 1, first + 2);
-    };
-    add(size * Eigen::Vector3d(-1, -1, -1), size * Eigen::Vector3d(1, 1, 1), size * Eigen::Vector3d(1, -1, 0));
+    raw.addTriangle(size * Eigen::Vector3d(-1, -1, -1), size * Eigen::Vector3d(1, 1, 1),
+                    size * Eigen::Vector3d(1, -1, 0));
     const bool is_strip = round % 2 == 1;
     std::array<Eigen::Vector3d, 3> v;
     for (std::size_t i = 0; i < count; ++i) {
@@ -763,7 +758,7 @@ TEST_P(EveryTarget, PackedCornersAreWhereTheMeshHasThem) {
       for (std::size_t k = is_strip && i > 0 ? 2 : 0; k < 3; ++k) {
         v[k] = at + size * part * 0.5 * Eigen::Vector3d(u(g), u(g), u(g));
       }
-      add(v[0], v[1], v[2]);
+      raw.addTriangle(v[0], v[1], v[2]);
     }
     const auto mesh = raw.mesh();
     const oracle::Surface surface{mesh, lattice::Lattice(mesh->bounds(), Subdivision::kBono, 0)};

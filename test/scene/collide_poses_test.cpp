@@ -263,8 +263,7 @@ TEST(CollidePosesModels, NothingTouchesAnEmptyOne) {
 
 TEST(CollidePosesConservative, HasThemWhereSpheresOfPointsBarelyTouch) {
   Raw raw;
-  raw.vertices = {{1, 0, 0}, {1, 0, 0}, {1, 0, 0}};
-  raw.triangles.emplace_back(0, 1, 2);
+  raw.addTriangle({1, 0, 0}, {1, 0, 0}, {1, 0, 0});
   Options options;
   options.answer = Answer::kConservative;
   options.subdivision = Subdivision::kOctree;

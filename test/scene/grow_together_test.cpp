@@ -114,8 +114,7 @@ TEST_P(GrowTogether, PosesInThreads) {
 // A mesh so large that the other's lattice is lost in its rounding; and a model with itself.
 TEST_P(GrowTogether, AnySizes) {
   Raw huge;
-  huge.vertices = {{-1e30, -1e30, 0}, {1e30, -1e30, 0}, {0, 1e30, 0}};
-  huge.triangles.emplace_back(0, 1, 2);
+  huge.addTriangle({-1e30, -1e30, 0}, {1e30, -1e30, 0}, {0, 1e30, 0});
   const auto small = test::torus(12).mesh();
   const Modeld a(huge.mesh(), optionsOf(GetParam().oracle)), b(small, optionsOf(GetParam().oracle));
   const Transforms X = randomPoses(40, 0.3);

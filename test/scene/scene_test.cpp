@@ -111,9 +111,7 @@ struct World {
   S clearance(const fcl::Transform3<S>* X_WM) const {
     S least = std::numeric_limits<S>::max();
     pairs(X_WM, [&](const Object& a, const auto& X_WA, const Object& b, const auto& X_WB) {
-      fcl::DistanceResult<S> result;
-      const S d = fcl::distance(a.geometry.get(), X_WA, b.geometry.get(), X_WB, fcl::DistanceRequest<S>(), result);
-      least = std::min(least, std::max(d, S(0)));
+      least = std::min(least, std::max(test::distance<S>(*a.geometry, X_WA, *b.geometry, X_WB), S(0)));
     });
     return least;
   }
@@ -197,8 +195,7 @@ States<S> walk(std::size_t states, std::size_t moving, double spread, double ste
 
 template <typename S>
 class SceneTest : public testing::Test {};
-using Scalars = testing::Types<float, double>;
-TYPED_TEST_SUITE(SceneTest, Scalars);
+TYPED_TEST_SUITE(SceneTest, test::Scalars);
 
 template <typename S>
 void checkVerdicts(const World<S>& w, const States<S>& X, std::size_t states, std::size_t& hits) {
@@ -688,9 +685,7 @@ TYPED_TEST(SceneTest, ClearanceIsTheLeastDistance) {
     (expected > 0 ? apart : near) += 1;
     w.pairs(X.data(), [&](const auto& a, const auto& X_WA, const auto& b, const auto& X_WB) {
       if (a.id != nearest.a || b.id != nearest.b) return;
-      fcl::DistanceResult<S> result;
-      const S d = fcl::distance(a.geometry.get(), X_WA, b.geometry.get(), X_WB, fcl::DistanceRequest<S>(), result);
-      EXPECT_NEAR(std::max(d, S(0)), expected, tolerance);
+      EXPECT_NEAR(std::max(test::distance<S>(*a.geometry, X_WA, *b.geometry, X_WB), S(0)), expected, tolerance);
     });
   }
   EXPECT_GT(near, 5);
@@ -931,8 +926,7 @@ TYPED_TEST(SceneTest, EdgesThroughAThinWall) {
 TYPED_TEST(SceneTest, ConservativeSpheresReachOutOfTheBoxes) {
   using S = TypeParam;
   Raw slanted, plate = test::box({-1, -1, 0}, {1, 1, 0});
-  slanted.vertices = {{1, 0, 0}, {0, 1, 0}, {0, 0, 1}};
-  slanted.triangles.emplace_back(0, 1, 2);
+  slanted.addTriangle({1, 0, 0}, {0, 1, 0}, {0, 0, 1});
   int hits = 0;
   for (const Raw& raw : {slanted, plate}) {
     for (const Subdivision subdivision : {Subdivision::kBono, Subdivision::kOctree}) {

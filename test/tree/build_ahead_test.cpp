@@ -7,7 +7,6 @@
 
 #include <chrono>
 #include <future>
-#include <mutex>
 #include <random>
 #include <shared_mutex>
 #include <thread>

@@ -6,7 +6,6 @@
 #include <gtest/gtest.h>
 
 #include <algorithm>
-#include <cmath>
 #include <random>
 
 #include "every_target.h"
@@ -185,26 +184,22 @@ TEST(RootGrid, KnowsWhatTouchesFacesOfCells) {
     test::Raw raw = test::torus(50);
     raw.scale(1000).move({2000, 2000, 2000});
     // The bounds are that of cells: half as many along two axes as along the third.
-    const auto triangle = [&raw](const Eigen::Vector3d& a, const Eigen::Vector3d& b, const Eigen::Vector3d& c) {
-      raw.vertices.insert(raw.vertices.end(), {a, b, c});
-      raw.triangles.emplace_back(raw.vertices.size() - 3, raw.vertices.size() - 2, raw.vertices.size() - 1);
-    };
     Eigen::Vector3d most(32768, 32768, 32768);
     most[round % 3] = 65536;
-    triangle({0, 0, 0}, {0, 0, 0}, {0, 0, 0});
-    triangle(most, most, most);
+    raw.addTriangle({0, 0, 0}, {0, 0, 0}, {0, 0, 0});
+    raw.addTriangle(most, most, most);
     const double side = 8192;
     const auto cornerOfCell = [&] {
       Eigen::Vector3d p;
       for (int k = 0; k < 3; ++k) p[k] = static_cast<double>(g() % (k == round % 3 ? 9 : 5)) * side;
       return p;
     };
-    for (int i = 0; i < 2; ++i) triangle(cornerOfCell(), cornerOfCell(), cornerOfCell());
+    for (int i = 0; i < 2; ++i) raw.addTriangle(cornerOfCell(), cornerOfCell(), cornerOfCell());
     for (int i = 0; i < 12; ++i) {
       Eigen::Vector3d p = cornerOfCell().cwiseMax(side).cwiseMin(most - Eigen::Vector3d::Constant(side));
       const double off = g() % 2 != 0 ? 0.5 : -0.5;
       for (int k = 0; k < 3; ++k) p[k] += g() % 2 != 0 ? side / 2 : off;
-      triangle(p, p + Eigen::Vector3d(off, 0, off), p + Eigen::Vector3d(0, off, off));
+      raw.addTriangle(p, p + Eigen::Vector3d(off, 0, off), p + Eigen::Vector3d(0, off, off));
     }
     const Surface surface = surfaceOf(raw);
     ASSERT_EQ(surface.lattice.unit(), 1);

@@ -7,7 +7,6 @@
 
 #include <map>
 #include <random>
-#include <set>
 
 #include "fcl/adapters/models.h"
 #include "lattice/lattice.h"
@@ -135,10 +134,7 @@ TEST(Tree, LeavesOfAWholeTreeArePacked) {
   }
   // A torus of a 100 000th of the mesh's size.
   test::Raw raw = test::torus(40);
-  for (Eigen::Vector3d& v : raw.vertices) v *= 1e-5;
-  const std::size_t first = raw.vertices.size();
-  for (const double x : {-1.0, 0.0, 1.0}) raw.vertices.emplace_back(x, x * x, 1 - x);
-  raw.triangles.emplace_back(first, first + 1, first + 2);
+  raw.scale(1e-5).addTriangle({-1, 1, 2}, {0, 0, 1}, {1, 1, 0});
   EXPECT_LT(share(raw.mesh(), 0), 0.05);
 }
 

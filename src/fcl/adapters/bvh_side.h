@@ -6,7 +6,6 @@
 #include <cstddef>
 #include <stdexcept>
 #include <string>
-#include <vector>
 
 #include "fcl/adapters/rounding.h"
 #include "query/sides/side.h"

@@ -13,7 +13,8 @@ namespace bocst::fcl_adapter {
 template <typename S>
 class PolytopeShape final : public query::SupportShape {
  public:
-  explicit PolytopeShape(const fcl::Convex<S>& convex) : PolytopeShape(convex, boxOf(convex)) {}
+  explicit PolytopeShape(const fcl::Convex<S>& convex)
+      : SupportShape(query::boxOf(convex.getVertices()), 0), convex_(convex) {}
 
  protected:
   Eigen::Vector3d support(const Eigen::Vector3d& d) const override {
@@ -33,15 +34,6 @@ class PolytopeShape final : public query::SupportShape {
 
  private:
   static constexpr std::size_t kMany = 64;
-
-  PolytopeShape(const fcl::Convex<S>& convex, const Eigen::AlignedBox3d& box)
-      : SupportShape(box.center(), box.sizes() / 2, 0), convex_(convex) {}
-
-  static Eigen::AlignedBox3d boxOf(const fcl::Convex<S>& convex) {
-    Eigen::AlignedBox3d box;
-    for (const fcl::Vector3<S>& v : convex.getVertices()) box.extend(v.template cast<double>());
-    return box;
-  }
 
   const fcl::Convex<S>& convex_;
 };

@@ -48,10 +48,13 @@ enum class PairKind {
 
 /// @throws std::logic_error for a Model that is being built, std::invalid_argument for null.
 template <typename S>
-PairKind kindOf(const fcl::CollisionGeometry<S>* o1, const fcl::CollisionGeometry<S>* o2) {
+PairKind kindOf(const char* query, const fcl::CollisionGeometry<S>* o1, const fcl::CollisionGeometry<S>* o2) {
   const Model<S>*model1 = asModel<S>(o1), *model2 = asModel<S>(o2);
   if (model1 == nullptr || model2 == nullptr) {
-    if (o1 == nullptr || o2 == nullptr) throw std::invalid_argument("bocst: a geometry is a null pointer");
+    if (o1 == nullptr || o2 == nullptr) {
+      throw std::invalid_argument(std::string("bocst::") + query + ": " + (o1 == nullptr ? "o1" : "o2") +
+                                  " is a null pointer");
+    }
     if (model1 == model2) return PairKind::kForeign;
   }
   const auto is_empty = [](const Model<S>* model) {

@@ -110,11 +110,7 @@ std::unique_ptr<query::Motion> motionOf(const char* argument, const fcl::MotionB
 /// The pose at a time from 0 to 1.
 template <typename S>
 fcl::Transform3<S> poseAt(const query::Motion& motion, double time) {
-  const Eigen::Isometry3d X = motion.at(time);
-  fcl::Transform3<S> Y = fcl::Transform3<S>::Identity();
-  Y.linear() = X.linear().template cast<S>();
-  Y.translation() = X.translation().template cast<S>();
-  return Y;
+  return motion.at(time).cast<S>();
 }
 
 /// From one pose to another. FCL 0.7 makes an InterpMotion with an unset reference point and a SplineMotion with unset

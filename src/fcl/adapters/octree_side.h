@@ -14,7 +14,6 @@
 #include <limits>
 #include <optional>
 #include <utility>
-#include <vector>
 
 #include "fcl/adapters/narrow_phase.h"
 #include "geometry/convex_shape.h"

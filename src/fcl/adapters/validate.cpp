@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #include "fcl/adapters/validate.h"
 
+#include <cmath>
 #include <cstring>
 #include <sstream>
 #include <stdexcept>

@@ -8,7 +8,6 @@
 #include <fcl/narrowphase/distance_result.h>
 
 #include <Eigen/Geometry>
-#include <cmath>
 #include <cstring>
 
 // What is no pose, no tolerance and no option is refused: nothing answers "free" to nonsense. Each function throws

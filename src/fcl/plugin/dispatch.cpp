@@ -218,7 +218,7 @@ void refuseWithoutDistance(const fcl::CollisionGeometry<S>* o1, const fcl::Colli
 template <typename S>
 S distance(const fcl::CollisionGeometry<S>* o1, const fcl::Transform3<S>& X_W1, const fcl::CollisionGeometry<S>* o2,
            const fcl::Transform3<S>& X_W2, const fcl::DistanceRequest<S>& request, fcl::DistanceResult<S>& result) {
-  switch (fcl_adapter::kindOf<S>(o1, o2)) {
+  switch (fcl_adapter::kindOf<S>("distance", o1, o2)) {
     case fcl_adapter::PairKind::kModel:
       return fcl_adapter::distancePair<S>(o1, X_W1, o2, X_W2, request, result);
     case fcl_adapter::PairKind::kNothing:

@@ -48,7 +48,7 @@ std::size_t collideOr(const Foreign& foreign, const fcl::CollisionGeometry<S>* o
                       const fcl::CollisionGeometry<S>* o2, const fcl::Transform3<S>& X_W2,
                       const BroughtSolver<S>& solver, const fcl::CollisionRequest<S>& request,
                       fcl::CollisionResult<S>& result) {
-  switch (kindOf<S>(o1, o2)) {
+  switch (kindOf<S>("collide", o1, o2)) {
     case PairKind::kForeign:
       return foreign();
     case PairKind::kNothing:
@@ -79,7 +79,7 @@ template <typename S, typename Solver>
 S distanceEntry(const fcl::CollisionGeometry<S>* o1, const fcl::Transform3<S>& X_W1,
                 const fcl::CollisionGeometry<S>* o2, const fcl::Transform3<S>& X_W2, const Solver*,
                 const fcl::DistanceRequest<S>& request, fcl::DistanceResult<S>& result) {
-  const PairKind kind = kindOf<S>(o1, o2);
+  const PairKind kind = kindOf<S>("distance", o1, o2);
   if (kind == PairKind::kNothing) return result.min_distance;
   if (kind == PairKind::kModel) return distancePair<S>(o1, X_W1, o2, X_W2, request, result);
   if (isSentinel<S>(o1)) return Sentinel<S>::kReached;
@@ -93,7 +93,7 @@ double advancementEntry(const fcl::CollisionGeometry<double>* o1, const fcl::Mot
                         const fcl::CollisionGeometry<double>* o2, const fcl::MotionBase<double>* motion2, const Solver*,
                         const fcl::ContinuousCollisionRequest<double>& request,
                         fcl::ContinuousCollisionResult<double>& result) {
-  if (kindOf<double>(o1, o2) != PairKind::kForeign) {
+  if (kindOf<double>("continuousCollide", o1, o2) != PairKind::kForeign) {
     return continuousPair<double>(o1, motion1, o2, motion2, request, result);
   }
   warnAsFcl<double>("collision", o1, o2);

@@ -8,7 +8,6 @@
 #include <cmath>
 #include <cstdint>
 #include <optional>
-#include <stdexcept>
 #include <type_traits>
 #include <vector>
 
@@ -23,6 +22,7 @@
 #include "fcl/queries/inside_contact.h"
 #include "fcl/queries/mesh_collector.h"
 #include "fcl/queries/query_scope.h"
+#include "log/assert.h"
 #include "query/collide/pair_walk.h"
 #include "query/collide/sphere_walk.h"
 #include "query/collide/tree_walk.h"
@@ -206,9 +206,7 @@ template <typename S>
 struct Models {
   Models(const fcl::CollisionGeometry<S>* o1, const fcl::CollisionGeometry<S>* o2)
       : first(asModel<S>(o1)), second(asModel<S>(o2)) {
-    if (first == nullptr && second == nullptr) {
-      throw std::logic_error("bocst::collide: neither geometry is a bocst::Model");
-    }
+    BOCST_ASSERT(first != nullptr || second != nullptr);
   }
   bool areTwo() const { return first != nullptr && second != nullptr; }
   const Model<S>*first, *second;

@@ -148,7 +148,7 @@ double firstContact(const ContinuousQuery<S>& q) {
 template <typename S>
 S answer(const ContinuousQuery<S>& q, fcl::ContinuousCollisionResult<S>& result) {
   // An empty model touches nothing.
-  const bool is_empty = kindOf<S>(q.o1, q.o2) == PairKind::kNothing;
+  const bool is_empty = kindOf<S>("continuousCollide", q.o1, q.o2) == PairKind::kNothing;
   const double time = is_empty ? std::numeric_limits<double>::infinity() : firstContact(q);
   result.is_collide = time <= 1;
   // Rounded, if at all, to what is earlier.

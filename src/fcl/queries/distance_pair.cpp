@@ -18,6 +18,7 @@
 #include "fcl/queries/convex_frame.h"
 #include "fcl/queries/inside.h"
 #include "fcl/queries/query_scope.h"
+#include "log/assert.h"
 #include "query/distance/distance_walk.h"
 
 namespace bocst::fcl_adapter {
@@ -262,9 +263,7 @@ S distancePair(const fcl::CollisionGeometry<S>* o1, const fcl::Transform3<S>& X_
                const fcl::Transform3<S>& X_W2, const fcl::DistanceRequest<S>& request, fcl::DistanceResult<S>& result) {
   const auto* model1 = asModel<S>(o1);
   const auto* model2 = asModel<S>(o2);
-  if (model1 == nullptr && model2 == nullptr) {
-    throw std::logic_error("bocst::distance: neither geometry is a bocst::Model");
-  }
+  BOCST_ASSERT(model1 != nullptr || model2 != nullptr);
   checkPose("distance", "tf1", X_W1);
   checkPose("distance", "tf2", X_W2);
   checkRequest(request, result);

@@ -4,7 +4,6 @@
 #include <algorithm>
 #include <chrono>
 #include <optional>
-#include <utility>
 
 #include "fcl/adapters/models.h"
 #include "fcl/adapters/pair.h"

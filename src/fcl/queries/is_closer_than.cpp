@@ -21,7 +21,7 @@ template <typename S>
 bool isCloserThan(const fcl::CollisionGeometry<S>* o1, const fcl::Transform3<S>& X_W1,
                   const fcl::CollisionGeometry<S>* o2, const fcl::Transform3<S>& X_W2, S distance) {
   fcl_adapter::checkTolerance("isCloserThan", "distance", static_cast<double>(distance));
-  switch (fcl_adapter::kindOf<S>(o1, o2)) {
+  switch (fcl_adapter::kindOf<S>("isCloserThan", o1, o2)) {
     case fcl_adapter::PairKind::kNothing:
       return false;
     case fcl_adapter::PairKind::kModel:

@@ -1,8 +1,6 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #include "oracle/cpu/kernels.h"
 
-#include <algorithm>
-
 #include "simd/unroll.h"
 
 #undef HWY_TARGET_INCLUDE

@@ -1,9 +1,6 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #include "oracle/gl/compute_oracle.h"
 
-#include <algorithm>
-#include <utility>
-
 #include "log/log.h"
 #include "oracle/gl/self_test.h"
 

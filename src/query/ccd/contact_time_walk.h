@@ -2,7 +2,6 @@
 #pragma once
 
 #include <algorithm>
-#include <cmath>
 #include <cstddef>
 #include <limits>
 #include <type_traits>
@@ -188,7 +187,7 @@ class ContactTimeWalk : private BestFirst<ContactTimeWalk<A, B>, A, B> {
     if (!(free > 0)) return now_;
     const Eigen::Vector3d direction = -(b_in_world_.rotation * gap.normal);
     return advanced(free, motion_a_.closingSpeed(direction, kBlur, ball.center, radius_of_turn, now_) +
-                              closingSpeedOf(motion_b_, inWorld(b, b_in_world_), -direction, kBlur, now_));
+                              speedOf(motion_b_, inWorld(b, b_in_world_), -direction, kBlur, now_));
   }
 
   // Of bodies the ball would be a poor bound: they are asked themselves.
@@ -331,15 +330,10 @@ class ContactTimeWalk : private BestFirst<ContactTimeWalk<A, B>, A, B> {
     return gap.isTouching() ? 0 : std::max(0.0, gap.at_least * b_in_world_.scale - p.radius);
   }
 
-  // Velocities are affine in position, so a hull's extremes are at its corners; a ball goes with its middle.
   template <typename T>
-  static ClosingSpeed closingSpeedOf(const Motion& motion, const T& primitive, const Eigen::Vector3d& direction,
-                                     double blur, double time) {
-    ClosingSpeed most = motion.closingSpeed(direction, blur, primitive.corners[0], 0, time);
-    for (std::size_t k = 1; k < primitive.count; ++k) {
-      most = ClosingSpeed::most(most, motion.closingSpeed(direction, blur, primitive.corners[k], 0, time));
-    }
-    return most;
+  static ClosingSpeed speedOf(const Motion& motion, const T& primitive, const Eigen::Vector3d& direction, double blur,
+                              double time) {
+    return closingSpeedOf(motion, primitive.corners, primitive.count, direction, blur, time);
   }
 
   template <typename T>
@@ -369,9 +363,9 @@ class ContactTimeWalk : private BestFirst<ContactTimeWalk<A, B>, A, B> {
       const double size = sizeOf(pw) + sizeOf(qw) + pw.corners[0].norm() + qw.corners[0].norm();
       const double blur = std::min(1.0, 8 * std::numeric_limits<double>::epsilon() * size / distance);
       // To half of what counts as contact, so that steps do not shrink for ever.
-      const double later = advanced(
-          distance - contactDistance() + goal_.rounding / 2,
-          closingSpeedOf(motion_a_, pw, direction, blur, time) + closingSpeedOf(motion_b_, qw, -direction, blur, time));
+      const double later =
+          advanced(distance - contactDistance() + goal_.rounding / 2,
+                   speedOf(motion_a_, pw, direction, blur, time) + speedOf(motion_b_, qw, -direction, blur, time));
       if (!(later > time)) return time;
       // Close to a contact: if it is certain to come soon, the rest of the way need not be gone.
       if (later - time < tie() && time + tie() <= 1 && isContact(p, q, time + tie())) return time;

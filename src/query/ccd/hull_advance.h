@@ -14,43 +14,16 @@ namespace bocst::query {
 /// The convex hull of points, which must outlive it.
 class HullShape final : public SupportShape {
  public:
-  explicit HullShape(const std::vector<Eigen::Vector3d>& points) : HullShape(points, boxOf(points)) {}
+  explicit HullShape(const std::vector<Eigen::Vector3d>& points) : SupportShape(boxOf(points), 0), points_(points) {}
 
  protected:
   Eigen::Vector3d support(const Eigen::Vector3d& d) const override {
-    const Eigen::Vector3d* best = &points_.front();
-    double most = -std::numeric_limits<double>::infinity();
-    for (const Eigen::Vector3d& p : points_) {
-      const double along = d.dot(p);
-      if (along > most) most = along, best = &p;
-    }
-    return *best;
+    return PointSet{points_.data(), static_cast<int>(points_.size())}.support(d);
   }
 
  private:
-  HullShape(const std::vector<Eigen::Vector3d>& points, const Eigen::AlignedBox3d& box)
-      : SupportShape(box.center(), box.sizes() / 2, 0), points_(points) {}
-
-  static Eigen::AlignedBox3d boxOf(const std::vector<Eigen::Vector3d>& points) {
-    Eigen::AlignedBox3d box;
-    for (const Eigen::Vector3d& p : points) box.extend(p);
-    return box;
-  }
-
   const std::vector<Eigen::Vector3d>& points_;
 };
-
-/// Of the hull of points of a moving body, along a unit direction: velocities are affine in position, so the extremes
-/// are at the points.
-inline ClosingSpeed fastestOf(const std::vector<Eigen::Vector3d>& points, const Motion& motion,
-                              const Eigen::Vector3d& direction, double time) {
-  constexpr double kBlur = 1e-15;
-  ClosingSpeed most = motion.closingSpeed(direction, kBlur, points[0], 0, time);
-  for (const Eigen::Vector3d& p : points) {
-    most = ClosingSpeed::most(most, motion.closingSpeed(direction, kBlur, p, 0, time));
-  }
-  return most;
-}
 
 /// A time before which two moving meshes are surely farther apart than `clearance`, because their convex hulls are;
 /// more than 1: they are so all the time. Some steps of conservative advancement, as in ContactTimeWalk; each looks at
@@ -59,7 +32,7 @@ inline double hullsApartUntil(const Mesh& a, const Motion& motion_a, const Mesh&
                               double clearance) {
   constexpr int kMostSteps = 24, kFirstSteps = 6;
   constexpr double kLeastStep = 1.0 / 96;  // on average, after the first
-  constexpr double kRounding = 1e-14;
+  constexpr double kRounding = 1e-14, kBlur = 1e-15;
   const auto place = [](const Mesh& mesh, const Eigen::Isometry3d& X, std::vector<Eigen::Vector3d>& points) {
     points.clear();
     const Eigen::AlignedBox3d box = mesh.bounds();  // vertices of no triangle may lie anywhere
@@ -81,8 +54,8 @@ inline double hullsApartUntil(const Mesh& a, const Motion& motion_a, const Mesh&
     const double free = gap.at_least - kRounding * (farthest + 2 * size) - clearance;
     if (!(free > 0)) break;
     // gap.normal leads from B to A.
-    const ClosingSpeed speed =
-        fastestOf(points_a, motion_a, -gap.normal, time) + fastestOf(points_b, motion_b, gap.normal, time);
+    const ClosingSpeed speed = closingSpeedOf(motion_a, points_a.data(), points_a.size(), -gap.normal, kBlur, time) +
+                               closingSpeedOf(motion_b, points_b.data(), points_b.size(), gap.normal, kBlur, time);
     time += speed.timeFor(free) * (1 - 1e-12);
   }
   return time;

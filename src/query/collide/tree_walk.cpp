@@ -1,8 +1,6 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #include "query/collide/tree_walk.h"
 
-#include <algorithm>
-
 namespace bocst::query {
 namespace {
 

@@ -1,9 +1,6 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #pragma once
 
-#include <vector>
-
-#include "query/collide/deferred_pairs.h"
 #include "query/collide/pair_walk.h"
 #include "query/collide/tree_steps.h"
 #include "query/cull/separation.h"

@@ -24,7 +24,7 @@ using tree::SupportTable;
 // large one may take all six.
 constexpr int kIterations = 6;
 constexpr float kFirstRadius = 0.45f, kHopeless = 0.12f, kHopelessLater = 0.5f;
-constexpr float kShallow = 0.3f;  // 0.2 and 0.4 were no faster (share/doc/performance.md, "Warm exact queries")
+constexpr float kShallow = 0.3f;  // 0.2 and 0.4 were no faster (share/doc/performance-record.md, "Warm exact queries")
 
 }  // namespace
 }  // namespace bocst::query

@@ -1,13 +1,11 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #pragma once
 
-#include <algorithm>
 #include <cstddef>
 #include <cstdint>
 #include <vector>
 
 #include "geometry/extent.h"
-#include "geometry/triangle.h"
 #include "query/distance/distance_kernels.h"
 #include "query/leaf/leaf_pairs.h"
 #include "query/sides/side.h"

@@ -3,7 +3,6 @@
 
 #include <cstddef>
 #include <cstdint>
-#include <vector>
 
 #include "geometry/overlap_kernels.h"
 #include "query/sides/side.h"

@@ -3,7 +3,6 @@
 
 #include <cstddef>
 #include <cstdint>
-#include <vector>
 
 #include "query/sides/side.h"
 #include "tree/box_tree.h"

@@ -16,13 +16,6 @@ namespace {
 using Eigen::Isometry3d;
 using Eigen::Vector3d;
 
-Isometry3d pose(const Eigen::Matrix3d& R, const Vector3d& p) {
-  Isometry3d X = Isometry3d::Identity();
-  X.linear() = R;
-  X.translation() = p;
-  return X;
-}
-
 test::Raw cloud(std::mt19937_64& g, std::size_t points) {
   test::Raw raw;
   for (std::size_t i = 0; i < points; ++i) raw.vertices.push_back(test::randomDirection(g));
@@ -36,7 +29,9 @@ TEST(HullAdvance, NeverLaterThanTheFirstContactOfHulls) {
   int always = 0, never = 0, later = 0;
   for (int i = 0; i < 300; ++i) {
     const auto a = cloud(g, 3 + g() % 12).mesh(), b = cloud(g, 3 + g() % 12).mesh();
-    const auto at = [&](double spread) { return pose(test::randomRotation(g), spread * test::randomDirection(g)); };
+    const auto at = [&](double spread) {
+      return test::pose<double>(test::randomRotation(g), spread * test::randomDirection(g));
+    };
     const auto motionFrom = [&](const Isometry3d& begin) {
       const Vector3d velocity = 3 * test::randomDirection(g);
       return i % 3 == 0 ? AxisMotion(begin, velocity)
@@ -67,13 +62,13 @@ TEST(HullAdvance, BodiesThatPassEachOtherAreFree) {
   const auto cube = test::box({-1, -1, -1}, {1, 1, 1}).mesh();
   const Eigen::Matrix3d R = Eigen::AngleAxisd(0.25 * std::acos(-1.0), Vector3d::UnitZ()).toRotationMatrix();
   const double edge = 1 + std::sqrt(2.0);  // an edge of the one touches a face of the other
-  const AxisMotion still(pose(Eigen::Matrix3d::Identity(), {0, 0, 0}), Vector3d::Zero());
+  const AxisMotion still(test::pose<double>(Eigen::Matrix3d::Identity(), {0, 0, 0}), Vector3d::Zero());
   for (const double gap : {1e-6, 1e-3, 0.1}) {
-    const AxisMotion along(pose(R, {edge + gap, 0, 0}), {0, 0.3, 5});
+    const AxisMotion along(test::pose<double>(R, {edge + gap, 0, 0}), {0, 0.3, 5});
     EXPECT_GT(hullsApartUntil(*cube, still, *cube, along, gap / 2), 1);
     EXPECT_GT(hullsApartUntil(*cube, along, *cube, still, gap / 2), 1);
     EXPECT_EQ(hullsApartUntil(*cube, still, *cube, along, 2 * gap), 0);
-    const AxisMotion nearer(pose(R, {edge + gap, 0, 0}), {-4 * gap, 0, 5});
+    const AxisMotion nearer(test::pose<double>(R, {edge + gap, 0, 0}), {-4 * gap, 0, 5});
     const double until = hullsApartUntil(*cube, nearer, *cube, still, gap / 2);
     EXPECT_LE(until, 0.125);
     EXPECT_GT(until, 0.1);

@@ -1,6 +1,5 @@
 // SPDX-License-Identifier: BSD-3-Clause
 // Meshes that cubes divide badly: what the worst inputs cost beside FCL's build and queries.
-#include <array>
 #include <cmath>
 #include <functional>
 

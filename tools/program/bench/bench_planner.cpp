@@ -2,7 +2,6 @@
 // What a planner asks: an arm of seven joints and a hand among shelves and scans, under FCL's broad phase.
 #include <algorithm>
 #include <array>
-#include <numeric>
 #include <tuple>
 
 #include "bench/bench_scenarios.h"

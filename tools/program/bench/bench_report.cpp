@@ -1,7 +1,6 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #include "bench/bench_report.h"
 
-#include <cstdint>
 #include <cstdio>
 #include <iostream>
 #include <stdexcept>

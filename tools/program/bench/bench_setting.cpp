@@ -4,7 +4,6 @@
 #include <bocst/io.h>
 
 #include <algorithm>
-#include <array>
 
 #include "bench/heap.h"
 #include "cli/report.h"

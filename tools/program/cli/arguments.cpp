@@ -4,11 +4,9 @@
 #include <bocst/io.h>
 
 #include <CLI/CLI.hpp>
-#include <algorithm>
 #include <cctype>
 #include <charconv>
 #include <cmath>
-#include <filesystem>
 
 #include "cli/words.h"
 
@@ -171,6 +169,14 @@ void addJson(CLI::App& command, Output& output) {
 void checkStdout(const std::string& csv_file, const Output& output) {
   if (csv_file != "-" || output.json_file != "-") return;
   throw CLI::ValidationError("--csv", "--json already writes to stdout; give a file");
+}
+
+void read(const char* option, const std::function<void()>& f) {
+  try {
+    f();
+  } catch (const std::invalid_argument& e) {
+    throw CLI::ValidationError(option, e.what());
+  }
 }
 
 void addHtml(CLI::App& command, std::string& file) {

@@ -3,7 +3,6 @@
 
 #include <bocst/options.h>
 
-#include <cstddef>
 #include <cstdint>
 #include <functional>
 #include <string>
@@ -93,5 +92,9 @@ void addJson(CLI::App& command, Output& output);  ///< --json
 /// @throws CLI::ValidationError if CSV and JSON both go to stdout.
 void checkStdout(const std::string& csv_file, const Output& output);
 void addHtml(CLI::App& command, std::string& file);  ///< --html
+
+/// Calls f, which reads what the command line gave as `option`.
+/// @throws CLI::ValidationError if f throws std::invalid_argument.
+void read(const char* option, const std::function<void()>& f);
 
 }  // namespace bocst::program

@@ -104,6 +104,10 @@ std::string formatNumber(double value, int digits) {
   return text;
 }
 
+std::string formatVector(const Eigen::Vector3d& v, int digits, const char* between) {
+  return formatNumber(v.x(), digits) + between + formatNumber(v.y(), digits) + between + formatNumber(v.z(), digits);
+}
+
 std::string formatPlain(double value) {
   char text[64];
   std::snprintf(text, sizeof(text), "%.12g", value);

@@ -88,7 +88,8 @@ double mean(const std::vector<double>& samples);
 std::string formatTime(double microseconds);
 std::string formatBytes(double bytes);
 std::string formatNumber(double value, int digits = 3);  ///< That many significant digits, no exponent if short.
-std::string formatPlain(double value);                   ///< "514", "0.05": up to twelve digits, no zeros after them.
-std::string formatRatio(double ratio);                   ///< "12.3 x"; "-" beside nothing.
+std::string formatVector(const Eigen::Vector3d& v, int digits, const char* between);
+std::string formatPlain(double value);  ///< "514", "0.05": up to twelve digits, no zeros after them.
+std::string formatRatio(double ratio);  ///< "12.3 x"; "-" beside nothing.
 
 }  // namespace bocst::program

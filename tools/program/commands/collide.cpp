@@ -61,9 +61,7 @@ void measureWarm(const QueryPair& pair, const Eigen::Isometry3d& X_AB, Run& run)
   run.settled_us = quantile({times.end() - some, times.end()}, 0.5);
 }
 
-std::string tuple(const Eigen::Vector3d& v) {
-  return "(" + formatNumber(v.x(), 6) + ", " + formatNumber(v.y(), 6) + ", " + formatNumber(v.z(), 6) + ")";
-}
+std::string tuple(const Eigen::Vector3d& v) { return "(" + formatVector(v, 6, ", ") + ")"; }
 
 Json extentsJson(const Mesh& mesh) {
   const Eigen::AlignedBox3d& box = mesh.bounds();
@@ -194,9 +192,8 @@ struct Collide {
   void printHead(const Input& input) const {
     Table head(Table::Others::kLeft);
     const auto described = [](const std::string& file, const MeshArrays& mesh, const Mesh& shape) {
-      const Eigen::Vector3d size = shape.bounds().sizes();
-      return file + ", " + std::to_string(mesh.triangles.size()) + " triangles, " + formatNumber(size.x(), 4) + " x " +
-             formatNumber(size.y(), 4) + " x " + formatNumber(size.z(), 4);
+      return file + ", " + std::to_string(mesh.triangles.size()) + " triangles, " +
+             formatVector(shape.bounds().sizes(), 4, " x ");
     };
     head.row({"A", described(file_a, input.a, *input.mesh_a)});
     head.row({"B", described(file_b, input.b, *input.mesh_b)});
@@ -466,11 +463,9 @@ void addCollide(CLI::App& program, Job& job) {
   collide->image.add(*command);
   addJson(*command, collide->output);
   command->callback([collide, pose, &job] {
-    try {
+    read("--pose", [&] {
       if (pose->count() != 0) collide->pose = Pose::parse(collide->pose_text, collide->format());
-    } catch (const std::invalid_argument& e) {
-      throw CLI::ValidationError("--pose", e.what());
-    }
+    });
     const bool shown =
         !collide->html_file.empty() || collide->image.wanted() || collide->max_contacts != QueryPair::kAll;
     if (!collide->poses_file.empty() && shown) {

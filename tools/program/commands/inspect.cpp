@@ -8,7 +8,6 @@
 #include <memory>
 #include <optional>
 #include <stdexcept>
-#include <utility>
 #include <vector>
 
 #include "cli/arguments.h"
@@ -56,10 +55,7 @@ Grown grow(const std::shared_ptr<const Mesh>& mesh, Options options, bool errors
   return grown;
 }
 
-std::string extentsText(const Mesh& mesh) {
-  const Eigen::Vector3d extent = mesh.bounds().sizes();
-  return formatNumber(extent.x(), 6) + " x " + formatNumber(extent.y(), 6) + " x " + formatNumber(extent.z(), 6);
-}
+std::string extentsText(const Mesh& mesh) { return formatVector(mesh.bounds().sizes(), 6, " x "); }
 
 std::string watertightText(const Health& health) {
   if (!health.watertight()) return "no";
@@ -67,9 +63,7 @@ std::string watertightText(const Health& health) {
   return health.volume < 0 ? "yes, inside out" : "yes";
 }
 
-std::string text(const Eigen::Vector3d& v) {
-  return formatNumber(v.x(), 6) + ", " + formatNumber(v.y(), 6) + ", " + formatNumber(v.z(), 6);
-}
+std::string text(const Eigen::Vector3d& v) { return formatVector(v, 6, ", "); }
 
 /// The first few of a list, as text.
 template <typename T, typename Text>
@@ -358,11 +352,9 @@ void addInspect(CLI::App& program, Job& job) {
   inspect->image.add(*command);
   addJson(*command, inspect->output);
   command->callback([inspect, &job] {
-    try {
+    read("--spheres", [&] {
       if (!inspect->spheres_file.empty()) checkSphereFile(inspect->spheres_file);
-    } catch (const std::invalid_argument& e) {
-      throw CLI::ValidationError("--spheres", e.what());
-    }
+    });
     job = [inspect] { return inspect->run(); };
   });
 }

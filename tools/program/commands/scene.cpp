@@ -400,11 +400,7 @@ void addScene(CLI::App& program, Job& job) {
   addHtml(*command, scene->html_file);
   addJson(*command, scene->output);
   command->callback([scene, &job] {
-    try {
-      Packages(scene->scene.packages);
-    } catch (const std::invalid_argument& e) {
-      throw CLI::ValidationError("--package", e.what());
-    }
+    read("--package", [&] { Packages(scene->scene.packages); });
     checkStdout(scene->csv_file, scene->output);
     using Adjacent = SceneArguments::Adjacent;
     scene->scene.adjacent = scene->adjacent == "ignore"  ? Adjacent::kIgnore

@@ -4,12 +4,10 @@
 #include <CLI/CLI.hpp>
 #include <algorithm>
 #include <array>
-#include <iostream>
 #include <memory>
 #include <optional>
 #include <stdexcept>
 #include <string>
-#include <utility>
 #include <vector>
 
 #include "cli/arguments.h"
@@ -237,13 +235,7 @@ void addValidate(CLI::App& program, Job& job) {
   command
       ->add_option_function<std::string>(
           "--shard",
-          [validate](const std::string& text) {
-            try {
-              validate->shard = Shard::parse(text);
-            } catch (const std::invalid_argument& e) {
-              throw CLI::ValidationError("--shard", e.what());
-            }
-          },
+          [validate](const std::string& text) { read("--shard", [&] { validate->shard = Shard::parse(text); }); },
           "check only part i of n of the poses; `bocst merge` merges the reports")
       ->type_name("i/n");
   validate->model.addAll(*command);

@@ -2,7 +2,6 @@
 #include "commands/validation.h"
 
 #include <algorithm>
-#include <cmath>
 #include <iostream>
 #include <numeric>
 #include <stdexcept>

@@ -2,7 +2,6 @@
 #include "mesh/subdivide.h"
 
 #include <algorithm>
-#include <array>
 #include <cstdint>
 #include <tuple>
 #include <utility>

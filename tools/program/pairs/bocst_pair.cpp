@@ -2,6 +2,7 @@
 #include <bocst/fcl.h>
 #include <bocst/model.h>
 
+#include "pairs/fcl_calls.h"
 #include "pairs/pair_of.h"
 #include "pairs/query_pair.h"
 
@@ -9,24 +10,9 @@ namespace bocst::program {
 namespace {
 
 template <typename S>
-struct BocstQueries {
-  using Geometry = fcl::CollisionGeometry<S>;
-  using Pose = fcl::Transform3<S>;
-
-  static void collide(const Geometry* o1, const Pose& X_W1, const Geometry* o2, const Pose& X_W2,
-                      const fcl::CollisionRequest<S>& request, fcl::CollisionResult<S>& result) {
-    fcl::collide(o1, X_W1, o2, X_W2, request, result);
-  }
-  static void distance(const Geometry* o1, const Pose& X_W1, const Geometry* o2, const Pose& X_W2,
-                       const fcl::DistanceRequest<S>& request, fcl::DistanceResult<S>& result) {
-    fcl::distance(o1, X_W1, o2, X_W2, request, result);
-  }
-};
-
-template <typename S>
-class ModelPair : public PairOf<S, Model<S>, BocstPair, BocstQueries<S>> {
+class ModelPair : public PairOf<S, Model<S>, BocstPair, FclCalls> {
  public:
-  using PairOf<S, Model<S>, BocstPair, BocstQueries<S>>::PairOf;
+  using PairOf<S, Model<S>, BocstPair, FclCalls>::PairOf;
 
   std::vector<TouchingPoint> touchingPoints(const Eigen::Isometry3d& X_AB, std::size_t limit) const override {
     const fcl::CollisionRequest<S> request(limit, true);
@@ -47,11 +33,7 @@ class ModelPair : public PairOf<S, Model<S>, BocstPair, BocstQueries<S>> {
   NearestPoints nearest(const Eigen::Isometry3d& X_AB) const override {
     const fcl::DistanceRequest<S> request(true);
     fcl::DistanceResult<S> result;
-    const fcl::Transform3<S> X_WA = fcl::Transform3<S>::Identity();
-    const fcl::Transform3<S> X_WB = X_AB.cast<S>();
-    const fcl::CollisionGeometry<S>* a = &this->a();
-    const fcl::CollisionGeometry<S>* b = &this->b();
-    fcl::distance(a, X_WA, b, X_WB, request, result);
+    this->measure(X_AB, request, result);
     return {result.min_distance,
             result.nearest_points[0].template cast<double>(),
             result.nearest_points[1].template cast<double>(),

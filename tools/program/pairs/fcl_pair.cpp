@@ -10,6 +10,7 @@
 #include <fcl/narrowphase/detail/traversal/collision/intersect.h>
 #include <fcl/narrowphase/distance.h>
 
+#include "pairs/fcl_calls.h"
 #include "pairs/fcl_tree.h"
 #include "pairs/pair_of.h"
 #include "pairs/query_pair.h"
@@ -17,27 +18,12 @@
 namespace bocst::program {
 namespace {
 
-template <typename S>
-struct FclQueries {
-  using Geometry = fcl::CollisionGeometry<S>;
-  using Pose = fcl::Transform3<S>;
-
-  static void collide(const Geometry* o1, const Pose& X_W1, const Geometry* o2, const Pose& X_W2,
-                      const fcl::CollisionRequest<S>& request, fcl::CollisionResult<S>& result) {
-    fcl::collide(o1, X_W1, o2, X_W2, request, result);
-  }
-  static void distance(const Geometry* o1, const Pose& X_W1, const Geometry* o2, const Pose& X_W2,
-                       const fcl::DistanceRequest<S>& request, fcl::DistanceResult<S>& result) {
-    fcl::distance(o1, X_W1, o2, X_W2, request, result);
-  }
-};
-
 template <typename BV>
-class BvhPair : public PairOf<typename BV::S, fcl::BVHModel<BV>, FclPair, FclQueries<typename BV::S>> {
+class BvhPair : public PairOf<typename BV::S, fcl::BVHModel<BV>, FclPair, FclCalls> {
   using S = typename BV::S;
 
  public:
-  using PairOf<S, fcl::BVHModel<BV>, FclPair, FclQueries<S>>::PairOf;
+  using PairOf<S, fcl::BVHModel<BV>, FclPair, FclCalls>::PairOf;
 
   bool trianglesTouch(QueryPair::Contact triangles, const Eigen::Isometry3d& X_AB,
                       QueryPair::Order order) const override {

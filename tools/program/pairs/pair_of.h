@@ -16,8 +16,7 @@
 
 namespace bocst::program {
 
-/// A QueryPair over two FCL geometries. Queries has fcl::collide and fcl::distance, since which are meant depends on
-/// the headers that the including file has: FCL's own, or bocst's overloads.
+/// A QueryPair over two FCL geometries. Queries is FclCalls, which stands for FCL's own functions or bocst's overloads.
 template <typename S, typename Geometry, typename Base, typename Queries>
 class PairOf : public Base {
  public:
@@ -58,11 +57,7 @@ class PairOf : public Base {
   double distance(const Eigen::Isometry3d& X_AB) const override {
     const fcl::DistanceRequest<S> request;
     fcl::DistanceResult<S> result;
-    const fcl::Transform3<S> X_WA = fcl::Transform3<S>::Identity();
-    const fcl::Transform3<S> X_WB = X_AB.cast<S>();
-    const fcl::CollisionGeometry<S>* a = a_.get();
-    const fcl::CollisionGeometry<S>* b = b_.get();
-    Queries::distance(a, X_WA, b, X_WB, request, result);
+    measure(X_AB, request, result);
     return result.min_distance;
   }
 
@@ -83,6 +78,15 @@ class PairOf : public Base {
     } else {
       Queries::collide(b, X_WB, a, X_WA, request, result);
     }
+  }
+
+  void measure(const Eigen::Isometry3d& X_AB, const fcl::DistanceRequest<S>& request,
+               fcl::DistanceResult<S>& result) const {
+    const fcl::Transform3<S> X_WA = fcl::Transform3<S>::Identity();
+    const fcl::Transform3<S> X_WB = X_AB.cast<S>();
+    const fcl::CollisionGeometry<S>* a = a_.get();
+    const fcl::CollisionGeometry<S>* b = b_.get();
+    Queries::distance(a, X_WA, b, X_WB, request, result);
   }
 
  private:

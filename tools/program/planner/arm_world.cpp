@@ -99,14 +99,9 @@ Shape shelves() {
 std::shared_ptr<const Mesh> fitted(const Mesh& mesh, double size) {
   const Eigen::AlignedBox3d box = mesh.bounds();
   const double scale = size / box.sizes().maxCoeff();
-  Shape shape;
-  for (std::size_t i = 0; i < mesh.vertexCount(); ++i)
-    shape.vertices.push_back(scale * (mesh.vertex(i) - box.center()));
-  for (std::size_t t = 0; t < mesh.triangleCount(); ++t) {
-    const Mesh::Indices& i = mesh.indices(t);
-    shape.triangles.emplace_back(i[0], i[1], i[2]);
-  }
-  return shape.mesh();
+  std::vector<Eigen::Vector3d> vertices = mesh.vertices();
+  for (Eigen::Vector3d& v : vertices) v = scale * (v - box.center());
+  return mesh.withVertices(std::move(vertices));
 }
 
 Eigen::Isometry3d at(double x, double y, double z, double yaw = 0) {

@@ -1,23 +1,13 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #include <bocst/fcl.h>
 
+#include "pairs/fcl_calls.h"
 #include "planner/managed_arm_of.h"
 
 namespace bocst::program {
 namespace {
 
-struct BocstArmQueries {
-  template <typename... Arguments>
-  static void collide(Arguments&&... arguments) {
-    fcl::collide(std::forward<Arguments>(arguments)...);
-  }
-  template <typename... Arguments>
-  static void distance(Arguments&&... arguments) {
-    fcl::distance(std::forward<Arguments>(arguments)...);
-  }
-};
-
-class BocstArm final : public ManagedArmOf<BocstManagedArm, BocstArmQueries> {
+class BocstArm final : public ManagedArmOf<BocstManagedArm, FclCalls> {
  public:
   using ManagedArmOf::ManagedArmOf;
 

@@ -4,22 +4,12 @@
 #include <fcl/narrowphase/collision.h>
 #include <fcl/narrowphase/distance.h>
 
+#include "pairs/fcl_calls.h"
 #include "pairs/fcl_tree.h"
 #include "planner/managed_arm_of.h"
 
 namespace bocst::program {
 namespace {
-
-struct FclArmQueries {
-  template <typename... Arguments>
-  static void collide(Arguments&&... arguments) {
-    fcl::collide(std::forward<Arguments>(arguments)...);
-  }
-  template <typename... Arguments>
-  static void distance(Arguments&&... arguments) {
-    fcl::distance(std::forward<Arguments>(arguments)...);
-  }
-};
 
 std::shared_ptr<fcl::CollisionGeometryd> build(const std::shared_ptr<const Mesh>& mesh) {
   std::shared_ptr<fcl::CollisionGeometryd> model = buildFclTree<fcl::OBBRSSd>(MeshArrays(*mesh, Scalar::kDouble));
@@ -33,7 +23,7 @@ std::unique_ptr<ManagedArm> manageFclArm(const ArmWorld& world) {
   std::vector<std::shared_ptr<fcl::CollisionGeometryd>> geometries;
   for (const ArmWorld::Thing& link : world.links()) geometries.push_back(build(link.mesh));
   for (const ArmWorld::Thing& thing : world.things()) geometries.push_back(build(thing.mesh));
-  return std::make_unique<ManagedArmOf<ManagedArm, FclArmQueries>>(world, std::move(geometries));
+  return std::make_unique<ManagedArmOf<ManagedArm, FclCalls>>(world, std::move(geometries));
 }
 
 }  // namespace bocst::program

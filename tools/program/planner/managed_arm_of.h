@@ -15,7 +15,7 @@
 
 namespace bocst::program {
 
-/// A ManagedArm over FCL geometries. Queries has fcl::collide and fcl::distance, as for PairOf.
+/// A ManagedArm over FCL geometries. Queries is FclCalls, as for PairOf.
 template <typename Base, typename Queries>
 class ManagedArmOf : public Base {
  public:
