@@ -145,6 +145,7 @@ std::string Packages::search(const std::string& name, const std::string& folder)
 }
 
 std::string Packages::resolve(const std::string& uri, const std::string& folder) const {
+  if (uri.empty()) throw std::runtime_error("the name is empty");
   for (const std::string scheme : {"package://", "model://"}) {
     if (!startsWith(uri, scheme)) continue;
     const std::size_t end = std::min(uri.find('/', scheme.size()), uri.size());

@@ -1,8 +1,8 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #include "robot/robot.h"
 
+#include <algorithm>
 #include <map>
-#include <set>
 #include <stdexcept>
 
 namespace bocst::program {
@@ -37,6 +37,7 @@ Robot::Robot(std::string name, std::vector<Part> links, std::vector<Joint> joint
     source.column = sources_[leader]->column;
     sources_[i] = source;
   }
+  findFrames();
 }
 
 std::vector<double> Robot::jointValues(const std::vector<double>& state) const {
@@ -63,28 +64,34 @@ std::vector<Eigen::Isometry3d> Robot::linkPoses(const std::vector<double>& state
   return X_RL;
 }
 
+void Robot::findFrames() {
+  frame_.resize(links_.size());
+  around_.resize(links_.size());
+  for (std::size_t i = 0; i < links_.size(); ++i) {
+    frame_[i] = i;
+    if (i == 0) continue;
+    const std::size_t parent = joints_[i - 1].parent;
+    const bool has_shapes = !links_[i].shapes.empty();
+    if (has_shapes == links_[parent].shapes.empty()) {
+      around_[has_shapes ? frame_[parent] : i].push_back(has_shapes ? i : parent);
+    } else if (!has_shapes) {
+      frame_[i] = frame_[parent];
+    }
+  }
+}
+
 std::vector<std::pair<std::size_t, std::size_t>> Robot::adjacentLinks() const {
-  std::vector<std::set<std::size_t>> next(links_.size());
-  for (std::size_t i = 0; i < joints_.size(); ++i) {
-    next[joints_[i].parent].insert(i + 1);
-    next[i + 1].insert(joints_[i].parent);
+  std::vector<std::pair<std::size_t, std::size_t>> pairs;  // each once, because links are a tree
+  for (std::size_t i = 1; i < links_.size(); ++i) {
+    const std::size_t parent = joints_[i - 1].parent;
+    if (!links_[i].shapes.empty() && !links_[parent].shapes.empty()) pairs.emplace_back(parent, i);
   }
-  // A link without shapes goes, and its neighbours become neighbours.
-  for (std::size_t link = 0; link < links_.size(); ++link) {
-    if (!links_[link].shapes.empty()) continue;
-    for (const std::size_t a : next[link]) {
-      next[a].insert(next[link].begin(), next[link].end());
-      next[a].erase(a);
-      next[a].erase(link);
-    }
-    next[link].clear();
-  }
-  std::vector<std::pair<std::size_t, std::size_t>> pairs;
-  for (std::size_t a = 0; a < links_.size(); ++a) {
-    for (const std::size_t b : next[a]) {
-      if (a < b) pairs.emplace_back(a, b);
+  for (const std::vector<std::size_t>& links : around_) {
+    for (auto a = links.begin(); a != links.end(); ++a) {
+      for (auto b = a + 1; b != links.end(); ++b) pairs.emplace_back(*a, *b);
     }
   }
+  std::sort(pairs.begin(), pairs.end());
   return pairs;
 }
 

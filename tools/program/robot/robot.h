@@ -57,6 +57,10 @@ class Robot {
   /// Pairs of links with shapes that joints join, directly or by way of links without shapes. Smaller index first.
   std::vector<std::pair<std::size_t, std::size_t>> adjacentLinks() const;
 
+  /// The links with shapes that joints join to a link without shapes, directly or by way of others without; none for a
+  /// link with shapes.
+  const std::vector<std::size_t>& linksAround(std::size_t link) const { return around_[frame_[link]]; }
+
  private:
   /// The value of a joint as multiplier * state[column] + offset.
   struct Source {
@@ -64,11 +68,15 @@ class Robot {
     double multiplier, offset;
   };
 
+  void findFrames();
+
   std::string name_;
   std::vector<Part> links_;
   std::vector<Joint> joints_;
   std::vector<std::size_t> free_;
   std::vector<std::optional<Source>> sources_;  ///< None of fixed joints.
+  std::vector<std::size_t> frame_;  ///< Of each link: the uppermost that it reaches across links without shapes.
+  std::vector<std::vector<std::size_t>> around_;  ///< Of each such frame: links with shapes next to it, in order.
 };
 
 }  // namespace bocst::program

@@ -15,6 +15,7 @@
 #include <utility>
 #include <vector>
 
+#include "cli/suggest.h"
 #include "robot/xml_file.h"
 
 namespace bocst::program {
@@ -42,6 +43,27 @@ class Listener final : public console_bridge::OutputHandler {
 /// Joints between a link and the root; parsers go down the tree by recursion.
 constexpr std::size_t kMostDepth = 1000;
 
+/// What an element of a URDF may have, as far as it matters here.
+struct Known {
+  bool is_once;  ///< urdfdom takes the first child of each name.
+  std::vector<std::string> children;
+  std::vector<std::string> attributes;  ///< Empty if urdfdom needs all of them.
+  bool is_strict = false;               ///< Has no others.
+};
+
+const std::map<std::string, Known> kKnown = {
+    {"robot", {false, {"link", "joint"}, {}}},
+    {"link", {false, {"collision"}, {}}},
+    {"collision", {true, {"origin", "geometry"}, {}}},
+    {"geometry", {false, {"box", "sphere", "cylinder", "mesh"}, {}}},
+    {"joint", {true, {"parent", "child", "origin", "axis", "limit", "mimic"}, {}}},
+    {"origin", {true, {}, {"xyz", "rpy"}, true}},
+    {"axis", {true, {}, {"xyz"}}},
+    {"limit", {true, {}, {"lower", "upper", "effort", "velocity"}}},
+    {"mimic", {true, {}, {"joint", "multiplier", "offset"}}},
+    {"mesh", {true, {}, {"filename", "scale"}}},
+};
+
 class UrdfReader {
  public:
   UrdfReader(const std::string& file, const Packages& packages, MeshStore& meshes)
@@ -50,8 +72,8 @@ class UrdfReader {
   }
 
   Robot read() {
+    checkElement(xml_.root(), "");
     checkTree();
-    checkGeometries();
     const urdf::ModelInterfaceSharedPtr model = parse();
     add(*model->root_link_);
     try {
@@ -96,20 +118,42 @@ class UrdfReader {
     }
   }
 
-  /// urdfdom takes the first shape of a geometry and leaves out the others without a word.
-  void checkGeometries() const {
-    for (const pugi::xml_node& link : xml_.root().children("link")) {
-      for (const pugi::xml_node& collision : link.children("collision")) {
-        const auto shapes = collision.child("geometry").children();
-        const auto elements = std::count_if(shapes.begin(), shapes.end(), [](const pugi::xml_node& shape) {
-          return shape.type() == pugi::node_element;
-        });
-        if (elements > 1 ||
-            std::distance(collision.children("geometry").begin(), collision.children("geometry").end()) > 1) {
-          throw std::runtime_error(xml_.place(collision) + ": link " + link.attribute("name").value() +
-                                   ": a <collision> has one shape; write a <collision> for each");
-        }
+  /// urdfdom leaves out, without a word, what it does not know, and a second element where it takes one.
+  void checkElement(const pugi::xml_node& element, const std::string& owner) const {
+    const auto found = kKnown.find(element.name());
+    if (found == kKnown.end()) return;
+    const Known& known = found->second;
+    const auto isIn = [](const std::vector<std::string>& names, const std::string& name) {
+      return std::find(names.begin(), names.end(), name) != names.end();
+    };
+    const std::string in = "<" + found->first + ">";
+    const auto refuse = [&](const pugi::xml_node& where, const std::string& what) {
+      throw std::runtime_error(xml_.place(where) + ": " + owner + what);
+    };
+    for (const pugi::xml_attribute& attribute : element.attributes()) {
+      const std::string name = attribute.name();
+      if (isIn(known.attributes, name) || name.find(':') != std::string::npos) continue;
+      const std::string near = suggestion(name, known.attributes);
+      if (known.is_strict || !near.empty()) refuse(element, in + " has no attribute " + name + "." + near);
+    }
+    std::set<std::string> seen;
+    for (const pugi::xml_node& child : element.children()) {
+      const std::string name = child.name();
+      if (child.type() != pugi::node_element || name.find(':') != std::string::npos) continue;
+      if (isIn(known.children, name)) {
+        const bool is_first = seen.insert(name).second;
+        if (known.is_once && !is_first) refuse(child, "a second <" + name + "> in one " + in);
+        const bool is_named = name == "link" || name == "joint";
+        checkElement(child, is_named ? name + " " + child.attribute("name").value() + ": " : owner);
+      } else {
+        const std::string near = suggestion(name, known.children);
+        if (!near.empty()) refuse(child, in + " has no element <" + name + ">." + near);
       }
+    }
+    const auto shapes = element.children();
+    const auto isElement = [](const pugi::xml_node& shape) { return shape.type() == pugi::node_element; };
+    if (found->first == "geometry" && std::count_if(shapes.begin(), shapes.end(), isElement) > 1) {
+      refuse(element, "a <collision> has one shape; write a <collision> for each");
     }
   }
 

@@ -15,14 +15,18 @@ XmlFile::XmlFile(std::string file, const std::string& root_name) : file_(std::mo
   if (root().name() != root_name) {
     throw std::runtime_error(place(root()) + ": the root element is <" + root().name() + ">, not <" + root_name + ">");
   }
+  for (pugi::xml_node next = root().next_sibling(); next; next = next.next_sibling()) {
+    if (next.type() != pugi::node_element) continue;
+    throw std::runtime_error(place(next) + ": <" + next.name() + "> is a second root element; XML has one");
+  }
 }
 
 void XmlFile::refuseXacro(const std::string& result) const {
-  for (const pugi::xml_node& element : root().children()) {
-    if (std::string(element.name()).rfind("xacro:", 0) != 0) continue;
-    throw std::runtime_error(place(element) + ": <" + element.name() + "> is a xacro element; run `xacro FILE > " +
-                             result + "` first");
-  }
+  const pugi::xml_node element =
+      root().find_node([](const pugi::xml_node& node) { return std::string(node.name()).rfind("xacro:", 0) == 0; });
+  if (!element) return;
+  throw std::runtime_error(place(element) + ": <" + element.name() + "> is a xacro element; run `xacro FILE > " +
+                           result + "` first");
 }
 
 std::string XmlFile::placeOf(std::ptrdiff_t offset) const {

@@ -9,14 +9,14 @@ namespace bocst::program {
 /// An XML file that knows the lines of its elements.
 class XmlFile {
  public:
-  /// @throws std::runtime_error that names the line when it is no XML or its root has another name.
+  /// @throws std::runtime_error that names the line when it is no XML, its root has another name or is not alone.
   XmlFile(std::string file, const std::string& root);
 
   const std::string& name() const { return file_; }
   const std::string& text() const { return text_; }
   pugi::xml_node root() const { return document_.document_element(); }
 
-  /// @throws std::runtime_error if a child of the root is an element of xacro. `result`: a name for what xacro writes.
+  /// @throws std::runtime_error if there is an element of xacro. `result`: a name for what xacro writes.
   void refuseXacro(const std::string& result) const;
 
   /// "FILE: line N", for complaints about this element.
