@@ -10,6 +10,7 @@
 #include <cstdlib>
 #include <filesystem>
 #include <fstream>
+#include <random>
 #include <set>
 #include <stdexcept>
 #include <string>
@@ -287,7 +288,7 @@ TEST_F(SceneFile, SaysWhereAUrdfIsWrong) {
   complains(link("b", kSphere + "<!-- and --><box size='1 1 1'/>"), {"line 2", "link b", "one shape"});
   complains("<link name='b'><collision><geometry>" + kSphere + "</geometry><geometry>" + kSphere +
                 "</geometry></collision></link>",
-            {"line 2", "link b", "one shape"});
+            {"line 2: link b: a second <geometry> in one <collision>"});
   // Parsers that go down the tree by recursion need a limit. Links in the order of their names, and not.
   for (const int first : {10000, 0}) {
     const auto chain = [&](int joints) {
@@ -307,6 +308,7 @@ TEST_F(SceneFile, SaysWhereAUrdfIsWrong) {
             {"line 2", "[x]", "[b]"});
   complains(link("b", "<box size='1 2'/>"), {"line 2", "[1 2]", "[b]"});
   complains("<xacro:property name='x' value='1'/>\n" + link("a"), {"line 2", "xacro"});
+  complains(link("a") + "<link name='b'><visual><xacro:look/></visual></link>", {"line 3: <xacro:look> is a xacro"});
   complains("<link name='a'>\n</robot>", {"line 3", "no XML"});
   // What is not asked about may be wrong.
   EXPECT_EQ(read(robot("<link name='a'><inertial><mass value='x'/></inertial><visual><geometry><capsule/></geometry>"
@@ -317,6 +319,57 @@ TEST_F(SceneFile, SaysWhereAUrdfIsWrong) {
   const std::string other = write("other.urdf", "<sdf></sdf>");
   expectComplaint([&] { read(other); }, {other + ": line 1", "<sdf>", "<robot>"});
   expectComplaint([&] { read("/nowhere/r.urdf"); }, {"/nowhere/r.urdf", "No such file"});
+}
+
+TEST_F(SceneFile, RefusesWhatUrdfdomLeavesOut) {
+  const auto complains = [&](const std::string& text, const std::string& what) {
+    const std::string file = robot(link("a", kSphere) + link("b", kSphere) + text);
+    expectComplaint([&] { read(file); }, {file + ": line 4: " + what});
+  };
+  const std::vector<std::string> once = {
+      "<parent link='a'/>", "<child link='b'/>", "<origin xyz='1 0 0'/>", "<axis xyz='0 0 1'/>", kLimit,
+      "<mimic joint='k'/>"};
+  for (const std::string& element : once) {
+    const std::string name = element.substr(1, element.find(' ') - 1);
+    const bool twice = name != "parent" && name != "child";
+    complains(joint("j", "revolute", "a", "b", element + (twice ? element : "")),
+              "joint j: a second <" + name + "> in one <joint>");
+  }
+  const auto collision = [](const std::string& more, const std::string& shape) {
+    return "<link name='c'><collision>" + more + "<geometry>" + shape + "</geometry></collision></link>";
+  };
+  complains(collision("<origin/><origin xyz='1 0 0'/>", kSphere), "link c: a second <origin> in one <collision>");
+  for (const auto& [element, name] : std::vector<std::pair<std::string, std::string>>{
+           {"<linc name='c'/>", "link"},
+           {"<link name='c'><colision/></link>", "collision"},
+           {"<link name='c'><Collision/></link>", "collision"},
+           {collision("<orgin/>", kSphere), "origin"},
+           {collision("", "<spere radius='1'/>"), "sphere"},
+           {collision("", "<mesh filename='tetra.off' scal='2 2 2'/>"), "scale"},
+           {joint("j", "fixed", "a", "b", "<orgin/>"), "origin"},
+           {joint("j", "fixed", "a", "b", "<origin xzy='1 0 0'/>"), "xyz"},
+           {joint("j", "continuous", "a", "b", "<axis xzy='0 0 1'/>"), "xyz"},
+           {joint("j", "revolute", "a", "b", "<limit lowr='-1' upper='1' effort='1' velocity='1'/>"), "lower"},
+           {joint("j", "continuous", "a", "b", "<mimic joint='k' multipler='2'/>"), "multiplier"}}) {
+    const std::string file = robot("\n\n" + element);
+    expectComplaint([&] { read(file); }, {file + ": line 4: ", " has no ", "Did you mean " + name + "?"});
+  }
+  complains(joint("j", "fixed", "a", "b", "<origin quat_xyzw='0 0 0 1'/>"),
+            "joint j: <origin> has no attribute quat_xyzw.");
+  const std::string two = write("two.urdf", "<robot name='r'><link name='a'/></robot>\n<!-- --><robot name='q'/>");
+  expectComplaint([&] { read(two); }, {two + ": line 2: <robot> is a second root element"});
+
+  const std::string other =
+      "<gazebo reference='a'><origin x='1'/></gazebo><transmission name='t'><joint name='j'/></transmission>"
+      "<sensor name='s'/><material name='m'><color rgba='1 1 1 1'/></material><drake:joint name='d'/>"
+      "<link name='a'><contact/><sensor/><self_collision_checking/><collision name='n' group='g'><verbose value='1'/>"
+      "<drake:origin/><surface/><material/><contact_coefficients/><geometry>" +
+      kSphere + "</geometry></collision></link>" + link("b") +
+      joint("j", "revolute", "a", "b",
+            "<dynamics damping='1'/><calibration/><safety_controller k_velocity='1'/><hardwareInterface/><friction/>"
+            "<origin xyz='0 0 0' drake:frame='f'/><axis xyz='0 0 1' rpy='0 0 0'/>"
+            "<limit lower='0' upper='1' effort='1' velocity='1' acceleration='1' jerk='1' soft_lower='1'/>");
+  EXPECT_EQ(read(robot(other)).links().size(), 2u);
 }
 
 TEST_F(SceneFile, FindsPackages) {
@@ -391,6 +444,45 @@ TEST_F(SceneFile, LinksAreAdjacentAcrossLinksWithoutShapes) {
   EXPECT_EQ(names, (std::set<std::set<std::string>>{{"a", "b"}, {"a", "c"}, {"b", "c"}, {"c", "d"}}));
 }
 
+// Against the shortest path between two links.
+TEST_F(SceneFile, AdjacentLinksAreThoseWithoutALinkWithShapesBetween) {
+  for (unsigned seed = 0; seed < 30; ++seed) {
+    std::mt19937 random(seed);
+    const std::size_t count = 2 + random() % 20;
+    std::vector<Part> links(count);
+    std::vector<Joint> joints(count - 1);
+    for (std::size_t i = 0; i < count; ++i) {
+      if (random() % 2 == 0) links[i].shapes.emplace_back();
+      if (i > 0) joints[i - 1].parent = random() % i;
+    }
+    const Robot r("r", links, joints);
+    // reached[a][b]: from a to b by way of links without shapes.
+    std::vector<std::set<std::size_t>> reached(count);
+    for (std::size_t a = 0; a < count; ++a) {
+      std::vector<std::size_t> open{a};
+      for (std::size_t k = 0; k < open.size(); ++k) {
+        for (std::size_t b = 0; b < count; ++b) {
+          const bool joined =
+              (b > 0 && joints[b - 1].parent == open[k]) || (open[k] > 0 && joints[open[k] - 1].parent == b);
+          if (!joined || b == a || !reached[a].insert(b).second) continue;
+          if (links[b].shapes.empty()) open.push_back(b);
+        }
+      }
+    }
+    std::vector<std::pair<std::size_t, std::size_t>> wanted;
+    for (std::size_t a = 0; a < count; ++a) {
+      std::vector<std::size_t> around;
+      for (const std::size_t b : reached[a]) {
+        if (links[b].shapes.empty()) continue;
+        if (links[a].shapes.empty()) around.push_back(b);
+        if (!links[a].shapes.empty() && a < b) wanted.emplace_back(a, b);
+      }
+      EXPECT_EQ(r.linksAround(a), around) << seed << ' ' << a;
+    }
+    EXPECT_EQ(r.adjacentLinks(), wanted) << seed;
+  }
+}
+
 TEST_F(SceneFile, AnSrdfDecidesWhichLinksAreChecked) {
   SceneArguments arguments;
   arguments.file = robot(link("a", kSphere) + link("b", kSphere) + link("c", kSphere) +
@@ -423,6 +515,10 @@ TEST_F(SceneFile, AnSrdfDecidesWhichLinksAreChecked) {
   expectComplaint([&] { readScene(arguments); }, {"r.srdf: line 3", "link2"});
   write("r.srdf", "<robot name='r'>\n<xacro:arm/></robot>");
   expectComplaint([&] { readScene(arguments); }, {"r.srdf: line 2", "run `xacro FILE > robot.srdf` first"});
+  write("r.srdf", "<robot name='r'><group name='g'>\n<xacro:arm/></group></robot>");
+  expectComplaint([&] { readScene(arguments); }, {"r.srdf: line 2", "<xacro:arm> is a xacro element"});
+  write("r.srdf", "<robot name='r'/>\n<robot name='r'/>");
+  expectComplaint([&] { readScene(arguments); }, {"r.srdf: line 2: <robot> is a second root element"});
   arguments.srdf = arguments.file;
   expectComplaint([&] { readScene(arguments); }, {"robot.urdf: line 2", "<link> belongs to a URDF"});
   arguments.srdf = write("r.srdf", "<robot name='s'><disable_collisions link1=' a' link2='b\n'/></robot>");
@@ -469,6 +565,14 @@ TEST_F(SceneFile, NamesOfGroupsAreNoNamesOfParts) {
                   {"allowed[0][0]: it may be the link of this name or all links"});
 }
 
+/// Tables without warnings.
+std::vector<State> table(const std::string& text, const StateNames& names) {
+  std::vector<std::string> warnings;
+  std::vector<State> states = statesOfTable(text, names, "path.csv", warnings);
+  EXPECT_TRUE(warnings.empty()) << warnings.front();
+  return states;
+}
+
 StateNames twoJointsAndABox() {
   StateNames names;
   names.joints = {"q1", "elbow"};
@@ -480,22 +584,28 @@ StateNames twoJointsAndABox() {
 
 TEST(States, AreATableWithNames) {
   const StateNames names = twoJointsAndABox();
-  const std::vector<State> some = statesOfTable("# a path\n\nelbow, \"q1\" # names\r\n0.5,-1e-3\n+1;2\n", names, "f");
+  const std::vector<State> some = table("# a path\n\nelbow, \"q1\" # names\r\n0.5,-1e-3\n+1;2\n", names);
   ASSERT_EQ(some.size(), 2u);
   EXPECT_EQ(some[0].joints, (std::vector<double>{-1e-3, 0.5}));
   EXPECT_EQ(some[1].joints, (std::vector<double>{2, 1}));
   EXPECT_EQ(some[0].place, "line 4");
   expectNear(some[0].objects.at(0), *names.X_WO[0], "where the scene has it");
-  EXPECT_EQ(statesOfTable("\xEF\xBB\xBFq1,elbow\r\n1,2\r\n", names, "f").at(0).joints, (std::vector<double>{1, 2}));
+  EXPECT_EQ(table("\xEF\xBB\xBFq1,elbow\r\n1,2\r\n", names).at(0).joints, (std::vector<double>{1, 2}));
   const State placed =
-      statesOfTable("q1\telbow\tbox.yaw\tbox.x\tbox.y\tbox.z\tbox.roll\tbox.pitch\n0\t0\t0.3\t1\t2\t3\t0.1\t0.2", names,
-                    "f")
-          .at(0);
+      table("q1\telbow\tbox.yaw\tbox.x\tbox.y\tbox.z\tbox.roll\tbox.pitch\n0\t0\t0.3\t1\t2\t3\t0.1\t0.2", names).at(0);
   expectNear(placed.objects.at(0), pose(rpy(0.1, 0.2, 0.3), {1, 2, 3}), "roll, pitch, yaw");
+  std::vector<std::string> warnings;
   const State turn =
-      statesOfTable("q1,elbow,box.x,box.y,box.z,box.qw,box.qx,box.qy,box.qz\n0,0,1,2,3,1,0,0,1", names, "f").at(0);
+      statesOfTable("q1,elbow,box.x,box.y,box.z,box.qw,box.qx,box.qy,box.qz\n0,0,1,2,3,1,0,0,1", names, "f", warnings)
+          .at(0);
   expectNear(turn.objects.at(0), pose(rpy(0, 0, M_PI / 2), {1, 2, 3}), "a quaternion, not normalised");
-  expectNear(statesOfTable("q1,elbow,box.x,box.y,box.z\n0,0,1,2,3", names, "f").at(0).objects.at(0),
+  ASSERT_EQ(warnings.size(), 1u);
+  EXPECT_EQ(warnings[0], "f: line 2: box: the quaternion has the norm 1.41421 and is normalised");
+  StateNames odd;
+  odd.joints = {"a,b", "say \"c\"", "d#e;f"};
+  EXPECT_EQ(table("\"say \"\"c\"\"\", \"a,b\" ,\"d#e;f\"# g\n1,\"2\",3\n", odd).at(0).joints,
+            (std::vector<double>{2, 1, 3}));
+  expectNear(table("q1,elbow,box.x,box.y,box.z\n0,0,1,2,3", names).at(0).objects.at(0),
              pose(Matrix3d::Identity(), {1, 2, 3}), "not turned");
 }
 
@@ -503,7 +613,7 @@ TEST(States, SayWhatIsWrongAndWhere) {
   const StateNames names = twoJointsAndABox();
   const auto complaint = [&](const std::string& text) -> std::string {
     try {
-      statesOfTable(text, names, "path.csv");
+      table(text, names);
     } catch (const std::runtime_error& e) {
       return e.what();
     }
@@ -511,17 +621,22 @@ TEST(States, SayWhatIsWrongAndWhere) {
   };
   EXPECT_EQ(complaint("q1\n1"), "path.csv: line 1: columns are missing: elbow");
   EXPECT_EQ(complaint("q1,elbo,elbow\n1,2,3"),
-            "path.csv: line 1: no moving joint or object is called elbo. Did you mean elbow?");
+            "path.csv: line 1: no moving joint or object is called 'elbo'. Did you mean elbow?");
   EXPECT_EQ(complaint("q1,elbow,f2\n1,2,3"), "path.csv: line 1: joint f2 mimics f1, so it must not be given");
   EXPECT_EQ(complaint("q1,elbow,weld\n1,2,3"), "path.csv: line 1: joint weld is fixed, so it must not be given");
   EXPECT_EQ(complaint("q1,elbow,q1\n1,2,3"), "path.csv: line 1: column q1 occurs twice");
-  EXPECT_EQ(complaint("q1,elbow\n1,2\n\n3,x"), "path.csv: line 4: column elbow: \"x\" is no finite number");
-  EXPECT_EQ(complaint("q1,elbow\n1,+-2"), "path.csv: line 2: column elbow: \"+-2\" is no finite number");
-  EXPECT_EQ(complaint("q1,elbow\n+1,+"), "path.csv: line 2: column elbow: \"+\" is no finite number");
+  EXPECT_EQ(complaint("q1,elbow\n1,2\n\n3,x"), "path.csv: line 4: column elbow: 'x' is no finite number");
+  EXPECT_EQ(complaint("q1,elbow\n1,+-2"), "path.csv: line 2: column elbow: '+-2' is no finite number");
+  EXPECT_EQ(complaint("q1,elbow\n+1,+"), "path.csv: line 2: column elbow: '+' is no finite number");
   EXPECT_EQ(complaint("q1,elbow,\n1,2,"), "path.csv: line 1: a column has no name");
-  EXPECT_EQ(complaint("q1,elbow\n1,nan"), "path.csv: line 2: column elbow: \"nan\" is no finite number");
-  EXPECT_EQ(complaint("q1,elbow\n1,"), "path.csv: line 2: column elbow: \"\" is no finite number");
+  EXPECT_EQ(complaint("q1,elbow\n1,nan"), "path.csv: line 2: column elbow: 'nan' is no finite number");
+  EXPECT_EQ(complaint("q1,elbow\n1,"), "path.csv: line 2: column elbow: '' is no finite number");
   EXPECT_EQ(complaint("q1,elbow\n1,2,3"), "path.csv: line 2: 2 numbers expected, 3 found");
+  EXPECT_EQ(complaint("q1,elbow\n1,\x1b[31m2\xff"), "path.csv: line 2: column elbow: '?[31m2?' is no finite number");
+  EXPECT_EQ(complaint("q1,\x1b[0m\n1,2"), "path.csv: line 1: no moving joint or object is called '?[0m'.");
+  EXPECT_EQ(complaint("q1,elbow\n1," + std::string(1000, 'x')),
+            "path.csv: line 2: column elbow: '" + std::string(60, 'x') + "...' is no finite number");
+  EXPECT_EQ(complaint("q1,\"elbow\n1,2"), "path.csv: line 1: a quote is not closed");
   EXPECT_EQ(complaint("1,2\n"), "path.csv: line 1: the first line must have the names of the columns");
   EXPECT_EQ(complaint("q1,elbow\n"), "path.csv: no states");
   EXPECT_NE(complaint("q1,elbow,box.x\n1,2,3").find("object box needs the columns"), std::string::npos);
@@ -529,7 +644,7 @@ TEST(States, SayWhatIsWrongAndWhere) {
   EXPECT_NE(complaint("q1,elbow,box.x,box.y,box.z,box.qw,box.qx,box.qy,box.qz\n1,2,3,4,5,0,0,0,0")
                 .find("line 2: the quaternion"),
             std::string::npos);
-  EXPECT_NE(complaint("q1,elbow,box.w\n1,2,3").find("no moving joint or object is called box.w"), std::string::npos);
+  EXPECT_NE(complaint("q1,elbow,box.w\n1,2,3").find("no moving joint or object is called 'box.w'"), std::string::npos);
 }
 
 TEST_F(SceneFile, ReadsObjectsOfAllKinds) {
@@ -590,6 +705,53 @@ TEST_F(SceneFile, AnAttachedObjectMovesWithItsLink) {
                   {"objects[1]", "not both"});
 }
 
+TEST_F(SceneFile, AnAttachedObjectMayTouchTheLinksAroundItsFrame) {
+  robot(link("arm", kSphere) + link("wrist", kSphere) + link("flange") + link("tool0") + link("finger", kSphere) +
+        joint("q", "continuous", "arm", "wrist") + joint("f1", "fixed", "wrist", "flange") +
+        joint("f2", "fixed", "flange", "tool0") + joint("f3", "fixed", "flange", "finger"));
+  const SceneSetup s =
+      scene(R"({"robot": "robot.urdf", "objects": [{"name": "tool", "sphere": 1, "attached": "tool0"}]})",
+            SceneArguments::Adjacent::kCheck);
+  std::set<std::string> touched;
+  for (const auto& [link, object] : s.allowed) {
+    EXPECT_EQ(object, 5u);
+    touched.insert(s.part(link).name);
+  }
+  EXPECT_EQ(touched, (std::set<std::string>{"wrist", "tool0", "finger"}));
+}
+
+TEST_F(SceneFile, WarnsOfQuaternionsThatAreNotNormalised) {
+  const auto warnings = [&](const std::string& pose, const std::string& states) {
+    return scene(R"({"objects": [{"name": "p", "box": [1, 1, 1], "moving": true, "pose": )" + pose +
+                 R"(}], "states": )" + states + "}")
+        .warnings;
+  };
+  EXPECT_TRUE(warnings("[0, 0, 0, 1.0001, 0, 0, 0]", R"([{"p": {"rpy": [1, 2, 3]}}])").empty());
+  const std::vector<std::string> two =
+      warnings(R"({"xyzw": [0, 0, 0, 0.5]})", R"([{}, {"p": [0, 0, 0, 0.1, 0.2, 0, 0]}])");
+  ASSERT_EQ(two.size(), 2u);
+  const std::string file = (folder_ / "scene.json").string();
+  EXPECT_EQ(two[0], file + ": objects[0].pose: the quaternion has the norm 0.5 and is normalised");
+  EXPECT_EQ(two[1], file + ": states[1].p: the quaternion has the norm 0.223607 and is normalised");
+  std::string table = "p.x,p.y,p.z,p.qw,p.qx,p.qy,p.qz\n";
+  for (int i = 0; i < 100; ++i) table += "0,0,0,2,0,0,0\n";
+  write("many.csv", table);
+  const std::vector<std::string> many = warnings("[0, 0, 0]", "\"many.csv\"");
+  ASSERT_EQ(many.size(), 11u);
+  EXPECT_NE(many[0].find("many.csv: line 2: p: the quaternion has the norm 2 "), std::string::npos) << many[0];
+  EXPECT_EQ(many[10], "90 more quaternions are normalised");
+}
+
+TEST_F(SceneFile, AJointAndAMovingObjectHaveTwoNames) {
+  robot(link("a", kSphere) + link("b", kSphere) + joint("q", "continuous", "a", "b"));
+  const auto with = [&](const std::string& object) {
+    return scene(R"({"robot": "robot.urdf", "objects": [{"name": "q", "sphere": 1, "pose": [9, 0, 0])" + object +
+                 "}]}");
+  };
+  EXPECT_EQ(with("").partCount(), 3u);
+  expectComplaint([&] { with(", \"moving\": true"); }, {"scene.json: a joint and a moving object are called q"});
+}
+
 TEST_F(SceneFile, SaysWhereASceneIsWrong) {
   const std::string ball = R"({"name": "ball", "sphere": 1, "moving": true, "pose": [0, 0, 0]})";
   const auto complains = [&](const std::string& json, const std::string& what) {
@@ -606,7 +768,8 @@ TEST_F(SceneFile, SaysWhereASceneIsWrong) {
   complains(R"({"object": []})", "there is no key \"object\" here. Did you mean objects?");
   complains(objects(R"({"sphere": 1})"), "objects[0]: \"name\" is missing");
   complains(objects(ball + R"(, {"name": "a"})"), "objects[1]: one of mesh, box");
-  complains(objects(R"({"name": "a", "sphere": 1, "box": [1, 1, 1]})"), "objects[0]: one of mesh, box");
+  complains(objects(R"({"name": "a", "sphere": 1, "box": [1, 1, 1]})"),
+            "objects[0]: only one shape is allowed, not box and sphere");
   complains(objects(R"({"name": "a", "sphere": 0})"), "objects[0].sphere: sizes must be above 0");
   complains(objects(R"({"name": "a", "box": [1, 1e76, 1]})"), "objects[0].box: sizes must be above 0 and at most 1e75");
   complains(objects(R"({"name": "a", "box": [1, 2]})"), "objects[0].box: a list of 3 numbers expected");
@@ -617,7 +780,15 @@ TEST_F(SceneFile, SaysWhereASceneIsWrong) {
   complains(objects(R"({"name": "a", "mesh": "tetra.off", "scale": [1, 0, 1]})"), "objects[0].mesh: a scale is");
   complains(objects(R"({"name": "a", "sphere": 1, "scale": 2})"), "\"scale\" is for meshes");
   complains(objects(R"({"name": "a", "sphere": 1, "pose": [1, 2, 3, 4]})"),
-            "objects[0].pose: a list of 7 numbers expected");
+            "objects[0].pose: a list of 3 or 7 numbers or {\"xyz\": [x, y, z], \"rpy\": [roll, pitch, yaw]} expected");
+  complains(objects(R"({"name": "a", "sphere": 1, "pose": 3})"), "objects[0].pose: a list of 3 or 7 numbers or");
+  complains(objects(R"({"name": "a", "mesh": "tetra.off", "scale": "2"})"),
+            "objects[0].scale: a number or a list of 3 numbers expected");
+  complains(objects(R"({"name": "a", "mesh": "tetra.off", "scale": [2]})"),
+            "objects[0].scale: a number or a list of 3 numbers expected");
+  complains(objects(R"({"name": "a", "mesh": ""})"), "objects[0].mesh: the name is empty");
+  complains(R"({"robot": 3})", "robot: the name of a URDF (\"...\") or an object");
+  complains(objects(ball, R"(, "states": 3)"), "states: the name of a table (\"...\") or a list expected");
   complains(objects(R"({"name": "a", "sphere": 1, "pose": [1, 2, 3, 0, 0, 0, 0]})"), "objects[0].pose: the quaternion");
   complains(objects(R"({"name": "a", "sphere": 1, "pose": {"rpy": [0, 0, 0], "wxyz": [1, 0, 0, 0]}})"), "one rotation");
   complains(objects(R"({"name": "a", "sphere": 1, "moving": 1})"), "objects[0].moving: true or false");
@@ -627,11 +798,26 @@ TEST_F(SceneFile, SaysWhereASceneIsWrong) {
   complains(objects(ball, R"(, "allowed": [["ball", "bal"]])"),
             "allowed[0][1]: there is no link, object or group bal. Did you mean ball?");
   complains(objects(ball, R"(, "allowed": [["ball"]])"), "allowed[0]: two names expected");
+  complains(objects(ball, R"(, "groups": {"a": ["b"], "b": ["ball"]})"),
+            "groups.a[0]: a group can only use groups that");
   complains(objects(ball, R"(, "groups": {"ball": []})"), "groups.ball: the name is already used");
   complains(objects(ball, R"(, "states": [])"), "states: the list is empty");
   complains(objects(ball, R"(, "states": [{"bal": [1, 2, 3]}])"),
-            "states[0]: no moving joint or object is called bal. Did you mean ball?");
+            "states[0]: no moving joint or object is called 'bal'. Did you mean ball?");
+  complains(objects(ball, R"(, "states": [{"ball.x": 1}])"),
+            "states[0]: no moving joint or object is called 'ball.x'. Write \"ball\": [x, y, z].");
   complains(objects(R"({"name": "a", "sphere": 1, "moving": true})", R"(, "states": [{}])"), "states[0]: missing: a");
+  const auto whole = [&](const std::string& json, const std::string& what) {
+    try {
+      scene(json);
+      ADD_FAILURE() << "no complaint: " << what;
+    } catch (const std::runtime_error& e) {
+      EXPECT_EQ(e.what(), (folder_ / "scene.json").string() + ": " + what);
+    }
+  };
+  whole(objects(R"({"name": "a", "mesh": 3})"), "objects[0].mesh: a text (\"...\") expected");
+  whole(R"({"robot": {"urdf": "r.urdf", "packages": {"p": 3}}})", "robot.packages.p: a text (\"...\") expected");
+  whole(objects(ball, R"(, "allowed": [["ball", "x"]])"), "allowed[0][1]: there is no link, object or group x.");
   expectComplaint([&] { scene(R"({"robot": {"urdf": "none.urdf"}})"); }, {"none.urdf", "No such file"});
   expectComplaint([&] { scene(objects(ball, R"(, "states": "none.csv")")); }, {"none.csv", "No such file"});
 }
@@ -643,8 +829,11 @@ TEST_F(SceneFile, RefusesPositionsBeyondAllSizes) {
     posesOf(s, Bodies(s));
   };
   place("1e75", "-1e75");
-  expectComplaint([&] { place("1e76", "0"); }, {"ball", "beyond 1e75"});
-  expectComplaint([&] { place("0", "-1e308"); }, {"post", "beyond 1e75"});
+  expectComplaint([&] { place("1e76", "0"); }, {"scene.json: the start: ball: ", "beyond 1e75"});
+  expectComplaint([&] { place("0", "-1e308"); }, {"scene.json: post: ", "beyond 1e75"});
+  const std::string states = write("path.csv", "ball.x,ball.y,ball.z\n0,0,0\n0,0,1e76\n");
+  const SceneSetup s = scene(R"({"objects": [{"name": "ball", "sphere": 1, "moving": true}], "states": "path.csv"})");
+  expectComplaint([&] { posesOf(s, Bodies(s)); }, {states + ": line 3: ball: ", "beyond 1e75"});
 }
 
 TEST_F(SceneFile, TakesAUrdfByItsContent) {

@@ -7,10 +7,9 @@
 namespace bocst::program {
 namespace {
 
-void checkPosition(const SceneSetup& setup, std::size_t part, const State& state, const Eigen::Isometry3d& X_WB) {
+void checkPosition(const std::string& place, const Part& part, const Eigen::Isometry3d& X_WB) {
   if (X_WB.translation().cwiseAbs().maxCoeff() <= kMostLength) return;
-  throw std::runtime_error((state.place.empty() ? "" : state.place + ": ") + setup.part(part).name +
-                           ": a coordinate of its position is beyond 1e75");
+  throw std::runtime_error(place + ": " + part.name + ": a coordinate of its position is beyond 1e75");
 }
 
 }  // namespace
@@ -27,7 +26,7 @@ Bodies::Bodies(const SceneSetup& setup) : parts(setup.partCount()), allowed(part
         if (found == shapes.end()) shapes.push_back(placed.shape);
         if (moves) continue;
         X_WB.push_back(X_WP[p] * placed.X_PS);
-        checkPosition(setup, p, setup.states.front(), X_WB.back());
+        checkPosition(setup.file, setup.part(p), X_WB.back());
       }
     }
     if (moves) moving = bodies.size();
@@ -57,10 +56,11 @@ std::vector<Eigen::Isometry3d> posesOf(const SceneSetup& setup, const Bodies& bo
   std::vector<Eigen::Isometry3d> poses;
   poses.reserve(setup.states.size() * bodies.moving);
   for (const State& state : setup.states) {
+    const std::string place = setup.states_file + ": " + state.place;
     const std::vector<Eigen::Isometry3d> X_WP = setup.partPoses(state);
     for (std::size_t i = 0; i < bodies.moving; ++i) {
       poses.push_back(X_WP[bodies.bodies[i].part] * bodies.bodies[i].X_PB);
-      checkPosition(setup, bodies.bodies[i].part, state, poses.back());
+      checkPosition(place, setup.part(bodies.bodies[i].part), poses.back());
     }
   }
   return poses;

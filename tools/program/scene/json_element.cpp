@@ -3,19 +3,30 @@
 
 #include <algorithm>
 #include <array>
+#include <cmath>
+#include <sstream>
 #include <stdexcept>
 
 #include "cli/suggest.h"
-#include "pairs/poses.h"
 
 namespace bocst::program {
 
-void JsonElement::complain(const std::string& what) const {
-  throw std::runtime_error(file_ + ": " + (path_.empty() ? "" : path_ + ": ") + what);
+std::string normWarning(const Pose& pose) {
+  const double norm = pose.quaternionNorm();
+  if (std::abs(norm - 1) <= 1e-3) return "";
+  std::ostringstream text;
+  text << "the quaternion has the norm " << norm << " and is normalised";
+  return text.str();
 }
 
+std::string JsonElement::placed(const std::string& what) const {
+  return file_ + ": " + (path_.empty() ? "" : path_ + ": ") + what;
+}
+
+void JsonElement::complain(const std::string& what) const { throw std::runtime_error(placed(what)); }
+
 JsonElement JsonElement::part(const Json& json, const std::string& step) const {
-  JsonElement element(json, file_);
+  JsonElement element(json, file_, warnings_);
   element.path_ = path_.empty() && step.front() == '.' ? step.substr(1) : path_ + step;
   return element;
 }
@@ -65,9 +76,10 @@ Eigen::Isometry3d JsonElement::pose() const {
     const std::vector<double> list = element.numbers(count);
     std::copy(list.begin(), list.end(), numbers.begin() + static_cast<std::ptrdiff_t>(begin));
   };
-  if (isList()) {
-    fill(*this, 0, json_.size() == 3 ? 3 : 7);
+  if (isList() && (json_.size() == 3 || json_.size() == 7)) {
+    fill(*this, 0, json_.size());
   } else {
+    if (!isObject()) complain("a list of 3 or 7 numbers or {\"xyz\": [x, y, z], \"rpy\": [roll, pitch, yaw]} expected");
     allowKeys({"xyz", "rpy", "wxyz", "xyzw"});
     if (has("xyz")) fill(at("xyz"), 0, 3);
     if (has("rpy") + has("wxyz") + has("xyzw") > 1)
@@ -78,7 +90,10 @@ Eigen::Isometry3d JsonElement::pose() const {
     format = has("xyzw") ? RotationFormat::kXyzw : has("rpy") ? RotationFormat::kRpy : RotationFormat::kWxyz;
   }
   try {
-    return Pose::of(numbers, format).transform();
+    const Pose pose = Pose::of(numbers, format);
+    const std::string warning = normWarning(pose);
+    if (!warning.empty()) warnings_.push_back(placed(warning));
+    return pose.transform();
   } catch (const std::invalid_argument& e) {
     complain(e.what());
   }

@@ -7,14 +7,19 @@
 #include <vector>
 
 #include "cli/report.h"
+#include "pairs/poses.h"
 
 namespace bocst::program {
+
+/// "the quaternion has the norm 0.5 and is normalised"; empty if its norm is about 1.
+std::string normWarning(const Pose& pose);
 
 /// A value of a JSON file that knows its place, so that each complaint names it: "scene.json: objects[2].pose".
 class JsonElement {
  public:
-  /// @param json must outlive this.
-  JsonElement(const Json& json, std::string file) : json_(json), file_(std::move(file)) {}
+  /// @param json must outlive this, as `warnings`, which pose() adds to.
+  JsonElement(const Json& json, std::string file, std::vector<std::string>& warnings)
+      : json_(json), file_(std::move(file)), warnings_(warnings) {}
 
   /// @throws std::runtime_error always.
   [[noreturn]] void complain(const std::string& what) const;
@@ -22,6 +27,7 @@ class JsonElement {
   bool isText() const { return json_.is_string(); }
   bool isNumber() const { return json_.is_number(); }
   bool isList() const { return json_.is_array(); }
+  bool isObject() const { return json_.is_object(); }
 
   // All throw std::runtime_error where the value is of another kind.
 
@@ -40,10 +46,12 @@ class JsonElement {
 
  private:
   JsonElement part(const Json& json, const std::string& step) const;
+  std::string placed(const std::string& what) const;
 
   const Json& json_;
   std::string file_;
   std::string path_;
+  std::vector<std::string>& warnings_;
 };
 
 }  // namespace bocst::program

@@ -59,23 +59,26 @@ class Reader {
   explicit Reader(const SceneArguments& arguments) : arguments_(arguments), packages_(arguments.packages) {}
 
   SceneSetup read() {
+    setup_.file = arguments_.file;
     if (isUrdf(arguments_.file)) {
       addRobot(arguments_.file, "");
       readStates(nullptr);
     } else {
       const Json json = parseJson(arguments_.file);
-      const JsonElement root(json, arguments_.file);
+      const JsonElement root(json, arguments_.file, norms_);
       readScene(root);
       readStates(&root);
     }
     checkSomethingIsAsked();
+    warnOfNorms();
     return std::move(setup_);
   }
 
  private:
   std::string path(const JsonElement& element) const {
+    const std::string uri = element.text();
     try {
-      return packages_.resolve(element.text(), fs::path(arguments_.file).parent_path().string());
+      return packages_.resolve(uri, fs::path(arguments_.file).parent_path().string());
     } catch (const std::runtime_error& e) {
       element.complain(e.what());
     }
@@ -98,6 +101,7 @@ class Reader {
 
   void readRobot(const JsonElement& robot) {
     if (robot.isText()) return addRobot(path(robot), "");
+    if (!robot.isObject()) robot.complain("the name of a URDF (\"...\") or an object {\"urdf\": \"...\"} expected");
     robot.allowKeys({"urdf", "srdf", "pose", "packages"});
     if (robot.has("packages")) {
       for (const auto& [name, folder] : robot.at("packages").members()) packages_.add(name, path(folder));
@@ -141,6 +145,9 @@ class Reader {
       if (object.moving) element.complain("an object can be moving or attached, not both");
       object.link = linkOf(element.at("attached"));
       setup_.allowed.emplace(*object.link, setup_.partCount());
+      for (const std::size_t link : setup_.robot->linksAround(*object.link)) {
+        setup_.allowed.emplace(link, setup_.partCount());
+      }
     }
     if (!object.moving && !object.X_WO) object.X_WO = Eigen::Isometry3d::Identity();
     if (element.has("shapes")) {
@@ -177,7 +184,8 @@ class Reader {
 
   Shape readShape(const JsonElement& element) {
     const std::vector<std::string> kinds = kindsOf(element);
-    if (kinds.size() != 1) element.complain("one of mesh, box, sphere, cylinder, capsule is expected");
+    if (kinds.empty()) element.complain("one of " + joined(kShapes, ", ") + " is expected");
+    if (kinds.size() > 1) element.complain("only one shape is allowed, not " + joined(kinds, " and "));
     const std::string& kind = kinds.front();
     const JsonElement value = element.at(kind);
     if (kind != "mesh" && element.has("scale")) element.complain("\"scale\" is for meshes");
@@ -211,6 +219,7 @@ class Reader {
       if (given.isNumber()) {
         scale.setConstant(given.number());
       } else {
+        if (!given.isList() || given.items().size() != 3) given.complain("a number or a list of 3 numbers expected");
         const std::vector<double> numbers = given.numbers(3);
         scale = {numbers[0], numbers[1], numbers[2]};
       }
@@ -243,7 +252,9 @@ class Reader {
     const auto found = groups_.find(name.text());
     if (found != groups_.end()) return found->second;
     std::vector<std::string> known;
-    for (const auto& [group, parts] : groups_) known.push_back(group);
+    for (const auto& [group, parts] : groups_) {
+      if (group != kAllParts) known.push_back(group);
+    }
     name.complain("there is no link, object or group " + name.text() + "." + suggestion(name.text(), known));
   }
 
@@ -251,6 +262,9 @@ class Reader {
     for (const auto& [name, members] : groups.members()) {
       std::vector<std::size_t> parts;
       for (const JsonElement& member : members.items()) {
+        if (groups_.count(member.text()) == 0 && groups.has(member.text().c_str())) {
+          member.complain("a group can only use groups that are above it");
+        }
         const std::vector<std::size_t>& more = groupOf(member);
         parts.insert(parts.end(), more.begin(), more.end());
       }
@@ -272,14 +286,20 @@ class Reader {
 
   void readStates(const JsonElement* root) {
     const StateNames names = setup_.names();
+    for (const std::string& object : names.objects) {
+      if (std::find(names.joints.begin(), names.joints.end(), object) == names.joints.end()) continue;
+      root->complain("a joint and a moving object are called " + object + "; a state could mean either");
+    }
     const bool own = root != nullptr && root->has("states");
+    setup_.states_file = arguments_.file;
     const std::string table = !arguments_.states.empty()           ? arguments_.states
                               : own && root->at("states").isText() ? path(root->at("states"))
                                                                    : "";
     if (!table.empty()) {
-      setup_.states = statesOfTable(readFile(table), names, table);
-      setup_.states_from = table;
+      setup_.states = statesOfTable(readFile(table), names, table, norms_);
+      setup_.states_from = setup_.states_file = table;
     } else if (own) {
+      if (!root->at("states").isList()) root->at("states").complain("the name of a table (\"...\") or a list expected");
       for (const JsonElement& element : root->at("states").items()) {
         setup_.states.push_back(stateOfJson(element, names));
         setup_.states.back().place = "states[" + std::to_string(setup_.states.size() - 1) + "]";
@@ -294,6 +314,15 @@ class Reader {
       }
       setup_.states_from =
           setup_.robot ? "no states given: all joints at 0" : "no states given: objects at their poses";
+    }
+  }
+
+  /// A table may have one in each line.
+  void warnOfNorms() {
+    constexpr std::size_t kShown = 10;
+    for (std::size_t i = 0; i < std::min(norms_.size(), kShown); ++i) setup_.warnings.push_back(norms_[i]);
+    if (norms_.size() > kShown) {
+      setup_.warnings.push_back(std::to_string(norms_.size() - kShown) + " more quaternions are normalised");
     }
   }
 
@@ -315,6 +344,7 @@ class Reader {
   SceneSetup setup_;
   std::map<std::string, std::vector<std::size_t>> groups_;
   std::vector<std::size_t> unchecked_;  ///< Links that the SRDF leaves out.
+  std::vector<std::string> norms_;      ///< Warnings of quaternions.
   bool has_link_robot_ = false;
 };
 

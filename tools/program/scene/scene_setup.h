@@ -33,11 +33,13 @@ struct OutsideLimits {
 /// A robot, objects, and where they are asked about. Parts are the robot's links, then the objects; a pair of parts is
 /// asked about unless both are fixed objects or it is allowed. All links count as moving.
 struct SceneSetup {
+  std::string file;  ///< The scene file or URDF.
   std::optional<Robot> robot;
   Eigen::Isometry3d X_WR = Eigen::Isometry3d::Identity();  ///< Of the robot's root.
   std::vector<SceneObject> objects;
   std::set<std::pair<std::size_t, std::size_t>> allowed;  ///< Pairs of parts that may touch, the smaller index first.
   std::vector<State> states;
+  std::string states_file;            ///< That names the places of states.
   std::string states_from;            ///< In words: a file, or what stands for it.
   std::vector<std::string> notes;     ///< What was decided for the user.
   std::vector<std::string> warnings;  ///< What is probably a mistake.

@@ -7,6 +7,7 @@
 #include <cmath>
 #include <sstream>
 #include <stdexcept>
+#include <string_view>
 #include <system_error>
 
 #include "cli/suggest.h"
@@ -20,20 +21,41 @@ constexpr std::array<const char*, 10> kFields = {"x", "y", "z", "qw", "qx", "qy"
 constexpr unsigned kPosition = 0x007, kQuaternion = 0x078, kAngles = 0x380;  // bits of kFields
 
 std::string trimmed(const std::string& text) {
-  const std::size_t begin = text.find_first_not_of(" \r\"");
+  const std::size_t begin = text.find_first_not_of(" \r");
   if (begin == std::string::npos) return "";
-  return text.substr(begin, text.find_last_not_of(" \r\"") + 1 - begin);
+  return text.substr(begin, text.find_last_not_of(" \r") + 1 - begin);
 }
 
+/// For messages: a file may hold what a terminal obeys.
+std::string inQuotes(const std::string& text) {
+  constexpr std::size_t kMost = 60;
+  std::string shown = text.substr(0, kMost);
+  for (char& c : shown) {
+    if (c < ' ' || c > '~') c = '?';
+  }
+  return "'" + shown + (text.size() > kMost ? "...'" : "'");
+}
+
+/// Of the part before #. @throws std::invalid_argument for a quote that is not closed.
 std::vector<std::string> cellsOf(const std::string& line) {
+  constexpr std::string_view kSeparators = ",;\t";
   std::vector<std::string> cells(1);
-  for (const char c : line) {
-    if (c == ',' || c == ';' || c == '\t') {
-      cells.emplace_back();
-    } else {
+  bool quoted = false;
+  for (std::size_t i = 0; i < line.size(); ++i) {
+    const char c = line[i];
+    if (c == '"' && quoted && line[i + 1] == '"') {
+      cells.back() += line[++i];
+    } else if (c == '"' && (quoted || trimmed(cells.back()).empty())) {
+      quoted = !quoted;
+    } else if (c == '#' && !quoted) {
+      break;
+    } else if (quoted || kSeparators.find(c) == std::string_view::npos) {
       cells.back() += c;
+    } else {
+      cells.emplace_back();
     }
   }
+  if (quoted) throw std::invalid_argument("a quote is not closed");
   for (std::string& cell : cells) cell = trimmed(cell);
   return cells;
 }
@@ -47,19 +69,23 @@ std::optional<double> numberOf(const std::string& cell) {
   return whole ? std::optional<double>(value) : std::nullopt;
 }
 
-std::string refusal(const std::string& name, const StateNames& names) {
-  if (name.empty()) return "a column has no name";
+/// Why a name is not that of a column (`fields`: object.x and so on) or of a key.
+std::string refusal(const std::string& name, const StateNames& names, bool fields) {
+  if (name.empty()) return fields ? "a column has no name" : "a name is empty";
   const auto joint = names.others.find(name);
   if (joint != names.others.end()) return "joint " + name + " " + joint->second + ", so it must not be given";
+  const std::string unknown = "no moving joint or object is called " + inQuotes(name) + ".";
+  const std::size_t dot = name.rfind('.');
   std::vector<std::string> known = names.joints;
   for (const std::string& object : names.objects) {
-    if (name.find('.') == std::string::npos) {
+    if (!fields && object == name.substr(0, dot)) return unknown + " Write \"" + object + "\": [x, y, z].";
+    if (!fields || dot == std::string::npos) {
       known.push_back(object);
     } else {
       for (const char* field : kFields) known.push_back(object + "." + field);
     }
   }
-  return "no moving joint or object is called " + name + "." + suggestion(name, known);
+  return unknown + suggestion(name, known);
 }
 
 /// The table, once its first line is read.
@@ -82,7 +108,7 @@ class Columns {
     for (std::size_t i = 0; i < given_.size(); ++i) checkObject(i);
   }
 
-  State read(const std::vector<std::string>& cells) const {
+  State read(const std::vector<std::string>& cells, std::vector<std::string>& warnings) const {
     if (cells.size() != columns_.size()) {
       throw std::invalid_argument(std::to_string(columns_.size()) + " numbers expected, " +
                                   std::to_string(cells.size()) + " found");
@@ -93,11 +119,12 @@ class Columns {
     for (std::size_t i = 0; i < cells.size(); ++i) {
       const std::optional<double> number = numberOf(cells[i]);
       if (!number)
-        throw std::invalid_argument("column " + nameOf(columns_[i]) + ": \"" + cells[i] + "\" is no finite number");
+        throw std::invalid_argument("column " + nameOf(columns_[i]) + ": " + inQuotes(cells[i]) +
+                                    " is no finite number");
       const Column& column = columns_[i];
       (column.object ? fields[column.index][column.field] : state.joints[column.index]) = *number;
     }
-    for (std::size_t i = 0; i < given_.size(); ++i) state.objects.push_back(poseOf(i, fields[i]));
+    for (std::size_t i = 0; i < given_.size(); ++i) state.objects.push_back(poseOf(i, fields[i], warnings));
     return state;
   }
 
@@ -119,7 +146,7 @@ class Columns {
       given_[i] |= 1u << column.field;
       return column;
     }
-    throw std::invalid_argument(refusal(name, names_));
+    throw std::invalid_argument(refusal(name, names_, true));
   }
 
   std::string nameOf(const Column& column) const {
@@ -140,11 +167,15 @@ class Columns {
     }
   }
 
-  Eigen::Isometry3d poseOf(std::size_t i, const std::array<double, kFields.size()>& f) const {
+  Eigen::Isometry3d poseOf(std::size_t i, const std::array<double, kFields.size()>& f,
+                           std::vector<std::string>& warnings) const {
     if (given_[i] == 0) return *names_.X_WO[i];
     if ((given_[i] & kAngles) != 0)
       return Pose::of({f[0], f[1], f[2], f[7], f[8], f[9]}, RotationFormat::kRpy).transform();
-    return Pose::of({f[0], f[1], f[2], f[3], f[4], f[5], f[6]}).transform();
+    const Pose pose = Pose::of({f[0], f[1], f[2], f[3], f[4], f[5], f[6]});
+    const std::string warning = normWarning(pose);
+    if (!warning.empty()) warnings.push_back(names_.objects[i] + ": " + warning);
+    return pose.transform();
   }
 
   const StateNames& names_;
@@ -166,7 +197,8 @@ State startState(const StateNames& names) {
   return state;
 }
 
-std::vector<State> statesOfTable(const std::string& text, const StateNames& names, const std::string& file) {
+std::vector<State> statesOfTable(const std::string& text, const StateNames& names, const std::string& file,
+                                 std::vector<std::string>& warnings) {
   std::vector<State> states;
   std::optional<Columns> columns;
   std::istringstream stream(text);
@@ -174,14 +206,15 @@ std::vector<State> statesOfTable(const std::string& text, const StateNames& name
   for (std::size_t number = 1; std::getline(stream, line); ++number) {
     const std::string mark = "\xEF\xBB\xBF";  // of UTF-8, as spreadsheets write it
     if (number == 1 && line.rfind(mark, 0) == 0) line.erase(0, mark.size());
-    line.erase(std::min(line.find('#'), line.size()));
-    if (trimmed(line).empty()) continue;
-    const std::vector<std::string> cells = cellsOf(line);
     const std::string place = "line " + std::to_string(number);
     try {
+      const std::vector<std::string> cells = cellsOf(line);
+      if (cells.size() == 1 && cells[0].empty()) continue;
       if (columns) {
-        states.push_back(columns->read(cells));
+        std::vector<std::string> found;
+        states.push_back(columns->read(cells, found));
         states.back().place = place;
+        for (const std::string& warning : found) warnings.push_back(file + ": " + place + ": " + warning);
         continue;
       }
       if (numberOf(cells.front())) throw std::invalid_argument("the first line must have the names of the columns");
@@ -207,7 +240,7 @@ State stateOfJson(const JsonElement& element, const StateNames& names) {
     } else if (object != names.objects.end()) {
       objects[static_cast<std::size_t>(object - names.objects.begin())] = value.pose();
     } else {
-      element.complain(refusal(name, names));
+      element.complain(refusal(name, names, false));
     }
   }
   std::vector<std::string> missing;

@@ -31,10 +31,12 @@ struct StateNames {
 State startState(const StateNames& names);
 
 /// A table: a line with the names of columns, then one a state. Columns are separated by commas, semicolons or tabs:
-/// the free joints, and of moving objects object.x, .y, .z with .qw, .qx, .qy, .qz or .roll, .pitch, .yaw. What follows
-/// # and empty lines are skipped.
-/// @param file for messages. @throws std::runtime_error that names the line and the column.
-std::vector<State> statesOfTable(const std::string& text, const StateNames& names, const std::string& file);
+/// the free joints, and of moving objects object.x, .y, .z with .qw, .qx, .qy, .qz or .roll, .pitch, .yaw. Cells may be
+/// in quotes, as in CSV. What follows # and empty lines are skipped.
+/// @param file for messages. @param warnings of quaternions. @throws std::runtime_error that names the line and the
+/// column.
+std::vector<State> statesOfTable(const std::string& text, const StateNames& names, const std::string& file,
+                                 std::vector<std::string>& warnings);
 
 /// {"joint": value, "object": pose, ...}. @throws std::runtime_error as JsonElement.
 State stateOfJson(const JsonElement& element, const StateNames& names);
