@@ -62,6 +62,9 @@ std::string readFile(const std::string& path) {
   }
   content.resize(size);
   if (content.empty()) throw std::runtime_error("is empty");
+  if (content.rfind("version https://git-lfs", 0) == 0) {
+    throw std::runtime_error("is a Git LFS pointer, not the file itself: `git lfs pull` fetches it");
+  }
   return content;
 }
 

@@ -10,6 +10,7 @@
 #include <utility>
 #include <vector>
 
+#include "check_scene.h"
 #include "file.h"
 #include "read_mesh.h"
 #include "read_scene.h"
@@ -19,6 +20,7 @@ namespace {
 
 std::string extensionOf(const std::string& file) {
   std::string extension = std::filesystem::path(file).extension().string();
+  if (!extension.empty()) extension.erase(0, 1);  // the dot
   std::transform(extension.begin(), extension.end(), extension.begin(),
                  [](unsigned char c) { return static_cast<char>(std::tolower(c)); });
   return extension;
@@ -28,9 +30,10 @@ io::Polygons readPolygons(const std::string& file) {
   const std::string content = io::readFile(file);
   const std::string extension = extensionOf(file);
   for (const auto& [name, format] : io::kFormats) {
-    if (extension == std::string(".") + name) return io::readMesh(content, format);
+    if (extension == name) return io::readMesh(content, format);
   }
-  return io::readScene(file);
+  io::refuseMisread(content, extension);
+  return io::readScene(file, content);
 }
 
 }  // namespace

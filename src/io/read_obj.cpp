@@ -25,12 +25,13 @@ class ObjReader {
 
   Polygons read() {
     std::string_view rest = bytes_;
+    const char end = lineEnd(bytes_);
     while (!rest.empty()) {
-      std::string_view line = takeLine(rest);
+      std::string_view line = takeLine(rest, end);
       // A backslash at the end of a line, comments aside, takes the next one in; blanks and ends of lines are the same
       // to takeWord.
       while (!line.empty() && line.back() == '\\' && line.find('#') == line.npos && !rest.empty()) {
-        const std::string_view more = takeLine(rest);
+        const std::string_view more = takeLine(rest, end);
         line = {line.data(), static_cast<std::size_t>(more.data() + more.size() - line.data())};
       }
       readStatement(line.substr(0, line.find('#')));

@@ -94,11 +94,13 @@ class PlyReader {
   }
 
   void readHeader() {
-    if (takeLine(rest_) != "ply") throw std::runtime_error("no PLY file: the first line is not 'ply'");
+    // Lines that end with CR alone: a line feed after one of them belongs to binary data.
+    const char end = file_.substr(0, 4) == "ply\r" && file_.substr(4, 1) != "\n" ? '\r' : '\n';
+    if (takeLine(rest_, end) != "ply") throw std::runtime_error("no PLY file: the first line is not 'ply'");
     bool has_format = false;
     while (true) {
       if (rest_.empty()) throw std::runtime_error("truncated: no end of the PLY header");
-      std::string_view line = takeLine(rest_);
+      std::string_view line = takeLine(rest_, end);
       const std::string_view word = takeWord(line);
       if (word == "end_header") break;
       if (word == "format") {

@@ -10,6 +10,8 @@
 #include <algorithm>
 #include <assimp/IOSystem.hpp>
 #include <assimp/Importer.hpp>
+#include <charconv>
+#include <cstddef>
 #include <cstdint>
 #include <exception>
 #include <filesystem>
@@ -23,6 +25,7 @@
 
 #include "file.h"
 #include "read_mesh.h"
+#include "text.h"
 #include "vertex_pool.h"
 
 namespace bocst::io {
@@ -30,25 +33,37 @@ namespace {
 
 namespace fs = std::filesystem;
 
-/// What assimp may open: regular files in or below the folder of the file that it reads (the .bin of a glTF), to read.
+/// What assimp may open, to read: the file itself, whose content is there already, and regular files in or below its
+/// folder (the .bin of a glTF).
 class Folder final : public Assimp::IOSystem {
  public:
-  explicit Folder(const std::string& file) : folder_(fs::canonical(file).parent_path()) {}
+  Folder(const std::string& file, std::string_view content)
+      : file_(file), content_(content), folder_(fs::canonical(file).parent_path()) {}
 
   bool Exists(const char* path) const override {
     std::error_code error;
-    return isInside(path) && fs::is_regular_file(path, error);
+    const std::string place = placeOf(path);
+    return isInside(place) && fs::is_regular_file(place, error);
   }
 
   Assimp::IOStream* Open(const char* path, const char* mode) override try {
-    if (!isInside(path) || std::string_view(mode).find_first_of("wa+") != std::string_view::npos) return nullptr;
-    const std::string content = readFile(path);
+    if (std::string_view(mode).find_first_of("wa+") != std::string_view::npos) return nullptr;
+    if (path == file_) {
+      return new Assimp::MemoryIOStream(reinterpret_cast<const std::uint8_t*>(content_.data()), content_.size());
+    }
+    const std::string place = placeOf(path);
+    if (!isInside(place)) throw std::runtime_error("is outside the folder of the mesh file");
+    const std::string content = readFile(place);
     auto bytes = std::make_unique<std::uint8_t[]>(content.size());
     std::copy(content.begin(), content.end(), bytes.get());
     return new Assimp::MemoryIOStream(bytes.release(), content.size(), true);
-  } catch (const std::exception&) {
-    return nullptr;  // assimp says which file it wanted
+  } catch (const std::exception& e) {
+    refused_ = inQuotes(std::string_view(path).substr(isBeside(path) ? folderSize() : 0)) + " " + e.what();
+    return nullptr;
   }
+
+  /// The last file that could not be opened, and why; empty if there is none.
+  const std::string& refused() const { return refused_; }
 
   char getOsSeparator() const override { return '/'; }
   void Close(Assimp::IOStream* stream) override { delete stream; }
@@ -57,13 +72,33 @@ class Folder final : public Assimp::IOSystem {
   bool DeleteFile(const std::string&) override { return false; }
 
  private:
-  bool isInside(const char* path) const {
+  std::size_t folderSize() const { return file_.rfind('/') + 1; }
+  bool isBeside(std::string_view path) const { return path.substr(0, folderSize()) == file_.substr(0, folderSize()); }
+
+  /// References in a glTF are URIs: a blank is "%20" there.
+  std::string placeOf(std::string path) const {
     std::error_code error;
-    const fs::path whole = fs::canonical(path, error);
+    if (fs::exists(path, error) || !isBeside(path)) return path;
+    for (std::size_t at = folderSize(); (at = path.find('%', at)) != path.npos && at + 3 <= path.size(); ++at) {
+      int byte = 0;
+      const char* const end = path.data() + at + 3;
+      if (std::from_chars(end - 2, end, byte, 16).ptr == end && byte > 0) {
+        path.replace(at, 3, 1, static_cast<char>(byte));
+      }
+    }
+    return path;
+  }
+
+  bool isInside(const std::string& path) const {
+    std::error_code error;
+    const fs::path whole = fs::weakly_canonical(fs::absolute(path), error);
     return !error && std::mismatch(folder_.begin(), folder_.end(), whole.begin(), whole.end()).first == folder_.end();
   }
 
+  std::string file_;
+  std::string_view content_;
   fs::path folder_;
+  std::string refused_;
 };
 
 /// Numbers with a point in this thread, whatever the program's locale.
@@ -93,13 +128,17 @@ void leaveOut(Assimp::Importer& importer) {
 
 }  // namespace
 
-Polygons readScene(const std::string& file) {
+Polygons readScene(const std::string& file, std::string_view content) {
   const CLocale c_locale;
   Assimp::Importer importer;
-  importer.SetIOHandler(new Folder(file));  // the importer's own from here on
+  auto* const folder = new Folder(file, content);
+  importer.SetIOHandler(folder);  // the importer's own from here on
   leaveOut(importer);
   const aiScene* scene = importer.ReadFile(file, 0);
-  if (scene == nullptr) throw std::runtime_error(importer.GetErrorString());
+  if (scene == nullptr) {
+    const std::string& refused = folder->refused();
+    throw std::runtime_error(importer.GetErrorString() + (refused.empty() ? "" : " (" + refused + ")"));
+  }
   if (scene->mRootNode == nullptr || scene->mNumMeshes == 0) throw std::runtime_error("no mesh in this file");
 
   Polygons polygons;

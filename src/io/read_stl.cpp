@@ -53,6 +53,7 @@ Polygons readText(std::string_view bytes) {
   VertexPool pool(polygons.vertices);
   std::size_t vertices = 0;
   std::string_view rest = bytes;
+  const char end = lineEnd(bytes);
   const auto expect = [&](std::string_view word, std::initializer_list<std::string_view> keywords) {
     for (const std::string_view keyword : keywords) {
       if (!equal(word, keyword)) {
@@ -64,14 +65,14 @@ Polygons readText(std::string_view bytes) {
   };
   for (std::string_view word = takeWord(rest); !word.empty(); word = takeWord(rest)) {
     expect(word, {"solid"});
-    takeLine(rest);
+    takeLine(rest, end);
     for (word = takeWord(rest); !equal(word, "endsolid"); word = takeWord(rest)) {
       if (word.empty()) failAt(bytes, word.data(), "truncated: no 'endsolid' at the end");
       expect(word, {"facet", "normal"});
-      double normal = 0;
       for (int i = 0; i < 3; ++i) {
-        const std::string_view at = rest;
-        if (!takeNumber(rest, normal)) failAt(bytes, at.data(), "a normal of three numbers expected");
+        // Not used, so it need not be a number: some write -1.#IND.
+        word = takeWord(rest);
+        if (word.empty() || equal(word, "outer")) failAt(bytes, word.data(), "a normal of three numbers expected");
       }
       expect(takeWord(rest), {"outer", "loop"});
       std::array<std::uint32_t, 3> corner;
@@ -86,7 +87,7 @@ Polygons readText(std::string_view bytes) {
       expect(takeWord(rest), {"endfacet"});
       polygons.addTriangle(corner[0], corner[1], corner[2]);
     }
-    takeLine(rest);
+    takeLine(rest, end);
   }
   return polygons;
 }
@@ -101,7 +102,14 @@ Polygons readStl(std::string_view bytes) {
   const bool is_binary = bytes.size() >= kHead && bytes.size() > needed;
   std::string_view rest = withoutByteOrderMark(bytes);
   if (!is_binary && equal(takeWord(rest), "solid")) return readText(withoutByteOrderMark(bytes));
-  if (bytes.size() < kHead) throw std::runtime_error("no STL file: neither 'solid' nor a binary header of 84 bytes");
+  // No binary file promises so many triangles as the bytes of a text: 150 million at least.
+  const std::string_view head = bytes.substr(0, kHead);
+  const bool is_text = std::all_of(head.begin(), head.end(), [](unsigned char c) {
+    return c >= ' ' || kBlanks.find(static_cast<char>(c)) != std::string_view::npos;
+  });
+  if (bytes.size() < kHead || (is_text && bytes.size() < needed)) {
+    throw std::runtime_error("no STL file: neither text that begins with 'solid' nor binary");
+  }
   if (bytes.size() < needed) {
     throw std::runtime_error("truncated: " + std::to_string((bytes.size() - kHead) / kFacet) + " of " +
                              std::to_string(count) + " triangles");

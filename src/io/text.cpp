@@ -14,10 +14,14 @@
 
 namespace bocst::io {
 
-std::string_view takeLine(std::string_view& text) {
-  const std::size_t end = text.find('\n');
-  std::string_view line = text.substr(0, end);
-  text.remove_prefix(end == std::string_view::npos ? text.size() : end + 1);
+char lineEnd(std::string_view text) {
+  return text.find('\n') == text.npos && text.find('\r') != text.npos ? '\r' : '\n';
+}
+
+std::string_view takeLine(std::string_view& text, char end) {
+  const std::size_t size = text.find(end);
+  std::string_view line = text.substr(0, size);
+  text.remove_prefix(size == std::string_view::npos ? text.size() : size + 1);
   if (!line.empty() && line.back() == '\r') line.remove_suffix(1);
   return line;
 }
@@ -56,8 +60,9 @@ std::string inQuotes(std::string_view word) {
 }
 
 void failAt(std::string_view file, const char* at, const std::string& what) {
-  const auto line = 1 + std::count(file.data(), at, '\n');
-  throw std::runtime_error("line " + std::to_string(line) + ": " + what);
+  auto ends = std::count(file.data(), at, '\n');
+  if (ends == 0) ends = std::count(file.data(), at, '\r');
+  throw std::runtime_error("line " + std::to_string(1 + ends) + ": " + what);
 }
 
 const char* notACoordinate(double number) {

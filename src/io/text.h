@@ -13,8 +13,11 @@ inline std::string_view withoutByteOrderMark(std::string_view text) {
   return text.substr(text.substr(0, 3) == "\xEF\xBB\xBF" ? 3 : 0);
 }
 
+/// What ends the lines of `text`: '\n', or '\r' if there is no other (CR LF ends lines, too).
+char lineEnd(std::string_view text);
+
 /// Cuts the next line off `text`, without its end.
-std::string_view takeLine(std::string_view& text);
+std::string_view takeLine(std::string_view& text, char end = '\n');
 
 /// Cuts the next word off `text`; empty at the end.
 std::string_view takeWord(std::string_view& text);

@@ -138,6 +138,44 @@ std::string binaryStl() {
   return stl;
 }
 
+std::string replaced(std::string text, const std::string& what, const std::string& by) {
+  const std::size_t at = text.find(what);
+  if (at == std::string::npos) throw std::logic_error("no such text: " + what);
+  return text.replace(at, what.size(), by);
+}
+
+const std::string kPointer = "version https://git-lfs.github.com/spec/v1\noid sha256:4d7a\nsize 123456\n";
+
+std::string gltfBuffer() {
+  std::string buffer;
+  for (const float x : {0, 0, 0, 1, 0, 0, 1, 1, 0, 0, 1, 0}) append(buffer, x);
+  for (const std::uint16_t i : {0, 1, 2, 0, 2, 3}) append(buffer, i);
+  return buffer;
+}
+
+/// A square whose buffer is in another file, or in the GLB if `uri` is empty.
+std::string gltf(const std::string& uri) {
+  return R"({"asset":{"version":"2.0"},"scene":0,"scenes":[{"nodes":[0]}],"nodes":[{"mesh":0}],
+"meshes":[{"primitives":[{"attributes":{"POSITION":0},"indices":1}]}],
+"buffers":[{)" +
+         (uri.empty() ? "" : "\"uri\":\"" + uri + "\",") +
+         R"("byteLength":60}],"bufferViews":[{"buffer":0,"byteLength":48},
+{"buffer":0,"byteOffset":48,"byteLength":12}],"accessors":[{"bufferView":0,"componentType":5126,"count":4,
+"type":"VEC3","min":[0,0,0],"max":[1,1,0]},{"bufferView":1,"componentType":5123,"count":6,"type":"SCALAR"}]})";
+}
+
+std::string glb(std::string json) {
+  const std::string buffer = gltfBuffer();
+  json.resize((json.size() + 3) / 4 * 4, ' ');
+  std::string glb = "glTF";
+  for (const std::size_t n : {std::size_t{2}, 12 + 8 + json.size() + 8 + buffer.size(), json.size()}) {
+    append(glb, static_cast<std::uint32_t>(n));
+  }
+  glb += "JSON" + json;
+  append(glb, static_cast<std::uint32_t>(buffer.size()));
+  return glb + std::string("BIN\0", 4) + buffer;
+}
+
 /// A ZIP archive of files that are stored as they are.
 std::string zip(const std::vector<std::pair<std::string, std::string>>& files) {
   std::string archive;
@@ -268,29 +306,9 @@ TEST_F(LoadMesh, ReadsNoMaterials) {
 }
 
 TEST_F(LoadMesh, ReadsWhatAssimpReads) {
-  std::string buffer;
-  for (const float x : {0, 0, 0, 1, 0, 0, 1, 1, 0, 0, 1, 0}) append(buffer, x);
-  for (const std::uint16_t i : {0, 1, 2, 0, 2, 3}) append(buffer, i);
-  const auto gltf = [&](const std::string& uri) {
-    return R"({"asset":{"version":"2.0"},"scene":0,"scenes":[{"nodes":[0]}],"nodes":[{"mesh":0}],
-"meshes":[{"primitives":[{"attributes":{"POSITION":0},"indices":1}]}],
-"buffers":[{)" +
-           uri + R"("byteLength":60}],"bufferViews":[{"buffer":0,"byteLength":48},
-{"buffer":0,"byteOffset":48,"byteLength":12}],"accessors":[{"bufferView":0,"componentType":5126,"count":4,
-"type":"VEC3","min":[0,0,0],"max":[1,1,0]},{"bufferView":1,"componentType":5123,"count":6,"type":"SCALAR"}]})";
-  };
-  write("square.bin", buffer);
-  expectSquare(*load("square.gltf", gltf(R"("uri":"square.bin",)")));
-  std::string json = gltf("");
-  json.resize((json.size() + 3) / 4 * 4, ' ');
-  std::string glb = "glTF";
-  for (const std::size_t n : {std::size_t{2}, 12 + 8 + json.size() + 8 + buffer.size(), json.size()}) {
-    append(glb, static_cast<std::uint32_t>(n));
-  }
-  glb += "JSON" + json;
-  append(glb, static_cast<std::uint32_t>(buffer.size()));
-  glb += std::string("BIN\0", 4) + buffer;
-  expectSquare(*load("square.glb", glb));
+  write("square.bin", gltfBuffer());
+  expectSquare(*load("square.gltf", gltf("square.bin")));
+  expectSquare(*load("square.glb", glb(gltf(""))));
   expectSquare(*load(
       "square.3mf",
       zip({{"_rels/.rels",
@@ -303,15 +321,99 @@ TEST_F(LoadMesh, ReadsWhatAssimpReads) {
 <triangles><triangle v1="0" v2="1" v3="2"/><triangle v1="0" v2="2" v3="3"/></triangles></mesh></object></resources>
 <build><item objectid="1"/></build></model>)"}})));
 
-  // No way out of the folder, nor into what is no regular file.
-  fs::create_directory(folder_ / "inner");
-  complaint(write("inner/out.gltf", gltf(R"("uri":"../square.bin",)")));
-  complaint(write("inner/far.gltf", gltf("\"uri\":\"" + (folder_ / "square.bin").string() + "\",")));
-  ASSERT_EQ(mkfifo((folder_ / "fifo.bin").c_str(), 0600), 0);
-  complaint(write("fifo.gltf", gltf(R"("uri":"fifo.bin",)")));
-  // Nor past the readers here by another name.
+  // No way past the readers here by another name.
   complaint(write("square.xyz", kObj));
   complaint(write("square", kDae));
+}
+
+TEST_F(LoadMesh, OpensBuffersInTheFolderOnly) {
+  fs::create_directory(folder_ / "a%20b");
+  write("a%20b/my part%.bin", gltfBuffer());
+  expectSquare(*load("a%20b/blank.gltf", gltf("my%20part%25.bin")));
+  expectSquare(*load("a%20b/literal.gltf", gltf("my part%.bin")));
+  write("square.bin", gltfBuffer());
+  for (const char* uri : {"../square.bin", "%2e%2E%2fsquare.bin", "../missing.bin"}) {
+    expectComplaint("a%20b/out.gltf", gltf(uri), "is outside the folder");
+  }
+  complaint(write("a%20b/far.gltf", gltf((folder_ / "square.bin").string())));
+  ASSERT_EQ(mkfifo((folder_ / "fifo.bin").c_str(), 0600), 0);
+  expectComplaint("fifo.gltf", gltf("fifo.bin"), "'fifo.bin' is a FIFO");
+  write("pointer.bin", kPointer);
+  expectComplaint("pointer.gltf", gltf("pointer.bin"), "is a Git LFS pointer");
+  expectComplaint("missing.gltf", gltf("%6dissing%0.bin"), "no such file");
+  const fs::path before = fs::current_path();
+  fs::current_path(folder_);
+  EXPECT_NE(complaint("missing.gltf").find("no such file"), std::string::npos);
+  fs::current_path(before);
+}
+
+TEST_F(LoadMesh, RefusesGltfThatAssimpMisreads) {
+  const auto with = [](const std::string& members) {
+    return glb(replaced(gltf(""), "{\"mesh\":0}", "{\"mesh\":0,\"skin\":0}, {}").insert(1, members + ","));
+  };
+  const auto extensions = [](const std::string& list, const std::string& name) {
+    return gltf("square.bin").insert(1, "\"" + list + "\":[\"KHR_materials_unlit\",\"" + name + "\"],");
+  };
+  write("square.bin", gltfBuffer());
+  for (const std::string name : {"KHR_mesh_quantization", "EXT_mesh_gpu_instancing"}) {
+    expectComplaint("used.gltf", extensions("extensionsUsed", name), "extension '" + name + "' is not supported");
+    expectComplaint("used.glb", glb(extensions("extensionsUsed", name)), name);
+  }
+  for (const std::string name : {"KHR_mesh_quantization", "EXT_meshopt_compression", "XYZ_unknown"}) {
+    expectComplaint("required.gltf", extensions("extensionsRequired", name), name);
+    // The content of a GLB tells, whatever the name.
+    expectComplaint("required.bin", glb(extensions("extensionsRequired", name)), "'" + name + "' is not supported");
+  }
+  for (const std::string name : {"KHR_texture_transform", "EXT_texture_webp", "KHR_lights_punctual"}) {
+    expectSquare(*load("harmless.gltf", extensions("extensionsRequired", name)));
+  }
+  expectSquare(*load("used.gltf", extensions("extensionsUsed", "EXT_meshopt_compression")));
+  expectComplaint("skin.glb", with(R"("skins":[{"joints":[1]}])"), "skin without inverseBindMatrices");
+  expectComplaint("skin.glb", with(R"("skins":[{"joints":[1],"inverseBindMatrices":"2"}])"), "inverseBindMatrices");
+}
+
+TEST_F(LoadMesh, RefusesMalformedGltf) {
+  write("square.bin", gltfBuffer());
+  const std::string json = gltf("square.bin");
+  for (std::size_t size = 1; size < json.size(); size += 5) {
+    expectComplaint("cut.gltf", json.substr(0, size), "no glTF file: malformed JSON");
+    complaint(write("cut.glb", glb(json).substr(0, size)));
+  }
+  expectComplaint("bad.gltf", replaced(json, "\"meshes\"", "meshes"), "line 2: no glTF file: malformed JSON");
+  expectComplaint("bad.gltf", replaced(json, "60", "1e999"), "a number that is too large");
+  expectComplaint("bad.gltf", replaced(json, "square", "\xff"), "malformed JSON");
+  expectComplaint("list.gltf", "[1, 2]", "its JSON is no object");
+  for (const char* list : {"7", "{}"}) {
+    complaint(write("list.gltf", std::string(json).insert(1, "\"extensionsRequired\":" + std::string(list) + ",")));
+  }
+  for (const std::string open : {"[", "{\"a\":"}) {
+    std::string deep = "{\"extras\":";
+    for (int i = 0; i < 200000; ++i) deep += open;
+    expectComplaint("deep.gltf", deep, "JSON nested deeper than 256");
+    expectComplaint("deep.glb", glb(deep), "JSON nested deeper than 256");
+  }
+}
+
+TEST_F(LoadMesh, RefusesAmfThatPlacesItsObjects) {
+  std::string amf = "<amf unit=\"millimeter\"><!-- <constellation --><object id=\"0\"><mesh><vertices>";
+  for (const char* corner : {"<x>0</x><y>0</y>", "<x>1</x><y>0</y>", "<x>1</x><y>1</y>", "<x>0</x><y>1</y>"}) {
+    amf += std::string("<vertex><coordinates>") + corner + "<z>0</z></coordinates></vertex>";
+  }
+  amf +=
+      "</vertices><volume><triangle><v1>0</v1><v2>1</v2><v3>2</v3></triangle>"
+      "<triangle><v1>0</v1><v2>2</v2><v3>3</v3></triangle></volume></mesh></object></amf>";
+  expectSquare(*load("square.amf", amf));
+  expectComplaint("placed.amf",
+                  replaced(amf, "</amf>",
+                           "<constellation id=\"1\"><instance objectid=\"0\"><deltax>9</deltax></instance>"
+                           "</constellation></amf>"),
+                  "<constellation> is not supported: export as 3MF");
+}
+
+TEST_F(LoadMesh, KnowsAGitLfsPointer) {
+  for (const char* ending : {"obj", "ply", "stl", "off", "dae", "glb", "gltf", "3mf", "amf", "fbx"}) {
+    expectComplaint(std::string("pointer.") + ending, kPointer, "is a Git LFS pointer");
+  }
 }
 
 TEST_F(LoadMesh, ReadsAPointInEveryLocale) {

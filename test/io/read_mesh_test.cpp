@@ -458,6 +458,50 @@ TEST(ReadMesh, SkipsAByteOrderMark) {
   EXPECT_EQ(readStl(mark + binaryStl().substr(3)).ends.size(), 1u);
 }
 
+TEST(ReadMesh, TakesCarriageReturnsAsEndsOfLines) {
+  const auto cr = [](std::string text) {
+    std::replace(text.begin(), text.end(), '\n', '\r');
+    return text;
+  };
+  for (const auto& [format, text] :
+       {std::pair{Format::kObj, "# a comment\n" + kObj}, std::pair{Format::kOff, replaced(kOff, "1 1", "1 1 0 # 1\n#")},
+        std::pair{Format::kPly, kPly}, std::pair{Format::kStl, kStl + kStl}}) {
+    const Polygons expected = readMesh(text, format);
+    const Polygons polygons = readMesh(cr(text), format);
+    EXPECT_EQ(polygons.vertices, expected.vertices);
+    EXPECT_EQ(polygons.corners, expected.corners);
+  }
+  EXPECT_EQ(sizes(readObj(cr(replaced(kObj, "1 3 4", "1 3 \\\n4")))), (Sizes{3, 3}));
+  expectComplaint(Format::kObj, cr(replaced(kObj, "1 3 4", "1 3")), "line 9: a face has at least three corners");
+  expectComplaint(Format::kPly, cr(replaced(kPly, "3 0 2 3", "3 0 2 4")), "line 15: face 1: vertex index 4");
+
+  // Binary data after a header of such lines may begin with a line feed.
+  const std::string ply = binaryPly();
+  const std::size_t head = ply.find("end_header\n") + 11;
+  std::string line_feeds(48, '\n');
+  line_feeds = cr(ply.substr(0, head)) + line_feeds + ply.substr(head + 48);
+  EXPECT_EQ(readPly(line_feeds).ends.size(), 2u);
+  EXPECT_EQ(readPly(cr(ply.substr(0, head)) + ply.substr(head)).vertices, readPly(ply).vertices);
+}
+
+TEST(ReadOff, ReadsFreeForm) {
+  const Polygons expected = readOff(kOff);
+  for (const std::string text : {"OFF 4 2 0 0 0 0 1 0 0 1 1 0 0 1 0 3 0 1 2 3 0 2 3",
+                                 "OFF\n4 2 0\n0 0 0 1 0 0\n1 1 0 0 1 0 # a\n\n3 0 1 2\n3 0 2 3\n",
+                                 "OFF\n4 2 0\n0 0 0\n1 0 0\n1 1 0\n0 1 0\n3 0 1 2 3 0 2 3\n",
+                                 "4 2 0\n0 0\n0 1 0 0 1 1 0 0 1 0\n3\n0 1 2 3 0 2 3\n"}) {
+    EXPECT_EQ(readOff(text).vertices, expected.vertices) << text;
+    EXPECT_EQ(readOff(text).corners, expected.corners) << text;
+    for (const std::string end : {"9", "x"}) {
+      EXPECT_THROW(readOff(text + " " + end), std::runtime_error) << text;
+    }
+    EXPECT_THROW(readOff(text.substr(0, text.rfind('3'))), std::runtime_error) << text;
+  }
+  // Colours ask for a line each, and messages are about lines.
+  expectComplaint(Format::kOff, "COFF\n4 2 0\n0 0 0 1 0 0\n1 1 0 0 1 0\n3 0 1 2\n3 0 2 3\n", "truncated: 0 of 2 faces");
+  expectComplaint(Format::kOff, "OFF\n4 2 0\n0 0 0 1 0 0\n1 1 0 0 1 0\n3 0 1 2\n3 0 2 4\n", "truncated: 0 of 2 faces");
+}
+
 TEST(ReadStl, RefusesRubbish) {
   expectComplaint(Format::kStl, kStl + "rubbish\n", "line 17: 'solid' expected, not 'rubbish'");
   expectComplaint(Format::kStl, binaryStl() + "x", "byte 134: there is more");
@@ -469,6 +513,15 @@ TEST(ReadStl, RefusesRubbish) {
   const float bad = std::numeric_limits<float>::quiet_NaN();
   std::memcpy(nan.data() + 84 + 24, &bad, sizeof(bad));
   expectComplaint(Format::kStl, nan, "byte 108: vertex 1 of triangle 0 is not finite");
+  const std::string text = "# a mesh\n" + kStl;
+  for (const std::string& rubbish : {text, text.substr(0, 50), "<!DOCTYPE html><title>\xd0\xaf</title>" + text}) {
+    expectComplaint(Format::kStl, rubbish, "neither text that begins with 'solid' nor binary");
+  }
+  expectComplaint(Format::kStl, binaryStl().substr(0, 100), "truncated: 0 of 1 triangles");
+  for (const std::string normal : {"-1.#IND -1.#IND 1.#QNAN", "nan nan nan", "-nan(ind) x 1e999"}) {
+    EXPECT_EQ(readStl(replaced(kStl, "normal 0 0 1", "normal " + normal)).ends.size(), 2u);
+  }
+  expectComplaint(Format::kStl, replaced(kStl, "normal 0 0 1", "normal 0 1"), "line 3: a normal of three numbers");
   EXPECT_EQ(readStl(kStl + replaced(kStl, "solid s", "SOLID")).ends.size(), 4u);
   // Binary although it begins like a text: the number of triangles fits.
   const std::string named = "solid" + binaryStl().substr(5);
