@@ -17,8 +17,8 @@ namespace bocst {
 /// doubles, in any locale. Other formats (GLB, glTF, 3MF, ...) are read by assimp in this process, with its limits:
 /// float coordinates, and no guarantee for malformed files. It may open regular files in the folder of the file. Valid
 /// files that assimp would misread are refused: glTF with extensions about geometry (quantization, instances) or
-/// unknown ones (Draco is left to assimp), glTF with a skin without inverseBindMatrices, and AMF with a
-/// `<constellation>`.
+/// unknown ones (Draco may be used, except with indices of 32 bits), glTF with a skin without inverseBindMatrices, and
+/// AMF with a `<constellation>`.
 ///
 /// Coordinates and axes are those of the file. The coordinates of DAE are converted to metres (`<unit meter="...">`);
 /// the length units that 3MF, AMF and FBX state are not applied: a 3MF in inches gives inches. The axes of DAE stay as

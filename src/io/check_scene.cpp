@@ -20,7 +20,7 @@ using Json = nlohmann::json;
 constexpr std::size_t kGlbHead = 20;  // "glTF", version, length of the file; length and kind of the JSON
 constexpr int kDeepestJson = 256;     // assimp's parser recurses
 
-/// Beginnings of the names of extensions that leave the geometry alone; assimp itself decodes Draco or refuses it.
+/// Beginnings of the names of extensions that leave the geometry alone; Draco has its own check.
 constexpr std::string_view kHarmless[] = {"KHR_materials_", "KHR_texture_",   "EXT_texture_",
                                           "MSFT_texture_",  "KHR_lights_",    "EXT_lights_",
                                           "KHR_xmp",        "KHR_techniques", "KHR_draco_mesh_compression"};
@@ -53,6 +53,21 @@ Json parseGltf(std::string_view bytes) {
   }
 }
 
+/// assimp decodes Draco, but not indices of 32 bits: it leaves these as they are in the file.
+void refuseWideDraco(const Json& file) {
+  static const Json::json_pointer draco("/extensions/KHR_draco_mesh_compression");
+  for (const Json& mesh : file.value("meshes", Json::array())) {
+    if (!mesh.is_object()) continue;
+    for (const Json& primitive : mesh.value("primitives", Json::array())) {
+      const auto indices = primitive.find("indices");
+      if (!primitive.contains(draco) || indices == primitive.end() || !indices->is_number_unsigned()) continue;
+      const Json::json_pointer type("/accessors/" + indices->dump() + "/componentType");
+      if (!file.contains(type) || file[type] != 5125) continue;
+      throw std::runtime_error("Draco with indices of 32 bits is not supported: export without compression");
+    }
+  }
+}
+
 void refuseGltf(std::string_view bytes) {
   const Json file = parseGltf(bytes);
   if (!file.is_object()) throw std::runtime_error("no glTF file: its JSON is no object");
@@ -72,6 +87,7 @@ void refuseGltf(std::string_view bytes) {
     return std::none_of(std::begin(kHarmless), std::end(kHarmless),
                         [&](std::string_view beginning) { return name.compare(0, beginning.size(), beginning) == 0; });
   });
+  refuseWideDraco(file);
   const Json skins = file.value("skins", Json::array());
   if (!skins.is_array()) return;  // glTF 1.0, whose skins assimp skips
   for (const Json& skin : skins) {

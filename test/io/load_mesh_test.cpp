@@ -368,6 +368,10 @@ TEST_F(LoadMesh, RefusesGltfThatAssimpMisreads) {
     expectSquare(*load("harmless.gltf", extensions("extensionsRequired", name)));
   }
   expectSquare(*load("used.gltf", extensions("extensionsUsed", "EXT_meshopt_compression")));
+  const std::string draco =
+      replaced(gltf(""), "\"indices\"",
+               R"("extensions":{"KHR_draco_mesh_compression":{"bufferView":0,"attributes":{"POSITION":0}}},"indices")");
+  expectComplaint("draco.glb", glb(replaced(draco, "5123", "5125")), "Draco with indices of 32 bits is not supported");
   expectComplaint("skin.glb", with(R"("skins":[{"joints":[1]}])"), "skin without inverseBindMatrices");
   expectComplaint("skin.glb", with(R"("skins":[{"joints":[1],"inverseBindMatrices":"2"}])"), "inverseBindMatrices");
 }
