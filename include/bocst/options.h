@@ -74,9 +74,9 @@ struct Options {
   /// The mesh also collides with a geometry if a connected component of that geometry is completely inside the mesh, in
   /// both argument orders. A point is inside if its winding number is not zero: components may overlap, and one with
   /// the opposite orientation inside another is a cavity. The mesh must be watertight: each edge occurs equally often
-  /// in both directions (vertices at the same position count as one; triangles without area are ignored). Otherwise the
-  /// constructor, setMesh() and updateVertices() throw std::invalid_argument. Costs a sort of the edges and 12 to 40
-  /// bytes per triangle.
+  /// in both directions (vertices at the same position count as one; triangles with two corners at one position are
+  /// ignored). Otherwise the constructor, setMesh() and updateVertices() throw std::invalid_argument. Costs a sort of
+  /// the edges and 12 to 40 bytes per triangle.
   bool solid = false;
 
   /// A thread that all models of the process share builds the whole tree while the model's first queries run; without

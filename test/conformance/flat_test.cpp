@@ -4,11 +4,13 @@
 #include <bocst/is_closer_than.h>
 #include <gtest/gtest.h>
 
+#include <array>
 #include <cmath>
 #include <limits>
 #include <random>
 
 #include "conformance/reference.h"
+#include "fcl/adapters/models.h"
 #include "query/ccd/contact_time_walk.h"
 #include "query/collide/tree_walk.h"
 #include "query/distance/distance_walk.h"
@@ -168,6 +170,51 @@ TEST(FlatWork, PipesGetBoxesToo) {
   for (int i = 0; i < 3; ++i) EXPECT_FALSE(query::TreeWalk(side_a, side_b, to).runByTurns(counter));
   EXPECT_NE(a.tree.knownBoxes(), nullptr);
   EXPECT_NE(b.tree.knownBoxes(), nullptr);
+}
+
+// Requests for contacts alone get the boxes, too, and then find nothing quickly; what they find stays the same.
+TEST(FlatWork, ContactsOfPipesComeOverBoxes) {
+  const Raw raw = pipe(128);
+  const Modeld a(raw.mesh()), b(raw.mesh());
+  const auto bvh_a = test::bvh<fcl::OBBRSSd>(raw), bvh_b = test::bvh<fcl::OBBRSSd>(raw);
+  const fcl::Transform3d I = fcl::Transform3d::Identity();
+  const auto crossed = [](double gap) {
+    return test::pose<double>(Eigen::AngleAxisd(0.5, Vector3d::UnitX()).toRotationMatrix(), {0.2 + gap, 0, 0});
+  };
+  using Found = std::vector<std::array<double, 5>>;
+  const auto contacts = [&](const fcl::Transform3d& X, std::size_t most) {
+    fcl::CollisionResultd result;
+    fcl::collide(&a, I, &b, X, fcl::CollisionRequestd(most, true), result);
+    Found found;
+    for (std::size_t i = 0; i < result.numContacts(); ++i) {
+      const fcl::Contactd& c = result.getContact(i);
+      found.push_back({double(c.b1), double(c.b2), c.pos.x(), c.pos.y(), c.penetration_depth});
+    }
+    return found;
+  };
+  const auto boxes = [](const Modeld& m) { return fcl_adapter::treeOf<double>(m).knownBoxes(); };
+  const std::vector<fcl::Transform3d> poses{crossed(0.01), crossed(-0.01), crossed(-0.1), crossed(-1e-3),
+                                            crossed(1e-4)};
+  std::vector<Found> few, all;
+  for (const fcl::Transform3d& X : poses) few.push_back(contacts(X, 3)), all.push_back(contacts(X, 1000000));
+  EXPECT_TRUE(all[0].empty());
+  EXPECT_GT(all[2].size(), 100u);
+  for (std::size_t i = 0; i < poses.size(); ++i) {
+    EXPECT_EQ(test::pairs<double>(a, I, b, poses[i]), test::pairs<double>(*bvh_a, I, *bvh_b, poses[i])) << i;
+  }
+  for (int i = 0; i < 1000 && boxes(a) == nullptr; ++i) contacts(poses[0], 1000000);
+  ASSERT_NE(boxes(a), nullptr);
+  ASSERT_NE(boxes(b), nullptr);
+  for (const bool remembers : {false, true}) {
+    SCOPED_TRACE(remembers);
+    if (remembers) test::touching<double>(a, I, b, poses[0]);
+    const query::TreeSide side_a(fcl_adapter::treeOf<double>(a)), side_b(fcl_adapter::treeOf<double>(b));
+    EXPECT_EQ(query::Turns::favourBoxes(side_a, side_b), remembers);
+    for (std::size_t i = 0; i < poses.size(); ++i) {
+      EXPECT_EQ(contacts(poses[i], 3), few[i]) << i;
+      EXPECT_EQ(contacts(poses[i], 1000000), all[i]) << i;
+    }
+  }
 }
 
 // `steps` counts pairs of leaves and of triangles, each exact distance as two more.

@@ -874,6 +874,57 @@ TEST_F(Program, ExplainsWrongCommandLines) {
   expectComplaint("validate " + cube() + " " + cube() + " --reference kdop", kUsage, "--reference");
 }
 
+// A script's variable that is not set must not count as an option that is not given.
+TEST_F(Program, RefusesEmptyValuesAndOptionsWithoutEffect) {
+  const std::string collide = "collide " + cube() + " " + cube(), inspect = "inspect " + cube();
+  const std::string bench = "bench " + cube();
+  const std::string scene =
+      "scene " + write("scene.json", R"({"objects": [{"name": "p", "box": [1, 1, 1], "moving": true}]})");
+  for (const std::string command :
+       {collide + " --poses ''", collide + " --pose ''", collide + " --csv ''", collide + " --json ''",
+        inspect + " --html ''", inspect + " --image ''", scene + " --states ''", scene + " --srdf ''", "inspect ''"}) {
+    expectComplaint(command, kUsage, "empty");
+  }
+  expectComplaint(collide + " --rpy", kUsage, "--rpy: needs --pose");
+  expectComplaint(collide + " --xyzw", kUsage, "--xyzw: needs --pose");
+  expectComplaint(collide + " --depth 5", kUsage, "--depth: has an effect only with --answer conservative");
+  expectComplaint(collide + " --viewport 64", kUsage, "--viewport: has an effect only with --oracle sampled");
+  expectComplaint(inspect + " --viewport 64", kUsage, "--viewport: has an effect only with --oracle sampled");
+  expectComplaint(inspect + " --link hand --spheres x.ply", kUsage, "--link: needs --spheres FILE.yaml");
+  expectComplaint(inspect + " --tolerance 0.1 --count 9", kUsage, "--tolerance");
+  expectComplaint(scene + " --depth 5", kUsage, "--depth");
+  expectComplaint(scene + " --adjacent check", kFailed, "--adjacent: ");
+  expectComplaint(bench + " " + cube() + " --oracles", kUsage, "b: not available with --oracles");
+  expectComplaint(bench + " --oracles --scenarios warm", kUsage, "--scenarios: not available with --oracles");
+  expectComplaint(bench + " --frames 3", kUsage, "--frames: needs --scenarios moving");
+  expectComplaint(bench + " --build-ahead", kUsage, "--build-ahead: needs --scenarios fresh or planner");
+  expectComplaint(bench + " --limit 3", kUsage, "--limit: needs --oracles");
+  expectComplaint(bench + " --triangles 100", kUsage, "--triangles: needs --scenarios growth or --oracles");
+  expectComplaint("help fly", kUsage, "there is no command fly");
+}
+
+TEST_F(Program, KeepsWhatASceneNames) {
+  const std::string states = write("states.csv", "p.x,p.y,p.z\n1,0,0\n");
+  const std::string scene = write("scene.json", R"({"objects": [{"name": "p", "box": [1, 1, 1], "moving": true},
+                                                  {"name": "q", "box": [1, 1, 1]}], "states": "states.csv"})");
+  expectComplaint("scene " + scene + " --csv " + states, kFailed, "would be overwritten");
+  EXPECT_EQ(read(states), "p.x,p.y,p.z\n1,0,0\n");
+  EXPECT_EQ(run("scene " + scene + " --csv " + (folder_ / "report.csv").string()).code, 0);
+}
+
+TEST_F(Program, ReadsPosesWithAByteOrderMark) {
+  const std::string poses = write("poses.csv", "\xEF\xBB\xBFx,y,z,qw,qx,qy,qz\n0,0,0,1,0,0,0\n");
+  EXPECT_EQ(json("collide " + cube() + " " + cube() + " --poses " + poses).at("collisions"), 1);
+}
+
+// An existing file keeps its permissions.
+TEST_F(Program, KeepsPermissionsOfOutputs) {
+  const std::string report = write("report.json", "");
+  fs::permissions(report, fs::perms::owner_read | fs::perms::owner_write);
+  EXPECT_EQ(run("inspect " + cube() + " --depth 1 --json " + report).code, 0);
+  EXPECT_EQ(fs::status(report).permissions(), fs::perms::owner_read | fs::perms::owner_write);
+}
+
 TEST_F(Program, SuggestsWhatWasMeant) {
   expectComplaint("colide a b", kUsage, "Did you mean collide?");
   expectComplaint("inspec a", kUsage, "Did you mean inspect?");

@@ -4,9 +4,11 @@
 #include <fcl/config.h>
 
 #include "fcl/adapters/convex_shapes.h"
+#include "fcl/adapters/models.h"
 #if FCL_HAVE_OCTOMAP
 #include "fcl/adapters/octree_side.h"
 #endif
+#include "fcl/adapters/pair.h"
 #include "query/sides/convex_side.h"
 
 namespace bocst::fcl_adapter {
@@ -18,6 +20,14 @@ bool isBodies(const fcl::CollisionGeometry<S>* geometry) {
   if (geometry->getNodeType() == fcl::GEOM_OCTREE) return true;
 #endif
   return isShape(geometry);
+}
+
+/// @throws std::invalid_argument for a geometry that is no Model, BVHModel, shape or OcTree.
+template <typename S>
+void checkPartners(const char* query, const fcl::CollisionGeometry<S>* o1, const fcl::CollisionGeometry<S>* o2) {
+  for (const auto* o : {o1, o2}) {
+    if (asModel<S>(o) == nullptr && !isBodies(o)) withBvh<S>(query, o, [](const auto&) {});
+  }
 }
 
 /// Calls f with the side of a shape or of an octree (see isBodies()) at a pose, unless the octree has no occupied cell.

@@ -31,7 +31,8 @@ S roundDown(double x) {
 template <typename S>
 void setBounds(fcl::CollisionGeometry<S>& geometry, Eigen::AlignedBox3d b, double margin, double radius) {
   const Eigen::Vector3d middle = b.center();
-  margin *= 1 + 4e-16;
+  // Rounded outwards, also where it is added.
+  if (margin > 0) margin += 4e-16 * (b.min().cwiseAbs().cwiseMax(b.max().cwiseAbs()).maxCoeff() + margin);
   b = Eigen::AlignedBox3d(b.min().array() - margin, b.max().array() + margin);
   for (int k = 0; k < 3; ++k) {
     geometry.aabb_local.min_[k] = roundDown<S>(b.min()[k]);

@@ -116,32 +116,55 @@ bool collideTrees(const CollideQuery<S>& q, const TreeSide& a, const TreeSide& b
     const Interior *of_a = tree_a.interior(a.now()), *of_b = tree_b.interior(b.now());
     return of_a != nullptr && of_b != nullptr && query::surelyCross(*of_a, *of_b, b_in_a);
   };
-  const auto walk = [&, &b_in_a = b_in_a, magnitude = magnitude](auto&& with_collector) {
+  const auto walkFor = [&, &b_in_a = b_in_a, magnitude = magnitude](const CollideQuery<S>& of, auto&& with_collector) {
     const Triangles<S> t1(q.swapped ? tree_b : tree_a), t2(q.swapped ? tree_a : tree_b);
-    MeshCollector<S> collector(q, tree_a, t1, t2, magnitude);
+    MeshCollector<S> collector(of, tree_a, t1, t2, magnitude);
     collector.setFrame(tree_a.surface().lattice, b_in_a.tolerance + q.margin / tree_a.surface().lattice.unit());
     with_collector(collector);
     collector.finish();
   };
+  const auto walk = [&](auto&& with_collector) { walkFor(q, with_collector); };
   // TreeWalk widens slabs by itself; oriented boxes and spheres need no more than the margin.
   const SimilarityTransform near = withMargin(b_in_a, a, q, q.margin);
   const auto walkBoxes = [&](MeshCollector<S>& collector) {
     const query::BoxSide boxes_a(a), boxes_b(b);
     query::PairWalk<query::BoxSide, query::BoxSide>(boxes_a, boxes_b, near, collector).run();
   };
+  // Of slivers, a walk for contacts over blocks may take thousands of times as long as one over boxes to find nothing.
+  const auto boxesPartAll = [&] {
+    constexpr std::size_t kMostSteps = 1024;
+    if (q.endsAtFirst() || q.request.enable_cost || query::Turns::favourBoxes(a, b)) return false;
+    if (!query::BoxSide::fits(a) || !query::BoxSide::fits(b)) return false;
+    if (tree_a.boxPrice() + tree_b.boxPrice() > 0 || !query::BoxSide::build(a) || !query::BoxSide::build(b))
+      return false;
+    const fcl::CollisionRequest<S> request;
+    fcl::CollisionResult<S> result;
+    bool part_all = false;
+    walkFor({q, request, result, q.margin, q.is_distance}, [&](MeshCollector<S>& collector) {
+      const query::BoxSide boxes_a(a), boxes_b(b);
+      query::PairWalk<query::BoxSide, query::BoxSide> boxes(boxes_a, boxes_b, near, collector);
+      part_all = !boxes.run(kMostSteps) && !boxes.gaveUp();
+    });
+    return part_all;
+  };
   if (query::TreeWalk::fits(a, b, near) && !isNeedle(tree_a) && !isNeedle(tree_b)) {
     query::TreeWalk trees(a, b, near);
-    if (!trees.isNeedless() && !(kUsesBoxes<S> && query::knownBoxesApart(a, b, near))) {
+    if (!trees.isNeedless() && !(kUsesBoxes<S> && (query::knownBoxesApart(a, b, near) || boxesPartAll()))) {
       if (isProved()) return true;
+      std::size_t steps = 0;
       walk([&](auto& collector) {
         if (near.margin > 0 && collector.endsAtFirst()) {
           walkWithinMargin(a, b, near, collector, [&](std::size_t most) { return trees.run(collector, most); });
         } else if (kUsesBoxes<S> && collector.endsAtFirst()) {
           trees.runByTurns(collector);
+        } else if (kUsesBoxes<S> && query::Turns::favourBoxes(a, b)) {
+          walkBoxes(collector);
         } else {
-          trees.run(collector);
+          steps = trees.run(collector, ~std::size_t{0}).steps;
         }
       });
+      // Walks for a verdict have taken turns with oriented boxes; a walk for contacts that found none pays for them.
+      if (kUsesBoxes<S> && !q.endsAtFirst() && q.result.numContacts() == before) trees.payForBoxes(steps);
     }
   } else if (kUsesBoxes<S> && isNeedle(tree_a) && isNeedle(tree_b) && query::BoxSide::fits(a) &&
              query::BoxSide::fits(b)) {

@@ -119,19 +119,9 @@ std::optional<double> timeOfContact(const ContinuousQuery<S>& q, const Mesh* mes
   return walk(scope.a(), bvhSideOf<S>("continuousCollide", q.b()), SimilarityTransform());
 }
 
-/// @throws std::invalid_argument for partners that are not supported, wherever they are.
-template <typename S>
-void checkPartner(const ContinuousQuery<S>& q) {
-  for (const auto* o : {q.o1, q.o2}) {
-    if (asModel<S>(o) == nullptr && !isBodies(o)) {
-      withBvh<S>("continuousCollide", o, [](const auto&) {});
-    }
-  }
-}
-
 template <typename S>
 double firstContact(const ContinuousQuery<S>& q) {
-  checkPartner(q);
+  checkPartners<S>("continuousCollide", q.o1, q.o2);
   const fcl::Transform3<S> X_W1 = poseAt<S>(q.X_W1, 0), X_W2 = poseAt<S>(q.X_W2, 0);
   for (;;) {
     // Held, so that another mesh does not get the address of one of these.

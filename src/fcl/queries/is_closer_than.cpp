@@ -4,6 +4,7 @@
 
 #include <stdexcept>
 
+#include "fcl/adapters/bodies.h"
 #include "fcl/adapters/models.h"
 #include "fcl/adapters/validate.h"
 #include "fcl/queries/collide_pair.h"
@@ -25,6 +26,9 @@ bool isCloserThan(const fcl::CollisionGeometry<S>* o1, const fcl::Transform3<S>&
     case fcl_adapter::PairKind::kNothing:
       return false;
     case fcl_adapter::PairKind::kModel:
+      fcl_adapter::checkPartners<S>("isCloserThan", o1, o2);
+      fcl_adapter::checkPose("isCloserThan", "X_W1", X_W1);
+      fcl_adapter::checkPose("isCloserThan", "X_W2", X_W2);
       if (!(static_cast<double>(distance) < kMostAsMargin)) {
         if (!o1->isOccupied() || !o2->isOccupied()) return false;
         fcl::DistanceResult<S> result;

@@ -29,6 +29,10 @@ bool TreeWalk::runByTurns(Visitor& visitor) {
   return walkByTurns(a_, b_, b_in_a_, visitor, kLimits, [&](std::size_t most) { return run(visitor, most); });
 }
 
+void TreeWalk::payForBoxes(std::size_t steps) const {
+  Turns(a_, b_, tree::Tree::Search::kYesOrNo, kLimits).tookOverBlocks(steps, true);
+}
+
 WalkEnd TreeWalk::run(Visitor& visitor, std::size_t most_leaf_pairs) {
   visitor_ = &visitor;
   leaf_pairs_ = 0;

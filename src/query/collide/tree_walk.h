@@ -34,6 +34,9 @@ class TreeWalk {
   /// a whole; in other places the float walk is quicker.
   bool runByTurns(Visitor& visitor);
 
+  /// A walk took so many steps, where one over oriented boxes might have been quicker.
+  void payForBoxes(std::size_t steps) const;
+
  private:
   struct Scratch;
 

@@ -33,10 +33,20 @@ class Turns {
     const std::size_t steps = 2 * std::size_t{std::min(last[0].steps, last[1].steps)};
     if (last[0].over_boxes != 0) {
       most_over_boxes_ = steps;
+      // Of slivers, a single pair of leaves takes longer than most walks over boxes.
+      if (price == 0 && kind == tree::Tree::Search::kYesOrNo) most_ = 0;
     } else if (price == 0 && steps > 0) {
       most_ = std::max(most_, steps);
       follows_last_ = true;
     }
+  }
+
+  /// Do two models have their boxes, and did the last long yes-or-no walk of both end over boxes?
+  static bool favourBoxes(const TreeSide& a, const TreeSide& b) {
+    const auto favours = [](const tree::Tree& tree) {
+      return tree.knownBoxes() != nullptr && tree.longSearch(tree::Tree::Search::kYesOrNo).over_boxes != 0;
+    };
+    return favours(a.tree()) && favours(b.tree());
   }
 
   /// Of this turn.
@@ -56,7 +66,7 @@ class Turns {
 
   void next() {
     constexpr std::size_t kLonger = 16;
-    most_ *= kLonger;
+    most_ = kLonger * std::max(most_, limits_.few);
     is_first_ = false;
   }
 

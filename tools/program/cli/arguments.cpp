@@ -86,6 +86,11 @@ void ModelArguments::addAll(CLI::App& command) {
   addOracle(command);
 }
 
+void ModelArguments::refuseIdle(const CLI::App& command) const {
+  refuseUnless(oracle == "sampled", command, "--viewport", "has an effect only with --oracle sampled");
+  refuseUnless(!exact(), command, "--depth", "has an effect only with --answer conservative");
+}
+
 Options ModelArguments::options() const {
   Options options;
   options.subdivision = subdivision == "octree" ? Subdivision::kOctree : Subdivision::kBono;
@@ -169,6 +174,10 @@ void addJson(CLI::App& command, Output& output) {
 void checkStdout(const std::string& csv_file, const Output& output) {
   if (csv_file != "-" || output.json_file != "-") return;
   throw CLI::ValidationError("--csv", "--json already writes to stdout; give a file");
+}
+
+void refuseUnless(bool has_effect, const CLI::App& command, const char* option, const char* why) {
+  if (!has_effect && command.get_option(option)->count() != 0) throw CLI::ValidationError(option, why);
 }
 
 void read(const char* option, const std::function<void()>& f) {

@@ -48,6 +48,9 @@ struct ModelArguments {
   void addAnswer(CLI::App& command);  ///< --answer --scalar
   void addAll(CLI::App& command);
 
+  /// @throws CLI::ValidationError for an option of addAll() that has no effect beside the others.
+  void refuseIdle(const CLI::App& command) const;
+
   Options options() const;
   Scalar scalarKind() const { return scalar == "float" ? Scalar::kFloat : Scalar::kDouble; }
   bool exact() const { return answer == "exact"; }
@@ -92,6 +95,9 @@ void addJson(CLI::App& command, Output& output);  ///< --json
 /// @throws CLI::ValidationError if CSV and JSON both go to stdout.
 void checkStdout(const std::string& csv_file, const Output& output);
 void addHtml(CLI::App& command, std::string& file);  ///< --html
+
+/// @throws CLI::ValidationError if the option was given although it has no effect.
+void refuseUnless(bool has_effect, const CLI::App& command, const char* option, const char* why);
 
 /// Calls f, which reads what the command line gave as `option`.
 /// @throws CLI::ValidationError if f throws std::invalid_argument.

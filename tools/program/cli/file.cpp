@@ -27,6 +27,8 @@ namespace fs = std::filesystem;
 volatile sig_atomic_t partial_exists = 0;
 char partial_name[PATH_MAX];
 bool stderr_is_terminal = false;
+// What readFile() has read.
+std::vector<fs::path> read_files;
 
 [[noreturn]] void cannotWrite(const std::string& file, int error) {
   throw std::runtime_error(file + ": cannot be written: " + std::generic_category().message(error));
@@ -89,7 +91,9 @@ class Partial {
     writeAll(fd_, text, file_);
     const mode_t mask = ::umask(0);
     ::umask(mask);
-    if (::fchmod(fd_, 0666 & ~mask) != 0) cannotWrite(file_, errno);
+    struct stat before;
+    const mode_t mode = ::stat(target_.c_str(), &before) == 0 ? before.st_mode & 07777 : 0666 & ~mask;
+    if (::fchmod(fd_, mode) != 0) cannotWrite(file_, errno);
   }
 
   void putInPlace() {
@@ -119,7 +123,7 @@ void cleanUp(int signal) {
 }  // namespace
 
 void checkOutputs(const std::vector<std::string>& outputs, const std::vector<std::string>& inputs) {
-  std::vector<fs::path> taken;
+  std::vector<fs::path> taken = read_files;
   for (const std::string& input : inputs) taken.push_back(targetOf(input));
   for (const std::string& file : outputs) {
     if (file.empty() || file == "-") continue;
@@ -155,6 +159,7 @@ std::string readFile(const std::string& file) {
   if (!stream.eof()) {
     throw std::runtime_error(file + ": cannot be read: " + std::generic_category().message(errno != 0 ? errno : EIO));
   }
+  read_files.push_back(targetOf(file));
   return text;
 }
 

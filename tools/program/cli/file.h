@@ -7,7 +7,8 @@
 namespace bocst::program {
 
 /// Fails now rather than after minutes of work. Empty names and "-" (stdout) are no files.
-/// @throws std::runtime_error when one of the outputs cannot be written, or is another output or an input, too.
+/// @throws std::runtime_error when one of the outputs cannot be written, or is another output, one of the inputs, or a
+/// file that readFile() has read.
 void checkOutputs(const std::vector<std::string>& outputs, const std::vector<std::string>& inputs);
 
 /// The whole of a text file. @throws std::runtime_error when it cannot be read.

@@ -201,11 +201,18 @@ void addBench(CLI::App& program, Job& job) {
   command->add_option("--csv", bench->csv_file, "write the rows as CSV to this file; - is stdout")
       ->type_name("FILE|-")
       ->check(outputFile(".csv", true));
-  command->callback([bench, &job] {
+  command->callback([bench, command, &job] {
     checkStdout(bench->csv_file, bench->output);
-    if (bench->of_oracles && !bench->csv_file.empty()) {
-      throw CLI::ValidationError("--csv", "not available with --oracles; use --json");
+    const auto measures = [&](const char* name) { return !bench->of_oracles && bench->asksFor(name); };
+    for (const char* option : {"--csv", "--scenarios", "b"}) {
+      refuseUnless(!bench->of_oracles, *command, option, "not available with --oracles");
     }
+    refuseUnless(bench->of_oracles, *command, "--limit", "needs --oracles");
+    refuseUnless(measures("moving"), *command, "--frames", "needs --scenarios moving");
+    refuseUnless(measures("fresh") || measures("planner"), *command, "--build-ahead",
+                 "needs --scenarios fresh or planner");
+    refuseUnless(bench->of_oracles || measures("growth"), *command, "--triangles",
+                 "needs --scenarios growth or --oracles");
     job = [bench] { return bench->run(); };
   });
 }

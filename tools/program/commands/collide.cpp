@@ -219,10 +219,8 @@ struct Collide {
   }
 
   static void warnOfNorm(const Pose& pose, const std::string& where) {
-    const double norm = pose.quaternionNorm();
-    if (std::abs(norm - 1) > 1e-3) {
-      std::cerr << "bocst: " << where << ": the quaternion has the norm " << norm << " and is normalised\n";
-    }
+    const std::string warning = normWarning(pose);
+    if (!warning.empty()) std::cerr << "bocst: " << where << ": " << warning << '\n';
   }
 
   /// What is said of one pose of a list, and of all.
@@ -462,7 +460,11 @@ void addCollide(CLI::App& program, Job& job) {
   addHtml(*command, collide->html_file);
   collide->image.add(*command);
   addJson(*command, collide->output);
-  command->callback([collide, pose, &job] {
+  command->callback([collide, command, pose, &job] {
+    collide->model.refuseIdle(*command);
+    const bool has_poses = pose->count() != 0 || !collide->poses_file.empty();
+    refuseUnless(has_poses, *command, "--rpy", "needs --pose or --poses");
+    refuseUnless(has_poses, *command, "--xyzw", "needs --pose or --poses");
     read("--pose", [&] {
       if (pose->count() != 0) collide->pose = Pose::parse(collide->pose_text, collide->format());
     });

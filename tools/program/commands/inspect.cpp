@@ -347,11 +347,15 @@ void addInspect(CLI::App& program, Job& job) {
       ->add_option("--tolerance", inspect->tolerance,
                    "fit as many spheres as needed, so that none protrudes from the surface by more than this length")
       ->check(positive())
-      ->type_name("L");
+      ->type_name("L")
+      ->excludes(count);
   addHtml(*command, inspect->html_file);
   inspect->image.add(*command);
   addJson(*command, inspect->output);
-  command->callback([inspect, &job] {
+  command->callback([inspect, command, &job] {
+    refuseUnless(inspect->model.oracle == "sampled", *command, "--viewport",
+                 "has an effect only with --oracle sampled");
+    refuseUnless(endingOf(inspect->spheres_file) == ".yaml", *command, "--link", "needs --spheres FILE.yaml");
     read("--spheres", [&] {
       if (!inspect->spheres_file.empty()) checkSphereFile(inspect->spheres_file);
     });

@@ -55,10 +55,23 @@ std::string unexpected(const CLI::App& program) {
   return command + ": there is no option " + word + "." + suggestion(word, names) + help;
 }
 
+/// An unset variable of a script must not count as an option that is not given.
+void refuseEmptyValues(CLI::App& program) {
+  for (CLI::App* command : program.get_subcommands(nullptr)) {
+    for (CLI::Option* option : command->get_options()) {
+      const auto check = [](const std::string& value) { return value.empty() ? "is empty; give a value" : ""; };
+      if (option->get_items_expected_max() > 0) option->check(CLI::Validator(check, "", "not empty"));
+    }
+  }
+}
+
 /// "bocst help" and "bocst help COMMAND" are the same as with --help.
-std::vector<std::string> argumentsOf(int argc, char** argv) {
+std::vector<std::string> argumentsOf(int argc, char** argv, const CLI::App& program) {
   std::vector<std::string> words(argv + 1, argv + argc);
   if (!words.empty() && words[0] == "help") {
+    const auto all = program.get_subcommands(nullptr);
+    const auto is_named = [&](const CLI::App* command) { return command->get_name() == words.back(); };
+    if (words.size() > 1 && std::none_of(all.begin(), all.end(), is_named)) return {words.back()};
     words.erase(words.begin());
     words.insert(words.begin() + (words.empty() ? 0 : 1), "--help");
   }
@@ -92,7 +105,8 @@ int run(int argc, char** argv, const std::string& version) {
   addOracles(program, job);
   addManual(program, job);
   try {
-    program.parse(argumentsOf(argc, argv));
+    refuseEmptyValues(program);
+    program.parse(argumentsOf(argc, argv, program));
     const int code = job();
     if (!std::cout.flush()) throw std::runtime_error("stdout: cannot be written");
     return code;
@@ -106,7 +120,7 @@ int run(int argc, char** argv, const std::string& version) {
       return complain("a command is missing, one of: " + commandList(program) + "; see `bocst --help`", kUsage);
     return complain(e.what(), kUsage);
   } catch (const std::bad_alloc&) {
-    return complain("out of memory", kFailed);
+    return complain("out of memory; smaller meshes, or a smaller --depth, need less", kFailed);
   } catch (const std::exception& e) {
     return complain(e.what(), kFailed);
   }

@@ -203,6 +203,7 @@ struct SceneCommand {
   double margin = 0;
   bool clearance = false;
   bool no_fcl = false;
+  bool adjacent_given = false;
   ModelArguments model;
   std::string csv_file;
   std::string html_file;
@@ -211,6 +212,8 @@ struct SceneCommand {
   int run() const {
     output.check({scene.file, scene.states, scene.srdf}, {csv_file, html_file});
     const SceneSetup setup = readScene(scene);
+    output.check({}, {csv_file, html_file});  // the scene names more files
+    if (!setup.robot && adjacent_given) throw std::runtime_error("--adjacent: " + scene.file + " has no robot");
     for (const std::string& warning : setup.warnings) std::cerr << "bocst: " << warning << '\n';
     const Bodies bodies(setup);
     SceneQuestions questions;
@@ -264,7 +267,8 @@ struct SceneCommand {
     if (setup.robot) head.row({"robot", robotText(*setup.robot)});
     if (!setup.objects.empty()) head.row({"objects", objectsText(setup)});
     head.row({"meshes", shapesText(bodies)});
-    head.row({"pairs", std::to_string(bodies.pairCount()) + " pairs of shapes are checked"});
+    head.row({"pairs", counted(bodies.pairCount(), "pair") + " of shapes" + (bodies.pairCount() == 1 ? " is" : " are") +
+                           " checked"});
     head.row({"states", std::to_string(report.states()) + ", " + setup.states_from});
     head.row({"answer", model.answerText()});
     head.print();
@@ -277,6 +281,7 @@ struct SceneCommand {
       std::cout << "In " << report.statesOutsideLimits() << " of " << report.states()
                 << " states a joint is outside its limits.\n";
     }
+    if (bodies.pairCount() == 0) std::cout << "No pair of shapes was checked: none moves, or all may touch.\n";
     const std::string differences = report.explainedDifferences(model);
     if (!differences.empty()) std::cout << differences << ".\n";
     std::cout << '\n';
@@ -399,7 +404,9 @@ void addScene(CLI::App& program, Job& job) {
   scene->model.addAll(*command);
   addHtml(*command, scene->html_file);
   addJson(*command, scene->output);
-  command->callback([scene, &job] {
+  command->callback([scene, command, &job] {
+    scene->model.refuseIdle(*command);
+    scene->adjacent_given = command->get_option("--adjacent")->count() != 0;
     read("--package", [&] { Packages(scene->scene.packages); });
     checkStdout(scene->csv_file, scene->output);
     using Adjacent = SceneArguments::Adjacent;

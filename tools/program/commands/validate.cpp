@@ -242,7 +242,8 @@ void addValidate(CLI::App& program, Job& job) {
   addHtml(*command, validate->html_file);
   validate->image.add(*command);
   addJson(*command, validate->output);
-  command->callback([validate, &job] {
+  command->callback([validate, command, &job] {
+    validate->model.refuseIdle(*command);
     if (validate->compare_contacts && !validate->model.exact()) {
       throw CLI::ValidationError("--contacts", "needs --answer exact: only exact answers have triangle pairs");
     }

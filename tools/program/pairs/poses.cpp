@@ -98,7 +98,8 @@ Pose Pose::of(const std::array<double, 7>& given, RotationFormat format) {
 
 std::vector<ListedPose> parsePoses(const std::string& text, RotationFormat format, const std::string& name) {
   std::vector<ListedPose> poses;
-  std::istringstream stream(text);
+  constexpr char kByteOrderMark[] = "\xEF\xBB\xBF";
+  std::istringstream stream(text.compare(0, 3, kByteOrderMark) == 0 ? text.substr(3) : text);
   std::string line;
   for (std::size_t number = 1; std::getline(stream, line); ++number) {
     line.erase(std::min(line.find('#'), line.size()));
@@ -127,6 +128,14 @@ std::vector<ListedPose> parsePoses(const std::string& text, RotationFormat forma
   }
   if (poses.empty()) throw std::runtime_error(name + ": no poses");
   return poses;
+}
+
+std::string normWarning(const Pose& pose) {
+  const double norm = pose.quaternionNorm();
+  if (std::abs(norm - 1) <= 1e-3) return "";
+  std::ostringstream text;
+  text << "the quaternion has the norm " << norm << " and is normalised";
+  return text.str();
 }
 
 double Pose::quaternionNorm() const {

@@ -47,6 +47,9 @@ struct Pose {
   std::string rotationText() const;
 };
 
+/// "the quaternion has the norm 0.5 and is normalised"; empty if its norm is about 1.
+std::string normWarning(const Pose& pose);
+
 /// A pose of a list and the line that it came from; the first line is 1.
 struct ListedPose {
   std::size_t line;

@@ -11,14 +11,6 @@
 
 namespace bocst::program {
 
-std::string normWarning(const Pose& pose) {
-  const double norm = pose.quaternionNorm();
-  if (std::abs(norm - 1) <= 1e-3) return "";
-  std::ostringstream text;
-  text << "the quaternion has the norm " << norm << " and is normalised";
-  return text.str();
-}
-
 std::string JsonElement::placed(const std::string& what) const {
   return file_ + ": " + (path_.empty() ? "" : path_ + ": ") + what;
 }

@@ -11,9 +11,6 @@
 
 namespace bocst::program {
 
-/// "the quaternion has the norm 0.5 and is normalised"; empty if its norm is about 1.
-std::string normWarning(const Pose& pose);
-
 /// A value of a JSON file that knows its place, so that each complaint names it: "scene.json: objects[2].pose".
 class JsonElement {
  public:
