@@ -109,7 +109,8 @@ BOCST_EXPORT std::size_t collide(const fcl::CollisionGeometry<S>* o1, const fcl:
 /// the surfaces. If the model is solid, it is 0, and the nearest points are not those of a contact. Shapes and cells
 /// are solid. Margins have no effect. An octree without occupied cells leaves the result unchanged.
 /// - o1, o2, b1, b2, nearest_points: in the caller's order. Ids are as in collide(), but DistanceResult::NONE for
-///   shapes. The points (with enable_nearest_points) are on the surfaces or spheres, in the world frame.
+///   shapes. The points (with enable_nearest_points) are on the surfaces or spheres, in the world frame. If several
+///   pairs are equally near, they are those of any.
 /// - Conservative answers: the distance between the spheres at the collision depth. It is never larger than that
 ///   between the surfaces, and 0 if spheres overlap.
 /// - abs_err and rel_err: absolute and relative amount by which the answer may exceed the minimum distance, as in FCL.

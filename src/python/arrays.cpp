@@ -4,6 +4,7 @@
 #include <array>
 #include <cmath>
 #include <cstring>
+#include <sstream>
 #include <stdexcept>
 
 namespace bocst::python {
@@ -110,6 +111,15 @@ Poses::Poses(const char* name, const py::handle& object) : name_(name) {
   data_ = static_cast<const double*>(array_.data());
 }
 
+std::string Poses::indexText(std::size_t k) const {
+  std::string text;
+  for (auto n = shape_.rbegin(); n != shape_.rend(); ++n) {
+    text = std::to_string(k % static_cast<std::size_t>(*n)) + (text.empty() ? "" : ", ") + text;
+    k /= static_cast<std::size_t>(*n);
+  }
+  return text.empty() ? text : "[" + text + "]";
+}
+
 const fcl::Transform3d* Poses::transforms(std::vector<fcl::Transform3d>& copy) const {
   const bool columns = order_ == MatrixOrder::kColumns;
   // The last row of a matrix starts at the last number of the first column, or of the third row.
@@ -117,10 +127,10 @@ const fcl::Transform3d* Poses::transforms(std::vector<fcl::Transform3d>& copy) c
   for (std::size_t k = 0; k < count_; ++k) {
     const double* m = data_ + 16 * k + first;
     if ((m[0] == 0) & (m[step] == 0) & (m[2 * step] == 0) & (m[3 * step] == 1)) continue;
-    throw std::invalid_argument(std::string("bocst: ") + name_ + ": matrix " + std::to_string(k) +
-                                " has the last row " + std::to_string(m[0]) + " " + std::to_string(m[step]) + " " +
-                                std::to_string(m[2 * step]) + " " + std::to_string(m[3 * step]) +
-                                "; 0 0 0 1 is expected");
+    std::ostringstream text;
+    text << "bocst: " << name_ << indexText(k) << " has the last row " << m[0] << " " << m[step] << " " << m[2 * step]
+         << " " << m[3 * step] << "; 0 0 0 1 is expected";
+    throw std::invalid_argument(text.str());
   }
   if (columns && reinterpret_cast<std::uintptr_t>(data_) % alignof(fcl::Transform3d) == 0) {
     return reinterpret_cast<const fcl::Transform3d*>(data_);
@@ -140,6 +150,10 @@ fcl::Transform3d pose(const char* name, const py::handle& object) {
     refuse(name, "has the shape " + shapeText(py::array::ensure(object)) + "; (4, 4) is expected");
   std::vector<fcl::Transform3d> copy;
   return *poses.transforms(copy);
+}
+
+std::string counted(std::size_t count, const char* one, const char* many) {
+  return std::to_string(count) + " " + (count == 1 ? one : many != nullptr ? many : std::string(one) + "s");
 }
 
 py::array_t<double> arrayOf(const Eigen::Vector3d& v) { return py::array_t<double>(3, v.data()); }

@@ -8,6 +8,7 @@
 
 #include <cstddef>
 #include <cstdint>
+#include <string>
 #include <vector>
 
 // NumPy arrays as C++ wants them. What does not fit is refused with the argument's name: TypeError for what holds no
@@ -48,6 +49,8 @@ class Poses {
   const fcl::Transform3d* transforms(std::vector<fcl::Transform3d>& copy) const;
 
  private:
+  std::string indexText(std::size_t k) const;  ///< Where pose k is in the array, as in Python: "[3, 0]".
+
   const char* name_;
   py::array array_;
   const double* data_;
@@ -58,6 +61,9 @@ class Poses {
 
 /// One of them, of shape (4, 4).
 fcl::Transform3d pose(const char* name, const py::handle& object);
+
+/// "1 node", "3 nodes".
+std::string counted(std::size_t count, const char* one, const char* many = nullptr);
 
 /// A copy as a NumPy array.
 py::array_t<double> arrayOf(const Eigen::Vector3d& v);

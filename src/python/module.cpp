@@ -112,20 +112,26 @@ std::string repr(const char* name, const py::dict& values) {
   return std::string("bocst.") + name + "(" + text + ")";
 }
 
-void bindOptions(py::module_& m) {
-  py::class_<Options> options(
-      m, "Options", R"(How a model expands its tree, answers queries and drops nodes. Fixed when the model is made.
+/// What help() says of each option.
+constexpr std::pair<const char*, const char*> kOptionTexts[] = {
+    {"subdivision", "'bono' (B-BOCST) or 'octree' (O-BOCST)."},
+    {"answer", "'exact' (FCL's mesh-mesh answer) or 'conservative' (tests of the spheres at the collision depth)."},
+    {"depth",
+     "collision depth from 1 to 17, the level of the spheres that conservative answers test; the root is level 1."},
+    {"dimension",
+     "the paper's d_t, the mesh's largest extent in lattice units, from 1 to 65536; 0: 65536, the finest lattice."},
+    {"oracle", "'auto', 'cpu', 'occlusion', 'compute' or 'sampled'."},
+    {"ttl", "seconds after which unused deepest levels are dropped; 0: never."},
+    {"memory_budget", "limit of the resident tree in bytes; 0: no limit."},
+    {"margin", "surfaces at a distance of at most this collide; in the length unit of the mesh."},
+    {"solid", "a watertight mesh also collides with geometries that are completely inside it."},
+    {"build_ahead", "a thread that all models share builds the tree while the first queries run."}};
 
-subdivision: 'bono' (B-BOCST) or 'octree' (O-BOCST).
-answer: 'exact' (FCL's mesh-mesh answer) or 'conservative' (tests of the spheres at the collision depth).
-depth: collision depth from 1 to 17, the level of the spheres that conservative answers test; the root is level 1.
-dimension: the paper's d_t, the mesh's largest extent in lattice units, from 1 to 65536; 0: 65536, the finest lattice.
-oracle: 'auto', 'cpu', 'occlusion', 'compute' or 'sampled'.
-ttl: seconds after which unused deepest levels are dropped; 0: never.
-memory_budget: limit of the resident tree in bytes; 0: no limit.
-margin: surfaces at a distance of at most this collide; in the length unit of the mesh.
-solid: a watertight mesh also collides with geometries that are completely inside it.
-build_ahead: a thread that all models share builds the tree while the first queries run.)");
+void bindOptions(py::module_& m) {
+  std::string text =
+      "How a model expands its tree, answers queries and drops nodes. Fixed when the model is made.\n\n";
+  for (const auto& [name, meaning] : kOptionTexts) text += std::string(name) + ": " + meaning + "\n";
+  py::class_<Options> options(m, "Options", text.c_str());
   options
       .def(py::init(&makeOptions), py::kw_only(), "subdivision"_a = "bono", "answer"_a = "exact", "depth"_a = 6,
            "dimension"_a = 0.0, "oracle"_a = "auto", "ttl"_a = 2.0, "memory_budget"_a = 0, "margin"_a = 0.0,
@@ -133,10 +139,9 @@ build_ahead: a thread that all models share builds the tree while the first quer
       .def("__repr__", [](const Options& o) { return repr("Options", asDict(o)); })
       .def(
           "__eq__", [](const Options& a, const Options& b) { return asDict(a).equal(asDict(b)); }, py::is_operator());
-  for (const auto item : asDict(Options())) {
-    const std::string key = py::str(item.first);
-    options.def_property_readonly(key.c_str(),
-                                  [key](const Options& o) -> py::object { return asDict(o)[key.c_str()]; });
+  for (const auto& [name, meaning] : kOptionTexts) {
+    options.def_property_readonly(
+        name, [key = name](const Options& o) -> py::object { return asDict(o)[key]; }, meaning);
   }
 }
 
@@ -157,27 +162,31 @@ MeshPtr loadMeshOf(const py::object& file) {
 }
 
 void bindMesh(py::module_& m) {
-  py::class_<program::Health>(m, "Health", R"(Faults, area and volume of a mesh as a surface.
-
-Vertices with equal coordinates count as one. components: pieces that share no vertex; open_edges: edges of one triangle;
-non_manifold_edges: edges of more than two triangles; flipped_edges: edges that two triangles have in the same direction;
-watertight: no open and no non-manifold edges; oriented: no flipped edges. area is in the square of the mesh's length
-unit. volume is in its cube, with a sign; None if the mesh is not watertight and oriented.)")
-      .def_readonly("components", &program::Health::components)
-      .def_readonly("open_edges", &program::Health::open_edges)
-      .def_readonly("non_manifold_edges", &program::Health::non_manifold_edges)
-      .def_readonly("flipped_edges", &program::Health::flipped_edges)
-      .def_readonly("degenerate_triangles", &program::Health::degenerate_triangles)
-      .def_readonly("duplicate_triangles", &program::Health::duplicate_triangles)
-      .def_readonly("repeated_vertices", &program::Health::repeated_vertices)
-      .def_readonly("unused_vertices", &program::Health::unused_vertices)
-      .def_readonly("area", &program::Health::area)
-      .def_property_readonly("volume",
-                             [](const program::Health& h) {
-                               return h.watertight() && h.oriented() ? std::optional<double>(h.volume) : std::nullopt;
-                             })
-      .def_property_readonly("watertight", &program::Health::watertight)
-      .def_property_readonly("oriented", &program::Health::oriented);
+  using program::Health;
+  py::class_<Health>(m, "Health",
+                     "Faults, area and volume of a mesh as a surface. Vertices with equal coordinates count as one.")
+      .def_readonly("components", &Health::components, "Number of pieces that share no vertex.")
+      .def_readonly("open_edges", &Health::open_edges, "Number of edges of one triangle.")
+      .def_readonly("non_manifold_edges", &Health::non_manifold_edges, "Number of edges of more than two triangles.")
+      .def_readonly("flipped_edges", &Health::flipped_edges,
+                    "Number of edges that two triangles have in the same direction.")
+      .def_readonly("degenerate_triangles", &Health::degenerate_triangles,
+                    "Number of triangles without area, up to rounding.")
+      .def_readonly("duplicate_triangles", &Health::duplicate_triangles,
+                    "Number of triangles with the corners of an earlier one, in any order.")
+      .def_readonly("repeated_vertices", &Health::repeated_vertices,
+                    "Number of vertices with the coordinates of an earlier one.")
+      .def_readonly("unused_vertices", &Health::unused_vertices, "Number of vertices that no triangle has.")
+      .def_readonly("area", &Health::area, "Of all triangles, in the square of the mesh's length unit.")
+      .def_property_readonly(
+          "volume",
+          [](const Health& h) {
+            return h.watertight() && h.oriented() ? std::optional<double>(h.volume) : std::nullopt;
+          },
+          "In the cube of the mesh's length unit, negative for a mesh that is inside out; None if the mesh is not "
+          "watertight and oriented.")
+      .def_property_readonly("watertight", &Health::watertight, "True without open and non-manifold edges.")
+      .def_property_readonly("oriented", &Health::oriented, "True without flipped edges.");
 
   py::class_<Mesh, MeshPtr>(m, "Mesh", R"(A triangle mesh: validated once, immutable, shared by any number of models.
 
@@ -211,8 +220,8 @@ Raises ValueError that names the first bad vertex or triangle.)")
           "vertices"_a, "A mesh with the same triangles and these vertices, (n, 3). Both meshes share the indices.")
       .def("health", &program::healthOf, py::call_guard<NoGil>(), "Checks the mesh as a surface; see Health.")
       .def("__repr__", [](const Mesh& mesh) {
-        return "<bocst.Mesh of " + std::to_string(mesh.vertexCount()) + " vertices and " +
-               std::to_string(mesh.triangleCount()) + " triangles>";
+        return "Mesh(" + counted(mesh.vertexCount(), "vertex", "vertices") + ", " +
+               counted(mesh.triangleCount(), "triangle") + ")";
       });
 
   m.def("load_mesh", &loadMeshOf, "file"_a,
@@ -276,23 +285,21 @@ std::pair<py::array_t<double>, py::array_t<double>> spheresOf(const MeshPtr& mes
 }
 
 void bindModel(py::module_& m) {
-  const auto statistics =
-      py::class_<Statistics>(m, "Statistics", R"(A snapshot of a model's memory and of its work since it was made.
-
-resident_nodes and resident_bytes (heap bytes of the tree) are in memory now; nodes_per_level: number of nodes of level 1
-(the root), 2, ...; mesh_bytes: the mesh in host memory; device_bytes: all data on a GPU. The others are counters:
-expansions of nodes, batches and cells that the oracle tested, triangles sorted into the tree, nodes dropped.)")
-          .def_readonly("resident_nodes", &Statistics::resident_nodes)
-          .def_readonly("resident_bytes", &Statistics::resident_bytes)
-          .def_readonly("nodes_per_level", &Statistics::nodes_per_level)
-          .def_readonly("expansions", &Statistics::expansions)
-          .def_readonly("oracle_batches", &Statistics::oracle_batches)
-          .def_readonly("oracle_cells", &Statistics::oracle_cells)
-          .def_readonly("expanded_octants", &Statistics::expanded_octants)
-          .def_readonly("built_triangles", &Statistics::built_triangles)
-          .def_readonly("pruned_nodes", &Statistics::pruned_nodes)
-          .def_readonly("mesh_bytes", &Statistics::mesh_bytes)
-          .def_readonly("device_bytes", &Statistics::device_bytes);
+  py::class_<Statistics>(m, "Statistics", "A snapshot of a model's memory and of its work since it was made.")
+      .def_readonly("resident_nodes", &Statistics::resident_nodes, "Number of nodes in memory; 1: only the root.")
+      .def_readonly("resident_bytes", &Statistics::resident_bytes, "Heap bytes of the tree, without the mesh.")
+      .def_readonly("nodes_per_level", &Statistics::nodes_per_level, "Number of nodes of level 1 (the root), 2, ...")
+      .def_readonly("expansions", &Statistics::expansions, "Number of nodes expanded so far.")
+      .def_readonly("oracle_batches", &Statistics::oracle_batches, "Number of batches that the oracle tested so far.")
+      .def_readonly("oracle_cells", &Statistics::oracle_cells, "Number of cells that the oracle tested so far.")
+      .def_readonly("expanded_octants", &Statistics::expanded_octants,
+                    "Number of octants of expanded nodes that have an actual region, so far.")
+      .def_readonly("built_triangles", &Statistics::built_triangles,
+                    "Number of triangles that exact answers have sorted into the tree so far.")
+      .def_readonly("pruned_nodes", &Statistics::pruned_nodes, "Number of nodes dropped so far.")
+      .def_readonly("mesh_bytes", &Statistics::mesh_bytes, "Heap bytes of the mesh; other models may share them.")
+      .def_readonly("device_bytes", &Statistics::device_bytes,
+                    "Bytes on a GPU: the mesh, which other models may share, and lists of triangles.");
 
   py::class_<ModelGeometry, Geometry, std::shared_ptr<ModelGeometry>>(
       m, "Model", R"(A triangle mesh as a geometry, with a sphere-tree.
@@ -311,7 +318,8 @@ Model(mesh, options), or options as keyword arguments: Model(mesh, margin=0.01).
       .def_property_readonly(
           "mesh", [](const ModelGeometry& g) { return forPython(g.model().mesh()); },
           "The current Mesh; None after release_mesh().")
-      .def_property_readonly("options", [](const ModelGeometry& g) { return g.model().options(); })
+      .def_property_readonly("options", [](const ModelGeometry& g) { return g.model().options(); },
+                             "The Options that the model was made with.")
       .def_property_readonly(
           "oracle_name", [](const ModelGeometry& g) { return g.model().oracleName(); },
           "'cpu', 'occlusion', 'sampled', 'compute', or 'cpu and compute' ('auto' with a GPU).")
@@ -323,7 +331,9 @@ Model(mesh, options), or options as keyword arguments: Model(mesh, margin=0.01).
           "Builds the whole tree of exact answers now, so that the next queries do not have to.")
       .def(
           "expand_all", [](const ModelGeometry& g, int depth) { g.model().expandAll(depth); }, "depth"_a,
-          py::call_guard<NoGil>(), "Expands the whole tree down to this level (1 to 17). For inspection.")
+          py::call_guard<NoGil>(),
+          "Expands the whole tree down to this level (1 to 17). For inspection. Each level takes about four times the "
+          "memory of the level above it: a deep one may take gigabytes.")
       .def(
           "nodes", [](const ModelGeometry& g) { return nodesOf(g.model()); },
           R"(The resident nodes as a dict of arrays, one row each, parents before children.
@@ -348,22 +358,28 @@ resident children; is_cell (k,): False for a node that exact answers build below
           "Releases the mesh in host memory; a device keeps a copy. Exact answers read it back while they need it.")
       .def("__repr__", [](const ModelGeometry& g) {
         const std::shared_ptr<const Mesh> mesh = g.model().mesh();
-        return "<bocst.Model" +
-               (mesh ? " of " + std::to_string(mesh->triangleCount()) + " triangles" : " without a mesh") + ">";
+        const std::string triangles = mesh ? counted(mesh->triangleCount(), "triangle") : "mesh released";
+        const std::string answer = nameOf(g.model().options().answer, kAnswers);
+        const NoGil free;
+        return "Model(" + triangles + ", " + answer + ", " + counted(g.model().statistics().resident_nodes, "node") +
+               ")";
       });
 
   m.def("spheres", &spheresOf, "mesh"_a, "depth"_a = 6, "subdivision"_a = "bono",
         R"(Spheres that together contain the whole surface: the leaves of a tree that ends at level `depth` (1 to 17).
 
-Returns (centers (k, 3), radii (k,)) in the mesh's frame and length unit.)");
+Returns (centers (k, 3), radii (k,)) in the mesh's frame and length unit. Each level has about four times as many spheres
+as the level above it and takes about four times the memory: a deep one may take gigabytes.)");
 
   py::class_<OracleInfo>(m, "OracleInfo", "One oracle that this build supports; why_not is empty if it can be used.")
-      .def_property_readonly("kind", [](const OracleInfo& o) { return nameOf(o.kind, kOracles); })
-      .def_readonly("name", &OracleInfo::name)
-      .def_readonly("device", &OracleInfo::device)
-      .def_readonly("hardware", &OracleInfo::hardware)
-      .def_readonly("why_not", &OracleInfo::why_not)
-      .def_readonly("self_test", &OracleInfo::self_test);
+      .def_property_readonly(
+          "kind", [](const OracleInfo& o) { return nameOf(o.kind, kOracles); }, "The value for Options.oracle.")
+      .def_readonly("name", &OracleInfo::name, "The value for the environment variable BOCST_ORACLE; or 'sampled'.")
+      .def_readonly("device", &OracleInfo::device, "Name of the device, for display.")
+      .def_readonly("hardware", &OracleInfo::hardware, "True if it runs on a GPU.")
+      .def_readonly("why_not", &OracleInfo::why_not, "Why it cannot be used; empty if it can.")
+      .def_readonly("self_test", &OracleInfo::self_test,
+                    "Result of the tests of the device before it is used; empty if there was no test.");
   m.def("available_oracles", &availableOracles, py::call_guard<NoGil>(),
         "Lists all oracles; for those that cannot be used, the reason.");
   py::register_exception<OracleError>(m, "OracleError", PyExc_RuntimeError);
@@ -441,6 +457,7 @@ Pass 1 if your own threads or processes call this at the same time.)");
   py::class_<Id>(m, "Id", "Identifies an object of one Scene.")
       .def("__bool__", &Id::isValid)
       .def("__hash__", [](Id id) { return std::hash<Id>()(id); })
+      .def("__repr__", [](Id id) { return "Id(" + std::to_string(std::hash<Id>()(id)) + ")"; })
       .def(py::self == py::self)
       .def(py::self != py::self)
       .def(py::self < py::self);
@@ -563,8 +580,16 @@ threads: number of threads that share the states of one call; 0: one per hardwar
           R"(True if the motion from one state to another, both (m, 4, 4), is free of collisions at all times.
 
 motion: 'linear', 'translation', 'screw' or 'spline', see fcl.CCDMotionType.)")
-      .def_property_readonly("moving_count", [](const PyScene& s) { return s.scene.movingCount(); })
-      .def_property_readonly("fixed_count", [](const PyScene& s) { return s.scene.fixedCount(); })
+      .def("__repr__",
+           [](const PyScene& s) {
+             return "Scene(" + std::to_string(s.scene.fixedCount()) + " fixed, " +
+                    std::to_string(s.scene.movingCount()) + " moving, " + counted(s.scene.pairCount(), "pair") + ")";
+           })
+      .def_property_readonly(
+          "moving_count", [](const PyScene& s) { return s.scene.movingCount(); },
+          "Number of moving objects: m of a state, (m, 4, 4).")
+      .def_property_readonly(
+          "fixed_count", [](const PyScene& s) { return s.scene.fixedCount(); }, "Number of fixed objects.")
       .def_property_readonly(
           "pair_count", [](const PyScene& s) { return s.scene.pairCount(); }, "Number of pairs that are not ignored.")
       .def(
@@ -600,6 +625,32 @@ void requireInit(const py::module_& m) {
   }
 }
 
+/// Classes without a __repr__ get one that names their properties, in one line.
+void addReprs(const py::module_& m) {
+  for (const auto& item : m.attr("__dict__").cast<py::dict>()) {
+    const py::handle value = item.second;
+    if (py::isinstance<py::module_>(value)) addReprs(value.cast<py::module_>());
+    if (PyType_Check(value.ptr()) == 0 || PyExceptionClass_Check(value.ptr())) continue;
+    const auto members = py::dict(value.attr("__dict__"));
+    std::vector<py::str> names;
+    for (const auto& [name, member] : members) {
+      if (py::isinstance(member, py::handle(reinterpret_cast<PyObject*>(&PyProperty_Type)))) names.emplace_back(name);
+    }
+    if (names.empty() || members.contains("__repr__")) continue;
+    const auto text = [names, type = std::string(py::str(value.attr("__name__")))](const py::object& self) {
+      std::string fields;
+      for (const py::str& name : names) {
+        py::object field = self.attr(name);
+        if (py::isinstance<py::array>(field)) field = field.attr("tolist")();
+        if (py::hasattr(field, "__members__")) field = field.attr("name");
+        fields += (fields.empty() ? "" : ", ") + std::string(name) + "=" + std::string(py::repr(field));
+      }
+      return type + "(" + fields + ")";
+    };
+    py::setattr(value, "__repr__", py::cpp_function(text, py::is_method(value), py::name("__repr__")));
+  }
+}
+
 }  // namespace
 
 PYBIND11_MODULE(_bocst, m) {
@@ -610,6 +661,7 @@ PYBIND11_MODULE(_bocst, m) {
   bindFcl(m.def_submodule("fcl"));
   bindModel(m);
   bindScene(m);
+  addReprs(m);
   requireInit(m);
 }
 

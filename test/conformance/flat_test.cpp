@@ -14,6 +14,7 @@
 #include "query/ccd/contact_time_walk.h"
 #include "query/collide/tree_walk.h"
 #include "query/distance/distance_walk.h"
+#include "query/distance/touch.h"
 
 namespace bocst {
 namespace {
@@ -246,6 +247,34 @@ TEST(FlatWork, OfADistanceIsBounded) {
     EXPECT_TRUE(short_one.gaveUp());
     EXPECT_NEAR(query::findNearest(side_a, side_b, to, {}).distance, expected, 1e-11 * expected + 1e-6) << i;
   }
+}
+
+// Where surfaces touch, a short walk finds a pair that is at distance 0; else it says nothing, and grows no new tree.
+TEST(FlatWork, TouchesAreFoundByAShortWalk) {
+  Side a(test::torus(40)), b(test::torus(30, 0.2));
+  const query::TreeSide side_a(a.tree), side_b(b.tree);
+  std::mt19937_64 g(8);
+  std::uniform_real_distribution<double> u(0, 1);
+  int found = 0, apart = 0;
+  EXPECT_FALSE(query::findTouch(side_a, side_b, relative(a, b, fcl::Transform3d::Identity()))) << "the roots are new";
+  for (int i = 0; i < 60; ++i) {
+    const auto X = test::pose<double>(test::randomRotation(g), test::randomDirection(g) * 3 * u(g));
+    const query::SimilarityTransform to = relative(a, b, X);
+    const query::Nearest nearest = query::findNearest(side_a, side_b, to, {});
+    const std::optional<query::Nearest> touch = query::findTouch(side_a, side_b, to);
+    ASSERT_FALSE(touch && nearest.distance > 0) << i;
+    ++(touch ? found : apart);
+    if (!touch) continue;
+    EXPECT_EQ(touch->distance, 0);
+    EXPECT_LT((touch->on_a - touch->on_b).norm(), 1e-6);
+    const auto t = static_cast<std::uint32_t>(touch->a), v = static_cast<std::uint32_t>(touch->b);
+    const Corners in_a = {side_a.corner(t, 0), side_a.corner(t, 1), side_a.corner(t, 2)};
+    const Corners of_b = {to * side_b.corner(v, 0), to * side_b.corner(v, 1), to * side_b.corner(v, 2)};
+    Vector3d p, q;
+    EXPECT_EQ(query::nearestPoints(in_a, of_b, p, q), 0) << "the triangles that it names touch";
+  }
+  EXPECT_GT(found, 15);
+  EXPECT_GT(apart, 15);
 }
 
 // Rough plates: the nearest pair is not among the first that a walk looks at.

@@ -8,6 +8,7 @@
 #include <algorithm>
 #include <functional>
 #include <limits>
+#include <optional>
 #include <type_traits>
 
 #include "fcl/adapters/bodies.h"
@@ -20,6 +21,7 @@
 #include "fcl/queries/query_scope.h"
 #include "log/assert.h"
 #include "query/distance/distance_walk.h"
+#include "query/distance/touch.h"
 
 namespace bocst::fcl_adapter {
 namespace {
@@ -169,7 +171,8 @@ void search(const DistanceQuery<S>& q, const TreeSide& a, const B& b, const Simi
   const query::DistanceGoal goal = goalOf(q, lattice.unit());
   const query::Nearest nearest = [&] {
     if constexpr (std::is_same<B, TreeSide>::value) {
-      return query::findNearest(a, b, b_in_a, goal);
+      const std::optional<query::Nearest> touch = query::findTouch(a, b, b_in_a);
+      return touch ? *touch : query::findNearest(a, b, b_in_a, goal);
     } else {
       return query::DistanceWalk<TreeSide, B>(a, b, b_in_a).run(goal);
     }

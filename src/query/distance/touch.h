@@ -1,0 +1,48 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#pragma once
+
+#include <optional>
+
+#include "geometry/triangle.h"
+#include "query/collide/tree_walk.h"
+#include "query/distance/distance_walk.h"
+
+namespace bocst::query {
+
+/// Two triangles of two trees with exact answers that touch, if a short walk for a verdict finds them: where many nodes
+/// overlap, a search for the distance finds them late. Grows nothing at the root.
+inline std::optional<Nearest> findTouch(const TreeSide& a, const TreeSide& b, const SimilarityTransform& b_in_a) {
+  class Touch final : public Visitor {
+   public:
+    Touch(const TreeSide& a, const TreeSide& b, const SimilarityTransform& b_in_a) : a_(a), b_(b), b_in_a_(b_in_a) {}
+
+    bool endsAtFirst() const override { return true; }
+    bool triangles(std::uint32_t t, std::uint32_t u, bool) override {
+      const Corners in_a = {a_.corner(t, 0), a_.corner(t, 1), a_.corner(t, 2)};
+      const Corners of_b = {b_in_a_ * b_.corner(u, 0), b_in_a_ * b_.corner(u, 1), b_in_a_ * b_.corner(u, 2)};
+      found.a = t;
+      found.b = u;
+      found.distance = nearestPoints(in_a, of_b, found.on_a, found.on_b);
+      return found.distance == 0;
+    }
+    bool cells(const CellLeaf&, const CellLeaf&) override { return false; }
+    bool cellOfA(const CellLeaf&, std::uint32_t, const Eigen::Vector3d&) override { return false; }
+    bool cellOfB(std::uint32_t, const CellLeaf&, const Eigen::Vector3d&) override { return false; }
+
+    Nearest found;
+
+   private:
+    const TreeSide &a_, &b_;
+    const SimilarityTransform& b_in_a_;
+  };
+  constexpr std::size_t kMostLeafPairs = 64;
+  if (!TreeWalk::fits(a, b, b_in_a)) return std::nullopt;
+  if (a.state(a.root()) == State::kGrows || b.state(b.root()) == State::kGrows) return std::nullopt;
+  TreeWalk walk(a, b, b_in_a);
+  if (walk.isNeedless()) return std::nullopt;
+  Touch touch(a, b, b_in_a);
+  if (!walk.run(touch, kMostLeafPairs).met) return std::nullopt;
+  return touch.found;
+}
+
+}  // namespace bocst::query
