@@ -132,7 +132,12 @@ translation t (3,), a rotation R (3, 3), a quaternion q (4,): w, x, y, z, which 
       .def(
           "setTranslation", [](Transform3d& X, const py::object& t) { X.translation() = translation(t); }, "T"_a)
       .def(
-          "setQuatRotation", [](Transform3d& X, const py::object& q) { X.linear() = quaternion(q); }, "q"_a);
+          "setQuatRotation", [](Transform3d& X, const py::object& q) { X.linear() = quaternion(q); }, "q"_a)
+      .def("__repr__", [](const Transform3d& X) {
+        const auto text = [](const py::object& a) { return std::string(py::str(a.attr("tolist")())); };
+        return "Transform(q=" + text(quaternionOf(X.linear())) + ", t=" + text(arrayOf(Vector3d(X.translation()))) +
+               ")";
+      });
 }
 
 // Geometries ----------------------------------------------------------------------------------------------------------
@@ -150,7 +155,7 @@ using ShapeClass = py::class_<Shape<T>, Geometry, std::shared_ptr<Shape<T>>>;
 
 /// A member of the shape as a property; `check` turns what Python gives into a value.
 template <typename T, typename Member, typename Check>
-void member(ShapeClass<T>& c, const char* name, Member T::*at, Check check) {
+void member(ShapeClass<T>& c, const char* name, Member T::*at, Check check, const char* text) {
   const auto get = [at](const Shape<T>& s) {
     if constexpr (std::is_same_v<Member, double>) {
       return s.shape().*at;
@@ -158,14 +163,15 @@ void member(ShapeClass<T>& c, const char* name, Member T::*at, Check check) {
       return arrayOf(Vector3d(s.shape().*at));
     }
   };
-  c.def_property(name, get, [name, at, check](const Shape<T>& s, const py::object& value) {
+  const auto set = [name, at, check](const Shape<T>& s, const py::object& value) {
     if constexpr (std::is_same_v<Member, double>) {
       s.shape().*at = check(name, value.cast<double>());
     } else {
       s.shape().*at = check(name, value);
     }
     s.shape().computeLocalAABB();
-  });
+  };
+  c.def_property(name, get, set, text);
 }
 
 template <typename T>
@@ -173,8 +179,8 @@ void bindRound(py::module_& m, const char* name, const char* text) {
   ShapeClass<T> c(m, name, text);
   c.def(py::init([](double r, double lz) { return std::make_shared<Shape<T>>(length("radius", r), length("lz", lz)); }),
         "radius"_a, "lz"_a);
-  member(c, "radius", &T::radius, length);
-  member(c, "lz", &T::lz, length);
+  member(c, "radius", &T::radius, length, "In the length unit of the geometries.");
+  member(c, "lz", &T::lz, length, "Along z, in the length unit of the geometries.");
 }
 
 template <typename T>
@@ -182,8 +188,10 @@ void bindHalf(py::module_& m, const char* name, const char* text) {
   ShapeClass<T> c(m, name, text);
   c.def(py::init([](const py::object& n, double d) { return std::make_shared<Shape<T>>(normal(n), number("d", d)); }),
         "n"_a, "d"_a);
-  member(c, "n", &T::n, [](const char*, const py::object& n) { return normal(n).stableNormalized().eval(); });
-  member(c, "d", &T::d, number);
+  member(
+      c, "n", &T::n, [](const char*, const py::object& n) { return normal(n).stableNormalized().eval(); },
+      "(3,): unit vector in the geometry's frame; a new value is normalised.");
+  member(c, "d", &T::d, number, "Offset along n from the origin, in the length unit of the geometries.");
 }
 
 /// FCL goes through the faces without looking where they end.
@@ -337,7 +345,9 @@ void bindBuilder(py::module_& m, const char* name, const char* text) {
       .def("addVertex", &B::addVertex, "x"_a, "y"_a, "z"_a)
       .def("addTriangle", &B::addTriangle, "v1"_a, "v2"_a, "v3"_a, "Three corners, (3,) each.")
       .def("addSubModel", &B::addSubModel, "verts"_a, "triangles"_a, "(n, 3) numbers and (m, 3) indices of them.")
-      .def("endModel", &B::end);
+      .def("endModel", &B::end)
+      .def("__repr__",
+           [name](const B& b) { return std::string(name) + "(" + counted(b.triangles(), "triangle") + ")"; });
 }
 
 #if FCL_HAVE_OCTOMAP
@@ -450,7 +460,7 @@ void bindGeometries(py::module_& m) {
       .def_property(
           "aabb_center", [](const Geometry& g) { return arrayOf(g.get()->aabb_center); },
           [](const Geometry& g, const py::object& c) { g.get()->aabb_center = vector3("aabb_center", c); },
-          "(3,): the centre of its bounding box.");
+          "(3,): centre of its bounding box, in the geometry's frame.");
 
   ShapeClass<fcl::TrianglePd> triangle(m, "TriangleP", "A triangle of three points, (3,) each.");
   triangle.def(py::init([](const py::object& a, const py::object& b, const py::object& c) {
@@ -458,27 +468,29 @@ void bindGeometries(py::module_& m) {
                }),
                "a"_a, "b"_a, "c"_a);
   const auto point = [](const char* name, const py::object& p) { return vector3(name, p); };
-  member(triangle, "a", &fcl::TrianglePd::a, point);
-  member(triangle, "b", &fcl::TrianglePd::b, point);
-  member(triangle, "c", &fcl::TrianglePd::c, point);
+  constexpr const char* corner = "(3,): a corner in the geometry's frame.";
+  member(triangle, "a", &fcl::TrianglePd::a, point, corner);
+  member(triangle, "b", &fcl::TrianglePd::b, point, corner);
+  member(triangle, "c", &fcl::TrianglePd::c, point, corner);
 
   ShapeClass<fcl::Boxd> box(m, "Box", "A box about the origin with these side lengths.");
   box.def(py::init([](double x, double y, double z) {
             return std::make_shared<Shape<fcl::Boxd>>(length("x", x), length("y", y), length("z", z));
           }),
           "x"_a, "y"_a, "z"_a);
-  member(box, "side", &fcl::Boxd::side, lengths);
+  member(box, "side", &fcl::Boxd::side, lengths, "(3,): along x, y and z, in the length unit of the geometries.");
 
   ShapeClass<fcl::Sphered> sphere(m, "Sphere", "A sphere about the origin.");
   sphere.def(py::init([](double r) { return std::make_shared<Shape<fcl::Sphered>>(length("radius", r)); }), "radius"_a);
-  member(sphere, "radius", &fcl::Sphered::radius, length);
+  member(sphere, "radius", &fcl::Sphered::radius, length, "In the length unit of the geometries.");
 
   ShapeClass<fcl::Ellipsoidd> ellipsoid(m, "Ellipsoid", "An ellipsoid about the origin with these radii.");
   ellipsoid.def(py::init([](double a, double b, double c) {
                   return std::make_shared<Shape<fcl::Ellipsoidd>>(length("a", a), length("b", b), length("c", c));
                 }),
                 "a"_a, "b"_a, "c"_a);
-  member(ellipsoid, "radii", &fcl::Ellipsoidd::radii, lengths);
+  member(ellipsoid, "radii", &fcl::Ellipsoidd::radii, lengths,
+         "(3,): along x, y and z, in the length unit of the geometries.");
 
   bindRound<fcl::Capsuled>(m, "Capsule", "A cylinder of length lz along z about the origin, with round ends.");
   bindRound<fcl::Coned>(m, "Cone", "A cone of height lz along z about the origin.");
@@ -494,7 +506,8 @@ void bindGeometries(py::module_& m) {
 
 vertices: (n, 3). faces: one flat array; each face is its number of corners, then their indices.)")
       .def(py::init(&makeConvex), "vertices"_a, "num_faces"_a, "faces"_a)
-      .def_property_readonly("num_faces", [](const Shape<fcl::Convexd>& s) { return s.shape().getFaceCount(); });
+      .def_property_readonly(
+          "num_faces", [](const Shape<fcl::Convexd>& s) { return s.shape().getFaceCount(); }, "Number of faces.");
 
   bindBuilder<MakeModel>(m, "BVHModel",
                          R"(A triangle mesh: a bocst.Model with the functions of python-fcl's BVHModel.
@@ -599,7 +612,11 @@ void bindObject(py::module_& m) {
       .def("computeAABB", [](Object& o) { o.computeAABB(); })
       .def("isOccupied", [](const Object& o) { return o.isOccupied(); })
       .def("isFree", [](const Object& o) { return o.isFree(); })
-      .def("isUncertain", [](const Object& o) { return o.isUncertain(); });
+      .def("isUncertain", [](const Object& o) { return o.isUncertain(); })
+      .def("__repr__", [](const Object& o) {
+        return "CollisionObject(" + std::string(py::repr(o.python())) + ", " +
+               std::string(py::repr(py::cast(Transform3d(o.getTransform())))) + ")";
+      });
 }
 
 // Queries -------------------------------------------------------------------------------------------------------------
@@ -683,6 +700,11 @@ double distanceOf(const Object& o1, const Object& o2, const std::optional<fcl::D
   return distance;
 }
 
+/// Is this a shape that is flat, a line or a point? A TriangleP is flat, but FCL can do with it.
+bool hasNoVolume(const fcl::CollisionGeometryd& g) {
+  return g.getObjectType() == fcl::OT_GEOM && g.getNodeType() != fcl::GEOM_TRIANGLE && g.computeVolume() == 0;
+}
+
 /// @throws for what FCL ends the process with, or reads memory that it has not set.
 void refuseWhatFclLacks(const fcl::CollisionGeometryd& g1, const fcl::CollisionGeometryd& g2,
                         const fcl::ContinuousCollisionRequestd& request) {
@@ -697,6 +719,12 @@ void refuseWhatFclLacks(const fcl::CollisionGeometryd& g1, const fcl::CollisionG
         "bocst: FCL has no continuous collision of a Plane and a Convex; make the Convex a bocst.Model");
   }
   const bool advances = request.ccd_solver_type == fcl::CCDC_CONSERVATIVE_ADVANCEMENT;
+  if (advances && request.gjk_solver_type == fcl::GST_LIBCCD && !is_unbounded(g1) && !is_unbounded(g2) &&
+      (hasNoVolume(g1) || hasNoVolume(g2))) {
+    throw py::value_error(
+        "bocst: FCL has no continuous collision of a shape without volume by conservative advancement with libccd; ask "
+        "for CCDC_NAIVE or GST_INDEP, or make one of the geometries a bocst.Model");
+  }
   if (request.ccd_motion_type != fcl::CCDM_SPLINE &&
       !(advances && (is_unbounded(g1) || is_unbounded(g2) ||
                      (g1.getObjectType() != fcl::OT_BVH && g2.getObjectType() == fcl::OT_BVH)))) {
@@ -727,20 +755,20 @@ double continuousOf(const Object& o1, const Transform3d& X_W1_end, const Object&
 }
 
 template <typename C, typename Struct>
-void vectorMember(py::class_<C>& c, const char* name, Vector3d Struct::*at) {
+void vectorMember(py::class_<C>& c, const char* name, Vector3d Struct::*at, const char* text) {
   c.def_property(
       name, [at](const C& s) { return arrayOf(Vector3d(s.*at)); },
-      [name, at](C& s, const py::object& v) { s.*at = vector3(name, v); }, "(3,)");
+      [name, at](C& s, const py::object& v) { s.*at = vector3(name, v); }, text);
 }
 
 /// Ints are taken for them, as python-fcl has them.
 template <typename E>
-py::enum_<E> bindEnum(py::module_& m, const char* name) {
-  return py::enum_<E>(m, name, py::arithmetic());
+py::enum_<E> bindEnum(py::module_& m, const char* name, const char* text) {
+  return py::enum_<E>(m, name, py::arithmetic(), text);
 }
 
 void bindQueries(py::module_& m) {
-  bindEnum<fcl::NODE_TYPE>(m, "NODE_TYPE")
+  bindEnum<fcl::NODE_TYPE>(m, "NODE_TYPE", "Type of a geometry.")
       .value("BV_UNKNOWN", fcl::BV_UNKNOWN)
       .value("BV_OBBRSS", fcl::BV_OBBRSS)
       .value("GEOM_BOX", fcl::GEOM_BOX)
@@ -754,20 +782,20 @@ void bindQueries(py::module_& m) {
       .value("GEOM_HALFSPACE", fcl::GEOM_HALFSPACE)
       .value("GEOM_TRIANGLE", fcl::GEOM_TRIANGLE)
       .value("GEOM_OCTREE", fcl::GEOM_OCTREE);
-  bindEnum<fcl::OBJECT_TYPE>(m, "OBJECT_TYPE")
+  bindEnum<fcl::OBJECT_TYPE>(m, "OBJECT_TYPE", "Kind of a geometry: mesh, shape or octree.")
       .value("OT_UNKNOWN", fcl::OT_UNKNOWN)
       .value("OT_BVH", fcl::OT_BVH)
       .value("OT_GEOM", fcl::OT_GEOM)
       .value("OT_OCTREE", fcl::OT_OCTREE);
-  bindEnum<fcl::GJKSolverType>(m, "GJKSolverType")
+  bindEnum<fcl::GJKSolverType>(m, "GJKSolverType", "Solver for convex shapes: libccd, or FCL's own.")
       .value("GST_LIBCCD", fcl::GST_LIBCCD)
       .value("GST_INDEP", fcl::GST_INDEP);
-  bindEnum<fcl::CCDMotionType>(m, "CCDMotionType")
+  bindEnum<fcl::CCDMotionType>(m, "CCDMotionType", "How an object moves between two poses in continuousCollide().")
       .value("CCDM_TRANS", fcl::CCDM_TRANS)
       .value("CCDM_LINEAR", fcl::CCDM_LINEAR)
       .value("CCDM_SCREW", fcl::CCDM_SCREW)
       .value("CCDM_SPLINE", fcl::CCDM_SPLINE);
-  bindEnum<fcl::CCDSolverType>(m, "CCDSolverType")
+  bindEnum<fcl::CCDSolverType>(m, "CCDSolverType", "How continuousCollide() finds the time of contact.")
       .value("CCDC_NAIVE", fcl::CCDC_NAIVE)
       .value("CCDC_CONSERVATIVE_ADVANCEMENT", fcl::CCDC_CONSERVATIVE_ADVANCEMENT)
       .value("CCDC_RAY_SHOOTING", fcl::CCDC_RAY_SHOOTING)
@@ -783,34 +811,33 @@ void bindQueries(py::module_& m) {
       .def(py::init<std::size_t, bool, std::size_t, bool, bool, fcl::GJKSolverType>(), "num_max_contacts"_a = 1,
            "enable_contact"_a = false, "num_max_cost_sources"_a = 1, "enable_cost"_a = false,
            "use_approximate_cost"_a = true, "gjk_solver_type"_a = fcl::GST_LIBCCD)
-      .def_readwrite("num_max_contacts", &Request::num_max_contacts)
-      .def_readwrite("enable_contact", &Request::enable_contact)
-      .def_readwrite("num_max_cost_sources", &Request::num_max_cost_sources)
-      .def_readwrite("enable_cost", &Request::enable_cost)
-      .def_readwrite("use_approximate_cost", &Request::use_approximate_cost)
-      .def_readwrite("gjk_solver_type", &Request::gjk_solver_type)
-      .def_readwrite("gjk_tolerance", &Request::gjk_tolerance);
+      .def_readwrite("num_max_contacts", &Request::num_max_contacts, "Contacts that a call returns at most.")
+      .def_readwrite("enable_contact", &Request::enable_contact, "True: contacts have positions, normals and depths.")
+      .def_readwrite("num_max_cost_sources", &Request::num_max_cost_sources,
+                     "Cost sources that a call returns at most.")
+      .def_readwrite("enable_cost", &Request::enable_cost, "True: cost sources are computed.")
+      .def_readwrite("use_approximate_cost", &Request::use_approximate_cost, "True: FCL may approximate cost sources.")
+      .def_readwrite("gjk_solver_type", &Request::gjk_solver_type, "Solver for convex shapes.")
+      .def_readwrite("gjk_tolerance", &Request::gjk_tolerance, "Tolerance of that solver.");
 
-  py::class_<Contact> contact(m, "Contact", R"(Two primitives that touch.
-
-o1, o2: the geometries as they were given. b1, b2: indices of the primitives, -1 for a shape.
-normal (3,): unit vector from o1 to o2; pos (3,); penetration_depth >= 0. They are in the world frame, and NaN without
-enable_contact.)");
+  py::class_<Contact> contact(m, "Contact", "Two primitives that touch.");
   contact.def(py::init<>())
-      .def_readwrite("o1", &Contact::o1)
-      .def_readwrite("o2", &Contact::o2)
-      .def_readwrite("b1", &Contact::b1)
-      .def_readwrite("b2", &Contact::b2)
-      .def_readwrite("penetration_depth", &Contact::penetration_depth);
-  vectorMember(contact, "normal", &Contact::normal);
-  vectorMember(contact, "pos", &Contact::pos);
+      .def_readwrite("o1", &Contact::o1, "The first geometry, as it was given.")
+      .def_readwrite("o2", &Contact::o2, "The second geometry, as it was given.")
+      .def_readwrite("b1", &Contact::b1, "Index of the triangle or cell of o1; -1 for a shape.")
+      .def_readwrite("b2", &Contact::b2, "Index of the triangle or cell of o2; -1 for a shape.")
+      .def_readwrite("penetration_depth", &Contact::penetration_depth,
+                     "At least 0, in the length unit of the geometries; NaN without enable_contact.");
+  vectorMember(contact, "normal", &Contact::normal,
+               "(3,): unit vector from o1 to o2, in the world frame; NaN without enable_contact.");
+  vectorMember(contact, "pos", &Contact::pos, "(3,): position in the world frame; NaN without enable_contact.");
 
   py::class_<CostSource> cost(m, "CostSource", "A box in which two geometries overlap, in the world frame.");
   cost.def(py::init<>())
-      .def_readwrite("cost_density", &CostSource::cost_density)
-      .def_readwrite("total_cost", &CostSource::total_cost);
-  vectorMember(cost, "aabb_min", &CostSource::aabb_min);
-  vectorMember(cost, "aabb_max", &CostSource::aabb_max);
+      .def_readwrite("cost_density", &CostSource::cost_density, "Cost per volume.")
+      .def_readwrite("total_cost", &CostSource::total_cost, "cost_density times the volume of the box.");
+  vectorMember(cost, "aabb_min", &CostSource::aabb_min, "(3,): minimum corner of the box, in the world frame.");
+  vectorMember(cost, "aabb_max", &CostSource::aabb_max, "(3,): maximum corner of the box, in the world frame.");
 
   py::class_<CollisionResult>(m, "CollisionResult", "The result of collide(); each call adds to it.")
       .def(py::init([](const py::object& contacts, const py::object& costs) {
@@ -820,9 +847,13 @@ enable_contact.)");
              return r;
            }),
            "contacts"_a = py::none(), "cost_sources"_a = py::none())
-      .def_readwrite("is_collision", &CollisionResult::is_collision)
-      .def_readwrite("contacts", &CollisionResult::contacts)
-      .def_readwrite("cost_sources", &CollisionResult::cost_sources);
+      .def_readwrite("is_collision", &CollisionResult::is_collision, "True if any call found a contact.")
+      .def_readwrite("contacts", &CollisionResult::contacts, "List of the Contacts of all calls.")
+      .def_readwrite("cost_sources", &CollisionResult::cost_sources, "List of the CostSources of all calls.")
+      .def("__repr__", [](const CollisionResult& r) {
+        return std::string("CollisionResult(") + (r.is_collision ? "collision, " : "no collision, ") +
+               counted(r.contacts.size(), "contact") + ", " + counted(r.cost_sources.size(), "cost source") + ")";
+      });
   m.def("collide", &collideObjects, "o1"_a, "o2"_a, "request"_a = py::none(), "result"_a = py::none(),
         R"(Checks two objects for collision.
 
@@ -836,26 +867,30 @@ Returns the number of contacts of this call, at most request.num_max_contacts, a
              return r;
            }),
            "enable_nearest_points"_a = false, "enable_signed_distance"_a = false, "gjk_solver_type"_a = fcl::GST_LIBCCD)
-      .def_readwrite("enable_nearest_points", &DRequest::enable_nearest_points)
-      .def_readwrite("enable_signed_distance", &DRequest::enable_signed_distance)
-      .def_readwrite("rel_err", &DRequest::rel_err)
-      .def_readwrite("abs_err", &DRequest::abs_err)
-      .def_readwrite("gjk_solver_type", &DRequest::gjk_solver_type);
-  py::class_<DistanceResult>(m, "DistanceResult", R"(The minimum distance over all calls of distance() with this result.
-
-nearest_points: a list of two points (3,), on o1 and on o2, in the world frame.)")
+      .def_readwrite("enable_nearest_points", &DRequest::enable_nearest_points,
+                     "True: the result has the nearest points.")
+      .def_readwrite(
+          "enable_signed_distance", &DRequest::enable_signed_distance,
+          "True: the distance of shapes that overlap is minus their penetration depth, where FCL computes it.")
+      .def_readwrite("rel_err", &DRequest::rel_err, "Relative error that is allowed, from 0 to 1.")
+      .def_readwrite("abs_err", &DRequest::abs_err, "Error that is allowed, in the length unit of the geometries.")
+      .def_readwrite("gjk_solver_type", &DRequest::gjk_solver_type, "Solver for convex shapes.");
+  py::class_<DistanceResult>(m, "DistanceResult", "The minimum distance over all calls of distance() with this result.")
       .def(py::init([](const std::optional<double>& least) {
              DistanceResult r;
              if (least) r.min_distance = *least;
              return r;
            }),
            "min_distance_"_a = py::none())
-      .def_readwrite("min_distance", &DistanceResult::min_distance)
-      .def_readwrite("nearest_points", &DistanceResult::nearest_points)
-      .def_readwrite("o1", &DistanceResult::o1)
-      .def_readwrite("o2", &DistanceResult::o2)
-      .def_readwrite("b1", &DistanceResult::b1)
-      .def_readwrite("b2", &DistanceResult::b2);
+      .def_readwrite(
+          "min_distance", &DistanceResult::min_distance,
+          "Minimum of all calls, in the length unit of the geometries; the largest float before the first call.")
+      .def_readwrite("nearest_points", &DistanceResult::nearest_points,
+                     "List of two points (3,), on o1 and on o2, in the world frame; None before a request enables it.")
+      .def_readwrite("o1", &DistanceResult::o1, "The first geometry of the nearest pair, as it was given.")
+      .def_readwrite("o2", &DistanceResult::o2, "The second geometry of the nearest pair, as it was given.")
+      .def_readwrite("b1", &DistanceResult::b1, "Index of the triangle or cell of o1; -1 for a shape.")
+      .def_readwrite("b2", &DistanceResult::b2, "Index of the triangle or cell of o2; -1 for a shape.");
   m.def("distance", &distanceOf, "o1"_a, "o2"_a, "request"_a = py::none(), "result"_a = py::none(),
         R"(Computes the distance between two objects.
 
@@ -866,20 +901,21 @@ Returns the distance of this pair, in the length unit of the geometries; the res
       .def(py::init<std::size_t, double, fcl::CCDMotionType, fcl::GJKSolverType, fcl::CCDSolverType>(),
            "num_max_iterations"_a = 10, "toc_err"_a = 0.0001, "ccd_motion_type"_a = fcl::CCDM_TRANS,
            "gjk_solver_type"_a = fcl::GST_LIBCCD, "ccd_solver_type"_a = fcl::CCDC_NAIVE)
-      .def_readwrite("num_max_iterations", &CRequest::num_max_iterations)
-      .def_readwrite("toc_err", &CRequest::toc_err)
-      .def_readwrite("ccd_motion_type", &CRequest::ccd_motion_type)
-      .def_readwrite("gjk_solver_type", &CRequest::gjk_solver_type)
-      .def_readwrite("ccd_solver_type", &CRequest::ccd_solver_type);
-  py::class_<ContinuousResult>(
-      m, "ContinuousCollisionResult",
-      "The result of continuousCollide(): True if any call found contact, and the earliest time of all calls.")
+      .def_readwrite("num_max_iterations", &CRequest::num_max_iterations, "Steps that FCL makes at most.")
+      .def_readwrite("toc_err", &CRequest::toc_err,
+                     "Error of the time of contact that is allowed; the whole motion takes the time 1.")
+      .def_readwrite("ccd_motion_type", &CRequest::ccd_motion_type, "How objects move between their poses.")
+      .def_readwrite("gjk_solver_type", &CRequest::gjk_solver_type, "Solver for convex shapes.")
+      .def_readwrite("ccd_solver_type", &CRequest::ccd_solver_type, "How the time of contact is found.");
+  py::class_<ContinuousResult>(m, "ContinuousCollisionResult",
+                               "The result of continuousCollide(); each call adds to it.")
       .def(py::init([](bool is_collide, double time) {
              return ContinuousResult{is_collide, time};
            }),
            "is_collide"_a = false, "time_of_contact"_a = 1.0)
-      .def_readwrite("is_collide", &ContinuousResult::is_collide)
-      .def_readwrite("time_of_contact", &ContinuousResult::time_of_contact);
+      .def_readwrite("is_collide", &ContinuousResult::is_collide, "True if any call found contact.")
+      .def_readwrite("time_of_contact", &ContinuousResult::time_of_contact,
+                     "Earliest time of all calls, from 0 to 1; 1 without contact.");
   m.def("continuousCollide", &continuousOf, "o1"_a, "tf1_end"_a, "o2"_a, "tf2_end"_a, "request"_a = py::none(),
         "result"_a = py::none(),
         R"(Computes when two objects first touch, on the motion from their current poses to tf1_end and tf2_end.
@@ -1047,6 +1083,10 @@ to stop. distance: the same, with callbacks that return (done, minimum distance 
                .def("clear", &Manager::clear)
                .def("empty", [](const Manager& s) { return s.objects().empty(); })
                .def("size", [](const Manager& s) { return s.objects().size(); })
+               .def("__repr__",
+                    [](const Manager& s) {
+                      return "DynamicAABBTreeCollisionManager(" + counted(s.objects().size(), "object") + ")";
+                    })
                .def("collide", &Manager::collideWith, "other_manager"_a, "cdata"_a, "callback"_a)
                .def(
                    "collide",
@@ -1064,22 +1104,33 @@ to stop. distance: the same, with callbacks that return (done, minimum distance 
                    "distance", [](const Manager& s, const py::object& d, const py::object& f) { s.distance(d, f); },
                    "cdata"_a, "callback"_a);
   using Fcl = fcl::DynamicAABBTreeCollisionManagerd;
-  const auto option = [&c](const char* name, auto at) {
+  const auto option = [&c](const char* name, auto at, const char* text) {
     using Value = std::remove_reference_t<decltype(at(std::declval<Fcl&>()))>;
     c.def_property(
-        name, [at](Manager& s) { return at(s.fcl()); }, [at](Manager& s, Value value) { at(s.fcl()) = value; });
+        name, [at](Manager& s) { return at(s.fcl()); }, [at](Manager& s, Value value) { at(s.fcl()) = value; }, text);
   };
-  option("max_tree_nonbalanced_level", [](Fcl& f) -> int& { return f.max_tree_nonbalanced_level; });
-  option("tree_incremental_balance_pass", [](Fcl& f) -> int& { return f.tree_incremental_balance_pass; });
-  option("tree_topdown_balance_threshold", [](Fcl& f) -> int& { return f.tree_topdown_balance_threshold; });
-  option("tree_topdown_level", [](Fcl& f) -> int& { return f.tree_topdown_level; });
-  option("tree_init_level", [](Fcl& f) -> int& { return f.tree_init_level; });
+  option(
+      "max_tree_nonbalanced_level", [](Fcl& f) -> int& { return f.max_tree_nonbalanced_level; },
+      "Levels above the balanced height at which setup() and update() rebuild the tree.");
+  option(
+      "tree_incremental_balance_pass", [](Fcl& f) -> int& { return f.tree_incremental_balance_pass; },
+      "Passes with which they balance a tree that is not so high.");
+  option(
+      "tree_topdown_balance_threshold", [](Fcl& f) -> int& { return f.tree_topdown_balance_threshold; },
+      "Number of objects up to which a part of the tree is built from the bottom.");
+  option(
+      "tree_topdown_level", [](Fcl& f) -> int& { return f.tree_topdown_level; },
+      "How larger parts are split, from the top: 0: at the median; 1: at the mean.");
+  option(
+      "tree_init_level", [](Fcl& f) -> int& { return f.tree_init_level; },
+      "How the tree is built from many objects: 0 to 3 as in FCL.");
   for (const char* name : {"octree_as_geometry_collide", "octree_as_geometry_distance"}) {
     c.def_property(
         name, [](const Manager&) { return true; },
         [name](Manager&, bool value) {
           if (!value) throw py::value_error(std::string("bocst: ") + name + " can only be True");
-        });
+        },
+        "Always True: callbacks get an OcTree as one object.");
   }
 }
 

@@ -128,8 +128,7 @@ constexpr std::pair<const char*, const char*> kOptionTexts[] = {
     {"build_ahead", "a thread that all models share builds the tree while the first queries run."}};
 
 void bindOptions(py::module_& m) {
-  std::string text =
-      "How a model expands its tree, answers queries and drops nodes. Fixed when the model is made.\n\n";
+  std::string text = "How a model expands its tree, answers queries and drops nodes. Fixed when the model is made.\n\n";
   for (const auto& [name, meaning] : kOptionTexts) text += std::string(name) + ": " + meaning + "\n";
   py::class_<Options> options(m, "Options", text.c_str());
   options
@@ -318,8 +317,9 @@ Model(mesh, options), or options as keyword arguments: Model(mesh, margin=0.01).
       .def_property_readonly(
           "mesh", [](const ModelGeometry& g) { return forPython(g.model().mesh()); },
           "The current Mesh; None after release_mesh().")
-      .def_property_readonly("options", [](const ModelGeometry& g) { return g.model().options(); },
-                             "The Options that the model was made with.")
+      .def_property_readonly(
+          "options", [](const ModelGeometry& g) { return g.model().options(); },
+          "The Options that the model was made with.")
       .def_property_readonly(
           "oracle_name", [](const ModelGeometry& g) { return g.model().oracleName(); },
           "'cpu', 'occlusion', 'sampled', 'compute', or 'cpu and compute' ('auto' with a GPU).")
@@ -368,8 +368,8 @@ resident children; is_cell (k,): False for a node that exact answers build below
   m.def("spheres", &spheresOf, "mesh"_a, "depth"_a = 6, "subdivision"_a = "bono",
         R"(Spheres that together contain the whole surface: the leaves of a tree that ends at level `depth` (1 to 17).
 
-Returns (centers (k, 3), radii (k,)) in the mesh's frame and length unit. Each level has about four times as many spheres
-as the level above it and takes about four times the memory: a deep one may take gigabytes.)");
+Returns (centers (k, 3), radii (k,)) in the mesh's frame and length unit. Each level has about four times as many
+spheres as the level above it and takes about four times the memory: a deep one may take gigabytes.)");
 
   py::class_<OracleInfo>(m, "OracleInfo", "One oracle that this build supports; why_not is empty if it can be used.")
       .def_property_readonly(
@@ -382,7 +382,8 @@ as the level above it and takes about four times the memory: a deep one may take
                     "Result of the tests of the device before it is used; empty if there was no test.");
   m.def("available_oracles", &availableOracles, py::call_guard<NoGil>(),
         "Lists all oracles; for those that cannot be used, the reason.");
-  py::register_exception<OracleError>(m, "OracleError", PyExc_RuntimeError);
+  py::register_exception<OracleError>(m, "OracleError", PyExc_RuntimeError).attr("__doc__") =
+      "The oracle that was asked for cannot be used.";
 }
 
 // Many poses ----------------------------------------------------------------------------------------------------------
@@ -457,7 +458,7 @@ Pass 1 if your own threads or processes call this at the same time.)");
   py::class_<Id>(m, "Id", "Identifies an object of one Scene.")
       .def("__bool__", &Id::isValid)
       .def("__hash__", [](Id id) { return std::hash<Id>()(id); })
-      .def("__repr__", [](Id id) { return "Id(" + std::to_string(std::hash<Id>()(id)) + ")"; })
+      .def("__repr__", [](Id id) { return py::str("Id({:#x})").format(std::hash<Id>()(id)); })
       .def(py::self == py::self)
       .def(py::self != py::self)
       .def(py::self < py::self);
@@ -637,7 +638,7 @@ void addReprs(const py::module_& m) {
       if (py::isinstance(member, py::handle(reinterpret_cast<PyObject*>(&PyProperty_Type)))) names.emplace_back(name);
     }
     if (names.empty() || members.contains("__repr__")) continue;
-    const auto text = [names, type = std::string(py::str(value.attr("__name__")))](const py::object& self) {
+    const auto text = [names](const py::object& self) {
       std::string fields;
       for (const py::str& name : names) {
         py::object field = self.attr(name);
@@ -645,7 +646,7 @@ void addReprs(const py::module_& m) {
         if (py::hasattr(field, "__members__")) field = field.attr("name");
         fields += (fields.empty() ? "" : ", ") + std::string(name) + "=" + std::string(py::repr(field));
       }
-      return type + "(" + fields + ")";
+      return std::string(py::str(py::type::of(self).attr("__name__"))) + "(" + fields + ")";
     };
     py::setattr(value, "__repr__", py::cpp_function(text, py::is_method(value), py::name("__repr__")));
   }

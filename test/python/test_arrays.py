@@ -203,6 +203,22 @@ def test_edges_name_the_argument(begin, end, name):
         scene.edge_is_free(begin, end)
 
 
+@pytest.mark.parametrize("order", [lambda X: X, lambda X: np.swapaxes(np.swapaxes(X, -1, -2).copy(), -1, -2)])
+def test_a_bad_last_row_is_named_by_its_place_in_the_array(order):
+    scene = bocst.Scene()
+    fixed = scene.add_fixed(models()[0], np.eye(4))
+    for model in models():
+        scene.add_moving(model)
+    X = np.tile(np.eye(4), (5, 2, 1, 1))
+    X[3, 1, 3] = 0, 0.5, 0, 1
+    for call, words in ((lambda: scene.collisions(order(X)), r"X_WM\[3, 1\] has the last row 0 0.5 0 1; 0 0 0 1 is"),
+                        (lambda: scene.collides(order(X[3])), r"X_WM\[1\] has the last row 0 0.5 0 1; "),
+                        (lambda: scene.edge_is_free(X[0], order(X[3])), r"X_WM_end\[1\] has the last row 0 0.5 0 1; "),
+                        (lambda: scene.set_pose(fixed, order(X[3, 1])), r"X_WG has the last row 0 0.5 0 1; ")):
+        with pytest.raises(ValueError, match=words):
+            call()
+
+
 def test_masked_arrays_are_refused():
     masked = np.ma.masked_array(V, mask=np.zeros_like(V))
     with pytest.raises(TypeError, match="vertices is a masked array"):

@@ -723,6 +723,24 @@ def test_what_fcl_would_end_the_process_with():
                               fcl.ContinuousCollisionRequest())
 
 
+def test_advancing_shapes_without_volume():
+    v, f = box()
+    convex = fcl.Convex(v, len(f), np.concatenate([[3, *t] for t in f]))
+    advance = dict(ccd_solver_type=fcl.CCDSolverType.CCDC_CONSERVATIVE_ADVANCEMENT)
+    end = fcl.Transform(np.array([0, 0, -2.0]))
+    for thin in (fcl.Sphere(0), fcl.Box(0, 1, 1), fcl.Capsule(0, 1), fcl.Cone(1, 0), fcl.Cylinder(0, 1),
+                 fcl.Ellipsoid(0, 1, 1), fcl.Convex(0 * v, len(f), np.concatenate([[3, *t] for t in f]))):
+        for a, b in ((thin, convex), (convex, thin)):
+            moving, fixed = at(a, 0, 0, 3.0), at(b)
+            with pytest.raises(ValueError, match='shape without volume.*bocst.Model'):
+                fcl.continuousCollide(moving, end, fixed, fcl.Transform(), fcl.ContinuousCollisionRequest(**advance))
+            for other in (dict(advance, gjk_solver_type=fcl.GJKSolverType.GST_INDEP), {}):
+                fcl.continuousCollide(moving, end, fixed, fcl.Transform(), fcl.ContinuousCollisionRequest(**other))
+    triangle = fcl.TriangleP([0, 0, 0], [1, 0, 0], [0, 1, 0])
+    fcl.continuousCollide(at(triangle, 0, 0, 3.0), end, at(convex), fcl.Transform(),
+                          fcl.ContinuousCollisionRequest(**advance))
+
+
 def test_faces_that_are_no_numbers():
     v, f = box()
     faces = np.concatenate([[3, *t] for t in f])

@@ -3,6 +3,7 @@
 import pathlib
 
 import bocst
+import bocst._bocst
 import bocst.fcl as fcl
 import numpy as np
 import pytest
@@ -205,6 +206,61 @@ def test_scene_keeps_its_geometries():
     scene.add_fixed(bocst.Model(bocst.Mesh(*box())), np.eye(4))
     scene.add_moving(fcl.Sphere(0.2))
     assert scene.collides(shift(1)[None]) and not scene.collides(shift(3)[None])
+
+
+def test_every_field_says_what_it_is():
+    for module in (bocst._bocst, bocst._bocst.fcl):
+        for cls in vars(module).values():
+            if not isinstance(cls, type):
+                continue
+            assert cls.__doc__, cls
+            for name, member in vars(cls).items():
+                if isinstance(member, property) and not hasattr(cls, "__members__"):
+                    assert len(member.__doc__ or "") > 10 and "self" not in member.__doc__, (cls, name)
+
+
+def test_reprs_are_a_line_of_what_counts():
+    mesh = bocst.Mesh(*box())
+    model = bocst.Model(mesh)
+    scene = bocst.Scene()
+    first, second = scene.add_fixed(model, np.eye(4)), scene.add_moving(fcl.Sphere(0.5))
+    request, result = fcl.CollisionRequest(enable_contact=True), fcl.CollisionResult()
+    nearest, time = fcl.DistanceResult(), fcl.ContinuousCollisionResult()
+    a, b = fcl.CollisionObject(model), fcl.CollisionObject(fcl.Sphere(0.5), fcl.Transform(np.array([1, 0.25, 0.1])))
+    fcl.collide(a, b, request, result)
+    fcl.distance(a, b, fcl.DistanceRequest(True), nearest)
+    manager, bvh = fcl.DynamicAABBTreeCollisionManager(), fcl.BVHModel()
+    manager.registerObject(a)
+    expected = {
+        "Mesh(8 vertices, 12 triangles)": mesh,
+        "Model(12 triangles, conservative, 1 node)": bocst.Model(mesh, answer="conservative"),
+        "Scene(1 fixed, 1 moving, 1 pair)": scene,
+        "CollisionResult(collision, 1 contact, 0 cost sources)": result,
+        "ContinuousCollisionResult(is_collide=False, time_of_contact=1.0)": time,
+        "Sphere(radius=0.5)": fcl.Sphere(0.5),
+        "Box(side=[1.0, 2.0, 3.0])": fcl.Box(1, 2, 3),
+        "BVHModel(0 triangles)": bvh,
+        "DynamicAABBTreeCollisionManager(1 object)": manager,
+        "Transform(q=[1.0, 0.0, 0.0, 0.0], t=[1.0, 0.0, 0.0])": fcl.Transform(np.array([1.0, 0, 0])),
+    }
+    for text, thing in expected.items():
+        assert repr(thing) == text
+    assert repr(first) != repr(second) and repr(first).startswith("Id(")
+    begins = {"Health(components=1, open_edges=0, ": mesh.health(), "Statistics(resident_nodes=": model.statistics(),
+              "OracleInfo(kind='": bocst.available_oracles()[0], "Contact(o1=Model(": result.contacts[0],
+              "DistanceResult(min_distance=": nearest, "CollisionObject(Sphere(radius=0.5), Transform(": b,
+              "CollisionRequest(num_max_contacts=1, enable_contact=True, ": request}
+    for text, thing in begins.items():
+        assert repr(thing).startswith(text) and "\n" not in repr(thing)
+    assert "gjk_solver_type='GST_LIBCCD'" in repr(request)
+
+
+def test_a_star_import_has_what_the_stub_has():
+    import ast
+    tree = ast.parse((pathlib.Path(bocst.__file__).parent / "fcl.pyi").read_text())
+    names = {node.name for node in tree.body if isinstance(node, (ast.ClassDef, ast.FunctionDef))} | {"Model"}
+    absent = set() if hasattr(fcl, "OcTree") else {"OcTree"}
+    assert set(fcl.__all__) == {name for name in names if not name.startswith("_")} - absent
 
 
 def test_the_stubs_know_the_package():

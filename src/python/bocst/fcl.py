@@ -93,3 +93,6 @@ def defaultDistanceCallback(o1, o2, cdata):
     if result.min_distance <= 0:
         return True, result.min_distance
     return cdata.done, result.min_distance
+
+
+__all__ = sorted(name for name in globals() if not name.startswith("_"))
