@@ -175,12 +175,13 @@ TEST(FlatWork, PipesGetBoxesToo) {
 
 // Requests for contacts alone get the boxes, too, and then find nothing quickly; what they find stays the same.
 TEST(FlatWork, ContactsOfPipesComeOverBoxes) {
-  const Raw raw = pipe(128);
+  const Raw raw = pipe(512);
   const Modeld a(raw.mesh()), b(raw.mesh());
   const auto bvh_a = test::bvh<fcl::OBBRSSd>(raw), bvh_b = test::bvh<fcl::OBBRSSd>(raw);
   const fcl::Transform3d I = fcl::Transform3d::Identity();
   const auto crossed = [](double gap) {
-    return test::pose<double>(Eigen::AngleAxisd(0.5, Vector3d::UnitX()).toRotationMatrix(), {0.2 + gap, 0, 0});
+    const Vector3d axis(std::cos(0.7), std::sin(0.7), 0);  // no direction of the support tables
+    return test::pose<double>(Eigen::AngleAxisd(0.5, axis).toRotationMatrix(), (0.2 + gap) * axis);
   };
   using Found = std::vector<std::array<double, 5>>;
   const auto contacts = [&](const fcl::Transform3d& X, std::size_t most) {
@@ -198,17 +199,17 @@ TEST(FlatWork, ContactsOfPipesComeOverBoxes) {
                                             crossed(1e-4)};
   std::vector<Found> few, all;
   for (const fcl::Transform3d& X : poses) few.push_back(contacts(X, 3)), all.push_back(contacts(X, 1000000));
-  EXPECT_TRUE(all[0].empty());
+  EXPECT_TRUE(all[0].empty() && all[4].empty());
   EXPECT_GT(all[2].size(), 100u);
   for (std::size_t i = 0; i < poses.size(); ++i) {
     EXPECT_EQ(test::pairs<double>(a, I, b, poses[i]), test::pairs<double>(*bvh_a, I, *bvh_b, poses[i])) << i;
   }
-  for (int i = 0; i < 1000 && boxes(a) == nullptr; ++i) contacts(poses[0], 1000000);
+  for (int i = 0; i < 1000 && boxes(a) == nullptr; ++i) contacts(poses[4], 1000000);
   ASSERT_NE(boxes(a), nullptr);
   ASSERT_NE(boxes(b), nullptr);
   for (const bool remembers : {false, true}) {
     SCOPED_TRACE(remembers);
-    if (remembers) test::touching<double>(a, I, b, poses[0]);
+    if (remembers) test::touching<double>(a, I, b, poses[4]);
     const query::TreeSide side_a(fcl_adapter::treeOf<double>(a)), side_b(fcl_adapter::treeOf<double>(b));
     EXPECT_EQ(query::Turns::favourBoxes(side_a, side_b), remembers);
     for (std::size_t i = 0; i < poses.size(); ++i) {
@@ -268,8 +269,8 @@ TEST(FlatWork, TouchesAreFoundByAShortWalk) {
     EXPECT_EQ(touch->distance, 0);
     EXPECT_LT((touch->on_a - touch->on_b).norm(), 1e-6);
     const auto t = static_cast<std::uint32_t>(touch->a), v = static_cast<std::uint32_t>(touch->b);
-    const Corners in_a = {side_a.corner(t, 0), side_a.corner(t, 1), side_a.corner(t, 2)};
-    const Corners of_b = {to * side_b.corner(v, 0), to * side_b.corner(v, 1), to * side_b.corner(v, 2)};
+    const query::Corners in_a = {side_a.corner(t, 0), side_a.corner(t, 1), side_a.corner(t, 2)};
+    const query::Corners of_b = {to * side_b.corner(v, 0), to * side_b.corner(v, 1), to * side_b.corner(v, 2)};
     Vector3d p, q;
     EXPECT_EQ(query::nearestPoints(in_a, of_b, p, q), 0) << "the triangles that it names touch";
   }

@@ -879,10 +879,11 @@ TEST_F(Program, RefusesEmptyValuesAndOptionsWithoutEffect) {
   const std::string collide = "collide " + cube() + " " + cube(), inspect = "inspect " + cube();
   const std::string bench = "bench " + cube();
   const std::string scene =
-      "scene " + write("scene.json", R"({"objects": [{"name": "p", "box": [1, 1, 1], "moving": true}]})");
-  for (const std::string command :
-       {collide + " --poses ''", collide + " --pose ''", collide + " --csv ''", collide + " --json ''",
-        inspect + " --html ''", inspect + " --image ''", scene + " --states ''", scene + " --srdf ''", "inspect ''"}) {
+      "scene " + write("scene.json", R"({"objects": [{"name": "p", "box": [1, 1, 1], "moving": true}],
+                                                  "states": [{"p": [0, 0, 0]}]})");
+  for (const std::string& command : {collide + " --poses ''", collide + " --pose ''", collide + " --csv ''",
+                                     collide + " --json ''", inspect + " --html ''", inspect + " --image ''",
+                                     scene + " --states ''", scene + " --srdf ''", std::string("inspect ''")}) {
     expectComplaint(command, kUsage, "empty");
   }
   expectComplaint(collide + " --rpy", kUsage, "--rpy: needs --pose");
@@ -897,7 +898,8 @@ TEST_F(Program, RefusesEmptyValuesAndOptionsWithoutEffect) {
   expectComplaint(bench + " " + cube() + " --oracles", kUsage, "b: not available with --oracles");
   expectComplaint(bench + " --oracles --scenarios warm", kUsage, "--scenarios: not available with --oracles");
   expectComplaint(bench + " --frames 3", kUsage, "--frames: needs --scenarios moving");
-  expectComplaint(bench + " --build-ahead", kUsage, "--build-ahead: needs --scenarios fresh or planner");
+  expectComplaint(bench + " --scenarios warm --build-ahead", kUsage,
+                  "--build-ahead: needs --scenarios fresh or planner");
   expectComplaint(bench + " --limit 3", kUsage, "--limit: needs --oracles");
   expectComplaint(bench + " --triangles 100", kUsage, "--triangles: needs --scenarios growth or --oracles");
   expectComplaint("help fly", kUsage, "there is no command fly");
