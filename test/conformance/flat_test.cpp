@@ -276,6 +276,36 @@ TEST(FlatWork, TouchesAreFoundByAShortWalk) {
   }
   EXPECT_GT(found, 15);
   EXPECT_GT(apart, 15);
+  // Pairs that the walk must look at, and that do not touch.
+  Side lower(tray(40)), upper(plate(40).scale(0.9));
+  const query::TreeSide side_lower(lower.tree), side_upper(upper.tree);
+  const query::SimilarityTransform to = relative(lower, upper, above<double>(1e-7));
+  EXPECT_GT(query::findNearest(side_lower, side_upper, to, {}).distance, 0);
+  EXPECT_FALSE(query::findTouch(side_lower, side_upper, to));
+}
+
+// Rough plates of which one place touches: oriented boxes look for longer than they may, and must not say "none".
+TEST(FlatWork, ContactsThatBoxesDoNotFindAreFound) {
+  std::mt19937_64 g(5);
+  std::uniform_real_distribution<double> height(0, 2e-3);
+  Raw first = plate(40), second = plate(40);
+  for (Raw* raw : {&first, &second}) {
+    for (Vector3d& v : raw->vertices) v.z() = height(g);
+  }
+  const auto bvh_a = test::bvh<fcl::OBBRSSd>(first), bvh_b = test::bvh<fcl::OBBRSSd>(second);
+  const Modeld a(first.mesh()), b(second.mesh());
+  const fcl::Transform3d I = fcl::Transform3d::Identity();
+  const auto at = [](double gap) { return above<double>(gap, 0.3); };
+  const double contact =
+      test::contactDistance([&](double gap) { return test::touching<double>(*bvh_a, I, *bvh_b, at(gap)); }, 0.1, 40);
+  const auto boxes = [&] { return fcl_adapter::treeOf<double>(a).knownBoxes(); };
+  for (int i = 0; i < 1000 && boxes() == nullptr; ++i) {
+    ASSERT_TRUE(test::pairs<double>(a, I, b, at(contact + 1e-7)).empty());
+  }
+  ASSERT_NE(boxes(), nullptr);
+  const test::Pairs expected = test::pairs<double>(*bvh_a, I, *bvh_b, at(contact - 1e-7));
+  EXPECT_FALSE(expected.empty());
+  EXPECT_EQ(test::pairs<double>(a, I, b, at(contact - 1e-7)), expected);
 }
 
 // Rough plates: the nearest pair is not among the first that a walk looks at.
