@@ -288,7 +288,7 @@ TEST(FlatWork, TouchesAreFoundByAShortWalk) {
 TEST(FlatWork, ContactsThatBoxesDoNotFindAreFound) {
   std::mt19937_64 g(5);
   std::uniform_real_distribution<double> height(0, 2e-3);
-  Raw first = plate(40), second = plate(40);
+  Raw first = plate(100), second = plate(100);
   for (Raw* raw : {&first, &second}) {
     for (Vector3d& v : raw->vertices) v.z() = height(g);
   }
