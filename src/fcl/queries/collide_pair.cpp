@@ -126,10 +126,13 @@ bool collideTrees(const CollideQuery<S>& q, const TreeSide& a, const TreeSide& b
   const auto walk = [&](auto&& with_collector) { walkFor(q, with_collector); };
   // TreeWalk widens slabs by itself; oriented boxes and spheres need no more than the margin.
   const SimilarityTransform near = withMargin(b_in_a, a, q, q.margin);
-  const auto walkBoxes = [&](MeshCollector<S>& collector) {
+  const auto walkBoxes = [&](MeshCollector<S>& collector, std::size_t most_steps) {
     const query::BoxSide boxes_a(a), boxes_b(b);
-    query::PairWalk<query::BoxSide, query::BoxSide>(boxes_a, boxes_b, near, collector).run();
+    query::PairWalk<query::BoxSide, query::BoxSide> boxes(boxes_a, boxes_b, near, collector);
+    const bool met = boxes.run(most_steps);
+    return query::WalkEnd{met, boxes.steps(), boxes.gaveUp()};
   };
+  constexpr std::size_t kAll = ~std::size_t{0};
   // Of slivers, a walk for contacts over blocks may take thousands of times as long as one over boxes to find nothing.
   const auto boxesPartAll = [&] {
     constexpr std::size_t kMostSteps = 1024;
@@ -139,13 +142,10 @@ bool collideTrees(const CollideQuery<S>& q, const TreeSide& a, const TreeSide& b
       return false;
     const fcl::CollisionRequest<S> request;
     fcl::CollisionResult<S> result;
-    bool part_all = false;
-    walkFor({q, request, result, q.margin, q.is_distance}, [&](MeshCollector<S>& collector) {
-      const query::BoxSide boxes_a(a), boxes_b(b);
-      query::PairWalk<query::BoxSide, query::BoxSide> boxes(boxes_a, boxes_b, near, collector);
-      part_all = !boxes.run(kMostSteps) && !boxes.gaveUp();
-    });
-    return part_all;
+    query::WalkEnd end{};
+    walkFor({q, request, result, q.margin, q.is_distance},
+            [&](MeshCollector<S>& collector) { end = walkBoxes(collector, kMostSteps); });
+    return !end.met && !end.gave_up;
   };
   if (query::TreeWalk::fits(a, b, near) && !isNeedle(tree_a) && !isNeedle(tree_b)) {
     query::TreeWalk trees(a, b, near);
@@ -158,9 +158,9 @@ bool collideTrees(const CollideQuery<S>& q, const TreeSide& a, const TreeSide& b
         } else if (kUsesBoxes<S> && collector.endsAtFirst()) {
           trees.runByTurns(collector);
         } else if (kUsesBoxes<S> && query::Turns::favourBoxes(a, b)) {
-          walkBoxes(collector);
+          walkBoxes(collector, kAll);
         } else {
-          steps = trees.run(collector, ~std::size_t{0}).steps;
+          steps = trees.run(collector, kAll).steps;
         }
       });
       // Walks for a verdict have taken turns with oriented boxes; a walk for contacts that found none pays for them.
@@ -168,7 +168,7 @@ bool collideTrees(const CollideQuery<S>& q, const TreeSide& a, const TreeSide& b
     }
   } else if (kUsesBoxes<S> && isNeedle(tree_a) && isNeedle(tree_b) && query::BoxSide::fits(a) &&
              query::BoxSide::fits(b)) {
-    walk(walkBoxes);
+    walk([&](auto& collector) { walkBoxes(collector, kAll); });
   } else if (query::SphereWalk::fits(a, b)) {
     query::SphereWalk spheres(a, b, near);
     if (!spheres.isNeedless()) {
@@ -193,7 +193,7 @@ bool collideTrees(const CollideQuery<S>& q, const TreeSide& a, const TreeSide& b
       } else if (collector.endsAtFirst()) {
         query::walkByTurns(a, b, near, collector, kLimits, walk_blocks);
       } else if (tree_a.knownBoxes() != nullptr && tree_b.knownBoxes() != nullptr) {
-        walkBoxes(collector);
+        walkBoxes(collector, kAll);
       } else {
         const query::Turns turns(a, b, tree::Tree::Search::kYesOrNo, kLimits);
         turns.tookOverBlocks(walk_blocks(~std::size_t{0}).steps, false);

@@ -10,7 +10,7 @@
 namespace bocst::query {
 
 /// Two triangles of two trees with exact answers that touch, if a short walk for a verdict finds them: where many nodes
-/// overlap, a search for the distance finds them late. Grows nothing at the root.
+/// overlap, a search for the distance finds them late. Not looked for in trees whose roots are not expanded yet.
 inline std::optional<Nearest> findTouch(const TreeSide& a, const TreeSide& b, const SimilarityTransform& b_in_a) {
   class Touch final : public Visitor {
    public:
