@@ -959,37 +959,48 @@ TEST(CollideSelf, OneModelOnBothSides) {
 }
 
 // A rotation may be off by as much as is allowed: then its transpose is not its inverse, and what lies far from the
-// origins is not where a walk that takes it for the inverse would place it.
+// origins is not where a walk that takes it for the inverse would place it. In both orders, FCL's poses decide.
 TEST(CollideRigid, NoPairIsLostToARotationThatIsNotQuiteOne) {
   std::mt19937_64 g(11);
   std::uniform_real_distribution<double> u(-1, 1);
   const auto anywhere = [&] { return Eigen::Vector3d(u(g), u(g), u(g)); };
+  const auto crooked = [&](double defect) {
+    Eigen::Matrix3d R = test::randomRotation(g);
+    for (int k = 0; k < 9; ++k) R(k / 3, k % 3) += defect * u(g);
+    return R;
+  };
   std::size_t pairs = 0;
   for (const double defect : {1e-12, 1e-9, 1e-7, 1e-5, 2e-4}) {
-    for (int round = 0; round < 20; ++round) {
-      auto X = test::pose<double>(test::randomRotation(g), anywhere());
-      for (int k = 0; k < 9; ++k) X.linear()(k / 3, k % 3) += defect * u(g);
-      const Eigen::Matrix3d back = X.linear().inverse();
+    for (int round = 0; round < 40; ++round) {
+      const double far = round % 4 < 2 ? 200 : 1;
+      const auto X1 = test::pose<double>(crooked(defect), far * anywhere()),
+                 X2 = test::pose<double>(crooked(defect), far * anywhere());
+      const Eigen::Matrix3d R = X1.linear().transpose() * X2.linear(), back = R.inverse();
+      const Eigen::Vector3d t = X1.linear().transpose() * (X2.translation() - X1.translation());
+      const Eigen::Vector3d middle = far * anywhere();
       Raw a, b;
-      Eigen::Vector3d cluster = anywhere();
+      Eigen::Vector3d cluster = middle;
       for (std::size_t i = 0; i < 100; ++i) {
-        if (i % 20 == 0) cluster = anywhere();
+        if (i % 20 == 0) cluster = middle + anywhere();
         const Eigen::Vector3d c = cluster + 4e-3 * anywhere(), e = 1e-3 * anywhere(), f = 1e-3 * anywhere(),
                               n = e.cross(f).normalized();
-        const Eigen::Vector3d of_b[3] = {c - 1e-8 * n, c + 1e-3 * n + 0.3 * e, c + 1e-3 * n - 0.3 * e};
-        for (const Eigen::Vector3d& v : {Eigen::Vector3d(c + e), Eigen::Vector3d(c + f), Eigen::Vector3d(c - e - f)}) {
-          a.vertices.push_back(v);
-        }
-        for (const Eigen::Vector3d& v : of_b) b.vertices.push_back(back * (v - X.translation()));
-        a.triangles.emplace_back(3 * i, 3 * i + 1, 3 * i + 2);
-        b.triangles.emplace_back(3 * i, 3 * i + 1, 3 * i + 2);
+        a.addTriangle(c + e, c + f, c - e - f);
+        b.addTriangle(back * (c - 1e-8 * n - t), back * (c + 1e-3 * n + 0.3 * e - t),
+                      back * (c + 1e-3 * n - 0.3 * e - t));
       }
-      const Modeld model_a(a.mesh()), model_b(b.mesh());
-      const auto found = test::pairs<double>(model_a, fcl::Transform3d::Identity(), model_b, X);
+      const bool turned = round % 2 != 0;
+      const Raw &first = turned ? b : a, &second = turned ? a : b;
+      const auto &X = turned ? X2 : X1, &Y = turned ? X1 : X2;
+      const Modeld model1(first.mesh()), model2(second.mesh());
+      const auto bvh1 = test::bvh<fcl::OBBRSSd>(first);
+      // The model is side A of a walk with a mesh of FCL, whichever comes first.
+      const auto found =
+          round % 8 < 4 ? test::pairs<double>(*bvh1, X, model2, Y) : test::pairs<double>(model1, X, model2, Y);
       for (std::size_t i = 0; i < 100; ++i) {
-        const auto *p = &a.vertices[3 * i], *q = &b.vertices[3 * i];
-        if (!fcl::detail::Intersect<double>::intersect_Triangle(p[0], p[1], p[2], q[0], q[1], q[2], X.linear(),
-                                                                Eigen::Vector3d(X.translation()))) {
+        const auto *p = &first.vertices[3 * i], *q = &second.vertices[3 * i];
+        if (!fcl::detail::Intersect<double>::intersect_Triangle(
+                p[0], p[1], p[2], q[0], q[1], q[2], X.linear().transpose() * Y.linear(),
+                Eigen::Vector3d(X.linear().transpose() * (Y.translation() - X.translation())))) {
           continue;
         }
         ++pairs;
@@ -997,7 +1008,7 @@ TEST(CollideRigid, NoPairIsLostToARotationThatIsNotQuiteOne) {
       }
     }
   }
-  EXPECT_GT(pairs, 9000u);
+  EXPECT_GT(pairs, 15000u);
 }
 
 TEST(CollideBatches, AtMostOneALevelWhenEverythingIsAsked) {

@@ -69,11 +69,32 @@ struct RelativePose {
     }
   }
 
+  /// The pose of A in B's frame. Not A's rotation transposed: X_AB need not be quite rigid.
+  RelativePose inverse() const {
+    Eigen::Matrix3d R;
+    Eigen::Vector3d p;
+    for (int r = 0; r < 3; ++r) {
+      for (int c = 0; c < 3; ++c) R(r, c) = rotation[r][c];
+      p[r] = translation[r];
+    }
+    R = R.inverse().eval();
+    p = -(R * p).eval();
+    RelativePose X_BA;
+    for (int r = 0; r < 3; ++r) {
+      for (int c = 0; c < 3; ++c) X_BA.rotation[r][c] = static_cast<S>(R(r, c));
+      X_BA.translation[r] = static_cast<S>(p[r]);
+    }
+    return X_BA;
+  }
+
   /// Positions in A's frame are at most this large, for sizes of A and B in their own.
   double magnitude(double size_a, double size_b) const {
     const double x = translation[0], y = translation[1], z = translation[2];
     return std::sqrt(x * x + y * y + z * z) + 2 * (size_a + size_b);
   }
+
+ private:
+  RelativePose() = default;
 };
 
 /// From the frame of B (origin and unit in B's model frame) to that of A, through the pose X_AB in model units.
@@ -104,8 +125,6 @@ query::SimilarityTransform similarityOf(const RelativePose<S>& X_AB, const Eigen
   p.orthogonality_error =
       larger(larger(larger(std::abs(dot(0, 0) - 1), std::abs(dot(1, 1) - 1)), std::abs(dot(2, 2) - 1)),
              larger(larger(std::abs(dot(0, 1)), std::abs(dot(0, 2))), std::abs(dot(1, 2))));
-  // X_AB takes the transposed rotation of A for the inverse, as FCL does, which moves what is far from an origin.
-  p.tolerance += 4 * p.orthogonality_error * magnitude * per_unit;
   p.ready();
   return p;
 }

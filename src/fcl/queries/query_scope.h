@@ -5,6 +5,7 @@
 #include <cstddef>
 #include <exception>
 #include <functional>
+#include <limits>
 
 #include "fcl/adapters/pair.h"
 #include "fcl/queries/ordered_pair.h"
@@ -105,6 +106,20 @@ inline double magnitudeOf(const query::TreeSide& side) { return magnitudeOf(side
 inline double unitOf(const query::TreeSide& side) { return side.tree().surface().lattice.unit(); }
 inline const Eigen::Vector3d& originOf(const query::TreeSide& side) { return side.tree().surface().lattice.origin(); }
 
+/// The middle of a surface and its largest half extent, in the frame of the side's nodes.
+struct Extent {
+  Eigen::Vector3d middle;
+  double half;
+};
+inline Extent extentOf(const query::TreeSide& side) {
+  const Eigen::AlignedBox3d& bounds = side.tree().surface().bounds;
+  return {(bounds.center() - originOf(side)) / unitOf(side), bounds.sizes().maxCoeff() / 2 / unitOf(side)};
+}
+inline Extent extentOf(const BvhSide& side) {
+  const query::Sphere root = side.sphere(side.root());
+  return {root.center, root.radius};
+}
+
 inline double magnitudeOf(const BvhSide& side) { return side.magnitude(); }
 inline double unitOf(const BvhSide&) { return 1; }
 inline Eigen::Vector3d originOf(const BvhSide& side) { return side.origin(); }
@@ -115,11 +130,27 @@ struct RelativeSides {
   double magnitude;  ///< Positions in the frame of either are at most this large, in model units.
 };
 
+/// FCL takes the transposed rotation of o1 for its inverse. Where an orthogonality error makes the two differ, the walk
+/// of a swapped pair inverts FCL's pose of o2 in the frame of o1. Positions are then off by this error times the
+/// distance and the sizes of the surfaces, and not times their distance from the origins of their models.
 template <typename S, typename B>
 RelativeSides relate(const OrderedPair<S>& pair, const query::TreeSide& a, const B& b) {
-  const RelativePose<S> X_AB(pair.X_WA(), pair.X_WB());
-  const double magnitude = X_AB.magnitude(magnitudeOf(a), magnitudeOf(b));
-  return {similarityOf(X_AB, originOf(a), unitOf(a), originOf(b), unitOf(b), magnitude), magnitude};
+  const auto place = [&](const RelativePose<S>& X_AB) {
+    const double magnitude = X_AB.magnitude(magnitudeOf(a), magnitudeOf(b));
+    return RelativeSides{similarityOf(X_AB, originOf(a), unitOf(a), originOf(b), unitOf(b), magnitude), magnitude};
+  };
+  RelativeSides sides = place({pair.X_WA(), pair.X_WB()});
+  query::SimilarityTransform& b_in_a = sides.b_in_a;
+  double lengths = sides.magnitude / unitOf(a);
+  // Below, FCL's own rounding is more.
+  if (b_in_a.orthogonality_error > 16 * static_cast<double>(std::numeric_limits<S>::epsilon())) {
+    if (pair.swapped) sides = place(RelativePose<S>(pair.X_W1, pair.X_W2).inverse());
+    const Extent of_a = extentOf(a), of_b = extentOf(b);
+    lengths =
+        std::min(lengths, (b_in_a * of_b.middle - of_a.middle).norm() + 2 * (of_a.half + of_b.half * b_in_a.scale));
+  }
+  b_in_a.tolerance += 4 * b_in_a.orthogonality_error * lengths;
+  return sides;
 }
 
 }  // namespace bocst::fcl_adapter
