@@ -675,6 +675,58 @@ std::size_t collideObjects(const Object& o1, const Object& o2, const std::option
   return count;
 }
 
+/// Is this a shape that is flat, a line or a point? A TriangleP is flat, but FCL can do with it.
+bool hasNoVolume(const fcl::CollisionGeometryd& g) {
+  return g.getObjectType() == fcl::OT_GEOM && g.getNodeType() != fcl::GEOM_TRIANGLE && g.computeVolume() == 0;
+}
+
+bool isRound(fcl::NODE_TYPE type) {
+  return type == fcl::GEOM_SPHERE || type == fcl::GEOM_ELLIPSOID || type == fcl::GEOM_CAPSULE ||
+         type == fcl::GEOM_CONE || type == fcl::GEOM_CYLINDER;
+}
+
+/// Has FCL a formula for the distance, so that it asks no solver?
+bool hasFormula(fcl::NODE_TYPE type1, fcl::NODE_TYPE type2) {
+  if (type1 == fcl::GEOM_CAPSULE && type2 == fcl::GEOM_CAPSULE) return true;
+  if (type2 == fcl::GEOM_SPHERE) std::swap(type1, type2);
+  return type1 == fcl::GEOM_SPHERE && (type2 == fcl::GEOM_SPHERE || type2 == fcl::GEOM_BOX ||
+                                       type2 == fcl::GEOM_CAPSULE || type2 == fcl::GEOM_CYLINDER);
+}
+
+/// @throws std::invalid_argument for what FCL ends the process with, or reads memory that is not there.
+void refuseWhatFclLacks(const Placed& a, const Placed& b, const fcl::DistanceRequestd& request) {
+  const fcl::CollisionGeometryd &g1 = *a.geometry, &g2 = *b.geometry;
+  if (isModel<double>(&g1) || isModel<double>(&g2)) return;
+  const auto distance = [&](bool is_signed, fcl::GJKSolverType solver) {
+    fcl::DistanceRequestd plain(false, is_signed);
+    plain.gjk_solver_type = solver;
+    fcl::DistanceResultd r;
+    bocst::distance<double>(&g1, a.X_WG, &g2, b.X_WG, plain, r);
+    return r.min_distance;
+  };
+  const bool by_libccd = request.gjk_solver_type == fcl::GST_LIBCCD, is_signed = request.enable_signed_distance;
+  const fcl::NODE_TYPE type1 = g1.getNodeType(), type2 = g2.getNodeType();
+  // An assertion of libccd's simplices fails, or its polytope grows for ever, but only where they touch.
+  if (by_libccd && (isRound(type1) || isRound(type2)) && (hasNoVolume(g1) || hasNoVolume(g2)) &&
+      (is_signed || !hasFormula(type1, type2)) && distance(false, fcl::GST_INDEP) <= 0) {
+    throw std::invalid_argument(
+        "bocst: FCL has no distance by libccd of these two geometries, which touch, because one is a shape without "
+        "volume; ask for GST_INDEP, or make one of them a bocst.Model");
+  }
+  // FCL takes the points from a contact, which it does not always find.
+  const bool by_contact = !by_libccd || g1.getObjectType() != fcl::OT_GEOM || g2.getObjectType() != fcl::OT_GEOM;
+  if (is_signed && request.enable_nearest_points && by_contact && distance(true, request.gjk_solver_type) < 0) {
+    fcl::CollisionRequestd contact(1, true);
+    contact.gjk_solver_type = request.gjk_solver_type;
+    fcl::CollisionResultd r;
+    if (bocst::collide<double>(&g1, a.X_WG, &g2, b.X_WG, contact, r) == 0) {
+      throw std::invalid_argument(
+          "bocst: FCL has no nearest points of these two geometries, because it finds a negative distance but no "
+          "contact; leave out enable_nearest_points or enable_signed_distance, or make one of them a bocst.Model");
+    }
+  }
+}
+
 double distanceOf(const Object& o1, const Object& o2, const std::optional<fcl::DistanceRequestd>& asked,
                   DistanceResult* result) {
   const fcl::DistanceRequestd request = asked.value_or(fcl::DistanceRequestd());
@@ -683,6 +735,7 @@ double distanceOf(const Object& o1, const Object& o2, const std::optional<fcl::D
   double distance;
   {
     const NoGilWithOctrees free;
+    refuseWhatFclLacks(a, b, request);
     distance = bocst::distance<double>(a.geometry.get(), a.X_WG, b.geometry.get(), b.X_WG, request, r);
   }
   if (result == nullptr || !(r.min_distance < result->min_distance)) return distance;
@@ -698,11 +751,6 @@ double distanceOf(const Object& o1, const Object& o2, const std::optional<fcl::D
   result->b1 = r.b1;
   result->b2 = r.b2;
   return distance;
-}
-
-/// Is this a shape that is flat, a line or a point? A TriangleP is flat, but FCL can do with it.
-bool hasNoVolume(const fcl::CollisionGeometryd& g) {
-  return g.getObjectType() == fcl::OT_GEOM && g.getNodeType() != fcl::GEOM_TRIANGLE && g.computeVolume() == 0;
 }
 
 /// @throws for what FCL ends the process with, or reads memory that it has not set.

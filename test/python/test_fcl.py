@@ -741,6 +741,45 @@ def test_advancing_shapes_without_volume():
                           fcl.ContinuousCollisionRequest(**advance))
 
 
+@pytest.mark.parametrize('signed', [False, True])
+def test_distances_of_shapes_without_volume(signed):
+    indep = fcl.GJKSolverType.GST_INDEP
+    ask = dict(enable_signed_distance=signed)
+    mesh = built(fcl.BVHModelOBBRSS, *TETRAHEDRON)
+    cube = fcl.Convex(box(0.5)[0], 12, np.column_stack([np.full(12, 3), box()[1]]).ravel())
+    # Without the exception, an assertion in FCL's code fails.
+    for a, b, t in ((fcl.Cone(1, 1), fcl.Sphere(0), (1, 0, -0.5)), (fcl.Capsule(0, 0), fcl.Cone(0, 0), (0, 0, 0)),
+                    (fcl.Box(1, 1, 1), fcl.Cone(1, 0), (0.5, -1, -0.5)) if signed else
+                    (fcl.Capsule(0, 0), fcl.Cylinder(0.5, 1), (0.5, 0, 0)), (fcl.Sphere(0), cube, (0.5, 0.5, 0.5)),
+                    (fcl.Ellipsoid(1, 1, 1), fcl.Cylinder(0, 0), (1, 0, 0)), (fcl.Capsule(0, 0), mesh, (-1, -1, -1))):
+        for pair in ((at(a), at(b, *t)), (at(b), at(a, *(-np.array(t))))):
+            with pytest.raises(ValueError, match='GST_INDEP.*bocst.Model'):
+                fcl.distance(*pair, fcl.DistanceRequest(**ask))
+            assert fcl.distance(*pair, fcl.DistanceRequest(**ask, gjk_solver_type=indep)) <= 0
+        assert fcl.distance(at(a), at(b, 9, 9, 9), fcl.DistanceRequest(**ask)) > 0
+    assert fcl.distance(at(fcl.Box(1, 1, 0)), at(fcl.Box(1, 1, 1)), fcl.DistanceRequest(**ask)) <= 0
+    assert fcl.distance(at(fcl.Box(1, 1, 1)), at(fcl.Sphere(1), 0.7, 0.1, 0), fcl.DistanceRequest(**ask)) <= 0
+    inside = at(fcl.Box(1, 1, 1)), at(fcl.Sphere(0), 0.2, 0.1, 0)
+    if not signed:  # FCL has a formula.
+        assert fcl.distance(*inside) <= 0
+    model = built(fcl.BVHModel, *TETRAHEDRON)
+    assert fcl.distance(at(fcl.Sphere(0)), at(model, -1, -1, -1), fcl.DistanceRequest(**ask)) <= 0
+
+
+def test_nearest_points_that_fcl_takes_from_no_contact():
+    for solver, a, b in ((fcl.GJKSolverType.GST_INDEP, fcl.Box(0, 0, 0), fcl.Box(1, 1, 1)),
+                         (fcl.GJKSolverType.GST_LIBCCD, fcl.Box(0, 0, 0), built(fcl.BVHModelOBBRSS, *TETRAHEDRON))):
+        t = (0.5, 0, 0) if solver == fcl.GJKSolverType.GST_INDEP else (-1, -1, -1)
+        result = fcl.DistanceResult()
+        with pytest.raises(ValueError, match='enable_nearest_points.*bocst.Model'):
+            fcl.distance(at(a), at(b, *t), fcl.DistanceRequest(True, True, solver), result)
+        for nearest, signed in ((True, False), (False, True)):
+            assert fcl.distance(at(a), at(b, *t), fcl.DistanceRequest(nearest, signed, solver), result) <= 0
+    result = fcl.DistanceResult()
+    assert fcl.distance(at(fcl.Box(1, 1, 1)), at(fcl.Box(1, 1, 1), 0.7, 0.1, 0), fcl.DistanceRequest(True, True, 1), result) < 0
+    assert len(result.nearest_points) == 2
+
+
 def test_faces_that_are_no_numbers():
     v, f = box()
     faces = np.concatenate([[3, *t] for t in f])
