@@ -215,12 +215,16 @@ TEST(BenchReport, ComplainsAboutDifferentAnswers) {
   EXPECT_NO_THROW(report.check());
   EXPECT_EQ(report.json(program::Json::object()).at("verdicts").at("equal"), true);
   report.begin("moving");
-  report.verdicts({true, true}, {true, false});
+  Eigen::Isometry3d X_AB = Eigen::Isometry3d::Identity();
+  X_AB.translation() = Eigen::Vector3d(1, 2, 3);
+  report.verdicts({true, true}, {true, false}, {Eigen::Isometry3d::Identity(), X_AB});
   try {
     report.check();
     FAIL() << "no complaint";
   } catch (const std::runtime_error& e) {
-    EXPECT_NE(std::string(e.what()).find("verdicts of moving"), std::string::npos) << e.what();
+    EXPECT_NE(std::string(e.what()).find("verdicts of moving (only bocst finds a contact at --pose 1,2,3,1,0,0,0)"),
+              std::string::npos)
+        << e.what();
     EXPECT_EQ(std::string(e.what()).find("warm"), std::string::npos) << e.what();
   }
   const program::Json verdicts = report.json(program::Json::object()).at("verdicts");

@@ -46,7 +46,7 @@ void benchFirst(BenchSetting& setting, BenchReport& report) {
     ours.push_back(watch.microseconds());
     progress.step();
   }
-  report.verdicts(our_verdicts, fcl_verdicts);
+  report.verdicts(our_verdicts, fcl_verdicts, setting.firstPoses());
 
   const double first = quantile(ours, 0.5), fcl_first = quantile(theirs, 0.5), pass = quantile(passes, 0.5);
   report.compare("first_answer", "first answer, median", BenchRow::Unit::kMicroseconds, first, fcl_first);

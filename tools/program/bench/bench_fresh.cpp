@@ -69,7 +69,7 @@ void benchFresh(BenchSetting& setting, BenchReport& report) {
     ask(setting.fcl(), times.fcl, fcl_verdicts);
     ask(*bocst, times.bocst, our_verdicts);
   }
-  report.verdicts(our_verdicts, fcl_verdicts);
+  report.verdicts(our_verdicts, fcl_verdicts, X_ABs);
 
   std::size_t begin = 0;
   for (const std::size_t window : kWindows) {

@@ -84,7 +84,7 @@ void benchMoving(BenchSetting& setting, BenchReport& report) {
     ours.add(followWithBocst(setting, path));
     progress.step();
   }
-  report.verdicts(ours.verdicts(), theirs.verdicts());
+  report.verdicts(ours.verdicts(), theirs.verdicts(), path);
 
   const auto compare = [&](const std::string& key, const std::string& name, double bocst, double fcl) {
     report.compare(key, name, BenchRow::Unit::kMicroseconds, bocst, fcl);

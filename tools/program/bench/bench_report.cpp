@@ -1,10 +1,13 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #include "bench/bench_report.h"
 
+#include <algorithm>
 #include <cstdio>
 #include <iostream>
 #include <stdexcept>
 #include <utility>
+
+#include "pairs/poses.h"
 
 namespace bocst::program {
 namespace {
@@ -88,15 +91,22 @@ void BenchReport::skip(const std::string& key, const std::string& reason) {
   skipped_.push_back({scenario_, key, reason});
 }
 
-void BenchReport::verdicts(const std::vector<bool>& bocst, const std::vector<bool>& fcl) {
+void BenchReport::verdicts(const std::vector<bool>& bocst, const std::vector<bool>& fcl,
+                           const std::vector<Eigen::Isometry3d>& X_ABs) {
   bocst_hash_.add(bocst);
   fcl_hash_.add(fcl);
   verdict_count_ += fcl.size();
-  mustBeEqual(bocst == fcl, "verdicts");
+  std::string example;
+  const auto [ours, theirs] = std::mismatch(bocst.begin(), bocst.end(), fcl.begin());
+  if (ours != bocst.end() && !X_ABs.empty()) {
+    example = std::string(" (only ") + (*ours ? "bocst" : "FCL") + " finds a contact at --pose " +
+              Pose::fromTransform(X_ABs[static_cast<std::size_t>(ours - bocst.begin())]).text() + ")";
+  }
+  mustBeEqual(bocst == fcl, "verdicts", example);
 }
 
-void BenchReport::mustBeEqual(bool equal, const std::string& what) {
-  if (!equal) differences_.push_back(what + " of " + scenario_);
+void BenchReport::mustBeEqual(bool equal, const std::string& what, const std::string& example) {
+  if (!equal) differences_.push_back(what + " of " + scenario_ + example);
 }
 
 const BenchRow* BenchReport::rowOf(const std::string& key) const {

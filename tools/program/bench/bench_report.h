@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #pragma once
 
+#include <Eigen/Geometry>
 #include <cstddef>
 #include <cstdint>
 #include <optional>
@@ -52,11 +53,12 @@ class BenchReport {
   /// A member of the JSON report beside the rows.
   void set(const std::string& key, Json value) { members_[key] = std::move(value); }
 
-  /// Verdicts of both sides in the same order.
-  void verdicts(const std::vector<bool>& bocst, const std::vector<bool>& fcl);
+  /// Verdicts of both sides in the same order, and where they were asked for, if messages shall name that.
+  void verdicts(const std::vector<bool>& bocst, const std::vector<bool>& fcl,
+                const std::vector<Eigen::Isometry3d>& X_ABs = {});
 
-  /// Other answers that must be equal.
-  void mustBeEqual(bool equal, const std::string& what);
+  /// Other answers that must be equal. @param example of a difference, for the message.
+  void mustBeEqual(bool equal, const std::string& what, const std::string& example = "");
 
   Json json(Json head) const;
   std::string csv() const;

@@ -96,6 +96,12 @@ Pose Pose::of(const std::array<double, 7>& given, RotationFormat format) {
   return pose;
 }
 
+Pose Pose::fromTransform(const Eigen::Isometry3d& X_AB) {
+  const Eigen::Quaterniond q(X_AB.linear());
+  const Eigen::Vector3d& p = X_AB.translation();
+  return of({p.x(), p.y(), p.z(), q.w(), q.x(), q.y(), q.z()});
+}
+
 std::vector<ListedPose> parsePoses(const std::string& text, RotationFormat format, const std::string& name) {
   std::vector<ListedPose> poses;
   constexpr char kByteOrderMark[] = "\xEF\xBB\xBF";

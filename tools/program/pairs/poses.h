@@ -39,6 +39,8 @@ struct Pose {
   /// Of numbers in that order; kRpy has six, and the last does not count. @throws std::invalid_argument as parse().
   static Pose of(const std::array<double, 7>& numbers, RotationFormat format = RotationFormat::kWxyz);
 
+  static Pose fromTransform(const Eigen::Isometry3d& X_AB);  ///< To within rounding.
+
   double quaternionNorm() const;
   Eigen::Isometry3d transform() const;  ///< Of the quaternion divided by its norm.
   std::string text() const;
