@@ -51,14 +51,6 @@ bool toNumber(std::string_view word, long long& number) {
   return r.ec == std::errc() && r.ptr == word.data() + word.size();
 }
 
-std::string inQuotes(std::string_view word) {
-  std::string shown(word.substr(0, 32));
-  for (char& c : shown) {
-    if (c < ' ' || c > '~') c = '?';
-  }
-  return "'" + shown + (word.size() > 32 ? "...'" : "'");
-}
-
 void failAt(std::string_view file, const char* at, const std::string& what) {
   auto ends = std::count(file.data(), at, '\n');
   if (ends == 0) ends = std::count(file.data(), at, '\r');

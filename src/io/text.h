@@ -31,8 +31,16 @@ bool takeNumber(std::string_view& text, Number& number) {
   return toNumber(takeWord(text), number);
 }
 
-/// The word for a message: in quotes, cut to 32 bytes, bytes that do not print replaced.
-std::string inQuotes(std::string_view word);
+/// A text for a message: in quotes, cut to 60 bytes, bytes that do not print replaced, because a file may hold what a
+/// terminal obeys.
+inline std::string inQuotes(std::string_view text) {
+  constexpr std::size_t kMost = 60;
+  std::string shown(text.substr(0, kMost));
+  for (char& c : shown) {
+    if (c < ' ' || c > '~') c = '?';
+  }
+  return "'" + shown + (text.size() > kMost ? "...'" : "'");
+}
 
 /// @throws std::runtime_error "line N: what", where N is the line of `file` that `at` points into.
 [[noreturn]] void failAt(std::string_view file, const char* at, const std::string& what);

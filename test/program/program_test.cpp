@@ -413,6 +413,15 @@ TEST_F(Program, FitsAsManySpheresAsAreAskedFor) {
   expectComplaint(inspect + " --dimension 65537", kUsage, "--dimension");
 }
 
+TEST_F(Program, RefusesTreesThatNoMachineHolds) {
+  const std::string inspect = "inspect " + model("gripper") + " --no-error ";
+  expectComplaint(inspect + "--depth 17", kFailed, "--depth 17: both trees would take about ");
+  EXPECT_EQ(run(inspect + "--depth 10").code, 0);
+  // A segment has few cells on each level.
+  const std::string segment = write("segment.off", "OFF\n3 1 0\n0 0 0\n1 0 0\n2 0 0\n3 0 1 2\n");
+  EXPECT_EQ(run("inspect " + segment + " --depth 15 --no-error").code, 0);
+}
+
 TEST_F(Program, ValidatesAgainstFcl) {
   const std::string pair = "validate " + model("link") + " " + model("gripper") + " --poses 64 --seed 7";
   const Json exact = json(pair + " --contacts --reference obbrss,obb");
@@ -606,6 +615,14 @@ TEST_F(Program, MeasuresTheScenariosThatAreNamed) {
   EXPECT_EQ(alone.code, 0) << alone.err;
   EXPECT_EQ(Json::parse(alone.out).at("skipped").at(0).at("scenario"), "threads");
 
+  // FCL's distances of triangles as small as these are too large or 0, which is no fault of bocst's.
+  const std::string specks = write("specks.off",
+                                   "OFF\n4 4 0\n0 0 0\n1e-9 0 0\n0 1e-9 0\n0 0 1e-9\n"
+                                   "3 0 2 1\n3 0 1 3\n3 0 3 2\n3 1 2 3\n");
+  const Result small = run("bench " + specks + " --scenarios distance --poses 100 --rounds 1");
+  EXPECT_EQ(small.code, 0) << small.err;
+  EXPECT_NE(small.out.find("distances: FCL's are wrong at "), std::string::npos) << small.out;
+
   expectComplaint(bench + " --scenarios first,nosuch", kUsage, "--scenarios");
   expectComplaint(bench + " --json - --csv -", kUsage, "--csv");
   expectComplaint(bench + " --oracles --csv -", kUsage, "--csv");
@@ -729,7 +746,9 @@ TEST_F(SceneProgram, SaysWhatIsWrong) {
   const std::string arm = "scene " + example("arm.urdf");
   expectComplaint(arm, kFailed, "line 31: link upper_arm: mesh package://bocst_models/link.obj: package bocst_models");
   expectComplaint(arm + " --package bocst_models", kUsage, "--package: bocst_models: name=folder expected");
-  expectComplaint(arm + " --package bocst_models=/nowhere", kFailed, "/nowhere/link.obj: no such file");
+  expectComplaint(arm + " --package bocst_models=/nowhere", kUsage, "--package: bocst_models=/nowhere: no such folder");
+  expectComplaint(arm + package() + package(), kUsage, "the package is given twice");
+  expectComplaint(arm + " --package bocst_models=" + folder_.string(), kFailed, "/link.obj: no such file");
   expectComplaint(arm + package() + " --adjacent maybe", kUsage, "--adjacent");
   expectComplaint(arm + package() + " --margin -1", kUsage, "--margin");
   expectComplaint(arm + package() + " --states " + write("states.csv", "elbow\n1\n"), kFailed,
@@ -741,6 +760,15 @@ TEST_F(SceneProgram, SaysWhatIsWrong) {
   const std::string scene = write("scene.json", "{\"objects\": []}");
   expectComplaint("scene " + scene, kFailed, "scene.json: nothing moves");
   expectComplaint("scene " + scene + " --json " + scene, kFailed, "would be overwritten");
+  const std::string shapes = write("shapes.json",
+                                   "{\"objects\": [{\"name\": \"a\", \"sphere\": 1},"
+                                   " {\"name\": \"b\", \"sphere\": 1, \"moving\": true, \"pose\": [3, 0, 0]}]}");
+  EXPECT_EQ(run("scene " + shapes + " --scalar float").code, 0);
+  for (const std::string option :
+       {"--margin 0.1", "--answer conservative", "--subdivision octree", "--dimension 64", "--oracle cpu"}) {
+    expectComplaint("scene " + shapes + " " + option, kFailed,
+                    option.substr(0, option.find(' ')) + ": has no effect, because " + shapes + " has no mesh");
+  }
 }
 
 TEST_F(Program, ListsOracles) {

@@ -345,6 +345,9 @@ TEST_F(SceneFile, RefusesWhatUrdfdomLeavesOut) {
            {"<link name='c'><Collision/></link>", "collision"},
            {collision("<orgin/>", kSphere), "origin"},
            {collision("", "<spere radius='1'/>"), "sphere"},
+           {collision("", "<shpre radius='1'/>"), "sphere"},
+           {collision("", "<meshh filename='tetra.off'/>"), "mesh"},
+           {joint("j", "continuous", "a", "b", "<miimc joint='k'/>"), "mimic"},
            {collision("", "<mesh filename='tetra.off' scal='2 2 2'/>"), "scale"},
            {joint("j", "fixed", "a", "b", "<orgin/>"), "origin"},
            {joint("j", "fixed", "a", "b", "<origin xzy='1 0 0'/>"), "xyz"},
@@ -361,12 +364,14 @@ TEST_F(SceneFile, RefusesWhatUrdfdomLeavesOut) {
 
   const std::string other =
       "<gazebo reference='a'><origin x='1'/></gazebo><transmission name='t'><joint name='j'/></transmission>"
-      "<sensor name='s'/><material name='m'><color rgba='1 1 1 1'/></material><drake:joint name='d'/>"
+      "<sensor name='s'/><plugin/><ros2_control/><group/><light/><loop_joint/><material name='m'><color rgba='1 1 1 "
+      "1'/></material><drake:joint name='d'/>"
       "<link name='a'><contact/><sensor/><self_collision_checking/><collision name='n' group='g'><verbose value='1'/>"
-      "<drake:origin/><surface/><material/><contact_coefficients/><geometry>" +
+      "<drake:origin/><surface/><material/><contact_coefficients/><pose/><max_contacts/><geometry>" +
       kSphere + "</geometry></collision></link>" + link("b") +
       joint("j", "revolute", "a", "b",
-            "<dynamics damping='1'/><calibration/><safety_controller k_velocity='1'/><hardwareInterface/><friction/>"
+            "<plugin/><mechanicalReduction/><sensor/><actuator/><dynamics "
+            "damping='1'/><calibration/><safety_controller k_velocity='1'/><hardwareInterface/><friction/>"
             "<origin xyz='0 0 0' drake:frame='f'/><axis xyz='0 0 1' rpy='0 0 0'/>"
             "<limit lower='0' upper='1' effort='1' velocity='1' acceleration='1' jerk='1' soft_lower='1'/>");
   EXPECT_EQ(read(robot(other)).links().size(), 2u);
@@ -412,9 +417,10 @@ TEST_F(SceneFile, FindsPackages) {
   unsetenv("ROS_PACKAGE_PATH");
   EXPECT_EQ(Packages().resolve("package://husky/a", repo + "/old"), repo + "/husky/husky/a");
 
-  const Packages given({"other=/x", "robots=" + (folder_ / "given").string()});
+  const std::string other = (folder_ / "ros").string();
+  const Packages given({"other=" + other, "robots=" + (folder_ / "given").string()});
   EXPECT_EQ(given.resolve(uri, deep), at("given"));
-  EXPECT_EQ(given.resolve("package://other//m//a.stl", deep), "/x//m//a.stl");
+  EXPECT_EQ(given.resolve("package://other//m//a.stl", deep), other + "//m//a.stl");
   EXPECT_EQ(given.resolve("file:///a/b.stl", deep), "/a/b.stl");
   EXPECT_EQ(given.resolve("file://localhost/a/b%20c%2d50%.stl", deep), "/a/b c-50%.stl");
   EXPECT_EQ(given.resolve("file:///a%zz%4", deep), "/a%zz%4");
@@ -424,6 +430,10 @@ TEST_F(SceneFile, FindsPackages) {
   EXPECT_EQ(given.resolve("/a/b.stl", deep), "/a/b.stl");
   EXPECT_EQ(given.resolve("b.stl", "/c"), "/c/b.stl");
   EXPECT_THROW(given.resolve("package://robots", deep), std::runtime_error);
+  for (const std::vector<std::string>& wrong : std::vector<std::vector<std::string>>{
+           {"robots"}, {"robots=/nowhere"}, {"robots=" + other, "a=" + other, "robots=" + other}}) {
+    EXPECT_THROW(Packages{wrong}, std::invalid_argument) << wrong.back();
+  }
   // A file that is named without a folder is in the working one.
   unsetenv("ROS_PACKAGE_PATH");
   unsetenv("AMENT_PREFIX_PATH");
@@ -601,6 +611,13 @@ TEST(States, AreATableWithNames) {
   expectNear(turn.objects.at(0), pose(rpy(0, 0, M_PI / 2), {1, 2, 3}), "a quaternion, not normalised");
   ASSERT_EQ(warnings.size(), 1u);
   EXPECT_EQ(warnings[0], "f: line 2: box: the quaternion has the norm 1.41421 and is normalised");
+  for (const char* blanks : {"q1 elbow\n1 2", " elbow  q1 # names \r\n 2   +1 \r\n", "\"q1\" elbow\n1 \"2\" # end",
+                             "q1 elbow\n1, 2", "q1 elbow\n1 ;2 ", "q1 elbow\n1\t2"}) {
+    EXPECT_EQ(table(blanks, names).at(0).joints, (std::vector<double>{1, 2})) << blanks;
+  }
+  StateNames blank;
+  blank.joints = {"joint 1"};
+  EXPECT_EQ(table("joint 1\n3", blank).at(0).joints, (std::vector<double>{3}));
   StateNames odd;
   odd.joints = {"a,b", "say \"c\"", "d#e;f"};
   EXPECT_EQ(table("\"say \"\"c\"\"\", \"a,b\" ,\"d#e;f\"# g\n1,\"2\",3\n", odd).at(0).joints,
@@ -631,6 +648,10 @@ TEST(States, SayWhatIsWrongAndWhere) {
   EXPECT_EQ(complaint("q1,elbow,\n1,2,"), "path.csv: line 1: a column has no name");
   EXPECT_EQ(complaint("q1,elbow\n1,nan"), "path.csv: line 2: column elbow: 'nan' is no finite number");
   EXPECT_EQ(complaint("q1,elbow\n1,"), "path.csv: line 2: column elbow: '' is no finite number");
+  EXPECT_EQ(complaint("q1 elbow\n1 2 3"), "path.csv: line 2: 2 numbers expected, 3 found");
+  EXPECT_EQ(complaint("q1 elbow\n1 , , 2"), "path.csv: line 2: 2 numbers expected, 3 found");
+  EXPECT_EQ(complaint("q1,elbow\n1 2"), "path.csv: line 2: 2 numbers expected, 1 found");
+  EXPECT_EQ(complaint("1 2\n"), "path.csv: line 1: the first line must have the names of the columns");
   EXPECT_EQ(complaint("q1,elbow\n1,2,3"), "path.csv: line 2: 2 numbers expected, 3 found");
   EXPECT_EQ(complaint("q1,elbow\n1,\x1b[31m2\xff"), "path.csv: line 2: column elbow: '?[31m2?' is no finite number");
   EXPECT_EQ(complaint("q1,\x1b[0m\n1,2"), "path.csv: line 1: no moving joint or object is called '?[0m'.");

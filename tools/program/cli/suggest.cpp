@@ -28,8 +28,12 @@ std::size_t editDistance(const std::string& a, const std::string& b) {
 }  // namespace
 
 std::string suggestion(const std::string& word, const std::vector<std::string>& names) {
+  return suggestion(word, names, word.size() / 3 + 1);  // more than that is another word
+}
+
+std::string suggestion(const std::string& word, const std::vector<std::string>& names, std::size_t most) {
   const std::string* best = nullptr;
-  std::size_t least = word.size() / 3 + 2;  // more than that is another word
+  std::size_t least = most + 1;
   for (const std::string& name : names) {
     // What was typed so far counts as near.
     const std::size_t distance = word.size() > 1 && name.rfind(word, 0) == 0 ? 1 : editDistance(word, name);

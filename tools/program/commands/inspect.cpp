@@ -1,8 +1,10 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #include <bocst/io.h>
 #include <bocst/model.h>
+#include <unistd.h>
 
 #include <CLI/CLI.hpp>
+#include <cmath>
 #include <filesystem>
 #include <iostream>
 #include <memory>
@@ -30,6 +32,26 @@ struct Grown {
   std::string oracle;
   double microseconds = 0;
 };
+
+/// @throws std::runtime_error if two trees of this depth would take more memory than the machine has.
+void refuseTooLarge(const std::shared_ptr<const Mesh>& mesh, const Options& options) {
+  constexpr int kTried = 9;  // tens of thousands of nodes for most meshes: enough to tell by how much a level grows
+  if (options.depth <= kTried) return;
+  Modeld tree(mesh, options);
+  tree.expandAll(kTried);
+  const Statistics statistics = tree.statistics();
+  const auto nodes = static_cast<double>(statistics.resident_nodes);
+  const double factor = static_cast<double>(statistics.nodes_per_level[kTried - 1]) /
+                        static_cast<double>(statistics.nodes_per_level[kTried - 2]);
+  const double growth = std::pow(factor, options.depth - kTried);
+  const double bytes = growth * (2 * nodes * sizeof(NodeView) + static_cast<double>(statistics.resident_bytes));
+  const double memory = static_cast<double>(sysconf(_SC_PHYS_PAGES)) * static_cast<double>(sysconf(_SC_PAGESIZE));
+  if (bytes <= memory) return;
+  throw std::runtime_error("--depth " + std::to_string(options.depth) + ": both trees would take about " +
+                           formatBytes(bytes) + ", but this machine has " + formatBytes(memory) +
+                           " of memory; each level takes about " + formatNumber(factor, 2) +
+                           " times as much as the one above");
+}
 
 Grown grow(const std::shared_ptr<const Mesh>& mesh, Options options, bool errors) {
   options.ttl = std::chrono::milliseconds(0);
@@ -159,6 +181,7 @@ struct Inspect {
     std::optional<render::Renderer> renderer;
     if (image.wanted()) renderer.emplace(model.options().oracle);
     const std::shared_ptr<const Mesh> mesh = loadMesh(file);
+    refuseTooLarge(mesh, model.options());
     const Health health = healthOf(*mesh);
     const Grown grown = grow(mesh, model.options(), !no_error), other = grow(mesh, otherOptions(), !no_error);
     std::optional<SphereFit> fit;

@@ -204,6 +204,7 @@ struct SceneCommand {
   bool clearance = false;
   bool no_fcl = false;
   bool adjacent_given = false;
+  std::string of_meshes;  ///< The first option that was given of those that only meshes obey.
   ModelArguments model;
   std::string csv_file;
   std::string html_file;
@@ -216,6 +217,9 @@ struct SceneCommand {
     if (!setup.robot && adjacent_given) throw std::runtime_error("--adjacent: " + scene.file + " has no robot");
     for (const std::string& warning : setup.warnings) std::cerr << "bocst: " << warning << '\n';
     const Bodies bodies(setup);
+    if (bodies.triangles() == 0 && !of_meshes.empty()) {
+      throw std::runtime_error(of_meshes + ": has no effect, because " + scene.file + " has no mesh");
+    }
     SceneQuestions questions;
     questions.scalar = model.scalarKind();
     questions.options = model.options();
@@ -366,8 +370,9 @@ void addScene(CLI::App& program, Job& job) {
   command->footer(
       "FILE is a scene file (JSON with objects, a robot, pairs that may touch and states; see share/doc/scene.md)\n"
       "or a URDF.\n"
-      "States are the lines of a table (CSV). Its first line names the columns: each movable joint that does not\n"
-      "mimic another, and for each moving object NAME.x, .y, .z with .qw, .qx, .qy, .qz or .roll, .pitch, .yaw.\n"
+      "States are the lines of a table (CSV, or separated by blanks). Its first line names the columns: each movable\n"
+      "joint that does not mimic another, and for each moving object NAME.x, .y, .z with .qw, .qx, .qy, .qz or .roll,\n"
+      ".pitch, .yaw.\n"
       "Without states, joints are at 0.\n"
       "All links and moving objects are checked with each other and with the fixed objects, except for pairs that\n"
       "may touch.");
@@ -407,6 +412,9 @@ void addScene(CLI::App& program, Job& job) {
   command->callback([scene, command, &job] {
     scene->model.refuseIdle(*command);
     scene->adjacent_given = command->get_option("--adjacent")->count() != 0;
+    for (const char* option : {"--margin", "--answer", "--depth", "--subdivision", "--dimension", "--oracle"}) {
+      if (scene->of_meshes.empty() && command->get_option(option)->count() != 0) scene->of_meshes = option;
+    }
     read("--package", [&] { Packages(scene->scene.packages); });
     checkStdout(scene->csv_file, scene->output);
     using Adjacent = SceneArguments::Adjacent;

@@ -107,7 +107,10 @@ Packages::Packages(const std::vector<std::string>& given) {
     if (at == 0 || at == std::string::npos || at + 1 == text.size()) {
       throw std::invalid_argument(text + ": name=folder expected");
     }
-    folders_[text.substr(0, at)] = text.substr(at + 1);
+    if (!isFolder(text.substr(at + 1))) throw std::invalid_argument(text + ": no such folder");
+    if (!folders_.emplace(text.substr(0, at), text.substr(at + 1)).second) {
+      throw std::invalid_argument(text + ": the package is given twice");
+    }
   }
 }
 

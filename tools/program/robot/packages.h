@@ -11,7 +11,8 @@ namespace bocst::program {
 /// Where ROS packages are.
 class Packages {
  public:
-  /// @param given "name=folder" each. @throws std::invalid_argument for one that is not.
+  /// @param given "name=folder" each. @throws std::invalid_argument for one that is not, no folder, or a name
+  /// that was given before.
   explicit Packages(const std::vector<std::string>& given = {});
 
   /// A package that the command line does not name.

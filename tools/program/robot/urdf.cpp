@@ -43,6 +43,9 @@ class Listener final : public console_bridge::OutputHandler {
 /// Joints between a link and the root; parsers go down the tree by recursion.
 constexpr std::size_t kMostDepth = 1000;
 
+/// Letters of a name that may be wrong: <plugin>, of which a joint may have one, differs from <origin> in three.
+constexpr std::size_t kMostWrong = 2;
+
 /// What an element of a URDF may have, as far as it matters here.
 struct Known {
   bool is_once;  ///< urdfdom takes the first child of each name.
@@ -133,7 +136,7 @@ class UrdfReader {
     for (const pugi::xml_attribute& attribute : element.attributes()) {
       const std::string name = attribute.name();
       if (isIn(known.attributes, name) || name.find(':') != std::string::npos) continue;
-      const std::string near = suggestion(name, known.attributes);
+      const std::string near = suggestion(name, known.attributes, kMostWrong);
       if (known.is_strict || !near.empty()) refuse(element, in + " has no attribute " + name + "." + near);
     }
     std::set<std::string> seen;
@@ -146,7 +149,7 @@ class UrdfReader {
         const bool is_named = name == "link" || name == "joint";
         checkElement(child, is_named ? name + " " + child.attribute("name").value() + ": " : owner);
       } else {
-        const std::string near = suggestion(name, known.children);
+        const std::string near = suggestion(name, known.children, kMostWrong);
         if (!near.empty()) refuse(child, in + " has no element <" + name + ">." + near);
       }
     }

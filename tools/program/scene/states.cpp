@@ -9,13 +9,17 @@
 #include <stdexcept>
 #include <string_view>
 #include <system_error>
+#include <utility>
 
 #include "cli/suggest.h"
 #include "cli/words.h"
+#include "io/text.h"
 #include "pairs/poses.h"
 
 namespace bocst::program {
 namespace {
+
+using io::inQuotes;
 
 constexpr std::array<const char*, 10> kFields = {"x", "y", "z", "qw", "qx", "qy", "qz", "roll", "pitch", "yaw"};
 constexpr unsigned kPosition = 0x007, kQuaternion = 0x078, kAngles = 0x380;  // bits of kFields
@@ -26,23 +30,22 @@ std::string trimmed(const std::string& text) {
   return text.substr(begin, text.find_last_not_of(" \r") + 1 - begin);
 }
 
-/// For messages: a file may hold what a terminal obeys.
-std::string inQuotes(const std::string& text) {
-  constexpr std::size_t kMost = 60;
-  std::string shown = text.substr(0, kMost);
-  for (char& c : shown) {
-    if (c < ' ' || c > '~') c = '?';
-  }
-  return "'" + shown + (text.size() > kMost ? "...'" : "'");
-}
-
-/// Of the part before #. @throws std::invalid_argument for a quote that is not closed.
-std::vector<std::string> cellsOf(const std::string& line) {
+/// Of the part before #. @param blanks separate cells, too, several as one does.
+/// @throws std::invalid_argument for a quote that is not closed.
+std::vector<std::string> cellsOf(const std::string& line, bool blanks) {
   constexpr std::string_view kSeparators = ",;\t";
   std::vector<std::string> cells(1);
-  bool quoted = false;
+  bool quoted = false, gap = false;
   for (std::size_t i = 0; i < line.size(); ++i) {
     const char c = line[i];
+    const bool is_gap = blanks && !quoted && (c == ' ' || c == '\r');
+    if (!is_gap && std::exchange(gap, false) && c != '#' && kSeparators.find(c) == std::string_view::npos) {
+      cells.emplace_back();
+    }
+    if (is_gap) {
+      gap = !trimmed(cells.back()).empty();
+      continue;
+    }
     if (c == '"' && quoted && line[i + 1] == '"') {
       cells.back() += line[++i];
     } else if (c == '"' && (quoted || trimmed(cells.back()).empty())) {
@@ -201,6 +204,7 @@ std::vector<State> statesOfTable(const std::string& text, const StateNames& name
                                  std::vector<std::string>& warnings) {
   std::vector<State> states;
   std::optional<Columns> columns;
+  bool blanks = false;
   std::istringstream stream(text);
   std::string line;
   for (std::size_t number = 1; std::getline(stream, line); ++number) {
@@ -208,7 +212,7 @@ std::vector<State> statesOfTable(const std::string& text, const StateNames& name
     if (number == 1 && line.rfind(mark, 0) == 0) line.erase(0, mark.size());
     const std::string place = "line " + std::to_string(number);
     try {
-      const std::vector<std::string> cells = cellsOf(line);
+      std::vector<std::string> cells = cellsOf(line, blanks);
       if (cells.size() == 1 && cells[0].empty()) continue;
       if (columns) {
         std::vector<std::string> found;
@@ -217,6 +221,9 @@ std::vector<State> statesOfTable(const std::string& text, const StateNames& name
         for (const std::string& warning : found) warnings.push_back(file + ": " + place + ": " + warning);
         continue;
       }
+      // A joint may have a blank in its name.
+      blanks = cells.size() == 1 && std::count(names.joints.begin(), names.joints.end(), cells[0]) == 0;
+      if (blanks) cells = cellsOf(line, true);
       if (numberOf(cells.front())) throw std::invalid_argument("the first line must have the names of the columns");
       columns.emplace(cells, names);
     } catch (const std::invalid_argument& e) {

@@ -30,9 +30,9 @@ struct StateNames {
 /// Joints at 0, objects where the file of the scene says. @throws std::runtime_error for an object without a pose.
 State startState(const StateNames& names);
 
-/// A table: a line with the names of columns, then one a state. Columns are separated by commas, semicolons or tabs:
-/// the free joints, and of moving objects object.x, .y, .z with .qw, .qx, .qy, .qz or .roll, .pitch, .yaw. Cells may be
-/// in quotes, as in CSV. What follows # and empty lines are skipped.
+/// A table: a line with the names of columns, then one a state. Columns are separated by commas, semicolons or tabs, or
+/// by blanks if the first line has none of these: the free joints, and of moving objects object.x, .y, .z with .qw,
+/// .qx, .qy, .qz or .roll, .pitch, .yaw. Cells may be in quotes, as in CSV. What follows # and empty lines are skipped.
 /// @param file for messages. @param warnings of quaternions. @throws std::runtime_error that names the line and the
 /// column.
 std::vector<State> statesOfTable(const std::string& text, const StateNames& names, const std::string& file,
