@@ -175,6 +175,9 @@ bool collideTrees(const CollideQuery<S>& q, const TreeSide& a, const TreeSide& b
       if (isProved()) return true;
       walk([&](auto& collector) { spheres.run(collector); });
     }
+  } else if (query::TreeWalk::fitsCells(a, b, near)) {
+    query::TreeWalk trees(a, b, near);
+    if (!trees.isNeedless()) walk([&](auto& collector) { trees.run(collector); });
   } else {
     const bool spheres = a.isConservative() || b.isConservative();
     const SimilarityTransform wide = withMargin(b_in_a, a, q, q.cullingMargin(spheres));

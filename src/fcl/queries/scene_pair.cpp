@@ -19,7 +19,10 @@ bool hullsApart(const Model<S>& a, const fcl::Transform3<S>& X_WA, const Model<S
   const OrderedPair<S> pair{&a, X_WA, &b, X_WB, false};
   query::SimilarityTransform b_in_a = relate<S>(pair, scope.a(), scope.b()).b_in_a;
   const bool spheres = query::SphereWalk::fits(scope.a(), scope.b());
-  if (!spheres && !query::TreeWalk::fits(scope.a(), scope.b(), b_in_a)) return false;
+  if (!spheres && !query::TreeWalk::fits(scope.a(), scope.b(), b_in_a) &&
+      !query::TreeWalk::fitsCells(scope.a(), scope.b(), b_in_a)) {
+    return false;
+  }
   b_in_a.tolerance += (marginOf(&a, &b) + gap) / unitOf(scope.a());
   if (spheres) return query::SphereWalk(scope.a(), scope.b(), b_in_a).areBoxesApart();
   return query::TreeWalk(scope.a(), scope.b(), b_in_a).isNeedless();

@@ -24,7 +24,7 @@ namespace bocst::query {
 ///
 /// Triangles against triangles are culled by boxes and slabs; where a side answers with cells, both are culled by
 /// spheres, in double and on integer cells, so a conservative verdict does not depend on what is resident. Two such
-/// sides have SphereWalk.
+/// sides have SphereWalk; a tree with cells beside one with triangles has TreeWalk.
 ///
 /// Where leaves of side B are solid bodies (B::kBodies), the visitor V is a ConvexVisitor, and spheres meet the bodies
 /// themselves.

@@ -16,9 +16,11 @@
 namespace bocst::query {
 namespace {
 
-inline bool isLeaf(const StepNode& n) {
+inline bool isLeaf(const PairSteps& s, int side, const StepNode& n) {
   const tree::ChildRef::Tag tag = n.ref.tag();
-  return tag == tree::ChildRef::kShortList || (tag == tree::ChildRef::kList && n.level == lattice::kMaxLevel);
+  const bool is_deepest = n.level == s.leaf_level[side];
+  return s.has_cells[side] ? is_deepest
+                           : tag == tree::ChildRef::kShortList || (tag == tree::ChildRef::kList && is_deepest);
 }
 
 // A block of side x whose octants are in a frame.
@@ -156,7 +158,8 @@ HWY_INLINE Popped pop(PairSteps& s) {
     p.own.node = tree::NodeRef::octant(top.own.index, static_cast<int>(o));
     p.own.ref = top.own.at != nullptr ? top.own.at->child[o].load(std::memory_order_acquire)
                                       : s.side[p.side]->childRef(p.own.node);
-    if (p.own.ref.tag() == tree::ChildRef::kImplicit && rest != 0 && soon != 0) {
+    if (p.own.ref.tag() == tree::ChildRef::kImplicit && rest != 0 && soon != 0 &&
+        !(s.has_cells[p.side] && top.own.level == s.leaf_level[p.side])) {
       top.late |= 1u << o;
       continue;
     }
@@ -302,7 +305,7 @@ void OctantsMeeting(const PairFrames& geometry, int own, const CellOctants& cell
 // expanded. `fetch_own`: nobody has fetched what is below that block.
 HWY_INLINE bool expandOther(PairSteps& s, const BlockView& own, const StepNode& other, unsigned mask, bool fetch_own) {
   const int x = static_cast<int>(own.side), y = 1 - x;
-  if (other.ref.tag() != tree::ChildRef::kBlock) return false;
+  if (other.ref.tag() != tree::ChildRef::kBlock || isLeaf(s, y, other)) return false;
   const int deeper = static_cast<int>(other.level) - static_cast<int>(own.level);
   if (s.level_rule.isFirst(x, deeper)) return false;
   bool is_new;
@@ -335,7 +338,7 @@ HWY_INLINE bool pushOthers(PairSteps& s, const BlockView& own, const StepNode& o
   next.other = other;
   next.frames = own.frame + 1;
   next.asked.side = AskedLeaf::kNone;
-  const bool waits = rest != 0 && next.own.ref.tag() == tree::ChildRef::kImplicit;
+  const bool waits = rest != 0 && next.own.ref.tag() == tree::ChildRef::kImplicit && !isLeaf(s, next.side, next.own);
   if (rest != 0) push(s, own, other, waits ? octants : rest);
   return !waits;
 }
@@ -358,6 +361,11 @@ HWY_INLINE void orderAlongCut(const PairSteps& s, int side, const Frame& f, std:
     const auto octant = hn::Iota(du, static_cast<std::uint32_t>(i));
     hn::StoreU(hn::Or(hn::AndNot(hn::Set(du, 7), hn::BitCast(du, hn::Sub(beyond, least))), octant), du, order + i);
   }
+}
+
+// Orders octants by their ids: that with the smallest is taken first.
+HWY_INLINE void orderById(std::uint32_t (&order)[8]) {
+  for (std::uint32_t o = 0; o < 8; ++o) order[o] = (7 - o) << 3 | o;
 }
 
 // Which node of a pair is expanded, and is the other a leaf that is larger?
@@ -390,7 +398,11 @@ void NextEvent(PairSteps& s, StepEvent& event) {
     if (!known) p = pop(s);
     known = false;
     if (s.isCut() && (isBeyondCut(s, p.side, p.own) || isBeyondCut(s, 1 - p.side, p.other))) continue;
-    const bool own_leaf = isLeaf(p.own), other_leaf = isLeaf(p.other);
+    if (s.cell_cut != nullptr &&
+        s.isBeyondCellCut(p.side == 0 ? p.own.node : p.other.node, p.side == 0 ? p.other.node : p.own.node)) {
+      continue;
+    }
+    const bool own_leaf = isLeaf(s, p.side, p.own), other_leaf = isLeaf(s, 1 - p.side, p.other);
     if (own_leaf && other_leaf) {
       if (!s.sees_all) {
         fetch(*s.tree[p.side], p.own.ref);
@@ -412,7 +424,8 @@ void NextEvent(PairSteps& s, StepEvent& event) {
         overlapping(s.geometry, s.frames[block.frame], s.frames[other.lane / 8], other.lane % 8, block.at->grey, order);
     if (mask == 0) continue;
     if (s.isCut()) orderAlongCut(s, x, s.frames[block.frame], order);
-    if (choice.has_larger_leaf) {
+    if (s.cell_cut != nullptr && s.has_cells[x]) orderById(order);
+    if (choice.has_larger_leaf && !s.has_cells[y]) {
       if (p.asked.side == AskedLeaf::kNone || !s.leaf[y]->know(other.node, p.asked.triangles)) {
         fill(event, StepEvent::kLargeTriangles, p);
         event.pair[y] = other;

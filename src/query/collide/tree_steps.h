@@ -51,7 +51,7 @@ struct StepEvent {
   unsigned mask = 0;  ///< kLargeTriangles only.
 };
 
-/// The state of the depth-first walk over resident pairs of two trees, exact answers.
+/// The state of the depth-first walk over resident pairs of two trees, of which one at least has exact answers.
 struct PairSteps {
   /// Blocks below one another: of cells, then loose ones.
   static constexpr std::size_t kMostDepth = lattice::kMaxLevel + tree::kMostLooseDepth;
@@ -71,6 +71,9 @@ struct PairSteps {
 
   const LevelRule level_rule;
 
+  bool has_cells[2];            ///< Leaves of this side are cells of the collision depth; else lists of triangles.
+  std::uint32_t leaf_level[2];  ///< The deepest level of each side.
+
   /// The other node of a pair is expanded for all octants of a group at once, so that their tests overlap in time. Set
   /// where a hit is not expected or does not end the walk; else the first hit makes most of these tests unnecessary.
   bool all_at_once = false;
@@ -88,6 +91,12 @@ struct PairSteps {
     cut = static_cast<float>(c.last - lattice::kMiddle) + geometry.rounding_margin;
   }
 
+  /// The same where a side has cells, by their ids. Null: nothing is left out.
+  const Cut* cell_cut = nullptr;
+  bool isBeyondCellCut(tree::NodeRef a, tree::NodeRef b) const {
+    return (has_cells[0] ? side[0]->firstCellId(a) : side[1]->firstCellId(b)) > cell_cut->last_cell;
+  }
+
   const LargeTriangles* leaf[2] = {nullptr, nullptr};  ///< Of each side, those of the larger leaf placed last.
 
   std::uint64_t holds[kFrames];  ///< frameName() of what is in a frame.
@@ -100,7 +109,9 @@ struct PairSteps {
         frames(frames_),
         stack(nullptr),
         // Units are floats, and so is their quotient.
-        level_rule(LevelRule::of(static_cast<double>(geometry.side[1].unit / geometry.side[0].unit))) {
+        level_rule(LevelRule::of(static_cast<double>(geometry.side[1].unit / geometry.side[0].unit))),
+        has_cells{a.isConservative(), b.isConservative()},
+        leaf_level{static_cast<std::uint32_t>(a.tree().deepest()), static_cast<std::uint32_t>(b.tree().deepest())} {
     for (std::uint64_t& h : holds) h = kEmptyFrame;
   }
 };

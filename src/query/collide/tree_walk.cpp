@@ -20,13 +20,20 @@ struct TreeWalk::Scratch {
   DeferredPairs<TreeSide, TreeSide> deferred;
   LeafPairs<TreeSide, TreeSide> leaves;
   bool leaves_started = false;
-  LargeTriangles large[2];
+  LargeTriangles large[2], beside_cell;
   LargeTriangleLeaf<TreeSide> long_a, long_b;  // leaves of more triangles than those hold
 };
 
 bool TreeWalk::runByTurns(Visitor& visitor) {
   if (!BoxSide::fits(a_) || !BoxSide::fits(b_)) return run(visitor);
   return walkByTurns(a_, b_, b_in_a_, visitor, kLimits, [&](std::size_t most) { return run(visitor, most); });
+}
+
+SimilarityTransform TreeWalk::widened(const TreeSide& a, const TreeSide& b, const SimilarityTransform& b_in_a) {
+  const auto reach = [](const TreeSide& side) { return side.tree().sphereReach() * side.inverseUnit(); };
+  SimilarityTransform wide = b_in_a;
+  wide.tolerance += (reach(a) + reach(b) * b_in_a.scale) * (1 + 1e-9);
+  return wide;
 }
 
 void TreeWalk::payForBoxes(std::size_t steps) const {
@@ -41,11 +48,13 @@ WalkEnd TreeWalk::run(Visitor& visitor, std::size_t most_leaf_pairs) {
   thread_local Scratch s;
   s.deferred.clear();
   s.leaves_started = false;
-  for (LargeTriangles& large : s.large) large.clear();
+  for (LargeTriangles* large : {&s.large[0], &s.large[1], &s.beside_cell}) large->clear();
   s.long_a.clear();
   s.long_b.clear();
   // Each walk in a tree that is not whole brings the query nearer that builds it whole: see Tree::payRent().
-  for (const TreeSide* side : {&a_, &b_}) side->tree().payRent(tree::Tree::kWalkRent);
+  for (const TreeSide* side : {&a_, &b_}) {
+    if (!side->isConservative()) side->tree().payRent(tree::Tree::kWalkRent);
+  }
   const bool ended = search(s);
   return {ended && !gave_up_, leaf_pairs_, gave_up_};
 }
@@ -53,15 +62,19 @@ WalkEnd TreeWalk::run(Visitor& visitor, std::size_t most_leaf_pairs) {
 bool TreeWalk::search(Scratch& s) {
   // A root is not expanded for a pair whose root boxes are apart.
   const bool new_root = a_.state(a_.root()) == State::kGrows || b_.state(b_.root()) == State::kGrows;
-  if (new_root && facesApart(a_.volume(a_.root()), b_.volume(b_.root()), b_in_a_)) return false;
+  if (new_root && facesApart(a_.volume(a_.root()), b_.volume(b_.root()), place())) return false;
 
-  PairSteps steps(a_, b_, PairFrames(b_in_a_), s.frames);
+  PairSteps steps(a_, b_, PairFrames(place()), s.frames);
   for (int side = 0; side < 2; ++side) steps.leaf[side] = &s.large[side];
   const Cut* const cut = visitor_->cut();
   const bool may_end = visitor_->endsAtFirst() || cut != nullptr;
   steps.sees_all = !may_end;
   steps.all_at_once = cut == nullptr && (is_shallow_ || steps.sees_all);
-  if (cut != nullptr) steps.setCut(*cut);
+  if (wide_) {
+    steps.cell_cut = cut;
+  } else if (cut != nullptr) {
+    steps.setCut(*cut);
+  }
   const auto push = [&](const DeferredPairs<TreeSide, TreeSide>::Pair& pair) {
     pushWithRoom(steps, s.stack, pair.a, pair.b);
   };
@@ -69,7 +82,9 @@ bool TreeWalk::search(Scratch& s) {
   for (;;) {
     if (stepAll(steps, s)) return true;
     if (cut != nullptr) {
-      s.deferred.dropIf([&](const auto& pair) { return cut->isBeyond(cut->leastOf(a_.volume(pair.a))); });
+      s.deferred.dropIf([&](const auto& pair) {
+        return wide_ ? steps.isBeyondCellCut(pair.a, pair.b) : cut->isBeyond(cut->leastOf(a_.volume(pair.a)));
+      });
     }
     if (s.deferred.empty()) return false;
     s.deferred.grow(a_, b_, b_in_a_, may_end, push);
@@ -101,7 +116,7 @@ bool TreeWalk::stepAll(PairSteps& steps, Scratch& s) {
 void TreeWalk::testLargeTriangles(PairSteps& steps, const StepEvent& event, Scratch& s) {
   const auto x = static_cast<int>(event.block.side), y = 1 - x;
   const TreeSide &small = x == 0 ? a_ : b_, &large = x == 0 ? b_ : a_;
-  const SimilarityTransform& to = x == 0 ? b_in_a_ : aInB();
+  const SimilarityTransform& to = x == 0 ? place() : aInB();
   const tree::NodeRef node = event.pair[x].node, leaf = event.pair[y].node;
   if (large.triangleCount(leaf) <= LargeTriangles::kCapacity) {
     const auto unit = static_cast<double>(steps.geometry.side[x].unit);
@@ -119,6 +134,7 @@ void TreeWalk::testLargeTriangles(PairSteps& steps, const StepEvent& event, Scra
 bool TreeWalk::testLeaves(const StepEvent& event, Scratch& s) {
   gave_up_ = ++leaf_pairs_ > most_leaf_pairs_;
   if (gave_up_) return true;
+  if (wide_) return testCell(event, s);
   if (!s.leaves_started) {
     s.leaves.start(b_in_a_, aInB(), visitor_->endsAtFirst(), visitor_->cut());
     s.leaves_started = true;
@@ -138,8 +154,45 @@ bool TreeWalk::testLeaves(const StepEvent& event, Scratch& s) {
   return ended;
 }
 
+// A cell against the triangles of a leaf.
+bool TreeWalk::testCell(const StepEvent& event, Scratch& s) {
+  const int x = a_.isConservative() ? 0 : 1;
+  const TreeSide &cells = x == 0 ? a_ : b_, &meshes = x == 0 ? b_ : a_;
+  const tree::NodeRef node = event.pair[x].node, leaf = event.pair[1 - x].node;
+  CellLeaf cell{cells.cellId(node), cells.cellSphere(node)};
+  const std::size_t count = meshes.triangleCount(leaf);
+  std::uint32_t left = event.asked.triangles;
+  const auto near = [&] {
+    return x == 0 ? s.beside_cell.near(cell.sphere, b_in_a_.tolerance, b_, leaf, place())
+                  : s.beside_cell.near(cell.sphere, b_in_a_.tolerance / b_in_a_.scale, a_, leaf, aInB());
+  };
+  const bool is_short = count <= LargeTriangles::kCapacity;
+  if (is_short) left = event.asked.side == AskedLeaf::kNone ? near() : left & near();
+  if (x == 1) cell.sphere = placed(cell.sphere, b_in_a_);
+  const auto meets = [&](std::uint32_t t) {
+    Corners corners = {meshes.corner(t, 0), meshes.corner(t, 1), meshes.corner(t, 2)};
+    if (x == 0) {
+      for (Eigen::Vector3d& corner : corners) corner = b_in_a_ * corner;
+    }
+    const Eigen::Vector3d point = closestPoint(cell.sphere.center, corners);
+    if (!spheresMeet(cell.sphere, {point, 0}, b_in_a_.tolerance)) return false;
+    return x == 0 ? visitor_->cellOfA(cell, t, point) : visitor_->cellOfB(t, cell, point);
+  };
+  const tree::TriangleList list = meshes.triangles(leaf);
+  if (is_short) {
+    for (; left != 0; left &= left - 1) {
+      if (meets(list.ids[static_cast<std::size_t>(__builtin_ctz(left))])) return true;
+    }
+    return false;
+  }
+  for (std::uint32_t i = 0; i < list.count; ++i) {
+    if (meets(list.ids[i])) return true;
+  }
+  return false;
+}
+
 const SimilarityTransform& TreeWalk::aInB() {
-  if (!inverted_) a_in_b_ = b_in_a_.inverse();
+  if (!inverted_) a_in_b_ = place().inverse();
   inverted_ = true;
   return a_in_b_;
 }

@@ -1,6 +1,8 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #pragma once
 
+#include <optional>
+
 #include "query/collide/pair_walk.h"
 #include "query/collide/tree_steps.h"
 #include "query/cull/separation.h"
@@ -9,8 +11,12 @@
 
 namespace bocst::query {
 
-/// The walk of PairWalk for two trees with exact answers, where queries spend most of their time. Volumes are in float
-/// about the middles of the roots (see PairFrames); a block is decoded once for all nodes that it is tested against.
+/// The walk of PairWalk for two trees of which one at least has exact answers, where queries spend most of their time.
+/// Volumes are in float about the middles of the roots (see PairFrames); a block is decoded once for all nodes that it
+/// is tested against.
+///
+/// Where one side answers with cells, the walk's tolerance holds how far their spheres reach beyond the surface that
+/// the volumes bound; spheres against triangles are then tested in double, as in PairWalk.
 class TreeWalk {
  public:
   static bool fits(const TreeSide& a, const TreeSide& b, const SimilarityTransform& b_in_a) {
@@ -18,10 +24,18 @@ class TreeWalk {
     return !a.isConservative() && !b.isConservative() && PairFrames::fits(b_in_a.scale) && b_in_a.tolerance < 1e9;
   }
 
-  TreeWalk(const TreeSide& a, const TreeSide& b, const SimilarityTransform& b_in_a) : a_(a), b_(b), b_in_a_(b_in_a) {}
+  /// Does it serve for two sides of which one answers with cells?
+  static bool fitsCells(const TreeSide& a, const TreeSide& b, const SimilarityTransform& b_in_a) {
+    return a.isConservative() != b.isConservative() && PairFrames::fits(b_in_a.scale) &&
+           widened(a, b, b_in_a).tolerance < 1e9;
+  }
+
+  TreeWalk(const TreeSide& a, const TreeSide& b, const SimilarityTransform& b_in_a) : a_(a), b_(b), b_in_a_(b_in_a) {
+    if (a.isConservative() || b.isConservative()) wide_ = widened(a, b, b_in_a);
+  }
 
   /// Are the two surely apart by their supports, so that no walk is needed? Costs little; to be asked before run().
-  bool isNeedless() { return areSeparate(a_.tree().supports(), b_.tree().supports(), b_in_a_, is_shallow_); }
+  bool isNeedless() { return areSeparate(a_.tree().supports(), b_.tree().supports(), place(), is_shallow_); }
 
   /// True when the visitor ended it.
   bool run(Visitor& visitor) { return run(visitor, ~std::size_t{0}).met; }
@@ -40,15 +54,21 @@ class TreeWalk {
  private:
   struct Scratch;
 
+  static SimilarityTransform widened(const TreeSide& a, const TreeSide& b, const SimilarityTransform& b_in_a);
+  // With the tolerance of the walk.
+  const SimilarityTransform& place() const { return wide_ ? *wide_ : b_in_a_; }
+
   bool search(Scratch& s);
   bool stepAll(PairSteps& steps, Scratch& s);
   void testLargeTriangles(PairSteps& steps, const StepEvent& event, Scratch& s);
   bool testLeaves(const StepEvent& event, Scratch& s);
+  bool testCell(const StepEvent& event, Scratch& s);
   const SimilarityTransform& aInB();
 
   const TreeSide &a_, &b_;
   const SimilarityTransform& b_in_a_;
-  SimilarityTransform a_in_b_;  // once asked for
+  std::optional<SimilarityTransform> wide_;  // where a side answers with cells
+  SimilarityTransform a_in_b_;               // once asked for
   bool inverted_ = false;
   bool is_shallow_ = false;  // see areSeparate()
   Visitor* visitor_ = nullptr;

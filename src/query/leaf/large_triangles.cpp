@@ -23,7 +23,7 @@ PackRegion regionOf(const Volume& v, const SimilarityTransform& other_in_side, d
     offset += v.normal[k] * displacement[k];
     region.normal[k] = v.normal[k];
   }
-  const double rounding_margin = regionMargin(other_in_side, extent, error);
+  const double rounding_margin = regionMargin(other_in_side, other_in_side.tolerance, extent, error);
   for (int k = 0; k < 3; ++k) {
     region.low[k] = static_cast<float>(displacement[k] - v.half[k] - rounding_margin);
     region.high[k] = static_cast<float>(displacement[k] + v.half[k] + rounding_margin);
@@ -67,6 +67,21 @@ void LargeTriangles::start(const TreeSide& other, tree::NodeRef leaf, const Simi
   size += offset;
   unpackTriangles(packed, motion_, pack_);
   error_ = other_in_side.scale * static_cast<double>(packingError(packed)) + 1.7321 * 6 * 0x1p-24 * size;
+}
+
+std::uint32_t LargeTriangles::near(const Sphere& ball, double tolerance, const TreeSide& other, tree::NodeRef leaf,
+                                   const SimilarityTransform& other_in_side) {
+  if (count_ == 0 || !(leaf_ == leaf)) start(other, leaf, other_in_side);
+  if (!inRange(pack_)) return all();
+  const Eigen::Vector3d center = ball.center.array() - kMiddle;
+  const double extent = std::max(static_cast<double>(pack_.size), center.cwiseAbs().maxCoeff() + ball.radius);
+  const double reach = ball.radius + regionMargin(other_in_side, tolerance, extent, error_);
+  PackRegion region{};
+  for (int k = 0; k < 3; ++k) {
+    region.low[k] = static_cast<float>(center[k] - reach);
+    region.high[k] = static_cast<float>(center[k] + reach);
+  }
+  return trianglesWithin(pack_, region) & all();
 }
 
 std::uint32_t LargeTriangles::meeting(const TreeSide& side, tree::NodeRef node, const TreeSide& other,

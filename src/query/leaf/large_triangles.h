@@ -10,9 +10,9 @@
 namespace bocst::query {
 
 /// By how much a PackRegion reaches beyond what it bounds, for a node of the other side that `to` places and corners
-/// that are off by `error`; no coordinate is larger than `extent`.
-inline double regionMargin(const SimilarityTransform& to, double extent, double error) {
-  return (32 * 0x1p-24 + 4 * to.orthogonality_error) * extent + 1.02 * (to.tolerance + error);
+/// that are off by `error`; no coordinate is larger than `extent`. `tolerance`: usually that of `to`.
+inline double regionMargin(const SimilarityTransform& to, double tolerance, double extent, double error) {
+  return (32 * 0x1p-24 + 4 * to.orthogonality_error) * extent + 1.02 * (tolerance + error);
 }
 
 /// The triangles of a leaf of one side as smaller nodes of the other see them: with large triangles the leaf's volume
@@ -37,6 +37,10 @@ class LargeTriangles {
   /// has at most kCapacity; `unit` is that of `side` in PairFrames.
   std::uint32_t meeting(const TreeSide& side, tree::NodeRef node, const TreeSide& other, tree::NodeRef leaf,
                         std::uint32_t which, const SimilarityTransform& other_in_side, double unit);
+
+  /// Those triangles of a leaf of `other` that may come within `tolerance` of a ball in the frame of the other side.
+  std::uint32_t near(const Sphere& ball, double tolerance, const TreeSide& other, tree::NodeRef leaf,
+                     const SimilarityTransform& other_in_side);
 
   // Of triangles that are known.
 

@@ -299,7 +299,7 @@ class LeafPairs {
   bool testRows(const Leaf& leaf, const SimilarityTransform& to, const std::uint32_t* ids, F&& f) {
     PackRegion region{};
     const double size = static_cast<double>(leaf.pack.size), error = static_cast<double>(leaf.error);
-    const double rounding_margin = regionMargin(to, size, error);
+    const double rounding_margin = regionMargin(to, to.tolerance, size, error);
     for (int k = 0; k < 3; ++k) {
       region.high[k] = static_cast<float>(leaf.volume.half[0][k] + rounding_margin);
       region.low[k] = -region.high[k];
@@ -342,7 +342,7 @@ class LeafPairs {
       offset += other.normal[1][k] * displacement[k];
       region.normal[k] = static_cast<float>(other.normal[1][k]);
     }
-    const double rounding_margin = regionMargin(to, extent, static_cast<double>(error));
+    const double rounding_margin = regionMargin(to, to.tolerance, extent, static_cast<double>(error));
     for (int k = 0; k < 3; ++k) {
       region.low[k] =
           static_cast<float>(std::max(-own.half[0][k], displacement[k] - other.half[1][k]) - rounding_margin);
