@@ -469,6 +469,8 @@ ContactPoint TriangleShape::penetration(const PointSet& points, const Separation
 
 namespace {
 
+constexpr double kFar = std::numeric_limits<double>::infinity();
+
 // The box from `lo` to `hi` along n that covers the region sideways.
 OrientedVolume layer(const Vector3d& n, double lo, double hi, const Sphere& region) {
   OrientedVolume box;
@@ -480,45 +482,26 @@ OrientedVolume layer(const Vector3d& n, double lo, double hi, const Sphere& regi
   return box;
 }
 
-// The lowest point along n.
-const Vector3d& lowest(const PointSet& points, const Vector3d& n) { return points.support(-n); }
-
 }  // namespace
 
-HalfspaceShape::HalfspaceShape(const Vector3d& normal, double height, const Sphere& region)
-    : normal_(normal), height_(height) {
-  const double floor = std::min(height, normal.dot(region.center)) - 2 * region.radius;
-  box_ = layer(normal, floor, height, region);
-}
-
-SeparationResult HalfspaceShape::gap(const PointSet& points, double) const {
-  SeparationResult gap;
-  gap.on_points = lowest(points, normal_);
-  gap.normal = normal_;
-  const double above = normal_.dot(gap.on_points) - height_;
-  gap.at_least = above - kRounding * (gap.on_points.lpNorm<1>() + std::abs(height_));
-  gap.distance = gap.isTouching() ? 0 : above;
-  gap.on_body = gap.isTouching() ? gap.on_points : Vector3d(gap.on_points - normal_ * above);
-  return gap;
-}
-
-ContactPoint HalfspaceShape::penetration(const PointSet& points, const SeparationResult&) const {
-  ContactPoint contact;
-  const Vector3d& p = lowest(points, normal_);
-  contact.normal = normal_;
-  contact.depth = std::max(height_ - normal_.dot(p), 0.0);
-  contact.point = p + normal_ * (contact.depth / 2);
-  return contact;
-}
-
-PlaneShape::PlaneShape(const Vector3d& normal, double height, const Sphere& region) : normal_(normal), height_(height) {
+PlaneShape::PlaneShape(const Vector3d& normal, double height, const Sphere& region)
+    : normal_(normal), height_(height), is_half_space_(false) {
   box_ = layer(normal, height, height, region);
 }
 
+PlaneShape::PlaneShape(const Vector3d& normal, double height, const Sphere& region, double floor)
+    : normal_(normal), height_(height), is_half_space_(true) {
+  box_ = layer(normal, floor, height, region);
+}
+
+HalfspaceShape::HalfspaceShape(const Vector3d& normal, double height, const Sphere& region)
+    : PlaneShape(normal, height, region, std::min(height, normal.dot(region.center)) - 2 * region.radius) {}
+
 SeparationResult PlaneShape::gap(const PointSet& points, double) const {
   SeparationResult gap;
-  const Vector3d &low = lowest(points, normal_), &high = points.support(normal_);
-  const double above = normal_.dot(low) - height_, below = height_ - normal_.dot(high);
+  // Points are never below a half-space.
+  const Vector3d &low = points.support(-normal_), &high = is_half_space_ ? low : points.support(normal_);
+  const double above = normal_.dot(low) - height_, below = is_half_space_ ? -kFar : height_ - normal_.dot(high);
   gap.on_points = above > below ? low : high;
   gap.normal = above > below ? normal_ : Vector3d(-normal_);
   const double apart = std::max(above, below);
@@ -533,8 +516,8 @@ SeparationResult PlaneShape::gap(const PointSet& points, double) const {
 }
 
 ContactPoint PlaneShape::penetration(const PointSet& points, const SeparationResult&) const {
-  const Vector3d &low = lowest(points, normal_), &high = points.support(normal_);
-  const double up = height_ - normal_.dot(low), down = normal_.dot(high) - height_;
+  const Vector3d &low = points.support(-normal_), &high = is_half_space_ ? low : points.support(normal_);
+  const double up = height_ - normal_.dot(low), down = is_half_space_ ? kFar : normal_.dot(high) - height_;
   ContactPoint contact;
   contact.normal = up <= down ? normal_ : Vector3d(-normal_);
   contact.depth = std::max(std::min(up, down), 0.0);

@@ -217,23 +217,8 @@ class TriangleShape final : public SupportShape {
   Corners corners_;
 };
 
-/// What lies at or below a height along a unit normal: n.x <= height. Its box reaches as far as the region does.
-class HalfspaceShape final : public ConvexShape {
- public:
-  HalfspaceShape(const Eigen::Vector3d& normal, double height, const Sphere& region);
-
-  bool hasExactBox() const override { return true; }
-  SeparationResult gap(const PointSet& points, double cutoff) const override;
-  ContactPoint penetration(const PointSet& points, const SeparationResult& gap) const override;
-  std::optional<Eigen::Vector3d> point() const override { return std::nullopt; }
-
- private:
-  const Eigen::Vector3d normal_;
-  const double height_;
-};
-
-/// n.x == height.
-class PlaneShape final : public ConvexShape {
+/// n.x == height, for a unit normal. Its box reaches as far as the region does.
+class PlaneShape : public ConvexShape {
  public:
   PlaneShape(const Eigen::Vector3d& normal, double height, const Sphere& region);
 
@@ -242,9 +227,20 @@ class PlaneShape final : public ConvexShape {
   ContactPoint penetration(const PointSet& points, const SeparationResult& gap) const override;
   std::optional<Eigen::Vector3d> point() const override { return std::nullopt; }
 
+ protected:
+  /// What lies at or below the height; `floor` is where the box ends.
+  PlaneShape(const Eigen::Vector3d& normal, double height, const Sphere& region, double floor);
+
  private:
   const Eigen::Vector3d normal_;
   const double height_;
+  const bool is_half_space_;
+};
+
+/// n.x <= height.
+class HalfspaceShape final : public PlaneShape {
+ public:
+  HalfspaceShape(const Eigen::Vector3d& normal, double height, const Sphere& region);
 };
 
 }  // namespace bocst::query
