@@ -4,6 +4,7 @@
 // among scans (OFF files of the folder), random states, edges, clearance; then among 500 small objects. Both sides take
 // turns on the same states; prints times and ratios (above 1: bocst is faster), and compares all verdicts.
 #include <bocst/bocst.h>
+#include <bocst/io.h>
 #include <fcl/broadphase/broadphase_dynamic_AABB_tree.h>
 #include <fcl/broadphase/default_broadphase_callbacks.h>
 #include <fcl/geometry/bvh/BVH_model.h>
@@ -13,7 +14,7 @@
 #include <cstdlib>
 #include <ctime>
 #include <filesystem>
-#include <fstream>
+#include <memory>
 #include <set>
 #include <string>
 
@@ -32,27 +33,11 @@ double now() {
   return static_cast<double>(t.tv_sec) + 1e-9 * static_cast<double>(t.tv_nsec);
 }
 
-Raw readOff(const std::filesystem::path& file) {
-  std::ifstream in(file);
-  std::string word;
-  std::size_t vertices = 0, faces = 0, edges = 0;
-  in >> word >> vertices >> faces >> edges;
+Raw readMesh(const std::string& file) {
+  const std::shared_ptr<const Mesh> mesh = loadMesh(file);
   Raw raw;
-  for (std::size_t i = 0; i < vertices; ++i) {
-    Eigen::Vector3d v;
-    in >> v.x() >> v.y() >> v.z();
-    raw.vertices.push_back(v);
-  }
-  for (std::size_t i = 0; i < faces; ++i) {
-    std::size_t n = 0, a, b, c;
-    in >> n >> a >> b;
-    for (std::size_t k = 2; k < n; ++k, b = c) {
-      in >> c;
-      raw.triangles.emplace_back(a, b, c);
-    }
-    std::getline(in, word);
-  }
-  if (!in || raw.triangles.empty()) throw std::runtime_error("cannot read " + file.string());
+  raw.vertices = mesh->vertices();
+  for (std::size_t t = 0; t < mesh->triangleCount(); ++t) raw.triangles.push_back(mesh->triangle(t));
   return raw;
 }
 
@@ -409,7 +394,7 @@ int main(int argc, char** argv) {
     std::size_t triangles = 0;
     for (int turn = 0; turn < 2; ++turn) {
       for (const auto& file : files) {
-        arm.things.push_back(fitted(readOff(file), 0.3 + 0.3 * u(g)));
+        arm.things.push_back(fitted(readMesh(file), 0.3 + 0.3 * u(g)));
         triangles += arm.things.back().triangles.size();
         const double angle = 6.283 * u(g), distance = 0.55 + 0.5 * u(g), height = 1.3 * u(g) - 0.3;
         arm.X_WT.push_back(test::pose<double>(test::randomRotation(g),

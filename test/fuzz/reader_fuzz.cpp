@@ -2,14 +2,11 @@
 //
 // Any bytes as a mesh file of each format: loadMesh() gives a sound mesh, the same one twice, or says what is wrong.
 #include <bocst/io.h>
-#include <unistd.h>
 
-#include <cstdlib>
-#include <filesystem>
-#include <fstream>
 #include <sstream>
 
 #include "fuzz/fuzz.h"
+#include "temporary_folder.h"
 
 namespace bocst::fuzz {
 namespace {
@@ -19,24 +16,6 @@ const char* const kFormats[] = {"obj", "ply", "stl", "off", "dae"};
 struct Counts {
   std::uint64_t inputs = 0, meshes = 0;
 } counts;
-
-/// A folder of this process, gone with it.
-class Folder {
- public:
-  Folder() {
-    std::string name = (std::filesystem::temp_directory_path() / "bocst-fuzz-XXXXXX").string();
-    if (mkdtemp(name.data()) == nullptr) throw std::runtime_error("no temporary folder");
-    path_ = name;
-  }
-  ~Folder() {
-    std::error_code ignored;
-    std::filesystem::remove_all(path_, ignored);
-  }
-  const std::filesystem::path& path() const { return path_; }
-
- private:
-  std::filesystem::path path_;
-};
 
 std::shared_ptr<const Mesh> load(const std::string& file) {
   try {
@@ -115,12 +94,11 @@ const char* const kTokens[] = {"nan",
                                nullptr};
 
 void testOneInput(const std::uint8_t* data, std::size_t size) {
-  static const Folder folder;
+  static const test::TemporaryFolder folder;
   Bytes in(data, size);
   const std::string format = kFormats[in.below(static_cast<int>(std::size(kFormats)))];
-  const std::string file = (folder.path() / ("input." + format)).string();
-  std::ofstream(file, std::ios::binary)
-      .write(reinterpret_cast<const char*>(in.rest()), static_cast<std::streamsize>(in.left()));
+  const std::string file =
+      folder.write("input." + format, std::string(reinterpret_cast<const char*>(in.rest()), in.left()));
   ++counts.inputs;
   const std::shared_ptr<const Mesh> mesh = load(file);
   if (mesh == nullptr) return;

@@ -14,34 +14,21 @@
 #include <cstdlib>
 #include <cstring>
 #include <filesystem>
-#include <fstream>
 #include <limits>
 #include <stdexcept>
 #include <string>
 #include <utility>
 #include <vector>
 
+#include "temporary_folder.h"
+
 namespace bocst {
 namespace {
 
 namespace fs = std::filesystem;
 
-/// A folder of its own for each test, gone afterwards.
-class LoadMesh : public ::testing::Test {
+class LoadMesh : public ::testing::Test, protected test::TemporaryFolder {
  protected:
-  LoadMesh() {
-    std::string pattern = (fs::temp_directory_path() / "bocst_io_XXXXXX").string();
-    if (mkdtemp(pattern.data()) == nullptr) throw std::runtime_error("no temporary folder");
-    folder_ = pattern;
-  }
-  ~LoadMesh() override { fs::remove_all(folder_); }
-
-  std::string write(const std::string& name, const std::string& content) const {
-    const std::string file = (folder_ / name).string();
-    std::ofstream(file, std::ios::binary) << content;
-    return file;
-  }
-
   std::shared_ptr<const Mesh> load(const std::string& name, const std::string& content) const {
     return loadMesh(write(name, content));
   }
@@ -63,8 +50,6 @@ class LoadMesh : public ::testing::Test {
     const std::string what = complaint(write(name, content));
     EXPECT_NE(what.find(about), std::string::npos) << what;
   }
-
-  fs::path folder_;
 };
 
 void expectSquare(const Mesh& mesh) {

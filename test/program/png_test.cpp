@@ -3,12 +3,13 @@
 
 #include <gtest/gtest.h>
 
-#include <cstdlib>
 #include <filesystem>
 #include <fstream>
 #include <iterator>
 #include <stdexcept>
 #include <string>
+
+#include "temporary_folder.h"
 
 namespace bocst {
 namespace {
@@ -17,17 +18,7 @@ namespace fs = std::filesystem;
 using program::Pen;
 using program::Picture;
 
-class Png : public testing::Test {
- protected:
-  void SetUp() override {
-    std::string name = (fs::temp_directory_path() / "bocst_png.XXXXXX").string();
-    ASSERT_NE(mkdtemp(name.data()), nullptr);
-    folder_ = name;
-  }
-  void TearDown() override { fs::remove_all(folder_); }
-
-  fs::path folder_;
-};
+class Png : public testing::Test, protected test::TemporaryFolder {};
 
 const unsigned char* pixel(const Picture& picture, int x, int y) {
   cairo_surface_flush(picture.get());

@@ -18,10 +18,11 @@
 #include <regex>
 #include <set>
 #include <sstream>
-#include <stdexcept>
 #include <string>
 #include <utility>
 #include <vector>
+
+#include "temporary_folder.h"
 
 namespace bocst {
 namespace {
@@ -32,15 +33,8 @@ using Json = nlohmann::json;
 constexpr int kFailed = 1;
 constexpr int kUsage = 2;
 
-class Program : public ::testing::Test {
+class Program : public ::testing::Test, protected test::TemporaryFolder {
  protected:
-  Program() {
-    std::string pattern = (fs::temp_directory_path() / "bocst_program_XXXXXX").string();
-    if (mkdtemp(pattern.data()) == nullptr) throw std::runtime_error("no temporary folder");
-    folder_ = pattern;
-  }
-  ~Program() override { fs::remove_all(folder_); }
-
   struct Result {
     int code;
     std::string out;
@@ -88,12 +82,6 @@ class Program : public ::testing::Test {
     return {std::istreambuf_iterator<char>(stream), std::istreambuf_iterator<char>()};
   }
 
-  std::string write(const std::string& name, const std::string& content) const {
-    const std::string file = (folder_ / name).string();
-    std::ofstream(file, std::ios::binary) << content;
-    return file;
-  }
-
   static std::string model(const std::string& name) { return std::string("'") + BOCST_MODELS + "/" + name + ".obj'"; }
 
   /// The unit cube about the origin.
@@ -103,8 +91,6 @@ class Program : public ::testing::Test {
         "OFF\n8 6 0\n-.5 -.5 -.5\n.5 -.5 -.5\n.5 .5 -.5\n-.5 .5 -.5\n-.5 -.5 .5\n.5 -.5 .5\n.5 .5 .5\n-.5 .5 .5\n"
         "4 0 3 2 1\n4 4 5 6 7\n4 0 1 5 4\n4 1 2 6 5\n4 2 3 7 6\n4 3 0 4 7\n");
   }
-
-  fs::path folder_;
 };
 
 TEST_F(Program, CollidesTheModelsItComesWith) {

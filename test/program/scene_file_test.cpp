@@ -9,7 +9,6 @@
 #include <cmath>
 #include <cstdlib>
 #include <filesystem>
-#include <fstream>
 #include <random>
 #include <set>
 #include <stdexcept>
@@ -22,6 +21,7 @@
 #include "scene/ask_scene.h"
 #include "scene/scene_page.h"
 #include "scene/shape_mesh.h"
+#include "temporary_folder.h"
 
 namespace bocst {
 namespace {
@@ -59,24 +59,12 @@ void expectNear(const Isometry3d& X, const Isometry3d& wanted, const std::string
                                                                              << wanted.matrix();
 }
 
-class SceneFile : public ::testing::Test {
+class SceneFile : public ::testing::Test, protected test::TemporaryFolder {
  protected:
   SceneFile() {
-    std::string pattern = (fs::temp_directory_path() / "bocst_scene_XXXXXX").string();
-    if (mkdtemp(pattern.data()) == nullptr) throw std::runtime_error("no temporary folder");
-    folder_ = pattern;
     for (const char* name : {"ROS_PACKAGE_PATH", "AMENT_PREFIX_PATH"}) unsetenv(name);
     write("tetra.off", "OFF\n4 4 0\n0 0 0\n1 0 0\n0 1 0\n0 0 1\n3 0 2 1\n3 0 1 3\n3 1 2 3\n3 2 0 3\n");
   }
-  ~SceneFile() override { fs::remove_all(folder_); }
-
-  std::string write(const std::string& name, const std::string& text) const {
-    const fs::path file = folder_ / name;
-    fs::create_directories(file.parent_path());
-    std::ofstream(file) << text;
-    return file.string();
-  }
-
   std::string robot(const std::string& text) const {
     return write("robot.urdf", "<robot name='r'>\n" + text + "</robot>\n");
   }
@@ -105,8 +93,6 @@ class SceneFile : public ::testing::Test {
       }
     }
   }
-
-  fs::path folder_;
 };
 
 std::string link(const std::string& name, const std::string& geometry = "") {
