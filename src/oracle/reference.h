@@ -3,7 +3,15 @@
 
 #include <Eigen/Core>
 
+#include "lattice/lattice.h"
+
 namespace bocst::oracle {
+
+/// In lattice units.
+inline Eigen::Vector3d centerOf(const lattice::Cell& cell) {
+  const auto at = cell.corner();
+  return Eigen::Vector3d(at[0], at[1], at[2]).array() + cell.side() / 2.0;
+}
 
 /// Does the closed triangle meet the closed cube? A separating-axis test in double over the 13 axes. Rounding never
 /// separates what touches: the half side is kBoxRoundingMargin longer on box and edge axes, and the plane axis has a

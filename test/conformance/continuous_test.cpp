@@ -9,11 +9,13 @@
 #include "conformance/octrees.h"
 #include "conformance/reference.h"
 #include "conformance/shapes.h"
-#include "geometry/motion.h"
+#include "fcl/adapters/motion.h"
 
 namespace bocst {
 namespace {
 
+using fcl_adapter::motionOf;
+using fcl_adapter::poseAt;
 using test::Raw;
 
 /// Shapes and cells that are no farther apart may be said to touch, for FCL's solvers may say so at half of it.
@@ -24,35 +26,6 @@ constexpr fcl::CCDMotionType kTypes[] = {fcl::CCDM_TRANS, fcl::CCDM_LINEAR, fcl:
 template <typename S>
 fcl::Transform3<S> identity() {
   return fcl::Transform3<S>::Identity();
-}
-
-Eigen::Isometry3d isometry(const fcl::Transform3d& X) {
-  Eigen::Isometry3d Y = Eigen::Isometry3d::Identity();
-  Y.matrix() = X.matrix();
-  return Y;
-}
-
-/// A way between two poses as the walks take it, for sampling.
-template <typename S>
-std::unique_ptr<query::Motion> motionOf(const fcl::Transform3<S>& X, const fcl::Transform3<S>& Y,
-                                        fcl::CCDMotionType type) {
-  const Eigen::Isometry3d begin = isometry(X.template cast<double>()), end = isometry(Y.template cast<double>());
-  switch (type) {
-    case fcl::CCDM_TRANS:
-      return std::make_unique<query::AxisMotion>(query::translation(begin, end));
-    case fcl::CCDM_LINEAR:
-      return std::make_unique<query::AxisMotion>(query::interpolation(begin, end));
-    case fcl::CCDM_SCREW:
-      return std::make_unique<query::AxisMotion>(query::screw(begin, end));
-    default:
-      return std::make_unique<query::SplineMotion>(query::spline(begin, end));
-  }
-}
-
-template <typename S>
-fcl::Transform3<S> poseAt(const query::Motion& m, double t) {
-  const Eigen::Isometry3d X = m.at(t);
-  return test::pose<S>(X.linear(), X.translation());
 }
 
 fcl::Transform3d currentPose(const fcl::MotionBase<double>& m) {

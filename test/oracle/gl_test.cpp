@@ -32,12 +32,6 @@ std::shared_ptr<Thread> newThread(int major = 4) {
   return std::make_shared<Thread>(request);
 }
 
-Surface residentOn(Oracle& oracle, Surface surface) {
-  surface.device = oracle.makeResident(surface);
-  EXPECT_NE(surface.device, nullptr);
-  return surface;
-}
-
 // All cells of a level that are grey, grown by the oracle itself from lists that it keeps.
 std::vector<ExpansionRequest> grownFromKeptLists(Oracle& oracle, const Surface& surface, int levels) {
   std::vector<ExpansionRequest> level{rootOf(surface)};

@@ -23,13 +23,6 @@ namespace {
 using lattice::Cell;
 using lattice::Lattice;
 
-// Where the oracle works.
-Surface residentOn(Oracle& oracle, Surface surface) {
-  surface.device = oracle.makeResident(surface);
-  EXPECT_EQ(surface.device != nullptr, oracle.kind() != OracleKind::kCpu);
-  return surface;
-}
-
 // Is p, in lattice units, inside the bounds of the octant?
 bool contains(const bounds::NodeBounds& b, const Cell& cell, const Eigen::Vector3d& p, double relative = 1e-6) {
   const double side = cell.side(), tolerance = side * relative + 1e-9;
@@ -330,6 +323,26 @@ Eigen::AlignedBox3d boxOf(const Cell& cell) {
   return {centerOf(cell) - half, centerOf(cell) + half};
 }
 
+Cell parentOf(const Cell& octant) { return {octant.level - 1, {octant.at[0] / 2, octant.at[1] / 2, octant.at[2] / 2}}; }
+int indexOf(const Cell& octant) {
+  return static_cast<int>((octant.at[0] & 1) | (octant.at[1] & 1) << 1 | (octant.at[2] & 1) << 2);
+}
+
+/// Asks for each cell with one triangle, the first with that of id 2. The answers point into `ids`.
+std::vector<ExpansionRequest> askOneByOne(Oracle& oracle, const Surface& surface, const std::vector<Cell>& cells,
+                                          std::vector<std::uint32_t>& ids) {
+  ids.resize(cells.size());
+  std::vector<ExpansionRequest> batch(cells.size());
+  for (std::uint32_t i = 0; i < cells.size(); ++i) {
+    ids[i] = i + 2;
+    batch[i].surface = &surface;
+    batch[i].cell = cells[i];
+    batch[i].ids = &ids[i];
+    batch[i].count = 1;
+  }
+  return ask(oracle, std::move(batch));
+}
+
 TEST_P(EveryOracle, LongSliversThroughDeepCells) {
   std::mt19937_64 g(13);
   for (const int level : {4, 8, 12, 15, 16}) {
@@ -340,10 +353,11 @@ TEST_P(EveryOracle, LongSliversThroughDeepCells) {
       raw.triangles.emplace_back(raw.vertices.size() - 3, raw.vertices.size() - 2, raw.vertices.size() - 1);
     }
     constexpr std::uint32_t kCount = 600;
-    std::vector<Cell> octants;
+    std::vector<Cell> octants, parents;
     std::vector<Eigen::Vector3d> places;
     for (std::uint32_t t = 0; t < kCount; ++t) {
       octants.push_back(cellNearMiddle(level + 1, g));
+      parents.push_back(parentOf(octants.back()));
       places.push_back(placeIn(octants.back(), g));
       Eigen::Vector3d corners[3];
       sliverThrough(places.back(), t % 2 == 0 ? 16000 : std::min(16000u, 6 * octants.back().side()), g, corners);
@@ -351,20 +365,10 @@ TEST_P(EveryOracle, LongSliversThroughDeepCells) {
     }
     const Surface surface = residentOn(*oracle_, surfaceOf(raw));
     ASSERT_EQ(surface.lattice.unit(), 1);
-    std::vector<std::uint32_t> ids(kCount);
-    std::vector<ExpansionRequest> batch(kCount);
+    std::vector<std::uint32_t> ids;
+    const std::vector<ExpansionRequest> answers = askOneByOne(*oracle_, surface, parents, ids);
     for (std::uint32_t t = 0; t < kCount; ++t) {
-      ids[t] = t + 2;
-      const auto& at = octants[t].at;
-      batch[t].surface = &surface;
-      batch[t].cell = Cell{level, {at[0] / 2, at[1] / 2, at[2] / 2}};
-      batch[t].ids = &ids[t];
-      batch[t].count = 1;
-    }
-    const std::vector<ExpansionRequest> answers = ask(*oracle_, batch);
-    for (std::uint32_t t = 0; t < kCount; ++t) {
-      const auto& at = octants[t].at;
-      const int o = static_cast<int>((at[0] & 1) | (at[1] & 1) << 1 | (at[2] & 1) << 2);
+      const int o = indexOf(octants[t]);
       ASSERT_TRUE(answers[t].grey >> o & 1) << "level " << level << " triangle " << t;
       ASSERT_TRUE(contains(answers[t].octants.get(o), octants[t], places[t])) << "level " << level << " triangle " << t;
       ASSERT_TRUE(contains(answers[t].own, answers[t].cell, places[t])) << "level " << level << " triangle " << t;
@@ -401,10 +405,11 @@ TEST_P(EveryOracle, BoundsHoldWhatLiesBesideWholeBytes) {
   std::uniform_real_distribution<double> u(-1e-9, 1e-9);
   for (const int level : {1, 9}) {
     SingleTriangles triangles;
-    std::vector<Cell> octants;
+    std::vector<Cell> octants, parents;
     for (int i = 0; i < 500; ++i) {
       const Cell cell = level == 1 ? Cell{} : cellNearMiddle(level, g), octant = cell.octant(static_cast<int>(g() % 8));
       octants.push_back(octant);
+      parents.push_back(cell);
       const double side = octant.side();
       Eigen::Vector3d corners[3];
       for (Eigen::Vector3d& p : corners) {
@@ -422,20 +427,10 @@ TEST_P(EveryOracle, BoundsHoldWhatLiesBesideWholeBytes) {
     }
     const Surface surface = residentOn(*oracle_, surfaceOf(triangles.raw));
     ASSERT_EQ(surface.lattice.unit(), 1);
-    std::vector<std::uint32_t> ids(octants.size());
-    std::vector<ExpansionRequest> batch(octants.size());
+    std::vector<std::uint32_t> ids;
+    const std::vector<ExpansionRequest> answers = askOneByOne(*oracle_, surface, parents, ids);
     for (std::uint32_t i = 0; i < octants.size(); ++i) {
-      ids[i] = i + 2;
-      const auto& at = octants[i].at;
-      batch[i].surface = &surface;
-      batch[i].cell = Cell{level, {at[0] / 2, at[1] / 2, at[2] / 2}};
-      batch[i].ids = &ids[i];
-      batch[i].count = 1;
-    }
-    const std::vector<ExpansionRequest> answers = ask(*oracle_, batch);
-    for (std::uint32_t i = 0; i < octants.size(); ++i) {
-      const auto& at = octants[i].at;
-      const int o = static_cast<int>((at[0] & 1) | (at[1] & 1) << 1 | (at[2] & 1) << 2);
+      const int o = indexOf(octants[i]);
       ASSERT_TRUE(answers[i].grey >> o & 1);
       for (int k = 0; k < 3; ++k) {
         const Eigen::Vector3d p = surface.corner(i + 2, k);
@@ -466,16 +461,8 @@ TEST_P(EveryOracle, WhiteOctantsListNothing) {
     triangles.add(corners[0], corners[1], corners[2]);
   }
   const Surface surface = residentOn(*oracle_, surfaceOf(triangles.raw));
-  std::vector<std::uint32_t> ids(kCount);
-  std::vector<ExpansionRequest> batch(kCount);
-  for (std::uint32_t i = 0; i < kCount; ++i) {
-    ids[i] = i + 2;
-    batch[i].surface = &surface;
-    batch[i].cell = cells[i];
-    batch[i].ids = &ids[i];
-    batch[i].count = 1;
-  }
-  for (const ExpansionRequest& e : ask(*oracle_, batch)) {
+  std::vector<std::uint32_t> ids;
+  for (const ExpansionRequest& e : askOneByOne(*oracle_, surface, cells, ids)) {
     int grey = 0;
     for (int o = 0; o < 8; ++o) {
       ASSERT_EQ(e.grey >> o & 1, meets(surface, *e.ids, e.cell.octant(o))) << *e.ids;

@@ -2,6 +2,9 @@
 // What the tests of the oracles share.
 #pragma once
 
+#include <gtest/gtest.h>
+
+#include <memory>
 #include <vector>
 
 #include "meshes.h"
@@ -10,14 +13,19 @@
 
 namespace bocst::oracle {
 
-inline Surface surfaceOf(const test::Raw& raw, Subdivision s = Subdivision::kBono, double dimension = 0) {
-  const auto mesh = raw.mesh();
+inline Surface surfaceOf(const std::shared_ptr<const Mesh>& mesh, Subdivision s = Subdivision::kBono,
+                         double dimension = 0) {
   return {mesh, lattice::Lattice(mesh->bounds(), s, dimension)};
 }
+inline Surface surfaceOf(const test::Raw& raw, Subdivision s = Subdivision::kBono, double dimension = 0) {
+  return surfaceOf(raw.mesh(), s, dimension);
+}
 
-inline Eigen::Vector3d centerOf(const lattice::Cell& cell) {
-  const auto c = cell.corner();
-  return Eigen::Vector3d(c[0], c[1], c[2]).array() + cell.side() / 2.0;
+/// Where the oracle works.
+inline Surface residentOn(Oracle& oracle, Surface surface) {
+  surface.device = oracle.makeResident(surface);
+  EXPECT_EQ(surface.device != nullptr, oracle.kind() != OracleKind::kCpu);
+  return surface;
 }
 
 inline bool meets(const Surface& surface, std::uint32_t t, const lattice::Cell& cell, double more = 0) {

@@ -258,10 +258,7 @@ TEST_P(EveryTarget, NoTriangleIsLostThatMeetsAnOctant) {
         }
         // The whole octant, by the reference of the oracle: what it says is free may not be found too often.
         const lattice::Cell cell = c.cell.octant(o);
-        const auto corner = cell.corner();
-        const double half = cell.side() / 2.0;
-        const Eigen::Vector3d middle = Eigen::Vector3d(corner[0], corner[1], corner[2]).array() + half;
-        const bool free = !oracle::triangleMeetsCube(corners[i].data(), middle, half + 2);
+        const bool free = !oracle::triangleMeetsCube(corners[i].data(), oracle::centerOf(cell), cell.side() / 2.0 + 2);
         ++others;
         seen += free;
         needless += free && is_met;

@@ -9,20 +9,16 @@
 #include <random>
 #include <vector>
 
-#include "meshes.h"
+#include "oracle/surfaces.h"
 
 namespace bocst::tree {
 namespace {
 
 using Eigen::Vector3d;
+using oracle::surfaceOf;
 using Random = std::mt19937_64;
 
 double uniform(Random& g, double lo, double hi) { return std::uniform_real_distribution<double>(lo, hi)(g); }
-
-oracle::Surface surfaceOf(const test::Raw& raw) {
-  const auto mesh = raw.mesh();
-  return {mesh, lattice::Lattice(mesh->bounds(), Subdivision::kBono, 0)};
-}
 
 class Check {
  public:

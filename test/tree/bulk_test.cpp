@@ -9,11 +9,12 @@
 #include <numeric>
 #include <random>
 
-#include "meshes.h"
+#include "oracle/surfaces.h"
 
 namespace bocst::tree {
 namespace {
 
+using oracle::surfaceOf;
 using Random = std::mt19937_64;
 
 double uniform(Random& g, double lo, double hi) { return std::uniform_real_distribution<double>(lo, hi)(g); }
@@ -25,10 +26,6 @@ void randomBox(Random& g, double (&lo)[3], double (&hi)[3]) {
     lo[k] = uniform(g, 0, 65536 - extent);
     hi[k] = lo[k] + (g() % 8 == 0 ? 0 : extent);
   }
-}
-
-oracle::Surface surfaceOf(const std::shared_ptr<const Mesh>& mesh) {
-  return {mesh, lattice::Lattice(mesh->bounds(), Subdivision::kBono, 0)};
 }
 
 std::vector<std::shared_ptr<const Mesh>> hardMeshes() {

@@ -77,11 +77,6 @@ std::vector<Eigen::Vector3d> cornersOf(const Surface& surface, std::uint32_t t) 
   return {surface.corner(t, 0), surface.corner(t, 1), surface.corner(t, 2)};
 }
 
-Eigen::Vector3d centerOf(const lattice::Cell& cell) {
-  const auto at = cell.corner();
-  return Eigen::Vector3d(at[0], at[1], at[2]).array() + cell.side() / 2.0;
-}
-
 // Those of the ids that meet the octant, by the reference test.
 Ids meeting(const Surface& surface, const Ids& ids, const lattice::Cell& octant) {
   Ids met;
