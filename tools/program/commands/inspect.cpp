@@ -87,81 +87,51 @@ std::string watertightText(const Health& health) {
 
 std::string text(const Eigen::Vector3d& v) { return formatVector(v, 6, ", "); }
 
-/// The first few of a list, as text.
-template <typename T, typename Text>
-std::string firstFew(const std::vector<T>& all, const Text& text) {
-  constexpr std::size_t kShown = 3;
-  std::string few;
-  for (std::size_t i = 0; i < std::min(all.size(), kShown); ++i) few += (i > 0 ? ", " : "") + text(all[i]);
-  return few + (all.size() > kShown ? ", ..." : "");
+std::string text(const FaultyEdge& e) {
+  return std::to_string(e.vertices[0]) + "-" + std::to_string(e.vertices[1]) + " of triangle " +
+         std::to_string(e.triangles.front());
 }
+std::string text(std::uint32_t id) { return std::to_string(id); }
+
+constexpr std::size_t kShownFaults = 3;  ///< Of each kind.
 
 /// Rows that say where the faults are.
-void addFaults(Table& table, const Faults& faults) {
-  const auto edge = [](const FaultyEdge& e) {
-    return std::to_string(e.vertices[0]) + "-" + std::to_string(e.vertices[1]) + " of triangle " +
-           std::to_string(e.triangles.front());
-  };
-  const auto id = [](std::uint32_t i) { return std::to_string(i); };
-  const auto row = [&table](const char* name, const std::string& where) {
-    if (!where.empty()) table.row({name, where});
-  };
-  row("  open edges", firstFew(faults.open_edges, edge));
-  row("  non-manifold edges", firstFew(faults.non_manifold_edges, edge));
-  row("  flipped edges", firstFew(faults.flipped_edges, edge));
-  row("  degenerate triangles", firstFew(faults.degenerate_triangles, id));
-  row("  duplicate triangles", firstFew(faults.duplicate_triangles, id));
-  row("  repeated vertices", firstFew(faults.repeated_vertices, id));
-  row("  unused vertices", firstFew(faults.unused_vertices, id));
-}
-
-Json json(const std::vector<FaultyEdge>& edges) {
-  Json all = Json::array();
-  for (const FaultyEdge& edge : edges) all.push_back({{"vertices", edge.vertices}, {"triangles", edge.triangles}});
-  return all;
-}
-
-Json json(const Faults& faults) {
-  return {{"open_edges", json(faults.open_edges)},
-          {"non_manifold_edges", json(faults.non_manifold_edges)},
-          {"flipped_edges", json(faults.flipped_edges)},
-          {"degenerate_triangles", faults.degenerate_triangles},
-          {"duplicate_triangles", faults.duplicate_triangles},
-          {"repeated_vertices", faults.repeated_vertices},
-          {"unused_vertices", faults.unused_vertices}};
+void addFaults(Table& table, const Health& health) {
+  forEachFault(health, [&table](const std::string& name, std::size_t, const auto& all) {
+    std::string few;
+    for (std::size_t i = 0; i < std::min(all.size(), kShownFaults); ++i) few += (i > 0 ? ", " : "") + text(all[i]);
+    if (!few.empty()) table.row({"  " + name, few + (all.size() > kShownFaults ? ", ..." : "")});
+  });
 }
 
 /// What is wrong with a mesh, in words.
 std::string faultsText(const Health& health) {
   std::string text;
-  const auto add = [&text](std::size_t count, const char* what) {
-    if (count > 0) text += std::string(text.empty() ? "" : ", ") + what + " " + std::to_string(count);
-  };
-  add(health.open_edges, "open edges");
-  add(health.non_manifold_edges, "non-manifold edges");
-  add(health.flipped_edges, "flipped edges");
-  add(health.degenerate_triangles, "degenerate triangles");
-  add(health.duplicate_triangles, "duplicate triangles");
-  add(health.repeated_vertices, "repeated vertices");
-  add(health.unused_vertices, "unused vertices");
+  forEachFault(health, [&text](const std::string& name, std::size_t count, const auto&) {
+    if (count > 0) text += (text.empty() ? "" : ", ") + name + " " + std::to_string(count);
+  });
   return text.empty() ? "none" : text;
 }
 
+Json json(std::uint32_t id) { return id; }
+Json json(const FaultyEdge& edge) { return {{"vertices", edge.vertices}, {"triangles", edge.triangles}}; }
+
 Json json(const Health& health) {
+  Json result = {
+      {"watertight", health.watertight()}, {"oriented", health.oriented()}, {"components", health.components}};
+  Json faults;
+  forEachFault(health, [&](std::string name, std::size_t count, const auto& all) {
+    std::replace_if(
+        name.begin(), name.end(), [](char c) { return c == ' ' || c == '-'; }, '_');
+    result[name] = count;
+    faults[name] = Json::array();
+    for (const auto& fault : all) faults[name].push_back(json(fault));
+  });
   const bool has_volume = health.watertight() && health.oriented();
-  return {{"watertight", health.watertight()},
-          {"oriented", health.oriented()},
-          {"components", health.components},
-          {"open_edges", health.open_edges},
-          {"non_manifold_edges", health.non_manifold_edges},
-          {"flipped_edges", health.flipped_edges},
-          {"degenerate_triangles", health.degenerate_triangles},
-          {"duplicate_triangles", health.duplicate_triangles},
-          {"repeated_vertices", health.repeated_vertices},
-          {"unused_vertices", health.unused_vertices},
-          {"area", health.area},
-          {"volume", has_volume ? Json(health.volume) : Json()},
-          {"faults", json(health.faults)}};
+  result["area"] = health.area;
+  result["volume"] = has_volume ? Json(health.volume) : Json();
+  result["faults"] = faults;
+  return result;
 }
 
 struct Inspect {
@@ -272,7 +242,7 @@ struct Inspect {
     summary.row({"components", std::to_string(health.components)});
     summary.row({"watertight", watertightText(health)});
     summary.row({"faults", faultsText(health)});
-    addFaults(summary, health.faults);
+    addFaults(summary, health);
     summary.row({"area", formatNumber(health.area, 6)});
     if (health.watertight() && health.oriented()) summary.row({"volume", formatNumber(health.volume, 6)});
     summary.row({"tree", model.subdivision + ", depth " + std::to_string(model.depth) + ", oracle " + grown.oracle});

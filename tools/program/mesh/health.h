@@ -48,6 +48,18 @@ struct Health {
 
 Health healthOf(const Mesh& mesh);
 
+/// Calls f(name, number of all, the first ones) for each kind of fault.
+template <typename F>
+void forEachFault(const Health& health, F&& f) {
+  f("open edges", health.open_edges, health.faults.open_edges);
+  f("non-manifold edges", health.non_manifold_edges, health.faults.non_manifold_edges);
+  f("flipped edges", health.flipped_edges, health.faults.flipped_edges);
+  f("degenerate triangles", health.degenerate_triangles, health.faults.degenerate_triangles);
+  f("duplicate triangles", health.duplicate_triangles, health.faults.duplicate_triangles);
+  f("repeated vertices", health.repeated_vertices, health.faults.repeated_vertices);
+  f("unused vertices", health.unused_vertices, health.faults.unused_vertices);
+}
+
 /// What is to be marked where faults are shown: pairs of vertices, those of faulty edges and of the edges of degenerate
 /// and duplicate triangles.
 std::vector<std::pair<std::size_t, std::size_t>> faultLines(const Faults& faults, const Mesh& mesh);
