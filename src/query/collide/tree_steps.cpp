@@ -158,14 +158,13 @@ HWY_INLINE Popped pop(PairSteps& s) {
     p.own.node = tree::NodeRef::octant(top.own.index, static_cast<int>(o));
     p.own.ref = top.own.at != nullptr ? top.own.at->child[o].load(std::memory_order_acquire)
                                       : s.side[p.side]->childRef(p.own.node);
-    if (p.own.ref.tag() == tree::ChildRef::kImplicit && rest != 0 && soon != 0 &&
-        !(s.has_cells[p.side] && top.own.level == s.leaf_level[p.side])) {
+    p.own.level = top.own.level;
+    if (p.own.ref.tag() == tree::ChildRef::kImplicit && rest != 0 && soon != 0 && !isLeaf(s, p.side, p.own)) {
       top.late |= 1u << o;
       continue;
     }
     top.octants = rest;
     if (rest == 0) --s.depth;
-    p.own.level = top.own.level;
     p.own.lane = top.own.frame == BlockView::kNoFrame ? StepNode::kNoLane : 8 * top.own.frame + o;
     p.other.node = top.other.node;
     p.other.ref = top.other.ref;
