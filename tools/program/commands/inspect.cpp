@@ -40,6 +40,7 @@ void refuseTooLarge(const std::shared_ptr<const Mesh>& mesh, const Options& opti
   Modeld tree(mesh, options);
   tree.expandAll(kTried);
   const Statistics statistics = tree.statistics();
+  if (statistics.nodes_per_level.size() < kTried) return;  // --oracle sampled can miss the whole surface
   const auto nodes = static_cast<double>(statistics.resident_nodes);
   const double factor = static_cast<double>(statistics.nodes_per_level[kTried - 1]) /
                         static_cast<double>(statistics.nodes_per_level[kTried - 2]);
