@@ -135,7 +135,6 @@ bool collideTrees(const CollideQuery<S>& q, const TreeSide& a, const TreeSide& b
   constexpr std::size_t kAll = ~std::size_t{0};
   // Of slivers, a walk for contacts over blocks may take thousands of times as long as one over boxes to find nothing.
   const auto boxesPartAll = [&] {
-    constexpr std::size_t kMostSteps = 1024;
     if (q.endsAtFirst() || q.request.enable_cost || query::Turns::favourBoxes(a, b)) return false;
     if (!query::BoxSide::fits(a) || !query::BoxSide::fits(b)) return false;
     if (tree_a.boxPrice() + tree_b.boxPrice() > 0 || !query::BoxSide::build(a) || !query::BoxSide::build(b))
@@ -144,7 +143,7 @@ bool collideTrees(const CollideQuery<S>& q, const TreeSide& a, const TreeSide& b
     fcl::CollisionResult<S> result;
     query::WalkEnd end{};
     walkFor({q, request, result, q.margin, q.is_distance},
-            [&](MeshCollector<S>& collector) { end = walkBoxes(collector, kMostSteps); });
+            [&](MeshCollector<S>& collector) { end = walkBoxes(collector, query::Turns::kShort); });
     return !end.met && !end.gave_up;
   };
   if (query::TreeWalk::fits(a, b, near) && !isNeedle(tree_a) && !isNeedle(tree_b)) {

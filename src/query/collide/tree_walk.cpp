@@ -5,7 +5,7 @@ namespace bocst::query {
 namespace {
 
 // One walk in ten thousand of scans and robots' links tests more than 256 pairs of leaves without a hit.
-constexpr Turns::Limits kLimits = {64, 256, 1024, 1};
+constexpr Turns::Limits kLimits = {64, 256, Turns::kShort, 1};
 // The exact test of two triangles that float cannot tell apart takes as long as this many pairs of leaves.
 constexpr std::size_t kExactTest = 8;
 // Boxes and slabs of leaves leave few triangles to be tested, but of slivers all: so many pairs of triangles then take

@@ -33,18 +33,22 @@ class Turns {
     const std::size_t steps = 2 * std::size_t{std::min(last[0].steps, last[1].steps)};
     if (last[0].over_boxes != 0) {
       most_over_boxes_ = steps;
-      // Of slivers, a single pair of leaves takes longer than most walks over boxes.
-      if (price == 0 && kind == tree::Tree::Search::kYesOrNo) most_ = 0;
+      if (price == 0 && kind == tree::Tree::Search::kYesOrNo && favourBoxes(a, b)) most_ = 0;
     } else if (price == 0 && steps > 0) {
       most_ = std::max(most_, steps);
       follows_last_ = true;
     }
   }
 
-  /// Do two models have their boxes, and did the last long yes-or-no walk of both end over boxes?
+  /// A walk over boxes that is no longer than this.
+  static constexpr std::size_t kShort = 256;
+
+  /// Do two models have their boxes, and did the last long yes-or-no walk of both end over boxes, soon? So it is of
+  /// slivers: a single pair of their leaves takes longer than most walks over boxes.
   static bool favourBoxes(const TreeSide& a, const TreeSide& b) {
     const auto favours = [](const tree::Tree& tree) {
-      return tree.knownBoxes() != nullptr && tree.longSearch(tree::Tree::Search::kYesOrNo).over_boxes != 0;
+      const tree::Tree::LongSearch last = tree.longSearch(tree::Tree::Search::kYesOrNo);
+      return tree.knownBoxes() != nullptr && last.over_boxes != 0 && last.steps <= kShort;
     };
     return favours(a.tree()) && favours(b.tree());
   }
@@ -58,8 +62,8 @@ class Turns {
     if (steps > limits_.many) {
       for (const tree::Tree* tree : trees_) tree->payBoxRent(steps - limits_.many);
     }
-    // In a first turn, boxes were not tried.
-    if (!gave_up && (!is_first_ || follows_last_)) remember(0, steps);
+    // In a first turn, boxes were not tried; and a short walk says nothing.
+    if (!gave_up && steps > limits_.few && (!is_first_ || follows_last_)) remember(0, steps);
   }
   /// The walk over boxes ended.
   void endedOverBoxes(std::size_t steps) const { remember(1, steps); }

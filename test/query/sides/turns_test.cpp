@@ -77,12 +77,28 @@ TEST(Turns, WhatEndedTheLastLongSearchGetsMore) {
   EXPECT_EQ(pair.turns().mostOverBoxes(), 3500u);
   pair.turns().tookOverBlocks(300, false);
   EXPECT_EQ(pair.turns().most(), 600u) << "no longer than the last of these";
+  pair.turns().tookOverBlocks(40, false);
+  EXPECT_EQ(pair.turns().most(), 600u) << "but a short one says nothing";
 
   pair.a.setLongSearch(Search::kDistance, {1, 9000});
   EXPECT_EQ(pair.turns().most(), 64u) << "the two do not agree";
   EXPECT_EQ(pair.turns().mostOverBoxes(), 2048u);
   pair.b.setLongSearch(Search::kDistance, {1, 4000});
   EXPECT_EQ(pair.turns().mostOverBoxes(), 8000u) << "the lesser of both";
+}
+
+// A part that rests on a large face: walks over boxes are then much longer than those over blocks, and may still end.
+TEST(Turns, OnlyShortWalksOverBoxesComeFirst) {
+  Pair pair;
+  pair.buildBoxes();
+  const auto favours = [&] { return Turns::favourBoxes(pair.side_a, pair.side_b); };
+  EXPECT_FALSE(favours());
+  pair.turns(Search::kYesOrNo).endedOverBoxes(Turns::kShort);
+  EXPECT_TRUE(favours());
+  EXPECT_EQ(pair.turns(Search::kYesOrNo).most(), 0u);
+  pair.turns(Search::kYesOrNo).endedOverBoxes(Turns::kShort + 1);
+  EXPECT_FALSE(favours());
+  EXPECT_EQ(pair.turns(Search::kYesOrNo).most(), 64u);
 }
 
 TEST(Turns, BlocksGetNoMoreBeforeBoxesAreThere) {
