@@ -173,6 +173,57 @@ void OctantGapsOf(const PairFrames& g, int own, const Frame& f, const Frame& y, 
   }
 }
 
+// The square of the distance of boxes.
+HWY_INLINE V squareOfGap(const Vec3& low, const Vec3& high, const Vec3& lo, const Vec3& hi) {
+  const V zero = hn::Zero(D());
+  const V x = hn::Max(hn::Max(hn::Sub(low.x, hi.x), hn::Sub(lo.x, high.x)), zero);
+  const V y = hn::Max(hn::Max(hn::Sub(low.y, hi.y), hn::Sub(lo.y, high.y)), zero);
+  const V z = hn::Max(hn::Max(hn::Sub(low.z, hi.z), hn::Sub(lo.z, high.z)), zero);
+  return hn::MulAdd(x, x, hn::MulAdd(y, y, hn::Mul(z, z)));
+}
+
+void TriangleGaps(const PairFrames& g, const Frame& f, const TriangleBounds& b, std::size_t count, OctantGaps& gaps) {
+  const D d;
+  const V zero = hn::Zero(d), margin = hn::Set(d, 2 * g.slab_rounding_margin);
+  for (std::size_t i = 0; i < 8; i += hn::Lanes(d)) {
+    const Vec3 center = load(f.center[0], i), half = load(f.half[0], i), normal = load(f.normal[0], i);
+    const Vec3 low = sub(center, half),
+               high{hn::Add(center.x, half.x), hn::Add(center.y, half.y), hn::Add(center.z, half.z)};
+    const V slab_center = hn::Load(d, f.slab_center + i), slab_half = hn::Load(d, f.slab_half + i);
+    V nearest = hn::Set(d, 1e30f);
+    for (std::size_t t = 0; t < count; ++t) {
+      const auto along = [&](const float(&axis)[3][TriangleBounds::kCapacity], V& at) HWY_ATTR {
+        const Vec3 n = broadcast(axis[0][t], axis[1][t], axis[2][t]);
+        at = dot(n, center);
+        return intervalAlong(n, half, normal, slab_center, slab_half);
+      };
+      const auto inverseLength = [&](const float(&axis)[3][TriangleBounds::kCapacity]) HWY_ATTR {
+        const float square = axis[0][t] * axis[0][t] + axis[1][t] * axis[1][t] + axis[2][t] * axis[2][t];
+        return hn::Div(hn::Set(d, 1.0f), hn::Sqrt(hn::Set(d, square < 0.25f ? 1.0f : square)));
+      };
+      V at;
+      const Interval over = along(b.normal, at);
+      const V across =
+          hn::Mul(inverseLength(b.normal), hn::Max(hn::Sub(hn::Sub(hn::Set(d, b.normal_low[t]), at), over.hi),
+                                                   hn::Sub(hn::Add(at, over.lo), hn::Set(d, b.normal_high[t]))));
+      V beside = zero;
+      BOCST_UNROLL
+      for (int e = 0; e < 3; ++e) {
+        const Interval reach = along(b.edge[e], at);
+        const V gap = hn::Sub(hn::Add(at, reach.lo), hn::Set(d, b.edge_high[e][t]));
+        beside = hn::Max(beside, hn::Mul(inverseLength(b.edge[e]), gap));
+      }
+      const V over_plane = hn::Max(across, zero);
+      const V square = hn::MulAdd(over_plane, over_plane, hn::Mul(beside, beside));
+      const V of_boxes = squareOfGap(low, high, broadcast(b.low[0][t], b.low[1][t], b.low[2][t]),
+                                     broadcast(b.high[0][t], b.high[1][t], b.high[2][t]));
+      nearest = hn::Min(nearest, hn::Max(square, of_boxes));
+    }
+    const V gap = hn::Sub(hn::Mul(hn::Sqrt(nearest), hn::Set(d, 1 - 64 * 0x1p-24f)), margin);
+    hn::Store(hn::Max(hn::Load(d, gaps.at_least + i), gap), d, gaps.at_least + i);
+  }
+}
+
 // The largest gap along a direction between two triangles whose corners lie at `p` and `q` along it, times its length.
 HWY_INLINE V gapAlong(V p0, V p1, V p2, V q0, V q1, V q2) {
   return hn::Max(hn::Sub(min3(q0, q1, q2), max3(p0, p1, p2)), hn::Sub(min3(p0, p1, p2), max3(q0, q1, q2)));
@@ -181,15 +232,6 @@ HWY_INLINE V gapAlong(V p0, V p1, V p2, V q0, V q1, V q2) {
 HWY_INLINE V clampToUnit(V x) {
   const D d;
   return hn::Min(hn::Max(x, hn::Zero(d)), hn::Set(d, 1.0f));
-}
-
-// The square of the distance of boxes.
-HWY_INLINE V squareOfGap(const Vec3& low, const Vec3& high, const Vec3& lo, const Vec3& hi) {
-  const V zero = hn::Zero(D());
-  const V x = hn::Max(hn::Max(hn::Sub(low.x, hi.x), hn::Sub(lo.x, high.x)), zero);
-  const V y = hn::Max(hn::Max(hn::Sub(low.y, hi.y), hn::Sub(lo.y, high.y)), zero);
-  const V z = hn::Max(hn::Max(hn::Sub(low.z, hi.z), hn::Sub(lo.z, high.z)), zero);
-  return hn::MulAdd(x, x, hn::MulAdd(y, y, hn::Mul(z, z)));
 }
 
 // The rows' boxes and how far they reach along a direction, once for all lanes.
@@ -357,6 +399,7 @@ HWY_EXPORT(FillRootFrame);
 HWY_EXPORT(FillCenters);
 HWY_EXPORT(FillRootCenters);
 HWY_EXPORT(OctantGapsOf);
+HWY_EXPORT(TriangleGaps);
 HWY_EXPORT(NearPairs);
 
 void fillFrame(const PairFrames& geometry, int own, const tree::Block& block, Frame& frame) {
@@ -379,6 +422,11 @@ void fillCenters(const PairFrames& geometry, int own, const bounds::NodeBounds& 
 void octantGaps(const PairFrames& geometry, int own, const Frame& f, const Frame& y, std::size_t lane,
                 const FrameDirection& direction, OctantGaps& gaps) {
   HWY_DYNAMIC_DISPATCH(OctantGapsOf)(geometry, own, f, y, lane, direction, gaps);
+}
+
+void triangleGaps(const PairFrames& geometry, const Frame& f, const TriangleBounds& triangles, std::size_t count,
+                  OctantGaps& gaps) {
+  HWY_DYNAMIC_DISPATCH(TriangleGaps)(geometry, f, triangles, count, gaps);
 }
 
 std::size_t nearPairs(const TrianglePack& rows, const TrianglePack& lanes, const float direction[3], float cutoff,

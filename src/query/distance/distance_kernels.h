@@ -53,6 +53,17 @@ struct OctantGaps {
 void octantGaps(const PairFrames& geometry, int own, const Frame& f, const Frame& y, std::size_t lane,
                 const FrameDirection& direction, OctantGaps& gaps);
 
+/// Raises at_least of eight octants beside a leaf of the other side to the gap of the nearest of its
+/// triangles, whose bounds are in the frame of the octants, at most a pack of them: where these are large, the leaf's
+/// volume says little.
+///
+/// Along the axes, the triangle's normal and those of its edges in its plane. With M and u as at PairFrames, a gap
+/// along an axis of unit sum is off by 45 u M: a centre by 9, an extent and a slab's offset by 11, sums by 8, a bound
+/// by 1, the slab's normal by 16; such an axis is no shorter than 0.57. 2 * slab_rounding_margin, 320 u M, is taken
+/// off, and 64 u of the gap because axes are at right angles but for rounding.
+void triangleGaps(const PairFrames& geometry, const Frame& f, const TriangleBounds& triangles, std::size_t count,
+                  OctantGaps& gaps);
+
 /// Two triangles that may be the nearest.
 struct NearPair {
   float at_least;  ///< They are no nearer than this.

@@ -107,12 +107,11 @@ class DistanceWalk : private BestFirst<DistanceWalk<A, B>, A, B> {
       cornersOf(oriented(a_.volume(pair.a)), a_in_b_, corners);
       bound = b_.gap(pair.b, {corners, 8}, cutoff() * a_in_b_.scale).at_least * b_in_a_.scale;
     } else {
+      if (gaps_.has_value()) return false;  // gapsOf() has seen to it
       const bool leaf_a = a_.state(pair.a) == State::kLeaf, leaf_b = b_.state(pair.b) == State::kLeaf;
       if (leaf_a == leaf_b) return false;
       const double size_a = a_.size(pair.a), size_b = b_.size(pair.b) * b_in_a_.scale * b_in_a_.scale;
-      const double large = leaf_a ? size_a : size_b, small = leaf_a ? size_b : size_a;
-      // A node that is hardly larger than a tie would be left out for the first of its triangles.
-      if (large < kMuchLarger * small || small < kManyTies * tie_ * tie_) return false;
+      if (!isMuchLarger(leaf_a ? size_a : size_b, leaf_a ? size_b : size_a)) return false;
       bound = leaf_a ? boundOfLeaf(a_, pair.a, SimilarityTransform(), extentOfB(pair.b))
                      : boundOfLeaf(b_, pair.b, b_in_a_, extentOfA(pair.a));
     }
@@ -120,6 +119,12 @@ class DistanceWalk : private BestFirst<DistanceWalk<A, B>, A, B> {
     if (!(bound > pair.bound + 1e-9 * std::abs(pair.bound))) return false;
     this->push({bound, pair.a, pair.b});
     return true;
+  }
+
+  // Of the size of a leaf and that of a node of the other side, both squared: is the bound by triangles worth it? A
+  // node that is hardly larger than a tie would be left out for the first of its triangles.
+  bool isMuchLarger(double large, double small) const {
+    return large >= kMuchLarger * small && small >= kManyTies * tie_ * tie_;
   }
 
   double boundOfSpheres(const Pair& pair) const {
@@ -173,7 +178,17 @@ class DistanceWalk : private BestFirst<DistanceWalk<A, B>, A, B> {
 
   // Two trees have their bounds in SIMD.
   OctantGaps gapsOf(const Pair& pair, bool expands_a) {
-    return expands_a ? gaps_->ofOctants(0, pair.a, pair.b) : gaps_->ofOctants(1, pair.b, pair.a);
+    const int own = expands_a ? 0 : 1;
+    const tree::NodeRef x = expands_a ? pair.a : pair.b, y = expands_a ? pair.b : pair.a;
+    const State other = expands_a ? b_.state(y) : a_.state(y);
+    if (other == State::kLeaf && !spheres()) {
+      const double size_a = a_.size(pair.a), size_b = b_.size(pair.b) * b_in_a_.scale * b_in_a_.scale;
+      constexpr double kOctant = 0.25;  // of the size of a node, squared
+      if (isMuchLarger(expands_a ? size_b : size_a, kOctant * (expands_a ? size_a : size_b))) {
+        return gaps_->ofOctantsBeside(own, x, y);
+      }
+    }
+    return gaps_->ofOctants(own, x, y);
   }
   template <typename F>
   void children(const Pair& pair, bool expands_a, F&& f) const {
@@ -190,7 +205,7 @@ class DistanceWalk : private BestFirst<DistanceWalk<A, B>, A, B> {
         const OctantGaps gaps = gapsOf(pair, expands_a);
         children(pair, expands_a, [&](int o, tree::NodeRef a, tree::NodeRef b) {
           limit_ = std::min(limit_, double{gaps.at_most[o]});
-          const Pair child{gaps.at_least[o], a, b};
+          const Pair child{std::max(pair.bound, double{gaps.at_least[o]}), a, b};
           // The distance of two spheres costs less than a place on the heap.
           if (spheres() && a_.state(a) == State::kLeaf && b_.state(b) == State::kLeaf) {
             if (worthIt(child.bound)) leaves(child);

@@ -11,16 +11,26 @@ constexpr double kHalfDiagonal = 0.8660254037844387;  // of a cube of side 1
 
 }  // namespace
 
+/// The triangles of a leaf in the frame of the other side, as triangleGaps() sees them.
+struct TreeGaps::LargeLeaf {
+  tree::NodeRef leaf;
+  std::size_t count = 0;  // nothing is held when it is 0
+  TriangleBounds bounds;
+};
+
 /// Frames and corners of one thread. Pairs come best first, so what was used lately is often used again.
 struct TreeGaps::Scratch {
   static constexpr std::size_t kFrames = 64;
   static constexpr std::size_t kLeaves = 16;
+  static constexpr std::size_t kLargeLeaves = 8;
   static constexpr std::uint32_t kNoBlock = 0xffffffff;
 
   std::uint32_t blocks[2][kFrames];
   Frame frames[2][kFrames];
   Frame roots[2];
   LeafCorners<TreeSide> corners[2][kLeaves];
+  LargeLeaf large[2][kLargeLeaves];
+  RawTriangles raw, placed;
   TrianglePack packs[2];
   NearPair found[TrianglePack::kCapacity * TrianglePack::kCapacity];
   std::vector<Candidate> candidates;
@@ -49,6 +59,7 @@ TreeGaps::TreeGaps(const TreeSide& a, const TreeSide& b, const SimilarityTransfo
       fillFrame(geometry_, side, root, s.roots[side]);
     }
     for (LeafCorners<TreeSide>& leaf : s.corners[side]) leaf.clear();
+    for (LargeLeaf& leaf : s.large[side]) leaf.count = 0;
   }
   doubt_ += 4 * static_cast<double>(geometry_.slab_rounding_margin);
 }
@@ -101,6 +112,32 @@ OctantGaps TreeGaps::ofOctants(int own, tree::NodeRef x, tree::NodeRef y) {
   if (radii_ > 0) {
     for (float& gap : gaps.at_least) gap = std::max(gap * (1 - 0x1p-22f) - radii_, 0.0f);
   }
+  return gaps;
+}
+
+const TreeGaps::LargeLeaf& TreeGaps::largeLeaf(int side, tree::NodeRef leaf) {
+  constexpr double kNowhere = 1e30;
+  Scratch& s = scratch();
+  LargeLeaf& large = s.large[side][leaf.bits % Scratch::kLargeLeaves];
+  if (large.count != 0 && large.leaf == leaf) return large;
+  const tree::TriangleList list = side_[side]->triangles(leaf);
+  large.leaf = leaf;
+  large.count = list.count;
+  const std::uint32_t all = ~0u >> (TriangleBounds::kCapacity - large.count);
+  readCorners(*side_[side], list.ids, all, s.raw);
+  const SimilarityTransform in_other = side == 1 ? b_in_a_ : b_in_a_.inverse();
+  const PackTransform place = packTransform(*side_[side], in_other, Eigen::Vector3d::Constant(lattice::kMiddle), 1);
+  boundTriangles(s.raw, all, place, static_cast<double>(geometry_.side[1 - side].unit), kNowhere, s.placed,
+                 large.bounds);
+  return large;
+}
+
+OctantGaps TreeGaps::ofOctantsBeside(int own, tree::NodeRef x, tree::NodeRef y) {
+  OctantGaps gaps = ofOctants(own, x, y);
+  const std::size_t count = side_[1 - own]->triangleCount(y);
+  if (count > TriangleBounds::kCapacity) return gaps;
+  const LargeLeaf& large = largeLeaf(1 - own, y);
+  triangleGaps(geometry_, frame(own, side_[own]->block(x)), large.bounds, large.count, gaps);
   return gaps;
 }
 

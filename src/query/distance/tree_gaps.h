@@ -24,6 +24,9 @@ class TreeGaps {
   /// The gaps between the octants of an inner node x of side `own` and a node y of the other side.
   OctantGaps ofOctants(int own, tree::NodeRef x, tree::NodeRef y);
 
+  /// The same with the triangles of y, a leaf of exact answers that is much larger than the octants of x.
+  OctantGaps ofOctantsBeside(int own, tree::NodeRef x, tree::NodeRef y);
+
   /// The same of two nodes in double, where a side answers conservatively: up to kExtentRounding of the sizes, which is
   /// taken off. `direction` and `cutoff`: see distanceBound().
   double ofSpheres(tree::NodeRef a, tree::NodeRef b, const Eigen::Vector3d& direction, double cutoff) const;
@@ -40,11 +43,13 @@ class TreeGaps {
   const std::vector<Candidate>& ofTriangles(tree::NodeRef leaf_a, tree::NodeRef leaf_b, double cutoff);
 
  private:
+  struct LargeLeaf;
   struct Scratch;
   static Scratch& scratch();
 
   LeafCells leavesOf(int side) const;
   NodeExtent extentOf(int side, tree::NodeRef node, double& radii) const;
+  const LargeLeaf& largeLeaf(int side, tree::NodeRef leaf);
   const Frame& frame(int side, std::uint32_t block);
   const Frame& frameOf(int side, tree::NodeRef node, std::size_t& lane);
 
