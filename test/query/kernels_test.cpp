@@ -875,6 +875,65 @@ TEST_P(EveryTarget, GapsOfOctantsHoldTheDistancesOfTheirPoints) {
   EXPECT_GT(close, compared / 10) << "bounds of nothing prove nothing";
 }
 
+// The triangles lie in the frame of the octants' side. Some are segments or points, some are as large as all of it.
+TEST_P(EveryTarget, GapsToTrianglesAreNoMoreThanTheDistancesOfPoints) {
+  std::mt19937_64 g(24);
+  std::uniform_real_distribution<double> u(-1, 1);
+  int compared = 0, close = 0;
+  for (int round = 0; round < 20000; ++round) {
+    const int own = static_cast<int>(g() % 2);
+    lattice::Cell cell;
+    cell.level = 1 + static_cast<int>(g() % 14);
+    for (auto& x : cell.at) x = static_cast<std::uint32_t>(g() % (1u << (cell.level - 1)));
+    tree::Block block;
+    block.setCell(cell);
+    for (int o = 0; o < 8; ++o) block.octants.set(o, randomBounds(g));
+    const int o = static_cast<int>(g() % 8);
+    const auto corner = cell.octant(o).corner();
+    Eigen::Vector3d point;
+    if (!randomPoint(g, block.octants.get(o), Eigen::Vector3d(corner[0], corner[1], corner[2]), cell.octant(o).side(),
+                     point)) {
+      continue;
+    }
+    SimilarityTransform to;
+    to.rotation = test::randomRotation(g);
+    to.scale = std::pow(2.0, 9 * u(g));
+    to.translation = test::randomDirection(g) * 3e4;
+    to.ready();
+    const PairFrames geometry(to);
+    const auto unit = static_cast<double>(geometry.side[own].unit);
+
+    const std::size_t count = 1 + g() % TriangleBounds::kCapacity;
+    RawTriangles raw{}, placed;
+    double distance = std::numeric_limits<double>::infinity();
+    const Eigen::Vector3d middle = point + test::randomDirection(g) * std::pow(10.0, 2 + 2.5 * u(g));
+    for (std::size_t t = 0; t < count; ++t) {
+      Corners corners;
+      const double size = std::pow(10.0, 2.5 + 2 * u(g));
+      for (Eigen::Vector3d& c : corners) c = middle + size * Eigen::Vector3d(u(g), u(g), u(g));
+      if (t % 7 == 5) corners[2] = corners[0] + u(g) * (corners[1] - corners[0]);
+      if (t % 11 == 6) corners[1] = corners[2] = corners[0];
+      distance = std::min(distance, (closestPoint(point, corners) - point).norm());
+      for (std::size_t k = 0; k < 9; ++k) raw.xyz[k][t] = corners[k / 3][static_cast<Eigen::Index>(k % 3)];
+    }
+    PackTransform place{};
+    for (int k = 0; k < 3; ++k) place.linear[k][k] = 1, place.offset[k] = -lattice::kMiddle;
+    TriangleBounds bounds;
+    boundTriangles(raw, ~0u >> (TriangleBounds::kCapacity - count), place, unit, 1e30, placed, bounds);
+
+    Frame frame;
+    fillFrame(geometry, own, block, frame);
+    OctantGaps gaps{};
+    triangleGaps(geometry, frame, bounds, count, gaps);
+    ASSERT_LE(gaps.at_least[o], unit * distance) << "round " << round;
+    for (int i = 0; i < 8; ++i) ASSERT_LT(gaps.at_least[i], 1e9f);
+    ++compared;
+    close += gaps.at_least[o] > 0.5 * unit * distance;
+  }
+  EXPECT_GT(compared, 10000);
+  EXPECT_GT(close, compared / 10) << "bounds of nothing prove nothing";
+}
+
 // The centre of the sphere about each leaf that meets the surface, wherever the actual regions end.
 TEST_P(EveryTarget, FramesOfCentersHoldThoseOfAllLeaves) {
   std::mt19937_64 g(23);

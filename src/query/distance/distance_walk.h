@@ -428,7 +428,7 @@ inline Nearest findNearest(const TreeSide& a, const TreeSide& b, const Similarit
   DistanceWalk<TreeSide, TreeSide> trees(a, b, b_in_a);
   if (!BoxSide::fits(a) || !BoxSide::fits(b)) return trees.run(goal);
   Nearest nearest;
-  for (Turns turns(a, b, tree::Tree::Search::kDistance, {64, 1024, 1024, 4});; turns.next()) {
+  for (Turns turns(a, b, tree::Tree::Search::kDistance, {256, 1024, 1024, 4});; turns.next()) {
     nearest = trees.run(goal, nearest, turns.most());
     turns.tookOverBlocks(trees.steps(), trees.gaveUp());
     if (!trees.gaveUp()) return nearest;
