@@ -170,6 +170,40 @@ TYPED_TEST(Distance, BesideMuchLargerTriangles) {
   EXPECT_GT(apart, 5);
 }
 
+// A part in a room of posts and panels: their leaves are as large as the room. Some panels lie there forty times.
+TYPED_TEST(Distance, BetweenWallsAndPosts) {
+  using S = TypeParam;
+  Raw room = test::box({-4, -4, -0.1}, {4, 4, 0});
+  for (int i = 0; i < 8; ++i) {
+    const double x = i - 3.5, y = i % 3 - 1.2;
+    room.add(test::box({x, y, 0}, {x + 0.02, y + 0.05, 4}));
+    room.add(test::box({x, -4, 0.4 * i}, {x + 0.9, 4, 0.4 * i + 0.01}));
+  }
+  Raw heap = room;
+  for (int i = 0; i < 40; ++i) heap.addTriangle({-4, -4, 5}, {4, -4, 5}, {-4, 4, 5});
+  Raw part = test::torus(16, 0.3);
+  part.scale(0.25);
+  const Model<S> b(part.mesh());
+  const double rounding = std::is_same<S, double>::value ? 1e-12 : 1e-5;
+  std::mt19937_64 g(20);
+  std::uniform_real_distribution<double> u(-1, 1);
+  for (const Raw& raw : {room, heap}) {
+    const Model<S> a(raw.mesh());
+    int apart = 0;
+    for (int i = 0; i < 30; ++i) {
+      const Eigen::Matrix3d turn = test::randomRotation(g);
+      const auto X = test::pose<S>(turn, test::randomDirection(g));
+      const Eigen::Vector3d at(3 * u(g), 3 * u(g), 2.5 + 2.4 * u(g));
+      const auto Y = test::pose<S>(test::randomRotation(g), turn * at + X.translation().template cast<double>());
+      const double expected = bruteForce<S>(raw, X, part, Y);
+      apart += expected > 0;
+      EXPECT_NEAR(ask<S>(a, X, b, Y).min_distance, expected, rounding) << i;
+      EXPECT_NEAR(ask<S>(b, Y, a, X).min_distance, expected, rounding) << i;
+    }
+    EXPECT_GT(apart, 10);
+  }
+}
+
 TEST(DistanceDouble, SignedOfWhatIsInsideASolid) {
   Options options;
   options.solid = true;
