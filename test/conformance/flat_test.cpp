@@ -313,7 +313,7 @@ TEST(FlatWork, ATurnThatGivesUpIsNoAnswer) {
   std::mt19937_64 g(3);
   std::uniform_real_distribution<double> height(0, 2e-3);
   for (int round = 0; round < 8; ++round) {
-    Raw first = plate(40), second = plate(40);
+    Raw first = plate(90), second = plate(90);
     for (Raw* raw : {&first, &second}) {
       for (Vector3d& v : raw->vertices) v.z() = height(g);
     }
@@ -322,7 +322,7 @@ TEST(FlatWork, ATurnThatGivesUpIsNoAnswer) {
     const query::SimilarityTransform to = relative(a, b, above<double>(0.1, 0.3));
     query::DistanceWalk<query::TreeSide, query::TreeSide> walk(side_a, side_b, to);
     const double expected = walk.run({}).distance;
-    EXPECT_GT(walk.steps(), 64u);
+    EXPECT_GT(walk.steps(), 256u) << "or the turns below do not give up";
     a.tree.boxes(0);
     b.tree.boxes(0);
     EXPECT_NEAR(query::findNearest(side_a, side_b, to, {}).distance, expected, 1e-11 * expected);
