@@ -91,7 +91,7 @@ class TriangleLists {
   void swap(TriangleLists& other) { words_.swap(other.words_); }
 
  private:
-  using Words = memory::Pool<std::uint32_t, 10>;
+  using Words = memory::Pool<std::uint32_t, 8>;
 
   // A list is flags and a length, then the numbers: all as they are or, narrow, the least and 16-bit steps from it;
   // packed, then PackedTriangles. On a device: flags and length, then the Place.

@@ -54,7 +54,7 @@ TEST(TriangleLists, NearNumbersTakeTwoBytes) {
     ids[500] = 1;
     far.add(ids.data(), ids.size());
   }
-  EXPECT_LT(near.bytes(), 1.1 * 2 * 200 * 1000);
+  EXPECT_LT(near.bytes(), 1.15 * 2 * 200 * 1000);
   EXPECT_GT(far.bytes(), 4 * 200 * 1000);
 }
 
