@@ -24,9 +24,9 @@ namespace {
 // Growth by parts costs some four times as much a triangle as building all at once, the wider walks between bounds that
 // are still loose included; `bench --scenarios fresh` is the same to 5 % from 6 to 16.
 constexpr std::size_t kRent = 8;
-// Queries grow parts for longer while the helper thread builds; should it not come to it, a query still builds the
-// tree.
-constexpr std::size_t kRentAhead = 1;
+// While the helper thread builds, small queries grow parts for as long as one triangle takes to pay this often; should
+// it not come to it, a query still builds the tree.
+constexpr std::size_t kRentAhead = 4;
 // A whole tree with the corners of its leaves takes about this many bytes a triangle, of a soup at most.
 constexpr std::size_t kPackedBytes = 24;
 // What a thread keeps of a build's memory for the next one, in triangles.
@@ -193,7 +193,7 @@ bool Tree::buildNow() {
   if (!lock.owns_lock() || !isBuildDue()) return false;
   if (is_ahead_build_due_) {
     is_ahead_build_due_ = false;
-    price_ = surface_.triangle_count / kRentAhead;
+    price_ = surface_.triangle_count * kRentAhead;
     askForAheadBuild();
     return false;
   }
