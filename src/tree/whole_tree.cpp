@@ -24,9 +24,9 @@ namespace {
 // Growth by parts costs some four times as much a triangle as building all at once, the wider walks between bounds that
 // are still loose included; `bench --scenarios fresh` is the same to 5 % from 6 to 16.
 constexpr std::size_t kRent = 8;
-// While the helper thread builds, small queries grow parts for as long as one triangle takes to pay this often; should
-// it not come to it, a query still builds the tree.
-constexpr std::size_t kRentAhead = 4;
+// While the helper thread builds, queries grow parts, which soon have what they need: then a walk pays more than it
+// costs. Should the thread not come to it, a query still builds the tree, after about half as many walks as triangles.
+constexpr std::size_t kRentAhead = 32;
 // A whole tree with the corners of its leaves takes about this many bytes a triangle, of a soup at most.
 constexpr std::size_t kPackedBytes = 24;
 // What a thread keeps of a build's memory for the next one, in triangles.
