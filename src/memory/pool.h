@@ -19,7 +19,8 @@ class Pool {
  public:
   static constexpr std::size_t kMost = std::size_t{1} << 30;  ///< a ChildRef has thirty bits.
   static constexpr std::size_t kChunk = std::size_t{1} << kChunkBits;
-  /// It grows by the 16th part, but by few enough bytes to keep one append() fast; while it is small, to twice its size.
+  /// It grows by the 16th part, but by few enough bytes to keep one append() fast; while it is small, to twice its
+  /// size.
   static constexpr std::size_t kShare = 16, kLargestShare = 1 << 16, kSmall = 1 << 12;
 
   T& operator[](std::uint32_t i) { return chunk(i)[i & (kChunk - 1)]; }
@@ -35,8 +36,8 @@ class Pool {
       throw std::length_error("bocst: a tree of more than 2^30 nodes or list entries");
     }
     if (!fits) {
-      const std::size_t share = std::max(std::min(capacity_ / kShare, kLargestShare / sizeof(T)),
-                                         std::min(capacity_, kSmall / sizeof(T)));
+      const std::size_t share =
+          std::max(std::min(capacity_ / kShare, kLargestShare / sizeof(T)), std::min(capacity_, kSmall / sizeof(T)));
       size_ = static_cast<std::uint32_t>(capacity_);
       grow((std::max(count, share) + kChunk - 1) / kChunk);
     }
