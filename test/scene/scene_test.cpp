@@ -674,6 +674,8 @@ TYPED_TEST(SceneTest, ClearanceIsTheLeastDistance) {
   for (std::size_t i = 0; i < 25; ++i) w.fix(geometry<S>(i % 3 == 2 ? 6 : 0, g), randomPose<S>(g, 3));
   for (const std::size_t kind : {0, 1, 8}) w.move(geometry<S>(kind, g));
   w.ignore(w.moving[0].id, w.fixed[4].id);
+  // FCL's own distance of a mesh and a shape depends on values that it has not set.
+  for (std::size_t i = 2; i < 25; i += 3) w.ignore(w.moving[2].id, w.fixed[i].id);
   const double tolerance = std::is_same<S, double>::value ? 1e-5 : 1e-4;  // of FCL's pairs
   int near = 0, apart = 0;
   for (int k = 0; k < 60; ++k) {
