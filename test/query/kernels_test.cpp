@@ -820,6 +820,16 @@ TEST_P(EveryTarget, PackedCornersAreWhereTheMeshHasThem) {
   EXPECT_LT(too_small, 150);
 }
 
+// Makes it the block of some cell, which is returned, with some octants.
+lattice::Cell fillRandomly(std::mt19937_64& g, tree::Block& block) {
+  lattice::Cell cell;
+  cell.level = 1 + static_cast<int>(g() % 14);
+  for (auto& x : cell.at) x = static_cast<std::uint32_t>(g() % (1u << (cell.level - 1)));
+  block.setCell(cell);
+  for (int o = 0; o < 8; ++o) block.octants.set(o, randomBounds(g));
+  return cell;
+}
+
 TEST_P(EveryTarget, GapsOfOctantsHoldTheDistancesOfTheirPoints) {
   std::mt19937_64 g(21);
   std::uniform_real_distribution<double> u(-1, 1);
@@ -830,11 +840,7 @@ TEST_P(EveryTarget, GapsOfOctantsHoldTheDistancesOfTheirPoints) {
     int octants[2];
     bool found = true;
     for (int side = 0; side < 2 && found; ++side) {
-      lattice::Cell cell;
-      cell.level = 1 + static_cast<int>(g() % 14);
-      for (auto& x : cell.at) x = static_cast<std::uint32_t>(g() % (1u << (cell.level - 1)));
-      blocks[side].setCell(cell);
-      for (int o = 0; o < 8; ++o) blocks[side].octants.set(o, randomBounds(g));
+      const lattice::Cell cell = fillRandomly(g, blocks[side]);
       octants[side] = static_cast<int>(g() % 8);
       const lattice::Cell octant = cell.octant(octants[side]);
       const auto corner = octant.corner();
@@ -882,12 +888,8 @@ TEST_P(EveryTarget, GapsToTrianglesAreNoMoreThanTheDistancesOfPoints) {
   int compared = 0, close = 0;
   for (int round = 0; round < 20000; ++round) {
     const int own = static_cast<int>(g() % 2);
-    lattice::Cell cell;
-    cell.level = 1 + static_cast<int>(g() % 14);
-    for (auto& x : cell.at) x = static_cast<std::uint32_t>(g() % (1u << (cell.level - 1)));
     tree::Block block;
-    block.setCell(cell);
-    for (int o = 0; o < 8; ++o) block.octants.set(o, randomBounds(g));
+    const lattice::Cell cell = fillRandomly(g, block);
     const int o = static_cast<int>(g() % 8);
     const auto corner = cell.octant(o).corner();
     Eigen::Vector3d point;
@@ -939,12 +941,8 @@ TEST_P(EveryTarget, FramesOfCentersHoldThoseOfAllLeaves) {
   std::mt19937_64 g(23);
   int compared = 0, tight = 0;
   for (int round = 0; round < 20000; ++round) {
-    lattice::Cell cell;
-    cell.level = 1 + static_cast<int>(g() % 14);
-    for (auto& x : cell.at) x = static_cast<std::uint32_t>(g() % (1u << (cell.level - 1)));
     tree::Block block;
-    block.setCell(cell);
-    for (int o = 0; o < 8; ++o) block.octants.set(o, randomBounds(g));
+    const lattice::Cell cell = fillRandomly(g, block);
     const int o = static_cast<int>(g() % 8);
     const lattice::Cell octant = cell.octant(o);
     const Eigen::Vector3d corner(octant.corner()[0], octant.corner()[1], octant.corner()[2]);

@@ -12,6 +12,7 @@
 #include "every_target.h"
 #include "geometry/triangle.h"
 #include "meshes.h"
+#include "query/collide/cell_tree.h"
 #include "query/collide/tree_walk.h"
 
 namespace bocst::query {
@@ -60,42 +61,17 @@ class Found : public Visitor {
   Cut cut_;
 };
 
-std::unique_ptr<tree::Tree> treeOf(const std::shared_ptr<const Mesh>& mesh, Answer answer, Subdivision subdivision,
-                                   int depth) {
-  Options options;
-  options.answer = answer;
-  options.subdivision = subdivision;
-  options.depth = depth;
-  options.ttl = std::chrono::milliseconds(0);
-  return std::make_unique<tree::Tree>(mesh, options);
-}
-
-struct Cells {
-  Cells(const test::Raw& raw, Subdivision subdivision, int depth)
-      : mesh(raw.mesh()),
-        whole(treeOf(mesh, Answer::kConservative, subdivision, depth)),
-        lazy(treeOf(mesh, Answer::kConservative, subdivision, depth)) {
-    whole->expandAll(depth);
-    collect(TreeSide(*whole), tree::NodeRef());
-  }
-
-  std::shared_ptr<const Mesh> mesh;
-  std::unique_ptr<tree::Tree> whole, lazy;
-  std::vector<CellLeaf> leaves;
-
- private:
-  void collect(const TreeSide& side, tree::NodeRef node) {
-    if (side.state(node) == State::kLeaf) {
-      leaves.push_back({side.cellId(node), side.cellSphere(node)});
-    } else {
-      side.children(node, [&](tree::NodeRef child) { collect(side, child); });
-    }
-  }
+struct Cells : test::CellTree {
+  using CellTree::CellTree;
+  std::unique_ptr<tree::Tree> lazy = fresh();
 };
 
 struct Triangles {
-  explicit Triangles(const test::Raw& raw)
-      : mesh(raw.mesh()), lazy(treeOf(mesh, Answer::kExact, Subdivision::kBono, 8)) {}
+  explicit Triangles(const test::Raw& raw) : mesh(raw.mesh()) {
+    Options options;
+    options.ttl = std::chrono::milliseconds(0);
+    lazy = std::make_unique<tree::Tree>(mesh, options);
+  }
 
   std::shared_ptr<const Mesh> mesh;
   std::unique_ptr<tree::Tree> lazy;

@@ -12,6 +12,7 @@
 
 #include "every_target.h"
 #include "meshes.h"
+#include "query/collide/cell_tree.h"
 
 namespace bocst::query {
 namespace {
@@ -45,40 +46,7 @@ class Cells : public Visitor {
   const bool ends_at_first_;
 };
 
-std::unique_ptr<tree::Tree> conservative(const std::shared_ptr<const Mesh>& mesh, Subdivision subdivision, int depth) {
-  Options options;
-  options.answer = Answer::kConservative;
-  options.subdivision = subdivision;
-  options.depth = depth;
-  options.ttl = std::chrono::milliseconds(0);
-  return std::make_unique<tree::Tree>(mesh, options);
-}
-
-// A tree, grown as far as it may be, and its leaves.
-struct Model {
-  Model(const test::Raw& raw, Subdivision subdivision_, int depth_)
-      : mesh(raw.mesh()), subdivision(subdivision_), depth(depth_), whole(conservative(mesh, subdivision, depth)) {
-    whole->expandAll(depth);
-    collect(TreeSide(*whole), tree::NodeRef());
-  }
-
-  std::unique_ptr<tree::Tree> fresh() const { return conservative(mesh, subdivision, depth); }
-
-  std::shared_ptr<const Mesh> mesh;
-  Subdivision subdivision;
-  int depth;
-  std::unique_ptr<tree::Tree> whole;
-  std::vector<CellLeaf> leaves;
-
- private:
-  void collect(const TreeSide& side, tree::NodeRef node) {
-    if (side.state(node) == State::kLeaf) {
-      leaves.push_back({side.cellId(node), side.cellSphere(node)});
-    } else {
-      side.children(node, [&](tree::NodeRef child) { collect(side, child); });
-    }
-  }
-};
+using Model = test::CellTree;
 
 // By the definition.
 CellPairs meetingCells(const Model& a, const Model& b, const SimilarityTransform& b_in_a) {
