@@ -158,7 +158,6 @@ class Cutter::Sweep {
       return order != 0 ? order < 0 : sweep->height(a->upper, b->upper) < 0;
     }
     bool operator()(Corner edge, const Interval* b) const { return sweep->height(edge, b->lower) < 0; }
-    bool operator()(const Interval* a, Corner edge) const { return sweep->height(a->lower, edge) < 0; }
   };
   using Intervals = std::multiset<Interval*, Below>;
 

@@ -8,8 +8,8 @@
 namespace bocst::io {
 namespace {
 
-/// The polygon's corners in the coordinate plane it is seen best from, turning left, scaled by a power of two to sizes
-/// of about 1; empty when it has no area or a corner is not finite.
+/// The polygon's corners in the coordinate plane where its area is largest, counter-clockwise, scaled by a power of two
+/// to sizes of about 1; empty if it has no area or a corner is not finite.
 std::vector<Eigen::Vector2d> flatten(const Polygons& polygons, const std::uint32_t* corner, std::size_t n) {
   double largest = 0;
   for (std::size_t i = 0; i < n; ++i) {

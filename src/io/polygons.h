@@ -10,7 +10,7 @@
 
 namespace bocst::io {
 
-/// What a reader brings home: vertices and polygons, before triangulation.
+/// What a reader returns: vertices and polygons, before triangulation.
 struct Polygons {
   std::vector<Eigen::Vector3d> vertices;
   std::vector<std::uint32_t> corners;  ///< All polygons' vertex indices, one after the other.

@@ -28,8 +28,8 @@ class ObjReader {
     const char end = lineEnd(bytes_);
     while (!rest.empty()) {
       std::string_view line = takeLine(rest, end);
-      // A backslash at the end of a line, comments aside, takes the next one in; blanks and ends of lines are the same
-      // to takeWord.
+      // A backslash at the end of a line, except in a comment, joins it with the next line; takeWord() takes ends of
+      // lines for blanks.
       while (!line.empty() && line.back() == '\\' && line.find('#') == line.npos && !rest.empty()) {
         const std::string_view more = takeLine(rest, end);
         line = {line.data(), static_cast<std::size_t>(more.data() + more.size() - line.data())};

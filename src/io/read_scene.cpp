@@ -10,7 +10,6 @@
 #include <algorithm>
 #include <assimp/IOSystem.hpp>
 #include <assimp/Importer.hpp>
-#include <charconv>
 #include <cstddef>
 #include <cstdint>
 #include <exception>
@@ -76,17 +75,10 @@ class Folder final : public Assimp::IOSystem {
   bool isBeside(std::string_view path) const { return path.substr(0, folderSize()) == file_.substr(0, folderSize()); }
 
   /// References in a glTF are URIs: a blank is "%20" there.
-  std::string placeOf(std::string path) const {
+  std::string placeOf(const std::string& path) const {
     std::error_code error;
     if (fs::exists(path, error) || !isBeside(path)) return path;
-    for (std::size_t at = folderSize(); (at = path.find('%', at)) != path.npos && at + 3 <= path.size(); ++at) {
-      int byte = 0;
-      const char* const end = path.data() + at + 3;
-      if (std::from_chars(end - 2, end, byte, 16).ptr == end && byte > 0) {
-        path.replace(at, 3, 1, static_cast<char>(byte));
-      }
-    }
-    return path;
+    return path.substr(0, folderSize()) + percentDecoded(path.substr(folderSize()));
   }
 
   bool isInside(const std::string& path) const {

@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #pragma once
 
+#include <charconv>
 #include <string>
 #include <string_view>
 
@@ -17,7 +18,7 @@ inline std::string_view withoutByteOrderMark(std::string_view text) {
 char lineEnd(std::string_view text);
 
 /// Cuts the next line off `text`, without its end.
-std::string_view takeLine(std::string_view& text, char end = '\n');
+std::string_view takeLine(std::string_view& text, char end);
 
 /// Cuts the next word off `text`; empty at the end.
 std::string_view takeWord(std::string_view& text);
@@ -31,8 +32,8 @@ bool takeNumber(std::string_view& text, Number& number) {
   return toNumber(takeWord(text), number);
 }
 
-/// A text for a message: in quotes, cut to 60 bytes, bytes that do not print replaced, because a file may hold what a
-/// terminal obeys.
+/// A text for a message: in quotes, cut to 60 bytes, bytes that do not print replaced, because a file may contain
+/// control sequences of terminals.
 inline std::string inQuotes(std::string_view text) {
   constexpr std::size_t kMost = 60;
   std::string shown(text.substr(0, kMost));
@@ -40,6 +41,20 @@ inline std::string inQuotes(std::string_view text) {
     if (c < ' ' || c > '~') c = '?';
   }
   return "'" + shown + (text.size() > kMost ? "...'" : "'");
+}
+
+/// The path that a URI means: "%20" is a blank. What is no byte, or 0, stays as it is.
+inline std::string percentDecoded(std::string_view path) {
+  std::string result;
+  for (std::size_t i = 0; i < path.size(); ++i) {
+    const char* const digits = path.data() + i + 1;
+    unsigned char byte = 0;
+    const bool is_byte =
+        path[i] == '%' && i + 2 < path.size() && std::from_chars(digits, digits + 2, byte, 16).ptr == digits + 2;
+    result += is_byte && byte != 0 ? static_cast<char>(byte) : path[i];
+    if (is_byte && byte != 0) i += 2;
+  }
+  return result;
 }
 
 /// @throws std::runtime_error "line N: what", where N is the line of `file` that `at` points into.

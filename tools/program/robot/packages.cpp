@@ -2,7 +2,6 @@
 #include "robot/packages.h"
 
 #include <algorithm>
-#include <charconv>
 #include <cstdlib>
 #include <filesystem>
 #include <pugixml.hpp>
@@ -10,6 +9,8 @@
 #include <sstream>
 #include <stdexcept>
 #include <system_error>
+
+#include "io/text.h"
 
 namespace bocst::program {
 namespace {
@@ -81,22 +82,6 @@ fs::path namedFolder(const fs::path& folder, const std::string& name) {
   return {};
 }
 
-/// A path of a URI, in which %20 is a blank.
-std::string decoded(const std::string& path) {
-  std::string result;
-  for (std::size_t i = 0; i < path.size(); ++i) {
-    unsigned char byte = 0;
-    const char* digits = path.data() + i + 1;
-    if (path[i] == '%' && i + 2 < path.size() && std::from_chars(digits, digits + 2, byte, 16).ptr == digits + 2) {
-      result += static_cast<char>(byte);
-      i += 2;
-    } else {
-      result += path[i];
-    }
-  }
-  return result;
-}
-
 bool startsWith(const std::string& text, const std::string& start) { return text.rfind(start, 0) == 0; }
 
 }  // namespace
@@ -161,7 +146,7 @@ std::string Packages::resolve(const std::string& uri, const std::string& folder)
     if (path == std::string::npos || (host > 0 && uri.substr(7, host) != "localhost")) {
       throw std::runtime_error("file:// and an absolute path expected, as in file:///opt/part.stl");
     }
-    return decoded(uri.substr(path));
+    return io::percentDecoded(uri.substr(path));
   }
   if (uri.find("://") != std::string::npos) {
     throw std::runtime_error("unknown kind of URI: use package://, model://, file:// or a path");
