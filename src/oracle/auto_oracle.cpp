@@ -21,7 +21,7 @@ constexpr CostModel kHost{1e-7, 1e-6, 4e-8}, kDevice{1e-4, 4e-7, 2e-9}, kUpload{
 // device.
 constexpr double kHostEarlier = 0.8;
 
-// What it takes to part a batch and to put it together again, in seconds a cell.
+// The time to split a batch and to join its parts again, in seconds per cell.
 constexpr double kMoving = 1.5e-7;
 
 // A surface with hills, and triangles of many sizes.
@@ -313,7 +313,7 @@ void AutoOracle::wait(std::vector<ExpansionRequest>& batch) {
   ended.splice(ended.begin(), all, mine);
   device_->wait(asked(*mine, batch));
   const double now = clock_(), took = now - mine->begin;
-  // Where the host was the slower, the device took less than this.
+  // If the host ended last, the device took less than this.
   if (now - mine->host_end > 0.05 * took || took < mine->expected) learn(device_cost_, mine->work, took);
   for (std::size_t i = 0; i < mine->places.size(); ++i) {
     const Pending::Place& place = mine->places[i];

@@ -35,7 +35,7 @@ class Trials {
 
 /// Who walks pairs of sphere-trees: a device, or the host? Learns from what both took.
 ///
-/// Threads: any number. A thread that finds another here has the host walk.
+/// Threads: any number. While one thread uses this, the others let the host walk.
 class PairsChoice {
  public:
   /// is_hardware: is the device expected to be fast, before it was measured?

@@ -152,7 +152,7 @@ void ComputeChain::clearAnswers() {
   glMemoryBarrier(GL_SHADER_STORAGE_BARRIER_BIT | GL_BUFFER_UPDATE_BARRIER_BIT);
 }
 
-// The number of lanes that work on each pair or cell. Long passes are parted.
+// `lanes`: the number of lanes that work on each pair or cell. Long passes are split.
 void ComputeChain::run(Pass pass, std::uint64_t items, std::uint32_t lanes) {
   const Step& step = steps_[pass];
   step.program->use();

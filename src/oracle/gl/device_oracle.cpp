@@ -25,9 +25,8 @@ void DeviceOracle::submit(std::vector<ExpansionRequest>& batch) {
 }
 
 void DeviceOracle::flush() {
-  std::vector<Ticket*> taken;
   try {
-    answerAll(taken);
+    answerAll();
   } catch (const std::exception& e) {
     reportFailure("a batch", e);  // no memory
   }
@@ -37,7 +36,8 @@ void DeviceOracle::flush() {
   answered_->notify_all();
 }
 
-void DeviceOracle::answerAll(std::vector<Ticket*>& taken) {
+void DeviceOracle::answerAll() {
+  std::vector<Ticket*> taken;
   {
     const std::lock_guard<std::mutex> lock(mutex_);
     flush_is_due_ = false;

@@ -60,12 +60,12 @@ class DeviceOracle : public Oracle {
  private:
   struct Ticket {
     std::vector<ExpansionRequest>* batch;
-    bool taken = false, done = false;  // done: no thread but that which waits has to do with it
+    bool taken = false, done = false;  // done: only the thread that waits still uses it
     std::vector<Verdict> verdicts = {};
   };
 
   void flush();
-  void answerAll(std::vector<Ticket*>& taken);
+  void answerAll();
 
   DeviceMeshes meshes_;
   std::atomic<std::uint64_t> left_to_cpu_{0};

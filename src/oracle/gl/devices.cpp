@@ -200,12 +200,10 @@ class Registry {
 
   static DeviceReport report(int device) {
     DeviceReport r;
-    r.device = device;
     const auto attempt = [&](OracleKind kind, int major, std::string& self_test) -> std::string {
       try {
         const std::shared_ptr<Thread> its_thread = newThread(device, major);  // for a moment: it takes memory
         const ContextInfo& info = its_thread->info();
-        r.device = info.device;
         r.description = std::to_string(info.device) + ": " + info.renderer + ", OpenGL " + info.version;
         r.hardware = info.hardware;
         const Tested tested = makeTested(kind, its_thread, PaperOptions{}.viewport);

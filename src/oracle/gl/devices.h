@@ -1,13 +1,10 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #pragma once
 
-#include <bocst/oracle.h>
-
 #include <memory>
 #include <string>
 #include <vector>
 
-#include "egl/context.h"
 #include "oracle/oracle.h"
 
 namespace bocst::oracle::gl {
@@ -15,7 +12,6 @@ namespace bocst::oracle::gl {
 /// What each EGL device offers, the one that is taken by default first. One entry without a device that says why not if
 /// there is none. Each is tested (self_test.h). Asked once a process.
 struct DeviceReport {
-  int device = 0;
   std::string description;  ///< Index, renderer and version, for people.
   bool hardware = false;
   std::string why_no_compute, why_no_occlusion;  ///< Empty when it can be used.

@@ -113,17 +113,16 @@ constexpr std::uint32_t kWalkStack = 256;       ///< Pairs of nodes that a walk 
 
 /// What answers say of a question that they belong to; the shaders have the same.
 constexpr std::uint32_t kCheckFactor = 0x9e3779b1u;
-template <std::size_t kCount>
-std::uint32_t check(const std::uint32_t (&words)[kCount]) {
+inline std::uint32_t check(const std::uint32_t* words, std::size_t count) {
   std::uint32_t sum = 0, factor = 1;
   // From the last: products that need not wait for each other.
-  for (std::size_t i = kCount; i-- > 0; factor *= kCheckFactor) sum += words[i] * factor;
+  for (std::size_t i = count; i-- > 0; factor *= kCheckFactor) sum += words[i] * factor;
   return sum;
 }
 inline std::uint32_t check(const Cell& cell) {
   std::uint32_t words[sizeof(Cell) / 4];
   std::memcpy(words, &cell, sizeof(cell));
-  return check(words);
+  return check(words, std::size(words));
 }
 
 /// All of these as constants of the shaders' language.

@@ -117,9 +117,8 @@ void PairWalker::take(DeviceWalks& walks, std::size_t first, std::size_t count, 
                       Thread& thread) const {
   for (std::size_t i = 0; i < count; ++i) {
     const std::uint32_t* const row = answers + i * kPairAnswer;
-    std::uint32_t asked[kPairWords];
-    std::copy_n(rows_.data() + i * kPairWords, kPairWords, asked);
-    thread.require(row[0] >> 8 == batch_ && row[1] == check(asked), "a pair of trees was not walked");
+    const std::uint32_t asked = check(rows_.data() + i * kPairWords, kPairWords);
+    thread.require(row[0] >> 8 == batch_ && row[1] == asked, "a pair of trees was not walked");
     thread.require((row[0] & DeviceWalks::kInvalid) == 0, "a table of nodes did not arrive");
     walks.found[first + i] = static_cast<std::uint8_t>(row[0] & 0xff);
   }

@@ -7,6 +7,7 @@
 #include <cstddef>
 #include <cstdint>
 #include <memory>
+#include <numeric>
 #include <utility>
 #include <vector>
 
@@ -23,12 +24,11 @@ using Ids = std::vector<std::uint32_t>;
 // A ball with waves: triangles of all directions, smaller towards the poles.
 std::shared_ptr<const Mesh> ball() {
   constexpr int kRings = 14, kSides = 20;
-  constexpr double kPi = 3.14159265358979323846;
   std::vector<Eigen::Vector3d> vertices;
   std::vector<Mesh::Indices> triangles;
   for (int i = 0; i <= kRings; ++i) {
     for (int j = 0; j < kSides; ++j) {
-      const double a = kPi * (i + 0.3) / (kRings + 0.6), b = 2 * kPi * j / kSides;
+      const double a = M_PI * (i + 0.3) / (kRings + 0.6), b = 2 * M_PI * j / kSides;
       const double r = 1 + 0.2 * std::sin(5 * b) * std::sin(3 * a);
       vertices.emplace_back(r * std::sin(a) * std::cos(b), 1.3 * r * std::sin(a) * std::sin(b), 0.7 * r * std::cos(a));
       if (i == kRings) continue;
@@ -198,7 +198,7 @@ std::string askKept(ComputeOracle& oracle, std::vector<Question> questions) {
 
 Ids allOf(const Surface& surface) {
   Ids ids(surface.triangle_count);
-  for (std::uint32_t i = 0; i < ids.size(); ++i) ids[i] = i;
+  std::iota(ids.begin(), ids.end(), 0u);
   return ids;
 }
 

@@ -111,13 +111,9 @@ void Thread::lose(const std::string& why) {
   log(LogLevel::kWarning, info_.renderer + " was lost (" + why + "); queries go on on the CPU");
 }
 
-void Thread::distrust(const std::string& why) {
-  distrusted_ = true;
-  lose("it answered wrongly: " + why);
-}
-
 void Thread::fail(const char* what) {
-  distrust(what);
+  distrusted_ = true;
+  lose(std::string("it answered wrongly: ") + what);
   throw OracleError("the GPU context is lost");
 }
 

@@ -48,10 +48,8 @@ class Thread {
   /// Gives the context up, and reports it once (bocst::setLogger).
   void lose(const std::string& why);
 
-  /// The same for a device that answered wrongly, which nobody should ask again.
-  void distrust(const std::string& why);
-  /// In a job: distrusts the device unless it `holds`; a driver that leaves out work in silence would make surface
-  /// vanish. @throws OracleError then.
+  /// In a job: unless it `holds`, the device answered wrongly: gives the context up, and nobody should ask the device
+  /// again. (A driver that leaves out work in silence would make surface vanish.) @throws OracleError then.
   void require(bool holds, const char* what) {
     if (!holds) fail(what);
   }
