@@ -29,12 +29,7 @@ class Simplex {
     ++n_;
   }
 
-  bool has(const Vector3d& w) const {
-    for (int i = 0; i < n_; ++i) {
-      if (w_[i] == w) return true;
-    }
-    return false;
-  }
+  bool has(const Vector3d& w) const { return std::find(w_, w_ + n_, w) != w_ + n_; }
 
   /// Leaves only the points that the nearest point needs. False when the origin is inside, which then is that point.
   bool reduce() {

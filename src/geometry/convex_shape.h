@@ -78,7 +78,7 @@ class ConvexShape {
  public:
   virtual ~ConvexShape() = default;
 
-  /// A box about the body; of an unbounded one, about as much of it as its maker was told to care for.
+  /// A box about the body; of an unbounded one, about the part of it in the region that its constructor was given.
   const OrientedVolume& box() const { return box_; }
 
   /// The box bounds the body tightly: what meets the box nearly always meets the body, so the box alone culls.
@@ -87,16 +87,16 @@ class ConvexShape {
   /// The distance of the points. More than `cutoff` is not looked at closely.
   virtual SeparationResult gap(const PointSet& points, double cutoff) const = 0;
 
-  /// A point of the body; none of what has no end.
+  /// A point of the body; none if it is unbounded.
   virtual std::optional<Eigen::Vector3d> point() const = 0;
 
   /// That of its box, if nothing better is known.
   virtual SweptHull hull() const { return sweptHullOf(box_); }
 
-  /// How points that touch the body get away from it, in a straight line: normal from the body to the points, depth >=
-  /// 0 so that moving the points by depth * normal leaves them touching at most, and a point in or beside the overlap.
-  /// Of boxes, balls, planes, half-spaces and triangles the shortest way; of other bodies one that is seldom longer by
-  /// more than a tenth. `gap` is what gap() says of these points.
+  /// The translation that ends the overlap with points that touch the body: normal from the body to the points, depth
+  /// >= 0 so that moving the points by depth * normal leaves them touching at most, and a point in or beside the
+  /// overlap. For boxes, balls, planes, half-spaces and triangles it is the shortest one; for other bodies it is seldom
+  /// longer by more than a tenth. `gap` is what gap() says of these points.
   virtual ContactPoint penetration(const PointSet& points, const SeparationResult& gap) const = 0;
 
  protected:
@@ -201,7 +201,7 @@ class RoundShape final : public SupportShape {
   const double bottom_, top_, half_length_;
 };
 
-/// A triangle, which parts as triangles do.
+/// A triangle; its gap and penetration with another triangle are those of triangle.h.
 class TriangleShape final : public SupportShape {
  public:
   explicit TriangleShape(const Corners& corners);

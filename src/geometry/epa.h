@@ -9,9 +9,9 @@
 
 namespace bocst::query {
 
-/// Looks for the direction in which a convex set reaches least far from the origin, which it holds: the shortest way
-/// out of an overlap, when the set is a difference. By expanding a polytope of the set's points at its face nearest to
-/// the origin (van den Bergen's EPA). No allocation; 2 KB on the stack.
+/// Finds the direction along which a convex set that contains the origin extends least: if the set is a difference of
+/// two, the shortest translation that ends their overlap. It expands a polytope of the set's points at the face nearest
+/// to the origin (van den Bergen's EPA). No allocation; 2 KB on the stack.
 class Epa {
  public:
   /// `size`: no coordinate of the set is much larger.
@@ -20,9 +20,9 @@ class Epa {
   /// A point of the set; at most four, and the origin must lie in their hull.
   void add(const Eigen::Vector3d& point) { points_[count_++] = point; }
 
-  /// support(n) is the point of the set that is farthest along the unit direction n. The reach along the direction that
-  /// is returned exceeds the least by at most the part `tolerance` of itself, unless numbers give out: then it is the
-  /// best of those that were tried. Zero if none was.
+  /// support(n) is the point of the set that is farthest along the unit direction n. The extent along the direction
+  /// that is returned exceeds the least one by at most the part `tolerance` of itself, unless rounding ends the search:
+  /// then it is the least of those that were tried. Zero if none was.
   template <typename Support>
   Eigen::Vector3d run(const Support& support, double tolerance) {
     if (!fill(support)) return direction_;
@@ -33,14 +33,14 @@ class Epa {
       const double lowest = nearest.distance;
       const Eigen::Vector3d w = support(normal);
       consider(normal, w);
-      // The polytope is inside, so nothing of the set reaches less far than its nearest face.
+      // The polytope is inside the set, so the set extends at least as far as the nearest face.
       settled_ = extent_ - lowest <= tolerance * extent_ + tiny_;
       if (settled_ || !expand(w)) break;
     }
     return direction_;
   }
 
-  /// The last run() found what was asked for: its numbers did not give out, nor its steps.
+  /// The last run() reached its tolerance: neither rounding nor the number of steps ended it.
   bool settled() const { return settled_; }
 
  private:
@@ -75,7 +75,7 @@ class Epa {
     return true;
   }
 
-  // Until there is a tetrahedron, and its faces.
+  // Adds points up to a tetrahedron, and its faces.
   template <typename Support>
   bool fill(const Support& support) {
     const auto& p = points_;
@@ -110,8 +110,8 @@ class Epa {
     return true;
   }
 
-  // Takes away what the new point sees and closes the hole with faces to it. False if the point
-  // adds nothing, or if there is no room for more faces.
+  // Removes the faces that the new point sees and closes the hole with faces to it. False if the
+  // point adds nothing, or if there is no room for more faces.
   bool expand(const Eigen::Vector3d& w) {
     const int point = static_cast<int>(count_);
     points_[count_++] = w;

@@ -10,7 +10,7 @@
 #include "geometry/triangle.h"
 #include "geometry/volume.h"
 
-// How far bodies are from each other, from below: for distance queries. All in double, in one frame.
+// Lower bounds of the distance between bodies, for distance queries. All in double, in one frame.
 
 namespace bocst::query {
 
@@ -76,12 +76,12 @@ bool anyDirectionApart(const NodeExtent& a, const NodeExtent& b, const F& f) {
   return false;
 }
 
-/// What computing in double may be off by, as a share of the distance and of all half extents; twice over is enough for
+/// The error of computations in double, as a share of the distance and of all half extents; twice this is enough for
 /// the boxes of a BoxTree, which are 2^-30 lattice units larger.
 constexpr double kExtentRounding = 1e-13;
 
-/// No point of a is nearer to any of b than this, up to kExtentRounding of the sizes, which is taken off. `guess` is a
-/// direction in which the bound is likely to be good, or zero; a bound of `cutoff` or more is not made better.
+/// A lower bound of the distance of two nodes, less kExtentRounding of the sizes. `guess` is a direction along which
+/// the bound is likely to be good, or zero; a bound of `cutoff` or more is not improved.
 inline double distanceBound(const NodeExtent& a, const NodeExtent& b, const Eigen::Vector3d& guess, double cutoff) {
   const Eigen::Vector3d t = b.center - a.center;
   const double apart = t.norm(), rounding_margin = kExtentRounding * (apart + a.half.sum() + b.half.sum());
@@ -141,8 +141,8 @@ struct TriangleExtent {
   }
 };
 
-/// The box about a body, placed by `to`. What is apart from it along its axes or those of the frame need not be asked
-/// the body itself. Triangles are in a root cube; the margin is that of boxesApart().
+/// The box about a body, placed by `to`. Triangles that are apart from it along its axes or those of the frame are not
+/// tested against the body itself. Triangles are in a root cube; the margin is that of boxesApart().
 class BodyBox {
  public:
   BodyBox(const OrientedVolume& box, const SimilarityTransform& to)

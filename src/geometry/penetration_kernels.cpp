@@ -36,7 +36,7 @@ HWY_INLINE void consider(const BothTriangles& t, const Vec3d& axis, Vd shortest,
   const Vd p1 = dot(axis, t.p[1]), p2 = dot(axis, t.p[2]);
   const Vd q0 = dot(axis, t.q[0]), q1 = dot(axis, t.q[1]), q2 = dot(axis, t.q[2]);
   const Vd inverse = hn::Div(hn::Set(d, 1.0), hn::Sqrt(length));
-  // Two ways out: q beyond the upper end of p, or below the lower end.
+  // Two translations end the overlap: q beyond the upper end of p, or below its lower end.
   const Vd up = hn::Sub(max3(zero, p1, p2), min3(q0, q1, q2)), down = hn::Sub(max3(q0, q1, q2), min3(zero, p1, p2));
   const Vd depth = hn::Mul(hn::Min(up, down), inverse);
   const Md better = hn::And(hn::Gt(length, shortest), hn::Lt(depth, least.depth));
@@ -156,7 +156,7 @@ void PenetrationsOfPairs(const TrianglePairs& pairs, double tolerance, PairPenet
       t.q[k] = sub(at(3 + k), origin);
     }
     const Edges e = edgesOf(t.p), f = edgesOf(t.q);
-    // Of what has no area the plane is rounding.
+    // The plane of a triangle without area is rounding.
     const Md areas = hn::And(hn::Gt(e.normal_squared, e.shortest), hn::Gt(f.normal_squared, f.shortest));
 
     const LeastOverlap least = leastOverlap(t, e, f, areas);

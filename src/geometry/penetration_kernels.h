@@ -33,15 +33,15 @@ struct TrianglePairs {
   }
 };
 
-/// How each of them is parted, see trianglePenetrations().
+/// What trianglePenetrations() says of each pair.
 struct PairPenetrations {
   alignas(64) double normal[3][TrianglePairs::kCapacity];
   alignas(64) double point[3][TrianglePairs::kCapacity];
   alignas(64) double depth[TrianglePairs::kCapacity];  ///< Negative: a gap along normal. 0 where nothing has an area.
   // A bit a pair:
   std::uint32_t no_point = 0;  ///< The triangles cut each other in no segment that has its ends inside of edges.
-  std::uint32_t meet = 0;      ///< They do, however the corners are moved by tolerance.
-  std::uint32_t apart = 0;     ///< So they are.
+  std::uint32_t meet = 0;      ///< They meet, wherever in the tolerance their corners are.
+  std::uint32_t apart = 0;     ///< They are apart, likewise.
 };
 
 /// The least depth is the distance of the origin from the boundary of the convex set P - Q. Moving corners by less than
