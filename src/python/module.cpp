@@ -441,6 +441,12 @@ auto ask(const PyScene& s, const py::object& X_WM, bool many, const F& f, const 
 
 using Xs = const fcl::Transform3d*;
 
+/// A query of Python: f of one state or of many.
+template <typename F>
+auto query(bool many, const F& f) {
+  return [many, f](const PyScene& s, const py::object& X_WM) { return ask(s, X_WM, many, f); };
+}
+
 std::optional<std::pair<Id, Id>> idsOf(const Pair& pair) {
   return pair.a.isValid() ? std::optional<std::pair<Id, Id>>({pair.a, pair.b}) : std::nullopt;
 }
@@ -507,22 +513,16 @@ threads: number of threads that share the states of one call; 0: one per hardwar
           "update", [](PyScene& s, Id id) { s.scene.update(id); }, "object"_a, py::call_guard<NoGilWithOctrees>(),
           "Call this after the shape of a geometry has changed. A BVHModel that was built again is another geometry: "
           "remove the object and add it again.")
-      .def(
-          "collides",
-          [](const PyScene& s, const py::object& X_WM) {
-            return ask(s, X_WM, false, [](const Scened& scene, Xs X, std::size_t) { return scene.collides(X); });
-          },
-          "X_WM"_a, "True if this state, (m, 4, 4), collides.")
-      .def(
-          "colliding_pair",
-          [](const PyScene& s, const py::object& X_WM) {
-            return ask(s, X_WM, false, [](const Scened& scene, Xs X, std::size_t) {
-              Pair pair;
-              scene.collides(X, &pair);
-              return idsOf(pair);
-            });
-          },
-          "X_WM"_a, "A pair of Ids that collides in this state, (m, 4, 4), or None.")
+      .def("collides", query(false, [](const Scened& scene, Xs X, std::size_t) { return scene.collides(X); }), "X_WM"_a,
+           "True if this state, (m, 4, 4), collides.")
+      .def("colliding_pair",
+           query(false,
+                 [](const Scened& scene, Xs X, std::size_t) {
+                   Pair pair;
+                   scene.collides(X, &pair);
+                   return idsOf(pair);
+                 }),
+           "X_WM"_a, "A pair of Ids that collides in this state, (m, 4, 4), or None.")
       .def(
           "collisions",
           [](const PyScene& s, const py::object& X_WM) {
@@ -534,37 +534,23 @@ threads: number of threads that share the states of one call; 0: one per hardwar
             return py::array_t<bool>(static_cast<py::ssize_t>(hits.size()), reinterpret_cast<const bool*>(hits.data()));
           },
           "X_WM"_a, "A bool array (n,): True for each of the states, (n, m, 4, 4), that collides.")
-      .def(
-          "first_collision",
-          [](const PyScene& s, const py::object& X_WM) {
-            return ask(s, X_WM, true,
-                       [](const Scened& scene, Xs X, std::size_t states) { return scene.firstCollision(X, states); });
-          },
-          "X_WM"_a, "The smallest index of a state that collides; n if none does. The states are (n, m, 4, 4).")
-      .def(
-          "any_collision",
-          [](const PyScene& s, const py::object& X_WM) {
-            return ask(s, X_WM, true,
-                       [](const Scened& scene, Xs X, std::size_t states) { return scene.anyCollision(X, states); });
-          },
-          "X_WM"_a,
-          "True if any of the states, (n, m, 4, 4), collides. Checks the middle of each part before its halves.")
-      .def(
-          "clearance",
-          [](const PyScene& s, const py::object& X_WM) {
-            return ask(s, X_WM, false, [](const Scened& scene, Xs X, std::size_t) { return scene.clearance(X); });
-          },
-          "X_WM"_a, "The minimum distance of all pairs in this state, (m, 4, 4); 0 if a pair touches.")
-      .def(
-          "nearest_pair",
-          [](const PyScene& s, const py::object& X_WM) {
-            return ask(s, X_WM, false, [](const Scened& scene, Xs X, std::size_t) {
-              Pair pair;
-              scene.clearance(X, &pair);
-              return idsOf(pair);
-            });
-          },
-          "X_WM"_a, "The pair of Ids at the minimum distance in this state, (m, 4, 4); None without pairs.")
+      .def("first_collision",
+           query(true, [](const Scened& scene, Xs X, std::size_t states) { return scene.firstCollision(X, states); }),
+           "X_WM"_a, "The smallest index of a state that collides; n if none does. The states are (n, m, 4, 4).")
+      .def("any_collision",
+           query(true, [](const Scened& scene, Xs X, std::size_t states) { return scene.anyCollision(X, states); }),
+           "X_WM"_a,
+           "True if any of the states, (n, m, 4, 4), collides. Checks the middle of each part before its halves.")
+      .def("clearance", query(false, [](const Scened& scene, Xs X, std::size_t) { return scene.clearance(X); }),
+           "X_WM"_a, "The minimum distance of all pairs in this state, (m, 4, 4); 0 if a pair touches.")
+      .def("nearest_pair",
+           query(false,
+                 [](const Scened& scene, Xs X, std::size_t) {
+                   Pair pair;
+                   scene.clearance(X, &pair);
+                   return idsOf(pair);
+                 }),
+           "X_WM"_a, "The pair of Ids at the minimum distance in this state, (m, 4, 4); None without pairs.")
       .def(
           "edge_is_free",
           [](const PyScene& s, const py::object& begin, const py::object& end, const std::string& motion) {
@@ -597,10 +583,6 @@ motion: 'linear', 'translation', 'screw' or 'spline', see fcl.CCDMotionType.)")
           "moving_index", [](const PyScene& s, Id moving) { return s.scene.movingIndex(moving); }, "moving"_a,
           "The index of a moving object among the poses of a state.");
 }
-
-}  // namespace
-
-namespace {
 
 /// Objects that were made without __init__ raise TypeError. pickle's oldest protocols would make such an object, at
 /// which pybind11 ends the process; X.__new__(X) makes one for which pybind11 hands C++ memory that holds no object.
