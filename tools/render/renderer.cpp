@@ -163,11 +163,6 @@ class Renderer::Drawing {
   }
 
  private:
-  static void forgetErrors() {
-    while (glGetError() != GL_NO_ERROR) {
-    }
-  }
-
   /// All samples of a picture of that size, the lowest row first. @throws OracleError when the drawing failed, too.
   template <typename T>
   std::vector<T> read(int width, int height, GLenum format, GLenum type) const {
@@ -183,7 +178,7 @@ class Renderer::Drawing {
   }
 
   void prepare(const View& view, int width, int height) {
-    forgetErrors();
+    gl::forgetErrors();
     const auto smaller = static_cast<float>(std::min(width, height));
     scale_ = {smaller / static_cast<float>(width), smaller / static_cast<float>(height),
               static_cast<float>(-view.radius / view.reach)};

@@ -4,7 +4,6 @@
 #include <bocst/io.h>
 
 #include <CLI/CLI.hpp>
-#include <cctype>
 #include <charconv>
 #include <cmath>
 

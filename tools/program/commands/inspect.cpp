@@ -14,7 +14,9 @@
 
 #include "cli/arguments.h"
 #include "cli/file.h"
+#include "cli/words.h"
 #include "mesh/health.h"
+#include "mesh/node_levels.h"
 #include "mesh/sphere_error.h"
 #include "mesh/sphere_fit.h"
 #include "mesh/spheres.h"
@@ -71,10 +73,7 @@ Grown grow(const std::shared_ptr<const Mesh>& mesh, Options options, bool errors
     grown.levels = errorByLevel(*mesh, grown.nodes);
     return grown;
   }
-  for (const NodeView& node : grown.nodes) {
-    grown.levels.resize(std::max(grown.levels.size(), static_cast<std::size_t>(node.level)));
-    ++grown.levels[static_cast<std::size_t>(node.level) - 1].nodes;
-  }
+  for (const std::size_t nodes : nodesPerLevel(grown.nodes)) grown.levels.push_back({nodes});
   return grown;
 }
 

@@ -5,14 +5,13 @@
 
 #include <CLI/CLI.hpp>
 #include <algorithm>
-#include <iostream>
 #include <memory>
 #include <sstream>
 #include <string>
 #include <vector>
 
 #include "cli/arguments.h"
-#include "cli/file.h"
+#include "cli/report.h"
 #include "cli/words.h"
 
 namespace bocst::program {
@@ -240,11 +239,7 @@ void add(CLI::App& program, Job& job, const char* name, std::string (*text)(cons
   command->add_option("file", *file, "output file; - is stdout");
   command->callback([&program, &job, file, text] {
     job = [&program, file, text] {
-      if (*file != "-") {
-        writeFile(*file, text(program));
-      } else {
-        std::cout << text(program);
-      }
+      writeText(*file, text(program));
       return 0;
     };
   });

@@ -10,6 +10,8 @@
 #include <stdexcept>
 #include <system_error>
 
+#include "io/text.h"
+
 namespace bocst::program {
 
 namespace {
@@ -104,8 +106,7 @@ Pose Pose::fromTransform(const Eigen::Isometry3d& X_AB) {
 
 std::vector<ListedPose> parsePoses(const std::string& text, RotationFormat format, const std::string& name) {
   std::vector<ListedPose> poses;
-  constexpr char kByteOrderMark[] = "\xEF\xBB\xBF";
-  std::istringstream stream(text.compare(0, 3, kByteOrderMark) == 0 ? text.substr(3) : text);
+  std::istringstream stream{std::string(io::withoutByteOrderMark(text))};
   std::string line;
   for (std::size_t number = 1; std::getline(stream, line); ++number) {
     line.erase(std::min(line.find('#'), line.size()));

@@ -5,7 +5,6 @@
 #include <bocst/model.h>
 
 #include <algorithm>
-#include <cmath>
 #include <stdexcept>
 #include <utility>
 

@@ -3,8 +3,6 @@
 
 #include <algorithm>
 #include <array>
-#include <cmath>
-#include <sstream>
 #include <stdexcept>
 
 #include "cli/suggest.h"

@@ -2,7 +2,6 @@
 #include "scene/scene_file.h"
 
 #include <algorithm>
-#include <cctype>
 #include <filesystem>
 #include <map>
 #include <set>

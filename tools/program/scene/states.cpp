@@ -205,11 +205,9 @@ std::vector<State> statesOfTable(const std::string& text, const StateNames& name
   std::vector<State> states;
   std::optional<Columns> columns;
   bool blanks = false;
-  std::istringstream stream(text);
+  std::istringstream stream{std::string(io::withoutByteOrderMark(text))};
   std::string line;
   for (std::size_t number = 1; std::getline(stream, line); ++number) {
-    const std::string mark = "\xEF\xBB\xBF";  // of UTF-8, as spreadsheets write it
-    if (number == 1 && line.rfind(mark, 0) == 0) line.erase(0, mark.size());
     const std::string place = "line " + std::to_string(number);
     try {
       std::vector<std::string> cells = cellsOf(line, blanks);
