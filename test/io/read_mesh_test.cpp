@@ -5,7 +5,6 @@
 
 #include <Eigen/Geometry>
 #include <algorithm>
-#include <array>
 #include <cmath>
 #include <cstdint>
 #include <cstring>
@@ -16,8 +15,12 @@
 #include <utility>
 #include <vector>
 
+#include "mesh_files.h"
+
 namespace bocst::io {
 namespace {
+
+using namespace test;
 
 std::string complaint(const std::string& bytes, Format format) {
   try {
@@ -35,46 +38,14 @@ void expectComplaint(Format format, const std::string& bytes, const std::string&
                                                  << bytes.substr(0, 100);
 }
 
-std::string replaced(std::string text, const std::string& what, const std::string& by) {
-  const std::size_t at = text.find(what);
-  if (at == std::string::npos) throw std::logic_error("no such text: " + what);
-  return text.replace(at, what.size(), by);
-}
-
-template <typename T>
-void append(std::string& bytes, T value) {
-  bytes.append(reinterpret_cast<const char*>(&value), sizeof(T));
-}
-
-const std::string kOff = "OFF\n4 2 0\n0 0 0\n1 0 0\n1 1 0\n0 1 0\n3 0 1 2\n3 0 2 3\n";
 const std::string kObj =
     "mtllib none.mtl\no a\nv 0 0 0\nv 1 0 0\nv 1 1 0\nv 0 1 0\nvn 0 0 1\nf 1//1 2//1 3//1\nf 1 3 4\n";
-const std::string kPly =
-    "ply\nformat ascii 1.0\nelement vertex 4\nproperty float x\nproperty float y\nproperty float z\n"
-    "element face 2\nproperty list uchar int vertex_indices\nend_header\n"
-    "0 0 0\n1 0 0\n1 1 0\n0 1 0\n3 0 1 2\n3 0 2 3\n";
-const std::string kStl =
-    "solid s\n"
-    "facet normal 0 0 1\nouter loop\nvertex 0 0 0\nvertex 1 0 0\nvertex 1 1 0\nendloop\nendfacet\n"
-    "facet normal 0 0 1\nouter loop\nvertex 0 0 0\nvertex 1 1 0\nvertex 0 1 0\nendloop\nendfacet\n"
-    "endsolid s\n";
-
 std::string binaryStl() {
   std::string stl(80, 's');
   append(stl, std::uint32_t{1});
   for (const float x : {0, 0, 1, 0, 0, 0, 1, 0, 0, 1, 1, 0}) append(stl, x);
   append(stl, std::uint16_t{0});
   return stl;
-}
-
-std::string binaryPly() {
-  std::string ply = replaced(kPly.substr(0, kPly.find("end_header\n") + 11), "ascii", "binary_little_endian");
-  for (const float x : {0, 0, 0, 1, 0, 0, 1, 1, 0, 0, 1, 0}) append(ply, x);
-  for (const auto& t : {std::array<int, 3>{0, 1, 2}, std::array<int, 3>{0, 2, 3}}) {
-    append(ply, std::uint8_t{3});
-    for (const std::int32_t i : t) append(ply, i);
-  }
-  return ply;
 }
 
 /// A COLLADA file; its mesh has five vertices: a unit square and (0.5 0.5 1).
@@ -349,7 +320,9 @@ TEST(ReadPly, RefusesWhatIsNoIndexAndNoCount) {
   refuse("3 0 2 3", "4 0 2 3", "truncated");
   refuse("3 0 2 3", "3 0 2 3 4", "line 15: there is more");
   refuse("3 0 2 3", "3 0 2 4", "line 15: face 1: vertex index 4 out of range");
-  refuse("1 1 0", "1 nan 0", "line 12: vertex 2: a coordinate is no finite number");
+  for (const std::string bad : {"nan", "inf", "-inf", "1e999"}) {
+    refuse("1 1 0", "1 " + bad + " 0", "line 12: vertex 2: a coordinate is no finite number");
+  }
   refuse("1 1 0", "1 1e300 0", "line 12: vertex 2: a coordinate is larger than 1e75 in magnitude");
   refuse("1 1 0", "1 1,5 0", "line 12: vertex 2: '1,5' is no number");
   refuse("property float y", "property float x", "line 5: PLY header: twice the property 'x'");
@@ -381,6 +354,13 @@ TEST(ReadPly, RefusesWhatIsNoIndexAndNoCount) {
     for (const double x : {0.0, 1.0, i}) append(bad, x);
     expectComplaint(Format::kPly, bad + std::string(28, '\0'), "face 0: vertex index");
   }
+  std::string nan = binaryPly();
+  const float no_number = std::numeric_limits<float>::quiet_NaN();
+  std::memcpy(&nan[nan.find("end_header\n") + 11 + 12], &no_number, sizeof(no_number));
+  expectComplaint(Format::kPly, nan, "vertex 1: a coordinate is no finite number");
+  std::string far = binaryPly(true);
+  far.back() = 77;
+  expectComplaint(Format::kPly, far, "vertex index 77 out of range");
   expectComplaint(Format::kPly, binaryPly() + "\n", "byte " + std::to_string(binaryPly().size()) + ": there is more");
 }
 
@@ -394,13 +374,15 @@ TEST(ReadOff, RefusesWhatIsNoIndexAndNoEnd) {
   refuse("3 0 2 3\n", "3 0 2 3 1 2 3 4 5\n", "line 8: '5' not expected");
   refuse("1 1 0\n", "1 1 0 x\n", "line 5: 'x' not expected");
   refuse("1 1 0\n", "1 1,5 0\n", "line 5: vertex 2");
-  refuse("1 1 0\n", "1 inf 0\n", "line 5: vertex 2: 'inf' is no finite number");
+  for (const std::string bad : {"nan", "inf", "-inf", "1e999"}) {
+    refuse("1 1 0\n", "1 " + bad + " 0\n", "line 5: vertex 2: '" + bad + "' is no finite number");
+  }
   refuse("1 1 0\n", "1 -1e76 0\n", "line 5: vertex 2: '-1e76' is larger than 1e75 in magnitude");
   refuse("1 1 0\n", "1 1\n", "line 5: vertex 2: number missing");
   refuse("4 2 0\n", "4 2 0 7\n", "line 2: ");
   refuse("4 2 0\n", "4 2.5 0\n", "line 2: ");
   refuse("4 2 0\n", "4 1e300 0\n", "line 2: ");
-  for (const std::string bad : {"1.5", "1e300", "-1", "4", "x"})
+  for (const std::string bad : {"1.5", "1e300", "-1", "4", "x", "4294967296", "99999999999999999999"})
     refuse("3 0 2 3\n", "3 0 2 " + bad + "\n", "line 8: face 1");
   for (const std::string bad : {"3.5", "1e300", "-1", "99999999999", "x"}) {
     refuse("3 0 2 3\n", bad + " 0 2 3\n", "line 8: face 1");
@@ -506,6 +488,7 @@ TEST(ReadStl, RefusesRubbish) {
   expectComplaint(Format::kStl, kStl + "rubbish\n", "line 17: 'solid' expected, not 'rubbish'");
   expectComplaint(Format::kStl, binaryStl() + "x", "byte 134: there is more");
   expectComplaint(Format::kStl, replaced(kStl, "vertex 1 0 0", "vertex 1,5 0 0"), "line 5: vertex 1: '1,5'");
+  expectComplaint(Format::kStl, replaced(kStl, "vertex 1 0 0", "vertex nan 0 0"), "line 5: vertex 1: 'nan'");
   expectComplaint(Format::kStl, replaced(kStl, "vertex 1 0 0", "vertex 1 0"),
                   "line 6: vertex 1: 'vertex' is no finite");
   expectComplaint(Format::kStl, replaced(kStl, "endloop", "vertex 0 0 1\nendloop"), "line 7: 'endloop' expected");
