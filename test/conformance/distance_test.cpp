@@ -4,11 +4,10 @@
 #include <fcl/narrowphase/detail/primitive_shape_algorithm/triangle_distance.h>
 #include <gtest/gtest.h>
 
-#include <thread>
-
 #include "conformance/reference.h"
 #include "geometry/triangle.h"
 #include "sanitized.h"
+#include "thread_group.h"
 
 namespace bocst {
 namespace {
@@ -517,21 +516,17 @@ TEST(DistanceThreads, FreshModelsPruningAndCollisions) {
     expected.push_back(ask<double>(calm, I, calm, poses.back()).min_distance);
   }
   Modeld a(raw.mesh()), b(raw.mesh());
-  std::vector<std::thread> threads;
   std::atomic<int> wrong{0};
-  for (std::size_t k = 0; k < 4; ++k) {
-    threads.emplace_back([&, k] {
-      for (std::size_t i = 0; i < poses.size(); ++i) {
-        const std::size_t n = (i * 7 + k * 11) % poses.size();
-        const double d =
-            k % 2 ? ask<double>(b, poses[n], a, I).min_distance : ask<double>(a, I, b, poses[n]).min_distance;
-        wrong += !(std::abs(d - expected[n]) < 1e-12);
-        wrong += test::touching<double>(a, I, b, poses[n]) != (expected[n] <= 0);
-        if (i % 13 == k) a.prune(Clock::now() + std::chrono::hours(1));
-      }
-    });
-  }
-  for (auto& t : threads) t.join();
+  test::ThreadGroup(4, [&](std::size_t k) {
+    for (std::size_t i = 0; i < poses.size(); ++i) {
+      const std::size_t n = (i * 7 + k * 11) % poses.size();
+      const double d =
+          k % 2 ? ask<double>(b, poses[n], a, I).min_distance : ask<double>(a, I, b, poses[n]).min_distance;
+      wrong += !(std::abs(d - expected[n]) < 1e-12);
+      wrong += test::touching<double>(a, I, b, poses[n]) != (expected[n] <= 0);
+      if (i % 13 == k) a.prune(Clock::now() + std::chrono::hours(1));
+    }
+  });
   EXPECT_EQ(wrong, 0);
 }
 

@@ -5,11 +5,11 @@
 #include <unistd.h>
 
 #include <atomic>
-#include <thread>
 
 #include "conformance/reference.h"
 #include "fcl/adapters/models.h"
 #include "oracle/gl/device_oracle.h"
+#include "thread_group.h"
 #include "tree/tree.h"
 
 namespace bocst {
@@ -321,17 +321,13 @@ TEST_P(OnDevice, ThreadsShareAReleasedMesh) {
     for (const auto& X : all) expected.push_back(test::touching<double>(r.c, kIdentity, r.d, X));
     std::atomic<int> wrong{0};
     for (int round = 0; round < 3; ++round) {
-      std::vector<std::thread> threads;
-      for (int t = 0; t < 4; ++t) {
-        threads.emplace_back([&, t] {
-          for (std::size_t i = 0; i < all.size(); ++i) {
-            const std::size_t k = (i + static_cast<std::size_t>(3 * t)) % all.size();
-            wrong += test::touching<double>(r.a, kIdentity, r.b, all[k]) != expected[k];
-            (void)r.a.statistics();
-          }
-        });
-      }
-      for (std::thread& t : threads) t.join();
+      test::ThreadGroup(4, [&](std::size_t t) {
+        for (std::size_t i = 0; i < all.size(); ++i) {
+          const std::size_t k = (i + 3 * t) % all.size();
+          wrong += test::touching<double>(r.a, kIdentity, r.b, all[k]) != expected[k];
+          (void)r.a.statistics();
+        }
+      });
       r.rest();
       EXPECT_EQ(r.a.statistics().mesh_bytes, 0u);
     }

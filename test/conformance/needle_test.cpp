@@ -7,10 +7,10 @@
 #include <chrono>
 #include <cmath>
 #include <random>
-#include <thread>
 #include <vector>
 
 #include "conformance/reference.h"
+#include "thread_group.h"
 
 namespace bocst {
 namespace {
@@ -194,19 +194,15 @@ TEST(Needles, ThreadsBuildOnce) {
   const Raw raw = rod(5e-6, 60);
   for (int round = 0; round < 10; ++round) {
     Modeld a(raw.mesh()), b(raw.mesh());
-    std::vector<std::thread> threads;
     std::atomic<int> wrong{0};
-    for (int t = 0; t < 8; ++t) {
-      threads.emplace_back([&, t] {
-        for (int k = 0; k < 20; ++k) {
-          const bool near = (t + k) % 2 == 0;
-          const fcl::Transform3d X = test::pose<double>(Matrix3d::Identity(), {0.1, near ? 9e-6 : 1.1e-5, 0});
-          wrong += test::touching<double>(a, fcl::Transform3d::Identity(), b, X) != near;
-          if (t == 0) a.prune(Clock::now() + std::chrono::hours(1));
-        }
-      });
-    }
-    for (std::thread& thread : threads) thread.join();
+    test::ThreadGroup(8, [&](std::size_t t) {
+      for (int k = 0; k < 20; ++k) {
+        const bool near = (t + k) % 2 == 0;
+        const fcl::Transform3d X = test::pose<double>(Matrix3d::Identity(), {0.1, near ? 9e-6 : 1.1e-5, 0});
+        wrong += test::touching<double>(a, fcl::Transform3d::Identity(), b, X) != near;
+        if (t == 0) a.prune(Clock::now() + std::chrono::hours(1));
+      }
+    });
     EXPECT_EQ(wrong, 0);
   }
 }

@@ -9,11 +9,11 @@
 
 #include <algorithm>
 #include <map>
-#include <thread>
 
 #include "conformance/reference.h"
 #include "conformance/truth.h"
 #include "sanitized.h"
+#include "thread_group.h"
 
 namespace bocst {
 namespace {
@@ -622,17 +622,13 @@ TEST(ShapesDouble, ThreadsGrowOneModel) {
     expected.push_back(test::touching<double>(calm, I, *shapes[i % shapes.size()].shape, poses.back()));
   }
   std::atomic<int> wrong{0};
-  std::vector<std::thread> threads;
-  for (std::size_t k = 0; k < 4; ++k) {
-    threads.emplace_back([&, k] {
-      for (std::size_t i = 0; i < poses.size(); ++i) {
-        const std::size_t n = (i * 7 + k * 11) % poses.size();
-        const auto& shape = *shapes[n % shapes.size()].shape;
-        wrong += test::touching<double>(shape, poses[n], model, I) != expected[n];
-      }
-    });
-  }
-  for (auto& t : threads) t.join();
+  test::ThreadGroup(4, [&](std::size_t k) {
+    for (std::size_t i = 0; i < poses.size(); ++i) {
+      const std::size_t n = (i * 7 + k * 11) % poses.size();
+      const auto& shape = *shapes[n % shapes.size()].shape;
+      wrong += test::touching<double>(shape, poses[n], model, I) != expected[n];
+    }
+  });
   EXPECT_EQ(wrong, 0);
 }
 

@@ -10,6 +10,7 @@
 #include "conformance/reference.h"
 #include "conformance/shapes.h"
 #include "sanitized.h"
+#include "thread_group.h"
 
 namespace bocst {
 namespace {
@@ -32,13 +33,6 @@ std::vector<PosedQuery> questions(const test::Raw& raw, int count) {
   return all;
 }
 
-template <typename F>
-void inThreads(int count, F&& f) {
-  std::vector<std::thread> threads;
-  for (int i = 0; i < count; ++i) threads.emplace_back([&f, i] { f(i); });
-  for (auto& t : threads) t.join();
-}
-
 TEST(Threads, OneFreshModel) {
   const test::Raw raw = test::torus(60);
   const std::vector<PosedQuery> all = questions(raw, 60);
@@ -46,9 +40,9 @@ TEST(Threads, OneFreshModel) {
   for (int round = 0; round < 3; ++round) {
     const Modeld a(raw.mesh()), b(raw.mesh());
     std::atomic<int> wrong{0};
-    inThreads(4, [&](int thread) {
+    test::ThreadGroup(4, [&](std::size_t thread) {
       for (std::size_t i = 0; i < all.size(); ++i) {
-        const PosedQuery& q = all[(i * 7 + static_cast<std::size_t>(thread) * 13) % all.size()];
+        const PosedQuery& q = all[(i * 7 + thread * 13) % all.size()];
         // Half the threads in the other order, some against the model itself.
         const Modeld& other = i % 5 == 0 ? a : b;
         const bool answer =
@@ -69,7 +63,7 @@ TEST(Threads, QueriesWhilePruning) {
   options.memory_budget = 200000;
   Modeld a(raw.mesh(), options), b(raw.mesh(), options);
   std::atomic<int> wrong{0}, running{3};
-  inThreads(4, [&](int thread) {
+  test::ThreadGroup(4, [&](std::size_t thread) {
     if (thread == 3) {
       while (running > 0) {
         a.prune(Clock::now() + std::chrono::seconds(10));
@@ -95,20 +89,17 @@ TEST(Threads, QueriesWhileEverythingIsExpanded) {
   const Modeld b(test::torus(24).mesh());
   std::atomic<bool> done{false};
   std::atomic<int> asked{0}, wrong{0};
-  std::vector<std::thread> threads;
-  for (int t = 0; t < 3; ++t) {
-    threads.emplace_back([&, t] {
-      for (int i = 0; !done || i < 20; ++i) {
-        const auto X =
-            test::pose<double>(Eigen::Matrix3d::Identity(), Eigen::Vector3d(1.2 + 0.02 * (i % 4), 0.3, 0.01 * t));
-        wrong += !test::touching<double>(a, fcl::Transform3d::Identity(), b, X);
-        ++asked;
-      }
-    });
-  }
+  test::ThreadGroup threads(3, [&](std::size_t t) {
+    for (int i = 0; !done || i < 20; ++i) {
+      const auto X =
+          test::pose<double>(Eigen::Matrix3d::Identity(), Eigen::Vector3d(1.2 + 0.02 * (i % 4), 0.3, 0.01 * t));
+      wrong += !test::touching<double>(a, fcl::Transform3d::Identity(), b, X);
+      ++asked;
+    }
+  });
   for (int i = 0; i < test::repetitions(60); ++i) a.expandAll(7);
   done = true;
-  for (std::thread& t : threads) t.join();
+  threads.join();
   EXPECT_EQ(wrong, 0);
   EXPECT_GE(asked, 60);
 }
@@ -125,7 +116,7 @@ TEST(Threads, QueriesWhileVerticesChange) {
   std::vector<Eigen::Vector3d> away = raw.vertices;
   for (auto& v : away) v.x() += 100;
   std::atomic<int> wrong{0}, hits{0}, running{3};
-  inThreads(4, [&](int thread) {
+  test::ThreadGroup(4, [&](std::size_t thread) {
     if (thread == 3) {
       for (int i = 0; running > 0; ++i) a.updateVertices(i % 2 ? raw.vertices : away);
       return;
@@ -192,7 +183,7 @@ TEST(Threads, QueriesOfAllKindsOnSharedModels) {
     for (const auto& Y : poses) expected.push_back(Answers::of(*pair.first, *pair.second, Y));
   }
   std::atomic<int> wrong{0}, running{4};
-  inThreads(5, [&](int thread) {
+  test::ThreadGroup(5, [&](std::size_t thread) {
     if (thread == 4) {
       while (running > 0) {
         for (Modeld* model : {&a, &b, &c}) {
@@ -204,7 +195,7 @@ TEST(Threads, QueriesOfAllKindsOnSharedModels) {
       return;
     }
     for (std::size_t i = 0; i < expected.size(); ++i) {
-      const std::size_t n = (i * 5 + static_cast<std::size_t>(thread) * 11) % expected.size();
+      const std::size_t n = (i * 5 + thread * 11) % expected.size();
       const Pair& pair = shared[n / poses.size()];
       wrong += !(Answers::of(*pair.first, *pair.second, poses[n % poses.size()]) == expected[n]);
     }
@@ -234,7 +225,7 @@ TEST(Threads, DistancesTimesAndSolidsWhileVerticesChange) {
     other.push_back(Answers::of(there, grain, Y));
   }
   std::atomic<int> wrong{0}, running{3};
-  inThreads(4, [&](int thread) {
+  test::ThreadGroup(4, [&](std::size_t thread) {
     if (thread == 3) {
       for (int i = 0; running > 0; ++i) a.updateVertices(i % 2 ? raw.vertices : away);
       return;
@@ -339,7 +330,7 @@ TEST(Threads, ShapesAndOctreesWhilePruningAndLooking) {
   EXPECT_GT(hits, 10);
   EXPECT_LT(hits, static_cast<int>(cases.size()) - 10);
   std::atomic<int> wrong{0}, running{4};
-  inThreads(5, [&](int thread) {
+  test::ThreadGroup(5, [&](std::size_t thread) {
     if (thread == 4) {
       while (running > 0) {
         for (Modeld* model : {&a, &b}) {
@@ -353,10 +344,10 @@ TEST(Threads, ShapesAndOctreesWhilePruningAndLooking) {
       return;
     }
     for (std::size_t i = 0; i < cases.size(); ++i) {
-      const Case& c = cases[(i * 5 + static_cast<std::size_t>(thread) * 17) % cases.size()];
+      const Case& c = cases[(i * 5 + thread * 17) % cases.size()];
       const ConvexAnswers x =
           ConvexAnswers::of(c.is_exact ? a : b, *others[c.partner], poses[c.pose], static_cast<unsigned>(thread));
-      wrong += !(x == c.expected[static_cast<std::size_t>(thread) / 2]);
+      wrong += !(x == c.expected[thread / 2]);
     }
     --running;
   });
@@ -383,7 +374,7 @@ TEST(Threads, ShapesAndOctreesWhileVerticesChange) {
     }
   }
   std::atomic<int> wrong{0}, running{3};
-  inThreads(4, [&](int thread) {
+  test::ThreadGroup(4, [&](std::size_t thread) {
     if (thread == 3) {
       for (int i = 0; running > 0; ++i) a.updateVertices(i % 2 ? raw.vertices : away);
       return;
@@ -410,7 +401,7 @@ TEST(Threads, PruningOfAPairInBothOrdersDoesNotLock) {
   const fcl::Transform3d I = fcl::Transform3d::Identity();
   const auto X = test::pose<double>(Eigen::Matrix3d::Identity(), {1.2, 0.3, 0.1});
   std::atomic<int> wrong{0};
-  inThreads(4, [&](int thread) {
+  test::ThreadGroup(4, [&](std::size_t thread) {
     for (int i = 0; i < 300; ++i) {
       if (thread == 0) a.prune(Clock::now() + std::chrono::seconds(10));
       if (thread == 1) b.prune(Clock::now() + std::chrono::seconds(10));

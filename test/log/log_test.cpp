@@ -12,6 +12,8 @@
 #include <utility>
 #include <vector>
 
+#include "thread_group.h"
+
 namespace bocst {
 namespace {
 
@@ -53,12 +55,9 @@ TEST_F(Log, WorksInAChildOfAProcessThatReports) {
   setLogger([](LogLevel, const std::string&) {});
   const std::string message = "again";
   std::atomic<bool> stop{false};
-  std::vector<std::thread> threads;
-  for (int t = 0; t < 3; ++t) {
-    threads.emplace_back([&] {
-      while (!stop) log(LogLevel::kInfo, message);
-    });
-  }
+  test::ThreadGroup threads(3, [&](std::size_t) {
+    while (!stop) log(LogLevel::kInfo, message);
+  });
   int failed = 0;
   for (int i = 0; i < 300; ++i) {
     const pid_t child = fork();
@@ -68,12 +67,12 @@ TEST_F(Log, WorksInAChildOfAProcessThatReports) {
       _exit(0);
     }
     int status = 0;
-    ASSERT_EQ(waitpid(child, &status, 0), child);
+    EXPECT_EQ(waitpid(child, &status, 0), child);
     failed += status != 0;
     if (failed > 0) break;
   }
   stop = true;
-  for (std::thread& t : threads) t.join();
+  threads.join();
   EXPECT_EQ(failed, 0);
 }
 
@@ -81,12 +80,9 @@ TEST_F(Log, MayBeReplacedWhileOthersReport) {
   std::atomic<int> first{0}, second{0};
   std::atomic<bool> stop{false};
   setLogger([&first](LogLevel, const std::string&) { ++first; });
-  std::vector<std::thread> threads;
-  for (int t = 0; t < 3; ++t) {
-    threads.emplace_back([&stop] {
-      while (!stop) log(LogLevel::kInfo, "again");
-    });
-  }
+  test::ThreadGroup threads(3, [&stop](std::size_t) {
+    while (!stop) log(LogLevel::kInfo, "again");
+  });
   while (first == 0) std::this_thread::yield();
   for (int i = 0; i < 200; ++i) {
     setLogger([&second](LogLevel, const std::string&) { ++second; });
@@ -96,7 +92,7 @@ TEST_F(Log, MayBeReplacedWhileOthersReport) {
   const int before = second;
   while (second == before) std::this_thread::yield();
   stop = true;
-  for (std::thread& t : threads) t.join();
+  threads.join();
   EXPECT_GT(first, 0);
   EXPECT_GT(second, 0);
 }

@@ -8,13 +8,13 @@
 #include <algorithm>
 #include <cstdio>
 #include <random>
-#include <thread>
 
 #include "egl/context.h"
 #include "oracle/cpu/cpu_oracle.h"
 #include "oracle/gl/compute_oracle.h"
 #include "sanitized.h"
 #include "surfaces.h"
+#include "thread_group.h"
 
 namespace bocst::oracle {
 namespace {
@@ -396,17 +396,13 @@ TEST(AutoOracle, ThreadsShareTheDevice) {
   const auto thread = std::make_shared<gl::Thread>(gl::ContextRequest());
   const auto compute = std::make_shared<gl::ComputeOracle>(thread);
   AutoOracle both(std::make_shared<CpuOracle>(), compute);
-  std::vector<std::thread> threads;
-  for (unsigned k = 0; k < 4; ++k) {
-    threads.emplace_back([&, k] {
-      std::mt19937_64 g(k);
-      for (int i = 0; i < 20; ++i) {
-        const auto batch = some(levels, 1 + g() % 5, 1 + g() % 300, g);
-        expectSameAnswers(batch, ask(both, batch));
-      }
-    });
-  }
-  for (std::thread& t : threads) t.join();
+  test::ThreadGroup(4, [&](std::size_t k) {
+    std::mt19937_64 g(k);
+    for (int i = 0; i < 20; ++i) {
+      const auto batch = some(levels, 1 + g() % 5, 1 + g() % 300, g);
+      expectSameAnswers(batch, ask(both, batch));
+    }
+  });
   EXPECT_EQ(compute->leftToCpu(), 0u);
 }
 

@@ -25,6 +25,7 @@
 #include "conformance/reference.h"
 #include "fcl/adapters/models.h"
 #include "sanitized.h"
+#include "thread_group.h"
 #include "tree/tree.h"
 
 namespace {
@@ -1482,19 +1483,15 @@ TEST(SceneThreads, EdgesAlongMeshesOfFcl) {
     const auto bvh = test::bvh<fcl::OBBRSSd>(test::torus(20, 0));
     scene.addFixed(bvh, fcl::Transform3d::Identity());
     scene.addMoving(bvh);
-    std::vector<std::thread> threads;
-    for (int t = 0; t < 3; ++t) {
-      threads.emplace_back([&scene, t] {
-        // About their common axis, one above the other: the tubes have the radius 0.35.
-        for (const double height : {0.705, 0.695}) {
-          const auto begin = test::pose<double>(Eigen::Matrix3d::Identity(), {0, 0, height});
-          const auto end =
-              test::pose<double>(Eigen::AngleAxisd(1 + t, Eigen::Vector3d::UnitZ()).toRotationMatrix(), {0, 0, height});
-          EXPECT_EQ(scene.edgeIsFree(&begin, &end), height > 0.7);
-        }
-      });
-    }
-    for (std::thread& thread : threads) thread.join();
+    test::ThreadGroup(3, [&scene](std::size_t t) {
+      // About their common axis, one above the other: the tubes have the radius 0.35.
+      for (const double height : {0.705, 0.695}) {
+        const auto begin = test::pose<double>(Eigen::Matrix3d::Identity(), {0, 0, height});
+        const auto end =
+            test::pose<double>(Eigen::AngleAxisd(1 + t, Eigen::Vector3d::UnitZ()).toRotationMatrix(), {0, 0, height});
+        EXPECT_EQ(scene.edgeIsFree(&begin, &end), height > 0.7);
+      }
+    });
   }
 }
 
@@ -1539,19 +1536,16 @@ TEST(SceneThreads, ChangesBesideQueries) {
   scene.addFixed(wall, fcl::Transform3d::Identity());
   std::atomic<bool> stop{false};
   std::atomic<int> asked{0};
-  std::vector<std::thread> threads;
-  for (int t = 0; t < 3; ++t) {
-    threads.emplace_back([&, t] {
-      std::vector<std::uint8_t> hit(300);
-      for (int k = t; !stop || k < t + 3; ++k) {
-        scene.collisions(X.data(), 300, hit.data());
-        EXPECT_EQ(std::count(hit.begin(), hit.end(), 1), 300);
-        EXPECT_TRUE(scene.collides(X.data() + 2 * (k % 300)));
-        EXPECT_EQ(scene.firstCollision(X.data(), 300), 0u);
-        ++asked;
-      }
-    });
-  }
+  test::ThreadGroup threads(3, [&](std::size_t t) {
+    std::vector<std::uint8_t> hit(300);
+    for (std::size_t k = t; !stop || k < t + 3; ++k) {
+      scene.collisions(X.data(), 300, hit.data());
+      EXPECT_EQ(std::count(hit.begin(), hit.end(), 1), 300);
+      EXPECT_TRUE(scene.collides(X.data() + 2 * (k % 300)));
+      EXPECT_EQ(scene.firstCollision(X.data(), 300), 0u);
+      ++asked;
+    }
+  });
   while (asked < 3) std::this_thread::yield();
   for (int k = 0; k < 40; ++k) {
     scene.setPose(fixed[static_cast<std::size_t>(k) % fixed.size()], randomPose<double>(g, 3));
@@ -1559,7 +1553,7 @@ TEST(SceneThreads, ChangesBesideQueries) {
     if (k % 2 == 0) scene.remove(id);
   }
   stop = true;
-  for (std::thread& t : threads) t.join();
+  threads.join();
   EXPECT_EQ(scene.fixedCount(), 12u + 1 + 20);
 }
 

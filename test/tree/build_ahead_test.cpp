@@ -15,6 +15,7 @@
 #include "meshes.h"
 #include "sanitized.h"
 #include "thread/helper_thread.h"
+#include "thread_group.h"
 #include "tree/tree.h"
 
 namespace bocst {
@@ -182,18 +183,14 @@ TEST(BuildAhead, ThreadsAskMeanwhile) {
   }
   for (int round = 0; round < test::repetitions(10); ++round) {
     Modeld a(mesh, options(true)), b(mesh, options(true));
-    std::vector<std::thread> threads;
     std::atomic<int> wrong{0};
-    for (std::size_t t = 0; t < 3; ++t) {
-      threads.emplace_back([&, t] {
-        for (std::size_t i = 0; i < poses.size(); ++i) {
-          const std::size_t k = (i + 20 * t) % poses.size();
-          wrong += contacts(a, b, poses[k], 20) != expected[k];
-          if (t == 2 && i % 16 == 0) a.prune(Clock::now() + std::chrono::hours(1));
-        }
-      });
-    }
-    for (std::thread& t : threads) t.join();
+    test::ThreadGroup(3, [&](std::size_t t) {
+      for (std::size_t i = 0; i < poses.size(); ++i) {
+        const std::size_t k = (i + 20 * t) % poses.size();
+        wrong += contacts(a, b, poses[k], 20) != expected[k];
+        if (t == 2 && i % 16 == 0) a.prune(Clock::now() + std::chrono::hours(1));
+      }
+    });
     ASSERT_EQ(wrong, 0);
   }
 }
