@@ -11,7 +11,6 @@
 #include <random>
 #include <set>
 #include <string>
-#include <thread>
 
 #include "egl/context.h"
 #include "oracle/cpu/cpu_oracle.h"
@@ -20,6 +19,7 @@
 #include "oracle/gl/occlusion_oracle.h"
 #include "oracle/gl/self_test.h"
 #include "surfaces.h"
+#include "thread_group.h"
 
 namespace bocst::oracle::gl {
 namespace {
@@ -130,11 +130,7 @@ TEST(Compute, SplitsWhatExceedsALimit) {
   for (std::uint32_t i = 0; i < some.size(); ++i) some[i] = i;
   std::vector<ExpansionRequest> batch;
   for (int i = 0; i < 64; ++i) {
-    ExpansionRequest e;
-    e.cell = Cell{}.octant(i % 8).octant(i / 8);
-    e.ids = some.data();
-    e.count = some.size();
-    batch.push_back(e);
+    batch.push_back(requestFor(surface, Cell{}.octant(i % 8).octant(i / 8), some.data(), some.size()));
   }
   const auto askAbout = [&](Oracle& oracle, const Surface& s) {
     for (ExpansionRequest& e : batch) e.surface = &s;
@@ -173,12 +169,10 @@ TEST(Compute, TablesStayWithinOneBuffer) {
   const Surface surface = residentOn(oracle, surfaceOf(test::torus(16)));
   std::vector<std::uint32_t> ids(surface.triangle_count);
   for (std::uint32_t i = 0; i < ids.size(); ++i) ids[i] = i;
-  std::vector<ExpansionRequest> batch(3000);
-  for (std::size_t i = 0; i < batch.size(); ++i) {
-    batch[i].surface = &surface;
-    batch[i].cell = Cell{}.octant(static_cast<int>(i % 8)).octant(static_cast<int>(i / 8 % 8));
-    batch[i].ids = &ids[i % ids.size()];
-    batch[i].count = 1;
+  std::vector<ExpansionRequest> batch;
+  for (int i = 0; i < 3000; ++i) {
+    const std::uint32_t* const id = &ids[static_cast<std::size_t>(i) % ids.size()];
+    batch.push_back(requestFor(surface, Cell{}.octant(i % 8).octant(i / 8 % 8), id, 1));
   }
   const std::vector<ExpansionRequest> answers = ask(oracle, batch);
   EXPECT_EQ(oracle.leftToCpu(), 0u);
@@ -260,22 +254,16 @@ TEST(Compute, ThreadsThatWaitTogether) {
     expand(e);
     expected.push_back(e.grey);
   }
-  std::vector<std::thread> threads;
   std::atomic<int> wrong{0};
-  for (int t = 0; t < 8; ++t) {
-    threads.emplace_back([&, t] {
-      for (int i = 0; i < 20; ++i) {
-        const std::size_t size = 1 + static_cast<std::size_t>(t + i) % 5;
-        std::vector<ExpansionRequest> batch(size, rootOf(surface));
-        for (std::size_t k = 0; k < size; ++k) batch[k].cell = Cell{}.octant(static_cast<int>(t + i + k) % 8);
-        batch = ask(oracle, batch);
-        for (std::size_t k = 0; k < size; ++k) {
-          wrong += batch[k].grey != expected[(static_cast<std::size_t>(t + i) + k) % 8];
-        }
-      }
-    });
-  }
-  for (std::thread& t : threads) t.join();
+  test::ThreadGroup(8, [&](std::size_t t) {
+    for (std::size_t i = 0; i < 20; ++i) {
+      const std::size_t size = 1 + (t + i) % 5;
+      std::vector<ExpansionRequest> batch(size, rootOf(surface));
+      for (std::size_t k = 0; k < size; ++k) batch[k].cell = Cell{}.octant(static_cast<int>((t + i + k) % 8));
+      batch = ask(oracle, batch);
+      for (std::size_t k = 0; k < size; ++k) wrong += batch[k].grey != expected[(t + i + k) % 8];
+    }
+  });
   EXPECT_EQ(wrong, 0);
   EXPECT_EQ(oracle.leftToCpu(), 0u);
 }
@@ -609,18 +597,11 @@ Seen lookAt(OcclusionOracle& oracle, const Surface& surface, int levels) {
         }
         if (!grey) continue;
         next_lists.emplace_back(e.listBegin(o), e.listEnd(o));
-        ExpansionRequest child;
-        child.surface = &surface;
-        child.cell = octant;
-        next.push_back(child);
+        next.push_back(requestFor(surface, octant, next_lists.back().data(), next_lists.back().size()));
       }
     }
     lists.swap(next_lists);
     level.swap(next);
-    for (std::size_t i = 0; i < level.size(); ++i) {
-      level[i].ids = lists[i].data();
-      level[i].count = lists[i].size();
-    }
   }
   return seen;
 }

@@ -10,6 +10,7 @@
 #include <array>
 #include <cmath>
 #include <cstdlib>
+#include <numeric>
 #include <random>
 
 #include "oracle/cpu/kernels.h"
@@ -53,23 +54,22 @@ void checkMesh(Oracle& oracle, const Surface& here, int levels, std::size_t most
   const Surface surface = residentOn(oracle, here);
   std::mt19937_64 g(1);
   std::uniform_real_distribution<double> u(0, 1);
-  ExpansionRequest root = rootOf(surface);
-  std::vector<ExpansionRequest> level{root};
+  std::vector<ExpansionRequest> level{rootOf(surface)};
+  std::vector<std::vector<std::uint32_t>> lists;  // that `level` points to
   for (int l = 1; l <= levels; ++l) {
     if (level.size() > most_cells) {
       std::shuffle(level.begin(), level.end(), g);
       level.resize(most_cells);
     }
     const std::vector<ExpansionRequest> answers = ask(oracle, level);
-    static std::vector<std::vector<std::uint32_t>> keep;
-    keep.clear();
     std::vector<ExpansionRequest> next;
+    std::vector<std::vector<std::uint32_t>> next_lists;
     for (const ExpansionRequest& e : answers) {
       for (int o = 0; o < 8; ++o) {
         const Cell octant = e.cell.octant(o);
         const bool grey = e.grey >> o & 1;
         ASSERT_EQ(grey, referenceGrey(surface, octant)) << "level " << octant.level << " octant " << o;
-        const std::vector<std::uint32_t> list(e.listBegin(static_cast<int>(o)), e.listEnd(static_cast<int>(o)));
+        std::vector<std::uint32_t> list(e.listBegin(o), e.listEnd(o));
         if (!grey) {
           ASSERT_TRUE(list.empty());
           continue;
@@ -88,20 +88,11 @@ void checkMesh(Oracle& oracle, const Surface& here, int levels, std::size_t most
             ASSERT_TRUE(contains(e.own, e.cell, p)) << "triangle " << t << " level " << octant.level;
           }
         }
-        ExpansionRequest child;
-        child.surface = &surface;
-        child.cell = octant;
-        keep.push_back(list);
-        next.push_back(child);
+        next.push_back(requestFor(surface, octant, list.data(), list.size()));
+        next_lists.push_back(std::move(list));
       }
     }
-    for (std::size_t i = 0; i < next.size(); ++i) {
-      next[i].ids = keep[i].data();
-      next[i].count = keep[i].size();
-    }
-    // The lists that the next batch points to must live on.
-    static std::vector<std::vector<std::uint32_t>> held;
-    held.swap(keep);
+    lists.swap(next_lists);
     level.swap(next);
   }
 }
@@ -146,6 +137,13 @@ TEST_P(EveryOracle, OddBatches) {
       }
     }
   }
+}
+
+/// A mesh whose lattice unit is 1: two triangles pin its bounds to the whole cube; more are to be added.
+test::Raw pinnedToCube() {
+  test::Raw raw;
+  for (const double x : {0.0, 65536.0}) raw.addTriangle({x, x, x}, {x, x, x}, {x, x, x});
+  return raw;
 }
 
 // Triangles with integer corners against cells: whether they touch is decided exactly, in 128-bit integers.
@@ -201,12 +199,7 @@ TEST_P(EveryOracle, NothingMissedAgainstIntegers) {
     const int level = 3 + round;  // of the octants
     const std::int64_t side = std::int64_t{1} << (lattice::kMaxLevel - level + kFine);
     const std::int64_t whole = std::int64_t{1} << (lattice::kBits + kFine);
-    test::Raw raw;
-    // Two triangles that pin the bounds to the whole cube.
-    for (const double x : {0.0, 65536.0}) {
-      raw.vertices.insert(raw.vertices.end(), 3, Eigen::Vector3d(x, x, x));
-      raw.triangles.emplace_back(raw.vertices.size() - 3, raw.vertices.size() - 2, raw.vertices.size() - 1);
-    }
+    test::Raw raw = pinnedToCube();
     const std::int64_t middle = whole / 2;
     std::vector<IntVec> corners;
     for (std::uint32_t t = 0; t < triangles; ++t) {
@@ -227,17 +220,13 @@ TEST_P(EveryOracle, NothingMissedAgainstIntegers) {
     const Surface surface = residentOn(*oracle_, surfaceOf(raw));
     ASSERT_EQ(surface.lattice.unit(), 1);
     std::vector<std::uint32_t> ids(triangles);
-    for (std::uint32_t t = 0; t < triangles; ++t) ids[t] = t + 2;
+    std::iota(ids.begin(), ids.end(), 2u);
     std::vector<ExpansionRequest> batch;
     for (std::uint32_t t = 0; t < triangles; ++t) {
       for (int o = 0; o < 8; ++o) {  // the eight cells of the level above about the middle
         const std::uint32_t at = 1u << (level - 3);
-        ExpansionRequest e;
-        e.surface = &surface;
-        e.cell = Cell{level - 1, {at - (o & 1), at - (o >> 1 & 1), at - (o >> 2 & 1)}};
-        e.ids = &ids[t];
-        e.count = 1;
-        batch.push_back(e);
+        const Cell cell{level - 1, {at - (o & 1), at - (o >> 1 & 1), at - (o >> 2 & 1)}};
+        batch.push_back(requestFor(surface, cell, &ids[t], 1));
       }
     }
     const std::vector<ExpansionRequest> answers = ask(*oracle_, batch);
@@ -332,26 +321,16 @@ int indexOf(const Cell& octant) {
 std::vector<ExpansionRequest> askOneByOne(Oracle& oracle, const Surface& surface, const std::vector<Cell>& cells,
                                           std::vector<std::uint32_t>& ids) {
   ids.resize(cells.size());
-  std::vector<ExpansionRequest> batch(cells.size());
-  for (std::uint32_t i = 0; i < cells.size(); ++i) {
-    ids[i] = i + 2;
-    batch[i].surface = &surface;
-    batch[i].cell = cells[i];
-    batch[i].ids = &ids[i];
-    batch[i].count = 1;
-  }
+  std::iota(ids.begin(), ids.end(), 2u);
+  std::vector<ExpansionRequest> batch;
+  for (std::size_t i = 0; i < cells.size(); ++i) batch.push_back(requestFor(surface, cells[i], &ids[i], 1));
   return ask(oracle, std::move(batch));
 }
 
 TEST_P(EveryOracle, LongSliversThroughDeepCells) {
   std::mt19937_64 g(13);
   for (const int level : {4, 8, 12, 15, 16}) {
-    test::Raw raw;
-    // Two triangles that pin the bounds to the whole cube.
-    for (const double x : {0.0, 65536.0}) {
-      raw.vertices.insert(raw.vertices.end(), 3, Eigen::Vector3d(x, x, x));
-      raw.triangles.emplace_back(raw.vertices.size() - 3, raw.vertices.size() - 2, raw.vertices.size() - 1);
-    }
+    test::Raw raw = pinnedToCube();
     constexpr std::uint32_t kCount = 600;
     std::vector<Cell> octants, parents;
     std::vector<Eigen::Vector3d> places;
@@ -385,26 +364,12 @@ TEST_P(EveryOracle, LongSliversThroughDeepCells) {
   }
 }
 
-/// Triangles one by one, in a mesh whose lattice unit is 1.
-struct SingleTriangles {
-  SingleTriangles() {
-    // Two triangles that pin the bounds to the whole cube.
-    for (const double x : {0.0, 65536.0})
-      add(Eigen::Vector3d(x, x, x), Eigen::Vector3d(x, x, x), Eigen::Vector3d(x, x, x));
-  }
-  std::uint32_t add(const Eigen::Vector3d& a, const Eigen::Vector3d& b, const Eigen::Vector3d& c) {
-    raw.addTriangle(a, b, c);
-    return static_cast<std::uint32_t>(raw.triangles.size() - 1);
-  }
-  test::Raw raw;
-};
-
 // In float a coordinate beside a whole byte, or beside half a step of a slab, is on either side of it.
 TEST_P(EveryOracle, BoundsHoldWhatLiesBesideWholeBytes) {
   std::mt19937_64 g(16);
   std::uniform_real_distribution<double> u(-1e-9, 1e-9);
   for (const int level : {1, 9}) {
-    SingleTriangles triangles;
+    test::Raw triangles = pinnedToCube();
     std::vector<Cell> octants, parents;
     for (int i = 0; i < 500; ++i) {
       const Cell cell = level == 1 ? Cell{} : cellNearMiddle(level, g), octant = cell.octant(static_cast<int>(g() % 8));
@@ -423,9 +388,9 @@ TEST_P(EveryOracle, BoundsHoldWhatLiesBesideWholeBytes) {
         const double steps = static_cast<double>(g() % 240) / 2 - 60;
         for (Eigen::Vector3d& p : corners) p[k] = centerOf(octant)[k] + side * (steps / 127 + u(g));
       }
-      triangles.add(corners[0], corners[1], corners[2]);
+      triangles.addTriangle(corners[0], corners[1], corners[2]);
     }
-    const Surface surface = residentOn(*oracle_, surfaceOf(triangles.raw));
+    const Surface surface = residentOn(*oracle_, surfaceOf(triangles));
     ASSERT_EQ(surface.lattice.unit(), 1);
     std::vector<std::uint32_t> ids;
     const std::vector<ExpansionRequest> answers = askOneByOne(*oracle_, surface, parents, ids);
@@ -447,7 +412,7 @@ TEST_P(EveryOracle, BoundsHoldWhatLiesBesideWholeBytes) {
 TEST_P(EveryOracle, WhiteOctantsListNothing) {
   std::mt19937_64 g(17);
   constexpr std::uint32_t kCount = 200;
-  SingleTriangles triangles;
+  test::Raw triangles = pinnedToCube();
   std::vector<Cell> cells;
   for (std::uint32_t i = 0; i < kCount; ++i) {
     cells.push_back(cellNearMiddle(8, g));
@@ -458,9 +423,9 @@ TEST_P(EveryOracle, WhiteOctantsListNothing) {
       p = placeIn(cells.back(), g);
       p[k] = centerOf(cells.back())[k] + off;
     }
-    triangles.add(corners[0], corners[1], corners[2]);
+    triangles.addTriangle(corners[0], corners[1], corners[2]);
   }
-  const Surface surface = residentOn(*oracle_, surfaceOf(triangles.raw));
+  const Surface surface = residentOn(*oracle_, surfaceOf(triangles));
   std::vector<std::uint32_t> ids;
   for (const ExpansionRequest& e : askOneByOne(*oracle_, surface, cells, ids)) {
     int grey = 0;
@@ -478,7 +443,7 @@ TEST_P(EveryOracle, WhiteOctantsListNothing) {
 TEST(CpuOracle, BoundsAreHardlyLargerThanTheSurface) {
   const auto oracle = makeOracle(OracleKind::kCpu);
   std::mt19937_64 g(18);
-  SingleTriangles triangles;
+  test::Raw triangles = pinnedToCube();
   constexpr std::uint32_t kCount = 1000;
   std::vector<Cell> cells;
   for (std::uint32_t i = 0; i < kCount; ++i) {
@@ -493,21 +458,15 @@ TEST(CpuOracle, BoundsAreHardlyLargerThanTheSurface) {
       const int k = static_cast<int>(g() % 3);
       corners[1][k] = corners[2][k] = corners[0][k] = i % 4 == 0 ? centerOf(cells.back())[k] : corners[0][k];
     }
-    triangles.add(corners[0], corners[1], corners[2]);
-    triangles.add(corners[0], corners[2], corners[1]);
+    triangles.addTriangle(corners[0], corners[1], corners[2]);
+    triangles.addTriangle(corners[0], corners[2], corners[1]);
   }
-  const Surface surface = surfaceOf(triangles.raw);
+  const Surface surface = surfaceOf(triangles);
   ASSERT_EQ(surface.lattice.unit(), 1);
   std::vector<std::uint32_t> ids(2 * kCount);
-  std::vector<ExpansionRequest> batch(kCount);
-  for (std::uint32_t i = 0; i < kCount; ++i) {
-    ids[2 * i] = 2 * i + 2;
-    ids[2 * i + 1] = 2 * i + 3;
-    batch[i].surface = &surface;
-    batch[i].cell = cells[i];
-    batch[i].ids = &ids[2 * i];
-    batch[i].count = 2;
-  }
+  std::iota(ids.begin(), ids.end(), 2u);
+  std::vector<ExpansionRequest> batch;
+  for (std::uint32_t i = 0; i < kCount; ++i) batch.push_back(requestFor(surface, cells[i], &ids[2 * i], 2));
   std::size_t slabs = 0;
   const auto expectThin = [&](const bounds::NodeBounds& b, const Cell& cell,
                               const std::vector<Eigen::Vector3d>& corners) {

@@ -49,6 +49,17 @@ inline ExpansionRequest rootOf(const Surface& surface) {
   return root;
 }
 
+/// The question about `count` triangles and a cell; the ids must outlive it.
+inline ExpansionRequest requestFor(const Surface& surface, const lattice::Cell& cell, const std::uint32_t* ids,
+                                   std::size_t count) {
+  ExpansionRequest e;
+  e.surface = &surface;
+  e.cell = cell;
+  e.ids = ids;
+  e.count = count;
+  return e;
+}
+
 inline std::vector<ExpansionRequest> ask(Oracle& oracle, std::vector<ExpansionRequest> batch) {
   oracle.submit(batch);
   oracle.wait(batch);
