@@ -35,16 +35,6 @@ Health healthOfRaw(const test::Raw& raw) { return healthOf(*raw.mesh()); }
 
 test::Raw cube() { return test::box({0, 0, 0}, {1, 2, 3}); }
 
-/// As many vertices as corners: equal coordinates are one vertex in space.
-test::Raw exploded(const test::Raw& raw) {
-  test::Raw result;
-  for (const fcl::Triangle& t : raw.triangles) {
-    for (std::size_t k = 0; k < 3; ++k) result.vertices.push_back(raw.vertices[t[k]]);
-    result.triangles.emplace_back(result.vertices.size() - 3, result.vertices.size() - 2, result.vertices.size() - 1);
-  }
-  return result;
-}
-
 TEST(Health, OfASoundMesh) {
   const Health health = healthOfRaw(cube());
   EXPECT_TRUE(health.watertight());
@@ -56,7 +46,7 @@ TEST(Health, OfASoundMesh) {
 }
 
 TEST(Health, SeesTheShapeRatherThanTheIndices) {
-  const Health health = healthOfRaw(exploded(cube()));
+  const Health health = healthOfRaw(test::unwelded(cube()));
   EXPECT_TRUE(health.watertight());
   EXPECT_EQ(health.components, 1u);
   EXPECT_EQ(health.repeated_vertices, 36u - 8u);
@@ -67,14 +57,11 @@ TEST(Health, SeesTheShapeRatherThanTheIndices) {
       if (i % 2 == 0 && zeros.vertices[i][k] == 0) zeros.vertices[i][k] = -0.0;
     }
   }
-  EXPECT_EQ(healthOfRaw(exploded(zeros)).repeated_vertices, 36u - 8u) << "-0 is 0";
+  EXPECT_EQ(healthOfRaw(test::unwelded(zeros)).repeated_vertices, 36u - 8u) << "-0 is 0";
 }
 
 TEST(Health, TurnedInsideOutTheVolumeChangesItsSign) {
-  test::Raw raw = cube();
-  const double volume = healthOfRaw(raw).volume;
-  for (fcl::Triangle& t : raw.triangles) t = fcl::Triangle(t[1], t[0], t[2]);
-  EXPECT_DOUBLE_EQ(healthOfRaw(raw).volume, -volume);
+  EXPECT_DOUBLE_EQ(healthOfRaw(test::turnedOver(cube())).volume, -healthOfRaw(cube()).volume);
 }
 
 TEST(Health, CountsEachFault) {
@@ -107,7 +94,7 @@ TEST(Health, CountsEachFault) {
   raw.add(test::box({5, 5, 5}, {6, 6, 6}));
   EXPECT_EQ(healthOfRaw(raw).components, 2u);
   EXPECT_EQ(healthOfRaw(test::adversarial()).degenerate_triangles,
-            healthOfRaw(exploded(test::adversarial())).degenerate_triangles);
+            healthOfRaw(test::unwelded(test::adversarial())).degenerate_triangles);
 }
 
 TEST(Health, LocatesEachFault) {

@@ -7,7 +7,6 @@
 #include <memory>
 #include <set>
 #include <utility>
-#include <vector>
 
 #include "every_target.h"
 #include "geometry/triangle.h"
