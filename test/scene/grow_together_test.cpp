@@ -41,6 +41,7 @@ Options optionsOf(OracleKind oracle, bool solid = false) {
   options.depth = 6;
   options.oracle = oracle;
   options.solid = solid;
+  options.ttl = std::chrono::milliseconds(0);  // a device in software may take longer than the default
   return options;
 }
 
