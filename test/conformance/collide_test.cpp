@@ -753,8 +753,7 @@ TEST(CollideRequest, AnyNumberOfContacts) {
   const Pairs all = test::pairs<double>(*bvh, X, *bvh, Y);
   ASSERT_GT(all.size(), 100u);
   const fcl::CollisionGeometryd* ga = &a;
-  for (const fcl::CollisionGeometryd* gb :
-       {static_cast<const fcl::CollisionGeometryd*>(&b), static_cast<const fcl::CollisionGeometryd*>(bvh.get())}) {
+  for (const fcl::CollisionGeometryd* gb : test::Geometries<double>{&b, bvh.get()}) {
     for (std::size_t limit = 1; limit < all.size() + 3; limit += limit < 100 ? 1 : 7) {
       for (const bool with_geometry : {false, true}) {
         fcl::CollisionResultd result;

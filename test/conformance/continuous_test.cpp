@@ -538,8 +538,7 @@ TEST(ContinuousDouble, ANeedleTurnsOntoAPlane) {
     const double middle = (lo + hi) / 2;
     (5 - 10 * std::sin(middle) - 0.01 * std::cos(middle) > 0 ? lo : hi) = middle;
   }
-  for (const fcl::CollisionGeometryd* shape : {static_cast<const fcl::CollisionGeometryd*>(&plane),
-                                               static_cast<const fcl::CollisionGeometryd*>(&half_space)}) {
+  for (const fcl::CollisionGeometryd* shape : test::Geometries<double>{&plane, &half_space}) {
     for (const fcl::CCDMotionType type : {fcl::CCDM_LINEAR, fcl::CCDM_SCREW}) {
       const Result<double> result = Ways<double>{&needle, begin, end, shape, I, I}.ask(request<double>(type));
       EXPECT_TRUE(result.is_collide);
@@ -567,9 +566,7 @@ TEST(ContinuousConservative, IsNeverLater) {
       Ways<double> ways = randomWays<double>(g, exact_a, exact_b, 3);
       const double exact = ways.ask(request<double>(type)).time_of_contact;
       ways.o1 = &a;
-      for (const fcl::CollisionGeometryd* other :
-           {static_cast<const fcl::CollisionGeometryd*>(&b), static_cast<const fcl::CollisionGeometryd*>(&exact_b),
-            static_cast<const fcl::CollisionGeometryd*>(fb.get())}) {
+      for (const fcl::CollisionGeometryd* other : test::Geometries<double>{&b, &exact_b, fb.get()}) {
         ways.o2 = other;
         const auto result = ways.ask(request<double>(type)), reversed = ways.swapped().ask(request<double>(type));
         EXPECT_LE(result.time_of_contact, exact);
@@ -623,8 +620,7 @@ TYPED_TEST(Continuous, TipsMeetUnboundedShapes) {
   const double lowest = rod.mesh()->bounds().min().z();
   const fcl::Plane<S> plane(fcl::Vector3<S>(0, 0, 1), 0);
   const fcl::Halfspace<S> half_space(fcl::Vector3<S>(0, 0, 1), 0);
-  for (const fcl::CollisionGeometry<S>* shape : {static_cast<const fcl::CollisionGeometry<S>*>(&plane),
-                                                 static_cast<const fcl::CollisionGeometry<S>*>(&half_space)}) {
+  for (const fcl::CollisionGeometry<S>* shape : test::Geometries<S>{&plane, &half_space}) {
     for (const auto type : kTypes) {
       const auto at = [&](double height) {
         return test::pose<S>(Eigen::Matrix3d::Identity(), {0, 0, height - lowest});
@@ -649,8 +645,7 @@ TYPED_TEST(Continuous, UnboundedShapesMove) {
   const fcl::Plane<S> plane(fcl::Vector3<S>(0, 0, 1), 0);
   const fcl::Halfspace<S> half_space(fcl::Vector3<S>(0, 0, 1), 0);
   int hits = 0, misses = 0;
-  for (const fcl::CollisionGeometry<S>* shape : {static_cast<const fcl::CollisionGeometry<S>*>(&plane),
-                                                 static_cast<const fcl::CollisionGeometry<S>*>(&half_space)}) {
+  for (const fcl::CollisionGeometry<S>* shape : test::Geometries<S>{&plane, &half_space}) {
     for (int i = 0; i < 32; ++i) {
       const fcl::CCDMotionType type = kTypes[i % 4];
       const Eigen::Vector3d place = 3 * test::randomDirection(g), slip(4 * u(g), 3 * u(g), -2 - u(g));

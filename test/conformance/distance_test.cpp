@@ -326,8 +326,7 @@ TEST(DistanceRequest, SmallErrorsAreInTheCallersUnit) {
     for (int i = 0; i < 40; ++i) {
       const auto Y = test::pose<double>(test::randomRotation(g), test::randomDirection(g) * 3 * scale);
       const double exact = ask<double>(a, I, b, Y).min_distance;
-      for (const fcl::CollisionGeometryd* partner :
-           {static_cast<const fcl::CollisionGeometryd*>(&b), static_cast<const fcl::CollisionGeometryd*>(bvh.get())}) {
+      for (const fcl::CollisionGeometryd* partner : test::Geometries<double>{&b, bvh.get()}) {
         for (const double error : {1e-6, 1e-5, 1e-4, 1e-3}) {
           const double absolute = error * scale;
           fcl::DistanceResultd with_absolute, with_relative;
@@ -379,8 +378,7 @@ TEST(DistanceRequest, ResultsOfEarlierPairsAreOverwritten) {
   const fcl::Sphered ball(0.1);
   const fcl::Transform3d I = fcl::Transform3d::Identity();
   const auto there = test::pose<double>(I.linear(), {0.5, 0.2, 0.3}), away = test::pose<double>(I.linear(), {9, 0, 0});
-  for (const fcl::CollisionGeometryd* partner :
-       {static_cast<const fcl::CollisionGeometryd*>(&inner), static_cast<const fcl::CollisionGeometryd*>(&ball)}) {
+  for (const fcl::CollisionGeometryd* partner : test::Geometries<double>{&inner, &ball}) {
     for (const bool is_signed : {false, true}) {
       fcl::DistanceRequestd request;
       request.enable_nearest_points = true;
@@ -426,8 +424,7 @@ TEST(DistanceConservative, IsNeverMoreAndNearerWithDepth) {
         EXPECT_EQ(d > 0, !test::touching<double>(a, I, b, Y));
         EXPECT_NEAR(ask<double>(b, Y, a, I).min_distance, d, 1e-12);
         // Spheres against triangles lie between.
-        for (const fcl::CollisionGeometryd* partner : {static_cast<const fcl::CollisionGeometryd*>(&exact_b),
-                                                       static_cast<const fcl::CollisionGeometryd*>(fb.get())}) {
+        for (const fcl::CollisionGeometryd* partner : test::Geometries<double>{&exact_b, fb.get()}) {
           const double mixed = ask<double>(a, I, *partner, Y).min_distance;
           EXPECT_GE(mixed, d - 1e-12);
           EXPECT_LE(mixed, exact + 1e-12);

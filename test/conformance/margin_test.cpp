@@ -214,8 +214,7 @@ TEST(MarginConservative, NeverFreeWithinIt) {
         EXPECT_EQ(test::touching<double>(b, Y, a, I), hit);
         // As the distance of the spheres says, which is a query of its own.
         EXPECT_EQ(hit, test::distance<double>(same, I, b, Y) <= margin);
-        for (const fcl::CollisionGeometryd* partner : {static_cast<const fcl::CollisionGeometryd*>(&exact_b),
-                                                       static_cast<const fcl::CollisionGeometryd*>(bvh.get())}) {
+        for (const fcl::CollisionGeometryd* partner : test::Geometries<double>{&exact_b, bvh.get()}) {
           EXPECT_EQ(test::touching<double>(a, I, *partner, Y), test::distance<double>(same, I, *partner, Y) <= margin);
           EXPECT_EQ(test::touching<double>(*partner, Y, a, I), test::distance<double>(same, I, *partner, Y) <= margin);
         }
@@ -443,8 +442,7 @@ TYPED_TEST(Margin, AlongEdgesWithTinyComponents) {
   const auto I = fcl::Transform3<S>(fcl::Transform3<S>::Identity());
   const Model<S> narrow(a.mesh(), with(0.09)), wide(a.mesh(), with(0.2)), model(b.mesh());
   const auto bvh = test::bvh<fcl::AABB<S>>(b);
-  for (const fcl::CollisionGeometry<S>* partner : {static_cast<const fcl::CollisionGeometry<S>*>(&model),
-                                                   static_cast<const fcl::CollisionGeometry<S>*>(bvh.get())}) {
+  for (const fcl::CollisionGeometry<S>* partner : test::Geometries<S>{&model, bvh.get()}) {
     EXPECT_TRUE(test::touching<S>(wide, I, *partner, I));
     EXPECT_TRUE(test::touching<S>(*partner, I, wide, I));
     EXPECT_FALSE(test::touching<S>(narrow, I, *partner, I));
@@ -500,8 +498,7 @@ TEST(IsCloserThan, IsThatOfDistancesAtAnySize) {
     const fcl::Sphered ball(s);
     const fcl::Coned cone(s, s);
     const fcl::Capsuled capsule(s, s);
-    for (const fcl::CollisionGeometryd* shape :
-         std::initializer_list<const fcl::CollisionGeometryd*>{&cylinder, &box, &ball, &cone, &capsule}) {
+    for (const fcl::CollisionGeometryd* shape : test::Geometries<double>{&cylinder, &box, &ball, &cone, &capsule}) {
       for (int i = 0; i < 20; ++i) {
         auto X = test::pose<double>(test::randomRotation(g), Eigen::Vector3d(0, 0, 3 + i) * s);
         fcl::DistanceResultd result;
@@ -520,8 +517,7 @@ TEST(IsCloserThan, IsThatOfDistancesAtAnySize) {
   for (const double far : {1e60, 1e90, 1e155, 1e160, 1e300}) {
     const auto X = test::pose<double>(Eigen::Matrix3d::Identity(), {far, 0, 0});
     for (const fcl::CollisionGeometryd* a : {&exact, &spheres}) {
-      for (const fcl::CollisionGeometryd* b :
-           std::initializer_list<const fcl::CollisionGeometryd*>{&ball, &exact, &spheres}) {
+      for (const fcl::CollisionGeometryd* b : test::Geometries<double>{&ball, &exact, &spheres}) {
         EXPECT_FALSE(isCloserThan<double>(a, X, b, I, far / 2)) << far;
         EXPECT_TRUE(isCloserThan<double>(b, I, a, X, far * 2)) << far;
       }

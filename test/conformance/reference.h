@@ -5,6 +5,7 @@
 #include <fcl/geometry/bvh/BVH_model.h>
 #include <gtest/gtest.h>
 
+#include <initializer_list>
 #include <set>
 #include <utility>
 #include <vector>
@@ -22,6 +23,10 @@ constexpr double kAtContact = 0;
 #endif
 
 using Scalars = testing::Types<float, double>;
+
+/// Geometries of several types that a loop goes through.
+template <typename S>
+using Geometries = std::initializer_list<const fcl::CollisionGeometry<S>*>;
 
 using Pairs = std::set<std::pair<std::intptr_t, std::intptr_t>>;
 

@@ -413,8 +413,7 @@ TEST(ShapesDouble, NormalsOfContactsAreUnitVectors) {
   X.linear() *= 1 + 4.9e-4;
   fcl::CollisionRequestd request(1000, true);
   std::size_t contacts = 0;
-  for (const fcl::CollisionGeometryd* partner :
-       std::initializer_list<const fcl::CollisionGeometryd*>{&ball, &box, &other}) {
+  for (const fcl::CollisionGeometryd* partner : test::Geometries<double>{&ball, &box, &other}) {
     for (const bool turned : {false, true}) {
       fcl::CollisionResultd result;
       const auto Y = test::pose<double>(Eigen::Matrix3d::Identity(), {0.9, 0.1, 0.2});

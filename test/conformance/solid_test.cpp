@@ -168,8 +168,7 @@ TEST(SolidModel, NormalsFromInsideAreInTheCallersOrder) {
   const Modeld model(small.mesh());
   const auto bvh = test::bvh<fcl::OBBRSSd>(small);
   const auto I = test::pose<double>(Eigen::Matrix3d::Identity(), {0, 0, 0});
-  for (const fcl::CollisionGeometryd* inner :
-       {static_cast<const fcl::CollisionGeometryd*>(&model), static_cast<const fcl::CollisionGeometryd*>(bvh.get())}) {
+  for (const fcl::CollisionGeometryd* inner : test::Geometries<double>{&model, bvh.get()}) {
     fcl::CollisionRequestd request(10, true);
     fcl::CollisionResultd one, two;
     ASSERT_EQ(fcl::collide(&outer, I, inner, I, request, one), 1u);
@@ -286,8 +285,7 @@ TEST(SolidModel, WhatReachesInWithItsFarthestPieceCollides) {
     // The way leads along x, into the face at 0.
     const Eigen::Matrix3d R = test::turnOnto(direction, Eigen::Vector3d::UnitX());
     const auto X = test::pose<double>(R, Eigen::Vector3d(depth, 0.5, 0.5) - R * (9 * direction));
-    for (const fcl::CollisionGeometryd* partner : {static_cast<const fcl::CollisionGeometryd*>(&model),
-                                                   static_cast<const fcl::CollisionGeometryd*>(bvh.get())}) {
+    for (const fcl::CollisionGeometryd* partner : test::Geometries<double>{&model, bvh.get()}) {
       EXPECT_EQ(test::touching<double>(box, I, *partner, X), depth > 0);
       EXPECT_EQ(test::touching<double>(*partner, X, box, I), depth > 0);
     }
