@@ -424,19 +424,11 @@ std::size_t wrongDeepOctants(ComputeOracle& oracle) {
   Surface surface = surfaceOf(test::soup(2000, 3));
   surface.device = oracle.makeResident(surface);
   std::vector<std::uint32_t> ids(60000);
-  std::vector<ExpansionRequest> batch(ids.size());
-  for (std::size_t i = 0; i < batch.size(); ++i) {
-    ExpansionRequest& e = batch[i];
-    e.surface = &surface;
-    e.ids = &ids[i];
-    e.count = 1;
+  std::vector<ExpansionRequest> batch;
+  for (std::size_t i = 0; i < ids.size(); ++i) {
     ids[i] = static_cast<std::uint32_t>(g() % surface.triangle_count);
-    const Eigen::Vector3d p = surface.corner(ids[i], static_cast<int>(i % 3));
-    e.cell.level = 14 + static_cast<int>(i % 3);
-    for (int k = 0; k < 3; ++k) {
-      e.cell.at[static_cast<std::size_t>(k)] =
-          std::min(static_cast<std::uint32_t>(p[k] / e.cell.side()), (1u << (e.cell.level - 1)) - 1);
-    }
+    const int k = static_cast<int>(i % 3);
+    batch.push_back(requestFor(surface, cellAbout(surface.corner(ids[i], k), 14 + k), &ids[i], 1));
   }
   std::size_t wrong = 0;
   const std::vector<ExpansionRequest> answers = ask(oracle, batch);

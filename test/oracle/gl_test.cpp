@@ -215,20 +215,12 @@ TEST(Compute, AHundredThousandCellsInABatch) {
                 b = residentOn(oracle, surfaceOf(test::soup(2000, 3)));
   std::mt19937_64 g(5);
   std::vector<std::uint32_t> ids(100000);
-  std::vector<ExpansionRequest> batch(100000);
-  for (std::size_t i = 0; i < batch.size(); ++i) {
-    ExpansionRequest& e = batch[i];
-    e.surface = i % 2 ? &a : &b;
-    e.ids = &ids[i];
-    e.count = 1;
-    ids[i] = static_cast<std::uint32_t>(g() % e.surface->triangle_count);
-    // A cell about a corner of the triangle.
-    const Eigen::Vector3d p = e.surface->corner(ids[i], 0);
-    e.cell.level = 2 + static_cast<int>(g() % 8);
-    for (int k = 0; k < 3; ++k) {
-      e.cell.at[static_cast<std::size_t>(k)] =
-          std::min(static_cast<std::uint32_t>(p[k] / e.cell.side()), (1u << (e.cell.level - 1)) - 1);
-    }
+  std::vector<ExpansionRequest> batch;
+  for (std::size_t i = 0; i < ids.size(); ++i) {
+    const Surface& surface = i % 2 ? a : b;
+    ids[i] = static_cast<std::uint32_t>(g() % surface.triangle_count);
+    const int level = 2 + static_cast<int>(g() % 8);
+    batch.push_back(requestFor(surface, cellAbout(surface.corner(ids[i], 0), level), &ids[i], 1));
   }
   const std::vector<ExpansionRequest> answers = ask(oracle, batch);
   std::size_t grey = 0;

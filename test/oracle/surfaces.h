@@ -4,6 +4,7 @@
 
 #include <gtest/gtest.h>
 
+#include <algorithm>
 #include <memory>
 #include <vector>
 
@@ -47,6 +48,16 @@ inline ExpansionRequest rootOf(const Surface& surface) {
   root.surface = &surface;
   root.count = surface.triangle_count;
   return root;
+}
+
+/// The cell of a level in which a point is; of the root cube's far faces, the last one.
+inline lattice::Cell cellAbout(const Eigen::Vector3d& p, int level) {
+  lattice::Cell cell;
+  cell.level = level;
+  for (std::size_t k = 0; k < 3; ++k) {
+    cell.at[k] = std::min(static_cast<std::uint32_t>(p[static_cast<int>(k)] / cell.side()), (1u << (level - 1)) - 1);
+  }
+  return cell;
 }
 
 /// The question about `count` triangles and a cell; the ids must outlive it.
