@@ -132,11 +132,10 @@ Animation::Run Animation::runOnce(const Setting& setting) const {
   options.ttl = kMaxTime;
   options.clock = [&now] { return now; };
 
-  const Modeld object(scaled(*object_, setting.dimension), options);
-  std::array<std::unique_ptr<Modeld>, kObstacles> obstacles;
-  for (std::size_t i = 0; i < kObstacles; ++i) {
-    obstacles[i] = std::make_unique<Modeld>(scaled(*obstacles_[i], setting.dimension), options);
-  }
+  std::vector<std::unique_ptr<Modeld>> models;  // the obstacles, then the object
+  for (const auto& mesh : obstacles_)
+    models.push_back(std::make_unique<Modeld>(scaled(*mesh, setting.dimension), options));
+  models.push_back(std::make_unique<Modeld>(scaled(*object_, setting.dimension), options));
   const std::shared_ptr<oracle::Oracle> oracle =
       oracle::makeOracle(setting.oracle, options.answer, options.paper.viewport);
 
@@ -154,17 +153,15 @@ Animation::Run Animation::runOnce(const Setting& setting) const {
     for (std::size_t i = 0; i < kObstacles; ++i) {
       const fcl::CollisionRequestd request;
       fcl::CollisionResultd result;
-      fcl::collide(&object, X_WO, obstacles[i].get(), poseOf(i), request, result);
+      fcl::collide(models.back().get(), X_WO, models[i].get(), poseOf(i), request, result);
       hit = hit || result.isCollision();
     }
     const double took = watch.microseconds();
 
-    Statistics s = object.statistics();
-    std::uint64_t octants_now = s.expanded_octants;
-    run.last_nodes = s.resident_nodes;
-    run.pruned_nodes = s.pruned_nodes;
-    for (const auto& obstacle : obstacles) {
-      s = obstacle->statistics();
+    std::uint64_t octants_now = 0;
+    run.last_nodes = run.pruned_nodes = 0;
+    for (const auto& model : models) {
+      const Statistics s = model->statistics();
       octants_now += s.expanded_octants;
       run.last_nodes += s.resident_nodes;
       run.pruned_nodes += s.pruned_nodes;
