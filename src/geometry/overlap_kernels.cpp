@@ -351,6 +351,7 @@ void TakeRows(const RawTriangles& placed, const TriangleBounds& bounds, std::uin
 // The corner of a triangle that is alone on its side of a plane, and its edges; `above` as the corners are over it.
 struct Fork {
   Vec3 corner, edge[2];
+  V above, above_ends[2];  // the corner's height, and those of the edges' other ends
 };
 
 HWY_INLINE Fork forkOf(const Vec3 (&t)[3], V above0, V above1, V above2) {
@@ -360,7 +361,10 @@ HWY_INLINE Fork forkOf(const Vec3 (&t)[3], V above0, V above1, V above2) {
   const M alone1 = hn::AndNot(other2, other1), alone2 = hn::AndNot(other1, other2);
   const Vec3 corner = choose(alone1, t[1], choose(alone2, t[2], t[0]));
   // The others: that after it comes in place 0 or 1 of two, either will do.
-  return {corner, {sub(choose(alone1, t[0], t[1]), corner), sub(choose(alone2, t[0], t[2]), corner)}};
+  return {corner,
+          {sub(choose(alone1, t[0], t[1]), corner), sub(choose(alone2, t[0], t[2]), corner)},
+          hn::IfThenElse(alone1, above1, hn::IfThenElse(alone2, above2, above0)),
+          {hn::IfThenElse(alone1, above0, above1), hn::IfThenElse(alone2, above0, above2)}};
 }
 
 // Triangles of a pack, those wanted one after the other, and their boxes as far as they matter.
@@ -497,6 +501,36 @@ struct PairBits {
   std::uint32_t possible, certain;
 };
 
+// A vector of one PackCut.
+struct Ahead {
+  Vec3 direction;
+  V rounding_margin;  // of coordinates along it
+  V most;
+};
+
+HWY_INLINE Ahead aheadOf(const PackCut& cut, float size, const Limits& limits) {
+  const D d;
+  const Vec3 way = broadcast(cut.direction[0], cut.direction[1], cut.direction[2]);
+  return {way, hn::Mul(norm1(way), hn::Set(d, limits.moved + 16 * 0x1p-24f * size)), hn::Set(d, cut.most)};
+}
+
+// A lower bound of where a triangle meets another: that of its corners and, where these are clearly on both sides of
+// the other's plane, that of its cut. Heights are off by less than `off`.
+HWY_INLINE V leastOfCut(const Vec3 (&t)[3], const Fork& fork, M is_cut, V off, const Ahead& ahead) {
+  const D d;
+  const Vec3& direction = ahead.direction;
+  V least = hn::Set(d, std::numeric_limits<float>::infinity());
+  BOCST_UNROLL
+  for (int e = 0; e < 2; ++e) {
+    const V way = dot(direction, fork.edge[e]), drop = hn::Sub(fork.above, fork.above_ends[e]);
+    const V at = hn::Div(hn::Mul(way, fork.above), drop);
+    least = hn::Min(least, hn::Sub(at, hn::Abs(hn::Div(hn::Mul(way, off), drop))));
+  }
+  least = hn::Add(dot(direction, fork.corner), least);
+  const V of_corners = min3(dot(direction, t[0]), dot(direction, t[1]), dot(direction, t[2]));
+  return hn::Sub(hn::IfThenElse(is_cut, hn::Max(least, of_corners), of_corners), ahead.rounding_margin);
+}
+
 // Are p and q apart along a cross product of their edges? w: the corners of q from p[0] on. Any axis will do, whatever
 // it was computed from: with u = 2^-24, corners are off by 25 u of the size and the tolerance, what w and the two
 // products round is below 16 u times the sum of the axis's entries; the limits have 64 u of the size and the tolerance.
@@ -537,10 +571,10 @@ struct SlabLanes {
   V middle, half;
 };
 
-// slab: of p, or null.
+// slab: of p, or null. ahead: null, or `begin` is set.
 template <typename Slab>
 HWY_INLINE PairBits testPairs(const Vec3 (&p)[3], const Vec3 (&q)[3], const Slab* slab, const Limits& limits,
-                              bool one_will_do, M pairs) {
+                              bool one_will_do, M pairs, const Ahead* ahead, V& begin) {
   constexpr bool kSlab = std::is_same<Slab, SlabLanes>::value;
   const D d;
   const float u = 0x1p-24f;
@@ -579,9 +613,11 @@ HWY_INLINE PairBits testPairs(const Vec3 (&p)[3], const Vec3 (&q)[3], const Slab
   } else {
     n_off = offNormal(of_p.longest);
   }
-  M clear = hn::Gt(min3(hn::Abs(n0), hn::Abs(n1), hn::Abs(n2)), n_off);
-  clear = hn::And(clear, hn::Gt(min3(hn::Abs(m0), hn::Abs(m1), hn::Abs(m2)), offNormal(of_q.longest)));
-  clear = hn::And(clear, hn::Gt(shorter, hn::Set(d, 64 * limits.moved)));
+  const V m_off = offNormal(of_q.longest);
+  const M long_enough = hn::Gt(shorter, hn::Set(d, 64 * limits.moved));
+  const M clear_n = hn::And(long_enough, hn::Gt(min3(hn::Abs(n0), hn::Abs(n1), hn::Abs(n2)), n_off));
+  const M clear_m = hn::And(long_enough, hn::Gt(min3(hn::Abs(m0), hn::Abs(m1), hn::Abs(m2)), m_off));
+  const M clear = hn::And(clear_n, clear_m);
   // Each cuts the other's plane with the edges from its corner that is alone on its side, in an interval of the line of
   // both planes. The determinant of two such edges says where an end of the one lies to an end of the other; the
   // intervals share no point when all ends of the one lie to one side of all of the other.
@@ -591,7 +627,8 @@ HWY_INLINE PairBits testPairs(const Vec3 (&p)[3], const Vec3 (&q)[3], const Slab
   const V low = hn::Min(hn::Min(d00, d01), hn::Min(d10, d11)), high = hn::Max(hn::Max(d00, d01), hn::Max(d10, d11));
   const M beside = hn::Or(hn::Gt(low, edges_off), hn::Lt(high, hn::Neg(edges_off)));
   const M across = hn::And(hn::Lt(low, hn::Neg(edges_off)), hn::Gt(high, edges_off));
-  const M cut = hn::Gt(hn::Min(by_n, by_m), hn::Zero(d));
+  const M cut_by_n = hn::Gt(by_n, hn::Zero(d)), cut_by_m = hn::Gt(by_m, hn::Zero(d));
+  const M cut = hn::And(cut_by_n, cut_by_m);
   // With a margin, what shares no point may touch.
   M possible = limits.margin > 0 ? near : hn::AndNot(hn::And(clear, hn::Or(hn::Not(cut), beside)), near);
   M certain = hn::And(hn::And(near, clear), hn::And(cut, across));
@@ -606,6 +643,11 @@ HWY_INLINE PairBits testPairs(const Vec3 (&p)[3], const Vec3 (&q)[3], const Slab
     certain =
         hn::Or(certain, hn::And(near, hn::Le(squareBetweenCorners(p, q), hn::Set(d, limits.margin * limits.margin))));
   }
+  if (ahead != nullptr) {
+    begin = hn::Max(leastOfCut(p, fp, hn::And(clear_m, cut_by_m), m_off, *ahead),
+                    leastOfCut(q, fq, hn::And(clear_n, cut_by_n), n_off, *ahead));
+    possible = hn::And(possible, hn::Le(begin, ahead->most));
+  }
   const M doubtful = hn::AndNot(certain, possible);
   if (!hn::AllFalse(d, doubtful) && (!one_will_do || hn::AllFalse(d, certain))) {
     possible = hn::AndNot(hn::And(doubtful, apartByEdges(of_p, of_q, w, limits, doubtful)), possible);
@@ -616,13 +658,16 @@ HWY_INLINE PairBits testPairs(const Vec3 (&p)[3], const Vec3 (&q)[3], const Slab
 template <bool kSlabs>
 HWY_INLINE std::size_t touching(const TrianglePack& rows, std::uint32_t which, const TrianglePack& lanes,
                                 const PackRegion& region, float tolerance, float margin, bool one_will_do,
-                                PackPair* pairs, const PackSlabs* slabs) {
+                                PackPair* pairs, const PackSlabs* slabs, const PackCut* cut) {
   const D d;
   const hn::RebindToSigned<D> di;
   constexpr std::size_t kMost = hn::MaxLanes(D());
   const float size = std::max(rows.size, lanes.size) * 1.0001f;
   const Limits limits = limitsOf(size, lanes.size, tolerance, margin);
   const V extent = hn::Set(d, 64 * 0x1p-24f * size + tolerance);
+  Ahead along;
+  if (cut != nullptr) along = aheadOf(*cut, size, limits);
+  const Ahead* const ahead = cut == nullptr ? nullptr : &along;
   std::size_t found = 0;
   PickedRows picked;
   pickRows(rows, slabs, which, region, extent, picked);
@@ -651,6 +696,7 @@ HWY_INLINE std::size_t touching(const TrianglePack& rows, std::uint32_t which, c
                   hn::TableLookupLanes(lane_corner[k].z, lane)};
         }
         PairBits bits;
+        V bound = hn::Zero(d);
         if constexpr (kSlabs) {
           const auto slabRow = [&](const float* from)
                                    HWY_ATTR { return hn::TableLookupLanes(hn::Load(d, from + j), row); };
@@ -658,14 +704,17 @@ HWY_INLINE std::size_t touching(const TrianglePack& rows, std::uint32_t which, c
           const SlabLanes slab{{slabRow(of.normal[0]), slabRow(of.normal[1]), slabRow(of.normal[2])},
                                slabRow(of.middle),
                                slabRow(of.half)};
-          bits = testPairs(p, q, &slab, limits, one_will_do, hn::FirstN(d, count - at));
+          bits = testPairs(p, q, &slab, limits, one_will_do, hn::FirstN(d, count - at), ahead, bound);
         } else {
-          bits = testPairs(p, q, static_cast<const void*>(nullptr), limits, one_will_do, hn::FirstN(d, count - at));
+          bits = testPairs(p, q, static_cast<const void*>(nullptr), limits, one_will_do, hn::FirstN(d, count - at),
+                           ahead, bound);
         }
+        alignas(64) float least[kMost];
+        hn::Store(bound, d, least);
         const auto pairAt = [&](std::size_t in) HWY_ATTR {
           const auto met = static_cast<std::size_t>(which_pair[at + in]);
           return PackPair{picked.row[j + met / 8], static_cast<std::uint8_t>(i + met % 8),
-                          (bits.certain >> in & 1) != 0};
+                          (bits.certain >> in & 1) != 0, least[in]};
         };
         const std::uint32_t certain = bits.possible & bits.certain;
         if (one_will_do && certain != 0) {
@@ -683,9 +732,10 @@ HWY_INLINE std::size_t touching(const TrianglePack& rows, std::uint32_t which, c
 
 std::size_t TouchingPairs(const TrianglePack& rows, std::uint32_t which, const TrianglePack& lanes,
                           const PackRegion& region, float tolerance, float margin, bool one_will_do, PackPair* pairs,
-                          const PackSlabs* slabs) {
-  return slabs == nullptr ? touching<false>(rows, which, lanes, region, tolerance, margin, one_will_do, pairs, slabs)
-                          : touching<true>(rows, which, lanes, region, tolerance, margin, one_will_do, pairs, slabs);
+                          const PackSlabs* slabs, const PackCut* cut) {
+  return slabs == nullptr
+             ? touching<false>(rows, which, lanes, region, tolerance, margin, one_will_do, pairs, slabs, cut)
+             : touching<true>(rows, which, lanes, region, tolerance, margin, one_will_do, pairs, slabs, cut);
 }
 
 }  // namespace bocst::query::HWY_NAMESPACE
@@ -736,8 +786,9 @@ void takeRows(const RawTriangles& placed, const TriangleBounds& bounds, std::uin
 
 std::size_t touchingPairs(const TrianglePack& rows, std::uint32_t which, const TrianglePack& lanes,
                           const PackRegion& region, float tolerance, float margin, bool one_will_do, PackPair* pairs,
-                          const PackSlabs* slabs) {
-  return HWY_DYNAMIC_DISPATCH(TouchingPairs)(rows, which, lanes, region, tolerance, margin, one_will_do, pairs, slabs);
+                          const PackSlabs* slabs, const PackCut* cut) {
+  return HWY_DYNAMIC_DISPATCH(TouchingPairs)(rows, which, lanes, region, tolerance, margin, one_will_do, pairs, slabs,
+                                             cut);
 }
 
 }  // namespace bocst::query

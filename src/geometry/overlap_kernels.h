@@ -99,6 +99,14 @@ void moveTriangles(const TrianglePack& pack, std::uint32_t which, const PackMoti
 struct PackPair {
   std::uint8_t row, lane;
   bool certain;  ///< They surely meet.
+  float least;   ///< See touchingPairs().
+};
+
+/// Only pairs that may touch in a point whose coordinate along this direction, of any length, is at most so large are
+/// wanted. In the frame of the packs.
+struct PackCut {
+  float direction[3];
+  float most;
 };
 
 /// What bounds each triangle of a pack along a direction of its own, in the pack's frame. Computed in double: in float,
@@ -136,8 +144,13 @@ void takeRows(const RawTriangles& placed, const TriangleBounds& bounds, std::uin
 /// With slabs, corners of lanes are on known sides where they are off the slab by 12 u m + tolerance, m the size of the
 /// lanes. A pair is certain to meet only where the former hold for the row, too, with the tolerance for s, and its
 /// normal is no less than 1e-3 E^2.
+///
+/// `cut`: not null only if the margin is 0. Then `least` is a lower bound, along its direction, of all points in which
+/// the two touch, and pairs beyond it are left out. An edge with ends at heights g > 0 and h < 0 from a plane, both
+/// off by less than e, crosses it at g / (g
+/// - h) of its length, off by less than e / (g - h).
 std::size_t touchingPairs(const TrianglePack& rows, std::uint32_t which, const TrianglePack& lanes,
                           const PackRegion& region, float tolerance, float margin, bool one_will_do, PackPair* pairs,
-                          const PackSlabs* slabs = nullptr);
+                          const PackSlabs* slabs = nullptr, const PackCut* cut = nullptr);
 
 }  // namespace bocst::query

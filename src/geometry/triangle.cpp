@@ -377,7 +377,7 @@ bool clearlyCutByPlane(const Corners& t, const Corners& other, const Vector3d& n
 
 }  // namespace
 
-std::optional<double> farEndOfCut(const Corners& p, const Corners& q, const Vector3d& direction, double tolerance) {
+std::optional<double> nearEndOfCut(const Corners& p, const Corners& q, const Vector3d& direction, double tolerance) {
   const Vector3d normal_p = (p[1] - p[0]).cross(p[2] - p[0]), normal_q = (q[1] - q[0]).cross(q[2] - q[0]);
   const Vector3d line = normal_p.cross(normal_q);
   // The order of points along the line is that of their coordinates along its direction, which must be known.
@@ -392,7 +392,7 @@ std::optional<double> farEndOfCut(const Corners& p, const Corners& q, const Vect
   const Vector3d& from = line.dot(of_p[0]) > line.dot(of_q[0]) ? of_p[0] : of_q[0];
   const Vector3d& to = line.dot(of_p[1]) < line.dot(of_q[1]) ? of_p[1] : of_q[1];
   if (line.dot(from) > line.dot(to)) return {};
-  return std::max(direction.dot(from), direction.dot(to));
+  return std::min(direction.dot(from), direction.dot(to));
 }
 
 Vector3d closestPoint(const Vector3d& x, const Corners& t) {

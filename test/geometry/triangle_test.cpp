@@ -228,7 +228,7 @@ TEST(EdgesTouch, FindsWhatSharesAPointOfEdges) {
 }
 
 // The points in which edges of one cut the other end the segment that both share.
-TEST(FarEndOfCut, IsTheFarthestPointOfBoth) {
+TEST(NearEndOfCut, IsTheFirstPointOfBoth) {
   std::mt19937_64 g(11);
   std::uniform_real_distribution<double> u(-1, 1);
   std::uniform_int_distribution<int> step(-3, 3);
@@ -246,9 +246,9 @@ TEST(FarEndOfCut, IsTheFarthestPointOfBoth) {
     }
     const Vector3d direction = round % 3 == 0 ? Vector3d(0, 0, 2) : Vector3d(u(g), u(g), u(g));
     const double tolerance = 1e-6;
-    const auto end = farEndOfCut(p, q, direction, tolerance), same = farEndOfCut(q, p, direction, tolerance);
+    const auto end = nearEndOfCut(p, q, direction, tolerance), same = nearEndOfCut(q, p, direction, tolerance);
     ASSERT_EQ(end.has_value(), same.has_value());
-    double expected = -std::numeric_limits<double>::infinity();
+    double expected = std::numeric_limits<double>::infinity();
     for (const auto& [t, other] : {std::make_pair(&p, &q), std::make_pair(&q, &p)}) {
       for (int k = 0; k < 3; ++k) {
         const Vector3d begin = (*t)[k], way = (*t)[(k + 1) % 3] - begin;
@@ -259,7 +259,7 @@ TEST(FarEndOfCut, IsTheFarthestPointOfBoth) {
         if (!lu.isInvertible()) continue;
         const Eigen::Matrix<long double, 3, 1> x = lu.solve((begin - (*other)[0]).cast<long double>());
         if (!(x.minCoeff() >= -1e-9L && x[0] + x[1] <= 1 + 1e-9L && x[2] <= 1 + 1e-9L)) continue;
-        expected = std::max(expected, direction.dot(begin) + static_cast<double>(x[2]) * direction.dot(way));
+        expected = std::min(expected, direction.dot(begin) + static_cast<double>(x[2]) * direction.dot(way));
       }
     }
     if (!end.has_value()) {

@@ -277,10 +277,56 @@ PackRegion everywhere() {
   return {{-kInfinity, -kInfinity, -kInfinity}, {kInfinity, kInfinity, kInfinity}, {0, 0, 0}, -kInfinity, kInfinity};
 }
 
+void takeCorners(const TrianglePack& pack, std::size_t i, Corners& t) {
+  for (std::size_t k = 0; k < 9; ++k) t[k / 3][static_cast<int>(k % 3)] = static_cast<double>(pack.xyz[k][i]);
+}
+
+// How many pairs had a bound, and how many a close one.
+struct BoundedPairs {
+  std::size_t all = 0, close = 0;
+};
+
+// Where pairs clearly cut each other, their bounds along a direction hold, and none is left out that begins before the
+// cut.
+void expectBoundsAlong(std::mt19937_64& g, const TrianglePack& rows, const TrianglePack& lanes, float tolerance,
+                       const PackSlabs* slabs, BoundedPairs& bounded) {
+  const Eigen::Vector3f along = test::randomDirection(g).cast<float>() * static_cast<float>(1 + g() % 3);
+  const Eigen::Vector3d direction = along.cast<double>();
+  const auto size = static_cast<double>(std::max(rows.size, lanes.size));
+  const double computed = 1e-9 * size * direction.norm();  // what the reference may be off by
+  const auto ask = [&](float most, PackPair* found) {
+    const PackCut cut = {{along[0], along[1], along[2]}, most};
+    return touchingPairs(rows, ~0u >> (32 - rows.count), lanes, everywhere(), tolerance, 0, false, found, slabs, &cut);
+  };
+  PackPair found[TrianglePack::kCapacity * TrianglePack::kCapacity];
+  const std::size_t count = ask(std::numeric_limits<float>::infinity(), found);
+  std::map<std::pair<int, int>, double> begins;
+  for (std::size_t k = 0; k < count; ++k) {
+    Corners p, q;
+    takeCorners(rows, found[k].row, p);
+    takeCorners(lanes, found[k].lane, q);
+    const auto begin = nearEndOfCut(p, q, direction, 1e-9 * size);
+    if (!begin.has_value()) continue;
+    const auto least = static_cast<double>(found[k].least);
+    ASSERT_LE(least, *begin + computed);
+    ++bounded.all;
+    bounded.close += least > *begin - 1e-3 * size;
+    begins[{found[k].row, found[k].lane}] = *begin;
+  }
+  if (begins.empty()) return;
+  const auto most = static_cast<float>(std::next(begins.begin(), static_cast<int>(g() % begins.size()))->second);
+  const std::size_t fewer = ask(most, found);
+  for (std::size_t k = 0; k < fewer; ++k) begins.erase({found[k].row, found[k].lane});
+  for (const auto& left_out : begins) {
+    ASSERT_GT(left_out.second, static_cast<double>(most) - 1e-6 * static_cast<double>(std::abs(most)) - computed);
+  }
+}
+
 TEST_P(EveryTarget, NoPairIsLostThatFclFinds) {
   std::mt19937_64 g(3);
   std::uniform_real_distribution<double> u(-1, 1);
   std::uint64_t hits = 0, candidates = 0, pairs = 0, certain = 0;
+  BoundedPairs bounded;
   for (int round = 0; round < 400; ++round) {
     const double scale = std::pow(10.0, 6 * u(g));
     TrianglePack a, b;
@@ -319,6 +365,7 @@ TEST_P(EveryTarget, NoPairIsLostThatFclFinds) {
     for (std::size_t k = 0; k < count; ++k) set[{found[k].row, found[k].lane}] = found[k].certain;
     ASSERT_EQ(set.size(), count);
     candidates += count;
+    ASSERT_NO_FATAL_FAILURE(expectBoundsAlong(g, a, b, 0, nullptr, bounded)) << "round " << round;
     // Where one pair will do, a certain one if there is any, else the same as before.
     PackPair one[TrianglePack::kCapacity * TrianglePack::kCapacity];
     const std::size_t fewer = touchingPairs(a, ~0u >> (32 - a.count), b, everywhere(), 0, 0, true, one);
@@ -353,6 +400,8 @@ TEST_P(EveryTarget, NoPairIsLostThatFclFinds) {
     }
   }
   EXPECT_GT(hits, 3000u);
+  EXPECT_GT(bounded.all, 1000u);
+  EXPECT_GT(bounded.close, bounded.all / 2);
   EXPECT_LT(candidates, hits + pairs / 25) << "a filter that lets everything through proves nothing";
   EXPECT_GT(certain, hits / 2) << "what is never certain is never wrong";
 }
@@ -502,6 +551,7 @@ void noPairIsLostBesideLargeTriangles() {
   };
   const PackTransform identity = {{{1, 0, 0}, {0, 1, 0}, {0, 0, 1}}, {0, 0, 0}};
   std::size_t pairs = 0, met = 0, certain = 0, found_free = 0, free = 0;
+  BoundedPairs bounded;
   for (int round = 0; round < 1500; ++round) {
     const double scale = std::pow(10.0, 3 * u(g)), large_size = std::pow(10.0, 3 * std::abs(u(g)));
     TrianglePack small;
@@ -559,6 +609,7 @@ void noPairIsLostBesideLargeTriangles() {
     std::map<std::pair<std::size_t, std::size_t>, bool> set;
     for (std::size_t k = 0; k < count; ++k) set[{found[k].row, found[k].lane}] = found[k].certain;
     ASSERT_EQ(set.size(), count);
+    ASSERT_NO_FATAL_FAILURE(expectBoundsAlong(g, rows, small, tolerance, &slabs, bounded)) << "round " << round;
     for (std::size_t r = 0; r < rows.count; ++r) {
       for (std::size_t j = 0; j < small.count; ++j) {
         const Corners &a = p[taken[r]], &b = q[j];
@@ -594,6 +645,8 @@ void noPairIsLostBesideLargeTriangles() {
   EXPECT_GT(met, 5000u);
   EXPECT_GT(certain, met / 6);
   EXPECT_LT(found_free, free / 20) << "a test that lets everything through proves nothing";
+  EXPECT_GT(bounded.all, 1000u);
+  EXPECT_GT(bounded.close, bounded.all / 2);
 }
 
 TEST_P(EveryTarget, NoPairIsLostBesideLargeTriangles) {

@@ -15,49 +15,56 @@
 namespace bocst::fcl_adapter {
 
 /// Which of many contacts a request for few gets: the first by place, then by the ids. The place of two triangles is
-/// the largest coordinate of the segment in which they cut each other, along the longest axis of the bounding box of
-/// the model's mesh, in the mesh's frame and length unit; where they do not clearly cut each other, and beside bodies,
-/// that of the corners of the model's triangle. The place of a cell is its Morton code, which has at most 48 bits. So
-/// the order is a property of mesh, pose and request, and a walk that wants the first few can leave out what lies
-/// beyond: where two triangles touch, no coordinate is larger than their place.
+/// the smallest coordinate of the segment in which they cut each other, along a direction near the longest axis of the
+/// bounding box of the model's mesh, in the mesh's frame and length unit; where they do not clearly cut each other, and
+/// beside bodies, the largest of the corners of the model's triangle. The place of a cell is its Morton code, which has
+/// at most 48 bits. So the order is a property of mesh, pose and request, and a walk that wants the first few can leave
+/// out what lies beyond: where two triangles touch, they do so in a point whose coordinate is no larger than their
+/// place.
 class ContactOrder {
  public:
   explicit ContactOrder(const tree::Tree& model) : surface_(model.surface()) {
-    if (surface_.mesh != nullptr) surface_.mesh->bounds().diagonal().maxCoeff(&axis_);
+    if (surface_.mesh == nullptr) return;
+    int longest = 0;
+    surface_.mesh->bounds().diagonal().maxCoeff(&longest);
+    direction_[longest] = 1;
+    // Parts have flat faces across that axis, in which all places would be the same.
+    direction_[(longest + 1) % 3] = 0.03;
+    direction_[(longest + 2) % 3] = 0.02;
   }
 
   double placeOf(std::uint32_t t) const {
     const auto& i = surface_.mesh->indices(t);
-    return std::max(
-        {surface_.mesh->vertex(i[0])[axis_], surface_.mesh->vertex(i[1])[axis_], surface_.mesh->vertex(i[2])[axis_]});
+    const auto at = [&](std::uint32_t v) { return direction_.dot(surface_.mesh->vertex(v)); };
+    return std::max({at(i[0]), at(i[1]), at(i[2])});
   }
 
   /// The same of triangle t and one of another mesh, corners in any frame, from which `to_model` leads to the model's.
   double placeOf(std::uint32_t t, const query::Corners& p, const query::Corners& q,
                  const fcl::Transform3<double>& to_model) const {
-    const Eigen::Vector3d direction = to_model.linear().row(axis_);
-    const auto place = query::farEndOfCut(p, q, direction, kTolerance * surface_.lattice.unit());
-    return place ? *place + to_model.translation()[axis_] : placeOf(t);
+    const Eigen::Vector3d direction = to_model.linear().transpose() * direction_;
+    const auto place = query::nearEndOfCut(p, q, direction, kTolerance * surface_.lattice.unit());
+    return place ? *place + direction_.dot(to_model.translation()) : placeOf(t);
   }
 
   /// The cut of a walk in the model's lattice frame that has found nothing yet: it leaves nothing out.
   query::Cut startCut() const {
     query::Cut cut;
-    cut.axis = axis_;
+    cut.direction = direction_;
     return cut;
   }
-  /// What lies beyond this place along the axis may be left out of the walk. Positions may be off by `tolerance`
+  /// What lies beyond this place along the direction may be left out of the walk. Positions may be off by `tolerance`
   /// lattice units.
   void setCut(double place, double tolerance, query::Cut& cut) const {
     const lattice::Lattice& lattice = surface_.lattice;
-    cut.last = (place - lattice.origin()[axis_]) / lattice.unit() + tolerance;
+    cut.last = (place - direction_.dot(lattice.origin())) / lattice.unit() + tolerance * direction_.lpNorm<1>();
   }
 
  private:
   static constexpr double kTolerance = 0x1p-8;  // lattice units: less than Cut::isBeyond() adds
 
   const oracle::Surface& surface_;
-  int axis_ = 0;
+  Eigen::Vector3d direction_ = Eigen::Vector3d::UnitX();
 };
 
 /// The first items that a walk finds, a given number of them, in an order of contacts.

@@ -347,16 +347,23 @@ HWY_INLINE bool isBeyondCut(const PairSteps& s, int side, const StepNode& node) 
   if (node.lane == StepNode::kNoLane) return false;
   const Frame& f = s.frames[node.lane / 8];
   const std::uint32_t o = node.lane % 8;
-  return f.center[side][s.cut_axis][o] - f.half[side][s.cut_axis][o] > s.cut;
+  float least = 0;
+  for (int k = 0; k < 3; ++k) least += s.cut_direction[k] * (f.center[side][k][o] - f.half[side][k][o]);
+  return least > s.cut;
 }
 
-// Orders a side's octants by their least coordinates along the axis of the cut: that with the smallest is taken first.
+// Orders a side's octants by their least coordinates along the direction of the cut: that with the smallest is taken
+// first.
 HWY_INLINE void orderAlongCut(const PairSteps& s, int side, const Frame& f, std::uint32_t (&order)[8]) {
   const D d;
   const hn::RebindToUnsigned<D> du;
-  const V beyond = hn::Set(d, 4.0f * lattice::kMiddle);  // keeps the numbers positive: their bits are in their order
+  const V beyond = hn::Set(d, 16.0f * lattice::kMiddle);  // keeps the numbers positive: their bits are in their order
   for (std::size_t i = 0; i < 8; i += hn::Lanes(d)) {
-    const V least = hn::Sub(hn::Load(d, f.center[side][s.cut_axis] + i), hn::Load(d, f.half[side][s.cut_axis] + i));
+    V least = hn::Zero(d);
+    for (int k = 0; k < 3; ++k) {
+      const V at = hn::Sub(hn::Load(d, f.center[side][k] + i), hn::Load(d, f.half[side][k] + i));
+      least = hn::MulAdd(hn::Set(d, s.cut_direction[k]), at, least);
+    }
     const auto octant = hn::Iota(du, static_cast<std::uint32_t>(i));
     hn::StoreU(hn::Or(hn::AndNot(hn::Set(du, 7), hn::BitCast(du, hn::Sub(beyond, least))), octant), du, order + i);
   }
@@ -396,7 +403,7 @@ void NextEvent(PairSteps& s, StepEvent& event) {
   while (known || s.depth != 0) {
     if (!known) p = pop(s);
     known = false;
-    if (s.isCut() && (isBeyondCut(s, p.side, p.own) || isBeyondCut(s, 1 - p.side, p.other))) continue;
+    if (s.is_cut && (isBeyondCut(s, p.side, p.own) || isBeyondCut(s, 1 - p.side, p.other))) continue;
     if (s.cell_cut != nullptr &&
         s.isBeyondCellCut(p.side == 0 ? p.own.node : p.other.node, p.side == 0 ? p.other.node : p.own.node)) {
       continue;
@@ -422,7 +429,7 @@ void NextEvent(PairSteps& s, StepEvent& event) {
     const unsigned mask =
         overlapping(s.geometry, s.frames[block.frame], s.frames[other.lane / 8], other.lane % 8, block.at->grey, order);
     if (mask == 0) continue;
-    if (s.isCut()) orderAlongCut(s, x, s.frames[block.frame], order);
+    if (s.is_cut) orderAlongCut(s, x, s.frames[block.frame], order);
     if (s.cell_cut != nullptr && s.has_cells[x]) orderById(order);
     if (choice.has_larger_leaf && !s.has_cells[y]) {
       if (p.asked.side == AskedLeaf::kNone || !s.leaf[y]->know(other.node, p.asked.triangles)) {

@@ -81,14 +81,16 @@ struct PairSteps {
   /// No hit ends the walk: what is on the stack will be walked, so it is fetched ahead.
   bool sees_all = false;
 
-  /// Nodes whose least coordinate along this axis, in the frame of side 0, is larger than `cut` are left out; octants
-  /// come in the order of these coordinates. Axis 3: nothing is left out.
-  std::uint32_t cut_axis = 3;
-  float cut = 0;
-  bool isCut() const { return cut_axis < 3; }
+  /// Where it is cut, nodes whose least coordinate along this direction, in the frame of side 0, is larger than `cut`
+  /// are left out; octants come in the order of these coordinates.
+  bool is_cut = false;
+  float cut_direction[3];
+  float cut;
   void setCut(const Cut& c) {
-    cut_axis = static_cast<std::uint32_t>(c.axis);
-    cut = static_cast<float>(c.last - lattice::kMiddle) + geometry.rounding_margin;
+    is_cut = true;
+    for (int k = 0; k < 3; ++k) cut_direction[k] = static_cast<float>(c.direction[k]);
+    const double size = c.direction.sum();  // of entries that are not negative
+    cut = static_cast<float>(c.last - size * lattice::kMiddle) + static_cast<float>(size) * geometry.rounding_margin;
   }
 
   /// The same where a side has cells, by their ids. Null: nothing is left out.

@@ -107,7 +107,7 @@ bool TreeWalk::stepAll(PairSteps& steps, Scratch& s) {
         break;
       case StepEvent::kLeaves:
         if (testLeaves(event, s)) return true;
-        if (steps.isCut()) steps.setCut(*visitor_->cut());
+        if (steps.is_cut) steps.setCut(*visitor_->cut());
         break;
     }
   }

@@ -73,12 +73,15 @@ struct LeafVolume {
     }
   }
 
-  /// Leaves out what has a larger coordinate along an axis of its own frame. To be placed again.
-  void cutOff(int axis, double most) {
-    const double beyond = std::clamp(center[0][axis] + half[0][axis] - most, 0.0, 2 * half[0][axis]);
-    center[0][axis] -= beyond / 2;
-    half[0][axis] -= beyond / 2;
-    slab[0] += normal[0][axis] * beyond / 2;
+  /// Leaves out what lies beyond a cut in its own frame. To be placed again.
+  void cutOff(const Cut& cut) {
+    const Eigen::Vector3d least(center[0][0] - half[0][0], center[0][1] - half[0][1], center[0][2] - half[0][2]);
+    for (int k = 0; k < 3; ++k) {
+      const double beyond = std::max(2 * half[0][k] - cut.reach(least, k), 0.0);
+      center[0][k] -= beyond / 2;
+      half[0][k] -= beyond / 2;
+      slab[0] += normal[0][k] * beyond / 2;
+    }
   }
 
   void place(const SimilarityTransform& to_other) {
@@ -252,7 +255,7 @@ class LeafPairs {
       fillRegion(b.volume, a.volume, *a_in_b_, b.pack.size, b.error, region);
     } else {
       LeafVolume before_cut = a.volume;
-      before_cut.cutOff(cut_->axis, cut_->most());
+      before_cut.cutOff(*cut_);
       before_cut.place(*a_in_b_);
       fillRegion(b.volume, before_cut, *a_in_b_, b.pack.size, b.error, region);
     }
@@ -268,11 +271,49 @@ class LeafPairs {
     for (std::uint32_t left = lanes; left != 0; left &= left - 1)
       *id++ = b.id(static_cast<std::size_t>(__builtin_ctz(left)));
     const double error = static_cast<double>(a.error) + b_in_a_->scale * static_cast<double>(b.error);
-    const auto [tolerance, margin] = limits(*b_in_a_, error);
     tested_ += static_cast<std::size_t>(__builtin_popcount(rows)) * lanes_.count;
-    const std::size_t found = touchingPairs(a.pack, rows, lanes_, region, tolerance, margin, one_will_do_, found_);
-    for (std::size_t k = 0; k < found; ++k) {
-      if (f(a.id(found_[k].row), ids[found_[k].lane], found_[k].certain)) return true;
+    return reportPairs(a.pack, rows, lanes_, region, *b_in_a_, error, nullptr, placedCut(false, a.volume.center[0]),
+                       [&](const PackPair& pair) { return f(a.id(pair.row), ids[pair.lane], pair.certain); });
+  }
+
+  // The cut as packs see it; origin: the coordinate along its direction of the place that they are about.
+  struct PlacedCut {
+    double origin;
+    PackCut cut;
+  };
+
+  // Where there is a cut. `middle`: of the packs, in the frame of side B or else A.
+  PlacedCut placedCut(bool in_b, const double (&middle)[3]) const {
+    if (cut_ == nullptr) return {};
+    Eigen::RowVector3d row = cut_->direction;
+    double origin = 0;
+    if (in_b) {
+      origin = row.dot(b_in_a_->translation);
+      row *= b_in_a_->scale * b_in_a_->rotation;
+    }
+    const Eigen::RowVector3f direction = row.cast<float>();
+    origin += row.dot(Eigen::Vector3d(middle[0], middle[1], middle[2]));
+    return {origin, {{direction[0], direction[1], direction[2]}, static_cast<float>(cut_->most() - origin)}};
+  }
+
+  // Calls f for the pairs of touchingPairs(), where there is a cut only for those that may lie before it. Those that
+  // begin first come first then, as f lowers the cut.
+  template <typename F>
+  bool reportPairs(const TrianglePack& rows, std::uint32_t which, const TrianglePack& lanes, const PackRegion& region,
+                   const SimilarityTransform& to, double error, const PackSlabs* slabs, const PlacedCut& placed,
+                   F&& f) {
+    const auto [tolerance, margin] = limits(to, error);
+    const bool is_cut = cut_ != nullptr && to.margin == 0;
+    std::size_t found = touchingPairs(rows, which, lanes, region, tolerance, margin, one_will_do_, found_, slabs,
+                                      is_cut ? &placed.cut : nullptr);
+    if (!is_cut) {
+      return std::any_of(found_, found_ + found, f);
+    }
+    const auto later = [](const PackPair& x, const PackPair& y) { return x.least > y.least; };
+    std::make_heap(found_, found_ + found, later);
+    for (; found > 0 && !cut_->isBeyond(placed.origin + static_cast<double>(found_[0].least)); --found) {
+      std::pop_heap(found_, found_ + found, later);
+      if (f(found_[found - 1])) return true;
     }
     return false;
   }
@@ -290,13 +331,14 @@ class LeafPairs {
       for (std::uint32_t left = which; left != 0; left &= left - 1) {
         *id++ = large.id(static_cast<std::size_t>(__builtin_ctz(left)));
       }
-      if (testRows(leaf, to, ids, f)) return true;
+      if (testRows(leaf, to, ids, placedCut(&to == a_in_b_, c), f)) return true;
       if (begin + TrianglePack::kCapacity >= leaf.all) return false;
     }
   }
 
   template <typename Leaf, typename F>
-  bool testRows(const Leaf& leaf, const SimilarityTransform& to, const std::uint32_t* ids, F&& f) {
+  bool testRows(const Leaf& leaf, const SimilarityTransform& to, const std::uint32_t* ids, const PlacedCut& placed,
+                F&& f) {
     PackRegion region{};
     const double size = static_cast<double>(leaf.pack.size), error = static_cast<double>(leaf.error);
     const double rounding_margin = regionMargin(to, to.tolerance, size, error);
@@ -305,14 +347,9 @@ class LeafPairs {
       region.low[k] = -region.high[k];
     }
     const std::uint32_t all = rows_.count < 32 ? (1u << rows_.count) - 1 : ~0u;
-    const auto [tolerance, margin] = limits(to, error);
     tested_ += rows_.count * leaf.pack.count;
-    const std::size_t found =
-        touchingPairs(rows_, all, leaf.pack, region, tolerance, margin, one_will_do_, found_, &slabs_);
-    for (std::size_t k = 0; k < found; ++k) {
-      if (f(leaf.id(found_[k].lane), ids[found_[k].row], found_[k].certain)) return true;
-    }
-    return false;
+    return reportPairs(rows_, all, leaf.pack, region, to, error, &slabs_, placed,
+                       [&](const PackPair& pair) { return f(leaf.id(pair.lane), ids[pair.row], pair.certain); });
   }
 
   /// Tolerance and margin of touchingPairs(), of corners that are off by `error`.
@@ -350,8 +387,12 @@ class LeafPairs {
           static_cast<float>(std::min(own.half[0][k], displacement[k] + other.half[1][k]) + rounding_margin);
     }
     if (cut != nullptr) {
-      const int k = cut->axis;
-      region.high[k] = std::min(region.high[k], static_cast<float>(cut->most() - own.center[0][k] + rounding_margin));
+      Eigen::Vector3d least;
+      for (int k = 0; k < 3; ++k) least[k] = own.center[0][k] + static_cast<double>(region.low[k]);
+      for (int k = 0; k < 3; ++k) {
+        const double reach = cut->reach(least, k) + rounding_margin;
+        region.high[k] = std::min(region.high[k], static_cast<float>(static_cast<double>(region.low[k]) + reach));
+      }
     }
     const double half = to.scale * other.slab[1] + rounding_margin;
     region.slab_low = static_cast<float>(offset - half);

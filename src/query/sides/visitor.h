@@ -2,6 +2,7 @@
 #pragma once
 
 #include <Eigen/Core>
+#include <algorithm>
 #include <cstddef>
 #include <cstdint>
 #include <limits>
@@ -23,28 +24,38 @@ struct CellLeaf {
 };
 
 /// Limits of a walk that wants only the first pairs in their order; the visitor lowers them as it finds pairs. With
-/// exact answers, nodes are left out if their least coordinate along `axis` is larger than `last`: those of side A, and
-/// of side B where it has triangles. Where leaves are cells, nodes are left out if all their cells have ids larger than
-/// `last_cell`.
+/// exact answers, nodes are left out if their least coordinate along `direction` is larger than `last`: those of side
+/// A, and of side B where it has triangles. Where leaves are cells, nodes are left out if all their cells have ids
+/// larger than `last_cell`.
 struct Cut {
-  int axis = 0;                                           ///< Of the frame of A.
-  double last = std::numeric_limits<double>::infinity();  ///< Lattice units, in the frame of A.
+  Eigen::Vector3d direction = Eigen::Vector3d::UnitX();   ///< Frame of A; no entry is negative, none more than 1.
+  double last = std::numeric_limits<double>::infinity();  ///< Along direction, in lattice units.
   int cell_side = 0;                                      ///< Whose ids count if both sides have cells; 0: A, 1: B.
   std::uint64_t last_cell = ~std::uint64_t{0};
 
   double leastOf(const Volume& v) const {
-    const auto k = static_cast<std::size_t>(axis);
-    return v.center[k] - static_cast<double>(v.half[k]);
+    double least = 0;
+    for (std::size_t k = 0; k < 3; ++k) {
+      least += direction[static_cast<int>(k)] * (v.center[k] - static_cast<double>(v.half[k]));
+    }
+    return least;
   }
-  double leastOf(const OrientedVolume& v) const { return v.center[axis] - v.axes.row(axis).cwiseAbs().dot(v.half); }
+  double leastOf(const OrientedVolume& v) const {
+    return direction.dot(v.center) - (direction.transpose() * v.axes).cwiseAbs().dot(v.half);
+  }
   /// The same of a node of side B, in the frame of A.
   double leastOf(const Volume& v, const SimilarityTransform& to_a) const { return leastOf(oriented(v), to_a); }
   double leastOf(const OrientedVolume& v, const SimilarityTransform& to_a) const {
-    const Eigen::RowVector3d row = to_a.scale * to_a.rotation.row(axis);
-    return row.dot(v.center) + to_a.translation[axis] - (row * v.axes).cwiseAbs().dot(v.half);
+    const Eigen::RowVector3d row = to_a.scale * direction.transpose() * to_a.rotation;
+    return row.dot(v.center) + direction.dot(to_a.translation) - (row * v.axes).cwiseAbs().dot(v.half);
+  }
+  /// How far a box with these least coordinates may reach along axis k before all of its points are beyond the cut.
+  double reach(const Eigen::Vector3d& least, int k) const {
+    const double left = std::max(most() - direction.dot(least), 0.0);
+    return direction[k] > 0 ? left / direction[k] : std::numeric_limits<double>::infinity();
   }
   /// Half extents are rounded to float: by less than 2^-8 of a lattice unit, as is the middle.
-  double most() const { return last + 0x1p-6; }
+  double most() const { return last + 0x1p-5; }
   bool isBeyond(double least) const { return least > most(); }
 };
 
