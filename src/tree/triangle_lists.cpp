@@ -4,7 +4,6 @@
 #include <algorithm>
 #include <stdexcept>
 
-#include "log/assert.h"
 
 namespace bocst::tree {
 

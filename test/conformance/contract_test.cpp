@@ -133,15 +133,17 @@ class Contacts : public ::testing::Test {
     const Mesh& mesh = turned ? *b->mesh() : *a->mesh();
     const Eigen::Vector3d extent = mesh.bounds().diagonal();
     const int axis = extent[2] > std::max(extent[0], extent[1]) ? 2 : extent[1] > extent[0] ? 1 : 0;
-    const auto most = [axis](const Triangle& t) { return std::max({t[0][axis], t[1][axis], t[2][axis]}); };
+    const auto at = [axis](const Eigen::Vector3d& x) {
+      return x[axis] + 0.31 * x[(axis + 1) % 3] + 0.23 * x[(axis + 2) % 3];
+    };
     const Triangle own = triangle(mesh, turned ? s.b2 : s.b1, Eigen::Isometry3d::Identity());
-    const double corner = most(own);
+    const double corner = std::max({at(own[0]), at(own[1]), at(own[2])});
     const auto other = triangleOf(turned ? q.a : q.b, turned ? s.b1 : s.b2,
                                   (turned ? q.Y.inverse() * q.X : q.X.inverse() * q.Y).template cast<double>());
     if (!other.has_value() || (a != nullptr && a->options().margin > 0) || (b != nullptr && b->options().margin > 0)) {
       return {corner, corner};
     }
-    double cut = -std::numeric_limits<double>::infinity();
+    double cut = std::numeric_limits<double>::infinity();
     for (const auto& [p, t] : {std::make_pair(own, *other), std::make_pair(*other, own)}) {
       for (std::size_t k = 0; k < 3; ++k) {
         const Eigen::Vector3d begin = p[k], way = p[(k + 1) % 3] - begin;
@@ -151,7 +153,7 @@ class Contacts : public ::testing::Test {
         if (!lu.isInvertible()) continue;
         const Eigen::Vector3d x = lu.solve(begin - t[0]);
         if (!(x.minCoeff() > -1e-9 && x[0] + x[1] < 1 + 1e-9 && x[2] < 1 + 1e-9)) continue;
-        cut = std::max(cut, begin[axis] + x[2] * way[axis]);
+        cut = std::min(cut, at(begin) + x[2] * at(way));
       }
     }
     return {std::min(cut, corner), corner};

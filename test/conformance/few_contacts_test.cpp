@@ -39,8 +39,8 @@ Vector3d directionOf(const Mesh& mesh) {
   mesh.bounds().diagonal().maxCoeff(&longest);
   Vector3d direction;
   direction[longest] = 1;
-  direction[(longest + 1) % 3] = 0.03;
-  direction[(longest + 2) % 3] = 0.02;
+  direction[(longest + 1) % 3] = 0.31;
+  direction[(longest + 2) % 3] = 0.23;
   return direction;
 }
 

@@ -29,8 +29,8 @@ class ContactOrder {
     surface_.mesh->bounds().diagonal().maxCoeff(&longest);
     direction_[longest] = 1;
     // Parts have flat faces across that axis, in which all places would be the same.
-    direction_[(longest + 1) % 3] = 0.03;
-    direction_[(longest + 2) % 3] = 0.02;
+    direction_[(longest + 1) % 3] = 0.31;
+    direction_[(longest + 2) % 3] = 0.23;
   }
 
   double placeOf(std::uint32_t t) const {

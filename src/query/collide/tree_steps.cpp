@@ -7,6 +7,7 @@
 #include <hwy/highway.h>
 
 #include <algorithm>
+#include <cmath>
 
 #include "log/assert.h"
 #include "query/cull/frames-inl.h"
@@ -347,9 +348,19 @@ HWY_INLINE bool isBeyondCut(const PairSteps& s, int side, const StepNode& node) 
   if (node.lane == StepNode::kNoLane) return false;
   const Frame& f = s.frames[node.lane / 8];
   const std::uint32_t o = node.lane % 8;
-  float least = 0;
-  for (int k = 0; k < 3; ++k) least += s.cut_direction[k] * (f.center[side][k][o] - f.half[side][k][o]);
-  return least > s.cut;
+  float center = 0, box = 0, along = 0;
+  for (int k = 0; k < 3; ++k) {
+    center += s.cut_direction[k] * f.center[side][k][o];
+    box += s.cut_direction[k] * f.half[side][k][o];
+    along += s.cut_direction[k] * f.normal[side][k][o];
+  }
+  if (center - box > s.cut) return true;
+  // The slab bounds the part of the direction along its normal, and the box the rest.
+  float least = along * f.slab_center[o] - std::abs(along) * f.slab_half[o];
+  for (int k = 0; k < 3; ++k) {
+    least -= std::abs(s.cut_direction[k] - along * f.normal[side][k][o]) * f.half[side][k][o];
+  }
+  return center + least > s.cut;
 }
 
 // Orders a side's octants by their least coordinates along the direction of the cut: that with the smallest is taken

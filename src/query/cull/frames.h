@@ -2,7 +2,6 @@
 #pragma once
 
 #include "geometry/volume.h"
-#include "oracle/oracle.h"
 
 namespace bocst::query {
 
