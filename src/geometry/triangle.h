@@ -34,10 +34,10 @@ struct PenetrationVerdicts {
 /// nobody asks. `tolerance` is a length that corners may be off by without that meet or apart is wrong.
 PenetrationVerdicts trianglePenetrations(const TrianglePairs& pairs, double tolerance, ContactPoint* contacts);
 
-/// Of the segment in which two triangles cut each other, the smallest coordinate along a direction, known to `tolerance`
-/// (both may have any length). Nothing where they do not, or where rounding leaves that in doubt.
+/// Of the segment in which two triangles cut each other, the smallest coordinate along a direction, known to
+/// `tolerance` (both may have any length). Nothing where they do not, or where rounding leaves that in doubt.
 std::optional<double> nearEndOfCut(const Corners& p, const Corners& q, const Eigen::Vector3d& direction,
-                                  double tolerance);
+                                   double tolerance);
 
 /// The point of a closed triangle, degenerate or not, that is nearest to x.
 Eigen::Vector3d closestPoint(const Eigen::Vector3d& x, const Corners& triangle);

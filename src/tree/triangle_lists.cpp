@@ -4,7 +4,6 @@
 #include <algorithm>
 #include <stdexcept>
 
-
 namespace bocst::tree {
 
 void TriangleList::appendTo(std::vector<std::uint32_t>& all) const {
