@@ -19,6 +19,10 @@ struct Surface {
   std::size_t triangle_count = mesh->triangleCount();
   Eigen::AlignedBox3d bounds = mesh->bounds();  ///< In the mesh's frame.
 
+  /// The bounds in lattice units.
+  Eigen::AlignedBox3d latticeBounds() const {
+    return {lattice.toLattice(bounds.min()), lattice.toLattice(bounds.max())};
+  }
   /// Corner k of triangle t, in lattice units.
   Eigen::Vector3d corner(std::uint32_t t, int k) const { return lattice.toLattice(mesh->vertex(mesh->indices(t)[k])); }
 };

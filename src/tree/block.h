@@ -22,6 +22,15 @@ inline bounds::CellFrame frameOf(const lattice::Cell& cell) {
   return {{double(corner[0]), double(corner[1]), double(corner[2])}, double(cell.side())};
 }
 
+/// A box in lattice units as bytes of a cell; the margin is far above the rounding of Lattice::toLattice().
+inline void encodeBox(const Eigen::AlignedBox3d& box, const lattice::Cell& cell, bounds::NodeBounds& b) {
+  constexpr double kMargin = 1e-6;
+  const bounds::CellFrame frame = frameOf(cell);
+  for (int k = 0; k < 3; ++k) {
+    frame.encodeBox(static_cast<std::size_t>(k), box.min()[k] - kMargin, box.max()[k] + kMargin, b);
+  }
+}
+
 /// Says where the triangles or the children of a resident node are: two bits of tag, thirty of index.
 class ChildRef {
  public:

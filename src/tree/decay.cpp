@@ -21,7 +21,7 @@ constexpr std::uint32_t kFewTriangles = 256;
 
 void Tree::collectTriangles(ChildRef ref, const lattice::Cell& cell, std::vector<std::uint32_t>& ids) const {
   if (ref.tag() == ChildRef::kBlock) {
-    const Block& block = blocks_[ref.index()];
+    const Block& block = nodes_.blocks[ref.index()];
     for (int o = 0; o < 8; ++o) {
       if (block.grey >> o & 1) collectTriangles(block.child[o].load(std::memory_order_relaxed), cell.octant(o), ids);
     }
@@ -35,40 +35,19 @@ void Tree::collectTriangles(ChildRef ref, const lattice::Cell& cell, std::vector
 // The list of a node whose block goes.
 ChildRef Tree::regained(ChildRef block, const lattice::Cell& cell, TriangleLists& lists) const {
   if (grid_ && cell.level <= grid_->level()) return ChildRef();
-  const std::uint32_t own = records_[block.index()].own_list;
+  const std::uint32_t own = nodes_.records[block.index()].own_list;
   if (own != Block::kNone) {
-    const bool is_short = !lists_.isOnDevice(own) && lists_[own].count <= kMaxLeafTriangles;
-    return ChildRef(is_short ? ChildRef::kShortList : ChildRef::kList, lists.addCopy(lists_, own));
+    const bool is_short = !nodes_.lists.isOnDevice(own) && nodes_.lists[own].count <= kMaxLeafTriangles;
+    return ChildRef(is_short ? ChildRef::kShortList : ChildRef::kList, lists.addCopy(nodes_.lists, own));
   }
   std::vector<std::uint32_t> ids;
   collectTriangles(block, cell, ids);
-  if (!blocks_[block.index()].isLoose()) {  // lanes share no triangles, cells do
+  if (!nodes_.blocks[block.index()].isLoose()) {  // lanes share no triangles, cells do
     std::sort(ids.begin(), ids.end());
     ids.erase(std::unique(ids.begin(), ids.end()), ids.end());
   }
   return ChildRef(ids.size() <= kMaxLeafTriangles ? ChildRef::kShortList : ChildRef::kList,
                   lists.add(ids.data(), ids.size()));
-}
-
-void Tree::dropUnusedResources() {
-  std::vector<std::uint8_t> used(resources_.size(), 0);
-  const auto mark = [&](std::uint32_t list) {
-    if (lists_.isOnDevice(list)) used[lists_.place(list).resource] = 1;
-  };
-  for (std::uint32_t i = 0; i < blocks_.size(); ++i) {
-    const Block& block = blocks_[i];
-    if (records_[i].own_list != Block::kNone) mark(records_[i].own_list);
-    for (int o = 0; o < 8; ++o) {
-      const ChildRef ref = block.child[o].load(std::memory_order_relaxed);
-      if ((block.grey >> o & 1) != 0 && ref.isList()) mark(ref.index());
-    }
-  }
-  for (std::size_t i = 0; i < resources_.size(); ++i) {
-    if (used[i] || resources_[i] == nullptr) continue;
-    resource_bytes_ -= resources_[i]->bytes();
-    resources_[i] = nullptr;
-    free_resources_.push_back(static_cast<std::uint32_t>(i));
-  }
 }
 
 // The tree is one sphere again.
@@ -77,24 +56,16 @@ void Tree::dropTree() {
   grid_tried_ = false;
   startRent();
   root_.store(ChildRef(), std::memory_order_relaxed);
-  blocks_.clear();
-  records_.clear();
-  last_use_.clear();
-  lists_.clear();
-  resources_.clear();
-  free_resources_.clear();
-  resource_bytes_ = 0;
+  nodes_.clear();
   NodeCounts nodes_at{};
   nodes_at[1] = 1;
   startGeneration(nodes_at);
 }
 
-// What names nodes of the old pools goes.
+// What names nodes of the old store goes.
 void Tree::startGeneration(const NodeCounts& nodes_at) {
   ++generation_;
   dropNodeTable();
-  refits_.clear();
-  refits_wait_.store(false, std::memory_order_relaxed);
   const std::size_t before = std::accumulate(nodes_at_.begin(), nodes_at_.end(), std::size_t{0});
   const std::size_t after = std::accumulate(nodes_at.begin(), nodes_at.end(), std::size_t{0});
   std::copy(nodes_at.begin(), nodes_at.end(), nodes_at_.begin());
@@ -102,22 +73,20 @@ void Tree::startGeneration(const NodeCounts& nodes_at) {
   countBytes();
 }
 
-// Copies what stays into fresh pools: what goes leaves no holes, and nothing of it is looked at again. In one
+// Copies what stays into a fresh store: what goes leaves no holes, and nothing of it is looked at again. In one
 // function, as a node is copied whole: its children, list, record and times belong to one move.
 void Tree::keepOnly(const std::vector<std::uint8_t>& keep) {
   const ChildRef old_root = root_.load(std::memory_order_relaxed);
   if (old_root.tag() != ChildRef::kBlock || !keep[old_root.index()]) return dropTree();
-  if (blocks_[old_root.index()].isLoose()) grid_.reset();  // its cells are not those of the tree any more
+  if (nodes_.blocks[old_root.index()].isLoose()) grid_.reset();  // its cells are not those of the tree any more
   struct Move {
     ChildRef from;
     NodeRef to;
     lattice::Cell cell;
   };
   std::vector<Move> moves{{old_root, NodeRef{}, lattice::Cell{}}};
-  memory::Pool<Block, 5> blocks;
-  memory::Pool<BlockRecord, 5> records;
-  memory::Pool<std::atomic<std::int64_t>, 5> last_use;
-  TriangleLists lists;
+  NodeStore kept;
+  kept.root_bounds = nodes_.root_bounds;
   ChildRef root;
   NodeCounts nodes_at{};
   nodes_at[1] = 1;
@@ -126,23 +95,20 @@ void Tree::keepOnly(const std::vector<std::uint8_t>& keep) {
     moves.pop_back();
     ChildRef ref = move.from;
     if (ref.tag() == ChildRef::kBlock && !keep[ref.index()]) {
-      ref = regained(move.from, move.cell, lists);
+      ref = regained(move.from, move.cell, kept.lists);
     } else if (ref.isList()) {
-      ref = ChildRef(ref.tag(), lists.addCopy(lists_, ref.index()));
+      ref = ChildRef(ref.tag(), kept.lists.addCopy(nodes_.lists, ref.index()));
     } else if (ref.tag() == ChildRef::kBlock) {
-      const Block& from = blocks_[ref.index()];
-      const std::uint32_t own_list = records_[ref.index()].own_list, index = blocks.append(1);
-      records.append(1);
-      last_use.append(1);
-      Block& to = blocks[index];
+      const Block& from = nodes_.blocks[ref.index()];
+      const std::uint32_t own_list = nodes_.records[ref.index()].own_list;
+      const std::uint32_t index =
+          kept.append(move.to, from.grey, nodes_.last_use[ref.index()].load(std::memory_order_relaxed));
+      Block& to = kept.blocks[index];
       to.octants = from.octants;
-      to.grey = from.grey;
       to.shape = from.shape;
       std::copy_n(from.at, 3, to.at);
-      records[index].own = records_[ref.index()].own;
-      if (own_list != Block::kNone) records[index].own_list = lists.addCopy(lists_, own_list);
-      records[index].parent = move.to;
-      last_use[index].store(last_use_[ref.index()].load(std::memory_order_relaxed), std::memory_order_relaxed);
+      kept.records[index].own = nodes_.records[ref.index()].own;
+      if (own_list != Block::kNone) kept.records[index].own_list = kept.lists.addCopy(nodes_.lists, own_list);
       nodes_at[countedLevel(move.cell.level + 1)] += __builtin_popcount(from.grey);
       for (int o = 0; o < 8; ++o) {
         if (from.grey >> o & 1) {
@@ -155,32 +121,37 @@ void Tree::keepOnly(const std::vector<std::uint8_t>& keep) {
     if (move.to.isRoot()) {
       root = ref;
     } else {
-      blocks[move.to.block()].child[move.to.octant()].store(ref, std::memory_order_relaxed);
+      kept.blocks[move.to.block()].child[move.to.octant()].store(ref, std::memory_order_relaxed);
     }
   }
   // There was memory for all of it.
   root_.store(root, std::memory_order_relaxed);
-  blocks_.swap(blocks);
-  records_.swap(records);
-  last_use_.swap(last_use);
-  lists_.swap(lists);
+  nodes_.swap(kept);
   startGeneration(nodes_at);
-  dropUnusedResources();
-  countBytes();
+}
+
+template <typename T>
+bool Tree::dropIfOld(OnDemand<T>& structure, std::int64_t now) {
+  if (!structure || !isOld(structure.lastUse(), now)) return false;
+  structure.drop();
+  return true;
 }
 
 void Tree::pruneAlone(std::int64_t now, Pruning pruning) {
   const bool budget_only = pruning == Pruning::kBudget;
-  const auto is_old = [&](std::uint32_t block) { return isOld(last_use_[block].load(std::memory_order_relaxed), now); };
+  const auto is_old = [&](std::uint32_t block) {
+    return isOld(nodes_.last_use[block].load(std::memory_order_relaxed), now);
+  };
   if (!budget_only && ttl_ > 0 && root_.load(std::memory_order_relaxed).tag() == ChildRef::kBlock) {
     const bool is_used = pruning == Pruning::kWorthwhile && !is_old(root_.load(std::memory_order_relaxed).index());
     // What stays is copied, so for few blocks a query of a large tree would pay much.
-    const std::uint32_t least = pruning == Pruning::kWorthwhile ? std::max(1u, blocks_.size() / kWorthwhileShare) : 1;
+    const std::uint32_t least =
+        pruning == Pruning::kWorthwhile ? std::max(1u, nodes_.blocks.size() / kWorthwhileShare) : 1;
     std::uint32_t dropped = 0;
-    std::vector<std::uint8_t> keep(blocks_.size(), 1);
-    for (std::uint32_t i = 0; i < blocks_.size(); ++i) {
+    std::vector<std::uint8_t> keep(nodes_.blocks.size(), 1);
+    for (std::uint32_t i = 0; i < nodes_.blocks.size(); ++i) {
       if (!is_old(i)) continue;
-      const Block& block = blocks_[i];
+      const Block& block = nodes_.blocks[i];
       bool is_deepest = true;
       std::uint32_t triangles = 0;
       for (int o = 0; o < 8; ++o) {
@@ -195,24 +166,20 @@ void Tree::pruneAlone(std::int64_t now, Pruning pruning) {
       ++dropped;
     }
     if (dropped >= least) {
-      for (std::uint32_t i = 0; i < blocks_.size(); ++i) {
-        const NodeRef parent = records_[i].parent;
+      for (std::uint32_t i = 0; i < nodes_.blocks.size(); ++i) {
+        const NodeRef parent = nodes_.records[i].parent;
         // The parent's own time starts (3.1).
-        if (!keep[i] && !parent.isRoot()) last_use_[parent.block()].store(now, std::memory_order_relaxed);
+        if (!keep[i] && !parent.isRoot()) nodes_.last_use[parent.block()].store(now, std::memory_order_relaxed);
       }
       keepOnly(keep);
     }
   }
-  if (!budget_only && boxes_ && isOld(boxes_used_.load(std::memory_order_relaxed), now)) {
-    dropBoxes();
-    countBytes();
+  if (!budget_only) {
+    const bool boxes_went = dropIfOld(boxes_, now), interior_went = dropIfOld(interior_, now);
+    if (boxes_went || interior_went) countBytes();
+    const bool is_at_rest = root_.load(std::memory_order_relaxed).tag() != ChildRef::kBlock && !boxes_ && !interior_;
+    if (is_at_rest && isOld(recall_time_, now)) forgetMesh();
   }
-  if (!budget_only && interior_ && isOld(interior_used_.load(std::memory_order_relaxed), now)) {
-    dropInterior();
-    countBytes();
-  }
-  const bool is_at_rest = root_.load(std::memory_order_relaxed).tag() != ChildRef::kBlock && !boxes_ && !interior_;
-  if (!budget_only && is_at_rest && isOld(recall_time_, now)) forgetMesh();
   applyBudget();
 }
 
@@ -221,19 +188,19 @@ void Tree::applyBudget() {
   if (budget == 0 || bytes_ <= budget) return;
   // Lists of dropped branches come back at their parents, so how much must go shows only when it is gone.
   auto count = static_cast<std::size_t>(0.75 * static_cast<double>(budget) / static_cast<double>(bytes_) *
-                                        static_cast<double>(blocks_.size()));
+                                        static_cast<double>(nodes_.blocks.size()));
   for (;; count /= 2) {
     // Most recently used first, and with each block all that leads to it.
-    std::vector<std::uint32_t> order(blocks_.size());
+    std::vector<std::uint32_t> order(nodes_.blocks.size());
     std::iota(order.begin(), order.end(), 0u);
     std::stable_sort(order.begin(), order.end(), [this](std::uint32_t a, std::uint32_t b) {
-      return last_use_[a].load(std::memory_order_relaxed) > last_use_[b].load(std::memory_order_relaxed);
+      return nodes_.last_use[a].load(std::memory_order_relaxed) > nodes_.last_use[b].load(std::memory_order_relaxed);
     });
-    std::vector<std::uint8_t> keep(blocks_.size(), 0);
+    std::vector<std::uint8_t> keep(nodes_.blocks.size(), 0);
     for (std::size_t k = 0; k < std::min(count, order.size()); ++k) {
-      for (std::uint32_t i = order[k]; !keep[i]; i = records_[i].parent.block()) {
+      for (std::uint32_t i = order[k]; !keep[i]; i = nodes_.records[i].parent.block()) {
         keep[i] = 1;
-        if (records_[i].parent.isRoot()) break;
+        if (nodes_.records[i].parent.isRoot()) break;
       }
     }
     keepOnly(keep);
@@ -242,7 +209,7 @@ void Tree::applyBudget() {
 }
 
 void Tree::afterQuery(std::int64_t now) {
-  const bool refits = refits_wait_.load(std::memory_order_relaxed);
+  const bool refits = nodes_.hasRefits();
   const bool over_budget = options_.memory_budget != 0 && bytes_ > options_.memory_budget;
   std::int64_t due = next_prune_.load(std::memory_order_relaxed);
   bool time_to = isPruneDue(now);
@@ -254,7 +221,7 @@ void Tree::afterQuery(std::int64_t now) {
   if (!refits && !over_budget && !time_to) return;
   const std::unique_lock<thread::ShardedLock> alone(query_lock_, std::try_to_lock);
   if (!alone.owns_lock()) return;
-  if (refits) refit();
+  if (refits) nodes_.refit();
   if (over_budget || time_to) pruneAlone(now, time_to ? Pruning::kWorthwhile : Pruning::kBudget);
 }
 

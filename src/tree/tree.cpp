@@ -15,7 +15,6 @@
 #include "log/assert.h"
 #include "oracle/stored_mesh.h"
 #include "tree/box_tree.h"
-#include "tree/cell_bounds.h"
 
 namespace bocst::tree {
 namespace {
@@ -93,13 +92,19 @@ Tree::Tree(std::shared_ptr<const Mesh> mesh, const Options& options)
 void Tree::reset(std::shared_ptr<const Mesh> mesh) {
   solid_ = options_.solid ? std::make_shared<const Solid>(mesh) : nullptr;
   component_points_.reset();
-  dropBoxes();
-  dropInterior();
   surface_ = surfaceOf(std::move(mesh), options_);
+  // A triangle's share of building oriented boxes takes as long as this many pairs of leaves.
+  constexpr std::size_t kLeafPairsPerTriangle = 4;
+  boxes_.drop();
+  boxes_.rent.start(kLeafPairsPerTriangle * surface_.triangle_count);
+  // Probes spare about half of the walks that find contact; one takes as long as the share of 32 triangles.
+  constexpr std::size_t kTrianglesPerWalk = 16, kLeastWalks = 24;
+  interior_.drop();
+  interior_.rent.start(kLeastWalks + surface_.triangle_count / kTrianglesPerWalk);
   radius_ = -1;
-  root_bounds_ = bounds::NodeBounds();
-  const Eigen::AlignedBox3d box = latticeBounds(surface_);
-  encodeBox(box, lattice::Cell{}, root_bounds_);
+  nodes_.root_bounds = bounds::NodeBounds();
+  const Eigen::AlignedBox3d box = surface_.latticeBounds();
+  encodeBox(box, lattice::Cell{}, nodes_.root_bounds);
   supports_.start(box);
   supports_known_ = false;
   outline_.set(Outline::boxOf(surface_.bounds.center(), Eigen::Matrix3d::Identity(),
@@ -126,7 +131,7 @@ const std::vector<Eigen::Vector3d>& Tree::componentPoints() const {
 }
 
 const BoxTree& Tree::boxes(std::int64_t now) {
-  markUsed(boxes_used_, now);
+  boxes_.markUsed(now);
   if (const BoxTree* known = boxes_.seen()) return *known;
   const std::lock_guard<thread::ForkAwareMutex> lock(growth_);
   if (!boxes_) {
@@ -141,7 +146,7 @@ bool Tree::buildBoxes(std::int64_t now) {
     boxes(now);
     return true;
   } catch (const std::bad_alloc&) {
-    box_rent_.store(0, std::memory_order_relaxed);
+    boxes_.rent.restart();
     return false;
   }
 }
@@ -150,41 +155,22 @@ bool Tree::affordsBoxes() const {
   return options_.memory_budget == 0 || BoxTree::bytesOf(surface_.triangle_count) <= options_.memory_budget / 2;
 }
 
-std::size_t Tree::boxPrice() const {
-  constexpr std::size_t kPerTriangle = 4;  // a triangle's share of the build takes as long as this many pairs of leaves
-  if (knownBoxes() != nullptr) return 0;
-  const std::size_t price = kPerTriangle * surface_.triangle_count, paid = box_rent_.load(std::memory_order_relaxed);
-  return price - std::min(price, paid);
-}
-
-void Tree::dropBoxes() {
-  boxes_.reset();
-  box_rent_ = 0;
-}
-
 void Tree::payInterior(std::int64_t now) {
-  // Probes spare about half of the walks that find contact; one takes as long as the share of 32 triangles.
-  constexpr std::size_t kTrianglesPerWalk = 16, kLeastWalks = 24;
   const std::size_t budget = options_.memory_budget;
   if (interior_.seen() != nullptr || surface_.mesh == nullptr) return;
   if (budget != 0 && Interior::mostBytesOf(surface_.triangle_count) > budget / 2) return;
-  const std::size_t price = kLeastWalks + surface_.triangle_count / kTrianglesPerWalk;
-  if (interior_rent_.fetch_add(1, std::memory_order_relaxed) + 1 < price) return;
+  interior_.rent.pay(1);
+  if (interior_.rent.left() > 0) return;
   const std::unique_lock<thread::ForkAwareMutex> lock(growth_, std::try_to_lock);
   if (!lock.owns_lock() || interior_) return;
   try {
     interior_.set(std::make_unique<const Interior>(*surface_.mesh, surface_.lattice));
   } catch (const std::bad_alloc&) {
-    interior_rent_ = 0;  // walks go on without it; tried again when they have paid again
+    interior_.rent.restart();  // walks go on without it; tried again when they have paid again
     return;
   }
-  markUsed(interior_used_, now);
+  interior_.markUsed(now);
   countBytes();
-}
-
-void Tree::dropInterior() {
-  interior_.reset();
-  interior_rent_ = 0;
 }
 
 std::shared_ptr<const Mesh> Tree::mesh() const {
@@ -396,11 +382,11 @@ void Tree::Batch::abandon() noexcept {
 }
 
 void Tree::askFor(std::uint32_t list, oracle::ExpansionRequest& request, std::vector<std::uint32_t>& ids) const {
-  const TriangleList triangles = lists_[list];
+  const TriangleList triangles = nodes_.lists[list];
   request.count = triangles.count;
-  if (lists_.isOnDevice(list)) {
-    const TriangleLists::Place place = lists_.place(list);
-    request.resource = resources_[place.resource];
+  if (nodes_.lists.isOnDevice(list)) {
+    const TriangleLists::Place place = nodes_.lists.place(list);
+    request.resource = place.resource;
     request.resource_begin = place.begin;
     return;
   }
@@ -427,9 +413,9 @@ void Tree::growFromGrid(NodeRef node) {
   }
   const std::uint32_t index = addBlock(node, cell.level, grey, now());
   for (int o = 0; o < 8; ++o) octants_ += surface_.lattice.exists(cell.octant(o));
-  Block& block = blocks_[index];
+  Block& block = nodes_.blocks[index];
   block.setCell(cell);
-  const Eigen::AlignedBox3d all = latticeBounds(surface_);
+  const Eigen::AlignedBox3d all = surface_.latticeBounds();
   Eigen::AlignedBox3d own;
   for (int o = 0; o < 8; ++o) {
     if ((grey >> o & 1) == 0) continue;
@@ -439,48 +425,23 @@ void Tree::growFromGrid(NodeRef node) {
     block.octants.set(static_cast<std::size_t>(o), bounds);
     own.extend(box);
   }
-  bounds::NodeBounds& bounds_of_all = records_[index].own;
+  bounds::NodeBounds& bounds_of_all = nodes_.records[index].own;
   encodeBox(own, cell, bounds_of_all);
-  addRefit(node, bounds_of_all);
+  nodes_.addRefit(node, bounds_of_all);
   setChild(node, ChildRef(ChildRef::kBlock, index));
 }
 
 // Appends a block whose children are one level below `level`.
 std::uint32_t Tree::addBlock(NodeRef node, int level, std::uint8_t grey, std::int64_t now) {
-  // Without memory for one of the three, the next block takes the places of those that there were.
-  const std::uint32_t index = blocks_.size();
-  if (index >= NodeRef::kMostBlocks) throw std::length_error("bocst: a tree of more than 2^29 blocks");
-  if (records_.size() == index) records_.append(1);
-  if (last_use_.size() == index) last_use_.append(1);
-  blocks_.append(1);
-  blocks_[index].grey = grey;
-  records_[index].parent = node;
-  last_use_[index].store(now, std::memory_order_relaxed);
+  const std::uint32_t index = nodes_.append(node, grey, now);
   nodes_at_[countedLevel(level + 1)] += __builtin_popcount(grey);
   ++expansions_;
   return index;
 }
 
 ChildRef Tree::addList(const std::uint32_t* ids, std::size_t count, bool leaf) {
-  const std::uint32_t index = lists_.add(ids, count);
+  const std::uint32_t index = nodes_.lists.add(ids, count);
   return ChildRef(leaf || count <= kMaxLeafTriangles ? ChildRef::kShortList : ChildRef::kList, index);
-}
-
-void Tree::addResource(const std::shared_ptr<const oracle::DeviceResource>& resource) {
-  if (free_resources_.empty()) {
-    resources_.push_back(nullptr);
-    free_resources_.push_back(static_cast<std::uint32_t>(resources_.size() - 1));
-  }
-  newest_resource_ = free_resources_.back();
-  free_resources_.pop_back();
-  resources_[newest_resource_] = resource;
-  resource_bytes_ += resource->bytes();
-}
-
-ChildRef Tree::addDeviceList(const std::shared_ptr<const oracle::DeviceResource>& resource,
-                             oracle::ExpansionRequest::DeviceList list) {
-  if (newest_resource_ >= resources_.size() || resources_[newest_resource_] != resource) addResource(resource);
-  return ChildRef(ChildRef::kList, lists_.addDeviceList(list.count, {newest_resource_, list.begin}));
 }
 
 ChildRef Tree::addOctantList(const oracle::ExpansionRequest& answer, int octant) {
@@ -495,25 +456,25 @@ ChildRef Tree::addOctantList(const oracle::ExpansionRequest& answer, int octant)
     std::vector<std::uint32_t> ids(count);
     if (oracle_->fetch(*answer.batch->on_device, kept, ids.data())) return addList(ids.data(), count, true);
   }
-  return addDeviceList(answer.batch->on_device, kept);
+  return ChildRef(ChildRef::kList, nodes_.lists.addDeviceList(kept.count, {answer.batch->on_device, kept.begin}));
 }
 
 void Tree::setChild(NodeRef node, ChildRef ref) {
-  std::atomic<ChildRef>& place = node.isRoot() ? root_ : blocks_[node.block()].child[node.octant()];
+  std::atomic<ChildRef>& place = node.isRoot() ? root_ : nodes_.blocks[node.block()].child[node.octant()];
   place.store(ref, std::memory_order_release);
 }
 
 void Tree::publish(NodeRef node, const oracle::ExpansionRequest& answer) {
-  if (answer.grey != 0) addRefit(node, answer.own);
+  if (answer.grey != 0) nodes_.addRefit(node, answer.own);
   const std::uint32_t index = addBlock(node, answer.cell.level, answer.grey, now());
   for (int o = 0; o < 8; ++o) octants_ += surface_.lattice.exists(answer.cell.octant(o));
-  Block& block = blocks_[index];
+  Block& block = nodes_.blocks[index];
   block.setCell(answer.cell);
   block.octants = answer.octants;
-  records_[index].own = answer.own;
+  nodes_.records[index].own = answer.own;
   if (answer.on_device != 0) {
     const ChildRef own = childRef(node);
-    if (own.isList()) records_[index].own_list = own.index();
+    if (own.isList()) nodes_.records[index].own_list = own.index();
   }
   for (int o = 0; o < 8; ++o) {
     if (answer.grey >> o & 1) block.child[o].store(addOctantList(answer, o), std::memory_order_relaxed);
@@ -540,17 +501,17 @@ void Tree::updateVertices(std::vector<Eigen::Vector3d> vertices) {
 Tree::NodeTable Tree::nodeTable() {
   namespace table = oracle::node_table;
   const std::lock_guard<thread::ForkAwareMutex> lock(growth_);
-  const std::uint32_t known = node_table_.blocks, count = blocks_.size();
+  const std::uint32_t known = node_table_.blocks, count = nodes_.blocks.size();
   if (node_table_.nodes != nullptr && known == count) return node_table_;
   const auto blockOf = [](ChildRef ref) { return ref.tag() == ChildRef::kBlock ? ref.index() : table::kNone; };
   node_words_.resize(std::size_t{count} * table::kWords);
   for (std::uint32_t i = known; i < count; ++i) {
-    const Block& block = blocks_[i];
+    const Block& block = nodes_.blocks[i];
     std::uint32_t* const row = node_words_.data() + std::size_t{i} * table::kWords;
     row[table::kPlace] = block.at[0] | std::uint32_t{block.at[1]} << 16;
     row[table::kShape] = block.at[2] | std::uint32_t{block.shape} << 16 | std::uint32_t{block.grey} << 24;
     std::fill_n(row + table::kChildren, 8, table::kNone);
-    const NodeRef node = records_[i].parent;  // its block is an earlier one
+    const NodeRef node = nodes_.records[i].parent;  // its block is an earlier one
     if (node.isRoot()) continue;
     node_words_[std::size_t{node.block()} * table::kWords + table::kChildren + node.octant()] = blockOf(childRef(node));
   }
@@ -591,7 +552,7 @@ void Tree::expandAll(int depth) {
     for (const NodeRef node : level) {
       const std::uint32_t index = childRef(node).index();
       for (int o = 0; o < 8; ++o) {
-        if (blocks_[index].grey >> o & 1) next.push_back(NodeRef::octant(index, o));
+        if (nodes_.blocks[index].grey >> o & 1) next.push_back(NodeRef::octant(index, o));
       }
     }
     level.swap(next);
@@ -618,7 +579,7 @@ void Tree::visit(const std::function<void(const NodeView&)>& f) const {
     view.level = e.level;
     Eigen::Vector3d center, half;
     if (isLoose(e.node)) {
-      const Eigen::AlignedBox3d box = blocks_[e.node.block()].looseBox(e.node.octant());
+      const Eigen::AlignedBox3d box = nodes_.blocks[e.node.block()].looseBox(e.node.octant());
       center = box.center();
       half = box.sizes() / 2;
       view.is_cell = false;
@@ -631,7 +592,7 @@ void Tree::visit(const std::function<void(const NodeView&)>& f) const {
     view.radius = surface_.lattice.unit() * half.norm();
     const ChildRef ref = this->childRef(e.node);
     if (ref.tag() == ChildRef::kBlock) {
-      const Block& block = blocks_[ref.index()];
+      const Block& block = nodes_.blocks[ref.index()];
       for (int o = 0; o < 8; ++o) {
         if ((block.grey >> o & 1) == 0) continue;
         const NodeRef child = NodeRef::octant(ref.index(), o);
@@ -668,13 +629,12 @@ void Tree::countBytes() {
   std::size_t device = surface_.device != nullptr ? surface_.device->bytes() : 0;
   if (stored_ != nullptr) device += stored_->bytes();
   if (node_table_.nodes != nullptr) device += node_table_.nodes->bytes();
-  device_bytes_ = device + resource_bytes_;
+  device_bytes_ = device + nodes_.lists.deviceBytes();
 }
 
 std::size_t Tree::treeBytes() const {
-  return blocks_.bytes() + records_.bytes() + last_use_.bytes() + lists_.bytes() + (grid_ ? grid_->bytes() : 0) +
-         node_words_.capacity() * sizeof(node_words_[0]) + (boxes_ ? boxes_->bytes() : 0) +
-         (interior_ ? interior_->bytes() : 0);
+  return nodes_.bytes() + (grid_ ? grid_->bytes() : 0) + node_words_.capacity() * sizeof(node_words_[0]) +
+         boxes_.bytes() + interior_.bytes();
 }
 
 }  // namespace bocst::tree

@@ -17,17 +17,16 @@
 #include <mutex>
 #include <vector>
 
-#include "memory/pool.h"
 #include "mesh/interior.h"
 #include "mesh/solid.h"
 #include "oracle/oracle.h"
 #include "thread/published.h"
 #include "thread/sharded_lock.h"
-#include "tree/block.h"
+#include "tree/node_store.h"
+#include "tree/on_demand.h"
 #include "tree/outline.h"
 #include "tree/root_grid.h"
 #include "tree/support_table.h"
-#include "tree/triangle_lists.h"
 
 namespace bocst::oracle {
 class StoredMesh;
@@ -77,32 +76,30 @@ class Tree {
 
   ChildRef childRef(NodeRef node) const {
     return node.isRoot() ? root_.load(std::memory_order_acquire)
-                         : blocks_[node.block()].child[node.octant()].load(std::memory_order_acquire);
+                         : nodes_.blocks[node.block()].child[node.octant()].load(std::memory_order_acquire);
   }
-  const Block& block(std::uint32_t index) const { return blocks_[index]; }
+  const Block& block(std::uint32_t index) const { return nodes_.blocks[index]; }
   /// Is it a lane of a loose block? Else it is a cell.
-  bool isLoose(NodeRef node) const { return !node.isRoot() && blocks_[node.block()].isLoose(); }
+  bool isLoose(NodeRef node) const { return !node.isRoot() && nodes_.blocks[node.block()].isLoose(); }
   /// The root's is 1; that of a lane is the level of a cell of about its size.
-  int level(NodeRef node) const { return node.isRoot() ? 1 : blocks_[node.block()].childLevel(); }
+  int level(NodeRef node) const { return node.isRoot() ? 1 : nodes_.blocks[node.block()].childLevel(); }
   /// For nodes that are no lanes.
   lattice::Cell cell(NodeRef node) const {
-    return node.isRoot() ? lattice::Cell{} : blocks_[node.block()].cell().octant(node.octant());
+    return node.isRoot() ? lattice::Cell{} : nodes_.blocks[node.block()].cell().octant(node.octant());
   }
   /// Box and slab of the root; those of other nodes are in their parents' blocks.
-  const bounds::NodeBounds& rootBounds() const { return root_bounds_; }
-  TriangleList list(ChildRef ref) const { return lists_[ref.index()]; }
-  const TriangleLists& lists() const { return lists_; }
+  const bounds::NodeBounds& rootBounds() const { return nodes_.root_bounds; }
+  TriangleList list(ChildRef ref) const { return nodes_.lists[ref.index()]; }
+  const TriangleLists& lists() const { return nodes_.lists; }
   /// How far the surface reaches in any direction: as far as its box, or exactly once the whole tree was built.
   const SupportTable& supports() const { return supports_; }
   /// Adds work that a whole tree would have saved, in triangles grown by parts. Once the sum exceeds the price of a
   /// whole tree, the next query builds it. One walk in a tree that is not whole adds kWalkRent.
   static constexpr std::size_t kWalkRent = 64;
-  void payRent(std::size_t triangles) const {
-    if (price_.load(std::memory_order_relaxed) != kNever) rent_.fetch_add(triangles, std::memory_order_relaxed);
-  }
+  void payRent(std::size_t triangles) const { rent_.pay(triangles); }
   /// Builds the whole tree when queries have paid as much as that costs, unless another thread grows it; did it? Of a
   /// model that is built ahead, the first query that has paid anything has the helper thread do it.
-  bool buildIfDue() { return isBuildDue() && buildNow(); }
+  bool buildIfDue() { return rent_.isDue() && buildNow(); }
   /// Builds the whole tree of exact answers, if the host can, whatever queries have paid.
   void build();
   /// No more expansions below this node: a single lattice unit, or the collision depth of conservative answers.
@@ -124,15 +121,15 @@ class Tree {
   /// They would not take most of the memory budget.
   bool affordsBoxes() const;
   /// How many pairs of leaves long walks still test before boxes() pays; 0 if it is built.
-  std::size_t boxPrice() const;
+  std::size_t boxPrice() const { return knownBoxes() != nullptr ? 0 : boxes_.rent.left(); }
   /// Adds pairs of leaves that a long walk has tested.
-  void payBoxRent(std::size_t pairs) const { box_rent_.fetch_add(pairs, std::memory_order_relaxed); }
+  void payBoxRent(std::size_t pairs) const { boxes_.rent.pay(pairs); }
 
   /// The surface's Interior, which proves contact quickly; null until payInterior() has built it. Dropped like a
   /// branch.
   const Interior* interior(std::int64_t now) const {
     const Interior* known = interior_.seen();
-    if (known != nullptr) markUsed(interior_used_, now);
+    if (known != nullptr) interior_.markUsed(now);
     return known;
   }
   /// A walk has found that the surface touches another one. Builds interior() once such walks have taken about twice as
@@ -149,9 +146,9 @@ class Tree {
   void setLongSearch(Search kind, LongSearch last) const { long_searches_[static_cast<std::size_t>(kind)] = last; }
 
   /// Marks a block as used now, for ttl and budget.
-  void markUsed(std::uint32_t block, std::int64_t now) const { markUsed(last_use_[block], now); }
+  void markUsed(std::uint32_t block, std::int64_t now) const { markUsedAt(nodes_.last_use[block], now); }
   /// A block is about to be marked.
-  void prefetchLastUse(std::uint32_t block) const { __builtin_prefetch(&last_use_[block]); }
+  void prefetchLastUse(std::uint32_t block) const { __builtin_prefetch(&nodes_.last_use[block]); }
   std::int64_t now() const;
 
   /// The root grid knows the children of this frontier node.
@@ -234,9 +231,6 @@ class Tree {
  private:
   struct AheadBuild;
   class BuildMemory;
-  static void markUsed(std::atomic<std::int64_t>& last_use, std::int64_t now) {
-    if (last_use.load(std::memory_order_relaxed) < now) last_use.store(now, std::memory_order_relaxed);
-  }
   /// Where a block of a build goes: below a node, whose level as counted this is; and its index, once it is added.
   struct BulkPlace {
     NodeRef node;
@@ -254,13 +248,9 @@ class Tree {
   // A device is not asked about fewer triangles: the host builds what is below them sooner than a batch comes back.
   static constexpr std::size_t kHostTriangles = 512;
   static std::size_t countedLevel(int level) { return static_cast<std::size_t>(std::min(level, lattice::kMaxLevel)); }
-  void addResource(const std::shared_ptr<const oracle::DeviceResource>& resource);
-  ChildRef addDeviceList(const std::shared_ptr<const oracle::DeviceResource>& resource,
-                         oracle::ExpansionRequest::DeviceList list);
   ChildRef addOctantList(const oracle::ExpansionRequest& answer, int octant);
   /// The host has all lists, so it can grow from the root grid and in bulk.
   bool growsOnHost() const { return oracle_->kind() == OracleKind::kCpu || oracle_->kind() == OracleKind::kAuto; }
-  bool isBuildDue() const { return rent_.load(std::memory_order_relaxed) > price_.load(std::memory_order_relaxed); }
   bool buildNow();
   bool fitsBuild() const;
   void startRent();
@@ -285,7 +275,6 @@ class Tree {
   std::uint32_t addBlock(NodeRef node, int level, std::uint8_t grey, std::int64_t now);
   ChildRef addList(const std::uint32_t* ids, std::size_t count, bool leaf);
   void setChild(NodeRef node, ChildRef ref);
-  void refit();
   /// Was the time `then` more than ttl before `now`? Both may be any times.
   bool isOld(std::int64_t then, std::int64_t now) const {
     std::int64_t age;
@@ -298,15 +287,14 @@ class Tree {
   };
   void pruneAlone(std::int64_t now, Pruning pruning);
   void applyBudget();
-  void dropBoxes();
-  void dropInterior();
+  template <typename T>
+  bool dropIfOld(OnDemand<T>& structure, std::int64_t now);
   using NodeCounts = std::array<std::size_t, lattice::kMaxLevel + 1>;
   void keepOnly(const std::vector<std::uint8_t>& keep);
   void dropTree();
   void startGeneration(const NodeCounts& nodes_at);
   void collectTriangles(ChildRef ref, const lattice::Cell& cell, std::vector<std::uint32_t>& ids) const;
   ChildRef regained(ChildRef block, const lattice::Cell& cell, TriangleLists& lists) const;
-  void dropUnusedResources();
   std::size_t treeBytes() const;
   void countBytes();
 
@@ -328,14 +316,10 @@ class Tree {
   mutable thread::ForkAwareMutex component_mutex_;  // guards component_points_ while they are found
   mutable thread::Published<const std::vector<Eigen::Vector3d>> component_points_;
   mutable std::atomic<double> radius_{-1};  // negative: not known yet
-  thread::Published<const BoxTree> boxes_;  // made under growth_, dropped alone
-  std::atomic<std::int64_t> boxes_used_{0};
-  mutable std::atomic<std::size_t> box_rent_{0};  // see payBoxRent()
-  thread::Published<const Interior> interior_;    // made under growth_, dropped alone
-  mutable std::atomic<std::int64_t> interior_used_{0};
-  std::atomic<std::size_t> interior_rent_{0};  // walks, see payInterior()
+  // Made under growth_, dropped alone.
+  OnDemand<BoxTree> boxes_;      // rent: pairs of leaves
+  OnDemand<Interior> interior_;  // rent: walks
   mutable std::atomic<LongSearch> long_searches_[2] = {};
-  bounds::NodeBounds root_bounds_;
   SupportTable supports_;
   // A query of two models that are far apart reads only the members up to next_prune_.
   Outline outline_;
@@ -345,37 +329,13 @@ class Tree {
   bool supports_known_ = false;
   thread::Published<RootGrid> grid_;
   bool grid_tried_ = false;
-  static constexpr std::size_t kNever = ~std::size_t{0};
-  mutable std::atomic<std::size_t> rent_{0};  // see payRent()
-  std::atomic<std::size_t> price_{kNever};    // the whole tree is built when rent_ is more; kNever once it is
-  bool is_ahead_build_due_ = false;           // the helper thread must still be asked to build it; under growth_
+  Rent rent_;                        // of the whole tree, see payRent()
+  bool is_ahead_build_due_ = false;  // the helper thread must still be asked to build it; under growth_
   std::shared_ptr<AheadBuild> ahead_build_;
-  std::uint64_t generation_ = 0;  // of the pools: indices of blocks are of one generation
-  // Of each block: what walks read, what growth and decay know, and when a query last went through it, in ns of the
-  // model's clock. Apart, so that walks have few lines to read.
-  memory::Pool<Block, 5> blocks_;
-  memory::Pool<BlockRecord, 5> records_;
-  mutable memory::Pool<std::atomic<std::int64_t>, 5> last_use_;
-  TriangleLists lists_;
-  std::vector<std::shared_ptr<const oracle::DeviceResource>> resources_;  // of the lists that the oracle keeps
-  std::vector<std::uint32_t> free_resources_;                             // entries that no list names
-  std::uint32_t newest_resource_ = 0;
-  std::size_t resource_bytes_ = 0;         // of all resources_
+  std::uint64_t generation_ = 0;  // of nodes_: indices of blocks are of one generation
+  NodeStore nodes_;
   NodeTable node_table_;                   // of a generation; under growth_
   std::vector<std::uint32_t> node_words_;  // what it was made from
-
-  // Tighter bounds of nodes than their parents' blocks hold; blocks that readers see are not written to, so these wait
-  // for a moment alone.
-  struct Refit {
-    NodeRef node;
-    bounds::NodeBounds bounds;
-  };
-  void addRefit(NodeRef node, const bounds::NodeBounds& bounds) {
-    refits_.push_back({node, bounds});
-    refits_wait_.store(true, std::memory_order_relaxed);
-  }
-  std::vector<Refit> refits_;
-  std::atomic<bool> refits_wait_{false};
 
   std::array<std::atomic<std::size_t>, lattice::kMaxLevel + 1> nodes_at_{};
   std::atomic<std::size_t> bytes_{0}, device_bytes_{0};

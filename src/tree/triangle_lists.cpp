@@ -3,6 +3,9 @@
 
 #include <algorithm>
 #include <stdexcept>
+#include <utility>
+
+#include "oracle/oracle.h"
 
 namespace bocst::tree {
 
@@ -50,11 +53,21 @@ std::uint32_t TriangleLists::addPacked(const std::uint32_t* ids, std::size_t cou
   return index;
 }
 
-std::uint32_t TriangleLists::addDeviceList(std::size_t count, Place place) {
+std::uint32_t TriangleLists::numberOf(const std::shared_ptr<const oracle::DeviceResource>& resource) {
+  const auto known = numbers_.find(resource.get());
+  if (known != numbers_.end()) return known->second;
+  const auto number = static_cast<std::uint32_t>(resources_.size());
+  resources_.push_back(resource);
+  numbers_.emplace(resource.get(), number);
+  device_bytes_ += resource->bytes();
+  return number;
+}
+
+std::uint32_t TriangleLists::addDeviceList(std::size_t count, const Place& place) {
   if (count > kCount) throw std::length_error("bocst: a node of more than 2^29 triangles");
-  const std::uint32_t index = words_.append(kDeviceListWords);
+  const std::uint32_t resource = numberOf(place.resource), index = words_.append(kDeviceListWords);
   words_[index] = static_cast<std::uint32_t>(count) | kOnDevice;
-  words_[index + 1] = place.resource;
+  words_[index + 1] = resource;
   words_[index + 2] = place.begin;
   return index;
 }
@@ -62,11 +75,19 @@ std::uint32_t TriangleLists::addDeviceList(std::size_t count, Place place) {
 std::uint32_t TriangleLists::addCopy(const TriangleLists& from, std::uint32_t list) {
   const std::uint32_t* const words = &from.words_[list];
   const std::uint32_t flags = words[0];
+  if ((flags & kOnDevice) != 0) return addDeviceList(flags & kCount, from.place(list));
   const std::size_t packed = (flags & kPacked) != 0 ? packedAt(words).words() : 0;
-  const std::size_t count = (flags & kOnDevice) != 0 ? kDeviceListWords : 1 + packed + idWords(flags);
+  const std::size_t count = 1 + packed + idWords(flags);
   const std::uint32_t index = words_.append(count);
   std::copy_n(words, count, &words_[index]);
   return index;
+}
+
+void TriangleLists::swap(TriangleLists& other) {
+  words_.swap(other.words_);
+  resources_.swap(other.resources_);
+  numbers_.swap(other.numbers_);
+  std::swap(device_bytes_, other.device_bytes_);
 }
 
 }  // namespace bocst::tree

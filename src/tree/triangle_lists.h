@@ -4,10 +4,16 @@
 #include <cstddef>
 #include <cstdint>
 #include <cstring>
+#include <memory>
+#include <unordered_map>
 #include <vector>
 
 #include "memory/pool.h"
 #include "tree/packed_triangles.h"
+
+namespace bocst::oracle {
+class DeviceResource;
+}
 
 namespace bocst::tree {
 
@@ -46,12 +52,13 @@ struct TriangleList {
 };
 
 /// The lists of a tree's nodes. A list never moves or changes, so that readers need no lock while one writer appends.
-/// Threads: as Pool.
+/// Threads: as Pool; where lists are on a device, the writer alone asks for their places.
 class TriangleLists {
  public:
-  /// Where an oracle keeps a list: the number of a resource, and a place there.
+  /// Where an oracle keeps a list.
   struct Place {
-    std::uint32_t resource, begin;
+    std::shared_ptr<const oracle::DeviceResource> resource;
+    std::uint32_t begin;
   };
 
   // What is there.
@@ -72,14 +79,14 @@ class TriangleLists {
   }
   /// Does the oracle keep it?
   bool isOnDevice(std::uint32_t list) const { return (words_[list] & kOnDevice) != 0; }
-  Place place(std::uint32_t list) const { return {words_[list + 1], words_[list + 2]}; }
+  Place place(std::uint32_t list) const { return {resources_[words_[list + 1]], words_[list + 2]}; }
   /// Where it lies, for those who want it in the processor's cache.
   const std::uint32_t* begin(std::uint32_t list) const { return &words_[list]; }
 
   // What is new; each returns the list's index. They throw std::length_error beyond 2^29 triangles or 2^30 words.
 
   std::uint32_t add(const std::uint32_t* ids, std::size_t count);
-  std::uint32_t addDeviceList(std::size_t count, Place place);
+  std::uint32_t addDeviceList(std::size_t count, const Place& place);
   /// A list with its corners, as PackedTriangles::pack() put them into `words`.
   std::uint32_t addPacked(const std::uint32_t* ids, std::size_t count, const PackedTriangles::Words& packed,
                           std::size_t size);
@@ -87,14 +94,16 @@ class TriangleLists {
 
   bool isHalfFull() const { return words_.size() > Words::kMost / 2; }
   std::size_t bytes() const { return words_.bytes(); }
-  void clear() { words_.clear(); }
-  void swap(TriangleLists& other) { words_.swap(other.words_); }
+  /// Of what oracles keep for the lists.
+  std::size_t deviceBytes() const { return device_bytes_; }
+  void clear() { TriangleLists().swap(*this); }
+  void swap(TriangleLists& other);
 
  private:
   using Words = memory::Pool<std::uint32_t, 8>;
 
   // A list is flags and a length, then the numbers: all as they are or, narrow, the least and 16-bit steps from it;
-  // packed, then PackedTriangles. On a device: flags and length, then the Place.
+  // packed, then PackedTriangles. On a device: flags and length, the number of a resource, a place there.
   static constexpr std::uint32_t kOnDevice = 0x80000000u, kPacked = 0x40000000u, kNarrow = 0x20000000u,
                                  kCount = 0x1fffffffu;
   static constexpr std::size_t kDeviceListWords = 3;
@@ -107,7 +116,12 @@ class TriangleLists {
   static void writeIds(const std::uint32_t* ids, std::size_t count, bool narrow, std::uint32_t* to);
   static PackedTriangles packedAt(const std::uint32_t* list) { return {list + 1 + idWords(list[0]), list[0] & kCount}; }
 
+  std::uint32_t numberOf(const std::shared_ptr<const oracle::DeviceResource>& resource);
+
   Words words_;
+  std::vector<std::shared_ptr<const oracle::DeviceResource>> resources_;
+  std::unordered_map<const oracle::DeviceResource*, std::uint32_t> numbers_;  // of resources_
+  std::size_t device_bytes_ = 0;
 };
 
 }  // namespace bocst::tree

@@ -15,7 +15,6 @@
 #include "thread/helper_thread.h"
 #include "tree/box_tree.h"
 #include "tree/bulk.h"
-#include "tree/cell_bounds.h"
 #include "tree/tree.h"
 
 namespace bocst::tree {
@@ -55,7 +54,7 @@ void buildWhole(const oracle::Surface& surface, BulkBuilder& bulk) {
   }
   std::vector<std::uint32_t> ids(surface.triangle_count);
   std::iota(ids.begin(), ids.end(), 0u);
-  bulk.build(surface, ids.data(), ids.size(), latticeBounds(surface));
+  bulk.build(surface, ids.data(), ids.size(), surface.latticeBounds());
 }
 
 }  // namespace
@@ -110,14 +109,9 @@ Tree::~Tree() {
 
 // What a thread that stayed in the parent was changing may name memory that is free, so a child never frees it.
 void Tree::leakPools() {
-  (new decltype(blocks_))->swap(blocks_);
-  (new decltype(records_))->swap(records_);
-  (new decltype(last_use_))->swap(last_use_);
-  (new decltype(lists_))->swap(lists_);
-  (new decltype(resources_))->swap(resources_);
+  (new NodeStore)->swap(nodes_);
   (new decltype(node_table_.nodes))->swap(node_table_.nodes);
   (new decltype(node_words_))->swap(node_words_);
-  (new decltype(refits_))->swap(refits_);
   boxes_.leak();
   interior_.leak();
 }
@@ -125,7 +119,7 @@ void Tree::leakPools() {
 // The cell of a node; of a lane only the level, which counts from the cell that was built in bulk.
 lattice::Cell Tree::cellOrDepth(NodeRef node) const {
   int deeper = 0;
-  for (; isLoose(node); ++deeper) node = records_[node.block()].parent;
+  for (; isLoose(node); ++deeper) node = nodes_.records[node.block()].parent;
   lattice::Cell cell = this->cell(node);
   cell.level += deeper;
   return cell;
@@ -156,7 +150,7 @@ bool Tree::growInBulk(NodeRef node, std::vector<std::uint32_t>& ids) {
   const bool is_loose = isLoose(node);
   Eigen::AlignedBox3d region;
   if (is_loose) {
-    region = blocks_[node.block()].looseBox(node.octant());
+    region = nodes_.blocks[node.block()].looseBox(node.octant());
   } else {
     const lattice::Cell cell = this->cell(node);
     const Eigen::Vector3d corner(cell.corner()[0], cell.corner()[1], cell.corner()[2]);
@@ -166,7 +160,7 @@ bool Tree::growInBulk(NodeRef node, std::vector<std::uint32_t>& ids) {
   BulkBuilder& bulk = memory.bulk();
   std::vector<BulkPlace>& places = memory.places();
   bulk.build(surface_, ids.data(), ids.size(), region);
-  if (!is_loose && !bulk.ids().empty()) addRefit(node, encode(bulk.own(), cell(node)));
+  if (!is_loose && !bulk.ids().empty()) nodes_.addRefit(node, encode(bulk.own(), cell(node)));
   startPlaces(bulk, node, cellOrDepth(node).level, places);
   addBlocks(bulk, places, 0, bulk.blocks().size(), now());
   publishBulk(bulk, places);
@@ -180,27 +174,29 @@ bool Tree::buildsAhead() const {
 bool Tree::fitsBuild() const { return 3 * surface_.triangle_count <= BulkBuilder::kMostToSort; }
 
 void Tree::startRent() {
-  rent_ = 0;
   is_ahead_build_due_ = buildsAhead();
   // Beside a device, a build finds the supports alone.
   const bool gains = !conservative() && (growsOnHost() || !supports_known_);
-  const bool is_built = gains && fitsBuild();
-  price_ = !is_built ? kNever : is_ahead_build_due_ ? 0 : surface_.triangle_count / kRent;
+  if (gains && fitsBuild()) {
+    rent_.start(is_ahead_build_due_ ? 0 : surface_.triangle_count / kRent);
+  } else {
+    rent_.stop();
+  }
 }
 
 bool Tree::buildNow() {
   const std::unique_lock<thread::ForkAwareMutex> lock(growth_, std::try_to_lock);
-  if (!lock.owns_lock() || !isBuildDue()) return false;
+  if (!lock.owns_lock() || !rent_.isDue()) return false;
   if (is_ahead_build_due_) {
     is_ahead_build_due_ = false;
-    price_ = surface_.triangle_count * kRentAhead;
+    rent_.setPrice(surface_.triangle_count * kRentAhead);
     askForAheadBuild();
     return false;
   }
   try {
     growWhole();
   } catch (const std::bad_alloc&) {
-    price_ = kNever;  // the parts that queries need may still have room
+    rent_.stop();  // the parts that queries need may still have room
     return false;
   }
   countBytes();
@@ -221,7 +217,7 @@ void Tree::growWhole() {
   BulkBuilder& bulk = memory.bulk();
   std::vector<BulkPlace>& places = memory.places();
   buildWhole(surface_, bulk);
-  price_ = kNever;
+  rent_.stop();
   if (!supports_known_) {
     bulk.findSupports(supports_);
     outline_.set(bulk.findOutline(surface_.lattice));
@@ -264,7 +260,7 @@ void Tree::buildAhead(AheadBuild& ahead) {
     Tree& tree = *ahead.tree;
     const std::shared_lock<thread::ShardedLock> query(tree.query_lock_);
     const std::lock_guard<thread::ForkAwareMutex> growth(tree.growth_);
-    if (tree.price_ == kNever || (surface != nullptr && tree.generation_ != generation)) return false;
+    if (tree.rent_.isStopped() || (surface != nullptr && tree.generation_ != generation)) return false;
     f(tree);
     return true;
   };
@@ -277,7 +273,7 @@ void Tree::buildAhead(AheadBuild& ahead) {
   BulkBuilder bulk;
   buildWhole(*surface, bulk);
   SupportTable supports;
-  supports.start(latticeBounds(*surface));
+  supports.start(surface->latticeBounds());
   bulk.findSupports(supports);
   const Outline::Box outline = bulk.findOutline(surface->lattice);
 
@@ -290,7 +286,7 @@ void Tree::buildAhead(AheadBuild& ahead) {
     std::this_thread::sleep_for(kPause);
   }
   withTree([&](Tree& tree) {
-    tree.price_ = kNever;
+    tree.rent_.stop();
     if (!tree.supports_known_) {
       for (int n = 0; n < SupportTable::kCount; ++n) tree.supports_.lower(n, static_cast<double>(supports.value(n)));
       tree.outline_.set(outline);
@@ -311,7 +307,7 @@ void Tree::startPlaces(const BulkBuilder& bulk, NodeRef node, int level, std::ve
 // Are leaves of what was built kept with their corners? Not if a build of the whole tree is about to replace them, or
 // if they would fill the memory budget.
 bool Tree::packs(const std::vector<BulkPlace>& places) const {
-  const bool is_part = !places[0].node.isRoot(), will_be_replaced = is_part && growsOnHost() && price_ != kNever;
+  const bool is_part = !places[0].node.isRoot(), will_be_replaced = is_part && growsOnHost() && !rent_.isStopped();
   const bool fit = options_.memory_budget == 0 || kPackedBytes * surface_.triangle_count <= options_.memory_budget / 2;
   return fit && !will_be_replaced;
 }
@@ -320,8 +316,9 @@ ChildRef Tree::addLeaf(const BulkBuilder& bulk, std::uint32_t begin, std::uint32
   const std::uint32_t* const ids = bulk.ids().data() + begin;
   PackedTriangles::Words words;
   // Lists without corners always have room.
-  const std::size_t size = packed && count > 0 && !lists_.isHalfFull() ? bulk.pack(begin, count, words) : 0;
-  return {ChildRef::kShortList, size > 0 ? lists_.addPacked(ids, count, words, size) : lists_.add(ids, count)};
+  const std::size_t size = packed && count > 0 && !nodes_.lists.isHalfFull() ? bulk.pack(begin, count, words) : 0;
+  return {ChildRef::kShortList,
+          size > 0 ? nodes_.lists.addPacked(ids, count, words, size) : nodes_.lists.add(ids, count)};
 }
 
 // Adds blocks of what was built, from number `begin` on, after those before them. No reader sees them: all but the
@@ -334,7 +331,7 @@ void Tree::addBlocks(const BulkBuilder& bulk, std::vector<BulkPlace>& places, st
     BulkPlace& place = places[number];
     place.index = addBlock(place.node, place.level, static_cast<std::uint8_t>(0xff >> (8 - built.lanes)), now);
     octants_ += built.lanes;
-    Block& block = blocks_[place.index];
+    Block& block = nodes_.blocks[place.index];
     block.setFrame(built.frame);
     for (std::uint32_t o = 0; o < built.lanes; ++o) {
       const BulkBuilder::Lane& lane = built.lane[o];
@@ -366,7 +363,7 @@ void Tree::publishWhole(const BulkBuilder& bulk, const std::vector<BulkPlace>& p
     nodes_at_[countedLevel(places[number].level + 1)] += bulk.blocks()[number].lanes;
   }
   publishBulk(bulk, places);
-  addRefit(NodeRef(), encode(bulk.own(), lattice::Cell{}));
+  nodes_.addRefit(NodeRef(), encode(bulk.own(), lattice::Cell{}));
 }
 
 }  // namespace bocst::tree

@@ -19,7 +19,6 @@
 #include "query/leaf/large_triangles.h"
 #include "query/leaf/unpack.h"
 #include "tree/bulk.h"
-#include "tree/cell_bounds.h"
 #include "tree/packed_triangles.h"
 
 namespace bocst::query {
@@ -820,7 +819,7 @@ TEST_P(EveryTarget, PackedCornersAreWhereTheMeshHasThem) {
       for (int k = 0; k < 3; ++k) box.extend(surface.corner(t, k));
     }
     tree::BulkBuilder bulk;
-    bulk.build(surface, ids.data(), count, tree::latticeBounds(surface));
+    bulk.build(surface, ids.data(), count, surface.latticeBounds());
     ASSERT_EQ(bulk.ids(), ids);
     tree::PackedTriangles::Words words;
     const std::size_t word_count = bulk.pack(0, static_cast<std::uint32_t>(count), words);

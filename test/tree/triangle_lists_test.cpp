@@ -9,7 +9,6 @@
 
 #include "meshes.h"
 #include "tree/bulk.h"
-#include "tree/cell_bounds.h"
 
 namespace bocst::tree {
 namespace {
@@ -58,22 +57,29 @@ TEST(TriangleLists, NearNumbersTakeTwoBytes) {
   EXPECT_GT(far.bytes(), 4 * 200 * 1000);
 }
 
+struct FakeResource : oracle::DeviceResource {
+  std::size_t bytes() const override { return 100; }
+};
+
 TEST(TriangleLists, PackedAndKeptOnesGoAlongWithCopies) {
   const test::Raw raw = test::torus(30);
   const auto mesh = raw.mesh();
   const oracle::Surface surface{mesh, lattice::Lattice(mesh->bounds(), Subdivision::kBono, 0)};
   TriangleLists lists, copies;
   std::mt19937 g(6);
+  std::vector<std::shared_ptr<const oracle::DeviceResource>> resources(5);
+  for (auto& resource : resources) resource = std::make_shared<const FakeResource>();
   for (std::uint32_t i = 0; i < 300; ++i) {
+    const auto& resource = resources[i % resources.size()];
     Ids ids(1 + g() % PackedTriangles::kMostTriangles);
     for (auto& id : ids) id = static_cast<std::uint32_t>(g() % mesh->triangleCount());
     BulkBuilder bulk;
-    bulk.build(surface, ids.data(), ids.size(), latticeBounds(surface));
+    bulk.build(surface, ids.data(), ids.size(), surface.latticeBounds());
     PackedTriangles::Words words;
     const std::size_t size = bulk.pack(0, static_cast<std::uint32_t>(ids.size()), words);
     const std::uint32_t plain = lists.add(ids.data(), ids.size()),
                         packed = lists.addPacked(ids.data(), ids.size(), words, size),
-                        kept = lists.addDeviceList(1000 * i, {i, 7 * i}), copy = copies.addCopy(lists, packed),
+                        kept = lists.addDeviceList(1000 * i, {resource, 7 * i}), copy = copies.addCopy(lists, packed),
                         kept_copy = copies.addCopy(lists, kept);
     PackedTriangles no, first, second;
     ASSERT_FALSE(lists.packed(plain, no));
@@ -90,15 +96,33 @@ TEST(TriangleLists, PackedAndKeptOnesGoAlongWithCopies) {
     ASSERT_TRUE(copies.isOnDevice(kept_copy));
     ASSERT_FALSE(copies[kept_copy].ids.areKnown());
     ASSERT_EQ(copies[kept_copy].count, 1000 * i);
-    ASSERT_EQ(copies.place(kept_copy).resource, i);
+    ASSERT_EQ(copies.place(kept_copy).resource, resource);
     ASSERT_EQ(copies.place(kept_copy).begin, 7 * i);
   }
 }
 
+TEST(TriangleLists, HoldTheResourcesThatTheyName) {
+  const auto first = std::make_shared<const FakeResource>(), second = std::make_shared<const FakeResource>();
+  TriangleLists lists, copies;
+  const std::uint32_t list = lists.addDeviceList(10, {first, 1});
+  lists.addDeviceList(20, {second, 2});
+  lists.addDeviceList(30, {first, 3});
+  EXPECT_EQ(lists.deviceBytes(), 200u);
+  EXPECT_EQ(first.use_count(), 2);
+  copies.addCopy(lists, list);
+  EXPECT_EQ(copies.deviceBytes(), 100u);
+  lists.swap(copies);
+  copies.clear();
+  EXPECT_EQ(copies.deviceBytes(), 0u);
+  EXPECT_EQ(first.use_count(), 2);
+  EXPECT_EQ(second.use_count(), 1);
+}
+
 TEST(TriangleLists, RefuseMoreThanTheyCanCount) {
   TriangleLists lists;
-  EXPECT_THROW(lists.addDeviceList(std::size_t{1} << 29, {0, 0}), std::length_error);
-  EXPECT_NO_THROW(lists.addDeviceList((std::size_t{1} << 29) - 1, {0, 0}));
+  const auto resource = std::make_shared<const FakeResource>();
+  EXPECT_THROW(lists.addDeviceList(std::size_t{1} << 29, {resource, 0}), std::length_error);
+  EXPECT_NO_THROW(lists.addDeviceList((std::size_t{1} << 29) - 1, {resource, 0}));
 }
 
 }  // namespace
