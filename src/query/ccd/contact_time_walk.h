@@ -15,6 +15,7 @@
 #include "query/distance/best_first.h"
 #include "query/sides/box_side.h"
 #include "query/sides/side.h"
+#include "query/sides/visitor.h"
 
 namespace bocst::query {
 
@@ -46,7 +47,7 @@ class ContactTimeWalk : private BestFirst<ContactTimeWalk<A, B>, A, B> {
   /// The time of the first contact, at most goal.time_error too early and never too late; infinite without contact.
   /// `known`: a time at which there is contact. After `most_steps` it gives up, and returns the first that it found.
   /// `begin`: there is no contact before.
-  double run(const ContactGoal& goal, double known = kNever, std::size_t most_steps = ~std::size_t{0},
+  double run(const ContactGoal& goal, double known = kNever, std::size_t most_steps = kNoLimit,
              double begin = 0) {
     goal_ = goal;
     first_ = known;
@@ -388,7 +389,7 @@ class ContactTimeWalk : private BestFirst<ContactTimeWalk<A, B>, A, B> {
 template <typename B>
 double findContactTime(const TreeSide& a, const SimilarityTransform& a_in_body, const Motion& motion_a, const B& b,
                        const SimilarityTransform& b_in_body, const Motion& motion_b, const ContactGoal& goal) {
-  constexpr std::size_t kFew = 32, kMany = 2048, kAll = ~std::size_t{0};
+  constexpr std::size_t kFew = 32, kMany = 2048;
   constexpr bool kTwoTrees = std::is_same<B, TreeSide>::value;
   ContactTimeWalk<TreeSide, B> trees(a, a_in_body, motion_a, b, b_in_body, motion_b);
   std::size_t price = a.tree().boxPrice();
@@ -439,8 +440,8 @@ double findContactTime(const TreeSide& a, const SimilarityTransform& a_in_body, 
   if (gave_up) walkTrees(price == 0 ? kFew : kMany + price);
   bool has_boxes = gave_up && BoxSide::build(a);
   if constexpr (kTwoTrees) has_boxes = has_boxes && BoxSide::build(b);
-  if (has_boxes) walkBoxes(kAll);
-  if (gave_up) walkTrees(kAll);
+  if (has_boxes) walkBoxes(kNoLimit);
+  if (gave_up) walkTrees(kNoLimit);
   return time;
 }
 

@@ -43,9 +43,19 @@ class PairWalk {
     if constexpr (!B::kBodies) BOCST_ASSERT(!a.isConservative() || !b.isConservative());
   }
 
-  /// True when the visitor ended it. After `most_steps` pairs of nodes it gives up.
-  bool run(std::size_t most_steps = ~std::size_t{0}) {
+  /// True when the visitor ended it.
+  bool run() { return run(kNoLimit).met; }
+  /// The same, but gives up after so many pairs of nodes.
+  WalkEnd run(std::size_t most_steps) {
     most_steps_ = most_steps;
+    const bool ended = search();
+    return {ended && !gave_up_, steps_, gave_up_};
+  }
+
+ private:
+  using Pair = typename DeferredPairs<A, B>::Pair;
+
+  bool search() {
     Scratch& s = scratch();
     s.stack.clear();
     s.ordered.clear();
@@ -59,8 +69,8 @@ class PairWalk {
     for (;;) {
       Pair pair;
       while (cut_ != nullptr ? popFirst(s, pair) : popLast(s, pair)) {
-        if (spheres_ ? stepSpheres(pair, s) : stepBoxes(pair, s)) return !gave_up_;
-        if (++steps_ < most_steps) continue;
+        if (spheres_ ? stepSpheres(pair, s) : stepBoxes(pair, s)) return true;
+        if (++steps_ < most_steps_) continue;
         gave_up_ = true;
         return false;
       }
@@ -72,13 +82,6 @@ class PairWalk {
     }
   }
 
-  /// Did the walk end before it had seen all pairs?
-  bool gaveUp() const { return gave_up_; }
-  /// Pairs of nodes that it looked at.
-  std::size_t steps() const { return steps_; }
-
- private:
-  using Pair = typename DeferredPairs<A, B>::Pair;
   struct PlacedPair {
     double place;
     Pair pair;
@@ -388,13 +391,6 @@ class PairWalk {
   std::size_t steps_ = 0, most_steps_ = 0;
 };
 
-/// How a walk ended.
-struct WalkEnd {
-  bool met;  ///< The visitor ended it.
-  std::size_t steps;
-  bool gave_up;
-};
-
 /// A walk over the blocks of two models and one over their oriented boxes in turns, until one ends; for a visitor that
 /// ends at the first hit. walk_blocks(most_steps) returns a WalkEnd.
 template <typename WalkBlocks>
@@ -404,13 +400,12 @@ bool walkByTurns(const TreeSide& a, const TreeSide& b, const SimilarityTransform
     const WalkEnd blocks = walk_blocks(turns.most());
     turns.tookOverBlocks(blocks.steps, blocks.gave_up);
     if (!blocks.gave_up) return blocks.met;
-    if (!BoxSide::build(a) || !BoxSide::build(b)) return walk_blocks(~std::size_t{0}).met;
+    if (!BoxSide::build(a) || !BoxSide::build(b)) return walk_blocks(kNoLimit).met;
     const BoxSide boxes_a(a), boxes_b(b);
-    PairWalk<BoxSide, BoxSide> boxes(boxes_a, boxes_b, b_in_a, visitor);
-    const bool met = boxes.run(turns.mostOverBoxes());
-    if (boxes.gaveUp()) continue;
-    turns.endedOverBoxes(boxes.steps());
-    return met;
+    const WalkEnd boxes = PairWalk<BoxSide, BoxSide>(boxes_a, boxes_b, b_in_a, visitor).run(turns.mostOverBoxes());
+    if (boxes.gave_up) continue;
+    turns.endedOverBoxes(boxes.steps);
+    return boxes.met;
   }
 }
 

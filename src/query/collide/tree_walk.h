@@ -38,7 +38,7 @@ class TreeWalk {
   bool isNeedless() { return areSeparate(a_.tree().supports(), b_.tree().supports(), place(), is_shallow_); }
 
   /// True when the visitor ended it.
-  bool run(Visitor& visitor) { return run(visitor, ~std::size_t{0}).met; }
+  bool run(Visitor& visitor) { return run(visitor, kNoLimit).met; }
 
   /// The same, but gives up after more than so many pairs of leaves.
   WalkEnd run(Visitor& visitor, std::size_t most_leaf_pairs);

@@ -47,7 +47,7 @@ class DistanceWalk : private BestFirst<DistanceWalk<A, B>, A, B> {
   }
 
   /// `known`: an answer in hand. After `most_steps` it gives up.
-  Nearest run(const DistanceGoal& goal, const Nearest& known = {}, std::size_t most_steps = ~std::size_t{0}) {
+  Nearest run(const DistanceGoal& goal, const Nearest& known = {}, std::size_t most_steps = kNoLimit) {
     goal_ = goal;
     limit_ = goal.below;
     steps_ = 0;

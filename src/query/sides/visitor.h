@@ -59,6 +59,16 @@ struct Cut {
   bool isBeyond(double least) const { return least > most(); }
 };
 
+/// A walk that goes on until all is visited.
+constexpr std::size_t kNoLimit = ~std::size_t{0};
+
+/// How a walk ended that has a limit.
+struct WalkEnd {
+  bool met;  ///< The visitor ended it.
+  std::size_t steps;
+  bool gave_up;  ///< At the limit.
+};
+
 /// What a query does with the pairs that a walk finds. Each function returns true to end the walk. A pair may come more
 /// than once.
 class Visitor {

@@ -1,0 +1,249 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#pragma once
+
+#include <algorithm>
+#include <cmath>
+#include <cstddef>
+#include <cstdint>
+#include <type_traits>
+
+#include "fcl/adapters/pair.h"
+#include "fcl/queries/collide_query.h"
+#include "fcl/queries/inside.h"
+#include "fcl/queries/inside_contact.h"
+#include "fcl/queries/mesh_collector.h"
+#include "fcl/queries/query_scope.h"
+#include "query/collide/pair_walk.h"
+#include "query/collide/sphere_walk.h"
+#include "query/collide/tree_walk.h"
+#include "query/cull/crossing.h"
+#include "query/distance/distance_walk.h"
+#include "query/sides/box_side.h"
+
+namespace bocst::fcl_adapter {
+
+/// What is within the margin touches: the walk's tolerance, in units of side A, is so much more. Positions may be off
+/// by the tolerance before. `culling_margin`: the margin, or what CollideQuery::cullingMargin() has for slabs.
+template <typename S>
+query::SimilarityTransform withMargin(query::SimilarityTransform b_in_a, const query::TreeSide& a,
+                                      const CollideQuery<S>& q, double culling_margin) {
+  const double per_unit = 1 / unitOf(a);
+  b_in_a.margin = std::max(q.margin * per_unit - b_in_a.tolerance, 0.0);
+  b_in_a.tolerance += culling_margin * per_unit;
+  return b_in_a;
+}
+
+/// Are two meshes, and the spheres of their cells, apart because their distance exceeds the range of a walk's floats? A
+/// walk would overflow, or lose the distance in its tolerance. Most queries compare one number.
+template <typename S>
+bool isOutOfSight(const CollideQuery<S>& q, const query::SimilarityTransform& b_in_a, double size_a, double size_b) {
+  if (b_in_a.tolerance < 1e15) return false;
+  const Eigen::Vector3d half_way =
+      q.X_W1.translation().template cast<double>() / 2 - q.X_W2.translation().template cast<double>() / 2;
+  return half_way.cwiseAbs().maxCoeff() > 8 * (size_a + size_b) + q.margin;
+}
+
+/// A collision query of two models: chooses among the walks, and hands what they find to a MeshCollector. While both
+/// trees' query locks are held.
+template <typename S>
+class TreesCollision {
+ public:
+  TreesCollision(const CollideQuery<S>& q, const query::TreeSide& a, const query::TreeSide& b)
+      : q_(q),
+        a_(a),
+        b_(b),
+        relative_(relate<S>(q, a, b)),
+        // TreeWalk widens slabs by itself; oriented boxes and spheres need no more than the margin.
+        near_(withMargin(relative_.b_in_a, a, q, q.margin)) {}
+
+  /// What a query wants: contacts, or only whether there is one.
+  enum class Wanted { kContacts, kVerdict };
+
+  /// Adds contacts to the result. True where only a verdict is wanted and probes prove contact; then there may be none.
+  bool run(Wanted wanted) {
+    tree::Tree &tree_a = a_.tree(), &tree_b = b_.tree();
+    const double magnitude = relative_.magnitude;
+    if (isOutOfSight(q_, relative_.b_in_a, magnitudeOf(tree_a.surface().bounds),
+                     magnitudeOf(tree_b.surface().bounds))) {
+      return false;
+    }
+    const std::size_t before = q_.result.numContacts();
+    if (walk(wanted)) return true;
+    if (q_.mayBeInside(before) && (contains<S>(tree_a, q_.X_WA(), tree_b, q_.X_WB(), magnitude) ||
+                                   contains<S>(tree_b, q_.X_WB(), tree_a, q_.X_WA(), magnitude))) {
+      addInside(q_, a_, b_, relative_.b_in_a);
+    }
+    return false;
+  }
+
+ private:
+  /// Not with float: FCL may see contacts of slivers that oriented boxes separate.
+  static constexpr bool kUsesBoxes = std::is_same<S, double>::value;
+
+  // Those that take a verdict return true where probes prove contact.
+
+  bool walk(Wanted wanted) {
+    const bool float_trees = query::TreeWalk::fits(a_, b_, near_);
+    if (float_trees && !isNeedle(a_.tree()) && !isNeedle(b_.tree())) return walkTrees(wanted);
+    if (kUsesBoxes && isNeedle(a_.tree()) && isNeedle(b_.tree()) && boxesFit()) {
+      collect(q_, [&](MeshCollector<S>& collector) { walkBoxes(collector, query::kNoLimit); });
+      return false;
+    }
+    if (query::SphereWalk::fits(a_, b_)) return walkSpheres(wanted);
+    if (query::TreeWalk::fitsCells(a_, b_, near_)) {
+      walkCells();
+    } else {
+      walkInDouble();
+    }
+    return false;
+  }
+
+  /// Is a surface so long and thin that the float walk's rounding, which is a part of its length, is as wide as it is?
+  /// The walk in double parts what that one cannot; of two such surfaces, along the axes of oriented boxes.
+  static bool isNeedle(const tree::Tree& tree) {
+    constexpr float kThin = 0x1p-12f;
+    return tree.outline().read([](const tree::Outline::Reader& box) {
+      const float x = box.half(0), y = box.half(1), z = box.half(2);
+      const float most = std::max({x, y, z}), least = std::min({x, y, z}), middle = x + y + z - most - least;
+      return middle < kThin * most;
+    });
+  }
+
+  // Two models with exact answers, in float.
+  bool walkTrees(Wanted wanted) {
+    query::TreeWalk trees(a_, b_, near_);
+    if (trees.isNeedless()) return false;
+    if (kUsesBoxes && (query::knownBoxesApart(a_, b_, near_) || boxesPartAll())) return false;
+    if (isProved(wanted)) return true;
+    const std::size_t before = q_.result.numContacts();
+    std::size_t steps = 0;
+    collect(q_, [&](MeshCollector<S>& collector) {
+      if (isWithinMargin(collector)) {
+        walkWithinMargin(collector, [&](std::size_t most) { return trees.run(collector, most); });
+      } else if (kUsesBoxes && collector.endsAtFirst()) {
+        trees.runByTurns(collector);
+      } else if (kUsesBoxes && query::Turns::favourBoxes(a_, b_)) {
+        walkBoxes(collector, query::kNoLimit);
+      } else {
+        steps = trees.run(collector, query::kNoLimit).steps;
+      }
+    });
+    // Walks for a verdict have taken turns with oriented boxes; a walk for contacts that found none pays for them.
+    if (kUsesBoxes && !q_.endsAtFirst() && q_.result.numContacts() == before) trees.payForBoxes(steps);
+    return false;
+  }
+
+  // Two models with conservative answers.
+  bool walkSpheres(Wanted wanted) {
+    query::SphereWalk spheres(a_, b_, near_);
+    if (spheres.isNeedless()) return false;
+    if (isProved(wanted)) return true;
+    collect(q_, [&](MeshCollector<S>& collector) { spheres.run(collector); });
+    return false;
+  }
+
+  // One with conservative answers beside one with exact ones, in float.
+  void walkCells() {
+    query::TreeWalk trees(a_, b_, near_);
+    if (!trees.isNeedless()) collect(q_, [&](MeshCollector<S>& collector) { trees.run(collector); });
+  }
+
+  // What float cannot hold.
+  void walkInDouble() {
+    const bool spheres = a_.isConservative() || b_.isConservative();
+    const query::SimilarityTransform wide = withMargin(relative_.b_in_a, a_, q_, q_.cullingMargin(spheres));
+    collect(q_, [&](MeshCollector<S>& collector) {
+      const auto walk_blocks = [&](std::size_t most) {
+        return query::PairWalk<query::TreeSide, query::TreeSide>(a_, b_, wide, collector).run(most);
+      };
+      // Of a mesh that is much larger than its details, these share a unit of the lattice, and blocks part nothing.
+      constexpr query::Turns::Limits kLimits = {64, 1024, 1024, 1};
+      if (!spheres && isWithinMargin(collector)) {
+        walkWithinMargin(collector, walk_blocks);
+      } else if (spheres || !kUsesBoxes || !boxesFit()) {
+        walk_blocks(query::kNoLimit);
+      } else if (collector.endsAtFirst()) {
+        query::walkByTurns(a_, b_, near_, collector, kLimits, walk_blocks);
+      } else if (boxesAreBuilt()) {
+        walkBoxes(collector, query::kNoLimit);
+      } else {
+        const query::Turns turns(a_, b_, tree::Tree::Search::kYesOrNo, kLimits);
+        turns.tookOverBlocks(walk_blocks(query::kNoLimit).steps, false);
+      }
+    });
+  }
+
+  // Calls f(collector), and hands what was collected to the query's result.
+  template <typename F>
+  void collect(const CollideQuery<S>& q, F&& f) const {
+    const tree::Tree &tree_a = a_.tree(), &tree_b = b_.tree();
+    const Triangles<S> t1(q.swapped ? tree_b : tree_a), t2(q.swapped ? tree_a : tree_b);
+    MeshCollector<S> collector(q, tree_a, t1, t2, relative_.magnitude);
+    collector.setFrame(tree_a.surface().lattice, relative_.b_in_a.tolerance + q.margin / unitOf(a_));
+    f(collector);
+    collector.finish();
+  }
+
+  bool isProved(Wanted wanted) const {
+    if (wanted != Wanted::kVerdict) return false;
+    const Interior *of_a = a_.tree().interior(a_.now()), *of_b = b_.tree().interior(b_.now());
+    return of_a != nullptr && of_b != nullptr && query::surelyCross(*of_a, *of_b, relative_.b_in_a);
+  }
+
+  // Oriented boxes.
+
+  bool boxesFit() const { return query::BoxSide::fits(a_) && query::BoxSide::fits(b_); }
+  bool boxesAreBuilt() const { return a_.tree().knownBoxes() != nullptr && b_.tree().knownBoxes() != nullptr; }
+
+  query::WalkEnd walkBoxes(MeshCollector<S>& collector, std::size_t most_steps) const {
+    const query::BoxSide boxes_a(a_), boxes_b(b_);
+    return query::PairWalk<query::BoxSide, query::BoxSide>(boxes_a, boxes_b, near_, collector).run(most_steps);
+  }
+
+  // Of slivers, a walk for contacts over blocks may take thousands of times as long as one over boxes to find nothing.
+  bool boxesPartAll() const {
+    if (q_.endsAtFirst() || q_.request.enable_cost || query::Turns::favourBoxes(a_, b_)) return false;
+    if (!boxesFit() || a_.tree().boxPrice() + b_.tree().boxPrice() > 0) return false;
+    if (!query::BoxSide::build(a_) || !query::BoxSide::build(b_)) return false;
+    const fcl::CollisionRequest<S> request;
+    fcl::CollisionResult<S> result;
+    query::WalkEnd end{};
+    collect({q_, request, result, q_.margin, q_.is_distance},
+            [&](MeshCollector<S>& collector) { end = walkBoxes(collector, query::Turns::kShort); });
+    return !end.met && !end.gave_up;
+  }
+
+  // Margins.
+
+  /// Does the margin exceed rounding, so that the distance of two triangles alone decides whether they touch, and does
+  /// one pair do?
+  bool isWithinMargin(const MeshCollector<S>& collector) const { return near_.margin > 0 && collector.endsAtFirst(); }
+
+  /// A yes-or-no walk of such a query. Beside a margin that is much larger than nodes and triangles, these separate
+  /// nothing: so if the walks over blocks and oriented boxes get as long as a search for the distance usually takes,
+  /// that is asked whether anything is near enough to be tested. walk_blocks(most_steps) returns a query::WalkEnd.
+  template <typename WalkBlocks>
+  void walkWithinMargin(MeshCollector<S>& collector, WalkBlocks&& walk_blocks) const {
+    constexpr std::size_t kFewSteps = 64, kMostSteps = 4096;
+    constexpr double kAnyWillDo = 1e300;
+    const bool boxes = kUsesBoxes && boxesAreBuilt();
+    if (!walk_blocks(boxes ? kFewSteps : kMostSteps).gave_up) return;
+    if (boxes && !walkBoxes(collector, kMostSteps).gave_up) return;
+    // What the search computes is off by less than this; so are the lengths of the tolerance.
+    constexpr double kRounding = 1e-12;
+    const double below = near_.tolerance * (1 + kRounding) + kRounding * 2 * lattice::kMiddle * (1 + near_.scale);
+    const query::Nearest nearest = query::findNearest(a_, b_, near_, {below, kAnyWillDo, kAnyWillDo});
+    if (!std::isfinite(nearest.distance)) return;
+    // Else the distance and the margin are the same up to rounding.
+    const bool meets =
+        collector.triangles(static_cast<std::uint32_t>(nearest.a), static_cast<std::uint32_t>(nearest.b), false);
+    if (!meets) walk_blocks(query::kNoLimit);
+  }
+
+  const CollideQuery<S>& q_;
+  const query::TreeSide &a_, &b_;
+  const RelativeSides relative_;
+  const query::SimilarityTransform near_;
+};
+
+}  // namespace bocst::fcl_adapter
