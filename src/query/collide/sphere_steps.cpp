@@ -23,22 +23,6 @@ namespace {
 constexpr float kHalfDiagonal = 0.8660254f;   // of a cube of side 1
 constexpr float kClippedFactor = 1.4142136f;  // see TreeSide::sphere()
 
-// A block of a side whose octants are in a frame.
-inline BlockView viewOf(const SphereSteps& s, int side, std::uint32_t index, std::uint32_t frame) {
-  const tree::Block& block = s.side[side]->tree().block(index);
-  return {&block, index, block.shape + 1u, frame, static_cast<std::uint32_t>(side)};
-}
-
-// Octant o of a block in a frame.
-inline StepNode octantOf(const BlockView& b, std::uint32_t o) {
-  StepNode n;
-  n.node = tree::NodeRef::octant(b.index, static_cast<int>(o));
-  n.ref = b.at->child[o].load(std::memory_order_acquire);
-  n.level = b.level;
-  n.lane = 8 * b.frame + o;
-  return n;
-}
-
 }  // namespace
 }  // namespace bocst::query
 #endif
@@ -47,7 +31,7 @@ HWY_BEFORE_NAMESPACE();
 namespace bocst::query::HWY_NAMESPACE {
 
 // Writes the centres of some spheres, in their own frame and in the other.
-HWY_INLINE void turnSpheres(const SphereFrames::Side& g, const V (&c)[3], std::size_t i, SphereFrame& f) {
+HWY_INLINE void turnSpheres(const SideFrame& g, const V (&c)[3], std::size_t i, SphereFrame& f) {
   const D d;
   BOCST_UNROLL
   for (int j = 0; j < 3; ++j) {
@@ -63,7 +47,7 @@ HWY_INLINE void turnSpheres(const SphereFrames::Side& g, const V (&c)[3], std::s
 template <typename Position>
 HWY_INLINE void decodeSpheres(const SphereSteps& s, int side, int level, const Position& at, SphereFrame& f) {
   const D d;
-  const SphereFrames::Side& g = s.frames.side[side];
+  const SideFrame& g = s.frames.side[side];
   const std::int32_t length = 1 << (lattice::kMaxLevel - 1 - level);
   std::int32_t corner[3], end[3];  // of the first octant and of the regions, from the middle of the root
   bool whole = true;
@@ -117,7 +101,7 @@ HWY_INLINE void decodeBlock(SphereSteps& s, const BlockView& block) {
 
 // Decodes the block of an expanded node of a side into a frame.
 HWY_INLINE BlockView open(SphereSteps& s, int side, const StepNode& node, std::uint32_t frame) {
-  const BlockView block = viewOf(s, side, node.ref.index(), frame);
+  const BlockView block = viewOf(s.side[side]->tree(), side, node.ref.index(), frame);
   s.side[side]->tree().markUsed(block.index, s.side[side]->now());
   decodeBlock(s, block);
   return block;
@@ -181,7 +165,7 @@ HWY_INLINE std::uint32_t first(const SphereGroup& group, std::uint32_t octants) 
 HWY_NOINLINE std::uint32_t lookUp(SphereSteps& s, int side, tree::NodeRef node, std::uint32_t frame) {
   const std::uint32_t root[3] = {0, 0, 0};
   if (!node.isRoot()) {
-    decodeBlock(s, viewOf(s, side, node.block(), frame));
+    decodeBlock(s, viewOf(s.side[side]->tree(), side, node.block(), frame));
     return 8 * frame + static_cast<std::uint32_t>(node.octant());
   }
   s.holds[frame] = kEmptyFrame;
@@ -216,7 +200,8 @@ HWY_INLINE bool expandOther(SphereSteps& s, const BlockView& own, const StepNode
   const BlockView block = open(s, y, other, own.frame + 1);
   const std::size_t start = s.depth;
   for (; mask != 0; mask &= mask - 1) {
-    const StepNode n = octantOf(own, static_cast<std::uint32_t>(__builtin_ctz(mask)));
+    StepNode n;
+    setOctant(n, own, static_cast<std::uint32_t>(__builtin_ctz(mask)));
     const unsigned left = meetingOctants(s, block, n, s.stack[s.depth].order);
     if (left != 0) push(s, block, block.frame + 1, n, left);
   }
@@ -295,19 +280,12 @@ HWY_EXPORT(NextEvent);
 
 SphereFrames::SphereFrames(const SimilarityTransform& one_in_zero) {
   const double q0 = lattice::kMiddle, q1 = q0 * one_in_zero.scale;
-  const Eigen::Matrix3d& r = one_in_zero.rotation;
-  const Eigen::Vector3d t = one_in_zero * Eigen::Vector3d::Constant(q0) - Eigen::Vector3d::Constant(q0);
-  const double size = t.norm() + 2.45 * (q0 + q1);
+  const double size = placeSides(one_in_zero, side[0], side[1]) + 2.45 * (q0 + q1);
   constexpr double kMost = 1e17;  // squares must be floats
-  if (!(size < kMost && one_in_zero.tolerance < kMost)) return;
-  const Eigen::Vector3d back = -(r.transpose() * t);
-  for (int j = 0; j < 3; ++j) {
-    for (int k = 0; k < 3; ++k) side[0].to_other[j][k] = side[1].to_other[k][j] = static_cast<float>(r(k, j));
-    side[0].shift[j] = static_cast<float>(back[j]);
-    side[1].shift[j] = static_cast<float>(t[j]);
+  if (!(size < kMost && one_in_zero.tolerance < kMost)) {
+    side[0] = side[1] = {};  // numbers, so that the margin alone decides
+    return;
   }
-  side[0].unit = 1;
-  side[1].unit = static_cast<float>(one_in_zero.scale);
   rounding_margin = static_cast<float>(size * (48 * 0x1p-24 + 6 * one_in_zero.orthogonality_error) * 1.0001);
   tolerance = static_cast<float>(one_in_zero.tolerance);
 }

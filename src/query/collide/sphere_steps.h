@@ -6,6 +6,7 @@
 #include <limits>
 
 #include "query/collide/step_state.h"
+#include "query/cull/frames.h"
 #include "query/sides/side.h"
 #include "query/sides/visitor.h"
 
@@ -17,8 +18,7 @@ struct alignas(64) SphereFrame {
   float radius[8];
 };
 
-/// The pose of one root relative to the other, in float: side[s] leads from coordinates about the middle of root s to
-/// those about the middle of the other root, in lattice units of side 0.
+/// The pose of one root relative to the other, in float, and the rounding margin that this needs.
 ///
 /// With u = 2^-24, Q0 and Q1 half the roots' sides and t the vector between their middles, no coordinate, distance or
 /// radius is larger than M = |t| + sqrt(6) (Q0 + Q1). Cells are integers: in its own frame a centre is off by 2 u M, in
@@ -30,12 +30,7 @@ struct alignas(64) SphereFrame {
 struct SphereFrames {
   explicit SphereFrames(const SimilarityTransform& one_in_zero);
 
-  struct Side {
-    float unit;            ///< A lattice unit, in those of side 0.
-    float shift[3];        ///< Coordinates in the other frame are to_other * own coordinates + shift.
-    float to_other[3][3];  ///< Rows.
-  };
-  Side side[2] = {};
+  SideFrame side[2] = {};
   /// Infinite where floats can't hold the pair: then each test is in doubt.
   float rounding_margin = std::numeric_limits<float>::infinity();
   float tolerance = 0;

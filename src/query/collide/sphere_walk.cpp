@@ -124,7 +124,7 @@ bool SphereWalk::describe(oracle::DeviceWalks::Pair& pair) const {
   constexpr float kWider = 1.5f;
   const SphereFrames frames(b_in_a_);
   if (!std::isfinite(frames.rounding_margin) || (a_.tree().isDeepest(1) && b_.tree().isDeepest(1))) return false;
-  const SphereFrames::Side& side = frames.side[1];
+  const SideFrame& side = frames.side[1];
   std::copy_n(&side.to_other[0][0], 9, &pair.rotation[0][0]);
   std::copy_n(side.shift, 3, pair.shift);
   pair.unit = side.unit;

@@ -32,6 +32,20 @@ struct BlockView {
   std::uint32_t side;     ///< Whose tree has the block.
 };
 
+/// A block of a side whose octants are in a frame.
+inline BlockView viewOf(const tree::Tree& tree, int side, std::uint32_t index, std::uint32_t frame) {
+  const tree::Block& block = tree.block(index);
+  return {&block, index, static_cast<std::uint32_t>(block.childLevel()), frame, static_cast<std::uint32_t>(side)};
+}
+
+/// Octant o of a block in a frame.
+inline void setOctant(StepNode& n, const BlockView& b, std::uint32_t o) {
+  n.node = tree::NodeRef::octant(b.index, static_cast<int>(o));
+  n.ref = b.at->child[o].load(std::memory_order_acquire);
+  n.level = b.level;
+  n.lane = 8 * b.frame + o;
+}
+
 /// Copies word by word: a processor is slow to read a wide word that was just written in parts.
 inline void copyWords(const StepNode& from, StepNode& to) {
   to.node = from.node;

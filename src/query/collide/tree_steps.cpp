@@ -24,20 +24,6 @@ inline bool isLeaf(const PairSteps& s, int side, const StepNode& n) {
                            : tag == tree::ChildRef::kShortList || (tag == tree::ChildRef::kList && is_deepest);
 }
 
-// A block of side x whose octants are in a frame.
-inline BlockView viewOf(const PairSteps& s, int x, std::uint32_t index, std::uint32_t frame) {
-  const tree::Block& block = s.tree[x]->block(index);
-  return {&block, index, static_cast<std::uint32_t>(block.childLevel()), frame, static_cast<std::uint32_t>(x)};
-}
-
-// Octant o of a block in a frame.
-inline void setOctant(StepNode& n, const BlockView& b, std::uint32_t o) {
-  n.node = tree::NodeRef::octant(b.index, static_cast<int>(o));
-  n.ref = b.at->child[o].load(std::memory_order_acquire);
-  n.level = b.level;
-  n.lane = 8 * b.frame + o;
-}
-
 // StepGroup::order is set before: overlapping() writes it to the place on the stack that the group takes.
 inline void push(PairSteps& s, const BlockView& own, const StepNode& other, unsigned octants,
                  std::uint32_t asked = AskedLeaf::kNone) {
@@ -111,7 +97,7 @@ HWY_INLINE void lookUp(PairSteps& s, StepNode& n, int side, std::uint32_t& frame
 // Decodes the block of an expanded node of side x into a frame. `is_new`: the frame did not hold it before.
 HWY_INLINE BlockView open(PairSteps& s, int x, const StepNode& node, std::uint32_t frame, bool& is_new) {
   BOCST_ASSERT(frame < PairSteps::kFrames);
-  const BlockView block = viewOf(s, x, node.ref.index(), frame);
+  const BlockView block = viewOf(*s.tree[x], x, node.ref.index(), frame);
   s.tree[x]->markUsed(block.index, s.now[x]);
   is_new = decodeBlock(s, x, block.index, *block.at, frame);
   return block;

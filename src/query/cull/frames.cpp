@@ -12,23 +12,29 @@ bool PairFrames::isFine(const SimilarityTransform& one_in_zero) {
   return fits(one_in_zero.scale) && (one_in_zero.translation.norm() + q0 + q1) * 0x1p-9 <= std::min(q0, q1);
 }
 
+double placeSides(const SimilarityTransform& one_in_zero, SideFrame& zero, SideFrame& one) {
+  const Eigen::Vector3d middle = Eigen::Vector3d::Constant(lattice::kMiddle);
+  const Eigen::Matrix3d& r = one_in_zero.rotation;
+  const Eigen::Vector3d t = one_in_zero * middle - middle, back = -(r.transpose() * t);
+  for (int j = 0; j < 3; ++j) {
+    for (int k = 0; k < 3; ++k) zero.to_other[j][k] = one.to_other[k][j] = static_cast<float>(r(k, j));
+    zero.shift[j] = static_cast<float>(back[j]);
+    one.shift[j] = static_cast<float>(t[j]);
+  }
+  zero.unit = 1;
+  one.unit = static_cast<float>(one_in_zero.scale);
+  return t.norm();
+}
+
 PairFrames::PairFrames(const SimilarityTransform& one_in_zero) {
   const double q0 = lattice::kMiddle, q1 = q0 * one_in_zero.scale;
-  const Eigen::Matrix3d& r = one_in_zero.rotation;
-  // Where the middle of side 1's root is, from that of side 0's.
-  const Eigen::Vector3d t = one_in_zero * Eigen::Vector3d::Constant(q0) - Eigen::Vector3d::Constant(q0);
-  const Eigen::Vector3d back = -(r.transpose() * t);
-  for (int j = 0; j < 3; ++j) {
-    for (int k = 0; k < 3; ++k) {
-      side[0].to_other[j][k] = side[1].to_other[k][j] = static_cast<float>(r(k, j));
-      side[0].abs_to_other[j][k] = side[1].abs_to_other[k][j] = static_cast<float>(std::abs(r(k, j)));
+  const double between = placeSides(one_in_zero, side[0], side[1]);
+  for (Side& s : side) {
+    for (int j = 0; j < 3; ++j) {
+      for (int k = 0; k < 3; ++k) s.abs_to_other[j][k] = std::abs(s.to_other[j][k]);
     }
-    side[0].shift[j] = static_cast<float>(back[j]);
-    side[1].shift[j] = static_cast<float>(t[j]);
   }
-  side[0].unit = 1;
-  side[1].unit = static_cast<float>(one_in_zero.scale);
-  const double size = t.norm() + std::sqrt(3.0) * (q0 + q1),
+  const double size = between + std::sqrt(3.0) * (q0 + q1),
                orthogonality_error = 4 * size * one_in_zero.orthogonality_error;
   rounding_margin = static_cast<float>((48 * 0x1p-24 * size + orthogonality_error + one_in_zero.tolerance) * 1.0001);
   side[0].rounding_margin =

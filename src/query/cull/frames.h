@@ -16,6 +16,17 @@ struct alignas(64) Frame {
   float slab_half[8];
 };
 
+/// From the frame of a side to that of the other, in float: coordinates are in lattice units of side 0 about the middle
+/// of each side's root.
+struct SideFrame {
+  float unit;            ///< A lattice unit, in those of side 0.
+  float shift[3];        ///< Coordinates in the other frame are to_other * own coordinates + shift.
+  float to_other[3][3];  ///< Rows.
+};
+
+/// Sets the frames of both sides; returns how far the middles of their roots are apart.
+double placeSides(const SimilarityTransform& one_in_zero, SideFrame& zero, SideFrame& one);
+
 /// From the frame of each of two trees to that of the other, in float, and the rounding margins that this needs.
 ///
 /// With u = 2^-24 and M = |t| + sqrt(3) (Q0 + Q1), Q half a root's side, no coordinate is larger than M. A centre is
@@ -37,10 +48,7 @@ struct PairFrames {
   /// Are rounding margins small beside both sides? What is far away is no pair for collisions; for distances it is one.
   static bool isFine(const SimilarityTransform& one_in_zero);
 
-  struct Side {
-    float unit;            ///< A lattice unit, in those of side 0.
-    float shift[3];        ///< Coordinates in the other frame are to_other * own coordinates + shift.
-    float to_other[3][3];  ///< Rows.
+  struct Side : SideFrame {
     float abs_to_other[3][3];
     float rounding_margin;  ///< Of tests in the octants' own frame: 128 u Q, and the same.
   };
