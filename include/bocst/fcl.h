@@ -157,16 +157,20 @@ BOCST_EXPORT S continuousPair(const fcl::CollisionGeometry<S>* o1, const fcl::Tr
 /// - is_collide: true if the geometries touch at some time, as in collide() (including margin, solid, conservative
 ///   answers and occupancy). The method is always conservative advancement, for any ccd_solver_type. It never steps
 ///   over a contact; num_max_iterations and gjk_solver_type have no effect.
-/// - time_of_contact: never later than the first contact, and at most toc_err earlier. Before this time they do not
-///   touch. It is 0 if they touch at the begin, and 1 without contact. toc_err may be 0.
+/// - time_of_contact: never later than the first contact. It is earlier by at most toc_err, or because the distance
+///   is already below the limits that follow. Before this time they do not touch. It is 0 if they touch
+///   at the begin, and 1 without contact. toc_err may be 0.
 /// - contact_tf1, contact_tf2: the poses at that time; without contact, the end poses.
 /// - Geometries that pass each other at a distance below 1e-9 of the smaller geometry's size (with float: about 1e-5 of
 ///   the coordinates) count as touching. With shapes and cells the limit is 2e-6 in length units: twice the distance at
-///   which collide() can report a contact because of FCL's solvers.
+///   which collide() can report a contact because of FCL's solvers. With float, it is up to 1e-5 of the sum of all
+///   lengths more: coordinates, sizes, and the paths of both, as long as their fastest points could make them.
 /// Supported motions are FCL's TranslationMotion, InterpMotion, ScrewMotion and SplineMotion (in FCL 0.7, two of them
-/// exist only for double). They are not modified. With poses, ccd_motion_type selects the motion: CCDM_TRANS keeps the
-/// rotation of the begin; CCDM_LINEAR moves the geometry's origin on a line and turns about a fixed axis; CCDM_SCREW
-/// turns about one axis and moves along it; CCDM_SPLINE interpolates the origin and the rotation vector linearly.
+/// exist only for double, and of InterpMotion's constructors that take poses only the one with two rotations, two
+/// translations and a point sets all members). They are not modified. With poses, ccd_motion_type selects the motion:
+/// CCDM_TRANS keeps the rotation of the begin; CCDM_LINEAR moves the geometry's origin on a line and turns about a
+/// fixed axis; CCDM_SCREW turns about one axis and moves along it; CCDM_SPLINE interpolates the origin and the rotation
+/// vector linearly.
 /// @throws std::invalid_argument as collide(); for a motion that is not supported or whose begin or end pose is not
 /// rigid; for an invalid toc_err; and, with float and poses, for a pair without a Model, for which FCL 0.7 has no
 /// query. Thread rule: as collide(); threads may share motions while no thread calls their integrate().
