@@ -215,13 +215,15 @@ struct Scene<S>::Impl {
   std::size_t search(const char* query, const Transform* X_WM, std::size_t states, Goal goal, std::uint8_t* hit) const {
     const WorldPtr w = current();
     const std::size_t moving = w->moving.size();
-    thread_local std::vector<double> errors_of_thread;
-    std::vector<double>& orthogonality_errors = errors_of_thread;  // the pool's threads have others
-    scene::checkPoses<S>(query, X_WM, states, moving, orthogonality_errors);
-    if (goal == Goal::kAll) std::fill(hit, hit + states, std::uint8_t{0});
-    if (states == 0 || moving == 0) return states;
     const bool all_at_once = goal == Goal::kAny && states <= kEdge;
     const std::size_t length = all_at_once ? states : kStatesAtOnce, rows = (states + length - 1) / length;
+    thread_local std::vector<double> errors_of_thread;
+    std::vector<double>& orthogonality_errors = errors_of_thread;  // the pool's threads have others
+    // Where all are asked, each row is checked just before: then its poses are read from memory once.
+    const bool checks_rows = goal == Goal::kAll && rows > 1 && X_WM != nullptr;
+    if (!checks_rows) scene::checkPoses<S>(query, X_WM, states, moving, orthogonality_errors);
+    if (goal == Goal::kAll) std::fill(hit, hit + states, std::uint8_t{0});
+    if (states == 0 || moving == 0) return states;
     if (rows == 1) return sweepOfThread<S>().run(*w, X_WM, states, goal, hit, orthogonality_errors);
     const std::vector<std::size_t> order = goal == Goal::kAny ? bisected(rows) : std::vector<std::size_t>();
     // The first row, in the order of the search, that has a hit; later rows are skipped.
@@ -233,7 +235,10 @@ struct Scene<S>::Impl {
       const std::size_t row = order.empty() ? place : order[place];
       const std::size_t begin = row * length, count = std::min(length, states - begin);
       std::uint8_t* hits = hit == nullptr ? nullptr : hit + begin;
-      const std::size_t at = sweepOfThread<S>().run(*w, X_WM + begin * moving, count, goal, hits, orthogonality_errors);
+      const Transform* X = X_WM + begin * moving;
+      std::vector<double>& errors = checks_rows ? errors_of_thread : orthogonality_errors;
+      if (checks_rows) scene::checkPoses<S>(query, X, count, moving, errors, nullptr, begin);
+      const std::size_t at = sweepOfThread<S>().run(*w, X, count, goal, hits, errors);
       if (at == count || goal == Goal::kAll) return true;
       const std::lock_guard<std::mutex> lock(finding);
       if (place < least) {

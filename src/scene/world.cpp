@@ -30,7 +30,7 @@ inline double deviationOf(double error) { return 2 * (error / kErrorPerDeviation
 
 template <typename S>
 void checkPoses(const char* query, const fcl::Transform3<S>* X_WM, std::size_t states, std::size_t moving,
-                std::vector<double>& orthogonality_errors, const char* state) {
+                std::vector<double>& orthogonality_errors, const char* state, std::size_t first) {
   orthogonality_errors.assign(roomFor(moving), 0);
   if (states == 0 || moving == 0) return;
   // Strings are made for what is refused, or nearly: queries allocate no memory.
@@ -44,7 +44,7 @@ void checkPoses(const char* query, const fcl::Transform3<S>* X_WM, std::size_t s
     for (std::size_t i = 0; i < moving; ++i) {
       const fcl::Transform3<S>& X = X_WM[k * moving + i];
       if (!fcl_adapter::isSurelyRigid(X)) {
-        const std::string where = state != nullptr ? state : "state " + std::to_string(k),
+        const std::string where = state != nullptr ? state : "state " + std::to_string(first + k),
                           which = "the pose of moving object " + std::to_string(i) + " in " + where;
         fcl_adapter::checkPose(name().c_str(), which.c_str(), X);
       }
@@ -470,7 +470,7 @@ void World<S>::place(const fcl::Transform3<S>* X_WM, const double* orthogonality
 #define BOCST_INSTANTIATE(S)                                                                                          \
   template class World<S>;                                                                                            \
   template void checkPoses<S>(const char*, const fcl::Transform3<S>*, std::size_t, std::size_t, std::vector<double>&, \
-                              const char*);
+                              const char*, std::size_t);
 BOCST_INSTANTIATE(float)
 BOCST_INSTANTIATE(double)
 #undef BOCST_INSTANTIATE

@@ -29,10 +29,11 @@ struct Object {
 };
 
 /// Writes at least the largest orthogonality error of the poses of each moving object to `orthogonality_errors`.
-/// @throws std::invalid_argument that names the first pose that is not rigid; `state`: the name of the only one.
+/// @throws std::invalid_argument that names the first pose that is not rigid. `state`: the name of the only one, or
+/// null: they have numbers, from `first` on.
 template <typename S>
 void checkPoses(const char* query, const fcl::Transform3<S>* X_WM, std::size_t states, std::size_t moving,
-                std::vector<double>& orthogonality_errors, const char* state = nullptr);
+                std::vector<double>& orthogonality_errors, const char* state = nullptr, std::size_t first = 0);
 
 /// A scene as a query sees it. A change takes the time of the moving objects and of a path in the hierarchy of fixed
 /// ones, but wears the hierarchy: it is to be made anew once isWorn().
