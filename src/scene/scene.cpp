@@ -46,6 +46,12 @@ scene::Sweep<S>& sweepOfThread() {
   return sweep;
 }
 
+/// Likewise: how far the poses of each moving object are from rigid.
+std::vector<double>& errorsOfThread() {
+  thread_local std::vector<double> errors;
+  return errors;
+}
+
 /// The numbers below `count`, middles before halves.
 std::vector<std::size_t> bisected(std::size_t count) {
   std::vector<std::size_t> order;
@@ -217,8 +223,7 @@ struct Scene<S>::Impl {
     const std::size_t moving = w->moving.size();
     const bool all_at_once = goal == Goal::kAny && states <= kEdge;
     const std::size_t length = all_at_once ? states : kStatesAtOnce, rows = (states + length - 1) / length;
-    thread_local std::vector<double> errors_of_thread;
-    std::vector<double>& orthogonality_errors = errors_of_thread;  // the pool's threads have others
+    std::vector<double>& orthogonality_errors = errorsOfThread();
     // Where all are asked, each row is checked just before: then its poses are read from memory once.
     const bool checks_rows = goal == Goal::kAll && rows > 1 && X_WM != nullptr;
     if (!checks_rows) scene::checkPoses<S>(query, X_WM, states, moving, orthogonality_errors);
@@ -236,7 +241,7 @@ struct Scene<S>::Impl {
       const std::size_t begin = row * length, count = std::min(length, states - begin);
       std::uint8_t* hits = hit == nullptr ? nullptr : hit + begin;
       const Transform* X = X_WM + begin * moving;
-      std::vector<double>& errors = checks_rows ? errors_of_thread : orthogonality_errors;
+      std::vector<double>& errors = checks_rows ? errorsOfThread() : orthogonality_errors;
       if (checks_rows) scene::checkPoses<S>(query, X, count, moving, errors, nullptr, begin);
       const std::size_t at = sweepOfThread<S>().run(*w, X, count, goal, hits, errors);
       if (at == count || goal == Goal::kAll) return true;
