@@ -47,8 +47,7 @@ class ContactTimeWalk : private BestFirst<ContactTimeWalk<A, B>, A, B> {
   /// The time of the first contact, at most goal.time_error too early and never too late; infinite without contact.
   /// `known`: a time at which there is contact. After `most_steps` it gives up, and returns the first that it found.
   /// `begin`: there is no contact before.
-  double run(const ContactGoal& goal, double known = kNever, std::size_t most_steps = kNoLimit,
-             double begin = 0) {
+  double run(const ContactGoal& goal, double known = kNever, std::size_t most_steps = kNoLimit, double begin = 0) {
     goal_ = goal;
     first_ = known;
     first_skipped_ = kNever;
