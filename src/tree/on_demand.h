@@ -24,7 +24,7 @@ class Rent {
     paid_ = 0;
     price_ = price;
   }
-  /// Nothing was paid any more; the price stays.
+  /// Forgets what was paid; the price stays.
   void restart() { paid_ = 0; }
   /// What was paid stays.
   void setPrice(std::size_t price) { price_ = price; }
@@ -37,7 +37,7 @@ class Rent {
   }
   /// Was more paid than the price?
   bool isDue() const { return paid_.load(std::memory_order_relaxed) > price_.load(std::memory_order_relaxed); }
-  /// What of the price was not paid yet.
+  /// The part of the price that is not paid yet.
   std::size_t left() const {
     const std::size_t price = price_.load(std::memory_order_relaxed);
     return price - std::min(price, paid_.load(std::memory_order_relaxed));
