@@ -1144,6 +1144,31 @@ TYPED_TEST(SceneTest, APoseThatIsNoneBehindOneThatIsSlightlyOff) {
   }
 }
 
+// Rows of states are checked one by one, by any thread: the first bad pose of all is named.
+TYPED_TEST(SceneTest, TheFirstPoseThatIsNotRigidIsNamedAmongManyStates) {
+  using S = TypeParam;
+  std::mt19937_64 g(1);
+  for (const unsigned threads : {1u, 3u}) {
+    SceneOptions options;
+    options.threads = threads;
+    Scene<S> scene(options);
+    scene.addFixed(geometry<S>(0, g), fcl::Transform3<S>::Identity());
+    for (int i = 0; i < 2; ++i) scene.addMoving(geometry<S>(0, g));
+    const std::size_t states = 1000;
+    const States<S> X(2 * states, test::pose<S>(Eigen::Matrix3d::Identity(), {50, 0, 0}));
+    std::vector<std::uint8_t> hit(states);
+    for (const std::size_t first : {0u, 127u, 128u, 700u, 999u}) {
+      States<S> Y = X;
+      Y[2 * first + 1].linear() *= S(1.01);
+      for (std::size_t k = first + 1; k < states; k += 100) Y[2 * k].linear().setZero();
+      const std::string said = complaintOf([&] { scene.collisions(Y.data(), states, hit.data()); }),
+                        name = "object 1 in state " + std::to_string(first) + " ";
+      EXPECT_NE((said + " ").find(name), std::string::npos) << said;
+    }
+    EXPECT_THROW(scene.collisions(nullptr, states, hit.data()), std::invalid_argument);
+  }
+}
+
 TYPED_TEST(SceneTest, MisuseThrows) {
   using S = TypeParam;
   std::mt19937_64 g(1);
