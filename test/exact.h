@@ -16,7 +16,7 @@
 
 namespace bocst::exact {
 
-using Corners = Eigen::Vector3d[3];
+using Corners = std::array<Eigen::Vector3d, 3>;
 
 namespace detail {
 

@@ -416,17 +416,16 @@ Vector3d RoundShape::support(const Vector3d& d) const {
   return Vector3d(d[0] * radius, d[1] * radius, up ? half_length_ : -half_length_);
 }
 
-TriangleShape::TriangleShape(const Corners& corners) : SupportShape(boxOf(corners), 0) {
-  for (int k = 0; k < 3; ++k) corners_[k] = corners[k];
-}
+TriangleShape::TriangleShape(const Corners& corners) : SupportShape(boxOf(corners), 0), corners_(corners) {}
 
-Vector3d TriangleShape::support(const Vector3d& d) const { return PointSet{corners_, 3}.support(d); }
+Vector3d TriangleShape::support(const Vector3d& d) const { return PointSet{corners_.data(), 3}.support(d); }
 
 namespace {
 
 // A point, a segment or a triangle as a triangle.
-void asTriangle(const PointSet& points, Corners& corners) {
-  for (int k = 0; k < 3; ++k) corners[k] = points.x[std::min(k, points.count - 1)];
+Corners asTriangle(const PointSet& points) {
+  const auto at = [&points](int k) { return points.x[std::min(k, points.count - 1)]; };
+  return {at(0), at(1), at(2)};
 }
 
 }  // namespace
@@ -434,8 +433,7 @@ void asTriangle(const PointSet& points, Corners& corners) {
 SeparationResult TriangleShape::gap(const PointSet& points, double cutoff) const {
   if (points.count > 3) return SupportShape::gap(points, cutoff);
   SeparationResult gap;
-  Corners other;
-  asTriangle(points, other);
+  const Corners other = asTriangle(points);
   gap.distance = nearestPoints(corners_, other, gap.on_body, gap.on_points);
   if (gap.distance > 0) gap.normal = (gap.on_points - gap.on_body) / gap.distance;
   double size = 0;
@@ -448,14 +446,13 @@ SeparationResult TriangleShape::gap(const PointSet& points, double cutoff) const
 SweptHull TriangleShape::hull() const {
   SweptHull hull;
   hull.count = 3;
-  std::copy(corners_, corners_ + 3, hull.corners);
+  std::copy(corners_.begin(), corners_.end(), hull.corners);
   return hull;
 }
 
 ContactPoint TriangleShape::penetration(const PointSet& points, const SeparationResult& gap) const {
   if (points.count > 3) return SupportShape::penetration(points, gap);
-  Corners other;
-  asTriangle(points, other);
+  const Corners other = asTriangle(points);
   ContactPoint contact = trianglePenetrations(corners_, other);
   // Triangles that are apart by no more than a query's rounding.
   if (!contact.point.allFinite()) contact.point = (gap.on_body + gap.on_points) / 2;

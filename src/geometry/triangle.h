@@ -2,6 +2,7 @@
 #pragma once
 
 #include <Eigen/Core>
+#include <array>
 #include <cstdint>
 #include <limits>
 #include <optional>
@@ -10,7 +11,7 @@
 
 namespace bocst::query {
 
-using Corners = Eigen::Vector3d[3];
+using Corners = std::array<Eigen::Vector3d, 3>;
 
 /// Where two primitives touch: unit normal from the first to the second, depth >= 0 such that moving the second by
 /// depth * normal ends the overlap, and a point midway in it.

@@ -7,6 +7,7 @@
 
 #include "bounds/node_bounds.h"
 #include "geometry/overlap_kernels.h"
+#include "geometry/triangle.h"
 #include "lattice/lattice.h"
 
 namespace bocst::query {
@@ -65,6 +66,7 @@ struct SimilarityTransform {
 };
 
 inline Sphere placed(const Sphere& s, const SimilarityTransform& to) { return {to * s.center, s.radius * to.scale}; }
+inline Corners placed(const Corners& c, const SimilarityTransform& to) { return {to * c[0], to * c[1], to * c[2]}; }
 
 /// The volume as the octants of a cell see it; `corner` is the cell's minimum corner, `side` that of its octants.
 inline OneVolume seenFrom(const Volume& v, const SimilarityTransform& to, const double* corner, double side) {

@@ -3,6 +3,7 @@
 
 #include <bocst/mesh.h>
 
+#include <array>
 #include <memory>
 
 #include "lattice/lattice.h"
@@ -25,6 +26,7 @@ struct Surface {
   }
   /// Corner k of triangle t, in lattice units.
   Eigen::Vector3d corner(std::uint32_t t, int k) const { return lattice.toLattice(mesh->vertex(mesh->indices(t)[k])); }
+  std::array<Eigen::Vector3d, 3> corners(std::uint32_t t) const { return {corner(t, 0), corner(t, 1), corner(t, 2)}; }
 };
 
 }  // namespace bocst::oracle

@@ -263,8 +263,7 @@ bool RootGrid::decide(const oracle::Surface& surface, const lattice::Cell& cell)
   const auto corner = cell.corner();
   const Eigen::Vector3d center(corner[0] + half, corner[1] + half, corner[2] + half);
   return anyCandidate(surface, cell, [&](std::uint32_t t) {
-    const Eigen::Vector3d corners[3] = {surface.corner(t, 0), surface.corner(t, 1), surface.corner(t, 2)};
-    return oracle::triangleMeetsCube(corners, center, half);
+    return oracle::triangleMeetsCube(surface.corners(t).data(), center, half);
   });
 }
 

@@ -131,7 +131,7 @@ void expectRight(const Corners& p, const Corners& q, const Eigen::Isometry3d& X)
 // Collinear corners, up to the rounding of 0.3 d, through the inside of a triangle.
 template <typename S>
 void throughTheInside() {
-  const Corners p = {{-1, -1, 0}, {2, -1, 0}, {-1, 2, 0}};
+  const Corners p = {{{-1, -1, 0}, {2, -1, 0}, {-1, 2, 0}}};
   int count = 0, orders = 0;
   for (int x = -9; x <= 9; ++x) {
     for (int y = -9; y <= 9; ++y) {

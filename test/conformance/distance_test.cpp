@@ -267,7 +267,7 @@ TEST(NearestPoints, EqualFclsTriangleDistance) {
     }
     Eigen::Vector3d a, b, fa, fb;
     const double d = query::nearestPoints(p, q, a, b);
-    const double expected = fcl::detail::TriangleDistance<double>::triDistance(p, q, fa, fb);
+    const double expected = fcl::detail::TriangleDistance<double>::triDistance(p.data(), q.data(), fa, fb);
     ASSERT_NEAR(d, expected, 1e-10) << round;
     ASSERT_NEAR((a - b).norm(), d, 1e-12);
     ASSERT_LT((query::closestPoint(a, p) - a).norm(), 1e-9);

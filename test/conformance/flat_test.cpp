@@ -269,8 +269,8 @@ TEST(FlatWork, TouchesAreFoundByAShortWalk) {
     EXPECT_EQ(touch->distance, 0);
     EXPECT_LT((touch->on_a - touch->on_b).norm(), 1e-6);
     const auto t = static_cast<std::uint32_t>(touch->a), v = static_cast<std::uint32_t>(touch->b);
-    const query::Corners in_a = {side_a.corner(t, 0), side_a.corner(t, 1), side_a.corner(t, 2)};
-    const query::Corners of_b = {to * side_b.corner(v, 0), to * side_b.corner(v, 1), to * side_b.corner(v, 2)};
+    const query::Corners in_a = side_a.corners(t);
+    const query::Corners of_b = query::placed(side_b.corners(v), to);
     Vector3d p, q;
     EXPECT_EQ(query::nearestPoints(in_a, of_b, p, q), 0) << "the triangles that it names touch";
   }

@@ -158,7 +158,7 @@ TEST(ConvexShape, TrianglesAreNoNearerThanTheySay) {
       q[k] = at + gap + Vector3d(u(g), u(g), u(g));
     }
     if (i % 2 == 0) q[0] = p[0] + gap;
-    const SeparationResult found = TriangleShape(p).gap({q, 3}, kFar);
+    const SeparationResult found = TriangleShape(p).gap({q.data(), 3}, kFar);
     ASSERT_LE(found.at_least, found.distance);
     const long double distance = std::sqrt(exact::squaredDistance(p, q));
     ASSERT_LE(static_cast<long double>(found.at_least), distance * (1 + 1e-17L)) << i;
@@ -435,7 +435,7 @@ TEST(ConvexShape, PartingPartsWhatIsFlatAndSymmetric) {
 }
 
 TEST(ConvexShape, TrianglesPartAsTriangles) {
-  const Corners c = {{0, 0, 0}, {2, 0, 0}, {0, 2, 0}};
+  const Corners c = {{{0, 0, 0}, {2, 0, 0}, {0, 2, 0}}};
   const TriangleShape body(c);
   const Vector3d across[3] = {{0.5, 0.5, -0.25}, {0.5, 0.5, 1}, {1, 0.5, 1}},
                  off[3] = {{0, 0, 1}, {1, 0, 1}, {0, 1, 1}};

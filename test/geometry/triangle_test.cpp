@@ -70,7 +70,7 @@ void flatten(std::mt19937_64& g, Corners& t, double by) {
 }
 
 TEST(Exact, KnowsWhatIsPlain) {
-  const Corners t = {{0, 0, 0}, {2, 0, 0}, {0, 2, 0}};
+  const Corners t = {{{0, 0, 0}, {2, 0, 0}, {0, 2, 0}}};
   const auto segment = [](const Vector3d& a, const Vector3d& b, exact::Corners& s) {
     s[0] = a;
     s[1] = b;
@@ -194,8 +194,8 @@ TEST(AreApart, FindsWhatIsApartByFacesOrEdges) {
   }
   EXPECT_GT(apart, 1000);
   EXPECT_EQ(found, apart);
-  const Corners huge = {{1e200, 0, 0}, {1e200, 1e200, 0}, {1e200, 0, 1e200}},
-                far = {{-1e200, 0, 0}, {-1e200, 1e200, 0}, {-1e200, 0, 1e200}};
+  const Corners huge = {{{1e200, 0, 0}, {1e200, 1e200, 0}, {1e200, 0, 1e200}}},
+                far = {{{-1e200, 0, 0}, {-1e200, 1e200, 0}, {-1e200, 0, 1e200}}};
   EXPECT_FALSE(areApart(huge, far, 3e200));
 }
 
@@ -283,13 +283,13 @@ TEST(IsDegenerate, WhateverTheOrderAndTheUnit) {
     const double width = std::pow(10.0, -10 - 8 * std::abs(u(g))), along = std::abs(u(g));
     if (std::abs(width - 1e-14) < 3e-15) continue;
     const double unit = std::ldexp(1.0, static_cast<int>(400 * u(g)));
-    Corners t = {{0, 0, 0}, {1, 0, 0}, {along, width, 0}};
+    Corners t = {{{0, 0, 0}, {1, 0, 0}, {along, width, 0}}};
     std::shuffle(std::begin(t), std::end(t), g);
     for (Vector3d& v : t) v *= unit;
     ASSERT_EQ(isDegenerate(t), width < 1e-14) << width << " " << along << " " << unit;
   }
-  const Corners point = {{1e-200, 0, 0}, {1e-200, 0, 0}, {1e-200, 0, 0}}, none = {{0, 0, 0}, {0, 0, 0}, {0, 0, 0}};
-  const Corners small_far_away = {{1, 1e-80, 0}, {1, 3e-80, 0}, {1, 1e-80, 2e-80}};
+  const Corners point = {{{1e-200, 0, 0}, {1e-200, 0, 0}, {1e-200, 0, 0}}}, none = {{{0, 0, 0}, {0, 0, 0}, {0, 0, 0}}};
+  const Corners small_far_away = {{{1, 1e-80, 0}, {1, 3e-80, 0}, {1, 1e-80, 2e-80}}};
   EXPECT_NEAR(relativeWidth(small_far_away), 0.5, 1e-15);
   EXPECT_TRUE(isDegenerate(point));
   EXPECT_TRUE(isDegenerate(none));

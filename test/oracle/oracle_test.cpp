@@ -75,8 +75,8 @@ void checkMesh(Oracle& oracle, const Surface& here, int levels, std::size_t most
           continue;
         }
         for (std::uint32_t t = 0; t < surface.mesh->triangleCount(); ++t) {
-          const Eigen::Vector3d c[3] = {surface.corner(t, 0), surface.corner(t, 1), surface.corner(t, 2)};
-          if (!triangleMeetsCube(c, centerOf(octant), octant.side() / 2.0)) continue;
+          const auto c = surface.corners(t);
+          if (!triangleMeetsCube(c.data(), centerOf(octant), octant.side() / 2.0)) continue;
           ASSERT_NE(std::find(list.begin(), list.end(), t), list.end()) << "triangle " << t << " is not listed";
           for (int i = 0; i < 40; ++i) {
             double a = u(g), b = u(g);
@@ -495,7 +495,8 @@ TEST(CpuOracle, BoundsAreHardlyLargerThanTheSurface) {
   for (std::uint32_t i = 0; i < kCount && !HasFailure(); ++i) {
     SCOPED_TRACE(testing::Message() << "triangle " << i);
     const std::uint32_t t = ids[2 * i];
-    const std::vector<Eigen::Vector3d> corners = {surface.corner(t, 0), surface.corner(t, 1), surface.corner(t, 2)};
+    const auto at = surface.corners(t);
+    const std::vector<Eigen::Vector3d> corners(at.begin(), at.end());
     for (int o = 0; o < 8; ++o) {
       if (answers[i].grey >> o & 1) expectThin(answers[i].octants.get(o), cells[i].octant(o), corners);
     }

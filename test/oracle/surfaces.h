@@ -30,8 +30,7 @@ inline Surface residentOn(Oracle& oracle, Surface surface) {
 }
 
 inline bool meets(const Surface& surface, std::uint32_t t, const lattice::Cell& cell, double more = 0) {
-  const Eigen::Vector3d corners[3] = {surface.corner(t, 0), surface.corner(t, 1), surface.corner(t, 2)};
-  return triangleMeetsCube(corners, centerOf(cell), cell.side() / 2.0 + more);
+  return triangleMeetsCube(surface.corners(t).data(), centerOf(cell), cell.side() / 2.0 + more);
 }
 
 inline bool referenceGrey(const Surface& surface, const lattice::Cell& cell) {

@@ -77,7 +77,6 @@ class HandTree : public query::CompleteSide {
   void prefetch(std::uint32_t) const {}
   void prefetchCorners(std::uint32_t) const {}
   const Eigen::Vector3d& vertex(std::uint32_t t, int k) const { return triangles_[t].corners[k]; }
-  Eigen::Vector3d corner(std::uint32_t t, int k) const { return triangles_[t].corners[k]; }
   Eigen::Vector3d origin() const { return Eigen::Vector3d::Zero(); }
   double inverseUnit() const { return 1; }
 

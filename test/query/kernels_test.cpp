@@ -1240,7 +1240,7 @@ TEST(NearestPoints, NoTwoPointsAreNearer) {
   };
   for (int round = 0; round < 5000; ++round) {
     Corners p, q;
-    for (Eigen::Vector3d* t : {p, q}) {
+    for (Eigen::Vector3d* t : {p.data(), q.data()}) {
       for (int k = 0; k < 3; ++k) t[k] = Eigen::Vector3d(u(g), u(g), u(g));
       degenerateAtTimes(g, t, 4);
     }

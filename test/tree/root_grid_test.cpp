@@ -112,8 +112,8 @@ void gathersAllOnce(const RootGrid& grid, const Surface& surface, const Cell& ce
   std::sort(ids.begin(), ids.end());
   ASSERT_EQ(std::adjacent_find(ids.begin(), ids.end()), ids.end());
   for (std::uint32_t t = 0; t < surface.mesh->triangleCount(); ++t) {
-    const Eigen::Vector3d c[3] = {surface.corner(t, 0), surface.corner(t, 1), surface.corner(t, 2)};
-    if (triangleMeetsCube(c, centerOf(cell), cell.side() / 2.0)) {
+    const auto c = surface.corners(t);
+    if (triangleMeetsCube(c.data(), centerOf(cell), cell.side() / 2.0)) {
       ASSERT_TRUE(std::binary_search(ids.begin(), ids.end(), t));
     }
   }

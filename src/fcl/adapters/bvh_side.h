@@ -134,7 +134,7 @@ class BvhSide : public query::CompleteSide {
   Eigen::Vector3d vertex(std::uint32_t t, int k) const { return vertex(triangles_[t][static_cast<std::size_t>(k)]); }
   Eigen::Vector3d origin() const { return Eigen::Vector3d::Zero(); }
   double inverseUnit() const { return 1; }
-  Eigen::Vector3d corner(std::uint32_t t, int k) const { return vertex(t, k); }
+  query::Corners corners(std::uint32_t t) const { return {vertex(t, 0), vertex(t, 1), vertex(t, 2)}; }
 
   // Of the whole mesh.
   std::size_t meshTriangles() const { return triangle_count_; }

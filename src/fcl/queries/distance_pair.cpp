@@ -95,7 +95,7 @@ struct Distant {
   Distant(const Eigen::Isometry3d& X, const BvhSide& side)
       : X_WM(X),
         triangles(side.meshTriangles()),
-        corner([&side](std::uint32_t t, int k) { return side.corner(t, k); }) {
+        corner([&side](std::uint32_t t, int k) { return side.vertex(t, k); }) {
     const query::OrientedVolume box = side.volume(side.root());
     center = box.center;
     radius = box.half.norm();

@@ -34,6 +34,13 @@ class Triangles {
     if (bvh_ != nullptr) return bvh_->vertex(t, k).template cast<S>();
     return mesh_->vertex(mesh_->indices(t)[static_cast<std::size_t>(k)]).template cast<S>();
   }
+  query::Corners corners(std::uint32_t t) const {
+    const auto at = [t, this](int k) -> Eigen::Vector3d { return corner(t, k).template cast<double>(); };
+    return {at(0), at(1), at(2)};
+  }
+  fcl::AABB<S> box(std::uint32_t t, const fcl::Transform3<S>& X_WM) const {
+    return fcl::AABB<S>(X_WM * corner(t, 0), X_WM * corner(t, 1), X_WM * corner(t, 2));
+  }
   /// Triangle t is about to be asked for, and now its corners.
   void prefetch(std::uint32_t t) const {
     if (bvh_ != nullptr) return bvh_->prefetch(t);
@@ -309,13 +316,9 @@ class MeshCollector : public query::Visitor {
     place();
     s_.pairs.count = count;
     for (std::size_t i = 0; i < count; ++i) {
-      query::Corners p, q;
-      for (int k = 0; k < 3; ++k) {
-        p[k] = t1_.corner(first(keys[i]), k).template cast<double>();
-        const Eigen::Vector3d own = t2_.corner(second(keys[i]), k).template cast<double>();
-        q[k] = place_.linear() * own + place_.translation();
-      }
-      s_.pairs.put(i, p, q);
+      query::Corners q = t2_.corners(second(keys[i]));
+      for (Eigen::Vector3d& corner : q) corner = place_.linear() * corner + place_.translation();
+      s_.pairs.put(i, t1_.corners(first(keys[i])), q);
     }
   }
 
@@ -328,8 +331,7 @@ class MeshCollector : public query::Visitor {
     s_.pairs.get(i, p, q);
     if (margin_ > rounding()) return isWithinMargin(isCertain(key), p, q, contact);
     // Each in its own frame: where it is placed, rounding may give it a width.
-    query::Corners own;
-    for (int k = 0; k < 3; ++k) own[k] = t2_.corner(b, k).template cast<double>();
+    const query::Corners own = t2_.corners(b);
     const bool tiny = longest(p) * longest(own) < kSmallestProduct;
     const double width_q = query::relativeWidth(own);
     const bool is_sliver_q = tiny || isSliver(own, width_q);
@@ -426,10 +428,7 @@ class MeshCollector : public query::Visitor {
     return fcl::AABB<S>((s.center - r).template cast<S>(), (s.center + r).template cast<S>());
   }
 
-  void addCost(std::uint32_t a, std::uint32_t b) {
-    addCost(fcl::AABB<S>(q_.X_W1 * t1_.corner(a, 0), q_.X_W1 * t1_.corner(a, 1), q_.X_W1 * t1_.corner(a, 2)),
-            fcl::AABB<S>(q_.X_W2 * t2_.corner(b, 0), q_.X_W2 * t2_.corner(b, 1), q_.X_W2 * t2_.corner(b, 2)));
-  }
+  void addCost(std::uint32_t a, std::uint32_t b) { addCost(t1_.box(a, q_.X_W1), t2_.box(b, q_.X_W2)); }
 
   void addCost(const fcl::AABB<S>& a, const fcl::AABB<S>& b) {
     q_.addCost(a, b, q_.o1->cost_density * q_.o2->cost_density);

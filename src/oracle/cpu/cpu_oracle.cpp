@@ -93,9 +93,9 @@ class Expander {
 
   // One certain triangle makes an octant grey; most octants are settled by the first.
   void prove(std::uint32_t t, int candidates) {
-    const Eigen::Vector3d corners[3] = {e_.surface->corner(t, 0), e_.surface->corner(t, 1), e_.surface->corner(t, 2)};
+    const auto corners = e_.surface->corners(t);
     for (int o = 0; candidates != 0; ++o, candidates >>= 1) {
-      if ((candidates & 1) && triangleMeetsCube(corners, center_ + octantCenter(o, half_ / 2), half_ / 2))
+      if ((candidates & 1) && triangleMeetsCube(corners.data(), center_ + octantCenter(o, half_ / 2), half_ / 2))
         proven_ |= 1 << o;
     }
   }

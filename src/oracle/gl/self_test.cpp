@@ -73,16 +73,12 @@ ExpansionRequest requestFor(const Question& question) {
   return e;
 }
 
-std::vector<Eigen::Vector3d> cornersOf(const Surface& surface, std::uint32_t t) {
-  return {surface.corner(t, 0), surface.corner(t, 1), surface.corner(t, 2)};
-}
-
 // Those of the ids that meet the octant, by the reference test.
 Ids meeting(const Surface& surface, const Ids& ids, const lattice::Cell& octant) {
   Ids met;
   if (!surface.lattice.exists(octant)) return met;
   for (const std::uint32_t t : ids) {
-    if (triangleMeetsCube(cornersOf(surface, t).data(), centerOf(octant), octant.side() / 2.0)) met.push_back(t);
+    if (triangleMeetsCube(surface.corners(t).data(), centerOf(octant), octant.side() / 2.0)) met.push_back(t);
   }
   return met;
 }
@@ -103,7 +99,7 @@ bool holds(const bounds::NodeBounds& b, const lattice::Cell& cell, const Eigen::
 
 // Points of the triangle in the octant must be within its bounds.
 bool areBounded(const Surface& surface, std::uint32_t t, const bounds::NodeBounds& b, const lattice::Cell& octant) {
-  const std::vector<Eigen::Vector3d> c = cornersOf(surface, t);
+  const auto c = surface.corners(t);
   constexpr int kSteps = 6;
   for (int i = 0; i <= kSteps; ++i) {
     for (int j = 0; i + j <= kSteps; ++j) {

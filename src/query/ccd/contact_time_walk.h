@@ -3,6 +3,7 @@
 
 #include <algorithm>
 #include <cstddef>
+#include <iterator>
 #include <limits>
 #include <type_traits>
 #include <vector>
@@ -251,7 +252,7 @@ class ContactTimeWalk : private BestFirst<ContactTimeWalk<A, B>, A, B> {
     out.resize(side.triangleCount(node));
     for (std::size_t i = 0; i < out.size(); ++i) {
       const std::uint32_t t = side.triangle(node, i);
-      for (int k = 0; k < 3; ++k) out[i].corners[k] = side.corner(t, k);
+      out[i].corners = side.corners(t);
       out[i].count = 3;
       out[i].radius = 0;
     }
@@ -325,7 +326,7 @@ class ContactTimeWalk : private BestFirst<ContactTimeWalk<A, B>, A, B> {
   double distanceOf(const Primitive& p, const Convex& q, Eigen::Vector3d& direction) const {
     Corners x;
     for (std::size_t k = 0; k < p.count; ++k) x[k] = world_in_b_ * p.corners[k];
-    const SeparationResult gap = b_.gap(q.node, {x, static_cast<int>(p.count)}, kFar);
+    const SeparationResult gap = b_.gap(q.node, {x.data(), static_cast<int>(p.count)}, kFar);
     direction = -(b_in_world_.rotation * gap.normal);
     return gap.isTouching() ? 0 : std::max(0.0, gap.at_least * b_in_world_.scale - p.radius);
   }
@@ -333,7 +334,7 @@ class ContactTimeWalk : private BestFirst<ContactTimeWalk<A, B>, A, B> {
   template <typename T>
   static ClosingSpeed speedOf(const Motion& motion, const T& primitive, const Eigen::Vector3d& direction, double blur,
                               double time) {
-    return closingSpeedOf(motion, primitive.corners, primitive.count, direction, blur, time);
+    return closingSpeedOf(motion, std::data(primitive.corners), primitive.count, direction, blur, time);
   }
 
   template <typename T>

@@ -244,7 +244,7 @@ class PairWalk {
     for (std::size_t i = 0; i < s.leaf.size(); ++i) {
       TriangleExtent& t = s.leaf[i];
       t.id = a_.triangle(leaf, i);
-      for (int k = 0; k < 3; ++k) t.corners[static_cast<std::size_t>(k)] = a_.corner(t.id, k);
+      t.corners = a_.corners(t.id);
       t.ready();
     }
     return s.leaf;
@@ -307,8 +307,7 @@ class PairWalk {
                 F&& f) const {
     for (std::size_t i = 0; i < side.triangleCount(leaf); ++i) {
       const std::uint32_t t = side.triangle(leaf, i);
-      const Corners corners = {place * side.corner(t, 0), place * side.corner(t, 1), place * side.corner(t, 2)};
-      const Eigen::Vector3d point = closestPoint(ball.center, corners);
+      const Eigen::Vector3d point = closestPoint(ball.center, placed(side.corners(t), place));
       if (spheresMeet(ball, {point, 0}) && f(t, point)) return true;
     }
     return false;

@@ -170,11 +170,8 @@ bool TreeWalk::testCell(const StepEvent& event, Scratch& s) {
   if (is_short) left = event.asked.side == AskedLeaf::kNone ? near() : left & near();
   if (x == 1) cell.sphere = placed(cell.sphere, b_in_a_);
   const auto meets = [&](std::uint32_t t) {
-    Corners corners = {meshes.corner(t, 0), meshes.corner(t, 1), meshes.corner(t, 2)};
-    if (x == 0) {
-      for (Eigen::Vector3d& corner : corners) corner = b_in_a_ * corner;
-    }
-    const Eigen::Vector3d point = closestPoint(cell.sphere.center, corners);
+    const Corners own = meshes.corners(t);
+    const Eigen::Vector3d point = closestPoint(cell.sphere.center, x == 0 ? placed(own, b_in_a_) : own);
     if (!spheresMeet(cell.sphere, {point, 0}, b_in_a_.tolerance)) return false;
     return x == 0 ? visitor_->cellOfA(cell, t, point) : visitor_->cellOfB(t, cell, point);
   };

@@ -139,8 +139,7 @@ class DistanceWalk : private BestFirst<DistanceWalk<A, B>, A, B> {
     double bound = std::numeric_limits<double>::infinity();
     for (std::size_t i = 0; i < side.triangleCount(leaf); ++i) {
       const std::uint32_t t = side.triangle(leaf, i);
-      const Corners c = {place * side.corner(t, 0), place * side.corner(t, 1), place * side.corner(t, 2)};
-      bound = std::min(bound, distanceBound(c, other));
+      bound = std::min(bound, distanceBound(placed(side.corners(t), place), other));
     }
     return bound;
   }
@@ -274,8 +273,8 @@ class DistanceWalk : private BestFirst<DistanceWalk<A, B>, A, B> {
     }
     for (std::size_t i = 0; i < a_.triangleCount(pair.a); ++i) {
       const std::uint32_t t = a_.triangle(pair.a, i);
-      const Corners corners = {a_in_b_ * a_.corner(t, 0), a_in_b_ * a_.corner(t, 1), a_in_b_ * a_.corner(t, 2)};
-      const PointSet points{corners, 3};
+      const Corners corners = placed(a_.corners(t), a_in_b_);
+      const PointSet points{corners.data(), 3};
       const SeparationResult gap = b_.gap(pair.b, points, cutoff() * a_in_b_.scale);
       if (std::isfinite(gap.distance)) bodyFound(t, pair.b, gap, gap.on_points, 0);
     }
@@ -338,18 +337,14 @@ class DistanceWalk : private BestFirst<DistanceWalk<A, B>, A, B> {
     out.resize(side.triangleCount(node));
     for (std::size_t i = 0; i < out.size(); ++i) {
       out[i].id = side.triangle(node, i);
-      for (int k = 0; k < 3; ++k) out[i].corners[k] = place * side.corner(out[i].id, k);
+      out[i].corners = placed(side.corners(out[i].id), place);
       out[i].ready();
     }
   }
 
   void triangles(const TriangleExtent& t, const TriangleExtent& u) { triangles(t.id, t.corners, u.id, u.corners); }
 
-  void triangles(std::uint32_t t, std::uint32_t u) {
-    const Corners in_a = {a_.corner(t, 0), a_.corner(t, 1), a_.corner(t, 2)};
-    const Corners of_b = {b_in_a_ * b_.corner(u, 0), b_in_a_ * b_.corner(u, 1), b_in_a_ * b_.corner(u, 2)};
-    triangles(t, in_a, u, of_b);
-  }
+  void triangles(std::uint32_t t, std::uint32_t u) { triangles(t, a_.corners(t), u, placed(b_.corners(u), b_in_a_)); }
 
   void triangles(std::uint32_t t, const Corners& in_a, std::uint32_t u, const Corners& of_b) {
     ++steps_;
@@ -387,8 +382,7 @@ class DistanceWalk : private BestFirst<DistanceWalk<A, B>, A, B> {
   template <typename Side>
   static CellLeaf pointOf(const Side& side, std::uint32_t t, const SimilarityTransform& place,
                           const Eigen::Vector3d& to) {
-    const Corners corners = {place * side.corner(t, 0), place * side.corner(t, 1), place * side.corner(t, 2)};
-    return {t, {closestPoint(to, corners), 0}};
+    return {t, {closestPoint(to, placed(side.corners(t), place)), 0}};
   }
 
   void spheresFound(const CellLeaf& a, const CellLeaf& b) {

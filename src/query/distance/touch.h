@@ -18,11 +18,9 @@ inline std::optional<Nearest> findTouch(const TreeSide& a, const TreeSide& b, co
 
     bool endsAtFirst() const override { return true; }
     bool triangles(std::uint32_t t, std::uint32_t u, bool) override {
-      const Corners in_a = {a_.corner(t, 0), a_.corner(t, 1), a_.corner(t, 2)};
-      const Corners of_b = {b_in_a_ * b_.corner(u, 0), b_in_a_ * b_.corner(u, 1), b_in_a_ * b_.corner(u, 2)};
       found.a = t;
       found.b = u;
-      found.distance = nearestPoints(in_a, of_b, found.on_a, found.on_b);
+      found.distance = nearestPoints(a_.corners(t), placed(b_.corners(u), b_in_a_), found.on_a, found.on_b);
       return found.distance == 0;
     }
     bool cells(const CellLeaf&, const CellLeaf&) override { return false; }

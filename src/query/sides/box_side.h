@@ -56,7 +56,7 @@ class BoxSide : public CompleteSide {
   const Eigen::Vector3d& vertex(std::uint32_t t, int k) const { return side_.vertex(t, k); }
   const Eigen::Vector3d& origin() const { return side_.origin(); }
   double inverseUnit() const { return side_.inverseUnit(); }
-  Eigen::Vector3d corner(std::uint32_t t, int k) const { return side_.corner(t, k); }
+  Corners corners(std::uint32_t t) const { return side_.corners(t); }
 
  private:
   const tree::BoxTree::Node& node(Node n) const { return boxes_.nodes()[static_cast<std::size_t>(n)]; }

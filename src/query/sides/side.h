@@ -5,6 +5,7 @@
 #include <vector>
 
 #include "geometry/overlap_kernels.h"
+#include "geometry/triangle.h"
 #include "geometry/volume.h"
 #include "tree/tree.h"
 
@@ -194,8 +195,8 @@ class TreeSide {
   const Eigen::Vector3d& origin() const { return tree_.surface().lattice.origin(); }
   double inverseUnit() const { return 1 / tree_.surface().lattice.unit(); }
 
-  /// Corner k of triangle t in this side's frame.
-  Eigen::Vector3d corner(std::uint32_t t, int k) const { return tree_.surface().corner(t, k); }
+  /// The corners of triangle t in this side's frame.
+  Corners corners(std::uint32_t t) const { return tree_.surface().corners(t); }
 
   std::int64_t now() const { return now_; }
   tree::Tree& tree() const { return tree_; }

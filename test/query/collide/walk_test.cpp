@@ -227,9 +227,9 @@ TEST(TreeWalk, FindsAllThatTouches) {
     b_in_a.ready();
     Pairs touch;
     for (std::uint32_t t = 0; t < mesh[0]->triangleCount(); ++t) {
-      const Corners p = {side_a.corner(t, 0), side_a.corner(t, 1), side_a.corner(t, 2)};
+      const Corners p = side_a.corners(t);
       for (std::uint32_t u = 0; u < mesh[1]->triangleCount(); ++u) {
-        const Corners q = {side_b.corner(u, 0), side_b.corner(u, 1), side_b.corner(u, 2)};
+        const Corners q = side_b.corners(u);
         if (test::distanceOf(p, q, b_in_a) == 0) touch.insert({t, u});
       }
     }
