@@ -29,10 +29,11 @@ namespace bocst {
 /// order are those of the file, but equal vertices of STL and of assimp's formats are merged. In triangle strips of PLY
 /// and DAE, triangles with a repeated corner are removed.
 ///
-/// @throws std::runtime_error if the file cannot be read as a mesh. The message names the file, the fault and the line
-/// (the byte in binary data). Faults are: not a regular file (it never waits for a FIFO or a device), empty, a Git
-/// LFS pointer, truncated, no triangles, invalid or non-finite numbers, indices that are fractional or out of range,
-/// data after the end. Binary OFF, polygons with holes (`<ph>`) and free-form surfaces are not supported.
+/// @throws std::runtime_error if the file cannot be read as a mesh. The message names the file, the fault and, where it
+/// has one place, the line (the byte in binary data). Faults are: not a regular file (it never waits for a FIFO or a
+/// device), empty, a Git LFS pointer, truncated, no triangles, invalid or non-finite numbers, indices that are
+/// fractional or out of range, data after the end. Binary OFF, polygons with holes (`<ph>`) and free-form surfaces are
+/// not supported.
 BOCST_EXPORT std::shared_ptr<const Mesh> loadMesh(const std::string& file);
 
 /// A format that loadMesh() reads.

@@ -44,6 +44,8 @@ std::shared_ptr<const Mesh> loadMesh(const std::string& file) {
     io::Polygons polygons = readPolygons(file);
     std::vector<Mesh::Indices> triangles = io::triangulate(polygons);
     if (triangles.empty()) throw std::runtime_error("no triangles in this file");
+    polygons.vertices.shrink_to_fit();  // the mesh keeps them
+    triangles.shrink_to_fit();
     return Mesh::fromIndices(std::move(polygons.vertices), std::move(triangles));
   } catch (const std::exception& e) {
     std::string what = e.what();

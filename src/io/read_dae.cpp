@@ -45,18 +45,21 @@ class DaeReader {
 
  private:
   [[noreturn]] void fail(const pugi::xml_node& node, const std::string& what) const {
-    const auto at = std::clamp<std::ptrdiff_t>(node.offset_debug(), 0, static_cast<std::ptrdiff_t>(bytes_.size()));
-    failAt(bytes_, bytes_.data() + at, std::string("<") + node.name() + ">: " + what);
+    failAtOffset(node.offset_debug(), std::string("<") + node.name() + ">: " + what);
+  }
+
+  [[noreturn]] void failAtOffset(std::ptrdiff_t offset, const std::string& what) const {
+    if (!has_lines_) throw std::runtime_error(what);
+    failAt(bytes_, bytes_.data() + std::clamp<std::ptrdiff_t>(offset, 0, static_cast<std::ptrdiff_t>(bytes_.size())),
+           what);
   }
 
   void parse() {
     // Fragments: what stands outside the root element is kept, to be refused.
     const pugi::xml_parse_result result =
         document_.load_buffer(bytes_.data(), bytes_.size(), pugi::parse_default | pugi::parse_fragment);
-    if (!result) {
-      const auto at = std::clamp<std::ptrdiff_t>(result.offset, 0, static_cast<std::ptrdiff_t>(bytes_.size()));
-      failAt(bytes_, bytes_.data() + at, std::string("no XML: ") + result.description());
-    }
+    has_lines_ = result.encoding == pugi::encoding_utf8;
+    if (!result) failAtOffset(result.offset, std::string("no XML: ") + result.description());
     if (result.encoding == pugi::encoding_utf8 && bytes_.find('\0') != std::string_view::npos) {
       failAt(bytes_, bytes_.data() + bytes_.find('\0'), "no XML: a zero byte");
     }
@@ -123,7 +126,7 @@ class DaeReader {
         const std::string what =
             inQuotes(word) + (std::is_same_v<Number, double> ? " is no finite number" : " is no index");
         const std::ptrdiff_t at = part.offset_debug();
-        if (at < 0 || static_cast<std::size_t>(at) > bytes_.size()) fail(node, what);
+        if (!has_lines_ || at < 0 || static_cast<std::size_t>(at) > bytes_.size()) fail(node, what);
         // Ends of lines are one byte each in the text, so lines are counted there and not in the file.
         const auto lines =
             std::count(bytes_.data(), bytes_.data() + at, '\n') + std::count(text.data(), word.data(), '\n');
@@ -420,6 +423,7 @@ class DaeReader {
   }
 
   std::string_view bytes_;
+  bool has_lines_ = true;  // the bytes are UTF-8, so offsets in the XML are those of the bytes
   pugi::xml_document document_;
   std::unordered_map<std::string_view, pugi::xml_node> ids_;
   std::unordered_map<void*, Polygons> geometries_;

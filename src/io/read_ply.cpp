@@ -104,12 +104,13 @@ class PlyReader {
       const std::string_view word = takeWord(line);
       if (word == "end_header") break;
       if (word == "format") {
+        if (has_format) fail(word.data(), "PLY header: a second format");
         const std::string_view format = takeWord(line);
         if (format == "binary_little_endian") {
           format_ = Format::kLittleEndian;
         } else if (format == "binary_big_endian") {
           format_ = Format::kBigEndian;
-        } else if (format != "ascii" || has_format) {
+        } else if (format != "ascii") {
           fail(format.data(), "PLY header: unknown format " + inQuotes(format));
         }
         has_format = true;

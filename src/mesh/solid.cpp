@@ -43,8 +43,9 @@ void checkWatertight(const Mesh& mesh) {
   const auto there = count(up), back = count(down);
   const std::size_t a = edge >> 32, b = edge & 0xffffffffu;
   throw std::invalid_argument(
-      "bocst::Options: solid needs a watertight mesh, but the edge between vertices " + std::to_string(a) + " " +
-      placeOf(mesh.vertex(a)) + " and " + std::to_string(b) + " " + placeOf(mesh.vertex(b)) +
+      "bocst::Options: solid needs a watertight mesh with triangles of one orientation, but the edge between "
+      "vertices " +
+      std::to_string(a) + " " + placeOf(mesh.vertex(a)) + " and " + std::to_string(b) + " " + placeOf(mesh.vertex(b)) +
       (there + back == 1 ? " has only one triangle"
                          : " is used " + std::to_string(there) + " times in one direction and " + std::to_string(back) +
                                " times in the other: triangles are missing or turned over"));

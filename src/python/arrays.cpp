@@ -4,6 +4,7 @@
 #include <array>
 #include <cmath>
 #include <cstring>
+#include <limits>
 #include <sstream>
 #include <stdexcept>
 
@@ -128,6 +129,7 @@ const fcl::Transform3d* Poses::transforms(std::vector<fcl::Transform3d>& copy) c
     const double* m = data_ + 16 * k + first;
     if ((m[0] == 0) & (m[step] == 0) & (m[2 * step] == 0) & (m[3 * step] == 1)) continue;
     std::ostringstream text;
+    text.precision(std::numeric_limits<double>::max_digits10);
     text << "bocst: " << name_ << indexText(k) << " has the last row " << m[0] << " " << m[step] << " " << m[2 * step]
          << " " << m[3 * step] << "; 0 0 0 1 is expected";
     throw std::invalid_argument(text.str());

@@ -124,7 +124,9 @@ constexpr std::pair<const char*, const char*> kOptionTexts[] = {
     {"ttl", "seconds after which unused deepest levels are dropped; 0: never."},
     {"memory_budget", "limit of the resident tree in bytes; 0: no limit."},
     {"margin", "surfaces at a distance of at most this collide; in the length unit of the mesh."},
-    {"solid", "a watertight mesh also collides with geometries that are completely inside it."},
+    {"solid",
+     "a watertight, consistently oriented mesh also collides with geometries that are "
+     "completely inside it."},
     {"build_ahead", "a thread that all models share builds the tree while the first queries run."}};
 
 void bindOptions(py::module_& m) {
@@ -156,8 +158,14 @@ MeshPtr makeMesh(const py::object& vertices, const py::object& triangles) {
 MeshPtr loadMeshOf(const py::object& file) {
   // As bytes: what is no UTF-8 in a name has no string of C++.
   const std::string name = py::module_::import("os").attr("fsencode")(file).cast<std::string>();
-  const NoGil free;
-  return forPython(loadMesh(name));
+  try {
+    const NoGil free;
+    return forPython(loadMesh(name));
+  } catch (const std::runtime_error& e) {
+    const auto what = py::reinterpret_steal<py::object>(PyUnicode_DecodeFSDefault(e.what()));
+    PyErr_SetObject(PyExc_RuntimeError, what.ptr());
+    throw py::error_already_set();
+  }
 }
 
 void bindMesh(py::module_& m) {
@@ -184,7 +192,8 @@ void bindMesh(py::module_& m) {
           },
           "In the cube of the mesh's length unit, negative for a mesh that is inside out; None if the mesh is not "
           "watertight and oriented.")
-      .def_property_readonly("watertight", &Health::watertight, "True without open and non-manifold edges.")
+      .def_property_readonly("watertight", &Health::watertight,
+                             "True without open and non-manifold edges. solid needs oriented, too.")
       .def_property_readonly("oriented", &Health::oriented, "True without flipped edges.");
 
   py::class_<Mesh, MeshPtr>(m, "Mesh", R"(A triangle mesh: validated once, immutable, shared by any number of models.

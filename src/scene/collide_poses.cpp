@@ -2,6 +2,7 @@
 #include <bocst/collide_poses.h>
 
 #include <algorithm>
+#include <limits>
 #include <sstream>
 #include <stdexcept>
 #include <string>
@@ -42,6 +43,7 @@ class Poses {
     const auto name = [k] { return "pose " + std::to_string(k); };
     if (last_row_ == LastRow::kChecked && !(at(3, 0) == 0 && at(3, 1) == 0 && at(3, 2) == 0 && at(3, 3) == 1)) {
       std::ostringstream row;
+      row.precision(std::numeric_limits<S>::max_digits10);
       for (int j = 0; j < 4; ++j) row << at(3, j) << " ";
       throw std::invalid_argument("bocst::collidePoses: " + name() + " has the last row " + row.str() +
                                   "where 0 0 0 1 is expected");

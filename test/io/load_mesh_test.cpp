@@ -184,6 +184,19 @@ TEST_F(LoadMesh, KeepsVerticesAndTheirOrder) {
   EXPECT_EQ(off->bounds().max(), Eigen::Vector3d(1, 1, 0));
 }
 
+TEST_F(LoadMesh, TakesNoMoreMemoryThanTheMeshNeeds) {
+  std::string obj, stl = "solid\n";
+  for (int i = 0; i < 100; ++i) {
+    const std::string x = std::to_string(i) + " 0 0\n", y = std::to_string(i) + " 1 0\n", z = "0 0 " + x;
+    obj += "v " + x + "v " + y + "v 0 1 " + std::to_string(i) + "\nf -1 -2 -3\n";
+    stl += "facet normal 0 0 1\nouter loop\nvertex " + x + "vertex " + y + "vertex 0 1 " + std::to_string(i) +
+           "\nendloop\nendfacet\n";
+  }
+  for (const auto& mesh : {load("m.obj", obj), load("m.stl", stl + "endsolid\n")}) {
+    EXPECT_EQ(mesh->bytes(), 24 * mesh->vertexCount() + 12 * mesh->triangleCount());
+  }
+}
+
 TEST_F(LoadMesh, KeepsNeighboursApart) {
   const auto mesh = load("tiny.obj", "v 0 0 0\nv 1e-7 0 0\nv 0 1e-7 0\nv 1e-7 1e-7 0\nf 1 2 3\nf 2 4 3\n");
   EXPECT_EQ(mesh->vertexCount(), 4u);

@@ -988,6 +988,16 @@ TEST_F(Program, ExplainsWhatFails) {
                   "cut.ply: truncated");
 }
 
+TEST_F(Program, ReadsAScenesFileFromAPipe) {
+  const auto piped = [this](const std::string& text) {
+    return shell("cat '" + write("scene", text) + "' | " + program() + " scene /dev/stdin");
+  };
+  EXPECT_EQ(piped("<robot name='r'>\n<link/></robot>").err, "bocst: /dev/stdin: line 2: <link> without name=\"...\"\n");
+  const Result json = piped("{\"objects\": 1}");
+  EXPECT_EQ(json.code, kFailed);
+  EXPECT_EQ(json.err.rfind("bocst: /dev/stdin: objects", 0), 0u) << json.err;
+}
+
 TEST_F(Program, ExplainsWhatCannotBeWritten) {
   const std::string inspect = "inspect " + cube() + " --depth 2";
   for (const std::string option : {"--json", "--html", "--image"}) {
@@ -998,6 +1008,20 @@ TEST_F(Program, ExplainsWhatCannotBeWritten) {
   }
   expectComplaint(inspect + " --spheres " + (folder_ / "none" / "f.ply").string(), kFailed, "none/f.ply");
   EXPECT_EQ(runTo("/dev/full", inspect).err, "bocst: stdout: cannot be written\n");
+  for (const std::string words : {"--help", "--version", "collide --help"}) {
+    EXPECT_EQ(runTo("/dev/full", words).err, "bocst: stdout: cannot be written\n");
+    EXPECT_EQ(runTo("/dev/full", words).code, kFailed);
+  }
+  // What a link points to is written, also where that is not there yet.
+  const std::string target = (folder_ / "target.json").string();
+  fs::create_symlink("target.json", folder_ / "new.json");
+  ASSERT_EQ(run("inspect " + cube() + " --depth 2 --json " + (folder_ / "new.json").string()).code, 0);
+  EXPECT_TRUE(fs::is_symlink(folder_ / "new.json"));
+  EXPECT_EQ(Json::parse(read(target)).at("levels").size(), 2u);
+  if (geteuid() != 0) {
+    fs::permissions(target, fs::perms::owner_read);
+    expectComplaint(inspect + " --json " + target, kFailed, "Permission denied");
+  }
   EXPECT_EQ(runTo("/dev/full", inspect + " --json -").code, kFailed);
   // What goes in, or out elsewhere, is not written over.
   const std::string ply = (folder_ / "a.ply").string();

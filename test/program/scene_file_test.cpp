@@ -71,7 +71,7 @@ class SceneFile : public ::testing::Test, protected test::TemporaryFolder {
 
   static Robot read(const std::string& file, const Packages& packages = Packages()) {
     MeshStore meshes;
-    return readUrdf(file, packages, meshes);
+    return readUrdf(XmlFile(file), packages, meshes);
   }
 
   SceneSetup scene(const std::string& json,
@@ -108,6 +108,36 @@ std::string joint(const std::string& name, const std::string& type, const std::s
 
 const std::string kLimit = "<limit lower='-1' upper='2' effort='1' velocity='1'/>";
 const std::string kSphere = "<sphere radius='0.1'/>";
+
+TEST_F(SceneFile, NamesTheSecondOfTwo) {
+  const auto complains = [this](const std::string& text, const std::string& what) {
+    expectComplaint([&] { read(robot(text)); }, {what});
+  };
+  complains(link("a") + link("b") + link("a"), "line 4: a second link named a");
+  const std::string links = link("a") + link("b") + link("c");
+  complains(links + joint("j", "fixed", "a", "b") + joint("j", "fixed", "a", "c"), "a second joint named j");
+  complains(link("a") + "<link/>\n", "line 3: <link> without name");
+}
+
+TEST_F(SceneFile, GivesNoLinesOfUtf16) {
+  const std::string text = "<?xml version='1.0' encoding='UTF-16'?>\n<robot name='r'>\n<link nme='a'/>\n</robot>\n";
+  std::string wide = "\xff\xfe";
+  for (const char c : text) wide += {c, '\0'};
+  const std::string file = write("wide.urdf", wide);
+  try {
+    read(file);
+    ADD_FAILURE();
+  } catch (const std::exception& e) {
+    EXPECT_EQ(std::string(e.what()).rfind(file + ": ", 0), 0u) << e.what();
+    EXPECT_EQ(std::string(e.what()).find("line"), std::string::npos) << e.what();
+  }
+}
+
+TEST_F(SceneFile, AllowsElementsOfOthers) {
+  const Robot r =
+      read(robot(link("a") + link("b") + joint("j", "continuous", "a", "b", "<init value='0'/><plugin/>") + "<pin/>"));
+  EXPECT_EQ(r.joints().size(), 1u);
+}
 
 TEST_F(SceneFile, APlanarArmIsWhereTrigonometrySays) {
   const double a = 0.7, b = 0.4;
@@ -259,7 +289,8 @@ TEST_F(SceneFile, SaysWhereAUrdfIsWrong) {
   complains(two + joint("bb", "fixed", "b", "b"), {"joint bb: links are connected in a circle"});
   complains(two + "<joint name='j' type='fixed'/>", {"line 4", "[j]"});
   complains(two + joint("j", "continuous", "a", "b", "<axis xyz='0 0 0'/>"), {"line 4", "joint j", "axis"});
-  complains(two + joint("j", "continuous", "a", "b", "<mimic joint='k'/>"), {"joint j mimics k, which is no joint"});
+  complains(two + joint("j", "continuous", "a", "b", "<mimic joint='k'/>"),
+            {"line 4: joint j mimics k, which is no joint"});
   complains(two + joint("j", "continuous", "a", "b", "<mimic joint='j'/>"), {"joint j mimics itself"});
   complains(two + link("c") + joint("k", "fixed", "a", "c") + joint("j", "continuous", "a", "b", "<mimic joint='k'/>"),
             {"joint j mimics k, which is fixed"});
@@ -367,6 +398,12 @@ TEST_F(SceneFile, FindsPackages) {
   for (const char* place : {"given", "ros/robots", "prefix/share/robots", "up/robots/urdf/deep"})
     fs::create_directories(folder_ / place);
   const std::string uri = "package://robots/meshes/a.stl";
+  // As ROS decodes a URI; a file that has the name as it stands comes first.
+  const std::string spaced = write("spaced/my part.stl", ""), here = fs::path(spaced).parent_path().string();
+  const Packages with({"spaced=" + here});
+  EXPECT_EQ(with.resolve("package://spaced/my%20part.stl", "/"), spaced);
+  const std::string literal = write("spaced/my%20part.stl", "");
+  EXPECT_EQ(with.resolve("package://spaced/my%20part.stl", "/"), literal);
   const auto at = [&](const std::string& place) { return (folder_ / place / "meshes/a.stl").string(); };
   const std::string deep = (folder_ / "up/robots/urdf/deep").string();
   EXPECT_EQ(Packages().resolve(uri, deep), at("up/robots"));

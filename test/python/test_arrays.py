@@ -156,6 +156,7 @@ def reflected():
     (np.stack([np.eye(4), np.diag([2.0, 2, 2, 1])]), ValueError, "pose 1 has the rotation"),
     (np.stack([np.eye(4), reflected()]), ValueError, "pose 1 has the rotation .* a reflection"),
     (np.stack([np.eye(4), shift(1, 2, 3).T]), ValueError, "pose 1 has the last row 1 2 3 1 "),
+    (np.diag([1, 1, 1, 1 + 1e-9])[None], ValueError, "pose 0 has the last row 0 0 0 1.0000000010"),
 ])
 def test_what_is_no_pose(X, error, words):
     a, b = models()
@@ -269,6 +270,7 @@ def test_empty_states():
     (lambda: bocst.Model(bocst.Mesh(V, T[1:]), solid=True), ValueError, "watertight"),
     (lambda: bocst.Model(None), (TypeError, ValueError), ""),
     (lambda: bocst.load_mesh("/nowhere/cube.obj"), RuntimeError, "/nowhere/cube.obj"),
+    (lambda: bocst.load_mesh(b"/nowhere/\xff.obj"), RuntimeError, "/nowhere/\udcff.obj: no such file"),
 ])
 def test_what_is_refused(make, error, words):
     with pytest.raises(error, match=words):

@@ -45,11 +45,22 @@ bool isSpecial(const std::string& file) {
   return fs::exists(status) && !fs::is_regular_file(status) && !fs::is_directory(status);
 }
 
-/// What a link points to is written, not the link.
+/// What a link points to is written, not the link; also where that is not there yet.
 fs::path targetOf(const std::string& file) {
   std::error_code error;
-  const fs::path target = fs::weakly_canonical(file, error);
+  fs::path at = file;
+  constexpr int kMostLinks = 40;  // as the kernel
+  for (int links = 0; links < kMostLinks && fs::is_symlink(at, error); ++links) {
+    at = folderOf(at) / fs::read_symlink(at, error);
+  }
+  const fs::path target = fs::weakly_canonical(at, error);
   return error ? fs::path(file) : target;
+}
+
+/// A file that is there must be writable, though another would take its place.
+void checkWritable(const fs::path& target, const std::string& file) {
+  if (::access(folderOf(target).c_str(), W_OK) != 0) cannotWrite(file, errno);
+  if (::access(target.c_str(), W_OK) != 0 && errno != ENOENT) cannotWrite(file, errno);
 }
 
 void writeAll(int fd, const std::string& text, const std::string& file) {
@@ -133,7 +144,7 @@ void checkOutputs(const std::vector<std::string>& outputs, const std::vector<std
       continue;
     }
     const fs::path target = targetOf(file);
-    if (::access(folderOf(target).c_str(), W_OK) != 0) cannotWrite(file, errno);
+    checkWritable(target, file);
     if (std::find(taken.begin(), taken.end(), target) != taken.end()) {
       throw std::runtime_error(file + ": would be overwritten: it is also another file of this command");
     }
@@ -175,7 +186,9 @@ void writeFile(const std::string& file, const std::string& text) {
     if (::close(fd) != 0) cannotWrite(file, errno);
     return;
   }
-  Partial partial(targetOf(file), file);
+  const fs::path target = targetOf(file);
+  checkWritable(target, file);
+  Partial partial(target, file);
   partial.write(text);
   partial.putInPlace();
 }

@@ -335,7 +335,7 @@ void addInspect(CLI::App& program, Job& job) {
       ->type_name("NAME");
   CLI::Option* count = command->add_option("--count", inspect->sphere_count,
                                            "fit at most N spheres, instead of those at the collision depth");
-  count->check(wholeNumber())->type_name("N");
+  count->check(CLI::Range(std::size_t{1}, kMostSpheres))->type_name("N");
   command
       ->add_option("--tolerance", inspect->tolerance,
                    "fit as many spheres as needed, so that none protrudes from the surface by more than this length")

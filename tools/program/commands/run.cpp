@@ -84,6 +84,7 @@ int run(int argc, char** argv, const std::string& version) {
   cleanUpOnSignals();
   constexpr int kFailed = 1;
   constexpr int kUsage = 2;
+  const char* const kNoOutput = "stdout: cannot be written";
   Job job;
   CLI::App program("Collision queries with sphere-trees that grow on demand, measurements and comparisons with FCL.",
                    "bocst");
@@ -108,10 +109,13 @@ int run(int argc, char** argv, const std::string& version) {
     refuseEmptyValues(program);
     program.parse(argumentsOf(argc, argv, program));
     const int code = job();
-    if (!std::cout.flush()) throw std::runtime_error("stdout: cannot be written");
+    if (!std::cout.flush()) throw std::runtime_error(kNoOutput);
     return code;
   } catch (const CLI::ParseError& e) {
-    if (e.get_exit_code() == 0) return program.exit(e);  // --help, --version
+    if (e.get_exit_code() == 0) {  // --help, --version
+      const int code = program.exit(e);
+      return std::cout.flush() ? code : complain(kNoOutput, kFailed);
+    }
     // CLI11 looks for a command before it looks at words that are left.
     if (argc > 1 && (dynamic_cast<const CLI::ExtrasError*>(&e) != nullptr || program.get_subcommands().empty())) {
       return complain(unexpected(program), kUsage);

@@ -139,7 +139,10 @@ std::string Packages::resolve(const std::string& uri, const std::string& folder)
     const std::size_t end = std::min(uri.find('/', scheme.size()), uri.size());
     const std::string name = uri.substr(scheme.size(), end - scheme.size());
     if (name.empty() || end + 1 >= uri.size()) throw std::runtime_error(scheme + "NAME/FILE expected");
-    return find(name, folder) + uri.substr(end);  // also where there are several slashes
+    const std::string package = find(name, folder), path = uri.substr(end);  // also where there are several slashes
+    // ROS decodes names; but a file may be named as it stands.
+    const std::string decoded = package + io::percentDecoded(path);
+    return !isThere(package + path) && isThere(decoded) ? decoded : package + path;
   }
   if (startsWith(uri, "file://")) {
     const std::size_t path = uri.find('/', 7), host = path == std::string::npos ? 0 : path - 7;

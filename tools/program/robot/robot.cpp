@@ -24,14 +24,14 @@ Robot::Robot(std::string name, std::vector<Part> links, std::vector<Joint> joint
       const Joint::Mimic& mimic = *joints_[leader].mimic;
       const auto found = index.find(mimic.joint);
       if (found == index.end()) {
-        throw std::runtime_error("joint " + joints_[leader].name + " mimics " + mimic.joint + ", which is no joint");
+        throw JointError(joints_[leader].name, "mimics " + mimic.joint + ", which is no joint");
       }
       source.offset += source.multiplier * mimic.offset;
       source.multiplier *= mimic.multiplier;
       leader = found->second;
-      if (steps > joints_.size()) throw std::runtime_error("joint " + joints_[i].name + " mimics itself");
+      if (steps > joints_.size()) throw JointError(joints_[i].name, "mimics itself");
       if (joints_[leader].kind == Joint::Kind::kFixed) {
-        throw std::runtime_error("joint " + joints_[i].name + " mimics " + mimic.joint + ", which is fixed");
+        throw JointError(joints_[i].name, "mimics " + mimic.joint + ", which is fixed");
       }
     }
     source.column = sources_[leader]->column;

@@ -4,6 +4,7 @@
 #include <Eigen/Geometry>
 #include <cstddef>
 #include <optional>
+#include <stdexcept>
 #include <string>
 #include <utility>
 #include <vector>
@@ -34,11 +35,18 @@ struct Joint {
   std::optional<Mimic> mimic;
 };
 
+/// A fault of a joint. what() names the joint, too.
+struct JointError : std::runtime_error {
+  JointError(const std::string& joint_, const std::string& fault)
+      : std::runtime_error("joint " + joint_ + " " + fault), joint(joint_) {}
+  std::string joint;
+};
+
 /// A tree of links.
 class Robot {
  public:
   /// @param links the root first; joint i moves link i + 1, and its parent is one of the links 0 to i.
-  /// @throws std::runtime_error for a joint that mimics no joint, a fixed one or, by way of others, itself.
+  /// @throws JointError for a joint that mimics no joint, a fixed one or, by way of others, itself.
   Robot(std::string name, std::vector<Part> links, std::vector<Joint> joints);
 
   const std::string& name() const { return name_; }

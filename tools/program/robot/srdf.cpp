@@ -72,7 +72,8 @@ class SrdfReader {
 }  // namespace
 
 Srdf readSrdf(const std::string& file, const Robot& robot) {
-  const XmlFile xml(file, "robot");
+  const XmlFile xml(file);
+  xml.expectRoot("robot");
   return SrdfReader(xml, robot).read();
 }
 

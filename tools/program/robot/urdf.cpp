@@ -16,7 +16,6 @@
 #include <vector>
 
 #include "cli/suggest.h"
-#include "robot/xml_file.h"
 
 namespace bocst::program {
 namespace {
@@ -43,8 +42,9 @@ class Listener final : public console_bridge::OutputHandler {
 /// Joints between a link and the root; parsers go down the tree by recursion.
 constexpr std::size_t kMostDepth = 1000;
 
-/// Letters of a name that may be wrong: <plugin>, of which a joint may have one, differs from <origin> in three.
-constexpr std::size_t kMostWrong = 2;
+/// Letters of a name that may be wrong: <plugin>, of which a joint may have one, differs from <origin> in three, and
+/// <init> from <limit> in two.
+std::size_t mostWrongIn(const std::string& name) { return std::clamp<std::size_t>((name.size() + 1) / 3, 1, 2); }
 
 /// What an element of a URDF may have, as far as it matters here.
 struct Known {
@@ -69,24 +69,40 @@ const std::map<std::string, Known> kKnown = {
 
 class UrdfReader {
  public:
-  UrdfReader(const std::string& file, const Packages& packages, MeshStore& meshes)
-      : xml_(file, "robot"), packages_(packages), meshes_(meshes) {
+  UrdfReader(const XmlFile& file, const Packages& packages, MeshStore& meshes)
+      : xml_(file), packages_(packages), meshes_(meshes) {
+    xml_.expectRoot("robot");
     xml_.refuseXacro("robot.urdf");
   }
 
   Robot read() {
     checkElement(xml_.root(), "");
+    checkNames("link");
+    checkNames("joint");
     checkTree();
     const urdf::ModelInterfaceSharedPtr model = parse();
     add(*model->root_link_);
     try {
       return Robot(model->name_, std::move(links_), std::move(joints_));
+    } catch (const JointError& e) {
+      throw std::runtime_error(placeOf("joint", e.joint) + ": " + e.what());
     } catch (const std::runtime_error& e) {
       throw std::runtime_error(xml_.name() + ": " + e.what());
     }
   }
 
  private:
+  /// Each needs a name of its own. (Of two that have the same, urdfdom does not say which is the second.)
+  void checkNames(const char* kind) const {
+    std::set<std::string> names;
+    for (const pugi::xml_node& element : xml_.root().children(kind)) {
+      const std::string name = xml_.attribute(element, "name");
+      if (!names.insert(name).second) {
+        throw std::runtime_error(xml_.place(element) + ": a second " + kind + " named " + name);
+      }
+    }
+  }
+
   /// urdfdom only looks that one link is nobody's child, and never frees links in a circle.
   void checkTree() const {
     std::map<std::string, pugi::xml_node> joint_of;
@@ -136,7 +152,7 @@ class UrdfReader {
     for (const pugi::xml_attribute& attribute : element.attributes()) {
       const std::string name = attribute.name();
       if (isIn(known.attributes, name) || name.find(':') != std::string::npos) continue;
-      const std::string near = suggestion(name, known.attributes, kMostWrong);
+      const std::string near = suggestion(name, known.attributes, mostWrongIn(name));
       if (known.is_strict || !near.empty()) refuse(element, in + " has no attribute " + name + "." + near);
     }
     std::set<std::string> seen;
@@ -149,7 +165,7 @@ class UrdfReader {
         const bool is_named = name == "link" || name == "joint";
         checkElement(child, is_named ? name + " " + child.attribute("name").value() + ": " : owner);
       } else {
-        const std::string near = suggestion(name, known.children, kMostWrong);
+        const std::string near = suggestion(name, known.children, mostWrongIn(name));
         if (!near.empty()) refuse(child, in + " has no element <" + name + ">." + near);
       }
     }
@@ -202,13 +218,13 @@ class UrdfReader {
     return xml_.name();
   }
 
-  std::string place(const char* kind, const std::string& name) const {
+  std::string placeOf(const char* kind, const std::string& name) const {
     const pugi::xml_node element = xml_.root().find_child_by_attribute(kind, "name", name.c_str());
-    return (element ? xml_.place(element) : xml_.name()) + ": " + kind + " " + name;
+    return element ? xml_.place(element) : xml_.name();
   }
 
   [[noreturn]] void complain(const char* kind, const std::string& name, const std::string& what) const {
-    throw std::runtime_error(place(kind, name) + ": " + what);
+    throw std::runtime_error(placeOf(kind, name) + ": " + kind + " " + name + ": " + what);
   }
 
   Eigen::Isometry3d poseOf(const urdf::Pose& pose, const char* kind, const std::string& name) const {
@@ -317,7 +333,7 @@ class UrdfReader {
     }
   }
 
-  XmlFile xml_;
+  const XmlFile& xml_;
   const Packages& packages_;
   MeshStore& meshes_;
   std::vector<Part> links_;
@@ -326,7 +342,7 @@ class UrdfReader {
 
 }  // namespace
 
-Robot readUrdf(const std::string& file, const Packages& packages, MeshStore& meshes) {
+Robot readUrdf(const XmlFile& file, const Packages& packages, MeshStore& meshes) {
   return UrdfReader(file, packages, meshes).read();
 }
 

@@ -9,16 +9,21 @@
 
 namespace bocst::program {
 
-XmlFile::XmlFile(std::string file, const std::string& root_name) : file_(std::move(file)), text_(readFile(file_)) {
+XmlFile::XmlFile(std::string file) : XmlFile(file, readFile(file)) {}
+
+XmlFile::XmlFile(std::string file, std::string text) : file_(std::move(file)), text_(std::move(text)) {
   const pugi::xml_parse_result result = document_.load_buffer(text_.data(), text_.size());
+  has_lines_ = result.encoding == pugi::encoding_utf8;
   if (!result) throw std::runtime_error(placeOf(result.offset) + ": no XML: " + result.description());
-  if (root().name() != root_name) {
-    throw std::runtime_error(place(root()) + ": the root element is <" + root().name() + ">, not <" + root_name + ">");
-  }
   for (pugi::xml_node next = root().next_sibling(); next; next = next.next_sibling()) {
     if (next.type() != pugi::node_element) continue;
     throw std::runtime_error(place(next) + ": <" + next.name() + "> is a second root element; XML has one");
   }
+}
+
+void XmlFile::expectRoot(const std::string& name) const {
+  if (root().name() == name) return;
+  throw std::runtime_error(place(root()) + ": the root element is <" + root().name() + ">, not <" + name + ">");
 }
 
 void XmlFile::refuseXacro(const std::string& result) const {
@@ -30,6 +35,7 @@ void XmlFile::refuseXacro(const std::string& result) const {
 }
 
 std::string XmlFile::placeOf(std::ptrdiff_t offset) const {
+  if (!has_lines_) return file_;
   const std::size_t end = std::min(static_cast<std::size_t>(std::max<std::ptrdiff_t>(offset, 0)), text_.size());
   const auto lines = std::count(text_.begin(), text_.begin() + static_cast<std::ptrdiff_t>(end), '\n');
   return file_ + ": line " + std::to_string(lines + 1);

@@ -23,16 +23,15 @@ namespace {
 namespace fs = std::filesystem;
 
 /// By its ending, or by its first character.
-bool isUrdf(const std::string& file) {
+bool isUrdf(const std::string& file, const std::string& text) {
   const std::string ending = endingOf(file);
   if (ending == ".json") return false;
   if (ending == ".urdf" || ending == ".xml" || ending == ".xacro") return true;
-  const std::string text = readFile(file);
   const std::size_t first = text.find_first_not_of(" \t\r\n\xEF\xBB\xBF");
   return first != std::string::npos && text[first] == '<';
 }
 
-Json parseJson(const std::string& file) {
+Json parseJson(const std::string& file, const std::string& text) {
   std::vector<std::set<std::string>> keys;  // Of the objects that are open.
   const auto refuseRepeatedKeys = [&](int, Json::parse_event_t event, Json& parsed) {
     if (event == Json::parse_event_t::object_start) keys.emplace_back();
@@ -43,7 +42,7 @@ Json parseJson(const std::string& file) {
     return true;
   };
   try {
-    return Json::parse(readFile(file), refuseRepeatedKeys, true, true);
+    return Json::parse(text, refuseRepeatedKeys, true, true);
   } catch (const Json::exception& e) {
     std::string what = e.what();
     what.erase(0, what.find("] ") + 2);
@@ -59,11 +58,12 @@ class Reader {
 
   SceneSetup read() {
     setup_.file = arguments_.file;
-    if (isUrdf(arguments_.file)) {
-      addRobot(arguments_.file, "");
+    const std::string text = readFile(arguments_.file);  // once: it may be a pipe
+    if (isUrdf(arguments_.file, text)) {
+      addRobot(XmlFile(arguments_.file, text), "");
       readStates(nullptr);
     } else {
-      const Json json = parseJson(arguments_.file);
+      const Json json = parseJson(arguments_.file, text);
       const JsonElement root(json, arguments_.file, norms_);
       readScene(root);
       readStates(&root);
@@ -99,17 +99,17 @@ class Reader {
   }
 
   void readRobot(const JsonElement& robot) {
-    if (robot.isText()) return addRobot(path(robot), "");
+    if (robot.isText()) return addRobot(XmlFile(path(robot)), "");
     if (!robot.isObject()) robot.complain("the name of a URDF (\"...\") or an object {\"urdf\": \"...\"} expected");
     robot.allowKeys({"urdf", "srdf", "pose", "packages"});
     if (robot.has("packages")) {
       for (const auto& [name, folder] : robot.at("packages").members()) packages_.add(name, path(folder));
     }
     if (robot.has("pose")) setup_.X_WR = robot.at("pose").pose();
-    addRobot(path(robot.at("urdf")), robot.has("srdf") ? path(robot.at("srdf")) : "");
+    addRobot(XmlFile(path(robot.at("urdf"))), robot.has("srdf") ? path(robot.at("srdf")) : "");
   }
 
-  void addRobot(const std::string& urdf, const std::string& own_srdf) {
+  void addRobot(const XmlFile& urdf, const std::string& own_srdf) {
     setup_.robot = readUrdf(urdf, packages_, meshes_);
     const std::string& srdf = arguments_.srdf.empty() ? own_srdf : arguments_.srdf;
     if (!srdf.empty()) {
