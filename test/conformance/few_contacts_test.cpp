@@ -97,11 +97,36 @@ Raw cylinder(double radius, double length, std::size_t sectors) {
   return raw;
 }
 
+struct Counts {
+  std::size_t compared = 0, doubtful = 0;
+};
+
+// Does a request for `most` contacts get the first of them?
+void expectFirst(const fcl::CollisionGeometryd& first, const fcl::Transform3d& X_W1,
+                 const fcl::CollisionGeometryd& second, const fcl::Transform3d& X_W2, std::size_t most,
+                 const std::vector<Place>& ordered, Counts& counts) {
+  if (ordered.size() <= most) return;
+  // Rounding decides which of two at the same place is first.
+  if (std::get<0>(ordered[most]) - std::get<0>(ordered[most - 1]) < 1e-8) {
+    ++counts.doubtful;
+    return;
+  }
+  ++counts.compared;
+  const auto few = ask(first, X_W1, second, X_W2, most);
+  const auto end = ordered.begin() + static_cast<std::ptrdiff_t>(most);
+  ASSERT_EQ(few.size(), most);
+  for (const fcl::Contactd& c : few) {
+    ASSERT_TRUE(std::any_of(ordered.begin(), end, [&](const Place& p) {
+      return std::get<1>(p) == c.b1 && std::get<2>(p) == c.b2;
+    })) << most;
+  }
+}
+
 TEST(FewContacts, AreThoseOfTheLeastPosition) {
   std::mt19937_64 g(17);
   std::uniform_real_distribution<double> u(-1, 1);
   const std::vector<Raw> raws = {test::torus(24), cloud(g), cylinder(0.4, 2.2, 60), test::torus(9)};
-  std::size_t compared = 0, doubtful = 0;
+  Counts counts;
   for (int round = 0; round < 240; ++round) {
     const std::size_t i = g() % raws.size(), j = (i + 1 + g() % (raws.size() - 1)) % raws.size();
     const Raw &one = raws[i], &two = raws[j];
@@ -115,23 +140,8 @@ TEST(FewContacts, AreThoseOfTheLeastPosition) {
     const auto check = [&](const fcl::CollisionGeometryd& first, const fcl::Transform3d& X_W1,
                            const fcl::CollisionGeometryd& second, const fcl::Transform3d& X_W2,
                            const std::vector<Place>& ordered) {
-      for (const std::size_t most : {std::size_t{1}, std::size_t{7}}) {
-        if (ordered.size() <= most) continue;
-        // Rounding decides which of two at the same place is first.
-        if (std::get<0>(ordered[most]) - std::get<0>(ordered[most - 1]) < 1e-8) {
-          ++doubtful;
-          continue;
-        }
-        ++compared;
-        const auto few = ask(first, X_W1, second, X_W2, most);
-        const auto end = ordered.begin() + static_cast<std::ptrdiff_t>(most);
-        ASSERT_EQ(few.size(), most);
-        for (const fcl::Contactd& c : few) {
-          ASSERT_TRUE(std::any_of(ordered.begin(), end,
-                                  [&](const Place& p) { return std::get<1>(p) == c.b1 && std::get<2>(p) == c.b2; }))
-              << "round " << round << ", " << most;
-        }
-      }
+      SCOPED_TRACE(round);
+      for (const std::size_t most : {1, 7}) expectFirst(first, X_W1, second, X_W2, most, ordered, counts);
     };
     const auto ordered = places(ask(a, X1, b, X2, 1000000), one, same, two, X_12, one);
     ASSERT_NO_FATAL_FAILURE(check(a, X1, b, X2, ordered));
@@ -139,8 +149,54 @@ TEST(FewContacts, AreThoseOfTheLeastPosition) {
     ASSERT_NO_FATAL_FAILURE(
         check(*other, X2, a, X1, places(ask(*other, X2, a, X1, 1000000), two, X_12, one, same, one)));
   }
-  EXPECT_GT(compared, 500u);
-  EXPECT_LT(doubtful, compared);
+  EXPECT_GT(counts.compared, 500u);
+  EXPECT_LT(counts.doubtful, counts.compared);
+}
+
+// A bumpy sheet across the direction of the order: all contacts are within a part in 300 of its size along it. What a
+// walk leaves out too early shows there.
+TEST(FewContacts, AreTheFirstOfManyAtHardlyDifferentPositions) {
+  constexpr double kBumps = 0.002;
+  std::mt19937_64 g(5);
+  std::uniform_real_distribution<double> u(-1, 1);
+  const Vector3d normal = Vector3d(1, 0.31, 0.23).normalized();
+  const Eigen::Quaterniond turn = Eigen::Quaterniond::FromTwoVectors(Vector3d::UnitZ(), normal);
+  Counts counts;
+  for (int round = 0; round < 40; ++round) {
+    Raw sheet;
+    constexpr std::size_t kSide = 24;
+    for (std::size_t i = 0; i <= kSide; ++i) {
+      for (std::size_t k = 0; k <= kSide; ++k) {
+        const double x = 2.0 * static_cast<double>(i) / kSide - 1, y = 2.0 * static_cast<double>(k) / kSide - 1;
+        sheet.vertices.push_back(turn * Vector3d(0.8 * x, 0.8 * y, kBumps * u(g)));
+        if (i == 0 || k == 0) continue;
+        const std::size_t v = sheet.vertices.size() - 1;
+        sheet.triangles.emplace_back(v, v - 1, v - kSide - 2);
+        sheet.triangles.emplace_back(v, v - kSide - 2, v - kSide - 1);
+      }
+    }
+    Raw pieces;
+    for (int i = 0; i < 150; ++i) {
+      const Vector3d at = turn * Vector3d(0.7 * u(g), 0.7 * u(g), 0.05 * u(g));
+      const auto corner = [&] { return Vector3d(at + 0.1 * Vector3d(u(g), u(g), u(g))); };
+      pieces.addTriangle(corner(), corner(), corner());
+    }
+    // So x is the longest axis of each.
+    for (Raw* raw : {&sheet, &pieces}) {
+      for (const double x : {-1.1, 1.1}) raw->addTriangle({x, 0, 0}, {x, 0.01, 0}, {x, 0, 0.01});
+    }
+    const Modeld a(sheet.mesh()), b(pieces.mesh());
+    const auto same = fcl::Transform3d::Identity();
+    const fcl::Transform3d X = test::pose<double>(
+        Eigen::AngleAxisd(1e-3 * u(g), Vector3d(u(g), u(g), u(g)).normalized()).toRotationMatrix(), {0.01, 0, 0});
+    const fcl::Transform3d back = X.inverse(Eigen::Isometry);
+    SCOPED_TRACE(round);
+    for (const std::size_t most : {1, 7, 40}) {
+      expectFirst(a, same, b, X, most, places(ask(a, same, b, X, 1000000), sheet, same, pieces, X, sheet), counts);
+      expectFirst(b, X, a, same, most, places(ask(b, X, a, same, 1000000), pieces, same, sheet, back, pieces), counts);
+    }
+  }
+  EXPECT_GT(counts.compared, 80u);
 }
 
 }  // namespace
