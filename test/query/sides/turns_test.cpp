@@ -67,6 +67,8 @@ TEST(Turns, WhatEndedTheLastLongSearchGetsMore) {
 
   pair.turns().tookOverBlocks(50, false);
   EXPECT_EQ(pair.turns().mostOverBoxes(), 10000u) << "a short search says nothing";
+  pair.turns().tookOverBlocks(kLimits.few + 6, false);
+  EXPECT_EQ(pair.turns().mostOverBoxes(), 10000u) << "nor does a first turn: boxes were not tried";
 
   Turns second = pair.turns();
   second.next();
