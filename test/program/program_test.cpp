@@ -988,7 +988,7 @@ TEST_F(Program, ExplainsWhatFails) {
                   "cut.ply: truncated");
 }
 
-TEST_F(Program, ReadsAScenesFileFromAPipe) {
+TEST_F(Program, ReadsASceneFileFromAPipe) {
   const auto piped = [this](const std::string& text) {
     return shell("cat '" + write("scene", text) + "' | " + program() + " scene /dev/stdin");
   };
