@@ -242,15 +242,16 @@ std::vector<fcl::Transform3d> randomPoses(const Mesh& mesh, std::size_t count) {
   return poses;
 }
 
-/// Conservative answers to many poses by collidePoses in one thread: microseconds a pose.
+/// Conservative answers to many poses by collidePoses: microseconds a pose.
 struct ManyPoses {
   double first;  ///< Two new models.
   double again;  ///< The same poses, once both trees have all that these need.
   std::vector<std::uint8_t> hits;
 };
 
+/// threads: 0 is the default of collidePoses.
 ManyPoses timeOfPoses(OracleKind kind, const std::shared_ptr<const Mesh>& mesh,
-                      const std::vector<fcl::Transform3d>& poses, int depth) {
+                      const std::vector<fcl::Transform3d>& poses, int depth, unsigned threads) {
   constexpr int kRounds = 8;
   Options options;
   options.oracle = kind;
@@ -262,7 +263,7 @@ ManyPoses timeOfPoses(OracleKind kind, const std::shared_ptr<const Mesh>& mesh,
   std::vector<double> times;
   for (int round = 0; round < kRounds; ++round) {
     const Stopwatch watch;
-    collidePoses(a, b, poses.data(), poses.size(), result.hits.data(), 1);
+    collidePoses(a, b, poses.data(), poses.size(), result.hits.data(), threads);
     const double time = watch.microseconds() / static_cast<double>(poses.size());
     if (round == 0) result.first = time;
     if (round > kRounds / 2) times.push_back(time);
@@ -275,21 +276,29 @@ ManyPoses timeOfPoses(OracleKind kind, const std::shared_ptr<const Mesh>& mesh,
 bool measurePoses(const std::shared_ptr<const Mesh>& mesh, std::size_t count, Table& table, Json& rows) {
   const std::vector<fcl::Transform3d> poses = randomPoses(*mesh, count);
   bool are_equal = true;
-  for (const int depth : {5, 6, 7, 8}) {
-    const ManyPoses host = timeOfPoses(OracleKind::kCpu, mesh, poses, depth),
-                    device = timeOfPoses(OracleKind::kCompute, mesh, poses, depth);
-    const bool is_equal = host.hits == device.hits;
-    are_equal = are_equal && is_equal;
-    rows.push_back({{"depth", depth},
-                    {"poses", count},
-                    {"cpu_first_us", host.first},
-                    {"compute_first_us", device.first},
-                    {"cpu_us", host.again},
-                    {"compute_us", device.again},
-                    {"verdicts_equal", is_equal}});
-    table.row({std::to_string(depth), formatTime(host.first), formatTime(device.first), formatTime(host.again),
-               formatTime(device.again), formatNumber(host.again / device.again, 3) + " x",
-               is_equal ? "equal" : "DIFFER"});
+  for (const unsigned threads : {1u, 0u}) {
+    for (const int depth : {5, 6, 7, 8}) {
+      const auto time = [&](OracleKind kind) { return timeOfPoses(kind, mesh, poses, depth, threads); };
+      const ManyPoses host = time(OracleKind::kCpu), device = time(OracleKind::kCompute),
+                      both = time(OracleKind::kAuto);
+      const bool is_equal = host.hits == device.hits && host.hits == both.hits;
+      are_equal = are_equal && is_equal;
+      rows.push_back({{"depth", depth},
+                      {"poses", count},
+                      {"threads", threads},
+                      {"cpu_first_us", host.first},
+                      {"compute_first_us", device.first},
+                      {"auto_first_us", both.first},
+                      {"cpu_us", host.again},
+                      {"compute_us", device.again},
+                      {"auto_us", both.again},
+                      {"verdicts_equal", is_equal}});
+      const auto gain = [](double a, double b, double c) { return formatNumber(std::min(a, b) / c, 3) + " x"; };
+      table.row({std::to_string(depth), threads == 0 ? "default" : std::to_string(threads), formatTime(host.first),
+                 formatTime(device.first), formatTime(both.first), gain(host.first, device.first, both.first),
+                 formatTime(host.again), formatTime(device.again), formatTime(both.again),
+                 gain(host.again, device.again, both.again), is_equal ? "equal" : "DIFFER"});
+    }
   }
   return are_equal;
 }
@@ -357,8 +366,8 @@ int OracleBench::run(const Output& output) const {
   placement.row({"conservative growth", "batches", "cpu", "compute", "auto", "better of both / auto"});
   report["placement"] = Json::array();
   Table poses;
-  poses.row({"many poses, depth", "first: cpu, a pose", "compute", "again: cpu, a pose", "compute", "cpu / compute",
-             "verdicts"});
+  poses.row({"many poses, depth", "threads", "first: cpu, a pose", "compute", "auto", "better of both / auto",
+             "again: cpu, a pose", "compute", "auto", "better of both / auto", "verdicts"});
   report["poses"] = Json::array();
   bool are_equal = true;
   if (seen.count("compute") != 0) {
