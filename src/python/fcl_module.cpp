@@ -815,7 +815,7 @@ py::enum_<E> bindEnum(py::module_& m, const char* name, const char* text) {
   return py::enum_<E>(m, name, py::arithmetic(), text);
 }
 
-void bindQueries(py::module_& m) {
+void bindEnums(py::module_& m) {
   bindEnum<fcl::NODE_TYPE>(m, "NODE_TYPE", "Type of a geometry.")
       .value("BV_UNKNOWN", fcl::BV_UNKNOWN)
       .value("BV_OBBRSS", fcl::BV_OBBRSS)
@@ -851,7 +851,9 @@ void bindQueries(py::module_& m) {
   py::implicitly_convertible<int, fcl::GJKSolverType>();
   py::implicitly_convertible<int, fcl::CCDMotionType>();
   py::implicitly_convertible<int, fcl::CCDSolverType>();
+}
 
+void bindCollide(py::module_& m) {
   using Request = fcl::CollisionRequestd;
   py::class_<Request>(
       m, "CollisionRequest",
@@ -906,23 +908,25 @@ void bindQueries(py::module_& m) {
         R"(Checks two objects for collision.
 
 Returns the number of contacts of this call, at most request.num_max_contacts, and adds them to the result.)");
+}
 
-  using DRequest = fcl::DistanceRequestd;
-  py::class_<DRequest>(m, "DistanceRequest", "The request of distance().")
+void bindDistance(py::module_& m) {
+  using Request = fcl::DistanceRequestd;
+  py::class_<Request>(m, "DistanceRequest", "The request of distance().")
       .def(py::init([](bool nearest, bool with_sign, fcl::GJKSolverType solver) {
-             DRequest r(nearest, with_sign);
+             Request r(nearest, with_sign);
              r.gjk_solver_type = solver;
              return r;
            }),
            "enable_nearest_points"_a = false, "enable_signed_distance"_a = false, "gjk_solver_type"_a = fcl::GST_LIBCCD)
-      .def_readwrite("enable_nearest_points", &DRequest::enable_nearest_points,
+      .def_readwrite("enable_nearest_points", &Request::enable_nearest_points,
                      "True: the result has the nearest points.")
       .def_readwrite(
-          "enable_signed_distance", &DRequest::enable_signed_distance,
+          "enable_signed_distance", &Request::enable_signed_distance,
           "True: the distance of shapes that overlap is minus their penetration depth, where FCL computes it.")
-      .def_readwrite("rel_err", &DRequest::rel_err, "Relative error that is allowed, from 0 to 1.")
-      .def_readwrite("abs_err", &DRequest::abs_err, "Error that is allowed, in the length unit of the geometries.")
-      .def_readwrite("gjk_solver_type", &DRequest::gjk_solver_type, "Solver for convex shapes.");
+      .def_readwrite("rel_err", &Request::rel_err, "Relative error that is allowed, from 0 to 1.")
+      .def_readwrite("abs_err", &Request::abs_err, "Error that is allowed, in the length unit of the geometries.")
+      .def_readwrite("gjk_solver_type", &Request::gjk_solver_type, "Solver for convex shapes.");
   py::class_<DistanceResult>(m, "DistanceResult", "The minimum distance over all calls of distance() with this result.")
       .def(py::init([](const std::optional<double>& least) {
              DistanceResult r;
@@ -943,18 +947,20 @@ Returns the number of contacts of this call, at most request.num_max_contacts, a
         R"(Computes the distance between two objects.
 
 Returns the distance of this pair, in the length unit of the geometries; the result keeps the minimum of all calls.)");
+}
 
-  using CRequest = fcl::ContinuousCollisionRequestd;
-  py::class_<CRequest>(m, "ContinuousCollisionRequest", "The request of continuousCollide().")
+void bindContinuousCollide(py::module_& m) {
+  using Request = fcl::ContinuousCollisionRequestd;
+  py::class_<Request>(m, "ContinuousCollisionRequest", "The request of continuousCollide().")
       .def(py::init<std::size_t, double, fcl::CCDMotionType, fcl::GJKSolverType, fcl::CCDSolverType>(),
            "num_max_iterations"_a = 10, "toc_err"_a = 0.0001, "ccd_motion_type"_a = fcl::CCDM_TRANS,
            "gjk_solver_type"_a = fcl::GST_LIBCCD, "ccd_solver_type"_a = fcl::CCDC_NAIVE)
-      .def_readwrite("num_max_iterations", &CRequest::num_max_iterations, "Steps that FCL makes at most.")
-      .def_readwrite("toc_err", &CRequest::toc_err,
+      .def_readwrite("num_max_iterations", &Request::num_max_iterations, "Steps that FCL makes at most.")
+      .def_readwrite("toc_err", &Request::toc_err,
                      "Error of the time of contact that is allowed; the whole motion takes the time 1.")
-      .def_readwrite("ccd_motion_type", &CRequest::ccd_motion_type, "How objects move between their poses.")
-      .def_readwrite("gjk_solver_type", &CRequest::gjk_solver_type, "Solver for convex shapes.")
-      .def_readwrite("ccd_solver_type", &CRequest::ccd_solver_type, "How the time of contact is found.");
+      .def_readwrite("ccd_motion_type", &Request::ccd_motion_type, "How objects move between their poses.")
+      .def_readwrite("gjk_solver_type", &Request::gjk_solver_type, "Solver for convex shapes.")
+      .def_readwrite("ccd_solver_type", &Request::ccd_solver_type, "How the time of contact is found.");
   py::class_<ContinuousResult>(m, "ContinuousCollisionResult",
                                "The result of continuousCollide(); each call adds to it.")
       .def(py::init([](bool is_collide, double time) {
@@ -1199,7 +1205,10 @@ void bindFcl(py::module_ m) {
   bindTransform(m);
   bindGeometries(m);
   bindObject(m);
-  bindQueries(m);
+  bindEnums(m);
+  bindCollide(m);
+  bindDistance(m);
+  bindContinuousCollide(m);
   bindManager(m);
 }
 

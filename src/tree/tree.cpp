@@ -277,68 +277,14 @@ void Tree::Batch::nameOnce(const std::vector<Growth>& nodes, std::vector<std::ui
       names.end());
 }
 
-// In one function, as what a node asks for depends on what the nodes before it have grown.
 Tree::Batch::Batch(const std::vector<Growth>& nodes) {
-  // Every growth locks its trees in address order.
-  for (const Growth& g : nodes) {
-    if (trees_.empty() || g.tree != trees_.back()) trees_.push_back(g.tree);
-  }
-  std::sort(trees_.begin(), trees_.end(), std::less<Tree*>());
-  trees_.erase(std::unique(trees_.begin(), trees_.end()), trees_.end());
-  for (Tree* tree : trees_) locks_.emplace_back(tree->growth_);
-
-  thread_local std::vector<std::uint32_t> scratch;
+  lockTrees(nodes);
   thread_local std::vector<std::uint64_t> names;
   nameOnce(nodes, names);
   gathered_.reserve(names.size());
   for (const std::uint64_t name : names) {
     const Growth g{trees_[name >> 33], NodeRef{static_cast<std::uint32_t>(name >> 1)}, (name & 1) != 0};
-    Tree& tree = *g.tree;
-    const ChildRef ref = tree.childRef(g.node);
-    if (ref.tag() == ChildRef::kBlock) continue;
-    if (g.list_suffices && ref.tag() == ChildRef::kShortList) continue;
-    if (g.node.isRoot()) tree.growRoot();
-    if (g.list_suffices && tree.growInBulk(g.node, scratch)) continue;
-    const lattice::Cell cell = tree.cell(g.node);
-    if (tree.grid_ && cell.level < tree.grid_->level()) {
-      tree.growFromGrid(g.node);
-      continue;
-    }
-    oracle::ExpansionRequest request;
-    request.surface = &tree.grownSurface();
-    request.cell = cell;
-    // Leaves are tested here; trees of conservative answers have none.
-    request.ids_up_to = tree.conservative()              ? 0
-                        : tree.isDeepest(cell.level + 1) ? oracle::ExpansionRequest::kAll
-                                                         : kHostTriangles;
-    if (ref.isList()) {
-      gathered_.emplace_back();
-      tree.askFor(ref.index(), request, gathered_.back());
-    } else if (g.node.isRoot()) {
-      request.count = tree.surface_.triangle_count;
-      if (g.list_suffices && request.count <= kMaxLeafTriangles) {
-        std::array<std::uint32_t, kMaxLeafTriangles> ids;
-        std::iota(ids.begin(), ids.end(), 0u);
-        tree.setChild(g.node, tree.addList(ids.data(), request.count, true));
-        continue;
-      }
-    } else {
-      gathered_.emplace_back();
-      gathered_.back().reserve(4 * kMaxLeafTriangles);
-      BOCST_ASSERT(tree.grid_);
-      tree.grid_->gather(tree.surface_, cell, gathered_.back());
-      request.ids = gathered_.back().data();
-      request.count = gathered_.back().size();
-    }
-    const auto is_its = [&tree](const Part& part) { return part.oracle == tree.oracle_.get(); };
-    auto part = std::find_if(parts_.begin(), parts_.end(), is_its);
-    if (part == parts_.end()) {
-      part = parts_.insert(parts_.end(), {tree.oracle_.get(), {}, {}});
-      part->nodes.reserve(names.size());
-      part->requests.reserve(names.size());
-    }
-    part->nodes.push_back(g);
-    part->requests.push_back(std::move(request));
+    if (!g.tree->growAlone(g)) ask(g, names.size());
   }
   // From here on, oracles may write to the requests.
   try {
@@ -347,6 +293,30 @@ Tree::Batch::Batch(const std::vector<Growth>& nodes) {
     abandon();
     throw;
   }
+}
+
+// Every growth locks its trees in address order.
+void Tree::Batch::lockTrees(const std::vector<Growth>& nodes) {
+  for (const Growth& g : nodes) {
+    if (trees_.empty() || g.tree != trees_.back()) trees_.push_back(g.tree);
+  }
+  std::sort(trees_.begin(), trees_.end(), std::less<Tree*>());
+  trees_.erase(std::unique(trees_.begin(), trees_.end()), trees_.end());
+  for (Tree* tree : trees_) locks_.emplace_back(tree->growth_);
+}
+
+// Adds the question about a node to those for its oracle, of which there are at most `most`.
+void Tree::Batch::ask(const Growth& g, std::size_t most) {
+  oracle::Oracle* const oracle = g.tree->oracle_.get();
+  auto part = std::find_if(parts_.begin(), parts_.end(), [oracle](const Part& p) { return p.oracle == oracle; });
+  if (part == parts_.end()) {
+    part = parts_.insert(parts_.end(), {oracle, {}, {}});
+    part->nodes.reserve(most);
+    part->requests.reserve(most);
+  }
+  part->nodes.push_back(g);
+  gathered_.emplace_back();
+  part->requests.push_back(g.tree->question(g.node, gathered_.back()));
 }
 
 void Tree::Batch::finish() {
@@ -379,6 +349,50 @@ void Tree::Batch::abandon() noexcept {
       // The first error is on its way.
     }
   }
+}
+
+// Grows a node where that takes no oracle, or nothing has to grow any more. Nodes that grew before it in its batch
+// count.
+bool Tree::growAlone(const Growth& g) {
+  const ChildRef ref = childRef(g.node);
+  if (ref.tag() == ChildRef::kBlock || (g.list_suffices && ref.tag() == ChildRef::kShortList)) return true;
+  if (g.node.isRoot()) growRoot();
+  thread_local std::vector<std::uint32_t> ids;
+  if (g.list_suffices && growInBulk(g.node, ids)) return true;
+  if (grid_ && cell(g.node).level < grid_->level()) {
+    growFromGrid(g.node);
+    return true;
+  }
+  const std::size_t count = surface_.triangle_count;
+  if (!g.node.isRoot() || ref.isList() || !g.list_suffices || count > kMaxLeafTriangles) return false;
+  ids.resize(count);
+  std::iota(ids.begin(), ids.end(), 0u);
+  setChild(g.node, addList(ids.data(), count, true));
+  return true;
+}
+
+// What an oracle is asked about a node; `ids` must stay as long as the question.
+oracle::ExpansionRequest Tree::question(NodeRef node, std::vector<std::uint32_t>& ids) {
+  const ChildRef ref = childRef(node);
+  oracle::ExpansionRequest request;
+  request.surface = &grownSurface();
+  request.cell = cell(node);
+  // Leaves are tested here; trees of conservative answers have none.
+  request.ids_up_to = conservative()                      ? 0
+                      : isDeepest(request.cell.level + 1) ? oracle::ExpansionRequest::kAll
+                                                          : kHostTriangles;
+  if (ref.isList()) {
+    askFor(ref.index(), request, ids);
+  } else if (node.isRoot()) {
+    request.count = surface_.triangle_count;
+  } else {
+    BOCST_ASSERT(grid_);
+    ids.reserve(4 * kMaxLeafTriangles);
+    grid_->gather(surface_, request.cell, ids);
+    request.ids = ids.data();
+    request.count = ids.size();
+  }
+  return request;
 }
 
 void Tree::askFor(std::uint32_t list, oracle::ExpansionRequest& request, std::vector<std::uint32_t>& ids) const {

@@ -193,7 +193,9 @@ class Tree {
       std::vector<Growth> nodes;
       std::vector<oracle::ExpansionRequest> requests;
     };
+    void lockTrees(const std::vector<Growth>& nodes);
     void nameOnce(const std::vector<Growth>& nodes, std::vector<std::uint64_t>& names) const;
+    void ask(const Growth& g, std::size_t most);
     void abandon() noexcept;
 
     std::vector<Tree*> trees_;  // by address, in which order their locks are taken
@@ -244,6 +246,8 @@ class Tree {
   const oracle::Surface& grownSurface();
   void forgetMesh();
 
+  bool growAlone(const Growth& g);
+  oracle::ExpansionRequest question(NodeRef node, std::vector<std::uint32_t>& ids);
   void askFor(std::uint32_t list, oracle::ExpansionRequest& request, std::vector<std::uint32_t>& ids) const;
   // A device is not asked about fewer triangles: the host builds what is below them sooner than a batch comes back.
   static constexpr std::size_t kHostTriangles = 512;

@@ -38,7 +38,12 @@ struct ContactGoal {
 /// All in world coordinates, in the unit of the meshes.
 template <typename A, typename B>
 class ContactTimeWalk : private BestFirst<ContactTimeWalk<A, B>, A, B> {
+  using Base = BestFirst<ContactTimeWalk<A, B>, A, B>;
+
  public:
+  using Base::gaveUp;
+  using Base::steps;
+
   /// `a_in_body` and `b_in_body` lead from the sides' frames to those of the bodies that the motions are about, without
   /// turning.
   ContactTimeWalk(const A& a, const SimilarityTransform& a_in_body, const Motion& motion_a, const B& b,
@@ -52,19 +57,13 @@ class ContactTimeWalk : private BestFirst<ContactTimeWalk<A, B>, A, B> {
     goal_ = goal;
     first_ = known;
     first_skipped_ = kNever;
-    steps_ = 0;
-    most_steps_ = most_steps;
+    this->limitSteps(most_steps);
     at(begin);
     this->search();
     return gaveUp() ? first_ : std::min(first_, first_skipped_);
   }
 
-  /// Did the walk end before it was sure?
-  bool gaveUp() const { return steps_ > most_steps_; }
-  std::size_t steps() const { return steps_; }
-
  private:
-  using Base = BestFirst<ContactTimeWalk<A, B>, A, B>;
   friend Base;
   using Pair = typename Base::Pair;
   using Base::a_;
@@ -226,7 +225,7 @@ class ContactTimeWalk : private BestFirst<ContactTimeWalk<A, B>, A, B> {
   }
 
   bool again(const Pair& pair) {
-    ++steps_;
+    this->countSteps();
     at(pair.bound);
     double time = Base::boundOf(pair);
     if constexpr (B::kBodies) {
@@ -353,7 +352,7 @@ class ContactTimeWalk : private BestFirst<ContactTimeWalk<A, B>, A, B> {
   // When two convex primitives that do not touch before `time` first do, if before `until`.
   double firstContact(const Primitive& p, const PrimitiveOfB& q, double time, double until) {
     while (time < until && worthIt(time)) {
-      ++steps_;
+      this->countSteps();
       at(time);
       const Primitive pw = inWorld(p, a_in_world_);
       const PrimitiveOfB qw = inWorld(q, b_in_world_);
@@ -379,7 +378,6 @@ class ContactTimeWalk : private BestFirst<ContactTimeWalk<A, B>, A, B> {
   const Motion &motion_a_, &motion_b_;
   ContactGoal goal_;
   double now_ = -1, first_ = 0, first_skipped_ = 0;
-  std::size_t steps_ = 0, most_steps_ = 0;
   SimilarityTransform a_in_world_, b_in_world_, world_in_b_;  // at the time now_; the last for bodies only
 };
 

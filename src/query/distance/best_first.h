@@ -20,6 +20,11 @@ namespace bocst::query {
 /// when a side answers with cells; boundOf() of two of these; leaves(pair); scaleOfB(), the unit of B in that of A.
 template <typename Walk, typename A, typename B>
 class BestFirst {
+ public:
+  /// Did the walk end after its most steps, before it was sure?
+  bool gaveUp() const { return steps_ > most_steps_; }
+  std::size_t steps() const { return steps_; }
+
  protected:
   struct Pair {
     double bound;
@@ -33,6 +38,12 @@ class BestFirst {
   };
 
   BestFirst(const A& a, const B& b, Heap& heap) : a_(a), b_(b), heap_(heap) {}
+
+  void limitSteps(std::size_t most) {
+    steps_ = 0;
+    most_steps_ = most;
+  }
+  void countSteps(std::size_t count = 1) { steps_ += count; }
 
   /// Looks at pairs, from that of the roots on, until nothing can be better than what was found.
   void search() {
@@ -176,6 +187,7 @@ class BestFirst {
   }
 
   Heap& heap_;
+  std::size_t steps_ = 0, most_steps_ = 0;
   Pair next_{};
   bool has_next_ = false;
 };

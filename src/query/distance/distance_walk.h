@@ -38,7 +38,12 @@ struct DistanceGoal {
 /// conservative ones.
 template <typename A, typename B>
 class DistanceWalk : private BestFirst<DistanceWalk<A, B>, A, B> {
+  using Base = BestFirst<DistanceWalk<A, B>, A, B>;
+
  public:
+  using Base::gaveUp;
+  using Base::steps;
+
   DistanceWalk(const A& a, const B& b, const SimilarityTransform& b_in_a)
       : Base(a, b, scratch()), b_in_a_(b_in_a), a_in_b_(b_in_a.inverse()) {
     if constexpr (kTrees) {
@@ -46,12 +51,11 @@ class DistanceWalk : private BestFirst<DistanceWalk<A, B>, A, B> {
     }
   }
 
-  /// `known`: an answer in hand. After `most_steps` it gives up.
+  /// `known`: an answer in hand. After `most_steps` it gives up, and returns the nearest so far.
   Nearest run(const DistanceGoal& goal, const Nearest& known = {}, std::size_t most_steps = kNoLimit) {
     goal_ = goal;
     limit_ = goal.below;
-    steps_ = 0;
-    most_steps_ = most_steps;
+    this->limitSteps(most_steps);
     if constexpr (!B::kBodies) {
       const NodeExtent root_a = extentOfA(a_.root()), root_b = extentOfB(b_.root());
       const double rounding = spheres() && !gaps_.has_value() ? kSphereRounding : kExtentRounding;
@@ -63,12 +67,7 @@ class DistanceWalk : private BestFirst<DistanceWalk<A, B>, A, B> {
     return best_;
   }
 
-  /// Did the walk end before it was sure? Then run() has returned the nearest so far.
-  bool gaveUp() const { return steps_ > most_steps_; }
-  std::size_t steps() const { return steps_; }
-
  private:
-  using Base = BestFirst<DistanceWalk<A, B>, A, B>;
   friend Base;
   using Pair = typename Base::Pair;
   using Base::a_;
@@ -256,7 +255,7 @@ class DistanceWalk : private BestFirst<DistanceWalk<A, B>, A, B> {
   }
 
   void leaves(const Pair& pair) {
-    ++steps_;
+    this->countSteps();
     if constexpr (B::kBodies) {
       leafBody(pair);
     } else {
@@ -347,12 +346,12 @@ class DistanceWalk : private BestFirst<DistanceWalk<A, B>, A, B> {
   void triangles(std::uint32_t t, std::uint32_t u) { triangles(t, a_.corners(t), u, placed(b_.corners(u), b_in_a_)); }
 
   void triangles(std::uint32_t t, const Corners& in_a, std::uint32_t u, const Corners& of_b) {
-    ++steps_;
+    this->countSteps();
     const auto along = [this](const Corners& c) {
       return Eigen::Vector3d(direction_.dot(c[0]), direction_.dot(c[1]), direction_.dot(c[2]));
     };
     if (along(of_b).minCoeff() - along(in_a).maxCoeff() >= cutoff()) return;
-    steps_ += kExactTest;
+    this->countSteps(kExactTest);
     Nearest n;
     n.a = t;
     n.b = u;
@@ -411,7 +410,6 @@ class DistanceWalk : private BestFirst<DistanceWalk<A, B>, A, B> {
   Nearest best_;
   double limit_ = 0;  // something at least this near exists, or nobody asks for more
   double tie_ = 0;    // what is nearer by no more is as near
-  std::size_t steps_ = 0, most_steps_ = 0;
   Eigen::Vector3d direction_ =
       Eigen::Vector3d::Zero();  // from side A to side B where they are nearest so far, unit length
 };
