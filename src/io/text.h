@@ -1,6 +1,8 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #pragma once
 
+#include <bocst/export.h>
+
 #include <charconv>
 #include <string>
 #include <string_view>
@@ -24,7 +26,7 @@ std::string_view takeLine(std::string_view& text, char end);
 std::string_view takeWord(std::string_view& text);
 
 /// The whole word as a number, whatever the locale; NaN and infinities are numbers here.
-bool toNumber(std::string_view word, double& number);
+BOCST_EXPORT bool toNumber(std::string_view word, double& number);
 bool toNumber(std::string_view word, long long& number);
 
 template <typename Number>

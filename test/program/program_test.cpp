@@ -214,7 +214,7 @@ TEST_F(Program, WarnsOfOtherUnits) {
 TEST_F(Program, AsksForEachPoseOfAFile) {
   const std::string list = write("poses.csv",
                                  "x,y,z,qw,qx,qy,qz\r\n0.9,0,0,1,0,0,0\r\n\n# far\n3 0 0 1 0 0 0 # blanks\n"
-                                 "1.1;0;0;0.92387953251128674;0;0;0.38268343236508978\n");
+                                 "\"1.1\";+0;\t0\t0.92387953251128674;0;1e-400;0.38268343236508978\n");
   const std::string command = "collide " + cube() + " " + cube() + " --poses " + list;
   const Json report = json(command + " --distance");
   EXPECT_EQ(report.at("asked"), 3);

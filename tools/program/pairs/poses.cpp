@@ -1,15 +1,15 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #include "pairs/poses.h"
 
-#include <algorithm>
 #include <cctype>
 #include <charconv>
 #include <cmath>
 #include <cstdio>
 #include <sstream>
 #include <stdexcept>
-#include <system_error>
 
+#include "cli/cells.h"
+#include "cli/words.h"
 #include "io/text.h"
 
 namespace bocst::program {
@@ -29,19 +29,15 @@ std::string shortest(double number) {
   return {buffer, r.ptr};
 }
 
-bool startsWithName(const std::string& list) {
-  std::string word = list.substr(0, 3);
-  for (char& c : word) c = static_cast<char>(std::tolower(static_cast<unsigned char>(c)));
-  return (std::isalpha(static_cast<unsigned char>(list.front())) != 0 || list[0] == '"') && word != "nan" &&
-         word != "inf";
+bool isName(const std::string& cell) {
+  double number = 0;
+  return !cell.empty() && std::isalpha(static_cast<unsigned char>(cell.front())) != 0 && !io::toNumber(cell, number);
 }
 
 // Columns in another order would be other poses.
-void checkNames(const std::string& list, RotationFormat format) {
-  std::string names;
-  for (const char c : list) {
-    if (c != '"') names += static_cast<char>(std::tolower(static_cast<unsigned char>(c)));
-  }
+void checkNames(const std::vector<std::string>& cells, RotationFormat format) {
+  std::string names = joined(cells, ",");
+  for (char& c : names) c = static_cast<char>(std::tolower(static_cast<unsigned char>(c)));
   if (names == spelling(format)) return;
   for (const RotationFormat other : {RotationFormat::kWxyz, RotationFormat::kXyzw, RotationFormat::kRpy}) {
     if (names != spelling(other)) continue;
@@ -53,6 +49,15 @@ void checkNames(const std::string& list, RotationFormat format) {
   throw std::invalid_argument("the columns must be named " + spelling(format));
 }
 
+Pose poseOf(const std::vector<std::string>& words, RotationFormat format) {
+  const std::size_t count = format == RotationFormat::kRpy ? 6 : 7;
+  std::array<double, 7> numbers{};
+  bool are_numbers = words.size() == count;
+  for (std::size_t i = 0; i < count && are_numbers; ++i) are_numbers = io::toNumber(words[i], numbers[i]);
+  if (!are_numbers) throw std::invalid_argument(std::to_string(count) + " numbers " + spelling(format) + " expected");
+  return Pose::of(numbers, format);
+}
+
 }  // namespace
 
 std::string spelling(RotationFormat format) {
@@ -62,23 +67,15 @@ std::string spelling(RotationFormat format) {
 }
 
 Pose Pose::parse(const std::string& text, RotationFormat format) {
-  const std::size_t count = format == RotationFormat::kRpy ? 6 : 7;
-  const std::string expected = std::to_string(count) + " numbers " + spelling(format) + " expected";
-  std::array<double, 7> read{};
-  const char* at = text.data();
-  const char* const end = at + text.size();
-  for (std::size_t i = 0; i < count; ++i) {
-    if (i > 0) {
-      if (at == end || *at != ',') throw std::invalid_argument(expected);
-      ++at;
+  std::vector<std::string> words(1);
+  for (const char c : text) {
+    if (c == ',') {
+      words.emplace_back();
+    } else if (c != ' ' || !words.back().empty()) {
+      words.back() += c;
     }
-    while (at != end && (*at == ' ' || *at == '+')) ++at;
-    const auto [next, error] = std::from_chars(at, end, read[i]);
-    if (error != std::errc()) throw std::invalid_argument(expected);
-    at = next;
   }
-  if (at != end) throw std::invalid_argument(expected);
-  return of(read, format);
+  return poseOf(words, format);
 }
 
 Pose Pose::of(const std::array<double, 7>& given, RotationFormat format) {
@@ -109,26 +106,14 @@ std::vector<ListedPose> parsePoses(const std::string& text, RotationFormat forma
   std::istringstream stream{std::string(io::withoutByteOrderMark(text))};
   std::string line;
   for (std::size_t number = 1; std::getline(stream, line); ++number) {
-    line.erase(std::min(line.find('#'), line.size()));
-    std::string list;
-    bool gap = false;
-    for (const char c : line) {
-      const bool blank = c == ' ' || c == '\t' || c == '\r';
-      if (c == ',' || c == ';') {
-        list += ',';
-      } else if (!blank) {
-        if (gap && !list.empty() && list.back() != ',') list += ',';
-        list += c;
-      }
-      gap = blank;
-    }
-    if (list.empty()) continue;
     try {
-      if (number == 1 && startsWithName(list)) {
-        checkNames(list, format);
-        continue;
+      const std::vector<std::string> cells = cellsOf(line, Blanks::kSeparate);
+      if (cells.size() == 1 && cells[0].empty()) continue;
+      if (number == 1 && isName(cells[0])) {
+        checkNames(cells, format);
+      } else {
+        poses.push_back({number, poseOf(cells, format)});
       }
-      poses.push_back({number, Pose::parse(list, format)});
     } catch (const std::invalid_argument& e) {
       throw std::runtime_error(name + ": line " + std::to_string(number) + ": " + e.what());
     }

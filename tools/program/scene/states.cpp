@@ -3,14 +3,10 @@
 
 #include <algorithm>
 #include <array>
-#include <charconv>
-#include <cmath>
 #include <sstream>
 #include <stdexcept>
-#include <string_view>
-#include <system_error>
-#include <utility>
 
+#include "cli/cells.h"
 #include "cli/suggest.h"
 #include "cli/words.h"
 #include "io/text.h"
@@ -23,54 +19,6 @@ using io::inQuotes;
 
 constexpr std::array<const char*, 10> kFields = {"x", "y", "z", "qw", "qx", "qy", "qz", "roll", "pitch", "yaw"};
 constexpr unsigned kPosition = 0x007, kQuaternion = 0x078, kAngles = 0x380;  // bits of kFields
-
-std::string trimmed(const std::string& text) {
-  const std::size_t begin = text.find_first_not_of(" \r");
-  if (begin == std::string::npos) return "";
-  return text.substr(begin, text.find_last_not_of(" \r") + 1 - begin);
-}
-
-/// Of the part before #. @param blanks separate cells, too, several as one does.
-/// @throws std::invalid_argument for a quote that is not closed.
-std::vector<std::string> cellsOf(const std::string& line, bool blanks) {
-  constexpr std::string_view kSeparators = ",;\t";
-  std::vector<std::string> cells(1);
-  bool quoted = false, gap = false;
-  for (std::size_t i = 0; i < line.size(); ++i) {
-    const char c = line[i];
-    const bool is_gap = blanks && !quoted && (c == ' ' || c == '\r');
-    if (!is_gap && std::exchange(gap, false) && c != '#' && kSeparators.find(c) == std::string_view::npos) {
-      cells.emplace_back();
-    }
-    if (is_gap) {
-      gap = !trimmed(cells.back()).empty();
-      continue;
-    }
-    if (c == '"' && quoted && line[i + 1] == '"') {
-      cells.back() += line[++i];
-    } else if (c == '"' && (quoted || trimmed(cells.back()).empty())) {
-      quoted = !quoted;
-    } else if (c == '#' && !quoted) {
-      break;
-    } else if (quoted || kSeparators.find(c) == std::string_view::npos) {
-      cells.back() += c;
-    } else {
-      cells.emplace_back();
-    }
-  }
-  if (quoted) throw std::invalid_argument("a quote is not closed");
-  for (std::string& cell : cells) cell = trimmed(cell);
-  return cells;
-}
-
-std::optional<double> numberOf(const std::string& cell) {
-  double value = 0;
-  const bool has_plus = cell.size() > 1 && cell[0] == '+' && cell[1] != '-';
-  const char* begin = cell.data() + has_plus;
-  const auto [end, error] = std::from_chars(begin, cell.data() + cell.size(), value);
-  const bool whole = error == std::errc() && end == cell.data() + cell.size() && std::isfinite(value);
-  return whole ? std::optional<double>(value) : std::nullopt;
-}
 
 /// Why a name is not that of a column (`fields`: object.x and so on) or of a key.
 std::string refusal(const std::string& name, const StateNames& names, bool fields) {
@@ -210,7 +158,7 @@ std::vector<State> statesOfTable(const std::string& text, const StateNames& name
   for (std::size_t number = 1; std::getline(stream, line); ++number) {
     const std::string place = "line " + std::to_string(number);
     try {
-      std::vector<std::string> cells = cellsOf(line, blanks);
+      std::vector<std::string> cells = cellsOf(line, blanks ? Blanks::kSeparate : Blanks::kKeep);
       if (cells.size() == 1 && cells[0].empty()) continue;
       if (columns) {
         std::vector<std::string> found;
@@ -221,7 +169,7 @@ std::vector<State> statesOfTable(const std::string& text, const StateNames& name
       }
       // A joint may have a blank in its name.
       blanks = cells.size() == 1 && std::count(names.joints.begin(), names.joints.end(), cells[0]) == 0;
-      if (blanks) cells = cellsOf(line, true);
+      if (blanks) cells = cellsOf(line, Blanks::kSeparate);
       if (numberOf(cells.front())) throw std::invalid_argument("the first line must have the names of the columns");
       columns.emplace(cells, names);
     } catch (const std::invalid_argument& e) {
