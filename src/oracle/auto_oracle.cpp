@@ -10,6 +10,7 @@
 #include <utility>
 
 #include "log/assert.h"
+#include "thread/of_thread.h"
 
 namespace bocst::oracle {
 namespace {
@@ -253,10 +254,7 @@ void AutoOracle::answerHere(std::vector<ExpansionRequest>& batch) {
   learn(host_cost_, work, clock_() - begin);
 }
 
-std::list<AutoOracle::Pending>& AutoOracle::pendingOfThread() {
-  thread_local std::list<Pending> pending;
-  return pending;
-}
+std::list<AutoOracle::Pending>& AutoOracle::pendingOfThread() { return thread::ofThread<std::list<Pending>>(); }
 
 void AutoOracle::submit(std::vector<ExpansionRequest>& batch) {
   std::list<Pending> made;

@@ -15,6 +15,7 @@
 #include "fcl/queries/grow_together.h"
 #include "fcl/queries/pose_boxes.h"
 #include "fcl/queries/query_scope.h"
+#include "thread/of_thread.h"
 #include "thread/thread_pool.h"
 
 namespace bocst {
@@ -66,9 +67,12 @@ class Poses {
 template <typename S>
 void collideSome(const Model<S>& a, const Model<S>& b, const Poses<S>& X_AB, std::size_t begin, std::size_t end,
                  std::uint8_t* hit) {
-  thread_local std::vector<fcl::Transform3<S>> near_poses;
-  thread_local std::vector<std::uint32_t> near;
-  thread_local std::vector<std::uint8_t> hits;
+  struct Scratch {
+    std::vector<fcl::Transform3<S>> near_poses;
+    std::vector<std::uint32_t> near;
+    std::vector<std::uint8_t> hits;
+  };
+  auto& [near_poses, near, hits] = thread::ofThread<Scratch>();
   near.resize(std::max(near.size(), end - begin));
   hits.resize(near.size());
   std::fill(hit + begin, hit + end, std::uint8_t{0});

@@ -16,6 +16,7 @@
 #include "fcl/adapters/validate.h"
 #include "fcl/queries/scene_pair.h"
 #include "scene/reach.h"
+#include "thread/of_thread.h"
 
 namespace bocst::scene {
 namespace {
@@ -215,8 +216,12 @@ S clearance(const World<S>& world, StateCheck<S>& check, const fcl::Transform3<S
     float gap;
     PairAt pair;
   };
-  thread_local std::vector<Candidate> candidates;
-  thread_local std::vector<std::uint64_t> asked;  // in earlier rounds, sorted
+  struct Lists {
+    std::vector<Candidate> candidates;
+    std::vector<std::uint64_t> asked;
+  };
+  std::vector<Candidate>& candidates = thread::ofThread<Lists>().candidates;
+  std::vector<std::uint64_t>& asked = thread::ofThread<Lists>().asked;  // in earlier rounds, sorted
   asked.clear();
   const auto nameOf = [](const PairAt& p) {
     return std::uint64_t{p.moving} << 32 | std::uint64_t{8 * p.group + p.lane};

@@ -20,6 +20,7 @@
 #include "fcl/queries/scene_pair.h"
 #include "scene/edge.h"
 #include "scene/sweep.h"
+#include "thread/of_thread.h"
 #include "thread/sharded_lock.h"
 #include "thread/thread_pool.h"
 
@@ -42,14 +43,15 @@ std::uint32_t nextScene() {
 /// What a thread keeps between queries.
 template <typename S>
 scene::Sweep<S>& sweepOfThread() {
-  thread_local scene::Sweep<S> sweep;
-  return sweep;
+  return thread::ofThread<scene::Sweep<S>>();
 }
 
 /// Likewise: how far the poses of each moving object are from rigid.
 std::vector<double>& errorsOfThread() {
-  thread_local std::vector<double> errors;
-  return errors;
+  struct Errors {
+    std::vector<double> errors;
+  };
+  return thread::ofThread<Errors>().errors;
 }
 
 /// The numbers below `count`, middles before halves.

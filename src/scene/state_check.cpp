@@ -73,6 +73,7 @@ void StateCheck<S>::beginState(const fcl::Transform3<S>* X_WM) {
   place(X_WM);
   near_count_ = 0;
   candidates_.clear();
+  deep_.clear();
   touches_ = false;
   far_of_moving_ = nullptr;
   for (std::size_t i = 0; i < far.size(); ++i) {
@@ -109,6 +110,7 @@ bool StateCheck<S>::runAll(const fcl::Transform3<S>* X_WM, std::vector<Entry>* e
     near_count_ = 0;
     addNear(i, far_[i], far_of_moving_);
     for (std::size_t k = 0; k < near_count_; ++k) addCandidates(X_WM, near_[k], entries);
+    askDeep(X_WM, entries);
   }
   return checkCandidates(X_WM, entries);
 }
@@ -130,7 +132,9 @@ bool StateCheck<S>::run(const fcl::Transform3<S>* X_WM, const Entry* begin, cons
     n.box = e->moving;
     n.group = e->group;
     addCandidates(X_WM, n, entries);
+    if (e + 1 == end || e[1].moving != e->moving) askDeep(X_WM, entries);
   }
+  askDeep(X_WM, entries);
   return checkCandidates(X_WM, entries);
 }
 
@@ -146,12 +150,25 @@ void StateCheck<S>::addCandidates(const fcl::Transform3<S>* X_WM, const NearGrou
     const double depth = -static_cast<double>(gap) / width;  // NaN for what is flat and touches: not deep
     const bool is_last = has_last_ && last_.moving == n.box && last_.group == n.group && last_.lane == lane;
     const Candidate c{gap, depth, {n.box, n.group, lane}, entries == nullptr ? 0 : entries->size() - 1};
-    if (depth >= kDeep || is_last) {
+    if (is_last) {
       ask(X_WM, c, entries);
     } else {
-      candidates_.push_back(c);
+      (depth >= kDeep ? deep_ : candidates_).push_back(c);
     }
   }
+}
+
+// Asks about the deep pairs of a moving object. What probes prove saves the walks of the others.
+template <typename S>
+void StateCheck<S>::askDeep(const fcl::Transform3<S>* X_WM, std::vector<Entry>* entries) {
+  for (std::size_t k = 0; k < deep_.size() && deep_.size() > 1 && !touches_; ++k) {
+    const PairAt& p = deep_[k].pair;
+    const Object<S>&a = world_->moving[p.moving], &b = world_->object(p.group, p.lane);
+    if (a.model == nullptr || b.model == nullptr) continue;
+    if (fcl_adapter::surelyTouch(*a.model, X_WM[p.moving], *b.model, pose(X_WM, p.group, p.lane))) touched(p);
+  }
+  for (std::size_t k = 0; k < deep_.size() && !touches_; ++k) ask(X_WM, deep_[k], entries);
+  deep_.clear();
 }
 
 // Asks about the candidates, the deepest first.
@@ -189,10 +206,14 @@ void StateCheck<S>::ask(const fcl::Transform3<S>* X_WM, const Candidate& c, std:
       return;
     }
   }
-  if (!touch(a, X_WA, b, X_WB, result_)) return;
+  if (touch(a, X_WA, b, X_WB, result_)) touched(c.pair);
+}
+
+template <typename S>
+void StateCheck<S>::touched(const PairAt& pair) {
   touches_ = has_last_ = true;
-  last_ = c.pair;
-  const auto at = std::find(order_.begin(), order_.end(), c.pair.moving);
+  last_ = pair;
+  const auto at = std::find(order_.begin(), order_.end(), pair.moving);
   std::rotate(order_.begin(), at, at + 1);
 }
 

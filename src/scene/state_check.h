@@ -83,7 +83,9 @@ class StateCheck {
   bool isDone(const std::vector<Entry>* entries) const { return touches_ && (entries == nullptr || !lists_after_hit); }
   void addCandidates(const fcl::Transform3<S>* X_WM, const NearGroup& n, std::vector<Entry>* entries);
   bool checkCandidates(const fcl::Transform3<S>* X_WM, std::vector<Entry>* entries);
+  void askDeep(const fcl::Transform3<S>* X_WM, std::vector<Entry>* entries);
   void ask(const fcl::Transform3<S>* X_WM, const Candidate& c, std::vector<Entry>* entries);
+  void touched(const PairAt& pair);
 
   const World<S>* world_ = nullptr;
   std::uint64_t serial_ = 0;
@@ -95,7 +97,7 @@ class StateCheck {
   std::vector<NearGroup> near_;
   std::size_t near_count_ = 0;
   std::vector<std::int32_t> stack_;
-  std::vector<Candidate> candidates_;
+  std::vector<Candidate> candidates_, deep_;
   PairAt last_{};  // that touched
   bool has_last_ = false;
   bool touches_ = false;  // in this state

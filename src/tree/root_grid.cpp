@@ -6,6 +6,7 @@
 
 #include "memory/huge_pages.h"
 #include "oracle/reference.h"
+#include "thread/of_thread.h"
 
 namespace bocst::tree {
 namespace {
@@ -32,7 +33,7 @@ class ScratchMemory {
       std::unique_ptr<std::byte[]> bytes;
       std::size_t size = 0;
     };
-    thread_local Allocation allocation;
+    Allocation& allocation = thread::ofThread<Allocation>();
     if (allocation.size < bytes) {
       allocation.bytes.reset(new std::byte[bytes]);
       allocation.size = bytes;

@@ -14,6 +14,7 @@
 
 #include "log/assert.h"
 #include "oracle/stored_mesh.h"
+#include "thread/of_thread.h"
 #include "tree/box_tree.h"
 
 namespace bocst::tree {
@@ -279,7 +280,10 @@ void Tree::Batch::nameOnce(const std::vector<Growth>& nodes, std::vector<std::ui
 
 Tree::Batch::Batch(const std::vector<Growth>& nodes) {
   lockTrees(nodes);
-  thread_local std::vector<std::uint64_t> names;
+  struct Names {
+    std::vector<std::uint64_t> names;
+  };
+  std::vector<std::uint64_t>& names = thread::ofThread<Names>().names;
   nameOnce(nodes, names);
   gathered_.reserve(names.size());
   for (const std::uint64_t name : names) {
@@ -357,7 +361,10 @@ bool Tree::growAlone(const Growth& g) {
   const ChildRef ref = childRef(g.node);
   if (ref.tag() == ChildRef::kBlock || (g.list_suffices && ref.tag() == ChildRef::kShortList)) return true;
   if (g.node.isRoot()) growRoot();
-  thread_local std::vector<std::uint32_t> ids;
+  struct Ids {
+    std::vector<std::uint32_t> ids;
+  };
+  std::vector<std::uint32_t>& ids = thread::ofThread<Ids>().ids;
   if (g.list_suffices && growInBulk(g.node, ids)) return true;
   if (grid_ && cell(g.node).level < grid_->level()) {
     growFromGrid(g.node);

@@ -13,6 +13,7 @@
 
 #include "oracle/stored_mesh.h"
 #include "thread/helper_thread.h"
+#include "thread/of_thread.h"
 #include "tree/box_tree.h"
 #include "tree/bulk.h"
 #include "tree/tree.h"
@@ -77,10 +78,7 @@ class Tree::BuildMemory {
     BulkBuilder bulk;
     std::vector<BulkPlace> places;
   };
-  static Parts& ofThread() {
-    thread_local Parts parts;
-    return parts;
-  }
+  static Parts& ofThread() { return thread::ofThread<Parts>(); }
 
   const std::size_t triangles_;
 };

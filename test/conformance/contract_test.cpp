@@ -2,6 +2,7 @@
 // The same question gets the same contacts in the same order, whatever happened before; the integrals are FCL's; a
 // child after fork() never waits for threads that stayed in the parent.
 #include <bocst/bocst.h>
+#include <bocst/collide_poses.h>
 #include <fcl/geometry/octree/octree.h>
 #include <fcl/geometry/shape/box.h>
 #include <fcl/geometry/shape/capsule.h>
@@ -14,9 +15,11 @@
 #include <atomic>
 #include <cmath>
 #include <csignal>
+#include <cstdlib>
 #include <cstring>
 #include <functional>
 #include <limits>
+#include <memory>
 #include <optional>
 #include <random>
 #include <thread>
@@ -480,6 +483,63 @@ TEST(Fork, AChildUsesModelsOfAQuietParent) {
             }),
             0);
   EXPECT_TRUE(touches(a, b, 0.3));
+}
+
+/// Asks all kinds of queries of two models of its own.
+struct Asker {
+  Modeld a{test::torus(30).mesh()}, b{test::torus(12).mesh()};
+
+  bool ask() const {
+    const fcl::Transform3d I = fcl::Transform3d::Identity(), far(Eigen::Translation3d(4, 0, 0)),
+                           turned(Eigen::AngleAxisd(1, Eigen::Vector3d::UnitX()));
+    fcl::CollisionResultd result;
+    const bool touch = fcl::collide(&a, I, &b, turned, fcl::CollisionRequestd(10, true), result) > 0 &&
+                       test::touching<double>(a, I, b, turned) && !test::touching<double>(a, I, b, far);
+    fcl::DistanceResultd distance;
+    const bool apart = fcl::distance(&a, I, &b, far, fcl::DistanceRequestd(true), distance) > 1;
+    const fcl::Transform3d poses[] = {turned, far};
+    std::uint8_t hits[2];
+    collidePoses(a, b, poses, 2, hits, 1);
+    const fcl::Boxd box(1, 1, 1);
+    fcl::CollisionResultd with_box;
+    fcl::ContinuousCollisionResultd on_way;
+    fcl::continuousCollide(&a, I, I, &b, far, turned, fcl::ContinuousCollisionRequestd(), on_way);
+    return touch && apart && hits[0] == 1 && hits[1] == 0 && on_way.is_collide &&
+           fcl::collide(&a, I, &box, I, fcl::CollisionRequestd(10, true), with_box) > 0;
+  }
+};
+
+// Objects with static storage are destroyed after the thread_local ones of the main thread.
+TEST(Ends, HandlersAtExitMayQuery) {
+  static const Asker* asker = nullptr;
+  EXPECT_EQ(inChild([] {
+              asker = new Asker;
+              if (!asker->ask()) return false;
+              std::atexit([] {
+                // Twice: the first query makes the memory that the second uses.
+                const bool right = asker->ask() && asker->ask();
+                delete asker;
+                _exit(right ? 0 : 1);
+              });
+              std::exit(1);
+            }),
+            0);
+}
+
+// What a thread destroys last, it has made first.
+TEST(Ends, ThreadLocalObjectsMayQueryWhenTheyAreDestroyed) {
+  static std::atomic<int> right{0};
+  struct Last {
+    std::unique_ptr<const Asker> asker = std::make_unique<const Asker>();
+    ~Last() { right += asker->ask() && asker->ask(); }
+  };
+  for (int t = 0; t < 3; ++t) {
+    std::thread([] {
+      thread_local const Last last;
+      EXPECT_TRUE(last.asker->ask());
+    }).join();
+  }
+  EXPECT_EQ(right, 3);
 }
 
 // Threads query, grow, prune and deform; at any moment a child begins.

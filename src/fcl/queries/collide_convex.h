@@ -22,6 +22,7 @@
 #include "query/collide/pair_walk.h"
 #include "query/leaf/pair_set.h"
 #include "query/sides/visitor.h"
+#include "thread/of_thread.h"
 
 namespace bocst::fcl_adapter {
 
@@ -139,10 +140,7 @@ class ConvexCollector final : public query::ConvexVisitor<typename Partner::Node
     std::vector<Found> found;
     std::vector<std::uint32_t> order;  // of what was found, which is too large to be moved about
   };
-  static Scratch& scratch() {
-    thread_local Scratch scratch;
-    return scratch;
-  }
+  static Scratch& scratch() { return thread::ofThread<Scratch>(); }
 
   Found placed(double place, const query::CellLeaf& a, const Node& b) const {
     auto b1 = static_cast<std::intptr_t>(a.id), b2 = static_cast<std::intptr_t>(partner_.id(b));

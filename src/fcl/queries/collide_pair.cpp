@@ -24,6 +24,7 @@
 #include "log/assert.h"
 #include "query/collide/pair_walk.h"
 #include "query/cull/far_apart.h"
+#include "thread/of_thread.h"
 
 namespace bocst::fcl_adapter {
 namespace {
@@ -130,7 +131,10 @@ namespace {
 template <typename S>
 bool touchAt(const Models<S>& models, const fcl::Transform3<S>& X_W1, const fcl::Transform3<S>& X_W2, double margin) {
   static const fcl::CollisionRequest<S> request;
-  thread_local fcl::CollisionResult<S> result;
+  struct Scratch {
+    fcl::CollisionResult<S> result;
+  };
+  fcl::CollisionResult<S>& result = thread::ofThread<Scratch>().result;
   result.clear();
   const CollideQuery<S> q{
       {models.first, X_W1, models.second, X_W2, turnsRound(models, X_W1, X_W2)}, request, result, margin};
@@ -151,6 +155,16 @@ bool touch(const Model<S>& a, const fcl::Transform3<S>& X_WA, const Model<S>& b,
 }
 
 template <typename S>
+bool surelyTouch(const Model<S>& a, const fcl::Transform3<S>& X_WA, const Model<S>& b, const fcl::Transform3<S>& X_WB) {
+  if (!a.isOccupied() || !b.isOccupied()) return false;
+  const QueryScope scope(treeOf(a), treeOf(b));
+  const Interior *of_a = treeOf(a).interior(scope.a().now()), *of_b = treeOf(b).interior(scope.b().now());
+  if (of_a == nullptr || of_b == nullptr) return false;
+  const OrderedPair<S> pair{&a, X_WA, &b, X_WB, false};
+  return query::surelyCross(*of_a, *of_b, relate<S>(pair, scope.a(), scope.b()).b_in_a);
+}
+
+template <typename S>
 void collideRow(const Model<S>& a, const Model<S>& b, const fcl::Transform3<S>* X_AB, std::size_t count,
                 std::uint8_t* hit) {
   static const fcl::Transform3<S> identity = fcl::Transform3<S>::Identity();
@@ -162,7 +176,10 @@ void collideRow(const Model<S>& a, const Model<S>& b, const fcl::Transform3<S>* 
   const bool may_be_inside = treeOf(a).options().solid || treeOf(b).options().solid;
   const std::vector<Spheres>* spheres = nullptr;
   if (growsTogether(a, b)) {
-    thread_local std::vector<PosedPair<S>> pairs;
+    struct Scratch {
+      std::vector<PosedPair<S>> pairs;
+    };
+    std::vector<PosedPair<S>>& pairs = thread::ofThread<Scratch>().pairs;
     pairs.clear();
     for (std::size_t k = 0; k < count; ++k) pairs.push_back({&a, identity, &b, X_AB[k]});
     spheres = &growTogether(pairs);
@@ -179,6 +196,7 @@ void collideRow(const Model<S>& a, const Model<S>& b, const fcl::Transform3<S>* 
 #define BOCST_INSTANTIATE(S)                                                                                           \
   template void collideRow(const Model<S>&, const Model<S>&, const fcl::Transform3<S>*, std::size_t, std::uint8_t*);   \
   template bool touch(const Model<S>&, const fcl::Transform3<S>&, const Model<S>&, const fcl::Transform3<S>&);         \
+  template bool surelyTouch(const Model<S>&, const fcl::Transform3<S>&, const Model<S>&, const fcl::Transform3<S>&);   \
   template std::size_t collidePair(const fcl::CollisionGeometry<S>*, const fcl::Transform3<S>&,                        \
                                    const fcl::CollisionGeometry<S>*, const fcl::Transform3<S>&,                        \
                                    const BroughtSolver<S>&, const fcl::CollisionRequest<S>&, fcl::CollisionResult<S>&, \

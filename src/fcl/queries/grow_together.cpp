@@ -11,6 +11,7 @@
 #include "fcl/queries/query_scope.h"
 #include "query/collide/deferred_pairs.h"
 #include "query/collide/sphere_walk.h"
+#include "thread/of_thread.h"
 
 namespace bocst::fcl_adapter {
 namespace {
@@ -247,7 +248,7 @@ bool growsTogether(const Model<S>& a, const Model<S>& b) {
 
 template <typename S>
 const std::vector<Spheres>& growTogether(const std::vector<PosedPair<S>>& pairs) {
-  thread_local Scratch s;
+  auto& s = thread::ofThread<Scratch>();
   s.found.assign(pairs.size(), Spheres::kApart);
   s.trees.clear();
   for (const PosedPair<S>& p : pairs) {

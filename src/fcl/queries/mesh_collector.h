@@ -19,6 +19,7 @@
 #include "geometry/triangle.h"
 #include "query/leaf/pair_set.h"
 #include "query/sides/visitor.h"
+#include "thread/of_thread.h"
 
 namespace bocst::fcl_adapter {
 
@@ -154,6 +155,8 @@ class MeshCollector : public query::Visitor {
   /// To be called at the end of the walk.
   void finish() {
     if (ends_at_first_) return;
+    s_.seen.clear();
+    s_.seen_cells.clear();
     if (is_cut_) {
       for (const RankedPair& pair : s_.first.sort()) s_.found.push_back(pair.key);
       s_.met = s_.first_cells.sort();
@@ -162,6 +165,8 @@ class MeshCollector : public query::Visitor {
     std::sort(s_.met.begin(), s_.met.end(),
               [](const Met& x, const Met& y) { return std::tie(x.b1, x.b2) < std::tie(y.b1, y.b2); });
     emit();
+    freeIfLarge(s_.met);
+    freeIfLarge(s_.found);
   }
 
  private:
@@ -190,9 +195,10 @@ class MeshCollector : public query::Visitor {
     std::vector<std::uint64_t> found;  // keys of pairs of triangles that were not tested yet
     std::vector<Met> met;              // the first that touch, of those that were
   };
-  static Scratch& scratch() {
-    thread_local Scratch scratch;
-    return scratch;
+  static Scratch& scratch() { return thread::ofThread<Scratch>(); }
+  template <typename T>
+  static void freeIfLarge(std::vector<T>& v) {
+    if (v.capacity() > kMost) std::vector<T>().swap(v);
   }
 
   // A triangle so narrow, of its length or of its corners' coordinates, is a segment or a point but for rounding in S.
@@ -344,8 +350,8 @@ class MeshCollector : public query::Visitor {
     const double width_p = query::relativeWidth(p);
     const bool is_sliver_p = isSliver(p, width_p), sliver = !isCertain(key) && (is_sliver_q || is_sliver_p);
     if (!is_sliver_q && is_sliver_p && touchesByEdges()) return true;
-    // FCL's axes do not separate segments and points from everything.
-    const bool degenerate = sliver && (tiny || std::min(width_p, width_q) <= query::kDegenerate);
+    // FCL's axes do not separate segments and points from everything, nor in float slivers.
+    const bool degenerate = sliver && (!kTrustsApart || tiny || std::min(width_p, width_q) <= query::kDegenerate);
     const bool meet =
         isCertain(key) || (!degenerate && fcl::detail::Intersect<S>::intersect_Triangle(
                                               t1_.corner(a, 0), t1_.corner(a, 1), t1_.corner(a, 2), t2_.corner(b, 0),

@@ -7,6 +7,7 @@
 #include "oracle/cpu/clip.h"
 #include "oracle/cpu/kernels.h"
 #include "oracle/reference.h"
+#include "thread/of_thread.h"
 
 namespace bocst::oracle {
 namespace {
@@ -172,8 +173,7 @@ class Expander {
 }  // namespace
 
 void expand(ExpansionRequest& e, std::uint8_t candidates) {
-  thread_local Scratch scratch;
-  Expander(e, scratch, candidates).run();
+  Expander(e, thread::ofThread<Scratch>(), candidates).run();
 }
 
 void answerOnCpu(ExpansionRequest& e, std::uint8_t candidates) {

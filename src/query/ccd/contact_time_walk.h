@@ -17,6 +17,7 @@
 #include "query/sides/box_side.h"
 #include "query/sides/side.h"
 #include "query/sides/visitor.h"
+#include "thread/of_thread.h"
 
 namespace bocst::query {
 
@@ -100,10 +101,7 @@ class ContactTimeWalk : private BestFirst<ContactTimeWalk<A, B>, A, B> {
     std::vector<PrimitiveOfB> b;
     std::vector<Eigen::AlignedBox3d> boxes_a, boxes_b;
   };
-  static Scratch& scratch() {
-    thread_local Scratch s;
-    return s;
-  }
+  static Scratch& scratch() { return thread::ofThread<Scratch>(); }
 
   double contactDistance() const { return goal_.margin + goal_.rounding; }
   // Nodes go on to half of what counts as contact, as primitives do. So rounding, which is less than the other half,

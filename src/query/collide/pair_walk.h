@@ -14,6 +14,7 @@
 #include "query/leaf/leaf_pairs.h"
 #include "query/sides/turns.h"
 #include "query/sides/visitor.h"
+#include "thread/of_thread.h"
 
 namespace bocst::query {
 
@@ -96,10 +97,7 @@ class PairWalk {
     LargeTriangleLeaf<B> large_b;
     std::vector<TriangleExtent> leaf;  // beside bodies
   };
-  static Scratch& scratch() {
-    thread_local Scratch s;
-    return s;
-  }
+  static Scratch& scratch() { return thread::ofThread<Scratch>(); }
 
   static bool popLast(Scratch& s, Pair& pair) {
     if (s.stack.empty()) return false;

@@ -6,6 +6,7 @@
 #include <vector>
 
 #include "query/collide/deferred_pairs.h"
+#include "thread/of_thread.h"
 
 namespace bocst::query {
 
@@ -43,10 +44,7 @@ bool SphereWalk::areBoxesApart() const {
   return facesApart(a_.volume(a_.root()), b_.volume(b_.root()), wide);
 }
 
-SphereWalk::Scratch& SphereWalk::scratchOfThread() {
-  thread_local Scratch s;
-  return s;
-}
+SphereWalk::Scratch& SphereWalk::scratchOfThread() { return thread::ofThread<Scratch>(); }
 
 bool SphereWalk::run(Visitor& visitor) {
   Scratch& s = scratchOfThread();

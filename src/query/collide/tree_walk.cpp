@@ -1,6 +1,8 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #include "query/collide/tree_walk.h"
 
+#include "thread/of_thread.h"
+
 namespace bocst::query {
 namespace {
 
@@ -45,7 +47,7 @@ WalkEnd TreeWalk::run(Visitor& visitor, std::size_t most_leaf_pairs) {
   leaf_pairs_ = 0;
   most_leaf_pairs_ = most_leaf_pairs;
   gave_up_ = false;
-  thread_local Scratch s;
+  auto& s = thread::ofThread<Scratch>();
   s.deferred.clear();
   s.leaves_started = false;
   for (LargeTriangles* large : {&s.large[0], &s.large[1], &s.beside_cell}) large->clear();

@@ -18,6 +18,7 @@
 #include "query/sides/side.h"
 #include "query/sides/turns.h"
 #include "query/sides/visitor.h"
+#include "thread/of_thread.h"
 
 namespace bocst::query {
 
@@ -78,10 +79,7 @@ class DistanceWalk : private BestFirst<DistanceWalk<A, B>, A, B> {
   struct Scratch : Base::Heap {
     std::vector<TriangleExtent> a, b;
   };
-  static Scratch& scratch() {
-    thread_local Scratch s;
-    return s;
-  }
+  static Scratch& scratch() { return thread::ofThread<Scratch>(); }
 
   // What is at this distance or beyond does not improve the answer by more than rounding, or than the caller lets go.
   // Where many pairs are equally near (faces that are parallel, triangles about a tip), none but the first is computed.

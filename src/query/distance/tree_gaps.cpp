@@ -4,6 +4,8 @@
 #include <algorithm>
 #include <cmath>
 
+#include "thread/of_thread.h"
+
 namespace bocst::query {
 namespace {
 
@@ -36,10 +38,7 @@ struct TreeGaps::Scratch {
   std::vector<Candidate> candidates;
 };
 
-TreeGaps::Scratch& TreeGaps::scratch() {
-  thread_local Scratch s;
-  return s;
-}
+TreeGaps::Scratch& TreeGaps::scratch() { return thread::ofThread<Scratch>(); }
 
 TreeGaps::TreeGaps(const TreeSide& a, const TreeSide& b, const SimilarityTransform& b_in_a)
     : side_{&a, &b}, b_in_a_(b_in_a), geometry_(b_in_a) {

@@ -11,14 +11,20 @@
 namespace bocst::query {
 
 /// A set of pairs of an id (of a triangle, or with 64 bits a cell) and a triangle, to serve query after query. No more
-/// memory is touched than the last queries needed: beside it, a walk wants the processor's cache.
+/// memory is touched than the query before needed, because beside it, a walk wants the processor's cache; and no more is
+/// kept than kMostKept slots.
 template <typename Id>
 class PairSet {
  public:
   void clear() {
-    if (size_ != 0) std::fill_n(slots_.begin(), used_, Slot());
+    if (size_ == 0) return;
+    if (slots_.size() > kMostKept) {
+      *this = PairSet();
+      return;
+    }
+    std::fill_n(slots_.begin(), used_, Slot());
     // The next queries are likely to be like this one.
-    if (used_ > kLeast && 8 * size_ < used_) used_ /= 2;
+    while (used_ > kLeast && 8 * size_ < used_) used_ /= 2;
     size_ = 0;
   }
 
@@ -29,7 +35,7 @@ class PairSet {
   }
 
  private:
-  static constexpr std::size_t kLeast = 1024;
+  static constexpr std::size_t kLeast = 1024, kMostKept = std::size_t{1} << 16;
   static constexpr std::uint32_t kNone = std::numeric_limits<std::uint32_t>::max();
 
   struct Slot {
@@ -64,8 +70,9 @@ class PairSet {
     held_.clear();
     std::copy_if(slots_.begin(), slots_.begin() + static_cast<std::ptrdiff_t>(used_), std::back_inserter(held_),
                  [](const Slot& s) { return s.b != kNone; });
-    clear();
+    std::fill_n(slots_.begin(), used_, Slot());
     used_ = more;
+    size_ = 0;
     for (const Slot& s : held_) place(s);
   }
 

@@ -7,6 +7,7 @@
 
 #include "geometry/volume.h"
 #include "query/sides/side.h"
+#include "thread/of_thread.h"
 
 namespace bocst::query {
 
@@ -35,8 +36,10 @@ class ComponentPoints {
   using NodeB = typename B::Node;
 
   static std::vector<NodeA>& scratch() {
-    thread_local std::vector<NodeA> near;
-    return near;
+    struct Near {
+      std::vector<NodeA> nodes;
+    };
+    return thread::ofThread<Near>().nodes;
   }
 
   // The nodes of A in near_ from `begin` to `end` hold all of the surface that may meet this node's parent.

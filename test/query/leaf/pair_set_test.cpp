@@ -24,11 +24,12 @@ TYPED_TEST(PairSets, TellNewPairsFromOldOnes) {
   std::mt19937_64 g(1);
   std::size_t again = 0;
   // Large queries after small ones and back, so that it grows and shrinks; the same pairs come in several of them.
-  for (const std::size_t count : {0u, 1u, 5000u, 3u, 0u, 40000u, 10u, 10u, 10u, 10u, 10u, 10u, 10u, 3000u, 200u}) {
+  for (const std::size_t count :
+       {0u, 1u, 5000u, 3u, 0u, 40000u, 10u, 10u, 10u, 10u, 10u, 10u, 10u, 3000u, 200u, 150000u, 100u, 3000u}) {
     set.clear();
     std::set<std::pair<Id, std::uint32_t>> want;
     for (std::size_t i = 0; i < count; ++i) {
-      const auto a = static_cast<Id>(g() % 150), b = static_cast<Id>(g() % 150);
+      const auto a = static_cast<Id>(g() % 300), b = static_cast<Id>(g() % 300);
       const bool is_new = want.insert({a, static_cast<std::uint32_t>(b)}).second;
       ASSERT_EQ(set.insert(a, static_cast<std::uint32_t>(b)), is_new) << "pair " << i << " of " << count;
       again += !is_new;

@@ -8,8 +8,7 @@
 #include <sstream>
 #include <stdexcept>
 
-#include "cli/cells.h"
-#include "cli/words.h"
+#include "pairs/cells.h"
 #include "io/text.h"
 
 namespace bocst::program {
@@ -36,8 +35,11 @@ bool isName(const std::string& cell) {
 
 // Columns in another order would be other poses.
 void checkNames(const std::vector<std::string>& cells, RotationFormat format) {
-  std::string names = joined(cells, ",");
-  for (char& c : names) c = static_cast<char>(std::tolower(static_cast<unsigned char>(c)));
+  std::string names;
+  for (const std::string& cell : cells) {
+    if (!names.empty()) names += ',';
+    for (const char c : cell) names += static_cast<char>(std::tolower(static_cast<unsigned char>(c)));
+  }
   if (names == spelling(format)) return;
   for (const RotationFormat other : {RotationFormat::kWxyz, RotationFormat::kXyzw, RotationFormat::kRpy}) {
     if (names != spelling(other)) continue;

@@ -6,7 +6,7 @@
 #include <sstream>
 #include <stdexcept>
 
-#include "cli/cells.h"
+#include "pairs/cells.h"
 #include "cli/suggest.h"
 #include "cli/words.h"
 #include "io/text.h"

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: BSD-3-Clause
-#include "cli/cells.h"
+#include "pairs/cells.h"
 
 #include <cmath>
 #include <cstddef>
