@@ -242,10 +242,10 @@ class MeshCollector : public query::Visitor {
 
   // Only the first pairs that touch, a given number of them, are wanted: is this one of them?
   void addFirst(std::uint32_t of_model, std::uint64_t key) {
-    if (!s_.seen.insert(first(key), second(key))) return;
     getCorners(&key, 1);
     const RankedPair pair{placeOf(of_model), key};
-    if (!s_.first.wants(pair) || !decide(key, 0, nullptr)) return;
+    // Most are not wanted, so only the others are remembered.
+    if (!s_.first.wants(pair) || !s_.seen.insert(first(key), second(key)) || !decide(key, 0, nullptr)) return;
     s_.first.add(pair);
     if (s_.first.isFull()) order_.setCut(s_.first.last().place, position_tolerance_, cut_);
   }
