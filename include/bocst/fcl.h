@@ -116,8 +116,8 @@ BOCST_EXPORT std::size_t collide(const fcl::CollisionGeometry<S>* o1, const fcl:
 ///   between the surfaces, and 0 if spheres overlap.
 /// - abs_err and rel_err: absolute and relative amount by which the answer may exceed the minimum distance, as in FCL.
 /// - enable_signed_distance: surfaces that touch get minus the penetration_depth of a contact of collide(), with both
-///   nearest points at its pos (FCL gives 0 for meshes that touch). This describes two primitives, not two bodies. For a
-///   geometry inside a solid it is minus the distance between the surfaces (the depth of collide()'s contact without
+///   nearest points at its pos (FCL gives 0 for meshes that touch). This describes two primitives, not two bodies. For
+///   a geometry inside a solid it is minus the distance between the surfaces (the depth of collide()'s contact without
 ///   margin).
 /// The error of the answer is below 1e-11 of the geometries' sizes (1e-8 with ellipsoids, cones and cylinders), plus
 /// rounding to S. The answer does not depend on the solver, and on the resident nodes only within that error.

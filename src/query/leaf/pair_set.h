@@ -11,8 +11,8 @@
 namespace bocst::query {
 
 /// A set of pairs of an id (of a triangle, or with 64 bits a cell) and a triangle, to serve query after query. No more
-/// memory is touched than the query before needed, because beside it, a walk wants the processor's cache; and no more is
-/// kept than kMostKept slots.
+/// memory is touched than the query before needed, because beside it, a walk wants the processor's cache; and no more
+/// is kept than kMostKept slots.
 template <typename Id>
 class PairSet {
  public:

@@ -8,8 +8,8 @@
 #include <sstream>
 #include <stdexcept>
 
-#include "pairs/cells.h"
 #include "io/text.h"
+#include "pairs/cells.h"
 
 namespace bocst::program {
 

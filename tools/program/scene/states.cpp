@@ -6,10 +6,10 @@
 #include <sstream>
 #include <stdexcept>
 
-#include "pairs/cells.h"
 #include "cli/suggest.h"
 #include "cli/words.h"
 #include "io/text.h"
+#include "pairs/cells.h"
 #include "pairs/poses.h"
 
 namespace bocst::program {
