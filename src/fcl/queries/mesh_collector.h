@@ -350,8 +350,8 @@ class MeshCollector : public query::Visitor {
     const double width_p = query::relativeWidth(p);
     const bool is_sliver_p = isSliver(p, width_p), sliver = !isCertain(key) && (is_sliver_q || is_sliver_p);
     if (!is_sliver_q && is_sliver_p && touchesByEdges()) return true;
-    // FCL's axes do not separate segments and points from everything, nor in float slivers.
-    const bool degenerate = sliver && (!kTrustsApart || tiny || std::min(width_p, width_q) <= query::kDegenerate);
+    // FCL's axes do not separate segments and points from everything.
+    const bool degenerate = sliver && (tiny || std::min(width_p, width_q) <= query::kDegenerate);
     const bool meet =
         isCertain(key) || (!degenerate && fcl::detail::Intersect<S>::intersect_Triangle(
                                               t1_.corner(a, 0), t1_.corner(a, 1), t1_.corner(a, 2), t2_.corner(b, 0),
