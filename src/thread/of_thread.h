@@ -1,29 +1,27 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #pragma once
 
+#include <cxxabi.h>
+
+/// Names this library or program to the C++ runtime (Itanium C++ ABI 3.3.5).
+extern "C" void* __dso_handle __attribute__((visibility("hidden")));
+
 namespace bocst::thread {
 
-/// The calling thread's T, which lasts until the thread ends: memory that queries use again. When a program ends, its
-/// static objects are destroyed after the thread_local ones of the main thread, and may still ask queries; for these,
-/// another T is made that is never freed.
+/// The calling thread's T, which lasts until the thread ends: memory that queries use again. Unlike a thread_local
+/// object, it may also be asked for by what is destroyed later: thread_local objects that are older, and static objects
+/// when the program ends. Then another T is made, which goes with the thread or the process.
 template <typename T>
 T& ofThread() {
   thread_local T* object = nullptr;
-  thread_local bool is_owned = false;
-  struct Owner {
-    ~Owner() {
-      delete object;
-      object = nullptr;
-    }
-  };
   if (object == nullptr) {
     object = new T();
-    // A destroyed thread_local object must not be passed again.
-    if (!is_owned) {
-      is_owned = true;
-      thread_local Owner owner;
-      static_cast<void>(owner);
-    }
+    abi::__cxa_thread_atexit(
+        [](void*) {
+          delete object;
+          object = nullptr;
+        },
+        nullptr, &__dso_handle);
   }
   return *object;
 }
