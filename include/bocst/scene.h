@@ -100,6 +100,14 @@ class BOCST_EXPORT Scene {
   /// vertices, thresholds or cost density of a BVHModel. Updates all objects with the same geometry.
   void update(Id object);
 
+  /// Builds the complete trees of all models with exact answers now (Model::buildTree()), those of BVHModels included,
+  /// on the scene's threads, so that no query has to: for a planner whose set-up is not part of the planning time.
+  /// Objects that are added later are not included. A model drops the branches that no query has used for Options::ttl;
+  /// set that to 0 for models that shall keep their trees. Queries and changes may run at the same time.
+  /// @throws std::logic_error for a Model between beginModel() and endModel(); std::bad_alloc. Some of the trees may
+  /// have been built then.
+  void buildTrees();
+
   // Queries. X_WM may be null if there are no moving objects or no states. All throw std::invalid_argument, which names
   // the moving object and the state, for a pose that is not rigid, for another null pointer to poses or hits, and for
   // two geometries near each other of which FCL knows no collision: a Plane and a Convex, or a TriangleP and any

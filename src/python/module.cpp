@@ -522,6 +522,10 @@ threads: number of threads that share the states of one call; 0: one per hardwar
           "update", [](PyScene& s, Id id) { s.scene.update(id); }, "object"_a, py::call_guard<NoGilWithOctrees>(),
           "Call this after the shape of a geometry has changed. A BVHModel that was built again is another geometry: "
           "remove the object and add it again.")
+      .def(
+          "build_trees", [](PyScene& s) { s.scene.buildTrees(); }, py::call_guard<NoGil>(),
+          "Builds the whole trees of all models with exact answers now, with the scene's threads, so that no query has "
+          "to. A model with ttl=0 keeps its tree.")
       .def("collides", query(false, [](const Scened& scene, Xs X, std::size_t) { return scene.collides(X); }), "X_WM"_a,
            "True if this state, (m, 4, 4), collides.")
       .def("colliding_pair",

@@ -354,6 +354,26 @@ void Scene<S>::update(Id object) {
 }
 
 template <typename S>
+void Scene<S>::buildTrees() {
+  std::vector<std::pair<std::size_t, std::shared_ptr<Geometry>>> models;  // with the numbers of their triangles
+  {
+    const std::lock_guard<thread::ForkAwareMutex> lock(impl_->mutex);
+    for (const auto& [given, numbers] : impl_->with_geometry) {
+      const Object<S>& object = impl_->objects.at(*numbers.begin()).object;
+      if (!object.exact || object.model->empty()) continue;
+      const std::shared_ptr<const Mesh> mesh = object.model->mesh();
+      models.emplace_back(mesh != nullptr ? mesh->triangleCount() : 0, object.geometry);
+    }
+  }
+  // The longest build first, so that no thread ends alone with it.
+  std::sort(models.rbegin(), models.rend());
+  impl_->pool.share(models.size(), [&](std::size_t i) {
+    static_cast<Model<S>&>(*models[i].second).buildTree();
+    return true;
+  });
+}
+
+template <typename S>
 bool Scene<S>::collides(const Transform* X_WM, Pair* pair) const {
   const auto w = impl_->current();
   scene::StateCheck<S>& check = sweepOfThread<S>().check();

@@ -336,7 +336,8 @@ class Tree {
   Rent rent_;                        // of the whole tree, see payRent()
   bool is_ahead_build_due_ = false;  // the helper thread must still be asked to build it; under growth_
   std::shared_ptr<AheadBuild> ahead_build_;
-  std::uint64_t generation_ = 0;  // of nodes_: indices of blocks are of one generation
+  std::uint64_t generation_ = 0;                        // of nodes_: indices of blocks are of one generation
+  std::uint64_t whole_generation_ = ~std::uint64_t{0};  // the one whose tree is complete; under growth_
   NodeStore nodes_;
   NodeTable node_table_;                   // of a generation; under growth_
   std::vector<std::uint32_t> node_words_;  // what it was made from

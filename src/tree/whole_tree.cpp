@@ -204,6 +204,7 @@ bool Tree::buildNow() {
 void Tree::build() {
   if (conservative() || !growsOnHost() || !fitsBuild()) return;
   const std::lock_guard<thread::ForkAwareMutex> lock(growth_);
+  if (whole_generation_ == generation_) return;
   is_ahead_build_due_ = false;
   growWhole();
   countBytes();
@@ -355,6 +356,7 @@ void Tree::publishBulk(const BulkBuilder& bulk, const std::vector<BulkPlace>& pl
 // Of the whole tree; what was grown before is not counted any more.
 void Tree::publishWhole(const BulkBuilder& bulk, const std::vector<BulkPlace>& places) {
   built_ += surface_.triangle_count;
+  whole_generation_ = generation_;
   for (auto& n : nodes_at_) n = 0;
   nodes_at_[1] = 1;
   for (std::size_t number = 0; number < bulk.blocks().size(); ++number) {

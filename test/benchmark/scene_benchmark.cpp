@@ -1,8 +1,9 @@
 // SPDX-License-Identifier: BSD-3-Clause
-// Usage: bocst_scene_benchmark MESHES_DIR [SEED]
+// Usage: bocst_scene_benchmark MESHES_DIR [SEED [THREADS [SCENE]]]
 // Scene with bocst models against FCL's DynamicAABBTreeCollisionManager with BVHModel<OBBRSS>: an arm of seven links
 // among scans (OFF files of the folder), random states, edges, clearance; then among 500 small objects. Both sides take
-// turns on the same states; prints times and ratios (above 1: bocst is faster), and compares all verdicts.
+// turns on the same states; prints times and ratios (above 1: bocst is faster), and compares all verdicts. At the end,
+// the same once more for models whose trees are built in the set-up.
 #include <bocst/bocst.h>
 #include <bocst/io.h>
 #include <fcl/broadphase/broadphase_dynamic_AABB_tree.h>
@@ -138,26 +139,38 @@ struct Both {
     for (auto& o : world) world_manager.registerObject(o.get());
     robot_manager.setup();
     world_manager.setup();
-    const double fcl_time = now() - start;
-    start = now();
-    SceneOptions options;
-    options.threads = threads;
-    scene = std::make_unique<Scened>(options);
-    std::vector<Id> ids;
-    for (std::size_t i = 0; i < things.size(); ++i)
-      scene->addFixed(std::make_shared<Modeld>(things[i].mesh()), X_WT[i]);
-    for (const Raw& r : links) ids.push_back(scene->addMoving(std::make_shared<Modeld>(r.mesh())));
-    std::printf("  set-up: FCL %.0f ms, bocst %.1f ms\n", 1e3 * fcl_time, 1e3 * (now() - start));
-    // Neighbours, and next ones, as an SRDF has them.
+    std::printf("  set-up: FCL %.0f ms", 1e3 * (now() - start));
     for (std::size_t i = 0; i < links.size(); ++i) {
-      for (std::size_t j = i + 1; j < links.size() && j <= i + 2; ++j) {
-        scene->ignore(ids[i], ids[j]);
+      for (std::size_t j = i + 1; j < links.size() && j <= i + kIgnored; ++j) {
         const auto *a = robot[i]->collisionGeometry().get(), *b = robot[j]->collisionGeometry().get();
         ignored.insert({a, b});
         ignored.insert({b, a});
       }
     }
+    makeScene(threads, false);
   }
+
+  // A scene of new models, whose trees are built and kept where `built`.
+  void makeScene(unsigned threads, bool built) {
+    const double start = now();
+    SceneOptions options;
+    options.threads = threads;
+    scene = std::make_unique<Scened>(options);
+    Options of_models;
+    if (built) of_models.ttl = std::chrono::milliseconds(0);
+    const auto model = [&](const Raw& raw) { return std::make_shared<Modeld>(raw.mesh(), of_models); };
+    std::vector<Id> ids;
+    for (std::size_t i = 0; i < things.size(); ++i) scene->addFixed(model(things[i]), X_WT[i]);
+    for (const Raw& r : links) ids.push_back(scene->addMoving(model(r)));
+    if (built) scene->buildTrees();
+    std::printf("%s bocst %.1f ms\n", built ? "  set-up with trees built:" : ",", 1e3 * (now() - start));
+    for (std::size_t i = 0; i < links.size(); ++i) {
+      for (std::size_t j = i + 1; j < links.size() && j <= i + kIgnored; ++j) scene->ignore(ids[i], ids[j]);
+    }
+  }
+
+  // As an SRDF has them: links that may touch the next ones.
+  static constexpr std::size_t kIgnored = 2;
 
   struct Data {
     const Both* both;
@@ -237,7 +250,7 @@ struct Times {
 
 // FCL and bocst are asked in long turns, as a planner uses one of them: in short ones each finds its data evicted from
 // the caches by the other.
-void measure(Both& both, unsigned seed, bool with_distances) {
+void measure(Both& both, unsigned seed, unsigned threads, bool with_distances) {
   std::mt19937_64 g(seed);
   constexpr std::size_t kStates = 10000, kStatesInTurn = 2000;
   constexpr int kSettle = 15;
@@ -343,6 +356,10 @@ void measure(Both& both, unsigned seed, bool with_distances) {
   timeEdges("new edge, any collision", fclHits, bocstHits);
   timeEdges("edge, first collision", fclBlocked, bocstBlocked);
 
+  both.makeScene(threads, true);
+  timeStates("random states, first", X.data());
+  timeEdges("edge, any collision", fclHits, bocstHits);
+
   if (!with_distances) return;
   Times t;
   Poses one(kJoints);
@@ -408,7 +425,7 @@ int main(int argc, char** argv) {
     std::printf("  %zu links of %zu triangles, %zu things of %zu triangles in all\n", arm.links.size(),
                 arm.links[0].triangles.size(), arm.things.size(), triangles);
     arm.setUp(threads);
-    measure(arm, seed, true);
+    measure(arm, seed, threads, true);
   }
   if (only == 0 || only == 2) {
     std::printf("an arm among 500 small objects\n");
@@ -421,7 +438,7 @@ int main(int argc, char** argv) {
                                               {distance * std::cos(angle), distance * std::sin(angle), height}));
     }
     small.setUp(threads);
-    measure(small, seed, false);
+    measure(small, seed, threads, false);
   }
   return 0;
 }

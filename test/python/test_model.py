@@ -164,6 +164,8 @@ def test_scene():
         assert (pair is not None) == hit and (not hit or set(pair) & set(moving))
         assert (scene.clearance(state) <= 0) == hit
         assert len(scene.nearest_pair(state)) == 2
+    scene.build_trees()
+    assert np.array_equal(scene.collisions(X), expected)
     scene.ignore(moving[0], fixed[0])
     assert scene.pair_count == 6
     ignored = [{moving[0], fixed[0]}]

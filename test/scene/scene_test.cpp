@@ -1071,6 +1071,51 @@ TEST(SceneDouble, TinySizes) {
   }
 }
 
+// After it, no query builds anything.
+TYPED_TEST(SceneTest, BuildsItsTreesBeforeQueries) {
+  using S = TypeParam;
+  const test::Raw torus = test::torus(30);
+  const States<S> X = walk<S>(500, 2, 1.5, 0.05, 4);
+  std::vector<std::uint8_t> expected(500), hit(500);
+  for (const unsigned threads : {1u, 3u}) {
+    Options on_host, conservative;
+    on_host.oracle = conservative.oracle = OracleKind::kCpu;
+    conservative.answer = Answer::kConservative;
+    std::vector<std::shared_ptr<Model<S>>> models;
+    for (std::size_t i = 0; i < 4; ++i) models.push_back(std::make_shared<Model<S>>(torus.mesh(), on_host));
+    const auto cells = std::make_shared<Model<S>>(torus.mesh(), conservative);
+    const auto emptied = std::make_shared<Model<S>>(torus.mesh(), on_host);
+    Scene<S> scene(SceneOptions{threads});
+    scene.addMoving(models[0]);
+    scene.addMoving(models[1]);
+    for (std::size_t i = 2; i < 4; ++i) {
+      for (const double x : {-1.0, 1.0}) {  // two objects have one geometry
+        scene.addFixed(models[i], test::pose<S>(Eigen::Matrix3d::Identity(), {x, 0, static_cast<double>(i)}));
+      }
+    }
+    scene.addFixed(cells, test::pose<S>(Eigen::Matrix3d::Identity(), {100, 0, 0}));
+    scene.addFixed(emptied, test::pose<S>(Eigen::Matrix3d::Identity(), {0, 100, 0}));
+    scene.addFixed(test::bvh<fcl::OBBRSS<S>>(torus), test::pose<S>(Eigen::Matrix3d::Identity(), {0, -100, 0}));
+    scene.addFixed(std::make_shared<fcl::Sphere<S>>(S(0.5)), test::pose<S>(Eigen::Matrix3d::Identity(), {0, 0, 0}));
+    emptied->beginModel();
+    emptied->endModel();
+    if (threads == 1) scene.collisions(X.data(), 500, expected.data());
+    scene.buildTrees();
+    EXPECT_EQ(cells->statistics().resident_nodes, 1u);
+    std::uint64_t built[4];
+    for (std::size_t i = 0; i < 4; ++i) {
+      built[i] = models[i]->statistics().built_triangles;
+      EXPECT_GE(built[i], torus.triangles.size());
+    }
+    scene.collisions(X.data(), 500, hit.data());
+    EXPECT_EQ(hit, expected);
+    scene.buildTrees();
+    for (std::size_t i = 0; i < 4; ++i) EXPECT_EQ(models[i]->statistics().built_triangles, built[i]);
+  }
+  EXPECT_GT(std::count(expected.begin(), expected.end(), 1), 20);
+  EXPECT_LT(std::count(expected.begin(), expected.end(), 1), 480);
+}
+
 TYPED_TEST(SceneTest, AModelThatWasEmptied) {
   using S = TypeParam;
   const auto model = std::make_shared<Model<S>>(test::box({-1, -1, -1}, {1, 1, 1}).mesh());
@@ -1573,6 +1618,7 @@ TEST(SceneThreads, ChangesBesideQueries) {
   });
   while (asked < 3) std::this_thread::yield();
   for (int k = 0; k < 40; ++k) {
+    if (k % 8 == 0) scene.buildTrees();
     scene.setPose(fixed[static_cast<std::size_t>(k) % fixed.size()], randomPose<double>(g, 3));
     const Id id = scene.addFixed(geometry<double>(2, g), randomPose<double>(g, 3));
     if (k % 2 == 0) scene.remove(id);

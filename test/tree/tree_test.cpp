@@ -245,8 +245,10 @@ TEST(Tree, BuildTreeLeavesNothingToGrow) {
       EXPECT_EQ(touching(a, b, p), touching(lazy, b, p));
     }
     EXPECT_EQ(a.statistics().expansions, expansions);
+    const std::uint64_t built = a.statistics().built_triangles;
     a.buildTree();
-    EXPECT_TRUE(touching(a, b, kHit)) << "built once more";
+    EXPECT_EQ(a.statistics().built_triangles, built) << "nothing is left to build";
+    EXPECT_TRUE(touching(a, b, kHit));
   }
   EXPECT_THROW(Modeld().buildTree(), std::logic_error);
   Options options;
@@ -254,6 +256,30 @@ TEST(Tree, BuildTreeLeavesNothingToGrow) {
   Modeld conservative(test::torus(20).mesh(), options);
   conservative.buildTree();
   EXPECT_EQ(conservative.statistics().resident_nodes, 1u);
+}
+
+TEST(Tree, BuildTreeBuildsWhatWasDropped) {
+  const test::Raw torus = test::torus(60);
+  FakeClock clock;
+  Options options;
+  options.oracle = OracleKind::kCpu;
+  options.clock = clock.function();
+  Modeld model(torus.mesh(), options);
+  model.buildTree();
+  const std::size_t nodes = model.statistics().resident_nodes;
+  clock.now += milliseconds(3000);
+  model.prune();
+  EXPECT_LT(model.statistics().resident_nodes, nodes);
+  EXPECT_GT(model.statistics().resident_nodes, 1u);
+  model.buildTree();
+  EXPECT_EQ(model.statistics().resident_nodes, nodes);
+  model.expandAll(2);
+  model.buildTree();
+  EXPECT_EQ(model.statistics().resident_nodes, nodes);
+  model.updateVertices(torus.vertices);
+  EXPECT_EQ(model.statistics().resident_nodes, 1u);
+  model.buildTree();
+  EXPECT_EQ(model.statistics().resident_nodes, nodes);
 }
 
 // A block is used at the time of its own model's clock, whichever model is asked first.

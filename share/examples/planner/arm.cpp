@@ -3,12 +3,13 @@
 //
 // Plans with OMPL's RRT-Connect for an arm of seven joints with a hand, among shelves, a table and scans (each scan
 // three times, on the shelves). LINKS is the folder that `tools/make-models --arm TRIANGLES LINKS` writes. The same
-// plans are made three times, each time in a process of its own with the same seeds:
+// plans are made five times, each time in a process of its own with the same seeds:
 //   - FCL's managers with fcl::BVHModel<OBBRSS>, as planners do today,
 //   - FCL's managers with bocst::Model: only the geometries change,
-//   - bocst::Scene, which answers whole states and edges: StateValidityChecker and MotionValidator change.
+//   - bocst::Scene, which answers whole states and edges: StateValidityChecker and MotionValidator change,
+//   - the latter two with all trees built in the set-up, where otherwise they grow while plans are made.
 // Prints the set-up time; then, after the set-up, the time to the first plan, that of all plans and the share of it
-// that was checking. Exits with 1 when one of the three finds another plan.
+// that was checking. Exits with 1 when one of the five finds another plan.
 
 #include <bocst/bocst.h>
 #include <bocst/io.h>
@@ -135,6 +136,15 @@ class Geometries {
 
 GeometryPtr makeModel(const MeshPtr& mesh) { return std::make_shared<bocst::Modeld>(mesh); }
 
+/// A model that keeps its whole tree from the start: no query builds or drops anything.
+GeometryPtr makeBuiltModel(const MeshPtr& mesh) {
+  bocst::Options options;
+  options.ttl = std::chrono::milliseconds(0);
+  const auto model = std::make_shared<bocst::Modeld>(mesh, options);
+  model->buildTree();
+  return model;
+}
+
 /// FCL's managers with any geometries: one state at a time.
 class Managers {
  public:
@@ -247,7 +257,11 @@ struct Outcome {
   long plans = 0, path_states = 0;
 };
 
-enum class Kind { kBvh, kBocst, kScene };
+struct Way {
+  const char* name;
+  Geometries::Make make;
+  bool is_scene;
+};
 
 /// Plans from one random free state to the next. `is_free` says of one state; `scene` of edges, where it is given.
 void plan(const std::function<bool(const double*)>& is_free, const bocst::Scened* scene, int plans, unsigned seed,
@@ -289,14 +303,14 @@ void plan(const std::function<bool(const double*)>& is_free, const bocst::Scened
   outcome.all_plans = secondsSince(start);
 }
 
-Outcome solve(const World& world, Kind kind, int plans, unsigned seed) {
+Outcome solve(const World& world, const Way& way, int plans, unsigned seed) {
   ompl::RNG::setSeed(seed);
   Outcome outcome;
   const auto start = Clock::now();
-  if (kind == Kind::kScene) {
+  if (way.is_scene) {
     bocst::Scened scene;
     std::vector<bocst::Id> ids;
-    Geometries geometries(makeModel);
+    Geometries geometries(way.make);
     for (const MeshPtr& link : world.links) ids.push_back(scene.addMoving(geometries.of(link)));
     for (const Thing& thing : world.things) scene.addFixed(geometries.of(thing.mesh), thing.X_WT);
     for (std::size_t i = 0; i < ids.size(); ++i) {
@@ -312,7 +326,7 @@ Outcome solve(const World& world, Kind kind, int plans, unsigned seed) {
     };
     plan(is_free, &scene, plans, seed, outcome);
   } else {
-    Managers managers(world, Geometries(kind == Kind::kBvh ? makeBvh : makeModel));
+    Managers managers(world, Geometries(way.make));
     outcome.set_up = secondsSince(start);
     plan([&](const double* joints) { return managers.isFree(joints); }, nullptr, plans, seed, outcome);
   }
@@ -320,14 +334,14 @@ Outcome solve(const World& world, Kind kind, int plans, unsigned seed) {
 }
 
 /// In a process of its own, since OMPL takes one seed a process.
-Outcome solveInChild(const World& world, Kind kind, int plans, unsigned seed) {
+Outcome solveInChild(const World& world, const Way& way, int plans, unsigned seed) {
   int ends[2];
   if (pipe(ends) != 0) throw std::runtime_error("no pipe");
   const pid_t child = fork();
   if (child < 0) throw std::runtime_error("no process");
   if (child == 0) {
     try {
-      const Outcome o = solve(world, kind, plans, seed);
+      const Outcome o = solve(world, way, plans, seed);
       _exit(write(ends[1], &o, sizeof o) == static_cast<ssize_t>(sizeof o) ? 0 : 1);
     } catch (const std::exception& e) {
       std::fprintf(stderr, "arm: %s\n", e.what());
@@ -365,19 +379,23 @@ int run(const std::vector<std::string>& arguments) {
   for (const Thing& thing : world.things) about += thing.mesh->triangleCount();
   std::printf("arm: %zu links of %zu triangles, among %zu things of %zu triangles; %d plans\n\n", world.links.size(),
               triangles, world.things.size(), about, plans);
-  std::printf("%-34s %10s %12s %12s %10s %9s\n", "", "set-up", "first plan", "all plans", "checking", "speed");
-  const char* names[] = {"FCL's managers, fcl::BVHModel", "FCL's managers, bocst::Model", "bocst::Scene"};
-  Outcome outcomes[3];
+  std::printf("%-42s %10s %12s %12s %10s %9s\n", "", "set-up", "first plan", "all plans", "checking", "speed");
+  const Way ways[] = {{"FCL's managers, fcl::BVHModel", makeBvh, false},
+                      {"FCL's managers, bocst::Model", makeModel, false},
+                      {"FCL's managers, bocst::Model, trees built", makeBuiltModel, false},
+                      {"bocst::Scene", makeModel, true},
+                      {"bocst::Scene, trees built", makeBuiltModel, true}};
+  Outcome fcl;
   bool same = true;
-  for (const Kind kind : {Kind::kBvh, Kind::kBocst, Kind::kScene}) {
-    const auto k = static_cast<std::size_t>(kind);
-    const Outcome& o = outcomes[k] = solveInChild(world, kind, plans, static_cast<unsigned>(seed));
-    std::printf("%-34s %7.1f ms %9.1f ms %9.1f ms %8.0f %% %7.2f x\n", names[k], o.set_up * 1e3, o.first_plan * 1e3,
-                o.all_plans * 1e3, 100 * o.checking / o.all_plans, outcomes[0].all_plans / o.all_plans);
-    same = same && o.length == outcomes[0].length && o.path_states == outcomes[0].path_states;
+  for (const Way& way : ways) {
+    const Outcome o = solveInChild(world, way, plans, static_cast<unsigned>(seed));
+    if (&way == ways) fcl = o;
+    std::printf("%-42s %7.1f ms %9.1f ms %9.1f ms %8.0f %% %7.2f x\n", way.name, o.set_up * 1e3, o.first_plan * 1e3,
+                o.all_plans * 1e3, 100 * o.checking / o.all_plans, fcl.all_plans / o.all_plans);
+    same = same && o.length == fcl.length && o.path_states == fcl.path_states;
   }
-  std::printf("\n%s: %ld states, %.4f rad\n", same ? "the same plans" : "THE PLANS DIFFER", outcomes[2].path_states,
-              outcomes[2].length);
+  std::printf("\n%s: %ld states, %.4f rad\n", same ? "the same plans" : "THE PLANS DIFFER", fcl.path_states,
+              fcl.length);
   return same ? 0 : 1;
 }
 

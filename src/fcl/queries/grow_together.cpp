@@ -240,6 +240,7 @@ class Walks {
 
 template <typename S>
 bool growsTogether(const Model<S>& a, const Model<S>& b) {
+  if (a.empty() || b.empty()) return false;
   const tree::Tree &x = treeOf(a), &y = treeOf(b);
   // A small budget would have to be grown again for each pose.
   const bool is_bounded = x.options().memory_budget != 0 || y.options().memory_budget != 0;

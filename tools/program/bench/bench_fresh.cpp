@@ -2,6 +2,7 @@
 // Poses that are asked once: what a planner asks.
 #include <algorithm>
 #include <array>
+#include <chrono>
 
 #include "bench/bench_scenarios.h"
 #include "cli/report.h"
@@ -21,14 +22,15 @@ struct PoseTimes {
 
 double worst(const std::vector<double>& values) { return *std::max_element(values.begin(), values.end()); }
 
-void addWindow(BenchReport& report, const PoseTimes& times, std::size_t begin, std::size_t end) {
+void addWindow(BenchReport& report, const PoseTimes& times, std::size_t begin, std::size_t end,
+               const std::string& key_prefix, const std::string& name_prefix) {
   const auto part = [&](const std::vector<double>& all) {
     return std::vector<double>(all.begin() + static_cast<std::ptrdiff_t>(begin),
                                all.begin() + static_cast<std::ptrdiff_t>(end));
   };
   const std::vector<double> ours = part(times.bocst), theirs = part(times.fcl);
-  const std::string key = "fresh_" + std::to_string(end);
-  const std::string name = "poses " + std::to_string(begin + 1) + " to " + std::to_string(end);
+  const std::string key = key_prefix + std::to_string(end);
+  const std::string name = name_prefix + "poses " + std::to_string(begin + 1) + " to " + std::to_string(end);
   const auto row = [&](const std::string& what, double bocst, double fcl) {
     report.compare(key + "_" + what, name + ", " + what, BenchRow::Unit::kMicroseconds, bocst, fcl);
   };
@@ -38,20 +40,9 @@ void addWindow(BenchReport& report, const PoseTimes& times, std::size_t begin, s
   row("worst", worst(ours), worst(theirs));
 }
 
-}  // namespace
-
-void benchFresh(BenchSetting& setting, BenchReport& report) {
-  const double fcl_build = setting.fclBuildTime();
-  PoseSampler sampler(*setting.meshA(), *setting.meshB(), setting.fcl(), setting.request().seed + 1);
-  std::vector<Eigen::Isometry3d> X_ABs;
-  for (std::size_t i = 0; i < setting.request().poses; ++i) X_ABs.push_back(sampler.nextAnywhere().transform());
-
-  HandedOver a(*setting.meshA()), b(*setting.meshB());
-  const Stopwatch making;
-  Options options;
-  options.build_ahead = setting.request().build_ahead;
-  const std::unique_ptr<BocstPair> bocst = makeBocstPair(std::move(a), std::move(b), options);
-  const double bocst_build = making.microseconds();
+/// Asks both sides each pose once, in turns, and compares their answers.
+PoseTimes askInTurns(const BocstPair& bocst, const FclPair& fcl, const std::vector<Eigen::Isometry3d>& X_ABs,
+                     BenchReport& report) {
   PoseTimes times;
   std::vector<bool> our_verdicts, fcl_verdicts;
   Progress progress("fresh: poses", X_ABs.size());
@@ -66,15 +57,37 @@ void benchFresh(BenchSetting& setting, BenchReport& report) {
         if (&verdicts == &our_verdicts) progress.step();
       }
     };
-    ask(setting.fcl(), times.fcl, fcl_verdicts);
-    ask(*bocst, times.bocst, our_verdicts);
+    ask(fcl, times.fcl, fcl_verdicts);
+    ask(bocst, times.bocst, our_verdicts);
   }
   report.verdicts(our_verdicts, fcl_verdicts, X_ABs);
+  return times;
+}
 
+}  // namespace
+
+void benchFresh(BenchSetting& setting, BenchReport& report) {
+  const double fcl_build = setting.fclBuildTime();
+  PoseSampler sampler(*setting.meshA(), *setting.meshB(), setting.fcl(), setting.request().seed + 1);
+  std::vector<Eigen::Isometry3d> X_ABs;
+  for (std::size_t i = 0; i < setting.request().poses; ++i) X_ABs.push_back(sampler.nextAnywhere().transform());
+
+  // New models from arrays that they take over, and the microseconds that this takes.
+  const auto make = [&](const Options& options, bool builds_trees) {
+    HandedOver a(*setting.meshA()), b(*setting.meshB());
+    const Stopwatch making;
+    std::unique_ptr<BocstPair> pair = makeBocstPair(std::move(a), std::move(b), options);
+    if (builds_trees) pair->buildTrees();
+    return std::make_pair(std::move(pair), making.microseconds());
+  };
+  Options options;
+  options.build_ahead = setting.request().build_ahead;
+  const auto [bocst, bocst_build] = make(options, false);
+  const PoseTimes times = askInTurns(*bocst, setting.fcl(), X_ABs, report);
   std::size_t begin = 0;
   for (const std::size_t window : kWindows) {
     const std::size_t end = std::min(window, X_ABs.size());
-    if (end > begin) addWindow(report, times, begin, end);
+    if (end > begin) addWindow(report, times, begin, end, "fresh_", "");
     begin = end;
   }
   double ours = bocst_build, theirs = fcl_build;
@@ -88,6 +101,17 @@ void benchFresh(BenchSetting& setting, BenchReport& report) {
   }
   report.figure("fresh_bytes", "tree bytes a triangle after them", BenchRow::Unit::kBytesPerTriangle,
                 static_cast<double>(bocst->bytes()) / setting.triangles());
+
+  // As a planner with a set-up would do it: the trees are built, and kept.
+  options = Options();
+  options.ttl = std::chrono::milliseconds(0);
+  const auto [built, set_up] = make(options, true);
+  const std::string built_name = "trees built first, ";
+  report.compare("built_set_up", built_name + "from the arrays", BenchRow::Unit::kMicroseconds, set_up, fcl_build);
+  const PoseTimes built_times = askInTurns(*built, setting.fcl(), X_ABs, report);
+  const std::size_t first = std::min(kWindows.front(), X_ABs.size());
+  addWindow(report, built_times, 0, first, "built_", built_name);
+  if (first < X_ABs.size()) addWindow(report, built_times, first, X_ABs.size(), "built_", built_name);
 }
 
 }  // namespace bocst::program

@@ -40,6 +40,11 @@ class ModelPair : public PairOf<S, Model<S>, BocstPair, FclCalls> {
             {static_cast<int>(result.b1), static_cast<int>(result.b2)}};
   }
 
+  void buildTrees() override {
+    this->a().buildTree();
+    this->b().buildTree();
+  }
+
   void updateA(std::vector<Eigen::Vector3d> vertices) override { this->a().updateVertices(std::move(vertices)); }
 
   std::vector<NodeView> nodesA() const override { return nodesOf(this->a()); }

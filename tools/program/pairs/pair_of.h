@@ -65,6 +65,7 @@ class PairOf : public Base {
   const Geometry& a() const { return *a_; }
   const Geometry& b() const { return *b_; }
   Geometry& a() { return *a_; }
+  Geometry& b() { return *b_; }
   void replaceA(std::unique_ptr<Geometry> a) { a_ = std::move(a); }
 
   void collide(const Eigen::Isometry3d& X_AB, QueryPair::Order order, const fcl::CollisionRequest<S>& request,

@@ -104,6 +104,9 @@ class BocstPair : public QueryPair {
 
   virtual NearestPoints nearest(const Eigen::Isometry3d& X_AB) const = 0;
 
+  /// Model::buildTree() of both.
+  virtual void buildTrees() = 0;
+
   /// A's vertices move.
   virtual void updateA(std::vector<Eigen::Vector3d> vertices) = 0;
 

@@ -11,6 +11,10 @@ class BocstArm final : public ManagedArmOf<BocstManagedArm, FclCalls> {
  public:
   using ManagedArmOf::ManagedArmOf;
 
+  void buildTrees() override {
+    for (const auto& geometry : geometries()) static_cast<Modeld&>(*geometry).buildTree();
+  }
+
   void rest(double seconds) override {
     const auto later =
         Clock::now() + std::chrono::duration_cast<Clock::duration>(std::chrono::duration<double>(seconds));

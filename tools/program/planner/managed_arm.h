@@ -48,6 +48,9 @@ std::unique_ptr<ManagedArm> manageFclArm(const ArmWorld& world);
 /// With bocst's models.
 class BocstManagedArm : public ManagedArm {
  public:
+  /// Model::buildTree() of all.
+  virtual void buildTrees() = 0;
+
   /// As after `seconds` without a query.
   virtual void rest(double seconds) = 0;
 
