@@ -307,6 +307,10 @@ struct SceneCommand {
     row("all states, second query", ours.again, theirs.again, formatTime);
     row("set-up and first query", ours.set_up + ours.first, theirs.set_up + theirs.first, formatTime);
     row("one state, second query", ours.again / states, theirs.again / states, formatTime);
+    if (answers.built) {
+      row("set-up, trees built (Scene::buildTrees)", answers.built->set_up, theirs.set_up, formatTime);
+      row("all states, first query, trees built", answers.built->first, theirs.first, formatTime);
+    }
     row("tree bytes", static_cast<double>(answers.bytes), static_cast<double>(answers.fcl_bytes), formatBytes);
     table.print();
   }
@@ -342,6 +346,7 @@ struct SceneCommand {
                    {"outside_limits", report.statesOutsideLimits()}};
     result["bytes"] = {{"bocst", answers.bytes}};
     result["times_us"] = {{"bocst", timesJson(answers.bocst)}};
+    if (answers.built) result["times_us"]["bocst_built"] = timesJson(*answers.built);
     if (answers.fcl) {
       const SceneTimes& fcl = *answers.fcl;
       result["agree"] = agree;

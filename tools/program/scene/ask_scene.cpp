@@ -38,6 +38,17 @@ SceneAnswers askScene(const SceneSetup& setup, const Bodies& bodies, const Scene
   const std::unique_ptr<BocstSide> ours = measured(make, answers.hit, answers.bocst);
   answers.oracle = ours->oracleName();
   answers.bytes = ours->bytes();
+  if (questions.options.answer == Answer::kExact) {
+    std::vector<std::uint8_t> hit;
+    const auto makeBuilt = [&] {
+      auto side = make();
+      side->buildTrees();
+      return side;
+    };
+    measured(makeBuilt, hit, answers.built.emplace());
+    if (hit != answers.hit)
+      throw std::runtime_error("trees that are built first give other verdicts; please report it");
+  }
 
   std::unique_ptr<SceneSide> theirs;
   std::vector<std::uint8_t> fcl_hit(answers.hit.size(), 0);

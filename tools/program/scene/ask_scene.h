@@ -38,6 +38,7 @@ struct SceneAnswers {
   std::vector<Clearance> clearance;          ///< Of each state, if it was asked for.
   std::string oracle;
   SceneTimes bocst;
+  std::optional<SceneTimes> built;  ///< The same with all trees built in the set-up; of exact answers.
   std::size_t bytes = 0;
   std::optional<SceneTimes> fcl;  ///< If FCL was asked.
   std::size_t fcl_bytes = 0;

@@ -68,6 +68,8 @@ class ModelSide final : public BocstSide {
     return sum;
   }
 
+  void buildTrees() override { scene_.buildTrees(); }
+
   Clearance clearance(std::size_t state) override {
     Pair nearest;
     Clearance result;

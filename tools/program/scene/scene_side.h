@@ -77,6 +77,7 @@ struct Clearance {
 /// bocst::Scene with models.
 class BocstSide : public SceneSide {
  public:
+  virtual void buildTrees() = 0;  ///< Scene::buildTrees().
   virtual Clearance clearance(std::size_t state) = 0;
   virtual std::string oracleName() const = 0;  ///< Empty without meshes.
 };
