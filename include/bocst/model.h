@@ -129,11 +129,13 @@ class BOCST_EXPORT Model : public fcl::CollisionGeometry<S> {
 
   Statistics statistics() const;  ///< A snapshot.
 
-  /// Builds the whole tree of exact answers now, in 60 to 150 ns per triangle (the first build of a process up to 300),
-  /// so that the next queries do not have to. For a program whose queries have a time limit. If it pauses for longer
-  /// than Options::ttl, set that to 0; otherwise branches are dropped and grow again. Conservative answers gain nothing
-  /// by it, nor do models with an oracle on a device. Does nothing if the tree is complete. Queries may run at the same
-  /// time; those that have to grow the tree wait.
+  /// Builds the whole tree of exact answers now, in 60 to 150 ns per triangle (the first build of a process up to 450),
+  /// so that the next queries do not have to. For a program with a set-up, or whose queries have a time limit. Set
+  /// Options::ttl to 0 to keep the tree: otherwise branches that no query uses for ttl are dropped, also while other
+  /// queries run. A memory_budget still holds: what exceeds it is dropped again. Oriented boxes, which queries of flat
+  /// parts at rest on each other need, are not built. Conservative answers gain nothing by it, nor do models with an
+  /// oracle on a device. Does nothing if the tree is complete. Queries may run at the same time; those that have to
+  /// grow the tree wait.
   /// @throws std::logic_error for an empty model; std::bad_alloc, which leaves the tree as valid as it was.
   void buildTree();
 

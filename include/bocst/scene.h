@@ -101,9 +101,10 @@ class BOCST_EXPORT Scene {
   void update(Id object);
 
   /// Builds the complete trees of all models with exact answers now (Model::buildTree()), those of BVHModels included,
-  /// on the scene's threads, so that no query has to: for a planner whose set-up is not part of the planning time.
-  /// Objects that are added later are not included. A model drops the branches that no query has used for Options::ttl;
-  /// set that to 0 for models that shall keep their trees. Queries and changes may run at the same time.
+  /// on the scene's threads, and the internal data that the first query would update: for a planner whose set-up is not
+  /// part of the planning time. Objects that are added later are not included. A model drops the branches that no query
+  /// has used for Options::ttl; set that to 0 for models that shall keep their trees. (The scene's own models of
+  /// BVHModels have the default, 2 s.) Queries and changes may run at the same time.
   /// @throws std::logic_error for a Model between beginModel() and endModel(); std::bad_alloc. Some of the trees may
   /// have been built then.
   void buildTrees();

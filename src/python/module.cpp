@@ -292,7 +292,7 @@ std::pair<py::array_t<double>, py::array_t<double>> spheresOf(const MeshPtr& mes
   return {centers, radii};
 }
 
-void bindModel(py::module_& m) {
+void bindStatistics(py::module_& m) {
   py::class_<Statistics>(m, "Statistics", "A snapshot of a model's memory and of its work since it was made.")
       .def_readonly("resident_nodes", &Statistics::resident_nodes, "Number of nodes in memory; 1: only the root.")
       .def_readonly("resident_bytes", &Statistics::resident_bytes, "Heap bytes of the tree, without the mesh.")
@@ -308,7 +308,9 @@ void bindModel(py::module_& m) {
       .def_readonly("mesh_bytes", &Statistics::mesh_bytes, "Heap bytes of the mesh; other models may share them.")
       .def_readonly("device_bytes", &Statistics::device_bytes,
                     "Bytes on a GPU: the mesh, which other models may share, and lists of triangles.");
+}
 
+void bindModel(py::module_& m) {
   py::class_<ModelGeometry, Geometry, std::shared_ptr<ModelGeometry>>(
       m, "Model", R"(A triangle mesh as a geometry, with a sphere-tree.
 
@@ -373,13 +375,17 @@ resident children; is_cell (k,): False for a node that exact answers build below
         return "Model(" + triangles + ", " + answer + ", " + counted(g.model().statistics().resident_nodes, "node") +
                ")";
       });
+}
 
+void bindSpheres(py::module_& m) {
   m.def("spheres", &spheresOf, "mesh"_a, "depth"_a = 6, "subdivision"_a = "bono",
         R"(Spheres that together contain the whole surface: the leaves of a tree that ends at level `depth` (1 to 17).
 
 Returns (centers (k, 3), radii (k,)) in the mesh's frame and length unit. Each level has about four times as many
 spheres as the level above it and takes about four times the memory: a deep one may take gigabytes.)");
+}
 
+void bindOracles(py::module_& m) {
   py::class_<OracleInfo>(m, "OracleInfo", "One oracle that this build supports; why_not is empty if it can be used.")
       .def_property_readonly(
           "kind", [](const OracleInfo& o) { return nameOf(o.kind, kOracles); }, "The value for Options.oracle.")
@@ -460,7 +466,7 @@ std::optional<std::pair<Id, Id>> idsOf(const Pair& pair) {
   return pair.a.isValid() ? std::optional<std::pair<Id, Id>>({pair.a, pair.b}) : std::nullopt;
 }
 
-void bindScene(py::module_& m) {
+void bindCollidePoses(py::module_& m) {
   m.def("collide_poses", &posesOf, "a"_a, "b"_a, "X_AB"_a, py::kw_only(), "threads"_a = 0,
         R"(Checks one pair of models for collision at many poses. Returns a bool array (n,), as fcl.collide answers.
 
@@ -469,7 +475,9 @@ X_AB: (n, 4, 4) poses of b in the frame of a, in the length unit of the meshes. 
 nor are those with matrices in column-major order (np.swapaxes(X, 1, 2) of an array in C order).
 threads: number of threads that share the poses; 0: one for every 4096 poses, at most one per hardware thread.
 Pass 1 if your own threads or processes call this at the same time.)");
+}
 
+void bindId(py::module_& m) {
   py::class_<Id>(m, "Id", "Identifies an object of one Scene.")
       .def("__bool__", &Id::isValid)
       .def("__hash__", [](Id id) { return std::hash<Id>()(id); })
@@ -477,21 +485,43 @@ Pass 1 if your own threads or processes call this at the same time.)");
       .def(py::self == py::self)
       .def(py::self != py::self)
       .def(py::self < py::self);
+}
 
-  py::class_<PyScene>(m, "Scene",
-                      R"(The collision queries of a planner for a robot among obstacles: one call checks whole states.
+py::class_<PyScene> bindScene(py::module_& m) {
+  py::class_<PyScene> type(
+      m, "Scene",
+      R"(The collision queries of a planner for a robot among obstacles: one call checks whole states.
 
 Geometries are bocst.Model and those of bocst.fcl. A state is an array (m, 4, 4): the poses of all m moving objects, world
 from geometry, in the order in which they were added. Many states are (n, m, 4, 4); with m = 1 also (n, 4, 4).
 Verdicts are those of fcl.collide for each pair of a moving object and another object that is not ignored.
-threads: number of threads that share the states of one call; 0: one per hardware thread.)")
-      .def(py::init([](unsigned threads) {
+threads: number of threads that share the states of one call; 0: one per hardware thread.)");
+  type.def(py::init([](unsigned threads) {
              SceneOptions options;
              options.threads = threads;
              return std::make_unique<PyScene>(options);
            }),
            py::kw_only(), "threads"_a = 1)
+      .def("__repr__",
+           [](const PyScene& s) {
+             return "Scene(" + std::to_string(s.scene.fixedCount()) + " fixed, " +
+                    std::to_string(s.scene.movingCount()) + " moving, " + counted(s.scene.pairCount(), "pair") + ")";
+           })
+      .def_property_readonly(
+          "moving_count", [](const PyScene& s) { return s.scene.movingCount(); },
+          "Number of moving objects: m of a state, (m, 4, 4).")
+      .def_property_readonly(
+          "fixed_count", [](const PyScene& s) { return s.scene.fixedCount(); }, "Number of fixed objects.")
+      .def_property_readonly(
+          "pair_count", [](const PyScene& s) { return s.scene.pairCount(); }, "Number of pairs that are not ignored.")
       .def(
+          "moving_index", [](const PyScene& s, Id moving) { return s.scene.movingIndex(moving); }, "moving"_a,
+          "The index of a moving object among the poses of a state.");
+  return type;
+}
+
+void bindSceneChanges(py::class_<PyScene>& type) {
+  type.def(
           "add_fixed",
           [](PyScene& s, const Geometry& geometry, const py::object& X_WG) {
             const fcl::Transform3d X = pose("X_WG", X_WG);
@@ -525,8 +555,11 @@ threads: number of threads that share the states of one call; 0: one per hardwar
       .def(
           "build_trees", [](PyScene& s) { s.scene.buildTrees(); }, py::call_guard<NoGil>(),
           "Builds the whole trees of all models with exact answers now, with the scene's threads, so that no query has "
-          "to. A model with ttl=0 keeps its tree.")
-      .def("collides", query(false, [](const Scened& scene, Xs X, std::size_t) { return scene.collides(X); }), "X_WM"_a,
+          "to. A model with ttl=0 keeps its tree.");
+}
+
+void bindSceneQueries(py::class_<PyScene>& type) {
+  type.def("collides", query(false, [](const Scened& scene, Xs X, std::size_t) { return scene.collides(X); }), "X_WM"_a,
            "True if this state, (m, 4, 4), collides.")
       .def("colliding_pair",
            query(false,
@@ -567,34 +600,19 @@ threads: number of threads that share the states of one call; 0: one per hardwar
       .def(
           "edge_is_free",
           [](const PyScene& s, const py::object& begin, const py::object& end, const std::string& motion) {
-            const auto type = valueOf("motion", motion, kMotions);
+            const auto motion_type = valueOf("motion", motion, kMotions);
             const Poses last("X_WM_end", end);
             const auto is_free = [&](const Scened& scene, Xs X, std::size_t) {
               statesIn("X_WM_end", last, scene.movingCount(), false);
               std::vector<fcl::Transform3d> copy;
-              return scene.edgeIsFree(X, last.transforms(copy), type);
+              return scene.edgeIsFree(X, last.transforms(copy), motion_type);
             };
             return ask(s, begin, false, is_free, "X_WM_begin");
           },
           "X_WM_begin"_a, "X_WM_end"_a, "motion"_a = "linear",
           R"(True if the motion from one state to another, both (m, 4, 4), is free of collisions at all times.
 
-motion: 'linear', 'translation', 'screw' or 'spline', see fcl.CCDMotionType.)")
-      .def("__repr__",
-           [](const PyScene& s) {
-             return "Scene(" + std::to_string(s.scene.fixedCount()) + " fixed, " +
-                    std::to_string(s.scene.movingCount()) + " moving, " + counted(s.scene.pairCount(), "pair") + ")";
-           })
-      .def_property_readonly(
-          "moving_count", [](const PyScene& s) { return s.scene.movingCount(); },
-          "Number of moving objects: m of a state, (m, 4, 4).")
-      .def_property_readonly(
-          "fixed_count", [](const PyScene& s) { return s.scene.fixedCount(); }, "Number of fixed objects.")
-      .def_property_readonly(
-          "pair_count", [](const PyScene& s) { return s.scene.pairCount(); }, "Number of pairs that are not ignored.")
-      .def(
-          "moving_index", [](const PyScene& s, Id moving) { return s.scene.movingIndex(moving); }, "moving"_a,
-          "The index of a moving object among the poses of a state.");
+motion: 'linear', 'translation', 'screw' or 'spline', see fcl.CCDMotionType.)");
 }
 
 /// Objects that were made without __init__ raise TypeError. pickle's oldest protocols would make such an object, at
@@ -655,8 +673,15 @@ PYBIND11_MODULE(_bocst, m) {
   bindOptions(m);
   bindMesh(m);
   bindFcl(m.def_submodule("fcl"));
+  bindStatistics(m);
   bindModel(m);
-  bindScene(m);
+  bindSpheres(m);
+  bindOracles(m);
+  bindCollidePoses(m);
+  bindId(m);
+  py::class_<PyScene> scene_type = bindScene(m);
+  bindSceneChanges(scene_type);
+  bindSceneQueries(scene_type);
   addReprs(m);
   requireInit(m);
 }

@@ -371,6 +371,7 @@ void Scene<S>::buildTrees() {
     static_cast<Model<S>&>(*models[i].second).buildTree();
     return true;
   });
+  impl_->current();
 }
 
 template <typename S>

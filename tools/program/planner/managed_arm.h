@@ -34,7 +34,7 @@ class ManagedArm {
   virtual bool collides(const ArmWorld::Poses& X_WL, std::vector<AskedPair>* pairs = nullptr,
                         double* narrow = nullptr) = 0;
 
-  /// The same with new collision objects for the links, as MoveIt makes them for each check.
+  /// The same with new collision objects for the links, as MoveIt makes them of attached bodies for each check.
   virtual bool collidesWithNewObjects(const ArmWorld::Poses& X_WL) = 0;
 
   /// fcl::collide in its default form, and fcl::distance.
