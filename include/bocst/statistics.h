@@ -10,7 +10,7 @@ namespace bocst {
 /// A snapshot of a model's memory and of its work so far. Counters never decrease, but start again at 0 when the
 /// model gets another mesh (setMesh, beginModel); they are exact if no query runs.
 struct Statistics {
-  std::size_t resident_nodes = 0;  ///< Nodes in memory: cells and groups of triangles; 1 if only the root is left.
+  std::size_t resident_nodes = 0;  ///< Nodes of the tree: cells and groups of triangles; 1 if only the root is left.
   std::size_t resident_bytes = 0;  ///< Heap bytes of the tree: nodes, triangle lists, bookkeeping; not the mesh.
   std::vector<std::size_t> nodes_per_level;  ///< [0] is level 1 (the root), as in the paper's tables.
   std::uint64_t expansions = 0;              ///< Nodes expanded so far.
@@ -19,9 +19,9 @@ struct Statistics {
   std::uint64_t expanded_octants = 0;        ///< Octants of expanded nodes that have an actual region; the paper makes
                                              ///< an occlusion query for each (5.4), from up to three sides.
   std::uint64_t built_triangles = 0;  ///< Triangles that exact answers have sorted into the tree so far. From one time
-                                      ///< at which only the root is resident to the next: at most 1.25 times the
-                                      ///< mesh's triangles (2.25 times with Options::build_ahead), plus those of one
-                                      ///< expansion.
+                                      ///< at which only the root is resident to the next, without Model::buildTree():
+                                      ///< at most 1.25 times the mesh's triangles (2.25 times with
+                                      ///< Options::build_ahead), plus those of one expansion.
   std::uint64_t pruned_nodes = 0;     ///< Nodes dropped by ttl, budget, prune() or updateVertices().
   std::size_t mesh_bytes = 0;         ///< Heap bytes of the mesh (other models may share them; 0 after releaseMesh(),
                                       ///< except while queries need it) and of the data for `solid`.

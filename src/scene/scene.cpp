@@ -17,6 +17,7 @@
 #include "fcl/adapters/models.h"
 #include "fcl/adapters/shapes.h"
 #include "fcl/adapters/validate.h"
+#include "fcl/queries/grow_together.h"
 #include "fcl/queries/scene_pair.h"
 #include "scene/edge.h"
 #include "scene/sweep.h"
@@ -203,6 +204,7 @@ struct Scene<S>::Impl {
     o.model = fcl_adapter::asModel<S>(o.geometry.get());
     refuseEmpty(o);
     o.exact = o.model != nullptr && o.model->options().answer == Answer::kExact;
+    o.grows_together = o.model != nullptr && fcl_adapter::growsTogether(*o.model, *o.model);
     o.bounds = scene::boundsOf<S>(*o.geometry);
     return o;
   }

@@ -177,11 +177,6 @@ double sizeOf(const Object<S>& o) {
   return o.bounds.kind == Bounds::kBox ? o.bounds.size : 0;
 }
 
-template <typename S>
-bool growsSlowly(const Object<S>& o) {
-  return o.model != nullptr && fcl_adapter::growsTogether(*o.model, *o.model);
-}
-
 constexpr std::size_t kFewPlaces = 8;  // free ones that are compared for a new object
 
 // The box along the world's axes around all lanes of a node or group.
@@ -218,7 +213,7 @@ World<S>::World(std::vector<Object<S>> moving_objects, const std::vector<Object<
   for (const Object<S>& o : fixed_objects) {
     const double orthogonality_error = fcl_adapter::orthogonalityErrorOf<S>(o.X_WG);
     fixed_error = std::max(fixed_error, orthogonality_error);
-    grows_together |= growsSlowly(o);
+    grows_together |= o.grows_together;
     boxes.push_back(boxAt(o, o.X_WG, orthogonality_error));
   }
   const auto unbounded =
@@ -364,7 +359,7 @@ bool World<S>::putFixed(const Object<S>& object, const IgnoredPairs& ignored) {
   fixed[place] = object;
   occupied_[place / 8] |= static_cast<std::uint8_t>(1u << place % 8);
   fixed_error = std::max(fixed_error, orthogonality_error);
-  grows_together |= growsSlowly(object);
+  grows_together |= object.grows_together;
   groups[place / 8].set(place % 8, box);
   refit(place / 8);
   for (std::size_t i = 0; i < moving.size(); ++i) {
@@ -392,7 +387,7 @@ template <typename S>
 bool World<S>::setMoving(std::vector<Object<S>> objects, const IgnoredPairs& ignored) {
   for (const Object<S>& o : objects) {
     if (sizeOf(o) > largest_) return false;
-    grows_together |= growsSlowly(o);
+    grows_together |= o.grows_together;
   }
   moving = std::move(objects);
   serial = nextSerial();

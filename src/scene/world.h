@@ -23,6 +23,7 @@ struct Object {
       geometry;                     ///< For a BVHModel, the Model made from it; null: an empty lane.
   const Model<S>* model = nullptr;  ///< `geometry` as a Model, or null.
   bool exact = false;               ///< A model with exact answers.
+  bool grows_together = false;      ///< A model that is worth fcl_adapter::growTogether().
   Bounds bounds;
   Id id;
   fcl::Transform3<S> X_WG = fcl::Transform3<S>::Identity();  ///< Of a fixed object, in the world.
@@ -80,7 +81,7 @@ class World {
   std::vector<BoxGroup> groups;
   /// [i * allGroups() + group]: lanes that make a pair with moving object i; of two moving objects in row of the first.
   std::vector<std::uint8_t> masks;
-  bool grows_together = false;  ///< A model is worth fcl_adapter::growTogether().
+  bool grows_together = false;  ///< Of any object.
   double fixed_error = 0;       ///< The largest orthogonality error of fixed objects.
   std::uint64_t serial = 0;     ///< No world with other moving objects has it.
 

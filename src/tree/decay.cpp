@@ -52,24 +52,22 @@ ChildRef Tree::regained(ChildRef block, const lattice::Cell& cell, TriangleLists
 
 // The tree is one sphere again.
 void Tree::dropTree() {
+  NodeCounts gone{};
+  countNodes(root_.load(std::memory_order_relaxed), 1, gone);
+  pruned_ += std::accumulate(gone.begin(), gone.end(), std::size_t{0});
+  is_whole_ = false;
   grid_.reset();
   grid_tried_ = false;
   startRent();
   root_.store(ChildRef(), std::memory_order_relaxed);
   nodes_.clear();
-  NodeCounts nodes_at{};
-  nodes_at[1] = 1;
-  startGeneration(nodes_at);
+  startGeneration();
 }
 
 // What names nodes of the old store goes.
-void Tree::startGeneration(const NodeCounts& nodes_at) {
+void Tree::startGeneration() {
   ++generation_;
   dropNodeTable();
-  const std::size_t before = std::accumulate(nodes_at_.begin(), nodes_at_.end(), std::size_t{0});
-  const std::size_t after = std::accumulate(nodes_at.begin(), nodes_at.end(), std::size_t{0});
-  std::copy(nodes_at.begin(), nodes_at.end(), nodes_at_.begin());
-  if (before > after) pruned_ += before - after;
   countBytes();
 }
 
@@ -88,13 +86,13 @@ void Tree::keepOnly(const std::vector<std::uint8_t>& keep) {
   NodeStore kept;
   kept.root_bounds = nodes_.root_bounds;
   ChildRef root;
-  NodeCounts nodes_at{};
-  nodes_at[1] = 1;
+  NodeCounts gone{};
   while (!moves.empty()) {
     const Move move = moves.back();
     moves.pop_back();
     ChildRef ref = move.from;
     if (ref.tag() == ChildRef::kBlock && !keep[ref.index()]) {
+      countNodes(ref, move.cell.level, gone);
       ref = regained(move.from, move.cell, kept.lists);
     } else if (ref.isList()) {
       ref = ChildRef(ref.tag(), kept.lists.addCopy(nodes_.lists, ref.index()));
@@ -109,7 +107,6 @@ void Tree::keepOnly(const std::vector<std::uint8_t>& keep) {
       std::copy_n(from.at, 3, to.at);
       kept.records[index].own = nodes_.records[ref.index()].own;
       if (own_list != Block::kNone) kept.records[index].own_list = kept.lists.addCopy(nodes_.lists, own_list);
-      nodes_at[countedLevel(move.cell.level + 1)] += __builtin_popcount(from.grey);
       for (int o = 0; o < 8; ++o) {
         if (from.grey >> o & 1) {
           moves.push_back(
@@ -127,7 +124,10 @@ void Tree::keepOnly(const std::vector<std::uint8_t>& keep) {
   // There was memory for all of it.
   root_.store(root, std::memory_order_relaxed);
   nodes_.swap(kept);
-  startGeneration(nodes_at);
+  const std::size_t count = std::accumulate(gone.begin(), gone.end(), std::size_t{0});
+  pruned_ += count;
+  is_whole_ = is_whole_ && count == 0;
+  startGeneration();
 }
 
 template <typename T>

@@ -432,7 +432,7 @@ void Tree::growFromGrid(NodeRef node) {
   for (int o = 0; o < 8; ++o) {
     if (grid_->grey(surface_, cell.octant(o))) grey |= 1 << o;
   }
-  const std::uint32_t index = addBlock(node, cell.level, grey, now());
+  const std::uint32_t index = addBlock(node, grey, now());
   for (int o = 0; o < 8; ++o) octants_ += surface_.lattice.exists(cell.octant(o));
   Block& block = nodes_.blocks[index];
   block.setCell(cell);
@@ -452,10 +452,8 @@ void Tree::growFromGrid(NodeRef node) {
   setChild(node, ChildRef(ChildRef::kBlock, index));
 }
 
-// Appends a block whose children are one level below `level`.
-std::uint32_t Tree::addBlock(NodeRef node, int level, std::uint8_t grey, std::int64_t now) {
+std::uint32_t Tree::addBlock(NodeRef node, std::uint8_t grey, std::int64_t now) {
   const std::uint32_t index = nodes_.append(node, grey, now);
-  nodes_at_[countedLevel(level + 1)] += __builtin_popcount(grey);
   ++expansions_;
   return index;
 }
@@ -487,7 +485,7 @@ void Tree::setChild(NodeRef node, ChildRef ref) {
 
 void Tree::publish(NodeRef node, const oracle::ExpansionRequest& answer) {
   if (answer.grey != 0) nodes_.addRefit(node, answer.own);
-  const std::uint32_t index = addBlock(node, answer.cell.level, answer.grey, now());
+  const std::uint32_t index = addBlock(node, answer.grey, now());
   for (int o = 0; o < 8; ++o) octants_ += surface_.lattice.exists(answer.cell.octant(o));
   Block& block = nodes_.blocks[index];
   block.setCell(answer.cell);
@@ -629,9 +627,12 @@ Statistics Tree::statistics() const {
   const std::shared_lock<thread::ShardedLock> lock(query_lock_);
   Statistics s;
   s.resident_bytes = bytes_;
-  for (int level = 1; level <= lattice::kMaxLevel && nodes_at_[level] > 0; ++level) {
-    s.nodes_per_level.push_back(nodes_at_[level]);
-    s.resident_nodes += nodes_at_[level];
+  NodeCounts nodes{};
+  nodes[1] = 1;
+  countNodes(root_.load(std::memory_order_acquire), 1, nodes);
+  for (std::size_t level = 1; level < nodes.size() && nodes[level] > 0; ++level) {
+    s.nodes_per_level.push_back(nodes[level]);
+    s.resident_nodes += nodes[level];
   }
   s.expansions = expansions_;
   s.expanded_octants = octants_;
@@ -643,6 +644,16 @@ Statistics Tree::statistics() const {
   if (solid_ != nullptr) s.mesh_bytes += solid_->bytes();
   s.device_bytes = device_bytes_;
   return s;
+}
+
+// Adds the nodes below `child`, which a node of this level has.
+void Tree::countNodes(ChildRef child, int level, NodeCounts& counts) const {
+  if (child.tag() != ChildRef::kBlock) return;
+  const Block& block = nodes_.blocks[child.index()];
+  counts[countedLevel(level + 1)] += static_cast<std::size_t>(__builtin_popcount(block.grey));
+  for (int o = 0; o < 8; ++o) {
+    if (block.grey >> o & 1) countNodes(block.child[o].load(std::memory_order_acquire), level + 1, counts);
+  }
 }
 
 void Tree::countBytes() {

@@ -100,8 +100,9 @@ class Tree {
   /// Builds the whole tree when queries have paid as much as that costs, unless another thread grows it; did it? Of a
   /// model that is built ahead, the first query that has paid anything has the helper thread do it.
   bool buildIfDue() { return rent_.isDue() && buildNow(); }
-  /// Builds the whole tree of exact answers, if the host can, whatever queries have paid.
+  /// Builds the whole tree of exact answers, whatever queries have paid; only of a tree that gains by it, in a query.
   void build();
+  bool gainsByBuild() const;
   /// No more expansions below this node: a single lattice unit, or the collision depth of conservative answers.
   bool isDeepest(int level) const { return level >= deepest_; }
   int deepest() const { return deepest_; }
@@ -233,10 +234,9 @@ class Tree {
  private:
   struct AheadBuild;
   class BuildMemory;
-  /// Where a block of a build goes: below a node, whose level as counted this is; and its index, once it is added.
+  /// Where a block of a build goes: below a node; and its index, once it is added.
   struct BulkPlace {
     NodeRef node;
-    int level = 0;
     std::uint32_t index = 0;
   };
 
@@ -267,16 +267,15 @@ class Tree {
   void growFromGrid(NodeRef node);
   bool growInBulk(NodeRef node, std::vector<std::uint32_t>& ids);
   void growWhole();
-  static void startPlaces(const BulkBuilder& bulk, NodeRef node, int level, std::vector<BulkPlace>& places);
+  static void startPlaces(const BulkBuilder& bulk, NodeRef node, std::vector<BulkPlace>& places);
   void addBlocks(const BulkBuilder& bulk, std::vector<BulkPlace>& places, std::size_t begin, std::size_t end,
                  std::int64_t now);
   bool packs(const std::vector<BulkPlace>& places) const;
   ChildRef addLeaf(const BulkBuilder& bulk, std::uint32_t begin, std::uint32_t count, bool packed);
   void publishBulk(const BulkBuilder& bulk, const std::vector<BulkPlace>& places);
   void publishWhole(const BulkBuilder& bulk, const std::vector<BulkPlace>& places);
-  lattice::Cell cellOrDepth(NodeRef node) const;
   void publish(NodeRef node, const oracle::ExpansionRequest& answer);
-  std::uint32_t addBlock(NodeRef node, int level, std::uint8_t grey, std::int64_t now);
+  std::uint32_t addBlock(NodeRef node, std::uint8_t grey, std::int64_t now);
   ChildRef addList(const std::uint32_t* ids, std::size_t count, bool leaf);
   void setChild(NodeRef node, ChildRef ref);
   /// Was the time `then` more than ttl before `now`? Both may be any times.
@@ -296,7 +295,8 @@ class Tree {
   using NodeCounts = std::array<std::size_t, lattice::kMaxLevel + 1>;
   void keepOnly(const std::vector<std::uint8_t>& keep);
   void dropTree();
-  void startGeneration(const NodeCounts& nodes_at);
+  void startGeneration();
+  void countNodes(ChildRef child, int level, NodeCounts& counts) const;
   void collectTriangles(ChildRef ref, const lattice::Cell& cell, std::vector<std::uint32_t>& ids) const;
   ChildRef regained(ChildRef block, const lattice::Cell& cell, TriangleLists& lists) const;
   std::size_t treeBytes() const;
@@ -335,14 +335,13 @@ class Tree {
   bool grid_tried_ = false;
   Rent rent_;                        // of the whole tree, see payRent()
   bool is_ahead_build_due_ = false;  // the helper thread must still be asked to build it; under growth_
+  bool is_whole_ = false;            // it was built, and nothing of it was dropped since; under growth_ or alone
   std::shared_ptr<AheadBuild> ahead_build_;
-  std::uint64_t generation_ = 0;                        // of nodes_: indices of blocks are of one generation
-  std::uint64_t whole_generation_ = ~std::uint64_t{0};  // the one whose tree is complete; under growth_
+  std::uint64_t generation_ = 0;  // of nodes_: indices of blocks are of one generation
   NodeStore nodes_;
   NodeTable node_table_;                   // of a generation; under growth_
   std::vector<std::uint32_t> node_words_;  // what it was made from
 
-  std::array<std::atomic<std::size_t>, lattice::kMaxLevel + 1> nodes_at_{};
   std::atomic<std::size_t> bytes_{0}, device_bytes_{0};
   std::atomic<std::uint64_t> expansions_{0}, octants_{0}, batches_{0}, cells_{0}, pruned_{0}, built_{0};
 };

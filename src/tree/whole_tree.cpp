@@ -114,15 +114,6 @@ void Tree::leakPools() {
   interior_.leak();
 }
 
-// The cell of a node; of a lane only the level, which counts from the cell that was built in bulk.
-lattice::Cell Tree::cellOrDepth(NodeRef node) const {
-  int deeper = 0;
-  for (; isLoose(node); ++deeper) node = nodes_.records[node.block()].parent;
-  lattice::Cell cell = this->cell(node);
-  cell.level += deeper;
-  return cell;
-}
-
 // What exact answers need below a node whose triangles are known here. False where the oracle is to be asked: for what
 // the root grid or a device knows.
 bool Tree::growInBulk(NodeRef node, std::vector<std::uint32_t>& ids) {
@@ -159,7 +150,7 @@ bool Tree::growInBulk(NodeRef node, std::vector<std::uint32_t>& ids) {
   std::vector<BulkPlace>& places = memory.places();
   bulk.build(surface_, ids.data(), ids.size(), region);
   if (!is_loose && !bulk.ids().empty()) nodes_.addRefit(node, encode(bulk.own(), cell(node)));
-  startPlaces(bulk, node, cellOrDepth(node).level, places);
+  startPlaces(bulk, node, places);
   addBlocks(bulk, places, 0, bulk.blocks().size(), now());
   publishBulk(bulk, places);
   return true;
@@ -197,17 +188,16 @@ bool Tree::buildNow() {
     rent_.stop();  // the parts that queries need may still have room
     return false;
   }
-  countBytes();
   return true;
 }
 
+bool Tree::gainsByBuild() const { return !conservative() && growsOnHost() && fitsBuild(); }
+
 void Tree::build() {
-  if (conservative() || !growsOnHost() || !fitsBuild()) return;
   const std::lock_guard<thread::ForkAwareMutex> lock(growth_);
-  if (whole_generation_ == generation_) return;
+  if (is_whole_) return;
   is_ahead_build_due_ = false;
   growWhole();
-  countBytes();
 }
 
 // All of the tree that exact answers need. Queries under way go on in the old blocks.
@@ -224,9 +214,15 @@ void Tree::growWhole() {
   }
   // A device has grown what is above the parts, so the host would gain little by new blocks.
   if (!growsOnHost()) return;
-  startPlaces(bulk, NodeRef(), 1, places);
-  addBlocks(bulk, places, 0, bulk.blocks().size(), now());
-  publishWhole(bulk, places);
+  startPlaces(bulk, NodeRef(), places);
+  try {
+    addBlocks(bulk, places, 0, bulk.blocks().size(), now());
+    publishWhole(bulk, places);
+  } catch (const std::bad_alloc&) {
+    countBytes();  // blocks stay that nothing leads to
+    throw;
+  }
+  countBytes();
 }
 
 void Tree::askForAheadBuild() {
@@ -277,7 +273,7 @@ void Tree::buildAhead(AheadBuild& ahead) {
   const Outline::Box outline = bulk.findOutline(surface->lattice);
 
   std::vector<BulkPlace> places;
-  startPlaces(bulk, NodeRef(), 1, places);
+  startPlaces(bulk, NodeRef(), places);
   for (std::size_t begin = 0, end; begin < bulk.blocks().size(); begin = end) {
     end = std::min(begin + kBlocksAtOnce, bulk.blocks().size());
     if (!withTree([&](Tree& tree) { tree.addBlocks(bulk, places, begin, end, ahead.asked); })) return;
@@ -296,11 +292,10 @@ void Tree::buildAhead(AheadBuild& ahead) {
   });
 }
 
-// Below `node`, whose level as counted is `level`.
-void Tree::startPlaces(const BulkBuilder& bulk, NodeRef node, int level, std::vector<BulkPlace>& places) {
+// Below `node`.
+void Tree::startPlaces(const BulkBuilder& bulk, NodeRef node, std::vector<BulkPlace>& places) {
   places.assign(std::max<std::size_t>(1, bulk.blocks().size()), BulkPlace());
   places[0].node = node;
-  places[0].level = level;
 }
 
 // Are leaves of what was built kept with their corners? Not if a build of the whole tree is about to replace them, or
@@ -328,7 +323,7 @@ void Tree::addBlocks(const BulkBuilder& bulk, std::vector<BulkPlace>& places, st
   for (std::size_t number = begin; number < end; ++number) {
     const BulkBuilder::Block& built = bulk.blocks()[number];
     BulkPlace& place = places[number];
-    place.index = addBlock(place.node, place.level, static_cast<std::uint8_t>(0xff >> (8 - built.lanes)), now);
+    place.index = addBlock(place.node, static_cast<std::uint8_t>(0xff >> (8 - built.lanes)), now);
     octants_ += built.lanes;
     Block& block = nodes_.blocks[place.index];
     block.setFrame(built.frame);
@@ -339,7 +334,6 @@ void Tree::addBlocks(const BulkBuilder& bulk, std::vector<BulkPlace>& places, st
         block.child[o].store(addLeaf(bulk, lane.begin, lane.count, packed), std::memory_order_relaxed);
       } else {
         places[lane.block].node = NodeRef::octant(place.index, static_cast<int>(o));
-        places[lane.block].level = place.level + 1;
       }
     }
     if (number > 0) setChild(place.node, ChildRef(ChildRef::kBlock, place.index));
@@ -353,16 +347,11 @@ void Tree::publishBulk(const BulkBuilder& bulk, const std::vector<BulkPlace>& pl
                                : ChildRef(ChildRef::kBlock, places[0].index));
 }
 
-// Of the whole tree; what was grown before is not counted any more.
+// Of the whole tree.
 void Tree::publishWhole(const BulkBuilder& bulk, const std::vector<BulkPlace>& places) {
-  built_ += surface_.triangle_count;
-  whole_generation_ = generation_;
-  for (auto& n : nodes_at_) n = 0;
-  nodes_at_[1] = 1;
-  for (std::size_t number = 0; number < bulk.blocks().size(); ++number) {
-    nodes_at_[countedLevel(places[number].level + 1)] += bulk.blocks()[number].lanes;
-  }
   publishBulk(bulk, places);
+  built_ += surface_.triangle_count;
+  is_whole_ = true;
   nodes_.addRefit(NodeRef(), encode(bulk.own(), lattice::Cell{}));
 }
 

@@ -1118,18 +1118,87 @@ TYPED_TEST(SceneTest, BuildsItsTreesBeforeQueries) {
 
 TYPED_TEST(SceneTest, AModelThatWasEmptied) {
   using S = TypeParam;
-  const auto model = std::make_shared<Model<S>>(test::box({-1, -1, -1}, {1, 1, 1}).mesh());
+  const auto mesh = test::box({-1, -1, -1}, {1, 1, 1}).mesh();
+  for (const Answer answer : {Answer::kExact, Answer::kConservative}) {
+    for (const bool asked_before : {false, true}) {
+      for (const bool moves : {false, true}) {
+        Options options;
+        options.answer = answer;
+        const auto model = std::make_shared<Model<S>>(mesh, options);
+        Scene<S> scene;
+        const auto partner = std::make_shared<Model<S>>(mesh, options);
+        if (moves) {
+          scene.addMoving(model);
+          scene.addFixed(partner, fcl::Transform3<S>::Identity());
+        } else {
+          scene.addFixed(model, fcl::Transform3<S>::Identity());
+          scene.addMoving(partner);
+        }
+        scene.addMoving(std::make_shared<fcl::Sphere<S>>(S(1)));
+        const fcl::Transform3<S> here = fcl::Transform3<S>::Identity(),
+                                 there = test::pose<S>(Eigen::Matrix3d::Identity(), {0, 0, 100});
+        // The model with the other one, then with the sphere; what else moves is far away.
+        States<S> X{test::pose<S>(Eigen::Matrix3d::Identity(), {0.5, 0, 0}), there};
+        if (!moves) X.insert(X.end(), {there, here});
+        const std::size_t states = X.size() / 2;
+        std::vector<std::uint8_t> hit(states, 1);
+        if (asked_before) {
+          scene.collisions(X.data(), states, hit.data());
+          EXPECT_EQ(hit, std::vector<std::uint8_t>(states, 1));
+        }
+        model->beginModel();
+        model->endModel();
+        scene.collisions(X.data(), states, hit.data());
+        EXPECT_EQ(hit, std::vector<std::uint8_t>(states, 0));
+        EXPECT_EQ(scene.firstCollision(X.data(), states), states);
+        EXPECT_FALSE(scene.anyCollision(X.data(), states));
+        for (std::size_t k = 0; k < states; ++k) {
+          EXPECT_FALSE(scene.collides(&X[2 * k]));
+          EXPECT_TRUE(scene.edgeIsFree(&X[2 * k], &X[2 * k]));
+          EXPECT_GT(scene.clearance(&X[2 * k]), S(90));
+        }
+      }
+    }
+  }
+}
+
+// Changes of others while a model gets a mesh are complete.
+TYPED_TEST(SceneTest, ChangesWhileAModelGetsAMesh) {
+  using S = TypeParam;
+  const test::Raw box = test::box({-1, -1, -1}, {1, 1, 1});
+  const auto at = [](double x) { return test::pose<S>(Eigen::Matrix3d::Identity(), {x, 0, 0}); };
+  const auto refill = [&](Model<S>& model) {
+    std::vector<fcl::Vector3<S>> vertices;
+    for (const Eigen::Vector3d& v : box.vertices) vertices.push_back(v.cast<S>());
+    model.addSubModel(vertices, box.triangles);
+    model.endModel();
+  };
+  const auto a = std::make_shared<Model<S>>(box.mesh()), b = std::make_shared<Model<S>>(box.mesh());
   Scene<S> scene;
-  scene.addFixed(model, fcl::Transform3<S>::Identity());
-  const Id id = scene.addMoving(std::make_shared<fcl::Sphere<S>>(S(1)));
-  const States<S> X(1, fcl::Transform3<S>::Identity());
+  const Id fixed = scene.addFixed(a, at(0));
+  scene.addMoving(b);
+  States<S> X{at(0.5), at(9.5)};
+  EXPECT_TRUE(scene.collides(&X[0]));
+  a->beginModel();
+  EXPECT_THROW(scene.collides(&X[0]), std::logic_error);
+  scene.setPose(fixed, at(9));
+  refill(*a);
+  EXPECT_FALSE(scene.collides(&X[0]));
+  EXPECT_TRUE(scene.collides(&X[1]));
+
+  a->beginModel();
+  const auto sphere = std::make_shared<fcl::Sphere<S>>(S(1));
+  const Id moving = scene.addMoving(sphere);
+  scene.addFixed(sphere, at(50));
+  X = {at(-50), at(50)};
   EXPECT_TRUE(scene.collides(X.data()));
-  model->beginModel();
-  model->endModel();
+  refill(*a);
+  EXPECT_TRUE(scene.collides(X.data()));
+  a->beginModel();
+  scene.remove(moving);
   EXPECT_FALSE(scene.collides(X.data()));
-  EXPECT_TRUE(scene.edgeIsFree(X.data(), X.data()));
-  EXPECT_EQ(scene.clearance(X.data()), std::numeric_limits<S>::max());
-  scene.remove(id);
+  refill(*a);
+  EXPECT_FALSE(scene.collides(X.data()));
 }
 
 // Steps of conservative advancement end where they are below the rounding of time.
@@ -1351,6 +1420,40 @@ TEST(Scene, ClearancesDoNotNeedMemoryForOrientedBoxes) {
 }
 
 // Others may read the box of a shape that they share with the scene, and may have enlarged it.
+// Builds that fail, at whichever allocation, leave a tree that is counted right and that the next call builds.
+TEST(Scene, BuildsTreesOnceThereIsMemory) {
+  const auto countNodes = [](const Modeld& model) {
+    std::size_t count = 0;
+    model.visit([&](const NodeView&) { ++count; });
+    return count;
+  };
+  int failures = 0;
+  for (const test::Raw& raw : {test::box({-1, -1, -1}, {1, 1, 1}), test::torus(60)}) {
+    Options options;
+    options.oracle = OracleKind::kCpu;
+    Modeld whole(raw.mesh(), options);
+    whole.buildTree();
+    for (std::size_t most = 16; most < std::size_t{1} << 18; most += most / 2) {
+      const auto model = std::make_shared<Modeld>(raw.mesh(), options);
+      Scened scene;
+      scene.addFixed(model, fcl::Transform3d::Identity());
+      most_bytes = most;
+      try {
+        scene.buildTrees();
+      } catch (const std::bad_alloc&) {
+        ++failures;
+      }
+      most_bytes = ~std::size_t{0};
+      EXPECT_EQ(model->statistics().resident_nodes, countNodes(*model));
+      scene.buildTrees();
+      EXPECT_EQ(model->statistics().resident_nodes, countNodes(*model));
+      EXPECT_EQ(countNodes(*model), countNodes(whole));
+      EXPECT_EQ(model->statistics().built_triangles, raw.triangles.size());
+    }
+  }
+  EXPECT_GT(failures, 10);
+}
+
 TYPED_TEST(SceneTest, LeavesTheBoxesOfShapesAlone) {
   using S = TypeParam;
   const auto ball = std::make_shared<fcl::Sphere<S>>(S(1));

@@ -5,6 +5,7 @@
 #include <bocst/bocst.h>
 #include <gtest/gtest.h>
 
+#include <algorithm>
 #include <map>
 #include <random>
 
@@ -14,6 +15,7 @@
 #include "oracle/reference.h"
 #include "query/sides/side.h"
 #include "sanitized.h"
+#include "thread_group.h"
 #include "tree/packed_share.h"
 
 namespace bocst {
@@ -280,6 +282,60 @@ TEST(Tree, BuildTreeBuildsWhatWasDropped) {
   EXPECT_EQ(model.statistics().resident_nodes, 1u);
   model.buildTree();
   EXPECT_EQ(model.statistics().resident_nodes, nodes);
+}
+
+// Parts that queries grew before the tree was built go without it.
+TEST(Tree, BuildTreeDoesNothingWhileTheTreeIsComplete) {
+  FakeClock clock;
+  Options options;
+  options.oracle = OracleKind::kCpu;
+  options.clock = clock.function();
+  const auto mesh = test::torus(60).mesh();
+  Modeld model(mesh, options), twin(mesh, options), small(test::box({-.05, -.05, -.05}, {.05, .05, .05}).mesh());
+  touching(model, small, {1.05, 0, 0});
+  clock.now += milliseconds(1500);
+  model.buildTree();
+  const Statistics built = model.statistics();
+  EXPECT_GT(built.built_triangles, mesh->triangleCount()) << "a query had grown a part";
+  std::size_t least = built.resident_bytes;
+  for (int k = 0; k < 12; ++k) {
+    clock.now += milliseconds(1000);
+    fcl::CollisionResultd result;
+    const fcl::Transform3d X = fcl::Transform3d::Identity();
+    fcl::collide(&model, X, &twin, X, fcl::CollisionRequestd(1 << 20), result);  // uses all of it
+    model.prune();
+    model.buildTree();
+    const Statistics s = model.statistics();
+    EXPECT_EQ(s.built_triangles, built.built_triangles);
+    EXPECT_EQ(s.resident_nodes, built.resident_nodes);
+    EXPECT_EQ(s.pruned_nodes, 0u);
+    least = std::min(least, s.resident_bytes);
+  }
+  EXPECT_LT(least, built.resident_bytes) << "the part went";
+}
+
+// What statistics() counts is what visit() finds, also where a tree was built beside queries that grow it.
+TEST(Tree, CountsTheNodesThatItHas) {
+  const auto mesh = test::torus(60).mesh();
+  Options options;
+  options.oracle = OracleKind::kCpu;
+  for (int round = 0; round < test::repetitions(20); ++round) {
+    Modeld model(mesh, options), partner(mesh, options);
+    test::ThreadGroup threads(3, [&](std::size_t t) {
+      std::mt19937_64 g(t);
+      std::uniform_real_distribution<double> u(-1.5, 1.5);
+      for (int i = 0; i < 20; ++i) touching(model, partner, {u(g), u(g), u(g)});
+    });
+    model.buildTree();
+    threads.join();
+    std::vector<std::size_t> levels;
+    model.visit([&](const NodeView& v) {
+      const auto level = static_cast<std::size_t>(std::min(v.level, lattice::kMaxLevel));
+      if (levels.size() < level) levels.resize(level, 0);
+      ++levels[level - 1];
+    });
+    EXPECT_EQ(model.statistics().nodes_per_level, levels);
+  }
 }
 
 // A block is used at the time of its own model's clock, whichever model is asked first.

@@ -207,8 +207,10 @@ Statistics Model<S>::statistics() const {
 
 template <typename S>
 void Model<S>::buildTree() {
-  const fcl_adapter::QueryScope scope(fcl_adapter::treeOf(*this));
-  scope.a().tree().build();
+  tree::Tree& tree = fcl_adapter::treeOf(*this);
+  if (!tree.gainsByBuild()) return;
+  const fcl_adapter::QueryScope scope(tree);
+  tree.build();
 }
 
 template <typename S>
