@@ -256,6 +256,8 @@ TEST_P(OnDevice, AReleasedMeshComesBackForQueriesAndGoesAtRest) {
       EXPECT_FALSE(
           test::touching<double>(r.a, kIdentity, r.b, test::pose<double>(Eigen::Matrix3d::Identity(), {9, 0, 0})));
       EXPECT_EQ(r.a.statistics().mesh_bytes, 0u) << "far pairs need no mesh";
+      r.a.buildTree();
+      EXPECT_EQ(r.a.statistics().mesh_bytes, 0u) << "a model on a device gains nothing by it";
       for (const auto& X : poses(15, 2.4)) {
         const bool expected = test::touching<double>(r.c, kIdentity, r.d, X);
         hits += expected;
