@@ -150,8 +150,8 @@ class BOCST_EXPORT Model : public fcl::CollisionGeometry<S> {
 
   /// Applies ttl and memory_budget at the time `now` (paper, 3.1). Removes the deepest nodes that were last used more
   /// than ttl ago; at that moment the ttl of their parents starts anew. So a branch goes level by level. Queries also
-  /// do this from time to time, if it is worth the work; of a completely built tree that is in use they keep the nodes
-  /// of more than 256 triangles.
+  /// do this from time to time, if it is worth the work; while a model is in use they keep nodes that were built in
+  /// bulk, and drop what is copied of the mesh for their leaves.
   void prune(Clock::time_point now);
   void prune();  ///< With the current time.
 

@@ -137,6 +137,7 @@ struct NodeRef {
 /// What only growth and decay read of a block; the record has the block's number.
 struct BlockRecord {
   bounds::NodeBounds own;                 ///< Box and slab of the expanded node itself, as its octants showed it.
+  bool is_stripped = false;               ///< Decay took corners of its leaves.
   std::uint32_t own_list = Block::kNone;  ///< Where its list is; only where an oracle keeps its octants'.
   NodeRef parent;                         ///< Which node was expanded.
 };

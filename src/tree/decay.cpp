@@ -13,11 +13,27 @@ namespace {
 /// Queries drop old branches when these have at least one block in this many.
 constexpr std::uint32_t kWorthwhileShare = 64;
 
-/// While a model is used, queries keep lanes' blocks of more triangles: they take less than a byte a triangle, and
-/// without them a query that comes back builds all that was below.
-constexpr std::uint32_t kFewTriangles = 256;
-
 }  // namespace
+
+/// What becomes of a block. A stripped one stays without the corners of its leaves, which are most of what it takes:
+/// queries that come back pack those of the leaves that they need.
+enum class Tree::Fate : std::uint8_t { kDropped, kStripped, kKept };
+
+// Has it no child blocks?
+bool Tree::isDeepestBlock(const Block& block) {
+  for (int o = 0; o < 8; ++o) {
+    const bool is_grey = (block.grey >> o & 1) != 0;
+    if (is_grey && block.child[o].load(std::memory_order_relaxed).tag() == ChildRef::kBlock) return false;
+  }
+  return true;
+}
+
+bool Tree::hasCorners(const Block& block) const {
+  for (int o = 0; o < 8; ++o) {
+    if ((block.grey >> o & 1) != 0 && isPacked(block.child[o].load(std::memory_order_relaxed))) return true;
+  }
+  return false;
+}
 
 void Tree::collectTriangles(ChildRef ref, const lattice::Cell& cell, std::vector<std::uint32_t>& ids) const {
   if (ref.tag() == ChildRef::kBlock) {
@@ -67,22 +83,27 @@ void Tree::dropTree() {
 // What names nodes of the old store goes.
 void Tree::startGeneration() {
   ++generation_;
+  is_stripped_ = false;
+  for (std::atomic<std::uint32_t>& leaf : noted_) leaf.store(NodeRef::kRoot, std::memory_order_relaxed);
+  noted_count_.store(0, std::memory_order_relaxed);
   dropNodeTable();
   countBytes();
 }
 
 // Copies what stays into a fresh store: what goes leaves no holes, and nothing of it is looked at again. In one
 // function, as a node is copied whole: its children, list, record and times belong to one move.
-void Tree::keepOnly(const std::vector<std::uint8_t>& keep) {
+void Tree::keepOnly(const std::vector<Fate>& fates) {
   const ChildRef old_root = root_.load(std::memory_order_relaxed);
-  if (old_root.tag() != ChildRef::kBlock || !keep[old_root.index()]) return dropTree();
+  if (old_root.tag() != ChildRef::kBlock || fates[old_root.index()] == Fate::kDropped) return dropTree();
   if (nodes_.blocks[old_root.index()].isLoose()) grid_.reset();  // its cells are not those of the tree any more
   struct Move {
     ChildRef from;
     NodeRef to;
     lattice::Cell cell;
+    bool is_stripped;
   };
-  std::vector<Move> moves{{old_root, NodeRef{}, lattice::Cell{}}};
+  std::vector<Move> moves{{old_root, NodeRef{}, lattice::Cell{}, false}};
+  bool is_any_stripped = false;
   NodeStore kept;
   kept.root_bounds = nodes_.root_bounds;
   ChildRef root;
@@ -91,9 +112,11 @@ void Tree::keepOnly(const std::vector<std::uint8_t>& keep) {
     const Move move = moves.back();
     moves.pop_back();
     ChildRef ref = move.from;
-    if (ref.tag() == ChildRef::kBlock && !keep[ref.index()]) {
+    if (ref.tag() == ChildRef::kBlock && fates[ref.index()] == Fate::kDropped) {
       countNodes(ref, move.cell.level, gone);
       ref = regained(move.from, move.cell, kept.lists);
+    } else if (move.is_stripped && isPacked(ref)) {
+      ref = ChildRef(ref.tag(), kept.lists.addWithoutCorners(nodes_.lists, ref.index()));
     } else if (ref.isList()) {
       ref = ChildRef(ref.tag(), kept.lists.addCopy(nodes_.lists, ref.index()));
     } else if (ref.tag() == ChildRef::kBlock) {
@@ -107,10 +130,13 @@ void Tree::keepOnly(const std::vector<std::uint8_t>& keep) {
       std::copy_n(from.at, 3, to.at);
       kept.records[index].own = nodes_.records[ref.index()].own;
       if (own_list != Block::kNone) kept.records[index].own_list = kept.lists.addCopy(nodes_.lists, own_list);
+      const bool is_stripped = fates[ref.index()] == Fate::kStripped;
+      kept.records[index].is_stripped = is_stripped || nodes_.records[ref.index()].is_stripped;
+      is_any_stripped |= kept.records[index].is_stripped;
       for (int o = 0; o < 8; ++o) {
         if (from.grey >> o & 1) {
-          moves.push_back(
-              {from.child[o].load(std::memory_order_relaxed), NodeRef::octant(index, o), move.cell.octant(o)});
+          moves.push_back({from.child[o].load(std::memory_order_relaxed), NodeRef::octant(index, o),
+                           move.cell.octant(o), is_stripped});
         }
       }
       ref = ChildRef(ChildRef::kBlock, index);
@@ -126,8 +152,9 @@ void Tree::keepOnly(const std::vector<std::uint8_t>& keep) {
   nodes_.swap(kept);
   const std::size_t count = std::accumulate(gone.begin(), gone.end(), std::size_t{0});
   pruned_ += count;
-  is_whole_ = is_whole_ && count == 0;
+  is_whole_ = is_whole_ && count == 0 && !is_any_stripped;
   startGeneration();
+  is_stripped_ = is_any_stripped;
 }
 
 template <typename T>
@@ -142,36 +169,32 @@ void Tree::pruneAlone(std::int64_t now, Pruning pruning) {
   const auto is_old = [&](std::uint32_t block) {
     return isOld(nodes_.last_use[block].load(std::memory_order_relaxed), now);
   };
-  if (!budget_only && ttl_ > 0 && root_.load(std::memory_order_relaxed).tag() == ChildRef::kBlock) {
-    const bool is_used = pruning == Pruning::kWorthwhile && !is_old(root_.load(std::memory_order_relaxed).index());
+  const ChildRef root = root_.load(std::memory_order_relaxed);
+  if (!budget_only && ttl_ > 0 && root.tag() == ChildRef::kBlock) {
+    const bool is_used = pruning == Pruning::kAfterRest || (pruning == Pruning::kWorthwhile && !is_old(root.index()));
     // What stays is copied, so for few blocks a query of a large tree would pay much.
-    const std::uint32_t least =
-        pruning == Pruning::kWorthwhile ? std::max(1u, nodes_.blocks.size() / kWorthwhileShare) : 1;
-    std::uint32_t dropped = 0;
-    std::vector<std::uint8_t> keep(nodes_.blocks.size(), 1);
+    const std::uint32_t least = pruning == Pruning::kAll ? 1 : std::max(1u, nodes_.blocks.size() / kWorthwhileShare);
+    std::uint32_t changed = 0;
+    std::vector<Fate> fates(nodes_.blocks.size(), Fate::kKept);
     for (std::uint32_t i = 0; i < nodes_.blocks.size(); ++i) {
       if (!is_old(i)) continue;
       const Block& block = nodes_.blocks[i];
-      bool is_deepest = true;
-      std::uint32_t triangles = 0;
-      for (int o = 0; o < 8; ++o) {
-        if ((block.grey >> o & 1) == 0) continue;
-        const ChildRef child = block.child[o].load(std::memory_order_relaxed);
-        if (child.isList()) triangles += list(child).count;
-        is_deepest &= child.tag() != ChildRef::kBlock;
+      if (is_used && block.isLoose()) {
+        if (hasCorners(block)) fates[i] = Fate::kStripped;
+      } else if (isDeepestBlock(block)) {
+        fates[i] = Fate::kDropped;
       }
-      const bool is_cheap_to_keep = is_used && block.isLoose() && triangles > kFewTriangles;
-      if (!is_deepest || is_cheap_to_keep) continue;
-      keep[i] = 0;
-      ++dropped;
+      changed += fates[i] != Fate::kKept;
     }
-    if (dropped >= least) {
+    if (changed >= least) {
       for (std::uint32_t i = 0; i < nodes_.blocks.size(); ++i) {
         const NodeRef parent = nodes_.records[i].parent;
         // The parent's own time starts (3.1).
-        if (!keep[i] && !parent.isRoot()) nodes_.last_use[parent.block()].store(now, std::memory_order_relaxed);
+        if (fates[i] == Fate::kDropped && !parent.isRoot()) {
+          nodes_.last_use[parent.block()].store(now, std::memory_order_relaxed);
+        }
       }
-      keepOnly(keep);
+      keepOnly(fates);
     }
   }
   if (!budget_only) {
@@ -196,14 +219,14 @@ void Tree::applyBudget() {
     std::stable_sort(order.begin(), order.end(), [this](std::uint32_t a, std::uint32_t b) {
       return nodes_.last_use[a].load(std::memory_order_relaxed) > nodes_.last_use[b].load(std::memory_order_relaxed);
     });
-    std::vector<std::uint8_t> keep(nodes_.blocks.size(), 0);
+    std::vector<Fate> fates(nodes_.blocks.size(), Fate::kDropped);
     for (std::size_t k = 0; k < std::min(count, order.size()); ++k) {
-      for (std::uint32_t i = order[k]; !keep[i]; i = nodes_.records[i].parent.block()) {
-        keep[i] = 1;
+      for (std::uint32_t i = order[k]; fates[i] == Fate::kDropped; i = nodes_.records[i].parent.block()) {
+        fates[i] = Fate::kKept;
         if (nodes_.records[i].parent.isRoot()) break;
       }
     }
-    keepOnly(keep);
+    keepOnly(fates);
     if (bytes_ <= budget || count == 0) return;
   }
 }
@@ -213,6 +236,7 @@ void Tree::afterQuery(std::int64_t now) {
   const bool over_budget = options_.memory_budget != 0 && bytes_ > options_.memory_budget;
   std::int64_t due = next_prune_.load(std::memory_order_relaxed);
   bool time_to = isPruneDue(now);
+  const bool is_after_rest = time_to && due != 0 && isOld(due, now);  // the first look finds 0
   if (time_to) {
     // A quarter of ttl between looks keeps the cost away from queries; whoever moves the time does the work.
     const std::int64_t step = ttl_ / 4 + 1, next = now > kNeverDue - step ? kNeverDue : now + step;
@@ -222,7 +246,13 @@ void Tree::afterQuery(std::int64_t now) {
   const std::unique_lock<thread::ShardedLock> alone(query_lock_, std::try_to_lock);
   if (!alone.owns_lock()) return;
   if (refits) nodes_.refit();
-  if (over_budget || time_to) pruneAlone(now, time_to ? Pruning::kWorthwhile : Pruning::kBudget);
+  if (time_to) {
+    // Once: the next look may drop what no query has used since.
+    spared_after_rest_ = is_after_rest && !spared_after_rest_;
+    pruneAlone(now, spared_after_rest_ ? Pruning::kAfterRest : Pruning::kWorthwhile);
+  } else if (over_budget) {
+    pruneAlone(now, Pruning::kBudget);
+  }
 }
 
 }  // namespace bocst::tree

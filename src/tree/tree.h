@@ -206,6 +206,15 @@ class Tree {
     std::size_t submitted_ = 0, answered_ = 0;          // parts
   };
 
+  /// A query has read the corners of this leaf from the mesh. If decay took them, they are packed when it ends.
+  void noteUnpacked(NodeRef leaf) const {
+    if (!is_stripped_ || noted_count_.load(std::memory_order_relaxed) >= kMostNoted) return;
+    const std::size_t place = noted_count_.fetch_add(1, std::memory_order_relaxed);
+    if (place < kMostNoted) noted_[place].store(leaf.bits, std::memory_order_relaxed);
+  }
+  /// Packs the corners of the leaves that queries have noted, unless another thread grows the tree.
+  void packNoted();
+
   /// A batch takes an oracle long, however small it is: walks that grow together ask it less often.
   bool growsSlowly() const { return oracle_->kind() != OracleKind::kCpu; }
 
@@ -286,14 +295,19 @@ class Tree {
   enum class Pruning {
     kBudget,      ///< What exceeds the memory budget only.
     kWorthwhile,  ///< And branches unused for longer than ttl, if there are enough for the work that it is.
-    kAll,         ///< And all of these.
+    kAfterRest,   ///< The same, but a rest, in which no query asked, does not count as one without use.
+    kAll,         ///< All branches unused for longer than ttl.
   };
   void pruneAlone(std::int64_t now, Pruning pruning);
   void applyBudget();
   template <typename T>
   bool dropIfOld(OnDemand<T>& structure, std::int64_t now);
   using NodeCounts = std::array<std::size_t, lattice::kMaxLevel + 1>;
-  void keepOnly(const std::vector<std::uint8_t>& keep);
+  enum class Fate : std::uint8_t;
+  void keepOnly(const std::vector<Fate>& fates);
+  bool isPacked(ChildRef ref) const { return ref.isList() && nodes_.lists.isPacked(ref.index()); }
+  bool hasCorners(const Block& block) const;
+  static bool isDeepestBlock(const Block& block);
   void dropTree();
   void startGeneration();
   void countNodes(ChildRef child, int level, NodeCounts& counts) const;
@@ -335,7 +349,14 @@ class Tree {
   bool grid_tried_ = false;
   Rent rent_;                        // of the whole tree, see payRent()
   bool is_ahead_build_due_ = false;  // the helper thread must still be asked to build it; under growth_
-  bool is_whole_ = false;            // it was built, and nothing of it was dropped since; under growth_ or alone
+  bool spared_after_rest_ = false;   // by the last look of a query; changed alone
+  bool is_stripped_ = false;         // leaves of stripped blocks wait for their corners; changed alone
+  // Leaves whose corners queries have missed, the root where there is none. A note may be lost or late, never wrong: it
+  // is of this generation.
+  static constexpr std::size_t kMostNoted = 16;
+  mutable std::atomic<std::size_t> noted_count_{0};
+  mutable std::array<std::atomic<std::uint32_t>, kMostNoted> noted_;
+  bool is_whole_ = false;  // it was built, and nothing of it was dropped since; under growth_ or alone
   std::shared_ptr<AheadBuild> ahead_build_;
   std::uint64_t generation_ = 0;  // of nodes_: indices of blocks are of one generation
   NodeStore nodes_;

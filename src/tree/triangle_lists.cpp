@@ -83,6 +83,15 @@ std::uint32_t TriangleLists::addCopy(const TriangleLists& from, std::uint32_t li
   return index;
 }
 
+std::uint32_t TriangleLists::addWithoutCorners(const TriangleLists& from, std::uint32_t list) {
+  const std::uint32_t* const words = &from.words_[list];
+  const std::uint32_t flags = words[0] & ~kPacked;
+  const std::uint32_t index = words_.append(1 + idWords(flags));
+  words_[index] = flags;
+  std::copy_n(words + 1, idWords(flags), &words_[index] + 1);
+  return index;
+}
+
 void TriangleLists::swap(TriangleLists& other) {
   words_.swap(other.words_);
   resources_.swap(other.resources_);

@@ -77,6 +77,7 @@ class TriangleLists {
     triangles = packedAt(words);
     return true;
   }
+  bool isPacked(std::uint32_t list) const { return (words_[list] & kPacked) != 0; }
   /// Does the oracle keep it?
   bool isOnDevice(std::uint32_t list) const { return (words_[list] & kOnDevice) != 0; }
   Place place(std::uint32_t list) const { return {resources_[words_[list + 1]], words_[list + 2]}; }
@@ -91,6 +92,7 @@ class TriangleLists {
   std::uint32_t addPacked(const std::uint32_t* ids, std::size_t count, const PackedTriangles::Words& packed,
                           std::size_t size);
   std::uint32_t addCopy(const TriangleLists& from, std::uint32_t list);
+  std::uint32_t addWithoutCorners(const TriangleLists& from, std::uint32_t list);
 
   bool isHalfFull() const { return words_.size() > Words::kMost / 2; }
   std::size_t bytes() const { return words_.bytes(); }

@@ -315,6 +315,26 @@ ChildRef Tree::addLeaf(const BulkBuilder& bulk, std::uint32_t begin, std::uint32
           size > 0 ? nodes_.lists.addPacked(ids, count, words, size) : nodes_.lists.add(ids, count)};
 }
 
+void Tree::packNoted() {
+  if (noted_count_.load(std::memory_order_relaxed) == 0) return;
+  const std::unique_lock<thread::ForkAwareMutex> lock(growth_, std::try_to_lock);
+  if (!lock.owns_lock()) return;
+  const BuildMemory memory(kMaxLeafTriangles);
+  std::vector<std::uint32_t> ids;
+  for (std::atomic<std::uint32_t>& noted : noted_) {
+    const NodeRef leaf{noted.exchange(NodeRef::kRoot, std::memory_order_relaxed)};
+    if (leaf.isRoot() || !nodes_.records[leaf.block()].is_stripped) continue;
+    const ChildRef ref = childRef(leaf);
+    if (ref.tag() != ChildRef::kShortList || isPacked(ref)) continue;
+    ids.clear();
+    list(ref).appendTo(ids);
+    memory.bulk().build(surface_, ids.data(), ids.size(), surface_.latticeBounds());
+    setChild(leaf, addLeaf(memory.bulk(), 0, static_cast<std::uint32_t>(ids.size()), true));
+  }
+  noted_count_.store(0, std::memory_order_relaxed);
+  countBytes();
+}
+
 // Adds blocks of what was built, from number `begin` on, after those before them. No reader sees them: all but the
 // first are put below their parents, and that one nowhere.
 void Tree::addBlocks(const BulkBuilder& bulk, std::vector<BulkPlace>& places, std::size_t begin, std::size_t end,

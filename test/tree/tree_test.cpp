@@ -188,45 +188,93 @@ TEST(Tree, DecaysLevelByLevelToItsRoot) {
   }
 }
 
-// Blocks of many triangles are few: while queries use the tree, they stay, so that what comes back is built quickly.
-TEST(Tree, AWholeTreeInUseKeepsBlocksOfManyTriangles) {
+// How many leaves of a tree have their corners with them, and how many do not.
+struct Leaves {
+  std::size_t packed = 0, plain = 0;
+};
+Leaves leavesOf(const tree::Tree& tree) {
+  Leaves leaves;
+  std::vector<tree::NodeRef> stack{tree::NodeRef()};
+  while (!stack.empty()) {
+    const tree::ChildRef ref = tree.childRef(stack.back());
+    stack.pop_back();
+    if (ref.isList()) ++(tree.lists().isPacked(ref.index()) ? leaves.packed : leaves.plain);
+    if (ref.tag() != tree::ChildRef::kBlock) continue;
+    for (int o = 0; o < 8; ++o) {
+      if ((tree.block(ref.index()).grey >> o & 1) != 0) stack.push_back(tree::NodeRef::octant(ref.index(), o));
+    }
+  }
+  return leaves;
+}
+
+// While queries use the tree they keep its blocks, which are a small part of it, and drop the corners of leaves. These
+// come back where a query reads them.
+TEST(Tree, AWholeTreeInUseKeepsItsBlocksWithoutCorners) {
   FakeClock clock;
   Options options;
   options.clock = clock.function();
   options.oracle = OracleKind::kCpu;
   Modeld a(test::torus(100).mesh(), options);
   const Modeld b(test::torus(10, 0.05).mesh(), options);
-  tree::Tree& tree = fcl_adapter::treeOf(a);
-  tree.payRent(2 * a.mesh()->triangleCount());
+  const tree::Tree& tree = fcl_adapter::treeOf(a);
+  a.buildTree();
   ASSERT_TRUE(touching(a, b, kHit));
   const Statistics whole = a.statistics();
-  ASSERT_GE(whole.built_triangles, a.mesh()->triangleCount());
+  ASSERT_EQ(leavesOf(tree).plain, 0u);
   for (int i = 0; i < 40; ++i) {
     clock.now += milliseconds(600);
     ASSERT_TRUE(touching(a, b, kHit));
   }
-  EXPECT_LT(a.statistics().resident_nodes, whole.resident_nodes / 2) << "the rest is dropped";
-  std::size_t most = 0;
-  std::vector<tree::NodeRef> stack{tree::NodeRef()};
-  while (!stack.empty()) {
-    const tree::ChildRef ref = tree.childRef(stack.back());
-    stack.pop_back();
-    if (ref.isList()) most = std::max<std::size_t>(most, tree.list(ref).count);
-    if (ref.tag() != tree::ChildRef::kBlock) continue;
-    for (int o = 0; o < 8; ++o) {
-      if ((tree.block(ref.index()).grey >> o & 1) != 0) stack.push_back(tree::NodeRef::octant(ref.index(), o));
-    }
+  EXPECT_EQ(a.statistics().resident_nodes, whole.resident_nodes);
+  EXPECT_LT(a.statistics().resident_bytes, whole.resident_bytes / 2);
+  const Leaves in_use = leavesOf(tree);
+  EXPECT_GT(in_use.packed, 0u) << "those that the queries read";
+  EXPECT_LT(in_use.packed, in_use.plain);
+  for (const double angle : {0.5, 1.0, 2.0}) {
+    const fcl::Vector3d elsewhere(std::cos(angle), std::sin(angle), 0);
+    const std::size_t before = leavesOf(tree).packed;
+    ASSERT_TRUE(touching(a, b, elsewhere));
+    EXPECT_GT(leavesOf(tree).packed, before);
+    ASSERT_EQ(touching(a, b, elsewhere), touching(Modeld(a.mesh(), options), b, elsewhere));
   }
-  EXPECT_LE(most, 256u);
-  EXPECT_GT(most, 64u);
-  const std::size_t kept = a.statistics().resident_nodes;
+  EXPECT_EQ(a.statistics().built_triangles, whole.built_triangles) << "nothing is built for that";
+  a.buildTree();
+  EXPECT_EQ(leavesOf(tree).plain, 0u) << "but by whoever asks for it";
+  clock.now += milliseconds(2001);
   a.prune();
-  EXPECT_LT(a.statistics().resident_nodes, kept) << "prune() drops all that is old";
+  EXPECT_LT(a.statistics().resident_nodes, whole.resident_nodes) << "prune() drops all that is old";
   for (int i = 0; i < 30; ++i) {
     clock.now += milliseconds(2001);
     a.prune();
   }
   EXPECT_EQ(a.statistics().resident_nodes, 1u);
+}
+
+// The first query after a rest finds a tree that nobody has used. If it does not use it either, the blocks stay until
+// the next look.
+TEST(Tree, ARestIsNoReasonToDropBlocks) {
+  FakeClock clock;
+  Options options;
+  options.clock = clock.function();
+  options.oracle = OracleKind::kCpu;
+  Modeld a(test::torus(100).mesh(), options);
+  a.buildTree();
+  const std::size_t nodes = a.statistics().resident_nodes;
+  clock.now += milliseconds(20000);
+  EXPECT_EQ(a.statistics().resident_nodes, nodes);
+  tree::Tree& tree = fcl_adapter::treeOf(a);
+  const auto look = [&] { tree.afterQuery(tree.now()); };
+  look();
+  EXPECT_EQ(a.statistics().resident_nodes, nodes);
+  EXPECT_EQ(leavesOf(tree).packed, 0u);
+  clock.now += milliseconds(20000);
+  look();
+  EXPECT_LT(a.statistics().resident_nodes, nodes) << "nothing used it in between";
+  for (int i = 0; i < 60; ++i) {
+    clock.now += milliseconds(20000);
+    look();
+  }
+  EXPECT_EQ(a.statistics().resident_nodes, 1u) << "a model beside which nothing happens decays to its root";
 }
 
 // After it, no pose makes the tree grow.

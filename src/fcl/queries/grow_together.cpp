@@ -72,6 +72,7 @@ class TreesScope {
     }
   }
   ~TreesScope() {
+    for (tree::Tree* tree : s_.trees) tryAtEnd([&] { tree->packNoted(); });
     release();
     for (const query::TreeSide& side : s_.sides) endQuery(side);
   }

@@ -16,11 +16,15 @@ namespace bocst::fcl_adapter {
 
 /// Has a tree do what waits for the end of a query. Without memory or room for it, that waits for a later query; the
 /// answer stands.
-inline void endQuery(const query::TreeSide& side) {
+template <typename F>
+void tryAtEnd(F&& f) {
   try {
-    side.tree().afterQuery(side.now());
+    f();
   } catch (const std::exception&) {
   }
+}
+inline void endQuery(const query::TreeSide& side) {
+  tryAtEnd([&] { side.tree().afterQuery(side.now()); });
 }
 
 /// The session of one query about one or two trees. While it lives, it holds their query locks shared, so nobody
@@ -40,6 +44,8 @@ class QueryScope {
     if (!a.buildIfDue()) b.buildIfDue();  // one a query, as each may take milliseconds
   }
   ~QueryScope() {
+    tryAtEnd([&] { a_.tree().packNoted(); });
+    tryAtEnd([&] { b_.tree().packNoted(); });
     locks_.release();
     endQuery(a_);
     if (&b_.tree() != &a_.tree()) endQuery(b_);

@@ -176,7 +176,10 @@ class TreeSide {
   /// The corners of a leaf's triangles where the tree keeps them packed, and their numbers; else false.
   bool packed(Node node, tree::PackedTriangles& triangles, tree::TriangleIds& ids) const {
     const std::uint32_t list = childRef(node).index();
-    if (!tree_.lists().packed(list, triangles)) return false;
+    if (!tree_.lists().packed(list, triangles)) {
+      tree_.noteUnpacked(node);
+      return false;
+    }
     ids = tree_.lists()[list].ids;
     return true;
   }
