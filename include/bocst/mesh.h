@@ -34,7 +34,8 @@ class BOCST_EXPORT Mesh {
   static std::shared_ptr<const Mesh> fromIndices(std::vector<Eigen::Vector3d> vertices, std::vector<Indices> triangles);
 
   /// The same from plain arrays: x, y, z of each vertex and three indices of each triangle. The arrays are copied. For
-  /// meshes of shape_msgs, geometric_shapes, NumPy and similar types.
+  /// meshes of shape_msgs, geometric_shapes, NumPy and similar types. @throws std::invalid_argument for a null array
+  /// with a count above 0, too.
   static std::shared_ptr<const Mesh> fromArrays(const double* vertices, std::size_t vertex_count,
                                                 const std::uint32_t* triangles, std::size_t triangle_count);
   /// The same from float coordinates.

@@ -33,7 +33,8 @@ struct ModelTree;
 /// tree starts as one sphere; queries expand the nodes that they touch.
 ///
 /// Threads: any number of threads may query one model, read its statistics, visit() and prune() it at the same time.
-/// updateVertices() may run at the same time, too; a query sees the mesh before or after the update, never a mixture.
+/// One thread at a time may call updateVertices() meanwhile; a query sees the mesh before or after the update, never a
+/// mixture.
 /// expandAll() and releaseMesh() may be called at the same time, and wait for running queries. No query may run during
 /// setMesh(), or between beginModel() and endModel().
 /// The public members of CollisionGeometry (cost_density, aabb_local, ...) are not protected, as in FCL.
@@ -62,7 +63,8 @@ class BOCST_EXPORT Model : public fcl::CollisionGeometry<S> {
   /// An empty model: it collides with nothing and has no distance to any geometry, as an empty fcl::BVHModel. Its mesh
   /// is set by setMesh(), or by FCL's functions from beginModel() on. A Scene does not accept an empty model.
   Model() : Model(Options{}) {}
-  explicit Model(const Options& options);  ///< An empty model with these options.
+  /// An empty model with these options. @throws std::invalid_argument for an option out of range.
+  explicit Model(const Options& options);
 
   ~Model() override;
   Model(const Model&) = delete;
@@ -163,7 +165,7 @@ class BOCST_EXPORT Model : public fcl::CollisionGeometry<S> {
   /// Volume inside the surface (negative if the surface is inside out), its centre of mass, and its moments of inertia
   /// about the mesh's origin for density 1, by the same sums over triangles as fcl::BVHModel. For a surface that is not
   /// closed, the values are those of FCL and depend on the position of the origin.
-  /// @throws std::logic_error after releaseMesh().
+  /// @throws std::logic_error after releaseMesh() and for an empty model.
   S computeVolume() const override;
   fcl::Vector3<S> computeCOM() const override;              ///< See computeVolume(); NaN without a volume.
   fcl::Matrix3<S> computeMomentofInertia() const override;  ///< See computeVolume().

@@ -160,6 +160,8 @@ namespace {
 template <typename S>
 std::shared_ptr<const Mesh> fromArraysOf(const S* vertices, std::size_t vertex_count, const std::uint32_t* triangles,
                                          std::size_t triangle_count) {
+  if (vertices == nullptr && vertex_count > 0) bad("the array of vertices is null");
+  if (triangles == nullptr && triangle_count > 0) bad("the array of triangles is null");
   std::vector<Eigen::Vector3d> points(vertex_count);
   for (std::size_t i = 0; i < vertex_count; ++i) {
     for (int k = 0; k < 3; ++k) points[i][k] = static_cast<double>(vertices[3 * i + static_cast<std::size_t>(k)]);

@@ -8,6 +8,8 @@
 #include <sstream>
 #include <stdexcept>
 
+#include "python/geometry.h"
+
 namespace bocst::python {
 namespace {
 
@@ -53,7 +55,10 @@ std::vector<Eigen::Vector3d> vectors(const char* name, const py::handle& object)
   std::vector<Eigen::Vector3d> result(static_cast<std::size_t>(a.shape(0)));
   // NumPy converts and copies, whatever the dtype and the strides, straight to where the vectors are.
   const py::array_t<double> to({a.shape(0), py::ssize_t{3}}, reinterpret_cast<double*>(result.data()), py::none());
-  py::module_::import("numpy").attr("copyto")(to, a);
+  const py::object copyto = py::module_::import("numpy").attr("copyto");
+  const auto done = py::reinterpret_steal<py::object>(
+      pauseAtExit([&] { return PyObject_CallFunctionObjArgs(copyto.ptr(), to.ptr(), a.ptr(), nullptr); }));
+  if (!done) throw py::error_already_set();
   return result;
 }
 

@@ -4,10 +4,12 @@
 #include <fcl/broadphase/broadphase_dynamic_AABB_tree.h>
 #include <fcl/geometry/bvh/BVH_model.h>
 #include <fcl/geometry/octree/octree.h>
+#include <pthread.h>
 #include <pybind11/pybind11.h>
 #include <pybind11/stl.h>
 
 #include <algorithm>
+#include <atomic>
 #include <cmath>
 #include <exception>
 #include <limits>
@@ -401,6 +403,16 @@ class Octree : public Geometry {
  public:
   explicit Octree(double resolution) : Octree(std::make_shared<octomap::OcTree>(length("r", resolution))) {}
 
+  std::shared_ptr<fcl::CollisionGeometryd> get() const override {
+    const unsigned changing = changing_;
+    if (changing != 0 && changing != forks() + 1) {
+      throw std::runtime_error(
+          "bocst: another thread was changing this OcTree when the process was forked, so the child cannot use it; "
+          "create a new one in the child");
+    }
+    return Geometry::get();
+  }
+
   void read(const std::string& data) {
     octomap::OcTree tree(tree_->getResolution());
     std::string_view nodes = data;
@@ -439,11 +451,14 @@ class Octree : public Geometry {
   void change(F&& f) const {
     const NoGil released;
     const std::lock_guard<FairSharedMutex> alone(octreeMutex());
+    changing_ = forks() + 1;
     f();
     geometry_->computeLocalAABB();
+    changing_ = 0;
   }
 
-  std::shared_ptr<octomap::OcTree> tree_;  // what geometry_ reads
+  std::shared_ptr<octomap::OcTree> tree_;      // what geometry_ reads
+  mutable std::atomic<unsigned> changing_{0};  // forks() + 1 while it is changed
 };
 #endif
 
@@ -650,9 +665,17 @@ const py::object& named(const fcl::CollisionGeometryd* g, const Object& o1, cons
   return g == o1.shared().get() ? o1.python() : o2.python();
 }
 
+/// @throws py::value_error for a number that is none of the first `count` values, which FCL would take for one.
+void checkValue(const char* name, int value, int count) {
+  if (value >= 0 && value < count) return;
+  throw py::value_error(std::string("bocst: ") + name + " is " + std::to_string(value) +
+                        ", which is none of its values");
+}
+
 std::size_t collideObjects(const Object& o1, const Object& o2, const std::optional<fcl::CollisionRequestd>& asked,
                            CollisionResult* result) {
   const fcl::CollisionRequestd request = asked.value_or(fcl::CollisionRequestd());
+  checkValue("gjk_solver_type", request.gjk_solver_type, fcl::GST_INDEP + 1);
   const Placed a(o1), b(o2);
   fcl::CollisionResultd r;
   std::size_t count;
@@ -730,6 +753,7 @@ void refuseWhatFclLacks(const Placed& a, const Placed& b, const fcl::DistanceReq
 double distanceOf(const Object& o1, const Object& o2, const std::optional<fcl::DistanceRequestd>& asked,
                   DistanceResult* result) {
   const fcl::DistanceRequestd request = asked.value_or(fcl::DistanceRequestd());
+  checkValue("gjk_solver_type", request.gjk_solver_type, fcl::GST_INDEP + 1);
   const Placed a(o1), b(o2);
   fcl::DistanceResultd r;
   double distance;
@@ -740,12 +764,11 @@ double distanceOf(const Object& o1, const Object& o2, const std::optional<fcl::D
   }
   if (result == nullptr || !(r.min_distance < result->min_distance)) return distance;
   result->min_distance = r.min_distance;
-  // FCL sets them only where they were asked for.
-  if (request.enable_nearest_points) {
-    py::list points;
-    for (const Vector3d& p : r.nearest_points) points.append(arrayOf(p));
-    result->nearest_points = points;
-  }
+  // FCL sets them only where they were asked for; code for python-fcl expects two arrays.
+  const Vector3d unknown = Vector3d::Constant(std::numeric_limits<double>::quiet_NaN());
+  py::list points;
+  for (const Vector3d& p : r.nearest_points) points.append(arrayOf(request.enable_nearest_points ? p : unknown));
+  result->nearest_points = points;
   result->o1 = named(r.o1, o1, o2);
   result->o2 = named(r.o2, o1, o2);
   result->b1 = r.b1;
@@ -786,6 +809,9 @@ void refuseWhatFclLacks(const fcl::CollisionGeometryd& g1, const fcl::CollisionG
 double continuousOf(const Object& o1, const Transform3d& X_W1_end, const Object& o2, const Transform3d& X_W2_end,
                     const std::optional<fcl::ContinuousCollisionRequestd>& asked, ContinuousResult* result) {
   const fcl::ContinuousCollisionRequestd request = asked.value_or(fcl::ContinuousCollisionRequestd());
+  checkValue("ccd_motion_type", request.ccd_motion_type, fcl::CCDM_SPLINE + 1);
+  checkValue("ccd_solver_type", request.ccd_solver_type, fcl::CCDC_POLYNOMIAL_SOLVER + 1);
+  checkValue("gjk_solver_type", request.gjk_solver_type, fcl::GST_INDEP + 1);
   const Placed a(o1), b(o2);
   refuseWhatFclLacks(*a.geometry, *b.geometry, request);
   fcl::ContinuousCollisionResultd r;
@@ -1033,26 +1059,31 @@ class Manager {
   void add(Object& object) {
     change();
     const py::object o = named(object);
-    if (objects_.contains(o)) throw py::value_error("bocst: the object is registered already");
-    objects_[o] = py::none();
+    if (objects_.contains(keyOf(o))) throw py::value_error("bocst: the object is registered already");
+    objects_[keyOf(o)] = o;
     manager_.registerObject(&object);
   }
   void addAll(const py::iterable& objects) {
     std::vector<py::object> held;
+    py::dict keys;
     for (const py::handle o : objects) {
       if (!py::isinstance<Object>(o))
         throw py::type_error("bocst: " + py::repr(o).cast<std::string>() + " is not a CollisionObject");
       held.push_back(py::reinterpret_borrow<py::object>(o));
-      if (objects_.contains(held.back())) throw py::value_error("bocst: an object is registered already");
+      const py::int_ key = keyOf(o);
+      if (objects_.contains(key)) throw py::value_error("bocst: an object is registered already");
+      if (keys.contains(key)) throw py::value_error("bocst: an object is given twice");
+      keys[key] = py::none();
     }
     for (const py::object& o : held) add(o.cast<Object&>());
   }
-  void remove(Object& object) {
+  // Ignores whatever else it is given, as python-fcl does.
+  void remove(const py::object& object) {
     change();
-    const py::object o = named(object);
-    if (!objects_.contains(o)) return;
-    objects_.attr("pop")(o);
-    manager_.unregisterObject(&object);
+    const py::int_ key = keyOf(object);
+    if (!objects_.contains(key)) return;
+    manager_.unregisterObject(object.cast<Object*>());
+    objects_.attr("pop")(key);
   }
   void clear() {
     change();
@@ -1066,9 +1097,18 @@ class Manager {
   void update(const py::object& what) {
     change();
     if (what.is_none()) return manager_.update();
-    if (py::isinstance<Object>(what)) return manager_.update(registered(what));
     std::vector<fcl::CollisionObjectd*> all;
-    for (const auto& o : what) all.push_back(registered(o));
+    const auto add = [&](const py::handle& o) {
+      if (!py::isinstance<Object>(o)) {
+        throw py::type_error("bocst: " + py::repr(o).cast<std::string>() + " is not a CollisionObject");
+      }
+      if (objects_.contains(keyOf(o))) all.push_back(o.cast<Object*>());
+    };
+    if (py::isinstance<Object>(what)) {
+      add(what);
+    } else {
+      for (const auto& o : what) add(o);
+    }
     manager_.update(all);
   }
 
@@ -1096,7 +1136,7 @@ class Manager {
     distance(data, callback, &other.manager_);
   }
 
-  py::list objects() const { return py::list(objects_); }
+  py::list objects() const { return py::list(objects_.attr("values")()); }
   fcl::DynamicAABBTreeCollisionManagerd& fcl() { return manager_; }
 
  private:
@@ -1110,12 +1150,10 @@ class Manager {
     if (asked_ > 0) throw std::runtime_error("bocst: the manager cannot be changed during a query");
   }
   static py::object named(Object& o) { return py::cast(&o, py::return_value_policy::reference); }
-  Object* registered(const py::handle& object) const {
-    if (!objects_.contains(object)) throw py::value_error("bocst: the object is not registered");
-    return object.cast<Object*>();
-  }
+  // Not the object itself: its class may say that another is equal to it.
+  static py::int_ keyOf(const py::handle& object) { return py::int_(reinterpret_cast<std::uintptr_t>(object.ptr())); }
 
-  py::dict objects_;  // as keys, in the order of registering; they outlive what FCL knows of them
+  py::dict objects_;  // by keyOf(), in the order of registering; they outlive what FCL knows of them
   fcl::DynamicAABBTreeCollisionManagerd manager_;
   mutable int asked_ = 0;
 };
@@ -1132,7 +1170,8 @@ to stop. distance: the same, with callbacks that return (done, minimum distance 
                .def("unregisterObject", &Manager::remove, "obj"_a)
                .def("setup", &Manager::setup)
                .def("update", &Manager::update, "arg"_a = py::none(),
-                    "Call this after one object, several objects or all objects were moved.")
+                    "Call this after one object, several objects or all objects were moved. Objects that are not "
+                    "registered are ignored, as by python-fcl.")
                .def("getObjects", &Manager::objects)
                .def("clear", &Manager::clear)
                .def("empty", [](const Manager& s) { return s.objects().empty(); })
@@ -1189,6 +1228,12 @@ to stop. distance: the same, with callbacks that return (done, minimum distance 
 }
 
 }  // namespace
+
+unsigned forks() {
+  static std::atomic<unsigned> count{0};
+  [[maybe_unused]] static const int registered = pthread_atfork(nullptr, nullptr, [] { count.fetch_add(1); });
+  return count;
+}
 
 FairSharedMutex& octreeMutex() {
   static FairSharedMutex mutex;

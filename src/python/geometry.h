@@ -6,6 +6,7 @@
 #include <fcl/geometry/collision_geometry.h>
 #include <pybind11/pybind11.h>
 
+#include <atomic>
 #include <chrono>
 #include <memory>
 #include <mutex>
@@ -39,23 +40,47 @@ class NoGil {
   PyThreadState* const state_ = PyEval_SaveThread();
 };
 
-/// A shared mutex where a thread that waits to be alone goes before those that come later.
+/// How often this process, or an ancestor of it, was forked from another.
+unsigned forks();
+
+/// A shared mutex where a thread that waits to be alone goes before those that come later. In a child after fork(),
+/// what threads of the parent held is free.
 class FairSharedMutex {
  public:
+  FairSharedMutex() = default;
+  ~FairSharedMutex() { delete state_.load(); }
+  FairSharedMutex(const FairSharedMutex&) = delete;
+  FairSharedMutex& operator=(const FairSharedMutex&) = delete;
+
   void lock_shared() {
-    { const std::lock_guard<std::mutex> turn(turn_); }
-    mutex_.lock_shared();
+    State& s = state();
+    { const std::lock_guard<std::mutex> turn(s.turn); }
+    s.mutex.lock_shared();
   }
-  void unlock_shared() { mutex_.unlock_shared(); }
+  void unlock_shared() { state().mutex.unlock_shared(); }
   void lock() {
-    const std::lock_guard<std::mutex> turn(turn_);
-    mutex_.lock();
+    State& s = state();
+    const std::lock_guard<std::mutex> turn(s.turn);
+    s.mutex.lock();
   }
-  void unlock() { mutex_.unlock(); }
+  void unlock() { state().mutex.unlock(); }
 
  private:
-  std::mutex turn_;
-  std::shared_mutex mutex_;
+  struct State {
+    const unsigned at_forks = forks();
+    std::mutex turn;
+    std::shared_mutex mutex;
+  };
+
+  // The parent's is never destroyed in a child: somebody may hold it for ever.
+  State& state() {
+    State* known = state_.load();
+    if (known->at_forks == forks()) return *known;
+    auto made = std::make_unique<State>();
+    return state_.compare_exchange_strong(known, made.get()) ? *made.release() : *known;
+  }
+
+  std::atomic<State*> state_{new State};
 };
 
 /// Held shared by whatever runs without Python's lock and may read an octree, alone by what changes one.

@@ -628,7 +628,13 @@ void requireInit(const py::module_& m) {
     py::detail::get_type_info(reinterpret_cast<PyTypeObject*>(value.ptr()))->operator_new = [](std::size_t) -> void* {
       throw py::type_error("bocst: __init__ of the object was not called");
     };
-    if (!py::hasattr(value, "__members__")) {
+    if (py::hasattr(value, "__members__")) {
+      // Of all protocols of pickle; the oldest would make an object without __init__.
+      const auto reduce = [](const py::object& self, const py::args&) {
+        return py::make_tuple(py::type::of(self), py::make_tuple(py::int_(self)));
+      };
+      py::setattr(value, "__reduce_ex__", py::cpp_function(reduce, py::is_method(value), py::name("__reduce_ex__")));
+    } else {
       const auto refuse = [](const py::object& self, const py::args&) {
         throw py::type_error("cannot pickle '" + std::string(Py_TYPE(self.ptr())->tp_name) + "' object");
       };

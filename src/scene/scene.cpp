@@ -226,7 +226,8 @@ struct Scene<S>::Impl {
     const WorldPtr w = current();
     const std::size_t moving = w->moving.size();
     const bool all_at_once = goal == Goal::kAny && states <= kEdge;
-    const std::size_t length = all_at_once ? states : kStatesAtOnce, rows = (states + length - 1) / length;
+    const std::size_t length = all_at_once ? std::max<std::size_t>(states, 1) : kStatesAtOnce;
+    const std::size_t rows = (states + length - 1) / length;
     std::vector<double>& orthogonality_errors = errorsOfThread();
     // Where all are asked, each row is checked just before: then its poses are read from memory once.
     const bool checks_rows = goal == Goal::kAll && rows > 1 && X_WM != nullptr;

@@ -20,32 +20,6 @@
 namespace bocst::tree {
 namespace {
 
-Options checked(const Options& o) {
-  const auto bad = [](const std::string& what) { throw std::invalid_argument("bocst::Options: " + what); };
-  const auto badEnum = [&](const char* name, int value) {
-    bad(std::string(name) + " is " + std::to_string(value) + ", which is none of its values");
-  };
-  if (o.subdivision != Subdivision::kOctree && o.subdivision != Subdivision::kBono) {
-    badEnum("subdivision", static_cast<int>(o.subdivision));
-  }
-  if (o.answer != Answer::kExact && o.answer != Answer::kConservative) badEnum("answer", static_cast<int>(o.answer));
-  if (o.oracle < OracleKind::kAuto || o.oracle > OracleKind::kSampled) badEnum("oracle", static_cast<int>(o.oracle));
-  if (o.depth < 1 || o.depth > lattice::kMaxLevel) {
-    bad("depth is " + std::to_string(o.depth) + ", not 1 to " + std::to_string(lattice::kMaxLevel));
-  }
-  const double finest = 1 << lattice::kBits;
-  if (o.dimension != 0 && !(o.dimension >= 1 && o.dimension <= finest)) {
-    bad("dimension is " + std::to_string(o.dimension) + ", not 0 or 1 to 65536");
-  }
-  if (o.ttl.count() < 0) bad("ttl is negative");
-  if (o.paper.viewport < 1 || o.paper.viewport > 4096)
-    bad("viewport is " + std::to_string(o.paper.viewport) + ", not 1 to 4096");
-  if (!(o.margin >= 0) || !std::isfinite(o.margin)) {
-    bad("margin is " + std::to_string(o.margin) + ", not a length of 0 or more");
-  }
-  return o;
-}
-
 int deepestLevel(const Options& o) {
   if (o.answer == Answer::kExact) return lattice::kMaxLevel;
   const bool more = o.paper.level_rule && o.subdivision == Subdivision::kBono && lattice::oneLevelMore(o.dimension);
@@ -80,8 +54,33 @@ std::int64_t coarseNow() {
 
 }  // namespace
 
+void checkOptions(const Options& o) {
+  const auto bad = [](const std::string& what) { throw std::invalid_argument("bocst::Options: " + what); };
+  const auto badEnum = [&](const char* name, int value) {
+    bad(std::string(name) + " is " + std::to_string(value) + ", which is none of its values");
+  };
+  if (o.subdivision != Subdivision::kOctree && o.subdivision != Subdivision::kBono) {
+    badEnum("subdivision", static_cast<int>(o.subdivision));
+  }
+  if (o.answer != Answer::kExact && o.answer != Answer::kConservative) badEnum("answer", static_cast<int>(o.answer));
+  if (o.oracle < OracleKind::kAuto || o.oracle > OracleKind::kSampled) badEnum("oracle", static_cast<int>(o.oracle));
+  if (o.depth < 1 || o.depth > lattice::kMaxLevel) {
+    bad("depth is " + std::to_string(o.depth) + ", not 1 to " + std::to_string(lattice::kMaxLevel));
+  }
+  const double finest = 1 << lattice::kBits;
+  if (o.dimension != 0 && !(o.dimension >= 1 && o.dimension <= finest)) {
+    bad("dimension is " + std::to_string(o.dimension) + ", not 0 or 1 to 65536");
+  }
+  if (o.ttl.count() < 0) bad("ttl is negative");
+  if (o.paper.viewport < 1 || o.paper.viewport > 4096)
+    bad("viewport is " + std::to_string(o.paper.viewport) + ", not 1 to 4096");
+  if (!(o.margin >= 0) || !std::isfinite(o.margin)) {
+    bad("margin is " + std::to_string(o.margin) + ", not a length of 0 or more");
+  }
+}
+
 Tree::Tree(std::shared_ptr<const Mesh> mesh, const Options& options)
-    : options_(checked(options)),
+    : options_((checkOptions(options), options)),
       ttl_(nanoseconds(options.ttl)),
       oracle_(oracle::makeOracle(options.oracle, options.answer, options.paper.viewport)),
       deepest_(deepestLevel(options)),

@@ -37,6 +37,9 @@ namespace bocst::tree {
 class BoxTree;
 class BulkBuilder;
 
+/// @throws std::invalid_argument for options out of range.
+void checkOptions(const Options& options);
+
 /// The sphere-tree of one model: resident nodes, how they grow and how they are dropped.
 ///
 /// Threads: a query holds the query lock shared while it looks at nodes. Growth appends blocks and publishes each by

@@ -226,6 +226,8 @@ TEST(Builder, TakesPlainArrays) {
   EXPECT_EQ(b->vertex(3), Eigen::Vector3d(0, 0, double{0.1f}));
   EXPECT_EQ(a->indices(1), (Mesh::Indices{0, 1, 3}));
   EXPECT_THROW(Mesh::fromArrays(wide.data(), 3, triangles.data(), 2), std::invalid_argument);
+  EXPECT_THROW(Mesh::fromArrays(static_cast<const double*>(nullptr), 4, triangles.data(), 2), std::invalid_argument);
+  EXPECT_THROW(Mesh::fromArrays(wide.data(), 4, nullptr, 2), std::invalid_argument);
 }
 
 TEST(Builder, ScalesAndPadsAsGeometricShapesDoes) {

@@ -424,6 +424,23 @@ TEST_F(Program, ValidatesAgainstFcl) {
   EXPECT_EQ(json(pair + " --scalar float").at("mismatches"), 0);
 }
 
+TEST_F(Program, SaysThatAnswersAboutDegenerateTrianglesMayDiffer) {
+  const std::string pair = " " + write("one.off", "OFF\n3 1 0\n0 0 0\n1 0 0\n0 1 0\n3 0 1 2\n") + " " +
+                           write("point.off", "OFF\n1 1 0\n5 5 5\n3 0 0 0\n");
+  const std::string beyond = "the meshes have 1 degenerate triangle; share/doc/guarantees.md, Limits, describes";
+  const std::string validate = "validate" + pair + " --poses 200";
+  const Json report = json(validate, kFailed);
+  EXPECT_GT(report.at("mismatches"), 0);
+  EXPECT_EQ(report.at("beyond_limits").get<std::string>().rfind(beyond, 0), 0u);
+  expectComplaint(validate, kFailed, " of 200 poses answered differently from FCL, the first (false positive) at");
+  expectComplaint(validate, kFailed, beyond);
+  std::string pose;
+  for (const Json& number : report.at("failures").at(0).at("pose")) pose += (pose.empty() ? "" : ",") + number.dump();
+  expectComplaint("collide" + pair + " --pose " + pose, kFailed, "answers of bocst and FCL differ, but " + beyond);
+  EXPECT_EQ(run("collide" + pair + " --pose " + pose).err.find("report"), std::string::npos);
+  EXPECT_FALSE(json("validate " + cube() + " " + cube() + " --poses 16").contains("beyond_limits"));
+}
+
 TEST_F(Program, DividesAValidation) {
   const std::string whole = "validate " + model("link") + " " + model("gripper") + " --poses 100 --seed 5";
   for (const std::string options : {" --contacts", " --answer conservative --depth 5 --histogram"}) {
@@ -702,6 +719,37 @@ TEST_F(SceneProgram, TakesAUrdfWithATableOfStates) {
   const Result result = run(arm + " --adjacent ignore --states " + table + " --srdf " + srdf);
   EXPECT_NE(result.out.find("0 of 2 states collide"), std::string::npos) << result.out;
   EXPECT_NE(result.err.find("no link gone"), std::string::npos) << result.err;
+}
+
+TEST_F(SceneProgram, PrintsNoControlCharacters) {
+  const std::string scene = "scene " + write("names.json", R"({"objects": [
+      {"name": "a\u001b[31m\u0007\nb\u0000\u00e4", "box": [1, 1, 1], "moving": true, "pose": [0, 0, 0]},
+      {"name": "b", "sphere": 0.5}]})");
+  const std::string shown = "a?[31m??b?\u00e4 - b";
+  for (const char* options : {"", " --csv -"}) {
+    const Result result = run(scene + options);
+    EXPECT_EQ(result.code, 0) << result.err;
+    EXPECT_NE(result.out.find(shown), std::string::npos) << result.out;
+    EXPECT_EQ(result.out.find('\x1b'), std::string::npos);
+  }
+  // Other programs read JSON: names stay as they are there.
+  EXPECT_EQ(json(scene).at("parts").at(0).at("name"), std::string("a\x1b[31m\a\nb\0\u00e4", 12));
+}
+
+TEST_F(SceneProgram, ShowsTheDigitsThatAreOutsideOfALimit) {
+  const std::string urdf =
+      write("pi.urdf",
+            "<robot name='r'><link name='a'/><link name='b'><collision><geometry><sphere radius='1'/>"
+            "</geometry></collision></link><joint name='j' type='revolute'>"
+            "<parent link='a'/><child link='b'/><axis xyz='0 0 1'/>"
+            "<limit lower='-3.14159265358979' upper='3.14159265358979' effort='1' velocity='1'/>"
+            "</joint></robot>");
+  const std::string states = write("pi.csv", "j\n3.141592653589793\n4\n");
+  const Result result = run("scene " + urdf + " --states " + states + " --no-fcl");
+  for (const char* words : {"j 3.141592653589793 is not in -3.14159265358979 to 3.14159265358979\n",
+                            "j 4 is not in -3.14159265359 to 3.14159265359\n"}) {
+    EXPECT_NE(result.out.find(words), std::string::npos) << words << '\n' << result.out;
+  }
 }
 
 TEST_F(SceneProgram, TakesTheOptionsOfAModel) {

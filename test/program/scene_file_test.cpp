@@ -678,12 +678,16 @@ TEST(States, SayWhatIsWrongAndWhere) {
   EXPECT_EQ(complaint("q1,elbow\n1,2,3"), "path.csv: line 2: 2 numbers expected, 3 found");
   EXPECT_EQ(complaint("q1,elbow\n1,\x1b[31m2\xff"), "path.csv: line 2: column elbow: '?[31m2?' is no finite number");
   EXPECT_EQ(complaint("q1,\x1b[0m\n1,2"), "path.csv: line 1: no moving joint or object is called '?[0m'.");
+  EXPECT_EQ(complaint("q1,Gelenk\u00e4\n1,2"), "path.csv: line 1: no moving joint or object is called 'Gelenk\u00e4'.");
   EXPECT_EQ(complaint("q1,elbow\n1," + std::string(1000, 'x')),
             "path.csv: line 2: column elbow: '" + std::string(60, 'x') + "...' is no finite number");
   EXPECT_EQ(complaint("q1,\"elbow\n1,2"), "path.csv: line 1: a quote is not closed");
   EXPECT_EQ(complaint("1,2\n"), "path.csv: line 1: the first line must have the names of the columns");
   EXPECT_EQ(complaint("q1,elbow\n"), "path.csv: no states");
   EXPECT_NE(complaint("q1,elbow,box.x\n1,2,3").find("object box needs the columns"), std::string::npos);
+  EXPECT_EQ(complaint("q1,elbow,box\n1,2,3"),
+            "path.csv: line 1: object box needs the columns box.x, box.y, box.z, and for a rotation box.qw, box.qx, "
+            "box.qy, box.qz or box.roll, box.pitch, box.yaw");
   EXPECT_NE(complaint("q1,elbow,box.x,box.y,box.z,box.qw\n1,2,3,4,5,6").find("object box needs"), std::string::npos);
   EXPECT_NE(complaint("q1,elbow,box.x,box.y,box.z,box.qw,box.qx,box.qy,box.qz\n1,2,3,4,5,0,0,0,0")
                 .find("line 2: the quaternion"),

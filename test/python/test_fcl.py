@@ -1,7 +1,9 @@
 # SPDX-License-Identifier: BSD-3-Clause
 """python-fcl's names: what its documents show gives the same answers here, known in closed form or from FCL's own tree."""
 import gc
+import os
 import pickle
+import signal
 import threading
 
 import bocst
@@ -331,9 +333,15 @@ def test_moving_objects_of_a_manager():
         assert not collides()
     with pytest.raises(ValueError, match="already"):
         manager.registerObject(things[0])
-    with pytest.raises(ValueError, match="not registered"):
-        manager.update(at(fcl.Sphere(1)))
-    manager.unregisterObject(at(fcl.Sphere(1)))
+    with pytest.raises(ValueError, match="twice"):
+        manager.registerObjects([at(fcl.Sphere(1))] * 2)
+    with pytest.raises(TypeError, match="CollisionObject"):
+        manager.update([3])
+    other = at(fcl.Sphere(1))
+    manager.update(other)  # what is not registered is ignored, as by python-fcl
+    manager.unregisterObject(other)
+    manager.unregisterObject({"obj": other})
+    assert manager.size() == 10
     manager.clear()
     assert manager.empty() and manager.getObjects() == []
     manager.max_tree_nonbalanced_level = 7
@@ -454,6 +462,7 @@ class Collisions:
     def add(self, name, mesh, X=np.eye(4)):
         geometry = built(fcl.BVHModel, *mesh)
         if name in self.objects:
+            self.manager.unregisterObject(self.objects[name])  # the tuple, as trimesh does
             self.manager.unregisterObject(self.objects[name][0])
         X = np.asanyarray(X, dtype=np.float32)
         thing = fcl.CollisionObject(geometry, fcl.Transform(X[:3, :3], X[:3, 3]))
@@ -464,7 +473,7 @@ class Collisions:
 
     def remove(self, name):
         self.manager.unregisterObject(self.objects[name][0])
-        self.manager.update()
+        self.manager.update(self.objects[name][0])
         del self.names[id(self.objects.pop(name)[1])]
 
     def move(self, name, X):
@@ -809,3 +818,84 @@ def test_points_that_were_not_asked_for():
     fcl.distance(at(fcl.Sphere(1)), at(fcl.Sphere(1), 3, 0, 0), fcl.DistanceRequest(), result)
     before = fcl.DistanceResult().nearest_points
     assert result.nearest_points == before
+
+
+def test_a_manager_tells_objects_apart_by_identity():
+    class Equal(fcl.CollisionObject):
+        def __eq__(self, other):
+            return True
+
+        def __hash__(self):
+            return 1
+
+    first, second = Equal(fcl.Sphere(1)), Equal(fcl.Sphere(1))
+    manager = fcl.DynamicAABBTreeCollisionManager()
+    manager.registerObjects([first, second])
+    manager.unregisterObject(second)
+    assert manager.size() == 1 and manager.getObjects()[0] is first
+    data = fcl.CollisionData()
+    manager.collide(second, data, fcl.defaultCollisionCallback)
+    assert data.result.is_collision
+
+
+def test_nearest_points_are_nan_unless_they_are_asked_for():
+    result = fcl.DistanceResult()
+    fcl.distance(at(fcl.Sphere(1)), at(fcl.Sphere(1), 3, 0, 0), fcl.DistanceRequest(), result)
+    assert result.min_distance == pytest.approx(1) and len(result.nearest_points) == 2
+    assert np.isnan(result.nearest_points).all()
+
+
+def test_the_default_callback_stops_where_python_fcl_does():
+    manager = fcl.DynamicAABBTreeCollisionManager()
+    manager.registerObjects([at(fcl.Sphere(1)) for _ in range(5)])
+    data = fcl.CollisionData(request=fcl.CollisionRequest(num_max_contacts=1, enable_contact=True))
+    manager.collide(data, fcl.defaultCollisionCallback)
+    assert len(data.result.contacts) == 2
+
+
+@pytest.mark.parametrize("protocol", range(pickle.HIGHEST_PROTOCOL + 1))
+def test_enumerators_are_pickled(protocol):
+    for value in (fcl.GJKSolverType.GST_LIBCCD, fcl.CCDMotionType.CCDM_SCREW, fcl.NODE_TYPE.GEOM_BOX):
+        assert pickle.loads(pickle.dumps(value, protocol)) == value
+
+
+def test_numbers_that_are_no_enumerators_are_refused():
+    a, b = at(fcl.Sphere(1)), at(fcl.Sphere(1), 3, 0, 0)
+    for name, kind in (("ccd_motion_type", fcl.CCDMotionType), ("ccd_solver_type", fcl.CCDSolverType)):
+        with pytest.raises(ValueError, match=name):
+            fcl.continuousCollide(a, fcl.Transform(), b, fcl.Transform(), fcl.ContinuousCollisionRequest(**{name: kind(9)}))
+    with pytest.raises(ValueError, match="gjk_solver_type"):
+        fcl.collide(a, b, fcl.CollisionRequest(gjk_solver_type=fcl.GJKSolverType(9)))
+    with pytest.raises(ValueError, match="gjk_solver_type"):
+        fcl.distance(a, b, fcl.DistanceRequest(gjk_solver_type=fcl.GJKSolverType(9)))
+
+
+@pytest.mark.skipif(not hasattr(fcl, "OcTree"), reason="FCL was built without octomap")
+def test_a_child_has_octrees_of_its_own_after_fork():
+    """While a thread of the parent changes an octree and others read it."""
+    busy = fcl.OcTree(0.1)
+    points = np.random.default_rng(1).uniform(-5, 5, (2000, 3))
+    stop = threading.Event()
+
+    def insert():
+        while not stop.is_set():
+            busy.insertPointCloud(points, np.zeros(3))
+
+    thread = threading.Thread(target=insert)
+    thread.start()
+    try:
+        for _ in range(10):
+            child = os.fork()
+            if child == 0:
+                signal.alarm(20)  # a child that waits for ever ends by it
+                made = fcl.CollisionObject(fcl.OcTree(0.1, points=np.zeros((1, 3))))
+                is_right = fcl.collide(made, at(fcl.Sphere(1))) > 0
+                try:
+                    fcl.collide(fcl.CollisionObject(busy), at(fcl.Sphere(1)))
+                except RuntimeError as error:
+                    is_right &= "forked" in str(error)
+                os._exit(0 if is_right else 1)
+            assert os.waitpid(child, 0)[1] == 0
+    finally:
+        stop.set()
+        thread.join()

@@ -157,6 +157,7 @@ def test_scene():
     assert 60 < expected.sum() < 540
     assert np.array_equal(scene.collisions(X), expected)
     assert scene.first_collision(X) == np.argmax(expected) and scene.any_collision(X)
+    assert scene.first_collision(X[:0]) == 0 and not scene.any_collision(X[:0]) and scene.collisions(X[:0]).size == 0
     assert scene.first_collision(X[~expected]) == (~expected).sum() and not scene.any_collision(X[~expected])
     for state, hit in zip(X[:100], expected):
         assert scene.collides(state) == hit

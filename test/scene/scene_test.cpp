@@ -645,6 +645,7 @@ TYPED_TEST(SceneTest, ScenesWithoutPairs) {
     EXPECT_FALSE(scene.collides(X));
     EXPECT_EQ(scene.firstCollision(X, 3), 3u);
     EXPECT_FALSE(scene.anyCollision(X, 3, &where));
+    EXPECT_FALSE(scene.anyCollision(X, 0, &where)) << "no states";
     EXPECT_EQ(where, 9u);
     scene.collisions(X, 3, hit);
     EXPECT_EQ(hit[0] + hit[1] + hit[2], 0);

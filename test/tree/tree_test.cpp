@@ -906,6 +906,9 @@ TEST(Tree, BadOptionsAreNamed) {
   };
   EXPECT_EQ(message([](Options&) {}), "");
   EXPECT_NE(message([](Options& o) { o.depth = 0; }).find("depth"), std::string::npos);
+  Options bad;
+  bad.depth = 0;
+  EXPECT_THROW(Modeld{bad}, std::invalid_argument) << "without a mesh, too";
   EXPECT_NE(message([](Options& o) { o.depth = 18; }).find("depth"), std::string::npos);
   EXPECT_NE(message([](Options& o) { o.dimension = -1; }).find("dimension"), std::string::npos);
   EXPECT_NE(message([](Options& o) { o.dimension = 65537; }).find("dimension"), std::string::npos);

@@ -75,6 +75,7 @@ Model<S>::Model(std::shared_ptr<const Mesh> mesh, const Options& options)
 
 template <typename S>
 Model<S>::Model(const Options& options) : options_(options) {
+  tree::checkOptions(options);
   fcl_adapter::checkDispatch<S>();
   computeLocalAABB();
 }

@@ -74,12 +74,15 @@ class DistanceData:
 
 
 def defaultCollisionCallback(o1, o2, cdata):
-    """Adds this pair's contacts to cdata.result; returns True when the requested number is reached."""
+    """Adds this pair's contacts to cdata.result; returns True when there are more than the requested number.
+
+    So does python-fcl's, while FCL's own stops when the number is reached.
+    """
     if cdata.done:
         return True
     request, result = cdata.request, cdata.result
     collide(o1, o2, request, result)
-    if not request.enable_cost and result.is_collision and len(result.contacts) >= request.num_max_contacts:
+    if not request.enable_cost and result.is_collision and len(result.contacts) > request.num_max_contacts:
         cdata.done = True
     return cdata.done
 

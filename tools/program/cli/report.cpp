@@ -4,6 +4,7 @@
 #include <unistd.h>
 
 #include <algorithm>
+#include <charconv>
 #include <cmath>
 #include <cstdio>
 #include <iostream>
@@ -11,6 +12,7 @@
 #include <utility>
 
 #include "cli/file.h"
+#include "cli/printable.h"
 
 namespace bocst::program {
 
@@ -28,16 +30,21 @@ void writeText(const std::string& file, const std::string& text) {
   std::cout << text << std::flush;
 }
 
+void Table::row(std::vector<std::string> cells) {
+  for (std::string& cell : cells) cell = printable(cell);
+  rows_.push_back(std::move(cells));
+}
+
 void Table::print() const {
   std::vector<std::size_t> width;
   for (const auto& cells : rows_) {
     width.resize(std::max(width.size(), cells.size()));
-    for (std::size_t i = 0; i < cells.size(); ++i) width[i] = std::max(width[i], cells[i].size());
+    for (std::size_t i = 0; i < cells.size(); ++i) width[i] = std::max(width[i], characters(cells[i]));
   }
   for (const auto& cells : rows_) {
     std::string line;
     for (std::size_t i = 0; i < cells.size(); ++i) {
-      const std::string pad(width[i] - cells[i].size(), ' ');
+      const std::string pad(width[i] - characters(cells[i]), ' ');
       line += (i == 0 ? "" : "  ") + (i == 0 || others_ == Others::kLeft ? cells[i] + pad : pad + cells[i]);
     }
     line.erase(line.find_last_not_of(' ') + 1);
@@ -112,6 +119,12 @@ std::string formatPlain(double value) {
   char text[64];
   std::snprintf(text, sizeof(text), "%.12g", value);
   return text;
+}
+
+std::string formatExact(double value) {
+  char text[64];
+  const std::to_chars_result end = std::to_chars(text, text + sizeof(text), value);
+  return {text, end.ptr};
 }
 
 std::string formatTime(double microseconds) {

@@ -39,7 +39,7 @@ class Table {
   enum class Others { kRight, kLeft };
   explicit Table(Others others = Others::kRight) : others_(others) {}
 
-  void row(std::vector<std::string> cells) { rows_.push_back(std::move(cells)); }
+  void row(std::vector<std::string> cells);  ///< Made printable.
   void print() const;
 
  private:
@@ -90,6 +90,7 @@ std::string formatBytes(double bytes);
 std::string formatNumber(double value, int digits = 3);  ///< That many significant digits, no exponent if short.
 std::string formatVector(const Eigen::Vector3d& v, int digits, const char* between);
 std::string formatPlain(double value);  ///< "514", "0.05": up to twelve digits, no zeros after them.
+std::string formatExact(double value);  ///< The fewest digits that give this double again.
 std::string formatRatio(double ratio);  ///< "12.3 x"; "-" beside nothing.
 
 }  // namespace bocst::program

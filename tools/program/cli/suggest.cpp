@@ -6,6 +6,8 @@
 #include <numeric>
 #include <utility>
 
+#include "cli/printable.h"
+
 namespace bocst::program {
 namespace {
 
@@ -41,7 +43,7 @@ std::string suggestion(const std::string& word, const std::vector<std::string>& 
     least = distance;
     best = &name;
   }
-  return best == nullptr ? "" : " Did you mean " + *best + "?";
+  return best == nullptr ? "" : " Did you mean " + printable(*best) + "?";
 }
 
 }  // namespace bocst::program

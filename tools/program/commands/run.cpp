@@ -12,6 +12,7 @@
 
 #include "cli/arguments.h"
 #include "cli/file.h"
+#include "cli/printable.h"
 #include "cli/suggest.h"
 #include "cli/words.h"
 
@@ -20,7 +21,7 @@ namespace {
 
 int complain(std::string what, int code) {
   std::replace(what.begin(), what.end(), '\n', ' ');
-  std::cerr << "bocst: " << what << std::endl;
+  std::cerr << "bocst: " << printable(what) << std::endl;
   return code;
 }
 

@@ -11,7 +11,9 @@
 
 #include "cli/arguments.h"
 #include "cli/file.h"
+#include "cli/printable.h"
 #include "cli/words.h"
+#include "pairs/beyond_limits.h"
 #include "robot/packages.h"
 #include "scene/ask_scene.h"
 #include "scene/scene_file.h"
@@ -22,9 +24,10 @@ namespace {
 
 using Names = std::pair<std::string, std::string>;
 
-/// A cell of CSV that may hold anything.
-std::string csvCell(const std::string& text) {
-  if (text.find_first_of(",\"\n") == std::string::npos) return text;
+/// A cell of CSV with names, which may hold anything.
+std::string csvCell(const std::string& names) {
+  const std::string text = printable(names);
+  if (text.find_first_of(",\"") == std::string::npos) return text;
   std::string result = "\"";
   for (const char c : text) result += c == '"' ? std::string("\"\"") : std::string(1, c);
   return result + "\"";
@@ -65,8 +68,12 @@ class SceneReport {
     std::vector<std::string> texts;
     for (const OutsideLimits& outside : setup_.outsideLimits(setup_.states[state])) {
       const Joint& joint = setup_.robot->joints()[outside.joint];
-      texts.push_back(joint.name + " " + formatPlain(outside.value) + " is not in " + formatPlain(joint.limits->lower) +
-                      " to " + formatPlain(joint.limits->upper));
+      const double lower = joint.limits->lower, upper = joint.limits->upper;
+      const std::string value = formatPlain(outside.value);
+      // Twelve digits are easier to read, but may not show what is outside.
+      const bool all_digits = value == formatPlain(lower) || value == formatPlain(upper);
+      const auto text = [all_digits](double number) { return all_digits ? formatExact(number) : formatPlain(number); };
+      texts.push_back(joint.name + " " + text(outside.value) + " is not in " + text(lower) + " to " + text(upper));
     }
     return texts;
   }
@@ -172,14 +179,17 @@ class SceneReport {
     return list;
   }
 
-  void throwIfWrong() const {
+  void throwIfWrong(Scalar scalar) const {
     for (const SceneDifference& d : answers_.differences) {
       if (!d.fault) continue;
       const Names names = namesOf(d.pair);
-      throw std::runtime_error(setup_.states[d.state].place + ": " + names.first + " and " + names.second +
+      const auto mesh = [this](std::size_t body) { return bodies_.shapes[bodies_.bodies[body].shape].mesh.get(); };
+      const std::string beyond = beyondLimits({mesh(d.pair.first), mesh(d.pair.second)}, scalar);
+      throw std::runtime_error(setup_.states[d.state].place + ": " + printable(names.first) + " and " +
+                               printable(names.second) +
                                (d.bocst ? " collide according to bocst, but not according to FCL"
                                         : " collide according to FCL, but not according to bocst") +
-                               "; please report the scene");
+                               "; " + (beyond.empty() ? "please report the scene" : beyond));
     }
   }
 
@@ -215,7 +225,7 @@ struct SceneCommand {
     const SceneSetup setup = readScene(scene);
     output.check({}, {csv_file, html_file});  // the scene names more files
     if (!setup.robot && adjacent_given) throw std::runtime_error("--adjacent: " + scene.file + " has no robot");
-    for (const std::string& warning : setup.warnings) std::cerr << "bocst: " << warning << '\n';
+    for (const std::string& warning : setup.warnings) std::cerr << "bocst: " << printable(warning) << '\n';
     const Bodies bodies(setup);
     if (bodies.triangles() == 0 && !of_meshes.empty()) {
       throw std::runtime_error(of_meshes + ": has no effect, because " + scene.file + " has no mesh");
@@ -236,7 +246,7 @@ struct SceneCommand {
     } else if (csv_file != "-") {
       print(setup, bodies, answers, report);
     }
-    report.throwIfWrong();
+    report.throwIfWrong(model.scalarKind());
     return 0;
   }
 
@@ -276,7 +286,7 @@ struct SceneCommand {
     head.row({"states", std::to_string(report.states()) + ", " + setup.states_from});
     head.row({"answer", model.answerText()});
     head.print();
-    for (const std::string& note : setup.notes) std::cout << "Note: " << note << ".\n";
+    for (const std::string& note : setup.notes) std::cout << "Note: " << printable(note) << ".\n";
     std::cout << '\n';
     report.printStates();
     std::cout << report.collisions() << " of " << counted(report.states(), "state")

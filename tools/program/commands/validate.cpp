@@ -13,6 +13,7 @@
 #include "cli/arguments.h"
 #include "cli/file.h"
 #include "commands/validation.h"
+#include "pairs/beyond_limits.h"
 #include "pairs/poses.h"
 #include "pairs/query_pair.h"
 #include "picture/pair_page.h"
@@ -132,6 +133,8 @@ struct Validate {
                     {"contacts_compared", compare_contacts},
                     {"poses_in_all", poses},
                     {"seed", seed}};
+    const std::string beyond = beyondLimits({mesh_a.get(), mesh_b.get()}, model.scalarKind());
+    if (!beyond.empty()) sum.settings[Validation::kBeyondLimits] = beyond;
     sum.shard = shard;
     sum.overestimates.resize(by_depth.size());
     PoseSampler sampler(*mesh_a, *mesh_b, *all.front(), seed);
@@ -217,7 +220,11 @@ void addValidate(CLI::App& program, Job& job) {
       "With --scalar float, a pair is not counted if FCL's trees cull it although FCL's own triangle test finds\n"
       "contact.\n"
       "--html and --image show the first mismatch; without a mismatch, the pose that conservative answers\n"
-      "overestimate most (with --histogram), else the first pose. Exit code 0 means that there was no mismatch.");
+      "overestimate most (with --histogram), else the first pose.\n"
+      "Exit code 0 means that there was no mismatch. Answers about degenerate triangles, or with --scalar float about\n"
+      "coordinates above 1e9, may differ from FCL's (share/doc/guarantees.md, Limits): these are counted and give "
+      "exit\n"
+      "code 1, too, but the message says that the meshes have such.");
   command->add_option("a", validate->file_a, std::string("A: ") + kMeshFile)->required();
   command->add_option("b", validate->file_b, "B: mesh file")->required();
   command->add_option("--poses", validate->poses, "number of poses")->check(wholeNumber())->capture_default_str();

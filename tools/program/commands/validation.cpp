@@ -6,6 +6,8 @@
 #include <numeric>
 #include <stdexcept>
 
+#include "cli/printable.h"
+
 namespace bocst::program {
 namespace {
 
@@ -206,16 +208,19 @@ void Validation::print() const {
     if (last.count() > 0)
       std::cout << "largest at depth " << overestimates.size() << ": --pose " << last.pose.text() << '\n';
   }
-  for (const Failure& failure : failures) std::cout << failure.what << ": --pose " << failure.pose.text() << '\n';
+  for (const Failure& failure : failures)
+    std::cout << printable(failure.what) << ": --pose " << failure.pose.text() << '\n';
 }
 
 void Validation::throwIfWrong() const {
   if (count[kMismatches] == 0) return;
-  std::string text =
-      std::to_string(count[kMismatches]) + " of " + std::to_string(count[kPoses]) + " poses answered wrongly";
+  const std::string beyond = settings.value(kBeyondLimits, "");
+  std::string text = std::to_string(count[kMismatches]) + " of " + std::to_string(count[kPoses]) + " poses answered " +
+                     (beyond.empty() ? "wrongly" : "differently from FCL");
   if (!failures.empty()) {
     text += ", the first (" + failures.front().what + ") at --pose " + failures.front().pose.text();
   }
+  if (!beyond.empty()) text += "; " + beyond;
   throw std::runtime_error(text);
 }
 

@@ -64,6 +64,8 @@ struct Validation {
     kKeys
   };
 
+  static constexpr const char* kBeyondLimits = "beyond_limits";  ///< Of the settings: beyondLimits(), if not empty.
+
   Json settings;  ///< What must be the same in all parts.
   Shard shard;
   std::array<std::size_t, kKeys> count{};

@@ -17,11 +17,12 @@ struct LevelError {
   double max = 0;
 };
 
-/// Error_i = max over s on sphere_i of dist(s, O_i) / diam(sphere_root), where O_i is the surface inside sphere_i: how
-/// far from the surface a conservative answer can be. This is the reading of 5.2 in which "the maximum error is equal
-/// to 1.0 when the root sphere is tangent to the object surface" holds: all of O_i at one point of the sphere leaves
-/// the opposite point a diameter away. (The distance from O_i to the sphere would be 0 there, and never above 0.5.)
-/// dist is exact; s runs over 64 directions, the best is refined by pattern search to about a hundredth.
+/// Error_i = max over s on sphere_i of dist(s, O_i) / diam(sphere_root), where O_i is the surface inside sphere_i:
+/// about how far from the surface a conservative answer can be (points inside the sphere, which can be farther, do not
+/// count). This is the reading of 5.2 in which "the maximum error is equal to 1.0 when the root sphere is tangent to
+/// the object surface" holds: all of O_i at one point of the sphere leaves the opposite point a diameter away. (The
+/// distance from O_i to the sphere would be 0 there, and never above 0.5.) dist is exact; s runs over 64 directions,
+/// the best is refined by pattern search to about a hundredth, so the result may be a little below the maximum.
 ///
 /// @param nodes a whole tree as Model::visit() gives it, parents before children.
 /// @return levels from 1 on.

@@ -12,6 +12,7 @@
 
 #include "cli/report.h"
 #include "mesh/closest_point.h"
+#include "mesh/protrusion.h"
 
 namespace bocst::program {
 namespace {
@@ -78,7 +79,10 @@ Sphere ballAbout(const Part& part) {
 class Fit {
  public:
   Fit(const Mesh& mesh, std::size_t count, double tolerance)
-      : triangles_(boundedTriangles(mesh)), most_(count > 0 ? count : kMostSpheres), tolerance_(tolerance) {
+      : triangles_(boundedTriangles(mesh)),
+        most_(count > 0 ? count : kMostSpheres),
+        tolerance_(tolerance),
+        enough_(count > 0 ? std::numeric_limits<double>::infinity() : tolerance) {
     Part all;
     all.pieces.reserve(triangles_.size());
     for (std::size_t t = 0; t < triangles_.size(); ++t) {
@@ -121,7 +125,11 @@ class Fit {
       for (const Vector3d& p : piece.corners) part.box.extend(p);
     }
     part.sphere = ballAbout(part);
-    part.protrusion = protrusionOf(part);
+    std::vector<std::uint32_t> near;  // whole triangles, which are on the surface, too
+    near.reserve(part.pieces.size());
+    for (const Piece& piece : part.pieces) near.push_back(piece.triangle);
+    // A part that protrudes by more than the tolerance is cut, by however much it is.
+    part.protrusion = protrusionOf(part.sphere.center, part.sphere.radius, triangles_, near, enough_);
     parts_.push_back(std::move(part));
     std::push_heap(parts_.begin(), parts_.end());
   }
@@ -150,23 +158,6 @@ class Fit {
     }
     add(std::move(below));
     add(std::move(above));
-  }
-
-  /// From points of the sphere to the nearest of its triangles, which are on the surface as a whole.
-  double protrusionOf(const Part& part) const {
-    double worst = 0;
-    for (const Vector3d& u : directions()) {
-      const Vector3d s = part.sphere.center + part.sphere.radius * u;
-      double best = std::numeric_limits<double>::max();
-      for (const Piece& piece : part.pieces) {
-        const BoundedTriangle& t = triangles_[piece.triangle];
-        if ((t.center - s).norm() - t.radius >= best) continue;
-        best = std::min(best, (closestOnTriangle(s, t) - s).norm());
-        if (best <= worst) break;
-      }
-      worst = std::max(worst, best);
-    }
-    return worst;
   }
 
   /// Samples evenly over the area, the same in each run.
@@ -200,6 +191,7 @@ class Fit {
   std::vector<BoundedTriangle> triangles_;
   std::size_t most_;
   double tolerance_;
+  double enough_;                                // protrusions above this need not be known better
   std::vector<Part> parts_;                      // a heap: the first protrudes most
   std::vector<std::pair<Sphere, double>> done_;  // with its protrusion
 };

@@ -17,7 +17,9 @@ struct Sphere {
 /// Spheres about a surface, and how well they fit. Lengths are in the mesh's unit.
 struct SphereFit {
   std::vector<Sphere> spheres;
-  double protrusion = 0;          ///< Greatest distance from a point of a sphere to the surface; from above.
+  /// Greatest distance from a point on a sphere to the surface: a bound from above, as protrusionOf() finds it for each
+  /// sphere and the triangles that it is about.
+  double protrusion = 0;
   double average_protrusion = 0;  ///< Over the spheres, of each one's greatest.
   double coverage = 0;            ///< Of samples of the surface, the fraction that lies in a sphere.
 };

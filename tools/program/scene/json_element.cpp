@@ -5,12 +5,13 @@
 #include <array>
 #include <stdexcept>
 
+#include "cli/printable.h"
 #include "cli/suggest.h"
 
 namespace bocst::program {
 
 std::string JsonElement::placed(const std::string& what) const {
-  return file_ + ": " + (path_.empty() ? "" : path_ + ": ") + what;
+  return printable(file_ + ": " + (path_.empty() ? "" : path_ + ": ") + what);
 }
 
 void JsonElement::complain(const std::string& what) const { throw std::runtime_error(placed(what)); }

@@ -124,7 +124,7 @@ class Reader {
     setup_.allowed.insert(adjacent.begin(), adjacent.end());
     if (arguments_.adjacent == Adjacent::kAsSrdf && !adjacent.empty()) {
       setup_.notes.push_back("without an SRDF, links that a joint connects are not checked with each other (" +
-                             std::to_string(adjacent.size()) + " pairs); --adjacent check checks them");
+                             counted(adjacent.size(), "pair") + "); --adjacent check checks them");
     }
   }
 

@@ -6,6 +6,7 @@
 #include <sstream>
 #include <stdexcept>
 
+#include "cli/printable.h"
 #include "cli/suggest.h"
 #include "cli/words.h"
 #include "io/text.h"
@@ -15,16 +16,25 @@
 namespace bocst::program {
 namespace {
 
-using io::inQuotes;
-
 constexpr std::array<const char*, 10> kFields = {"x", "y", "z", "qw", "qx", "qy", "qz", "roll", "pitch", "yaw"};
 constexpr unsigned kPosition = 0x007, kQuaternion = 0x078, kAngles = 0x380;  // bits of kFields
+
+/// What to write for a moving object.
+std::string neededColumns(const std::string& object) {
+  const auto column = [&object](const char* field) { return object + "." + field; };
+  const auto columns = [&](std::size_t begin, std::size_t end) {
+    return joined(std::vector<const char*>(kFields.begin() + begin, kFields.begin() + end), ", ", column);
+  };
+  return printable("object " + object + " needs the columns " + columns(0, 3) + ", and for a rotation " +
+                   columns(3, 7) + " or " + columns(7, 10));
+}
 
 /// Why a name is not that of a column (`fields`: object.x and so on) or of a key.
 std::string refusal(const std::string& name, const StateNames& names, bool fields) {
   if (name.empty()) return fields ? "a column has no name" : "a name is empty";
   const auto joint = names.others.find(name);
   if (joint != names.others.end()) return "joint " + name + " " + joint->second + ", so it must not be given";
+  if (fields && std::count(names.objects.begin(), names.objects.end(), name) > 0) return neededColumns(name);
   const std::string unknown = "no moving joint or object is called " + inQuotes(name) + ".";
   const std::size_t dot = name.rfind('.');
   std::vector<std::string> known = names.joints;
@@ -47,7 +57,7 @@ class Columns {
     for (const std::string& name : head) columns_.push_back(columnOf(name));
     for (std::size_t i = 0; i < columns_.size(); ++i) {
       for (std::size_t k = 0; k < i; ++k) {
-        if (head[i] == head[k]) throw std::invalid_argument("column " + head[i] + " occurs twice");
+        if (head[i] == head[k]) throw std::invalid_argument("column " + printable(head[i]) + " occurs twice");
       }
     }
     std::vector<std::string> missing;
@@ -55,14 +65,14 @@ class Columns {
       const auto is = [j](const Column& c) { return !c.object && c.index == j; };
       if (std::none_of(columns_.begin(), columns_.end(), is)) missing.push_back(names.joints[j]);
     }
-    if (!missing.empty()) throw std::invalid_argument("columns are missing: " + joined(missing, ", "));
+    if (!missing.empty()) throw std::invalid_argument("columns are missing: " + printable(joined(missing, ", ")));
     for (std::size_t i = 0; i < given_.size(); ++i) checkObject(i);
   }
 
   State read(const std::vector<std::string>& cells, std::vector<std::string>& warnings) const {
     if (cells.size() != columns_.size()) {
-      throw std::invalid_argument(std::to_string(columns_.size()) + " numbers expected, " +
-                                  std::to_string(cells.size()) + " found");
+      throw std::invalid_argument(counted(columns_.size(), "number") + " expected, " + std::to_string(cells.size()) +
+                                  " found");
     }
     State state;
     state.joints.resize(names_.joints.size());
@@ -70,7 +80,7 @@ class Columns {
     for (std::size_t i = 0; i < cells.size(); ++i) {
       const std::optional<double> number = numberOf(cells[i]);
       if (!number)
-        throw std::invalid_argument("column " + nameOf(columns_[i]) + ": " + inQuotes(cells[i]) +
+        throw std::invalid_argument("column " + printable(nameOf(columns_[i])) + ": " + inQuotes(cells[i]) +
                                     " is no finite number");
       const Column& column = columns_[i];
       (column.object ? fields[column.index][column.field] : state.joints[column.index]) = *number;
@@ -108,13 +118,12 @@ class Columns {
   void checkObject(std::size_t i) const {
     const unsigned given = given_[i];
     const std::string& name = names_.objects[i];
-    if (given == 0 && !names_.X_WO[i]) throw std::invalid_argument("columns are missing: " + name + ".x and so on");
+    if (given == 0 && !names_.X_WO[i])
+      throw std::invalid_argument("columns are missing: " + printable(name) + ".x and so on");
     const bool whole =
         given == 0 || given == kPosition || given == (kPosition | kQuaternion) || given == (kPosition | kAngles);
     if (!whole) {
-      throw std::invalid_argument("object " + name +
-                                  " needs the columns .x, .y, .z, and for a rotation .qw, .qx, .qy, .qz "
-                                  "or .roll, .pitch, .yaw");
+      throw std::invalid_argument(neededColumns(name));
     }
   }
 
@@ -142,7 +151,7 @@ State startState(const StateNames& names) {
   state.joints.assign(names.joints.size(), 0.0);
   for (std::size_t i = 0; i < names.objects.size(); ++i) {
     if (!names.X_WO[i])
-      throw std::runtime_error("no states are given, and object " + names.objects[i] + " has no pose");
+      throw std::runtime_error("no states are given, and object " + printable(names.objects[i]) + " has no pose");
     state.objects.push_back(*names.X_WO[i]);
   }
   return state;
