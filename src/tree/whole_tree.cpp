@@ -316,7 +316,7 @@ ChildRef Tree::addLeaf(const BulkBuilder& bulk, std::uint32_t begin, std::uint32
 }
 
 void Tree::packNoted() {
-  if (noted_count_.load(std::memory_order_relaxed) == 0) return;
+  if (noted_count_.load(std::memory_order_relaxed) == 0 || lacksMesh()) return;
   const std::unique_lock<thread::ForkAwareMutex> lock(growth_, std::try_to_lock);
   if (!lock.owns_lock()) return;
   const BuildMemory memory(kMaxLeafTriangles);

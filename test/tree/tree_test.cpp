@@ -232,8 +232,10 @@ TEST(Tree, AWholeTreeInUseKeepsItsBlocksWithoutCorners) {
   EXPECT_LT(in_use.packed, in_use.plain);
   const auto expectPackedAt = [&](double angle) {
     const std::size_t before = leavesOf(tree).packed;
-    ASSERT_TRUE(touching(a, b, {std::cos(angle), std::sin(angle), 0}));
+    const Eigen::Vector3d p(std::cos(angle), std::sin(angle), 0);
+    ASSERT_EQ(touching(a, b, p), touching(Modeld(a.mesh(), options), b, p));
     EXPECT_GT(leavesOf(tree).packed, before) << angle;
+    EXPECT_TRUE(touching(a, b, p)) << "by the packed corners";
   };
   for (double angle = 0.5; angle < 3; angle += 0.5) expectPackedAt(angle);
   const std::size_t most = leavesOf(tree).packed;
