@@ -9,6 +9,8 @@
 #include <fcl/geometry/shape/box.h>
 #include <fcl/geometry/shape/utility.h>
 
+#include <algorithm>
+#include <array>
 #include <cmath>
 #include <cstdint>
 #include <limits>
@@ -17,6 +19,7 @@
 
 #include "fcl/adapters/narrow_phase.h"
 #include "geometry/convex_shape.h"
+#include "geometry/overlap_kernels.h"
 #include "query/sides/side.h"
 
 namespace bocst::fcl_adapter {
@@ -28,13 +31,10 @@ class OcTreeSide : public query::CompleteSide {
   /// A cube of the octree; without an octomap node it is one that nobody has seen.
   struct Node {
     const octomap::OcTreeNode* node = nullptr;
-    Eigen::Vector3d center = Eigen::Vector3d::Zero();
-    double half = 0;
-    fcl::AABB<S> box;  ///< As FCL halves it, level by level, in S.
+    std::array<std::uint16_t, 3> at{};  ///< Its place among the cubes of its level.
+    std::uint16_t level = 0;            ///< 0: the root.
 
-    bool operator==(const Node& other) const {
-      return node == other.node && center == other.center && half == other.half;
-    }
+    bool operator==(const Node& other) const { return node == other.node && at == other.at && level == other.level; }
   };
   static constexpr bool kBodies = true;
   // Octomap's inner nodes need not be up to date.
@@ -43,18 +43,32 @@ class OcTreeSide : public query::CompleteSide {
   /// `density` is that of the other geometry. Cells that are uncertain or not known are seen only where costs are asked
   /// for.
   OcTreeSide(const fcl::OcTree<S>& octree, const fcl::Transform3<S>& X_WO, S density, bool costs)
-      : octree_(octree), X_WO_(X_WO), density_(density), costs_(costs), root_node_(octree.getRoot()) {
-    root_.node = root_node_;
-    root_.box = octree.getRootBV();
-    root_.half = (static_cast<double>(root_.box.max_[0]) - static_cast<double>(root_.box.min_[0])) / 2;
+      : octree_(octree),
+        X_WO_(X_WO),
+        density_(density),
+        costs_(costs),
+        root_node_(octree.getRoot()),
+        root_box_(octree.getRootBV()),
+        root_half_((static_cast<double>(root_box_.max_[0]) - static_cast<double>(root_box_.min_[0])) / 2),
+        unit_(root_half_ / (1 << kLevels)) {
+    const auto threshold = static_cast<double>(octree.getOccupancyThres());
+    const double log_odds = std::log(threshold / (1 - threshold));
+    if (std::abs(log_odds) < kMostLogOdds) {
+      surely_free_ = log_odds - kLogOddsDoubt;
+      surely_occupied_ = log_odds + kLogOddsDoubt;
+    }
   }
 
   /// Nothing in it is of interest.
   bool empty() const { return !sees(root_node_); }
 
-  const Node& root() const { return root_; }
+  Node root() const { return {root_node_}; }
   query::State state(const Node& n) const {
-    return n.node != nullptr && octree_.nodeHasChildren(n.node) ? query::State::kInner : query::State::kLeaf;
+    if (n.node == nullptr) return query::State::kLeaf;
+    octomap::AbstractOcTreeNode* const* const nodes = NodeChildren::of(*n.node);
+    bool inner = false;
+    for (int i = 0; nodes != nullptr && i < 8; ++i) inner |= nodes[i] != nullptr;
+    return inner ? query::State::kInner : query::State::kLeaf;
   }
 
   /// As FCL names cells, see fcl::OcTree::getNodeByQueryCellId(); of cells that octomap does not have, by their places,
@@ -62,64 +76,58 @@ class OcTreeSide : public query::CompleteSide {
   std::uint64_t id(const Node& n) const {
     if (n.node != nullptr) return static_cast<std::uint64_t>(n.node - root_node_);
     std::uint64_t id = 0xfffe;
-    for (int k = 0; k < 3; ++k) {
-      id = id << 16 | static_cast<std::uint64_t>((n.center[k] / root_.half + 1) * 0x1p15);
+    for (std::size_t k = 0; k < 3; ++k) {
+      id = id << 16 | (2 * std::uint64_t{n.at[k]} + 1) << kLevels >> (n.level + 1);
     }
     return id;
   }
 
-  double size(const Node& n) const { return 3 * n.half * n.half; }
-  query::OrientedVolume volume(const Node& n) const {
-    query::OrientedVolume v;
-    v.center = n.center;
-    v.half = Eigen::Vector3d::Constant(n.half);
+  /// More than half the diagonal, squared: a cube is expanded before a node of a model that is up to three times as
+  /// large, because few of its children are occupied.
+  double size(const Node& n) const { return 8 * 3 * half(n) * half(n); }
+  query::Volume volume(const Node& n) const {
+    const Eigen::Vector3d middle = center(n);
+    query::Volume v{};
+    for (int k = 0; k < 3; ++k) {
+      v.center[k] = middle[k];
+      v.half[k] = static_cast<float>(half(n));
+    }
     return v;
   }
-  query::Sphere sphere(const Node& n) const { return {n.center, std::sqrt(3.0) * n.half}; }
+  query::Sphere sphere(const Node& n) const { return {center(n), std::sqrt(3.0) * half(n)}; }
 
   bool hasExactBox(const Node&) const { return true; }
   query::SeparationResult gap(const Node& n, const query::PointSet& points, double cutoff) const {
     Eigen::Vector3d x[8];
-    query::SeparationResult gap = bodyOf(n).gap(about(n, points, x), cutoff);
-    gap.on_body += n.center;
-    gap.on_points += n.center;
+    const Eigen::Vector3d middle = center(n);
+    query::SeparationResult gap = bodyOf(n).gap(about(middle, points, x), cutoff);
+    gap.on_body += middle;
+    gap.on_points += middle;
     return gap;
   }
   query::ContactPoint penetration(const Node& n, const query::PointSet& points, query::SeparationResult gap) const {
     Eigen::Vector3d x[8];
-    gap.on_body -= n.center;
-    gap.on_points -= n.center;
-    query::ContactPoint contact = bodyOf(n).penetration(about(n, points, x), gap);
-    contact.point += n.center;
+    const Eigen::Vector3d middle = center(n);
+    gap.on_body -= middle;
+    gap.on_points -= middle;
+    query::ContactPoint contact = bodyOf(n).penetration(about(middle, points, x), gap);
+    contact.point += middle;
     return contact;
   }
-  std::optional<Eigen::Vector3d> point(const Node& n) const { return n.center; }
-  query::SweptHull hull(const Node& n) const { return query::sweptHullOf(volume(n)); }
+  std::optional<Eigen::Vector3d> point(const Node& n) const { return center(n); }
+  query::SweptHull hull(const Node& n) const { return query::sweptHullOf(query::oriented(volume(n))); }
 
   template <typename F>
   void children(const Node& n, F&& f) const {
-    for (unsigned i = 0; i < 8; ++i) {
-      Node child;
-      if (octree_.nodeChildExists(n.node, i)) child.node = octree_.getNodeChild(n.node, i);
-      if (!sees(child.node)) continue;
-      child.half = n.half / 2;
-      for (int k = 0; k < 3; ++k) child.center[k] = n.center[k] + ((i >> k & 1) != 0 ? child.half : -child.half);
-      fcl::computeChildBV(n.box, i, child.box);
-      f(child);
-    }
+    children(n, 0xff, f);
   }
   template <typename F>
   void overlappingChildren(const Node& n, const query::Volume& other, const query::SimilarityTransform& to,
                            F&& f) const {
-    children(n, [&](const Node& child) {
-      query::Volume box{};
-      for (int k = 0; k < 3; ++k) {
-        box.center[k] = child.center[k];
-        // Rounded outwards: the half side may be below all floats but 0.
-        box.half[k] = std::nextafter(static_cast<float>(child.half), std::numeric_limits<float>::infinity());
-      }
-      if (!query::facesApart(box, other, to)) f(child);
-    });
+    const Eigen::Vector3d middle = center(n);
+    unsigned nearest = 0;
+    const unsigned mask = octantsNear(middle, half(n), other, to, nearest);
+    children(n, mask, f, nearest);
   }
 
   // For ConvexCollector.
@@ -140,21 +148,106 @@ class OcTreeSide : public query::CompleteSide {
   }
 
  private:
+  static constexpr int kLevels = 16;  // octomap's
+  // FCL compares probabilities, each with an exponential. Log-odds decide the same where they differ by more than these
+  // were rounded: odds of e^20 by 1e-7.
+  static constexpr double kMostLogOdds = 20, kLogOddsDoubt = 1e-3;
+  inline static const bounds::OctantBounds kWholeOctants = [] {
+    bounds::OctantBounds octants;
+    octants.fill(bounds::NodeBounds{});
+    return octants;
+  }();
+
+  // octomap's and FCL's functions ask for the same array again for each child.
+  struct NodeChildren : octomap::OcTreeNode {
+    static octomap::AbstractOcTreeNode* const* of(const octomap::OcTreeNode& node) {
+      return node.*&NodeChildren::children;
+    }
+  };
+
+  double half(const Node& n) const { return unit_ * (1 << (kLevels - n.level)); }
+  Eigen::Vector3d center(const Node& n) const {
+    Eigen::Vector3d c;
+    for (std::size_t k = 0; k < 3; ++k) {
+      c[static_cast<int>(k)] = unit_ * (((2 * n.at[k] + 1) << (kLevels - n.level)) - (1 << kLevels));
+    }
+    return c;
+  }
+
+  // The octants of a cube that a node of the model may meet, and the one nearest to its centre. Of a cube much larger
+  // than the node, the box about it says enough.
+  static unsigned octantsNear(const Eigen::Vector3d& middle, double side, const query::Volume& other,
+                              const query::SimilarityTransform& to, unsigned& nearest) {
+    const double* r = to.rotation.data();  // column by column
+    double along[3], reach[3], size = 0;
+    for (int k = 0; k < 3; ++k) {
+      along[k] = to.scale * (r[k] * other.center[0] + r[k + 3] * other.center[1] + r[k + 6] * other.center[2]) +
+                 to.translation[k] - middle[k];
+      reach[k] = to.scale * (std::abs(r[k]) * static_cast<double>(other.half[0]) +
+                             std::abs(r[k + 3]) * static_cast<double>(other.half[1]) +
+                             std::abs(r[k + 6]) * static_cast<double>(other.half[2]));
+      nearest |= unsigned{along[k] > 0} << k;
+      size += reach[k];
+    }
+    if (size < side) {
+      const double rounding_margin = (size + std::abs(along[0]) + std::abs(along[1]) + std::abs(along[2]) + 4 * side) *
+                                         (0x1p-22 + 4 * to.orthogonality_error) +
+                                     to.tolerance;
+      constexpr unsigned kLower[] = {0x55, 0x33, 0x0f};
+      unsigned mask = 0xff;
+      for (int k = 0; k < 3; ++k) {
+        if (along[k] > reach[k] + rounding_margin) mask &= ~kLower[k];
+        if (-along[k] > reach[k] + rounding_margin) mask &= kLower[k];
+      }
+      return mask;
+    }
+    const Eigen::Vector3d corner = middle.array() - side;
+    return query::overlappingOctants(kWholeOctants, query::seenFrom(other, to, corner.data(), side));
+  }
+
+  // Those of `mask` that are seen, the nearest last.
+  template <typename F>
+  void children(const Node& n, unsigned mask, F&& f, unsigned nearest = 0) const {
+    octomap::AbstractOcTreeNode* const* const nodes = NodeChildren::of(*n.node);
+    for (unsigned left = mask; left != 0; left &= left - 1) __builtin_prefetch(nodes[__builtin_ctz(left)]);
+    Node child;
+    child.level = static_cast<std::uint16_t>(n.level + 1);
+    for (unsigned j = 8; j-- > 0;) {
+      const unsigned i = j ^ nearest;
+      if ((mask >> i & 1) == 0) continue;
+      child.node = static_cast<const octomap::OcTreeNode*>(nodes[i]);
+      if (!sees(child.node)) continue;
+      if (child.node != nullptr) __builtin_prefetch(NodeChildren::of(*child.node));
+      for (std::size_t k = 0; k < 3; ++k) child.at[k] = static_cast<std::uint16_t>(2 * n.at[k] + (i >> k & 1));
+      f(child);
+    }
+  }
+
   bool sees(const octomap::OcTreeNode* node) const {
     if (node == nullptr) return costs_;
+    const float log_odds = node->getLogOdds();
+    if (log_odds > surely_occupied_) return true;
+    if (log_odds < surely_free_ && !costs_) return false;
     return octree_.isNodeOccupied(node) || (costs_ && !octree_.isNodeFree(node));
   }
 
-  // Made as FCL makes it, with its rounding.
+  // Made as FCL makes it, with its rounding: halved in S, level by level.
   std::pair<fcl::Box<S>, fcl::Transform3<S>> cellOf(const Node& n) const {
+    fcl::AABB<S> box = root_box_;
+    for (int level = n.level - 1; level >= 0; --level) {
+      unsigned octant = 0;
+      for (unsigned k = 0; k < 3; ++k) octant |= (n.at[k] >> level & 1u) << k;
+      const fcl::AABB<S> parent = box;
+      fcl::computeChildBV(parent, octant, box);
+    }
     std::pair<fcl::Box<S>, fcl::Transform3<S>> cell;
-    fcl::constructBox(n.box, X_WO_, cell.first, cell.second);
+    fcl::constructBox(box, X_WO_, cell.first, cell.second);
     return cell;
   }
 
-  static query::BoxShape bodyOf(const Node& n) { return query::BoxShape(Eigen::Vector3d::Constant(n.half)); }
-  static query::PointSet about(const Node& n, const query::PointSet& points, Eigen::Vector3d (&x)[8]) {
-    for (int i = 0; i < points.count; ++i) x[i] = points.x[i] - n.center;
+  query::BoxShape bodyOf(const Node& n) const { return query::BoxShape(Eigen::Vector3d::Constant(half(n))); }
+  static query::PointSet about(const Eigen::Vector3d& middle, const query::PointSet& points, Eigen::Vector3d (&x)[8]) {
+    for (int i = 0; i < points.count; ++i) x[i] = points.x[i] - middle;
     return {x, points.count};
   }
 
@@ -162,8 +255,11 @@ class OcTreeSide : public query::CompleteSide {
   const fcl::Transform3<S>& X_WO_;
   const S density_;
   const bool costs_;
-  const octomap::OcTreeNode* root_node_;
-  Node root_;
+  const octomap::OcTreeNode* const root_node_;
+  const fcl::AABB<S> root_box_;
+  const double root_half_, unit_;  // half the side of the root, and of a cube of the last level
+  double surely_free_ = -std::numeric_limits<double>::infinity();
+  double surely_occupied_ = std::numeric_limits<double>::infinity();
 };
 
 }  // namespace bocst::fcl_adapter

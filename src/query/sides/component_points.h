@@ -46,7 +46,7 @@ class ComponentPoints {
   template <typename F>
   bool any(const NodeB& node, std::size_t begin, std::size_t end, F& f) {
     if (b_.state(node) == State::kLeaf) return take(node, f);
-    const OrientedVolume box = b_.volume(node);
+    const OrientedVolume box = oriented(b_.volume(node));
     const double size = b_.size(node) * b_in_a_.scale * b_in_a_.scale;
     for (std::size_t i = begin; i < end; ++i) addNear(NodeA(near_[i]), box, size);
     const std::size_t last = near_.size();
