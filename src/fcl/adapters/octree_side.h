@@ -82,9 +82,10 @@ class OcTreeSide : public query::CompleteSide {
     return id;
   }
 
-  /// More than half the diagonal, squared: a cube is expanded before a node of a model that is up to three times as
-  /// large, because few of its children are occupied.
+  /// Half the diagonal, squared, times 8: a cube is expanded before nodes of a model up to 2.8 times as large. Few of
+  /// its children are occupied, so that takes fewer steps.
   double size(const Node& n) const { return 8 * 3 * half(n) * half(n); }
+
   query::Volume volume(const Node& n) const {
     const Eigen::Vector3d middle = center(n);
     query::Volume v{};
@@ -119,15 +120,14 @@ class OcTreeSide : public query::CompleteSide {
 
   template <typename F>
   void children(const Node& n, F&& f) const {
-    children(n, 0xff, f);
+    visitChildren(n, 0xff, 0, f);
   }
   template <typename F>
   void overlappingChildren(const Node& n, const query::Volume& other, const query::SimilarityTransform& to,
                            F&& f) const {
-    const Eigen::Vector3d middle = center(n);
     unsigned nearest = 0;
-    const unsigned mask = octantsNear(middle, half(n), other, to, nearest);
-    children(n, mask, f, nearest);
+    const unsigned mask = octantsMeeting(center(n), half(n), other, to, nearest);
+    visitChildren(n, mask, nearest, f);
   }
 
   // For ConvexCollector.
@@ -149,8 +149,8 @@ class OcTreeSide : public query::CompleteSide {
 
  private:
   static constexpr int kLevels = 16;  // octomap's
-  // FCL compares probabilities, each with an exponential. Log-odds decide the same where they differ by more than these
-  // were rounded: odds of e^20 by 1e-7.
+  // FCL computes a probability from the log-odds of each node, with an exponential, and compares that. Log-odds that
+  // differ from the threshold's by more than kLogOddsDoubt decide the same: up to kMostLogOdds, rounding is below 1e-7.
   static constexpr double kMostLogOdds = 20, kLogOddsDoubt = 1e-3;
   inline static const bounds::OctantBounds kWholeOctants = [] {
     bounds::OctantBounds octants;
@@ -158,7 +158,7 @@ class OcTreeSide : public query::CompleteSide {
     return octants;
   }();
 
-  // octomap's and FCL's functions ask for the same array again for each child.
+  // octomap keeps the children in a protected array; its functions, and FCL's, are calls for each child.
   struct NodeChildren : octomap::OcTreeNode {
     static octomap::AbstractOcTreeNode* const* of(const octomap::OcTreeNode& node) {
       return node.*&NodeChildren::children;
@@ -174,10 +174,10 @@ class OcTreeSide : public query::CompleteSide {
     return c;
   }
 
-  // The octants of a cube that a node of the model may meet, and the one nearest to its centre. Of a cube much larger
-  // than the node, the box about it says enough.
-  static unsigned octantsNear(const Eigen::Vector3d& middle, double side, const query::Volume& other,
-                              const query::SimilarityTransform& to, unsigned& nearest) {
+  // The octants of a cube that a node of the model may meet, as a mask, and the octant nearest to the centre of that
+  // node; `side` is that of an octant. If the octants are larger than the node, its bounding box alone is tested.
+  static unsigned octantsMeeting(const Eigen::Vector3d& middle, double side, const query::Volume& other,
+                                 const query::SimilarityTransform& to, unsigned& nearest) {
     const double* r = to.rotation.data();  // column by column
     double along[3], reach[3], size = 0;
     for (int k = 0; k < 3; ++k) {
@@ -205,9 +205,10 @@ class OcTreeSide : public query::CompleteSide {
     return query::overlappingOctants(kWholeOctants, query::seenFrom(other, to, corner.data(), side));
   }
 
-  // Those of `mask` that are seen, the nearest last.
+  // Calls f for the children in `mask` that are seen. The nearest comes last, so that a stack returns it first: it is
+  // the most likely to be hit.
   template <typename F>
-  void children(const Node& n, unsigned mask, F&& f, unsigned nearest = 0) const {
+  void visitChildren(const Node& n, unsigned mask, unsigned nearest, F&& f) const {
     octomap::AbstractOcTreeNode* const* const nodes = NodeChildren::of(*n.node);
     for (unsigned left = mask; left != 0; left &= left - 1) __builtin_prefetch(nodes[__builtin_ctz(left)]);
     Node child;

@@ -61,7 +61,6 @@ class PairWalk {
     s.stack.clear();
     s.ordered.clear();
     s.deferred.clear();
-    s.packs.clear();
     s.leaves.start(b_in_a_, a_in_b_, visitor_.endsAtFirst(), cut_);
     s.large_a.clear();
     s.large_b.clear();
@@ -80,7 +79,7 @@ class PairWalk {
       if (s.deferred.empty()) return false;
       const bool may_end = visitor_.endsAtFirst() || cut_ != nullptr;
       s.deferred.grow(a_, b_, b_in_a_, may_end, [&s](const Pair& p) { s.stack.push_back(p); });
-      seen_a_.valid = seen_b_.valid = false;
+      seen_a_.valid = seen_b_.valid = leaf_known_ = false;
     }
   }
 
@@ -96,7 +95,7 @@ class PairWalk {
     LeafPairs<A, B> leaves;
     LargeTriangleLeaf<A> large_a;
     LargeTriangleLeaf<B> large_b;
-    LeafPacks<A> packs;  // beside bodies
+    std::vector<TriangleExtent> leaf;  // beside bodies
   };
   static Scratch& scratch() { return thread::ofThread<Scratch>(); }
 
@@ -234,34 +233,28 @@ class PairWalk {
     }
   }
 
-  // The triangles of a pack that may meet a body, whose box is placed in the frame of A.
-  std::uint32_t trianglesNear(const LeafVolume& body, const typename LeafPacks<A>::Leaf& leaf) const {
-    const std::uint32_t all = ~0u >> (TrianglePack::kCapacity - leaf.pack.count);
-    if (!inRange(leaf.pack) || !inRange(b_in_a_.tolerance) ||
-        !inRange(body.half[1][0] + body.half[1][1] + body.half[1][2]))
-      return all;
-    PackRegion region;
-    fillRegion(leaf.volume, body, b_in_a_, leaf.pack.size, leaf.error, region);
-    return trianglesWithin(leaf.pack, region);
+  // The triangles of the leaf asked last, kept because many bodies ask about the same leaf.
+  const std::vector<TriangleExtent>& trianglesOf(typename A::Node leaf, Scratch& s) {
+    if (leaf_known_ && leaf_ == leaf) return s.leaf;
+    leaf_known_ = true;
+    leaf_ = leaf;
+    s.leaf.resize(a_.triangleCount(leaf));
+    for (std::size_t i = 0; i < s.leaf.size(); ++i) {
+      TriangleExtent& t = s.leaf[i];
+      t.id = a_.triangle(leaf, i);
+      t.corners = a_.corners(t.id);
+      t.ready();
+    }
+    return s.leaf;
   }
 
   bool leafTriangles(const Pair& pair, Scratch& s) {
     if constexpr (B::kBodies) {
-      const auto& volume = volumeOf(b_, seen_b_);
-      const BodyBox box(oriented(volume), b_in_a_);
-      LeafVolume body(volume);
-      body.place(b_in_a_);
-      TriangleExtent t;
-      for (std::size_t begin = 0;; begin += TrianglePack::kCapacity) {
-        const auto& leaf = s.packs.get(a_, pair.a, begin);
-        for (std::uint32_t left = trianglesNear(body, leaf); left != 0; left &= left - 1) {
-          t.id = leaf.id(static_cast<std::size_t>(__builtin_ctz(left)));
-          t.corners = a_.corners(t.id);
-          t.ready();
-          if (!box.isApart(t) && visitor_.triangle(t.id, pair.b)) return true;
-        }
-        if (begin + TrianglePack::kCapacity >= leaf.all) return false;
+      const BodyBox box(oriented(volumeOf(b_, seen_b_)), b_in_a_);
+      for (const TriangleExtent& t : trianglesOf(pair.a, s)) {
+        if (!box.isApart(t) && visitor_.triangle(t.id, pair.b)) return true;
       }
+      return false;
     } else {
       const std::size_t before = s.leaves.tested();
       const auto visit = [this](std::uint32_t t, std::uint32_t u, bool certain) {
@@ -383,6 +376,8 @@ class PairWalk {
 
   Seen<A> seen_a_;
   Seen<B> seen_b_;
+  typename A::Node leaf_{};  // whose triangles Scratch has, if that is known
+  bool leaf_known_ = false;
   const A& a_;
   const B& b_;
   const SimilarityTransform here_, b_in_a_, a_in_b_;

@@ -194,35 +194,6 @@ class LeafPacks {
   LeafCorners<Side> corners_;
 };
 
-/// Where the triangles of a leaf can meet those of another, which `to` places in its frame. With M = `extent`, what
-/// is computed here and by trianglesWithin() is off by 15 u M: corners 2, the normal 3, sums along it 10.
-inline void fillRegion(const LeafVolume& own, const LeafVolume& other, const SimilarityTransform& to, double size,
-                       float error, PackRegion& region, const Cut* cut = nullptr) {
-  double displacement[3], extent = size, offset = to.scale * other.slab[0];
-  for (int k = 0; k < 3; ++k) {
-    displacement[k] = other.center[1][k] - own.center[0][k];
-    extent = std::max(extent, std::abs(displacement[k]) + other.half[1][k]);
-    offset += other.normal[1][k] * displacement[k];
-    region.normal[k] = static_cast<float>(other.normal[1][k]);
-  }
-  const double rounding_margin = regionMargin(to, to.tolerance, extent, static_cast<double>(error));
-  for (int k = 0; k < 3; ++k) {
-    region.low[k] = static_cast<float>(std::max(-own.half[0][k], displacement[k] - other.half[1][k]) - rounding_margin);
-    region.high[k] = static_cast<float>(std::min(own.half[0][k], displacement[k] + other.half[1][k]) + rounding_margin);
-  }
-  if (cut != nullptr) {
-    Eigen::Vector3d least;
-    for (int k = 0; k < 3; ++k) least[k] = own.center[0][k] + static_cast<double>(region.low[k]);
-    for (int k = 0; k < 3; ++k) {
-      const double reach = cut->reach(least, k) + rounding_margin;
-      region.high[k] = std::min(region.high[k], static_cast<float>(static_cast<double>(region.low[k]) + reach));
-    }
-  }
-  const double half = to.scale * other.slab[1] + rounding_margin;
-  region.slab_low = static_cast<float>(offset - half);
-  region.slab_high = static_cast<float>(offset + half);
-}
-
 /// Leaves against leaves, triangle by triangle.
 template <typename A, typename B>
 class LeafPairs {
@@ -395,6 +366,37 @@ class LeafPairs {
       }
     }
     return false;
+  }
+
+  /// Where the triangles of a leaf can meet those of another, which `to` places in its frame. With M = `extent`, what
+  /// is computed here and by trianglesWithin() is off by 15 u M: corners 2, the normal 3, sums along it 10.
+  static void fillRegion(const LeafVolume& own, const LeafVolume& other, const SimilarityTransform& to, double size,
+                         float error, PackRegion& region, const Cut* cut = nullptr) {
+    double displacement[3], extent = size, offset = to.scale * other.slab[0];
+    for (int k = 0; k < 3; ++k) {
+      displacement[k] = other.center[1][k] - own.center[0][k];
+      extent = std::max(extent, std::abs(displacement[k]) + other.half[1][k]);
+      offset += other.normal[1][k] * displacement[k];
+      region.normal[k] = static_cast<float>(other.normal[1][k]);
+    }
+    const double rounding_margin = regionMargin(to, to.tolerance, extent, static_cast<double>(error));
+    for (int k = 0; k < 3; ++k) {
+      region.low[k] =
+          static_cast<float>(std::max(-own.half[0][k], displacement[k] - other.half[1][k]) - rounding_margin);
+      region.high[k] =
+          static_cast<float>(std::min(own.half[0][k], displacement[k] + other.half[1][k]) + rounding_margin);
+    }
+    if (cut != nullptr) {
+      Eigen::Vector3d least;
+      for (int k = 0; k < 3; ++k) least[k] = own.center[0][k] + static_cast<double>(region.low[k]);
+      for (int k = 0; k < 3; ++k) {
+        const double reach = cut->reach(least, k) + rounding_margin;
+        region.high[k] = std::min(region.high[k], static_cast<float>(static_cast<double>(region.low[k]) + reach));
+      }
+    }
+    const double half = to.scale * other.slab[1] + rounding_margin;
+    region.slab_low = static_cast<float>(offset - half);
+    region.slab_high = static_cast<float>(offset + half);
   }
 
   LeafPacks<A> leaves_a_;
