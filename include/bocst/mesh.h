@@ -45,7 +45,8 @@ class BOCST_EXPORT Mesh {
   /// A copy with each vertex moved along the line from the mean of all vertices: its distance d from the mean becomes
   /// scale * d + padding. This is what geometric_shapes does (MoveIt's link scale and padding). Both meshes share the
   /// indices. The result is not an offset of the surface; for an offset, use Options::margin.
-  /// @throws std::invalid_argument for a scale that is not above 0, or a number that is not finite.
+  /// @throws std::invalid_argument for a scale that is not above 0, or a number that is not finite, or when a vertex
+  /// would have a coordinate larger than 1e75 in magnitude.
   std::shared_ptr<const Mesh> scaledAndPadded(double scale, double padding) const;
 
   /// A mesh with the same triangles and other vertex positions. Both meshes share the indices.

@@ -54,7 +54,8 @@ class BOCST_EXPORT Model : public fcl::CollisionGeometry<S> {
   explicit Model(std::shared_ptr<const Mesh> mesh, const Options& options = {});
 
   /// Copies the vertices and triangles of an FCL mesh. FCL's tree is not used and need not be built: addSubModel()
-  /// without endModel() is enough. BV::S must be S. From an empty BVHModel, the model is empty, too.
+  /// without endModel() is enough. BV::S must be S. From an empty BVHModel, the model is empty, too. Throws as the
+  /// constructor above, and std::invalid_argument for a mesh that Mesh refuses.
   template <typename BV>
   explicit Model(const fcl::BVHModel<BV>& bvh, const Options& options = {}) : Model(options) {
     if (bvh.num_tris > 0 || bvh.num_vertices > 0) setMesh(meshOf(bvh));
@@ -62,8 +63,10 @@ class BOCST_EXPORT Model : public fcl::CollisionGeometry<S> {
 
   /// An empty model: it collides with nothing and has no distance to any geometry, as an empty fcl::BVHModel. Its mesh
   /// is set by setMesh(), or by FCL's functions from beginModel() on. A Scene does not accept an empty model.
+  /// @throws std::runtime_error as above.
   Model() : Model(Options{}) {}
-  /// An empty model with these options. @throws std::invalid_argument for an option out of range.
+  /// An empty model with these options.
+  /// @throws std::invalid_argument for an option out of range; std::runtime_error as above.
   explicit Model(const Options& options);
 
   ~Model() override;
@@ -121,12 +124,13 @@ class BOCST_EXPORT Model : public fcl::CollisionGeometry<S> {
   /// its device only. For exact answers, and for the occlusion oracles, a query that is not decided by boxes reads the
   /// mesh back; prune() frees it again once the tree is a single sphere and ttl has passed. Such queries throw
   /// OracleError if the device lost the mesh.
-  /// @throws std::logic_error for solids, which need the triangles in host memory; OracleError if the oracle of this
-  /// model has no device (OracleKind::kCpu; kAuto, unless BOCST_ORACLE names an oracle on a device). The model is then
-  /// unchanged.
+  /// @throws std::logic_error for an empty model, and for solids, which need the triangles in host memory; OracleError
+  /// if the oracle of this model has no device (OracleKind::kCpu; kAuto, unless BOCST_ORACLE names an oracle on a
+  /// device). The model is then unchanged.
   void releaseMesh();
 
   /// "cpu", "occlusion", "sampled", "compute", or "cpu and compute" (kAuto where there is a GPU).
+  /// @throws std::logic_error for an empty model.
   std::string oracleName() const;
 
   Statistics statistics() const;  ///< A snapshot.
@@ -136,8 +140,8 @@ class BOCST_EXPORT Model : public fcl::CollisionGeometry<S> {
   /// Options::ttl to 0 to keep the tree: otherwise branches that no query uses for ttl are dropped, also while other
   /// queries run. A memory_budget still holds: what exceeds it is dropped again. Oriented boxes, which queries of flat
   /// parts at rest on each other need, are not built. Conservative answers gain nothing by it, nor do models with an
-  /// oracle on a device. Does nothing if the tree is complete. Queries may run at the same time; those that have to
-  /// grow the tree wait.
+  /// oracle on a device. Does nothing if the tree is complete, or for more than 178 million triangles. Queries may run
+  /// at the same time; those that have to grow the tree wait.
   /// @throws std::logic_error for an empty model; std::bad_alloc, which leaves the tree as valid as it was.
   void buildTree();
 
@@ -159,7 +163,7 @@ class BOCST_EXPORT Model : public fcl::CollisionGeometry<S> {
 
   /// Sets new positions of all vertices; the triangles stay. The tree is reset to its root, nothing is rebuilt.
   /// @throws std::invalid_argument for a wrong number of vertices, a bad vertex, or with Options::solid a mesh that is
-  /// not watertight; std::logic_error after releaseMesh(). The model is then unchanged.
+  /// not watertight; std::logic_error for an empty model or after releaseMesh(). The model is then unchanged.
   void updateVertices(std::vector<Eigen::Vector3d> vertices);
 
   /// Volume inside the surface (negative if the surface is inside out), its centre of mass, and its moments of inertia

@@ -31,7 +31,8 @@ struct NodeView {
   std::uint32_t id = 0;          ///< Unique among the nodes of one visit(); the root is 0.
   std::uint32_t parent = kNone;  ///< The parent's id.
   Children children;             ///< Ids of the resident children; empty on the frontier.
-  const Mesh* object = nullptr;  ///< The mesh of this node.
+  const Mesh* object = nullptr;  ///< The mesh of this node; null after releaseMesh(). Not a copy: valid while the
+                                 ///< model or another owner keeps that mesh.
   int n = 0;                     ///< 2^n is the side of the node's cube, in lattice units (negative below one unit).
   double radius = 0;             ///< Of the sphere about the node's actual region, in the mesh's length unit.
   Eigen::Vector3d center;        ///< Of that sphere, in the mesh's frame.

@@ -82,7 +82,7 @@ struct Options {
   /// A thread that all models of the process share builds the whole tree while the model's first queries run; without
   /// it, one of those queries does. A query that expands nodes may wait for that thread some tens of microseconds. If
   /// the process forks while the thread builds a model, the child cannot query that model. No effect with conservative
-  /// answers, with a memory budget, or with an oracle other than kCpu and kAuto.
+  /// answers, with a memory budget, for more than 178 million triangles, or with an oracle other than kCpu and kAuto.
   bool build_ahead = false;
 
   PaperOptions paper;  ///< For experiments.

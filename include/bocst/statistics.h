@@ -14,10 +14,13 @@ struct Statistics {
   std::size_t resident_bytes = 0;  ///< Heap bytes of the tree: nodes, triangle lists, bookkeeping; not the mesh.
   std::vector<std::size_t> nodes_per_level;  ///< [0] is level 1 (the root), as in the paper's tables.
   std::uint64_t expansions = 0;              ///< Nodes expanded so far.
-  std::uint64_t oracle_batches = 0;          ///< Batches of expansions that included this model.
-  std::uint64_t oracle_cells = 0;            ///< Cells that the oracle tested (eight octants per plain expansion).
+  std::uint64_t oracle_batches = 0;          ///< Batches of expansions that included this model. The grid of the root's
+                                             ///< first levels counts as one batch.
+  std::uint64_t oracle_cells = 0;            ///< Cells that the oracle tested (eight octants per plain expansion), and
+                                             ///< those of the grid's levels.
   std::uint64_t expanded_octants = 0;        ///< Octants of expanded nodes that have an actual region; the paper makes
-                                             ///< an occlusion query for each (5.4), from up to three sides.
+                                             ///< an occlusion query for each (5.4), from up to three sides. With exact
+                                             ///< answers also groups of triangles.
   std::uint64_t built_triangles = 0;  ///< Triangles that exact answers have sorted into the tree so far. From one time
                                       ///< at which only the root is resident to the next, without Model::buildTree():
                                       ///< at most 1.25 times the mesh's triangles (2.25 times with

@@ -55,7 +55,7 @@ class Context {
 
   const ContextInfo& info() const { return info_; }
 
-  /// Was the context lost (GPU reset, driver update)? Then nothing in it is of use any more.
+  /// True if the driver says that the context was lost (GPU reset, driver update). Then nothing in it is of use.
   bool isLost() const;
 
  private:

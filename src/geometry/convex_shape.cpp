@@ -151,7 +151,7 @@ class Simplex {
       const auto& f = kFaces[i];
       const Vector3d e = w_[f[1]] - w_[f[0]], d = w_[f[2]] - w_[f[0]], n = e.cross(d);
       const double origin = -n.dot(w_[f[0]]), other = n.dot(w_[f[3]] - w_[f[0]]);
-      // On the same side as the fourth corner, and both surely off the plane?
+      // True if the origin is on the same side as the fourth corner, and both are surely off the plane.
       const double least = kRounding * size * e.norm() * d.norm();
       is_within[i] = (origin > least && other > least) || (origin < -least && other < -least);
       is_inside = is_inside && is_within[i];
@@ -453,7 +453,7 @@ SweptHull TriangleShape::hull() const {
 ContactPoint TriangleShape::penetration(const PointSet& points, const SeparationResult& gap) const {
   if (points.count > 3) return SupportShape::penetration(points, gap);
   const Corners other = asTriangle(points);
-  ContactPoint contact = trianglePenetrations(corners_, other);
+  ContactPoint contact = trianglePenetration(corners_, other);
   // Triangles that are apart by no more than a query's rounding.
   if (!contact.point.allFinite()) contact.point = (gap.on_body + gap.on_points) / 2;
   return contact;

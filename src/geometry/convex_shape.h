@@ -119,7 +119,7 @@ class SupportShape : public ConvexShape {
   SupportShape(const Eigen::AlignedBox3d& core, double radius)
       : SupportShape(core.center(), core.sizes() / 2, radius) {}
 
-  /// Is the point surely in the core? False where that is not known at a glance.
+  /// True if the point is surely in the core. False also where a quick test cannot tell.
   virtual bool contains(const Eigen::Vector3d&) const { return false; }
 
   const double radius_;

@@ -54,7 +54,7 @@ struct NodeExtent {
 };
 
 /// Calls f(direction) with directions along which the gap between two nodes may be large, the most likely one first,
-/// until it returns true; did it? All are of unit length.
+/// until it returns true. True if it did. All are of unit length.
 template <typename F>
 bool anyDirectionApart(const NodeExtent& a, const NodeExtent& b, const F& f) {
   const Eigen::Vector3d t = b.center - a.center;
@@ -176,7 +176,7 @@ class BodyBox {
   Eigen::Vector3d half_, lo_, hi_;
 };
 
-/// Is the one at least this far from the other, by their boxes or along the line of their middles?
+/// True if the one is at least this far from the other, by their boxes or along the line of their middles.
 inline bool isBeyond(const TriangleExtent& a, const TriangleExtent& b, double distance) {
   const double least = distance * (1 + 1e-12);
   if ((b.lo - a.hi).cwiseMax(a.lo - b.hi).cwiseMax(0).squaredNorm() >= least * least) return true;

@@ -25,7 +25,7 @@ struct Boxes {
   V middle[3], half[3], delta[3];
 };
 
-// Apart along an axis of the octants or of the volume's box?
+// The octants that are apart from the volume along an axis of theirs or of its box.
 HWY_INLINE M apartByFaces(const Boxes& boxes, const OneVolume& b) {
   const D d;
   const V rounding_margin = hn::Set(d, b.rounding_margin);
@@ -496,7 +496,7 @@ HWY_INLINE Plane planeOf(const Vec3 (&t)[3], const Limits& limits) {
 // How far triangles reach to the nearer side of a plane, from their corners' heights above it.
 HWY_INLINE V reachAcross(V h0, V h1, V h2) { return hn::Min(max3(h0, h1, h2), hn::Neg(min3(h0, h1, h2))); }
 
-// Bit k: may triangles p and q of lane k meet, and do they surely?
+// Bit k: whether triangles p and q of lane k may meet, and whether they surely do.
 struct PairBits {
   std::uint32_t possible, certain;
 };
@@ -531,9 +531,9 @@ HWY_INLINE V leastOfCut(const Vec3 (&t)[3], const Fork& fork, M is_cut, V off, c
   return hn::Sub(hn::IfThenElse(is_cut, hn::Max(least, of_corners), of_corners), ahead.rounding_margin);
 }
 
-// Are p and q apart along a cross product of their edges? w: the corners of q from p[0] on. Any axis will do, whatever
-// it was computed from: with u = 2^-24, corners are off by 25 u of the size and the tolerance, what w and the two
-// products round is below 16 u times the sum of the axis's entries; the limits have 64 u of the size and the tolerance.
+// Where p and q are apart along a cross product of their edges. w: the corners of q from p[0] on. Any axis will do,
+// however computed: with u = 2^-24, corners are off by 25 u of the size and the tolerance, what w and the two products
+// round is below 16 u times the sum of the axis's entries; the limits have 64 u of the size and the tolerance.
 HWY_INLINE M apartByEdges(const Plane& of_p, const Plane& of_q, const Vec3 (&w)[3], const Limits& limits, M asked) {
   const D d;
   const V zero = hn::Zero(d);

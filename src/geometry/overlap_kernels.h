@@ -6,7 +6,6 @@
 
 #include "bounds/loose_frame.h"
 #include "lattice/limits.h"
-#include "oracle/oracle.h"
 
 namespace bocst::query {
 

@@ -29,7 +29,7 @@ struct BothTriangles {
   Vec3d p[3], q[3];
 };
 
-// Is the overlap along an axis the least? Not along one that is all rounding: no longer than the root of `shortest`.
+// Takes the overlap along an axis if it is the least. An axis no longer than the root of `shortest` is all rounding.
 HWY_INLINE void consider(const BothTriangles& t, const Vec3d& axis, Vd shortest, LeastOverlap& least) {
   const Dd d;
   const Vd zero = hn::Zero(d), length = dot(axis, axis);
@@ -132,7 +132,8 @@ HWY_INLINE CutMiddle cutMiddle(const BothTriangles& t, const Edges& e, const Edg
   const Vec3d direction = scaled(line, hn::Div(hn::Set(d, 1.0), hn::Sqrt(squared)));
   const Vd pb = dot(direction, sub(b, a)), qc = dot(direction, sub(c, a)), qd = dot(direction, sub(g, a));
   const Vd lo = hn::Max(hn::Min(pb, zero), hn::Min(qc, qd)), hi = hn::Min(hn::Max(pb, zero), hn::Max(qc, qd));
-  const Vd least = hn::Mul(hn::Set(d, 1e-24), hn::Mul(e.normal_squared, f.normal_squared));
+  const Vd least =
+      hn::Mul(hn::Set(d, kLeastSineOfPlanes * kLeastSineOfPlanes), hn::Mul(e.normal_squared, f.normal_squared));
   const Md slanted = hn::And(areas, hn::Gt(squared, least));
   return {along(a, hn::Mul(hn::Add(lo, hi), hn::Set(d, 0.5)), direction),
           hn::And(hn::And(cuts, slanted), hn::Le(lo, hi))};

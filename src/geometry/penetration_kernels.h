@@ -33,6 +33,9 @@ struct TrianglePairs {
   }
 };
 
+/// Below this sine of the angle between two planes, their line is too uncertain to say where triangles cut each other.
+constexpr double kLeastSineOfPlanes = 1e-6;
+
 /// What trianglePenetrations() says of each pair.
 struct PairPenetrations {
   alignas(64) double normal[3][TrianglePairs::kCapacity];

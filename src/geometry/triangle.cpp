@@ -30,6 +30,40 @@ bool cutByPlane(const Corners& t, const Vector3d& o, const Vector3d& n, Vector3d
   return true;
 }
 
+// The middle of what two parallel triangles share, which are `distance` apart: p, clipped by planes through the edges
+// of q (Sutherland and Hodgman 1974). Nothing if they are not parallel there. q has an area.
+std::optional<Vector3d> middleOfSharedPolygon(const Corners& p, const Corners& q, double distance) {
+  const Vector3d normal = (q[1] - q[0]).cross(q[2] - q[0]).stableNormalized();
+  double size = 0;
+  for (int k = 0; k < 3; ++k) size = std::max({size, (p[k] - q[0]).lpNorm<1>(), (q[k] - q[0]).lpNorm<1>()});
+  constexpr std::size_t kMost = 24;  // each clip at most doubles the corners
+  Vector3d polygon[kMost], kept[kMost];
+  std::size_t count = 3;
+  std::copy(p.begin(), p.end(), polygon);
+  for (std::size_t i = 0; i < 3; ++i) {
+    const Vector3d inwards = normal.cross(q[(i + 1) % 3] - q[i]).stableNormalized();
+    const double doubt = 1e-12 * size;
+    std::size_t left = 0;
+    for (std::size_t j = 0; j < count; ++j) {
+      const Vector3d &u = polygon[j], &v = polygon[(j + 1) % count];
+      const double in_u = inwards.dot(u - q[i]), in_v = inwards.dot(v - q[i]);
+      if (in_u >= -doubt) kept[left++] = u;
+      if (std::min(in_u, in_v) < -doubt && std::max(in_u, in_v) > doubt)
+        kept[left++] = u + in_u / (in_u - in_v) * (v - u);
+    }
+    count = left;
+    std::copy(kept, kept + count, polygon);
+  }
+  if (count == 0) return {};
+  Vector3d sum = Vector3d::Zero();
+  for (std::size_t j = 0; j < count; ++j) {
+    if (std::abs(normal.dot(polygon[j] - q[0])) > distance + 1e-9 * size) return {};
+    sum += polygon[j] - q[0];
+  }
+  const Vector3d middle = sum / static_cast<double>(count);
+  return q[0] + middle - normal.dot(middle) / 2 * normal;
+}
+
 Vector3d middleOfOverlap(const Corners& p, const Corners& q) {
   const Vector3d n = (p[1] - p[0]).cross(p[2] - p[0]), m = (q[1] - q[0]).cross(q[2] - q[0]);
   const Vector3d line = n.cross(m);
@@ -40,8 +74,8 @@ Vector3d middleOfOverlap(const Corners& p, const Corners& q) {
     if (!edgesTouch(p, q, std::numeric_limits<double>::epsilon() * largest, a, b)) nearestPoints(p, q, a, b);
     return (a + b) / 2;
   }
-  if (line.squaredNorm() > 1e-24 * n.squaredNorm() * m.squaredNorm() && cutByPlane(p, q[0], m, a, b) &&
-      cutByPlane(q, p[0], n, c, d)) {
+  if (line.squaredNorm() > kLeastSineOfPlanes * kLeastSineOfPlanes * n.squaredNorm() * m.squaredNorm() &&
+      cutByPlane(p, q[0], m, a, b) && cutByPlane(q, p[0], n, c, d)) {
     // Both segments lie on the line of the two planes: the middle of what they share.
     const Vector3d origin = a, dir = line.normalized();
     const double pa = 0, pb = dir.dot(b - origin), qc = dir.dot(c - origin), qd = dir.dot(d - origin);
@@ -51,10 +85,8 @@ Vector3d middleOfOverlap(const Corners& p, const Corners& q) {
     return (a + b) / 2;
   }
   // They may be said to touch, in S, and be just apart.
-  if (nearestPoints(p, q, a, b) > 0) return (a + b) / 2;
-  const Vector3d lo = p[0].cwiseMin(p[1]).cwiseMin(p[2]).cwiseMax(q[0].cwiseMin(q[1]).cwiseMin(q[2]));
-  const Vector3d hi = p[0].cwiseMax(p[1]).cwiseMax(p[2]).cwiseMin(q[0].cwiseMax(q[1]).cwiseMax(q[2]));
-  return (lo + hi) / 2;
+  const double distance = nearestPoints(p, q, a, b);
+  return middleOfSharedPolygon(p, q, distance).value_or((a + b) / 2);
 }
 
 // The sum of two doubles, the second no more than half a unit of the first: 106 bits (Dekker 1971, Knuth 1969).
@@ -177,7 +209,7 @@ bool hasFace(const Face<T>& f) {
   return f.sine2 > (std::is_same<T, double>::value ? kWellShaped : kHasFace);
 }
 
-// Is a point of the plane over the inside?
+// True if a point of the plane is in the triangle.
 template <typename T>
 bool isInside(const Face<T>& t, const Vec<T>& at) {
   for (int i = 0; i < 3; ++i) {
@@ -319,7 +351,7 @@ Face<double> faceOf(const Corners& t) { return {Vec<double>(t[0]), Vec<double>(t
 
 }  // namespace
 
-ContactPoint trianglePenetrations(const Corners& p, const Corners& q) {
+ContactPoint trianglePenetration(const Corners& p, const Corners& q) {
   TrianglePairs pair;
   pair.put(0, p, q);
   pair.count = 1;
@@ -381,8 +413,8 @@ std::optional<double> nearEndOfCut(const Corners& p, const Corners& q, const Vec
   const Vector3d normal_p = (p[1] - p[0]).cross(p[2] - p[0]), normal_q = (q[1] - q[0]).cross(q[2] - q[0]);
   const Vector3d line = normal_p.cross(normal_q);
   // The order of points along the line is that of their coordinates along its direction, which must be known.
-  constexpr double kLeastSine = 1e-6;
-  if (!(line.squaredNorm() > kLeastSine * kLeastSine * normal_p.squaredNorm() * normal_q.squaredNorm())) return {};
+  if (!(line.squaredNorm() > kLeastSineOfPlanes * kLeastSineOfPlanes * normal_p.squaredNorm() * normal_q.squaredNorm()))
+    return {};
   Vector3d of_p[2], of_q[2];
   if (!clearlyCutByPlane(p, q, normal_q, tolerance, of_p) || !clearlyCutByPlane(q, p, normal_p, tolerance, of_q))
     return {};

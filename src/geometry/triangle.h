@@ -22,9 +22,9 @@ struct ContactPoint {
 };
 
 /// The shortest way to part two triangles that touch: the separating axis (face normals, edge cross products, in-plane
-/// edge normals) with the least overlap. point is the middle of the segment in which they cut, of the overlap of their
-/// boxes when they are coplanar, or between their nearest points when they do not meet or one is degenerate.
-ContactPoint trianglePenetrations(const Corners& p, const Corners& q);
+/// edge normals) with the least overlap. point is the middle of the segment in which they cut, or of the polygon that
+/// they share if they are coplanar; else it is between their nearest points.
+ContactPoint trianglePenetration(const Corners& p, const Corners& q);
 
 /// What the depths of many pairs say, a bit each: whether FCL's test surely finds that they meet, or that they do not.
 struct PenetrationVerdicts {
@@ -51,11 +51,11 @@ double relativeWidth(const Corners& triangle);
 constexpr double kDegenerate = 1e-14;
 inline bool isDegenerate(const Corners& triangle) { return relativeWidth(triangle) <= kDegenerate; }
 
-/// Are two closed triangles, degenerate or not, surely farther apart than `distance`? Looks for an axis among their
-/// normals and the cross products of their edges; a fiftieth of the time of nearestPoints() on slivers.
+/// True if two closed triangles, degenerate or not, are surely farther apart than `distance`. Looks for an axis among
+/// their normals and the cross products of their edges; a fiftieth of the time of nearestPoints() on slivers.
 bool areApart(const Corners& p, const Corners& q, double distance);
 
-/// Are there points of edges of both, degenerate or not, that are no farther apart than `distance`? Looks in double, so
+/// True if points of edges of both, degenerate or not, are found no farther apart than `distance`. Looks in double, so
 /// each point may be off its edge by 4 roundings of the largest coordinate. False says nothing.
 bool edgesTouch(const Corners& p, const Corners& q, double distance, Eigen::Vector3d& on_p, Eigen::Vector3d& on_q);
 

@@ -135,8 +135,8 @@ inline void cornersOf(const OrientedVolume& box, const SimilarityTransform& to, 
   }
 }
 
-/// Are the two boxes surely apart? The fifteen axes in double; `to` places b in a's frame. For the few pairs that no
-/// kernel sees.
+/// True if the two boxes are surely apart. The fifteen axes in double; `to` places b in a's frame. For the few pairs
+/// that no kernel sees.
 inline bool boxesApart(const OrientedVolume& a, const OrientedVolume& b, const SimilarityTransform& to) {
   const Eigen::Matrix3d r = a.axes.transpose() * (to.rotation * b.axes);
   const Eigen::Vector3d t = a.axes.transpose() * (to * b.center - a.center), h = b.half * to.scale;

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: BSD-3-Clause
-#include "check_scene.h"
+#include "io/check_scene.h"
 
 #include <algorithm>
 #include <cstddef>
@@ -9,8 +9,8 @@
 #include <stdexcept>
 #include <string>
 
-#include "binary.h"
-#include "text.h"
+#include "io/binary.h"
+#include "io/text.h"
 
 namespace bocst::io {
 namespace {

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: BSD-3-Clause
-#include "cut_polygon.h"
+#include "io/cut_polygon.h"
 
 #include <algorithm>
 #include <cmath>
@@ -86,7 +86,7 @@ class Cutter {
     }
   }
 
-  /// May the triangle at corner i be cut off? Only if it turns left and no other corner lies in it.
+  /// True if the triangle at corner i may be cut off: it does not turn right, and no other corner lies in it.
   bool isEar(Corner i, std::size_t& effort) const {
     const Corner a = prev_[i];
     const Corner c = next_[i];

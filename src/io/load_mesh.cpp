@@ -10,10 +10,10 @@
 #include <utility>
 #include <vector>
 
-#include "check_scene.h"
-#include "file.h"
-#include "read_mesh.h"
-#include "read_scene.h"
+#include "io/check_scene.h"
+#include "io/file.h"
+#include "io/read_mesh.h"
+#include "io/read_scene.h"
 
 namespace bocst {
 namespace {

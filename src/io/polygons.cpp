@@ -1,9 +1,9 @@
 // SPDX-License-Identifier: BSD-3-Clause
-#include "polygons.h"
+#include "io/polygons.h"
 
 #include <cmath>
 
-#include "cut_polygon.h"
+#include "io/cut_polygon.h"
 
 namespace bocst::io {
 namespace {

@@ -13,8 +13,8 @@
 #include <utility>
 #include <vector>
 
-#include "read_mesh.h"
-#include "text.h"
+#include "io/read_mesh.h"
+#include "io/text.h"
 
 namespace bocst::io {
 namespace {

@@ -1,9 +1,9 @@
 // SPDX-License-Identifier: BSD-3-Clause
-#include "read_mesh.h"
+#include "io/read_mesh.h"
 
 #include <stdexcept>
 
-#include "text.h"
+#include "io/text.h"
 
 namespace bocst::io {
 

@@ -4,7 +4,7 @@
 #include <string_view>
 #include <utility>
 
-#include "polygons.h"
+#include "io/polygons.h"
 
 namespace bocst::io {
 

@@ -6,8 +6,9 @@
 #include <string>
 #include <string_view>
 
-#include "read_mesh.h"
-#include "text.h"
+#include "io/read_mesh.h"
+#include "io/text.h"
+#include "mesh/limits.h"
 
 namespace bocst::io {
 namespace {

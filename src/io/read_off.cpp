@@ -7,8 +7,8 @@
 #include <string_view>
 #include <utility>
 
-#include "read_mesh.h"
-#include "text.h"
+#include "io/read_mesh.h"
+#include "io/text.h"
 
 namespace bocst::io {
 namespace {

@@ -9,9 +9,9 @@
 #include <string_view>
 #include <vector>
 
-#include "binary.h"
-#include "read_mesh.h"
-#include "text.h"
+#include "io/binary.h"
+#include "io/read_mesh.h"
+#include "io/text.h"
 
 namespace bocst::io {
 namespace {

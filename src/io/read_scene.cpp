@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: BSD-3-Clause
-#include "read_scene.h"
+#include "io/read_scene.h"
 
 #include <assimp/BaseImporter.h>
 #include <assimp/MemoryIOWrapper.h>
@@ -22,10 +22,10 @@
 #include <utility>
 #include <vector>
 
-#include "file.h"
-#include "read_mesh.h"
-#include "text.h"
-#include "vertex_pool.h"
+#include "io/file.h"
+#include "io/read_mesh.h"
+#include "io/text.h"
+#include "io/vertex_pool.h"
 
 namespace bocst::io {
 namespace {

@@ -5,7 +5,7 @@
 #include <string_view>
 #include <vector>
 
-#include "polygons.h"
+#include "io/polygons.h"
 
 namespace bocst::io {
 

@@ -8,10 +8,10 @@
 #include <string>
 #include <string_view>
 
-#include "binary.h"
-#include "read_mesh.h"
-#include "text.h"
-#include "vertex_pool.h"
+#include "io/binary.h"
+#include "io/read_mesh.h"
+#include "io/text.h"
+#include "io/vertex_pool.h"
 
 namespace bocst::io {
 namespace {

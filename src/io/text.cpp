@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: BSD-3-Clause
-#include "text.h"
+#include "io/text.h"
 
 #include <locale.h>
 #include <stdlib.h>
@@ -11,6 +11,8 @@
 #include <cstddef>
 #include <stdexcept>
 #include <system_error>
+
+#include "mesh/limits.h"
 
 namespace bocst::io {
 

@@ -62,8 +62,6 @@ inline std::string percentDecoded(std::string_view path) {
 /// @throws std::runtime_error "line N: what", where N is the line of `file` that `at` points into.
 [[noreturn]] void failAt(std::string_view file, const char* at, const std::string& what);
 
-/// Meshes have no larger coordinates.
-constexpr double kMostCoordinate = 1e75;
 /// Why a number is no coordinate of a mesh, for a message; null if it is one.
 const char* notACoordinate(double number);
 

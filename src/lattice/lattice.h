@@ -52,7 +52,7 @@ class BOCST_EXPORT Lattice {
   /// The actual regions end here, in units, on each axis.
   const std::array<std::uint32_t, 3>& extent() const { return extent_; }
 
-  /// Has the cell an actual region?
+  /// True if the cell has an actual region.
   bool exists(const Cell& cell) const;
 
   /// The actual region, in lattice units.
@@ -76,7 +76,7 @@ class BOCST_EXPORT Lattice {
   int root_exponent_ = kBits;
 };
 
-/// The paper's level rule (5.3): is the collision depth one more for this d_t?
+/// The paper's level rule (5.3): true if the collision depth is one more for this d_t.
 bool oneLevelMore(double dimension);
 
 }  // namespace bocst::lattice

@@ -30,7 +30,7 @@ class Pool {
 
   /// `count` consecutive default-initialised elements, contiguous in memory; returns the index of the first.
   std::uint32_t append(std::size_t count) {
-    // What room there is lies in the last chunks; a run that does not fit starts with chunks of its own.
+    // Free elements are in the last chunks; a run that does not fit there starts with a new chunk.
     const bool fits = count <= capacity_ - size_;
     if ((fits ? size_ : capacity_) + count > kMost) {
       throw std::length_error("bocst: a tree of more than 2^30 nodes or list entries");
@@ -78,7 +78,7 @@ class Pool {
 
   void grow(std::size_t chunks) {
     const std::size_t used = capacity_ >> kChunkBits;
-    // Room first: what is made then must not be lost for want of it.
+    // Reserve first: an exception after an allocation would lose the chunk.
     chunks_.reserve(chunks_.size() + 1);
     directories_.reserve(directories_.size() + 1);
     directory_sizes_.reserve(directory_sizes_.size() + 1);

@@ -11,6 +11,7 @@
 #include <string>
 #include <type_traits>
 
+#include "mesh/limits.h"
 #include "mesh/scan.h"
 
 namespace bocst {
@@ -18,8 +19,6 @@ namespace {
 
 constexpr std::size_t kMaxTriangles = std::size_t{1} << 28;
 constexpr std::size_t kMaxVertices = std::numeric_limits<std::uint32_t>::max();
-// Squares and cubes of coordinates appear in the exact test: they must stay finite.
-constexpr double kMaxCoordinate = 1e75;
 
 [[noreturn]] void bad(const std::string& what) { throw std::invalid_argument("bocst::Mesh: " + what); }
 
@@ -68,7 +67,7 @@ class NarrowIterator {
 [[noreturn]] void badVertex(const std::vector<Eigen::Vector3d>& vertices) {
   const auto good = [](const Eigen::Vector3d& v) {
     // One comparison a coordinate finds NaN, infinities and what is too large.
-    return std::abs(v[0]) <= kMaxCoordinate && std::abs(v[1]) <= kMaxCoordinate && std::abs(v[2]) <= kMaxCoordinate;
+    return std::abs(v[0]) <= kMostCoordinate && std::abs(v[1]) <= kMostCoordinate && std::abs(v[2]) <= kMostCoordinate;
   };
   const auto v = std::find_if_not(vertices.begin(), vertices.end(), good);
   bad("vertex " + std::to_string(v - vertices.begin()) + " is " + coordinates(*v) +
@@ -88,7 +87,7 @@ Extremes extremesOf(const std::vector<Eigen::Vector3d>& vertices) {
   for (std::size_t begin = 0; begin < vertices.size(); begin += kBlock) {
     const Eigen::Vector3d lo_before = lo, hi_before = hi;
     const std::size_t count = std::min(kBlock, vertices.size() - begin);
-    if (!widenByPoints(vertices[begin].data(), count, kMaxCoordinate, lo.data(), hi.data())) badVertex(vertices);
+    if (!widenByPoints(vertices[begin].data(), count, kMostCoordinate, lo.data(), hi.data())) badVertex(vertices);
     for (int k = 0; k < 3; ++k) {
       if (lo[k] < lo_before[k]) block[k] = begin;
       if (hi[k] > hi_before[k]) block[3 + k] = begin;
@@ -108,7 +107,7 @@ Extremes extremesOf(const std::vector<Eigen::Vector3d>& vertices) {
 
 struct IndexScan {
   std::uint32_t largest = 0;
-  bool uses_all = false;  ///< Are all of the wanted among the indices?
+  bool uses_all = false;  ///< All of the wanted are among the indices.
 };
 
 IndexScan scanIndices(const std::vector<Mesh::Indices>& triangles, std::array<std::uint32_t, 6> wanted) {

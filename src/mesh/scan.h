@@ -13,7 +13,6 @@ bool widenByPoints(const double* points, std::size_t count, double most, double 
 /// The largest of the values; 0 of none.
 std::uint32_t largest(const std::uint32_t* values, std::size_t count);
 
-/// Is the value among them?
 bool contains(const std::uint32_t* values, std::size_t count, std::uint32_t value);
 
 }  // namespace bocst

@@ -148,7 +148,7 @@ bool Solid::windsAbout(const Vector3d& point) const {
     if ((up + along * side).norm() <= rounding_) return true;
     const int turns = int{up.x() > 0} - int{down.x() > 0};
     if (turns == 0) continue;
-    // Does the side pass above the point? It is not near it, so this has a sign.
+    // True if the side passes above the point. It is not near it, so this has a sign.
     const bool above = std::min(up.y(), down.y()) > 0 ||
                        (std::max(up.y(), down.y()) > 0 && (side.x() * up.y() > side.y() * up.x()) == (side.x() > 0));
     if (above) winding += turns;

@@ -25,8 +25,8 @@ class Solid {
   /// @throws std::invalid_argument naming the first edge where that is not so.
   explicit Solid(std::shared_ptr<const Mesh> mesh);
 
-  /// Is the point (in the mesh's frame), whose coordinates may be off by `tolerance`, inside? True also where rounding
-  /// leaves that open.
+  /// True if the point (in the mesh's frame), whose coordinates may be off by `tolerance`, is inside. True also where
+  /// rounding leaves that open.
   bool mayContain(const Eigen::Vector3d& point, double tolerance) const;
 
   std::size_t bytes() const;

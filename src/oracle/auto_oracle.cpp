@@ -136,8 +136,8 @@ AutoOracle::Share AutoOracle::bestShare(const Work& batch, const std::vector<Can
   return share;
 }
 
-// Is the device faster than the host, and faster alone than both together can be? In a second, the host answers what
-// takes the device at most `relief` seconds, so both together take at least 1 / (1 + relief) of the device's time.
+// True if the device is faster than the host, and faster alone than both together can be. In a second, the host answers
+// what takes the device at most `relief` seconds, so both together take at least 1 / (1 + relief) of the device's time.
 bool AutoOracle::isAllForDevice(const Work& batch) const {
   const double here = host_cost_.of(batch.cells, batch.triangles),
                there = device_cost_.of(batch.cells, batch.triangles);

@@ -24,7 +24,7 @@ class Trials {
 
   /// Work came that takes the host `host` seconds.
   void earn(double host);
-  /// May work be tried that takes so long on the device and on the host? Without paying.
+  /// True if work that takes so long on the device and on the host may be tried. Without paying.
   bool affords(double device, double host) const;
   /// Pays for a trial, or says no.
   bool take(double device, double host);
@@ -33,12 +33,12 @@ class Trials {
   double credit_ = 0;  // seconds
 };
 
-/// Who walks pairs of sphere-trees: a device, or the host? Learns from what both took.
+/// Chooses who walks pairs of sphere-trees: a device or the host. Learns from what both took.
 ///
 /// Threads: any number. While one thread uses this, the others let the host walk.
 class PairsChoice {
  public:
-  /// is_hardware: is the device expected to be fast, before it was measured?
+  /// is_hardware: true if the device is expected to be fast, before it was measured.
   explicit PairsChoice(bool is_hardware);
 
   bool takesDevice(std::size_t pairs);

@@ -102,7 +102,7 @@ class Oracle {
   /// it cannot. A surface that nobody keeps resident is brought again for each batch.
   virtual std::shared_ptr<const DeviceResource> makeResident(const Surface&) { return nullptr; }
 
-  /// Does it need the mesh on the host, too?
+  /// True if it needs the mesh on the host, too.
   virtual bool needsHostMesh() const { return true; }
 
   /// Keeps words where the oracle works; null where it cannot.

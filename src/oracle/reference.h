@@ -13,7 +13,7 @@ inline Eigen::Vector3d centerOf(const lattice::Cell& cell) {
   return Eigen::Vector3d(at[0], at[1], at[2]).array() + cell.side() / 2.0;
 }
 
-/// Does the closed triangle meet the closed cube? A separating-axis test in double over the 13 axes. Rounding never
+/// True if the closed triangle meets the closed cube. A separating-axis test in double over the 13 axes. Rounding never
 /// separates what touches: the half side is kBoxRoundingMargin longer on box and edge axes, and the plane axis has a
 /// margin of kPlaneRoundingMargin times the sum of its products' sizes (reference.cpp). Both are twice what the
 /// first-order bound of the operations needs (6.5 and 11 units of 2^-53, plus 2 for the rounding of toLattice).

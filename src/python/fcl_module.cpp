@@ -353,9 +353,9 @@ void bindBuilder(py::module_& m, const char* name, const char* text) {
 }
 
 #if FCL_HAVE_OCTOMAP
-/// Is this the data part of octomap's binary format, of a tree that is no deeper than octomap's? Its reader takes what
-/// is beyond the end for nodes, and calls itself for each level. A node is two bits for each child; both are set for a
-/// child that is a node again, which follows.
+/// True if this is the data part of octomap's binary format, of a tree that is no deeper than octomap's. Its reader
+/// takes what is beyond the end for nodes, and calls itself for each level. A node is two bits for each child; both are
+/// set for a child that is a node again, which follows.
 bool isBinaryOctree(std::string_view data) {
   constexpr int kDeepest = 16;
   std::vector<int> levels{0};  // of the nodes to come, the next one last
@@ -698,7 +698,7 @@ std::size_t collideObjects(const Object& o1, const Object& o2, const std::option
   return count;
 }
 
-/// Is this a shape that is flat, a line or a point? A TriangleP is flat, but FCL can do with it.
+/// True for a shape that is flat, a line or a point, except a TriangleP, which FCL can deal with.
 bool hasNoVolume(const fcl::CollisionGeometryd& g) {
   return g.getObjectType() == fcl::OT_GEOM && g.getNodeType() != fcl::GEOM_TRIANGLE && g.computeVolume() == 0;
 }
@@ -708,7 +708,7 @@ bool isRound(fcl::NODE_TYPE type) {
          type == fcl::GEOM_CONE || type == fcl::GEOM_CYLINDER;
 }
 
-/// Has FCL a formula for the distance, so that it asks no solver?
+/// True if FCL has a formula for the distance, so that it asks no solver.
 bool hasFormula(fcl::NODE_TYPE type1, fcl::NODE_TYPE type2) {
   if (type1 == fcl::GEOM_CAPSULE && type2 == fcl::GEOM_CAPSULE) return true;
   if (type2 == fcl::GEOM_SPHERE) std::swap(type1, type2);

@@ -7,8 +7,8 @@
 
 namespace bocst::scene {
 
-/// Is the motion from one state to the other free? begin, end: one pose for each moving object, which checkPoses() has
-/// checked. One StateCheck a thread.
+/// True if the motion from one state to the other is free. begin, end: one pose for each moving object, which
+/// checkPoses() has checked. One StateCheck a thread.
 template <typename S>
 bool edgeIsFree(const World<S>& world, StateCheck<S>& check, const fcl::Transform3<S>* begin,
                 const fcl::Transform3<S>* end, fcl::CCDMotionType motion);

@@ -36,7 +36,7 @@ class IgnoredPairs {
     partners_.erase(object);
   }
 
-  /// What may touch an object.
+  /// The objects that this object may touch.
   const Partners& of(Id object) const {
     static const Partners none;
     const auto found = partners_.find(object);

@@ -8,9 +8,9 @@
 #include "scene/bounds.h"
 #include "scene/boxes.h"
 
-// Rows of poses, several at a time: are they rigid, how far do they move objects, and where are the objects' boxes? A
-// pose is sixteen numbers of S, the matrix of an fcl::Transform3 column after column; its last row is not read. A state
-// is a pose of each moving object in a row. Chosen at run time for the machine's instruction set.
+// Finds for rows of poses, several at a time, whether they are rigid, how far they move objects, and where the objects'
+// boxes are. A pose is sixteen numbers of S, the matrix of an fcl::Transform3 column after column; its last row is not
+// read. A state is a pose of each moving object in a row. Chosen at run time for the machine's instruction set.
 
 namespace bocst::scene {
 

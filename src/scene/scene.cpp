@@ -121,7 +121,7 @@ struct Scene<S>::Impl {
       if (world.use_count() > 1) {
         world = std::make_shared<World<S>>(*world);  // queries under way keep the old one
       } else {
-        const auto counted = world;  // when it counts down, it sees what queries did before they counted down
+        const auto counted = world;  // its decrement makes what ended queries did visible here
       }
       if (apply(*world) && !world->isWorn()) return;
     } catch (const std::bad_alloc&) {

@@ -190,7 +190,7 @@ bool StateCheck<S>::checkCandidates(const fcl::Transform3<S>* X_WM, std::vector<
   return touches_;
 }
 
-// Does the pair touch in this state? If it can in no other either, takes it off its entry.
+// Asks whether the pair touches in this state. Takes it off its entry if it can touch in no state.
 template <typename S>
 void StateCheck<S>::ask(const fcl::Transform3<S>* X_WM, const Candidate& c, std::vector<Entry>* entries) {
   const Object<S>&a = world_->moving[c.pair.moving], &b = world_->object(c.pair.group, c.pair.lane);

@@ -20,7 +20,7 @@ struct PairAt {
   std::uint32_t moving, group, lane;
 };
 
-/// Does fcl::collide say so? `scratch` is a result to write to.
+/// True if fcl::collide with the default request says that they touch. `scratch` is a result to write to.
 template <typename S>
 bool touch(const Object<S>& a, const fcl::Transform3<S>& X_WA, const Object<S>& b, const fcl::Transform3<S>& X_WB,
            fcl::CollisionResult<S>& scratch);
@@ -46,7 +46,7 @@ class StateCheck {
   /// A length that clearances of this world may have; more than 0.
   double clearance_guess = 0;
 
-  /// Should lists be complete where a pair touches, too?
+  /// True if lists should be complete where a pair touches, too.
   bool lists_after_hit = false;
 
   /// Places the objects, and finds pairs that may be near: among the entries [begin, end) of the list, or, without one,

@@ -346,12 +346,12 @@ void World<S>::addGroup() {
 template <typename S>
 bool World<S>::putFixed(const Object<S>& object, const IgnoredPairs& ignored) {
   if (sizeOf(object) > largest_) return false;  // the reach of all boxes depends on it
-  ++changes_;
-  const auto known = place_of_.find(object.id);
   if (object.bounds.kind == Bounds::kNowhere) {
     removeFixed(object.id);
     return true;
   }
+  ++changes_;
+  const auto known = place_of_.find(object.id);
   const double orthogonality_error = fcl_adapter::orthogonalityErrorOf<S>(object.X_WG);
   const Box box = boxAt(object, object.X_WG, orthogonality_error);
   const std::size_t place = known != place_of_.end() ? known->second : freePlace(box);

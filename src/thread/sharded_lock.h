@@ -21,7 +21,7 @@ namespace bocst::thread {
 /// throws std::runtime_error.
 class ShardedLock {
  public:
-  /// The index of this thread's counter. Who takes several query locks reads it once and passes it on.
+  /// The index of this thread's counter. A caller that takes several query locks reads it once and passes it on.
   static std::size_t shard() {
     static std::atomic<std::size_t> threads{0};
     thread_local const std::size_t number = threads.fetch_add(1, std::memory_order_relaxed);

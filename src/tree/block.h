@@ -7,8 +7,8 @@
 
 #include "bounds/cell_frame.h"
 #include "bounds/loose_frame.h"
+#include "lattice/lattice.h"
 #include "lattice/limits.h"
-#include "oracle/oracle.h"
 
 namespace bocst::tree {
 

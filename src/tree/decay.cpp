@@ -19,7 +19,7 @@ constexpr std::uint32_t kWorthwhileShare = 64;
 /// queries that come back pack those of the leaves that they need.
 enum class Tree::Fate : std::uint8_t { kDropped, kStripped, kKept };
 
-// Has it no child blocks?
+// True if the block has no child blocks.
 bool Tree::isDeepestBlock(const Block& block) {
   for (int o = 0; o < 8; ++o) {
     const bool is_grey = (block.grey >> o & 1) != 0;

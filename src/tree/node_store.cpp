@@ -9,7 +9,7 @@
 namespace bocst::tree {
 
 std::uint32_t NodeStore::append(NodeRef node, std::uint8_t grey, std::int64_t now) {
-  // Without memory for one of the three, the next block takes the places of those that there were.
+  // If one of the three appends throws, the next block uses the elements that were appended.
   const std::uint32_t index = blocks.size();
   if (index >= NodeRef::kMostBlocks) throw std::length_error("bocst: a tree of more than 2^29 blocks");
   if (records.size() == index) records.append(1);

@@ -35,7 +35,7 @@ class Rent {
   void pay(std::size_t amount) const {
     if (!isStopped()) paid_.fetch_add(amount, std::memory_order_relaxed);
   }
-  /// Was more paid than the price?
+  /// True if more was paid than the price.
   bool isDue() const { return paid_.load(std::memory_order_relaxed) > price_.load(std::memory_order_relaxed); }
   /// The part of the price that is not paid yet.
   std::size_t left() const {

@@ -66,7 +66,7 @@ class alignas(64) Outline {
     std::array<std::uint64_t, kWords> words;
     static_assert(sizeof(Box) == sizeof(words));
     std::memcpy(words.data(), &box, sizeof(box));
-    // Who sees one of these sees that the version is odd, or a later one.
+    // A reader that sees one of these words also sees the odd version or a later one.
     for (std::size_t i = 0; i < kWords; ++i) words_[i].store(words[i], std::memory_order_release);
     version_.store(version + 2, std::memory_order_release);
   }

@@ -6,7 +6,7 @@
 #include <memory>
 #include <vector>
 
-#include "oracle/oracle.h"
+#include "oracle/surface.h"
 #include "tree/root_grid_kernels.h"
 
 namespace bocst::tree {
@@ -27,7 +27,7 @@ class RootGrid {
   /// The finest level that is known.
   int level() const { return bits_ + 1; }
 
-  /// Is this cell, of level 2 to level(), grey? Remembers the answer, so one thread at a time.
+  /// True if this cell, of level 2 to level(), is grey. Remembers the answer, so one thread at a time.
   bool grey(const oracle::Surface& surface, const lattice::Cell& cell);
 
   /// A box of the surface inside a grey cell, in lattice units: that of its finest cells which are not known to be

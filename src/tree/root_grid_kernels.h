@@ -25,7 +25,7 @@ constexpr std::uint32_t kGridSpanLarge = 1u << 6;
 /// last vertex is read, too. out: room for a multiple of 8. bits: 1 to 5.
 void gridSpans(const std::int16_t* vertices, const std::uint32_t* indices, std::size_t count, int bits, GridSpan* out);
 
-/// Bit i % 8 of bits[i / 8]: is values[i] another value than this? count: a multiple of 8.
+/// Bit i % 8 of bits[i / 8] is 1 where values[i] is another value than this. count: a multiple of 8.
 void bitsOfOthers(const std::uint32_t* values, std::size_t count, std::uint32_t value, std::uint8_t* bits);
 
 /// back[i] = first + i - from[i], modulo 2^32 and then as a signed number, no less than 0 and no more than 65535. Whole

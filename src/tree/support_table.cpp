@@ -9,7 +9,7 @@
 namespace bocst::tree {
 namespace {
 
-// Beside the rounding to float, that of the sums in double.
+// Adds the rounding to float and that of the sums in double.
 float roundedUp(double x) {
   return std::nextafter(static_cast<float>(x + 1e-9 * std::abs(x)), std::numeric_limits<float>::infinity());
 }

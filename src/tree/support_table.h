@@ -36,7 +36,7 @@ class SupportTable {
 
   float value(int number) const { return values_[static_cast<std::size_t>(number)].load(std::memory_order_relaxed); }
 
-  /// All of them, for who reads several at once; each is a word of its own, so it is never read in parts.
+  /// All values, for callers that read several at once. Each value is one word, so no read sees half of a write.
   const float* values() const {
     static_assert(sizeof(std::atomic<float>) == sizeof(float) && std::atomic<float>::is_always_lock_free);
     return reinterpret_cast<const float*>(values_.data());

@@ -287,7 +287,7 @@ Tree::Batch::Batch(const std::vector<Growth>& nodes) {
   gathered_.reserve(names.size());
   for (const std::uint64_t name : names) {
     const Growth g{trees_[name >> 33], NodeRef{static_cast<std::uint32_t>(name >> 1)}, (name & 1) != 0};
-    if (!g.tree->growAlone(g)) ask(g, names.size());
+    if (!g.tree->growWithoutOracle(g)) ask(g, names.size());
   }
   // From here on, oracles may write to the requests.
   try {
@@ -356,7 +356,7 @@ void Tree::Batch::abandon() noexcept {
 
 // Grows a node where that takes no oracle, or nothing has to grow any more. Nodes that grew before it in its batch
 // count.
-bool Tree::growAlone(const Growth& g) {
+bool Tree::growWithoutOracle(const Growth& g) {
   const ChildRef ref = childRef(g.node);
   if (ref.tag() == ChildRef::kBlock || (g.list_suffices && ref.tag() == ChildRef::kShortList)) return true;
   if (g.node.isRoot()) growRoot();

@@ -58,9 +58,9 @@ class Tree {
 
   /// A box about the surface, or about the spheres of conservative answers; without a lock.
   const Outline& outline() const { return outline_; }
-  /// Is it time that a query looks for branches to drop? Without a lock.
+  /// True if it is time for a query to look for branches to drop. Without a lock.
   bool isPruneDue(std::int64_t now) const { return now >= next_prune_.load(std::memory_order_relaxed); }
-  /// Are there branches that are dropped some time, if no query uses them? Without a lock.
+  /// True if something is resident that is dropped some time if no query uses it. Without a lock.
   bool hasDecay() const {
     return (root_.load(std::memory_order_relaxed).tag() == ChildRef::kBlock || boxes_.seen() != nullptr ||
             interior_.seen() != nullptr || recalled_bytes_.load(std::memory_order_relaxed) != 0) &&
@@ -82,7 +82,7 @@ class Tree {
                          : nodes_.blocks[node.block()].child[node.octant()].load(std::memory_order_acquire);
   }
   const Block& block(std::uint32_t index) const { return nodes_.blocks[index]; }
-  /// Is it a lane of a loose block? Else it is a cell.
+  /// True for a lane of a loose block. Other nodes are cells.
   bool isLoose(NodeRef node) const { return !node.isRoot() && nodes_.blocks[node.block()].isLoose(); }
   /// The root's is 1; that of a lane is the level of a cell of about its size.
   int level(NodeRef node) const { return node.isRoot() ? 1 : nodes_.blocks[node.block()].childLevel(); }
@@ -100,8 +100,8 @@ class Tree {
   /// whole tree, the next query builds it. One walk in a tree that is not whole adds kWalkRent.
   static constexpr std::size_t kWalkRent = 64;
   void payRent(std::size_t triangles) const { rent_.pay(triangles); }
-  /// Builds the whole tree when queries have paid as much as that costs, unless another thread grows it; did it? Of a
-  /// model that is built ahead, the first query that has paid anything has the helper thread do it.
+  /// Builds the whole tree when queries have paid as much as that costs, unless another thread grows it; true if built.
+  /// Of a model that is built ahead, the first query that has paid anything has the helper thread do it.
   bool buildIfDue() { return rent_.isDue() && buildNow(); }
   /// Builds the whole tree of exact answers, whatever queries have paid; only of a tree that gains by it, in a query.
   void build();
@@ -258,7 +258,7 @@ class Tree {
   const oracle::Surface& grownSurface();
   void forgetMesh();
 
-  bool growAlone(const Growth& g);
+  bool growWithoutOracle(const Growth& g);
   oracle::ExpansionRequest question(NodeRef node, std::vector<std::uint32_t>& ids);
   void askFor(std::uint32_t list, oracle::ExpansionRequest& request, std::vector<std::uint32_t>& ids) const;
   // A device is not asked about fewer triangles: the host builds what is below them sooner than a batch comes back.
@@ -290,7 +290,7 @@ class Tree {
   std::uint32_t addBlock(NodeRef node, std::uint8_t grey, std::int64_t now);
   ChildRef addList(const std::uint32_t* ids, std::size_t count, bool leaf);
   void setChild(NodeRef node, ChildRef ref);
-  /// Was the time `then` more than ttl before `now`? Both may be any times.
+  /// True if there is a ttl and `then` is more than ttl before `now`. Both may be any times.
   bool isOld(std::int64_t then, std::int64_t now) const {
     std::int64_t age;
     return ttl_ > 0 && now > then && (__builtin_sub_overflow(now, then, &age) || age > ttl_);

@@ -78,7 +78,7 @@ class TriangleLists {
     return true;
   }
   bool isPacked(std::uint32_t list) const { return (words_[list] & kPacked) != 0; }
-  /// Does the oracle keep it?
+  /// True if the oracle keeps the list.
   bool isOnDevice(std::uint32_t list) const { return (words_[list] & kOnDevice) != 0; }
   Place place(std::uint32_t list) const { return {resources_[words_[list + 1]], words_[list + 2]}; }
   /// Where it lies, for those who want it in the processor's cache.

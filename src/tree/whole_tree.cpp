@@ -298,8 +298,8 @@ void Tree::startPlaces(const BulkBuilder& bulk, NodeRef node, std::vector<BulkPl
   places[0].node = node;
 }
 
-// Are leaves of what was built kept with their corners? Not if a build of the whole tree is about to replace them, or
-// if they would fill the memory budget.
+// True if leaves of what was built are kept with their corners. Not if a build of the whole tree is about to replace
+// them, or if they would take more than half of the memory budget.
 bool Tree::packs(const std::vector<BulkPlace>& places) const {
   const bool is_part = !places[0].node.isRoot(), will_be_replaced = is_part && growsOnHost() && !rent_.isStopped();
   const bool fit = options_.memory_budget == 0 || kPackedBytes * surface_.triangle_count <= options_.memory_budget / 2;

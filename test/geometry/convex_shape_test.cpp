@@ -383,7 +383,7 @@ TEST(ConvexShape, TrianglesThatAreJustApartTouchBetweenTheirNearestPoints) {
     // Put so that they are 1e-9 apart, where they were nearest.
     const Vector3d step = (a - b) - (a - b).normalized() * 1e-9;
     for (Vector3d& x : q) x += step;
-    const ContactPoint touch = trianglePenetrations(p, q);
+    const ContactPoint touch = trianglePenetration(p, q);
     ASSERT_LT((closestPoint(touch.point, p) - touch.point).norm(), 1e-6) << i;
     ASSERT_LT((closestPoint(touch.point, q) - touch.point).norm(), 1e-6) << i;
     ASSERT_LT(touch.depth, 1e-9) << i;

@@ -4,6 +4,7 @@
 
 #include <gtest/gtest.h>
 
+#include <Eigen/Geometry>
 #include <algorithm>
 #include <cmath>
 #include <limits>
@@ -293,6 +294,52 @@ TEST(IsDegenerate, WhateverTheOrderAndTheUnit) {
   EXPECT_NEAR(relativeWidth(small_far_away), 0.5, 1e-15);
   EXPECT_TRUE(isDegenerate(point));
   EXPECT_TRUE(isDegenerate(none));
+}
+
+// Faces that rest on one another: boxes on floors, parts set down exactly.
+TEST(Triangle, CoplanarTrianglesTouchInBoth) {
+  std::mt19937_64 g(71);
+  std::uniform_int_distribution<int> whole(-4, 4);
+  std::normal_distribution<double> normal;
+  int touching = 0;
+  for (int round = 0; round < 20000; ++round) {
+    Corners p, q;
+    for (Corners* t : {&p, &q}) {
+      for (Vector3d& v : *t) v = Vector3d(whole(g), whole(g), 0);
+    }
+    if (round % 3 == 1) q[whole(g) & 1] = p[0];                        // a common corner
+    if (round % 3 == 2) q[whole(g) & 1] = p[0] + 0.5 * (p[1] - p[0]);  // a corner on an edge
+    if (isDegenerate(p) || isDegenerate(q) || exactDistance(p, q) > 0) continue;
+    ++touching;
+    if (round % 2 == 1) {
+      const Eigen::Quaterniond turn = Eigen::Quaterniond(normal(g), normal(g), normal(g), normal(g)).normalized();
+      const Vector3d shift = 1e3 * Vector3d(normal(g), normal(g), normal(g));
+      for (Corners* t : {&p, &q}) {
+        for (Vector3d& v : *t) v = turn * v + shift;
+      }
+    }
+    const ContactPoint contact = trianglePenetration(p, q);
+    ASSERT_LT((closestPoint(contact.point, p) - contact.point).norm(), 1e-10) << round;
+    ASSERT_LT((closestPoint(contact.point, q) - contact.point).norm(), 1e-10) << round;
+  }
+  EXPECT_GT(touching, 10000);
+}
+
+TEST(Triangle, CoplanarTrianglesTouchInTheMiddleOfWhatTheyShare) {
+  // Half of a floor; a triangle of which half a square lies beyond it.
+  const Corners floor = {Vector3d(0, 0, 0), Vector3d(10, 0, 0), Vector3d(0, 10, 0)};
+  const Corners within = {Vector3d(1, 1, 0), Vector3d(4, 1, 0), Vector3d(1, 4, 0)};
+  const Corners across = {Vector3d(-2, 1, 0), Vector3d(2, 1, 0), Vector3d(2, 5, 0)};
+  for (const double height : {0.0, 1e-17, -1e-12}) {
+    const auto at = [height](Corners t) {
+      for (Vector3d& v : t) v.z() += height;
+      return t;
+    };
+    for (const auto& [t, middle] : {std::pair(within, Vector3d(2, 2, 0)), std::pair(across, Vector3d(1, 2.5, 0))}) {
+      EXPECT_LT((trianglePenetration(floor, at(t)).point - middle).norm(), 1e-9);
+      EXPECT_LT((trianglePenetration(at(t), floor).point - middle).norm(), 1e-9);
+    }
+  }
 }
 
 }  // namespace

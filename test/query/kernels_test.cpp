@@ -1167,7 +1167,7 @@ TEST_P(EveryTarget, MovingByDepthParts) {
     for (std::size_t i = 0; i < pairs.count; ++i) {
       const ContactPoint& touch = touches[i];
       if (!Exact::intersect_Triangle(p[i][0], p[i][1], p[i][2], q[i][0], q[i][1], q[i][2])) continue;
-      const ContactPoint alone = trianglePenetrations(p[i], q[i]);
+      const ContactPoint alone = trianglePenetration(p[i], q[i]);
       EXPECT_EQ(alone.depth, touch.depth);
       EXPECT_EQ(alone.normal, touch.normal);
       EXPECT_EQ(alone.point, touch.point);

@@ -69,7 +69,7 @@ class Renderer {
   /// @throws OracleError when the device cannot: no memory, pictures too large, lost.
   Image draw(const Scene& scene, const View& view, int width, int height);
 
-  /// How many of these points, which are on the surfaces, does no other part of them hide? Volumes do not count.
+  /// How many of these points, which are on the surfaces, no other part of them hides. Volumes do not count.
   std::size_t countSeen(const Scene& scene, const View& view, int side, const std::vector<Eigen::Vector3d>& points);
 
   /// What draws, for people.

@@ -13,7 +13,7 @@
 
 namespace bocst::fcl_adapter {
 
-/// Is it a shape or an octree?
+/// True for a shape or an octree.
 template <typename S>
 bool isBodies(const fcl::CollisionGeometry<S>* geometry) {
 #if FCL_HAVE_OCTOMAP

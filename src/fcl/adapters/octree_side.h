@@ -91,7 +91,8 @@ class OcTreeSide : public query::CompleteSide {
     query::Volume v{};
     for (int k = 0; k < 3; ++k) {
       v.center[k] = middle[k];
-      v.half[k] = static_cast<float>(half(n));
+      // Rounded outwards; it may be less than all floats but 0.
+      v.half[k] = static_cast<float>(half(n) * (1 + 0x1p-22)) + std::numeric_limits<float>::denorm_min();
     }
     return v;
   }

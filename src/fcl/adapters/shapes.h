@@ -16,7 +16,7 @@
 
 namespace bocst::fcl_adapter {
 
-/// One of FCL's shapes that are partners, TriangleP too (but not Model, which shares its node type)?
+/// True for FCL's shapes that are partners, TriangleP too (but not Model, which shares its node type).
 template <typename S>
 bool isShape(const fcl::CollisionGeometry<S>* geometry) {
   switch (geometry->getNodeType()) {

@@ -27,7 +27,7 @@ std::string text(const T& value) {
   return out.str();
 }
 
-/// Of an enum without a fixed type, which may not be read as what it is when it has no value of it.
+/// Copied as a number: to read an enum that holds none of its values is undefined behaviour.
 template <typename Enum>
 void checkEnum(const char* query, const char* argument, const Enum& value, int count) {
   std::underlying_type_t<Enum> number;

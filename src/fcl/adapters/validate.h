@@ -10,8 +10,8 @@
 #include <Eigen/Geometry>
 #include <cstring>
 
-// What is no pose, no tolerance and no option is refused: nothing answers "free" to nonsense. Each function throws
-// std::invalid_argument that names the query, the argument and its value.
+// Arguments that are not a pose, a tolerance or an option are refused: a query must not answer "free" for them. Each
+// check throws std::invalid_argument that names the query, the argument and its value.
 
 namespace bocst::fcl_adapter {
 
@@ -22,7 +22,7 @@ constexpr double kMaxOrthogonalityError = 1e-3;
 /// No entry of R^T R - I is larger where isSurelyRigid() says so.
 constexpr double kSurelyRigidError = 2e-5;
 
-/// What tells rotations from other matrices. With singular values 1 + e, and products of three e left out,
+/// Sums that tell rotations from other matrices. The singular values are 1 + e; products of three e are left out.
 template <typename Number>
 struct RigidSums {
   Number stretch;  ///< 2 sum e + sum e^2: the sum of the squares of all entries, minus 3
@@ -44,8 +44,8 @@ RigidSums<Number> rigidSumsOf(const Matrix& m) {
 
 constexpr double kSurelyRigidStretch = 1e-5, kSurelyRigidShear = 1e-10;
 
-/// Is a pose rigid for sure? Seldom false where it is. With these bounds no |e| is above 8e-6, and the determinant is
-/// positive, so R is no reflection.
+/// True if a pose is surely rigid. Seldom false where it is. With these bounds no |e| is above 8e-6, and the
+/// determinant is positive, so R is no reflection.
 template <typename Number>
 auto isSurelyRigid(const RigidSums<Number>& sums) {
   return (sums.stretch <= kSurelyRigidStretch) & (sums.stretch >= -kSurelyRigidStretch) &
@@ -98,7 +98,7 @@ void refuseUnlessSound(const fcl::CollisionRequest<S>& request);
 
 template <typename S>
 void checkRequest(const fcl::CollisionRequest<S>& request) {
-  unsigned solver;  // An enum may not be read as what it is when it has no value of it.
+  unsigned solver;  // Copied as a number: to read an enum that holds none of its values is undefined behaviour.
   static_assert(sizeof solver == sizeof request.gjk_solver_type);
   std::memcpy(&solver, &request.gjk_solver_type, sizeof solver);
   const bool sound = request.gjk_tolerance >= 0 && request.gjk_tolerance <= 1 && solver <= 1;
@@ -109,7 +109,7 @@ void checkRequest(const fcl::DistanceRequest<S>& request, const fcl::DistanceRes
 template <typename S>
 void checkRequest(const fcl::ContinuousCollisionRequest<S>& request);
 
-/// Of a solver that the caller brought.
+/// @throws std::invalid_argument unless it is finite and at least 0.
 void checkTolerance(const char* query, const char* argument, double tolerance);
 
 }  // namespace bocst::fcl_adapter

@@ -28,7 +28,7 @@ namespace {
 const char* scalarName(float) { return "float"; }
 const char* scalarName(double) { return "double"; }
 
-/// Is it libfcl's own copy that the dynamic linker found? It reads a table that nobody else can reach.
+/// True if the dynamic linker found libfcl's own copy, which reads a table that nobody else can reach.
 bool isInLibfcl(const void* address) {
   Dl_info info;
   if (dladdr(address, &info) == 0 || info.dli_fname == nullptr) return false;

@@ -13,8 +13,8 @@
 
 namespace bocst::fcl_adapter::libfcl {
 
-/// Would code that is loaded now call libfcl's own fcl::collide<double, Solver>, which knows no Model? So it is where
-/// libfcl was loaded for all (RTLD_GLOBAL) and this library was not.
+/// True if code that is loaded now would call libfcl's own fcl::collide<double, Solver>, which does not know Model.
+/// This is so where libfcl was loaded globally (RTLD_GLOBAL) and this library was not.
 bool isFoundFirst();
 
 // Each of these throws std::runtime_error if this process has no libfcl that exports the function.

@@ -45,7 +45,7 @@ void setBounds(fcl::CollisionGeometry<S>& geometry, Eigen::AlignedBox3d b, doubl
   geometry.aabb_radius = roundUp<S>(std::min(to_corner, to_vertex) * (1 + 1e-15));
 }
 
-/// The same by the box alone: who asks geometries and poses needs no radius, so vertices are not looked through yet.
+/// The same from the box alone. Queries need no radius, so the vertices are not read.
 template <typename S>
 void setBoundsByBox(fcl::CollisionGeometry<S>& geometry, const tree::Tree& tree) {
   setBounds(geometry, tree.bounds(), tree.options().margin, HUGE_VAL);

@@ -148,7 +148,7 @@ class ConvexCollector final : public query::ConvexVisitor<typename Partner::Node
     return {place, b1, b2, a, b};
   }
 
-  // Only the first contacts, a given number of them, are wanted: is this one of them?
+  // Only the first contacts, a given number of them, are wanted: adds this one if it is one so far.
   void addFirst(const Found& found) {
     query::SeparationResult gap;
     const auto t = static_cast<std::uint32_t>(found.leaf.id);
@@ -163,7 +163,7 @@ class ConvexCollector final : public query::ConvexVisitor<typename Partner::Node
             frame_ * surface_.mesh->vertex(i[2])};
   }
 
-  // Does a triangle touch a body? Sets the gap between them.
+  // True if a triangle touches a body. Sets the gap between them.
   bool touches(std::uint32_t t, const Eigen::Vector3d* corners, const Node& b, query::SeparationResult& gap) const {
     const double near = std::max(tolerance_, q_.margin);
     gap = partner_.gap(b, {corners, 3}, near);

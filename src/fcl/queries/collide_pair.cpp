@@ -59,15 +59,15 @@ struct Models {
   const Model<S>*first, *second;
 };
 
-// Is the second to be side A? Without a choice, only where the first is no model.
+// True if the second is to be side A. Without a choice, only where the first is no model.
 template <typename S>
 bool turnsRound(const Models<S>& models, const fcl::Transform3<S>& X_W1, const fcl::Transform3<S>& X_W2) {
   if (!models.areTwo()) return models.first == nullptr;
   return walksTurned(treeOf(*models.first), X_W1, treeOf(*models.second), X_W2);
 }
 
-// Are two models so far apart that nothing need be locked? For poses that are surely rigid. False where branches are
-// due to be dropped, since only a query that holds the locks drops them, at its end.
+// True if two models are so far apart that nothing need be locked. For poses that are surely rigid. False where
+// branches are due to be dropped, since only a query that holds the locks drops them, at its end.
 template <typename S>
 bool areFarApart(const Models<S>& models, const fcl::Transform3<S>& X_W1, const fcl::Transform3<S>& X_W2,
                  double margin) {

@@ -14,11 +14,11 @@ template <typename S>
 void collideRow(const Model<S>& a, const Model<S>& b, const fcl::Transform3<S>* X_AB, std::size_t count,
                 std::uint8_t* hit);
 
-/// Does fcl::collide say with the default request that two models touch? Poses as above.
+/// True if fcl::collide says with the default request that two models touch. Poses as above.
 template <typename S>
 bool touch(const Model<S>& a, const fcl::Transform3<S>& X_WA, const Model<S>& b, const fcl::Transform3<S>& X_WB);
 
-/// Do probes prove that they touch? A sixth of a walk's time; false says nothing.
+/// True if probes prove that they touch. A sixth of a walk's time; false says nothing.
 template <typename S>
 bool surelyTouch(const Model<S>& a, const fcl::Transform3<S>& X_WA, const Model<S>& b, const fcl::Transform3<S>& X_WB);
 

@@ -33,8 +33,8 @@ query::SimilarityTransform withMargin(query::SimilarityTransform b_in_a, const q
   return b_in_a;
 }
 
-/// Are two meshes, and the spheres of their cells, apart because their distance exceeds the range of a walk's floats? A
-/// walk would overflow, or lose the distance in its tolerance. Most queries compare one number.
+/// True if two meshes, and the spheres of their cells, are apart because their distance exceeds the range of a walk's
+/// floats. A walk would overflow, or lose the distance in its tolerance. Most queries compare one number.
 template <typename S>
 bool isOutOfSight(const CollideQuery<S>& q, const query::SimilarityTransform& b_in_a, double size_a, double size_b) {
   if (b_in_a.tolerance < 1e15) return false;
@@ -98,7 +98,7 @@ class TreesCollision {
     return false;
   }
 
-  /// Is a surface so long and thin that the float walk's rounding, which is a part of its length, is as wide as it is?
+  /// True if a surface is so long and thin that the float walk's rounding, a part of its length, is as wide as it is.
   /// The walk in double parts what that one cannot; of two such surfaces, along the axes of oriented boxes.
   static bool isNeedle(const tree::Tree& tree) {
     constexpr float kThin = 0x1p-12f;
@@ -215,8 +215,8 @@ class TreesCollision {
 
   // Margins.
 
-  /// Does the margin exceed rounding, so that the distance of two triangles alone decides whether they touch, and does
-  /// one pair do?
+  /// True if the margin exceeds rounding, so that the distance of two triangles alone decides whether they touch, and
+  /// one pair will do.
   bool isWithinMargin(const MeshCollector<S>& collector) const { return near_.margin > 0 && collector.endsAtFirst(); }
 
   /// A yes-or-no walk of such a query. Beside a margin that is much larger than nodes and triangles, these separate

@@ -79,7 +79,7 @@ class FirstItems {
     items_.clear();
   }
   bool isFull() const { return items_.size() == count_; }
-  /// Would this item be one of them?
+  /// True if this item would be one of them.
   bool wants(const Item& item) const { return !isFull() || item < items_.front(); }
   void add(const Item& item) {
     if (isFull()) {

@@ -127,7 +127,7 @@ class Walks {
     return std::chrono::duration<double>(std::chrono::steady_clock::now().time_since_epoch()).count();
   }
 
-  /// Has the walk its answer? If not, adds what it needs.
+  /// True if the walk has its answer. If not, adds what it needs.
   bool walkResident(Walk& walk) {
     const Outcome outcome = walk.spheres().walkResident(walk.batch, s_.growths);
     walk.batch = std::min(2 * walk.batch, kMostBatch);

@@ -21,7 +21,7 @@ struct PosedPair {
   fcl::Transform3<S> X_WB;
 };
 
-/// Is growTogether() worth its walks: do both answer conservatively, and ask oracles that are slow to answer?
+/// True if growTogether() is worth it: both answer conservatively without a budget, and one asks a slow oracle.
 template <typename S>
 bool growsTogether(const Model<S>& a, const Model<S>& b);
 
@@ -34,9 +34,9 @@ enum class Spheres : std::uint8_t { kApart, kMeet, kUnknown };
 template <typename S>
 const std::vector<Spheres>& growTogether(const std::vector<PosedPair<S>>& pairs);
 
-/// Is the second tree side A of a walk? Conservative verdicts must not depend on the argument order, so there the walk
-/// has an order of its own: by address only where the poses are equal, so that what a query grows does not depend on
-/// where models happen to lie.
+/// True if the second tree is side A of a walk. Conservative verdicts must not depend on the argument order, so there
+/// the walk has an order of its own: by address only where the poses are equal, so that what a query grows does not
+/// depend on where models happen to lie.
 template <typename S>
 bool walksTurned(const tree::Tree& tree1, const fcl::Transform3<S>& X_W1, const tree::Tree& tree2,
                  const fcl::Transform3<S>& X_W2) {

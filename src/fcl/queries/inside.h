@@ -25,12 +25,12 @@ inline bool containsOne(const Solid& solid, const std::vector<Eigen::Vector3d>& 
                      [&](const Eigen::Vector3d& p) { return solid.mayContain(X * p, tolerance); });
 }
 
-/// Can something within this ball be inside a mesh with these bounds?
+/// True if something within this ball can be inside a mesh with these bounds.
 inline bool reaches(const Eigen::AlignedBox3d& bounds, const Eigen::Vector3d& center, double radius) {
   return bounds.exteriorDistance(center) <= radius * (1 + 1e-9);
 }
 
-/// Is a piece of B inside the solid A?
+/// True if A is solid and a piece of B is inside it.
 template <typename S>
 bool contains(const tree::Tree& a, const fcl::Transform3<S>& X_WA, const tree::Tree& b, const fcl::Transform3<S>& X_WB,
               double magnitude) {
@@ -60,7 +60,7 @@ bool contains(const tree::Tree& a, const fcl::Transform3<S>& X_WA, const BvhSide
   return containsOne(*a.solid(), pointOfEachComponent(vertices, triangles), X_AB, tolerance);
 }
 
-/// Is a body of the partner, none of which meets the surface, inside the solid?
+/// True if a body of the partner, none of which meets the surface, is inside the solid.
 template <typename S, typename Partner>
 bool contains(const query::TreeSide& a, const ConvexFrame<S>& frame, const Partner& partner) {
   const Solid* solid = a.tree().solid();

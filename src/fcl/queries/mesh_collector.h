@@ -231,7 +231,7 @@ class MeshCollector : public query::Visitor {
     placed_ = true;
   }
 
-  // Any pair that touches will do: does this one?
+  // Any pair that touches will do: adds this one if it touches. True if nothing more is asked for.
   bool endsWith(std::uint64_t key) {
     if (!isCertain(key)) {
       getCorners(&key, 1);
@@ -240,7 +240,7 @@ class MeshCollector : public query::Visitor {
     return q_.addContact(first(key), second(key), nullptr);
   }
 
-  // Only the first pairs that touch, a given number of them, are wanted: is this one of them?
+  // Only the first pairs that touch, a given number of them, are wanted: adds this one if it is one so far.
   void addFirst(std::uint32_t of_model, std::uint64_t key) {
     getCorners(&key, 1);
     const RankedPair pair{placeOf(of_model), key};
@@ -328,8 +328,8 @@ class MeshCollector : public query::Visitor {
     }
   }
 
-  // Does the pair touch whose corners are pair i of s_.pairs: by FCL's test, and by ours where that leaves it open?
-  // Improves *contact, the pair's penetration; null: not wanted.
+  // True if the pair whose corners are pair i of s_.pairs touches: by FCL's test, and by ours where that leaves it
+  // open. Improves *contact, the pair's penetration; null: not wanted.
   bool decide(std::uint64_t key, std::size_t i, query::ContactPoint* contact) {
     const std::uint32_t a = first(key), b = second(key);
     if (isCertain(key) && margin_ == 0) return true;

@@ -14,7 +14,7 @@
 
 namespace bocst::fcl_adapter {
 
-/// Has a tree do what waits for the end of a query. Without memory or room for it, that waits for a later query; the
+/// Calls f, the work of a tree at the end of a query. If f lacks memory or room, a later query does the work; the
 /// answer stands.
 template <typename F>
 void tryAtEnd(F&& f) {

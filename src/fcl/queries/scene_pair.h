@@ -10,8 +10,8 @@
 
 namespace bocst::fcl_adapter {
 
-/// Are the convex hulls of the two surely farther apart than their margins and `gap` together? Looks for a direction
-/// between them, so it may miss one. Of two models with conservative answers: their root boxes, widened by the spheres.
+/// True if the convex hulls of the two are surely farther apart than their margins and `gap` together. Looks for a
+/// direction between them, so it may miss one. With conservative answers: their root boxes, widened by the spheres.
 template <typename S>
 bool hullsApart(const Model<S>& a, const fcl::Transform3<S>& X_WA, const Model<S>& b, const fcl::Transform3<S>& X_WB,
                 double gap);

@@ -41,7 +41,7 @@ HWY_INLINE void edgeAxis(D d, V ep, V eq, V ap, V aq, V bp, V bq, V half, int p,
   }
 }
 
-// Which octants does the triangle's box meet? v[corner][axis], the cell is [-1, 1]^3.
+// The octants that the triangle's box meets. v[corner][axis], the cell is [-1, 1]^3.
 HWY_INLINE void boxAxes(const V (&v)[3][3], V rounding_margin, M (&alive)[8]) {
   const D d;
   const V outer = hn::Add(hn::Set(d, 1.0f), rounding_margin);
@@ -60,7 +60,7 @@ HWY_INLINE void boxAxes(const V (&v)[3][3], V rounding_margin, M (&alive)[8]) {
   }
 }
 
-// Which of these does the triangle's plane meet? e[edge][axis]; h is half an octant's side, with the margin.
+// Those of these that the triangle's plane meets. e[edge][axis]; h is half an octant's side, with the margin.
 HWY_INLINE void planeAxis(const V (&v)[3][3], const V (&e)[3][3], V h, M (&alive)[8]) {
   const D d;
   const V one = hn::Set(d, 1.0f), half = hn::Set(d, 0.5f);

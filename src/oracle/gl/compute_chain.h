@@ -32,7 +32,7 @@ class ComputeChain {
   /// @throws OracleError when a shader does not compile or the driver's limits are below what the chain needs.
   ComputeChain(Limits limits, Arena& arena);
 
-  /// Does this question, with its mesh on the device, fit into a chain at all?
+  /// True if this question, with its mesh on the device, fits into a chain at all.
   bool fits(const ExpansionRequest& request) const;
 
   /// How many of the questions, from the first on, fit into one chain; at least one.

@@ -39,7 +39,7 @@ class Registry {
   static Registry& instance() {
     static std::atomic<Registry*> registry{new Registry};
     Registry* current = registry.load();
-    if (current->process_ != getpid()) {
+    if (current->forks_ != thread::forks.load()) {
       // A child after fork() starts anew: the parent's lock may be held for ever.
       auto* fresh = new Registry;
       if (registry.compare_exchange_strong(current, fresh)) {
@@ -105,7 +105,7 @@ class Registry {
  private:
   using Key = std::tuple<OracleKind, int, int>;  // kind, device, viewport
 
-  Registry() : process_(getpid()) {}
+  Registry() = default;
 
   /// On one device, which has passed its test.
   std::shared_ptr<DeviceOracle> on(OracleKind kind, int device, int viewport) {
@@ -223,7 +223,7 @@ class Registry {
     return r;
   }
 
-  const pid_t process_;
+  const unsigned forks_ = thread::forks.load();
   std::mutex mutex_;
   std::map<std::pair<int, int>, std::shared_ptr<Thread>> threads_;
   std::map<Key, std::shared_ptr<DeviceOracle>> oracles_;

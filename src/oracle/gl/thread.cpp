@@ -3,7 +3,6 @@
 
 #include <bocst/oracle.h>
 #include <epoxy/gl.h>
-#include <unistd.h>
 
 #include <algorithm>
 #include <exception>
@@ -16,7 +15,7 @@
 
 namespace bocst::oracle::gl {
 
-Thread::Thread(const ContextRequest& request) : process_(getpid()), wait_limit_(request.wait_limit) {
+Thread::Thread(const ContextRequest& request) : wait_limit_(request.wait_limit) {
   try {
     thread_ = std::make_unique<std::thread>(thread::startWithoutSignals([this, request] { loop(request); }));
   } catch (const std::system_error& e) {
@@ -102,7 +101,7 @@ void Thread::post(std::function<void()> job) {
   work_->notify_one();
 }
 
-bool Thread::isForked() const { return getpid() != process_; }
+bool Thread::isForked() const { return forks_ != thread::forks.load(); }
 
 bool Thread::isLost() const { return lost_.load(std::memory_order_relaxed) || isForked(); }
 

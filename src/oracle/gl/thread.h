@@ -1,8 +1,6 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #pragma once
 
-#include <sys/types.h>
-
 #include <atomic>
 #include <chrono>
 #include <condition_variable>
@@ -39,10 +37,10 @@ class Thread {
   /// child after fork(), where nobody would do it, it is dropped.
   void post(std::function<void()> job);
 
-  /// Is this a child's copy? Locks that the parent's thread may have held must not be asked for.
+  /// True for a child's copy, which must not ask for locks that the parent's thread may have held.
   bool isForked() const;
 
-  /// Is there no context to work with any more?
+  /// True if there is no context to work with any more.
   bool isLost() const;
 
   /// Gives the context up, and reports it once (bocst::setLogger).
@@ -74,7 +72,7 @@ class Thread {
   void loop(const ContextRequest& request);
 
   ContextInfo info_;
-  const pid_t process_;
+  const unsigned forks_ = thread::forks.load();
   std::chrono::milliseconds wait_limit_;
   std::atomic<bool> lost_{false}, distrusted_{false};
   std::mutex mutex_;

@@ -29,7 +29,7 @@ struct ContactGoal {
   double time_error = 0;  ///< The answer may be earlier than the contact by so much.
 };
 
-/// When do two moving sides first touch? Conservative advancement, for each pair of nodes by itself: apart by a gap
+/// Finds when two moving sides first touch, by conservative advancement of each pair of nodes by itself: apart by a gap
 /// along a direction, they cannot touch before the gap is closed at the largest speed along it that any of their points
 /// can have. Best first by that time, so a pair is looked at again at the time when it might touch, and only its parts
 /// from there on. No contact is stepped over, whatever the motions are.
@@ -379,9 +379,8 @@ class ContactTimeWalk : private BestFirst<ContactTimeWalk<A, B>, A, B> {
   SimilarityTransform a_in_world_, b_in_world_, world_in_b_;  // at the time now_; the last for bodies only
 };
 
-/// When the triangles of a tree and another side first touch. Of exact answers, oriented boxes take a fifth of the
-/// steps: parts that slide past each other or land flat are apart along an axis of theirs. They are built when walks
-/// have paid for them.
+/// When a tree and another side first touch. With exact answers, oriented boxes take a fifth of the steps: parts that
+/// slide past each other or land flat are apart along an axis of theirs. They are built when walks have paid for them.
 template <typename B>
 double findContactTime(const TreeSide& a, const SimilarityTransform& a_in_body, const Motion& motion_a, const B& b,
                        const SimilarityTransform& b_in_body, const Motion& motion_b, const ContactGoal& goal) {

@@ -27,7 +27,7 @@ class DeferredPairs {
     batch_ = kFirstBatch;
   }
   bool empty() const { return waiting_.empty(); }
-  /// Are there as many as the next batch takes?
+  /// True if there are as many as the next batch takes.
   bool fillsBatch() const { return waiting_.size() >= batch_; }
   void add(const Pair& pair) { waiting_.push_back({pair, kUnknown}); }
 

@@ -160,7 +160,7 @@ class PairWalk {
     }
   }
 
-  // May the box of a node meet the body itself, and not only the box about it?
+  // True if the box of a node may meet the body itself, and not only the box about it.
   bool boxMeets(typename A::Node a, typename B::Node b) const {
     if (b_.hasExactBox(b)) return true;
     Eigen::Vector3d corners[8];

@@ -15,7 +15,7 @@
 #define BOCST_SPHERE_STEPS_ONCE
 namespace bocst::query {
 
-/// Decides in double, as the definition says: which octants in `mask` of a block of side `own` meet the other node?
+/// Decides in double, as the definition says, which octants in `mask` of a block of side `own` meet the other node.
 unsigned decideMeeting(const SphereSteps& s, int own, std::uint32_t index, unsigned mask, tree::NodeRef other);
 
 namespace {
@@ -176,7 +176,7 @@ HWY_NOINLINE std::uint32_t lookUp(SphereSteps& s, int side, tree::NodeRef node, 
 
 HWY_INLINE bool isLeaf(const SphereSteps& s, int side, std::uint32_t level) { return level >= s.deepest[side]; }
 
-// Of two nodes that are no leaves, is that of side x, at `level`, to be expanded before the other?
+// True if of two nodes that are no leaves, that of side x, at `level`, is expanded before the other.
 HWY_INLINE bool isLarger(const SphereSteps& s, int x, std::uint32_t level, std::uint32_t other_level) {
   return s.level_rule.isFirst(x, static_cast<int>(other_level) - static_cast<int>(level));
 }

@@ -12,15 +12,6 @@ namespace bocst::query {
 
 namespace {
 
-// How far the sphere of a leaf may be from the surface that is in the leaf, of both sides together: each leaf's cell
-// meets the surface, so its sphere is within a diameter of that.
-double radiiOfLeaves(const TreeSide& a, const TreeSide& b, double scale) {
-  const auto diameter = [](const TreeSide& side) {
-    return std::sqrt(3.0) * (1 << (lattice::kMaxLevel - side.tree().deepest()));
-  };
-  return (diameter(a) + diameter(b) * scale) * (1 + 1e-9);
-}
-
 template <typename F>
 void forEachBit(const std::vector<std::uint32_t>& words, F&& f) {
   for (std::uint32_t i = 0; i < words.size(); ++i) {
@@ -39,9 +30,7 @@ struct SphereWalk::Scratch {
 };
 
 bool SphereWalk::areBoxesApart() const {
-  SimilarityTransform wide = b_in_a_;
-  wide.tolerance += radiiOfLeaves(a_, b_, b_in_a_.scale);
-  return facesApart(a_.volume(a_.root()), b_.volume(b_.root()), wide);
+  return facesApart(a_.volume(a_.root()), b_.volume(b_.root()), withSphereReach(a_, b_, b_in_a_));
 }
 
 SphereWalk::Scratch& SphereWalk::scratchOfThread() { return thread::ofThread<Scratch>(); }

@@ -17,12 +17,12 @@ class SphereWalk {
 
   SphereWalk(const TreeSide& a, const TreeSide& b, const SimilarityTransform& b_in_a) : a_(a), b_(b), b_in_a_(b_in_a) {}
 
-  /// Are the spheres about the roots apart, so that no walk is needed? Costs little; to be asked before run().
+  /// True if the spheres about the roots are apart, so that no walk is needed. Costs little; call it before run().
   bool isNeedless() const {
     return !spheresMeet(a_.sphere(a_.root()), placed(b_.sphere(b_.root()), b_in_a_), b_in_a_.tolerance);
   }
 
-  /// Are the boxes about the surfaces so far apart that no spheres of leaves meet? It does not matter in whose
+  /// True if the boxes about the surfaces are so far apart that no spheres of leaves meet. It does not matter in whose
   /// frame they are compared: the margin is far larger than the rounding.
   bool areBoxesApart() const;
 
@@ -30,8 +30,8 @@ class SphereWalk {
   bool run(Visitor& visitor);
 
   enum class Outcome { kApart, kMeet, kNeedsGrowth };
-  /// Do the spheres of any leaves meet, as far as resident nodes say? Unless it is needless. Where more must grow, adds
-  /// that to `growths`: of at most `batch` pairs, the deepest overlaps first.
+  /// Says whether the spheres of any leaves meet, from resident nodes; only if isNeedless() is false. Where more must
+  /// grow, adds that to `growths`: of at most `batch` pairs, the deepest overlaps first.
   Outcome walkResident(std::size_t batch, std::vector<tree::Tree::Growth>& growths) const;
 
   /// The same by a device: what it is asked about this pair. False where float cannot hold the pair, or the roots are

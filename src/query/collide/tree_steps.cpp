@@ -185,7 +185,7 @@ HWY_INLINE void load(const Frame& f, std::size_t i, float rounding_margin, Octan
   o.slab_half = hn::Load(d, f.slab_half + i);
 }
 
-// Do the octants meet triangle t's box?
+// The octants in `meet` that meet triangle t's box.
 HWY_INLINE M meetsBox(const OctantLanes& o, const TriangleBounds& b, int t, M meet) {
   const D d;
   BOCST_UNROLL
@@ -196,8 +196,8 @@ HWY_INLINE M meetsBox(const OctantLanes& o, const TriangleBounds& b, int t, M me
   return meet;
 }
 
-// Do they reach triangle t's plane? How far an octant reaches along the normal: its box, and its slab as in
-// overlapping().
+// Those that reach triangle t's plane. Along the normal, both the box of an octant and its slab, as in overlapping(),
+// bound how far it reaches.
 HWY_INLINE M meetsPlane(const OctantLanes& o, const TriangleBounds& b, int t, M meet) {
   const D d;
   V n[3], at = hn::Zero(d), r = o.rounding_margin, along = hn::Zero(d);
@@ -219,7 +219,7 @@ HWY_INLINE M meetsPlane(const OctantLanes& o, const TriangleBounds& b, int t, M 
   return hn::And(meet, hn::And(hn::Le(least, hn::Set(d, b.normal_high[t])), hn::Ge(most, hn::Set(d, b.normal_low[t]))));
 }
 
-// Do they reach behind triangle t's edges, in its plane?
+// Those that reach behind triangle t's edges, in its plane.
 HWY_INLINE M meetsEdges(const OctantLanes& o, const TriangleBounds& b, int t, M meet) {
   const D d;
   BOCST_UNROLL
@@ -329,7 +329,7 @@ HWY_INLINE bool pushOthers(PairSteps& s, const BlockView& own, const StepNode& o
   return !waits;
 }
 
-// Does a node of a side lie behind the cut? All in the frame of side 0, as side 1's octants see it, too.
+// True if a node of a side lies behind the cut. All in the frame of side 0, as side 1's octants see it, too.
 HWY_INLINE bool isBeyondCut(const PairSteps& s, int side, const StepNode& node) {
   if (node.lane == StepNode::kNoLane) return false;
   const Frame& f = s.frames[node.lane / 8];
@@ -371,7 +371,7 @@ HWY_INLINE void orderById(std::uint32_t (&order)[8]) {
   for (std::uint32_t o = 0; o < 8; ++o) order[o] = (7 - o) << 3 | o;
 }
 
-// Which node of a pair is expanded, and is the other a leaf that is larger?
+// Which node of a pair is expanded, and whether the other is a leaf that is larger.
 struct Choice {
   int side;
   bool has_larger_leaf;

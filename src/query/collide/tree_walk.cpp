@@ -31,13 +31,6 @@ bool TreeWalk::runByTurns(Visitor& visitor) {
   return walkByTurns(a_, b_, b_in_a_, visitor, kLimits, [&](std::size_t most) { return run(visitor, most); });
 }
 
-SimilarityTransform TreeWalk::widened(const TreeSide& a, const TreeSide& b, const SimilarityTransform& b_in_a) {
-  const auto reach = [](const TreeSide& side) { return side.tree().sphereReach() * side.inverseUnit(); };
-  SimilarityTransform wide = b_in_a;
-  wide.tolerance += (reach(a) + reach(b) * b_in_a.scale) * (1 + 1e-9);
-  return wide;
-}
-
 void TreeWalk::payForBoxes(std::size_t steps) const {
   Turns(a_, b_, tree::Tree::Search::kYesOrNo, kLimits).tookOverBlocks(steps, true);
 }

@@ -24,17 +24,17 @@ class TreeWalk {
     return !a.isConservative() && !b.isConservative() && PairFrames::fits(b_in_a.scale) && b_in_a.tolerance < 1e9;
   }
 
-  /// Does it serve for two sides of which one answers with cells?
+  /// True if one of the two sides answers with cells, and their scales and distance fit the walk's floats.
   static bool fitsCells(const TreeSide& a, const TreeSide& b, const SimilarityTransform& b_in_a) {
     return a.isConservative() != b.isConservative() && PairFrames::fits(b_in_a.scale) &&
-           widened(a, b, b_in_a).tolerance < 1e9;
+           withSphereReach(a, b, b_in_a).tolerance < 1e9;
   }
 
   TreeWalk(const TreeSide& a, const TreeSide& b, const SimilarityTransform& b_in_a) : a_(a), b_(b), b_in_a_(b_in_a) {
-    if (a.isConservative() || b.isConservative()) wide_ = widened(a, b, b_in_a);
+    if (a.isConservative() || b.isConservative()) wide_ = withSphereReach(a, b, b_in_a);
   }
 
-  /// Are the two surely apart by their supports, so that no walk is needed? Costs little; to be asked before run().
+  /// True if the supports show that the two are apart, so that no walk is needed. Costs little; call it before run().
   bool isNeedless() { return areSeparate(a_.tree().supports(), b_.tree().supports(), place(), is_shallow_); }
 
   /// True when the visitor ended it.
@@ -54,7 +54,6 @@ class TreeWalk {
  private:
   struct Scratch;
 
-  static SimilarityTransform widened(const TreeSide& a, const TreeSide& b, const SimilarityTransform& b_in_a);
   // With the tolerance of the walk.
   const SimilarityTransform& place() const { return wide_ ? *wide_ : b_in_a_; }
 

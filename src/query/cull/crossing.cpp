@@ -14,7 +14,7 @@
 HWY_BEFORE_NAMESPACE();
 namespace bocst::query::HWY_NAMESPACE {
 
-// Is a probe in a marked cell, or, where that counts, beyond the grid?
+// True if a probe is in a marked cell, or, where that counts, beyond the grid.
 HWY_INLINE bool anyIn(const ProbeGrid& grid, const std::uint32_t* marked, bool beyond_counts) {
   const D d;
   using Di = hn::RebindToSigned<D>;
@@ -57,8 +57,8 @@ HWY_EXPORT(EntersAndLeaves);
 
 namespace {
 
-/// Do probes prove that a surface crosses that of `grid`, in whose lattice units they are at M * probe + t? They may be
-/// off by `off` units; the rows of M are `scale` long.
+/// True if probes prove that a surface crosses that of `grid`, in whose lattice units they are at M * probe + t. They
+/// may be off by `off` units; the rows of M are `scale` long.
 bool proves(const Interior& grid, const float (&probes)[3][Interior::kProbes], const double (&M)[3][3],
             const double (&t)[3], double scale, double off) {
   if (grid.bits == 0) return false;

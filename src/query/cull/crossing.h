@@ -6,7 +6,7 @@
 
 namespace bocst::query {
 
-/// Do probes of one of two surfaces prove that it crosses the other? Then they meet. False says nothing.
+/// True if probes of one of two surfaces prove that it crosses the other. Then they meet. False says nothing.
 /// b_in_a: from the lattice of b to that of a.
 bool surelyCross(const Interior& a, const Interior& b, const SimilarityTransform& b_in_a);
 

@@ -5,8 +5,8 @@
 
 namespace bocst::query {
 
-/// Are two outlines surely farther apart than `margin`? Along the line of their centers, their own axes and the
-/// products of these (Gottschalk et al., OBBTree, 1996). X_WA and X_WB place the frames of a and b in the world: 16
+/// True if two outlines are surely farther apart than `margin`, along the line of their centers, one of their own axes
+/// or a product of these (Gottschalk et al., OBBTree, 1996). X_WA and X_WB place the frames of a and b in the world: 16
 /// numbers, column after column; the last row is not read. All in float, whose range ends where sizes are not within
 /// 1e-15 to 1e15: these are never far apart.
 ///

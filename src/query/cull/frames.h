@@ -45,7 +45,7 @@ struct PairFrames {
   /// Beyond these, one side's rounding is too coarse for the other's nodes.
   static bool fits(double scale) { return scale >= 0x1p-10 && scale <= 0x1p10; }
 
-  /// Are rounding margins small beside both sides? What is far away is no pair for collisions; for distances it is one.
+  /// True if rounding margins are small beside both sides. False for sides far apart, which only distances ask about.
   static bool isFine(const SimilarityTransform& one_in_zero);
 
   struct Side : SideFrame {

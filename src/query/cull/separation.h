@@ -9,8 +9,8 @@
 
 namespace bocst::query {
 
-/// Are two surfaces surely apart by their supports? `b_in_a` places the lattice of b in that of a. Tries directions
-/// about the line of the middles of their bounds, then ever closer about the best direction so far, so it may miss one.
+/// True if two surfaces are surely apart by their supports. `b_in_a` places the lattice of b in that of a. Tries
+/// directions about the line of the middles of their bounds, then closer about the best one so far, so it may miss one.
 /// Where it does, `shallow` tells whether the hulls overlap so little that the surfaces are probably apart.
 bool areSeparate(const tree::SupportTable& a, const tree::SupportTable& b, const SimilarityTransform& b_in_a,
                  bool& shallow);

@@ -21,7 +21,7 @@ namespace bocst::query {
 template <typename Walk, typename A, typename B>
 class BestFirst {
  public:
-  /// Did the walk end after its most steps, before it was sure?
+  /// True if the walk ended after its most steps, before it was sure.
   bool gaveUp() const { return steps_ > most_steps_; }
   std::size_t steps() const { return steps_; }
 

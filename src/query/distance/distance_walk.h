@@ -118,7 +118,7 @@ class DistanceWalk : private BestFirst<DistanceWalk<A, B>, A, B> {
     return true;
   }
 
-  // Of the size of a leaf and that of a node of the other side, both squared: is the bound by triangles worth it? A
+  // True if the bound by triangles of a leaf of size `large` is worth it for a node of size `small`, both squared. A
   // node that is hardly larger than a tie would be left out for the first of its triangles.
   bool isMuchLarger(double large, double small) const {
     return large >= kMuchLarger * small && small >= kManyTies * tie_ * tie_;
@@ -412,7 +412,7 @@ class DistanceWalk : private BestFirst<DistanceWalk<A, B>, A, B> {
       Eigen::Vector3d::Zero();  // from side A to side B where they are nearest so far, unit length
 };
 
-/// The nearest triangles of two trees with exact answers.
+/// The nearest primitives of two trees. With exact answers, takes turns with a walk over oriented boxes.
 inline Nearest findNearest(const TreeSide& a, const TreeSide& b, const SimilarityTransform& b_in_a,
                            const DistanceGoal& goal) {
   DistanceWalk<TreeSide, TreeSide> trees(a, b, b_in_a);

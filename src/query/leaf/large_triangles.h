@@ -28,7 +28,7 @@ class LargeTriangles {
     known_ = 0;
   }
 
-  /// Have these triangles of the leaf been placed?
+  /// True if these triangles of the leaf have been placed.
   bool know(tree::NodeRef leaf, std::uint32_t which) const {
     return count_ != 0 && leaf_ == leaf && (which & ~known_) == 0;
   }

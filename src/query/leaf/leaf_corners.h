@@ -59,11 +59,11 @@ class LeafCorners {
   typename Side::Node leaf_{};
 };
 
-/// Can the float tests compute with these corners? Determinants of three lengths must neither overflow nor vanish; NaN
-/// is out of range, too.
+/// True if the float tests can compute with these corners. Determinants of three lengths must neither overflow nor
+/// vanish; NaN is out of range, too.
 inline bool inRange(const TrianglePack& pack) { return pack.size > 1e-9f && pack.size < 1e9f; }
 
-/// And with this tolerance? A margin in the frame of a mesh without extent is beyond all floats.
+/// True if they can with this tolerance. A margin in the frame of a mesh without extent is beyond all floats.
 inline bool inRange(double tolerance) { return tolerance < 1e9; }
 
 /// Scale and rotation of `to` for corners in float; the offset is 0.

@@ -19,7 +19,7 @@ class BoxSide : public CompleteSide {
 
   static bool fits(const TreeSide& side) { return !side.isConservative() && side.tree().affordsBoxes(); }
 
-  /// Has a model its boxes, or is there memory to build them? Else walks over blocks go on.
+  /// Builds a model's boxes if it has none. False without memory for them: then walks over blocks go on.
   static bool build(const TreeSide& side) { return side.tree().buildBoxes(side.now()); }
 
   explicit BoxSide(const TreeSide& side) : side_(side), boxes_(side.tree().boxes(side.now())) {}
@@ -65,7 +65,7 @@ class BoxSide : public CompleteSide {
   const tree::BoxTree& boxes_;
 };
 
-/// Do two models have oriented boxes, of which the roots' are apart?
+/// True if two models have oriented boxes, and those of the roots are apart.
 inline bool knownBoxesApart(const TreeSide& a, const TreeSide& b, const SimilarityTransform& b_in_a) {
   if (a.tree().knownBoxes() == nullptr || b.tree().knownBoxes() == nullptr) return false;
   const BoxSide boxes_a(a), boxes_b(b);

@@ -146,7 +146,7 @@ class TreeSide {
   /// The block of an inner node.
   std::uint32_t block(Node node) const { return childRef(node).index(); }
 
-  /// Are the children of an inner node octants of a cell, rather than lanes of a loose block?
+  /// True if the children of an inner node are octants of a cell, false if they are lanes of a loose block.
   bool hasOctants(Node node) const { return !tree_.block(childRef(node).index()).isLoose(); }
 
   /// The centre of an inner node's cell and half its side, which is the side of its octants.
@@ -250,7 +250,7 @@ class TreeSide {
     return s;
   }
 
-  /// Is the actual region less than the cell? If not, none below it is.
+  /// True if the actual region is less than the cell. If not, none below it is.
   bool isClipped(const lattice::Cell& cell) const {
     const std::array<std::uint32_t, 3>& end = tree_.surface().lattice.extent();
     const std::array<std::uint32_t, 3> corner = cell.corner();
@@ -266,5 +266,13 @@ class TreeSide {
   const std::int64_t now_;
   mutable tree::ChildRef root_ref_;
 };
+
+/// The transform with the reach of the spheres of both sides' leaves added to its tolerance: what separates the
+/// surfaces by more also separates these spheres.
+inline SimilarityTransform withSphereReach(const TreeSide& a, const TreeSide& b, SimilarityTransform b_in_a) {
+  const auto reach = [](const TreeSide& side) { return side.tree().sphereReach() * side.inverseUnit(); };
+  b_in_a.tolerance += (reach(a) + reach(b) * b_in_a.scale) * (1 + 1e-9);
+  return b_in_a;
+}
 
 }  // namespace bocst::query

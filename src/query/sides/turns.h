@@ -43,8 +43,8 @@ class Turns {
   /// A walk over boxes that is no longer than this.
   static constexpr std::size_t kShort = 256;
 
-  /// Do two models have their boxes, and did the last long yes-or-no walk of both end over boxes, soon? So it is of
-  /// slivers: a single pair of their leaves takes longer than most walks over boxes.
+  /// True if two models have their boxes, and the last long yes-or-no walk of both ended soon, over boxes. Slivers are
+  /// like this: a single pair of their leaves takes longer than most walks over boxes.
   static bool favourBoxes(const TreeSide& a, const TreeSide& b) {
     const auto favours = [](const tree::Tree& tree) {
       const tree::Tree::LongSearch last = tree.longSearch(tree::Tree::Search::kYesOrNo);

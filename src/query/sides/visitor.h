@@ -11,7 +11,7 @@
 
 namespace bocst::query {
 
-/// Do two spheres of cells touch, in one frame? Conservative answers say so by this alone.
+/// True if two spheres of cells touch, in one frame. Conservative answers follow from this alone.
 inline bool spheresMeet(const Sphere& a, const Sphere& b, double tolerance) {
   const double extent = (a.radius + b.radius) * (1 + 1e-12) + tolerance;
   return (a.center - b.center).squaredNorm() <= extent * extent;

@@ -20,7 +20,7 @@ void benchCliffs(BenchSetting& setting, BenchReport& report);
 /// An arm among shelves and both meshes under FCL's broad phase: pairs one by one, states, modes.
 void benchPlanner(BenchSetting& setting, BenchReport& report);
 
-/// Do they touch? On poses that were asked until the trees stopped growing.
+/// Yes-or-no queries, on poses that were asked until the trees stopped growing.
 void benchWarm(BenchSetting& setting, BenchReport& report);
 
 /// All contacts with their geometry, warm.

@@ -42,7 +42,7 @@ struct Validate {
     return name == "obb" ? FclTree::kObb : name == "rss" ? FclTree::kRss : FclTree::kObbRss;
   }
 
-  /// Is all that sets us apart that FCL's trees culled pairs which its own triangle test finds touching?
+  /// True if the contacts differ only by pairs that FCL's trees cull and its own triangle test finds touching.
   static bool culledByFcl(const QueryPair& ours, const FclPair& fcl, const Eigen::Isometry3d& X_AB, Order order) {
     const std::vector<QueryPair::Contact> mine = ours.contacts(X_AB, QueryPair::kAll, order);
     const std::vector<QueryPair::Contact> theirs = fcl.contacts(X_AB, QueryPair::kAll, order);
@@ -52,7 +52,7 @@ struct Validate {
     });
   }
 
-  /// @return does the reference say that they touch?
+  /// @return true if the first reference says that they touch.
   bool check(std::size_t number, const Pose& pose, const QueryPair& ours,
              const std::vector<std::unique_ptr<FclPair>>& all, Validation& sum) const {
     const Eigen::Isometry3d X_AB = pose.transform();

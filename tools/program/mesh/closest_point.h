@@ -18,7 +18,7 @@ struct BoundedTriangle {
 
 std::vector<BoundedTriangle> boundedTriangles(const Mesh& mesh);
 
-/// Is the point of the triangle's plane inside it? Normal need not be a unit vector.
+/// True if the point of the triangle's plane is inside it. `normal` need not be a unit vector.
 bool isInside(const BoundedTriangle& t, const Eigen::Vector3d& normal, const Eigen::Vector3d& p);
 
 Eigen::Vector3d closestOnTriangle(const Eigen::Vector3d& p, const BoundedTriangle& t);

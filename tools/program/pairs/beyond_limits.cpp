@@ -9,7 +9,7 @@
 namespace bocst::program {
 namespace {
 
-/// As exact answers decide it (share/doc/guarantees.md, Limits): is the triangle a segment or a point up to rounding?
+/// True if exact answers take the triangle for a segment or a point (share/doc/guarantees.md, Limits).
 bool isDegenerate(const Eigen::Vector3d& p, const Eigen::Vector3d& q, const Eigen::Vector3d& r, Scalar scalar) {
   const bool single = scalar == Scalar::kFloat;
   const double eps = single ? double{std::numeric_limits<float>::epsilon()} : std::numeric_limits<double>::epsilon();

@@ -22,10 +22,8 @@ class ModelPair : public PairOf<S, Model<S>, BocstPair, FclCalls> {
     points.reserve(result.numContacts());
     for (std::size_t i = 0; i < result.numContacts(); ++i) {
       const fcl::Contact<S>& c = result.getContact(i);
-      points.push_back({c.pos.template cast<double>(),
-                        c.normal.template cast<double>(),
-                        c.penetration_depth,
-                        {static_cast<int>(c.b1), static_cast<int>(c.b2)}});
+      points.push_back(
+          {c.pos.template cast<double>(), c.normal.template cast<double>(), c.penetration_depth, {c.b1, c.b2}});
     }
     return points;
   }
@@ -37,7 +35,7 @@ class ModelPair : public PairOf<S, Model<S>, BocstPair, FclCalls> {
     return {result.min_distance,
             result.nearest_points[0].template cast<double>(),
             result.nearest_points[1].template cast<double>(),
-            {static_cast<int>(result.b1), static_cast<int>(result.b2)}};
+            {result.b1, result.b2}};
   }
 
   void buildTrees() override {

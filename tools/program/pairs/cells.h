@@ -7,7 +7,7 @@
 
 namespace bocst::program {
 
-/// Do blanks and tabs separate the cells of a line, several as one does, or only commas, semicolons and single tabs?
+/// Whether blanks and tabs separate cells, several as one does, or only commas, semicolons and single tabs.
 enum class Blanks { kKeep, kSeparate };
 
 /// The cells of a line of a table in text (CSV) without blanks at their ends; what follows a # is a comment. In quotes,

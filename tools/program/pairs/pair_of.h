@@ -38,9 +38,8 @@ class PairOf : public Base {
     found.reserve(result.numContacts());
     for (std::size_t i = 0; i < result.numContacts(); ++i) {
       const fcl::Contact<S>& contact = result.getContact(i);
-      const auto b1 = static_cast<int>(contact.b1);
-      const auto b2 = static_cast<int>(contact.b2);
-      found.push_back(order == QueryPair::Order::kAB ? QueryPair::Contact(b1, b2) : QueryPair::Contact(b2, b1));
+      found.push_back(order == QueryPair::Order::kAB ? QueryPair::Contact(contact.b1, contact.b2)
+                                                     : QueryPair::Contact(contact.b2, contact.b1));
     }
     std::sort(found.begin(), found.end());
     found.erase(std::unique(found.begin(), found.end()), found.end());

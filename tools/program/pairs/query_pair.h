@@ -9,6 +9,7 @@
 
 #include <Eigen/Geometry>
 #include <cstddef>
+#include <cstdint>
 #include <limits>
 #include <memory>
 #include <string>
@@ -31,8 +32,8 @@ struct MeshArrays {
 /// Two geometries A and B, and questions about them. X_AB is the pose of B in A's frame.
 class QueryPair {
  public:
-  /// Triangle of A, triangle of B.
-  using Contact = std::pair<int, int>;
+  /// Ids of A and of B, as in fcl::Contact: triangles, or with conservative answers Morton codes of cells.
+  using Contact = std::pair<std::int64_t, std::int64_t>;
   static constexpr std::size_t kAll = std::numeric_limits<std::size_t>::max();
   enum class Order { kAB, kBA };
 
@@ -41,7 +42,7 @@ class QueryPair {
   QueryPair(const QueryPair&) = delete;
   QueryPair& operator=(const QueryPair&) = delete;
 
-  /// fcl::collide in its default form: do they touch? Order says which geometry is the first argument.
+  /// fcl::collide in its default form: true if they touch. Order says which geometry is the first argument.
   virtual bool touch(const Eigen::Isometry3d& X_AB, Order order = Order::kAB) const = 0;
 
   /// Up to `limit` contacts as found, sorted and without repetitions.
@@ -84,16 +85,16 @@ std::size_t fclTreeBytes(Scalar scalar, std::size_t triangles);
 /// Where two geometries touch, in A's frame.
 struct TouchingPoint {
   Eigen::Vector3d position;
-  Eigen::Vector3d normal;                ///< A unit vector from A to B.
-  double depth = 0;                      ///< In the meshes' length unit.
-  QueryPair::Contact triangles{-1, -1};  ///< With conservative answers: Morton codes of cells.
+  Eigen::Vector3d normal;  ///< A unit vector from A to B.
+  double depth = 0;        ///< In the meshes' length unit.
+  QueryPair::Contact triangles{-1, -1};
 };
 
 /// What of two geometries that do not touch is nearest, in A's frame.
 struct NearestPoints {
   double distance = 0;  ///< In the meshes' length unit.
   Eigen::Vector3d on_a, on_b;
-  QueryPair::Contact triangles{-1, -1};  ///< As of TouchingPoint.
+  QueryPair::Contact triangles{-1, -1};
 };
 
 /// Two fresh bocst models.

@@ -42,7 +42,7 @@ class Animation {
   const Mesh& object() const { return *object_; }
   const Mesh& obstacle(std::size_t i) const { return *obstacles_[i]; }
 
-  /// Does any pair touch? By frame, from FCL's OBBRSS trees.
+  /// Whether any pair touches, by frame, from FCL's OBBRSS trees.
   std::vector<bool> touching(double dimension) const;
 
   struct Setting {

@@ -29,7 +29,7 @@ class ManagedArm {
   ManagedArm(const ManagedArm&) = delete;
   ManagedArm& operator=(const ManagedArm&) = delete;
 
-  /// Does the state collide? Ends at the first pair that does. `pairs`, if not null, gets the pairs asked about;
+  /// True if the state collides. Ends at the first pair that does. `pairs`, if not null, gets the pairs asked about;
   /// `narrow`, if not null, the microseconds spent on them.
   virtual bool collides(const ArmWorld::Poses& X_WL, std::vector<AskedPair>* pairs = nullptr,
                         double* narrow = nullptr) = 0;

@@ -18,10 +18,10 @@ class Packages {
   /// A package that the command line does not name.
   void add(const std::string& name, const std::string& folder) { folders_.emplace(name, folder); }
 
-  /// The file that a URI means in a file of this folder: package://name/path, file:///path (%20 is a blank there),
-  /// /path, path. Packages are looked for among those given, in and below the folders of ROS_PACKAGE_PATH, in
-  /// AMENT_PREFIX_PATH, and from `folder` upwards. A package has the name that its package.xml says; a folder of this
-  /// name without a package.xml will do, too.
+  /// The file that a URI means in a file of this folder: package://name/path or model://name/path, file:///path (%20 is
+  /// a blank there), /path, path. Packages are looked for among those given, in and below the folders of
+  /// ROS_PACKAGE_PATH, in AMENT_PREFIX_PATH, and from `folder` upwards. A package has the name that its package.xml
+  /// says; a folder of this name without a package.xml will do, too.
   /// @throws std::runtime_error that says where the package was looked for.
   std::string resolve(const std::string& uri, const std::string& folder) const;
 

@@ -28,7 +28,7 @@ struct SceneDifference {
   bool fault;  ///< Else it is explained: by the answer, or by FCL's solver for a shape.
 };
 
-/// Is it bocst's fault that only one of the two finds a pair? `meshes`: of two meshes; `bocst`: bocst finds it;
+/// True if it is bocst's fault that only one of the two finds a pair. `meshes`: of two meshes; `bocst`: bocst finds it;
 /// `equal`: verdicts must be FCL's, otherwise bocst may find more.
 inline bool isFault(bool meshes, bool bocst, bool equal) { return meshes && (equal || !bocst); }
 

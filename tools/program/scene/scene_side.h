@@ -27,7 +27,6 @@ struct Bodies {
 
   explicit Bodies(const SceneSetup& setup);
 
-  /// Is this pair asked about?
   bool asked(std::size_t a, std::size_t b) const {
     return (a < moving || b < moving) && !allowed[bodies[a].part * parts + bodies[b].part];
   }

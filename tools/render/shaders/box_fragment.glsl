@@ -6,7 +6,7 @@ uniform float u_pixels;
 out vec4 result;
 
 void main() {
-  // Of the two coordinates that vary over this face: how many pixels from an edge?
+  // Of the two coordinates that vary over this face: how many pixels from an edge.
   vec3 change = fwidth(at);
   vec3 away = mix((1.0 - abs(at)) / max(change, 1e-9), vec3(1e9), lessThan(change, vec3(1e-6)));
   // Edges of boxes that are a few pixels wide would be all that is seen.

@@ -65,7 +65,7 @@ uint octantState(uint cell, int octant, uint word) {
   return state(cell, kOctants + uint(octant) * kOctantWords + word);
 }
 
-// Did a list or the ids not find room? Then the host makes room and starts over from the placing of the lists.
+// True if a list or the ids found no room. Then the host makes room and starts over from the placing of the lists.
 bool isOverflown() { return answers[kListWords] > u_list_capacity.y || answers[kIdWords] > u_id_capacity; }
 
 // What pass 1 wrote of a pair: the octants that it may meet.

@@ -1,4 +1,4 @@
-// Pass 1: which octants may each triangle meet, which does it surely meet? The separating-axis test of octantMasks()
+// Pass 1: which octants each triangle may meet, and which it surely meets. The separating-axis test of octantMasks()
 // (oracle/cpu/kernels.h) with its rounding margins: 16 u M on the half side, 24 u on the products of the plane equation. Here
 // corners carry two roundings rather than one, 9.5 u M in all. With the rounding margins taken away instead of added, what still
 // overlaps on every axis surely touches.

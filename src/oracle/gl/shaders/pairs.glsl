@@ -98,7 +98,7 @@ uint blockOf(int t, uint name) {
   return name == kRoot ? ofTree(t, kTreeRoot) : blockWord(t, name >> 3, kNodeChildren + (name & 7u));
 }
 
-// Is this octant of the next node of a pair to be walked on, and as what?
+// True if the walk goes on with this octant of the node that is expanded; `next` is then the pair with it.
 bool step(uvec2 names, uint octant, out uvec2 next) {
   Node node[2] = Node[2](nodeOf(0, names.x), nodeOf(1, names.y));
   bool leaf0 = node[0].level >= ofTree(0, kTreeDeepest), leaf1 = node[1].level >= ofTree(1, kTreeDeepest);
