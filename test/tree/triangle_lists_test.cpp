@@ -8,6 +8,7 @@
 #include <vector>
 
 #include "meshes.h"
+#include "oracle/oracle.h"
 #include "tree/bulk.h"
 
 namespace bocst::tree {

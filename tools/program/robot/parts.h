@@ -8,12 +8,10 @@
 #include <string>
 #include <vector>
 
-#include "mesh/limits.h"
-
 namespace bocst::program {
 
 /// Larger sizes and coordinates of positions are refused, as those of meshes are: FCL's solvers compute with squares.
-constexpr double kMostLength = kMostCoordinate;
+constexpr double kMostLength = 1e75;
 
 /// A mesh or a body about the origin of its own frame.
 struct Shape {
