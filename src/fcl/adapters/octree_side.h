@@ -39,6 +39,7 @@ class OcTreeSide : public query::CompleteSide {
   static constexpr bool kBodies = true;
   // Octomap's inner nodes need not be up to date.
   static constexpr bool kNodesContainSurface = false;
+  static constexpr bool kHasOctants = true;
 
   /// `density` is that of the other geometry. Cells that are uncertain or not known are seen only where costs are asked
   /// for.
@@ -129,6 +130,22 @@ class OcTreeSide : public query::CompleteSide {
     unsigned nearest = 0;
     const unsigned mask = octantsMeeting(center(n), half(n), other, to, nearest);
     visitChildren(n, mask, nearest, f);
+  }
+
+  /// The same against the triangles of a leaf of the other side, see LargeTriangleLeaf.
+  template <typename Large, typename Other, typename F>
+  void childrenMeeting(const Node& n, const query::Volume& volume, const query::SimilarityTransform& to, Large& large,
+                       const Other& other, typename Other::Node leaf, F&& f) const {
+    unsigned nearest = 0;
+    unsigned mask = octantsMeeting(center(n), half(n), volume, to, nearest);
+    if (mask != 0) mask = large.octantsMeeting(*this, n, mask, other, leaf, to);
+    visitChildren(n, mask, nearest, f);
+  }
+
+  /// The centre of a cube, and half its side.
+  double octantsOf(const Node& n, Eigen::Vector3d& middle) const {
+    middle = center(n);
+    return half(n);
   }
 
   // For ConvexCollector.

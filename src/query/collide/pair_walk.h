@@ -226,7 +226,7 @@ class PairWalk {
   static void childrenBesideLeaf(const Side& side, typename Side::Node node, Volume& volume,
                                  const SimilarityTransform& to, Large& large, const Other& other,
                                  typename Other::Node leaf, F&& f) {
-    if constexpr (std::is_same<Side, TreeSide>::value) {
+    if constexpr (Side::kHasOctants) {
       side.childrenMeeting(node, volume, to, large, other, leaf, f);
     } else {
       side.overlappingChildren(node, volume, to, f);

@@ -27,7 +27,8 @@ class LargeTriangleLeaf {
   void clear() { leaf_.clear(); }
 
   /// The octants in `mask` of an inner node that a triangle of `leaf` meets.
-  unsigned octantsMeeting(const TreeSide& side, tree::NodeRef node, unsigned mask, const Other& other,
+  template <typename Side>
+  unsigned octantsMeeting(const Side& side, const typename Side::Node& node, unsigned mask, const Other& other,
                           typename Other::Node leaf, const SimilarityTransform& other_in_side) {
     Eigen::Vector3d center;
     const double half = side.octantsOf(node, center), scale = 1 / half;

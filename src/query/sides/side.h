@@ -27,6 +27,8 @@ struct CompleteSide {
   }
   template <typename Node>
   void grow(const Node&, std::vector<tree::Tree::Growth>&) const {}
+  // Children are octants that can be tested against the triangles of a leaf, see TreeSide::childrenMeeting().
+  static constexpr bool kHasOctants = false;
   // Only a side that answers with cells is asked for these.
   template <typename Node>
   Sphere cellSphere(const Node&) const {
@@ -45,6 +47,7 @@ class TreeSide {
   using Node = tree::NodeRef;
   static constexpr bool kBodies = false;
   static constexpr bool kNodesContainSurface = true;
+  static constexpr bool kHasOctants = true;
 
   explicit TreeSide(tree::Tree& tree) : TreeSide(tree, tree.now()) {}
   TreeSide(tree::Tree& tree, std::int64_t now) : tree_(tree), now_(now) {}
