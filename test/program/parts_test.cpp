@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: BSD-3-Clause
 // The parts of the program that can be tested without running it.
+#include <bocst/fcl.h>
 #include <bocst/model.h>
 #include <gtest/gtest.h>
 
@@ -9,6 +10,7 @@
 #include <cstdint>
 #include <limits>
 #include <map>
+#include <memory>
 #include <numeric>
 #include <random>
 #include <set>
@@ -27,6 +29,7 @@
 #include "meshes.h"
 #include "pairs/beyond_limits.h"
 #include "pairs/poses.h"
+#include "pairs/query_pair.h"
 #include "picture/display_mesh.h"
 #include "picture/page.h"
 
@@ -462,6 +465,38 @@ TEST(PoseSampler, LiesToBothSidesOfContact) {
   }
   EXPECT_LT(nearest, 1e-8);
   EXPECT_GT(farthest, 1e-2);
+}
+
+// Their Morton codes have more than 32 bits.
+TEST(QueryPair, NamesDeepCellsAsFclContactsDo) {
+  using namespace program;
+  Options options;
+  options.oracle = OracleKind::kCpu;
+  options.answer = Answer::kConservative;
+  options.depth = 14;
+  const auto mesh = test::box({0, 0, 0}, {1, 1, 1}).mesh();
+  const MeshArrays arrays(*mesh, Scalar::kDouble);
+  Eigen::Isometry3d X_AB = Eigen::Isometry3d::Identity();
+  X_AB.translation() = Eigen::Vector3d(0.99, 0.97, 0.98);
+  const std::unique_ptr<BocstPair> pair = makeBocstPair(Scalar::kDouble, arrays, arrays, options);
+  const std::vector<TouchingPoint> points = pair->touchingPoints(X_AB, 5);
+
+  const Modeld a(mesh, options), b(mesh, options);
+  const fcl::CollisionRequestd request(5, true);
+  fcl::CollisionResultd result;
+  fcl::collide<double>(&a, fcl::Transform3d::Identity(), &b, fcl::Transform3d(X_AB.matrix()), request, result);
+  ASSERT_EQ(points.size(), result.numContacts());
+  ASSERT_FALSE(points.empty());
+  std::int64_t largest = 0;
+  for (std::size_t i = 0; i < points.size(); ++i) {
+    EXPECT_EQ(points[i].triangles.first, result.getContact(i).b1);
+    EXPECT_EQ(points[i].triangles.second, result.getContact(i).b2);
+    largest = std::max(largest, points[i].triangles.first);
+  }
+  EXPECT_GT(largest, std::int64_t{1} << 32);
+  const std::vector<QueryPair::Contact> ids = pair->contacts(X_AB, 5);
+  EXPECT_EQ(ids.size(), points.size());
+  for (const TouchingPoint& point : points) EXPECT_EQ(std::count(ids.begin(), ids.end(), point.triangles), 1);
 }
 
 TEST(Pose, SaysItsRotationInWords) {
