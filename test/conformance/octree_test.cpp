@@ -2,8 +2,11 @@
 // fcl::OcTree as a partner: against FCL's own mesh query where that is right, and against all boxes and triangles.
 #include <gtest/gtest.h>
 
+#include <cmath>
 #include <limits>
 #include <map>
+#include <memory>
+#include <vector>
 
 #include "conformance/octrees.h"
 #include "conformance/reference.h"
@@ -192,6 +195,31 @@ TYPED_TEST(OcTrees, EmptyOnesAreNowhere) {
     std::vector<fcl::CostSource<S>> sources;
     none.getCostSources(sources);
     EXPECT_EQ(sources.empty(), !costs);
+  }
+}
+
+// Occupancy is decided by log-odds, with FCL's probability in doubt: near the threshold, and for extreme thresholds.
+TYPED_TEST(OcTrees, OccupancyIsFcls) {
+  using S = TypeParam;
+  const Raw raw = test::box({-0.02, -0.02, -0.02}, {0.02, 0.02, 0.02});
+  const Model<S> model(raw.mesh());
+  const auto I = test::pose<S>(Eigen::Matrix3d::Identity(), {0, 0, 0});
+  for (const double log_odds : {-30.0, -3.0, 0.0, 0.5, 8.0, 30.0, 40.0}) {
+    const auto map = std::make_shared<octomap::OcTree>(0.1);
+    std::vector<octomap::point3d> places;
+    for (int k = -12; k <= 12; ++k) {
+      const double off = k == 0 ? 0 : std::copysign(std::pow(10.0, std::abs(k) % 6 - 5), k);
+      places.emplace_back(0.2f * static_cast<float>(k) + 0.05f, 0.05f, 0.05f);
+      map->setNodeValue(places.back(), static_cast<float>(log_odds + off));
+    }
+    map->updateInnerOccupancy();
+    fcl::OcTree<S> octree{std::shared_ptr<const octomap::OcTree>(map)};
+    octree.setOccupancyThres(static_cast<S>(1 - 1 / (1 + std::exp(log_odds))));
+    for (const octomap::point3d& place : places) {
+      const auto X = test::pose<S>(Eigen::Matrix3d::Identity(), {place.x(), place.y(), place.z()});
+      ASSERT_EQ(test::touching<S>(model, X, octree, I), octree.isNodeOccupied(map->search(place)))
+          << log_odds << " at " << place.x();
+    }
   }
 }
 
