@@ -210,7 +210,8 @@ TYPED_TEST(OcTrees, OccupancyIsFcls) {
     for (int k = -12; k <= 12; ++k) {
       const double off = k == 0 ? 0 : std::copysign(std::pow(10.0, std::abs(k) % 6 - 5), k);
       places.emplace_back(0.2f * static_cast<float>(k) + 0.05f, 0.05f, 0.05f);
-      map->setNodeValue(places.back(), static_cast<float>(log_odds + off));
+      map->setNodeValue(places.back(), 0)
+          ->setLogOdds(static_cast<float>(log_odds + off));  // beyond octomap's own limits
     }
     map->updateInnerOccupancy();
     fcl::OcTree<S> octree{std::shared_ptr<const octomap::OcTree>(map)};
