@@ -198,7 +198,7 @@ TYPED_TEST(OcTrees, EmptyOnesAreNowhere) {
   }
 }
 
-// Occupancy is decided by log-odds, with FCL's probability in doubt: near the threshold, and for extreme thresholds.
+// Near the threshold, and for extreme thresholds.
 TYPED_TEST(OcTrees, OccupancyIsFcls) {
   using S = TypeParam;
   const Raw raw = test::box({-0.02, -0.02, -0.02}, {0.02, 0.02, 0.02});

@@ -51,14 +51,7 @@ class OcTreeSide : public query::CompleteSide {
         root_node_(octree.getRoot()),
         root_box_(octree.getRootBV()),
         root_half_((static_cast<double>(root_box_.max_[0]) - static_cast<double>(root_box_.min_[0])) / 2),
-        unit_(root_half_ / (1 << kLevels)) {
-    const auto threshold = static_cast<double>(octree.getOccupancyThres());
-    const double log_odds = std::log(threshold / (1 - threshold));
-    if (std::abs(log_odds) < kMostLogOdds) {
-      surely_free_ = log_odds - kLogOddsDoubt;
-      surely_occupied_ = log_odds + kLogOddsDoubt;
-    }
-  }
+        unit_(root_half_ / (1 << kLevels)) {}
 
   /// Nothing in it is of interest.
   bool empty() const { return !sees(root_node_); }
@@ -167,9 +160,6 @@ class OcTreeSide : public query::CompleteSide {
 
  private:
   static constexpr int kLevels = 16;  // octomap's
-  // FCL computes a probability from the log-odds of each node, with an exponential, and compares that. Log-odds that
-  // differ from the threshold's by more than kLogOddsDoubt decide the same: up to kMostLogOdds, rounding is below 1e-7.
-  static constexpr double kMostLogOdds = 20, kLogOddsDoubt = 1e-3;
   inline static const bounds::OctantBounds kWholeOctants = [] {
     bounds::OctantBounds octants;
     octants.fill(bounds::NodeBounds{});
@@ -244,9 +234,6 @@ class OcTreeSide : public query::CompleteSide {
 
   bool sees(const octomap::OcTreeNode* node) const {
     if (node == nullptr) return costs_;
-    const float log_odds = node->getLogOdds();
-    if (log_odds > surely_occupied_) return true;
-    if (log_odds < surely_free_ && !costs_) return false;
     return octree_.isNodeOccupied(node) || (costs_ && !octree_.isNodeFree(node));
   }
 
@@ -277,8 +264,6 @@ class OcTreeSide : public query::CompleteSide {
   const octomap::OcTreeNode* const root_node_;
   const fcl::AABB<S> root_box_;
   const double root_half_, unit_;  // half the side of the root, and of a cube of the last level
-  double surely_free_ = -std::numeric_limits<double>::infinity();
-  double surely_occupied_ = std::numeric_limits<double>::infinity();
 };
 
 }  // namespace bocst::fcl_adapter
