@@ -136,6 +136,55 @@ std::uint8_t OverlappingLanes(const bounds::LooseFrame& frame, const bounds::Oct
   return overlapping<true>(lanes, half_step, codec::looseSlabUnit(2), volume);
 }
 
+std::uint8_t OverlappingBoxes(const OrientedBoxes& boxes, const OneVolume& b) {
+  const D d;
+  const V rounding_margin = hn::Set(d, b.rounding_margin);
+  std::uint8_t result = 0;
+  for (std::size_t i = 0; i < 8; i += hn::Lanes(d)) {
+    V delta[3], slab_t = hn::Set(d, b.slab_offset), slab_r = hn::Add(hn::Set(d, b.slab_half), rounding_margin);
+    V face_t[3], face_r[3];
+    BOCST_UNROLL
+    for (int k = 0; k < 3; ++k) {
+      delta[k] = hn::Sub(hn::Set(d, b.center[k]), hn::Load(d, boxes.center[k] + i));
+      slab_t = hn::MulAdd(hn::Set(d, b.normal[k]), delta[k], slab_t);
+      face_t[k] = hn::Zero(d);
+      face_r[k] = hn::Add(hn::Set(d, b.half[k]), rounding_margin);
+    }
+    M apart = hn::MaskFromVec(hn::Zero(d));
+    BOCST_UNROLL
+    for (int j = 0; j < 3; ++j) {
+      V axis[3];
+      const V half = hn::Load(d, boxes.half[j] + i);
+      V t = hn::Zero(d), r = hn::Add(half, rounding_margin), along_normal = hn::Zero(d);
+      BOCST_UNROLL
+      for (int c = 0; c < 3; ++c) {
+        axis[c] = hn::Load(d, boxes.axes[j][c] + i);
+        t = hn::MulAdd(axis[c], delta[c], t);
+        along_normal = hn::MulAdd(axis[c], hn::Set(d, b.normal[c]), along_normal);
+      }
+      slab_r = hn::MulAdd(hn::Abs(along_normal), half, slab_r);
+      BOCST_UNROLL
+      for (int k = 0; k < 3; ++k) {
+        V along = hn::Mul(axis[0], hn::Set(d, b.axes[k][0]));
+        along = hn::MulAdd(axis[1], hn::Set(d, b.axes[k][1]), along);
+        along = hn::Abs(hn::MulAdd(axis[2], hn::Set(d, b.axes[k][2]), along));
+        r = hn::MulAdd(along, hn::Set(d, b.half[k]), r);
+        face_r[k] = hn::MulAdd(along, half, face_r[k]);
+      }
+      apart = hn::Or(apart, hn::Gt(hn::Abs(t), r));
+    }
+    BOCST_UNROLL
+    for (int k = 0; k < 3; ++k) {
+      BOCST_UNROLL
+      for (int c = 0; c < 3; ++c) face_t[k] = hn::MulAdd(hn::Set(d, b.axes[k][c]), delta[c], face_t[k]);
+      apart = hn::Or(apart, hn::Gt(hn::Abs(face_t[k]), face_r[k]));
+    }
+    apart = hn::Or(apart, hn::Gt(hn::Abs(slab_t), slab_r));
+    result = static_cast<std::uint8_t>(result | bitsOf(d, hn::Not(apart)) << i);
+  }
+  return result;
+}
+
 void PlaceTriangles(RawTriangles& raw, std::size_t count, const PackTransform& place, TrianglePack& pack) {
   const hn::CappedTag<double, 8> dd;
   const hn::Rebind<float, decltype(dd)> df;
@@ -746,6 +795,7 @@ namespace bocst::query {
 
 HWY_EXPORT(OverlappingOctants);
 HWY_EXPORT(OverlappingLanes);
+HWY_EXPORT(OverlappingBoxes);
 HWY_EXPORT(PlaceTriangles);
 HWY_EXPORT(BoundTriangles);
 HWY_EXPORT(TrianglesWithin);
@@ -760,6 +810,10 @@ std::uint8_t overlappingLanes(const bounds::LooseFrame& frame, const bounds::Oct
 
 std::uint8_t overlappingOctants(const bounds::OctantBounds& octants, const OneVolume& volume) {
   return HWY_DYNAMIC_DISPATCH(OverlappingOctants)(octants, volume);
+}
+
+std::uint8_t overlappingBoxes(const OrientedBoxes& boxes, const OneVolume& volume) {
+  return HWY_DYNAMIC_DISPATCH(OverlappingBoxes)(boxes, volume);
 }
 
 void placeTriangles(RawTriangles& raw, std::size_t count, const PackTransform& place, TrianglePack& pack) {

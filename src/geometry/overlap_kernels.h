@@ -34,6 +34,18 @@ std::uint8_t overlappingOctants(const bounds::OctantBounds& octants, const OneVo
 std::uint8_t overlappingLanes(const bounds::LooseFrame& frame, const bounds::OctantBounds& lanes,
                               const OneVolume& volume);
 
+/// Eight boxes with axes of their own, in one frame: coordinate or axis first, lane last.
+struct OrientedBoxes {
+  alignas(64) float center[3][8];
+  float half[3][8];     ///< Half extents along the axes.
+  float axes[3][3][8];  ///< axes[j][k]: entry k of unit axis j.
+};
+
+/// Bit i is set unless box i is surely separated from the volume, by one of seven axes: the faces of both boxes and the
+/// slab normal of the volume, given in the frame of the boxes. Rounding margins as for overlappingOctants(), Q with the
+/// largest |center|_1 + |half|_1 of the boxes in place of 4.
+std::uint8_t overlappingBoxes(const OrientedBoxes& boxes, const OneVolume& volume);
+
 /// Corners of up to kCapacity triangles as structure of arrays, in one frame, near the origin.
 struct TrianglePack {
   static constexpr std::size_t kCapacity = kMaxLeafTriangles;

@@ -3,12 +3,16 @@
 
 #include <fcl/geometry/bvh/BVH_model.h>
 
+#include <algorithm>
+#include <cmath>
 #include <cstddef>
+#include <cstdint>
 #include <stdexcept>
 #include <string>
 
 #include "fcl/adapters/rounding.h"
 #include "query/sides/side.h"
+#include "thread/of_thread.h"
 
 namespace bocst::fcl_adapter {
 
@@ -78,7 +82,9 @@ class BvhSide : public query::CompleteSide {
         volume_([](const fcl::BVNodeBase& node) { return volumeOf(static_cast<const fcl::BVNode<BV>&>(node).bv); }),
         triangles_(bvh.tri_indices),
         triangle_count_(static_cast<std::size_t>(bvh.num_tris)),
-        vertex_count_(static_cast<std::size_t>(bvh.num_vertices)) {
+        vertex_count_(static_cast<std::size_t>(bvh.num_vertices)),
+        groups_(&thread::ofThread<Groups>()),
+        number_(++groups_->sides) {
     setVertices(bvh.vertices);
     const query::OrientedVolume v = volume_(node(0));
     magnitude_ = v.center.cwiseAbs().maxCoeff() + v.half.norm();
@@ -89,7 +95,7 @@ class BvhSide : public query::CompleteSide {
   double magnitude() const { return magnitude_; }
 
   Node root() const { return 0; }
-  query::State state(Node n) const { return node(n).isLeaf() ? query::State::kLeaf : query::State::kInner; }
+  query::State state(Node n) const { return isLeaf(node(n)) ? query::State::kLeaf : query::State::kInner; }
 
   double size(Node n) const { return volume(n).half.squaredNorm(); }
 
@@ -105,21 +111,34 @@ class BvhSide : public query::CompleteSide {
     return {v.center, v.half.norm()};
   }
 
+  /// Not its children in FCL's tree, but up to eight nodes below them.
   template <typename F>
   void overlappingChildren(Node n, const query::Volume& other, const query::SimilarityTransform& to, F&& f) const {
-    children(n, [&](Node child) {
-      if (!query::boxesApart(volume(child), query::oriented(other), to)) f(child);
-    });
+    const Group& group = groupOf(n);
+    query::OneVolume seen = query::seenFrom(other, to, group.middle, group.unit);
+    seen.rounding_margin += group.size * to.rounding_margin;
+    for (unsigned left = query::overlappingBoxes(group.boxes, seen) & group.lanes; left != 0; left &= left - 1) {
+      f(group.node[__builtin_ctz(left)]);
+    }
   }
 
   template <typename F>
   void children(Node n, F&& f) const {
-    f(node(n).leftChild());
-    f(node(n).rightChild());
+    f(node(n).first_child);
+    f(node(n).first_child + 1);
   }
 
-  std::size_t triangleCount(Node) const { return 1; }
-  std::uint32_t triangle(Node n, std::size_t) const { return static_cast<std::uint32_t>(node(n).primitiveId()); }
+  std::size_t triangleCount(Node n) const { return static_cast<std::size_t>(node(n).num_primitives); }
+  std::uint32_t triangle(Node n, std::size_t i) const {
+    const fcl::BVNodeBase* at = &node(n);
+    while (at->first_child >= 0) {
+      const fcl::BVNodeBase& left = node(at->first_child);
+      const auto of_left = static_cast<std::size_t>(left.num_primitives);
+      at = i < of_left ? &left : &node(at->first_child + 1);
+      if (i >= of_left) i -= of_left;
+    }
+    return static_cast<std::uint32_t>(-at->first_child - 1);
+  }
   void prefetch(std::uint32_t t) const { __builtin_prefetch(&triangles_[t]); }
   void prefetchCorners(std::uint32_t t) const {
     for (int k = 0; k < 3; ++k) {
@@ -145,6 +164,70 @@ class BvhSide : public query::CompleteSide {
   }
 
  private:
+#ifndef KLEAF
+#define KLEAF 8
+#endif
+  static constexpr int kLeafTriangles = KLEAF;
+  static bool isLeaf(const fcl::BVNodeBase& node) { return node.num_primitives <= kLeafTriangles; }
+
+  /// Up to eight nodes that hold all triangles below another one, for tests in SIMD.
+  struct Group {
+    std::uint64_t side = 0;  ///< Of which it was made.
+    Node parent = 0, node[8];
+    unsigned lanes = 0;  ///< A bit for each node.
+    double middle[3], unit;  ///< Of the coordinates of `boxes`.
+    float size;              ///< The largest |center|_1 + |half|_1 of `boxes`.
+    query::OrientedBoxes boxes;
+  };
+  struct Groups {
+    static constexpr std::size_t kCount = 128;
+    std::uint64_t sides = 0;
+    Group group[kCount];
+  };
+
+  const Group& groupOf(Node n) const {
+    Group& group = groups_->group[static_cast<std::size_t>(n) % Groups::kCount];
+    if (group.side != number_ || group.parent != n) fill(n, group);
+    return group;
+  }
+
+  void fill(Node n, Group& group) const {
+    group.side = number_;
+    group.parent = n;
+    group.node[0] = node(n).first_child;
+    group.node[1] = node(n).first_child + 1;
+    int count = 2;
+    int triangles[8] = {node(group.node[0]).num_primitives, node(group.node[1]).num_primitives};
+    while (count < 8) {
+      const int most = static_cast<int>(std::max_element(triangles, triangles + count) - triangles);
+      if (triangles[most] <= kLeafTriangles) break;
+      const Node first = node(group.node[most]).first_child;
+      group.node[most] = first;
+      triangles[most] = node(first).num_primitives;
+      group.node[count] = first + 1;
+      triangles[count++] = node(first + 1).num_primitives;
+    }
+    group.lanes = (1u << count) - 1;
+    const query::OrientedVolume all = volume(n);
+    const double radius = all.half.norm(), scale = radius > 0 ? 1 / radius : 1;
+    group.unit = 1 / scale;
+    group.size = 0;
+    for (int k = 0; k < 3; ++k) group.middle[k] = all.center[k];
+    for (int i = 0; i < count; ++i) {
+      const query::OrientedVolume v = volume(group.node[i]);
+      float size = 0;
+      for (int k = 0; k < 3; ++k) {
+        const auto center = static_cast<float>((v.center[k] - all.center[k]) * scale);
+        const auto half = static_cast<float>(v.half[k] * scale);
+        group.boxes.center[k][i] = center;
+        group.boxes.half[k][i] = half;
+        size += std::abs(center) + half;
+        for (int j = 0; j < 3; ++j) group.boxes.axes[j][k][i] = static_cast<float>(v.axes(k, j));
+      }
+      group.size = std::max(group.size, size);
+    }
+  }
+
   template <typename BV>
   static const char* nodesOf(const char* query, const fcl::BVHModel<BV>& bvh) {
     if (bvh.getModelType() != fcl::BVH_MODEL_TRIANGLES || bvh.num_tris <= 0 || bvh.getNumBVs() <= 0) {
@@ -168,6 +251,8 @@ class BvhSide : public query::CompleteSide {
   const fcl::Vector3<double>* doubles_ = nullptr;  // the vertices, one of the two
   const fcl::Vector3<float>* floats_ = nullptr;
   double magnitude_ = 0, rounding_ = 0;
+  Groups* groups_;
+  std::uint64_t number_;  // of this side, among those of the thread
 };
 
 }  // namespace bocst::fcl_adapter
