@@ -4,6 +4,7 @@
 #include <Eigen/Core>
 #include <Eigen/LU>
 #include <cmath>
+#include <utility>
 
 #include "bounds/node_bounds.h"
 #include "geometry/overlap_kernels.h"
@@ -116,6 +117,44 @@ inline OneVolume seenFrom(OrientedVolume& v, const SimilarityTransform& to, cons
   return o;
 }
 
+/// A box with axes of its own in the frame of the side that sees it.
+struct PlacedVolume {
+  double center[3];
+  double half[3];    ///< Along the axes.
+  float axes[3][3];  ///< axes[j]: unit axis j.
+};
+
+inline PlacedVolume placed(const OrientedVolume& v, const SimilarityTransform& to) {
+  PlacedVolume p;
+  const Eigen::Vector3d center = to * v.center;
+  for (int k = 0; k < 3; ++k) {
+    p.center[k] = center[k];
+    p.half[k] = v.half[k] * to.scale;
+    const Eigen::Vector3d axis = to.rotation * v.axes.col(k);
+    for (int c = 0; c < 3; ++c) p.axes[k][c] = static_cast<float>(axis[c]);
+  }
+  return p;
+}
+
+/// `to`: what placed the volume.
+inline OneVolume seenFrom(const PlacedVolume& v, const SimilarityTransform& to, const double* corner, double side) {
+  OneVolume o;
+  const double inverse = 1 / side;
+  double size = 4;
+  for (int k = 0; k < 3; ++k) {
+    const double center = (v.center[k] - corner[k]) * inverse, half = v.half[k] * inverse;
+    o.center[k] = static_cast<float>(center);
+    o.half[k] = static_cast<float>(half);
+    o.normal[k] = 0;
+    size += std::abs(center) + half;
+  }
+  o.axes = v.axes;
+  o.slab_offset = 0;
+  o.slab_half = 0;
+  o.rounding_margin = static_cast<float>(size) * to.rounding_margin + static_cast<float>(to.tolerance * inverse);
+  return o;
+}
+
 inline OrientedVolume oriented(const Volume& v) {
   OrientedVolume o;
   for (int k = 0; k < 3; ++k) {
@@ -125,6 +164,32 @@ inline OrientedVolume oriented(const Volume& v) {
   return o;
 }
 inline const OrientedVolume& oriented(const OrientedVolume& v) { return v; }
+
+/// The box about a triangle: along its longest edge, across that in its plane, and along its normal.
+inline OrientedVolume boxAbout(const Corners& c) {
+  Eigen::Vector3d edge = c[1] - c[0], other = c[2] - c[0];
+  if (other.squaredNorm() > edge.squaredNorm()) std::swap(edge, other);
+  const Eigen::Vector3d third = c[2] - c[1];
+  if (third.squaredNorm() > edge.squaredNorm()) edge = third;
+  OrientedVolume v;
+  const double length = edge.norm();
+  // Any axes at right angles will do: the extents are found along what they are.
+  if (length > 0) {
+    const Eigen::Vector3d along = edge / length;
+    Eigen::Vector3d across = other - other.dot(along) * along;
+    if (!(across.norm() > 1e-6 * length)) across = along.unitOrthogonal();
+    v.axes.col(0) = along;
+    v.axes.col(1) = (across - across.dot(along) * along).normalized();
+    v.axes.col(2) = along.cross(v.axes.col(1));
+  }
+  Eigen::Matrix3d in_axes;
+  for (int k = 0; k < 3; ++k) in_axes.col(k) = v.axes.transpose() * c[static_cast<std::size_t>(k)];
+  const Eigen::Vector3d low = in_axes.rowwise().minCoeff(), high = in_axes.rowwise().maxCoeff();
+  v.center = v.axes * ((low + high) / 2);
+  v.half = (high - low) / 2;
+  v.half.array() += 32 * 0x1p-53 * in_axes.cwiseAbs().sum();
+  return v;
+}
 
 /// The corners of a box, placed.
 inline void cornersOf(const OrientedVolume& box, const SimilarityTransform& to, Eigen::Vector3d (&corners)[8]) {

@@ -73,7 +73,15 @@ class HandTree : public query::CompleteSide {
   }
 
   std::size_t triangleCount(Node n) const { return at(n).end - at(n).begin; }
-  std::uint32_t triangle(Node n, std::size_t i) const { return static_cast<std::uint32_t>(at(n).begin + i); }
+  struct Numbers {
+    std::size_t begin;
+    std::uint32_t operator[](std::size_t i) const { return static_cast<std::uint32_t>(begin + i); }
+  };
+  struct Triangles {
+    Numbers ids;
+    std::size_t count;
+  };
+  Triangles triangles(Node n) const { return {{at(n).begin}, at(n).end - at(n).begin}; }
   void prefetch(std::uint32_t) const {}
   void prefetchCorners(std::uint32_t) const {}
   const Eigen::Vector3d& vertex(std::uint32_t t, int k) const { return triangles_[t].corners[k]; }

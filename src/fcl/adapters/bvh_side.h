@@ -11,8 +11,10 @@
 #include <string>
 
 #include "fcl/adapters/rounding.h"
+#include "log/assert.h"
 #include "query/sides/side.h"
 #include "thread/of_thread.h"
+#include "tree/outline.h"
 
 namespace bocst::fcl_adapter {
 
@@ -73,6 +75,9 @@ class BvhSide : public query::CompleteSide {
   using Node = int;
   static constexpr bool kBodies = false;
   static constexpr bool kNodesContainSurface = true;
+  static constexpr bool kHasLanes = true;
+  // Below so few triangles, FCL's nodes part less than they cost.
+  static constexpr int kLeafTriangles = 8;
 
   /// @throws std::invalid_argument when the model is no finished triangle mesh.
   template <typename BV>
@@ -80,6 +85,7 @@ class BvhSide : public query::CompleteSide {
       : nodes_(nodesOf(query, bvh)),
         node_size_(sizeof(fcl::BVNode<BV>)),
         volume_([](const fcl::BVNodeBase& node) { return volumeOf(static_cast<const fcl::BVNode<BV>&>(node).bv); }),
+        pack_(&pack<BV>),
         triangles_(bvh.tri_indices),
         triangle_count_(static_cast<std::size_t>(bvh.num_tris)),
         vertex_count_(static_cast<std::size_t>(bvh.num_vertices)),
@@ -93,6 +99,12 @@ class BvhSide : public query::CompleteSide {
 
   /// No coordinate is larger, in absolute value.
   double magnitude() const { return magnitude_; }
+
+  /// About all triangles.
+  tree::Outline::Box outline() const {
+    const query::OrientedVolume v = volume(root());
+    return tree::Outline::boxOf(v.center, v.axes, v.half);
+  }
 
   Node root() const { return 0; }
   query::State state(Node n) const { return isLeaf(node(n)) ? query::State::kLeaf : query::State::kInner; }
@@ -111,15 +123,25 @@ class BvhSide : public query::CompleteSide {
     return {v.center, v.half.norm()};
   }
 
-  /// Not its children in FCL's tree, but up to eight nodes below them.
   template <typename F>
   void overlappingChildren(Node n, const query::Volume& other, const query::SimilarityTransform& to, F&& f) const {
+    pushLanes(n, overlappingLanes(n, other, to), [&f](Node node, int) { f(node); });
+  }
+
+  /// Lanes are not the children of the node in FCL's tree, but up to eight nodes below it.
+  template <typename OtherVolume>
+  unsigned overlappingLanes(Node n, OtherVolume& other, const query::SimilarityTransform& to) const {
     const Group& group = groupOf(n);
     query::OneVolume seen = query::seenFrom(other, to, group.middle, group.unit);
     seen.rounding_margin += group.size * to.rounding_margin;
-    for (unsigned left = query::overlappingBoxes(group.boxes, seen) & group.lanes; left != 0; left &= left - 1) {
-      f(group.node[__builtin_ctz(left)]);
-    }
+    return query::overlappingBoxes(group.boxes, seen) & group.lanes;
+  }
+
+  /// Calls f(node, lane) for the nodes in `mask`.
+  template <typename F>
+  void pushLanes(Node n, unsigned mask, F&& f) const {
+    const Group& group = groupOf(n);
+    for (; mask != 0; mask &= mask - 1) f(group.node[__builtin_ctz(mask)], __builtin_ctz(mask));
   }
 
   template <typename F>
@@ -129,20 +151,32 @@ class BvhSide : public query::CompleteSide {
   }
 
   std::size_t triangleCount(Node n) const { return static_cast<std::size_t>(node(n).num_primitives); }
-  std::uint32_t triangle(Node n, std::size_t i) const {
-    const fcl::BVNodeBase* at = &node(n);
-    while (at->first_child >= 0) {
-      const fcl::BVNodeBase& left = node(at->first_child);
-      const auto of_left = static_cast<std::size_t>(left.num_primitives);
-      at = i < of_left ? &left : &node(at->first_child + 1);
-      if (i >= of_left) i -= of_left;
+  struct Triangles {
+    std::uint32_t ids[kLeafTriangles];
+    std::size_t count;
+  };
+  /// Of a leaf.
+  Triangles triangles(Node n) const {
+    const fcl::BVNodeBase& top = node(n);
+    Triangles leaf;
+    leaf.count = static_cast<std::size_t>(top.num_primitives);
+    if (top.first_child < 0) {
+      leaf.ids[0] = triangleOf(top);
+      return leaf;
     }
-    return static_cast<std::uint32_t>(-at->first_child - 1);
+    // FCL numbers the nodes below a node one after the other.
+    const Node end = top.first_child + 2 * (top.num_primitives - 1);
+    std::uint32_t* id = leaf.ids;
+    for (Node below = top.first_child; below < end; ++below) {
+      if (node(below).first_child < 0) *id++ = triangleOf(node(below));
+    }
+    BOCST_ASSERT(id == leaf.ids + leaf.count);
+    return leaf;
   }
   void prefetch(std::uint32_t t) const { __builtin_prefetch(&triangles_[t]); }
   void prefetchCorners(std::uint32_t t) const {
     for (int k = 0; k < 3; ++k) {
-      const std::size_t v = triangles_[t][static_cast<std::size_t>(k)];
+      const std::size_t v = corner(t, k);
       // A vertex may lie in two cache lines.
       const char* const at = doubles_ != nullptr ? reinterpret_cast<const char*>(&doubles_[v])
                                                  : reinterpret_cast<const char*>(&floats_[v]);
@@ -150,7 +184,7 @@ class BvhSide : public query::CompleteSide {
       __builtin_prefetch(at + 16);
     }
   }
-  Eigen::Vector3d vertex(std::uint32_t t, int k) const { return vertex(triangles_[t][static_cast<std::size_t>(k)]); }
+  Eigen::Vector3d vertex(std::uint32_t t, int k) const { return vertex(corner(t, k)); }
   Eigen::Vector3d origin() const { return Eigen::Vector3d::Zero(); }
   double inverseUnit() const { return 1; }
   query::Corners corners(std::uint32_t t) const { return {vertex(t, 0), vertex(t, 1), vertex(t, 2)}; }
@@ -164,17 +198,13 @@ class BvhSide : public query::CompleteSide {
   }
 
  private:
-#ifndef KLEAF
-#define KLEAF 8
-#endif
-  static constexpr int kLeafTriangles = KLEAF;
   static bool isLeaf(const fcl::BVNodeBase& node) { return node.num_primitives <= kLeafTriangles; }
 
   /// Up to eight nodes that hold all triangles below another one, for tests in SIMD.
   struct Group {
     std::uint64_t side = 0;  ///< Of which it was made.
     Node parent = 0, node[8];
-    unsigned lanes = 0;  ///< A bit for each node.
+    unsigned lanes = 0;      ///< A bit for each node.
     double middle[3], unit;  ///< Of the coordinates of `boxes`.
     float size;              ///< The largest |center|_1 + |half|_1 of `boxes`.
     query::OrientedBoxes boxes;
@@ -194,31 +224,43 @@ class BvhSide : public query::CompleteSide {
   void fill(Node n, Group& group) const {
     group.side = number_;
     group.parent = n;
-    group.node[0] = node(n).first_child;
-    group.node[1] = node(n).first_child + 1;
-    int count = 2;
-    int triangles[8] = {node(group.node[0]).num_primitives, node(group.node[1]).num_primitives};
-    while (count < 8) {
-      const int most = static_cast<int>(std::max_element(triangles, triangles + count) - triangles);
-      if (triangles[most] <= kLeafTriangles) break;
-      const Node first = node(group.node[most]).first_child;
-      group.node[most] = first;
-      triangles[most] = node(first).num_primitives;
-      group.node[count] = first + 1;
-      triangles[count++] = node(first + 1).num_primitives;
+    int count = 1;
+    split(n, group, count, 0);
+    // Two levels more, all of one level at once: nodes lie anywhere in memory.
+    for (int level = 0; level < 2; ++level) {
+      for (int i = 0, end = count; i < end; ++i) {
+        const Node child = group.node[i];
+        if (!isLeaf(node(child))) split(child, group, count, i);
+      }
     }
     group.lanes = (1u << count) - 1;
-    const query::OrientedVolume all = volume(n);
-    const double radius = all.half.norm(), scale = radius > 0 ? 1 / radius : 1;
+    pack_(*this, volume(n), count, group);
+  }
+
+  void split(Node n, Group& group, int& count, int at) const {
+    group.node[at] = node(n).first_child;
+    group.node[count] = node(n).first_child + 1;
+    prefetchNode(group.node[at]);
+    prefetchNode(group.node[count++]);
+  }
+  void prefetchNode(Node n) const {
+    const char* const at = nodes_ + static_cast<std::size_t>(n) * node_size_;
+    for (int line = 0; line < 3; ++line) __builtin_prefetch(at + 64 * line);
+  }
+
+  // The boxes of a group in float, about the middle of the parent's box, half the diagonal of which is the unit.
+  template <typename BV>
+  static void pack(const BvhSide& side, const query::OrientedVolume& parent, int count, Group& group) {
+    const double radius = parent.half.norm(), scale = radius > 0 ? 1 / radius : 1;
     group.unit = 1 / scale;
     group.size = 0;
-    for (int k = 0; k < 3; ++k) group.middle[k] = all.center[k];
+    for (int k = 0; k < 3; ++k) group.middle[k] = parent.center[k];
     for (int i = 0; i < count; ++i) {
-      const query::OrientedVolume v = volume(group.node[i]);
+      const query::OrientedVolume v = volumeOf(static_cast<const fcl::BVNode<BV>&>(side.node(group.node[i])).bv);
       float size = 0;
       for (int k = 0; k < 3; ++k) {
-        const auto center = static_cast<float>((v.center[k] - all.center[k]) * scale);
-        const auto half = static_cast<float>(v.half[k] * scale);
+        const auto center = static_cast<float>((v.center[k] - parent.center[k]) * scale);
+        const auto half = static_cast<float>((v.half[k] + side.rounding_) * scale);
         group.boxes.center[k][i] = center;
         group.boxes.half[k][i] = half;
         size += std::abs(center) + half;
@@ -236,6 +278,16 @@ class BvhSide : public query::CompleteSide {
     return reinterpret_cast<const char*>(static_cast<const fcl::BVNodeBase*>(&bvh.getBV(0)));
   }
 
+  // FCL's own operator is a call into its library.
+  std::size_t corner(std::uint32_t t, int k) const {
+    static_assert(sizeof(fcl::Triangle) == 3 * sizeof(std::size_t), "three numbers of vertices");
+    return reinterpret_cast<const std::size_t*>(&triangles_[t])[k];
+  }
+
+  static std::uint32_t triangleOf(const fcl::BVNodeBase& leaf) {
+    return static_cast<std::uint32_t>(-leaf.first_child - 1);
+  }
+
   const fcl::BVNodeBase& node(Node n) const {
     return *reinterpret_cast<const fcl::BVNodeBase*>(nodes_ + static_cast<std::size_t>(n) * node_size_);
   }
@@ -246,6 +298,7 @@ class BvhSide : public query::CompleteSide {
   const char* nodes_;  // BVNode<BV> one after the other, of node_size_ bytes each
   std::size_t node_size_;
   query::OrientedVolume (*volume_)(const fcl::BVNodeBase&);
+  void (*pack_)(const BvhSide&, const query::OrientedVolume& parent, int count, Group& group);
   const fcl::Triangle* triangles_;
   std::size_t triangle_count_, vertex_count_;
   const fcl::Vector3<double>* doubles_ = nullptr;  // the vertices, one of the two

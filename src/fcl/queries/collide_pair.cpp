@@ -31,23 +31,6 @@ namespace {
 
 using query::TreeSide;
 
-template <typename S>
-void collideBvh(const CollideQuery<S>& q, tree::Tree& tree, const BvhSide& b) {
-  const std::size_t before = q.result.numContacts();
-  const QueryScope scope(tree);
-  const TreeSide& a = scope.a();
-  const auto [b_in_a, magnitude] = relate<S>(q, a, b);
-  const oracle::Surface& surface = tree.surface();
-  if (isOutOfSight(q, b_in_a, magnitudeOf(surface.bounds), b.magnitude())) return;
-  const Triangles<S> of_model(tree), of_partner(b);
-  MeshCollector<S> collector(q, tree, q.swapped ? of_partner : of_model, q.swapped ? of_model : of_partner, magnitude);
-  collector.setFrame(surface.lattice, b_in_a.tolerance + q.margin / surface.lattice.unit());
-  query::PairWalk<TreeSide, BvhSide>(a, b, withMargin(b_in_a, a, q, q.cullingMargin(a.isConservative())), collector)
-      .run();
-  collector.finish();
-  if (q.mayBeInside(before) && contains<S>(tree, q.X_WA(), b, q.X_WB(), magnitude)) addInside(q, a, b, b_in_a);
-}
-
 /// The models among two geometries, of which one at least is one.
 template <typename S>
 struct Models {
@@ -66,12 +49,13 @@ bool turnsRound(const Models<S>& models, const fcl::Transform3<S>& X_W1, const f
   return walksTurned(treeOf(*models.first), X_W1, treeOf(*models.second), X_W2);
 }
 
+static_assert(kSurelyRigidError <= 2e-5, "what query::areFarApart() allows for");
+
 // True if two models are so far apart that nothing need be locked. For poses that are surely rigid. False where
 // branches are due to be dropped, since only a query that holds the locks drops them, at its end.
 template <typename S>
 bool areFarApart(const Models<S>& models, const fcl::Transform3<S>& X_W1, const fcl::Transform3<S>& X_W2,
                  double margin) {
-  static_assert(kSurelyRigidError <= 2e-5, "what query::areFarApart() allows for");
   const tree::Tree &tree1 = treeOf(*models.first), &tree2 = treeOf(*models.second);
   if (!query::areFarApart(tree1.outline(), X_W1.matrix().data(), tree2.outline(), X_W2.matrix().data(), margin)) {
     return false;
@@ -80,6 +64,33 @@ bool areFarApart(const Models<S>& models, const fcl::Transform3<S>& X_W1, const 
   // The system's clock need not be read twice.
   const std::int64_t now1 = tree1.now(), now2 = tree1.options().clock || tree2.options().clock ? tree2.now() : now1;
   return !(tree1.hasDecay() && tree1.isPruneDue(now1)) && !(tree2.hasDecay() && tree2.isPruneDue(now2));
+}
+
+// The same for a model and a BVHModel.
+template <typename S>
+bool isFarApart(const CollideQuery<S>& q, const tree::Tree& tree, const BvhSide& b) {
+  return areSurelyRigid(q.X_WA(), q.X_WB()) &&
+         query::areFarApart(tree.outline(), q.X_WA().matrix().data(), b.outline(), q.X_WB().matrix().data(),
+                            q.margin) &&
+         !(tree.hasDecay() && tree.isPruneDue(tree.now()));
+}
+
+template <typename S>
+void collideBvh(const CollideQuery<S>& q, tree::Tree& tree, const BvhSide& b) {
+  if (isFarApart(q, tree, b)) return;
+  const std::size_t before = q.result.numContacts();
+  const QueryScope scope(tree);
+  const TreeSide& a = scope.a();
+  const auto [b_in_a, magnitude] = relate<S>(q, a, b);
+  const oracle::Surface& surface = tree.surface();
+  if (isOutOfSight(q, b_in_a, magnitudeOf(surface.bounds), b.magnitude())) return;
+  const Triangles<S> of_model(tree), of_partner(b);
+  MeshCollector<S> collector(q, tree, q.swapped ? of_partner : of_model, q.swapped ? of_model : of_partner, magnitude);
+  collector.setFrame(surface.lattice, b_in_a.tolerance + q.margin / surface.lattice.unit());
+  query::PairWalk<TreeSide, BvhSide>(a, b, withMargin(b_in_a, a, q, q.cullingMargin(a.isConservative())), collector)
+      .run();
+  collector.finish();
+  if (q.mayBeInside(before) && contains<S>(tree, q.X_WA(), b, q.X_WB(), magnitude)) addInside(q, a, b, b_in_a);
 }
 
 template <typename S>

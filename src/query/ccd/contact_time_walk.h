@@ -246,10 +246,10 @@ class ContactTimeWalk : private BestFirst<ContactTimeWalk<A, B>, A, B> {
       out[0].radius = s.radius;
       return;
     }
-    out.resize(side.triangleCount(node));
+    const auto triangles = side.triangles(node);
+    out.resize(triangles.count);
     for (std::size_t i = 0; i < out.size(); ++i) {
-      const std::uint32_t t = side.triangle(node, i);
-      out[i].corners = side.corners(t);
+      out[i].corners = side.corners(triangles.ids[i]);
       out[i].count = 3;
       out[i].radius = 0;
     }

@@ -3,6 +3,7 @@
 
 #include <algorithm>
 #include <cstddef>
+#include <cstdint>
 #include <type_traits>
 #include <vector>
 
@@ -17,6 +18,8 @@ class DeferredPairs {
   struct Pair {
     typename A::Node a;
     typename B::Node b;
+    /// If one node is a leaf and the other is not: the triangles of the leaf that the other may meet, a bit each.
+    std::uint32_t triangles = ~0u;
   };
 
   /// Pairs in the first batch of a walk that may end early; a few oracle answers cost less than one too many.

@@ -79,7 +79,7 @@ class PairWalk {
       if (s.deferred.empty()) return false;
       const bool may_end = visitor_.endsAtFirst() || cut_ != nullptr;
       s.deferred.grow(a_, b_, b_in_a_, may_end, [&s](const Pair& p) { s.stack.push_back(p); });
-      seen_a_.valid = seen_b_.valid = leaf_known_ = false;
+      seen_a_.valid = seen_b_.valid = least_a_.valid = least_b_.valid = leaf_known_ = false;
     }
   }
 
@@ -88,13 +88,16 @@ class PairWalk {
     Pair pair;
     bool operator<(const PlacedPair& other) const { return place > other.place; }  // the front of a heap is the first
   };
+  // Of leaves of `Side`, beside nodes of `Other`.
+  template <typename Side, typename Other>
+  using LargeLeaf = std::conditional_t<Other::kHasLanes, TriangleBoxes<Side>, LargeTriangleLeaf<Side>>;
   struct Scratch {
     std::vector<Pair> stack;
     std::vector<PlacedPair> ordered;  // a heap; the walk's pairs where the visitor has a cut
     DeferredPairs<A, B> deferred;
     LeafPairs<A, B> leaves;
-    LargeTriangleLeaf<A> large_a;
-    LargeTriangleLeaf<B> large_b;
+    LargeLeaf<A, B> large_a;
+    LargeLeaf<B, A> large_b;
     std::vector<TriangleExtent> leaf;  // beside bodies
   };
   static Scratch& scratch() { return thread::ofThread<Scratch>(); }
@@ -107,7 +110,7 @@ class PairWalk {
   }
 
   // Takes what was pushed into the heap, and the first of that, unless it is beyond the cut.
-  bool popFirst(Scratch& s, Pair& pair) const {
+  bool popFirst(Scratch& s, Pair& pair) {
     for (const Pair& pushed : s.stack) {
       const double place = placeOf(pushed);
       if (isBeyond(place)) continue;
@@ -123,10 +126,17 @@ class PairWalk {
   }
 
   // The least that Cut knows of a pair: along its axis, or the least id of its cells.
-  double placeOf(const Pair& pair) const {
+  double placeOf(const Pair& pair) {
     if (!spheres_) {
-      const double least = cut_->leastOf(a_.volume(pair.a));
-      return B::kBodies ? least : std::max(least, cut_->leastOf(b_.volume(pair.b), b_in_a_));
+      // The pairs of a step share a node.
+      if (!least_a_.valid || !(least_a_.node == pair.a)) {
+        least_a_ = {pair.a, true, cut_->leastOf(a_.volume(pair.a))};
+      }
+      if constexpr (B::kBodies) return least_a_.least;
+      if (!least_b_.valid || !(least_b_.node == pair.b)) {
+        least_b_ = {pair.b, true, cut_->leastOf(b_.volume(pair.b), b_in_a_)};
+      }
+      return std::max(least_a_.least, least_b_.least);
     }
     if constexpr (std::is_same<A, TreeSide>::value) {
       if (a_.isConservative()) return static_cast<double>(a_.firstCellId(pair.a));
@@ -171,6 +181,9 @@ class PairWalk {
 
   // Beside a pair of nodes: as many pairs of triangles take as long, and the exact test of one that many.
   static constexpr std::size_t kTrianglePairs = 32, kExactTest = 8;
+  // In a walk of so many steps, nodes beside a leaf so much larger, squared, are tested against each of its triangles.
+  static constexpr std::size_t kLongWalk = 128;
+  static constexpr double kMuchLarger = 4;
 
   // The larger of two nodes is expanded, unless it is a leaf.
   static bool expandsA(State sa, State sb, double size_a, double size_b) {
@@ -192,10 +205,12 @@ class PairWalk {
       if (sa == State::kGrows) {
         s.deferred.add(pair);
       } else {
-        const auto push = [&](typename A::Node c) { s.stack.push_back({c, pair.b}); };
+        const auto push = [&](typename A::Node c, std::uint32_t triangles = ~0u) {
+          s.stack.push_back({c, pair.b, triangles});
+        };
         if constexpr (!B::kBodies) {
-          if (sb == State::kLeaf && seen_a_.size < size_b) {
-            childrenBesideLeaf(a_, pair.a, volumeOf(b_, seen_b_), b_in_a_, s.large_b, b_, pair.b, push);
+          if (sb == State::kLeaf && steps_ >= kLongWalk && kMuchLarger * seen_a_.size < size_b) {
+            childrenBesideLeaf(a_, pair.a, volumeOf(b_, seen_b_), b_in_a_, s.large_b, b_, pair.b, pair.triangles, push);
             return false;
           }
         }
@@ -210,9 +225,11 @@ class PairWalk {
     } else if (sb == State::kGrows) {
       s.deferred.add(pair);
     } else {
-      const auto push = [&](typename B::Node c) { s.stack.push_back({pair.a, c}); };
-      if (sa == State::kLeaf && size_b < seen_a_.size) {
-        childrenBesideLeaf(b_, pair.b, volumeOf(a_, seen_a_), a_in_b_, s.large_a, a_, pair.a, push);
+      const auto push = [&](typename B::Node c, std::uint32_t triangles = ~0u) {
+        s.stack.push_back({pair.a, c, triangles});
+      };
+      if (sa == State::kLeaf && steps_ >= kLongWalk && kMuchLarger * size_b < seen_a_.size) {
+        childrenBesideLeaf(b_, pair.b, volumeOf(a_, seen_a_), a_in_b_, s.large_a, a_, pair.a, pair.triangles, push);
       } else {
         b_.overlappingChildren(pair.b, volumeOf(a_, seen_a_), a_in_b_, push);
       }
@@ -220,13 +237,29 @@ class PairWalk {
     return false;
   }
 
-  // Calls f for the children of an inner node that may meet a larger leaf of the other side. Only eight octants are
-  // worth a look at each triangle.
+  // Calls f for the children of an inner node that may meet a larger leaf of the other side, whose box says little:
+  // its triangles in `which` are looked at one by one, and children need not look at those that miss them.
   template <typename Side, typename Volume, typename Large, typename Other, typename F>
   static void childrenBesideLeaf(const Side& side, typename Side::Node node, Volume& volume,
                                  const SimilarityTransform& to, Large& large, const Other& other,
-                                 typename Other::Node leaf, F&& f) {
-    if constexpr (Side::kHasOctants) {
+                                 typename Other::Node leaf, std::uint32_t which, F&& f) {
+    if constexpr (Side::kHasLanes) {
+      unsigned mask = side.overlappingLanes(node, volume, to);
+      std::uint32_t triangles[8];
+      std::fill(triangles, triangles + 8, ~0u);
+      const auto* const boxes = mask != 0 ? large.get(other, leaf, to) : nullptr;
+      if (boxes != nullptr) {
+        std::fill(triangles, triangles + 8, 0);
+        unsigned met = 0;
+        for (which &= boxes->all(); which != 0; which &= which - 1) {
+          const unsigned lanes = side.overlappingLanes(node, boxes->boxes[__builtin_ctz(which)], to) & mask;
+          for (unsigned left = lanes; left != 0; left &= left - 1) triangles[__builtin_ctz(left)] |= which & -which;
+          met |= lanes;
+        }
+        mask = met;
+      }
+      side.pushLanes(node, mask, [&](typename Side::Node child, int lane) { f(child, triangles[lane]); });
+    } else if constexpr (Side::kHasOctants) {
       side.childrenMeeting(node, volume, to, large, other, leaf, f);
     } else {
       side.overlappingChildren(node, volume, to, f);
@@ -238,10 +271,11 @@ class PairWalk {
     if (leaf_known_ && leaf_ == leaf) return s.leaf;
     leaf_known_ = true;
     leaf_ = leaf;
-    s.leaf.resize(a_.triangleCount(leaf));
+    const auto triangles = a_.triangles(leaf);
+    s.leaf.resize(triangles.count);
     for (std::size_t i = 0; i < s.leaf.size(); ++i) {
       TriangleExtent& t = s.leaf[i];
-      t.id = a_.triangle(leaf, i);
+      t.id = triangles.ids[i];
       t.corners = a_.corners(t.id);
       t.ready();
     }
@@ -303,8 +337,9 @@ class PairWalk {
   template <typename Side, typename F>
   bool anyMeets(const Side& side, typename Side::Node leaf, const SimilarityTransform& place, const Sphere& ball,
                 F&& f) const {
-    for (std::size_t i = 0; i < side.triangleCount(leaf); ++i) {
-      const std::uint32_t t = side.triangle(leaf, i);
+    const auto triangles = side.triangles(leaf);
+    for (std::size_t i = 0; i < triangles.count; ++i) {
+      const std::uint32_t t = triangles.ids[i];
       const Eigen::Vector3d point = closestPoint(ball.center, placed(side.corners(t), place));
       if (spheresMeet(ball, {point, 0}) && f(t, point)) return true;
     }
@@ -374,8 +409,18 @@ class PairWalk {
     return seen.volume;
   }
 
+  // The least of a node's volume along the axis of the cut.
+  template <typename Side>
+  struct Least {
+    typename Side::Node node{};
+    bool valid = false;
+    double least = 0;
+  };
+
   Seen<A> seen_a_;
   Seen<B> seen_b_;
+  Least<A> least_a_;
+  Least<B> least_b_;
   typename A::Node leaf_{};  // whose triangles Scratch has, if that is known
   bool leaf_known_ = false;
   const A& a_;

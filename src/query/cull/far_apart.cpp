@@ -22,9 +22,15 @@ Float4 product(const Float4 (&columns)[3], Float4 v) {
   return columns[0] * lane<0>(v) + columns[1] * lane<1>(v) + columns[2] * lane<2>(v);
 }
 
+struct BoxReader {
+  const tree::Outline::Box& box;
+  Float4 axis(std::size_t k) const { return simd::load(box.axes[k].direction); }
+  Float4 center() const { return simd::load(box.center); }
+};
+
 // Inlined, or its answer goes through memory.
-template <typename S>
-__attribute__((always_inline)) inline TurnedBox turn(const tree::Outline::Reader& box, const S* X) {
+template <typename Reader, typename S>
+__attribute__((always_inline)) inline TurnedBox turn(const Reader& box, const S* X) {
   const Float4 R[3] = {simd::load(X), simd::load(X + 4), simd::load(X + 8)};
   const Float4 x = box.axis(0), y = box.axis(1), z = box.axis(2), center = box.center();
   const Float4 half_xy = __builtin_shufflevector(x, y, 3, 7, 3, 7);
@@ -100,7 +106,19 @@ bool areFarApart(const tree::Outline& a, const S* X_WA, const tree::Outline& b, 
   });
 }
 
-template bool areFarApart(const tree::Outline&, const float*, const tree::Outline&, const float*, double);
-template bool areFarApart(const tree::Outline&, const double*, const tree::Outline&, const double*, double);
+template <typename S>
+bool areFarApart(const tree::Outline& a, const S* X_WA, const tree::Outline::Box& b, const S* X_WB, double margin) {
+  const Float4 translation = simd::loadDifference(X_WB + 12, X_WA + 12);
+  return a.read([&](const tree::Outline::Reader& box_a) {
+    return areFarApart(turn(box_a, X_WA), turn(BoxReader{b}, X_WB), translation, static_cast<float>(margin));
+  });
+}
+
+#define BOCST_INSTANTIATE(S)                                                                         \
+  template bool areFarApart(const tree::Outline&, const S*, const tree::Outline&, const S*, double); \
+  template bool areFarApart(const tree::Outline&, const S*, const tree::Outline::Box&, const S*, double);
+BOCST_INSTANTIATE(float)
+BOCST_INSTANTIATE(double)
+#undef BOCST_INSTANTIATE
 
 }  // namespace bocst::query

@@ -14,5 +14,7 @@ namespace bocst::query {
 /// share/doc/guarantees.md.
 template <typename S>
 bool areFarApart(const tree::Outline& a, const S* X_WA, const tree::Outline& b, const S* X_WB, double margin);
+template <typename S>
+bool areFarApart(const tree::Outline& a, const S* X_WA, const tree::Outline::Box& b, const S* X_WB, double margin);
 
 }  // namespace bocst::query

@@ -134,9 +134,9 @@ class DistanceWalk : private BestFirst<DistanceWalk<A, B>, A, B> {
   double boundOfLeaf(const Side& side, typename Side::Node leaf, const SimilarityTransform& place,
                      const NodeExtent& other) const {
     double bound = std::numeric_limits<double>::infinity();
-    for (std::size_t i = 0; i < side.triangleCount(leaf); ++i) {
-      const std::uint32_t t = side.triangle(leaf, i);
-      bound = std::min(bound, distanceBound(placed(side.corners(t), place), other));
+    const auto triangles = side.triangles(leaf);
+    for (std::size_t i = 0; i < triangles.count; ++i) {
+      bound = std::min(bound, distanceBound(placed(side.corners(triangles.ids[i]), place), other));
     }
     return bound;
   }
@@ -268,8 +268,9 @@ class DistanceWalk : private BestFirst<DistanceWalk<A, B>, A, B> {
       if (std::isfinite(gap.distance)) bodyFound(a_.cellId(pair.a), pair.b, gap, ball.center, ball.radius);
       return;
     }
-    for (std::size_t i = 0; i < a_.triangleCount(pair.a); ++i) {
-      const std::uint32_t t = a_.triangle(pair.a, i);
+    const auto triangles = a_.triangles(pair.a);
+    for (std::size_t i = 0; i < triangles.count; ++i) {
+      const std::uint32_t t = triangles.ids[i];
       const Corners corners = placed(a_.corners(t), a_in_b_);
       const PointSet points{corners.data(), 3};
       const SeparationResult gap = b_.gap(pair.b, points, cutoff() * a_in_b_.scale);
@@ -331,9 +332,10 @@ class DistanceWalk : private BestFirst<DistanceWalk<A, B>, A, B> {
 
   template <typename Side, typename Node>
   static void fill(const Side& side, Node node, const SimilarityTransform& place, std::vector<TriangleExtent>& out) {
-    out.resize(side.triangleCount(node));
+    const auto triangles = side.triangles(node);
+    out.resize(triangles.count);
     for (std::size_t i = 0; i < out.size(); ++i) {
-      out[i].id = side.triangle(node, i);
+      out[i].id = triangles.ids[i];
       out[i].corners = placed(side.corners(out[i].id), place);
       out[i].ready();
     }
@@ -364,13 +366,15 @@ class DistanceWalk : private BestFirst<DistanceWalk<A, B>, A, B> {
                    {b_.cellId(pair.b), placed(b_.cellSphere(pair.b), b_in_a_)});
     } else if (a_.isConservative()) {
       const CellLeaf ball{a_.cellId(pair.a), a_.cellSphere(pair.a)};
-      for (std::size_t i = 0; i < b_.triangleCount(pair.b); ++i) {
-        spheresFound(ball, pointOf(b_, b_.triangle(pair.b, i), b_in_a_, ball.sphere.center));
+      const auto triangles = b_.triangles(pair.b);
+      for (std::size_t i = 0; i < triangles.count; ++i) {
+        spheresFound(ball, pointOf(b_, triangles.ids[i], b_in_a_, ball.sphere.center));
       }
     } else {
       const CellLeaf ball{b_.cellId(pair.b), placed(b_.cellSphere(pair.b), b_in_a_)};
-      for (std::size_t i = 0; i < a_.triangleCount(pair.a); ++i) {
-        spheresFound(pointOf(a_, a_.triangle(pair.a, i), here, ball.sphere.center), ball);
+      const auto triangles = a_.triangles(pair.a);
+      for (std::size_t i = 0; i < triangles.count; ++i) {
+        spheresFound(pointOf(a_, triangles.ids[i], here, ball.sphere.center), ball);
       }
     }
   }

@@ -41,9 +41,10 @@ class LeafCorners {
     if (count_ != 0 && leaf_ == leaf && begin_ == begin) return false;
     leaf_ = leaf;
     begin_ = begin;
-    BOCST_ASSERT(begin < side.triangleCount(leaf));
-    count_ = std::min(side.triangleCount(leaf) - begin, TrianglePack::kCapacity);
-    for (std::size_t i = 0; i < count_; ++i) ids_[i] = side.triangle(leaf, begin + i);
+    const auto triangles = side.triangles(leaf);
+    BOCST_ASSERT(begin < triangles.count);
+    count_ = std::min(triangles.count - begin, TrianglePack::kCapacity);
+    for (std::size_t i = 0; i < count_; ++i) ids_[i] = triangles.ids[begin + i];
     readCorners(side, ids_, ~0u >> (TrianglePack::kCapacity - count_), raw_);
     return true;
   }

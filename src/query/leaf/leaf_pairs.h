@@ -53,6 +53,47 @@ class LargeTriangleLeaf {
   TrianglePack pack_;
 };
 
+inline std::size_t numberOf(tree::NodeRef node) { return node.bits; }
+inline std::size_t numberOf(int node) { return static_cast<std::size_t>(node); }
+
+/// Boxes about the single triangles of leaves, in the frame of the other side, whose nodes are smaller than the leaf.
+template <typename Side>
+class TriangleBoxes {
+ public:
+  struct Leaf {
+    static constexpr std::size_t kCapacity = 32;
+    std::uint32_t all() const { return ~0u >> (kCapacity - count); }
+
+    typename Side::Node node{};
+    std::uint64_t walk = 0;
+    std::size_t count = 0;
+    PlacedVolume boxes[kCapacity];
+  };
+
+  /// To be called before the first use in a walk.
+  void clear() { ++walk_; }
+
+  /// The boxes of a leaf; null if it has too many triangles. Good until the next call.
+  const Leaf* get(const Side& side, typename Side::Node node, const SimilarityTransform& to) {
+    Leaf& leaf = leaves_[numberOf(node) % kLeaves];
+    if (leaf.walk == walk_ && leaf.node == node) return &leaf;
+    const auto triangles = side.triangles(node);
+    if (triangles.count > Leaf::kCapacity) return nullptr;
+    leaf.node = node;
+    leaf.walk = walk_;
+    leaf.count = triangles.count;
+    for (std::size_t i = 0; i < leaf.count; ++i) {
+      leaf.boxes[i] = placed(boxAbout(side.corners(triangles.ids[i])), to);
+    }
+    return &leaf;
+  }
+
+ private:
+  static constexpr std::size_t kLeaves = 16;
+  Leaf leaves_[kLeaves];
+  std::uint64_t walk_ = 0;
+};
+
 /// What bounds a leaf's triangles, as far as they are its own: a box and a slab, in its own frame [0] and, once placed
 /// there, in that of the other side [1].
 struct LeafVolume {
@@ -145,7 +186,7 @@ class LeafPacks {
   static constexpr std::size_t kLeaves = 256;
 
   Leaf& find(const Side& side, typename Side::Node node, std::size_t begin) {
-    std::uint16_t& slot = slots_[(number(node) + begin) % (4 * kLeaves)];
+    std::uint16_t& slot = slots_[(numberOf(node) + begin) % (4 * kLeaves)];
     if (slot < leaves_.size() && leaves_[slot].walk == walk_ && leaves_[slot].node == node &&
         leaves_[slot].begin == begin) {
       return leaves_[slot];
@@ -184,9 +225,6 @@ class LeafPacks {
     leaf.listed = {};
     for (std::size_t i = 0; i < leaf.pack.count; ++i) leaf.own[i] = corners_.id(i);
   }
-
-  static std::size_t number(tree::NodeRef node) { return node.bits; }
-  static std::size_t number(int node) { return static_cast<std::size_t>(node); }
 
   std::vector<Leaf> leaves_;
   std::uint16_t slots_[4 * kLeaves] = {};

@@ -50,7 +50,11 @@ class BoxSide : public CompleteSide {
   }
 
   std::size_t triangleCount(Node n) const { return node(n).count; }
-  std::uint32_t triangle(Node n, std::size_t i) const { return boxes_.triangles()[node(n).begin + i]; }
+  struct Triangles {
+    const std::uint32_t* ids;
+    std::size_t count;
+  };
+  Triangles triangles(Node n) const { return {&boxes_.triangles()[node(n).begin], node(n).count}; }
   void prefetch(std::uint32_t t) const { side_.prefetch(t); }
   void prefetchCorners(std::uint32_t t) const { side_.prefetchCorners(t); }
   const Eigen::Vector3d& vertex(std::uint32_t t, int k) const { return side_.vertex(t, k); }

@@ -27,8 +27,9 @@ struct CompleteSide {
   }
   template <typename Node>
   void grow(const Node&, std::vector<tree::Tree::Growth>&) const {}
-  // Children are octants that can be tested against the triangles of a leaf, see TreeSide::childrenMeeting().
-  static constexpr bool kHasOctants = false;
+  // How the children of a node can be tested against single triangles of a leaf, see PairWalk: eight at once, as lanes
+  // (TreeSide::overlappingLanes()), or as octants of a cube (LargeTriangleLeaf).
+  static constexpr bool kHasLanes = false, kHasOctants = false;
   // Only a side that answers with cells is asked for these.
   template <typename Node>
   Sphere cellSphere(const Node&) const {
@@ -47,7 +48,7 @@ class TreeSide {
   using Node = tree::NodeRef;
   static constexpr bool kBodies = false;
   static constexpr bool kNodesContainSurface = true;
-  static constexpr bool kHasOctants = true;
+  static constexpr bool kHasLanes = true, kHasOctants = false;
 
   explicit TreeSide(tree::Tree& tree) : TreeSide(tree, tree.now()) {}
   TreeSide(tree::Tree& tree, std::int64_t now) : tree_(tree), now_(now) {}
@@ -130,20 +131,45 @@ class TreeSide {
   /// Calls f(child) for the children of an inner node that `other`, placed in this frame by `to`, may overlap.
   template <typename OtherVolume, typename F>
   void overlappingChildren(Node node, OtherVolume& other, const SimilarityTransform& to, F&& f) const {
-    const std::uint32_t index = childRef(node).index();
-    pushOctants(tree_.block(index), index, octantsOverlapping(index, other, to), f);
+    pushLanes(node, overlappingLanes(node, other, to), [&f](Node child, int) { f(child); });
   }
 
-  /// The same against the triangles of a leaf of the other side, see LargeTriangleLeaf: octants that no triangle meets
-  /// are left out too.
-  template <typename OtherVolume, typename Large, typename Other, typename F>
-  void childrenMeeting(Node node, OtherVolume& volume, const SimilarityTransform& to, Large& large, const Other& other,
-                       typename Other::Node leaf, F&& f) const {
+  /// The children of an inner node that `other`, placed in this frame by `to`, may overlap: a bit for each lane.
+  template <typename OtherVolume>
+  unsigned overlappingLanes(Node node, OtherVolume& other, const SimilarityTransform& to) const {
     const std::uint32_t index = childRef(node).index();
     const tree::Block& block = tree_.block(index);
-    unsigned mask = octantsOverlapping(index, volume, to);
-    if (mask != 0 && !block.isLoose()) mask = large.octantsMeeting(*this, node, mask, other, leaf, to);
-    pushOctants(block, index, mask, f);
+    tree_.markUsed(index, now_);
+    if (block.isLoose()) {
+      const bounds::LooseFrame frame = block.frame();
+      const double corner[3] = {double(frame.origin[0]), double(frame.origin[1]), double(frame.origin[2])};
+      return query::overlappingLanes(frame, block.octants, seenFrom(other, to, corner, frame.longest() / 2)) &
+             block.grey;
+    }
+    const double side = 1 << (lattice::kMaxLevel - block.shape);
+    const double corner[3] = {block.at[0] * side, block.at[1] * side, block.at[2] * side};
+    return overlappingOctants(block.octants, seenFrom(other, to, corner, side / 2)) & block.grey;
+  }
+
+  /// Calls f(child, lane) for the children in `mask`. What is still implicit comes first, so that a stack leaves it for
+  /// last: a hit among resident nodes makes its growth unnecessary.
+  template <typename F>
+  void pushLanes(Node node, unsigned mask, F&& f) const {
+    const std::uint32_t index = childRef(node).index();
+    const tree::Block& block = tree_.block(index);
+    unsigned resident = 0;
+    for (unsigned left = mask; left != 0; left &= left - 1) {
+      const int o = __builtin_ctz(left);
+      if (block.child[o].load(std::memory_order_relaxed).tag() == tree::ChildRef::kImplicit) {
+        f(Node::octant(index, o), o);
+      } else {
+        resident |= 1u << o;
+      }
+    }
+    for (; resident != 0; resident &= resident - 1) {
+      const int o = __builtin_ctz(resident);
+      f(Node::octant(index, o), o);
+    }
   }
 
   /// The block of an inner node.
@@ -174,7 +200,6 @@ class TreeSide {
   /// Triangles of a leaf that is not a cell.
   tree::TriangleList triangles(Node node) const { return tree_.list(childRef(node)); }
   std::size_t triangleCount(Node node) const { return triangles(node).count; }
-  std::uint32_t triangle(Node node, std::size_t i) const { return triangles(node).ids[i]; }
 
   /// The corners of a leaf's triangles where the tree keeps them packed, and their numbers; else false.
   bool packed(Node node, tree::PackedTriangles& triangles, tree::TriangleIds& ids) const {
@@ -208,36 +233,6 @@ class TreeSide {
   tree::Tree& tree() const { return tree_; }
 
  private:
-  template <typename OtherVolume>
-  unsigned octantsOverlapping(std::uint32_t index, OtherVolume& other, const SimilarityTransform& to) const {
-    const tree::Block& block = tree_.block(index);
-    tree_.markUsed(index, now_);
-    if (block.isLoose()) {
-      const bounds::LooseFrame frame = block.frame();
-      const double corner[3] = {double(frame.origin[0]), double(frame.origin[1]), double(frame.origin[2])};
-      return overlappingLanes(frame, block.octants, seenFrom(other, to, corner, frame.longest() / 2)) & block.grey;
-    }
-    const double side = 1 << (lattice::kMaxLevel - block.shape);
-    const double corner[3] = {block.at[0] * side, block.at[1] * side, block.at[2] * side};
-    return overlappingOctants(block.octants, seenFrom(other, to, corner, side / 2)) & block.grey;
-  }
-
-  // Calls f for the octants of a mask. What is still implicit comes first, so that a stack leaves it for last: a hit
-  // among resident nodes makes its growth unnecessary.
-  template <typename F>
-  static void pushOctants(const tree::Block& block, std::uint32_t index, unsigned mask, F&& f) {
-    unsigned resident = 0;
-    for (unsigned left = mask; left != 0; left &= left - 1) {
-      const int o = __builtin_ctz(left);
-      if (block.child[o].load(std::memory_order_relaxed).tag() == tree::ChildRef::kImplicit) {
-        f(Node::octant(index, o));
-      } else {
-        resident |= 1u << o;
-      }
-    }
-    for (; resident != 0; resident &= resident - 1) f(Node::octant(index, __builtin_ctz(resident)));
-  }
-
   static Sphere sphereAbout(const Volume& v) {
     Sphere s;
     s.center = {v.center[0], v.center[1], v.center[2]};
