@@ -14,6 +14,7 @@
 #include "geometry/extent.h"
 #include "geometry/triangle.h"
 #include "query/distance/best_first.h"
+#include "query/distance/near_triangles.h"
 #include "query/distance/tree_gaps.h"
 #include "query/sides/side.h"
 #include "query/sides/turns.h"
@@ -58,6 +59,7 @@ class DistanceWalk : private BestFirst<DistanceWalk<A, B>, A, B> {
     limit_ = goal.below;
     this->limitSteps(most_steps);
     if constexpr (!B::kBodies) {
+      scratch().near.clear();
       const NodeExtent root_a = extentOfA(a_.root()), root_b = extentOfB(b_.root());
       const double rounding = spheres() && !gaps_.has_value() ? kSphereRounding : kExtentRounding;
       tie_ = 4 * rounding * ((root_b.center - root_a.center).norm() + root_a.half.sum() + root_b.half.sum());
@@ -76,8 +78,10 @@ class DistanceWalk : private BestFirst<DistanceWalk<A, B>, A, B> {
   using Base::spheres;
   static constexpr bool kTrees = std::is_same<A, TreeSide>::value && std::is_same<B, TreeSide>::value;
 
+  struct Nothing {};
   struct Scratch : Base::Heap {
     std::vector<TriangleExtent> a, b;
+    std::conditional_t<B::kBodies, Nothing, NearTriangles<A, B>> near;
   };
   static Scratch& scratch() { return thread::ofThread<Scratch>(); }
 
@@ -299,16 +303,17 @@ class DistanceWalk : private BestFirst<DistanceWalk<A, B>, A, B> {
       leafSpheres(pair);
       return;
     }
-    if constexpr (kTrees) {
-      if (gaps_.has_value()) {
-        for (const TreeGaps::Candidate& c : gaps_->ofTriangles(pair.a, pair.b, cutoff())) {
-          if (!worthIt(c.at_least)) break;
-          triangles(c.a, c.b);
-        }
-        return;
-      }
-    }
     Scratch& s = scratch();
+    const float direction[3] = {static_cast<float>(direction_[0]), static_cast<float>(direction_[1]),
+                                static_cast<float>(direction_[2])};
+    const auto* const candidates = s.near.find(a_, pair.a, b_, pair.b, b_in_a_, direction, cutoff());
+    if (candidates != nullptr) {
+      for (const auto& c : *candidates) {
+        if (!worthIt(c.at_least)) break;
+        triangles(c.a, c.b);
+      }
+      return;
+    }
     fill(a_, pair.a, SimilarityTransform(), s.a);
     fill(b_, pair.b, b_in_a_, s.b);
     // The pair of nearest middles first: a good answer makes most of the others superfluous.

@@ -20,22 +20,17 @@ struct TreeGaps::LargeLeaf {
   TriangleBounds bounds;
 };
 
-/// Frames and corners of one thread. Pairs come best first, so what was used lately is often used again.
+/// Frames of one thread. Pairs come best first, so what was used lately is often used again.
 struct TreeGaps::Scratch {
   static constexpr std::size_t kFrames = 64;
-  static constexpr std::size_t kLeaves = 16;
   static constexpr std::size_t kLargeLeaves = 8;
   static constexpr std::uint32_t kNoBlock = 0xffffffff;
 
   std::uint32_t blocks[2][kFrames];
   Frame frames[2][kFrames];
   Frame roots[2];
-  LeafCorners<TreeSide> corners[2][kLeaves];
   LargeLeaf large[2][kLargeLeaves];
   RawTriangles raw, placed;
-  TrianglePack packs[2];
-  NearPair found[TrianglePack::kCapacity * TrianglePack::kCapacity];
-  std::vector<Candidate> candidates;
 };
 
 TreeGaps::Scratch& TreeGaps::scratch() { return thread::ofThread<Scratch>(); }
@@ -57,7 +52,6 @@ TreeGaps::TreeGaps(const TreeSide& a, const TreeSide& b, const SimilarityTransfo
     } else {
       fillFrame(geometry_, side, root, s.roots[side]);
     }
-    for (LeafCorners<TreeSide>& leaf : s.corners[side]) leaf.clear();
     for (LargeLeaf& leaf : s.large[side]) leaf.count = 0;
   }
   doubt_ += 4 * static_cast<double>(geometry_.slab_rounding_margin);
@@ -170,36 +164,6 @@ double TreeGaps::ofSpheres(tree::NodeRef a, tree::NodeRef b, const Eigen::Vector
   double radii = 0;
   const NodeExtent extent_a = extentOf(0, a, radii), extent_b = extentOf(1, b, radii);
   return distanceBound(extent_a, extent_b, direction, cutoff + radii) - radii;
-}
-
-const std::vector<TreeGaps::Candidate>& TreeGaps::ofTriangles(tree::NodeRef leaf_a, tree::NodeRef leaf_b,
-                                                              double cutoff) {
-  Scratch& s = scratch();
-  s.candidates.clear();
-  const TreeSide &a = *side_[0], &b = *side_[1];
-  const Eigen::Vector3d center = a.roughSphere(leaf_a).center;
-  const PackTransform to_a = packTransform(a, SimilarityTransform(), center, 1),
-                      to_b = packTransform(b, b_in_a_, center, 1);
-  const std::size_t count_a = a.triangleCount(leaf_a), count_b = b.triangleCount(leaf_b);
-  LeafCorners<TreeSide>&corners_a = s.corners[0][leaf_a.bits % Scratch::kLeaves],
-  &corners_b = s.corners[1][leaf_b.bits % Scratch::kLeaves];
-  const auto limit = static_cast<float>(cutoff * (1 + 0x1p-22));
-  for (std::size_t i = 0; i < count_a; i += TrianglePack::kCapacity) {
-    corners_a.take(a, leaf_a, i);
-    corners_a.place(to_a, s.packs[0]);
-    for (std::size_t j = 0; j < count_b; j += TrianglePack::kCapacity) {
-      corners_b.take(b, leaf_b, j);
-      corners_b.place(to_b, s.packs[1]);
-      const std::size_t found = nearPairs(s.packs[0], s.packs[1], direction_.in[0], limit, s.found);
-      for (std::size_t k = 0; k < found; ++k) {
-        const NearPair& p = s.found[k];
-        s.candidates.push_back({p.at_least, corners_a.id(p.row), corners_b.id(p.lane)});
-      }
-    }
-  }
-  std::sort(s.candidates.begin(), s.candidates.end(),
-            [](const Candidate& x, const Candidate& y) { return x.at_least < y.at_least; });
-  return s.candidates;
 }
 
 }  // namespace bocst::query

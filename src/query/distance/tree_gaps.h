@@ -3,11 +3,10 @@
 
 #include <cstddef>
 #include <cstdint>
-#include <vector>
 
 #include "geometry/extent.h"
 #include "query/distance/distance_kernels.h"
-#include "query/leaf/leaf_pairs.h"
+#include "query/leaf/leaf_corners.h"
 #include "query/sides/side.h"
 
 namespace bocst::query {
@@ -32,15 +31,6 @@ class TreeGaps {
   double ofSpheres(tree::NodeRef a, tree::NodeRef b, const Eigen::Vector3d& direction, double cutoff) const;
   /// Then it may be larger than that of ofOctants() by this much because of rounding and of smaller spheres alone.
   double doubt() const { return doubt_; }
-
-  /// Triangles of two leaves, and no more than their distance.
-  struct Candidate {
-    double at_least;
-    std::uint32_t a, b;
-  };
-  /// Of exact answers, the pairs of triangles of two leaves that may be nearer than `cutoff`, the nearest bound first.
-  /// Valid until the next call.
-  const std::vector<Candidate>& ofTriangles(tree::NodeRef leaf_a, tree::NodeRef leaf_b, double cutoff);
 
  private:
   struct LargeLeaf;

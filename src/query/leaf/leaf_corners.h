@@ -8,8 +8,13 @@
 #include "geometry/overlap_kernels.h"
 #include "geometry/volume.h"
 #include "log/assert.h"
+#include "tree/block.h"
 
 namespace bocst::query {
+
+/// A number of a node for places in tables of nodes.
+inline std::size_t numberOf(tree::NodeRef node) { return node.bits; }
+inline std::size_t numberOf(int node) { return static_cast<std::size_t>(node); }
 
 /// Reads the corners of those triangles of `ids` that `which` has bits of, as the mesh gives them. Triangles and
 /// vertices lie anywhere in memory: all are asked for before any is waited for.

@@ -53,9 +53,6 @@ class LargeTriangleLeaf {
   TrianglePack pack_;
 };
 
-inline std::size_t numberOf(tree::NodeRef node) { return node.bits; }
-inline std::size_t numberOf(int node) { return static_cast<std::size_t>(node); }
-
 /// Boxes about the single triangles of leaves, in the frame of the other side, whose nodes are smaller than the leaf.
 template <typename Side>
 class TriangleBoxes {
