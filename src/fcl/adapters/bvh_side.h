@@ -78,6 +78,7 @@ class BvhSide : public query::CompleteSide {
   static constexpr bool kHasLanes = true;
   // Below so few triangles, FCL's nodes part less than they cost.
   static constexpr int kLeafTriangles = 8;
+  static constexpr double kOutwards = 1 + 0x1p-22;  // what is rounded to float becomes no less
 
   /// @throws std::invalid_argument when the model is no finished triangle mesh.
   template <typename BV>
@@ -135,6 +136,36 @@ class BvhSide : public query::CompleteSide {
     query::OneVolume seen = query::seenFrom(other, to, group.middle, group.unit);
     seen.rounding_margin += group.size * to.rounding_margin;
     return query::overlappingBoxes(group.boxes, seen) & group.lanes;
+  }
+
+  /// All of them.
+  unsigned lanes(Node n) const { return groupOf(n).lanes; }
+
+  /// Their volumes. Of the others nothing is written.
+  void laneVolumes(Node n, query::Volume (&volumes)[8]) const {
+    const Group& group = groupOf(n);
+    for (unsigned left = group.lanes; left != 0; left &= left - 1) {
+      const int i = __builtin_ctz(left);
+      volumes[i] = uprightVolume(group.node[i]);
+    }
+  }
+
+  /// A box along the axes of the frame, and a slab across the node's shortest side.
+  query::Volume uprightVolume(Node n) const {
+    const query::OrientedVolume v = volume(n);
+    int shortest = 0;
+    const double thickness = v.half.minCoeff(&shortest);
+    query::Volume upright;
+    const Eigen::Vector3d half = v.axes.cwiseAbs() * v.half;
+    for (int k = 0; k < 3; ++k) {
+      upright.center[k] = v.center[k];
+      upright.half[k] = static_cast<float>(half[k] * kOutwards);
+      upright.normal[k] = static_cast<float>(v.axes(k, shortest));
+    }
+    upright.slab_offset = 0;
+    // The normal is rounded, too.
+    upright.slab_half = static_cast<float>(thickness + 0x1p-22 * v.half.sum());
+    return upright;
   }
 
   /// Calls f(node, lane) for the nodes in `mask`.

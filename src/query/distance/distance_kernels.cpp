@@ -20,6 +20,21 @@ void FillRootFrame(const PairFrames& geometry, int own, const bounds::NodeBounds
   decodeRoot(geometry, own, root, frame);
 }
 
+void FillLanes(const PairFrames& geometry, int own, const LaneVolumes& lanes, Frame& frame) {
+  const D d;
+  for (std::size_t i = 0; i < 8; i += hn::Lanes(d)) {
+    V c[3], h[3], n[3];
+    BOCST_UNROLL
+    for (int k = 0; k < 3; ++k) {
+      c[k] = hn::Load(d, lanes.center[k] + i);
+      h[k] = hn::Load(d, lanes.half[k] + i);
+      n[k] = hn::Load(d, lanes.normal[k] + i);
+    }
+    storeLanes(geometry.side[own], c, h, n, hn::Load(d, lanes.slab_center + i), hn::Load(d, lanes.slab_half + i), i,
+               frame);
+  }
+}
+
 // Of octants of sides `length`, the first with its corner at `corner`: lattice units, from the corner of the root.
 HWY_INLINE void decodeCenters(const PairFrames::Side& g, const bounds::OctantBounds& octants,
                               const std::int32_t (&corner)[3], std::int32_t length, const LeafCells& leaves, Frame& f) {
@@ -396,6 +411,7 @@ namespace bocst::query {
 
 HWY_EXPORT(FillFrame);
 HWY_EXPORT(FillRootFrame);
+HWY_EXPORT(FillLanes);
 HWY_EXPORT(FillCenters);
 HWY_EXPORT(FillRootCenters);
 HWY_EXPORT(OctantGapsOf);
@@ -408,6 +424,10 @@ void fillFrame(const PairFrames& geometry, int own, const tree::Block& block, Fr
 
 void fillFrame(const PairFrames& geometry, int own, const bounds::NodeBounds& root, Frame& frame) {
   HWY_DYNAMIC_DISPATCH(FillRootFrame)(geometry, own, root, frame);
+}
+
+void fillFrame(const PairFrames& geometry, int own, const LaneVolumes& lanes, Frame& frame) {
+  HWY_DYNAMIC_DISPATCH(FillLanes)(geometry, own, lanes, frame);
 }
 
 void fillCenters(const PairFrames& geometry, int own, const tree::Block& block, const LeafCells& leaves, Frame& frame) {

@@ -18,6 +18,14 @@ void fillFrame(const PairFrames& geometry, int own, const tree::Block& block, Fr
 /// Fills lane 0 of the frame with the root of side `own`.
 void fillFrame(const PairFrames& geometry, int own, const bounds::NodeBounds& root, Frame& frame);
 
+/// Eight boxes and slabs of one side as Frame has them, along their own axes.
+struct LaneVolumes {
+  alignas(64) float center[3][8];
+  float half[3][8], normal[3][8], slab_center[8], slab_half[8];
+};
+/// Fills the frame with lanes of side `own`.
+void fillFrame(const PairFrames& geometry, int own, const LaneVolumes& lanes, Frame& frame);
+
 /// The leaves of a side with conservative answers: cells of this side, cut off where the actual regions end.
 struct LeafCells {
   std::int32_t side;                   ///< Lattice units.

@@ -15,7 +15,7 @@
 #include "geometry/triangle.h"
 #include "query/distance/best_first.h"
 #include "query/distance/near_triangles.h"
-#include "query/distance/tree_gaps.h"
+#include "query/distance/node_gaps.h"
 #include "query/sides/side.h"
 #include "query/sides/turns.h"
 #include "query/sides/visitor.h"
@@ -48,8 +48,8 @@ class DistanceWalk : private BestFirst<DistanceWalk<A, B>, A, B> {
 
   DistanceWalk(const A& a, const B& b, const SimilarityTransform& b_in_a)
       : Base(a, b, scratch()), b_in_a_(b_in_a), a_in_b_(b_in_a.inverse()) {
-    if constexpr (kTrees) {
-      if (PairFrames::isFine(b_in_a)) gaps_.emplace(a, b, b_in_a);
+    if constexpr (kHasLanes) {
+      if ((kTrees || !spheres()) && Gaps::fits(a, b, b_in_a)) gaps_.emplace(a, b, b_in_a);
     }
   }
 
@@ -61,11 +61,11 @@ class DistanceWalk : private BestFirst<DistanceWalk<A, B>, A, B> {
     if constexpr (!B::kBodies) {
       scratch().near.clear();
       const NodeExtent root_a = extentOfA(a_.root()), root_b = extentOfB(b_.root());
-      const double rounding = spheres() && !gaps_.has_value() ? kSphereRounding : kExtentRounding;
+      const double rounding = spheres() && !hasGaps() ? kSphereRounding : kExtentRounding;
       tie_ = 4 * rounding * ((root_b.center - root_a.center).norm() + root_a.half.sum() + root_b.half.sum());
     }
     found(known);
-    if (gaps_.has_value()) descendGreedily();
+    if (hasGaps()) descendGreedily();
     if (!settled()) this->search();
     return best_;
   }
@@ -76,9 +76,12 @@ class DistanceWalk : private BestFirst<DistanceWalk<A, B>, A, B> {
   using Base::a_;
   using Base::b_;
   using Base::spheres;
+  static constexpr bool kHasLanes = A::kHasLanes && B::kHasLanes;
   static constexpr bool kTrees = std::is_same<A, TreeSide>::value && std::is_same<B, TreeSide>::value;
-
   struct Nothing {};
+  using Gaps =
+      typename std::conditional_t<kHasLanes, std::common_type<NodeGaps<A, B>>, std::common_type<Nothing>>::type;
+
   struct Scratch : Base::Heap {
     std::vector<TriangleExtent> a, b;
     std::conditional_t<B::kBodies, Nothing, NearTriangles<A, B>> near;
@@ -93,6 +96,7 @@ class DistanceWalk : private BestFirst<DistanceWalk<A, B>, A, B> {
   }
   bool worthIt(double bound) const { return bound < cutoff(); }
   double tie() const { return tie_; }
+  bool hasGaps() const { return gaps_.has_value(); }
   bool settled() const { return !(limit_ > 0) || gaveUp(); }
   // Pairs that pass the bound of their boxes are bounded once more where that bound is poor: of a body, which may be
   // much smaller than its box; of a leaf beside a much smaller node, which may be nearer to the leaf's box than to its
@@ -100,15 +104,19 @@ class DistanceWalk : private BestFirst<DistanceWalk<A, B>, A, B> {
   bool again(const Pair& pair) {
     double bound = 0;
     if (spheres()) {
-      if (!gaps_.has_value() || pair.bound + gaps_->doubt() < cutoff()) return false;
-      bound = boundOfSpheres(pair);
+      if constexpr (kTrees) {
+        if (!gaps_.has_value() || pair.bound + gaps_->doubt() < cutoff()) return false;
+        bound = gaps_->ofSpheres(pair.a, pair.b, direction_, cutoff());
+      } else {
+        return false;
+      }
     } else if constexpr (B::kBodies) {
       if (b_.hasExactBox(pair.b)) return false;
       Eigen::Vector3d corners[8];
       cornersOf(oriented(a_.volume(pair.a)), a_in_b_, corners);
       bound = b_.gap(pair.b, {corners, 8}, cutoff() * a_in_b_.scale).at_least * b_in_a_.scale;
     } else {
-      if (gaps_.has_value()) return false;  // gapsOf() has seen to it
+      if (hasGaps()) return false;  // gapsOf() has seen to it
       const bool leaf_a = a_.state(pair.a) == State::kLeaf, leaf_b = b_.state(pair.b) == State::kLeaf;
       if (leaf_a == leaf_b) return false;
       const double size_a = a_.size(pair.a), size_b = b_.size(pair.b) * b_in_a_.scale * b_in_a_.scale;
@@ -126,11 +134,6 @@ class DistanceWalk : private BestFirst<DistanceWalk<A, B>, A, B> {
   // node that is hardly larger than a tie would be left out for the first of its triangles.
   bool isMuchLarger(double large, double small) const {
     return large >= kMuchLarger * small && small >= kManyTies * tie_ * tie_;
-  }
-
-  double boundOfSpheres(const Pair& pair) const {
-    if constexpr (kTrees) return gaps_->ofSpheres(pair.a, pair.b, direction_, cutoff());
-    return 0;
   }
 
   // No triangle of a leaf, placed in the frame of A, is nearer to the other side's node than this.
@@ -176,34 +179,31 @@ class DistanceWalk : private BestFirst<DistanceWalk<A, B>, A, B> {
     return (b_.gap(body, {&ball.center, 1}, cutoff() * a_in_b_.scale + extent).at_least - extent) * b_in_a_.scale;
   }
 
-  // Two trees have their bounds in SIMD.
+  // Sides with lanes have their bounds in SIMD.
   OctantGaps gapsOf(const Pair& pair, bool expands_a) {
-    const int own = expands_a ? 0 : 1;
-    const tree::NodeRef x = expands_a ? pair.a : pair.b, y = expands_a ? pair.b : pair.a;
-    const State other = expands_a ? b_.state(y) : a_.state(y);
+    const State other = expands_a ? b_.state(pair.b) : a_.state(pair.a);
+    bool beside = false;
     if (other == State::kLeaf && !spheres()) {
       const double size_a = a_.size(pair.a), size_b = b_.size(pair.b) * b_in_a_.scale * b_in_a_.scale;
-      constexpr double kOctant = 0.25;  // of the size of a node, squared
-      if (isMuchLarger(expands_a ? size_b : size_a, kOctant * (expands_a ? size_a : size_b))) {
-        return gaps_->ofOctantsBeside(own, x, y);
-      }
+      constexpr double kLane = 0.25;  // of the size of a node, squared
+      beside = isMuchLarger(expands_a ? size_b : size_a, kLane * (expands_a ? size_a : size_b));
     }
-    return gaps_->ofOctants(own, x, y);
+    return expands_a ? gaps_->ofLanesOfA(pair.a, pair.b, beside) : gaps_->ofLanesOfB(pair.a, pair.b, beside);
   }
   template <typename F>
-  void children(const Pair& pair, bool expands_a, F&& f) const {
+  void lanes(const Pair& pair, bool expands_a, F&& f) const {
     if (expands_a) {
-      a_.children(pair.a, [&](typename A::Node c) { f(c.octant(), c, pair.b); });
+      a_.pushLanes(pair.a, a_.lanes(pair.a), [&](typename A::Node c, int lane) { f(lane, c, pair.b); });
     } else {
-      b_.children(pair.b, [&](typename B::Node c) { f(c.octant(), pair.a, c); });
+      b_.pushLanes(pair.b, b_.lanes(pair.b), [&](typename B::Node c, int lane) { f(lane, pair.a, c); });
     }
   }
 
   void expand(const Pair& pair, bool expands_a) {
-    if constexpr (kTrees) {
+    if constexpr (kHasLanes) {
       if (gaps_.has_value()) {
         const OctantGaps gaps = gapsOf(pair, expands_a);
-        children(pair, expands_a, [&](int o, tree::NodeRef a, tree::NodeRef b) {
+        lanes(pair, expands_a, [&](int o, typename A::Node a, typename B::Node b) {
           limit_ = std::min(limit_, double{gaps.at_most[o]});
           const Pair child{std::max(pair.bound, double{gaps.at_least[o]}), a, b};
           // The distance of two spheres costs less than a place on the heap.
@@ -222,7 +222,7 @@ class DistanceWalk : private BestFirst<DistanceWalk<A, B>, A, B> {
   // Straight down to a pair of leaves, if they are resident. With its answer in hand, and the direction in which it
   // was found, the search from the root on leaves most pairs out at once.
   void descendGreedily() {
-    if constexpr (kTrees) {
+    if constexpr (kHasLanes) {
       Pair pair{0, a_.root(), b_.root()};
       for (;;) {
         const State sa = a_.state(pair.a), sb = b_.state(pair.b);
@@ -232,7 +232,7 @@ class DistanceWalk : private BestFirst<DistanceWalk<A, B>, A, B> {
         const OctantGaps gaps = gapsOf(pair, expands_a);
         float least = std::numeric_limits<float>::infinity();
         Pair next = pair;
-        children(pair, expands_a, [&](int o, tree::NodeRef a, tree::NodeRef b) {
+        lanes(pair, expands_a, [&](int o, typename A::Node a, typename B::Node b) {
           const float guess = gaps.at_least[o] + gaps.at_most[o];
           if (!(guess < least)) return;
           least = guess;
@@ -251,7 +251,7 @@ class DistanceWalk : private BestFirst<DistanceWalk<A, B>, A, B> {
     limit_ = std::min(limit_, n.distance);
     if (!(n.distance > 0)) return;
     direction_ = (n.on_b - n.on_a) / n.distance;
-    if constexpr (kTrees) {
+    if constexpr (kHasLanes) {
       if (gaps_.has_value()) gaps_->expect(direction_);
     }
   }
@@ -412,7 +412,7 @@ class DistanceWalk : private BestFirst<DistanceWalk<A, B>, A, B> {
 
   const SimilarityTransform& b_in_a_;
   const SimilarityTransform a_in_b_;
-  std::optional<TreeGaps> gaps_;  // of two trees
+  std::optional<Gaps> gaps_;
   DistanceGoal goal_;
   Nearest best_;
   double limit_ = 0;  // something at least this near exists, or nobody asks for more

@@ -151,6 +151,13 @@ class TreeSide {
     return overlappingOctants(block.octants, seenFrom(other, to, corner, side / 2)) & block.grey;
   }
 
+  /// Those of all children.
+  unsigned lanes(Node node) const {
+    const std::uint32_t index = childRef(node).index();
+    tree_.markUsed(index, now_);
+    return tree_.block(index).grey;
+  }
+
   /// Calls f(child, lane) for the children in `mask`. What is still implicit comes first, so that a stack leaves it for
   /// last: a hit among resident nodes makes its growth unnecessary.
   template <typename F>
