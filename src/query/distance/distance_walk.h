@@ -50,6 +50,9 @@ class DistanceWalk : private BestFirst<DistanceWalk<A, B>, A, B> {
       : Base(a, b, scratch()), b_in_a_(b_in_a), a_in_b_(b_in_a.inverse()) {
     if constexpr (kHasLanes) {
       if ((kTrees || !spheres()) && Gaps::fits(a, b, b_in_a)) gaps_.emplace(a, b, b_in_a);
+      in_float_ = hasGaps();
+    } else if constexpr (!B::kBodies) {
+      in_float_ = PairFrames::isFine(b_in_a);
     }
   }
 
@@ -304,14 +307,8 @@ class DistanceWalk : private BestFirst<DistanceWalk<A, B>, A, B> {
       return;
     }
     Scratch& s = scratch();
-    const float direction[3] = {static_cast<float>(direction_[0]), static_cast<float>(direction_[1]),
-                                static_cast<float>(direction_[2])};
-    const auto* const candidates = s.near.find(a_, pair.a, b_, pair.b, b_in_a_, direction, cutoff());
-    if (candidates != nullptr) {
-      for (const auto& c : *candidates) {
-        if (!worthIt(c.at_least)) break;
-        triangles(c.a, c.b);
-      }
+    if (in_float_) {
+      leafPairInFloat(pair, s.near);
       return;
     }
     fill(a_, pair.a, SimilarityTransform(), s.a);
@@ -332,6 +329,16 @@ class DistanceWalk : private BestFirst<DistanceWalk<A, B>, A, B> {
       for (const TriangleExtent& u : s.b) {
         if (worthIt(u.lowest - t.highest) && !isBeyond(t, u, cutoff())) triangles(t, u);
       }
+    }
+  }
+
+  template <typename Near>
+  void leafPairInFloat(const Pair& pair, Near& near) {
+    const float direction[3] = {static_cast<float>(direction_[0]), static_cast<float>(direction_[1]),
+                                static_cast<float>(direction_[2])};
+    for (const auto& candidate : near.find(a_, pair.a, b_, pair.b, b_in_a_, direction, cutoff())) {
+      if (!worthIt(candidate.at_least)) break;
+      triangles(candidate.a, candidate.b);
     }
   }
 
@@ -413,6 +420,7 @@ class DistanceWalk : private BestFirst<DistanceWalk<A, B>, A, B> {
   const SimilarityTransform& b_in_a_;
   const SimilarityTransform a_in_b_;
   std::optional<Gaps> gaps_;
+  bool in_float_ = false;  // floats can tell the triangles of both sides apart
   DistanceGoal goal_;
   Nearest best_;
   double limit_ = 0;  // something at least this near exists, or nobody asks for more

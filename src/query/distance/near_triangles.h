@@ -13,7 +13,8 @@
 
 namespace bocst::query {
 
-/// Finds the pairs of triangles of two leaves that may be the nearest, eight at a time in float. Kept by a thread.
+/// Finds the pairs of triangles of two leaves that may be the nearest, eight at a time in float: of sides whose sizes
+/// and distance are fine for that, see PairFrames::isFine(). Kept by a thread.
 template <typename A, typename B>
 class NearTriangles {
  public:
@@ -29,9 +30,9 @@ class NearTriangles {
     for (LeafCorners<B>& leaf : corners_b_) leaf.clear();
   }
 
-  /// The pairs that may be nearer than `cutoff`, that with the least bound first; null where floats cannot hold the
-  /// corners. `direction`: from side A to side B in the frame of A, see nearPairs(). Valid until the next call.
-  const std::vector<Candidate>* find(const A& a, typename A::Node leaf_a, const B& b, typename B::Node leaf_b,
+  /// The pairs that may be nearer than `cutoff`, that with the least bound first. `direction`: from side A to side B in
+  /// the frame of A, see nearPairs(). Valid until the next call.
+  const std::vector<Candidate>& find(const A& a, typename A::Node leaf_a, const B& b, typename B::Node leaf_b,
                                      const SimilarityTransform& b_in_a, const float (&direction)[3], double cutoff) {
     candidates_.clear();
     const Eigen::Vector3d center = centerOf(a, leaf_a);
@@ -47,7 +48,6 @@ class NearTriangles {
       for (std::size_t j = 0; j < count_b; j += TrianglePack::kCapacity) {
         corners_b.take(b, leaf_b, j);
         corners_b.place(to_b, packs_[1]);
-        if (!isBelow(packs_[0]) || !isBelow(packs_[1])) return nullptr;
         const std::size_t found = nearPairs(packs_[0], packs_[1], direction, limit, found_);
         for (std::size_t k = 0; k < found; ++k) {
           const NearPair& p = found_[k];
@@ -57,14 +57,11 @@ class NearTriangles {
     }
     std::sort(candidates_.begin(), candidates_.end(),
               [](const Candidate& x, const Candidate& y) { return x.at_least < y.at_least; });
-    return &candidates_;
+    return candidates_;
   }
 
  private:
   static constexpr std::size_t kLeaves = 16;
-
-  // Products of four lengths must not overflow.
-  static bool isBelow(const TrianglePack& pack) { return pack.size < 1e9f; }
 
   template <typename Side>
   static Eigen::Vector3d centerOf(const Side& side, typename Side::Node leaf) {
