@@ -24,6 +24,7 @@
 namespace bocst::query {
 namespace {
 
+using Eigen::Vector3d;
 using EveryTarget = test::EveryTarget;
 
 // Random bounds of an octant, and points of the surface that they allow.
@@ -61,6 +62,23 @@ bool randomPoint(std::mt19937_64& g, const bounds::NodeBounds& b, const Eigen::V
   return false;
 }
 
+// The volume in a cell of side 1 at the origin.
+Volume decoded(const bounds::NodeBounds& b) {
+  Volume v;
+  Vector3d n, box_middle;
+  for (int k = 0; k < 3; ++k) {
+    const auto s = static_cast<std::size_t>(k);
+    v.half[k] = static_cast<float>((b.hi[s] - b.lo[s]) / 510.0);
+    box_middle[k] = (b.hi[s] + b.lo[s]) / 510.0;
+    v.center[k] = box_middle[k];
+    n[k] = b.normal[s] / 127.0;
+    v.normal[k] = static_cast<float>(n[k]);
+  }
+  v.slab_offset = static_cast<float>(b.slab_center / 127.0 - n.dot(box_middle - Vector3d::Constant(0.5)));
+  v.slab_half = static_cast<float>(b.slab_half / 254.0);
+  return v;
+}
+
 TEST_P(EveryTarget, NoOctantIsLostThatSharesAPoint) {
   std::mt19937_64 g(2);
   std::uniform_real_distribution<double> u(-1, 1);
@@ -71,18 +89,7 @@ TEST_P(EveryTarget, NoOctantIsLostThatSharesAPoint) {
     // A volume of another tree, its own cell at the origin with side 1, placed so that a point of it is a point of
     // ours.
     const bounds::NodeBounds other = randomBounds(g);
-    Volume v;
-    Eigen::Vector3d n, box_middle;
-    for (int k = 0; k < 3; ++k) {
-      const auto s = static_cast<std::size_t>(k);
-      v.half[k] = static_cast<float>((other.hi[s] - other.lo[s]) / 510.0);
-      box_middle[k] = (other.hi[s] + other.lo[s]) / 510.0;
-      v.center[k] = box_middle[k];
-      n[k] = other.normal[s] / 127.0;
-      v.normal[k] = static_cast<float>(n[k]);
-    }
-    v.slab_offset = static_cast<float>(other.slab_center / 127.0 - n.dot(box_middle - Eigen::Vector3d::Constant(0.5)));
-    v.slab_half = static_cast<float>(other.slab_half / 254.0);
+    const Volume v = decoded(other);
     SimilarityTransform to;
     to.rotation = test::randomRotation(g);
     to.scale = std::pow(10.0, 3 * u(g));
@@ -104,6 +111,100 @@ TEST_P(EveryTarget, NoOctantIsLostThatSharesAPoint) {
   }
   EXPECT_GT(shared, 5000);
   EXPECT_GT(parted, shared / 2) << "a test that parts nothing proves nothing";
+}
+
+// A box with axes of its own, and points of it: extreme ones matter most.
+OrientedVolume randomBox(std::mt19937_64& g) {
+  std::uniform_real_distribution<double> u(0, 1);
+  OrientedVolume v;
+  v.axes = test::randomRotation(g);
+  v.center = 3 * u(g) * test::randomDirection(g);
+  for (int k = 0; k < 3; ++k) v.half[k] = g() % 4 == 0 ? 0 : u(g);
+  return v;
+}
+Vector3d randomPoint(std::mt19937_64& g, const OrientedVolume& v) {
+  std::uniform_real_distribution<double> u(-1, 1);
+  Vector3d x;
+  for (int k = 0; k < 3; ++k) x[k] = v.half[k] * (g() % 3 == 0 ? u(g) : g() % 2 ? 1 : -1);
+  return v.center + v.axes * x;
+}
+
+TEST_P(EveryTarget, NoOrientedBoxIsLostThatSharesAPoint) {
+  std::mt19937_64 g(21);
+  std::uniform_real_distribution<double> u(-1, 1);
+  int parted = 0;
+  constexpr int kRounds = 20000;
+  for (int round = 0; round < kRounds; ++round) {
+    OrientedBoxes boxes;
+    OrientedVolume volumes[8];
+    float size = 0;
+    for (int i = 0; i < 8; ++i) {
+      volumes[i] = randomBox(g);
+      float sum = 0;
+      for (int k = 0; k < 3; ++k) {
+        boxes.center[k][i] = static_cast<float>(volumes[i].center[k]);
+        boxes.half[k][i] = static_cast<float>(volumes[i].half[k]);
+        sum += std::abs(boxes.center[k][i]) + boxes.half[k][i];
+        for (int j = 0; j < 3; ++j) boxes.axes[j][k][i] = static_cast<float>(volumes[i].axes(k, j));
+      }
+      size = std::max(size, sum);
+    }
+    const auto i = static_cast<std::size_t>(g() % 8);
+    SimilarityTransform to;
+    to.rotation = test::randomRotation(g);
+    to.scale = std::pow(10.0, 2 * u(g));
+    const double unit = std::pow(10.0, 3 * u(g)), corner[3] = {100 * u(g), 100 * u(g), 100 * u(g)};
+    const Vector3d touched = unit * randomPoint(g, volumes[i]) + Vector3d(corner[0], corner[1], corner[2]);
+    OneVolume seen;
+    OrientedVolume other = randomBox(g);
+    PlacedVolume placed_other;
+    // Volumes with a slab, with axes of their own, and the latter once placed are seen alike.
+    if (round % 3 == 0) {
+      const bounds::NodeBounds b = randomBounds(g);
+      const Volume v = decoded(b);
+      Vector3d point;
+      if (!randomPoint(g, b, Vector3d::Zero(), 1, point)) continue;
+      to.translation = touched - to.scale * (to.rotation * point);
+      to.tolerance = 1e-13 * (touched.norm() + to.translation.norm());
+      to.ready();
+      seen = seenFrom(v, to, corner, unit);
+    } else {
+      to.translation = touched - to.scale * (to.rotation * randomPoint(g, other));
+      to.tolerance = 1e-13 * (touched.norm() + to.translation.norm());
+      to.ready();
+      placed_other = placed(other, to);
+      seen = round % 3 == 1 ? seenFrom(other, to, corner, unit) : seenFrom(placed_other, to, corner, unit);
+    }
+    seen.rounding_margin += size * to.rounding_margin;
+    const unsigned mask = overlappingBoxes(boxes, seen);
+    ASSERT_TRUE(mask >> i & 1) << "round " << round;
+    parted += mask != 255;
+  }
+  EXPECT_GT(parted, kRounds / 2) << "a test that parts nothing proves nothing";
+}
+
+TEST(BoxAbout, HoldsATriangleAndNoMore) {
+  std::mt19937_64 g(22);
+  std::uniform_real_distribution<double> u(-1, 1);
+  for (int round = 0; round < 20000; ++round) {
+    const double size = std::pow(10.0, 6 * u(g)), away = round % 2 ? 0 : 1e3 * size;
+    Corners c;
+    for (Vector3d& corner : c) corner = size * Vector3d(u(g), u(g), u(g)) + away * Vector3d(1, -0.7, 0.3);
+    if (round % 5 == 1) c[2] = c[0];
+    if (round % 5 == 2) c[2] = c[0] + u(g) * (c[1] - c[0]);
+    if (round % 50 == 3) c[1] = c[2] = c[0];
+    const OrientedVolume box = boxAbout(c);
+    ASSERT_LT((box.axes.transpose() * box.axes - Eigen::Matrix3d::Identity()).cwiseAbs().maxCoeff(), 1e-14) << round;
+    const double rounding = 1e-13 * (size + away);
+    for (const Vector3d& corner : c) {
+      const Vector3d x = box.axes.transpose() * (corner - box.center);
+      ASSERT_LE((x.cwiseAbs() - box.half).maxCoeff(), 0) << round;
+    }
+    // As thin as the triangle is flat, and no larger than twice the triangle in its plane.
+    ASSERT_LT(box.half[2], 10 * rounding + 1e-6 * size) << round;
+    const double area = (c[1] - c[0]).cross(c[2] - c[0]).norm();
+    ASSERT_LE(4 * box.half[0] * box.half[1], area * (1 + 1e-5) + 1e-5 * size * size + 40 * size * rounding) << round;
+  }
 }
 
 TEST_P(EveryTarget, NoOctantIsLostThatSharesAPointInFramesOfTheRoots) {

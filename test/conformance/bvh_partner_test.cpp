@@ -1,0 +1,244 @@
+// SPDX-License-Identifier: BSD-3-Clause
+// A BVHModel beside a model: its nodes as a side of walks, and answers where these are long.
+#include <gtest/gtest.h>
+
+#include <algorithm>
+#include <atomic>
+#include <chrono>
+#include <cmath>
+#include <limits>
+#include <memory>
+#include <random>
+#include <set>
+#include <vector>
+
+#include "conformance/reference.h"
+#include "fcl/adapters/bvh_side.h"
+#include "geometry/triangle.h"
+
+namespace bocst {
+namespace {
+
+using Eigen::Vector3d;
+using fcl_adapter::BvhSide;
+using test::Raw;
+
+template <typename S>
+class BvhPartner : public testing::Test {};
+TYPED_TEST_SUITE(BvhPartner, test::Scalars);
+
+// n triangles along a line and in a heap, some of them equal.
+Raw strip(std::size_t n, std::mt19937_64& g) {
+  std::uniform_real_distribution<double> u(-1, 1);
+  Raw raw;
+  for (std::size_t i = 0; i < n; ++i) {
+    const Vector3d at = i % 3 == 0 ? Vector3d::Zero() : Vector3d(double(i), u(g), u(g));
+    raw.addTriangle(at, at + Vector3d(u(g), u(g), u(g)), i % 7 == 0 ? at : Vector3d(at + Vector3d(u(g), u(g), u(g))));
+  }
+  return raw;
+}
+
+bool holds(const query::OrientedVolume& box, const Vector3d& x) {
+  const Vector3d in_box = box.axes.transpose() * (x - box.center);
+  return (in_box.cwiseAbs() - box.half).maxCoeff() <= 0;
+}
+
+bool holds(const query::Volume& v, const Vector3d& x) {
+  double along = -double(v.slab_offset);
+  for (int k = 0; k < 3; ++k) {
+    if (std::abs(x[k] - v.center[k]) > double(v.half[k])) return false;
+    along += double(v.normal[k]) * (x[k] - v.center[k]);
+  }
+  return std::abs(along) <= double(v.slab_half);
+}
+
+template <typename BV>
+void checkNodes(std::size_t count) {
+  std::mt19937_64 g(count);
+  const Raw raw = strip(count, g);
+  const auto bvh = test::bvh<BV>(raw);
+  const BvhSide side("collide", *bvh);
+  std::multiset<std::uint32_t> seen;
+  std::vector<int> stack = {side.root()};
+  while (!stack.empty()) {
+    const int node = stack.back();
+    stack.pop_back();
+    if (side.state(node) == query::State::kInner) {
+      const unsigned lanes = side.lanes(node);
+      query::Volume volumes[8];
+      side.laneVolumes(node, volumes);
+      std::size_t below = 0;
+      side.pushLanes(node, lanes, [&](int child, int lane) {
+        below += side.triangleCount(child);
+        stack.push_back(child);
+        if (side.state(child) != query::State::kLeaf) return;
+        const auto triangles = side.triangles(child);
+        for (std::size_t i = 0; i < triangles.count; ++i) {
+          for (const Vector3d& corner : side.corners(triangles.ids[i])) {
+            EXPECT_TRUE(holds(side.volume(child), corner));
+            EXPECT_TRUE(holds(volumes[lane], corner));
+          }
+        }
+      });
+      EXPECT_EQ(below, side.triangleCount(node));
+      EXPECT_GT(side.triangleCount(node), 8U);
+      continue;
+    }
+    const auto triangles = side.triangles(node);
+    EXPECT_EQ(triangles.count, side.triangleCount(node));
+    for (std::size_t i = 0; i < triangles.count; ++i) seen.insert(triangles.ids[i]);
+  }
+  ASSERT_EQ(seen.size(), count);
+  EXPECT_EQ(std::set<std::uint32_t>(seen.begin(), seen.end()).size(), count);
+}
+
+TYPED_TEST(BvhPartner, LeavesHaveEachTriangleOnce) {
+  using S = TypeParam;
+  for (const std::size_t count : {1, 2, 7, 8, 9, 15, 16, 17, 64, 65, 1000}) {
+    SCOPED_TRACE(count);
+    checkNodes<fcl::AABB<S>>(count);
+    checkNodes<fcl::OBB<S>>(count);
+    checkNodes<fcl::RSS<S>>(count);
+    checkNodes<fcl::kIOS<S>>(count);
+    checkNodes<fcl::OBBRSS<S>>(count);
+    checkNodes<fcl::KDOP<S, 24>>(count);
+  }
+}
+
+// Some triangles much larger than all of the other mesh, a small angle apart, so that the boxes of their leaves say
+// little.
+Raw fan(std::mt19937_64& g) {
+  std::uniform_real_distribution<double> u(0, 0.2);
+  Raw raw;
+  for (int i = 0; i < 24; ++i) {
+    const double angle = 0.25 * i, next = angle + 0.2;
+    const Vector3d tip(0, 0, u(g));
+    raw.addTriangle(tip, Vector3d(30 * std::cos(angle), 30 * std::sin(angle), u(g)),
+                    Vector3d(30 * std::cos(next), 30 * std::sin(next), u(g)));
+  }
+  return raw;
+}
+
+template <typename S>
+void checkFan(const Raw& fine, const Raw& large, double lift, int& hits, int& misses, std::mt19937_64& g) {
+  const auto bvh_fine = test::bvh<fcl::OBBRSS<S>>(fine), bvh_large = test::bvh<fcl::OBBRSS<S>>(large);
+  const Model<S> model_fine(fine.mesh()), model_large(large.mesh());
+  const auto I = fcl::Transform3<S>::Identity();
+  std::uniform_real_distribution<double> u(-1, 1);
+  for (int i = 0; i < 40; ++i) {
+    const auto X =
+        test::pose<S>(test::randomRotation(g), Vector3d(4 * u(g), 4 * u(g), lift + 0.3 * u(g)).cast<double>());
+    const bool expected = test::touching<S>(*bvh_fine, X, *bvh_large, I);
+    ++(expected ? hits : misses);
+    ASSERT_EQ(test::touching<S>(model_fine, X, *bvh_large, I), expected) << i;
+    ASSERT_EQ(test::touching<S>(*bvh_large, I, model_fine, X), expected) << i;
+    ASSERT_EQ(test::touching<S>(*bvh_fine, X, model_large, I), expected) << i;
+    ASSERT_EQ(test::touching<S>(model_large, I, *bvh_fine, X), expected) << i;
+    const test::Pairs pairs = test::pairs<S>(model_fine, X, model_large, I);
+    EXPECT_EQ(pairs.empty(), !expected);
+    ASSERT_EQ(test::pairs<S>(model_fine, X, *bvh_large, I), pairs) << i;
+    ASSERT_EQ(test::pairs<S>(*bvh_fine, X, model_large, I), pairs) << i;
+  }
+}
+
+TYPED_TEST(BvhPartner, SmallNodesBesideLargeTriangles) {
+  std::mt19937_64 g(5);
+  const Raw fine = test::torus(60);
+  int hits = 0, misses = 0;
+  for (const double lift : {0.0, 0.8, 1.2, 1.4}) checkFan<TypeParam>(fine, fan(g), lift, hits, misses, g);
+  EXPECT_GT(hits, 30);
+  EXPECT_GT(misses, 30);
+}
+
+// FCL's distances are too large where edges are parallel, so the reference is every pair of triangles.
+double leastDistance(const Raw& a, const Raw& b, const Eigen::Isometry3d& X_AB) {
+  double least = std::numeric_limits<double>::infinity();
+  Vector3d p, q;
+  for (const fcl::Triangle& t : a.triangles) {
+    for (const fcl::Triangle& u : b.triangles) {
+      query::Corners of_a, of_b;
+      for (std::size_t k = 0; k < 3; ++k) {
+        of_a[k] = a.vertices[t[k]];
+        of_b[k] = X_AB * b.vertices[u[k]];
+      }
+      least = std::min(least, query::nearestPoints(of_a, of_b, p, q));
+    }
+  }
+  return least;
+}
+
+template <typename BV>
+void checkDistances(const Raw& ra, const Raw& rb) {
+  using S = typename BV::S;
+  const auto bvh = test::bvh<BV>(rb);
+  const Model<S> model(ra.mesh());
+  const auto I = fcl::Transform3<S>::Identity();
+  std::mt19937_64 g(7);
+  std::uniform_real_distribution<double> u(-1, 1);
+  int apart = 0;
+  for (int i = 0; i < 24; ++i) {
+    // In float the same pose for both.
+    const auto X = test::pose<S>(test::randomRotation(g), Vector3d(u(g), u(g), u(g)) * (i % 3 == 0 ? 30 : 4));
+    Eigen::Isometry3d Y = Eigen::Isometry3d::Identity();
+    Y.linear() = X.linear().template cast<double>();
+    Y.translation() = X.translation().template cast<double>();
+    const double expected = leastDistance(ra, rb, Y);
+    if (expected > 0) ++apart;
+    const double rounding = 64 * double(std::numeric_limits<S>::epsilon()) * 40;
+    ASSERT_NEAR(double(test::distance<S>(model, I, *bvh, X)), expected, rounding) << i;
+    ASSERT_NEAR(double(test::distance<S>(*bvh, X, model, I)), expected, rounding) << i;
+    fcl::DistanceRequest<S> request(true);
+    fcl::DistanceResult<S> result;
+    fcl::distance<S>(&model, I, bvh.get(), X, request, result);
+    if (expected > 0) {
+      const double between = double((result.nearest_points[0] - result.nearest_points[1]).norm());
+      EXPECT_NEAR(between, expected, 4 * rounding);
+    }
+    EXPECT_TRUE(isCloserThan<S>(&model, I, bvh.get(), X, S(expected * 1.001 + 1e-3)));
+    if (expected > 1e-2) {
+      EXPECT_FALSE(isCloserThan<S>(&model, I, bvh.get(), X, S(expected * 0.999)));
+    }
+  }
+  EXPECT_GT(apart, 8);
+}
+
+TYPED_TEST(BvhPartner, DistancesAreThoseOfTheNearestTriangles) {
+  using S = TypeParam;
+  std::mt19937_64 g(9);
+  const Raw torus = test::torus(12), large = fan(g), line = strip(60, g);
+  for (const Raw* a : {&torus, &large, &line}) {
+    for (const Raw* b : {&torus, &large, &line}) {
+      if (b == a) continue;
+      checkDistances<fcl::OBBRSS<S>>(*a, *b);
+      checkDistances<fcl::AABB<S>>(*a, *b);
+      checkDistances<fcl::RSS<S>>(*a, *b);
+      checkDistances<fcl::KDOP<S, 16>>(*a, *b);
+    }
+  }
+}
+
+// A model that decays must not keep its branches because the BVHModel beside it is far.
+TYPED_TEST(BvhPartner, FarPartnersDoNotKeepBranches) {
+  using S = TypeParam;
+  const Raw raw = test::torus(40);
+  auto now = std::make_shared<std::atomic<int>>(0);
+  Options options;
+  options.ttl = std::chrono::seconds(1);
+  options.clock = [now] { return Clock::time_point(std::chrono::seconds(now->load())); };
+  const Model<S> model(raw.mesh(), options);
+  const auto bvh = test::bvh<fcl::OBBRSS<S>>(raw);
+  const auto I = fcl::Transform3<S>::Identity();
+  ASSERT_TRUE(test::touching<S>(model, I, *bvh, I));
+  const std::size_t before = model.statistics().resident_nodes;
+  ASSERT_GT(before, 1U);
+  auto far = I;
+  far.translation()[0] = S(50);
+  for (int i = 0; i < 10; ++i) {
+    now->fetch_add(1);
+    ASSERT_FALSE(test::touching<S>(model, I, *bvh, far));
+  }
+  EXPECT_LT(model.statistics().resident_nodes, before);
+}
+
+}  // namespace
+}  // namespace bocst
