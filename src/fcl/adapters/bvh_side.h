@@ -9,6 +9,7 @@
 #include <cstdint>
 #include <stdexcept>
 #include <string>
+#include <utility>
 
 #include "fcl/adapters/rounding.h"
 #include "log/assert.h"
@@ -124,18 +125,33 @@ class BvhSide : public query::CompleteSide {
     return {v.center, v.half.norm()};
   }
 
+  /// Those nearest to the centre of `other` come last, so that a stack returns them first: they are the most likely to
+  /// be hit.
   template <typename F>
   void overlappingChildren(Node n, const query::Volume& other, const query::SimilarityTransform& to, F&& f) const {
-    pushLanes(n, overlappingLanes(n, other, to), [&f](Node node, int) { f(node); });
+    const Group& group = groupOf(n);
+    const query::OneVolume seen = seenFrom(group, other, to);
+    std::pair<float, Node> nodes[8];
+    int count = 0;
+    for (unsigned left = query::overlappingBoxes(group.boxes, seen) & group.lanes; left != 0; left &= left - 1) {
+      const int lane = __builtin_ctz(left);
+      float squared = 0;
+      for (int k = 0; k < 3; ++k) {
+        const float way = seen.center[k] - group.boxes.center[k][lane];
+        squared += way * way;
+      }
+      int at = count++;
+      for (; at > 0 && nodes[at - 1].first < squared; --at) nodes[at] = nodes[at - 1];
+      nodes[at] = {squared, group.node[lane]};
+    }
+    for (int i = 0; i < count; ++i) f(nodes[i].second);
   }
 
   /// Lanes are not the children of the node in FCL's tree, but up to eight nodes below it.
   template <typename OtherVolume>
   unsigned overlappingLanes(Node n, OtherVolume& other, const query::SimilarityTransform& to) const {
     const Group& group = groupOf(n);
-    query::OneVolume seen = query::seenFrom(other, to, group.middle, group.unit);
-    seen.rounding_margin += group.size * to.rounding_margin;
-    return query::overlappingBoxes(group.boxes, seen) & group.lanes;
+    return query::overlappingBoxes(group.boxes, seenFrom(group, other, to)) & group.lanes;
   }
 
   /// All of them.
@@ -245,6 +261,13 @@ class BvhSide : public query::CompleteSide {
     std::uint64_t sides = 0;
     Group group[kCount];
   };
+
+  template <typename OtherVolume>
+  static query::OneVolume seenFrom(const Group& group, OtherVolume& other, const query::SimilarityTransform& to) {
+    query::OneVolume seen = query::seenFrom(other, to, group.middle, group.unit);
+    seen.rounding_margin += group.size * to.rounding_margin;
+    return seen;
+  }
 
   const Group& groupOf(Node n) const {
     Group& group = groups_->group[static_cast<std::size_t>(n) % Groups::kCount];
