@@ -2,6 +2,7 @@
 #pragma once
 
 #include <algorithm>
+#include <cmath>
 #include <cstdint>
 #include <type_traits>
 #include <utility>
@@ -69,7 +70,7 @@ class PairWalk {
     s.stack.push_back(root);
     for (;;) {
       Pair pair;
-      while (cut_ != nullptr ? popFirst(s, pair) : popLast(s, pair)) {
+      while (isCut() ? popFirst(s, pair) : popLast(s, pair)) {
         if (spheres_ ? stepSpheres(pair, s) : stepBoxes(pair, s)) return true;
         if (++steps_ < most_steps_) continue;
         gave_up_ = true;
@@ -147,6 +148,10 @@ class PairWalk {
     return 0;
   }
 
+  // True once as many contacts are known as are wanted: before, depth first is the quickest.
+  bool isCut() const {
+    return cut_ != nullptr && (spheres_ ? cut_->last_cell != ~std::uint64_t{0} : std::isfinite(cut_->last));
+  }
   bool isBeyond(double place) const {
     return spheres_ ? place > static_cast<double>(cut_->last_cell) : cut_->isBeyond(place);
   }
