@@ -127,8 +127,8 @@ class BvhSide : public query::CompleteSide {
 
   /// Those nearest to the centre of `other` come last, so that a stack returns them first: they are the most likely to
   /// be hit.
-  template <typename F>
-  void overlappingChildren(Node n, const query::Volume& other, const query::SimilarityTransform& to, F&& f) const {
+  template <typename OtherVolume, typename F>
+  void overlappingChildren(Node n, OtherVolume& other, const query::SimilarityTransform& to, F&& f) const {
     const Group& group = groupOf(n);
     const query::OneVolume seen = seenFrom(group, other, to);
     std::pair<float, Node> nodes[8];

@@ -29,6 +29,7 @@
 namespace bocst::fcl_adapter {
 namespace {
 
+using query::BoxSide;
 using query::TreeSide;
 
 /// The models among two geometries, of which one at least is one.
@@ -87,9 +88,27 @@ void collideBvh(const CollideQuery<S>& q, tree::Tree& tree, const BvhSide& b) {
   const Triangles<S> of_model(tree), of_partner(b);
   MeshCollector<S> collector(q, tree, q.swapped ? of_partner : of_model, q.swapped ? of_model : of_partner, magnitude);
   collector.setFrame(surface.lattice, b_in_a.tolerance + q.margin / surface.lattice.unit());
-  query::PairWalk<TreeSide, BvhSide>(a, b, withMargin(b_in_a, a, q, q.cullingMargin(a.isConservative())), collector)
-      .run();
+  const query::SimilarityTransform wide = withMargin(b_in_a, a, q, q.cullingMargin(a.isConservative()));
+  const auto walk_blocks = [&](std::size_t most) {
+    return query::PairWalk<TreeSide, BvhSide>(a, b, wide, collector).run(most);
+  };
+  // Faces that are flat on one another, as between two models, see TreesCollision.
+  constexpr query::Turns::Limits kLimits = {256, 1024, 1024, 1};
+  std::size_t steps = 0;  // of a walk for contacts: one that finds none pays for the boxes
+  if (!std::is_same<S, double>::value || q.margin > 0 || !BoxSide::fits(a)) {
+    walk_blocks(query::kNoLimit);
+  } else if (collector.endsAtFirst()) {
+    query::walkByTurns(a, b, wide, collector, kLimits, walk_blocks);
+  } else if (query::Turns::favourBoxes(a, b)) {
+    const BoxSide boxes(a);
+    query::PairWalk<BoxSide, BvhSide>(boxes, b, wide, collector).run();
+  } else {
+    steps = walk_blocks(query::kNoLimit).steps;
+  }
   collector.finish();
+  if (steps > 0 && q.result.numContacts() == before) {
+    query::Turns(a, b, tree::Tree::Search::kYesOrNo, kLimits).tookOverBlocks(steps, true);
+  }
   if (q.mayBeInside(before) && contains<S>(tree, q.X_WA(), b, q.X_WB(), magnitude)) addInside(q, a, b, b_in_a);
 }
 

@@ -170,11 +170,14 @@ void search(const DistanceQuery<S>& q, const TreeSide& a, const B& b, const Simi
   const lattice::Lattice& lattice = a.tree().surface().lattice;
   const query::DistanceGoal goal = goalOf(q, lattice.unit());
   const query::Nearest nearest = [&] {
-    if constexpr (std::is_same<B, TreeSide>::value) {
-      const std::optional<query::Nearest> touch = query::findTouch(a, b, b_in_a);
-      return touch ? *touch : query::findNearest(a, b, b_in_a, goal);
-    } else {
+    if constexpr (B::kBodies) {
       return query::DistanceWalk<TreeSide, B>(a, b, b_in_a).run(goal);
+    } else {
+      if constexpr (std::is_same<B, TreeSide>::value) {
+        const std::optional<query::Nearest> touch = query::findTouch(a, b, b_in_a);
+        if (touch) return *touch;
+      }
+      return query::findNearest(a, b, b_in_a, goal);
     }
   }();
   report(q, nearest, lattice.origin(), lattice.unit());

@@ -438,18 +438,20 @@ class PairWalk {
   std::size_t steps_ = 0, most_steps_ = 0;
 };
 
-/// A walk over the blocks of two models and one over their oriented boxes in turns, until one ends; for a visitor that
-/// ends at the first hit. walk_blocks(most_steps) returns a WalkEnd.
-template <typename WalkBlocks>
-bool walkByTurns(const TreeSide& a, const TreeSide& b, const SimilarityTransform& b_in_a, Visitor& visitor,
+/// A walk over the blocks of one model or two and one over their oriented boxes in turns, until one ends; for a visitor
+/// that ends at the first hit. walk_blocks(most_steps) returns a WalkEnd.
+template <typename B, typename WalkBlocks>
+bool walkByTurns(const TreeSide& a, const B& b, const SimilarityTransform& b_in_a, Visitor& visitor,
                  const Turns::Limits& limits, WalkBlocks&& walk_blocks) {
   for (Turns turns(a, b, tree::Tree::Search::kYesOrNo, limits);; turns.next()) {
     const WalkEnd blocks = walk_blocks(turns.most());
     turns.tookOverBlocks(blocks.steps, blocks.gave_up);
     if (!blocks.gave_up) return blocks.met;
-    if (!BoxSide::build(a) || !BoxSide::build(b)) return walk_blocks(kNoLimit).met;
-    const BoxSide boxes_a(a), boxes_b(b);
-    const WalkEnd boxes = PairWalk<BoxSide, BoxSide>(boxes_a, boxes_b, b_in_a, visitor).run(turns.mostOverBoxes());
+    if (!buildBoxes(a) || !buildBoxes(b)) return walk_blocks(kNoLimit).met;
+    const BoxSide boxes_a(a);
+    const auto& boxes_b = boxesOf(b);
+    const WalkEnd boxes = PairWalk<BoxSide, std::decay_t<decltype(boxes_b)>>(boxes_a, boxes_b, b_in_a, visitor)
+                              .run(turns.mostOverBoxes());
     if (boxes.gave_up) continue;
     turns.endedOverBoxes(boxes.steps);
     return boxes.met;

@@ -429,19 +429,21 @@ class DistanceWalk : private BestFirst<DistanceWalk<A, B>, A, B> {
       Eigen::Vector3d::Zero();  // from side A to side B where they are nearest so far, unit length
 };
 
-/// The nearest primitives of two trees. With exact answers, takes turns with a walk over oriented boxes.
-inline Nearest findNearest(const TreeSide& a, const TreeSide& b, const SimilarityTransform& b_in_a,
-                           const DistanceGoal& goal) {
-  DistanceWalk<TreeSide, TreeSide> trees(a, b, b_in_a);
-  if (!BoxSide::fits(a) || !BoxSide::fits(b)) return trees.run(goal);
+/// The nearest primitives of a tree and another side that is no body. With exact answers, takes turns with a walk over
+/// oriented boxes.
+template <typename B>
+Nearest findNearest(const TreeSide& a, const B& b, const SimilarityTransform& b_in_a, const DistanceGoal& goal) {
+  DistanceWalk<TreeSide, B> trees(a, b, b_in_a);
+  if (!fitsBoxes(a) || !fitsBoxes(b)) return trees.run(goal);
   Nearest nearest;
   for (Turns turns(a, b, tree::Tree::Search::kDistance, {256, 1024, 1024, 4});; turns.next()) {
     nearest = trees.run(goal, nearest, turns.most());
     turns.tookOverBlocks(trees.steps(), trees.gaveUp());
     if (!trees.gaveUp()) return nearest;
-    if (!BoxSide::build(a) || !BoxSide::build(b)) return trees.run(goal, nearest);
-    const BoxSide boxes_a(a), boxes_b(b);
-    DistanceWalk<BoxSide, BoxSide> boxes(boxes_a, boxes_b, b_in_a);
+    if (!buildBoxes(a) || !buildBoxes(b)) return trees.run(goal, nearest);
+    const BoxSide boxes_a(a);
+    const auto& boxes_b = boxesOf(b);
+    DistanceWalk<BoxSide, std::decay_t<decltype(boxes_b)>> boxes(boxes_a, boxes_b, b_in_a);
     nearest = boxes.run(goal, nearest, turns.mostOverBoxes());
     if (boxes.gaveUp()) continue;
     turns.endedOverBoxes(boxes.steps());

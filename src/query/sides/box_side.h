@@ -69,6 +69,29 @@ class BoxSide : public CompleteSide {
   const tree::BoxTree& boxes_;
 };
 
+// For walks of a tree and another side by way of oriented boxes: those of a tree, and other sides as they are.
+
+inline bool fitsBoxes(const TreeSide& side) { return BoxSide::fits(side); }
+inline bool buildBoxes(const TreeSide& side) { return BoxSide::build(side); }
+inline BoxSide boxesOf(const TreeSide& side) { return BoxSide(side); }
+inline const tree::Tree* treeOf(const TreeSide& side) { return &side.tree(); }
+template <typename Side>
+bool fitsBoxes(const Side&) {
+  return true;
+}
+template <typename Side>
+bool buildBoxes(const Side&) {
+  return true;
+}
+template <typename Side>
+const Side& boxesOf(const Side& side) {
+  return side;
+}
+template <typename Side>
+const tree::Tree* treeOf(const Side&) {
+  return nullptr;
+}
+
 /// True if two models have oriented boxes, and those of the roots are apart.
 inline bool knownBoxesApart(const TreeSide& a, const TreeSide& b, const SimilarityTransform& b_in_a) {
   if (a.tree().knownBoxes() == nullptr || b.tree().knownBoxes() == nullptr) return false;

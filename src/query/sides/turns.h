@@ -9,9 +9,9 @@
 
 namespace bocst::query {
 
-/// How long a walk over the blocks of two models and one over their oriented boxes (BoxSide) take turns, until one
-/// ends. The first is usually quicker; but between two flat faces with little space between them, or of slivers, its
-/// volumes separate little. Each turn may take longer than the one before, so all take at most some times what the
+/// How long a walk over the blocks of one model or two and one over their oriented boxes (BoxSide) take turns, until
+/// one ends. The first is usually quicker; but between two flat faces with little space between them, or of slivers,
+/// its volumes separate little. Each turn may take longer than the one before, so all take at most some times what the
 /// quicker way takes. What ended the last long search of both trees gets as many steps at once.
 ///
 /// The boxes are built when walks have paid for them, as whole trees are.
@@ -24,10 +24,12 @@ class Turns {
     std::size_t slower;      ///< A step over boxes takes as long as this many over blocks.
   };
 
-  Turns(const TreeSide& a, const TreeSide& b, tree::Tree::Search kind, const Limits& limits)
-      : trees_{&a.tree(), &b.tree()}, kind_(kind), limits_(limits) {
-    const std::size_t price = trees_[0]->boxPrice() + trees_[1]->boxPrice();
-    const tree::Tree::LongSearch last[2] = {trees_[0]->longSearch(kind), trees_[1]->longSearch(kind)};
+  template <typename B>
+  Turns(const TreeSide& a, const B& b, tree::Tree::Search kind, const Limits& limits)
+      : trees_{&a.tree(), treeOf(b)}, kind_(kind), limits_(limits) {
+    const tree::Tree& second = trees_[1] != nullptr ? *trees_[1] : *trees_[0];
+    const std::size_t price = trees_[0]->boxPrice() + (trees_[1] != nullptr ? second.boxPrice() : 0);
+    const tree::Tree::LongSearch last[2] = {trees_[0]->longSearch(kind), second.longSearch(kind)};
     most_ = price == 0 ? limits.few : std::max(limits.many, price);
     if (last[0].over_boxes != last[1].over_boxes) return;
     const std::size_t steps = 2 * std::size_t{std::min(last[0].steps, last[1].steps)};
@@ -43,14 +45,16 @@ class Turns {
   /// A walk over boxes that is no longer than this.
   static constexpr std::size_t kShort = 256;
 
-  /// True if two models have their boxes, and the last long yes-or-no walk of both ended soon, over boxes. Slivers are
+  /// True if the models have their boxes, and the last long yes-or-no walk of each ended soon, over boxes. Slivers are
   /// like this: a single pair of their leaves takes longer than most walks over boxes.
-  static bool favourBoxes(const TreeSide& a, const TreeSide& b) {
-    const auto favours = [](const tree::Tree& tree) {
-      const tree::Tree::LongSearch last = tree.longSearch(tree::Tree::Search::kYesOrNo);
-      return tree.knownBoxes() != nullptr && last.over_boxes != 0 && last.steps <= kShort;
+  template <typename B>
+  static bool favourBoxes(const TreeSide& a, const B& b) {
+    const auto favours = [](const tree::Tree* tree) {
+      if (tree == nullptr) return true;
+      const tree::Tree::LongSearch last = tree->longSearch(tree::Tree::Search::kYesOrNo);
+      return tree->knownBoxes() != nullptr && last.over_boxes != 0 && last.steps <= kShort;
     };
-    return favours(a.tree()) && favours(b.tree());
+    return favours(&a.tree()) && favours(treeOf(b));
   }
 
   /// Of this turn.
@@ -60,7 +64,9 @@ class Turns {
   /// The walk over blocks took so many steps, and gave up or not.
   void tookOverBlocks(std::size_t steps, bool gave_up) const {
     if (steps > limits_.many) {
-      for (const tree::Tree* tree : trees_) tree->payBoxRent(steps - limits_.many);
+      for (const tree::Tree* tree : trees_) {
+        if (tree != nullptr) tree->payBoxRent(steps - limits_.many);
+      }
     }
     // In a first turn, boxes were not tried; and a short walk says nothing.
     if (!gave_up && steps > limits_.few && (!is_first_ || follows_last_)) remember(0, steps);
@@ -78,11 +84,12 @@ class Turns {
   void remember(std::uint32_t over_boxes, std::size_t steps) const {
     constexpr std::size_t kMost = std::size_t{1} << 30;
     for (const tree::Tree* tree : trees_) {
+      if (tree == nullptr) continue;
       tree->setLongSearch(kind_, {over_boxes, static_cast<std::uint32_t>(std::min(steps, kMost))});
     }
   }
 
-  const tree::Tree* trees_[2];
+  const tree::Tree* trees_[2];  // the second may be null
   const tree::Tree::Search kind_;
   const Limits limits_;
   std::size_t most_ = 0, most_over_boxes_ = 0;
