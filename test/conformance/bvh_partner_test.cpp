@@ -217,6 +217,35 @@ TYPED_TEST(BvhPartner, DistancesAreThoseOfTheNearestTriangles) {
   }
 }
 
+// Blocks separate nothing here; queries pay for oriented boxes, and later ones use them.
+TEST(BvhPartnerDouble, FlatFacesOnOneAnother) {
+  const Raw ra = test::plate(30), rb = test::plate(23);
+  const auto bvh = test::bvh<fcl::OBBRSSd>(rb);
+  Modeld model(ra.mesh());
+  std::mt19937_64 g(3);
+  const auto X = test::pose<double>(test::randomRotation(g), Vector3d(0.3, 0.2, 0.1));
+  const auto above = [&](double gap) {
+    fcl::Transform3d in_a = fcl::Transform3d::Identity();
+    in_a.linear() = Eigen::AngleAxisd(0.3, Vector3d::UnitZ()).toRotationMatrix();
+    in_a.translation() = Vector3d(0.013, 0.021, gap);
+    return fcl::Transform3d(X * in_a);
+  };
+  // So many bytes a triangle do the boxes take, see design.md.
+  const std::size_t boxes = 100 * ra.triangles.size();
+  model.buildTree();
+  const std::size_t before = model.statistics().resident_bytes;
+  for (int i = 0; i < 100; ++i) {
+    ASSERT_NEAR(test::distance<double>(model, X, *bvh, above(1e-4)), 1e-4, 1e-14) << i;
+    ASSERT_FALSE(test::touching<double>(model, X, *bvh, above(1e-9))) << i;
+    ASSERT_FALSE(test::touching<double>(*bvh, above(1e-9), model, X)) << i;
+    ASSERT_TRUE(test::pairs<double>(model, X, *bvh, above(1e-9)).empty()) << i;
+    ASSERT_TRUE(test::touching<double>(model, X, *bvh, X)) << i;
+  }
+  EXPECT_GT(model.statistics().resident_bytes, before + boxes);
+  const Modeld other(rb.mesh());
+  EXPECT_EQ(test::pairs<double>(model, X, *bvh, X), test::pairs<double>(model, X, other, X));
+}
+
 // A model that decays must not keep its branches because the BVHModel beside it is far.
 TYPED_TEST(BvhPartner, FarPartnersDoNotKeepBranches) {
   using S = TypeParam;
