@@ -77,15 +77,17 @@ class BvhSide : public query::CompleteSide {
   static constexpr bool kBodies = false;
   static constexpr bool kNodesContainSurface = true;
   static constexpr bool kHasLanes = true;
-  // Below so few triangles, FCL's nodes part less than they cost.
+  /// Below so few triangles, FCL's nodes separate less than they cost.
   static constexpr int kLeafTriangles = 8;
   static constexpr double kOutwards = 1 + 0x1p-22;  // what is rounded to float becomes no less
 
+  /// Leaves have at most `leaf_triangles`, which is 1 to kLeafTriangles.
   /// @throws std::invalid_argument when the model is no finished triangle mesh.
   template <typename BV>
-  BvhSide(const char* query, const fcl::BVHModel<BV>& bvh)
+  BvhSide(const char* query, const fcl::BVHModel<BV>& bvh, int leaf_triangles = kLeafTriangles)
       : nodes_(nodesOf(query, bvh)),
         node_size_(sizeof(fcl::BVNode<BV>)),
+        leaf_triangles_(leaf_triangles),
         volume_([](const fcl::BVNodeBase& node) { return volumeOf(static_cast<const fcl::BVNode<BV>&>(node).bv); }),
         pack_(&pack<BV>),
         triangles_(bvh.tri_indices),
@@ -95,7 +97,7 @@ class BvhSide : public query::CompleteSide {
         number_(++groups_->sides) {
     setVertices(bvh.vertices);
     const query::OrientedVolume v = volume_(node(0));
-    magnitude_ = v.center.cwiseAbs().maxCoeff() + v.half.norm();
+    magnitude_ = (v.center.cwiseAbs() + v.axes.cwiseAbs() * v.half).maxCoeff();
     rounding_ = roundingOf<typename BV::S>(magnitude_);
   }
 
@@ -245,7 +247,7 @@ class BvhSide : public query::CompleteSide {
   }
 
  private:
-  static bool isLeaf(const fcl::BVNodeBase& node) { return node.num_primitives <= kLeafTriangles; }
+  bool isLeaf(const fcl::BVNodeBase& node) const { return node.num_primitives <= leaf_triangles_; }
 
   /// Up to eight nodes that hold all triangles below another one, for tests in SIMD.
   struct Group {
@@ -351,6 +353,7 @@ class BvhSide : public query::CompleteSide {
 
   const char* nodes_;  // BVNode<BV> one after the other, of node_size_ bytes each
   std::size_t node_size_;
+  int leaf_triangles_;
   query::OrientedVolume (*volume_)(const fcl::BVNodeBase&);
   void (*pack_)(const BvhSide&, const query::OrientedVolume& parent, int count, Group& group);
   const fcl::Triangle* triangles_;

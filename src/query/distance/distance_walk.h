@@ -49,7 +49,7 @@ class DistanceWalk : private BestFirst<DistanceWalk<A, B>, A, B> {
   DistanceWalk(const A& a, const B& b, const SimilarityTransform& b_in_a)
       : Base(a, b, scratch()), b_in_a_(b_in_a), a_in_b_(b_in_a.inverse()) {
     if constexpr (kHasLanes) {
-      if ((kTrees || !spheres()) && Gaps::fits(a, b, b_in_a)) gaps_.emplace(a, b, b_in_a);
+      if (Gaps::fits(b, b_in_a)) gaps_.emplace(a, b, b_in_a);
       in_float_ = hasGaps();
     } else if constexpr (!B::kBodies) {
       in_float_ = PairFrames::isFine(b_in_a);
@@ -80,7 +80,6 @@ class DistanceWalk : private BestFirst<DistanceWalk<A, B>, A, B> {
   using Base::b_;
   using Base::spheres;
   static constexpr bool kHasLanes = A::kHasLanes && B::kHasLanes;
-  static constexpr bool kTrees = std::is_same<A, TreeSide>::value && std::is_same<B, TreeSide>::value;
   struct Nothing {};
   using Gaps =
       typename std::conditional_t<kHasLanes, std::common_type<NodeGaps<A, B>>, std::common_type<Nothing>>::type;
@@ -107,7 +106,7 @@ class DistanceWalk : private BestFirst<DistanceWalk<A, B>, A, B> {
   bool again(const Pair& pair) {
     double bound = 0;
     if (spheres()) {
-      if constexpr (kTrees) {
+      if constexpr (kHasLanes) {
         if (!gaps_.has_value() || pair.bound + gaps_->doubt() < cutoff()) return false;
         bound = gaps_->ofSpheres(pair.a, pair.b, direction_, cutoff());
       } else {

@@ -22,12 +22,12 @@ template <typename A, typename B>
 class NodeGaps {
  public:
   /// True if the bounds of this pair can be computed in float.
-  static bool fits(const A& a, const B& b, const SimilarityTransform& b_in_a) {
-    return PairFrames::isFine(betweenLattices(a, b, b_in_a));
+  static bool fits(const B& b, const SimilarityTransform& b_in_a) {
+    return PairFrames::isFine(betweenLattices(b, b_in_a));
   }
 
   NodeGaps(const A& a, const B& b, const SimilarityTransform& b_in_a)
-      : a_(a), b_(b), b_in_a_(b_in_a), lattices_(betweenLattices(a, b, b_in_a)), geometry_(lattices_) {
+      : a_(a), b_(b), b_in_a_(b_in_a), lattices_(betweenLattices(b, b_in_a)), geometry_(lattices_) {
     Scratch& s = scratch();
     s.a.start(a, geometry_, 0);
     s.b.start(b, geometry_, 1);
@@ -58,9 +58,9 @@ class NodeGaps {
     return ofLanes<1>(s.b.ofLanes(b_, x), s.a, a_, y, beside, s.large_a);
   }
 
-  /// The same of two nodes of trees in double, where one answers conservatively: up to kExtentRounding of the sizes,
-  /// which is taken off. `direction` and `cutoff`: see distanceBound().
-  double ofSpheres(tree::NodeRef a, tree::NodeRef b, const Eigen::Vector3d& direction, double cutoff) const {
+  /// The same of two nodes in double, where a side answers conservatively: up to kExtentRounding of the sizes, which is
+  /// taken off. `direction` and `cutoff`: see distanceBound().
+  double ofSpheres(typename A::Node a, typename B::Node b, const Eigen::Vector3d& direction, double cutoff) const {
     double radii = 0;
     const NodeExtent extent_a = extentOf(a_, a, SimilarityTransform(), radii),
                      extent_b = extentOf(b_, b, b_in_a_, radii);
@@ -88,9 +88,8 @@ class NodeGaps {
   };
   static Scratch& scratch() { return thread::ofThread<Scratch>(); }
 
-  static SimilarityTransform betweenLattices(const A& a, const B& b, const SimilarityTransform& b_in_a) {
+  static SimilarityTransform betweenLattices(const B& b, const SimilarityTransform& b_in_a) {
     static_assert(std::is_same<A, TreeSide>::value, "its frame is its lattice");
-    (void)a;
     SimilarityTransform to = b_in_a;
     to.translation = b_in_a * SideFrames<B>::originOf(b);
     to.scale = b_in_a.scale * SideFrames<B>::unitOf(b);
@@ -146,6 +145,10 @@ class NodeGaps {
     return large;
   }
 
+  template <typename Side>
+  static NodeExtent extentOf(const Side& side, typename Side::Node node, const SimilarityTransform& to, double&) {
+    return {side.volume(node), to};
+  }
   // As fillCenters() has it. Adds the radius that no leaf's sphere exceeds.
   static NodeExtent extentOf(const TreeSide& side, tree::NodeRef node, const SimilarityTransform& to, double& radii) {
     const Volume v = side.volume(node);
