@@ -15,6 +15,7 @@
 #include "conformance/reference.h"
 #include "fcl/adapters/bvh_side.h"
 #include "geometry/triangle.h"
+#include "query/distance/side_frames.h"
 
 namespace bocst {
 namespace {
@@ -27,12 +28,12 @@ template <typename S>
 class BvhPartner : public testing::Test {};
 TYPED_TEST_SUITE(BvhPartner, test::Scalars);
 
-// n triangles along a line and in a heap, some of them equal.
+// n triangles along a line and in a heap, some of them equal, and one far away, which FCL makes a node of its own.
 Raw strip(std::size_t n, std::mt19937_64& g) {
   std::uniform_real_distribution<double> u(-1, 1);
   Raw raw;
   for (std::size_t i = 0; i < n; ++i) {
-    const Vector3d at = i % 3 == 0 ? Vector3d::Zero() : Vector3d(double(i), u(g), u(g));
+    const Vector3d at = i % 3 == 0 ? Vector3d::Zero() : Vector3d(double(i + 1 == n ? 100 * n : i), u(g), u(g));
     raw.addTriangle(at, at + Vector3d(u(g), u(g), u(g)), i % 7 == 0 ? at : Vector3d(at + Vector3d(u(g), u(g), u(g))));
   }
   return raw;
@@ -105,13 +106,63 @@ TYPED_TEST(BvhPartner, LeavesHaveEachTriangleOnce) {
   }
 }
 
-// Some triangles much larger than all of the other mesh, a small angle apart, so that the boxes of their leaves say
+// For distances, nodes become upright boxes and slabs in float.
+TYPED_TEST(BvhPartner, FramesHoldTheTrianglesOfTheirNodes) {
+  using S = TypeParam;
+  std::mt19937_64 g(11);
+  const Raw raw = strip(400, g);
+  const auto bvh = test::bvh<fcl::OBBRSS<S>>(raw);
+  const BvhSide side("distance", *bvh);
+  using Frames = query::SideFrames<BvhSide>;
+  const query::PairFrames geometry{query::SimilarityTransform()};
+  auto frames = std::make_unique<Frames>();
+  frames->start(side, geometry, 1);
+  const double unit = Frames::unitOf(side);
+  const Vector3d middle = Frames::originOf(side) + unit * Vector3d::Constant(lattice::kMiddle);
+  const auto check = [&](const query::Frame& f, std::size_t lane, const Vector3d& corner) {
+    const Vector3d x = (corner - middle) / unit;
+    constexpr double kRounding = 0x1p-20 * lattice::kMiddle;
+    double along = -double(f.slab_center[lane]);
+    for (int k = 0; k < 3; ++k) {
+      const double from_center = x[k] - double(f.center[0][k][lane]);
+      EXPECT_LE(std::abs(from_center), double(f.half[0][k][lane]) + kRounding);
+      along += double(f.normal[0][k][lane]) * from_center;
+    }
+    EXPECT_LE(std::abs(along), double(f.slab_half[lane]) + kRounding);
+  };
+  const auto checkLeaves = [&](auto&& self, int node, const query::Frame& f, std::size_t lane) -> void {
+    if (side.state(node) == query::State::kInner) {
+      side.children(node, [&](int child) { self(self, child, f, lane); });
+      return;
+    }
+    const auto triangles = side.triangles(node);
+    for (std::size_t i = 0; i < triangles.count; ++i) {
+      for (const Vector3d& corner : side.corners(triangles.ids[i])) check(f, lane, corner);
+    }
+  };
+  std::vector<int> stack = {side.root()};
+  while (!stack.empty()) {
+    const int node = stack.back();
+    stack.pop_back();
+    std::size_t lane = 0;
+    const query::Frame own = frames->of(side, node, lane);
+    checkLeaves(checkLeaves, node, own, lane);
+    if (side.state(node) == query::State::kLeaf) continue;
+    const query::Frame lanes = frames->ofLanes(side, node);
+    side.pushLanes(node, side.lanes(node), [&](int child, int i) {
+      checkLeaves(checkLeaves, child, lanes, static_cast<std::size_t>(i));
+      stack.push_back(child);
+    });
+  }
+}
+
+// Triangles much larger than all of the other mesh, a small angle apart, so that the boxes of their leaves say
 // little.
-Raw fan(std::mt19937_64& g) {
+Raw fan(int count, std::mt19937_64& g) {
   std::uniform_real_distribution<double> u(0, 0.2);
   Raw raw;
-  for (int i = 0; i < 24; ++i) {
-    const double angle = 0.25 * i, next = angle + 0.2;
+  for (int i = 0; i < count; ++i) {
+    const double angle = 6.2 * i / count, next = angle + 0.2;
     const Vector3d tip(0, 0, u(g));
     raw.addTriangle(tip, Vector3d(30 * std::cos(angle), 30 * std::sin(angle), u(g)),
                     Vector3d(30 * std::cos(next), 30 * std::sin(next), u(g)));
@@ -145,7 +196,7 @@ TYPED_TEST(BvhPartner, SmallNodesBesideLargeTriangles) {
   std::mt19937_64 g(5);
   const Raw fine = test::torus(60);
   int hits = 0, misses = 0;
-  for (const double lift : {0.0, 0.8, 1.2, 1.4}) checkFan<TypeParam>(fine, fan(g), lift, hits, misses, g);
+  for (const double lift : {0.0, 0.8, 1.2, 1.4}) checkFan<TypeParam>(fine, fan(300, g), lift, hits, misses, g);
   EXPECT_GT(hits, 30);
   EXPECT_GT(misses, 30);
 }
@@ -205,7 +256,7 @@ void checkDistances(const Raw& ra, const Raw& rb) {
 TYPED_TEST(BvhPartner, DistancesAreThoseOfTheNearestTriangles) {
   using S = TypeParam;
   std::mt19937_64 g(9);
-  const Raw torus = test::torus(12), large = fan(g), line = strip(60, g);
+  const Raw torus = test::torus(12), large = fan(24, g), line = strip(60, g);
   for (const Raw* a : {&torus, &large, &line}) {
     for (const Raw* b : {&torus, &large, &line}) {
       if (b == a) continue;
