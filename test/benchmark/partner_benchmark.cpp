@@ -122,6 +122,9 @@ struct Times {
   std::size_t mismatches = 0;
 };
 
+/// FCL's distances to cells are found by libccd, to its tolerance of 1e-6 or a little more.
+constexpr double kSolver = 1e-5;
+
 template <typename Query>
 Times inTurns(const std::vector<Sample>& samples, const Query& query) {
   constexpr std::size_t kTurn = 500;
@@ -147,7 +150,7 @@ Times inTurns(const std::vector<Sample>& samples, const Query& query) {
   }
   for (std::size_t i = 0; i < samples.size(); ++i) {
     times.hit.push_back(theirs[i] <= 0);
-    times.mismatches += (theirs[i] <= 0) != (ours[i] <= 0) || std::abs(theirs[i] - ours[i]) > 1e-6;
+    times.mismatches += (theirs[i] <= 0) != (ours[i] <= 0) || std::abs(theirs[i] - ours[i]) > kSolver;
   }
   return times;
 }
