@@ -242,8 +242,9 @@ class PairWalk {
     return false;
   }
 
-  // Calls f for the children of an inner node that may meet a larger leaf of the other side, whose box says little:
-  // its triangles in `which` are looked at one by one, and children need not look at those that miss them.
+  // Calls f for the children of an inner node that may meet a much larger leaf of the other side. The leaf's own box
+  // separates little, so its triangles in `which` are tested one by one; of lanes, each child gets those that it may
+  // meet.
   template <typename Side, typename Volume, typename Large, typename Other, typename F>
   static void childrenBesideLeaf(const Side& side, typename Side::Node node, Volume& volume,
                                  const SimilarityTransform& to, Large& large, const Other& other,
