@@ -1,11 +1,11 @@
 // SPDX-License-Identifier: BSD-3-Clause
 // Usage: bocst_partner_benchmark octree|bvh MESHES_DIR LINKS_DIR [SEED [RESOLUTION]]
 // The links of an arm (OBJ files, see tools/make-models --arm) in random poses among scans (OFF files) and boards, as
-// models beside geometries of FCL. `octree`: the scans are one octomap of cells of RESOLUTION (0.025), as a planner
-// with a depth camera has it. `bvh`: either the links or the scans are models, and the others BVHModels, in the pairs
-// whose boxes overlap. FCL's time is that of BVHModel<OBBRSS> in place of the model. Trees are built before, and both
-// sides ask in turns of 500 pairs. Prints times of single pairs in us, and FCL's time / bocst's, and compares all
-// verdicts and distances. It leaves out the broad phase, and what moves or changes.
+// models beside geometries of FCL. `octree`: the scans are one octomap of cells of RESOLUTION (0.025; only used here),
+// as a planner with a depth camera has it. `bvh`: either the links or the scans are models, and the others BVHModels,
+// in the pairs whose boxes overlap. FCL's time is that of BVHModel<OBBRSS> in place of the model. Trees are built
+// before, and both sides ask in turns of 500 pairs. Prints times of single pairs in us, and FCL's time / bocst's, and
+// compares all verdicts and distances. It leaves out the broad phase, and what moves or changes.
 #include <bocst/bocst.h>
 #include <bocst/io.h>
 #include <fcl/geometry/bvh/BVH_model.h>
@@ -20,6 +20,7 @@
 #include <filesystem>
 #include <memory>
 #include <random>
+#include <stdexcept>
 #include <string>
 #include <utility>
 #include <vector>
@@ -254,7 +255,7 @@ std::size_t runOctree(const std::string& meshes, const std::vector<Part>& links,
   }
   std::printf("%zu links, among %zu occupied cells of %g (%zu leaves of the octomap); times in us\n", links.size(),
               occupied, resolution, map->getNumLeafNodes());
-  return compare(samples, 100);  // FCL takes up to 0.1 s for each distance
+  return compare(samples, 100);  // FCL takes up to a second for each distance
 }
 
 std::size_t runBvh(const std::string& meshes, const std::vector<Part>& links, std::mt19937_64& g) {

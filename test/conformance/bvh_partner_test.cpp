@@ -293,8 +293,17 @@ TEST(BvhPartnerDouble, FlatFacesOnOneAnother) {
     ASSERT_TRUE(test::touching<double>(model, X, *bvh, X)) << i;
   }
   EXPECT_GT(model.statistics().resident_bytes, before + boxes);
+  // Requests for contacts alone do so, too.
+  Modeld asked_for_contacts(ra.mesh());
+  asked_for_contacts.buildTree();
+  for (int i = 0; i < 100; ++i) {
+    ASSERT_TRUE(test::pairs<double>(asked_for_contacts, X, *bvh, above(1e-9)).empty()) << i;
+  }
+  EXPECT_GT(asked_for_contacts.statistics().resident_bytes, before + boxes);
   const Modeld other(rb.mesh());
-  EXPECT_EQ(test::pairs<double>(model, X, *bvh, X), test::pairs<double>(model, X, other, X));
+  const test::Pairs pairs = test::pairs<double>(model, X, other, X);
+  EXPECT_EQ(test::pairs<double>(model, X, *bvh, X), pairs);
+  EXPECT_EQ(test::pairs<double>(asked_for_contacts, X, *bvh, X), pairs);
 }
 
 // A model that decays must not keep its branches because the BVHModel beside it is far.

@@ -7,6 +7,7 @@
 #include <cmath>
 #include <cstddef>
 #include <cstdint>
+#include <limits>
 #include <stdexcept>
 #include <string>
 #include <utility>
@@ -77,7 +78,7 @@ class BvhSide : public query::CompleteSide {
   static constexpr bool kBodies = false;
   static constexpr bool kNodesContainSurface = true;
   static constexpr bool kHasLanes = true;
-  /// Below so few triangles, FCL's nodes separate less than they cost.
+  /// A node of at most this many triangles is a leaf: FCL's smaller nodes cost more time than they save.
   static constexpr int kLeafTriangles = 8;
   static constexpr double kOutwards = 1 + 0x1p-22;  // what is rounded to float becomes no less
 
@@ -101,7 +102,7 @@ class BvhSide : public query::CompleteSide {
     rounding_ = roundingOf<typename BV::S>(magnitude_);
   }
 
-  /// No coordinate is larger, in absolute value.
+  /// The largest coordinate of the root's box, in absolute value, up to FCL's rounding.
   double magnitude() const { return magnitude_; }
 
   /// About all triangles.
@@ -127,8 +128,8 @@ class BvhSide : public query::CompleteSide {
     return {v.center, v.half.norm()};
   }
 
-  /// Those nearest to the centre of `other` come last, so that a stack returns them first: they are the most likely to
-  /// be hit.
+  /// Calls f(node) for the lanes that `other` may overlap. Those nearest to the centre of `other` come last, so that a
+  /// stack returns them first: they are the most likely to be hit.
   template <typename OtherVolume, typename F>
   void overlappingChildren(Node n, OtherVolume& other, const query::SimilarityTransform& to, F&& f) const {
     const Group& group = groupOf(n);
@@ -159,7 +160,7 @@ class BvhSide : public query::CompleteSide {
   /// All of them.
   unsigned lanes(Node n) const { return groupOf(n).lanes; }
 
-  /// Their volumes. Of the others nothing is written.
+  /// Writes the volumes of lanes(n); other entries stay as they are.
   void laneVolumes(Node n, query::Volume (&volumes)[8]) const {
     const Group& group = groupOf(n);
     for (unsigned left = group.lanes; left != 0; left &= left - 1) {
@@ -171,18 +172,19 @@ class BvhSide : public query::CompleteSide {
   /// A box along the axes of the frame, and a slab across the node's shortest side.
   query::Volume uprightVolume(Node n) const {
     const query::OrientedVolume v = volume(n);
+    constexpr float kLeast = std::numeric_limits<float>::denorm_min();  // lengths may be less than all floats but 0
     int shortest = 0;
     const double thickness = v.half.minCoeff(&shortest);
     query::Volume upright;
     const Eigen::Vector3d half = v.axes.cwiseAbs() * v.half;
     for (int k = 0; k < 3; ++k) {
       upright.center[k] = v.center[k];
-      upright.half[k] = static_cast<float>(half[k] * kOutwards);
+      upright.half[k] = static_cast<float>(half[k] * kOutwards) + kLeast;
       upright.normal[k] = static_cast<float>(v.axes(k, shortest));
     }
     upright.slab_offset = 0;
     // The normal is rounded, too.
-    upright.slab_half = static_cast<float>(thickness + 0x1p-22 * v.half.sum());
+    upright.slab_half = static_cast<float>(thickness + 0x1p-22 * v.half.sum()) + kLeast;
     return upright;
   }
 

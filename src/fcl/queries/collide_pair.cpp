@@ -69,47 +69,103 @@ bool areFarApart(const Models<S>& models, const fcl::Transform3<S>& X_W1, const 
 
 // The same for a model and a BVHModel.
 template <typename S>
-bool isFarApart(const CollideQuery<S>& q, const tree::Tree& tree, const BvhSide& b) {
+bool areFarApart(const CollideQuery<S>& q, const tree::Tree& tree, const BvhSide& b) {
   return areSurelyRigid(q.X_WA(), q.X_WB()) &&
          query::areFarApart(tree.outline(), q.X_WA().matrix().data(), b.outline(), q.X_WB().matrix().data(),
                             q.margin) &&
          !(tree.hasDecay() && tree.isPruneDue(tree.now()));
 }
 
+/// A collision query of a model, side A, and a BVHModel, while the tree's query lock is held.
+template <typename S>
+class BvhCollision {
+ public:
+  BvhCollision(const CollideQuery<S>& q, const TreeSide& a, const BvhSide& b)
+      : q_(q),
+        a_(a),
+        b_(b),
+        relative_(relate<S>(q, a, b)),
+        to_a_(withMargin(relative_.b_in_a, a, q, q.cullingMargin(a.isConservative()))) {}
+
+  /// Adds contacts to the result.
+  void run() const {
+    tree::Tree& tree = a_.tree();
+    if (isOutOfSight(q_, relative_.b_in_a, magnitudeOf(tree.surface().bounds), b_.magnitude())) return;
+    const std::size_t before = q_.result.numContacts();
+    walk(before);
+    if (q_.mayBeInside(before) && contains<S>(tree, q_.X_WA(), b_, q_.X_WB(), relative_.magnitude)) {
+      addInside(q_, a_, b_, relative_.b_in_a);
+    }
+  }
+
+ private:
+  static constexpr query::Turns::Limits kLimits = {256, 1024, 1024, 1};
+
+  // Between flat faces and beside slivers, oriented boxes separate what blocks do not, as with two models, see
+  // TreesCollision.
+  void walk(std::size_t contacts_before) const {
+    const bool uses_boxes = std::is_same<S, double>::value && !(q_.margin > 0) && BoxSide::fits(a_);
+    if (uses_boxes && !q_.endsAtFirst() && boxesPartAll()) return;
+    std::size_t steps = 0;
+    collect(q_, [&](MeshCollector<S>& collector) {
+      const auto walk_blocks = [&](std::size_t most) {
+        return query::PairWalk<TreeSide, BvhSide>(a_, b_, to_a_, collector).run(most);
+      };
+      if (uses_boxes && collector.endsAtFirst()) {
+        query::walkByTurns(a_, b_, to_a_, collector, kLimits, walk_blocks);
+      } else if (uses_boxes && query::Turns::favourBoxes(a_, b_)) {
+        walkBoxes(collector, query::kNoLimit);
+      } else {
+        steps = walk_blocks(query::kNoLimit).steps;
+      }
+    });
+    // Yes-or-no walks have taken turns with boxes; a walk for contacts that found none pays for them.
+    if (uses_boxes && !q_.endsAtFirst() && q_.result.numContacts() == contacts_before) {
+      query::Turns(a_, b_, tree::Tree::Search::kYesOrNo, kLimits).tookOverBlocks(steps, true);
+    }
+  }
+
+  query::WalkEnd walkBoxes(MeshCollector<S>& collector, std::size_t most_steps) const {
+    const BoxSide boxes(a_);
+    return query::PairWalk<BoxSide, BvhSide>(boxes, b_, to_a_, collector).run(most_steps);
+  }
+
+  // True if boxes that are paid for show soon that there is no contact.
+  bool boxesPartAll() const {
+    if (q_.request.enable_cost || query::Turns::favourBoxes(a_, b_)) return false;
+    if (a_.tree().boxPrice() > 0 || !BoxSide::build(a_)) return false;
+    const fcl::CollisionRequest<S> request;
+    fcl::CollisionResult<S> result;
+    query::WalkEnd end{};
+    collect({q_, request, result, q_.margin, q_.is_distance},
+            [&](MeshCollector<S>& collector) { end = walkBoxes(collector, query::Turns::kShort); });
+    return !end.met && !end.gave_up;
+  }
+
+  // Calls f(collector), and hands what was collected to the query's result.
+  template <typename F>
+  void collect(const CollideQuery<S>& q, F&& f) const {
+    const Triangles<S> of_model(a_.tree()), of_partner(b_);
+    MeshCollector<S> collector(q, a_.tree(), q.swapped ? of_partner : of_model, q.swapped ? of_model : of_partner,
+                               relative_.magnitude);
+    const lattice::Lattice& lattice = a_.tree().surface().lattice;
+    collector.setFrame(lattice, relative_.b_in_a.tolerance + q.margin / lattice.unit());
+    f(collector);
+    collector.finish();
+  }
+
+  const CollideQuery<S>& q_;
+  const TreeSide& a_;
+  const BvhSide& b_;
+  const RelativeSides relative_;
+  const query::SimilarityTransform to_a_;
+};
+
 template <typename S>
 void collideBvh(const CollideQuery<S>& q, tree::Tree& tree, const BvhSide& b) {
-  if (isFarApart(q, tree, b)) return;
-  const std::size_t before = q.result.numContacts();
+  if (areFarApart(q, tree, b)) return;
   const QueryScope scope(tree);
-  const TreeSide& a = scope.a();
-  const auto [b_in_a, magnitude] = relate<S>(q, a, b);
-  const oracle::Surface& surface = tree.surface();
-  if (isOutOfSight(q, b_in_a, magnitudeOf(surface.bounds), b.magnitude())) return;
-  const Triangles<S> of_model(tree), of_partner(b);
-  MeshCollector<S> collector(q, tree, q.swapped ? of_partner : of_model, q.swapped ? of_model : of_partner, magnitude);
-  collector.setFrame(surface.lattice, b_in_a.tolerance + q.margin / surface.lattice.unit());
-  const query::SimilarityTransform wide = withMargin(b_in_a, a, q, q.cullingMargin(a.isConservative()));
-  const auto walk_blocks = [&](std::size_t most) {
-    return query::PairWalk<TreeSide, BvhSide>(a, b, wide, collector).run(most);
-  };
-  // Faces that are flat on one another, as between two models, see TreesCollision.
-  constexpr query::Turns::Limits kLimits = {256, 1024, 1024, 1};
-  std::size_t steps = 0;  // of a walk for contacts: one that finds none pays for the boxes
-  if (!std::is_same<S, double>::value || q.margin > 0 || !BoxSide::fits(a)) {
-    walk_blocks(query::kNoLimit);
-  } else if (collector.endsAtFirst()) {
-    query::walkByTurns(a, b, wide, collector, kLimits, walk_blocks);
-  } else if (query::Turns::favourBoxes(a, b)) {
-    const BoxSide boxes(a);
-    query::PairWalk<BoxSide, BvhSide>(boxes, b, wide, collector).run();
-  } else {
-    steps = walk_blocks(query::kNoLimit).steps;
-  }
-  collector.finish();
-  if (steps > 0 && q.result.numContacts() == before) {
-    query::Turns(a, b, tree::Tree::Search::kYesOrNo, kLimits).tookOverBlocks(steps, true);
-  }
-  if (q.mayBeInside(before) && contains<S>(tree, q.X_WA(), b, q.X_WB(), magnitude)) addInside(q, a, b, b_in_a);
+  BvhCollision<S>(q, scope.a(), b).run();
 }
 
 template <typename S>

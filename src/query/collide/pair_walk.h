@@ -19,10 +19,10 @@
 
 namespace bocst::query {
 
-/// The walk over pairs of nodes. Resident pairs first, depth first, or in the order of the visitor's cut where it has
-/// one, so that nothing is visited that lies beyond the last pair wanted; a pair that needs an unexpanded node is
-/// deferred. When the resident pairs do not settle the question, nodes deferred grow in one batch and the walk goes on
-/// with their pairs, one level down.
+/// The walk over pairs of nodes. Resident pairs first, depth first. If the visitor has a cut, the walk goes on in the
+/// cut's order once as many contacts are known as are wanted (isCut()), so that nothing is visited that lies beyond the
+/// last of them. A pair that needs an unexpanded node is deferred. When the resident pairs do not settle the question,
+/// nodes deferred grow in one batch and the walk goes on with their pairs, one level down.
 ///
 /// Triangles against triangles are culled by boxes and slabs; where a side answers with cells, both are culled by
 /// spheres, in double and on integer cells, so a conservative verdict does not depend on what is resident. Two such
@@ -94,7 +94,7 @@ class PairWalk {
   using LargeLeaf = std::conditional_t<Other::kHasLanes, TriangleBoxes<Side>, LargeTriangleLeaf<Side>>;
   struct Scratch {
     std::vector<Pair> stack;
-    std::vector<PlacedPair> ordered;  // a heap; the walk's pairs where the visitor has a cut
+    std::vector<PlacedPair> ordered;  // a heap; the walk's pairs once isCut()
     DeferredPairs<A, B> deferred;
     LeafPairs<A, B> leaves;
     LargeLeaf<A, B> large_a;
@@ -186,6 +186,8 @@ class PairWalk {
 
   // Beside a pair of nodes: as many pairs of triangles take as long, and the exact test of one that many.
   static constexpr std::size_t kTrianglePairs = 32, kExactTest = 8;
+  // So do as many tests of eight lanes against a triangle.
+  static constexpr std::size_t kTriangleTests = 4;
   // In a walk of so many steps, nodes beside a leaf so much larger, squared, are tested against each of its triangles.
   static constexpr std::size_t kLongWalk = 128;
   static constexpr double kMuchLarger = 4;
@@ -246,9 +248,8 @@ class PairWalk {
   // separates little, so its triangles in `which` are tested one by one; of lanes, each child gets those that it may
   // meet.
   template <typename Side, typename Volume, typename Large, typename Other, typename F>
-  static void childrenBesideLeaf(const Side& side, typename Side::Node node, Volume& volume,
-                                 const SimilarityTransform& to, Large& large, const Other& other,
-                                 typename Other::Node leaf, std::uint32_t which, F&& f) {
+  void childrenBesideLeaf(const Side& side, typename Side::Node node, Volume& volume, const SimilarityTransform& to,
+                          Large& large, const Other& other, typename Other::Node leaf, std::uint32_t which, F&& f) {
     if constexpr (Side::kHasLanes) {
       unsigned mask = side.overlappingLanes(node, volume, to);
       std::uint32_t triangles[8];
@@ -256,6 +257,7 @@ class PairWalk {
       const auto* const boxes = mask != 0 ? large.get(other, leaf, to) : nullptr;
       if (boxes != nullptr) {
         std::fill(triangles, triangles + 8, 0);
+        steps_ += static_cast<std::size_t>(__builtin_popcount(which & boxes->all())) / kTriangleTests;
         unsigned met = 0;
         for (which &= boxes->all(); which != 0; which &= which - 1) {
           const unsigned lanes = side.overlappingLanes(node, boxes->boxes[__builtin_ctz(which)], to) & mask;

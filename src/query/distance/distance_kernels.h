@@ -18,7 +18,7 @@ void fillFrame(const PairFrames& geometry, int own, const tree::Block& block, Fr
 /// Fills lane 0 of the frame with the root of side `own`.
 void fillFrame(const PairFrames& geometry, int own, const bounds::NodeBounds& root, Frame& frame);
 
-/// Eight boxes and slabs of one side as Frame has them, along their own axes.
+/// Eight boxes and slabs of one side, along the axes of its frame, as Frame has them at [0].
 struct LaneVolumes {
   alignas(64) float center[3][8];
   float half[3][8], normal[3][8], slab_center[8], slab_half[8];

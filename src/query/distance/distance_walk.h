@@ -48,11 +48,9 @@ class DistanceWalk : private BestFirst<DistanceWalk<A, B>, A, B> {
 
   DistanceWalk(const A& a, const B& b, const SimilarityTransform& b_in_a)
       : Base(a, b, scratch()), b_in_a_(b_in_a), a_in_b_(b_in_a.inverse()) {
+    if constexpr (!B::kBodies) in_float_ = PairFrames::isFine(betweenLattices(b, b_in_a));
     if constexpr (kHasLanes) {
-      if (Gaps::fits(b, b_in_a)) gaps_.emplace(a, b, b_in_a);
-      in_float_ = hasGaps();
-    } else if constexpr (!B::kBodies) {
-      in_float_ = PairFrames::isFine(b_in_a);
+      if (in_float_) gaps_.emplace(a, b, b_in_a);
     }
   }
 

@@ -18,7 +18,7 @@ namespace bocst::query {
 template <typename A, typename B>
 class NearTriangles {
  public:
-  /// Triangles of two leaves, and no more than their distance, in the unit of side A.
+  /// A triangle of each leaf, and a lower bound of their distance in the unit of side A.
   struct Candidate {
     double at_least;
     std::uint32_t a, b;

@@ -21,11 +21,9 @@ namespace bocst::query {
 template <typename A, typename B>
 class NodeGaps {
  public:
-  /// True if the bounds of this pair can be computed in float.
-  static bool fits(const B& b, const SimilarityTransform& b_in_a) {
-    return PairFrames::isFine(betweenLattices(b, b_in_a));
-  }
+  static_assert(std::is_same<A, TreeSide>::value, "its frame is its lattice");
 
+  /// Of sides for which PairFrames::isFine().
   NodeGaps(const A& a, const B& b, const SimilarityTransform& b_in_a)
       : a_(a), b_(b), b_in_a_(b_in_a), lattices_(betweenLattices(b, b_in_a)), geometry_(lattices_) {
     Scratch& s = scratch();
@@ -66,7 +64,8 @@ class NodeGaps {
                      extent_b = extentOf(b_, b, b_in_a_, radii);
     return distanceBound(extent_a, extent_b, direction, cutoff + radii) - radii;
   }
-  /// Then it may be larger than that of lanes by this much because of rounding and of smaller spheres alone.
+  /// It may exceed the bound of lanes by this length, in the unit of A, because of rounding and of smaller spheres
+  /// alone.
   double doubt() const { return doubt_; }
 
  private:
@@ -87,14 +86,6 @@ class NodeGaps {
     RawTriangles raw, placed;
   };
   static Scratch& scratch() { return thread::ofThread<Scratch>(); }
-
-  static SimilarityTransform betweenLattices(const B& b, const SimilarityTransform& b_in_a) {
-    static_assert(std::is_same<A, TreeSide>::value, "its frame is its lattice");
-    SimilarityTransform to = b_in_a;
-    to.translation = b_in_a * SideFrames<B>::originOf(b);
-    to.scale = b_in_a.scale * SideFrames<B>::unitOf(b);
-    return to;
-  }
 
   // Of the spheres of a side's leaves. Where regions are clipped, some are smaller.
   template <typename Side>

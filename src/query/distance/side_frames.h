@@ -3,13 +3,12 @@
 
 #include <Eigen/Core>
 #include <algorithm>
-#include <cmath>
 #include <cstddef>
 #include <cstdint>
 #include <iterator>
 
-#include "geometry/extent.h"
 #include "query/distance/distance_kernels.h"
+#include "query/sides/box_side.h"
 #include "query/sides/side.h"
 
 namespace bocst::query {
@@ -163,5 +162,22 @@ class SideFrames<TreeSide> {
   Frame frames_[kFrames];
   Frame root_;
 };
+
+/// Oriented boxes are in the lattice of their tree.
+template <>
+class SideFrames<BoxSide> {
+ public:
+  static double unitOf(const BoxSide&) { return 1; }
+  static Eigen::Vector3d originOf(const BoxSide&) { return Eigen::Vector3d::Zero(); }
+};
+
+/// From the lattice of side B to that of a tree, `b_in_a` being from the frame of B.
+template <typename B>
+SimilarityTransform betweenLattices(const B& b, const SimilarityTransform& b_in_a) {
+  SimilarityTransform to = b_in_a;
+  to.translation = b_in_a * SideFrames<B>::originOf(b);
+  to.scale = b_in_a.scale * SideFrames<B>::unitOf(b);
+  return to;
+}
 
 }  // namespace bocst::query

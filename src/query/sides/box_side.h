@@ -10,7 +10,7 @@
 namespace bocst::query {
 
 /// A model's oriented boxes as a side of a walk, in the frame of its TreeSide, which must outlive this: for exact
-/// answers of what is long and thin, and where TreeWalk gives up.
+/// answers of what is long and thin, and where the walk over blocks gives up.
 class BoxSide : public CompleteSide {
  public:
   using Node = int;

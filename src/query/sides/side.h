@@ -27,8 +27,8 @@ struct CompleteSide {
   }
   template <typename Node>
   void grow(const Node&, std::vector<tree::Tree::Growth>&) const {}
-  // How the children of a node can be tested against single triangles of a leaf, see PairWalk: eight at once, as lanes
-  // (TreeSide::overlappingLanes()), or as octants of a cube (LargeTriangleLeaf).
+  // How the children of a node are tested eight at once: as lanes, with lanes(), overlappingLanes() and pushLanes() as
+  // TreeSide has them, also for distances (SideFrames); or as octants of a cube, with childrenMeeting().
   static constexpr bool kHasLanes = false, kHasOctants = false;
   // Only a side that answers with cells is asked for these.
   template <typename Node>

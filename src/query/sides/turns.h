@@ -12,7 +12,7 @@ namespace bocst::query {
 /// How long a walk over the blocks of one model or two and one over their oriented boxes (BoxSide) take turns, until
 /// one ends. The first is usually quicker; but between two flat faces with little space between them, or of slivers,
 /// its volumes separate little. Each turn may take longer than the one before, so all take at most some times what the
-/// quicker way takes. What ended the last long search of both trees gets as many steps at once.
+/// quicker way takes. What ended the last long search of each tree gets as many steps at once.
 ///
 /// The boxes are built when walks have paid for them, as whole trees are.
 class Turns {
