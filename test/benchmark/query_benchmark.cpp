@@ -73,10 +73,10 @@ void gapsOfOctants(benchmark::State& state) {
       fillFrame(c.geometry, side, block, frames[side][i]);
     }
   }
-  OctantGaps gaps;
+  LaneGaps gaps;
   std::size_t i = 0;
   for (auto _ : state) {
-    octantGaps(c.geometry, 0, frames[0][i % kMany], frames[1][i * 7 % kMany], 3, FrameDirection(), gaps);
+    laneGaps(c.geometry, 0, frames[0][i % kMany], frames[1][i * 7 % kMany], 3, FrameDirection(), gaps);
     benchmark::DoNotOptimize(gaps);
     ++i;
   }

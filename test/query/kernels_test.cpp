@@ -1021,9 +1021,8 @@ TEST_P(EveryTarget, GapsOfOctantsHoldTheDistancesOfTheirPoints) {
     Frame frames[2];
     for (int side = 0; side < 2; ++side) fillFrame(geometry, side, blocks[side], frames[side]);
     for (int own = 0; own < 2; ++own) {
-      OctantGaps gaps;
-      octantGaps(geometry, own, frames[own], frames[1 - own], static_cast<std::size_t>(octants[1 - own]), expected,
-                 gaps);
+      LaneGaps gaps;
+      laneGaps(geometry, own, frames[own], frames[1 - own], static_cast<std::size_t>(octants[1 - own]), expected, gaps);
       ASSERT_LE(gaps.at_least[octants[own]], distance + rounding) << "round " << round << " side " << own;
       ASSERT_GE(gaps.at_most[octants[own]], distance - rounding) << "round " << round << " side " << own;
       ++compared;
@@ -1078,7 +1077,7 @@ TEST_P(EveryTarget, GapsToTrianglesAreNoMoreThanTheDistancesOfPoints) {
 
     Frame frame;
     fillFrame(geometry, own, block, frame);
-    OctantGaps gaps{};
+    LaneGaps gaps{};
     triangleGaps(geometry, frame, bounds, count, gaps);
     ASSERT_LE(gaps.at_least[o], unit * distance) << "round " << round;
     for (int i = 0; i < 8; ++i) ASSERT_LT(gaps.at_least[i], 1e9f);

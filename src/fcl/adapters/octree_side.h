@@ -39,7 +39,7 @@ class OcTreeSide : public query::CompleteSide {
   static constexpr bool kBodies = true;
   // Octomap's inner nodes need not be up to date.
   static constexpr bool kNodesContainSurface = false;
-  static constexpr bool kHasLanes = false, kHasOctants = true;
+  static constexpr bool kHasLanes = false, kHasCubes = true;
 
   /// `density` is that of the other geometry. Cells that are uncertain or not known are seen only where costs are asked
   /// for.

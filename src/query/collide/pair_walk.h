@@ -267,7 +267,7 @@ class PairWalk {
         mask = met;
       }
       side.pushLanes(node, mask, [&](typename Side::Node child, int lane) { f(child, triangles[lane]); });
-    } else if constexpr (Side::kHasOctants) {
+    } else if constexpr (Side::kHasCubes) {
       side.childrenMeeting(node, volume, to, large, other, leaf, f);
     } else {
       side.overlappingChildren(node, volume, to, f);

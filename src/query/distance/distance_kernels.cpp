@@ -151,8 +151,8 @@ HWY_INLINE V orAlongNormal(V best, const Vec3& n, V apart, const Interval& x, co
   return hn::IfThenElse(hn::Gt(dot(n, n), hn::Zero(d)), hn::Max(best, gap), best);
 }
 
-void OctantGapsOf(const PairFrames& g, int own, const Frame& f, const Frame& y, std::size_t l,
-                  const FrameDirection& along, OctantGaps& gaps) {
+void LaneGapsOf(const PairFrames& g, int own, const Frame& f, const Frame& y, std::size_t l,
+                const FrameDirection& along, LaneGaps& gaps) {
   const D d;
   const int other = 1 - own;
   const Vec3 y_half = broadcast(y.half[0][0][l], y.half[0][1][l], y.half[0][2][l]);
@@ -197,7 +197,7 @@ HWY_INLINE V squareOfGap(const Vec3& low, const Vec3& high, const Vec3& lo, cons
   return hn::MulAdd(x, x, hn::MulAdd(y, y, hn::Mul(z, z)));
 }
 
-void TriangleGaps(const PairFrames& g, const Frame& f, const TriangleBounds& b, std::size_t count, OctantGaps& gaps) {
+void TriangleGaps(const PairFrames& g, const Frame& f, const TriangleBounds& b, std::size_t count, LaneGaps& gaps) {
   const D d;
   const V zero = hn::Zero(d), margin = hn::Set(d, 2 * g.slab_rounding_margin);
   for (std::size_t i = 0; i < 8; i += hn::Lanes(d)) {
@@ -414,7 +414,7 @@ HWY_EXPORT(FillRootFrame);
 HWY_EXPORT(FillLanes);
 HWY_EXPORT(FillCenters);
 HWY_EXPORT(FillRootCenters);
-HWY_EXPORT(OctantGapsOf);
+HWY_EXPORT(LaneGapsOf);
 HWY_EXPORT(TriangleGaps);
 HWY_EXPORT(NearPairs);
 
@@ -439,13 +439,13 @@ void fillCenters(const PairFrames& geometry, int own, const bounds::NodeBounds& 
   HWY_DYNAMIC_DISPATCH(FillRootCenters)(geometry, own, root, leaves, frame);
 }
 
-void octantGaps(const PairFrames& geometry, int own, const Frame& f, const Frame& y, std::size_t lane,
-                const FrameDirection& direction, OctantGaps& gaps) {
-  HWY_DYNAMIC_DISPATCH(OctantGapsOf)(geometry, own, f, y, lane, direction, gaps);
+void laneGaps(const PairFrames& geometry, int own, const Frame& f, const Frame& y, std::size_t lane,
+              const FrameDirection& direction, LaneGaps& gaps) {
+  HWY_DYNAMIC_DISPATCH(LaneGapsOf)(geometry, own, f, y, lane, direction, gaps);
 }
 
 void triangleGaps(const PairFrames& geometry, const Frame& f, const TriangleBounds& triangles, std::size_t count,
-                  OctantGaps& gaps) {
+                  LaneGaps& gaps) {
   HWY_DYNAMIC_DISPATCH(TriangleGaps)(geometry, f, triangles, count, gaps);
 }
 

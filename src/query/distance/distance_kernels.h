@@ -46,23 +46,23 @@ struct FrameDirection {
   float in[2][3] = {};
 };
 
-/// How far eight octants are from a node of the other side, in lattice units of side 0.
-struct OctantGaps {
+/// How far eight lanes are from a node of the other side, in lattice units of side 0.
+struct LaneGaps {
   alignas(64) float at_least[8];
   alignas(64) float at_most[8];  ///< Some point of the one is no farther from some point of the other.
 };
 
 /// Along the faces of both boxes, both slabs' normals, the line of the middles and `direction`, which should be where
-/// the nearest points are expected. The octants are those of frame f, side `own`; the node is lane `lane` of frame y.
+/// the nearest points are expected. The lanes are those of frame f, side `own`; the node is lane `lane` of frame y.
 ///
 /// With M and u as at PairFrames, a gap along a direction of unit length: the way between centres is off by 59 u M and
 /// its sum by 7; each of two reaches by 72, as the slab test's; the two spellings of the direction by 16: 226 u M,
 /// which is less than 2 * slab_rounding_margin. That is taken off, and 8 u of the gap for the direction's length.
-void octantGaps(const PairFrames& geometry, int own, const Frame& f, const Frame& y, std::size_t lane,
-                const FrameDirection& direction, OctantGaps& gaps);
+void laneGaps(const PairFrames& geometry, int own, const Frame& f, const Frame& y, std::size_t lane,
+              const FrameDirection& direction, LaneGaps& gaps);
 
-/// Raises at_least of eight octants beside a leaf of the other side to the gap of the nearest of its
-/// triangles, whose bounds are in the frame of the octants, at most a pack of them: where these are large, the leaf's
+/// Raises at_least of eight lanes beside a leaf of the other side to the gap of the nearest of its
+/// triangles, whose bounds are in the frame of the lanes, at most a pack of them: where these are large, the leaf's
 /// volume says little.
 ///
 /// Along the axes, the triangle's normal and those of its edges in its plane. With M and u as at PairFrames, a gap
@@ -70,7 +70,7 @@ void octantGaps(const PairFrames& geometry, int own, const Frame& f, const Frame
 /// by 1, the slab's normal by 16; such an axis is no shorter than 0.57. 2 * slab_rounding_margin, 320 u M, is taken
 /// off, and 64 u of the gap because axes are at right angles but for rounding.
 void triangleGaps(const PairFrames& geometry, const Frame& f, const TriangleBounds& triangles, std::size_t count,
-                  OctantGaps& gaps);
+                  LaneGaps& gaps);
 
 /// Two triangles that may be the nearest.
 struct NearPair {

@@ -180,7 +180,7 @@ class DistanceWalk : private BestFirst<DistanceWalk<A, B>, A, B> {
   }
 
   // Sides with lanes have their bounds in SIMD.
-  OctantGaps gapsOf(const Pair& pair, bool expands_a) {
+  LaneGaps gapsOf(const Pair& pair, bool expands_a) {
     const State other = expands_a ? b_.state(pair.b) : a_.state(pair.a);
     bool beside = false;
     if (other == State::kLeaf && !spheres()) {
@@ -202,7 +202,7 @@ class DistanceWalk : private BestFirst<DistanceWalk<A, B>, A, B> {
   void expand(const Pair& pair, bool expands_a) {
     if constexpr (kHasLanes) {
       if (gaps_.has_value()) {
-        const OctantGaps gaps = gapsOf(pair, expands_a);
+        const LaneGaps gaps = gapsOf(pair, expands_a);
         lanes(pair, expands_a, [&](int o, typename A::Node a, typename B::Node b) {
           limit_ = std::min(limit_, double{gaps.at_most[o]});
           const Pair child{std::max(pair.bound, double{gaps.at_least[o]}), a, b};
@@ -229,7 +229,7 @@ class DistanceWalk : private BestFirst<DistanceWalk<A, B>, A, B> {
         if (sa == State::kLeaf && sb == State::kLeaf) return leaves(pair);
         const bool expands_a = this->expandsA(pair, sa, sb);
         if ((expands_a ? sa : sb) == State::kGrows) return;
-        const OctantGaps gaps = gapsOf(pair, expands_a);
+        const LaneGaps gaps = gapsOf(pair, expands_a);
         float least = std::numeric_limits<float>::infinity();
         Pair next = pair;
         lanes(pair, expands_a, [&](int o, typename A::Node a, typename B::Node b) {

@@ -47,11 +47,11 @@ class NodeGaps {
 
   /// The gaps between the lanes of an inner node of one side and a node of the other. `beside`: the latter is a leaf of
   /// exact answers that is much larger than the lanes, so its triangles are looked at, too.
-  OctantGaps ofLanesOfA(typename A::Node x, typename B::Node y, bool beside) {
+  LaneGaps ofLanesOfA(typename A::Node x, typename B::Node y, bool beside) {
     Scratch& s = scratch();
     return ofLanes<0>(s.a.ofLanes(a_, x), s.b, b_, y, beside, s.large_b);
   }
-  OctantGaps ofLanesOfB(typename A::Node y, typename B::Node x, bool beside) {
+  LaneGaps ofLanesOfB(typename A::Node y, typename B::Node x, bool beside) {
     Scratch& s = scratch();
     return ofLanes<1>(s.b.ofLanes(b_, x), s.a, a_, y, beside, s.large_a);
   }
@@ -103,12 +103,12 @@ class NodeGaps {
   }
 
   template <int kOwn, typename Other>
-  OctantGaps ofLanes(const Frame& f, SideFrames<Other>& frames, const Other& other, typename Other::Node y, bool beside,
-                     LargeLeaf<Other> (&large)[kLargeLeaves]) {
+  LaneGaps ofLanes(const Frame& f, SideFrames<Other>& frames, const Other& other, typename Other::Node y, bool beside,
+                   LargeLeaf<Other> (&large)[kLargeLeaves]) {
     std::size_t lane = 0;
     const Frame& other_frame = frames.of(other, y, lane);
-    OctantGaps gaps;
-    octantGaps(geometry_, kOwn, f, other_frame, lane, direction_, gaps);
+    LaneGaps gaps;
+    laneGaps(geometry_, kOwn, f, other_frame, lane, direction_, gaps);
     if (radii_ > 0) {
       for (float& gap : gaps.at_least) gap = std::max(gap * (1 - 0x1p-22f) - radii_, 0.0f);
     }

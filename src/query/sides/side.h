@@ -29,7 +29,7 @@ struct CompleteSide {
   void grow(const Node&, std::vector<tree::Tree::Growth>&) const {}
   // How the children of a node are tested eight at once: as lanes, with lanes(), overlappingLanes() and pushLanes() as
   // TreeSide has them, also for distances (SideFrames); or as octants of a cube, with childrenMeeting().
-  static constexpr bool kHasLanes = false, kHasOctants = false;
+  static constexpr bool kHasLanes = false, kHasCubes = false;
   // Only a side that answers with cells is asked for these.
   template <typename Node>
   Sphere cellSphere(const Node&) const {
@@ -48,7 +48,7 @@ class TreeSide {
   using Node = tree::NodeRef;
   static constexpr bool kBodies = false;
   static constexpr bool kNodesContainSurface = true;
-  static constexpr bool kHasLanes = true, kHasOctants = false;
+  static constexpr bool kHasLanes = true, kHasCubes = false;
 
   explicit TreeSide(tree::Tree& tree) : TreeSide(tree, tree.now()) {}
   TreeSide(tree::Tree& tree, std::int64_t now) : tree_(tree), now_(now) {}
