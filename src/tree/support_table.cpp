@@ -2,28 +2,33 @@
 #include "tree/support_table.h"
 
 #include <cmath>
-#include <limits>
 
 #include "lattice/lattice.h"
 
 namespace bocst::tree {
 namespace {
 
-// Adds the rounding to float and that of the sums in double.
-float roundedUp(double x) {
-  return std::nextafter(static_cast<float>(x + 1e-9 * std::abs(x)), std::numeric_limits<float>::infinity());
-}
+// Adds the rounding to float, also of the smallest numbers, and that of the sums in double.
+float roundedUp(double x) { return static_cast<float>(x + 0x1p-23 * std::abs(x) + 1e-40); }
+
+struct Directions {
+  double entries[SupportTable::kCount][3] = {};
+
+  constexpr Directions() {
+    constexpr int kRow = SupportTable::kRow;
+    for (int number = 0; number < SupportTable::kCount; ++number) {
+      const int j = number % kRow, i = number / kRow % kRow, face = number / (kRow * kRow), k = face / 2;
+      entries[number][k] = face % 2 == 0 ? 1 : -1;
+      entries[number][(k + 1) % 3] = 2.0 * i / SupportTable::kCells - 1;
+      entries[number][(k + 2) % 3] = 2.0 * j / SupportTable::kCells - 1;
+    }
+  }
+};
+constexpr Directions kDirections;
 
 }  // namespace
 
-Eigen::Vector3d SupportTable::direction(int number) {
-  const int j = number % kRow, i = number / kRow % kRow, face = number / (kRow * kRow), k = face / 2;
-  Eigen::Vector3d d;
-  d[k] = face % 2 == 0 ? 1 : -1;
-  d[(k + 1) % 3] = 2.0 * i / kCells - 1;
-  d[(k + 2) % 3] = 2.0 * j / kCells - 1;
-  return d;
-}
+Eigen::Vector3d SupportTable::direction(int number) { return Eigen::Vector3d(kDirections.entries[number]); }
 
 void SupportTable::start(const Eigen::AlignedBox3d& box) {
   const Eigen::Vector3d center = box.center() - Eigen::Vector3d::Constant(lattice::kMiddle), half = box.sizes() / 2;
