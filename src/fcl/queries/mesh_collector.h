@@ -99,6 +99,7 @@ class MeshCollector : public query::Visitor {
         left_(q.contactsLeft()),
         most_(std::max<std::size_t>(kMost, left_ < kUnlimited ? 4 * left_ : kUnlimited)),
         is_cut_(!ends_at_first_ && left_ > 0 && left_ <= FirstPairs::kMost && !q.request.enable_cost),
+        is_ranked_(is_cut_ && left_ < kFew),
         s_(scratch()),
         cut_(order_.startCut()) {
     s_.met.clear();
@@ -125,14 +126,14 @@ class MeshCollector : public query::Visitor {
   const query::Cut* cut() const override { return is_cut_ ? &cut_ : nullptr; }
 
   bool triangles(std::uint32_t a, std::uint32_t b, bool certain) override {
-    const std::uint32_t of_model = a;
     q_.inCallersOrder(a, b);
     const std::uint64_t key = keyOf(a, b, certain);
     if (ends_at_first_) return endsWith(key);
-    if (is_cut_) {
-      addFirst(of_model, key);
+    if (is_ranked_) {
+      addFirst(key);
     } else if (s_.seen.insert(a, b)) {
       s_.found.push_back(key);
+      if (is_cut_ && s_.found.size() > left_) rankFound();
       if (s_.found.size() >= most_) decideFound();
     }
     return false;
@@ -173,6 +174,8 @@ class MeshCollector : public query::Visitor {
   static constexpr double kEpsilon = static_cast<double>(std::numeric_limits<S>::epsilon());
   // In float, FCL's axes between slivers' all but parallel edges are rubbish, and it may say that they meet.
   static constexpr bool kTrustsApart = std::is_same<S, double>::value;
+  // Of so few there are nearly always more.
+  static constexpr std::size_t kFew = 16;
   // When this many pairs are gathered, those beyond the number wanted are dropped.
   static constexpr std::size_t kMost = std::size_t{1} << 16, kUnlimited = std::size_t{1} << 40;
 
@@ -241,13 +244,21 @@ class MeshCollector : public query::Visitor {
   }
 
   // Only the first pairs that touch, a given number of them, are wanted: adds this one if it is one so far.
-  void addFirst(std::uint32_t of_model, std::uint64_t key) {
+  void addFirst(std::uint64_t key) {
     getCorners(&key, 1);
-    const RankedPair pair{placeOf(of_model), key};
+    const RankedPair pair{placeOf(q_.swapped ? second(key) : first(key)), key};
     // Most are not wanted, so only the others are remembered.
     if (!s_.first.wants(pair) || !s_.seen.insert(first(key), second(key)) || !decide(key, 0, nullptr)) return;
     s_.first.add(pair);
     if (s_.first.isFull()) order_.setCut(s_.first.last().place, position_tolerance_, cut_);
+  }
+
+  // There may be more than are wanted: from here on, by their places.
+  void rankFound() {
+    is_ranked_ = true;
+    s_.seen.clear();
+    for (const std::uint64_t key : s_.found) addFirst(key);
+    s_.found.clear();
   }
 
   // Of the pair whose corners were got last.
@@ -450,6 +461,7 @@ class MeshCollector : public query::Visitor {
   const std::size_t left_;  // contacts that are asked for
   const std::size_t most_;  // pairs to gather
   const bool is_cut_;
+  bool is_ranked_;  // what is found from now on is, of pairs of triangles
   Scratch& s_;
   query::Cut cut_;
   fcl::Transform3<double> place_ = fcl::Transform3<double>::Identity();     // the same in double
