@@ -157,11 +157,14 @@ void StateCheck<S>::addCandidates(const fcl::Transform3<S>* X_WM, const NearGrou
     const double width = std::min(a.bounds.width, b.bounds.width);
     const double depth = -static_cast<double>(gap) / width;  // NaN for what is flat and touches: not deep
     const bool is_last = has_last_ && last_.moving == n.box && last_.group == n.group && last_.lane == lane;
-    const Candidate c{gap, depth, {n.box, n.group, lane}, entries == nullptr ? 0 : entries->size() - 1};
+    // What is wholly inside the box of the other, as all is in that of a hall, may be anywhere: that says little.
+    const double size = 2 * std::min(a.bounds.half.maxCoeff(), b.bounds.half.maxCoeff());
+    const bool is_inside = -static_cast<double>(gap) > size;
+    const Candidate c{is_inside ? 0 : gap, depth, {n.box, n.group, lane}, entries == nullptr ? 0 : entries->size() - 1};
     if (is_last) {
       ask(X_WM, c, entries);
     } else {
-      (depth >= kDeep ? deep_ : candidates_).push_back(c);
+      (depth >= kDeep && !is_inside ? deep_ : candidates_).push_back(c);
     }
   }
 }
