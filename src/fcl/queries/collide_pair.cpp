@@ -23,7 +23,6 @@
 #include "fcl/queries/query_scope.h"
 #include "log/assert.h"
 #include "query/collide/pair_walk.h"
-#include "query/cull/far_apart.h"
 #include "thread/of_thread.h"
 
 namespace bocst::fcl_adapter {
@@ -50,32 +49,6 @@ bool turnsRound(const Models<S>& models, const fcl::Transform3<S>& X_W1, const f
   return walksTurned(treeOf(*models.first), X_W1, treeOf(*models.second), X_W2);
 }
 
-static_assert(kSurelyRigidError <= 2e-5, "what query::areFarApart() allows for");
-
-// True if two models are so far apart that nothing need be locked. For poses that are surely rigid. False where
-// branches are due to be dropped, since only a query that holds the locks drops them, at its end.
-template <typename S>
-bool areFarApart(const Models<S>& models, const fcl::Transform3<S>& X_W1, const fcl::Transform3<S>& X_W2,
-                 double margin) {
-  const tree::Tree &tree1 = treeOf(*models.first), &tree2 = treeOf(*models.second);
-  if (!query::areFarApart(tree1.outline(), X_W1.matrix().data(), tree2.outline(), X_W2.matrix().data(), margin)) {
-    return false;
-  }
-  if (!tree1.hasDecay() && !tree2.hasDecay()) return true;
-  // The system's clock need not be read twice.
-  const std::int64_t now1 = tree1.now(), now2 = tree1.options().clock || tree2.options().clock ? tree2.now() : now1;
-  return !(tree1.hasDecay() && tree1.isPruneDue(now1)) && !(tree2.hasDecay() && tree2.isPruneDue(now2));
-}
-
-// The same for a model and a BVHModel.
-template <typename S>
-bool areFarApart(const CollideQuery<S>& q, const tree::Tree& tree, const BvhSide& b) {
-  return areSurelyRigid(q.X_WA(), q.X_WB()) &&
-         query::areFarApart(tree.outline(), q.X_WA().matrix().data(), b.outline(), q.X_WB().matrix().data(),
-                            q.margin) &&
-         !(tree.hasDecay() && tree.isPruneDue(tree.now()));
-}
-
 /// A collision query of a model, side A, and a BVHModel, while the tree's query lock is held.
 template <typename S>
 class BvhCollision {
@@ -99,47 +72,30 @@ class BvhCollision {
   }
 
  private:
-  static constexpr query::Turns::Limits kLimits = {256, 1024, 1024, 1};
+  static constexpr query::Turns::Limits kLimits = {256, 1024, 1024, 1}, kLimitsOfContacts = {1024, 1024, 1024, 1};
 
   // Between flat faces and beside slivers, oriented boxes separate what blocks do not, as with two models, see
   // TreesCollision.
   void walk(std::size_t contacts_before) const {
     const bool uses_boxes = std::is_same<S, double>::value && !(q_.margin > 0) && BoxSide::fits(a_);
-    if (uses_boxes && !q_.endsAtFirst() && boxesPartAll()) return;
     std::size_t steps = 0;
     collect(q_, [&](MeshCollector<S>& collector) {
       const auto walk_blocks = [&](std::size_t most) {
         return query::PairWalk<TreeSide, BvhSide>(a_, b_, to_a_, collector).run(most);
       };
-      if (uses_boxes && collector.endsAtFirst()) {
-        query::walkByTurns(a_, b_, to_a_, collector, kLimits, walk_blocks);
-      } else if (uses_boxes && query::Turns::favourBoxes(a_, b_)) {
-        walkBoxes(collector, query::kNoLimit);
+      if (to_a_.margin > 0 && !a_.isConservative() && collector.endsAtFirst()) {
+        walkWithinMargin(a_, b_, relative_.b_in_a, to_a_, collector, kMostNodePairs, walk_blocks);
+      } else if (uses_boxes && (collector.endsAtFirst() || query::Turns::arePaid(a_, b_))) {
+        const auto& limits = collector.endsAtFirst() ? kLimits : kLimitsOfContacts;
+        query::walkByTurns(a_, b_, to_a_, collector, limits, walk_blocks);
       } else {
         steps = walk_blocks(query::kNoLimit).steps;
       }
     });
-    // Yes-or-no walks have taken turns with boxes; a walk for contacts that found none pays for them.
+    // A walk for a verdict pays for boxes itself, a walk for contacts where it found none.
     if (uses_boxes && !q_.endsAtFirst() && q_.result.numContacts() == contacts_before) {
       query::Turns(a_, b_, tree::Tree::Search::kYesOrNo, kLimits).tookOverBlocks(steps, true);
     }
-  }
-
-  query::WalkEnd walkBoxes(MeshCollector<S>& collector, std::size_t most_steps) const {
-    const BoxSide boxes(a_);
-    return query::PairWalk<BoxSide, BvhSide>(boxes, b_, to_a_, collector).run(most_steps);
-  }
-
-  // True if boxes that are paid for show soon that there is no contact.
-  bool boxesPartAll() const {
-    if (q_.request.enable_cost || query::Turns::favourBoxes(a_, b_)) return false;
-    if (a_.tree().boxPrice() > 0 || !BoxSide::build(a_)) return false;
-    const fcl::CollisionRequest<S> request;
-    fcl::CollisionResult<S> result;
-    query::WalkEnd end{};
-    collect({q_, request, result, q_.margin, q_.is_distance},
-            [&](MeshCollector<S>& collector) { end = walkBoxes(collector, query::Turns::kShort); });
-    return !end.met && !end.gave_up;
   }
 
   // Calls f(collector), and hands what was collected to the query's result.
@@ -163,7 +119,7 @@ class BvhCollision {
 
 template <typename S>
 void collideBvh(const CollideQuery<S>& q, tree::Tree& tree, const BvhSide& b) {
-  if (areFarApart(q, tree, b)) return;
+  if (areFarApart(tree, q.X_WA(), b, q.X_WB(), q.margin)) return;
   const QueryScope scope(tree);
   BvhCollision<S>(q, scope.a(), b).run();
 }
@@ -205,7 +161,9 @@ std::size_t collidePair(const fcl::CollisionGeometry<S>* o1, const fcl::Transfor
   checkRequest(request);
   const double m = margin ? *margin : marginOf(models.first, models.second);
   // Most of a planner's pairs end here.
-  if (are_rigid && models.areTwo() && areFarApart(models, X_W1, X_W2, m)) return result.numContacts();
+  if (are_rigid && models.areTwo() && areFarApart(treeOf(*models.first), X_W1, treeOf(*models.second), X_W2, m)) {
+    return result.numContacts();
+  }
   return answer(
       CollideQuery<S>{{o1, X_W1, o2, X_W2, turnsRound(models, X_W1, X_W2)}, request, result, m, margin.has_value()},
       models, solver);
@@ -274,7 +232,7 @@ void collideRow(const Model<S>& a, const Model<S>& b, const fcl::Transform3<S>* 
     const Spheres found = spheres != nullptr ? (*spheres)[k] : Spheres::kUnknown;
     hit[k] = found == Spheres::kMeet;
     if (found == Spheres::kMeet || (found == Spheres::kApart && !may_be_inside)) continue;
-    if (isSurelyRigid(X_AB[k]) && areFarApart(models, identity, X_AB[k], margin)) continue;
+    if (isSurelyRigid(X_AB[k]) && areFarApart(treeOf(a), identity, treeOf(b), X_AB[k], margin)) continue;
     hit[k] = touchAt(models, identity, X_AB[k], margin);
   }
 }

@@ -43,6 +43,27 @@ bool isOutOfSight(const CollideQuery<S>& q, const query::SimilarityTransform& b_
   return half_way.cwiseAbs().maxCoeff() > 8 * (size_a + size_b) + q.margin;
 }
 
+/// A yes-or-no walk of a query with a margin, without which side B is at `b_in_a`. Beside a margin that is much larger
+/// than nodes and triangles, these separate nothing: so a walk that gets long is ended, and a search for the distance
+/// is asked whether anything is near enough to be tested. walk_blocks(most_steps) returns a query::WalkEnd.
+template <typename S, typename B, typename WalkBlocks>
+void walkWithinMargin(const query::TreeSide& a, const B& b, const query::SimilarityTransform& b_in_a,
+                      const query::SimilarityTransform& near, MeshCollector<S>& collector, std::size_t most_steps,
+                      WalkBlocks&& walk_blocks) {
+  constexpr double kAnyWillDo = 1e300;
+  if (!walk_blocks(most_steps).gave_up) return;
+  // What the search computes is off by less than this; so are the lengths of the tolerance.
+  constexpr double kRounding = 1e-12;
+  const double below = near.tolerance * (1 + kRounding) + kRounding * 2 * lattice::kMiddle * (1 + near.scale);
+  const query::Nearest nearest = query::findNearest(a, b, b_in_a, {below, kAnyWillDo, kAnyWillDo});
+  if (!std::isfinite(nearest.distance)) return;
+  // Else the distance and the margin are the same up to rounding.
+  const bool meets =
+      collector.triangles(static_cast<std::uint32_t>(nearest.a), static_cast<std::uint32_t>(nearest.b), false);
+  if (!meets) walk_blocks(query::kNoLimit);
+}
+constexpr std::size_t kMostNodePairs = 256;  ///< Of a PairWalk in such a query.
+
 /// A collision query of two models: chooses among the walks, and hands what they find to a MeshCollector. While both
 /// trees' query locks are held.
 template <typename S>
@@ -86,7 +107,7 @@ class TreesCollision {
     const bool float_trees = query::TreeWalk::fits(a_, b_, near_);
     if (float_trees && !isNeedle(a_.tree()) && !isNeedle(b_.tree())) return walkTrees(wanted);
     if (kUsesBoxes && isNeedle(a_.tree()) && isNeedle(b_.tree()) && boxesFit()) {
-      collect(q_, [&](MeshCollector<S>& collector) { walkBoxes(collector, query::kNoLimit); });
+      collect(q_, [&](MeshCollector<S>& collector) { walkBoxes(collector); });
       return false;
     }
     if (query::SphereWalk::fits(a_, b_)) return walkSpheres(wanted);
@@ -113,22 +134,22 @@ class TreesCollision {
   bool walkTrees(Wanted wanted) {
     query::TreeWalk trees(a_, b_, near_);
     if (trees.isNeedless()) return false;
-    if (kUsesBoxes && (query::knownBoxesApart(a_, b_, near_) || boxesPartAll())) return false;
+    if (kUsesBoxes && query::knownBoxesApart(a_, b_, near_)) return false;
     if (isProved(wanted)) return true;
     const std::size_t before = q_.result.numContacts();
     std::size_t steps = 0;
     collect(q_, [&](MeshCollector<S>& collector) {
       if (isWithinMargin(collector)) {
-        walkWithinMargin(collector, [&](std::size_t most) { return trees.run(collector, most); });
-      } else if (kUsesBoxes && collector.endsAtFirst()) {
+        constexpr std::size_t kMostLeafPairs = 64;
+        walkWithinMargin(a_, b_, relative_.b_in_a, near_, collector, kMostLeafPairs,
+                         [&](std::size_t most) { return trees.run(collector, most); });
+      } else if (takesTurns(collector)) {
         trees.runByTurns(collector);
-      } else if (kUsesBoxes && query::Turns::favourBoxes(a_, b_)) {
-        walkBoxes(collector, query::kNoLimit);
       } else {
         steps = trees.run(collector, query::kNoLimit).steps;
       }
     });
-    // Walks for a verdict have taken turns with oriented boxes; a walk for contacts that found none pays for them.
+    // A walk for a verdict pays for oriented boxes itself, a walk for contacts where it found none.
     if (kUsesBoxes && !q_.endsAtFirst() && q_.result.numContacts() == before) trees.payForBoxes(steps);
     return false;
   }
@@ -159,13 +180,11 @@ class TreesCollision {
       // Of a mesh that is much larger than its details, these share a unit of the lattice, and blocks part nothing.
       constexpr query::Turns::Limits kLimits = {64, 1024, 1024, 1};
       if (!spheres && isWithinMargin(collector)) {
-        walkWithinMargin(collector, walk_blocks);
+        walkWithinMargin(a_, b_, relative_.b_in_a, wide, collector, kMostNodePairs, walk_blocks);
       } else if (spheres || !kUsesBoxes || !boxesFit()) {
         walk_blocks(query::kNoLimit);
-      } else if (collector.endsAtFirst()) {
+      } else if (takesTurns(collector)) {
         query::walkByTurns(a_, b_, near_, collector, kLimits, walk_blocks);
-      } else if (boxesAreBuilt()) {
-        walkBoxes(collector, query::kNoLimit);
       } else {
         const query::Turns turns(a_, b_, tree::Tree::Search::kYesOrNo, kLimits);
         turns.tookOverBlocks(walk_blocks(query::kNoLimit).steps, false);
@@ -193,52 +212,19 @@ class TreesCollision {
   // Oriented boxes.
 
   bool boxesFit() const { return query::BoxSide::fits(a_) && query::BoxSide::fits(b_); }
-  bool boxesAreBuilt() const { return a_.tree().knownBoxes() != nullptr && b_.tree().knownBoxes() != nullptr; }
-
-  query::WalkEnd walkBoxes(MeshCollector<S>& collector, std::size_t most_steps) const {
+  void walkBoxes(MeshCollector<S>& collector) const {
     const query::BoxSide boxes_a(a_), boxes_b(b_);
-    return query::PairWalk<query::BoxSide, query::BoxSide>(boxes_a, boxes_b, near_, collector).run(most_steps);
+    query::PairWalk<query::BoxSide, query::BoxSide>(boxes_a, boxes_b, near_, collector).run();
   }
 
-  // Of slivers, a walk for contacts over blocks may take thousands of times as long as one over boxes to find nothing.
-  bool boxesPartAll() const {
-    if (q_.endsAtFirst() || q_.request.enable_cost || query::Turns::favourBoxes(a_, b_)) return false;
-    if (!boxesFit() || a_.tree().boxPrice() + b_.tree().boxPrice() > 0) return false;
-    if (!query::BoxSide::build(a_) || !query::BoxSide::build(b_)) return false;
-    const fcl::CollisionRequest<S> request;
-    fcl::CollisionResult<S> result;
-    query::WalkEnd end{};
-    collect({q_, request, result, q_.margin, q_.is_distance},
-            [&](MeshCollector<S>& collector) { end = walkBoxes(collector, query::Turns::kShort); });
-    return !end.met && !end.gave_up;
+  // A walk for contacts may be long because there are many, so it does not build the boxes.
+  bool takesTurns(const MeshCollector<S>& collector) const {
+    return kUsesBoxes && (collector.endsAtFirst() || (boxesFit() && query::Turns::arePaid(a_, b_)));
   }
-
-  // Margins.
 
   /// True if the margin exceeds rounding, so that the distance of two triangles alone decides whether they touch, and
   /// one pair will do.
   bool isWithinMargin(const MeshCollector<S>& collector) const { return near_.margin > 0 && collector.endsAtFirst(); }
-
-  /// A yes-or-no walk of such a query. Beside a margin that is much larger than nodes and triangles, these separate
-  /// nothing: so if the walks over blocks and oriented boxes get as long as a search for the distance usually takes,
-  /// that is asked whether anything is near enough to be tested. walk_blocks(most_steps) returns a query::WalkEnd.
-  template <typename WalkBlocks>
-  void walkWithinMargin(MeshCollector<S>& collector, WalkBlocks&& walk_blocks) const {
-    constexpr std::size_t kFewSteps = 64, kMostSteps = 4096;
-    constexpr double kAnyWillDo = 1e300;
-    const bool boxes = kUsesBoxes && boxesAreBuilt();
-    if (!walk_blocks(boxes ? kFewSteps : kMostSteps).gave_up) return;
-    if (boxes && !walkBoxes(collector, kMostSteps).gave_up) return;
-    // What the search computes is off by less than this; so are the lengths of the tolerance.
-    constexpr double kRounding = 1e-12;
-    const double below = near_.tolerance * (1 + kRounding) + kRounding * 2 * lattice::kMiddle * (1 + near_.scale);
-    const query::Nearest nearest = query::findNearest(a_, b_, near_, {below, kAnyWillDo, kAnyWillDo});
-    if (!std::isfinite(nearest.distance)) return;
-    // Else the distance and the margin are the same up to rounding.
-    const bool meets =
-        collector.triangles(static_cast<std::uint32_t>(nearest.a), static_cast<std::uint32_t>(nearest.b), false);
-    if (!meets) walk_blocks(query::kNoLimit);
-  }
 
   const CollideQuery<S>& q_;
   const query::TreeSide &a_, &b_;

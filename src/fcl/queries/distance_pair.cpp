@@ -235,13 +235,17 @@ void searchMeshes(const DistanceQuery<S>& q, const TreeSide& a, const B& b, Mesh
 template <typename S>
 void searchPair(const DistanceQuery<S>& q) {
   tree::Tree& tree = treeOf(*asModel<S>(q.a()));
+  // FCL's managers pass the least distance so far: most of their pairs end here.
+  const auto known = static_cast<double>(q.result.min_distance);
   if (const Model<S>* other = asModel<S>(q.b())) {
+    if (areSurelyRigid(q.X_WA(), q.X_WB()) && areFarApart(tree, q.X_WA(), treeOf(*other), q.X_WB(), known)) return;
     const QueryScope scope(tree, treeOf(*other));
     searchMeshes(q, scope.a(), scope.b(), treeOf(*other));
   } else if (isBodies<S>(q.b())) {
     searchBodies(q, tree);
   } else {
     const BvhSide b = bvhSideOf<S>("distance", q.b());
+    if (areFarApart(tree, q.X_WA(), b, q.X_WB(), known)) return;
     const QueryScope scope(tree);
     searchMeshes(q, scope.a(), b, b);
   }

@@ -8,7 +8,9 @@
 #include <limits>
 
 #include "fcl/adapters/pair.h"
+#include "fcl/adapters/validate.h"
 #include "fcl/queries/ordered_pair.h"
+#include "query/cull/far_apart.h"
 #include "query/sides/side.h"
 #include "tree/tree.h"
 
@@ -25,6 +27,29 @@ void tryAtEnd(F&& f) {
 }
 inline void endQuery(const query::TreeSide& side) {
   tryAtEnd([&] { side.tree().afterQuery(side.now()); });
+}
+
+static_assert(kSurelyRigidError <= 2e-5, "what query::areFarApart() allows for");
+
+/// True if two models are surely farther apart than `margin`, so that nothing need be locked. For poses that are surely
+/// rigid. False where branches are due to be dropped, since only a query that holds the locks drops them, at its end.
+template <typename S>
+bool areFarApart(const tree::Tree& a, const fcl::Transform3<S>& X_WA, const tree::Tree& b,
+                 const fcl::Transform3<S>& X_WB, double margin) {
+  if (!query::areFarApart(a.outline(), X_WA.matrix().data(), b.outline(), X_WB.matrix().data(), margin)) return false;
+  if (!a.hasDecay() && !b.hasDecay()) return true;
+  // The system's clock need not be read twice.
+  const std::int64_t now_a = a.now(), now_b = a.options().clock || b.options().clock ? b.now() : now_a;
+  return !(a.hasDecay() && a.isPruneDue(now_a)) && !(b.hasDecay() && b.isPruneDue(now_b));
+}
+
+/// The same for a model and a BVHModel, and for any poses.
+template <typename S>
+bool areFarApart(const tree::Tree& a, const fcl::Transform3<S>& X_WA, const BvhSide& b, const fcl::Transform3<S>& X_WB,
+                 double margin) {
+  return areSurelyRigid(X_WA, X_WB) &&
+         query::areFarApart(a.outline(), X_WA.matrix().data(), b.outline(), X_WB.matrix().data(), margin) &&
+         !(a.hasDecay() && a.isPruneDue(a.now()));
 }
 
 /// The session of one query about one or two trees. While it lives, it holds their query locks shared, so nobody

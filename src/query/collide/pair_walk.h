@@ -441,12 +441,13 @@ class PairWalk {
   std::size_t steps_ = 0, most_steps_ = 0;
 };
 
-/// A walk over the blocks of one model or two and one over their oriented boxes in turns, until one ends; for a visitor
-/// that ends at the first hit. walk_blocks(most_steps) returns a WalkEnd.
+/// A walk over the blocks of one model or two and one over their oriented boxes in turns, until one ends: the visitor
+/// may see a pair in several turns. walk_blocks(most_steps) returns a WalkEnd.
 template <typename B, typename WalkBlocks>
 bool walkByTurns(const TreeSide& a, const B& b, const SimilarityTransform& b_in_a, Visitor& visitor,
                  const Turns::Limits& limits, WalkBlocks&& walk_blocks) {
-  for (Turns turns(a, b, tree::Tree::Search::kYesOrNo, limits);; turns.next()) {
+  const auto kind = visitor.endsAtFirst() ? tree::Tree::Search::kYesOrNo : tree::Tree::Search::kContacts;
+  for (Turns turns(a, b, kind, limits);; turns.next()) {
     const WalkEnd blocks = walk_blocks(turns.most());
     turns.tookOverBlocks(blocks.steps, blocks.gave_up);
     if (!blocks.gave_up) return blocks.met;

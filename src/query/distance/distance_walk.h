@@ -433,7 +433,7 @@ Nearest findNearest(const TreeSide& a, const B& b, const SimilarityTransform& b_
   DistanceWalk<TreeSide, B> trees(a, b, b_in_a);
   if (!fitsBoxes(a) || !fitsBoxes(b)) return trees.run(goal);
   Nearest nearest;
-  for (Turns turns(a, b, tree::Tree::Search::kDistance, {256, 1024, 1024, 4});; turns.next()) {
+  for (Turns turns(a, b, tree::Tree::Search::kDistance, {1024, 1024, 1024, 4});; turns.next()) {
     nearest = trees.run(goal, nearest, turns.most());
     turns.tookOverBlocks(trees.steps(), trees.gaveUp());
     if (!trees.gaveUp()) return nearest;

@@ -12,7 +12,8 @@ namespace bocst::query {
 /// How long a walk over the blocks of one model or two and one over their oriented boxes (BoxSide) take turns, until
 /// one ends. The first is usually quicker; but between two flat faces with little space between them, or of slivers,
 /// its volumes separate little. Each turn may take longer than the one before, so all take at most some times what the
-/// quicker way takes. What ended the last long search of each tree gets as many steps at once.
+/// quicker way takes. What ended the last long search of each tree gets as many steps at once; the blocks, which are
+/// always first, get no more time before boxes than these took.
 ///
 /// The boxes are built when walks have paid for them, as whole trees are.
 class Turns {
@@ -32,29 +33,21 @@ class Turns {
     const tree::Tree::LongSearch last[2] = {trees_[0]->longSearch(kind), second.longSearch(kind)};
     most_ = price == 0 ? limits.few : std::max(limits.many, price);
     if (last[0].over_boxes != last[1].over_boxes) return;
-    const std::size_t steps = 2 * std::size_t{std::min(last[0].steps, last[1].steps)};
+    const std::size_t steps = std::min(last[0].steps, last[1].steps);
     if (last[0].over_boxes != 0) {
-      most_over_boxes_ = steps;
-      if (price == 0 && kind == tree::Tree::Search::kYesOrNo && favourBoxes(a, b)) most_ = 0;
+      most_over_boxes_ = 2 * steps;
+      if (price == 0) most_ = limits.slower * steps;
     } else if (price == 0 && steps > 0) {
-      most_ = std::max(most_, steps);
+      most_ = std::max(most_, 2 * steps);
       follows_last_ = true;
     }
   }
 
-  /// A walk over boxes that is no longer than this.
-  static constexpr std::size_t kShort = 256;
-
-  /// True if the models have their boxes, and the last long yes-or-no walk of each ended soon, over boxes. Slivers are
-  /// like this: a single pair of their leaves takes longer than most walks over boxes.
+  /// True if boxes are built, or queries have paid for them.
   template <typename B>
-  static bool favourBoxes(const TreeSide& a, const B& b) {
-    const auto favours = [](const tree::Tree* tree) {
-      if (tree == nullptr) return true;
-      const tree::Tree::LongSearch last = tree->longSearch(tree::Tree::Search::kYesOrNo);
-      return tree->knownBoxes() != nullptr && last.over_boxes != 0 && last.steps <= kShort;
-    };
-    return favours(&a.tree()) && favours(treeOf(b));
+  static bool arePaid(const TreeSide& a, const B& b) {
+    const tree::Tree* const second = treeOf(b);
+    return a.tree().boxPrice() == 0 && (second == nullptr || second->boxPrice() == 0);
   }
 
   /// Of this turn.
