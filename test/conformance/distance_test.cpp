@@ -500,6 +500,30 @@ TEST(DistanceGrowth, OnlyWhatTheBoundNeedsAndNothingTwice) {
   EXPECT_EQ(ask<double>(a, I, a, Y).min_distance, ask<double>(a, I, b, Y).min_distance) << "one model on both sides";
 }
 
+// FCL's managers ask most pairs only whether they are nearer than the nearest so far.
+TEST(DistanceGrowth, NothingWhereBoundingBoxesAreFartherThanWhatIsKnown) {
+  const Raw raw = test::torus(100);
+  const Modeld a(raw.mesh()), b(raw.mesh());
+  const auto bvh = test::bvh<fcl::OBBRSSd>(raw);
+  const auto I = fcl::Transform3d(fcl::Transform3d::Identity());
+  const auto Y = test::pose<double>(Eigen::Matrix3d::Identity(), Eigen::Vector3d(5, 0.2, 0.1));
+  const fcl::CollisionGeometryd* ga = &a;
+  for (const fcl::CollisionGeometryd* gb : test::Geometries<double>{&b, bvh.get()}) {
+    fcl::DistanceResultd result;
+    result.min_distance = 1.5;  // 5 is 2.6 more than the diameter
+    EXPECT_EQ(fcl::distance(ga, I, gb, Y, fcl::DistanceRequestd(true), result), 1.5);
+    EXPECT_EQ(result.o1, nullptr);
+    EXPECT_EQ(a.statistics().resident_nodes, 1u);
+  }
+  const double exact = ask<double>(a, I, b, Y).min_distance;
+  for (const double more : {1e-9, 1e-3}) {
+    fcl::DistanceResultd result;
+    result.min_distance = exact + more;
+    EXPECT_NEAR(fcl::distance(ga, I, &b, Y, fcl::DistanceRequestd(true), result), exact, 1e-12);
+    EXPECT_EQ(result.o1, ga);
+  }
+}
+
 TEST(DistanceThreads, FreshModelsPruningAndCollisions) {
   const Raw raw = test::torus(60);
   std::mt19937_64 g(7);

@@ -143,7 +143,7 @@ TEST(FlatWork, OfAYesOrNoQueryIsBounded) {
   EXPECT_LT(sum, 2 * triangles) << "until oriented boxes are built, exact tests cost less than these";
   EXPECT_NE(a.tree.knownBoxes(), nullptr);
   EXPECT_NE(b.tree.knownBoxes(), nullptr);
-  EXPECT_LT(ask(true), 100u) << "from then on";
+  EXPECT_LT(ask(true), 200u) << "from then on, blocks get no more time before boxes than these took";
 }
 
 // A pipe whose triangles run from end to end: a leaf has few, and each pair of leaves takes long.
@@ -209,9 +209,7 @@ TEST(FlatWork, ContactsOfPipesComeOverBoxes) {
   ASSERT_NE(boxes(b), nullptr);
   for (const bool remembers : {false, true}) {
     SCOPED_TRACE(remembers);
-    if (remembers) test::touching<double>(a, I, b, poses[4]);
-    const query::TreeSide side_a(fcl_adapter::treeOf<double>(a)), side_b(fcl_adapter::treeOf<double>(b));
-    EXPECT_EQ(query::Turns::favourBoxes(side_a, side_b), remembers);
+    EXPECT_EQ(fcl_adapter::treeOf<double>(a).longSearch(tree::Tree::Search::kContacts).over_boxes == 1, remembers);
     for (std::size_t i = 0; i < poses.size(); ++i) {
       EXPECT_EQ(contacts(poses[i], 3), few[i]) << i;
       EXPECT_EQ(contacts(poses[i], 1000000), all[i]) << i;

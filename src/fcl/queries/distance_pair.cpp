@@ -170,13 +170,13 @@ void search(const DistanceQuery<S>& q, const TreeSide& a, const B& b, const Simi
   const lattice::Lattice& lattice = a.tree().surface().lattice;
   const query::DistanceGoal goal = goalOf(q, lattice.unit());
   const query::Nearest nearest = [&] {
+    if constexpr (std::is_same<B, TreeSide>::value || std::is_same<B, query::ConvexSide>::value) {
+      const std::optional<query::Nearest> touch = query::findTouch(a, b, b_in_a);
+      if (touch) return *touch;
+    }
     if constexpr (B::kBodies) {
       return query::DistanceWalk<TreeSide, B>(a, b, b_in_a).run(goal);
     } else {
-      if constexpr (std::is_same<B, TreeSide>::value) {
-        const std::optional<query::Nearest> touch = query::findTouch(a, b, b_in_a);
-        if (touch) return *touch;
-      }
       return query::findNearest(a, b, b_in_a, goal);
     }
   }();

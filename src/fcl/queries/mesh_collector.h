@@ -245,8 +245,10 @@ class MeshCollector : public query::Visitor {
 
   // Only the first pairs that touch, a given number of them, are wanted: adds this one if it is one so far.
   void addFirst(std::uint64_t key) {
+    const std::uint32_t of_model = q_.swapped ? second(key) : first(key);
+    if (margin_ > 0 && !s_.first.wants({order_.placeOf(of_model), key})) return;
     getCorners(&key, 1);
-    const RankedPair pair{placeOf(q_.swapped ? second(key) : first(key)), key};
+    const RankedPair pair{placeOf(of_model), key};
     // Most are not wanted, so only the others are remembered.
     if (!s_.first.wants(pair) || !s_.seen.insert(first(key), second(key)) || !decide(key, 0, nullptr)) return;
     s_.first.add(pair);

@@ -4,8 +4,10 @@
 #include <optional>
 
 #include "geometry/triangle.h"
+#include "query/collide/pair_walk.h"
 #include "query/collide/tree_walk.h"
 #include "query/distance/distance_walk.h"
+#include "query/sides/convex_side.h"
 
 namespace bocst::query {
 
@@ -40,6 +42,43 @@ inline std::optional<Nearest> findTouch(const TreeSide& a, const TreeSide& b, co
   if (walk.isNeedless()) return std::nullopt;
   Touch touch(a, b, b_in_a);
   if (!walk.run(touch, kMostLeafPairs).met) return std::nullopt;
+  return touch.found;
+}
+
+/// The same of a tree and a solid body.
+inline std::optional<Nearest> findTouch(const TreeSide& a, const ConvexSide& b, const SimilarityTransform& b_in_a) {
+  class Touch final : public ConvexVisitor<ConvexSide::Node> {
+   public:
+    Touch(const TreeSide& a, const ConvexSide& b, const SimilarityTransform& b_in_a)
+        : a_(a), b_(b), b_in_a_(b_in_a), a_in_b_(b_in_a.inverse()) {}
+
+    bool endsAtFirst() const override { return true; }
+    bool triangle(std::uint32_t t, const ConvexSide::Node& body) override {
+      const Corners corners = placed(a_.corners(t), a_in_b_);
+      const SeparationResult gap = b_.gap(body, {corners.data(), 3}, 0);
+      if (gap.distance != 0) return false;
+      found.a = t;
+      found.b = b_.id(body);
+      found.distance = 0;
+      found.on_a = found.on_b = b_in_a_ * gap.on_points;
+      return true;
+    }
+    bool cell(const CellLeaf&, const ConvexSide::Node&) override { return false; }
+
+    Nearest found;
+
+   private:
+    const TreeSide& a_;
+    const ConvexSide& b_;
+    const SimilarityTransform& b_in_a_;
+    const SimilarityTransform a_in_b_;
+  };
+  constexpr std::size_t kMostSteps = 64;
+  if (a.isConservative() || a.state(a.root()) == State::kGrows) return std::nullopt;
+  Touch touch(a, b, b_in_a);
+  if (!PairWalk<TreeSide, ConvexSide, ConvexVisitor<ConvexSide::Node>>(a, b, b_in_a, touch).run(kMostSteps).met) {
+    return std::nullopt;
+  }
   return touch.found;
 }
 

@@ -36,6 +36,7 @@ struct Pair {
 TEST(Turns, WalksPayForBoxes) {
   const Pair pair;
   const std::size_t price = pair.a.boxPrice() + pair.b.boxPrice();
+  EXPECT_FALSE(Turns::arePaid(pair.side_a, pair.side_b));
   EXPECT_EQ(pair.turns().most(), std::max(kLimits.many, price));
   pair.turns().tookOverBlocks(kLimits.many, true);
   EXPECT_EQ(pair.a.boxPrice() + pair.b.boxPrice(), price) << "a short walk pays nothing";
@@ -61,7 +62,7 @@ TEST(Turns, WhatEndedTheLastLongSearchGetsMore) {
   Pair pair;
   pair.buildBoxes();
   pair.turns().endedOverBoxes(5000);
-  EXPECT_EQ(pair.turns().most(), 64u);
+  EXPECT_EQ(pair.turns().most(), 20000u) << "as long as those boxes took";
   EXPECT_EQ(pair.turns().mostOverBoxes(), 10000u);
   EXPECT_EQ(pair.turns(Search::kYesOrNo).mostOverBoxes(), 2048u) << "of another kind";
 
@@ -73,7 +74,7 @@ TEST(Turns, WhatEndedTheLastLongSearchGetsMore) {
   Turns second = pair.turns();
   second.next();
   second.tookOverBlocks(900, true);
-  EXPECT_EQ(pair.turns().most(), 64u) << "that one gave up";
+  EXPECT_EQ(pair.turns().most(), 20000u) << "that one gave up";
   second.tookOverBlocks(7000, false);
   EXPECT_EQ(pair.turns().most(), 14000u);
   EXPECT_EQ(pair.turns().mostOverBoxes(), 3500u);
@@ -89,18 +90,17 @@ TEST(Turns, WhatEndedTheLastLongSearchGetsMore) {
   EXPECT_EQ(pair.turns().mostOverBoxes(), 8000u) << "the lesser of both";
 }
 
-// A part that rests on a large face: walks over boxes are then much longer than those over blocks, and may still end.
-TEST(Turns, OnlyShortWalksOverBoxesComeFirst) {
+// Parts that rested flat on one another are asked about in other poses, too: there boxes would take several times as
+// long as blocks.
+TEST(Turns, BlocksComeFirstHoweverShortTheLastWalkOverBoxes) {
   Pair pair;
   pair.buildBoxes();
-  const auto favours = [&] { return Turns::favourBoxes(pair.side_a, pair.side_b); };
-  EXPECT_FALSE(favours());
-  pair.turns(Search::kYesOrNo).endedOverBoxes(Turns::kShort);
-  EXPECT_TRUE(favours());
-  EXPECT_EQ(pair.turns(Search::kYesOrNo).most(), 0u);
-  pair.turns(Search::kYesOrNo).endedOverBoxes(Turns::kShort + 1);
-  EXPECT_FALSE(favours());
-  EXPECT_EQ(pair.turns(Search::kYesOrNo).most(), 64u);
+  EXPECT_TRUE(Turns::arePaid(pair.side_a, pair.side_b));
+  for (const Search kind : {Search::kYesOrNo, Search::kContacts, Search::kDistance}) {
+    pair.turns(kind).endedOverBoxes(10);
+    EXPECT_EQ(pair.turns(kind).most(), 40u) << "as long as those boxes took";
+    EXPECT_EQ(pair.turns(kind).mostOverBoxes(), 2048u);
+  }
 }
 
 TEST(Turns, BlocksGetNoMoreBeforeBoxesAreThere) {
