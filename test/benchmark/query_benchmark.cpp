@@ -135,7 +135,7 @@ void nearestOfLeaves(benchmark::State& state) {
   const Leaf a(g, 24, 0), b(g, 24, 3);
   static NearPair found[TrianglePack::kCapacity * TrianglePack::kCapacity];
   const float displacement[3] = {0, 0, 1};
-  for (auto _ : state) benchmark::DoNotOptimize(nearPairs(a.pack, b.pack, displacement, 5, found));
+  for (auto _ : state) benchmark::DoNotOptimize(nearPairs(a.pack, b.pack, displacement, 5, false, found));
 }
 BENCHMARK(nearestOfLeaves);
 

@@ -7,6 +7,7 @@
 #include <algorithm>
 #include <map>
 #include <numeric>
+#include <set>
 
 #include "every_target.h"
 #include "geometry/overlap_kernels.h"
@@ -1141,7 +1142,7 @@ TEST_P(EveryTarget, FramesOfCentersHoldThoseOfAllLeaves) {
 TEST_P(EveryTarget, NoPairIsLostThatIsNearest) {
   std::mt19937_64 g(22);
   std::uniform_real_distribution<double> u(-1, 1);
-  std::size_t nearer = 0, ties = 0, candidates = 0, pairs = 0, tight = 0;
+  std::size_t nearer = 0, ties = 0, others = 0, candidates = 0, pairs = 0, tight = 0;
   for (int round = 0; round < 600; ++round) {
     const double scale = std::pow(10.0, 6 * u(g));
     TrianglePack a, b;
@@ -1186,7 +1187,7 @@ TEST_P(EveryTarget, NoPairIsLostThatIsNearest) {
     const double factors[] = {0.5, 1, 1.0001, 2, std::numeric_limits<double>::infinity()};
     const auto cutoff = static_cast<float>(std::max(least, 1e-3 * scale) * factors[round % 5]);
     static NearPair found[TrianglePack::kCapacity * TrianglePack::kCapacity];
-    const std::size_t count = nearPairs(a, b, expected, cutoff, found);
+    const std::size_t count = nearPairs(a, b, expected, cutoff, false, found);
     std::map<std::pair<std::size_t, std::size_t>, double> bounds;
     for (std::size_t k = 0; k < count; ++k) bounds[{found[k].row, found[k].lane}] = found[k].at_least;
     ASSERT_EQ(bounds.size(), count);
@@ -1206,7 +1207,16 @@ TEST_P(EveryTarget, NoPairIsLostThatIsNearest) {
       ties += distances[k] != least;
       ASSERT_TRUE(bounds.count({k / b.count, k % b.count})) << "round " << round;
     }
+    const std::size_t all = nearPairs(a, b, expected, cutoff, true, found);
+    std::set<std::pair<std::size_t, std::size_t>> listed;
+    for (std::size_t k = 0; k < all; ++k) listed.insert({found[k].row, found[k].lane});
+    for (std::size_t k = 0; k < distances.size(); ++k) {
+      if (!(distances[k] < cutoff)) continue;
+      ASSERT_TRUE(listed.count({k / b.count, k % b.count})) << "round " << round;
+      others += distances[k] > least;
+    }
   }
+  EXPECT_GT(others, 400u) << "not the nearest, but near";
   EXPECT_GT(nearer, 400u);
   EXPECT_GT(ties, 3u);
   EXPECT_LT(candidates, pairs / 5) << "a filter that lets everything through proves nothing";

@@ -14,6 +14,7 @@
 #include "geometry/triangle.h"
 #include "query/ccd/hull_advance.h"
 #include "query/distance/best_first.h"
+#include "query/distance/near_triangles.h"
 #include "query/sides/box_side.h"
 #include "query/sides/side.h"
 #include "query/sides/visitor.h"
@@ -58,6 +59,7 @@ class ContactTimeWalk : private BestFirst<ContactTimeWalk<A, B>, A, B> {
     goal_ = goal;
     first_ = known;
     first_skipped_ = kNever;
+    if constexpr (!B::kBodies) scratch().near.clear();
     this->limitSteps(most_steps);
     at(begin);
     this->search();
@@ -78,6 +80,8 @@ class ContactTimeWalk : private BestFirst<ContactTimeWalk<A, B>, A, B> {
   // Two leaves' primitives are tested for the time in which the leaves move by this share of their sizes, but at least
   // for kLeastWindow of the motion.
   static constexpr double kShareOfLeaves = 0.25, kLeastWindow = 1e-6;
+  // Pairs of triangles that are apart by this share of the smaller leaf's size are not looked at one by one.
+  static constexpr double kShareOfSmaller = 1.0 / 32;
 
   static constexpr double kFar = std::numeric_limits<double>::infinity(), kNever = kFar;
 
@@ -95,11 +99,13 @@ class ContactTimeWalk : private BestFirst<ContactTimeWalk<A, B>, A, B> {
   struct Convex : SweptHull {
     typename B::Node node;
   };
+  struct Nothing {};
   using PrimitiveOfB = std::conditional_t<B::kBodies, Convex, Primitive>;
   struct Scratch : Base::Heap {
     std::vector<Primitive> a;
     std::vector<PrimitiveOfB> b;
     std::vector<Eigen::AlignedBox3d> boxes_a, boxes_b;
+    std::conditional_t<B::kBodies, Nothing, NearTriangles<A, B>> near;
   };
   static Scratch& scratch() { return thread::ofThread<Scratch>(); }
 
@@ -258,19 +264,17 @@ class ContactTimeWalk : private BestFirst<ContactTimeWalk<A, B>, A, B> {
   // The primitives of two leaves, for as long as these take to go a part of their size: most are too far from each
   // other for that. Then the pair waits for its next turn. A single pair is followed to the end.
   void leaves(const Pair& pair) {
+    if (triangles(pair)) return;
     Scratch& s = scratch();
     fill(a_, pair.a, s.a);
     fill(b_, pair.b, s.b);
     const Sphere a = boundsOf(s.a, a_in_world_, s.boxes_a), b = boundsOf(s.b, b_in_world_, s.boxes_b);
-    const double speed =
-        motion_a_.fastest(a.center, a.radius, pair.bound) + motion_b_.fastest(b.center, b.radius, pair.bound);
-    const double gap = std::max(0.0, (a.center - b.center).norm() - a.radius - b.radius);
+    const double speed = speedOf(a, b, pair.bound);
     const bool is_single = s.a.size() * s.b.size() == 1;
-    const double window =
-        is_single || !(speed > 0) ? 2 : std::max(kLeastWindow, (gap + kShareOfLeaves * (a.radius + b.radius)) / speed);
+    const double gap = std::max(0.0, (a.center - b.center).norm() - a.radius - b.radius);
+    const double window = is_single ? 2 : windowOf(gap + kShareOfLeaves * (a.radius + b.radius), speed);
     const double until = pair.bound + window;
-    const double near =
-        (window * speed + contactDistance()) * (1 + 1e-12) + 1e-15 * (a.center.norm() + b.center.norm());
+    const double near = reachOf(window, speed, a, b);
     for (std::size_t i = 0; i < s.a.size(); ++i) {
       for (std::size_t j = 0; j < s.b.size(); ++j) {
         if (s.boxes_a[i].squaredExteriorDistance(s.boxes_b[j]) > near * near) continue;
@@ -278,6 +282,60 @@ class ContactTimeWalk : private BestFirst<ContactTimeWalk<A, B>, A, B> {
       }
     }
     push({until, pair.a, pair.b});
+  }
+
+  // How fast points of two balls may close a gap from `time` on.
+  double speedOf(const Sphere& a, const Sphere& b, double time) const {
+    return motion_a_.fastest(a.center, a.radius, time) + motion_b_.fastest(b.center, b.radius, time);
+  }
+  static double windowOf(double way, double speed) { return speed > 0 ? std::max(kLeastWindow, way / speed) : 2; }
+  // What is farther apart does not touch within a window.
+  double reachOf(double window, double speed, const Sphere& a, const Sphere& b) const {
+    return (window * speed + contactDistance()) * (1 + 1e-12) + 1e-14 * (a.center.norm() + b.center.norm());
+  }
+
+  // The same for several triangles, of which those near each other are found in float; false where float cannot. The
+  // pair waits without a look at single triangles while all are apart by a part of the smaller leaf's size.
+  bool triangles(const Pair& pair) {
+    if constexpr (B::kBodies) {
+      return false;
+    } else {
+      if (spheres() || a_.triangleCount(pair.a) * b_.triangleCount(pair.b) == 1) return false;
+      const Sphere a = sphereOfA(pair.a), b = sphereOfB(pair.b);
+      const double speed = speedOf(a, b, pair.bound);
+      const SimilarityTransform world_in_a = a_in_world_.inverse();
+      SimilarityTransform b_in_a;
+      b_in_a.rotation = world_in_a.rotation * b_in_world_.rotation;
+      b_in_a.scale = world_in_a.scale * b_in_world_.scale;
+      b_in_a.translation = world_in_a * b_in_world_.translation;
+      b_in_a.ready();
+      // Beyond, squares of lengths may overflow in float.
+      constexpr double kMost = 1e15;
+      if (!(b_in_a.translation.norm() + 2 * lattice::kMiddle * (1 + b_in_a.scale) < kMost)) return false;
+      const Eigen::Vector3f along =
+          (a_in_world_.rotation.transpose() * (b.center - a.center).stableNormalized()).template cast<float>();
+      const float direction[3] = {along[0], along[1], along[2]};
+      NearTriangles<A, B>& near = scratch().near;
+      const auto& nearest = near.find(a_, pair.a, b_, pair.b, b_in_a, direction, kMost, false);
+      if (nearest.empty()) return false;
+      const double part = kShareOfSmaller * std::min(a.radius, b.radius);
+      const double free = nearest.front().at_least * a_in_world_.scale - reachOf(0, 0, a, b);
+      if (free > part) {
+        push({pair.bound + (speed > 0 ? free / speed * (1 - 1e-12) : 2), pair.a, pair.b});
+        return true;
+      }
+      const double window = windowOf(2 * std::max(free, 0.0) + part, speed), until = pair.bound + window;
+      Primitive p, q;
+      p.count = q.count = 3;
+      for (const auto& t : near.find(a_, pair.a, b_, pair.b, b_in_a, direction,
+                                     reachOf(window, speed, a, b) / a_in_world_.scale, true)) {
+        p.corners = a_.corners(t.a);
+        q.corners = b_.corners(t.b);
+        first_ = std::min(first_, firstContact(p, q, pair.bound, until));
+      }
+      push({until, pair.a, pair.b});
+      return true;
+    }
   }
 
   // Boxes of all bodies in the world, and a ball about these.

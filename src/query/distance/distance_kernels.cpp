@@ -345,7 +345,7 @@ HWY_INLINE NearestEdges nearestEdges(const Vec3 (&p)[3], const Vec3 (&e)[3], con
 }
 
 std::size_t NearPairs(const TrianglePack& rows, const TrianglePack& lanes, const float direction[3], float cutoff,
-                      NearPair* pairs) {
+                      bool all, NearPair* pairs) {
   const D d;
   const float size = (rows.size > lanes.size ? rows.size : lanes.size) * 1.0001f;
   const V rounding_margin = hn::Set(d, 32 * 0x1p-24f * size), zero = hn::Zero(d), tiny = hn::Set(d, 1e-12f);
@@ -388,9 +388,11 @@ std::size_t NearPairs(const TrianglePack& rows, const TrianglePack& lanes, const
       const unsigned bits = bitsOf(d, near);
       if (bits == 0) continue;
       // The edges are no farther apart than where they were found, so nothing farther is of interest any more.
-      const V least_square = hn::MinOfLanes(d, hn::IfThenElse(near, nearest.square, huge));
-      far = hn::Min(far, hn::MulAdd(hn::Sqrt(least_square), more, hn::Add(rounding_margin, rounding_margin)));
-      far_squared = hn::Mul(far, hn::Mul(far, more));
+      if (!all) {
+        const V least_square = hn::MinOfLanes(d, hn::IfThenElse(near, nearest.square, huge));
+        far = hn::Min(far, hn::MulAdd(hn::Sqrt(least_square), more, hn::Add(rounding_margin, rounding_margin)));
+        far_squared = hn::Mul(far, hn::Mul(far, more));
+      }
       alignas(64) float least[8];
       hn::Store(hn::Max(hn::Sub(hn::Mul(at_least, hn::Set(d, 1 - 16 * 0x1p-24f)), rounding_margin), zero), d, least);
       for (std::size_t k = 0; k < hn::Lanes(d); ++k) {
@@ -450,8 +452,8 @@ void triangleGaps(const PairFrames& geometry, const Frame& f, const TriangleBoun
 }
 
 std::size_t nearPairs(const TrianglePack& rows, const TrianglePack& lanes, const float direction[3], float cutoff,
-                      NearPair* pairs) {
-  return HWY_DYNAMIC_DISPATCH(NearPairs)(rows, lanes, direction, cutoff, pairs);
+                      bool all, NearPair* pairs) {
+  return HWY_DYNAMIC_DISPATCH(NearPairs)(rows, lanes, direction, cutoff, all, pairs);
 }
 
 }  // namespace bocst::query

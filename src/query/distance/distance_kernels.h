@@ -78,15 +78,15 @@ struct NearPair {
   std::uint8_t row, lane;
 };
 
-/// Writes the pairs (a triangle of rows, a triangle of lanes) that may be the nearest of all and less than `cutoff`
-/// apart, at most rows.count * lanes.count of them. Returns how many. `direction` is a unit vector from rows to lanes,
-/// where the nearest points are expected, or zero.
+/// Writes the pairs (a triangle of rows, a triangle of lanes) that may be less than `cutoff` apart, at most rows.count
+/// * lanes.count of them; unless `all` are wanted, only those that may be the nearest. Returns how many. `direction` is
+/// a unit vector from rows to lanes, where the nearest points are expected, or zero.
 ///
 /// A triangle pair is at least as far apart as along any direction: those of both normals and that between the nearest
 /// points of their edges, found by sloppy arithmetic, are looked at; one of them is exact but for rounding. Nine edge
 /// pairs find vertices too. With M the larger size of the packs and u = 2^-24, corners are off by u M and a corner's
 /// projection on a unit vector by 7 u M more: 18 u M for a gap; 32 u M is taken off.
 std::size_t nearPairs(const TrianglePack& rows, const TrianglePack& lanes, const float direction[3], float cutoff,
-                      NearPair* pairs);
+                      bool all, NearPair* pairs);
 
 }  // namespace bocst::query

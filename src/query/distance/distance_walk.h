@@ -333,7 +333,7 @@ class DistanceWalk : private BestFirst<DistanceWalk<A, B>, A, B> {
   void leafPairInFloat(const Pair& pair, Near& near) {
     const float direction[3] = {static_cast<float>(direction_[0]), static_cast<float>(direction_[1]),
                                 static_cast<float>(direction_[2])};
-    for (const auto& candidate : near.find(a_, pair.a, b_, pair.b, b_in_a_, direction, cutoff())) {
+    for (const auto& candidate : near.find(a_, pair.a, b_, pair.b, b_in_a_, direction, cutoff(), false)) {
       if (!worthIt(candidate.at_least)) break;
       triangles(candidate.a, candidate.b);
     }

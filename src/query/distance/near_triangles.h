@@ -13,8 +13,7 @@
 
 namespace bocst::query {
 
-/// Finds the pairs of triangles of two leaves that may be the nearest, eight at a time in float: of sides whose sizes
-/// and distance are fine for that, see PairFrames::isFine(). Kept by a thread.
+/// Finds the pairs of triangles of two leaves that may be near each other, eight at a time in float. Kept by a thread.
 template <typename A, typename B>
 class NearTriangles {
  public:
@@ -30,10 +29,12 @@ class NearTriangles {
     for (LeafCorners<B>& leaf : corners_b_) leaf.clear();
   }
 
-  /// The pairs that may be nearer than `cutoff`, that with the least bound first. `direction`: from side A to side B in
-  /// the frame of A, see nearPairs(). Valid until the next call.
+  /// The pairs that may be nearer than `cutoff`, that with the least bound first; unless `all` are wanted, only those
+  /// that may be the nearest. `direction`: from side A to side B in the frame of A, see nearPairs(). Valid until the
+  /// next call.
   const std::vector<Candidate>& find(const A& a, typename A::Node leaf_a, const B& b, typename B::Node leaf_b,
-                                     const SimilarityTransform& b_in_a, const float (&direction)[3], double cutoff) {
+                                     const SimilarityTransform& b_in_a, const float (&direction)[3], double cutoff,
+                                     bool all) {
     candidates_.clear();
     const Eigen::Vector3d center = centerOf(a, leaf_a);
     const PackTransform to_a = packTransform(a, SimilarityTransform(), center, 1),
@@ -48,7 +49,7 @@ class NearTriangles {
       for (std::size_t j = 0; j < count_b; j += TrianglePack::kCapacity) {
         corners_b.take(b, leaf_b, j);
         corners_b.place(to_b, packs_[1]);
-        const std::size_t found = nearPairs(packs_[0], packs_[1], direction, limit, found_);
+        const std::size_t found = nearPairs(packs_[0], packs_[1], direction, limit, all, found_);
         for (std::size_t k = 0; k < found; ++k) {
           const NearPair& p = found_[k];
           candidates_.push_back({p.at_least, corners_a.id(p.row), corners_b.id(p.lane)});
