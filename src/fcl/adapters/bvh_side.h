@@ -82,13 +82,11 @@ class BvhSide : public query::CompleteSide {
   static constexpr int kLeafTriangles = 8;
   static constexpr double kOutwards = 1 + 0x1p-22;  // what is rounded to float becomes no less
 
-  /// Leaves have at most `leaf_triangles`, which is 1 to kLeafTriangles.
   /// @throws std::invalid_argument when the model is no finished triangle mesh.
   template <typename BV>
-  BvhSide(const char* query, const fcl::BVHModel<BV>& bvh, int leaf_triangles = kLeafTriangles)
+  BvhSide(const char* query, const fcl::BVHModel<BV>& bvh)
       : nodes_(nodesOf(query, bvh)),
         node_size_(sizeof(fcl::BVNode<BV>)),
-        leaf_triangles_(leaf_triangles),
         volume_([](const fcl::BVNodeBase& node) { return volumeOf(static_cast<const fcl::BVNode<BV>&>(node).bv); }),
         pack_(&pack<BV>),
         triangles_(bvh.tri_indices),
@@ -249,7 +247,7 @@ class BvhSide : public query::CompleteSide {
   }
 
  private:
-  bool isLeaf(const fcl::BVNodeBase& node) const { return node.num_primitives <= leaf_triangles_; }
+  static bool isLeaf(const fcl::BVNodeBase& node) { return node.num_primitives <= kLeafTriangles; }
 
   /// Up to eight nodes that hold all triangles below another one, for tests in SIMD.
   struct Group {
@@ -355,7 +353,6 @@ class BvhSide : public query::CompleteSide {
 
   const char* nodes_;  // BVNode<BV> one after the other, of node_size_ bytes each
   std::size_t node_size_;
-  int leaf_triangles_;
   query::OrientedVolume (*volume_)(const fcl::BVNodeBase&);
   void (*pack_)(const BvhSide&, const query::OrientedVolume& parent, int count, Group& group);
   const fcl::Triangle* triangles_;

@@ -164,10 +164,9 @@ void withBvh(const char* query, const fcl::CollisionGeometry<S>* partner, F&& f)
 /// The partner of a model as a side of a walk, see BvhSide(). @throws std::invalid_argument when it is no finished
 /// BVHModel of triangles.
 template <typename S>
-BvhSide bvhSideOf(const char* query, const fcl::CollisionGeometry<S>* partner,
-                  int leaf_triangles = BvhSide::kLeafTriangles) {
+BvhSide bvhSideOf(const char* query, const fcl::CollisionGeometry<S>* partner) {
   std::optional<BvhSide> side;
-  withBvh<S>(query, partner, [&](const auto& bvh) { side.emplace(query, bvh, leaf_triangles); });
+  withBvh<S>(query, partner, [&](const auto& bvh) { side.emplace(query, bvh); });
   return *side;
 }
 

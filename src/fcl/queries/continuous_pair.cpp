@@ -116,8 +116,7 @@ std::optional<double> timeOfContact(const ContinuousQuery<S>& q, const Mesh* mes
   const QueryScope scope(tree);
   if (tree.surface().mesh.get() != mesh_a) return {};
   if (isBodies(q.b())) return walkConvex(q, scope.a(), margin);
-  // The primitives of two leaves are followed one pair after the other: here FCL's smallest nodes pay.
-  return walk(scope.a(), bvhSideOf<S>("continuousCollide", q.b(), 1), SimilarityTransform());
+  return walk(scope.a(), bvhSideOf<S>("continuousCollide", q.b()), SimilarityTransform());
 }
 
 template <typename S>
