@@ -142,7 +142,7 @@ class Tree {
 
   /// How the last long search of a kind ended: over oriented boxes or not, and after how many steps. A guess for the
   /// next one.
-  enum class Search { kYesOrNo, kContacts, kDistance };
+  enum class Search { kYesOrNo, kContacts, kDistance, kContactTime };
   struct LongSearch {
     std::uint32_t over_boxes = 0, steps = 0;
   };
@@ -340,7 +340,7 @@ class Tree {
   // Made under growth_, dropped alone.
   OnDemand<BoxTree> boxes_;      // rent: pairs of leaves
   OnDemand<Interior> interior_;  // rent: walks
-  mutable std::atomic<LongSearch> long_searches_[3] = {};
+  mutable std::atomic<LongSearch> long_searches_[4] = {};
   SupportTable supports_;
   // A query of two models that are far apart reads only the members up to next_prune_.
   Outline outline_;

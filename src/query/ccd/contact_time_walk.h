@@ -17,6 +17,7 @@
 #include "query/distance/near_triangles.h"
 #include "query/sides/box_side.h"
 #include "query/sides/side.h"
+#include "query/sides/turns.h"
 #include "query/sides/visitor.h"
 #include "thread/of_thread.h"
 
@@ -437,65 +438,42 @@ class ContactTimeWalk : private BestFirst<ContactTimeWalk<A, B>, A, B> {
   SimilarityTransform a_in_world_, b_in_world_, world_in_b_;  // at the time now_; the last for bodies only
 };
 
-/// When a tree and another side first touch. With exact answers, oriented boxes take a fifth of the steps: parts that
-/// slide past each other or land flat are apart along an axis of theirs. They are built when walks have paid for them.
+/// When a tree and another side first touch. With exact answers, walks over blocks and over oriented boxes take turns:
+/// parts that slide along each other are apart along an axis of such boxes.
 template <typename B>
 double findContactTime(const TreeSide& a, const SimilarityTransform& a_in_body, const Motion& motion_a, const B& b,
                        const SimilarityTransform& b_in_body, const Motion& motion_b, const ContactGoal& goal) {
-  constexpr std::size_t kFew = 32, kMany = 2048;
-  constexpr bool kTwoTrees = std::is_same<B, TreeSide>::value;
   ContactTimeWalk<TreeSide, B> trees(a, a_in_body, motion_a, b, b_in_body, motion_b);
-  std::size_t price = a.tree().boxPrice();
-  bool fits = BoxSide::fits(a);
-  if constexpr (kTwoTrees) {
-    price += b.tree().boxPrice();
-    fits = fits && BoxSide::fits(b);
-  }
-  if (!fits) return trees.run(goal);
+  if (!fitsBoxes(a) || !fitsBoxes(b)) return trees.run(goal);
   double time = std::numeric_limits<double>::infinity(), begin = 0;
-  bool gave_up = true;
-  const auto walkTrees = [&](std::size_t most) {
-    time = trees.run(goal, time, most, begin);
-    gave_up = trees.gaveUp();
-    const std::size_t rent = trees.steps() - std::min(trees.steps(), kMany);
-    a.tree().payBoxRent(rent);
-    if constexpr (kTwoTrees) b.tree().payBoxRent(rent);
-  };
-  const auto walkBoxes = [&](std::size_t most) {
-    const BoxSide boxes_a(a);
-    const auto walk = [&](auto&& boxes) {
-      time = boxes.run(goal, time, most, begin);
-      gave_up = boxes.gaveUp();
-    };
-    if constexpr (kTwoTrees) {
-      const BoxSide boxes_b(b);
-      walk(ContactTimeWalk<BoxSide, BoxSide>(boxes_a, a_in_body, motion_a, boxes_b, b_in_body, motion_b));
-    } else {
-      walk(ContactTimeWalk<BoxSide, B>(boxes_a, a_in_body, motion_a, b, b_in_body, motion_b));
-    }
-  };
-  if constexpr (kTwoTrees) {
+  if constexpr (std::is_same<B, TreeSide>::value) {
     // Bodies that pass each other usually do so with their hulls apart. To ask this many vertices takes about as long
     // as a step of a walk.
-    constexpr std::size_t kVerticesPerStep = 16, kMostVertices = 8192;
+    constexpr std::size_t kFew = 32, kVerticesPerStep = 16, kMostVertices = 8192;
     const std::shared_ptr<const Mesh>&mesh_a = a.tree().surface().mesh, &mesh_b = b.tree().surface().mesh;
     const bool are_here = mesh_a != nullptr && mesh_b != nullptr;
     const std::size_t vertices = are_here ? mesh_a->vertexCount() + mesh_b->vertexCount() : 0;
     if (are_here && vertices <= kMostVertices) {
-      const std::size_t steps = std::max(kFew, vertices / kVerticesPerStep);
-      walkTrees(price == 0 ? kFew : steps);
-      if (gave_up && price == 0) walkBoxes(steps);
-      if (!gave_up) return time;
+      time = trees.run(goal, time, std::max(kFew, vertices / kVerticesPerStep));
+      if (!trees.gaveUp()) return time;
       begin = hullsApartUntil(*mesh_a, motion_a, *mesh_b, motion_b, goal.margin + goal.rounding);
       if (begin > 1) return time;
     }
   }
-  if (gave_up) walkTrees(price == 0 ? kFew : kMany + price);
-  bool has_boxes = gave_up && BoxSide::build(a);
-  if constexpr (kTwoTrees) has_boxes = has_boxes && BoxSide::build(b);
-  if (has_boxes) walkBoxes(kNoLimit);
-  if (gave_up) walkTrees(kNoLimit);
-  return time;
+  for (Turns turns(a, b, tree::Tree::Search::kContactTime, {256, 2048, 256, 1});; turns.next()) {
+    time = trees.run(goal, time, turns.most(), begin);
+    turns.tookOverBlocks(trees.steps(), trees.gaveUp());
+    if (!trees.gaveUp()) return time;
+    if (!buildBoxes(a) || !buildBoxes(b)) return trees.run(goal, time, kNoLimit, begin);
+    const BoxSide boxes_a(a);
+    const auto& boxes_b = boxesOf(b);
+    ContactTimeWalk<BoxSide, std::decay_t<decltype(boxes_b)>> boxes(boxes_a, a_in_body, motion_a, boxes_b, b_in_body,
+                                                                    motion_b);
+    time = boxes.run(goal, time, turns.mostOverBoxes(), begin);
+    if (boxes.gaveUp()) continue;
+    turns.endedOverBoxes(boxes.steps());
+    return time;
+  }
 }
 
 }  // namespace bocst::query
