@@ -36,10 +36,10 @@ namespace bocst {
 ///
 /// **Order.** The reported contacts and their order depend only on meshes, poses and request, not on the resident
 /// nodes, the clock, the oracle or the thread. Contacts are sorted by (b1, b2). If there are more than a request asks
-/// for, a request with costs, or for more than 1024, gets those with the smallest (b1, b2). Other requests get, in less
-/// time, those with the smallest position along the mesh. In the frame of the model's mesh (o1's if both are models),
-/// with x the longest axis of its bounding box and y and z the two that follow (x, y, z, x, ...), the position of a
-/// point is x + 0.31 y + 0.23 z, and that of a contact
+/// for, a request with costs, or for more than 1024, gets those with the smallest (b1, b2). Other requests get those
+/// with the smallest position along the mesh, which takes less time if there are many more. In the frame of the model's
+/// mesh (o1's if both are models), with x the longest axis of its bounding box and y and z the two that follow (x, y, z,
+/// x, ...), the position of a point is x + 0.31 y + 0.23 z, and that of a contact
 /// - the smallest of the segment in which the two triangles intersect;
 /// - the largest of the corners of the model's triangle, if the triangles do not clearly intersect, with a margin, and
 ///   with shapes and octrees.
@@ -70,6 +70,8 @@ namespace bocst {
 /// is a pair of primitives at a distance <= m. With p1 and p2 the nearest points of P1 and P2:
 ///     apart:       n = (p2 - p1) / |p2 - p1|,   d = m - |p2 - p1|,   pos = (p1 + p2) / 2
 ///     overlapping: n and pos as without margin,  d = m + the depth without margin
+/// The number of contacts grows with the square of m / (size of a triangle), and so does the time of requests for
+/// contacts: for a clearance of more than some triangles use distance() or isCloserThan().
 ///
 /// **Solids** (Options::solid). If there is no contact between primitives, but one geometry (or a connected component
 /// or an occupied cell of it) is inside the other, there is one contact with Contact::NONE as b1 and b2. With p1 and p2

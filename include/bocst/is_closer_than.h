@@ -7,7 +7,7 @@
 namespace bocst {
 
 /// True if the distance between two geometries at the poses X_W1 and X_W2 (world from geometry) is at most `distance`,
-/// in the world's length unit. Stops once the answer is known, so it mostly takes far less time than fcl::distance. The
+/// in the world's length unit. Stops once the answer is known, so it mostly takes less time than fcl::distance. The
 /// answer is `fcl::distance(...) <= distance` up to rounding; 0 tests for contact. Solids and shapes include their
 /// inside.
 ///
