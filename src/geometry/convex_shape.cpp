@@ -500,7 +500,8 @@ SeparationResult PlaneShape::gap(const PointSet& points, double) const {
   gap.at_least = apart - kRounding * (gap.on_points.lpNorm<1>() + std::abs(height_));
   gap.distance = gap.isTouching() ? 0 : apart;
   if (gap.isTouching() && above + below < 0) {
-    gap.on_body = gap.on_points = low + (high - low) * (above / (above + below));
+    // Rounding may put both on one side.
+    gap.on_body = gap.on_points = low + (high - low) * std::clamp(above / (above + below), 0.0, 1.0);
   } else {
     gap.on_body = gap.on_points - normal_ * (normal_.dot(gap.on_points) - height_);
   }

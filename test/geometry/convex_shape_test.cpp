@@ -305,6 +305,29 @@ TEST(ConvexShape, TouchingExactlyIsTouching) {
   EXPECT_TRUE(plane.gap({flat, 3}, kFar).isTouching()) << "a triangle in the plane";
 }
 
+// Rounding may put all corners of a triangle in the plane on one side of it, by hardly different heights.
+TEST(ConvexShape, APlaneTouchesATriangleInItWhereTheTriangleIs) {
+  std::mt19937_64 g(12);
+  std::uniform_real_distribution<double> u(-1, 1);
+  int on_one_side = 0;
+  for (int i = 0; i < 20000; ++i) {
+    const Vector3d n = test::randomDirection(g), a = n.unitOrthogonal(), b = n.cross(a);
+    const double height = u(g);
+    Vector3d t[3];
+    for (Vector3d& x : t) x = height * n + u(g) * a + u(g) * b;
+    const PlaneShape plane(n, height, {Vector3d::Zero(), 9});
+    const SeparationResult gap = plane.gap({t, 3}, kFar);
+    ASSERT_TRUE(gap.isTouching());
+    const Eigen::AlignedBox3d box = Eigen::AlignedBox3d(t[0].cwiseMin(t[1]).cwiseMin(t[2]).array() - 1e-12,
+                                                        t[0].cwiseMax(t[1]).cwiseMax(t[2]).array() + 1e-12);
+    ASSERT_TRUE(box.contains(gap.on_points)) << i << ": " << gap.on_points.transpose();
+    int above = 0;
+    for (const Vector3d& x : t) above += n.dot(x) > height;
+    on_one_side += above == 0 || above == 3;
+  }
+  EXPECT_GT(on_one_side, 1000);
+}
+
 TEST(ConvexShape, PartingPartsAndIsLeastWhereItSaysSo) {
   std::mt19937_64 g(4);
   std::uniform_real_distribution<double> u(-1, 1);

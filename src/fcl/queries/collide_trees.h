@@ -54,7 +54,8 @@ void walkWithinMargin(const query::TreeSide& a, const B& b, const query::Similar
   if (!walk_blocks(most_steps).gave_up) return;
   // What the search computes is off by less than this; so are the lengths of the tolerance.
   constexpr double kRounding = 1e-12;
-  const double below = near.tolerance * (1 + kRounding) + kRounding * 2 * lattice::kMiddle * (1 + near.scale);
+  const double tolerance = near.margin + 2 * b_in_a.tolerance;  // of walks it may be larger, because of their slabs
+  const double below = tolerance * (1 + kRounding) + kRounding * 2 * lattice::kMiddle * (1 + near.scale);
   const query::Nearest nearest = query::findNearest(a, b, b_in_a, {below, kAnyWillDo, kAnyWillDo});
   if (!std::isfinite(nearest.distance)) return;
   // Else the distance and the margin are the same up to rounding.
