@@ -38,8 +38,8 @@ namespace bocst {
 /// nodes, the clock, the oracle or the thread. Contacts are sorted by (b1, b2). If there are more than a request asks
 /// for, a request with costs, or for more than 1024, gets those with the smallest (b1, b2). Other requests get those
 /// with the smallest position along the mesh, which takes less time if there are many more. In the frame of the model's
-/// mesh (o1's if both are models), with x the longest axis of its bounding box and y and z the two that follow (x, y, z,
-/// x, ...), the position of a point is x + 0.31 y + 0.23 z, and that of a contact
+/// mesh (o1's if both are models), with x the longest axis of its bounding box and y and z the two that follow (x, y,
+/// z, x, ...), the position of a point is x + 0.31 y + 0.23 z, and that of a contact
 /// - the smallest of the segment in which the two triangles intersect;
 /// - the largest of the corners of the model's triangle, if the triangles do not clearly intersect, with a margin, and
 ///   with shapes and octrees.
