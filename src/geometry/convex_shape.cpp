@@ -281,6 +281,11 @@ SeparationResult SupportShape::gap(const PointSet& points, double cutoff) const 
   return gap;
 }
 
+double SupportShape::gapAlong(const Vector3d& direction, const PointSet& points) const {
+  const Vector3d p = support(direction), &q = points.support(-direction);
+  return direction.dot(q - p) - kRounding * (p.lpNorm<1>() + q.lpNorm<1>()) - radius_;
+}
+
 ContactPoint SupportShape::penetration(const PointSet& points, const SeparationResult& gap) const {
   constexpr double kTolerance = 0.1;
   ContactPoint contact;

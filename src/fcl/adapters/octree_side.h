@@ -101,6 +101,10 @@ class OcTreeSide : public query::CompleteSide {
     gap.on_points += middle;
     return gap;
   }
+  double gapAlong(const Node& n, const Eigen::Vector3d& direction, const query::PointSet& points) const {
+    Eigen::Vector3d x[8];
+    return bodyOf(n).gapAlong(direction, about(center(n), points, x));
+  }
   query::ContactPoint penetration(const Node& n, const query::PointSet& points, query::SeparationResult gap) const {
     Eigen::Vector3d x[8];
     const Eigen::Vector3d middle = center(n);

@@ -21,6 +21,7 @@
 #include "fcl/queries/query_scope.h"
 #include "query/collide/pair_walk.h"
 #include "query/leaf/pair_set.h"
+#include "query/sides/convex_side.h"
 #include "query/sides/visitor.h"
 #include "thread/of_thread.h"
 
@@ -164,9 +165,9 @@ class ConvexCollector final : public query::ConvexVisitor<typename Partner::Node
   }
 
   // True if a triangle touches a body. Sets the gap between them.
-  bool touches(std::uint32_t t, const Eigen::Vector3d* corners, const Node& b, query::SeparationResult& gap) const {
+  bool touches(std::uint32_t t, const Eigen::Vector3d* corners, const Node& b, query::SeparationResult& gap) {
     const double near = std::max(tolerance_, q_.margin);
-    gap = partner_.gap(b, {corners, 3}, near);
+    gap = gaps_.gap(partner_, b, {corners, 3}, near);
     if (gap.at_least > near) return false;
     if (gap.isTouching() || gap.at_least <= q_.margin) return true;
     if (q_.is_distance) return false;
@@ -285,6 +286,7 @@ class ConvexCollector final : public query::ConvexVisitor<typename Partner::Node
   const bool costs_, ends_at_first_, is_cut_;
   Scratch& s_;
   query::Cut cut_;
+  query::GapFinder gaps_;
 };
 
 /// The collision of a model, side A, and the bodies of a partner: with_partner(frame, costs, f) makes the partner's
@@ -319,12 +321,24 @@ void collideConvex(const CollideQuery<S>& q, tree::Tree& tree, const NarrowPhase
   if (q.occupied() || request.enable_cost) {
     with_collector(request.enable_cost, [&](const auto& partner, auto& collector) {
       using Partner = std::remove_cv_t<std::remove_reference_t<decltype(partner)>>;
-      using Visitor = query::ConvexVisitor<typename Partner::Node>;
       // What is farther away than can be computed with touches nothing.
       if (isOutOfSight(partner)) return;
       const query::SimilarityTransform b_in_a =
           frame.toLattice(surface.lattice, collector.tolerance(a.isConservative()));
-      query::PairWalk<query::TreeSide, Partner, Visitor>(a, partner, b_in_a, collector).run();
+      const auto walk_blocks = [&](std::size_t most) {
+        return query::PairWalk<query::TreeSide, Partner>(a, partner, b_in_a, collector).run(most);
+      };
+      // Boxes as in TreesCollision.
+      if constexpr (std::is_same_v<S, double> && std::is_base_of_v<query::ConvexSide, Partner>) {
+        if (query::fitsBoxes(a) && (collector.endsAtFirst() || query::Turns::arePaid(a, partner))) {
+          constexpr query::Turns::Limits kLimits = {128, 1024, 256, 1};
+          query::walkByTurns(a, partner, b_in_a, collector, kLimits, walk_blocks);
+        } else {
+          walk_blocks(query::kNoLimit);
+        }
+      } else {
+        walk_blocks(query::kNoLimit);
+      }
       collector.finish(a.isConservative());
     });
   }

@@ -174,11 +174,7 @@ void search(const DistanceQuery<S>& q, const TreeSide& a, const B& b, const Simi
       const std::optional<query::Nearest> touch = query::findTouch(a, b, b_in_a);
       if (touch) return *touch;
     }
-    if constexpr (B::kBodies) {
-      return query::DistanceWalk<TreeSide, B>(a, b, b_in_a).run(goal);
-    } else {
-      return query::findNearest(a, b, b_in_a, goal);
-    }
+    return query::findNearest(a, b, b_in_a, goal);
   }();
   report(q, nearest, lattice.origin(), lattice.unit());
 }

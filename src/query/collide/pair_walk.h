@@ -13,6 +13,7 @@
 #include "log/assert.h"
 #include "query/collide/deferred_pairs.h"
 #include "query/leaf/leaf_pairs.h"
+#include "query/sides/convex_side.h"
 #include "query/sides/turns.h"
 #include "query/sides/visitor.h"
 #include "thread/of_thread.h"
@@ -28,10 +29,12 @@ namespace bocst::query {
 /// spheres, in double and on integer cells, so a conservative verdict does not depend on what is resident. Two such
 /// sides have SphereWalk; a tree with cells beside one with triangles has TreeWalk.
 ///
-/// Where leaves of side B are solid bodies (B::kBodies), the visitor V is a ConvexVisitor, and spheres meet the bodies
+/// Where leaves of side B are solid bodies (B::kBodies), the visitor is a ConvexVisitor, and spheres meet the bodies
 /// themselves.
-template <typename A, typename B, typename V = Visitor>
+template <typename A, typename B>
 class PairWalk {
+  using V = VisitorOf<B>;
+
  public:
   /// `b_in_a` places side B's frame in side A's. Scratch memory is kept by the thread between walks.
   PairWalk(const A& a, const B& b, const SimilarityTransform& b_in_a, V& visitor)
@@ -175,17 +178,19 @@ class PairWalk {
     }
   }
 
+  // True if a body is so round that much of the box about it is not of the body.
+  static bool isRound(const OrientedVolume& box) { return box.half.maxCoeff() < 2 * box.half.minCoeff(); }
+
   // True if the box of a node may meet the body itself, and not only the box about it.
   bool boxMeets(typename A::Node a, typename B::Node b) const {
-    if (b_.hasExactBox(b)) return true;
-    Eigen::Vector3d corners[8];
-    cornersOf(oriented(a_.volume(a)), a_in_b_, corners);
     const double tolerance = a_in_b_.tolerance + 4 * a_in_b_.orthogonality_error * a_in_b_.translation.norm();
-    return !(b_.gap(b, {corners, 8}, tolerance).at_least > tolerance);
+    return !(gapOnLine(b_, b, oriented(a_.volume(a)), a_in_b_) > tolerance);
   }
 
   // Beside a pair of nodes: as many pairs of triangles take as long, and the exact test of one that many.
   static constexpr std::size_t kTrianglePairs = 32, kExactTest = 8;
+  // So do as many triangles against a body's box.
+  static constexpr std::size_t kBodyTests = 4;
   // So do as many tests of eight lanes against a triangle.
   static constexpr std::size_t kTriangleTests = 4;
   // In a walk of so many steps, nodes beside a leaf so much larger, squared, are tested against each of its triangles.
@@ -222,8 +227,10 @@ class PairWalk {
           }
         }
         if constexpr (B::kBodies) {
-          a_.overlappingChildren(pair.a, volumeOf(b_, seen_b_), b_in_a_, [&](typename A::Node c) {
-            if (boxMeets(c, pair.b)) push(c);
+          auto& body = volumeOf(b_, seen_b_);
+          const bool is_round = !b_.hasExactBox(pair.b) && isRound(oriented(body));
+          a_.overlappingChildren(pair.a, body, b_in_a_, [&](typename A::Node c) {
+            if (!is_round || boxMeets(c, pair.b)) push(c);
           });
         } else {
           a_.overlappingChildren(pair.a, volumeOf(b_, seen_b_), b_in_a_, push);
@@ -293,8 +300,12 @@ class PairWalk {
   bool leafTriangles(const Pair& pair, Scratch& s) {
     if constexpr (B::kBodies) {
       const BodyBox box(oriented(volumeOf(b_, seen_b_)), b_in_a_);
-      for (const TriangleExtent& t : trianglesOf(pair.a, s)) {
-        if (!box.isApart(t) && visitor_.triangle(t.id, pair.b)) return true;
+      const std::vector<TriangleExtent>& triangles = trianglesOf(pair.a, s);
+      steps_ += triangles.size() / kBodyTests;
+      for (const TriangleExtent& t : triangles) {
+        if (box.isApart(t)) continue;
+        steps_ += kExactTest;
+        if (visitor_.triangle(t.id, pair.b)) return true;
       }
       return false;
     } else {
@@ -444,7 +455,7 @@ class PairWalk {
 /// A walk over the blocks of one model or two and one over their oriented boxes in turns, until one ends: the visitor
 /// may see a pair in several turns. walk_blocks(most_steps) returns a WalkEnd.
 template <typename B, typename WalkBlocks>
-bool walkByTurns(const TreeSide& a, const B& b, const SimilarityTransform& b_in_a, Visitor& visitor,
+bool walkByTurns(const TreeSide& a, const B& b, const SimilarityTransform& b_in_a, VisitorOf<B>& visitor,
                  const Turns::Limits& limits, WalkBlocks&& walk_blocks) {
   const auto kind = visitor.endsAtFirst() ? tree::Tree::Search::kYesOrNo : tree::Tree::Search::kContacts;
   for (Turns turns(a, b, kind, limits);; turns.next()) {
@@ -454,8 +465,8 @@ bool walkByTurns(const TreeSide& a, const B& b, const SimilarityTransform& b_in_
     if (!buildBoxes(a) || !buildBoxes(b)) return walk_blocks(kNoLimit).met;
     const BoxSide boxes_a(a);
     const auto& boxes_b = boxesOf(b);
-    const WalkEnd boxes = PairWalk<BoxSide, std::decay_t<decltype(boxes_b)>>(boxes_a, boxes_b, b_in_a, visitor)
-                              .run(turns.mostOverBoxes());
+    PairWalk<BoxSide, std::decay_t<decltype(boxes_b)>> walk_boxes(boxes_a, boxes_b, b_in_a, visitor);
+    const WalkEnd boxes = walk_boxes.run(turns.mostOverBoxes());
     if (boxes.gave_up) continue;
     turns.endedOverBoxes(boxes.steps);
     return boxes.met;

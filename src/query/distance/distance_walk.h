@@ -16,6 +16,7 @@
 #include "query/distance/best_first.h"
 #include "query/distance/near_triangles.h"
 #include "query/distance/node_gaps.h"
+#include "query/sides/convex_side.h"
 #include "query/sides/side.h"
 #include "query/sides/turns.h"
 #include "query/sides/visitor.h"
@@ -111,10 +112,14 @@ class DistanceWalk : private BestFirst<DistanceWalk<A, B>, A, B> {
         return false;
       }
     } else if constexpr (B::kBodies) {
-      if (b_.hasExactBox(pair.b)) return false;
-      Eigen::Vector3d corners[8];
-      cornersOf(oriented(a_.volume(pair.a)), a_in_b_, corners);
-      bound = b_.gap(pair.b, {corners, 8}, cutoff() * a_in_b_.scale).at_least * b_in_a_.scale;
+      const OrientedVolume box = oriented(a_.volume(pair.a));
+      if (steps() < kLongWalk || b_.hasExactBox(pair.b)) {
+        bound = gapOnLine(b_, pair.b, box, a_in_b_) * b_in_a_.scale;
+      } else {
+        Eigen::Vector3d corners[8];
+        cornersOf(box, a_in_b_, corners);
+        bound = body_gaps_.gap(b_, pair.b, {corners, 8}, cutoff() * a_in_b_.scale).at_least * b_in_a_.scale;
+      }
     } else {
       if (hasGaps()) return false;  // gapsOf() has seen to it
       const bool leaf_a = a_.state(pair.a) == State::kLeaf, leaf_b = b_.state(pair.b) == State::kLeaf;
@@ -277,7 +282,7 @@ class DistanceWalk : private BestFirst<DistanceWalk<A, B>, A, B> {
       const std::uint32_t t = triangles.ids[i];
       const Corners corners = placed(a_.corners(t), a_in_b_);
       const PointSet points{corners.data(), 3};
-      const SeparationResult gap = b_.gap(pair.b, points, cutoff() * a_in_b_.scale);
+      const SeparationResult gap = body_gaps_.gap(b_, pair.b, points, cutoff() * a_in_b_.scale);
       if (std::isfinite(gap.distance)) bodyFound(t, pair.b, gap, gap.on_points, 0);
     }
   }
@@ -412,6 +417,7 @@ class DistanceWalk : private BestFirst<DistanceWalk<A, B>, A, B> {
   static constexpr double kTieShare = 1e-3;     // of a distance: what is next to nothing is found as exactly as before
   static constexpr double kMuchLarger = 4 * 4;  // of two sizes squared: there the better bound of a leaf pays
   static constexpr double kManyTies = 1e4 * 1e4;  // of a size squared over a tie squared
+  static constexpr std::size_t kLongWalk = 64;    // steps, from which on the best bound beside a body pays
   static constexpr std::size_t kExactTest = 2;    // steps in the time that the distance of two triangles takes
 
   const SimilarityTransform& b_in_a_;
@@ -420,6 +426,7 @@ class DistanceWalk : private BestFirst<DistanceWalk<A, B>, A, B> {
   bool in_float_ = false;  // floats can tell the triangles of both sides apart
   DistanceGoal goal_;
   Nearest best_;
+  GapFinder body_gaps_;
   double limit_ = 0;  // something at least this near exists, or nobody asks for more
   double tie_ = 0;    // what is nearer by no more is as near
   Eigen::Vector3d direction_ =

@@ -76,7 +76,7 @@ inline std::optional<Nearest> findTouch(const TreeSide& a, const ConvexSide& b, 
   constexpr std::size_t kMostSteps = 64;
   if (a.isConservative() || a.state(a.root()) == State::kGrows) return std::nullopt;
   Touch touch(a, b, b_in_a);
-  if (!PairWalk<TreeSide, ConvexSide, ConvexVisitor<ConvexSide::Node>>(a, b, b_in_a, touch).run(kMostSteps).met) {
+  if (!PairWalk<TreeSide, ConvexSide>(a, b, b_in_a, touch).run(kMostSteps).met) {
     return std::nullopt;
   }
   return touch.found;

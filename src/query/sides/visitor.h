@@ -6,6 +6,7 @@
 #include <cstddef>
 #include <cstdint>
 #include <limits>
+#include <type_traits>
 
 #include "geometry/volume.h"
 
@@ -103,5 +104,9 @@ class ConvexVisitor {
   /// The sphere of a cell (frame of A) meets body b.
   virtual bool cell(const CellLeaf& a, const Node& b) = 0;
 };
+
+/// What a walk calls whose side B is of this class.
+template <typename B>
+using VisitorOf = std::conditional_t<B::kBodies, ConvexVisitor<typename B::Node>, Visitor>;
 
 }  // namespace bocst::query
