@@ -513,6 +513,11 @@ SeparationResult PlaneShape::gap(const PointSet& points, double) const {
   return gap;
 }
 
+double PlaneShape::gapAlong(const Vector3d& direction, const PointSet& points) const {
+  const SeparationResult gap = PlaneShape::gap(points, 0);
+  return direction == gap.normal ? gap.at_least : -kFar;
+}
+
 ContactPoint PlaneShape::penetration(const PointSet& points, const SeparationResult&) const {
   const Vector3d &low = points.support(-normal_), &high = is_half_space_ ? low : points.support(normal_);
   const double up = height_ - normal_.dot(low), down = is_half_space_ ? kFar : normal_.dot(high) - height_;

@@ -228,8 +228,8 @@ class PlaneShape : public ConvexShape {
 
   bool hasExactBox() const override { return true; }
   SeparationResult gap(const PointSet& points, double cutoff) const override;
-  /// Of two sides, that on which the points are.
-  double gapAlong(const Eigen::Vector3d&, const PointSet& points) const override { return gap(points, 0).at_least; }
+  /// Along any direction but those of its normal it is unbounded.
+  double gapAlong(const Eigen::Vector3d& direction, const PointSet& points) const override;
   ContactPoint penetration(const PointSet& points, const SeparationResult& gap) const override;
   std::optional<Eigen::Vector3d> point() const override { return std::nullopt; }
 

@@ -9,11 +9,14 @@
 
 #include <algorithm>
 #include <map>
+#include <set>
 
 #include "conformance/reference.h"
 #include "conformance/truth.h"
+#include "fcl/adapters/models.h"
 #include "sanitized.h"
 #include "thread_group.h"
+#include "tree/tree.h"
 
 namespace bocst {
 namespace {
@@ -589,6 +592,58 @@ TEST(ShapesFloat, PositionsOfContactsWithinAMarginAreFinite) {
     ASSERT_TRUE(result.getContact(0).pos.allFinite()) << i;
   }
   EXPECT_GT(contacts, test::repetitions(3000) / 2);
+}
+
+// A floor of slivers about one vertex: only oriented boxes part them, and queries pay for these.
+TEST(ShapesDouble, BesideSliversAreAskedOverOrientedBoxes) {
+  constexpr std::size_t kSlivers = 1500;
+  Raw raw;
+  raw.vertices.emplace_back(0, 0, 0);
+  for (std::size_t i = 0; i < kSlivers; ++i) {
+    const double angle = 2 * std::acos(-1.0) * static_cast<double>(i) / static_cast<double>(kSlivers);
+    raw.vertices.emplace_back(5 * std::cos(angle), 5 * std::sin(angle), 0);
+    raw.triangles.emplace_back(0, 1 + i, 1 + (i + 1) % kSlivers);
+  }
+  const Modeld model(raw.mesh());
+  const tree::Tree& tree = fcl_adapter::treeOf<double>(model);
+  const auto I = test::pose<double>(Eigen::Matrix3d::Identity(), {0, 0, 0});
+  for (const bool has_boxes : {false, true}) {
+    SCOPED_TRACE(has_boxes);
+    std::mt19937_64 g(7);
+    std::uniform_real_distribution<double> u(-1, 1);
+    ASSERT_EQ(tree.knownBoxes() != nullptr, has_boxes);
+    for (const test::NamedShape<double>& named : test::shapes<double>()) {
+      SCOPED_TRACE(named.name);
+      const Truth<double> truth(raw, *named.shape);
+      for (int i = 0; i < (has_boxes ? test::repetitions(12) : 1); ++i) {
+        const auto X = test::pose<double>(test::randomRotation(g), Vector3d(4 * u(g), 4 * u(g), 0.8 * u(g)));
+        const double distance = truth.distance(I, X);
+        fcl::CollisionResultd result, few, all;
+        EXPECT_EQ(fcl::collide(&model, I, named.shape.get(), X, fcl::CollisionRequestd(), result) > 0, distance == 0);
+        fcl::DistanceResultd nearest;
+        fcl::distance(&model, I, named.shape.get(), X, fcl::DistanceRequestd(), nearest);
+        ASSERT_NEAR(nearest.min_distance, distance, 1e-9) << i;
+        // Few contacts are some of all, whatever they were found over.
+        fcl::collide(&model, I, named.shape.get(), X, fcl::CollisionRequestd(1000000), all);
+        fcl::collide(named.shape.get(), X, &model, I, fcl::CollisionRequestd(3), few);
+        std::size_t touching = 0;
+        for (std::size_t t = 0; t < kSlivers; ++t) touching += truth.gap(t, I, X).isTouching();
+        EXPECT_EQ(all.numContacts(), touching) << i;
+        ASSERT_EQ(few.numContacts(), std::min<std::size_t>(3, touching)) << i;
+        std::set<std::intptr_t> of_all;
+        for (std::size_t c = 0; c < all.numContacts(); ++c) of_all.insert(all.getContact(c).b1);
+        EXPECT_EQ(of_all.size(), all.numContacts()) << "each once";
+        for (std::size_t c = 0; c < few.numContacts(); ++c) EXPECT_TRUE(of_all.count(few.getContact(c).b2) == 1);
+      }
+    }
+    if (has_boxes) break;
+    const fcl::Boxd rod(0.02, 0.02, 2);
+    for (int i = 0; i < 3000 && tree.knownBoxes() == nullptr; ++i) {
+      const auto X = test::pose<double>(test::randomRotation(g), Vector3d(4 * u(g), 4 * u(g), 1.5 * u(g)));
+      fcl::CollisionResultd result;
+      fcl::collide(&model, I, &rod, X, fcl::CollisionRequestd(), result);
+    }
+  }
 }
 
 TEST(ShapesDouble, ManagersAndObjects) {

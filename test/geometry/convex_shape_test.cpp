@@ -232,6 +232,31 @@ TEST(ConvexShape, GapsOfTrianglesAreProvedBothWays) {
   }
 }
 
+TEST(ConvexShape, GapsAlongADirectionAreNoMoreThanTheGap) {
+  std::mt19937_64 g(5);
+  std::uniform_real_distribution<double> u(-1, 1);
+  for (const Known& k : bodies()) {
+    SCOPED_TRACE(k.name);
+    int apart = 0;
+    for (int i = 0; i < 500; ++i) {
+      Vector3d t[3];
+      for (Vector3d& x : t) x = 2.5 * Vector3d(u(g), u(g), u(g));
+      const PointSet p{t, 3};
+      const SeparationResult gap = k.body->gap(p, kFar);
+      const Vector3d direction = Vector3d(u(g), u(g), u(g)).normalized();
+      const double height = k.height(direction), along = k.body->gapAlong(direction, p);
+      ASSERT_LE(along, gap.distance) << i;
+      if (gap.isTouching()) continue;
+      ++apart;
+      if (std::isfinite(height)) {
+        ASSERT_NEAR(along, lowest(direction, p) - height, 1e-9) << i;
+      }
+      ASSERT_NEAR(k.body->gapAlong(gap.normal, p), gap.at_least, 1e-9) << i;
+    }
+    EXPECT_GT(apart, 20);
+  }
+}
+
 TEST(ConvexShape, NearContactNothingThatTouchesIsApart) {
   std::mt19937_64 g(2);
   std::uniform_real_distribution<double> u(-1, 1);

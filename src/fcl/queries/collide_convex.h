@@ -331,8 +331,9 @@ void collideConvex(const CollideQuery<S>& q, tree::Tree& tree, const NarrowPhase
       // Boxes as in TreesCollision.
       if constexpr (std::is_same_v<S, double> && std::is_base_of_v<query::ConvexSide, Partner>) {
         if (query::fitsBoxes(a) && (collector.endsAtFirst() || query::Turns::arePaid(a, partner))) {
-          constexpr query::Turns::Limits kLimits = {128, 1024, 256, 1};
-          query::walkByTurns(a, partner, b_in_a, collector, kLimits, walk_blocks);
+          constexpr query::Turns::Limits kLimits = {128, 1024, 256, 1}, kLimitsOfContacts = {1024, 1024, 1024, 1};
+          query::walkByTurns(a, partner, b_in_a, collector, collector.endsAtFirst() ? kLimits : kLimitsOfContacts,
+                             walk_blocks);
         } else {
           walk_blocks(query::kNoLimit);
         }

@@ -51,7 +51,7 @@ class ConvexSide : public CompleteSide {
 };
 
 /// How far a body surely is from a box, placed in the frame of the bodies by `to`, along one line between them: exact
-/// for balls, and a tenth of the time that gap() of its corners takes.
+/// for balls, and a tenth of the time that gap() of its corners takes. Not positive where it finds no such line.
 template <typename Bodies>
 double gapOnLine(const Bodies& bodies, const typename Bodies::Node& body, const OrientedVolume& box,
                  const SimilarityTransform& to) {
@@ -66,7 +66,11 @@ double gapOnLine(const Bodies& bodies, const typename Bodies::Node& body, const 
   const Eigen::Vector3d from =
       about.center + about.axes * clamped(about.axes.transpose() * (center - about.center), core);
   const Eigen::Vector3d in_box = axes.transpose() * (from - center);
-  const Eigen::Vector3d direction = (axes * (clamped(in_box, half) - in_box)).normalized();
+  Eigen::Vector3d direction = axes * (clamped(in_box, half) - in_box);
+  const double length = direction.norm();
+  constexpr double kLeast = 1e-100;  // shorter ones cannot be made unit vectors
+  if (!(length > kLeast)) return 0;
+  direction /= length;
   const Eigen::Vector3d lowest =
       (direction.dot(center) - (direction.transpose() * axes).cwiseAbs().dot(half)) * direction;
   return bodies.gapAlong(body, direction, {&lowest, 1});
