@@ -417,7 +417,7 @@ class DistanceWalk : private BestFirst<DistanceWalk<A, B>, A, B> {
   static constexpr double kTieShare = 1e-3;     // of a distance: what is next to nothing is found as exactly as before
   static constexpr double kMuchLarger = 4 * 4;  // of two sizes squared: there the better bound of a leaf pays
   static constexpr double kManyTies = 1e4 * 1e4;  // of a size squared over a tie squared
-  static constexpr std::size_t kLongWalk = 64;    // steps, from which on the best bound beside a body pays
+  static constexpr std::size_t kLongWalk = 8;     // steps, from which on the best bound beside a body pays
   static constexpr std::size_t kExactTest = 2;    // steps in the time that the distance of two triangles takes
 
   const SimilarityTransform& b_in_a_;
