@@ -17,6 +17,7 @@
 #include "query/collide/sphere_walk.h"
 #include "query/collide/tree_walk.h"
 #include "query/cull/crossing.h"
+#include "query/cull/far_apart.h"
 #include "query/distance/distance_walk.h"
 #include "query/sides/box_side.h"
 
@@ -135,7 +136,7 @@ class TreesCollision {
   bool walkTrees(Wanted wanted) {
     query::TreeWalk trees(a_, b_, near_);
     if (trees.isNeedless()) return false;
-    if (kUsesBoxes && query::knownBoxesApart(a_, b_, near_)) return false;
+    if (kUsesBoxes && (query::outlinesApart(a_, b_, near_) || query::knownBoxesApart(a_, b_, near_))) return false;
     if (isProved(wanted)) return true;
     const std::size_t before = q_.result.numContacts();
     std::size_t steps = 0;

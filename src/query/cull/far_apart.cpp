@@ -94,7 +94,39 @@ __attribute__((always_inline)) inline bool areFarApart(const TurnedBox& a, const
                    areApartByProducts<2>(along_a, a.half, cosines, b.half, least));
 }
 
+// In the frame of a side; false where float cannot hold it, or where it is being changed.
+bool outlineOf(const TreeSide& side, OrientedVolume& volume) {
+  return side.tree().outline().read([&](const tree::Outline::Reader& box) {
+    const Float4 center = box.center();
+    if (!(center[3] > 1e-30f)) return false;
+    const auto direction = [&box](std::size_t k) {
+      const Float4 axis = box.axis(k);
+      return Eigen::Vector3d(static_cast<double>(axis[0]), static_cast<double>(axis[1]), static_cast<double>(axis[2]));
+    };
+    // At right angles again, as they were before they were rounded to float.
+    const Eigen::Vector3d first = direction(0).normalized(), second = direction(1);
+    volume.axes.col(0) = first;
+    volume.axes.col(1) = (second - first.dot(second) * first).normalized();
+    volume.axes.col(2) = volume.axes.col(0).cross(volume.axes.col(1));
+    if (volume.axes.col(2).dot(direction(2)) < 0) volume.axes.col(2) *= -1;
+    for (int k = 0; k < 3; ++k) {
+      // The centre, the axes and the half sides were rounded.
+      volume.half[k] =
+          static_cast<double>(box.half(static_cast<std::size_t>(k))) + 0x1p-21 * static_cast<double>(center[3]);
+      volume.center[k] = static_cast<double>(center[k]);
+    }
+    volume.half *= side.inverseUnit();
+    volume.center = (volume.center - side.origin()) * side.inverseUnit();
+    return true;
+  });
+}
+
 }  // namespace
+
+bool outlinesApart(const TreeSide& a, const TreeSide& b, const SimilarityTransform& b_in_a) {
+  OrientedVolume of_a, of_b;
+  return outlineOf(a, of_a) && outlineOf(b, of_b) && boxesApart(of_a, of_b, b_in_a);
+}
 
 template <typename S>
 bool areFarApart(const tree::Outline& a, const S* X_WA, const tree::Outline& b, const S* X_WB, double margin) {

@@ -1,6 +1,8 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #pragma once
 
+#include "geometry/volume.h"
+#include "query/sides/side.h"
 #include "tree/outline.h"
 
 namespace bocst::query {
@@ -16,5 +18,9 @@ template <typename S>
 bool areFarApart(const tree::Outline& a, const S* X_WA, const tree::Outline& b, const S* X_WB, double margin);
 template <typename S>
 bool areFarApart(const tree::Outline& a, const S* X_WA, const tree::Outline::Box& b, const S* X_WB, double margin);
+
+/// True if the outlines of two models are surely apart, by boxesApart(). Of flat parts close to each other, which
+/// blocks separate only near their leaves, and which are not far apart: a gap counts beyond 1e-6 of all sizes.
+bool outlinesApart(const TreeSide& a, const TreeSide& b, const SimilarityTransform& b_in_a);
 
 }  // namespace bocst::query

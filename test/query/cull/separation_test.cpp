@@ -9,6 +9,7 @@
 #include <algorithm>
 #include <cmath>
 #include <limits>
+#include <memory>
 
 #include "conformance/reference.h"
 #include "every_target.h"
@@ -299,6 +300,79 @@ TEST(Outline, BoxesThatMeetAreNotFarApart) {
   }
   EXPECT_GE(far, expected);
   EXPECT_GT(expected, 6000);
+}
+
+/// A box about the origin whose corners and whose middles of faces are each in equally many triangles, so that the
+/// principal axes are those of the box.
+test::Raw evenBox(const Vector3d& half) {
+  test::Raw raw;
+  for (int i = 0; i < 8; ++i)
+    raw.vertices.push_back(half.cwiseProduct(Vector3d(i & 1, i >> 1 & 1, i >> 2) * 2 - Vector3d::Ones()));
+  for (int k = 0; k < 3; ++k) {
+    for (const int side : {0, 1}) {
+      const auto middle = static_cast<std::uint32_t>(raw.vertices.size());
+      raw.vertices.push_back(half[k] * (2 * side - 1) * Vector3d::Unit(k));
+      const std::uint32_t x = 1u << (k + 1) % 3, y = 1u << (k + 2) % 3, corner = static_cast<std::uint32_t>(side) << k;
+      const std::uint32_t round[5] = {corner, corner | x, corner | x | y, corner | y, corner};
+      for (int i = 0; i < 4; ++i) raw.triangles.emplace_back(round[i], round[i + 1], middle);
+    }
+  }
+  return raw;
+}
+
+// Two boxes face to face, turned and far from the origins of their frames, are apart where there is a little more
+// between them than what rounding the outlines to float takes away, and never where a corner is on the face.
+TEST(Outline, SeparatesFacesCloseToEachOther) {
+  std::mt19937_64 g(37);
+  std::uniform_real_distribution<double> u(-1, 1);
+  int close_turned = 0;  // of 190 or so
+  for (int round = 0; round < 300; ++round) {
+    const double exponent = 45 * u(g), length = round % 3 ? 1 : std::pow(10.0, exponent);
+    struct Part {
+      Eigen::Matrix3d axes;
+      Vector3d center, half;
+      double size;
+      std::unique_ptr<Side> side;
+    } parts[2];
+    for (Part& part : parts) {
+      part.axes = round % 4 == 0 ? Eigen::Matrix3d(Eigen::Matrix3d::Identity()) : test::randomRotation(g);
+      for (double& h : part.half) h = length * std::exp2(3 * u(g));
+      part.center = length * std::exp2(6 * u(g)) * test::randomDirection(g);
+      part.size = part.center.norm() + part.half.norm();
+      test::Raw raw = evenBox(part.half);
+      for (Vector3d& v : raw.vertices) v = part.center + part.axes * v;
+      part.side = std::make_unique<Side>(raw);
+    }
+    learnSupports(*parts[0].side, *parts[1].side);
+    const Part &a = parts[0], &b = parts[1];
+    const double size = a.size + b.size;
+    const auto found = [&](double gap, double margin) {
+      // Face k of a and face j of b, a corner of b above a corner of a or any other place.
+      const auto k = static_cast<Eigen::Index>(g() % 3), j = static_cast<Eigen::Index>(g() % 3);
+      const Eigen::Matrix3d R =
+          test::turnOnto(b.axes.col(j), -a.axes.col(k)) * Eigen::AngleAxisd(3 * u(g), b.axes.col(j)).toRotationMatrix();
+      Vector3d across = a.axes.col((k + 1) % 3) * a.half[(k + 1) % 3] * u(g);
+      if (round % 2)
+        across = a.axes.col((k + 1) % 3) * a.half[(k + 1) % 3] + a.axes.col((k + 2) % 3) * a.half[(k + 2) % 3];
+      Vector3d to = a.center + a.axes.col(k) * (a.half[k] + gap) + across;
+      Vector3d from = b.center + b.axes.col(j) * b.half[j];
+      if (round % 2)
+        from += b.axes.col((j + 1) % 3) * b.half[(j + 1) % 3] - b.axes.col((j + 2) % 3) * b.half[(j + 2) % 3];
+      const lattice::Lattice &of_a = a.side->tree.surface().lattice, &of_b = b.side->tree.surface().lattice;
+      const double scale = of_b.unit() / of_a.unit();
+      SimilarityTransform X = placement(R, scale, of_a.toLattice(to) - scale * (R * of_b.toLattice(from)));
+      X.tolerance = margin / of_a.unit();
+      return outlinesApart(TreeSide(a.side->tree), TreeSide(b.side->tree), X);
+    };
+    ASSERT_FALSE(found(-1e-14 * size, 0)) << round;
+    ASSERT_FALSE(found(0.1 * size, 0.1001 * size)) << round;
+    if (round % 3 == 0 && std::abs(exponent) > 25) continue;
+    close_turned += round % 4 != 0 && found(1e-5 * size, 0);
+    if (round % 4 == 0) {
+      ASSERT_TRUE(found(3e-6 * size, 0)) << round;
+    }
+  }
+  EXPECT_GT(close_turned, 170);
 }
 
 // Beside boxes whose distance is known: a direction between them is found where there is one of the fifteen.
