@@ -143,10 +143,9 @@ class Simplex {
   // True when the origin is inside, with its weights; else the nearest face.
   bool tetrahedron(Face& best) {
     static constexpr int kFaces[4][4] = {{0, 1, 2, 3}, {0, 3, 1, 2}, {0, 2, 3, 1}, {1, 3, 2, 0}};
-    constexpr double kClear = 1e3;  // volumes of so many times their rounding make good weights
     double size = 0, volume[4], sum = 0;
     for (const Vector3d& w : w_) size = std::max(size, w.lpNorm<1>());
-    bool is_within[4], is_inside = true, is_clear = true;
+    bool is_within[4], is_inside = true;
     for (int i = 0; i < 4; ++i) {
       const auto& f = kFaces[i];
       const Vector3d e = w_[f[1]] - w_[f[0]], d = w_[f[2]] - w_[f[0]], n = e.cross(d);
@@ -157,20 +156,15 @@ class Simplex {
       is_inside = is_inside && is_within[i];
       volume[f[3]] = std::abs(origin);
       sum += volume[f[3]];
-      is_clear = is_clear && volume[f[3]] > kClear * least;
     }
-    if (is_inside && is_clear) {
+    if (is_inside) {
       for (int i = 0; i < 4; ++i) weight_[i] = volume[i] / sum;
       return true;
     }
     for (int i = 0; i < 4; ++i) {
-      if (is_inside || !is_within[i]) best = nearer(best, triangle(kFaces[i][0], kFaces[i][1], kFaces[i][2]));
+      if (!is_within[i]) best = nearer(best, triangle(kFaces[i][0], kFaces[i][1], kFaces[i][2]));
     }
-    if (!is_inside) return false;
-    // The nearest face is as near as rounding.
-    std::fill(weight_, weight_ + 4, 0.0);
-    for (int i = 0; i < best.n; ++i) weight_[best.index[i]] = best.weight[i];
-    return true;
+    return false;
   }
 
   Vector3d w_[4], body_[4], points_[4], nearest_;

@@ -250,11 +250,35 @@ TEST(ConvexShape, GapsAlongADirectionAreNoMoreThanTheGap) {
       ++apart;
       if (std::isfinite(height)) {
         ASSERT_NEAR(along, lowest(direction, p) - height, 1e-9) << i;
+      } else {
+        ASSERT_EQ(along, -kFar) << i;
       }
       ASSERT_NEAR(k.body->gapAlong(gap.normal, p), gap.at_least, 1e-9) << i;
     }
     EXPECT_GT(apart, 20);
   }
+}
+
+// The simplex of such a triangle is all but flat.
+TEST(ConvexShape, TrianglesInTheFacesOfABoxTouchAtAPointOfBoth) {
+  std::mt19937_64 g(6);
+  std::uniform_real_distribution<double> u(-1, 1);
+  const Known box = bodies().front();
+  const Vector3d half = box.body->box().half;
+  int touching = 0;
+  for (int i = 0; i < 20000; ++i) {
+    const auto k = static_cast<Eigen::Index>(g() % 3);
+    Vector3d t[3];
+    for (Vector3d& x : t) {
+      x = 3 * Vector3d(u(g), u(g), u(g));
+      x[k] = (i % 2 ? 1 : -1) * half[k] + std::pow(10.0, -11 - 6 * std::abs(u(g))) * u(g);
+    }
+    if (!box.body->gap({t, 3}, kFar).isTouching()) continue;
+    ++touching;
+    checkGap(box, {t, 3}, 1e-11);
+    if (HasFatalFailure()) return;
+  }
+  EXPECT_GT(touching, 1000);
 }
 
 TEST(ConvexShape, NearContactNothingThatTouchesIsApart) {
@@ -276,7 +300,9 @@ TEST(ConvexShape, NearContactNothingThatTouchesIsApart) {
         }
         // What passes the tip of a cone need not meet it.
         if (k.shortest) {
-          ASSERT_TRUE(k.body->gap({in, 3}, kFar).isTouching()) << i << ' ' << beyond;
+          const SeparationResult found = k.body->gap({in, 3}, kFar);
+          ASSERT_TRUE(found.isTouching()) << i << ' ' << beyond;
+          ASSERT_LE(k.level(found.on_points), 1e-9) << i << ' ' << beyond;
         }
         const SeparationResult left = k.body->gap({out, 3}, kFar);
         ASSERT_NEAR(left.distance, beyond, 1e-8) << i;
