@@ -146,6 +146,21 @@ TEST(FlatWork, OfAYesOrNoQueryIsBounded) {
   EXPECT_LT(ask(true), 200u) << "from then on, blocks get no more time before boxes than these took";
 }
 
+TEST(FlatWork, OfFacesCloseToEachOtherNeedsNoTree) {
+  const Modeld a(plate(40).mesh()), b(plate(40).scale(0.7).mesh());
+  std::mt19937_64 g(3);
+  std::uniform_real_distribution<double> u(-1, 1);
+  for (int i = 0; i < 200; ++i) {
+    const fcl::Transform3d X_W1 = test::pose<double>(test::randomRotation(g), Vector3d(u(g), u(g), u(g)));
+    const fcl::Transform3d X_W2 = X_W1 * above<double>(1e-5 * std::pow(10, u(g)), 3 * u(g));
+    fcl::CollisionRequestd request;
+    fcl::CollisionResultd result;
+    ASSERT_EQ(fcl::collide<double>(&a, X_W1, &b, X_W2, request, result), 0u);
+  }
+  EXPECT_EQ(a.statistics().resident_nodes, 1u);
+  EXPECT_EQ(b.statistics().resident_nodes, 1u);
+}
+
 // A pipe whose triangles run from end to end: a leaf has few, and each pair of leaves takes long.
 Raw pipe(std::size_t sectors) {
   Raw raw;

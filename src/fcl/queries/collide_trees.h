@@ -136,7 +136,7 @@ class TreesCollision {
   bool walkTrees(Wanted wanted) {
     query::TreeWalk trees(a_, b_, near_);
     if (trees.isNeedless()) return false;
-    if (kUsesBoxes && (query::outlinesApart(a_, b_, near_) || query::knownBoxesApart(a_, b_, near_))) return false;
+    if (kUsesBoxes && boxesApart()) return false;
     if (isProved(wanted)) return true;
     const std::size_t before = q_.result.numContacts();
     std::size_t steps = 0;
@@ -212,6 +212,13 @@ class TreesCollision {
   }
 
   // Oriented boxes.
+
+  // True if the boxes about both surfaces are apart.
+  bool boxesApart() const {
+    return query::mayBeApart(a_.tree().outline(), q_.X_WA().matrix().data(), b_.tree().outline(),
+                             q_.X_WB().matrix().data()) &&
+           (query::outlinesApart(a_, b_, near_) || query::knownBoxesApart(a_, b_, near_));
+  }
 
   bool boxesFit() const { return query::BoxSide::fits(a_) && query::BoxSide::fits(b_); }
   void walkBoxes(MeshCollector<S>& collector) const {

@@ -58,40 +58,68 @@ simd::Int4 areApartByProducts(Float4 displacement, Float4 half_a, const Float4 (
   return distance - extent_a - extent_b > least;
 }
 
+/// Two turned boxes along their axes.
+struct Projections {
+  Float4 along_a, along_b;               // the displacement of the centres
+  Float4 cosines[3];                     // of the axes of a, a lane each, and axis j of b
+  Float4 sizes[3], transposed_sizes[3];  // of these cosines, and with the boxes changed over
+  float squared, length;                 // of the displacement
+
+  // Face axes: a gap along one of them is larger than `least`.
+  bool facesBeyond(const TurnedBox& a, const TurnedBox& b, Float4 least) const {
+    return simd::any((simd::abs(along_a) - a.half - product(sizes, b.half) > least) |
+                     (simd::abs(along_b) - b.half - product(transposed_sizes, a.half) > least));
+  }
+};
+
 // `translation` is that of b minus that of a.
-__attribute__((always_inline)) inline bool areFarApart(const TurnedBox& a, const TurnedBox& b, Float4 translation,
-                                                       float margin) {
+__attribute__((always_inline)) inline Projections project(const TurnedBox& a, const TurnedBox& b, Float4 translation) {
+  Projections p;
   const Float4 displacement = translation + b.center - a.center;
   const Float4 none = {0, 0, 0, 0};
   // Row c: coordinate c of each axis of a. So what is a sum over rows has a lane for each axis, and 0 in lane 3.
   Float4 rows_a[3] = {a.axes[0], a.axes[1], a.axes[2]}, rest = none;
   simd::transpose(rows_a[0], rows_a[1], rows_a[2], rest);
-  const Float4 along_a = product(rows_a, displacement);
-  const Float4 squares = along_a * along_a;
-  const float squared = squares[0] + squares[1] + squares[2];
-  // The square may vanish. Where it is infinite, so is the gap that is asked for.
-  if (!(squared > 1e-30f)) return false;
-  const float length = std::sqrt(squared);
-  const float gap = 1.001f * margin + 2e-4f * (length + 2 * (a.radius + b.radius));
-  const Float4 least = {gap, gap, gap, gap};
-
-  const Float4 cosines[3] = {product(rows_a, b.axes[0]), product(rows_a, b.axes[1]), product(rows_a, b.axes[2])};
-  Float4 transposed[3] = {cosines[0], cosines[1], cosines[2]};
+  p.along_a = product(rows_a, displacement);
+  const Float4 squares = p.along_a * p.along_a;
+  p.squared = squares[0] + squares[1] + squares[2];
+  p.length = std::sqrt(p.squared);
+  for (int j = 0; j < 3; ++j) p.cosines[j] = product(rows_a, b.axes[j]);
+  Float4 transposed[3] = {p.cosines[0], p.cosines[1], p.cosines[2]};
   rest = none;
   simd::transpose(transposed[0], transposed[1], transposed[2], rest);
-  const Float4 along_b = product(transposed, along_a);
-  const Float4 sizes[3] = {simd::abs(cosines[0]), simd::abs(cosines[1]), simd::abs(cosines[2])};
-  const Float4 transposed_sizes[3] = {simd::abs(transposed[0]), simd::abs(transposed[1]), simd::abs(transposed[2])};
-  const Float4 distance_a = simd::abs(along_a), distance_b = simd::abs(along_b);
-  if (simd::any((distance_a - a.half - product(sizes, b.half) > least) |
-                (distance_b - b.half - product(transposed_sizes, a.half) > least))) {
-    return true;
+  p.along_b = product(transposed, p.along_a);
+  for (int j = 0; j < 3; ++j) {
+    p.sizes[j] = simd::abs(p.cosines[j]);
+    p.transposed_sizes[j] = simd::abs(transposed[j]);
   }
-  const Float4 extents = distance_a * a.half + distance_b * b.half;
-  if (squared - extents[0] - extents[1] - extents[2] > gap * length) return true;
-  return simd::any(areApartByProducts<0>(along_a, a.half, cosines, b.half, least) |
-                   areApartByProducts<1>(along_a, a.half, cosines, b.half, least) |
-                   areApartByProducts<2>(along_a, a.half, cosines, b.half, least));
+  return p;
+}
+
+// What the numbers of areFarApart() may be off by.
+float slackOf(const Projections& p, const TurnedBox& a, const TurnedBox& b) {
+  return 2e-4f * (p.length + 2 * (a.radius + b.radius));
+}
+
+__attribute__((always_inline)) inline bool areFarApart(const TurnedBox& a, const TurnedBox& b, Float4 translation,
+                                                       float margin) {
+  const Projections p = project(a, b, translation);
+  // The square may vanish. Where it is infinite, so is the gap that is asked for.
+  if (!(p.squared > 1e-30f)) return false;
+  const float gap = 1.001f * margin + slackOf(p, a, b);
+  const Float4 least = {gap, gap, gap, gap};
+  if (p.facesBeyond(a, b, least)) return true;
+  const Float4 extents = simd::abs(p.along_a) * a.half + simd::abs(p.along_b) * b.half;
+  if (p.squared - extents[0] - extents[1] - extents[2] > gap * p.length) return true;
+  return simd::any(areApartByProducts<0>(p.along_a, a.half, p.cosines, b.half, least) |
+                   areApartByProducts<1>(p.along_a, a.half, p.cosines, b.half, least) |
+                   areApartByProducts<2>(p.along_a, a.half, p.cosines, b.half, least));
+}
+
+__attribute__((always_inline)) inline bool facesMayPart(const TurnedBox& a, const TurnedBox& b, Float4 translation) {
+  const Projections p = project(a, b, translation);
+  const float least = -slackOf(p, a, b);
+  return p.facesBeyond(a, b, Float4{least, least, least, least});
 }
 
 // In the frame of a side; false where float cannot hold it, or where it is being changed.
@@ -123,6 +151,16 @@ bool outlineOf(const TreeSide& side, OrientedVolume& volume) {
 
 }  // namespace
 
+template <typename S>
+bool mayBeApart(const tree::Outline& a, const S* X_WA, const tree::Outline& b, const S* X_WB) {
+  const Float4 translation = simd::loadDifference(X_WB + 12, X_WA + 12);
+  return a.read([&](const tree::Outline::Reader& box_a) {
+    return b.read([&](const tree::Outline::Reader& box_b) {
+      return facesMayPart(turn(box_a, X_WA), turn(box_b, X_WB), translation);
+    });
+  });
+}
+
 bool outlinesApart(const TreeSide& a, const TreeSide& b, const SimilarityTransform& b_in_a) {
   OrientedVolume of_a, of_b;
   return outlineOf(a, of_a) && outlineOf(b, of_b) && boxesApart(of_a, of_b, b_in_a);
@@ -147,6 +185,7 @@ bool areFarApart(const tree::Outline& a, const S* X_WA, const tree::Outline::Box
 }
 
 #define BOCST_INSTANTIATE(S)                                                                         \
+  template bool mayBeApart(const tree::Outline&, const S*, const tree::Outline&, const S*);          \
   template bool areFarApart(const tree::Outline&, const S*, const tree::Outline&, const S*, double); \
   template bool areFarApart(const tree::Outline&, const S*, const tree::Outline::Box&, const S*, double);
 BOCST_INSTANTIATE(float)
