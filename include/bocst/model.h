@@ -82,7 +82,8 @@ class BOCST_EXPORT Model : public fcl::CollisionGeometry<S> {
 
   // FCL's functions, for code that was written for fcl::BVHModel. They return fcl::BVH_OK, or FCL's code for a call out
   // of sequence. endModel() builds no tree. If nothing was added, it returns fcl::BVH_ERR_BUILD_EMPTY_MODEL and the
-  // model stays empty. It throws std::invalid_argument if Mesh() does. No query may run at the same time.
+  // model stays empty. It throws as Mesh() and setMesh() do, and the model is then empty. No query may run at the same
+  // time.
   int beginModel(int num_tris = 0, int num_vertices = 0);  ///< Drops the mesh that is there.
   int addVertex(const fcl::Vector3<S>& p);                 ///< In the mesh's frame.
   /// Adds three vertices and the triangle between them.
@@ -175,9 +176,11 @@ class BOCST_EXPORT Model : public fcl::CollisionGeometry<S> {
   fcl::Matrix3<S> computeMomentofInertia() const override;  ///< See computeVolume().
 
   // FCL's interface of a geometry.
-  /// Sets aabb_local to the mesh's bounds, enlarged by Options::margin, and the sphere about its centre around all
-  /// vertices (searched only once). The spheres of conservative answers reach beyond this box, so a broadphase manager
-  /// leaves out pairs that touch by these alone.
+  /// Sets aabb_local to the mesh's bounds, enlarged by Options::margin, and aabb_center and aabb_radius to the sphere
+  /// about the box's centre around all vertices (searched only once for each mesh). Constructors, setMesh() and
+  /// updateVertices() set them, too, but aabb_radius to the sphere around the whole box, which is found at once. As
+  /// with fcl::BVHModel, fcl::CollisionObject's constructor calls this. The spheres of conservative answers reach
+  /// beyond this box, so a broadphase manager leaves out pairs that touch by these alone.
   void computeLocalAABB() override;
   fcl::OBJECT_TYPE getObjectType() const override;  ///< OT_UNKNOWN: FCL never swaps the arguments.
   fcl::NODE_TYPE getNodeType() const override;      ///< GEOM_TRIANGLE: an empty row of FCL's tables.

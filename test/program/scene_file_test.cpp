@@ -328,7 +328,8 @@ TEST_F(SceneFile, SaysWhereAUrdfIsWrong) {
   complains(link("a") + "<link name='b'><visual><xacro:look/></visual></link>", {"line 3: <xacro:look> is a xacro"});
   complains("<link name='a'>\n</robot>", {"line 3", "no XML"});
   // What is not asked about may be wrong.
-  EXPECT_EQ(read(robot("<link name='a'><inertial><mass value='x'/></inertial><visual><geometry><capsule/></geometry>"
+  EXPECT_EQ(read(robot("<material name='m'><color rgba='red'/></material><material name='m'/>"
+                       "<link name='a'><inertial><mass value='x'/></inertial><visual><geometry><capsule/></geometry>"
                        "<material name='none'/></visual></link>"))
                 .links()
                 .size(),
@@ -546,6 +547,10 @@ TEST_F(SceneFile, AnSrdfDecidesWhichLinksAreChecked) {
   EXPECT_EQ(readScene(arguments).allowed, (Pairs{{1, 2}}));
   write("r.srdf", "<robot name='r'>\n\n<disable_collisions link1='c'/></robot>");
   expectComplaint([&] { readScene(arguments); }, {"r.srdf: line 3", "link2"});
+  write("r.srdf",
+        "<robot name='r'><group name='g'/><tool_center_points/>\n<disable_colisions link1='c' link2='a'/></robot>");
+  expectComplaint([&] { readScene(arguments); },
+                  {"r.srdf: line 2: <robot> has no element <disable_colisions>. Did you mean disable_collisions?"});
   write("r.srdf", "<robot name='r'>\n<xacro:arm/></robot>");
   expectComplaint([&] { readScene(arguments); }, {"r.srdf: line 2", "run `xacro FILE > robot.srdf` first"});
   write("r.srdf", "<robot name='r'><group name='g'>\n<xacro:arm/></group></robot>");

@@ -4,7 +4,9 @@
 #include <algorithm>
 #include <optional>
 #include <stdexcept>
+#include <vector>
 
+#include "cli/suggest.h"
 #include "robot/xml_file.h"
 
 namespace bocst::program {
@@ -31,6 +33,7 @@ class SrdfReader {
       srdf_.warnings.push_back(xml_.place(xml_.root()) + ": the SRDF is of robot \"" + robot + "\", the URDF of \"" +
                                robot_.name() + "\"");
     }
+    refuseMisspelledNames();
     for (const pugi::xml_node& element : xml_.root().children("disable_default_collisions")) {
       const std::optional<std::size_t> link = linkOf(element, "link");
       if (link) srdf_.unchecked.push_back(*link);
@@ -48,6 +51,19 @@ class SrdfReader {
   }
 
  private:
+  // Other elements may be of any extension of SRDF.
+  void refuseMisspelledNames() const {
+    const std::vector<std::string> read = {"disable_collisions", "disable_default_collisions", "enable_collisions"};
+    constexpr std::size_t kMostWrongLetters = 3;
+    for (const pugi::xml_node& element : xml_.root().children()) {
+      const std::string name = element.name();
+      if (std::find(read.begin(), read.end(), name) != read.end()) continue;
+      const std::string near = suggestion(name, read, kMostWrongLetters);
+      if (!near.empty())
+        throw std::runtime_error(xml_.place(element) + ": <robot> has no element <" + name + ">." + near);
+    }
+  }
+
   std::optional<std::size_t> linkOf(const pugi::xml_node& element, const char* attribute) {
     const std::string name = withoutOuterBlanks(xml_.attribute(element, attribute));
     const auto& links = robot_.links();

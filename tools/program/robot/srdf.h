@@ -19,7 +19,8 @@ struct Srdf {
 };
 
 /// Reads <disable_collisions>, <disable_default_collisions> and <enable_collisions>; all else is skipped.
-/// @throws std::runtime_error that names the line; for a URDF and for what xacro has not expanded, too.
+/// @throws std::runtime_error that names the line; for a URDF, for what xacro has not expanded, and for names that are
+/// nearly those of these elements, too.
 Srdf readSrdf(const std::string& file, const Robot& robot);
 
 }  // namespace bocst::program

@@ -180,6 +180,8 @@ class UrdfReader {
   std::string withoutLooks() const {
     pugi::xml_document robot;
     robot.append_copy(xml_.root());
+    while (robot.document_element().remove_child("material")) {
+    }
     for (pugi::xml_node link : robot.document_element().children("link")) {
       for (const char* name : {"visual", "inertial"}) {
         while (link.remove_child(name)) {
