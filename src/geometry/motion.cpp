@@ -134,6 +134,85 @@ double SplineMotion::fastest(const Vector3d& center, double radius, double time)
   return straight + turn_ * ((center - onSpline(positions_, time)).norm() + radius);
 }
 
+RelativeMotion::RelativeMotion(const AxisMotion& a, const AxisMotion& b)
+    : velocity_(b.velocity() - a.velocity()),
+      velocity_b_(b.velocity()),
+      turn_a_(a.turn()),
+      turn_(b.turn() - a.turn()),
+      axis_b_(b.pointOfAxis()),
+      between_(b.pointOfAxis() - a.pointOfAxis()),
+      speeds_(a.velocity().norm() + b.velocity().norm()),
+      turns_(a.turn().norm() + b.turn().norm()) {}
+
+// With u from B's axis to a point of B, s from A's axis to B's, w = s', and the turns p of A and p + d of B, the
+// point's velocity as A sees it is w + d x u - p x s, and its acceleration (d x p) x u + d x (d x u) + p x (p x s) - 2
+// p x w. The length of u does not change, and s is linear in the time: what is affine in it is longest at an end.
+ClosingSpeed RelativeMotion::closingSpeed(const Vector3d& direction, double blur, const Vector3d& center, double radius,
+                                          double time) const {
+  const double ever = fastest(center, radius, time), distance = distanceToAxis(center, radius, time);
+  const Vector3d displacement = center - axis_b_ - time * velocity_b_;
+  const double now = direction.dot(shift(time) + turn_.cross(displacement)) + turn_.cross(direction).norm() * radius +
+                     blur * ever + rounding(distance, time);
+  const auto drawn = [this](double t) {
+    return (turn_a_.cross(turn_a_.cross(between(t))) - 2 * turn_a_.cross(velocity_)).norm();
+  };
+  const double change = (turn_.cross(turn_a_).norm() + turn_.squaredNorm()) * distance +
+                        std::max(drawn(time), drawn(1)) + turns_ * rounding(distance, time);
+  return {ever, now, change};
+}
+
+double RelativeMotion::fastest(const Vector3d& center, double radius, double time) const {
+  const double distance = distanceToAxis(center, radius, time);
+  return std::max(shift(time).norm(), shift(1).norm()) + turn_.norm() * distance + rounding(distance, time);
+}
+
+// What is left of velocities that nearly cancel may be this.
+double RelativeMotion::rounding(double distance, double time) const {
+  return 1e-13 * (speeds_ + turns_ * (distance + std::max(between(time).norm(), between(1).norm())));
+}
+
+MotionPair::MotionPair(const Motion& a, const Motion& b) : a_(a), b_(b) {
+  const auto *axis_a = dynamic_cast<const AxisMotion*>(&a), *axis_b = dynamic_cast<const AxisMotion*>(&b);
+  // Without a turn of both, what they do together is in the sum of their speeds along a direction already.
+  if (axis_a == nullptr || axis_b == nullptr || axis_a->turn().isZero(0) || axis_b->turn().isZero(0)) return;
+  relative_.emplace(*axis_a, *axis_b);
+}
+
+double MotionPair::timeToTouch(double gap, const Vector3d& direction, double blur, const MovingHull& part_a,
+                               const MovingHull& part_b, double time) const {
+  double highest = direction.dot(part_a.points[0]), lowest = direction.dot(part_b.points[0]), size = 0;
+  for (std::size_t i = 0; i < part_a.count; ++i) {
+    highest = std::max(highest, direction.dot(part_a.points[i]));
+    size = std::max(size, (part_a.points[i] - part_a.points[0]).norm());
+  }
+  for (std::size_t j = 0; j < part_b.count; ++j) {
+    lowest = std::min(lowest, direction.dot(part_b.points[j]));
+    size = std::max(size, (part_b.points[j] - part_b.points[0]).norm());
+  }
+  const double rounding = 2 * blur * size;
+  double in_world = std::numeric_limits<double>::infinity(), seen_from_a = in_world;
+  for (std::size_t j = 0; j < part_b.count; ++j) {
+    const Vector3d& q = part_b.points[j];
+    const double above = gap + std::max(0.0, direction.dot(q) - lowest - rounding);
+    const ClosingSpeed of_b = b_.closingSpeed(-direction, blur, q, 0, time);
+    for (std::size_t i = 0; i < part_a.count; ++i) {
+      const Vector3d& p = part_a.points[i];
+      const double free = above + std::max(0.0, highest - direction.dot(p) - rounding);
+      in_world = std::min(in_world, (a_.closingSpeed(direction, blur, p, 0, time) + of_b).timeFor(free));
+    }
+    if (relative_) {
+      seen_from_a = std::min(seen_from_a, relative_->closingSpeed(-direction, blur, q, 0, time).timeFor(above));
+    }
+  }
+  return relative_ ? std::max(in_world, seen_from_a) : in_world;
+}
+
+double MotionPair::fastest(const MovingBall& part_a, const MovingBall& part_b, double time) const {
+  const double in_world =
+      a_.fastest(part_a.center, part_a.radius, time) + b_.fastest(part_b.center, part_b.radius, time);
+  return relative_ ? std::min(in_world, relative_->fastest(part_b.center, part_b.radius, time)) : in_world;
+}
+
 AxisMotion translation(const Isometry3d& begin, const Isometry3d& end) {
   return {begin, end.translation() - begin.translation()};
 }

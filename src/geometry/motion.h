@@ -4,6 +4,8 @@
 #include <Eigen/Geometry>
 #include <algorithm>
 #include <array>
+#include <cstddef>
+#include <optional>
 
 namespace bocst::query {
 
@@ -39,16 +41,6 @@ class Motion {
   virtual double fastest(const Eigen::Vector3d& center, double radius, double time) const = 0;
 };
 
-/// Of the hull of some points (W): velocities are affine in position, so a hull's extremes are at its corners.
-inline ClosingSpeed closingSpeedOf(const Motion& motion, const Eigen::Vector3d* points, std::size_t count,
-                                   const Eigen::Vector3d& direction, double blur, double time) {
-  ClosingSpeed most = motion.closingSpeed(direction, blur, points[0], 0, time);
-  for (std::size_t i = 1; i < count; ++i) {
-    most = ClosingSpeed::most(most, motion.closingSpeed(direction, blur, points[i], 0, time));
-  }
-  return most;
-}
-
 /// A constant turn about an axis that moves with a constant velocity: FCL's translation, interpolation and screw.
 class AxisMotion final : public Motion {
  public:
@@ -63,6 +55,10 @@ class AxisMotion final : public Motion {
   ClosingSpeed closingSpeed(const Eigen::Vector3d& direction, double blur, const Eigen::Vector3d& center, double radius,
                             double time) const override;
   double fastest(const Eigen::Vector3d& center, double radius, double time) const override;
+
+  const Eigen::Vector3d& velocity() const { return velocity_; }
+  Eigen::Vector3d turn() const { return angle_ * axis_; }                      ///< The angular velocity.
+  Eigen::Vector3d pointOfAxis() const { return begin_.translation() - arm_; }  ///< At time 0.
 
  private:
   Eigen::Vector3d around(const Eigen::Vector3d& point, double time) const;
@@ -88,6 +84,93 @@ class SplineMotion final : public Motion {
   std::array<Eigen::Vector3d, 3> velocities_, turns_;  // whose convex hulls hold the first derivatives
   std::array<Eigen::Vector3d, 2> accelerations_;       // and the second
   double turn_ = 0, turn_change_ = 0;                  // the largest first and second derivative of a rotation
+};
+
+/// How a body B moves as a body A sees it, where both turn: what both do together changes no distance, so links that
+/// one joint turns stay apart as they are. Positions and directions are those in the world at the time of the question.
+class RelativeMotion {
+ public:
+  RelativeMotion(const AxisMotion& a, const AxisMotion& b);
+
+  /// As Motion::closingSpeed(), of a part of B towards A, along a direction that turns with A.
+  ClosingSpeed closingSpeed(const Eigen::Vector3d& direction, double blur, const Eigen::Vector3d& center, double radius,
+                            double time) const;
+  /// No distance between a point of A and a point of the ball of B ever changes faster.
+  double fastest(const Eigen::Vector3d& center, double radius, double time) const;
+
+ private:
+  Eigen::Vector3d between(double time) const { return between_ + time * velocity_; }
+  Eigen::Vector3d shift(double time) const { return velocity_ - turn_a_.cross(between(time)); }
+  double distanceToAxis(const Eigen::Vector3d& center, double radius, double time) const {
+    return (center - axis_b_ - time * velocity_b_).norm() + radius;
+  }
+  double rounding(double distance, double time) const;
+
+  Eigen::Vector3d velocity_, velocity_b_;  // of B's axis against that of A, and in the world
+  Eigen::Vector3d turn_a_, turn_;          // angular velocities: of A, and of B against A
+  Eigen::Vector3d axis_b_, between_;       // a point of B's axis at time 0; the way to it from one of A's
+  double speeds_, turns_;                  // sums of both
+};
+
+/// A part of a body that moves, in the world: a ball, or the hull of points. Velocities are affine in the position, so
+/// a hull's extremes are at its corners.
+struct MovingBall {
+  const Eigen::Vector3d& center;
+  double radius;
+  template <typename SpeedOf>
+  ClosingSpeed most(SpeedOf&& speed_of) const {
+    return speed_of(center, radius);
+  }
+};
+struct MovingHull {
+  const Eigen::Vector3d* points;
+  std::size_t count;
+  template <typename SpeedOf>
+  ClosingSpeed most(SpeedOf&& speed_of) const {
+    ClosingSpeed most = speed_of(points[0], 0.0);
+    for (std::size_t i = 1; i < count; ++i) most = ClosingSpeed::most(most, speed_of(points[i], 0.0));
+    return most;
+  }
+};
+
+/// Two bodies that move. It lives no longer than their motions.
+class MotionPair {
+ public:
+  MotionPair(const Motion& a, const Motion& b);
+
+  const Motion& a() const { return a_; }
+  const Motion& b() const { return b_; }
+
+  /// The least time in which a gap between two parts, along a unit direction from A to B that is off by at most `blur`,
+  /// may close.
+  template <typename PartA, typename PartB>
+  double timeToClose(double gap, const Eigen::Vector3d& direction, double blur, const PartA& part_a,
+                     const PartB& part_b, double time) const {
+    const auto of_a = [&](const Eigen::Vector3d& x, double radius) {
+      return a_.closingSpeed(direction, blur, x, radius, time);
+    };
+    const auto of_b = [&](const Eigen::Vector3d& x, double radius) {
+      return b_.closingSpeed(-direction, blur, x, radius, time);
+    };
+    const double in_world = (part_a.most(of_a) + part_b.most(of_b)).timeFor(gap);
+    if (!relative_) return in_world;
+    const auto seen_from_a = [&](const Eigen::Vector3d& x, double radius) {
+      return relative_->closingSpeed(-direction, blur, x, radius, time);
+    };
+    return std::max(in_world, part_b.most(seen_from_a).timeFor(gap));
+  }
+
+  /// The same of two hulls of few points, where `gap` is the one between the hulls themselves: points behind the
+  /// foremost ones have a longer way, however fast they are.
+  double timeToTouch(double gap, const Eigen::Vector3d& direction, double blur, const MovingHull& part_a,
+                     const MovingHull& part_b, double time) const;
+
+  /// No distance between points of two balls ever changes faster.
+  double fastest(const MovingBall& part_a, const MovingBall& part_b, double time) const;
+
+ private:
+  const Motion &a_, &b_;
+  std::optional<RelativeMotion> relative_;
 };
 
 /// The motions that FCL names, from a pose to a pose.

@@ -51,7 +51,7 @@ class ContactTimeWalk : private BestFirst<ContactTimeWalk<A, B>, A, B> {
   /// turning.
   ContactTimeWalk(const A& a, const SimilarityTransform& a_in_body, const Motion& motion_a, const B& b,
                   const SimilarityTransform& b_in_body, const Motion& motion_b)
-      : Base(a, b, scratch()), a_in_body_(a_in_body), b_in_body_(b_in_body), motion_a_(motion_a), motion_b_(motion_b) {}
+      : Base(a, b, scratch()), a_in_body_(a_in_body), b_in_body_(b_in_body), motions_(motion_a, motion_b) {}
 
   /// The time of the first contact, at most goal.time_error too early and never too late; infinite without contact.
   /// `known`: a time at which there is contact. After `most_steps` it gives up, and returns the first that it found.
@@ -139,20 +139,15 @@ class ContactTimeWalk : private BestFirst<ContactTimeWalk<A, B>, A, B> {
   void at(double time) {
     if (time == now_) return;
     now_ = time;
-    a_in_world_ = placed(a_in_body_, motion_a_, time);
-    b_in_world_ = placed(b_in_body_, motion_b_, time);
+    a_in_world_ = placed(a_in_body_, motions_.a(), time);
+    b_in_world_ = placed(b_in_body_, motions_.b(), time);
     if constexpr (B::kBodies) world_in_b_ = b_in_world_.inverse();
   }
 
-  // The time at which a gap along a direction, between what lies in two balls, may be closed.
-  double timeToClose(double gap, const Eigen::Vector3d& direction, const Eigen::Vector3d& center_a, double radius_a,
-                     const Eigen::Vector3d& center_b, double radius_b) const {
-    return advanced(gap, motion_a_.closingSpeed(direction, kBlur, center_a, radius_a, now_) +
-                             motion_b_.closingSpeed(-direction, kBlur, center_b, radius_b, now_));
-  }
-
-  double advanced(double gap, const ClosingSpeed& closing_speed) const {
-    return gap > 0 ? now_ + closing_speed.timeFor(gap) * (1 - 1e-12) : now_;
+  // The time at which a gap along a direction, between two parts, may be closed.
+  template <typename PartA, typename PartB>
+  double whenClosed(double gap, const Eigen::Vector3d& direction, double blur, const PartA& a, const PartB& b) const {
+    return gap > 0 ? now_ + motions_.timeToClose(gap, direction, blur, a, b, now_) * (1 - 1e-12) : now_;
   }
 
   double boundOf(const NodeExtent& a, const NodeExtent& b) {
@@ -169,7 +164,10 @@ class ContactTimeWalk : private BestFirst<ContactTimeWalk<A, B>, A, B> {
       a.along(direction, lo_a, hi_a);
       b.along(direction, lo_b, hi_b);
       const double gap = along + lo_b - hi_a - rounding_margin;
-      if (gap > 0) best = std::max(best, timeToClose(gap, direction, a.center, radius_a, b.center, radius_b));
+      if (gap > 0) {
+        best = std::max(
+            best, whenClosed(gap, direction, kBlur, MovingBall{a.center, radius_a}, MovingBall{b.center, radius_b}));
+      }
       return !worthIt(best);
     };
     anyDirectionApart(a, b, consider);
@@ -181,7 +179,7 @@ class ContactTimeWalk : private BestFirst<ContactTimeWalk<A, B>, A, B> {
     const Eigen::Vector3d t = b.center - a.center;
     const double apart = t.norm();
     const double gap = apart * (1 - kRounding) - (a.radius + b.radius) * (1 + kRounding) - clearance();
-    return gap > 0 ? timeToClose(gap, t / apart, a.center, 0, b.center, 0) : now_;
+    return gap > 0 ? whenClosed(gap, t / apart, kBlur, MovingBall{a.center, 0}, MovingBall{b.center, 0}) : now_;
   }
 
   // What lies in a ball and a node of bodies, apart by a gap of the ball's middle or of other points in it.
@@ -191,8 +189,8 @@ class ContactTimeWalk : private BestFirst<ContactTimeWalk<A, B>, A, B> {
     const double free = far * (1 - kRounding) - radius * (1 + kRounding) - clearance();
     if (!(free > 0)) return now_;
     const Eigen::Vector3d direction = -(b_in_world_.rotation * gap.normal);
-    return advanced(free, motion_a_.closingSpeed(direction, kBlur, ball.center, radius_of_turn, now_) +
-                              speedOf(motion_b_, inWorld(b, b_in_world_), -direction, kBlur, now_));
+    const Convex in_world = inWorld(b, b_in_world_);
+    return whenClosed(free, direction, kBlur, MovingBall{ball.center, radius_of_turn}, hullOf(in_world));
   }
 
   // Of bodies the ball would be a poor bound: they are asked themselves.
@@ -287,7 +285,7 @@ class ContactTimeWalk : private BestFirst<ContactTimeWalk<A, B>, A, B> {
 
   // How fast points of two balls may close a gap from `time` on.
   double speedOf(const Sphere& a, const Sphere& b, double time) const {
-    return motion_a_.fastest(a.center, a.radius, time) + motion_b_.fastest(b.center, b.radius, time);
+    return motions_.fastest({a.center, a.radius}, {b.center, b.radius}, time);
   }
   static double windowOf(double way, double speed) { return speed > 0 ? std::max(kLeastWindow, way / speed) : 2; }
   // What is farther apart does not touch within a window.
@@ -388,9 +386,8 @@ class ContactTimeWalk : private BestFirst<ContactTimeWalk<A, B>, A, B> {
   }
 
   template <typename T>
-  static ClosingSpeed speedOf(const Motion& motion, const T& primitive, const Eigen::Vector3d& direction, double blur,
-                              double time) {
-    return closingSpeedOf(motion, std::data(primitive.corners), primitive.count, direction, blur, time);
+  static MovingHull hullOf(const T& primitive) {
+    return {std::data(primitive.corners), primitive.count};
   }
 
   template <typename T>
@@ -408,6 +405,7 @@ class ContactTimeWalk : private BestFirst<ContactTimeWalk<A, B>, A, B> {
 
   // When two convex primitives that do not touch before `time` first do, if before `until`.
   double firstContact(const Primitive& p, const PrimitiveOfB& q, double time, double until) {
+    std::size_t short_steps = 0;
     while (time < until && worthIt(time)) {
       this->countSteps();
       at(time);
@@ -420,19 +418,28 @@ class ContactTimeWalk : private BestFirst<ContactTimeWalk<A, B>, A, B> {
       const double size = sizeOf(pw) + sizeOf(qw) + pw.corners[0].norm() + qw.corners[0].norm();
       const double blur = std::min(1.0, 8 * std::numeric_limits<double>::epsilon() * size / distance);
       // To half of what counts as contact, so that steps do not shrink for ever.
-      const double later =
-          advanced(distance - contactDistance() + goal_.rounding / 2,
-                   speedOf(motion_a_, pw, direction, blur, time) + speedOf(motion_b_, qw, -direction, blur, time));
+      const double gap = distance - contactDistance() + goal_.rounding / 2;
+      double later;
+      if constexpr (B::kBodies) {
+        later = whenClosed(gap, direction, blur, hullOf(pw), hullOf(qw));
+      } else {
+        later = now_ + motions_.timeToTouch(gap, direction, blur, hullOf(pw), hullOf(qw), now_) * (1 - 1e-12);
+      }
       if (!(later > time)) return time;
-      // Close to a contact: if it is certain to come soon, the rest of the way need not be gone.
-      if (later - time < tie() && time + tie() <= 1 && isContact(p, q, time + tie())) return time;
+      // Close to a contact: if it is certain to come soon, the rest of the way need not be gone. Where it does not
+      // come, it is asked ever less often.
+      if (later - time < tie() && time + tie() <= 1) {
+        const bool is_power = (short_steps & (short_steps - 1)) == 0;
+        ++short_steps;
+        if (is_power && isContact(p, q, time + tie())) return time;
+      }
       time = later;
     }
     return kNever;
   }
 
   const SimilarityTransform a_in_body_, b_in_body_;
-  const Motion &motion_a_, &motion_b_;
+  const MotionPair motions_;
   ContactGoal goal_;
   double now_ = -1, first_ = 0, first_skipped_ = 0;
   SimilarityTransform a_in_world_, b_in_world_, world_in_b_;  // at the time now_; the last for bodies only

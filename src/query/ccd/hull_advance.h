@@ -54,9 +54,10 @@ inline double hullsApartUntil(const Mesh& a, const Motion& motion_a, const Mesh&
     const double free = gap.at_least - kRounding * (farthest + 2 * size) - clearance;
     if (!(free > 0)) break;
     // gap.normal leads from B to A.
-    const ClosingSpeed speed = closingSpeedOf(motion_a, points_a.data(), points_a.size(), -gap.normal, kBlur, time) +
-                               closingSpeedOf(motion_b, points_b.data(), points_b.size(), gap.normal, kBlur, time);
-    time += speed.timeFor(free) * (1 - 1e-12);
+    time += MotionPair(motion_a, motion_b)
+                .timeToClose(free, -gap.normal, kBlur, MovingHull{points_a.data(), points_a.size()},
+                             MovingHull{points_b.data(), points_b.size()}, time) *
+            (1 - 1e-12);
   }
   return time;
 }
