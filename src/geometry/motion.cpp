@@ -190,18 +190,22 @@ double MotionPair::timeToTouch(double gap, const Vector3d& direction, double blu
     size = std::max(size, (part_b.points[j] - part_b.points[0]).norm());
   }
   const double rounding = 2 * blur * size;
+  ClosingSpeed of_a[kMostCorners];
+  double behind_a[kMostCorners];
+  for (std::size_t i = 0; i < part_a.count; ++i) {
+    of_a[i] = a_.closingSpeed(direction, blur, part_a.points[i], 0, time);
+    behind_a[i] = std::max(0.0, highest - direction.dot(part_a.points[i]) - rounding);
+  }
   double in_world = std::numeric_limits<double>::infinity(), seen_from_a = in_world;
   for (std::size_t j = 0; j < part_b.count; ++j) {
     const Vector3d& q = part_b.points[j];
-    const double above = gap + std::max(0.0, direction.dot(q) - lowest - rounding);
+    const double free = gap + std::max(0.0, direction.dot(q) - lowest - rounding);
     const ClosingSpeed of_b = b_.closingSpeed(-direction, blur, q, 0, time);
     for (std::size_t i = 0; i < part_a.count; ++i) {
-      const Vector3d& p = part_a.points[i];
-      const double free = above + std::max(0.0, highest - direction.dot(p) - rounding);
-      in_world = std::min(in_world, (a_.closingSpeed(direction, blur, p, 0, time) + of_b).timeFor(free));
+      in_world = std::min(in_world, (of_a[i] + of_b).timeFor(free + behind_a[i]));
     }
     if (relative_) {
-      seen_from_a = std::min(seen_from_a, relative_->closingSpeed(-direction, blur, q, 0, time).timeFor(above));
+      seen_from_a = std::min(seen_from_a, relative_->closingSpeed(-direction, blur, q, 0, time).timeFor(free));
     }
   }
   return relative_ ? std::max(in_world, seen_from_a) : in_world;

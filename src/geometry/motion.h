@@ -11,9 +11,9 @@ namespace bocst::query {
 
 /// How fast a part of a body comes nearer along a direction, from some time until 1. Negative: it recedes.
 struct ClosingSpeed {
-  double ever;    ///< No point of it is ever faster.
-  double now;     ///< Upper bound of the speed at that time.
-  double change;  ///< How much `now` may grow per unit of time.
+  double ever = 0;    ///< No point of it is ever faster.
+  double now = 0;     ///< Upper bound of the speed at that time.
+  double change = 0;  ///< How much `now` may grow per unit of time.
 
   ClosingSpeed operator+(const ClosingSpeed& o) const { return {ever + o.ever, now + o.now, change + o.change}; }
   /// What holds for two parts.
@@ -136,6 +136,8 @@ struct MovingHull {
 /// Two bodies that move. It lives no longer than their motions.
 class MotionPair {
  public:
+  static constexpr std::size_t kMostCorners = 3;
+
   MotionPair(const Motion& a, const Motion& b);
 
   const Motion& a() const { return a_; }
@@ -160,8 +162,8 @@ class MotionPair {
     return std::max(in_world, part_b.most(seen_from_a).timeFor(gap));
   }
 
-  /// The same of two hulls of few points, where `gap` is the one between the hulls themselves: points behind the
-  /// foremost ones have a longer way, however fast they are.
+  /// The same of two hulls of at most kMostCorners points, where `gap` is the one between the hulls themselves: points
+  /// behind the foremost ones have a longer way, however fast they are.
   double timeToTouch(double gap, const Eigen::Vector3d& direction, double blur, const MovingHull& part_a,
                      const MovingHull& part_b, double time) const;
 

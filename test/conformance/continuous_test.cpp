@@ -412,6 +412,54 @@ TEST(ContinuousDouble, SlidingAtASmallGapIsNoContact) {
   }
 }
 
+// Two links beyond one joint, and a third that a joint between them turns a little.
+TYPED_TEST(Continuous, NothingIsSteppedOverBetweenLinksThatTurnTogether) {
+  using S = TypeParam;
+  const Model<S> a(test::torus(14).mesh()), b(test::box({-0.4, -0.4, -0.2}, {0.4, 0.4, 0.2}).mesh());
+  std::mt19937_64 g(31);
+  std::uniform_real_distribution<double> u(-1, 1);
+  int hits = 0, misses = 0;
+  for (int i = 0; i < 300; ++i) {
+    const fcl::CCDMotionType type = kTypes[1 + i % 2];
+    const Eigen::Vector3d axis = test::randomDirection(g), at = 2 * test::randomDirection(g);
+    const auto joint = [](const Eigen::Vector3d& about, const Eigen::Vector3d& through, double angle) {
+      const Eigen::Matrix3d R = Eigen::AngleAxisd(angle, about).toRotationMatrix();
+      return test::pose<double>(R, through - R * through);
+    };
+    const fcl::Transform3d X = randomPose(g, 0.5), Y = randomPose(g, 1.9);
+    const fcl::Transform3d base = joint(axis, at, 1.5 * u(g));
+    const fcl::Transform3d beyond =
+        i % 3 == 0 ? identity<double>() : joint(test::randomDirection(g), Y.translation() / 2, 1.5 * u(g));
+    const fcl::Transform3d X_end = base * X, Y_end = base * beyond * Y;
+    const Ways<S> ways{&a, X.cast<S>(), X_end.cast<S>(), &b, Y.cast<S>(), Y_end.cast<S>()};
+    const Result<S> result = ways.ask(request<S>(type)), other = ways.swapped().ask(request<S>(type));
+    checkBySampling<S>(ways, a, b, type, 1e-4, result, 80);
+    if (testing::Test::HasFatalFailure()) return;
+    ASSERT_EQ(other.is_collide, result.is_collide) << i;
+    hits += result.is_collide && result.time_of_contact > 0;
+    misses += !result.is_collide;
+  }
+  EXPECT_GT(hits, 10);
+  EXPECT_GT(misses, 40);
+}
+
+// How near they may pass does not depend on where the origins of their meshes are.
+TEST(ContinuousDouble, MeshesFarFromTheirOriginsPassAsNear) {
+  for (const double far : {0.0, 1e2, 1e4}) {
+    Raw cube = test::box({-0.5, -0.5, -0.5}, {0.5, 0.5, 0.5});
+    for (Eigen::Vector3d& v : cube.vertices) v.x() += far;
+    const Modeld a(cube.mesh()), b(cube.mesh());
+    const auto at = [](double y, double gap) {
+      return test::pose<double>(Eigen::Matrix3d::Identity(), {0.3, y, 1 + gap});
+    };
+    const double gap = 2e-9 + 1e-12 * far;
+    const Ways<double> passing{&a, identity<double>(), identity<double>(), &b, at(-3, gap), at(3, gap)};
+    EXPECT_FALSE(passing.ask(request<double>(fcl::CCDM_TRANS)).is_collide) << far;
+    const Ways<double> scraping{&a, identity<double>(), identity<double>(), &b, at(-3, -gap), at(3, -gap)};
+    EXPECT_NEAR(scraping.ask(request<double>(fcl::CCDM_TRANS)).time_of_contact, 1.0 / 3, 1e-4) << far;
+  }
+}
+
 TEST(ContinuousDouble, TouchingAtTheBeginOrTheEnd) {
   const Modeld a(test::box({0, 0, 0}, {1, 1, 1}).mesh()), b(test::box({0, 0, 0}, {1, 1, 1}).mesh());
   const auto at = [](double x) { return test::pose<double>(Eigen::Matrix3d::Identity(), {x, 0.25, 0.125}); };
@@ -608,6 +656,46 @@ TYPED_TEST(Continuous, NoShapeIsSteppedOverOnRandomWays) {
     // A plane or a half-space is touched at the begin, mostly.
     EXPECT_GE(hits, name == "plane" || name == "half-space" ? 1 : rounds / 4);
   }
+}
+
+// A wheel's turn about its own axis changes nothing; one about another axis does.
+TYPED_TEST(Continuous, WheelsTurn) {
+  using S = TypeParam;
+  const Model<S> wall(test::torus(16).mesh());
+  const fcl::Capsule<S> capsule(S(0.2), S(0.5));
+  const fcl::Cylinder<S> cylinder(S(0.4), S(0.3));
+  const fcl::Cone<S> cone(S(0.4), S(0.5));
+  const fcl::Ellipsoid<S> along_z(S(0.4), S(0.4), S(0.2)), along_y(S(0.4), S(0.2), S(0.4)),
+      along_x(S(0.2), S(0.4), S(0.4));
+  const fcl::Box<S> box(S(0.4), S(0.3), S(0.5));
+  const Eigen::Vector3d x = Eigen::Vector3d::UnitX(), y = Eigen::Vector3d::UnitY(), z = Eigen::Vector3d::UnitZ();
+  const std::pair<const fcl::CollisionGeometry<S>*, Eigen::Vector3d> bodies[] = {
+      {&capsule, z}, {&cylinder, z}, {&cone, z}, {&along_z, z}, {&along_y, y}, {&along_x, x}, {&box, z}};
+  std::mt19937_64 g(41);
+  std::uniform_real_distribution<double> u(-1, 1);
+  int hits = 0;
+  for (const auto& [body, axis] : bodies) {
+    for (int i = 0; i < 36; ++i) {
+      const fcl::CCDMotionType type = i % 2 == 0 ? fcl::CCDM_LINEAR : fcl::CCDM_SCREW;
+      // About its own axis, one that is tilted, or one beside it.
+      Eigen::Vector3d about = axis;
+      if (i % 3 == 1) about = (about + 0.2 * test::randomDirection(g)).normalized();
+      const Eigen::Vector3d beside = i % 3 == 2 && type == fcl::CCDM_SCREW
+                                         ? Eigen::Vector3d(0.3 * test::randomDirection(g))
+                                         : Eigen::Vector3d::Zero();
+      const fcl::Transform3d begin = randomPose(g, 1.8);
+      const Eigen::Matrix3d turn = Eigen::AngleAxisd(2.5, about).toRotationMatrix();
+      fcl::Transform3d end = begin * test::pose<double>(turn, beside - turn * beside);
+      end.translation() += (type == fcl::CCDM_SCREW ? Eigen::Vector3d(begin.linear() * about * u(g))
+                                                    : Eigen::Vector3d(2.5 * test::randomDirection(g)));
+      const Ways<S> ways{&wall, identity<S>(), identity<S>(), body, begin.cast<S>(), end.cast<S>()};
+      const Result<S> result = ways.ask(request<S>(type));
+      checkBySampling<S>(ways, wall, *body, type, 1e-4, result, 60);
+      if (testing::Test::HasFatalFailure()) return;
+      hits += result.is_collide && result.time_of_contact > 0;
+    }
+  }
+  EXPECT_GT(hits, 20);
 }
 
 // A plane or a half-space that the tip of a long rod meets, far from the foot of its origin.

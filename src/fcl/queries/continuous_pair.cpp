@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #include <bocst/fcl.h>
+#include <fcl/geometry/shape/ellipsoid.h>
 
 #include <algorithm>
 #include <cmath>
@@ -37,20 +38,28 @@ SimilarityTransform inBody(const tree::Tree& tree) {
   return p;
 }
 
-/// What counts as a contact. size1, size2: the largest distance of each body's points from its origin.
+/// How large a body is: half the diagonal of a box about it, and the largest distance of its points from its origin.
+struct Size {
+  double half_diagonal, reach;
+};
+Size sizeOf(const TreeSide& side) { return {side.tree().surface().bounds.diagonal().norm() / 2, magnitudeOf(side)}; }
+Size sizeOf(const BvhSide& side) { return {side.volume(side.root()).half.norm(), magnitudeOf(side)}; }
+
+/// What counts as a contact.
 template <typename S>
-ContactGoal goalOf(const ContinuousQuery<S>& q, double size1, double size2, double margin) {
-  double largest = size1 + size2;
+ContactGoal goalOf(const ContinuousQuery<S>& q, const Size& size1, const Size& size2, double margin) {
+  const double reach = size1.reach + size2.reach;
+  double largest = reach;
   for (const Motion* m : {&q.X_W1, &q.X_W2}) {
     const Eigen::Vector3d p = m->at(0).translation();
-    largest = std::max(largest, p.norm() + m->fastest(p, size1 + size2, 0));
+    largest = std::max(largest, p.norm() + m->fastest(p, reach, 0));
   }
   ContactGoal goal;
   goal.margin = margin;
   // FCL's triangle test in S, and this walk's coordinates in the world; a billionth of the smaller body so that a pair
   // that passes at no distance at all does not take for ever.
-  goal.rounding = std::max(
-      {1e-9 * std::min(size1, size2), 1e-13 * largest, roundingOf<S>(largest), std::numeric_limits<double>::min()});
+  goal.rounding = std::max({1e-9 * std::min(size1.half_diagonal, size2.half_diagonal), 1e-13 * largest,
+                            roundingOf<S>(largest), std::numeric_limits<double>::min()});
   goal.time_error = static_cast<double>(q.request.toc_err);
   return goal;
 }
@@ -76,6 +85,41 @@ double toleranceOfCollide(const ContinuousQuery<S>& q, double model_size, double
   return roundingOf<S>(largest) + static_cast<double>(fcl::CollisionRequest<S>().gjk_tolerance);
 }
 
+/// The axis about which a shape may be turned without a change, in its frame; zero for other geometries.
+template <typename S>
+Eigen::Vector3d axisOfRevolution(const fcl::CollisionGeometry<S>& geometry) {
+  switch (geometry.getNodeType()) {
+    case fcl::GEOM_CAPSULE:
+    case fcl::GEOM_CONE:
+    case fcl::GEOM_CYLINDER:
+      return Eigen::Vector3d::UnitZ();
+    case fcl::GEOM_ELLIPSOID: {
+      const fcl::Vector3<S>& r = static_cast<const fcl::Ellipsoid<S>&>(geometry).radii;
+      for (int k = 0; k < 3; ++k) {
+        if (r[(k + 1) % 3] == r[(k + 2) % 3]) return Eigen::Vector3d::Unit(k);
+      }
+      return Eigen::Vector3d::Zero();
+    }
+    default:
+      return Eigen::Vector3d::Zero();
+  }
+}
+
+/// The motion of a body of revolution that turns about its own axis, as a wheel does, without that turn. Nothing for
+/// other bodies, and where the axes are apart by more than `tolerance`, in length units and as an angle.
+template <typename S>
+std::optional<query::AxisMotion> withoutSpin(const fcl::CollisionGeometry<S>& geometry, const Motion& motion,
+                                             double tolerance) {
+  const auto* const turning = dynamic_cast<const query::AxisMotion*>(&motion);
+  const Eigen::Vector3d own_axis = axisOfRevolution(geometry);
+  if (turning == nullptr || own_axis.isZero(0) || turning->turn().isZero(0)) return std::nullopt;
+  const Eigen::Isometry3d begin = motion.at(0);
+  const Eigen::Vector3d axis = turning->turn().normalized();
+  if (axis.cross(begin.linear() * own_axis).norm() > tolerance) return std::nullopt;
+  if (axis.cross(begin.translation() - turning->pointOfAxis()).norm() > tolerance) return std::nullopt;
+  return query::AxisMotion(begin, turning->velocity());
+}
+
 /// When a model and a shape or an octree first touch; see timeOfContact().
 template <typename S>
 double walkConvex(const ContinuousQuery<S>& q, const TreeSide& a, double margin) {
@@ -84,13 +128,15 @@ double walkConvex(const ContinuousQuery<S>& q, const TreeSide& a, double margin)
   double time = std::numeric_limits<double>::infinity();
   const auto run = [&](const auto& b) {
     const query::Sphere ball = b.sphere(b.root());
-    const double size = std::min(ball.center.norm() + ball.radius, region.radius);
-    query::ContactTimeWalk<TreeSide, std::decay_t<decltype(b)>> walk(a, inBody(a.tree()), q.X_WA(), b,
-                                                                     SimilarityTransform(), q.X_WB());
-    const double model_size = magnitudeOf(a);
+    const Size size{std::min(ball.radius, region.radius), std::min(ball.center.norm() + ball.radius, region.radius)};
+    const Size model_size = sizeOf(a);
     ContactGoal goal = goalOf(q, model_size, size, margin);
     // The walk stops between a half of it and all of it.
-    goal.rounding = std::max(goal.rounding, 2 * toleranceOfCollide(q, model_size, region.radius));
+    goal.rounding = std::max(goal.rounding, 2 * toleranceOfCollide(q, model_size.reach, region.radius));
+    const auto straight = withoutSpin<S>(*q.b(), q.X_WB(), 1e-3 * goal.rounding / (1 + size.reach));
+    const Motion& motion = straight ? *straight : q.X_WB();
+    query::ContactTimeWalk<TreeSide, std::decay_t<decltype(b)>> walk(a, inBody(a.tree()), q.X_WA(), b,
+                                                                     SimilarityTransform(), motion);
     time = walk.run(goal);
   };
   withBodies(*q.b(), poseAt<S>(q.X_WB(), 0), region, run);
@@ -105,7 +151,7 @@ std::optional<double> timeOfContact(const ContinuousQuery<S>& q, const Mesh* mes
   const double margin = marginOf(model_a, model_b);
   const auto walk = [&](const TreeSide& a, const auto& b, const SimilarityTransform& b_in_body) {
     return query::findContactTime(a, inBody(a.tree()), q.X_WA(), b, b_in_body, q.X_WB(),
-                                  goalOf(q, magnitudeOf(a), magnitudeOf(b), margin));
+                                  goalOf(q, sizeOf(a), sizeOf(b), margin));
   };
   tree::Tree& tree = treeOf(*model_a);
   if (model_b != nullptr) {

@@ -81,6 +81,9 @@ class ContactTimeWalk : private BestFirst<ContactTimeWalk<A, B>, A, B> {
   // Two leaves' primitives are tested for the time in which the leaves move by this share of their sizes, but at least
   // for kLeastWindow of the motion.
   static constexpr double kShareOfLeaves = 0.25, kLeastWindow = 1e-6;
+  // Where more windows than this for each pair of triangles would follow, as on a long way in a narrow gap, all pairs
+  // are followed to the end at once: most slide along each other, and take a step or two.
+  static constexpr double kWindowsPerPair = 0.1;
   // Pairs of triangles that are apart by this share of the smaller leaf's size are not looked at one by one.
   static constexpr double kShareOfSmaller = 1.0 / 32;
 
@@ -324,6 +327,11 @@ class ContactTimeWalk : private BestFirst<ContactTimeWalk<A, B>, A, B> {
         return true;
       }
       const double window = windowOf(2 * std::max(free, 0.0) + part, speed), until = pair.bound + window;
+      const std::size_t pairs = a_.triangleCount(pair.a) * b_.triangleCount(pair.b);
+      if (std::min(1.0, first_) - pair.bound > kWindowsPerPair * static_cast<double>(pairs) * window) {
+        followAll(pair);
+        return true;
+      }
       Primitive p, q;
       p.count = q.count = 3;
       for (const auto& t : near.find(a_, pair.a, b_, pair.b, b_in_a, direction,
@@ -334,6 +342,21 @@ class ContactTimeWalk : private BestFirst<ContactTimeWalk<A, B>, A, B> {
       }
       push({until, pair.a, pair.b});
       return true;
+    }
+  }
+
+  // Follows each pair of two leaves' triangles to the end.
+  void followAll(const Pair& pair) {
+    Primitive p, q;
+    p.count = q.count = 3;
+    const auto ids_a = a_.triangles(pair.a);
+    const auto ids_b = b_.triangles(pair.b);
+    for (std::size_t i = 0; i < ids_a.count; ++i) {
+      p.corners = a_.corners(ids_a.ids[i]);
+      for (std::size_t j = 0; j < ids_b.count; ++j) {
+        q.corners = b_.corners(ids_b.ids[j]);
+        first_ = std::min(first_, firstContact(p, q, pair.bound, 2));
+      }
     }
   }
 

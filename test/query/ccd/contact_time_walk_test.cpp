@@ -145,6 +145,49 @@ TEST(ContactTimes, FlatLandingsTakeFewSteps) {
   EXPECT_LE(walk.steps(), 1u);
 }
 
+// A joint turns two links together: nothing between them changes.
+TEST(ContactTimes, BodiesThatTurnTogetherTakeFewSteps) {
+  HandTree a(test::row(64)), b(test::row(64, 1e-5));
+  SimilarityTransform same;
+  same.ready();
+  const Eigen::Vector3d axis = Eigen::Vector3d(1, 2, 3).normalized();
+  const AxisMotion turn(Eigen::Isometry3d::Identity(), {1, 1, 0}, {3, 4, 5}, axis, 2);
+  ContactTimeWalk<HandTree, HandTree> walk(a, same, turn, b, same, turn);
+  ContactGoal goal;
+  goal.rounding = kRounding;
+  EXPECT_EQ(walk.run(goal), kNever);
+  EXPECT_LT(walk.steps(), 100u);
+}
+
+// The corner of a blade passes a wall: the other corners come nearer faster than it does, from farther away.
+TEST(ContactTimes, ACornerThatTurnsPastAWallTakesFewSteps) {
+  std::vector<test::HandTriangle> blade(1), wall(1);
+  blade[0].corners[0] = {0, 0, -0.1};
+  blade[0].corners[1] = {0, 0, 0.1};
+  blade[0].corners[2] = {1, 0, 0};
+  for (const double gap : {1e-3, 1e-6, 1e-8}) {
+    wall[0].corners[0] = {1 + gap, -5, -5};
+    wall[0].corners[1] = {1 + gap, 5, -5};
+    wall[0].corners[2] = {1 + gap, 0, 9};
+    HandTree a(blade), b(wall);
+    SimilarityTransform same;
+    same.ready();
+    Eigen::Isometry3d begin = Eigen::Isometry3d::Identity();
+    begin.linear() = Eigen::AngleAxisd(-1, Eigen::Vector3d::UnitZ()).toRotationMatrix();
+    const AxisMotion turn(begin, Eigen::Vector3d::Zero(), Eigen::Vector3d::Zero(), Eigen::Vector3d::UnitZ(), 2),
+        none = still();
+    for (const bool turned : {false, true}) {
+      ContactTimeWalk<HandTree, HandTree> walk(turned ? b : a, same, turned ? none : turn, turned ? a : b, same,
+                                               turned ? turn : none);
+      ContactGoal goal;
+      goal.rounding = kRounding;
+      goal.time_error = 1e-4;
+      EXPECT_EQ(walk.run(goal), kNever) << gap;
+      EXPECT_LT(walk.steps(), 100u) << gap;
+    }
+  }
+}
+
 TEST(ContactTimes, OnlyWhatMayTouchFirstGrows) {
   HandTree a(test::row(64)), b(test::row(1, 4));
   a.sleepFrom(0);
