@@ -165,11 +165,14 @@ BOCST_EXPORT S continuousPair(const fcl::CollisionGeometry<S>* o1, const fcl::Tr
 ///   at the begin, and 1 without contact. toc_err may be 0.
 /// - contact_tf1, contact_tf2: the poses at that time; without contact, the end poses.
 /// - Geometries that pass each other at a distance below 1e-9 of the smaller geometry's size, or below 1e-13 of all
-///   lengths, count as touching. A size is the largest distance of a geometry's points from its own origin; all lengths
-///   are the sum of both sizes, or the distance of a geometry from the world's origin with the path of its fastest
-///   point, whichever is larger. With shapes and cells the limit is at least 2e-6 in length units: twice the distance
-///   at which collide() can report a contact because of FCL's solvers. With float, it is up to 1e-5 of the sum of all
-///   lengths more: coordinates, sizes, and the paths of both, as long as their fastest points could make them.
+///   lengths, may count as touching. A size is half the diagonal of a geometry's bounding box; all lengths are the sum
+///   of the largest distances of both geometries' points from their own origins, or the distance of a geometry from the
+///   world's origin with the path of its fastest point, whichever is larger. With shapes and cells the limit is at
+///   least 2e-6 in length units: twice the distance at which collide() can report a contact because of FCL's solvers.
+///   With float, it is up to 2e-5 of the sum of all lengths more: coordinates, sizes, and the paths of both, as long as
+///   their fastest points could make them.
+/// - Beyond these limits, verdicts do not depend on earlier queries, the order of the arguments or the partner's kind.
+///   time_of_contact may, within toc_err and the time in which such a distance closes.
 /// Supported motions are FCL's TranslationMotion, InterpMotion, ScrewMotion and SplineMotion (in FCL 0.7, two of them
 /// exist only for double, and of InterpMotion's constructors that take poses only the one with two rotations, two
 /// translations and a point sets all members). They are not modified. With poses, ccd_motion_type selects the motion:
