@@ -151,12 +151,19 @@ class Edge {
   }
 
   // No distance between points of two moving objects changes faster. Origins move on lines, or their velocities are not
-  // known and 0: then the speeds count in full. What is left of a speed is that of the turn about the origin.
+  // known and 0: then the speeds count in full. What is left of a speed is that of the turn about the origin. What one
+  // joint turns moves together.
   double relativeSpeed(std::size_t i, std::size_t j) const {
     const double straight_i = velocities_[i].norm(), straight_j = velocities_[j].norm();
     const double rounding = 1e-14 * (straight_i + straight_j);
-    return std::max(speeds_[i] - straight_i, 0.0) + std::max(speeds_[j] - straight_j, 0.0) +
-           (velocities_[i] - velocities_[j]).norm() + rounding;
+    const double by_origins = std::max(speeds_[i] - straight_i, 0.0) + std::max(speeds_[j] - straight_j, 0.0) +
+                              (velocities_[i] - velocities_[j]).norm() + rounding;
+    const Bounds &a = world_.moving[i].bounds, &b = world_.moving[j].bounds;
+    if (a.kind != Bounds::kBox || b.kind != Bounds::kBox) return by_origins;
+    const Eigen::Vector3d center_a = motions_[i]->at(0) * a.center, center_b = motions_[j]->at(0) * b.center;
+    const double together =
+        query::MotionPair(*motions_[i], *motions_[j]).fastest({center_a, a.radius}, {center_b, b.radius}, 0);
+    return std::min(by_origins, together * (1 + 1e-6));
   }
 
   // Conservative advancement, of two of FCL's shapes and octrees: FCL's own may step over contacts.

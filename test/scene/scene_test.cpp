@@ -1531,6 +1531,29 @@ TYPED_TEST(SceneTest, EdgesOfShapesThatMoveTogether) {
   }
 }
 
+// The same of a joint that turns both.
+TYPED_TEST(SceneTest, EdgesOfShapesThatTurnTogether) {
+  using S = TypeParam;
+  using V = fcl::Vector3<S>;
+  Scene<S> scene;
+  const auto box = std::make_shared<fcl::Box<S>>(S(0.4), S(0.4), S(0.4));
+  scene.addMoving(box);
+  scene.addMoving(box);
+  States<S> begin(2, fcl::Transform3<S>::Identity()), end = begin;
+  const S gap = S(1e-3), far = std::is_same<S, double>::value ? S(1e5) : S(1);
+  begin[0].translation().x() = far;
+  begin[1].translation().x() = far + S(0.4) + gap;
+  for (const S closer : {S(0), gap / 2, gap * 2, S(0.5)}) {
+    fcl::Transform3<S> joint = fcl::Transform3<S>::Identity();
+    joint.linear() = Eigen::AngleAxis<S>(S(1.5), V(0, S(0.6), S(0.8))).toRotationMatrix();
+    end[0] = joint * begin[0];
+    end[1] = joint * begin[1];
+    end[1].translation() -= joint.linear() * V(closer, 0, 0);
+    EXPECT_EQ(scene.edgeIsFree(begin.data(), end.data(), fcl::CCDM_SCREW), closer < gap) << closer;
+    EXPECT_EQ(scene.edgeIsFree(end.data(), begin.data(), fcl::CCDM_SCREW), closer < gap) << closer;
+  }
+}
+
 // The two touch for a hundredth of the way, between the states that halving it looks at.
 TYPED_TEST(SceneTest, EdgesOfShapesThatPassOneAnother) {
   using S = TypeParam;
