@@ -448,15 +448,18 @@ TEST(ContinuousDouble, MeshesFarFromTheirOriginsPassAsNear) {
   for (const double far : {0.0, 1e2, 1e4}) {
     Raw cube = test::box({-0.5, -0.5, -0.5}, {0.5, 0.5, 0.5});
     for (Eigen::Vector3d& v : cube.vertices) v.x() += far;
-    const Modeld a(cube.mesh()), b(cube.mesh());
+    Raw large = test::box({-5, -5, -9.5}, {5, 5, 0.5});
+    for (Eigen::Vector3d& v : large.vertices) v.x() += far;
+    const Modeld a(large.mesh()), b(cube.mesh());
     const auto at = [](double y, double gap) {
       return test::pose<double>(Eigen::Matrix3d::Identity(), {0.3, y, 1 + gap});
     };
     const double gap = 2e-9 + 1e-12 * far;
-    const Ways<double> passing{&a, identity<double>(), identity<double>(), &b, at(-3, gap), at(3, gap)};
+    const Ways<double> passing{&a, identity<double>(), identity<double>(), &b, at(-8, gap), at(8, gap)};
     EXPECT_FALSE(passing.ask(request<double>(fcl::CCDM_TRANS)).is_collide) << far;
-    const Ways<double> scraping{&a, identity<double>(), identity<double>(), &b, at(-3, -gap), at(3, -gap)};
-    EXPECT_NEAR(scraping.ask(request<double>(fcl::CCDM_TRANS)).time_of_contact, 1.0 / 3, 1e-4) << far;
+    EXPECT_FALSE(passing.swapped().ask(request<double>(fcl::CCDM_TRANS)).is_collide) << far;
+    const Ways<double> scraping{&a, identity<double>(), identity<double>(), &b, at(-8, -gap), at(8, -gap)};
+    EXPECT_NEAR(scraping.ask(request<double>(fcl::CCDM_TRANS)).time_of_contact, 2.5 / 16, 1e-4) << far;
   }
 }
 
@@ -670,7 +673,8 @@ TYPED_TEST(Continuous, WheelsTurn) {
   const fcl::Box<S> box(S(0.4), S(0.3), S(0.5));
   const Eigen::Vector3d x = Eigen::Vector3d::UnitX(), y = Eigen::Vector3d::UnitY(), z = Eigen::Vector3d::UnitZ();
   const std::pair<const fcl::CollisionGeometry<S>*, Eigen::Vector3d> bodies[] = {
-      {&capsule, z}, {&cylinder, z}, {&cone, z}, {&along_z, z}, {&along_y, y}, {&along_x, x}, {&box, z}};
+      {&capsule, z}, {&cylinder, z}, {&cone, z},    {&along_z, z}, {&along_y, y},
+      {&along_x, x}, {&box, z},      {&along_z, x}, {&along_x, y}, {&cylinder, x}};
   std::mt19937_64 g(41);
   std::uniform_real_distribution<double> u(-1, 1);
   int hits = 0;
