@@ -127,5 +127,23 @@ TEST_F(Motions, TrianglesDoNotTouchBeforeTheyCan) {
   EXPECT_GT(longer, 250);
 }
 
+// A blade that turns slowly about an end near a wall: its other end, which is fast, has a longer way to the wall.
+TEST_F(Motions, CornersBehindTheForemostHaveTheirOwnWay) {
+  const double gap = 1e-3, behind = 0.1, angle = 0.05, length = 10;
+  const Corners blade{Vector3d(0.01, gap, 0), Vector3d(length, gap + behind, 0), Vector3d(0.01, gap, 0.1)};
+  const Corners wall{Vector3d(-50, 0, -50), Vector3d(50, 0, -50), Vector3d(0, 0, 90)};
+  const Vector3d up = Vector3d::UnitY();
+  const AxisMotion still(Isometry3d::Identity(), Vector3d::Zero());
+  const AxisMotion down(Isometry3d::Identity(), Vector3d::Zero(), Vector3d::Zero(), -Vector3d::UnitZ(), angle);
+  const MovingHull of_blade{blade.data(), 3}, of_wall{wall.data(), 3};
+  const double exact = std::atan2(gap + behind, length) / angle;
+  for (const bool turned : {false, true}) {
+    const double time = turned ? MotionPair(down, still).timeToTouch(gap, -up, 1e-15, of_blade, of_wall, 0)
+                               : MotionPair(still, down).timeToTouch(gap, up, 1e-15, of_wall, of_blade, 0);
+    EXPECT_LE(time, exact);
+    EXPECT_GE(time, 0.95 * exact);
+  }
+}
+
 }  // namespace
 }  // namespace bocst::query
