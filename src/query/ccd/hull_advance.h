@@ -41,6 +41,7 @@ inline double hullsApartUntil(const Mesh& a, const Motion& motion_a, const Mesh&
     }
   };
   const double size = a.bounds().diagonal().norm() + b.bounds().diagonal().norm();
+  const MotionPair motions(motion_a, motion_b);
   std::vector<Eigen::Vector3d> points_a, points_b;
   double time = 0;
   for (int step = 0; step < kMostSteps && time <= 1; ++step) {
@@ -54,9 +55,8 @@ inline double hullsApartUntil(const Mesh& a, const Motion& motion_a, const Mesh&
     const double free = gap.at_least - kRounding * (farthest + 2 * size) - clearance;
     if (!(free > 0)) break;
     // gap.normal leads from B to A.
-    time += MotionPair(motion_a, motion_b)
-                .timeToClose(free, -gap.normal, kBlur, MovingHull{points_a.data(), points_a.size()},
-                             MovingHull{points_b.data(), points_b.size()}, time) *
+    time += motions.timeToClose(free, -gap.normal, kBlur, MovingHull{points_a.data(), points_a.size()},
+                                MovingHull{points_b.data(), points_b.size()}, time) *
             (1 - 1e-12);
   }
   return time;
