@@ -8,6 +8,9 @@
 #include <cmath>
 #include <limits>
 #include <random>
+#include <set>
+#include <utility>
+#include <vector>
 
 #include "conformance/reference.h"
 #include "fcl/adapters/models.h"
@@ -260,6 +263,64 @@ TEST(FlatWork, OfADistanceIsBounded) {
     EXPECT_EQ(short_one.run({}, known, 0).distance, known.distance);
     EXPECT_TRUE(short_one.gaveUp());
     EXPECT_NEAR(query::findNearest(side_a, side_b, to, {}).distance, expected, 1e-11 * expected + 1e-6) << i;
+  }
+}
+
+/// Keeps the pairs of triangles that it is asked about, and takes one of them.
+class Asked final : public query::Visitor {
+ public:
+  explicit Asked(std::size_t taken = ~std::size_t{0}) : taken_(taken) {}
+  bool endsAtFirst() const override { return true; }
+  bool triangles(std::uint32_t a, std::uint32_t b, bool) override {
+    pairs.emplace_back(a, b);
+    return pairs.size() > taken_;
+  }
+  bool cells(const query::CellLeaf&, const query::CellLeaf&) override { return false; }
+  bool cellOfA(const query::CellLeaf&, std::uint32_t, const Vector3d&) override { return false; }
+  bool cellOfB(std::uint32_t, const query::CellLeaf&, const Vector3d&) override { return false; }
+
+  std::vector<std::pair<std::uint32_t, std::uint32_t>> pairs;
+
+ private:
+  const std::size_t taken_;
+};
+
+// Of a distance, and a limit just above it, few pairs are tested, however small the triangles are beside it.
+TEST(FlatWork, AVisitorIsAskedAboutAllPairsThatAreNearEnough) {
+  Side a(test::torus(30)), b(test::torus(24, 0.2));
+  const query::TreeSide side_a(a.tree), side_b(b.tree);
+  std::mt19937_64 g(9);
+  for (const double far : {2.6, 30.0, 3000.0}) {
+    const auto X = test::pose<double>(test::randomRotation(g), test::randomDirection(g) * far);
+    const query::SimilarityTransform to = relative(a, b, X);
+    const double distance = query::findNearest(side_a, side_b, to, {}).distance;
+    const double unit = a.tree.surface().lattice.unit();
+    for (const double more : {1e-12 * distance, 0.003 / unit}) {
+      const double below = distance + more;
+      std::set<std::pair<std::uint32_t, std::uint32_t>> expected;
+      for (std::uint32_t i = 0; i < a.tree.surface().triangle_count; ++i) {
+        for (std::uint32_t j = 0; j < b.tree.surface().triangle_count; ++j) {
+          Vector3d p, q;
+          const query::Corners in_a = side_a.corners(i), of_b = query::placed(side_b.corners(j), to);
+          if (query::nearestPoints(in_a, of_b, p, q) < below) expected.emplace(i, j);
+        }
+      }
+      Asked all;
+      query::DistanceWalk<query::TreeSide, query::TreeSide> walk(side_a, side_b, to);
+      EXPECT_FALSE(std::isfinite(walk.run({below, 0, 0, &all}).distance)) << "none was taken";
+      EXPECT_EQ(std::set(all.pairs.begin(), all.pairs.end()), expected) << far << ' ' << more;
+      ASSERT_FALSE(expected.empty());
+      EXPECT_LT(walk.steps(), 40 * expected.size() + 4000) << far << ' ' << more;
+      const std::size_t last = all.pairs.size() - 1;
+      for (const std::size_t taken : {std::size_t{0}, last / 2, last}) {
+        Asked some(taken);
+        const query::Nearest found = query::findNearest(side_a, side_b, to, {below, 0, 0, &some});
+        ASSERT_EQ(some.pairs.size(), taken + 1) << "nothing is asked after it";
+        EXPECT_EQ(std::make_pair(std::uint64_t{some.pairs.back().first}, std::uint64_t{some.pairs.back().second}),
+                  std::make_pair(found.a, found.b));
+        EXPECT_LT(found.distance, below);
+      }
+    }
   }
 }
 

@@ -46,23 +46,17 @@ bool isOutOfSight(const CollideQuery<S>& q, const query::SimilarityTransform& b_
 
 /// A yes-or-no walk of a query with a margin, without which side B is at `b_in_a`. Beside a margin that is much larger
 /// than nodes and triangles, these separate nothing: so a walk that gets long is ended, and a search for the distance
-/// is asked whether anything is near enough to be tested. walk_blocks(most_steps) returns a query::WalkEnd.
+/// finds what is near enough to be tested. walk_blocks(most_steps) returns a query::WalkEnd.
 template <typename S, typename B, typename WalkBlocks>
 void walkWithinMargin(const query::TreeSide& a, const B& b, const query::SimilarityTransform& b_in_a,
                       const query::SimilarityTransform& near, MeshCollector<S>& collector, std::size_t most_steps,
                       WalkBlocks&& walk_blocks) {
-  constexpr double kAnyWillDo = 1e300;
   if (!walk_blocks(most_steps).gave_up) return;
   // What the search computes is off by less than this; so are the lengths of the tolerance.
   constexpr double kRounding = 1e-12;
   const double tolerance = near.margin + 2 * b_in_a.tolerance;  // of walks it may be larger, because of their slabs
   const double below = tolerance * (1 + kRounding) + kRounding * 2 * lattice::kMiddle * (1 + near.scale);
-  const query::Nearest nearest = query::findNearest(a, b, b_in_a, {below, kAnyWillDo, kAnyWillDo});
-  if (!std::isfinite(nearest.distance)) return;
-  // Else the distance and the margin are the same up to rounding.
-  const bool meets =
-      collector.triangles(static_cast<std::uint32_t>(nearest.a), static_cast<std::uint32_t>(nearest.b), false);
-  if (!meets) walk_blocks(query::kNoLimit);
+  query::findNearest(a, b, b_in_a, {below, 0, 0, &collector});
 }
 constexpr std::size_t kMostNodePairs = 256;  ///< Of a PairWalk in such a query.
 

@@ -35,6 +35,9 @@ struct Nearest {
 struct DistanceGoal {
   double below = std::numeric_limits<double>::infinity();  ///< Only what is nearer is of interest.
   double absolute = 0, relative = 0;  ///< An answer that is too large by so much will do, as in FCL's canStop().
+  /// If set, it is asked about all pairs of triangles nearer than `below`, until it returns true; then this pair is the
+  /// answer, else there is none.
+  Visitor* visitor = nullptr;
 };
 
 /// Looks for the nearest primitives of two sides: triangles with exact answers, spheres of the collision depth with
@@ -161,7 +164,7 @@ class DistanceWalk : private BestFirst<DistanceWalk<A, B>, A, B> {
   double boundOf(const NodeExtent& a, const NodeExtent& b) {
     // Where each node holds a piece of surface, something is no farther than this. From bodies, distances are measured
     // in their own frame.
-    if (B::kNodesContainSurface) limit_ = std::min(limit_, farthest(a, b) * (B::kBodies ? kMostStretch : 1));
+    if (B::kNodesContainSurface) exists(farthest(a, b) * (B::kBodies ? kMostStretch : 1));
     return distanceBound(a, b, direction_, cutoff());
   }
 
@@ -209,7 +212,7 @@ class DistanceWalk : private BestFirst<DistanceWalk<A, B>, A, B> {
       if (gaps_.has_value()) {
         const LaneGaps gaps = gapsOf(pair, expands_a);
         lanes(pair, expands_a, [&](int o, typename A::Node a, typename B::Node b) {
-          limit_ = std::min(limit_, double{gaps.at_most[o]});
+          exists(double{gaps.at_most[o]});
           const Pair child{std::max(pair.bound, double{gaps.at_least[o]}), a, b};
           // The distance of two spheres costs less than a place on the heap.
           if (spheres() && a_.state(a) == State::kLeaf && b_.state(b) == State::kLeaf) {
@@ -253,7 +256,17 @@ class DistanceWalk : private BestFirst<DistanceWalk<A, B>, A, B> {
   void found(const Nearest& n) {
     if (!(n.distance < std::min(best_.distance, goal_.below))) return;
     best_ = n;
-    limit_ = std::min(limit_, n.distance);
+    exists(n.distance);
+    expect(n);
+  }
+
+  // Something is no farther than this.
+  void exists(double distance) {
+    if (goal_.visitor == nullptr) limit_ = std::min(limit_, distance);
+  }
+
+  // Bounds along the direction of the nearest pair are the best ones.
+  void expect(const Nearest& n) {
     if (!(n.distance > 0)) return;
     direction_ = (n.on_b - n.on_a) / n.distance;
     if constexpr (kHasLanes) {
@@ -338,7 +351,8 @@ class DistanceWalk : private BestFirst<DistanceWalk<A, B>, A, B> {
   void leafPairInFloat(const Pair& pair, Near& near) {
     const float direction[3] = {static_cast<float>(direction_[0]), static_cast<float>(direction_[1]),
                                 static_cast<float>(direction_[2])};
-    for (const auto& candidate : near.find(a_, pair.a, b_, pair.b, b_in_a_, direction, cutoff(), false)) {
+    const bool all = goal_.visitor != nullptr;
+    for (const auto& candidate : near.find(a_, pair.a, b_, pair.b, b_in_a_, direction, cutoff(), all)) {
       if (!worthIt(candidate.at_least)) break;
       triangles(candidate.a, candidate.b);
     }
@@ -370,7 +384,14 @@ class DistanceWalk : private BestFirst<DistanceWalk<A, B>, A, B> {
     n.a = t;
     n.b = u;
     n.distance = nearestPoints(in_a, of_b, n.on_a, n.on_b);
-    found(n);
+    if (goal_.visitor == nullptr) return found(n);
+    if (n.distance < goal_.below && goal_.visitor->triangles(t, u, false)) {
+      best_ = n;
+      limit_ = 0;
+    } else if (n.distance < nearest_refused_) {
+      nearest_refused_ = n.distance;
+      expect(n);
+    }
   }
 
   void leafSpheres(const Pair& pair) {
@@ -429,6 +450,7 @@ class DistanceWalk : private BestFirst<DistanceWalk<A, B>, A, B> {
   GapFinder body_gaps_;
   double limit_ = 0;  // something at least this near exists, or nobody asks for more
   double tie_ = 0;    // what is nearer by no more is as near
+  double nearest_refused_ = std::numeric_limits<double>::infinity();  // by the visitor, or beyond `below`
   Eigen::Vector3d direction_ =
       Eigen::Vector3d::Zero();  // from side A to side B where they are nearest so far, unit length
 };
