@@ -61,8 +61,9 @@ struct SceneOptions {
 /// earlier queries, on threads or on the resident nodes. Each query checks that all its poses are rigid.
 ///
 /// Threads: any number of threads may query one scene, also while another thread changes it: each query sees the scene
-/// before or after a change, never a mixture. Changes wait for each other. A change of a fixed object takes
-/// microseconds; while queries are under way, it copies what they share. The first query, and the first one after
+/// before or after a change, never a mixture (changes of a geometry itself: see update()). Changes wait for each other.
+/// A change of a fixed object takes microseconds; while queries are under way, it copies what they share (0.2 ms for
+/// 20 000 fixed objects). The first query, and the first one after
 /// moving objects came or went or after many changes, updates the scene's internal data, and other queries wait for
 /// that; apart from changes, no query waits for another. When no tree has to grow, collides() and calls with up to 128
 /// states allocate no memory (after the first such calls of a thread), except inside FCL: for pairs without a Model,
@@ -85,19 +86,24 @@ class BOCST_EXPORT Scene {
   // ignore(a, a), setPose() of a moving object and movingIndex() of a fixed one; std::logic_error for a Model between
   // beginModel() and endModel().
 
-  /// Adds an object that stays at X_WG. Computes a tight bound of its geometry, in time linear in its vertices; objects
-  /// with the same geometry share the bound.
+  /// Adds an object that stays at X_WG. Computes a bound of its geometry, in time linear in its vertices (of an OcTree,
+  /// without a look at most cells); objects with the same geometry share the bound.
   Id addFixed(std::shared_ptr<Geometry> geometry, const Transform& X_WG);
   /// Adds an object whose pose is part of each state.
   Id addMoving(std::shared_ptr<Geometry> geometry);
-  /// Removes an object. The other moving objects keep their order.
+  /// Removes an object. The other moving objects keep their order. To replace an object while other threads query, add
+  /// the new one before you remove the old one: then no query misses both. A geometry that nobody else holds is
+  /// destroyed by this call, or by the last query that uses it: an OcTree of 100 000 cells takes 80 ms.
   void remove(Id object);
   /// Moves a fixed object to another pose.
   void setPose(Id fixed, const Transform& X_WG);
   /// Allows the two to touch (allowed collision, SRDF's disabled pairs); `ignored` = false undoes this.
   void ignore(Id a, Id b, bool ignored = true);
   /// Call this after the geometry of an object has changed: Model::updateVertices(), a changed map of an OcTree, new
-  /// vertices, thresholds or cost density of a BVHModel. Updates all objects with the same geometry.
+  /// vertices, thresholds or cost density of a BVHModel. Updates all objects with the same geometry. Between the change
+  /// of the geometry and the end of this call, queries may miss contacts, because they look for the new surface in the
+  /// bounds of the old one. Where other threads query meanwhile, add an object with a new geometry instead, then remove
+  /// the old one.
   void update(Id object);
 
   /// Builds the complete trees of all models with exact answers now (Model::buildTree()), those of BVHModels included,
@@ -125,8 +131,9 @@ class BOCST_EXPORT Scene {
   void collisions(const Transform* X_WM, std::size_t states, std::uint8_t* hit) const;
   /// The minimum fcl::distance of all pairs; if a pair touches, 0 up to the rounding of fcl::distance;
   /// std::numeric_limits<S>::max() without pairs. `nearest` is set to a pair at this distance; to invalid Ids without
-  /// pairs. Options::margin has no effect.
-  /// @throws std::invalid_argument for two of FCL's shapes and octrees whose distance FCL cannot compute, unless
+  /// pairs. Options::margin has no effect. Of a Plane or Halfspace and another of FCL's shapes, of which fcl::distance
+  /// computes nothing, it is the distance of the two.
+  /// @throws std::invalid_argument for other pairs of FCL's shapes and octrees whose distance FCL cannot compute, unless
   /// another pair is found to be nearer before.
   S clearance(const Transform* X_WM, Pair* nearest = nullptr) const;
   /// True if the motion of all moving objects from one state to another is free of collisions at all times. Never steps
@@ -135,7 +142,7 @@ class BOCST_EXPORT Scene {
   /// moves on a line, and the object turns about a fixed axis (slerp of the normalised quaternions, which removes
   /// rounding errors of a rotation). Two of FCL's shapes and octrees that pass closer than the rounding of the motion's
   /// length also count as touching.
-  /// @throws std::invalid_argument as clearance().
+  /// @throws std::invalid_argument as clearance(), and for a Plane or Halfspace that moves near another of FCL's shapes.
   bool edgeIsFree(const Transform* X_WM_begin, const Transform* X_WM_end,
                   fcl::CCDMotionType motion = fcl::CCDM_LINEAR) const;
 

@@ -2,10 +2,6 @@
 #include "scene/bounds.h"
 
 #include <fcl/config.h>
-#if FCL_HAVE_OCTOMAP
-#include <fcl/geometry/octree/octree.h>
-#endif
-
 #include <fcl/geometry/shape/utility.h>
 
 #include <Eigen/Eigenvalues>
@@ -13,6 +9,7 @@
 #include <shared_mutex>
 
 #include "fcl/adapters/models.h"
+#include "fcl/adapters/octree_side.h"
 #include "fcl/adapters/shapes.h"
 #include "scene/reach.h"
 #include "thread/sharded_lock.h"
@@ -101,16 +98,31 @@ Bounds boundsOfModel(const Model<S>& model) {
 }
 
 #if FCL_HAVE_OCTOMAP
+// Extends a box by the occupied cells below a node. Cubes that stick out of it by little are not looked at closely: a
+// map may have a million cells, and each change of it asks for its bounds.
 template <typename S>
-Bounds boundsOfOcTree(const fcl::OcTree<S>& tree) {
-  Eigen::AlignedBox3d box;
-  // Cells that are occupied; no other makes a contact.
-  for (const auto& cell : tree.toBoxes()) {
-    const Eigen::Vector3d center(static_cast<double>(cell[0]), static_cast<double>(cell[1]),
-                                 static_cast<double>(cell[2]));
-    const Eigen::Vector3d half = Eigen::Vector3d::Constant(static_cast<double>(cell[3]) / 2);
-    box.extend(center - half).extend(center + half);
+void extendByCells(const fcl_adapter::OcTreeSide<S>& tree, const typename fcl_adapter::OcTreeSide<S>::Node& node,
+                   Eigen::AlignedBox3d& box) {
+  constexpr double kCoarse = 32;  // each face of the box is too far out by at most this part of its length
+  Eigen::Vector3d center;
+  const double half = tree.octantsOf(node, center);
+  const Eigen::AlignedBox3d cube(center.array() - half, center.array() + half);
+  if (box.contains(cube)) return;
+  const bool is_leaf = tree.state(node) == query::State::kLeaf;
+  if (is_leaf ? tree.occupied(node) : 2 * half * kCoarse <= box.sizes().maxCoeff()) {
+    box.extend(cube);
+  } else if (!is_leaf) {
+    tree.children(node, [&](const auto& child) { extendByCells(tree, child, box); });
   }
+}
+
+// Of cells that are occupied; no other makes a contact.
+template <typename S>
+Bounds boundsOfOcTree(const fcl::OcTree<S>& octree) {
+  const fcl::Transform3<S> X = fcl::Transform3<S>::Identity();
+  const fcl_adapter::OcTreeSide<S> tree(octree, X, S(1), false);
+  Eigen::AlignedBox3d box;
+  if (!tree.empty()) extendByCells(tree, tree.root(), box);
   Bounds b;
   if (box.isEmpty()) {
     b.kind = Bounds::kNowhere;

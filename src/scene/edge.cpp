@@ -30,7 +30,7 @@ constexpr int kHalvings = 4;
 /// What passes closer than this share of the sizes is taken to touch, between two of FCL's geometries.
 constexpr double kTouch = 1e-5;
 
-/// fcl::distance of a pair, no less than 0; any larger value where it is not less than `below`.
+/// fcl::distance of a pair, and that to planes, no less than 0; any larger value where it is not less than `below`.
 template <typename S>
 S distanceBelow(const Object<S>& a, const fcl::Transform3<S>& X_WA, const Object<S>& b, const fcl::Transform3<S>& X_WB,
                 S below, fcl::GJKSolverType solver = fcl::GST_LIBCCD) {
@@ -38,7 +38,12 @@ S distanceBelow(const Object<S>& a, const fcl::Transform3<S>& X_WA, const Object
   request.gjk_solver_type = solver;
   fcl::DistanceResult<S> result;
   const bool has_model = a.model != nullptr || b.model != nullptr;
-  if (has_model) result.min_distance = below;
+  if (has_model) {
+    result.min_distance = below;
+  } else {
+    const std::optional<double> known = fcl_adapter::distanceToPlane<S>(*a.geometry, X_WA, *b.geometry, X_WB);
+    if (known.has_value()) return static_cast<S>(*known);
+  }
   const S d = bocst::distance<S>(a.geometry.get(), X_WA, b.geometry.get(), X_WB, request, result);
   if (!has_model && result.o1 == nullptr && !(d < std::numeric_limits<S>::max())) {
     throw std::invalid_argument("bocst::Scene: FCL computes no distance of " +
@@ -58,6 +63,13 @@ double leastDistance(const Object<S>& a, const fcl::Transform3<S>& X_WA, const O
   constexpr S kAny = std::numeric_limits<S>::max();
   return static_cast<double>(std::min(distanceBelow<S>(a, X_WA, b, X_WB, kAny, fcl::GST_LIBCCD),
                                       distanceBelow<S>(a, X_WA, b, X_WB, kAny, fcl::GST_INDEP)));
+}
+
+/// Far from its origin, a plane that turns is as fast as one likes.
+template <typename S>
+bool isPlane(const Object<S>& o) {
+  const fcl::NODE_TYPE type = o.geometry->getNodeType();
+  return type == fcl::GEOM_PLANE || type == fcl::GEOM_HALFSPACE;
 }
 
 /// One way of all moving objects.
@@ -185,6 +197,10 @@ class Edge {
       const fcl::Transform3<S> X_WB = fixed ? b.X_WG : poseAt<S>(*motions_[j], time);
       if (touch(a, X_WA, b, X_WB, result_)) return true;
       if (!a.geometry->isOccupied() || !b.geometry->isOccupied()) return false;
+      if (isPlane(a) || (!fixed && isPlane(b))) {
+        throw std::invalid_argument(
+            "bocst::Scene::edgeIsFree: a Plane or Halfspace that moves needs a bocst::Model beside it");
+      }
       const double gap = leastDistance<S>(a, X_WA, b, X_WB);
       if (gap <= near) return true;
       if (time >= 1 || gap >= speed * (1 - time) + near) return false;

@@ -296,10 +296,11 @@ Id Scene<S>::addMoving(std::shared_ptr<Geometry> geometry) {
 
 template <typename S>
 void Scene<S>::remove(Id object) {
+  decltype(impl_->objects.extract(0)) removed;  // destroyed without locks: an OcTree takes milliseconds
   const std::lock_guard<thread::ForkAwareMutex> lock(impl_->mutex);
   impl_->forgetGeometry(impl_->find("remove", object).given.get(), object.number_);
-  const bool moves = impl_->objects.at(object.number_).moves;
-  impl_->objects.erase(object.number_);
+  removed = impl_->objects.extract(object.number_);
+  const bool moves = removed.mapped().moves;
   impl_->ignored.remove(object);
   if (moves) {
     auto& moving = impl_->moving_numbers;

@@ -12,6 +12,7 @@
 #include <cstdint>
 #include <cstdlib>
 #include <fstream>
+#include <functional>
 #include <limits>
 #include <memory>
 #include <new>
@@ -19,12 +20,14 @@
 #include <set>
 #include <string>
 #include <thread>
+#include <utility>
 #include <vector>
 
 #include "conformance/octrees.h"
 #include "conformance/reference.h"
 #include "fcl/adapters/models.h"
 #include "sanitized.h"
+#include "scene/bounds.h"
 #include "thread_group.h"
 #include "tree/tree.h"
 
@@ -1344,34 +1347,143 @@ TYPED_TEST(SceneTest, MisuseThrows) {
   EXPECT_EQ(scene.fixedCount(), 1u);
 }
 
-// FCL has no distance of them: its general algorithm would follow a support function that is null.
-TYPED_TEST(SceneTest, UnboundedShapesNeedAModelForDistances) {
+// A box about an octree holds all occupied cells, and no face of it is farther out than by 1/32 of its length.
+TYPED_TEST(SceneTest, BoundsOfOcTreesAreNearlyTight) {
   using S = TypeParam;
-  std::mt19937_64 g(2);
-  const auto half = std::make_shared<fcl::Halfspace<S>>(fcl::Vector3<S>::UnitZ(), S(-5));
-  const auto plane = std::make_shared<fcl::Plane<S>>(fcl::Vector3<S>::UnitZ(), S(-5));
-  const auto at = fcl::Transform3<S>::Identity();
-  const States<S> state(1, at);
-  for (const Geometry<S>& floor : {Geometry<S>(half), Geometry<S>(plane)}) {
-    const bool is_half = floor == half;
-    const auto said = [&](const fcl::CollisionGeometry<S>* a, const fcl::CollisionGeometry<S>* b) {
-      return complaintOf([&] {
-        fcl::DistanceResult<S> result;
-        bocst::distance<S>(a, at, b, at, fcl::DistanceRequest<S>(), result);
-      });
+  std::mt19937_64 g(3);
+  std::uniform_real_distribution<double> u(-1, 1);
+  std::vector<std::shared_ptr<octomap::OcTree>> maps;
+  for (const double resolution : {0.3, 0.05, 0.013}) {
+    const auto add = [&](const std::vector<Eigen::Vector3d>& occupied, const std::vector<Eigen::Vector3d>& free) {
+      maps.push_back(std::make_shared<octomap::OcTree>(resolution));
+      const auto at = [](const Eigen::Vector3d& p) {
+        return octomap::point3d(float(p.x()), float(p.y()), float(p.z()));
+      };
+      for (const Eigen::Vector3d& p : free) maps.back()->updateNode(at(p), false);
+      for (const Eigen::Vector3d& p : occupied) maps.back()->updateNode(at(p), true);
     };
-    const auto ball = std::make_shared<fcl::Sphere<S>>(S(1));
-    EXPECT_NE(said(ball.get(), floor.get()).find(is_half ? "Halfspace" : "Plane"), std::string::npos);
-    EXPECT_NE(said(floor.get(), ball.get()).find("bocst::Model"), std::string::npos);
-    Scene<S> scene;
-    scene.addFixed(floor, at);
-    const Id id = scene.addMoving(ball);
-    EXPECT_THROW(scene.clearance(state.data()), std::invalid_argument);
-    EXPECT_FALSE(scene.collides(state.data()));
-    scene.remove(id);
-    scene.addMoving(geometry<S>(0, g));
-    EXPECT_GT(scene.clearance(state.data()), S(0));
-    EXPECT_TRUE(scene.edgeIsFree(state.data(), state.data()));
+    std::vector<Eigen::Vector3d> one{{0.7, -8, 3}}, line, floor, ball, far, free;
+    for (int i = 0; i < 4000; ++i) {
+      line.emplace_back(4 * u(g), 0.01, 7);
+      floor.emplace_back(3 * u(g), 2 * u(g), 0.001);
+      ball.push_back(test::randomDirection(g) + Eigen::Vector3d(5, 1, 1));
+      free.push_back(9 * test::randomDirection(g));
+    }
+    far = ball;
+    far.emplace_back(-40, 3, -20);
+    for (const auto& occupied : {one, line, floor, ball, far}) {
+      add(occupied, {});
+      add(occupied, free);
+    }
+  }
+  for (std::size_t m = 0; m < maps.size(); ++m) {
+    const fcl::OcTree<S> octree(maps[m]);
+    Eigen::AlignedBox3d tight;
+    for (const auto& c : octree.toBoxes()) {
+      const Eigen::Vector3d center(c[0], c[1], c[2]), half = Eigen::Vector3d::Constant(c[3] / 2);
+      tight.extend(center - half).extend(center + half);
+    }
+    ASSERT_FALSE(tight.isEmpty());
+    const scene::Bounds b = scene::boundsOf<S>(octree);
+    ASSERT_EQ(b.kind, scene::Bounds::kBox);
+    const Eigen::AlignedBox3d box(b.center - b.half, b.center + b.half);
+    const double rounding = 1e-4 * (tight.sizes().norm() + tight.center().norm());
+    EXPECT_TRUE(
+        Eigen::AlignedBox3d(box.min().array() - 1e-2 * rounding, box.max().array() + 1e-2 * rounding).contains(tight))
+        << m;
+    EXPECT_LT((tight.min() - box.min()).maxCoeff(), tight.sizes().maxCoeff() / 31 + rounding) << m;
+    EXPECT_LT((box.max() - tight.max()).maxCoeff(), tight.sizes().maxCoeff() / 31 + rounding) << m;
+  }
+  const auto free = std::make_shared<octomap::OcTree>(0.1);
+  free->updateNode(octomap::point3d(1, 2, 3), false);
+  EXPECT_EQ(scene::boundsOf<S>(fcl::OcTree<S>(free)).kind, scene::Bounds::kNowhere);
+}
+
+// FCL has no distance of them: its general algorithm would follow a support function that is null.
+TYPED_TEST(SceneTest, FclHasNoDistanceOfUnboundedShapes) {
+  using S = TypeParam;
+  const auto at = fcl::Transform3<S>::Identity();
+  const fcl::Halfspace<S> half(fcl::Vector3<S>::UnitZ(), S(-5));
+  const fcl::Plane<S> plane(fcl::Vector3<S>::UnitZ(), S(-5));
+  const fcl::Sphere<S> ball(S(1));
+  const auto said = [&](const fcl::CollisionGeometry<S>& a, const fcl::CollisionGeometry<S>& b) {
+    return complaintOf([&] {
+      fcl::DistanceResult<S> result;
+      bocst::distance<S>(&a, at, &b, at, fcl::DistanceRequest<S>(), result);
+    });
+  };
+  EXPECT_NE(said(ball, half).find("Halfspace"), std::string::npos);
+  EXPECT_NE(said(ball, plane).find("Plane"), std::string::npos);
+  EXPECT_NE(said(half, ball).find("bocst::Model"), std::string::npos);
+}
+
+// Beside a floor, clearance and edges of every bounded shape follow from its lowest point, and those beside a plane
+// from the lowest and the highest one.
+TYPED_TEST(SceneTest, ShapesBesidePlanes) {
+  using S = TypeParam;
+  using V = fcl::Vector3<S>;
+  // How far a shape extends from its origin along a unit direction of its frame.
+  using Extent = std::function<double(const Eigen::Vector3d&)>;
+  const auto disc = [](const Eigen::Vector3d& n) { return 0.5 * std::hypot(n.x(), n.y()); };
+  const std::vector<std::pair<Geometry<S>, Extent>> shapes = {
+      {std::make_shared<fcl::Box<S>>(S(0.4), S(0.8), S(1.2)),
+       [](const Eigen::Vector3d& n) { return n.cwiseAbs().dot(Eigen::Vector3d(0.2, 0.4, 0.6)); }},
+      {std::make_shared<fcl::Sphere<S>>(S(0.7)), [](const Eigen::Vector3d&) { return 0.7; }},
+      {std::make_shared<fcl::Ellipsoid<S>>(S(0.3), S(0.6), S(0.9)),
+       [](const Eigen::Vector3d& n) { return n.cwiseProduct(Eigen::Vector3d(0.3, 0.6, 0.9)).norm(); }},
+      {std::make_shared<fcl::Capsule<S>>(S(0.3), S(1)),
+       [](const Eigen::Vector3d& n) { return 0.3 + 0.5 * std::abs(n.z()); }},
+      {std::make_shared<fcl::Cylinder<S>>(S(0.5), S(1.2)),
+       [=](const Eigen::Vector3d& n) { return disc(n) + 0.6 * std::abs(n.z()); }},
+      {std::make_shared<fcl::Cone<S>>(S(0.5), S(1.2)),
+       [=](const Eigen::Vector3d& n) { return std::max(disc(n) - 0.6 * n.z(), 0.6 * n.z()); }},
+  };
+  std::mt19937_64 g(12);
+  const double rounding = std::is_same<S, double>::value ? 1e-12 : 1e-6, short_of = rounding < 1e-9 ? 1e-3 : 1e-2;
+  const V normal = V(1, 2, -2) / S(3);
+  for (const bool is_half : {false, true}) {
+    const Geometry<S> plane = is_half ? Geometry<S>(std::make_shared<fcl::Halfspace<S>>(normal, S(0.5)))
+                                      : Geometry<S>(std::make_shared<fcl::Plane<S>>(normal, S(0.5)));
+    for (const auto& [shape, extent] : shapes) {
+      Scene<S> scene, other_way;
+      const auto X_WP = test::pose<S>(test::randomRotation(g), {100, -50, 30});
+      scene.addFixed(plane, X_WP);
+      const Id id = scene.addMoving(shape);
+      // FCL sees contacts of these up to half of their size away.
+      const bool is_wrong = shape->getNodeType() == (is_half ? fcl::GEOM_CONE : fcl::GEOM_CYLINDER);
+      int touching = 0, above = 0, below = 0;
+      for (int i = 0; i < 60; ++i) {
+        const double height = std::uniform_real_distribution<double>(-3, 4)(g);
+        const V foot = X_WP * V(normal * (S(0.5) + static_cast<S>(height)));
+        const States<S> X(1, test::pose<S>(test::randomRotation(g), foot.template cast<double>()));
+        const Eigen::Vector3d n = (X[0].linear().transpose() * X_WP.linear() * normal).template cast<double>();
+        const double low = height - extent(-n), high = height + extent(n), gap = is_half ? low : std::max(low, -high);
+        Pair nearest;
+        EXPECT_NEAR(static_cast<double>(scene.clearance(X.data(), &nearest)), std::max(gap, 0.0), 100 * rounding);
+        EXPECT_EQ(nearest.a, id);
+        ++(gap < 0 ? touching : low > 0 ? above : below);
+        if (is_wrong || std::abs(gap) < 2 * short_of) continue;
+        EXPECT_EQ(scene.collides(X.data()), gap < 0);
+        if (gap < 0) continue;
+        for (const double way : {gap - short_of, gap + short_of, gap + 20}) {
+          States<S> end = X;
+          end[0].translation() += X_WP.linear() * normal * static_cast<S>(low > 0 ? -way : way);
+          EXPECT_EQ(scene.edgeIsFree(X.data(), end.data()), way < gap) << way << ' ' << gap;
+          EXPECT_EQ(scene.edgeIsFree(end.data(), X.data()), way < gap) << way << ' ' << gap;
+        }
+      }
+      EXPECT_GT(touching, 2);
+      EXPECT_GT(above, 5);
+      EXPECT_GT(is_half ? 6 : below, 5);
+      // A plane may move, too, but then FCL's shapes have no edges beside it.
+      const V free = X_WP * V(normal * S(4));
+      const States<S> X{X_WP}, Y{test::pose<S>(Eigen::Matrix3d::Identity(), free.template cast<double>())};
+      other_way.addFixed(shape, Y[0]);
+      other_way.addMoving(plane);
+      EXPECT_EQ(other_way.clearance(X.data()), scene.clearance(Y.data()));
+      EXPECT_NE(complaintOf([&] { other_way.edgeIsFree(X.data(), X.data()); }).find("Plane or Halfspace that moves"),
+                std::string::npos);
+    }
   }
 }
 

@@ -28,15 +28,53 @@ bool hullsApart(const Model<S>& a, const fcl::Transform3<S>& X_WA, const Model<S
   return query::TreeWalk(scope.a(), scope.b(), b_in_a).isNeedless();
 }
 
+namespace {
+
+/// Calls f with the body of a bounded shape; does nothing for other geometries.
+template <typename S, typename F>
+void withBoundedShape(const fcl::CollisionGeometry<S>& g, F&& f) {
+  if (!isShape<S>(&g)) return;
+  withConvexShape(static_cast<const fcl::ShapeBase<S>&>(g), query::Sphere(), [&](const query::ConvexShape& shape) {
+    if (const auto* bounded = dynamic_cast<const query::SupportShape*>(&shape)) f(*bounded);
+  });
+}
+
+/// How far a body is beyond a half-space, or beyond either side of a plane; negative: they overlap.
+template <typename Shape>
+double gapTo(const Shape& plane, const Eigen::Isometry3d& X_WP, const query::SupportShape& body,
+             const Eigen::Isometry3d& X_WB) {
+  const auto [n, height] = equationOf(plane);
+  const Eigen::Vector3d normal = X_WP.linear() * n, normal_in_body = X_WB.linear().transpose() * normal;
+  // Not the height in the world: both may be far from its origin.
+  const double middle = normal.dot(X_WB.translation() - X_WP.translation()) - height;
+  const double lowest = middle + normal_in_body.dot(body.support(-normal_in_body)) - body.radius();
+  if (plane.getNodeType() == fcl::GEOM_HALFSPACE) return lowest;
+  return std::max(lowest, -(middle + normal_in_body.dot(body.support(normal_in_body)) + body.radius()));
+}
+
+}  // namespace
+
+template <typename S>
+std::optional<double> distanceToPlane(const fcl::CollisionGeometry<S>& a, const fcl::Transform3<S>& X_WA,
+                                      const fcl::CollisionGeometry<S>& b, const fcl::Transform3<S>& X_WB) {
+  const fcl::NODE_TYPE type = b.getNodeType();
+  if (type != fcl::GEOM_PLANE && type != fcl::GEOM_HALFSPACE) {
+    if (a.getNodeType() != fcl::GEOM_PLANE && a.getNodeType() != fcl::GEOM_HALFSPACE) return std::nullopt;
+    return distanceToPlane<S>(b, X_WB, a, X_WA);
+  }
+  std::optional<double> distance;
+  withBoundedShape<S>(a, [&](const query::SupportShape& body) {
+    const Eigen::Isometry3d X = isometryOf<S>(X_WB), Y = isometryOf<S>(X_WA);
+    const double gap = type == fcl::GEOM_PLANE ? gapTo(static_cast<const fcl::Plane<S>&>(b), X, body, Y)
+                                               : gapTo(static_cast<const fcl::Halfspace<S>&>(b), X, body, Y);
+    distance = std::max(gap, 0.0);
+  });
+  return distance;
+}
+
 template <typename S>
 std::optional<double> distanceOfShapes(const fcl::CollisionGeometry<S>& a, const fcl::Transform3<S>& X_WA,
                                        const fcl::CollisionGeometry<S>& b, const fcl::Transform3<S>& X_WB) {
-  if (!isShape<S>(&a) || !isShape<S>(&b)) return std::nullopt;
-  const auto withCore = [](const fcl::CollisionGeometry<S>& g, auto&& f) {
-    withConvexShape(static_cast<const fcl::ShapeBase<S>&>(g), query::Sphere(), [&](const query::ConvexShape& shape) {
-      if (const auto* core = dynamic_cast<const query::SupportShape*>(&shape)) f(*core);
-    });
-  };
   // Not inverse(): the difference first, as both may be far from the origin.
   const Eigen::Isometry3d X = isometryOf<S>(X_WA), Y = isometryOf<S>(X_WB);
   Eigen::Isometry3d X_AB = Eigen::Isometry3d::Identity();
@@ -44,8 +82,8 @@ std::optional<double> distanceOfShapes(const fcl::CollisionGeometry<S>& a, const
   X_AB.translation() = X.linear().transpose() * (Y.translation() - X.translation());
   const Eigen::Vector3d origin = Eigen::Vector3d::Zero();
   std::optional<double> distance;
-  withCore(a, [&](const query::SupportShape& core_a) {
-    withCore(b, [&](const query::SupportShape& core_b) {
+  withBoundedShape<S>(a, [&](const query::SupportShape& core_a) {
+    withBoundedShape<S>(b, [&](const query::SupportShape& core_b) {
       const query::DifferenceShape difference(core_a, core_b, X_AB);
       distance = std::max(difference.gap({&origin, 1}, std::numeric_limits<double>::infinity()).at_least, 0.0);
     });
@@ -71,6 +109,14 @@ template std::optional<double> distanceOfShapes<double>(const fcl::CollisionGeom
                                                         const fcl::Transform3<double>&,
                                                         const fcl::CollisionGeometry<double>&,
                                                         const fcl::Transform3<double>&);
+template std::optional<double> distanceToPlane<float>(const fcl::CollisionGeometry<float>&,
+                                                      const fcl::Transform3<float>&,
+                                                      const fcl::CollisionGeometry<float>&,
+                                                      const fcl::Transform3<float>&);
+template std::optional<double> distanceToPlane<double>(const fcl::CollisionGeometry<double>&,
+                                                       const fcl::Transform3<double>&,
+                                                       const fcl::CollisionGeometry<double>&,
+                                                       const fcl::Transform3<double>&);
 template std::unique_ptr<Model<float>> modelOfBvh<float>(const fcl::CollisionGeometry<float>&);
 template std::unique_ptr<Model<double>> modelOfBvh<double>(const fcl::CollisionGeometry<double>&);
 template bool hullsApart<float>(const Model<float>&, const fcl::Transform3<float>&, const Model<float>&,
