@@ -39,7 +39,6 @@ Isometry3d AxisMotion::at(double time) const {
   return X;
 }
 
-// The axis times the way from it to a point: the direction in which the point moves.
 Vector3d AxisMotion::around(const Vector3d& point, double time) const {
   return axis_.cross(point - begin_.translation() - time * velocity_) + axis_.cross(arm_);
 }
@@ -58,6 +57,40 @@ ClosingSpeed AxisMotion::closingSpeed(const Vector3d& direction, double blur, co
 
 double AxisMotion::fastest(const Vector3d& center, double radius, double time) const {
   return velocity_.norm() + std::abs(angle_) * (around(center, time).norm() + radius);
+}
+
+RevolutionMotion::RevolutionMotion(const AxisMotion& motion, const Vector3d& own_axis)
+    : motion_(motion), own_axis_(own_axis), turn_(motion.turn().norm()) {
+  const Isometry3d begin = motion.at(0);
+  sine_ = turn_ > 0 ? (begin.linear() * own_axis).cross(motion.turn() / turn_).norm() : 0;
+  orbit_ = turn_ > 0 ? motion.around(begin.translation(), 0).norm() : 0;
+}
+
+// With the turn p and the own axis k, the frame turns by q = k x (p x k). All of it goes round p: q' = p x q, and the
+// length of q does not change.
+ClosingSpeed RevolutionMotion::closingSpeed(const Vector3d& direction, double blur, const Vector3d& center,
+                                            double radius, double time) const {
+  const Isometry3d X = at(time);
+  const Vector3d own_axis = X.linear() * own_axis_, arm = center - X.translation();
+  const Vector3d turn = own_axis.cross(motion_.turn().cross(own_axis));
+  const Vector3d velocity = motion_.velocityAt(X.translation(), time);
+  const double distance = arm.norm() + radius, wobble = turn_ * sine_, error = rounding(X.translation(), distance);
+  const double straight = direction.dot(motion_.velocity()) + blur * motion_.velocity().norm();
+  const double now = direction.dot(velocity + turn.cross(arm)) + direction.cross(turn).norm() * radius +
+                     blur * (velocity.norm() + wobble * distance) + error;
+  return {straight + turn_ * orbit_ + wobble * distance + error, now,
+          turn_ * turn_ * orbit_ + wobble * (turn_ + wobble) * distance + turn_ * error};
+}
+
+double RevolutionMotion::fastest(const Vector3d& center, double radius, double time) const {
+  const Vector3d origin = at(time).translation();
+  const double distance = (center - origin).norm() + radius;
+  return motion_.velocity().norm() + turn_ * (orbit_ + sine_ * distance) + rounding(origin, distance);
+}
+
+// What is left of a turn whose axes are nearly the same may be this.
+double RevolutionMotion::rounding(const Vector3d& origin, double distance) const {
+  return 1e-14 * (motion_.velocity().norm() + turn_ * (orbit_ + distance)) + 1e-15 * turn_ * origin.norm();
 }
 
 SplineMotion::SplineMotion(const Points& positions, const Points& rotations)

@@ -59,13 +59,41 @@ class AxisMotion final : public Motion {
   const Eigen::Vector3d& velocity() const { return velocity_; }
   Eigen::Vector3d turn() const { return angle_ * axis_; }                      ///< The angular velocity.
   Eigen::Vector3d pointOfAxis() const { return begin_.translation() - arm_; }  ///< At time 0.
-
- private:
+  /// Of the body's point that is at `point` (W) at this time.
+  Eigen::Vector3d velocityAt(const Eigen::Vector3d& point, double time) const {
+    return velocity_ + angle_ * around(point, time);
+  }
+  /// The axis times the way from it to a point: the direction in which a positive turn moves the point.
   Eigen::Vector3d around(const Eigen::Vector3d& point, double time) const;
 
+ private:
   Eigen::Isometry3d begin_;
   Eigen::Vector3d velocity_, arm_, axis_;
   double angle_;
+};
+
+/// How a body of revolution moves: what it turns about its own axis moves no part of its surface, so a wheel that rolls
+/// only goes straight on. Points are those of a frame that does not turn about this axis.
+class RevolutionMotion final : public Motion {
+ public:
+  /// `own_axis` (unit, in the body's frame) passes through the body's origin.
+  RevolutionMotion(const AxisMotion& motion, const Eigen::Vector3d& own_axis);
+
+  Eigen::Isometry3d at(double time) const override { return motion_.at(time); }
+  ClosingSpeed closingSpeed(const Eigen::Vector3d& direction, double blur, const Eigen::Vector3d& center, double radius,
+                            double time) const override;
+  double fastest(const Eigen::Vector3d& center, double radius, double time) const override;
+
+  /// Of the fastest point, `reach` from the origin, the share of speed that the turn leaves; 0 for a perfect wheel.
+  double shareOfTurn(double reach) const { return (orbit_ + sine_ * reach) / reach; }
+
+ private:
+  double rounding(const Eigen::Vector3d& origin, double distance) const;
+
+  AxisMotion motion_;
+  Eigen::Vector3d own_axis_;
+  double turn_;          // its amount
+  double sine_, orbit_;  // of the angle between the two axes; the distance of the origin from the axis of the turn
 };
 
 /// Position and rotation vector (about the body's origin) on uniform cubic B-splines: FCL's spline.

@@ -83,6 +83,43 @@ TEST_F(Motions, AsOneBodySeesTheOtherAreBounded) {
   }
 }
 
+// A disc on the body's own axis: how far it reaches along a direction.
+TEST_F(Motions, OfBodiesOfRevolutionAreBounded) {
+  for (int i = 0; i < 3000; ++i) {
+    // From a perfect wheel to a body that is thrown about.
+    const double off = i % 5 == 0 ? 0 : std::pow(10, -3 + 3 * uniform());
+    const Isometry3d X = test::pose<double>(test::randomRotation(g_), anywhere(2));
+    const Vector3d own_axis = test::randomDirection(g_), turned = X.linear() * own_axis;
+    const Vector3d axis = (turned + off * test::randomDirection(g_)).normalized();
+    const Vector3d arm = uniform() * axis + off * anywhere(1);
+    const AxisMotion motion(X, anywhere(1), arm, axis, 3 * uniform());
+    const RevolutionMotion wheel(motion, own_axis);
+    const double begin = 0.5 + 0.5 * uniform(), height = uniform(), radius = 0.5 + 0.5 * uniform();
+    const Vector3d n = test::randomDirection(g_);
+    const auto reach = [&](double time) {
+      const Isometry3d at = motion.at(time);
+      const Vector3d own = at.linear() * own_axis;
+      return n.dot(at.translation() + height * own) + radius * n.cross(own).norm();
+    };
+    const Vector3d center = motion.at(begin) * Vector3d(height * own_axis);
+    const ClosingSpeed speed = wheel.closingSpeed(n, 0, center, radius, begin);
+    const double fastest = wheel.fastest(center, radius, begin);
+    for (int k = 1; k <= 20; ++k) {
+      const double step = (1 - begin) * k / 20, way = reach(begin + step) - reach(begin);
+      ASSERT_LE(way, speed.ever * step + 1e-12) << i;
+      ASSERT_LE(way, speed.now * step + speed.change * step * step / 2 + 1e-12) << i;
+      ASSERT_LE(std::abs(way), fastest * step + 1e-12) << i;
+    }
+    ASSERT_TRUE(wheel.at(begin).isApprox(motion.at(begin)));
+    if (off > 0) continue;
+    ASSERT_NEAR(speed.now, n.dot(motion.velocity()), 1e-12) << "it only goes straight on";
+    ASSERT_NEAR(speed.ever, n.dot(motion.velocity()), 1e-12);
+    ASSERT_NEAR(fastest, motion.velocity().norm(), 1e-12);
+    ASSERT_LT(speed.change, 1e-12);
+    ASSERT_LT(wheel.shareOfTurn(1), 1e-12);
+  }
+}
+
 TEST_F(Motions, TrianglesDoNotTouchBeforeTheyCan) {
   int touching = 0, longer = 0;
   for (int i = 0; i < 6000; ++i) {

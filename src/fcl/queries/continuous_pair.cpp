@@ -105,20 +105,17 @@ Eigen::Vector3d axisOfRevolution(const fcl::CollisionGeometry<S>& geometry) {
   }
 }
 
-/// The motion of a body of revolution that turns about its own axis, as a wheel does, without that turn. Nothing for
-/// other bodies, and where the turn moves the surface, `reach` from its origin at most, by more than `tolerance`, a
-/// length.
+/// The motion of a body of revolution, `reach` from its origin at most, that turns about nearly its own axis, as a
+/// wheel does; nothing for other bodies and motions.
 template <typename S>
-std::optional<query::AxisMotion> withoutSpin(const fcl::CollisionGeometry<S>& geometry, const Motion& motion,
-                                             double reach, double tolerance) {
+std::optional<query::RevolutionMotion> motionOfWheel(const fcl::CollisionGeometry<S>& geometry, const Motion& motion,
+                                                     double reach) {
+  constexpr double kNearly = 0.1;
   const auto* const turning = dynamic_cast<const query::AxisMotion*>(&motion);
   const Eigen::Vector3d own_axis = axisOfRevolution(geometry);
   if (turning == nullptr || own_axis.isZero(0) || turning->turn().isZero(0)) return std::nullopt;
-  const Eigen::Isometry3d begin = motion.at(0);
-  const Eigen::Vector3d axis = turning->turn().normalized();
-  if (reach * axis.cross(begin.linear() * own_axis).norm() > tolerance) return std::nullopt;
-  if (axis.cross(begin.translation() - turning->pointOfAxis()).norm() > tolerance) return std::nullopt;
-  return query::AxisMotion(begin, turning->velocity());
+  const query::RevolutionMotion wheel(*turning, own_axis);
+  return wheel.shareOfTurn(reach) < kNearly ? std::make_optional(wheel) : std::nullopt;
 }
 
 /// When a model and a shape or an octree first touch; see timeOfContact().
@@ -134,8 +131,8 @@ double walkConvex(const ContinuousQuery<S>& q, const TreeSide& a, double margin)
     ContactGoal goal = goalOf(q, model_size, size, margin);
     // The walk stops between a half of it and all of it.
     goal.rounding = std::max(goal.rounding, 2 * toleranceOfCollide(q, model_size.reach, region.radius));
-    const auto straight = withoutSpin<S>(*q.b(), q.X_WB(), size.reach, 1e-3 * goal.rounding);
-    const Motion& motion = straight ? *straight : q.X_WB();
+    const auto wheel = motionOfWheel<S>(*q.b(), q.X_WB(), size.reach);
+    const Motion& motion = wheel ? *wheel : q.X_WB();
     query::ContactTimeWalk<TreeSide, std::decay_t<decltype(b)>> walk(a, inBody(a.tree()), q.X_WA(), b,
                                                                      SimilarityTransform(), motion);
     time = walk.run(goal);
