@@ -72,8 +72,8 @@ class AxisMotion final : public Motion {
   double angle_;
 };
 
-/// How a body of revolution moves: what it turns about its own axis moves no part of its surface, so a wheel that rolls
-/// only goes straight on. Points are those of a frame that does not turn about this axis.
+/// The motion of a body of revolution without its turn about its own axis, which does not change the set of its points:
+/// a wheel that rolls moves along a line. Speeds are those of a frame that does not turn about this axis.
 class RevolutionMotion final : public Motion {
  public:
   /// `own_axis` (unit, in the body's frame) passes through the body's origin.
@@ -84,7 +84,8 @@ class RevolutionMotion final : public Motion {
                             double time) const override;
   double fastest(const Eigen::Vector3d& center, double radius, double time) const override;
 
-  /// Of the fastest point, `reach` from the origin, the share of speed that the turn leaves; 0 for a perfect wheel.
+  /// How fast the turn moves points at a distance of `reach` from the origin, at most, as a share of what it would be
+  /// with the turn about the own axis; 0 for a perfect wheel.
   double shareOfTurn(double reach) const { return (orbit_ + sine_ * reach) / reach; }
 
  private:
@@ -92,8 +93,9 @@ class RevolutionMotion final : public Motion {
 
   AxisMotion motion_;
   Eigen::Vector3d own_axis_;
-  double turn_;          // its amount
-  double sine_, orbit_;  // of the angle between the two axes; the distance of the origin from the axis of the turn
+  double turn_;   // radians over the whole time
+  double sine_;   // of the angle between the own axis and that of the turn
+  double orbit_;  // distance of the body's origin from the axis of the turn
 };
 
 /// Position and rotation vector (about the body's origin) on uniform cubic B-splines: FCL's spline.

@@ -65,7 +65,7 @@ double leastDistance(const Object<S>& a, const fcl::Transform3<S>& X_WA, const O
                                       distanceBelow<S>(a, X_WA, b, X_WB, kAny, fcl::GST_INDEP)));
 }
 
-/// Far from its origin, a plane that turns is as fast as one likes.
+/// Planes and half-spaces have no bounds: where they turn, some of their points are arbitrarily fast.
 template <typename S>
 bool isPlane(const Object<S>& o) {
   const fcl::NODE_TYPE type = o.geometry->getNodeType();
