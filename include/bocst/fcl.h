@@ -117,10 +117,12 @@ BOCST_EXPORT std::size_t collide(const fcl::CollisionGeometry<S>* o1, const fcl:
 /// - Conservative answers: the distance between the spheres at the collision depth. It is never larger than that
 ///   between the surfaces, and 0 if spheres overlap.
 /// - abs_err and rel_err: absolute and relative amount by which the answer may exceed the minimum distance, as in FCL.
-/// - enable_signed_distance: surfaces that touch get minus the penetration_depth of a contact of collide(), with both
-///   nearest points at its pos (FCL gives 0 for meshes that touch). This describes two primitives, not two bodies. For
-///   a geometry inside a solid it is minus the distance between the surfaces (the depth of collide()'s contact without
-///   margin).
+/// - enable_signed_distance: surfaces that touch get minus the penetration_depth of the contact that collide() returns
+///   when asked for one, with both nearest points at its pos (FCL gives 0 for meshes that touch). This describes two
+///   primitives, not two bodies: it depends on the order of the arguments, is seldom the deepest contact, and jumps as
+///   the geometries move, so it is no gradient for an optimiser (the largest penetration_depth of all contacts changes
+///   less). For a geometry inside a solid it is minus the distance between the surfaces (the depth of collide()'s
+///   contact without margin).
 /// The error of the answer is below 1e-11 of the geometries' sizes (1e-8 with ellipsoids, cones and cylinders), plus
 /// rounding to S. The answer does not depend on the solver, and on the resident nodes only within that error.
 /// @throws std::invalid_argument as collide(), if result.min_distance is NaN before the call, and if neither geometry

@@ -295,7 +295,7 @@ TEST(FlatWork, AVisitorIsAskedAboutAllPairsThatAreNearEnough) {
     const query::SimilarityTransform to = relative(a, b, X);
     const double distance = query::findNearest(side_a, side_b, to, {}).distance;
     const double unit = a.tree.surface().lattice.unit();
-    for (const double more : {1e-12 * distance, 0.003 / unit}) {
+    for (const double more : {1e-12 * distance, 0.003 / unit, 0.1 / unit}) {
       const double below = distance + more;
       std::set<std::pair<std::uint32_t, std::uint32_t>> expected;
       for (std::uint32_t i = 0; i < a.tree.surface().triangle_count; ++i) {
@@ -356,6 +356,32 @@ TEST(FlatWork, TouchesAreFoundByAShortWalk) {
   const query::SimilarityTransform to = relative(lower, upper, above<double>(1e-7));
   EXPECT_GT(query::findNearest(side_lower, side_upper, to, {}).distance, 0);
   EXPECT_FALSE(query::findTouch(side_lower, side_upper, to));
+}
+
+// Rough plates that are nearly parallel: the search takes more than a turn, over blocks and over oriented boxes.
+TEST(FlatWork, DistancesOfManyTurnsAreRight) {
+  std::mt19937_64 g(10);
+  std::uniform_real_distribution<double> u(0, 1);
+  Raw rough[2] = {plate(120), plate(110)};
+  for (Raw& raw : rough) {
+    for (Vector3d& v : raw.vertices) v.z() += 1e-4 * u(g);
+  }
+  Side a(rough[0]), b(rough[1]);
+  const query::TreeSide side_a(a.tree), side_b(b.tree);
+  std::size_t most = 0;
+  for (int i = 0; i < 12; ++i) {
+    const query::SimilarityTransform to = relative(a, b, above<double>(0.02 + 0.02 * u(g), 6 * u(g)));
+    query::DistanceWalk<query::TreeSide, query::TreeSide> walk(side_a, side_b, to);
+    const double expected = walk.run({}).distance;
+    most = std::max(most, walk.steps());
+    EXPECT_NEAR(query::findNearest(side_a, side_b, to, {}).distance, expected, 1e-12 * expected) << i;
+    // Shorter turns, so that each of them ends too early.
+    query::DistanceWalk<query::TreeSide, query::TreeSide> part(side_a, side_b, to);
+    const query::Nearest first = part.run({}, {}, walk.steps() / 2);
+    EXPECT_TRUE(part.gaveUp());
+    EXPECT_NEAR(part.run({}, first).distance, expected, 1e-12 * expected);
+  }
+  EXPECT_GT(most, 2048u);
 }
 
 // Rough plates of which one place touches: oriented boxes look for longer than they may, and must not say "none".

@@ -55,7 +55,9 @@ void walkWithinMargin(const query::TreeSide& a, const B& b, const query::Similar
   // What the search computes is off by less than this; so are the lengths of the tolerance.
   constexpr double kRounding = 1e-12;
   const double tolerance = near.margin + 2 * b_in_a.tolerance;  // of walks it may be larger, because of their slabs
-  const double below = tolerance * (1 + kRounding) + kRounding * 2 * lattice::kMiddle * (1 + near.scale);
+  double half_b = lattice::kMiddle;                             // of the other side, in its own unit
+  if constexpr (!std::is_same<B, query::TreeSide>::value) half_b = b.magnitude();
+  const double below = tolerance * (1 + kRounding) + kRounding * 2 * (lattice::kMiddle + half_b * near.scale);
   query::findNearest(a, b, b_in_a, {below, 0, 0, &collector});
 }
 constexpr std::size_t kMostNodePairs = 256;  ///< Of a PairWalk in such a query.

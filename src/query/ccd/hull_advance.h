@@ -30,8 +30,8 @@ class HullShape final : public SupportShape {
 /// all vertices some twenty times. All in world coordinates.
 inline double hullsApartUntil(const Mesh& a, const Motion& motion_a, const Mesh& b, const Motion& motion_b,
                               double clearance) {
-  constexpr int kMostSteps = 24, kFirstSteps = 6;
-  constexpr double kLeastStep = 1.0 / 96;  // on average, after the first
+  constexpr int kMostSteps = 24, kMostShortSteps = 2;  // so many short ones in a row mean that they soon touch
+  constexpr double kShortStep = 1.0 / 32;
   constexpr double kRounding = 1e-14, kBlur = 1e-15;
   const auto place = [](const Mesh& mesh, const Eigen::Isometry3d& X, std::vector<Eigen::Vector3d>& points) {
     points.clear();
@@ -44,8 +44,8 @@ inline double hullsApartUntil(const Mesh& a, const Motion& motion_a, const Mesh&
   const MotionPair motions(motion_a, motion_b);
   std::vector<Eigen::Vector3d> points_a, points_b;
   double time = 0;
-  for (int step = 0; step < kMostSteps && time <= 1; ++step) {
-    if (step >= kFirstSteps && time < step * kLeastStep) break;
+  int short_steps = 0;
+  for (int step = 0; step < kMostSteps && short_steps < kMostShortSteps && time <= 1; ++step) {
     const Eigen::Isometry3d X_WA = motion_a.at(time), X_WB = motion_b.at(time);
     place(a, X_WA, points_a);
     place(b, X_WB, points_b);
@@ -55,9 +55,10 @@ inline double hullsApartUntil(const Mesh& a, const Motion& motion_a, const Mesh&
     const double free = gap.at_least - kRounding * (farthest + 2 * size) - clearance;
     if (!(free > 0)) break;
     // gap.normal leads from B to A.
-    time += motions.timeToClose(free, -gap.normal, kBlur, MovingHull{points_a.data(), points_a.size()},
-                                MovingHull{points_b.data(), points_b.size()}, time) *
-            (1 - 1e-12);
+    const double later = motions.timeToClose(free, -gap.normal, kBlur, MovingHull{points_a.data(), points_a.size()},
+                                             MovingHull{points_b.data(), points_b.size()}, time);
+    short_steps = later < kShortStep ? short_steps + 1 : 0;
+    time += later * (1 - 1e-12);
   }
   return time;
 }

@@ -6,10 +6,13 @@
 
 namespace bocst::query {
 
-bool PairFrames::isFine(const SimilarityTransform& one_in_zero) {
-  const double q0 = lattice::kMiddle, q1 = q0 * one_in_zero.scale;
-  // False for NaN.
-  return fits(one_in_zero.scale) && (one_in_zero.translation.norm() + q0 + q1) * 0x1p-9 <= std::min(q0, q1);
+bool PairFrames::isFine(const SimilarityTransform& one_in_zero, std::size_t triangles_of_smaller) {
+  const double q0 = lattice::kMiddle, q1 = q0 * one_in_zero.scale, all = one_in_zero.translation.norm() + q0 + q1;
+  // By measurement. Bounds in double take three times as long; but float cannot tell which triangles are the nearest
+  // of those within the rounding margin, 320 u `all`.
+  constexpr double kMostTriangles = 0x1p25, kLeast = 0x1p6, kMost = 0x1p13;
+  const double most = std::clamp(kMostTriangles / static_cast<double>(triangles_of_smaller + 1), kLeast, kMost);
+  return all <= most * std::min(q0, q1);  // false for NaN
 }
 
 double placeSides(const SimilarityTransform& one_in_zero, SideFrame& zero, SideFrame& one) {

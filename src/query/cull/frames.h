@@ -45,8 +45,9 @@ struct PairFrames {
   /// Beyond these, one side's rounding is too coarse for the other's nodes.
   static bool fits(double scale) { return scale >= 0x1p-10 && scale <= 0x1p10; }
 
-  /// True if rounding margins are small beside both sides. False for sides far apart, which only distances ask about.
-  static bool isFine(const SimilarityTransform& one_in_zero);
+  /// True if bounds of distances in float are worth it: the rounding margin is a small part of the smaller side, which
+  /// has so many triangles. Else many of these are equally near, as far as float can tell.
+  static bool isFine(const SimilarityTransform& one_in_zero, std::size_t triangles_of_smaller);
 
   struct Side : SideFrame {
     float abs_to_other[3][3];

@@ -47,16 +47,21 @@ class DistanceWalk : private BestFirst<DistanceWalk<A, B>, A, B> {
   using Base = BestFirst<DistanceWalk<A, B>, A, B>;
 
  public:
-  using Base::gaveUp;
   using Base::steps;
 
   DistanceWalk(const A& a, const B& b, const SimilarityTransform& b_in_a)
       : Base(a, b, scratch()), b_in_a_(b_in_a), a_in_b_(b_in_a.inverse()) {
-    if constexpr (!B::kBodies) in_float_ = PairFrames::isFine(betweenLattices(b, b_in_a));
+    if constexpr (!B::kBodies) {
+      const SimilarityTransform lattices = betweenLattices(b, b_in_a);
+      in_float_ = PairFrames::isFine(lattices, lattices.scale < 1 ? b.meshTriangles() : a.meshTriangles());
+    }
     if constexpr (kHasLanes) {
       if (in_float_) gaps_.emplace(a, b, b_in_a);
     }
   }
+
+  /// True if the walk ended after its most steps, before it was sure.
+  bool gaveUp() const { return limit_ > 0 && Base::gaveUp(); }
 
   /// `known`: an answer in hand. After `most_steps` it gives up, and returns the nearest so far.
   Nearest run(const DistanceGoal& goal, const Nearest& known = {}, std::size_t most_steps = kNoLimit) {

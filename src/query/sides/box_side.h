@@ -24,6 +24,8 @@ class BoxSide : public CompleteSide {
 
   explicit BoxSide(const TreeSide& side) : side_(side), boxes_(side.tree().boxes(side.now())) {}
 
+  std::size_t meshTriangles() const { return side_.meshTriangles(); }
+
   Node root() const { return 0; }
   State state(Node n) const { return node(n).second == 0 ? State::kLeaf : State::kInner; }
   double size(Node n) const { return node(n).half.squaredNorm(); }

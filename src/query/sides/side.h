@@ -238,6 +238,7 @@ class TreeSide {
 
   std::int64_t now() const { return now_; }
   tree::Tree& tree() const { return tree_; }
+  std::size_t meshTriangles() const { return tree_.surface().triangle_count; }
 
  private:
   static Sphere sphereAbout(const Volume& v) {
