@@ -63,12 +63,12 @@ struct SceneOptions {
 /// Threads: any number of threads may query one scene, also while another thread changes it: each query sees the scene
 /// before or after a change, never a mixture (changes of a geometry itself: see update()). Changes wait for each other.
 /// A change of a fixed object takes microseconds; while queries are under way, it copies what they share (0.2 ms for
-/// 20 000 fixed objects). The first query, and the first one after
-/// moving objects came or went or after many changes, updates the scene's internal data, and other queries wait for
-/// that; apart from changes, no query waits for another. When no tree has to grow, collides() and calls with up to 128
-/// states allocate no memory (after the first such calls of a thread), except inside FCL: for pairs without a Model,
-/// and for a triangle near a shape or a cell. A child of fork() works alone; calls throw std::runtime_error if another
-/// thread of the parent was at work in the scene or in one of its models at the fork.
+/// 20 000 fixed objects). The first query, and the first one after moving objects came or went or after many changes,
+/// updates the scene's internal data, and other queries wait for that; apart from changes, no query waits for another.
+/// When no tree has to grow, collides() and calls with up to 128 states allocate no memory (after the first such calls
+/// of a thread), except inside FCL: for pairs without a Model, and for a triangle near a shape or a cell. A child of
+/// fork() works alone; calls throw std::runtime_error if another thread of the parent was at work in the scene or in
+/// one of its models at the fork.
 template <typename S>
 class BOCST_EXPORT Scene {
  public:
@@ -133,8 +133,8 @@ class BOCST_EXPORT Scene {
   /// std::numeric_limits<S>::max() without pairs. `nearest` is set to a pair at this distance; to invalid Ids without
   /// pairs. Options::margin has no effect. Of a Plane or Halfspace and another of FCL's shapes, of which fcl::distance
   /// computes nothing, it is the distance of the two.
-  /// @throws std::invalid_argument for other pairs of FCL's shapes and octrees whose distance FCL cannot compute, unless
-  /// another pair is found to be nearer before.
+  /// @throws std::invalid_argument for other pairs of FCL's shapes and octrees whose distance FCL cannot compute,
+  /// unless another pair is found to be nearer before.
   S clearance(const Transform* X_WM, Pair* nearest = nullptr) const;
   /// True if the motion of all moving objects from one state to another is free of collisions at all times. Never steps
   /// over a contact. Geometries that pass closer than the resolution of fcl::continuousCollide (see bocst/fcl.h; for
@@ -142,7 +142,8 @@ class BOCST_EXPORT Scene {
   /// moves on a line, and the object turns about a fixed axis (slerp of the normalised quaternions, which removes
   /// rounding errors of a rotation). Two of FCL's shapes and octrees that pass closer than the rounding of the motion's
   /// length also count as touching.
-  /// @throws std::invalid_argument as clearance(), and for a Plane or Halfspace that moves near another of FCL's shapes.
+  /// @throws std::invalid_argument as clearance(), and for a Plane or Halfspace that moves near another of FCL's
+  /// shapes.
   bool edgeIsFree(const Transform* X_WM_begin, const Transform* X_WM_end,
                   fcl::CCDMotionType motion = fcl::CCDM_LINEAR) const;
 

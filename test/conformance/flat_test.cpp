@@ -295,7 +295,7 @@ TEST(FlatWork, AVisitorIsAskedAboutAllPairsThatAreNearEnough) {
     const query::SimilarityTransform to = relative(a, b, X);
     const double distance = query::findNearest(side_a, side_b, to, {}).distance;
     const double unit = a.tree.surface().lattice.unit();
-    for (const double more : {1e-12 * distance, 0.003 / unit, 0.1 / unit}) {
+    for (const double more : {1e-12 * distance, 0.003 / unit, 0.6 / unit}) {
       const double below = distance + more;
       std::set<std::pair<std::uint32_t, std::uint32_t>> expected;
       for (std::uint32_t i = 0; i < a.tree.surface().triangle_count; ++i) {
