@@ -10,6 +10,7 @@
 #include <cstdint>
 #include <functional>
 #include <memory>
+#include <vector>
 
 namespace bocst {
 
@@ -38,6 +39,15 @@ class Id {
 struct Pair {
   Id a;  ///< The moving object; of two, the one added first.
   Id b;  ///< The other object.
+};
+
+/// Two objects of a scene and the distance between their surfaces in one state, in the unit of the poses.
+template <typename S>
+struct PairDistance {
+  Pair pair;                         ///< The two objects.
+  S distance = 0;                    ///< fcl::distance of the two; 0 if they touch.
+  fcl::Vector3<S> nearest_points[2]; /**< In the world, on the surfaces of pair.a and pair.b, as fcl::distance finds
+                                        them; without meaning if the two touch. */
 };
 
 /// Options of a scene.
@@ -136,6 +146,18 @@ class BOCST_EXPORT Scene {
   /// @throws std::invalid_argument for other pairs of FCL's shapes and octrees whose distance FCL cannot compute,
   /// unless another pair is found to be nearer before.
   S clearance(const Transform* X_WM, Pair* nearest = nullptr) const;
+  /// Sets distances[k] to the clearance of state k, and nearest[k] to the pair that has it. The scene's threads share
+  /// the states.
+  /// @throws std::invalid_argument as clearance(); some of the numbers are then set.
+  void clearances(const Transform* X_WM, std::size_t states, S* distances, Pair* nearest = nullptr) const;
+  /// All pairs that collide in this state, in the order of their Ids, where collides() stops at one. fcl::collide with
+  /// the objects' geometries and poses reports the contacts of such a pair.
+  std::vector<Pair> collidingPairs(const Transform* X_WM) const;
+  /// All pairs whose distance in this state is at most `distance`, the nearest first; for optimisers that keep each
+  /// pair apart. Options::margin has no effect; distances are those of clearance().
+  /// @throws std::invalid_argument as clearance(), of pairs whose bounding boxes are that near; and for a `distance`
+  /// that is negative or NaN.
+  std::vector<PairDistance<S>> pairsWithin(const Transform* X_WM, S distance) const;
   /// True if the motion of all moving objects from one state to another is free of collisions at all times. Never steps
   /// over a contact. Geometries that pass closer than the resolution of fcl::continuousCollide (see bocst/fcl.h; for
   /// two of FCL's shapes and octrees 1e-5 of their sizes) count as touching. With CCDM_LINEAR, each object's origin

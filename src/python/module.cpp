@@ -462,6 +462,29 @@ auto query(bool many, const F& f) {
   return [many, f](const PyScene& s, const py::object& X_WM) { return ask(s, X_WM, many, f); };
 }
 
+py::list pairsOf(const std::vector<Pair>& pairs) {
+  py::list list;
+  for (const Pair& p : pairs) list.append(py::make_tuple(p.a, p.b));
+  return list;
+}
+
+py::tuple pairsWithin(const PyScene& s, const py::object& X_WM, double distance) {
+  const auto found = ask(s, X_WM, false,
+                         [distance](const Scened& scene, Xs X, std::size_t) { return scene.pairsWithin(X, distance); });
+  const auto count = static_cast<py::ssize_t>(found.size());
+  std::vector<Pair> pairs;
+  py::array_t<double> distances(count), points({count, py::ssize_t{2}, py::ssize_t{3}});
+  for (const PairDistance<double>& p : found) {
+    const auto row = static_cast<py::ssize_t>(pairs.size());
+    pairs.push_back(p.pair);
+    distances.mutable_at(row) = p.distance;
+    for (int i = 0; i < 2; ++i) {
+      for (int k = 0; k < 3; ++k) points.mutable_at(row, i, k) = p.nearest_points[i][k];
+    }
+  }
+  return py::make_tuple(pairsOf(pairs), distances, points);
+}
+
 std::optional<std::pair<Id, Id>> idsOf(const Pair& pair) {
   return pair.a.isValid() ? std::optional<std::pair<Id, Id>>({pair.a, pair.b}) : std::nullopt;
 }
@@ -570,6 +593,13 @@ void bindSceneQueries(py::class_<PyScene>& type) {
                  }),
            "X_WM"_a, "A pair of Ids that collides in this state, (m, 4, 4), or None.")
       .def(
+          "colliding_pairs",
+          [](const PyScene& s, const py::object& X_WM) {
+            return pairsOf(
+                ask(s, X_WM, false, [](const Scened& scene, Xs X, std::size_t) { return scene.collidingPairs(X); }));
+          },
+          "X_WM"_a, "A list of all pairs of Ids that collide in this state, (m, 4, 4).")
+      .def(
           "collisions",
           [](const PyScene& s, const py::object& X_WM) {
             std::vector<std::uint8_t> hits;
@@ -597,6 +627,23 @@ void bindSceneQueries(py::class_<PyScene>& type) {
                    return idsOf(pair);
                  }),
            "X_WM"_a, "The pair of Ids at the minimum distance in this state, (m, 4, 4); None without pairs.")
+      .def(
+          "clearances",
+          [](const PyScene& s, const py::object& X_WM) {
+            std::vector<double> distances;
+            ask(s, X_WM, true, [&distances](const Scened& scene, Xs X, std::size_t states) {
+              distances.resize(states);
+              scene.clearances(X, states, distances.data());
+            });
+            return py::array_t<double>(static_cast<py::ssize_t>(distances.size()), distances.data());
+          },
+          "X_WM"_a,
+          "A float64 array (n,): the clearance of each of the states, (n, m, 4, 4). The scene's threads share them.")
+      .def("pairs_within", &pairsWithin, "X_WM"_a, "distance"_a,
+           R"(All pairs whose distance in this state, (m, 4, 4), is at most `distance`; the nearest first.
+
+Returns (pairs, distances, points): a list of k pairs of Ids; float64 (k,), 0 for a pair that touches; float64 (k, 2, 3),
+the nearest points on the first and the second object in the world, without meaning if the two touch.)")
       .def(
           "edge_is_free",
           [](const PyScene& s, const py::object& begin, const py::object& end, const std::string& motion) {

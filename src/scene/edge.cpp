@@ -1,22 +1,19 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #include "scene/edge.h"
 
-#include <bocst/fcl.h>
-
 #include <algorithm>
 #include <cmath>
 #include <cstdint>
 #include <limits>
 #include <optional>
-#include <stdexcept>
 #include <tuple>
 
 #include "fcl/adapters/models.h"
 #include "fcl/adapters/motion.h"
 #include "fcl/adapters/validate.h"
 #include "fcl/queries/scene_pair.h"
+#include "scene/distance.h"
 #include "scene/reach.h"
-#include "thread/of_thread.h"
 
 namespace bocst::scene {
 namespace {
@@ -29,29 +26,6 @@ constexpr int kHalvings = 4;
 
 /// What passes closer than this share of the sizes is taken to touch, between two of FCL's geometries.
 constexpr double kTouch = 1e-5;
-
-/// fcl::distance of a pair, and that to planes, no less than 0; any larger value where it is not less than `below`.
-template <typename S>
-S distanceBelow(const Object<S>& a, const fcl::Transform3<S>& X_WA, const Object<S>& b, const fcl::Transform3<S>& X_WB,
-                S below, fcl::GJKSolverType solver = fcl::GST_LIBCCD) {
-  fcl::DistanceRequest<S> request;
-  request.gjk_solver_type = solver;
-  fcl::DistanceResult<S> result;
-  const bool has_model = a.model != nullptr || b.model != nullptr;
-  if (has_model) {
-    result.min_distance = below;
-  } else {
-    const std::optional<double> known = fcl_adapter::distanceToPlane<S>(*a.geometry, X_WA, *b.geometry, X_WB);
-    if (known.has_value()) return static_cast<S>(*known);
-  }
-  const S d = bocst::distance<S>(a.geometry.get(), X_WA, b.geometry.get(), X_WB, request, result);
-  if (!has_model && result.o1 == nullptr && !(d < std::numeric_limits<S>::max())) {
-    throw std::invalid_argument("bocst::Scene: FCL computes no distance of " +
-                                fcl_adapter::typeName<S>(a.geometry.get()) + " and " +
-                                fcl_adapter::typeName<S>(b.geometry.get()));
-  }
-  return std::max(d, S(0));
-}
 
 /// No more than the distance of two of FCL's geometries. Its solvers may say more, each for other poses; shapes are
 /// measured here, and of octrees the lesser of both solvers' answers is taken.
@@ -231,66 +205,9 @@ bool edgeIsFree(const World<S>& world, StateCheck<S>& check, const fcl::Transfor
   return Edge<S>(world, check, begin, end, motion).isFree();
 }
 
-template <typename S>
-S clearance(const World<S>& world, StateCheck<S>& check, const fcl::Transform3<S>* X_WM, PairAt& nearest) {
-  check.start(world);
-  check.place(X_WM);
-  struct Candidate {
-    float gap;
-    PairAt pair;
-  };
-  struct Lists {
-    std::vector<Candidate> candidates;
-    std::vector<std::uint64_t> asked;
-  };
-  std::vector<Candidate>& candidates = thread::ofThread<Lists>().candidates;
-  std::vector<std::uint64_t>& asked = thread::ofThread<Lists>().asked;  // in earlier rounds, sorted
-  asked.clear();
-  const auto nameOf = [](const PairAt& p) {
-    return std::uint64_t{p.moving} << 32 | std::uint64_t{8 * p.group + p.lane};
-  };
-  S least = std::numeric_limits<S>::max();
-  // Pairs of boxes are listed in rounds, each with a longer reach, so most are never listed. Once something was found,
-  // the next round, as long as that, is the last.
-  constexpr float kInfinity = std::numeric_limits<float>::infinity(), kMost = std::numeric_limits<float>::max();
-  constexpr float kLonger = 4;
-  for (float reach = std::max(static_cast<float>(check.clearance_guess), std::numeric_limits<float>::min());;
-       reach =
-           std::min(kLonger * reach, std::nextafter(static_cast<float>(std::min<double>(least, kMost)), kInfinity))) {
-    const bool is_last = !(reach < kUnboxedSize);
-    if (is_last) reach = kMost;
-    candidates.clear();
-    for (const NearGroup& n : check.findNear(reach)) {
-      for (std::uint32_t left = n.mask; left != 0; left &= left - 1) {
-        const PairAt pair{n.box, n.group, static_cast<std::uint32_t>(__builtin_ctz(left))};
-        if (std::binary_search(asked.begin(), asked.end(), nameOf(pair))) continue;
-        candidates.push_back({n.gap[pair.lane], pair});
-      }
-    }
-    std::sort(candidates.begin(), candidates.end(),
-              [](const Candidate& p, const Candidate& q) { return p.gap < q.gap; });
-    for (const Candidate& c : candidates) {
-      if (static_cast<double>(c.gap) >= static_cast<double>(least)) break;
-      asked.push_back(nameOf(c.pair));
-      const Object<S>&a = world.moving[c.pair.moving], &b = world.object(c.pair.group, c.pair.lane);
-      const S d = distanceBelow<S>(a, X_WM[c.pair.moving], b, check.pose(X_WM, c.pair.group, c.pair.lane), least);
-      if (!(d < least)) continue;
-      least = d;
-      nearest = c.pair;
-      if (!(least > 0)) return least;
-    }
-    if (is_last || static_cast<double>(least) <= static_cast<double>(reach)) break;
-    std::sort(asked.begin(), asked.end());
-  }
-  const auto found = static_cast<double>(least);
-  if (found < kUnboxedSize) check.clearance_guess = std::max(found, check.clearance_guess / kLonger);
-  return least;
-}
-
 #define BOCST_INSTANTIATE(S)                                                                                      \
   template bool edgeIsFree(const World<S>&, StateCheck<S>&, const fcl::Transform3<S>*, const fcl::Transform3<S>*, \
-                           fcl::CCDMotionType);                                                                   \
-  template S clearance(const World<S>&, StateCheck<S>&, const fcl::Transform3<S>*, PairAt&);
+                           fcl::CCDMotionType);
 BOCST_INSTANTIATE(float)
 BOCST_INSTANTIATE(double)
 #undef BOCST_INSTANTIATE

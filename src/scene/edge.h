@@ -13,9 +13,4 @@ template <typename S>
 bool edgeIsFree(const World<S>& world, StateCheck<S>& check, const fcl::Transform3<S>* begin,
                 const fcl::Transform3<S>* end, fcl::CCDMotionType motion);
 
-/// The least fcl::distance of all pairs, no less than 0, and a pair that has it; the largest S without pairs.
-/// @throws std::invalid_argument where FCL knows no distance.
-template <typename S>
-S clearance(const World<S>& world, StateCheck<S>& check, const fcl::Transform3<S>* X_WM, PairAt& nearest);
-
 }  // namespace bocst::scene

@@ -11,6 +11,7 @@
 #include <shared_mutex>
 #include <stdexcept>
 #include <string>
+#include <tuple>
 #include <utility>
 #include <vector>
 
@@ -19,6 +20,7 @@
 #include "fcl/adapters/validate.h"
 #include "fcl/queries/grow_together.h"
 #include "fcl/queries/scene_pair.h"
+#include "scene/distance.h"
 #include "scene/edge.h"
 #include "scene/sweep.h"
 #include "thread/of_thread.h"
@@ -260,6 +262,21 @@ struct Scene<S>::Impl {
     return found;
   }
 
+  void clearances(const char* query, const Transform* X_WM, std::size_t states, S* distances, Pair* nearest) const {
+    const WorldPtr w = current();
+    const std::size_t moving = w->moving.size();
+    pool.share(states, [&](std::size_t k) {
+      const Transform* X = X_WM == nullptr ? nullptr : X_WM + k * moving;
+      scene::StateCheck<S>& check = sweepOfThread<S>().check();
+      scene::checkPoses<S>(query, X, 1, moving, check.orthogonality_errors, nullptr, k);
+      scene::PairAt pair;
+      distances[k] = scene::clearance(*w, check, X, pair);
+      const bool has_pair = distances[k] < std::numeric_limits<S>::max();
+      if (nearest != nullptr) nearest[k] = has_pair ? named(*w, pair) : Pair();
+      return true;
+    });
+  }
+
   Pair named(const World<S>& w, const scene::PairAt& p) const {
     return {w.moving[p.moving].id, w.object(p.group, p.lane).id};
   }
@@ -409,13 +426,43 @@ void Scene<S>::collisions(const Transform* X_WM, std::size_t states, std::uint8_
 
 template <typename S>
 S Scene<S>::clearance(const Transform* X_WM, Pair* nearest) const {
+  S distance;
+  impl_->clearances("clearance", X_WM, 1, &distance, nearest);
+  return distance;
+}
+
+template <typename S>
+void Scene<S>::clearances(const Transform* X_WM, std::size_t states, S* distances, Pair* nearest) const {
+  if (states != 0 && distances == nullptr) {
+    throw std::invalid_argument("bocst::Scene::clearances: distances is null");
+  }
+  impl_->clearances("clearances", X_WM, states, distances, nearest);
+}
+
+template <typename S>
+std::vector<Pair> Scene<S>::collidingPairs(const Transform* X_WM) const {
   const auto w = impl_->current();
   scene::StateCheck<S>& check = sweepOfThread<S>().check();
-  scene::checkPoses<S>("clearance", X_WM, 1, w->moving.size(), check.orthogonality_errors);
-  scene::PairAt pair;
-  const S least = scene::clearance(*w, check, X_WM, pair);
-  if (nearest != nullptr) *nearest = least < std::numeric_limits<S>::max() ? impl_->named(*w, pair) : Pair();
-  return least;
+  scene::checkPoses<S>("collidingPairs", X_WM, 1, w->moving.size(), check.orthogonality_errors);
+  check.start(*w);
+  std::vector<scene::PairAt> touching;
+  check.listTouching(X_WM, touching);
+  std::vector<Pair> pairs;
+  for (const scene::PairAt& p : touching) pairs.push_back(impl_->named(*w, p));
+  std::sort(pairs.begin(), pairs.end(),
+            [](const Pair& p, const Pair& q) { return std::tie(p.a, p.b) < std::tie(q.a, q.b); });
+  return pairs;
+}
+
+template <typename S>
+std::vector<PairDistance<S>> Scene<S>::pairsWithin(const Transform* X_WM, S distance) const {
+  if (!(distance >= 0)) {
+    throw std::invalid_argument("bocst::Scene::pairsWithin: distance is " + std::to_string(distance));
+  }
+  const auto w = impl_->current();
+  scene::StateCheck<S>& check = sweepOfThread<S>().check();
+  scene::checkPoses<S>("pairsWithin", X_WM, 1, w->moving.size(), check.orthogonality_errors);
+  return scene::pairsWithin(*w, check, X_WM, distance);
 }
 
 template <typename S>

@@ -169,6 +169,19 @@ void StateCheck<S>::addCandidates(const fcl::Transform3<S>* X_WM, const NearGrou
   }
 }
 
+template <typename S>
+void StateCheck<S>::listTouching(const fcl::Transform3<S>* X_WM, std::vector<PairAt>& pairs) {
+  place(X_WM);
+  for (const NearGroup& n : findNear(0)) {
+    for (std::uint32_t left = n.mask; left != 0; left &= left - 1) {
+      const PairAt p{n.box, n.group, static_cast<std::uint32_t>(__builtin_ctz(left))};
+      const Object<S>&mover = world_->moving[p.moving], &other = world_->object(p.group, p.lane);
+      if (isEmptied(mover) || isEmptied(other)) continue;
+      if (touch(mover, X_WM[p.moving], other, pose(X_WM, p.group, p.lane), result_)) pairs.push_back(p);
+    }
+  }
+}
+
 // Asks about the deep pairs of a moving object. What probes prove saves the walks of the others.
 template <typename S>
 void StateCheck<S>::askDeep(const fcl::Transform3<S>* X_WM, std::vector<Entry>* entries) {

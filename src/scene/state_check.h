@@ -64,6 +64,9 @@ class StateCheck {
     return world_->isFixed(group) ? world_->object(group, lane).X_WG : X_WM[world_->movingIndex(group, lane)];
   }
 
+  /// The pairs that touch, in any order.
+  void listTouching(const fcl::Transform3<S>* X_WM, std::vector<PairAt>& pairs);
+
   /// Places the objects alone.
   void place(const fcl::Transform3<S>* X_WM);
   /// The groups that are no farther than `most` from each moving object, as they were last placed.

@@ -165,6 +165,20 @@ def test_scene():
         assert (pair is not None) == hit and (not hit or set(pair) & set(moving))
         assert (scene.clearance(state) <= 0) == hit
         assert len(scene.nearest_pair(state)) == 2
+        touching = scene.colliding_pairs(state)
+        assert bool(touching) == hit and (not hit or pair in touching)
+        pairs, distances, points = scene.pairs_within(state, 1.0)
+        assert (scene.clearance(state) <= 1) == bool(pairs) and (np.diff(distances) >= 0).all()
+        assert set(touching) == {p for p, d in zip(pairs, distances) if d == 0}
+        if pairs:
+            assert distances[0] == scene.clearance(state) and scene.nearest_pair(state) in pairs
+            apart = distances > 0
+            gaps = np.linalg.norm(points[:, 0] - points[:, 1], axis=1)
+            assert points.shape == (len(pairs), 2, 3) and np.allclose(gaps[apart], distances[apart], atol=1e-5)
+    assert np.array_equal(scene.clearances(X[:100]), [scene.clearance(state) for state in X[:100]])
+    assert scene.clearances(X[:0]).shape == (0,)
+    with pytest.raises(ValueError, match="distance is -1"):
+        scene.pairs_within(X[0], -1.0)
     scene.build_trees()
     assert np.array_equal(scene.collisions(X), expected)
     scene.ignore(moving[0], fixed[0])

@@ -14,12 +14,14 @@
 #include <fstream>
 #include <functional>
 #include <limits>
+#include <map>
 #include <memory>
 #include <new>
 #include <random>
 #include <set>
 #include <string>
 #include <thread>
+#include <tuple>
 #include <utility>
 #include <vector>
 
@@ -215,6 +217,9 @@ void checkVerdicts(const World<S>& w, const States<S>& X, std::size_t states, st
     if (expected[k]) {
       EXPECT_EQ(touching.count({pair.a, pair.b}), 1u);
     }
+    std::vector<std::pair<Id, Id>> listed;
+    for (const Pair& p : w.scene.collidingPairs(X.data() + k * moving)) listed.emplace_back(p.a, p.b);
+    ASSERT_EQ(listed, std::vector(touching.begin(), touching.end())) << "state " << k;
   }
   w.scene.collisions(X.data(), states, hit.data());
   EXPECT_EQ(hit, expected);
@@ -655,6 +660,13 @@ TYPED_TEST(SceneTest, ScenesWithoutPairs) {
     Pair nearest;
     EXPECT_EQ(scene.clearance(X, &nearest), std::numeric_limits<S>::max());
     EXPECT_FALSE(nearest.a.isValid() || nearest.b.isValid());
+    S distances[3] = {1, 1, 1};
+    Pair pairs[3];
+    scene.clearances(X, 3, distances, pairs);
+    EXPECT_EQ(distances[0] + distances[1] + distances[2], 3 * std::numeric_limits<S>::max());
+    EXPECT_FALSE(pairs[0].a.isValid());
+    EXPECT_TRUE(scene.collidingPairs(X).empty());
+    EXPECT_TRUE(scene.pairsWithin(X, std::numeric_limits<S>::infinity()).empty());
     EXPECT_TRUE(scene.edgeIsFree(X, X));
     EXPECT_EQ(scene.pairCount(), 0u);
   };
@@ -683,9 +695,11 @@ TYPED_TEST(SceneTest, ClearanceIsTheLeastDistance) {
   for (std::size_t i = 2; i < 25; i += 3) w.ignore(w.moving[2].id, w.fixed[i].id);
   const double tolerance = std::is_same<S, double>::value ? 1e-5 : 1e-4;  // of FCL's pairs
   int near = 0, apart = 0;
+  States<S> states;
   for (int k = 0; k < 60; ++k) {
     States<S> X;
     for (std::size_t i = 0; i < 3; ++i) X.push_back(randomPose<S>(g, k % 2 == 0 ? 3 : 6));
+    states.insert(states.end(), X.begin(), X.end());
     Pair nearest;
     const S expected = w.clearance(X.data());
     ASSERT_NEAR(w.scene.clearance(X.data(), &nearest), expected, tolerance);
@@ -697,6 +711,97 @@ TYPED_TEST(SceneTest, ClearanceIsTheLeastDistance) {
   }
   EXPECT_GT(near, 5);
   EXPECT_GT(apart, 5);
+  for (const unsigned threads : {1u, 3u}) {
+    World<S> shared(threads);
+    for (const auto& o : w.fixed) shared.fix(o.geometry, o.X_WG);
+    for (const auto& o : w.moving) shared.move(o.geometry);
+    std::vector<S> all(60);
+    std::vector<Pair> nearest(60);
+    shared.scene.clearances(states.data(), 60, all.data(), nearest.data());
+    for (std::size_t k = 0; k < 60; ++k) {
+      Pair pair;
+      EXPECT_EQ(shared.scene.clearance(&states[3 * k], &pair), all[k]);
+      EXPECT_EQ(pair.a == nearest[k].a && pair.b == nearest[k].b, true);
+    }
+    shared.scene.clearances(states.data(), 60, all.data());
+    shared.scene.clearances(nullptr, 0, nullptr);
+  }
+}
+
+template <typename S>
+bool isOnSurface(const fcl::CollisionGeometry<S>& g, const fcl::Transform3<S>& X_WG, const fcl::Vector3<S>& point,
+                 double tolerance) {
+  const fcl::Sphere<S> ball(static_cast<S>(tolerance / 4));
+  return static_cast<double>(test::distance<S>(
+             g, X_WG, ball, test::pose<S>(Eigen::Matrix3d::Identity(), point.template cast<double>()))) < tolerance;
+}
+
+TYPED_TEST(SceneTest, PairsWithinADistance) {
+  using S = TypeParam;
+  World<S> w;
+  std::mt19937_64 g(21);
+  for (std::size_t i = 0; i < 30; ++i) w.fix(geometry<S>(i % 5 == 4 ? 7 : i % 10, g), randomPose<S>(g, 3));
+  const Id nowhere = w.fix(test::cloud<S>(std::make_shared<octomap::OcTree>(0.1)), fcl::Transform3<S>::Identity());
+  for (const std::size_t kind : {0, 2, 4, 9}) w.move(geometry<S>(kind, g));
+  w.ignore(w.moving[0].id, w.fixed[4].id);
+  // FCL's own distance of a mesh and a shape depends on values that it has not set.
+  for (const auto& o : w.fixed) {
+    if (o.id == nowhere || fcl_adapter::asModel<S>(o.geometry.get()) == nullptr) w.ignore(o.id, w.moving[3].id);
+  }
+  const double tolerance = std::is_same<S, double>::value ? 1e-5 : 1e-4;
+  std::size_t listed = 0, left_out = 0;
+  for (int k = 0; k < 40; ++k) {
+    States<S> X;
+    for (std::size_t i = 0; i < 4; ++i) X.push_back(randomPose<S>(g, 3));
+    for (const S most : {S(0), w.scene.clearance(X.data()), S(0.3), S(2), std::numeric_limits<S>::max(),
+                         std::numeric_limits<S>::infinity()}) {
+      const std::vector<PairDistance<S>> found = w.scene.pairsWithin(X.data(), most);
+      std::map<std::pair<Id, Id>, S> distance_of;
+      for (std::size_t i = 0; i < found.size(); ++i) {
+        EXPECT_LE(found[i].distance, most);
+        EXPECT_LE(found[i == 0 ? 0 : i - 1].distance, found[i].distance);
+        const auto [a, b] = found[i].pair;
+        EXPECT_TRUE(distance_of.emplace(std::pair(a, b), found[i].distance).second) << "twice";
+      }
+      if (most == w.scene.clearance(X.data())) {
+        EXPECT_GE(found.size(), 1u);
+      }
+      std::size_t seen = 0;
+      w.pairs(X.data(), [&](const auto& a, const auto& X_WA, const auto& b, const auto& X_WB) {
+        if (b.id == nowhere) return;
+        const S d = std::max(test::distance<S>(*a.geometry, X_WA, *b.geometry, X_WB), S(0));
+        const auto at = distance_of.find({a.id, b.id});
+        if (at == distance_of.end()) {
+          EXPECT_GT(d, S(0)) << "touching pairs are never left out";
+          EXPECT_GT(d, most - static_cast<S>(tolerance)) << most;
+          ++left_out;
+          return;
+        }
+        ++seen;
+        EXPECT_NEAR(d, at->second, tolerance);
+        if (d < S(tolerance) || most != S(2)) return;
+        const auto& points = std::find_if(found.begin(), found.end(), [&](const auto& p) {
+                               return p.pair.a == a.id && p.pair.b == b.id;
+                             })->nearest_points;
+        EXPECT_NEAR((points[0] - points[1]).norm(), d, tolerance);
+        // Of conservative answers the points are those of spheres; FCL measures no mesh of its own and a shape well.
+        const auto isMeasured = [](const fcl::CollisionGeometry<S>& geometry) {
+          const Model<S>* model = fcl_adapter::asModel<S>(&geometry);
+          return model != nullptr && model->options().answer == Answer::kExact;
+        };
+        if (isMeasured(*a.geometry)) {
+          EXPECT_TRUE(isOnSurface<S>(*a.geometry, X_WA, points[0], 10 * tolerance));
+        }
+        if (isMeasured(*b.geometry)) {
+          EXPECT_TRUE(isOnSurface<S>(*b.geometry, X_WB, points[1], 10 * tolerance));
+        }
+      });
+      EXPECT_EQ(seen, found.size());
+      listed += seen;
+    }
+  }
+  EXPECT_GT(listed, 1000u);
+  EXPECT_GT(left_out, 1000u);
 }
 
 // Bodies that pass each other and others: what the middle of a row says must hold for all of its states.
@@ -1160,6 +1265,8 @@ TYPED_TEST(SceneTest, AModelThatWasEmptied) {
           EXPECT_FALSE(scene.collides(&X[2 * k]));
           EXPECT_TRUE(scene.edgeIsFree(&X[2 * k], &X[2 * k]));
           EXPECT_GT(scene.clearance(&X[2 * k]), S(90));
+          EXPECT_TRUE(scene.collidingPairs(&X[2 * k]).empty());
+          EXPECT_TRUE(scene.pairsWithin(&X[2 * k], S(50)).empty());
         }
       }
     }
@@ -1315,6 +1422,10 @@ TYPED_TEST(SceneTest, MisuseThrows) {
   EXPECT_THROW(scene.addMoving(unfinished), std::invalid_argument);
   EXPECT_THROW(scene.collides(nullptr), std::invalid_argument);
   EXPECT_THROW(scene.collisions(nullptr, 1, nullptr), std::invalid_argument);
+  EXPECT_THROW(scene.clearances(&good, 1, nullptr), std::invalid_argument);
+  for (const S distance : {S(-1), std::numeric_limits<S>::quiet_NaN()}) {
+    EXPECT_THROW(scene.pairsWithin(&good, distance), std::invalid_argument);
+  }
 
   const S nan = std::numeric_limits<S>::quiet_NaN(), inf = std::numeric_limits<S>::infinity();
   std::vector<fcl::Transform3<S>> bad(6, good);
@@ -1331,15 +1442,19 @@ TYPED_TEST(SceneTest, MisuseThrows) {
       States<S> states(6, test::pose<S>(Eigen::Matrix3d::Identity(), {9, 9, 9}));
       states[at] = X;
       std::uint8_t hit[3];
+      S distances[3];
       const std::string name = "object " + std::to_string(at % 2) + " in state " + std::to_string(at / 2);
       for (const std::string& said : {complaintOf([&] { scene.firstCollision(states.data(), 3); }),
                                       complaintOf([&] { scene.anyCollision(states.data(), 3); }),
-                                      complaintOf([&] { scene.collisions(states.data(), 3, hit); })}) {
+                                      complaintOf([&] { scene.collisions(states.data(), 3, hit); }),
+                                      complaintOf([&] { scene.clearances(states.data(), 3, distances); })}) {
         EXPECT_NE(said.find(name), std::string::npos) << said;
       }
       if (at >= 2) continue;
       EXPECT_THROW(scene.collides(states.data()), std::invalid_argument);
       EXPECT_THROW(scene.clearance(states.data()), std::invalid_argument);
+      EXPECT_THROW(scene.collidingPairs(states.data()), std::invalid_argument);
+      EXPECT_THROW(scene.pairsWithin(states.data(), S(1)), std::invalid_argument);
       EXPECT_THROW(scene.edgeIsFree(states.data(), states.data() + 2), std::invalid_argument);
       EXPECT_THROW(scene.edgeIsFree(states.data() + 2, states.data()), std::invalid_argument);
     }
@@ -1461,6 +1576,24 @@ TYPED_TEST(SceneTest, ShapesBesidePlanes) {
         Pair nearest;
         EXPECT_NEAR(static_cast<double>(scene.clearance(X.data(), &nearest)), std::max(gap, 0.0), 100 * rounding);
         EXPECT_EQ(nearest.a, id);
+        const S most = static_cast<S>(std::max(gap, 0.0) + 1000 * rounding);
+        const std::vector<PairDistance<S>> near = scene.pairsWithin(X.data(), most);
+        ASSERT_EQ(near.size(), 1u);
+        EXPECT_NEAR(near[0].distance, std::max(gap, 0.0), 100 * rounding);
+        if (gap > 0.01) {
+          EXPECT_EQ(scene.pairsWithin(X.data(), static_cast<S>(gap - 0.01)).size(), 0u);
+          const V on_shape = near[0].nearest_points[0], on_plane = near[0].nearest_points[1];
+          EXPECT_NEAR((on_shape - on_plane).norm(), gap, 100 * rounding);
+          EXPECT_NEAR(normal.dot(X_WP.inverse() * on_plane), 0.5, 100 * rounding);
+          EXPECT_TRUE(isOnSurface<S>(*shape, X[0], on_shape, 1e-3));
+          States<S> there{X_WP};
+          Scene<S> swapped;
+          swapped.addMoving(plane);
+          swapped.addFixed(shape, X[0]);
+          const PairDistance<S> same = swapped.pairsWithin(there.data(), most).at(0);
+          EXPECT_EQ(same.nearest_points[0], on_plane);
+          EXPECT_EQ(same.nearest_points[1], on_shape);
+        }
         ++(gap < 0 ? touching : low > 0 ? above : below);
         if (is_wrong || std::abs(gap) < 2 * short_of) continue;
         EXPECT_EQ(scene.collides(X.data()), gap < 0);

@@ -3,6 +3,7 @@
 
 #include <algorithm>
 #include <limits>
+#include <utility>
 
 #include "fcl/adapters/convex_shapes.h"
 #include "fcl/adapters/pair.h"
@@ -39,37 +40,50 @@ void withBoundedShape(const fcl::CollisionGeometry<S>& g, F&& f) {
   });
 }
 
-/// How far a body is beyond a half-space, or beyond either side of a plane; negative: they overlap.
+/// Of a half-space, or of a plane, whichever side the body is on, and of a body.
 template <typename Shape>
-double gapTo(const Shape& plane, const Eigen::Isometry3d& X_WP, const query::SupportShape& body,
-             const Eigen::Isometry3d& X_WB) {
+PlaneDistance distanceOf(const Shape& plane, const Eigen::Isometry3d& X_WP, const query::SupportShape& body,
+                         const Eigen::Isometry3d& X_WB) {
   const auto [n, height] = equationOf(plane);
-  const Eigen::Vector3d normal = X_WP.linear() * n, normal_in_body = X_WB.linear().transpose() * normal;
-  // Not the height in the world: both may be far from its origin.
-  const double middle = normal.dot(X_WB.translation() - X_WP.translation()) - height;
-  const double lowest = middle + normal_in_body.dot(body.support(-normal_in_body)) - body.radius();
-  if (plane.getNodeType() == fcl::GEOM_HALFSPACE) return lowest;
-  return std::max(lowest, -(middle + normal_in_body.dot(body.support(normal_in_body)) + body.radius()));
+  const Eigen::Vector3d normal = X_WP.linear() * n;
+  // The gap on the side that the normal points to, and the point of the body that is nearest to the plane there.
+  const auto on_side = [&](double sign) {
+    const Eigen::Vector3d towards_body = sign * normal, in_body = X_WB.linear().transpose() * towards_body;
+    const Eigen::Vector3d arm = X_WB.linear() * (body.support(-in_body) - body.radius() * in_body);
+    // Not the height in the world: both may be far from its origin.
+    const double middle = towards_body.dot(X_WB.translation() - X_WP.translation()) - sign * height;
+    const double gap = middle + towards_body.dot(arm);
+    const Eigen::Vector3d point = X_WB.translation() + arm;
+    return PlaneDistance{gap, {point - gap * towards_body, point}};
+  };
+  PlaneDistance result = on_side(1);
+  if (plane.getNodeType() == fcl::GEOM_PLANE) {
+    const PlaneDistance other = on_side(-1);
+    if (other.distance > result.distance) result = other;
+  }
+  result.distance = std::max(result.distance, 0.0);
+  return result;
 }
 
 }  // namespace
 
 template <typename S>
-std::optional<double> distanceToPlane(const fcl::CollisionGeometry<S>& a, const fcl::Transform3<S>& X_WA,
-                                      const fcl::CollisionGeometry<S>& b, const fcl::Transform3<S>& X_WB) {
-  const fcl::NODE_TYPE type = b.getNodeType();
+std::optional<PlaneDistance> distanceToPlane(const fcl::CollisionGeometry<S>& a, const fcl::Transform3<S>& X_WA,
+                                             const fcl::CollisionGeometry<S>& b, const fcl::Transform3<S>& X_WB) {
+  const fcl::NODE_TYPE type = a.getNodeType();
+  std::optional<PlaneDistance> result;
   if (type != fcl::GEOM_PLANE && type != fcl::GEOM_HALFSPACE) {
-    if (a.getNodeType() != fcl::GEOM_PLANE && a.getNodeType() != fcl::GEOM_HALFSPACE) return std::nullopt;
-    return distanceToPlane<S>(b, X_WB, a, X_WA);
+    if (b.getNodeType() != fcl::GEOM_PLANE && b.getNodeType() != fcl::GEOM_HALFSPACE) return result;
+    result = distanceToPlane<S>(b, X_WB, a, X_WA);
+    if (result.has_value()) std::swap(result->nearest_points[0], result->nearest_points[1]);
+    return result;
   }
-  std::optional<double> distance;
-  withBoundedShape<S>(a, [&](const query::SupportShape& body) {
-    const Eigen::Isometry3d X = isometryOf<S>(X_WB), Y = isometryOf<S>(X_WA);
-    const double gap = type == fcl::GEOM_PLANE ? gapTo(static_cast<const fcl::Plane<S>&>(b), X, body, Y)
-                                               : gapTo(static_cast<const fcl::Halfspace<S>&>(b), X, body, Y);
-    distance = std::max(gap, 0.0);
+  withBoundedShape<S>(b, [&](const query::SupportShape& body) {
+    const Eigen::Isometry3d X = isometryOf<S>(X_WA), Y = isometryOf<S>(X_WB);
+    result = type == fcl::GEOM_PLANE ? distanceOf(static_cast<const fcl::Plane<S>&>(a), X, body, Y)
+                                     : distanceOf(static_cast<const fcl::Halfspace<S>&>(a), X, body, Y);
   });
-  return distance;
+  return result;
 }
 
 template <typename S>
@@ -109,14 +123,14 @@ template std::optional<double> distanceOfShapes<double>(const fcl::CollisionGeom
                                                         const fcl::Transform3<double>&,
                                                         const fcl::CollisionGeometry<double>&,
                                                         const fcl::Transform3<double>&);
-template std::optional<double> distanceToPlane<float>(const fcl::CollisionGeometry<float>&,
-                                                      const fcl::Transform3<float>&,
-                                                      const fcl::CollisionGeometry<float>&,
-                                                      const fcl::Transform3<float>&);
-template std::optional<double> distanceToPlane<double>(const fcl::CollisionGeometry<double>&,
-                                                       const fcl::Transform3<double>&,
-                                                       const fcl::CollisionGeometry<double>&,
-                                                       const fcl::Transform3<double>&);
+template std::optional<PlaneDistance> distanceToPlane<float>(const fcl::CollisionGeometry<float>&,
+                                                             const fcl::Transform3<float>&,
+                                                             const fcl::CollisionGeometry<float>&,
+                                                             const fcl::Transform3<float>&);
+template std::optional<PlaneDistance> distanceToPlane<double>(const fcl::CollisionGeometry<double>&,
+                                                              const fcl::Transform3<double>&,
+                                                              const fcl::CollisionGeometry<double>&,
+                                                              const fcl::Transform3<double>&);
 template std::unique_ptr<Model<float>> modelOfBvh<float>(const fcl::CollisionGeometry<float>&);
 template std::unique_ptr<Model<double>> modelOfBvh<double>(const fcl::CollisionGeometry<double>&);
 template bool hullsApart<float>(const Model<float>&, const fcl::Transform3<float>&, const Model<float>&,

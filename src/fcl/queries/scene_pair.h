@@ -23,11 +23,17 @@ template <typename S>
 std::optional<double> distanceOfShapes(const fcl::CollisionGeometry<S>& a, const fcl::Transform3<S>& X_WA,
                                        const fcl::CollisionGeometry<S>& b, const fcl::Transform3<S>& X_WB);
 
+/// Of two geometries, with their nearest points in the world.
+struct PlaneDistance {
+  double distance;
+  Eigen::Vector3d nearest_points[2];
+};
+
 /// The distance of a bounded shape of FCL and a Plane or Halfspace, which FCL does not compute; 0 where they touch.
 /// Null for other geometries.
 template <typename S>
-std::optional<double> distanceToPlane(const fcl::CollisionGeometry<S>& a, const fcl::Transform3<S>& X_WA,
-                                      const fcl::CollisionGeometry<S>& b, const fcl::Transform3<S>& X_WB);
+std::optional<PlaneDistance> distanceToPlane(const fcl::CollisionGeometry<S>& a, const fcl::Transform3<S>& X_WA,
+                                             const fcl::CollisionGeometry<S>& b, const fcl::Transform3<S>& X_WB);
 
 /// A model of the triangles of an fcl::BVHModel. @throws std::invalid_argument for other geometries, and for a mesh
 /// that is not finished or that Mesh refuses.

@@ -24,7 +24,7 @@ template <typename S>
 class ModelSide final : public BocstSide {
  public:
   ModelSide(const Bodies& bodies, const std::vector<Eigen::Isometry3d>& poses, const Options& options)
-      : bodies_(bodies), poses_(poses, bodies.moving), by_boxes_(options.answer == Answer::kExact) {
+      : poses_(poses, bodies.moving) {
     for (const Shape& shape : bodies.shapes) geometries_.push_back(geometryOf(shape, options));
     std::vector<Id> ids;
     for (std::size_t i = 0; i < bodies.bodies.size(); ++i) {
@@ -33,8 +33,6 @@ class ModelSide final : public BocstSide {
                         ? scene_.addMoving(geometry)
                         : scene_.addFixed(geometry, fcl::Transform3<S>(bodies.X_WB[i - bodies.moving].cast<S>())));
       body_of_[ids.back()] = i;
-      objects_.emplace_back(geometry);
-      if (i >= bodies.moving) place(objects_.back(), bodies.X_WB[i - bodies.moving].cast<S>());
     }
     for (std::size_t a = 0; a < bodies.moving; ++a) {
       for (std::size_t b = a + 1; b < ids.size(); ++b) {
@@ -49,16 +47,10 @@ class ModelSide final : public BocstSide {
     return hit;
   }
 
-  /// Scene stops at the first pair, so each one is asked that comes near.
   std::vector<BodyPair> pairs(std::size_t state) override {
-    for (std::size_t i = 0; i < bodies_.moving; ++i) place(objects_[i], poses_.state(state)[i]);
     std::vector<BodyPair> found;
-    for (std::size_t a = 0; a < bodies_.moving; ++a) {
-      for (std::size_t b = a + 1; b < objects_.size(); ++b) {
-        if (!bodies_.asked(a, b) || (by_boxes_ && !near(objects_[a], objects_[b]))) continue;
-        if (touch(objects_[a], objects_[b])) found.emplace_back(a, b);
-      }
-    }
+    for (const Pair& pair : scene_.collidingPairs(poses_.state(state))) found.push_back(bodiesOf(pair));
+    std::sort(found.begin(), found.end());
     return found;
   }
 
@@ -74,7 +66,7 @@ class ModelSide final : public BocstSide {
     Pair nearest;
     Clearance result;
     result.distance = scene_.clearance(poses_.state(state), &nearest);
-    if (nearest.a.isValid()) result.nearest = std::minmax(body_of_.at(nearest.a), body_of_.at(nearest.b));
+    if (nearest.a.isValid()) result.nearest = bodiesOf(nearest);
     return result;
   }
 
@@ -88,32 +80,13 @@ class ModelSide final : public BocstSide {
     return models_.back();
   }
 
-  static void place(fcl::CollisionObject<S>& object, const fcl::Transform3<S>& X_WB) {
-    object.setTransform(X_WB);
-    object.computeAABB();
-  }
+  BodyPair bodiesOf(const Pair& pair) const { return std::minmax(body_of_.at(pair.a), body_of_.at(pair.b)); }
 
-  /// By boxes a little larger than they are: FCL's solvers call a contact what has a tiny gap.
-  static bool near(const fcl::CollisionObject<S>& a, const fcl::CollisionObject<S>& b) {
-    const fcl::AABB<S>&p = a.getAABB(), &q = b.getAABB();
-    const S slack = S(1e-5) + S(1e-3) * std::min((p.max_ - p.min_).norm(), (q.max_ - q.min_).norm());
-    return (p.min_.array() <= q.max_.array() + slack).all() && (q.min_.array() <= p.max_.array() + slack).all();
-  }
-
-  static bool touch(const fcl::CollisionObject<S>& a, const fcl::CollisionObject<S>& b) {
-    const fcl::CollisionRequest<S> request;
-    fcl::CollisionResult<S> result;
-    return fcl::collide(&a, &b, request, result) > 0;
-  }
-
-  const Bodies& bodies_;
   ScenePoses<S> poses_;
-  bool by_boxes_;  ///< The spheres of conservative answers reach out of the boxes.
   std::vector<std::shared_ptr<Model<S>>> models_;
   std::vector<std::shared_ptr<fcl::CollisionGeometry<S>>> geometries_;
   Scene<S> scene_;
   std::unordered_map<Id, std::size_t> body_of_;
-  std::vector<fcl::CollisionObject<S>> objects_;  ///< Of all bodies.
 };
 
 }  // namespace
