@@ -25,6 +25,7 @@
 #include <fcl/narrowphase/distance_result.h>
 
 #include <stdexcept>
+#include <string>
 #include <type_traits>
 
 namespace bocst {
@@ -153,6 +154,13 @@ BOCST_EXPORT S continuousPair(const fcl::CollisionGeometry<S>* o1, const fcl::Tr
                               const fcl::Transform3<S>& X_W2_begin, const fcl::Transform3<S>& X_W2_end,
                               const fcl::ContinuousCollisionRequest<S>& request,
                               fcl::ContinuousCollisionResult<S>& result);
+
+// FCL reads through null pointers.
+inline void refuseNull(const void* o1, const void* o2) {
+  if (o1 != nullptr && o2 != nullptr) return;
+  throw std::invalid_argument(std::string("bocst::continuousCollide: ") + (o1 == nullptr ? "o1" : "o2") +
+                              " is a null pointer");
+}
 }  // namespace fcl_adapter
 
 /// Computes the first time in [0, 1] at which two moving geometries touch. Same interface as fcl::continuousCollide,
@@ -191,6 +199,7 @@ S continuousCollide(const fcl::CollisionGeometry<S>* o1, const fcl::MotionBase<S
   if (isModel<S>(o1) || isModel<S>(o2)) {
     return fcl_adapter::continuousPair<S>(o1, motion1, o2, motion2, request, result);
   }
+  fcl_adapter::refuseNull(o1, o2);
   return fcl::continuousCollide<S>(o1, motion1, o2, motion2, request, result);
 }
 template <typename S>
@@ -201,6 +210,7 @@ S continuousCollide(const fcl::CollisionGeometry<S>* o1, const fcl::Transform3<S
   if (isModel<S>(o1) || isModel<S>(o2)) {
     return fcl_adapter::continuousPair<S>(o1, X_W1_begin, X_W1_end, o2, X_W2_begin, X_W2_end, request, result);
   }
+  fcl_adapter::refuseNull(o1, o2);
   if constexpr (std::is_same<S, double>::value) {
     return fcl::continuousCollide<S>(o1, X_W1_begin, X_W1_end, o2, X_W2_begin, X_W2_end, request, result);
   } else {

@@ -137,7 +137,7 @@ class BOCST_EXPORT Scene {
   /// True if any state collides. Checks the middle of each part before its halves, to find a collision on an edge
   /// early. `where` is then set to the index of such a state; it is the same for any number of threads.
   bool anyCollision(const Transform* X_WM, std::size_t states, std::size_t* where = nullptr) const;
-  /// Sets hit[k] to 1 if state k collides, otherwise to 0.
+  /// Sets hit[k] to 1 if state k collides, otherwise to 0. When it throws, some of hit[] may have been set.
   void collisions(const Transform* X_WM, std::size_t states, std::uint8_t* hit) const;
   /// The minimum fcl::distance of all pairs; if a pair touches, 0 up to the rounding of fcl::distance;
   /// std::numeric_limits<S>::max() without pairs. `nearest` is set to a pair at this distance; to invalid Ids without

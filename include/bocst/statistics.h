@@ -23,8 +23,8 @@ struct Statistics {
                                              ///< answers also groups of triangles.
   std::uint64_t built_triangles = 0;  ///< Triangles that exact answers have sorted into the tree so far. From one time
                                       ///< at which only the root is resident to the next, without Model::buildTree():
-                                      ///< at most 1.25 times the mesh's triangles (2.25 times with
-                                      ///< Options::build_ahead), plus those of one expansion.
+                                      ///< at most 1.25 times the mesh's triangles plus those that one query grows
+                                      ///< (with Options::build_ahead: those of all growth by parts plus the mesh's).
   std::uint64_t pruned_nodes = 0;     ///< Nodes dropped by ttl, budget, prune() or updateVertices().
   std::size_t mesh_bytes = 0;         ///< Heap bytes of the mesh (other models may share them; 0 after releaseMesh(),
                                       ///< except while queries need it) and of the data for `solid`.

@@ -192,8 +192,8 @@ class MotionPair {
     return std::max(in_world, part_b.most(seen_from_a).timeFor(gap));
   }
 
-  /// The same of two hulls of at most kMostCorners points, where `gap` is the one between the hulls themselves: points
-  /// behind the foremost ones have a longer way, however fast they are.
+  /// The same of two hulls of at most kMostCorners points, where `gap` is the one between the hulls themselves: a point
+  /// that is not at the front of its hull has its distance to the front to go, too.
   double timeToTouch(double gap, const Eigen::Vector3d& direction, double blur, const MovingHull& part_a,
                      const MovingHull& part_b, double time) const;
 

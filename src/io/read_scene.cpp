@@ -109,7 +109,7 @@ class CLocale {
   locale_t before_;
 };
 
-/// What a reader here refuses must not get in by another name.
+/// assimp must not read the formats that this project's own readers handle, as it would accept what they refuse.
 void leaveOut(Assimp::Importer& importer) {
   for (const auto& [name, format] : kFormats) {
     while (const std::unique_ptr<Assimp::BaseImporter> reader{importer.GetImporter(name)}) {

@@ -18,7 +18,8 @@ struct Box {
   float lo[3], hi[3];  ///< The box along the axes of the world, reach included.
 };
 
-/// Eight of them, structure of arrays. A lane without an object has an empty lo/hi.
+/// Eight of them, structure of arrays. A lane without an object has an empty lo/hi in groups of fixed objects, and may
+/// hold anything in those of moving ones, where masks leave it out.
 struct alignas(64) BoxGroup {
   float center[3][8];
   float axis[3][3][8];

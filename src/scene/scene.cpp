@@ -114,7 +114,7 @@ struct Scene<S>::Impl {
   }
 
   // Changes the world that queries see by apply(World&), unless there is none; drops it where that returns false, or
-  // where changes have worn it. To be called with the mutex held, after the objects were changed.
+  // where it needs a new hierarchy. To be called with the mutex held, after the objects were changed.
   template <typename Apply>
   void change(Apply&& apply) const {
     const std::lock_guard<thread::ShardedLock> alone(sharded_lock);
@@ -125,7 +125,7 @@ struct Scene<S>::Impl {
       } else {
         const auto counted = world;  // its decrement makes what ended queries did visible here
       }
-      if (apply(*world) && !world->isWorn()) return;
+      if (apply(*world) && !world->needsRebuild()) return;
     } catch (const std::bad_alloc&) {
       // The next query makes another one, or has no memory either.
     }
@@ -323,6 +323,10 @@ void Scene<S>::remove(Id object) {
     auto& moving = impl_->moving_numbers;
     moving.erase(std::find(moving.begin(), moving.end(), object.number_));
     impl_->changeMoving();
+    impl_->change([&](World<S>& w) {
+      w.releaseMoving(object);
+      return true;
+    });
   } else {
     impl_->change([&](World<S>& w) {
       w.removeFixed(object);
@@ -362,8 +366,8 @@ void Scene<S>::update(Id object) {
   const std::shared_ptr<Geometry> geometry = impl_->find("update", object).given;
   const Object<S> updated = Impl::describe(geometry);
   bool any_moves = false;
-  for (auto& [number, record] : impl_->objects) {
-    if (record.given != geometry) continue;
+  for (const std::uint32_t number : impl_->with_geometry.at(geometry.get())) {
+    typename Impl::Record& record = impl_->objects.at(number);
     const Object<S> before = std::exchange(record.object, updated);
     record.object.id = before.id;
     record.object.X_WG = before.X_WG;

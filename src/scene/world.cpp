@@ -384,6 +384,12 @@ void World<S>::removeFixed(Id object) {
 }
 
 template <typename S>
+void World<S>::releaseMoving(Id object) {
+  const auto place = moving_of_.find(object);
+  if (place != moving_of_.end()) moving[place->second].geometry = nullptr;
+}
+
+template <typename S>
 bool World<S>::setMoving(std::vector<Object<S>> objects, const IgnoredPairs& ignored) {
   for (const Object<S>& o : objects) {
     if (sizeOf(o) > largest_) return false;
@@ -420,8 +426,16 @@ void World<S>::fillMasks(const IgnoredPairs& ignored) {
     std::copy(all.begin() + static_cast<std::ptrdiff_t>(fixedGroups() + i / 8), all.end(),
               &masks[i * allGroups() + fixedGroups() + i / 8]);
   }
-  for (const Object<S>& o : moving) {
-    for (const Id other : ignored.of(o.id)) setIgnored(o.id, other, true);
+  for (std::size_t i = 0; i < moving.size(); ++i) {
+    for (const Id other : ignored.of(moving[i].id)) {
+      // Of two moving objects, each has the other; the first one has the lane.
+      const auto moves = moving_of_.find(other);
+      if (moves != moving_of_.end() && moves->second > i) {
+        setMask(i, fixedGroups() + moves->second / 8, moves->second % 8, false);
+      } else if (moves == moving_of_.end()) {
+        setIgnored(moving[i].id, other, true);
+      }
+    }
   }
 }
 

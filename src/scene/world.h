@@ -37,7 +37,7 @@ void checkPoses(const char* query, const fcl::Transform3<S>* X_WM, std::size_t s
                 std::vector<double>& orthogonality_errors, const char* state = nullptr, std::size_t first = 0);
 
 /// A scene as a query sees it. A change takes the time of the moving objects and of a path in the hierarchy of fixed
-/// ones, but wears the hierarchy: it is to be made anew once isWorn().
+/// ones, but leaves the hierarchy less balanced: a new world is to be made once needsRebuild().
 ///
 /// Threads: any number of queries, or one change alone.
 template <typename S>
@@ -51,9 +51,11 @@ class World {
   /// Adds a fixed object, or replaces the one of this Id.
   bool putFixed(const Object<S>& object, const IgnoredPairs& ignored);
   void removeFixed(Id object);
+  /// Lets go of the geometry of a removed object; no query before setMoving().
+  void releaseMoving(Id object);
   bool setMoving(std::vector<Object<S>> objects, const IgnoredPairs& ignored);
   void setIgnored(Id a, Id b, bool ignored);
-  bool isWorn() const { return changes_ > fixed.size() / 4 + 16; }
+  bool needsRebuild() const { return changes_ > fixed.size() / 4 + 16; }
 
   std::size_t fixedGroups() const { return groups.size(); }
   std::size_t movingGroups() const { return (moving.size() + 7) / 8; }

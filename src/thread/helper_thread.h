@@ -9,7 +9,7 @@ namespace bocst::thread {
 /// ends with the process: jobs that wait then are dropped, the one under way is waited for. A child after fork() gets a
 /// thread of its own, and none of its parent's jobs. Thread-safe.
 ///
-/// @throws std::system_error when there is no thread to be had, std::bad_alloc.
+/// @throws std::system_error if the system can start no more threads, std::bad_alloc.
 void runInHelperThread(std::function<void()> job);
 
 }  // namespace bocst::thread

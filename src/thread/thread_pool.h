@@ -19,7 +19,7 @@ namespace bocst::thread {
 /// after fork().
 class ThreadPool {
  public:
-  /// `threads` work, the calling one included, or as many as there are to be had, but no more than `most`; 0: as many
+  /// `threads` work, the calling one included, or as many as the system can start, but no more than `most`; 0: as many
   /// as the machine runs at once.
   explicit ThreadPool(unsigned threads, std::size_t most = 1024);
   ~ThreadPool();

@@ -31,7 +31,7 @@ class RootGrid {
   bool grey(const oracle::Surface& surface, const lattice::Cell& cell);
 
   /// A box of the surface inside a grey cell, in lattice units: that of its finest cells which are not known to be
-  /// white.
+  /// empty.
   Eigen::AlignedBox3d bounds(const lattice::Cell& cell) const;
 
   /// Appends the triangles that may meet a cell of the finest level (a superset), each once, in no order.

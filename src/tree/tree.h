@@ -44,8 +44,9 @@ void checkOptions(const Options& options);
 ///
 /// Threads: a query holds the query lock shared while it looks at nodes. Growth appends blocks and publishes each by
 /// one store of its child reference, so readers are never in its way; one growth a tree at a time. What removes nodes
-/// (pruning, new vertices) holds the query lock alone. Child references only go implicit -> list -> block while the
-/// query lock is held shared.
+/// (pruning, new vertices) holds the query lock alone. While the query lock is held shared, child references only go
+/// implicit -> list -> block, with two exceptions: a list may become the same list with packed corners, and the root's
+/// block may become that of the whole tree. So read a reference once.
 class Tree {
  public:
   /// @throws std::invalid_argument for options out of range, OracleError.

@@ -206,18 +206,18 @@ void Tree::growWhole() {
   BulkBuilder& bulk = memory.bulk();
   std::vector<BulkPlace>& places = memory.places();
   buildWhole(surface_, bulk);
-  rent_.stop();
   if (!supports_known_) {
     bulk.findSupports(supports_);
     outline_.set(bulk.findOutline(surface_.lattice));
     supports_known_ = true;
   }
   // A device has grown what is above the parts, so the host would gain little by new blocks.
-  if (!growsOnHost()) return;
+  if (!growsOnHost()) return rent_.stop();
   startPlaces(bulk, NodeRef(), places);
   try {
     addBlocks(bulk, places, 0, bulk.blocks().size(), now());
     publishWhole(bulk, places);
+    rent_.stop();
   } catch (const std::bad_alloc&) {
     countBytes();  // blocks stay that nothing leads to
     throw;
@@ -240,7 +240,7 @@ void Tree::askForAheadBuild() {
       }
     });
   } catch (const std::exception&) {
-    // No thread to be had.
+    // The system can start no more threads: queries build what they need.
   }
 }
 
@@ -272,11 +272,18 @@ void Tree::buildAhead(AheadBuild& ahead) {
   bulk.findSupports(supports);
   const Outline::Box outline = bulk.findOutline(surface->lattice);
 
+  // Queries have gone on since the thread was asked: blocks that are older than that would decay at once.
+  const auto lastUse = [&](const Tree& tree) {
+    const ChildRef root = tree.root_.load(std::memory_order_relaxed);
+    const bool is_block = root.tag() == ChildRef::kBlock;
+    return std::max(ahead.asked,
+                    is_block ? tree.nodes_.last_use[root.index()].load(std::memory_order_relaxed) : ahead.asked);
+  };
   std::vector<BulkPlace> places;
   startPlaces(bulk, NodeRef(), places);
   for (std::size_t begin = 0, end; begin < bulk.blocks().size(); begin = end) {
     end = std::min(begin + kBlocksAtOnce, bulk.blocks().size());
-    if (!withTree([&](Tree& tree) { tree.addBlocks(bulk, places, begin, end, ahead.asked); })) return;
+    if (!withTree([&](Tree& tree) { tree.addBlocks(bulk, places, begin, end, lastUse(tree)); })) return;
     // A mutex is not fair: without a pause, queries that wait for it would hardly get it.
     std::this_thread::sleep_for(kPause);
   }
@@ -286,6 +293,9 @@ void Tree::buildAhead(AheadBuild& ahead) {
       for (int n = 0; n < SupportTable::kCount; ++n) tree.supports_.lower(n, static_cast<double>(supports.value(n)));
       tree.outline_.set(outline);
       tree.supports_known_ = true;
+    }
+    for (std::size_t number = 0; number < bulk.blocks().size(); ++number) {
+      tree.nodes_.last_use[places[number].index].store(lastUse(tree), std::memory_order_relaxed);
     }
     tree.publishWhole(bulk, places);
     tree.countBytes();

@@ -356,6 +356,35 @@ TYPED_TEST(Validate, RefusesGeometriesThatAreNullOrUnknown) {
   }
 }
 
+// Also where neither is a model, and FCL would read through the pointer.
+TYPED_TEST(Validate, RefusesNullBesideShapes) {
+  using S = TypeParam;
+  const fcl::Sphere<S> ball(S(1));
+  const fcl::Transform3<S> I = fcl::Transform3<S>::Identity();
+  using Pointer = const fcl::CollisionGeometry<S>*;
+  for (const auto& [o1, o2, what] : {std::tuple(Pointer{nullptr}, Pointer{&ball}, "o1 is a null"),
+                                     std::tuple(Pointer{&ball}, Pointer{nullptr}, "o2 is a null"),
+                                     std::tuple(Pointer{nullptr}, Pointer{nullptr}, "o1 is a null")}) {
+    const Pointer a = o1, b = o2;
+    const fcl::detail::GJKSolver_indep<S> solver;
+    fcl::DistanceResult<S> least;
+    fcl::CollisionResult<S> contacts;
+    fcl::ContinuousCollisionResult<S> time;
+    const fcl::TranslationMotion<S> motion(I, I);
+    const fcl::ContinuousCollisionRequest<S> request;
+    expectRefusal([&] { this->collide(a, I, b, I); }, {"bocst::collide", what});
+    expectRefusal([&] { fcl::collide(a, I, b, I, &solver, fcl::CollisionRequest<S>(), contacts); },
+                  {"bocst::collide", what});
+    expectRefusal([&] { this->distance(a, I, b, I); }, {"bocst::distance", what});
+    expectRefusal([&] { fcl::distance(a, I, b, I, &solver, fcl::DistanceRequest<S>(), least); },
+                  {"bocst::distance", what});
+    expectRefusal([&] { bocst::continuousCollide<S>(a, I, I, b, I, I, request, time); },
+                  {"bocst::continuousCollide", what});
+    expectRefusal([&] { bocst::continuousCollide<S>(a, &motion, b, &motion, request, time); },
+                  {"bocst::continuousCollide", what});
+  }
+}
+
 TYPED_TEST(Validate, IsCloserThanNeedsAModel) {
   using S = TypeParam;
   const fcl::Sphere<S> ball(S(1));

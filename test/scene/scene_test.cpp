@@ -489,6 +489,27 @@ fcl::Transform3<S> placeAt(S x, S y, S z) {
 }
 
 // One pair decides, so a change that is lost shows.
+// A removed geometry that nobody else holds is destroyed by remove() itself, not under the locks of a later query.
+TYPED_TEST(SceneTest, RemovedGeometriesAreDestroyedAtOnce) {
+  using S = TypeParam;
+  const auto ball = std::make_shared<fcl::Sphere<S>>(S(1));
+  Scene<S> scene;
+  scene.addMoving(ball);
+  scene.addFixed(ball, placeAt<S>(50, 0, 0));
+  const States<S> X(2, placeAt<S>(0, 0, 0));
+  EXPECT_FALSE(scene.collides(X.data()));
+  for (const bool moves : {true, false}) {
+    auto geometry = std::make_shared<fcl::Sphere<S>>(S(2));
+    const std::weak_ptr<fcl::Sphere<S>> watch = geometry;
+    const Id id = moves ? scene.addMoving(geometry) : scene.addFixed(geometry, X[0]);
+    EXPECT_TRUE(scene.collides(X.data()));
+    geometry.reset();
+    scene.remove(id);
+    EXPECT_TRUE(watch.expired()) << moves;
+    EXPECT_FALSE(scene.collides(X.data()));
+  }
+}
+
 TYPED_TEST(SceneTest, IgnoredPairsStayIgnoredThroughChanges) {
   using S = TypeParam;
   const auto ball = std::make_shared<fcl::Sphere<S>>(S(1));
@@ -1691,10 +1712,21 @@ TEST(Scene, BuildsTreesOnceThereIsMemory) {
       }
       most_bytes = ~std::size_t{0};
       EXPECT_EQ(model->statistics().resident_nodes, countNodes(*model));
+      const bool is_asked = countNodes(*model) < countNodes(whole) && most % 2 == 0;
+      if (is_asked) {
+        // A failed build keeps no later query from building the tree.
+        const auto at = fcl::Transform3d(Eigen::Translation3d(0.7, 0.2, 0.1));
+        for (int i = 0; i < 3000; ++i) {
+          test::distance<double>(*model, fcl::Transform3d::Identity(), whole, at);
+        }
+        EXPECT_EQ(countNodes(*model), countNodes(whole));
+      }
       scene.buildTrees();
       EXPECT_EQ(model->statistics().resident_nodes, countNodes(*model));
       EXPECT_EQ(countNodes(*model), countNodes(whole));
-      EXPECT_EQ(model->statistics().built_triangles, raw.triangles.size());
+      if (!is_asked) {
+        EXPECT_EQ(model->statistics().built_triangles, raw.triangles.size());
+      }
     }
   }
   EXPECT_GT(failures, 10);

@@ -100,6 +100,34 @@ TEST(BuildAhead, AQueryBuildsTheTreeIfTheThreadIsBusyAndTheThreadDoesNotBuildItA
   EXPECT_EQ(b.statistics().built_triangles, built_b);
 }
 
+// Its blocks are as old as the last query, not as the request for the thread.
+TEST(BuildAhead, WhatTheThreadBuildsLateDoesNotDecayAtOnce) {
+  std::promise<void> go;
+  thread::runInHelperThread([busy = go.get_future().share()] { busy.wait(); });
+  Clock::time_point now(std::chrono::hours(1));
+  Options o = options(true);
+  o.ttl = std::chrono::milliseconds(100);
+  o.clock = [&now] { return now; };
+  const std::shared_ptr<const Mesh> mesh = test::torus(60).mesh();
+  Modeld a(mesh, o), b(mesh, o);
+  for (int i = 0; i < 8; ++i) {
+    contacts(a, b, kHit, 1);
+    now += std::chrono::milliseconds(60);
+  }
+  EXPECT_FALSE(isWhole(a) || isWhole(b)) << "so the thread was asked";
+  go.set_value();
+  ASSERT_TRUE(comesTrue([&] { return isWhole(a) && isWhole(b); }));
+  const Statistics before = a.statistics();
+  contacts(a, b, kHit, 1);
+  EXPECT_EQ(a.statistics().pruned_nodes, before.pruned_nodes);
+  EXPECT_EQ(a.statistics().resident_bytes, before.resident_bytes) << "corners of leaves stay";
+  for (int level = 0; level < 64; ++level) {
+    now += std::chrono::hours(1);
+    a.prune(now);
+  }
+  EXPECT_EQ(a.statistics().resident_nodes, 1u) << "what nobody uses decays";
+}
+
 TEST(BuildAhead, WhatNobodyMeetsStaysARoot) {
   const std::shared_ptr<const Mesh> mesh = test::torus(80).mesh();
   const Modeld a(mesh, options(true)), b(mesh, options(true));

@@ -234,7 +234,9 @@ template <typename S, typename Solver>
 S distance(const fcl::CollisionGeometry<S>* o1, const fcl::Transform3<S>& X_W1, const fcl::CollisionGeometry<S>* o2,
            const fcl::Transform3<S>& X_W2, const Solver* solver, const fcl::DistanceRequest<S>& request,
            fcl::DistanceResult<S>& result) {
-  if (isModel<S>(o1) || isModel<S>(o2)) return bocst::distance<S>(o1, X_W1, o2, X_W2, request, result);
+  if (fcl_adapter::kindOf<S>("distance", o1, o2) != fcl_adapter::PairKind::kForeign) {
+    return bocst::distance<S>(o1, X_W1, o2, X_W2, request, result);
+  }
   refuseWithoutDistance<S>(o1, o2);
   return fcl::distance<Solver>(o1, X_W1, o2, X_W2, solver, request, result);
 }

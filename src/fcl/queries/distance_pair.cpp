@@ -232,7 +232,7 @@ template <typename S>
 void searchPair(const DistanceQuery<S>& q) {
   tree::Tree& tree = treeOf(*asModel<S>(q.a()));
   // FCL's managers pass the least distance so far: most of their pairs end here.
-  const auto known = static_cast<double>(q.result.min_distance);
+  const double known = std::min<double>(static_cast<double>(q.result.min_distance), std::numeric_limits<float>::max());
   if (const Model<S>* other = asModel<S>(q.b())) {
     if (areSurelyRigid(q.X_WA(), q.X_WB()) && areFarApart(tree, q.X_WA(), treeOf(*other), q.X_WB(), known)) return;
     const QueryScope scope(tree, treeOf(*other));

@@ -172,7 +172,8 @@ class MeshCollector : public query::Visitor {
 
  private:
   static constexpr double kEpsilon = static_cast<double>(std::numeric_limits<S>::epsilon());
-  // In float, FCL's axes between slivers' all but parallel edges are rubbish, and it may say that they meet.
+  // In float, FCL's axes between slivers' all but parallel edges are dominated by rounding, and it may say that they
+  // meet.
   static constexpr bool kTrustsApart = std::is_same<S, double>::value;
   // Of so few there are nearly always more.
   static constexpr std::size_t kFew = 16;

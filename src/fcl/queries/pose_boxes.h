@@ -27,9 +27,8 @@ query::PoseBoxes boxesOf(const Model<S>& a, const Model<S>& b) {
   query::PoseBoxes boxes;
   // However b is turned, it is no farther from its origin than this.
   boxes.radius_sum = to_a.norm() + 1.002 * (middle_b.norm() + to_b.norm());
-  // Conservative answers allow for an orthogonality error, see relate(); no length there is more than one here. The
-  // sums of findNearPoses() leave an orthogonality error of 1.6e-4 at most.
-  const double skew = treeOf(a).conservative() || treeOf(b).conservative() ? 4 * 2e-4 : 0;
+  // Conservative answers allow for an orthogonality error, see relate(); no length there is more than one here.
+  const double skew = treeOf(a).conservative() || treeOf(b).conservative() ? 4 * query::kPoseSkew : 0;
   boxes.allowed_per_length = 1.001 * (2 * roundingOf<S>(1) + skew);
   boxes.allowed = margin + boxes.allowed_per_length * 2 * (magnitudeOf(box_a) + magnitudeOf(box_b));
   for (int i = 0; i < 3; ++i) {

@@ -449,8 +449,8 @@ class ContactTimeWalk : private BestFirst<ContactTimeWalk<A, B>, A, B> {
         later = now_ + motions_.timeToTouch(gap, direction, blur, hullOf(pw), hullOf(qw), now_) * (1 - 1e-12);
       }
       if (!(later > time)) return time;
-      // Close to a contact: if it is certain to come soon, the rest of the way need not be gone. Where it does not
-      // come, it is asked ever less often.
+      // Close to a contact: if it is certain to come soon, the remaining steps can be skipped. While it does not come,
+      // this is tested after 1, 2, 4, ... short steps.
       if (later - time < tie() && time + tie() <= 1) {
         const bool is_power = (short_steps & (short_steps - 1)) == 0;
         ++short_steps;

@@ -70,7 +70,7 @@ HWY_INLINE Md haveRotations(const LanesOfPoses& X) {
   const Vd determinant = dot(X.column[0], cross(X.column[1], X.column[2]));
   const Vd stretch = hn::Abs(hn::Sub(squares, hn::Set(d, 3.0)));
   const Vd shear = hn::Sub(hn::Sub(squares, hn::Add(determinant, determinant)), one);
-  const Md rigid = hn::And(hn::Le(stretch, hn::Set(d, 1e-4)), hn::Le(shear, hn::Set(d, 1e-8)));
+  const Md rigid = hn::And(hn::Le(stretch, hn::Set(d, kPoseStretch)), hn::Le(shear, hn::Set(d, kPoseShear)));
   return hn::And(rigid, hn::And(hn::Eq(norm1(X.last_row), hn::Zero(d)), hn::Eq(X.last, one)));
 }
 

@@ -16,9 +16,13 @@ struct PoseBoxes {
   double allowed_per_length;  ///< It grows so with the length of the translation.
 };
 
+/// Bounds on the sums of fcl_adapter::isSurelyRigid() for poses that findNearPoses() settles, and the largest entry of
+/// R^T R - I that they leave, rounded up.
+constexpr double kPoseStretch = 1e-4, kPoseShear = 1e-8, kPoseSkew = 2e-4;
+
 /// Writes to near[] the numbers k of the poses of b in the frame of a that it cannot settle, in their order, and
 /// returns how many: those whose boxes are not surely apart by more than what is allowed, those that are not surely
-/// rigid (by the sums of fcl_adapter::isSurelyRigid, within 1e-4 and 1e-8), and those whose last row is not 0 0 0 1.
+/// rigid (by the bounds above), and those whose last row is not 0 0 0 1.
 /// Pose k is the 16 numbers from X_AB + 16 * k on, row after row if `rows`, else column after column.
 ///
 /// Boxes are apart by the spheres about them, or along the six axes of both. Those of b are the columns of R.
