@@ -9,6 +9,7 @@
 #include <cstddef>
 #include <cstdint>
 #include <functional>
+#include <limits>
 #include <memory>
 #include <vector>
 
@@ -141,15 +142,17 @@ class BOCST_EXPORT Scene {
   void collisions(const Transform* X_WM, std::size_t states, std::uint8_t* hit) const;
   /// The minimum fcl::distance of all pairs; if a pair touches, 0 up to the rounding of fcl::distance;
   /// std::numeric_limits<S>::max() without pairs. `nearest` is set to a pair at this distance; to invalid Ids without
-  /// pairs. Options::margin has no effect. Of a Plane or Halfspace and another of FCL's shapes, of which fcl::distance
-  /// computes nothing, it is the distance of the two.
+  /// pairs. at_most: the answer where no pair is nearer (then without a pair), so that farther ones need not be
+  /// measured; for thresholds and truncated distances. Options::margin has no effect. Of a Plane or Halfspace and
+  /// another of FCL's shapes, of which fcl::distance computes nothing, it is the distance of the two.
   /// @throws std::invalid_argument for other pairs of FCL's shapes and octrees whose distance FCL cannot compute,
-  /// unless another pair is found to be nearer before.
-  S clearance(const Transform* X_WM, Pair* nearest = nullptr) const;
+  /// unless another pair is found to be nearer before; and if at_most is negative or NaN.
+  S clearance(const Transform* X_WM, Pair* nearest = nullptr, S at_most = std::numeric_limits<S>::max()) const;
   /// Sets distances[k] to the clearance of state k, and nearest[k] to the pair that has it. The scene's threads share
   /// the states.
   /// @throws std::invalid_argument as clearance(); some of the numbers are then set.
-  void clearances(const Transform* X_WM, std::size_t states, S* distances, Pair* nearest = nullptr) const;
+  void clearances(const Transform* X_WM, std::size_t states, S* distances, Pair* nearest = nullptr,
+                  S at_most = std::numeric_limits<S>::max()) const;
   /// All pairs that collide in this state, in the order of their Ids, where collides() stops at one. fcl::collide with
   /// the objects' geometries and poses reports the contacts of such a pair.
   std::vector<Pair> collidingPairs(const Transform* X_WM) const;

@@ -57,7 +57,7 @@ S distanceBelow(const Object<S>& a, const fcl::Transform3<S>& X_WA, const Object
 }
 
 template <typename S>
-S clearance(const World<S>& world, StateCheck<S>& check, const fcl::Transform3<S>* X_WM, PairAt& nearest) {
+S clearance(const World<S>& world, StateCheck<S>& check, const fcl::Transform3<S>* X_WM, S at_most, PairAt& nearest) {
   check.start(world);
   check.place(X_WM);
   struct Candidate {
@@ -74,11 +74,12 @@ S clearance(const World<S>& world, StateCheck<S>& check, const fcl::Transform3<S
   const auto nameOf = [](const PairAt& p) {
     return std::uint64_t{p.moving} << 32 | std::uint64_t{8 * p.group + p.lane};
   };
-  S least = std::numeric_limits<S>::max();
+  S least = at_most;
   // Pairs of boxes are listed in rounds, each with a longer reach, so most are never listed. Once something was found,
   // the next round, as long as that, is the last.
   constexpr float kLonger = 4;
-  for (float reach = std::max(static_cast<float>(check.clearance_guess), std::numeric_limits<float>::min());;
+  const float guess = std::max(static_cast<float>(check.clearance_guess), std::numeric_limits<float>::min());
+  for (float reach = std::min(guess, above(static_cast<double>(least)));;
        reach = std::min(kLonger * reach, above(static_cast<double>(least)))) {
     const bool is_last = !(reach < kUnboxedSize);
     if (is_last) reach = kMost;
@@ -143,7 +144,7 @@ std::vector<PairDistance<S>> pairsWithin(const World<S>& world, StateCheck<S>& c
 #define BOCST_INSTANTIATE(S)                                                                                         \
   template S distanceBelow(const Object<S>&, const fcl::Transform3<S>&, const Object<S>&, const fcl::Transform3<S>&, \
                            S, fcl::GJKSolverType, fcl::Vector3<S>*);                                                 \
-  template S clearance(const World<S>&, StateCheck<S>&, const fcl::Transform3<S>*, PairAt&);                         \
+  template S clearance(const World<S>&, StateCheck<S>&, const fcl::Transform3<S>*, S, PairAt&);                      \
   template std::vector<PairDistance<S>> pairsWithin(const World<S>&, StateCheck<S>&, const fcl::Transform3<S>*, S);
 BOCST_INSTANTIATE(float)
 BOCST_INSTANTIATE(double)

@@ -17,11 +17,11 @@ template <typename S>
 S distanceBelow(const Object<S>& a, const fcl::Transform3<S>& X_WA, const Object<S>& b, const fcl::Transform3<S>& X_WB,
                 S below, fcl::GJKSolverType solver = fcl::GST_LIBCCD, fcl::Vector3<S>* points = nullptr);
 
-/// The least fcl::distance of all pairs, no less than 0, and a pair that has it; the largest S without pairs. X_WM:
-/// poses that checkPoses() has checked; one StateCheck a thread.
+/// The least fcl::distance of all pairs, no less than 0, and a pair that has it; `at_most` if none is less. X_WM: poses
+/// that checkPoses() has checked; one StateCheck a thread.
 /// @throws std::invalid_argument where FCL knows no distance.
 template <typename S>
-S clearance(const World<S>& world, StateCheck<S>& check, const fcl::Transform3<S>* X_WM, PairAt& nearest);
+S clearance(const World<S>& world, StateCheck<S>& check, const fcl::Transform3<S>* X_WM, S at_most, PairAt& nearest);
 
 /// All pairs whose distance is at most `distance`, which is no less than 0; the nearest first. Otherwise as
 /// clearance().

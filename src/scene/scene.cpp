@@ -192,6 +192,12 @@ struct Scene<S>::Impl {
     if (others->second.empty()) with_geometry.erase(others);
   }
 
+  static void checkLimit(const char* query, const char* name, S distance) {
+    if (distance >= 0) return;
+    throw std::invalid_argument(std::string("bocst::Scene::") + query + ": " + name + " is " +
+                                std::to_string(distance));
+  }
+
   static void refuseEmpty(const Object<S>& o) {
     if (o.model != nullptr && o.model->empty()) throw std::invalid_argument("bocst::Scene: the model is empty");
   }
@@ -262,7 +268,10 @@ struct Scene<S>::Impl {
     return found;
   }
 
-  void clearances(const char* query, const Transform* X_WM, std::size_t states, S* distances, Pair* nearest) const {
+  void clearances(const char* query, const Transform* X_WM, std::size_t states, S* distances, Pair* nearest,
+                  S at_most) const {
+    checkLimit(query, "at_most", at_most);
+    at_most = std::min(at_most, std::numeric_limits<S>::max());
     const WorldPtr w = current();
     const std::size_t moving = w->moving.size();
     pool.share(states, [&](std::size_t k) {
@@ -270,8 +279,8 @@ struct Scene<S>::Impl {
       scene::StateCheck<S>& check = sweepOfThread<S>().check();
       scene::checkPoses<S>(query, X, 1, moving, check.orthogonality_errors, nullptr, k);
       scene::PairAt pair;
-      distances[k] = scene::clearance(*w, check, X, pair);
-      const bool has_pair = distances[k] < std::numeric_limits<S>::max();
+      distances[k] = scene::clearance(*w, check, X, at_most, pair);
+      const bool has_pair = distances[k] < at_most;
       if (nearest != nullptr) nearest[k] = has_pair ? named(*w, pair) : Pair();
       return true;
     });
@@ -429,18 +438,18 @@ void Scene<S>::collisions(const Transform* X_WM, std::size_t states, std::uint8_
 }
 
 template <typename S>
-S Scene<S>::clearance(const Transform* X_WM, Pair* nearest) const {
+S Scene<S>::clearance(const Transform* X_WM, Pair* nearest, S at_most) const {
   S distance;
-  impl_->clearances("clearance", X_WM, 1, &distance, nearest);
+  impl_->clearances("clearance", X_WM, 1, &distance, nearest, at_most);
   return distance;
 }
 
 template <typename S>
-void Scene<S>::clearances(const Transform* X_WM, std::size_t states, S* distances, Pair* nearest) const {
+void Scene<S>::clearances(const Transform* X_WM, std::size_t states, S* distances, Pair* nearest, S at_most) const {
   if (states != 0 && distances == nullptr) {
     throw std::invalid_argument("bocst::Scene::clearances: distances is null");
   }
-  impl_->clearances("clearances", X_WM, states, distances, nearest);
+  impl_->clearances("clearances", X_WM, states, distances, nearest, at_most);
 }
 
 template <typename S>
@@ -460,9 +469,7 @@ std::vector<Pair> Scene<S>::collidingPairs(const Transform* X_WM) const {
 
 template <typename S>
 std::vector<PairDistance<S>> Scene<S>::pairsWithin(const Transform* X_WM, S distance) const {
-  if (!(distance >= 0)) {
-    throw std::invalid_argument("bocst::Scene::pairsWithin: distance is " + std::to_string(distance));
-  }
+  Impl::checkLimit("pairsWithin", "distance", distance);
   const auto w = impl_->current();
   scene::StateCheck<S>& check = sweepOfThread<S>().check();
   scene::checkPoses<S>("pairsWithin", X_WM, 1, w->moving.size(), check.orthogonality_errors);

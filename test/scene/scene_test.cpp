@@ -744,6 +744,15 @@ TYPED_TEST(SceneTest, ClearanceIsTheLeastDistance) {
       EXPECT_EQ(shared.scene.clearance(&states[3 * k], &pair), all[k]);
       EXPECT_EQ(pair.a == nearest[k].a && pair.b == nearest[k].b, true);
     }
+    for (const S at_most : {S(0), S(0.01), S(0.5), S(3), std::numeric_limits<S>::infinity()}) {
+      std::vector<S> limited(60);
+      shared.scene.clearances(states.data(), 60, limited.data(), nearest.data(), at_most);
+      for (std::size_t k = 0; k < 60; ++k) {
+        EXPECT_EQ(limited[k], std::min(all[k], at_most)) << at_most;
+        EXPECT_EQ(nearest[k].a.isValid(), all[k] < at_most);
+        EXPECT_EQ(shared.scene.clearance(&states[3 * k], nullptr, at_most), limited[k]);
+      }
+    }
     shared.scene.clearances(states.data(), 60, all.data());
     shared.scene.clearances(nullptr, 0, nullptr);
   }
@@ -1446,6 +1455,7 @@ TYPED_TEST(SceneTest, MisuseThrows) {
   EXPECT_THROW(scene.clearances(&good, 1, nullptr), std::invalid_argument);
   for (const S distance : {S(-1), std::numeric_limits<S>::quiet_NaN()}) {
     EXPECT_THROW(scene.pairsWithin(&good, distance), std::invalid_argument);
+    EXPECT_THROW(scene.clearance(&good, nullptr, distance), std::invalid_argument);
   }
 
   const S nan = std::numeric_limits<S>::quiet_NaN(), inf = std::numeric_limits<S>::infinity();
