@@ -42,8 +42,10 @@ namespace bocst {
 /// mesh (o1's if both are models), with x the longest axis of its bounding box and y and z the two that follow (x, y,
 /// z, x, ...), the position of a point is x + 0.31 y + 0.23 z, and that of a contact
 /// - the smallest of the segment in which the two triangles intersect;
-/// - the largest of the corners of the model's triangle, if the triangles do not clearly intersect, with a margin, and
-///   with shapes and octrees.
+/// - the largest of that triangle whose largest is smaller, if the triangles do not clearly intersect; with a margin,
+///   the largest of the triangle of that mesh;
+/// - with shapes and octrees, the larger of two: the smallest of the triangle, and that of the shape's bounding box (in
+///   its own frame) or of the cell.
 /// With conservative answers it is the Morton code of the cell. The default request (one contact, enable_contact false)
 /// is a yes-or-no query: its ids are those of any pair that touches.
 ///

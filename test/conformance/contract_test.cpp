@@ -140,11 +140,14 @@ class Contacts : public ::testing::Test {
       return x[axis] + 0.31 * x[(axis + 1) % 3] + 0.23 * x[(axis + 2) % 3];
     };
     const Triangle own = triangle(mesh, turned ? s.b2 : s.b1, Eigen::Isometry3d::Identity());
-    const double corner = std::max({at(own[0]), at(own[1]), at(own[2])});
+    const auto endOf = [&](const Triangle& t) { return std::max({at(t[0]), at(t[1]), at(t[2])}); };
     const auto other = triangleOf(turned ? q.a : q.b, turned ? s.b1 : s.b2,
                                   (turned ? q.Y.inverse() * q.X : q.X.inverse() * q.Y).template cast<double>());
-    if (!other.has_value() || (a != nullptr && a->options().margin > 0) || (b != nullptr && b->options().margin > 0)) {
-      return {corner, corner};
+    // Where a triangle and a body have both begun: not before the triangle, and before it ends.
+    if (!other.has_value()) return {std::min({at(own[0]), at(own[1]), at(own[2])}), endOf(own)};
+    const double end = std::min(endOf(own), endOf(*other));
+    if ((a != nullptr && a->options().margin > 0) || (b != nullptr && b->options().margin > 0)) {
+      return {endOf(own), endOf(own)};
     }
     double cut = std::numeric_limits<double>::infinity();
     for (const auto& [p, t] : {std::make_pair(own, *other), std::make_pair(*other, own)}) {
@@ -159,7 +162,7 @@ class Contacts : public ::testing::Test {
         cut = std::min(cut, at(begin) + x[2] * at(way));
       }
     }
-    return {std::min(cut, corner), corner};
+    return {std::min(cut, end), end};
   }
 
   using Triangle = std::array<Eigen::Vector3d, 3>;

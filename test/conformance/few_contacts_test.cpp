@@ -4,10 +4,12 @@
 
 #include <algorithm>
 #include <cmath>
+#include <map>
 #include <random>
 #include <tuple>
 #include <vector>
 
+#include "conformance/octrees.h"
 #include "conformance/reference.h"
 #include "geometry/triangle.h"
 
@@ -45,7 +47,7 @@ Vector3d directionOf(const Mesh& mesh) {
 }
 
 // The contacts in their order; none where rounding decides whether two triangles clearly intersect. `ordering`: the
-// mesh whose frame counts, that of the first geometry or the second.
+// mesh in whose frame positions are, that of the first geometry or the second.
 std::vector<Place> places(const std::vector<fcl::Contactd>& all, const Raw& one, const fcl::Transform3d& in_ordering1,
                           const Raw& two, const fcl::Transform3d& in_ordering2, const Raw& ordering) {
   const Vector3d direction = directionOf(*ordering.mesh());
@@ -54,11 +56,12 @@ std::vector<Place> places(const std::vector<fcl::Contactd>& all, const Raw& one,
     query::Corners p, q;
     takeCorners(one, c.b1, in_ordering1, p);
     takeCorners(two, c.b2, in_ordering2, q);
-    const query::Corners& own = &ordering == &one ? p : q;
-    const double most = std::max({direction.dot(own[0]), direction.dot(own[1]), direction.dot(own[2])});
+    const auto endOf = [&](const query::Corners& t) {
+      return std::max({direction.dot(t[0]), direction.dot(t[1]), direction.dot(t[2])});
+    };
     const auto place = query::nearEndOfCut(p, q, direction, 1e-6);
     if (place.has_value() != query::nearEndOfCut(p, q, direction, 1e-8).has_value()) return {};
-    ordered.emplace_back(place.value_or(most), c.b1, c.b2);
+    ordered.emplace_back(place.value_or(std::min(endOf(p), endOf(q))), c.b1, c.b2);
   }
   std::sort(ordered.begin(), ordered.end());
   return ordered;
@@ -200,6 +203,100 @@ TEST(FewContacts, AreTheFirstOfManyAtHardlyDifferentPositions) {
     }
   }
   EXPECT_GT(counts.compared, 80u);
+}
+
+// A large triangle ends no earlier than any small one on it: the small ones are in the order of their own ends.
+TEST(FewContacts, OfFlatFacesOnEachOther) {
+  std::mt19937_64 g(23);
+  std::uniform_real_distribution<double> u(-1, 1);
+  Counts counts;
+  for (int round = 0; round < 20; ++round) {
+    const Raw block = test::box({-1, -0.9, -0.2}, {1, 0.9, 0});
+    Raw grid;
+    constexpr std::size_t kSide = 20;
+    for (std::size_t i = 0; i <= kSide; ++i) {
+      for (std::size_t k = 0; k <= kSide; ++k) {
+        grid.vertices.emplace_back(1.7 * static_cast<double>(i) / kSide - 0.9, 1.5 * static_cast<double>(k) / kSide, 0);
+        if (i == 0 || k == 0) continue;
+        const std::size_t v = grid.vertices.size() - 1;
+        grid.triangles.emplace_back(v, v - 1, v - kSide - 2);
+        grid.triangles.emplace_back(v, v - kSide - 2, v - kSide - 1);
+      }
+    }
+    const Modeld a(block.mesh()), b(grid.mesh());
+    const auto partner = test::bvh<fcl::OBBRSSd>(grid);
+    const auto same = fcl::Transform3d::Identity();
+    const fcl::Transform3d X =
+        test::pose<double>(Eigen::AngleAxisd(0.5 * u(g), Vector3d::UnitZ()).toRotationMatrix(), {0.1 * u(g), 0, 0});
+    SCOPED_TRACE(round);
+    for (const std::size_t most : {1, 5, 50}) {
+      const auto ordered = places(ask(a, same, b, X, 1000000), block, same, grid, X, block);
+      EXPECT_GT(ordered.size(), 100u);
+      expectFirst(a, same, b, X, most, ordered, counts);
+      expectFirst(a, same, *partner, X, most, ordered, counts);
+      expectFirst(b, X, a, same, most,
+                  places(ask(b, X, a, same, 1000000), grid, same, block, X.inverse(Eigen::Isometry), grid), counts);
+    }
+  }
+  EXPECT_GT(counts.compared, 30u);
+}
+
+// A triangle and a body are at the larger of the positions at which they begin, where many cells lie on one triangle.
+TEST(FewContacts, BesideCellsAndShapes) {
+  std::mt19937_64 g(29);
+  std::uniform_real_distribution<double> u(-1, 1);
+  const auto map = test::cloudMap(7, 4000, 0.05);
+  const auto octree = test::cloud<double>(map);
+  const auto* const root = octree->getRoot();
+  std::map<std::intptr_t, std::pair<Vector3d, double>> cells;
+  for (auto leaf = map->begin(), end = map->end(); leaf != end; ++leaf) {
+    cells[&*leaf - root] = {{leaf.getX(), leaf.getY(), leaf.getZ()}, leaf.getSize() / 2};
+  }
+  const fcl::Boxd box(0.9, 0.7, 0.5);
+  Counts counts;
+  for (int round = 0; round < 60; ++round) {
+    const Raw raw = round % 3 == 0   ? test::box({-1, -0.7, -0.2}, {1, 0.7, 0.1})
+                    : round % 3 == 1 ? cloud(g)
+                                     : test::torus(9);
+    const auto mesh = raw.mesh();
+    const Modeld model(mesh);
+    const auto rotation = [&] { return Eigen::Quaterniond(u(g), u(g), u(g), u(g)).normalized().toRotationMatrix(); };
+    const fcl::Transform3d X1 = test::pose<double>(rotation(), {u(g), u(g), u(g)}),
+                           X2 = X1 * test::pose<double>(rotation(), Vector3d(u(g), u(g), u(g)) / 2),
+                           to_model = X1.inverse(Eigen::Isometry) * X2;
+    const Vector3d direction = directionOf(*mesh);
+    for (const bool is_octree : {true, false}) {
+      const auto beginOf = [&](std::intptr_t id) {
+        const auto [center, half] = is_octree ? cells.at(id) : std::pair(Vector3d(0, 0, 0), 0.0);
+        const Vector3d extents = is_octree ? Vector3d(half, half, half) : Vector3d(0.45, 0.35, 0.25);
+        return direction.dot(to_model * center) - (to_model.linear().transpose() * direction).cwiseAbs().dot(extents);
+      };
+      const fcl::CollisionGeometryd& body = is_octree ? static_cast<const fcl::CollisionGeometryd&>(*octree)
+                                                      : static_cast<const fcl::CollisionGeometryd&>(box);
+      for (const bool is_second : {false, true}) {
+        const auto asked = [&](std::size_t most) {
+          return is_second ? ask(body, X2, model, X1, most) : ask(model, X1, body, X2, most);
+        };
+        std::vector<Place> ordered;
+        for (const fcl::Contactd& c : asked(1000000)) {
+          query::Corners t;
+          takeCorners(raw, is_second ? c.b2 : c.b1, fcl::Transform3d::Identity(), t);
+          const double begin = std::min({direction.dot(t[0]), direction.dot(t[1]), direction.dot(t[2])});
+          ordered.emplace_back(std::max(begin, beginOf(is_second ? c.b1 : c.b2)), c.b1, c.b2);
+        }
+        std::sort(ordered.begin(), ordered.end());
+        SCOPED_TRACE(round);
+        for (const std::size_t most : {1, 5, 50}) {
+          if (is_second) {
+            expectFirst(body, X2, model, X1, most, ordered, counts);
+          } else {
+            expectFirst(model, X1, body, X2, most, ordered, counts);
+          }
+        }
+      }
+    }
+  }
+  EXPECT_GT(counts.compared, 200u);
 }
 
 }  // namespace

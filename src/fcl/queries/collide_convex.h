@@ -51,6 +51,7 @@ class ConvexCollector final : public query::ConvexVisitor<typename Partner::Node
         narrow_phase_(narrow_phase),
         X_WM_(q.X_WA()),
         X_WB_(q.X_WB().template cast<double>()),
+        b_in_a_(frame.toLattice(surface_.lattice, 0)),
         tolerance_(frame.rounding() + (q.is_distance ? 0 : narrow_phase.tolerance())),
         costs_(costs),
         ends_at_first_(q.endsAtFirst()),
@@ -83,7 +84,9 @@ class ConvexCollector final : public query::ConvexVisitor<typename Partner::Node
 
   bool triangle(std::uint32_t t, const Node& b) override {
     if (ends_at_first_) return addTriangle(t, b);
-    const Found found = placed(order_.placeOf(t), {t, {Eigen::Vector3d::Zero(), 0}}, b);
+    const double place =
+        is_cut_ ? std::max(order_.beginOf(t), order_.beginOf(cut_.leastOf(partner_.volume(b), b_in_a_))) : 0;
+    const Found found = placed(place, {t, {Eigen::Vector3d::Zero(), 0}}, b);
     if (is_cut_ && !s_.first.wants(found)) return false;
     if (!s_.seen.insert(partner_.id(b), t)) return false;
     if (is_cut_) {
@@ -282,6 +285,7 @@ class ConvexCollector final : public query::ConvexVisitor<typename Partner::Node
   const NarrowPhase<S>& narrow_phase_;
   const fcl::Transform3<S>& X_WM_;
   const fcl::Transform3<double> X_WB_;
+  const query::SimilarityTransform b_in_a_;
   const double tolerance_;
   const bool costs_, ends_at_first_, is_cut_;
   Scratch& s_;

@@ -16,9 +16,11 @@ namespace bocst::fcl_adapter {
 
 /// Which of many contacts a request for few gets: the first by place, then by the ids. The place of two triangles is
 /// the smallest coordinate of the segment in which they cut each other, along a direction near the longest axis of the
-/// bounding box of the model's mesh, in the mesh's frame and length unit; where they do not clearly cut each other, and
-/// beside bodies, the largest of the corners of the model's triangle. The place of a cell is its Morton code, which has
-/// at most 48 bits. So the order is a property of mesh, pose and request, and a walk that wants the first few can leave
+/// bounding box of the model's mesh, in the mesh's frame and length unit; where they do not clearly cut each other, the
+/// largest coordinate of that triangle which ends first, so that a fine mesh has many places on a large triangle; with
+/// a margin, the largest of the model's triangle, which needs no look at the other. The place of a triangle and a body
+/// is where both have begun: the larger of their smallest coordinates. That of a cell is its Morton code, which has at
+/// most 48 bits. So the order is a property of mesh, pose and request, and a walk that wants the first few can leave
 /// out what lies beyond: where two triangles touch, they do so in a point whose coordinate is no larger than their
 /// place.
 class ContactOrder {
@@ -33,18 +35,32 @@ class ContactOrder {
     direction_[(longest + 2) % 3] = 0.23;
   }
 
-  double placeOf(std::uint32_t t) const {
+  /// Where triangle t of the model begins.
+  double beginOf(std::uint32_t t) const {
+    const auto& i = surface_.mesh->indices(t);
+    const auto at = [&](std::uint32_t v) { return direction_.dot(surface_.mesh->vertex(v)); };
+    return std::min({at(i[0]), at(i[1]), at(i[2])});
+  }
+  /// Where a body begins; `least`: in the lattice frame, see Cut::leastOf().
+  double beginOf(double least) const {
+    return surface_.lattice.unit() * least + direction_.dot(surface_.lattice.origin());
+  }
+
+  /// With a margin, whatever the triangle of the other mesh.
+  double endOf(std::uint32_t t) const {
     const auto& i = surface_.mesh->indices(t);
     const auto at = [&](std::uint32_t v) { return direction_.dot(surface_.mesh->vertex(v)); };
     return std::max({at(i[0]), at(i[1]), at(i[2])});
   }
 
-  /// The same of triangle t and one of another mesh, corners in any frame, from which `to_model` leads to the model's.
-  double placeOf(std::uint32_t t, const query::Corners& p, const query::Corners& q,
-                 const fcl::Transform3<double>& to_model) const {
+  /// Of two triangles, corners in any frame, from which `to_model` leads to the model's.
+  double placeOf(const query::Corners& p, const query::Corners& q, const fcl::Transform3<double>& to_model) const {
     const Eigen::Vector3d direction = to_model.linear().transpose() * direction_;
     const auto place = query::nearEndOfCut(p, q, direction, kTolerance * surface_.lattice.unit());
-    return place ? *place + direction_.dot(to_model.translation()) : placeOf(t);
+    const auto end = [&](const query::Corners& t) {
+      return std::max({direction.dot(t[0]), direction.dot(t[1]), direction.dot(t[2])});
+    };
+    return (place ? *place : std::min(end(p), end(q))) + direction_.dot(to_model.translation());
   }
 
   /// The cut of a walk in the model's lattice frame that has found nothing yet: it leaves nothing out.

@@ -247,7 +247,7 @@ class MeshCollector : public query::Visitor {
   // Only the first pairs that touch, a given number of them, are wanted: adds this one if it is one so far.
   void addFirst(std::uint64_t key) {
     const std::uint32_t of_model = q_.swapped ? second(key) : first(key);
-    if (margin_ > 0 && !s_.first.wants({order_.placeOf(of_model), key})) return;
+    if (margin_ > 0 && !s_.first.wants({order_.endOf(of_model), key})) return;
     getCorners(&key, 1);
     const RankedPair pair{placeOf(of_model), key};
     // Most are not wanted, so only the others are remembered.
@@ -256,20 +256,20 @@ class MeshCollector : public query::Visitor {
     if (s_.first.isFull()) order_.setCut(s_.first.last().place, position_tolerance_, cut_);
   }
 
+  // Of the pair whose corners were got last.
+  double placeOf(std::uint32_t of_model) const {
+    if (margin_ > 0) return order_.endOf(of_model);
+    query::Corners p, q;
+    s_.pairs.get(0, p, q);
+    return order_.placeOf(p, q, to_model_);
+  }
+
   // There may be more than are wanted: from here on, by their places.
   void rankFound() {
     is_ranked_ = true;
     s_.seen.clear();
     for (const std::uint64_t key : s_.found) addFirst(key);
     s_.found.clear();
-  }
-
-  // Of the pair whose corners were got last.
-  double placeOf(std::uint32_t of_model) const {
-    if (margin_ > 0) return order_.placeOf(of_model);
-    query::Corners p, q;
-    s_.pairs.get(0, p, q);
-    return order_.placeOf(of_model, p, q, to_model_);
   }
 
   // True when nothing more is asked for.

@@ -136,7 +136,6 @@ class PairWalk {
       if (!least_a_.valid || !(least_a_.node == pair.a)) {
         least_a_ = {pair.a, true, cut_->leastOf(a_.volume(pair.a))};
       }
-      if constexpr (B::kBodies) return least_a_.least;
       if (!least_b_.valid || !(least_b_.node == pair.b)) {
         least_b_ = {pair.b, true, cut_->leastOf(b_.volume(pair.b), b_in_a_)};
       }
