@@ -86,6 +86,8 @@ class ContactTimeWalk : private BestFirst<ContactTimeWalk<A, B>, A, B> {
   static constexpr double kWindowsPerPair = 0.1;
   // Pairs of triangles that are apart by this share of the smaller leaf's size are not looked at one by one.
   static constexpr double kShareOfSmaller = 1.0 / 32;
+  // Of two sizes squared: there a bound by single triangles pays.
+  static constexpr double kMuchLarger = 4 * 4;
 
   static constexpr double kFar = std::numeric_limits<double>::infinity(), kNever = kFar;
 
@@ -212,6 +214,47 @@ class ContactTimeWalk : private BestFirst<ContactTimeWalk<A, B>, A, B> {
     return boundOf(b_.gap(pair.b, {corners, 8}, kFar), 0, ball, ball.radius, convexOf(pair.b));
   }
 
+  // A leaf that is much larger than the other node, as a room is beside a part in it, reaches all around that node:
+  // its triangles are looked at one by one.
+  double triangleBound(const Pair& pair) const {
+    const double scale = scaleOfB(), size_a = a_.size(pair.a), size_b = b_.size(pair.b) * scale * scale;
+    if (size_b >= kMuchLarger * size_a && b_.state(pair.b) == State::kLeaf) {
+      return triangleBound(extentOfA(pair.a), b_, pair.b, b_in_world_, 1);
+    }
+    if (size_a >= kMuchLarger * size_b && a_.state(pair.a) == State::kLeaf) {
+      return triangleBound(extentOfB(pair.b), a_, pair.a, a_in_world_, -1);
+    }
+    return now_;
+  }
+  // `sign`: 1 if the leaf is of side B.
+  template <typename Side>
+  double triangleBound(const NodeExtent& small, const Side& side, typename Side::Node leaf,
+                       const SimilarityTransform& to_world, double sign) const {
+    const double radius = kMostStretch * small.half.norm();
+    double best = kNever;
+    const auto triangles = side.triangles(leaf);
+    for (std::size_t i = 0; i < triangles.count; ++i) {
+      Corners t = side.corners(triangles.ids[i]);
+      for (Eigen::Vector3d& x : t) x = to_world * x;
+      const Eigen::Vector3d way = closestPoint(small.center, t) - small.center;
+      const double apart = way.norm();
+      if (!(apart > 0)) return now_;
+      const Eigen::Vector3d direction = way / apart;
+      double lo, hi;
+      small.along(direction, lo, hi);
+      const double begin = std::min(
+          {direction.dot(t[0] - small.center), direction.dot(t[1] - small.center), direction.dot(t[2] - small.center)});
+      const double largest = t[0].lpNorm<1>() + t[1].lpNorm<1>() + t[2].lpNorm<1>() + small.center.lpNorm<1>();
+      const double gap = begin - hi - kRounding * (largest + radius) - clearance();
+      if (!(gap > 0)) return now_;
+      const MovingBall ball{small.center, radius};
+      const MovingHull hull{t.data(), 3};
+      best = std::min(best, sign > 0 ? whenClosed(gap, direction, kBlur, ball, hull)
+                                     : whenClosed(gap, -direction, kBlur, hull, ball));
+    }
+    return best;
+  }
+
   Convex convexOf(typename B::Node node) const {
     Convex convex;
     static_cast<SweptHull&>(convex) = b_.hull(node);
@@ -236,6 +279,8 @@ class ContactTimeWalk : private BestFirst<ContactTimeWalk<A, B>, A, B> {
     double time = Base::boundOf(pair);
     if constexpr (B::kBodies) {
       if (!spheres() && !b_.hasExactBox(pair.b) && worthIt(time)) time = std::max(time, bodyBound(pair));
+    } else if (!spheres() && time < now_ + kWorthWaiting) {
+      time = std::max(time, triangleBound(pair));
     }
     if (time < now_ + kWorthWaiting) return !worthIt(time);
     push({time, pair.a, pair.b});
