@@ -22,7 +22,7 @@ using fcl_adapter::poseAt;
 using query::Motion;
 
 /// Halvings of the way in search of what is near, before pairs are followed one by one.
-constexpr int kHalvings = 4;
+constexpr int kHalvings = 2;
 
 /// What passes closer than this share of the sizes is taken to touch, between two of FCL's geometries.
 constexpr double kTouch = 1e-5;
