@@ -97,8 +97,8 @@ class BOCST_EXPORT Scene {
   // ignore(a, a), setPose() of a moving object and movingIndex() of a fixed one; std::logic_error for a Model between
   // beginModel() and endModel().
 
-  /// Adds an object that stays at X_WG. Computes a bound of its geometry, in time linear in its vertices (of an OcTree,
-  /// without a look at most cells); objects with the same geometry share the bound.
+  /// Adds an object that stays at X_WG. Computes a bound of its geometry, of a mesh once in the process and in time
+  /// linear in its vertices, of an OcTree without a look at most cells; objects with the same geometry share the bound.
   Id addFixed(std::shared_ptr<Geometry> geometry, const Transform& X_WG);
   /// Adds an object whose pose is part of each state.
   Id addMoving(std::shared_ptr<Geometry> geometry);

@@ -5,13 +5,19 @@
 #include <fcl/geometry/shape/utility.h>
 
 #include <Eigen/Eigenvalues>
+#include <algorithm>
+#include <iterator>
 #include <limits>
+#include <memory>
+#include <mutex>
 #include <shared_mutex>
+#include <unordered_map>
 
 #include "fcl/adapters/models.h"
 #include "fcl/adapters/octree_side.h"
 #include "fcl/adapters/shapes.h"
 #include "scene/reach.h"
+#include "thread/fork.h"
 #include "thread/sharded_lock.h"
 #include "tree/tree.h"
 
@@ -69,6 +75,50 @@ Bounds aligned(const fcl::AABB<S>& box) {
   return b;
 }
 
+/// About the triangles of a mesh.
+Bounds fitMesh(const Mesh& mesh) {
+  const Eigen::AlignedBox3d box = mesh.bounds();
+  // Vertices of no triangle may lie anywhere.
+  return fit([&](auto&& f) {
+    for (std::size_t i = 0; i < mesh.vertexCount(); ++i) {
+      if (box.contains(mesh.vertex(i))) f(mesh.vertex(i));
+    }
+  });
+}
+
+/// The bounds of the meshes of this process, for planners that make a scene for each plan of the same models.
+class MeshBounds {
+ public:
+  Bounds of(const std::shared_ptr<const Mesh>& mesh) {
+    {
+      const std::lock_guard<thread::ForkAwareMutex> lock(mutex_);
+      const auto known = bounds_.find(mesh.get());
+      // Another mesh may have had this address.
+      if (known != bounds_.end() && known->second.mesh.lock() == mesh) return known->second.bounds;
+    }
+    const Bounds bounds = fitMesh(*mesh);
+    const std::lock_guard<thread::ForkAwareMutex> lock(mutex_);
+    if (bounds_.size() >= most_) {
+      for (auto i = bounds_.begin(); i != bounds_.end();)
+        i = i->second.mesh.expired() ? bounds_.erase(i) : std::next(i);
+      most_ = std::max(kLeast, 2 * bounds_.size());
+    }
+    bounds_.insert_or_assign(mesh.get(), Known{mesh, bounds});
+    return bounds;
+  }
+
+ private:
+  struct Known {
+    std::weak_ptr<const Mesh> mesh;
+    Bounds bounds;
+  };
+  static constexpr std::size_t kLeast = 64;
+
+  thread::ForkAwareMutex mutex_;
+  std::unordered_map<const Mesh*, Known> bounds_;
+  std::size_t most_ = kLeast;  // then what is gone is forgotten
+};
+
 template <typename S>
 Bounds boundsOfModel(const Model<S>& model) {
   const tree::Tree& tree = fcl_adapter::treeOf(model);
@@ -77,13 +127,9 @@ Bounds boundsOfModel(const Model<S>& model) {
   const std::shared_ptr<const Mesh>& mesh = tree.surface().mesh;
   Bounds b;
   if (mesh != nullptr) {
-    const Eigen::AlignedBox3d box = mesh->bounds();
-    // Vertices of no triangle may lie anywhere.
-    b = fit([&](auto&& f) {
-      for (std::size_t i = 0; i < mesh->vertexCount(); ++i) {
-        if (box.contains(mesh->vertex(i))) f(mesh->vertex(i));
-      }
-    });
+    // Never destroyed: scenes of static objects may still ask.
+    static MeshBounds& known = *new MeshBounds;
+    b = known.of(mesh);
   } else {
     const Eigen::AlignedBox3d& box = tree.surface().bounds;
     b.center = box.center();

@@ -1493,6 +1493,28 @@ TYPED_TEST(SceneTest, MisuseThrows) {
   EXPECT_EQ(scene.fixedCount(), 1u);
 }
 
+// The box of a mesh is found once; another mesh at the same address has its own.
+TYPED_TEST(SceneTest, MeshesAtTheAddressOfOneThatIsGone) {
+  using S = TypeParam;
+  std::set<const Mesh*> addresses;
+  for (int i = 1; i <= 400; ++i) {
+    const double half = 0.01 * i;
+    const auto mesh = test::box({-half, -half, -half}, {half, half, half}).mesh();
+    addresses.insert(mesh.get());
+    const auto model = std::make_shared<Model<S>>(mesh);
+    for (int again = 0; again < 2; ++again) {
+      Scene<S> scene;
+      scene.addFixed(model, test::pose<S>(Eigen::Matrix3d::Identity(), {10, 0, 0}));
+      scene.addMoving(model);
+      const auto X = test::pose<S>(Eigen::Matrix3d::Identity(), {10 - 2 * half - 0.001, 0, 0}),
+                 Y = test::pose<S>(Eigen::Matrix3d::Identity(), {10 - 2 * half + 0.001, 0, 0});
+      ASSERT_FALSE(scene.collides(&X)) << i;
+      ASSERT_TRUE(scene.collides(&Y)) << i;
+    }
+  }
+  EXPECT_LT(addresses.size(), 400u);
+}
+
 // A box about an octree holds all occupied cells, and no face of it is farther out than by 1/32 of its length.
 TYPED_TEST(SceneTest, BoundsOfOcTreesAreNearlyTight) {
   using S = TypeParam;
