@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #include "python/arrays.h"
 
+#include <algorithm>
 #include <array>
 #include <cmath>
 #include <cstring>
@@ -26,11 +27,18 @@ py::array numbers(const char* name, const py::handle& object, const char* kinds,
     throw py::type_error(std::string("bocst: ") + name +
                          " is a masked array; pass its filled() or compressed() values");
   }
-  const py::array a = py::array::ensure(object);
-  if (!a || std::strchr(kinds, a.dtype().kind()) == nullptr) {
-    PyErr_Clear();
-    const std::string got = a ? "dtype " + std::string(py::str(a.dtype())) : std::string(py::str(py::type::of(object)));
-    throw py::type_error(std::string("bocst: ") + name + " must be an array of " + expected + ", not " + got);
+  const auto wrong = [&](const std::string& got) {
+    return std::string("bocst: ") + name + " must be an array of " + expected + ", not " + got;
+  };
+  py::array a;
+  try {
+    a = py::module_::import("numpy").attr("asarray")(object);
+  } catch (py::error_already_set& e) {  // NumPy or the object's __array__ says why
+    py::raise_from(e, PyExc_TypeError, wrong(py::str(py::type::of(object))).c_str());
+    throw py::error_already_set();
+  }
+  if (std::strchr(kinds, a.dtype().kind()) == nullptr) {
+    throw py::type_error(wrong("dtype " + std::string(py::str(a.dtype()))));
   }
   return a;
 }
@@ -106,15 +114,29 @@ Poses::Poses(const char* name, const py::handle& object) : name_(name) {
   }
   shape_.assign(array_.shape(), array_.shape() + n - 2);
   for (const py::ssize_t s : shape_) count_ *= static_cast<std::size_t>(s);
-  // What np.swapaxes(X, -1, -2) of an array in C order looks like.
-  const py::array turned = array_.attr("swapaxes")(n - 2, n - 1);
-  constexpr int kInPlace = py::array::c_style | py::detail::npy_api::NPY_ARRAY_ALIGNED_;
-  if (array_.dtype().is(py::dtype::of<double>()) && (turned.flags() & kInPlace) == kInPlace) {
-    order_ = MatrixOrder::kColumns;
-  } else {
-    array_ = doubles(name, array_);
+  const bool is_double = array_.dtype().is(py::dtype::of<double>());
+  is_float_ = array_.dtype().is(py::dtype::of<float>());
+  if (!(is_double || is_float_) || shape_.size() > 2) array_ = doubles(name, array_), is_float_ = false;
+  data_ = static_cast<const char*>(array_.data());
+  row_ = array_.strides(n - 2);
+  column_ = array_.strides(n - 1);
+  if (shape_.size() > 2) {
+    outer_ = kBytes;
+  } else if (!shape_.empty()) {
+    outer_ = array_.strides(0);
   }
-  data_ = static_cast<const double*>(array_.data());
+  if (shape_.size() == 2) {
+    inner_ = array_.strides(1);
+    inner_count_ = std::max<std::size_t>(1, static_cast<std::size_t>(shape_[1]));
+  }
+  bool is_compact = !is_float_ && reinterpret_cast<std::uintptr_t>(data_) % alignof(double) == 0;
+  py::ssize_t stride = kBytes;
+  for (py::ssize_t d = n - 3; d >= 0; --d) {
+    is_compact &= array_.shape(d) == 1 || array_.strides(d) == stride;
+    stride *= array_.shape(d);
+  }
+  if (is_compact && row_ == 32 && column_ == 8) order_ = MatrixOrder::kRows;
+  if (is_compact && row_ == 8 && column_ == 32) order_ = MatrixOrder::kColumns;
 }
 
 std::string Poses::indexText(std::size_t k) const {
@@ -126,27 +148,54 @@ std::string Poses::indexText(std::size_t k) const {
   return text.empty() ? text : "[" + text + "]";
 }
 
-const fcl::Transform3d* Poses::transforms(std::vector<fcl::Transform3d>& copy) const {
-  const bool columns = order_ == MatrixOrder::kColumns;
-  // The last row of a matrix starts at the last number of the first column, or of the third row.
-  const std::size_t first = columns ? 3 : 12, step = columns ? 4 : 1;
-  for (std::size_t k = 0; k < count_; ++k) {
-    const double* m = data_ + 16 * k + first;
-    if ((m[0] == 0) & (m[step] == 0) & (m[2 * step] == 0) & (m[3 * step] == 1)) continue;
+namespace {
+
+template <typename Number>
+Eigen::Matrix4d matrixAt(const char* at, py::ssize_t row, py::ssize_t column) {
+  Eigen::Matrix4d m;
+  for (int c = 0; c < 4; ++c) {
+    for (int r = 0; r < 4; ++r) {
+      Number x;
+      std::memcpy(&x, at + r * row + c * column, sizeof(x));
+      m(r, c) = static_cast<double>(x);
+    }
+  }
+  return m;
+}
+
+}  // namespace
+
+Eigen::Matrix4d Poses::matrix(std::size_t k) const {
+  const char* const at =
+      data_ + static_cast<py::ssize_t>(k / inner_count_) * outer_ + static_cast<py::ssize_t>(k % inner_count_) * inner_;
+  if (is_float_) return matrixAt<float>(at, row_, column_);
+  if (row_ == 32 && column_ == 8) return matrixAt<double>(at, 32, 8);
+  return matrixAt<double>(at, row_, column_);
+}
+
+const fcl::Transform3d* Poses::transforms(std::size_t begin, std::size_t end,
+                                          std::vector<fcl::Transform3d>& copy) const {
+  const auto check = [&](std::size_t k, double x, double y, double z, double w) {
+    if ((x == 0) & (y == 0) & (z == 0) & (w == 1)) return;
     std::ostringstream text;
     text.precision(std::numeric_limits<double>::max_digits10);
-    text << "bocst: " << name_ << indexText(k) << " has the last row " << m[0] << " " << m[step] << " " << m[2 * step]
-         << " " << m[3 * step] << "; 0 0 0 1 is expected";
+    text << "bocst: " << name_ << indexText(k) << " has the last row " << x << " " << y << " " << z << " " << w
+         << "; 0 0 0 1 is expected";
     throw std::invalid_argument(text.str());
+  };
+  if (order_ == MatrixOrder::kColumns && reinterpret_cast<std::uintptr_t>(data_) % alignof(fcl::Transform3d) == 0) {
+    const double* const all = data();
+    for (std::size_t k = begin; k < end; ++k) {
+      const double* m = all + 16 * k;
+      check(k, m[3], m[7], m[11], m[15]);
+    }
+    return reinterpret_cast<const fcl::Transform3d*>(all) + begin;
   }
-  if (columns && reinterpret_cast<std::uintptr_t>(data_) % alignof(fcl::Transform3d) == 0) {
-    return reinterpret_cast<const fcl::Transform3d*>(data_);
-  }
-  using Rows = Eigen::Map<const Eigen::Matrix<double, 4, 4, Eigen::RowMajor>>;
-  copy.resize(count_);
-  for (std::size_t k = 0; k < count_; ++k) {
-    const double* m = data_ + 16 * k;
-    copy[k].matrix() = columns ? Eigen::Matrix4d(Eigen::Map<const Eigen::Matrix4d>(m)) : Eigen::Matrix4d(Rows(m));
+  copy.resize(end - begin);
+  for (std::size_t k = begin; k < end; ++k) {
+    Eigen::Matrix4d& m = copy[k - begin].matrix();
+    m = matrix(k);
+    check(k, m(3, 0), m(3, 1), m(3, 2), m(3, 3));
   }
   return copy.data();
 }
@@ -156,7 +205,13 @@ fcl::Transform3d pose(const char* name, const py::handle& object) {
   if (!poses.shape().empty())
     refuse(name, "has the shape " + shapeText(py::array::ensure(object)) + "; (4, 4) is expected");
   std::vector<fcl::Transform3d> copy;
-  return *poses.transforms(copy);
+  return *poses.transforms(0, 1, copy);
+}
+
+std::string shapeOf(const std::vector<py::ssize_t>& leading) {
+  std::string text = "(";
+  for (const py::ssize_t n : leading) text += std::to_string(n) + ", ";
+  return text + "4, 4)";
 }
 
 std::string counted(std::size_t count, const char* one, const char* many) {

@@ -40,6 +40,11 @@ double length(const char* name, double value) {
   if (!(number(name, value) >= 0)) throw py::value_error(std::string("bocst: ") + name + " is negative");
   return value;
 }
+/// octomap counts cells in 16 bits, and divides by their size.
+double cellSize(double resolution) {
+  if (!(length("r", resolution) > 1e-100)) throw py::value_error("bocst: r, the size of a cell, must be more than 0");
+  return resolution;
+}
 Vector3d lengths(const char* name, const py::object& value) {
   const Vector3d v = vector3(name, value);
   for (int k = 0; k < 3; ++k) length(name, v[k]);
@@ -401,7 +406,7 @@ bool readHeader(std::string_view& data, double& resolution) {
 
 class Octree : public Geometry {
  public:
-  explicit Octree(double resolution) : Octree(std::make_shared<octomap::OcTree>(length("r", resolution))) {}
+  explicit Octree(double resolution) : Octree(std::make_shared<octomap::OcTree>(cellSize(resolution))) {}
 
   std::shared_ptr<fcl::CollisionGeometryd> get() const override {
     const unsigned changing = changing_;

@@ -9,7 +9,9 @@
 #include <pybind11/stl.h>
 
 #include <algorithm>
+#include <chrono>
 #include <cmath>
+#include <limits>
 #include <mutex>
 #include <optional>
 #include <shared_mutex>
@@ -138,6 +140,12 @@ void bindOptions(py::module_& m) {
            "dimension"_a = 0.0, "oracle"_a = "auto", "ttl"_a = 2.0, "memory_budget"_a = 0, "margin"_a = 0.0,
            "solid"_a = false, "build_ahead"_a = false)
       .def("__repr__", [](const Options& o) { return repr("Options", asDict(o)); })
+      .def("__reduce__",
+           [](const py::object& self) {
+             const py::object made = py::module_::import("functools")
+                                         .attr("partial")(py::type::of(self), **asDict(self.cast<const Options&>()));
+             return py::make_tuple(made, py::tuple());
+           })
       .def(
           "__eq__", [](const Options& a, const Options& b) { return asDict(a).equal(asDict(b)); }, py::is_operator());
   for (const auto& [name, meaning] : kOptionTexts) {
@@ -226,6 +234,10 @@ Raises ValueError that names the first bad vertex or triangle.)")
             return forPython(mesh.withVertices(std::move(v)));
           },
           "vertices"_a, "A mesh with the same triangles and these vertices, (n, 3). Both meshes share the indices.")
+      .def("__reduce__",
+           [](const py::object& self) {
+             return py::make_tuple(py::type::of(self), py::make_tuple(self.attr("vertices"), self.attr("triangles")));
+           })
       .def("health", &program::healthOf, py::call_guard<NoGil>(), "Checks the mesh as a surface; see Health.")
       .def("__repr__", [](const Mesh& mesh) {
         return "Mesh(" + counted(mesh.vertexCount(), "vertex", "vertices") + ", " +
@@ -328,6 +340,12 @@ Model(mesh, options), or options as keyword arguments: Model(mesh, margin=0.01).
       .def_property_readonly(
           "mesh", [](const ModelGeometry& g) { return forPython(g.model().mesh()); },
           "The current Mesh; None after release_mesh().")
+      .def("__reduce__",
+           [](const py::object& self) {
+             const py::object mesh = self.attr("mesh");
+             if (mesh.is_none()) throw py::value_error("bocst: a Model without its mesh cannot be pickled");
+             return py::make_tuple(py::type::of<ModelGeometry>(), py::make_tuple(mesh, self.attr("options")));
+           })
       .def_property_readonly(
           "options", [](const ModelGeometry& g) { return g.model().options(); },
           "The Options that the model was made with.")
@@ -403,14 +421,53 @@ void bindOracles(py::module_& m) {
 
 // Many poses ----------------------------------------------------------------------------------------------------------
 
+/// Calls f(begin, end) for the items below `count` in parts of at most `most`, without the GIL, until it returns false.
+/// In between, the signals that came are handled, so Ctrl-C ends a long call.
+template <typename F>
+void inParts(std::size_t count, std::size_t most, const F& f) {
+  constexpr std::chrono::milliseconds kPatience(100);
+  std::size_t begin = 0;
+  do {
+    {
+      const NoGil free;
+      const auto start = std::chrono::steady_clock::now();
+      do {
+        const std::size_t end = std::min(begin + most, count);
+        if (!f(begin, end)) return;
+        begin = end;
+      } while (begin < count && std::chrono::steady_clock::now() - start < kPatience);
+    }
+    if (PyErr_CheckSignals() != 0) throw py::error_already_set();
+  } while (begin < count);
+}
+
 py::array_t<bool> posesOf(const ModelGeometry& a, const ModelGeometry& b, const py::object& X_AB, unsigned threads) {
   const Poses poses("X_AB", X_AB);
-  if (poses.shape().size() != 1) throw py::value_error("bocst: X_AB must have the shape (n, 4, 4)");
+  if (poses.shape().size() != 1) {
+    throw py::value_error("bocst: X_AB has the shape " + shapeOf(poses.shape()) + "; (n, 4, 4) is expected");
+  }
   py::array_t<bool> hits(poses.shape());
   auto* hit = reinterpret_cast<std::uint8_t*>(hits.mutable_data());
   const std::shared_ptr<Modeld> model_a = a.shared(), model_b = b.shared();
-  const NoGil free;
-  collidePoses(*model_a, *model_b, poses.data(), poses.order(), poses.count(), hit, threads);
+  std::vector<fcl::Transform3d> copy;
+  const auto check = [&](std::size_t begin, std::size_t end) {
+    if (poses.order().has_value()) {
+      collidePoses(*model_a, *model_b, poses.data() + 16 * begin, *poses.order(), end - begin, hit + begin, threads);
+    } else {
+      collidePoses(*model_a, *model_b, poses.transforms(begin, end, copy), end - begin, hit + begin, threads);
+    }
+  };
+  // Each part starts its threads.
+  const std::size_t most = poses.order().has_value() ? std::size_t{1} << 18 : std::size_t{1} << 15;
+  inParts(poses.count(), most, [&](std::size_t begin, std::size_t end) {
+    try {
+      check(begin, end);
+    } catch (const std::invalid_argument&) {
+      if (begin > 0) check(0, end);  // so that the message has the pose's number in the whole array
+      throw;
+    }
+    return true;
+  });
   return hits;
 }
 
@@ -435,31 +492,58 @@ std::size_t statesIn(const char* name, const Poses& poses, std::size_t moving, b
   const std::size_t dimensions = many ? 2 : 1;
   const bool has_moving = shape.size() == dimensions && shape.back() == static_cast<py::ssize_t>(moving);
   if (!has_moving && !(moving == 1 && shape.size() == dimensions - 1)) {
-    std::string got;
-    for (const py::ssize_t n : shape) got += std::to_string(n) + ", ";
-    throw py::value_error("bocst: " + std::string(name) + " has the shape (" + got + "4, 4); (" + (many ? "n, " : "") +
-                          std::to_string(moving) + ", 4, 4) is expected");
+    throw py::value_error("bocst: " + std::string(name) + " has the shape " + shapeOf(shape) + "; (" +
+                          (many ? "n, " : "") + std::to_string(moving) + ", 4, 4) is expected, as the scene has " +
+                          counted(moving, "moving object"));
   }
   return many ? static_cast<std::size_t>(shape.front()) : 1;
 }
 
-/// Calls f(scene, poses, states) without the GIL.
+/// Calls f(scene, poses) for one state, without the GIL.
 template <typename F>
-auto ask(const PyScene& s, const py::object& X_WM, bool many, const F& f, const char* name = "X_WM") {
+auto ask(const PyScene& s, const py::object& X_WM, const F& f, const char* name = "X_WM") {
   const Poses poses(name, X_WM);
   const NoGilWithOctrees free;
   const std::shared_lock<FairSharedMutex> lock(s.changing);
-  const std::size_t states = statesIn(name, poses, s.scene.movingCount(), many);
+  statesIn(name, poses, s.scene.movingCount(), false);
   std::vector<fcl::Transform3d> copy;
-  return f(s.scene, poses.transforms(copy), states);
+  return f(s.scene, poses.transforms(0, poses.count(), copy));
+}
+
+/// Calls start(states), then f(scene, poses, first state, number of states) for parts of many states in turn, until it
+/// returns false. A change of the scene by another thread may come between two parts.
+template <typename Start, typename F>
+void askMany(const PyScene& s, const py::object& X_WM, const Start& start, const F& f) {
+  constexpr std::size_t kPoses = 1 << 15, kMost = 4096;
+  const Poses poses("X_WM", X_WM);
+  const std::size_t moving = s.scene.movingCount(), states = statesIn("X_WM", poses, moving, true);
+  start(states);
+  std::vector<fcl::Transform3d> copy;
+  const auto part = [&](std::size_t begin, std::size_t end) {
+    const std::shared_lock<FairSharedMutex> octrees(octreeMutex());
+    const std::shared_lock<FairSharedMutex> lock(s.changing);
+    if (s.scene.movingCount() != moving) {
+      throw std::runtime_error("bocst: moving objects came or went while the scene was asked");
+    }
+    return f(s.scene, poses.transforms(begin * moving, end * moving, copy), begin, end - begin);
+  };
+  inParts(states, std::clamp<std::size_t>(kPoses / std::max<std::size_t>(1, moving), 128, kMost),
+          [&](std::size_t begin, std::size_t end) {
+            try {
+              return part(begin, end);
+            } catch (const std::invalid_argument&) {
+              if (begin > 0) part(0, end);  // so that the message has the state's number in the whole array
+              throw;
+            }
+          });
 }
 
 using Xs = const fcl::Transform3d*;
 
-/// A query of Python: f of one state or of many.
+/// A query of Python about one state.
 template <typename F>
-auto query(bool many, const F& f) {
-  return [many, f](const PyScene& s, const py::object& X_WM) { return ask(s, X_WM, many, f); };
+auto query(const F& f) {
+  return [f](const PyScene& s, const py::object& X_WM) { return ask(s, X_WM, f); };
 }
 
 py::list pairsOf(const std::vector<Pair>& pairs) {
@@ -469,8 +553,7 @@ py::list pairsOf(const std::vector<Pair>& pairs) {
 }
 
 py::tuple pairsWithin(const PyScene& s, const py::object& X_WM, double distance) {
-  const auto found = ask(s, X_WM, false,
-                         [distance](const Scened& scene, Xs X, std::size_t) { return scene.pairsWithin(X, distance); });
+  const auto found = ask(s, X_WM, [distance](const Scened& scene, Xs X) { return scene.pairsWithin(X, distance); });
   const auto count = static_cast<py::ssize_t>(found.size());
   std::vector<Pair> pairs;
   py::array_t<double> distances(count), points({count, py::ssize_t{2}, py::ssize_t{3}});
@@ -484,6 +567,8 @@ py::tuple pairsWithin(const PyScene& s, const py::object& X_WM, double distance)
   }
   return py::make_tuple(pairsOf(pairs), distances, points);
 }
+
+constexpr double kAnyDistance = std::numeric_limits<double>::infinity();
 
 std::optional<std::pair<Id, Id>> idsOf(const Pair& pair) {
   return pair.a.isValid() ? std::optional<std::pair<Id, Id>>({pair.a, pair.b}) : std::nullopt;
@@ -582,63 +667,102 @@ void bindSceneChanges(py::class_<PyScene>& type) {
 }
 
 void bindSceneQueries(py::class_<PyScene>& type) {
-  type.def("collides", query(false, [](const Scened& scene, Xs X, std::size_t) { return scene.collides(X); }), "X_WM"_a,
+  type.def("collides", query([](const Scened& scene, Xs X) { return scene.collides(X); }), "X_WM"_a,
            "True if this state, (m, 4, 4), collides.")
-      .def("colliding_pair",
-           query(false,
-                 [](const Scened& scene, Xs X, std::size_t) {
-                   Pair pair;
-                   scene.collides(X, &pair);
-                   return idsOf(pair);
-                 }),
-           "X_WM"_a, "A pair of Ids that collides in this state, (m, 4, 4), or None.")
+      .def("colliding_pair", query([](const Scened& scene, Xs X) {
+             Pair pair;
+             scene.collides(X, &pair);
+             return idsOf(pair);
+           }),
+           "X_WM"_a,
+           "A pair of Ids that collides in this state, (m, 4, 4), or None. If several do, it may be any of them: it "
+           "depends on earlier queries. The first of colliding_pairs() does not.")
       .def(
           "colliding_pairs",
           [](const PyScene& s, const py::object& X_WM) {
-            return pairsOf(
-                ask(s, X_WM, false, [](const Scened& scene, Xs X, std::size_t) { return scene.collidingPairs(X); }));
+            return pairsOf(ask(s, X_WM, [](const Scened& scene, Xs X) { return scene.collidingPairs(X); }));
           },
-          "X_WM"_a, "A list of all pairs of Ids that collide in this state, (m, 4, 4).")
+          "X_WM"_a, "A list of all pairs of Ids that collide in this state, (m, 4, 4), in the order of the Ids.")
       .def(
           "collisions",
           [](const PyScene& s, const py::object& X_WM) {
-            std::vector<std::uint8_t> hits;
-            ask(s, X_WM, true, [&hits](const Scened& scene, Xs X, std::size_t states) {
-              hits.resize(states);
-              scene.collisions(X, states, hits.data());
-            });
-            return py::array_t<bool>(static_cast<py::ssize_t>(hits.size()), reinterpret_cast<const bool*>(hits.data()));
+            py::array_t<bool> hits;
+            std::uint8_t* hit = nullptr;
+            askMany(
+                s, X_WM,
+                [&](std::size_t states) {
+                  hits = py::array_t<bool>(static_cast<py::ssize_t>(states));
+                  hit = reinterpret_cast<std::uint8_t*>(hits.mutable_data());
+                },
+                [&](const Scened& scene, Xs X, std::size_t begin, std::size_t states) {
+                  scene.collisions(X, states, hit + begin);
+                  return true;
+                });
+            return hits;
           },
           "X_WM"_a, "A bool array (n,): True for each of the states, (n, m, 4, 4), that collides.")
-      .def("first_collision",
-           query(true, [](const Scened& scene, Xs X, std::size_t states) { return scene.firstCollision(X, states); }),
-           "X_WM"_a, "The smallest index of a state that collides; n if none does. The states are (n, m, 4, 4).")
-      .def("any_collision",
-           query(true, [](const Scened& scene, Xs X, std::size_t states) { return scene.anyCollision(X, states); }),
-           "X_WM"_a,
-           "True if any of the states, (n, m, 4, 4), collides. Checks the middle of each part before its halves.")
-      .def("clearance", query(false, [](const Scened& scene, Xs X, std::size_t) { return scene.clearance(X); }),
-           "X_WM"_a, "The minimum distance of all pairs in this state, (m, 4, 4); 0 if a pair touches.")
-      .def("nearest_pair",
-           query(false,
-                 [](const Scened& scene, Xs X, std::size_t) {
-                   Pair pair;
-                   scene.clearance(X, &pair);
-                   return idsOf(pair);
-                 }),
+      .def(
+          "first_collision",
+          [](const PyScene& s, const py::object& X_WM) {
+            std::size_t first = 0;
+            askMany(
+                s, X_WM, [](std::size_t) {},
+                [&first](const Scened& scene, Xs X, std::size_t begin, std::size_t states) {
+                  const std::size_t found = scene.firstCollision(X, states);
+                  first = begin + found;
+                  return found == states;
+                });
+            return first;
+          },
+          "X_WM"_a, "The smallest index of a state that collides; n if none does. The states are (n, m, 4, 4).")
+      .def(
+          "any_collision",
+          [](const PyScene& s, const py::object& X_WM) {
+            bool any = false;
+            askMany(
+                s, X_WM, [](std::size_t) {},
+                [&any](const Scened& scene, Xs X, std::size_t, std::size_t states) {
+                  any = scene.anyCollision(X, states);
+                  return !any;
+                });
+            return any;
+          },
+          "X_WM"_a,
+          "True if any of the states, (n, m, 4, 4), collides. Checks the middle of each part before its halves.")
+      .def(
+          "clearance",
+          [](const PyScene& s, const py::object& X_WM, double at_most) {
+            return ask(s, X_WM, [at_most](const Scened& scene, Xs X) { return scene.clearance(X, nullptr, at_most); });
+          },
+          "X_WM"_a, "at_most"_a = kAnyDistance,
+          "The minimum distance of all pairs in this state, (m, 4, 4); 0 if a pair touches; at_most if no pair is "
+          "nearer, so that farther ones need not be measured.")
+      .def("nearest_pair", query([](const Scened& scene, Xs X) {
+             Pair pair;
+             scene.clearance(X, &pair);
+             return idsOf(pair);
+           }),
            "X_WM"_a, "The pair of Ids at the minimum distance in this state, (m, 4, 4); None without pairs.")
       .def(
           "clearances",
-          [](const PyScene& s, const py::object& X_WM) {
-            std::vector<double> distances;
-            ask(s, X_WM, true, [&distances](const Scened& scene, Xs X, std::size_t states) {
-              distances.resize(states);
-              scene.clearances(X, states, distances.data());
-            });
-            return py::array_t<double>(static_cast<py::ssize_t>(distances.size()), distances.data());
+          [](const PyScene& s, const py::object& X_WM, double at_most) {
+            py::array_t<double> distances;
+            double* distance = nullptr;
+            askMany(
+                s, X_WM,
+                [&](std::size_t states) {
+                  distances = py::array_t<double>(static_cast<py::ssize_t>(states));
+                  distance = distances.mutable_data();
+                },
+                [&](const Scened& scene, Xs X, std::size_t begin, std::size_t states) {
+                  scene.clearances(X, states, distance + begin, nullptr, at_most);
+                  return true;
+                });
+            return distances;
           },
-          "X_WM"_a,
-          "A float64 array (n,): the clearance of each of the states, (n, m, 4, 4). The scene's threads share them.")
+          "X_WM"_a, "at_most"_a = kAnyDistance,
+          "A float64 array (n,): the clearance of each of the states, (n, m, 4, 4), see clearance(). The scene's "
+          "threads share them.")
       .def("pairs_within", &pairsWithin, "X_WM"_a, "distance"_a,
            R"(All pairs whose distance in this state, (m, 4, 4), is at most `distance`; the nearest first.
 
@@ -649,16 +773,18 @@ the nearest points on the first and the second object in the world, without mean
           [](const PyScene& s, const py::object& begin, const py::object& end, const std::string& motion) {
             const auto motion_type = valueOf("motion", motion, kMotions);
             const Poses last("X_WM_end", end);
-            const auto is_free = [&](const Scened& scene, Xs X, std::size_t) {
+            const auto is_free = [&](const Scened& scene, Xs X) {
               statesIn("X_WM_end", last, scene.movingCount(), false);
               std::vector<fcl::Transform3d> copy;
-              return scene.edgeIsFree(X, last.transforms(copy), motion_type);
+              return scene.edgeIsFree(X, last.transforms(0, last.count(), copy), motion_type);
             };
-            return ask(s, begin, false, is_free, "X_WM_begin");
+            return ask(s, begin, is_free, "X_WM_begin");
           },
           "X_WM_begin"_a, "X_WM_end"_a, "motion"_a = "linear",
           R"(True if the motion from one state to another, both (m, 4, 4), is free of collisions at all times.
 
+Each object moves on its own: by default its origin along a line, while it turns about a fixed axis. The links of an arm
+that moves in joint space leave that motion: divide such an edge, or ask any_collision() about states on it.
 motion: 'linear', 'translation', 'screw' or 'spline', see fcl.CCDMotionType.)");
 }
 
@@ -672,6 +798,7 @@ void requireInit(const py::module_& m) {
       continue;
     }
     if (PyType_Check(value.ptr()) == 0 || PyExceptionClass_Check(value.ptr())) continue;
+    const bool is_pickled = py::dict(value.attr("__dict__")).contains("__reduce__");
     py::detail::get_type_info(reinterpret_cast<PyTypeObject*>(value.ptr()))->operator_new = [](std::size_t) -> void* {
       throw py::type_error("bocst: __init__ of the object was not called");
     };
@@ -680,6 +807,9 @@ void requireInit(const py::module_& m) {
       const auto reduce = [](const py::object& self, const py::args&) {
         return py::make_tuple(py::type::of(self), py::make_tuple(py::int_(self)));
       };
+      py::setattr(value, "__reduce_ex__", py::cpp_function(reduce, py::is_method(value), py::name("__reduce_ex__")));
+    } else if (is_pickled) {
+      const auto reduce = [](const py::object& self, const py::args&) { return self.attr("__reduce__")(); };
       py::setattr(value, "__reduce_ex__", py::cpp_function(reduce, py::is_method(value), py::name("__reduce_ex__")));
     } else {
       const auto refuse = [](const py::object& self, const py::args&) {

@@ -139,6 +139,66 @@ def test_poses_of_any_layout():
     assert bocst.collide_poses(a, b, np.zeros((0, 4, 4))).shape == (0,)
 
 
+def test_states_of_any_layout():
+    a, b = models()
+    scene = bocst.Scene()
+    scene.add_fixed(a, np.eye(4))
+    for _ in range(2):
+        scene.add_moving(b)
+    X = poses(9000, 2.5).reshape(4500, 2, 4, 4)  # more than a part
+    expected, distances = scene.collisions(X), scene.clearances(X[:50])
+    assert 450 < expected.sum() < 4050
+    wide = np.zeros((4500, 3, 5, 8), X.dtype)
+    wide[:, ::2, :4, ::2] = X
+    columns = X.swapaxes(2, 3).copy().swapaxes(2, 3)
+    for Y in (wide[:, ::2, :4, ::2], X[::-1].copy()[::-1], columns, np.asfortranarray(X), X.tolist()):
+        assert np.array_equal(scene.collisions(Y), expected)
+        assert np.array_equal(scene.clearances(Y[:50]), distances)
+        assert scene.first_collision(Y) == np.argmax(expected) and scene.any_collision(Y)
+    assert np.array_equal(scene.collisions(wide.astype(np.float32)[:, ::2, :4, ::2]),
+                          scene.collisions(X.astype(np.float32).astype(np.float64)))
+    # One of several objects, and one pose for all.
+    first, both = X[:, 0], np.broadcast_to(X[:1], X.shape)
+    assert np.array_equal(bocst.collide_poses(a, b, first), bocst.collide_poses(a, b, first.copy()))
+    assert np.array_equal(bocst.collide_poses(a, b, first.astype(np.float32)[::3]),
+                          bocst.collide_poses(a, b, first.astype(np.float32)[::3].astype(np.float64)))
+    assert np.array_equal(scene.collisions(both), np.full(4500, expected[0]))
+    free = X[~expected]
+    assert scene.first_collision(free) == len(free) and not scene.any_collision(free)
+
+
+@pytest.mark.parametrize("bad", [10, 40000])
+def test_bad_poses_have_the_numbers_of_the_whole_array(bad):
+    a, b = models()
+    X = np.tile(np.eye(4), (50000, 2, 1, 1))
+    X[:, :, 0, 3] = 9
+    X[bad, 0, 1, 1] = 2
+    with pytest.raises(ValueError, match=f"pose {bad} "):
+        bocst.collide_poses(a, b, X[:, 0])
+    scene = bocst.Scene()
+    scene.add_fixed(a, np.eye(4))
+    scene.add_moving(b)
+    for Y in (X[:, :1], X[:, :1].copy(), X[:, :1].swapaxes(2, 3).copy().swapaxes(2, 3)):
+        for call in (scene.collisions, scene.first_collision, scene.clearances):
+            with pytest.raises(ValueError, match=f"state {bad} "):
+                call(Y)
+
+
+class Refusing:
+    def __array__(self, dtype=None, copy=None):
+        raise RuntimeError("call detach() first")
+
+
+def test_why_an_object_is_no_array_is_told():
+    a, b = models()
+    with pytest.raises(TypeError, match="X_AB must be an array of real numbers, not .*Refusing") as info:
+        bocst.collide_poses(a, b, Refusing())
+    assert "call detach() first" in str(info.value.__cause__)
+    with pytest.raises(TypeError) as info:
+        bocst.Mesh([[0, 0, 0], [1, 0]], T)
+    assert "inhomogeneous" in str(info.value.__cause__)
+
+
 def reflected():
     X = np.eye(4)
     X[0, 0] = -1
@@ -146,9 +206,9 @@ def reflected():
 
 
 @pytest.mark.parametrize("X, error, words", [
-    (np.eye(4), ValueError, r"X_AB must have the shape \(n, 4, 4\)"),
+    (np.eye(4), ValueError, r"X_AB has the shape \(4, 4\); \(n, 4, 4\) is expected"),
     (np.zeros((5, 3, 4)), ValueError, r"X_AB has the shape \(5, 3, 4\)"),
-    (np.zeros((2, 5, 4, 4)), ValueError, "X_AB must have the shape"),
+    (np.zeros((2, 5, 4, 4)), ValueError, r"X_AB has the shape \(2, 5, 4, 4\)"),
     (4.0, ValueError, "X_AB has the shape"),
     (np.tile(np.eye(4), (3, 1, 1)).astype(complex), TypeError, "X_AB must be an array of real numbers"),
     (nan_in(np.tile(np.eye(4), (9000, 1, 1)), (7000, 0, 3)), ValueError, "pose .*has the translation .*not finite"),

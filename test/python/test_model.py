@@ -1,6 +1,10 @@
 # SPDX-License-Identifier: BSD-3-Clause
 """Models, many poses of a pair, scenes, and what inspect says."""
+import contextlib
+import copy
 import pathlib
+import pickle
+import signal
 
 import bocst
 import bocst._bocst
@@ -177,6 +181,10 @@ def test_scene():
             assert points.shape == (len(pairs), 2, 3) and np.allclose(gaps[apart], distances[apart], atol=1e-5)
     assert np.array_equal(scene.clearances(X[:100]), [scene.clearance(state) for state in X[:100]])
     assert scene.clearances(X[:0]).shape == (0,)
+    assert np.array_equal(scene.clearances(X[:100], at_most=0.3), np.minimum(scene.clearances(X[:100]), 0.3))
+    assert scene.clearance(X[0], 0.0) == 0
+    with pytest.raises(ValueError, match="at_most is -1"):
+        scene.clearances(X[:1], at_most=-1)
     with pytest.raises(ValueError, match="distance is -1"):
         scene.pairs_within(X[0], -1.0)
     scene.build_trees()
@@ -216,6 +224,49 @@ def test_scene_changes():
         bocst.Scene().remove(fixed[0])
     with pytest.raises(ValueError, match="Scene::setPose: X_WG has the rotation"):
         scene.set_pose(fixed[0], np.diag([2.0, 1, 1, 1]))
+
+
+@pytest.mark.parametrize("protocol", range(pickle.HIGHEST_PROTOCOL + 1))
+def test_meshes_options_and_models_are_pickled(protocol):
+    mesh = bocst.Mesh(*torus())
+    options = bocst.Options(margin=0.25, answer="conservative", depth=5, ttl=0.5)
+    model = bocst.Model(mesh, options)
+    for again in (lambda x: pickle.loads(pickle.dumps(x, protocol)), copy.deepcopy, copy.copy):
+        other = again(mesh)
+        assert np.array_equal(other.vertices, mesh.vertices) and np.array_equal(other.triangles, mesh.triangles)
+        assert again(options) == options
+        assert again(model).options == options and np.array_equal(again(model).mesh.vertices, mesh.vertices)
+    together = pickle.loads(pickle.dumps((mesh, model), protocol))
+    assert np.array_equal(together[1].mesh.vertices, together[0].vertices)
+    with contextlib.suppress(bocst.OracleError):  # only a device can keep the mesh
+        model.release_mesh()
+    if model.mesh is None:
+        with pytest.raises(ValueError, match="without its mesh"):
+            pickle.dumps(model, protocol)
+
+
+def test_signals_are_handled_during_long_calls():
+    """A handler runs several times in one call; without a check, once at its end."""
+    a = bocst.Model(bocst.Mesh(*torus(40)))
+    scene = bocst.Scene()
+    scene.add_fixed(a, np.eye(4))
+    scene.add_moving(a)
+    X = np.tile(shift(1.3, 0.2, 0.1), (1000, 1, 1))
+    X[:, 0, 3] += np.linspace(0, 0.1, 1000)
+    for call in (lambda Y: bocst.collide_poses(a, a, Y, threads=1), scene.collisions, scene.clearances):
+        handled, before = [], signal.signal(signal.SIGALRM, lambda *_: handled.append(1))
+        Y = X
+        try:
+            while len(handled) < 3 and len(Y) < 1 << 21:
+                Y = np.tile(Y, (4, 1, 1))
+                signal.setitimer(signal.ITIMER_REAL, 0.05, 0.05)
+                handled.clear()
+                call(Y)
+                signal.setitimer(signal.ITIMER_REAL, 0)
+        finally:
+            signal.setitimer(signal.ITIMER_REAL, 0)
+            signal.signal(signal.SIGALRM, before)
+        assert len(handled) >= 3
 
 
 def test_scene_keeps_its_geometries():
