@@ -28,7 +28,7 @@ constexpr int kHalvings = 2;
 constexpr double kTouch = 1e-5;
 
 /// No more than the distance of two of FCL's geometries. Its solvers may say more, each for other poses; shapes are
-/// measured here, and of octrees the lesser of both solvers' answers is taken.
+/// measured here, and of two octrees the lesser of both solvers' answers is taken.
 template <typename S>
 double leastDistance(const Object<S>& a, const fcl::Transform3<S>& X_WA, const Object<S>& b,
                      const fcl::Transform3<S>& X_WB) {

@@ -928,6 +928,15 @@ TYPED_TEST(SceneTest, RowsOfStatesOfBodiesThatPassEachOther) {
 }
 
 // No sample between touches where an edge is free; where it is not, something comes very close.
+/// On the way of CCDM_LINEAR.
+template <typename S>
+fcl::Transform3<S> between(const fcl::Transform3<S>& begin, const fcl::Transform3<S>& end, double t) {
+  const Eigen::Matrix3d R0 = begin.linear().template cast<double>(), R1 = end.linear().template cast<double>();
+  return test::pose<S>(
+      Eigen::Quaterniond(R0).slerp(t, Eigen::Quaterniond(R1)).toRotationMatrix(),
+      (1 - t) * begin.translation().template cast<double>() + t * end.translation().template cast<double>());
+}
+
 TYPED_TEST(SceneTest, EdgesNeverStepOverAContact) {
   using S = TypeParam;
   int free = 0, blocked = 0;
@@ -946,13 +955,7 @@ TYPED_TEST(SceneTest, EdgesNeverStepOverAContact) {
       for (int s = 0; s <= samples; ++s) {
         States<S> X;
         const double t = static_cast<double>(s) / samples;
-        for (std::size_t i = 0; i < 2; ++i) {
-          const Eigen::Matrix3d R0 = begin[i].linear().template cast<double>(),
-                                R1 = end[i].linear().template cast<double>();
-          const Eigen::Quaterniond q = Eigen::Quaterniond(R0).slerp(t, Eigen::Quaterniond(R1));
-          X.push_back(test::pose<S>(q.toRotationMatrix(), (1 - t) * begin[i].translation().template cast<double>() +
-                                                              t * end[i].translation().template cast<double>()));
-        }
+        for (std::size_t i = 0; i < 2; ++i) X.push_back(between(begin[i], end[i], t));
         if (w.scene.collides(X.data())) {
           touches = true;
           break;
@@ -1044,6 +1047,56 @@ TYPED_TEST(SceneTest, EdgesOfShapesThatFclMeasuresTooFarApart) {
 }
 
 // A thin wall that samples would step over.
+// Beside an octomap the distance of a shape is that of its cells: no edge steps over one, and what stays clear is free.
+TYPED_TEST(SceneTest, EdgesOfShapesBesideOctrees) {
+  using S = TypeParam;
+  const auto cells = test::cloud<S>(test::cloudMap(11, 150));
+  const auto empty = test::cloud<S>(std::make_shared<octomap::OcTree>(0.1));
+  const std::vector<Geometry<S>> shapes = {
+      std::make_shared<fcl::Box<S>>(S(0.3), S(0.2), S(0.4)),       std::make_shared<fcl::Sphere<S>>(S(0.15)),
+      std::make_shared<fcl::Ellipsoid<S>>(S(0.1), S(0.2), S(0.3)), std::make_shared<fcl::Capsule<S>>(S(0.1), S(0.4)),
+      std::make_shared<fcl::Cylinder<S>>(S(0.15), S(0.3)),         std::make_shared<fcl::Cone<S>>(S(0.2), S(0.4))};
+  const auto box_of_triangles = std::make_shared<Model<S>>(test::box({-0.15, -0.1, -0.2}, {0.15, 0.1, 0.2}).mesh());
+  std::mt19937_64 g(31);
+  const auto X_WO = test::pose<S>(test::randomRotation(g), {20, -10, 5});
+  int free = 0, blocked = 0, clear = 0;
+  for (std::size_t k = 0; k < shapes.size(); ++k) {
+    Scene<S> scene, other_way, of_triangles, without;
+    scene.addFixed(cells, X_WO);
+    scene.addMoving(shapes[k]);
+    other_way.addFixed(shapes[k], fcl::Transform3<S>::Identity());
+    other_way.addMoving(cells);
+    of_triangles.addFixed(cells, X_WO);
+    of_triangles.addMoving(box_of_triangles);
+    without.addFixed(empty, X_WO);
+    without.addMoving(shapes[k]);
+    for (int i = 0; i < 80; ++i) {
+      const fcl::Transform3<S> begin = X_WO * randomPose<S>(g, 1), end = begin * randomPose<S>(g, 0.3);
+      EXPECT_TRUE(without.edgeIsFree(&begin, &end));
+      const bool is_free = scene.edgeIsFree(&begin, &end);
+      ++(is_free ? free : blocked);
+      S least = std::numeric_limits<S>::max();
+      for (int t = 0; t <= 100; ++t) {
+        const auto X = between(begin, end, t / 100.0);
+        if (is_free) {
+          ASSERT_FALSE(scene.collides(&X)) << k << ", time " << t;
+        }
+        if (k == 0) least = std::min(least, scene.collides(&X) ? S(0) : of_triangles.clearance(&X));
+      }
+      if (k == 0 && least > S(0.02)) {
+        EXPECT_TRUE(is_free) << least;
+        ++clear;
+      }
+      // The octree moves past the shape in the same way.
+      const fcl::Transform3<S> from = begin.inverse(Eigen::Isometry) * X_WO;
+      EXPECT_EQ(other_way.edgeIsFree(&from, &from), !other_way.collides(&from));
+    }
+  }
+  EXPECT_GT(free, 100);
+  EXPECT_GT(blocked, 100);
+  EXPECT_GT(clear, 10);
+}
+
 TYPED_TEST(SceneTest, EdgesThroughAThinWall) {
   using S = TypeParam;
   for (const bool is_model : {true, false}) {

@@ -3,9 +3,11 @@
 
 #include <algorithm>
 #include <limits>
+#include <queue>
 #include <utility>
 
 #include "fcl/adapters/convex_shapes.h"
+#include "fcl/adapters/octree_side.h"
 #include "fcl/adapters/pair.h"
 #include "fcl/queries/query_scope.h"
 #include "query/collide/sphere_walk.h"
@@ -38,6 +40,15 @@ void withBoundedShape(const fcl::CollisionGeometry<S>& g, F&& f) {
   withConvexShape(static_cast<const fcl::ShapeBase<S>&>(g), query::Sphere(), [&](const query::ConvexShape& shape) {
     if (const auto* bounded = dynamic_cast<const query::SupportShape*>(&shape)) f(*bounded);
   });
+}
+
+/// The pose of B in the frame of A.
+Eigen::Isometry3d relativePose(const Eigen::Isometry3d& X_WA, const Eigen::Isometry3d& X_WB) {
+  // Not inverse(): the difference first, as both may be far from the origin.
+  Eigen::Isometry3d X_AB = Eigen::Isometry3d::Identity();
+  X_AB.linear() = X_WA.linear().transpose() * X_WB.linear();
+  X_AB.translation() = X_WA.linear().transpose() * (X_WB.translation() - X_WA.translation());
+  return X_AB;
 }
 
 /// Of a half-space, or of a plane, whichever side the body is on, and of a body.
@@ -86,14 +97,68 @@ std::optional<PlaneDistance> distanceToPlane(const fcl::CollisionGeometry<S>& a,
   return result;
 }
 
+namespace {
+
+#if FCL_HAVE_OCTOMAP
+/// The distance of a body and the occupied cells of an octree O, no more than it; infinite without such cells.
+template <typename S>
+double distanceToCells(const query::SupportShape& body, const OcTreeSide<S>& octree, const Eigen::Isometry3d& X_OB) {
+  using Node = typename OcTreeSide<S>::Node;
+  struct Cube {
+    double distance;
+    Node node;
+    bool is_measured;  // else the distance is that of the boxes along the octree's axes, which is less
+    bool operator<(const Cube& other) const { return distance > other.distance; }
+  };
+  const Eigen::Vector3d origin = Eigen::Vector3d::Zero(), middle = X_OB * body.box().center,
+                        extents = (X_OB.linear() * body.box().axes).cwiseAbs() * body.box().half;
+  const Eigen::Isometry3d X_BO = X_OB.inverse(Eigen::Isometry);
+  std::priority_queue<Cube> cubes;
+  const auto push = [&](const Node& node) {
+    if (octree.state(node) == query::State::kLeaf && !octree.occupied(node)) return;
+    Eigen::Vector3d center;
+    const double half = octree.octantsOf(node, center);
+    const Eigen::Vector3d gaps = (center - middle).cwiseAbs() - extents - Eigen::Vector3d::Constant(half);
+    cubes.push({gaps.cwiseMax(0).norm(), node, false});
+  };
+  if (!octree.empty()) push(octree.root());
+  while (!cubes.empty()) {
+    const Cube least = cubes.top();
+    if (least.is_measured) return least.distance;
+    cubes.pop();
+    if (octree.state(least.node) != query::State::kLeaf) {
+      octree.children(least.node, push);
+      continue;
+    }
+    Eigen::Vector3d center;
+    const query::BoxShape cell(Eigen::Vector3d::Constant(octree.octantsOf(least.node, center)));
+    Eigen::Isometry3d X_BC = X_BO;
+    X_BC.translation() = X_BO * center;
+    const query::DifferenceShape difference(body, cell, X_BC);
+    const double gap = difference.gap({&origin, 1}, std::numeric_limits<double>::infinity()).at_least;
+    cubes.push({std::max(gap, 0.0), least.node, true});
+  }
+  return std::numeric_limits<double>::infinity();
+}
+#endif
+
+}  // namespace
+
 template <typename S>
 std::optional<double> distanceOfShapes(const fcl::CollisionGeometry<S>& a, const fcl::Transform3<S>& X_WA,
                                        const fcl::CollisionGeometry<S>& b, const fcl::Transform3<S>& X_WB) {
-  // Not inverse(): the difference first, as both may be far from the origin.
-  const Eigen::Isometry3d X = isometryOf<S>(X_WA), Y = isometryOf<S>(X_WB);
-  Eigen::Isometry3d X_AB = Eigen::Isometry3d::Identity();
-  X_AB.linear() = X.linear().transpose() * Y.linear();
-  X_AB.translation() = X.linear().transpose() * (Y.translation() - X.translation());
+#if FCL_HAVE_OCTOMAP
+  if (a.getNodeType() == fcl::GEOM_OCTREE) {
+    std::optional<double> result;
+    withBoundedShape<S>(b, [&](const query::SupportShape& body) {
+      const OcTreeSide<S> octree(static_cast<const fcl::OcTree<S>&>(a), X_WA, S(1), false);
+      result = distanceToCells(body, octree, relativePose(isometryOf<S>(X_WA), isometryOf<S>(X_WB)));
+    });
+    return result;
+  }
+  if (b.getNodeType() == fcl::GEOM_OCTREE) return distanceOfShapes<S>(b, X_WB, a, X_WA);
+#endif
+  const Eigen::Isometry3d X_AB = relativePose(isometryOf<S>(X_WA), isometryOf<S>(X_WB));
   const Eigen::Vector3d origin = Eigen::Vector3d::Zero();
   std::optional<double> distance;
   withBoundedShape<S>(a, [&](const query::SupportShape& core_a) {

@@ -16,9 +16,10 @@ template <typename S>
 bool hullsApart(const Model<S>& a, const fcl::Transform3<S>& X_WA, const Model<S>& b, const fcl::Transform3<S>& X_WB,
                 double gap);
 
-/// No more than the distance of two of FCL's bounded shapes, and less than it by rounding alone, at poses that are
-/// rigid up to rounding; 0 where they may touch. Null for other geometries. fcl::distance may be too large: by a tenth
-/// and more for boxes whose faces are parallel.
+/// No more than the distance of two of FCL's bounded shapes, or of one and the occupied cells of an OcTree (infinite
+/// without any), and less than it by rounding alone, at poses that are rigid up to rounding; 0 where they may touch.
+/// Null for other geometries. fcl::distance may be too large, by a tenth and more for boxes whose faces are parallel,
+/// and takes up to a millisecond beside an OcTree.
 template <typename S>
 std::optional<double> distanceOfShapes(const fcl::CollisionGeometry<S>& a, const fcl::Transform3<S>& X_WA,
                                        const fcl::CollisionGeometry<S>& b, const fcl::Transform3<S>& X_WB);
