@@ -72,14 +72,16 @@ struct SceneOptions {
 /// earlier queries, on threads or on the resident nodes. Each query checks that all its poses are rigid.
 ///
 /// Threads: any number of threads may query one scene, also while another thread changes it: each query sees the scene
-/// before or after a change, never a mixture (changes of a geometry itself: see update()). Changes wait for each other.
-/// A change of a fixed object takes microseconds; while queries are under way, it copies what they share (0.2 ms for
-/// 20 000 fixed objects). The first query, and the first one after moving objects came or went or after many changes,
-/// updates the scene's internal data, and other queries wait for that; apart from changes, no query waits for another.
-/// When no tree has to grow, collides() and calls with up to 128 states allocate no memory (after the first such calls
-/// of a thread), except inside FCL: for pairs without a Model, and for a triangle near a shape or a cell. A child of
-/// fork() works alone; calls throw std::runtime_error if another thread of the parent was at work in the scene or in
-/// one of its models at the fork.
+/// before or after a change, never a mixture (changes of a geometry itself: see update()). A query reads movingCount()
+/// poses, as of the moment it begins: while other threads query, add or remove moving objects only if these threads
+/// cannot hold a state of the old length, for example under a lock of the caller, or in a scene of each thread (a new
+/// one costs little, see addFixed()). Changes wait for each other. A change of a fixed object takes microseconds; while
+/// queries are under way, it copies what they share (0.2 ms for 20 000 fixed objects). The first query, and the first
+/// one after moving objects came or went or after many changes, updates the scene's internal data, and other queries
+/// wait for that; apart from changes, no query waits for another. When no tree has to grow, collides() and calls with
+/// up to 128 states allocate no memory (after the first such calls of a thread), except inside FCL: for pairs without a
+/// Model, and for a triangle near a shape or a cell. A child of fork() works alone; calls throw std::runtime_error if
+/// another thread of the parent was at work in the scene or in one of its models at the fork.
 template <typename S>
 class BOCST_EXPORT Scene {
  public:
