@@ -28,6 +28,7 @@
 #include "conformance/octrees.h"
 #include "conformance/reference.h"
 #include "fcl/adapters/models.h"
+#include "fcl/queries/scene_pair.h"
 #include "sanitized.h"
 #include "scene/bounds.h"
 #include "thread_group.h"
@@ -1087,6 +1088,15 @@ TYPED_TEST(SceneTest, EdgesOfShapesBesideOctrees) {
         EXPECT_TRUE(is_free) << least;
         ++clear;
       }
+      S gap = std::numeric_limits<S>::max();
+      for (const std::array<S, 6>& cell : cells->toBoxes()) {
+        const fcl::Box<S> cube(cell[3], cell[3], cell[3]);
+        const fcl::Transform3<S> X_WC = X_WO * fcl::Transform3<S>(fcl::Translation3<S>(cell[0], cell[1], cell[2]));
+        gap = std::min(gap, static_cast<S>(*fcl_adapter::distanceOfShapes<S>(*shapes[k], begin, cube, X_WC)));
+      }
+      const double tolerance = std::is_same<S, double>::value ? 1e-9 : 1e-5;
+      EXPECT_NEAR(*fcl_adapter::distanceOfShapes<S>(*shapes[k], begin, *cells, X_WO), gap, tolerance);
+      EXPECT_NEAR(*fcl_adapter::distanceOfShapes<S>(*cells, X_WO, *shapes[k], begin), gap, tolerance);
       // The octree moves past the shape in the same way.
       const fcl::Transform3<S> from = begin.inverse(Eigen::Isometry) * X_WO;
       EXPECT_EQ(other_way.edgeIsFree(&from, &from), !other_way.collides(&from));
@@ -1350,6 +1360,7 @@ TYPED_TEST(SceneTest, AModelThatWasEmptied) {
           EXPECT_GT(scene.clearance(&X[2 * k]), S(90));
           EXPECT_TRUE(scene.collidingPairs(&X[2 * k]).empty());
           EXPECT_TRUE(scene.pairsWithin(&X[2 * k], S(50)).empty());
+          EXPECT_EQ(scene.pairsWithin(&X[2 * k], std::numeric_limits<S>::infinity()).size(), 1u);
         }
       }
     }
@@ -1552,7 +1563,9 @@ TYPED_TEST(SceneTest, MeshesAtTheAddressOfOneThatIsGone) {
   std::set<const Mesh*> addresses;
   for (int i = 1; i <= 400; ++i) {
     const double half = 0.01 * i;
-    const auto mesh = test::box({-half, -half, -half}, {half, half, half}).mesh();
+    const auto raw = test::box({-half, -half, -half}, {half, half, half}).mesh();
+    // Not of make_shared(), whose memory is there for as long as anybody asks whether the mesh is.
+    const auto mesh = Mesh::fromIndices(raw->vertices(), raw->triangles());
     addresses.insert(mesh.get());
     const auto model = std::make_shared<Model<S>>(mesh);
     for (int again = 0; again < 2; ++again) {
