@@ -443,6 +443,44 @@ TYPED_TEST(Continuous, NothingIsSteppedOverBetweenLinksThatTurnTogether) {
   EXPECT_GT(misses, 40);
 }
 
+// A part of many triangles in a room of few, whose one leaf is all around it: near walls, edges and corners, where the
+// part moves, the room does, or both.
+TYPED_TEST(Continuous, PartsInRoomsOfFewTriangles) {
+  using S = TypeParam;
+  Raw room = test::box({-10, -8, -3}, {10, 8, 3}), part = test::torus(20);
+  room.addTriangle({-10, 2, -3}, {10, 2.001, -2.9}, {0, 2, -2.999});  // a sliver
+  part.scale(0.15);
+  const Model<S> a(part.mesh()), b(room.mesh());
+  const auto fa = test::bvh<fcl::OBBRSS<S>>(part), fb = test::bvh<fcl::OBBRSS<S>>(room);
+  std::mt19937_64 g(41);
+  std::uniform_real_distribution<double> u(-1, 1);
+  int hits = 0, misses = 0;
+  for (int i = 0; i < 240; ++i) {
+    const fcl::CCDMotionType type = kTypes[i % 4];
+    const Eigen::Vector3d near(u(g) * 10, u(g) * 8, i % 2 == 0 ? -2.5 : 2.5 + 0.2 * u(g));
+    const auto at = [&](double way) {
+      return test::pose<double>(test::randomRotation(g), near + way * test::randomDirection(g));
+    };
+    const auto room_at = [&](double way) {
+      const Eigen::Matrix3d R = Eigen::AngleAxisd(0.02 * u(g), test::randomDirection(g)).toRotationMatrix();
+      return test::pose<double>(R, way * test::randomDirection(g));
+    };
+    const fcl::Transform3d X = at(0), X_end = i % 3 == 1 ? X : at(0.4), Y = room_at(0.1),
+                           Y_end = i % 3 == 0 ? Y : room_at(0.4);
+    const Ways<S> ways{&a, X.cast<S>(), X_end.cast<S>(), &b, Y.cast<S>(), Y_end.cast<S>()};
+    const Result<S> result = ways.ask(request<S>(type)), other = ways.swapped().ask(request<S>(type));
+    checkBySampling<S>(ways, *fa, *fb, type, 1e-4, result, 100);
+    if (testing::Test::HasFatalFailure()) return;
+    ASSERT_EQ(other.is_collide, result.is_collide) << i;
+    // With float, passes within 2e-5 of all lengths count.
+    ASSERT_NEAR(other.time_of_contact, result.time_of_contact, std::is_same<S, double>::value ? 2e-4 : 5e-3) << i;
+    hits += result.is_collide && result.time_of_contact > 0;
+    misses += !result.is_collide;
+  }
+  EXPECT_GT(hits, 20);
+  EXPECT_GT(misses, 60);
+}
+
 // How near they may pass does not depend on where the origins of their meshes are.
 TEST(ContinuousDouble, MeshesFarFromTheirOriginsPassAsNear) {
   for (const double far : {0.0, 1e2, 1e4}) {
