@@ -44,8 +44,8 @@ namespace bocst {
 /// - the smallest of the segment in which the two triangles intersect;
 /// - the largest of that triangle whose largest is smaller, if the triangles do not clearly intersect; with a margin,
 ///   the largest of the triangle of that mesh;
-/// - with shapes and octrees, the larger of two: the smallest of the triangle, and that of the shape's bounding box (in
-///   its own frame) or of the cell.
+/// - with shapes and octrees, the largest of the triangle, or that of the shape's bounding box (in its own frame) or of
+///   the cell, whichever is smaller.
 /// With conservative answers it is the Morton code of the cell. The default request (one contact, enable_contact false)
 /// is a yes-or-no query: its ids are those of any pair that touches.
 ///

@@ -310,13 +310,12 @@ BulkBuilder::Half BulkBuilder::split(std::uint32_t* order, std::uint32_t items, 
   Half half{0, 0};
   if (best == 0) {
     const auto twiceMiddle = [&](std::uint32_t i) { return all_items.boxOf(i).lo[axis] + all_items.boxOf(i).hi[axis]; };
+    half.items = items / 2;
     if (extent > 0) {
-      std::sort(order, order + items,
-                [&](std::uint32_t x, std::uint32_t y) { return twiceMiddle(x) < twiceMiddle(y); });
+      std::nth_element(order, order + half.items, order + items,
+                       [&](std::uint32_t x, std::uint32_t y) { return twiceMiddle(x) < twiceMiddle(y); });
     }
-    do {
-      half.triangles += all_items.trianglesOf(order[half.items++]);
-    } while (half.items + 1 < items && 2 * half.triangles + all_items.trianglesOf(order[half.items]) <= count);
+    for (std::size_t i = 0; i < half.items; ++i) half.triangles += all_items.trianglesOf(order[i]);
     return half;
   }
   // Without a branch, which would be guessed wrong half of the time.

@@ -10,7 +10,6 @@
 namespace bocst::tree {
 
 void TriangleList::appendTo(std::vector<std::uint32_t>& all) const {
-  all.reserve(all.size() + count);
   for (std::size_t i = 0; i < count; ++i) all.push_back(ids[i]);
 }
 

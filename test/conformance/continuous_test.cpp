@@ -473,7 +473,8 @@ TYPED_TEST(Continuous, PartsInRoomsOfFewTriangles) {
     if (testing::Test::HasFatalFailure()) return;
     ASSERT_EQ(other.is_collide, result.is_collide) << i;
     // With float, passes within 2e-5 of all lengths count.
-    ASSERT_NEAR(other.time_of_contact, result.time_of_contact, std::is_same<S, double>::value ? 2e-4 : 5e-3) << i;
+    constexpr double kTolerance = std::is_same<S, double>::value ? 2e-4 : 5e-3;
+    ASSERT_NEAR(other.time_of_contact, result.time_of_contact, kTolerance) << i;
     hits += result.is_collide && result.time_of_contact > 0;
     misses += !result.is_collide;
   }

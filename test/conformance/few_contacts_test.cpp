@@ -241,7 +241,8 @@ TEST(FewContacts, OfFlatFacesOnEachOther) {
   EXPECT_GT(counts.compared, 30u);
 }
 
-// A triangle and a body are at the larger of the positions at which they begin, where many cells lie on one triangle.
+// A triangle and a body are where the first of them ends, whatever nodes a tree has: many cells lie on one triangle,
+// and octants have parts of triangles.
 TEST(FewContacts, BesideCellsAndShapes) {
   std::mt19937_64 g(29);
   std::uniform_real_distribution<double> u(-1, 1);
@@ -259,17 +260,21 @@ TEST(FewContacts, BesideCellsAndShapes) {
                     : round % 3 == 1 ? cloud(g)
                                      : test::torus(9);
     const auto mesh = raw.mesh();
-    const Modeld model(mesh);
+    Options octree_options;
+    octree_options.subdivision = Subdivision::kOctree;
+    Modeld model(mesh), fresh(mesh), octants(mesh, octree_options);
+    model.buildTree();
+    octants.expandAll(3 + round % 5);
     const auto rotation = [&] { return Eigen::Quaterniond(u(g), u(g), u(g), u(g)).normalized().toRotationMatrix(); };
     const fcl::Transform3d X1 = test::pose<double>(rotation(), {u(g), u(g), u(g)}),
                            X2 = X1 * test::pose<double>(rotation(), Vector3d(u(g), u(g), u(g)) / 2),
                            to_model = X1.inverse(Eigen::Isometry) * X2;
     const Vector3d direction = directionOf(*mesh);
     for (const bool is_octree : {true, false}) {
-      const auto beginOf = [&](std::intptr_t id) {
+      const auto endOf = [&](std::intptr_t id) {
         const auto [center, half] = is_octree ? cells.at(id) : std::pair(Vector3d(0, 0, 0), 0.0);
         const Vector3d extents = is_octree ? Vector3d(half, half, half) : Vector3d(0.45, 0.35, 0.25);
-        return direction.dot(to_model * center) - (to_model.linear().transpose() * direction).cwiseAbs().dot(extents);
+        return direction.dot(to_model * center) + (to_model.linear().transpose() * direction).cwiseAbs().dot(extents);
       };
       const fcl::CollisionGeometryd& body = is_octree ? static_cast<const fcl::CollisionGeometryd&>(*octree)
                                                       : static_cast<const fcl::CollisionGeometryd&>(box);
@@ -281,16 +286,18 @@ TEST(FewContacts, BesideCellsAndShapes) {
         for (const fcl::Contactd& c : asked(1000000)) {
           query::Corners t;
           takeCorners(raw, is_second ? c.b2 : c.b1, fcl::Transform3d::Identity(), t);
-          const double begin = std::min({direction.dot(t[0]), direction.dot(t[1]), direction.dot(t[2])});
-          ordered.emplace_back(std::max(begin, beginOf(is_second ? c.b1 : c.b2)), c.b1, c.b2);
+          const double end = std::max({direction.dot(t[0]), direction.dot(t[1]), direction.dot(t[2])});
+          ordered.emplace_back(std::min(end, endOf(is_second ? c.b1 : c.b2)), c.b1, c.b2);
         }
         std::sort(ordered.begin(), ordered.end());
         SCOPED_TRACE(round);
         for (const std::size_t most : {1, 5, 50}) {
-          if (is_second) {
-            expectFirst(body, X2, model, X1, most, ordered, counts);
-          } else {
-            expectFirst(model, X1, body, X2, most, ordered, counts);
+          for (const Modeld* asked_one : {&fresh, &model, &octants}) {
+            if (is_second) {
+              expectFirst(body, X2, *asked_one, X1, most, ordered, counts);
+            } else {
+              expectFirst(*asked_one, X1, body, X2, most, ordered, counts);
+            }
           }
         }
       }

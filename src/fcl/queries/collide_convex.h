@@ -84,8 +84,7 @@ class ConvexCollector final : public query::ConvexVisitor<typename Partner::Node
 
   bool triangle(std::uint32_t t, const Node& b) override {
     if (ends_at_first_) return addTriangle(t, b);
-    const double place =
-        is_cut_ ? std::max(order_.beginOf(t), order_.beginOf(cut_.leastOf(partner_.volume(b), b_in_a_))) : 0;
+    const double place = is_cut_ ? order_.placeOf(t, greatestOf(b)) : 0;
     const Found found = placed(place, {t, {Eigen::Vector3d::Zero(), 0}}, b);
     if (is_cut_ && !s_.first.wants(found)) return false;
     if (!s_.seen.insert(partner_.id(b), t)) return false;
@@ -158,7 +157,7 @@ class ConvexCollector final : public query::ConvexVisitor<typename Partner::Node
     const auto t = static_cast<std::uint32_t>(found.leaf.id);
     if (!partner_.occupied(found.body) || !touches(t, cornersOf(t).data(), found.body, gap)) return;
     s_.first.add(found);
-    if (s_.first.isFull()) order_.setCut(s_.first.last().place, 0, cut_);
+    if (s_.first.isFull()) order_.setCut(s_.first.last().place, near() / surface_.lattice.unit(), cut_);
   }
 
   std::array<Eigen::Vector3d, 3> cornersOf(std::uint32_t t) const {
@@ -167,11 +166,21 @@ class ConvexCollector final : public query::ConvexVisitor<typename Partner::Node
             frame_ * surface_.mesh->vertex(i[2])};
   }
 
+  // See Cut. Most pairs have the body of the pair before.
+  double greatestOf(const Node& b) {
+    if (!has_body_ || !(b == body_)) greatest_ = cut_.greatestOf(partner_.volume(b), b_in_a_);
+    has_body_ = true;
+    body_ = b;
+    return greatest_;
+  }
+
+  // What is farther apart does not touch.
+  double near() const { return std::max(tolerance_, q_.margin); }
+
   // True if a triangle touches a body. Sets the gap between them.
   bool touches(std::uint32_t t, const Eigen::Vector3d* corners, const Node& b, query::SeparationResult& gap) {
-    const double near = std::max(tolerance_, q_.margin);
-    gap = gaps_.gap(partner_, b, {corners, 3}, near);
-    if (gap.at_least > near) return false;
+    gap = gaps_.gap(partner_, b, {corners, 3}, near());
+    if (gap.at_least > near()) return false;
     if (gap.isTouching() || gap.at_least <= q_.margin) return true;
     if (q_.is_distance) return false;
     const auto& i = surface_.mesh->indices(t);
@@ -290,6 +299,9 @@ class ConvexCollector final : public query::ConvexVisitor<typename Partner::Node
   const bool costs_, ends_at_first_, is_cut_;
   Scratch& s_;
   query::Cut cut_;
+  Node body_{};  // of which `greatest_` is known
+  bool has_body_ = false;
+  double greatest_ = 0;
   query::GapFinder gaps_;
 };
 

@@ -147,8 +147,10 @@ class TreesCollision {
         steps = trees.run(collector, query::kNoLimit).steps;
       }
     });
-    // A walk for a verdict pays for oriented boxes itself, a walk for contacts where it found none.
-    if (kUsesBoxes && !q_.endsAtFirst() && q_.result.numContacts() == before) trees.payForBoxes(steps);
+    // A walk for a verdict pays for oriented boxes itself, a walk for contacts where it found none. Within a margin all
+    // pairs are near, which boxes do not change.
+    const bool has_missed = !q_.endsAtFirst() && q_.result.numContacts() == before;
+    if (kUsesBoxes && has_missed && !(near_.margin > 0)) trees.payForBoxes(steps);
     return false;
   }
 

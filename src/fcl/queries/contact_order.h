@@ -19,10 +19,10 @@ namespace bocst::fcl_adapter {
 /// bounding box of the model's mesh, in the mesh's frame and length unit; where they do not clearly cut each other, the
 /// largest coordinate of that triangle which ends first, so that a fine mesh has many places on a large triangle; with
 /// a margin, the largest of the model's triangle, which needs no look at the other. The place of a triangle and a body
-/// is where both have begun: the larger of their smallest coordinates. That of a cell is its Morton code, which has at
-/// most 48 bits. So the order is a property of mesh, pose and request, and a walk that wants the first few can leave
-/// out what lies beyond: where two triangles touch, they do so in a point whose coordinate is no larger than their
-/// place.
+/// is the largest coordinate of that which ends first, of the body's box. That of a cell is its Morton code, which has
+/// at most 48 bits. So the order is a property of mesh, pose and request, and a walk that wants the first few can leave
+/// out what lies beyond: what touches does so in a point whose coordinate is no larger than the place. (Where both have
+/// begun would not do: a node may have a part of a triangle alone, and they may touch in another.)
 class ContactOrder {
  public:
   explicit ContactOrder(const tree::Tree& model) : surface_(model.surface()) {
@@ -35,22 +35,16 @@ class ContactOrder {
     direction_[(longest + 2) % 3] = 0.23;
   }
 
-  /// Where triangle t of the model begins.
-  double beginOf(std::uint32_t t) const {
-    const auto& i = surface_.mesh->indices(t);
-    const auto at = [&](std::uint32_t v) { return direction_.dot(surface_.mesh->vertex(v)); };
-    return std::min({at(i[0]), at(i[1]), at(i[2])});
-  }
-  /// Where a body begins; `least`: in the lattice frame, see Cut::leastOf().
-  double beginOf(double least) const {
-    return surface_.lattice.unit() * least + direction_.dot(surface_.lattice.origin());
-  }
-
-  /// With a margin, whatever the triangle of the other mesh.
+  /// Where triangle t of the model ends.
   double endOf(std::uint32_t t) const {
     const auto& i = surface_.mesh->indices(t);
     const auto at = [&](std::uint32_t v) { return direction_.dot(surface_.mesh->vertex(v)); };
     return std::max({at(i[0]), at(i[1]), at(i[2])});
+  }
+
+  /// Of a triangle and a body that ends at `greatest` in the lattice frame, see Cut::greatestOf().
+  double placeOf(std::uint32_t t, double greatest) const {
+    return std::min(endOf(t), surface_.lattice.unit() * greatest + direction_.dot(surface_.lattice.origin()));
   }
 
   /// Of two triangles, corners in any frame, from which `to_model` leads to the model's.

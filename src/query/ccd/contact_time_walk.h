@@ -58,6 +58,7 @@ class ContactTimeWalk : private BestFirst<ContactTimeWalk<A, B>, A, B> {
   /// `begin`: there is no contact before.
   double run(const ContactGoal& goal, double known = kNever, std::size_t most_steps = kNoLimit, double begin = 0) {
     goal_ = goal;
+    worth_waiting_ = worthWaiting();
     first_ = known;
     first_skipped_ = kNever;
     if constexpr (!B::kBodies) scratch().near.clear();
@@ -75,8 +76,10 @@ class ContactTimeWalk : private BestFirst<ContactTimeWalk<A, B>, A, B> {
   using Base::push;
   using Base::spheres;
 
-  // A pair that can be put off by this much is looked at again before its parts are.
-  static constexpr double kWorthWaiting = 1.0 / 64;
+  // A pair that can be put off by this much of the way is looked at again before its parts are; on a way of more than
+  // kLongWay radii of the smaller side, by this much of kLongWay radii, but of no more than kMostShort parts of the
+  // way.
+  static constexpr double kWorthWaiting = 1.0 / 64, kLongWay = 4, kMostShort = 64;
 
   // Two leaves' primitives are tested for the time in which the leaves move by this share of their sizes, but at least
   // for kLeastWindow of the motion.
@@ -114,6 +117,14 @@ class ContactTimeWalk : private BestFirst<ContactTimeWalk<A, B>, A, B> {
     std::conditional_t<B::kBodies, Nothing, NearTriangles<A, B>> near;
   };
   static Scratch& scratch() { return thread::ofThread<Scratch>(); }
+
+  double worthWaiting() {
+    at(0);
+    const Sphere a = query::placed(a_.sphere(a_.root()), a_in_world_),
+                 b = query::placed(b_.sphere(b_.root()), b_in_world_);
+    const double way = speedOf(a, b, 0) / std::min(a.radius, b.radius);
+    return way > kLongWay ? kWorthWaiting * std::max(kLongWay / way, 1 / kMostShort) : kWorthWaiting;
+  }
 
   double contactDistance() const { return goal_.margin + goal_.rounding; }
   // Nodes go on to half of what counts as contact, as primitives do. So rounding, which is less than the other half,
@@ -279,10 +290,10 @@ class ContactTimeWalk : private BestFirst<ContactTimeWalk<A, B>, A, B> {
     double time = Base::boundOf(pair);
     if constexpr (B::kBodies) {
       if (!spheres() && !b_.hasExactBox(pair.b) && worthIt(time)) time = std::max(time, bodyBound(pair));
-    } else if (!spheres() && time < now_ + kWorthWaiting) {
+    } else if (!spheres() && time < now_ + worth_waiting_) {
       time = std::max(time, triangleBound(pair));
     }
-    if (time < now_ + kWorthWaiting) return !worthIt(time);
+    if (time < now_ + worth_waiting_) return !worthIt(time);
     push({time, pair.a, pair.b});
     return true;
   }
@@ -509,6 +520,7 @@ class ContactTimeWalk : private BestFirst<ContactTimeWalk<A, B>, A, B> {
   const SimilarityTransform a_in_body_, b_in_body_;
   const MotionPair motions_;
   ContactGoal goal_;
+  double worth_waiting_ = kWorthWaiting;
   double now_ = -1, first_ = 0, first_skipped_ = 0;
   SimilarityTransform a_in_world_, b_in_world_, world_in_b_;  // at the time now_; the last for bodies only
 };

@@ -50,6 +50,12 @@ struct Cut {
     const Eigen::RowVector3d row = to_a.scale * direction.transpose() * to_a.rotation;
     return row.dot(v.center) + direction.dot(to_a.translation) - (row * v.axes).cwiseAbs().dot(v.half);
   }
+  /// The largest coordinate, of a node of side B.
+  double greatestOf(const Volume& v, const SimilarityTransform& to_a) const { return greatestOf(oriented(v), to_a); }
+  double greatestOf(const OrientedVolume& v, const SimilarityTransform& to_a) const {
+    const Eigen::RowVector3d row = to_a.scale * direction.transpose() * to_a.rotation;
+    return row.dot(v.center) + direction.dot(to_a.translation) + (row * v.axes).cwiseAbs().dot(v.half);
+  }
   /// How far a box with these least coordinates may reach along axis k before all of its points are beyond the cut.
   double reach(const Eigen::Vector3d& least, int k) const {
     const double left = std::max(most() - direction.dot(least), 0.0);
