@@ -158,17 +158,17 @@ class BOCST_EXPORT Scene {
   /// All pairs that collide in this state, in the order of their Ids, where collides() stops at one. fcl::collide with
   /// the objects' geometries and poses reports the contacts of such a pair.
   std::vector<Pair> collidingPairs(const Transform* X_WM) const;
-  /// All pairs whose distance in this state is at most `distance`, the nearest first; for optimisers that keep each
-  /// pair apart. Options::margin has no effect; distances are those of clearance().
+  /// All pairs whose distance in this state is at most `distance`, up to rounding, the nearest first; for optimisers
+  /// that keep each pair apart. Options::margin has no effect; distances are those of clearance().
   /// @throws std::invalid_argument as clearance(), of pairs whose bounding boxes are that near; and for a `distance`
   /// that is negative or NaN.
   std::vector<PairDistance<S>> pairsWithin(const Transform* X_WM, S distance) const;
   /// True if the motion of all moving objects from one state to another is free of collisions at all times. Never steps
   /// over a contact. Geometries that pass closer than the resolution of fcl::continuousCollide (see bocst/fcl.h; for
-  /// two of FCL's shapes and octrees 1e-5 of their sizes) count as touching. With CCDM_LINEAR, each object's origin
-  /// moves on a line, and the object turns about a fixed axis (slerp of the normalised quaternions, which removes
-  /// rounding errors of a rotation). Two of FCL's shapes and octrees that pass closer than the rounding of the motion's
-  /// length also count as touching.
+  /// two of FCL's shapes and octrees 1e-5 of their sizes and 1e-5 in length units) count as touching. With CCDM_LINEAR,
+  /// each object's origin moves on a line, and the object turns about a fixed axis (slerp of the normalised
+  /// quaternions, which removes rounding errors of a rotation). Two of FCL's shapes and octrees that pass closer than
+  /// the rounding of the motion's length also count as touching.
   /// @throws std::invalid_argument as clearance(), and for a Plane or Halfspace that moves near another of FCL's
   /// shapes.
   bool edgeIsFree(const Transform* X_WM_begin, const Transform* X_WM_end,

@@ -126,11 +126,11 @@ std::vector<PairDistance<S>> pairsWithin(const World<S>& world, StateCheck<S>& c
       // A search below a bound may miss what is less than it by rounding alone.
       constexpr double kRounding = 1024 * static_cast<double>(std::numeric_limits<S>::epsilon());
       const double below = most + kRounding * (most + a.bounds.size + b.bounds.size);
+      const S limit = below < static_cast<double>(kAny) ? static_cast<S>(below) : kAny;
       PairDistance<S> pair;
-      pair.distance = distanceBelow<S>(a, X_WM[n.box], b, check.pose(X_WM, n.group, lane),
-                                       below < static_cast<double>(kAny) ? static_cast<S>(below) : kAny,
-                                       fcl::GST_LIBCCD, pair.nearest_points);
-      if (!(pair.distance <= distance && pair.distance < kAny)) continue;
+      pair.distance = distanceBelow<S>(a, X_WM[n.box], b, check.pose(X_WM, n.group, lane), limit, fcl::GST_LIBCCD,
+                                       pair.nearest_points);
+      if (!(pair.distance < limit)) continue;
       pair.pair = {a.id, b.id};
       found.push_back(pair);
     }

@@ -74,15 +74,21 @@ query::Sphere regionOf(const Motion& of_model, const Eigen::AlignedBox3d& bounds
           (center - origin).norm() + radius + of_model.fastest(center, radius, 0) + of_partner.fastest(origin, 0, 0)};
 }
 
-/// The distance at which collide() may call bodies touching, see ConvexFrame and NarrowPhase, on all of the way.
+/// The distance at which collide() may call spheres touching for the sake of rounding, on all of the way.
 template <typename S>
-double toleranceOfCollide(const ContinuousQuery<S>& q, double model_size, double region) {
-  double largest = region + 2 * model_size;
+double roundingOfCollide(const ContinuousQuery<S>& q, double sizes) {
+  double largest = sizes;
   for (const Motion* m : {&q.X_W1, &q.X_W2}) {
     const Eigen::Vector3d p = m->at(0).translation();
     largest += p.norm() + m->fastest(p, 0, 0);
   }
-  return roundingOf<S>(largest) + static_cast<double>(fcl::CollisionRequest<S>().gjk_tolerance);
+  return roundingOf<S>(largest);
+}
+
+/// The same of bodies, see ConvexFrame and NarrowPhase.
+template <typename S>
+double toleranceOfCollide(const ContinuousQuery<S>& q, double model_size, double region) {
+  return roundingOfCollide(q, region + 2 * model_size) + static_cast<double>(fcl::CollisionRequest<S>().gjk_tolerance);
 }
 
 /// The axis about which a shape may be turned without a change, in its frame; zero for other geometries.
@@ -148,8 +154,12 @@ std::optional<double> timeOfContact(const ContinuousQuery<S>& q, const Mesh* mes
   const Model<S>*model_a = asModel<S>(q.a()), *model_b = asModel<S>(q.b());
   const double margin = marginOf(model_a, model_b);
   const auto walk = [&](const TreeSide& a, const auto& b, const SimilarityTransform& b_in_body) {
-    return query::findContactTime(a, inBody(a.tree()), q.X_WA(), b, b_in_body, q.X_WB(),
-                                  goalOf(q, sizeOf(a), sizeOf(b), margin));
+    ContactGoal goal = goalOf(q, sizeOf(a), sizeOf(b), margin);
+    if (a.isConservative() || b.isConservative()) {
+      // The walk stops between a half of it and all of it; collide() rounds the margin, too.
+      goal.rounding = std::max(goal.rounding, 4 * roundingOfCollide(q, 2 * (sizeOf(a).reach + sizeOf(b).reach)));
+    }
+    return query::findContactTime(a, inBody(a.tree()), q.X_WA(), b, b_in_body, q.X_WB(), goal);
   };
   tree::Tree& tree = treeOf(*model_a);
   if (model_b != nullptr) {
