@@ -181,8 +181,8 @@ inline void refuseNull(const void* o1, const void* o2) {
 ///   of the largest distances of both geometries' points from their own origins, or the distance of a geometry from the
 ///   world's origin with the path of its fastest point, whichever is larger. With shapes and cells the limit is at
 ///   least 2e-6 in length units: twice the distance at which collide() can report a contact because of FCL's solvers.
-///   With float, it is up to 2e-5 (conservative answers: 4e-5) of the sum of all lengths more: coordinates, sizes, and the paths of both, as long as
-///   their fastest points could make them.
+///   With float, it is up to 2e-5 (conservative answers: 4e-5) of the sum of all lengths more: coordinates, sizes, and
+///   the paths of both, as long as their fastest points could make them.
 /// - Beyond these limits, verdicts do not depend on earlier queries, the order of the arguments or the partner's kind.
 ///   time_of_contact may, within toc_err and the time in which such a distance closes.
 /// Supported motions are FCL's TranslationMotion, InterpMotion, ScrewMotion and SplineMotion (in FCL 0.7, two of them
