@@ -1578,7 +1578,10 @@ TYPED_TEST(SceneTest, MeshesAtTheAddressOfOneThatIsGone) {
       ASSERT_TRUE(scene.collides(&Y)) << i;
     }
   }
-  EXPECT_LT(addresses.size(), 400u);
+  // The allocators of sanitizers give no address twice.
+  if (!test::kSanitized) {
+    EXPECT_LT(addresses.size(), 400u);
+  }
 }
 
 // A box about an octree holds all occupied cells, and no face of it is farther out than by 1/32 of its length.
