@@ -86,18 +86,19 @@ Bounds fitMesh(const Mesh& mesh) {
   });
 }
 
-/// The bounds of the meshes of this process, for planners that make a scene for each plan of the same models.
+/// The bounds of the meshes of this process, for planners that make a scene for each plan of the same models. Nobody
+/// waits for another, nor in a child after fork() for a thread of the parent: the box is found again instead.
 class MeshBounds {
  public:
   Bounds of(const std::shared_ptr<const Mesh>& mesh) {
-    {
-      const std::lock_guard<thread::ForkAwareMutex> lock(mutex_);
+    if (const std::unique_lock<thread::ForkAwareMutex> lock(mutex_, std::try_to_lock); lock.owns_lock()) {
       const auto known = bounds_.find(mesh.get());
       // Another mesh may have had this address.
       if (known != bounds_.end() && known->second.mesh.lock() == mesh) return known->second.bounds;
     }
     const Bounds bounds = fitMesh(*mesh);
-    const std::lock_guard<thread::ForkAwareMutex> lock(mutex_);
+    const std::unique_lock<thread::ForkAwareMutex> lock(mutex_, std::try_to_lock);
+    if (!lock.owns_lock()) return bounds;
     if (bounds_.size() >= most_) {
       for (auto i = bounds_.begin(); i != bounds_.end();)
         i = i->second.mesh.expired() ? bounds_.erase(i) : std::next(i);
