@@ -63,8 +63,8 @@ struct Options {
   std::chrono::milliseconds ttl{2000};
 
   /// Limit of the resident tree in bytes; the least recently used branches are dropped first; 0: no limit. A running
-  /// query may exceed it; branches are dropped when it ends. With less than about 6 bytes per triangle of the mesh, many
-  /// queries drop and grow large parts again (a complete tree takes 16 to 25).
+  /// query may exceed it; branches are dropped when it ends. With less than about 6 bytes per triangle of the mesh,
+  /// many queries drop and grow large parts again (a complete tree takes 16 to 25).
   std::size_t memory_budget = 0;
 
   /// Surfaces at a distance of at most this collide; 0 or more, in the mesh's length unit. Between two models, the sum
