@@ -61,8 +61,14 @@ class alignas(64) Outline {
   }
 
   void set(const Box& box) {
+    set(box, [] {});
+  }
+  /// The same, while f changes what else read() answers for, by stores that release.
+  template <typename F>
+  void set(const Box& box, F&& f) {
     const std::uint32_t version = version_.load(std::memory_order_relaxed);
     version_.store(version + 1, std::memory_order_relaxed);
+    f();
     std::array<std::uint64_t, kWords> words;
     static_assert(sizeof(Box) == sizeof(words));
     std::memcpy(words.data(), &box, sizeof(box));
@@ -71,7 +77,8 @@ class alignas(64) Outline {
     version_.store(version + 2, std::memory_order_release);
   }
 
-  /// What f says of the box; false when that was changed meanwhile.
+  /// What f says of the box; false when that was changed meanwhile. Other data that set() changes must be read by
+  /// loads that acquire.
   template <typename F>
   bool read(F&& f) const {
     const std::uint32_t version = version_.load(std::memory_order_acquire);

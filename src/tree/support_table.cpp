@@ -3,8 +3,6 @@
 
 #include <cmath>
 
-#include "lattice/lattice.h"
-
 namespace bocst::tree {
 namespace {
 
@@ -30,16 +28,23 @@ constexpr Directions kDirections;
 
 Eigen::Vector3d SupportTable::direction(int number) { return Eigen::Vector3d(kDirections.entries[number]); }
 
-void SupportTable::start(const Eigen::AlignedBox3d& box) {
-  const Eigen::Vector3d center = box.center() - Eigen::Vector3d::Constant(lattice::kMiddle), half = box.sizes() / 2;
-  center_ = center.cast<float>();
-  inner_radius_.store(static_cast<float>(half.minCoeff()), std::memory_order_relaxed);
+// Stores release, so that Outline::read() sees that a reader met one of them.
+void SupportTable::start(const Eigen::AlignedBox3d& box, const lattice::Lattice& lattice) {
+  const Eigen::Vector3d root = Eigen::Vector3d::Constant(lattice::kMiddle);
+  const Eigen::Vector3d center = box.center() - root, half = box.sizes() / 2;
+  const Eigen::Vector3d middle = lattice.origin() + lattice.unit() * root;
+  for (int k = 0; k < 3; ++k) {
+    center_[static_cast<std::size_t>(k)].store(static_cast<float>(center[k]), std::memory_order_release);
+    middle_[static_cast<std::size_t>(k)].store(static_cast<float>(middle[k]), std::memory_order_release);
+  }
+  unit_.store(static_cast<float>(lattice.unit()), std::memory_order_release);
+  inner_radius_.store(static_cast<float>(half.minCoeff()), std::memory_order_release);
   for (int n = 0; n < kCount; ++n) {
     const Eigen::Vector3d d = direction(n);
     const auto i = static_cast<std::size_t>(n);
     // The terms may cancel, their rounding does not.
     const double margin = 1e-9 * d.cwiseAbs().dot(center.cwiseAbs() + half);
-    values_[i].store(roundedUp(d.dot(center) + d.cwiseAbs().dot(half) + margin), std::memory_order_relaxed);
+    values_[i].store(roundedUp(d.dot(center) + d.cwiseAbs().dot(half) + margin), std::memory_order_release);
   }
 }
 
@@ -50,7 +55,7 @@ void SupportTable::lower(int number, double value) {
   while (rounded < known && !values_[i].compare_exchange_weak(known, rounded, std::memory_order_relaxed)) {
   }
   const Eigen::Vector3f d = direction(number).cast<float>();
-  const float radius = (rounded - d.dot(center_)) / d.norm();
+  const float radius = (rounded - d.dot(Eigen::Vector3f(center(0), center(1), center(2)))) / d.norm();
   if (radius < innerRadius()) inner_radius_.store(radius, std::memory_order_relaxed);
 }
 

@@ -105,10 +105,10 @@ void Tree::reset(std::shared_ptr<const Mesh> mesh) {
   nodes_.root_bounds = bounds::NodeBounds();
   const Eigen::AlignedBox3d box = surface_.latticeBounds();
   encodeBox(box, lattice::Cell{}, nodes_.root_bounds);
-  supports_.start(box);
   supports_known_ = false;
   outline_.set(Outline::boxOf(surface_.bounds.center(), Eigen::Matrix3d::Identity(),
-                              surface_.bounds.sizes() / 2 + Eigen::Vector3d::Constant(sphereReach())));
+                              surface_.bounds.sizes() / 2 + Eigen::Vector3d::Constant(sphereReach())),
+               [&] { supports_.start(box, surface_.lattice); });
   dropTree();
 }
 

@@ -268,7 +268,7 @@ void Tree::buildAhead(AheadBuild& ahead) {
   BulkBuilder bulk;
   buildWhole(*surface, bulk);
   SupportTable supports;
-  supports.start(surface->latticeBounds());
+  supports.start(surface->latticeBounds(), surface->lattice);
   bulk.findSupports(supports);
   const Outline::Box outline = bulk.findOutline(surface->lattice);
 

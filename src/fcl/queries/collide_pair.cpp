@@ -161,27 +161,29 @@ std::size_t collidePair(const fcl::CollisionGeometry<S>* o1, const fcl::Transfor
   checkRequest(request);
   const double m = margin ? *margin : marginOf(models.first, models.second);
   // Most of a planner's pairs end here.
-  if (are_rigid && models.areTwo() && areFarApart(treeOf(*models.first), X_W1, treeOf(*models.second), X_W2, m)) {
+  query::Hulls hulls = query::Hulls::kUnknown;
+  if (are_rigid && models.areTwo() &&
+      areFarApart(treeOf(*models.first), X_W1, treeOf(*models.second), X_W2, m, hulls)) {
     return result.numContacts();
   }
-  return answer(
-      CollideQuery<S>{{o1, X_W1, o2, X_W2, turnsRound(models, X_W1, X_W2)}, request, result, m, margin.has_value()},
-      models, solver);
+  const OrderedPair<S> pair{o1, X_W1, o2, X_W2, turnsRound(models, X_W1, X_W2)};
+  return answer(CollideQuery<S>{pair, request, result, m, margin.has_value(), hulls}, models, solver);
 }
 
 namespace {
 
 // Yes or no for two occupied models.
 template <typename S>
-bool touchAt(const Models<S>& models, const fcl::Transform3<S>& X_W1, const fcl::Transform3<S>& X_W2, double margin) {
+bool touchAt(const Models<S>& models, const fcl::Transform3<S>& X_W1, const fcl::Transform3<S>& X_W2, double margin,
+             query::Hulls hulls = query::Hulls::kUnknown) {
   static const fcl::CollisionRequest<S> request;
   struct Scratch {
     fcl::CollisionResult<S> result;
   };
   fcl::CollisionResult<S>& result = thread::ofThread<Scratch>().result;
   result.clear();
-  const CollideQuery<S> q{
-      {models.first, X_W1, models.second, X_W2, turnsRound(models, X_W1, X_W2)}, request, result, margin};
+  const OrderedPair<S> pair{models.first, X_W1, models.second, X_W2, turnsRound(models, X_W1, X_W2)};
+  const CollideQuery<S> q{pair, request, result, margin, false, hulls};
   const QueryScope scope(treeOf(*models.first), treeOf(*models.second));
   const TreeSide &a = q.swapped ? scope.b() : scope.a(), &b = q.swapped ? scope.a() : scope.b();
   if (TreesCollision<S>(q, a, b).run(TreesCollision<S>::Wanted::kVerdict)) return true;
@@ -232,8 +234,9 @@ void collideRow(const Model<S>& a, const Model<S>& b, const fcl::Transform3<S>* 
     const Spheres found = spheres != nullptr ? (*spheres)[k] : Spheres::kUnknown;
     hit[k] = found == Spheres::kMeet;
     if (found == Spheres::kMeet || (found == Spheres::kApart && !may_be_inside)) continue;
-    if (isSurelyRigid(X_AB[k]) && areFarApart(treeOf(a), identity, treeOf(b), X_AB[k], margin)) continue;
-    hit[k] = touchAt(models, identity, X_AB[k], margin);
+    query::Hulls hulls = query::Hulls::kUnknown;
+    if (isSurelyRigid(X_AB[k]) && areFarApart(treeOf(a), identity, treeOf(b), X_AB[k], margin, hulls)) continue;
+    hit[k] = touchAt(models, identity, X_AB[k], margin, hulls);
   }
 }
 

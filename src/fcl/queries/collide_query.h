@@ -11,6 +11,7 @@
 
 #include "fcl/queries/ordered_pair.h"
 #include "geometry/triangle.h"
+#include "query/cull/separation.h"
 
 namespace bocst::fcl_adapter {
 
@@ -19,8 +20,9 @@ template <typename S>
 struct CollideQuery : OrderedPair<S> {
   const fcl::CollisionRequest<S>& request;
   fcl::CollisionResult<S>& result;
-  double margin;             ///< Surfaces no farther apart than this touch.
-  bool is_distance = false;  ///< Only the margin counts, and not the tolerance of FCL's solvers.
+  double margin;                                ///< Surfaces no farther apart than this touch.
+  bool is_distance = false;                     ///< Only the margin counts, and not the tolerance of FCL's solvers.
+  query::Hulls hulls = query::Hulls::kUnknown;  ///< Of two models; they may have changed since.
 
   /// Only between occupied geometries are there contacts.
   bool occupied() const { return this->o1->isOccupied() && this->o2->isOccupied(); }

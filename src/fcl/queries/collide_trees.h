@@ -131,7 +131,7 @@ class TreesCollision {
   // Two models with exact answers, in float.
   bool walkTrees(Wanted wanted) {
     query::TreeWalk trees(a_, b_, near_);
-    if (trees.isNeedless()) return false;
+    if (trees.isNeedless(q_.hulls)) return false;
     if (kUsesBoxes && boxesApart()) return false;
     if (isProved(wanted)) return true;
     const std::size_t before = q_.result.numContacts();

@@ -234,9 +234,11 @@ void searchPair(const DistanceQuery<S>& q) {
   // FCL's managers pass the least distance so far: most of their pairs end here.
   const double known = std::min<double>(static_cast<double>(q.result.min_distance), std::numeric_limits<float>::max());
   if (const Model<S>* other = asModel<S>(q.b())) {
-    if (areSurelyRigid(q.X_WA(), q.X_WB()) && areFarApart(tree, q.X_WA(), treeOf(*other), q.X_WB(), known)) return;
-    const QueryScope scope(tree, treeOf(*other));
-    searchMeshes(q, scope.a(), scope.b(), treeOf(*other));
+    tree::Tree& tree_b = treeOf(*other);
+    query::Hulls hulls;  // of no use to a search
+    if (areSurelyRigid(q.X_WA(), q.X_WB()) && areFarApart(tree, q.X_WA(), tree_b, q.X_WB(), known, hulls)) return;
+    const QueryScope scope(tree, tree_b);
+    searchMeshes(q, scope.a(), scope.b(), tree_b);
   } else if (isBodies<S>(q.b())) {
     searchBodies(q, tree);
   } else {

@@ -11,6 +11,7 @@
 #include "fcl/adapters/validate.h"
 #include "fcl/queries/ordered_pair.h"
 #include "query/cull/far_apart.h"
+#include "query/cull/separation.h"
 #include "query/sides/side.h"
 #include "tree/tree.h"
 
@@ -31,12 +32,19 @@ inline void endQuery(const query::TreeSide& side) {
 
 static_assert(kSurelyRigidError <= 2e-5, "what query::areFarApart() allows for");
 
-/// True if two models are surely farther apart than `margin`, so that nothing need be locked. For poses that are surely
-/// rigid. False where branches are due to be dropped, since only a query that holds the locks drops them, at its end.
+/// True if two models are surely farther apart than `margin`, so that nothing need be locked; else `hulls` has what is
+/// known of their hulls. For poses that are surely rigid. False where branches are due to be dropped, since only a
+/// query that holds the locks drops them, at its end.
 template <typename S>
 bool areFarApart(const tree::Tree& a, const fcl::Transform3<S>& X_WA, const tree::Tree& b,
-                 const fcl::Transform3<S>& X_WB, double margin) {
-  if (!query::areFarApart(a.outline(), X_WA.matrix().data(), b.outline(), X_WB.matrix().data(), margin)) return false;
+                 const fcl::Transform3<S>& X_WB, double margin, query::Hulls& hulls) {
+  const S *x = X_WA.matrix().data(), *y = X_WB.matrix().data();
+  if (!query::areFarApart(a.outline(), x, b.outline(), y, margin)) {
+    // Supports know nothing of spheres.
+    if (a.conservative() || b.conservative()) return false;
+    hulls = query::hullsWithoutLock<S>({a.supports(), a.outline()}, x, {b.supports(), b.outline()}, y, margin);
+    if (hulls != query::Hulls::kApart) return false;
+  }
   if (!a.hasDecay() && !b.hasDecay()) return true;
   // The system's clock need not be read twice.
   const std::int64_t now_a = a.now(), now_b = a.options().clock || b.options().clock ? b.now() : now_a;

@@ -7,8 +7,11 @@
 #include <hwy/highway.h>
 
 #include <algorithm>
+#include <atomic>
 #include <cmath>
+#include <cstring>
 
+#include "simd/float4.h"
 #include "simd/octants-inl.h"
 
 #ifndef BOCST_SEPARATION_ONCE
@@ -27,6 +30,14 @@ constexpr float kFirstRadius = 0.45f, kHopeless = 0.12f, kHopelessLater = 0.5f;
 constexpr float kShallow = 0.3f;  // 0.2 and 0.4 were no faster (share/doc/performance-record.md, "Warm exact queries")
 
 }  // namespace
+
+/// The pose of b's lattice in a's, in float; t is the displacement between the middles of the roots.
+struct Between {
+  float rotation[3][4];  // [j][k]: column j; the last entries are not used
+  float t[4];
+  float scale, tolerance, orthogonality_error;
+};
+
 }  // namespace bocst::query
 #endif
 
@@ -106,13 +117,6 @@ HWY_INLINE V supportOf(const SupportTable& supports, const V (&u)[3]) {
   const V middle = hn::Mul(hn::Sub(high, low), hn::IfThenElse(hn::Ge(rest_i, rest_j), corner[2], corner[1]));
   return hn::Mul(size, hn::Add(hn::Add(inner, middle), outer));
 }
-
-/// The pose of b's lattice in a's, in float; t is the displacement between the middles of the roots.
-struct Between {
-  float rotation[3][3];  // [j][k]: column j
-  float t[3];
-  float scale, tolerance, orthogonality_error;
-};
 
 // f of EightSeparations, and the largest of it. direction(lane, v) gives the directions.
 template <typename F>
@@ -205,12 +209,12 @@ HWY_INLINE std::size_t largest(const float (&values)[8], float most) {
 // The direction from the middle of a's bounds to that of b's, and how far that is.
 HWY_INLINE float displacementBetweenMiddles(const SupportTable& a, const SupportTable& b, const Between& g,
                                             float (&n)[3]) {
-  const Eigen::Vector3f &from = a.center(), &to = b.center();
+  const float to[3] = {b.center(0), b.center(1), b.center(2)};
   float squared = 0;
   BOCST_UNROLL
   for (int k = 0; k < 3; ++k) {
     const float turned = g.rotation[0][k] * to[0] + g.rotation[1][k] * to[1] + g.rotation[2][k] * to[2];
-    n[k] = g.t[k] + g.scale * turned - from[k];
+    n[k] = g.t[k] + g.scale * turned - a.center(static_cast<std::size_t>(k));
     squared += n[k] * n[k];
   }
   const float per_length = roughInverseSqrt(squared), length = squared * per_length;
@@ -218,9 +222,8 @@ HWY_INLINE float displacementBetweenMiddles(const SupportTable& a, const Support
   return length;
 }
 
-bool AreSeparate(const SupportTable& a, const SupportTable& b, const SimilarityTransform& b_in_a, bool& shallow) {
+bool AreSeparateBetween(const SupportTable& a, const SupportTable& b, const Between& g, bool& shallow) {
   shallow = false;
-  const Between g = between(b_in_a);
   const float size = static_cast<float>(lattice::kMiddle) * (1 + g.scale);
   const float smaller = 2 * lattice::kMiddle * std::min(1.0f, g.scale);
   const float distance = std::abs(g.t[0]) + std::abs(g.t[1]) + std::abs(g.t[2]);
@@ -256,6 +259,10 @@ bool AreSeparate(const SupportTable& a, const SupportTable& b, const SimilarityT
   return false;
 }
 
+bool AreSeparate(const SupportTable& a, const SupportTable& b, const SimilarityTransform& b_in_a, bool& shallow) {
+  return AreSeparateBetween(a, b, between(b_in_a), shallow);
+}
+
 void Evaluate(const SupportTable& a, const SupportTable& b, const SimilarityTransform& b_in_a,
               EightSeparations& eight) {
   const auto directions = [&eight](std::size_t lane, V(&v)[3]) HWY_ATTR {
@@ -271,11 +278,65 @@ HWY_AFTER_NAMESPACE();
 namespace bocst::query {
 
 HWY_EXPORT(AreSeparate);
+HWY_EXPORT(AreSeparateBetween);
 HWY_EXPORT(Evaluate);
 
 bool areSeparate(const SupportTable& a, const SupportTable& b, const SimilarityTransform& b_in_a, bool& shallow) {
   return HWY_DYNAMIC_DISPATCH(AreSeparate)(a, b, b_in_a, shallow);
 }
+
+namespace {
+
+// Of the surfaces at these poses, where what is no farther apart than `margin` touches.
+template <typename S>
+Between between(const SupportTable& a, const S* X_WA, const SupportTable& b, const S* X_WB, float margin) {
+  using simd::Float4;
+  const Float4 none = {0, 0, 0, 0}, middle_a = {a.middle(0), a.middle(1), a.middle(2), 0};
+  Float4 rows_a[3] = {simd::load(X_WA), simd::load(X_WA + 4), simd::load(X_WA + 8)}, rest = none;
+  simd::transpose(rows_a[0], rows_a[1], rows_a[2], rest);
+  const auto in_a = [&](Float4 v) {
+    return rows_a[0] * simd::lane<0>(v) + rows_a[1] * simd::lane<1>(v) + rows_a[2] * simd::lane<2>(v);
+  };
+  const float per_unit = 1 / a.unit();
+  Between g;
+  Float4 t = in_a(simd::loadDifference(X_WB + 12, X_WA + 12)) - middle_a, size = simd::abs(middle_a);
+  for (std::size_t j = 0; j < 3; ++j) {
+    const Float4 axis = in_a(simd::load(X_WB + 4 * j));
+    std::memcpy(g.rotation[j], &axis, sizeof axis);
+    t += b.middle(j) * axis;
+    size[j] += std::abs(b.middle(j));
+  }
+  t *= per_unit;
+  std::memcpy(g.t, &t, sizeof t);
+  const Float4 distances = simd::abs(t);
+  const float distance = distances[0] + distances[1] + distances[2], far = size[0] + size[1] + size[2];
+  g.scale = b.unit() * per_unit;
+  // As of areFarApart(). The corners of a root's cube are nearer to its middle than 2 kMiddle.
+  g.tolerance = 1.001f * margin * per_unit +
+                2e-4f * (distance + 2 * (far * per_unit + 2 * static_cast<float>(lattice::kMiddle) * (1 + g.scale)));
+  g.orthogonality_error = 0;
+  return g;
+}
+
+}  // namespace
+
+template <typename S>
+Hulls hullsWithoutLock(const OpenHull& a, const S* X_WA, const OpenHull& b, const S* X_WB, double margin) {
+  bool apart = false, shallow = false;
+  const auto ask = [&](const tree::Outline::Reader&) {
+    apart = HWY_DYNAMIC_DISPATCH(AreSeparateBetween)(
+        a.supports, b.supports, between(a.supports, X_WA, b.supports, X_WB, static_cast<float>(margin)), shallow);
+#if !HWY_IS_TSAN  // which does not know fences; there, each value is acquired
+    std::atomic_thread_fence(std::memory_order_acquire);
+#endif
+    return true;
+  };
+  if (!a.outline.read([&](const tree::Outline::Reader&) { return b.outline.read(ask); })) return Hulls::kUnknown;
+  return apart ? Hulls::kApart : shallow ? Hulls::kShallow : Hulls::kMeet;
+}
+
+template Hulls hullsWithoutLock(const OpenHull&, const float*, const OpenHull&, const float*, double);
+template Hulls hullsWithoutLock(const OpenHull&, const double*, const OpenHull&, const double*, double);
 
 void evaluate(const SupportTable& a, const SupportTable& b, const SimilarityTransform& b_in_a,
               EightSeparations& eight) {

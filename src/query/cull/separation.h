@@ -2,6 +2,7 @@
 #pragma once
 
 #include "geometry/volume.h"
+#include "tree/outline.h"
 #include "tree/support_table.h"
 
 // Two surfaces whose convex hulls are apart, told without a walk: by a direction in which the one ends before the other
@@ -14,6 +15,25 @@ namespace bocst::query {
 /// Where it does, `shallow` tells whether the hulls overlap so little that the surfaces are probably apart.
 bool areSeparate(const tree::SupportTable& a, const tree::SupportTable& b, const SimilarityTransform& b_in_a,
                  bool& shallow);
+
+/// What can be read of a surface without a lock.
+struct OpenHull {
+  const tree::SupportTable& supports;
+  const tree::Outline& outline;  ///< Tells whether all was read of one surface.
+};
+
+/// What areSeparate() says of two hulls.
+enum class Hulls {
+  kUnknown,  ///< It was not asked, or a surface changed meanwhile.
+  kApart,
+  kShallow,  ///< They may meet, but the surfaces are probably apart.
+  kMeet      ///< They may meet.
+};
+
+/// As areSeparate(), without a lock: kApart if the two are surely farther apart than `margin`. Poses, range and
+/// rounding as for areFarApart().
+template <typename S>
+Hulls hullsWithoutLock(const OpenHull& a, const S* X_WA, const OpenHull& b, const S* X_WB, double margin);
 
 /// What one iteration evaluates: f(u) = u.t - h_a(u) - h_b(-R^T u) of eight directions u in a's frame, each h as
 /// interpolated. Positive, beyond the rounding margin, means apart. For tests; chosen at run time for the machine's
