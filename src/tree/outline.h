@@ -39,7 +39,7 @@ class alignas(64) Outline {
     float half(std::size_t k) const { return axis(k)[3]; }
 
    private:
-    simd::Float4 at(std::size_t i) const {
+    __attribute__((always_inline)) simd::Float4 at(std::size_t i) const {
       using Words = std::uint64_t __attribute__((vector_size(16)));
       return reinterpret_cast<simd::Float4>(
           Words{words_[i].load(std::memory_order_acquire), words_[i + 1].load(std::memory_order_acquire)});

@@ -151,7 +151,7 @@ template <typename S>
 std::size_t collidePair(const fcl::CollisionGeometry<S>* o1, const fcl::Transform3<S>& X_W1,
                         const fcl::CollisionGeometry<S>* o2, const fcl::Transform3<S>& X_W2,
                         const BroughtSolver<S>& solver, const fcl::CollisionRequest<S>& request,
-                        fcl::CollisionResult<S>& result, std::optional<double> margin) {
+                        fcl::CollisionResult<S>& result, const std::optional<double>& margin) {
   const Models<S> models(o1, o2);
   const bool are_rigid = areSurelyRigid(X_W1, X_W2);
   if (!are_rigid) {
@@ -247,7 +247,7 @@ void collideRow(const Model<S>& a, const Model<S>& b, const fcl::Transform3<S>* 
   template std::size_t collidePair(const fcl::CollisionGeometry<S>*, const fcl::Transform3<S>&,                        \
                                    const fcl::CollisionGeometry<S>*, const fcl::Transform3<S>&,                        \
                                    const BroughtSolver<S>&, const fcl::CollisionRequest<S>&, fcl::CollisionResult<S>&, \
-                                   std::optional<double>);
+                                   const std::optional<double>&);
 BOCST_INSTANTIATE(float)
 BOCST_INSTANTIATE(double)
 #undef BOCST_INSTANTIATE

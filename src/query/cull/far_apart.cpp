@@ -84,11 +84,13 @@ __attribute__((always_inline)) inline Projections project(const TurnedBox& a, co
   const Float4 squares = p.along_a * p.along_a;
   p.squared = squares[0] + squares[1] + squares[2];
   p.length = std::sqrt(p.squared);
+#pragma GCC unroll 3
   for (int j = 0; j < 3; ++j) p.cosines[j] = product(rows_a, b.axes[j]);
   Float4 transposed[3] = {p.cosines[0], p.cosines[1], p.cosines[2]};
   rest = none;
   simd::transpose(transposed[0], transposed[1], transposed[2], rest);
   p.along_b = product(transposed, p.along_a);
+#pragma GCC unroll 3
   for (int j = 0; j < 3; ++j) {
     p.sizes[j] = simd::abs(p.cosines[j]);
     p.transposed_sizes[j] = simd::abs(transposed[j]);

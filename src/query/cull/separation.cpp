@@ -300,6 +300,7 @@ Between between(const SupportTable& a, const S* X_WA, const SupportTable& b, con
   const float per_unit = 1 / a.unit();
   Between g;
   Float4 t = in_a(simd::loadDifference(X_WB + 12, X_WA + 12)) - middle_a, size = simd::abs(middle_a);
+#pragma GCC unroll 3
   for (std::size_t j = 0; j < 3; ++j) {
     const Float4 axis = in_a(simd::load(X_WB + 4 * j));
     std::memcpy(g.rotation[j], &axis, sizeof axis);
@@ -314,7 +315,9 @@ Between between(const SupportTable& a, const S* X_WA, const SupportTable& b, con
   // As of areFarApart(). The corners of a root's cube are nearer to its middle than 2 kMiddle.
   g.tolerance = 1.001f * margin * per_unit +
                 2e-4f * (distance + 2 * (far * per_unit + 2 * static_cast<float>(lattice::kMiddle) * (1 + g.scale)));
-  g.orthogonality_error = 0;
+  // A smaller unit has lost digits as a float.
+  constexpr float kLeastUnit = 1e-30f;
+  g.orthogonality_error = a.unit() > kLeastUnit && b.unit() > kLeastUnit ? 0.0f : 1.0f;
   return g;
 }
 

@@ -30,8 +30,8 @@ enum class Hulls {
   kMeet      ///< They may meet.
 };
 
-/// As areSeparate(), without a lock: kApart if the two are surely farther apart than `margin`. Poses, range and
-/// rounding as for areFarApart().
+/// As areSeparate(), without a lock: kApart if the two are surely farther apart than `margin`. Poses, and what is
+/// allowed for their rounding, as for areFarApart(); see share/doc/guarantees.md.
 template <typename S>
 Hulls hullsWithoutLock(const OpenHull& a, const S* X_WA, const OpenHull& b, const S* X_WB, double margin);
 

@@ -172,6 +172,97 @@ TEST_P(Separation, WhatIsNoNumberIsNotSeparate) {
   }
 }
 
+using Outline = tree::Outline;
+
+/// A pose, its rotation off by `error` an entry of it at most.
+Eigen::Isometry3d randomPose(std::mt19937_64& g, double size, double error) {
+  std::uniform_real_distribution<double> u(-1, 1);
+  Eigen::Isometry3d X = Eigen::Isometry3d::Identity();
+  X.linear() = test::randomRotation(g) + error * Eigen::Matrix3d::NullaryExpr([&] { return u(g); });
+  X.translation() = size * test::randomDirection(g);
+  return X;
+}
+
+template <typename S>
+Hulls hullsAt(const Side& a, const Eigen::Isometry3d& X_WA, const Side& b, const Eigen::Isometry3d& X_WB,
+              double margin) {
+  const Eigen::Matrix<S, 4, 4> X_A = X_WA.matrix().cast<S>(), X_B = X_WB.matrix().cast<S>();
+  return hullsWithoutLock<S>({a.tree.supports(), a.tree.outline()}, X_A.data(), {b.tree.supports(), b.tree.outline()},
+                             X_B.data(), margin);
+}
+
+// A vertex of one mesh comes to lie within the margin of a vertex of the other, however off the rotations may be, of
+// meshes of any size and far from the origins of their frames.
+TEST_P(Separation, HullsThatMeetAreNotApartWithoutLock) {
+  std::mt19937_64 g(38);
+  std::uniform_real_distribution<double> u(-1, 1);
+  const std::vector<test::Raw> raws = surfaces();
+  int found = 0, expected = 0, close = 0;
+  for (std::size_t i = 0; i < raws.size(); ++i) {
+    for (int round = 0; round < 60; ++round) {
+      const double exponent = round % 2 ? 44 * u(g) : 0, size = std::pow(10.0, exponent);
+      const auto moved = [&](const test::Raw& from) {
+        test::Raw raw = from;
+        const Vector3d away = size * std::exp2(6 * u(g)) * test::randomDirection(g);
+        for (Vector3d& v : raw.vertices) v = size * v + (round % 3 ? Vector3d(0, 0, 0) : away);
+        return raw;
+      };
+      const test::Raw raw_a = moved(raws[i]), raw_b = moved(raws[(i + 1) % raws.size()]);
+      const Side a(raw_a), b(raw_b);
+      learnSupports(a, b);
+      const auto sizeOf = [](const test::Raw& raw) {
+        double most = 0;
+        for (const Vector3d& v : raw.vertices) most = std::max(most, v.norm());
+        return most;
+      };
+      const double sizes = sizeOf(raw_a) + sizeOf(raw_b), error = round % 4 == 1 ? 2e-6 : 0;
+      const double margin = round % 5 ? 0 : size * std::abs(u(g));
+      const Eigen::Isometry3d X_WA = randomPose(g, size, error);
+      Eigen::Isometry3d X_WB = randomPose(g, size, error);
+      const Vector3d d = test::randomDirection(g);
+      const auto extreme = [](const test::Raw& raw, const Vector3d& direction) {
+        return *std::max_element(raw.vertices.begin(), raw.vertices.end(), [&](const Vector3d& v, const Vector3d& w) {
+          return direction.dot(v) < direction.dot(w);
+        });
+      };
+      const Vector3d touching = X_WA * extreme(raw_a, X_WA.linear().transpose() * d) -
+                                X_WB.linear() * extreme(raw_b, -(X_WB.linear().transpose() * d));
+      const auto at = [&](double gap) {
+        X_WB.translation() = touching + gap * d;
+        return round % 7 == 0 && std::abs(exponent) < 30 ? hullsAt<float>(a, X_WA, b, X_WB, margin)
+                                                         : hullsAt<double>(a, X_WA, b, X_WB, margin);
+      };
+      ASSERT_NE(at(0.99 * margin), Hulls::kApart) << i << ' ' << round;
+      // In units of a lattice about a point, all is too far.
+      if (std::abs(exponent) > 10 || raws[i].triangles.size() == 1) continue;
+      ++expected;
+      found += at(9 * (sizes + margin)) == Hulls::kApart;
+      close += at(0.3 * sizes + margin) == Hulls::kApart;
+    }
+  }
+  EXPECT_EQ(found, expected);
+  EXPECT_GT(expected, 150);
+  EXPECT_GT(close, expected / 2);
+}
+
+TEST_P(Separation, NothingIsSaidOfASurfaceThatChanges) {
+  const Side a(test::torus(20)), b(test::torus(20));
+  const Eigen::Isometry3d here = Eigen::Isometry3d::Identity(), there = here * Eigen::Translation3d(100, 0, 0);
+  EXPECT_EQ(hullsAt<double>(a, here, b, there, 0), Hulls::kApart);
+  EXPECT_NE(hullsAt<double>(a, here, b, here, 0), Hulls::kApart);
+  // What set() calls sees what another thread sees meanwhile.
+  for (const bool first : {false, true}) {
+    Outline changing;
+    Hulls hulls = Hulls::kMeet;
+    changing.set(Outline::Box(), [&] {
+      const OpenHull of_a{a.tree.supports(), first ? changing : a.tree.outline()},
+          of_b{b.tree.supports(), first ? b.tree.outline() : changing};
+      hulls = hullsWithoutLock<double>(of_a, here.matrix().data(), of_b, there.matrix().data(), 0);
+    });
+    EXPECT_EQ(hulls, Hulls::kUnknown) << first;
+  }
+}
+
 INSTANTIATE_TEST_SUITE_P(Targets, Separation, testing::ValuesIn(test::EveryTarget::targets()), test::EveryTarget::name);
 
 TEST(SupportTable, AreExactOnceATreeIsWhole) {
@@ -189,8 +280,6 @@ TEST(SupportTable, AreExactOnceATreeIsWhole) {
     }
   }
 }
-
-using Outline = tree::Outline;
 
 Outline::Box boxOf(const tree::Tree& tree) {
   Outline::Box box;
@@ -248,15 +337,6 @@ Outline::Box randomBox(std::mt19937_64& g, double size, Vector3d& corner) {
   corner = center;
   for (int k = 0; k < 3; ++k) corner += axes.col(k) * half[k] * (g() % 2 ? 1 : -1);
   return Outline::boxOf(center, axes, half);
-}
-
-/// A pose, its rotation off by `error` an entry of it at most.
-Eigen::Isometry3d randomPose(std::mt19937_64& g, double size, double error) {
-  std::uniform_real_distribution<double> u(-1, 1);
-  Eigen::Isometry3d X = Eigen::Isometry3d::Identity();
-  X.linear() = test::randomRotation(g) + error * Eigen::Matrix3d::NullaryExpr([&] { return u(g); });
-  X.translation() = size * test::randomDirection(g);
-  return X;
 }
 
 bool areFar(const Outline::Box& box_a, const Eigen::Isometry3d& X_WA, const Outline::Box& box_b,
