@@ -141,8 +141,8 @@ class Tree {
   /// long as that does, if there is memory.
   void payInterior(std::int64_t now);
 
-  /// How the last long search of a kind ended: over oriented boxes or not, and after how many steps. A guess for the
-  /// next one.
+  /// How the last long search of a kind ended: over oriented boxes, so many times in a row, or over blocks (0); and
+  /// after how many steps. A guess for the next one.
   enum class Search { kYesOrNo, kContacts, kDistance, kContactTime };
   struct LongSearch {
     std::uint32_t over_boxes = 0, steps = 0;

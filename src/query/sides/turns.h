@@ -32,14 +32,18 @@ class Turns {
     const std::size_t price = trees_[0]->boxPrice() + (trees_[1] != nullptr ? second.boxPrice() : 0);
     const tree::Tree::LongSearch last[2] = {trees_[0]->longSearch(kind), second.longSearch(kind)};
     most_ = price == 0 ? limits.few : std::max(limits.many, price);
-    if (last[0].over_boxes != last[1].over_boxes) return;
+    if ((last[0].over_boxes == 0) != (last[1].over_boxes == 0)) return;
     const std::size_t steps = std::min(last[0].steps, last[1].steps);
-    if (last[0].over_boxes != 0) {
+    times_over_boxes_ = std::min(last[0].over_boxes, last[1].over_boxes);
+    if (times_over_boxes_ != 0) {
       most_over_boxes_ = 2 * steps;
-      if (price == 0) most_ = limits.slower * steps;
+      // Blocks that would have ended a little later must not be given up for ever: the 2nd, 4th, 8th, ... time they get
+      // twice as long.
+      const bool is_twice = times_over_boxes_ > 1 && (times_over_boxes_ & (times_over_boxes_ - 1)) == 0;
+      if (price == 0) most_ = limits.slower * steps * (is_twice ? 2 : 1);
     } else if (price == 0 && steps > 0) {
       most_ = std::max(most_, 2 * steps);
-      follows_last_ = true;
+      last_over_blocks_ = steps;
     }
   }
 
@@ -61,11 +65,14 @@ class Turns {
         if (tree != nullptr) tree->payBoxRent(steps - limits_.many);
       }
     }
-    // In a first turn, boxes were not tried; and a short walk says nothing.
-    if (!gave_up && steps > limits_.few && (!is_first_ || follows_last_)) remember(0, steps);
+    // In a first turn, boxes were not tried; and a short walk says nothing. Objects that share a model may need
+    // different numbers of steps: a larger one is forgotten by and by.
+    if (!gave_up && steps > limits_.few && (!is_first_ || last_over_blocks_ > 0)) {
+      remember(0, std::max(steps, last_over_blocks_ / 4 * 3));
+    }
   }
   /// The walk over boxes ended.
-  void endedOverBoxes(std::size_t steps) const { remember(1, steps); }
+  void endedOverBoxes(std::size_t steps) const { remember(times_over_boxes_ + 1, steps); }
 
   void next() {
     constexpr std::size_t kLonger = 16;
@@ -86,7 +93,9 @@ class Turns {
   const tree::Tree::Search kind_;
   const Limits limits_;
   std::size_t most_ = 0, most_over_boxes_ = 0;
-  bool is_first_ = true, follows_last_ = false;
+  std::uint32_t times_over_boxes_ = 0;  // in a row
+  std::size_t last_over_blocks_ = 0;
+  bool is_first_ = true;
 };
 
 }  // namespace bocst::query
