@@ -35,19 +35,19 @@ namespace bocst {
 /// the number over all calls with this result (0 if num_max_contacts is 0). Adds nothing if
 /// request.isSatisfied(result) is already true.
 ///
-/// **Order.** The reported contacts and their order depend only on meshes, poses and request, not on the resident
-/// nodes, the clock, the oracle or the thread. Contacts are sorted by (b1, b2). If there are more than a request asks
-/// for, a request with costs, or for more than 1024, gets those with the smallest (b1, b2). Other requests get those
-/// with the smallest position along the mesh, which takes less time if there are many more. In the frame of the model's
-/// mesh (o1's if both are models), with x the longest axis of its bounding box and y and z the two that follow (x, y,
-/// z, x, ...), the position of a point is x + 0.31 y + 0.23 z, and that of a contact
-/// - the smallest of the segment in which the two triangles intersect;
-/// - the largest of that triangle whose largest is smaller, if the triangles do not clearly intersect; with a margin,
-///   the largest of the triangle of that mesh;
-/// - with shapes and octrees, the largest of the triangle, or that of the shape's bounding box (in its own frame) or of
-///   the cell, whichever is smaller.
-/// With conservative answers it is the Morton code of the cell. The default request (one contact, enable_contact false)
-/// is a yes-or-no query: its ids are those of any pair that touches.
+/// **Order.** The default request (one contact, enable_contact false) is a yes-or-no query: it gets the ids of any pair
+/// that touches. For other requests, the contacts and their order depend only on meshes, poses and request, not on the
+/// resident nodes, the clock, the oracle or the thread. Contacts are sorted by (b1, b2). If there are more than a
+/// request asks for, a request with costs, or for more than 1024, gets those with the smallest (b1, b2). Other requests
+/// get those with the smallest position along the mesh, which takes less time if there are many more. In the frame of
+/// the model's mesh (o1's if both are models), with x the longest axis of its bounding box and y and z the two that
+/// follow (x, y, z, x, ...), the position of a point is x + 0.31 y + 0.23 z. The position of a contact is
+/// - if the two triangles intersect: the smallest position of the segment in which they do;
+/// - if they do not clearly intersect: the largest position of each triangle, and of these two the smaller;
+/// - with a margin: the largest position of the triangle of that mesh;
+/// - with shapes and octrees: the largest position of the triangle, and that of the shape's bounding box (in its own
+///   frame) or of the cell, and of these two the smaller;
+/// - with conservative answers: the Morton code of the cell.
 ///
 /// **Pairs.** One geometry is a Model; the other is a Model, an fcl::BVHModel<BV> of any BV, one of FCL's shapes (Box,
 /// Sphere, Ellipsoid, Capsule, Cone, Cylinder, Convex, Plane, Halfspace, TriangleP) or an OcTree. Contacts keep the
@@ -92,7 +92,9 @@ namespace bocst {
 /// @throws std::invalid_argument for a geometry that is null or not supported (FCL would return 0, "free"), a pose that
 /// is not rigid, an invalid tolerance or an unknown solver type. The message names the argument and its value. If
 /// neither is a Model, the answer is FCL's own (which is 0 for a TriangleP); a Plane and a Convex are refused. See
-/// share/doc/guarantees.md.
+/// share/doc/guarantees.md. std::logic_error for a Model between beginModel() and endModel(); std::bad_alloc, which
+/// leaves models as valid as they were; std::runtime_error in a child of fork(), see Model; OracleError where a device
+/// has lost a released mesh, see Model::releaseMesh().
 /// Thread rule: any number of threads may query the same models, each with its own request and result.
 template <typename S>
 BOCST_EXPORT std::size_t collide(const fcl::CollisionGeometry<S>* o1, const fcl::Transform3<S>& X_W1,
@@ -116,7 +118,7 @@ BOCST_EXPORT std::size_t collide(const fcl::CollisionGeometry<S>* o1, const fcl:
 /// are solid. Margins have no effect. An octree without occupied cells leaves the result unchanged.
 /// - o1, o2, b1, b2, nearest_points: in the caller's order. Ids are as in collide(), but DistanceResult::NONE for
 ///   shapes. The points (with enable_nearest_points) are on the surfaces or spheres, in the world frame. If several
-///   pairs are equally near, they are those of any.
+///   pairs are equally near, the ids and points of one of them are returned; which one is not defined.
 /// - Conservative answers: the distance between the spheres at the collision depth. It is never larger than that
 ///   between the surfaces, and 0 if spheres overlap.
 /// - abs_err and rel_err: absolute and relative amount by which the answer may exceed the minimum distance, as in FCL.
@@ -176,21 +178,22 @@ inline void refuseNull(const void* o1, const void* o2) {
 ///   is already below the limits that follow. Before this time they do not touch. It is 0 if they touch
 ///   at the begin, and 1 without contact. toc_err may be 0.
 /// - contact_tf1, contact_tf2: the poses at that time; without contact, the end poses.
-/// - Geometries that pass each other at a distance below 1e-9 of the smaller geometry's size, or below 1e-13 of all
-///   lengths, may count as touching. A size is half the diagonal of a geometry's bounding box; all lengths are the sum
-///   of the largest distances of both geometries' points from their own origins, or the distance of a geometry from the
-///   world's origin with the path of its fastest point, whichever is larger. With shapes and cells the limit is at
-///   least 2e-6 in length units: twice the distance at which collide() can report a contact because of FCL's solvers.
-///   With float, it is up to 2e-5 (conservative answers: 4e-5) of the sum of all lengths more: coordinates, sizes, and
-///   the paths of both, as long as their fastest points could make them.
+/// - Geometries that pass each other at a distance below a limit may count as touching. The limit is the largest of
+///   1e-9 s, where s is the smaller size (half the diagonal of a geometry's bounding box);
+///   1e-13 L, where L is the larger of two lengths: the sum of the largest distances of both geometries' points from
+///   their own origins, and the distance of a geometry from the world's origin plus the path of its fastest point;
+///   with shapes and cells 2e-6 length units: twice the distance at which collide() can report a contact because of
+///   FCL's solvers.
+///   With float, up to 2e-5 (conservative answers: 4e-5) of the sum of all lengths is added: coordinates, sizes, and
+///   the longest paths of points of both geometries.
 /// - Beyond these limits, verdicts do not depend on earlier queries, the order of the arguments or the partner's kind.
-///   time_of_contact may, within toc_err and the time in which such a distance closes.
-/// Supported motions are FCL's TranslationMotion, InterpMotion, ScrewMotion and SplineMotion (in FCL 0.7, two of them
-/// exist only for double, and of InterpMotion's constructors that take poses only the one with two rotations, two
-/// translations and a point sets all members). They are not modified. With poses, ccd_motion_type selects the motion:
-/// CCDM_TRANS keeps the rotation of the begin; CCDM_LINEAR moves the geometry's origin on a line and turns about a
-/// fixed axis; CCDM_SCREW turns about one axis and moves along it; CCDM_SPLINE interpolates the origin and the rotation
-/// vector linearly.
+///   time_of_contact may differ by toc_err plus the time in which the geometries cross such a distance.
+/// Supported motions are FCL's TranslationMotion, InterpMotion, ScrewMotion and SplineMotion. They are not modified. In
+/// FCL 0.7, two of them exist only for double. Make an InterpMotion with the constructor that takes two rotations, two
+/// translations and a point: the other constructors that take poses leave members unset. With poses, ccd_motion_type
+/// selects the motion: CCDM_TRANS keeps the rotation of the begin; CCDM_LINEAR moves the geometry's origin on a line
+/// and turns about a fixed axis; CCDM_SCREW turns about one axis and moves along it; CCDM_SPLINE interpolates the
+/// origin and the rotation vector linearly.
 /// @throws std::invalid_argument as collide(); for a motion that is not supported or whose begin or end pose is not
 /// rigid; for an invalid toc_err; and, with float and poses, for a pair without a Model, for which FCL 0.7 has no
 /// query. Thread rule: as collide(); threads may share motions while no thread calls their integrate().

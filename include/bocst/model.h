@@ -36,7 +36,8 @@ struct ModelTree;
 /// One thread at a time may call updateVertices() meanwhile; a query sees the mesh before or after the update, never a
 /// mixture.
 /// expandAll() and releaseMesh() may be called at the same time, and wait for running queries. No query may run during
-/// setMesh(), or between beginModel() and endModel().
+/// setMesh(). A query that begins between beginModel() and endModel() throws std::logic_error; none may run while one
+/// of these two runs.
 /// The public members of CollisionGeometry (cost_density, aabb_local, ...) are not protected, as in FCL.
 ///
 /// After fork() a child process may use models that it makes itself, and models of the parent that no other thread was
@@ -157,12 +158,13 @@ class BOCST_EXPORT Model : public fcl::CollisionGeometry<S> {
 
   /// Applies ttl and memory_budget at the time `now` (paper, 3.1). Removes the deepest nodes that were last used more
   /// than ttl ago; at that moment the ttl of their parents starts anew. So a branch goes level by level. Queries also
-  /// do this from time to time, if it is worth the work; while a model is in use they keep nodes that were built in
-  /// bulk, and drop what is copied of the mesh for their leaves.
+  /// do this from time to time, if it is worth the work. If a query used the model within the last ttl, they keep
+  /// the nodes of a whole build, and drop only the copies of triangle corners in unused leaves.
   void prune(Clock::time_point now);
   void prune();  ///< With the current time.
 
-  /// Sets new positions of all vertices; the triangles stay. The tree is reset to its root, nothing is rebuilt.
+  /// Sets new positions of all vertices; the triangles stay. The tree is reset to its root, nothing is rebuilt: later
+  /// queries grow it again. Where these have a time limit, make a new model instead, see share/doc/from-bvhmodel.md.
   /// @throws std::invalid_argument for a wrong number of vertices, a bad vertex, or with Options::solid a mesh that is
   /// not watertight; std::logic_error for an empty model or after releaseMesh(). The model is then unchanged.
   void updateVertices(std::vector<Eigen::Vector3d> vertices);

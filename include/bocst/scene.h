@@ -72,10 +72,10 @@ struct SceneOptions {
 /// earlier queries, on threads or on the resident nodes. Each query checks that all its poses are rigid.
 ///
 /// Threads: any number of threads may query one scene, also while another thread changes it: each query sees the scene
-/// before or after a change, never a mixture (changes of a geometry itself: see update()). A query reads movingCount()
-/// poses, as of the moment it begins: while other threads query, add or remove moving objects only if these threads
-/// cannot hold a state of the old length, for example under a lock of the caller, or in a scene of each thread (a new
-/// one costs little, see addFixed()). Changes wait for each other. A change of a fixed object takes microseconds; while
+/// before or after a change, never a mixture (changes of a geometry itself: see update()). A query reads as
+/// many poses as there are moving objects when it begins. Before you add or remove a moving object, make sure that no
+/// other thread passes a state of the old length: use a lock of your own, or a scene for each thread (a new one costs
+/// little, see addFixed()). Changes wait for each other. A change of a fixed object takes microseconds; while
 /// queries are under way, it copies what they share (0.2 ms for 20 000 fixed objects). The first query, and the first
 /// one after moving objects came or went or after many changes, updates the scene's internal data, and other queries
 /// wait for that; apart from changes, no query waits for another. When no tree has to grow, collides() and calls with
@@ -99,8 +99,9 @@ class BOCST_EXPORT Scene {
   // ignore(a, a), setPose() of a moving object and movingIndex() of a fixed one; std::logic_error for a Model between
   // beginModel() and endModel().
 
-  /// Adds an object that stays at X_WG. Computes a bound of its geometry, of a mesh once in the process and in time
-  /// linear in its vertices, of an OcTree without a look at most cells; objects with the same geometry share the bound.
+  /// Adds an object that stays at X_WG. Computes a bounding box of its geometry. For a mesh this takes time linear
+  /// in its vertices, once in the process; for an OcTree most cells are not read. Objects with the same geometry share
+  /// the box.
   Id addFixed(std::shared_ptr<Geometry> geometry, const Transform& X_WG);
   /// Adds an object whose pose is part of each state.
   Id addMoving(std::shared_ptr<Geometry> geometry);
@@ -144,9 +145,9 @@ class BOCST_EXPORT Scene {
   void collisions(const Transform* X_WM, std::size_t states, std::uint8_t* hit) const;
   /// The minimum fcl::distance of all pairs; if a pair touches, 0 up to the rounding of fcl::distance;
   /// std::numeric_limits<S>::max() without pairs. `nearest` is set to a pair at this distance; to invalid Ids without
-  /// pairs. at_most: the answer where no pair is nearer (then without a pair), so that farther ones need not be
-  /// measured; for thresholds and truncated distances. Options::margin has no effect. Of a Plane or Halfspace and
-  /// another of FCL's shapes, of which fcl::distance computes nothing, it is the distance of the two.
+  /// pairs. at_most: if no pair is nearer than this, the function returns at_most and sets no pair; it does not measure
+  /// pairs that are farther apart. For thresholds and truncated distances. Options::margin has no effect. Of a Plane or
+  /// Halfspace and another of FCL's shapes, of which fcl::distance computes nothing, it is the distance of the two.
   /// @throws std::invalid_argument for other pairs of FCL's shapes and octrees whose distance FCL cannot compute,
   /// unless another pair is found to be nearer before; and if at_most is negative or NaN.
   S clearance(const Transform* X_WM, Pair* nearest = nullptr, S at_most = std::numeric_limits<S>::max()) const;

@@ -21,9 +21,9 @@ struct Statistics {
   std::uint64_t expanded_octants = 0;        ///< Octants of expanded nodes that have an actual region; the paper makes
                                              ///< an occlusion query for each (5.4), from up to three sides. With exact
                                              ///< answers also groups of triangles.
-  std::uint64_t built_triangles = 0;  ///< Triangles that exact answers have sorted into the tree so far. From one time
-                                      ///< at which only the root is resident to the next, without Model::buildTree():
-                                      ///< at most 1.25 times the mesh's triangles plus those that one query grows
+  std::uint64_t built_triangles = 0;  ///< Triangles that exact answers have sorted into the tree so far. Between two
+                                      ///< times at which only the root is resident, without Model::buildTree(): at
+                                      ///< most 1.125 times the mesh's triangles, plus those that one query grows
                                       ///< (with Options::build_ahead: those of all growth by parts plus the mesh's).
   std::uint64_t pruned_nodes = 0;     ///< Nodes dropped by ttl, budget, prune() or updateVertices().
   std::size_t mesh_bytes = 0;         ///< Heap bytes of the mesh (other models may share them; 0 after releaseMesh(),

@@ -68,18 +68,24 @@ TEST(Tree, GrowsOnlyWhatAQueryNeedsAndSettles) {
 
 // Whatever is asked, all growth together costs no more than about twice a build of the whole tree: what is built by
 // parts is an eighth of the triangles and one query's more, then all are built at once.
-TEST(Tree, GrowthCostsAtMostTwiceABuild) {
+TEST(Tree, GrowthCostsABuildAndAnEighth) {
   for (const std::size_t n : {std::size_t{20}, std::size_t{60}, std::size_t{150}}) {
     Options options;
     options.ttl = milliseconds(0);
     Modeld a(test::torus(n).mesh(), options), b(test::torus(n).mesh(), options);
     std::mt19937_64 g(n);
     std::uniform_real_distribution<double> u(-2.5, 2.5);
-    for (int i = 0; i < 3000; ++i) touching(a, b, {u(g), u(g), u(g) / 2});
-    const Statistics asked = a.statistics();
     const std::size_t triangles = a.mesh()->triangleCount();
+    std::size_t most_by_parts = 0, before = 0;  // of one query
+    for (int i = 0; i < 3000; ++i) {
+      touching(a, b, {u(g), u(g), u(g) / 2});
+      const std::size_t now = a.statistics().built_triangles;
+      if (now - before < triangles) most_by_parts = std::max(most_by_parts, now - before);
+      before = now;
+    }
+    const Statistics asked = a.statistics();
     EXPECT_GT(asked.built_triangles, triangles / 8);
-    EXPECT_LE(asked.built_triangles, 2 * triangles);
+    EXPECT_LE(asked.built_triangles, triangles + triangles / 8 + most_by_parts);
     if (asked.built_triangles < triangles) continue;
     for (int i = 0; i < 3000; ++i) touching(a, b, {u(g), u(g), u(g) / 2});
     EXPECT_EQ(a.statistics().built_triangles, asked.built_triangles) << "what is whole does not grow";
