@@ -141,11 +141,12 @@ class Tree {
   /// long as that does, if there is memory.
   void payInterior(std::int64_t now);
 
-  /// How the last long search of a kind ended: over oriented boxes, so many times in a row, or over blocks (0); and
-  /// after how many steps. A guess for the next one.
+  /// How the last long search of a kind ended: over oriented boxes or over blocks, so many times in a row, and after
+  /// how many steps. A guess for the next one.
   enum class Search { kYesOrNo, kContacts, kDistance, kContactTime };
   struct LongSearch {
-    std::uint32_t over_boxes = 0, steps = 0;
+    std::uint32_t over_boxes : 1, times : 31;  ///< times: 0 before the first.
+    std::uint32_t steps;
   };
   LongSearch longSearch(Search kind) const { return long_searches_[static_cast<std::size_t>(kind)]; }
   void setLongSearch(Search kind, LongSearch last) const { long_searches_[static_cast<std::size_t>(kind)] = last; }

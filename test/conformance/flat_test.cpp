@@ -225,10 +225,10 @@ TEST(FlatWork, ContactsOfPipesComeOverBoxes) {
   for (int i = 0; i < 1000 && boxes(a) == nullptr; ++i) contacts(poses[4], 1000000);
   ASSERT_NE(boxes(a), nullptr);
   ASSERT_NE(boxes(b), nullptr);
-  for (const std::uint32_t over_boxes : {0u, 1u, 2u}) {
-    SCOPED_TRACE(over_boxes);
+  for (const auto& [over_boxes, times] : {std::pair(0u, 1u), std::pair(0u, 2u), std::pair(1u, 1u), std::pair(1u, 2u)}) {
+    SCOPED_TRACE(testing::Message() << over_boxes << ' ' << times);
     for (const Modeld* m : {&a, &b}) {
-      fcl_adapter::treeOf<double>(*m).setLongSearch(tree::Tree::Search::kContacts, {over_boxes, 500});
+      fcl_adapter::treeOf<double>(*m).setLongSearch(tree::Tree::Search::kContacts, {over_boxes, times, 500});
     }
     for (std::size_t i = 0; i < poses.size(); ++i) {
       EXPECT_EQ(contacts(poses[i], 3), few[i]) << i;

@@ -232,18 +232,22 @@ template <typename S>
 void searchPair(const DistanceQuery<S>& q) {
   tree::Tree& tree = treeOf(*asModel<S>(q.a()));
   // FCL's managers pass the least distance so far: most of their pairs end here.
-  const double known = std::min<double>(static_cast<double>(q.result.min_distance), std::numeric_limits<float>::max());
+  constexpr double kMost = std::numeric_limits<float>::max();
+  const double known = std::min(static_cast<double>(q.result.min_distance), kMost);
   if (const Model<S>* other = asModel<S>(q.b())) {
     tree::Tree& tree_b = treeOf(*other);
     query::Hulls hulls;  // of no use to a search
-    if (areSurelyRigid(q.X_WA(), q.X_WB()) && areFarApart(tree, q.X_WA(), tree_b, q.X_WB(), known, hulls)) return;
+    if (known < kMost && areSurelyRigid(q.X_WA(), q.X_WB()) &&
+        areFarApart(tree, q.X_WA(), tree_b, q.X_WB(), known, hulls)) {
+      return;
+    }
     const QueryScope scope(tree, tree_b);
     searchMeshes(q, scope.a(), scope.b(), tree_b);
   } else if (isBodies<S>(q.b())) {
     searchBodies(q, tree);
   } else {
     const BvhSide b = bvhSideOf<S>("distance", q.b());
-    if (areFarApart(tree, q.X_WA(), b, q.X_WB(), known)) return;
+    if (known < kMost && areFarApart(tree, q.X_WA(), b, q.X_WB(), known)) return;
     const QueryScope scope(tree);
     searchMeshes(q, scope.a(), b, b);
   }

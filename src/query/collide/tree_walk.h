@@ -35,10 +35,11 @@ class TreeWalk {
   }
 
   /// True if the supports show that the two are apart, so that no walk is needed. Costs little; call it before run().
-  /// `known`: what they have shown already.
+  /// `known`: what they have shown already, with a wider rounding margin.
   bool isNeedless(Hulls known = Hulls::kUnknown) {
     is_shallow_ = known == Hulls::kShallow;
-    return known == Hulls::kUnknown && areSeparate(a_.tree().supports(), b_.tree().supports(), place(), is_shallow_);
+    if (known == Hulls::kShallow || known == Hulls::kMeet) return false;
+    return areSeparate(a_.tree().supports(), b_.tree().supports(), place(), is_shallow_);
   }
 
   /// True when the visitor ended it.

@@ -222,8 +222,7 @@ HWY_INLINE float displacementBetweenMiddles(const SupportTable& a, const Support
   return length;
 }
 
-bool AreSeparateBetween(const SupportTable& a, const SupportTable& b, const Between& g, bool& shallow) {
-  shallow = false;
+Hulls HullsBetween(const SupportTable& a, const SupportTable& b, const Between& g) {
   const float size = static_cast<float>(lattice::kMiddle) * (1 + g.scale);
   const float smaller = 2 * lattice::kMiddle * std::min(1.0f, g.scale);
   const float distance = std::abs(g.t[0]) + std::abs(g.t[1]) + std::abs(g.t[2]);
@@ -231,18 +230,19 @@ bool AreSeparateBetween(const SupportTable& a, const SupportTable& b, const Betw
   float n[3];
   const float length = displacementBetweenMiddles(a, b, g, n);
   // False for NaN.
-  if (!(length > 1e-6f * size && length < 0x1p50f && g.orthogonality_error < 1e-3f)) return false;
+  if (!(length > 1e-6f * size && length < 0x1p50f && g.orthogonality_error < 1e-3f)) return Hulls::kUnknown;
   // No direction can do better than this; most hits are so deep.
-  if (length - a.innerRadius() - g.scale * b.innerRadius() < -kHopeless * smaller) return false;
+  const float depth = a.innerRadius() + g.scale * b.innerRadius() - length - rounding_margin;
+  if (depth > kHopeless * smaller) return Hulls::kMeet;
 
   float value[8], best = -1e30f, hopeless = -kHopeless * smaller, radius = kFirstRadius;
   for (int iteration = 0; iteration < kIterations; ++iteration) {
     const Ring ring(n, radius, iteration == 0 ? kSevenAndMiddle : kEight);
     const auto directions = [&ring](std::size_t lane, V(&v)[3]) HWY_ATTR { ring.directions(lane, v); };
     const float most = values(a, b, g, directions, value);
-    if (most > rounding_margin) return true;
+    if (most > rounding_margin) return Hulls::kApart;
     const std::size_t lane = largest(value, most);
-    if (lane == 8) return false;
+    if (lane == 8) return Hulls::kUnknown;
     if (most > best) {
       best = most;
       const bool same = iteration == 0 && lane == 0;
@@ -255,12 +255,15 @@ bool AreSeparateBetween(const SupportTable& a, const SupportTable& b, const Betw
     if (best < hopeless) break;
     hopeless *= kHopelessLater;
   }
-  shallow = best > -kShallow * smaller;
-  return false;
+  // With less of a rounding margin, they may be apart.
+  if (best > -rounding_margin) return Hulls::kClose;
+  return best > -kShallow * smaller ? Hulls::kShallow : Hulls::kMeet;
 }
 
 bool AreSeparate(const SupportTable& a, const SupportTable& b, const SimilarityTransform& b_in_a, bool& shallow) {
-  return AreSeparateBetween(a, b, between(b_in_a), shallow);
+  const Hulls hulls = HullsBetween(a, b, between(b_in_a));
+  shallow = hulls == Hulls::kShallow || hulls == Hulls::kClose;
+  return hulls == Hulls::kApart;
 }
 
 void Evaluate(const SupportTable& a, const SupportTable& b, const SimilarityTransform& b_in_a,
@@ -278,7 +281,7 @@ HWY_AFTER_NAMESPACE();
 namespace bocst::query {
 
 HWY_EXPORT(AreSeparate);
-HWY_EXPORT(AreSeparateBetween);
+HWY_EXPORT(HullsBetween);
 HWY_EXPORT(Evaluate);
 
 bool areSeparate(const SupportTable& a, const SupportTable& b, const SimilarityTransform& b_in_a, bool& shallow) {
@@ -313,11 +316,14 @@ Between between(const SupportTable& a, const S* X_WA, const SupportTable& b, con
   const float distance = distances[0] + distances[1] + distances[2], far = size[0] + size[1] + size[2];
   g.scale = b.unit() * per_unit;
   // As of areFarApart(). The corners of a root's cube are nearer to its middle than 2 kMiddle.
-  g.tolerance = 1.001f * margin * per_unit +
-                2e-4f * (distance + 2 * (far * per_unit + 2 * static_cast<float>(lattice::kMiddle) * (1 + g.scale)));
-  // A smaller unit has lost digits as a float.
-  constexpr float kLeastUnit = 1e-30f;
-  g.orthogonality_error = a.unit() > kLeastUnit && b.unit() > kLeastUnit ? 0.0f : 1.0f;
+  constexpr float kSide = 2.0f * static_cast<float>(lattice::kMiddle);
+  const float slack = 2e-4f * (distance + 2 * (far * per_unit + kSide * (1 + g.scale)));
+  g.tolerance = 1.001f * margin * per_unit + slack;
+  // A smaller unit has lost digits as a float, or the inverse of a larger one. With more slack, only areSeparate() can
+  // tell hulls apart that are near each other.
+  const auto has_digits = [](float unit) { return unit > 1e-30f && unit < 1e30f; };
+  const bool is_sharp = slack < 0.02f * kSide * std::min(1.0f, g.scale);
+  g.orthogonality_error = is_sharp && has_digits(a.unit()) && has_digits(b.unit()) ? 0.0f : 1.0f;
   return g;
 }
 
@@ -325,17 +331,17 @@ Between between(const SupportTable& a, const S* X_WA, const SupportTable& b, con
 
 template <typename S>
 Hulls hullsWithoutLock(const OpenHull& a, const S* X_WA, const OpenHull& b, const S* X_WB, double margin) {
-  bool apart = false, shallow = false;
+  Hulls hulls = Hulls::kUnknown;
   const auto ask = [&](const tree::Outline::Reader&) {
-    apart = HWY_DYNAMIC_DISPATCH(AreSeparateBetween)(
-        a.supports, b.supports, between(a.supports, X_WA, b.supports, X_WB, static_cast<float>(margin)), shallow);
+    hulls = HWY_DYNAMIC_DISPATCH(HullsBetween)(a.supports, b.supports,
+                                               between(a.supports, X_WA, b.supports, X_WB, static_cast<float>(margin)));
 #if !HWY_IS_TSAN  // which does not know fences; there, each value is acquired
     std::atomic_thread_fence(std::memory_order_acquire);
 #endif
     return true;
   };
   if (!a.outline.read([&](const tree::Outline::Reader&) { return b.outline.read(ask); })) return Hulls::kUnknown;
-  return apart ? Hulls::kApart : shallow ? Hulls::kShallow : Hulls::kMeet;
+  return hulls;
 }
 
 template Hulls hullsWithoutLock(const OpenHull&, const float*, const OpenHull&, const float*, double);

@@ -24,8 +24,9 @@ struct OpenHull {
 
 /// What areSeparate() says of two hulls.
 enum class Hulls {
-  kUnknown,  ///< It was not asked, or a surface changed meanwhile.
+  kUnknown,  ///< It was not asked, a surface changed meanwhile, or numbers were beyond the range of float.
   kApart,
+  kClose,    ///< They are apart by no more than the rounding margin, or overlap by no more than that.
   kShallow,  ///< They may meet, but the surfaces are probably apart.
   kMeet      ///< They may meet.
 };

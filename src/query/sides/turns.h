@@ -32,18 +32,19 @@ class Turns {
     const std::size_t price = trees_[0]->boxPrice() + (trees_[1] != nullptr ? second.boxPrice() : 0);
     const tree::Tree::LongSearch last[2] = {trees_[0]->longSearch(kind), second.longSearch(kind)};
     most_ = price == 0 ? limits.few : std::max(limits.many, price);
-    if ((last[0].over_boxes == 0) != (last[1].over_boxes == 0)) return;
+    if (last[0].over_boxes != last[1].over_boxes) return;
     const std::size_t steps = std::min(last[0].steps, last[1].steps);
-    times_over_boxes_ = std::min(last[0].over_boxes, last[1].over_boxes);
-    if (times_over_boxes_ != 0) {
+    last_over_boxes_ = last[0].over_boxes != 0;
+    times_ = std::min(last[0].times, last[1].times);
+    // What would have ended soon after it was given up must not be given up for ever: the 2nd, 4th, 8th, ... time the
+    // other way gets longer.
+    const bool tries_other = times_ > 1 && (times_ & (times_ - 1)) == 0;
+    if (last_over_boxes_) {
       most_over_boxes_ = 2 * steps;
-      // Blocks that would have ended a little later must not be given up for ever: the 2nd, 4th, 8th, ... time they get
-      // twice as long.
-      const bool is_twice = times_over_boxes_ > 1 && (times_over_boxes_ & (times_over_boxes_ - 1)) == 0;
-      if (price == 0) most_ = limits.slower * steps * (is_twice ? 2 : 1);
+      if (price == 0) most_ = limits.slower * steps * (tries_other ? 2 : 1);
     } else if (price == 0 && steps > 0) {
-      most_ = std::max(most_, 2 * steps);
-      last_over_blocks_ = steps;
+      most_ = std::max(most_, tries_other ? steps / 4 : 2 * steps);
+      follows_blocks_ = true;
     }
   }
 
@@ -65,14 +66,11 @@ class Turns {
         if (tree != nullptr) tree->payBoxRent(steps - limits_.many);
       }
     }
-    // In a first turn, boxes were not tried; and a short walk says nothing. Objects that share a model may need
-    // different numbers of steps: a larger one is forgotten by and by.
-    if (!gave_up && steps > limits_.few && (!is_first_ || last_over_blocks_ > 0)) {
-      remember(0, std::max(steps, last_over_blocks_ / 4 * 3));
-    }
+    // In a first turn, boxes were not tried; and a short walk says nothing.
+    if (!gave_up && steps > limits_.few && (!is_first_ || follows_blocks_)) remember(false, steps);
   }
   /// The walk over boxes ended.
-  void endedOverBoxes(std::size_t steps) const { remember(times_over_boxes_ + 1, steps); }
+  void endedOverBoxes(std::size_t steps) const { remember(true, steps); }
 
   void next() {
     constexpr std::size_t kLonger = 16;
@@ -81,11 +79,13 @@ class Turns {
   }
 
  private:
-  void remember(std::uint32_t over_boxes, std::size_t steps) const {
+  void remember(bool over_boxes, std::size_t steps) const {
     constexpr std::size_t kMost = std::size_t{1} << 30;
+    constexpr std::uint32_t kMostTimes = 1u << 30;
+    const std::uint32_t times = over_boxes == last_over_boxes_ ? std::min(times_ + 1, kMostTimes) : 1;
     for (const tree::Tree* tree : trees_) {
       if (tree == nullptr) continue;
-      tree->setLongSearch(kind_, {over_boxes, static_cast<std::uint32_t>(std::min(steps, kMost))});
+      tree->setLongSearch(kind_, {over_boxes, times, static_cast<std::uint32_t>(std::min(steps, kMost))});
     }
   }
 
@@ -93,9 +93,8 @@ class Turns {
   const tree::Tree::Search kind_;
   const Limits limits_;
   std::size_t most_ = 0, most_over_boxes_ = 0;
-  std::uint32_t times_over_boxes_ = 0;  // in a row
-  std::size_t last_over_blocks_ = 0;
-  bool is_first_ = true;
+  bool last_over_boxes_ = false, follows_blocks_ = false, is_first_ = true;
+  std::uint32_t times_ = 0;  // in a row; 0 if the two trees do not agree
 };
 
 }  // namespace bocst::query

@@ -79,34 +79,36 @@ TEST(Turns, WhatEndedTheLastLongSearchGetsMore) {
   EXPECT_EQ(pair.turns().most(), 14000u);
   EXPECT_EQ(pair.turns().mostOverBoxes(), 3500u);
   pair.turns().tookOverBlocks(300, false);
-  EXPECT_EQ(pair.turns().most(), 10500u) << "of poses asked in turns, the longest counts";
-  for (int k = 0; k < 20; ++k) pair.turns().tookOverBlocks(300, false);
-  EXPECT_EQ(pair.turns().most(), 600u) << "but not for ever";
+  pair.turns().tookOverBlocks(300, false);
+  EXPECT_EQ(pair.turns().most(), 600u) << "no longer than the last of these";
   pair.turns().tookOverBlocks(40, false);
   EXPECT_EQ(pair.turns().most(), 600u) << "a short one says nothing";
 
-  pair.a.setLongSearch(Search::kDistance, {1, 9000});
+  pair.a.setLongSearch(Search::kDistance, {1, 1, 9000});
   EXPECT_EQ(pair.turns().most(), 64u) << "the two do not agree";
   EXPECT_EQ(pair.turns().mostOverBoxes(), 2048u);
-  pair.b.setLongSearch(Search::kDistance, {1, 4000});
+  pair.b.setLongSearch(Search::kDistance, {1, 1, 4000});
   EXPECT_EQ(pair.turns().mostOverBoxes(), 8000u) << "the lesser of both";
 }
 
-// Of one pose that is asked again and again, where both take about as long.
-TEST(Turns, BlocksAreNotGivenUpForEver) {
+// Of one pose that is asked again and again: what would have ended soon after it was given up, or is never begun.
+TEST(Turns, NeitherWayIsGivenUpForEver) {
   Pair pair;
   pair.buildBoxes();
+  const auto is_power_of_two = [](int n) { return n == 2 || n == 4 || n == 8 || n == 16 || n == 32; };
   for (int times = 1; times < 40; ++times) {
     pair.turns().endedOverBoxes(5000);
-    const bool is_twice = times == 2 || times == 4 || times == 8 || times == 16 || times == 32;
-    EXPECT_EQ(pair.turns().most(), is_twice ? 40000u : 20000u) << times;
+    EXPECT_EQ(pair.turns().most(), is_power_of_two(times) ? 40000u : 20000u) << times;
     EXPECT_EQ(pair.turns().mostOverBoxes(), 10000u);
   }
   Turns second = pair.turns();
   second.next();
-  second.tookOverBlocks(7000, false);
-  pair.turns().endedOverBoxes(5000);
-  pair.turns().endedOverBoxes(5000);
+  second.tookOverBlocks(8000, false);
+  for (int times = 1; times < 40; ++times) {
+    EXPECT_EQ(pair.turns().most(), is_power_of_two(times) ? 2000u : 16000u) << times;
+    pair.turns().tookOverBlocks(8000, false);
+  }
+  for (int times = 1; times <= 2; ++times) pair.turns().endedOverBoxes(5000);
   EXPECT_EQ(pair.turns().most(), 40000u) << "counted from the last walk over blocks on";
 }
 
@@ -125,7 +127,7 @@ TEST(Turns, BlocksComeFirstHoweverShortTheLastWalkOverBoxes) {
 
 TEST(Turns, BlocksGetNoMoreBeforeBoxesAreThere) {
   const Pair pair;
-  for (const tree::Tree* tree : {&pair.a, &pair.b}) tree->setLongSearch(Search::kDistance, {0, 1u << 29});
+  for (const tree::Tree* tree : {&pair.a, &pair.b}) tree->setLongSearch(Search::kDistance, {0, 1, 1u << 29});
   EXPECT_EQ(pair.turns().most(), std::max(kLimits.many, pair.a.boxPrice() + pair.b.boxPrice()));
 }
 
