@@ -16,6 +16,11 @@
 
 #ifndef BOCST_SEPARATION_ONCE
 #define BOCST_SEPARATION_ONCE
+#if HWY_IS_TSAN || defined(__SANITIZE_THREAD__)  // Highway asks Clang only
+#define BOCST_IS_TSAN 1
+#else
+#define BOCST_IS_TSAN 0
+#endif
 namespace bocst::query {
 namespace {
 
@@ -53,7 +58,7 @@ HWY_INLINE void cornersOf(const SupportTable& supports, VI at, V (&corner)[4]) {
   const hn::RebindToSigned<D> di;
   alignas(64) std::int32_t lanes[8];
   hn::Store(at, di, lanes);
-#if HWY_TARGET == HWY_SCALAR || HWY_IS_TSAN
+#if HWY_TARGET == HWY_SCALAR || BOCST_IS_TSAN
   // One by one, as ThreadSanitizer can follow it, too.
   constexpr int kCorner[4] = {0, 1, SupportTable::kRow, SupportTable::kRow + 1};
   alignas(64) float values[8];
@@ -335,7 +340,7 @@ Hulls hullsWithoutLock(const OpenHull& a, const S* X_WA, const OpenHull& b, cons
   const auto ask = [&](const tree::Outline::Reader&) {
     hulls = HWY_DYNAMIC_DISPATCH(HullsBetween)(a.supports, b.supports,
                                                between(a.supports, X_WA, b.supports, X_WB, static_cast<float>(margin)));
-#if !HWY_IS_TSAN  // which does not know fences; there, each value is acquired
+#if !BOCST_IS_TSAN  // which does not know fences; there, each value is acquired
     std::atomic_thread_fence(std::memory_order_acquire);
 #endif
     return true;
