@@ -273,7 +273,9 @@ TEST_P(Separation, HullsNearEachOtherAreClose) {
   EXPECT_EQ(at(0.9999 * extent), Hulls::kClose);
   EXPECT_EQ(at(0.9 * extent), Hulls::kShallow);
   EXPECT_EQ(at(0.1 * extent), Hulls::kMeet);
-  TreeWalk walk(TreeSide(a.tree), TreeSide(b.tree), apartBy(a, b, Eigen::Matrix3d::Identity(), 1, {8 * 65536, 0, 0}));
+  const TreeSide side_a(a.tree), side_b(b.tree);
+  const SimilarityTransform far_apart = apartBy(a, b, Eigen::Matrix3d::Identity(), 1, {8 * 65536, 0, 0});
+  TreeWalk walk(side_a, side_b, far_apart);
   EXPECT_TRUE(walk.isNeedless(Hulls::kUnknown));
   EXPECT_TRUE(walk.isNeedless(Hulls::kClose));
   EXPECT_FALSE(walk.isNeedless(Hulls::kShallow));
