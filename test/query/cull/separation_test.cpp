@@ -259,6 +259,13 @@ TEST_P(Separation, UnitsBeyondFloatSayNothing) {
     EXPECT_NE(hullsAt<double>(a, here, b, here, 0), Hulls::kApart) << exponent;
     EXPECT_NE(hullsAt<double>(b, here, a, here, 0), Hulls::kApart) << exponent;
   }
+  // The smallest number that a float holds is the unit of one, and 1.4 times that, which it rounds down, of the other.
+  const double half = 32768 * static_cast<double>(std::numeric_limits<float>::denorm_min());
+  const Vector3d corner = Vector3d::Constant(half);
+  const Side a(test::box(-corner, corner)), b(test::box(-1.4 * corner, 1.4 * corner));
+  Eigen::Isometry3d there = Eigen::Isometry3d::Identity();
+  there.translation().x() = 2.39 * half;
+  EXPECT_NE(hullsAt<double>(a, Eigen::Isometry3d::Identity(), b, there, 0), Hulls::kApart);
 }
 
 // Hulls between the two rounding margins are left to areSeparate(); those that overlap clearly are not.
