@@ -324,11 +324,10 @@ Between between(const SupportTable& a, const S* X_WA, const SupportTable& b, con
   constexpr float kSide = 2.0f * static_cast<float>(lattice::kMiddle);
   const float slack = 2e-4f * (distance + 2 * (far * per_unit + kSide * (1 + g.scale)));
   g.tolerance = 1.001f * margin * per_unit + slack;
-  // A smaller unit has lost digits as a float, or the inverse of a larger one. With more slack, only areSeparate() can
-  // tell hulls apart that are near each other.
-  const auto has_digits = [](float unit) { return unit > 1e-30f && unit < 1e30f; };
+  // With more slack, only areSeparate() can tell hulls apart that are near each other. Nor is it less where a unit or
+  // its inverse is no float: then the scale is 0 or no number.
   const bool is_sharp = slack < 0.02f * kSide * std::min(1.0f, g.scale);
-  g.orthogonality_error = is_sharp && has_digits(a.unit()) && has_digits(b.unit()) ? 0.0f : 1.0f;
+  g.orthogonality_error = is_sharp ? 0.0f : 1.0f;
   return g;
 }
 
