@@ -55,7 +55,7 @@ if(BOCST_BUILD_TOOLS)
   # library that is built with them.
   set(run_documents Python3::Interpreter ${CMAKE_CURRENT_SOURCE_DIR}/documents/run.py ${PROJECT_SOURCE_DIR} ${PROJECT_BINARY_DIR})
   set(planners ${PROJECT_SOURCE_DIR}/share/doc/planners.md)
-  file(GLOB documents CONFIGURE_DEPENDS ${PROJECT_SOURCE_DIR}/share/doc/*.md)
+  file(GLOB documents CONFIGURE_DEPENDS ${PROJECT_SOURCE_DIR}/share/doc/*.md ${PROJECT_SOURCE_DIR}/share/examples/*/README.md)
   list(REMOVE_ITEM documents ${planners})
   if(NOT BOCST_SANITIZE)
     add_test(NAME documents COMMAND ${run_documents} ${PROJECT_SOURCE_DIR}/README.md ${PROJECT_SOURCE_DIR}/CHANGELOG.md ${documents})
