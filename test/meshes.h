@@ -97,6 +97,19 @@ inline Raw plate(std::size_t n) {
   return raw;
 }
 
+/// A pipe whose triangles run from end to end: a leaf has few, and each pair of leaves takes long.
+inline Raw pipe(std::size_t sectors) {
+  Raw raw;
+  for (std::size_t i = 0; i < sectors; ++i) {
+    const double angle = 2 * std::acos(-1.0) * static_cast<double>(i) / static_cast<double>(sectors);
+    for (const double z : {-1.0, 1.0}) raw.vertices.emplace_back(0.1 * std::cos(angle), 0.1 * std::sin(angle), z);
+    const std::size_t j = (i + 1) % sectors;
+    raw.triangles.emplace_back(2 * i, 2 * j, 2 * i + 1);
+    raw.triangles.emplace_back(2 * j, 2 * j + 1, 2 * i + 1);
+  }
+  return raw;
+}
+
 /// The surface of a box.
 inline Raw box(const Eigen::Vector3d& lo, const Eigen::Vector3d& hi) {
   Raw raw;

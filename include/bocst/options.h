@@ -81,11 +81,12 @@ struct Options {
   /// the edges and 12 to 40 bytes per triangle.
   bool solid = false;
 
-  /// A thread that all models of the process share builds the whole tree while the model's first queries run. If
-  /// false, one of those queries builds it and takes longer. A query that expands nodes may wait for that thread some
-  /// tens of microseconds. If the process forks while the thread builds a model, the child cannot query that model. No
-  /// effect with conservative answers, with a memory budget, for more than 178 million triangles, or with an oracle
-  /// other than kCpu and kAuto.
+  /// A thread that all models of the process share builds the whole tree while the model's first queries run, and later
+  /// the oriented boxes and the probes that queries need (share/doc/how-it-works.md). If false, one of those queries
+  /// builds each of these and takes longer. A query still builds oriented boxes itself if it would take much longer
+  /// without them. A query that expands nodes may wait for that thread some tens of microseconds. If the process forks
+  /// while the thread builds a model, the child cannot query that model. No effect with conservative answers, with a
+  /// memory budget, for more than 178 million triangles, or with an oracle other than kCpu and kAuto.
   bool build_ahead = false;
 
   PaperOptions paper;  ///< For experiments.

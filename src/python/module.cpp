@@ -129,7 +129,8 @@ constexpr std::pair<const char*, const char*> kOptionTexts[] = {
     {"solid",
      "a watertight, consistently oriented mesh also collides with geometries that are "
      "completely inside it."},
-    {"build_ahead", "a thread that all models share builds the tree while the first queries run."}};
+    {"build_ahead",
+     "a thread that all models share builds the tree while the first queries run, and later what else they need."}};
 
 void bindOptions(py::module_& m) {
   std::string text = "How a model expands its tree, answers queries and drops nodes. Fixed when the model is made.\n\n";

@@ -50,22 +50,35 @@ class Rent {
 };
 
 /// A structure beside a tree's nodes that is built once walks have paid for it, and dropped like a branch. Threads: as
-/// Published; times of use and rent from any thread.
+/// Published; times of use, rent and isAwaited() from any thread.
 template <typename T>
 class OnDemand {
  public:
   const T* seen() const { return value_.seen(); }
   void markUsed(std::int64_t now) const { markUsedAt(last_use_, now); }
   std::int64_t lastUse() const { return last_use_.load(std::memory_order_relaxed); }
+  /// Another thread was asked to build it.
+  bool isAwaited() const { return is_awaited_.load(std::memory_order_relaxed); }
 
   // For the writer.
 
   explicit operator bool() const { return static_cast<bool>(value_); }
   std::size_t bytes() const { return value_ ? value_->bytes() : 0; }
   void set(std::unique_ptr<const T> value) { value_.set(std::move(value)); }
+  /// Drops what there is. The price is that of building it.
+  void start(std::size_t price) {
+    price_ = price;
+    drop();
+  }
   void drop() {
     value_.reset();
-    rent.restart();
+    is_awaited_ = false;
+    rent.start(price_);
+  }
+  /// Another thread builds it. It is due again when walks have paid so many times its price.
+  void await(std::size_t times) {
+    is_awaited_ = true;
+    rent.start(times * price_);
   }
   void leak() { value_.leak(); }
 
@@ -74,6 +87,8 @@ class OnDemand {
  private:
   thread::Published<const T> value_;
   mutable std::atomic<std::int64_t> last_use_{0};
+  std::atomic<bool> is_awaited_{false};
+  std::size_t price_ = 0;
 };
 
 }  // namespace bocst::tree

@@ -95,12 +95,10 @@ void Tree::reset(std::shared_ptr<const Mesh> mesh) {
   surface_ = surfaceOf(std::move(mesh), options_);
   // A triangle's share of building oriented boxes takes as long as this many pairs of leaves.
   constexpr std::size_t kLeafPairsPerTriangle = 4;
-  boxes_.drop();
-  boxes_.rent.start(kLeafPairsPerTriangle * surface_.triangle_count);
+  boxes_.start(kLeafPairsPerTriangle * surface_.triangle_count);
   // Probes spare about half of the walks that find contact; one takes as long as the share of 32 triangles.
   constexpr std::size_t kTrianglesPerWalk = 16, kLeastWalks = 24;
-  interior_.drop();
-  interior_.rent.start(kLeastWalks + surface_.triangle_count / kTrianglesPerWalk);
+  interior_.start(kLeastWalks + surface_.triangle_count / kTrianglesPerWalk);
   radius_ = -1;
   nodes_.root_bounds = bounds::NodeBounds();
   const Eigen::AlignedBox3d box = surface_.latticeBounds();
@@ -130,47 +128,8 @@ const std::vector<Eigen::Vector3d>& Tree::componentPoints() const {
   return *component_points_.seen();
 }
 
-const BoxTree& Tree::boxes(std::int64_t now) {
-  boxes_.markUsed(now);
-  if (const BoxTree* known = boxes_.seen()) return *known;
-  const std::lock_guard<thread::ForkAwareMutex> lock(growth_);
-  if (!boxes_) {
-    boxes_.set(std::make_unique<const BoxTree>(surface_));
-    countBytes();
-  }
-  return *boxes_.seen();
-}
-
-bool Tree::buildBoxes(std::int64_t now) {
-  try {
-    boxes(now);
-    return true;
-  } catch (const std::bad_alloc&) {
-    boxes_.rent.restart();
-    return false;
-  }
-}
-
 bool Tree::affordsBoxes() const {
   return options_.memory_budget == 0 || BoxTree::bytesOf(surface_.triangle_count) <= options_.memory_budget / 2;
-}
-
-void Tree::payInterior(std::int64_t now) {
-  const std::size_t budget = options_.memory_budget;
-  if (interior_.seen() != nullptr || surface_.mesh == nullptr) return;
-  if (budget != 0 && Interior::mostBytesOf(surface_.triangle_count) > budget / 2) return;
-  interior_.rent.pay(1);
-  if (interior_.rent.left() > 0) return;
-  const std::unique_lock<thread::ForkAwareMutex> lock(growth_, std::try_to_lock);
-  if (!lock.owns_lock() || interior_) return;
-  try {
-    interior_.set(std::make_unique<const Interior>(*surface_.mesh, surface_.lattice));
-  } catch (const std::bad_alloc&) {
-    interior_.rent.restart();  // walks go on without it; tried again when they have paid again
-    return;
-  }
-  interior_.markUsed(now);
-  countBytes();
 }
 
 std::shared_ptr<const Mesh> Tree::mesh() const {

@@ -119,14 +119,16 @@ class Tree {
   /// Oriented boxes of all triangles in double, for exact answers where the boxes of blocks separate too little: they
   /// are as thin as the surface. Built when first asked for, and dropped like a branch. @throws std::bad_alloc.
   const BoxTree& boxes(std::int64_t now);
-  /// The same; false where there is no memory for them, and walks must pay for them again.
+  /// Builds them, or leaves that to the helper thread (Options::build_ahead). False while there are none, and where
+  /// there is no memory for them: then walks must pay for them again.
   bool buildBoxes(std::int64_t now);
   /// Null unless they are built.
   const BoxTree* knownBoxes() const { return boxes_.seen(); }
   /// They would not take most of the memory budget.
   bool affordsBoxes() const;
-  /// How many pairs of leaves long walks still test before boxes() pays; 0 if it is built.
-  std::size_t boxPrice() const { return knownBoxes() != nullptr ? 0 : boxes_.rent.left(); }
+  /// How many pairs of leaves long walks still test before boxes() pays; 0 if it is built, or the helper thread was
+  /// asked for it.
+  std::size_t boxPrice() const { return knownBoxes() != nullptr || boxes_.isAwaited() ? 0 : boxes_.rent.left(); }
   /// Adds pairs of leaves that a long walk has tested.
   void payBoxRent(std::size_t pairs) const { boxes_.rent.pay(pairs); }
 
@@ -137,8 +139,8 @@ class Tree {
     if (known != nullptr) interior_.markUsed(now);
     return known;
   }
-  /// A walk has found that the surface touches another one. Builds interior() once such walks have taken about twice as
-  /// long as that does, if there is memory.
+  /// A walk has found that the surface touches another one. Builds interior(), or has the helper thread do it, once
+  /// such walks have taken about twice as long as that does, if there is memory.
   void payInterior(std::int64_t now);
 
   /// How the last long search of a kind ended: over oriented boxes or over blocks, so many times in a row, and after
@@ -246,7 +248,7 @@ class Tree {
   void afterQuery(std::int64_t now);
 
  private:
-  struct AheadBuild;
+  struct Ahead;
   class BuildMemory;
   /// Where a block of a build goes: below a node; and its index, once it is added.
   struct BulkPlace {
@@ -273,10 +275,15 @@ class Tree {
   bool fitsBuild() const;
   void startRent();
   bool buildsAhead() const;
-  void askForAheadBuild();
+  template <typename Job>
+  void runAhead(const Job& job);
+  template <typename T>
+  bool isLeftToHelper(OnDemand<T> Tree::*structure);
+  template <typename T>
+  bool provide(OnDemand<T> Tree::*structure);
   void leakPools();
   void dropNodeTable();
-  static void buildAhead(AheadBuild& ahead);
+  static void buildAhead(Ahead& ahead, std::int64_t asked);
   void growRoot();
   void growFromGrid(NodeRef node);
   bool growInBulk(NodeRef node, std::vector<std::uint32_t>& ids);
@@ -362,7 +369,7 @@ class Tree {
   mutable std::atomic<std::size_t> noted_count_{0};
   mutable std::array<std::atomic<std::uint32_t>, kMostNoted> noted_;
   bool is_whole_ = false;  // it was built, and nothing of it was dropped since; under growth_ or alone
-  std::shared_ptr<AheadBuild> ahead_build_;
+  std::shared_ptr<Ahead> ahead_;
   std::uint64_t generation_ = 0;  // of nodes_: indices of blocks are of one generation
   NodeStore nodes_;
   NodeTable node_table_;                   // of a generation; under growth_

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: BSD-3-Clause
-// Growth in bulk: what is below a node at once, and the whole tree, by a query or ahead of queries by the helper
-// thread.
+// Growth in bulk: what is below a node at once, the whole tree, and the structures beside it, by a query or ahead of
+// queries by the helper thread.
 #include <algorithm>
 #include <chrono>
 #include <exception>
@@ -83,18 +83,27 @@ class Tree::BuildMemory {
   const std::size_t triangles_;
 };
 
-/// A build by the helper thread: it and the tree share this, as either may end first.
-struct Tree::AheadBuild {
+/// The helper thread and the tree share this, as either may end first.
+struct Tree::Ahead {
   thread::ForkAwareMutex mutex;  // of `tree`
   Tree* tree;                    // null when the tree is gone
-  std::int64_t asked;            // by Options::clock, which the helper thread does not call; under the tree's growth_
+
+  /// Calls f(tree), which may publish, and returns what it returns; false if the tree is gone.
+  template <typename F>
+  bool withTree(F&& f) {
+    const std::lock_guard<thread::ForkAwareMutex> exists(mutex);
+    if (tree == nullptr) return false;
+    const std::shared_lock<thread::ShardedLock> query(tree->query_lock_);
+    const std::lock_guard<thread::ForkAwareMutex> growth(tree->growth_);
+    return f(*tree);
+  }
 };
 
 Tree::~Tree() {
   try {
-    if (ahead_build_ != nullptr) {
-      const std::lock_guard<thread::ForkAwareMutex> lock(ahead_build_->mutex);
-      ahead_build_->tree = nullptr;
+    if (ahead_ != nullptr) {
+      const std::lock_guard<thread::ForkAwareMutex> lock(ahead_->mutex);
+      ahead_->tree = nullptr;
     }
     const std::shared_lock<thread::ShardedLock> query(query_lock_);
     const std::unique_lock<thread::ForkAwareMutex> growth(growth_, std::try_to_lock);
@@ -179,7 +188,8 @@ bool Tree::buildNow() {
   if (is_ahead_build_due_) {
     is_ahead_build_due_ = false;
     rent_.setPrice(surface_.triangle_count * kRentAhead);
-    askForAheadBuild();
+    // The helper thread does not call Options::clock.
+    runAhead([asked = now()](Ahead& ahead) { buildAhead(ahead, asked); });
     return false;
   }
   try {
@@ -225,16 +235,17 @@ void Tree::growWhole() {
   countBytes();
 }
 
-void Tree::askForAheadBuild() {
+// Calls job(Ahead&) in the helper thread. Under growth_.
+template <typename Job>
+void Tree::runAhead(const Job& job) {
   try {
-    if (ahead_build_ == nullptr) {
-      ahead_build_ = std::make_shared<AheadBuild>();
-      ahead_build_->tree = this;
+    if (ahead_ == nullptr) {
+      ahead_ = std::make_shared<Ahead>();
+      ahead_->tree = this;
     }
-    ahead_build_->asked = now();
-    thread::runInHelperThread([build = ahead_build_] {
+    thread::runInHelperThread([ahead = ahead_, job] {
       try {
-        buildAhead(*build);
+        job(*ahead);
       } catch (const std::exception&) {
         // Without memory for it, or in a child after fork(): queries build what they need.
       }
@@ -245,19 +256,16 @@ void Tree::askForAheadBuild() {
 }
 
 // In the helper thread: builds from the mesh alone, then adds the blocks in parts between which queries grow the tree.
-void Tree::buildAhead(AheadBuild& ahead) {
+void Tree::buildAhead(Ahead& ahead, std::int64_t asked) {
   std::unique_ptr<oracle::Surface> surface;
   std::uint64_t generation = 0;
   // Calls f(tree) unless the tree is gone, or is another by now, or was built by a query. Returns whether it did.
   const auto withTree = [&](auto&& f) {
-    const std::lock_guard<thread::ForkAwareMutex> exists(ahead.mutex);
-    if (ahead.tree == nullptr) return false;
-    Tree& tree = *ahead.tree;
-    const std::shared_lock<thread::ShardedLock> query(tree.query_lock_);
-    const std::lock_guard<thread::ForkAwareMutex> growth(tree.growth_);
-    if (tree.rent_.isStopped() || (surface != nullptr && tree.generation_ != generation)) return false;
-    f(tree);
-    return true;
+    return ahead.withTree([&](Tree& tree) {
+      if (tree.rent_.isStopped() || (surface != nullptr && tree.generation_ != generation)) return false;
+      f(tree);
+      return true;
+    });
   };
   const bool is_wanted = withTree([&](Tree& tree) {
     surface.reset(new oracle::Surface{tree.surface_.mesh, tree.surface_.lattice});
@@ -276,8 +284,7 @@ void Tree::buildAhead(AheadBuild& ahead) {
   const auto lastUse = [&](const Tree& tree) {
     const ChildRef root = tree.root_.load(std::memory_order_relaxed);
     const bool is_block = root.tag() == ChildRef::kBlock;
-    return std::max(ahead.asked,
-                    is_block ? tree.nodes_.last_use[root.index()].load(std::memory_order_relaxed) : ahead.asked);
+    return std::max(asked, is_block ? tree.nodes_.last_use[root.index()].load(std::memory_order_relaxed) : asked);
   };
   std::vector<BulkPlace> places;
   startPlaces(bulk, NodeRef(), places);
@@ -300,6 +307,93 @@ void Tree::buildAhead(AheadBuild& ahead) {
     tree.publishWhole(bulk, places);
     tree.countBytes();
   });
+}
+
+namespace {
+
+template <typename T>
+std::unique_ptr<const T> makeOf(const oracle::Surface& surface) {
+  if constexpr (std::is_same<T, Interior>::value) {
+    return std::make_unique<const T>(*surface.mesh, surface.lattice);
+  } else {
+    return std::make_unique<const T>(surface);
+  }
+}
+
+}  // namespace
+
+// True if queries go on without a structure that they have paid for, because the helper thread builds it. Under
+// growth_.
+template <typename T>
+bool Tree::isLeftToHelper(OnDemand<T> Tree::*structure) {
+  // The thread may be busy; a query that needs the structure must not go on without it for ever.
+  constexpr std::size_t kTimesPaid = 4;
+  if (!buildsAhead()) return false;
+  if ((this->*structure).isAwaited()) return (this->*structure).rent.left() > 0;
+  (this->*structure).await(kTimesPaid);
+  runAhead([structure](Ahead& ahead) {
+    std::unique_ptr<const oracle::Surface> surface;
+    const bool is_wanted = ahead.withTree([&](Tree& tree) {
+      if (tree.*structure || !(tree.*structure).isAwaited() || tree.surface_.mesh == nullptr) return false;
+      surface.reset(new oracle::Surface{tree.surface_.mesh, tree.surface_.lattice});
+      return true;
+    });
+    if (!is_wanted) return;
+    std::unique_ptr<const T> made = makeOf<T>(*surface);
+    ahead.withTree([&](Tree& tree) {
+      if (tree.*structure || tree.surface_.mesh != surface->mesh) return false;
+      (tree.*structure).set(std::move(made));
+      tree.countBytes();
+      return true;
+    });
+  });
+  return true;
+}
+
+// Builds a structure that queries have paid for, if it is not left to the helper thread and there is memory; true if it
+// is there. Under growth_.
+template <typename T>
+bool Tree::provide(OnDemand<T> Tree::*structure) {
+  if (this->*structure) return true;
+  if (isLeftToHelper(structure)) return false;
+  try {
+    (this->*structure).set(makeOf<T>(surface_));
+  } catch (const std::bad_alloc&) {
+    (this->*structure).rent.restart();  // queries go on without it, and try again when they have paid again
+    return false;
+  }
+  countBytes();
+  return true;
+}
+
+const BoxTree& Tree::boxes(std::int64_t now) {
+  boxes_.markUsed(now);
+  if (const BoxTree* known = boxes_.seen()) return *known;
+  const std::lock_guard<thread::ForkAwareMutex> lock(growth_);
+  if (!boxes_) {
+    boxes_.set(makeOf<BoxTree>(surface_));
+    countBytes();
+  }
+  return *boxes_.seen();
+}
+
+bool Tree::buildBoxes(std::int64_t now) {
+  boxes_.markUsed(now);
+  if (boxes_.seen() != nullptr) return true;
+  const std::lock_guard<thread::ForkAwareMutex> lock(growth_);
+  return provide(&Tree::boxes_);
+}
+
+void Tree::payInterior(std::int64_t now) {
+  const std::size_t budget = options_.memory_budget;
+  if (interior_.seen() != nullptr || surface_.mesh == nullptr) return;
+  if (budget != 0 && Interior::mostBytesOf(surface_.triangle_count) > budget / 2) return;
+  interior_.rent.pay(1);
+  if (interior_.rent.left() > 0) return;
+  const std::unique_lock<thread::ForkAwareMutex> lock(growth_, std::try_to_lock);
+  if (!lock.owns_lock()) return;
+  interior_.markUsed(now);
+  provide(&Tree::interior_);
 }
 
 // Below `node`.

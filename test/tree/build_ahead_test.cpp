@@ -5,8 +5,11 @@
 #include <sys/wait.h>
 #include <unistd.h>
 
+#include <algorithm>
 #include <chrono>
+#include <cmath>
 #include <future>
+#include <memory>
 #include <random>
 #include <shared_mutex>
 #include <thread>
@@ -59,6 +62,35 @@ bool comesTrue(const Condition& condition) {
   return true;
 }
 
+/// Keeps the helper thread from its next jobs until go(), or its own end.
+class BusyThread {
+ public:
+  BusyThread() {
+    thread::runInHelperThread([busy = go_.get_future().share()] { busy.wait(); });
+  }
+  ~BusyThread() {
+    if (is_busy_) go();
+  }
+  BusyThread(const BusyThread&) = delete;
+  BusyThread& operator=(const BusyThread&) = delete;
+
+  void go() {
+    is_busy_ = false;
+    go_.set_value();
+  }
+  /// Waits until all jobs are done.
+  void finish() {
+    go();
+    std::promise<void> done;
+    thread::runInHelperThread([&done] { done.set_value(); });
+    done.get_future().wait();
+  }
+
+ private:
+  std::promise<void> go_;
+  bool is_busy_ = true;
+};
+
 const fcl::Transform3d kHit = at(1.3, 0.2, 0.1), kMiss = at(9, 0, 0);
 
 TEST(BuildAhead, TwoQueriesAreEnough) {
@@ -83,8 +115,7 @@ TEST(BuildAhead, TwoQueriesAreEnough) {
 }
 
 TEST(BuildAhead, AQueryBuildsTheTreeIfTheThreadIsBusyAndTheThreadDoesNotBuildItAgain) {
-  std::promise<void> go;
-  thread::runInHelperThread([busy = go.get_future().share()] { busy.wait(); });
+  BusyThread thread;
   const std::shared_ptr<const Mesh> mesh = test::torus(60).mesh();
   const Modeld a(mesh, options(true)), b(mesh, options(true));
   for (int i = 0; i < 3; ++i) contacts(a, b, kHit, 1);
@@ -92,18 +123,14 @@ TEST(BuildAhead, AQueryBuildsTheTreeIfTheThreadIsBusyAndTheThreadDoesNotBuildItA
   for (int i = 0; i < 5000 && !(isWhole(a) && isWhole(b)); ++i) contacts(a, b, at(1.3, 1e-4 * i, 0.1), 1);
   EXPECT_TRUE(isWhole(a) && isWhole(b));
   const std::size_t built_a = a.statistics().built_triangles, built_b = b.statistics().built_triangles;
-  go.set_value();
-  std::promise<void> done;
-  thread::runInHelperThread([&done] { done.set_value(); });
-  done.get_future().wait();
+  thread.finish();
   EXPECT_EQ(a.statistics().built_triangles, built_a);
   EXPECT_EQ(b.statistics().built_triangles, built_b);
 }
 
 // Its blocks are as old as the last query, not as the request for the thread.
 TEST(BuildAhead, WhatTheThreadBuildsLateDoesNotDecayAtOnce) {
-  std::promise<void> go;
-  thread::runInHelperThread([busy = go.get_future().share()] { busy.wait(); });
+  BusyThread thread;
   Clock::time_point now(std::chrono::hours(1));
   Options o = options(true);
   o.ttl = std::chrono::milliseconds(100);
@@ -115,7 +142,7 @@ TEST(BuildAhead, WhatTheThreadBuildsLateDoesNotDecayAtOnce) {
     now += std::chrono::milliseconds(60);
   }
   EXPECT_FALSE(isWhole(a) || isWhole(b)) << "so the thread was asked";
-  go.set_value();
+  thread.go();
   ASSERT_TRUE(comesTrue([&] { return isWhole(a) && isWhole(b); }));
   const Statistics before = a.statistics();
   contacts(a, b, kHit, 1);
@@ -221,6 +248,105 @@ TEST(BuildAhead, ThreadsAskMeanwhile) {
     });
     ASSERT_EQ(wrong, 0);
   }
+}
+
+// Structures beside the nodes, which queries pay for.
+
+const tree::Tree& treeOf(const Modeld& m) { return fcl_adapter::treeOf(m); }
+
+/// Two pipes of slivers that cross each other with a gap that boxes along the axes do not see: a query pays for
+/// oriented boxes.
+bool pipesMeet(const Modeld& a, const Modeld& b, double gap) {
+  const Eigen::Vector3d axis(std::cos(0.7), std::sin(0.7), 0);
+  const Eigen::Matrix3d R = Eigen::AngleAxisd(0.5, axis).toRotationMatrix();
+  return !contacts(a, b, test::pose<double>(R, (0.2 + gap) * axis), 1).empty();
+}
+
+bool haveBoxes(const Modeld& a, const Modeld& b) {
+  return treeOf(a).knownBoxes() != nullptr && treeOf(b).knownBoxes() != nullptr;
+}
+
+/// Asks until both have asked the helper thread for oriented boxes.
+void askForBoxes(const Modeld& a, const Modeld& b) {
+  const auto asked = [&] { return treeOf(a).boxPrice() == 0 && treeOf(b).boxPrice() == 0; };
+  for (int i = 0; i < 1000 && !asked(); ++i) ASSERT_FALSE(pipesMeet(a, b, 1e-4));
+  ASSERT_TRUE(asked());
+}
+
+TEST(BuildAhead, OrientedBoxesComeFromTheThread) {
+  BusyThread thread;
+  const std::shared_ptr<const Mesh> mesh = test::pipe(256).mesh();
+  Modeld a(mesh, options(true)), b(mesh, options(true));
+  a.buildTree();
+  b.buildTree();
+  askForBoxes(a, b);
+  EXPECT_TRUE(pipesMeet(a, b, -1e-3));
+  EXPECT_FALSE(haveBoxes(a, b)) << "so no query built them";
+  thread.go();
+  EXPECT_TRUE(comesTrue([&] { return haveBoxes(a, b); }));
+  EXPECT_TRUE(pipesMeet(a, b, -1e-3));
+  EXPECT_FALSE(pipesMeet(a, b, 1e-4));
+}
+
+TEST(BuildAhead, AQueryBuildsOrientedBoxesIfTheThreadIsBusy) {
+  BusyThread thread;
+  const std::shared_ptr<const Mesh> mesh = test::pipe(256).mesh();
+  const Modeld a(mesh, options(true)), b(mesh, options(true));
+  for (int i = 0; i < 5000 && !haveBoxes(a, b); ++i) EXPECT_FALSE(pipesMeet(a, b, 1e-4));
+  ASSERT_TRUE(haveBoxes(a, b));
+  const tree::BoxTree* const built = treeOf(a).knownBoxes();
+  thread.finish();
+  EXPECT_EQ(treeOf(a).knownBoxes(), built) << "queries may read them: the thread must leave them";
+}
+
+TEST(BuildAhead, OrientedBoxesOfOldVerticesAreNotUsed) {
+  BusyThread thread;
+  const test::Raw raw = test::pipe(256);
+  Modeld a(raw.mesh(), options(true));
+  const Modeld b(raw.mesh(), options(true));
+  askForBoxes(a, b);
+  a.updateVertices(test::Raw(raw).scale(0.5).vertices);
+  EXPECT_GT(treeOf(a).boxPrice(), 0u) << "queries pay anew";
+  thread.finish();
+  EXPECT_EQ(treeOf(a).knownBoxes(), nullptr);
+  EXPECT_NE(treeOf(b).knownBoxes(), nullptr);
+}
+
+// They change while the thread builds.
+TEST(BuildAhead, OrientedBoxesOfVerticesThatChangeMeanwhileAreNotUsed) {
+  const test::Raw raw = test::pipe(1024);
+  std::mt19937_64 g(14);
+  for (int round = 0; round < test::repetitions(30); ++round) {
+    Modeld a(raw.mesh(), options(true));
+    const Modeld b(raw.mesh(), options(true));
+    BusyThread thread;
+    askForBoxes(a, b);
+    thread.go();
+    std::this_thread::sleep_for(std::chrono::microseconds(g() % 3000));
+    a.updateVertices(test::Raw(raw).scale(0.5).vertices);
+    BusyThread().finish();
+    ASSERT_EQ(treeOf(a).knownBoxes(), nullptr) << round;
+  }
+}
+
+TEST(BuildAhead, ProbesComeFromTheThread) {
+  BusyThread thread;
+  const std::shared_ptr<const Mesh> mesh = test::torus(40).mesh();
+  const Modeld a(mesh, options(true)), b(mesh, options(true)), c(mesh, options(false)), d(mesh, options(false));
+  const std::vector<fcl::Transform3d> poses(600, at(1.3, 0.2, 0.1));
+  const auto hits = [&](const Modeld& p, const Modeld& q) {
+    std::vector<std::uint8_t> hit(poses.size());
+    collidePoses(p, q, poses.data(), poses.size(), hit.data(), 1);
+    return std::count(hit.begin(), hit.end(), 1);
+  };
+  const auto known = [](const Modeld& m) { return treeOf(m).interior(0) != nullptr; };
+  EXPECT_EQ(hits(a, b), 600);
+  EXPECT_EQ(hits(c, d), 600);
+  EXPECT_TRUE(known(c) && known(d)) << "so these queries have paid";
+  EXPECT_FALSE(known(a) || known(b));
+  thread.go();
+  EXPECT_TRUE(comesTrue([&] { return known(a) && known(b); }));
+  EXPECT_EQ(hits(a, b), 600);
 }
 
 // A child makes models of its own; those of its parent, which may be half built, end without a wait.

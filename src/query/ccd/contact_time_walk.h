@@ -551,7 +551,7 @@ double findContactTime(const TreeSide& a, const SimilarityTransform& a_in_body, 
     time = trees.run(goal, time, turns.most(), begin);
     turns.tookOverBlocks(trees.steps(), trees.gaveUp());
     if (!trees.gaveUp()) return time;
-    if (!buildBoxes(a) || !buildBoxes(b)) return trees.run(goal, time, kNoLimit, begin);
+    if (!provideBoxes(a, b)) continue;
     const BoxSide boxes_a(a);
     const auto& boxes_b = boxesOf(b);
     ContactTimeWalk<BoxSide, std::decay_t<decltype(boxes_b)>> boxes(boxes_a, a_in_body, motion_a, boxes_b, b_in_body,

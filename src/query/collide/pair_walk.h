@@ -461,7 +461,7 @@ bool walkByTurns(const TreeSide& a, const B& b, const SimilarityTransform& b_in_
     const WalkEnd blocks = walk_blocks(turns.most());
     turns.tookOverBlocks(blocks.steps, blocks.gave_up);
     if (!blocks.gave_up) return blocks.met;
-    if (!buildBoxes(a) || !buildBoxes(b)) return walk_blocks(kNoLimit).met;
+    if (!provideBoxes(a, b)) continue;
     const BoxSide boxes_a(a);
     const auto& boxes_b = boxesOf(b);
     PairWalk<BoxSide, std::decay_t<decltype(boxes_b)>> walk_boxes(boxes_a, boxes_b, b_in_a, visitor);

@@ -471,7 +471,7 @@ Nearest findNearest(const TreeSide& a, const B& b, const SimilarityTransform& b_
     nearest = trees.run(goal, nearest, turns.most());
     turns.tookOverBlocks(trees.steps(), trees.gaveUp());
     if (!trees.gaveUp()) return nearest;
-    if (!buildBoxes(a) || !buildBoxes(b)) return trees.run(goal, nearest);
+    if (!provideBoxes(a, b)) continue;
     const BoxSide boxes_a(a);
     const auto& boxes_b = boxesOf(b);
     DistanceWalk<BoxSide, std::decay_t<decltype(boxes_b)>> boxes(boxes_a, boxes_b, b_in_a);

@@ -19,7 +19,7 @@ class BoxSide : public CompleteSide {
 
   static bool fits(const TreeSide& side) { return !side.isConservative() && side.tree().affordsBoxes(); }
 
-  /// Builds a model's boxes if it has none. False without memory for them: then walks over blocks go on.
+  /// Builds a model's boxes if it has none. False without memory for them, or while the helper thread builds them.
   static bool build(const TreeSide& side) { return side.tree().buildBoxes(side.now()); }
 
   explicit BoxSide(const TreeSide& side) : side_(side), boxes_(side.tree().boxes(side.now())) {}
@@ -92,6 +92,13 @@ const Side& boxesOf(const Side& side) {
 template <typename Side>
 const tree::Tree* treeOf(const Side&) {
   return nullptr;
+}
+
+/// Builds what walks over boxes need; false while they must go on over blocks.
+template <typename B>
+bool provideBoxes(const TreeSide& a, const B& b) {
+  const bool first = buildBoxes(a), second = buildBoxes(b);
+  return first && second;
 }
 
 /// True if two models have oriented boxes, and those of the roots are apart.
