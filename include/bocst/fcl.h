@@ -113,9 +113,9 @@ BOCST_EXPORT std::size_t collide(const fcl::CollisionGeometry<S>* o1, const fcl:
 /// Does nothing if request.isSatisfied(result) is already true.
 ///
 /// Pairs are those of collide(); an octree consists of its occupied cells. Geometries that touch are at distance 0, up
-/// to rounding (guarantees.md). A model is a surface: the distance of a geometry completely inside it is that between
-/// the surfaces. If the model is solid, it is 0, and the nearest points are not those of a contact. Shapes and cells
-/// are solid. Margins have no effect. An octree without occupied cells leaves the result unchanged.
+/// to rounding (share/doc/rounding.md). A model is a surface: the distance of a geometry completely inside it is that
+/// between the surfaces. If the model is solid, it is 0, and the nearest points are not those of a contact. Shapes and
+/// cells are solid. Margins have no effect. An octree without occupied cells leaves the result unchanged.
 /// - o1, o2, b1, b2, nearest_points: in the caller's order. Ids are as in collide(), but DistanceResult::NONE for
 ///   shapes. The points (with enable_nearest_points) are on the surfaces or spheres, in the world frame. If several
 ///   pairs are equally near, the ids and points of one of them are returned; which one is not defined.

@@ -72,6 +72,7 @@ void Tree::dropTree() {
   countNodes(root_.load(std::memory_order_relaxed), 1, gone);
   pruned_ += std::accumulate(gone.begin(), gone.end(), std::size_t{0});
   is_whole_ = false;
+  is_complete_ = false;
   grid_.reset();
   grid_tried_ = false;
   startRent();
@@ -153,6 +154,7 @@ void Tree::keepOnly(const std::vector<Fate>& fates) {
   const std::size_t count = std::accumulate(gone.begin(), gone.end(), std::size_t{0});
   pruned_ += count;
   is_whole_ = is_whole_ && count == 0 && !is_any_stripped;
+  if (count != 0) is_complete_ = false;
   startGeneration();
   is_stripped_ = is_any_stripped;
 }

@@ -473,6 +473,7 @@ void Tree::updateVertices(std::vector<Eigen::Vector3d> vertices) {
                                 " vertices, but the mesh has " + std::to_string(old.vertexCount()));
   }
   reset(old.withVertices(std::move(vertices)));
+  has_changed_ = true;
 }
 
 Tree::NodeTable Tree::nodeTable() {

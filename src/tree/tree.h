@@ -107,6 +107,13 @@ class Tree {
   /// Builds the whole tree of exact answers, whatever queries have paid; only of a tree that gains by it, in a query.
   void build();
   bool gainsByBuild() const;
+  /// All blocks of the whole tree are there. They stay while a query runs.
+  bool isComplete() const { return is_complete_.load(std::memory_order_acquire); }
+  /// A request for few contacts may build the whole tree: not where that takes long, is often repeated, or has no room.
+  bool isBuiltForFew() const {
+    constexpr std::size_t kMostTriangles = 1 << 18;
+    return gainsByBuild() && options_.memory_budget == 0 && surface_.triangle_count <= kMostTriangles && !has_changed_;
+  }
   /// No more expansions below this node: a single lattice unit, or the collision depth of conservative answers.
   bool isDeepest(int level) const { return level >= deepest_; }
   int deepest() const { return deepest_; }
@@ -368,7 +375,9 @@ class Tree {
   static constexpr std::size_t kMostNoted = 16;
   mutable std::atomic<std::size_t> noted_count_{0};
   mutable std::array<std::atomic<std::uint32_t>, kMostNoted> noted_;
-  bool is_whole_ = false;  // it was built, and nothing of it was dropped since; under growth_ or alone
+  bool is_whole_ = false;                 // it was built, and nothing of it was dropped since; under growth_ or alone
+  std::atomic<bool> is_complete_{false};  // the same, but for corners of leaves
+  bool has_changed_ = false;              // by updateVertices(); changed alone
   std::shared_ptr<Ahead> ahead_;
   std::uint64_t generation_ = 0;  // of nodes_: indices of blocks are of one generation
   NodeStore nodes_;

@@ -11,13 +11,23 @@
 
 #include "conformance/octrees.h"
 #include "conformance/reference.h"
+#include "every_target.h"
+#include "fcl/adapters/models.h"
 #include "geometry/triangle.h"
+#include "tree/tree.h"
 
 namespace bocst {
 namespace {
 
 using Eigen::Vector3d;
 using test::Raw;
+
+// Few contacts of two models with a budget are those of the least position.
+Options byPosition() {
+  Options options;
+  options.memory_budget = std::size_t{1} << 30;
+  return options;
+}
 
 // Position, then ids.
 using Place = std::tuple<double, std::intptr_t, std::intptr_t>;
@@ -30,6 +40,14 @@ std::vector<fcl::Contactd> ask(const fcl::CollisionGeometryd& one, const fcl::Tr
   std::vector<fcl::Contactd> contacts;
   result.getContacts(contacts);
   return contacts;
+}
+
+using Ids = std::vector<std::pair<std::intptr_t, std::intptr_t>>;
+
+Ids idsOf(const std::vector<fcl::Contactd>& contacts) {
+  Ids ids;
+  for (const fcl::Contactd& c : contacts) ids.emplace_back(c.b1, c.b2);
+  return ids;
 }
 
 void takeCorners(const Raw& raw, std::intptr_t t, const fcl::Transform3d& X, query::Corners& corners) {
@@ -133,7 +151,7 @@ TEST(FewContacts, AreThoseOfTheLeastPosition) {
   for (int round = 0; round < 240; ++round) {
     const std::size_t i = g() % raws.size(), j = (i + 1 + g() % (raws.size() - 1)) % raws.size();
     const Raw &one = raws[i], &two = raws[j];
-    const Modeld a(one.mesh()), b(two.mesh());
+    const Modeld a(one.mesh(), byPosition()), b(two.mesh(), byPosition());
     const auto other = test::bvh<fcl::OBBRSSd>(two);
     const auto rotation = [&] { return Eigen::Quaterniond(u(g), u(g), u(g), u(g)).normalized().toRotationMatrix(); };
     const Vector3d at(u(g), u(g), u(g));
@@ -190,7 +208,7 @@ TEST(FewContacts, AreTheFirstOfManyAtHardlyDifferentPositions) {
     for (Raw* raw : {&sheet, &pieces}) {
       for (const double x : {-1.1, 1.1}) raw->addTriangle({x, 0, 0}, {x, 0.01, 0}, {x, 0, 0.01});
     }
-    const Modeld a(sheet.mesh()), b(pieces.mesh());
+    const Modeld a(sheet.mesh(), byPosition()), b(pieces.mesh(), byPosition());
     const auto same = fcl::Transform3d::Identity();
     const fcl::Transform3d X =
         test::pose<double>(Eigen::AngleAxisd(1e-3 * u(g), Vector3d(u(g), u(g), u(g)).normalized()).toRotationMatrix(),
@@ -223,7 +241,7 @@ TEST(FewContacts, OfFlatFacesOnEachOther) {
         grid.triangles.emplace_back(v, v - kSide - 2, v - kSide - 1);
       }
     }
-    const Modeld a(block.mesh()), b(grid.mesh());
+    const Modeld a(block.mesh(), byPosition()), b(grid.mesh(), byPosition()), c(block.mesh()), d(grid.mesh());
     const auto partner = test::bvh<fcl::OBBRSSd>(grid);
     const auto same = fcl::Transform3d::Identity();
     const fcl::Transform3d X =
@@ -234,6 +252,7 @@ TEST(FewContacts, OfFlatFacesOnEachOther) {
       EXPECT_GT(ordered.size(), 100u);
       expectFirst(a, same, b, X, most, ordered, counts);
       expectFirst(a, same, *partner, X, most, ordered, counts);
+      EXPECT_EQ(idsOf(ask(c, same, d, X, most)), idsOf(ask(a, same, b, X, most))) << "no walk in order";
       expectFirst(b, X, a, same, most,
                   places(ask(b, X, a, same, 1000000), grid, same, block, X.inverse(Eigen::Isometry), grid), counts);
     }
@@ -306,5 +325,99 @@ TEST(FewContacts, BesideCellsAndShapes) {
   EXPECT_GT(counts.compared, 200u);
 }
 
+// Of two models whose hulls overlap deeply: those that a walk in order over complete trees finds.
+
+struct DeepPairs {
+  DeepPairs() {
+    std::mt19937_64 g(31);
+    std::uniform_real_distribution<double> u(-1, 1);
+    for (int i = 0; i < 30; ++i) {
+      const Eigen::Quaterniond q(u(g), u(g), u(g), u(g));
+      poses.push_back(test::pose<double>(q.normalized().toRotationMatrix(), 0.7 * Vector3d(u(g), u(g), u(g))));
+    }
+  }
+
+  Ids ask(const Modeld& a, const Modeld& b, std::size_t i, std::size_t most) const {
+    return idsOf(bocst::ask(a, fcl::Transform3d::Identity(), b, poses[i], most));
+  }
+
+  const Raw one = test::torus(40), two = test::torus(23, 0.2);
+  std::vector<fcl::Transform3d> poses;
+};
+
+TEST(FewContacts, OfDeepPairsAreSomeOfAllWhateverHappenedBefore) {
+  const DeepPairs pairs;
+  std::size_t others = 0, asked = 0;
+  for (const std::size_t most : {1, 5, 60}) {
+    const Modeld a(pairs.one.mesh()), b(pairs.two.mesh());
+    const Modeld placed_a(pairs.one.mesh(), byPosition()), placed_b(pairs.two.mesh(), byPosition());
+    for (std::size_t i = 0; i < pairs.poses.size(); ++i) {
+      const Ids few = pairs.ask(a, b, i, most), all = pairs.ask(a, b, i, 1000000);
+      ASSERT_TRUE(std::is_sorted(few.begin(), few.end()));
+      ASSERT_TRUE(std::includes(all.begin(), all.end(), few.begin(), few.end()));
+      ASSERT_EQ(few.size(), std::min(most, all.size()));
+      others += few != pairs.ask(placed_a, placed_b, i, most);
+      ++asked;
+      // Other models: new ones; some that grew by other queries; complete ones; some that lost branches.
+      const Modeld c(pairs.one.mesh()), d(pairs.two.mesh());
+      ASSERT_EQ(pairs.ask(c, d, i, most), few) << i;
+      Modeld e(pairs.one.mesh()), f(pairs.two.mesh());
+      test::touching<double>(e, fcl::Transform3d::Identity(), f, pairs.poses[(i + 1) % pairs.poses.size()]);
+      f.buildTree();
+      ASSERT_EQ(pairs.ask(e, f, i, most), few) << i;
+      Clock::time_point now = Clock::now();
+      for (const int levels : {1, 2, 5}) {
+        for (int k = 0; k < levels; ++k) e.prune(now += std::chrono::hours(1));
+        ASSERT_EQ(pairs.ask(e, f, i, most), few) << i;
+      }
+    }
+  }
+  EXPECT_GT(others, asked / 2) << "so they were not chosen by position";
+}
+
+TEST(FewContacts, OfPairsThatDoNotTouchNeedNoWholeTree) {
+  const DeepPairs pairs;
+  const Modeld a(pairs.one.mesh()), b(Raw(pairs.two).scale(0.2).mesh());
+  const fcl::Transform3d I = fcl::Transform3d::Identity();
+  EXPECT_TRUE(bocst::ask(a, I, b, I, 1).empty()) << "a ring in the hole of another";
+  EXPECT_FALSE(fcl_adapter::treeOf(a).isComplete());
+  const Modeld c(pairs.two.mesh());
+  EXPECT_FALSE(pairs.ask(a, c, 0, 1).empty());
+  EXPECT_TRUE(fcl_adapter::treeOf(a).isComplete());
+}
+
+// Which of the trees are built whole, and which contacts are first, is the same on each instruction set.
+class FewContactsOnTarget : public test::EveryTarget {
+ protected:
+  static std::vector<Ids> answers() {
+    const DeepPairs pairs;
+    const Modeld a(pairs.one.mesh()), b(pairs.two.mesh());
+    std::vector<Ids> found;
+    for (std::size_t i = 0; i < pairs.poses.size(); ++i) {
+      for (const std::size_t most : {1, 5, 60}) found.push_back(pairs.ask(a, b, i, most));
+    }
+    return found;
+  }
+};
+
+TEST_P(FewContactsOnTarget, AreTheSame) {
+  static const std::vector<Ids> expected = answers();
+  EXPECT_EQ(answers(), expected);
+}
+
+INSTANTIATE_TEST_SUITE_P(Targets, FewContactsOnTarget, testing::ValuesIn(test::EveryTarget::targets()),
+                         test::EveryTarget::name);
+
+// What changes in each frame, and what is large, is not built whole for a contact.
+TEST(FewContacts, OfVerticesThatChangedAreThoseOfTheLeastPosition) {
+  const DeepPairs pairs;
+  Modeld a(pairs.one.mesh());
+  const Modeld b(pairs.two.mesh());
+  a.updateVertices(pairs.one.vertices);
+  const Modeld placed_a(pairs.one.mesh(), byPosition()), placed_b(pairs.two.mesh(), byPosition());
+  for (std::size_t i = 0; i < pairs.poses.size(); ++i) {
+    EXPECT_EQ(pairs.ask(a, b, i, 5), pairs.ask(placed_a, placed_b, i, 5)) << i;
+  }
+}
 }  // namespace
 }  // namespace bocst

@@ -55,7 +55,7 @@ class ConvexCollector final : public query::ConvexVisitor<typename Partner::Node
         tolerance_(frame.rounding() + (q.is_distance ? 0 : narrow_phase.tolerance())),
         costs_(costs),
         ends_at_first_(q.endsAtFirst()),
-        is_cut_(!ends_at_first_ && !by_ids && q.contactsLeft() > 0 && q.contactsLeft() <= FirstFound::kMost),
+        is_cut_(!ends_at_first_ && !by_ids && q.contactsLeft() > 0 && q.contactsLeft() <= CollideQuery<S>::kMostOfFew),
         s_(scratch()),
         cut_(order_.startCut()) {
     s_.seen.clear();

@@ -46,6 +46,13 @@ struct CollideQuery : OrderedPair<S> {
     return request.num_max_contacts == 1 && !request.enable_contact && !request.enable_cost && occupied();
   }
 
+  /// Requests for more gather all contacts, and get the first by the ids.
+  static constexpr std::size_t kMostOfFew = 1024;
+  /// Few contacts, of which there may be more: the walk need not find all.
+  bool wantsFew() const {
+    return !endsAtFirst() && contactsLeft() > 0 && contactsLeft() <= kMostOfFew && !request.enable_cost;
+  }
+
   /// Adds a contact if there is room; `contact` (world frame) may be null where contacts are not enabled. True when
   /// nothing more is asked for.
   bool addContact(std::intptr_t b1, std::intptr_t b2, const query::ContactPoint* contact) const {

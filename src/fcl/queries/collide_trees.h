@@ -134,9 +134,12 @@ class TreesCollision {
     if (trees.isNeedless(q_.hulls)) return false;
     if (kUsesBoxes && boxesApart()) return false;
     if (isProved(wanted)) return true;
+    const bool in_order = takesInOrder();
+    if (in_order && !completeTrees()) return false;
     const std::size_t before = q_.result.numContacts();
     std::size_t steps = 0;
     collect(q_, [&](MeshCollector<S>& collector) {
+      if (in_order && walkInOrder(collector)) return;
       if (isWithinMargin(collector)) {
         constexpr std::size_t kMostLeafPairs = 64;
         walkWithinMargin(a_, b_, relative_.b_in_a, near_, collector, kMostLeafPairs,
@@ -152,6 +155,44 @@ class TreesCollision {
     const bool has_missed = !q_.endsAtFirst() && q_.result.numContacts() == before;
     if (kUsesBoxes && has_missed && !(near_.margin > 0)) trees.payForBoxes(steps);
     return false;
+  }
+
+  // Few contacts of trees that can be complete are those that a walk in order finds first, where the hulls overlap
+  // deeply and it does not take long. Only what never changes decides this, so that the same query gets the same
+  // contacts.
+  bool takesInOrder() const {
+    return q_.wantsFew() && q_.margin == 0 && a_.tree().isBuiltForFew() && b_.tree().isBuiltForFew();
+  }
+
+  // True if both trees are complete. If not, builds them where any contact shows that they are needed.
+  bool completeTrees() const {
+    tree::Tree &tree_a = a_.tree(), &tree_b = b_.tree();
+    if (tree_a.isComplete() && tree_b.isComplete()) return true;
+    const fcl::CollisionRequest<S> any;
+    fcl::CollisionResult<S> result;
+    TreesCollision<S>(CollideQuery<S>{static_cast<const OrderedPair<S>&>(q_), any, result, q_.margin}, a_, b_)
+        .walk(Wanted::kContacts);
+    if (!result.isCollision()) return false;
+    for (tree::Tree* tree : {&tree_a, &tree_b}) {
+      if (!tree->isComplete()) tree->build();
+    }
+    return true;
+  }
+
+  // False where it gave up.
+  bool walkInOrder(MeshCollector<S>& collector) const {
+    // Few pairs of leaves are enough unless surfaces hardly touch.
+    constexpr std::size_t kLeafPairs = 32;
+    // The trees may have other roots than those that the query's sides have seen.
+    const query::TreeSide a(a_.tree(), a_.now()), b(b_.tree(), b_.now());
+    query::TreeWalk walk(a, b, near_);
+    if (walk.isNeedless()) return true;
+    // What lies flat on something else has many pairs of leaves in doubt, and few that touch.
+    if (walk.isShallow() || query::outlinesHardlyOverlap(a, b, near_)) return false;
+    collector.beginInOrder();
+    const query::WalkEnd end = walk.runInOrder(collector, kLeafPairs + q_.contactsLeft());
+    collector.endInOrder(end.gave_up);
+    return !end.gave_up;
   }
 
   // Two models with conservative answers.

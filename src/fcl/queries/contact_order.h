@@ -81,9 +81,6 @@ class ContactOrder {
 template <typename Item>
 class FirstItems {
  public:
-  /// Requests for more gather all contacts, and get the first by the ids.
-  static constexpr std::size_t kMost = 1024;
-
   void start(std::size_t count) {
     count_ = count;
     items_.clear();

@@ -98,7 +98,7 @@ class MeshCollector : public query::Visitor {
         ends_at_first_(q.endsAtFirst()),
         left_(q.contactsLeft()),
         most_(std::max<std::size_t>(kMost, left_ < kUnlimited ? 4 * left_ : kUnlimited)),
-        is_cut_(!ends_at_first_ && left_ > 0 && left_ <= FirstPairs::kMost && !q.request.enable_cost),
+        is_cut_(q.wantsFew()),
         is_ranked_(is_cut_ && left_ < kFew),
         s_(scratch()),
         cut_(order_.startCut()) {
@@ -125,11 +125,23 @@ class MeshCollector : public query::Visitor {
   bool endsAtFirst() const override { return ends_at_first_; }
   const query::Cut* cut() const override { return is_cut_ ? &cut_ : nullptr; }
 
+  /// From here on the first contacts are taken, leaves by leaves, and in leaves those of the smallest ids.
+  void beginInOrder() { in_order_ = true; }
+  /// `gave_up`: what came is forgotten, and another walk begins.
+  void endInOrder(bool gave_up) {
+    if (!gave_up) return;
+    in_order_ = false;
+    s_.found.clear();
+    s_.met.clear();
+  }
+
   bool triangles(std::uint32_t a, std::uint32_t b, bool certain) override {
     q_.inCallersOrder(a, b);
     const std::uint64_t key = keyOf(a, b, certain);
     if (ends_at_first_) return endsWith(key);
-    if (is_ranked_) {
+    if (in_order_) {
+      s_.found.push_back(key);
+    } else if (is_ranked_) {
       addFirst(key);
     } else if (s_.seen.insert(a, b)) {
       s_.found.push_back(key);
@@ -137,6 +149,15 @@ class MeshCollector : public query::Visitor {
       if (s_.found.size() >= most_) decideFound();
     }
     return false;
+  }
+
+  bool endLeaves() override {
+    if (s_.found.empty()) return false;
+    decideEach();
+    s_.found.clear();
+    if (s_.met.size() < left_) return false;
+    s_.met.resize(left_);
+    return true;
   }
 
   bool cells(const query::CellLeaf& a, const query::CellLeaf& b) override {
@@ -158,7 +179,7 @@ class MeshCollector : public query::Visitor {
     if (ends_at_first_) return;
     s_.seen.clear();
     s_.seen_cells.clear();
-    if (is_cut_) {
+    if (is_cut_ && !in_order_) {
       for (const RankedPair& pair : s_.first.sort()) s_.found.push_back(pair.key);
       s_.met = s_.first_cells.sort();
     }
@@ -283,6 +304,13 @@ class MeshCollector : public query::Visitor {
 
   // Moves the first of what was found and touches to `met`, and forgets the rest of it.
   void decideFound() {
+    decideEach();
+    s_.found.clear();
+    keepFirst();
+  }
+
+  // Adds what was found and touches to `met`, in the order of ids, until there are enough.
+  void decideEach() {
     constexpr std::size_t kBatch = query::TrianglePairs::kCapacity;
     std::vector<std::uint64_t>& found = s_.found;
     std::sort(found.begin(), found.end());
@@ -300,8 +328,6 @@ class MeshCollector : public query::Visitor {
       if (q_.request.enable_cost || s_.met.size() - before < left_) continue;
       break;  // What comes later comes behind what there is.
     }
-    found.clear();
-    keepFirst();
   }
 
   // Of what touches, only as much as is asked for.
@@ -465,6 +491,7 @@ class MeshCollector : public query::Visitor {
   const std::size_t most_;  // pairs to gather
   const bool is_cut_;
   bool is_ranked_;  // what is found from now on is, of pairs of triangles
+  bool in_order_ = false;
   Scratch& s_;
   query::Cut cut_;
   fcl::Transform3<double> place_ = fcl::Transform3<double>::Identity();     // the same in double

@@ -366,7 +366,7 @@ HWY_INLINE void orderAlongCut(const PairSteps& s, int side, const Frame& f, std:
   }
 }
 
-// Orders octants by their ids: that with the smallest is taken first.
+// Orders octants by their numbers, as their ids are: that with the smallest is taken first.
 HWY_INLINE void orderById(std::uint32_t (&order)[8]) {
   for (std::uint32_t o = 0; o < 8; ++o) order[o] = (7 - o) << 3 | o;
 }
@@ -427,7 +427,7 @@ void NextEvent(PairSteps& s, StepEvent& event) {
         overlapping(s.geometry, s.frames[block.frame], s.frames[other.lane / 8], other.lane % 8, block.at->grey, order);
     if (mask == 0) continue;
     if (s.is_cut) orderAlongCut(s, x, s.frames[block.frame], order);
-    if (s.cell_cut != nullptr && s.has_cells[x]) orderById(order);
+    if (s.in_order || (s.cell_cut != nullptr && s.has_cells[x])) orderById(order);
     if (choice.has_larger_leaf && !s.has_cells[y]) {
       if (p.asked.side == AskedLeaf::kNone || !s.leaf[y]->know(other.node, p.asked.triangles)) {
         fill(event, StepEvent::kLargeTriangles, p);

@@ -81,6 +81,9 @@ struct PairSteps {
   /// No hit ends the walk: what is on the stack will be walked, so it is fetched ahead.
   bool sees_all = false;
 
+  /// Octants are taken in the order of their numbers, not the deepest overlap first.
+  bool in_order = false;
+
   /// Where it is cut, nodes whose least coordinate along this direction, in the frame of side 0, is larger than `cut`
   /// are left out; octants come in the order of these coordinates.
   bool is_cut = false;

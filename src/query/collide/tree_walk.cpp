@@ -57,6 +57,13 @@ WalkEnd TreeWalk::run(Visitor& visitor, std::size_t most_leaf_pairs) {
   return {ended && !gave_up_, leaf_pairs_, gave_up_};
 }
 
+WalkEnd TreeWalk::runInOrder(Visitor& visitor, std::size_t most_leaf_pairs) {
+  in_order_ = true;
+  const WalkEnd end = run(visitor, most_leaf_pairs);
+  in_order_ = false;
+  return end;
+}
+
 bool TreeWalk::search(Scratch& s) {
   // A root is not expanded for a pair whose root boxes are apart.
   const bool new_root = a_.state(a_.root()) == State::kGrows || b_.state(b_.root()) == State::kGrows;
@@ -64,10 +71,11 @@ bool TreeWalk::search(Scratch& s) {
 
   PairSteps steps(a_, b_, PairFrames(place()), s.frames);
   for (int side = 0; side < 2; ++side) steps.leaf[side] = &s.large[side];
-  const Cut* const cut = visitor_->cut();
-  const bool may_end = visitor_->endsAtFirst() || cut != nullptr;
+  const Cut* const cut = in_order_ ? nullptr : visitor_->cut();
+  const bool may_end = in_order_ || visitor_->endsAtFirst() || cut != nullptr;
+  steps.in_order = in_order_;
   steps.sees_all = !may_end;
-  steps.all_at_once = cut == nullptr && (is_shallow_ || steps.sees_all);
+  steps.all_at_once = !in_order_ && cut == nullptr && (is_shallow_ || steps.sees_all);
   if (wide_) {
     steps.cell_cut = cut;
   } else if (cut != nullptr) {
@@ -134,10 +142,11 @@ bool TreeWalk::testLeaves(const StepEvent& event, Scratch& s) {
   if (gave_up_) return true;
   if (wide_) return testCell(event, s);
   if (!s.leaves_started) {
-    s.leaves.start(b_in_a_, aInB(), visitor_->endsAtFirst(), visitor_->cut());
+    s.leaves.start(b_in_a_, aInB(), visitor_->endsAtFirst(), in_order_ ? nullptr : visitor_->cut());
     s.leaves_started = true;
   }
   const auto visit = [this](std::uint32_t t, std::uint32_t u, bool certain) {
+    if (in_order_) return visitor_->triangles(t, u, certain);
     if (!certain) leaf_pairs_ += kExactTest;
     gave_up_ = leaf_pairs_ > most_leaf_pairs_;
     return gave_up_ || visitor_->triangles(t, u, certain);
@@ -148,6 +157,8 @@ bool TreeWalk::testLeaves(const StepEvent& event, Scratch& s) {
   const bool ended = event.asked.side == AskedLeaf::kNone ? s.leaves.test(a_, a, b_, b, visit)
                      : event.asked.side == 0              ? s.leaves.testLargeA(s.large[0], triangles, b_, b, visit)
                                                           : s.leaves.testLargeB(a_, a, s.large[1], triangles, visit);
+  // How many triangles are tested depends on whether their corners are packed.
+  if (in_order_) return visitor_->endLeaves();
   leaf_pairs_ += (s.leaves.tested() - before) / kTrianglePairs;
   return ended;
 }

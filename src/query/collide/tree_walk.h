@@ -42,6 +42,9 @@ class TreeWalk {
     return areSeparate(a_.tree().supports(), b_.tree().supports(), place(), is_shallow_);
   }
 
+  /// What isNeedless() has found: the hulls overlap so little that the surfaces are probably apart.
+  bool isShallow() const { return is_shallow_; }
+
   /// True when the visitor ended it.
   bool run(Visitor& visitor) { return run(visitor, kNoLimit).met; }
 
@@ -52,6 +55,10 @@ class TreeWalk {
   /// little between two flat faces with little space between them, where oriented boxes in double separate the faces as
   /// a whole; in other places the float walk is quicker.
   bool runByTurns(Visitor& visitor);
+
+  /// Pairs of leaves come in an order that depends only on the trees and their sizes, as long as these are complete:
+  /// not on what is culled, so it is the same on every instruction set. Calls visitor.endLeaves() after each pair.
+  WalkEnd runInOrder(Visitor& visitor, std::size_t most_leaf_pairs);
 
   /// A walk took so many steps, where one over oriented boxes might have been quicker.
   void payForBoxes(std::size_t steps) const;
@@ -78,6 +85,7 @@ class TreeWalk {
   Visitor* visitor_ = nullptr;
   std::size_t leaf_pairs_, most_leaf_pairs_;
   bool gave_up_;  // after more than most_leaf_pairs_
+  bool in_order_ = false;
 };
 
 }  // namespace bocst::query

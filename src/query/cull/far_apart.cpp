@@ -168,6 +168,19 @@ bool outlinesApart(const TreeSide& a, const TreeSide& b, const SimilarityTransfo
   return outlineOf(a, of_a) && outlineOf(b, of_b) && boxesApart(of_a, of_b, b_in_a);
 }
 
+bool outlinesHardlyOverlap(const TreeSide& a, const TreeSide& b, const SimilarityTransform& b_in_a) {
+  constexpr double kLittle = 0.05;  // of the smaller one's length
+  OrientedVolume of_a, of_b;
+  if (!outlineOf(a, of_a) || !outlineOf(b, of_b)) return false;
+  const Eigen::Matrix3d r = of_a.axes.transpose() * (b_in_a.rotation * of_b.axes), s = r.cwiseAbs();
+  const Eigen::Vector3d t = of_a.axes.transpose() * (b_in_a * of_b.center - of_a.center),
+                        half = b_in_a.scale * of_b.half;
+  const double little = kLittle * std::min(of_a.half.maxCoeff(), half.maxCoeff());
+  const Eigen::Array3d along_a = of_a.half + s * half - t.cwiseAbs();
+  const Eigen::Array3d along_b = half + s.transpose() * of_a.half - (r.transpose() * t).cwiseAbs();
+  return std::min(along_a.minCoeff(), along_b.minCoeff()) < little;
+}
+
 template <typename S>
 bool areFarApart(const tree::Outline& a, const S* X_WA, const tree::Outline& b, const S* X_WB, double margin) {
   const Float4 translation = simd::loadDifference(X_WB + 12, X_WA + 12);

@@ -13,7 +13,7 @@ namespace bocst::query {
 /// 1e-15 to 1e15: these are never far apart.
 ///
 /// The poses must be rigid but for 2e-5, the largest entry of R^T R - I. A gap counts beyond 2e-4 of all sizes, see
-/// share/doc/guarantees.md.
+/// share/doc/rounding.md.
 template <typename S>
 bool areFarApart(const tree::Outline& a, const S* X_WA, const tree::Outline& b, const S* X_WB, double margin);
 template <typename S>
@@ -27,5 +27,8 @@ bool mayBeApart(const tree::Outline& a, const S* X_WA, const tree::Outline& b, c
 /// blocks separate only near their leaves, and which are not far apart: a gap counts beyond 1e-6 of all sizes. Takes
 /// ten times as long as mayBeApart().
 bool outlinesApart(const TreeSide& a, const TreeSide& b, const SimilarityTransform& b_in_a);
+
+/// True if the outlines overlap by little along a face's normal, as those of a part that lies on another.
+bool outlinesHardlyOverlap(const TreeSide& a, const TreeSide& b, const SimilarityTransform& b_in_a);
 
 }  // namespace bocst::query

@@ -32,7 +32,7 @@ enum class Hulls {
 };
 
 /// As areSeparate(), without a lock: kApart if the two are surely farther apart than `margin`. Poses, and what is
-/// allowed for their rounding, as for areFarApart(); see share/doc/guarantees.md.
+/// allowed for their rounding, as for areFarApart(); see share/doc/rounding.md.
 template <typename S>
 Hulls hullsWithoutLock(const OpenHull& a, const S* X_WA, const OpenHull& b, const S* X_WB, double margin);
 
