@@ -221,10 +221,17 @@ struct Released {
   Released(OracleKind kind, Answer answer)
       : a(raw.mesh(), options(kind, answer)),
         b(raw.mesh(), options(kind, answer)),
-        c(raw.mesh(), with(OracleKind::kCpu, answer, 6)),
-        d(raw.mesh(), with(OracleKind::kCpu, answer, 6)) {
+        c(raw.mesh(), host(answer)),
+        d(raw.mesh(), host(answer)) {
     a.releaseMesh();
     b.releaseMesh();
+  }
+
+  // With a budget, so that the contact whose depth is a signed distance is chosen as with a device.
+  static Options host(Answer answer) {
+    Options o = with(OracleKind::kCpu, answer, 6);
+    o.memory_budget = std::size_t{1} << 30;
+    return o;
   }
 
   Options options(OracleKind kind, Answer answer) {
