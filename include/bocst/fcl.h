@@ -36,12 +36,20 @@ namespace bocst {
 /// request.isSatisfied(result) is already true.
 ///
 /// **Order.** The default request (one contact, enable_contact false) is a yes-or-no query: it gets the ids of any pair
-/// that touches. For other requests, the contacts and their order depend only on meshes, poses and request, not on the
-/// resident nodes, the clock, the oracle or the thread. Contacts are sorted by (b1, b2). If there are more than a
-/// request asks for, a request with costs, or for more than 1024, gets those with the smallest (b1, b2). Other requests
-/// get those with the smallest position along the mesh, which takes less time if there are many more. In the frame of
-/// the model's mesh (o1's if both are models), with x the longest axis of its bounding box and y and z the two that
-/// follow (x, y, z, x, ...), the position of a point is x + 0.31 y + 0.23 z. The position of a contact is
+/// that touches. For other requests, the contacts and their order depend only on meshes, options, poses and request,
+/// not on the resident nodes, the clock or the thread. Contacts are sorted by (b1, b2). If there are more than a
+/// request asks for, then
+/// - a request with costs, or for more than 1024, gets those with the smallest (b1, b2);
+/// - of two models whose trees can be complete (below), a request gets the first that a walk in a fixed order over both
+///   complete trees finds, unless the models overlap by little, or the walk gets long;
+/// - otherwise a request gets those with the smallest position along the mesh, which takes two to ten times as long.
+///
+/// The first request of the second kind whose models touch builds both trees (Model::buildTree()). It is for models
+/// with exact answers, no margin, no memory budget, the oracle kCpu or kAuto, at most 262 144 triangles, and a mesh
+/// that updateVertices() has not changed.
+///
+/// In the frame of the model's mesh (o1's if both are models), with x the longest axis of its bounding box and y and z
+/// the two that follow (x, y, z, x, ...), the position of a point is x + 0.31 y + 0.23 z. The position of a contact is
 /// - if the two triangles intersect: the smallest position of the segment in which they do;
 /// - if they do not clearly intersect: the largest position of each triangle, and of these two the smaller;
 /// - with a margin: the largest position of the triangle of that mesh;

@@ -418,5 +418,14 @@ TEST(FewContacts, OfVerticesThatChangedAreThoseOfTheLeastPosition) {
     EXPECT_EQ(pairs.ask(a, b, i, 5), pairs.ask(placed_a, placed_b, i, 5)) << i;
   }
 }
+
+TEST(FewContacts, OfLargeMeshesAreThoseOfTheLeastPosition) {
+  const DeepPairs pairs;
+  const std::shared_ptr<const Mesh> large = test::torus(363).mesh();
+  const Modeld a(large), b(pairs.two.mesh()), placed_a(large, byPosition()), placed_b(pairs.two.mesh(), byPosition());
+  for (std::size_t i = 0; i < 5; ++i) {
+    EXPECT_EQ(pairs.ask(a, b, i, 5), pairs.ask(placed_a, placed_b, i, 5)) << i;
+  }
+}
 }  // namespace
 }  // namespace bocst

@@ -157,9 +157,9 @@ class TreesCollision {
     return false;
   }
 
-  // Few contacts of trees that can be complete are those that a walk in order finds first, where the hulls overlap
-  // deeply and it does not take long. Only what never changes decides this, so that the same query gets the same
-  // contacts.
+  // Few contacts of trees that can be complete are those that a walk in order finds first, where the outlines overlap
+  // by more than a little and it does not take long. Only what never changes decides this, so that the same query gets
+  // the same contacts.
   bool takesInOrder() const {
     return q_.wantsFew() && q_.margin == 0 && a_.tree().isBuiltForFew() && b_.tree().isBuiltForFew();
   }
@@ -188,7 +188,7 @@ class TreesCollision {
     query::TreeWalk walk(a, b, near_);
     if (walk.isNeedless()) return true;
     // What lies flat on something else has many pairs of leaves in doubt, and few that touch.
-    if (walk.isShallow() || query::outlinesHardlyOverlap(a, b, near_)) return false;
+    if (query::outlinesHardlyOverlap(a, b, near_)) return false;
     collector.beginInOrder();
     const query::WalkEnd end = walk.runInOrder(collector, kLeafPairs + q_.contactsLeft());
     collector.endInOrder(end.gave_up);

@@ -42,9 +42,6 @@ class TreeWalk {
     return areSeparate(a_.tree().supports(), b_.tree().supports(), place(), is_shallow_);
   }
 
-  /// What isNeedless() has found: the hulls overlap so little that the surfaces are probably apart.
-  bool isShallow() const { return is_shallow_; }
-
   /// True when the visitor ended it.
   bool run(Visitor& visitor) { return run(visitor, kNoLimit).met; }
 
