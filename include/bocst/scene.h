@@ -143,11 +143,12 @@ class BOCST_EXPORT Scene {
   bool anyCollision(const Transform* X_WM, std::size_t states, std::size_t* where = nullptr) const;
   /// Sets hit[k] to 1 if state k collides, otherwise to 0. When it throws, some of hit[] may have been set.
   void collisions(const Transform* X_WM, std::size_t states, std::uint8_t* hit) const;
-  /// The minimum fcl::distance of all pairs; if a pair touches, 0 up to the rounding of fcl::distance;
+  /// The minimum distance of all pairs: fcl::distance, but of two of FCL's shapes, where that can be too large, the
+  /// distance that bocst computes. If a pair touches, 0 up to the rounding of fcl::distance;
   /// std::numeric_limits<S>::max() without pairs. `nearest` is set to a pair at this distance; to invalid Ids without
   /// pairs. at_most: if no pair is nearer than this, the function returns at_most and sets no pair; it does not measure
-  /// pairs that are farther apart. For thresholds and truncated distances. Options::margin has no effect. Of a Plane or
-  /// Halfspace and another of FCL's shapes, of which fcl::distance computes nothing, it is the distance of the two.
+  /// pairs that are farther apart. For thresholds and truncated distances. Options::margin has no effect. It includes
+  /// a Plane or Halfspace beside another of FCL's shapes, of which fcl::distance computes nothing.
   /// @throws std::invalid_argument for other pairs of FCL's shapes and octrees whose distance FCL cannot compute,
   /// unless another pair is found to be nearer before; and if at_most is negative or NaN.
   S clearance(const Transform* X_WM, Pair* nearest = nullptr, S at_most = std::numeric_limits<S>::max()) const;

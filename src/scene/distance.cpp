@@ -46,14 +46,23 @@ S distanceBelow(const Object<S>& a, const fcl::Transform3<S>& X_WA, const Object
       return static_cast<S>(known->distance);
     }
   }
+  // FCL's distance of two shapes may be too large, and its points not the nearest.
+  constexpr S kLargest = std::numeric_limits<S>::max();
+  std::optional<double> known;
+  if (!has_model) known = fcl_adapter::distanceOfShapes<S>(*a.geometry, X_WA, *b.geometry, X_WB);
+  if (known.has_value() && points == nullptr) {
+    return *known < static_cast<double>(kLargest) ? static_cast<S>(*known) : kLargest;
+  }
   const S d = bocst::distance<S>(a.geometry.get(), X_WA, b.geometry.get(), X_WB, request, result);
-  if (!has_model && result.o1 == nullptr && !(d < std::numeric_limits<S>::max())) {
+  if (!has_model && result.o1 == nullptr && !(d < kLargest)) {
     throw std::invalid_argument("bocst::Scene: FCL computes no distance of " +
                                 fcl_adapter::typeName<S>(a.geometry.get()) + " and " +
                                 fcl_adapter::typeName<S>(b.geometry.get()));
   }
   if (points != nullptr) std::copy_n(result.nearest_points, 2, points);
-  return std::max(d, S(0));
+  if (!known.has_value()) return std::max(d, S(0));
+  fcl_adapter::improvePoints<S>(*a.geometry, X_WA, *b.geometry, X_WB, *known, points);
+  return static_cast<S>(*known);
 }
 
 template <typename S>

@@ -171,6 +171,34 @@ std::optional<double> distanceOfShapes(const fcl::CollisionGeometry<S>& a, const
 }
 
 template <typename S>
+void improvePoints(const fcl::CollisionGeometry<S>& a, const fcl::Transform3<S>& X_WA,
+                   const fcl::CollisionGeometry<S>& b, const fcl::Transform3<S>& X_WB, double distance,
+                   fcl::Vector3<S>* points) {
+  constexpr double kEnough = 1e-6;
+  constexpr int kMostSteps = 1000;
+  const Eigen::Isometry3d X = isometryOf<S>(X_WA), Y = isometryOf<S>(X_WB);
+  const double enough = (1 + kEnough) * distance + kEnough * (X.translation() - Y.translation()).norm();
+  Eigen::Vector3d on_a = points[0].template cast<double>(), on_b = points[1].template cast<double>();
+  if (!((on_a - on_b).norm() > enough)) return;
+  // Projections on two convex bodies in turn end where these are nearest.
+  const auto nearest = [](const query::SupportShape& body, const Eigen::Isometry3d& X_W, const Eigen::Vector3d& point) {
+    const Eigen::Vector3d own = X_W.linear().transpose() * (point - X_W.translation());
+    const query::SeparationResult gap = body.gap({&own, 1}, std::numeric_limits<double>::infinity());
+    return Eigen::Vector3d(X_W * gap.on_body);
+  };
+  withBoundedShape<S>(a, [&](const query::SupportShape& body_a) {
+    withBoundedShape<S>(b, [&](const query::SupportShape& body_b) {
+      for (int i = 0; i < kMostSteps && (on_a - on_b).norm() > enough; ++i) {
+        on_b = nearest(body_b, Y, on_a);
+        on_a = nearest(body_a, X, on_b);
+      }
+    });
+  });
+  points[0] = on_a.template cast<S>();
+  points[1] = on_b.template cast<S>();
+}
+
+template <typename S>
 std::unique_ptr<Model<S>> modelOfBvh(const fcl::CollisionGeometry<S>& geometry) {
   bvhSideOf<S>("Scene", &geometry);  // throws unless it is a finished mesh
   std::unique_ptr<Model<S>> model;
@@ -188,6 +216,12 @@ template std::optional<double> distanceOfShapes<double>(const fcl::CollisionGeom
                                                         const fcl::Transform3<double>&,
                                                         const fcl::CollisionGeometry<double>&,
                                                         const fcl::Transform3<double>&);
+template void improvePoints<float>(const fcl::CollisionGeometry<float>&, const fcl::Transform3<float>&,
+                                   const fcl::CollisionGeometry<float>&, const fcl::Transform3<float>&, double,
+                                   fcl::Vector3<float>*);
+template void improvePoints<double>(const fcl::CollisionGeometry<double>&, const fcl::Transform3<double>&,
+                                    const fcl::CollisionGeometry<double>&, const fcl::Transform3<double>&, double,
+                                    fcl::Vector3<double>*);
 template std::optional<PlaneDistance> distanceToPlane<float>(const fcl::CollisionGeometry<float>&,
                                                              const fcl::Transform3<float>&,
                                                              const fcl::CollisionGeometry<float>&,

@@ -24,6 +24,13 @@ template <typename S>
 std::optional<double> distanceOfShapes(const fcl::CollisionGeometry<S>& a, const fcl::Transform3<S>& X_WA,
                                        const fcl::CollisionGeometry<S>& b, const fcl::Transform3<S>& X_WB);
 
+/// Moves two points in the world, one on each of two bounded shapes at this distance, to where these are nearest, if
+/// they are farther apart than that. Does nothing for other geometries.
+template <typename S>
+void improvePoints(const fcl::CollisionGeometry<S>& a, const fcl::Transform3<S>& X_WA,
+                   const fcl::CollisionGeometry<S>& b, const fcl::Transform3<S>& X_WB, double distance,
+                   fcl::Vector3<S>* points);
+
 /// Of two geometries, with their nearest points in the world.
 struct PlaneDistance {
   double distance;
