@@ -2133,5 +2133,78 @@ TEST(SceneThreads, ChangesBesideQueries) {
   EXPECT_EQ(scene.fixedCount(), 12u + 1 + 20);
 }
 
+// Distances of two of FCL's shapes, which FCL's solvers find too large: nearest points that are as far apart, one on
+// each shape, bound the distance from above, points all over both shapes from below.
+TEST(SceneShapes, AreMeasuredToTheirNearestPoints) {
+  std::mt19937_64 g(71);
+  std::uniform_real_distribution<double> u(-1, 1);
+  struct Solid {
+    std::shared_ptr<fcl::CollisionGeometryd> geometry;
+    std::function<double(const Eigen::Vector3d&)> outside;  // 0 on it, more outside
+    std::function<Eigen::Vector3d()> any;                   // a point on it
+  };
+  const auto disc = [&](double radius, double length) {
+    return Solid{
+        std::make_shared<fcl::Cylinderd>(radius, length),
+        [=](const Eigen::Vector3d& x) { return std::max(x.head<2>().norm() - radius, std::abs(x.z()) - length / 2); },
+        [&g, &u, radius, length]() -> Eigen::Vector3d {
+          const double angle = 4 * u(g), r = u(g) > 0 ? radius : radius * std::sqrt(std::abs(u(g)));
+          return {r * std::cos(angle), r * std::sin(angle), u(g) > 0 ? length / 2 : -length / 2};
+        }};
+  };
+  const auto capsule = [&](double radius, double length) {
+    return Solid{std::make_shared<fcl::Capsuled>(radius, length),
+                 [=](const Eigen::Vector3d& x) {
+                   const Eigen::Vector3d axis(0, 0, std::clamp(x.z(), -length / 2, length / 2));
+                   return (x - axis).norm() - radius;
+                 },
+                 [&g, &u, radius, length]() -> Eigen::Vector3d {
+                   return Eigen::Vector3d(0, 0, u(g) * length / 2) +
+                          radius * Eigen::Vector3d(u(g), u(g), u(g)).normalized();
+                 }};
+  };
+  const auto box = [&](const Eigen::Vector3d& half) {
+    return Solid{std::make_shared<fcl::Boxd>(2 * half),
+                 [=](const Eigen::Vector3d& x) { return (x.cwiseAbs() - half).maxCoeff(); },
+                 [&g, &u, half]() -> Eigen::Vector3d {
+                   Eigen::Vector3d x(u(g), u(g), u(g));
+                   x[static_cast<int>(g() % 3)] = g() % 2 == 0 ? 1 : -1;
+                   return x.cwiseProduct(half);
+                 }};
+  };
+  const std::vector<Solid> solids{disc(0.3, 0.02), disc(0.05, 0.4), capsule(0.1, 0.5), box({0.2, 0.01, 0.3})};
+  int apart = 0, fcl_was_wrong = 0;
+  for (const Solid& a : solids) {
+    for (const Solid& b : solids) {
+      Scened scene;
+      scene.addMoving(a.geometry);
+      scene.addMoving(b.geometry);
+      for (int round = 0; round < 40; ++round) {
+        const auto pose = [&] {
+          return test::pose<double>(Eigen::Quaterniond(u(g), u(g), u(g), u(g)).normalized().toRotationMatrix(),
+                                    0.4 * Eigen::Vector3d(u(g), u(g), u(g)));
+        };
+        const fcl::Transform3d X[2] = {pose(), pose()};
+        const double clearance = scene.clearance(X);
+        const auto pairs = scene.pairsWithin(X, 10);
+        ASSERT_EQ(pairs.size(), 1u);
+        ASSERT_NEAR(pairs[0].distance, clearance, 1e-12);
+        if (!(clearance > 1e-6)) continue;
+        ++apart;
+        const Eigen::Vector3d p = pairs[0].nearest_points[0], q = pairs[0].nearest_points[1];
+        ASSERT_NEAR((p - q).norm(), clearance, 1e-5);
+        ASSERT_LT(a.outside(X[0].inverse(Eigen::Isometry) * p), 1e-7);
+        ASSERT_LT(b.outside(X[1].inverse(Eigen::Isometry) * q), 1e-7);
+        for (int i = 0; i < 300; ++i) ASSERT_GT((X[0] * a.any() - X[1] * b.any()).norm(), clearance - 1e-9);
+        fcl::DistanceResultd result;
+        fcl_was_wrong += fcl::distance(a.geometry.get(), X[0], b.geometry.get(), X[1], fcl::DistanceRequestd(),
+                                       result) > 1.0001 * clearance;
+      }
+    }
+  }
+  EXPECT_GT(apart, 200);
+  EXPECT_GT(fcl_was_wrong, 0) << "FCL's distances would do";
+}
+
 }  // namespace
 }  // namespace bocst
