@@ -6,11 +6,11 @@
 #include <cstring>
 #include <iterator>
 #include <limits>
-#include <sstream>
 #include <stdexcept>
 #include <string>
 #include <type_traits>
 
+#include "log/number_text.h"
 #include "mesh/limits.h"
 #include "mesh/scan.h"
 
@@ -25,12 +25,6 @@ constexpr std::size_t kMaxVertices = std::numeric_limits<std::uint32_t>::max();
 [[noreturn]] void badIndex(std::size_t triangle, std::size_t index, std::size_t vertices) {
   bad("triangle " + std::to_string(triangle) + " has vertex index " + std::to_string(index) + ", but there are " +
       std::to_string(vertices) + " vertices");
-}
-
-std::string coordinates(const Eigen::Vector3d& v) {
-  std::ostringstream text;
-  text << "(" << v.x() << ", " << v.y() << ", " << v.z() << ")";
-  return text.str();
 }
 
 // FCL's accessor is a call into its library; its triangle is three indices and nothing else.
@@ -70,7 +64,7 @@ class NarrowIterator {
     return std::abs(v[0]) <= kMostCoordinate && std::abs(v[1]) <= kMostCoordinate && std::abs(v[2]) <= kMostCoordinate;
   };
   const auto v = std::find_if_not(vertices.begin(), vertices.end(), good);
-  bad("vertex " + std::to_string(v - vertices.begin()) + " is " + coordinates(*v) +
+  bad("vertex " + std::to_string(v - vertices.begin()) + " is " + pointText(*v) +
       "; coordinates must be finite and at most 1e75 in magnitude");
 }
 
@@ -185,8 +179,8 @@ std::shared_ptr<const Mesh> Mesh::fromArrays(const float* vertices, std::size_t 
 }
 
 std::shared_ptr<const Mesh> Mesh::scaledAndPadded(double scale, double padding) const {
-  if (!(scale > 0) || !std::isfinite(scale)) bad("the scale is " + std::to_string(scale) + ", not above 0");
-  if (!std::isfinite(padding)) bad("the padding is " + std::to_string(padding));
+  if (!(scale > 0) || !std::isfinite(scale)) bad("the scale is " + numberText(scale) + ", not above 0");
+  if (!std::isfinite(padding)) bad("the padding is " + numberText(padding));
   Eigen::Vector3d mean = Eigen::Vector3d::Zero();
   for (const Eigen::Vector3d& v : vertices_) mean += v / static_cast<double>(vertices_.size());
   std::vector<Eigen::Vector3d> moved(vertices_);

@@ -7,16 +7,13 @@
 #include <stdexcept>
 #include <string>
 
+#include "log/number_text.h"
 #include "mesh/weld.h"
 
 namespace bocst {
 namespace {
 
 using Eigen::Vector3d;
-
-std::string placeOf(const Vector3d& v) {
-  return "(" + std::to_string(v.x()) + ", " + std::to_string(v.y()) + ", " + std::to_string(v.z()) + ")";
-}
 
 void checkWatertight(const Mesh& mesh) {
   const std::vector<std::uint32_t> first = weld(mesh.vertices());
@@ -45,7 +42,8 @@ void checkWatertight(const Mesh& mesh) {
   throw std::invalid_argument(
       "bocst::Options: solid needs a watertight mesh with triangles of one orientation, but the edge between "
       "vertices " +
-      std::to_string(a) + " " + placeOf(mesh.vertex(a)) + " and " + std::to_string(b) + " " + placeOf(mesh.vertex(b)) +
+      std::to_string(a) + " " + pointText(mesh.vertex(a)) + " and " + std::to_string(b) + " " +
+      pointText(mesh.vertex(b)) +
       (there + back == 1 ? " has only one triangle"
                          : " is used " + std::to_string(there) + " times in one direction and " + std::to_string(back) +
                                " times in the other: triangles are missing or turned over"));

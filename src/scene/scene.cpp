@@ -20,6 +20,7 @@
 #include "fcl/adapters/validate.h"
 #include "fcl/queries/grow_together.h"
 #include "fcl/queries/scene_pair.h"
+#include "log/number_text.h"
 #include "scene/distance.h"
 #include "scene/edge.h"
 #include "scene/sweep.h"
@@ -195,7 +196,7 @@ struct Scene<S>::Impl {
   static void checkLimit(const char* query, const char* name, S distance) {
     if (distance >= 0) return;
     throw std::invalid_argument(std::string("bocst::Scene::") + query + ": " + name + " is " +
-                                std::to_string(distance));
+                                numberText(static_cast<double>(distance)));
   }
 
   static void refuseEmpty(const Object<S>& o) {

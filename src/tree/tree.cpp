@@ -13,6 +13,7 @@
 #include <string>
 
 #include "log/assert.h"
+#include "log/number_text.h"
 #include "oracle/stored_mesh.h"
 #include "thread/of_thread.h"
 #include "tree/box_tree.h"
@@ -69,13 +70,13 @@ void checkOptions(const Options& o) {
   }
   const double finest = 1 << lattice::kBits;
   if (o.dimension != 0 && !(o.dimension >= 1 && o.dimension <= finest)) {
-    bad("dimension is " + std::to_string(o.dimension) + ", not 0 or 1 to 65536");
+    bad("dimension is " + numberText(o.dimension) + ", not 0 or 1 to 65536");
   }
-  if (o.ttl.count() < 0) bad("ttl is negative");
+  if (o.ttl.count() < 0) bad("ttl is " + std::to_string(o.ttl.count()) + " ms, which is negative");
   if (o.paper.viewport < 1 || o.paper.viewport > 4096)
     bad("viewport is " + std::to_string(o.paper.viewport) + ", not 1 to 4096");
   if (!(o.margin >= 0) || !std::isfinite(o.margin)) {
-    bad("margin is " + std::to_string(o.margin) + ", not a length of 0 or more");
+    bad("margin is " + numberText(o.margin) + ", not a length of 0 or more");
   }
 }
 

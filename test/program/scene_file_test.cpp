@@ -758,6 +758,22 @@ TEST_F(SceneFile, AnAttachedObjectMovesWithItsLink) {
                   {"objects[1]", "not both"});
 }
 
+TEST_F(SceneFile, ObjectsAttachedToOneLinkMayTouch) {
+  robot(link("base", kSphere) + link("hand", kSphere) + joint("q", "continuous", "base", "hand"));
+  const SceneSetup s = scene(R"({"robot": "robot.urdf", "objects": [
+      {"name": "x", "sphere": 1, "attached": "hand"}, {"name": "y", "sphere": 1, "attached": "hand"},
+      {"name": "z", "sphere": 1, "attached": "base"}, {"name": "wall", "sphere": 1}]})");
+  EXPECT_EQ(s.allowed.count({2, 3}), 1u);
+  EXPECT_EQ(s.allowed.count({2, 4}) + s.allowed.count({3, 4}) + s.allowed.count({2, 5}), 0u);
+}
+
+TEST_F(SceneFile, LinksThatAreOnlySeenAreNoted) {
+  robot(link("base", kSphere) + "<link name='arm'><visual><geometry><box size='1 1 1'/></geometry></visual></link>" +
+        link("frame") + joint("q", "continuous", "base", "arm") + joint("f", "fixed", "arm", "frame"));
+  const SceneSetup s = scene(R"({"robot": "robot.urdf"})", SceneArguments::Adjacent::kCheck);
+  EXPECT_EQ(s.notes, std::vector<std::string>{"links with a <visual> and no <collision> are not checked: arm"});
+}
+
 TEST_F(SceneFile, AnAttachedObjectMayTouchTheLinksAroundItsFrame) {
   robot(link("arm", kSphere) + link("wrist", kSphere) + link("flange") + link("tool0") + link("finger", kSphere) +
         joint("q", "continuous", "arm", "wrist") + joint("f1", "fixed", "wrist", "flange") +

@@ -33,6 +33,7 @@ struct PlacedShape {
 struct Part {
   std::string name;
   std::vector<PlacedShape> shapes;
+  bool has_visual = false;  ///< Of a link: there is something to be seen, which is not checked.
 };
 
 }  // namespace bocst::program

@@ -244,6 +244,7 @@ class UrdfReader {
     const std::size_t index = links_.size();
     Part part;
     part.name = link.name;
+    part.has_visual = xml_.root().find_child_by_attribute("link", "name", link.name.c_str()).child("visual") != nullptr;
     for (const urdf::CollisionSharedPtr& collision : link.collision_array) {
       part.shapes.push_back({shapeOf(*collision->geometry, link.name), poseOf(collision->origin, "link", link.name)});
     }

@@ -109,8 +109,18 @@ class Reader {
     addRobot(XmlFile(path(robot.at("urdf"))), robot.has("srdf") ? path(robot.at("srdf")) : "");
   }
 
+  void noteUncheckedLinks() {
+    std::vector<std::string> names;
+    for (const Part& link : setup_.robot->links()) {
+      if (link.has_visual && link.shapes.empty()) names.push_back(link.name);
+    }
+    if (names.empty()) return;
+    setup_.notes.push_back("links with a <visual> and no <collision> are not checked: " + joined(names, ", "));
+  }
+
   void addRobot(const XmlFile& urdf, const std::string& own_srdf) {
     setup_.robot = readUrdf(urdf, packages_, meshes_);
+    noteUncheckedLinks();
     const std::string& srdf = arguments_.srdf.empty() ? own_srdf : arguments_.srdf;
     if (!srdf.empty()) {
       Srdf read = readSrdf(srdf, *setup_.robot);
@@ -144,6 +154,10 @@ class Reader {
       if (object.moving) element.complain("an object can be moving or attached, not both");
       object.link = linkOf(element.at("attached"));
       setup_.allowed.emplace(*object.link, setup_.partCount());
+      // Two objects on one link never move to each other.
+      for (std::size_t i = 0; i < setup_.objects.size(); ++i) {
+        if (setup_.objects[i].link == object.link) setup_.allowed.emplace(setup_.linkCount() + i, setup_.partCount());
+      }
       for (const std::size_t link : setup_.robot->linksAround(*object.link)) {
         setup_.allowed.emplace(link, setup_.partCount());
       }
