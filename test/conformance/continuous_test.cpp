@@ -1060,5 +1060,22 @@ TEST(ContinuousGrowth, OnlyWhatTheWayMeets) {
   EXPECT_LT(a.statistics().resident_nodes, whole.statistics().resident_nodes / 2);
 }
 
+TEST(Continuous, WaysBeyondTheLargestNumberAreRefusedByName) {
+  const auto mesh = test::torus(8).mesh();
+  const Modeld a(mesh), b(mesh);
+  const auto at = [](double x) { return test::pose<double>(Eigen::Matrix3d::Identity(), {x, 0, 0}); };
+  const auto ask = [&](double x) {
+    fcl::ContinuousCollisionResultd result;
+    fcl::continuousCollide(&a, at(-x), at(x), &b, at(0), at(0), fcl::ContinuousCollisionRequestd(), result);
+  };
+  EXPECT_NO_THROW(ask(8e307));
+  try {
+    ask(1e308);
+    FAIL();
+  } catch (const std::invalid_argument& e) {
+    EXPECT_NE(std::string(e.what()).find("begin and the end of a motion"), std::string::npos) << e.what();
+  }
+}
+
 }  // namespace
 }  // namespace bocst

@@ -115,10 +115,14 @@ fcl::Transform3<S> poseAt(const query::Motion& motion, double time) {
 
 /// From one pose to another. FCL 0.7 makes an InterpMotion with an unset reference point and a SplineMotion with unset
 /// points; here the reference point is the body's origin, and the spline is the straight one.
+/// @throws std::invalid_argument where the two are farther apart than the largest number.
 template <typename S>
 std::unique_ptr<query::Motion> motionOf(const fcl::Transform3<S>& begin, const fcl::Transform3<S>& end,
                                         fcl::CCDMotionType type) {
   const Eigen::Isometry3d X = isometryOf<S>(begin), Y = isometryOf<S>(end);
+  if (!(Y.translation() - X.translation()).allFinite()) {
+    throw std::invalid_argument("bocst: the begin and the end of a motion are farther apart than the largest number");
+  }
   switch (type) {
     case fcl::CCDM_TRANS:
       return std::make_unique<query::AxisMotion>(query::translation(X, Y));
