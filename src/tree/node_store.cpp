@@ -32,12 +32,10 @@ void NodeStore::refit() {
   refits.swap(refits_);
   std::vector<std::uint8_t> changed(blocks.size(), 0);
   const auto apply = [&](NodeRef node, const bounds::NodeBounds& bounds) {
-    if (node.isRoot()) {
-      root_bounds = bounds;
-    } else {
-      blocks[node.block()].octants.set(node.octant(), bounds);
-      changed[node.block()] = 1;
-    }
+    // The root's bounds are those of the mesh: what a walk in order visits must not depend on what has grown.
+    if (node.isRoot()) return;
+    blocks[node.block()].octants.set(node.octant(), bounds);
+    changed[node.block()] = 1;
   };
   for (const Refit& r : refits) apply(r.node, r.bounds);
   // Children come after their parents, so one backward pass reaches the root.

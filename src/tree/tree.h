@@ -109,10 +109,12 @@ class Tree {
   bool gainsByBuild() const;
   /// All blocks of the whole tree are there. They stay while a query runs.
   bool isComplete() const { return is_complete_.load(std::memory_order_acquire); }
-  /// A request for few contacts may build the whole tree: not where that takes long, is often repeated, or has no room.
+  /// A request for few contacts may build the whole tree: not where that takes long, is often repeated, is for the
+  /// helper thread to do, or has no room.
   bool isBuiltForFew() const {
     constexpr std::size_t kMostTriangles = 1 << 18;
-    return gainsByBuild() && options_.memory_budget == 0 && surface_.triangle_count <= kMostTriangles && !has_changed_;
+    return gainsByBuild() && options_.memory_budget == 0 && !options_.build_ahead &&
+           surface_.triangle_count <= kMostTriangles && !has_changed_;
   }
   /// No more expansions below this node: a single lattice unit, or the collision depth of conservative answers.
   bool isDeepest(int level) const { return level >= deepest_; }

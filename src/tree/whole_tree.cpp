@@ -477,7 +477,6 @@ void Tree::publishWhole(const BulkBuilder& bulk, const std::vector<BulkPlace>& p
   built_ += surface_.triangle_count;
   is_whole_ = true;
   is_complete_ = true;
-  nodes_.addRefit(NodeRef(), encode(bulk.own(), lattice::Cell{}));
 }
 
 }  // namespace bocst::tree

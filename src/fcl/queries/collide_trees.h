@@ -5,6 +5,7 @@
 #include <cmath>
 #include <cstddef>
 #include <cstdint>
+#include <new>
 #include <type_traits>
 
 #include "fcl/adapters/pair.h"
@@ -134,8 +135,8 @@ class TreesCollision {
     if (trees.isNeedless(q_.hulls)) return false;
     if (kUsesBoxes && boxesApart()) return false;
     if (isProved(wanted)) return true;
-    const bool in_order = takesInOrder();
-    if (in_order && !completeTrees()) return false;
+    bool in_order = takesInOrder();
+    if (in_order && !completeTrees(in_order)) return false;
     const std::size_t before = q_.result.numContacts();
     std::size_t steps = 0;
     collect(q_, [&](MeshCollector<S>& collector) {
@@ -161,11 +162,14 @@ class TreesCollision {
   // by more than a little and it does not take long. Only what never changes decides this, so that the same query gets
   // the same contacts.
   bool takesInOrder() const {
-    return q_.wantsFew() && q_.margin == 0 && a_.tree().isBuiltForFew() && b_.tree().isBuiltForFew();
+    constexpr std::size_t kMostContacts = 256;
+    return q_.wantsFew() && q_.contactsLeft() <= kMostContacts && q_.margin == 0 && a_.tree().isBuiltForFew() &&
+           b_.tree().isBuiltForFew();
   }
 
-  // True if both trees are complete. If not, builds them where any contact shows that they are needed.
-  bool completeTrees() const {
+  // Builds the two trees, if they are not complete and any contact shows that they are needed. False if there is none.
+  // `has_room` becomes false where there is no memory for them.
+  bool completeTrees(bool& has_room) const {
     tree::Tree &tree_a = a_.tree(), &tree_b = b_.tree();
     if (tree_a.isComplete() && tree_b.isComplete()) return true;
     const fcl::CollisionRequest<S> any;
@@ -173,8 +177,12 @@ class TreesCollision {
     TreesCollision<S>(CollideQuery<S>{static_cast<const OrderedPair<S>&>(q_), any, result, q_.margin}, a_, b_)
         .walk(Wanted::kContacts);
     if (!result.isCollision()) return false;
-    for (tree::Tree* tree : {&tree_a, &tree_b}) {
-      if (!tree->isComplete()) tree->build();
+    try {
+      for (tree::Tree* tree : {&tree_a, &tree_b}) {
+        if (!tree->isComplete()) tree->build();
+      }
+    } catch (const std::bad_alloc&) {
+      has_room = false;
     }
     return true;
   }
@@ -187,8 +195,9 @@ class TreesCollision {
     const query::TreeSide a(a_.tree(), a_.now()), b(b_.tree(), b_.now());
     query::TreeWalk walk(a, b, near_);
     if (walk.isNeedless()) return true;
-    // What lies flat on something else has many pairs of leaves in doubt, and few that touch.
-    if (query::outlinesHardlyOverlap(a, b, near_)) return false;
+    // What lies flat on something else, or at the place of its copy, has many pairs of leaves in doubt, and few that
+    // touch.
+    if (query::outlinesHardlyOverlap(a, b, near_) || query::outlinesCoincide(a, b, near_)) return false;
     collector.beginInOrder();
     const query::WalkEnd end = walk.runInOrder(collector, kLeafPairs + q_.contactsLeft());
     collector.endInOrder(end.gave_up);

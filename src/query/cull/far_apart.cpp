@@ -181,6 +181,17 @@ bool outlinesHardlyOverlap(const TreeSide& a, const TreeSide& b, const Similarit
   return std::min(along_a.minCoeff(), along_b.minCoeff()) < little;
 }
 
+bool outlinesCoincide(const TreeSide& a, const TreeSide& b, const SimilarityTransform& b_in_a) {
+  constexpr double kAbout = 0.05;  // of the length
+  OrientedVolume of_a, of_b;
+  if (!outlineOf(a, of_a) || !outlineOf(b, of_b)) return false;
+  // Their corners, up to the signs of the axes.
+  const Eigen::Matrix3d r = (of_a.axes.transpose() * (b_in_a.rotation * of_b.axes)).cwiseAbs();
+  const Eigen::Vector3d apart = b_in_a * of_b.center - of_a.center;
+  const Eigen::Vector3d longer = b_in_a.scale * (r * of_b.half) - of_a.half;
+  return apart.cwiseAbs().maxCoeff() + longer.cwiseAbs().maxCoeff() < kAbout * of_a.half.maxCoeff();
+}
+
 template <typename S>
 bool areFarApart(const tree::Outline& a, const S* X_WA, const tree::Outline& b, const S* X_WB, double margin) {
   const Float4 translation = simd::loadDifference(X_WB + 12, X_WA + 12);
