@@ -427,5 +427,15 @@ TEST(FewContacts, OfLargeMeshesAreThoseOfTheLeastPosition) {
     EXPECT_EQ(pairs.ask(a, b, i, 5), pairs.ask(placed_a, placed_b, i, 5)) << i;
   }
 }
+// As many pairs of triangles are in doubt as touch.
+TEST(FewContacts, OfCopiesAtOnePlaceAreThoseOfTheLeastPosition) {
+  const DeepPairs pairs;
+  const Modeld a(pairs.one.mesh()), b(pairs.one.mesh());
+  const Modeld placed_a(pairs.one.mesh(), byPosition()), placed_b(pairs.one.mesh(), byPosition());
+  const auto I = fcl::Transform3d::Identity();
+  const auto X = test::pose<double>(Eigen::Matrix3d::Identity(), {1e-3, 0, 0});
+  EXPECT_EQ(idsOf(ask(a, I, b, X, 5)), idsOf(ask(placed_a, I, placed_b, X, 5)));
+}
+
 }  // namespace
 }  // namespace bocst

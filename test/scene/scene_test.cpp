@@ -1833,6 +1833,22 @@ TEST(Scene, BuildsTreesOnceThereIsMemory) {
   EXPECT_GT(failures, 10);
 }
 
+// Whole trees, which few contacts are taken from, need more memory than parts.
+TEST(SceneMemory, FewContactsAreFoundWithoutWholeTrees) {
+  const auto mesh = test::torus(180).mesh();
+  const Modeld a(mesh), b(mesh);
+  const auto X = fcl::Transform3d(Eigen::Translation3d(1.3, 0.2, 0.1));
+  fcl::CollisionResultd few, more;
+  most_bytes = std::size_t{1} << 20;
+  EXPECT_NO_THROW(fcl::collide(&a, fcl::Transform3d::Identity(), &b, X, fcl::CollisionRequestd(5, true), few));
+  most_bytes = ~std::size_t{0};
+  EXPECT_EQ(few.numContacts(), 5u);
+  EXPECT_FALSE(fcl_adapter::treeOf(a).isComplete() && fcl_adapter::treeOf(b).isComplete()) << "there was enough memory";
+  fcl::collide(&a, fcl::Transform3d::Identity(), &b, X, fcl::CollisionRequestd(5, true), more);
+  EXPECT_EQ(more.numContacts(), 5u);
+  EXPECT_TRUE(fcl_adapter::treeOf(a).isComplete() && fcl_adapter::treeOf(b).isComplete());
+}
+
 TYPED_TEST(SceneTest, LeavesTheBoxesOfShapesAlone) {
   using S = TypeParam;
   const auto ball = std::make_shared<fcl::Sphere<S>>(S(1));

@@ -879,6 +879,19 @@ TEST(Tree, RootBoundsHoldWhatEndsBesideWholeBytes) {
   }
 }
 
+// Which contacts are first must not depend on what has grown.
+TEST(Tree, RootBoundsAreThoseOfTheMesh) {
+  for (const std::size_t n : {3, 20, 60}) {
+    const auto mesh = test::torus(n).mesh();
+    Modeld a(mesh), b(mesh);
+    const bounds::NodeBounds before = fcl_adapter::treeOf(a).rootBounds();
+    for (int i = 0; i < 50; ++i) touching(a, b, {0.03 * i, 0.2, 0.1});
+    EXPECT_GT(a.statistics().built_triangles, 0u);
+    a.buildTree();
+    EXPECT_EQ(fcl_adapter::treeOf(a).rootBounds(), before) << n;
+  }
+}
+
 TEST(Tree, ConservativeTreesStopAtTheirDepth) {
   for (const bool rule : {false, true}) {
     Options options;
