@@ -1842,7 +1842,14 @@ TEST(SceneMemory, FewContactsAreFoundWithoutWholeTrees) {
   most_bytes = std::size_t{1} << 20;
   EXPECT_NO_THROW(fcl::collide(&a, fcl::Transform3d::Identity(), &b, X, fcl::CollisionRequestd(5, true), few));
   most_bytes = ~std::size_t{0};
-  EXPECT_EQ(few.numContacts(), 5u);
+  ASSERT_EQ(few.numContacts(), 5u);
+  Options by_position;
+  by_position.memory_budget = std::size_t{1} << 30;
+  const Modeld c(mesh, by_position), d(mesh, by_position);
+  fcl::CollisionResultd expected;
+  fcl::collide(&c, fcl::Transform3d::Identity(), &d, X, fcl::CollisionRequestd(5, true), expected);
+  ASSERT_EQ(expected.numContacts(), 5u);
+  for (std::size_t i = 0; i < 5; ++i) EXPECT_EQ(few.getContact(i).b1, expected.getContact(i).b1);
   EXPECT_FALSE(fcl_adapter::treeOf(a).isComplete() && fcl_adapter::treeOf(b).isComplete()) << "there was enough memory";
   fcl::collide(&a, fcl::Transform3d::Identity(), &b, X, fcl::CollisionRequestd(5, true), more);
   EXPECT_EQ(more.numContacts(), 5u);
