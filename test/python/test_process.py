@@ -81,7 +81,7 @@ def test_a_scene_changes_while_it_is_asked():
         for _ in range(60):
             try:
                 hits = scene.collisions(X)
-            except ValueError as error:
+            except (ValueError, RuntimeError) as error:  # before the first state, or between two
                 refused.append(str(error))
                 continue
             expected = hits if expected is None else expected
@@ -89,7 +89,7 @@ def test_a_scene_changes_while_it_is_asked():
     finally:
         stop.set()
         changer.join()
-    assert all("(n, 2, 4, 4) is expected" in words for words in refused)
+    assert all("(n, 2, 4, 4) is expected" in words or "came or went" in words for words in refused)
 
 
 def resident():
