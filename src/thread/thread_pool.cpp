@@ -11,7 +11,7 @@ ThreadPool::ThreadPool(unsigned threads, std::size_t most) {
   if (threads == 0) threads = std::max(1u, std::thread::hardware_concurrency());
   const std::size_t all = std::min<std::size_t>(threads, most);
   try {
-    threads_.reserve(all);  // a thread that has started must have its place
+    if (all > 1) threads_.reserve(all - 1);  // a thread that has started must have its place
     while (threads_.size() + 1 < all) threads_.push_back(startWithoutSignals([this] { wait(); }));
   } catch (const std::exception&) {
     // The system has no more, or no memory for them.

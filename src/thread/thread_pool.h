@@ -38,7 +38,7 @@ class ThreadPool {
     std::exception_ptr failure;
     std::size_t failed = rows;
     std::mutex failing;
-    const std::function<void()> some = [&] {
+    const auto some = [&] {
       for (std::size_t row; (row = next++) < rows;) {
         try {
           if (!work(row)) break;
@@ -51,7 +51,7 @@ class ThreadPool {
       }
     };
     if (rows > 1) {
-      run(some);
+      run(std::ref(some));  // A function of this size would be copied to the heap.
     } else {
       some();
     }

@@ -201,6 +201,15 @@ TEST(Builder, AModelThatIsBeingBuiltIsNoGeometry) {
   EXPECT_THROW(fcl::collide(model.get(), I, model.get(), I, fcl::CollisionRequestd(), result), std::logic_error);
   fcl::DistanceResultd distance;
   EXPECT_THROW(fcl::distance(model.get(), I, model.get(), I, fcl::DistanceRequestd(), distance), std::logic_error);
+  const fcl::Boxd box(1, 1, 1);
+  try {
+    fcl::collide(&box, I, model.get(), I, fcl::CollisionRequestd(), result);
+    ADD_FAILURE();
+  } catch (const std::logic_error& e) {
+    EXPECT_NE(std::string(e.what()).find("bocst::collide: o2 is a bocst::Model between beginModel()"),
+              std::string::npos)
+        << e.what();
+  }
   EXPECT_EQ(model->addSubModel({{0, 0, 0}, {1, 0, 0}}, {fcl::Triangle(0, 1, 2)}), fcl::BVH_OK);
   EXPECT_THROW(model->endModel(), std::invalid_argument) << "there is no vertex 2";
   EXPECT_TRUE(model->empty());

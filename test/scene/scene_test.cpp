@@ -1764,6 +1764,31 @@ TYPED_TEST(SceneTest, WarmQueriesAllocateNothing) {
   EXPECT_EQ(allocations, before);
 }
 
+TYPED_TEST(SceneTest, WarmPairsAllocateNothing) {
+  using S = TypeParam;
+  const auto mesh = test::torus(30).mesh();
+  const Model<S> a(mesh), b(mesh);
+  std::mt19937_64 g(10);
+  std::vector<fcl::Transform3<S>> X;
+  for (int k = 0; k < 100; ++k) X.push_back(randomPose<S>(g, 1.5));
+  std::uint8_t hit[100];
+  fcl::CollisionResult<S> collision;
+  const auto ask = [&] {
+    collidePoses(a, b, X.data(), X.size(), hit, 1);
+    for (const fcl::Transform3<S>& X_AB : X) {
+      isCloserThan<S>(&a, fcl::Transform3<S>::Identity(), &b, X_AB, S(0.05));
+      collision.clear();
+      bocst::collide<S>(&a, fcl::Transform3<S>::Identity(), &b, X_AB, fcl::CollisionRequest<S>(), collision);
+      fcl::DistanceResult<S> distance;
+      bocst::distance<S>(&a, fcl::Transform3<S>::Identity(), &b, X_AB, fcl::DistanceRequest<S>(), distance);
+    }
+  };
+  for (int k = 0; k < 10; ++k) ask();
+  const std::size_t before = allocations;
+  ask();
+  EXPECT_EQ(allocations, before);
+}
+
 // Two flat faces with little space between them are searched over oriented boxes, if there is memory for these.
 TEST(Scene, ClearancesDoNotNeedMemoryForOrientedBoxes) {
   const auto mesh = test::plate(64).mesh();

@@ -5,6 +5,7 @@
 
 #include <cstdlib>
 #include <memory>
+#include <stdexcept>
 
 namespace bocst::fcl_adapter {
 
@@ -13,6 +14,11 @@ std::string typeName(const std::type_info& type) {
   const std::unique_ptr<char, void (*)(void*)> name(abi::__cxa_demangle(type.name(), nullptr, nullptr, &status),
                                                     std::free);
   return status == 0 ? name.get() : type.name();
+}
+
+void refuseStaged(const char* query, const char* argument) {
+  throw std::logic_error(std::string("bocst::") + query + ": " + argument +
+                         " is a bocst::Model between beginModel() and endModel(); call endModel() first");
 }
 
 }  // namespace bocst::fcl_adapter

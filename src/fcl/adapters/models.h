@@ -30,7 +30,14 @@ struct ModelTree {
   static tree::Tree* of(const Model<S>& model) {
     return model.tree_.get();
   }
+  template <typename S>
+  static bool isStaged(const Model<S>& model) {
+    return model.staged_ != nullptr;
+  }
 };
+
+/// @throws std::logic_error: `argument` of a query is a Model between beginModel() and endModel().
+[[noreturn]] void refuseStaged(const char* query, const char* argument);
 
 /// The tree of a model. @throws std::logic_error for an empty one.
 template <typename S>
@@ -57,10 +64,12 @@ PairKind kindOf(const char* query, const fcl::CollisionGeometry<S>* o1, const fc
     }
     if (model1 == model2) return PairKind::kForeign;
   }
-  const auto is_empty = [](const Model<S>* model) {
-    return model != nullptr && ModelTree::of(*model) == nullptr && model->empty();
+  const auto is_empty = [query](const Model<S>* model, const char* argument) {
+    if (model == nullptr || ModelTree::of(*model) != nullptr) return false;
+    if (ModelTree::isStaged(*model)) refuseStaged(query, argument);
+    return true;
   };
-  return is_empty(model1) || is_empty(model2) ? PairKind::kNothing : PairKind::kModel;
+  return is_empty(model1, "o1") || is_empty(model2, "o2") ? PairKind::kNothing : PairKind::kModel;
 }
 
 /// The C++ name of a type, for messages.

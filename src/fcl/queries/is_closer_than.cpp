@@ -9,6 +9,7 @@
 #include "fcl/adapters/validate.h"
 #include "fcl/queries/collide_pair.h"
 #include "fcl/queries/distance_pair.h"
+#include "thread/of_thread.h"
 
 namespace bocst {
 namespace {
@@ -38,7 +39,8 @@ bool isCloserThan(const fcl::CollisionGeometry<S>* o1, const fcl::Transform3<S>&
     case fcl_adapter::PairKind::kForeign:
       throw std::logic_error("bocst::isCloserThan: neither geometry is a bocst::Model");
   }
-  fcl::CollisionResult<S> result;
+  fcl::CollisionResult<S>& result = thread::ofThread<fcl::CollisionResult<S>>();
+  result.clear();
   return fcl_adapter::collidePair<S>(o1, X_W1, o2, X_W2, {}, fcl::CollisionRequest<S>(), result,
                                      static_cast<double>(distance)) > 0;
 }
