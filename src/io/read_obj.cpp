@@ -46,7 +46,7 @@ class ObjReader {
 
   std::string outOfRange(long long index) const {
     return "vertex index " + std::to_string(index) + " out of range, there are " + std::to_string(vertices()) +
-           " vertices";
+           " vertices" + (index == 0 ? ", and OBJ counts from 1" : "");
   }
 
   /// The next word that is not the backslash between two lines.

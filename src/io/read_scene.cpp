@@ -128,6 +128,9 @@ Polygons readScene(const std::string& file, std::string_view content) {
   leaveOut(importer);
   const aiScene* scene = importer.ReadFile(file, 0);
   if (scene == nullptr) {
+    if (!importer.IsExtensionSupported(fs::path(file).extension().string())) {
+      throw std::runtime_error("no known format has this ending; see meshFormats() and `bocst --help`");
+    }
     const std::string& refused = folder->refused();
     throw std::runtime_error(importer.GetErrorString() + (refused.empty() ? "" : " (" + refused + ")"));
   }

@@ -120,6 +120,36 @@ TEST(Builder, ReturnsFclsCodeForWhatIsOutOfSequence) {
   EXPECT_EQ(model.mesh(), nullptr);
 }
 
+TEST(Builder, CodesOfFclAreLoggedOnceForASequence) {
+  std::vector<std::string> seen;
+  setLogger([&seen](LogLevel level, const std::string& message) {
+    EXPECT_EQ(level, LogLevel::kError);
+    seen.push_back(message);
+  });
+  const std::vector<fcl::Vector3d> points{{0, 0, 0}, {1, 0, 0}, {0, 1, 0}};
+  Modeld model;
+  for (int i = 0; i < 3; ++i) model.addSubModel(points, {fcl::Triangle(0, 1, 2)});
+  model.endModel();
+  model.beginModel();
+  model.endModel();
+  model.beginUpdateModel();
+  model.updateVertex(points[0]);
+  model.endUpdateModel();
+  model.beginModel();
+  model.addSubModel(points, {fcl::Triangle(0, 1, 2)});
+  EXPECT_EQ(model.endModel(), fcl::BVH_OK);
+  model.beginUpdateModel();
+  model.updateVertex(points[0]);
+  EXPECT_EQ(model.endUpdateModel(), fcl::BVH_ERR_INCORRECT_DATA);
+  setLogger({});
+  ASSERT_EQ(seen.size(), 5u);
+  EXPECT_EQ(seen[0], "Model::endModel() without beginModel()");
+  EXPECT_EQ(seen[1], "Model::endModel() after nothing was added; the model is empty");
+  EXPECT_EQ(seen[2], "Model::beginUpdateModel() of an empty model");
+  EXPECT_EQ(seen[3], "Model::endUpdateModel() without beginUpdateModel()");
+  EXPECT_EQ(seen[4], "Model::endUpdateModel() after 1 positions; the mesh has 3 vertices and keeps its own");
+}
+
 TEST(Builder, MovesVertices) {
   const test::Raw raw = test::box({0, 0, 0}, {1, 1, 1});
   Modeld model(raw.mesh());

@@ -752,6 +752,20 @@ TEST_F(SceneProgram, ShowsTheDigitsThatAreOutsideOfALimit) {
   }
 }
 
+TEST_F(SceneProgram, DoubtsDegreesAndSwappedLimits) {
+  const auto outOf = [this](const char* limits) {
+    const std::string urdf =
+        write("one.urdf", std::string("<robot name='r'><link name='a'/><link name='b'><collision><geometry><sphere "
+                                      "radius='1'/></geometry></collision></link><joint name='j' type='revolute'>"
+                                      "<parent link='a'/><child link='b'/><axis xyz='0 0 1'/><limit ") +
+                              limits + " effort='1' velocity='1'/></joint></robot>");
+    return run("scene " + urdf + " --states " + write("one.csv", "j\n45\n") + " --no-fcl").out;
+  };
+  const std::string degrees = outOf("lower='-2' upper='2'"), swapped = outOf("lower='2' upper='-2'");
+  EXPECT_NE(degrees.find("j 45 is not in -2 to 2 (radians; is it given in degrees?)"), std::string::npos) << degrees;
+  EXPECT_NE(swapped.find("j: its lower limit 2 is above its upper limit -2"), std::string::npos) << swapped;
+}
+
 TEST_F(SceneProgram, TakesTheOptionsOfAModel) {
   const std::string cell = "scene " + example("cell.json");
   const Json exact = json(cell);

@@ -774,6 +774,21 @@ TEST_F(SceneFile, LinksThatAreOnlySeenAreNoted) {
   EXPECT_EQ(s.notes, std::vector<std::string>{"links with a <visual> and no <collision> are not checked: arm"});
 }
 
+TEST_F(SceneFile, PartsInAnotherLengthUnitAreNoted) {
+  const auto notesOf = [this](const std::string& scale) {
+    write("cube.off", "OFF 8 2 0 0 0 0 1 0 0 0 1 0 0 0 1 1 1 1 1 1 0 0 1 1 1 0 1 3 0 1 2 3 0 1 3");
+    return scene(R"({"objects": [{"name": "a", "sphere": 0.5, "moving": true, "pose": [0, 0, 0]},
+        {"name": "b", "box": [1, 0.1, 0.1]}, {"name": "cup", "mesh": "cube.off", "scale": )" +
+                 scale + "}]}")
+        .notes;
+  };
+  EXPECT_TRUE(notesOf("290").empty());
+  const std::vector<std::string> notes = notesOf("1000");
+  ASSERT_EQ(notes.size(), 1u);
+  EXPECT_EQ(notes[0],
+            "cup has the size 1000, most parts have 1.00; is it in another length unit (\"scale\" converts it)?");
+}
+
 TEST_F(SceneFile, AnAttachedObjectMayTouchTheLinksAroundItsFrame) {
   robot(link("arm", kSphere) + link("wrist", kSphere) + link("flange") + link("tool0") + link("finger", kSphere) +
         joint("q", "continuous", "arm", "wrist") + joint("f1", "fixed", "wrist", "flange") +
@@ -846,7 +861,8 @@ TEST_F(SceneFile, SaysWhereASceneIsWrong) {
   complains(objects(R"({"name": "a", "mesh": "none.stl"})"), "objects[0].mesh: ");
   complains(objects(R"({"name": "a", "mesh": "none.stl"})"), "no such file");
   complains(objects(R"({"name": "a", "mesh": "tetra.off", "scale": 1e100})"), "objects[0].mesh: ");
-  complains(objects(R"({"name": "a", "mesh": "tetra.off", "scale": [1, 0, 1]})"), "objects[0].mesh: a scale is");
+  complains(objects(R"({"name": "a", "mesh": "tetra.off", "scale": [1, 0, 1]})"),
+            "objects[0].scale: the scale must not be 0");
   complains(objects(R"({"name": "a", "sphere": 1, "scale": 2})"), "\"scale\" is for meshes");
   complains(objects(R"({"name": "a", "sphere": 1, "pose": [1, 2, 3, 4]})"),
             "objects[0].pose: a list of 3 or 7 numbers or {\"xyz\": [x, y, z], \"rpy\": [roll, pitch, yaw]} expected");
@@ -875,7 +891,8 @@ TEST_F(SceneFile, SaysWhereASceneIsWrong) {
             "states[0]: no moving joint or object is called 'bal'. Did you mean ball?");
   complains(objects(ball, R"(, "states": [{"ball.x": 1}])"),
             "states[0]: no moving joint or object is called 'ball.x'. Write \"ball\": [x, y, z].");
-  complains(objects(R"({"name": "a", "sphere": 1, "moving": true})", R"(, "states": [{}])"), "states[0]: missing: a");
+  complains(objects(R"({"name": "a", "sphere": 1, "moving": true})", R"(, "states": [{}])"),
+            "states[0]: missing: the pose of object a");
   const auto whole = [&](const std::string& json, const std::string& what) {
     try {
       scene(json);

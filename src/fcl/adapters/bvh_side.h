@@ -329,7 +329,8 @@ class BvhSide : public query::CompleteSide {
   template <typename BV>
   static const char* nodesOf(const char* query, const fcl::BVHModel<BV>& bvh) {
     if (bvh.getModelType() != fcl::BVH_MODEL_TRIANGLES || bvh.num_tris <= 0 || bvh.getNumBVs() <= 0) {
-      throw std::invalid_argument(std::string("bocst::") + query + ": the BVHModel is not a finished triangle mesh");
+      throw std::invalid_argument(std::string("bocst::") + query +
+                                  ": the BVHModel has no triangles or no tree (endModel() builds it)");
     }
     return reinterpret_cast<const char*>(static_cast<const fcl::BVNodeBase*>(&bvh.getBV(0)));
   }

@@ -43,7 +43,7 @@ struct ModelTree {
 template <typename S>
 tree::Tree& treeOf(const Model<S>& model) {
   tree::Tree* const tree = ModelTree::of(model);
-  if (tree == nullptr) throw std::logic_error("bocst::Model: the model is empty");
+  if (tree == nullptr && model.empty()) throw std::logic_error("bocst::Model: the model is empty");
   return *tree;
 }
 

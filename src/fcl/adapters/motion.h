@@ -133,7 +133,8 @@ std::unique_ptr<query::Motion> motionOf(const fcl::Transform3<S>& begin, const f
     case fcl::CCDM_SPLINE:
       return std::make_unique<query::SplineMotion>(query::spline(X, Y));
   }
-  throw std::invalid_argument("bocst::continuousCollide: ccd_motion_type is none of FCL's");
+  throw std::invalid_argument("bocst: the motion type " + std::to_string(static_cast<int>(type)) +
+                              " is none of fcl::CCDMotionType");
 }
 
 }  // namespace bocst::fcl_adapter

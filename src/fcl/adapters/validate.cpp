@@ -58,7 +58,7 @@ void refuseUnlessRigid(const char* query, const char* argument, const Eigen::Iso
 
 void checkTolerance(const char* query, const char* argument, double tolerance) {
   if (!(tolerance >= 0) || !std::isfinite(tolerance)) {
-    refuse(query, argument, "is " + text(tolerance) + ", which is no tolerance");
+    refuse(query, argument, "is " + text(tolerance) + ", not a finite number of at least 0");
   }
 }
 

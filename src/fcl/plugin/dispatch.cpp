@@ -43,7 +43,7 @@ std::string complaint() {
          "> in this process does not reach bocst, so code that was compiled without <bocst/fcl.h> would be told that "
          "nothing collides. There are three ways to fix this. (1) Link the executable with libbocst before libfcl, and "
          "keep it, also if only a plugin of the executable uses bocst (CMake: target_link_libraries(app bocst::bocst "
-         "...) with bocst::bocst before fcl; else -Wl,--no-as-needed -lbocst -lfcl). (2) Load libbocst first "
+         "...) with bocst::bocst before fcl; else -Wl,--no-as-needed -lbocst -lfcl -lccd). (2) Load libbocst first "
          "(LD_PRELOAD=libbocst.so; in Python, before anything that loads libfcl). With (1) and (2), code that makes "
          "its "
          "own copies of FCL's templates (anything in float, a query with a solver) must be compiled without "

@@ -10,6 +10,7 @@
 #include "fcl/adapters/models.h"
 #include "fcl/plugin/dispatch.h"
 #include "fcl/queries/query_scope.h"
+#include "log/log.h"
 #include "tree/tree.h"
 
 namespace bocst {
@@ -49,6 +50,12 @@ void setBounds(fcl::CollisionGeometry<S>& geometry, Eigen::AlignedBox3d b, doubl
 template <typename S>
 void setBoundsByBox(fcl::CollisionGeometry<S>& geometry, const tree::Tree& tree) {
   setBounds(geometry, tree.bounds(), tree.options().margin, HUGE_VAL);
+}
+
+/// The codes of FCL's builder are easily ignored; what ends a sequence of calls says so, once.
+int refused(const std::string& call, int code) {
+  log(LogLevel::kError, "Model::" + call);
+  return code;
 }
 
 }  // namespace
@@ -132,16 +139,23 @@ int Model<S>::addSubModel(const std::vector<fcl::Vector3<S>>& ps) {
 
 template <typename S>
 int Model<S>::endModel() {
-  if (staged_ == nullptr || staged_->update) return fcl::BVH_ERR_BUILD_OUT_OF_SEQUENCE;
+  if (staged_ == nullptr || staged_->update) {
+    return refused("endModel() without beginModel()", fcl::BVH_ERR_BUILD_OUT_OF_SEQUENCE);
+  }
   const std::unique_ptr<Staged> staged = std::move(staged_);
-  if (staged->vertices.empty() && staged->triangles.empty()) return fcl::BVH_ERR_BUILD_EMPTY_MODEL;
+  if (staged->vertices.empty() && staged->triangles.empty()) {
+    return refused("endModel() after nothing was added; the model is empty", fcl::BVH_ERR_BUILD_EMPTY_MODEL);
+  }
   setMesh(std::make_shared<const Mesh>(std::move(staged->vertices), staged->triangles));
   return fcl::BVH_OK;
 }
 
 template <typename S>
 int Model<S>::beginUpdateModel() {
-  if (tree_ == nullptr || staged_ != nullptr) return fcl::BVH_ERR_BUILD_OUT_OF_SEQUENCE;
+  if (tree_ == nullptr || staged_ != nullptr) {
+    return refused(tree_ == nullptr ? "beginUpdateModel() of an empty model" : "beginUpdateModel() twice",
+                   fcl::BVH_ERR_BUILD_OUT_OF_SEQUENCE);
+  }
   staged_ = std::make_unique<Staged>(Staged{true, {}, {}});
   return fcl::BVH_OK;
 }
@@ -165,10 +179,16 @@ int Model<S>::updateSubModel(const std::vector<fcl::Vector3<S>>& ps) {
 
 template <typename S>
 int Model<S>::endUpdateModel(bool, bool) {
-  if (staged_ == nullptr || !staged_->update) return fcl::BVH_ERR_BUILD_OUT_OF_SEQUENCE;
+  if (staged_ == nullptr || !staged_->update) {
+    return refused("endUpdateModel() without beginUpdateModel()", fcl::BVH_ERR_BUILD_OUT_OF_SEQUENCE);
+  }
   const std::unique_ptr<Staged> staged = std::move(staged_);
   const std::shared_ptr<const Mesh> before = mesh();
-  if (before != nullptr && staged->vertices.size() != before->vertexCount()) return fcl::BVH_ERR_INCORRECT_DATA;
+  if (before != nullptr && staged->vertices.size() != before->vertexCount()) {
+    return refused("endUpdateModel() after " + std::to_string(staged->vertices.size()) + " positions; the mesh has " +
+                       std::to_string(before->vertexCount()) + " vertices and keeps its own",
+                   fcl::BVH_ERR_INCORRECT_DATA);
+  }
   updateVertices(std::move(staged->vertices));
   return fcl::BVH_OK;
 }

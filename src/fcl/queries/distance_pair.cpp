@@ -262,7 +262,7 @@ void sign(const DistanceQuery<S>& q) {
   collidePair<S>(q.o1, q.X_W1, q.o2, q.X_W2, {}, request, contacts, 0.0);
   if (!contacts.isCollision()) return;
   const fcl::Contact<S>& contact = contacts.getContact(0);
-  q.result.min_distance = -contact.penetration_depth;
+  q.result.min_distance = S(0) - contact.penetration_depth;  // never -0
   q.result.b1 = contact.b1;
   q.result.b2 = contact.b2;
   if (q.request.enable_nearest_points) q.result.nearest_points[0] = q.result.nearest_points[1] = contact.pos;

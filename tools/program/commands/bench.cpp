@@ -174,7 +174,7 @@ void addBench(CLI::App& program, Job& job) {
   command->footer(kOfScenarios);
   command->add_option("a", bench->request.file_a, std::string("A: ") + kMeshFile)->required();
   command->add_option("b", bench->request.file_b, "B: mesh file; default: A");
-  command->add_option("--scenarios", bench->scenarios, "scenarios to measure")
+  command->add_option("--scenarios", bench->scenarios, "scenarios to measure, separated by commas")
       ->check(CLI::IsMember(choices()))
       ->delimiter(',')
       ->allow_extra_args(false)

@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #include <CLI/CLI.hpp>
 #include <algorithm>
+#include <cmath>
 #include <iostream>
 #include <limits>
 #include <memory>
@@ -69,11 +70,18 @@ class SceneReport {
     for (const OutsideLimits& outside : setup_.outsideLimits(setup_.states[state])) {
       const Joint& joint = setup_.robot->joints()[outside.joint];
       const double lower = joint.limits->lower, upper = joint.limits->upper;
+      const bool is_many_turns = joint.kind == Joint::Kind::kRevolute && std::abs(outside.value) > 7;
       const std::string value = formatPlain(outside.value);
       // Twelve digits are easier to read, but may not show what is outside.
       const bool all_digits = value == formatPlain(lower) || value == formatPlain(upper);
+      if (lower > upper) {
+        texts.push_back(joint.name + ": its lower limit " + formatPlain(lower) + " is above its upper limit " +
+                        formatPlain(upper));
+        continue;
+      }
       const auto text = [all_digits](double number) { return all_digits ? formatExact(number) : formatPlain(number); };
-      texts.push_back(joint.name + " " + text(outside.value) + " is not in " + text(lower) + " to " + text(upper));
+      texts.push_back(joint.name + " " + text(outside.value) + " is not in " + text(lower) + " to " + text(upper) +
+                      (is_many_turns ? " (radians; is it given in degrees?)" : ""));
     }
     return texts;
   }
@@ -383,7 +391,8 @@ void addScene(CLI::App& program, Job& job) {
   CLI::App* command = program.add_subcommand(
       "scene", "check states of a robot or of other moving objects for collision with obstacles");
   command->footer(
-      "FILE is a scene file (JSON with objects, a robot, pairs that may touch and states; see share/doc/scene.md)\n"
+      "FILE is a scene file (JSON with objects, a robot, pairs that may touch and states; see "
+      "share/doc/scene-program.md)\n"
       "or a URDF.\n"
       "States are the lines of a table (CSV, or separated by blanks). Its first line names the columns: each movable\n"
       "joint that does not mimic another, and for each moving object NAME.x, .y, .z with .qw, .qx, .qy, .qz or .roll,\n"

@@ -8,6 +8,7 @@
 #include <sstream>
 #include <stdexcept>
 
+#include "cli/report.h"
 #include "io/text.h"
 #include "pairs/cells.h"
 
@@ -83,7 +84,9 @@ Pose Pose::parse(const std::string& text, RotationFormat format) {
 Pose Pose::of(const std::array<double, 7>& given, RotationFormat format) {
   const auto& [x, y, z, r0, r1, r2, r3] = given;
   for (const double number : given) {
-    if (!std::isfinite(number)) throw std::invalid_argument("a pose must have finite numbers");
+    if (!std::isfinite(number)) {
+      throw std::invalid_argument("a pose must have finite numbers; one of them is " + formatPlain(number));
+    }
   }
   Pose pose;
   pose.numbers = given;
@@ -93,7 +96,8 @@ Pose Pose::of(const std::array<double, 7>& given, RotationFormat format) {
     pose.numbers = {x, y, z, qw, qx, qy, qz};
   }
   const double norm = pose.quaternionNorm();
-  if (!(norm > 1e-100) || !std::isfinite(norm)) throw std::invalid_argument("the quaternion cannot be normalised");
+  if (!(norm > 1e-100) || !std::isfinite(norm))
+    throw std::invalid_argument("the quaternion has the length " + formatPlain(norm) + " and is no rotation");
   return pose;
 }
 

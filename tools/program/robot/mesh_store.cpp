@@ -23,8 +23,7 @@ std::shared_ptr<const Mesh> scaled(const std::shared_ptr<const Mesh>& mesh, cons
 }  // namespace
 
 std::shared_ptr<const Mesh> MeshStore::get(const std::string& file, const Eigen::Vector3d& scale) {
-  if (!scale.allFinite() || (scale.array() == 0).any())
-    throw std::runtime_error("a scale is invalid: it must be finite and not 0");
+  if (!scale.allFinite() || (scale.array() == 0).any()) throw std::runtime_error("the scale must be finite and not 0");
   std::error_code error;
   const fs::path canonical = fs::weakly_canonical(file, error);
   const std::string name = error ? file : canonical.string();

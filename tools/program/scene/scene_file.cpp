@@ -9,6 +9,7 @@
 #include <vector>
 
 #include "cli/file.h"
+#include "cli/report.h"
 #include "cli/suggest.h"
 #include "cli/words.h"
 #include "robot/mesh_store.h"
@@ -48,6 +49,7 @@ Json parseJson(const std::string& file, const std::string& text) {
     what.erase(0, what.find("] ") + 2);
     const std::string at = "parse error at ";
     if (what.rfind(at, 0) == 0) what.erase(0, at.size());
+    if (text.find_first_of("{[") == std::string::npos) what += "; a scene file (JSON) or a URDF is expected";
     throw std::runtime_error(file + ": " + what);
   }
 }
@@ -69,6 +71,7 @@ class Reader {
       readStates(&root);
     }
     checkSomethingIsAsked();
+    noteSizes();
     warnOfNorms();
     return std::move(setup_);
   }
@@ -116,6 +119,34 @@ class Reader {
     }
     if (names.empty()) return;
     setup_.notes.push_back("links with a <visual> and no <collision> are not checked: " + joined(names, ", "));
+  }
+
+  /// A mesh in millimetres among parts in metres is 1000 times as large.
+  void noteSizes() {
+    constexpr double kRatio = 300;
+    std::vector<double> sizes;
+    for (std::size_t i = 0; i < setup_.partCount(); ++i) {
+      if (!setup_.part(i).shapes.empty()) sizes.push_back(sizeOf(setup_.part(i)));
+    }
+    if (sizes.size() < 3) return;
+    std::nth_element(sizes.begin(), sizes.begin() + static_cast<std::ptrdiff_t>(sizes.size() / 2), sizes.end());
+    const double usual = sizes[sizes.size() / 2];
+    for (std::size_t i = 0; i < setup_.partCount(); ++i) {
+      const double size = sizeOf(setup_.part(i));
+      if (!(size > kRatio * usual)) continue;
+      setup_.notes.push_back(setup_.part(i).name + " has the size " + formatNumber(size, 3) + ", most parts have " +
+                             formatNumber(usual, 3) + "; is it in another length unit (\"scale\" converts it)?");
+    }
+  }
+
+  /// The longest edge of a part's meshes and bodies, each about its own frame.
+  static double sizeOf(const Part& part) {
+    double size = 0;
+    for (const PlacedShape& placed : part.shapes) {
+      const Shape& shape = placed.shape;
+      size = std::max(size, shape.mesh != nullptr ? shape.mesh->bounds().sizes().maxCoeff() : shape.size.maxCoeff());
+    }
+    return size;
   }
 
   void addRobot(const XmlFile& urdf, const std::string& own_srdf) {
@@ -236,6 +267,7 @@ class Reader {
         const std::vector<double> numbers = given.numbers(3);
         scale = {numbers[0], numbers[1], numbers[2]};
       }
+      if ((scale.array() == 0).any()) given.complain("the scale must not be 0");
     }
     const std::string at = path(file);
     try {

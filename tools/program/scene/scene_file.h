@@ -21,7 +21,7 @@ struct SceneArguments {
   Adjacent adjacent = Adjacent::kAsSrdf;
 };
 
-/// Reads all that the arguments name; share/doc/scene.md describes the scene file.
+/// Reads all that the arguments name; share/doc/scene-program.md describes the scene file.
 /// @throws std::runtime_error that names the file and the line or the element.
 SceneSetup readScene(const SceneArguments& arguments);
 

@@ -118,8 +118,7 @@ class Columns {
   void checkObject(std::size_t i) const {
     const unsigned given = given_[i];
     const std::string& name = names_.objects[i];
-    if (given == 0 && !names_.X_WO[i])
-      throw std::invalid_argument("columns are missing: " + printable(name) + ".x and so on");
+    if (given == 0 && !names_.X_WO[i]) throw std::invalid_argument(neededColumns(name));
     const bool whole =
         given == 0 || given == kPosition || given == (kPosition | kQuaternion) || given == (kPosition | kAngles);
     if (!whole) {
@@ -207,11 +206,11 @@ State stateOfJson(const JsonElement& element, const StateNames& names) {
   }
   std::vector<std::string> missing;
   for (std::size_t i = 0; i < joints.size(); ++i) {
-    if (!joints[i]) missing.push_back(names.joints[i]);
+    if (!joints[i]) missing.push_back("joint " + names.joints[i]);
     state.joints[i] = joints[i].value_or(0);
   }
   for (std::size_t i = 0; i < objects.size(); ++i) {
-    if (!objects[i]) missing.push_back(names.objects[i]);
+    if (!objects[i]) missing.push_back("the pose of object " + names.objects[i]);
     state.objects.push_back(objects[i].value_or(Eigen::Isometry3d::Identity()));
   }
   if (!missing.empty()) element.complain("missing: " + joined(missing, ", "));
