@@ -92,7 +92,8 @@ namespace bocst {
 ///     n = (p1 - p2) / |p1 - p2|,   d = |p1 - p2| + m,   pos = (p1 + p2) / 2
 /// If o2 moves by |p1 - p2| n, the surfaces touch; to separate the two, o2 must move by at least d. With a BVHModel,
 /// such a query takes time linear in the number of its triangles if the bounding spheres overlap. Planes and
-/// half-spaces are unbounded, so they are never inside a geometry.
+/// half-spaces are unbounded, so they are never inside a geometry. If several pairs of points are equally near up to
+/// rounding, p1 and p2 are any of them, and earlier queries may change which.
 ///
 /// **Costs.** enable_cost adds the overlaps of the primitives' world-frame boxes, as FCL does. With shapes and octrees,
 /// use_approximate_cost adds those of the whole mesh's bounding box instead (unlike FCL, also for occupied cells).
