@@ -337,7 +337,7 @@ struct DeepPairs {
     }
   }
 
-  Ids ask(const Modeld& a, const Modeld& b, std::size_t i, std::size_t most) const {
+  Ids ask(const fcl::CollisionGeometryd& a, const fcl::CollisionGeometryd& b, std::size_t i, std::size_t most) const {
     return idsOf(bocst::ask(a, fcl::Transform3d::Identity(), b, poses[i], most));
   }
 
@@ -375,6 +375,43 @@ TEST(FewContacts, OfDeepPairsAreSomeOfAllWhateverHappenedBefore) {
   EXPECT_GT(others, asked / 2) << "so they were not chosen by position";
 }
 
+template <typename BV>
+void expectTheSameBesideBvh() {
+  const DeepPairs pairs;
+  const auto bvh = test::bvh<BV>(pairs.two);
+  std::size_t others = 0, asked = 0;
+  for (const bool is_second : {false, true}) {
+    const auto askOf = [&](const Modeld& model, std::size_t i, std::size_t most) {
+      return is_second ? pairs.ask(*bvh, model, i, most) : pairs.ask(model, *bvh, i, most);
+    };
+    for (const std::size_t most : {1, 5, 60}) {
+      const Modeld a(pairs.one.mesh()), placed(pairs.one.mesh(), byPosition());
+      for (std::size_t i = 0; i < pairs.poses.size(); ++i) {
+        const Ids few = askOf(a, i, most), all = askOf(a, i, 1000000);
+        ASSERT_TRUE(std::is_sorted(few.begin(), few.end()));
+        ASSERT_TRUE(std::includes(all.begin(), all.end(), few.begin(), few.end()));
+        ASSERT_EQ(few.size(), std::min(most, all.size()));
+        others += few != askOf(placed, i, most);
+        ++asked;
+        Modeld b(pairs.one.mesh());
+        ASSERT_EQ(askOf(b, i, most), few) << i;
+        Clock::time_point now = Clock::now();
+        for (const int levels : {1, 2, 5}) {
+          for (int k = 0; k < levels; ++k) b.prune(now += std::chrono::hours(1));
+          askOf(b, (i + 1) % pairs.poses.size(), 1000000);
+          ASSERT_EQ(askOf(b, i, most), few) << i;
+        }
+      }
+    }
+  }
+  EXPECT_GT(others, asked / 2) << "so they were not chosen by position";
+}
+
+TEST(FewContacts, BesideABvhModelAreSomeOfAllWhateverHappenedBefore) {
+  expectTheSameBesideBvh<fcl::OBBRSSd>();
+  expectTheSameBesideBvh<fcl::AABBd>();
+}
+
 TEST(FewContacts, OfPairsThatDoNotTouchNeedNoWholeTree) {
   const Raw ring = test::torus(80);  // so large that growth begins by parts
   const Modeld a(ring.mesh()), b(Raw(ring).scale(0.2).mesh());
@@ -383,6 +420,12 @@ TEST(FewContacts, OfPairsThatDoNotTouchNeedNoWholeTree) {
   EXPECT_FALSE(fcl_adapter::treeOf(a).isComplete());
   EXPECT_FALSE(ask(a, I, b, test::pose<double>(Eigen::Matrix3d::Identity(), {0.4, 0, 0}), 1).empty());
   EXPECT_TRUE(fcl_adapter::treeOf(a).isComplete());
+  const Modeld c(ring.mesh());
+  const auto bvh = test::bvh<fcl::OBBRSSd>(Raw(ring).scale(0.2));
+  EXPECT_TRUE(ask(c, I, *bvh, I, 1).empty());
+  EXPECT_FALSE(fcl_adapter::treeOf(c).isComplete());
+  EXPECT_FALSE(ask(c, I, *bvh, test::pose<double>(Eigen::Matrix3d::Identity(), {0.4, 0, 0}), 1).empty());
+  EXPECT_TRUE(fcl_adapter::treeOf(c).isComplete());
 }
 
 // Which of the trees are built whole, and which contacts are first, is the same on each instruction set.
@@ -391,9 +434,13 @@ class FewContactsOnTarget : public test::EveryTarget {
   static std::vector<Ids> answers() {
     const DeepPairs pairs;
     const Modeld a(pairs.one.mesh()), b(pairs.two.mesh());
+    const auto bvh = test::bvh<fcl::OBBRSSd>(pairs.two);
     std::vector<Ids> found;
     for (std::size_t i = 0; i < pairs.poses.size(); ++i) {
-      for (const std::size_t most : {1, 5, 60}) found.push_back(pairs.ask(a, b, i, most));
+      for (const std::size_t most : {1, 5, 60}) {
+        found.push_back(pairs.ask(a, b, i, most));
+        found.push_back(pairs.ask(a, *bvh, i, most));
+      }
     }
     return found;
   }
@@ -414,8 +461,10 @@ TEST(FewContacts, OfVerticesThatChangedAreThoseOfTheLeastPosition) {
   const Modeld b(pairs.two.mesh());
   a.updateVertices(pairs.one.vertices);
   const Modeld placed_a(pairs.one.mesh(), byPosition()), placed_b(pairs.two.mesh(), byPosition());
+  const auto bvh = test::bvh<fcl::OBBRSSd>(pairs.two);
   for (std::size_t i = 0; i < pairs.poses.size(); ++i) {
     EXPECT_EQ(pairs.ask(a, b, i, 5), pairs.ask(placed_a, placed_b, i, 5)) << i;
+    EXPECT_EQ(pairs.ask(a, *bvh, i, 5), pairs.ask(placed_a, *bvh, i, 5)) << i;
   }
 }
 

@@ -53,6 +53,15 @@ struct CollideQuery : OrderedPair<S> {
     return !endsAtFirst() && contactsLeft() > 0 && contactsLeft() <= kMostOfFew && !request.enable_cost;
   }
 
+  /// So few of them may be those that a walk in order over complete trees finds first. Only what never changes decides
+  /// this, so that the same query gets the same contacts.
+  bool mayTakeInOrder() const {
+    constexpr std::size_t kMostContacts = 256;
+    return wantsFew() && contactsLeft() <= kMostContacts && margin == 0;
+  }
+  /// After so many pairs of leaves such a walk gives up. Few are enough unless surfaces hardly touch.
+  std::size_t mostLeafPairs() const { return 32 + contactsLeft(); }
+
   /// Adds a contact if there is room; `contact` (world frame) may be null where contacts are not enabled. True when
   /// nothing more is asked for.
   bool addContact(std::intptr_t b1, std::intptr_t b2, const query::ContactPoint* contact) const {

@@ -158,14 +158,8 @@ class TreesCollision {
     return false;
   }
 
-  // Few contacts of trees that can be complete are those that a walk in order finds first, where the outlines overlap
-  // by more than a little and it does not take long. Only what never changes decides this, so that the same query gets
-  // the same contacts.
-  bool takesInOrder() const {
-    constexpr std::size_t kMostContacts = 256;
-    return q_.wantsFew() && q_.contactsLeft() <= kMostContacts && q_.margin == 0 && a_.tree().isBuiltForFew() &&
-           b_.tree().isBuiltForFew();
-  }
+  // Where the outlines overlap by more than a little.
+  bool takesInOrder() const { return q_.mayTakeInOrder() && a_.tree().isBuiltForFew() && b_.tree().isBuiltForFew(); }
 
   // Builds the two trees, if they are not complete and any contact shows that they are needed. False if there is none.
   // `has_room` becomes false where there is no memory for them.
@@ -189,8 +183,6 @@ class TreesCollision {
 
   // False where it gave up.
   bool walkInOrder(MeshCollector<S>& collector) const {
-    // Few pairs of leaves are enough unless surfaces hardly touch.
-    constexpr std::size_t kLeafPairs = 32;
     // The trees may have other roots than those that the query's sides have seen.
     const query::TreeSide a(a_.tree(), a_.now()), b(b_.tree(), b_.now());
     query::TreeWalk walk(a, b, near_);
@@ -199,7 +191,7 @@ class TreesCollision {
     // touch.
     if (query::outlinesHardlyOverlap(a, b, near_) || query::outlinesCoincide(a, b, near_)) return false;
     collector.beginInOrder();
-    const query::WalkEnd end = walk.runInOrder(collector, kLeafPairs + q_.contactsLeft());
+    const query::WalkEnd end = walk.runInOrder(collector, q_.mostLeafPairs());
     collector.endInOrder(end.gave_up);
     return !end.gave_up;
   }

@@ -57,6 +57,15 @@ class PairWalk {
     return {ended && !gave_up_, steps_, gave_up_};
   }
 
+  /// Over complete trees with exact answers: pairs of leaves come in an order that culling does not change, and the
+  /// visitor is told when all of a pair has come. Gives up after so many pairs of leaves.
+  WalkEnd runInOrder(std::size_t most_leaf_pairs) {
+    in_order_ = true;
+    most_leaf_pairs_ = most_leaf_pairs;
+    cut_ = nullptr;
+    return run(kNoLimit);
+  }
+
  private:
   using Pair = typename DeferredPairs<A, B>::Pair;
 
@@ -196,6 +205,9 @@ class PairWalk {
   static constexpr std::size_t kLongWalk = 128;
   static constexpr double kMuchLarger = 4;
 
+  // Steps depend on what is packed, which must not change an order.
+  bool isLong() const { return steps_ >= kLongWalk && !in_order_; }
+
   // The larger of two nodes is expanded, unless it is a leaf.
   static bool expandsA(State sa, State sb, double size_a, double size_b) {
     return sb == State::kLeaf || (sa != State::kLeaf && size_a >= size_b);
@@ -220,7 +232,7 @@ class PairWalk {
           s.stack.push_back({c, pair.b, triangles});
         };
         if constexpr (!B::kBodies) {
-          if (sb == State::kLeaf && steps_ >= kLongWalk && kMuchLarger * seen_a_.size < size_b) {
+          if (sb == State::kLeaf && isLong() && kMuchLarger * seen_a_.size < size_b) {
             childrenBesideLeaf(a_, pair.a, volumeOf(b_, seen_b_), b_in_a_, s.large_b, b_, pair.b, pair.triangles, push);
             return false;
           }
@@ -241,7 +253,7 @@ class PairWalk {
       const auto push = [&](typename B::Node c, std::uint32_t triangles = ~0u) {
         s.stack.push_back({pair.a, c, triangles});
       };
-      if (sa == State::kLeaf && steps_ >= kLongWalk && kMuchLarger * size_b < seen_a_.size) {
+      if (sa == State::kLeaf && isLong() && kMuchLarger * size_b < seen_a_.size) {
         childrenBesideLeaf(b_, pair.b, volumeOf(a_, seen_a_), a_in_b_, s.large_a, a_, pair.a, pair.triangles, push);
       } else {
         b_.overlappingChildren(pair.b, volumeOf(a_, seen_a_), a_in_b_, push);
@@ -308,6 +320,7 @@ class PairWalk {
       }
       return false;
     } else {
+      if (in_order_) return leafTrianglesInOrder(pair, s);
       const std::size_t before = s.leaves.tested();
       const auto visit = [this](std::uint32_t t, std::uint32_t u, bool certain) {
         if (!certain) steps_ += kExactTest;
@@ -318,6 +331,16 @@ class PairWalk {
       steps_ += (s.leaves.tested() - before) / kTrianglePairs;
       return ended;
     }
+  }
+
+  bool leafTrianglesInOrder(const Pair& pair, Scratch& s) {
+    gave_up_ = ++leaf_pairs_ > most_leaf_pairs_;
+    if (gave_up_) return true;
+    s.leaves.test(a_, pair.a, b_, pair.b, [this](std::uint32_t t, std::uint32_t u, bool certain) {
+      visitor_.triangles(t, u, certain);
+      return false;
+    });
+    return visitor_.endLeaves();
   }
 
   // Neither side has children to go on with.
@@ -446,9 +469,9 @@ class PairWalk {
   const SimilarityTransform here_, b_in_a_, a_in_b_;
   V& visitor_;
   const bool spheres_;
-  const Cut* const cut_;
-  bool gave_up_ = false;
-  std::size_t steps_ = 0, most_steps_ = 0;
+  const Cut* cut_;
+  bool gave_up_ = false, in_order_ = false;
+  std::size_t steps_ = 0, most_steps_ = 0, leaf_pairs_ = 0, most_leaf_pairs_ = 0;
 };
 
 /// A walk over the blocks of one model or two and one over their oriented boxes in turns, until one ends: the visitor
