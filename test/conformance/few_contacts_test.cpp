@@ -279,9 +279,9 @@ TEST(FewContacts, BesideCellsAndShapes) {
                     : round % 3 == 1 ? cloud(g)
                                      : test::torus(9);
     const auto mesh = raw.mesh();
-    Options octree_options;
+    Options octree_options = byPosition();
     octree_options.subdivision = Subdivision::kOctree;
-    Modeld model(mesh), fresh(mesh), octants(mesh, octree_options);
+    Modeld model(mesh, byPosition()), fresh(mesh, byPosition()), octants(mesh, octree_options);
     model.buildTree();
     octants.expandAll(3 + round % 5);
     const auto rotation = [&] { return Eigen::Quaterniond(u(g), u(g), u(g), u(g)).normalized().toRotationMatrix(); };
@@ -375,14 +375,11 @@ TEST(FewContacts, OfDeepPairsAreSomeOfAllWhateverHappenedBefore) {
   EXPECT_GT(others, asked / 2) << "so they were not chosen by position";
 }
 
-template <typename BV>
-void expectTheSameBesideBvh() {
-  const DeepPairs pairs;
-  const auto bvh = test::bvh<BV>(pairs.two);
+void expectTheSameBeside(const DeepPairs& pairs, const fcl::CollisionGeometryd& partner) {
   std::size_t others = 0, asked = 0;
   for (const bool is_second : {false, true}) {
     const auto askOf = [&](const Modeld& model, std::size_t i, std::size_t most) {
-      return is_second ? pairs.ask(*bvh, model, i, most) : pairs.ask(model, *bvh, i, most);
+      return is_second ? pairs.ask(partner, model, i, most) : pairs.ask(model, partner, i, most);
     };
     for (const std::size_t most : {1, 5, 60}) {
       const Modeld a(pairs.one.mesh()), placed(pairs.one.mesh(), byPosition());
@@ -407,9 +404,11 @@ void expectTheSameBesideBvh() {
   EXPECT_GT(others, asked / 2) << "so they were not chosen by position";
 }
 
-TEST(FewContacts, BesideABvhModelAreSomeOfAllWhateverHappenedBefore) {
-  expectTheSameBesideBvh<fcl::OBBRSSd>();
-  expectTheSameBesideBvh<fcl::AABBd>();
+TEST(FewContacts, BesideOtherPartnersAreSomeOfAllWhateverHappenedBefore) {
+  const DeepPairs pairs;
+  expectTheSameBeside(pairs, *test::bvh<fcl::OBBRSSd>(pairs.two));
+  expectTheSameBeside(pairs, *test::bvh<fcl::AABBd>(pairs.two));
+  expectTheSameBeside(pairs, *test::cloud<double>(test::cloudMap(8, 3000, 0.04)));
 }
 
 TEST(FewContacts, OfPairsThatDoNotTouchNeedNoWholeTree) {
@@ -435,11 +434,13 @@ class FewContactsOnTarget : public test::EveryTarget {
     const DeepPairs pairs;
     const Modeld a(pairs.one.mesh()), b(pairs.two.mesh());
     const auto bvh = test::bvh<fcl::OBBRSSd>(pairs.two);
+    static const auto octree = test::cloud<double>(test::cloudMap(8, 3000, 0.04));  // ids depend on where it is
     std::vector<Ids> found;
     for (std::size_t i = 0; i < pairs.poses.size(); ++i) {
       for (const std::size_t most : {1, 5, 60}) {
         found.push_back(pairs.ask(a, b, i, most));
         found.push_back(pairs.ask(a, *bvh, i, most));
+        found.push_back(pairs.ask(a, *octree, i, most));
       }
     }
     return found;
@@ -476,6 +477,32 @@ TEST(FewContacts, OfLargeMeshesAreThoseOfTheLeastPosition) {
     EXPECT_EQ(pairs.ask(a, b, i, 5), pairs.ask(placed_a, placed_b, i, 5)) << i;
   }
 }
+// Next to parallel faces, too many leaves are in doubt for a walk in order to reach the place where they touch.
+TEST(FewContacts, OfFacesThatHardlyTouchAreThoseOfTheLeastPosition) {
+  const Raw plate = test::plate(64);
+  const auto bvh = test::bvh<fcl::OBBRSSd>(plate);
+  const auto map = std::make_shared<octomap::OcTree>(0.02);
+  for (float x = -0.61f; x < 0.6f; x += 0.02f) {
+    for (float y = -0.61f; y < 0.6f; y += 0.02f) map->updateNode(octomap::point3d(x, y, -0.01f), true);
+  }
+  const auto octree = test::cloud<double>(map);
+  const fcl::Transform3d I = fcl::Transform3d::Identity(),
+                         X = test::pose<double>(Eigen::Matrix3d::Identity(), {0.013, 0.007, 1e-9});
+  std::size_t touching = 0;
+  for (const std::size_t bump : {0, 1000, 4000}) {
+    Raw with_bump = plate;
+    with_bump.vertices[bump].z() = -1e-3;
+    const Modeld a(with_bump.mesh()), placed_a(with_bump.mesh(), byPosition());
+    for (const fcl::CollisionGeometryd* partner :
+         std::initializer_list<const fcl::CollisionGeometryd*>{&*bvh, &*octree}) {
+      const Ids few = idsOf(ask(a, X, *partner, I, 1));
+      EXPECT_EQ(few, idsOf(ask(placed_a, X, *partner, I, 1))) << bump;
+      touching += !few.empty();
+    }
+  }
+  EXPECT_EQ(touching, 6u);
+}
+
 // As many pairs of triangles are in doubt as touch.
 TEST(FewContacts, OfCopiesAtOnePlaceAreThoseOfTheLeastPosition) {
   const DeepPairs pairs;

@@ -82,8 +82,22 @@ class ConvexCollector final : public query::ConvexVisitor<typename Partner::Node
                         fcl::AABB<S>(in_world.min().template cast<S>(), in_world.max().template cast<S>()));
   }
 
+  /// As MeshCollector has it.
+  void beginInOrder() { in_order_ = true; }
+  void endInOrder(bool gave_up) {
+    if (!gave_up) return;
+    in_order_ = false;
+    s_.found.clear();
+    s_.of_leaf.clear();
+  }
+
   bool triangle(std::uint32_t t, const Node& b) override {
     if (ends_at_first_) return addTriangle(t, b);
+    if (in_order_) {
+      if (partner_.occupied(b)) s_.of_leaf.push_back(placed(0, {t, {Eigen::Vector3d::Zero(), 0}}, b));
+      return false;
+    }
+
     const double place = is_cut_ ? order_.placeOf(t, greatestOf(b)) : 0;
     const Found found = placed(place, {t, {Eigen::Vector3d::Zero(), 0}}, b);
     if (is_cut_ && !s_.first.wants(found)) return false;
@@ -94,6 +108,16 @@ class ConvexCollector final : public query::ConvexVisitor<typename Partner::Node
       s_.found.push_back(found);
     }
     return false;
+  }
+
+  bool endLeaves() override {
+    std::sort(s_.of_leaf.begin(), s_.of_leaf.end());
+    for (const Found& found : s_.of_leaf) {
+      if (s_.found.size() == q_.contactsLeft()) break;
+      if (touches(found)) s_.found.push_back(found);
+    }
+    s_.of_leaf.clear();
+    return s_.found.size() == q_.contactsLeft();
   }
 
   bool cell(const query::CellLeaf& a, const Node& b) override {
@@ -111,7 +135,7 @@ class ConvexCollector final : public query::ConvexVisitor<typename Partner::Node
   /// To be called at the end of the walk: as in MeshCollector, contacts are sorted by their ids, and few are
   /// chosen by ContactOrder. `cells`: those are what it found.
   void finish(bool cells) {
-    if (is_cut_) s_.found = s_.first.sort();
+    if (is_cut_ && !in_order_) s_.found = s_.first.sort();
     s_.order.resize(s_.found.size());
     std::iota(s_.order.begin(), s_.order.end(), 0u);
     std::sort(s_.order.begin(), s_.order.end(), [this](std::uint32_t i, std::uint32_t j) {
@@ -140,7 +164,8 @@ class ConvexCollector final : public query::ConvexVisitor<typename Partner::Node
   struct Scratch {
     query::PairSet<std::uint64_t> seen;
     FirstFound first;
-    std::vector<Found> found;
+    std::vector<Found> found, of_leaf;
+
     std::vector<std::uint32_t> order;  // of what was found, which is too large to be moved about
   };
   static Scratch& scratch() { return thread::ofThread<Scratch>(); }
@@ -153,9 +178,8 @@ class ConvexCollector final : public query::ConvexVisitor<typename Partner::Node
 
   // Only the first contacts, a given number of them, are wanted: adds this one if it is one so far.
   void addFirst(const Found& found) {
-    query::SeparationResult gap;
-    const auto t = static_cast<std::uint32_t>(found.leaf.id);
-    if (!partner_.occupied(found.body) || !touches(t, cornersOf(t).data(), found.body, gap)) return;
+    if (!partner_.occupied(found.body) || !touches(found)) return;
+
     s_.first.add(found);
     if (s_.first.isFull()) order_.setCut(s_.first.last().place, near() / surface_.lattice.unit(), cut_);
   }
@@ -176,6 +200,12 @@ class ConvexCollector final : public query::ConvexVisitor<typename Partner::Node
 
   // What is farther apart does not touch.
   double near() const { return std::max(tolerance_, q_.margin); }
+
+  bool touches(const Found& found) {
+    query::SeparationResult gap;
+    const auto t = static_cast<std::uint32_t>(found.leaf.id);
+    return touches(t, cornersOf(t).data(), found.body, gap);
+  }
 
   // True if a triangle touches a body. Sets the gap between them.
   bool touches(std::uint32_t t, const Eigen::Vector3d* corners, const Node& b, query::SeparationResult& gap) {
@@ -297,6 +327,8 @@ class ConvexCollector final : public query::ConvexVisitor<typename Partner::Node
   const query::SimilarityTransform b_in_a_;
   const double tolerance_;
   const bool costs_, ends_at_first_, is_cut_;
+  bool in_order_ = false;
+
   Scratch& s_;
   query::Cut cut_;
   Node body_{};  // of which `greatest_` is known
@@ -344,6 +376,22 @@ void collideConvex(const CollideQuery<S>& q, tree::Tree& tree, const NarrowPhase
       const auto walk_blocks = [&](std::size_t most) {
         return query::PairWalk<query::TreeSide, Partner>(a, partner, b_in_a, collector).run(most);
       };
+      if constexpr (Partner::kHasCubes) {
+        const auto verdict = [&](const CollideQuery<S>& any) {
+          ConvexCollector<S, Partner> of_any(any, partner, frame, tree, narrow_phase, false, false);
+          query::PairWalk<query::TreeSide, Partner>(a, partner, b_in_a, of_any).run();
+        };
+        const WalkInOrder in_order = prepareWalkInOrder(q, {&tree}, verdict);
+        if (in_order == WalkInOrder::kNothingTouches) return;
+        if (in_order == WalkInOrder::kReady) {
+          const query::TreeSide whole(tree, a.now());  // the root may be another one than `a` has seen
+          collector.beginInOrder();
+          const query::WalkEnd end = query::PairWalk<query::TreeSide, Partner>(whole, partner, b_in_a, collector)
+                                         .runInOrder(q.mostLeafPairs());
+          collector.endInOrder(end.gave_up);
+          if (!end.gave_up) return collector.finish(false);
+        }
+      }
       // Boxes as in TreesCollision.
       if constexpr (std::is_same_v<S, double> && std::is_base_of_v<query::ConvexSide, Partner>) {
         if (query::fitsBoxes(a) && (collector.endsAtFirst() || query::Turns::arePaid(a, partner))) {

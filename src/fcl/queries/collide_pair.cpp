@@ -78,11 +78,13 @@ class BvhCollision {
   // TreesCollision.
   void walk(std::size_t contacts_before) const {
     const bool uses_boxes = std::is_same<S, double>::value && !(q_.margin > 0) && BoxSide::fits(a_);
-    bool in_order = q_.mayTakeInOrder() && a_.tree().isBuiltForFew();
-    if (in_order && !completeTree(in_order)) return;
+    const WalkInOrder in_order = prepareWalkInOrder(
+        q_, {&a_.tree()}, [this](const CollideQuery<S>& any) { BvhCollision<S>(any, a_, b_).walk(0); });
+    if (in_order == WalkInOrder::kNothingTouches) return;
+
     std::size_t steps = 0;
     collect(q_, [&](MeshCollector<S>& collector) {
-      if (in_order && walkInOrder(collector)) return;
+      if (in_order == WalkInOrder::kReady && walkInOrder(collector)) return;
       const auto walk_blocks = [&](std::size_t most) {
         return query::PairWalk<TreeSide, BvhSide>(a_, b_, to_a_, collector).run(most);
       };
@@ -99,23 +101,6 @@ class BvhCollision {
     if (uses_boxes && !q_.endsAtFirst() && q_.result.numContacts() == contacts_before) {
       query::Turns(a_, b_, tree::Tree::Search::kYesOrNo, kLimits).tookOverBlocks(steps, true);
     }
-  }
-
-  // As TreesCollision has it. Builds the tree, if it is not complete and any contact shows that it is needed. False if
-  // there is none. `has_room` becomes false where there is no memory for it.
-  bool completeTree(bool& has_room) const {
-    tree::Tree& tree = a_.tree();
-    if (tree.isComplete()) return true;
-    const fcl::CollisionRequest<S> any;
-    fcl::CollisionResult<S> result;
-    BvhCollision<S>(CollideQuery<S>{static_cast<const OrderedPair<S>&>(q_), any, result, q_.margin}, a_, b_).walk(0);
-    if (!result.isCollision()) return false;
-    try {
-      if (!tree.isComplete()) tree.build();
-    } catch (const std::bad_alloc&) {
-      has_room = false;
-    }
-    return true;
   }
 
   // False where it gave up.

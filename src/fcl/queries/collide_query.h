@@ -53,8 +53,7 @@ struct CollideQuery : OrderedPair<S> {
     return !endsAtFirst() && contactsLeft() > 0 && contactsLeft() <= kMostOfFew && !request.enable_cost;
   }
 
-  /// So few of them may be those that a walk in order over complete trees finds first. Only what never changes decides
-  /// this, so that the same query gets the same contacts.
+  /// So few of them may be those that a walk in order finds first.
   bool mayTakeInOrder() const {
     constexpr std::size_t kMostContacts = 256;
     return wantsFew() && contactsLeft() <= kMostContacts && margin == 0;

@@ -135,12 +135,15 @@ class TreesCollision {
     if (trees.isNeedless(q_.hulls)) return false;
     if (kUsesBoxes && boxesApart()) return false;
     if (isProved(wanted)) return true;
-    bool in_order = takesInOrder();
-    if (in_order && !completeTrees(in_order)) return false;
+    const WalkInOrder in_order = prepareWalkInOrder(q_, {&a_.tree(), &b_.tree()}, [this](const CollideQuery<S>& any) {
+      TreesCollision<S>(any, a_, b_).walk(Wanted::kContacts);
+    });
+    if (in_order == WalkInOrder::kNothingTouches) return false;
+
     const std::size_t before = q_.result.numContacts();
     std::size_t steps = 0;
     collect(q_, [&](MeshCollector<S>& collector) {
-      if (in_order && walkInOrder(collector)) return;
+      if (in_order == WalkInOrder::kReady && walkInOrder(collector)) return;
       if (isWithinMargin(collector)) {
         constexpr std::size_t kMostLeafPairs = 64;
         walkWithinMargin(a_, b_, relative_.b_in_a, near_, collector, kMostLeafPairs,
@@ -156,29 +159,6 @@ class TreesCollision {
     const bool has_missed = !q_.endsAtFirst() && q_.result.numContacts() == before;
     if (kUsesBoxes && has_missed && !(near_.margin > 0)) trees.payForBoxes(steps);
     return false;
-  }
-
-  // Where the outlines overlap by more than a little.
-  bool takesInOrder() const { return q_.mayTakeInOrder() && a_.tree().isBuiltForFew() && b_.tree().isBuiltForFew(); }
-
-  // Builds the two trees, if they are not complete and any contact shows that they are needed. False if there is none.
-  // `has_room` becomes false where there is no memory for them.
-  bool completeTrees(bool& has_room) const {
-    tree::Tree &tree_a = a_.tree(), &tree_b = b_.tree();
-    if (tree_a.isComplete() && tree_b.isComplete()) return true;
-    const fcl::CollisionRequest<S> any;
-    fcl::CollisionResult<S> result;
-    TreesCollision<S>(CollideQuery<S>{static_cast<const OrderedPair<S>&>(q_), any, result, q_.margin}, a_, b_)
-        .walk(Wanted::kContacts);
-    if (!result.isCollision()) return false;
-    try {
-      for (tree::Tree* tree : {&tree_a, &tree_b}) {
-        if (!tree->isComplete()) tree->build();
-      }
-    } catch (const std::bad_alloc&) {
-      has_room = false;
-    }
-    return true;
   }
 
   // False where it gave up.

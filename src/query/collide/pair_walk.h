@@ -309,6 +309,14 @@ class PairWalk {
   }
 
   bool leafTriangles(const Pair& pair, Scratch& s) {
+    if (!in_order_) return visitTriangles(pair, s);
+    gave_up_ = ++leaf_pairs_ > most_leaf_pairs_;
+    if (gave_up_) return true;
+    visitTriangles(pair, s);
+    return visitor_.endLeaves();
+  }
+
+  bool visitTriangles(const Pair& pair, Scratch& s) {
     if constexpr (B::kBodies) {
       const BodyBox box(oriented(volumeOf(b_, seen_b_)), b_in_a_);
       const std::vector<TriangleExtent>& triangles = trianglesOf(pair.a, s);
@@ -320,7 +328,6 @@ class PairWalk {
       }
       return false;
     } else {
-      if (in_order_) return leafTrianglesInOrder(pair, s);
       const std::size_t before = s.leaves.tested();
       const auto visit = [this](std::uint32_t t, std::uint32_t u, bool certain) {
         if (!certain) steps_ += kExactTest;
@@ -331,16 +338,6 @@ class PairWalk {
       steps_ += (s.leaves.tested() - before) / kTrianglePairs;
       return ended;
     }
-  }
-
-  bool leafTrianglesInOrder(const Pair& pair, Scratch& s) {
-    gave_up_ = ++leaf_pairs_ > most_leaf_pairs_;
-    if (gave_up_) return true;
-    s.leaves.test(a_, pair.a, b_, pair.b, [this](std::uint32_t t, std::uint32_t u, bool certain) {
-      visitor_.triangles(t, u, certain);
-      return false;
-    });
-    return visitor_.endLeaves();
   }
 
   // Neither side has children to go on with.

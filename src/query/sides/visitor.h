@@ -109,6 +109,8 @@ class ConvexVisitor {
   virtual const Cut* cut() const { return nullptr; }
   /// Triangle a of side A and body b may touch; everything that touches comes here.
   virtual bool triangle(std::uint32_t a, const Node& b) = 0;
+  /// All triangles of a leaf have come that are near a body, of a walk in order.
+  virtual bool endLeaves() { return false; }
   /// The sphere of a cell (frame of A) meets body b.
   virtual bool cell(const CellLeaf& a, const Node& b) = 0;
 };
