@@ -174,6 +174,44 @@ TEST(FewContacts, AreThoseOfTheLeastPosition) {
   EXPECT_LT(counts.doubtful, counts.compared);
 }
 
+TEST(FewContacts, WithinAMarginAreThoseWhoseTriangleOfTheModelEndsFirst) {
+  std::mt19937_64 g(19);
+  std::uniform_real_distribution<double> u(-1, 1);
+  const Raw one = test::torus(24), two = test::torus(9);
+  const Vector3d direction = directionOf(*one.mesh());
+  const auto other = test::bvh<fcl::OBBRSSd>(two);
+  const fcl::Transform3d I = fcl::Transform3d::Identity();
+  Options options;
+  options.margin = 0.05;
+  const Modeld a(one.mesh(), options);
+  Counts counts;
+  for (int round = 0; round < 40; ++round) {
+    const fcl::Transform3d X = test::pose<double>(
+        Eigen::Quaterniond(u(g), u(g), u(g), u(g)).normalized().toRotationMatrix(), Vector3d(u(g), u(g), u(g)));
+    for (const bool is_second : {false, true}) {
+      const auto asked = [&](std::size_t most) {
+        return is_second ? ask(*other, X, a, I, most) : ask(a, I, *other, X, most);
+      };
+      std::vector<Place> ordered;
+      for (const fcl::Contactd& c : asked(1000000)) {
+        query::Corners t;
+        takeCorners(one, is_second ? c.b2 : c.b1, I, t);
+        ordered.emplace_back(std::max({direction.dot(t[0]), direction.dot(t[1]), direction.dot(t[2])}), c.b1, c.b2);
+      }
+      std::sort(ordered.begin(), ordered.end());
+      SCOPED_TRACE(round);
+      for (const std::size_t most : {1, 3, 7, 20}) {
+        if (is_second) {
+          expectFirst(*other, X, a, I, most, ordered, counts);
+        } else {
+          expectFirst(a, I, *other, X, most, ordered, counts);
+        }
+      }
+    }
+  }
+  EXPECT_GT(counts.compared, 50u);
+}
+
 // A bumpy sheet across the direction of the order, as large as its mesh or a small part of it: all contacts are within
 // a part in 300 of the mesh's size along that direction. What a walk leaves out too early shows there, with the small
 // sheet also in leaves.

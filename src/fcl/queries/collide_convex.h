@@ -387,7 +387,7 @@ void collideConvex(const CollideQuery<S>& q, tree::Tree& tree, const NarrowPhase
           const query::TreeSide whole(tree, a.now());  // the root may be another one than `a` has seen
           collector.beginInOrder();
           const query::WalkEnd end = query::PairWalk<query::TreeSide, Partner>(whole, partner, b_in_a, collector)
-                                         .runInOrder(q.mostLeafPairs());
+                                         .runInOrder(4 * q.mostLeafPairs());
           collector.endInOrder(end.gave_up);
           if (!end.gave_up) return collector.finish(false);
         }
