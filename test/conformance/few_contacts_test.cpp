@@ -404,10 +404,12 @@ TEST(FewContacts, OfDeepPairsAreSomeOfAllWhateverHappenedBefore) {
       f.buildTree();
       ASSERT_EQ(pairs.ask(e, f, i, most), few) << i;
       Clock::time_point now = Clock::now();
-      for (const int levels : {1, 2, 5}) {
+      for (const int levels : {1, 2, 5, 20}) {
         for (int k = 0; k < levels; ++k) e.prune(now += std::chrono::hours(1));
         ASSERT_EQ(pairs.ask(e, f, i, most), few) << i;
       }
+      e.expandAll(4);
+      ASSERT_EQ(pairs.ask(e, f, i, most), few) << i;
     }
   }
   EXPECT_GT(others, asked / 2) << "so they were not chosen by position";
@@ -431,11 +433,13 @@ void expectTheSameBeside(const DeepPairs& pairs, const fcl::CollisionGeometryd& 
         Modeld b(pairs.one.mesh());
         ASSERT_EQ(askOf(b, i, most), few) << i;
         Clock::time_point now = Clock::now();
-        for (const int levels : {1, 2, 5}) {
+        for (const int levels : {1, 2, 5, 20}) {
           for (int k = 0; k < levels; ++k) b.prune(now += std::chrono::hours(1));
           askOf(b, (i + 1) % pairs.poses.size(), 1000000);
           ASSERT_EQ(askOf(b, i, most), few) << i;
         }
+        b.expandAll(4);
+        ASSERT_EQ(askOf(b, i, most), few) << i;
       }
     }
   }
@@ -524,21 +528,30 @@ TEST(FewContacts, OfFacesThatHardlyTouchAreThoseOfTheLeastPosition) {
     for (float y = -0.61f; y < 0.6f; y += 0.02f) map->updateNode(octomap::point3d(x, y, -0.01f), true);
   }
   const auto octree = test::cloud<double>(map);
+  // Fins that touch nothing, so that the outlines overlap by more than a little.
+  const auto withFin = [](Raw raw, double x) {
+    raw.addTriangle({x, -0.1, 0}, {x, 0.1, 0}, {x, 0, -0.5});
+    return raw;
+  };
+  const Modeld smaller(withFin(Raw(plate).scale(0.7), -0.3).mesh());
   const fcl::Transform3d I = fcl::Transform3d::Identity(),
                          X = test::pose<double>(Eigen::Matrix3d::Identity(), {0.013, 0.007, 1e-9});
   std::size_t touching = 0;
   for (const std::size_t bump : {0, 1000, 4000}) {
     Raw with_bump = plate;
     with_bump.vertices[bump].z() = -1e-3;
+    with_bump = withFin(with_bump, 0.4);
     const Modeld a(with_bump.mesh()), placed_a(with_bump.mesh(), byPosition());
     for (const fcl::CollisionGeometryd* partner :
-         std::initializer_list<const fcl::CollisionGeometryd*>{&*bvh, &*octree}) {
-      const Ids few = idsOf(ask(a, X, *partner, I, 1));
-      EXPECT_EQ(few, idsOf(ask(placed_a, X, *partner, I, 1))) << bump;
-      touching += !few.empty();
+         std::initializer_list<const fcl::CollisionGeometryd*>{&*bvh, &*octree, &smaller}) {
+      for (const std::size_t most : {1, 60}) {
+        const Ids few = idsOf(ask(a, X, *partner, I, most));
+        EXPECT_EQ(few, idsOf(ask(placed_a, X, *partner, I, most))) << bump << " " << most;
+        touching += !few.empty();
+      }
     }
   }
-  EXPECT_EQ(touching, 6u);
+  EXPECT_EQ(touching, 14u);
 }
 
 // As many pairs of triangles are in doubt as touch.
