@@ -205,8 +205,8 @@ class PairWalk {
   static constexpr std::size_t kLongWalk = 128;
   static constexpr double kMuchLarger = 4;
 
-  // Steps depend on what is packed, which must not change an order.
-  bool isLong() const { return steps_ >= kLongWalk && !in_order_; }
+  // Beside bodies, children keep their order. Beside triangles they do not, and steps depend on what is packed.
+  bool isLong() const { return steps_ >= kLongWalk && (B::kBodies || !in_order_); }
 
   // The larger of two nodes is expanded, unless it is a leaf.
   static bool expandsA(State sa, State sb, double size_a, double size_b) {
