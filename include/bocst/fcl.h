@@ -40,15 +40,16 @@ namespace bocst {
 /// not on the resident nodes, the clock or the thread. Contacts are sorted by (b1, b2). If there are more than a
 /// request asks for, then
 /// - a request with costs, or for more than 1024, gets those with the smallest (b1, b2);
-/// - of two models whose trees can be complete (below), a request for up to 256 gets the first that a walk in a fixed
-///   order over both complete trees finds, unless the models overlap by little, are copies at about the same place, or
-///   the walk gets long;
+/// - of two models, or a model and a BVHModel or an OcTree, a request for up to 256 gets the first that a walk in a
+///   fixed order finds, if the models' trees can be complete (below), unless two models overlap by little or are copies
+///   at about the same place, or the walk gets long;
+
 /// - otherwise a request gets those with the smallest position along the mesh, which takes two to ten times as long.
 ///
-/// The first request of the second kind whose models touch builds both trees (Model::buildTree()), and so does the
-/// first one after branches were dropped, for example by prune(). It is for models with exact answers, no margin, no
-/// memory budget, no build_ahead, the oracle kCpu or kAuto, at most 262 144 triangles, and a mesh that updateVertices()
-/// has not changed. distance() with enable_signed_distance makes such a request if the models touch.
+/// The first request of the second kind whose geometries touch builds the models' trees (Model::buildTree()), and so
+/// does the first one after branches were dropped, for example by prune(). It is for models with exact answers, no
+/// margin, no memory budget, no build_ahead, the oracle kCpu or kAuto, at most 262 144 triangles, and a mesh that
+/// updateVertices() has not changed. distance() with enable_signed_distance makes such a request if the models touch.
 ///
 /// In the frame of the model's mesh (o1's if both are models), with x the longest axis of its bounding box and y and z
 /// the two that follow (x, y, z, x, ...), the position of a point is x + 0.31 y + 0.23 z. The position of a contact is
