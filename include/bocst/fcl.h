@@ -47,8 +47,8 @@ namespace bocst {
 ///
 /// The first request of the second kind whose geometries touch builds the models' trees (Model::buildTree()), and so
 /// does the first one after branches were dropped, for example by prune(). It is for models with exact answers, no
-/// margin, no memory budget, no build_ahead, the oracle kCpu or kAuto, at most 262 144 triangles, and a mesh that
-/// updateVertices() has not changed. distance() with enable_signed_distance makes such a request if the models touch.
+/// memory budget, no build_ahead, the oracle kCpu or kAuto, at most 262 144 triangles, and a mesh that updateVertices()
+/// has not changed. distance() with enable_signed_distance makes such a request if the models touch.
 ///
 /// In the frame of the model's mesh (o1's if both are models), with x the longest axis of its bounding box and y and z
 /// the two that follow (x, y, z, x, ...), the position of a point is x + 0.31 y + 0.23 z. The position of a contact is
@@ -83,7 +83,7 @@ namespace bocst {
 /// is a pair of primitives at a distance <= m. With p1 and p2 the nearest points of P1 and P2:
 ///     apart:       n = (p2 - p1) / |p2 - p1|,   d = m - |p2 - p1|,   pos = (p1 + p2) / 2
 ///     overlapping: n and pos as without margin,  d = m + the depth without margin
-/// The number of contacts grows with the square of m / (size of a triangle), and so does the time of requests for
+/// The number of contacts grows with the square of m / (size of a triangle), and so does the time of requests for many
 /// contacts: for a clearance of more than some triangles use distance() or isCloserThan().
 ///
 /// **Solids** (Options::solid). If there is no contact between primitives, but one geometry (or a connected component

@@ -181,7 +181,7 @@ TEST(FewContacts, WithinAMarginAreThoseWhoseTriangleOfTheModelEndsFirst) {
   const Vector3d direction = directionOf(*one.mesh());
   const auto other = test::bvh<fcl::OBBRSSd>(two);
   const fcl::Transform3d I = fcl::Transform3d::Identity();
-  Options options;
+  Options options = byPosition();
   options.margin = 0.05;
   const Modeld a(one.mesh(), options);
   Counts counts;
@@ -383,12 +383,21 @@ struct DeepPairs {
   std::vector<fcl::Transform3d> poses;
 };
 
-TEST(FewContacts, OfDeepPairsAreSomeOfAllWhateverHappenedBefore) {
+Options within(double margin, Options options = {}) {
+  options.margin = margin;
+  return options;
+}
+
+class FewContactsWithin : public testing::TestWithParam<double> {};
+
+TEST_P(FewContactsWithin, OfDeepPairsAreSomeOfAllWhateverHappenedBefore) {
   const DeepPairs pairs;
+  const Options options = within(GetParam());
   std::size_t others = 0, asked = 0;
   for (const std::size_t most : {1, 5, 60}) {
-    const Modeld a(pairs.one.mesh()), b(pairs.two.mesh());
-    const Modeld placed_a(pairs.one.mesh(), byPosition()), placed_b(pairs.two.mesh(), byPosition());
+    const Modeld a(pairs.one.mesh(), options), b(pairs.two.mesh(), options);
+    const Modeld placed_a(pairs.one.mesh(), within(GetParam(), byPosition())),
+        placed_b(pairs.two.mesh(), within(GetParam(), byPosition()));
     for (std::size_t i = 0; i < pairs.poses.size(); ++i) {
       const Ids few = pairs.ask(a, b, i, most), all = pairs.ask(a, b, i, 1000000);
       ASSERT_TRUE(std::is_sorted(few.begin(), few.end()));
@@ -397,9 +406,9 @@ TEST(FewContacts, OfDeepPairsAreSomeOfAllWhateverHappenedBefore) {
       others += few != pairs.ask(placed_a, placed_b, i, most);
       ++asked;
       // Other models: new ones; some that grew by other queries; complete ones; some that lost branches.
-      const Modeld c(pairs.one.mesh()), d(pairs.two.mesh());
+      const Modeld c(pairs.one.mesh(), options), d(pairs.two.mesh(), options);
       ASSERT_EQ(pairs.ask(c, d, i, most), few) << i;
-      Modeld e(pairs.one.mesh()), f(pairs.two.mesh());
+      Modeld e(pairs.one.mesh(), options), f(pairs.two.mesh(), options);
       test::touching<double>(e, fcl::Transform3d::Identity(), f, pairs.poses[(i + 1) % pairs.poses.size()]);
       f.buildTree();
       ASSERT_EQ(pairs.ask(e, f, i, most), few) << i;
@@ -415,14 +424,14 @@ TEST(FewContacts, OfDeepPairsAreSomeOfAllWhateverHappenedBefore) {
   EXPECT_GT(others, asked / 2) << "so they were not chosen by position";
 }
 
-void expectTheSameBeside(const DeepPairs& pairs, const fcl::CollisionGeometryd& partner) {
+void expectTheSameBeside(const DeepPairs& pairs, const fcl::CollisionGeometryd& partner, double margin) {
   std::size_t others = 0, asked = 0;
   for (const bool is_second : {false, true}) {
     const auto askOf = [&](const Modeld& model, std::size_t i, std::size_t most) {
       return is_second ? pairs.ask(partner, model, i, most) : pairs.ask(model, partner, i, most);
     };
     for (const std::size_t most : {1, 5, 60}) {
-      const Modeld a(pairs.one.mesh()), placed(pairs.one.mesh(), byPosition());
+      const Modeld a(pairs.one.mesh(), within(margin)), placed(pairs.one.mesh(), within(margin, byPosition()));
       for (std::size_t i = 0; i < pairs.poses.size(); ++i) {
         const Ids few = askOf(a, i, most), all = askOf(a, i, 1000000);
         ASSERT_TRUE(std::is_sorted(few.begin(), few.end()));
@@ -430,7 +439,7 @@ void expectTheSameBeside(const DeepPairs& pairs, const fcl::CollisionGeometryd& 
         ASSERT_EQ(few.size(), std::min(most, all.size()));
         others += few != askOf(placed, i, most);
         ++asked;
-        Modeld b(pairs.one.mesh());
+        Modeld b(pairs.one.mesh(), within(margin));
         ASSERT_EQ(askOf(b, i, most), few) << i;
         Clock::time_point now = Clock::now();
         for (const int levels : {1, 2, 5, 20}) {
@@ -446,12 +455,14 @@ void expectTheSameBeside(const DeepPairs& pairs, const fcl::CollisionGeometryd& 
   EXPECT_GT(others, asked / 2) << "so they were not chosen by position";
 }
 
-TEST(FewContacts, BesideOtherPartnersAreSomeOfAllWhateverHappenedBefore) {
+TEST_P(FewContactsWithin, BesideOtherPartnersAreSomeOfAllWhateverHappenedBefore) {
   const DeepPairs pairs;
-  expectTheSameBeside(pairs, *test::bvh<fcl::OBBRSSd>(pairs.two));
-  expectTheSameBeside(pairs, *test::bvh<fcl::AABBd>(pairs.two));
-  expectTheSameBeside(pairs, *test::cloud<double>(test::cloudMap(8, 3000, 0.04)));
+  expectTheSameBeside(pairs, *test::bvh<fcl::OBBRSSd>(pairs.two), GetParam());
+  expectTheSameBeside(pairs, *test::bvh<fcl::AABBd>(pairs.two), GetParam());
+  expectTheSameBeside(pairs, *test::cloud<double>(test::cloudMap(8, 3000, 0.04)), GetParam());
 }
+
+INSTANTIATE_TEST_SUITE_P(Margins, FewContactsWithin, testing::Values(0, 0.03));
 
 TEST(FewContacts, OfPairsThatDoNotTouchNeedNoWholeTree) {
   const Raw ring = test::torus(80);  // so large that growth begins by parts

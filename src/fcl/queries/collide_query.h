@@ -56,10 +56,11 @@ struct CollideQuery : OrderedPair<S> {
   /// So few of them may be those that a walk in order finds first.
   bool mayTakeInOrder() const {
     constexpr std::size_t kMostContacts = 256;
-    return wantsFew() && contactsLeft() <= kMostContacts && margin == 0;
+    return wantsFew() && contactsLeft() <= kMostContacts;
   }
-  /// After so many pairs of leaves such a walk gives up. Few are enough unless surfaces hardly touch.
-  std::size_t mostLeafPairs() const { return 32 + contactsLeft(); }
+  /// After so many pairs of leaves such a walk gives up. Few are enough unless surfaces hardly touch. Within a margin
+  /// by position takes milliseconds.
+  std::size_t mostLeafPairs() const { return (margin > 0 ? 2048 : 32) + contactsLeft(); }
 
   /// Adds a contact if there is room; `contact` (world frame) may be null where contacts are not enabled. True when
   /// nothing more is asked for.

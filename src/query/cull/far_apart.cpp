@@ -178,7 +178,7 @@ bool outlinesHardlyOverlap(const TreeSide& a, const TreeSide& b, const Similarit
   const double little = kLittle * std::min(of_a.half.maxCoeff(), half.maxCoeff());
   const Eigen::Array3d along_a = of_a.half + s * half - t.cwiseAbs();
   const Eigen::Array3d along_b = half + s.transpose() * of_a.half - (r.transpose() * t).cwiseAbs();
-  return std::min(along_a.minCoeff(), along_b.minCoeff()) < little;
+  return std::min(along_a.minCoeff(), along_b.minCoeff()) + b_in_a.margin < little;
 }
 
 bool outlinesCoincide(const TreeSide& a, const TreeSide& b, const SimilarityTransform& b_in_a) {
