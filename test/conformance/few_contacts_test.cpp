@@ -439,6 +439,12 @@ void expectTheSameBeside(const DeepPairs& pairs, const fcl::CollisionGeometryd& 
         ASSERT_EQ(few.size(), std::min(most, all.size()));
         others += few != askOf(placed, i, most);
         ++asked;
+        if (is_second) {
+          Ids turned = idsOf(ask(a, pairs.poses[i], partner, fcl::Transform3d::Identity(), most));
+          for (auto& [b1, b2] : turned) std::swap(b1, b2);
+          std::sort(turned.begin(), turned.end());
+          ASSERT_EQ(turned, few) << i;
+        }
         Modeld b(pairs.one.mesh(), within(margin));
         ASSERT_EQ(askOf(b, i, most), few) << i;
         Clock::time_point now = Clock::now();
@@ -530,6 +536,21 @@ TEST(FewContacts, OfLargeMeshesAreThoseOfTheLeastPosition) {
     EXPECT_EQ(pairs.ask(a, b, i, 5), pairs.ask(placed_a, placed_b, i, 5)) << i;
   }
 }
+// Small parts beside a plate's fine grid: each pair of leaves has many pairs of triangles in doubt.
+TEST(FewContacts, BesideABvhModelOfFlatFacesPayForOrientedBoxes) {
+  const Raw ground = test::box({-1, -1, -1}, {1, 1, 0});
+  Raw part = test::plate(40);
+  part.addTriangle({0.5, 0.5, 0}, {0.5, 0.4, 0.5}, {0.5, 0.3, 0.5});  // so that its outline is no plate
+  const auto bvh = test::bvh<fcl::OBBRSSd>(part);
+  Modeld model(ground.mesh());
+  const fcl::Transform3d I = fcl::Transform3d::Identity(),
+                         X = test::pose<double>(Eigen::Matrix3d::Identity(), {0.013, 0.007, 1e-7});
+  model.buildTree();
+  for (int k = 0; k < 2000 && fcl_adapter::treeOf(model).boxPrice() > 0; ++k)
+    EXPECT_TRUE(ask(model, I, *bvh, X, 5).empty());
+  EXPECT_EQ(fcl_adapter::treeOf(model).boxPrice(), 0u);
+}
+
 // Next to parallel faces, too many leaves are in doubt for a walk in order to reach the place where they touch.
 TEST(FewContacts, OfFacesThatHardlyTouchAreThoseOfTheLeastPosition) {
   const Raw plate = test::plate(64);

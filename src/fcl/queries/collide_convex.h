@@ -381,13 +381,13 @@ void collideConvex(const CollideQuery<S>& q, tree::Tree& tree, const NarrowPhase
           ConvexCollector<S, Partner> of_any(any, partner, frame, tree, narrow_phase, false, false);
           query::PairWalk<query::TreeSide, Partner>(a, partner, b_in_a, of_any).run();
         };
-        const WalkInOrder in_order = prepareWalkInOrder(q, {&tree}, verdict);
+        const WalkInOrder in_order = prepareWalkInOrder(q, {&tree}, false, verdict);
         if (in_order == WalkInOrder::kNothingTouches) return;
         if (in_order == WalkInOrder::kReady) {
           const query::TreeSide whole(tree, a.now());  // the root may be another one than `a` has seen
           collector.beginInOrder();
           const query::WalkEnd end = query::PairWalk<query::TreeSide, Partner>(whole, partner, b_in_a, collector)
-                                         .runInOrder(4 * q.mostLeafPairs());
+                                         .runInOrder(q.mostLeafPairs(128));
           collector.endInOrder(end.gave_up);
           if (!end.gave_up) return collector.finish(false);
         }

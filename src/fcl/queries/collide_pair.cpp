@@ -78,13 +78,15 @@ class BvhCollision {
   // TreesCollision.
   void walk(std::size_t contacts_before) const {
     const bool uses_boxes = std::is_same<S, double>::value && !(q_.margin > 0) && BoxSide::fits(a_);
-    const WalkInOrder in_order = prepareWalkInOrder(
-        q_, {&a_.tree()}, [this](const CollideQuery<S>& any) { BvhCollision<S>(any, a_, b_).walk(0); });
+    // Once boxes are built, they soon tell that flat parts are apart.
+    const WalkInOrder in_order =
+        prepareWalkInOrder(q_, {&a_.tree()}, uses_boxes && query::Turns::arePaid(a_, b_),
+                           [this](const CollideQuery<S>& any) { BvhCollision<S>(any, a_, b_).walk(0); });
     if (in_order == WalkInOrder::kNothingTouches) return;
 
     std::size_t steps = 0;
     collect(q_, [&](MeshCollector<S>& collector) {
-      if (in_order == WalkInOrder::kReady && walkInOrder(collector)) return;
+      if (in_order == WalkInOrder::kReady && walkInOrder(collector, steps)) return;
       const auto walk_blocks = [&](std::size_t most) {
         return query::PairWalk<TreeSide, BvhSide>(a_, b_, to_a_, collector).run(most);
       };
@@ -94,7 +96,7 @@ class BvhCollision {
         const auto& limits = collector.endsAtFirst() ? kLimits : kLimitsOfContacts;
         query::walkByTurns(a_, b_, to_a_, collector, limits, walk_blocks);
       } else {
-        steps = walk_blocks(query::kNoLimit).steps;
+        steps += walk_blocks(query::kNoLimit).steps;
       }
     });
     // A walk for a verdict pays for boxes itself, a walk for contacts where it found none.
@@ -104,11 +106,14 @@ class BvhCollision {
   }
 
   // False where it gave up, later than two models do: by position takes longer here.
-  bool walkInOrder(MeshCollector<S>& collector) const {
+  bool walkInOrder(MeshCollector<S>& collector, std::size_t& steps) const {
     const TreeSide a(a_.tree(), a_.now());  // the root may be another one than a_ has seen
+    if (query::outlinesHardlyOverlap(a, b_.volume(b_.root()), to_a_)) return false;
+
     collector.beginInOrder();
     const query::WalkEnd end =
-        query::PairWalk<TreeSide, BvhSide>(a, b_, to_a_, collector).runInOrder(4 * q_.mostLeafPairs());
+        query::PairWalk<TreeSide, BvhSide>(a, b_, to_a_, collector).runInOrder(q_.mostLeafPairs(128));
+    steps = end.steps;
     collector.endInOrder(end.gave_up);
     return !end.gave_up;
   }

@@ -58,9 +58,9 @@ struct CollideQuery : OrderedPair<S> {
     constexpr std::size_t kMostContacts = 256;
     return wantsFew() && contactsLeft() <= kMostContacts;
   }
-  /// After so many pairs of leaves such a walk gives up. Few are enough unless surfaces hardly touch. Within a margin
-  /// by position takes milliseconds.
-  std::size_t mostLeafPairs() const { return (margin > 0 ? 2048 : 32) + contactsLeft(); }
+  /// After so many pairs of leaves such a walk gives up: `few` are enough unless surfaces hardly touch, or margins are
+  /// large, with which contacts by position take milliseconds.
+  std::size_t mostLeafPairs(std::size_t few) const { return (margin > 0 ? 2048 : few) + contactsLeft(); }
 
   /// Adds a contact if there is room; `contact` (world frame) may be null where contacts are not enabled. True when
   /// nothing more is asked for.

@@ -135,9 +135,9 @@ class TreesCollision {
     if (trees.isNeedless(q_.hulls)) return false;
     if (kUsesBoxes && boxesApart()) return false;
     if (isProved(wanted)) return true;
-    const WalkInOrder in_order = prepareWalkInOrder(q_, {&a_.tree(), &b_.tree()}, [this](const CollideQuery<S>& any) {
-      TreesCollision<S>(any, a_, b_).walk(Wanted::kContacts);
-    });
+    const WalkInOrder in_order = prepareWalkInOrder(
+        q_, {&a_.tree(), &b_.tree()}, false,
+        [this](const CollideQuery<S>& any) { TreesCollision<S>(any, a_, b_).walk(Wanted::kContacts); });
     if (in_order == WalkInOrder::kNothingTouches) return false;
 
     const std::size_t before = q_.result.numContacts();
@@ -171,7 +171,7 @@ class TreesCollision {
     // touch.
     if (query::outlinesHardlyOverlap(a, b, near_) || query::outlinesCoincide(a, b, near_)) return false;
     collector.beginInOrder();
-    const query::WalkEnd end = walk.runInOrder(collector, q_.mostLeafPairs());
+    const query::WalkEnd end = walk.runInOrder(collector, q_.mostLeafPairs(32));
     collector.endInOrder(end.gave_up);
     return !end.gave_up;
   }

@@ -26,13 +26,15 @@ enum class WalkInOrder {
 };
 
 /// Builds the trees, if they are not complete and any contact shows that they are needed: ask(query) adds it to the
-/// query's result, if there is one. While the trees' query locks are held.
+/// query's result, if there is one. `asks_always`: also where the trees are complete. While the trees' query locks are
+/// held.
 template <typename S, typename Ask>
-WalkInOrder prepareWalkInOrder(const CollideQuery<S>& q, std::initializer_list<tree::Tree*> trees, Ask&& ask) {
+WalkInOrder prepareWalkInOrder(const CollideQuery<S>& q, std::initializer_list<tree::Tree*> trees, bool asks_always,
+                               Ask&& ask) {
   const auto isBuilt = [](const tree::Tree* tree) { return tree->isBuiltForFew(); };
   const auto isComplete = [](const tree::Tree* tree) { return tree->isComplete(); };
   if (!q.mayTakeInOrder() || !std::all_of(trees.begin(), trees.end(), isBuilt)) return WalkInOrder::kNo;
-  if (std::all_of(trees.begin(), trees.end(), isComplete)) return WalkInOrder::kReady;
+  if (!asks_always && std::all_of(trees.begin(), trees.end(), isComplete)) return WalkInOrder::kReady;
   const fcl::CollisionRequest<S> any;
   fcl::CollisionResult<S> result;
   ask(CollideQuery<S>{static_cast<const OrderedPair<S>&>(q), any, result, q.margin});

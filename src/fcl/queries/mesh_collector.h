@@ -313,7 +313,7 @@ class MeshCollector : public query::Visitor {
   void decideEach() {
     constexpr std::size_t kBatch = query::TrianglePairs::kCapacity;
     std::vector<std::uint64_t>& found = s_.found;
-    std::sort(found.begin(), found.end());
+    sortFound();
     const std::size_t before = s_.met.size();
     for (std::size_t i = 0; i < found.size(); i += kBatch) {
       for (std::size_t k = i + kBatch; k < std::min(i + 2 * kBatch, found.size()); ++k) {
@@ -328,6 +328,15 @@ class MeshCollector : public query::Visitor {
       if (q_.request.enable_cost || s_.met.size() - before < left_) continue;
       break;  // What comes later comes behind what there is.
     }
+  }
+
+  // In order, ids of the walk's side A come first, so that which are first does not depend on the caller's order.
+  void sortFound() {
+    std::vector<std::uint64_t>& found = s_.found;
+    if (!in_order_ || !q_.swapped) return std::sort(found.begin(), found.end());
+    std::sort(found.begin(), found.end(), [](std::uint64_t x, std::uint64_t y) {
+      return keyOf(second(x), first(x), isCertain(x)) < keyOf(second(y), first(y), isCertain(y));
+    });
   }
 
   // Of what touches, only as much as is asked for.

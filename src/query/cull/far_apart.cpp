@@ -169,9 +169,15 @@ bool outlinesApart(const TreeSide& a, const TreeSide& b, const SimilarityTransfo
 }
 
 bool outlinesHardlyOverlap(const TreeSide& a, const TreeSide& b, const SimilarityTransform& b_in_a) {
+  OrientedVolume of_b;
+  return outlineOf(b, of_b) && outlinesHardlyOverlap(a, of_b, b_in_a);
+}
+
+bool outlinesHardlyOverlap(const TreeSide& a, const OrientedVolume& of_b, const SimilarityTransform& b_in_a) {
   constexpr double kLittle = 0.05;  // of the smaller one's length
-  OrientedVolume of_a, of_b;
-  if (!outlineOf(a, of_a) || !outlineOf(b, of_b)) return false;
+  OrientedVolume of_a;
+  if (!outlineOf(a, of_a)) return false;
+
   const Eigen::Matrix3d r = of_a.axes.transpose() * (b_in_a.rotation * of_b.axes), s = r.cwiseAbs();
   const Eigen::Vector3d t = of_a.axes.transpose() * (b_in_a * of_b.center - of_a.center),
                         half = b_in_a.scale * of_b.half;

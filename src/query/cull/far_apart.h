@@ -30,6 +30,8 @@ bool outlinesApart(const TreeSide& a, const TreeSide& b, const SimilarityTransfo
 
 /// True if the outlines overlap by little along a face's normal, as those of a part that lies on another.
 bool outlinesHardlyOverlap(const TreeSide& a, const TreeSide& b, const SimilarityTransform& b_in_a);
+/// The same beside the box of another partner, in its frame.
+bool outlinesHardlyOverlap(const TreeSide& a, const OrientedVolume& b, const SimilarityTransform& b_in_a);
 
 /// True if the outlines are about equal, in size and place: of a part and its copy.
 bool outlinesCoincide(const TreeSide& a, const TreeSide& b, const SimilarityTransform& b_in_a);

@@ -8,7 +8,6 @@
 #include <sstream>
 #include <stdexcept>
 
-#include "cli/report.h"
 #include "io/text.h"
 #include "pairs/cells.h"
 
@@ -85,7 +84,8 @@ Pose Pose::of(const std::array<double, 7>& given, RotationFormat format) {
   const auto& [x, y, z, r0, r1, r2, r3] = given;
   for (const double number : given) {
     if (!std::isfinite(number)) {
-      throw std::invalid_argument("a pose must have finite numbers; one of them is " + formatPlain(number));
+      throw std::invalid_argument(std::string("a pose must have finite numbers; one of them is ") +
+                                  (std::isnan(number) ? "not a number" : "infinite"));
     }
   }
   Pose pose;
@@ -97,7 +97,7 @@ Pose Pose::of(const std::array<double, 7>& given, RotationFormat format) {
   }
   const double norm = pose.quaternionNorm();
   if (!(norm > 1e-100) || !std::isfinite(norm))
-    throw std::invalid_argument("the quaternion has the length " + formatPlain(norm) + " and is no rotation");
+    throw std::invalid_argument("the quaternion has the length 0, or one too large, and is no rotation");
   return pose;
 }
 
