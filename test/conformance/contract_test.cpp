@@ -133,7 +133,7 @@ class Contacts : public ::testing::Test {
     options.memory_budget = std::size_t{1} << 30;
     return options;
   }
-    /// A pair whose few contacts may be those that a walk in order finds.
+  /// A pair whose few contacts may be those that a walk in order finds.
   static bool mayBeInOrder(const Question<S>& q) {
     for (const Geometry& g : {q.a, q.b}) {
       const Model<S>* m = asModel(g);
