@@ -41,8 +41,8 @@ namespace bocst {
 /// request asks for, then
 /// - a request with costs, or for more than 1024, gets those with the smallest (b1, b2);
 /// - of two models, or a model and a BVHModel or an OcTree, a request for up to 256 gets the first that a walk in a
-///   fixed order finds, if the models' trees can be complete (below), unless two models overlap by little or are copies
-///   at about the same place, or the walk gets long;
+///   fixed order finds, if the models' trees can be complete (below), unless the meshes overlap by little, two models
+///   are copies at about the same place, or the walk gets long;
 /// - otherwise a request gets those with the smallest position along the mesh, which takes two to ten times as long.
 ///
 /// The first request of the second kind whose geometries touch builds the models' trees (Model::buildTree()), and so

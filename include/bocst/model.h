@@ -93,8 +93,8 @@ class BOCST_EXPORT Model : public fcl::CollisionGeometry<S> {
   int addSubModel(const std::vector<fcl::Vector3<S>>& ps, const std::vector<fcl::Triangle>& ts);
   int addSubModel(const std::vector<fcl::Vector3<S>>& ps);  ///< Adds vertices only.
 
-  /// Takes what was added as the mesh. Without beginModel(), or if
-  /// nothing was added, it logs an error (see setLogger()).
+  /// Takes what was added as the mesh. Without beginModel(), or if nothing was added, it logs an error (see
+  /// setLogger()).
   int endModel();
 
   // New positions in the order of the vertices, as updateVertices(). Another number of positions than of vertices gives

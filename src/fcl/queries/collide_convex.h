@@ -97,7 +97,6 @@ class ConvexCollector final : public query::ConvexVisitor<typename Partner::Node
       if (partner_.occupied(b)) s_.of_leaf.push_back(placed(0, {t, {Eigen::Vector3d::Zero(), 0}}, b));
       return false;
     }
-
     const double place = is_cut_ ? order_.placeOf(t, greatestOf(b)) : 0;
     const Found found = placed(place, {t, {Eigen::Vector3d::Zero(), 0}}, b);
     if (is_cut_ && !s_.first.wants(found)) return false;
