@@ -540,12 +540,13 @@ TEST(FewContacts, OfLargeMeshesAreThoseOfTheLeastPosition) {
 TEST(FewContacts, BesideABvhModelOfFlatFacesPayForOrientedBoxes) {
   const Raw ground = test::box({-1, -1, -1}, {1, 1, 0});
   Raw part = test::plate(40);
-  part.addTriangle({0.5, 0.5, 0}, {0.5, 0.4, 0.5}, {0.5, 0.3, 0.5});  // so that its outline is no plate
+  part.addTriangle({1.2, 0, 0}, {1.2, 0.1, 0}, {1.2, 0, -0.5});  // beside the ground, so that the outlines overlap
   const auto bvh = test::bvh<fcl::OBBRSSd>(part);
   Modeld model(ground.mesh());
   const fcl::Transform3d I = fcl::Transform3d::Identity(),
                          X = test::pose<double>(Eigen::Matrix3d::Identity(), {0.013, 0.007, 1e-7});
   model.buildTree();
+  ASSERT_GT(fcl_adapter::treeOf(model).boxPrice(), 0u);
   for (int k = 0; k < 2000 && fcl_adapter::treeOf(model).boxPrice() > 0; ++k)
     EXPECT_TRUE(ask(model, I, *bvh, X, 5).empty());
   EXPECT_EQ(fcl_adapter::treeOf(model).boxPrice(), 0u);
