@@ -164,7 +164,6 @@ class ConvexCollector final : public query::ConvexVisitor<typename Partner::Node
     query::PairSet<std::uint64_t> seen;
     FirstFound first;
     std::vector<Found> found, of_leaf;
-
     std::vector<std::uint32_t> order;  // of what was found, which is too large to be moved about
   };
   static Scratch& scratch() { return thread::ofThread<Scratch>(); }
@@ -178,7 +177,6 @@ class ConvexCollector final : public query::ConvexVisitor<typename Partner::Node
   // Only the first contacts, a given number of them, are wanted: adds this one if it is one so far.
   void addFirst(const Found& found) {
     if (!partner_.occupied(found.body) || !touches(found)) return;
-
     s_.first.add(found);
     if (s_.first.isFull()) order_.setCut(s_.first.last().place, near() / surface_.lattice.unit(), cut_);
   }
@@ -327,7 +325,6 @@ class ConvexCollector final : public query::ConvexVisitor<typename Partner::Node
   const double tolerance_;
   const bool costs_, ends_at_first_, is_cut_;
   bool in_order_ = false;
-
   Scratch& s_;
   query::Cut cut_;
   Node body_{};  // of which `greatest_` is known
