@@ -249,23 +249,33 @@ struct Times {
 };
 
 // FCL and bocst are asked in long turns, as a planner uses one of them: in short ones each finds its data evicted from
-// the caches by the other.
+// the caches by the other. For the same reason each answers states, untimed, before a turn, once the trees have grown.
 void measure(Both& both, unsigned seed, unsigned threads, bool with_distances) {
   std::mt19937_64 g(seed);
   constexpr std::size_t kStates = 10000, kStatesInTurn = 2000;
+  constexpr std::size_t kWarmUp = 1000;
   constexpr int kSettle = 15;
   // First: asked for the first time, so that trees grow. Again: the same states once more. Settled: when nothing grows.
   // New: states that were never asked, of the settled trees.
   Poses X(2 * kStates * kJoints);
   for (std::size_t k = 0; k < 2 * kStates; ++k) forward(randomJoints(g), &X[k * kJoints]);
-  std::vector<std::uint8_t> expected(kStates), hit(kStates);
+  std::vector<std::uint8_t> expected(kStates), hit(kStates), warm(kWarmUp);
+  bool warms_up = false;
+  const auto warmUpFcl = [&] {
+    for (std::size_t k = 0; warms_up && k < kWarmUp; ++k) both.fclCollides(&X[k * kJoints]);
+  };
+  const auto warmUpBocst = [&] {
+    if (warms_up) both.scene->collisions(X.data(), kWarmUp, warm.data());
+  };
   const auto timeStates = [&](const char* what, const fcl::Transform3d* X_WM) {
     Times times;
     for (std::size_t begin = 0; begin < kStates; begin += kStatesInTurn) {
       const fcl::Transform3d* turn = X_WM + begin * kJoints;
+      warmUpFcl();
       double start = now();
       for (std::size_t k = 0; k < kStatesInTurn; ++k) expected[begin + k] = both.fclCollides(turn + k * kJoints);
       times.fcl += now() - start;
+      warmUpBocst();
       start = now();
       both.scene->collisions(turn, kStatesInTurn, &hit[begin]);
       times.bocst += now() - start;
@@ -280,6 +290,7 @@ void measure(Both& both, unsigned seed, unsigned threads, bool with_distances) {
   timeStates("random states", X.data());
   timeStates("random states again", X.data());
   for (int k = 0; k < kSettle; ++k) both.scene->collisions(X.data(), kStates, hit.data());
+  warms_up = true;
   timeStates("random states, settled", X.data());
   timeStates("new random states", &X[kStates * kJoints]);
 
@@ -320,7 +331,9 @@ void measure(Both& both, unsigned seed, unsigned threads, bool with_distances) {
   const auto timeEdges = [&](const char* what, const auto& fcl, const auto& bocst) {
     Times times;
     std::vector<std::size_t> theirs, ours;
+    warmUpFcl();
     times.fcl = askEdges(fcl, theirs);
+    warmUpBocst();
     times.bocst = askEdges(bocst, ours);
     std::size_t hits = 0, wrong = 0;
     for (std::size_t k = 0; k < edges.size(); ++k) {
@@ -357,6 +370,7 @@ void measure(Both& both, unsigned seed, unsigned threads, bool with_distances) {
   timeEdges("edge, first collision", fclBlocked, bocstBlocked);
 
   both.makeScene(threads, true);
+  warms_up = false;
   timeStates("random states, first", X.data());
   timeEdges("edge, any collision", fclHits, bocstHits);
 
