@@ -57,6 +57,8 @@ struct Options {
   /// The paper's d_t: the largest extent of the mesh in units of the lattice, which divides each axis of the root cube
   /// into 65536 at most: from 1 to 65536; 0: 65536, the finest lattice.
   /// Only kBono's cells depend on it (4.4): the side of its root cube is the smallest power of two that is >= d_t.
+  /// If it is not 0, conservative queries expand the nodes that the paper's do; else fewer, the verdicts being the
+  /// same.
   double dimension = 0;
 
   OracleKind oracle = OracleKind::kAuto;  ///< Backend that subdivides cells.

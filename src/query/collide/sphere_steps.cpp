@@ -9,6 +9,7 @@
 #include <algorithm>
 
 #include "log/assert.h"
+#include "query/cull/frames-inl.h"
 #include "simd/octants-inl.h"
 
 #ifndef BOCST_SPHERE_STEPS_ONCE
@@ -141,11 +142,40 @@ HWY_INLINE Met meeting(const SphereFrames& g, const SphereFrame& f, const Sphere
   return met;
 }
 
+// The volumes of what a frame has the spheres of: the octants of a node's block, or the root.
+HWY_INLINE const Frame& volumesOf(SphereSteps& s, int side, tree::NodeRef node, std::uint32_t frame) {
+  const PairFrames& g = *s.volume_geometry;
+  const tree::Tree& tree = s.side[side]->tree();
+  Frame& f = s.volumes[frame];
+  std::uint64_t& held = s.volumes_hold[frame];
+  if (node.isRoot()) {
+    decodeRoot(g, side, tree.rootBounds(), f);
+    held = kEmptyFrame;
+    return f;
+  }
+  const std::uint64_t name = frameName(static_cast<std::uint32_t>(side), node.block());
+  if (held != name) decodeBlock(g, side, tree.block(node.block()), f);
+  held = name;
+  return f;
+}
+
+// Which octants in `mask` of a block may have leaves that meet those of the other side's node.
+HWY_INLINE unsigned overlapping(SphereSteps& s, const BlockView& block, const StepNode& other, unsigned mask) {
+  const int x = static_cast<int>(block.side), y = 1 - x;
+  const auto is_large = [&s](int side, std::uint32_t level) {
+    return level + SphereSteps::kVolumeLevels <= s.deepest[side];
+  };
+  if (mask == 0 || !s.volume_geometry || !is_large(x, block.level) || !is_large(y, other.level)) return mask;
+  const Frame& octants = volumesOf(s, x, tree::NodeRef::octant(block.index, 0), block.frame);
+  const Frame& others = volumesOf(s, y, other.node, other.lane / 8);
+  return overlapping(*s.volume_geometry, octants, others, other.lane % 8, mask, nullptr);
+}
+
 // The octants of a block in a frame whose spheres meet that of the other side's node, and their order.
 HWY_INLINE unsigned meetingOctants(SphereSteps& s, const BlockView& block, const StepNode& other,
                                    std::uint32_t* order) {
   const Met met = meeting(s.frames, s.spheres[block.frame], s.spheres[other.lane / 8], other.lane % 8, order);
-  const unsigned mask = met.maybe & block.at->grey, doubtful = met.doubtful & block.at->grey;
+  const unsigned mask = overlapping(s, block, other, met.maybe & block.at->grey), doubtful = met.doubtful & mask;
   if (doubtful == 0) return mask;
   return (mask & ~doubtful) | decideMeeting(s, static_cast<int>(block.side), block.index, doubtful, other.node);
 }
@@ -291,14 +321,23 @@ SphereFrames::SphereFrames(const SimilarityTransform& one_in_zero) {
 }
 
 SphereSteps::SphereSteps(const TreeSide& a, const TreeSide& b, const SimilarityTransform& b_in_a_,
-                         SphereFrame* spheres_)
-    : side{&a, &b}, b_in_a(b_in_a_), frames(b_in_a_), level_rule(LevelRule::of(b_in_a_.scale)), spheres(spheres_) {
+                         SphereFrame* spheres_, Frame* volumes_)
+    : side{&a, &b},
+      b_in_a(b_in_a_),
+      frames(b_in_a_),
+      level_rule(LevelRule::of(b_in_a_.scale)),
+      spheres(spheres_),
+      volumes(volumes_) {
+  const SimilarityTransform wide = withSphereReach(a, b, b_in_a);
+  const bool as_in_paper = a.tree().options().dimension > 0 || b.tree().options().dimension > 0;
+  if (!as_in_paper && PairFrames::fits(b_in_a.scale) && wide.tolerance < 1e9) volume_geometry.emplace(wide);
   for (int s = 0; s < 2; ++s) {
     const tree::Tree& tree = side[s]->tree();
     std::copy_n(tree.surface().lattice.extent().data(), 3, extent[s]);
     deepest[s] = static_cast<std::uint32_t>(tree.deepest());
   }
   std::fill_n(holds, kFrames, kEmptyFrame);
+  std::fill_n(volumes_hold, kFrames, kEmptyFrame);
 }
 
 unsigned decideMeeting(const SphereSteps& s, int own, std::uint32_t index, unsigned mask, tree::NodeRef other) {

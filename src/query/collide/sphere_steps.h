@@ -4,6 +4,7 @@
 #include <cstddef>
 #include <cstdint>
 #include <limits>
+#include <optional>
 
 #include "query/collide/step_state.h"
 #include "query/cull/frames.h"
@@ -49,7 +50,8 @@ struct SphereGroup {
 
 /// The depth-first walk over resident pairs of two trees with conservative answers: up to the next leaves whose spheres
 /// meet. Eight octants at a time in float; what that leaves in doubt of spheres is decided in double by spheresMeet(),
-/// so nothing depends on the instruction set.
+/// so no verdict depends on the instruction set. Between large nodes the spheres of cells part little, so the boxes and
+/// slabs of their surfaces are compared, too.
 struct SphereSteps {
   /// Frames in use at once: one for each block of either side, two for the nodes of a pair that was pushed without.
   static constexpr std::size_t kFrames = 2 * lattice::kMaxLevel + 2;
@@ -62,8 +64,9 @@ struct SphereSteps {
     kDeferred,  ///< `pair` needs a node that is not expanded.
   };
 
-  /// `spheres`: kFrames of them.
-  SphereSteps(const TreeSide& a, const TreeSide& b, const SimilarityTransform& b_in_a, SphereFrame* spheres);
+  /// `spheres`, `volumes`: kFrames of them.
+  SphereSteps(const TreeSide& a, const TreeSide& b, const SimilarityTransform& b_in_a, SphereFrame* spheres,
+              Frame* volumes);
 
   const TreeSide* side[2];
   const SimilarityTransform& b_in_a;
@@ -79,6 +82,16 @@ struct SphereSteps {
 
   SphereFrame* const spheres;
   std::uint64_t holds[kFrames];  ///< frameName() of what is in a frame.
+
+  /// Volumes about the surface in the octants of each frame, decoded when asked for. Where they are farther apart than
+  /// spheres of leaves reach, no leaves below meet. They are asked for octants that are larger than leaves by so many
+  /// levels at least: others are as small as the reach.
+  static constexpr std::uint32_t kVolumeLevels = 2;
+  /// With that reach. None where its floats cannot hold the pair, and with Options::dimension: what the paper's trees
+  /// grow depends on spheres alone, so it is the same with every oracle.
+  std::optional<PairFrames> volume_geometry;
+  Frame* const volumes;
+  std::uint64_t volumes_hold[kFrames];  ///< frameName() of what is in a frame of `volumes`.
 
   SphereGroup* stack = nullptr;  ///< With room for kStackRoom more, below `stack_end`.
   const SphereGroup* stack_end = nullptr;

@@ -26,6 +26,7 @@ void forEachBit(const std::vector<std::uint32_t>& words, F&& f) {
 struct SphereWalk::Scratch {
   std::vector<SphereGroup> stack;
   SphereFrame spheres[SphereSteps::kFrames];
+  Frame volumes[SphereSteps::kFrames];
   DeferredPairs<TreeSide, TreeSide> deferred;
 };
 
@@ -37,7 +38,7 @@ SphereWalk::Scratch& SphereWalk::scratchOfThread() { return thread::ofThread<Scr
 
 bool SphereWalk::run(Visitor& visitor) {
   Scratch& s = scratchOfThread();
-  SphereSteps steps(a_, b_, b_in_a_, s.spheres);
+  SphereSteps steps(a_, b_, b_in_a_, s.spheres, s.volumes);
   steps.nearest_first = visitor.endsAtFirst();
   steps.cut = visitor.cut();
   return search(steps, s, visitor);
@@ -88,7 +89,7 @@ bool SphereWalk::search(SphereSteps& steps, Scratch& s, Visitor& visitor) const 
 
 SphereWalk::Outcome SphereWalk::walkResident(std::size_t batch, std::vector<tree::Tree::Growth>& growths) const {
   Scratch& s = scratchOfThread();
-  SphereSteps steps(a_, b_, b_in_a_, s.spheres);
+  SphereSteps steps(a_, b_, b_in_a_, s.spheres, s.volumes);
   s.deferred.clear();
   pushWithRoom(steps, s.stack, a_.root(), b_.root());
   for (;;) {

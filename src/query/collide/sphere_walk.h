@@ -9,8 +9,8 @@
 namespace bocst::query {
 
 /// The walk for two trees with conservative answers: finds the pairs of leaves whose spheres meet, see spheresMeet().
-/// Spheres follow from the lattices and the pose alone, so the verdict is the same with every oracle, and so is what
-/// run() and walkResident() grow.
+/// Spheres follow from the lattices and the pose alone, so the verdict is the same with every oracle. What run() and
+/// walkResident() grow depends on the oracle's boxes, too, unless Options::dimension is set.
 class SphereWalk {
  public:
   static bool fits(const TreeSide& a, const TreeSide& b) { return a.isConservative() && b.isConservative(); }
