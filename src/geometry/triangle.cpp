@@ -253,13 +253,16 @@ void considerEdges(const Edges<T>& p, int i, const Edges<T>& q, int j, Closest<T
   const Vec<T>&a = p.v[i], &b = q.v[j], &e = p.e[i], &f = q.e[j];
   const T &ee = p.ee[i], &ff = q.ee[j];
   const Vec<T> w = a - b;
-  const T ew = dot(e, w), fw = dot(f, w), ef = dot(e, f), both = ee * ff, det = both - ef * ef;
-  T s = det > zero ? clampToUnit<T>((ef * fw - ff * ew) / det) : zero;
+  const T ew = dot(e, w), fw = dot(f, w), ef = dot(e, f);
+  // Not ee * ff - ef * ef, which cancels where the edges are almost parallel.
+  const Vec<T> n = cross(e, f);
+  const T det = dot(n, n);
+  T s = det > zero ? clampToUnit<T>(dot(cross(f, w), n) / det) : zero;
   const T t = ff > zero ? clampToUnit<T>((ef * s + fw) / ff) : zero;
   s = ee > zero ? clampToUnit<T>((ef * t - ew) / ee) : zero;
   closest.consider(a + s * e, b + t * f);
-  if (det > T(1e-6) * both) return;
-  // All but parallel, the quotient is inaccurate; so may the nearest points be, unless the ends are looked at too.
+  if (det > T(1e-6) * ee * ff) return;
+  // Almost parallel, n is not accurate, or 0; then an end is about as near as any point.
   const Vec<T>&a2 = p.v[(i + 1) % 3], &b2 = q.v[(j + 1) % 3];
   closest.consider(a, onSegment(a, b, f, ff));
   closest.consider(a2, onSegment(a2, b, f, ff));

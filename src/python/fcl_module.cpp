@@ -272,13 +272,9 @@ class Builder : public Geometry {
   }
   bool addTriangle(const py::object& v1, const py::object& v2, const py::object& v3) {
     inSequence();
-    Mesh::Indices t;
-    std::size_t k = 0;
-    for (const py::object* v : {&v1, &v2, &v3}) {
-      t[k++] = static_cast<std::uint32_t>(vertices_.size());
-      vertices_.push_back(vector3("a corner", *v));
-    }
-    indices_.push_back(t);
+    const auto first = static_cast<std::uint32_t>(vertices_.size());
+    vertices_.insert(vertices_.end(), {vector3("a corner", v1), vector3("a corner", v2), vector3("a corner", v3)});
+    indices_.push_back({first, first + 1, first + 2});
     return true;
   }
   bool addSubModel(const py::object& verts, const py::object& triangles) {
@@ -1107,19 +1103,24 @@ class Manager {
     manager_.setup();
   }
   void update(const py::object& what) {
-    change();
-    if (what.is_none()) return manager_.update();
-    std::vector<fcl::CollisionObjectd*> all;
+    std::vector<py::object> given;
     const auto add = [&](const py::handle& o) {
       if (!py::isinstance<Object>(o)) {
         throw py::type_error("bocst: " + py::repr(o).cast<std::string>() + " is not a CollisionObject");
       }
-      if (objects_.contains(keyOf(o))) all.push_back(o.cast<Object*>());
+      given.push_back(py::reinterpret_borrow<py::object>(o));
     };
     if (py::isinstance<Object>(what)) {
       add(what);
-    } else {
+    } else if (!what.is_none()) {
       for (const auto& o : what) add(o);
+    }
+    // Only now: the caller's iterator may have let other threads start a query, or unregister objects.
+    change();
+    if (what.is_none()) return manager_.update();
+    std::vector<fcl::CollisionObjectd*> all;
+    for (const py::object& o : given) {
+      if (objects_.contains(keyOf(o))) all.push_back(o.cast<Object*>());
     }
     manager_.update(all);
   }

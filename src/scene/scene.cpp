@@ -80,6 +80,10 @@ struct Scene<S>::Impl {
   using Goal = typename scene::Sweep<S>::Goal;
   using WorldPtr = std::shared_ptr<const World<S>>;
 
+  // A change holds the mutex, then this lock, both before it changes anything: in a child after fork(), either may
+  // throw.
+  using Alone = std::lock_guard<thread::ShardedLock>;
+
   explicit Impl(const SceneOptions& o) : pool(o.threads) {}
 
   // The world for a query. Made when it is asked for, so that many additions in a row cost little.
@@ -90,7 +94,7 @@ struct Scene<S>::Impl {
     }
     const std::lock_guard<thread::ForkAwareMutex> lock(mutex);
     if (is_moving_stale) {
-      change([&](World<S>& w) {
+      change(Alone(sharded_lock), [&](World<S>& w) {
         is_moving_stale = false;
         return w.setMoving(movingObjects(), ignored);
       });
@@ -101,7 +105,7 @@ struct Scene<S>::Impl {
         if (!record.moves) fixed.push_back(record.object);
       }
       const auto made = std::make_shared<World<S>>(movingObjects(), fixed, ignored);
-      const std::lock_guard<thread::ShardedLock> alone(sharded_lock);
+      const Alone alone(sharded_lock);
       world = made;
       is_moving_stale = false;
     }
@@ -115,10 +119,9 @@ struct Scene<S>::Impl {
   }
 
   // Changes the world that queries see by apply(World&), unless there is none; drops it where that returns false, or
-  // where it needs a new hierarchy. To be called with the mutex held, after the objects were changed.
+  // where it needs a new hierarchy. To be called after the objects were changed.
   template <typename Apply>
-  void change(Apply&& apply) const {
-    const std::lock_guard<thread::ShardedLock> alone(sharded_lock);
+  void change(const Alone&, Apply&& apply) const {
     if (world == nullptr) return;
     try {
       if (world.use_count() > 1) {
@@ -127,17 +130,14 @@ struct Scene<S>::Impl {
         const auto counted = world;  // its decrement makes what ended queries did visible here
       }
       if (apply(*world) && !world->needsRebuild()) return;
-    } catch (const std::bad_alloc&) {
+    } catch (const std::exception&) {
       // The next query makes another one, or has no memory either.
     }
     world = nullptr;
   }
 
   // Moving objects came or went, or changed: the next query takes over all of them.
-  void changeMoving() {
-    const std::lock_guard<thread::ShardedLock> alone(sharded_lock);
-    is_moving_stale = true;
-  }
+  void changeMoving(const Alone&) { is_moving_stale = true; }
 
   struct Record {
     std::shared_ptr<Geometry> given;  // by the caller
@@ -151,6 +151,7 @@ struct Scene<S>::Impl {
     if (X_WG != nullptr) fcl_adapter::checkPose<S>(("Scene::" + std::string(query)).c_str(), "X_WG", *X_WG);
     Object<S> o = objectOf(geometry);
     const std::lock_guard<thread::ForkAwareMutex> lock(mutex);
+    const Alone alone(sharded_lock);
     const auto other = with_geometry.find(geometry.get());
     if (other != with_geometry.end())
       o = objects.at(*other->second.begin()).object;  // update() may have come in between
@@ -169,9 +170,9 @@ struct Scene<S>::Impl {
       throw;
     }
     if (record.moves) {
-      changeMoving();
+      changeMoving(alone);
     } else {
-      change([&](World<S>& w) { return w.putFixed(record.object, ignored); });
+      change(alone, [&](World<S>& w) { return w.putFixed(record.object, ignored); });
     }
     return Id(scene_number, number);
   }
@@ -325,6 +326,7 @@ template <typename S>
 void Scene<S>::remove(Id object) {
   decltype(impl_->objects.extract(0)) removed;  // destroyed without locks: an OcTree takes milliseconds
   const std::lock_guard<thread::ForkAwareMutex> lock(impl_->mutex);
+  const typename Impl::Alone alone(impl_->sharded_lock);
   impl_->forgetGeometry(impl_->find("remove", object).given.get(), object.number_);
   removed = impl_->objects.extract(object.number_);
   const bool moves = removed.mapped().moves;
@@ -332,13 +334,13 @@ void Scene<S>::remove(Id object) {
   if (moves) {
     auto& moving = impl_->moving_numbers;
     moving.erase(std::find(moving.begin(), moving.end(), object.number_));
-    impl_->changeMoving();
-    impl_->change([&](World<S>& w) {
+    impl_->changeMoving(alone);
+    impl_->change(alone, [&](World<S>& w) {
       w.releaseMoving(object);
       return true;
     });
   } else {
-    impl_->change([&](World<S>& w) {
+    impl_->change(alone, [&](World<S>& w) {
       w.removeFixed(object);
       return true;
     });
@@ -349,22 +351,24 @@ template <typename S>
 void Scene<S>::setPose(Id fixed, const Transform& X_WG) {
   fcl_adapter::checkPose<S>("Scene::setPose", "X_WG", X_WG);
   const std::lock_guard<thread::ForkAwareMutex> lock(impl_->mutex);
+  const typename Impl::Alone alone(impl_->sharded_lock);
   typename Impl::Record& record = impl_->find("setPose", fixed);
   if (record.moves) {
     throw std::invalid_argument("bocst::Scene::setPose: the object moves; its pose comes with each state");
   }
   record.object.X_WG = X_WG;
-  impl_->change([&](World<S>& w) { return w.putFixed(record.object, impl_->ignored); });
+  impl_->change(alone, [&](World<S>& w) { return w.putFixed(record.object, impl_->ignored); });
 }
 
 template <typename S>
 void Scene<S>::ignore(Id a, Id b, bool ignored) {
   const std::lock_guard<thread::ForkAwareMutex> lock(impl_->mutex);
+  const typename Impl::Alone alone(impl_->sharded_lock);
   impl_->find("ignore", a);
   impl_->find("ignore", b);
   if (a == b) throw std::invalid_argument("bocst::Scene::ignore: both Ids name the same object");
   impl_->ignored.set(a, b, ignored);
-  impl_->change([&](World<S>& w) {
+  impl_->change(alone, [&](World<S>& w) {
     w.setIgnored(a, b, ignored);
     return true;
   });
@@ -375,6 +379,7 @@ void Scene<S>::update(Id object) {
   const std::lock_guard<thread::ForkAwareMutex> lock(impl_->mutex);
   const std::shared_ptr<Geometry> geometry = impl_->find("update", object).given;
   const Object<S> updated = Impl::describe(geometry);
+  const typename Impl::Alone alone(impl_->sharded_lock);
   bool any_moves = false;
   for (const std::uint32_t number : impl_->with_geometry.at(geometry.get())) {
     typename Impl::Record& record = impl_->objects.at(number);
@@ -383,9 +388,9 @@ void Scene<S>::update(Id object) {
     record.object.X_WG = before.X_WG;
     any_moves |= record.moves;
     if (record.moves) continue;
-    impl_->change([&, &object = record.object](World<S>& w) { return w.putFixed(object, impl_->ignored); });
+    impl_->change(alone, [&, &object = record.object](World<S>& w) { return w.putFixed(object, impl_->ignored); });
   }
-  if (any_moves) impl_->changeMoving();
+  if (any_moves) impl_->changeMoving(alone);
 }
 
 template <typename S>

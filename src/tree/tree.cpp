@@ -164,15 +164,17 @@ void Tree::releaseMesh() {
   if (options_.solid) throw std::logic_error("bocst::Model::releaseMesh: a solid looks at its triangles on the host");
   const std::lock_guard<thread::ShardedLock> alone(query_lock_);
   if (isReleased()) return;
-  if (surface_.device == nullptr) surface_.device = oracle_->makeResident(surface_);
+  componentPoints();  // all that another solid asks of it
+  auto device = surface_.device;
   const bool needs_mesh = !conservative() || oracle_->needsHostMesh();
   try {
-    if (surface_.device == nullptr) throw OracleError("the oracle " + oracle_->name() + " needs the mesh on the host");
+    if (device == nullptr) device = oracle_->makeResident(surface_);
+    if (device == nullptr) throw OracleError("the oracle " + oracle_->name() + " needs the mesh on the host");
     if (needs_mesh) stored_ = std::make_unique<const oracle::StoredMesh>(*oracle_, *surface_.mesh);
   } catch (const OracleError& e) {
     throw OracleError(std::string("bocst::Model::releaseMesh: ") + e.what());
   }
-  componentPoints();  // all that another solid asks of it
+  surface_.device = std::move(device);
   is_released_ = true;
   surface_.mesh = nullptr;
   countBytes();

@@ -161,6 +161,24 @@ TEST(NearestPoints, OfSliversThatTouchOrAllButTouch) {
   }
 }
 
+// Two triangles lie side by side, the edges between them almost parallel and almost in contact.
+TEST(NearestPoints, OfEdgesThatAreAllButParallel) {
+  std::mt19937_64 g(5);
+  std::uniform_real_distribution<double> u(-1, 1);
+  for (int i = 0; i < 20000; ++i) {
+    Corners p, q;
+    for (Vector3d& v : p) v = Vector3d(u(g), u(g), u(g));
+    const Eigen::AngleAxisd turn(std::pow(10.0, -15 * std::abs(u(g))), test::randomDirection(g));
+    const Vector3d edge = p[1] - p[0], pivot = p[0] + std::abs(u(g)) * edge;
+    const Vector3d gap = test::randomDirection(g) * std::pow(10.0, -15 * std::abs(u(g)));
+    // The third corner lies on the other side of the edge.
+    q = {p[0], p[1], 2 * pivot - p[2]};
+    for (Vector3d& v : q) v = pivot + turn * (v - pivot) + 0.5 * u(g) * edge * static_cast<double>(g() % 2) + gap;
+    std::shuffle(std::begin(q), std::end(q), g);
+    ASSERT_NO_FATAL_FAILURE(expectRight(p, q, 1000)) << "round " << i;
+  }
+}
+
 TEST(NearestPoints, OfAnySizeAnywhere) {
   std::mt19937_64 g(4);
   std::uniform_real_distribution<double> u(-1, 1);

@@ -1,5 +1,6 @@
 # SPDX-License-Identifier: BSD-3-Clause
 """python-fcl's names: what its documents show gives the same answers here, known in closed form or from FCL's own tree."""
+import concurrent.futures
 import gc
 import os
 import pickle
@@ -309,6 +310,30 @@ def test_a_manager_is_not_changed_while_it_is_asked():
     assert third.size() == 2
     third.unregisterObject(groups[2][0])
     assert third.size() == 1 and third.getObjects() == [groups[2][1]]
+
+
+def test_a_manager_is_not_updated_while_it_is_asked():
+    (_, _, third), _, groups = managers()
+    inside, leave = threading.Event(), threading.Event()
+
+    def waits(o1, o2, data):
+        inside.set()
+        leave.wait(20)
+        return True
+
+    with concurrent.futures.ThreadPoolExecutor(1) as thread:
+        def moved():
+            thread.submit(third.collide, third, None, waits)
+            inside.wait(20)
+            yield groups[2][0]
+
+        try:
+            with pytest.raises(RuntimeError, match="during a query"):
+                third.update(moved())
+        finally:
+            leave.set()
+    third.update(groups[2])
+    third.update(iter(groups[0]))  # of another manager: left out, as before
 
 
 def test_moving_objects_of_a_manager():

@@ -2085,6 +2085,46 @@ TEST(SceneThreads, ForksBesideChanges) {
   other.join();
 }
 
+// A change that throws in a child that was forked beside queries has changed nothing.
+TEST(SceneThreads, ChangesInAChildAreWholeOrNone) {
+  if (test::kSanitized) return;  // Their allocator may be locked at the fork.
+  Scened scene;
+  const auto ball = std::make_shared<fcl::Sphered>(1);
+  const fcl::Transform3d X = fcl::Transform3d::Identity();
+  const Id fixed = scene.addFixed(ball, test::pose<double>(Eigen::Matrix3d::Identity(), {9, 0, 0}));
+  scene.addMoving(ball);
+  EXPECT_FALSE(scene.collides(&X));
+  std::atomic<bool> stop{false};
+  test::ThreadGroup group(4, [&](std::size_t t) {
+    if (t != 0) {
+      while (!stop) scene.collides(&X);
+      return;
+    }
+    for (int i = 0; i < 60; ++i) {
+      usleep(300);
+      expectInChild([&] {
+        const auto is_whole = [&](auto&& change, std::size_t count, bool collides) {
+          try {
+            change();
+          } catch (const std::runtime_error&) {
+            count = 1;
+            collides = false;
+          }
+          try {
+            return scene.fixedCount() == count && scene.collides(&X) == collides;
+          } catch (const std::runtime_error&) {
+            return scene.fixedCount() == count;
+          }
+        };
+        if (i % 3 == 0) return is_whole([&] { scene.addFixed(ball, X); }, 2, true);
+        if (i % 3 == 1) return is_whole([&] { scene.setPose(fixed, X); }, 1, true);
+        return is_whole([&] { scene.remove(fixed); }, 0, false);
+      });
+    }
+    stop = true;
+  });
+}
+
 // Where the system has not so many threads, the scene works with those that there are.
 TEST(SceneThreads, FewerThanAskedFor) {
   if (test::kSanitized) return;  // Sanitizers need all of the address space.

@@ -60,6 +60,7 @@ class ConvexCollector final : public query::ConvexVisitor<typename Partner::Node
         cut_(order_.startCut()) {
     s_.seen.clear();
     s_.found.clear();
+    s_.of_leaf.clear();
     if (is_cut_) s_.first.start(q.contactsLeft());
   }
 
