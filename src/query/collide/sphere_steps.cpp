@@ -19,85 +19,19 @@ namespace bocst::query {
 /// Decides in double, as the definition says, which octants in `mask` of a block of side `own` meet the other node.
 unsigned decideMeeting(const SphereSteps& s, int own, std::uint32_t index, unsigned mask, tree::NodeRef other);
 
-namespace {
-
-constexpr float kHalfDiagonal = 0.8660254f;   // of a cube of side 1
-constexpr float kClippedFactor = 1.4142136f;  // see TreeSide::sphere()
-
-}  // namespace
+namespace {}  // namespace
 }  // namespace bocst::query
 #endif
 
 HWY_BEFORE_NAMESPACE();
 namespace bocst::query::HWY_NAMESPACE {
 
-// Writes the centres of some spheres, in their own frame and in the other.
-HWY_INLINE void turnSpheres(const SideFrame& g, const V (&c)[3], std::size_t i, SphereFrame& f) {
-  const D d;
-  BOCST_UNROLL
-  for (int j = 0; j < 3; ++j) {
-    V cj = hn::Set(d, g.shift[j]);
-    BOCST_UNROLL
-    for (int k = 0; k < 3; ++k) cj = hn::MulAdd(hn::Set(d, g.to_other[j][k]), c[k], cj);
-    hn::Store(c[j], d, f.center[0][j] + i);
-    hn::Store(cj, d, f.center[1][j] + i);
-  }
-}
-
-// Writes the spheres of the octants of a cell, as TreeSide::sphere() has them. Whole lattice units are exact.
-template <typename Position>
-HWY_INLINE void decodeSpheres(const SphereSteps& s, int side, int level, const Position& at, SphereFrame& f) {
-  const D d;
-  const SideFrame& g = s.frames.side[side];
-  const std::int32_t length = 1 << (lattice::kMaxLevel - 1 - level);
-  std::int32_t corner[3], end[3];  // of the first octant and of the regions, from the middle of the root
-  bool whole = true;
-  BOCST_UNROLL
-  for (int k = 0; k < 3; ++k) {
-    corner[k] = static_cast<std::int32_t>(at[k]) * (2 * length) - lattice::kMiddle;
-    end[k] = static_cast<std::int32_t>(s.extent[side][k]) - lattice::kMiddle;
-    whole &= corner[k] + 2 * length <= end[k];
-  }
-  const V size = hn::Set(d, static_cast<float>(length)), half_unit = hn::Set(d, 0.5f * g.unit);
-  V c[3];
-  if (whole) {
-    const V radius = hn::Set(d, static_cast<float>(length) * g.unit * kHalfDiagonal);
-    for (std::size_t i = 0; i < 8; i += hn::Lanes(d)) {
-      BOCST_UNROLL
-      for (int k = 0; k < 3; ++k) {
-        const V twice = hn::MulAdd(hn::Load(d, kOctantCorner[k] + i), hn::Set(d, static_cast<float>(2 * length)),
-                                   hn::Set(d, static_cast<float>(2 * corner[k] + length)));
-        c[k] = hn::Mul(twice, half_unit);
-      }
-      turnSpheres(g, c, i, f);
-      hn::Store(radius, d, f.radius + i);
-    }
-    return;
-  }
-  const bool leaves = static_cast<std::uint32_t>(level) + 1 >= s.deepest[side];
-  const V of_clipped = hn::Set(d, leaves ? 1.0f : kClippedFactor);
-  for (std::size_t i = 0; i < 8; i += hn::Lanes(d)) {
-    V squared = hn::Zero(d), least = size;
-    BOCST_UNROLL
-    for (int k = 0; k < 3; ++k) {
-      const V low = hn::MulAdd(hn::Load(d, kOctantCorner[k] + i), size, hn::Set(d, static_cast<float>(corner[k])));
-      const V high = hn::Min(hn::Add(low, size), hn::Set(d, static_cast<float>(end[k]))), extent = hn::Sub(high, low);
-      least = hn::Min(least, extent);
-      squared = hn::MulAdd(extent, extent, squared);
-      c[k] = hn::Mul(hn::Add(low, high), half_unit);
-    }
-    const V factor = hn::IfThenElse(hn::Lt(least, size), of_clipped, hn::Set(d, 1.0f));
-    turnSpheres(g, c, i, f);
-    hn::Store(hn::Mul(hn::Mul(hn::Sqrt(squared), half_unit), factor), d, f.radius + i);
-  }
-}
-
 // Decodes the octants of a block into its frame, unless it holds them: the last pair may have had the same block.
 HWY_INLINE void decodeBlock(SphereSteps& s, const BlockView& block) {
   const std::uint64_t name = frameName(block.side, block.index);
   if (s.holds[block.frame] == name) return;
   s.holds[block.frame] = name;
-  decodeSpheres(s, static_cast<int>(block.side), block.at->shape, block.at->at, s.spheres[block.frame]);
+  decodeSpheres(s.frames.side[block.side], s.cells[block.side], block.at->shape, block.at->at, s.spheres[block.frame]);
 }
 
 // Decodes the block of an expanded node of a side into a frame.
@@ -163,7 +97,7 @@ HWY_INLINE const Frame& volumesOf(SphereSteps& s, int side, tree::NodeRef node, 
 HWY_INLINE unsigned overlapping(SphereSteps& s, const BlockView& block, const StepNode& other, unsigned mask) {
   const int x = static_cast<int>(block.side), y = 1 - x;
   const auto is_large = [&s](int side, std::uint32_t level) {
-    return level + SphereSteps::kVolumeLevels <= s.deepest[side];
+    return level + SphereSteps::kVolumeLevels <= s.cells[side].deepest;
   };
   if (mask == 0 || !s.volume_geometry || !is_large(x, block.level) || !is_large(y, other.level)) return mask;
   const Frame& octants = volumesOf(s, x, tree::NodeRef::octant(block.index, 0), block.frame);
@@ -200,11 +134,11 @@ HWY_NOINLINE std::uint32_t lookUp(SphereSteps& s, int side, tree::NodeRef node, 
   }
   s.holds[frame] = kEmptyFrame;
   // The root as the first octant of a cell that is twice as large, whose other octants nobody asks for.
-  decodeSpheres(s, side, 0, root, s.spheres[frame]);
+  decodeSpheres(s.frames.side[side], s.cells[side], 0, root, s.spheres[frame]);
   return 8 * frame;
 }
 
-HWY_INLINE bool isLeaf(const SphereSteps& s, int side, std::uint32_t level) { return level >= s.deepest[side]; }
+HWY_INLINE bool isLeaf(const SphereSteps& s, int side, std::uint32_t level) { return level >= s.cells[side].deepest; }
 
 // True if of two nodes that are no leaves, that of side x, at `level`, is expanded before the other.
 HWY_INLINE bool isLarger(const SphereSteps& s, int x, std::uint32_t level, std::uint32_t other_level) {
@@ -325,17 +259,13 @@ SphereSteps::SphereSteps(const TreeSide& a, const TreeSide& b, const SimilarityT
     : side{&a, &b},
       b_in_a(b_in_a_),
       frames(b_in_a_),
+      cells{cellTreeOf(a.tree()), cellTreeOf(b.tree())},
       level_rule(LevelRule::of(b_in_a_.scale)),
       spheres(spheres_),
       volumes(volumes_) {
   const SimilarityTransform wide = withSphereReach(a, b, b_in_a);
   const bool as_in_paper = a.tree().options().dimension > 0 || b.tree().options().dimension > 0;
   if (!as_in_paper && PairFrames::fits(b_in_a.scale) && wide.tolerance < 1e9) volume_geometry.emplace(wide);
-  for (int s = 0; s < 2; ++s) {
-    const tree::Tree& tree = side[s]->tree();
-    std::copy_n(tree.surface().lattice.extent().data(), 3, extent[s]);
-    deepest[s] = static_cast<std::uint32_t>(tree.deepest());
-  }
   std::fill_n(holds, kFrames, kEmptyFrame);
   std::fill_n(volumes_hold, kFrames, kEmptyFrame);
 }

@@ -13,12 +13,6 @@
 
 namespace bocst::query {
 
-/// The spheres of eight octants as both sides of a pair see them, as in Frame.
-struct alignas(64) SphereFrame {
-  float center[2][3][8];
-  float radius[8];
-};
-
 /// The pose of one root relative to the other, in float, and the rounding margin that this needs.
 ///
 /// With u = 2^-24, Q0 and Q1 half the roots' sides and t the vector between their middles, no coordinate, distance or
@@ -71,8 +65,7 @@ struct SphereSteps {
   const TreeSide* side[2];
   const SimilarityTransform& b_in_a;
   const SphereFrames frames;
-  std::uint32_t extent[2][3];  ///< Where the actual regions end.
-  std::uint32_t deepest[2];    ///< The level of each side's leaves.
+  const CellTree cells[2];
   const LevelRule level_rule;
   bool nearest_first = true;  ///< A hit ends the walk.
   const Cut* cut = nullptr;   ///< What is left out; octants then come in the order of their ids.

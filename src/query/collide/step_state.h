@@ -1,10 +1,12 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #pragma once
 
+#include <algorithm>
 #include <cmath>
 #include <cstdint>
 #include <vector>
 
+#include "query/cull/frames.h"
 #include "tree/tree.h"
 
 // What the walks over resident pairs of two trees have in common (tree_steps.h, sphere_steps.h).
@@ -59,6 +61,13 @@ inline void copyWords(const BlockView& from, BlockView& to) {
   to.level = from.level;
   to.frame = from.frame;
   to.side = from.side;
+}
+
+inline CellTree cellTreeOf(const tree::Tree& tree) {
+  CellTree cells;
+  std::copy_n(tree.surface().lattice.extent().data(), 3, cells.extent);
+  cells.deepest = static_cast<std::uint32_t>(tree.deepest());
+  return cells;
 }
 
 /// Names the block of a side that a frame holds.

@@ -112,6 +112,71 @@ std::uint8_t OverlappingOctants(const PairFrames& geometry, int own, const CellO
   return static_cast<std::uint8_t>(overlapping(geometry, f, y, static_cast<std::size_t>(octant), 0xff, order));
 }
 
+// The spheres of the cells in a block that a frame holds.
+HWY_INLINE const SphereFrame& spheresOf(PairSteps& s, int side, std::uint32_t index, std::uint32_t frame) {
+  const std::uint64_t name = frameName(static_cast<std::uint32_t>(side), index);
+  if (s.spheres_hold[frame] != name) {
+    const tree::Block& block = s.tree[side]->block(index);
+    decodeSpheres(s.geometry.side[side], s.cells, block.shape, block.at, s.spheres[frame]);
+    s.spheres_hold[frame] = name;
+  }
+  return s.spheres[frame];
+}
+
+// Spheres beside boxes and slabs, in the frame of these: how far a sphere's centre is from the box, squared, and from
+// the slab.
+HWY_INLINE void toVolumes(const V (&displacement)[3], const V (&half)[3], const V (&normal)[3], V slab_center,
+                          V slab_half, V& squared, V& from_slab) {
+  const D d;
+  V along = hn::Zero(d);
+  squared = hn::Zero(d);
+  BOCST_UNROLL
+  for (int k = 0; k < 3; ++k) {
+    const V outside = hn::Max(hn::Sub(hn::Abs(displacement[k]), half[k]), hn::Zero(d));
+    squared = hn::MulAdd(outside, outside, squared);
+    along = hn::MulAdd(normal[k], displacement[k], along);
+  }
+  from_slab = hn::Sub(hn::Abs(hn::Sub(along, slab_center)), slab_half);
+}
+
+// Where the octants of a block or the other node are leaves with cells: the octants in `mask` for which the sphere of
+// the cell may meet the volume beside it. Sets their order.
+HWY_INLINE unsigned meetingSpheres(PairSteps& s, const BlockView& block, const StepNode& other, unsigned mask,
+                                   std::uint32_t* order) {
+  const D d;
+  const hn::RebindToUnsigned<D> du;
+  const int x = static_cast<int>(block.side), y = 1 - x;
+  const bool one_cell = s.has_cells[y];
+  if (one_cell ? other.node.isRoot() || !isLeaf(s, y, other) : block.level != s.leaf_level[x]) return mask;
+  const SphereFrame& cells =
+      one_cell ? spheresOf(s, y, other.node.block(), other.lane / 8) : spheresOf(s, x, block.index, block.frame);
+  const Frame& volumes = s.frames[one_cell ? block.frame : other.lane / 8];
+  const std::size_t l = other.lane % 8;
+  const auto of_cell = [d, one_cell, l](const float* lanes, std::size_t i)
+                           HWY_ATTR { return one_cell ? hn::Set(d, lanes[l]) : hn::Load(d, lanes + i); };
+  const auto of_volume = [d, one_cell, l](const float* lanes, std::size_t i)
+                             HWY_ATTR { return one_cell ? hn::Load(d, lanes + i) : hn::Set(d, lanes[l]); };
+  unsigned result = 0;
+  for (std::size_t i = 0; i < 8; i += hn::Lanes(d)) {
+    V displacement[3], half[3], normal[3], squared, from_slab;
+    BOCST_UNROLL
+    for (int k = 0; k < 3; ++k) {
+      displacement[k] = hn::Sub(of_cell(cells.center[1][k], i), of_volume(volumes.center[0][k], i));
+      half[k] = of_volume(volumes.half[0][k], i);
+      normal[k] = of_volume(volumes.normal[0][k], i);
+    }
+    toVolumes(displacement, half, normal, of_volume(volumes.slab_center, i), of_volume(volumes.slab_half, i), squared,
+              from_slab);
+    const V reach = hn::Add(of_cell(cells.radius, i), hn::Set(d, s.sphere_margin));
+    const V depth = hn::Sub(hn::Mul(reach, reach), squared);
+    const M apart = hn::Or(hn::Lt(depth, hn::Zero(d)), hn::Gt(from_slab, reach));
+    const auto bits = hn::And(hn::BitCast(du, depth), hn::Set(du, ~7u));
+    hn::StoreU(hn::Or(bits, hn::Iota(du, static_cast<std::uint32_t>(i))), du, order + i);
+    result |= bitsOf(d, hn::AndNot(apart, maskOf(d, mask >> i))) << i;
+  }
+  return result;
+}
+
 // The one of these octants of a group that overlaps the other node the most.
 HWY_INLINE std::uint32_t deepest(const StepGroup& group, std::uint32_t octants) {
   const hn::RebindToUnsigned<D> du;
@@ -423,8 +488,9 @@ void NextEvent(PairSteps& s, StepEvent& event) {
     bool is_new;
     const BlockView block = open(s, x, node, p.frames, is_new);
     std::uint32_t(&order)[8] = s.stack[s.depth].order;
-    const unsigned mask =
+    unsigned mask =
         overlapping(s.geometry, s.frames[block.frame], s.frames[other.lane / 8], other.lane % 8, block.at->grey, order);
+    if (mask != 0 && s.spheres != nullptr) mask = meetingSpheres(s, block, other, mask, order);
     if (mask == 0) continue;
     if (s.is_cut) orderAlongCut(s, x, s.frames[block.frame], order);
     if (s.in_order || (s.cell_cut != nullptr && s.has_cells[x])) orderById(order);

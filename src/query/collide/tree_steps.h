@@ -102,6 +102,19 @@ struct PairSteps {
     return (has_cells[0] ? side[0]->firstCellId(a) : side[1]->firstCellId(b)) > cell_cut->last_cell;
   }
 
+  /// Where a side has cells: spheres of its leaves, in frames as `frames`, decoded when asked for. A sphere and a
+  /// volume that are apart by more than `sphere_margin` do not touch.
+  SphereFrame* spheres = nullptr;
+  float sphere_margin = 0;
+  CellTree cells{};
+  std::uint64_t spheres_hold[kFrames];
+  void setSpheres(SphereFrame* frames_of_spheres, float margin) {
+    spheres = frames_of_spheres;
+    sphere_margin = margin;
+    cells = cellTreeOf(*tree[has_cells[0] ? 0 : 1]);
+    for (std::uint64_t& h : spheres_hold) h = kEmptyFrame;
+  }
+
   const LargeTriangles* leaf[2] = {nullptr, nullptr};  ///< Of each side, those of the larger leaf placed last.
 
   std::uint64_t holds[kFrames];  ///< frameName() of what is in a frame.

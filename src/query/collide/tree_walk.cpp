@@ -21,6 +21,7 @@ constexpr std::size_t kTrianglePairs = 32;
 struct TreeWalk::Scratch {
   std::vector<StepGroup> stack;
   Frame frames[PairSteps::kFrames];
+  SphereFrame spheres[PairSteps::kFrames];
   DeferredPairs<TreeSide, TreeSide> deferred;
   LeafPairs<TreeSide, TreeSide> leaves;
   bool leaves_started = false;
@@ -77,6 +78,7 @@ bool TreeWalk::search(Scratch& s) {
   steps.sees_all = !may_end;
   steps.all_at_once = !in_order_ && cut == nullptr && (is_shallow_ || steps.sees_all);
   if (wide_) {
+    steps.setSpheres(s.spheres, PairFrames(b_in_a_).slab_rounding_margin);
     steps.cell_cut = cut;
   } else if (cut != nullptr) {
     steps.setCut(*cut);

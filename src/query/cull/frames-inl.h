@@ -115,6 +115,68 @@ HWY_INLINE void decodeRoot(const PairFrames& g, int own, const bounds::NodeBound
   decode(g.side[own], root, corner, 2 * static_cast<float>(lattice::kMiddle) * g.side[own].unit, f);
 }
 
+// Writes the centres of some spheres, in their own frame and in the other.
+HWY_INLINE void turnSpheres(const SideFrame& g, const V (&c)[3], std::size_t i, SphereFrame& f) {
+  const D d;
+  BOCST_UNROLL
+  for (int j = 0; j < 3; ++j) {
+    V cj = hn::Set(d, g.shift[j]);
+    BOCST_UNROLL
+    for (int k = 0; k < 3; ++k) cj = hn::MulAdd(hn::Set(d, g.to_other[j][k]), c[k], cj);
+    hn::Store(c[j], d, f.center[0][j] + i);
+    hn::Store(cj, d, f.center[1][j] + i);
+  }
+}
+
+// Writes the spheres of the octants of a cell, as TreeSide::sphere() has them. Whole lattice units are exact.
+template <typename Position>
+HWY_INLINE void decodeSpheres(const SideFrame& g, const CellTree& tree, int level, const Position& at, SphereFrame& f) {
+  constexpr float kHalfDiagonal = 0.8660254f;   // of a cube of side 1
+  constexpr float kClippedFactor = 1.4142136f;  // see TreeSide::sphere()
+  const D d;
+  const std::int32_t length = 1 << (lattice::kMaxLevel - 1 - level);
+  std::int32_t corner[3], end[3];  // of the first octant and of the regions, from the middle of the root
+  bool whole = true;
+  BOCST_UNROLL
+  for (int k = 0; k < 3; ++k) {
+    corner[k] = static_cast<std::int32_t>(at[k]) * (2 * length) - lattice::kMiddle;
+    end[k] = static_cast<std::int32_t>(tree.extent[k]) - lattice::kMiddle;
+    whole &= corner[k] + 2 * length <= end[k];
+  }
+  const V size = hn::Set(d, static_cast<float>(length)), half_unit = hn::Set(d, 0.5f * g.unit);
+  V c[3];
+  if (whole) {
+    const V radius = hn::Set(d, static_cast<float>(length) * g.unit * kHalfDiagonal);
+    for (std::size_t i = 0; i < 8; i += hn::Lanes(d)) {
+      BOCST_UNROLL
+      for (int k = 0; k < 3; ++k) {
+        const V twice = hn::MulAdd(hn::Load(d, kOctantCorner[k] + i), hn::Set(d, static_cast<float>(2 * length)),
+                                   hn::Set(d, static_cast<float>(2 * corner[k] + length)));
+        c[k] = hn::Mul(twice, half_unit);
+      }
+      turnSpheres(g, c, i, f);
+      hn::Store(radius, d, f.radius + i);
+    }
+    return;
+  }
+  const bool leaves = static_cast<std::uint32_t>(level) + 1 >= tree.deepest;
+  const V of_clipped = hn::Set(d, leaves ? 1.0f : kClippedFactor);
+  for (std::size_t i = 0; i < 8; i += hn::Lanes(d)) {
+    V squared = hn::Zero(d), least = size;
+    BOCST_UNROLL
+    for (int k = 0; k < 3; ++k) {
+      const V low = hn::MulAdd(hn::Load(d, kOctantCorner[k] + i), size, hn::Set(d, static_cast<float>(corner[k])));
+      const V high = hn::Min(hn::Add(low, size), hn::Set(d, static_cast<float>(end[k]))), extent = hn::Sub(high, low);
+      least = hn::Min(least, extent);
+      squared = hn::MulAdd(extent, extent, squared);
+      c[k] = hn::Mul(hn::Add(low, high), half_unit);
+    }
+    const V factor = hn::IfThenElse(hn::Lt(least, size), of_clipped, hn::Set(d, 1.0f));
+    turnSpheres(g, c, i, f);
+    hn::Store(hn::Mul(hn::Mul(hn::Sqrt(squared), half_unit), factor), d, f.radius + i);
+  }
+}
+
 // The octants from i on of frame f beside the volume in lane l of frame y, of the other side: displacements from the
 // octants' middles to the volume's along the axes of [0] the octants' side, and by how much the boxes overlap along the
 // axis where that is least; below 0 they are apart.

@@ -16,6 +16,18 @@ struct alignas(64) Frame {
   float slab_half[8];
 };
 
+/// The spheres of eight octants as both sides of a pair see them, as in Frame.
+struct alignas(64) SphereFrame {
+  float center[2][3][8];
+  float radius[8];
+};
+
+/// What the spheres of a tree's cells depend on beside their places.
+struct CellTree {
+  std::uint32_t extent[3];  ///< Where the actual regions end.
+  std::uint32_t deepest;    ///< The level of the leaves.
+};
+
 /// From the frame of a side to that of the other, in float: coordinates are in lattice units of side 0 about the middle
 /// of each side's root.
 struct SideFrame {
