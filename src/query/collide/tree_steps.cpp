@@ -147,7 +147,8 @@ HWY_INLINE unsigned meetingSpheres(PairSteps& s, const BlockView& block, const S
   const hn::RebindToUnsigned<D> du;
   const int x = static_cast<int>(block.side), y = 1 - x;
   const bool one_cell = s.has_cells[y];
-  if (one_cell ? other.node.isRoot() || !isLeaf(s, y, other) : block.level != s.leaf_level[x]) return mask;
+  const std::uint32_t level = one_cell ? other.level : block.level;
+  if (level + PairSteps::kSphereLevels < s.cells.deepest || (one_cell && other.node.isRoot())) return mask;
   const SphereFrame& cells =
       one_cell ? spheresOf(s, y, other.node.block(), other.lane / 8) : spheresOf(s, x, block.index, block.frame);
   const Frame& volumes = s.frames[one_cell ? block.frame : other.lane / 8];

@@ -104,6 +104,7 @@ struct PairSteps {
 
   /// Where a side has cells: spheres of its leaves, in frames as `frames`, decoded when asked for. A sphere and a
   /// volume that are apart by more than `sphere_margin` do not touch.
+  static constexpr std::uint32_t kSphereLevels = 2;
   SphereFrame* spheres = nullptr;
   float sphere_margin = 0;
   CellTree cells{};
