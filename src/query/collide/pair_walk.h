@@ -176,13 +176,20 @@ class PairWalk {
 
   bool spheresMeet(const Sphere& a, const Sphere& b) const { return query::spheresMeet(a, b, b_in_a_.tolerance); }
 
-  bool sphereMeets(const Sphere& a, typename B::Node b) const {
+  bool sphereMeets(const Sphere& a, typename B::Node b) const { return !(gapTo(a, b) > 0); }
+
+  // How far a sphere is at least from a node of B, or above 0 if they do not touch; in units of B.
+  double gapTo(const Sphere& a, typename B::Node b) const {
+    const Sphere s = placed(a, a_in_b_);
+    const double extent = s.radius * (1 + 1e-12) + a_in_b_.tolerance;
     if constexpr (B::kBodies) {
-      const Sphere s = placed(a, a_in_b_);
-      const double extent = s.radius * (1 + 1e-12) + a_in_b_.tolerance;
-      return !(b_.gap(b, {&s.center, 1}, extent).at_least > extent);
+      return b_.gap(b, {&s.center, 1}, extent).at_least - extent;
     } else {
-      return spheresMeet(a, inA(b_.sphere(b)));
+      if (b_.isConservative()) return spheresMeet(a, inA(b_.sphere(b))) ? 0 : 1;
+      const OrientedVolume box = oriented(b_.volume(b));
+      const Eigen::Vector3d displacement = s.center - box.center;
+      const Eigen::Vector3d outside = ((box.axes.transpose() * displacement).cwiseAbs() - box.half).cwiseMax(0);
+      return outside.norm() - extent - 4 * a_in_b_.orthogonality_error * displacement.norm();
     }
   }
 
@@ -347,24 +354,31 @@ class PairWalk {
     const State sa = a_.state(pair.a), sb = b_.state(pair.b);
     if (sa == State::kLeaf && sb == State::kLeaf) return leafSpheres(pair);
     const Sphere ball_a = a_.sphere(pair.a), ball_b = inA(b_.sphere(pair.b));
+    // The pair that overlaps the most is taken first.
+    const std::size_t start = s.stack.size();
+    double least = 0;
+    const auto push = [&](const Pair& child, double gap) {
+      s.stack.push_back(child);
+      if (s.stack.size() - 1 > start && !(gap < least)) std::swap(s.stack.back(), s.stack[s.stack.size() - 2]);
+      least = std::min(least, gap);
+    };
     if (expandsA(sa, sb, ball_a.radius, ball_b.radius)) {
       if (sa == State::kGrows) {
         s.deferred.add(pair);
       } else {
         a_.children(pair.a, [&](typename A::Node c) {
           const Sphere ball = a_.sphere(c);
-          if (sphereMeets(ball, pair.b) && (sb != State::kLeaf || meetsLeafOfB(ball, pair.b))) {
-            s.stack.push_back({c, pair.b});
-          }
+          const double gap = gapTo(ball, pair.b);
+          if (!(gap > 0) && (sb != State::kLeaf || meetsLeafOfB(ball, pair.b))) push({c, pair.b}, gap);
         });
       }
     } else if (sb == State::kGrows) {
       s.deferred.add(pair);
     } else {
       b_.children(pair.b, [&](typename B::Node c) {
-        if (!sphereMeets(ball_a, c)) return;
-        if (sa == State::kLeaf && !meetsLeafOfA(inA(b_.sphere(c)), pair.a)) return;
-        s.stack.push_back({pair.a, c});
+        const double gap = gapTo(ball_a, c);
+        if (gap > 0 || (sa == State::kLeaf && !meetsLeafOfA(inA(b_.sphere(c)), pair.a))) return;
+        push({pair.a, c}, gap);
       });
     }
     return false;
