@@ -135,11 +135,11 @@ class Tree {
   const BoxTree* knownBoxes() const { return boxes_.seen(); }
   /// They would not take most of the memory budget.
   bool affordsBoxes() const;
-  /// How many pairs of leaves long walks still test before boxes() pays; 0 if it is built, or the helper thread was
+  /// How many steps (see Turns) long walks still take before boxes() pays; 0 if it is built, or the helper thread was
   /// asked for it.
   std::size_t boxPrice() const { return knownBoxes() != nullptr || boxes_.isAwaited() ? 0 : boxes_.rent.left(); }
-  /// Adds pairs of leaves that a long walk has tested.
-  void payBoxRent(std::size_t pairs) const { boxes_.rent.pay(pairs); }
+  /// Adds steps that a long walk has taken.
+  void payBoxRent(std::size_t steps) const { boxes_.rent.pay(steps); }
 
   /// The surface's Interior, which proves contact quickly; null until payInterior() has built it. Dropped like a
   /// branch.
@@ -356,11 +356,11 @@ class Tree {
   mutable thread::Published<const std::vector<Eigen::Vector3d>> component_points_;
   mutable std::atomic<double> radius_{-1};  // negative: not known yet
   // Made under growth_, dropped alone.
-  OnDemand<BoxTree> boxes_;      // rent: pairs of leaves
+  OnDemand<BoxTree> boxes_;      // rent: steps of walks
   OnDemand<Interior> interior_;  // rent: walks
   mutable std::atomic<LongSearch> long_searches_[4] = {};
   SupportTable supports_;
-  // A query of two models that are far apart reads only the members up to next_prune_.
+  // Together, as a query of two models that are far apart reads little else.
   Outline outline_;
   std::atomic<ChildRef> root_{ChildRef()};
   static constexpr std::int64_t kNeverDue = std::numeric_limits<std::int64_t>::max();

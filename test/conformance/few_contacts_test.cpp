@@ -470,6 +470,39 @@ TEST_P(FewContactsWithin, BesideOtherPartnersAreSomeOfAllWhateverHappenedBefore)
 
 INSTANTIATE_TEST_SUITE_P(Margins, FewContactsWithin, testing::Values(0, 0.03));
 
+// Hundreds of leaves overlap and few triangles touch, so the walk in order gives up; what it found until then is
+// forgotten.
+TEST(FewContacts, AfterAWalkInOrderThatGivesUpAreThoseOfTheLeastPosition) {
+  std::mt19937_64 g(41);
+  std::uniform_real_distribution<double> u(-1, 1);
+  const auto soup = [&] {
+    Raw raw;
+    for (int i = 0; i < 8000; ++i) {
+      const Vector3d at(u(g), u(g), u(g));
+      const auto corner = [&] { return Vector3d(at + 0.024 * Vector3d(u(g), u(g), u(g))); };
+      raw.addTriangle(corner(), corner(), corner());
+    }
+    return raw;
+  };
+  constexpr std::size_t kRounds = 20;
+  std::size_t same_of_models = 0, same_of_bvh = 0, many = 0;
+  for (std::size_t round = 0; round < kRounds; ++round) {
+    const Raw one = soup(), two = soup();
+    const Modeld a(one.mesh()), b(two.mesh()), c(one.mesh(), byPosition()), d(two.mesh(), byPosition());
+    const auto bvh = test::bvh<fcl::OBBRSSd>(two);
+    const auto I = fcl::Transform3d::Identity();
+    const fcl::Transform3d X = test::pose<double>(test::randomRotation(g), Vector3d(u(g), u(g), u(g)) / 4);
+    const std::size_t most = 4 + round % 4;
+    many += ask(a, I, b, X, 1000).size() > most;
+    const Ids expected = idsOf(ask(c, I, d, X, most));
+    same_of_models += idsOf(ask(a, I, b, X, most)) == expected;
+    same_of_bvh += idsOf(ask(a, I, *bvh, X, most)) == expected;
+  }
+  EXPECT_GT(many, kRounds * 9 / 10);
+  EXPECT_GT(same_of_models, kRounds * 9 / 10);
+  EXPECT_GT(same_of_bvh, kRounds * 9 / 10);
+}
+
 TEST(FewContacts, OfPairsThatDoNotTouchNeedNoWholeTree) {
   const Raw ring = test::torus(80);  // so large that growth begins by parts
   const Modeld a(ring.mesh()), b(Raw(ring).scale(0.2).mesh());

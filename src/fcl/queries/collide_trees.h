@@ -61,7 +61,7 @@ void walkWithinMargin(const query::TreeSide& a, const B& b, const query::Similar
   const double below = tolerance * (1 + kRounding) + kRounding * 2 * (lattice::kMiddle + half_b * near.scale);
   query::findNearest(a, b, b_in_a, {below, 0, 0, &collector});
 }
-constexpr std::size_t kMostNodePairs = 256;  ///< Of a PairWalk in such a query.
+constexpr std::size_t kMostNodePairs = 256;  ///< Steps after which walkWithinMargin() ends a PairWalk.
 
 /// A collision query of two models: chooses among the walks, and hands what they find to a MeshCollector. While both
 /// trees' query locks are held.

@@ -50,7 +50,7 @@ class PairWalk {
 
   /// True when the visitor ended it.
   bool run() { return run(kNoLimit).met; }
-  /// The same, but gives up after so many pairs of nodes.
+  /// The same, but gives up after so many steps: a pair of nodes is one, and tests of triangles are more.
   WalkEnd run(std::size_t most_steps) {
     most_steps_ = most_steps;
     const bool ended = search();

@@ -145,13 +145,11 @@ HWY_INLINE bool isLarger(const SphereSteps& s, int x, std::uint32_t level, std::
   return s.level_rule.isFirst(x, static_cast<int>(other_level) - static_cast<int>(level));
 }
 
-HWY_INLINE void push(SphereSteps& s, const BlockView& own, std::uint32_t frames, const StepNode& other,
-                     unsigned octants) {
-  BOCST_ASSERT(frames <= SphereSteps::kFrames && s.stack + s.depth < s.stack_end);
+HWY_INLINE void push(SphereSteps& s, const BlockView& own, const StepNode& other, unsigned octants) {
+  BOCST_ASSERT(own.frame < SphereSteps::kFrames && s.stack + s.depth < s.stack_end);
   SphereGroup& top = s.stack[s.depth++];
   copyWords(other, top.other);
   copyWords(own, top.own);
-  top.frames = frames;
   top.octants = octants;
 }
 
@@ -167,7 +165,7 @@ HWY_INLINE bool expandOther(SphereSteps& s, const BlockView& own, const StepNode
     StepNode n;
     setOctant(n, own, static_cast<std::uint32_t>(__builtin_ctz(mask)));
     const unsigned left = meetingOctants(s, block, n, s.stack[s.depth].order);
-    if (left != 0) push(s, block, block.frame + 1, n, left);
+    if (left != 0) push(s, block, n, left);
   }
   // The group with the nearest octant goes on top.
   if (s.depth - start < 2 || !s.nearest_first) return true;
@@ -208,7 +206,7 @@ SphereSteps::Event NextEvent(SphereSteps& s) {
     own.level = top.own.level;
     own.ref =
         top.own.at != nullptr ? top.own.at->child[o].load(std::memory_order_acquire) : s.side[side]->childRef(own.node);
-    std::uint32_t frames = top.frames;
+    std::uint32_t frames = top.own.frame + 1;  // 0 without a frame
     if (frames == 0) {
       own.lane = lookUp(s, side, own.node, frames++);
       other.lane = lookUp(s, 1 - side, other.node, frames++);
@@ -229,7 +227,7 @@ SphereSteps::Event NextEvent(SphereSteps& s) {
     if (mask == 0) continue;
     const bool leaves = isLeaf(s, x, block.level) && isLeaf(s, 1 - x, still.level);
     // Not expandOther() with a cut: it puts octants on the stack in the opposite order.
-    if (leaves || s.cut != nullptr || !expandOther(s, block, still, mask)) push(s, block, frames, still, mask);
+    if (leaves || s.cut != nullptr || !expandOther(s, block, still, mask)) push(s, block, still, mask);
   }
   return SphereSteps::kDone;
 }
@@ -284,7 +282,7 @@ unsigned decideMeeting(const SphereSteps& s, int own, std::uint32_t index, unsig
 SphereSteps::Event nextEvent(SphereSteps& steps) { return HWY_DYNAMIC_DISPATCH(NextEvent)(steps); }
 
 void leaveFrames(SphereSteps& s) {
-  for (std::size_t i = 0; i < s.depth; ++i) s.stack[i].frames = 0;
+  for (std::size_t i = 0; i < s.depth; ++i) s.stack[i].own.frame = BlockView::kNoFrame;
 }
 
 void pushPair(SphereSteps& s, tree::NodeRef node_a, tree::NodeRef node_b) {
@@ -296,7 +294,6 @@ void pushPair(SphereSteps& s, tree::NodeRef node_a, tree::NodeRef node_b) {
   const tree::Block* const block = node_a.isRoot() ? nullptr : &a.block(node_a.block());
   top.own = {block, node_a.block(), static_cast<std::uint32_t>(a.level(node_a)), BlockView::kNoFrame, 0};
   top.octants = 1u << node_a.octant();
-  top.frames = 0;
 }
 
 }  // namespace bocst::query

@@ -35,8 +35,7 @@ struct SphereFrames {
 /// copyWords().
 struct SphereGroup {
   StepNode other;         ///< Its child is not read if it is a leaf.
-  BlockView own;          ///< Of the root: index of NodeRef::kRoot, octant 7.
-  std::uint32_t frames;   ///< How many are in use: for the octants, and for what is above both nodes. 0: it has none.
+  BlockView own;          ///< For the root, which no block has, `at` is null, and (index, octant) are NodeRef::kRoot.
   std::uint32_t octants;  ///< A bit each.
   /// Of each a number whose lowest three bits are the octant; the least comes first.
   std::uint32_t order[8];

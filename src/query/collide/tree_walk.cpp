@@ -39,10 +39,10 @@ void TreeWalk::payForBoxes(std::size_t steps) const {
   Turns(a_, b_, tree::Tree::Search::kYesOrNo, kLimits).tookOverBlocks(steps, true);
 }
 
-WalkEnd TreeWalk::run(Visitor& visitor, std::size_t most_leaf_pairs) {
+WalkEnd TreeWalk::run(Visitor& visitor, std::size_t most_steps) {
   visitor_ = &visitor;
-  leaf_pairs_ = 0;
-  most_leaf_pairs_ = most_leaf_pairs;
+  steps_ = 0;
+  most_steps_ = most_steps;
   gave_up_ = false;
   auto& s = thread::ofThread<Scratch>();
   s.deferred.clear();
@@ -55,7 +55,7 @@ WalkEnd TreeWalk::run(Visitor& visitor, std::size_t most_leaf_pairs) {
     if (!side->isConservative()) side->tree().payRent(tree::Tree::kWalkRent);
   }
   const bool ended = search(s);
-  return {ended && !gave_up_, leaf_pairs_, gave_up_};
+  return {ended && !gave_up_, steps_, gave_up_};
 }
 
 WalkEnd TreeWalk::runInOrder(Visitor& visitor, std::size_t most_leaf_pairs) {
@@ -111,7 +111,7 @@ bool TreeWalk::stepAll(PairSteps& steps, Scratch& s) {
         break;
       case StepEvent::kLargeTriangles:
         testLargeTriangles(steps, event, s);
-        ++leaf_pairs_;
+        ++steps_;
         break;
       case StepEvent::kLeaves:
         if (testLeaves(event, s)) return true;
@@ -140,7 +140,7 @@ void TreeWalk::testLargeTriangles(PairSteps& steps, const StepEvent& event, Scra
 
 // True when the visitor ended the walk, or it gave up.
 bool TreeWalk::testLeaves(const StepEvent& event, Scratch& s) {
-  gave_up_ = ++leaf_pairs_ > most_leaf_pairs_;
+  gave_up_ = ++steps_ > most_steps_;
   if (gave_up_) return true;
   if (wide_) return testCell(event, s);
   if (!s.leaves_started) {
@@ -149,8 +149,8 @@ bool TreeWalk::testLeaves(const StepEvent& event, Scratch& s) {
   }
   const auto visit = [this](std::uint32_t t, std::uint32_t u, bool certain) {
     if (in_order_) return visitor_->triangles(t, u, certain);
-    if (!certain) leaf_pairs_ += kExactTest;
-    gave_up_ = leaf_pairs_ > most_leaf_pairs_;
+    if (!certain) steps_ += kExactTest;
+    gave_up_ = steps_ > most_steps_;
     return gave_up_ || visitor_->triangles(t, u, certain);
   };
   const tree::NodeRef a = event.pair[0].node, b = event.pair[1].node;
@@ -161,7 +161,7 @@ bool TreeWalk::testLeaves(const StepEvent& event, Scratch& s) {
                                                           : s.leaves.testLargeB(a_, a, s.large[1], triangles, visit);
   // How many triangles are tested depends on whether their corners are packed.
   if (in_order_) return visitor_->endLeaves();
-  leaf_pairs_ += (s.leaves.tested() - before) / kTrianglePairs;
+  steps_ += (s.leaves.tested() - before) / kTrianglePairs;
   return ended;
 }
 

@@ -45,8 +45,9 @@ class TreeWalk {
   /// True when the visitor ended it.
   bool run(Visitor& visitor) { return run(visitor, kNoLimit).met; }
 
-  /// The same, but gives up after more than so many pairs of leaves.
-  WalkEnd run(Visitor& visitor, std::size_t most_leaf_pairs);
+  /// The same, but gives up after more than so many steps: a pair of leaves is one, and exact tests of triangles are
+  /// several.
+  WalkEnd run(Visitor& visitor, std::size_t most_steps);
 
   /// The same of a yes-or-no query, in turns with a walk over BoxSide where it gets long. Volumes in float separate
   /// little between two flat faces with little space between them, where oriented boxes in double separate the faces as
@@ -80,8 +81,8 @@ class TreeWalk {
   bool inverted_ = false;
   bool is_shallow_ = false;  // see areSeparate()
   Visitor* visitor_ = nullptr;
-  std::size_t leaf_pairs_, most_leaf_pairs_;
-  bool gave_up_;  // after more than most_leaf_pairs_
+  std::size_t steps_, most_steps_;
+  bool gave_up_;  // after more than most_steps_
   bool in_order_ = false;
 };
 

@@ -42,7 +42,7 @@ struct CompleteSide {
 };
 
 /// One side of a pair: a model's tree. A partner of another kind is another class with these members (BvhSide).
-/// The query lock of the tree is held shared for the life of this object.
+/// Nodes may be read only while the query lock of the tree is held shared.
 class TreeSide {
  public:
   using Node = tree::NodeRef;

@@ -12,8 +12,9 @@ namespace bocst::query {
 /// How long a walk over the blocks of one model or two and one over their oriented boxes (BoxSide) take turns, until
 /// one ends. The first is usually quicker; but between two flat faces with little space between them, or of slivers,
 /// its volumes separate little. Each turn may take longer than the one before, so all take at most some times what the
-/// quicker way takes. What ended the last long search of each tree gets as many steps at once; the blocks, which are
-/// always first, get no more time before boxes than these took.
+/// quicker way takes. The limits follow how the last long search of each tree ended: if over blocks, they get twice as
+/// many steps at once; if over boxes, the blocks get only as much time before them as the boxes took. A step takes
+/// about as long as a test of two leaves; walks count what takes longer as several.
 ///
 /// The boxes are built when walks have paid for them, as whole trees are.
 class Turns {
@@ -22,7 +23,7 @@ class Turns {
     std::size_t few;         ///< Steps over blocks in the first turn, once the boxes are built ...
     std::size_t many;        ///< ... and before. Longer walks over blocks pay for the boxes.
     std::size_t over_boxes;  ///< The least number of steps over boxes.
-    std::size_t slower;      ///< A step over boxes takes as long as this many over blocks.
+    std::size_t per_box;     ///< A step over boxes takes as long as this many over blocks.
   };
 
   template <typename B>
@@ -41,7 +42,7 @@ class Turns {
     const bool tries_other = times_ > 1 && (times_ & (times_ - 1)) == 0;
     if (last_over_boxes_) {
       most_over_boxes_ = 2 * steps;
-      if (price == 0) most_ = limits.slower * steps * (tries_other ? 2 : 1);
+      if (price == 0) most_ = limits.per_box * steps * (tries_other ? 2 : 1);
     } else if (price == 0 && steps > 0) {
       most_ = std::max(most_, tries_other ? steps / 4 : 2 * steps);
       follows_blocks_ = true;
@@ -57,7 +58,9 @@ class Turns {
 
   /// Of this turn.
   std::size_t most() const { return most_; }
-  std::size_t mostOverBoxes() const { return std::max({limits_.over_boxes, most_ / limits_.slower, most_over_boxes_}); }
+  std::size_t mostOverBoxes() const {
+    return std::max({limits_.over_boxes, most_ / limits_.per_box, most_over_boxes_});
+  }
 
   /// The walk over blocks took so many steps, and gave up or not.
   void tookOverBlocks(std::size_t steps, bool gave_up) const {

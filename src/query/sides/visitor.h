@@ -89,7 +89,7 @@ class Visitor {
   /// Triangle a of side A and b of side B may touch; everything that touches comes here. Where `certain`, they meet,
   /// and FCL's test says so.
   virtual bool triangles(std::uint32_t a, std::uint32_t b, bool certain) = 0;
-  /// All pairs of two leaves have come, of a walk in order.
+  /// Called by a walk in order when it has reported all pairs of triangles of two leaves.
   virtual bool endLeaves() { return false; }
   /// The spheres of two cells overlap.
   virtual bool cells(const CellLeaf& a, const CellLeaf& b) = 0;
