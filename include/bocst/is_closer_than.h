@@ -8,8 +8,8 @@ namespace bocst {
 
 /// True if the distance between two geometries at the poses X_W1 and X_W2 (world from geometry) is at most `distance`,
 /// in the world's length unit. Stops once the answer is known, so it mostly takes less time than fcl::distance. The
-/// answer is `fcl::distance(...) <= distance` up to rounding; 0 tests for contact. Solids and shapes include their
-/// inside.
+/// answer is `fcl::distance(...) <= distance` of the same geometries, up to the error of distances (<bocst/fcl.h>):
+/// FCL's own distance of two BVHModels may be off by more. 0 tests for contact. Solids and shapes include their inside.
 ///
 /// Pairs are those of bocst::collide (<bocst/fcl.h>); o1 and o2 may be in either order. The surface of a model with
 /// conservative answers is the set of its cells' spheres. Options::margin has no effect here. The answer is false if
