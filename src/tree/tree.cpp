@@ -105,8 +105,8 @@ void Tree::reset(std::shared_ptr<const Mesh> mesh) {
   const Eigen::AlignedBox3d box = surface_.latticeBounds();
   encodeBox(box, lattice::Cell{}, nodes_.root_bounds);
   supports_known_ = false;
-  outline_.set(Outline::boxOf(surface_.bounds.center(), Eigen::Matrix3d::Identity(),
-                              surface_.bounds.sizes() / 2 + Eigen::Vector3d::Constant(sphereReach())),
+  const Eigen::AlignedBox3d met = queryBox();
+  outline_.set(Outline::boxOf(met.center(), Eigen::Matrix3d::Identity(), met.sizes() / 2),
                [&] { supports_.start(box, surface_.lattice); });
   dropTree();
 }
@@ -115,6 +115,22 @@ double Tree::sphereReach() const {
   if (!conservative()) return 0;
   const int cell_side = 1 << (lattice::kMaxLevel - deepest_);
   return std::sqrt(3.0) * (cell_side + 1) * surface_.lattice.unit();
+}
+
+Eigen::AlignedBox3d Tree::queryBox() const {
+  if (!conservative()) return surface_.bounds;
+  const double side = 1 << (lattice::kMaxLevel - deepest_), reach = 0.70711 * (side + 1);
+  const lattice::Lattice& lattice = surface_.lattice;
+  const Eigen::AlignedBox3d box = surface_.latticeBounds();
+  Eigen::Array3d low, high;
+  for (int k = 0; k < 3; ++k) {
+    // Of the regions of cells that the surface meets, or may meet by less than a unit.
+    low[k] = std::max(0.0, side * std::floor((box.min()[k] - 1) / side)) - reach;
+    high[k] = std::min(static_cast<double>(lattice.extent()[static_cast<std::size_t>(k)]),
+                       side * (std::floor((box.max()[k] + 1) / side) + 1)) +
+              reach;
+  }
+  return {lattice.origin().array() + lattice.unit() * low, lattice.origin().array() + lattice.unit() * high};
 }
 
 std::int64_t Tree::now() const { return options_.clock ? nanoseconds(options_.clock()) : coarseNow(); }

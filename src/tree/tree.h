@@ -77,6 +77,10 @@ class Tree {
   /// A sphere is about a cell of the collision depth that the surface meets, so no point of it is farther from the
   /// surface than the cell's diagonal. (Cells are decided to less than a lattice unit, which is added.)
   double sphereReach() const;
+  /// About all that queries may meet, in the mesh's frame: the surface, or the spheres. No sphere reaches farther
+  /// beyond its cell's region than 2^-1/2 of a cell's side along an axis: to that where the region is flat, else to
+  /// less.
+  Eigen::AlignedBox3d queryBox() const;
 
   ChildRef childRef(NodeRef node) const {
     return node.isRoot() ? root_.load(std::memory_order_acquire)

@@ -19,11 +19,11 @@ namespace bocst::fcl_adapter {
 template <typename S>
 query::PoseBoxes boxesOf(const Model<S>& a, const Model<S>& b) {
   // Not Tree::bounds(), which takes the lock that is held: behind a writer that waits, it would wait for ever.
-  const Eigen::AlignedBox3d &box_a = treeOf(a).surface().bounds, &box_b = treeOf(b).surface().bounds;
+  const Eigen::AlignedBox3d box_a = treeOf(a).queryBox(), box_b = treeOf(b).queryBox();
   const Eigen::Vector3d middle_a = box_a.center(), middle_b = box_b.center();
   const Eigen::Vector3d to_a = (box_a.max() - middle_a).cwiseMax(middle_a - box_a.min()),
                         to_b = (box_b.max() - middle_b).cwiseMax(middle_b - box_b.min());
-  const double margin = 1.001 * (marginOf(&a, &b) + treeOf(a).sphereReach() + treeOf(b).sphereReach());
+  const double margin = 1.001 * marginOf(&a, &b);
   query::PoseBoxes boxes;
   // However b is turned, it is no farther from its origin than this.
   boxes.radius_sum = to_a.norm() + 1.002 * (middle_b.norm() + to_b.norm());
