@@ -19,7 +19,6 @@ namespace bocst::query {
 /// Decides in double, as the definition says, which octants in `mask` of a block of side `own` meet the other node.
 unsigned decideMeeting(const SphereSteps& s, int own, std::uint32_t index, unsigned mask, tree::NodeRef other);
 
-namespace {}  // namespace
 }  // namespace bocst::query
 #endif
 

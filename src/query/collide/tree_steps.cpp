@@ -140,7 +140,7 @@ HWY_INLINE void toVolumes(const V (&displacement)[3], const V (&half)[3], const 
 }
 
 // Where the octants of a block or the other node are leaves with cells: the octants in `mask` for which the sphere of
-// the cell may meet the volume beside it. Sets their order.
+// the cell may meet the volume beside it. Sets their order, unless null.
 HWY_INLINE unsigned meetingSpheres(PairSteps& s, const BlockView& block, const StepNode& other, unsigned mask,
                                    std::uint32_t* order) {
   const D d;
@@ -171,8 +171,10 @@ HWY_INLINE unsigned meetingSpheres(PairSteps& s, const BlockView& block, const S
     const V reach = hn::Add(of_cell(cells.radius, i), hn::Set(d, s.sphere_margin));
     const V depth = hn::Sub(hn::Mul(reach, reach), squared);
     const M apart = hn::Or(hn::Lt(depth, hn::Zero(d)), hn::Gt(from_slab, reach));
-    const auto bits = hn::And(hn::BitCast(du, depth), hn::Set(du, ~7u));
-    hn::StoreU(hn::Or(bits, hn::Iota(du, static_cast<std::uint32_t>(i))), du, order + i);
+    if (order != nullptr) {
+      const auto bits = hn::And(hn::BitCast(du, depth), hn::Set(du, ~7u));
+      hn::StoreU(hn::Or(bits, hn::Iota(du, static_cast<std::uint32_t>(i))), du, order + i);
+    }
     result |= bitsOf(d, hn::AndNot(apart, maskOf(d, mask >> i))) << i;
   }
   return result;
@@ -366,12 +368,12 @@ HWY_INLINE bool expandOther(PairSteps& s, const BlockView& own, const StepNode& 
   unsigned met = 0;
   for (; mask != 0; mask &= mask - 1) {
     const auto o = static_cast<std::uint32_t>(__builtin_ctz(mask));
-    const unsigned left =
-        overlapping(s.geometry, s.frames[block.frame], s.frames[own.frame], o, block.at->grey, nullptr);
+    unsigned left = overlapping(s.geometry, s.frames[block.frame], s.frames[own.frame], o, block.at->grey, nullptr);
     if (left == 0) continue;
-    met |= left;
     StepNode n;
     setOctant(n, own, o);
+    if (s.spheres != nullptr && (left = meetingSpheres(s, block, n, left, nullptr)) == 0) continue;
+    met |= left;
     if (!s.sees_all) fetch(*s.tree[x], n.ref);
     push(s, block, n, left);
   }
