@@ -403,26 +403,26 @@ TEST(Tree, CountsTheNodesThatItHas) {
 // A block is used at the time of its own model's clock, whichever model is asked first.
 TEST(Tree, ModelsWithClocksOfTheirOwnKeepWhatIsUsed) {
   for (const Answer answer : {Answer::kExact, Answer::kConservative}) {
-    FakeClock clocks[2];
-    Options options[2];
-    for (int i = 0; i < 2; ++i) {
-      options[i].answer = answer;
-      options[i].clock = clocks[i].function();
-    }
-    Modeld a(test::torus(60).mesh(), options[0]), b(test::torus(60).mesh(), options[1]);
-    const auto ask = [&](bool turned) { EXPECT_TRUE(turned ? touching(b, a, -kHit) : touching(a, b, kHit)); };
     for (const bool turned : {false, true}) {
-      for (int i = 0; i < 10; ++i) ask(turned);
-      // One clock stands still.
-      for (int k = 0; k < 2; ++k) {
+      // The other clock stands still.
+      for (const int moving : {0, 1}) {
+        FakeClock clocks[2];
+        Options options[2];
+        for (int i = 0; i < 2; ++i) {
+          options[i].answer = answer;
+          options[i].clock = clocks[i].function();
+        }
+        Modeld a(test::torus(60).mesh(), options[0]), b(test::torus(60).mesh(), options[1]);
+        const auto ask = [&] { EXPECT_TRUE(turned ? touching(b, a, -kHit) : touching(a, b, kHit)); };
+        for (int i = 0; i < 10; ++i) ask();
         for (int i = 0; i < 20; ++i) {
-          clocks[k].now += milliseconds(900);
-          ask(turned);
+          clocks[moving].now += milliseconds(900);
+          ask();
         }
         const std::uint64_t grown = a.statistics().expansions + b.statistics().expansions;
         for (int i = 0; i < 20; ++i) {
-          clocks[k].now += milliseconds(900);
-          ask(turned);
+          clocks[moving].now += milliseconds(900);
+          ask();
         }
         EXPECT_EQ(a.statistics().expansions + b.statistics().expansions, grown) << "what was dropped grew again";
       }
