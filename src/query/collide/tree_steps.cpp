@@ -139,8 +139,8 @@ HWY_INLINE void toVolumes(const V (&displacement)[3], const V (&half)[3], const 
   from_slab = hn::Sub(hn::Abs(hn::Sub(along, slab_center)), slab_half);
 }
 
-// Where the octants of a block or the other node are leaves with cells: the octants in `mask` for which the sphere of
-// the cell may meet the volume beside it. Sets their order, unless null.
+// The octants in `mask` of a block for which the cell's sphere may meet the volume beside it, be the cells those of the
+// block or the other node; all where these cells are above the last levels. Sets their order, unless null.
 HWY_INLINE unsigned meetingSpheres(PairSteps& s, const BlockView& block, const StepNode& other, unsigned mask,
                                    std::uint32_t* order) {
   const D d;

@@ -102,8 +102,9 @@ struct PairSteps {
     return (has_cells[0] ? side[0]->firstCellId(a) : side[1]->firstCellId(b)) > cell_cut->last_cell;
   }
 
-  /// Where a side has cells: spheres of its leaves, in frames as `frames`, decoded when asked for. A sphere and a
-  /// volume that are apart by more than `sphere_margin` do not touch.
+  /// Where a side has cells: the spheres of its leaves and of so many levels above, which hold those below them, in
+  /// frames as `frames`, decoded when asked for. A sphere and a volume that are apart by more than `sphere_margin` do
+  /// not touch.
   static constexpr std::uint32_t kSphereLevels = 2;
   SphereFrame* spheres = nullptr;
   float sphere_margin = 0;
