@@ -11,10 +11,10 @@
 
 #include "fcl/adapters/models.h"
 #include "fcl/adapters/validate.h"
-#include "fcl/queries/collide_row.h"
-#include "fcl/queries/grow_together.h"
-#include "fcl/queries/pose_boxes.h"
-#include "fcl/queries/query_scope.h"
+#include "fcl/collide/collide_row.h"
+#include "fcl/pair/grow_together.h"
+#include "fcl/pair/pose_boxes.h"
+#include "fcl/pair/query_scope.h"
 #include "thread/of_thread.h"
 #include "thread/thread_pool.h"
 

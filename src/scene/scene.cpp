@@ -18,7 +18,7 @@
 #include "fcl/adapters/models.h"
 #include "fcl/adapters/shapes.h"
 #include "fcl/adapters/validate.h"
-#include "fcl/queries/grow_together.h"
+#include "fcl/pair/grow_together.h"
 #include "fcl/queries/scene_pair.h"
 #include "log/number_text.h"
 #include "scene/distance.h"

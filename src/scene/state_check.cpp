@@ -9,7 +9,7 @@
 #include <stdexcept>
 
 #include "fcl/adapters/models.h"
-#include "fcl/queries/collide_row.h"
+#include "fcl/collide/collide_row.h"
 #include "fcl/queries/scene_pair.h"
 
 namespace bocst::scene {

@@ -5,7 +5,7 @@
 #include <cstdint>
 #include <vector>
 
-#include "fcl/queries/grow_together.h"
+#include "fcl/pair/grow_together.h"
 #include "scene/state_check.h"
 
 namespace bocst::scene {

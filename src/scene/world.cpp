@@ -9,7 +9,7 @@
 #include <string>
 
 #include "fcl/adapters/validate.h"
-#include "fcl/queries/grow_together.h"
+#include "fcl/pair/grow_together.h"
 #include "scene/reach.h"
 
 namespace bocst::scene {

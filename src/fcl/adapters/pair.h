@@ -36,6 +36,15 @@ inline double magnitudeOf(const Eigen::AlignedBox3d& box) {
   return std::max(box.min().cwiseAbs().maxCoeff(), box.max().cwiseAbs().maxCoeff());
 }
 
+/// With so large a tolerance, in lattice units, the floats of a walk no longer tell how far two geometries are apart:
+/// those that areOutOfSight() are not to be walked.
+constexpr double kMostTolerance = 1e15;
+/// True if the distance of two points exceeds the sizes of what is about them, and a margin, by far. Halves do not
+/// overflow.
+inline bool areOutOfSight(const Eigen::Vector3d& p, const Eigen::Vector3d& q, double sizes, double margin) {
+  return (p / 2 - q / 2).cwiseAbs().maxCoeff() > 8 * sizes + margin;
+}
+
 /// What is no farther touches: the sum of what the two ask for.
 template <typename S>
 double marginOf(const Model<S>* model1, const Model<S>* model2) {

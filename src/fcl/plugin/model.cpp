@@ -8,8 +8,8 @@
 #include <stdexcept>
 
 #include "fcl/adapters/models.h"
+#include "fcl/pair/query_scope.h"
 #include "fcl/plugin/dispatch.h"
-#include "fcl/queries/query_scope.h"
 #include "log/log.h"
 #include "tree/tree.h"
 

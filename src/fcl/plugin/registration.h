@@ -12,8 +12,8 @@
 #include <typeinfo>
 
 #include "fcl/adapters/models.h"
+#include "fcl/collide/collide_pair.h"
 #include "fcl/plugin/libfcl.h"
-#include "fcl/queries/collide_pair.h"
 #include "fcl/queries/distance_pair.h"
 
 namespace bocst::fcl_adapter {

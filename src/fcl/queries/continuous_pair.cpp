@@ -12,9 +12,9 @@
 #include "fcl/adapters/motion.h"
 #include "fcl/adapters/pair.h"
 #include "fcl/adapters/validate.h"
-#include "fcl/queries/collide_pair.h"
-#include "fcl/queries/convex_frame.h"
-#include "fcl/queries/query_scope.h"
+#include "fcl/collide/collide_pair.h"
+#include "fcl/pair/convex_frame.h"
+#include "fcl/pair/query_scope.h"
 #include "query/ccd/contact_time_walk.h"
 
 namespace bocst::fcl_adapter {

@@ -7,7 +7,7 @@
 #include "fcl/adapters/bodies.h"
 #include "fcl/adapters/models.h"
 #include "fcl/adapters/validate.h"
-#include "fcl/queries/collide_pair.h"
+#include "fcl/collide/collide_pair.h"
 #include "fcl/queries/distance_pair.h"
 #include "thread/of_thread.h"
 

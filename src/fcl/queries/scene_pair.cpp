@@ -9,7 +9,7 @@
 #include "fcl/adapters/convex_shapes.h"
 #include "fcl/adapters/octree_side.h"
 #include "fcl/adapters/pair.h"
-#include "fcl/queries/query_scope.h"
+#include "fcl/pair/query_scope.h"
 #include "query/collide/sphere_walk.h"
 #include "query/collide/tree_walk.h"
 

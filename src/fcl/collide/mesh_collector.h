@@ -1,7 +1,6 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #pragma once
 
-#include <fcl/geometry/bvh/BVH_model.h>
 #include <fcl/narrowphase/detail/traversal/collision/intersect.h>
 
 #include <algorithm>
@@ -12,54 +11,16 @@
 #include <type_traits>
 #include <vector>
 
-#include "fcl/adapters/models.h"
 #include "fcl/adapters/pair.h"
-#include "fcl/queries/collide_query.h"
-#include "fcl/queries/contact_order.h"
+#include "fcl/collide/collide_query.h"
+#include "fcl/collide/contact_order.h"
+#include "fcl/collide/triangles.h"
 #include "geometry/triangle.h"
 #include "query/leaf/pair_set.h"
 #include "query/sides/visitor.h"
 #include "thread/of_thread.h"
 
 namespace bocst::fcl_adapter {
-
-/// The triangles of one side as FCL computes with them: corners in S, in the geometry's frame. Of a model or, where
-/// `bvh` is given, of that.
-template <typename S>
-class Triangles {
- public:
-  explicit Triangles(const tree::Tree& tree) : mesh_(tree.surface().mesh.get()) {}
-  explicit Triangles(const BvhSide& bvh) : bvh_(&bvh) {}
-
-  fcl::Vector3<S> corner(std::uint32_t t, int k) const {
-    if (bvh_ != nullptr) return bvh_->vertex(t, k).template cast<S>();
-    return mesh_->vertex(mesh_->indices(t)[static_cast<std::size_t>(k)]).template cast<S>();
-  }
-  query::Corners corners(std::uint32_t t) const {
-    const auto at = [t, this](int k) -> Eigen::Vector3d { return corner(t, k).template cast<double>(); };
-    return {at(0), at(1), at(2)};
-  }
-  fcl::AABB<S> box(std::uint32_t t, const fcl::Transform3<S>& X_WM) const {
-    return fcl::AABB<S>(X_WM * corner(t, 0), X_WM * corner(t, 1), X_WM * corner(t, 2));
-  }
-  /// Triangle t is about to be asked for, and now its corners.
-  void prefetch(std::uint32_t t) const {
-    if (bvh_ != nullptr) return bvh_->prefetch(t);
-    __builtin_prefetch(&mesh_->indices(t));
-  }
-  void prefetchCorners(std::uint32_t t) const {
-    if (bvh_ != nullptr) return bvh_->prefetchCorners(t);
-    for (const std::uint32_t v : mesh_->indices(t)) {
-      // A vertex may lie in two cache lines.
-      __builtin_prefetch(&mesh_->vertex(v)[0]);
-      __builtin_prefetch(&mesh_->vertex(v)[2]);
-    }
-  }
-
- private:
-  const Mesh* mesh_ = nullptr;  // null where the host has none: conservative answers ask for no triangle
-  const BvhSide* bvh_ = nullptr;
-};
 
 /// A contact before it is one of FCL's: ids in the caller's order, and how the two touch, in the world.
 struct Met {
@@ -87,50 +48,44 @@ struct RankedPair {
 template <typename S>
 class MeshCollector : public query::Visitor {
  public:
-  MeshCollector(const CollideQuery<S>& q, const tree::Tree& a, const Triangles<S>& t1, const Triangles<S>& t2,
-                double magnitude)
+  /// `magnitude`: of positions in the frame of either mesh. `position_tolerance`: by how many lattice units of side A
+  /// they may be off, the margin included.
+  MeshCollector(const CollideQuery<S>& q, const tree::Tree& a, const Triangles<S>& of_a, const Triangles<S>& of_b,
+                double magnitude, double position_tolerance)
       : q_(q),
         order_(a),
-        t1_(t1),
-        t2_(t2),
+        t1_(q.swapped ? of_b : of_a),
+        t2_(q.swapped ? of_a : of_b),
+        lattice_(a.surface().lattice),
         magnitude_(magnitude),
+        position_tolerance_(position_tolerance),
         margin_(q.margin),
-        ends_at_first_(q.endsAtFirst()),
         left_(q.contactsLeft()),
         most_(std::max<std::size_t>(kMost, left_ < kUnlimited ? 4 * left_ : kUnlimited)),
-        is_cut_(q.wantsFew()),
-        is_ranked_(is_cut_ && left_ < kFew),
+        mode_(startMode()),
         s_(scratch()),
         cut_(order_.startCut()) {
     s_.met.clear();
-    if (ends_at_first_) return;
+    if (mode_ == Mode::kAny) return;
     s_.seen.clear();
     s_.seen_cells.clear();
     s_.found.clear();
-    if (is_cut_) {
+    if (wantsFew()) {
       s_.first.start(left_);
       s_.first_cells.start(left_);
       cut_.cell_side = q.swapped ? 1 : 0;
     }
   }
 
-  /// Where side A's cells lie in the world, and by how many of its lattice units positions may be off: the margin
-  /// included.
-  void setFrame(const lattice::Lattice& lattice, double tolerance) {
-    origin_ = lattice.origin();
-    unit_ = lattice.unit();
-    position_tolerance_ = tolerance;
-  }
-
-  bool endsAtFirst() const override { return ends_at_first_; }
-  const query::Cut* cut() const override { return is_cut_ ? &cut_ : nullptr; }
+  bool endsAtFirst() const override { return mode_ == Mode::kAny; }
+  const query::Cut* cut() const override { return wantsFew() ? &cut_ : nullptr; }
 
   /// From here on the first contacts are taken, leaves by leaves, and in leaves those of the smallest ids.
-  void beginInOrder() { in_order_ = true; }
+  void beginInOrder() { mode_ = Mode::kInOrder; }
   /// `gave_up`: what came is forgotten, and another walk begins.
   void endInOrder(bool gave_up) {
     if (!gave_up) return;
-    in_order_ = false;
+    mode_ = startMode();
     s_.found.clear();
     s_.met.clear();
   }
@@ -138,16 +93,23 @@ class MeshCollector : public query::Visitor {
   bool triangles(std::uint32_t a, std::uint32_t b, bool certain) override {
     q_.inCallersOrder(a, b);
     const std::uint64_t key = keyOf(a, b, certain);
-    if (ends_at_first_) return endsWith(key);
-    if (in_order_) {
-      s_.found.push_back(key);
-    } else if (is_ranked_) {
-      addFirst(key);
-    } else if (s_.seen.insert(a, b)) {
-      s_.found.push_back(key);
-      if (is_cut_ && s_.found.size() > left_) rankFound();
-      if (s_.found.size() >= most_) decideFound();
+    switch (mode_) {
+      case Mode::kAny:
+        return endsWith(key);
+      case Mode::kInOrder:
+        s_.found.push_back(key);
+        return false;
+      case Mode::kFirst:
+        addFirst(key);
+        return false;
+      case Mode::kFew:
+      case Mode::kAll:
+        break;
     }
+    if (!s_.seen.insert(a, b)) return false;
+    s_.found.push_back(key);
+    if (mode_ == Mode::kFew && s_.found.size() > left_) rankFound();
+    if (s_.found.size() >= most_) decideFound();
     return false;
   }
 
@@ -165,21 +127,21 @@ class MeshCollector : public query::Visitor {
   }
 
   bool cellOfA(const query::CellLeaf& a, std::uint32_t b, const Eigen::Vector3d& point) override {
-    if (!ends_at_first_ && !s_.seen_cells.insert(a.id, b)) return false;
+    if (mode_ != Mode::kAny && !s_.seen_cells.insert(a.id, b)) return false;
     return addSpheres(a.id, a.id, a.sphere, b, {point, 0});
   }
 
   bool cellOfB(std::uint32_t a, const query::CellLeaf& b, const Eigen::Vector3d& point) override {
-    if (!ends_at_first_ && !s_.seen_cells.insert(b.id, a)) return false;
+    if (mode_ != Mode::kAny && !s_.seen_cells.insert(b.id, a)) return false;
     return addSpheres(b.id, a, {point, 0}, b.id, b.sphere);
   }
 
   /// To be called at the end of the walk.
   void finish() {
-    if (ends_at_first_) return;
+    if (mode_ == Mode::kAny) return;
     s_.seen.clear();
     s_.seen_cells.clear();
-    if (is_cut_ && !in_order_) {
+    if (mode_ == Mode::kFew || mode_ == Mode::kFirst) {
       for (const RankedPair& pair : s_.first.sort()) s_.found.push_back(pair.key);
       s_.met = s_.first_cells.sort();
     }
@@ -192,12 +154,27 @@ class MeshCollector : public query::Visitor {
   }
 
  private:
+  /// What is done with a pair of triangles that a walk finds.
+  enum class Mode {
+    kAny,      ///< Ends the walk, if it touches: any pair will do.
+    kAll,      ///< Is gathered.
+    kFew,      ///< Is gathered, while there are no more than are asked for; then kFirst.
+    kFirst,    ///< Is kept, if it is one of the first by ContactOrder so far.
+    kInOrder,  ///< Is one of the first, as the walk is in order.
+  };
+
+  Mode startMode() const {
+    if (q_.endsAtFirst()) return Mode::kAny;
+    if (!q_.wantsFew()) return Mode::kAll;
+    constexpr std::size_t kNearlyAlwaysMore = 16;
+    return left_ < kNearlyAlwaysMore ? Mode::kFirst : Mode::kFew;
+  }
+  bool wantsFew() const { return mode_ != Mode::kAny && mode_ != Mode::kAll; }
+
   static constexpr double kEpsilon = static_cast<double>(std::numeric_limits<S>::epsilon());
   // In float, FCL's axes between slivers' all but parallel edges are dominated by rounding, and it may say that they
   // meet.
   static constexpr bool kTrustsApart = std::is_same<S, double>::value;
-  // Of so few there are nearly always more.
-  static constexpr std::size_t kFew = 16;
   // When this many pairs are gathered, those beyond the number wanted are dropped.
   static constexpr std::size_t kMost = std::size_t{1} << 16, kUnlimited = std::size_t{1} << 40;
 
@@ -287,7 +264,7 @@ class MeshCollector : public query::Visitor {
 
   // There may be more than are wanted: from here on, by their places.
   void rankFound() {
-    is_ranked_ = true;
+    mode_ = Mode::kFirst;
     s_.seen.clear();
     for (const std::uint64_t key : s_.found) addFirst(key);
     s_.found.clear();
@@ -333,7 +310,7 @@ class MeshCollector : public query::Visitor {
   // In order, ids of the walk's side A come first, so that which are first does not depend on the caller's order.
   void sortFound() {
     std::vector<std::uint64_t>& found = s_.found;
-    if (!in_order_ || !q_.swapped) return std::sort(found.begin(), found.end());
+    if (mode_ != Mode::kInOrder || !q_.swapped) return std::sort(found.begin(), found.end());
     std::sort(found.begin(), found.end(), [](std::uint64_t x, std::uint64_t y) {
       return keyOf(second(x), first(x), isCertain(x)) < keyOf(second(y), first(y), isCertain(y));
     });
@@ -450,13 +427,13 @@ class MeshCollector : public query::Visitor {
 
   bool addSpheres(std::uint64_t cell, std::uint64_t id1, query::Sphere a, std::uint64_t id2, query::Sphere b) {
     q_.inCallersOrder(id1, id2);
-    Met met{is_cut_ ? static_cast<double>(cell) : 0, id1, id2, {}};
-    if (is_cut_ && !s_.first_cells.wants(met)) return false;
+    Met met{wantsFew() ? static_cast<double>(cell) : 0, id1, id2, {}};
+    if (wantsFew() && !s_.first_cells.wants(met)) return false;
     q_.inCallersOrder(a, b);
     const fcl::Transform3<double> X_WA = q_.X_WA().template cast<double>();
     for (query::Sphere* s : {&a, &b}) {
-      s->center = X_WA * Eigen::Vector3d(origin_ + unit_ * s->center);
-      s->radius *= unit_;
+      s->center = X_WA * Eigen::Vector3d(lattice_.origin() + lattice_.unit() * s->center);
+      s->radius *= lattice_.unit();
     }
     if (q_.request.enable_cost) addCost(boxOf(a), boxOf(b));
     if (q_.request.enable_contact) {
@@ -467,13 +444,13 @@ class MeshCollector : public query::Visitor {
       met.contact.depth = std::max(overlap + margin_, 0.0);
       met.contact.point = a.center + met.contact.normal * (a.radius - overlap / 2);
     }
-    if (is_cut_) {
+    if (wantsFew()) {
       s_.first_cells.add(met);
       if (s_.first_cells.isFull()) cut_.last_cell = static_cast<std::uint64_t>(s_.first_cells.last().place);
       return false;
     }
     s_.met.push_back(met);
-    if (ends_at_first_) return emit();
+    if (mode_ == Mode::kAny) return emit();
     if (s_.met.size() >= most_) keepFirst();
     return false;
   }
@@ -493,14 +470,11 @@ class MeshCollector : public query::Visitor {
   const ContactOrder order_;
   const Triangles<S>& t1_;
   const Triangles<S>& t2_;
-  const double magnitude_;  // of positions in the frame of the first geometry
-  const double margin_;
-  const bool ends_at_first_;
+  const lattice::Lattice& lattice_;
+  const double magnitude_, position_tolerance_, margin_;
   const std::size_t left_;  // contacts that are asked for
   const std::size_t most_;  // pairs to gather
-  const bool is_cut_;
-  bool is_ranked_;  // what is found from now on is, of pairs of triangles
-  bool in_order_ = false;
+  Mode mode_;
   Scratch& s_;
   query::Cut cut_;
   fcl::Transform3<double> place_ = fcl::Transform3<double>::Identity();     // the same in double
@@ -508,8 +482,6 @@ class MeshCollector : public query::Visitor {
   fcl::Matrix3<S> R_12_;
   fcl::Vector3<S> p_12_;
   bool placed_ = false;  // R_12_ and p_12_ are set
-  Eigen::Vector3d origin_ = Eigen::Vector3d::Zero();
-  double unit_ = 1, position_tolerance_ = 0;
 };
 
 }  // namespace bocst::fcl_adapter

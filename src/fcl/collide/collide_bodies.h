@@ -2,7 +2,7 @@
 #pragma once
 
 #include "fcl/adapters/narrow_phase.h"
-#include "fcl/queries/collide_query.h"
+#include "fcl/collide/collide_query.h"
 #include "tree/tree.h"
 
 namespace bocst::fcl_adapter {

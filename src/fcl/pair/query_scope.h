@@ -9,7 +9,7 @@
 
 #include "fcl/adapters/pair.h"
 #include "fcl/adapters/validate.h"
-#include "fcl/queries/ordered_pair.h"
+#include "fcl/pair/ordered_pair.h"
 #include "query/cull/far_apart.h"
 #include "query/cull/separation.h"
 #include "query/sides/side.h"

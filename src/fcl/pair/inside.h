@@ -5,7 +5,7 @@
 #include <vector>
 
 #include "fcl/adapters/pair.h"
-#include "fcl/queries/convex_frame.h"
+#include "fcl/pair/convex_frame.h"
 #include "query/sides/component_points.h"
 
 // What lies wholly inside a solid (Options::solid), for surfaces that do not meet: each connected component is then

@@ -1,8 +1,7 @@
 // SPDX-License-Identifier: BSD-3-Clause
-#include "fcl/queries/collide_pair.h"
+#include "fcl/collide/collide_pair.h"
 
 #include <fcl/config.h>
-#include <fcl/geometry/bvh/BVH_model.h>
 
 #include <algorithm>
 #include <cstdint>
@@ -12,23 +11,19 @@
 #include "fcl/adapters/models.h"
 #include "fcl/adapters/pair.h"
 #include "fcl/adapters/validate.h"
-#include "fcl/queries/collide_bodies.h"
-#include "fcl/queries/collide_query.h"
-#include "fcl/queries/collide_row.h"
-#include "fcl/queries/collide_trees.h"
-#include "fcl/queries/grow_together.h"
-#include "fcl/queries/inside.h"
-#include "fcl/queries/inside_contact.h"
-#include "fcl/queries/mesh_collector.h"
-#include "fcl/queries/query_scope.h"
+#include "fcl/collide/bvh_collision.h"
+#include "fcl/collide/collide_bodies.h"
+#include "fcl/collide/collide_query.h"
+#include "fcl/collide/collide_row.h"
+#include "fcl/collide/trees_collision.h"
+#include "fcl/pair/grow_together.h"
+#include "fcl/pair/query_scope.h"
 #include "log/assert.h"
-#include "query/collide/pair_walk.h"
 #include "thread/of_thread.h"
 
 namespace bocst::fcl_adapter {
 namespace {
 
-using query::BoxSide;
 using query::TreeSide;
 
 /// The models among two geometries, of which one at least is one.
@@ -48,94 +43,6 @@ bool turnsRound(const Models<S>& models, const fcl::Transform3<S>& X_W1, const f
   if (!models.areTwo()) return models.first == nullptr;
   return walksTurned(treeOf(*models.first), X_W1, treeOf(*models.second), X_W2);
 }
-
-/// A collision query of a model, side A, and a BVHModel, while the tree's query lock is held.
-template <typename S>
-class BvhCollision {
- public:
-  BvhCollision(const CollideQuery<S>& q, const TreeSide& a, const BvhSide& b)
-      : q_(q),
-        a_(a),
-        b_(b),
-        relative_(relate<S>(q, a, b)),
-        to_a_(withMargin(relative_.b_in_a, a, q, q.cullingMargin(a.isConservative()))) {}
-
-  /// Adds contacts to the result.
-  void run() const {
-    tree::Tree& tree = a_.tree();
-    if (isOutOfSight(q_, relative_.b_in_a, magnitudeOf(tree.surface().bounds), b_.magnitude())) return;
-    const std::size_t before = q_.result.numContacts();
-    walk(before);
-    if (q_.mayBeInside(before) && contains<S>(tree, q_.X_WA(), b_, q_.X_WB(), relative_.magnitude)) {
-      addInside(q_, a_, b_, relative_.b_in_a);
-    }
-  }
-
- private:
-  static constexpr query::Turns::Limits kLimits = {256, 1024, 1024, 1}, kLimitsOfContacts = {1024, 1024, 1024, 1};
-
-  // Between flat faces and beside slivers, oriented boxes separate what blocks do not, as with two models, see
-  // TreesCollision.
-  void walk(std::size_t contacts_before) const {
-    const bool uses_boxes = std::is_same<S, double>::value && !(q_.margin > 0) && BoxSide::fits(a_);
-    // Once boxes are built, they soon tell that flat parts are apart.
-    const WalkInOrder in_order =
-        prepareWalkInOrder(q_, {&a_.tree()}, uses_boxes && query::Turns::arePaid(a_, b_),
-                           [this](const CollideQuery<S>& any) { BvhCollision<S>(any, a_, b_).walk(0); });
-    if (in_order == WalkInOrder::kNothingTouches) return;
-
-    std::size_t steps = 0;
-    collect(q_, [&](MeshCollector<S>& collector) {
-      if (in_order == WalkInOrder::kReady && walkInOrder(collector, steps)) return;
-      const auto walk_blocks = [&](std::size_t most) {
-        return query::PairWalk<TreeSide, BvhSide>(a_, b_, to_a_, collector).run(most);
-      };
-      if (to_a_.margin > 0 && !a_.isConservative() && collector.endsAtFirst()) {
-        walkWithinMargin(a_, b_, relative_.b_in_a, to_a_, collector, kMostNodePairs, walk_blocks);
-      } else if (uses_boxes && (collector.endsAtFirst() || query::Turns::arePaid(a_, b_))) {
-        const auto& limits = collector.endsAtFirst() ? kLimits : kLimitsOfContacts;
-        query::walkByTurns(a_, b_, to_a_, collector, limits, walk_blocks);
-      } else {
-        steps += walk_blocks(query::kNoLimit).steps;
-      }
-    });
-    // A walk for a verdict pays for boxes itself, a walk for contacts where it found none.
-    if (uses_boxes && !q_.endsAtFirst() && q_.result.numContacts() == contacts_before) {
-      query::Turns(a_, b_, tree::Tree::Search::kYesOrNo, kLimits).tookOverBlocks(steps, true);
-    }
-  }
-
-  // False where it gave up, later than two models do: by position takes longer here.
-  bool walkInOrder(MeshCollector<S>& collector, std::size_t& steps) const {
-    const TreeSide a(a_.tree(), a_.now());  // the root may be another one than a_ has seen
-    if (query::outlinesHardlyOverlap(a, b_.volume(b_.root()), to_a_)) return false;
-
-    collector.beginInOrder();
-    const query::WalkEnd end =
-        query::PairWalk<TreeSide, BvhSide>(a, b_, to_a_, collector).runInOrder(q_.mostLeafPairs(128));
-    steps = end.steps;
-    collector.endInOrder(end.gave_up);
-    return !end.gave_up;
-  }
-
-  // Calls f(collector), and hands what was collected to the query's result.
-  template <typename F>
-  void collect(const CollideQuery<S>& q, F&& f) const {
-    const Triangles<S> of_model(a_.tree()), of_partner(b_);
-    MeshCollector<S> collector(q, a_.tree(), q.swapped ? of_partner : of_model, q.swapped ? of_model : of_partner,
-                               relative_.magnitude);
-    const lattice::Lattice& lattice = a_.tree().surface().lattice;
-    collector.setFrame(lattice, relative_.b_in_a.tolerance + q.margin / lattice.unit());
-    f(collector);
-    collector.finish();
-  }
-
-  const CollideQuery<S>& q_;
-  const TreeSide& a_;
-  const BvhSide& b_;
-  const RelativeSides relative_;
-  const query::SimilarityTransform to_a_;
-};
 
 template <typename S>
 void collideBvh(const CollideQuery<S>& q, tree::Tree& tree, const BvhSide& b) {
@@ -224,10 +131,8 @@ template <typename S>
 bool surelyTouch(const Model<S>& a, const fcl::Transform3<S>& X_WA, const Model<S>& b, const fcl::Transform3<S>& X_WB) {
   if (!a.isOccupied() || !b.isOccupied()) return false;
   const QueryScope scope(treeOf(a), treeOf(b));
-  const Interior *of_a = treeOf(a).interior(scope.a().now()), *of_b = treeOf(b).interior(scope.b().now());
-  if (of_a == nullptr || of_b == nullptr) return false;
   const OrderedPair<S> pair{&a, X_WA, &b, X_WB, false};
-  return query::surelyCross(*of_a, *of_b, relate<S>(pair, scope.a(), scope.b()).b_in_a);
+  return query::surelyCross(scope.a(), scope.b(), relate<S>(pair, scope.a(), scope.b()).b_in_a);
 }
 
 template <typename S>

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: BSD-3-Clause
-#include "fcl/queries/grow_together.h"
+#include "fcl/pair/grow_together.h"
 
 #include <algorithm>
 #include <chrono>
@@ -7,8 +7,8 @@
 
 #include "fcl/adapters/models.h"
 #include "fcl/adapters/pair.h"
-#include "fcl/queries/ordered_pair.h"
-#include "fcl/queries/query_scope.h"
+#include "fcl/pair/ordered_pair.h"
+#include "fcl/pair/query_scope.h"
 #include "query/collide/deferred_pairs.h"
 #include "query/collide/sphere_walk.h"
 #include "thread/of_thread.h"
@@ -268,7 +268,7 @@ const std::vector<Spheres>& growTogether(const std::vector<PosedPair<S>>& pairs)
     ordered.inCallersOrder(a, b);
     Walk walk{a, b, relate<S>(ordered, *a, *b).b_in_a, k, kFirstBatch};
     walk.b_in_a.tolerance += marginOf(p.a, p.b) / unitOf(*a);
-    if (!(walk.b_in_a.tolerance < 1e15)) {
+    if (!(walk.b_in_a.tolerance < kMostTolerance)) {
       s.found[k] = Spheres::kUnknown;  // beyond this a query looks at the distance first
     } else if (!walk.spheres().isNeedless()) {
       s.walks.push_back(walk);

@@ -2,7 +2,7 @@
 #pragma once
 
 #include "fcl/adapters/pair.h"
-#include "fcl/queries/collide_query.h"
+#include "fcl/collide/collide_query.h"
 #include "query/distance/distance_walk.h"
 
 namespace bocst::fcl_adapter {

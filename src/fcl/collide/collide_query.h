@@ -9,7 +9,7 @@
 #include <cstdint>
 #include <limits>
 
-#include "fcl/queries/ordered_pair.h"
+#include "fcl/pair/ordered_pair.h"
 #include "geometry/triangle.h"
 #include "query/cull/separation.h"
 

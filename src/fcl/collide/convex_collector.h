@@ -9,17 +9,12 @@
 #include <limits>
 #include <numeric>
 #include <tuple>
-#include <type_traits>
 #include <vector>
 
 #include "fcl/adapters/narrow_phase.h"
-#include "fcl/queries/collide_query.h"
-#include "fcl/queries/contact_order.h"
-#include "fcl/queries/convex_frame.h"
-#include "fcl/queries/inside.h"
-#include "fcl/queries/inside_contact.h"
-#include "fcl/queries/query_scope.h"
-#include "query/collide/pair_walk.h"
+#include "fcl/collide/collide_query.h"
+#include "fcl/collide/contact_order.h"
+#include "fcl/pair/convex_frame.h"
 #include "query/leaf/pair_set.h"
 #include "query/sides/convex_side.h"
 #include "query/sides/visitor.h"
@@ -54,21 +49,21 @@ class ConvexCollector final : public query::ConvexVisitor<typename Partner::Node
         b_in_a_(frame.toLattice(surface_.lattice, 0)),
         tolerance_(frame.rounding() + (q.is_distance ? 0 : narrow_phase.tolerance())),
         costs_(costs),
-        ends_at_first_(q.endsAtFirst()),
-        is_cut_(!ends_at_first_ && !by_ids && q.contactsLeft() > 0 && q.contactsLeft() <= CollideQuery<S>::kMostOfFew),
+        start_mode_(startMode(q, by_ids)),
+        mode_(start_mode_),
         s_(scratch()),
         cut_(order_.startCut()) {
     s_.seen.clear();
     s_.found.clear();
     s_.of_leaf.clear();
-    if (is_cut_) s_.first.start(q.contactsLeft());
+    if (wantsFew()) s_.first.start(q.contactsLeft());
   }
 
   /// Bodies within so much of the surface, or of its cells' spheres, are to be visited.
   double tolerance(bool spheres) const { return tolerance_ + q_.cullingMargin(spheres); }
 
-  bool endsAtFirst() const override { return ends_at_first_; }
-  const query::Cut* cut() const override { return is_cut_ ? &cut_ : nullptr; }
+  bool endsAtFirst() const override { return mode_ == Mode::kAny; }
+  const query::Cut* cut() const override { return wantsFew() ? &cut_ : nullptr; }
 
   /// Cost sources of the bodies below a node that the box about the model meets, as FCL's approximate costs are.
   void addApproximateCosts(const Node& b) const {
@@ -84,25 +79,25 @@ class ConvexCollector final : public query::ConvexVisitor<typename Partner::Node
   }
 
   /// As MeshCollector has it.
-  void beginInOrder() { in_order_ = true; }
+  void beginInOrder() { mode_ = Mode::kInOrder; }
   void endInOrder(bool gave_up) {
     if (!gave_up) return;
-    in_order_ = false;
+    mode_ = start_mode_;
     s_.found.clear();
     s_.of_leaf.clear();
   }
 
   bool triangle(std::uint32_t t, const Node& b) override {
-    if (ends_at_first_) return addTriangle(t, b);
-    if (in_order_) {
+    if (mode_ == Mode::kAny) return addTriangle(t, b);
+    if (mode_ == Mode::kInOrder) {
       if (partner_.occupied(b)) s_.of_leaf.push_back(placed(0, {t, {Eigen::Vector3d::Zero(), 0}}, b));
       return false;
     }
-    const double place = is_cut_ ? order_.placeOf(t, greatestOf(b)) : 0;
+    const double place = mode_ == Mode::kFirst ? order_.placeOf(t, greatestOf(b)) : 0;
     const Found found = placed(place, {t, {Eigen::Vector3d::Zero(), 0}}, b);
-    if (is_cut_ && !s_.first.wants(found)) return false;
+    if (mode_ == Mode::kFirst && !s_.first.wants(found)) return false;
     if (!s_.seen.insert(partner_.id(b), t)) return false;
-    if (is_cut_) {
+    if (mode_ == Mode::kFirst) {
       addFirst(found);
     } else {
       s_.found.push_back(found);
@@ -121,9 +116,9 @@ class ConvexCollector final : public query::ConvexVisitor<typename Partner::Node
   }
 
   bool cell(const query::CellLeaf& a, const Node& b) override {
-    if (ends_at_first_) return addCell(a, b);
+    if (mode_ == Mode::kAny) return addCell(a, b);
     const Found found = placed(static_cast<double>(a.id), a, b);
-    if (!is_cut_) {
+    if (mode_ == Mode::kAll) {
       s_.found.push_back(found);
     } else if (partner_.occupied(b) && s_.first.wants(found)) {
       s_.first.add(found);
@@ -135,7 +130,7 @@ class ConvexCollector final : public query::ConvexVisitor<typename Partner::Node
   /// To be called at the end of the walk: as in MeshCollector, contacts are sorted by their ids, and few are
   /// chosen by ContactOrder. `cells`: those are what it found.
   void finish(bool cells) {
-    if (is_cut_ && !in_order_) s_.found = s_.first.sort();
+    if (mode_ == Mode::kFirst) s_.found = s_.first.sort();
     s_.order.resize(s_.found.size());
     std::iota(s_.order.begin(), s_.order.end(), 0u);
     std::sort(s_.order.begin(), s_.order.end(), [this](std::uint32_t i, std::uint32_t j) {
@@ -149,6 +144,16 @@ class ConvexCollector final : public query::ConvexVisitor<typename Partner::Node
   }
 
  private:
+  /// What is done with what a walk finds, as in MeshCollector.
+  enum class Mode { kAny, kAll, kFirst, kInOrder };
+
+  static Mode startMode(const CollideQuery<S>& q, bool by_ids) {
+    if (q.endsAtFirst()) return Mode::kAny;
+    const std::size_t left = q.contactsLeft();
+    return by_ids || left == 0 || left > CollideQuery<S>::kMostOfFew ? Mode::kAll : Mode::kFirst;
+  }
+  bool wantsFew() const { return mode_ == Mode::kFirst || mode_ == Mode::kInOrder; }
+
   struct Found {
     double place;          // see ContactOrder
     std::intptr_t b1, b2;  // as the caller gets them
@@ -324,8 +329,9 @@ class ConvexCollector final : public query::ConvexVisitor<typename Partner::Node
   const fcl::Transform3<double> X_WB_;
   const query::SimilarityTransform b_in_a_;
   const double tolerance_;
-  const bool costs_, ends_at_first_, is_cut_;
-  bool in_order_ = false;
+  const bool costs_;
+  const Mode start_mode_;
+  Mode mode_;
   Scratch& s_;
   query::Cut cut_;
   Node body_{};  // of which `greatest_` is known
@@ -333,85 +339,5 @@ class ConvexCollector final : public query::ConvexVisitor<typename Partner::Node
   double greatest_ = 0;
   query::GapFinder gaps_;
 };
-
-/// The collision of a model, side A, and the bodies of a partner: with_partner(frame, costs, f) makes the partner's
-/// side, with what has no contacts but costs or without, and calls f with it.
-template <typename S, typename F>
-void collideConvex(const CollideQuery<S>& q, tree::Tree& tree, const NarrowPhase<S>& narrow_phase, F&& with_partner) {
-  // As FCL does for meshes: contacts first, and then the costs of the box about the mesh.
-  const bool approximate = q.request.enable_cost && q.request.use_approximate_cost;
-  fcl::CollisionRequest<S> request(q.request);
-  request.enable_cost = q.request.enable_cost && !approximate;
-  const CollideQuery<S> first{q, request, q.result, q.margin, q.is_distance};
-  const std::size_t before = q.result.numContacts();
-  const QueryScope scope(tree);
-  const query::TreeSide& a = scope.a();
-  const oracle::Surface& surface = tree.surface();
-  const ConvexFrame<S> frame(q.X_WA(), q.X_WB(), surface);
-  const auto with_collector = [&](bool costs, auto&& f) {
-    with_partner(frame, costs, [&](const auto& partner) {
-      using Partner = std::remove_cv_t<std::remove_reference_t<decltype(partner)>>;
-      ConvexCollector<S, Partner> collector(first, partner, frame, tree, narrow_phase, request.enable_cost,
-                                            q.request.enable_cost);
-      f(partner, collector);
-    });
-  };
-  const auto isOutOfSight = [&](const auto& partner) {
-    const query::Sphere ball = partner.sphere(partner.root());
-    const double size = surface.bounds.diagonal().norm();
-    if (frame.rounding() < 1e15 * size) return false;
-    const Eigen::Vector3d half_way = (frame * surface.bounds.center()) / 2 - ball.center / 2;
-    return half_way.cwiseAbs().maxCoeff() > 8 * (size + ball.radius) + q.margin;
-  };
-  if (q.occupied() || request.enable_cost) {
-    with_collector(request.enable_cost, [&](const auto& partner, auto& collector) {
-      using Partner = std::remove_cv_t<std::remove_reference_t<decltype(partner)>>;
-      // What is farther away than can be computed with touches nothing.
-      if (isOutOfSight(partner)) return;
-      const query::SimilarityTransform b_in_a =
-          frame.toLattice(surface.lattice, collector.tolerance(a.isConservative()));
-      const auto walk_blocks = [&](std::size_t most) {
-        return query::PairWalk<query::TreeSide, Partner>(a, partner, b_in_a, collector).run(most);
-      };
-      if constexpr (Partner::kHasCubes) {
-        const auto verdict = [&](const CollideQuery<S>& any) {
-          ConvexCollector<S, Partner> of_any(any, partner, frame, tree, narrow_phase, false, false);
-          query::PairWalk<query::TreeSide, Partner>(a, partner, b_in_a, of_any).run();
-        };
-        const WalkInOrder in_order = prepareWalkInOrder(q, {&tree}, false, verdict);
-        if (in_order == WalkInOrder::kNothingTouches) return;
-        if (in_order == WalkInOrder::kReady) {
-          const query::TreeSide whole(tree, a.now());  // the root may be another one than `a` has seen
-          collector.beginInOrder();
-          const query::WalkEnd end = query::PairWalk<query::TreeSide, Partner>(whole, partner, b_in_a, collector)
-                                         .runInOrder(q.mostLeafPairs(128));
-          collector.endInOrder(end.gave_up);
-          if (!end.gave_up) return collector.finish(false);
-        }
-      }
-      // Boxes as in TreesCollision.
-      if constexpr (std::is_same_v<S, double> && std::is_base_of_v<query::ConvexSide, Partner>) {
-        if (query::fitsBoxes(a) && (collector.endsAtFirst() || query::Turns::arePaid(a, partner))) {
-          constexpr query::Turns::Limits kLimits = {128, 1024, 256, 1}, kLimitsOfContacts = {1024, 1024, 1024, 1};
-          query::walkByTurns(a, partner, b_in_a, collector, collector.endsAtFirst() ? kLimits : kLimitsOfContacts,
-                             walk_blocks);
-        } else {
-          walk_blocks(query::kNoLimit);
-        }
-      } else {
-        walk_blocks(query::kNoLimit);
-      }
-      collector.finish(a.isConservative());
-    });
-  }
-  if (tree.solid() != nullptr && q.mayBeInside(before)) {
-    with_partner(frame, false, [&](const auto& partner) {
-      if (contains(a, frame, partner)) addInside(q, a, partner, frame.toLattice(surface.lattice, 0));
-    });
-  }
-  if (approximate) {
-    with_collector(true, [](const auto& partner, auto& collector) { collector.addApproximateCosts(partner.root()); });
-  }
-}
 
 }  // namespace bocst::fcl_adapter

@@ -2,11 +2,11 @@
 #include <functional>
 
 #include "fcl/adapters/octree_side.h"
-#include "fcl/queries/collide_bodies.h"
+#include "fcl/collide/collide_bodies.h"
 
 #if FCL_HAVE_OCTOMAP
 
-#include "fcl/queries/collide_convex.h"
+#include "fcl/collide/convex_collision.h"
 
 namespace bocst::fcl_adapter {
 

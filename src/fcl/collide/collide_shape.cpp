@@ -3,8 +3,8 @@
 
 #include <functional>
 
-#include "fcl/queries/collide_bodies.h"
-#include "fcl/queries/collide_convex.h"
+#include "fcl/collide/collide_bodies.h"
+#include "fcl/collide/convex_collision.h"
 
 namespace bocst::fcl_adapter {
 namespace {
