@@ -235,6 +235,12 @@ TEST_F(Program, AsksForEachPoseOfAFile) {
                   kFailed, "bad.csv: line 2: 7 numbers");
   expectComplaint("collide " + cube() + " " + cube() + " --poses " + write("none.csv", "# none\n"), kFailed,
                   "no poses");
+  const Json near = json(command + " --margin 2.001");
+  EXPECT_EQ(near.at("collisions"), 3);
+  EXPECT_EQ(near.at("options").at("margin"), 2.001);
+  EXPECT_EQ(json(command + " --margin 1.999").at("collisions"), 2);
+  expectComplaint("collide " + cube() + " " + cube() + " --margin 1", kUsage, "--margin: needs --poses");
+  expectComplaint(command + " --margin -1", kUsage, "--margin");
   expectComplaint(command + " --pose 0,0,0,1,0,0,0", kUsage, "--pose");
   expectComplaint(command + " --csv - --json -", kUsage, "--csv");
   // Names of columns count: in another order the numbers are other poses.

@@ -102,6 +102,7 @@ struct Collide {
   bool rpy = false;
   bool xyzw = false;
   bool distances = false;
+  double margin = 0;
   Pose pose;
   std::size_t max_contacts = QueryPair::kAll;
   ModelArguments model;
@@ -212,11 +213,13 @@ struct Collide {
   }
 
   Json inputJson(const Input& input) const {
+    Json options = model.json();
+    options["margin"] = margin;
     return {{"a", file_a},
             {"b", file_b},
             {"extents", {{"a", extentsJson(*input.mesh_a)}, {"b", extentsJson(*input.mesh_b)}}},
             {"warnings", input.warnings},
-            {"options", model.json()}};
+            {"options", options}};
   }
 
   static void warnOfNorm(const Pose& pose, const std::string& where) {
@@ -262,7 +265,9 @@ struct Collide {
     for (const ListedPose& listed : poses)
       warnOfNorm(listed.pose, poses_file + ": line " + std::to_string(listed.line));
     const Input input = load();
-    const auto pair = makeBocstPair(model.scalarKind(), input.a, input.b, model.options());
+    Options options = model.options();
+    options.margin = margin / 2;  // of each model; the sum counts
+    const auto pair = makeBocstPair(model.scalarKind(), input.a, input.b, options);
 
     ListReport report;
     report.csv = "line,x,y,z,qw,qx,qy,qz,collide";
@@ -453,6 +458,10 @@ void addCollide(CLI::App& program, Job& job) {
   command->add_flag("--xyzw", collide->xyzw, "poses are x,y,z,qx,qy,qz,qw, as in ROS")->excludes(rpy);
   command->add_flag("--distance", collide->distances,
                     "with --poses: report also the distance and the nearest points of poses without contact");
+  command
+      ->add_option("--margin", collide->margin,
+                   "with --poses: surfaces that are at most this far apart collide, in the meshes' length unit")
+      ->check(notNegative());
   command->add_option("--max-contacts", collide->max_contacts, "maximum number of contacts; default: all")
       ->check(wholeNumber());
   command
@@ -481,6 +490,7 @@ void addCollide(CLI::App& program, Job& job) {
     if (collide->poses_file.empty() && collide->distances) {
       throw CLI::ValidationError("--distance", "needs --poses; for a single pose the distance is always reported");
     }
+    refuseUnless(!collide->poses_file.empty(), *command, "--margin", "needs --poses, since FCL has no margins");
     job = [collide] { return collide->run(); };
   });
 }
