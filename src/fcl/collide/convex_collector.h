@@ -148,9 +148,10 @@ class ConvexCollector final : public query::ConvexVisitor<typename Partner::Node
   enum class Mode { kAny, kAll, kFirst, kInOrder };
 
   static Mode startMode(const CollideQuery<S>& q, bool by_ids) {
+    if (by_ids) return Mode::kAll;
     if (q.endsAtFirst()) return Mode::kAny;
     const std::size_t left = q.contactsLeft();
-    return by_ids || left == 0 || left > CollideQuery<S>::kMostOfFew ? Mode::kAll : Mode::kFirst;
+    return left == 0 || left > CollideQuery<S>::kMostOfFew ? Mode::kAll : Mode::kFirst;
   }
   bool wantsFew() const { return mode_ == Mode::kFirst || mode_ == Mode::kInOrder; }
 

@@ -211,6 +211,37 @@ TEST_P(CellWalks, FindWhatMeetsAtAnySizeAndTolerance) {
   }
 }
 
+// A slab's normal may be longer than 1, and then says that what touches from above its faces is farther away.
+TEST_P(CellWalks, FindFlatFacesThatASphereJustTouches) {
+  std::mt19937_64 g(64);
+  std::uniform_real_distribution<double> u(0, 1);
+  Counts counts;
+  for (int i = 0; i < 60; ++i) {
+    const Cells cells(test::torus(12, 0.2), Subdivision::kOctree, 2 + i % 3);
+    test::Raw plate = test::plate(16);
+    const Eigen::Matrix3d turn = test::randomRotation(g);
+    for (Vector3d& v : plate.vertices) v = turn * v;
+    const Triangles triangles(plate);
+    const bool cells_are_a = i % 2 == 0;
+    SCOPED_TRACE(testing::Message() << "plate " << i);
+    Setting s{cells, triangles, cells_are_a, {}};
+    s.b_in_a.rotation = test::randomRotation(g);
+    s.b_in_a.scale = cells_are_a ? 0.5 : 2;
+    s.b_in_a.orthogonality_error = 1e-15;
+    s.b_in_a.ready();
+    const auto t = static_cast<std::uint32_t>(g() % triangles.mesh->triangleCount());
+    const Corners corners = {s.corner(t, 0), s.corner(t, 1), s.corner(t, 2)};
+    const Vector3d point = (corners[0] + corners[1] + corners[2]) / 3;
+    const Vector3d normal = (corners[1] - corners[0]).cross(corners[2] - corners[0]).normalized();
+    const Sphere ball = s.sphere(cells.leaves[g() % cells.leaves.size()]);
+    const Vector3d target = ball.center + ball.radius * (1 - 0.004 * u(g)) * normal;
+    s.b_in_a.translation = cells_are_a ? Vector3d(target - point) : Vector3d(point - target);
+    compare(s, counts);
+    if (HasFatalFailure()) return;
+  }
+  EXPECT_EQ(counts.misses, 0u);
+}
+
 INSTANTIATE_TEST_SUITE_P(Targets, CellWalks, testing::ValuesIn(test::EveryTarget::targets()), test::EveryTarget::name);
 
 }  // namespace
