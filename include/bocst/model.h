@@ -155,7 +155,7 @@ class BOCST_EXPORT Model : public fcl::CollisionGeometry<S> {
 
   /// Expands the complete tree down to level `depth` (1 to 17; the root is level 1, as in the paper's tables). Deeper
   /// branches, grown by queries, are dropped first. For inspection; queries never need it, and with exact answers they
-  /// may replace these nodes by their own.
+  /// may replace these nodes by their own. Options::memory_budget holds again when a query has walked the tree.
   /// @throws std::invalid_argument for another depth; std::logic_error for an empty model.
   void expandAll(int depth);
 

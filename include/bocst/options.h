@@ -68,9 +68,10 @@ struct Options {
   std::chrono::milliseconds ttl{2000};
 
   /// Limit of the resident tree in bytes; the least recently used branches are dropped first; 0: no limit. A running
-  /// query may exceed it; branches are dropped when it ends. With less than about 6 bytes per triangle of the mesh,
-  /// many queries drop and grow large parts again (a complete tree takes 16 to 25; with
-  /// less than 1000 triangles up to 140).
+  /// query may exceed it, and expandAll() until a query walks the tree; then branches are dropped. With less than about
+  /// 6 bytes per triangle of the mesh, many queries drop and grow large parts again and take milliseconds (a complete
+  /// tree takes 16 to 25; with less than 1000 triangles up to 140). With any limit, requests for a few contacts take up
+  /// to ten times as long, since they build no complete tree.
   std::size_t memory_budget = 0;
 
   /// Surfaces at a distance of at most this collide; 0 or more, in the mesh's length unit. Between two models, the sum
@@ -98,7 +99,7 @@ struct Options {
 
   /// Source of the time for ttl; empty: Clock, with the resolution of the system's tick (some milliseconds). Tests can
   /// set their own clock here. Queries call it from several threads at once, so it must be thread-safe, and must not
-  /// call the model.
+  /// call the model. If it jumps back, nothing is dropped until it has caught up.
   std::function<Clock::time_point()> clock;
 };
 

@@ -35,15 +35,17 @@ template <typename S>
 const std::vector<Spheres>& growTogether(const std::vector<PosedPair<S>>& pairs);
 
 /// True if the second tree is side A of a walk. Conservative verdicts must not depend on the argument order, so there
-/// the walk has an order of its own: by address only where the poses are equal, so that what a query grows does not
-/// depend on where models happen to lie.
+/// the walk has an order of its own: by address only of two conservative models at equal poses, so that what a query
+/// grows does not depend on where models happen to lie.
 template <typename S>
 bool walksTurned(const tree::Tree& tree1, const fcl::Transform3<S>& X_W1, const tree::Tree& tree2,
                  const fcl::Transform3<S>& X_W2) {
   if (!tree1.conservative() && !tree2.conservative()) return false;
   const S *x1 = X_W1.matrix().data(), *x2 = X_W2.matrix().data();
   const auto differ = std::mismatch(x1, x1 + 16, x2);
-  return differ.first == x1 + 16 ? std::less<const tree::Tree*>()(&tree2, &tree1) : *differ.second < *differ.first;
+  if (differ.first != x1 + 16) return *differ.second < *differ.first;
+  if (tree1.conservative() != tree2.conservative()) return tree2.conservative();
+  return std::less<const tree::Tree*>()(&tree2, &tree1);
 }
 
 }  // namespace bocst::fcl_adapter

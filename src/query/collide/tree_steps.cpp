@@ -139,6 +139,8 @@ HWY_INLINE void toVolumes(const V (&displacement)[3], const V (&half)[3], const 
   from_slab = hn::Sub(hn::Abs(hn::Sub(along, slab_center)), slab_half);
 }
 
+constexpr float kLongestNormal = 1.01f;  // of a slab; what it says of places is longer by so much
+
 // The octants in `mask` of a block for which the cell's sphere may meet the volume beside it, be the cells those of the
 // block or the other node; all where these cells are above the last levels. Sets their order, unless null.
 HWY_INLINE unsigned meetingSpheres(PairSteps& s, const BlockView& block, const StepNode& other, unsigned mask,
@@ -170,8 +172,8 @@ HWY_INLINE unsigned meetingSpheres(PairSteps& s, const BlockView& block, const S
               from_slab);
     const V reach = hn::Add(of_cell(cells.radius, i), hn::Set(d, s.sphere_margin));
     const V depth = hn::Sub(hn::Mul(reach, reach), squared);
-    // Slabs are measured along normals up to a hundredth too long.
-    const M apart = hn::Or(hn::Lt(depth, hn::Zero(d)), hn::Gt(from_slab, hn::Mul(reach, hn::Set(d, 1.01f))));
+    const V reach_along = hn::Mul(reach, hn::Set(d, kLongestNormal));
+    const M apart = hn::Or(hn::Lt(depth, hn::Zero(d)), hn::Gt(from_slab, reach_along));
     if (order != nullptr) {
       const auto bits = hn::And(hn::BitCast(du, depth), hn::Set(du, ~7u));
       hn::StoreU(hn::Or(bits, hn::Iota(du, static_cast<std::uint32_t>(i))), du, order + i);
