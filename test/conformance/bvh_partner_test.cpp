@@ -10,11 +10,14 @@
 #include <memory>
 #include <random>
 #include <set>
+#include <type_traits>
+#include <utility>
 #include <vector>
 
 #include "conformance/reference.h"
 #include "fcl/adapters/bvh_side.h"
 #include "geometry/triangle.h"
+#include "query/collide/cell_tree.h"
 #include "query/distance/side_frames.h"
 
 namespace bocst {
@@ -307,6 +310,82 @@ TEST(BvhPartnerDouble, FlatFacesOnOneAnother) {
 }
 
 // A model that decays must not keep its branches because the BVHModel beside it is far.
+// Places a plate and some triangles so that a cell's sphere just meets, or just misses, the inside of a triangle, and
+// compares the contacts with all pairs of a cell and a triangle.
+template <typename BV>
+void checkCells(Subdivision subdivision, int depth, std::mt19937_64& g) {
+  using S = typename BV::S;
+  std::uniform_real_distribution<double> u(0, 1);
+  const test::CellTree cells(test::torus(12, 0.2), subdivision, depth);
+  const lattice::Lattice& lattice = cells.whole->surface().lattice;
+  Options options;
+  options.answer = Answer::kConservative;
+  options.subdivision = subdivision;
+  options.depth = depth;
+  const Model<S> model(cells.mesh, options);
+
+  Raw raw = test::plate(6);
+  raw.add(test::soup(30, 65));
+  const Eigen::Matrix3d turn = test::randomRotation(g), R = test::randomRotation(g);
+  for (Vector3d& v : raw.vertices) v = turn * v;
+  const auto bvh = test::bvh<BV>(raw);
+  const auto cornersOf = [&](std::size_t t, const fcl::Transform3<S>& X) {
+    const auto at = [&](std::size_t k) -> Vector3d {
+      return X.template cast<double>() * raw.vertices[raw.triangles[t][k]].template cast<S>().template cast<double>();
+    };
+    return query::Corners{at(0), at(1), at(2)};
+  };
+  const auto sphereOf = [&](const query::CellLeaf& leaf) {
+    return query::Sphere{lattice.origin() + lattice.unit() * leaf.sphere.center, lattice.unit() * leaf.sphere.radius};
+  };
+  const query::Sphere ball = sphereOf(cells.leaves[g() % cells.leaves.size()]);
+  const std::size_t nearest = g() % raw.triangles.size();
+  const query::Corners c = cornersOf(nearest, test::pose<S>(R, {0, 0, 0}));
+  const Vector3d normal = (c[1] - c[0]).cross(c[2] - c[0]).normalized();
+  const double gaps[] = {-0.001, -0.01, -0.05, 0.001};
+  const Vector3d at = ball.center + ball.radius * (1 + gaps[g() % 4]) * normal - (c[0] + c[1] + c[2]) / 3;
+  const auto I = fcl::Transform3<S>(fcl::Transform3<S>::Identity());
+  const auto X = test::pose<S>(R, at);
+
+  const fcl::CollisionRequest<S> request(1000000, false);
+  fcl::CollisionResult<S> result, reversed;
+  fcl::collide(&model, I, bvh.get(), X, request, result);
+  fcl::collide(bvh.get(), X, &model, I, request, reversed);
+  std::set<std::pair<std::intptr_t, std::intptr_t>> pairs, turned;
+  for (std::size_t i = 0; i < result.numContacts(); ++i) {
+    pairs.emplace(result.getContact(i).b1, result.getContact(i).b2);
+  }
+  for (std::size_t i = 0; i < reversed.numContacts(); ++i) {
+    turned.emplace(reversed.getContact(i).b2, reversed.getContact(i).b1);
+  }
+  ASSERT_EQ(pairs, turned);
+  const double rounding = std::is_same<S, double>::value ? 1e-11 : 1e-4;
+  for (const query::CellLeaf& leaf : cells.leaves) {
+    const query::Sphere s = sphereOf(leaf);
+    for (std::size_t t = 0; t < raw.triangles.size(); ++t) {
+      const double gap = (query::closestPoint(s.center, cornersOf(t, X)) - s.center).norm() - s.radius;
+      if (std::abs(gap) < rounding) continue;
+      ASSERT_EQ(pairs.count({static_cast<std::intptr_t>(leaf.id), static_cast<std::intptr_t>(t)}), gap < 0)
+          << "cell " << leaf.id << " triangle " << t << " gap " << gap << " of radius " << s.radius;
+    }
+  }
+}
+
+TYPED_TEST(BvhPartner, CellsTouchTheTrianglesThatTheirSpheresMeet) {
+  using S = TypeParam;
+  std::mt19937_64 g(66);
+  for (int i = 0; i < 8; ++i) {
+    for (const Subdivision subdivision : {Subdivision::kOctree, Subdivision::kBono}) {
+      for (int depth = 2; depth <= 6; ++depth) {
+        SCOPED_TRACE(testing::Message() << "depth " << depth << " round " << i);
+        checkCells<fcl::OBBRSS<S>>(subdivision, depth, g);
+        checkCells<fcl::AABB<S>>(subdivision, depth, g);
+        if (this->HasFatalFailure()) return;
+      }
+    }
+  }
+}
+
 TYPED_TEST(BvhPartner, FarPartnersDoNotKeepBranches) {
   using S = TypeParam;
   const Raw raw = test::torus(40);

@@ -358,6 +358,23 @@ TEST(Triangle, CoplanarTrianglesTouchInTheMiddleOfWhatTheyShare) {
       EXPECT_LT((trianglePenetration(at(t), floor).point - middle).norm(), 1e-9);
     }
   }
+  EXPECT_LT((trianglePenetration(floor, floor).point - Vector3d(10, 10, 0) / 3).norm(), 1e-9) << "of all it shares";
+}
+
+TEST(Triangle, TrianglesThatTouchByAnEdgeOrACornerDoSoThere) {
+  const Corners floor = {Vector3d(0, 0, 0), Vector3d(10, 0, 0), Vector3d(0, 10, 0)};
+  for (const double height : {0.0, 1e-13}) {
+    for (const double rise : {1e-6, 1e-3, 1.0}) {
+      for (const double of_second : {0.0, 0.5}) {
+        const Corners t = {Vector3d(1, 1, height), Vector3d(4, 1, height + of_second * rise),
+                           Vector3d(1, 4, height + rise)};
+        for (const ContactPoint& contact : {trianglePenetration(floor, t), trianglePenetration(t, floor)}) {
+          EXPECT_LT((closestPoint(contact.point, floor) - contact.point).norm(), 1e-9) << rise << ' ' << of_second;
+          EXPECT_LT((closestPoint(contact.point, t) - contact.point).norm(), 1e-9) << rise << ' ' << of_second;
+        }
+      }
+    }
+  }
 }
 
 }  // namespace

@@ -26,7 +26,8 @@ namespace bocst::fcl_adapter {
 /// bodies, and knows them as FCL does:
 ///   bool fclOverlaps(node, narrow_phase, corners, X_WM)  FCL's test of the body and a triangle of the model
 ///   fcl::AABB<S> worldBox(node), S density(node)   for cost sources
-///   bool occupied(node)                            it makes contacts, and not only costs
+///   bool occupied(node)                            it makes contacts, and not only costs: all do unless costs are
+///                                                  asked for
 ///
 /// A triangle touches a body when they meet or are no farther apart than the margin, in double, or when FCL's test, in
 /// S and with the solver's tolerance, says so.
@@ -90,7 +91,7 @@ class ConvexCollector final : public query::ConvexVisitor<typename Partner::Node
   bool triangle(std::uint32_t t, const Node& b) override {
     if (mode_ == Mode::kAny) return addTriangle(t, b);
     if (mode_ == Mode::kInOrder) {
-      if (partner_.occupied(b)) s_.of_leaf.push_back(placed(0, {t, {Eigen::Vector3d::Zero(), 0}}, b));
+      s_.of_leaf.push_back(placed(0, {t, {Eigen::Vector3d::Zero(), 0}}, b));
       return false;
     }
     const double place = mode_ == Mode::kFirst ? order_.placeOf(t, greatestOf(b)) : 0;
@@ -120,7 +121,7 @@ class ConvexCollector final : public query::ConvexVisitor<typename Partner::Node
     const Found found = placed(static_cast<double>(a.id), a, b);
     if (mode_ == Mode::kAll) {
       s_.found.push_back(found);
-    } else if (partner_.occupied(b) && s_.first.wants(found)) {
+    } else if (s_.first.wants(found)) {
       s_.first.add(found);
       if (s_.first.isFull()) cut_.last_cell = static_cast<std::uint64_t>(s_.first.last().place);
     }
@@ -144,7 +145,7 @@ class ConvexCollector final : public query::ConvexVisitor<typename Partner::Node
   }
 
  private:
-  /// What is done with what a walk finds, as in MeshCollector.
+  /// What is done with what a walk finds, as in MeshCollector. Only kAll is for requests with costs.
   enum class Mode { kAny, kAll, kFirst, kInOrder };
 
   static Mode startMode(const CollideQuery<S>& q, bool by_ids) {
@@ -183,7 +184,7 @@ class ConvexCollector final : public query::ConvexVisitor<typename Partner::Node
 
   // Only the first contacts, a given number of them, are wanted: adds this one if it is one so far.
   void addFirst(const Found& found) {
-    if (!partner_.occupied(found.body) || !touches(found)) return;
+    if (!touches(found)) return;
     s_.first.add(found);
     if (s_.first.isFull()) order_.setCut(s_.first.last().place, near() / surface_.lattice.unit(), cut_);
   }

@@ -86,8 +86,7 @@ class MeshCollector : public query::Visitor {
   void endInOrder(bool gave_up) {
     if (!gave_up) return;
     mode_ = startMode();
-    s_.found.clear();
-    s_.met.clear();
+    s_.found.clear();  // finish() replaces what was tested
   }
 
   bool triangles(std::uint32_t a, std::uint32_t b, bool certain) override {
