@@ -38,7 +38,7 @@ class BvhCollision : MeshCollision<S, BvhSide> {
   using Base::near_;
   using Base::q_;
 
-  static constexpr query::Turns::Limits kLimits = {256, 1024, 1024, 1}, kLimitsOfContacts = {1024, 1024, 1024, 1};
+  static constexpr query::Turns::LimitsByKind kLimits = {{256, 1024, 1024, 1}, {1024, 1024, 1024, 1}};
 
   // Between flat faces and beside slivers, oriented boxes separate what blocks do not, as with two models, see
   // TreesCollision.
@@ -59,15 +59,14 @@ class BvhCollision : MeshCollision<S, BvhSide> {
       if (!a_.isConservative() && this->isWithinMargin(collector)) {
         this->walkWithinMargin(near_, collector, Base::kMostNodePairs, walk_blocks);
       } else if (uses_boxes && (collector.endsAtFirst() || query::Turns::arePaid(a_, b_))) {
-        const auto& limits = collector.endsAtFirst() ? kLimits : kLimitsOfContacts;
-        query::walkByTurns(a_, b_, near_, collector, limits, walk_blocks);
+        query::walkByTurns(a_, b_, near_, collector, kLimits, walk_blocks);
       } else {
         steps += walk_blocks(query::kNoLimit).steps;
       }
     });
     // A walk for a verdict pays for boxes itself, a walk for contacts where it found none.
     if (uses_boxes && !q_.endsAtFirst() && q_.result.numContacts() == contacts_before) {
-      query::Turns(a_, b_, tree::Tree::Search::kYesOrNo, kLimits).tookOverBlocks(steps, true);
+      query::Turns::pay(a_, b_, kLimits.of_verdict, steps);
     }
   }
 

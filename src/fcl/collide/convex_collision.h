@@ -111,9 +111,8 @@ class ConvexCollision {
     // Boxes as in TreesCollision.
     if constexpr (std::is_same_v<S, double> && std::is_base_of_v<query::ConvexSide, Partner>) {
       if (query::fitsBoxes(a_) && (collector.endsAtFirst() || query::Turns::arePaid(a_, partner))) {
-        constexpr query::Turns::Limits kLimits = {128, 1024, 256, 1}, kLimitsOfContacts = {1024, 1024, 1024, 1};
-        query::walkByTurns(a_, partner, b_in_a, collector, collector.endsAtFirst() ? kLimits : kLimitsOfContacts,
-                           walk_blocks);
+        constexpr query::Turns::LimitsByKind kLimits = {{128, 1024, 256, 1}, {1024, 1024, 1024, 1}};
+        query::walkByTurns(a_, partner, b_in_a, collector, kLimits, walk_blocks);
         return;
       }
     }

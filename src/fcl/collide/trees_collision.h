@@ -156,7 +156,7 @@ class TreesCollision : MeshCollision<S, query::TreeSide> {
       } else if (spheres || !kUsesBoxes || !boxesFit()) {
         walk_blocks(query::kNoLimit);
       } else if (takesTurns(collector)) {
-        query::walkByTurns(a_, b_, near_, collector, kLimits, walk_blocks);
+        query::walkByTurns(a_, b_, near_, collector, {kLimits, kLimits}, walk_blocks);
       } else {
         const query::Turns turns(a_, b_, tree::Tree::Search::kYesOrNo, kLimits);
         turns.tookOverBlocks(walk_blocks(query::kNoLimit).steps, false);

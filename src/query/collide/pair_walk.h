@@ -489,9 +489,10 @@ class PairWalk {
 /// may see a pair in several turns. walk_blocks(most_steps) returns a WalkEnd.
 template <typename B, typename WalkBlocks>
 bool walkByTurns(const TreeSide& a, const B& b, const SimilarityTransform& b_in_a, VisitorOf<B>& visitor,
-                 const Turns::Limits& limits, WalkBlocks&& walk_blocks) {
-  const auto kind = visitor.endsAtFirst() ? tree::Tree::Search::kYesOrNo : tree::Tree::Search::kContacts;
-  for (Turns turns(a, b, kind, limits);; turns.next()) {
+                 const Turns::LimitsByKind& limits, WalkBlocks&& walk_blocks) {
+  Turns turns = visitor.endsAtFirst() ? Turns(a, b, tree::Tree::Search::kYesOrNo, limits.of_verdict)
+                                      : Turns(a, b, tree::Tree::Search::kContacts, limits.of_contacts);
+  for (;; turns.next()) {
     const WalkEnd blocks = walk_blocks(turns.most());
     turns.tookOverBlocks(blocks.steps, blocks.gave_up);
     if (!blocks.gave_up) return blocks.met;

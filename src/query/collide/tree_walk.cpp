@@ -7,9 +7,7 @@ namespace bocst::query {
 namespace {
 
 // One walk in ten thousand of scans and robots' links tests more than 256 pairs of leaves without a hit.
-constexpr Turns::Limits kLimits = {64, 256, 256, 1};
-// Walks for contacts go on after a hit.
-constexpr Turns::Limits kLimitsOfContacts = {256, 1024, 1024, 2};
+constexpr Turns::LimitsByKind kLimits = {{64, 256, 256, 1}, {256, 1024, 1024, 2}};
 // The exact test of two triangles that float cannot tell apart takes as long as this many pairs of leaves.
 constexpr std::size_t kExactTest = 8;
 // Boxes and slabs of leaves leave few triangles to be tested, but of slivers all: so many pairs of triangles then take
@@ -31,13 +29,10 @@ struct TreeWalk::Scratch {
 
 bool TreeWalk::runByTurns(Visitor& visitor) {
   if (!BoxSide::fits(a_) || !BoxSide::fits(b_)) return run(visitor);
-  return walkByTurns(a_, b_, b_in_a_, visitor, visitor.endsAtFirst() ? kLimits : kLimitsOfContacts,
-                     [&](std::size_t most) { return run(visitor, most); });
+  return walkByTurns(a_, b_, b_in_a_, visitor, kLimits, [&](std::size_t most) { return run(visitor, most); });
 }
 
-void TreeWalk::payForBoxes(std::size_t steps) const {
-  Turns(a_, b_, tree::Tree::Search::kYesOrNo, kLimits).tookOverBlocks(steps, true);
-}
+void TreeWalk::payForBoxes(std::size_t steps) const { Turns::pay(a_, b_, kLimits.of_verdict, steps); }
 
 WalkEnd TreeWalk::run(Visitor& visitor, std::size_t most_steps) {
   visitor_ = &visitor;

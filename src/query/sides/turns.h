@@ -25,6 +25,10 @@ class Turns {
     std::size_t over_boxes;  ///< The least number of steps over boxes.
     std::size_t per_box;     ///< A step over boxes takes as long as this many over blocks.
   };
+  /// Walks for contacts go on after a hit.
+  struct LimitsByKind {
+    Limits of_verdict, of_contacts;
+  };
 
   template <typename B>
   Turns(const TreeSide& a, const B& b, tree::Tree::Search kind, const Limits& limits)
@@ -56,6 +60,14 @@ class Turns {
     return a.tree().boxPrice() == 0 && (second == nullptr || second->boxPrice() == 0);
   }
 
+  /// A walk that took no turns took so many steps, where one over boxes might have been quicker.
+  template <typename B>
+  static void pay(const TreeSide& a, const B& b, const Limits& limits, std::size_t steps) {
+    if (steps <= limits.many) return;
+    a.tree().payBoxRent(steps - limits.many);
+    if (const tree::Tree* const second = treeOf(b)) second->payBoxRent(steps - limits.many);
+  }
+
   /// Of this turn.
   std::size_t most() const { return most_; }
   std::size_t mostOverBoxes() const {
@@ -64,10 +76,8 @@ class Turns {
 
   /// The walk over blocks took so many steps, and gave up or not.
   void tookOverBlocks(std::size_t steps, bool gave_up) const {
-    if (steps > limits_.many) {
-      for (const tree::Tree* tree : trees_) {
-        if (tree != nullptr) tree->payBoxRent(steps - limits_.many);
-      }
+    for (const tree::Tree* tree : trees_) {
+      if (tree != nullptr && steps > limits_.many) tree->payBoxRent(steps - limits_.many);
     }
     // In a first turn, boxes were not tried; and a short walk says nothing.
     if (!gave_up && steps > limits_.few && (!is_first_ || follows_blocks_)) remember(false, steps);
