@@ -360,7 +360,8 @@ class MeshCollector : public query::Visitor {
     if (isCertain(key) && margin_ == 0) return true;
     query::Corners p, q;
     s_.pairs.get(i, p, q);
-    if (margin_ > rounding()) return isWithinMargin(isCertain(key), p, q, contact);
+    // FCL's test says nothing about what is apart by more than rounding, so distances alone decide.
+    if (margin_ > rounding()) return isWithin(margin_, isCertain(key), p, q, contact);
     // Each in its own frame: where it is placed, rounding may give it a width.
     const query::Corners own = t2_.corners(b);
     const bool tiny = longest(p) * longest(own) < kSmallestProduct;
@@ -383,22 +384,16 @@ class MeshCollector : public query::Visitor {
                                               t2_.corner(b, 1), t2_.corner(b, 2), R_12_, p_12_));
     if (!sliver && margin_ == 0) return meet;
     // Of slivers, its axes are rounding, and may part what touches.
-    const double touching = sliver ? rounding() : margin_;
+    return isWithin(sliver ? rounding() : margin_, meet, p, q, contact);
+  }
+
+  // True if two triangles meet, or are no farther apart than `touching`. Improves *contact unless that is null.
+  bool isWithin(double touching, bool meet, const query::Corners& p, const query::Corners& q,
+                query::ContactPoint* contact) const {
     Eigen::Vector3d on_p, on_q;
     const double distance =
         query::nearestPoints(p, q, on_p, on_q, meet ? std::numeric_limits<double>::infinity() : touching);
     if (!meet && distance > touching) return false;
-    if (contact != nullptr) setContact(distance, on_p, on_q, *contact);
-    return true;
-  }
-
-  // FCL's test says nothing about what is apart by more than rounding, so distances alone decide.
-  bool isWithinMargin(bool certain, const query::Corners& p, const query::Corners& q,
-                      query::ContactPoint* contact) const {
-    Eigen::Vector3d on_p, on_q;
-    const double distance =
-        query::nearestPoints(p, q, on_p, on_q, certain ? std::numeric_limits<double>::infinity() : margin_);
-    if (!certain && distance > margin_) return false;
     if (contact != nullptr) setContact(distance, on_p, on_q, *contact);
     return true;
   }
