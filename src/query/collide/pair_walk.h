@@ -208,12 +208,17 @@ class PairWalk {
   static constexpr std::size_t kBodyTests = 4;
   // So do as many tests of eight lanes against a triangle.
   static constexpr std::size_t kTriangleTests = 4;
-  // In a walk of so many steps, nodes beside a leaf so much larger, squared, are tested against each of its triangles.
-  static constexpr std::size_t kLongWalk = 128;
+  // Nodes beside a leaf so much larger, squared, are tested against each of its triangles: beside a mesh of few, as a
+  // room's walls are, at once, else in a walk of so many steps. Before, a hit is likely, and comes sooner without.
   static constexpr double kMuchLarger = 4;
+  static constexpr std::size_t kFewTriangles = 16, kLongWalk = 128;
 
   // Beside bodies, children keep their order. Beside triangles they do not, and steps depend on what is packed.
-  bool isLong() const { return steps_ >= kLongWalk && (B::kBodies || !in_order_); }
+  template <typename Side>
+  bool testsTriangles(const Side& side, double leaf, double node) const {
+    return (B::kBodies || !in_order_) && leaf > kMuchLarger * node &&
+           (steps_ >= kLongWalk || side.meshTriangles() <= kFewTriangles);
+  }
 
   // The larger of two nodes is expanded, unless it is a leaf.
   static bool expandsA(State sa, State sb, double size_a, double size_b) {
@@ -239,7 +244,7 @@ class PairWalk {
           s.stack.push_back({c, pair.b, triangles});
         };
         if constexpr (!B::kBodies) {
-          if (sb == State::kLeaf && isLong() && kMuchLarger * seen_a_.size < size_b) {
+          if (sb == State::kLeaf && testsTriangles(b_, size_b, seen_a_.size)) {
             childrenBesideLeaf(a_, pair.a, volumeOf(b_, seen_b_), b_in_a_, s.large_b, b_, pair.b, pair.triangles, push);
             return false;
           }
@@ -260,7 +265,7 @@ class PairWalk {
       const auto push = [&](typename B::Node c, std::uint32_t triangles = ~0u) {
         s.stack.push_back({pair.a, c, triangles});
       };
-      if (sa == State::kLeaf && isLong() && kMuchLarger * size_b < seen_a_.size) {
+      if (sa == State::kLeaf && testsTriangles(a_, seen_a_.size, size_b)) {
         childrenBesideLeaf(b_, pair.b, volumeOf(a_, seen_a_), a_in_b_, s.large_a, a_, pair.a, pair.triangles, push);
       } else {
         b_.overlappingChildren(pair.b, volumeOf(a_, seen_a_), a_in_b_, push);
