@@ -211,37 +211,71 @@ MotionPair::MotionPair(const Motion& a, const Motion& b) : a_(a), b_(b) {
   relative_.emplace(*axis_a, *axis_b);
 }
 
+namespace {
+
+/// How far the points of a hull are behind its front, that along `direction`.
+class BehindFront {
+ public:
+  BehindFront(const MovingHull& hull, const Vector3d& direction, double blur) : direction_(direction) {
+    double size = 0;
+    for (std::size_t i = 0; i < hull.count; ++i) {
+      front_ = std::max(front_, direction.dot(hull.points[i]));
+      size = std::max(size, (hull.points[i] - hull.points[0]).norm());
+    }
+    front_ -= 2 * blur * size;
+  }
+  double operator()(const Vector3d& point) const { return std::max(0.0, front_ - direction_.dot(point)); }
+
+ private:
+  const Vector3d direction_;
+  double front_ = -std::numeric_limits<double>::infinity();
+};
+
+}  // namespace
+
 double MotionPair::timeToTouch(double gap, const Vector3d& direction, double blur, const MovingHull& part_a,
                                const MovingHull& part_b, double time) const {
-  double highest = direction.dot(part_a.points[0]), lowest = direction.dot(part_b.points[0]), size = 0;
-  for (std::size_t i = 0; i < part_a.count; ++i) {
-    highest = std::max(highest, direction.dot(part_a.points[i]));
-    size = std::max(size, (part_a.points[i] - part_a.points[0]).norm());
+  constexpr double kNever = std::numeric_limits<double>::infinity();
+  const BehindFront behind_a(part_a, direction, blur), behind_b(part_b, -direction, blur);
+  const auto speed_a = [&](const Vector3d& x, double) { return a_.closingSpeed(direction, blur, x, 0, time); };
+  const auto speed_b = [&](const Vector3d& x, double) { return b_.closingSpeed(-direction, blur, x, 0, time); };
+  double in_world = kNever;
+  if (part_a.count <= kFewPoints && part_b.count <= kFewPoints) {
+    ClosingSpeed of_a[kFewPoints];
+    double from_a[kFewPoints];
+    for (std::size_t i = 0; i < part_a.count; ++i) {
+      of_a[i] = speed_a(part_a.points[i], 0);
+      from_a[i] = gap + behind_a(part_a.points[i]);
+    }
+    for (std::size_t j = 0; j < part_b.count; ++j) {
+      const double more = behind_b(part_b.points[j]);
+      const ClosingSpeed of_b = speed_b(part_b.points[j], 0);
+      for (std::size_t i = 0; i < part_a.count; ++i) {
+        in_world = std::min(in_world, (of_a[i] + of_b).timeFor(from_a[i] + more));
+      }
+    }
+  } else {
+    const ClosingSpeed fastest_a = part_a.most(speed_a), fastest_b = part_b.most(speed_b);
+    const double most = (fastest_a.ever + fastest_b.ever) * (1 - time);  // what is farther is not met
+    const auto first = [&](const MovingHull& part, const BehindFront& behind, const auto& speed_of,
+                           const ClosingSpeed& of_other) {
+      double least = kNever;
+      for (std::size_t i = 0; i < part.count; ++i) {
+        const double free = gap + behind(part.points[i]);
+        if (free <= most) least = std::min(least, (speed_of(part.points[i], 0) + of_other).timeFor(free));
+      }
+      return least;
+    };
+    in_world = std::max(first(part_a, behind_a, speed_a, fastest_b), first(part_b, behind_b, speed_b, fastest_a));
   }
-  for (std::size_t j = 0; j < part_b.count; ++j) {
-    lowest = std::min(lowest, direction.dot(part_b.points[j]));
-    size = std::max(size, (part_b.points[j] - part_b.points[0]).norm());
-  }
-  const double rounding = 2 * blur * size;
-  ClosingSpeed of_a[kMostCorners];
-  double behind_a[kMostCorners];
-  for (std::size_t i = 0; i < part_a.count; ++i) {
-    of_a[i] = a_.closingSpeed(direction, blur, part_a.points[i], 0, time);
-    behind_a[i] = std::max(0.0, highest - direction.dot(part_a.points[i]) - rounding);
-  }
-  double in_world = std::numeric_limits<double>::infinity(), seen_from_a = in_world;
+  if (!relative_) return in_world;
+  double seen_from_a = kNever;
   for (std::size_t j = 0; j < part_b.count; ++j) {
     const Vector3d& q = part_b.points[j];
-    const double free = gap + std::max(0.0, direction.dot(q) - lowest - rounding);
-    const ClosingSpeed of_b = b_.closingSpeed(-direction, blur, q, 0, time);
-    for (std::size_t i = 0; i < part_a.count; ++i) {
-      in_world = std::min(in_world, (of_a[i] + of_b).timeFor(free + behind_a[i]));
-    }
-    if (relative_) {
-      seen_from_a = std::min(seen_from_a, relative_->closingSpeed(-direction, blur, q, 0, time).timeFor(free));
-    }
+    seen_from_a =
+        std::min(seen_from_a, relative_->closingSpeed(-direction, blur, q, 0, time).timeFor(gap + behind_b(q)));
   }
-  return relative_ ? std::max(in_world, seen_from_a) : in_world;
+  return std::max(in_world, seen_from_a);
 }
 
 double MotionPair::fastest(const MovingBall& part_a, const MovingBall& part_b, double time) const {

@@ -166,8 +166,6 @@ struct MovingHull {
 /// Two bodies that move. It lives no longer than their motions.
 class MotionPair {
  public:
-  static constexpr std::size_t kMostCorners = 3;
-
   MotionPair(const Motion& a, const Motion& b);
 
   const Motion& a() const { return a_; }
@@ -192,8 +190,9 @@ class MotionPair {
     return std::max(in_world, part_b.most(seen_from_a).timeFor(gap));
   }
 
-  /// The same of two hulls of at most kMostCorners points, where `gap` is the one between the hulls themselves: a point
-  /// that is not at the front of its hull has its distance to the front to go, too.
+  /// The same of two hulls, where `gap` is the one between the hulls themselves: a point that is not at the front of
+  /// its hull has its distance to the front to go, too. Of more than three points, a point of one hull is taken to meet
+  /// the fastest of the other.
   double timeToTouch(double gap, const Eigen::Vector3d& direction, double blur, const MovingHull& part_a,
                      const MovingHull& part_b, double time) const;
 
@@ -201,6 +200,8 @@ class MotionPair {
   double fastest(const MovingBall& part_a, const MovingBall& part_b, double time) const;
 
  private:
+  static constexpr std::size_t kFewPoints = 3;
+
   const Motion &a_, &b_;
   std::optional<RelativeMotion> relative_;
 };

@@ -412,6 +412,56 @@ TEST(ContinuousDouble, SlidingAtASmallGapIsNoContact) {
   }
 }
 
+// A tilted tool slides along a flat part with one raised vertex. Of the larger part, hulls of leaves are advanced, of
+// the smaller one those of the meshes, too.
+TEST(ContinuousDouble, NothingIsSteppedOverAboveAFlatPart) {
+  const Raw tool = test::torus(12);
+  const auto fcl_tool = test::bvh<fcl::OBBRSSd>(tool);
+  const Modeld tool_model(tool.mesh());
+  std::mt19937_64 g(11);
+  std::uniform_real_distribution<double> u(-1, 1);
+  int hits = 0, free = 0;
+  for (const std::size_t n : {std::size_t{30}, std::size_t{92}}) {
+    Raw flat;
+    for (std::size_t i = 0; i < n * n; ++i) {
+      flat.vertices.emplace_back(20.0 * static_cast<double>(i % n) / static_cast<double>(n - 1) - 10,
+                                 20.0 * static_cast<double>(i / n) / static_cast<double>(n - 1) - 10, 0);
+    }
+    for (std::size_t i = 0; i + n < n * n; ++i) {
+      if (i % n == n - 1) continue;
+      flat.triangles.emplace_back(i, i + 1, i + n);
+      flat.triangles.emplace_back(i + 1, i + n + 1, i + n);
+    }
+    for (int round = 0; round < 24; ++round) {
+      Raw part = flat;
+      part.vertices[(n / 2) * n + n / 2].z() = round % 3 == 0 ? 0 : 0.05;
+      const auto fcl_part = test::bvh<fcl::OBBRSSd>(part);
+      const Modeld part_model(part.mesh());
+      const auto above = [&](const Eigen::Matrix3d& R, double x) {
+        double low = 0;
+        for (const Eigen::Vector3d& v : tool.vertices) low = std::min(low, (R * v).z());
+        return test::pose<double>(R, {x, 0.3 * u(g), 0.01 + 0.03 * std::abs(u(g)) - low});
+      };
+      const Eigen::Matrix3d tilt = (Eigen::AngleAxisd(0.4 * u(g), Eigen::Vector3d::UnitX()) *
+                                    Eigen::AngleAxisd(0.4 * u(g), Eigen::Vector3d::UnitY()))
+                                       .toRotationMatrix();
+      const Eigen::Matrix3d turn =
+          round % 2 == 0 ? tilt : Eigen::Matrix3d(Eigen::AngleAxisd(0.6 * u(g), Eigen::Vector3d::UnitZ()) * tilt);
+      const Ways<double> ways{&tool_model, above(tilt, -8),    above(turn, 8),
+                              &part_model, identity<double>(), identity<double>()};
+      const auto result = ways.ask(request<double>(fcl::CCDM_LINEAR));
+      checkBySampling<double>(ways, *fcl_tool, *fcl_part, fcl::CCDM_LINEAR, 1e-4, result, 200);
+      if (HasFatalFailure()) return;
+      const auto other = ways.swapped().ask(request<double>(fcl::CCDM_LINEAR));
+      EXPECT_EQ(other.is_collide, result.is_collide);
+      EXPECT_NEAR(other.time_of_contact, result.time_of_contact, 1e-4);
+      (result.is_collide ? hits : free)++;
+    }
+  }
+  EXPECT_GT(hits, 8);
+  EXPECT_GT(free, 8);
+}
+
 // Two links beyond one joint, and a third that a joint between them turns a little.
 TYPED_TEST(Continuous, NothingIsSteppedOverBetweenLinksThatTurnTogether) {
   using S = TypeParam;

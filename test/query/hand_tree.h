@@ -72,6 +72,7 @@ class HandTree : public query::CompleteSide {
     });
   }
 
+  std::size_t meshTriangles() const { return triangles_.size(); }
   std::size_t triangleCount(Node n) const { return at(n).end - at(n).begin; }
   struct Numbers {
     std::size_t begin;

@@ -5,6 +5,7 @@
 #include <cstddef>
 #include <iterator>
 #include <limits>
+#include <optional>
 #include <type_traits>
 #include <vector>
 
@@ -385,7 +386,12 @@ class ContactTimeWalk : private BestFirst<ContactTimeWalk<A, B>, A, B> {
       const double window = windowOf(2 * std::max(free, 0.0) + part, speed), until = pair.bound + window;
       const std::size_t pairs = a_.triangleCount(pair.a) * b_.triangleCount(pair.b);
       if (std::min(1.0, first_) - pair.bound > kWindowsPerPair * static_cast<double>(pairs) * window) {
-        followAll(pair);
+        const double apart = hullsApartUntil(pair);
+        if (apart > pair.bound + window) {
+          push({apart, pair.a, pair.b});
+        } else {
+          followAll(pair);
+        }
         return true;
       }
       Primitive p, q;
@@ -398,6 +404,34 @@ class ContactTimeWalk : private BestFirst<ContactTimeWalk<A, B>, A, B> {
       }
       push({until, pair.a, pair.b});
       return true;
+    }
+  }
+
+  // A time before which the hulls of two leaves' triangles are apart; that of the pair where it is not much later. Of
+  // flat leaves that slide along each other, all pairs of triangles are apart along one direction.
+  double hullsApartUntil(const Pair& pair) {
+    constexpr int kMostSteps = 8;
+    constexpr std::size_t kStepsOfWalk = 8;  // that take as long as one
+    constexpr double kWorthIt = 1.0 / 8;     // of the time that is left
+    fill(a_, pair.a, scratch().a);
+    fill(b_, pair.b, scratch().b);
+    const auto place = [this](double time, auto& points_a, auto& points_b) {
+      at(time);
+      placeCorners(scratch().a, a_in_world_, points_a);
+      placeCorners(scratch().b, b_in_world_, points_b);
+    };
+    HullAdvance hulls(motions_, clearance(), pair.bound);
+    for (int step = 0; step < kMostSteps && hulls.time() < first_ && hulls.step(place); ++step) {
+      this->countSteps(kStepsOfWalk);
+    }
+    at(pair.bound);
+    return hulls.time() - pair.bound > kWorthIt * (1 - pair.bound) ? hulls.time() : pair.bound;
+  }
+  static void placeCorners(const std::vector<Primitive>& triangles, const SimilarityTransform& to,
+                           std::vector<Eigen::Vector3d>& points) {
+    points.clear();
+    for (const Primitive& t : triangles) {
+      for (const Eigen::Vector3d& corner : t.corners) points.push_back(to * corner);
     }
   }
 
@@ -533,17 +567,22 @@ double findContactTime(const TreeSide& a, const SimilarityTransform& a_in_body, 
   ContactTimeWalk<TreeSide, B> trees(a, a_in_body, motion_a, b, b_in_body, motion_b);
   if (!fitsBoxes(a) || !fitsBoxes(b)) return trees.run(goal);
   double time = std::numeric_limits<double>::infinity(), begin = 0;
+  const MotionPair motions(motion_a, motion_b);
+  std::optional<MeshHullAdvance> hulls;
+  std::size_t steps_per_hulls = 0;  // of a walk, that take as long as one of the hulls
   if constexpr (std::is_same<B, TreeSide>::value) {
     // Bodies that pass each other usually do so with their hulls apart. To ask this many vertices takes about as long
     // as a step of a walk.
-    constexpr std::size_t kFew = 32, kVerticesPerStep = 16, kMostVertices = 8192;
+    constexpr std::size_t kFew = 32, kVerticesPerStep = 16, kMostVertices = 8192, kFirstSteps = 12;
     const std::shared_ptr<const Mesh>&mesh_a = a.tree().surface().mesh, &mesh_b = b.tree().surface().mesh;
     const bool are_here = mesh_a != nullptr && mesh_b != nullptr;
     const std::size_t vertices = are_here ? mesh_a->vertexCount() + mesh_b->vertexCount() : 0;
     if (are_here && vertices <= kMostVertices) {
-      time = trees.run(goal, time, std::max(kFew, vertices / kVerticesPerStep));
+      steps_per_hulls = std::max(kFew, vertices / kVerticesPerStep);
+      time = trees.run(goal, time, steps_per_hulls);
       if (!trees.gaveUp()) return time;
-      begin = hullsApartUntil(*mesh_a, motion_a, *mesh_b, motion_b, goal.margin + goal.rounding);
+      hulls.emplace(*mesh_a, *mesh_b, motions, goal.margin + goal.rounding);
+      begin = hulls->run(kFirstSteps);
       if (begin > 1) return time;
     }
   }
@@ -551,6 +590,8 @@ double findContactTime(const TreeSide& a, const SimilarityTransform& a_in_body, 
     time = trees.run(goal, time, turns.most(), begin);
     turns.tookOverBlocks(trees.steps(), trees.gaveUp());
     if (!trees.gaveUp()) return time;
+    if (hulls) begin = hulls->run(turns.most() / steps_per_hulls);
+    if (begin > 1) return time;
     if (!provideBoxes(a, b)) continue;
     const BoxSide boxes_a(a);
     const auto& boxes_b = boxesOf(b);
