@@ -38,7 +38,7 @@ std::string_view takeWord(std::string_view& text) {
 bool toNumber(std::string_view word, double& number) {
   if (word.size() > 1 && word.front() == '+' && word[1] != '-') word.remove_prefix(1);
   const std::from_chars_result r = std::from_chars(word.data(), word.data() + word.size(), number);
-  if (r.ptr != word.data() + word.size() || word.empty()) return false;
+  if (r.ptr != word.data() + word.size()) return false;
   if (r.ec == std::errc::result_out_of_range) {
     // Too large or too small for a double: only strtod says which, and it reads as the locale does.
     static const locale_t c_locale = newlocale(LC_ALL_MASK, "C", nullptr);

@@ -355,6 +355,18 @@ TEST(ContinuousDouble, FclsMotionsAreTakenAsTheyAre) {
     turn->integrate(result.time_of_contact);
     EXPECT_TRUE(result.contact_tf1.isApprox(currentPose(*turn), 1e-12));
   }
+  // A screw about an axis beside the bar's origin, and one along a line, go where FCL's integrate() takes them.
+  const auto turned =
+      test::pose<double>(Eigen::AngleAxisd(1, Eigen::Vector3d(1, 2, 2) / 3).toRotationMatrix(), {1, 2, 3});
+  const auto shifted = test::pose<double>(Eigen::Matrix3d::Identity(), {2, -1, 0.5});
+  for (const auto& end : {turned, shifted}) {
+    const fcl::ScrewMotion<double> motion(test::pose<double>(Eigen::Matrix3d::Identity(), {0.3, 0.1, -0.2}), end);
+    const auto ours = motionOf<double>("motion", &motion);
+    for (const double time : {0.0, 0.3, 1.0}) {
+      motion.integrate(time);
+      EXPECT_TRUE(ours->at(time).matrix().isApprox(currentPose(motion).matrix(), 1e-9)) << time;
+    }
+  }
   // About a point of its own: the bar's far end stays, so it swings the other way round.
   const fcl::InterpMotion<double> about_end(I.linear(), I.translation(), quarter.linear(),
                                             Eigen::Vector3d(1, 0, 0) - quarter.linear() * Eigen::Vector3d(1, 0, 0),

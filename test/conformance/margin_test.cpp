@@ -510,6 +510,15 @@ TEST(IsCloserThan, IsThatOfDistancesAtAnySize) {
       }
     }
   }
+  // Below the tolerance of FCL's solvers, with which collide() may report a contact.
+  {
+    const Modeld model(test::box({-3, -3, -1}, {3, 4, 0}).mesh());
+    const fcl::Sphered ball(1);
+    const auto X = test::pose<double>(Eigen::Matrix3d::Identity(), {0.3, 0.2, 1 + 2e-7});
+    ASSERT_TRUE(isCloserThan<double>(&model, I, &ball, X, 3e-7));
+    ASSERT_FALSE(isCloserThan<double>(&model, I, &ball, X, 1e-7));
+    ASSERT_FALSE(isCloserThan<double>(&ball, X, &model, I, 0.0));
+  }
   Options conservative;
   conservative.answer = Answer::kConservative;
   const Modeld exact(test::torus(9).mesh()), spheres(test::torus(9).mesh(), conservative);

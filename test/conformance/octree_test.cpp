@@ -2,6 +2,7 @@
 // fcl::OcTree as a partner: against FCL's own mesh query where that is right, and against all boxes and triangles.
 #include <gtest/gtest.h>
 
+#include <algorithm>
 #include <cmath>
 #include <limits>
 #include <map>
@@ -111,6 +112,27 @@ TEST(OcTreesDouble, CostsEqualFcls) {
       EXPECT_GE(rough.second, 0);
     }
   }
+}
+
+TEST(OcTreesDouble, UncertainCellsCostButMakeNoContacts) {
+  const auto map = std::make_shared<octomap::OcTree>(0.1);
+  map->setNodeValue(octomap::point3d(0.05f, 0.05f, 0.05f), 0)->setLogOdds(0);
+  map->setNodeValue(octomap::point3d(0.25f, 0.05f, 0.05f), 0)->setLogOdds(3);
+  map->updateInnerOccupancy();
+  fcl::OcTreed octree{std::shared_ptr<const octomap::OcTree>(map)};
+  octree.setOccupancyThres(0.8);
+  octree.setFreeThres(0.2);
+  const Modeld model(test::box({0, 0, 0}, {0.3, 0.09, 0.09}).mesh());
+  const auto I = test::pose<double>(Eigen::Matrix3d::Identity(), {0, 0, 0});
+  const fcl::CollisionRequestd request(1000, true, 1000, true, false);
+  fcl::CollisionResultd result;
+  fcl::collide<double>(&model, I, &octree, I, request, result);
+  ASSERT_GT(result.numContacts(), 0u);
+  for (std::size_t i = 0; i < result.numContacts(); ++i) EXPECT_GT(result.getContact(i).pos.x(), 0.19) << i;
+  std::vector<fcl::CostSourced> sources;
+  result.getCostSources(sources);
+  EXPECT_TRUE(std::any_of(sources.begin(), sources.end(), [](const auto& c) { return c.aabb_max.x() < 0.11; }));
+  EXPECT_TRUE(std::any_of(sources.begin(), sources.end(), [](const auto& c) { return c.aabb_min.x() > 0.19; }));
 }
 
 // The box about the mesh costs where it meets a cell. FCL computes that for all cells, but keeps what nobody has seen.

@@ -106,6 +106,10 @@ TYPED_TEST(Shapes, FreeAndUncertainShapesDoNotCollide) {
       std::vector<fcl::CostSource<S>> sources;
       result.getCostSources(sources);
       EXPECT_EQ(sources.empty(), density == 0) << "uncertain costs, free does not";
+      fcl::CollisionResult<S> turned;
+      EXPECT_EQ(fcl::collide(&box, Y, &model, I, request, turned), 0u);
+      turned.getCostSources(sources);
+      EXPECT_EQ(sources.empty(), density == 0);
     }
     EXPECT_FALSE(test::touching<S>(model, I, box, Y));
     box.cost_density = 1;
@@ -179,6 +183,41 @@ TEST(ShapesDouble, CostsEqualFcls) {
       }
     }
     EXPECT_GT(costs, 5);
+  }
+}
+
+// The one sphere about a model of depth 1 and a half-space: the depth of the sphere, and the middle of their overlap.
+TEST(ShapesDouble, ContactsOfASphereAndAHalfspaceAreExact) {
+  Options options;
+  options.answer = Answer::kConservative;
+  options.depth = 1;
+  const auto I = test::pose<double>(Eigen::Matrix3d::Identity(), {0, 0, 0});
+  for (const double margin : {0.0, 0.3}) {
+    options.margin = margin;
+    const Modeld model(test::torus(14).mesh(), options);
+    Eigen::Vector3d center;
+    double radius = 0;
+    model.visit([&](const NodeView& node) {
+      center = node.center;
+      radius = node.radius;
+    });
+    ASSERT_GT(radius, 0.5);
+    const fcl::Halfspaced below(Eigen::Vector3d::UnitZ(), 0);
+    for (const double height : {-0.4, 0.0, 0.2, radius - 0.01, radius + 0.2, radius + 0.4}) {
+      const auto X = test::pose<double>(Eigen::Matrix3d::Identity(), Eigen::Vector3d(0.3, 0, height) - center);
+      for (const bool turned : {false, true}) {
+        const fcl::CollisionRequestd request(9, true);
+        fcl::CollisionResultd result;
+        turned ? fcl::collide<double>(&below, I, &model, X, request, result)
+               : fcl::collide<double>(&model, X, &below, I, request, result);
+        ASSERT_EQ(result.numContacts(), height <= radius + margin ? 1u : 0u) << height;
+        if (result.numContacts() == 0) continue;
+        const fcl::Contactd& c = result.getContact(0);
+        EXPECT_NEAR(c.penetration_depth, radius - height + margin, 1e-9) << height;
+        EXPECT_NEAR((c.normal - Eigen::Vector3d(0, 0, turned ? 1 : -1)).norm(), 0, 1e-9) << height;
+        EXPECT_NEAR((c.pos - Eigen::Vector3d(0.3, 0, (height - radius) / 2)).norm(), 0, 1e-9) << height;
+      }
+    }
   }
 }
 

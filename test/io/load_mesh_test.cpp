@@ -18,6 +18,7 @@
 #include <utility>
 #include <vector>
 
+#include "io/file.h"
 #include "mesh_files.h"
 #include "temporary_folder.h"
 
@@ -242,6 +243,11 @@ TEST_F(LoadMesh, RefusesWhatIsNoFile) {
     fs::create_directory(folder_ / name);
     EXPECT_NE(complaint((folder_ / name).string()).find("directory"), std::string::npos);
   }
+}
+
+TEST_F(LoadMesh, ReadsFilesOfUnknownSize) {
+  for (const char* ending : {"obj", "stl"}) expectComplaint(std::string("empty.") + ending, "", "is empty");
+  EXPECT_GT(io::readFile("/proc/self/status").size(), 100u) << "the system says that it has no bytes";
 }
 
 TEST_F(LoadMesh, NeverWaits) {

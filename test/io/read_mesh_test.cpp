@@ -388,6 +388,12 @@ TEST(ReadOff, RefusesWhatIsNoIndexAndNoEnd) {
     refuse("3 0 2 3\n", bad + " 0 2 3\n", "line 8: face 1");
   }
   EXPECT_EQ(readOff(replaced(kOff, "3 0 2 3\n", "3 0 2 3 0.5 0.5 1 1 # red\n\n# the end\n")).ends.size(), 2u);
+  EXPECT_EQ(readOff(replaced(kOff, "1 1 0\n", "1 1 0 1 2 3 4 5 6 7 8 9\n")).vertices.size(), 4u);
+  refuse("1 1 0\n", "1 1 0 1 2 3 4 5 6 7 8 9 10\n", "line 5: '10' not expected");
+  // A line for each is no free form, even where that could be read.
+  refuse("1 1 0\n0 1 0\n", "1 1\n0 0 1 0\n", "line 5: vertex 2: number missing");
+  expectComplaint(Format::kOff, "OFF\n3 1 0 0 0 0\n1 0 0\n0 1 0\n3 0 1 2\n", "line 2: numbers of vertices");
+  EXPECT_EQ(sizes(readOff(replaced(kOff, "3 0 2 3\n", "0\n"))), (Sizes{3, 0}));
 }
 
 TEST(ReadObj, ReadsGeometryOnly) {
@@ -401,6 +407,8 @@ TEST(ReadObj, ReadsGeometryOnly) {
   EXPECT_EQ(p.corners, (Corners{0, 1, 2, 3, 0, 1, 2, 0, 1, 4}));
   EXPECT_EQ(sizes(p), (Sizes{4, 3, 3}));
   EXPECT_EQ(readObj("v 0.1234567890123456 1e-300 0\n").vertices[0], Eigen::Vector3d(0.1234567890123456, 1e-300, 0));
+  EXPECT_EQ(sizes(readObj("v 0 0 0\nv 1 0 0\nv 0 1 0\nfo 1 2 3\nf 1/ 2// 3/1/\nf 1 2\\\r\n3 \\\r\n 1\nf 1 2 3 \\")),
+            (Sizes{3, 3, 4, 3}));
   // A comment ends with its line, whatever its last character is.
   EXPECT_EQ(readObj("# C:\\meshes\\\nv 1 2 3\nv 4 5 6 # mm\\\nv 7 8 9\n").vertices.size(), 3u);
 }
@@ -417,6 +425,13 @@ TEST(ReadObj, RefusesWhatIsNoNumberAndNoIndex) {
        {"0", "5", "-5", "1.5", "1e3", "3/x", "3/1/1/1", "3/1/", "/1", "1,2", "99999999999999999999"}) {
     if (bad != "3/1/") refuse("f 1 3 4", "f 1 3 " + bad, "line 9: ");
   }
+  for (const std::string bad : {"+-1", "4294967296", "18446744073709551618"})
+    refuse("f 1 3 4", "f 1 3 " + bad, "line 9: ");
+  refuse("f 1 3 4", "f 1 3 77", "line 9: vertex index 77 out of range, there are 4 vertices");
+  refuse("v 1 1 0", "v 1 +-1 0", "line 5: vertex 2: ");
+  refuse("v 1 1 0", "v 1 1 0 0", "lies at infinity (w is 0)");
+  refuse("v 1 1 0", "v 1e74 1 0 0.01", "a coordinate divided by w is larger than 1e75");
+  EXPECT_EQ(readObj("v 1e75 -1e75 0\n").vertices.size(), 1u);
   refuse("f 1 3 4", "f 1 3", "line 9: a face has at least three corners");
   refuse("f 1 3 4", "f", "line 9: a face has at least three corners");
   refuse("f 1 3 4", "f 1 3 4\nrubbish", "line 10: no OBJ statement: 'rubbish'");
@@ -510,6 +525,7 @@ TEST(ReadStl, RefusesRubbish) {
   const std::string named = "solid" + binaryStl().substr(5);
   EXPECT_EQ(readStl(named).ends.size(), 1u);
   expectComplaint(Format::kStl, named + "\r\n", "byte 134: there is more");
+  expectComplaint(Format::kStl, "solid s" + binaryStl().substr(7) + "x", "byte 134: there is more");
   EXPECT_EQ(readStl(binaryStl()).vertices.size(), 3u);
 }
 

@@ -380,6 +380,8 @@ TYPED_TEST(CollidePoses, OnlyOccupiedModelsCollide) {
   const Poses<S> X = randomPoses<S>(300, 0.5, 8);
   EXPECT_EQ(atOnce(a, b, X), oneByOne(a, b, X));
   EXPECT_EQ(count(atOnce(a, b, X)), 0u);
+  EXPECT_EQ(count(atOnce(b, a, X)), 0u);
+  EXPECT_GT(count(atOnce(a, a, X)), 0u);
 }
 
 TYPED_TEST(CollidePoses, FarAwayAndHugePoses) {

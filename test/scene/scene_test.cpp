@@ -242,6 +242,26 @@ void checkVerdicts(const World<S>& w, const States<S>& X, std::size_t states, st
   EXPECT_EQ(w.scene.firstCollision(X.data(), states), static_cast<std::size_t>(first));
 }
 
+TYPED_TEST(SceneTest, OnlyOccupiedModelsCollide) {
+  using S = TypeParam;
+  const auto occupied = std::make_shared<Model<S>>(test::torus(6).mesh()),
+             free = std::make_shared<Model<S>>(test::torus(6).mesh());
+  free->cost_density = 0;
+  const auto X = test::pose<S>(Eigen::Matrix3d::Identity(), {0.1, 0, 0});
+  const auto touch = [&X](const auto& fixed, const auto& moving) {
+    Scene<S> scene;
+    scene.addFixed(fixed, test::pose<S>(Eigen::Matrix3d::Identity(), {0, 0, 0}));
+    scene.addMoving(moving);
+    std::uint8_t hit = 0;
+    scene.collisions(&X, 1, &hit);
+    EXPECT_EQ(scene.collides(&X), hit != 0);
+    return hit != 0;
+  };
+  EXPECT_TRUE(touch(occupied, occupied));
+  EXPECT_FALSE(touch(occupied, free));
+  EXPECT_FALSE(touch(free, occupied));
+}
+
 TYPED_TEST(SceneTest, VerdictsAreThoseOfAllPairs) {
   using S = TypeParam;
   std::size_t all_hits = 0, all_states = 0;
