@@ -288,5 +288,25 @@ TEST(Builder, ScalesAndPadsAsGeometricShapesDoes) {
   EXPECT_EQ(Mesh({{0, 0, 0}}, {fcl::Triangle(0, 0, 0)}).scaledAndPadded(3, 1)->vertex(0), Eigen::Vector3d(0, 0, 0));
 }
 
+// A mesh in map coordinates has lost its details in float, one of the same size near its origin has not.
+TEST(Builder, AMeshFarFromItsOriginIsReported) {
+  std::vector<std::string> seen;
+  setLogger([&seen](LogLevel level, const std::string& message) {
+    EXPECT_EQ(level, LogLevel::kWarning);
+    seen.push_back(message);
+  });
+  const test::Raw near = test::torus(8), far = test::torus(8).move({5e5, 4e6, 200});
+  const Modelf float_near(near.mesh());
+  const Modeld double_far(far.mesh());
+  EXPECT_TRUE(seen.empty());
+  const Modelf float_far(far.mesh());
+  ASSERT_EQ(seen.size(), 1u);
+  EXPECT_NE(seen[0].find("use double"), std::string::npos) << seen[0];
+  Modelf set(near.mesh());
+  set.setMesh(far.mesh());
+  EXPECT_EQ(seen.size(), 2u);
+  setLogger({});
+}
+
 }  // namespace
 }  // namespace bocst

@@ -11,6 +11,7 @@
 #include "fcl/pair/query_scope.h"
 #include "fcl/plugin/dispatch.h"
 #include "log/log.h"
+#include "log/number_text.h"
 #include "tree/tree.h"
 
 namespace bocst {
@@ -52,6 +53,20 @@ void setBoundsByBox(fcl::CollisionGeometry<S>& geometry, const tree::Tree& tree)
   setBounds(geometry, tree.bounds(), tree.options().margin, HUGE_VAL);
 }
 
+/// Far from its origin a mesh has no details in S: there FCL's test of two triangles, which collide() shares, may say
+/// anything.
+template <typename S>
+void warnIfFarFromOrigin(const tree::Tree& tree) {
+  constexpr double kDetails = 1000;  // steps of S that a mesh is long, at least
+  const Eigen::AlignedBox3d b = tree.bounds();
+  const double far = b.min().cwiseAbs().cwiseMax(b.max().cwiseAbs()).maxCoeff();
+  const double step = far * std::numeric_limits<S>::epsilon(), size = b.diagonal().norm();
+  if (!(size > 0 && size < kDetails * step)) return;
+  log(LogLevel::kWarning, "Model: coordinates of a mesh of size " + numberText(size) + ", up to " + numberText(far) +
+                              " from its origin, are " + numberText(step) + " apart in its scalar type: move the " +
+                              "mesh near its origin (and its poses back), or use double, else collide() may be wrong");
+}
+
 /// The codes of FCL's builder are easily ignored; what ends a sequence of calls says so, once.
 int refused(const std::string& call, int code) {
   log(LogLevel::kError, "Model::" + call);
@@ -78,6 +93,7 @@ Model<S>::Model(std::shared_ptr<const Mesh> mesh, const Options& options)
     : options_(options), tree_(std::make_unique<tree::Tree>(std::move(mesh), options)) {
   fcl_adapter::checkDispatch<S>();
   setBoundsByBox(*this, *tree_);
+  warnIfFarFromOrigin<S>(*tree_);
 }
 
 template <typename S>
@@ -92,6 +108,7 @@ void Model<S>::setMesh(std::shared_ptr<const Mesh> mesh) {
   tree_ = std::make_unique<tree::Tree>(std::move(mesh), options_);
   staged_.reset();
   setBoundsByBox(*this, *tree_);
+  warnIfFarFromOrigin<S>(*tree_);
 }
 
 template <typename S>
