@@ -23,8 +23,7 @@ test::Raw cloud(std::mt19937_64& g, std::size_t points) {
   return raw;
 }
 
-double hullsApartUntil(const Mesh& a, const Motion& motion_a, const Mesh& b, const Motion& motion_b,
-                       double clearance) {
+double hullsApartUntil(const Mesh& a, const Motion& motion_a, const Mesh& b, const Motion& motion_b, double clearance) {
   const MotionPair motions(motion_a, motion_b);
   return MeshHullAdvance(a, b, motions, clearance).run(24);
 }
