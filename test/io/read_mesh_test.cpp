@@ -494,6 +494,7 @@ TEST(ReadOff, ReadsFreeForm) {
     }
     EXPECT_THROW(readOff(text.substr(0, text.rfind('3'))), std::runtime_error) << text;
   }
+  EXPECT_THROW(readOff("OFF 4 2 0 0 0 0 1 0 0 1 1 0 0 1 0 3 0 1 2 0"), std::runtime_error) << "a face of no corners";
   // Colours ask for a line each, and messages are about lines.
   expectComplaint(Format::kOff, "COFF\n4 2 0\n0 0 0 1 0 0\n1 1 0 0 1 0\n3 0 1 2\n3 0 2 3\n", "truncated: 0 of 2 faces");
   expectComplaint(Format::kOff, "OFF\n4 2 0\n0 0 0 1 0 0\n1 1 0 0 1 0\n3 0 1 2\n3 0 2 4\n", "truncated: 0 of 2 faces");
