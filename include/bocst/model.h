@@ -52,6 +52,7 @@ class BOCST_EXPORT Model : public fcl::CollisionGeometry<S> {
   /// @throws std::invalid_argument for a null mesh, an option out of range, or with Options::solid a mesh that is not
   /// watertight; OracleError if the oracle is not available; std::runtime_error if code compiled without <bocst/fcl.h>
   /// would not reach this library (the message says how to fix it; BOCST_DISPATCH_CHECK=off turns the check off).
+  /// Logs a warning for a mesh so far from its origin that S holds no details of it; see setLogger().
   explicit Model(std::shared_ptr<const Mesh> mesh, const Options& options = {});
 
   /// Copies the vertices and triangles of an FCL mesh. FCL's tree is not used and need not be built: addSubModel()
